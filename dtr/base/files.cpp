@@ -1,0 +1,58 @@
+#include "dtr/base/files.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+
+#include "dtr/base/error.h"
+
+namespace dtr {
+namespace fs = std::filesystem;
+
+std::string ReadFile(const fs::path& file, std::uintmax_t limit_bytes) {
+  std::error_code error;
+  const auto size = fs::file_size(file, error);
+  if (error) throw Error(file.string() + ": cannot be read: " + error.message());
+  if (size > limit_bytes) {
+    throw Error(file.string() + ": expected at most " + std::to_string(limit_bytes) +
+                " bytes, found " + std::to_string(size));
+  }
+  std::string content(size, '\0');
+  std::ifstream in(file, std::ios::binary);
+  if (!in || !in.read(content.data(), static_cast<std::streamsize>(size))) {
+    throw Error(file.string() + ": cannot be read to its end");
+  }
+  return content;
+}
+
+namespace {
+
+// Writes and syncs; returns errno of the first failure, or 0.
+int WriteAll(int fd, std::string_view content) {
+  while (!content.empty()) {
+    const ssize_t written = write(fd, content.data(), content.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return errno;
+    content.remove_prefix(static_cast<size_t>(written));
+  }
+  return fsync(fd) == 0 ? 0 : errno;
+}
+
+}  // namespace
+
+void WriteFileAtomically(const fs::path& file, std::string_view content) {
+  const fs::path temporary = file.string() + ".tmp" + std::to_string(getpid());
+  const int fd = open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  int failure = fd < 0 ? errno : WriteAll(fd, content);
+  if (fd >= 0 && close(fd) != 0 && failure == 0) failure = errno;
+  if (failure == 0 && rename(temporary.c_str(), file.c_str()) != 0) failure = errno;
+  if (failure != 0) {
+    unlink(temporary.c_str());
+    throw Error(file.string() + ": cannot be written: " + std::strerror(failure));
+  }
+}
+
+}  // namespace dtr

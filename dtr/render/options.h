@@ -1,0 +1,51 @@
+// dtr/render/options.h -- what every renderer understands (docs/RENDER_SPEC.md numbers the steps).
+#pragma once
+#include <numbers>
+#include <optional>
+
+namespace dtr {
+
+enum class RenderMethod {
+  kTwoPass,   ///< SPEC 4: the founding report's algorithm
+  kDeferred,  ///< SPEC 5: depth first, then one pass per pixel over the views
+};
+
+enum class Primitive {
+  kMesh,   ///< SPEC 2.1: implied triangulation, two triangles per 2x2 block
+  kSplat,  ///< SPEC 2.3: one footprint per depth pixel
+};
+
+/// SPEC 4.4: weight of a view from the angle t at the 3D point between the directions to the
+/// view's centre and to the novel centre.
+enum class BlendWeight {
+  kCosine,        ///< max(0, cos t)^exponent
+  kExponential,   ///< e^(-falloff t)
+  kAngle,         ///< max(0, 1 - t / max_angle)
+  kInverseAngle,  ///< 1 / (t + t_pixel)^blend_k
+  kKNearest,      ///< max(0, 1 - t / t_(k+1)), k = blend_k
+};
+
+/// Options of `dtr render`, by the same names. Thresholds are in pixels of disparity at the view's
+/// reference baseline, so they mean the same at any scale of the world.
+struct RenderOptions {
+  RenderMethod method = RenderMethod::kTwoPass;
+  Primitive primitive = Primitive::kMesh;
+  int views = 8;            ///< K: at most so many of the valid views, the nearest by angle
+  int resolution = 1;       ///< R: every R-th depth pixel per axis
+  double point_size = 1.0;  ///< splats: factor on the footprint
+  BlendWeight blend = BlendWeight::kCosine;
+  double exponent = 8.0;                        ///< n of kCosine
+  double falloff = 8.0;                         ///< c of kExponential, per radian
+  int blend_k = 3;                              ///< k of kKNearest, power of kInverseAngle
+  double max_angle_rad = std::numbers::pi / 3;  ///< valid views, SPEC 1
+  double delta_px = 1.0;                        ///< Delta of SPEC 4, pixels of disparity
+  double depth_break_px = 2.0;  ///< break threshold of SPEC 2.2, pixels of disparity
+  /// The report's absolute thresholds, in scene units; when set they replace the scale-free ones.
+  std::optional<double> absolute_delta;
+  std::optional<double> absolute_depth_break;
+  bool blend_in_linear_light = true;  ///< else in sRGB values
+  bool fill_holes = false;            ///< SPEC 6.2, a separate step; never counted as seen
+  int threads = 0;                    ///< 0: all cores; the result does not depend on it
+};
+
+}  // namespace dtr

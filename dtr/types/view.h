@@ -1,0 +1,64 @@
+// dtr/types/view.h -- one triplet (D, I, C) of a D+TR set.
+#pragma once
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "dtr/types/camera.h"
+#include "dtr/types/depth_image.h"
+#include "dtr/types/grid.h"
+#include "dtr/types/pose.h"
+
+namespace dtr {
+
+enum class ViewRole {
+  kSource,   ///< has depth; renderers draw from it
+  kHeldOut,  ///< camera and image only, kept to measure with; never given to a renderer
+};
+
+/// How depth lies on disk (DESIGN section 3; docs/FORMAT.md gives the bytes).
+enum class DepthCoding {
+  kExrFloat,           ///< "exr-float": float32 EXR
+  kExrHalf,            ///< "exr-half": half EXR; refuses depths beyond half's range
+  kPng16Millimetre,    ///< "png16-mm": 16-bit PNG, millimetres; unit metre required, <= 65.535 m
+  kPng16InverseDepth,  ///< "png16-inverse": 16-bit PNG linear in 1/z between far and near
+};
+
+/// A file of the set: path relative to the set's folder, content hash (hex SHA-256), size.
+struct StoredFile {
+  std::string path;
+  std::string sha256;
+  std::uint64_t bytes = 0;
+  bool operator==(const StoredFile&) const = default;
+};
+
+/// One camera of the set with what it saw. Pixels are present only after loading.
+struct View {
+  std::string id;    ///< unique in the set, safe as a file name
+  std::string name;  ///< original photo name, kept for ever
+  ViewRole role = ViewRole::kSource;
+
+  PinholeCamera camera{1, 1, 1, 1, 0, 0};  ///< of the image grid
+  Pose cam_from_world;                     ///< world: relative to DtrSet::world_origin
+
+  ImageRgb8 image;                                 ///< 8-bit sRGB, size of `camera`
+  Mask mask;                                       ///< empty: every pixel is usable
+  DepthImage depth;                                ///< plane z; size of `camera` / depth_scale
+  std::optional<Grid<float>> inverse_depth_sigma;  ///< std. deviation of 1/z, grid of `depth`
+
+  DepthCoding depth_coding = DepthCoding::kPng16InverseDepth;
+  int depth_scale = 1;            ///< s: the depth map is 1/s of the image per axis
+  double near_z = 0, far_z = 0;   ///< range of the stored depth; 0 for held-out views
+  double reference_baseline = 0;  ///< DESIGN section 3; the baseline of every figure in px
+  Eigen::Vector3d gain = Eigen::Vector3d::Ones();  ///< linear RGB factor towards the set's mean
+
+  std::optional<StoredFile> image_file, depth_file, sigma_file, mask_file;
+  std::string extra_json;  ///< fields this version does not know, kept verbatim ("" = none)
+
+  /// Camera of the depth grid: K scaled so that pixel (i, j)'s centre maps to s (i + 0.5, j + 0.5).
+  PinholeCamera DepthCamera() const;
+  Eigen::Vector3d CenterInWorld() const { return cam_from_world.TargetOriginInSource(); }
+};
+
+}  // namespace dtr

@@ -1,0 +1,57 @@
+// stereo/engine.h -- the one interface behind which all depth engines stand.
+#pragma once
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "dtr/base/progress.h"
+#include "dtr/types/camera.h"
+#include "dtr/types/depth_image.h"
+#include "dtr/types/grid.h"
+#include "dtr/types/pose.h"
+
+namespace dtr::stereo {
+
+/// A calibrated, undistorted photo. Borrowed: the pixels must outlive the call.
+struct StereoView {
+  PinholeCamera camera{1, 1, 1, 1, 0, 0};
+  Pose cam_from_world;
+  const ImageRgb8* image = nullptr;  ///< 8-bit sRGB, size of `camera`
+  const Mask* mask = nullptr;        ///< null or empty: every pixel is usable
+};
+
+/// Depths to search in the reference view, plane z in scene units, 0 < near_z < far_z.
+struct DepthRange {
+  double near_z = 0, far_z = 0;
+};
+
+/// Depth of one view. Rejected pixels are holes: an honest hole beats a wrong depth.
+struct DepthEstimate {
+  DepthImage depth;                 ///< plane z, size of the reference camera
+  Grid<float> inverse_depth_sigma;  ///< standard deviation of 1/z; 0 where depth is a hole
+};
+
+struct EngineOptions {
+  int threads = 0;         ///< 0: all cores; the result does not depend on it
+  std::uint64_t seed = 0;  ///< for engines that draw random numbers
+};
+
+/// Computes the depth of one reference view from its neighbours.
+/// Deterministic: same input, options and seed give the same bytes for any number of threads.
+class Engine {
+ public:
+  virtual ~Engine() = default;
+  virtual std::string name() const = 0;
+  /// `views[reference]` is the reference; `neighbours` are indices into `views`, best first.
+  /// Throws Error when the input cannot be used (no neighbour, empty range).
+  virtual DepthEstimate Estimate(std::span<const StereoView> views, int reference,
+                                 std::span<const int> neighbours, const DepthRange& range,
+                                 const EngineOptions& options) const = 0;
+};
+
+/// Engine by its name on the command line ("sgbm"). Throws UsageError for unknown names.
+std::unique_ptr<Engine> MakeEngine(const std::string& name);
+
+}  // namespace dtr::stereo
