@@ -1,0 +1,61 @@
+// calib/lens_camera.h -- a camera as its lens draws it, distortion included.
+#pragma once
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dtr/types/camera.h"
+
+namespace dtr::calib {
+
+/// Lens models with COLMAP's names and ids (its sensor models 0 to 10); the parameter order is
+/// COLMAP's too. Ids beyond are refused by the readers, by name.
+enum class LensModel : int {
+  kSimplePinhole = 0,        ///< f, cx, cy
+  kPinhole = 1,              ///< fx, fy, cx, cy
+  kSimpleRadial = 2,         ///< f, cx, cy, k
+  kRadial = 3,               ///< f, cx, cy, k1, k2
+  kOpenCv = 4,               ///< fx, fy, cx, cy, k1, k2, p1, p2
+  kOpenCvFisheye = 5,        ///< fx, fy, cx, cy, k1, k2, k3, k4 (Kannala & Brandt 2006)
+  kFullOpenCv = 6,           ///< fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, k5, k6
+  kFov = 7,                  ///< fx, fy, cx, cy, omega (Devernay & Faugeras 2001)
+  kSimpleRadialFisheye = 8,  ///< f, cx, cy, k
+  kRadialFisheye = 9,        ///< f, cx, cy, k1, k2
+  kThinPrismFisheye = 10,    ///< fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, sx1, sy1
+};
+
+/// Number of parameters of a model.
+int ParameterCount(LensModel model);
+/// "OPENCV" and the like.
+std::string NameOf(LensModel model);
+/// Inverse of NameOf; empty for names this version does not know.
+std::optional<LensModel> LensModelFromName(const std::string& name);
+
+/// A camera with a lens. Pixels: origin at the outer corner of the top-left pixel.
+struct LensCamera {
+  LensModel model = LensModel::kPinhole;
+  int width_px = 0, height_px = 0;
+  std::vector<double> params;  ///< ParameterCount(model) values, COLMAP's order
+
+  /// Throws std::invalid_argument unless sizes and focal lengths are positive, the number of
+  /// parameters is the model's and all of them are finite.
+  void Check() const;
+
+  /// Focal lengths and principal point as a pinhole camera of the same size (distortion dropped).
+  PinholeCamera Pinhole() const;
+
+  /// True when every distortion parameter is zero, so undistortion would change nothing.
+  bool IsUndistorted() const;
+
+  /// Pixel of a point in the camera frame. Empty when it is behind the camera (or beyond the
+  /// model's reach) or the distortion is not monotone at its angle.
+  std::optional<Eigen::Vector2d> PixelFromCam(const Eigen::Vector3d& p_in_cam) const;
+
+  /// Direction (unit length) of a pixel's ray: inverse of PixelFromCam, by safeguarded Newton.
+  /// Empty where the model has no inverse.
+  std::optional<Eigen::Vector3d> RayFromPixel(const Eigen::Vector2d& pixel) const;
+};
+
+}  // namespace dtr::calib
