@@ -24,4 +24,10 @@ struct SparseScene {
   std::vector<SparseObservation> observations;  ///< sorted by (view, point)
 };
 
+/// The part of a scene that the views with `keep[view]` alone would know: their observations, and
+/// of the points those that at least two of them see. Views keep their indices, points are
+/// renumbered in their old order. This is what keeps held-out photos out of everything built from
+/// points.
+SparseScene RestrictToViews(const SparseScene& scene, const std::vector<bool>& keep);
+
 }  // namespace dtr

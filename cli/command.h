@@ -1,0 +1,50 @@
+// cli/command.h -- what every command of `dtr` has in common.
+#pragma once
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "cli/console.h"
+
+namespace dtr::cli {
+
+/// Options that every command takes.
+struct CommonOptions {
+  std::string json_target;  ///< "" none, "-" standard output, else a file
+  int threads = 0;          ///< 0: all cores
+  std::uint64_t seed = 0;
+};
+
+/// What a command's action is given.
+struct Context {
+  const CommonOptions& common;
+  Console& console;
+  /// Writes the machine-readable result where --json asked for it; nothing without --json.
+  void EmitJson(const std::string& json_text) const;
+};
+
+/// Exit codes of the command line (DESIGN section 5).
+enum ExitCode { kDone = 0, kFailed = 1, kWrongUsage = 2 };
+
+/// Adds a sub-command. `prepare` declares its options on the CLI::App and returns the action; the
+/// action runs after parsing and returns the exit code.
+using Action = std::function<int(const Context&)>;
+void AddCommand(CLI::App& app, const std::string& name, const std::string& description,
+                const std::string& example, const std::function<Action(CLI::App&)>& prepare);
+
+// One function per command, each in commands/NAME.cpp.
+void AddBuildCommand(CLI::App& app);
+void AddCaptureCommand(CLI::App& app);
+void AddCalibrateCommand(CLI::App& app);
+void AddValidateCommand(CLI::App& app);
+void AddStereoCommand(CLI::App& app);
+void AddInfoCommand(CLI::App& app);
+void AddRenderCommand(CLI::App& app);
+void AddEvaluateCommand(CLI::App& app);
+void AddImportCommand(CLI::App& app);
+void AddExportCommand(CLI::App& app);
+void AddDatasetCommand(CLI::App& app);
+
+}  // namespace dtr::cli

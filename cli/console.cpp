@@ -1,0 +1,118 @@
+#include "cli/console.h"
+
+#include <fmt/format.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "dtr/base/error.h"
+
+namespace dtr::cli {
+namespace {
+
+volatile sig_atomic_t g_interrupted = 0;  // a signal handler can reach nothing else safely
+
+void OnInterrupt(int signal_number) {
+  g_interrupted = 1;
+  signal(signal_number, SIG_DFL);  // the second one ends the program at once
+}
+
+std::string Duration(double seconds) {
+  if (seconds < 60) return fmt::format("{:.0f} s", seconds);
+  return fmt::format("{:.0f} min {:02.0f} s", std::floor(seconds / 60), std::fmod(seconds, 60));
+}
+
+}  // namespace
+
+void CatchInterrupts() {
+  signal(SIGINT, OnInterrupt);
+  signal(SIGTERM, OnInterrupt);
+}
+
+Console::Console(bool json_on_stdout)
+    : json_on_stdout_(json_on_stdout), terminal_(isatty(STDERR_FILENO) != 0) {}
+
+Console::~Console() {
+  const std::lock_guard lock(mutex_);
+  ClearBar();
+}
+
+void Console::Stage(const std::string& name, int total) {
+  const std::lock_guard lock(mutex_);
+  FinishStage();
+  stage_ = name;
+  total_ = total;
+  done_ = told_tenths_ = 0;
+  stage_start_ = std::chrono::steady_clock::now();
+  if (terminal_) {
+    DrawBar();
+  } else if (!name.empty()) {
+    fmt::print(stderr, "== {}\n", name);
+  }
+}
+
+void Console::Update(int done) {
+  const std::lock_guard lock(mutex_);
+  done_ = done;
+  if (terminal_) {
+    DrawBar();
+  } else if (total_ > 0 && 10 * done / total_ > told_tenths_) {
+    told_tenths_ = 10 * done / total_;
+    fmt::print(stderr, "   {} {}/{}\n", stage_, done, total_);
+  }
+}
+
+void Console::Note(const std::string& line) {
+  const std::lock_guard lock(mutex_);
+  ClearBar();
+  fmt::print(stderr, "   {}\n", line);
+}
+
+void Console::Say(const std::string& line) {
+  const std::lock_guard lock(mutex_);
+  ClearBar();
+  fmt::print(json_on_stdout_ ? stderr : stdout, "{}\n", line);
+  std::fflush(stdout);
+}
+
+void Console::ThrowIfInterrupted() const {
+  if (g_interrupted != 0) {
+    throw Interrupted("interrupted; what was finished is kept, the same command continues");
+  }
+}
+
+void Console::FinishStage() {
+  if (!terminal_ || stage_.empty()) return;
+  ClearBar();
+  const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - stage_start_;
+  fmt::print(stderr, "   {} ({})\n", stage_, Duration(spent.count()));
+}
+
+void Console::DrawBar() {
+  if (stage_.empty()) return;
+  constexpr int kBarWidth = 24;
+  const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - stage_start_;
+  std::string tail = Duration(spent.count());
+  int filled = 0;
+  if (total_ > 0) {
+    const double share = std::clamp(static_cast<double>(done_) / total_, 0.0, 1.0);
+    filled = static_cast<int>(kBarWidth * share);
+    tail = fmt::format("{:3.0f} %", 100 * share);
+    if (done_ > 0) tail += ", " + Duration(spent.count() * (1 - share) / share) + " left";
+  }
+  fmt::print(stderr, "\r\033[K   [{}{}] {} {}", std::string(static_cast<size_t>(filled), '='),
+             std::string(static_cast<size_t>(kBarWidth - filled), ' '), stage_, tail);
+  std::fflush(stderr);
+}
+
+void Console::ClearBar() {
+  if (terminal_) {
+    fmt::print(stderr, "\r\033[K");
+    std::fflush(stderr);
+  }
+}
+
+}  // namespace dtr::cli

@@ -1,0 +1,43 @@
+// cli/console.h -- talks to the person at the terminal.
+#pragma once
+#include <chrono>
+#include <mutex>
+#include <string>
+
+#include "dtr/base/progress.h"
+
+namespace dtr::cli {
+
+/// Progress and messages. A bar on a terminal, plain lines elsewhere (at most one per stage and
+/// tenth). Everything goes to stderr, except Say() while stdout is not taken by JSON.
+class Console final : public Progress {
+ public:
+  explicit Console(bool json_on_stdout);
+  ~Console() override;
+
+  void Stage(const std::string& name, int total) override;
+  void Update(int done) override;
+  void Note(const std::string& line) override;
+  /// Throws Interrupted after Ctrl-C or SIGTERM.
+  void ThrowIfInterrupted() const override;
+
+  /// A result for people.
+  void Say(const std::string& line);
+
+ private:
+  void FinishStage();  // requires mutex_
+  void DrawBar();      // requires mutex_
+  void ClearBar();     // requires mutex_
+
+  std::mutex mutex_;
+  bool json_on_stdout_;
+  bool terminal_;
+  std::string stage_;
+  int total_ = 0, done_ = 0, told_tenths_ = 0;
+  std::chrono::steady_clock::time_point stage_start_;
+};
+
+/// Installs handlers for SIGINT and SIGTERM that only set a flag; the second one kills.
+void CatchInterrupts();
+
+}  // namespace dtr::cli

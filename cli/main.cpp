@@ -1,0 +1,58 @@
+// The `dtr` program: parses, calls one function, prints.
+#include <fmt/format.h>
+
+#include <exception>
+
+#include "cli/command.h"
+#include "dtr/base/error.h"
+
+namespace {
+
+int Run(int argc, char** argv) {
+  CLI::App app("dtr -- Depth + Texture Representation: photos in, novel views out");
+  app.set_version_flag("--version", DTR_VERSION);
+  app.require_subcommand(1);
+  dtr::cli::AddBuildCommand(app);
+  dtr::cli::AddCaptureCommand(app);
+  dtr::cli::AddCalibrateCommand(app);
+  dtr::cli::AddValidateCommand(app);
+  dtr::cli::AddStereoCommand(app);
+  dtr::cli::AddInfoCommand(app);
+  dtr::cli::AddRenderCommand(app);
+  dtr::cli::AddEvaluateCommand(app);
+  dtr::cli::AddImportCommand(app);
+  dtr::cli::AddExportCommand(app);
+  dtr::cli::AddDatasetCommand(app);
+  try {
+    app.parse(argc, argv);
+    return dtr::cli::kDone;
+  } catch (const CLI::RuntimeError& ended) {
+    return ended.get_exit_code();
+  } catch (const CLI::Success& help_or_version) {
+    return app.exit(help_or_version);
+  } catch (const CLI::ParseError& error) {
+    fmt::print(stderr, "dtr: {}; see dtr --help\n", error.what());
+    return dtr::cli::kWrongUsage;
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  dtr::cli::CatchInterrupts();
+  try {
+    return Run(argc, argv);
+  } catch (const dtr::UsageError& error) {
+    fmt::print(stderr, "dtr: {}\n", error.what());
+    return dtr::cli::kWrongUsage;
+  } catch (const dtr::Error& error) {
+    fmt::print(stderr, "dtr: {}\n", error.what());
+    return dtr::cli::kFailed;
+  } catch (const std::bad_alloc&) {
+    fmt::print(stderr, "dtr: out of memory; lower --max-size or --memory\n");
+    return dtr::cli::kFailed;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "dtr: unexpected: {}\n", error.what());
+    return dtr::cli::kFailed;
+  }
+}
