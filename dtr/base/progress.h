@@ -2,6 +2,8 @@
 #pragma once
 #include <string>
 
+#include "dtr/base/error.h"
+
 namespace dtr {
 
 /// Receiver of progress. Implementations must be callable from any thread.
@@ -14,8 +16,14 @@ class Progress {
   virtual void Update(int done) = 0;
   /// One line worth telling (an omission, a warning); does not change the stage.
   virtual void Note(const std::string& line) = 0;
+  /// True once the user asked to stop (Ctrl-C).
+  virtual bool StopRequested() const { return false; }
   /// Throws Interrupted when the user asked to stop; long loops call it between items.
-  virtual void ThrowIfInterrupted() const {}
+  void ThrowIfInterrupted() const {
+    if (StopRequested()) {
+      throw Interrupted("interrupted; what was finished is kept, the same command continues");
+    }
+  }
 };
 
 /// Says nothing; the default where nobody listens.
