@@ -1,0 +1,36 @@
+#include "dtr/io/formats/file_names.h"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "dtr/base/error.h"
+
+namespace dtr::io {
+
+std::string WhyUnsafeName(const std::string& name) {
+  constexpr size_t kMaxNameBytes = 1024;  // PATH_MAX is 4096; leaves room for the folder
+  if (name.empty()) return "is empty";
+  if (name.size() > kMaxNameBytes) return "is longer than 1024 bytes";
+  const auto is_control = [](char c) { return static_cast<unsigned char>(c) < 32 || c == 127; };
+  if (std::any_of(name.begin(), name.end(), is_control)) return "holds control characters";
+  const std::filesystem::path path(name);
+  if (path.is_absolute()) return "is absolute";
+  for (const auto& part : path) {
+    if (part == "..") return "leaves its folder (..)";
+  }
+  if (!path.has_filename()) return "names a folder";
+  if (path.filename() == ".") return "names a folder";
+  return "";
+}
+
+void RequireSafeName(const std::string& name, const std::string& where) {
+  const std::string why = WhyUnsafeName(name);
+  if (why.empty()) return;
+  const auto is_control = [](char c) { return static_cast<unsigned char>(c) < 32 || c == 127; };
+  std::string shown = name.substr(0, 80);
+  std::replace_if(shown.begin(), shown.end(), is_control, '?');
+  throw Error(where + ": expected a relative path inside its folder, found \"" + shown +
+              "\", which " + why);
+}
+
+}  // namespace dtr::io

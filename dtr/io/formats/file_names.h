@@ -1,0 +1,14 @@
+// dtr/io/formats/file_names.h -- file names that come from files.
+#pragma once
+#include <string>
+
+namespace dtr::io {
+
+/// Empty when `name` is a relative path that stays inside its folder and prints as one line; else
+/// what is wrong with it ("is absolute", ...). Sub-folders ("left/0001.jpg") are fine.
+std::string WhyUnsafeName(const std::string& name);
+
+/// Throws Error "where: ..." unless WhyUnsafeName(name) is empty.
+void RequireSafeName(const std::string& name, const std::string& where);
+
+}  // namespace dtr::io
