@@ -1,0 +1,155 @@
+#include "dtr/render/geometry.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dtr/base/error.h"
+
+namespace dtr {
+namespace {
+
+constexpr int kNeighbours = 4;           // DESIGN section 3
+constexpr int kSamplesPerAxis = 64;      // 4096 points a view place a median to a percent or two
+constexpr double kLowPercentile = 0.01;  // beyond lie stray points of stereo and SfM
+constexpr double kHighPercentile = 0.99;
+
+/// The element of rank floor(share * (n - 1)); reorders `values`, which must not be empty.
+double Percentile(std::vector<double>& values, double share) {
+  const auto rank = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), values.begin() + rank, values.end());
+  return values[static_cast<size_t>(rank)];
+}
+
+/// Middle value, or the mean of the two middle ones.
+double Median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const size_t half = values.size() / 2;
+  return values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
+}
+
+SceneExtent ExtentOf(std::vector<double> (&coordinates)[3]) {
+  SceneExtent extent;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double>& values = coordinates[axis];
+    extent.center[axis] = Percentile(values, 0.5);
+    extent.bounds.min[axis] = Percentile(values, kLowPercentile);
+    extent.bounds.max[axis] = Percentile(values, kHighPercentile);
+  }
+  return extent;
+}
+
+bool HasDepth(const View& view) { return view.role == ViewRole::kSource && !view.depth.empty(); }
+
+void AppendPoints(const View& view, std::vector<double> (&coordinates)[3]) {
+  const PinholeCamera camera = view.DepthCamera();
+  if (view.depth.width() != camera.width_px() || view.depth.height() != camera.height_px()) {
+    throw Error(view.name + ": the depth map must have the image's size divided by depth.scale (" +
+                std::to_string(camera.width_px()) + "x" + std::to_string(camera.height_px()) +
+                "), found " + std::to_string(view.depth.width()) + "x" +
+                std::to_string(view.depth.height()));
+  }
+  const Pose world_from_cam = view.cam_from_world.Inverse();
+  const int step_x = (view.depth.width() + kSamplesPerAxis - 1) / kSamplesPerAxis;
+  const int step_y = (view.depth.height() + kSamplesPerAxis - 1) / kSamplesPerAxis;
+  for (int y = step_y / 2; y < view.depth.height(); y += step_y) {
+    for (int x = step_x / 2; x < view.depth.width(); x += step_x) {
+      const float depth = view.depth(x, y);
+      if (DepthImage::IsHole(depth)) continue;
+      const Eigen::Vector3d point =
+          world_from_cam * camera.CamFromPixel({x + 0.5, y + 0.5}, depth, view.depth.kind());
+      for (int axis = 0; axis < 3; ++axis) coordinates[axis].push_back(point[axis]);
+    }
+  }
+}
+
+}  // namespace
+
+double AngleBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b));
+}
+
+double ReferenceBaseline(const Pose& cam_from_world, std::span<const Pose> others_from_world,
+                         const Eigen::Vector3d& scene_center) {
+  const Eigen::Vector3d center = cam_from_world.TargetOriginInSource();
+  std::vector<std::pair<double, double>> angle_and_distance;
+  angle_and_distance.reserve(others_from_world.size());
+  for (const Pose& other_from_world : others_from_world) {
+    const Eigen::Vector3d other = other_from_world.TargetOriginInSource();
+    angle_and_distance.emplace_back(AngleBetween(center - scene_center, other - scene_center),
+                                    (center - other).norm());
+  }
+  if (angle_and_distance.empty()) return 0;
+  std::stable_sort(angle_and_distance.begin(), angle_and_distance.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  angle_and_distance.resize(std::min<size_t>(angle_and_distance.size(), kNeighbours));
+  std::vector<double> distances;
+  for (const auto& [angle, distance] : angle_and_distance) distances.push_back(distance);
+  return Median(std::move(distances));
+}
+
+std::vector<double> ReferenceBaselines(std::span<const Pose> cam_from_world,
+                                       const Eigen::Vector3d& scene_center) {
+  std::vector<double> baselines;
+  for (size_t i = 0; i < cam_from_world.size(); ++i) {
+    std::vector<Pose> others(cam_from_world.begin(), cam_from_world.end());
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
+    baselines.push_back(ReferenceBaseline(cam_from_world[i], others, scene_center));
+  }
+  return baselines;
+}
+
+SceneExtent SceneExtentFromDepth(std::span<const View> views) {
+  std::vector<double> coordinates[3];
+  for (const View& view : views) {
+    if (HasDepth(view)) AppendPoints(view, coordinates);
+  }
+  if (coordinates[0].empty()) {
+    throw Error(
+        "scene extent: expected source views with depth, found no depth sample; "
+        "run `dtr stereo` or give sparse points");
+  }
+  return ExtentOf(coordinates);
+}
+
+Eigen::Vector3d SceneCenterFromDepth(std::span<const View> views) {
+  return SceneExtentFromDepth(views).center;
+}
+
+SceneExtent SceneExtentFromPoints(std::span<const SparsePoint> points) {
+  std::vector<double> coordinates[3];
+  for (const SparsePoint& point : points) {
+    if (!point.p_in_world.allFinite()) continue;
+    for (int axis = 0; axis < 3; ++axis) coordinates[axis].push_back(point.p_in_world[axis]);
+  }
+  if (coordinates[0].empty()) {
+    throw Error("scene extent: expected sparse points, found none that is finite");
+  }
+  return ExtentOf(coordinates);
+}
+
+Eigen::Vector3d SceneCenterFromPoints(std::span<const SparsePoint> points) {
+  return SceneExtentFromPoints(points).center;
+}
+
+void FinishGeometry(DtrSet& set, std::span<const SparsePoint> points) {
+  if (set.frames.empty()) throw Error("set: expected at least one frame, found none");
+  std::vector<View>& views = set.frames.front().views;
+  const bool has_depth = std::any_of(views.begin(), views.end(), HasDepth);
+  const SceneExtent extent =
+      has_depth || points.empty() ? SceneExtentFromDepth(views) : SceneExtentFromPoints(points);
+  set.scene_center = extent.center;
+  set.bounds = extent.bounds;
+  for (Frame& frame : set.frames) {
+    for (View& view : frame.views) {
+      std::vector<Pose> sources;
+      for (const View& other : frame.views) {
+        if (&other != &view && other.role == ViewRole::kSource) {
+          sources.push_back(other.cam_from_world);
+        }
+      }
+      view.reference_baseline = ReferenceBaseline(view.cam_from_world, sources, set.scene_center);
+    }
+  }
+}
+
+}  // namespace dtr
