@@ -1,0 +1,101 @@
+#include "calib/lens_camera.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <stdexcept>
+
+#include "calib/lens_map.h"
+
+namespace dtr::calib {
+namespace {
+
+struct ModelFacts {
+  LensModel model;
+  const char* name;
+  int parameters;
+  int focal_lengths;  // 1 or 2; the principal point follows, then the distortion
+  bool fisheye;
+};
+
+constexpr std::array<ModelFacts, 11> kModels{{
+    {LensModel::kSimplePinhole, "SIMPLE_PINHOLE", 3, 1, false},
+    {LensModel::kPinhole, "PINHOLE", 4, 2, false},
+    {LensModel::kSimpleRadial, "SIMPLE_RADIAL", 4, 1, false},
+    {LensModel::kRadial, "RADIAL", 5, 1, false},
+    {LensModel::kOpenCv, "OPENCV", 8, 2, false},
+    {LensModel::kOpenCvFisheye, "OPENCV_FISHEYE", 8, 2, true},
+    {LensModel::kFullOpenCv, "FULL_OPENCV", 12, 2, false},
+    {LensModel::kFov, "FOV", 5, 2, false},
+    {LensModel::kSimpleRadialFisheye, "SIMPLE_RADIAL_FISHEYE", 4, 1, true},
+    {LensModel::kRadialFisheye, "RADIAL_FISHEYE", 5, 1, true},
+    {LensModel::kThinPrismFisheye, "THIN_PRISM_FISHEYE", 12, 2, true},
+}};
+
+const ModelFacts& FactsOf(LensModel model) {
+  for (const ModelFacts& facts : kModels) {
+    if (facts.model == model) return facts;
+  }
+  throw std::invalid_argument("LensModel: unknown id " + std::to_string(static_cast<int>(model)));
+}
+
+}  // namespace
+
+int ParameterCount(LensModel model) { return FactsOf(model).parameters; }
+
+std::string NameOf(LensModel model) { return FactsOf(model).name; }
+
+std::optional<LensModel> LensModelFromName(const std::string& name) {
+  for (const ModelFacts& facts : kModels) {
+    if (name == facts.name) return facts.model;
+  }
+  return std::nullopt;
+}
+
+void LensCamera::Check() const {
+  const ModelFacts& facts = FactsOf(model);
+  if (width_px <= 0 || height_px <= 0) {
+    throw std::invalid_argument("LensCamera: image size must be positive, found " +
+                                std::to_string(width_px) + "x" + std::to_string(height_px));
+  }
+  if (params.size() != static_cast<size_t>(facts.parameters)) {
+    throw std::invalid_argument(std::string("LensCamera: ") + facts.name + " has " +
+                                std::to_string(facts.parameters) + " parameters, found " +
+                                std::to_string(params.size()));
+  }
+  if (!std::all_of(params.begin(), params.end(), [](double p) { return std::isfinite(p); })) {
+    throw std::invalid_argument("LensCamera: every parameter must be finite");
+  }
+  for (int i = 0; i < facts.focal_lengths; ++i) {
+    if (!(params[static_cast<size_t>(i)] > 0)) {
+      throw std::invalid_argument("LensCamera: focal lengths must be positive, found " +
+                                  std::to_string(params[static_cast<size_t>(i)]));
+    }
+  }
+}
+
+PinholeCamera LensCamera::Pinhole() const {
+  Check();
+  const bool two_focals = FactsOf(model).focal_lengths == 2;
+  const size_t center = two_focals ? 2 : 1;
+  return {width_px,       height_px,         params[0], two_focals ? params[1] : params[0],
+          params[center], params[center + 1]};
+}
+
+bool LensCamera::IsUndistorted() const {
+  Check();
+  const ModelFacts& facts = FactsOf(model);
+  if (facts.fisheye) return false;  // equidistant even when every coefficient is zero
+  const auto distortion = params.begin() + facts.focal_lengths + 2;
+  return std::all_of(distortion, params.end(), [](double p) { return p == 0; });
+}
+
+std::optional<Eigen::Vector2d> LensCamera::PixelFromCam(const Eigen::Vector3d& p_in_cam) const {
+  return LensMap(*this).PixelFromCam(p_in_cam);
+}
+
+std::optional<Eigen::Vector3d> LensCamera::RayFromPixel(const Eigen::Vector2d& pixel) const {
+  return LensMap(*this).RayFromPixel(pixel);
+}
+
+}  // namespace dtr::calib

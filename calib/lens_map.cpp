@@ -1,0 +1,293 @@
+#include "calib/lens_map.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <vector>
+
+namespace dtr::calib {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// Of the polish, on the plane of q: a ten-millionth of a pixel at f = 10000 px. Newton ends near
+// 1e-16; what stays above this did not converge.
+constexpr double kLargestResidual = 1e-11;
+constexpr int kMaxNewtonSteps = 60;      // bisection alone would need 53 to reach the last bit
+constexpr double kLargestTangent = 1e9;  // of a ray's angle; 90 degrees less 2e-4 arc seconds
+
+using Polynomial = std::vector<double>;  // coefficients, lowest power first
+
+double Evaluate(const Polynomial& p, double x) {
+  double value = 0;
+  for (size_t i = p.size(); i-- > 0;) value = value * x + p[i];
+  return value;
+}
+
+Polynomial Derivative(const Polynomial& p) {
+  Polynomial d;
+  for (size_t i = 1; i < p.size(); ++i) d.push_back(p[i] * static_cast<double>(i));
+  return d;
+}
+
+Polynomial Product(const Polynomial& a, const Polynomial& b) {
+  Polynomial product(a.size() + b.size() - 1, 0.0);
+  for (size_t i = 0; i < a.size(); ++i) {
+    for (size_t j = 0; j < b.size(); ++j) product[i + j] += a[i] * b[j];
+  }
+  return product;
+}
+
+// x with p(x) = 0 in [low, high], given a change of sign there.
+double Bisect(const Polynomial& p, double low, double high) {
+  const bool rising = Evaluate(p, low) < 0;
+  for (;;) {
+    const double middle = 0.5 * (low + high);
+    if (!(middle > low && middle < high)) return low;
+    ((Evaluate(p, middle) < 0) == rising ? low : high) = middle;
+  }
+}
+
+// Places x > 0 where p changes sign, rising. Between two neighbouring extrema a polynomial is
+// monotone, so the extrema (the roots of the derivative, found the same way) bracket every root.
+std::vector<double> PositiveRoots(Polynomial p) {
+  while (!p.empty() && p.back() == 0) p.pop_back();
+  if (p.size() < 2) return {};
+  double largest = 0;
+  for (size_t i = 0; i + 1 < p.size(); ++i) largest = std::max(largest, std::abs(p[i] / p.back()));
+  std::vector<double> corners{0.0};
+  for (const double x : PositiveRoots(Derivative(p))) corners.push_back(x);
+  corners.push_back(std::max(1 + largest, corners.back()));  // Cauchy's bound on every root
+  std::vector<double> roots;
+  for (size_t i = 0; i + 1 < corners.size(); ++i) {
+    const double low = Evaluate(p, corners[i]), high = Evaluate(p, corners[i + 1]);
+    if ((low < 0 && high > 0) || (low > 0 && high < 0)) {
+      roots.push_back(Bisect(p, corners[i], corners[i + 1]));
+    } else if (high == 0 && low != 0 && corners[i + 1] > 0) {
+      roots.push_back(corners[i + 1]);
+    }
+  }
+  return roots;
+}
+
+double FirstPositiveRoot(const Polynomial& p) {
+  const std::vector<double> roots = PositiveRoots(p);
+  return roots.empty() ? kInfinity : roots.front();
+}
+
+}  // namespace
+
+LensMap::LensMap(const LensCamera& camera) {
+  camera.Check();
+  const PinholeCamera pinhole = camera.Pinhole();
+  fx_px_ = pinhole.fx_px();
+  fy_px_ = pinhole.fy_px();
+  cx_px_ = pinhole.cx_px();
+  cy_px_ = pinhole.cy_px();
+  const std::vector<double>& p = camera.params;
+  switch (camera.model) {
+    case LensModel::kSimplePinhole:
+    case LensModel::kPinhole:
+      break;
+    case LensModel::kSimpleRadialFisheye:
+      fisheye_ = true;
+      [[fallthrough]];
+    case LensModel::kSimpleRadial:
+      numerator_ = {p[3], 0, 0, 0};
+      break;
+    case LensModel::kRadialFisheye:
+      fisheye_ = true;
+      [[fallthrough]];
+    case LensModel::kRadial:
+      numerator_ = {p[3], p[4], 0, 0};
+      break;
+    case LensModel::kOpenCv:
+      numerator_ = {p[4], p[5], 0, 0};
+      p1_ = p[6];
+      p2_ = p[7];
+      break;
+    case LensModel::kOpenCvFisheye:
+      fisheye_ = true;
+      numerator_ = {p[4], p[5], p[6], p[7]};
+      break;
+    case LensModel::kFullOpenCv:
+      numerator_ = {p[4], p[5], p[8], 0};
+      p1_ = p[6];
+      p2_ = p[7];
+      denominator_ = {p[9], p[10], p[11]};
+      break;
+    case LensModel::kFov:
+      fov_ = p[4] != 0;  // the limit omega -> 0 is the pinhole camera
+      omega_ = std::abs(p[4]);
+      break;
+    case LensModel::kThinPrismFisheye:
+      fisheye_ = true;
+      numerator_ = {p[4], p[5], p[8], p[9]};
+      p1_ = p[6];
+      p2_ = p[7];
+      sx_ = p[10];
+      sy_ = p[11];
+      break;
+  }
+  decentred_ = p1_ != 0 || p2_ != 0 || sx_ != 0 || sy_ != 0;
+  max_radius_ = FindMaxRadius();
+}
+
+// The derivative of r N(s) / D(s) by r, s = r^2, has the sign of (N + 2 s N') D - 2 s N D' as long
+// as D stays positive.
+double LensMap::FindMaxRadius() const {
+  if (fov_) return omega_ < std::numbers::pi ? kInfinity : 0;
+  const Polynomial n{1, numerator_[0], numerator_[1], numerator_[2], numerator_[3]};
+  const Polynomial d{1, denominator_[0], denominator_[1], denominator_[2]};
+  const Polynomial two_s{0, 2};
+  Polynomial slope = Product(two_s, Derivative(n));
+  for (size_t i = 0; i < n.size(); ++i) slope[i] += n[i];
+  slope = Product(slope, d);
+  const Polynomial minus = Product(two_s, Product(n, Derivative(d)));
+  for (size_t i = 0; i < minus.size(); ++i) slope[i] -= minus[i];
+  const double radius = std::sqrt(std::min(FirstPositiveRoot(slope), FirstPositiveRoot(d)));
+  return fisheye_ ? std::min(radius, std::numbers::pi) : radius;
+}
+
+LensMap::RadialValue LensMap::RadialFactor(double s) const {
+  const auto& k = numerator_;
+  const auto& d = denominator_;
+  const double n = 1 + s * (k[0] + s * (k[1] + s * (k[2] + s * k[3])));
+  const double n_slope = k[0] + s * (2 * k[1] + s * (3 * k[2] + s * 4 * k[3]));
+  const double m = 1 + s * (d[0] + s * (d[1] + s * d[2]));
+  const double m_slope = d[0] + s * (2 * d[1] + s * 3 * d[2]);
+  const double factor = n / m;
+  return {factor, (n_slope - factor * m_slope) / m};
+}
+
+LensMap::Distorted LensMap::Distort(const Eigen::Vector2d& q) const {
+  const double x = q.x(), y = q.y(), s = q.squaredNorm();
+  const auto [factor, slope] = RadialFactor(s);
+  Distorted out;
+  out.point = {x * factor + 2 * p1_ * x * y + p2_ * (s + 2 * x * x) + sx_ * s,
+               y * factor + 2 * p2_ * x * y + p1_ * (s + 2 * y * y) + sy_ * s};
+  out.jacobian << factor + 2 * x * x * slope + 2 * p1_ * y + 6 * p2_ * x + 2 * sx_ * x,
+      2 * x * y * slope + 2 * p1_ * x + 2 * p2_ * y + 2 * sx_ * y,
+      2 * x * y * slope + 2 * p2_ * y + 2 * p1_ * x + 2 * sy_ * x,
+      factor + 2 * y * y * slope + 2 * p2_ * x + 6 * p1_ * y + 2 * sy_ * y;
+  return out;
+}
+
+std::optional<Eigen::Vector2d> LensMap::PlaneFromCam(const Eigen::Vector3d& p_in_cam) const {
+  if (!p_in_cam.allFinite()) return std::nullopt;
+  if (!fisheye_) {
+    if (!(p_in_cam.z() > 0)) return std::nullopt;
+    return Eigen::Vector2d(p_in_cam.x() / p_in_cam.z(), p_in_cam.y() / p_in_cam.z());
+  }
+  const double radius = std::hypot(p_in_cam.x(), p_in_cam.y());
+  if (radius == 0) {
+    if (!(p_in_cam.z() > 0)) return std::nullopt;
+    return Eigen::Vector2d::Zero();
+  }
+  const double angle = std::atan2(radius, p_in_cam.z());
+  return Eigen::Vector2d(p_in_cam.x() / radius * angle, p_in_cam.y() / radius * angle);
+}
+
+std::optional<Eigen::Vector2d> LensMap::PixelFromCam(const Eigen::Vector3d& p_in_cam) const {
+  const auto q = PlaneFromCam(p_in_cam);
+  if (!q) return std::nullopt;
+  const double radius = q->norm();
+  if (!(radius < max_radius_)) return std::nullopt;
+  Eigen::Vector2d distorted;
+  if (fov_) {
+    const double scale = 2 * std::tan(omega_ / 2);
+    distorted =
+        radius == 0 ? *q : Eigen::Vector2d(*q * (std::atan(radius * scale) / (omega_ * radius)));
+  } else {
+    const Distorted d = Distort(*q);
+    if (decentred_ && !(d.jacobian.determinant() > 0)) return std::nullopt;
+    distorted = d.point;
+  }
+  if (!distorted.allFinite()) return std::nullopt;
+  return Eigen::Vector2d(fx_px_ * distorted.x() + cx_px_, fy_px_ * distorted.y() + cy_px_);
+}
+
+// Newton on r N / D - target inside a bracket that bisection shrinks whenever Newton leaves it.
+std::optional<double> LensMap::InverseRadius(double distorted_radius) const {
+  if (distorted_radius == 0) return 0;
+  const auto value = [&](double r) { return r * RadialFactor(r * r).factor; };
+  double low = 0;
+  double high = std::min(max_radius_, std::max(distorted_radius, 1e-3));
+  while (!(value(high) >= distorted_radius)) {
+    if (high >= max_radius_ || high > kLargestTangent) return std::nullopt;
+    low = high;
+    high = std::min(2 * high, max_radius_);
+  }
+  double r = std::clamp(distorted_radius, low, high);
+  for (int step = 0; step < kMaxNewtonSteps; ++step) {
+    const auto [factor, slope] = RadialFactor(r * r);
+    const double miss = r * factor - distorted_radius;
+    if (miss == 0) break;
+    (miss < 0 ? low : high) = r;
+    double next = r - miss / (factor + 2 * r * r * slope);
+    if (!(next > low && next < high)) next = 0.5 * (low + high);
+    if (next == r || !(next > low && next < high)) break;
+    r = next;
+  }
+  return r < max_radius_ ? std::optional<double>(r) : std::nullopt;
+}
+
+std::optional<Eigen::Vector2d> LensMap::UndistortFov(const Eigen::Vector2d& distorted) const {
+  const double radius = distorted.norm();
+  const double angle = radius * omega_;
+  if (!(max_radius_ > 0) || !(angle < std::numbers::pi / 2)) return std::nullopt;
+  if (radius == 0) return distorted;
+  const double undistorted = std::tan(angle) / (2 * std::tan(omega_ / 2));
+  if (!(undistorted < kLargestTangent)) return std::nullopt;
+  return Eigen::Vector2d(distorted * (undistorted / radius));
+}
+
+std::optional<Eigen::Vector2d> LensMap::Undistort(const Eigen::Vector2d& distorted) const {
+  if (fov_) return UndistortFov(distorted);
+  const double radius = distorted.norm();
+  const std::optional<double> start = InverseRadius(radius);
+  if (!decentred_) {
+    if (!start) return std::nullopt;
+    return radius == 0 ? distorted : Eigen::Vector2d(distorted * (*start / radius));
+  }
+  // Newton in two dimensions; a step that makes things worse is halved.
+  const double first = start ? *start : std::min(0.9 * max_radius_, radius);
+  Eigen::Vector2d q = radius == 0 ? distorted : Eigen::Vector2d(distorted * (first / radius));
+  Distorted at_q = Distort(q);
+  double miss = (at_q.point - distorted).norm();
+  for (int i = 0; i < kMaxNewtonSteps && miss > 0; ++i) {
+    if (!(at_q.jacobian.determinant() > 0)) return std::nullopt;
+    const Eigen::Vector2d full_step = at_q.jacobian.inverse() * (distorted - at_q.point);
+    double share = 1;
+    bool better = false;
+    for (; share > 1e-4 && !better; share /= 2) {
+      const Eigen::Vector2d candidate = q + share * full_step;
+      const Distorted at_candidate = Distort(candidate);
+      const double candidate_miss = (at_candidate.point - distorted).norm();
+      if (candidate_miss < miss) {
+        q = candidate;
+        at_q = at_candidate;
+        miss = candidate_miss;
+        better = true;
+      }
+    }
+    if (!better) break;
+  }
+  const bool found = miss <= kLargestResidual * std::max(1.0, radius) && q.norm() < max_radius_ &&
+                     at_q.jacobian.determinant() > 0;
+  return found ? std::optional<Eigen::Vector2d>(q) : std::nullopt;
+}
+
+std::optional<Eigen::Vector3d> LensMap::RayFromPixel(const Eigen::Vector2d& pixel) const {
+  if (!pixel.allFinite()) return std::nullopt;
+  const auto q = Undistort({(pixel.x() - cx_px_) / fx_px_, (pixel.y() - cy_px_) / fy_px_});
+  if (!q) return std::nullopt;
+  if (!fisheye_) return Eigen::Vector3d(q->x(), q->y(), 1).normalized();
+  const double angle = q->norm();
+  if (angle == 0) return Eigen::Vector3d::UnitZ();
+  const double sine = std::sin(angle);
+  return Eigen::Vector3d(q->x() / angle * sine, q->y() / angle * sine, std::cos(angle));
+}
+
+}  // namespace dtr::calib
