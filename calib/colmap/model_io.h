@@ -1,0 +1,28 @@
+// calib/colmap/model_io.h -- COLMAP's sparse models on disk, binary and text.
+#pragma once
+#include <filesystem>
+
+#include "calib/sfm_model.h"
+
+namespace dtr::colmap {
+
+enum class Format { kBinary, kText };
+
+/// Reads the model in `folder`: cameras, images and points3D, as .bin where all three are there,
+/// else as .txt. COLMAP's frames are ours (x right, y down, z forward; first pixel's centre at
+/// (0.5, 0.5); cam_from_world), so nothing is converted. Rigs and frames, which newer versions
+/// write beside, are not read: the images' poses contain them. Images come back sorted by name.
+///
+/// Throws Error, naming file and record, on anything that is not a whole and consistent model:
+/// truncation, counts beyond the file's end, values that are not finite, unknown camera models (by
+/// number), duplicate ids or names, a feature of an absent point, an image of an absent camera, a
+/// track that disagrees with the features.
+calib::SfmModel ReadModel(const std::filesystem::path& folder);
+
+/// Writes the three files of a model into `folder` (made when absent), each atomically. Doubles
+/// survive both formats bit for bit; reading the result gives the model back.
+/// Throws Error on a model that ReadModel would refuse, when the folder holds files of a model in
+/// the other format, or when a file cannot be written.
+void WriteModel(const std::filesystem::path& folder, const calib::SfmModel& model, Format format);
+
+}  // namespace dtr::colmap

@@ -1,0 +1,241 @@
+// COLMAP's text model files. The layouts stand in COLMAP's documentation, "Output Format".
+#include <fmt/format.h>
+
+#include <charconv>
+#include <optional>
+#include <string_view>
+
+#include "calib/colmap/raw_model.h"
+#include "dtr/base/error.h"
+#include "dtr/base/files.h"
+
+namespace dtr::colmap {
+namespace {
+
+constexpr std::uintmax_t kLargestFile = std::uintmax_t{64} << 30;
+constexpr std::string_view kBlanks = " \t\r\v\f";
+
+std::string_view Trimmed(std::string_view text) {
+  const size_t first = text.find_first_not_of(kBlanks);
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
+}
+
+// The words of one line, as numbers; errors name file and line.
+class Fields {
+ public:
+  Fields(std::string where, std::string_view line) : where_(std::move(where)), rest_(line) {}
+
+  bool AtEnd() {
+    rest_ = Trimmed(rest_);
+    return rest_.empty();
+  }
+
+  std::string_view TakeWord(const char* what) {
+    if (AtEnd())
+      throw Error(fmt::format("{}: expected {}, found the end of the line", where_, what));
+    const std::string_view word = rest_.substr(0, rest_.find_first_of(kBlanks));
+    rest_.remove_prefix(word.size());
+    return word;
+  }
+
+  template <typename T>
+  T Take(const char* what) {
+    const std::string_view word = TakeWord(what);
+    T value{};
+    const auto [end, failure] = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (failure != std::errc() || end != word.data() + word.size()) {
+      throw Error(fmt::format("{}: expected {}, found '{}'", where_, what, word));
+    }
+    if constexpr (std::is_floating_point_v<T>) CheckedFinite(where_, value);
+    return value;
+  }
+
+  std::string_view TakeRest() {
+    const std::string_view rest = Trimmed(rest_);
+    rest_ = {};
+    return rest;
+  }
+
+  const std::string& where() const { return where_; }
+
+ private:
+  std::string where_;
+  std::string_view rest_;
+};
+
+// Lines of a file, with the record count its comments announce.
+class TextReader {
+ public:
+  explicit TextReader(const std::filesystem::path& file)
+      : file_(file.string()), content_(ReadFile(file, kLargestFile)), rest_(content_) {
+    // Without this a number cut in its middle would pass for a shorter number.
+    if (!content_.empty() && content_.back() != '\n') {
+      throw Error(file_ +
+                  ": expected a line end at the end of the file, found none; the file is "
+                  "cut short (add the line end if it is not)");
+    }
+  }
+
+  // The next line that carries a record, or nothing at the end of the file.
+  std::optional<Fields> NextRecord() {
+    while (const auto line = NextRawLine()) {
+      const std::string_view text = Trimmed(*line);
+      if (text.empty()) continue;
+      if (text.front() != '#') {
+        ++records_;
+        return Fields(Where(), text);
+      }
+      NoteComment(text);
+    }
+    return std::nullopt;
+  }
+
+  // The line after a record, empty or not.
+  Fields FollowingLine(const char* what) {
+    const auto line = NextRawLine();
+    if (!line) {
+      throw Error(fmt::format("{}: expected a line with {}, found the end; the file is cut short",
+                              Where(), what));
+    }
+    return Fields(Where(), *line);
+  }
+
+  void ExpectAnnouncedCount() const {
+    if (announced_ && *announced_ != records_) {
+      throw Error(
+          fmt::format("{}: expected {} records, as its first lines say, found {}; the file "
+                      "is cut short",
+                      file_, *announced_, records_));
+    }
+  }
+
+ private:
+  std::string Where() const { return fmt::format("{}: line {}", file_, line_); }
+
+  std::optional<std::string_view> NextRawLine() {
+    if (rest_.empty()) return std::nullopt;
+    const size_t end = rest_.find('\n');  // there is one: the constructor saw the last
+    const std::string_view line = rest_.substr(0, end);
+    rest_.remove_prefix(end + 1);
+    ++line_;
+    return line;
+  }
+
+  // "# Number of images: 11, mean observations per image: 3501.8"
+  void NoteComment(std::string_view text) {
+    constexpr std::string_view kCount = "# Number of ";
+    if (!text.starts_with(kCount)) return;
+    const size_t colon = text.find(": ");
+    if (colon == std::string_view::npos) return;
+    std::uint64_t count = 0;
+    const char* first = text.data() + colon + 2;
+    if (std::from_chars(first, text.data() + text.size(), count).ec == std::errc()) {
+      announced_ = count;
+    }
+  }
+
+  std::string file_;
+  std::string content_;
+  std::string_view rest_;
+  size_t line_ = 0;
+  std::uint64_t records_ = 0;
+  std::optional<std::uint64_t> announced_;
+};
+
+void ReadCameras(RawModel& raw) {
+  TextReader in(raw.cameras_file);
+  while (auto line = in.NextRecord()) {
+    RawModel::Camera camera;
+    camera.id = line->Take<std::uint32_t>("a camera id");
+    const std::string name(line->TakeWord("a camera model"));
+    const auto model = calib::LensModelFromName(name);
+    if (!model) {
+      throw Error(
+          fmt::format("{}: expected a camera model SIMPLE_PINHOLE to THIN_PRISM_FISHEYE, "
+                      "found '{}'; undistort the images first (colmap image_undistorter)",
+                      line->where(), name));
+    }
+    const auto width_px = line->Take<std::uint64_t>("a width");
+    const auto height_px = line->Take<std::uint64_t>("a height");
+    std::vector<double> params;
+    while (!line->AtEnd()) params.push_back(line->Take<double>("a camera parameter"));
+    camera.camera = CheckedCamera(line->where(), static_cast<int>(*model), width_px, height_px,
+                                  std::move(params));
+    raw.cameras.push_back(std::move(camera));
+  }
+  in.ExpectAnnouncedCount();
+}
+
+std::uint64_t TakePointId(Fields& line) {
+  const std::string_view word = line.TakeWord("a point id");
+  if (word == "-1") return calib::SfmFeature::kNoPoint;
+  std::uint64_t id = 0;
+  const auto [end, failure] = std::from_chars(word.data(), word.data() + word.size(), id);
+  if (failure != std::errc() || end != word.data() + word.size()) {
+    throw Error(fmt::format("{}: expected a point id, found '{}'", line.where(), word));
+  }
+  return id;
+}
+
+void ReadImages(RawModel& raw) {
+  TextReader in(raw.images_file);
+  while (auto line = in.NextRecord()) {
+    calib::SfmImage image;
+    image.id = line->Take<std::uint32_t>("an image id");
+    double wxyz[4], translation[3];
+    for (double& value : wxyz) value = line->Take<double>("a rotation (qw qx qy qz)");
+    for (double& value : translation) value = line->Take<double>("a translation (tx ty tz)");
+    image.cam_from_world = CheckedPose(line->where(), wxyz, translation);
+    image.camera_id = line->Take<std::uint32_t>("a camera id");
+    image.name = line->TakeRest();  // a name may contain spaces
+    Fields features = in.FollowingLine("the image's features");
+    while (!features.AtEnd()) {
+      calib::SfmFeature feature;
+      feature.pixel.x() = features.Take<double>("x");
+      feature.pixel.y() = features.Take<double>("y");
+      feature.point_id = TakePointId(features);
+      image.features.push_back(feature);
+    }
+    raw.images.push_back(std::move(image));
+  }
+  in.ExpectAnnouncedCount();
+}
+
+void ReadPoints(RawModel& raw) {
+  TextReader in(raw.points_file);
+  while (auto line = in.NextRecord()) {
+    RawModel::Point point;
+    point.id = line->Take<std::uint64_t>("a point id");
+    for (int i = 0; i < 3; ++i) point.point.p_in_world[i] = line->Take<double>("a coordinate");
+    for (auto& channel : point.point.rgb) {
+      const int value = line->Take<int>("a colour 0 to 255");
+      if (value < 0 || value > 255) {
+        throw Error(fmt::format("{}: expected a colour 0 to 255, found {}", line->where(), value));
+      }
+      channel = static_cast<std::uint8_t>(value);
+    }
+    point.point.error_px = line->Take<double>("an error");
+    while (!line->AtEnd()) {
+      const auto image_id = line->Take<std::uint32_t>("an image id");
+      point.track.push_back({image_id, line->Take<std::uint32_t>("a feature index")});
+    }
+    raw.points.push_back(std::move(point));
+  }
+  in.ExpectAnnouncedCount();
+}
+
+}  // namespace
+
+RawModel ReadTextModel(const std::filesystem::path& folder) {
+  RawModel raw;
+  raw.cameras_file = folder / "cameras.txt";
+  raw.images_file = folder / "images.txt";
+  raw.points_file = folder / "points3D.txt";
+  ReadCameras(raw);
+  ReadImages(raw);
+  ReadPoints(raw);
+  return raw;
+}
+
+}  // namespace dtr::colmap
