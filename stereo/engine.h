@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "dtr/base/progress.h"
+#include "dtr/base/error.h"
 #include "dtr/types/camera.h"
 #include "dtr/types/depth_image.h"
 #include "dtr/types/grid.h"
@@ -36,6 +36,13 @@ struct DepthEstimate {
 struct EngineOptions {
   int threads = 0;         ///< 0: all cores; the result does not depend on it
   std::uint64_t seed = 0;  ///< for engines that draw random numbers
+  double memory_gb = 2.0;  ///< fewer threads run rather than use more; no effect on the result
+};
+
+/// None of a view's neighbours can be matched with it (no baseline, forward motion, no overlap).
+class NoUsablePair : public Error {
+ public:
+  using Error::Error;
 };
 
 /// Computes the depth of one reference view from its neighbours.
@@ -45,7 +52,8 @@ class Engine {
   virtual ~Engine() = default;
   virtual std::string name() const = 0;
   /// `views[reference]` is the reference; `neighbours` are indices into `views`, best first.
-  /// Throws Error when the input cannot be used (no neighbour, empty range).
+  /// Throws NoUsablePair when no neighbour can be matched, Error when the input cannot be used
+  /// (empty range, image of another size than its camera).
   virtual DepthEstimate Estimate(std::span<const StereoView> views, int reference,
                                  std::span<const int> neighbours, const DepthRange& range,
                                  const EngineOptions& options) const = 0;

@@ -1,0 +1,38 @@
+// stereo/sgbm/picture.h -- grey pictures for matching: masks filled, resampled, shrunk.
+#pragma once
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "stereo/engine.h"
+
+namespace dtr::stereo {
+
+/// A view's grey values with what may be used of them.
+struct Picture {
+  PinholeCamera camera{1, 1, 1, 1, 0, 0};
+  Grid<float> grey;  ///< 0..255, sRGB-coded luma
+  Mask usable;       ///< 255 where the view's mask allows it
+};
+
+/// Grey picture of a view. Masked pixels are bridged linearly along their row (or column, where a
+/// whole row is masked), so that their content has no influence and they bring no edges of their
+/// own. Throws Error when the image or mask has not the camera's size.
+Picture MakePicture(const StereoView& view);
+
+/// Half the size per axis by averaging 2x2 pixels (a last odd row or column is dropped).
+Picture Halved(const Picture& picture);
+
+/// A picture seen by a turned virtual camera.
+struct WarpedPicture {
+  Grid<std::uint8_t> grey;
+  Mask usable;  ///< 255 where the source has a usable pixel
+};
+
+/// Resamples with Catmull-Rom weights; beyond the border the nearest pixel is repeated (an
+/// artificial edge there would be matched). Uses a halved source where the target is that much
+/// coarser.
+WarpedPicture Warp(const Picture& source, const PinholeCamera& target,
+                   const Eigen::Matrix3d& target_from_source);
+
+}  // namespace dtr::stereo
