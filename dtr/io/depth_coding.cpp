@@ -1,0 +1,193 @@
+// The pure half of depth_io.h: depths to codes and back.
+#include <Eigen/Core>
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <sstream>
+
+#include "dtr/base/error.h"
+#include "dtr/io/depth_io.h"
+
+namespace dtr::io {
+namespace {
+
+constexpr int kInverseSteps = 65534;      // between code 1 (far) and code 65535 (near)
+constexpr double kMillimetres = 1000;     // codes per metre
+constexpr float kHalfMax = 65504;         // largest finite half
+constexpr float kHalfMin = 0x1.0p-14f;    // smallest half with full precision
+constexpr double kNarrowestRange = 1e-3;  // relative width of the range of a map of one depth
+
+std::string Pixel(int x, int y) {
+  return "depth pixel (" + std::to_string(x) + ", " + std::to_string(y) + ")";
+}
+
+std::string Number(double value) {
+  std::ostringstream out;
+  out.precision(9);  // enough to tell any two floats apart
+  out << value;
+  return out.str();
+}
+
+void ExpectRange(double near_z, double far_z) {
+  if (near_z > 0 && near_z < far_z && std::isfinite(far_z)) return;
+  throw Error("depth range: expected 0 < near < far, found near " + Number(near_z) + ", far " +
+              Number(far_z));
+}
+
+// Calls `visit(x, y, z)` for every pixel with depth. Only 0 may stand for a hole: NaN, infinity
+// and negative numbers come from a slip further up and must not be stored as honest holes.
+template <typename Visit>
+void ForEachDepth(const DepthImage& depth, const Visit& visit) {
+  if (depth.empty() || depth.kind() != DepthKind::kPlaneZ) {
+    throw Error("depth map: expected plane z, found " +
+                std::string(depth.empty() ? "an empty map" : "ray distances"));
+  }
+  for (int y = 0; y < depth.height(); ++y) {
+    for (int x = 0; x < depth.width(); ++x) {
+      const float z = depth(x, y);
+      if (z == 0) continue;
+      if (DepthImage::IsHole(z)) {
+        throw Error(Pixel(x, y) + ": expected a positive finite depth or 0, found " + Number(z));
+      }
+      visit(x, y, z);
+    }
+  }
+}
+
+void ExpectWithin(int x, int y, float z, double low, double high) {
+  if (z >= static_cast<float>(low) && z <= static_cast<float>(high)) return;
+  throw Error(Pixel(x, y) + ": expected a depth in [" + Number(low) + ", " + Number(high) +
+              "], found " + Number(z));
+}
+
+// Nearest half, as float; `z` must be in half's normal range. Ties to even, like F16C and IEEE 754.
+float RoundToHalf(float z) {
+  const std::uint32_t bits = std::bit_cast<std::uint32_t>(z);
+  constexpr int kDropped = 13;  // 23 mantissa bits of float, 10 of half
+  const std::uint32_t odd = (bits >> kDropped) & 1u;
+  const std::uint32_t rounded = bits + ((1u << (kDropped - 1)) - 1u) + odd;
+  return std::bit_cast<float>(rounded & ~((1u << kDropped) - 1u));
+}
+
+}  // namespace
+
+const char* NameOf(DepthCoding coding) {
+  switch (coding) {
+    case DepthCoding::kExrFloat:
+      return "exr-float";
+    case DepthCoding::kExrHalf:
+      return "exr-half";
+    case DepthCoding::kPng16Millimetre:
+      return "png16-mm";
+    case DepthCoding::kPng16InverseDepth:
+      break;
+  }
+  return "png16-inverse";
+}
+
+DepthCoding DepthCodingFromName(const std::string& name) {
+  for (const auto coding : {DepthCoding::kExrFloat, DepthCoding::kExrHalf,
+                            DepthCoding::kPng16Millimetre, DepthCoding::kPng16InverseDepth}) {
+    if (name == NameOf(coding)) return coding;
+  }
+  throw UsageError(
+      "depth coding: expected exr-float, exr-half, png16-mm or png16-inverse, found '" + name +
+      "'");
+}
+
+const char* ExtensionOf(DepthCoding coding) {
+  return coding == DepthCoding::kExrFloat || coding == DepthCoding::kExrHalf ? ".exr" : ".png";
+}
+
+Grid<std::uint16_t> EncodePng16Inverse(const DepthImage& depth, double near_z, double far_z) {
+  ExpectRange(near_z, far_z);
+  const double inverse_far = 1 / far_z, inverse_range = 1 / near_z - 1 / far_z;
+  Grid<std::uint16_t> codes;
+  ForEachDepth(depth, [&](int x, int y, float z) {
+    ExpectWithin(x, y, z, near_z, far_z);
+    if (codes.empty()) codes = Grid<std::uint16_t>(depth.width(), depth.height());
+    const double share = std::clamp((1.0 / z - inverse_far) / inverse_range, 0.0, 1.0);
+    codes(x, y) = static_cast<std::uint16_t>(1 + std::lround(share * kInverseSteps));
+  });
+  return codes.empty() ? Grid<std::uint16_t>(depth.width(), depth.height()) : codes;
+}
+
+DepthImage DecodePng16Inverse(const Grid<std::uint16_t>& codes, double near_z, double far_z) {
+  ExpectRange(near_z, far_z);
+  const double inverse_far = 1 / far_z, inverse_range = 1 / near_z - 1 / far_z;
+  DepthImage depth(codes.width(), codes.height());
+  for (size_t i = 0; i < codes.data().size(); ++i) {
+    const std::uint16_t code = codes.data()[i];
+    if (code == 0) continue;
+    double z = 1 / (inverse_far + (code - 1) * inverse_range / kInverseSteps);
+    // 1 / (1 / z) may miss z by an ulp; the ends of the range are exact by definition.
+    if (code == 1) z = far_z;
+    if (code == UINT16_MAX) z = near_z;
+    depth.grid().data()[i] = static_cast<float>(std::clamp(z, near_z, far_z));
+  }
+  return depth;
+}
+
+Grid<std::uint16_t> EncodePng16Millimetre(const DepthImage& depth_m) {
+  Grid<std::uint16_t> codes;
+  ForEachDepth(depth_m, [&](int x, int y, float z) {
+    const double code = std::round(z * kMillimetres);
+    if (code < 1 || code > UINT16_MAX) {
+      throw Error(Pixel(x, y) + ": expected a depth in [0.001, 65.535] m for png16-mm, found " +
+                  Number(z) + "; choose another depth coding");
+    }
+    if (codes.empty()) codes = Grid<std::uint16_t>(depth_m.width(), depth_m.height());
+    codes(x, y) = static_cast<std::uint16_t>(code);
+  });
+  return codes.empty() ? Grid<std::uint16_t>(depth_m.width(), depth_m.height()) : codes;
+}
+
+DepthImage DecodePng16Millimetre(const Grid<std::uint16_t>& codes) {
+  DepthImage depth(codes.width(), codes.height());
+  for (size_t i = 0; i < codes.data().size(); ++i) {
+    depth.grid().data()[i] = static_cast<float>(codes.data()[i] / kMillimetres);
+  }
+  return depth;
+}
+
+DepthImage RoundToCoding(const DepthImage& depth, const DepthFormat& format) {
+  switch (format.coding) {
+    case DepthCoding::kPng16InverseDepth:
+      return DecodePng16Inverse(EncodePng16Inverse(depth, format.near_z, format.far_z),
+                                format.near_z, format.far_z);
+    case DepthCoding::kPng16Millimetre:
+      if (format.unit != LengthUnit::kMetre) {
+        throw Error("depth coding png16-mm: expected a set in metres; choose another depth coding");
+      }
+      return DecodePng16Millimetre(EncodePng16Millimetre(depth));
+    case DepthCoding::kExrHalf: {
+      DepthImage rounded = depth;
+      ForEachDepth(depth, [&](int x, int y, float z) {
+        if (z < kHalfMin || z > kHalfMax) {
+          throw Error(Pixel(x, y) +
+                      ": expected a depth in [6.10352e-05, 65504] for exr-half, found " +
+                      Number(z) + "; choose another depth coding");
+        }
+        rounded(x, y) = RoundToHalf(z);
+      });
+      return rounded;
+    }
+    case DepthCoding::kExrFloat:
+      break;
+  }
+  ForEachDepth(depth, [](int, int, float) {});  // refuses what no coding may hold
+  return depth;
+}
+
+DepthRangeOfMap RangeOf(const DepthImage& depth) {
+  DepthRangeOfMap range{HUGE_VAL, 0};
+  ForEachDepth(depth, [&](int, int, float z) {
+    range.near_z = std::min<double>(range.near_z, z);
+    range.far_z = std::max<double>(range.far_z, z);
+  });
+  if (range.far_z == 0) return {};
+  if (range.near_z == range.far_z) range.far_z *= 1 + kNarrowestRange;
+  return range;
+}
+
+}  // namespace dtr::io

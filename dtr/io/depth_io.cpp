@@ -1,0 +1,194 @@
+#include "dtr/io/depth_io.h"
+
+#include <bit>
+#include <cmath>
+
+#include "dtr/base/error.h"
+#include "dtr/base/files.h"
+#include "dtr/io/oiio_files.h"
+
+namespace dtr::io {
+namespace {
+
+namespace fs = std::filesystem;
+using OIIO::ImageSpec;
+using OIIO::TypeDesc;
+
+constexpr float kHalfMax = 65504;
+
+int DepthChannel(const ImageSpec& spec) {
+  for (const char* name : {"Z", "Y"}) {
+    const int channel = spec.channelindex(name);
+    if (channel >= 0) return channel;
+  }
+  return 0;
+}
+
+// Errors of the pure coding functions name a pixel; this puts the file in front.
+template <typename Function>
+auto Naming(const fs::path& file, const Function& function) {
+  try {
+    return function();
+  } catch (const Error& error) {
+    throw Error(file.string() + ": " + error.what());
+  }
+}
+
+Grid<float> ReadFloatsOf(OIIO::ImageInput& in, const fs::path& file) {
+  const ImageSpec& spec = in.spec();
+  if (!spec.format.is_floating_point()) {
+    throw Error(file.string() + ": expected float samples, found " +
+                std::string(spec.format.c_str()) + "; say how its numbers are coded");
+  }
+  Grid<float> grid(spec.width, spec.height);
+  const int channel = DepthChannel(spec);
+  ReadPixels(in, file, channel, channel + 1, TypeDesc::FLOAT, grid.data().data());
+  return grid;
+}
+
+Grid<std::uint16_t> ReadCodesOf(OIIO::ImageInput& in, const fs::path& file) {
+  const ImageSpec& spec = in.spec();
+  if (spec.format.basetype != TypeDesc::UINT16 || spec.nchannels != 1) {
+    throw Error(file.string() + ": expected one channel of 16 bits, found " +
+                std::to_string(spec.nchannels) + " of " + std::string(spec.format.c_str()));
+  }
+  Grid<std::uint16_t> grid(spec.width, spec.height);
+  ReadPixels(in, file, 0, 1, TypeDesc::UINT16, grid.data().data());
+  return grid;
+}
+
+// Every depth read must be one that WriteDepth would have accepted.
+void ExpectStoredDepth(const DepthImage& depth, const DepthFormat& format) {
+  const float near_z = static_cast<float>(format.near_z);
+  const float far_z = static_cast<float>(format.far_z);
+  for (int y = 0; y < depth.height(); ++y) {
+    for (int x = 0; x < depth.width(); ++x) {
+      const float z = depth(x, y);
+      if (z == 0 || (z >= near_z && z <= far_z)) continue;
+      throw Error("depth pixel (" + std::to_string(x) + ", " + std::to_string(y) +
+                  "): expected 0 or a depth in [" + std::to_string(near_z) + ", " +
+                  std::to_string(far_z) + "], found " + std::to_string(z));
+    }
+  }
+}
+
+DepthImage FromFloats(Grid<float> values) {
+  DepthImage depth(values.width(), values.height());
+  depth.grid() = std::move(values);
+  return depth;
+}
+
+// Keeps 12 significant bits, ties to even; a carry into the exponent is right by design of IEEE
+// 754. Numbers below float's normal range keep fewer, which no image measures.
+float KeepTwelveBits(float value) {
+  constexpr std::uint32_t kDropped = 12;  // of 23 stored mantissa bits
+  const std::uint32_t bits = std::bit_cast<std::uint32_t>(value);
+  const std::uint32_t odd = (bits >> kDropped) & 1u;
+  return std::bit_cast<float>((bits + (1u << (kDropped - 1)) - 1u + odd) &
+                              ~((1u << kDropped) - 1u));
+}
+
+void ExpectSigma(const fs::path& file, const Grid<float>& sigma) {
+  for (const float value : sigma.data()) {
+    if (!(value >= 0) || !std::isfinite(value)) {
+      throw Error(file.string() + ": expected finite sigmas of at least 0, found " +
+                  std::to_string(value));
+    }
+  }
+}
+
+}  // namespace
+
+Grid<float> ReadFloatGrid(const fs::path& file, std::uint64_t limit_px) {
+  return ReadFloatsOf(*OpenImage(file, limit_px), file);
+}
+
+void WriteExr(const fs::path& file, const Grid<float>& grid, bool half) {
+  if (grid.empty() || grid.channels() != 1) {
+    throw Error(file.string() + ": expected one channel of floats to write");
+  }
+  if (half) {
+    for (const float value : grid.data()) {
+      if (std::abs(value) > kHalfMax) {
+        throw Error(file.string() + ": expected values within half's range, 65504, found " +
+                    std::to_string(value));
+      }
+    }
+  }
+  ImageSpec spec(grid.width(), grid.height(), 1, half ? TypeDesc::HALF : TypeDesc::FLOAT);
+  spec.channelnames = {"Y"};
+  spec.attribute("compression", "zip");
+  spec.attribute("DateTime", "");  // else OpenImageIO writes the time of day
+  WriteFileAtomically(file, EncodeImage(".exr", spec, TypeDesc::FLOAT, grid.data().data()));
+}
+
+Grid<std::uint16_t> ReadPng16(const fs::path& file, std::uint64_t limit_px) {
+  return ReadCodesOf(*OpenImage(file, limit_px), file);
+}
+
+void WritePng16(const fs::path& file, const Grid<std::uint16_t>& grid) {
+  if (grid.empty() || grid.channels() != 1) {
+    throw Error(file.string() + ": expected one channel of 16 bits to write");
+  }
+  const ImageSpec spec(grid.width(), grid.height(), 1, TypeDesc::UINT16);
+  WriteFileAtomically(file, EncodeImage(".png", spec, TypeDesc::UINT16, grid.data().data()));
+}
+
+void WriteDepth(const fs::path& file, const DepthImage& depth, const DepthFormat& format) {
+  const DepthImage stored = Naming(file, [&] {
+    DepthImage rounded = RoundToCoding(depth, format);
+    ExpectStoredDepth(rounded, format);
+    return rounded;
+  });
+  switch (format.coding) {
+    case DepthCoding::kExrFloat:
+      return WriteExr(file, stored.grid(), false);
+    case DepthCoding::kExrHalf:
+      return WriteExr(file, stored.grid(), true);
+    case DepthCoding::kPng16Millimetre:
+      return WritePng16(file, EncodePng16Millimetre(stored));
+    case DepthCoding::kPng16InverseDepth:
+      break;
+  }
+  // Encoding the rounded map again gives the same codes (tested), so nothing is rounded twice.
+  WritePng16(file, EncodePng16Inverse(stored, format.near_z, format.far_z));
+}
+
+DepthImage ReadDepth(const fs::path& file, const DepthFormat& format, int width_px, int height_px) {
+  const auto in = OpenImage(file, kImageLimitPx);
+  ExpectSize(*in, file, width_px, height_px);
+  return Naming(file, [&] {
+    DepthImage depth;
+    switch (format.coding) {
+      case DepthCoding::kExrFloat:
+      case DepthCoding::kExrHalf:
+        depth = FromFloats(ReadFloatsOf(*in, "depth"));
+        break;
+      case DepthCoding::kPng16Millimetre:
+        depth = DecodePng16Millimetre(ReadCodesOf(*in, "depth"));
+        break;
+      case DepthCoding::kPng16InverseDepth:
+        depth = DecodePng16Inverse(ReadCodesOf(*in, "depth"), format.near_z, format.far_z);
+        break;
+    }
+    ExpectStoredDepth(depth, format);
+    return depth;
+  });
+}
+
+void WriteSigma(const fs::path& file, const Grid<float>& inverse_depth_sigma) {
+  ExpectSigma(file, inverse_depth_sigma);
+  Grid<float> rounded = inverse_depth_sigma;
+  for (float& value : rounded.data()) value = KeepTwelveBits(value);
+  WriteExr(file, rounded, false);
+}
+
+Grid<float> ReadSigma(const fs::path& file, int width_px, int height_px) {
+  const auto in = OpenImage(file, kImageLimitPx);
+  ExpectSize(*in, file, width_px, height_px);
+  Grid<float> sigma = ReadFloatsOf(*in, file);
+  ExpectSigma(file, sigma);
+  return sigma;
+}
+
+}  // namespace dtr::io

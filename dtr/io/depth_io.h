@@ -1,0 +1,80 @@
+// dtr/io/depth_io.h -- depth maps and float planes on disk (docs/FORMAT.md, sections 4 and 5).
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include "dtr/io/image_io.h"
+#include "dtr/types/dtr_set.h"
+
+namespace dtr::io {
+
+/// Reads one float channel of an EXR, float TIFF or other float image, shape (height, width):
+/// the channel named Z, else Y, else the first. Values as in the file, including NaN, infinity and
+/// negative ones: what they mean is for the importer to say. Throws Error for integer images.
+Grid<float> ReadFloatGrid(const std::filesystem::path& file,
+                          std::uint64_t limit_px = kImageLimitPx);
+
+/// Writes one channel named Y, ZIP, float32 or half; deterministic bytes. With `half`, values that
+/// half cannot hold (|v| > 65504) are refused. Throws Error.
+void WriteExr(const std::filesystem::path& file, const Grid<float>& grid, bool half = false);
+
+/// 16-bit grey PNG, values as stored. Throws Error when the file is not one channel of 16 bits.
+Grid<std::uint16_t> ReadPng16(const std::filesystem::path& file,
+                              std::uint64_t limit_px = kImageLimitPx);
+void WritePng16(const std::filesystem::path& file, const Grid<std::uint16_t>& grid);
+
+/// What the numbers in a depth file mean.
+struct DepthFormat {
+  DepthCoding coding = DepthCoding::kPng16InverseDepth;
+  double near_z = 0, far_z = 0;            ///< range of the stored depths, scene units
+  LengthUnit unit = LengthUnit::kUnknown;  ///< kPng16Millimetre needs kMetre
+};
+
+/// "exr-float", "exr-half", "png16-mm", "png16-inverse".
+const char* NameOf(DepthCoding coding);
+/// Inverse. Throws UsageError naming the known codings.
+DepthCoding DepthCodingFromName(const std::string& name);
+/// ".exr" or ".png".
+const char* ExtensionOf(DepthCoding coding);
+
+/// 16-bit inverse depth: code 0 a hole, c = 1..65535:
+/// 1/z = 1/far + (c - 1)/65534 * (1/near - 1/far); c = 65535 is exactly near, c = 1 exactly far.
+/// |error of 1/z| is at most half a step of (1/near - 1/far)/65534.
+/// Throws Error unless 0 < near < far < infinity and every depth lies in [near, far] (compared as
+/// float32); the map must be plane z.
+Grid<std::uint16_t> EncodePng16Inverse(const DepthImage& depth, double near_z, double far_z);
+DepthImage DecodePng16Inverse(const Grid<std::uint16_t>& codes, double near_z, double far_z);
+
+/// 16-bit millimetres of a depth in metres: code 0 a hole. Throws Error for depths that round to
+/// less than 1 mm or to more than 65.535 m.
+Grid<std::uint16_t> EncodePng16Millimetre(const DepthImage& depth_m);
+DepthImage DecodePng16Millimetre(const Grid<std::uint16_t>& codes);
+
+/// The depth that reading back would give: `depth` rounded to what the coding can hold.
+/// Throws Error where WriteDepth would.
+DepthImage RoundToCoding(const DepthImage& depth, const DepthFormat& format);
+
+/// Smallest and largest depth of a map, for a view that has no range yet. A map of one depth gets
+/// a range a thousandth wide; a map of holes only gets [1, 2].
+struct DepthRangeOfMap {
+  double near_z = 1, far_z = 2;
+};
+DepthRangeOfMap RangeOf(const DepthImage& depth);
+
+/// Writes a plane-z map in its coding. Throws Error when a depth lies outside [near_z, far_z], is
+/// NaN, infinite or negative, or does not fit the coding.
+void WriteDepth(const std::filesystem::path& file, const DepthImage& depth,
+                const DepthFormat& format);
+/// Reads it back as plane z. `width_px`, `height_px`: the size it must have, checked before any
+/// pixel is read. Throws Error for another size, a damaged file or depths outside the range.
+DepthImage ReadDepth(const std::filesystem::path& file, const DepthFormat& format, int width_px,
+                     int height_px);
+
+/// Standard deviation of inverse depth, 1/scene unit, one number per depth pixel, 0 where depth is
+/// a hole: float32 EXR whose numbers keep 12 significant bits (relative error at most 2^-12), for
+/// a third of the size. Throws Error for negative or not finite values.
+void WriteSigma(const std::filesystem::path& file, const Grid<float>& inverse_depth_sigma);
+Grid<float> ReadSigma(const std::filesystem::path& file, int width_px, int height_px);
+
+}  // namespace dtr::io

@@ -1,0 +1,260 @@
+#include "dtr/io/image_io.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <vector>
+
+#include "dtr/base/error.h"
+#include "dtr/base/files.h"
+#include "dtr/io/oiio_files.h"
+
+namespace dtr::io {
+namespace {
+
+namespace fs = std::filesystem;
+using OIIO::ImageSpec;
+using OIIO::TypeDesc;
+
+bool IsFloat(const TypeDesc& type) {
+  return type.basetype == TypeDesc::HALF || type.basetype == TypeDesc::FLOAT ||
+         type.basetype == TypeDesc::DOUBLE;
+}
+
+std::optional<double> PositiveNumber(const ImageSpec& spec, const char* name) {
+  const float value = spec.get_float_attribute(name, 0);
+  if (!std::isfinite(value) || value <= 0) return std::nullopt;
+  return value;
+}
+
+// Degrees from EXIF's three rationals (degrees, minutes, seconds); south and west are negative.
+std::optional<double> GpsAngle(const ImageSpec& spec, const char* name, const char* ref_name,
+                               char negative) {
+  const OIIO::ParamValue* value = spec.find_attribute(name);
+  if (value == nullptr || value->type().basevalues() < 3) return std::nullopt;
+  const double angle_deg = value->get_float_indexed(0) + value->get_float_indexed(1) / 60.0 +
+                           value->get_float_indexed(2) / 3600.0;
+  if (!std::isfinite(angle_deg) || angle_deg < 0 || angle_deg > 180) return std::nullopt;
+  const std::string ref(spec.get_string_attribute(ref_name));
+  return !ref.empty() && ref[0] == negative ? -angle_deg : angle_deg;
+}
+
+std::optional<GpsPosition> GpsOf(const ImageSpec& spec) {
+  const auto latitude = GpsAngle(spec, "GPS:Latitude", "GPS:LatitudeRef", 'S');
+  const auto longitude = GpsAngle(spec, "GPS:Longitude", "GPS:LongitudeRef", 'W');
+  if (!latitude || !longitude || std::abs(*latitude) > 90) return std::nullopt;
+  GpsPosition gps{*latitude, *longitude, std::nullopt};
+  if (spec.find_attribute("GPS:Altitude") != nullptr) {
+    const double altitude_m = spec.get_float_attribute("GPS:Altitude", NAN);
+    const bool below = spec.get_int_attribute("GPS:AltitudeRef", 0) == 1;
+    if (std::isfinite(altitude_m)) gps.altitude_m = below ? -altitude_m : altitude_m;
+  }
+  return gps;
+}
+
+// EXIF tag 0xA20E counts pixels per unit 0xA210: 2 = inch, 3 = centimetre.
+std::optional<double> FocalPlanePxPerMm(const ImageSpec& spec) {
+  const auto resolution = PositiveNumber(spec, "Exif:FocalPlaneXResolution");
+  if (!resolution) return std::nullopt;
+  const int unit = spec.get_int_attribute("Exif:FocalPlaneResolutionUnit", 2);
+  if (unit == 2) return *resolution / 25.4;
+  if (unit == 3) return *resolution / 10.0;
+  return std::nullopt;
+}
+
+int ExifOrientationOf(const ImageSpec& spec) {
+  const int orientation = spec.get_int_attribute("Orientation", 1);
+  return orientation >= 1 && orientation <= 8 ? orientation : 1;
+}
+
+// The usual transfer function of IEC 61966-2-1, rounded to 8 bits.
+std::uint8_t Srgb8FromLinear(float linear) {
+  const double v = std::clamp(static_cast<double>(linear), 0.0, 1.0);
+  const double coded = v <= 0.0031308 ? 12.92 * v : 1.055 * std::pow(v, 1 / 2.4) - 0.055;
+  return static_cast<std::uint8_t>(std::lround(coded * 255));
+}
+
+// Channels to read: RGB of colour images, the one channel of grey ones; alpha and more are left.
+int ColourChannels(const ImageSpec& spec) { return spec.nchannels >= 3 ? 3 : 1; }
+
+// Pixels as 8-bit sRGB with the file's number of colour channels.
+Grid<std::uint8_t> ReadColours(OIIO::ImageInput& in, const fs::path& file) {
+  const ImageSpec& spec = in.spec();
+  const int channels = ColourChannels(spec);
+  Grid<std::uint8_t> pixels(spec.width, spec.height, channels);
+  if (spec.format.basetype == TypeDesc::UINT8) {
+    ReadPixels(in, file, 0, channels, TypeDesc::UINT8, pixels.data().data());
+    return pixels;
+  }
+  const bool linear = IsFloat(spec.format);
+  std::vector<float> values(pixels.data().size());
+  ReadPixels(in, file, 0, channels, TypeDesc::FLOAT, values.data());
+  for (size_t i = 0; i < values.size(); ++i) {
+    if (!std::isfinite(values[i])) {
+      throw Error(file.string() + ": expected finite colours, found NaN or infinity");
+    }
+    pixels.data()[i] =
+        linear ? Srgb8FromLinear(values[i])
+               : static_cast<std::uint8_t>(std::lround(std::clamp(values[i], 0.0f, 1.0f) * 255.0f));
+  }
+  return pixels;
+}
+
+ImageRgb8 RgbFromGrey(const Grid<std::uint8_t>& grey) {
+  ImageRgb8 rgb(grey.width(), grey.height(), 3);
+  for (size_t i = 0; i < grey.data().size(); ++i) {
+    std::fill_n(rgb.data().begin() + static_cast<std::ptrdiff_t>(3 * i), 3, grey.data()[i]);
+  }
+  return rgb;
+}
+
+std::string LowerExtension(const fs::path& file) {
+  std::string extension = file.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension;
+}
+
+void ExpectRgb(const fs::path& file, const ImageRgb8& image) {
+  if (image.empty() || image.channels() != 3) {
+    throw Error(file.string() + ": expected an image of 3 channels to write, found " +
+                std::to_string(image.empty() ? 0 : image.channels()));
+  }
+}
+
+std::string EncodeJpeg(const ImageRgb8& image, int quality, ImageSpec spec) {
+  spec.attribute("CompressionQuality", std::clamp(quality, 1, 100));
+  spec.attribute("jpeg:subsampling", "4:4:4");
+  return EncodeImage(".jpg", spec, TypeDesc::UINT8, image.data().data());
+}
+
+}  // namespace
+
+ImageHeader ReadImageHeader(const fs::path& file) {
+  const auto in = OpenImage(file, UINT64_MAX);
+  const ImageSpec& spec = in->spec();
+  ImageHeader header;
+  header.width_px = spec.width;
+  header.height_px = spec.height;
+  header.channels = spec.nchannels;
+  header.bits =
+      spec.get_int_attribute("oiio:BitsPerSample", static_cast<int>(spec.format.size() * 8));
+  header.is_float = IsFloat(spec.format);
+  header.format = in->format_name();
+  header.exif_orientation = ExifOrientationOf(spec);
+  header.focal_mm = PositiveNumber(spec, "Exif:FocalLength");
+  header.focal_35mm = PositiveNumber(spec, "Exif:FocalLengthIn35mmFilm");
+  header.focal_plane_px_per_mm = FocalPlanePxPerMm(spec);
+  header.make = spec.get_string_attribute("Make");
+  header.model = spec.get_string_attribute("Model");
+  header.lens_model = spec.get_string_attribute("Exif:LensModel");
+  header.date_time = spec.get_string_attribute("Exif:DateTimeOriginal");
+  header.gps = GpsOf(spec);
+  return header;
+}
+
+ImageRgb8 ReadImage(const fs::path& file, const ImageReadOptions& options) {
+  const auto in = OpenImage(file, options.limit_px);
+  Grid<std::uint8_t> pixels = ReadColours(*in, file);
+  if (pixels.channels() == 1) pixels = RgbFromGrey(pixels);
+  if (!options.apply_exif_orientation) return pixels;
+  return ApplyExifOrientation(pixels, ExifOrientationOf(in->spec()));
+}
+
+Mask ReadMask(const fs::path& file, std::uint64_t limit_px) {
+  const auto in = OpenImage(file, limit_px);
+  Mask mask(in->spec().width, in->spec().height);
+  ReadPixels(*in, file, 0, 1, TypeDesc::UINT8, mask.data().data());
+  for (std::uint8_t& value : mask.data()) value = value >= 128 ? 255 : 0;
+  return mask;
+}
+
+void WriteImage(const fs::path& file, const ImageRgb8& image, int jpeg_quality) {
+  ExpectRgb(file, image);
+  const std::string extension = LowerExtension(file);
+  const ImageSpec spec(image.width(), image.height(), 3, TypeDesc::UINT8);
+  if (extension == ".png") {
+    WriteFileAtomically(file, EncodeImage(".png", spec, TypeDesc::UINT8, image.data().data()));
+  } else if (extension == ".jpg" || extension == ".jpeg") {
+    WriteFileAtomically(file, EncodeJpeg(image, jpeg_quality, spec));
+  } else {
+    throw UsageError(file.string() + ": expected a name ending in .png or .jpg, found '" +
+                     extension + "'");
+  }
+}
+
+void WriteImageWithAlpha(const fs::path& file, const ImageRgb8& image, const Mask& alpha) {
+  ExpectRgb(file, image);
+  if (LowerExtension(file) != ".png") {
+    throw UsageError(file.string() + ": expected a name ending in .png, as alpha needs PNG");
+  }
+  if (alpha.width() != image.width() || alpha.height() != image.height()) {
+    throw Error(file.string() + ": expected alpha of the image's size, found " +
+                std::to_string(alpha.width()) + "x" + std::to_string(alpha.height()));
+  }
+  Grid<std::uint8_t> rgba(image.width(), image.height(), 4);
+  for (size_t i = 0; i < alpha.data().size(); ++i) {
+    for (size_t c = 0; c < 3; ++c) rgba.data()[4 * i + c] = image.data()[3 * i + c];
+    rgba.data()[4 * i + 3] = alpha.data()[i];
+  }
+  ImageSpec spec(image.width(), image.height(), 4, TypeDesc::UINT8);
+  spec.attribute("oiio:UnassociatedAlpha", 1);
+  WriteFileAtomically(file, EncodeImage(".png", spec, TypeDesc::UINT8, rgba.data().data()));
+}
+
+void WriteMask(const fs::path& file, const Mask& mask) {
+  if (mask.empty() || mask.channels() != 1) {
+    throw Error(file.string() + ": expected a mask of 1 channel to write");
+  }
+  const ImageSpec spec(mask.width(), mask.height(), 1, TypeDesc::UINT8);
+  WriteFileAtomically(file, EncodeImage(".png", spec, TypeDesc::UINT8, mask.data().data()));
+}
+
+void WriteJpegWithExif(const fs::path& file, const ImageRgb8& image, int quality,
+                       const ExifFocal& exif) {
+  ExpectRgb(file, image);
+  ImageSpec spec(image.width(), image.height(), 3, TypeDesc::UINT8);
+  if (!exif.make.empty()) spec.attribute("Make", exif.make);
+  if (!exif.model.empty()) spec.attribute("Model", exif.model);
+  if (exif.focal_mm) spec.attribute("Exif:FocalLength", static_cast<float>(*exif.focal_mm));
+  if (exif.focal_35mm) {
+    spec.attribute("Exif:FocalLengthIn35mmFilm", static_cast<int>(std::lround(*exif.focal_35mm)));
+  }
+  WriteFileAtomically(file, EncodeJpeg(image, quality, spec));
+}
+
+ImageRgb8 ApplyExifOrientation(const ImageRgb8& image, int exif_orientation) {
+  if (exif_orientation < 2 || exif_orientation > 8) return image;
+  const int w = image.width(), h = image.height();
+  const bool transposed = exif_orientation >= 5;
+  ImageRgb8 upright(transposed ? h : w, transposed ? w : h, 3);
+  // Where pixel (x, y) of the upright image lies in the stored one; EXIF 2.3, tag 0x0112.
+  const auto stored = [&](int x, int y) -> std::array<int, 2> {
+    switch (exif_orientation) {
+      case 2:
+        return {w - 1 - x, y};
+      case 3:
+        return {w - 1 - x, h - 1 - y};
+      case 4:
+        return {x, h - 1 - y};
+      case 5:
+        return {y, x};
+      case 6:
+        return {y, h - 1 - x};
+      case 7:
+        return {w - 1 - y, h - 1 - x};
+      default:
+        return {w - 1 - y, x};
+    }
+  };
+  for (int y = 0; y < upright.height(); ++y) {
+    for (int x = 0; x < upright.width(); ++x) {
+      const auto [sx, sy] = stored(x, y);
+      for (int c = 0; c < 3; ++c) upright(x, y, c) = image(sx, sy, c);
+    }
+  }
+  return upright;
+}
+
+}  // namespace dtr::io

@@ -1,0 +1,89 @@
+// dtr/io/image_io.h -- photos and masks in, pictures out.
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "dtr/types/grid.h"
+
+namespace dtr::io {
+
+/// Where a photo says it was taken, WGS84 (EXIF tags 0x8825).
+struct GpsPosition {
+  double latitude_deg = 0;           ///< north positive
+  double longitude_deg = 0;          ///< east positive
+  std::optional<double> altitude_m;  ///< above sea level
+};
+
+/// What a file says about its image, before any pixel is read.
+struct ImageHeader {
+  int width_px = 0, height_px = 0;  ///< as stored, before the EXIF orientation
+  int channels = 0;
+  int bits = 0;              ///< per channel
+  bool is_float = false;     ///< float samples: linear light by convention
+  std::string format;        ///< OpenImageIO's name of the format: "jpeg", "png", ...
+  int exif_orientation = 1;  ///< 1..8; 1 = upright
+  std::optional<double> focal_mm;
+  std::optional<double> focal_35mm;  ///< 35 mm equivalent, as the camera wrote it
+  /// Pixels per millimetre on the sensor, horizontal, where the file tells it.
+  std::optional<double> focal_plane_px_per_mm;
+  std::string make, model, lens_model;
+  std::string date_time;  ///< "YYYY:MM:DD HH:MM:SS" of the exposure, or empty
+  std::optional<GpsPosition> gps;
+};
+
+/// Reads a file's header. Throws Error when the file is no image OpenImageIO knows.
+/// EXIF values that make no sense (zero, negative, NaN) are left out, as cameras write zeros there.
+ImageHeader ReadImageHeader(const std::filesystem::path& file);
+
+/// Default of the reading limits: 400 Mpx hold every camera sold, and 1.2 GB of memory at RGB.
+inline constexpr std::uint64_t kImageLimitPx = 400'000'000;
+
+struct ImageReadOptions {
+  bool apply_exif_orientation = false;     ///< turn the image upright
+  std::uint64_t limit_px = kImageLimitPx;  ///< larger images are refused before allocation
+};
+
+/// Reads an image as 8-bit sRGB of 3 channels.
+/// Grey becomes RGB; alpha is dropped (not multiplied in); CMYK JPEG is converted by OpenImageIO.
+/// Integer samples are taken as sRGB-coded and rounded to 8 bits. Float and half samples (EXR, HDR,
+/// float TIFF) are taken as linear light in the sRGB primaries, clipped to [0, 1] and sRGB-coded;
+/// NaN and infinity among them are refused. Only the first image of a file is read.
+/// Throws Error when the file is no image, is damaged or cut short, or is larger than the limit.
+ImageRgb8 ReadImage(const std::filesystem::path& file, const ImageReadOptions& options = {});
+
+/// Reads a mask: the first channel, usable (255) from half of full scale up, else 0. A mask that
+/// went through JPEG thus keeps its shape. Throws like ReadImage.
+Mask ReadMask(const std::filesystem::path& file, std::uint64_t limit_px = kImageLimitPx);
+
+inline constexpr int kDefaultJpegQuality = 95;
+
+/// Writes a PNG (lossless) or JPEG (4:4:4, `jpeg_quality` 1..100), by the file's extension.
+/// Atomic, and the same bytes for the same image: no times, no names.
+/// Throws UsageError for another extension, Error when the file cannot be written.
+void WriteImage(const std::filesystem::path& file, const ImageRgb8& image,
+                int jpeg_quality = kDefaultJpegQuality);
+
+/// Writes a PNG with an alpha channel (not multiplied in). `alpha` must have the image's size.
+void WriteImageWithAlpha(const std::filesystem::path& file, const ImageRgb8& image,
+                         const Mask& alpha);
+
+/// Writes an 8-bit grey PNG.
+void WriteMask(const std::filesystem::path& file, const Mask& mask);
+
+/// What a camera would have written about its lens.
+struct ExifFocal {
+  std::optional<double> focal_mm;
+  std::optional<double> focal_35mm;  ///< rounded to whole millimetres, as EXIF stores it
+  std::string make, model;
+};
+
+/// Writes a JPEG (4:4:4) with EXIF, as a camera would: for photos made by generators.
+void WriteJpegWithExif(const std::filesystem::path& file, const ImageRgb8& image, int quality,
+                       const ExifFocal& exif);
+
+/// The image as it must be turned for EXIF orientation 1..8 (others: unchanged).
+ImageRgb8 ApplyExifOrientation(const ImageRgb8& image, int exif_orientation);
+
+}  // namespace dtr::io

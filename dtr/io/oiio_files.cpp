@@ -1,0 +1,125 @@
+#include "dtr/io/oiio_files.h"
+
+#include <OpenImageIO/filesystem.h>
+
+#include <array>
+#include <fstream>
+#include <mutex>
+#include <vector>
+
+#include "dtr/base/error.h"
+
+namespace dtr::io {
+namespace {
+
+namespace fs = std::filesystem;
+
+// One line, without the full stop and line breaks that decoders add.
+std::string OneLine(std::string text) {
+  for (char& c : text) {
+    if (c == '\n' || c == '\r') c = ' ';
+  }
+  while (!text.empty() && (text.back() == ' ' || text.back() == '.')) text.pop_back();
+  return text;
+}
+
+// Our loops run over files, so OpenImageIO's own threads would only compete with them.
+void SetUpOnce() {
+  static std::once_flag once;
+  std::call_once(once, [] {
+    OIIO::attribute("threads", 1);
+    OIIO::attribute("exr_threads", -1);
+  });
+}
+
+constexpr size_t kPngSignatureBytes = 8;
+
+bool IsPng(std::ifstream& in) {
+  std::array<char, kPngSignatureBytes> start{};
+  in.read(start.data(), start.size());
+  return in.gcount() == static_cast<std::streamsize>(start.size()) &&
+         std::string(start.data(), start.size()) == "\x89PNG\r\n\x1a\n";
+}
+
+// libpng stops after the last row, so a file that lost its end would pass; walk its chunks
+// (PNG specification, section 5.3) up to IEND instead.
+void ExpectWholePng(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  if (!IsPng(in)) return;
+  const std::uintmax_t size = fs::file_size(file);
+  std::uintmax_t at = kPngSignatureBytes;
+  while (at + 12 <= size) {  // length, type and checksum are 4 bytes each
+    std::array<unsigned char, 8> head{};
+    in.seekg(static_cast<std::streamoff>(at));
+    if (!in.read(reinterpret_cast<char*>(head.data()), head.size())) break;
+    const std::uintmax_t length = (std::uintmax_t{head[0]} << 24) |
+                                  (std::uintmax_t{head[1]} << 16) | (std::uintmax_t{head[2]} << 8) |
+                                  head[3];
+    at += 12 + length;
+    if (std::string(head.begin() + 4, head.end()) == "IEND" && at <= size) return;
+  }
+  throw Error(file.string() + ": PNG cut short: expected chunks up to IEND, found " +
+              std::to_string(size) + " bytes; copy the file again");
+}
+
+}  // namespace
+
+std::unique_ptr<OIIO::ImageInput> OpenImage(const fs::path& file, std::uint64_t limit_px) {
+  SetUpOnce();
+  std::error_code error;
+  if (!fs::is_regular_file(file, error)) {
+    throw Error(file.string() + ": expected an image file, found " +
+                (fs::exists(file, error) ? "something else" : "nothing"));
+  }
+  ExpectWholePng(file);
+  OIIO::ImageSpec wishes;  // raw colours: alpha is dropped, not multiplied in
+  wishes.attribute("oiio:UnassociatedAlpha", 1);
+  auto in = OIIO::ImageInput::open(file.string(), &wishes);
+  if (!in) throw Error(file.string() + ": no readable image: " + OneLine(OIIO::geterror()));
+  const OIIO::ImageSpec& spec = in->spec();
+  if (spec.width <= 0 || spec.height <= 0 || spec.nchannels <= 0 || spec.depth > 1) {
+    throw Error(file.string() + ": expected a flat image, found " + std::to_string(spec.width) +
+                "x" + std::to_string(spec.height) + "x" + std::to_string(spec.depth) + " with " +
+                std::to_string(spec.nchannels) + " channels");
+  }
+  const auto found_px =
+      static_cast<std::uint64_t>(spec.width) * static_cast<std::uint64_t>(spec.height);
+  if (found_px > limit_px) {
+    throw Error(file.string() + ": expected at most " + std::to_string(limit_px) +
+                " pixels, found " + std::to_string(spec.width) + "x" + std::to_string(spec.height));
+  }
+  return in;
+}
+
+void ReadPixels(OIIO::ImageInput& in, const fs::path& file, int first_channel, int end_channel,
+                OIIO::TypeDesc type, void* pixels) {
+  const bool read = in.read_image(0, 0, first_channel, end_channel, type, pixels);
+  const std::string complaint = in.geterror();
+  if (!read || !complaint.empty()) {
+    throw Error(file.string() + ": damaged image: " + OneLine(complaint));
+  }
+}
+
+std::string EncodeImage(const std::string& extension, const OIIO::ImageSpec& spec,
+                        OIIO::TypeDesc type, const void* pixels) {
+  SetUpOnce();
+  const std::string name = "memory" + extension;
+  auto out = OIIO::ImageOutput::create(name);
+  std::vector<unsigned char> bytes;
+  OIIO::Filesystem::IOVecOutput memory(bytes);
+  if (!out || !out->set_ioproxy(&memory) || !out->open(name, spec) ||
+      !out->write_image(type, pixels) || !out->close()) {
+    throw Error("image cannot be encoded as " + extension + ": " +
+                OneLine(out ? out->geterror() : OIIO::geterror()));
+  }
+  return {bytes.begin(), bytes.end()};
+}
+
+void ExpectSize(const OIIO::ImageInput& in, const fs::path& file, int width_px, int height_px) {
+  if (in.spec().width == width_px && in.spec().height == height_px) return;
+  throw Error(file.string() + ": expected " + std::to_string(width_px) + "x" +
+              std::to_string(height_px) + " pixels, found " + std::to_string(in.spec().width) +
+              "x" + std::to_string(in.spec().height));
+}
+
+}  // namespace dtr::io

@@ -1,0 +1,30 @@
+// dtr/io/oiio_files.h -- internal to dtr/io: OpenImageIO with our rules on errors and limits.
+#pragma once
+#include <OpenImageIO/imageio.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+namespace dtr::io {
+
+/// Opens an image. Throws Error with one line when it cannot be opened, is a PNG cut short, or has
+/// no pixels or more than `limit_px`.
+std::unique_ptr<OIIO::ImageInput> OpenImage(const std::filesystem::path& file,
+                                            std::uint64_t limit_px);
+
+/// Reads channels [0, channels) of the first image into `pixels`, which must have room. Any word of
+/// complaint by the decoder is an Error: half-grey photos must not pass for whole ones.
+void ReadPixels(OIIO::ImageInput& in, const std::filesystem::path& file, int first_channel,
+                int end_channel, OIIO::TypeDesc type, void* pixels);
+
+/// Encodes an image in memory; `extension` chooses the format (".png", ".jpg", ".exr").
+std::string EncodeImage(const std::string& extension, const OIIO::ImageSpec& spec,
+                        OIIO::TypeDesc type, const void* pixels);
+
+/// Throws Error unless the opened image has this size.
+void ExpectSize(const OIIO::ImageInput& in, const std::filesystem::path& file, int width_px,
+                int height_px);
+
+}  // namespace dtr::io

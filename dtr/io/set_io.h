@@ -1,0 +1,148 @@
+// dtr/io/set_io.h -- the D+TR set on disk (docs/FORMAT.md).
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "dtr/io/image_io.h"
+#include "dtr/types/dtr_set.h"
+#include "dtr/types/sparse_scene.h"
+
+namespace dtr::io {
+
+/// Reads and checks set.json, without any pixel. Everything that can be known from the metadata is
+/// checked: version, unit, sizes, finite numbers, unit quaternions, positive focal lengths,
+/// near < far, depth scales, unique safe ids; every named file must lie inside the set's folder
+/// (symbolic links followed) and have its size in bytes.
+/// Throws Error naming file and field:
+/// `set.json: frames[0].views[3].camera.fx_px: expected a positive number, found -1`.
+DtrSet ReadSet(const std::filesystem::path& set_folder);
+
+/// What LoadSet and LoadPixels bring into memory.
+struct LoadOptions {
+  bool images = true;  ///< images and masks
+  bool depth = true;   ///< depth maps
+  bool sigma = false;  ///< standard deviations of inverse depth, where a view has them
+  bool held_out =
+      false;  ///< false: held-out views are left out altogether, so no renderer sees one
+  bool collapse_duplicates = true;  ///< views of equal camera and content count once
+  int threads = 0;                  ///< 0: all cores
+};
+
+/// ReadSet, then the pixels of its views. Throws Error; never gives half a set.
+DtrSet LoadSet(const std::filesystem::path& set_folder, const LoadOptions& options = {});
+
+/// Loads the pixels that `options` ask for into a view of ReadSet; `held_out` and
+/// `collapse_duplicates` do not matter here. Sizes are checked against the view before any pixel is
+/// read. A view without depth or sigma keeps them empty. The depth is the stored one: rounded to
+/// its coding.
+void LoadPixels(const std::filesystem::path& set_folder, View& view, const LoadOptions& options);
+
+/// Points and observations behind the calibration; views are indices into frames[0].views as
+/// ReadSet gives them (held-out views counted). Throws Error when the set has none.
+SparseScene LoadSparse(const std::filesystem::path& set_folder, const DtrSet& set);
+
+/// Removes views whose camera, pose, role and stored content equal those of an earlier view of the
+/// same frame; returns the ids of the removed. Views without content hashes are kept.
+std::vector<std::string> CollapseDuplicates(DtrSet& set);
+
+/// Reads the set, hashes every file again and compares. Returns one line per problem, empty when
+/// all is well; does not throw for a damaged set.
+std::vector<std::string> VerifySet(const std::filesystem::path& set_folder, int threads = 0);
+
+/// Unique ids, safe as file names on every system, from photo names: the name without extension,
+/// other characters than letters, digits, '.', '_', '-' replaced by '_'; where two would be equal
+/// (also but for case), all but the first get "_2", "_3", ... Same names, same ids.
+std::vector<std::string> MakeViewIds(std::span<const std::string> names);
+
+enum class ImageCoding {
+  kPng,   ///< lossless; the default, as every figure is measured on the stored pixels
+  kJpeg,  ///< quality 95, 4:4:4; source views only, held-out ones are always PNG
+};
+
+/// Writes a set, or goes on writing one that was interrupted.
+///
+/// All work happens in `name.dtr.partial`; Finish renames it. A run with the same fingerprint
+/// resumes what an interrupted one left there; nothing is ever lost by a failure. Views may be
+/// written from several threads at once; all else belongs to one thread.
+class SetWriter {
+ public:
+  /// `target`: the set's folder (name.dtr). `fingerprint_json`: a JSON object of everything that
+  /// decides the result (inputs with hashes, options, version); key order does not matter.
+  /// Throws UsageError (exit 2) when `target` exists and `force` is off, when it exists and is no
+  /// D+TR set, when the partial folder is of other inputs or options, or when another process
+  /// writes it now.
+  SetWriter(const std::filesystem::path& target, const std::string& fingerprint_json, bool force,
+            ImageCoding image_coding = ImageCoding::kPng);
+  /// Without Finish, the partial folder stays for the next run.
+  ~SetWriter();
+  SetWriter(const SetWriter&) = delete;
+  SetWriter& operator=(const SetWriter&) = delete;
+
+  /// name.dtr.partial: where everything lies until Finish.
+  const std::filesystem::path& folder() const;
+  /// folder()/work: for checkpoints of other stages; removed by Finish.
+  std::filesystem::path work_folder() const;
+  /// True when an earlier run with this fingerprint left work behind.
+  bool resumed() const;
+
+  /// Writes the pixels that the view has in memory (image, mask, depth, sigma) and fills in their
+  /// StoredFile entries; entries of pixels it does not have are kept, so an image may be written
+  /// first and its depth later. Held-out views go to held_out/ and must have no depth. Fills
+  /// near_z and far_z from the depth when both are 0. The pixels in memory are not changed; what
+  /// LoadPixels gives later is the stored depth, rounded to its coding.
+  /// Throws Error when sizes do not fit or the depth does not fit its coding or range.
+  void WriteView(View& view, LengthUnit unit);
+
+  /// True when WriteView finished this view in an earlier run, with the same camera and pose, and
+  /// its files still have their hashes; then everything it recorded is put back (files, coding,
+  /// scale, range, baseline, gain). Pixels are not loaded: LoadPixels(folder(), view, ...) does.
+  /// The caller looks at view.depth_file to see how far the view had got.
+  bool RestoreView(View& view) const;
+
+  /// Writes sparse.bin; views are indices into frames[0].views.
+  void WriteSparse(DtrSet& set, const SparseScene& scene);
+
+  /// Checks everything ReadSet would, removes files the set does not name from its pixel folders,
+  /// writes set.json, syncs, renames the folder to the target and removes the working files.
+  /// With `force` the old set is moved aside first and deleted last.
+  void Finish(DtrSet& set);
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// Writes set.json anew in a finished set, atomically, for changes that touch metadata only (a
+/// verdict, a baseline). Files are not touched; unknown fields stay. Throws like ReadSet.
+void RewriteMetadata(const std::filesystem::path& set_folder, const DtrSet& set);
+
+/// What a stage of a run cost.
+struct RunStage {
+  std::string name;
+  double wall_s = 0, cpu_s = 0;
+  long peak_rss_kib = 0;
+};
+
+/// report/run.json: what may differ between two runs of equal result. Outside all hashes.
+struct RunRecord {
+  std::vector<std::string> command;  ///< argv
+  std::vector<RunStage> stages;
+  int threads = 0;
+  std::vector<std::string> log;   ///< lines worth keeping
+  std::string extra_json = "{}";  ///< more fields of the same kind
+};
+
+/// Adds host (name, system, processor, cores) and the time of day, and writes report/run.json.
+void WriteRunRecord(const std::filesystem::path& set_folder, const RunRecord& record);
+
+/// For people: a summary and one line per view.
+std::string DescribeSet(const DtrSet& set);
+/// For machines, the output of `dtr info --json`: `unit`, `verdict`, `views[].{id, name, role,
+/// width_px, height_px, ...}` over all frames; pretty-printed.
+std::string InfoJson(const DtrSet& set);
+
+}  // namespace dtr::io

@@ -1,0 +1,234 @@
+#include "dtr/io/image_io.h"
+
+#include <OpenImageIO/imageio.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "dtr/base/error.h"
+#include "dtr/base/files.h"
+#include "dtr/base/random.h"
+#include "tests/support/test_data.h"
+#include "tests/support/truncation.h"
+
+namespace dtr::io {
+namespace {
+
+using OIIO::ImageOutput;
+using OIIO::ImageSpec;
+using OIIO::TypeDesc;
+using testing::TemporaryFolder;
+
+ImageRgb8 RandomImage(int width_px, int height_px, std::uint64_t seed) {
+  Random random(seed);
+  ImageRgb8 image(width_px, height_px, 3);
+  for (auto& value : image.data()) value = static_cast<std::uint8_t>(random.Index(256));
+  return image;
+}
+
+// A smooth image, which JPEG keeps within a few levels.
+ImageRgb8 SmoothImage(int width_px, int height_px) {
+  ImageRgb8 image(width_px, height_px, 3);
+  for (int y = 0; y < height_px; ++y) {
+    for (int x = 0; x < width_px; ++x) {
+      image(x, y, 0) = static_cast<std::uint8_t>(40 + 3 * x);
+      image(x, y, 1) = static_cast<std::uint8_t>(60 + 4 * y);
+      image(x, y, 2) = static_cast<std::uint8_t>(200 - x - y);
+    }
+  }
+  return image;
+}
+
+// Writes a file as some other program would.
+template <typename T>
+void WriteForeign(const std::filesystem::path& file, const ImageSpec& spec,
+                  const std::vector<T>& values) {
+  const auto out = ImageOutput::create(file.string());
+  ASSERT_TRUE(out && out->open(file.string(), spec)) << file;
+  ASSERT_TRUE(out->write_image(OIIO::BaseTypeFromC<T>::value, values.data()));
+  ASSERT_TRUE(out->close());
+}
+
+TEST(WriteImage, PngRoundTripsExactlyAndTheSameBytesTwice) {
+  const TemporaryFolder folder;
+  const ImageRgb8 image = RandomImage(13, 7, 1);
+  for (const char* name : {"a.png", "a.JPG"}) {
+    WriteImage(folder / name, image);
+    const std::string first = ReadFile(folder / name, 1 << 20);
+    WriteImage(folder / name, image);
+    EXPECT_EQ(ReadFile(folder / name, 1 << 20), first);
+  }
+  EXPECT_EQ(ReadImage(folder / "a.png"), image);
+  EXPECT_THROW(WriteImage(folder / "a.tga", image), UsageError);
+  EXPECT_THROW(WriteImage(folder / "no/such/folder.png", image), Error);
+}
+
+TEST(WriteImage, JpegKeepsASmoothImage) {
+  constexpr int kJpegLevels = 3;  // quality 95, no chroma subsampling; worst seen was 2
+  const TemporaryFolder folder;
+  const ImageRgb8 image = SmoothImage(40, 30);
+  WriteImage(folder / "a.jpg", image);
+  const ImageRgb8 back = ReadImage(folder / "a.jpg");
+  ASSERT_EQ(back.data().size(), image.data().size());
+  for (size_t i = 0; i < image.data().size(); ++i) {
+    ASSERT_LE(std::abs(back.data()[i] - image.data()[i]), kJpegLevels);
+  }
+}
+
+TEST(ReadImage, EveryTruncatedPrefixIsAnError) {
+  const TemporaryFolder folder;
+  for (const char* name : {"a.png", "a.jpg"}) {
+    WriteImage(folder / name, RandomImage(9, 8, 2));
+    testing::ExpectEveryPrefixIsAnError(folder / name, 3, [&] { ReadImage(folder / name); });
+  }
+}
+
+TEST(ReadImage, GreyBecomesRgbAndAlphaIsDroppedNotMultiplied) {
+  const TemporaryFolder folder;
+  WriteMask(folder / "grey.png", Mask(3, 2, 1, 77));
+  EXPECT_EQ(ReadImage(folder / "grey.png"), ImageRgb8(3, 2, 3, 77));
+  const ImageRgb8 image = RandomImage(5, 4, 3);
+  Mask alpha(5, 4, 1, 255);
+  alpha(2, 2) = 0;
+  WriteImageWithAlpha(folder / "alpha.png", image, alpha);
+  EXPECT_EQ(ReadImageHeader(folder / "alpha.png").channels, 4);
+  EXPECT_EQ(ReadImage(folder / "alpha.png"), image);
+  EXPECT_THROW(WriteImageWithAlpha(folder / "alpha.png", image, Mask(4, 4)), Error);
+  EXPECT_THROW(WriteImageWithAlpha(folder / "alpha.jpg", image, alpha), UsageError);
+}
+
+TEST(ReadImage, SixteenBitsAreRoundedAndFloatsAreLinearLight) {
+  const TemporaryFolder folder;
+  WriteForeign<std::uint16_t>(folder / "deep.png", ImageSpec(2, 1, 3, TypeDesc::UINT16),
+                              {0, 128, 129, 65535, 32896, 65406});  // 257 per level
+  EXPECT_EQ(ReadImage(folder / "deep.png").data(),
+            (std::vector<std::uint8_t>{0, 0, 1, 255, 128, 254}));
+  // IEC 61966-2-1: 0.2158605 linear is 0.5019608 = 128/255; above 1 and below 0 is clipped.
+  WriteForeign<float>(folder / "linear.exr", ImageSpec(1, 1, 3, TypeDesc::FLOAT),
+                      {0.2158605f, 7.0f, -1.0f});
+  EXPECT_EQ(ReadImage(folder / "linear.exr").data(), (std::vector<std::uint8_t>{128, 255, 0}));
+}
+
+TEST(ReadImage, RefusesNaNAndInfinity) {
+  const TemporaryFolder folder;
+  for (const float bad : {std::numeric_limits<float>::quiet_NaN(), HUGE_VALF}) {
+    WriteForeign<float>(folder / "bad.exr", ImageSpec(1, 1, 3, TypeDesc::FLOAT), {0, bad, 0});
+    EXPECT_THROW(ReadImage(folder / "bad.exr"), Error);
+  }
+}
+
+TEST(ReadImage, RefusesTextFoldersAbsentFilesAndTooManyPixels) {
+  const TemporaryFolder folder;
+  WriteFileAtomically(folder / "text.jpg", "this is no photo");
+  EXPECT_THROW(ReadImage(folder / "text.jpg"), Error);
+  EXPECT_THROW(ReadImageHeader(folder / "text.jpg"), Error);
+  EXPECT_THROW(ReadImage(folder / "absent.jpg"), Error);
+  EXPECT_THROW(ReadImage(folder.path()), Error);
+  WriteImage(folder / "a.png", ImageRgb8(10, 10, 3));
+  EXPECT_NO_THROW(ReadImage(folder / "a.png", {.limit_px = 100}));
+  EXPECT_THROW(ReadImage(folder / "a.png", {.limit_px = 99}), Error);
+}
+
+TEST(ReadImage, TurnsThePhotoUprightOnRequest) {
+  const TemporaryFolder folder;
+  // EXIF 6: the stored left edge is the top after a quarter turn clockwise.
+  ImageSpec spec(2, 1, 3, TypeDesc::UINT8);
+  spec.attribute("Orientation", 6);
+  WriteForeign<std::uint8_t>(folder / "six.tif", spec, {1, 1, 1, 2, 2, 2});
+  EXPECT_EQ(ReadImageHeader(folder / "six.tif").exif_orientation, 6);
+  EXPECT_EQ(ReadImage(folder / "six.tif").width(), 2);
+  const ImageRgb8 upright = ReadImage(folder / "six.tif", {.apply_exif_orientation = true});
+  ASSERT_EQ(upright.height(), 2);
+  EXPECT_EQ(upright(0, 0), 1);
+  EXPECT_EQ(upright(0, 1), 2);
+}
+
+TEST(ApplyExifOrientation, FollowsTheCornersOfTheExifTable) {
+  // Stored 3x2:  1 2 3      where the stored corners 1, 3, 4 and 6 land, in the order
+  //              4 5 6      top left, top right, bottom left, bottom right (EXIF 2.3, 0x0112).
+  ImageRgb8 image(3, 2, 3);
+  for (int i = 0; i < 6; ++i) image(i % 3, i / 3, 0) = static_cast<std::uint8_t>(i + 1);
+  const int corners[9][4] = {{},           {1, 3, 4, 6}, {3, 1, 6, 4}, {6, 4, 3, 1}, {4, 6, 1, 3},
+                             {1, 4, 3, 6}, {4, 1, 6, 3}, {6, 3, 4, 1}, {3, 6, 1, 4}};
+  for (int orientation = 1; orientation <= 8; ++orientation) {
+    const ImageRgb8 up = ApplyExifOrientation(image, orientation);
+    const int right = up.width() - 1, bottom = up.height() - 1;
+    EXPECT_EQ(up(0, 0), corners[orientation][0]) << orientation;
+    EXPECT_EQ(up(right, 0), corners[orientation][1]) << orientation;
+    EXPECT_EQ(up(0, bottom), corners[orientation][2]) << orientation;
+    EXPECT_EQ(up(right, bottom), corners[orientation][3]) << orientation;
+  }
+}
+
+TEST(WriteJpegWithExif, HeaderReadsTheLensBack) {
+  const TemporaryFolder folder;
+  WriteJpegWithExif(folder / "a.jpg", SmoothImage(32, 20), 95, {4.25, 26.0, "Acme", "Model 1"});
+  const ImageHeader header = ReadImageHeader(folder / "a.jpg");
+  EXPECT_EQ(header.width_px, 32);
+  EXPECT_EQ(header.height_px, 20);
+  EXPECT_EQ(header.bits, 8);
+  EXPECT_EQ(header.format, "jpeg");
+  EXPECT_FALSE(header.is_float);
+  EXPECT_NEAR(header.focal_mm.value_or(0), 4.25, 1e-4);  // EXIF stores a rational
+  EXPECT_EQ(header.focal_35mm, 26);
+  EXPECT_EQ(header.make, "Acme");
+  EXPECT_EQ(header.model, "Model 1");
+  EXPECT_FALSE(header.gps);
+  const std::string first = ReadFile(folder / "a.jpg", 1 << 20);
+  WriteJpegWithExif(folder / "a.jpg", SmoothImage(32, 20), 95, {4.25, 26.0, "Acme", "Model 1"});
+  EXPECT_EQ(ReadFile(folder / "a.jpg", 1 << 20), first);
+}
+
+TEST(ReadImageHeader, LeavesOutWhatMakesNoSense) {
+  const TemporaryFolder folder;
+  ImageSpec spec(2, 2, 3, TypeDesc::UINT8);
+  spec.attribute("Exif:FocalLength", 0.0f);
+  spec.attribute("Exif:FocalLengthIn35mmFilm", 0);
+  spec.attribute("Make", "Zero");
+  WriteForeign<std::uint8_t>(folder / "zero.jpg", spec, std::vector<std::uint8_t>(12));
+  const ImageHeader header = ReadImageHeader(folder / "zero.jpg");
+  EXPECT_EQ(header.make, "Zero");
+  EXPECT_FALSE(header.focal_mm);
+  EXPECT_FALSE(header.focal_35mm);
+}
+
+TEST(ReadImageHeader, ReadsTheGpsPositionSouthAndWestNegative) {
+  const TemporaryFolder folder;
+  ImageSpec spec(2, 2, 3, TypeDesc::UINT8);
+  const float latitude[3] = {33, 30, 36}, longitude[3] = {70, 15, 0};
+  spec.attribute("GPS:LatitudeRef", "S");
+  spec.attribute("GPS:Latitude", TypeDesc(TypeDesc::FLOAT, 3), latitude);
+  spec.attribute("GPS:LongitudeRef", "W");
+  spec.attribute("GPS:Longitude", TypeDesc(TypeDesc::FLOAT, 3), longitude);
+  spec.attribute("GPS:Altitude", 512.5f);
+  WriteForeign<std::uint8_t>(folder / "gps.jpg", spec, std::vector<std::uint8_t>(12));
+  const auto gps = ReadImageHeader(folder / "gps.jpg").gps;
+  ASSERT_TRUE(gps);
+  EXPECT_NEAR(gps->latitude_deg, -33.51, 1e-6);
+  EXPECT_NEAR(gps->longitude_deg, -70.25, 1e-6);
+  EXPECT_NEAR(gps->altitude_m.value_or(0), 512.5, 1e-3);
+}
+
+TEST(ReadMask, HalfScaleAndMoreIsUsable) {
+  const TemporaryFolder folder;
+  Mask grey(3, 1);
+  grey(0, 0) = 127;
+  grey(1, 0) = 128;
+  grey(2, 0) = 250;
+  WriteMask(folder / "m.png", grey);
+  EXPECT_EQ(ReadMask(folder / "m.png").data(), (std::vector<std::uint8_t>{0, 255, 255}));
+}
+
+TEST(ReadImageHeader, RealPhotosOfSceaux) {
+  const auto photo = testing::DataFolder() / "sceaux_castle/images/100_7100.JPG";
+  DTR_REQUIRE_DATA(photo);
+  const ImageHeader header = ReadImageHeader(photo);
+  EXPECT_EQ(header.width_px, 2832);
+  EXPECT_EQ(header.height_px, 2128);
+  EXPECT_TRUE(header.focal_mm);
+  EXPECT_FALSE(header.make.empty());
+}
+
+}  // namespace
+}  // namespace dtr::io
