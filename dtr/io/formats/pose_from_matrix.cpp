@@ -2,7 +2,6 @@
 
 #include <Eigen/LU>
 #include <Eigen/SVD>
-#include <cmath>
 
 #include "dtr/base/error.h"
 
@@ -12,13 +11,9 @@ namespace {
 using Matrix3l = Eigen::Matrix<long double, 3, 3>;
 using Vector3l = Eigen::Matrix<long double, 3, 1>;
 
-}  // namespace
-
-Pose PoseFromMatrix(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation,
-                    double tolerance, const std::string& what) {
-  if (!rotation.allFinite() || !translation.allFinite()) {
-    throw Error(what + ": expected finite numbers, found NaN or infinity; correct the pose");
-  }
+// Checks, then the nearest rotation.
+Eigen::Quaterniond RotationFrom(const Eigen::Matrix3d& rotation, double tolerance,
+                                const std::string& what) {
   const double deviation =
       (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
   if (!(deviation <= tolerance)) {
@@ -31,22 +26,54 @@ Pose PoseFromMatrix(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& tran
                 "axes than its format says");
   }
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(rotation, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Pose pose;
-  pose.rotation = Eigen::Quaterniond(svd.matrixU() * svd.matrixV().transpose()).normalized();
-  // R C + t = 0 with the given R; then t again from the rotation that is kept.
-  const Vector3l center =
-      -(rotation.cast<long double>().inverse() * translation.cast<long double>());
-  const Matrix3l kept = pose.rotation.cast<long double>().normalized().toRotationMatrix();
-  pose.translation = (-(kept * center)).cast<double>();
-  return pose;
+  return Eigen::Quaterniond(svd.matrixU() * svd.matrixV().transpose()).normalized();
+}
+
+// The pose with this rotation whose source has the target's origin at `center`.
+Pose PoseAround(const Eigen::Quaterniond& rotation, const Vector3l& center) {
+  const Matrix3l matrix = rotation.cast<long double>().normalized().toRotationMatrix();
+  return {rotation, (-(matrix * center)).cast<double>()};
+}
+
+void RequireFinite(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation,
+                   const std::string& what) {
+  if (rotation.allFinite() && translation.allFinite()) return;
+  throw Error(what + ": expected finite numbers, found NaN or infinity; correct the pose");
+}
+
+void RequireLastRow(const Eigen::Matrix4d& matrix, const std::string& what) {
+  if (matrix.row(3) == Eigen::RowVector4d(0, 0, 0, 1)) return;
+  throw Error(what + ": expected 0 0 0 1 as the last row of the matrix, found another");
+}
+
+}  // namespace
+
+Pose PoseFromMatrix(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation,
+                    double tolerance, const std::string& what) {
+  RequireFinite(rotation, translation, what);
+  const Eigen::Quaterniond kept = RotationFrom(rotation, tolerance, what);
+  return PoseAround(kept,
+                    -(rotation.cast<long double>().inverse() * translation.cast<long double>()));
 }
 
 Pose PoseFromMatrix(const Eigen::Matrix4d& b_from_a, double tolerance, const std::string& what) {
-  if (b_from_a.row(3) != Eigen::RowVector4d(0, 0, 0, 1)) {
-    throw Error(what + ": expected 0 0 0 1 as the last row of the matrix, found another");
-  }
+  RequireLastRow(b_from_a, what);
   return PoseFromMatrix(b_from_a.topLeftCorner<3, 3>(), b_from_a.topRightCorner<3, 1>(), tolerance,
                         what);
+}
+
+Pose PoseFromCenter(const Eigen::Matrix3d& world_from_cam, const Eigen::Vector3d& center,
+                    double tolerance, const std::string& what) {
+  RequireFinite(world_from_cam, center, what);
+  return PoseAround(RotationFrom(world_from_cam, tolerance, what).conjugate(),
+                    center.cast<long double>());
+}
+
+Pose PoseFromWorldFromCam(const Eigen::Matrix4d& world_from_cam, double tolerance,
+                          const std::string& what) {
+  RequireLastRow(world_from_cam, what);
+  return PoseFromCenter(world_from_cam.topLeftCorner<3, 3>(), world_from_cam.topRightCorner<3, 1>(),
+                        tolerance, what);
 }
 
 Eigen::Matrix4d MatrixFromPose(const Pose& b_from_a) {

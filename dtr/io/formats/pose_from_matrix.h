@@ -23,6 +23,15 @@ Pose PoseFromMatrix(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& tran
 /// The same from a 4x4 matrix, whose last row must be 0 0 0 1.
 Pose PoseFromMatrix(const Eigen::Matrix4d& b_from_a, double tolerance, const std::string& what);
 
+/// cam_from_world of a camera given the other way round: its axes as the columns of
+/// `world_from_cam` and its centre in the world. Checks as above; the centre is kept as given.
+Pose PoseFromCenter(const Eigen::Matrix3d& world_from_cam, const Eigen::Vector3d& center,
+                    double tolerance, const std::string& what);
+
+/// The same from a 4x4 world_from_cam matrix, whose last row must be 0 0 0 1.
+Pose PoseFromWorldFromCam(const Eigen::Matrix4d& world_from_cam, double tolerance,
+                          const std::string& what);
+
 /// [rotation | translation; 0 0 0 1].
 Eigen::Matrix4d MatrixFromPose(const Pose& b_from_a);
 

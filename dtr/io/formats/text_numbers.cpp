@@ -1,0 +1,106 @@
+#include "dtr/io/formats/text_numbers.h"
+
+#include <charconv>
+#include <cmath>
+
+#include "dtr/base/error.h"
+#include "dtr/base/files.h"
+
+namespace dtr::io::internal {
+namespace {
+
+constexpr std::uintmax_t kMaxFileBytes = 64u << 20;
+
+bool IsBlank(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
+
+std::string Shown(std::string_view word) {
+  constexpr size_t kMaxShown = 40;
+  std::string shown(word.substr(0, kMaxShown));
+  for (char& c : shown) {
+    if (static_cast<unsigned char>(c) < 32 || static_cast<unsigned char>(c) > 126) c = '?';
+  }
+  return shown;
+}
+
+}  // namespace
+
+TextNumbers::TextNumbers(const std::filesystem::path& file)
+    : text_(ReadFile(file, kMaxFileBytes)), source_(file.string()) {}
+
+TextNumbers::TextNumbers(std::string text, std::string source)
+    : text_(std::move(text)), source_(std::move(source)) {}
+
+bool TextNumbers::AtEnd() {
+  while (position_ < text_.size() && IsBlank(text_[position_])) {
+    if (text_[position_] == '\n') ++line_;
+    ++position_;
+  }
+  return position_ == text_.size();
+}
+
+void TextNumbers::ExpectEnd() {
+  if (AtEnd()) return;
+  const std::string found = Shown(Next());
+  throw Error(Where() + "expected the end of the file, found \"" + found + "\"");
+}
+
+std::string_view TextNumbers::Next() {
+  if (AtEnd()) return {};
+  word_line_ = line_;
+  const size_t begin = position_;
+  while (position_ < text_.size() && !IsBlank(text_[position_])) ++position_;
+  return std::string_view(text_).substr(begin, position_ - begin);
+}
+
+std::string TextNumbers::Where() const { return source_ + ":" + std::to_string(word_line_) + ": "; }
+
+std::string TextNumbers::Word(const char* what) {
+  const std::string_view word = Next();
+  if (word.empty()) {
+    throw Error(source_ + ": expected " + what + ", found the end of the file");
+  }
+  return std::string(word);
+}
+
+double TextNumbers::Number(const char* what) {
+  const std::string word = Word(what);
+  const char* begin = word.data();
+  const char* end = begin + word.size();
+  if (*begin == '+' && word.size() > 1 && word[1] != '-') ++begin;  // from_chars knows no '+'
+  double number = 0;
+  const auto result = std::from_chars(begin, end, number);
+  if (result.ec != std::errc() || result.ptr != end || !std::isfinite(number)) {
+    throw Error(Where() + "expected " + what + " as a finite number, found \"" + Shown(word) +
+                "\"");
+  }
+  return number;
+}
+
+int TextNumbers::Int(const char* what, int min, int max) {
+  const double number = Number(what);
+  if (number != std::floor(number) || number < min || number > max) {
+    throw Error(Where() + "expected " + what + " as a whole number from " + std::to_string(min) +
+                " to " + std::to_string(max) + ", found " + std::to_string(number));
+  }
+  return static_cast<int>(number);
+}
+
+Eigen::Matrix3d TextNumbers::Matrix3(const char* what) {
+  Eigen::Matrix3d matrix;
+  for (int i = 0; i < 9; ++i) matrix(i / 3, i % 3) = Number(what);
+  return matrix;
+}
+
+Eigen::Matrix4d TextNumbers::Matrix4(const char* what) {
+  Eigen::Matrix4d matrix;
+  for (int i = 0; i < 16; ++i) matrix(i / 4, i % 4) = Number(what);
+  return matrix;
+}
+
+Eigen::Vector3d TextNumbers::Vector3(const char* what) {
+  Eigen::Vector3d vector;
+  for (int i = 0; i < 3; ++i) vector(i) = Number(what);
+  return vector;
+}
+
+}  // namespace dtr::io::internal
