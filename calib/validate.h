@@ -1,0 +1,91 @@
+// calib/validate.h -- can a calibration be trusted? Residuals on observations it is not judged
+// with.
+#pragma once
+#include <Eigen/Core>
+#include <array>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "dtr/types/camera.h"
+#include "dtr/types/check.h"
+#include "dtr/types/pose.h"
+#include "dtr/types/sparse_scene.h"
+
+namespace dtr::calib {
+
+/// What a calibration must reach. The defaults were chosen between what honest models of real
+/// photos give and what the smallest sabotage in the tests gives; docs/CALIBRATION.md has both.
+struct ValidateLimits {
+  double max_rms_px = 1.5;          ///< held-out residuals, all cameras together
+  double max_camera_rms_px = 3.0;   ///< the same for the worst camera
+  double max_camera_ratio = 3.0;    ///< the worst camera's RMS over the typical (median) camera's
+  double max_stored_rms_px = 1.5;   ///< stored points, all cameras together
+  double max_mean_px = 0.25;        ///< mean residual vector of the stored points, all cameras
+  double max_camera_mean_px = 0.4;  ///< the same for the worst camera
+  double max_impossible_share = 0.01;  ///< observations no point in front of the cameras explains
+  int min_observations = 20;           ///< a camera with fewer tested ones cannot be judged
+};
+
+/// Residuals in pixels: observed minus predicted.
+struct ResidualStats {
+  int count = 0;
+  double rms_px = 0;  ///< root of the mean squared length of the residual vectors
+  double median_px = 0, p95_px = 0, worst_px = 0;     ///< of the lengths
+  Eigen::Vector2d mean_px = Eigen::Vector2d::Zero();  ///< of the vectors: what is systematic
+};
+
+/// What became of one camera's observations.
+struct CameraValidation {
+  std::string name;
+  ResidualStats held_out;  ///< against points triangulated from the other cameras alone
+  ResidualStats stored;    ///< against the points as stored
+  int short_tracks = 0;    ///< points seen by fewer than 3 cameras: nothing to hold out
+  int weak_geometry = 0;   ///< the other cameras do not fix the point well enough to judge
+  int impossible = 0;      ///< no point in front of the cameras explains the observations
+};
+
+/// Number of image regions per axis.
+inline constexpr int kRegionsPerAxis = 3;
+
+struct ValidationReport {
+  std::vector<Check> tests;
+  std::vector<CameraValidation> cameras;  ///< in the order given
+  ResidualStats held_out, stored;         ///< all cameras together
+  /// Held-out residuals by image region, row-major from the top left, all cameras together: a lens
+  /// model that does not fit shows here first.
+  std::array<ResidualStats, kRegionsPerAxis * kRegionsPerAxis> regions;
+  std::vector<std::string> untested;  ///< cameras with too few tested observations
+  bool passed() const { return AllPassed(tests); }
+};
+
+/// Tests cameras and poses against the sparse observations.
+///
+/// Held-out residuals: for every observation of a point with at least 3 of them, the point is
+/// triangulated from the *other* cameras' observations alone (linear least-squares meeting point of
+/// the rays, then Gauss-Newton on the reprojection error under Huber's loss) and projected into
+/// this camera. The residual is honest about the point, not about the poses: these came from the
+/// same observations. Observations whose point the others do not fix (rays within 1 degree of each
+/// other, or a predicted error in this camera of more than twice the observation's own) are left
+/// out and counted. Triangulation:
+/// Hartley & Zisserman, 2nd ed., ch. 12.
+///
+/// Stored residuals: the points as stored, projected into every camera that saw them. They find
+/// what a shared shift of all pixels does, which triangulation can absorb: a half-pixel slip of an
+/// importer is a mean residual of half a pixel.
+///
+/// `names[i]`, `cameras[i]` and `cam_from_world[i]` belong together. The result does not depend on
+/// `threads` (0: all cores). Throws Error when an index is out of range, a number is not finite or
+/// the lists differ in length.
+ValidationReport ValidateReprojection(std::span<const PinholeCamera> cameras,
+                                      std::span<const Pose> cam_from_world,
+                                      const SparseScene& scene, const ValidateLimits& limits,
+                                      std::span<const std::string> names, int threads = 0);
+
+/// JSON object: passed, tests[].{name,value,limit,passed,reason},
+/// cameras[].{name,held_out,stored,short_tracks,weak_geometry,impossible}, held_out, stored,
+/// regions[9], untested[]; residuals as {count,rms_px,median_px,p95_px,worst_px,mean_x_px,
+/// mean_y_px}.
+std::string ToJson(const ValidationReport& report);
+
+}  // namespace dtr::calib
