@@ -1,0 +1,245 @@
+#include "capture/ingest.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstdio>
+#include <set>
+#include <system_error>
+
+#include "capture/screening.h"
+#include "dtr/base/error.h"
+#include "dtr/base/hash.h"
+#include "dtr/base/parallel_for.h"
+
+namespace dtr::capture {
+namespace fs = std::filesystem;
+namespace {
+
+const double kFilmDiagonalMm = std::hypot(36.0, 24.0);
+constexpr double kShortestFocal = 0.1, kLongestFocal = 100;  // of the long side
+
+bool IsControl(char c) { return static_cast<unsigned char>(c) < 32 || c == 127; }
+
+// Well-formed UTF-8 (Unicode 15, table 3-7).
+bool IsUtf8(const std::string& text) {
+  const auto byte = [&](size_t i) {
+    return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u;
+  };
+  const auto in = [](unsigned b, unsigned low, unsigned high) { return b >= low && b <= high; };
+  for (size_t i = 0; i < text.size();) {
+    const unsigned b = byte(i), next = byte(i + 1);
+    size_t length = 0;
+    if (b < 0x80) length = 1;
+    if (in(b, 0xc2, 0xdf) && in(next, 0x80, 0xbf)) length = 2;
+    if (in(b, 0xe0, 0xef) && in(next, b == 0xe0 ? 0xa0 : 0x80, b == 0xed ? 0x9f : 0xbf)) length = 3;
+    if (in(b, 0xf0, 0xf4) && in(next, b == 0xf0 ? 0x90 : 0x80, b == 0xf4 ? 0x8f : 0xbf)) length = 4;
+    if (length == 0) return false;
+    for (size_t j = 2; j < length; ++j) {
+      if (!in(byte(i + j), 0x80, 0xbf)) return false;
+    }
+    i += length;
+  }
+  return true;
+}
+
+// A text that prints as one line and that JSON can hold: for names of skipped files and EXIF texts.
+std::string Printable(std::string text) {
+  const bool utf8 = IsUtf8(text);
+  for (char& c : text) {
+    if (IsControl(c) || (!utf8 && static_cast<unsigned char>(c) >= 0x80)) c = '?';
+  }
+  while (!text.empty() && (text.back() == ' ' || text.back() == '?')) text.pop_back();
+  return text;
+}
+
+std::string PrintableName(const std::string& name) {
+  const std::string text = Printable(name);
+  return text.empty() ? "(unprintable)" : text;
+}
+
+struct Listing {
+  std::vector<std::string> names;  // relative, '/' between parts
+  std::vector<Skipped> skipped;
+  int ignored = 0;  // files without an image extension
+};
+
+void ListFolder(const fs::path& top, const std::string& below, bool recurse, Listing& listing) {
+  std::error_code error;
+  fs::directory_iterator entries(below.empty() ? top : top / below, error);
+  for (; !error && entries != fs::directory_iterator(); entries.increment(error)) {
+    const std::string part = entries->path().filename().string();
+    if (part.front() == '.') continue;
+    const std::string name = below.empty() ? part : below + "/" + part;
+    std::error_code ignored;
+    if (entries->is_directory(ignored)) {
+      if (!recurse) continue;
+      if (entries->is_symlink(ignored)) {
+        listing.skipped.push_back(
+            {PrintableName(name), "links to a folder; links are not followed"});
+      } else {
+        ListFolder(top, name, recurse, listing);
+      }
+    } else if (!IsImageExtension(entries->path().extension().string())) {
+      ++listing.ignored;
+    } else if (!IsUtf8(name) || std::any_of(name.begin(), name.end(), IsControl)) {
+      listing.skipped.push_back({PrintableName(name), "its name is no printable UTF-8; rename it"});
+    } else {
+      listing.names.push_back(name);
+    }
+  }
+  if (!error) return;
+  const std::string reason = "cannot be listed: " + error.message();
+  if (below.empty()) throw Error(top.string() + ": " + reason);
+  listing.skipped.push_back({PrintableName(below), reason});
+}
+
+std::string CameraGroup(const Photo& photo, const io::ImageHeader& header) {
+  const auto known = [](const std::string& text) { return text.empty() ? "unknown" : text; };
+  char focal[48] = "unknown";
+  if (header.focal_mm) {
+    std::snprintf(focal, sizeof focal, "%.2fmm", *header.focal_mm);
+  } else if (header.focal_35mm) {
+    std::snprintf(focal, sizeof focal, "%.2fmm35", *header.focal_35mm);
+  }
+  std::string group = known(photo.make) + "|" + known(photo.model) + "|" +
+                      std::to_string(photo.width_px) + "x" + std::to_string(photo.height_px) + "|" +
+                      focal;
+  // A turned camera has its principal point elsewhere on the upright picture.
+  if (photo.exif_orientation != 1) group += "|turned" + std::to_string(photo.exif_orientation);
+  return group;
+}
+
+Photo InspectPhoto(const fs::path& file, const std::string& name, bool screen) {
+  std::error_code error;
+  if (!fs::is_regular_file(file, error)) throw Error("is no regular file");
+  const io::ImageHeader header = io::ReadImageHeader(file);
+  Photo photo;
+  photo.name = name;
+  photo.file = file;
+  photo.exif_orientation = header.exif_orientation;
+  const bool sideways = header.exif_orientation >= 5;
+  photo.width_px = sideways ? header.height_px : header.width_px;
+  photo.height_px = sideways ? header.width_px : header.height_px;
+  const FocalPrior focal = FocalFromExif(header);
+  photo.focal_prior_px = focal.focal_px;
+  photo.focal_source = focal.source;
+  photo.make = Printable(header.make);
+  photo.model = Printable(header.model);
+  photo.lens_model = Printable(header.lens_model);
+  photo.date_time = Printable(header.date_time);
+  photo.gps = header.gps;
+  photo.camera_group = CameraGroup(photo, header);
+  photo.source_sha256 = Sha256OfFile(file);
+  if (screen) photo.screening = MeasurePhoto(ReadPhoto(photo));
+  return photo;
+}
+
+// The message with the photo's name for its path: whose folder it was is nobody's business later.
+std::string ReasonFrom(std::string message, const fs::path& file, const std::string& name) {
+  const std::string path = file.string();
+  if (message.rfind(path + ": ", 0) == 0) message.erase(0, path.size() + 2);
+  for (size_t at = 0; (at = message.find(path, at)) != std::string::npos; at += name.size()) {
+    message.replace(at, path.size(), name);
+  }
+  return Printable(message);
+}
+
+// "left/IMG 1.jpg" -> "left_IMG_1"; equal ones are numbered in the order of the names.
+void AssignIds(std::vector<Photo>& photos) {
+  constexpr size_t kLongestId = 100;
+  std::set<std::string> taken;  // in lower case
+  const auto take = [&](std::string id) {
+    for (char& c : id) {
+      if (c >= 'A' && c <= 'Z') c = static_cast<char>(c + 32);
+    }
+    return taken.insert(id).second;
+  };
+  for (Photo& photo : photos) {
+    std::string stem = fs::path(photo.name).replace_extension().string();
+    for (char& c : stem) {
+      const bool safe = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
+                        (c >= '0' && c <= '9') || c == '_' || c == '-';
+      if (!safe) c = '_';
+    }
+    stem.resize(std::min(stem.size(), kLongestId));
+    if (stem.empty() || stem.front() == '-') stem.insert(0, "_");
+    photo.id = stem;
+    for (int n = 2; !take(photo.id); ++n) photo.id = stem + "-" + std::to_string(n);
+  }
+}
+
+[[noreturn]] void ThrowNoPhotos(const fs::path& folder, const Capture& capture, int ignored) {
+  std::string message = folder.string() + ": expected photos, found none";
+  if (!capture.skipped.empty()) {
+    message += "; " + std::to_string(capture.skipped.size()) + " skipped (" +
+               capture.skipped.front().name + ": " + capture.skipped.front().reason + ")";
+  }
+  if (ignored > 0) message += "; " + std::to_string(ignored) + " files without an image extension";
+  throw Error(message + "; give the folder that holds the photos");
+}
+
+}  // namespace
+
+FocalPrior FocalFromExif(const io::ImageHeader& header) {
+  const double longest = std::max(header.width_px, header.height_px);
+  const auto plausible = [&](double focal_px) {
+    return focal_px >= kShortestFocal * longest && focal_px <= kLongestFocal * longest;
+  };
+  if (header.focal_35mm) {
+    const double diagonal_px = std::hypot(header.width_px, header.height_px);
+    const double focal_px = *header.focal_35mm * diagonal_px / kFilmDiagonalMm;
+    if (plausible(focal_px)) return {focal_px, "exif-35mm"};
+  }
+  if (header.focal_mm && header.focal_plane_px_per_mm) {
+    const double focal_px = *header.focal_mm * *header.focal_plane_px_per_mm;
+    if (plausible(focal_px)) return {focal_px, "exif-focal-plane"};
+  }
+  return {};
+}
+
+Capture IngestPhotos(const fs::path& folder, const IngestOptions& options, Progress& progress) {
+  std::error_code error;
+  if (!fs::is_directory(folder, error)) {
+    throw UsageError(folder.string() + ": expected a folder of photos, found " +
+                     (fs::exists(folder, error) ? "something else" : "nothing"));
+  }
+  Listing listing;
+  ListFolder(folder, "", options.recurse, listing);
+  std::sort(listing.names.begin(), listing.names.end());
+
+  const int count = static_cast<int>(listing.names.size());
+  progress.Stage("photos", count);
+  std::vector<std::optional<Photo>> photos(listing.names.size());
+  std::vector<std::string> reasons(listing.names.size());
+  std::atomic<int> done{0};
+  ParallelFor(0, count, options.threads, [&](int i) {
+    progress.ThrowIfInterrupted();
+    const auto index = static_cast<size_t>(i);
+    const std::string& name = listing.names[index];
+    try {
+      photos[index] = InspectPhoto(folder / name, name, options.screen);
+    } catch (const Error& e) {
+      reasons[index] = ReasonFrom(e.what(), folder / name, name);
+    }
+    progress.Update(++done);
+  });
+
+  Capture capture;
+  capture.skipped = std::move(listing.skipped);
+  for (size_t i = 0; i < photos.size(); ++i) {
+    if (photos[i]) {
+      capture.photos.push_back(std::move(*photos[i]));
+    } else {
+      capture.skipped.push_back({listing.names[i], reasons[i]});
+    }
+  }
+  std::sort(capture.skipped.begin(), capture.skipped.end(),
+            [](const Skipped& a, const Skipped& b) { return a.name < b.name; });
+  if (capture.photos.empty()) ThrowNoPhotos(folder, capture, listing.ignored);
+  AssignIds(capture.photos);
+  JudgePhotos(capture.photos);
+  return capture;
+}
+
+}  // namespace dtr::capture

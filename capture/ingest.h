@@ -1,0 +1,46 @@
+// capture/ingest.h -- a folder of photos becomes a Capture.
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "capture/capture.h"
+#include "dtr/base/progress.h"
+
+namespace dtr::capture {
+
+struct IngestOptions {
+  bool recurse = true;  ///< photos of sub-folders too, as COLMAP takes them
+  /// Decode every photo: finds damaged ones now instead of hours later, and measures the rest.
+  bool screen = true;
+  int threads = 0;  ///< 0: all cores
+};
+
+/// The photos of a folder in byte order of their names. A photo is a file with the extension of an
+/// image format that OpenImageIO reads (any case). Hidden files and folders and files with other
+/// extensions are ignored; files with one that hold no readable image, names that are no UTF-8 and
+/// links to folders are skipped, with the reason. The result is the same for any number of threads.
+/// Throws UsageError when the folder does not exist, Error when it cannot be listed or holds no
+/// photo at all.
+Capture IngestPhotos(const std::filesystem::path& folder, const IngestOptions& options,
+                     Progress& progress);
+
+/// A focal length in pixels and where it comes from.
+struct FocalPrior {
+  std::optional<double> focal_px;
+  std::string source = "none";
+};
+
+/// Focal length from EXIF. First choice is the 35 mm equivalent, by the diagonal as CIPA DCG-001
+/// defines it and current COLMAP reads it: f35 * diagonal_px / 43.27 mm. (COLMAP 3.8 takes
+/// f35 * long_side_px / 35 mm: 3 % more for 3:2 photos, 1 % less for 4:3.) Else the focal length in
+/// millimetres times the pixels per millimetre of FocalPlaneXResolution. A result outside
+/// [0.1, 100] times the long side is a broken tag and is not taken.
+FocalPrior FocalFromExif(const io::ImageHeader& header);
+
+/// True for the extension of an image format that OpenImageIO reads, with or without the dot, in
+/// any case. Video and volume formats are no image formats here.
+bool IsImageExtension(const std::string& extension);
+
+}  // namespace dtr::capture

@@ -1,0 +1,286 @@
+#include "capture/ingest.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "capture/screening.h"
+#include "dtr/base/error.h"
+#include "tests/capture/photo_files.h"
+#include "tests/support/test_data.h"
+
+namespace dtr::capture {
+namespace {
+
+namespace fs = std::filesystem;
+using dtr::testing::TemporaryFolder;
+using testing::AddExifOrientation;
+using testing::BlockPhoto;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using testing::MessageOf;
+using testing::NoisePhoto;
+
+Capture Ingest(const fs::path& folder, int threads = 2) {
+  SilentProgress progress;
+  return IngestPhotos(folder, {.threads = threads}, progress);
+}
+
+std::vector<std::string> NamesOf(const Capture& capture) {
+  std::vector<std::string> names;
+  for (const Photo& photo : capture.photos) names.push_back(photo.name);
+  return names;
+}
+
+TEST(IngestPhotos, TakesPhotosInByteOrderWithTheirOriginalNames) {
+  const TemporaryFolder folder;
+  fs::create_directories(folder / "left/deep");
+  fs::create_directories(folder / ".thumbnails");
+  for (const char* name : {"b 2.png", "B1.JPG", "a.jpg", "épicerie.png", "left/10.png",
+                           "left/9.png", "left/deep/1.jpeg", ".hidden.png", ".thumbnails/t.png"}) {
+    // WriteImage takes its format from the extension in lower case or not.
+    io::WriteImage(folder / name, NoisePhoto(16, 8, 1));
+  }
+  WriteFileAtomically(folder / "notes.txt", "not a photo, and does not say so");
+  WriteFileAtomically(folder / "K", "1 0 0");
+  const Capture capture = Ingest(folder.path());
+  EXPECT_THAT(NamesOf(capture), ElementsAre("B1.JPG", "a.jpg", "b 2.png", "left/10.png",
+                                            "left/9.png", "left/deep/1.jpeg", "épicerie.png"));
+  EXPECT_THAT(capture.skipped, IsEmpty());
+  EXPECT_EQ(capture.photos[3].file, folder / "left/10.png");
+  SilentProgress progress;
+  const Capture flat = IngestPhotos(folder.path(), {.recurse = false}, progress);
+  EXPECT_THAT(NamesOf(flat), ElementsAre("B1.JPG", "a.jpg", "b 2.png", "épicerie.png"));
+}
+
+TEST(IngestPhotos, IdsAreUniqueAndSafeAsFileNames) {
+  const TemporaryFolder folder;
+  fs::create_directories(folder / "left");
+  for (const char* name : {"A.png", "a.jpg", "a.png", "left/1.png", "left_1.png", "-x.y z.png"}) {
+    io::WriteImage(folder / name, NoisePhoto(16, 8, 1));
+  }
+  std::vector<std::string> ids;
+  for (const Photo& photo : Ingest(folder.path()).photos) ids.push_back(photo.id);
+  // Names in byte order: -x.y z.png, A.png, a.jpg, a.png, left/1.png, left_1.png.
+  EXPECT_THAT(ids, ElementsAre("_-x_y_z", "A", "a-2", "a-3", "left_1", "left_1-2"));
+}
+
+TEST(IngestPhotos, NamesWhatItSkipsAndWhy) {
+  const TemporaryFolder folder;
+  io::WriteImage(folder / "good.jpg", NoisePhoto(64, 48, 1));
+  io::WriteImage(folder / "cut.jpg", NoisePhoto(64, 48, 2));
+  WriteFileAtomically(folder / "cut.jpg", ReadFile(folder / "cut.jpg", 1 << 20).substr(0, 2000));
+  WriteFileAtomically(folder / "text.jpg", "I am no photo");
+  WriteFileAtomically(folder / "empty.png", "");
+  WriteFileAtomically(folder / "b\xff.png", "name is no UTF-8");
+  fs::create_directories(folder / "is_a_folder.jpg");
+  fs::create_directory_symlink(folder.path(), folder / "loop");
+  const Capture capture = Ingest(folder.path());
+  EXPECT_THAT(NamesOf(capture), ElementsAre("good.jpg"));
+  std::vector<std::string> names;
+  for (const Skipped& skipped : capture.skipped) {
+    names.push_back(skipped.name);
+    EXPECT_FALSE(skipped.reason.empty()) << skipped.name;
+    EXPECT_THAT(skipped.reason, ::testing::Not(HasSubstr("\n")));
+    EXPECT_THAT(skipped.reason, ::testing::Not(HasSubstr(folder.path().string())));
+  }
+  EXPECT_THAT(names, ElementsAre("b?.png", "cut.jpg", "empty.png", "loop", "text.jpg"));
+}
+
+TEST(IngestPhotos, FoldersWithoutPhotosAreCleanErrors) {
+  const TemporaryFolder folder;
+  EXPECT_THAT(MessageOf<UsageError>([&] { Ingest(folder / "absent"); }), HasSubstr("absent"));
+  WriteFileAtomically(folder / "file", "");
+  EXPECT_THAT(MessageOf<UsageError>([&] { Ingest(folder / "file"); }), HasSubstr("folder"));
+  EXPECT_THAT(MessageOf<Error>([&] { Ingest(folder.path()); }), HasSubstr("found none"));
+  WriteFileAtomically(folder / "text.jpg", "I am no photo");
+  EXPECT_THAT(MessageOf<Error>([&] { Ingest(folder.path()); }), HasSubstr("text.jpg"));
+}
+
+TEST(RequireEnoughPhotos, OnePhotoIsNoScene) {
+  const TemporaryFolder folder;
+  io::WriteImage(folder / "a.png", NoisePhoto(16, 8, 1));
+  const Capture one = Ingest(folder.path());
+  EXPECT_THAT(MessageOf<Error>([&] { RequireEnoughPhotos(one, folder.path()); }),
+              HasSubstr("at least 2 photos, found 1"));
+  io::WriteImage(folder / "b.png", NoisePhoto(16, 8, 2));
+  EXPECT_NO_THROW(RequireEnoughPhotos(Ingest(folder.path()), folder.path()));
+}
+
+TEST(IngestPhotos, TurnsPhotosUprightForEveryOrientation) {
+  const TemporaryFolder folder;
+  const ImageRgb8 stored = BlockPhoto(48, 32, 3);
+  for (int orientation = 1; orientation <= 8; ++orientation) {
+    const fs::path file = folder / (std::to_string(orientation) + ".jpg");
+    io::WriteImage(file, stored, 100);
+    if (orientation > 1) AddExifOrientation(file, orientation);
+  }
+  const Capture capture = Ingest(folder.path());
+  ASSERT_EQ(capture.photos.size(), 8u);
+  const ImageRgb8 as_stored = ReadPhoto(capture.photos[0]);
+  for (int orientation = 1; orientation <= 8; ++orientation) {
+    const Photo& photo = capture.photos[static_cast<size_t>(orientation - 1)];
+    EXPECT_EQ(photo.exif_orientation, orientation);
+    EXPECT_EQ(photo.width_px, orientation >= 5 ? 32 : 48);
+    EXPECT_EQ(photo.height_px, orientation >= 5 ? 48 : 32);
+    const ImageRgb8 upright = ReadPhoto(photo);
+    // EXIF 2.3: where the stored first row and first column are seen.
+    const auto corner = [&](int x, int y) { return upright(x, y, 0) * 256 + upright(x, y, 1); };
+    const int w = photo.width_px - 1, h = photo.height_px - 1;
+    const int expected_corner[8][2] = {{0, 0}, {w, 0}, {w, h}, {0, h},
+                                       {0, 0}, {w, 0}, {w, h}, {0, h}};
+    const int expected_next[8][2] = {{12, 0}, {w - 12, 0}, {w - 12, h}, {12, h},
+                                     {0, 12}, {w, 12},     {w, h - 12}, {0, h - 12}};
+    const auto& at = expected_corner[orientation - 1];
+    const auto& next = expected_next[orientation - 1];
+    EXPECT_EQ(corner(at[0], at[1]), as_stored(0, 0, 0) * 256 + as_stored(0, 0, 1)) << orientation;
+    EXPECT_EQ(corner(next[0], next[1]), as_stored(12, 0, 0) * 256 + as_stored(12, 0, 1))
+        << orientation;
+  }
+}
+
+TEST(ReadPhoto, RefusesAFileThatChangedItsSize) {
+  const TemporaryFolder folder;
+  io::WriteImage(folder / "a.png", NoisePhoto(16, 8, 1));
+  const Capture capture = Ingest(folder.path());
+  io::WriteImage(folder / "a.png", NoisePhoto(16, 9, 1));
+  EXPECT_THAT(MessageOf<Error>([&] { ReadPhoto(capture.photos[0]); }), HasSubstr("16x9"));
+}
+
+TEST(FocalFromExif, FollowsTheDiagonalOfThirtyFiveMillimetreFilm) {
+  io::ImageHeader header;
+  header.width_px = 3600;
+  header.height_px = 2400;
+  EXPECT_FALSE(FocalFromExif(header).focal_px);
+  EXPECT_EQ(FocalFromExif(header).source, "none");
+  header.focal_35mm = 50;  // a 36x24 picture: 100 pixels per millimetre
+  EXPECT_NEAR(*FocalFromExif(header).focal_px, 5000, 1e-9);
+  EXPECT_EQ(FocalFromExif(header).source, "exif-35mm");
+  std::swap(header.width_px, header.height_px);
+  EXPECT_NEAR(*FocalFromExif(header).focal_px, 5000, 1e-9);
+  header.focal_35mm = {};
+  header.focal_mm = 18;
+  EXPECT_FALSE(FocalFromExif(header).focal_px);  // of an unknown sensor
+  header.focal_plane_px_per_mm = 250;
+  EXPECT_NEAR(*FocalFromExif(header).focal_px, 4500, 1e-9);
+  EXPECT_EQ(FocalFromExif(header).source, "exif-focal-plane");
+  header.focal_plane_px_per_mm = 1e6;  // 18 km of focal length in pixels: a broken tag
+  EXPECT_FALSE(FocalFromExif(header).focal_px);
+}
+
+TEST(IngestPhotos, PhotosOfOneLensShareAGroup) {
+  const TemporaryFolder folder;
+  const io::ExifFocal canon{35.0, 50.0, "Canon", "EOS"}, zoomed{70.0, 100.0, "Canon", "EOS"};
+  io::WriteJpegWithExif(folder / "a.jpg", BlockPhoto(48, 32, 1), 90, canon);
+  io::WriteJpegWithExif(folder / "b.jpg", BlockPhoto(48, 32, 2), 90, canon);
+  io::WriteJpegWithExif(folder / "c.jpg", BlockPhoto(48, 32, 3), 90, zoomed);
+  io::WriteJpegWithExif(folder / "d.jpg", BlockPhoto(32, 48, 4), 90, canon);
+  io::WriteImage(folder / "e.png", BlockPhoto(48, 32, 5));
+  io::WriteImage(folder / "f.png", BlockPhoto(48, 32, 6));
+  io::WriteImage(folder / "g.jpg", BlockPhoto(48, 32, 7));
+  AddExifOrientation(folder / "g.jpg", 3);
+  const auto photos = Ingest(folder.path()).photos;
+  ASSERT_EQ(photos.size(), 7u);
+  EXPECT_EQ(photos[0].camera_group, "Canon|EOS|48x32|35.00mm");
+  EXPECT_EQ(photos[0].camera_group, photos[1].camera_group);
+  EXPECT_EQ(photos[4].camera_group, photos[5].camera_group);
+  for (const size_t other : {2u, 3u, 4u, 6u}) {
+    EXPECT_NE(photos[0].camera_group, photos[other].camera_group);
+  }
+  EXPECT_NE(photos[4].camera_group, photos[6].camera_group);  // turned
+  ASSERT_TRUE(photos[0].focal_prior_px);
+  EXPECT_NEAR(*photos[0].focal_prior_px, 50.0 * 48 / 36, 1e-3);
+  EXPECT_FALSE(photos[4].focal_prior_px);
+}
+
+TEST(IngestPhotos, SceauxHasItsCamerasFocalLengthWithinThreePercent) {
+  const fs::path folder = dtr::testing::DataFolder() / "sceaux_castle/images";
+  DTR_REQUIRE_DATA(folder);
+  SilentProgress progress;
+  const Capture capture = IngestPhotos(folder, {.screen = false}, progress);
+  EXPECT_EQ(capture.photos.size(), 11u);
+  EXPECT_THAT(capture.skipped, IsEmpty());
+  for (const Photo& photo : capture.photos) {
+    ASSERT_TRUE(photo.focal_prior_px);
+    EXPECT_NEAR(*photo.focal_prior_px / 2905.88, 1, 0.03);  // K.txt beside the photos
+    EXPECT_EQ(photo.camera_group, capture.photos[0].camera_group);
+  }
+}
+
+TEST(Screening, DuplicatesBlurAndClippingAreRemarkedAndNothingIsDropped) {
+  const TemporaryFolder folder;
+  for (int i = 0; i < 4; ++i) {
+    io::WriteImage(folder / ("sharp" + std::to_string(i) + ".png"), NoisePhoto(64, 48, 10 + i));
+  }
+  fs::copy_file(folder / "sharp1.png", folder / "z_copy.png");
+  ImageRgb8 blurred(64, 48, 3), bright(64, 48, 3, 255);
+  for (int y = 0; y < 48; ++y) {
+    for (int x = 0; x < 64; ++x) {
+      for (int c = 0; c < 3; ++c) {
+        blurred(x, y, c) =
+            static_cast<std::uint8_t>(127 + 100 * std::sin(x * 0.1) * std::cos(y * 0.1));
+      }
+    }
+  }
+  for (int x = 0; x < 64; ++x) bright(x, 5, 1) = bright(x, 5, 0) = bright(x, 5, 2) = 100;
+  io::WriteImage(folder / "blurred.png", blurred);
+  io::WriteImage(folder / "bright.png", bright);
+  const Capture capture = Ingest(folder.path());
+  ASSERT_EQ(capture.photos.size(), 7u);  // blurred, bright, sharp0..3, z_copy
+  const auto& blurred_verdict = *capture.photos[0].screening;
+  ASSERT_EQ(blurred_verdict.remarks.size(), 1u);
+  EXPECT_THAT(blurred_verdict.remarks[0], HasSubstr("blurred"));
+  EXPECT_NEAR(capture.photos[1].screening->overexposed_share, 47.0 / 48, 1e-12);
+  EXPECT_THAT(capture.photos[1].screening->remarks.back(), HasSubstr("overexposed"));
+  EXPECT_THAT(capture.photos[2].screening->remarks, IsEmpty());
+  EXPECT_EQ(capture.photos[6].screening->duplicate_of, "sharp1.png");
+}
+
+TEST(MeasurePhoto, SharpnessIgnoresContrastAndFallsWithBlur) {
+  const ImageRgb8 noise = NoisePhoto(200, 200, 4);
+  ImageRgb8 faint = noise, soft = noise;
+  for (auto& value : faint.data()) value = static_cast<std::uint8_t>(100 + value / 4);
+  for (int y = 0; y < 200; ++y) {
+    for (int x = 1; x < 199; ++x) {
+      for (int c = 0; c < 3; ++c) {
+        soft(x, y, c) = static_cast<std::uint8_t>(
+            (noise(x - 1, y, c) + 2 * noise(x, y, c) + noise(x + 1, y, c)) / 4);
+      }
+    }
+  }
+  // White noise: the Laplacian's variance is 4^2 + 4 = 20 times the noise's.
+  EXPECT_NEAR(MeasurePhoto(noise).sharpness, 20, 0.5);
+  EXPECT_NEAR(MeasurePhoto(faint).sharpness, MeasurePhoto(noise).sharpness, 0.2);
+  EXPECT_LT(MeasurePhoto(soft).sharpness, 0.8 * MeasurePhoto(noise).sharpness);
+  EXPECT_EQ(MeasurePhoto(ImageRgb8(50, 50, 3, 90)).sharpness, 0);
+  EXPECT_EQ(MeasurePhoto(ImageRgb8(2, 2, 3, 0)).underexposed_share, 1);
+}
+
+TEST(IngestPhotos, SameResultForAnyNumberOfThreads) {
+  const TemporaryFolder folder;
+  for (int i = 0; i < 9; ++i) {
+    io::WriteImage(folder / (std::to_string(i) + ".png"), NoisePhoto(32, 24, i / 2));
+  }
+  WriteFileAtomically(folder / "5.png", "broken");
+  const Capture one = Ingest(folder.path(), 1), four = Ingest(folder.path(), 4);
+  EXPECT_EQ(NamesOf(one), NamesOf(four));
+  for (size_t i = 0; i < one.photos.size(); ++i) {
+    EXPECT_EQ(one.photos[i].id, four.photos[i].id);
+    EXPECT_EQ(one.photos[i].screening->sharpness, four.photos[i].screening->sharpness);
+    EXPECT_EQ(one.photos[i].screening->remarks, four.photos[i].screening->remarks);
+  }
+}
+
+TEST(IsImageExtension, KnowsPhotosAndLeavesFilmsAlone) {
+  for (const char* yes : {".jpg", "JPEG", ".png", ".TIFF", ".exr", ".webp", ".ppm", ".cr2"}) {
+    EXPECT_TRUE(IsImageExtension(yes)) << yes;
+  }
+  for (const char* no : {"", ".", ".txt", ".mp4", ".mov", ".json", ".vdb", ".npy"}) {
+    EXPECT_FALSE(IsImageExtension(no)) << no;
+  }
+}
+
+}  // namespace
+}  // namespace dtr::capture
