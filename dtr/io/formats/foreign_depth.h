@@ -1,0 +1,21 @@
+// dtr/io/formats/foreign_depth.h -- depth maps made by other programs.
+#pragma once
+#include <filesystem>
+
+#include "dtr/types/depth_image.h"
+
+namespace dtr::io {
+
+/// Reads a depth map, by the file's extension: .exr, .tif, .tiff (float or half: the channel Z,
+/// else Y, else the first), .pfm (one channel) or .png (one channel of 16 bits).
+/// Each number is multiplied by `unit_scale` to give scene units (0.001 for millimetres in a set in
+/// metres) and measures what `kind` says; nothing guesses either. Numbers that are zero, negative,
+/// NaN or infinite, before or after scaling, are holes (programs write 0, -1, NaN or infinity).
+/// The map must be width_px x height_px or 1/s of it per axis with one whole s; its pixel (i, j)
+/// then belongs to the image around s (i + 0.5), s (j + 0.5).
+/// Throws Error for another size (checked before any pixel is read), a damaged file or another
+/// coding; UsageError for another extension or a unit_scale that is not positive and finite.
+DepthImage ReadForeignDepth(const std::filesystem::path& file, DepthKind kind, double unit_scale,
+                            int width_px, int height_px);
+
+}  // namespace dtr::io

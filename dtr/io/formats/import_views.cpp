@@ -1,0 +1,283 @@
+#include "dtr/io/formats/import_views.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <span>
+
+#include "dtr/base/error.h"
+#include "dtr/base/hash.h"
+#include "dtr/base/parallel_for.h"
+#include "dtr/io/depth_io.h"
+#include "dtr/io/formats/foreign_depth.h"
+#include "dtr/io/image_io.h"
+#include "dtr/io/set_io.h"
+#include "dtr/render/geometry.h"
+
+namespace dtr::io {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string SizeText(int width_px, int height_px) {
+  return std::to_string(width_px) + "x" + std::to_string(height_px);
+}
+
+fs::path MaskFolder(const ImportOptions& options) {
+  if (!options.mask_dir.empty()) return options.mask_dir;
+  const fs::path images = fs::absolute(options.images_dir).lexically_normal();
+  // "photos/" has an empty file name; its parent is "photos".
+  return (images.has_filename() ? images.parent_path() : images.parent_path().parent_path()) /
+         "masks";
+}
+
+// The depth map of a camera: the one its list names, else the only one with the photo's name.
+fs::path DepthFileOf(const NamedCamera& named, const ImportOptions& options) {
+  if (!named.depth_file.empty()) return options.depth_dir / named.depth_file;
+  std::vector<fs::path> found;
+  for (const char* extension : {".exr", ".pfm", ".png", ".tif", ".tiff"}) {
+    const fs::path file = options.depth_dir / fs::path(named.name).replace_extension(extension);
+    if (fs::exists(file)) found.push_back(file);
+  }
+  if (found.size() != 1) {
+    throw Error(options.depth_dir.string() + ": expected one depth map (.exr, .pfm, .png, .tif) " +
+                "named like the photo " + named.name + ", found " + std::to_string(found.size()) +
+                "; name it in cameras.json");
+  }
+  return found.front();
+}
+
+bool HasDepth(const NamedCamera& named, const ImportOptions& options) {
+  return !options.depth_dir.empty() && !options.held_out.contains(named.name);
+}
+
+ImageRgb8 ReadCameraImage(const NamedCamera& named, const fs::path& file) {
+  const ImageHeader header = ReadImageHeader(file);
+  const PinholeCamera& camera = named.camera;
+  if (header.exif_orientation != 1) {
+    throw Error(file.string() + ": expected an upright image, found EXIF orientation " +
+                std::to_string(header.exif_orientation) +
+                "; turn the pixels upright and remove the tag, so that the camera is certain");
+  }
+  if (header.width_px != camera.width_px() || header.height_px != camera.height_px()) {
+    throw Error(file.string() + ": expected " + SizeText(camera.width_px(), camera.height_px()) +
+                " pixels as the camera says, found " + SizeText(header.width_px, header.height_px) +
+                "; give the images the cameras were made for");
+  }
+  return ReadImage(file);
+}
+
+DepthImage ReadCameraDepth(const NamedCamera& named, const ImportOptions& options) {
+  const fs::path file = DepthFileOf(named, options);
+  if (!options.depth_unit && (file.extension() == ".png" || file.extension() == ".PNG")) {
+    throw UsageError(file.string() +
+                     ": 16-bit PNG holds whole numbers; state their unit (--depth-unit, 0.001 for "
+                     "millimetres in a set in metres)");
+  }
+  const PinholeCamera& camera = named.camera;
+  const DepthKind kind = options.depth_kind.value_or(named.depth_kind);
+  const DepthImage depth = ReadForeignDepth(file, kind, options.depth_unit.value_or(1.0),
+                                            camera.width_px(), camera.height_px());
+  return ToPlaneZ(depth, camera.Resized(depth.width(), depth.height()));
+}
+
+Mask ReadCameraMask(const NamedCamera& named, const ImportOptions& options) {
+  const fs::path file = MaskFolder(options) / named.mask_file;
+  const Mask mask = ReadMask(file);
+  if (mask.width() != named.camera.width_px() || mask.height() != named.camera.height_px()) {
+    throw Error(file.string() + ": expected a mask of " +
+                SizeText(named.camera.width_px(), named.camera.height_px()) + " pixels, found " +
+                SizeText(mask.width(), mask.height()));
+  }
+  return mask;
+}
+
+void RequireHeldOutNames(const CameraList& list, const ImportOptions& options) {
+  for (const std::string& name : options.held_out) {
+    const bool known = std::any_of(list.cameras.begin(), list.cameras.end(),
+                                   [&](const NamedCamera& named) { return named.name == name; });
+    if (!known) throw UsageError("held-out photo \"" + name + "\": no camera of the list has it");
+  }
+}
+
+std::vector<std::string> IdsOf(const CameraList& list) {
+  std::vector<std::string> names;
+  for (const NamedCamera& named : list.cameras) names.push_back(named.name);
+  return MakeViewIds(names);
+}
+
+// What FinishGeometry looks at, without the pixels: the samples it takes of the depth (SPEC 0.2),
+// with the camera of that coarse grid.
+View CoarseCopy(const View& view) {
+  constexpr int kSamplesPerAxis = 64;
+  View coarse;
+  coarse.id = view.id;
+  coarse.name = view.name;
+  coarse.role = view.role;
+  coarse.cam_from_world = view.cam_from_world;
+  if (view.depth.empty()) return coarse;
+  const int step_x = (view.depth.width() + kSamplesPerAxis - 1) / kSamplesPerAxis;
+  const int step_y = (view.depth.height() + kSamplesPerAxis - 1) / kSamplesPerAxis;
+  const int first_x = step_x / 2, first_y = step_y / 2;
+  const int width = (view.depth.width() - first_x + step_x - 1) / step_x;
+  const int height = (view.depth.height() - first_y + step_y - 1) / step_y;
+  // Sample (i, j) is pixel (step i + first, step j + first): its centre maps to (i + .5, j + .5).
+  const PinholeCamera camera = view.DepthCamera();
+  coarse.camera = PinholeCamera(width, height, camera.fx_px() / step_x, camera.fy_px() / step_y,
+                                (camera.cx_px() - first_x - 0.5) / step_x + 0.5,
+                                (camera.cy_px() - first_y - 0.5) / step_y + 0.5);
+  coarse.depth = DepthImage(width, height);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      coarse.depth(x, y) = view.depth(step_x * x + first_x, step_y * y + first_y);
+    }
+  }
+  return coarse;
+}
+
+// Everything that decides the result; also the provenance of the set.
+nlohmann::json Inputs(const CameraList& list, const ImportOptions& options, Progress& progress) {
+  const int count = static_cast<int>(list.cameras.size());
+  std::vector<nlohmann::json> photos(list.cameras.size());
+  progress.Stage("hash", count);
+  ParallelFor(0, count, options.threads, [&](int i) {
+    progress.ThrowIfInterrupted();
+    const NamedCamera& named = list.cameras[static_cast<size_t>(i)];
+    nlohmann::json& photo = photos[static_cast<size_t>(i)];
+    photo["name"] = named.name;
+    photo["width_px"] = named.camera.width_px();
+    photo["height_px"] = named.camera.height_px();
+    photo["sha256"] = Sha256OfFile(options.images_dir / named.name);
+    if (!named.mask_file.empty()) {
+      photo["mask_sha256"] = Sha256OfFile(MaskFolder(options) / named.mask_file);
+    }
+    if (HasDepth(named, options)) {
+      photo["depth_sha256"] = Sha256OfFile(DepthFileOf(named, options));
+      const DepthKind kind = options.depth_kind.value_or(named.depth_kind);
+      photo["depth_kind"] = kind == DepthKind::kPlaneZ ? "z" : "ray";
+    }
+    progress.Update(i + 1);
+  });
+  nlohmann::json inputs;
+  inputs["made_by"] = "import";
+  inputs["photos"] = photos;
+  inputs["depth_unit"] = options.depth_unit.value_or(1.0);
+  return inputs;
+}
+
+std::string HashOf(const SparseScene& scene) {
+  std::vector<double> numbers;
+  for (const SparsePoint& point : scene.points) {
+    numbers.insert(numbers.end(), point.p_in_world.data(), point.p_in_world.data() + 3);
+  }
+  for (const SparseObservation& seen : scene.observations) {
+    numbers.insert(numbers.end(), {double(seen.view), double(seen.point)});
+    numbers.insert(numbers.end(), seen.pixel.data(), seen.pixel.data() + 2);
+  }
+  return Sha256(std::as_bytes(std::span<const double>(numbers)));
+}
+
+// The scene in a world whose origin lies `move` further on.
+SparseScene Shifted(SparseScene scene, const Eigen::Vector3d& move) {
+  for (SparsePoint& point : scene.points) point.p_in_world -= move;
+  return scene;
+}
+
+// Points that source views alone would know: held-out photos must not move the scene's centre.
+std::vector<SparsePoint> PointsOfSources(const SparseScene& scene, const std::vector<View>& views) {
+  std::vector<bool> is_source;
+  for (const View& view : views) is_source.push_back(view.role == ViewRole::kSource);
+  return RestrictToViews(scene, is_source).points;
+}
+
+}  // namespace
+
+View ImportView(const NamedCamera& named, const std::string& id, const ImportOptions& options) {
+  View view;
+  view.id = id;
+  view.name = named.name;
+  view.role = options.held_out.contains(named.name) ? ViewRole::kHeldOut : ViewRole::kSource;
+  view.camera = named.camera;
+  view.cam_from_world = named.cam_from_world;
+  view.depth_coding = options.depth_coding;
+  view.image = ReadCameraImage(named, options.images_dir / named.name);
+  if (!named.mask_file.empty()) view.mask = ReadCameraMask(named, options);
+  if (HasDepth(named, options)) {
+    view.depth = ReadCameraDepth(named, options);
+    view.depth_scale = view.camera.width_px() / view.depth.width();
+  }
+  return view;
+}
+
+std::vector<View> ImportViews(const CameraList& list, const ImportOptions& options) {
+  RequireHeldOutNames(list, options);
+  const std::vector<std::string> ids = IdsOf(list);
+  std::vector<View> views(list.cameras.size());
+  ParallelFor(0, static_cast<int>(views.size()), options.threads, [&](int i) {
+    const auto at = static_cast<size_t>(i);
+    views[at] = ImportView(list.cameras[at], ids[at], options);
+  });
+  return views;
+}
+
+void ImportSet(const CameraList& list, const ImportOptions& options, const fs::path& target,
+               bool force, const SparseScene* points, Progress& progress) {
+  RequireHeldOutNames(list, options);
+  if (options.depth_dir.empty() && (points == nullptr || points->points.empty())) {
+    throw UsageError(
+        "import: expected depth maps (--depth) or a model with points, found neither; without them "
+        "nobody knows where the scene is");
+  }
+  if (!force && fs::exists(target)) {  // before any file is hashed
+    throw UsageError(target.string() + ": exists; choose another name or give --force");
+  }
+  const CameraList near = RecentreWorld(list);
+  const nlohmann::json inputs = Inputs(list, options, progress);
+  nlohmann::json fingerprint = inputs;
+  fingerprint["cameras"] = nlohmann::json::parse(FormatCamerasJson(list));
+  fingerprint["depth_coding"] = NameOf(options.depth_coding);
+  fingerprint["held_out"] = options.held_out;
+  if (points != nullptr) fingerprint["points_sha256"] = HashOf(*points);
+  SetWriter writer(target, fingerprint.dump(), force);
+
+  DtrSet set;
+  set.unit = near.unit;
+  set.world_origin = near.world_origin;
+  set.provenance_json = inputs.dump();
+  set.frames.resize(1);
+  std::vector<View>& views = set.frames[0].views;
+  views.resize(near.cameras.size());
+  DtrSet coarse;
+  coarse.frames.resize(1);
+  coarse.frames[0].views.resize(near.cameras.size());
+  const std::vector<std::string> ids = IdsOf(near);
+  const int count = static_cast<int>(views.size());
+  progress.Stage("import", count);
+  ParallelFor(0, count, options.threads, [&](int i) {
+    progress.ThrowIfInterrupted();
+    const auto at = static_cast<size_t>(i);
+    View view = ImportView(near.cameras[at], ids[at], options);
+    writer.WriteView(view, near.unit);
+    coarse.frames[0].views[at] = CoarseCopy(view);
+    view.image = {};
+    view.mask = {};
+    view.depth = {};
+    views[at] = std::move(view);
+    progress.Update(i + 1);
+  });
+
+  std::vector<SparsePoint> source_points;
+  if (points != nullptr) {
+    const SparseScene scene = Shifted(*points, near.world_origin - list.world_origin);
+    source_points = PointsOfSources(scene, views);
+    writer.WriteSparse(set, scene);
+  }
+  FinishGeometry(coarse, source_points);
+  set.scene_center = coarse.scene_center;
+  set.bounds = coarse.bounds;
+  for (size_t i = 0; i < views.size(); ++i) {
+    views[i].reference_baseline = coarse.frames[0].views[i].reference_baseline;
+  }
+  writer.Finish(set);
+}
+
+}  // namespace dtr::io
