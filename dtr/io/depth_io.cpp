@@ -57,17 +57,33 @@ Grid<std::uint16_t> ReadCodesOf(OIIO::ImageInput& in, const fs::path& file) {
   return grid;
 }
 
-// Every depth read must be one that WriteDepth would have accepted.
-void ExpectStoredDepth(const DepthImage& depth, const DepthFormat& format) {
-  const float near_z = static_cast<float>(format.near_z);
-  const float far_z = static_cast<float>(format.far_z);
+// How far rounding to its coding may carry a depth past the end of the range it was checked
+// against.
+double RoundingOf(DepthCoding coding, double z) {
+  switch (coding) {
+    case DepthCoding::kExrHalf:
+      return 0x1.0p-11 * z;  // half of its last bit
+    case DepthCoding::kPng16Millimetre:
+      return 0.50001e-3;  // half a code, and float's rounding
+    case DepthCoding::kExrFloat:
+    case DepthCoding::kPng16InverseDepth:
+      break;  // both ends are stored exactly
+  }
+  return 0;
+}
+
+// `coding`: that of the numbers as they are; float for a map that was not rounded yet.
+void ExpectInRange(const DepthImage& depth, const DepthFormat& format, DepthCoding coding) {
+  const double low = static_cast<float>(format.near_z), high = static_cast<float>(format.far_z);
   for (int y = 0; y < depth.height(); ++y) {
     for (int x = 0; x < depth.width(); ++x) {
-      const float z = depth(x, y);
-      if (z == 0 || (z >= near_z && z <= far_z)) continue;
+      const double z = depth(x, y);
+      if (z == 0) continue;
+      const double slack = RoundingOf(coding, z);
+      if (z >= low - slack && z <= high + slack) continue;  // false for NaN
       throw Error("depth pixel (" + std::to_string(x) + ", " + std::to_string(y) +
-                  "): expected 0 or a depth in [" + std::to_string(near_z) + ", " +
-                  std::to_string(far_z) + "], found " + std::to_string(z));
+                  "): expected 0 or a depth in [" + std::to_string(low) + ", " +
+                  std::to_string(high) + "], found " + std::to_string(z));
     }
   }
 }
@@ -136,9 +152,8 @@ void WritePng16(const fs::path& file, const Grid<std::uint16_t>& grid) {
 
 void WriteDepth(const fs::path& file, const DepthImage& depth, const DepthFormat& format) {
   const DepthImage stored = Naming(file, [&] {
-    DepthImage rounded = RoundToCoding(depth, format);
-    ExpectStoredDepth(rounded, format);
-    return rounded;
+    ExpectInRange(depth, format, DepthCoding::kExrFloat);
+    return RoundToCoding(depth, format);
   });
   switch (format.coding) {
     case DepthCoding::kExrFloat:
@@ -171,7 +186,7 @@ DepthImage ReadDepth(const fs::path& file, const DepthFormat& format, int width_
         depth = DecodePng16Inverse(ReadCodesOf(*in, "depth"), format.near_z, format.far_z);
         break;
     }
-    ExpectStoredDepth(depth, format);
+    ExpectInRange(depth, format, format.coding);
     return depth;
   });
 }

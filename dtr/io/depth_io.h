@@ -27,7 +27,8 @@ void WritePng16(const std::filesystem::path& file, const Grid<std::uint16_t>& gr
 /// What the numbers in a depth file mean.
 struct DepthFormat {
   DepthCoding coding = DepthCoding::kPng16InverseDepth;
-  double near_z = 0, far_z = 0;            ///< range of the stored depths, scene units
+  /// Every depth lies in this range, scene units; exr-half and png16-mm may round one past its end.
+  double near_z = 0, far_z = 0;
   LengthUnit unit = LengthUnit::kUnknown;  ///< kPng16Millimetre needs kMetre
 };
 

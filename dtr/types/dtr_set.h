@@ -23,6 +23,7 @@ struct Bounds {
 struct Frame {
   double time_s = 0;
   std::vector<View> views;
+  std::string extra_json;  ///< fields this version does not know, kept verbatim ("" = none)
 };
 
 /// The set: what set.json says and, for loaded views, the pixels.

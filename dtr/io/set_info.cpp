@@ -1,0 +1,181 @@
+// What set_io.h tells about a set and about a run.
+#include <sys/utsname.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <ctime>
+#include <fstream>
+#include <sstream>
+
+#include "dtr/base/error.h"
+#include "dtr/base/files.h"
+#include "dtr/base/parallel_for.h"
+#include "dtr/io/depth_io.h"
+#include "dtr/io/json_fields.h"
+#include "dtr/io/set_io.h"
+#include "dtr/io/set_json.h"
+
+namespace dtr::io {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::uint64_t BytesOf(const View& view) {
+  std::uint64_t bytes = 0;
+  for (const auto* file : {&view.image_file, &view.mask_file, &view.depth_file, &view.sigma_file}) {
+    if (*file) bytes += (*file)->bytes;
+  }
+  return bytes;
+}
+
+Json Numbers(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+Json ViewInfo(const View& view, size_t frame) {
+  Json info = {{"id", view.id},
+               {"name", view.name},
+               {"role", NameOf(view.role)},
+               {"frame", frame},
+               {"width_px", view.camera.width_px()},
+               {"height_px", view.camera.height_px()},
+               {"fx_px", view.camera.fx_px()},
+               {"fy_px", view.camera.fy_px()},
+               {"cx_px", view.camera.cx_px()},
+               {"cy_px", view.camera.cy_px()},
+               {"center", Numbers(view.CenterInWorld())},
+               {"reference_baseline", view.reference_baseline},
+               {"bytes", BytesOf(view)},
+               {"has_mask", view.mask_file.has_value()},
+               {"has_depth", view.depth_file.has_value()},
+               {"has_sigma", view.sigma_file.has_value()}};
+  if (view.depth_file) {
+    info["depth_coding"] = NameOf(view.depth_coding);
+    info["depth_scale"] = view.depth_scale;
+    info["near_z"] = view.near_z;
+    info["far_z"] = view.far_z;
+  }
+  return info;
+}
+
+std::string Megabytes(std::uint64_t bytes) {
+  std::ostringstream out;
+  out.precision(1);
+  out << std::fixed << static_cast<double>(bytes) / 1e6 << " MB";
+  return out.str();
+}
+
+std::string VerdictLine(const DtrSet& set) {
+  const Json verdict = ParseJson(set.verdict_json, "verdict");
+  return verdict.empty() ? "not validated" : verdict.dump();
+}
+
+std::string ProcessorName() {
+  std::ifstream in("/proc/cpuinfo");
+  for (std::string line; std::getline(in, line);) {
+    const size_t colon = line.find(": ");
+    if (line.rfind("model name", 0) == 0 && colon != std::string::npos) {
+      return line.substr(colon + 2);
+    }
+  }
+  return "unknown";
+}
+
+std::string UtcNow() {
+  const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+  std::tm parts{};
+  gmtime_r(&now, &parts);
+  char text[32];
+  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &parts);
+  return text;
+}
+
+Json HostInfo() {
+  utsname names{};
+  uname(&names);
+  return {{"name", names.nodename},
+          {"system", std::string(names.sysname) + " " + names.release},
+          {"processor", ProcessorName()},
+          {"cores", ResolveThreads(0)}};
+}
+
+}  // namespace
+
+std::string DescribeSet(const DtrSet& set) {
+  std::uint64_t bytes = set.sparse_file ? set.sparse_file->bytes : 0;
+  size_t sources = 0, held_out = 0;
+  std::ostringstream lines;
+  for (const Frame& frame : set.frames) {
+    for (const View& view : frame.views) {
+      bytes += BytesOf(view);
+      ++(view.role == ViewRole::kSource ? sources : held_out);
+      lines << "  " << view.name << ": " << NameOf(view.role) << ", " << view.camera.width_px()
+            << "x" << view.camera.height_px() << ", f " << view.camera.fx_px() << " px";
+      if (view.depth_file) {
+        lines << ", depth " << NameOf(view.depth_coding) << " 1/" << view.depth_scale << " in ["
+              << view.near_z << ", " << view.far_z << "]";
+      } else if (view.role == ViewRole::kSource) {
+        lines << ", no depth";
+      }
+      lines << ", " << Megabytes(BytesOf(view)) << "\n";
+    }
+  }
+  std::ostringstream out;
+  out << "D+TR set: " << sources << " source views, " << held_out << " held out, "
+      << set.frames.size() << (set.frames.size() == 1 ? " frame, " : " frames, ")
+      << Megabytes(bytes) << "\nunit: " << NameOf(set.unit) << "\nscene centre: ("
+      << set.scene_center.transpose() << ")\nverdict: " << VerdictLine(set) << "\nviews:\n";
+  return out.str() + lines.str();
+}
+
+std::string InfoJson(const DtrSet& set) {
+  Json info = {{"format_version", kFormatVersion},
+               {"unit", NameOf(set.unit)},
+               {"world_origin", Numbers(set.world_origin)},
+               {"scene_center", Numbers(set.scene_center)},
+               {"bounds", nullptr},
+               {"frames", set.frames.size()},
+               {"bytes", 0},
+               {"has_sparse", set.sparse_file.has_value()},
+               {"verdict", ParseJson(set.verdict_json, "verdict")},
+               {"provenance", ParseJson(set.provenance_json, "provenance")},
+               {"views", Json::array()}};
+  if (!set.bounds.empty()) {
+    info["bounds"] = {{"min", Numbers(set.bounds.min)}, {"max", Numbers(set.bounds.max)}};
+  }
+  std::uint64_t bytes = set.sparse_file ? set.sparse_file->bytes : 0;
+  for (size_t f = 0; f < set.frames.size(); ++f) {
+    for (const View& view : set.frames[f].views) {
+      bytes += BytesOf(view);
+      info["views"].push_back(ViewInfo(view, f));
+    }
+  }
+  info["bytes"] = bytes;
+  return PrettyJson(info, "info");
+}
+
+void WriteRunRecord(const fs::path& set_folder, const RunRecord& record) {
+  Json run = {{"written_utc", UtcNow()},
+              {"command", record.command},
+              {"threads", record.threads},
+              {"host", HostInfo()},
+              {"stages", Json::array()}};
+  for (const RunStage& stage : record.stages) {
+    run["stages"].push_back({{"name", stage.name},
+                             {"wall_s", stage.wall_s},
+                             {"cpu_s", stage.cpu_s},
+                             {"peak_rss_kib", stage.peak_rss_kib}});
+  }
+  run["log"] = record.log;
+  const Json extra = ParseJson(record.extra_json, "run record");
+  if (!extra.is_object()) throw Error("run record: expected an object of extra fields");
+  for (const auto& [key, value] : extra.items()) {
+    if (!run.contains(key)) run[key] = value;
+  }
+  const fs::path file = set_folder / "report" / "run.json";
+  std::error_code error;
+  fs::create_directories(file.parent_path(), error);
+  if (error) throw Error(file.string() + ": its folder cannot be made: " + error.message());
+  WriteFileAtomically(file, PrettyJson(run, file.string()));
+}
+
+}  // namespace dtr::io

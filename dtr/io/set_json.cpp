@@ -1,0 +1,428 @@
+#include "dtr/io/set_json.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "dtr/base/error.h"
+#include "dtr/io/depth_io.h"
+#include "dtr/io/json_fields.h"
+
+namespace dtr::io {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Quaternions written with 7 digits by other programs pass; a wrong one does not.
+constexpr double kUnitQuaternion = 1e-6;
+constexpr size_t kLongestId = 200;  // most file systems stop at 255 bytes
+constexpr char kFormatName[] = "dtr-set";
+constexpr char kHeldOutFolder[] = "held_out/";
+
+LengthUnit UnitOf(const JsonObject& set) {
+  const std::string name = set.String("unit");
+  for (const auto unit : {LengthUnit::kUnknown, LengthUnit::kArbitrary, LengthUnit::kMetre}) {
+    if (name == NameOf(unit)) return unit;
+  }
+  set.Fail("unit", "\"unknown\", \"arbitrary\" or \"metre\"");
+}
+
+// Relative, with '/' between plain names: nothing that leaves the folder on any system.
+bool IsSafePath(const std::string& path) {
+  const fs::path parts(path);
+  const bool plain = std::all_of(path.begin(), path.end(), [](unsigned char c) {
+    return c >= 32 && c != 127 && c != '\\' && c != ':';
+  });
+  return plain && !path.empty() && parts.is_relative() && path.back() != '/' &&
+         path.find("//") == std::string::npos &&
+         std::none_of(parts.begin(), parts.end(),
+                      [](const fs::path& part) { return part == ".." || part == "."; });
+}
+
+bool IsHexSha256(const std::string& text) {
+  return text.size() == 64 && std::all_of(text.begin(), text.end(), [](char c) {
+           return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f');
+         });
+}
+
+StoredFile StoredFileFrom(const JsonObject& object) {
+  StoredFile file{object.String("path"), object.String("sha256"), object.Unsigned("bytes")};
+  if (!IsSafePath(file.path)) object.Fail("path", "a relative path inside the set's folder");
+  if (!IsHexSha256(file.sha256)) object.Fail("sha256", "64 lower-case hexadecimal digits");
+  return file;
+}
+
+Json ToJson(const StoredFile& file) {
+  return {{"path", file.path}, {"sha256", file.sha256}, {"bytes", file.bytes}};
+}
+
+template <typename Vector>
+Json NumbersToJson(const Vector& numbers) {
+  Json array = Json::array();
+  for (const double number : numbers) array.push_back(number);
+  return array;
+}
+
+// Unknown fields of a nested object are kept under its key.
+void Nest(Json& extra, const std::string& key, const Json& unknown) {
+  if (!unknown.empty()) extra[key] = unknown;
+}
+
+std::string TextOrEmpty(const Json& extra) { return extra.empty() ? "" : extra.dump(); }
+
+// Puts kept fields back. Those of a nested object are dropped with the object itself: a depth map
+// that is gone takes with it what was said about it.
+void Restore(Json& object, const std::string& extra_json, const std::set<std::string>& nested) {
+  if (extra_json.empty()) return;
+  const Json extra = ParseJson(extra_json, "extra_json");
+  if (!extra.is_object()) throw Error("extra_json: expected an object, found " + extra_json);
+  for (const auto& [key, value] : extra.items()) {
+    if (nested.count(key) == 0) {
+      if (!object.contains(key)) object[key] = value;
+    } else if (object.contains(key) && object[key].is_object() && value.is_object()) {
+      for (const auto& [inner_key, inner] : value.items()) {
+        if (!object[key].contains(inner_key)) object[key][inner_key] = inner;
+      }
+    }
+  }
+}
+
+PinholeCamera CameraFrom(const JsonObject& object) {
+  if (object.String("model") != "pinhole") object.Fail("model", "\"pinhole\"");
+  const int width_px = object.PositiveInt("width_px");
+  const int height_px = object.PositiveInt("height_px");
+  if (static_cast<std::uint64_t>(width_px) * static_cast<std::uint64_t>(height_px) >
+      kImageLimitPx) {
+    object.Fail("width_px", "an image of at most " + std::to_string(kImageLimitPx) + " pixels",
+                std::to_string(width_px) + "x" + std::to_string(height_px));
+  }
+  return {width_px,
+          height_px,
+          object.Positive("fx_px"),
+          object.Positive("fy_px"),
+          object.Number("cx_px"),
+          object.Number("cy_px")};
+}
+
+Json ToJson(const PinholeCamera& camera) {
+  return {
+      {"model", "pinhole"},      {"width_px", camera.width_px()}, {"height_px", camera.height_px()},
+      {"fx_px", camera.fx_px()}, {"fy_px", camera.fy_px()},       {"cx_px", camera.cx_px()},
+      {"cy_px", camera.cy_px()}};
+}
+
+Pose PoseFrom(const JsonObject& object) {
+  const Eigen::VectorXd wxyz = object.Numbers("rotation_wxyz", 4);
+  if (!(std::abs(wxyz.norm() - 1) <= kUnitQuaternion)) {
+    object.Fail("rotation_wxyz", "a quaternion of length 1", "length " + Json(wxyz.norm()).dump());
+  }
+  return {Eigen::Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3]), object.Numbers("translation", 3)};
+}
+
+Json ToJson(const Pose& pose) {
+  const Eigen::Quaterniond& q = pose.rotation;
+  return {{"rotation_wxyz", {q.w(), q.x(), q.y(), q.z()}},
+          {"translation", NumbersToJson(pose.translation)}};
+}
+
+// Fills the view's depth fields; returns what was not known.
+Json DepthFrom(const JsonObject& object, View& view) {
+  view.depth_file = StoredFileFrom(object);
+  const std::string coding = object.String("coding");
+  try {
+    view.depth_coding = DepthCodingFromName(coding);
+  } catch (const UsageError&) {
+    object.Fail("coding", "exr-float, exr-half, png16-mm or png16-inverse");
+  }
+  if (object.String("kind") != "plane-z") object.Fail("kind", "\"plane-z\"");
+  view.depth_scale = object.PositiveInt("scale");
+  if (view.camera.width_px() % view.depth_scale != 0 ||
+      view.camera.height_px() % view.depth_scale != 0) {
+    object.Fail("scale", "a divisor of the image's " + std::to_string(view.camera.width_px()) +
+                             "x" + std::to_string(view.camera.height_px()));
+  }
+  view.near_z = object.Positive("near_z");
+  view.far_z = object.Positive("far_z");
+  if (!(view.near_z < view.far_z)) object.Fail("far_z", "more than near_z");
+  return object.Unknown();
+}
+
+Json DepthToJson(const View& view) {
+  Json depth = ToJson(*view.depth_file);
+  depth["coding"] = NameOf(view.depth_coding);
+  depth["kind"] = "plane-z";
+  depth["scale"] = view.depth_scale;
+  depth["near_z"] = view.near_z;
+  depth["far_z"] = view.far_z;
+  return depth;
+}
+
+// A held-out photo must not be found among the sources, nor the other way round.
+void ExpectFolder(const JsonObject& object, const View& view, const std::optional<StoredFile>& file,
+                  const std::string& key) {
+  if (!file) return;
+  const bool in_held_out = file->path.rfind(kHeldOutFolder, 0) == 0;
+  if (in_held_out == (view.role == ViewRole::kHeldOut)) return;
+  object.Fail(key + ".path",
+              in_held_out ? "a path outside held_out/ for a source" : "a path in held_out/",
+              "\"" + file->path + "\"");
+}
+
+void FilesFrom(const JsonObject& object, View& view, Json& extra) {
+  const auto read = [&](const std::string& key, std::optional<StoredFile>& file) {
+    if (!object.Has(key)) return;
+    const JsonObject entry = object.Object(key);
+    file = StoredFileFrom(entry);
+    Nest(extra, key, entry.Unknown());
+  };
+  read("image", view.image_file);
+  read("mask", view.mask_file);
+  read("sigma", view.sigma_file);
+  if (object.Has("depth")) {
+    const JsonObject depth = object.Object("depth");
+    Nest(extra, "depth", DepthFrom(depth, view));
+  }
+  if (view.role == ViewRole::kHeldOut && (view.depth_file || view.sigma_file)) {
+    object.Fail(view.depth_file ? "depth" : "sigma", "no depth in a held-out view");
+  }
+  if (view.sigma_file && !view.depth_file) object.Fail("sigma", "a sigma only beside a depth");
+  ExpectFolder(object, view, view.image_file, "image");
+  ExpectFolder(object, view, view.mask_file, "mask");
+  ExpectFolder(object, view, view.depth_file, "depth");
+  ExpectFolder(object, view, view.sigma_file, "sigma");
+}
+
+View ViewFrom(const JsonObject& object) {
+  View view;
+  view.id = object.String("id");
+  if (!IsSafeId(view.id)) object.Fail("id", "1 to 200 of the characters A-Z a-z 0-9 . _ -");
+  view.name = object.String("name");
+  if (view.name.empty()) object.Fail("name", "the photo's name");
+  const std::string role = object.String("role");
+  if (role != NameOf(ViewRole::kSource) && role != NameOf(ViewRole::kHeldOut)) {
+    object.Fail("role", "\"source\" or \"held_out\"");
+  }
+  view.role = role == NameOf(ViewRole::kSource) ? ViewRole::kSource : ViewRole::kHeldOut;
+  const JsonObject camera = object.Object("camera"), pose = object.Object("cam_from_world");
+  view.camera = CameraFrom(camera);
+  view.cam_from_world = PoseFrom(pose);
+  Json nested = Json::object();
+  FilesFrom(object, view, nested);
+  if (object.Has("reference_baseline")) {
+    view.reference_baseline = object.Number("reference_baseline");
+    if (view.reference_baseline < 0) object.Fail("reference_baseline", "a number of at least 0");
+  }
+  if (object.Has("gain_linear_rgb")) {
+    view.gain = object.Numbers("gain_linear_rgb", 3);
+    if (!(view.gain.minCoeff() > 0)) object.Fail("gain_linear_rgb", "3 positive numbers");
+  }
+  Nest(nested, "camera", camera.Unknown());
+  Nest(nested, "cam_from_world", pose.Unknown());
+  Json extra = object.Unknown();
+  extra.update(nested);
+  view.extra_json = TextOrEmpty(extra);
+  return view;
+}
+
+Json ToJson(const View& view) {
+  Json object = {{"id", view.id},
+                 {"name", view.name},
+                 {"role", NameOf(view.role)},
+                 {"camera", ToJson(view.camera)},
+                 {"cam_from_world", ToJson(view.cam_from_world)}};
+  if (view.image_file) object["image"] = ToJson(*view.image_file);
+  if (view.mask_file) object["mask"] = ToJson(*view.mask_file);
+  if (view.depth_file) object["depth"] = DepthToJson(view);
+  if (view.sigma_file) object["sigma"] = ToJson(*view.sigma_file);
+  object["reference_baseline"] = view.reference_baseline;
+  object["gain_linear_rgb"] = NumbersToJson(view.gain);
+  Restore(object, view.extra_json, {"camera", "cam_from_world", "image", "mask", "depth", "sigma"});
+  return object;
+}
+
+void ExpectVersion(const JsonObject& root) {
+  if (root.String("format") != kFormatName) root.Fail("format", "\"dtr-set\"");
+  const int version = root.PositiveInt("format_version");
+  if (version != kFormatVersion) {
+    root.Fail("format_version", std::to_string(kFormatVersion),
+              std::to_string(version) + "; read it with the version of dtr that wrote it");
+  }
+}
+
+Frame FrameFrom(const JsonObject& object, LengthUnit unit, std::set<std::string>& ids) {
+  Frame frame;
+  if (object.Has("time_s")) frame.time_s = object.Number("time_s");
+  const Json& views = object.Array("views");
+  if (views.empty()) object.Fail("views", "at least one view");
+  for (size_t i = 0; i < views.size(); ++i) {
+    const JsonObject item = object.Item("views", i);
+    frame.views.push_back(ViewFrom(item));
+    const View& view = frame.views.back();
+    if (!view.image_file) item.Fail("image", "an object");
+    if (!ids.insert(view.id).second) item.Fail("id", "an id that no other view has");
+    if (view.depth_file && view.depth_coding == DepthCoding::kPng16Millimetre &&
+        unit != LengthUnit::kMetre) {
+      item.Fail("depth.coding", "another coding, as png16-mm needs the unit metre", "png16-mm");
+    }
+  }
+  frame.extra_json = TextOrEmpty(object.Unknown());
+  return frame;
+}
+
+Json ToJson(const Frame& frame) {
+  Json views = Json::array();
+  for (const View& view : frame.views) views.push_back(ToJson(view));
+  Json object = {{"time_s", frame.time_s}, {"views", std::move(views)}};
+  Restore(object, frame.extra_json, {});
+  return object;
+}
+
+std::string ObjectText(const JsonObject& root, const std::string& key) {
+  if (!root.Has(key)) return "{}";
+  (void)root.Object(key);  // refuses anything else
+  return root.Value(key).dump();
+}
+
+DtrSet SetFrom(const JsonObject& root) {
+  ExpectVersion(root);
+  DtrSet set;
+  set.unit = UnitOf(root);
+  set.world_origin = root.Numbers("world_origin", 3);
+  set.scene_center = root.Numbers("scene_center", 3);
+  Json nested = Json::object();
+  if (root.Has("bounds")) {
+    const JsonObject bounds = root.Object("bounds");
+    set.bounds.min = bounds.Numbers("min", 3);
+    set.bounds.max = bounds.Numbers("max", 3);
+    if (set.bounds.empty()) root.Fail("bounds", "min of at most max on every axis");
+    Nest(nested, "bounds", bounds.Unknown());
+  }
+  if (root.Has("sparse")) {
+    const JsonObject sparse = root.Object("sparse");
+    set.sparse_file = StoredFileFrom(sparse);
+    Nest(nested, "sparse", sparse.Unknown());
+  }
+  const Json& frames = root.Array("frames");
+  if (frames.empty()) root.Fail("frames", "at least one frame");
+  std::set<std::string> ids;
+  for (size_t i = 0; i < frames.size(); ++i) {
+    set.frames.push_back(FrameFrom(root.Item("frames", i), set.unit, ids));
+  }
+  set.provenance_json = ObjectText(root, "provenance");
+  set.verdict_json = ObjectText(root, "verdict");
+  Json extra = root.Unknown();
+  extra.update(nested);
+  set.extra_json = TextOrEmpty(extra);
+  return set;
+}
+
+}  // namespace
+
+const char* NameOf(LengthUnit unit) {
+  switch (unit) {
+    case LengthUnit::kArbitrary:
+      return "arbitrary";
+    case LengthUnit::kMetre:
+      return "metre";
+    case LengthUnit::kUnknown:
+      break;
+  }
+  return "unknown";
+}
+
+const char* NameOf(ViewRole role) { return role == ViewRole::kSource ? "source" : "held_out"; }
+
+bool IsSafeId(const std::string& id) {
+  return !id.empty() && id.size() <= kLongestId && id[0] != '.' &&
+         std::all_of(id.begin(), id.end(), [](unsigned char c) {
+           return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                  c == '.' || c == '_' || c == '-';
+         });
+}
+
+DtrSet SetFromJson(const std::string& text, const std::string& file) {
+  const Json root = ParseJson(text, file);
+  return SetFrom(JsonObject(root, file, ""));
+}
+
+std::string JsonFromSet(const DtrSet& set, const std::string& file) {
+  Json root = {{"format", kFormatName},
+               {"format_version", kFormatVersion},
+               {"unit", NameOf(set.unit)},
+               {"world_origin", NumbersToJson(set.world_origin)},
+               {"scene_center", NumbersToJson(set.scene_center)}};
+  if (!set.bounds.empty()) {
+    root["bounds"] = {{"min", NumbersToJson(set.bounds.min)},
+                      {"max", NumbersToJson(set.bounds.max)}};
+  }
+  if (set.sparse_file) root["sparse"] = ToJson(*set.sparse_file);
+  root["frames"] = Json::array();
+  for (const Frame& frame : set.frames) root["frames"].push_back(ToJson(frame));
+  root["provenance"] = ParseJson(set.provenance_json, file + ": provenance");
+  root["verdict"] = ParseJson(set.verdict_json, file + ": verdict");
+  Restore(root, set.extra_json, {"bounds", "sparse"});
+  const std::string text = PrettyJson(root, file);
+  SetFromJson(text, file);  // NaN turns into null here and is refused with its field
+  return text;
+}
+
+std::string JsonFromView(const View& view, const std::string& file) {
+  const std::string text = PrettyJson(ToJson(view), file);
+  ViewFromJson(text, file);
+  return text;
+}
+
+View ViewFromJson(const std::string& text, const std::string& file) {
+  const Json root = ParseJson(text, file);
+  return ViewFrom(JsonObject(root, file, ""));
+}
+
+std::vector<NamedFile> FilesOf(const DtrSet& set) {
+  std::vector<NamedFile> files;
+  const auto add = [&](const std::optional<StoredFile>& file, const std::string& field) {
+    if (file) files.push_back({&*file, field});
+  };
+  add(set.sparse_file, "sparse");
+  for (size_t f = 0; f < set.frames.size(); ++f) {
+    for (size_t i = 0; i < set.frames[f].views.size(); ++i) {
+      const View& view = set.frames[f].views[i];
+      const std::string field =
+          "frames[" + std::to_string(f) + "].views[" + std::to_string(i) + "].";
+      add(view.image_file, field + "image");
+      add(view.mask_file, field + "mask");
+      add(view.depth_file, field + "depth");
+      add(view.sigma_file, field + "sigma");
+    }
+  }
+  return files;
+}
+
+std::string ProblemOf(const fs::path& set_folder, const NamedFile& named) {
+  const fs::path root = fs::canonical(set_folder);
+  std::error_code error;
+  const fs::path full = fs::weakly_canonical(root / named.file->path, error);
+  const std::string shown = "'" + named.file->path + "'";
+  if (error ||
+      std::mismatch(root.begin(), root.end(), full.begin(), full.end()).first != root.end()) {
+    return named.field + ".path: expected a file inside the set's folder, found " + shown +
+           ", which leads to " + full.string();
+  }
+  if (!fs::is_regular_file(full, error)) {
+    return named.field + ".path: expected a file, found nothing at " + shown;
+  }
+  const auto size = fs::file_size(full, error);
+  if (error || size != named.file->bytes) {
+    return named.field + ".bytes: expected " + std::to_string(named.file->bytes) +
+           " bytes as recorded, found " + std::to_string(size) + " in " + shown;
+  }
+  return "";
+}
+
+void ExpectFiles(const fs::path& set_folder, const DtrSet& set) {
+  for (const NamedFile& named : FilesOf(set)) {
+    const std::string problem = ProblemOf(set_folder, named);
+    if (!problem.empty()) throw Error((set_folder / kSetFile).string() + ": " + problem);
+  }
+}
+
+}  // namespace dtr::io

@@ -1,0 +1,216 @@
+// The reading half of set_io.h.
+#include <algorithm>
+#include <set>
+
+#include "dtr/base/error.h"
+#include "dtr/base/files.h"
+#include "dtr/base/hash.h"
+#include "dtr/base/parallel_for.h"
+#include "dtr/io/depth_io.h"
+#include "dtr/io/set_io.h"
+#include "dtr/io/set_json.h"
+#include "dtr/io/sparse_io.h"
+
+namespace dtr::io {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::uintmax_t kSetFileLimitBytes = std::uintmax_t{256} << 20;  // 100,000 views
+
+DtrSet ReadSetFile(const fs::path& set_folder) {
+  const fs::path file = set_folder / kSetFile;
+  std::error_code error;
+  if (!fs::is_directory(set_folder, error)) {
+    throw Error(set_folder.string() + ": expected the folder of a D+TR set, found " +
+                (fs::exists(set_folder, error) ? "a file" : "nothing"));
+  }
+  if (!fs::is_regular_file(file, error)) {
+    throw Error(file.string() +
+                ": expected the file that makes a folder a D+TR set, found nothing; " +
+                "an unfinished set is resumed by the command that began it");
+  }
+  return SetFromJson(ReadFile(file, kSetFileLimitBytes), file.string());
+}
+
+void ExpectViewSize(const fs::path& file, const View& view, int width_px, int height_px) {
+  if (width_px == view.camera.width_px() && height_px == view.camera.height_px()) return;
+  throw Error(file.string() + ": expected the view's " + std::to_string(view.camera.width_px()) +
+              "x" + std::to_string(view.camera.height_px()) + " pixels, found " +
+              std::to_string(width_px) + "x" + std::to_string(height_px));
+}
+
+// What equal stored pixels and cameras have in common.
+bool AreDuplicates(const View& a, const View& b) {
+  const auto same = [](const std::optional<StoredFile>& x, const std::optional<StoredFile>& y) {
+    return x.has_value() == y.has_value() && (!x || x->sha256 == y->sha256);
+  };
+  const bool same_depth =
+      same(a.depth_file, b.depth_file) &&
+      (!a.depth_file || (a.depth_coding == b.depth_coding && a.depth_scale == b.depth_scale &&
+                         a.near_z == b.near_z && a.far_z == b.far_z));
+  return a.image_file && a.role == b.role && a.camera == b.camera &&
+         a.cam_from_world.rotation.coeffs() == b.cam_from_world.rotation.coeffs() &&
+         a.cam_from_world.translation == b.cam_from_world.translation &&
+         same(a.image_file, b.image_file) && same(a.mask_file, b.mask_file) && same_depth &&
+         same(a.sigma_file, b.sigma_file);
+}
+
+// "photos/IMG 1.JPG" -> "photos_IMG_1"
+std::string IdFromName(const std::string& name) {
+  constexpr size_t kLongestStem = 100;  // leaves room for a number and for file extensions
+  const size_t slash = name.find_last_of("/\\");
+  const size_t dot = name.find_last_of('.');
+  const bool has_extension =
+      dot != std::string::npos && dot > 0 && (slash == std::string::npos || dot > slash + 1);
+  std::string id = has_extension ? name.substr(0, dot) : name;
+  for (char& c : id) {
+    const bool safe = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                      c == '_' || c == '-';
+    if (!safe) c = '_';
+  }
+  if (id.size() > kLongestStem) id = id.substr(id.size() - kLongestStem);  // the end differs most
+  return id.empty() ? "view" : id;
+}
+
+std::string LowerCase(std::string text) {
+  for (char& c : text) {
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  }
+  return text;
+}
+
+}  // namespace
+
+DtrSet ReadSet(const fs::path& set_folder) {
+  DtrSet set = ReadSetFile(set_folder);
+  ExpectFiles(set_folder, set);
+  return set;
+}
+
+void LoadPixels(const fs::path& set_folder, View& view, const LoadOptions& options) {
+  if (options.images && view.image_file) {
+    const fs::path file = set_folder / view.image_file->path;
+    const ImageHeader header = ReadImageHeader(file);
+    ExpectViewSize(file, view, header.width_px, header.height_px);
+    view.image = ReadImage(file);
+  }
+  if (options.images && view.mask_file) {
+    const fs::path file = set_folder / view.mask_file->path;
+    const ImageHeader header = ReadImageHeader(file);
+    ExpectViewSize(file, view, header.width_px, header.height_px);
+    view.mask = ReadMask(file);
+  }
+  const int depth_width_px = view.camera.width_px() / view.depth_scale;
+  const int depth_height_px = view.camera.height_px() / view.depth_scale;
+  if (options.depth && view.depth_file) {
+    // The unit was checked with set.json, and reading does not depend on it.
+    const DepthFormat format{view.depth_coding, view.near_z, view.far_z, LengthUnit::kUnknown};
+    view.depth =
+        ReadDepth(set_folder / view.depth_file->path, format, depth_width_px, depth_height_px);
+  }
+  if (options.sigma && view.sigma_file) {
+    view.inverse_depth_sigma =
+        ReadSigma(set_folder / view.sigma_file->path, depth_width_px, depth_height_px);
+  }
+}
+
+DtrSet LoadSet(const fs::path& set_folder, const LoadOptions& options) {
+  DtrSet set = ReadSet(set_folder);
+  if (options.collapse_duplicates) CollapseDuplicates(set);
+  std::vector<View*> views;
+  for (Frame& frame : set.frames) {
+    if (!options.held_out) {
+      std::erase_if(frame.views, [](const View& v) { return v.role == ViewRole::kHeldOut; });
+    }
+    for (View& view : frame.views) views.push_back(&view);
+  }
+  ParallelFor(0, static_cast<int>(views.size()), options.threads,
+              [&](int i) { LoadPixels(set_folder, *views[static_cast<size_t>(i)], options); });
+  return set;
+}
+
+SparseScene LoadSparse(const fs::path& set_folder, const DtrSet& set) {
+  if (!set.sparse_file) {
+    throw Error((set_folder / kSetFile).string() +
+                ": sparse: expected the points behind the calibration, found nothing");
+  }
+  const fs::path file = set_folder / set.sparse_file->path;
+  SparseScene scene = ReadSparse(file);
+  const size_t views = set.frames.empty() ? 0 : set.frames[0].views.size();
+  // Observations are sorted by view, so the last one has the largest index.
+  if (!scene.observations.empty() && static_cast<size_t>(scene.observations.back().view) >= views) {
+    throw Error(file.string() + ": expected views below " + std::to_string(views) + ", found " +
+                std::to_string(scene.observations.back().view));
+  }
+  return scene;
+}
+
+std::vector<std::string> CollapseDuplicates(DtrSet& set) {
+  std::vector<std::string> removed;
+  for (Frame& frame : set.frames) {
+    std::vector<View> kept;
+    for (View& view : frame.views) {
+      const bool seen = std::any_of(kept.begin(), kept.end(),
+                                    [&](const View& v) { return AreDuplicates(v, view); });
+      if (seen) {
+        removed.push_back(view.id);
+      } else {
+        kept.push_back(std::move(view));
+      }
+    }
+    frame.views = std::move(kept);
+  }
+  return removed;
+}
+
+std::vector<std::string> VerifySet(const fs::path& set_folder, int threads) {
+  DtrSet set;
+  try {
+    set = ReadSetFile(set_folder);
+  } catch (const Error& error) {
+    return {error.what()};
+  }
+  const std::vector<NamedFile> files = FilesOf(set);
+  std::vector<std::string> found(files.size());
+  ParallelFor(0, static_cast<int>(files.size()), threads, [&](int i) {
+    const NamedFile& named = files[static_cast<size_t>(i)];
+    std::string& problem = found[static_cast<size_t>(i)];
+    try {
+      problem = ProblemOf(set_folder, named);
+      if (!problem.empty()) return;
+      const std::string hash = Sha256OfFile(set_folder / named.file->path);
+      if (hash != named.file->sha256) {
+        problem = named.field + ".sha256: expected " + named.file->sha256 + ", found " + hash +
+                  " in '" + named.file->path + "'";
+      }
+    } catch (const std::exception& error) {
+      problem = named.field + ": " + error.what();
+    }
+  });
+  std::erase(found, "");
+  for (std::string& problem : found) problem = (set_folder / kSetFile).string() + ": " + problem;
+  return found;
+}
+
+void RewriteMetadata(const fs::path& set_folder, const DtrSet& set) {
+  const fs::path file = set_folder / kSetFile;
+  const std::string text = JsonFromSet(set, file.string());
+  ReadSetFile(set_folder);  // only a finished set is rewritten
+  ExpectFiles(set_folder, set);
+  WriteFileAtomically(file, text);
+}
+
+std::vector<std::string> MakeViewIds(std::span<const std::string> names) {
+  std::vector<std::string> ids;
+  std::set<std::string> taken;  // lower case: some file systems do not tell A from a
+  for (const std::string& name : names) {
+    const std::string stem = IdFromName(name);
+    std::string id = stem;
+    for (int n = 2; !taken.insert(LowerCase(id)).second; ++n) id = stem + "_" + std::to_string(n);
+    ids.push_back(id);
+  }
+  return ids;
+}
+
+}  // namespace dtr::io

@@ -1,0 +1,394 @@
+// The writing half of set_io.h.
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <set>
+
+#include "dtr/base/error.h"
+#include "dtr/base/files.h"
+#include "dtr/base/hash.h"
+#include "dtr/io/depth_io.h"
+#include "dtr/io/json_fields.h"
+#include "dtr/io/set_io.h"
+#include "dtr/io/set_json.h"
+#include "dtr/io/sparse_io.h"
+
+namespace dtr::io {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr char kWork[] = "work";
+constexpr char kFingerprint[] = "work/fingerprint.json";
+constexpr char kLock[] = "work/lock";
+constexpr char kSparseFile[] = "sparse.bin";
+constexpr std::uintmax_t kRecordLimitBytes = 1 << 24;
+constexpr const char* kPixelFolders[] = {"images", "mask", "depth", "sigma", "held_out"};
+
+// "a/b.dtr/" and "a/b.dtr" are one folder.
+fs::path WithoutSlash(const fs::path& target) {
+  const fs::path path = fs::absolute(target).lexically_normal();
+  return path.has_filename() ? path : path.parent_path();
+}
+
+fs::path Beside(const fs::path& target, const std::string& suffix) {
+  return target.parent_path() / (target.filename().string() + suffix);
+}
+
+std::string Canonical(const std::string& fingerprint_json, const std::string& where) {
+  const Json parsed = ParseJson(fingerprint_json, where);
+  if (!parsed.is_object()) throw Error(where + ": expected a JSON object");
+  return nlohmann::json(parsed).dump(2) + "\n";  // sorts the keys
+}
+
+// True when a partial folder has more in it than what the constructor itself puts there.
+bool HoldsWork(const fs::path& partial) {
+  for (const auto& entry : fs::recursive_directory_iterator(partial)) {
+    const fs::path inside = entry.path().lexically_relative(partial);
+    if (!entry.is_directory() && inside != kFingerprint && inside != kLock) return true;
+  }
+  return false;
+}
+
+void Rename(const fs::path& from, const fs::path& to) {
+  std::error_code error;
+  fs::rename(from, to, error);
+  if (error) {
+    throw Error(from.string() + ": cannot be renamed to " + to.string() + ": " + error.message());
+  }
+}
+
+// A rename is on the disk only when its folder is.
+void SyncFolder(const fs::path& folder) {
+  const int fd = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  const bool synced = fd >= 0 && fsync(fd) == 0;
+  const int failure = errno;
+  if (fd >= 0) close(fd);
+  // Some network file systems cannot sync folders; their renames are as safe as they get.
+  if (!synced && failure != EINVAL && failure != ENOTSUP) {
+    throw Error(folder.string() + ": cannot be synced to disk: " + std::strerror(failure));
+  }
+}
+
+void SyncTree(const fs::path& root) {
+  for (const auto& entry : fs::recursive_directory_iterator(root)) {
+    if (entry.is_directory()) SyncFolder(entry.path());
+  }
+  SyncFolder(root);
+}
+
+StoredFile Describe(const fs::path& folder, const std::string& path) {
+  return {path, Sha256OfFile(folder / path), fs::file_size(folder / path)};
+}
+
+void ExpectGrid(const View& view, const std::string& what, int width_px, int height_px,
+                int expected_width_px, int expected_height_px) {
+  if (width_px == expected_width_px && height_px == expected_height_px) return;
+  throw Error("view '" + view.name + "': " + what + ": expected " +
+              std::to_string(expected_width_px) + "x" + std::to_string(expected_height_px) +
+              " pixels, found " + std::to_string(width_px) + "x" + std::to_string(height_px));
+}
+
+void ExpectPixels(const View& view) {
+  if (!IsSafeId(view.id)) {
+    throw Error("view '" + view.name + "': expected an id of the characters A-Z a-z 0-9 . _ -, " +
+                "found '" + view.id + "'");
+  }
+  const int w = view.camera.width_px(), h = view.camera.height_px();
+  if (!view.image.empty()) ExpectGrid(view, "image", view.image.width(), view.image.height(), w, h);
+  if (!view.mask.empty()) ExpectGrid(view, "mask", view.mask.width(), view.mask.height(), w, h);
+  const bool has_depth = !view.depth.empty() || view.inverse_depth_sigma;
+  if (!has_depth) return;
+  if (view.role == ViewRole::kHeldOut) {
+    throw Error("view '" + view.name + "': expected no depth in a held-out view");
+  }
+  if (view.depth_scale < 1 || w % view.depth_scale != 0 || h % view.depth_scale != 0) {
+    throw Error("view '" + view.name + "': expected a depth scale that divides " +
+                std::to_string(w) + "x" + std::to_string(h) + ", found " +
+                std::to_string(view.depth_scale));
+  }
+  const int depth_w = w / view.depth_scale, depth_h = h / view.depth_scale;
+  if (!view.depth.empty()) {
+    ExpectGrid(view, "depth", view.depth.width(), view.depth.height(), depth_w, depth_h);
+  }
+  if (view.inverse_depth_sigma) {
+    ExpectGrid(view, "sigma", view.inverse_depth_sigma->width(), view.inverse_depth_sigma->height(),
+               depth_w, depth_h);
+  }
+}
+
+// The file system's own errors, as ours: they name the file already.
+template <typename Function>
+auto AsError(const Function& function) {
+  try {
+    return function();
+  } catch (const fs::filesystem_error& error) {
+    throw Error(std::string("set cannot be written: ") + error.what());
+  }
+}
+
+}  // namespace
+
+struct SetWriter::State {
+  fs::path target, partial, aside;
+  bool force = false, resumed = false, finished = false;
+  ImageCoding image_coding = ImageCoding::kPng;
+  int lock_fd = -1;
+
+  fs::path RecordOf(const std::string& id) const {
+    return partial / kWork / "views" / (id + ".json");
+  }
+  void Recover() const;
+  void ExpectReplaceable() const;
+  void Lock();
+  void OpenPartial(const std::string& fingerprint);
+  std::string PathOf(const View& view, const std::string& kind, const std::string& extension) const;
+  template <typename Write>
+  StoredFile Store(const std::string& path, const Write& write) const;
+  void WriteView(View& view, LengthUnit unit) const;
+  bool RestoreView(View& view) const;
+  void RemoveUnnamed(const DtrSet& set) const;
+  void MoveIntoPlace();
+};
+
+// A replacement that was cut off between its two renames: the old set goes back.
+void SetWriter::State::Recover() const {
+  if (!fs::exists(aside / kSetFile)) return;
+  if (fs::exists(target)) {
+    fs::remove_all(aside);
+  } else {
+    Rename(aside, target);
+  }
+}
+
+void SetWriter::State::ExpectReplaceable() const {
+  if (!fs::exists(fs::symlink_status(target))) return;
+  if (!force) {
+    throw UsageError(target.string() + ": expected no such folder yet, found one; " +
+                     "choose another name or pass --force to replace it");
+  }
+  const bool empty_folder = fs::is_directory(target) && fs::is_empty(target);
+  if (!empty_folder && !fs::is_regular_file(target / kSetFile)) {
+    throw UsageError(target.string() + ": expected a D+TR set to replace, found something else; " +
+                     "it is left alone");
+  }
+}
+
+void SetWriter::State::Lock() {
+  const fs::path file = partial / kLock;
+  lock_fd = open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+  if (lock_fd < 0) throw Error(file.string() + ": cannot be opened: " + std::strerror(errno));
+  if (flock(lock_fd, LOCK_EX | LOCK_NB) == 0) return;
+  close(lock_fd);
+  lock_fd = -1;
+  throw UsageError(partial.string() + ": another process is writing this set; wait for it");
+}
+
+void SetWriter::State::OpenPartial(const std::string& fingerprint) {
+  std::error_code error;
+  if (fs::exists(partial) && !fs::is_directory(partial)) {
+    throw UsageError(partial.string() + ": expected a folder or nothing, found a file");
+  }
+  const bool foreign =
+      fs::exists(partial) && HoldsWork(partial) && !fs::exists(partial / kFingerprint);
+  if (!foreign) fs::create_directories(partial / kWork, error);
+  if (error) throw Error(partial.string() + ": cannot be made: " + error.message());
+  if (!foreign) Lock();
+  const bool holds_work = HoldsWork(partial);
+  if (holds_work &&
+      (foreign || ReadFile(partial / kFingerprint, kRecordLimitBytes) != fingerprint)) {
+    throw UsageError(partial.string() + ": expected work of the same inputs and options, found " +
+                     "others; run that command again to finish it, or delete the folder");
+  }
+  resumed = holds_work;
+  if (!resumed) WriteFileAtomically(partial / kFingerprint, fingerprint);
+}
+
+std::string SetWriter::State::PathOf(const View& view, const std::string& kind,
+                                     const std::string& extension) const {
+  const std::string path = kind + "/" + view.id + extension;
+  return view.role == ViewRole::kHeldOut ? "held_out/" + path : path;
+}
+
+template <typename Write>
+StoredFile SetWriter::State::Store(const std::string& path, const Write& write) const {
+  const fs::path file = partial / path;
+  std::error_code error;
+  fs::create_directories(file.parent_path(), error);
+  if (error) throw Error(file.string() + ": its folder cannot be made: " + error.message());
+  write(file);
+  return Describe(partial, path);
+}
+
+SetWriter::SetWriter(const fs::path& target, const std::string& fingerprint_json, bool force,
+                     ImageCoding image_coding)
+    : state_(std::make_unique<State>()) {
+  const std::string fingerprint = Canonical(fingerprint_json, "fingerprint");
+  state_->target = WithoutSlash(target);
+  state_->partial = Beside(state_->target, ".partial");
+  state_->aside = Beside(state_->target, ".replaced");
+  state_->force = force;
+  state_->image_coding = image_coding;
+  try {
+    AsError([&] {
+      state_->Recover();
+      state_->ExpectReplaceable();
+      state_->OpenPartial(fingerprint);
+    });
+  } catch (...) {
+    if (state_->lock_fd >= 0) close(state_->lock_fd);
+    throw;
+  }
+}
+
+SetWriter::~SetWriter() {
+  std::error_code ignored;
+  try {
+    // Nothing was done: leave nothing that would stand in the way of a corrected command.
+    if (!state_->finished && !HoldsWork(state_->partial)) fs::remove_all(state_->partial, ignored);
+  } catch (const fs::filesystem_error&) {
+    // The folder was taken away while we worked; there is nothing left to tidy.
+  }
+  if (state_->lock_fd >= 0) close(state_->lock_fd);
+}
+
+const fs::path& SetWriter::folder() const { return state_->partial; }
+fs::path SetWriter::work_folder() const { return state_->partial / kWork; }
+bool SetWriter::resumed() const { return state_->resumed; }
+
+void SetWriter::WriteView(View& view, LengthUnit unit) {
+  ExpectPixels(view);
+  AsError([&] { state_->WriteView(view, unit); });
+}
+
+void SetWriter::State::WriteView(View& view, LengthUnit unit) const {
+  if (!view.image.empty()) {
+    const bool jpeg = image_coding == ImageCoding::kJpeg && view.role == ViewRole::kSource;
+    view.image_file = Store(PathOf(view, "images", jpeg ? ".jpg" : ".png"),
+                            [&](const fs::path& file) { WriteImage(file, view.image); });
+  }
+  if (!view.mask.empty()) {
+    view.mask_file = Store(PathOf(view, "mask", ".png"),
+                           [&](const fs::path& file) { WriteMask(file, view.mask); });
+  }
+  if (!view.depth.empty()) {
+    if (view.near_z == 0 && view.far_z == 0) {
+      const DepthRangeOfMap range = RangeOf(view.depth);
+      view.near_z = range.near_z;
+      view.far_z = range.far_z;
+    }
+    const DepthFormat format{view.depth_coding, view.near_z, view.far_z, unit};
+    view.depth_file = Store(PathOf(view, "depth", ExtensionOf(view.depth_coding)),
+                            [&](const fs::path& file) { WriteDepth(file, view.depth, format); });
+  }
+  if (view.inverse_depth_sigma) {
+    view.sigma_file = Store(PathOf(view, "sigma", ".exr"), [&](const fs::path& file) {
+      WriteSigma(file, *view.inverse_depth_sigma);
+    });
+  }
+  // Written last: a record stands for files that are whole.
+  const fs::path record = RecordOf(view.id);
+  std::error_code error;
+  fs::create_directories(record.parent_path(), error);
+  if (error) throw Error(record.string() + ": its folder cannot be made: " + error.message());
+  WriteFileAtomically(record, JsonFromView(view, "view '" + view.name + "'"));
+}
+
+bool SetWriter::RestoreView(View& view) const {
+  return AsError([&] { return state_->RestoreView(view); });
+}
+
+bool SetWriter::State::RestoreView(View& view) const {
+  const fs::path record = RecordOf(view.id);
+  if (!IsSafeId(view.id) || !fs::exists(record)) return false;
+  View stored;
+  try {
+    stored = ViewFromJson(ReadFile(record, kRecordLimitBytes), record.string());
+  } catch (const Error&) {
+    return false;  // a damaged checkpoint costs time, never the job
+  }
+  const bool same_view =
+      stored.id == view.id && stored.name == view.name && stored.role == view.role &&
+      stored.camera == view.camera &&
+      stored.cam_from_world.rotation.coeffs() == view.cam_from_world.rotation.coeffs() &&
+      stored.cam_from_world.translation == view.cam_from_world.translation;
+  if (!same_view) return false;
+  for (const auto* file :
+       {&stored.image_file, &stored.mask_file, &stored.depth_file, &stored.sigma_file}) {
+    if (!*file) continue;
+    const fs::path full = partial / (*file)->path;
+    if (!fs::is_regular_file(full) || Sha256OfFile(full) != (*file)->sha256) return false;
+  }
+  view.image_file = stored.image_file;
+  view.mask_file = stored.mask_file;
+  view.depth_file = stored.depth_file;
+  view.sigma_file = stored.sigma_file;
+  view.depth_coding = stored.depth_coding;
+  view.depth_scale = stored.depth_scale;
+  view.near_z = stored.near_z;
+  view.far_z = stored.far_z;
+  view.reference_baseline = stored.reference_baseline;
+  view.gain = stored.gain;
+  view.extra_json = stored.extra_json;
+  return true;
+}
+
+void SetWriter::WriteSparse(DtrSet& set, const SparseScene& scene) {
+  set.sparse_file =
+      state_->Store(kSparseFile, [&](const fs::path& file) { dtr::io::WriteSparse(file, scene); });
+}
+
+// What an earlier, interrupted run left and the set does not name any more.
+void SetWriter::State::RemoveUnnamed(const DtrSet& set) const {
+  std::set<fs::path> named;
+  for (const NamedFile& file : FilesOf(set)) named.insert(partial / file.file->path);
+  std::vector<fs::path> unnamed;
+  for (const char* folder : kPixelFolders) {
+    if (!fs::exists(partial / folder)) continue;
+    for (const auto& entry : fs::recursive_directory_iterator(partial / folder)) {
+      if (!entry.is_directory() && named.count(entry.path()) == 0) unnamed.push_back(entry.path());
+    }
+  }
+  for (const fs::path& file : unnamed) fs::remove(file);
+}
+
+void SetWriter::State::MoveIntoPlace() {
+  ExpectReplaceable();
+  const bool replace = fs::exists(target);
+  if (replace) Rename(target, aside);
+  try {
+    Rename(partial, target);
+  } catch (const Error&) {
+    if (replace) Rename(aside, target);
+    throw;
+  }
+  SyncFolder(target.parent_path());
+  finished = true;
+  std::error_code error;
+  fs::remove_all(target / kWork, error);
+  if (!error && replace) fs::remove_all(aside, error);
+  if (error) {
+    throw Error(target.string() +
+                ": finished, but what it no longer needs cannot be deleted: " + error.message());
+  }
+}
+
+void SetWriter::Finish(DtrSet& set) {
+  State& state = *state_;
+  const fs::path file = state.partial / kSetFile;
+  const std::string text = JsonFromSet(set, file.string());
+  ExpectFiles(state.partial, set);
+  if (set.sparse_file) (void)LoadSparse(state.partial, set);  // its views must be the set's
+  AsError([&] {
+    state.RemoveUnnamed(set);
+    WriteFileAtomically(file, text);
+    SyncTree(state.partial);
+    state.MoveIntoPlace();
+  });
+}
+
+}  // namespace dtr::io
