@@ -11,15 +11,15 @@ enum class RenderMethod {
 };
 
 enum class Primitive {
-  kMesh,   ///< SPEC 2.1: implied triangulation, two triangles per 2x2 block
-  kSplat,  ///< SPEC 2.3: one footprint per depth pixel
+  kMesh,   ///< SPEC 2: implied triangulation, two triangles per 2x2 block
+  kSplat,  ///< SPEC 3: one footprint per depth pixel
 };
 
-/// SPEC 4.4: weight of a view from the angle t at the 3D point between the directions to the
+/// SPEC 4.5: weight of a view from the angle t at the 3D point between the directions to the
 /// view's centre and to the novel centre.
 enum class BlendWeight {
   kCosine,        ///< max(0, cos t)^exponent
-  kExponential,   ///< e^(-falloff t)
+  kExponential,   ///< e^(-falloff t); the report lost the minus sign
   kAngle,         ///< max(0, 1 - t / max_angle)
   kInverseAngle,  ///< 1 / (t + t_pixel)^blend_k
   kKNearest,      ///< max(0, 1 - t / t_(k+1)), k = blend_k
@@ -39,13 +39,16 @@ struct RenderOptions {
   int blend_k = 3;                              ///< k of kKNearest, power of kInverseAngle
   double max_angle_rad = std::numbers::pi / 3;  ///< valid views, SPEC 1
   double delta_px = 1.0;                        ///< Delta of SPEC 4, pixels of disparity
-  double depth_break_px = 2.0;  ///< break threshold of SPEC 2.2, pixels of disparity
+  double depth_break_px = 2.0;  ///< break threshold of SPEC 2.3, pixels of disparity
   /// The report's absolute thresholds, in scene units; when set they replace the scale-free ones.
   std::optional<double> absolute_delta;
   std::optional<double> absolute_depth_break;
   bool blend_in_linear_light = true;  ///< else in sRGB values
-  bool fill_holes = false;            ///< SPEC 6.2, a separate step; never counted as seen
+  bool fill_holes = false;            ///< SPEC 7, a separate step; never counted as seen
   int threads = 0;                    ///< 0: all cores; the result does not depend on it
 };
+
+/// Throws dtr::UsageError naming the option when a value has no meaning.
+void CheckRenderOptions(const RenderOptions& options);
 
 }  // namespace dtr

@@ -1,0 +1,265 @@
+#include "dtr/cpu/layer.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "dtr/cpu/raster.h"
+#include "dtr/render/scene.h"
+#include "dtr/render/triangulation.h"
+
+namespace dtr::cpu {
+namespace {
+
+// Splats beyond this are the novel camera touching the surface; it bounds the work (SPEC 3.2).
+constexpr double kMaxSplatHalfPx = 32;
+
+/// A sample seen from the novel camera.
+struct Vertex {
+  ScreenVertex screen;
+  bool exists = false;
+  bool in_front = false;  ///< beyond the near plane; only then `screen` is set
+};
+
+class ViewPainter {
+ public:
+  ViewPainter(const ViewInNovel& view_in_novel, const PinholeCamera& novel,
+              const RenderOptions& options, const Band& band)
+      : in_novel_(view_in_novel),
+        novel_(novel),
+        depth_camera_(view_in_novel.view->DepthCamera()),
+        samples_(MakeSampleGrid(*view_in_novel.view, options.resolution)),
+        rule_{ThresholdsOf(*view_in_novel.view, options).depth_break, options.absolute_depth_break},
+        point_size_(options.point_size),
+        layer_(band) {}
+
+  Layer TakeLayer() { return std::move(layer_); }
+
+  void PaintMesh() {
+    if (samples_.inverse_depth.empty()) return;
+    const int columns = samples_.inverse_depth.width(), rows = samples_.inverse_depth.height();
+    std::vector<Vertex> above, below;
+    // One row and column of empty samples around the grid closes its border cells (SPEC 2.6).
+    for (int j = -1; j < rows; ++j) {
+      std::swap(above, below);
+      below = ProjectRow(j + 1);
+      if (j == -1) above.assign(below.size(), Vertex{});
+      for (int i = -1; i < columns; ++i) PaintBlock(i, j, above, below);
+    }
+  }
+
+  void PaintSplats() {
+    if (samples_.inverse_depth.empty()) return;
+    for (int j = 0; j < samples_.inverse_depth.height(); ++j) {
+      const std::vector<Vertex> row = ProjectRow(j);
+      for (int i = 0; i < samples_.inverse_depth.width(); ++i) {
+        const Vertex& vertex = row[static_cast<size_t>(i + 1)];
+        if (vertex.in_front) PaintSplat(i, j, vertex.screen);
+      }
+    }
+  }
+
+ private:
+  double InverseDepth(int i, int j) const {
+    return samples_.inverse_depth.Contains(i, j) ? samples_.inverse_depth(i, j) : 0;
+  }
+
+  /// The point at depth-grid pixel (u, v), times its inverse depth in the view, in the novel frame.
+  Eigen::Vector3d Homogeneous(double u, double v, double inverse_depth) const {
+    return in_novel_.rotation * depth_camera_.RayFromPixel({u, v}) +
+           in_novel_.translation * inverse_depth;
+  }
+
+  bool InFront(const Eigen::Vector3d& q, double inverse_depth) const {
+    return q.z() > 0 && q.z() >= in_novel_.near_z * inverse_depth;
+  }
+
+  /// SPEC 2.4; requires InFront. The division by z is the only one.
+  ScreenVertex Screen(const Eigen::Vector3d& q, double inverse_depth) const {
+    const double inverse = 1 / q.z();
+    return {SnapToSubpixel(novel_.fx_px() * (q.x() * inverse) + novel_.cx_px()),
+            SnapToSubpixel(novel_.fy_px() * (q.y() * inverse) + novel_.cy_px()),
+            inverse_depth * inverse};
+  }
+
+  Vertex ProjectAt(double u, double v, double inverse_depth) const {
+    Vertex vertex;
+    vertex.exists = inverse_depth > 0;
+    if (!vertex.exists) return vertex;
+    const Eigen::Vector3d q = Homogeneous(u, v, inverse_depth);
+    vertex.in_front = InFront(q, inverse_depth);
+    if (vertex.in_front) vertex.screen = Screen(q, inverse_depth);
+    return vertex;
+  }
+
+  /// Samples -1 ... columns of row j; the ends, and rows off the grid, do not exist.
+  std::vector<Vertex> ProjectRow(int j) const {
+    const int columns = samples_.inverse_depth.width();
+    std::vector<Vertex> row(static_cast<size_t>(columns) + 2);
+    if (j < 0 || j >= samples_.inverse_depth.height()) return row;
+    for (int i = 0; i < columns; ++i) {
+      row[static_cast<size_t>(i + 1)] =
+          ProjectAt(samples_.Centre(i), samples_.Centre(j), samples_.inverse_depth(i, j));
+    }
+    return row;
+  }
+
+  void PaintBlock(int i, int j, const std::vector<Vertex>& above,
+                  const std::vector<Vertex>& below) {
+    const size_t left = static_cast<size_t>(i + 1);
+    const Vertex* corner[4] = {&above[left], &above[left + 1], &below[left], &below[left + 1]};
+    if (!corner[0]->exists && !corner[1]->exists && !corner[2]->exists && !corner[3]->exists) {
+      return;
+    }
+    const Grid<double>& w = samples_.inverse_depth;
+    const bool inside = i >= 0 && j >= 0 && i + 1 < w.width() && j + 1 < w.height();
+    const BlockTriangles block = inside ? TrianglesOfBlock(w, i, j, rule_) : BlockTriangles{};
+    for (const std::uint8_t corners : block.corners) {
+      if (corners != 0) PaintTriangle(i, j, corners, corner);
+    }
+    if (block.corners[0] != 0 && block.corners[1] != 0) return;
+    // SPEC 2.6: corners that a drawn triangle surrounds need no closing.
+    const std::uint8_t drawn = block.corners[0] | block.corners[1];
+    const std::uint8_t apex = drawn == 0 ? 0 : ApexOf(drawn);
+    for (int c = 0; c < 4; ++c) {
+      if (corner[c]->in_front && apex != (1 << c)) PaintQuarterCell(i, j, c);
+    }
+  }
+
+  /// The corner of a single triangle that does not lie on the block's diagonal.
+  static std::uint8_t ApexOf(std::uint8_t corners) {
+    switch (corners) {
+      case kA | kB | kC:
+        return kA;
+      case kB | kC | kD:
+        return kD;
+      case kA | kB | kD:
+        return kB;
+      default:
+        return kC;
+    }
+  }
+
+  void PaintTriangle(int i, int j, std::uint8_t corners, const Vertex* const (&corner)[4]) {
+    // Clockwise on the screen of the view, y down: A B D C without the missing corner.
+    std::array<int, 3> order{};
+    size_t count = 0;
+    for (const int c : {0, 1, 3, 2}) {
+      if (corners & (1 << c)) order[count++] = c;
+    }
+    const Vertex &a = *corner[order[0]], &b = *corner[order[1]], &c = *corner[order[2]];
+    const int in_front = a.in_front + b.in_front + c.in_front;
+    if (in_front == 3) {
+      DrawTriangle(a.screen, b.screen, c.screen, layer_);
+    } else if (in_front > 0) {
+      PaintClipped(i, j, order);
+    }
+  }
+
+  /// SPEC 2.5: the part of a triangle beyond the near plane, Sutherland and Hodgman 1974.
+  void PaintClipped(int i, int j, const std::array<int, 3>& order) {
+    Eigen::Vector3d point[3];
+    for (size_t k = 0; k < 3; ++k) {
+      const int x = i + (order[k] & 1), y = j + (order[k] >> 1);
+      const double w = samples_.inverse_depth(x, y);
+      point[k] = Homogeneous(samples_.Centre(x), samples_.Centre(y), w) / w;
+    }
+    std::array<ScreenVertex, 4> polygon;
+    size_t count = 0;
+    for (size_t k = 0; k < 3; ++k) {
+      const Eigen::Vector3d &from = point[k], &to = point[(k + 1) % 3];
+      const bool from_in = from.z() >= in_novel_.near_z, to_in = to.z() >= in_novel_.near_z;
+      if (from_in) polygon[count++] = Screen(from, 1);
+      if (from_in != to_in) {
+        const double share = (in_novel_.near_z - from.z()) / (to.z() - from.z());
+        Eigen::Vector3d cut = from + share * (to - from);
+        cut.z() = in_novel_.near_z;
+        polygon[count++] = Screen(cut, 1);
+      }
+    }
+    for (size_t k = 2; k < count; ++k) {
+      DrawTriangle(polygon[0], polygon[k - 1], polygon[k], layer_);
+    }
+  }
+
+  /// SPEC 2.6: the quarter of the sample's cell that lies in block (i, j), on its local plane.
+  void PaintQuarterCell(int i, int j, int corner) {
+    const int x = i + (corner & 1), y = j + (corner >> 1);
+    const double towards_x = (corner & 1) ? -0.5 : 0.5, towards_y = (corner >> 1) ? -0.5 : 0.5;
+    const double slope_x = Slope(x, y, 1, 0), slope_y = Slope(x, y, 0, 1);
+    const double here = InverseDepth(x, y);
+    const auto at = [&](double dx, double dy) {
+      // Half a sample cannot bring a surface to infinity; noise on a single sample could.
+      const double w = std::max(here + dx * slope_x + dy * slope_y, 0.5 * here);
+      return ProjectAt(samples_.Centre(x) + dx * samples_.step,
+                       samples_.Centre(y) + dy * samples_.step, w);
+    };
+    const double left = std::min(0.0, towards_x), right = std::max(0.0, towards_x);
+    const double top = std::min(0.0, towards_y), bottom = std::max(0.0, towards_y);
+    const Vertex a = at(left, top), b = at(right, top), c = at(left, bottom), d = at(right, bottom);
+    if (!a.in_front || !b.in_front || !c.in_front || !d.in_front) return;
+    DrawTriangle(a.screen, b.screen, d.screen, layer_);
+    DrawTriangle(a.screen, d.screen, c.screen, layer_);
+  }
+
+  /// Slope of 1/z per sample along (dx, dy): the flatter of the two sides that do not break.
+  double Slope(int i, int j, int dx, int dy) const {
+    const double here = InverseDepth(i, j);
+    double slope = 0;
+    bool found = false;
+    if (InverseDepth(i + dx, j + dy) > 0 &&
+        !EdgeBreaks(samples_.inverse_depth, i, j, dx, dy, rule_)) {
+      slope = InverseDepth(i + dx, j + dy) - here;
+      found = true;
+    }
+    if (InverseDepth(i - dx, j - dy) > 0 &&
+        !EdgeBreaks(samples_.inverse_depth, i - dx, j - dy, dx, dy, rule_)) {
+      const double backward = here - InverseDepth(i - dx, j - dy);
+      if (!found || std::abs(backward) < std::abs(slope)) slope = backward;
+    }
+    return slope;
+  }
+
+  /// SPEC 3.1: a square as large as the sample's cell on its local plane.
+  void PaintSplat(int i, int j, const ScreenVertex& screen) {
+    const double w = InverseDepth(i, j), step = samples_.step;
+    const Eigen::Vector3d q = Homogeneous(samples_.Centre(i), samples_.Centre(j), w);
+    const Eigen::Vector3d qu = in_novel_.rotation.col(0) * (step / depth_camera_.fx_px()) +
+                               in_novel_.translation * Slope(i, j, 1, 0);
+    const Eigen::Vector3d qv = in_novel_.rotation.col(1) * (step / depth_camera_.fy_px()) +
+                               in_novel_.translation * Slope(i, j, 0, 1);
+    const auto derivative = [&](const Eigen::Vector3d& dq) -> Eigen::Vector2d {
+      return {novel_.fx_px() * (dq.x() - q.x() / q.z() * dq.z()) / q.z(),
+              novel_.fy_px() * (dq.y() - q.y() / q.z() * dq.z()) / q.z()};
+    };
+    const Eigen::Vector2d du = derivative(qu), dv = derivative(qv);
+    if (!(du.x() * dv.y() - du.y() * dv.x() > 0)) return;  // SPEC 2.4: the back of a surface
+    const double extent =
+        std::max(std::abs(du.x()) + std::abs(dv.x()), std::abs(du.y()) + std::abs(dv.y()));
+    const double half = std::min(0.5 * point_size_ * extent, kMaxSplatHalfPx);
+    DrawSquare(screen, half, layer_);
+  }
+
+  const ViewInNovel& in_novel_;
+  const PinholeCamera& novel_;
+  const PinholeCamera depth_camera_;
+  const SampleGrid samples_;
+  const BreakRule rule_;
+  const double point_size_;
+  Layer layer_;
+};
+
+}  // namespace
+
+Layer DrawView(const ViewInNovel& view_in_novel, const PinholeCamera& novel,
+               const RenderOptions& options, const Band& band) {
+  ViewPainter painter(view_in_novel, novel, options, band);
+  if (options.primitive == Primitive::kMesh) {
+    painter.PaintMesh();
+  } else {
+    painter.PaintSplats();
+  }
+  return painter.TakeLayer();
+}
+
+}  // namespace dtr::cpu

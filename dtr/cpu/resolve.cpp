@@ -1,0 +1,165 @@
+#include "dtr/cpu/resolve.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <vector>
+
+#include "dtr/cpu/texture.h"
+#include "dtr/render/colour.h"
+#include "dtr/render/geometry.h"
+
+namespace dtr::cpu {
+namespace {
+
+// Renderers that agree on depth to single precision may differ on fragments this near to the
+// border, a share of Delta; tests look at them apart.
+constexpr double kBorderShare = 1e-4;
+
+struct Fragment {
+  const ResolveView* view = nullptr;
+  double inverse_depth = 0;
+  Eigen::Vector3d point_in_novel = Eigen::Vector3d::Zero();
+  Eigen::Vector2d source_pixel = Eigen::Vector2d::Zero();  ///< on the view's image
+  double angle_rad = 0;                                    ///< SPEC 4.5, at the point
+};
+
+double AngleAtPoint(const Fragment& f) {
+  return AngleBetween(f.view->in_novel->translation - f.point_in_novel, -f.point_in_novel);
+}
+
+class RowResolver {
+ public:
+  RowResolver(const ResolveSettings& settings, std::span<const ResolveView> views)
+      : settings_(settings), views_(views) {}
+
+  void Resolve(int x, int y, RenderResult& result) {
+    Collect(x, y);
+    if (fragments_.empty()) return;
+    const double front = FrontInverseDepth();
+    const double border = BorderInverseDepth();
+    result.coverage(x, y) = 255;
+    result.depth(x, y) = static_cast<float>(1 / front);
+    if (NearBorder(front, border)) result.delta_border(x, y) = 255;
+    // SPEC 4.3, pass 2: the same Delta as in pass 1.
+    std::erase_if(fragments_, [&](const Fragment& f) { return f.inverse_depth < border; });
+    if (settings_.per_pixel_rule) {
+      KeepNearestByAngle();
+    } else {
+      for (Fragment& f : fragments_) f.angle_rad = AngleAtPoint(f);
+    }
+    Blend(x, y, result);
+  }
+
+ private:
+  /// SPEC 4.2: one fragment per view; those without a colour are absent.
+  void Collect(int x, int y) {
+    fragments_.clear();
+    const Eigen::Vector3d ray = settings_.novel.RayFromPixel({x + 0.5, y + 0.5});
+    for (const ResolveView& view : views_) {
+      const Band& band = view.layer->band;
+      const size_t index =
+          static_cast<size_t>(y - band.first_row) * static_cast<size_t>(band.width_px) +
+          static_cast<size_t>(x);
+      Fragment fragment{&view, view.layer->inverse_depth[index]};
+      if (!(fragment.inverse_depth > 0)) continue;
+      fragment.point_in_novel = ray / fragment.inverse_depth;
+      if (settings_.per_pixel_rule) {
+        fragment.angle_rad = AngleAtPoint(fragment);
+        if (fragment.angle_rad > settings_.blend.max_angle_rad) continue;
+      }
+      if (!FindSourcePixel(fragment)) continue;
+      fragments_.push_back(fragment);
+    }
+  }
+
+  /// SPEC 4.4. False where the view has no colour to give.
+  static bool FindSourcePixel(Fragment& fragment) {
+    const View& source = *fragment.view->in_novel->view;
+    const Eigen::Vector3d point_in_view =
+        fragment.view->view_from_novel_rotation * fragment.point_in_novel +
+        fragment.view->view_from_novel_translation;
+    const auto pixel = source.camera.PixelFromCam(point_in_view);
+    if (!pixel || !pixel->allFinite()) return false;
+    fragment.source_pixel = *pixel;
+    return source.mask.empty() || ColourAt(source, fragment.source_pixel).has_value();
+  }
+
+  /// SPEC 4.2, pass 1: where Delta pushes a fragment; only the compared depth moves.
+  double Pushed(const Fragment& fragment) const {
+    if (settings_.absolute_delta) {
+      return 1 / (1 / fragment.inverse_depth + *settings_.absolute_delta);
+    }
+    return fragment.inverse_depth - fragment.view->delta_inverse_depth;
+  }
+
+  double FrontInverseDepth() const {
+    double front = 0;
+    for (const Fragment& f : fragments_) front = std::max(front, f.inverse_depth);
+    return front;
+  }
+
+  double BorderInverseDepth() const {
+    double border = Pushed(fragments_.front());
+    for (const Fragment& f : fragments_) border = std::max(border, Pushed(f));
+    return border;
+  }
+
+  bool NearBorder(double front, double border) const {
+    const double margin = kBorderShare * (front - border);
+    return std::any_of(fragments_.begin(), fragments_.end(), [&](const Fragment& f) {
+      return std::abs(f.inverse_depth - border) <= margin;
+    });
+  }
+
+  /// SPEC 1.3: per pixel the K nearest by angle; views tied with the K-th stay.
+  void KeepNearestByAngle() {
+    const auto count = static_cast<size_t>(settings_.views);
+    if (fragments_.size() <= count) return;
+    std::vector<double> angles;
+    for (const Fragment& f : fragments_) angles.push_back(f.angle_rad);
+    std::nth_element(angles.begin(), angles.begin() + static_cast<std::ptrdiff_t>(count) - 1,
+                     angles.end());
+    const double limit = angles[count - 1];
+    std::erase_if(fragments_, [&](const Fragment& f) { return f.angle_rad > limit; });
+  }
+
+  /// SPEC 4.5 to 4.7: weights, one sum, one division.
+  void Blend(int x, int y, RenderResult& result) {
+    angles_.clear();
+    for (const Fragment& f : fragments_) angles_.push_back(f.angle_rad);
+    shares_.resize(angles_.size());
+    const int blended = BlendShares(settings_.blend, angles_, shares_);
+    result.view_count(x, y) = static_cast<std::uint8_t>(std::min(blended, 255));
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (size_t i = 0; i < fragments_.size(); ++i) {
+      const Fragment& f = fragments_[i];
+      const auto linear = ColourAt(*f.view->in_novel->view, f.source_pixel);
+      assert(linear.has_value());  // Collect left out the others
+      sum += shares_[i] * (settings_.linear_light ? *linear : Srgb(*linear));
+    }
+    for (int channel = 0; channel < 3; ++channel) {
+      result.image(x, y, channel) =
+          settings_.linear_light ? Srgb8FromLinear(sum[channel]) : Srgb8FromSrgb(sum[channel]);
+    }
+  }
+
+  static Eigen::Vector3d Srgb(const Eigen::Vector3d& linear) {
+    return {SrgbFromLinear(linear[0]), SrgbFromLinear(linear[1]), SrgbFromLinear(linear[2])};
+  }
+
+  const ResolveSettings& settings_;
+  const std::span<const ResolveView> views_;
+  std::vector<Fragment> fragments_;
+  std::vector<double> angles_, shares_;
+};
+
+}  // namespace
+
+void ResolveRow(const ResolveSettings& settings, std::span<const ResolveView> views, int y,
+                RenderResult& result) {
+  RowResolver resolver(settings, views);
+  for (int x = 0; x < settings.novel.width_px(); ++x) resolver.Resolve(x, y, result);
+}
+
+}  // namespace dtr::cpu

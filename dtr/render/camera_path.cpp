@@ -1,0 +1,202 @@
+#include "dtr/render/camera_path.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dtr/base/error.h"
+
+namespace dtr {
+namespace {
+
+constexpr size_t kMaxKeys = 8;        // more keys make a path follow the photographer's steps
+constexpr int kStepsPerSegment = 64;  // of the table that evens out the speed
+
+struct Key {
+  const View* view;
+  Eigen::Vector3d center;
+  Eigen::Quaterniond world_from_cam;
+};
+
+std::vector<Key> SourceKeys(const DtrSet& set) {
+  if (set.frames.empty()) throw Error("set: expected at least one frame, found none");
+  std::vector<Key> keys;
+  for (const View& view : set.frames.front().views) {
+    if (view.role != ViewRole::kSource) continue;
+    keys.push_back({&view, view.CenterInWorld(), view.cam_from_world.rotation.conjugate()});
+  }
+  if (keys.empty()) throw Error("fly-through: expected source views, found none");
+  std::sort(keys.begin(), keys.end(),
+            [](const Key& a, const Key& b) { return a.view->id < b.view->id; });
+  return keys;
+}
+
+/// Greedy chain of nearest neighbours from the camera farthest from the mean: an end of an arc.
+std::vector<Key> Chain(std::vector<Key> keys) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const Key& key : keys) mean += key.center / static_cast<double>(keys.size());
+  const auto nearer_mean = [&](const Key& a, const Key& b) {
+    return (a.center - mean).norm() < (b.center - mean).norm();
+  };
+  auto next = std::max_element(keys.begin(), keys.end(), nearer_mean);
+  std::vector<Key> chain;
+  while (true) {
+    chain.push_back(*next);
+    keys.erase(next);
+    if (keys.empty()) return chain;
+    const Eigen::Vector3d here = chain.back().center;
+    next = std::min_element(keys.begin(), keys.end(), [&](const Key& a, const Key& b) {
+      return (a.center - here).norm() < (b.center - here).norm();
+    });
+  }
+}
+
+std::vector<Key> Thinned(const std::vector<Key>& chain) {
+  if (chain.size() <= kMaxKeys) return chain;
+  std::vector<Key> keys;
+  for (size_t i = 0; i < kMaxKeys; ++i) {
+    keys.push_back(chain[i * (chain.size() - 1) / (kMaxKeys - 1)]);
+  }
+  return keys;
+}
+
+/// Neighbouring quaternions in one half space: q and -q are the same rotation.
+void AlignSigns(std::vector<Key>& keys) {
+  for (size_t i = 1; i < keys.size(); ++i) {
+    if (keys[i].world_from_cam.dot(keys[i - 1].world_from_cam) < 0) {
+      keys[i].world_from_cam.coeffs() *= -1;
+    }
+  }
+}
+
+Eigen::Vector3d Log(const Eigen::Quaterniond& q) {
+  const double length = q.vec().norm();
+  if (length == 0) return Eigen::Vector3d::Zero();
+  return q.vec() * (std::atan2(length, q.w()) / length);
+}
+
+Eigen::Quaterniond Exp(const Eigen::Vector3d& half_angle) {
+  const double length = half_angle.norm();
+  if (length == 0) return Eigen::Quaterniond::Identity();
+  Eigen::Quaterniond q;
+  q.w() = std::cos(length);
+  q.vec() = half_angle * (std::sin(length) / length);
+  return q;
+}
+
+class Spline {
+ public:
+  explicit Spline(std::vector<Key> keys) : keys_(std::move(keys)) {
+    AlignSigns(keys_);
+    knots_ = {0};
+    for (size_t i = 1; i < keys_.size(); ++i) {
+      // Centripetal: the square root of the chord; cameras at one place still differ in time.
+      const double chord = (keys_[i].center - keys_[i - 1].center).norm();
+      knots_.push_back(knots_.back() + std::sqrt(chord));
+    }
+    if (!(knots_.back() > 0)) {
+      for (size_t i = 0; i < knots_.size(); ++i) knots_[i] = static_cast<double>(i);
+    }
+  }
+
+  size_t segments() const { return keys_.size() - 1; }
+  const View& first_view() const { return *keys_.front().view; }
+
+  /// Segment and share of it, both from s in [0, segments].
+  Eigen::Vector3d Position(double s) const {
+    const auto [i, u] = Locate(s);
+    const double width = knots_[i + 1] - knots_[i];
+    const double u2 = u * u, u3 = u2 * u;
+    return (2 * u3 - 3 * u2 + 1) * keys_[i].center + (u3 - 2 * u2 + u) * width * Tangent(i) +
+           (3 * u2 - 2 * u3) * keys_[i + 1].center + (u3 - u2) * width * Tangent(i + 1);
+  }
+
+  Eigen::Quaterniond Rotation(double s) const {
+    const auto [i, u] = Locate(s);
+    const Eigen::Quaterniond along = keys_[i].world_from_cam.slerp(u, keys_[i + 1].world_from_cam);
+    const Eigen::Quaterniond inner = Control(i).slerp(u, Control(i + 1));
+    return along.slerp(2 * u * (1 - u), inner).normalized();
+  }
+
+ private:
+  std::pair<size_t, double> Locate(double s) const {
+    const double last = static_cast<double>(segments() - 1);
+    const double i = std::clamp(std::floor(s), 0.0, last);
+    return {static_cast<size_t>(i), std::clamp(s - i, 0.0, 1.0)};
+  }
+
+  /// Velocity at key i per unit of the knots: of the parabola through it and its neighbours.
+  Eigen::Vector3d Tangent(size_t i) const {
+    if (i == 0) return Chord(0);
+    if (i == segments()) return Chord(i - 1);
+    const double before = knots_[i] - knots_[i - 1], after = knots_[i + 1] - knots_[i];
+    if (!(before + after > 0)) return Eigen::Vector3d::Zero();
+    return (Chord(i - 1) * after + Chord(i) * before) / (before + after);
+  }
+
+  Eigen::Vector3d Chord(size_t i) const {
+    const double width = knots_[i + 1] - knots_[i];
+    if (!(width > 0)) return Eigen::Vector3d::Zero();
+    return (keys_[i + 1].center - keys_[i].center) / width;
+  }
+
+  /// Shoemake's inner control rotation at key i.
+  Eigen::Quaterniond Control(size_t i) const {
+    const Eigen::Quaterniond& q = keys_[i].world_from_cam;
+    if (i == 0 || i == segments()) return q;
+    const Eigen::Vector3d to_next = Log(q.conjugate() * keys_[i + 1].world_from_cam);
+    const Eigen::Vector3d to_last = Log(q.conjugate() * keys_[i - 1].world_from_cam);
+    return (q * Exp(-0.25 * (to_next + to_last))).normalized();
+  }
+
+  std::vector<Key> keys_;
+  std::vector<double> knots_;
+};
+
+/// Spline parameters at even steps of the way travelled; even in the parameter where nothing moves.
+std::vector<double> EvenParameters(const Spline& spline, int frames) {
+  const int steps = kStepsPerSegment * static_cast<int>(spline.segments());
+  const auto parameter = [&](double step) { return step / kStepsPerSegment; };
+  std::vector<double> way = {0};
+  for (int i = 1; i <= steps; ++i) {
+    way.push_back(way.back() +
+                  (spline.Position(parameter(i)) - spline.Position(parameter(i - 1))).norm());
+  }
+  std::vector<double> parameters;
+  for (int f = 0; f < frames; ++f) {
+    const double share = frames == 1 ? 0.5 : static_cast<double>(f) / (frames - 1);
+    if (!(way.back() > 0)) {
+      parameters.push_back(parameter(share * steps));
+      continue;
+    }
+    const double target = share * way.back();
+    const auto above = std::lower_bound(way.begin() + 1, way.end() - 1, target);
+    const double low = *(above - 1), high = *above;
+    const double inside = high > low ? (target - low) / (high - low) : 0;
+    parameters.push_back(
+        parameter(static_cast<double>(above - way.begin() - 1) + std::clamp(inside, 0.0, 1.0)));
+  }
+  return parameters;
+}
+
+}  // namespace
+
+std::vector<NovelCamera> FlyThrough(const DtrSet& set, int frames) {
+  if (frames < 1) {
+    throw UsageError("frames: expected at least 1, found " + std::to_string(frames));
+  }
+  const std::vector<Key> keys = Thinned(Chain(SourceKeys(set)));
+  if (keys.size() == 1) {
+    return std::vector<NovelCamera>(static_cast<size_t>(frames),
+                                    {keys[0].view->camera, keys[0].view->cam_from_world});
+  }
+  const Spline spline(keys);
+  std::vector<NovelCamera> path;
+  for (const double s : EvenParameters(spline, frames)) {
+    const Eigen::Quaterniond cam_from_world = spline.Rotation(s).conjugate();
+    path.push_back(
+        {spline.first_view().camera, {cam_from_world, -(cam_from_world * spline.Position(s))}});
+  }
+  return path;
+}
+
+}  // namespace dtr

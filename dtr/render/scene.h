@@ -1,0 +1,39 @@
+// dtr/render/scene.h -- what a renderer is given: source views and where the scene is.
+#pragma once
+#include <Eigen/Core>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "dtr/render/options.h"
+#include "dtr/types/dtr_set.h"
+
+namespace dtr {
+
+/// The source views to draw from. The views must outlive the scene.
+struct RenderScene {
+  std::vector<const View*> views;  ///< with image and depth; in byte order of their ids
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< DtrSet::scene_center
+  Bounds bounds;
+};
+
+/// SPEC 0.4. The source views of the set's first frame, without those whose id or name is in
+/// `excluded_names`; held-out views are never among them. Views with the same camera, pose, image,
+/// depth and mask count once (the first by id), so that a duplicate cannot pull the blend.
+/// Throws dtr::Error when the set has no frame or a source view is not loaded or has the wrong
+/// size, and dtr::UsageError for an excluded name that no view has.
+RenderScene MakeRenderScene(const DtrSet& set, std::span<const std::string> excluded_names = {});
+
+/// SPEC 0.3. The baseline of every figure in pixels of disparity for this view, scene units: its
+/// reference_baseline, or, for a view that has none (a lone camera), a tenth of its median depth.
+double DisparityBaseline(const View& view);
+
+/// Thresholds of one view as differences of inverse depth (1 / scene units), SPEC 0.3:
+/// px / (fx * DisparityBaseline).
+struct InverseDepthThresholds {
+  double delta = 0;
+  double depth_break = 0;
+};
+InverseDepthThresholds ThresholdsOf(const View& view, const RenderOptions& options);
+
+}  // namespace dtr

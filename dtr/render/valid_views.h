@@ -1,0 +1,28 @@
+// dtr/render/valid_views.h -- SPEC 1: which views may show something of a novel view.
+#pragma once
+#include <vector>
+
+#include "dtr/render/options.h"
+#include "dtr/render/scene.h"
+
+namespace dtr {
+
+/// Outcome of SPEC 1.
+struct ViewSelection {
+  /// Indices into RenderScene::views. Sphere rule: the K nearest by angle at the scene centre,
+  /// nearest first. Per-pixel rule: every view, by the distance of its centre.
+  std::vector<int> views;
+  /// True where the angle at the scene centre says nothing (SPEC 1.3): then renderers apply
+  /// max_angle and K per pixel, at the 3D point (views tied with the K-th stay).
+  bool per_pixel = false;
+};
+
+/// SPEC 1.3: true when the sphere rule cannot hold: the novel camera does not have the scene
+/// centre in front of it, or no more than half of the views have it inside their image.
+bool NeedsPerPixelRule(const RenderScene& scene, const Pose& novel_from_world);
+
+/// SPEC 1. Ties go to the smaller id. Empty when no view is valid.
+ViewSelection SelectViews(const RenderScene& scene, const Pose& novel_from_world,
+                          const RenderOptions& options);
+
+}  // namespace dtr
