@@ -1,64 +1,6 @@
-// capture/capture.h -- what was photographed: photos and what is known of them before calibration.
+// capture/capture.h -- all of capture: from a folder of photos to a Capture and its files.
 #pragma once
-#include <filesystem>
-#include <optional>
-#include <string>
-#include <vector>
-
-#include "dtr/io/image_io.h"
-#include "dtr/types/grid.h"
-
-namespace dtr::capture {
-
-/// What the pixels and bytes of a photo say about its use. It is told, never acted upon here.
-struct Screening {
-  /// Variance of the 4-neighbour Laplacian over the variance of the brightness itself: falls with
-  /// blur, does not change with contrast. 0 for a photo of one colour.
-  double sharpness = 0;
-  double overexposed_share = 0;      ///< pixels with a channel at 254 or 255
-  double underexposed_share = 0;     ///< pixels with all channels at 0 or 1
-  std::string duplicate_of;          ///< name of the first photo with the same bytes, or empty
-  std::vector<std::string> remarks;  ///< one line for each thing worth a look
-};
-
-/// One photo. Sizes and pixels are meant upright, after the EXIF orientation.
-struct Photo {
-  std::string id;    ///< unique, also where case is ignored; letters, digits, '_' and '-' only
-  std::string name;  ///< original path below the photo folder, '/' between parts; kept for ever
-  std::filesystem::path file;
-  int width_px = 0, height_px = 0;
-  int exif_orientation = 1;  ///< of `file`, 1..8
-
-  std::optional<double> focal_prior_px;  ///< a first guess for the calibration
-  std::string focal_source = "none";     ///< "exif-35mm", "exif-focal-plane" or "none"
-  /// make|model|size|focal length, with |orientation where the camera was turned: photos that are
-  /// equal in this share a lens. Photos without EXIF share one if they have the same size.
-  std::string camera_group;
-  std::string make, model, lens_model;
-  std::string date_time;  ///< "YYYY:MM:DD HH:MM:SS" or empty
-  std::optional<io::GpsPosition> gps;
-
-  std::string source_sha256;  ///< of the original file
-  std::optional<Screening> screening;
-};
-
-/// A file that looked like a photo and is none.
-struct Skipped {
-  std::string name;
-  std::string reason;
-};
-
-/// Photos in byte order of their names.
-struct Capture {
-  std::vector<Photo> photos;
-  std::vector<Skipped> skipped;
-};
-
-/// A scene needs two photos. Throws Error naming `where`, the number found and what was skipped.
-void RequireEnoughPhotos(const Capture& capture, const std::filesystem::path& where);
-
-/// The photo upright, 8-bit sRGB. Throws Error when the file is unreadable or has no longer the
-/// size it had when it was ingested.
-ImageRgb8 ReadPhoto(const Photo& photo);
-
-}  // namespace dtr::capture
+#include "capture/ingest.h"
+#include "capture/photo.h"
+#include "capture/sfm_images.h"
+#include "capture/store.h"

@@ -8,6 +8,7 @@
 #include <system_error>
 
 #include "capture/screening.h"
+#include "capture/store.h"
 #include "dtr/base/error.h"
 #include "dtr/base/hash.h"
 #include "dtr/base/parallel_for.h"
@@ -64,6 +65,23 @@ struct Listing {
   int ignored = 0;  // files without an image extension
 };
 
+bool EndsWith(const std::string& text, const std::string& end) {
+  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
+}
+
+// Why a folder is not searched for photos: it would give pictures that we made ourselves.
+std::string WhyNotSearched(const fs::path& folder) {
+  std::error_code ignored;
+  if (fs::is_symlink(folder, ignored)) return "links to a folder; links are not followed";
+  const std::string name = folder.filename().string();
+  if (EndsWith(name, ".dtr") || EndsWith(name, ".partial") ||
+      fs::exists(folder / "set.json", ignored)) {
+    return "is a D+TR set, not photos";
+  }
+  if (fs::exists(folder / kCaptureFile, ignored)) return "is a capture of its own";
+  return "";
+}
+
 void ListFolder(const fs::path& top, const std::string& below, bool recurse, Listing& listing) {
   std::error_code error;
   fs::directory_iterator entries(below.empty() ? top : top / below, error);
@@ -74,11 +92,11 @@ void ListFolder(const fs::path& top, const std::string& below, bool recurse, Lis
     std::error_code ignored;
     if (entries->is_directory(ignored)) {
       if (!recurse) continue;
-      if (entries->is_symlink(ignored)) {
-        listing.skipped.push_back(
-            {PrintableName(name), "links to a folder; links are not followed"});
-      } else {
+      const std::string why_not = WhyNotSearched(entries->path());
+      if (why_not.empty()) {
         ListFolder(top, name, recurse, listing);
+      } else {
+        listing.skipped.push_back({PrintableName(name), why_not});
       }
     } else if (!IsImageExtension(entries->path().extension().string())) {
       ++listing.ignored;
@@ -204,6 +222,7 @@ Capture IngestPhotos(const fs::path& folder, const IngestOptions& options, Progr
     throw UsageError(folder.string() + ": expected a folder of photos, found " +
                      (fs::exists(folder, error) ? "something else" : "nothing"));
   }
+  if (fs::exists(folder / kCaptureFile, error)) return ReadCapture(folder);
   Listing listing;
   ListFolder(folder, "", options.recurse, listing);
   std::sort(listing.names.begin(), listing.names.end());

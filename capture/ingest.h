@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "capture/capture.h"
+#include "capture/photo.h"
 #include "dtr/base/progress.h"
 
 namespace dtr::capture {
@@ -19,8 +19,10 @@ struct IngestOptions {
 
 /// The photos of a folder in byte order of their names. A photo is a file with the extension of an
 /// image format that OpenImageIO reads (any case). Hidden files and folders and files with other
-/// extensions are ignored; files with one that hold no readable image, names that are no UTF-8 and
-/// links to folders are skipped, with the reason. The result is the same for any number of threads.
+/// extensions are ignored. Skipped, with the reason: files with such an extension that hold no
+/// readable image, names that are no UTF-8, links to folders, and sub-folders that are D+TR sets or
+/// captures. A folder that WriteCapture made is read as that capture, with its original names.
+/// The result is the same for any number of threads.
 /// Throws UsageError when the folder does not exist, Error when it cannot be listed or holds no
 /// photo at all.
 Capture IngestPhotos(const std::filesystem::path& folder, const IngestOptions& options,

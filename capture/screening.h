@@ -2,7 +2,7 @@
 #pragma once
 #include <vector>
 
-#include "capture/capture.h"
+#include "capture/photo.h"
 
 namespace dtr::capture {
 

@@ -1,4 +1,4 @@
-#include "capture/capture.h"
+#include "capture/photo.h"
 
 #include "dtr/base/error.h"
 

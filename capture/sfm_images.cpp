@@ -1,0 +1,100 @@
+#include "capture/sfm_images.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <system_error>
+#include <utility>
+
+#include "dtr/base/error.h"
+#include "dtr/base/parallel_for.h"
+#include "dtr/io/image_io.h"
+#include "dtr/types/area_average.h"
+
+namespace dtr::capture {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr int kJpegQuality = 98;  // features move by less than their own noise
+
+bool EndsInJpeg(const std::string& name) {
+  std::string extension = fs::path(name).extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
+  return extension == ".jpg" || extension == ".jpeg";
+}
+
+void Require(const std::error_code& error, const fs::path& file) {
+  if (error) throw Error(file.string() + ": cannot be written: " + error.message());
+}
+
+void LinkOrCopy(const fs::path& from, const fs::path& to) {
+  std::error_code error;
+  fs::create_hard_link(fs::canonical(from, error), to, error);
+  if (!error) return;
+  error.clear();
+  fs::copy_file(from, to, error);  // another disk, or one without links
+  Require(error, to);
+}
+
+void Rewrite(const Photo& photo, const io::ImageHeader& header, std::pair<int, int> size,
+             const fs::path& to) {
+  ImageRgb8 image = ReadPhoto(photo);
+  if (size != std::pair(image.width(), image.height())) {
+    image = AreaAverage(image, size.first, size.second);
+  }
+  if (EndsInJpeg(photo.name)) {
+    io::WriteJpegWithExif(to, image, kJpegQuality,
+                          {header.focal_mm, header.focal_35mm, header.make, header.model});
+    return;
+  }
+  const fs::path png = to.string() + ".tmp" + std::to_string(getpid()) + ".png";
+  io::WriteImage(png, image);
+  std::error_code error;
+  fs::rename(png, to, error);
+  Require(error, to);
+}
+
+void PreparePhoto(const Photo& photo, const fs::path& to, int max_size_px) {
+  const io::ImageHeader header = io::ReadImageHeader(photo.file);
+  const auto size = TargetSize(photo.width_px, photo.height_px, max_size_px);
+  const bool readable_by_colmap = (header.format == "jpeg" || header.format == "png") &&
+                                  header.bits == 8 &&
+                                  (header.channels == 1 || header.channels == 3);
+  const bool unchanged = readable_by_colmap && photo.exif_orientation == 1 &&
+                         size == std::pair(photo.width_px, photo.height_px);
+  std::error_code error;
+  fs::create_directories(to.parent_path(), error);
+  Require(error, to.parent_path());
+  fs::remove(to, error);
+  Require(error, to);
+  if (unchanged) {
+    LinkOrCopy(photo.file, to);
+  } else {
+    Rewrite(photo, header, size, to);
+  }
+}
+
+}  // namespace
+
+void PrepareSfmImages(const Capture& capture, const fs::path& folder, int max_size_px, int threads,
+                      Progress& progress) {
+  const int count = static_cast<int>(capture.photos.size());
+  progress.Stage("photos for calibration", count);
+  std::atomic<int> done{0};
+  ParallelFor(0, count, threads, [&](int i) {
+    progress.ThrowIfInterrupted();
+    const Photo& photo = capture.photos[static_cast<size_t>(i)];
+    PreparePhoto(photo, folder / photo.name, max_size_px);
+    progress.Update(++done);
+  });
+}
+
+void PrepareSfmImages(const Capture& capture, const fs::path& folder, int max_size_px,
+                      int threads) {
+  SilentProgress silent;
+  PrepareSfmImages(capture, folder, max_size_px, threads, silent);
+}
+
+}  // namespace dtr::capture

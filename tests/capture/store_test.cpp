@@ -1,0 +1,195 @@
+#include "capture/store.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "capture/ingest.h"
+#include "dtr/base/error.h"
+#include "tests/capture/photo_files.h"
+#include "tests/support/test_data.h"
+
+namespace dtr::capture {
+namespace {
+
+namespace fs = std::filesystem;
+using dtr::testing::TemporaryFolder;
+using testing::AddExifOrientation;
+using testing::BlockPhoto;
+using ::testing::HasSubstr;
+using testing::MessageOf;
+using testing::NoisePhoto;
+
+constexpr size_t kFileLimit = 1 << 20;
+
+Capture Ingest(const fs::path& folder) {
+  SilentProgress progress;
+  return IngestPhotos(folder, {.threads = 1}, progress);
+}
+
+// Photos of every kind: with EXIF, turned, in a sub-folder, one with GPS-free PNG, one skipped.
+void FillWithPhotos(const fs::path& folder) {
+  fs::create_directories(folder / "left");
+  io::WriteJpegWithExif(folder / "A b.JPG", BlockPhoto(48, 32, 1), 90,
+                        {35.0, 50.0, "Canon", "EOS"});
+  io::WriteImage(folder / "left/turned.jpg", BlockPhoto(48, 32, 2));
+  AddExifOrientation(folder / "left/turned.jpg", 6);
+  io::WriteImage(folder / "left/plain.png", NoisePhoto(40, 30, 3));
+  WriteFileAtomically(folder / "text.jpg", "no photo");
+}
+
+void ExpectSameFacts(const Capture& a, const Capture& b) {
+  ASSERT_EQ(a.photos.size(), b.photos.size());
+  for (size_t i = 0; i < a.photos.size(); ++i) {
+    const Photo &x = a.photos[i], &y = b.photos[i];
+    EXPECT_EQ(x.id, y.id);
+    EXPECT_EQ(x.name, y.name);
+    EXPECT_EQ(x.width_px, y.width_px);
+    EXPECT_EQ(x.height_px, y.height_px);
+    EXPECT_EQ(x.focal_prior_px, y.focal_prior_px);  // doubles survive JSON to the last bit
+    EXPECT_EQ(x.focal_source, y.focal_source);
+    EXPECT_EQ(x.camera_group, y.camera_group);
+    EXPECT_EQ(x.source_sha256, y.source_sha256);
+    EXPECT_EQ(x.screening->sharpness, y.screening->sharpness);
+    EXPECT_EQ(x.screening->remarks, y.screening->remarks);
+  }
+  ASSERT_EQ(a.skipped.size(), b.skipped.size());
+  EXPECT_EQ(a.skipped[0].name, b.skipped[0].name);
+  EXPECT_EQ(a.skipped[0].reason, b.skipped[0].reason);
+}
+
+TEST(WriteCapture, ComesBackWithTheSameFactsAndPixels) {
+  const TemporaryFolder folder;
+  FillWithPhotos(folder / "photos");
+  const Capture capture = Ingest(folder / "photos");
+  WriteCapture(capture, folder / "out/", 2);
+  const Capture back = ReadCapture(folder / "out");
+  ExpectSameFacts(capture, back);
+  for (size_t i = 0; i < capture.photos.size(); ++i) {
+    EXPECT_EQ(ReadPhoto(back.photos[i]), ReadPhoto(capture.photos[i])) << capture.photos[i].name;
+    EXPECT_EQ(back.photos[i].exif_orientation, 1);
+  }
+  EXPECT_FALSE(fs::exists(folder / "out.partial"));
+  // Ingesting a capture is reading it: original names stay.
+  ExpectSameFacts(capture, Ingest(folder / "out"));
+}
+
+TEST(WriteCapture, UprightPhotosKeepTheirBytes) {
+  const TemporaryFolder folder;
+  FillWithPhotos(folder / "photos");
+  WriteCapture(Ingest(folder / "photos"), folder / "out", 1);
+  EXPECT_EQ(ReadFile(folder / "out/images/A_b.jpg", kFileLimit),
+            ReadFile(folder / "photos/A b.JPG", kFileLimit));
+  EXPECT_TRUE(fs::exists(folder / "out/images/left_turned.png"));
+}
+
+TEST(WriteCapture, SameBytesForAnyNumberOfThreads) {
+  const TemporaryFolder folder;
+  FillWithPhotos(folder / "photos");
+  const Capture capture = Ingest(folder / "photos");
+  WriteCapture(capture, folder / "one", 1);
+  WriteCapture(capture, folder / "four", 4);
+  for (const char* file : {"capture.json", "images/left_turned.png"}) {
+    EXPECT_EQ(ReadFile(folder / "one" / file, kFileLimit),
+              ReadFile(folder / "four" / file, kFileLimit));
+  }
+}
+
+TEST(WriteCapture, LeavesWhatIsThereUnlessToldToReplaceACapture) {
+  const TemporaryFolder folder;
+  FillWithPhotos(folder / "photos");
+  const Capture capture = Ingest(folder / "photos");
+  SilentProgress progress;
+  EXPECT_THAT(MessageOf<UsageError>([&] { WriteCapture(capture, folder / "photos", 1); }),
+              HasSubstr("something in it already"));
+  EXPECT_THAT(MessageOf<UsageError>(
+                  [&] { WriteCapture(capture, folder / "photos", {.replace = true}, progress); }),
+              HasSubstr("no capture"));
+  fs::create_directory(folder / "empty");
+  EXPECT_NO_THROW(WriteCapture(capture, folder / "empty", 1));
+  EXPECT_THROW(WriteCapture(capture, folder / "empty", 1), UsageError);
+  EXPECT_NO_THROW(WriteCapture(capture, folder / "empty", {.replace = true}, progress));
+  EXPECT_FALSE(fs::exists(folder / "empty.replaced"));
+  WriteFileAtomically(folder / "file", "");
+  EXPECT_THROW(WriteCapture(capture, folder / "file", 1), UsageError);
+}
+
+TEST(WriteCapture, APhotoThatVanishedIsAnErrorAndNothingAppears) {
+  const TemporaryFolder folder;
+  FillWithPhotos(folder / "photos");
+  const Capture capture = Ingest(folder / "photos");
+  fs::remove(folder / "photos/left/plain.png");
+  EXPECT_THROW(WriteCapture(capture, folder / "out", 2), Error);
+  EXPECT_FALSE(fs::exists(folder / "out"));
+}
+
+TEST(WriteCapture, ClearsAnUnfinishedCaptureAndNothingElse) {
+  const TemporaryFolder folder;
+  FillWithPhotos(folder / "photos");
+  const Capture capture = Ingest(folder / "photos");
+  fs::create_directories(folder / "out.partial/images");
+  WriteFileAtomically(folder / "out.partial/images/old.png", "stale");
+  EXPECT_NO_THROW(WriteCapture(capture, folder / "out", 1));
+  EXPECT_FALSE(fs::exists(folder / "out/images/old.png"));
+  fs::create_directories(folder / "more.partial/thesis");
+  EXPECT_THROW(WriteCapture(capture, folder / "more", 1), UsageError);
+  EXPECT_TRUE(fs::exists(folder / "more.partial/thesis"));
+}
+
+TEST(ReadCapture, EveryTruncationIsACleanError) {
+  const TemporaryFolder folder;
+  FillWithPhotos(folder / "photos");
+  WriteCapture(Ingest(folder / "photos"), folder / "out", 1);
+  const std::string whole = ReadFile(folder / "out/capture.json", kFileLimit);
+  for (size_t length = 0; length + 1 < whole.size(); length += 3) {  // the last byte is a line end
+    WriteFileAtomically(folder / "out/capture.json", whole.substr(0, length));
+    ASSERT_THROW(ReadCapture(folder / "out"), Error) << length;
+  }
+}
+
+TEST(ReadCapture, NamesTheFieldThatIsWrong) {
+  const TemporaryFolder folder;
+  FillWithPhotos(folder / "photos");
+  WriteCapture(Ingest(folder / "photos"), folder / "out", 1);
+  const std::string whole = ReadFile(folder / "out/capture.json", kFileLimit);
+  const auto message_with = [&](const std::string& from, const std::string& to) {
+    std::string changed = whole;
+    const size_t at = changed.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    changed.replace(at, from.size(), to);
+    WriteFileAtomically(folder / "out/capture.json", changed);
+    return MessageOf<Error>([&] { ReadCapture(folder / "out"); });
+  };
+  EXPECT_THAT(message_with("\"version\": 1", "\"version\": 2"), HasSubstr("version"));
+  EXPECT_THAT(message_with("dtr-capture", "other"), HasSubstr("format"));
+  EXPECT_THAT(message_with("\"width_px\": 48", "\"width_px\": -48"),
+              HasSubstr("photos[0].width_px"));
+  EXPECT_THAT(message_with("\"width_px\": 48", "\"width_px\": 1e99"), HasSubstr("width_px"));
+  EXPECT_THAT(message_with("\"exif_orientation\": 1", "\"exif_orientation\": 9"),
+              HasSubstr("exif_orientation"));
+  EXPECT_THAT(message_with("images/A_b.jpg", "../photos/A b.JPG"), HasSubstr("photos[0].file"));
+  EXPECT_THAT(message_with("images/A_b.jpg", "/etc/passwd"), HasSubstr("photos[0].file"));
+  EXPECT_THAT(message_with("images/A_b.jpg", "images/gone.jpg"), HasSubstr("gone.jpg"));
+  EXPECT_THAT(message_with("\"id\": \"A_b\"", "\"id\": \"../A\""), HasSubstr("photos[0].id"));
+  EXPECT_THAT(message_with("\"id\": \"A_b\"", "\"id\": \"left_plain\""), HasSubstr("twice"));
+  EXPECT_THAT(message_with("\"name\": \"A b.JPG\"", "\"name\": \"z.JPG\""), HasSubstr("order"));
+  EXPECT_THAT(message_with("\"focal_prior_px\": ", "\"focal_prior_px\": -"),
+              HasSubstr("focal_prior_px"));
+  EXPECT_THAT(message_with("\"photos\": [", "\"photos\": 3, \"x\": ["), HasSubstr("a list"));
+  EXPECT_THAT(message_with("\"make\"", "\"mark\""), HasSubstr("\"make\""));
+}
+
+TEST(IngestPhotos, SetsAndCapturesBelowThePhotosAreNoPhotos) {
+  const TemporaryFolder folder;
+  FillWithPhotos(folder.path());
+  WriteCapture(Ingest(folder.path()), folder / "z capture", 1);
+  fs::create_directories(folder / "scene.dtr/images");
+  io::WriteImage(folder / "scene.dtr/images/1.png", NoisePhoto(8, 8, 1));
+  fs::create_directories(folder / "scene2.dtr.partial/images");
+  io::WriteImage(folder / "scene2.dtr.partial/images/1.png", NoisePhoto(8, 8, 1));
+  const Capture capture = Ingest(folder.path());
+  EXPECT_EQ(capture.photos.size(), 3u);
+  EXPECT_EQ(capture.skipped.size(), 4u);  // text.jpg and the three folders
+}
+
+}  // namespace
+}  // namespace dtr::capture
