@@ -1,0 +1,129 @@
+#include "datasets/convert/convert.h"
+
+#include <algorithm>
+#include <array>
+
+#include "datasets/convert/converters.h"
+#include "dtr/base/error.h"
+#include "dtr/io/depth_io.h"
+#include "dtr/io/image_io.h"
+
+namespace dtr::datasets {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Kind {
+  const char* name;
+  io::CameraList (*convert)(const fs::path& source, const ConvertedFolder& out);
+};
+
+constexpr std::array kKinds = {
+    Kind{"fountain", ConvertFountain},
+    Kind{"dtu", ConvertDtu},
+    Kind{"temple", ConvertTemple},
+    Kind{"lego", ConvertLego},
+    Kind{"livingroom", ConvertLivingRoom},
+    Kind{"7scenes", Convert7Scenes},
+    Kind{"fern", ConvertFern},
+    Kind{"plaza", ConvertPlaza},
+};
+
+/// Removes the folder unless told to keep it.
+class Scaffold {
+ public:
+  explicit Scaffold(fs::path folder) : folder_(std::move(folder)) { fs::remove_all(folder_); }
+  ~Scaffold() {
+    std::error_code ignored;
+    fs::remove_all(folder_, ignored);  // nothing there after Become
+  }
+  Scaffold(const Scaffold&) = delete;
+  Scaffold& operator=(const Scaffold&) = delete;
+  const fs::path& folder() const { return folder_; }
+  void Become(const fs::path& target) { fs::rename(folder_, target); }
+
+ private:
+  fs::path folder_;
+};
+
+std::string StemOf(const std::string& name) { return fs::path(name).stem().string(); }
+
+}  // namespace
+
+ConvertedFolder::ConvertedFolder(fs::path folder) : folder_(std::move(folder)) {
+  fs::create_directories(folder_ / "images");
+}
+
+fs::path ConvertedFolder::ImageFile(const std::string& name) const {
+  return folder_ / "images" / name;
+}
+
+void ConvertedFolder::CopyImage(const fs::path& from, const std::string& name) const {
+  std::error_code error;
+  fs::copy_file(from, ImageFile(name), error);
+  if (error) throw Error(from.string() + ": cannot be copied: " + error.message());
+  // A copy of a read-only file must not stand in the way of its removal or replacement.
+  fs::permissions(ImageFile(name), fs::perms::owner_write, fs::perm_options::add, error);
+}
+
+std::string ConvertedFolder::WriteDepth(const std::string& name, const DepthImage& depth_z) const {
+  fs::create_directories(folder_ / "depth");
+  const std::string file = StemOf(name) + ".exr";
+  io::WriteExr(folder_ / "depth" / file, depth_z.grid());
+  return file;
+}
+
+std::string ConvertedFolder::WriteMask(const std::string& name, const Mask& mask) const {
+  fs::create_directories(folder_ / "masks");
+  const std::string file = StemOf(name) + ".png";
+  io::WriteMask(folder_ / "masks" / file, mask);
+  return file;
+}
+
+io::SizedImage ImageAt(const fs::path& folder, const std::string& name) {
+  const io::ImageHeader header = io::ReadImageHeader(folder / name);
+  return {name, header.width_px, header.height_px};
+}
+
+std::vector<std::string> FilesEndingIn(const fs::path& folder, const std::string& ending) {
+  std::vector<std::string> names;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    const std::string name = entry.path().filename().string();
+    if (name.ends_with(ending)) names.push_back(name);
+  }
+  if (names.empty()) {
+    throw Error(folder.string() + ": expected files *" + ending +
+                ", found none; give the folder that holds the set's SOURCE.md");
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+std::vector<std::string> ConvertibleKinds() {
+  std::vector<std::string> names;
+  for (const Kind& kind : kKinds) names.push_back(kind.name);
+  return names;
+}
+
+void ConvertDataset(const std::string& kind, const fs::path& source, const fs::path& out) {
+  const auto found = std::find_if(kKinds.begin(), kKinds.end(),
+                                  [&](const Kind& candidate) { return kind == candidate.name; });
+  if (found == kKinds.end()) {
+    std::string known;
+    for (const Kind& candidate : kKinds) known += std::string(" ") + candidate.name;
+    throw UsageError("dataset kind \"" + kind + "\": expected one of" + known);
+  }
+  if (fs::exists(out)) {
+    throw UsageError(out.string() + ": exists; choose another folder or remove it");
+  }
+  if (!fs::is_directory(source)) {
+    throw Error(source.string() + ": expected the folder of the set, found none");
+  }
+  Scaffold scaffold(out.string() + ".partial");
+  const io::CameraList list = found->convert(source, ConvertedFolder(scaffold.folder()));
+  io::WriteCamerasJson(scaffold.folder() / "cameras.json", list);
+  scaffold.Become(out);
+}
+
+}  // namespace dtr::datasets
