@@ -1,0 +1,131 @@
+#include "dtr/eval/held_out.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <stdexcept>
+
+#include "dtr/base/error.h"
+#include "dtr/eval/metrics.h"
+
+namespace dtr::eval {
+namespace {
+
+constexpr int kDifferenceGain = 4;  // an error of 2 levels of 255 is visible, 64 saturate
+constexpr int kGapPx = 4;
+constexpr std::uint8_t kGapGrey = 128;
+
+std::vector<const View*> ViewsToCompare(const DtrSet& set, bool leave_one_out) {
+  std::vector<const View*> views;
+  if (set.frames.empty()) throw Error("evaluate: the set has no frame");
+  int sources = 0;
+  for (const View& view : set.frames.front().views) {
+    sources += view.role == ViewRole::kSource;
+    if (view.role != (leave_one_out ? ViewRole::kSource : ViewRole::kHeldOut)) continue;
+    if (view.image.empty()) {
+      throw Error("evaluate: view " + view.name +
+                  " has no image in memory; load the set with its "
+                  "held-out views");
+    }
+    views.push_back(&view);
+  }
+  if (leave_one_out && sources < 2) {
+    throw UsageError("evaluate: leaving one out needs at least 2 source views, found " +
+                     std::to_string(sources));
+  }
+  if (views.empty()) {
+    throw UsageError(
+        "evaluate: the set has no held-out view; build it with --holdout every:8, or "
+        "use --leave-one-out");
+  }
+  return views;
+}
+
+ViewScore Score(const View& view, const RenderResult& filled, int threads) {
+  ViewScore score;
+  score.name = view.name;
+  score.psnr_db = Psnr(filled.image, view.image, view.mask);
+  const Mask seen = Intersect(filled.coverage, view.mask);
+  score.psnr_covered_db = Psnr(filled.image, view.image, seen);
+  score.ssim = Ssim(filled.image, view.image, view.mask, threads);
+  score.coverage = ShareOf(filled.coverage, view.mask);
+  score.views_used = static_cast<int>(filled.views_used.size());
+  return score;
+}
+
+/// Mean of a figure over the views that have it.
+std::optional<double> MeanOf(const std::vector<ViewScore>& views,
+                             std::optional<double> ViewScore::*figure) {
+  double sum = 0;
+  int count = 0;
+  for (const ViewScore& view : views) {
+    if (!(view.*figure).has_value()) continue;
+    sum += *(view.*figure);
+    ++count;
+  }
+  if (count == 0) return std::nullopt;
+  return sum / count;
+}
+
+}  // namespace
+
+EvaluationReport EvaluateHeldOut(const DtrSet& set, const EvaluateOptions& options,
+                                 const RenderFunction& render, Progress& progress) {
+  const std::vector<const View*> views = ViewsToCompare(set, options.leave_one_out);
+  RenderOptions render_options = options.render;
+  // One rendering serves both figures: filling changes unseen pixels only.
+  render_options.fill_holes = true;
+
+  EvaluationReport report;
+  report.leave_one_out = options.leave_one_out;
+  report.not_registered = options.not_registered;
+  progress.Stage("evaluate", static_cast<int>(views.size()));
+  for (const View* view : views) {
+    progress.ThrowIfInterrupted();
+    std::vector<std::string> excluded;
+    if (options.leave_one_out) excluded.push_back(view->id);
+    const RenderScene scene = MakeRenderScene(set, excluded);
+    const auto start = std::chrono::steady_clock::now();
+    const RenderResult filled = render(scene, view->camera, view->cam_from_world, render_options);
+    const std::chrono::duration<double, std::milli> elapsed =
+        std::chrono::steady_clock::now() - start;
+    report.views.push_back(Score(*view, filled, options.render.threads));
+    report.views.back().render_ms = elapsed.count();
+    if (options.on_rendered) options.on_rendered(*view, filled);
+    progress.Update(static_cast<int>(report.views.size()));
+  }
+
+  ViewScore& mean = report.mean;
+  mean.name = "mean";
+  mean.psnr_db = MeanOf(report.views, &ViewScore::psnr_db);
+  mean.psnr_covered_db = MeanOf(report.views, &ViewScore::psnr_covered_db);
+  mean.ssim = MeanOf(report.views, &ViewScore::ssim);
+  for (const ViewScore& view : report.views) {
+    mean.coverage += view.coverage / static_cast<double>(report.views.size());
+    mean.render_ms += view.render_ms / static_cast<double>(report.views.size());
+  }
+  return report;
+}
+
+ImageRgb8 ComparisonImage(const ImageRgb8& rendered, const ImageRgb8& photo) {
+  if (rendered.empty() || rendered.channels() != 3 || photo.channels() != 3 ||
+      rendered.width() != photo.width() || rendered.height() != photo.height()) {
+    throw std::invalid_argument("ComparisonImage: the images must be RGB and of one size");
+  }
+  const int width = rendered.width(), stride = width + kGapPx;
+  ImageRgb8 sheet(3 * width + 2 * kGapPx, rendered.height(), 3, kGapGrey);
+  for (int y = 0; y < rendered.height(); ++y) {
+    for (int x = 0; x < width; ++x) {
+      for (int c = 0; c < 3; ++c) {
+        const int a = rendered(x, y, c), b = photo(x, y, c);
+        sheet(x, y, c) = rendered(x, y, c);
+        sheet(stride + x, y, c) = photo(x, y, c);
+        sheet(2 * stride + x, y, c) =
+            static_cast<std::uint8_t>(std::min(255, kDifferenceGain * std::abs(a - b)));
+      }
+    }
+  }
+  return sheet;
+}
+
+}  // namespace dtr::eval

@@ -1,0 +1,33 @@
+// dtr/eval/json.h -- the reports as JSON text, for programs. Names are an interface (DESIGN 5).
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dtr/eval/cross_depth.h"
+#include "dtr/eval/depth_truth.h"
+#include "dtr/eval/held_out.h"
+
+namespace dtr::eval {
+
+/// {"views":[{name,psnr_db,psnr_covered_db,ssim,coverage,views_used,render_ms}],"mean":{the same},
+///  "not_registered":count,"not_registered_names":[...],"leave_one_out":bool,"depth":{...}}.
+/// A figure that is not defined (no pixel to compare) or infinite (all pixels equal) is null; a
+/// mean is over the views where the figure is defined, and infinite if one of them is. "depth" only
+/// where given.
+std::string ToJson(const EvaluationReport& report,
+                   const std::optional<DepthScores>& depth = std::nullopt);
+
+/// {share_within_1pct,share_within_2pct,share_within_half_px,share_within_1px,share_within_2px,
+///  median_relative_error,outlier_share,outlier_share_5pct,depth_completeness,
+///  share_estimated_without_truth,truth_pixels,kept_pixels}.
+std::string ToJson(const DepthScores& scores);
+
+/// {passed,tests:[{name,value,limit,passed,reason}],views:[{name,compared,occluded,contradicted,
+///  median_px,p95_px}],all:{the same}}.
+std::string ToJson(const CrossDepthReport& report);
+
+/// {"passed":bool,"tests":[...]}: a verdict, as sets carry it in DtrSet::verdict_json. Compact.
+std::string VerdictJson(const std::vector<Check>& tests);
+
+}  // namespace dtr::eval
