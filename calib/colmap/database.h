@@ -1,0 +1,21 @@
+// calib/colmap/database.h -- the little we read from COLMAP's SQLite database.
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+
+namespace dtr::colmap {
+
+/// Ids under which a database knows an image.
+struct DatabaseIds {
+  std::uint32_t image_id = 0;
+  std::uint32_t camera_id = 0;
+};
+
+/// The images of a database by name. COLMAP numbers them in the order in which its threads finish,
+/// and its older versions refuse a model with other numbers.
+/// Throws Error when the file is no COLMAP database.
+std::map<std::string, DatabaseIds> ReadDatabaseIds(const std::filesystem::path& database);
+
+}  // namespace dtr::colmap

@@ -1,0 +1,176 @@
+#include "calib/colmap/features.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <tuple>
+
+#include "calib/colmap/database.h"
+#include "dtr/base/error.h"
+
+namespace dtr::colmap {
+namespace {
+
+constexpr double kMib = 1024.0 * 1024.0;
+// COLMAP's own start for the FOV model, which is singular at 0.
+constexpr double kFovStart = 0.01;
+
+struct LargestImage {
+  double pixels = 0;  // of the largest photo
+  double side_px = 0;
+};
+
+LargestImage LargestOf(const std::vector<SfmImageInput>& images) {
+  LargestImage largest;
+  for (const SfmImageInput& image : images) {
+    const double pixels = static_cast<double>(image.width_px) * image.height_px;
+    largest.pixels = std::max(largest.pixels, pixels);
+    largest.side_px =
+        std::max(largest.side_px, static_cast<double>(std::max(image.width_px, image.height_px)));
+  }
+  return largest;
+}
+
+// Pixels COLMAP works on when the long side is bounded.
+double WorkingPixels(const std::vector<SfmImageInput>& images, double side_px) {
+  double most = 0;
+  for (const SfmImageInput& image : images) {
+    const double scale = std::min(1.0, side_px / std::max(image.width_px, image.height_px));
+    most = std::max(most, scale * scale * image.width_px * image.height_px);
+  }
+  return most;
+}
+
+double PeakMib(double working_pixels, double full_pixels, int threads) {
+  return kBaseMib + (threads * kBytesPerPixelAndThread * working_pixels +
+                     (threads + 1) * kQueueBytesPerPixel * full_pixels) /
+                        kMib;
+}
+
+std::vector<double> FirstGuess(calib::LensModel model, const SfmImageInput& image,
+                               double focal_px) {
+  std::vector<double> params(static_cast<size_t>(calib::ParameterCount(model)), 0.0);
+  const bool one_focal =
+      model == calib::LensModel::kSimplePinhole || model == calib::LensModel::kSimpleRadial ||
+      model == calib::LensModel::kRadial || model == calib::LensModel::kSimpleRadialFisheye ||
+      model == calib::LensModel::kRadialFisheye;
+  size_t next = 0;
+  params[next++] = focal_px;
+  if (!one_focal) params[next++] = focal_px;
+  params[next++] = 0.5 * image.width_px;
+  params[next++] = 0.5 * image.height_px;
+  if (model == calib::LensModel::kFov) params[next] = kFovStart;
+  return params;
+}
+
+double Median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// COLMAP skips what it cannot read and ends with 0.
+void ExpectAllInDatabase(const Workspace& workspace, const std::filesystem::path& database) {
+  const auto ids = ReadDatabaseIds(database);
+  for (size_t i = 0; i < workspace.images().size(); ++i) {
+    if (ids.contains(workspace.AliasOf(i))) continue;
+    throw Error(
+        fmt::format("{}: expected a photo that colmap feature_extractor can read, found that "
+                    "it left the file out; convert it to JPEG or PNG",
+                    workspace.images()[i].name));
+  }
+}
+
+}  // namespace
+
+ExtractionPlan PlanExtraction(const std::vector<SfmImageInput>& images, int threads,
+                              double memory_gb, int requested_side_px) {
+  const double limit_mib = kFill * memory_gb * 1024;
+  const LargestImage largest = LargestOf(images);
+  ExtractionPlan plan;
+  double side_px = requested_side_px > 0 ? requested_side_px : kPreferredSidePx;
+  side_px = std::min(side_px, largest.side_px);
+  const auto peak = [&](double side, int count) {
+    return PeakMib(WorkingPixels(images, side), largest.pixels, count);
+  };
+  while (side_px > kSmallestSidePx && peak(side_px, 1) > limit_mib) --side_px;
+  if (peak(side_px, 1) > limit_mib) {
+    throw UsageError(
+        fmt::format("memory limit: expected at least {:.1f} GiB for features of photos "
+                    "of this size, found {:.1f}; raise the limit",
+                    peak(side_px, 1) / kFill / 1024, memory_gb));
+  }
+  plan.max_image_size_px = static_cast<int>(side_px);
+  plan.threads = std::clamp(threads, 1, static_cast<int>(images.size()));
+  while (plan.threads > 1 && peak(side_px, plan.threads) > limit_mib) --plan.threads;
+  plan.expected_peak_gib = peak(side_px, plan.threads) / 1024;
+  return plan;
+}
+
+std::vector<CameraGroup> GroupCameras(const std::vector<SfmImageInput>& images,
+                                      calib::LensModel model, bool share) {
+  using Key = std::tuple<std::string, int, int, size_t>;
+  std::map<Key, size_t> index;
+  std::vector<CameraGroup> groups;
+  for (size_t i = 0; i < images.size(); ++i) {
+    const SfmImageInput& image = images[i];
+    const Key key{image.camera_group, image.width_px, image.height_px, share ? 0 : i};
+    const auto [known, is_new] = index.emplace(key, groups.size());
+    if (is_new) groups.emplace_back().model = model;
+    groups[known->second].images.push_back(i);
+  }
+  for (CameraGroup& group : groups) {
+    std::vector<double> priors;
+    for (const size_t i : group.images) {
+      if (images[i].focal_prior_px) priors.push_back(*images[i].focal_prior_px);
+    }
+    if (!priors.empty()) {
+      group.params = FirstGuess(model, images[group.images.front()], Median(std::move(priors)));
+    }
+  }
+  return groups;
+}
+
+std::string ParamsText(const std::vector<double>& params) {
+  return fmt::format("{}", fmt::join(params, ","));
+}
+
+void ExtractFeatures(Workspace& workspace, const std::filesystem::path& database,
+                     const std::vector<CameraGroup>& groups, const ExtractionPlan& plan,
+                     std::uint64_t seed) {
+  workspace.progress().Stage("features", static_cast<int>(workspace.images().size()));
+  int done = 0;
+  for (size_t g = 0; g < groups.size(); ++g) {
+    const CameraGroup& group = groups[g];
+    std::vector<std::string> names;
+    for (const size_t i : group.images) names.push_back(workspace.AliasOf(i));
+    const auto list = workspace.WriteList(fmt::format("camera_{:04}.txt", g), names);
+    Arguments arguments(workspace.program(), "feature_extractor");
+    arguments.AddIfKnown({"random_seed", "default_random_seed"}, fmt::format("{}", seed))
+        .Add({"database_path"}, database.string())
+        .Add({"image_path"}, workspace.images_folder().string())
+        .Add({"image_list_path"}, list.string())
+        .Add({"ImageReader.camera_model"}, calib::NameOf(group.model))
+        .Add({"SiftExtraction.use_gpu", "FeatureExtraction.use_gpu"}, "0")
+        .Add({"SiftExtraction.num_threads", "FeatureExtraction.num_threads"},
+             std::to_string(std::min<size_t>(static_cast<size_t>(plan.threads), names.size())))
+        .Add({"SiftExtraction.max_image_size", "FeatureExtraction.max_image_size"},
+             std::to_string(plan.max_image_size_px));
+    if (group.camera_id) {
+      arguments.Add({"ImageReader.existing_camera_id"}, std::to_string(*group.camera_id));
+    } else {
+      arguments.Add({"ImageReader.single_camera"}, "1");
+      if (!group.params.empty()) {
+        arguments.Add({"ImageReader.camera_params"}, ParamsText(group.params));
+      }
+    }
+    workspace.Run(arguments, [&](const std::string& line) {
+      if (line.find("Processed file [") != std::string::npos) workspace.progress().Update(++done);
+    });
+  }
+  ExpectAllInDatabase(workspace, database);
+}
+
+}  // namespace dtr::colmap

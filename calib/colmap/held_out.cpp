@@ -1,0 +1,246 @@
+#include "calib/colmap/held_out.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <optional>
+
+#include "calib/colmap/matching.h"
+#include "calib/colmap/model_io.h"
+#include "calib/colmap/pairs.h"
+#include "calib/colmap/sfm_steps.h"
+#include "dtr/base/error.h"
+#include "dtr/base/hash.h"
+#include "dtr/base/parallel_for.h"
+
+namespace dtr::colmap {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr char kAliasPrefix[] = "held_";  // sources have none: names never meet
+
+// What every held-out photo is registered against.
+struct Frozen {
+  const calib::SfmModel& model;        // with the sources' own names
+  std::vector<SfmImageInput> sources;  // sorted by name, as their workspace has them
+  std::vector<std::string> aliases;    // of `sources`, in their database
+  std::vector<fs::path> files;         // of `sources`
+  fs::path database;
+  std::string fingerprint;  // of the model
+};
+
+// The frozen camera of a source with the photo's group and size, if one is registered.
+std::optional<std::uint32_t> SharedCamera(const Frozen& frozen, const SfmImageInput& photo,
+                                          bool share) {
+  if (!share) return std::nullopt;
+  for (const calib::SfmImage& image : frozen.model.images) {
+    const auto source = std::lower_bound(
+        frozen.sources.begin(), frozen.sources.end(), image.name,
+        [](const SfmImageInput& a, const std::string& name) { return a.name < name; });
+    if (source == frozen.sources.end() || source->name != image.name) continue;
+    if (source->camera_group == photo.camera_group && source->width_px == photo.width_px &&
+        source->height_px == photo.height_px) {
+      return image.camera_id;
+    }
+  }
+  return std::nullopt;
+}
+
+// The frozen model under the names its database knows.
+void WriteAliased(const fs::path& folder, const Frozen& frozen) {
+  calib::SfmModel model = frozen.model;
+  for (calib::SfmImage& image : model.images) {
+    const auto source = std::lower_bound(
+        frozen.sources.begin(), frozen.sources.end(), image.name,
+        [](const SfmImageInput& a, const std::string& name) { return a.name < name; });
+    if (source == frozen.sources.end() || source->name != image.name) {
+      throw UsageError(image.name + ": expected every image of the model among the sources");
+    }
+    image.name = frozen.aliases[static_cast<size_t>(source - frozen.sources.begin())];
+  }
+  WriteModel(folder, model, Format::kBinary);
+}
+
+void MatchWithSources(Workspace& workspace, const Frozen& frozen, const SfmOptions& options) {
+  std::vector<size_t> partners(frozen.sources.size());
+  for (size_t i = 0; i < partners.size(); ++i) partners[i] = i;
+  if (partners.size() > kExhaustiveLimit) {
+    partners = MostResembling(workspace.FileOf(0), frozen.files, 1);
+  }
+  std::vector<std::pair<std::string, std::string>> pairs;
+  for (const size_t i : partners) pairs.emplace_back(workspace.AliasOf(0), frozen.aliases[i]);
+  MatchPairs(workspace, workspace.database(), pairs, 1, options.seed);
+}
+
+void Register(Workspace& workspace, const Frozen& frozen, const SfmOptions& options) {
+  const fs::path input = workspace.folder() / "source", output = workspace.folder() / "registered";
+  RemoveAll(input);
+  RemoveAll(output);
+  MakeFolder(output);
+  WriteAliased(input, frozen);
+  Arguments arguments(workspace.program(), "image_registrator");
+  arguments.AddIfKnown({"random_seed", "default_random_seed"}, fmt::format("{}", options.seed))
+      .AddIfKnown({"Mapper.random_seed"}, fmt::format("{}", options.seed))
+      .Add({"database_path"}, workspace.database().string())
+      .Add({"input_path"}, input.string())
+      .Add({"output_path"}, output.string())
+      .Add({"Mapper.num_threads"}, "1");
+  workspace.Run(arguments, nullptr);
+  RemoveAll(input);  // a copy of the frozen model per photo would fill the disk
+}
+
+// Lets a photo's programs be stopped, but keeps their stages to itself.
+class QuietProgress final : public Progress {
+ public:
+  explicit QuietProgress(const Progress& outer) : outer_(outer) {}
+  void Stage(const std::string&, int) override {}
+  void Update(int) override {}
+  void Note(const std::string&) override {}
+  bool StopRequested() const override { return outer_.StopRequested(); }
+
+ private:
+  const Progress& outer_;
+};
+
+struct Placed {
+  std::optional<calib::SfmImage> image;
+  calib::LensCamera camera;
+  std::vector<StepRecord> runs;
+  std::string version;
+};
+
+// Features of the result that were matched with points the frozen model has; others (COLMAP made
+// none here) would point to nowhere.
+void KeepFrozenPoints(const calib::SfmModel& model, calib::SfmImage& image) {
+  for (calib::SfmFeature& feature : image.features) {
+    if (!model.points.contains(feature.point_id)) feature.point_id = calib::SfmFeature::kNoPoint;
+  }
+}
+
+Placed Place(const fs::path& images_dir, const SfmImageInput& photo, const Frozen& frozen,
+             const fs::path& folder, const SfmOptions& options, Progress& progress) {
+  Workspace workspace(folder, images_dir, std::span(&photo, 1), kAliasPrefix, 1, progress);
+  auto groups = GroupCameras(workspace.images(), LensModelOf(options), true);
+  groups.front().camera_id = SharedCamera(frozen, photo, options.share_intrinsics_within_group);
+  const ExtractionPlan plan =
+      PlanExtraction(workspace.images(), 1, options.memory_gb, options.max_image_size_px);
+  const auto inputs =
+      fmt::format("model {} size {} seed {} {} [{}]", frozen.fingerprint, plan.max_image_size_px,
+                  options.seed, options.lens_model, ParamsText(groups.front().params));
+  workspace.Step("registration", inputs, [&] {
+    CopyDatabase(frozen.database, workspace.database());
+    ExtractFeatures(workspace, workspace.database(), groups, plan, options.seed);
+    MatchWithSources(workspace, frozen, options);
+    Register(workspace, frozen, options);
+    for (const char* part : {"", "-wal", "-shm"}) RemoveAll(workspace.database().string() + part);
+  });
+  Placed placed;
+  placed.runs = workspace.Report().steps;
+  placed.version = workspace.program().version();
+  const calib::SfmModel model = ReadModel(workspace.folder() / "registered");
+  for (const calib::SfmImage& image : model.images) {
+    if (image.name != workspace.AliasOf(0)) continue;
+    placed.camera = groups.front().camera_id ? frozen.model.cameras.at(*groups.front().camera_id)
+                                             : model.cameras.at(image.camera_id);
+    placed.image = image;
+    placed.image->name = photo.name;
+    KeepFrozenPoints(frozen.model, *placed.image);
+  }
+  WriteReport(workspace.folder(), workspace.Report());
+  return placed;
+}
+
+std::string FingerprintOf(const calib::SfmModel& model, const fs::path& folder) {
+  const fs::path copy = folder / "frozen";
+  RemoveAll(copy);
+  WriteModel(copy, model, Format::kBinary);
+  std::string text;
+  for (const char* name : {"cameras.bin", "images.bin", "points3D.bin"}) {
+    text += Sha256OfFile(copy / name);
+  }
+  RemoveAll(copy);
+  return text;
+}
+
+Frozen FrozenFrom(const calib::SfmModel& model, std::span<const SfmImageInput> sources,
+                  const fs::path& images_dir, const fs::path& source_workspace,
+                  const fs::path& workspace) {
+  Frozen frozen{model, {sources.begin(), sources.end()}, {}, {}, {}, {}};
+  std::sort(frozen.sources.begin(), frozen.sources.end(),
+            [](const auto& a, const auto& b) { return a.name < b.name; });
+  for (size_t i = 0; i < frozen.sources.size(); ++i) {
+    frozen.aliases.push_back(Workspace::AliasFor("", i, frozen.sources[i].name));
+    frozen.files.push_back(images_dir / frozen.sources[i].name);
+  }
+  frozen.database = fs::absolute(source_workspace) / "database.db";
+  if (!fs::exists(frozen.database)) {
+    throw Error(frozen.database.string() +
+                ": expected the database that made the source model, found none; run structure "
+                "from motion on the sources again");
+  }
+  frozen.fingerprint = FingerprintOf(model, workspace);
+  return frozen;
+}
+
+HeldOutResult Collected(const Frozen& frozen, const std::vector<SfmImageInput>& photos,
+                        std::vector<Placed> placed, bool share) {
+  // Cameras of the frozen model keep their ids; own ones are numbered above them.
+  const std::uint32_t first_own =
+      frozen.model.cameras.empty() ? 1 : frozen.model.cameras.rbegin()->first + 1;
+  HeldOutResult result;
+  for (size_t i = 0; i < placed.size(); ++i) {
+    result.report.version = placed[i].version;
+    for (auto& run : placed[i].runs) result.report.steps.push_back(std::move(run));
+    if (!placed[i].image) {
+      result.not_registered.push_back(photos[i].name);
+      continue;
+    }
+    calib::SfmImage& image = result.images.emplace_back(std::move(*placed[i].image));
+    image.id = static_cast<std::uint32_t>(i + 1);
+    image.camera_id =
+        SharedCamera(frozen, photos[i], share).value_or(first_own + static_cast<std::uint32_t>(i));
+    result.cameras[image.camera_id] = placed[i].camera;
+  }
+  result.report.not_registered = result.not_registered;
+  return result;
+}
+
+}  // namespace
+
+HeldOutResult RegisterHeldOut(const fs::path& images_dir, std::span<const SfmImageInput> held_out,
+                              const calib::SfmModel& source_model,
+                              std::span<const SfmImageInput> sources,
+                              const fs::path& source_workspace, const fs::path& workspace,
+                              const SfmOptions& options, Progress& progress) {
+  LensModelOf(options);  // refuse before any work
+  MakeFolder(workspace);
+  const Frozen frozen = FrozenFrom(source_model, sources, images_dir, source_workspace, workspace);
+  std::vector<SfmImageInput> photos(held_out.begin(), held_out.end());
+  std::sort(photos.begin(), photos.end(),
+            [](const auto& a, const auto& b) { return a.name < b.name; });
+  // One photo per thread, each with one thread of its own: as many as the memory allows at once.
+  const int threads = photos.empty() ? 1
+                                     : PlanExtraction(photos, ResolveThreads(options.threads),
+                                                      options.memory_gb, options.max_image_size_px)
+                                           .threads;
+  std::vector<Placed> placed(photos.size());
+  progress.Stage("registering held-out photos", static_cast<int>(photos.size()));
+  std::atomic<int> done = 0;
+  ParallelFor(0, static_cast<int>(photos.size()), threads, [&](int i) {
+    const auto index = static_cast<size_t>(i);
+    // Its own stages would tangle with those of the photos beside it.
+    QuietProgress quiet(progress);
+    // A name is no folder name in general; its hash is, and does not depend on the other photos.
+    const auto folder = workspace / Sha256(std::as_bytes(std::span(photos[index].name)));
+    placed[index] = Place(images_dir, photos[index], frozen, folder, options, quiet);
+    progress.Update(++done);
+  });
+
+  HeldOutResult result =
+      Collected(frozen, photos, std::move(placed), options.share_intrinsics_within_group);
+  WriteReport(workspace, result.report);
+  return result;
+}
+
+}  // namespace dtr::colmap

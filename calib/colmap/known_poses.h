@@ -1,0 +1,35 @@
+// calib/colmap/known_poses.h -- sparse points for photos whose cameras and poses are given.
+#pragma once
+#include <filesystem>
+#include <span>
+#include <string>
+
+#include "calib/colmap/sfm.h"
+#include "calib/lens_camera.h"
+#include "dtr/types/pose.h"
+
+namespace dtr::colmap {
+
+/// A photo with its known camera. The photo may be distorted as `camera` says.
+struct PosedImage {
+  std::string name;  ///< file below images_dir
+  calib::LensCamera camera;
+  Pose cam_from_world;
+};
+
+/// COLMAP may return a pose it was told to keep with its quaternion normalised once more; more
+/// than this (radians; relative to the largest coordinate) means that it moved the camera.
+inline constexpr double kPoseKept = 1e-9;
+
+/// Features, matching and point triangulation with poses and intrinsics held fixed. The model that
+/// comes back carries exactly the given cameras and poses (a camera per distinct LensCamera) and
+/// all images, in order of names. Workspace, checkpoints and errors as in RunSfm;
+/// options.lens_model and share_intrinsics_within_group have no say here. Throws Error also when
+/// COLMAP moved a camera by more than kPoseKept. A report that lists not_registered names photos
+/// without any point.
+SfmResult TriangulateWithPoses(const std::filesystem::path& images_dir,
+                               std::span<const PosedImage> images,
+                               const std::filesystem::path& workspace, const SfmOptions& options,
+                               Progress& progress);
+
+}  // namespace dtr::colmap

@@ -1,0 +1,145 @@
+#include "calib/colmap/pairs.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <numeric>
+#include <opencv2/core.hpp>
+#include <opencv2/features2d.hpp>
+#include <opencv2/imgproc.hpp>
+#include <set>
+
+#include "dtr/base/parallel_for.h"
+#include "dtr/io/image_io.h"
+
+namespace dtr::colmap {
+namespace {
+
+// Squared ratio test on distances (Lowe 2004 uses 0.8); descriptors are unit vectors, so that
+// distance^2 = 2 - 2 dot.
+constexpr float kRatioSquared = 0.8f * 0.8f;
+
+struct Best {
+  Eigen::Index index = -1;
+  bool distinct = false;
+};
+
+Best BestOfRow(const Eigen::Ref<const Eigen::RowVectorXf>& dots) {
+  Best best;
+  float first = -2, second = -2;
+  for (Eigen::Index j = 0; j < dots.size(); ++j) {
+    if (dots[j] > first) {
+      second = first;
+      first = dots[j];
+      best.index = j;
+    } else if (dots[j] > second) {
+      second = dots[j];
+    }
+  }
+  best.distinct = (2 - 2 * first) < kRatioSquared * (2 - 2 * second);
+  return best;
+}
+
+std::vector<SmallFeatures> FeaturesOfFiles(std::span<const std::filesystem::path> files,
+                                           int threads, Progress* progress) {
+  std::vector<SmallFeatures> features(files.size());
+  if (progress != nullptr) progress->Stage("small images", static_cast<int>(files.size()));
+  std::atomic<int> done = 0;
+  ParallelFor(0, static_cast<int>(files.size()), threads, [&](int i) {
+    if (progress != nullptr) progress->ThrowIfInterrupted();
+    const auto index = static_cast<size_t>(i);
+    features[index] = SmallFeaturesOf(io::ReadImage(files[index]));
+    if (progress != nullptr) progress->Update(++done);
+  });
+  return features;
+}
+
+// The indices of the largest scores, ties to the lower index; zero scores never.
+std::vector<size_t> TopIndices(const std::vector<int>& scores) {
+  std::vector<size_t> order(scores.size());
+  std::iota(order.begin(), order.end(), size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](size_t a, size_t b) { return scores[a] > scores[b]; });
+  order.resize(std::min<size_t>(order.size(), kNeighbours));
+  std::erase_if(order, [&](size_t i) { return scores[i] <= 0; });
+  std::sort(order.begin(), order.end());
+  return order;
+}
+
+}  // namespace
+
+SmallFeatures SmallFeaturesOf(const ImageRgb8& image) {
+  // A view of our pixels; OpenCV's constructor wants them mutable but cvtColor only reads.
+  const cv::Mat rgb(image.height(), image.width(), CV_8UC3,
+                    const_cast<std::uint8_t*>(image.data().data()));
+  cv::Mat grey, small;
+  cv::cvtColor(rgb, grey, cv::COLOR_RGB2GRAY);
+  const double scale =
+      std::min(1.0, static_cast<double>(kSmallSidePx) / std::max(grey.cols, grey.rows));
+  const cv::Size size(std::max(1, static_cast<int>(std::lround(scale * grey.cols))),
+                      std::max(1, static_cast<int>(std::lround(scale * grey.rows))));
+  cv::resize(grey, small, size, 0, 0, cv::INTER_AREA);
+  std::vector<cv::KeyPoint> keypoints;
+  cv::Mat descriptors;
+  cv::SIFT::create(kSmallFeatures)->detectAndCompute(small, cv::noArray(), keypoints, descriptors);
+  // SIFT may return a few more than asked; rows beyond are as strong as the last kept.
+  const int rows = std::min(descriptors.rows, kSmallFeatures);
+  SmallFeatures features(rows, 128);
+  for (int i = 0; i < rows; ++i) {
+    const float* row = descriptors.ptr<float>(i);
+    float sum = 0;
+    for (int k = 0; k < 128; ++k) sum += row[k];
+    for (int k = 0; k < 128; ++k) features(i, k) = sum > 0 ? std::sqrt(row[k] / sum) : 0.0f;
+  }
+  return features;
+}
+
+int Resemblance(const SmallFeatures& a, const SmallFeatures& b) {
+  if (a.rows() == 0 || b.rows() == 0) return 0;
+  const Eigen::MatrixXf dots_ba = b * a.transpose();  // column i: feature i of a against all of b
+  std::vector<Eigen::Index> best_for_b(static_cast<size_t>(b.rows()));
+  for (Eigen::Index j = 0; j < b.rows(); ++j) {
+    dots_ba.row(j).maxCoeff(&best_for_b[static_cast<size_t>(j)]);
+  }
+  int shared = 0;
+  for (Eigen::Index i = 0; i < a.rows(); ++i) {
+    const Best best = BestOfRow(dots_ba.col(i).transpose());
+    if (best.distinct && best_for_b[static_cast<size_t>(best.index)] == i) ++shared;
+  }
+  return shared;
+}
+
+std::vector<std::pair<size_t, size_t>> PreselectPairs(std::span<const std::filesystem::path> files,
+                                                      int threads, Progress& progress) {
+  const auto features = FeaturesOfFiles(files, threads, &progress);
+  const size_t count = files.size();
+  std::vector<std::vector<int>> scores(count, std::vector<int>(count, 0));
+  progress.Stage("comparing small images", static_cast<int>(count));
+  std::atomic<int> done = 0;
+  ParallelFor(0, static_cast<int>(count), threads, [&](int i) {
+    progress.ThrowIfInterrupted();
+    const auto a = static_cast<size_t>(i);
+    for (size_t b = a + 1; b < count; ++b) scores[a][b] = Resemblance(features[a], features[b]);
+    progress.Update(++done);
+  });
+  for (size_t a = 0; a < count; ++a) {
+    for (size_t b = a + 1; b < count; ++b) scores[b][a] = scores[a][b];
+  }
+  std::set<std::pair<size_t, size_t>> pairs;
+  for (size_t a = 0; a < count; ++a) {
+    if (a + 1 < count) pairs.emplace(a, a + 1);
+    for (const size_t b : TopIndices(scores[a])) pairs.emplace(std::min(a, b), std::max(a, b));
+  }
+  return {pairs.begin(), pairs.end()};
+}
+
+std::vector<size_t> MostResembling(const std::filesystem::path& photo,
+                                   std::span<const std::filesystem::path> files, int threads) {
+  const SmallFeatures own = SmallFeaturesOf(io::ReadImage(photo));
+  const auto features = FeaturesOfFiles(files, threads, nullptr);
+  std::vector<int> scores;
+  for (const SmallFeatures& other : features) scores.push_back(Resemblance(own, other));
+  return TopIndices(scores);
+}
+
+}  // namespace dtr::colmap

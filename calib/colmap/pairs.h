@@ -1,0 +1,40 @@
+// calib/colmap/pairs.h -- which photos resemble each other, seen on small images.
+#pragma once
+#include <Eigen/Core>
+#include <filesystem>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "dtr/base/progress.h"
+#include "dtr/types/grid.h"
+
+namespace dtr::colmap {
+
+/// Unit-length SIFT descriptors of a small image, one per row.
+using SmallFeatures = Eigen::Matrix<float, Eigen::Dynamic, 128, Eigen::RowMajor>;
+
+inline constexpr int kSmallSidePx = 512;    ///< long side of the small images
+inline constexpr int kSmallFeatures = 384;  ///< the strongest features kept of each
+/// Neighbours every photo keeps. 20 of 300 photos are 7 % of all pairs; a photo set that connects
+/// through its best 20 of rank is what COLMAP's own vocabulary trees aim at (they take 100).
+inline constexpr int kNeighbours = 20;
+
+/// The strongest SIFT features of an image scaled down to kSmallSidePx (RootSIFT: Arandjelovic and
+/// Zisserman, CVPR 2012). Deterministic.
+SmallFeatures SmallFeaturesOf(const ImageRgb8& image);
+
+/// Number of mutual nearest neighbours that pass the ratio test: how much two photos share.
+int Resemblance(const SmallFeatures& a, const SmallFeatures& b);
+
+/// Pairs (a < b, sorted) worth matching in full: every photo with its kNeighbours most resembling
+/// ones and with the next in order, so that a chain through poor photos is not cut.
+/// Deterministic for any number of threads. Throws Error when a photo cannot be read.
+std::vector<std::pair<size_t, size_t>> PreselectPairs(std::span<const std::filesystem::path> files,
+                                                      int threads, Progress& progress);
+
+/// Indices (sorted) of the at most kNeighbours `files` most resembling `photo`.
+std::vector<size_t> MostResembling(const std::filesystem::path& photo,
+                                   std::span<const std::filesystem::path> files, int threads);
+
+}  // namespace dtr::colmap

@@ -1,0 +1,147 @@
+#include "calib/colmap/program.h"
+
+#include <fmt/format.h>
+#include <signal.h>
+
+#include <sstream>
+
+#include "dtr/base/error.h"
+#include "dtr/base/process.h"
+
+namespace dtr::colmap {
+namespace {
+
+constexpr char kProgram[] = "colmap";
+constexpr size_t kLongestCause = 200;  // of a message; the log has the rest
+
+std::vector<std::string> LinesOf(const std::vector<std::string>& argv) {
+  std::vector<std::string> lines;
+  ProcessOptions options;
+  options.on_line = [&](const std::string& line) { lines.push_back(line); };
+  const ProcessResult result = RunProcess(argv, options);
+  if (!result.Ok()) {
+    throw Error(fmt::format("{}: '{} {}' failed ({} {}); reinstall COLMAP",
+                            FindProgram(kProgram).string(), argv[0], argv[1],
+                            result.signal != 0 ? "signal" : "exit code",
+                            result.signal != 0 ? result.signal : result.exit_code));
+  }
+  return lines;
+}
+
+// Keeps the line that most likely says why a program failed.
+class CauseFinder {
+ public:
+  void Feed(const std::string& line) {
+    const size_t first = line.find_first_not_of(" \t=-*");
+    if (first == std::string::npos) return;
+    last_ = line.substr(first, kLongestCause);
+    // glog's fatal lines start with F and a date; stack traces follow them.
+    const bool fatal = line.size() > 2 && line[0] == 'F' && line[1] >= '0' && line[1] <= '9';
+    for (const char* mark : {"ERROR", "Error", "Check failed", "what():", "terminate", "bad_alloc",
+                             "unrecognised option"}) {
+      if ((fatal || line.find(mark) != std::string::npos) && error_.empty()) error_ = last_;
+    }
+  }
+  std::string Cause() const {
+    if (!error_.empty()) return error_;
+    return last_.empty() ? "it said nothing" : "last line: " + last_;
+  }
+
+ private:
+  std::string error_, last_;
+};
+
+std::string HowItEnded(const ProcessResult& result) {
+  if (result.signal == SIGKILL) {
+    return "it was killed, most likely because memory ran out; lower the memory limit or the "
+           "image size";
+  }
+  if (result.signal != 0) return fmt::format("it crashed with signal {}", result.signal);
+  return fmt::format("expected exit code 0, found {}", result.exit_code);
+}
+
+}  // namespace
+
+Program::Program() {
+  if (FindProgram(kProgram).empty()) {
+    throw Error(
+        "colmap: program not found on the PATH; install it (apt-get install colmap), or give the "
+        "camera poses so that it is not needed");
+  }
+  for (const std::string& line : LinesOf({kProgram, "help"})) {
+    if (line.find("COLMAP") == std::string::npos) continue;
+    version_ = line.substr(line.find("COLMAP"));
+    break;
+  }
+  if (version_.empty()) {
+    throw Error(FindProgram(kProgram).string() +
+                ": expected a program that calls itself COLMAP, found one that does not");
+  }
+}
+
+const char* Program::FindOption(const std::string& command,
+                                std::initializer_list<const char*> names) {
+  if (!options_.contains(command)) {
+    auto& known = options_[command];
+    for (const std::string& line : LinesOf({kProgram, command, "-h"})) {
+      std::istringstream words(line);
+      for (std::string word; words >> word;) {
+        if (word.starts_with("--")) known.insert(word.substr(2));
+      }
+    }
+  }
+  for (const char* name : names) {
+    if (options_[command].contains(name)) return name;
+  }
+  return nullptr;
+}
+
+Arguments::Arguments(Program& program, const std::string& command)
+    : program_(program), command_(command), argv_{kProgram, command} {}
+
+Arguments& Arguments::Add(std::initializer_list<const char*> names, const std::string& value) {
+  const char* name = program_.FindOption(command_, names);
+  if (name == nullptr) {
+    throw Error(
+        fmt::format("colmap {}: expected the option --{}, found a version ({}) without it; "
+                    "install another version (3.8 is the one this was tested with)",
+                    command_, *names.begin(), program_.version()));
+  }
+  argv_.push_back(std::string("--") + name);
+  argv_.push_back(value);
+  return *this;
+}
+
+Arguments& Arguments::AddIfKnown(std::initializer_list<const char*> names,
+                                 const std::string& value) {
+  return program_.FindOption(command_, names) == nullptr ? *this : Add(names, value);
+}
+
+void RunColmap(const std::vector<std::string>& argv, StepRecord& record,
+               const std::function<void(const std::string&)>& on_line, Progress& progress) {
+  progress.ThrowIfInterrupted();
+  record.argv = argv;
+  std::error_code ignored;
+  std::filesystem::remove(record.log_file, ignored);  // RunProcess appends
+  CauseFinder cause;
+  ProcessOptions options;
+  options.log_file = record.log_file;
+  options.should_stop = [&] { return progress.StopRequested(); };
+  options.on_line = [&](const std::string& line) {
+    cause.Feed(line);
+    if (on_line) on_line(line);
+  };
+  const ProcessResult result = RunProcess(argv, options);
+  record.exit_code = result.exit_code;
+  record.signal = result.signal;
+  record.wall_s = result.wall_s;
+  record.cpu_s = result.cpu_s;
+  record.max_rss_kib = result.max_rss_kib;
+  progress.ThrowIfInterrupted();
+  if (!result.Ok()) {
+    throw Error(fmt::format("colmap {} ({}): {}: {}; see {}", argv.at(1), record.name,
+                            HowItEnded(result), cause.Cause(), record.log_file.string()));
+  }
+}
+
+}  // namespace dtr::colmap

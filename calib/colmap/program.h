@@ -1,0 +1,58 @@
+// calib/colmap/program.h -- COLMAP as a program: its version, its options, one run of it.
+#pragma once
+#include <functional>
+#include <initializer_list>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "calib/colmap/sfm.h"
+
+namespace dtr::colmap {
+
+/// The `colmap` on the PATH. What its commands understand is asked of the program itself, since
+/// options were renamed between versions (SiftExtraction.use_gpu became FeatureExtraction.use_gpu)
+/// and distributions patch version strings.
+class Program {
+ public:
+  /// Throws Error when there is no colmap on the PATH or it does not answer `help`.
+  Program();
+
+  const std::string& version() const { return version_; }
+
+  /// The first of `names` that `command` understands, or nullptr.
+  const char* FindOption(const std::string& command, std::initializer_list<const char*> names);
+
+ private:
+  std::string version_;
+  std::map<std::string, std::set<std::string>> options_;  // by command, as asked so far
+};
+
+/// An argument list for one command, checked against what this COLMAP understands.
+class Arguments {
+ public:
+  Arguments(Program& program, const std::string& command);
+
+  /// Adds `--name value`; of several names (oldest first) the one this version understands.
+  /// Throws Error when it understands none.
+  Arguments& Add(std::initializer_list<const char*> names, const std::string& value);
+  /// The same, leaving the option out where the version does not have it.
+  Arguments& AddIfKnown(std::initializer_list<const char*> names, const std::string& value);
+
+  const std::vector<std::string>& argv() const { return argv_; }
+
+ private:
+  Program& program_;
+  std::string command_;
+  std::vector<std::string> argv_;
+};
+
+/// Runs COLMAP once, its output going to `record.log_file` and line by line to `on_line`. The rest
+/// of `record` but its name is filled in, also when this throws.
+/// Throws Interrupted when `progress` asks to stop (the program is ended first), and Error, naming
+/// step, cause and log, unless the program exits with 0.
+void RunColmap(const std::vector<std::string>& argv, StepRecord& record,
+               const std::function<void(const std::string&)>& on_line, Progress& progress);
+
+}  // namespace dtr::colmap

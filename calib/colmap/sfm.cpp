@@ -1,0 +1,132 @@
+#include "calib/colmap/sfm.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdio>
+
+#include "calib/colmap/model_io.h"
+#include "calib/colmap/sfm_steps.h"
+#include "dtr/base/error.h"
+#include "dtr/base/files.h"
+#include "dtr/base/parallel_for.h"
+
+namespace dtr::colmap {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr std::uintmax_t kLargestNote = 1 << 20;
+
+// Images registered so far, from "Registering image #7 (3)" (3.8) and
+// "Registering image #7 (num_reg_frames=3)" (later): the number in parentheses counts those before.
+int RegisteredImages(const std::string& line) {
+  if (line.find("Registering image #") == std::string::npos) return -1;
+  const size_t open = line.find('(');
+  if (open == std::string::npos) return -1;
+  const size_t digits = line.find_first_of("0123456789", open);
+  int count = 0;
+  if (digits == std::string::npos || std::sscanf(line.c_str() + digits, "%d", &count) != 1) {
+    return -1;
+  }
+  return count;
+}
+
+[[noreturn]] void ThrowNoModel(const Workspace& workspace) {
+  throw Error(fmt::format(
+      "colmap mapper: expected a model of {} photos, found that they have too little in common to "
+      "make one; photos must overlap by half and show texture; see {}",
+      workspace.images().size(), workspace.Report().steps.back().log_file.string()));
+}
+
+// Runs the mapper. COLMAP ends with an error when the photos do not connect: that is a finding
+// about the photos, told as such.
+void Map(Workspace& workspace, const fs::path& models, std::uint64_t seed) {
+  Arguments arguments(workspace.program(), "mapper");
+  arguments.AddIfKnown({"random_seed", "default_random_seed"}, fmt::format("{}", seed))
+      .AddIfKnown({"Mapper.random_seed"}, fmt::format("{}", seed))
+      .Add({"database_path"}, workspace.database().string())
+      .Add({"image_path"}, workspace.images_folder().string())
+      .Add({"output_path"}, models.string())
+      .Add({"Mapper.num_threads"}, std::to_string(workspace.threads()));
+  workspace.progress().Stage("mapping", static_cast<int>(workspace.images().size()));
+  int most = 0;
+  bool no_pair = false;
+  try {
+    workspace.Run(arguments, [&](const std::string& line) {
+      const int count = RegisteredImages(line);
+      if (count > most) workspace.progress().Update(most = count);
+      no_pair = no_pair || line.find("No good initial image pair") != std::string::npos ||
+                line.find("failed to create sparse model") != std::string::npos ||
+                line.find("failed to create any sparse model") != std::string::npos;
+    });
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const Error&) {
+    if (no_pair) ThrowNoModel(workspace);
+    throw;
+  }
+}
+
+// The folders "0", "1", ... in which the mapper leaves its models, as models; largest first (by
+// images, then points, then number).
+std::vector<calib::SfmModel> ModelsIn(const Workspace& workspace, const fs::path& folder) {
+  std::vector<calib::SfmModel> models;
+  for (int i = 0; fs::is_directory(folder / std::to_string(i)); ++i) {
+    models.push_back(workspace.ReadModelHere(folder / std::to_string(i)));
+  }
+  std::stable_sort(models.begin(), models.end(), [](const auto& a, const auto& b) {
+    return std::pair(a.images.size(), a.points.size()) >
+           std::pair(b.images.size(), b.points.size());
+  });
+  return models;
+}
+
+void MappingStep(Workspace& workspace, const SfmOptions& options) {
+  const fs::path models = workspace.folder() / "models";
+  RemoveAll(models);
+  RemoveAll(workspace.folder() / "model");
+  MakeFolder(models);
+  Map(workspace, models, options.seed);
+  const auto made = ModelsIn(workspace, models);
+  if (made.empty()) ThrowNoModel(workspace);
+  std::string sizes;
+  for (const auto& model : made) sizes += fmt::format("{}\n", model.images.size());
+  WriteFileAtomically(workspace.folder() / "models.txt", sizes);
+  WriteModel(workspace.folder() / "model", made.front(), Format::kBinary);
+}
+
+std::vector<int> ModelSizes(const Workspace& workspace) {
+  std::vector<int> sizes;
+  const std::string text = ReadFile(workspace.folder() / "models.txt", kLargestNote);
+  int size = 0, used = 0;
+  for (const char* at = text.c_str(); std::sscanf(at, "%d%n", &size, &used) == 1; at += used) {
+    sizes.push_back(size);
+  }
+  return sizes;
+}
+
+}  // namespace
+
+SfmResult RunSfm(const fs::path& images_dir, std::span<const SfmImageInput> images,
+                 const fs::path& workspace_folder, const SfmOptions& options, Progress& progress) {
+  const calib::LensModel lens = LensModelOf(options);
+  if (images.size() < 2) {
+    throw UsageError(
+        fmt::format("{}: expected at least two photos, found {}; depth needs a second "
+                    "place to look from",
+                    images_dir.string(), images.size()));
+  }
+  Workspace workspace(workspace_folder, images_dir, images, "", ResolveThreads(options.threads),
+                      progress);
+  const auto groups = GroupCameras(workspace.images(), lens, options.share_intrinsics_within_group);
+  SfmResult result;
+  FeaturesAndMatches(workspace, groups, options, result.report);
+  workspace.Step("mapping", fmt::format("seed {}", options.seed),
+                 [&] { MappingStep(workspace, options); });
+  result.model = ReadModel(workspace.folder() / "model");
+  result.report.images_per_model = ModelSizes(workspace);
+  CompleteReport(workspace, result.model, result.report);
+  return result;
+}
+
+}  // namespace dtr::colmap

@@ -1,0 +1,87 @@
+// calib/colmap/sfm.h -- structure from motion by the `colmap` program.
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "calib/sfm_model.h"
+#include "dtr/base/progress.h"
+
+namespace dtr::colmap {
+
+/// A photo to be calibrated: `images_dir / name`, upright (EXIF orientation already applied).
+struct SfmImageInput {
+  std::string name;
+  int width_px = 0, height_px = 0;
+  std::optional<double> focal_prior_px;  ///< empty: COLMAP's own guess from EXIF, else 1.2 w
+  std::string camera_group;              ///< photos of one group and size share intrinsics
+};
+
+/// Which pairs of photos are matched in full.
+enum class Matching {
+  kAuto,         ///< exhaustive up to kExhaustiveLimit photos, preselected beyond
+  kExhaustive,   ///< every pair
+  kPreselected,  ///< pairs that resemble each other in small images (calib/colmap/pairs.h)
+  kSequential,   ///< neighbours in the order of names: video
+};
+
+/// At 60 photos every pair (1770) takes some 15 minutes on 2 cores; the cost grows with the square.
+inline constexpr int kExhaustiveLimit = 60;
+
+struct SfmOptions {
+  Matching matching = Matching::kAuto;
+  int threads = 0;                           ///< 0: all cores
+  std::uint64_t seed = 0;                    ///< of COLMAP's random choices
+  double memory_gb = 4;                      ///< COLMAP stays below this many GiB
+  int max_image_size_px = 0;                 ///< long side for features; 0: from the memory
+  std::string lens_model = "SIMPLE_RADIAL";  ///< COLMAP's name
+  bool share_intrinsics_within_group = true;
+};
+
+/// One run of the program: what was asked, how it ended, what it cost.
+struct StepRecord {
+  std::string name;               ///< "features", "matches", "mapping", ...
+  std::vector<std::string> argv;  ///< as executed, no shell
+  int exit_code = 0, signal = 0;
+  double wall_s = 0, cpu_s = 0;
+  long max_rss_kib = 0;
+  std::filesystem::path log_file;
+  bool from_checkpoint = false;  ///< run by an earlier call, whose figures these are
+};
+
+struct SfmReport {
+  std::string version;  ///< COLMAP's first line about itself
+  std::vector<StepRecord> steps;
+  Matching matching = Matching::kAuto;  ///< the one used
+  int extraction_threads = 0;           ///< features.h: bounded by the memory
+  int max_image_size_px = 0;
+  std::vector<std::string> not_registered;  ///< names without a pose, sorted
+  std::vector<int> images_per_model;        ///< models COLMAP made, largest first; [0] was taken
+  double mean_reprojection_error_px = 0;    ///< over all observations, recomputed
+};
+
+struct SfmResult {
+  calib::SfmModel model;
+  SfmReport report;
+};
+
+/// Features, matching and mapping in `workspace` (made when absent), on the CPU, headless.
+/// The workspace keeps per step the arguments, log, exit code and cost (sfm_run.json, logs/), the
+/// database and the frozen result (model/, COLMAP binary, original names). A second call with the
+/// same photos (by content), options and COLMAP version returns the frozen result; an interrupted
+/// one goes on after its last finished step. COLMAP with several threads is not repeatable.
+///
+/// Throws UsageError on inputs that cannot be meant (fewer than two photos, names twice, an unknown
+/// lens model), Interrupted when asked to stop (the program is ended), Error when COLMAP is
+/// missing, fails (naming step, cause and log) or makes no model.
+SfmResult RunSfm(const std::filesystem::path& images_dir, std::span<const SfmImageInput> images,
+                 const std::filesystem::path& workspace, const SfmOptions& options,
+                 Progress& progress);
+
+/// Mean distance (px) between features and their points' projections; 0 without observations.
+double MeanReprojectionErrorPx(const calib::SfmModel& model);
+
+}  // namespace dtr::colmap

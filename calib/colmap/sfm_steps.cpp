@@ -1,0 +1,119 @@
+#include "calib/colmap/sfm_steps.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+
+#include "calib/colmap/matching.h"
+#include "dtr/base/error.h"
+#include "dtr/base/files.h"
+
+namespace dtr::colmap {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr std::uintmax_t kLargestNote = 1 << 12;
+
+// What the features depend on beside the photos.
+std::string TextOf(const std::vector<CameraGroup>& groups, const ExtractionPlan& plan,
+                   std::uint64_t seed) {
+  std::string text = fmt::format("size {} seed {}", plan.max_image_size_px, seed);
+  for (const CameraGroup& group : groups) {
+    text += fmt::format("\n{} [{}] of {}", calib::NameOf(group.model), ParamsText(group.params),
+                        fmt::join(group.images, ","));
+    if (group.camera_id) text += fmt::format(" camera {}", *group.camera_id);
+  }
+  return text;
+}
+
+void RemoveDatabase(const fs::path& database) {
+  for (const char* part : {"", "-wal", "-shm", "-journal"}) RemoveAll(database.string() + part);
+}
+
+}  // namespace
+
+calib::LensModel LensModelOf(const SfmOptions& options) {
+  const auto model = calib::LensModelFromName(options.lens_model);
+  if (!model) {
+    throw UsageError("lens model: expected a name like SIMPLE_RADIAL, RADIAL or OPENCV, found '" +
+                     options.lens_model + "'");
+  }
+  return *model;
+}
+
+void CopyDatabase(const fs::path& from, const fs::path& to) {
+  RemoveDatabase(to);
+  std::error_code failure;
+  for (const char* part : {"", "-wal"}) {
+    if (*part != '\0' && !fs::exists(from.string() + part)) continue;
+    fs::copy_file(from.string() + part, to.string() + part, failure);
+    if (failure) {
+      throw Error(fmt::format("{}: cannot be copied to {}: {}", from.string() + part,
+                              to.string() + part, failure.message()));
+    }
+  }
+}
+
+void FeaturesAndMatches(Workspace& workspace, const std::vector<CameraGroup>& groups,
+                        const SfmOptions& options, SfmReport& report) {
+  const ExtractionPlan plan = PlanExtraction(workspace.images(), workspace.threads(),
+                                             options.memory_gb, options.max_image_size_px);
+  report.extraction_threads = plan.threads;
+  report.max_image_size_px = plan.max_image_size_px;
+  report.matching = ResolveMatching(options.matching, workspace.images().size());
+
+  const fs::path features = workspace.folder() / "features.db";
+  workspace.Step("features", TextOf(groups, plan, options.seed), [&] {
+    RemoveDatabase(features);  // COLMAP would take over what an interrupted run left
+    ExtractFeatures(workspace, features, groups, plan, options.seed);
+  });
+  const auto text =
+      fmt::format("matching {} seed {}", static_cast<int>(report.matching), options.seed);
+  workspace.Step("matches", text, [&] {
+    // Matching may take hours: an interrupted run of the same inputs goes on with its pairs.
+    const fs::path begun = workspace.folder() / "matches.begun";
+    const bool go_on = fs::exists(begun) && fs::exists(workspace.database()) &&
+                       ReadFile(begun, kLargestNote) == workspace.fingerprint();
+    if (!go_on) {
+      RemoveAll(begun);
+      CopyDatabase(features, workspace.database());
+      WriteFileAtomically(begun, workspace.fingerprint());
+    }
+    MatchPhotos(workspace, workspace.database(), report.matching,
+                MatchingThreads(workspace.threads(), options.memory_gb), options.seed);
+  });
+}
+
+void CompleteReport(const Workspace& workspace, const calib::SfmModel& model, SfmReport& report) {
+  const SfmReport runs = workspace.Report();
+  report.version = runs.version;
+  report.steps = runs.steps;
+  std::set<std::string> registered;
+  for (const calib::SfmImage& image : model.images) registered.insert(image.name);
+  report.not_registered.clear();
+  for (const SfmImageInput& image : workspace.images()) {
+    if (!registered.contains(image.name)) report.not_registered.push_back(image.name);
+  }
+  report.mean_reprojection_error_px = MeanReprojectionErrorPx(model);
+  WriteReport(workspace.folder(), report);
+}
+
+double MeanReprojectionErrorPx(const calib::SfmModel& model) {
+  double sum = 0;
+  std::int64_t count = 0;
+  for (const calib::SfmImage& image : model.images) {
+    const calib::LensCamera& camera = model.cameras.at(image.camera_id);
+    for (const calib::SfmFeature& feature : image.features) {
+      if (feature.point_id == calib::SfmFeature::kNoPoint) continue;
+      const auto& p_in_world = model.points.at(feature.point_id).p_in_world;
+      const auto pixel = camera.PixelFromCam(image.cam_from_world * p_in_world);
+      if (!pixel) continue;  // behind its camera: COLMAP drops such observations, imports may not
+      sum += (*pixel - feature.pixel).norm();
+      ++count;
+    }
+  }
+  return count > 0 ? sum / static_cast<double>(count) : 0;
+}
+
+}  // namespace dtr::colmap

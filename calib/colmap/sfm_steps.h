@@ -1,0 +1,25 @@
+// calib/colmap/sfm_steps.h -- the steps that structure from motion and triangulation share.
+#pragma once
+#include <span>
+#include <string>
+#include <vector>
+
+#include "calib/colmap/features.h"
+#include "calib/colmap/workspace.h"
+
+namespace dtr::colmap {
+
+/// The lens model of the options. Throws UsageError on an unknown name.
+calib::LensModel LensModelOf(const SfmOptions& options);
+
+/// Steps "features" and "matches": fills workspace.database(). What was planned goes to `report`.
+void FeaturesAndMatches(Workspace& workspace, const std::vector<CameraGroup>& groups,
+                        const SfmOptions& options, SfmReport& report);
+
+/// Fills in what every report has: runs, version, who did not register, the error; writes it.
+void CompleteReport(const Workspace& workspace, const calib::SfmModel& model, SfmReport& report);
+
+/// Copies a database that no program has open. Throws Error when it cannot.
+void CopyDatabase(const std::filesystem::path& from, const std::filesystem::path& to);
+
+}  // namespace dtr::colmap

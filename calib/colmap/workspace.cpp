@@ -1,0 +1,230 @@
+#include "calib/colmap/workspace.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <nlohmann/json.hpp>
+
+#include "calib/colmap/model_io.h"
+#include "dtr/base/error.h"
+#include "dtr/base/files.h"
+#include "dtr/base/hash.h"
+
+namespace dtr::colmap {
+namespace fs = std::filesystem;
+using nlohmann::json;
+namespace {
+
+constexpr std::uintmax_t kLargestStamp = 1 << 24;
+
+std::string HashOfText(const std::string& text) { return Sha256(std::as_bytes(std::span(text))); }
+
+json ToJson(const StepRecord& record) {
+  return {{"name", record.name},
+          {"argv", record.argv},
+          {"exit_code", record.exit_code},
+          {"signal", record.signal},
+          {"wall_s", record.wall_s},
+          {"cpu_s", record.cpu_s},
+          {"max_rss_kib", record.max_rss_kib},
+          {"log_file", record.log_file.string()},
+          {"from_checkpoint", record.from_checkpoint}};
+}
+
+StepRecord FromJson(const json& j) {
+  StepRecord record;
+  record.name = j.at("name");
+  record.argv = j.at("argv").get<std::vector<std::string>>();
+  record.exit_code = j.at("exit_code");
+  record.signal = j.at("signal");
+  record.wall_s = j.at("wall_s");
+  record.cpu_s = j.at("cpu_s");
+  record.max_rss_kib = j.at("max_rss_kib");
+  record.log_file = j.at("log_file").get<std::string>();
+  record.from_checkpoint = true;
+  return record;
+}
+
+// The records of a finished step, or nothing when its stamp is absent, damaged or of other inputs:
+// then the step simply runs again.
+std::optional<std::vector<StepRecord>> ReadStamp(const fs::path& stamp,
+                                                 const std::string& fingerprint) {
+  if (!fs::exists(stamp)) return std::nullopt;
+  const json j = json::parse(ReadFile(stamp, kLargestStamp), nullptr, false);
+  try {
+    if (j.is_discarded() || j.at("fingerprint") != fingerprint) return std::nullopt;
+    std::vector<StepRecord> records;
+    for (const json& record : j.at("runs")) records.push_back(FromJson(record));
+    return records;
+  } catch (const json::exception&) {
+    return std::nullopt;
+  }
+}
+
+void Link(const fs::path& target, const fs::path& link) {
+  RemoveAll(link);
+  std::error_code failure;
+  fs::create_symlink(fs::absolute(target), link, failure);
+  if (failure) {
+    throw Error(
+        fmt::format("{}: cannot be linked to {}: {}; use a folder on a file system with "
+                    "symbolic links",
+                    link.string(), target.string(), failure.message()));
+  }
+}
+
+const char* NameOf(Matching matching) {
+  switch (matching) {
+    case Matching::kAuto:
+      return "auto";
+    case Matching::kExhaustive:
+      return "exhaustive";
+    case Matching::kPreselected:
+      return "preselected";
+    case Matching::kSequential:
+      return "sequential";
+  }
+  return "";
+}
+
+}  // namespace
+
+void RemoveAll(const fs::path& path) {
+  std::error_code failure;
+  fs::remove_all(path, failure);
+  if (failure) throw Error(path.string() + ": cannot be removed: " + failure.message());
+}
+
+void MakeFolder(const fs::path& path) {
+  std::error_code failure;
+  fs::create_directories(path, failure);
+  if (failure) throw Error(path.string() + ": cannot be made: " + failure.message());
+}
+
+std::string Workspace::AliasFor(const std::string& prefix, size_t index, const std::string& name) {
+  std::string extension = fs::path(name).extension().string();
+  std::erase_if(extension, [](unsigned char c) { return c != '.' && std::isalnum(c) == 0; });
+  return fmt::format("{}{:06}{}", prefix, index, extension);
+}
+
+Workspace::Workspace(const fs::path& folder, const fs::path& images_dir,
+                     std::span<const SfmImageInput> images, const std::string& alias_prefix,
+                     int threads, Progress& progress)
+    : folder_(fs::absolute(folder)),
+      images_(images.begin(), images.end()),
+      threads_(threads),
+      progress_(progress) {
+  std::sort(images_.begin(), images_.end(),
+            [](const auto& a, const auto& b) { return a.name < b.name; });
+  RemoveAll(images_folder());
+  for (const char* part : {"images", "logs", "lists"}) MakeFolder(folder_ / part);
+  json names = json::object(), identity = json::array();
+  for (size_t i = 0; i < images_.size(); ++i) {
+    const SfmImageInput& image = images_[i];
+    if (i > 0 && image.name == images_[i - 1].name) {
+      throw UsageError(image.name + ": expected every photo once, found it twice");
+    }
+    if (image.width_px < 1 || image.height_px < 1) {
+      throw UsageError(fmt::format("{}: expected a positive size, found {} x {}", image.name,
+                                   image.width_px, image.height_px));
+    }
+    const fs::path file = images_dir / image.name;
+    identity.push_back({image.name, image.width_px, image.height_px, Sha256OfFile(file)});
+    aliases_.push_back(AliasFor(alias_prefix, i, image.name));
+    names[aliases_.back()] = image.name;
+    Link(file, FileOf(i));
+  }
+  constexpr int kIndent = 1;
+  const auto replace = json::error_handler_t::replace;  // names need not be UTF-8
+  WriteFileAtomically(folder_ / "images.json", names.dump(kIndent, ' ', false, replace) + "\n");
+  fingerprint_ = HashOfText(program_.version() + identity.dump(-1, ' ', false, replace));
+}
+
+calib::SfmModel Workspace::ReadModelHere(const fs::path& folder) const {
+  calib::SfmModel model = ReadModel(folder);
+  for (calib::SfmImage& image : model.images) {
+    const auto alias = std::find(aliases_.begin(), aliases_.end(), image.name);
+    if (alias == aliases_.end()) {
+      throw Error(fmt::format("{}: expected images of this workspace only, found '{}'",
+                              folder.string(), image.name));
+    }
+    image.name = images_[static_cast<size_t>(alias - aliases_.begin())].name;
+  }
+  return model;  // aliases sort as the names do
+}
+
+void Workspace::WriteModelHere(const fs::path& folder, calib::SfmModel model) const {
+  for (calib::SfmImage& image : model.images) {
+    const auto known = std::lower_bound(images_.begin(), images_.end(), image.name,
+                                        [](const auto& a, const auto& b) { return a.name < b; });
+    if (known == images_.end() || known->name != image.name) {
+      throw Error(fmt::format("{}: expected images of this workspace only, found '{}'",
+                              folder.string(), image.name));
+    }
+    image.name = aliases_[static_cast<size_t>(known - images_.begin())];
+  }
+  WriteModel(folder, model, Format::kBinary);
+}
+
+void Workspace::Step(const std::string& name, const std::string& inputs,
+                     const std::function<void()>& body) {
+  fingerprint_ = HashOfText(fingerprint_ + "\n" + name + "\n" + inputs);
+  const fs::path stamp = folder_ / (name + ".done.json");
+  if (const auto records = ReadStamp(stamp, fingerprint_)) {
+    records_.insert(records_.end(), records->begin(), records->end());
+    return;
+  }
+  RemoveAll(stamp);
+  step_ = name;
+  const auto first = static_cast<std::ptrdiff_t>(records_.size());
+  body();
+  json runs = json::array();
+  for (auto it = records_.begin() + first; it != records_.end(); ++it) runs.push_back(ToJson(*it));
+  WriteFileAtomically(stamp, json{{"fingerprint", fingerprint_}, {"runs", runs}}.dump(1) + "\n");
+}
+
+void Workspace::Run(const Arguments& arguments,
+                    const std::function<void(const std::string&)>& on_line) {
+  StepRecord& record = records_.emplace_back();
+  record.name = step_;
+  record.log_file = folder_ / "logs" / fmt::format("{:02}-{}.log", records_.size(), step_);
+  try {
+    RunColmap(arguments.argv(), record, on_line, progress_);
+  } catch (...) {
+    WriteReport(folder_, Report());  // what failed, and how, stays beside its log
+    throw;
+  }
+}
+
+fs::path Workspace::WriteList(const std::string& name, const std::vector<std::string>& lines) {
+  std::string text;
+  for (const std::string& line : lines) text += line + "\n";
+  const fs::path file = folder_ / "lists" / name;
+  WriteFileAtomically(file, text);
+  return file;
+}
+
+SfmReport Workspace::Report() const {
+  SfmReport report;
+  report.version = program_.version();
+  report.steps = records_;
+  return report;
+}
+
+void WriteReport(const fs::path& folder, const SfmReport& report) {
+  json steps = json::array();
+  for (const StepRecord& record : report.steps) steps.push_back(ToJson(record));
+  const json j = {{"version", report.version},
+                  {"steps", steps},
+                  {"matching", NameOf(report.matching)},
+                  {"extraction_threads", report.extraction_threads},
+                  {"max_image_size_px", report.max_image_size_px},
+                  {"not_registered", report.not_registered},
+                  {"images_per_model", report.images_per_model},
+                  {"mean_reprojection_error_px", report.mean_reprojection_error_px}};
+  WriteFileAtomically(folder / "sfm_run.json",
+                      j.dump(1, ' ', false, json::error_handler_t::replace) + "\n");
+}
+
+}  // namespace dtr::colmap

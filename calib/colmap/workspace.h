@@ -1,0 +1,83 @@
+// calib/colmap/workspace.h -- the folder in which COLMAP works: photos, steps, checkpoints,
+// records.
+#pragma once
+#include <filesystem>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "calib/colmap/program.h"
+#include "calib/colmap/sfm.h"
+
+namespace dtr::colmap {
+
+/// Layout: images/ (links under plain names, see AliasOf), images.json (which link is which photo),
+/// logs/, lists/, STEP.done.json (stamps), database.db, and what the steps leave.
+class Workspace {
+ public:
+  /// Sorts `images` by name (byte order), checks that all are there, links them.
+  /// `alias_prefix` keeps photos of two workspaces apart that meet in one database.
+  /// Throws UsageError on duplicate names or sizes that cannot be, Error on files that are absent
+  /// or cannot be linked.
+  Workspace(const std::filesystem::path& folder, const std::filesystem::path& images_dir,
+            std::span<const SfmImageInput> images, const std::string& alias_prefix, int threads,
+            Progress& progress);
+
+  const std::filesystem::path& folder() const { return folder_; }
+  std::filesystem::path images_folder() const { return folder_ / "images"; }
+  std::filesystem::path database() const { return folder_ / "database.db"; }
+  const std::vector<SfmImageInput>& images() const { return images_; }
+  std::filesystem::path FileOf(size_t image) const { return images_folder() / AliasOf(image); }
+  Program& program() { return program_; }
+  Progress& progress() { return progress_; }
+  int threads() const { return threads_; }
+
+  /// Name under which COLMAP knows images()[image]. COLMAP's lists separate names by blanks and
+  /// trim them, so that photos called "my photo.jpg" could not be paired under their own names.
+  std::string AliasOf(size_t image) const { return aliases_.at(image); }
+  /// The same for photo number `index` of a list sorted by name.
+  static std::string AliasFor(const std::string& prefix, size_t index, const std::string& name);
+
+  /// Reads a model COLMAP made here and gives the images their own names back.
+  calib::SfmModel ReadModelHere(const std::filesystem::path& folder) const;
+  /// The inverse: writes a model for COLMAP to read. Every image must be one of images().
+  void WriteModelHere(const std::filesystem::path& folder, calib::SfmModel model) const;
+
+  /// Runs `body` unless an earlier call finished the step `name` on the same inputs: photos (names,
+  /// sizes, contents), COLMAP's version, all steps before, and `inputs` (options, as text).
+  void Step(const std::string& name, const std::string& inputs, const std::function<void()>& body);
+
+  /// Identity of the step running now (or last begun): hash of everything it depends on.
+  const std::string& fingerprint() const { return fingerprint_; }
+
+  /// Runs COLMAP once inside a step; see RunColmap.
+  void Run(const Arguments& arguments, const std::function<void(const std::string&)>& on_line);
+
+  /// Writes a list file (one line each) and returns its path.
+  std::filesystem::path WriteList(const std::string& name, const std::vector<std::string>& lines);
+
+  /// The program runs so far, and version; other fields of the report are the caller's.
+  SfmReport Report() const;
+
+ private:
+  std::filesystem::path folder_;
+  std::vector<SfmImageInput> images_;
+  std::vector<std::string> aliases_;
+  int threads_;
+  Progress& progress_;
+  Program program_;
+  std::string fingerprint_;
+  std::string step_;
+  std::vector<StepRecord> records_;
+};
+
+/// Writes `report` as sfm_run.json into `folder`.
+void WriteReport(const std::filesystem::path& folder, const SfmReport& report);
+
+/// Removes a file or folder tree that a step is about to make anew.
+void RemoveAll(const std::filesystem::path& path);
+/// Makes a folder with its parents. Throws Error when it cannot.
+void MakeFolder(const std::filesystem::path& path);
+
+}  // namespace dtr::colmap

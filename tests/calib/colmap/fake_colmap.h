@@ -1,0 +1,94 @@
+// tests/calib/colmap/fake_colmap.h -- a `colmap` that does as it is told, first on the PATH.
+#pragma once
+#include <sqlite3.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "dtr/base/files.h"
+#include "tests/support/test_data.h"
+
+namespace dtr::colmap::testing {
+
+/// Puts fake_colmap.sh, called colmap, first on the PATH for its life time. Told by files in its
+/// folder: `fail.COMMAND` holds shell lines that the command runs first; `model.N` are the models
+/// the mapper leaves; `database` is what the extractor leaves, `output` what the triangulator and
+/// registrator leave (their input without it). Every call is noted in `calls`.
+class FakeColmap {
+ public:
+  /// `new_names`: with the option names of later versions.
+  explicit FakeColmap(bool new_names = false) : old_path_(std::getenv("PATH")) {
+    namespace fs = std::filesystem;
+    fs::create_directories(folder_ / "bin");
+    fs::copy_file(DTR_FAKE_COLMAP, folder_ / "bin" / "colmap");
+    fs::permissions(folder_ / "bin" / "colmap", fs::perms::owner_all);
+    WriteFileAtomically(folder_ / "options", Options(new_names));
+    setenv("PATH", ((folder_ / "bin").string() + ":" + old_path_).c_str(), 1);
+    setenv("FAKE_COLMAP", folder_.path().c_str(), 1);
+  }
+  ~FakeColmap() {
+    setenv("PATH", old_path_.c_str(), 1);
+    unsetenv("FAKE_COLMAP");
+  }
+  FakeColmap(const FakeColmap&) = delete;
+  FakeColmap& operator=(const FakeColmap&) = delete;
+
+  void Fail(const std::string& command, const std::string& shell_lines) {
+    WriteFileAtomically(folder_ / ("fail." + command), shell_lines + "\n");
+  }
+  /// The database that the extractor leaves: these images, of one camera.
+  void LeaveDatabase(const std::vector<std::string>& names) {
+    std::filesystem::remove(folder_ / "database");
+    sqlite3* database = nullptr;
+    std::string sql = "CREATE TABLE images (image_id INTEGER, name TEXT, camera_id INTEGER);";
+    for (size_t i = 0; i < names.size(); ++i) {
+      sql += "INSERT INTO images VALUES (" + std::to_string(i + 1) + ", '" + names[i] + "', 1);";
+    }
+    const bool made = sqlite3_open((folder_ / "database").c_str(), &database) == SQLITE_OK &&
+                      sqlite3_exec(database, sql.c_str(), nullptr, nullptr, nullptr) == SQLITE_OK;
+    sqlite3_close(database);
+    if (!made) throw std::runtime_error("no database for the fake colmap");
+  }
+  void Succeed(const std::string& command) {
+    std::filesystem::remove(folder_ / ("fail." + command));
+  }
+  std::filesystem::path operator/(const std::string& name) const { return folder_ / name; }
+
+  /// Calls so far that did work (not help), one line of arguments each.
+  std::vector<std::string> Calls() const {
+    std::vector<std::string> lines;
+    if (!std::filesystem::exists(folder_ / "calls")) return lines;
+    std::string text = ReadFile(folder_ / "calls", 1 << 20);
+    for (size_t end; (end = text.find('\n')) != std::string::npos; text.erase(0, end + 1)) {
+      lines.push_back(text.substr(0, end));
+    }
+    return lines;
+  }
+  void ForgetCalls() { std::filesystem::remove(folder_ / "calls"); }
+
+ private:
+  static std::string Options(bool new_names) {
+    std::string options =
+        "--database_path\n--image_path\n--image_list_path\n--match_list_path\n--match_type\n"
+        "--input_path\n--output_path\n--ImageReader.camera_model\n--ImageReader.single_camera\n"
+        "--ImageReader.camera_params\n--ImageReader.existing_camera_id\n"
+        "--ExhaustiveMatching.block_size\n--SequentialMatching.overlap\n"
+        "--SequentialMatching.quadratic_overlap\n--Mapper.num_threads\n"
+        "--Mapper.ba_refine_focal_length\n--Mapper.ba_refine_principal_point\n"
+        "--Mapper.ba_refine_extra_params\n--Mapper.tri_ignore_two_view_tracks\n";
+    options += new_names ? "--default_random_seed\n" : "--random_seed\n";
+    for (const char* name : {".use_gpu", ".num_threads", ".max_image_size"}) {
+      for (const char* stage : {"Extraction", "Matching"}) {
+        options += std::string(new_names ? "--Feature" : "--Sift") + stage + name + "\n";
+      }
+    }
+    return options;
+  }
+
+  dtr::testing::TemporaryFolder folder_;
+  std::string old_path_;
+};
+
+}  // namespace dtr::colmap::testing
