@@ -1,6 +1,7 @@
 #include "dtr/io/formats/import_views.h"
 
 #include <algorithm>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <span>
 
@@ -189,6 +190,63 @@ std::vector<SparsePoint> PointsOfSources(const SparseScene& scene, const std::ve
   return RestrictToViews(scene, is_source).points;
 }
 
+std::string Fingerprint(const nlohmann::json& inputs, const CameraList& list,
+                        const ImportOptions& options, const SparseScene* points) {
+  nlohmann::json fingerprint = inputs;
+  fingerprint["cameras"] = nlohmann::json::parse(FormatCamerasJson(list));
+  fingerprint["depth_coding"] = NameOf(options.depth_coding);
+  fingerprint["held_out"] = options.held_out;
+  if (points != nullptr) fingerprint["points_sha256"] = HashOf(*points);
+  return fingerprint.dump();
+}
+
+// Writes all views, each in turn without its pixels into `set` and coarsely into `coarse`.
+void WriteViews(const CameraList& list, const ImportOptions& options, SetWriter& writer,
+                DtrSet& set, DtrSet& coarse, Progress& progress) {
+  const std::vector<std::string> ids = IdsOf(list);
+  const int count = static_cast<int>(list.cameras.size());
+  set.frames.resize(1);
+  set.frames[0].views.resize(list.cameras.size());
+  coarse.frames = set.frames;
+  progress.Stage("import", count);
+  ParallelFor(0, count, options.threads, [&](int i) {
+    progress.ThrowIfInterrupted();
+    const auto at = static_cast<size_t>(i);
+    View view = ImportView(list.cameras[at], ids[at], options);
+    writer.WriteView(view, list.unit);
+    coarse.frames[0].views[at] = CoarseCopy(view);
+    view.image = {};
+    view.mask = {};
+    view.depth = {};
+    set.frames[0].views[at] = std::move(view);
+    progress.Update(i + 1);
+  });
+}
+
+void WriteSet(const CameraList& list, const ImportOptions& options, const std::string& provenance,
+              const SparseScene* points, SetWriter& writer, Progress& progress) {
+  const CameraList near = RecentreWorld(list);
+  DtrSet set, coarse;
+  set.unit = near.unit;
+  set.world_origin = near.world_origin;
+  set.provenance_json = provenance;
+  WriteViews(near, options, writer, set, coarse, progress);
+  std::vector<View>& views = set.frames[0].views;
+  std::vector<SparsePoint> source_points;
+  if (points != nullptr) {
+    const SparseScene scene = Shifted(*points, near.world_origin - list.world_origin);
+    source_points = PointsOfSources(scene, views);
+    writer.WriteSparse(set, scene);
+  }
+  FinishGeometry(coarse, source_points);
+  set.scene_center = coarse.scene_center;
+  set.bounds = coarse.bounds;
+  for (size_t i = 0; i < views.size(); ++i) {
+    views[i].reference_baseline = coarse.frames[0].views[i].reference_baseline;
+  }
+  writer.Finish(set);
+}
+
 }  // namespace
 
 View ImportView(const NamedCamera& named, const std::string& id, const ImportOptions& options) {
@@ -230,54 +288,19 @@ void ImportSet(const CameraList& list, const ImportOptions& options, const fs::p
   if (!force && fs::exists(target)) {  // before any file is hashed
     throw UsageError(target.string() + ": exists; choose another name or give --force");
   }
-  const CameraList near = RecentreWorld(list);
   const nlohmann::json inputs = Inputs(list, options, progress);
-  nlohmann::json fingerprint = inputs;
-  fingerprint["cameras"] = nlohmann::json::parse(FormatCamerasJson(list));
-  fingerprint["depth_coding"] = NameOf(options.depth_coding);
-  fingerprint["held_out"] = options.held_out;
-  if (points != nullptr) fingerprint["points_sha256"] = HashOf(*points);
-  SetWriter writer(target, fingerprint.dump(), force);
-
-  DtrSet set;
-  set.unit = near.unit;
-  set.world_origin = near.world_origin;
-  set.provenance_json = inputs.dump();
-  set.frames.resize(1);
-  std::vector<View>& views = set.frames[0].views;
-  views.resize(near.cameras.size());
-  DtrSet coarse;
-  coarse.frames.resize(1);
-  coarse.frames[0].views.resize(near.cameras.size());
-  const std::vector<std::string> ids = IdsOf(near);
-  const int count = static_cast<int>(views.size());
-  progress.Stage("import", count);
-  ParallelFor(0, count, options.threads, [&](int i) {
-    progress.ThrowIfInterrupted();
-    const auto at = static_cast<size_t>(i);
-    View view = ImportView(near.cameras[at], ids[at], options);
-    writer.WriteView(view, near.unit);
-    coarse.frames[0].views[at] = CoarseCopy(view);
-    view.image = {};
-    view.mask = {};
-    view.depth = {};
-    views[at] = std::move(view);
-    progress.Update(i + 1);
-  });
-
-  std::vector<SparsePoint> source_points;
-  if (points != nullptr) {
-    const SparseScene scene = Shifted(*points, near.world_origin - list.world_origin);
-    source_points = PointsOfSources(scene, views);
-    writer.WriteSparse(set, scene);
+  const std::string fingerprint = Fingerprint(inputs, list, options, points);
+  auto writer = std::make_unique<SetWriter>(target, fingerprint, force);
+  try {
+    WriteSet(list, options, inputs.dump(), points, *writer, progress);
+  } catch (const Error&) {
+    // An import starts anew anyway, and what it left would stand in the way of mended inputs.
+    const fs::path unfinished = writer->folder();
+    writer.reset();
+    std::error_code ignored;
+    fs::remove_all(unfinished, ignored);
+    throw;
   }
-  FinishGeometry(coarse, source_points);
-  set.scene_center = coarse.scene_center;
-  set.bounds = coarse.bounds;
-  for (size_t i = 0; i < views.size(); ++i) {
-    views[i].reference_baseline = coarse.frames[0].views[i].reference_baseline;
-  }
-  writer.Finish(set);
 }
 
 }  // namespace dtr::io

@@ -44,7 +44,7 @@ std::vector<View> ImportViews(const CameraList& list, const ImportOptions& optio
 /// depth, or from `points` where there is none. `points` (world of the list, views = indices into
 /// it) become the set's sparse scene; null: none. Views go through memory a few at a time.
 /// Throws UsageError when `target` exists without `force` or neither depth nor points are given;
-/// Error like ImportView. After an interruption the same call starts anew and finishes.
+/// Error like ImportView. A failure or interruption leaves nothing behind.
 void ImportSet(const CameraList& list, const ImportOptions& options,
                const std::filesystem::path& target, bool force, const SparseScene* points,
                Progress& progress);

@@ -10,7 +10,9 @@
 #include "dtr/base/files.h"
 #include "dtr/io/depth_io.h"
 #include "dtr/io/formats/foreign_depth.h"
+#include "dtr/io/formats/import_views.h"
 #include "dtr/io/image_io.h"
+#include "dtr/io/set_io.h"
 #include "tests/io/formats/residuals.h"
 #include "tests/support/test_data.h"
 
@@ -228,6 +230,26 @@ TEST(ConvertPlaza, AHalfPixelSlipWouldShow) {
   std::cout << fit.samples << " samples, relative " << fit.median_relative << "; half a pixel off "
             << slipped.median_relative << ", read as ray distance " << as_ray.median_relative
             << "\n";
+}
+
+TEST(ConvertLego, TheResultImportsAsASet) {
+  const fs::path source = DataFolder() / "nerf_lego_depth";
+  DTR_REQUIRE_DATA(source);
+  Converted set("lego", source);
+  set.list.cameras.erase(set.list.cameras.begin() + 3, set.list.cameras.end());
+  io::ImportOptions options;
+  options.images_dir = set.out / "images";
+  options.depth_dir = set.out / "depth";
+  SilentProgress progress;
+  io::ImportSet(set.list, options, set.folder / "lego.dtr", false, nullptr, progress);
+  const DtrSet loaded = io::LoadSet(set.folder / "lego.dtr");
+  ASSERT_EQ(loaded.frames.at(0).views.size(), 3u);
+  EXPECT_LT(loaded.scene_center.norm(), 1.0);  // the model stands on the origin, cameras at 4
+  for (const View& view : loaded.frames[0].views) {
+    EXPECT_FALSE(view.mask.empty());
+    EXPECT_GT(view.near_z, 2);
+    EXPECT_LT(view.far_z, 6);
+  }
 }
 
 TEST(ConvertDataset, ImagesAreCopiedByteByByte) {
