@@ -104,7 +104,22 @@ Vector3d RayOfPhotoPixel(const PinholeCamera& camera, const RadialLens& lens, do
   return {distorted.x() * factor, distorted.y() * factor, 1.0};
 }
 
-void Check(const PinholeCamera& camera, const PhotoOptions& options) {
+/// Standard normal for channel c of pixel (x, y): depends on these names only.
+double PixelNoise(std::uint64_t seed, int x, int y, int channel) {
+  Random random(HashOf(seed, static_cast<std::uint64_t>(x), static_cast<std::uint64_t>(y),
+                       static_cast<std::uint64_t>(channel)));
+  return random.Normal();
+}
+
+/// Scene units per pixel at a hit, as area: oblique surfaces have longer, not wider footprints.
+double FootprintAt(const PinholeCamera& camera, const Ray& ray, const Hit& hit) {
+  const double cosine = std::abs(hit.normal.dot(ray.direction)) / ray.direction.norm();
+  return hit.t / camera.fx_px() / std::sqrt(std::max(cosine, kMinCosine));
+}
+
+}  // namespace
+
+void CheckPhotoOptions(const PinholeCamera& camera, const PhotoOptions& options) {
   if (options.supersampling < 1 || options.supersampling > kMaxSupersampling) {
     throw UsageError("supersampling: expected 1 to 16, found " +
                      std::to_string(options.supersampling));
@@ -133,28 +148,13 @@ void Check(const PinholeCamera& camera, const PhotoOptions& options) {
   }
 }
 
-/// Standard normal for channel c of pixel (x, y): depends on these names only.
-double PixelNoise(std::uint64_t seed, int x, int y, int channel) {
-  Random random(HashOf(seed, static_cast<std::uint64_t>(x), static_cast<std::uint64_t>(y),
-                       static_cast<std::uint64_t>(channel)));
-  return random.Normal();
-}
-
-/// Scene units per pixel at a hit, as area: oblique surfaces have longer, not wider footprints.
-double FootprintAt(const PinholeCamera& camera, const Ray& ray, const Hit& hit) {
-  const double cosine = std::abs(hit.normal.dot(ray.direction)) / ray.direction.norm();
-  return hit.t / camera.fx_px() / std::sqrt(std::max(cosine, kMinCosine));
-}
-
-}  // namespace
-
-ImageRgb8 RenderPhoto(const Scene& scene, const PinholeCamera& camera, const Pose& cam_from_world,
-                      const PhotoOptions& options) {
-  Check(camera, options);
+Grid<float> RenderLight(const Scene& scene, const PinholeCamera& camera, const Pose& cam_from_world,
+                        const PhotoOptions& options) {
+  CheckPhotoOptions(camera, options);
   const RayCaster caster(camera, cam_from_world);
   const double monotone = MonotoneRadius(options.lens);
   const int n = options.supersampling;
-  ImageRgb8 photo(camera.width_px(), camera.height_px(), 3);
+  Grid<float> light(camera.width_px(), camera.height_px(), 3);
   ParallelFor(0, camera.height_px(), options.threads, [&](int y) {
     for (int x = 0; x < camera.width_px(); ++x) {
       Vector3d sum = Vector3d::Zero();
@@ -165,9 +165,18 @@ ImageRgb8 RenderPhoto(const Scene& scene, const PinholeCamera& camera, const Pos
         const std::optional<Hit> hit = scene.Intersect(ray);
         if (hit) sum += scene.Radiance(*hit, FootprintAt(camera, ray, *hit));
       }
-      sum *= options.gain / (n * n);
+      for (int c = 0; c < 3; ++c) light(x, y, c) = static_cast<float>(sum[c] / (n * n));
+    }
+  });
+  return light;
+}
+
+ImageRgb8 Develop(const Grid<float>& light, const PhotoOptions& options) {
+  ImageRgb8 photo(light.width(), light.height(), 3);
+  ParallelFor(0, light.height(), options.threads, [&](int y) {
+    for (int x = 0; x < light.width(); ++x) {
       for (int c = 0; c < 3; ++c) {
-        double level = SrgbFromLinear(sum[c]);
+        double level = SrgbFromLinear(options.gain * light(x, y, c));
         if (options.noise_sigma > 0) {
           level += options.noise_sigma * PixelNoise(options.seed, x, y, c);
         }
@@ -176,6 +185,11 @@ ImageRgb8 RenderPhoto(const Scene& scene, const PinholeCamera& camera, const Pos
     }
   });
   return photo;
+}
+
+ImageRgb8 RenderPhoto(const Scene& scene, const PinholeCamera& camera, const Pose& cam_from_world,
+                      const PhotoOptions& options) {
+  return Develop(RenderLight(scene, camera, cam_from_world, options), options);
 }
 
 DepthImage RenderDepth(const Scene& scene, const PinholeCamera& camera, const Pose& cam_from_world,

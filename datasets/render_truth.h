@@ -29,9 +29,21 @@ struct PhotoOptions {
   int threads = 0;         ///< 0: all cores; the picture does not depend on it
 };
 
-/// What `camera`, standing at cam_from_world, photographs. Colours clip at white; sRGB transfer
-/// function of IEC 61966-2-1. Rays that hit nothing are black.
 /// Throws UsageError for options out of range, or a lens that folds over inside the image.
+void CheckPhotoOptions(const PinholeCamera& camera, const PhotoOptions& options);
+
+/// Linear light that reaches each pixel, shape (height, width, 3), before exposure and noise: the
+/// box-filtered mean of n x n radiances. `gain`, `noise_sigma` and `seed` play no part.
+/// Throws as CheckPhotoOptions.
+Grid<float> RenderLight(const Scene& scene, const PinholeCamera& camera, const Pose& cam_from_world,
+                        const PhotoOptions& options);
+
+/// The photo of that light: exposure, clipping at white, the sRGB transfer function of
+/// IEC 61966-2-1, noise, rounding to 8 bits.
+ImageRgb8 Develop(const Grid<float>& light, const PhotoOptions& options);
+
+/// What `camera`, standing at cam_from_world, photographs: RenderLight, then Develop.
+/// Rays that hit nothing are black.
 ImageRgb8 RenderPhoto(const Scene& scene, const PinholeCamera& camera, const Pose& cam_from_world,
                       const PhotoOptions& options);
 

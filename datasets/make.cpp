@@ -1,0 +1,181 @@
+#include "datasets/make.h"
+
+#include <cmath>
+#include <cstdio>
+#include <system_error>
+#include <utility>
+
+#include "datasets/layout.h"
+#include "datasets/render_truth.h"
+#include "datasets/scene.h"
+#include "dtr/base/error.h"
+#include "dtr/base/files.h"
+#include "dtr/base/random.h"
+#include "dtr/io/depth_io.h"
+#include "dtr/io/formats/cameras_json.h"
+#include "dtr/io/image_io.h"
+
+namespace dtr::datasets {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kMaxViews = 10000;  // names have four digits
+constexpr int kMinSidePx = 16, kMaxSidePx = 16384;
+// float32 depth keeps its relative precision far beyond; poses in double need lengths that differ
+// less than this.
+constexpr double kMaxScale = 1e6;
+constexpr double kMaxOffset = 1e9;
+constexpr double kMaxDriftStops = 10;
+constexpr int kMinVisibleOthers = 2;  // DESIGN section 5: "seen in at least 2 other views"
+
+void CheckRange(const char* field, double value, double low, double high) {
+  if (value >= low && value <= high) return;
+  char text[160];
+  std::snprintf(text, sizeof text, "%s: expected %g to %g, found %g", field, low, high, value);
+  throw UsageError(text);
+}
+
+void Check(const DatasetSpec& spec) {
+  CheckRange("views", spec.views, 2, kMaxViews);
+  CheckRange("width", spec.width_px, kMinSidePx, kMaxSidePx);
+  CheckRange("height", spec.height_px, kMinSidePx, kMaxSidePx);
+  CheckRange("focal length (35 mm)", spec.focal_35mm, 8, 400);
+  CheckRange("supersampling", spec.supersampling, 1, 16);
+  CheckRange("noise", spec.noise, 0, 255);
+  CheckRange("exposure drift", spec.exposure_drift, -kMaxDriftStops, kMaxDriftStops);
+  CheckRange("scale", spec.scale, 1 / kMaxScale, kMaxScale);
+  for (int k = 0; k < 3; ++k) {
+    CheckRange("world offset", spec.world_offset[k], -kMaxOffset, kMaxOffset);
+  }
+  CheckRange("JPEG quality", spec.jpeg_quality, 1, 100);
+}
+
+std::string NumberName(int i) {
+  char name[32];
+  std::snprintf(name, sizeof name, "%04d", i);
+  return name;
+}
+
+void CreateFolder(const fs::path& folder) {
+  std::error_code failed;
+  fs::create_directories(folder, failed);
+  if (failed) {
+    throw Error(folder.string() +
+                ": expected a folder that can be made, found: " + failed.message());
+  }
+}
+
+std::string SourceText(const DatasetSpec& spec) {
+  return "# " + spec.scene + ", " + std::to_string(spec.views) +
+         " views, synthetic\n"
+         "Made by `dtr dataset make` (ray cast, analytic surfaces, procedural texture: no "
+         "downloaded asset); the recipe is dataset.json.\n"
+         "- `images/`: photos" +
+         (spec.k1 != 0 || spec.k2 != 0 ? ", with the lens distortion of dataset.json" : "") +
+         ". `cameras.json`: ideal pinhole cameras, exact.\n"
+         "- `depth/`: plane z at pixel centres of the pinhole grid, float32, 0 = nothing hit.\n"
+         "- `masks/`: `_visible` seen by at least 2 other views (exact), `_texture` standard "
+         "deviation of at least 4 levels in 9x9.\n";
+}
+
+/// One view's files. Everything is computed in the scene's own frame.
+void WriteView(const DatasetSpec& spec, const Scene& scene, const std::vector<Pose>& poses, int i,
+               const fs::path& folder, int threads) {
+  const Pose& pose = poses[static_cast<size_t>(i)];
+  const PinholeCamera camera = MakeCamera(spec.width_px, spec.height_px, spec.focal_35mm);
+  const std::string name = NumberName(i);
+
+  PhotoOptions options;
+  options.supersampling = spec.supersampling;
+  options.noise_sigma = spec.noise;
+  options.gain = ExposureGain(spec.exposure_drift, i, spec.views);
+  options.lens = {spec.k1, spec.k2};
+  options.seed = HashOf(spec.seed, static_cast<std::uint64_t>(i));
+  options.threads = threads;
+  const Grid<float> light = RenderLight(scene, camera, pose, options);
+  io::ExifFocal exif;
+  exif.focal_mm = spec.focal_35mm;
+  exif.focal_35mm = spec.focal_35mm;
+  exif.make = "dtr";
+  exif.model = "ray caster";
+  io::WriteJpegWithExif(folder / "images" / (name + ".jpg"), Develop(light, options),
+                        spec.jpeg_quality, exif);
+
+  io::WriteExr(folder / "depth" / (name + ".exr"),
+               RenderDepth(scene, camera, pose, threads, spec.scale).grid());
+
+  std::vector<Pose> others = poses;
+  others.erase(others.begin() + i);
+  io::WriteMask(folder / "masks" / (name + "_visible.png"),
+                VisibilityMask(scene, camera, pose, others, kMinVisibleOthers, threads));
+  // Noise is no texture, and truth lies on the ideal grid: the mask is made without either.
+  PhotoOptions ideal = options;
+  ideal.noise_sigma = 0;
+  ideal.lens = {};
+  const ImageRgb8 clean =
+      options.lens.IsIdeal() ? Develop(light, ideal) : RenderPhoto(scene, camera, pose, ideal);
+  io::WriteMask(folder / "masks" / (name + "_texture.png"), TextureMask(clean));
+}
+
+}  // namespace
+
+double ExposureGain(double drift_stops, int i, int views) {
+  return std::exp2(drift_stops * (static_cast<double>(i) / (views - 1) - 0.5));
+}
+
+Pose WrittenPose(const Pose& cam_from_scene, double scale, const Eigen::Vector3d& world_offset) {
+  // scale * (R p + t) = R (scale p + offset) + (scale t - R offset).
+  return {cam_from_scene.rotation,
+          scale * cam_from_scene.translation - cam_from_scene.rotation * world_offset};
+}
+
+void MakeDataset(const DatasetSpec& given, const fs::path& out_folder, int threads,
+                 Progress& progress) {
+  DatasetSpec spec = given;
+  Check(spec);
+  if (fs::exists(out_folder)) {
+    throw UsageError(out_folder.string() +
+                     ": expected a folder that does not exist yet; remove "
+                     "it or choose another name");
+  }
+  const Scene scene = MakeScene(spec.scene, spec.seed);
+  if (spec.layout.empty()) spec.layout = scene.framing().layouts.front();
+  const std::vector<Pose> poses = MakeLayout(scene, spec.layout, spec.views);
+
+  // A lens that folds over is refused here, before any file is written.
+  PhotoOptions probe;
+  probe.lens = {spec.k1, spec.k2};
+  CheckPhotoOptions(MakeCamera(spec.width_px, spec.height_px, spec.focal_35mm), probe);
+
+  const fs::path partial = out_folder.string() + ".partial";
+  std::error_code failed;
+  fs::remove_all(partial, failed);
+  for (const char* part : {"images", "depth", "masks"}) CreateFolder(partial / part);
+
+  progress.Stage("rendering photos and truth", spec.views);
+  io::CameraList list;
+  list.unit = spec.scale == 1 ? LengthUnit::kMetre : LengthUnit::kArbitrary;
+  for (int i = 0; i < spec.views; ++i) {
+    progress.ThrowIfInterrupted();
+    WriteView(spec, scene, poses, i, partial, threads);
+    io::NamedCamera camera;
+    camera.name = NumberName(i) + ".jpg";
+    camera.depth_file = NumberName(i) + ".exr";
+    camera.camera = MakeCamera(spec.width_px, spec.height_px, spec.focal_35mm);
+    camera.cam_from_world =
+        WrittenPose(poses[static_cast<size_t>(i)], spec.scale, spec.world_offset);
+    list.cameras.push_back(std::move(camera));
+    progress.Update(i + 1);
+  }
+  io::WriteCamerasJson(partial / "cameras.json", list);
+  WriteFileAtomically(partial / "dataset.json", FormatSpecJson(spec));
+  WriteFileAtomically(partial / "SOURCE.md", SourceText(spec));
+  fs::rename(partial, out_folder, failed);
+  if (failed) {
+    throw Error(out_folder.string() + ": expected that " + partial.string() +
+                " can be renamed to it, found: " + failed.message());
+  }
+}
+
+}  // namespace dtr::datasets

@@ -1,0 +1,59 @@
+// datasets/make.h -- synthetic photo collections on disk, with truth.
+#pragma once
+#include <Eigen/Core>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "dtr/base/progress.h"
+#include "dtr/types/pose.h"
+
+namespace dtr::datasets {
+
+/// Everything that decides the bytes of a collection.
+struct DatasetSpec {
+  std::string scene = "courtyard";
+  std::string layout;  ///< empty: the scene's default
+  int views = 16;
+  int width_px = 960, height_px = 640;
+  double focal_35mm = 28;     ///< for a frame 36 mm wide: fx = fy = focal_35mm / 36 * width
+  int supersampling = 3;      ///< n x n rays per pixel of a photo
+  double noise = 0;           ///< std. deviation, 8-bit levels
+  double exposure_drift = 0;  ///< stops from the first photo to the last; the middle has gain 1
+  double k1 = 0, k2 = 0;      ///< lens of the photos (datasets/render_truth.h, RadialLens)
+  std::uint64_t seed = 1;     ///< of textures and noise
+  /// The written world: p_written = scale * p_scene + world_offset. Photos and masks are rendered
+  /// in the scene's own frame and do not depend on either, to the byte; written poses and depths
+  /// are transformed.
+  Eigen::Vector3d world_offset = Eigen::Vector3d::Zero();
+  double scale = 1;
+  int jpeg_quality = 95;
+};
+
+/// Linear exposure factor of photo `i` of `views`: 2^(drift * (i / (views - 1) - 1/2)).
+double ExposureGain(double drift_stops, int i, int views);
+
+/// cam_from_world of the written world (see DatasetSpec) from that of the scene. Lengths in the
+/// camera frame are `scale` times the scene's.
+Pose WrittenPose(const Pose& cam_from_scene, double scale, const Eigen::Vector3d& world_offset);
+
+/// Renders the collection into `out_folder`:
+///   images/NNNN.jpg          photos, 4:4:4, EXIF focal length; distorted if the spec has a lens
+///   cameras.json             the ideal pinhole cameras (docs/CONVENTIONS.md)
+///   depth/NNNN.exr           plane z at pixel centres of the ideal pinhole grid, float32
+///   masks/NNNN_visible.png   255: the surface point is seen by at least 2 other views
+///   masks/NNNN_texture.png   255: textured, judged on the ideal grid and before noise
+///   dataset.json, SOURCE.md  how it was made
+/// The folder appears when all is done, under its name with ".partial" before.
+/// Throws UsageError when it exists or the spec is out of range (naming the field), Error when
+/// something cannot be written.
+void MakeDataset(const DatasetSpec& spec, const std::filesystem::path& out_folder, int threads,
+                 Progress& progress);
+
+/// dataset.json and back: MakeDataset with what was read gives the same bytes again.
+/// Reading throws Error naming the field that is missing or wrong.
+std::string FormatSpecJson(const DatasetSpec& spec);
+DatasetSpec ParseSpecJson(const std::string& text, const std::string& source);
+
+}  // namespace dtr::datasets

@@ -1,0 +1,102 @@
+// datasets/spec_json.cpp -- dataset.json, the recipe of a collection.
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "datasets/make.h"
+#include "dtr/base/error.h"
+
+namespace dtr::datasets {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// Grows when the same spec begins to give other pictures.
+constexpr int kGeneratorVersion = 1;
+
+/// The member `key` as T; throws Error naming it when it is absent or of another kind.
+template <typename T>
+T FieldOf(const Json& object, const char* key, bool (Json::*is)() const noexcept,
+          const char* expected, const std::string& source) {
+  const auto found = object.find(key);
+  if (found == object.end() || !((*found).*is)()) {
+    throw Error(source + ": " + key + ": expected " + expected + ", found " +
+                (found == object.end() ? "nothing" : found->dump()));
+  }
+  return found->get<T>();
+}
+
+double NumberOf(const Json& object, const char* key, const std::string& source) {
+  return FieldOf<double>(object, key, &Json::is_number, "a number", source);
+}
+
+int IntOf(const Json& object, const char* key, const std::string& source) {
+  const auto value =
+      FieldOf<std::int64_t>(object, key, &Json::is_number_integer, "a whole number", source);
+  if (value < 0 || value > 1'000'000) {
+    throw Error(source + ": " + key + ": expected 0 to 1000000, found " + std::to_string(value));
+  }
+  return static_cast<int>(value);
+}
+
+}  // namespace
+
+std::string FormatSpecJson(const DatasetSpec& spec) {
+  Json json;
+  json["generator"] = "dtr dataset make";
+  json["generator_version"] = kGeneratorVersion;
+  json["scene"] = spec.scene;
+  json["layout"] = spec.layout;
+  json["views"] = spec.views;
+  json["width_px"] = spec.width_px;
+  json["height_px"] = spec.height_px;
+  json["focal_35mm"] = spec.focal_35mm;
+  json["supersampling"] = spec.supersampling;
+  json["noise_levels"] = spec.noise;
+  json["exposure_drift_stops"] = spec.exposure_drift;
+  json["lens"] = {{"model", "RADIAL"}, {"k1", spec.k1}, {"k2", spec.k2}};
+  json["seed"] = spec.seed;
+  json["world_offset"] = {spec.world_offset.x(), spec.world_offset.y(), spec.world_offset.z()};
+  json["scale"] = spec.scale;
+  json["jpeg_quality"] = spec.jpeg_quality;
+  return json.dump(2) + "\n";
+}
+
+DatasetSpec ParseSpecJson(const std::string& text, const std::string& source) {
+  const Json json = Json::parse(text, nullptr, false);
+  if (!json.is_object()) {
+    throw Error(source + ": expected a JSON object as `dtr dataset make` writes it, found " +
+                (json.is_discarded() ? "broken JSON" : json.type_name()));
+  }
+  const int version = IntOf(json, "generator_version", source);
+  if (version != kGeneratorVersion) {
+    throw Error(source + ": generator_version: expected " + std::to_string(kGeneratorVersion) +
+                ", found " + std::to_string(version) +
+                "; the same pictures need the version of dtr that made them");
+  }
+  DatasetSpec spec;
+  spec.scene = FieldOf<std::string>(json, "scene", &Json::is_string, "a name", source);
+  spec.layout = FieldOf<std::string>(json, "layout", &Json::is_string, "a name", source);
+  spec.views = IntOf(json, "views", source);
+  spec.width_px = IntOf(json, "width_px", source);
+  spec.height_px = IntOf(json, "height_px", source);
+  spec.focal_35mm = NumberOf(json, "focal_35mm", source);
+  spec.supersampling = IntOf(json, "supersampling", source);
+  spec.noise = NumberOf(json, "noise_levels", source);
+  spec.exposure_drift = NumberOf(json, "exposure_drift_stops", source);
+  const Json lens = FieldOf<Json>(json, "lens", &Json::is_object, "an object", source);
+  spec.k1 = NumberOf(lens, "k1", source);
+  spec.k2 = NumberOf(lens, "k2", source);
+  spec.seed = FieldOf<std::uint64_t>(json, "seed", &Json::is_number_unsigned,
+                                     "a whole number, 0 or more", source);
+  const Json offset = FieldOf<Json>(json, "world_offset", &Json::is_array, "three numbers", source);
+  if (offset.size() != 3 || !offset[0].is_number() || !offset[1].is_number() ||
+      !offset[2].is_number()) {
+    throw Error(source + ": world_offset: expected three numbers, found " + offset.dump());
+  }
+  for (int k = 0; k < 3; ++k) spec.world_offset[k] = offset[static_cast<size_t>(k)].get<double>();
+  spec.scale = NumberOf(json, "scale", source);
+  spec.jpeg_quality = IntOf(json, "jpeg_quality", source);
+  return spec;
+}
+
+}  // namespace dtr::datasets
