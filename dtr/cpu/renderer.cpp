@@ -72,6 +72,9 @@ double CoverageShare(const Mask& coverage) {
 RenderResult Render(const RenderScene& scene, const PinholeCamera& novel,
                     const Pose& novel_from_world, const RenderOptions& options) {
   CheckRenderOptions(options);
+  if (options.method != RenderMethod::kTwoPass) {
+    throw UsageError("--method: expected two-pass with --renderer cpu, found deferred");
+  }
   CheckNovel(novel, novel_from_world);
   RenderResult result = EmptyResult(novel);
   const ViewSelection selection = SelectViews(scene, novel_from_world, options);

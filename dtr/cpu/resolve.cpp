@@ -63,6 +63,8 @@ class RowResolver {
           static_cast<size_t>(x);
       Fragment fragment{&view, view.layer->inverse_depth[index]};
       if (!(fragment.inverse_depth > 0)) continue;
+      // SPEC 6.1: a depth that float32 cannot hold would be covered and have no depth.
+      if (DepthImage::IsHole(static_cast<float>(1 / fragment.inverse_depth))) continue;
       fragment.point_in_novel = ray / fragment.inverse_depth;
       if (settings_.per_pixel_rule) {
         fragment.angle_rad = AngleAtPoint(fragment);

@@ -11,8 +11,10 @@
 namespace dtr {
 namespace {
 
-// Cells this much nearer than the farthest are foreground; a share, so that scale does not matter.
-constexpr double kForegroundShare = 1.1;
+// A cell counts (farthest / own inverse depth)^4: a quarter nearer halves its say, twice as near
+// leaves a sixteenth, at any scale; a hard limit would draw the blocks of the pyramid into slanted
+// ground.
+constexpr double kBackgroundPower = 4;
 
 /// A cell of the pyramid: colour (linear), inverse depth and how much of it is known.
 struct Cell {
@@ -36,8 +38,9 @@ Cell BackgroundMean(const std::array<const Cell*, N>& cells, const std::array<do
   Cell mean;
   if (!any) return mean;
   for (size_t i = 0; i < N; ++i) {
-    if (cells[i] == nullptr || cells[i]->inverse_depth > kForegroundShare * farthest) continue;
-    const double weight = cells[i]->weight * taps[i];
+    if (cells[i] == nullptr || !(cells[i]->weight > 0)) continue;
+    const double nearness = std::pow(farthest / cells[i]->inverse_depth, kBackgroundPower);
+    const double weight = cells[i]->weight * taps[i] * nearness;
     mean.colour += weight * cells[i]->colour;
     mean.inverse_depth += weight * cells[i]->inverse_depth;
     mean.weight += weight;

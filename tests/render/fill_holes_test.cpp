@@ -1,0 +1,96 @@
+#include "dtr/render/fill_holes.h"
+
+#include <gtest/gtest.h>
+
+#include "dtr/base/random.h"
+#include "dtr/render/colour.h"
+
+namespace dtr {
+namespace {
+
+RenderResult Blank(int width, int height) {
+  RenderResult result;
+  result.image = ImageRgb8(width, height, 3);
+  result.depth = DepthImage(width, height);
+  result.coverage = Mask(width, height);
+  result.view_count = Grid<std::uint8_t>(width, height);
+  return result;
+}
+
+void See(RenderResult& result, int x, int y, std::uint8_t level, float depth) {
+  for (int c = 0; c < 3; ++c) result.image(x, y, c) = level;
+  result.coverage(x, y) = 255;
+  result.depth(x, y) = depth;
+}
+
+TEST(FillHoles, NeverChangesWhatWasSeen) {
+  Random random(3);
+  for (const auto& [width, height] : {std::pair{1, 1}, {1, 9}, {7, 1}, {33, 20}, {64, 64}}) {
+    RenderResult result = Blank(width, height);
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        if (random.Index(3) != 0) continue;
+        See(result, x, y, static_cast<std::uint8_t>(random.Index(256)),
+            static_cast<float>(random.Uniform(1, 100)));
+      }
+    }
+    result.coverage_share = 0.25;
+    const RenderResult before = result;
+    FillHoles(result);
+    EXPECT_EQ(result.coverage, before.coverage);
+    EXPECT_EQ(result.depth, before.depth);
+    EXPECT_EQ(result.view_count, before.view_count);
+    EXPECT_EQ(result.coverage_share, 0.25);
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        if (before.coverage(x, y) == 0) continue;
+        for (int c = 0; c < 3; ++c) EXPECT_EQ(result.image(x, y, c), before.image(x, y, c));
+      }
+    }
+    RenderResult again = before;
+    FillHoles(again);
+    EXPECT_EQ(again.image, result.image);
+  }
+}
+
+TEST(FillHoles, OneColourStaysThatColour) {
+  RenderResult result = Blank(40, 30);
+  See(result, 3, 4, 77, 5);
+  See(result, 30, 20, 77, 50);
+  FillHoles(result);
+  for (const std::uint8_t level : result.image.data()) EXPECT_EQ(level, 77);
+}
+
+TEST(FillHoles, TakesTheBackgroundAtADisocclusion) {
+  // Foreground (white, near) left, background (black level 20, far) right, a hole between them.
+  RenderResult result = Blank(48, 16);
+  for (int y = 0; y < 16; ++y) {
+    for (int x = 0; x < 20; ++x) See(result, x, y, 255, 2);
+    for (int x = 28; x < 48; ++x) See(result, x, y, 20, 20);
+  }
+  FillHoles(result);
+  for (int y = 0; y < 16; ++y) {
+    for (int x = 20; x < 28; ++x) EXPECT_LE(result.image(x, y, 0), 30) << x << " " << y;
+  }
+}
+
+TEST(FillHoles, NothingSeenStaysBlack) {
+  RenderResult result = Blank(5, 4);
+  FillHoles(result);
+  for (const std::uint8_t level : result.image.data()) EXPECT_EQ(level, 0);
+}
+
+TEST(Colour, EightBitValuesSurviveLinearLight) {
+  for (int v = 0; v < 256; ++v) {
+    EXPECT_EQ(Srgb8FromLinear(LinearFromSrgb8()[static_cast<size_t>(v)]), v);
+    EXPECT_NEAR(SrgbFromLinear(LinearFromSrgb(v / 255.0)), v / 255.0,
+                1e-7);  // the curve's own kink
+  }
+  EXPECT_NEAR(LinearFromSrgb(0.5), 0.21404114048223255, 1e-15);
+  EXPECT_EQ(Srgb8FromLinear(std::nan("")), 0);
+  EXPECT_EQ(Srgb8FromLinear(-1), 0);
+  EXPECT_EQ(Srgb8FromLinear(7), 255);
+}
+
+}  // namespace
+}  // namespace dtr
