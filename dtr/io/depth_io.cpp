@@ -94,10 +94,10 @@ DepthImage FromFloats(Grid<float> values) {
   return depth;
 }
 
-// Keeps 12 significant bits, ties to even; a carry into the exponent is right by design of IEEE
+// Keeps 8 significant bits, ties to even; a carry into the exponent is right by design of IEEE
 // 754. Numbers below float's normal range keep fewer, which no image measures.
-float KeepTwelveBits(float value) {
-  constexpr std::uint32_t kDropped = 12;  // of 23 stored mantissa bits
+float KeepEightBits(float value) {
+  constexpr std::uint32_t kDropped = 16;  // of 23 stored mantissa bits
   const std::uint32_t bits = std::bit_cast<std::uint32_t>(value);
   const std::uint32_t odd = (bits >> kDropped) & 1u;
   return std::bit_cast<float>((bits + (1u << (kDropped - 1)) - 1u + odd) &
@@ -194,7 +194,7 @@ DepthImage ReadDepth(const fs::path& file, const DepthFormat& format, int width_
 void WriteSigma(const fs::path& file, const Grid<float>& inverse_depth_sigma) {
   ExpectSigma(file, inverse_depth_sigma);
   Grid<float> rounded = inverse_depth_sigma;
-  for (float& value : rounded.data()) value = KeepTwelveBits(value);
+  for (float& value : rounded.data()) value = KeepEightBits(value);
   WriteExr(file, rounded, false);
 }
 

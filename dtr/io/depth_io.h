@@ -53,7 +53,7 @@ Grid<std::uint16_t> EncodePng16Millimetre(const DepthImage& depth_m);
 DepthImage DecodePng16Millimetre(const Grid<std::uint16_t>& codes);
 
 /// The depth that reading back would give: `depth` rounded to what the coding can hold.
-/// Throws Error where WriteDepth would.
+/// Throws Error where a depth does not fit the coding.
 DepthImage RoundToCoding(const DepthImage& depth, const DepthFormat& format);
 
 /// Smallest and largest depth of a map, for a view that has no range yet. A map of one depth gets
@@ -73,8 +73,9 @@ DepthImage ReadDepth(const std::filesystem::path& file, const DepthFormat& forma
                      int height_px);
 
 /// Standard deviation of inverse depth, 1/scene unit, one number per depth pixel, 0 where depth is
-/// a hole: float32 EXR whose numbers keep 12 significant bits (relative error at most 2^-12), for
-/// a third of the size. Throws Error for negative or not finite values.
+/// a hole: float32 EXR whose numbers keep 8 significant bits (relative error at most 2^-8; a
+/// standard deviation is never known better), which halves the file. Throws Error for negative or
+/// not finite values.
 void WriteSigma(const std::filesystem::path& file, const Grid<float>& inverse_depth_sigma);
 Grid<float> ReadSigma(const std::filesystem::path& file, int width_px, int height_px);
 

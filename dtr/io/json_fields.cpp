@@ -1,5 +1,6 @@
 #include "dtr/io/json_fields.h"
 
+#include <algorithm>
 #include <climits>
 #include <cmath>
 
@@ -16,6 +17,33 @@ std::string Shown(const Json* value) {
   std::string text = value->dump(-1, ' ', true, Json::error_handler_t::replace);
   if (text.size() > kShownCharacters) text = text.substr(0, kShownCharacters) + "...";
   return text;
+}
+
+bool IsFlatArray(const Json& value) {
+  return value.is_array() && std::none_of(value.begin(), value.end(),
+                                          [](const Json& item) { return item.is_structured(); });
+}
+
+// Like dump(2), but arrays of plain values stay on one line: a position is one thing to read.
+void AppendPretty(const Json& value, const std::string& indent, std::string& out) {
+  if (!value.is_structured() || value.empty()) {
+    out += value.dump();
+    return;
+  }
+  const bool flat = IsFlatArray(value);
+  const std::string deeper = flat ? "" : "\n" + indent + "  ";
+  const char open = value.is_array() ? '[' : '{', close = value.is_array() ? ']' : '}';
+  const char* separator = "";
+  out += open;
+  for (auto item = value.begin(); item != value.end(); ++item) {
+    out += separator;
+    out += deeper;
+    if (value.is_object()) out += Json(item.key()).dump() + ": ";
+    AppendPretty(*item, indent + "  ", out);
+    separator = flat ? ", " : ",";
+  }
+  if (!flat) out += "\n" + indent;
+  out += close;
 }
 
 }  // namespace
@@ -48,7 +76,9 @@ Json ParseJson(const std::string& text, const std::string& where) {
 
 std::string PrettyJson(const Json& value, const std::string& where) {
   try {
-    return value.dump(2) + "\n";
+    std::string text;
+    AppendPretty(value, "", text);
+    return text + "\n";
   } catch (const Json::exception& error) {
     throw Error(where + ": expected text in UTF-8: " + error.what() + "; rename the file it names");
   }

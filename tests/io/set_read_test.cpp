@@ -93,7 +93,7 @@ TEST_F(EditedSet, NumbersThatAreNoneAreRefused) {
 }
 
 TEST_F(EditedSet, PosesMustBeRotations) {
-  EXPECT_THAT(ErrorAfter("\"rotation_wxyz\": [\n", "0.", "3."),
+  EXPECT_THAT(ErrorAfter("\"rotation_wxyz\": [", "0.", "3."),
               HasSubstr("cam_from_world.rotation_wxyz: expected a quaternion of length 1"));
   EXPECT_THAT(ErrorAfter("", "\"rotation_wxyz\": [", "\"rotation_wxyz\": [1, "),
               HasSubstr("expected 4 numbers"));
@@ -112,7 +112,7 @@ TEST_F(EditedSet, FieldsOutOfRangeAreRefused) {
               HasSubstr("reference_baseline"));
   EXPECT_THAT(ErrorAfter("\"gain_linear_rgb\"", "1.01", "0"), HasSubstr("gain_linear_rgb"));
   EXPECT_THAT(ErrorAfter("", "\"held_out\",", "\"kept\","), HasSubstr("role: expected"));
-  EXPECT_THAT(ErrorAfter("", "\"min\": [\n", "\"max\": [\n"), HasSubstr("twice"));
+  EXPECT_THAT(ErrorAfter("", "\"min\": [", "\"max\": ["), HasSubstr("twice"));
 }
 
 TEST_F(EditedSet, IdsMustBeUniqueAndSafe) {
