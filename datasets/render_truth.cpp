@@ -156,14 +156,17 @@ Grid<float> RenderLight(const Scene& scene, const PinholeCamera& camera, const P
   const int n = options.supersampling;
   Grid<float> light(camera.width_px(), camera.height_px(), 3);
   ParallelFor(0, camera.height_px(), options.threads, [&](int y) {
+    int last = -1;
     for (int x = 0; x < camera.width_px(); ++x) {
       Vector3d sum = Vector3d::Zero();
       for (int k = 0; k < n * n; ++k) {
         const Vector2d pixel(x + (k % n + 0.5) / n, y + (k / n + 0.5) / n);
         const Ray ray =
             caster.ThroughDirection(RayOfPhotoPixel(camera, options.lens, monotone, pixel));
-        const std::optional<Hit> hit = scene.Intersect(ray);
-        if (hit) sum += scene.Radiance(*hit, FootprintAt(camera, ray, *hit));
+        const std::optional<Hit> hit = scene.Intersect(ray, kNoHit, last);
+        if (!hit) continue;
+        last = hit->primitive;
+        sum += scene.Radiance(*hit, FootprintAt(camera, ray, *hit));
       }
       for (int c = 0; c < 3; ++c) light(x, y, c) = static_cast<float>(sum[c] / (n * n));
     }

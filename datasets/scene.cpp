@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <stdexcept>
 #include <utility>
 
@@ -16,7 +15,7 @@ using Eigen::Vector3d;
 constexpr double kBoxMargin = 1e-7;
 // Shadow rays start this far off the surface: above rounding at 100 m (1e-14), far below a texel.
 constexpr double kShadowStart = 1e-6;
-constexpr int kLeafSize = 3;
+constexpr int kLeafSize = 2;
 // A primitive longer than this share of the scene's diagonal would spoil every box it is in.
 constexpr double kLargeShare = 0.25;
 
@@ -31,6 +30,51 @@ double EnterBox(const Eigen::AlignedBox3d& box, const Vector3d& origin, const Ve
     leave = std::min(leave, std::max(a, b));
   }
   return enter <= leave ? enter : kNoHit;
+}
+
+double HalfArea(const Eigen::AlignedBox3d& box) {
+  const Vector3d d = box.sizes();
+  return d.x() * d.y() + d.y() * d.z() + d.z() * d.x();
+}
+
+/// Orders primitives by the centres of their boxes along an axis; ties by index.
+template <typename BoundsOf>
+void SortAlong(int axis, std::vector<int>::iterator begin, std::vector<int>::iterator end,
+               const BoundsOf& bounds_of) {
+  std::sort(begin, end, [&](int a, int b) {
+    const double ca = bounds_of(a).center()[axis], cb = bounds_of(b).center()[axis];
+    return ca != cb ? ca < cb : a < b;
+  });
+}
+
+/// Where to cut a sorted run of primitives in two.
+struct Split {
+  int axis = 0;
+  int left = 0;          ///< primitives of the left part
+  double cost = kNoHit;  ///< sum over both parts of count times area
+};
+
+/// The cut with the smallest expected number of tests: the surface area heuristic (MacDonald and
+/// Booth 1990), over all cuts along all axes.
+template <typename BoundsOf>
+Split BestSplit(std::vector<int> run, const BoundsOf& bounds_of) {
+  Split best;
+  const size_t count = run.size();
+  std::vector<double> left_cost(count);
+  for (int axis = 0; axis < 3; ++axis) {
+    SortAlong(axis, run.begin(), run.end(), bounds_of);
+    Eigen::AlignedBox3d left, right;
+    for (size_t k = 0; k + 1 < count; ++k) {
+      left.extend(bounds_of(run[k]));
+      left_cost[k + 1] = static_cast<double>(k + 1) * HalfArea(left);
+    }
+    for (size_t k = count - 1; k > 0; --k) {
+      right.extend(bounds_of(run[k]));
+      const double cost = left_cost[k] + static_cast<double>(count - k) * HalfArea(right);
+      if (cost < best.cost) best = {axis, static_cast<int>(k), cost};
+    }
+  }
+  return best;
 }
 
 }  // namespace
@@ -60,35 +104,27 @@ Scene::Scene(std::string name, std::vector<Primitive> primitives, std::vector<Ma
 }
 
 void Scene::Build(int node, int first, int count) {
-  Eigen::AlignedBox3d box, centers;
-  for (int k = first; k < first + count; ++k) {
-    const Eigen::AlignedBox3d bounds =
-        primitives_[static_cast<size_t>(order_[static_cast<size_t>(k)])].Bounds();
-    box.extend(bounds);
-    centers.extend(bounds.center());
-  }
+  const auto bounds_of = [&](int index) {
+    return primitives_[static_cast<size_t>(index)].Bounds();
+  };
+  Eigen::AlignedBox3d box;
+  for (int k = first; k < first + count; ++k) box.extend(bounds_of(order_[static_cast<size_t>(k)]));
   box.min().array() -= kBoxMargin;
   box.max().array() += kBoxMargin;
   nodes_[static_cast<size_t>(node)].box = box;
-  if (count <= kLeafSize) {
+  const auto begin = order_.begin() + first;
+  const Split split = BestSplit({begin, begin + count}, bounds_of);
+  if (count <= kLeafSize || split.cost >= count * HalfArea(box)) {
     nodes_[static_cast<size_t>(node)].first = first;
     nodes_[static_cast<size_t>(node)].count = count;
     return;
   }
-  int axis = 0;
-  centers.sizes().maxCoeff(&axis);
-  const int half = count / 2;
-  const auto begin = order_.begin() + first;
-  std::nth_element(begin, begin + half, begin + count, [&](int a, int b) {
-    const double ca = primitives_[static_cast<size_t>(a)].Bounds().center()[axis];
-    const double cb = primitives_[static_cast<size_t>(b)].Bounds().center()[axis];
-    return ca != cb ? ca < cb : a < b;
-  });
+  SortAlong(split.axis, begin, begin + count, bounds_of);
   const int left = static_cast<int>(nodes_.size());
   nodes_.resize(nodes_.size() + 2);
   nodes_[static_cast<size_t>(node)].first = left;
-  Build(left, first, half);
-  Build(left + 1, first + half, count - half);
+  Build(left, first, split.left);
+  Build(left + 1, first + split.left, count - split.left);
 }
 
 template <typename Visit>
@@ -122,10 +158,18 @@ void Scene::Traverse(const Ray& ray, double limit, const Visit& visit) const {
   }
 }
 
-std::optional<Hit> Scene::Intersect(const Ray& ray, double t_max) const {
+std::optional<Hit> Scene::Intersect(const Ray& ray, double t_max, int guess) const {
   double nearest = t_max;
   int found = -1;
-  Traverse(ray, t_max, [&](int index, double limit) {
+  if (guess >= 0) {
+    // The limit this gives spares most boxes; the surface itself is then not found again.
+    const double t = primitives_[static_cast<size_t>(guess)].Intersect(ray, 0, t_max);
+    if (t < t_max) {
+      nearest = t;
+      found = guess;
+    }
+  }
+  Traverse(ray, nearest, [&](int index, double limit) {
     const double t = primitives_[static_cast<size_t>(index)].Intersect(ray, 0, limit);
     if (t < limit) {
       nearest = t;

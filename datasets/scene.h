@@ -54,8 +54,9 @@ class Scene {
   const std::vector<Primitive>& primitives() const { return primitives_; }
 
   /// The nearest surface with t in (0, t_max), or empty. Exact up to double rounding; with a
-  /// direction of z = 1 in a camera's frame, Hit::t is the z-depth.
-  std::optional<Hit> Intersect(const Ray& ray, double t_max = kNoHit) const;
+  /// direction of z = 1 in a camera's frame, Hit::t is the z-depth. `guess`: the primitive probably
+  /// hit (that of a neighbouring ray), which saves time and changes nothing; -1 for none.
+  std::optional<Hit> Intersect(const Ray& ray, double t_max = kNoHit, int guess = -1) const;
 
   /// True when a surface lies at t in (t_min, t_max).
   bool IsBlocked(const Ray& ray, double t_min, double t_max) const;

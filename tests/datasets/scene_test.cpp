@@ -120,6 +120,8 @@ TEST(Scene, TreeFindsWhatTestingEveryPrimitiveFinds) {
     const auto hit = scene.Intersect(ray);
     ASSERT_TRUE(hit);
     ASSERT_EQ(hit->t, nearest);
+    const int guess = random.Index(static_cast<int>(scene.primitives().size()));
+    ASSERT_EQ(scene.Intersect(ray, kNoHit, guess)->t, nearest);
     ASSERT_TRUE(scene.IsBlocked(ray, 0, nearest * 1.001));
     ASSERT_FALSE(scene.IsBlocked(ray, 0, nearest));
   }
