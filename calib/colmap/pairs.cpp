@@ -24,7 +24,7 @@ struct Best {
   bool distinct = false;
 };
 
-Best BestOfRow(const Eigen::Ref<const Eigen::RowVectorXf>& dots) {
+Best BestOfRow(const Eigen::RowVectorXf& dots) {
   Best best;
   float first = -2, second = -2;
   for (Eigen::Index j = 0; j < dots.size(); ++j) {
@@ -96,15 +96,15 @@ SmallFeatures SmallFeaturesOf(const ImageRgb8& image) {
 
 int Resemblance(const SmallFeatures& a, const SmallFeatures& b) {
   if (a.rows() == 0 || b.rows() == 0) return 0;
-  const Eigen::MatrixXf dots_ba = b * a.transpose();  // column i: feature i of a against all of b
-  std::vector<Eigen::Index> best_for_b(static_cast<size_t>(b.rows()));
-  for (Eigen::Index j = 0; j < b.rows(); ++j) {
-    dots_ba.row(j).maxCoeff(&best_for_b[static_cast<size_t>(j)]);
-  }
+  const Eigen::MatrixXf dots = b * a.transpose();  // column i: feature i of a against all of b
+  std::vector<Best> best_for_b;
+  for (Eigen::Index j = 0; j < b.rows(); ++j) best_for_b.push_back(BestOfRow(dots.row(j)));
   int shared = 0;
   for (Eigen::Index i = 0; i < a.rows(); ++i) {
-    const Best best = BestOfRow(dots_ba.col(i).transpose());
-    if (best.distinct && best_for_b[static_cast<size_t>(best.index)] == i) ++shared;
+    const Best best = BestOfRow(dots.col(i).transpose());
+    if (!best.distinct) continue;
+    const Best& back = best_for_b[static_cast<size_t>(best.index)];
+    if (back.distinct && back.index == i) ++shared;
   }
   return shared;
 }

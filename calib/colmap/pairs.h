@@ -24,7 +24,8 @@ inline constexpr int kNeighbours = 20;
 /// Zisserman, CVPR 2012). Deterministic.
 SmallFeatures SmallFeaturesOf(const ImageRgb8& image);
 
-/// Number of mutual nearest neighbours that pass the ratio test: how much two photos share.
+/// Number of mutual nearest neighbours that pass the ratio test both ways: how much two photos
+/// share. Symmetric.
 int Resemblance(const SmallFeatures& a, const SmallFeatures& b);
 
 /// Pairs (a < b, sorted) worth matching in full: every photo with its kNeighbours most resembling

@@ -28,6 +28,16 @@ std::vector<std::string> LinesOf(const std::vector<std::string>& argv) {
   return lines;
 }
 
+bool LooksLikeAnError(const std::string& line) {
+  // glog's fatal lines start with F and a date; stack traces follow them.
+  if (line.size() > 1 && line[0] == 'F' && line[1] >= '0' && line[1] <= '9') return true;
+  for (const char* mark :
+       {"ERROR", "Error", "Check failed", "what():", "terminate", "unrecognised option"}) {
+    if (line.find(mark) != std::string::npos) return true;
+  }
+  return false;
+}
+
 // Keeps the line that most likely says why a program failed.
 class CauseFinder {
  public:
@@ -35,12 +45,7 @@ class CauseFinder {
     const size_t first = line.find_first_not_of(" \t=-*");
     if (first == std::string::npos) return;
     last_ = line.substr(first, kLongestCause);
-    // glog's fatal lines start with F and a date; stack traces follow them.
-    const bool fatal = line.size() > 2 && line[0] == 'F' && line[1] >= '0' && line[1] <= '9';
-    for (const char* mark : {"ERROR", "Error", "Check failed", "what():", "terminate", "bad_alloc",
-                             "unrecognised option"}) {
-      if ((fatal || line.find(mark) != std::string::npos) && error_.empty()) error_ = last_;
-    }
+    if (error_.empty() && LooksLikeAnError(line)) error_ = last_;
   }
   std::string Cause() const {
     if (!error_.empty()) return error_;

@@ -181,7 +181,9 @@ void Workspace::Step(const std::string& name, const std::string& inputs,
   body();
   json runs = json::array();
   for (auto it = records_.begin() + first; it != records_.end(); ++it) runs.push_back(ToJson(*it));
-  WriteFileAtomically(stamp, json{{"fingerprint", fingerprint_}, {"runs", runs}}.dump(1) + "\n");
+  WriteFileAtomically(stamp, json{{"fingerprint", fingerprint_}, {"runs", runs}}.dump(
+                                 1, ' ', false, json::error_handler_t::replace) +
+                                 "\n");
 }
 
 void Workspace::Run(const Arguments& arguments,

@@ -38,13 +38,14 @@ class FakeColmap {
   void Fail(const std::string& command, const std::string& shell_lines) {
     WriteFileAtomically(folder_ / ("fail." + command), shell_lines + "\n");
   }
-  /// The database that the extractor leaves: these images, of one camera.
-  void LeaveDatabase(const std::vector<std::string>& names) {
+  /// The database that the extractor leaves: these images, of the cameras named (else of one).
+  void LeaveDatabase(const std::vector<std::string>& names, const std::vector<int>& cameras = {}) {
     std::filesystem::remove(folder_ / "database");
     sqlite3* database = nullptr;
     std::string sql = "CREATE TABLE images (image_id INTEGER, name TEXT, camera_id INTEGER);";
     for (size_t i = 0; i < names.size(); ++i) {
-      sql += "INSERT INTO images VALUES (" + std::to_string(i + 1) + ", '" + names[i] + "', 1);";
+      sql += "INSERT INTO images VALUES (" + std::to_string(i + 1) + ", '" + names[i] + "', " +
+             std::to_string(cameras.empty() ? 1 : cameras.at(i)) + ");";
     }
     const bool made = sqlite3_open((folder_ / "database").c_str(), &database) == SQLITE_OK &&
                       sqlite3_exec(database, sql.c_str(), nullptr, nullptr, nullptr) == SQLITE_OK;

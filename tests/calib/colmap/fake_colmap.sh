@@ -18,7 +18,7 @@ done
 if [ -f "$here/fail.$command" ]; then . "$here/fail.$command"; fi
 case $command in
   feature_extractor)
-    [ -e "$database" ] || cp "$here/database" "$database"
+    cp "$here/database" "$database"
     while read -r name; do
       [ -e "$images/$name" ] || { echo "ERROR: no $images/$name"; exit 1; }
       echo "Processed file [1/1]"
