@@ -1,0 +1,43 @@
+// dtr/report/html.h -- the one writer of HTML pages; a page needs no network and no other file.
+#pragma once
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "dtr/types/grid.h"
+
+namespace dtr::report {
+
+/// A table cell: text, or a picture with a description for those who cannot see it.
+struct Picture {
+  ImageRgb8 image;
+  std::string description;
+};
+using Cell = std::variant<std::string, Picture>;
+
+/// Builds a page from top to bottom. All text is escaped; pictures are inlined as JPEG, plots as
+/// SVG pictures, in which a browser runs no script. The same calls give the same bytes.
+class HtmlReport {
+ public:
+  explicit HtmlReport(std::string_view title);
+
+  void Section(std::string_view title);
+  void Paragraph(std::string_view text);
+  /// A short fact above the rest, in colour: a verdict.
+  void Verdict(bool good, std::string_view text);
+  /// Numbers are set right-aligned: columns whose every cell is a number, optionally with a unit.
+  /// Throws std::invalid_argument when a row has not the header's number of cells.
+  void Table(const std::vector<std::string>& header, const std::vector<std::vector<Cell>>& rows);
+  void Image(std::string_view caption, const ImageRgb8& image);
+  /// `svg`: a whole SVG document.
+  void Svg(std::string_view caption, std::string_view svg);
+
+  /// The page. The report can be continued afterwards.
+  std::string Finish() const;
+
+ private:
+  std::string title_, body_;
+};
+
+}  // namespace dtr::report

@@ -1,0 +1,206 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <stdexcept>
+
+#include "dtr/base/error.h"
+#include "dtr/report/contact_sheet.h"
+#include "dtr/report/encode.h"
+#include "dtr/report/false_color.h"
+#include "dtr/report/html.h"
+#include "dtr/report/set_report.h"
+
+namespace dtr::report {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+// Colours at the edge of the gamut are clipped to it; worst of 402: 0.85.
+constexpr double kLightness = 1.5;
+
+/// Lightness L* of an sRGB colour, 0..100.
+double Lightness(const std::array<std::uint8_t, 3>& c) {
+  const auto linear = [](double v) {
+    return v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
+  };
+  return 116 * std::cbrt(0.2126 * linear(c[0] / 255.0) + 0.7152 * linear(c[1] / 255.0) +
+                         0.0722 * linear(c[2] / 255.0)) -
+         16;
+}
+
+TEST(Base64, VectorsOfTheStandard) {  // RFC 4648, section 10
+  EXPECT_EQ(Base64(""), "");
+  EXPECT_EQ(Base64("f"), "Zg==");
+  EXPECT_EQ(Base64("fo"), "Zm8=");
+  EXPECT_EQ(Base64("foo"), "Zm9v");
+  EXPECT_EQ(Base64("foobar"), "Zm9vYmFy");
+  EXPECT_EQ(Base64(std::string("\xff\xfe\x00", 3)), "//4A");
+}
+
+TEST(EscapeHtml, HostileTextBecomesHarmless) {
+  EXPECT_EQ(EscapeHtml("<script>\"&'"), "&lt;script&gt;&quot;&amp;&#39;");
+  EXPECT_EQ(EscapeHtml("caf\xC3\xA9 \xE6\x97\xA5 \xF0\x9F\x93\xB7"),
+            "caf\xC3\xA9 \xE6\x97\xA5 \xF0\x9F\x93\xB7");
+  const std::string bad = "\xEF\xBF\xBD";
+  EXPECT_EQ(EscapeHtml("\xff"), bad);
+  EXPECT_EQ(EscapeHtml("\xC3"), bad);                      // cut short
+  EXPECT_EQ(EscapeHtml("\xC0\xBC"), bad + bad);            // overlong '<'
+  EXPECT_EQ(EscapeHtml("\xED\xA0\x80"), bad + bad + bad);  // surrogate
+  EXPECT_EQ(EscapeHtml(std::string("a\0b\x1b", 4)), "a" + bad + "b" + bad);
+  EXPECT_EQ(EscapeHtml("\xC3<b>"), bad + "&lt;b&gt;");  // a broken sequence swallows nothing
+}
+
+TEST(EncodeJpeg, IsAJpegAndRefusesWhatIsNoPicture) {
+  const ImageRgb8 image(33, 17, 3, 90);
+  const std::string file = EncodeJpeg(image, 90);
+  EXPECT_EQ(file.substr(0, 3), "\xFF\xD8\xFF");
+  EXPECT_EQ(file.substr(file.size() - 2), "\xFF\xD9");
+  EXPECT_EQ(file, EncodeJpeg(image, 90));
+  EXPECT_THROW(EncodeJpeg(ImageRgb8(), 90), Error);
+  EXPECT_THROW(EncodeJpeg(ImageRgb8(4, 4, 1), 90), Error);
+  EXPECT_THROW(EncodeJpeg(ImageRgb8(65501, 1, 3), 90), Error);
+}
+
+TEST(PaletteColor, GetsBrighterAllTheWayAndNeverLooksLikeAHole) {
+  for (const Palette palette : {Palette::kColor, Palette::kGrey}) {
+    for (int i = 0; i <= 200; ++i) {
+      const auto color = PaletteColor(palette, i / 200.0);
+      EXPECT_NEAR(Lightness(color), 12 + 84 * i / 200.0, kLightness) << i;
+      int distance = 0;
+      for (size_t c = 0; c < 3; ++c) distance += std::abs(color[c] - kHoleColor[c]);
+      EXPECT_GT(distance, 60) << i;
+    }
+    EXPECT_EQ(PaletteColor(palette, -5), PaletteColor(palette, 0));
+    EXPECT_EQ(PaletteColor(palette, 7), PaletteColor(palette, 1));
+    EXPECT_EQ(PaletteColor(palette, std::nan("")), PaletteColor(palette, 0));
+  }
+}
+
+TEST(ColorizeDepth, CloserIsBrighterAndHolesAreMarked) {
+  DepthImage depth(3, 1);
+  depth(0, 0) = 1;
+  depth(1, 0) = 4;
+  const ImageRgb8 image = ColorizeDepth(depth);
+  const auto at = [&](int x) {
+    return std::array<std::uint8_t, 3>{image(x, 0, 0), image(x, 0, 1), image(x, 0, 2)};
+  };
+  EXPECT_GT(Lightness(at(0)), Lightness(at(1)));
+  EXPECT_EQ(at(2), kHoleColor);
+  EXPECT_EQ(at(1), PaletteColor(Palette::kColor, 0));
+}
+
+TEST(ColorizeDepth, GivenRangeDecidesAndFlatMapsAreShown) {
+  DepthImage depth(2, 1);
+  depth(0, 0) = depth(1, 0) = 2;
+  EXPECT_EQ(ColorizeDepth(depth)(0, 0, 0), PaletteColor(Palette::kColor, 1)[0]);
+  // 1/2 lies in the middle of 1/1 and 1/inf: half of the ramp.
+  const ImageRgb8 grey = ColorizeDepth(depth, {Palette::kGrey, 1e9, 1.0});
+  EXPECT_NEAR(grey(0, 0, 0), PaletteColor(Palette::kGrey, 0.5)[0], 1);
+  EXPECT_TRUE(ColorizeDepth(DepthImage()).empty());
+  const ImageRgb8 holes = ColorizeDepth(DepthImage(2, 2));
+  EXPECT_EQ(holes(1, 1, 1), kHoleColor[1]);
+}
+
+TEST(ColorizeSigma, BrightIsUncertain) {
+  Grid<float> sigma(4, 1);
+  sigma(0, 0) = 1e-4f;
+  sigma(1, 0) = 1e-2f;
+  sigma(2, 0) = std::numeric_limits<float>::quiet_NaN();
+  const ImageRgb8 image = ColorizeSigma(sigma, Palette::kGrey);
+  EXPECT_LT(image(0, 0, 0), image(1, 0, 0));
+  EXPECT_EQ(image(2, 0, 1), kHoleColor[1]);
+  EXPECT_EQ(image(3, 0, 1), kHoleColor[1]);
+}
+
+TEST(Shrink, HandWorkedAreaMeans) {
+  ImageRgb8 image(3, 2, 3);
+  for (int c = 0; c < 3; ++c) {
+    image(0, 0, c) = image(0, 1, c) = 0;
+    image(1, 0, c) = image(1, 1, c) = 60;
+    image(2, 0, c) = image(2, 1, c) = 120;
+  }
+  const ImageRgb8 small = Shrink(image, 2);  // 3 columns into 2: 1 + half of the middle one
+  ASSERT_EQ(small.width(), 2);
+  ASSERT_EQ(small.height(), 1);
+  EXPECT_EQ(small(0, 0, 0), 20);
+  EXPECT_EQ(small(1, 0, 0), 100);
+  EXPECT_EQ(Shrink(image, 3), image);
+  EXPECT_EQ(Shrink(ImageRgb8(1000, 1, 3, 7), 10).height(), 1);
+  EXPECT_THROW(Shrink(image, 0), std::invalid_argument);
+}
+
+TEST(ContactSheet, PutsPicturesInRows) {
+  const std::vector<ImageRgb8> images{ImageRgb8(20, 10, 3, 200), ImageRgb8(),
+                                      ImageRgb8(5, 5, 3, 90)};
+  const ImageRgb8 sheet = ContactSheet(images, 2, 10);
+  EXPECT_EQ(sheet.width(), 2 * 14 + 4);
+  EXPECT_EQ(sheet.height(), 2 * 14 + 4);
+  EXPECT_EQ(sheet(9, 9, 0), 200);
+  EXPECT_EQ(sheet(23, 9, 0), 24);
+  EXPECT_EQ(sheet(9, 23, 0), 90);
+  EXPECT_TRUE(ContactSheet({}, 2, 10).empty());
+  EXPECT_THROW(ContactSheet(images, 0, 10), std::invalid_argument);
+}
+
+TEST(HtmlReport, NeedsNothingFromOutsideAndRunsNothing) {
+  HtmlReport page("Title <1>");
+  page.Section("A & B");
+  page.Paragraph("<img src=x onerror=alert(1)>");
+  page.Verdict(false, "broken");
+  page.Table({"name", "value"}, {{std::string("</td><script>"), std::string("3.5 dB")}});
+  page.Image("cap\"tion", ImageRgb8(4, 3, 3, 50));
+  page.Svg("plot", "<svg xmlns=\"http://www.w3.org/2000/svg\"><script>alert(1)</script></svg>");
+  const std::string html = page.Finish();
+  EXPECT_THAT(html, HasSubstr("<title>Title &lt;1&gt;</title>"));
+  EXPECT_THAT(html, HasSubstr("A &amp; B"));
+  EXPECT_THAT(html, HasSubstr("default-src 'none'"));
+  EXPECT_THAT(html, HasSubstr("class=\"number\">3.5 dB"));
+  EXPECT_THAT(html, Not(HasSubstr("<script")));
+  EXPECT_THAT(html, Not(HasSubstr("<img src=x")));
+  EXPECT_THAT(html, Not(HasSubstr("http://")));
+  EXPECT_THAT(html, Not(HasSubstr("https://")));
+  EXPECT_EQ(html, page.Finish());
+}
+
+TEST(HtmlReport, RowsOfAnotherLengthAreRefused) {
+  HtmlReport page("t");
+  EXPECT_THROW(page.Table({"a", "b"}, {{std::string("1")}}), std::invalid_argument);
+}
+
+TEST(SetReport, ShowsViewsSkippedPhotosChecksAndTimes) {
+  DtrSet set;
+  set.frames.resize(1);
+  for (int i = 0; i < 2; ++i) {
+    View view;
+    view.name = i == 0 ? "a<b>.jpg" : "held.jpg";
+    view.role = i == 0 ? ViewRole::kSource : ViewRole::kHeldOut;
+    view.camera = PinholeCamera(64, 48, 50, 50, 32, 24);
+    view.image = ImageRgb8(64, 48, 3, 80);
+    set.frames[0].views.push_back(std::move(view));
+  }
+  View& source = set.frames[0].views[0];
+  source.depth = DepthImage(64, 48);
+  for (int x = 0; x < 64; ++x) source.depth(x, 0) = 1.0f + static_cast<float>(x);
+  source.near_z = 1;
+  source.far_z = 64;
+  SetReportInfo info;
+  info.title = "sceaux";
+  info.facts = {{"Engine", "sgbm"}};
+  info.skipped = {{"notes.jpg", "no image"}};
+  info.stages = {{"stereo", 12.34}, {"sfm", 1}};
+  info.checks = {{"held_out_rms_px", std::nan(""), 1.5, false, "nothing measured"}};
+  const std::string html = SetReport(set, info);
+  for (const char* text : {"a&lt;b&gt;.jpg", "held out", "notes.jpg", "no image", "12.3 s",
+                           "13.3 s", "held_out_rms_px", "BROKEN", "2.1 %", "1 to 64", "sgbm"}) {
+    EXPECT_THAT(html, HasSubstr(text));
+  }
+  EXPECT_THAT(html, Not(HasSubstr("Uncertainty")));
+  EXPECT_EQ(html, SetReport(set, info));
+}
+
+}  // namespace
+}  // namespace dtr::report
