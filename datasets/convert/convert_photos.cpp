@@ -17,8 +17,8 @@ io::CameraList ConvertFountain(const fs::path& source, const ConvertedFolder& ou
     const io::StrechaCamera given = io::ReadStrechaCamera(camera_file);
     io::NamedCamera named;
     named.name = file.substr(0, file.size() - ending.size());
-    // The format does not say where its pixels begin. Over all pairs the epipolar residual is
-    // smallest when K at the size of the images is simply halved, so for an origin in the corner.
+    // The format does not say where its pixels begin, and the data do not tell half a pixel apart
+    // (docs/CONVENTIONS.md); K is taken as written.
     const PinholeCamera full_size = io::CameraFromK(given.k, given.width_px, given.height_px,
                                                     io::PixelOrigin::kCorner, camera_file.string());
     named.camera =
