@@ -199,9 +199,11 @@ std::optional<Eigen::Vector2d> LensMap::PixelFromCam(const Eigen::Vector3d& p_in
     const double scale = 2 * std::tan(omega_ / 2);
     distorted =
         radius == 0 ? *q : Eigen::Vector2d(*q * (std::atan(radius * scale) / (omega_ * radius)));
+  } else if (!decentred_) {
+    distorted = *q * RadialFactor(q->squaredNorm()).factor;
   } else {
     const Distorted d = Distort(*q);
-    if (decentred_ && !(d.jacobian.determinant() > 0)) return std::nullopt;
+    if (!(d.jacobian.determinant() > 0)) return std::nullopt;
     distorted = d.point;
   }
   if (!distorted.allFinite()) return std::nullopt;
