@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
+#include <vector>
 
 #include "dtr/base/parallel_for.h"
 
@@ -14,75 +17,114 @@ constexpr double kAgreePx = 1.0;
 /// pixels, which leaves 0.2 to 0.4 px (Szeliski and Scharstein, PAMI 2004, fig. 2).
 constexpr double kNoisePx = 0.35;
 /// From this many pairs on a single opinion is not enough.
-constexpr size_t kPairsThatMustAgree = 3;
+constexpr int kPairsThatMustAgree = 3;
 
 struct Opinion {
+  int pair;
   double inverse_depth;
   double step;  ///< change of 1/z per pixel of disparity
 };
+
+/// Opinions on one depth, at most one per pair.
+struct Group {
+  std::vector<Opinion> members;
+  double weight = 0;  ///< sum of 1 / step^2
+  int against = 0;    ///< pairs with opinions, none of them on this depth
+};
+
+/// The opinions that agree with `depth`; `opinions` are sorted by pair.
+void Gather(const std::vector<Opinion>& opinions, const Opinion& depth, Group* group) {
+  group->members.clear();
+  group->weight = 0;
+  group->against = 0;
+  for (size_t begin = 0; begin < opinions.size();) {
+    const Opinion* closest = nullptr;
+    double closest_px = kAgreePx;
+    size_t end = begin;
+    for (; end < opinions.size() && opinions[end].pair == opinions[begin].pair; ++end) {
+      const double off_px = std::abs(opinions[end].inverse_depth - depth.inverse_depth) /
+                            std::max(opinions[end].step, depth.step);
+      if (off_px <= closest_px) closest_px = off_px, closest = &opinions[end];
+    }
+    begin = end;
+    if (closest == nullptr) {
+      ++group->against;
+      continue;
+    }
+    group->members.push_back(*closest);
+    group->weight += 1.0 / (closest->step * closest->step);
+  }
+}
 
 struct Verdict {
   double inverse_depth = 0, sigma = 0;  ///< 0, 0: a hole
 };
 
-Verdict Vote(const std::vector<Opinion>& opinions, size_t pairs) {
-  size_t best_count = 0, best = 0;
-  double best_weight = 0;
-  const auto agree = [&](size_t i, size_t j) {
-    return std::abs(opinions[i].inverse_depth - opinions[j].inverse_depth) <=
-           kAgreePx * std::max(opinions[i].step, opinions[j].step);
-  };
-  for (size_t i = 0; i < opinions.size(); ++i) {
-    size_t count = 0;
-    double weight = 0;
-    for (size_t j = 0; j < opinions.size(); ++j) {
-      if (!agree(i, j)) continue;
-      ++count;
-      weight += 1.0 / (opinions[j].step * opinions[j].step);
-    }
-    if (count > best_count || (count == best_count && weight > best_weight)) {
-      best_count = count, best_weight = weight, best = i;
-    }
+Verdict MeanOf(const Group& group) {
+  double mean = 0, spread = 0;
+  for (const Opinion& o : group.members) {
+    mean += o.inverse_depth / (o.step * o.step) / group.weight;
   }
-  const size_t needed = pairs >= kPairsThatMustAgree ? 2 : 1;
-  if (best_count < needed || opinions.size() - best_count >= best_count) return {};
-
-  double mean = 0;
-  for (size_t j = 0; j < opinions.size(); ++j) {
-    if (agree(best, j)) {
-      mean += opinions[j].inverse_depth / (opinions[j].step * opinions[j].step) / best_weight;
-    }
+  for (const Opinion& o : group.members) {
+    const double off = o.inverse_depth - mean;
+    spread += off * off / (o.step * o.step) / group.weight;
   }
-  double spread = 0;
-  for (size_t j = 0; j < opinions.size(); ++j) {
-    const double off = opinions[j].inverse_depth - mean;
-    if (agree(best, j)) spread += off * off / (opinions[j].step * opinions[j].step) / best_weight;
-  }
-  // The pull to whole pixels is common to the pairs only in part; spread says how much is left.
   const double variance =
-      kNoisePx * kNoisePx / best_weight + spread / static_cast<double>(best_count);
+      kNoisePx * kNoisePx / group.weight + spread / static_cast<double>(group.members.size());
   return {mean, std::sqrt(variance)};
 }
 
+/// Works through the pixels of one row; keeps its buffers.
+class Voter {
+ public:
+  explicit Voter(int pair_count) : needed_(pair_count >= kPairsThatMustAgree ? 2 : 1) {}
+
+  void Clear() { opinions_.clear(); }
+  /// Opinions must come sorted by pair.
+  void Add(const Opinion& opinion) { opinions_.push_back(opinion); }
+
+  Verdict Vote() {
+    best_.members.clear();
+    best_.weight = 0;
+    for (const Opinion& candidate : opinions_) {
+      Gather(opinions_, candidate, &group_);
+      if (group_.members.size() > best_.members.size() ||
+          (group_.members.size() == best_.members.size() && group_.weight > best_.weight)) {
+        std::swap(group_, best_);
+      }
+    }
+    const int votes = static_cast<int>(best_.members.size());
+    return votes >= needed_ && votes > best_.against ? MeanOf(best_) : Verdict{};
+  }
+
+ private:
+  int needed_;
+  std::vector<Opinion> opinions_;
+  Group group_, best_;
+};
+
 }  // namespace
 
-DepthEstimate FusePairs(const PinholeCamera& camera, const std::vector<PairDepth>& pairs,
-                        const DepthRange& range, int threads) {
+DepthEstimate FusePairs(const PinholeCamera& camera, const Mask* mask,
+                        std::span<const PairDepth> sweeps, int pair_count, const DepthRange& range,
+                        int threads) {
   const int w = camera.width_px(), h = camera.height_px();
   DepthEstimate result{DepthImage(w, h), Grid<float>(w, h)};
   ParallelFor(0, h, threads, [&](int y) {
-    std::vector<Opinion> opinions;
+    Voter voter(pair_count);
     for (int x = 0; x < w; ++x) {
-      opinions.clear();
-      for (const PairDepth& pair : pairs) {
-        const float inverse_depth = pair.inverse_depth(x, y);
+      if (mask != nullptr && !mask->empty() && (*mask)(x, y) == 0) continue;
+      voter.Clear();
+      const Eigen::Vector3d ray = camera.RayFromPixel({x + 0.5, y + 0.5});
+      for (const PairDepth& sweep : sweeps) {
+        const float inverse_depth = sweep.inverse_depth(x, y);
         if (!std::isnan(inverse_depth)) {
-          opinions.push_back({inverse_depth, pair.StepAt(camera, x, y)});
+          voter.Add({sweep.pair, inverse_depth, sweep.StepAt(ray)});
         }
       }
-      if (opinions.empty()) continue;
-      const Verdict verdict = Vote(opinions, pairs.size());
-      if (verdict.inverse_depth < 1.0 / range.far_z || verdict.inverse_depth > 1.0 / range.near_z) {
+      const Verdict verdict = voter.Vote();
+      if (!(verdict.inverse_depth >= 1.0 / range.far_z) ||
+          !(verdict.inverse_depth <= 1.0 / range.near_z)) {
         continue;
       }
       result.depth(x, y) = static_cast<float>(1.0 / verdict.inverse_depth);
@@ -92,8 +134,8 @@ DepthEstimate FusePairs(const PinholeCamera& camera, const std::vector<PairDepth
   return result;
 }
 
-void RemoveSpeckles(const PinholeCamera& camera, const std::vector<PairDepth>& pairs,
-                    int min_pixels, double max_steps, DepthEstimate* estimate) {
+void RemoveSpeckles(const PinholeCamera& camera, std::span<const PairDepth> sweeps, int min_pixels,
+                    double max_steps, DepthEstimate* estimate) {
   const int w = camera.width_px(), h = camera.height_px();
   DepthImage& depth = estimate->depth;
   Grid<std::uint8_t> seen(w, h);
@@ -101,7 +143,8 @@ void RemoveSpeckles(const PinholeCamera& camera, const std::vector<PairDepth>& p
   const auto connected = [&](int a, int b) {
     const int x = a % w, y = a / w;
     double step = std::numeric_limits<double>::infinity();
-    for (const PairDepth& pair : pairs) step = std::min(step, pair.StepAt(camera, x, y));
+    const Eigen::Vector3d ray = camera.RayFromPixel({x + 0.5, y + 0.5});
+    for (const PairDepth& sweep : sweeps) step = std::min(step, sweep.StepAt(ray));
     const double za = depth(x, y), zb = depth(b % w, b / w);
     return std::abs(1.0 / za - 1.0 / zb) <= max_steps * step;
   };

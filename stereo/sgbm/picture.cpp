@@ -68,13 +68,12 @@ float Sample(const Grid<float>& grid, double x, double y) {
   return sum;
 }
 
-void WarpInto(const Picture& source, const PinholeCamera& target,
-              const Eigen::Matrix3d& source_from_target, WarpedPicture* out) {
+void WarpInto(const Picture& source, const VirtualImage& target, WarpedPicture* out) {
   const PinholeCamera& camera = source.camera;
-  for (int y = 0; y < target.height_px(); ++y) {
-    for (int x = 0; x < target.width_px(); ++x) {
+  for (int y = 0; y < target.height_px; ++y) {
+    for (int x = 0; x < target.width_px; ++x) {
       const auto pixel =
-          camera.PixelFromCam(source_from_target * target.RayFromPixel({x + 0.5, y + 0.5}));
+          camera.PixelFromCam(target.ray_from_pixel * Eigen::Vector3d(x + 0.5, y + 0.5, 1));
       if (!pixel) continue;
       const float value = Sample(source.grey, pixel->x() - 0.5, pixel->y() - 0.5);
       out->grey(x, y) = static_cast<std::uint8_t>(std::clamp(value + 0.5f, 0.0f, 255.0f));
@@ -131,21 +130,19 @@ Picture Halved(const Picture& picture) {
   return half;
 }
 
-WarpedPicture Warp(const Picture& source, const PinholeCamera& target,
-                   const Eigen::Matrix3d& target_from_source) {
+WarpedPicture Warp(const Picture& source, const VirtualImage& target) {
   constexpr double kHalve = 0.6;  // below, a pixel of the target covers nearly two of the source
   constexpr int kSmallest = 16;
-  WarpedPicture out{Grid<std::uint8_t>(target.width_px(), target.height_px()),
-                    Mask(target.width_px(), target.height_px())};
-  const Eigen::Matrix3d source_from_target = target_from_source.transpose();
+  WarpedPicture out{Grid<std::uint8_t>(target.width_px, target.height_px),
+                    Mask(target.width_px, target.height_px)};
   Picture half;
   const Picture* use = &source;
-  while (target.fx_px() < kHalve * use->camera.fx_px() && use->grey.width() >= 2 * kSmallest &&
+  while (target.focal_px < kHalve * use->camera.fx_px() && use->grey.width() >= 2 * kSmallest &&
          use->grey.height() >= 2 * kSmallest) {
     half = Halved(*use);
     use = &half;
   }
-  WarpInto(*use, target, source_from_target, &out);
+  WarpInto(*use, target, &out);
   return out;
 }
 

@@ -29,10 +29,17 @@ struct WarpedPicture {
   Mask usable;  ///< 255 where the source has a usable pixel
 };
 
+/// Where the pixels of a virtual image look: ray in the source's camera frame (of any length) =
+/// ray_from_pixel * (x, y, 1).
+struct VirtualImage {
+  int width_px = 0, height_px = 0;
+  double focal_px = 0;  ///< its resolution
+  Eigen::Matrix3d ray_from_pixel = Eigen::Matrix3d::Identity();
+};
+
 /// Resamples with Catmull-Rom weights; beyond the border the nearest pixel is repeated (an
 /// artificial edge there would be matched). Uses a halved source where the target is that much
 /// coarser.
-WarpedPicture Warp(const Picture& source, const PinholeCamera& target,
-                   const Eigen::Matrix3d& target_from_source);
+WarpedPicture Warp(const Picture& source, const VirtualImage& target);
 
 }  // namespace dtr::stereo

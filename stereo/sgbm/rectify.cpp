@@ -29,6 +29,10 @@ constexpr int kMinSize = 32;
 /// The rectified image has at most so many times the pixels of the reference.
 constexpr double kMaxGrowth = 2.0;
 
+/// A plane seen by the neighbour that much narrower (or wider) than by the reference is not
+/// matched.
+constexpr double kMinCompression = 0.3;
+
 /// Extent of an image in the rectified frame, on the plane z = 1.
 struct Extent {
   double x0 = std::numeric_limits<double>::infinity(), x1 = -x0;
@@ -72,15 +76,25 @@ double FocalKeepingArea(const PinholeCamera& camera, const Matrix3d& rect_from_c
 
 /// Disparity span, with margins, at a focal length.
 void FitDisparities(const Search& search, double focal_px, RectifiedPair* pair) {
-  double low = search.low * focal_px - kDisparityMarginPx;
-  const double high = search.high * focal_px + kDisparityMarginPx;
-  const double to_infinity = low + kDisparityMarginPx;  // infinity itself lies at disparity 0
-  if (to_infinity <= std::max(kInfinityCostPx, kInfinityCostShare * (high - low))) {
-    low = std::min(low, -kDisparityMarginPx);
+  const double infinity_px = 0;
+  pair->low_px = search.low * focal_px - kDisparityMarginPx;
+  pair->high_px = search.high * focal_px + kDisparityMarginPx;
+  const double to_infinity = pair->low_px - infinity_px;
+  const double span = pair->high_px - pair->low_px;
+  if (to_infinity <= std::max(kInfinityCostPx, kInfinityCostShare * span)) {
+    pair->low_px = std::min(pair->low_px, infinity_px - kDisparityMarginPx);
   }
-  pair->shift_px = std::floor(low);
-  pair->disparities = 16 * static_cast<int>(std::ceil((high - pair->shift_px) / 16.0));
 }
+
+/// Whole pixels that cover a length. Poses far from the origin carry rounding errors; without the
+/// slack they would decide between two sizes.
+int Cover(double length_px) {
+  constexpr double kSlackPx = 1e-5;
+  return static_cast<int>(std::ceil(length_px - kSlackPx));
+}
+
+/// A multiple of 16, as the matcher wants it.
+int RoundedSteps(double span_px) { return 16 * Cover(span_px / 16.0); }
 
 struct Window {
   double x0, x1, y0, y1;  // on the plane z = 1, part of the reference to match
@@ -94,8 +108,9 @@ double FitFocal(double focal_px, const Search& search, const Window& window, dou
     FitDisparities(search, focal_px, pair);
     const double width = (window.x1 - window.x0) * focal_px;
     const double height = (window.y1 - window.y0) * focal_px;
-    if (width * height <= max_pixels && pair->disparities <= limits.max_disparities &&
-        width * height * pair->disparities <= static_cast<double>(limits.max_volume)) {
+    const double disparities = RoundedSteps(pair->high_px - pair->low_px);
+    if (width * height <= max_pixels && disparities <= limits.max_disparities &&
+        width * height * disparities <= static_cast<double>(limits.max_volume)) {
       return focal_px;
     }
     if (focal_px < kMinSize) return focal_px;  // hopeless; the caller finds the image too small
@@ -118,6 +133,22 @@ std::optional<Matrix3d> RectFromWorld(const StereoView& a, const StereoView& b,
 }
 
 }  // namespace
+
+Sweep RectifiedPair::FullSweep(double slope_px_per_row) const {
+  const double rise = slope_px_per_row * camera.height_px();
+  const double low = low_px - std::max(rise, 0.0), high = high_px - std::min(rise, 0.0);
+  return {{0, slope_px_per_row, low}, RoundedSteps(high - low)};
+}
+
+std::optional<Sweep> RectifiedPair::SweepAround(const Eigen::Vector3d& n_in_reference,
+                                                int steps) const {
+  // 1/Z = n . ray and disparity = focal * baseline / Z, linear in the pixel.
+  const Vector3d n = baseline * (rect_from_reference * n_in_reference);
+  const double compression = 1 - n.x();
+  if (compression < kMinCompression || compression > 1 / kMinCompression) return std::nullopt;
+  const double at_origin = n.z() * camera.fx_px() - n.x() * camera.cx_px() - n.y() * camera.cy_px();
+  return Sweep{{n.x(), n.y(), at_origin - compression * steps / 2}, steps};
+}
 
 std::optional<RectifiedPair> RectifyPair(const StereoView& reference, const StereoView& neighbour,
                                          const DepthRange& range, const PairLimits& limits,
@@ -149,17 +180,15 @@ std::optional<RectifiedPair> RectifyPair(const StereoView& reference, const Ster
   if (window.x0 >= window.x1 || window.y0 >= window.y1) return refuse("the images do not overlap");
 
   const double max_pixels = kMaxGrowth * reference.camera.width_px() * reference.camera.height_px();
-  const double focal_px = FitFocal(FocalKeepingArea(reference.camera, pair.rect_from_reference),
-                                   search, window, max_pixels, limits, &pair);
-  const int width = static_cast<int>(std::ceil((window.x1 - window.x0) * focal_px));
-  const int height = static_cast<int>(std::ceil((window.y1 - window.y0) * focal_px));
+  const double focal_px =
+      FitFocal(limits.scale * FocalKeepingArea(reference.camera, pair.rect_from_reference), search,
+               window, max_pixels, limits, &pair);
+  const int width = Cover((window.x1 - window.x0) * focal_px);
+  const int height = Cover((window.y1 - window.y0) * focal_px);
   if (width < kMinSize || height < kMinSize) return refuse("the common area is too small");
 
-  // The matcher computes no disparity in its first `disparities` columns: a margin is added there.
-  const int full_width = width + pair.disparities;
-  const double cx = pair.disparities - window.x0 * focal_px, cy = -window.y0 * focal_px;
-  pair.reference = PinholeCamera(full_width, height, focal_px, focal_px, cx, cy);
-  pair.neighbour = PinholeCamera(full_width, height, focal_px, focal_px, cx + pair.shift_px, cy);
+  pair.camera = PinholeCamera(width, height, focal_px, focal_px, -window.x0 * focal_px,
+                              -window.y0 * focal_px);
   return pair;
 }
 

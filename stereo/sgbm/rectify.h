@@ -11,23 +11,41 @@ namespace dtr::stereo {
 
 /// Bounds on what matching one pair may cost.
 struct PairLimits {
-  int max_disparities = 256;
-  std::int64_t max_volume = 160'000'000;  ///< width * height * disparities of the matcher
+  double scale = 1.0;  ///< resolution to match at, relative to the reference image
+  int max_disparities = 512;
+  std::int64_t max_volume = 200'000'000;  ///< width * height * disparities of the matcher
+};
+
+/// Which disparities the matcher searches: those around a plane (planes of the world are planes of
+/// disparity). A disparity at pixel (x, y) of the rectified reference is
+///   plane . (x, y, 1) + (1 - plane.x) * step,   step in [0, steps),
+/// so that on a surface parallel to the plane the step is constant, however slanted the surface.
+struct Sweep {
+  Eigen::Vector3d plane = Eigen::Vector3d::Zero();
+  int steps = 0;  ///< a multiple of 16
+
+  double DisparityAt(const Eigen::Vector2d& pixel, double step) const {
+    return plane.x() * pixel.x() + plane.y() * pixel.y() + plane.z() + (1 - plane.x()) * step;
+  }
 };
 
 /// Two virtual cameras with one orientation, x axis along the baseline (the neighbour lies towards
-/// +x, so the reference is always the left one: other arrangements come out as rolled images).
-/// Both have one focal length and one size. In pixel *indices* of the rectified images
-///   x_reference - x_neighbour = disparity, in [0, disparities), and
-///   1/Z = (disparity + shift_px) / (focal_px * baseline).
+/// +x, so the reference is always the left one: other arrangements come out as rolled images), and
+/// with one pinhole model. x_reference - x_neighbour is the disparity; 1/Z = disparity /
+/// (focal * baseline).
 struct RectifiedPair {
-  PinholeCamera reference{1, 1, 1, 1, 0, 0};
-  PinholeCamera neighbour{1, 1, 1, 1, 0, 0};
+  PinholeCamera camera{1, 1, 1, 1, 0, 0};  ///< its size is the part of the reference to match
   Eigen::Matrix3d rect_from_reference = Eigen::Matrix3d::Identity();  ///< rotation
   Eigen::Matrix3d rect_from_neighbour = Eigen::Matrix3d::Identity();
   double baseline = 0;
-  int disparities = 0;  ///< multiple of 16; also the width of the left margin
-  double shift_px = 0;  ///< added to a disparity before it is turned into depth
+  double low_px = 0, high_px = 0;  ///< disparities of the depth range, with margins
+
+  /// All disparities of the depth range, on planes that rise by `slope` px per row (0: facing).
+  Sweep FullSweep(double slope_px_per_row) const;
+
+  /// A few disparities on either side of the plane n . p = 1, p in the reference's camera frame.
+  /// Empty where the neighbour sees the plane from behind or at a grazing angle.
+  std::optional<Sweep> SweepAround(const Eigen::Vector3d& n_in_reference, int steps) const;
 };
 
 /// Rectifies a pair for the depths of `range` in the reference view. The images keep about the

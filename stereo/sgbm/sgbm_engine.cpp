@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "dtr/base/parallel_for.h"
 #include "stereo/sgbm/fuse.h"
+#include "stereo/sgbm/planes.h"
 
 namespace dtr::stereo {
 namespace {
@@ -15,15 +17,38 @@ namespace {
 constexpr double kSpeckleShare = 1e-4;
 constexpr double kSpeckleSteps = 2.0;
 
+/// The coarse pass that looks for large planes: long side of the image, pairs used, slopes tried
+/// (px of disparity per row; the ground under a camera rises by baseline / height above it).
+constexpr double kCoarseSidePx = 256;
+constexpr size_t kCoarsePairs = 3;
+constexpr double kCoarseSlopes[] = {0, -0.7, 0.7, -1.4, 1.4};
+/// Slopes below this are matched well by the sweep that faces the camera.
+constexpr double kSteepSlope = 0.2;
+/// Disparities searched around a plane: 24 on either side.
+constexpr int kPlaneSteps = 48;
+
+/// Sweeps around planes have few disparities, so nothing forces them to a lower resolution.
+constexpr PairLimits kFineLimits{.scale = 1.0,
+                                 .max_disparities = std::numeric_limits<int>::max(),
+                                 .max_volume = std::numeric_limits<std::int64_t>::max()};
+
+/// A usable pair: how it is rectified, and the neighbour.
+struct Pair {
+  RectifiedPair whole;  ///< coarse enough to search the whole range
+  RectifiedPair fine;   ///< at the reference's resolution, for sweeps around planes
+  const StereoView* neighbour;
+};
+
 /// StereoSGBM in full mode keeps two 16-bit numbers per pixel and disparity.
 constexpr double kBytesPerCell = 4;
 
 /// Pairs that may be matched at the same time within the memory given; at least one.
-int PairsAtOnce(const std::vector<RectifiedPair>& pairs, const EngineOptions& options) {
+int PairsAtOnce(const std::vector<Pair>& pairs, const EngineOptions& options) {
   double largest = 1;
-  for (const RectifiedPair& p : pairs) {
-    largest = std::max(largest, kBytesPerCell * p.disparities * p.reference.height_px() *
-                                    (p.reference.width_px() - p.disparities));
+  for (const Pair& pair : pairs) {
+    const RectifiedPair& p = pair.whole;
+    largest = std::max(
+        largest, kBytesPerCell * p.camera.width_px() * p.camera.height_px() * p.FullSweep(0).steps);
   }
   return static_cast<int>(std::clamp(options.memory_gb * 1e9 / largest, 1.0, 1e6));
 }
@@ -42,6 +67,67 @@ void CheckRequest(std::span<const StereoView> views, int reference, std::span<co
   }
 }
 
+/// One run of the matcher.
+struct Task {
+  int pair;
+  const RectifiedPair* rectified;
+  Sweep sweep;
+};
+
+/// The large slanted planes of the reference view, from a coarse pass over several slopes.
+std::vector<Eigen::Vector3d> FindPlanes(const StereoView& reference, const Picture& picture,
+                                        const std::vector<Pair>& pairs,
+                                        const std::vector<Picture>& pictures,
+                                        const DepthRange& range, const PairLimits& limits,
+                                        const EngineOptions& options) {
+  const PinholeCamera& camera = reference.camera;
+  PairLimits coarse = limits;
+  coarse.scale = std::min(1.0, kCoarseSidePx / std::max(camera.width_px(), camera.height_px()));
+  const PinholeCamera grid =
+      camera.Resized(std::max(1, static_cast<int>(camera.width_px() * coarse.scale)),
+                     std::max(1, static_cast<int>(camera.height_px() * coarse.scale)));
+  std::vector<RectifiedPair> rectified;
+  rectified.reserve(kCoarsePairs);
+  std::vector<Task> tasks;
+  for (size_t i = 0; i < std::min(kCoarsePairs, pairs.size()); ++i) {
+    std::string refusal;
+    const auto pair = RectifyPair(reference, *pairs[i].neighbour, range, coarse, &refusal);
+    if (!pair) return {};
+    rectified.push_back(*pair);
+    for (const double slope : kCoarseSlopes) {
+      tasks.push_back({static_cast<int>(i), &rectified.back(), pair->FullSweep(slope)});
+    }
+  }
+  std::vector<PairDepth> sweeps(tasks.size());
+  ParallelFor(0, static_cast<int>(tasks.size()), options.threads, [&](int i) {
+    const Task& task = tasks[static_cast<size_t>(i)];
+    const auto k = static_cast<size_t>(task.pair);
+    sweeps[static_cast<size_t>(i)] =
+        MatchPair(picture, pictures[k], *task.rectified, task.sweep, grid);
+    sweeps[static_cast<size_t>(i)].pair = task.pair;
+  });
+  const DepthEstimate map =
+      FusePairs(grid, nullptr, sweeps, static_cast<int>(rectified.size()), range, options.threads);
+  return DominantPlanes(map.depth, grid, sweeps.front().step_from_ray, {});
+}
+
+/// The sweep that faces the camera for every pair, and one around each plane that is steep for it.
+std::vector<Task> TasksOf(const std::vector<Pair>& pairs,
+                          const std::vector<Eigen::Vector3d>& planes) {
+  std::vector<Task> tasks;
+  for (size_t i = 0; i < pairs.size(); ++i) {
+    const int pair = static_cast<int>(i);
+    tasks.push_back({pair, &pairs[i].whole, pairs[i].whole.FullSweep(0)});
+    for (const Eigen::Vector3d& n : planes) {
+      const auto sweep = pairs[i].fine.SweepAround(n, kPlaneSteps);
+      if (sweep && std::hypot(sweep->plane.x(), sweep->plane.y()) >= kSteepSlope) {
+        tasks.push_back({pair, &pairs[i].fine, *sweep});
+      }
+    }
+  }
+  return tasks;
+}
+
 }  // namespace
 
 DepthEstimate SgbmEngine::Estimate(std::span<const StereoView> views, int reference,
@@ -49,35 +135,43 @@ DepthEstimate SgbmEngine::Estimate(std::span<const StereoView> views, int refere
                                    const EngineOptions& options) const {
   CheckRequest(views, reference, neighbours, range);
   const StereoView& view = views[static_cast<size_t>(reference)];
-  std::vector<RectifiedPair> rectified;
-  std::vector<const StereoView*> partners;
+  std::vector<Pair> pairs;
   std::string reasons;
   for (const int n : neighbours) {
     std::string refusal;
     const StereoView& other = views[static_cast<size_t>(n)];
-    if (const auto pair = RectifyPair(view, other, range, limits_, &refusal)) {
-      rectified.push_back(*pair);
-      partners.push_back(&other);
+    const auto whole = RectifyPair(view, other, range, limits_, &refusal);
+    const auto fine = RectifyPair(view, other, range, kFineLimits, &refusal);
+    if (whole && fine) {
+      pairs.push_back({*whole, *fine, &other});
     } else {
       reasons += "; with view " + std::to_string(n) + ": " + refusal;
     }
   }
-  if (rectified.empty()) {
+  if (pairs.empty()) {
     throw NoUsablePair("view " + std::to_string(reference) + ": no usable stereo pair among " +
                        std::to_string(neighbours.size()) + " neighbours" + reasons);
   }
 
-  const Picture reference_picture = MakePicture(view);
-  std::vector<PairDepth> pairs(rectified.size());
-  const int at_once = std::min(ResolveThreads(options.threads), PairsAtOnce(rectified, options));
-  ParallelFor(0, static_cast<int>(pairs.size()), at_once, [&](int i) {
-    const auto k = static_cast<size_t>(i);
-    pairs[k] = MatchPair(reference_picture, MakePicture(*partners[k]), rectified[k]);
+  const Picture picture = MakePicture(view);
+  std::vector<Picture> pictures;
+  for (const Pair& pair : pairs) pictures.push_back(MakePicture(*pair.neighbour));
+  const std::vector<Task> tasks =
+      TasksOf(pairs, FindPlanes(view, picture, pairs, pictures, range, limits_, options));
+  std::vector<PairDepth> sweeps(tasks.size());
+  const int at_once = std::min(ResolveThreads(options.threads), PairsAtOnce(pairs, options));
+  ParallelFor(0, static_cast<int>(tasks.size()), at_once, [&](int i) {
+    const Task& task = tasks[static_cast<size_t>(i)];
+    const auto k = static_cast<size_t>(task.pair);
+    PairDepth& sweep = sweeps[static_cast<size_t>(i)];
+    sweep = MatchPair(picture, pictures[k], *task.rectified, task.sweep, view.camera);
+    sweep.pair = task.pair;
   });
-  DepthEstimate estimate = FusePairs(view.camera, pairs, range, options.threads);
+  DepthEstimate estimate = FusePairs(view.camera, view.mask, sweeps, static_cast<int>(pairs.size()),
+                                     range, options.threads);
   const int min_pixels = static_cast<int>(kSpeckleShare * view.camera.width_px() *
                                           static_cast<double>(view.camera.height_px()));
-  RemoveSpeckles(view.camera, pairs, min_pixels, kSpeckleSteps, &estimate);
+  RemoveSpeckles(view.camera, sweeps, min_pixels, kSpeckleSteps, &estimate);
   return estimate;
 }
 
