@@ -398,8 +398,9 @@ std::vector<NamedFile> FilesOf(const DtrSet& set) {
 }
 
 std::string ProblemOf(const fs::path& set_folder, const NamedFile& named) {
-  const fs::path root = fs::canonical(set_folder);
   std::error_code error;
+  const fs::path root = fs::canonical(set_folder, error);
+  if (error) return named.field + ".path: the set's folder cannot be read: " + error.message();
   const fs::path full = fs::weakly_canonical(root / named.file->path, error);
   const std::string shown = "'" + named.file->path + "'";
   if (error ||

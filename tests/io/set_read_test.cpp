@@ -5,8 +5,10 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
+#include "dtr/base/random.h"
 #include "dtr/io/depth_io.h"
 #include "dtr/io/set_io.h"
+#include "dtr/io/set_json.h"
 #include "tests/io/small_set.h"
 #include "tests/support/test_data.h"
 #include "tests/support/truncation.h"
@@ -66,6 +68,32 @@ TEST_F(EditedSet, EveryTruncatedPrefixOfSetJsonIsAnError) {
   // Without its final line break the text is still whole.
   WriteFileAtomically(set_ / "set.json", text_.substr(0, text_.size() - 1));
   testing::ExpectEveryPrefixIsAnError(set_ / "set.json", 13, [&] { ReadSet(set_); });
+}
+
+TEST_F(EditedSet, RandomDamageIsAnErrorOrASetButNothingElse) {
+  constexpr int kMutations = 2000;
+  Random random(11);
+  int refused = 0;
+  for (int i = 0; i < kMutations; ++i) {
+    std::string damaged = text_;
+    for (int n = 1 + random.Index(3); n > 0; --n) {
+      const auto at = static_cast<size_t>(random.Index(static_cast<int>(damaged.size())));
+      const auto bytes = static_cast<size_t>(random.Index(4));
+      switch (random.Index(3)) {
+        case 0:
+          damaged[at] = static_cast<char>(random.Index(256));
+          break;
+        case 1:
+          damaged.erase(at, bytes);
+          break;
+        default:
+          damaged.insert(at, text_.substr(at / 2, bytes));
+          break;
+      }
+    }
+    refused += ErrorOf([&] { SetFromJson(damaged, "set.json"); }).empty() ? 0 : 1;
+  }
+  EXPECT_GT(refused, kMutations / 2);  // the rest hit names, free text or digits
 }
 
 TEST_F(EditedSet, ErrorsNameFileFieldExpectedAndFound) {
