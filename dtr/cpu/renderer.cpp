@@ -123,7 +123,7 @@ RenderResult Render(const RenderScene& scene, const PinholeCamera& novel,
                 [&](int y) { ResolveRow(settings, views, y, result); });
   }
   result.coverage_share = CoverageShare(result.coverage);
-  if (options.fill_holes) FillHoles(result);
+  if (options.fill_holes) FillHolesFromViews(scene, novel, novel_from_world, options, result);
   return result;
 }
 

@@ -12,7 +12,7 @@ namespace dtr::cpu {
 /// in double precision, by the two-pass method of Verlani et al. 2006 as RENDER_SPEC states it.
 /// The result does not depend on the order of the views or on the number of threads. Where no view
 /// is valid the picture is empty: black, no depth, no coverage.
-/// With options.fill_holes, FillHoles is applied to the finished picture.
+/// With options.fill_holes, FillHolesFromViews is applied to the finished picture.
 /// Throws dtr::UsageError for options without a meaning and for pictures beyond 2^28 pixels, and
 /// dtr::Error for a pose that is not finite.
 RenderResult Render(const RenderScene& scene, const PinholeCamera& novel,

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <vector>
 
-#include "dtr/cpu/texture.h"
 #include "dtr/render/colour.h"
 #include "dtr/render/geometry.h"
+#include "dtr/render/texture.h"
 
 namespace dtr::cpu {
 namespace {

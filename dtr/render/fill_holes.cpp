@@ -4,9 +4,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <vector>
 
+#include "dtr/base/parallel_for.h"
+#include "dtr/render/blend_weights.h"
 #include "dtr/render/colour.h"
+#include "dtr/render/geometry.h"
+#include "dtr/render/texture.h"
 
 namespace dtr {
 namespace {
@@ -103,26 +108,134 @@ void FillFrom(const Level& coarse, Level& fine) {
   }
 }
 
-}  // namespace
-
-void FillHoles(RenderResult& result) {
-  const auto& covered = result.coverage.data();
-  if (std::count(covered.begin(), covered.end(), 0) == 0) return;
-  std::vector<Level> pyramid = {FinestLevel(result)};
+/// Fills every unknown cell of the finest level from the known ones.
+void PushPull(Level& finest) {
+  std::vector<Level> pyramid = {std::move(finest)};
   while (pyramid.back().width() > 1 || pyramid.back().height() > 1) {
     pyramid.push_back(Coarser(pyramid.back()));
   }
   for (size_t level = pyramid.size() - 1; level > 0; --level) {
     FillFrom(pyramid[level], pyramid[level - 1]);
   }
+  finest = std::move(pyramid.front());
+}
+
+void WriteHoles(const Level& level, RenderResult& result) {
   for (int y = 0; y < result.image.height(); ++y) {
     for (int x = 0; x < result.image.width(); ++x) {
       if (result.coverage(x, y) != 0) continue;
       for (int channel = 0; channel < 3; ++channel) {
-        result.image(x, y, channel) = Srgb8FromLinear(pyramid[0](x, y).colour[channel]);
+        result.image(x, y, channel) = Srgb8FromLinear(level(x, y).colour[channel]);
       }
     }
   }
+}
+
+bool HasHoles(const RenderResult& result) {
+  const auto& covered = result.coverage.data();
+  return std::find(covered.begin(), covered.end(), 0) != covered.end();
+}
+
+/// What a view shows of a guessed point; empty where it looks at something nearer, or off its
+/// image.
+std::optional<Eigen::Vector3d> GuessFrom(const View& view, double delta_inverse_depth,
+                                         const Eigen::Vector3d& p_in_cam) {
+  const auto pixel = view.camera.PixelFromCam(p_in_cam);
+  if (!pixel || !view.camera.Contains(*pixel)) return std::nullopt;
+  const float depth = view.depth(static_cast<int>(pixel->x()) / view.depth_scale,
+                                 static_cast<int>(pixel->y()) / view.depth_scale);
+  if (!DepthImage::IsHole(depth) &&
+      1.0 / static_cast<double>(depth) > 1 / p_in_cam.z() + delta_inverse_depth) {
+    return std::nullopt;
+  }
+  return ColourAt(view, *pixel);
+}
+
+/// SPEC 7.2 for one picture: the views to ask and where they stand.
+class GuessedColours {
+ public:
+  GuessedColours(const RenderScene& scene, const std::vector<int>& views_used,
+                 const PinholeCamera& novel, const Pose& novel_from_world,
+                 const RenderOptions& options)
+      : novel_(novel), blend_(BlendParametersOf(options, novel.fx_px())) {
+    const size_t count = std::min(views_used.size(), static_cast<size_t>(options.views));
+    std::vector<int> order(views_used.begin(),
+                           views_used.begin() + static_cast<std::ptrdiff_t>(count));
+    std::sort(order.begin(), order.end(), [&](int a, int b) {
+      const std::string &id_a = scene.views[static_cast<size_t>(a)]->id,
+                        &id_b = scene.views[static_cast<size_t>(b)]->id;
+      return id_a != id_b ? id_a < id_b : a < b;
+    });
+    for (const int index : order) {
+      const View& view = *scene.views[static_cast<size_t>(index)];
+      const Eigen::Quaterniond view_from_novel =
+          (view.cam_from_world.rotation.normalized() *
+           novel_from_world.rotation.normalized().conjugate());
+      const Eigen::Vector3d center_in_novel =
+          novel_from_world.rotation.normalized() *
+          (view.CenterInWorld() - novel_from_world.TargetOriginInSource());
+      views_.push_back({&view, view_from_novel.toRotationMatrix(), center_in_novel,
+                        ThresholdsOf(view, options).delta});
+    }
+  }
+
+  std::optional<Eigen::Vector3d> At(int x, int y, double inverse_depth) const {
+    const Eigen::Vector3d point = novel_.RayFromPixel({x + 0.5, y + 0.5}) / inverse_depth;
+    std::vector<double> angles;
+    std::vector<Eigen::Vector3d> colours;
+    for (const Placed& placed : views_) {
+      const auto colour = GuessFrom(*placed.view, placed.delta_inverse_depth,
+                                    placed.view_from_novel * (point - placed.center_in_novel));
+      if (!colour) continue;
+      colours.push_back(*colour);
+      angles.push_back(AngleBetween(placed.center_in_novel - point, -point));
+    }
+    if (colours.empty()) return std::nullopt;
+    std::vector<double> shares(angles.size());
+    BlendShares(blend_, angles, shares);
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (size_t i = 0; i < colours.size(); ++i) sum += shares[i] * colours[i];
+    return sum;
+  }
+
+ private:
+  struct Placed {
+    const View* view;
+    Eigen::Matrix3d view_from_novel;
+    Eigen::Vector3d center_in_novel;
+    double delta_inverse_depth;
+  };
+  const PinholeCamera novel_;
+  const BlendParameters blend_;
+  std::vector<Placed> views_;
+};
+
+}  // namespace
+
+void FillHoles(RenderResult& result) {
+  if (!HasHoles(result)) return;
+  Level level = FinestLevel(result);
+  PushPull(level);
+  WriteHoles(level, result);
+}
+
+void FillHolesFromViews(const RenderScene& scene, const PinholeCamera& novel,
+                        const Pose& novel_from_world, const RenderOptions& options,
+                        RenderResult& result) {
+  if (!HasHoles(result)) return;
+  Level known = FinestLevel(result);
+  Level guess = known;
+  PushPull(guess);
+  const GuessedColours colours(scene, result.views_used, novel, novel_from_world, options);
+  ParallelFor(0, known.height(), options.threads, [&](int y) {
+    for (int x = 0; x < known.width(); ++x) {
+      if (known(x, y).weight > 0 || !(guess(x, y).weight > 0)) continue;
+      const auto colour = colours.At(x, y, guess(x, y).inverse_depth);
+      if (colour) known(x, y) = {*colour, guess(x, y).inverse_depth, 1};
+    }
+  });
+  PushPull(known);
+  WriteHoles(known, result);
 }
 
 }  // namespace dtr

@@ -1,14 +1,26 @@
 // dtr/render/fill_holes.h -- SPEC 7: a guess for what no view saw, apart from rendering.
 #pragma once
+#include "dtr/render/options.h"
 #include "dtr/render/result.h"
+#include "dtr/render/scene.h"
 
 namespace dtr {
 
-/// Fills the image where coverage is 0; covered pixels, depth, coverage, view counts and
+/// SPEC 7.1. Fills the image where coverage is 0; covered pixels, depth, coverage, view counts and
 /// coverage_share stay as they are: a guess is never counted as seen. Push-pull (Gortler et al.,
 /// The Lumigraph, 1996) in linear light that takes colours from the background: of the cells around
 /// a hole the farthest has the most say, for what a view did not see was hidden by something
 /// nearer. Work is linear in the pixels. A picture without any covered pixel stays black.
 void FillHoles(RenderResult& result);
+
+/// SPEC 7.2. The same, but the guess is of depth: push-pull gives each hole an inverse depth, the
+/// views used show what colour they see at that point (where they see nothing nearer), and only
+/// what none of them shows is filled from its surroundings. Skies and textureless walls, where
+/// depth maps have holes and photos do not, come out as photographed. `result` is the picture
+/// Render made of `scene` with the other arguments, before any filling. Does not depend on the
+/// number of threads.
+void FillHolesFromViews(const RenderScene& scene, const PinholeCamera& novel,
+                        const Pose& novel_from_world, const RenderOptions& options,
+                        RenderResult& result);
 
 }  // namespace dtr

@@ -258,5 +258,50 @@ TEST(Render, MaskedPixelsAreNeitherShownNorInTheWay) {
   }
 }
 
+TEST(FillHolesFromViews, ASkyWithoutDepthComesOutAsPhotographedAndIsNotSeen) {
+  // A square before nothing: its depth maps have holes where the photos show a level sky.
+  std::vector<View> views;
+  for (int i = 0; i < 3; ++i) {
+    View view = Photograph(Square(0, 0, 8, 2),
+                           ShotFrom("v" + std::to_string(i), {0.4 * (i - 1), 0, 0}, {0, 0, 8}));
+    for (int y = 0; y < 72; ++y) {
+      for (int x = 0; x < 96; ++x) {
+        if (view.depth(x, y) > 0) continue;
+        for (int c = 0; c < 3; ++c) view.image(x, y, c) = 210;
+      }
+    }
+    views.push_back(std::move(view));
+  }
+  const DtrSet set = SetOf(std::move(views));
+  const Shot novel = ShotFrom("n", {0.2, 0.1, 0}, {0, 0, 8});
+  RenderOptions options;
+  const RenderResult bare =
+      Render(MakeRenderScene(set), novel.camera, novel.cam_from_world, options);
+  options.fill_holes = true;
+  options.threads = 1;
+  const RenderResult filled =
+      Render(MakeRenderScene(set), novel.camera, novel.cam_from_world, options);
+  options.threads = 3;
+  ExpectSameBytes(filled,
+                  Render(MakeRenderScene(set), novel.camera, novel.cam_from_world, options));
+  EXPECT_EQ(bare.coverage, filled.coverage);
+  EXPECT_EQ(bare.depth, filled.depth);
+  EXPECT_EQ(bare.view_count, filled.view_count);
+  EXPECT_EQ(bare.coverage_share, filled.coverage_share);
+  int off = 0, holes = 0;
+  for (int y = 0; y < 72; ++y) {
+    for (int x = 0; x < 96; ++x) {
+      if (bare.coverage(x, y) != 0) {
+        ASSERT_EQ(PixelDifference(bare.image, filled.image, x, y), 0);
+        continue;
+      }
+      ++holes;
+      off += filled.image(x, y, 0) != 210;
+    }
+  }
+  EXPECT_GT(holes, 3000);
+  EXPECT_LE(off, 200);  // the square's outline is 200 pixels long; there bilinear colours mix
+}
+
 }  // namespace
 }  // namespace dtr::cpu

@@ -1,11 +1,11 @@
-#include "dtr/cpu/texture.h"
+#include "dtr/render/texture.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "dtr/render/colour.h"
 
-namespace dtr::cpu {
+namespace dtr {
 
 std::optional<Eigen::Vector3d> ColourAt(const View& view, const Eigen::Vector2d& pixel) {
   const ImageRgb8& image = view.image;
@@ -34,4 +34,4 @@ std::optional<Eigen::Vector3d> ColourAt(const View& view, const Eigen::Vector2d&
   return Eigen::Vector3d(sum.cwiseProduct(view.gain) / weight_sum);
 }
 
-}  // namespace dtr::cpu
+}  // namespace dtr
