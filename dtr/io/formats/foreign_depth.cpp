@@ -1,6 +1,7 @@
 #include "dtr/io/formats/foreign_depth.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <string>
 

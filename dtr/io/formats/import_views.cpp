@@ -1,6 +1,7 @@
 #include "dtr/io/formats/import_views.h"
 
 #include <algorithm>
+#include <cctype>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <span>
@@ -67,9 +68,15 @@ ImageRgb8 ReadCameraImage(const NamedCamera& named, const fs::path& file) {
   return ReadImage(file);
 }
 
+bool HoldsWholeNumbers(const fs::path& depth_file) {
+  std::string extension = depth_file.extension().string();
+  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return extension == ".png";
+}
+
 DepthImage ReadCameraDepth(const NamedCamera& named, const ImportOptions& options) {
   const fs::path file = DepthFileOf(named, options);
-  if (!options.depth_unit && (file.extension() == ".png" || file.extension() == ".PNG")) {
+  if (!options.depth_unit && HoldsWholeNumbers(file)) {
     throw UsageError(file.string() +
                      ": 16-bit PNG holds whole numbers; state their unit (--depth-unit, 0.001 for "
                      "millimetres in a set in metres)");
