@@ -39,7 +39,7 @@ struct RenderOptions {
   int blend_k = 3;                              ///< k of kKNearest, power of kInverseAngle
   double max_angle_rad = std::numbers::pi / 3;  ///< valid views, SPEC 1
   double delta_px = 1.0;                        ///< Delta of SPEC 4, pixels of disparity
-  double depth_break_px = 2.0;  ///< break threshold of SPEC 2.3, pixels of disparity
+  double depth_break_px = 1.0;  ///< break threshold of SPEC 2.3, pixels of disparity
   /// The report's absolute thresholds, in scene units; when set they replace the scale-free ones.
   std::optional<double> absolute_delta;
   std::optional<double> absolute_depth_break;
