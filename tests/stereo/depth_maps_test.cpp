@@ -1,0 +1,184 @@
+#include "stereo/depth_maps.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+
+#include "tests/stereo/synthetic_scene.h"
+
+namespace dtr::stereo {
+namespace {
+
+using Eigen::Vector3d;
+using testing::Facing;
+
+const PinholeCamera kCamera(64, 48, 50, 50, 32, 24);
+constexpr float kWallZ = 4;
+
+/// Gives every view a wall at z = 4 with a wrong pixel at (view + 5, 10).
+class WallEngine final : public Engine {
+ public:
+  std::string name() const override { return "wall"; }
+  DepthEstimate Estimate(std::span<const StereoView>, int reference, std::span<const int>,
+                         const DepthRange&, const EngineOptions&) const override {
+    ++calls;
+    if (reference == refuse) throw NoUsablePair("view " + std::to_string(reference) + ": no pair");
+    DepthEstimate e{DepthImage(64, 48), Grid<float>(64, 48, 1, 0.01f)};
+    std::fill(e.depth.grid().data().begin(), e.depth.grid().data().end(), kWallZ);
+    e.depth(reference + 5, 10) = 2;
+    return e;
+  }
+  mutable std::atomic<int> calls{0};
+  int refuse = -1;
+};
+
+class Recorder final : public Progress {
+ public:
+  void Stage(const std::string&, int) override {}
+  void Update(int done) override { updates = done; }
+  void Note(const std::string& line) override { notes.push_back(line); }
+  bool StopRequested() const override { return updates >= stop_after; }
+  int updates = 0, stop_after = 1000;
+  std::vector<std::string> notes;
+};
+
+struct Row {
+  std::vector<StereoView> views;
+  SparseScene scene;
+};
+
+/// Cameras side by side before a wall of points.
+Row Cameras(int count) {
+  Row row;
+  Random random(2);
+  for (int i = 0; i < 60; ++i) {
+    row.scene.points.push_back({{random.Uniform(-2, 3), random.Uniform(-1, 1), kWallZ}});
+  }
+  for (int v = 0; v < count; ++v) {
+    row.views.push_back({kCamera, Facing({0.4 * v, 0, 0}), nullptr, nullptr});
+    for (int i = 0; i < 60; ++i) row.scene.observations.push_back({v, i, {0, 0}});
+  }
+  return row;
+}
+
+DepthMapsOptions Options(int neighbours, int threads, int min_agreeing = 1) {
+  DepthMapsOptions options;
+  options.neighbours.count = neighbours;
+  options.engine.threads = threads;
+  options.consistency.min_agreeing = min_agreeing;
+  return options;
+}
+
+using Results = std::vector<std::pair<int, DepthEstimate>>;
+
+Results Compute(const Row& row, const Engine& engine, const DepthMapsOptions& options,
+                Progress& progress, const std::function<bool(int)>& done = {}) {
+  Results results;
+  ComputeDepthMaps(row.views, row.scene, engine, options, progress, done,
+                   [&](int view, DepthEstimate&& e, const DepthRange& range) {
+                     EXPECT_LT(range.near_z, kWallZ);
+                     EXPECT_GT(range.far_z, kWallZ);
+                     results.emplace_back(view, std::move(e));
+                   });
+  return results;
+}
+
+TEST(ComputeDepthMaps, HandsOutEveryViewOnceInOrderWithWrongPixelsRemoved) {
+  WallEngine engine;
+  Recorder progress;
+  const Results results = Compute(Cameras(5), engine, Options(2, 2), progress);
+  ASSERT_EQ(results.size(), 5u);
+  for (int v = 0; v < 5; ++v) {
+    EXPECT_EQ(results[static_cast<size_t>(v)].first, v);
+    const DepthImage& depth = results[static_cast<size_t>(v)].second.depth;
+    EXPECT_TRUE(DepthImage::IsHole(depth(v + 5, 10)));
+    EXPECT_EQ(depth(32, 24), kWallZ);
+  }
+  EXPECT_EQ(engine.calls, 5);
+  EXPECT_EQ(progress.updates, 5);
+}
+
+TEST(ComputeDepthMaps, ResumesToTheSameBytesAndComputesOnlyWhatIsNeeded) {
+  WallEngine engine;
+  Recorder progress;
+  const Row row = Cameras(8);
+  const DepthMapsOptions options = Options(2, 1);
+  const Results all = Compute(row, engine, options, progress);
+  engine.calls = 0;
+  const Results last =
+      Compute(row, engine, Options(2, 4), progress, [](int view) { return view != 7; });
+  ASSERT_EQ(last.size(), 1u);
+  EXPECT_EQ(last[0].first, 7);
+  EXPECT_EQ(last[0].second.depth, all[7].second.depth);
+  EXPECT_EQ(engine.calls, 3);  // itself and its two neighbours
+}
+
+TEST(ComputeDepthMaps, WithoutTheFilterNothingIsRemoved) {
+  WallEngine engine;
+  Recorder progress;
+  const Results results = Compute(Cameras(3), engine, Options(5, 2, 0), progress);
+  EXPECT_EQ(results[0].second.depth(5, 10), 2);
+}
+
+TEST(ComputeDepthMaps, AViewWithoutAPairGetsHolesAndANote) {
+  WallEngine engine;
+  engine.refuse = 1;
+  Recorder progress;
+  const Results results = Compute(Cameras(4), engine, {}, progress);
+  ASSERT_EQ(results.size(), 4u);
+  EXPECT_TRUE(DepthImage::IsHole(results[1].second.depth(32, 24)));
+  ASSERT_EQ(progress.notes.size(), 1u);
+  EXPECT_NE(progress.notes[0].find("view 1"), std::string::npos);
+}
+
+TEST(ComputeDepthMaps, StopsBetweenViewsWhenAsked) {
+  WallEngine engine;
+  Recorder progress;
+  progress.stop_after = 2;
+  EXPECT_THROW(Compute(Cameras(6), engine, Options(5, 1), progress), Interrupted);
+  EXPECT_EQ(engine.calls, 2);
+}
+
+TEST(ComputeDepthMaps, GivenRangesReplaceThePoints) {
+  WallEngine engine;
+  Recorder progress;
+  Row row = Cameras(3);
+  row.scene = {};
+  EXPECT_THROW(Compute(row, engine, {}, progress), Error);
+  DepthMapsOptions options;
+  options.given_ranges.assign(3, {2, 8});
+  EXPECT_EQ(Compute(row, engine, options, progress).size(), 3u);
+  options.given_ranges.pop_back();
+  EXPECT_THROW(Compute(row, engine, options, progress), UsageError);
+}
+
+/// Two views of a wall; the second's map is at `other_z` everywhere.
+DepthEstimate FilteredAgainst(float other_z, double tolerance_px) {
+  const StereoView a{kCamera, Facing({0, 0, 0}), nullptr, nullptr};
+  const StereoView b{kCamera, Facing({0.4, 0, 0}), nullptr, nullptr};
+  DepthEstimate mine{DepthImage(64, 48), Grid<float>(64, 48, 1, 0.01f)}, other = mine;
+  for (float& z : mine.depth.grid().data()) z = kWallZ;
+  for (float& z : other.depth.grid().data()) z = other_z;
+  const OtherDepth others[] = {{&b, &other}};
+  return FilterByConsistency(a, mine, others, {.min_agreeing = 1, .tolerance_px = tolerance_px}, 2);
+}
+
+TEST(FilterByConsistency, KeepsWhatTheOtherMapConfirmsWithinTheTolerance) {
+  // 50 px * 0.4 * |1/4 - 1/5| = 1 px.
+  EXPECT_FALSE(DepthImage::IsHole(FilteredAgainst(4, 0.5).depth(32, 24)));
+  EXPECT_FALSE(DepthImage::IsHole(FilteredAgainst(5, 1.01).depth(32, 24)));
+  EXPECT_TRUE(DepthImage::IsHole(FilteredAgainst(5, 0.99).depth(32, 24)));
+  EXPECT_TRUE(DepthImage::IsHole(FilteredAgainst(3, 0.99).depth(32, 24)));
+}
+
+TEST(FilterByConsistency, RemovesWhatNobodyElseSees) {
+  // The second camera stands 0.4 to the right: at z = 4 it misses the leftmost 5 columns.
+  const DepthEstimate kept = FilteredAgainst(4, 0.5);
+  EXPECT_TRUE(DepthImage::IsHole(kept.depth(4, 24)));
+  EXPECT_EQ(kept.inverse_depth_sigma(4, 24), 0);
+  EXPECT_FALSE(DepthImage::IsHole(kept.depth(5, 24)));
+}
+
+}  // namespace
+}  // namespace dtr::stereo
