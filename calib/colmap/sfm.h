@@ -33,11 +33,14 @@ inline constexpr int kExhaustiveLimit = 60;
 
 struct SfmOptions {
   Matching matching = Matching::kAuto;
-  int threads = 0;                           ///< 0: all cores
-  std::uint64_t seed = 0;                    ///< of COLMAP's random choices
-  double memory_gb = 4;                      ///< COLMAP stays below this many GiB
-  int max_image_size_px = 0;                 ///< long side for features; 0: from the memory
-  std::string lens_model = "SIMPLE_RADIAL";  ///< COLMAP's name
+  int threads = 0;            ///< 0: all cores
+  std::uint64_t seed = 0;     ///< of COLMAP's random choices
+  double memory_gb = 4;       ///< COLMAP stays below this many GiB
+  int max_image_size_px = 0;  ///< long side for features; 0: from the memory
+  /// COLMAP's name. On the 11 photos of Sceaux castle (a compact camera), 8900 points each, the
+  /// mean reprojection error is 0.613 px with SIMPLE_RADIAL, 0.532 with RADIAL, 0.522 with OPENCV,
+  /// whose fx and fy then differ by 0.8 %: more freedom than a sensor of square pixels has.
+  std::string lens_model = "RADIAL";
   bool share_intrinsics_within_group = true;
 };
 
