@@ -25,8 +25,8 @@ struct HeldOutResult {
 /// source's frozen intrinsics; another gets its focal length estimated with its pose.
 ///
 /// Each photo is matched with source photos alone, in a database of its own, by programs of its
-/// own: neither the model nor the pose of another held-out photo can depend on it (with one thread
-/// per program and one seed, that also makes the poses repeatable). Up to kExhaustiveLimit sources
+/// own: neither the model nor the pose of another held-out photo can depend on it. Poses are frozen
+/// by checkpoints, not repeatable from scratch (see RunSfm). Up to kExhaustiveLimit sources
 /// all are matched, beyond that the most resembling ones. Checkpoints and errors as in RunSfm; a
 /// photo that COLMAP cannot place is no error but listed in not_registered.
 HeldOutResult RegisterHeldOut(const std::filesystem::path& images_dir,

@@ -34,7 +34,7 @@ inline constexpr int kExhaustiveLimit = 60;
 struct SfmOptions {
   Matching matching = Matching::kAuto;
   int threads = 0;            ///< 0: all cores
-  std::uint64_t seed = 0;     ///< of COLMAP's random choices
+  std::uint64_t seed = 0;     ///< of COLMAP's random choices, as far as it heeds it
   double memory_gb = 4;       ///< COLMAP stays below this many GiB
   int max_image_size_px = 0;  ///< long side for features; 0: from the memory
   /// COLMAP's name. On the 11 photos of Sceaux castle (a compact camera), 8900 points each, the
@@ -75,7 +75,8 @@ struct SfmResult {
 /// The workspace keeps per step the arguments, log, exit code and cost (sfm_run.json, logs/), the
 /// database and the frozen result (model/, COLMAP binary, original names). A second call with the
 /// same photos (by content), options and COLMAP version returns the frozen result; an interrupted
-/// one goes on after its last finished step. COLMAP with several threads is not repeatable.
+/// one goes on after its last finished step. From scratch COLMAP is not repeatable: 3.8 seeds the
+/// threads of its matchers from the clock, so that even one thread and one seed give other points.
 ///
 /// Throws UsageError on inputs that cannot be meant (fewer than two photos, names twice, an unknown
 /// lens model), Interrupted when asked to stop (the program is ended), Error when COLMAP is
