@@ -75,8 +75,8 @@ struct SfmResult {
 /// The workspace keeps per step the arguments, log, exit code and cost (sfm_run.json, logs/), the
 /// database and the frozen result (model/, COLMAP binary, original names). A second call with the
 /// same photos (by content), options and COLMAP version returns the frozen result; an interrupted
-/// one goes on after its last finished step. From scratch COLMAP is not repeatable: 3.8 seeds the
-/// threads of its matchers from the clock, so that even one thread and one seed give other points.
+/// one goes on after its last finished step. From scratch COLMAP is not repeatable:
+/// two runs of 3.8 with one thread and one seed gave 1339 and 1371 points of the same four photos.
 ///
 /// Throws UsageError on inputs that cannot be meant (fewer than two photos, names twice, an unknown
 /// lens model), Interrupted when asked to stop (the program is ended), Error when COLMAP is
