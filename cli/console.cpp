@@ -8,8 +8,6 @@
 #include <cmath>
 #include <cstdio>
 
-#include "dtr/base/error.h"
-
 namespace dtr::cli {
 namespace {
 
@@ -78,11 +76,7 @@ void Console::Say(const std::string& line) {
   std::fflush(stdout);
 }
 
-void Console::ThrowIfInterrupted() const {
-  if (g_interrupted != 0) {
-    throw Interrupted("interrupted; what was finished is kept, the same command continues");
-  }
-}
+bool Console::StopRequested() const { return g_interrupted != 0; }
 
 void Console::FinishStage() {
   if (!terminal_ || stage_.empty()) return;

@@ -18,8 +18,7 @@ class Console final : public Progress {
   void Stage(const std::string& name, int total) override;
   void Update(int done) override;
   void Note(const std::string& line) override;
-  /// Throws Interrupted after Ctrl-C or SIGTERM.
-  void ThrowIfInterrupted() const override;
+  bool StopRequested() const override;  ///< after Ctrl-C or SIGTERM
 
   /// A result for people.
   void Say(const std::string& line);

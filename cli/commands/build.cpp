@@ -1,0 +1,80 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "cli/command.h"
+#include "cli/pipeline/build_set.h"
+
+namespace dtr::cli {
+namespace {
+
+void SayResult(const pipeline::BuildOptions& options, const pipeline::BuildReport& report,
+               Console& console) {
+  const auto& views = report.set.frames.front().views;
+  const auto held_out = std::count_if(
+      views.begin(), views.end(), [](const View& view) { return view.role == ViewRole::kHeldOut; });
+  console.Say(fmt::format("{}: {} views to render from, {} held out", options.output.string(),
+                          static_cast<long>(views.size()) - held_out, held_out));
+  for (const std::string& name : report.not_registered) {
+    console.Say(fmt::format("  not registered: {}", name));
+  }
+  for (const auto& [name, reason] : report.skipped) {
+    console.Say(fmt::format("  skipped: {}: {}", name, reason));
+  }
+  if (report.validated) {
+    console.Say(report.validation_passed
+                    ? "  calibration: reprojection tests passed"
+                    : "  calibration: REPROJECTION TESTS FAILED; dtr validate says which");
+  }
+}
+
+}  // namespace
+
+void AddBuildCommand(CLI::App& app) {
+  AddCommand(
+      app, "build", "Build a D+TR set from a folder of photos",
+      "dtr build photos/ -o scene.dtr --holdout every:8", [](CLI::App& command) -> Action {
+        auto options = std::make_shared<pipeline::BuildOptions>();
+        command.add_option("PHOTOS", options->photos, "Folder of photos")->required();
+        command.add_option("-o,--output", options->output, "The set to write, NAME.dtr")
+            ->required()
+            ->type_name("SET.dtr");
+        command
+            .add_option("--holdout", options->holdout,
+                        "Photos kept out of depth and textures, to measure with")
+            ->type_name("every:N|NAME,...");
+        command.add_flag("--holdout-strict", options->holdout_strict,
+                         "Keep them out of SfM too and register them afterwards");
+        command.add_option("--engine", options->engine, "Depth engine [sgbm]")
+            ->check(CLI::IsMember({"sgbm", "none"}))
+            ->type_name("sgbm|none");
+        command
+            .add_option("--preset", options->preset, "Long side 800, 1024 or full size [balanced]")
+            ->check(CLI::IsMember({"fast", "balanced", "best"}))
+            ->type_name("fast|balanced|best");
+        command
+            .add_option("--max-size", options->max_size_px,
+                        "Long side of the set's images; 0 = full size; overrides the preset")
+            ->check(CLI::Range(0, 65536))
+            ->type_name("PX");
+        command.add_option("--memory", options->memory_gb, "Memory to stay within [4]")
+            ->check(CLI::Range(0.5, 4096.0))
+            ->type_name("GB");
+        command
+            .add_option(
+                "--poses", options->poses,
+                "Known cameras: a COLMAP model, cameras.json or poses_bounds.npy; no SfM then")
+            ->type_name("FILE");
+        command.add_flag("--force", options->force, "Replace a set that exists");
+        return [options](const Context& context) -> int {
+          options->threads = context.common.threads;
+          options->seed = context.common.seed;
+          const auto report = pipeline::BuildSet(*options, context.console);
+          SayResult(*options, report, context.console);
+          context.EmitJson(report.json);
+          return kDone;
+        };
+      });
+}
+
+}  // namespace dtr::cli

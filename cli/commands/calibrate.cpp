@@ -1,0 +1,75 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "calib/colmap/model_io.h"
+#include "capture/ingest.h"
+#include "cli/command.h"
+#include "cli/pipeline/calibrated_photos.h"
+#include "dtr/base/error.h"
+
+namespace dtr::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Options {
+  fs::path photos, output;
+  double memory_gb = 4;
+};
+
+int RunCalibratePhotos(const Options& options, const Context& context) {
+  if (fs::exists(options.output / "cameras.bin")) {
+    throw UsageError(fmt::format("{}: holds a model already; remove it or choose another folder",
+                                 options.output.string()));
+  }
+  const auto photos = capture::IngestPhotos(options.photos, {}, context.console);
+  capture::RequireEnoughPhotos(photos, options.photos);
+  pipeline::CalibrateOptions calibrate;
+  calibrate.threads = context.common.threads;
+  calibrate.seed = context.common.seed;
+  calibrate.memory_gb = options.memory_gb;
+  // The workspace stays: it holds COLMAP's arguments, logs and database, and lets a run continue.
+  const auto calibrated =
+      pipeline::CalibratePhotos(photos, calibrate, options.output / "workspace", context.console);
+  colmap::WriteModel(options.output, calibrated.model, colmap::Format::kBinary);
+
+  context.console.Say(fmt::format("{}: {} of {} photos have a camera; {} points",
+                                  options.output.string(), calibrated.model.images.size(),
+                                  photos.photos.size(), calibrated.model.points.size()));
+  for (const std::string& name : calibrated.not_registered) {
+    context.console.Say("  not registered: " + name);
+  }
+  auto json = nlohmann::ordered_json::parse(calibrated.report_json);
+  json["engine"] = calibrated.engine;
+  json["registered"] = calibrated.model.images.size();
+  json["not_registered"] = calibrated.not_registered;
+  context.EmitJson(json.dump(1));
+  return kDone;
+}
+
+}  // namespace
+
+void AddCalibrateCommand(CLI::App& app) {
+  CLI::App* calibrate = app.add_subcommand("calibrate", "Find cameras");
+  calibrate->require_subcommand(1);
+  AddCommand(*calibrate, "photos", "Calibrate a folder of photos by structure from motion",
+             "dtr calibrate photos photos/ -o calibration/", [](CLI::App& command) -> Action {
+               auto options = std::make_shared<Options>();
+               command.add_option("PHOTOS", options->photos, "Folder of photos")->required();
+               command
+                   .add_option("-o,--output", options->output,
+                               "Folder for the COLMAP model and its workspace")
+                   ->required()
+                   ->type_name("DIR");
+               command.add_option("--memory", options->memory_gb, "Memory to stay within [4]")
+                   ->check(CLI::Range(0.5, 4096.0))
+                   ->type_name("GB");
+               return [options](const Context& context) {
+                 return RunCalibratePhotos(*options, context);
+               };
+             });
+}
+
+}  // namespace dtr::cli

@@ -1,0 +1,89 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <map>
+
+#include "calib/colmap/export.h"
+#include "calib/colmap/model_io.h"
+#include "cli/command.h"
+#include "dtr/base/error.h"
+#include "dtr/io/image_io.h"
+#include "dtr/io/set_io.h"
+
+namespace dtr::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Options {
+  fs::path set, output;
+  std::string format = "colmap";
+  bool text = false;
+};
+
+// A photo's name with the extension of what the set stores, so that other programs are not misled;
+// the whole name is kept where two photos differ only in theirs.
+void NameByStoredFormat(std::vector<View>& views) {
+  std::map<std::string, int> stems;
+  for (const View& view : views) ++stems[fs::path(view.name).replace_extension().string()];
+  for (View& view : views) {
+    const std::string extension = fs::path(view.image_file->path).extension().string();
+    const fs::path stem = fs::path(view.name).replace_extension();
+    view.name = stems[stem.string()] > 1 ? view.name + extension : stem.string() + extension;
+  }
+}
+
+void ExportImages(const fs::path& folder, const DtrSet& set, const fs::path& target) {
+  for (const View& view : set.frames.front().views) {
+    const fs::path file = target / view.name;
+    fs::create_directories(file.parent_path());
+    fs::copy_file(folder / view.image_file->path, file, fs::copy_options::overwrite_existing);
+  }
+}
+
+int RunExport(const Options& options, const Context& context) {
+  if (fs::exists(options.output)) {
+    throw UsageError(
+        fmt::format("{}: exists already; choose another folder", options.output.string()));
+  }
+  DtrSet set = io::ReadSet(options.set);
+  io::LoadOptions load;
+  load.depth = false;
+  load.threads = context.common.threads;
+  for (View& view : set.frames.front().views) io::LoadPixels(options.set, view, load);
+  NameByStoredFormat(set.frames.front().views);
+  const SparseScene sparse = set.sparse_file ? io::LoadSparse(options.set, set) : SparseScene{};
+  const calib::SfmModel model = colmap::ModelFromViews(set, sparse);
+
+  const fs::path partial = options.output.string() + ".partial";
+  fs::remove_all(partial);
+  ExportImages(options.set, set, partial / "images");
+  colmap::WriteModel(partial / "sparse", model,
+                     options.text ? colmap::Format::kText : colmap::Format::kBinary);
+  fs::rename(partial, options.output);
+  context.console.Say(fmt::format("{}: {} images, {} points", options.output.string(),
+                                  model.images.size(), model.points.size()));
+  context.EmitJson(
+      fmt::format("{{\"images\": {}, \"points\": {}}}", model.images.size(), model.points.size()));
+  return kDone;
+}
+
+}  // namespace
+
+void AddExportCommand(CLI::App& app) {
+  AddCommand(app, "export", "Write a set's cameras, points and images for another program",
+             "dtr export scene.dtr --format colmap -o colmap/", [](CLI::App& command) -> Action {
+               auto options = std::make_shared<Options>();
+               command.add_option("SET", options->set, "The set")->required();
+               command.add_option("--format", options->format, "Format [colmap]")
+                   ->check(CLI::IsMember({"colmap"}))
+                   ->type_name("colmap");
+               command.add_flag("--text", options->text, "COLMAP's text files instead of binary");
+               command.add_option("-o,--output", options->output, "Folder to write")
+                   ->required()
+                   ->type_name("DIR");
+               return [options](const Context& context) { return RunExport(*options, context); };
+             });
+}
+
+}  // namespace dtr::cli

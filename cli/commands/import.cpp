@@ -1,0 +1,79 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <map>
+
+#include "cli/command.h"
+#include "cli/pipeline/camera_files.h"
+#include "dtr/base/error.h"
+#include "dtr/io/formats/import_views.h"
+
+namespace dtr::cli {
+namespace {
+
+struct Options {
+  std::filesystem::path cameras, output;
+  std::string format, depth_kind;
+  io::ImportOptions import;
+  std::string held_out;
+  bool force = false;
+};
+
+int RunImport(Options options, const Context& context) {
+  const auto cameras =
+      pipeline::ReadCameraFile(options.cameras, options.format, options.import.images_dir);
+  if (options.depth_kind == "z") options.import.depth_kind = DepthKind::kPlaneZ;
+  if (options.depth_kind == "ray") options.import.depth_kind = DepthKind::kRayDistance;
+  options.import.held_out = pipeline::NamesHeldOut(options.held_out, cameras.list);
+  options.import.threads = context.common.threads;
+  io::ImportSet(cameras.list, options.import, options.output, options.force,
+                cameras.points ? &*cameras.points : nullptr, context.console);
+  context.console.Say(fmt::format("{}: {} views, {} held out", options.output.string(),
+                                  cameras.list.cameras.size(), options.import.held_out.size()));
+  context.EmitJson(fmt::format("{{\"views\": {}}}", cameras.list.cameras.size()));
+  return kDone;
+}
+
+}  // namespace
+
+void AddImportCommand(CLI::App& app) {
+  AddCommand(
+      app, "import", "Make a set from others' cameras, images and depth maps",
+      "dtr import --cameras sparse/ --format colmap --images images/ --depth depth/ -o scene.dtr",
+      [](CLI::App& command) -> Action {
+        auto options = std::make_shared<Options>();
+        command.add_option("--cameras", options->cameras, "cameras.json, or what --format says")
+            ->required()
+            ->type_name("FILE");
+        command.add_option("--format", options->format, "Format of --cameras [by its name]")
+            ->check(CLI::IsMember(pipeline::CameraFormats()));
+        command.add_option("--images", options->import.images_dir, "Folder of undistorted images")
+            ->required()
+            ->type_name("DIR");
+        command
+            .add_option("--depth", options->import.depth_dir,
+                        "Folder of depth maps NAME.exr, .pfm, .png or .tif")
+            ->type_name("DIR");
+        command
+            .add_option("--depth-kind", options->depth_kind,
+                        "z: along the optical axis; ray: distance from the camera")
+            ->check(CLI::IsMember({"z", "ray"}));
+        command
+            .add_option("--depth-unit", options->import.depth_unit,
+                        "Scene units per number of a depth file (0.001: millimetres)")
+            ->check(CLI::PositiveNumber)
+            ->type_name("U");
+        command.add_option("--masks", options->import.mask_dir, "Folder of masks")
+            ->type_name("DIR");
+        command
+            .add_option("--holdout", options->held_out, "Views kept without depth, to measure with")
+            ->type_name("every:N|NAME,...");
+        command.add_option("-o,--output", options->output, "The set to write, NAME.dtr")
+            ->required()
+            ->type_name("SET.dtr");
+        command.add_flag("--force", options->force, "Replace a set that exists");
+        return [options](const Context& context) { return RunImport(*options, context); };
+      });
+}
+
+}  // namespace dtr::cli

@@ -1,0 +1,169 @@
+#include <fmt/format.h>
+
+#include <chrono>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "cli/command.h"
+#include "cli/novel_frames.h"
+#include "cli/render_options.h"
+#include "cli/video.h"
+#include "cli/view_names.h"
+#include "dtr/base/error.h"
+#include "dtr/cpu/renderer.h"
+#include "dtr/io/depth_io.h"
+#include "dtr/io/image_io.h"
+#include "dtr/io/set_io.h"
+#include "dtr/render/scene.h"
+
+namespace dtr::cli {
+namespace {
+
+namespace fs = std::filesystem;
+constexpr int kFramesPerSecond = 24;
+
+struct Options {
+  fs::path set, output, depth_out, coverage_out;
+  NovelCameraRequest request;
+  std::string exclude, renderer = "cpu";
+  std::shared_ptr<RenderOptions> render;
+};
+
+// Writes frames where --output says: one image, a folder of images, or a video.
+class FrameSink {
+ public:
+  FrameSink(const fs::path& output, bool several) : output_(output), several_(several) {
+    if (output.extension() == ".mp4") {
+      video_.emplace(output, kFramesPerSecond);
+    } else if (several) {
+      if (!output.extension().empty() && !fs::is_directory(output)) {
+        throw UsageError(
+            fmt::format("-o {}: several frames need a folder or an .mp4 file", output.string()));
+      }
+      fs::create_directories(output);
+    }
+  }
+  std::string Add(const NovelFrame& camera, const RenderResult& result, bool filled) {
+    if (video_) {
+      video_->Add(result.image);
+      return output_.string();
+    }
+    const fs::path file = several_ ? output_ / (camera.name + ".png") : output_;
+    // What no view saw is black with alpha 0, unless it was filled.
+    if (filled || file.extension() != ".png") {
+      io::WriteImage(file, result.image);
+    } else {
+      io::WriteImageWithAlpha(file, result.image, result.coverage);
+    }
+    return file.string();
+  }
+  void Finish(const Progress& progress) {
+    if (video_) video_->Finish(progress);
+  }
+
+ private:
+  fs::path output_;
+  bool several_;
+  std::optional<VideoWriter> video_;
+};
+
+void WritePlanes(const Options& options, const RenderResult& result) {
+  if (!options.depth_out.empty()) io::WriteExr(options.depth_out, result.depth.grid(), false);
+  if (!options.coverage_out.empty()) io::WriteMask(options.coverage_out, result.coverage);
+}
+
+nlohmann::ordered_json FrameJson(const std::string& file, double ms, const RenderScene& scene,
+                                 const RenderResult& result) {
+  auto used = nlohmann::ordered_json::array();
+  for (const int index : result.views_used) {
+    used.push_back(scene.views[static_cast<size_t>(index)]->name);
+  }
+  return {{"file", file}, {"ms", ms}, {"views_used", used}, {"coverage", result.coverage_share}};
+}
+
+int RunRender(const Options& options, const Context& context) {
+  const DtrSet described = io::ReadSet(options.set);
+  const auto cameras = NovelFrames(described, options.request);
+  const auto excluded = ResolveViewNames(described, options.exclude);
+  const bool several = cameras.size() > 1;
+  if (several && (!options.depth_out.empty() || !options.coverage_out.empty())) {
+    throw UsageError("--depth-out and --coverage-out go with a single camera");
+  }
+  RenderOptions render = *options.render;
+  render.threads = context.common.threads;
+  context.console.Stage("loading views", 0);
+  io::LoadOptions load;
+  load.threads = render.threads;
+  const DtrSet set = io::LoadSet(options.set, load);
+  const RenderScene scene = MakeRenderScene(set, excluded);
+
+  FrameSink sink(options.output, several);
+  nlohmann::ordered_json json{{"frames", nlohmann::ordered_json::array()}};
+  context.console.Stage("rendering", static_cast<int>(cameras.size()));
+  for (size_t i = 0; i < cameras.size(); ++i) {
+    context.console.ThrowIfInterrupted();
+    const auto start = std::chrono::steady_clock::now();
+    const RenderResult result =
+        cpu::Render(scene, cameras[i].camera, cameras[i].cam_from_world, render);
+    const std::chrono::duration<double, std::milli> ms = std::chrono::steady_clock::now() - start;
+    if (result.views_used.empty()) {
+      context.console.Note(
+          fmt::format("WARNING: {}: no view is valid for this camera: the picture "
+                      "is empty",
+                      cameras[i].name));
+    }
+    const std::string file = sink.Add(cameras[i], result, render.fill_holes);
+    WritePlanes(options, result);
+    json["frames"].push_back(FrameJson(file, ms.count(), scene, result));
+    context.console.Update(static_cast<int>(i) + 1);
+  }
+  sink.Finish(context.console);
+  context.console.Say(
+      fmt::format("{}: {} frame{}", options.output.string(), cameras.size(), several ? "s" : ""));
+  context.EmitJson(json.dump(1));
+  return kDone;
+}
+
+}  // namespace
+
+void AddRenderCommand(CLI::App& app) {
+  AddCommand(
+      app, "render", "Render new views of a set",
+      "dtr render scene.dtr --like IMG_4026 -o view.png", [](CLI::App& command) -> Action {
+        auto options = std::make_shared<Options>();
+        command.add_option("SET", options->set, "The set")->required();
+        command
+            .add_option("-o,--output", options->output,
+                        "One frame: an image; several: a folder or an .mp4 file")
+            ->required();
+        auto* where = command.add_option_group("where", "Where to look from (exactly one)");
+        where->add_option("--like", options->request.like, "From a view's place")
+            ->type_name("VIEW");
+        where->add_option("--camera", options->request.camera_file, "From a cameras.json")
+            ->type_name("FILE");
+        where->add_option("--path", options->request.path_file, "Along a cameras.json")
+            ->type_name("FILE");
+        where
+            ->add_option("--fly-through", options->request.fly_through_frames,
+                         "Along the set's own cameras, N frames")
+            ->check(CLI::Range(2, 100000))
+            ->type_name("N");
+        where->require_option(1);
+        command.add_option("--size", options->request.size, "Size; 0 keeps the proportions")
+            ->type_name("WxH");
+        command.add_option("--exclude", options->exclude, "Views not to render from")
+            ->type_name("NAME,...");
+        command.add_option("--renderer", options->renderer, "Renderer [cpu]")
+            ->check(CLI::IsMember({"cpu"}))
+            ->type_name("cpu");
+        command.add_option("--depth-out", options->depth_out, "Write the depth as float EXR")
+            ->type_name("FILE");
+        command.add_option("--coverage-out", options->coverage_out, "Write what was seen as PNG")
+            ->type_name("FILE");
+        options->render = AddRenderOptions(command);
+        return [options](const Context& context) { return RunRender(*options, context); };
+      });
+}
+
+}  // namespace dtr::cli

@@ -1,0 +1,40 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "cli/command.h"
+#include "cli/pipeline/recompute_depth.h"
+
+namespace dtr::cli {
+
+void AddStereoCommand(CLI::App& app) {
+  AddCommand(
+      app, "stereo", "Compute depth maps for a calibrated set",
+      "dtr stereo scene.dtr --engine sgbm -o with_depth.dtr", [](CLI::App& command) -> Action {
+        auto options = std::make_shared<pipeline::RecomputeOptions>();
+        command.add_option("SET", options->set, "The set")->required();
+        command
+            .add_option("-o,--output", options->output,
+                        "The set to write; without it SET itself is replaced, whole or not at all")
+            ->type_name("SET2");
+        command.add_option("--engine", options->engine, "Depth engine [sgbm]")
+            ->check(CLI::IsMember({"sgbm"}))
+            ->type_name("sgbm");
+        command.add_flag("--force", options->force, "Replace SET2 when it exists");
+        return [options](const Context& context) -> int {
+          options->threads = context.common.threads;
+          options->seed = context.common.seed;
+          const auto report = pipeline::RecomputeDepth(*options, context.console);
+          context.console.Say(fmt::format("{}: {} depth maps, {:.1f} % of the pixels have depth",
+                                          report.written.string(), report.depth_maps,
+                                          100 * report.depth_completeness));
+          context.EmitJson(
+              fmt::format("{{\"set\": \"{}\", \"depth_maps\": {}, \"depth_completeness\": {}}}",
+                          report.written.string(), report.depth_maps, report.depth_completeness));
+          return kDone;
+        };
+      });
+}
+
+}  // namespace dtr::cli

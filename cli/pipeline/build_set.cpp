@@ -1,0 +1,272 @@
+#include "cli/pipeline/build_set.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "calib/sparse_from_sfm.h"
+#include "calib/undistort.h"
+#include "capture/ingest.h"
+#include "cli/pipeline/calibrated_photos.h"
+#include "cli/pipeline/depth_stage.h"
+#include "cli/pipeline/holdout.h"
+#include "cli/pipeline/run_log.h"
+#include "cli/pipeline/validate_set.h"
+#include "dtr/base/error.h"
+#include "dtr/base/hash.h"
+#include "dtr/base/parallel_for.h"
+#include "dtr/io/set_io.h"
+#include "dtr/render/geometry.h"
+#include "stereo/engine.h"
+
+namespace dtr::pipeline {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::vector<std::string> NamesOf(const capture::Capture& capture) {
+  std::vector<std::string> names;
+  for (const capture::Photo& photo : capture.photos) names.push_back(photo.name);
+  return names;
+}
+
+Json OptionsJson(const BuildOptions& options, int max_size_px) {
+  // Everything that can change a byte of the set, and nothing else: threads and memory do not.
+  return {{"engine", options.engine},
+          {"max_size_px", max_size_px},
+          {"holdout", options.holdout},
+          {"holdout_strict", options.holdout_strict},
+          {"poses", options.poses.filename().string()},
+          {"seed", options.seed}};
+}
+
+// Photos by name, size and content: equal values mean the same input. Hashes of held-out photos are
+// for the fingerprint alone: nothing of their pixels may enter the set outside held_out/.
+Json PhotosJson(const capture::Capture& capture, const std::vector<bool>& with_hash) {
+  Json photos = Json::array();
+  for (size_t i = 0; i < capture.photos.size(); ++i) {
+    const capture::Photo& photo = capture.photos[i];
+    photos.push_back(
+        {{"name", photo.name}, {"width_px", photo.width_px}, {"height_px", photo.height_px}});
+    if (with_hash[i]) photos.back()["sha256"] = photo.source_sha256;
+  }
+  return photos;
+}
+
+std::string PosesHash(const std::filesystem::path& poses) {
+  if (poses.empty()) return "";
+  if (!std::filesystem::is_directory(poses)) return Sha256OfFile(poses);
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator(poses)) {
+    if (entry.is_regular_file()) files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end());
+  std::string all;
+  for (const auto& file : files) all += file.filename().string() + Sha256OfFile(file);
+  return Sha256(std::as_bytes(std::span(all)));
+}
+
+// Views of the registered photos, in the photos' order, with pixels on the set's grid.
+std::vector<View> UndistortPhotos(const capture::Capture& capture,
+                                  const CalibratedPhotos& calibrated,
+                                  const std::vector<bool>& held_out, int max_size_px, int threads,
+                                  Progress& progress) {
+  std::map<std::string, const calib::SfmImage*> registered;
+  for (const auto& image : calibrated.model.images) registered[image.name] = &image;
+  const bool undistorted =
+      std::all_of(calibrated.model.cameras.begin(), calibrated.model.cameras.end(),
+                  [](const auto& camera) { return camera.second.IsUndistorted(); });
+  if (undistorted) progress.Note("undistortion left out: no camera has distortion");
+  progress.Stage(undistorted ? "reading photos" : "undistorting",
+                 static_cast<int>(registered.size()));
+
+  std::vector<View> views;
+  for (size_t i = 0; i < capture.photos.size(); ++i) {
+    const capture::Photo& photo = capture.photos[i];
+    const auto found = registered.find(photo.name);
+    if (found == registered.end()) continue;
+    progress.ThrowIfInterrupted();
+    const calib::LensCamera& lens = calibrated.model.cameras.at(found->second->camera_id);
+    if (lens.width_px != photo.width_px || lens.height_px != photo.height_px) {
+      throw Error(
+          fmt::format("{}: the camera's image is {}x{}, the photo is {}x{}; give cameras for "
+                      "these photos",
+                      photo.name, lens.width_px, lens.height_px, photo.width_px, photo.height_px));
+    }
+    calib::UndistortedPhoto flat =
+        calib::Undistort(capture::ReadPhoto(photo), lens, max_size_px, threads);
+    View view;
+    view.id = photo.id;
+    view.name = photo.name;
+    view.role = held_out[i] ? ViewRole::kHeldOut : ViewRole::kSource;
+    view.camera = flat.camera;
+    view.cam_from_world = found->second->cam_from_world;
+    view.image = std::move(flat.image);
+    view.mask = std::move(flat.mask);
+    views.push_back(std::move(view));
+    progress.Update(static_cast<int>(views.size()));
+  }
+  return views;
+}
+
+SparseScene SparseOf(const CalibratedPhotos& calibrated, const std::vector<View>& views) {
+  std::vector<std::string> names;
+  std::vector<PinholeCamera> cameras;
+  for (const View& view : views) {
+    names.push_back(view.name);
+    cameras.push_back(view.camera);
+  }
+  return calib::ToSparseScene(calibrated.model, names, cameras);
+}
+
+// The points that the source views alone would know: held-out photos move nothing.
+std::vector<SparsePoint> SourcePoints(const SparseScene& sparse, const std::vector<View>& views) {
+  std::vector<bool> is_source;
+  for (const View& view : views) is_source.push_back(view.role == ViewRole::kSource);
+  return RestrictToViews(sparse, is_source).points;
+}
+
+void RequireTwoSources(const std::vector<View>& views, const CalibratedPhotos& calibrated) {
+  const auto sources = std::count_if(
+      views.begin(), views.end(), [](const View& view) { return view.role == ViewRole::kSource; });
+  if (sources >= 2) return;
+  throw Error(
+      fmt::format("calibration: expected at least 2 photos to build from, found {} with a camera "
+                  "({} photos have "
+                  "none); take more overlapping photos or give --poses",
+                  sources, calibrated.not_registered.size()));
+}
+
+Json ProvenanceJson(const BuildOptions& options, const Json& option_values, const Json& photos,
+                    const CalibratedPhotos& calibrated, const BuildReport& report) {
+  Json provenance;
+  provenance["tool"] = "dtr";
+  provenance["tool_version"] = DTR_VERSION;
+  provenance["calibration"] = Json::parse(calibrated.report_json);
+  provenance["calibration"]["engine"] = calibrated.engine;
+  provenance["depth_engine"] = options.engine;
+  provenance["options"] = option_values;
+  provenance["photos"] = photos;
+  provenance["not_registered"] = report.not_registered;
+  provenance["held_out_not_registered"] = report.held_out_not_registered;
+  provenance["skipped"] = Json::array();
+  for (const auto& [name, reason] : report.skipped) {
+    provenance["skipped"].push_back({{"name", name}, {"reason", reason}});
+  }
+  return provenance;
+}
+
+// The reprojection tests of every calibrated photo, held-out ones included.
+void Validate(DtrSet& set, const SparseScene& sparse, BuildReport& report, int threads,
+              Progress& progress) {
+  const calib::ValidationReport validation = ValidateSet(set, sparse, {}, threads);
+  report.validated = true;
+  report.validation_passed = validation.passed();
+  set.verdict_json = calib::ToJson(validation);
+  if (!report.validation_passed) {
+    progress.Note("WARNING: the calibration does not hold; see `dtr validate`");
+  }
+}
+
+Json ReportJson(const BuildReport& report, const RunLog& log, const std::filesystem::path& output) {
+  Json json;
+  json["set"] = output.string();
+  json["views"] = Json::array();
+  for (const View& view : report.set.frames.front().views) {
+    json["views"].push_back({{"name", view.name},
+                             {"role", view.role == ViewRole::kSource ? "source" : "held_out"},
+                             {"width_px", view.camera.width_px()},
+                             {"height_px", view.camera.height_px()}});
+  }
+  json["not_registered"] = report.not_registered;
+  json["skipped"] = Json::array();
+  for (const auto& [name, reason] : report.skipped) {
+    json["skipped"].push_back({{"name", name}, {"reason", reason}});
+  }
+  json["validation_passed"] = report.validated ? Json(report.validation_passed) : Json(nullptr);
+  json["stages"] = Json::array();
+  for (const io::RunStage& stage : log.stages()) {
+    json["stages"].push_back(
+        {{"name", stage.name}, {"wall_s", stage.wall_s}, {"cpu_s", stage.cpu_s}});
+  }
+  json["peak_memory_mib"] = static_cast<double>(PeakMemoryKib()) / 1024;
+  return json;
+}
+
+}  // namespace
+
+int MaxSizeOfPreset(const std::string& preset) {
+  if (preset == "fast") return 800;
+  if (preset == "balanced") return 1024;
+  if (preset == "best") return 0;
+  throw UsageError(fmt::format("--preset: expected fast, balanced or best, found '{}'", preset));
+}
+
+BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
+  const int max_size_px =
+      options.max_size_px >= 0 ? options.max_size_px : MaxSizeOfPreset(options.preset);
+  const auto engine = options.engine == "none" ? nullptr : stereo::MakeEngine(options.engine);
+  BuildReport report;
+  RunLog log;
+
+  log.Begin("capture");
+  const capture::Capture photos = capture::IngestPhotos(options.photos, {}, progress);
+  capture::RequireEnoughPhotos(photos, options.photos);
+  for (const auto& skipped : photos.skipped)
+    report.skipped.emplace_back(skipped.name, skipped.reason);
+  const std::vector<bool> held_out = ChooseHeldOut(options.holdout, NamesOf(photos));
+  std::vector<bool> is_source = held_out;
+  is_source.flip();
+  const Json option_values = OptionsJson(options, max_size_px);
+  const Json fingerprint = {
+      {"tool_version", DTR_VERSION},
+      {"options", option_values},
+      {"photos", PhotosJson(photos, std::vector<bool>(held_out.size(), true))},
+      {"poses_sha256", PosesHash(options.poses)}};
+  io::SetWriter writer(options.output, fingerprint.dump(), options.force);
+
+  log.Begin("calibration");
+  const CalibratedPhotos calibrated =
+      CalibratePhotos(photos,
+                      {options.poses, held_out, options.holdout_strict, options.threads,
+                       options.seed, options.memory_gb},
+                      writer.work_folder() / "calibration", progress);
+  report.not_registered = calibrated.not_registered;
+  for (size_t i = 0; i < held_out.size(); ++i) {
+    const auto& lost = report.not_registered;
+    if (held_out[i] && std::find(lost.begin(), lost.end(), photos.photos[i].name) != lost.end()) {
+      report.held_out_not_registered.push_back(photos.photos[i].name);
+    }
+  }
+
+  log.Begin("undistortion");
+  DtrSet set;
+  set.unit = calibrated.unit;
+  set.world_origin = calibrated.world_origin;
+  set.frames.resize(1);
+  std::vector<View>& views = set.frames.front().views;
+  views = UndistortPhotos(photos, calibrated, held_out, max_size_px, options.threads, progress);
+  RequireTwoSources(views, calibrated);
+  const SparseScene sparse = SparseOf(calibrated, views);
+
+  log.Begin("depth");
+  DepthStage(views, sparse, engine.get(), {options.threads, options.seed, options.memory_gb},
+             set.unit, writer, progress);
+
+  log.Begin("finishing");
+  FinishGeometry(set, SourcePoints(sparse, views));
+  Validate(set, sparse, report, options.threads, progress);
+  writer.WriteSparse(set, sparse);
+  set.provenance_json =
+      ProvenanceJson(options, option_values, PhotosJson(photos, is_source), calibrated, report)
+          .dump();
+  log.End();
+  io::WriteRunRecord(writer.folder(), log.Record(ResolveThreads(options.threads)));
+  writer.Finish(set);
+  report.set = std::move(set);
+  report.json = ReportJson(report, log, options.output).dump(1);
+  return report;
+}
+
+}  // namespace dtr::pipeline

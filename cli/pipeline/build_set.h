@@ -1,0 +1,46 @@
+// cli/pipeline/build_set.h -- photos in, D+TR set out: what `dtr build` does.
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "dtr/base/progress.h"
+#include "dtr/types/dtr_set.h"
+
+namespace dtr::pipeline {
+
+/// Options of `dtr build`, by the same names.
+struct BuildOptions {
+  std::filesystem::path photos;  ///< folder
+  std::filesystem::path output;  ///< NAME.dtr
+  std::string holdout;           ///< "", "every:N" or names
+  bool holdout_strict = false;
+  std::string engine = "sgbm";  ///< or "none"
+  std::string preset = "balanced";
+  int max_size_px = -1;  ///< long side; 0 = full size, -1 = what the preset says
+  double memory_gb = 4;
+  std::filesystem::path poses;
+  bool force = false;
+  int threads = 0;
+  std::uint64_t seed = 0;
+};
+
+/// What was built.
+struct BuildReport {
+  DtrSet set;                                                ///< without pixels
+  std::vector<std::string> not_registered;           ///< photos that found no camera
+  std::vector<std::string> held_out_not_registered;  ///< of them, those that were held out
+  std::vector<std::pair<std::string, std::string>> skipped;  ///< file, reason
+  bool validated = false, validation_passed = false;
+  std::string json;  ///< for --json
+};
+
+/// Builds a set. Continues an interrupted run of the same input and options; throws UsageError when
+/// the output exists (without force) or belongs to another run.
+BuildReport BuildSet(const BuildOptions& options, Progress& progress);
+
+/// Long side of the stored images for a preset: fast 800, balanced 1024, best 0 (full size).
+int MaxSizeOfPreset(const std::string& preset);
+
+}  // namespace dtr::pipeline

@@ -1,0 +1,100 @@
+#include "cli/pipeline/calibrated_photos.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "calib/colmap/sfm.h"
+#include "capture/sfm_images.h"
+#include "cli/pipeline/known_poses.h"
+#include "dtr/base/error.h"
+
+namespace dtr::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+// The photos with `wanted[i]`, in their order.
+capture::Capture Subset(const capture::Capture& capture, const std::vector<bool>& wanted) {
+  capture::Capture subset;
+  for (size_t i = 0; i < capture.photos.size(); ++i) {
+    if (wanted[i]) subset.photos.push_back(capture.photos[i]);
+  }
+  return subset;
+}
+
+// What can be told about an SfM run without times and paths, so that equal runs stay equal.
+Json SfmJson(const colmap::SfmReport& report, const calib::SfmModel& model) {
+  Json json;
+  json["mean_reprojection_error_px"] = report.mean_reprojection_error_px;
+  json["images_per_model"] = report.images_per_model;
+  json["feature_image_size_px"] = report.max_image_size_px;
+  json["points"] = model.points.size();
+  json["lens_model"] =
+      model.cameras.empty() ? "" : calib::NameOf(model.cameras.begin()->second.model);
+  return json;
+}
+
+CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions& options,
+                         const fs::path& workspace, Progress& progress) {
+  std::vector<bool> in_sfm(capture.photos.size(), true);
+  if (options.strict) {
+    for (size_t i = 0; i < in_sfm.size(); ++i) in_sfm[i] = !options.held_out[i];
+  }
+  const capture::Capture photos = Subset(capture, in_sfm);
+  const std::vector<colmap::SfmImageInput> inputs = SfmInputs(photos);
+  const colmap::SfmOptions sfm_options = SfmOptionsFor(options);
+  capture::PrepareSfmImages(photos, workspace / "photos", 0, options.threads);
+  colmap::SfmResult sfm =
+      colmap::RunSfm(workspace / "photos", inputs, workspace / "sfm", sfm_options, progress);
+
+  CalibratedPhotos calibrated;
+  calibrated.engine = sfm.report.version;
+  calibrated.report_json = SfmJson(sfm.report, sfm.model).dump();
+  calibrated.model = std::move(sfm.model);
+  if (options.strict) {
+    RegisterHeldOutPhotos(Subset(capture, options.held_out), inputs, workspace, sfm_options,
+                          calibrated.model, progress);
+  }
+  return calibrated;
+}
+
+}  // namespace
+
+std::vector<colmap::SfmImageInput> SfmInputs(const capture::Capture& capture) {
+  std::vector<colmap::SfmImageInput> inputs;
+  for (const capture::Photo& photo : capture.photos) {
+    inputs.push_back(
+        {photo.name, photo.width_px, photo.height_px, photo.focal_prior_px, photo.camera_group});
+  }
+  return inputs;
+}
+
+colmap::SfmOptions SfmOptionsFor(const CalibrateOptions& options) {
+  colmap::SfmOptions sfm;
+  sfm.threads = options.threads;
+  sfm.seed = options.seed;
+  sfm.memory_gb = options.memory_gb;
+  return sfm;
+}
+
+CalibratedPhotos CalibratePhotos(const capture::Capture& capture, const CalibrateOptions& options,
+                                 const fs::path& workspace, Progress& progress) {
+  CalibrateOptions checked = options;
+  checked.held_out.resize(capture.photos.size(), false);
+  fs::create_directories(workspace);
+  CalibratedPhotos calibrated = checked.poses.empty()
+                                    ? FromSfm(capture, checked, workspace, progress)
+                                    : FromKnownPoses(capture, checked, workspace, progress);
+  std::set<std::string> registered;
+  for (const calib::SfmImage& image : calibrated.model.images) registered.insert(image.name);
+  for (const capture::Photo& photo : capture.photos) {
+    if (!registered.contains(photo.name)) calibrated.not_registered.push_back(photo.name);
+  }
+  return calibrated;
+}
+
+}  // namespace dtr::pipeline

@@ -1,0 +1,41 @@
+// cli/pipeline/calibrated_photos.h -- from accepted photos to cameras, by SfM or from a file.
+#pragma once
+#include <Eigen/Core>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "calib/sfm_model.h"
+#include "capture/capture.h"
+#include "dtr/base/progress.h"
+#include "dtr/types/dtr_set.h"
+
+namespace dtr::pipeline {
+
+/// How cameras are found.
+struct CalibrateOptions {
+  std::filesystem::path
+      poses;  ///< empty: SfM; else a COLMAP model, cameras.json or poses_bounds.npy
+  std::vector<bool> held_out;  ///< per photo; empty: none
+  bool strict = false;  ///< held-out photos take no part in SfM and are registered afterwards
+  int threads = 0;
+  std::uint64_t seed = 0;
+  double memory_gb = 4;
+};
+
+/// Calibrated photos, frozen: everything later depends on this model alone.
+struct CalibratedPhotos {
+  calib::SfmModel model;  ///< images named like the photos; sorted by name
+  LengthUnit unit = LengthUnit::kArbitrary;
+  Eigen::Vector3d world_origin = Eigen::Vector3d::Zero();
+  std::vector<std::string> not_registered;  ///< photos without a camera
+  std::string engine;                       ///< "colmap 3.8", "cameras.json", ...
+  std::string report_json;                  ///< details for the provenance; no times, no paths
+};
+
+/// Calibrates the photos. `workspace` keeps checkpoints: the same input and options continue there,
+/// and a finished calibration is read back instead of computed again.
+CalibratedPhotos CalibratePhotos(const capture::Capture& capture, const CalibrateOptions& options,
+                                 const std::filesystem::path& workspace, Progress& progress);
+
+}  // namespace dtr::pipeline

@@ -1,0 +1,35 @@
+// cli/pipeline/camera_files.h -- known cameras, whichever program wrote them.
+#pragma once
+#include <filesystem>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "dtr/io/formats/cameras_json.h"
+#include "dtr/types/sparse_scene.h"
+
+namespace dtr::pipeline {
+
+/// Cameras with what else their file brings.
+struct CamerasFromFile {
+  io::CameraList list;
+  std::optional<SparseScene> points;  ///< views are indices into `list`
+};
+
+/// Names that ReadCameraFile takes as `format`.
+std::vector<std::string> CameraFormats();
+
+/// Reads cameras of undistorted images. `format` "": a folder is a COLMAP model, poses_bounds.npy
+/// LLFF's, transforms.json NeRF's, any other .json a cameras.json. `images_dir` gives the images'
+/// names and sizes to the formats that do not store them.
+/// Throws UsageError when the format cannot be told, Error when the file is broken or a COLMAP
+/// camera has distortion.
+CamerasFromFile ReadCameraFile(const std::filesystem::path& file, const std::string& format,
+                               const std::filesystem::path& images_dir);
+
+/// Names of `list` that a --holdout text means (cli/pipeline/holdout.h), over its cameras in byte
+/// order of their names.
+std::set<std::string> NamesHeldOut(const std::string& spec, const io::CameraList& list);
+
+}  // namespace dtr::pipeline

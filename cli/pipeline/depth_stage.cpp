@@ -1,0 +1,68 @@
+#include "cli/pipeline/depth_stage.h"
+
+#include "stereo/depth_maps.h"
+
+namespace dtr::pipeline {
+namespace {
+
+// The scene as the source views alone know it, with views renumbered to their order among sources.
+SparseScene SourceScene(const SparseScene& sparse, const std::vector<View>& views,
+                        const std::vector<int>& sources) {
+  std::vector<bool> is_source(views.size(), false);
+  std::vector<int> source_index(views.size(), -1);
+  for (size_t s = 0; s < sources.size(); ++s) {
+    is_source[static_cast<size_t>(sources[s])] = true;
+    source_index[static_cast<size_t>(sources[s])] = static_cast<int>(s);
+  }
+  SparseScene scene = RestrictToViews(sparse, is_source);
+  for (SparseObservation& seen : scene.observations) {
+    seen.view = source_index[static_cast<size_t>(seen.view)];
+  }
+  return scene;
+}
+
+}  // namespace
+
+void DepthStage(std::vector<View>& views, const SparseScene& sparse, const stereo::Engine* engine,
+                const DepthStageOptions& options, LengthUnit unit, io::SetWriter& writer,
+                Progress& progress) {
+  std::vector<int> sources;
+  std::vector<stereo::StereoView> stereo_views;
+  for (size_t i = 0; i < views.size(); ++i) {
+    View& view = views[i];
+    // Images first: what an interrupted run wrote is recognised and not written again.
+    if (!writer.RestoreView(view)) writer.WriteView(view, unit);
+    if (view.role != ViewRole::kSource) continue;
+    sources.push_back(static_cast<int>(i));
+    stereo_views.push_back({view.camera, view.cam_from_world, &view.image, &view.mask});
+  }
+  if (engine == nullptr) {
+    progress.Note("depth left out: --engine none");
+    return;
+  }
+
+  stereo::DepthMapsOptions depth_options;
+  depth_options.engine.threads = options.threads;
+  depth_options.engine.seed = options.seed;
+  const auto view_of = [&](int source) -> View& {
+    return views[static_cast<size_t>(sources[static_cast<size_t>(source)])];
+  };
+  stereo::ComputeDepthMaps(
+      stereo_views, SourceScene(sparse, views, sources), *engine, depth_options, progress,
+      [&](int source) { return view_of(source).depth_file.has_value(); },
+      [&](int source, stereo::DepthEstimate&& estimate, const stereo::DepthRange&) {
+        View& view = view_of(source);
+        view.depth = std::move(estimate.depth);
+        view.inverse_depth_sigma = std::move(estimate.inverse_depth_sigma);
+        writer.WriteView(view, unit);
+      });
+  // What follows uses the stored depth, so that a resumed run and an undisturbed one agree.
+  for (const int i : sources) {
+    io::LoadOptions load;
+    load.images = false;
+    load.threads = options.threads;
+    io::LoadPixels(writer.folder(), views[static_cast<size_t>(i)], load);
+  }
+}
+
+}  // namespace dtr::pipeline

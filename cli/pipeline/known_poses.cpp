@@ -1,0 +1,156 @@
+#include "cli/pipeline/known_poses.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "calib/colmap/export.h"
+#include "calib/colmap/held_out.h"
+#include "calib/colmap/known_poses.h"
+#include "calib/colmap/model_io.h"
+#include "capture/sfm_images.h"
+#include "dtr/base/error.h"
+#include "dtr/io/formats/cameras_json.h"
+#include "dtr/io/formats/llff.h"
+
+namespace dtr::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Adds a photo under ids of its own, keeping the order of names. Cameras are not shared: the
+// model's own stay what they were.
+void AddImage(calib::SfmImage image, const calib::LensCamera& camera, calib::SfmModel& model) {
+  image.camera_id = model.cameras.empty() ? 1 : model.cameras.rbegin()->first + 1;
+  image.id = 1;
+  for (const calib::SfmImage& other : model.images) image.id = std::max(image.id, other.id + 1);
+  model.cameras[image.camera_id] = camera;
+  const auto place = std::lower_bound(
+      model.images.begin(), model.images.end(), image.name,
+      [](const calib::SfmImage& other, const std::string& name) { return other.name < name; });
+  model.images.insert(place, std::move(image));
+}
+
+void RequireSharedNames(size_t found, const fs::path& poses, const std::string& first_of_file,
+                        const capture::Capture& capture) {
+  if (found >= 2) return;
+  throw Error(
+      fmt::format("{}: expected cameras for at least 2 of the photos by name, found {}; the file's "
+                  "first is '{}', "
+                  "the first photo is '{}'",
+                  poses.string(), found, first_of_file, capture.photos.front().name));
+}
+
+// Poses act on p_world - origin afterwards; returns that origin.
+Eigen::Vector3d RecentreModel(calib::SfmModel& model) {
+  io::CameraList list;
+  for (const calib::SfmImage& image : model.images) {
+    io::NamedCamera named;
+    named.name = image.name;
+    named.cam_from_world = image.cam_from_world;
+    list.cameras.push_back(named);
+  }
+  list = io::RecentreWorld(std::move(list));
+  for (size_t i = 0; i < model.images.size(); ++i) {
+    model.images[i].cam_from_world = list.cameras[i].cam_from_world;
+  }
+  for (auto& [id, point] : model.points) point.p_in_world -= list.world_origin;
+  return list.world_origin;
+}
+
+CalibratedPhotos FromColmapModel(const capture::Capture& capture, const fs::path& poses) {
+  CalibratedPhotos calibrated;
+  calibrated.engine = "COLMAP model";
+  calibrated.unit = LengthUnit::kUnknown;
+  calibrated.model = colmap::ReadModel(poses);
+  std::erase_if(calibrated.model.images, [&](const calib::SfmImage& image) {
+    return std::none_of(capture.photos.begin(), capture.photos.end(),
+                        [&](const capture::Photo& photo) { return photo.name == image.name; });
+  });
+  RequireSharedNames(calibrated.model.images.size(), poses,
+                     calibrated.model.images.empty() ? "" : calibrated.model.images.front().name,
+                     capture);
+  calibrated.world_origin = RecentreModel(calibrated.model);
+  return calibrated;
+}
+
+io::CameraList ReadCameraList(const capture::Capture& capture, const fs::path& poses) {
+  if (poses.extension() == ".json") return io::ReadCamerasJson(poses);
+  if (poses.extension() == ".npy") {
+    std::vector<io::SizedImage> images;
+    for (const capture::Photo& photo : capture.photos) {
+      images.push_back({photo.name, photo.width_px, photo.height_px});
+    }
+    return io::ReadLlff(poses, std::move(images)).list;
+  }
+  throw UsageError(fmt::format(
+      "--poses {}: expected the folder of a COLMAP model, a cameras.json or a poses_bounds.npy",
+      poses.string()));
+}
+
+CalibratedPhotos FromCameraList(const capture::Capture& capture, const CalibrateOptions& options,
+                                const fs::path& workspace, Progress& progress) {
+  const io::CameraList list = io::RecentreWorld(ReadCameraList(capture, options.poses));
+  std::map<std::string, const io::NamedCamera*> by_name;
+  for (const io::NamedCamera& named : list.cameras) by_name[named.name] = &named;
+
+  std::vector<colmap::PosedImage> sources, held_out;
+  capture::Capture source_photos;
+  for (size_t i = 0; i < capture.photos.size(); ++i) {
+    const auto found = by_name.find(capture.photos[i].name);
+    if (found == by_name.end()) continue;
+    const io::NamedCamera& named = *found->second;
+    (options.held_out[i] ? held_out : sources)
+        .push_back({named.name, colmap::FromPinhole(named.camera), named.cam_from_world});
+    if (!options.held_out[i]) source_photos.photos.push_back(capture.photos[i]);
+  }
+  RequireSharedNames(sources.size(), options.poses,
+                     list.cameras.empty() ? "" : list.cameras.front().name, capture);
+
+  capture::PrepareSfmImages(source_photos, workspace / "photos", 0, options.threads);
+  CalibratedPhotos calibrated;
+  calibrated.engine = options.poses.filename().string();
+  calibrated.unit = list.unit;
+  calibrated.world_origin = list.world_origin;
+  calibrated.model = colmap::TriangulateWithPoses(workspace / "photos", sources, workspace / "sfm",
+                                                  SfmOptionsFor(options), progress)
+                         .model;
+  for (const colmap::PosedImage& posed : held_out) {
+    AddImage({0, posed.name, 0, posed.cam_from_world, {}}, posed.camera, calibrated.model);
+  }
+  return calibrated;
+}
+
+}  // namespace
+
+void RegisterHeldOutPhotos(const capture::Capture& held_out,
+                           const std::vector<colmap::SfmImageInput>& sources,
+                           const fs::path& workspace, const colmap::SfmOptions& options,
+                           calib::SfmModel& model, Progress& progress) {
+  if (held_out.photos.empty()) return;
+  capture::PrepareSfmImages(held_out, workspace / "photos", 0, options.threads);
+  const colmap::HeldOutResult placed =
+      colmap::RegisterHeldOut(workspace / "photos", SfmInputs(held_out), model, sources,
+                              workspace / "sfm", workspace / "held_out", options, progress);
+  for (const calib::SfmImage& image : placed.images) {
+    AddImage(image, placed.cameras.at(image.camera_id), model);
+  }
+}
+
+CalibratedPhotos FromKnownPoses(const capture::Capture& capture, const CalibrateOptions& options,
+                                const fs::path& workspace, Progress& progress) {
+  if (!fs::exists(options.poses)) {
+    throw UsageError(fmt::format("--poses {}: no such file or folder", options.poses.string()));
+  }
+  progress.Note("structure from motion left out: cameras are given");
+  CalibratedPhotos calibrated = fs::is_directory(options.poses)
+                                    ? FromColmapModel(capture, options.poses)
+                                    : FromCameraList(capture, options, workspace, progress);
+  calibrated.report_json =
+      nlohmann::ordered_json{{"points", calibrated.model.points.size()}}.dump();
+  return calibrated;
+}
+
+}  // namespace dtr::pipeline

@@ -1,0 +1,76 @@
+#include "cli/pipeline/recompute_depth.h"
+
+#include <nlohmann/json.hpp>
+
+#include "cli/pipeline/depth_stage.h"
+#include "dtr/base/error.h"
+#include "dtr/base/hash.h"
+#include "dtr/io/set_io.h"
+#include "dtr/render/geometry.h"
+#include "stereo/engine.h"
+
+namespace dtr::pipeline {
+namespace {
+
+// The set with images in memory and without any depth.
+DtrSet LoadForDepth(const std::filesystem::path& folder, int threads) {
+  DtrSet set = io::ReadSet(folder);
+  if (!set.sparse_file) {
+    throw Error(
+        folder.string() +
+        ": expected sparse points to find depth ranges from, found none; build the set from "
+        "its photos with dtr build");
+  }
+  io::LoadOptions load;
+  load.depth = false;
+  load.threads = threads;
+  for (View& view : set.frames.front().views) {
+    io::LoadPixels(folder, view, load);
+    view.depth_file.reset();
+    view.sigma_file.reset();
+    view.near_z = view.far_z = 0;
+    view.depth_scale = 1;
+  }
+  return set;
+}
+
+double Completeness(const std::vector<View>& views, int& maps) {
+  long with_depth = 0, pixels = 0;
+  for (const View& view : views) {
+    if (view.depth.empty()) continue;
+    ++maps;
+    for (const float z : view.depth.grid().data()) with_depth += !DepthImage::IsHole(z);
+    pixels += static_cast<long>(view.depth.grid().data().size());
+  }
+  return pixels > 0 ? static_cast<double>(with_depth) / static_cast<double>(pixels) : 0;
+}
+
+}  // namespace
+
+RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& progress) {
+  const auto engine = stereo::MakeEngine(options.engine);
+  const bool in_place = options.output.empty();
+  RecomputeReport report;
+  report.written = in_place ? options.set : options.output;
+  DtrSet set = LoadForDepth(options.set, options.threads);
+  const SparseScene sparse = io::LoadSparse(options.set, set);
+
+  const nlohmann::json fingerprint = {{"tool_version", DTR_VERSION},
+                                      {"engine", options.engine},
+                                      {"seed", options.seed},
+                                      {"set_sha256", Sha256OfFile(options.set / "set.json")}};
+  io::SetWriter writer(report.written, fingerprint.dump(), in_place || options.force);
+  std::vector<View>& views = set.frames.front().views;
+  DepthStage(views, sparse, engine.get(), {options.threads, options.seed, 4}, set.unit, writer,
+             progress);
+  FinishGeometry(set);
+  writer.WriteSparse(set, sparse);
+  nlohmann::ordered_json provenance = nlohmann::ordered_json::parse(set.provenance_json);
+  provenance["depth_engine"] = options.engine;
+  set.provenance_json = provenance.dump();
+  report.depth_completeness = Completeness(views, report.depth_maps);
+  writer.Finish(set);
+  return report;
+}
+
+}  // namespace dtr::pipeline

@@ -1,0 +1,58 @@
+#include "cli/pipeline/run_log.h"
+
+#include <sys/resource.h>
+
+#include <algorithm>
+
+namespace dtr::pipeline {
+namespace {
+
+double CpuSeconds() {
+  double seconds = 0;
+  for (const int who : {RUSAGE_SELF, RUSAGE_CHILDREN}) {
+    rusage usage{};
+    getrusage(who, &usage);
+    for (const timeval& t : {usage.ru_utime, usage.ru_stime}) {
+      seconds += static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+    }
+  }
+  return seconds;
+}
+
+}  // namespace
+
+long PeakMemoryKib() {
+  long peak_kib = 0;
+  for (const int who : {RUSAGE_SELF, RUSAGE_CHILDREN}) {
+    rusage usage{};
+    getrusage(who, &usage);
+    peak_kib = std::max(peak_kib, usage.ru_maxrss);
+  }
+  return peak_kib;
+}
+
+void RunLog::Begin(const std::string& name) {
+  End();
+  stages_.push_back({name, 0, 0, 0});
+  running_ = true;
+  cpu_start_s_ = CpuSeconds();
+  start_ = std::chrono::steady_clock::now();
+}
+
+void RunLog::End() {
+  if (!running_) return;
+  const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - start_;
+  stages_.back().wall_s = wall.count();
+  stages_.back().cpu_s = CpuSeconds() - cpu_start_s_;
+  stages_.back().peak_rss_kib = PeakMemoryKib();
+  running_ = false;
+}
+
+io::RunRecord RunLog::Record(int threads) const {
+  io::RunRecord record;
+  record.stages = stages_;
+  record.threads = threads;
+  return record;
+}
+
+}  // namespace dtr::pipeline

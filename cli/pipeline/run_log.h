@@ -1,0 +1,32 @@
+// cli/pipeline/run_log.h -- what each stage cost; kept in report/run.json, outside every hash.
+#pragma once
+#include <chrono>
+#include <string>
+#include <vector>
+
+#include "dtr/io/set_io.h"
+
+namespace dtr::pipeline {
+
+/// Measures stages one after another.
+class RunLog {
+ public:
+  /// Ends the running stage and begins another.
+  void Begin(const std::string& name);
+  /// Ends the running stage.
+  void End();
+  const std::vector<io::RunStage>& stages() const { return stages_; }
+  /// The record of the run, to be written by io::WriteRunRecord.
+  io::RunRecord Record(int threads) const;
+
+ private:
+  std::vector<io::RunStage> stages_;
+  bool running_ = false;
+  double cpu_start_s_ = 0;
+  std::chrono::steady_clock::time_point start_;
+};
+
+/// Peak resident memory so far, of this process or of any program it ran.
+long PeakMemoryKib();
+
+}  // namespace dtr::pipeline

@@ -1,0 +1,55 @@
+#include "cli/video.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "dtr/base/error.h"
+#include "dtr/base/process.h"
+#include "dtr/io/image_io.h"
+
+namespace dtr::cli {
+namespace fs = std::filesystem;
+
+VideoWriter::VideoWriter(fs::path target, int frames_per_second)
+    : target_(std::move(target)),
+      frames_(target_.string() + fmt::format(".frames{}", getpid())),
+      frames_per_second_(frames_per_second) {
+  if (FindProgram("ffmpeg").empty()) {
+    throw Error(target_.string() +
+                ": program ffmpeg not found on the PATH; install it or write images to a folder");
+  }
+  fs::create_directory(frames_);
+}
+
+VideoWriter::~VideoWriter() {
+  std::error_code ignored;
+  fs::remove_all(frames_, ignored);
+}
+
+void VideoWriter::Add(const ImageRgb8& frame) {
+  io::WriteImage(frames_ / fmt::format("{:06}.png", count_++), frame);
+}
+
+void VideoWriter::Finish(const Progress& progress) {
+  const fs::path encoded = frames_ / "video.mp4";
+  const fs::path log = frames_ / "ffmpeg.log";
+  ProcessOptions options;
+  options.log_file = log;
+  std::string last_line;
+  options.on_line = [&last_line](const std::string& line) { last_line = line; };
+  options.should_stop = [&progress] { return progress.StopRequested(); };
+  // yuv420p, which every player knows, needs even sizes: an odd frame gains one row or column.
+  const auto result = RunProcess(
+      {"ffmpeg", "-y", "-loglevel", "error", "-framerate", std::to_string(frames_per_second_), "-i",
+       (frames_ / "%06d.png").string(), "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-c:v", "libx264",
+       "-crf", "18", "-pix_fmt", "yuv420p", "-movflags", "+faststart", encoded.string()},
+      options);
+  progress.ThrowIfInterrupted();
+  if (!result.Ok()) {
+    throw Error(fmt::format("{}: ffmpeg failed with exit code {}: {}", target_.string(),
+                            result.exit_code, last_line));
+  }
+  fs::rename(encoded, target_);
+}
+
+}  // namespace dtr::cli

@@ -1,0 +1,29 @@
+// cli/video.h -- frames into an MP4 file, by the ffmpeg program.
+#pragma once
+#include <filesystem>
+#include <memory>
+
+#include "dtr/base/progress.h"
+#include "dtr/types/grid.h"
+
+namespace dtr::cli {
+
+/// Collects frames and encodes them (H.264, yuv420p, constant quality) when finished. The target
+/// appears whole or not at all. Throws Error when ffmpeg is missing or fails.
+class VideoWriter {
+ public:
+  VideoWriter(std::filesystem::path target, int frames_per_second);
+  ~VideoWriter();  ///< removes the collected frames
+  VideoWriter(const VideoWriter&) = delete;
+  VideoWriter& operator=(const VideoWriter&) = delete;
+
+  void Add(const ImageRgb8& frame);
+  void Finish(const Progress& progress);
+
+ private:
+  std::filesystem::path target_, frames_;
+  int frames_per_second_;
+  int count_ = 0;
+};
+
+}  // namespace dtr::cli

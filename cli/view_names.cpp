@@ -1,0 +1,40 @@
+#include "cli/view_names.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <sstream>
+
+#include "dtr/base/error.h"
+
+namespace dtr::cli {
+
+const View& FindView(const DtrSet& set, const std::string& name) {
+  const std::vector<View>& views = set.frames.front().views;
+  const auto is_called = [&name](const View& view) {
+    const std::filesystem::path photo(view.name);
+    return view.name == name || view.id == name ||
+           (photo.parent_path() / photo.stem()).string() == name;
+  };
+  const auto found = std::find_if(views.begin(), views.end(), is_called);
+  if (found != views.end()) return *found;
+  constexpr size_t kExamples = 3;
+  std::string examples;
+  for (size_t i = 0; i < std::min(kExamples, views.size()); ++i) {
+    examples += (i == 0 ? "" : ", ") + views[i].name;
+  }
+  throw UsageError(fmt::format("no view is named '{}'; the set has {} ... ({} views, see dtr info)",
+                               name, examples, views.size()));
+}
+
+std::vector<std::string> ResolveViewNames(const DtrSet& set, const std::string& list) {
+  std::vector<std::string> names;
+  std::istringstream parts(list);
+  for (std::string part; std::getline(parts, part, ',');) {
+    names.push_back(FindView(set, part).name);
+  }
+  return names;
+}
+
+}  // namespace dtr::cli

@@ -1,0 +1,17 @@
+// cli/view_names.h -- views as people name them.
+#pragma once
+#include <string>
+#include <vector>
+
+#include "dtr/types/dtr_set.h"
+
+namespace dtr::cli {
+
+/// The view of the first frame called `name`: its photo's name, with or without the extension, or
+/// its id. Throws UsageError naming a few that exist when there is none.
+const View& FindView(const DtrSet& set, const std::string& name);
+
+/// The names of the views that a comma-separated list means, each by FindView. Empty list: none.
+std::vector<std::string> ResolveViewNames(const DtrSet& set, const std::string& list);
+
+}  // namespace dtr::cli
