@@ -14,10 +14,13 @@
 #include "cli/pipeline/run_log.h"
 #include "cli/pipeline/validate_set.h"
 #include "dtr/base/error.h"
+#include "dtr/base/files.h"
 #include "dtr/base/hash.h"
 #include "dtr/base/parallel_for.h"
+#include "dtr/eval/json.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/geometry.h"
+#include "dtr/report/set_report.h"
 #include "stereo/engine.h"
 
 namespace dtr::pipeline {
@@ -158,15 +161,35 @@ Json ProvenanceJson(const BuildOptions& options, const Json& option_values, cons
 }
 
 // The reprojection tests of every calibrated photo, held-out ones included.
-void Validate(DtrSet& set, const SparseScene& sparse, BuildReport& report, int threads,
-              Progress& progress) {
-  const calib::ValidationReport validation = ValidateSet(set, sparse, {}, threads);
+calib::ValidationReport Validate(DtrSet& set, const SparseScene& sparse, BuildReport& report,
+                                 int threads, Progress& progress) {
+  calib::ValidationReport validation = ValidateSet(set, sparse, {}, threads);
   report.validated = true;
   report.validation_passed = validation.passed();
-  set.verdict_json = calib::ToJson(validation);
+  set.verdict_json = eval::VerdictJson(validation.tests);
   if (!report.validation_passed) {
     progress.Note("WARNING: the calibration does not hold; see `dtr validate`");
   }
+  return validation;
+}
+
+// The page people look at: sources only, as pixels of held-out photos stay in held_out/, and
+// without times, so that equal builds stay equal.
+std::string PageOf(const DtrSet& set, const BuildOptions& options, const BuildReport& report,
+                   const calib::ValidationReport& validation) {
+  DtrSet sources = set;
+  std::erase_if(sources.frames.front().views,
+                [](const View& view) { return view.role == ViewRole::kHeldOut; });
+  report::SetReportInfo info;
+  info.title = "D+TR set " + options.output.stem().string();
+  info.facts = {{"views", std::to_string(sources.frames.front().views.size())},
+                {"held out", std::to_string(set.frames.front().views.size() -
+                                            sources.frames.front().views.size())},
+                {"depth engine", options.engine},
+                {"not registered", std::to_string(report.not_registered.size())}};
+  info.checks = validation.tests;
+  for (const auto& [name, reason] : report.skipped) info.skipped.push_back({name, reason});
+  return report::SetReport(sources, info);
 }
 
 Json ReportJson(const BuildReport& report, const RunLog& log, const std::filesystem::path& output) {
@@ -256,11 +279,15 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
 
   log.Begin("finishing");
   FinishGeometry(set, SourcePoints(sparse, views));
-  Validate(set, sparse, report, options.threads, progress);
+  const calib::ValidationReport validation =
+      Validate(set, sparse, report, options.threads, progress);
   writer.WriteSparse(set, sparse);
   set.provenance_json =
       ProvenanceJson(options, option_values, PhotosJson(photos, is_source), calibrated, report)
           .dump();
+  std::filesystem::create_directories(writer.folder() / "report");
+  WriteFileAtomically(writer.folder() / "report" / "index.html",
+                      PageOf(set, options, report, validation));
   log.End();
   io::WriteRunRecord(writer.folder(), log.Record(ResolveThreads(options.threads)));
   writer.Finish(set);

@@ -66,7 +66,15 @@ std::string Megabytes(std::uint64_t bytes) {
 
 std::string VerdictLine(const DtrSet& set) {
   const Json verdict = ParseJson(set.verdict_json, "verdict");
-  return verdict.empty() ? "not validated" : verdict.dump();
+  if (verdict.empty()) return "not validated";
+  if (!verdict.contains("passed") || !verdict["passed"].is_boolean()) return verdict.dump();
+  if (verdict["passed"].get<bool>()) return "passed";
+  std::string failed;
+  for (const Json& test : verdict.value("tests", Json::array())) {
+    if (test.value("passed", true)) continue;
+    failed += (failed.empty() ? "" : ", ") + test.value("name", std::string("?"));
+  }
+  return "FAILED" + (failed.empty() ? "" : ": " + failed) + "; dtr validate says more";
 }
 
 std::string ProcessorName() {
