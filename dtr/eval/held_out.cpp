@@ -41,12 +41,28 @@ std::vector<const View*> ViewsToCompare(const DtrSet& set, bool leave_one_out) {
   return views;
 }
 
+/// 255 where the view's own depth map has a value; a depth pixel stands for s x s image pixels.
+Mask HasOwnDepth(const View& view) {
+  Mask mask(view.camera.width_px(), view.camera.height_px());
+  for (int y = 0; y < mask.height(); ++y) {
+    for (int x = 0; x < mask.width(); ++x) {
+      const float depth = view.depth(x / view.depth_scale, y / view.depth_scale);
+      if (!DepthImage::IsHole(depth)) mask(x, y) = 255;
+    }
+  }
+  return mask;
+}
+
 ViewScore Score(const View& view, const RenderResult& filled, int threads) {
   ViewScore score;
   score.name = view.name;
   score.psnr_db = Psnr(filled.image, view.image, view.mask);
   const Mask seen = Intersect(filled.coverage, view.mask);
   score.psnr_covered_db = Psnr(filled.image, view.image, seen);
+  if (view.depth.width() > 0) {
+    score.psnr_own_depth_db =
+        Psnr(filled.image, view.image, Intersect(HasOwnDepth(view), view.mask));
+  }
   score.ssim = Ssim(filled.image, view.image, view.mask, threads);
   score.coverage = ShareOf(filled.coverage, view.mask);
   score.views_used = static_cast<int>(filled.views_used.size());
@@ -99,6 +115,7 @@ EvaluationReport EvaluateHeldOut(const DtrSet& set, const EvaluateOptions& optio
   mean.name = "mean";
   mean.psnr_db = MeanOf(report.views, &ViewScore::psnr_db);
   mean.psnr_covered_db = MeanOf(report.views, &ViewScore::psnr_covered_db);
+  mean.psnr_own_depth_db = MeanOf(report.views, &ViewScore::psnr_own_depth_db);
   mean.ssim = MeanOf(report.views, &ViewScore::ssim);
   for (const ViewScore& view : report.views) {
     mean.coverage += view.coverage / static_cast<double>(report.views.size());

@@ -36,8 +36,11 @@ struct ViewScore {
   std::string name;
   std::optional<double> psnr_db;          ///< usable pixels of the photo, after hole filling
   std::optional<double> psnr_covered_db;  ///< those of them that some view saw
-  std::optional<double> ssim;             ///< usable pixels, after hole filling
-  double coverage = 0;                    ///< share of the usable pixels that some view saw
+  /// Usable pixels where the photo's own depth map has a value, after hole filling: what published
+  /// comparisons of renderers call the valid area. Empty for a view without depth (a held-out one).
+  std::optional<double> psnr_own_depth_db;
+  std::optional<double> ssim;  ///< usable pixels, after hole filling
+  double coverage = 0;         ///< share of the usable pixels that some view saw
   int views_used = 0;
   double render_ms = 0;  ///< wall clock, filling included
 };

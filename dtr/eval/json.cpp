@@ -16,6 +16,7 @@ Json Value(const ViewScore& score) {
   return {{"name", score.name},
           {"psnr_db", Number(score.psnr_db)},
           {"psnr_covered_db", Number(score.psnr_covered_db)},
+          {"psnr_own_depth_db", Number(score.psnr_own_depth_db)},
           {"ssim", Number(score.ssim)},
           {"coverage", Number(score.coverage)},
           {"views_used", score.views_used},

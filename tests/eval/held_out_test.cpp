@@ -112,6 +112,25 @@ TEST(EvaluateHeldOut, MaskedPixelsOfThePhotoNeverCount) {
   EXPECT_DOUBLE_EQ(*report.views[0].psnr_db, *report.views[0].psnr_covered_db);
 }
 
+TEST(EvaluateHeldOut, TheValidAreaIsWhereTheLeftOutViewHasDepth) {
+  SilentProgress progress;
+  DtrSet set = SmallSet();
+  View& view = set.frames[0].views[0];  // its photo is 100
+  view.depth_scale = 2;
+  view.depth = DepthImage(40, 30);
+  // Depth in the quarter that the painter does not see, and as much beside it.
+  for (int y = 0; y < 30; ++y) {
+    for (int x = 0; x < 20; ++x) view.depth(x, y) = 10;
+  }
+  EvaluateOptions options;
+  options.leave_one_out = true;
+  const EvaluationReport report = EvaluateHeldOut(set, options, Painter(104), progress);
+  // Half of the area is filled 12 off, half is seen 4 off: MSE (144 + 16) / 2 = 80.
+  EXPECT_NEAR(*report.views[0].psnr_own_depth_db, 10 * std::log10(255.0 * 255 / 80), 1e-9);
+  EXPECT_EQ(EvaluateHeldOut(SmallSet(), {}, Painter(104), progress).views[0].psnr_own_depth_db,
+            std::nullopt);
+}
+
 TEST(EvaluateHeldOut, WithoutViewsToCompareItSaysWhatToDo) {
   SilentProgress progress;
   DtrSet set = SmallSet();
