@@ -76,7 +76,7 @@ DepthEstimate FilterByConsistency(const StereoView& view, const DepthEstimate& e
         confirming += verdict > 0;
         refuting += verdict < 0;
       }
-      if (confirming >= options.min_agreeing && confirming > refuting) continue;
+      if (confirming >= options.min_agreeing && confirming >= refuting) continue;
       result.depth(x, y) = 0;
       result.inverse_depth_sigma(x, y) = 0;
     }

@@ -29,14 +29,12 @@ struct Opinion {
 struct Group {
   std::vector<Opinion> members;
   double weight = 0;  ///< sum of 1 / step^2
-  int against = 0;    ///< pairs with opinions, none of them on this depth
 };
 
 /// The opinions that agree with `depth`; `opinions` are sorted by pair.
 void Gather(const std::vector<Opinion>& opinions, const Opinion& depth, Group* group) {
   group->members.clear();
   group->weight = 0;
-  group->against = 0;
   for (size_t begin = 0; begin < opinions.size();) {
     const Opinion* closest = nullptr;
     double closest_px = kAgreePx;
@@ -47,14 +45,14 @@ void Gather(const std::vector<Opinion>& opinions, const Opinion& depth, Group* g
       if (off_px <= closest_px) closest_px = off_px, closest = &opinions[end];
     }
     begin = end;
-    if (closest == nullptr) {
-      ++group->against;
-      continue;
-    }
+    if (closest == nullptr) continue;
     group->members.push_back(*closest);
     group->weight += 1.0 / (closest->step * closest->step);
   }
 }
+
+/// Groups of equal size and baselines must not be told apart by rounding; the first one wins then.
+constexpr double kHeavier = 1 + 1e-6;
 
 struct Verdict {
   double inverse_depth = 0, sigma = 0;  ///< 0, 0: a hole
@@ -89,15 +87,25 @@ class Voter {
     for (const Opinion& candidate : opinions_) {
       Gather(opinions_, candidate, &group_);
       if (group_.members.size() > best_.members.size() ||
-          (group_.members.size() == best_.members.size() && group_.weight > best_.weight)) {
+          (group_.members.size() == best_.members.size() &&
+           group_.weight > kHeavier * best_.weight)) {
         std::swap(group_, best_);
       }
     }
     const int votes = static_cast<int>(best_.members.size());
-    return votes >= needed_ && votes > best_.against ? MeanOf(best_) : Verdict{};
+    if (votes < needed_ || (votes == 1 && Contradicted(best_.members.front()))) return {};
+    return MeanOf(best_);
   }
 
  private:
+  /// Whether any opinion, of any sweep, differs from a lone one.
+  bool Contradicted(const Opinion& lone) const {
+    return std::any_of(opinions_.begin(), opinions_.end(), [&](const Opinion& o) {
+      return std::abs(o.inverse_depth - lone.inverse_depth) >
+             kAgreePx * std::max(o.step, lone.step);
+    });
+  }
+
   int needed_;
   std::vector<Opinion> opinions_;
   Group group_, best_;
