@@ -44,6 +44,8 @@ void DepthStage(std::vector<View>& views, const SparseScene& sparse, const stere
   stereo::DepthMapsOptions depth_options;
   depth_options.engine.threads = options.threads;
   depth_options.engine.seed = options.seed;
+  // The other half holds the photos, and maps that wait for their neighbours to be done.
+  depth_options.engine.memory_gb = options.memory_gb / 2;
   const auto view_of = [&](int source) -> View& {
     return views[static_cast<size_t>(sources[static_cast<size_t>(source)])];
   };
