@@ -135,7 +135,9 @@ void RegisterHeldOutPhotos(const capture::Capture& held_out,
       colmap::RegisterHeldOut(workspace / "photos", SfmInputs(held_out), model, sources,
                               workspace / "sfm", workspace / "held_out", options, progress);
   for (const calib::SfmImage& image : placed.images) {
-    AddImage(image, placed.cameras.at(image.camera_id), model);
+    // The pose alone: what the photo shows of the points would enter the set outside held_out/.
+    AddImage({0, image.name, 0, image.cam_from_world, {}}, placed.cameras.at(image.camera_id),
+             model);
   }
 }
 

@@ -34,6 +34,15 @@ DtrSet LoadForDepth(const std::filesystem::path& folder, int threads) {
   return set;
 }
 
+// set.json does not tell what held-out files contain.
+nlohmann::json HeldOutHashes(const DtrSet& set) {
+  auto hashes = nlohmann::json::array();
+  for (const View& view : set.frames.front().views) {
+    if (view.role == ViewRole::kHeldOut) hashes.push_back(view.image_file->sha256);
+  }
+  return hashes;
+}
+
 double Completeness(const std::vector<View>& views, int& maps) {
   long with_depth = 0, pixels = 0;
   for (const View& view : views) {
@@ -58,7 +67,8 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& progre
   const nlohmann::json fingerprint = {{"tool_version", DTR_VERSION},
                                       {"engine", options.engine},
                                       {"seed", options.seed},
-                                      {"set_sha256", Sha256OfFile(options.set / "set.json")}};
+                                      {"set_sha256", Sha256OfFile(options.set / "set.json")},
+                                      {"held_out", HeldOutHashes(set)}};
   io::SetWriter writer(report.written, fingerprint.dump(), in_place || options.force);
   std::vector<View>& views = set.frames.front().views;
   DepthStage(views, sparse, engine.get(), {options.threads, options.seed, 4}, set.unit, writer,

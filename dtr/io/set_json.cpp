@@ -6,6 +6,7 @@
 
 #include "dtr/base/error.h"
 #include "dtr/io/depth_io.h"
+#include "dtr/io/held_out_files.h"
 #include "dtr/io/json_fields.h"
 
 namespace dtr::io {
@@ -17,7 +18,6 @@ namespace fs = std::filesystem;
 constexpr double kUnitQuaternion = 1e-6;
 constexpr size_t kLongestId = 200;  // most file systems stop at 255 bytes
 constexpr char kFormatName[] = "dtr-set";
-constexpr char kHeldOutFolder[] = "held_out/";
 
 LengthUnit UnitOf(const JsonObject& set) {
   const std::string name = set.String("unit");
@@ -45,15 +45,10 @@ bool IsHexSha256(const std::string& text) {
          });
 }
 
-StoredFile StoredFileFrom(const JsonObject& object) {
-  StoredFile file{object.String("path"), object.String("sha256"), object.Unsigned("bytes")};
-  if (!IsSafePath(file.path)) object.Fail("path", "a relative path inside the set's folder");
-  if (!IsHexSha256(file.sha256)) object.Fail("sha256", "64 lower-case hexadecimal digits");
-  return file;
-}
-
-Json ToJson(const StoredFile& file) {
-  return {{"path", file.path}, {"sha256", file.sha256}, {"bytes", file.bytes}};
+std::string PathFrom(const JsonObject& object) {
+  const std::string path = object.String("path");
+  if (!IsSafePath(path)) object.Fail("path", "a relative path inside the set's folder");
+  return path;
 }
 
 template <typename Vector>
@@ -127,7 +122,7 @@ Json ToJson(const Pose& pose) {
 
 // Fills the view's depth fields; returns what was not known.
 Json DepthFrom(const JsonObject& object, View& view) {
-  view.depth_file = StoredFileFrom(object);
+  view.depth_file = StoredFileFromJson(object);
   const std::string coding = object.String("coding");
   try {
     view.depth_coding = DepthCodingFromName(coding);
@@ -148,7 +143,7 @@ Json DepthFrom(const JsonObject& object, View& view) {
 }
 
 Json DepthToJson(const View& view) {
-  Json depth = ToJson(*view.depth_file);
+  Json depth = JsonFromStoredFile(*view.depth_file);
   depth["coding"] = NameOf(view.depth_coding);
   depth["kind"] = "plane-z";
   depth["scale"] = view.depth_scale;
@@ -172,7 +167,9 @@ void FilesFrom(const JsonObject& object, View& view, Json& extra) {
   const auto read = [&](const std::string& key, std::optional<StoredFile>& file) {
     if (!object.Has(key)) return;
     const JsonObject entry = object.Object(key);
-    file = StoredFileFrom(entry);
+    // set.json does not tell what a held-out file contains; held_out/files.json does.
+    const bool told_elsewhere = view.role == ViewRole::kHeldOut && !entry.Has("sha256");
+    file = told_elsewhere ? StoredFile{PathFrom(entry), "", 0} : StoredFileFromJson(entry);
     Nest(extra, key, entry.Unknown());
   };
   read("image", view.image_file);
@@ -224,16 +221,22 @@ View ViewFrom(const JsonObject& object) {
   return view;
 }
 
-Json ToJson(const View& view) {
+enum class Hashes { kAll, kOfSources };
+
+Json ToJson(const View& view, Hashes hashes) {
+  const auto entry = [&](const StoredFile& file) {
+    const bool told_elsewhere = hashes == Hashes::kOfSources && view.role == ViewRole::kHeldOut;
+    return told_elsewhere ? Json{{"path", file.path}} : JsonFromStoredFile(file);
+  };
   Json object = {{"id", view.id},
                  {"name", view.name},
                  {"role", NameOf(view.role)},
                  {"camera", ToJson(view.camera)},
                  {"cam_from_world", ToJson(view.cam_from_world)}};
-  if (view.image_file) object["image"] = ToJson(*view.image_file);
-  if (view.mask_file) object["mask"] = ToJson(*view.mask_file);
+  if (view.image_file) object["image"] = entry(*view.image_file);
+  if (view.mask_file) object["mask"] = entry(*view.mask_file);
   if (view.depth_file) object["depth"] = DepthToJson(view);
-  if (view.sigma_file) object["sigma"] = ToJson(*view.sigma_file);
+  if (view.sigma_file) object["sigma"] = entry(*view.sigma_file);
   object["reference_baseline"] = view.reference_baseline;
   object["gain_linear_rgb"] = NumbersToJson(view.gain);
   Restore(object, view.extra_json, {"camera", "cam_from_world", "image", "mask", "depth", "sigma"});
@@ -271,7 +274,7 @@ Frame FrameFrom(const JsonObject& object, LengthUnit unit, std::set<std::string>
 
 Json ToJson(const Frame& frame) {
   Json views = Json::array();
-  for (const View& view : frame.views) views.push_back(ToJson(view));
+  for (const View& view : frame.views) views.push_back(ToJson(view, Hashes::kOfSources));
   Json object = {{"time_s", frame.time_s}, {"views", std::move(views)}};
   Restore(object, frame.extra_json, {});
   return object;
@@ -299,7 +302,7 @@ DtrSet SetFrom(const JsonObject& root) {
   }
   if (root.Has("sparse")) {
     const JsonObject sparse = root.Object("sparse");
-    set.sparse_file = StoredFileFrom(sparse);
+    set.sparse_file = StoredFileFromJson(sparse);
     Nest(nested, "sparse", sparse.Unknown());
   }
   const Json& frames = root.Array("frames");
@@ -332,6 +335,16 @@ const char* NameOf(LengthUnit unit) {
 
 const char* NameOf(ViewRole role) { return role == ViewRole::kSource ? "source" : "held_out"; }
 
+StoredFile StoredFileFromJson(const JsonObject& object) {
+  StoredFile file{PathFrom(object), object.String("sha256"), object.Unsigned("bytes")};
+  if (!IsHexSha256(file.sha256)) object.Fail("sha256", "64 lower-case hexadecimal digits");
+  return file;
+}
+
+Json JsonFromStoredFile(const StoredFile& file) {
+  return {{"path", file.path}, {"sha256", file.sha256}, {"bytes", file.bytes}};
+}
+
 bool IsSafeId(const std::string& id) {
   return !id.empty() && id.size() <= kLongestId && id[0] != '.' &&
          std::all_of(id.begin(), id.end(), [](unsigned char c) {
@@ -355,7 +368,7 @@ std::string JsonFromSet(const DtrSet& set, const std::string& file) {
     root["bounds"] = {{"min", NumbersToJson(set.bounds.min)},
                       {"max", NumbersToJson(set.bounds.max)}};
   }
-  if (set.sparse_file) root["sparse"] = ToJson(*set.sparse_file);
+  if (set.sparse_file) root["sparse"] = JsonFromStoredFile(*set.sparse_file);
   root["frames"] = Json::array();
   for (const Frame& frame : set.frames) root["frames"].push_back(ToJson(frame));
   root["provenance"] = ParseJson(set.provenance_json, file + ": provenance");
@@ -367,7 +380,7 @@ std::string JsonFromSet(const DtrSet& set, const std::string& file) {
 }
 
 std::string JsonFromView(const View& view, const std::string& file) {
-  const std::string text = PrettyJson(ToJson(view), file);
+  const std::string text = PrettyJson(ToJson(view, Hashes::kAll), file);
   ViewFromJson(text, file);
   return text;
 }

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "dtr/io/json_fields.h"
 #include "dtr/types/dtr_set.h"
 
 namespace dtr::io {
@@ -15,13 +16,18 @@ const char* NameOf(LengthUnit unit);
 const char* NameOf(ViewRole role);
 
 /// Parses and checks everything that needs no other file. `file` stands in front of every error.
+/// Files of held-out views come without hash and size (dtr/io/held_out_files.h).
 DtrSet SetFromJson(const std::string& text, const std::string& file);
 /// The text of set.json. Checked by reading it back, so what is written can be read. Throws Error.
 std::string JsonFromSet(const DtrSet& set, const std::string& file);
 
-/// One view alone, for checkpoints; the same fields as in set.json.
+/// One view alone, for checkpoints; the same fields as in set.json, hashes of held-out files too.
 std::string JsonFromView(const View& view, const std::string& file);
 View ViewFromJson(const std::string& text, const std::string& file);
+
+/// One entry `{"path", "sha256", "bytes"}`. Reading throws Error naming the field.
+StoredFile StoredFileFromJson(const JsonObject& object);
+Json JsonFromStoredFile(const StoredFile& file);
 
 /// Letters, digits, '.', '_', '-', not starting with '.', at most 200 characters.
 bool IsSafeId(const std::string& id);

@@ -7,6 +7,7 @@
 #include "dtr/base/hash.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/io/depth_io.h"
+#include "dtr/io/held_out_files.h"
 #include "dtr/io/set_io.h"
 #include "dtr/io/set_json.h"
 #include "dtr/io/sparse_io.h"
@@ -30,7 +31,12 @@ DtrSet ReadSetFile(const fs::path& set_folder) {
                 ": expected the file that makes a folder a D+TR set, found nothing; " +
                 "an unfinished set is resumed by the command that began it");
   }
-  return SetFromJson(ReadFile(file, kSetFileLimitBytes), file.string());
+  DtrSet set = SetFromJson(ReadFile(file, kSetFileLimitBytes), file.string());
+  if (LacksHeldOutHashes(set)) {
+    const fs::path list = set_folder / kHeldOutFiles;
+    MergeHeldOutFiles(ReadFile(list, kSetFileLimitBytes), list.string(), set);
+  }
+  return set;
 }
 
 void ExpectViewSize(const fs::path& file, const View& view, int width_px, int height_px) {

@@ -12,6 +12,7 @@
 #include "dtr/base/files.h"
 #include "dtr/base/hash.h"
 #include "dtr/io/depth_io.h"
+#include "dtr/io/held_out_files.h"
 #include "dtr/io/json_fields.h"
 #include "dtr/io/set_io.h"
 #include "dtr/io/set_json.h"
@@ -381,10 +382,13 @@ void SetWriter::Finish(DtrSet& set) {
   State& state = *state_;
   const fs::path file = state.partial / kSetFile;
   const std::string text = JsonFromSet(set, file.string());
+  const fs::path held_out_file = state.partial / kHeldOutFiles;
+  const std::string held_out_text = HeldOutFilesJson(set, held_out_file.string());
   ExpectFiles(state.partial, set);
   if (set.sparse_file) (void)LoadSparse(state.partial, set);  // its views must be the set's
   AsError([&] {
     state.RemoveUnnamed(set);
+    if (!held_out_text.empty()) WriteFileAtomically(held_out_file, held_out_text);
     WriteFileAtomically(file, text);
     SyncTree(state.partial);
     state.MoveIntoPlace();

@@ -205,6 +205,48 @@ TEST_F(EditedSet, VerifyFindsAWrongHash) {
   EXPECT_THAT(VerifySet(set_), ElementsAre(HasSubstr("views[1].image.sha256: expected")));
 }
 
+TEST_F(EditedSet, HashesOfHeldOutFilesStandInHeldOutAlone) {
+  const std::string hash = ReadSet(set_).frames[0].views[2].image_file->sha256;
+  EXPECT_THAT(hash, SizeIs(64));
+  EXPECT_EQ(text_.find(hash), std::string::npos);
+  EXPECT_THAT(Text(set_ / "held_out/files.json"), HasSubstr(hash));
+  std::string bytes = Text(set_ / "held_out/images/view2.png");
+  bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] ^ 1);
+  WriteFileAtomically(set_ / "held_out/images/view2.png", bytes);
+  EXPECT_THAT(VerifySet(set_), ElementsAre(HasSubstr("views[2].image.sha256: expected")));
+}
+
+TEST_F(EditedSet, EveryPrefixOfTheHeldOutListIsAnError) {
+  const fs::path list = set_ / "held_out/files.json";
+  const std::string text = Text(list);
+  WriteFileAtomically(list, text.substr(0, text.size() - 1));  // whole without its line break
+  testing::ExpectEveryPrefixIsAnError(list, 1, [&] { ReadSet(set_); });
+}
+
+TEST_F(EditedSet, TheHeldOutListMustFitTheSet) {
+  const fs::path list = set_ / "held_out/files.json";
+  const std::string good = Text(list);
+  const auto error_after = [&](const std::string& from, const std::string& to) {
+    std::string edited = good;
+    const size_t at = edited.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    WriteFileAtomically(list, edited.replace(at, from.size(), to));
+    return ErrorOf([&] { ReadSet(set_); });
+  };
+  EXPECT_THAT(error_after("view2.png", "view3.png"),
+              HasSubstr("files.json: files[0].path: expected a held-out file of set.json"));
+  EXPECT_THAT(error_after("view2.png", "../../images/view0.png"), HasSubstr("files[0].path"));
+  EXPECT_THAT(error_after("\"bytes\": ", "\"bytes\": -"), HasSubstr("files[0].bytes"));
+  EXPECT_THAT(error_after("\"sha256\": \"", "\"sha256\": \"X"), HasSubstr("files[0].sha256"));
+  EXPECT_THAT(error_after("\"format_version\": 1", "\"format_version\": 9"),
+              HasSubstr("format_version: expected 1"));
+  EXPECT_THAT(error_after("\"files\": [", "\"files\": [], \"others\": ["),
+              HasSubstr("files: expected an entry for 'held_out/images/view2.png'"));
+  fs::remove(list);
+  EXPECT_THAT(ErrorOf([&] { ReadSet(set_); }), HasSubstr("held_out/files.json: cannot be read"));
+  EXPECT_THAT(VerifySet(set_), SizeIs(1));
+}
+
 TEST_F(EditedSet, VerifyOfABrokenSetIsAProblemNotAnException) {
   WriteFileAtomically(set_ / "set.json", text_.substr(0, 100));
   EXPECT_THAT(VerifySet(set_), SizeIs(1));

@@ -37,10 +37,10 @@ TEST(SetWriter, LaysTheFilesOutAsDocumented) {
   WriteSmallSet(folder / "small.dtr");
   std::vector<std::string> names;
   for (const auto& [name, content] : Contents(folder / "small.dtr")) names.push_back(name);
-  EXPECT_THAT(names, ::testing::ElementsAre("depth/view0.png", "depth/view1.png",
-                                            "held_out/images/view2.png", "images/view0.png",
-                                            "images/view1.png", "mask/view1.png", "set.json",
-                                            "sigma/view1.exr", "sparse.bin"));
+  EXPECT_THAT(names, ::testing::ElementsAre(
+                         "depth/view0.png", "depth/view1.png", "held_out/files.json",
+                         "held_out/images/view2.png", "images/view0.png", "images/view1.png",
+                         "mask/view1.png", "set.json", "sigma/view1.exr", "sparse.bin"));
   EXPECT_FALSE(fs::exists(folder / "small.dtr.partial"));
 }
 
