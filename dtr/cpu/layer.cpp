@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "dtr/cpu/raster.h"
+#include "dtr/render/closed_cells.h"
 #include "dtr/render/scene.h"
 #include "dtr/render/triangulation.h"
 
@@ -117,26 +118,9 @@ class ViewPainter {
     for (const std::uint8_t corners : block.corners) {
       if (corners != 0) PaintTriangle(i, j, corners, corner);
     }
-    if (block.corners[0] != 0 && block.corners[1] != 0) return;
-    // SPEC 2.6: corners that a drawn triangle surrounds need no closing.
-    const std::uint8_t drawn = block.corners[0] | block.corners[1];
-    const std::uint8_t apex = drawn == 0 ? 0 : ApexOf(drawn);
+    const std::uint8_t open = OpenCorners(block);
     for (int c = 0; c < 4; ++c) {
-      if (corner[c]->in_front && apex != (1 << c)) PaintQuarterCell(i, j, c);
-    }
-  }
-
-  /// The corner of a single triangle that does not lie on the block's diagonal.
-  static std::uint8_t ApexOf(std::uint8_t corners) {
-    switch (corners) {
-      case kA | kB | kC:
-        return kA;
-      case kB | kC | kD:
-        return kD;
-      case kA | kB | kD:
-        return kB;
-      default:
-        return kC;
+      if (corner[c]->in_front && (open & (1 << c))) PaintQuarterCell(i, j, c);
     }
   }
 
@@ -184,40 +168,18 @@ class ViewPainter {
 
   /// SPEC 2.6: the quarter of the sample's cell that lies in block (i, j), on its local plane.
   void PaintQuarterCell(int i, int j, int corner) {
-    const int x = i + (corner & 1), y = j + (corner >> 1);
-    const double towards_x = (corner & 1) ? -0.5 : 0.5, towards_y = (corner >> 1) ? -0.5 : 0.5;
-    const double slope_x = Slope(x, y, 1, 0), slope_y = Slope(x, y, 0, 1);
-    const double here = InverseDepth(x, y);
-    const auto at = [&](double dx, double dy) {
-      // Half a sample cannot bring a surface to infinity; noise on a single sample could.
-      const double w = std::max(here + dx * slope_x + dy * slope_y, 0.5 * here);
-      return ProjectAt(samples_.Centre(x) + dx * samples_.step,
-                       samples_.Centre(y) + dy * samples_.step, w);
-    };
-    const double left = std::min(0.0, towards_x), right = std::max(0.0, towards_x);
-    const double top = std::min(0.0, towards_y), bottom = std::max(0.0, towards_y);
-    const Vertex a = at(left, top), b = at(right, top), c = at(left, bottom), d = at(right, bottom);
-    if (!a.in_front || !b.in_front || !c.in_front || !d.in_front) return;
-    DrawTriangle(a.screen, b.screen, d.screen, layer_);
-    DrawTriangle(a.screen, d.screen, c.screen, layer_);
+    const auto cell = QuarterCell(samples_, i + (corner & 1), j + (corner >> 1), corner, rule_);
+    std::array<Vertex, 4> v;
+    for (size_t k = 0; k < 4; ++k) {
+      v[k] = ProjectAt(cell[k].u, cell[k].v, cell[k].inverse_depth);
+      if (!v[k].in_front) return;
+    }
+    DrawTriangle(v[0].screen, v[1].screen, v[3].screen, layer_);
+    DrawTriangle(v[0].screen, v[3].screen, v[2].screen, layer_);
   }
 
-  /// Slope of 1/z per sample along (dx, dy): the flatter of the two sides that do not break.
   double Slope(int i, int j, int dx, int dy) const {
-    const double here = InverseDepth(i, j);
-    double slope = 0;
-    bool found = false;
-    if (InverseDepth(i + dx, j + dy) > 0 &&
-        !EdgeBreaks(samples_.inverse_depth, i, j, dx, dy, rule_)) {
-      slope = InverseDepth(i + dx, j + dy) - here;
-      found = true;
-    }
-    if (InverseDepth(i - dx, j - dy) > 0 &&
-        !EdgeBreaks(samples_.inverse_depth, i - dx, j - dy, dx, dy, rule_)) {
-      const double backward = here - InverseDepth(i - dx, j - dy);
-      if (!found || std::abs(backward) < std::abs(slope)) slope = backward;
-    }
-    return slope;
+    return LocalSlope(samples_.inverse_depth, i, j, dx, dy, rule_);
   }
 
   /// SPEC 3.1: a square as large as the sample's cell on its local plane.

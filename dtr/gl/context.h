@@ -1,0 +1,43 @@
+// dtr/gl/context.h -- an OpenGL context without a window; no GL header is needed to use it.
+#pragma once
+#include <memory>
+#include <string>
+
+namespace dtr::gl {
+
+/// An OpenGL core context of version 4.3 or newer without window or display, made with EGL: a real
+/// GPU where EGL lists one, else Mesa's software rasteriser. It is current on the thread that made
+/// it and belongs to that thread.
+class EglContext {
+ public:
+  /// Throws dtr::Error, one line that names --renderer cpu, where the machine has no EGL, no
+  /// OpenGL, or none of version 4.3.
+  EglContext();
+  ~EglContext();
+  EglContext(const EglContext&) = delete;
+  EglContext& operator=(const EglContext&) = delete;
+
+  void MakeCurrent();
+  /// Renderer and version as the driver gives them, for reports: "llvmpipe (...), 4.5 ...".
+  std::string Description() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// From now on the current context counts its errors and undefined behaviour reported by the
+/// driver (KHR_debug), and prints them to stderr. For tests and development.
+class DebugOutput {
+ public:
+  DebugOutput();
+  ~DebugOutput();
+  DebugOutput(const DebugOutput&) = delete;
+  DebugOutput& operator=(const DebugOutput&) = delete;
+  int errors() const { return *errors_; }
+
+ private:
+  std::unique_ptr<int> errors_;
+};
+
+}  // namespace dtr::gl

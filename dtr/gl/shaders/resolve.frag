@@ -1,0 +1,162 @@
+// SPEC 4.2 to 4.7 and 6: what the views' nearest fragments say together, pixel by pixel. One sum in
+// the views' canonical order and one division: nothing depends on the order they were drawn in.
+// Defines: MAX_VIEWS, IMAGE_ARRAYS, BLEND, PER_PIXEL, LINEAR_LIGHT.
+uniform sampler2DArray layers;  // 1/z in the novel camera, a layer per view; 0: no fragment
+uniform sampler2DArray images[IMAGE_ARRAYS];
+#include "view_block.glsl"
+#include "colour.glsl"
+#include "weights.glsl"
+
+layout(std430, binding = 0) readonly buffer Views { ViewBlock views[]; };
+
+uniform int view_count;
+uniform int nearest_views;     // K, for the per-pixel rule
+uniform vec4 novel_camera;     // fx, fy, cx, cy, pixels
+uniform float first_row;       // of the band, pixels
+uniform float absolute_delta;  // the report's Delta, scene units; negative: none
+
+layout(location = 0) out vec4 out_image;   // sRGB; alpha 1 where seen
+layout(location = 1) out float out_depth;  // plane z of the front surface
+layout(location = 2) out uvec4 out_marks;  // view count, 255 at the Delta border, unused
+
+const float kBorderShare = 1e-4;       // SPEC 6.2
+const float kLargestFloat = 3.4e38;
+
+float fragment[MAX_VIEWS];  // 1/z; 0: absent
+float angle[MAX_VIEWS];     // SPEC 4.5, at the point; then the logarithm of the weight
+
+vec3 Centre(ViewBlock view) { return vec3(view.row_x.w, view.row_y.w, view.row_z.w); }
+
+// The angle at the point ray / w, from vectors times w: no division, any scale (SPEC 1.1).
+float AngleAt(ViewBlock view, vec3 ray, float w) {
+  vec3 to_view = Centre(view) * w - ray;
+  return atan(length(cross(to_view, -ray)), dot(to_view, -ray));
+}
+
+// SPEC 4.4: the point in the view's frame, times w.
+vec3 PointInView(ViewBlock view, vec3 ray, float w) {
+  vec3 p = ray - Centre(view) * w;
+  return view.row_x.xyz * p.x + view.row_y.xyz * p.y + view.row_z.xyz * p.z;
+}
+
+vec2 SourcePixel(ViewBlock view, vec3 p) { return view.camera.xy * (p.xy / p.z) + view.camera.zw; }
+
+// SPEC 4.2: where Delta pushes a fragment; only the compared depth moves, and never nearer.
+float Pushed(ViewBlock view, float w) {
+  return absolute_delta < 0.0 ? w - view.limits.z : min(w, 1.0 / (1.0 / w + absolute_delta));
+}
+
+bool Exists(ViewBlock view, vec3 ray, float w) {
+  if (!(w > 0.0) || !(1.0 / w > 0.0) || !(1.0 / w <= kLargestFloat)) return false;
+#if PER_PIXEL
+  if (AngleAt(view, ray, w) > max_angle_rad) return false;  // SPEC 1.3
+#endif
+  vec3 p = PointInView(view, ray, w);
+  if (!(p.z > 0.0)) return false;
+  return view.image.z == 0 || ColourAt(view, SourcePixel(view, p)).a > 0.0;
+}
+
+// The rank-th smallest angle (0: the smallest) among the fragments that are left.
+float RankedAngle(int rank) {
+  for (int i = 0; i < view_count; ++i) {
+    if (fragment[i] == 0.0) continue;
+    int smaller = 0, equal = 0;
+    for (int j = 0; j < view_count; ++j) {
+      if (fragment[j] == 0.0) continue;
+      smaller += angle[j] < angle[i] ? 1 : 0;
+      equal += angle[j] == angle[i] ? 1 : 0;
+    }
+    if (smaller <= rank && rank < smaller + equal) return angle[i];
+  }
+  return max_angle_rad;
+}
+
+void main() {
+  ivec2 target = ivec2(gl_FragCoord.xy);
+  vec2 pixel = gl_FragCoord.xy + vec2(0.0, first_row);
+  vec3 ray = vec3((pixel - novel_camera.zw) / novel_camera.xy, 1.0);
+  out_image = vec4(0.0);
+  out_depth = 0.0;
+  out_marks = uvec4(0u);
+
+  // SPEC 4.2: front and border.
+  float front = 0.0, border = -kLargestFloat;
+  for (int i = 0; i < view_count; ++i) {
+    float w = texelFetch(layers, ivec3(target, i), 0).r;
+    fragment[i] = 0.0;
+    if (!(w > 0.0) || !Exists(views[i], ray, w)) continue;
+    fragment[i] = w;
+    front = max(front, w);
+    border = max(border, Pushed(views[i], w));
+  }
+  if (!(front > 0.0)) return;
+  out_depth = 1.0 / front;
+
+  // SPEC 4.3, with the same Delta.
+  float margin = kBorderShare * (front - border);
+  uint at_border = 0u;
+  int left = 0;
+  float smallest = kLargestFloat;
+  for (int i = 0; i < view_count; ++i) {
+    float w = fragment[i];
+    if (w == 0.0) continue;
+    if (abs(w - border) <= margin) at_border = 255u;
+    if (w < border) {
+      fragment[i] = 0.0;
+      continue;
+    }
+    ++left;
+    angle[i] = AngleAt(views[i], ray, w);
+    smallest = min(smallest, angle[i]);
+  }
+#if PER_PIXEL
+  if (left > nearest_views) {  // SPEC 1.3; views tied with the K-th stay
+    float limit = RankedAngle(nearest_views - 1);
+    left = 0;
+    for (int i = 0; i < view_count; ++i) {
+      if (fragment[i] == 0.0) continue;
+      if (angle[i] > limit) fragment[i] = 0.0;
+      else ++left;
+    }
+  }
+#endif
+
+  // SPEC 4.5, 4.6.
+#if BLEND == K_NEAREST
+  float next_angle = left <= blend_k ? max_angle_rad : RankedAngle(blend_k);
+#else
+  float next_angle = 0.0;
+#endif
+  float largest = kNoWeight;
+  int blended = 0;
+  for (int i = 0; i < view_count; ++i) {
+    if (fragment[i] == 0.0) continue;
+    float log_weight = LogWeight(angle[i], next_angle);
+    if (log_weight > kNoWeight) ++blended;
+    largest = max(largest, log_weight);
+  }
+  bool all_zero = blended == 0;  // then those at the smallest angle share
+
+  // SPEC 4.7.
+  vec4 sum = vec4(0.0);
+  for (int i = 0; i < view_count; ++i) {
+    if (fragment[i] == 0.0) continue;
+    float log_weight = LogWeight(angle[i], next_angle);
+    float weight = all_zero ? (angle[i] == smallest ? 1.0 : 0.0)
+                            : (log_weight > kNoWeight ? exp(log_weight - largest) : 0.0);
+    if (!(weight > 0.0)) continue;
+    if (all_zero) ++blended;
+    ViewBlock view = views[i];
+    vec3 colour = ColourAt(view, SourcePixel(view, PointInView(view, ray, fragment[i]))).rgb;
+#if !LINEAR_LIGHT
+    colour = SrgbFromLinear(colour);
+#endif
+    sum += weight * vec4(colour, 1.0);
+  }
+  vec3 mean = sum.rgb / sum.a;
+#if LINEAR_LIGHT
+  mean = SrgbFromLinear(mean);
+#endif
+  out_image = vec4(clamp(mean, 0.0, 1.0), 1.0);
+  out_marks = uvec4(uint(min(blended, 255)), at_border, 0u, 0u);
+}

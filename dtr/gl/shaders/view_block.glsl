@@ -1,0 +1,22 @@
+// One view as the shaders know it; the same text is read by C++ (dtr/gl/renderer.cpp) and GLSL.
+// Lengths stay in scene units, so nothing here depends on the world's origin: positions are
+// relative to the novel camera and were formed in double precision (SPEC 0.5).
+#ifdef __cplusplus
+struct ViewBlock {
+#define vec4 std::array<float, 4>
+#define ivec4 std::array<int, 4>
+#else
+struct ViewBlock {
+#endif
+  vec4 row_x;   // novel_from_view: first row of the rotation, translation x
+  vec4 row_y;   // second row, translation y
+  vec4 row_z;   // third row, translation z
+  vec4 camera;  // fx, fy, cx, cy of the view's image, pixels
+  vec4 gain;    // linear RGB factor, unused
+  vec4 limits;  // image width, height (pixels), Delta (difference of 1/z), unused
+  ivec4 image;  // texture array, layer in it, 1 if the view has a mask, unused
+};
+#ifdef __cplusplus
+#undef vec4
+#undef ivec4
+#endif

@@ -1,0 +1,66 @@
+#include "dtr/render/frame.h"
+
+#include <algorithm>
+#include <string>
+#include <tuple>
+
+#include "dtr/base/error.h"
+
+namespace dtr {
+namespace {
+
+// Far beyond any photo; refuses a slip of the pen before memory is asked for.
+constexpr long long kMaxNovelPixels = 1LL << 28;
+// Surfaces nearer to the novel camera than this share of the view's baseline are cut (SPEC 2.5).
+constexpr double kNearPlaneShare = 1e-3;
+
+}  // namespace
+
+void CheckNovelCamera(const PinholeCamera& novel, const Pose& novel_from_world) {
+  if (static_cast<long long>(novel.width_px()) * novel.height_px() > kMaxNovelPixels) {
+    throw UsageError("--size: expected at most 2^28 pixels, found " +
+                     std::to_string(novel.width_px()) + "x" + std::to_string(novel.height_px()));
+  }
+  if (!novel_from_world.translation.allFinite() ||
+      !novel_from_world.rotation.coeffs().allFinite() || !(novel_from_world.rotation.norm() > 0)) {
+    throw Error("novel camera: expected a finite pose, found NaN, infinity or a zero rotation");
+  }
+}
+
+RenderResult EmptyResult(const PinholeCamera& novel) {
+  const int width = novel.width_px(), height = novel.height_px();
+  RenderResult result;
+  result.image = ImageRgb8(width, height, 3);
+  result.depth = DepthImage(width, height);
+  result.coverage = Mask(width, height);
+  result.view_count = Grid<std::uint8_t>(width, height);
+  result.delta_border = Mask(width, height);
+  return result;
+}
+
+double CoverageShare(const Mask& coverage) {
+  const auto seen = std::count(coverage.data().begin(), coverage.data().end(), 255);
+  return static_cast<double>(seen) / static_cast<double>(coverage.data().size());
+}
+
+ViewPlacement PlaceView(const View& view, const Pose& novel_from_world) {
+  const Eigen::Quaterniond novel_rotation = novel_from_world.rotation.normalized();
+  const Eigen::Quaterniond view_rotation = view.cam_from_world.rotation.normalized();
+  ViewPlacement placed;
+  placed.rotation = (novel_rotation * view_rotation.conjugate()).toRotationMatrix();
+  placed.translation =
+      novel_rotation * (view.CenterInWorld() - novel_from_world.TargetOriginInSource());
+  placed.near_z = kNearPlaneShare * DisparityBaseline(view);
+  return placed;
+}
+
+std::vector<int> CanonicalOrder(const RenderScene& scene, std::vector<int> views) {
+  std::sort(views.begin(), views.end(), [&](int a, int b) {
+    const std::string &id_a = scene.views[static_cast<size_t>(a)]->id,
+                      &id_b = scene.views[static_cast<size_t>(b)]->id;
+    return std::tie(id_a, a) < std::tie(id_b, b);
+  });
+  return views;
+}
+
+}  // namespace dtr

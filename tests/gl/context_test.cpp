@@ -1,0 +1,84 @@
+#include "dtr/gl/context.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+
+#include "dtr/base/error.h"
+#include "dtr/gl/objects.h"
+#include "dtr/gl/program.h"
+#include "tests/gl/gl_testing.h"
+#include "tests/support/test_data.h"
+
+namespace dtr::gl {
+namespace {
+
+using namespace dtr::testing;
+using Context = GlTest;
+
+// Makes a context as a fresh process would, with a variable of the environment set.
+void OpenWith(const char* variable, const char* value) {
+  setenv(variable, value, 1);
+  try {
+    const EglContext context;
+  } catch (const Error& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    std::exit(1);
+  }
+  std::exit(0);
+}
+
+TEST(EglContextDeathTest, AnOlderContextIsRefusedInOneLineThatNamesTheCpuRenderer) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_EXIT(OpenWith("MESA_GL_VERSION_OVERRIDE", "4.2"), ::testing::ExitedWithCode(1),
+              "OpenGL: expected a context of version 4.3 or newer.*--renderer cpu");
+}
+
+TEST(EglContextDeathTest, AMachineWithoutADriverIsRefusedInOneLineThatNamesTheCpuRenderer) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_EXIT(OpenWith("__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent"),
+              ::testing::ExitedWithCode(1),
+              "OpenGL: expected a context of version 4.3 or newer.*--renderer cpu");
+}
+
+TEST_F(Context, SaysWhatItIs) {
+  std::string why;
+  EXPECT_NE(SharedContext(&why)->Description().find("OpenGL 4."), std::string::npos);
+}
+
+TEST_F(Context, AShaderThatDoesNotCompileIsNamedWithItsLine) {
+  const TemporaryFolder folder;
+  std::ofstream(folder / "shared.glsl")
+      << "float One() { return 1.0; }\nfloat Two() { retrun 2.0; }\n";
+  std::ofstream(folder / "a.vert")
+      << "// one\n#include \"shared.glsl\"\nvoid main() { gl_Position = vec4(Two()); }\n";
+  try {
+    BuildProgram({{GL_VERTEX_SHADER, "a.vert"}}, {}, folder.path().string());
+    FAIL() << "it compiled";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("shared.glsl:2"), std::string::npos) << error.what();
+  }
+  std::ofstream(folder / "shared.glsl") << "float Two() { return 2.0; }\n";
+  std::ofstream(folder / "a.vert")
+      << "// one\n#include \"shared.glsl\"\n\nvoid main() { gl_Position = Nothing(); }\n";
+  try {
+    BuildProgram({{GL_VERTEX_SHADER, "a.vert"}}, {}, folder.path().string());
+    FAIL() << "it compiled";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("a.vert:4"), std::string::npos) << error.what();
+  }
+  EXPECT_THROW(BuildProgram({{GL_VERTEX_SHADER, "absent.vert"}}, {}, ""), Error);
+}
+
+TEST_F(Context, EveryEmbeddedShaderSaysWhichStepItIs) {
+  EXPECT_EQ(EmbeddedShaders().size(), 9u);
+  for (const EmbeddedShader& shader : EmbeddedShaders()) {
+    EXPECT_FALSE(shader.text.empty()) << shader.name;
+  }
+}
+
+}  // namespace
+}  // namespace dtr::gl

@@ -1,0 +1,197 @@
+// tests/gl/gl_testing.h -- a context for the tests, scenes, and how two renderers are compared.
+#pragma once
+#include <epoxy/gl.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <string>
+
+#include "dtr/base/random.h"
+#include "dtr/gl/context.h"
+#include "dtr/gl/renderer.h"
+#include "dtr/render/scene.h"
+#include "tests/cpu/render_testing.h"
+
+namespace dtr::testing {
+
+/// One context for all tests of a program, with debug output; null where the machine has none.
+inline gl::EglContext* SharedContext(std::string* why) {
+  static std::string reason;
+  static std::unique_ptr<gl::EglContext> context = [] {
+    try {
+      return std::make_unique<gl::EglContext>();
+    } catch (const std::exception& error) {
+      reason = error.what();
+      return std::unique_ptr<gl::EglContext>();
+    }
+  }();
+  *why = reason;
+  return context.get();
+}
+
+/// Skips where there is no OpenGL; any error the driver reports fails the test.
+class GlTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    std::string why;
+    if (SharedContext(&why) == nullptr) GTEST_SKIP() << why;
+    debug_ = std::make_unique<gl::DebugOutput>();
+  }
+  void TearDown() override {
+    if (debug_) {
+      EXPECT_EQ(debug_->errors(), 0);
+    }
+    debug_.reset();
+  }
+
+ private:
+  std::unique_ptr<gl::DebugOutput> debug_;
+};
+
+struct NamedScene {
+  std::string name;
+  DtrSet set;
+  Shot novel;
+};
+
+inline DtrSet FromAround(const Surface& surface, int count, double spread,
+                         const Eigen::Vector3d& target, int depth_scale = 1) {
+  std::vector<View> views;
+  for (int i = 0; i < count; ++i) {
+    const double angle = 2 * 3.14159265358979323846 * i / count;
+    Shot shot =
+        ShotFrom("v" + std::to_string(i),
+                 {spread * std::cos(angle), 0.7 * spread * std::sin(angle), 0.1 * i}, target);
+    shot.depth_scale = depth_scale;
+    views.push_back(Photograph(surface, shot));
+  }
+  return SetOf(std::move(views));
+}
+
+/// A plane that leans, spheres before it, a step, a map with holes and masks and gains, thin rods,
+/// and cameras that look outwards from the middle of a room (the per-pixel rule).
+inline std::vector<NamedScene> ParityScenes() {
+  std::vector<NamedScene> scenes;
+  const Shot ahead = ShotFrom("n", {0.17, 0.11, 0.3}, {0.2, -0.1, 10});
+  scenes.push_back(
+      {"leaning plane", FromAround(Plane({0.4, 0.1, 0.9}, 8), 4, 0.8, {0, 0, 9}), ahead});
+  scenes.push_back({"spheres",
+                    FromAround(Union(Union(Sphere({-1, 0.3, 6}, 1.2), Sphere({1.6, -0.4, 7}, 1)),
+                                     Plane({0, 0, 1}, 11)),
+                               6, 0.7, {0, 0, 9}),
+                    ahead});
+  scenes.push_back({"square and plane", SquareBeforePlane(), ahead});
+  DtrSet damaged =
+      FromAround(Union(Square(0.3, 0.2, 5, 1), Plane({0.2, 0, 1}, 9)), 5, 0.6, {0, 0, 9});
+  Random random(7);
+  for (View& view : damaged.frames[0].views) {
+    view.mask = Mask(view.image.width(), view.image.height(), 1, 255);
+    for (int k = 0; k < 12; ++k) {
+      const int x = random.Index(86), y = random.Index(64);
+      for (int j = 0; j < 6; ++j) {
+        for (int i = 0; i < 6; ++i) {
+          if (k % 2 == 0)
+            view.depth(x + i, y + j) = 0;
+          else
+            view.mask(x + i, y + j) = 0;
+        }
+      }
+    }
+  }
+  FinishGeometry(damaged);
+  scenes.push_back({"holes and masks", std::move(damaged), ahead});
+  Surface rods = Plane({0, 0, 1}, 10);
+  for (int k = -2; k <= 2; ++k) rods = Union(rods, Square(0.9 * k, 0.3 * k, 5 + 0.2 * k, 0.09));
+  scenes.push_back({"small squares", FromAround(rods, 4, 0.5, {0, 0, 9}, 2), ahead});
+  const Surface room = [](const Eigen::Vector3d& o, const Eigen::Vector3d& d) {
+    double nearest = kNoHit;
+    for (int axis = 0; axis < 3; ++axis) {
+      if (d[axis] == 0) continue;
+      nearest = std::min(nearest, ((d[axis] > 0 ? 5.0 : -5.0) - o[axis]) / d[axis]);
+    }
+    return nearest;
+  };
+  std::vector<View> outwards;
+  for (int i = 0; i < 10; ++i) {
+    const double angle = 2 * 3.14159265358979323846 * i / 10;
+    const Eigen::Vector3d centre(0.5 * std::cos(angle), 0.1 * i, 0.5 * std::sin(angle));
+    outwards.push_back(
+        Photograph(room, ShotFrom("r" + std::to_string(i), centre,
+                                  centre + Eigen::Vector3d(std::cos(angle), 0, std::sin(angle)))));
+  }
+  scenes.push_back({"room from inside", SetOf(std::move(outwards)),
+                    ShotFrom("n", {0.1, 0.2, 0.05}, {2, 0.3, 1})});
+  // Photos of one world agree on its colours, whatever the weights: gains tell the views apart.
+  for (NamedScene& scene : scenes) {
+    double gain = 0.6;
+    for (View& view : scene.set.frames[0].views) {
+      view.gain = {gain, 1.3 - 0.5 * gain, 1.0};
+      gain = gain > 1 ? 0.65 : gain + 0.17;
+    }
+  }
+  return scenes;
+}
+
+/// What issue B asks of two renderers of one scene.
+struct Comparison {
+  long long compared = 0, apart = 0;         ///< seen by both and judged; more than 2 levels apart
+  long long judged = 0, coverage_apart = 0;  ///< neither at a break nor at the border
+  long long border = 0, total = 0;           ///< flagged by the reference
+  int largest = 0;
+  double border_share() const { return total == 0 ? 0 : double(border) / double(total); }
+  double apart_share() const { return compared == 0 ? 0 : double(apart) / double(compared); }
+  double coverage_share() const {
+    return judged == 0 ? 0 : double(coverage_apart) / double(judged);
+  }
+  void Add(const Comparison& o) {
+    compared += o.compared, apart += o.apart, judged += o.judged;
+    coverage_apart += o.coverage_apart, border += o.border, total += o.total;
+    largest = std::max(largest, o.largest);
+  }
+};
+
+/// Pixels within 2 of a step of the reference's depth (more than `step` of itself) or of the edge
+/// of what it covers.
+inline Mask NearBreaks(const RenderResult& reference, double step) {
+  const int width = reference.depth.width(), height = reference.depth.height();
+  Mask near(width, height);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      for (const auto& [dx, dy] : {std::pair(1, 0), std::pair(0, 1)}) {
+        if (!near.Contains(x + dx, y + dy)) continue;
+        const float a = reference.depth(x, y), b = reference.depth(x + dx, y + dy);
+        if ((a > 0) == (b > 0) && std::abs(a - b) <= step * std::max(a, b)) continue;
+        for (int j = -2; j <= 2; ++j) {
+          for (int i = -2; i <= 2; ++i) {
+            if (near.Contains(x + i, y + j)) near(x + i, y + j) = 255;
+          }
+        }
+      }
+    }
+  }
+  return near;
+}
+
+inline Comparison Compare(const RenderResult& reference, const RenderResult& other, double step) {
+  Comparison c;
+  const Mask breaks = NearBreaks(reference, step);
+  for (int y = 0; y < breaks.height(); ++y) {
+    for (int x = 0; x < breaks.width(); ++x) {
+      ++c.total;
+      const bool border = reference.delta_border(x, y) != 0;
+      c.border += border;
+      if (border || breaks(x, y) != 0) continue;
+      ++c.judged;
+      const bool seen = reference.coverage(x, y) != 0;
+      if (seen != (other.coverage(x, y) != 0)) ++c.coverage_apart;
+      if (!seen || other.coverage(x, y) == 0) continue;
+      ++c.compared;
+      const int difference = PixelDifference(reference.image, other.image, x, y);
+      c.apart += difference > 2;
+      c.largest = std::max(c.largest, difference);
+    }
+  }
+  return c;
+}
+
+}  // namespace dtr::testing
