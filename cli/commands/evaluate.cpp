@@ -8,7 +8,7 @@
 #include "cli/command.h"
 #include "cli/pipeline/depth_evaluation.h"
 #include "cli/render_options.h"
-#include "dtr/cpu/renderer.h"
+#include "cli/renderers.h"
 #include "dtr/eval/held_out.h"
 #include "dtr/eval/json.h"
 #include "dtr/io/image_io.h"
@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 struct Options {
   fs::path set, pictures, truth;
   bool leave_one_out = false;
-  std::string renderer = "cpu";
+  std::string renderer;
   std::shared_ptr<RenderOptions> render;
 };
 
@@ -101,7 +101,7 @@ int RunEvaluate(const Options& options, const Context& context) {
   eval::EvaluationReport report;
   // With truth alone there is still something to measure.
   if (options.leave_one_out || has_held_out || !depth) {
-    report = eval::EvaluateHeldOut(set, evaluate, &cpu::Render, context.console);
+    report = eval::EvaluateHeldOut(set, evaluate, MakeRenderer(options.renderer), context.console);
   }
   SayReport(report, context.console);
   if (depth) SayDepth(*depth, context.console);
@@ -125,9 +125,7 @@ void AddEvaluateCommand(CLI::App& app) {
             .add_option("--pictures", options->pictures,
                         "Write rendering | photo | difference for every view")
             ->type_name("DIR");
-        command.add_option("--renderer", options->renderer, "Renderer [cpu]")
-            ->check(CLI::IsMember({"cpu"}))
-            ->type_name("cpu");
+        AddRendererOption(command, options->renderer);
         options->render = AddRenderOptions(command);
         return [options](const Context& context) { return RunEvaluate(*options, context); };
       });

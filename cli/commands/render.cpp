@@ -8,10 +8,10 @@
 #include "cli/command.h"
 #include "cli/novel_frames.h"
 #include "cli/render_options.h"
+#include "cli/renderers.h"
 #include "cli/video.h"
 #include "cli/view_names.h"
 #include "dtr/base/error.h"
-#include "dtr/cpu/renderer.h"
 #include "dtr/io/depth_io.h"
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
@@ -26,7 +26,7 @@ constexpr int kFramesPerSecond = 24;
 struct Options {
   fs::path set, output, depth_out, coverage_out;
   NovelCameraRequest request;
-  std::string exclude, renderer = "cpu";
+  std::string exclude, renderer;
   std::shared_ptr<RenderOptions> render;
 };
 
@@ -92,6 +92,8 @@ int RunRender(const Options& options, const Context& context) {
   }
   RenderOptions render = *options.render;
   render.threads = context.common.threads;
+  // Before anything is loaded: a machine without OpenGL should say so at once.
+  const eval::RenderFunction render_view = MakeRenderer(options.renderer);
   context.console.Stage("loading views", 0);
   io::LoadOptions load;
   load.threads = render.threads;
@@ -105,7 +107,7 @@ int RunRender(const Options& options, const Context& context) {
     context.console.ThrowIfInterrupted();
     const auto start = std::chrono::steady_clock::now();
     const RenderResult result =
-        cpu::Render(scene, cameras[i].camera, cameras[i].cam_from_world, render);
+        render_view(scene, cameras[i].camera, cameras[i].cam_from_world, render);
     const std::chrono::duration<double, std::milli> ms = std::chrono::steady_clock::now() - start;
     if (result.views_used.empty()) {
       context.console.Note(
@@ -154,9 +156,7 @@ void AddRenderCommand(CLI::App& app) {
             ->type_name("WxH");
         command.add_option("--exclude", options->exclude, "Views not to render from")
             ->type_name("NAME,...");
-        command.add_option("--renderer", options->renderer, "Renderer [cpu]")
-            ->check(CLI::IsMember({"cpu"}))
-            ->type_name("cpu");
+        AddRendererOption(command, options->renderer);
         command.add_option("--depth-out", options->depth_out, "Write the depth as float EXR")
             ->type_name("FILE");
         command.add_option("--coverage-out", options->coverage_out, "Write what was seen as PNG")
