@@ -58,10 +58,11 @@ void DepthStage(std::vector<View>& views, const SparseScene& sparse, const stere
         view.inverse_depth_sigma = std::move(estimate.inverse_depth_sigma);
         writer.WriteView(view, unit);
       });
-  // What follows uses the stored depth, so that a resumed run and an undisturbed one agree.
+  // What follows uses the stored maps, so that a resumed run and an undisturbed one agree.
   for (const int i : sources) {
     io::LoadOptions load;
     load.images = false;
+    load.sigma = true;
     load.threads = options.threads;
     io::LoadPixels(writer.folder(), views[static_cast<size_t>(i)], load);
   }
