@@ -198,7 +198,7 @@ Json ReportJson(const BuildReport& report, const RunLog& log, const std::filesys
   json["views"] = Json::array();
   for (const View& view : report.set.frames.front().views) {
     json["views"].push_back({{"name", view.name},
-                             {"role", view.role == ViewRole::kSource ? "source" : "held_out"},
+                             {"role", NameOf(view.role)},
                              {"width_px", view.camera.width_px()},
                              {"height_px", view.camera.height_px()}});
   }

@@ -321,20 +321,6 @@ DtrSet SetFrom(const JsonObject& root) {
 
 }  // namespace
 
-const char* NameOf(LengthUnit unit) {
-  switch (unit) {
-    case LengthUnit::kArbitrary:
-      return "arbitrary";
-    case LengthUnit::kMetre:
-      return "metre";
-    case LengthUnit::kUnknown:
-      break;
-  }
-  return "unknown";
-}
-
-const char* NameOf(ViewRole role) { return role == ViewRole::kSource ? "source" : "held_out"; }
-
 StoredFile StoredFileFromJson(const JsonObject& object) {
   StoredFile file{PathFrom(object), object.String("sha256"), object.Unsigned("bytes")};
   if (!IsHexSha256(file.sha256)) object.Fail("sha256", "64 lower-case hexadecimal digits");

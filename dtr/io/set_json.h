@@ -12,9 +12,6 @@ namespace dtr::io {
 inline constexpr char kSetFile[] = "set.json";
 inline constexpr int kFormatVersion = 1;
 
-const char* NameOf(LengthUnit unit);
-const char* NameOf(ViewRole role);
-
 /// Parses and checks everything that needs no other file. `file` stands in front of every error.
 /// Files of held-out views come without hash and size (dtr/io/held_out_files.h).
 DtrSet SetFromJson(const std::string& text, const std::string& file);

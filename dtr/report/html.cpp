@@ -20,10 +20,10 @@ constexpr std::string_view kStyle = R"css(
 * { box-sizing: border-box; }
 body { margin: 0 auto; max-width: 76rem; padding: 2rem 1.25rem 4rem; background: var(--page);
   color: var(--ink); font: 15px/1.5 system-ui, -apple-system, "Segoe UI", sans-serif; }
-h1 { font-size: 1.7rem; line-height: 1.2; margin: 0 0 1.5rem; overflow-wrap: anywhere; }
+h1 { font-size: 1.7rem; line-height: 1.2; margin: 0 0 1.5rem; overflow-wrap: break-word; }
 h2 { font-size: 1.15rem; margin: 2.4rem 0 .8rem; padding-bottom: .3rem;
   border-bottom: 2px solid var(--accent); }
-p { max-width: 46rem; margin: .6rem 0; white-space: pre-line; overflow-wrap: anywhere; }
+p { max-width: 46rem; margin: .6rem 0; white-space: pre-line; overflow-wrap: break-word; }
 .verdict { display: inline-block; font-weight: 600; padding: .3rem .8rem; border-radius: 1rem;
   border: 1.5px solid currentColor; max-width: none; }
 .good { color: var(--good); } .bad { color: var(--bad); }
@@ -32,14 +32,14 @@ p { max-width: 46rem; margin: .6rem 0; white-space: pre-line; overflow-wrap: any
 table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums; }
 th { text-align: left; font-weight: 600; color: var(--soft); font-size: .85rem; }
 th, td { padding: .45rem .8rem; border-bottom: 1px solid var(--line); vertical-align: middle;
-  overflow-wrap: anywhere; }
+  overflow-wrap: break-word; }
 tbody tr:last-child td { border-bottom: 0; }
 .number { text-align: right; white-space: nowrap; }
 td img { display: block; max-width: 20rem; height: auto; border-radius: .25rem; }
 figure { margin: 1rem 0; }
 figure img { display: block; max-width: 100%; height: auto; border-radius: .4rem; }
 figure img.plot { background: #fff; padding: .5rem; border: 1px solid var(--line); }
-figcaption { color: var(--soft); font-size: .9rem; margin-top: .35rem; overflow-wrap: anywhere; }
+figcaption { color: var(--soft); font-size: .9rem; margin-top: .35rem; overflow-wrap: break-word; }
 @media print { body { background: #fff; color: #000; max-width: none; } }
 )css";
 

@@ -11,18 +11,6 @@
 namespace dtr::report {
 namespace {
 
-const char* NameOf(LengthUnit unit) {
-  switch (unit) {
-    case LengthUnit::kMetre:
-      return "metre";
-    case LengthUnit::kArbitrary:
-      return "arbitrary";
-    case LengthUnit::kUnknown:
-      return "unknown";
-  }
-  return "unknown";
-}
-
 Cell Thumbnail(const ImageRgb8& image, int side_px, std::string description) {
   return Picture{Shrink(image, side_px), std::move(description)};
 }

@@ -11,6 +11,8 @@ namespace dtr {
 
 /// What one scene unit is. Nothing guesses it.
 enum class LengthUnit { kUnknown, kArbitrary, kMetre };
+/// "unknown", "arbitrary" or "metre", as files and people call it.
+const char* NameOf(LengthUnit unit);
 
 /// Axis-aligned box in the set's world frame; empty while min > max.
 struct Bounds {

@@ -4,6 +4,8 @@
 
 namespace dtr {
 
+const char* NameOf(ViewRole role) { return role == ViewRole::kSource ? "source" : "held_out"; }
+
 PinholeCamera View::DepthCamera() const {
   if (depth_scale == 1) return camera;
   if (depth_scale < 1 || camera.width_px() % depth_scale != 0 ||

@@ -16,6 +16,8 @@ enum class ViewRole {
   kSource,   ///< has depth; renderers draw from it
   kHeldOut,  ///< camera and image only, kept to measure with; never given to a renderer
 };
+/// "source" or "held_out".
+const char* NameOf(ViewRole role);
 
 /// How depth lies on disk (DESIGN section 3; docs/FORMAT.md gives the bytes).
 enum class DepthCoding {

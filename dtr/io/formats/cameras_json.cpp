@@ -27,18 +27,6 @@ LengthUnit UnitFrom(const Json& root, const std::string& source) {
               Json(unit).dump(-1, ' ', true, Json::error_handler_t::replace));
 }
 
-const char* NameOf(LengthUnit unit) {
-  switch (unit) {
-    case LengthUnit::kArbitrary:
-      return "arbitrary";
-    case LengthUnit::kMetre:
-      return "metre";
-    case LengthUnit::kUnknown:
-      break;
-  }
-  return "unknown";
-}
-
 Eigen::Vector3d OriginFrom(const Json& root, const std::string& source) {
   if (!root.contains("world_origin")) return Eigen::Vector3d::Zero();
   const std::string where = source + ": world_origin";
