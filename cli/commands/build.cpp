@@ -46,8 +46,8 @@ void AddBuildCommand(CLI::App& app) {
         command.add_flag("--holdout-strict", options->holdout_strict,
                          "Keep them out of SfM too and register them afterwards");
         command.add_option("--engine", options->engine, "Depth engine [sgbm]")
-            ->check(CLI::IsMember({"sgbm", "none"}))
-            ->type_name("sgbm|none");
+            ->check(CLI::IsMember({"sgbm", "patchmatch", "none"}))
+            ->type_name("sgbm|patchmatch|none");
         command
             .add_option("--preset", options->preset, "Long side 800, 1024 or full size [balanced]")
             ->check(CLI::IsMember({"fast", "balanced", "best"}))

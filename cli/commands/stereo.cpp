@@ -19,8 +19,8 @@ void AddStereoCommand(CLI::App& app) {
                         "The set to write; without it SET itself is replaced, whole or not at all")
             ->type_name("SET2");
         command.add_option("--engine", options->engine, "Depth engine [sgbm]")
-            ->check(CLI::IsMember({"sgbm"}))
-            ->type_name("sgbm");
+            ->check(CLI::IsMember({"sgbm", "patchmatch"}))
+            ->type_name("sgbm|patchmatch");
         command.add_flag("--force", options->force, "Replace SET2 when it exists");
         return [options](const Context& context) -> int {
           options->threads = context.common.threads;

@@ -259,7 +259,7 @@ TEST(SgbmEngine, RefusesAnEmptyRangeAndAWrongSize) {
 
 TEST(MakeEngine, NamesTheEnginesThereAre) {
   EXPECT_EQ(MakeEngine("sgbm")->name(), "sgbm");
-  for (const char* name : {"patchmatch", "colmap", "", "SGBM"}) {
+  for (const char* name : {"colmap", "", "SGBM"}) {
     try {
       MakeEngine(name);
       FAIL() << name;

@@ -1,0 +1,455 @@
+#include "stereo/patchmatch/kernel.h"
+
+#include <cmath>
+#include <limits>
+
+#include "dtr/base/random.h"
+
+// The rest of this file is compiled once per instruction set; the best one is chosen at run time.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "stereo/patchmatch/kernel.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+// clang-format off: after highway.h
+#include <hwy/contrib/math/math-inl.h>
+
+#include "stereo/patchmatch/kernel_ncc-inl.h"
+// clang-format on
+
+HWY_BEFORE_NAMESPACE();
+namespace dtr::stereo::patchmatch::HWY_NAMESPACE {
+
+/// Candidates per visit: the pixel's own plane, 4 near and 4 far regions.
+constexpr int kPlanes = 9;
+constexpr int kNearSamples = 7, kFarSamples = 11;
+
+/// Candidate planes of a group and what each costs in each view.
+struct Candidates {
+  int count = 0;
+  HWY_ALIGN float w[kPlanes][kLanes];
+  HWY_ALIGN float a[kPlanes][kLanes];
+  HWY_ALIGN float b[kPlanes][kLanes];
+  HWY_ALIGN float cost[kPlanes][kMaxViews][kLanes];
+};
+
+/// Best plane so far, and the views' weights.
+struct Best {
+  HWY_ALIGN float w[kLanes];
+  HWY_ALIGN float a[kLanes];
+  HWY_ALIGN float b[kLanes];
+  HWY_ALIGN float cost[kLanes];
+  HWY_ALIGN float weight[kMaxViews][kLanes];
+};
+
+/// Every second value of a row from x on.
+HWY_INLINE VF LoadColour(const BorderedGrid& grid, int x, int y) {
+  return hn::GatherIndex(DF(), grid.at(x, y), EverySecond());
+}
+
+/// Stores lanes whose pixel lies in the image.
+HWY_INLINE void StoreColour(VF value, int x, int y, int width, BorderedGrid* grid) {
+  HWY_ALIGN float lanes[kLanes];
+  hn::Store(value, DF(), lanes);
+  float* row = grid->at(0, y);
+  for (int i = 0; i < static_cast<int>(kLanes) && x + 2 * i < width; ++i) row[x + 2 * i] = lanes[i];
+}
+
+/// Keeps, per lane, the pixel at (dx, dy) if it is cheaper than the cheapest so far.
+HWY_INLINE void Cheaper(const State& state, int x, int y, int dx, int dy, VF* cost, VF* at_x,
+                        VF* at_y) {
+  const DF d;
+  const VF c = LoadColour(state.cost, x + dx, y + dy);
+  const auto less = hn::Lt(c, *cost);
+  *cost = hn::IfThenElse(less, c, *cost);
+  *at_x = hn::IfThenElse(less, hn::Set(d, static_cast<float>(dx)), *at_x);
+  *at_y = hn::IfThenElse(less, hn::Set(d, static_cast<float>(dy)), *at_y);
+}
+
+/// Adds the plane of the cheapest pixel of a region, continued to the group's pixels.
+/// `forward` points away from the pixel; a near region is a V, a far one a strip.
+void AddRegion(const State& state, const Group& g, int fx, int fy, bool far_strip,
+               Candidates* candidates) {
+  const DF d;
+  VF cost = hn::Set(d, std::numeric_limits<float>::infinity());
+  VF at_x = hn::Zero(d), at_y = hn::Zero(d);
+  if (far_strip) {
+    for (int i = 0; i < kFarSamples; ++i) {
+      const int reach = 3 + 2 * i;
+      Cheaper(state, g.x, g.y, reach * fx, reach * fy, &cost, &at_x, &at_y);
+    }
+  } else {
+    Cheaper(state, g.x, g.y, fx, fy, &cost, &at_x, &at_y);
+    for (int i = 1; 2 * i < kNearSamples; ++i) {
+      for (const int side : {-i, i}) {
+        Cheaper(state, g.x, g.y, (i + 1) * fx + side * fy, (i + 1) * fy + side * fx, &cost, &at_x,
+                &at_y);
+      }
+    }
+  }
+  const VF stride = hn::Set(d, static_cast<float>(state.w.stride()));
+  const auto offset = hn::Add(EverySecond(), hn::ConvertTo(DI(), hn::MulAdd(at_y, stride, at_x)));
+  const VF a = hn::GatherIndex(d, state.a.at(g.x, g.y), offset);
+  const VF b = hn::GatherIndex(d, state.b.at(g.x, g.y), offset);
+  VF w = hn::GatherIndex(d, state.w.at(g.x, g.y), offset);
+  w = hn::NegMulAdd(a, at_x, hn::NegMulAdd(b, at_y, w));
+  const int n = candidates->count++;
+  hn::Store(w, d, candidates->w[n]);
+  hn::Store(a, d, candidates->a[n]);
+  hn::Store(b, d, candidates->b[n]);
+}
+
+void CollectCandidates(const State& state, const Group& g, int far_regions, Candidates* c) {
+  const DF d;
+  c->count = 1;
+  hn::Store(LoadColour(state.w, g.x, g.y), d, c->w[0]);
+  hn::Store(LoadColour(state.a, g.x, g.y), d, c->a[0]);
+  hn::Store(LoadColour(state.b, g.x, g.y), d, c->b[0]);
+  constexpr int kDirections[4][2] = {{0, -1}, {0, 1}, {-1, 0}, {1, 0}};
+  for (const auto& f : kDirections) AddRegion(state, g, f[0], f[1], false, c);
+  for (int i = 0; i < far_regions; ++i) {
+    AddRegion(state, g, kDirections[i][0], kDirections[i][1], true, c);
+  }
+}
+
+/// Joint view selection of ACMH without its sampling: a view in which several candidates match well
+/// and few match badly sees the pixel. Its weight is its score times what the neighbours think.
+void ChooseViews(const Level& level, const Sweep& sweep, const State& state, const Group& g,
+                 const Candidates& c, Best* best) {
+  const DF d;
+  const int views = static_cast<int>(level.sources.size());
+  const float age = static_cast<float>(sweep.iteration);
+  const float tau = 0.8f * std::exp(-age * age / 90.0f);
+  const VF good_below = hn::Set(d, tau), bad_above = hn::Set(d, 1.2f);
+  const VF one = hn::Set(d, 1.0f), zero = hn::Zero(d);
+  VF sum = zero, largest = zero;
+  for (int v = 0; v < views; ++v) {
+    VF good = zero, bad = zero, score = zero;
+    for (int n = 0; n < c.count; ++n) {
+      const VF cost = hn::Load(d, c.cost[n][v]);
+      const auto is_good = hn::Lt(cost, good_below);
+      good = hn::Add(good, hn::IfThenElseZero(is_good, one));
+      bad = hn::Add(bad, hn::IfThenElseZero(hn::Gt(cost, bad_above), one));
+      const VF e = hn::Exp(d, hn::Mul(hn::Mul(cost, cost), hn::Set(d, -1.0f / 0.18f)));
+      score = hn::Add(score, hn::IfThenElseZero(is_good, e));
+    }
+    const auto sees = hn::And(hn::Gt(good, hn::Set(d, 2.0f)), hn::Lt(bad, hn::Set(d, 3.0f)));
+    score = hn::IfThenElse(sees, hn::Div(score, hn::Max(good, one)),
+                           hn::Set(d, std::exp(-tau * tau / 0.32f)));
+    VF prior = zero;
+    const BorderedGrid& w = state.weight[static_cast<size_t>(v)];
+    prior = hn::Add(LoadColour(w, g.x, g.y - 1), LoadColour(w, g.x, g.y + 1));
+    prior = hn::Add(prior, hn::Add(LoadColour(w, g.x - 1, g.y), LoadColour(w, g.x + 1, g.y)));
+    // The mean weight, in units of an equal share, up to 1.
+    prior = hn::Min(one, hn::Mul(prior, hn::Set(d, 0.25f * static_cast<float>(views))));
+    score = hn::Mul(score, hn::MulAdd(prior, hn::Set(d, 0.8f), hn::Set(d, 0.1f)));
+    hn::Store(score, d, best->weight[v]);
+    largest = hn::Max(largest, score);
+  }
+  // A view with little weight only costs time.
+  const VF least = hn::Mul(largest, hn::Set(d, 0.1f));
+  for (int v = 0; v < views; ++v) {
+    VF weight = hn::Load(d, best->weight[v]);
+    weight = hn::IfThenZeroElse(hn::Lt(weight, least), weight);
+    hn::Store(weight, d, best->weight[v]);
+    sum = hn::Add(sum, weight);
+  }
+  for (int v = 0; v < views; ++v) {
+    hn::Store(hn::Div(hn::Load(d, best->weight[v]), sum), d, best->weight[v]);
+  }
+}
+
+/// Weighted mean cost of a plane; stops where no lane can get below `limit`.
+VF TotalCost(const Level& level, const Group& g, const Best& best, VF w, VF a, VF b, VF limit) {
+  const DF d;
+  VF total = hn::Zero(d);
+  for (size_t v = 0; v < level.sources.size(); ++v) {
+    const VF weight = hn::Load(d, best.weight[v]);
+    if (hn::AllTrue(d, hn::Eq(weight, hn::Zero(d)))) continue;
+    total = hn::MulAdd(weight, ScoreView(g, level.sources[v], v, w, a, b), total);
+    if (hn::AllTrue(d, hn::Ge(total, limit))) break;
+  }
+  return total;
+}
+
+/// Takes a plane where it lies in the range and costs less.
+void TryPlane(const Level& level, const Group& g, VF w, VF a, VF b, Best* best) {
+  const DF d;
+  w = hn::Min(hn::Max(w, hn::Set(d, level.w_min)), hn::Set(d, level.w_max));
+  const VF limit = hn::Load(d, best->cost);
+  const VF cost = TotalCost(level, g, *best, w, a, b, limit);
+  const auto less = hn::Lt(cost, limit);
+  hn::Store(hn::IfThenElse(less, cost, limit), d, best->cost);
+  hn::Store(hn::IfThenElse(less, w, hn::Load(d, best->w)), d, best->w);
+  hn::Store(hn::IfThenElse(less, a, hn::Load(d, best->a)), d, best->a);
+  hn::Store(hn::IfThenElse(less, b, hn::Load(d, best->b)), d, best->b);
+}
+
+/// Costs of all candidates in all views, new view weights, then the cheapest candidate.
+void ChooseJointly(const Level& level, const Sweep& sweep, const State& state, const Group& g,
+                   Candidates* c, Best* best) {
+  const DF d;
+  const VF w_min = hn::Set(d, level.w_min), w_max = hn::Set(d, level.w_max);
+  for (int n = 0; n < c->count; ++n) {
+    const VF w = hn::Load(d, c->w[n]), a = hn::Load(d, c->a[n]), b = hn::Load(d, c->b[n]);
+    const auto outside = hn::Or(hn::Lt(w, w_min), hn::Gt(w, w_max));
+    for (size_t v = 0; v < level.sources.size(); ++v) {
+      const VF cost = ScoreView(g, level.sources[v], v, w, a, b);
+      hn::Store(hn::IfThenElse(outside, hn::Set(d, kWorstCost), cost), d, c->cost[n][v]);
+    }
+  }
+  ChooseViews(level, sweep, state, g, *c, best);
+  hn::Store(hn::Set(d, std::numeric_limits<float>::infinity()), d, best->cost);
+  for (int n = 0; n < c->count; ++n) {
+    VF total = hn::Zero(d);
+    for (size_t v = 0; v < level.sources.size(); ++v) {
+      total = hn::MulAdd(hn::Load(d, best->weight[v]), hn::Load(d, c->cost[n][v]), total);
+    }
+    const VF old = hn::Load(d, best->cost);
+    const auto less = hn::Lt(total, old);
+    hn::Store(hn::IfThenElse(less, total, old), d, best->cost);
+    hn::Store(hn::IfThenElse(less, hn::Load(d, c->w[n]), hn::Load(d, best->w)), d, best->w);
+    hn::Store(hn::IfThenElse(less, hn::Load(d, c->a[n]), hn::Load(d, best->a)), d, best->a);
+    hn::Store(hn::IfThenElse(less, hn::Load(d, c->b[n]), hn::Load(d, best->b)), d, best->b);
+  }
+}
+
+/// The same with the view weights the pixel has.
+void ChooseWithKnownViews(const Level& level, const State& state, const Group& g,
+                          const Candidates& c, Best* best) {
+  const DF d;
+  for (size_t v = 0; v < level.sources.size(); ++v) {
+    hn::Store(LoadColour(state.weight[v], g.x, g.y), d, best->weight[v]);
+  }
+  const VF infinity = hn::Set(d, std::numeric_limits<float>::infinity());
+  hn::Store(hn::Load(d, c.w[0]), d, best->w);
+  hn::Store(hn::Load(d, c.a[0]), d, best->a);
+  hn::Store(hn::Load(d, c.b[0]), d, best->b);
+  hn::Store(infinity, d, best->cost);
+  for (int n = 0; n < c.count; ++n) {
+    TryPlane(level, g, hn::Load(d, c.w[n]), hn::Load(d, c.a[n]), hn::Load(d, c.b[n]), best);
+  }
+}
+
+/// Three uniform numbers in [-1, 1) per lane, named by pixel and use.
+void Draw(const Level& level, const Group& g, int round, int use, float (*out)[kLanes]) {
+  for (size_t i = 0; i < kLanes; ++i) {
+    const std::uint64_t bits =
+        HashOf(level.seed, g.x + 2 * static_cast<int>(i), g.y, static_cast<int>(round * 16 + use));
+    for (int k = 0; k < 3; ++k) {
+      const auto part = static_cast<std::int32_t>((bits >> (21 * k)) & 0x1fffff);
+      out[k][i] = static_cast<float>(part) * 0x1.0p-20f - 1.0f;
+    }
+  }
+}
+
+/// The plane through the four direct neighbours, then random changes of the best plane.
+void Refine(const Level& level, const Sweep& sweep, const State& state, const Group& g,
+            Best* best) {
+  const DF d;
+  const VF half = hn::Set(d, 0.5f);
+  const VF left = LoadColour(state.w, g.x - 1, g.y), right = LoadColour(state.w, g.x + 1, g.y);
+  const VF up = LoadColour(state.w, g.x, g.y - 1), down = LoadColour(state.w, g.x, g.y + 1);
+  if (g.y > 0 && g.y + 1 < level.reference.height) {
+    TryPlane(level, g, hn::Load(d, best->w), hn::Mul(half, hn::Sub(right, left)),
+             hn::Mul(half, hn::Sub(down, up)), best);
+  }
+  const VF px = DisparityPerInverseDepth(g, level, hn::Load(d, best->w), best->weight);
+  const VF step = hn::Div(hn::Set(d, sweep.step_px), px);
+  // A slope that moves the window's corner as far as `step` moves its centre.
+  const VF slope = hn::Mul(step, hn::Set(d, 1.0f / kRadius));
+  HWY_ALIGN float r[3][kLanes];
+  Draw(level, g, sweep.round, 0, r);
+  const VF w0 = hn::Load(d, best->w), a0 = hn::Load(d, best->a), b0 = hn::Load(d, best->b);
+  TryPlane(level, g, hn::MulAdd(step, hn::Load(d, r[0]), w0), a0, b0, best);
+  const VF w1 = hn::Load(d, best->w), a1 = hn::Load(d, best->a), b1 = hn::Load(d, best->b);
+  TryPlane(level, g, w1, hn::MulAdd(slope, hn::Load(d, r[1]), a1),
+           hn::MulAdd(slope, hn::Load(d, r[2]), b1), best);
+  Draw(level, g, sweep.round, 1, r);
+  const VF quarter = hn::Set(d, 0.25f);
+  const VF w2 = hn::Load(d, best->w), a2 = hn::Load(d, best->a), b2 = hn::Load(d, best->b);
+  TryPlane(level, g, hn::MulAdd(hn::Mul(quarter, step), hn::Load(d, r[0]), w2),
+           hn::MulAdd(hn::Mul(quarter, slope), hn::Load(d, r[1]), a2),
+           hn::MulAdd(hn::Mul(quarter, slope), hn::Load(d, r[2]), b2), best);
+  if (!sweep.jump) return;
+  Draw(level, g, sweep.round, 2, r);
+  const float mid = 0.5f * (level.w_min + level.w_max), span = 0.5f * (level.w_max - level.w_min);
+  const VF w3 = hn::MulAdd(hn::Load(d, r[0]), hn::Set(d, span), hn::Set(d, mid));
+  const VF tilt = hn::Div(hn::Set(d, 1.0f), px);
+  TryPlane(level, g, w3, hn::Mul(tilt, hn::Load(d, r[1])), hn::Mul(tilt, hn::Load(d, r[2])), best);
+}
+
+void SweepRowImpl(const Level& level, const Sweep& sweep, int y, State* state) {
+  const DF d;
+  const int width = level.reference.width;
+  Candidates candidates;
+  Best best;
+  Group g;
+  for (int x = (y + sweep.colour) % 2; x < width; x += 2 * static_cast<int>(kLanes)) {
+    PrepareGroup(level, x, y, &g);
+    CollectCandidates(*state, g, sweep.far_regions, &candidates);
+    if (sweep.choose_views) {
+      ChooseJointly(level, sweep, *state, g, &candidates, &best);
+    } else {
+      ChooseWithKnownViews(level, *state, g, candidates, &best);
+    }
+    Refine(level, sweep, *state, g, &best);
+    StoreColour(hn::Load(d, best.w), x, y, width, &state->w);
+    StoreColour(hn::Load(d, best.a), x, y, width, &state->a);
+    StoreColour(hn::Load(d, best.b), x, y, width, &state->b);
+    StoreColour(hn::Load(d, best.cost), x, y, width, &state->cost);
+    if (!sweep.choose_views) continue;
+    for (size_t v = 0; v < level.sources.size(); ++v) {
+      StoreColour(hn::Load(d, best.weight[v]), x, y, width, &state->weight[v]);
+    }
+  }
+}
+
+void SearchRowImpl(const Level& level, int samples, int y, State* state) {
+  const DF d;
+  const int width = level.reference.width;
+  const size_t views = level.sources.size();
+  const VF infinity = hn::Set(d, std::numeric_limits<float>::infinity());
+  const VF half = hn::Set(d, 0.5f);
+  HWY_ALIGN float r[3][kLanes];
+  HWY_ALIGN float equal[kMaxViews][kLanes];
+  for (auto& lanes : equal) hn::Store(hn::Set(d, 1.0f / static_cast<float>(views)), d, lanes);
+  Group g;
+  for (int start = 0; start < 2; ++start) {
+    for (int x = start; x < width; x += 2 * static_cast<int>(kLanes)) {
+      PrepareGroup(level, x, y, &g);
+      VF best = infinity, best_w = hn::Set(d, level.w_min);
+      VF best_a = hn::Zero(d), best_b = hn::Zero(d);
+      for (int n = 0; n < samples; ++n) {
+        Draw(level, g, n, 15, r);
+        const float cell = (level.w_max - level.w_min) / static_cast<float>(samples);
+        const float centre = level.w_min + cell * (static_cast<float>(n) + 0.5f);
+        const VF w = hn::MulAdd(hn::Load(d, r[0]), hn::Set(d, 0.5f * cell), hn::Set(d, centre));
+        const VF px = DisparityPerInverseDepth(g, level, w, equal);
+        const VF tilt = hn::Div(hn::Set(d, n % 2 == 0 ? 0.0f : 1.0f), px);
+        const VF a = hn::Mul(tilt, hn::Load(d, r[1])), b = hn::Mul(tilt, hn::Load(d, r[2]));
+        VF first = hn::Set(d, kWorstCost), second = first;
+        for (size_t v = 0; v < views; ++v) {
+          const VF cost = ScoreView(g, level.sources[v], v, w, a, b);
+          second = hn::Min(second, hn::Max(first, cost));
+          first = hn::Min(first, cost);
+        }
+        const VF mean = views == 1 ? first : hn::Mul(half, hn::Add(first, second));
+        const auto less = hn::Lt(mean, best);
+        best = hn::IfThenElse(less, mean, best);
+        best_w = hn::IfThenElse(less, w, best_w);
+        best_a = hn::IfThenElse(less, a, best_a);
+        best_b = hn::IfThenElse(less, b, best_b);
+      }
+      StoreColour(best_w, x, y, width, &state->w);
+      StoreColour(best_a, x, y, width, &state->a);
+      StoreColour(best_b, x, y, width, &state->b);
+      StoreColour(best, x, y, width, &state->cost);
+      for (size_t v = 0; v < views; ++v) {
+        StoreColour(hn::Load(d, equal[v]), x, y, width, &state->weight[v]);
+      }
+    }
+  }
+}
+
+/// Vertex of the parabola through costs at -1, 0, 1; `curvature` is its second derivative.
+HWY_INLINE VF Vertex(VF before, VF here, VF after, VF* curvature) {
+  const DF d;
+  const VF two = hn::Set(d, 2.0f);
+  *curvature = hn::Sub(hn::Add(before, after), hn::Mul(two, here));
+  const VF safe = hn::Max(*curvature, hn::Set(d, 1e-6f));
+  const VF at = hn::Div(hn::Mul(hn::Set(d, 0.5f), hn::Sub(before, after)), safe);
+  return hn::Min(hn::Max(at, hn::Set(d, -1.0f)), hn::Set(d, 1.0f));
+}
+
+void JudgeGroup(const Level& level, const State& state, const Group& g, Verdict* out) {
+  const DF d;
+  const VF zero = hn::Zero(d), one = hn::Set(d, 1.0f);
+  HWY_ALIGN float weights[kMaxViews][kLanes];
+  for (size_t v = 0; v < level.sources.size(); ++v) {
+    hn::Store(LoadColour(state.weight[v], g.x, g.y), d, weights[v]);
+  }
+  const VF w = LoadColour(state.w, g.x, g.y), a = LoadColour(state.a, g.x, g.y);
+  const VF b = LoadColour(state.b, g.x, g.y);
+  const VF px = DisparityPerInverseDepth(g, level, w, weights);
+  const VF step = hn::Div(hn::Set(d, kJudgeStepPx), px);
+  VF before = zero, here = zero, after = zero, agreeing = zero;
+  HWY_ALIGN float vertex[kMaxViews][kLanes];
+  HWY_ALIGN float certainty[kMaxViews][kLanes];
+  for (size_t v = 0; v < level.sources.size(); ++v) {
+    const Source& s = level.sources[v];
+    const VF weight = hn::Load(d, weights[v]);
+    const VF c0 = ScoreView(g, s, v, hn::Sub(w, step), a, b), c1 = ScoreView(g, s, v, w, a, b);
+    const VF c2 = ScoreView(g, s, v, hn::Add(w, step), a, b);
+    before = hn::MulAdd(weight, c0, before);
+    here = hn::MulAdd(weight, c1, here);
+    after = hn::MulAdd(weight, c2, after);
+    VF curvature;
+    const VF at = Vertex(c0, c1, c2, &curvature);
+    const auto agrees = hn::And(hn::Lt(c1, hn::Set(d, kAgreeingCost)), hn::Gt(curvature, zero));
+    agreeing = hn::Add(agreeing, hn::IfThenElseZero(agrees, one));
+    hn::Store(at, d, vertex[v]);
+    hn::Store(hn::IfThenElseZero(agrees, hn::Mul(weight, curvature)), d, certainty[v]);
+  }
+  VF curvature;
+  const VF at = Vertex(before, here, after, &curvature);
+  // Spread of the views' own minima about the common one, weighted like the minimum itself.
+  VF spread = zero, sum = zero;
+  for (size_t v = 0; v < level.sources.size(); ++v) {
+    const VF off = hn::Sub(hn::Load(d, vertex[v]), at), c = hn::Load(d, certainty[v]);
+    spread = hn::MulAdd(c, hn::Mul(off, off), spread);
+    sum = hn::Add(sum, c);
+  }
+  spread = hn::Div(spread, hn::Mul(hn::Max(sum, hn::Set(d, 1e-6f)), hn::Max(agreeing, one)));
+  // Least squares: the sum over the window of squared differences of normalised patches is
+  // 2 kTaps c, so the noise per sample is 2 c and the variance of the minimum 2 c / (kTaps c'').
+  const VF noise =
+      hn::Div(hn::Mul(hn::Set(d, 2.0f / kTaps), here), hn::Max(curvature, hn::Set(d, 1e-6f)));
+  const VF sigma = hn::Mul(step, hn::Sqrt(hn::Add(noise, spread)));
+  HWY_ALIGN float lanes[5][kLanes];
+  hn::Store(hn::MulAdd(step, at, w), d, lanes[0]);
+  hn::Store(sigma, d, lanes[1]);
+  hn::Store(here, d, lanes[2]);
+  hn::Store(px, d, lanes[3]);
+  hn::Store(agreeing, d, lanes[4]);
+  for (int i = 0; i < static_cast<int>(kLanes) && g.x + 2 * i < level.reference.width; ++i) {
+    out[g.x + 2 * i] = {lanes[0][i], lanes[1][i],  lanes[2][i],
+                        lanes[3][i], g.texture[i], static_cast<int>(lanes[4][i])};
+  }
+}
+
+void JudgeRowImpl(const Level& level, const State& state, int y, Verdict* out) {
+  Group g;
+  for (int start = 0; start < 2; ++start) {
+    for (int x = start; x < level.reference.width; x += 2 * static_cast<int>(kLanes)) {
+      PrepareGroup(level, x, y, &g);
+      JudgeGroup(level, state, g, out);
+    }
+  }
+}
+
+const char* TargetName() { return hwy::TargetName(HWY_TARGET); }
+
+}  // namespace dtr::stereo::patchmatch::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace dtr::stereo::patchmatch {
+
+HWY_EXPORT(SearchRowImpl);
+HWY_EXPORT(SweepRowImpl);
+HWY_EXPORT(JudgeRowImpl);
+HWY_EXPORT(TargetName);
+
+void SearchRow(const Level& level, int samples, int y, State* state) {
+  HWY_DYNAMIC_DISPATCH(SearchRowImpl)(level, samples, y, state);
+}
+void SweepRow(const Level& level, const Sweep& sweep, int y, State* state) {
+  HWY_DYNAMIC_DISPATCH(SweepRowImpl)(level, sweep, y, state);
+}
+void JudgeRow(const Level& level, const State& state, int y, Verdict* out) {
+  HWY_DYNAMIC_DISPATCH(JudgeRowImpl)(level, state, y, out);
+}
+const char* InstructionSet() { return HWY_DYNAMIC_DISPATCH(TargetName)(); }
+
+}  // namespace dtr::stereo::patchmatch
+#endif

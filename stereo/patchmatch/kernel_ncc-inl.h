@@ -1,0 +1,227 @@
+// stereo/patchmatch/kernel_ncc-inl.h -- bilateral NCC of slanted windows. Compiled per instruction
+// set: include only from kernel.cpp.
+#if defined(DTR_STEREO_PATCHMATCH_KERNEL_NCC_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef DTR_STEREO_PATCHMATCH_KERNEL_NCC_INL_H_
+#undef DTR_STEREO_PATCHMATCH_KERNEL_NCC_INL_H_
+#else
+#define DTR_STEREO_PATCHMATCH_KERNEL_NCC_INL_H_
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace dtr::stereo::patchmatch::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+using DF = hn::ScalableTag<float>;
+using DI = hn::ScalableTag<std::int32_t>;
+using VF = hn::Vec<DF>;
+using VI = hn::Vec<DI>;
+constexpr size_t kLanes = hn::MaxLanes(DF());
+static_assert(2 * kLanes <= kBorder, "a group's pixels must not leave the border");
+
+/// Fall-off of the window's weights with distance (pixels) and difference of grey (levels), in
+/// exp(-distance / (2 s^2) - difference / (2 s^2)): Xu and Tao, CVPR 2019.
+constexpr float kSpatialSigma = 3.0f, kGreySigma = 3.0f;
+/// Variance of the noise of a photo, grey levels squared, added to a window's: where there is
+/// nothing but noise NCC goes to 0 and not to chance values.
+constexpr float kNoiseVariance = 0.5f;
+/// A window may be stretched by this in the source; more needs a coarser level there.
+constexpr float kLargestStretch = 4.0f;
+static_assert(kLargestStretch * kRadius <= kTextureBorder - 2);
+/// Windows squeezed to less than this share of their area are seen edge on.
+constexpr float kSmallestArea = 0.05f;
+/// Steps of the judging parabola and the cost of a view that sees the same surface.
+constexpr float kJudgeStepPx = 0.5f;
+constexpr float kAgreeingCost = 0.4f;
+
+/// Pixels x, x + 2, x + 4, ... of a row with their windows of the reference.
+struct Group {
+  int x = 0, y = 0;
+  HWY_ALIGN float weight[kTaps][kLanes];    ///< sum to 1
+  HWY_ALIGN float weighted[kTaps][kLanes];  ///< weight * (grey - mean)
+  HWY_ALIGN float variance[kLanes];
+  HWY_ALIGN float texture[kLanes];  ///< variance of the pixels like the centre, grey levels squared
+  HWY_ALIGN float ray[kMaxViews][3][kLanes];  ///< m (x, y, 1) per source
+};
+
+HWY_INLINE VI EverySecond() { return hn::Add(hn::Iota(DI(), 0), hn::Iota(DI(), 0)); }
+
+/// Weights and values of the windows, and the pixels' rays in the sources.
+void PrepareGroup(const Level& level, int x, int y, Group* g) {
+  const DF d;
+  g->x = x;
+  g->y = y;
+  const VI lanes = EverySecond();
+  const VF centre = hn::GatherIndex(d, level.reference.grey.at(x, y), lanes);
+  VF sum = hn::Zero(d), mean = hn::Zero(d), squares = hn::Zero(d);
+  VF inner = hn::Zero(d), inner_sum = hn::Set(d, 1e-6f);
+  int t = 0;
+  for (int dy = -kRadius; dy <= kRadius; dy += kTapStep) {
+    for (int dx = -kRadius; dx <= kRadius; dx += kTapStep, ++t) {
+      const VF grey = hn::GatherIndex(d, level.reference.grey.at(x + dx, y + dy), lanes);
+      const VF usable = hn::GatherIndex(d, level.reference.usable.at(x + dx, y + dy), lanes);
+      const float distance = std::sqrt(static_cast<float>(dx * dx + dy * dy));
+      const VF exponent =
+          hn::MulAdd(hn::Abs(hn::Sub(grey, centre)), hn::Set(d, -0.5f / (kGreySigma * kGreySigma)),
+                     hn::Set(d, -0.5f * distance / (kSpatialSigma * kSpatialSigma)));
+      const VF weight = hn::Mul(usable, hn::Exp(d, exponent));
+      hn::Store(weight, d, g->weight[t]);
+      hn::Store(grey, d, g->weighted[t]);
+      sum = hn::Add(sum, weight);
+      mean = hn::MulAdd(weight, grey, mean);
+    }
+  }
+  const VF scale = hn::Div(hn::Set(d, 1.0f), hn::Max(sum, hn::Set(d, 1e-6f)));
+  mean = hn::Mul(mean, scale);
+  for (t = 0; t < kTaps; ++t) {
+    const VF weight = hn::Mul(hn::Load(d, g->weight[t]), scale);
+    const VF grey = hn::Sub(hn::Load(d, g->weighted[t]), mean);
+    const VF weighted = hn::Mul(weight, grey);
+    squares = hn::MulAdd(weighted, grey, squares);
+    inner = hn::MulAdd(weighted, weighted, inner);
+    inner_sum = hn::MulAdd(weight, weight, inner_sum);
+    hn::Store(weight, d, g->weight[t]);
+    hn::Store(weighted, d, g->weighted[t]);
+  }
+  hn::Store(squares, d, g->variance);
+  hn::Store(hn::Div(inner, inner_sum), d, g->texture);
+  const VF px = hn::Add(hn::Set(d, static_cast<float>(x) + 0.5f), hn::ConvertTo(d, lanes));
+  const VF py = hn::Set(d, static_cast<float>(y) + 0.5f);
+  for (size_t v = 0; v < level.sources.size(); ++v) {
+    const float* m = level.sources[v].m;
+    for (int i = 0; i < 3; ++i) {
+      const VF rest = hn::MulAdd(hn::Set(d, m[3 * i + 1]), py, hn::Set(d, m[3 * i + 2]));
+      hn::Store(hn::MulAdd(hn::Set(d, m[3 * i]), px, rest), d, g->ray[v][i]);
+    }
+  }
+}
+
+/// The window's position in a source and its change per pixel of the reference.
+struct Warp {
+  VF u, v, ux, uy, vx, vy;
+  hn::Mask<DF> fits;
+};
+
+HWY_INLINE Warp Locate(const Group& g, const Source& s, size_t view, VF w, VF a, VF b) {
+  const DF d;
+  const VF k0 = hn::Set(d, s.k[0]), k1 = hn::Set(d, s.k[1]), k2 = hn::Set(d, s.k[2]);
+  const VF depth = hn::MulAdd(w, k2, hn::Load(d, g.ray[view][2]));
+  const VF inverse = hn::Div(hn::Set(d, 1.0f), depth);
+  Warp p;
+  p.u = hn::Mul(hn::MulAdd(w, k0, hn::Load(d, g.ray[view][0])), inverse);
+  p.v = hn::Mul(hn::MulAdd(w, k1, hn::Load(d, g.ray[view][1])), inverse);
+  const VF zx = hn::MulAdd(a, k2, hn::Set(d, s.m[6])), zy = hn::MulAdd(b, k2, hn::Set(d, s.m[7]));
+  p.ux = hn::Mul(inverse, hn::NegMulAdd(p.u, zx, hn::MulAdd(a, k0, hn::Set(d, s.m[0]))));
+  p.uy = hn::Mul(inverse, hn::NegMulAdd(p.u, zy, hn::MulAdd(b, k0, hn::Set(d, s.m[1]))));
+  p.vx = hn::Mul(inverse, hn::NegMulAdd(p.v, zx, hn::MulAdd(a, k1, hn::Set(d, s.m[3]))));
+  p.vy = hn::Mul(inverse, hn::NegMulAdd(p.v, zy, hn::MulAdd(b, k1, hn::Set(d, s.m[4]))));
+  const VF low = hn::Set(d, kTextureBorder - 0.5f);
+  const VF right = hn::Set(d, static_cast<float>(kTextureBorder + s.texture->width) - 0.5f);
+  const VF bottom = hn::Set(d, static_cast<float>(kTextureBorder + s.texture->height) - 0.5f);
+  const VF stretch =
+      hn::Max(hn::Add(hn::Abs(p.ux), hn::Abs(p.uy)), hn::Add(hn::Abs(p.vx), hn::Abs(p.vy)));
+  const VF area = hn::NegMulAdd(p.uy, p.vx, hn::Mul(p.ux, p.vy));
+  p.fits = hn::And(hn::Gt(depth, hn::Set(d, 1e-6f)),
+                   hn::And(hn::And(hn::Gt(p.u, low), hn::Lt(p.u, right)),
+                           hn::And(hn::Gt(p.v, low), hn::Lt(p.v, bottom))));
+  p.fits = hn::And(p.fits, hn::And(hn::Lt(stretch, hn::Set(d, kLargestStretch)),
+                                   hn::Gt(area, hn::Set(d, kSmallestArea))));
+  return p;
+}
+
+/// Lanes whose window's centre the source's mask allows.
+HWY_INLINE hn::Mask<DF> Allowed(const Texture& texture, const Warp& p) {
+  const DF d;
+  HWY_ALIGN float u[kLanes];
+  HWY_ALIGN float v[kLanes];
+  HWY_ALIGN float allowed[kLanes];
+  const VF middle = hn::Set(d, kTextureBorder);
+  hn::Store(hn::IfThenElse(p.fits, p.u, middle), d, u);
+  hn::Store(hn::IfThenElse(p.fits, p.v, middle), d, v);
+  for (size_t i = 0; i < kLanes; ++i) {
+    const int x = static_cast<int>(u[i] + 0.5f) - kTextureBorder;
+    const int y = static_cast<int>(v[i] + 0.5f) - kTextureBorder;
+    allowed[i] = texture.usable.Contains(x, y) && texture.usable(x, y) != 0 ? 1.0f : 0.0f;
+  }
+  return hn::Gt(hn::Load(d, allowed), hn::Zero(d));
+}
+
+/// 1 - NCC of the reference's windows and the source's under the planes; kWorstCost where the
+/// window does not fit into the source. Within a window the homography is taken as affine.
+VF ScoreView(const Group& g, const Source& s, size_t view, VF w, VF a, VF b) {
+  const DF d;
+  const DI di;
+  const VF worst = hn::Set(d, kWorstCost);
+  Warp p = Locate(g, s, view, w, a, b);
+  if (!s.texture->usable.empty()) p.fits = hn::And(p.fits, Allowed(*s.texture, p));
+  if (hn::AllFalse(d, p.fits)) return worst;
+  // Lanes that do not fit read some place that exists.
+  const VF corner = hn::Set(d, kTextureBorder);
+  p.u = hn::IfThenElse(p.fits, p.u, corner);
+  p.v = hn::IfThenElse(p.fits, p.v, corner);
+  p.ux = hn::IfThenElseZero(p.fits, p.ux);
+  p.uy = hn::IfThenElseZero(p.fits, p.uy);
+  p.vx = hn::IfThenElseZero(p.fits, p.vx);
+  p.vy = hn::IfThenElseZero(p.fits, p.vy);
+  const auto* quads = reinterpret_cast<const std::int32_t*>(s.texture->quads.data());
+  const VI stride = hn::Set(di, s.texture->stride), byte = hn::Set(di, 255);
+  const VF reach = hn::Set(d, static_cast<float>(kRadius));
+  const VF skip = hn::Set(d, static_cast<float>(kTapStep));
+  VF row_u = hn::NegMulAdd(reach, hn::Add(p.ux, p.uy), p.u);
+  VF row_v = hn::NegMulAdd(reach, hn::Add(p.vx, p.vy), p.v);
+  const VF du = hn::Mul(skip, p.ux), dv = hn::Mul(skip, p.vx);
+  const VF down_u = hn::Mul(skip, p.uy), down_v = hn::Mul(skip, p.vy);
+  VF mean = hn::Zero(d), squares = hn::Zero(d), product = hn::Zero(d);
+  for (int j = 0; j < kTapsPerSide; ++j) {
+    VF u = row_u, v = row_v;
+    for (int i = 0; i < kTapsPerSide; ++i) {
+      const VI iu = hn::ConvertTo(di, u), iv = hn::ConvertTo(di, v);  // positive: truncation
+      const VF fu = hn::Sub(u, hn::ConvertTo(d, iu)), fv = hn::Sub(v, hn::ConvertTo(d, iv));
+      const VI quad = hn::GatherIndex(di, quads, hn::Add(hn::Mul(iv, stride), iu));
+      const VF p00 = hn::ConvertTo(d, hn::And(quad, byte));
+      const VF p10 = hn::ConvertTo(d, hn::And(hn::ShiftRight<8>(quad), byte));
+      const VF p01 = hn::ConvertTo(d, hn::And(hn::ShiftRight<16>(quad), byte));
+      const VF p11 = hn::ConvertTo(d, hn::And(hn::ShiftRight<24>(quad), byte));
+      const VF top = hn::MulAdd(fu, hn::Sub(p10, p00), p00);
+      const VF bottom = hn::MulAdd(fu, hn::Sub(p11, p01), p01);
+      const VF value = hn::MulAdd(fv, hn::Sub(bottom, top), top);
+      const VF part = hn::Mul(hn::Load(d, g.weight[kTapsPerSide * j + i]), value);
+      mean = hn::Add(mean, part);
+      squares = hn::MulAdd(part, value, squares);
+      product = hn::MulAdd(hn::Load(d, g.weighted[kTapsPerSide * j + i]), value, product);
+      u = hn::Add(u, du);
+      v = hn::Add(v, dv);
+    }
+    row_u = hn::Add(row_u, down_u);
+    row_v = hn::Add(row_v, down_v);
+  }
+  const VF noise = hn::Set(d, kNoiseVariance);
+  const VF variance = hn::Max(hn::Zero(d), hn::NegMulAdd(mean, mean, squares));
+  const VF scale =
+      hn::Sqrt(hn::Mul(hn::Add(variance, noise), hn::Add(hn::Load(d, g.variance), noise)));
+  const VF cost = hn::Sub(hn::Set(d, 1.0f), hn::Div(product, scale));
+  return hn::IfThenElse(p.fits, hn::Max(hn::Zero(d), cost), worst);
+}
+
+/// Weighted mean over the views of the pixels a source point moves per unit of inverse depth.
+VF DisparityPerInverseDepth(const Group& g, const Level& level, VF w,
+                            const float (*weights)[kLanes]) {
+  const DF d;
+  VF total = hn::Zero(d);
+  for (size_t v = 0; v < level.sources.size(); ++v) {
+    const Source& s = level.sources[v];
+    const VF k0 = hn::Set(d, s.k[0]), k1 = hn::Set(d, s.k[1]), k2 = hn::Set(d, s.k[2]);
+    const VF depth = hn::Max(hn::MulAdd(w, k2, hn::Load(d, g.ray[v][2])), hn::Set(d, 1e-6f));
+    const VF inverse = hn::Div(hn::Set(d, 1.0f), depth);
+    const VF u = hn::Mul(hn::MulAdd(w, k0, hn::Load(d, g.ray[v][0])), inverse);
+    const VF y = hn::Mul(hn::MulAdd(w, k1, hn::Load(d, g.ray[v][1])), inverse);
+    const VF gu = hn::NegMulAdd(u, k2, k0), gv = hn::NegMulAdd(y, k2, k1);
+    const VF length = hn::Mul(inverse, hn::Sqrt(hn::MulAdd(gu, gu, hn::Mul(gv, gv))));
+    total = hn::MulAdd(hn::Load(d, weights[v]), length, total);
+  }
+  return hn::Max(total, hn::Set(d, 1e-6f));
+}
+
+}  // namespace dtr::stereo::patchmatch::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif

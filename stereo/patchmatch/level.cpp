@@ -1,0 +1,131 @@
+#include "stereo/patchmatch/level.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace dtr::stereo::patchmatch {
+namespace {
+
+Texture MakeTexture(const Picture& picture) {
+  Texture t;
+  t.width = picture.grey.width();
+  t.height = picture.grey.height();
+  t.stride = t.width + 2 * kTextureBorder;
+  const int rows = t.height + 2 * kTextureBorder;
+  t.quads.resize(static_cast<size_t>(t.stride) * static_cast<size_t>(rows));
+  const auto at = [&](int x, int y) {
+    const float grey = picture.grey(std::clamp(x, 0, t.width - 1), std::clamp(y, 0, t.height - 1));
+    return static_cast<std::uint32_t>(std::clamp(grey + 0.5f, 0.0f, 255.0f));
+  };
+  size_t n = 0;
+  for (int y = -kTextureBorder; y < t.height + kTextureBorder; ++y) {
+    for (int x = -kTextureBorder; x < t.width + kTextureBorder; ++x) {
+      t.quads[n++] = at(x, y) | at(x + 1, y) << 8 | at(x, y + 1) << 16 | at(x + 1, y + 1) << 24;
+    }
+  }
+  const auto& usable = picture.usable.data();
+  if (std::count(usable.begin(), usable.end(), 0) > 0) t.usable = picture.usable;
+  return t;
+}
+
+Eigen::Matrix3d MatrixOf(const PinholeCamera& camera) {
+  Eigen::Matrix3d k;
+  k << camera.fx_px(), 0, camera.cx_px(), 0, camera.fy_px(), camera.cy_px(), 0, 0, 1;
+  return k;
+}
+
+}  // namespace
+
+std::vector<Picture> Pyramid(Picture full, int levels) {
+  std::vector<Picture> pictures;
+  pictures.push_back(std::move(full));
+  while (static_cast<int>(pictures.size()) < levels) pictures.push_back(Halved(pictures.back()));
+  return pictures;
+}
+
+SourcePyramid MakeSource(const StereoView& view, int levels) {
+  SourcePyramid source;
+  source.view = &view;
+  for (const Picture& picture : Pyramid(MakePicture(view), levels)) {
+    source.cameras.push_back(picture.camera);
+    source.textures.push_back(MakeTexture(picture));
+  }
+  return source;
+}
+
+Level MakeLevel(const StereoView& view, const Picture& reference,
+                std::span<const SourcePyramid> sources, size_t index, const DepthRange& range,
+                std::uint64_t seed) {
+  Level level;
+  level.w_min = static_cast<float>(range.near_z / range.far_z);
+  level.w_max = 1.0f;
+  level.seed = seed;
+  Reference& r = level.reference;
+  r.width = reference.grey.width();
+  r.height = reference.grey.height();
+  r.grey = BorderedGrid(r.width, r.height, 0);
+  r.usable = BorderedGrid(r.width, r.height, 0);
+  for (int y = 0; y < r.height; ++y) {
+    std::copy_n(reference.grey.row(y), r.width, r.grey.at(0, y));
+    for (int x = 0; x < r.width; ++x) *r.usable.at(x, y) = reference.usable(x, y) != 0 ? 1 : 0;
+  }
+  const Eigen::Matrix3d reference_inverse = MatrixOf(reference.camera).inverse();
+  // Texture index coordinates: pixel centre i + 0.5 lies at i + kTextureBorder.
+  Eigen::Matrix3d shift = Eigen::Matrix3d::Identity();
+  shift(0, 2) = shift(1, 2) = kTextureBorder - 0.5;
+  for (const SourcePyramid& s : sources) {
+    // From centres, so that an offset of the world cancels before anything is multiplied by it.
+    const Eigen::Vector3d gap =
+        view.cam_from_world.TargetOriginInSource() - s.view->cam_from_world.TargetOriginInSource();
+    const Eigen::Vector3d t = s.view->cam_from_world.rotation * gap;
+    const Eigen::Matrix3d rotation =
+        (s.view->cam_from_world.rotation * view.cam_from_world.rotation.conjugate())
+            .toRotationMatrix();
+    const Eigen::Matrix3d project = shift * MatrixOf(s.cameras[index]);
+    const Eigen::Matrix3d m = project * rotation * reference_inverse;
+    const Eigen::Vector3d k = project * t / range.near_z;
+    Source source{&s.textures[index], {}, {}};
+    for (int i = 0; i < 9; ++i) source.m[i] = static_cast<float>(m(i / 3, i % 3));
+    for (int i = 0; i < 3; ++i) source.k[i] = static_cast<float>(k(i));
+    level.sources.push_back(source);
+  }
+  return level;
+}
+
+State EmptyState(const Level& level) {
+  const int w = level.reference.width, h = level.reference.height;
+  State state;
+  state.w = BorderedGrid(w, h, level.w_min);
+  state.a = state.b = BorderedGrid(w, h, 0);
+  state.cost = BorderedGrid(w, h, std::numeric_limits<float>::infinity());
+  const float equal = 1.0f / static_cast<float>(level.sources.size());
+  state.weight.assign(level.sources.size(), BorderedGrid(w, h, equal));
+  return state;
+}
+
+State Upsampled(const State& coarse, const Level& coarse_level, const Level& level) {
+  State state = EmptyState(level);
+  for (int y = 0; y < level.reference.height; ++y) {
+    const int yc = std::min(y / 2, coarse_level.reference.height - 1);
+    const float dy = 0.5f * (static_cast<float>(y) + 0.5f) - (static_cast<float>(yc) + 0.5f);
+    for (int x = 0; x < level.reference.width; ++x) {
+      const int xc = std::min(x / 2, coarse_level.reference.width - 1);
+      const float dx = 0.5f * (static_cast<float>(x) + 0.5f) - (static_cast<float>(xc) + 0.5f);
+      const float a = *coarse.a.at(xc, yc), b = *coarse.b.at(xc, yc);
+      *state.w.at(x, y) =
+          std::clamp(*coarse.w.at(xc, yc) + a * dx + b * dy, level.w_min, level.w_max);
+      *state.a.at(x, y) = 0.5f * a;
+      *state.b.at(x, y) = 0.5f * b;
+      *state.cost.at(x, y) = *coarse.cost.at(xc, yc);
+      for (size_t v = 0; v < state.weight.size(); ++v) {
+        *state.weight[v].at(x, y) = *coarse.weight[v].at(xc, yc);
+      }
+    }
+  }
+  return state;
+}
+
+}  // namespace dtr::stereo::patchmatch

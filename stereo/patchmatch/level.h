@@ -1,0 +1,36 @@
+// stereo/patchmatch/level.h -- one level of the pyramid: pictures, projections, planes.
+#pragma once
+#include <span>
+#include <vector>
+
+#include "stereo/engine.h"
+#include "stereo/patchmatch/kernel.h"
+#include "stereo/sgbm/picture.h"
+
+namespace dtr::stereo::patchmatch {
+
+/// A neighbour's pictures from full size down, as textures.
+struct SourcePyramid {
+  const StereoView* view = nullptr;
+  std::vector<PinholeCamera> cameras;
+  std::vector<Texture> textures;
+};
+
+/// The picture and its halvings, `levels` in all. Requires sizes of at least 2^(levels - 1).
+std::vector<Picture> Pyramid(Picture full, int levels);
+
+SourcePyramid MakeSource(const StereoView& view, int levels);
+
+/// Sets up matching `reference` (a level's picture of `view`) with the sources' pictures at
+/// `index`.
+Level MakeLevel(const StereoView& view, const Picture& reference,
+                std::span<const SourcePyramid> sources, size_t index, const DepthRange& range,
+                std::uint64_t seed);
+
+/// Planes of nothing: cost infinite everywhere, equal weights.
+State EmptyState(const Level& level);
+
+/// Planes of a coarser level on the grid of the next finer one.
+State Upsampled(const State& coarse, const Level& coarse_level, const Level& level);
+
+}  // namespace dtr::stereo::patchmatch

@@ -1,0 +1,157 @@
+#include "stereo/patchmatch/patchmatch_engine.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "dtr/base/parallel_for.h"
+#include "dtr/base/random.h"
+#include "stereo/patchmatch/level.h"
+#include "stereo/patchmatch/trust.h"
+
+namespace dtr::stereo {
+namespace {
+
+using namespace patchmatch;
+
+/// Long side of the coarsest level, at most this; and the short side never falls below the least.
+constexpr int kCoarsestSidePx = 256;
+constexpr int kSmallestSidePx = 24;
+/// The first guess tries one inverse depth per pixel of disparity, within these bounds.
+constexpr double kLeastSamples = 48, kMostSamples = 128;
+/// Visits per pixel and level.
+constexpr int kCoarsestIterations = 5, kIterations = 3, kFinestIterations = 2;
+constexpr float kFirstStepPx = 4.0f, kFinestStepPx = 1.0f;
+/// A pair whose rays to the middle of the range meet at less than this has no baseline.
+constexpr double kSmallestDisparityPx = 0.5;
+
+void CheckRequest(std::span<const StereoView> views, int reference, std::span<const int> neighbours,
+                  const DepthRange& range) {
+  const auto exists = [&](int i) { return i >= 0 && static_cast<size_t>(i) < views.size(); };
+  if (!exists(reference)) throw std::invalid_argument("Estimate: no such reference view");
+  for (const int n : neighbours) {
+    if (!exists(n) || n == reference) throw std::invalid_argument("Estimate: no such neighbour");
+  }
+  if (!(range.near_z > 0) || !(range.far_z > range.near_z) || !std::isfinite(range.far_z)) {
+    throw Error("view " + std::to_string(reference) +
+                ": depth range, expected 0 < near < far, found " + std::to_string(range.near_z) +
+                " to " + std::to_string(range.far_z));
+  }
+}
+
+/// Pixels of disparity between the ends of the range, most in any view, at the image's centre.
+double RangePx(const StereoView& view, const StereoView& other, const DepthRange& range) {
+  const double baseline =
+      (view.cam_from_world.TargetOriginInSource() - other.cam_from_world.TargetOriginInSource())
+          .norm();
+  return other.camera.fx_px() * baseline * (1 / range.near_z - 1 / range.far_z);
+}
+
+/// The neighbours with a baseline, as pyramids.
+std::vector<SourcePyramid> MakeSources(std::span<const StereoView> views, int reference,
+                                       std::span<const int> neighbours, const DepthRange& range,
+                                       int levels, int threads) {
+  std::vector<const StereoView*> usable;
+  for (const int n : neighbours) {
+    const StereoView& other = views[static_cast<size_t>(n)];
+    if (RangePx(views[static_cast<size_t>(reference)], other, range) < kSmallestDisparityPx) {
+      continue;
+    }
+    if (static_cast<int>(usable.size()) < kMaxViews) usable.push_back(&other);
+  }
+  if (usable.empty()) {
+    throw NoUsablePair("view " + std::to_string(reference) + ": none of its " +
+                       std::to_string(neighbours.size()) + " neighbours has a baseline");
+  }
+  std::vector<SourcePyramid> sources(usable.size());
+  ParallelFor(0, static_cast<int>(usable.size()), threads, [&](int i) {
+    const auto k = static_cast<size_t>(i);
+    sources[k] = MakeSource(*usable[k], levels);
+  });
+  return sources;
+}
+
+/// Levels until the long side is small enough, as all the images allow.
+int LevelsFor(std::span<const StereoView> views, int reference, std::span<const int> neighbours) {
+  const PinholeCamera& camera = views[static_cast<size_t>(reference)].camera;
+  int shortest = std::min(camera.width_px(), camera.height_px());
+  for (const int n : neighbours) {
+    const PinholeCamera& c = views[static_cast<size_t>(n)].camera;
+    shortest = std::min({shortest, c.width_px(), c.height_px()});
+  }
+  int levels = 1;
+  while ((std::max(camera.width_px(), camera.height_px()) >> (levels - 1)) > kCoarsestSidePx &&
+         (shortest >> levels) >= kSmallestSidePx) {
+    ++levels;
+  }
+  return levels;
+}
+
+void RunSweeps(const Level& level, Sweep sweep, int iterations, float step_px, int threads,
+               int* round, State* state) {
+  for (int i = 0; i < iterations; ++i) {
+    sweep.iteration = i;
+    sweep.step_px = step_px * std::exp2(static_cast<float>(-i));
+    sweep.round = (*round)++;
+    for (sweep.colour = 0; sweep.colour < 2; ++sweep.colour) {
+      ParallelFor(0, level.reference.height, threads,
+                  [&](int y) { SweepRow(level, sweep, y, state); });
+    }
+  }
+}
+
+/// Planes of the finest level.
+State SearchPyramid(const StereoView& view, std::span<const Picture> pictures,
+                    std::span<const SourcePyramid> sources, const DepthRange& range,
+                    const EngineOptions& options, Level* finest) {
+  State state;
+  Level level, coarser;
+  int round = 0;
+  for (size_t index = pictures.size(); index-- > 0; coarser = std::move(level)) {
+    const std::uint64_t seed = HashOf(options.seed, index);
+    level = MakeLevel(view, pictures[index], sources, index, range, seed);
+    const bool coarsest = index + 1 == pictures.size();
+    if (coarsest) {
+      double range_px = 0;
+      for (const SourcePyramid& s : sources) {
+        range_px = std::max(range_px, RangePx(view, *s.view, range));
+      }
+      const double scale = std::exp2(-static_cast<double>(index));
+      const int samples =
+          static_cast<int>(std::clamp(range_px * scale, kLeastSamples, kMostSamples));
+      state = EmptyState(level);
+      ParallelFor(0, level.reference.height, options.threads,
+                  [&](int y) { SearchRow(level, samples, y, &state); });
+    } else {
+      state = Upsampled(state, coarser, level);
+    }
+    Sweep sweep;
+    sweep.jump = index > 0 || coarsest;
+    const int iterations = coarsest     ? kCoarsestIterations
+                           : index == 0 ? kFinestIterations
+                                        : kIterations;
+    RunSweeps(level, sweep, iterations, coarsest ? kFirstStepPx : kFinestStepPx * 2,
+              options.threads, &round, &state);
+    if (index == 0) break;
+  }
+  *finest = std::move(level);
+  return state;
+}
+
+}  // namespace
+
+DepthEstimate PatchMatchEngine::Estimate(std::span<const StereoView> views, int reference,
+                                         std::span<const int> neighbours, const DepthRange& range,
+                                         const EngineOptions& options) const {
+  CheckRequest(views, reference, neighbours, range);
+  const StereoView& view = views[static_cast<size_t>(reference)];
+  const int levels = LevelsFor(views, reference, neighbours);
+  const std::vector<Picture> pictures = Pyramid(MakePicture(view), levels);
+  const std::vector<SourcePyramid> sources =
+      MakeSources(views, reference, neighbours, range, levels, options.threads);
+  Level level;
+  const State state = SearchPyramid(view, pictures, sources, range, options, &level);
+  return TrustedDepth(level, state, view, range, options.threads);
+}
+
+}  // namespace dtr::stereo

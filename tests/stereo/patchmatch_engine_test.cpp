@@ -1,0 +1,263 @@
+#include "stereo/patchmatch/patchmatch_engine.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tests/stereo/synthetic_scene.h"
+
+namespace dtr::stereo {
+namespace {
+
+using Eigen::Vector3d;
+using testing::Facing;
+using testing::Photograph;
+using testing::Shot;
+
+constexpr int kWidth = 160, kHeight = 120;
+constexpr double kFocal = 140;
+/// Baseline 0.4 at depth 4: 14 px of disparity, so 1 px is 7 % of depth.
+constexpr double kBaseline = 0.4;
+constexpr DepthRange kRange{2.5, 8};
+/// Median error on clean synthetic pictures; measured 0.02 px, 8-bit pictures leave that much.
+constexpr double kMedianPx = 0.05;
+
+const PinholeCamera kCamera(kWidth, kHeight, kFocal, kFocal, 0.5 * kWidth, 0.5 * kHeight);
+
+testing::Surface Slanted() {
+  return testing::Plane(Vector3d(0.25, -0.35, 1).normalized(), 4 / Vector3d(0.25, -0.35, 1).norm());
+}
+
+testing::Surface SphereBeforeWall() {
+  return testing::Union({testing::Sphere({0, 0, 4}, 0.9), testing::Plane({0, 0, 1}, 6)});
+}
+
+std::vector<Shot> Shots(const testing::Surface& surface, const std::vector<Pose>& poses) {
+  std::vector<Shot> shots;
+  for (const Pose& pose : poses) shots.push_back(Photograph(surface, kCamera, pose, 0.35));
+  return shots;
+}
+
+DepthEstimate EstimateFirst(const std::vector<StereoView>& views, const DepthRange& range = kRange,
+                            int threads = 2) {
+  std::vector<int> neighbours;
+  for (int i = 1; i < static_cast<int>(views.size()); ++i) neighbours.push_back(i);
+  return MakeEngine("patchmatch")->Estimate(views, 0, neighbours, range, {.threads = threads});
+}
+
+std::vector<StereoView> ViewsOf(const std::vector<Shot>& shots) {
+  std::vector<StereoView> views;
+  for (const Shot& shot : shots) views.push_back(shot.View());
+  return views;
+}
+
+struct Quality {
+  double kept = 0, median_px = 0, mean_px = 0, bad_share = 0;
+};
+
+/// Errors in px of disparity at kBaseline; `mean_px` is signed, without outliers over 2 px.
+Quality Judge(const DepthEstimate& estimate, const DepthImage& truth) {
+  std::vector<double> errors;
+  double sum = 0;
+  int near = 0;
+  for (int y = 0; y < truth.height(); ++y) {
+    for (int x = 0; x < truth.width(); ++x) {
+      if (DepthImage::IsHole(estimate.depth(x, y))) continue;
+      const double off = kFocal * kBaseline * (1.0 / estimate.depth(x, y) - 1.0 / truth(x, y));
+      errors.push_back(std::abs(off));
+      if (std::abs(off) <= 2) sum += off, ++near;
+    }
+  }
+  Quality q;
+  if (errors.empty()) return q;
+  q.kept = static_cast<double>(errors.size()) / (truth.width() * truth.height());
+  q.bad_share = static_cast<double>(
+                    std::count_if(errors.begin(), errors.end(), [](double e) { return e > 1; })) /
+                static_cast<double>(errors.size());
+  std::nth_element(errors.begin(), errors.begin() + static_cast<long>(errors.size() / 2),
+                   errors.end());
+  q.median_px = errors[errors.size() / 2];
+  q.mean_px = near > 0 ? sum / near : 0;
+  return q;
+}
+
+TEST(PatchMatchEngine, FindsASlantedPlaneToAFractionOfAPixelFromTwoViews) {
+  const auto shots = Shots(Slanted(), {Facing({0, 0, 0}), Facing({kBaseline, 0, 0})});
+  const Quality q = Judge(EstimateFirst(ViewsOf(shots)), shots[0].truth);
+  EXPECT_GT(q.kept, 0.8);  // a strip of 14 to 20 columns is seen by one camera only
+  EXPECT_LT(q.median_px, kMedianPx);
+  EXPECT_LT(q.bad_share, 0.01);
+}
+
+TEST(PatchMatchEngine, HalfAPixelInThePrincipalPointWouldShow) {
+  const auto shots = Shots(Slanted(), {Facing({0, 0, 0}), Facing({kBaseline, 0, 0})});
+  std::vector<StereoView> views = ViewsOf(shots);
+  const double right = Judge(EstimateFirst(views), shots[0].truth).mean_px;
+  views[1].camera =
+      PinholeCamera(kWidth, kHeight, kFocal, kFocal, 0.5 * kWidth + 0.5, 0.5 * kHeight);
+  const double slipped = Judge(EstimateFirst(views), shots[0].truth).mean_px;
+  EXPECT_LT(std::abs(right), 0.02);
+  EXPECT_NEAR(slipped - right, 0.5, 0.05);
+}
+
+TEST(PatchMatchEngine, FindsASphereBeforeAWallFromFourNeighbours) {
+  const auto shots = Shots(
+      SphereBeforeWall(), {Facing({0, 0, 0}), Facing({kBaseline, 0, 0}), Facing({-kBaseline, 0, 0}),
+                           Facing({0, kBaseline, 0}), Facing({0, -kBaseline, 0})});
+  const Quality q = Judge(EstimateFirst(ViewsOf(shots)), shots[0].truth);
+  EXPECT_GT(q.kept, 0.9);  // what one side hides the other shows
+  EXPECT_LT(q.median_px, kMedianPx);
+  EXPECT_LT(q.bad_share, 0.03);
+}
+
+TEST(PatchMatchEngine, AnyDirectionOfTheBaselineWillDo) {
+  const struct {
+    const char* name;
+    Pose neighbour;
+    double bad_share = 0.03;
+  } cases[] = {{"below", Facing({0, kBaseline, 0})},
+               {"left", Facing({-kBaseline, 0, 0})},
+               {"rolled by 90", Facing({kBaseline, 0, 0}, 90)},
+               {"rolled by -37, diagonal", Facing({0.28, 0.28, 0}, -37)},
+               // The epipole lies at the right border; the depth is uncertain there.
+               {"ahead and to the side", Facing({0.3, 0.0, 0.5}), 0.06}};
+  for (const auto& c : cases) {
+    SCOPED_TRACE(c.name);
+    const auto shots = Shots(Slanted(), {Facing({0, 0, 0}), c.neighbour});
+    const Quality q = Judge(EstimateFirst(ViewsOf(shots)), shots[0].truth);
+    EXPECT_GT(q.kept, 0.5);  // a rolled or vertical partner sees less of the picture
+    EXPECT_LT(q.median_px, 2 * kMedianPx);
+    EXPECT_LT(q.bad_share, c.bad_share);
+  }
+}
+
+TEST(PatchMatchEngine, TheNumberOfThreadsChangesNoBit) {
+  const auto shots = Shots(SphereBeforeWall(), {Facing({0, 0, 0}), Facing({kBaseline, 0, 0}),
+                                                Facing({0, kBaseline, 0})});
+  const auto views = ViewsOf(shots);
+  const DepthEstimate one = EstimateFirst(views, kRange, 1);
+  for (const int threads : {2, 3}) {
+    const DepthEstimate other = EstimateFirst(views, kRange, threads);
+    EXPECT_EQ(one.depth, other.depth);
+    EXPECT_EQ(one.inverse_depth_sigma, other.inverse_depth_sigma);
+  }
+}
+
+TEST(PatchMatchEngine, SigmaDescribesTheError) {
+  const auto shots = Shots(Slanted(), {Facing({0, 0, 0}), Facing({kBaseline, 0, 0}),
+                                       Facing({0, kBaseline, 0}), Facing({-kBaseline, 0, 0})});
+  const DepthEstimate estimate = EstimateFirst(ViewsOf(shots));
+  int within = 0, all = 0;
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      const float z = estimate.depth(x, y), sigma = estimate.inverse_depth_sigma(x, y);
+      ASSERT_EQ(DepthImage::IsHole(z), sigma == 0);
+      if (DepthImage::IsHole(z)) continue;
+      ++all;
+      within += std::abs(1 / z - 1 / shots[0].truth(x, y)) <= sigma;
+    }
+  }
+  EXPECT_GT(within, 0.5 * all);  // 68 % for a perfect model
+  EXPECT_LT(within, 0.95 * all);
+}
+
+TEST(PatchMatchEngine, WithoutABaselineThereIsNoDepth) {
+  const auto shots = Shots(Slanted(), {Facing({0, 0, 0}), Facing({0, 0, 0})});
+  EXPECT_THROW(EstimateFirst(ViewsOf(shots)), NoUsablePair);
+}
+
+TEST(PatchMatchEngine, MaskedPixelsAreHolesAndTheirContentHasNoInfluence) {
+  auto shots = Shots(Slanted(), {Facing({0, 0, 0}), Facing({kBaseline, 0, 0})});
+  std::vector<Mask> masks(2, Mask(kWidth, kHeight, 1, 255));
+  for (int y = 40; y < 70; ++y) {
+    for (int x = 60; x < 90; ++x) masks[0](x, y) = masks[1](x - 12, y) = 0;
+  }
+  const auto estimate = [&] {
+    auto views = ViewsOf(shots);
+    for (size_t i = 0; i < 2; ++i) views[i].mask = &masks[i];
+    return EstimateFirst(views);
+  };
+  const DepthEstimate before = estimate();
+  for (int y = 40; y < 70; ++y) {
+    for (int x = 60; x < 90; ++x) {
+      EXPECT_TRUE(DepthImage::IsHole(before.depth(x, y)));
+      for (int c = 0; c < 3; ++c) {
+        shots[0].image(x, y, c) = static_cast<std::uint8_t>(HashOf(x, y));
+        shots[1].image(x - 12, y, c) = static_cast<std::uint8_t>(HashOf(y, x));
+      }
+    }
+  }
+  const DepthEstimate after = estimate();
+  EXPECT_EQ(before.depth, after.depth);
+  EXPECT_LT(Judge(after, shots[0].truth).bad_share, 0.02);
+}
+
+TEST(PatchMatchEngine, ATexturelessWallIsHoles) {
+  auto shots = Shots(testing::Plane({0, 0, 1}, 4),
+                     {Facing({0, 0, 0}), Facing({kBaseline, 0, 0}), Facing({-kBaseline, 0, 0})});
+  std::uint64_t n = 0;
+  for (Shot& shot : shots) {
+    for (auto& value : shot.image.data())
+      value = static_cast<std::uint8_t>(127 + HashBits(n++) % 3);
+  }
+  EXPECT_LT(Judge(EstimateFirst(ViewsOf(shots)), shots[0].truth).kept, 0.01);
+}
+
+TEST(PatchMatchEngine, ExposureDoesNotMatter) {
+  auto shots = Shots(Slanted(), {Facing({0, 0, 0}), Facing({kBaseline, 0, 0})});
+  for (auto& value : shots[1].image.data()) {
+    value = static_cast<std::uint8_t>(0.6 * value + 10);
+  }
+  const Quality q = Judge(EstimateFirst(ViewsOf(shots)), shots[0].truth);
+  EXPECT_GT(q.kept, 0.75);
+  EXPECT_LT(q.median_px, kMedianPx);
+  EXPECT_LT(q.bad_share, 0.01);
+}
+
+TEST(PatchMatchEngine, ScaleAndOffsetOfTheWorldDoNotMatter) {
+  const auto shots = Shots(SphereBeforeWall(), {Facing({0, 0, 0}), Facing({kBaseline, 0, 0}, 10),
+                                                Facing({0, kBaseline, 0})});
+  const DepthEstimate base = EstimateFirst(ViewsOf(shots));
+  const auto moved = [&](double scale, const Vector3d& offset) {
+    auto views = ViewsOf(shots);
+    for (StereoView& view : views) {
+      const Vector3d centre = scale * view.cam_from_world.TargetOriginInSource() + offset;
+      view.cam_from_world.translation = -(view.cam_from_world.rotation * centre);
+    }
+    return EstimateFirst(views, {kRange.near_z * scale, kRange.far_z * scale});
+  };
+  for (const auto& [scale, offset] : {std::pair(1e-6, Vector3d(0, 0, 0)),
+                                      {1e6, Vector3d(0, 0, 0)},
+                                      {1.0, Vector3d(5e5, 4.5e6, 100)}}) {
+    SCOPED_TRACE(scale);
+    const DepthEstimate other = moved(scale, offset);
+    int differing = 0;
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < kWidth; ++x) {
+        // 1e-9 of the baseline is lost at 4.5e6: a random search may then take another path.
+        differing += std::abs(other.depth(x, y) / scale - base.depth(x, y)) > 0.05f;
+      }
+    }
+    EXPECT_LT(differing, 0.01 * kWidth * kHeight);
+  }
+}
+
+TEST(PatchMatchEngine, TinyPicturesWork) {
+  const PinholeCamera camera(8, 8, 8, 8, 4, 4);
+  const Shot left = Photograph(Slanted(), camera, Facing({0, 0, 0}), 0.35);
+  const Shot right = Photograph(Slanted(), camera, Facing({kBaseline, 0, 0}), 0.35);
+  const DepthEstimate estimate = EstimateFirst({left.View(), right.View()});
+  EXPECT_EQ(estimate.depth.width(), 8);
+}
+
+TEST(PatchMatchEngine, RefusesAnEmptyRangeAndAWrongSize) {
+  auto shots = Shots(Slanted(), {Facing({0, 0, 0}), Facing({kBaseline, 0, 0})});
+  EXPECT_THROW(EstimateFirst(ViewsOf(shots), {4, 4}), Error);
+  EXPECT_THROW(EstimateFirst(ViewsOf(shots), {0, 4}), Error);
+  shots[1].image = ImageRgb8(kWidth, kHeight + 1, 3);
+  EXPECT_THROW(EstimateFirst(ViewsOf(shots)), Error);
+}
+
+}  // namespace
+}  // namespace dtr::stereo
