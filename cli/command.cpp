@@ -4,6 +4,7 @@
 
 #include <cstdio>
 
+#include "cli/output_file.h"
 #include "dtr/base/files.h"
 
 namespace dtr::cli {
@@ -34,6 +35,9 @@ void AddCommand(CLI::App& app, const std::string& name, const std::string& descr
   const Action action = prepare(*command);
   // The exit code leaves through CLI::RuntimeError, CLI11's way of ending with a code of one's own.
   command->callback([common, action] {
+    if (!common->json_target.empty() && common->json_target != "-") {
+      RequireFolderOf(common->json_target, "--json");
+    }
     Console console(common->json_target == "-");
     const int code = action(Context{*common, console});
     if (code != kDone) throw CLI::RuntimeError(code);

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <exception>
+#include <filesystem>
 
 #include "cli/command.h"
 #include "dtr/base/error.h"
@@ -23,6 +24,12 @@ int Run(int argc, char** argv) {
   dtr::cli::AddImportCommand(app);
   dtr::cli::AddExportCommand(app);
   dtr::cli::AddDatasetCommand(app);
+  // CLI11 would say that a command is missing, not that this one does not exist.
+  const auto is_called = [&](const CLI::App* command) { return command->get_name() == argv[1]; };
+  if (argc > 1 && argv[1][0] != '-' && app.get_subcommands(is_called).empty()) {
+    fmt::print(stderr, "dtr: no command is called '{}'; see dtr --help\n", argv[1]);
+    return dtr::cli::kWrongUsage;
+  }
   try {
     app.parse(argc, argv);
     return dtr::cli::kDone;
@@ -47,6 +54,9 @@ int main(int argc, char** argv) {
     return dtr::cli::kWrongUsage;
   } catch (const dtr::Error& error) {
     fmt::print(stderr, "dtr: {}\n", error.what());
+    return dtr::cli::kFailed;
+  } catch (const std::filesystem::filesystem_error& error) {
+    fmt::print(stderr, "dtr: {}: {}\n", error.path1().string(), error.code().message());
     return dtr::cli::kFailed;
   } catch (const std::bad_alloc&) {
     fmt::print(stderr, "dtr: out of memory; lower --max-size or --memory\n");

@@ -30,8 +30,11 @@ struct Options {
 std::vector<std::string> NotRegistered(const DtrSet& set) {
   const auto provenance = nlohmann::json::parse(set.provenance_json);
   std::vector<std::string> names;
-  for (const auto& name : provenance.value("held_out_not_registered", nlohmann::json::array())) {
-    names.push_back(name.get<std::string>());
+  // Provenance is free text to a reader of sets: what has another form tells nothing here.
+  const auto listed = provenance.find("held_out_not_registered");
+  if (listed == provenance.end() || !listed->is_array()) return names;
+  for (const auto& name : *listed) {
+    if (name.is_string()) names.push_back(name.get<std::string>());
   }
   return names;
 }

@@ -6,6 +6,7 @@
 #include "calib/colmap/export.h"
 #include "calib/colmap/model_io.h"
 #include "cli/command.h"
+#include "cli/output_file.h"
 #include "dtr/base/error.h"
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
@@ -46,6 +47,7 @@ int RunExport(const Options& options, const Context& context) {
     throw UsageError(
         fmt::format("{}: exists already; choose another folder", options.output.string()));
   }
+  RequireFolderOf(options.output, "-o");
   DtrSet set = io::ReadSet(options.set);
   io::LoadOptions load;
   load.depth = false;

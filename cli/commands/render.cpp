@@ -7,6 +7,7 @@
 
 #include "cli/command.h"
 #include "cli/novel_frames.h"
+#include "cli/output_file.h"
 #include "cli/render_options.h"
 #include "cli/renderers.h"
 #include "cli/video.h"
@@ -37,10 +38,6 @@ class FrameSink {
     if (output.extension() == ".mp4") {
       video_.emplace(output, kFramesPerSecond);
     } else if (several) {
-      if (!output.extension().empty() && !fs::is_directory(output)) {
-        throw UsageError(
-            fmt::format("-o {}: several frames need a folder or an .mp4 file", output.string()));
-      }
       fs::create_directories(output);
     }
   }
@@ -68,6 +65,26 @@ class FrameSink {
   std::optional<VideoWriter> video_;
 };
 
+// Everything about the outputs that can be known before the work.
+void RequireOutputs(const Options& options, bool several) {
+  if (options.output.extension() == ".mp4") {
+    RequireFolderOf(options.output, "-o");
+  } else if (!several) {
+    RequireOutputFile(options.output, "-o", {".png", ".jpg", ".jpeg"});
+  } else if (!fs::is_directory(options.output) &&
+             (!options.output.extension().empty() || fs::exists(options.output))) {
+    throw UsageError(fmt::format("-o {}: several frames need a folder or an .mp4 file",
+                                 options.output.string()));
+  }
+  if (several && (!options.depth_out.empty() || !options.coverage_out.empty())) {
+    throw UsageError("--depth-out and --coverage-out go with a single camera");
+  }
+  if (!options.depth_out.empty()) RequireOutputFile(options.depth_out, "--depth-out", {".exr"});
+  if (!options.coverage_out.empty()) {
+    RequireOutputFile(options.coverage_out, "--coverage-out", {".png"});
+  }
+}
+
 void WritePlanes(const Options& options, const RenderResult& result) {
   if (!options.depth_out.empty()) io::WriteExr(options.depth_out, result.depth.grid(), false);
   if (!options.coverage_out.empty()) io::WriteMask(options.coverage_out, result.coverage);
@@ -87,9 +104,7 @@ int RunRender(const Options& options, const Context& context) {
   const auto cameras = NovelFrames(described, options.request);
   const auto excluded = ResolveViewNames(described, options.exclude);
   const bool several = cameras.size() > 1;
-  if (several && (!options.depth_out.empty() || !options.coverage_out.empty())) {
-    throw UsageError("--depth-out and --coverage-out go with a single camera");
-  }
+  RequireOutputs(options, several);
   RenderOptions render = *options.render;
   render.threads = context.common.threads;
   // Before anything is loaded: a machine without OpenGL should say so at once.

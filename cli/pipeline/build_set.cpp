@@ -233,6 +233,7 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
   BuildReport report;
   RunLog log;
 
+  RequireCalibration(options.poses);
   log.Begin("capture");
   const capture::Capture photos = capture::IngestPhotos(options.photos, {}, progress);
   capture::RequireEnoughPhotos(photos, options.photos);

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "calib/colmap/program.h"
 #include "calib/colmap/sfm.h"
 #include "capture/sfm_images.h"
 #include "cli/pipeline/known_poses.h"
@@ -81,10 +82,18 @@ colmap::SfmOptions SfmOptionsFor(const CalibrateOptions& options) {
   return sfm;
 }
 
+void RequireCalibration(const fs::path& poses) {
+  if (!poses.empty() && !fs::exists(poses)) {
+    throw UsageError(fmt::format("--poses {}: no such file or folder", poses.string()));
+  }
+  if (!fs::is_directory(poses)) (void)colmap::Program();
+}
+
 CalibratedPhotos CalibratePhotos(const capture::Capture& capture, const CalibrateOptions& options,
                                  const fs::path& workspace, Progress& progress) {
   CalibrateOptions checked = options;
   checked.held_out.resize(capture.photos.size(), false);
+  RequireCalibration(checked.poses);
   fs::create_directories(workspace);
   CalibratedPhotos calibrated = checked.poses.empty()
                                     ? FromSfm(capture, checked, workspace, progress)

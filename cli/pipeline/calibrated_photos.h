@@ -33,6 +33,11 @@ struct CalibratedPhotos {
   std::string report_json;                  ///< details for the provenance; no times, no paths
 };
 
+/// Refuses before any work what cannot work: UsageError for `poses` that do not exist, Error when
+/// COLMAP is needed and not installed. (The model of a folder of poses brings its points; all other
+/// ways run COLMAP.)
+void RequireCalibration(const std::filesystem::path& poses);
+
 /// Calibrates the photos. `workspace` keeps checkpoints: the same input and options continue there,
 /// and a finished calibration is read back instead of computed again.
 CalibratedPhotos CalibratePhotos(const capture::Capture& capture, const CalibrateOptions& options,

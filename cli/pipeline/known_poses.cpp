@@ -143,9 +143,6 @@ void RegisterHeldOutPhotos(const capture::Capture& held_out,
 
 CalibratedPhotos FromKnownPoses(const capture::Capture& capture, const CalibrateOptions& options,
                                 const fs::path& workspace, Progress& progress) {
-  if (!fs::exists(options.poses)) {
-    throw UsageError(fmt::format("--poses {}: no such file or folder", options.poses.string()));
-  }
   progress.Note("structure from motion left out: cameras are given");
   CalibratedPhotos calibrated = fs::is_directory(options.poses)
                                     ? FromColmapModel(capture, options.poses)

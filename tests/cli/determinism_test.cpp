@@ -41,12 +41,12 @@ TEST_F(Building, SetsPicturesAndScoresDoNotDependOnTheNumberOfThreads) {
     DtrOk(Arguments(set, threads));
     const fs::path out = folder_ / ("pictures" + threads);
     fs::create_directories(out);
-    DtrOk({"render", set, "--like", "0000", "-o", (out / "like.png").string(), "--depth-out",
-           (out / "depth.exr").string(), "--coverage-out", (out / "seen.png").string(), "--threads",
-           threads});
-    DtrOk({"render", set, "--fly-through", "3", "-o", (out / "path").string(), "--primitive",
-           "splat", "--fill-holes", "--threads", threads});
-    DtrOk({"evaluate", set, "--threads", threads, "--json",
+    DtrOk({"render", set, "--renderer", "cpu", "--like", "0000", "-o", (out / "like.png").string(),
+           "--depth-out", (out / "depth.exr").string(), "--coverage-out",
+           (out / "seen.png").string(), "--threads", threads});
+    DtrOk({"render", set, "--renderer", "cpu", "--fly-through", "3", "-o", (out / "path").string(),
+           "--primitive", "splat", "--fill-holes", "--threads", threads});
+    DtrOk({"evaluate", set, "--renderer", "cpu", "--threads", threads, "--json",
            (folder_ / ("scores" + threads)).string()});
   }
   EXPECT_THAT(DifferingFiles(Contents(Set("1")), Contents(Set("2"))), IsEmpty());

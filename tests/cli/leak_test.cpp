@@ -40,7 +40,7 @@ class TwoCaptures : public ::testing::Test {
   }
   Json Scores(const std::string& side) const {
     const fs::path file = folder_ / (side + ".json");
-    DtrOk({"evaluate", Set(side), "--json", file.string()});
+    DtrOk({"evaluate", Set(side), "--renderer", "cpu", "--json", file.string()});
     return Json::parse(Text(file))["views"];
   }
   // Every score but that of the changed photo is the same.

@@ -36,11 +36,12 @@ class Worlds : public ::testing::Test {
   std::vector<ImageRgb8> Pictures(const fs::path& set) {
     const fs::path out = set.string() + ".pictures";
     fs::create_directories(out);
-    DtrOk({"render", set.string(), "--like", "0003", "--exclude", "0003", "-o",
+    DtrOk({"render", set.string(), "--renderer", "cpu", "--like", "0003", "--exclude", "0003", "-o",
            (out / "like.png").string()});
-    DtrOk({"render", set.string(), "--like", "0002", "--exclude", "0002", "--primitive", "splat",
-           "-o", (out / "splat.png").string()});
-    DtrOk({"render", set.string(), "--fly-through", "2", "-o", (out / "path").string()});
+    DtrOk({"render", set.string(), "--renderer", "cpu", "--like", "0002", "--exclude", "0002",
+           "--primitive", "splat", "-o", (out / "splat.png").string()});
+    DtrOk({"render", set.string(), "--renderer", "cpu", "--fly-through", "2", "-o",
+           (out / "path").string()});
     std::vector<ImageRgb8> pictures;
     for (const char* name : {"like.png", "splat.png", "path/000000.png", "path/000001.png"}) {
       pictures.push_back(io::ReadImage(out / name));

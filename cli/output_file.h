@@ -1,0 +1,17 @@
+// cli/output_file.h -- outputs that cannot be written are refused before the work, not after it.
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace dtr::cli {
+
+/// Throws UsageError unless the folder that `file` would lie in exists. `option` is named.
+void RequireFolderOf(const std::filesystem::path& file, const std::string& option);
+
+/// The same, and the name must end in one of `extensions` (with the dot, lower case; any case
+/// passes).
+void RequireOutputFile(const std::filesystem::path& file, const std::string& option,
+                       const std::vector<std::string>& extensions);
+
+}  // namespace dtr::cli

@@ -1,0 +1,286 @@
+// Input that cannot work: one clear line, the right exit code, nothing left behind half-written.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+
+#include "dtr/base/files.h"
+#include "dtr/io/image_io.h"
+#include "tests/calib/colmap/fake_colmap.h"
+#include "tests/cli/run_dtr.h"
+#include "tests/cli/small_courtyard.h"
+#include "tests/support/test_data.h"
+
+namespace dtr::testing {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+constexpr int kFailed = 1, kWrongUsage = 2;
+
+// Sets an environment variable for its life time.
+class Environment {
+ public:
+  Environment(const char* name, const std::string& value) : name_(name) {
+    if (const char* old = std::getenv(name)) old_ = old;
+    setenv(name, value.c_str(), 1);
+  }
+  ~Environment() { setenv(name_, old_.c_str(), 1); }
+  Environment(const Environment&) = delete;
+  Environment& operator=(const Environment&) = delete;
+
+ private:
+  const char* name_;
+  std::string old_;
+};
+
+class BadInput : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    shared_ = new TemporaryFolder;
+    MakeSmallCourtyard(*shared_ / "courtyard");
+    const fs::path c = *shared_ / "courtyard";
+    DtrOk({"import", "--cameras", (c / "cameras.json").string(), "--images",
+           (c / "images").string(), "--depth", (c / "depth").string(), "--holdout", "every:4", "-o",
+           (*shared_ / "good.dtr").string()});
+  }
+  static void TearDownTestSuite() { delete shared_; }
+  static std::string Shared(const std::string& name) { return (*shared_ / name).string(); }
+  static std::string Photos() { return Shared("courtyard/images"); }
+  std::string In(const std::string& name) const { return (folder_ / name).string(); }
+
+  // `dtr build` into set.dtr with these arguments after the photos.
+  Ran Build(const std::string& photos, std::vector<std::string> further = {}) {
+    further.insert(further.begin(), {"build", photos, "-o", In("set.dtr")});
+    return Dtr(further);
+  }
+  void ExpectNothingBuilt() {
+    EXPECT_FALSE(fs::exists(In("set.dtr")));
+    EXPECT_FALSE(fs::exists(In("set.dtr.partial")));
+  }
+  // A copy of the good set, to be damaged.
+  fs::path Copy(const std::string& name = "bad.dtr") {
+    fs::remove_all(folder_ / name);
+    fs::copy(Shared("good.dtr"), folder_ / name, fs::copy_options::recursive);
+    return folder_ / name;
+  }
+  // The run of `dtr info` after replacing the first `from` in set.json.
+  Ran InfoAfter(const std::string& from, const std::string& to) {
+    const fs::path set = Copy();
+    std::string text = Text(set / "set.json");
+    const size_t at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    WriteFileAtomically(set / "set.json", text.replace(at, from.size(), to));
+    return Dtr({"info", set.string()});
+  }
+  Ran Render(std::vector<std::string> further) {
+    further.insert(further.begin(), {"render", Shared("good.dtr"), "--renderer", "cpu"});
+    return Dtr(further);
+  }
+  static TemporaryFolder* shared_;
+  TemporaryFolder folder_;
+};
+TemporaryFolder* BadInput::shared_ = nullptr;
+
+TEST_F(BadInput, FoldersWithoutEnoughPhotos) {
+  fs::create_directories(folder_ / "photos");
+  ExpectRefused(Build(In("photos")), kFailed, "expected photos, found none");
+  fs::copy(Photos() + "/0000.jpg", In("photos"));
+  ExpectRefused(Build(In("photos")), kFailed, "expected at least 2 photos, found 1");
+  ExpectRefused(Build(In("absent")), kWrongUsage, "expected a folder of photos, found nothing");
+  ExpectRefused(Build(Photos() + "/0000.jpg"), kWrongUsage,
+                "expected a folder of photos, found something else");
+  ExpectNothingBuilt();
+}
+
+TEST_F(BadInput, ATextFileAmongThePhotosIsSkippedAndNamed) {
+  fs::copy(Photos(), In("photos"));
+  WriteFileAtomically(In("photos/notes.jpg"), "Sunny day, 14 photos.\n");
+  WriteFileAtomically(In("photos/notes.txt"), "No image extension: ignored.\n");
+  const Ran ran = Build(In("photos"), {"--poses", Shared("courtyard/sparse"), "--engine", "none",
+                                       "--json", In("build.json")});
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("skipped: notes.jpg: "));
+  const Json skipped = Json::parse(Text(In("build.json")))["skipped"];
+  ASSERT_EQ(skipped.size(), 1u);
+  EXPECT_EQ(skipped[0]["name"], "notes.jpg");
+  EXPECT_NE(skipped[0]["reason"], "");
+}
+
+TEST_F(BadInput, ColmapThatIsAbsentOrFails) {
+  {
+    const Environment path("PATH", In("bin"));
+    ExpectRefused(Build(Photos()), kFailed, "colmap: program not found on the PATH");
+    ExpectRefused(Build(Photos(), {"--poses", Shared("courtyard/cameras.json")}), kFailed,
+                  "colmap: program not found on the PATH");
+    ExpectNothingBuilt();
+  }
+  colmap::testing::FakeColmap colmap;
+  colmap.Fail("feature_extractor", "echo full; exit 3");
+  ExpectRefused(
+      Build(Photos()), kFailed,
+      "colmap feature_extractor (features): expected exit code 0, found 3: last line: full");
+  EXPECT_FALSE(fs::exists(In("set.dtr")));
+}
+
+TEST_F(BadInput, PhotosWithNothingInCommon) {
+  colmap::testing::FakeColmap colmap;  // its mapper leaves no model
+  // Photos are numbered for COLMAP, whatever their names.
+  colmap.LeaveDatabase({"000000.jpg", "000001.jpg", "000002.jpg", "000003.jpg", "000004.jpg",
+                        "000005.jpg", "000006.jpg"});
+  ExpectRefused(Build(Photos()), kFailed, "found that they have too little in common");
+  EXPECT_FALSE(fs::exists(In("set.dtr")));
+}
+
+TEST_F(BadInput, OutputsThatExistOrCannotBeMade) {
+  fs::create_directories(folder_ / "set.dtr");
+  WriteFileAtomically(In("set.dtr/mine"), "precious");
+  const std::vector<std::string> poses = {"--poses", Shared("courtyard/sparse")};
+  ExpectRefused(Build(Photos(), poses), kWrongUsage, "expected no such folder yet, found one");
+  ExpectRefused(Build(Photos(), {"--force", "--poses", Shared("courtyard/sparse")}), kWrongUsage,
+                "expected a D+TR set to replace, found something else");
+  EXPECT_EQ(Text(In("set.dtr/mine")), "precious");
+  const auto build_into = [&](const std::string& set) {
+    return Dtr({"build", Photos(), "-o", set, "--poses", Shared("courtyard/sparse")});
+  };
+  ExpectRefused(build_into(In("set.dtr/mine/set.dtr")), kFailed, "cannot be made: Not a directory");
+  ExpectRefused(build_into("/proc/set.dtr"), kFailed, "cannot be made: No such file or directory");
+  ExpectRefused(Dtr({"export", Shared("good.dtr"), "-o", In("set.dtr")}), kWrongUsage,
+                "exists already; choose another folder");
+  ExpectRefused(Dtr({"export", Shared("good.dtr"), "-o", In("absent/colmap")}), kWrongUsage,
+                "expected an existing folder to write into, found nothing");
+  ExpectRefused(Dtr({"info", Shared("good.dtr"), "--json", In("absent/info.json")}), kWrongUsage,
+                "expected an existing folder to write into, found nothing");
+}
+
+TEST_F(BadInput, HoldoutsAndPosesThatDoNotFit) {
+  const auto with = [&](const std::string& option, const std::string& value) {
+    return Build(Photos(), option == "--poses"
+                               ? std::vector<std::string>{option, value}
+                               : std::vector<std::string>{"--poses", Shared("courtyard/sparse"),
+                                                          option, value});
+  };
+  ExpectRefused(with("--holdout", "0000,0001,0002,0003,0004,0005"), kWrongUsage,
+                "expected at least 2 photos to build from, found 1 of 7");
+  ExpectRefused(with("--holdout", "every:1"), kWrongUsage,
+                "expected every:N with a whole number N >= 2, found '1'");
+  ExpectRefused(with("--holdout", "nobody"), kWrongUsage, "no photo is named 'nobody'");
+  ExpectRefused(with("--poses", In("absent")), kWrongUsage, "no such file or folder");
+  fs::create_directories(folder_ / "empty");
+  EXPECT_EQ(with("--poses", In("empty")).code, kFailed);
+  ExpectNothingBuilt();
+}
+
+TEST_F(BadInput, WordsThatMeanNothing) {
+  ExpectRefused(Dtr({"info", Shared("good.dtr"), "--frobnicate"}), kWrongUsage,
+                "The following argument was not expected: --frobnicate");
+  ExpectRefused(Dtr({"frobnicate"}), kWrongUsage, "no command is called 'frobnicate'");
+  ExpectRefused(Dtr({}), kWrongUsage, "A subcommand is required");
+  ExpectRefused(Dtr({"build"}), kWrongUsage, "PHOTOS is required");
+  ExpectRefused(Build(Photos(), {"--engine", "magic"}), kWrongUsage, "--engine: magic not in");
+  ExpectRefused(Build(Photos(), {"--threads", "-1"}), kWrongUsage,
+                "--threads: Value -1 not in range");
+}
+
+TEST_F(BadInput, SetsCutShort) {
+  const std::string text = Text(Shared("good.dtr/set.json"));
+  const fs::path set = Copy();
+  constexpr size_t kCuts = 12;  // tests/io cuts in-process, 13 bytes at a time
+  for (size_t i = 0; i < kCuts; ++i) {
+    WriteFileAtomically(set / "set.json", text.substr(0, i * (text.size() - 1) / kCuts));
+    ExpectRefused(Dtr({"info", set.string()}), kFailed, "expected JSON, found an error after byte");
+  }
+  ExpectRefused(Dtr({"info", In("absent.dtr")}), kFailed,
+                "expected the folder of a D+TR set, found nothing");
+  fs::remove(set / "set.json");
+  ExpectRefused(Dtr({"info", set.string()}), kFailed,
+                "expected the file that makes a folder a D+TR set");
+}
+
+TEST_F(BadInput, SetsWithWrongFields) {
+  ExpectRefused(InfoAfter("\"format_version\": 1", "\"format_version\": 7"), kFailed,
+                "format_version: expected 1, found 7");
+  ExpectRefused(InfoAfter("\"translation\": [", "\"translation\": [NaN, "), kFailed,
+                "expected JSON, found an error after byte");
+  ExpectRefused(InfoAfter("\"translation\": [", "\"translation\": [null, "), kFailed,
+                "cam_from_world.translation: expected 3 numbers");
+  ExpectRefused(InfoAfter("\"fx_px\": ", "\"fx_px\": -"), kFailed,
+                "camera.fx_px: expected a positive number");
+  ExpectRefused(InfoAfter("\"images/0001.png\"", "\"../0001.png\""), kFailed,
+                "image.path: expected a relative path inside the set's folder");
+}
+
+TEST_F(BadInput, SetsOfAnotherToolStayReadable) {
+  EXPECT_EQ(InfoAfter("\"verdict\": {}", "\"verdict\": {\"passed\": false, \"tests\": [1]}").code,
+            0);
+  EXPECT_EQ(InfoAfter("\"verdict\": {}", "\"verdict\": {\"passed\": false, \"tests\": 1}").code, 0);
+  InfoAfter("\"provenance\": {", "\"provenance\": {\"held_out_not_registered\": [1],");
+  EXPECT_EQ(Dtr({"evaluate", In("bad.dtr"), "--renderer", "cpu"}).code, 0);
+}
+
+TEST_F(BadInput, SetsWithMissingOrDamagedFiles) {
+  fs::path set = Copy();
+  fs::remove(set / "depth/0001.png");
+  ExpectRefused(Dtr({"info", set.string()}), kFailed, "depth.path: expected a file, found nothing");
+  set = Copy();
+  fs::resize_file(set / "images/0001.png", 100);
+  ExpectRefused(Dtr({"info", set.string()}), kFailed, "bytes as recorded, found 100");
+  for (const char* file : {"images/0001.png", "held_out/images/0004.png"}) {
+    set = Copy();
+    std::string bytes = Text(set / file);
+    bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] ^ 1);
+    WriteFileAtomically(set / file, bytes);
+    const Ran ran = Dtr({"info", set.string(), "--verify"});
+    EXPECT_EQ(ran.code, kFailed);
+    EXPECT_THAT(ran.out, HasSubstr("image.sha256: expected "));
+    EXPECT_THAT(ran.out, HasSubstr(file));
+  }
+  set = Copy();
+  // Another view's size in a file of the recorded length: only reading it can tell.
+  const auto length = fs::file_size(set / "depth/0001.png");
+  io::WriteImage(set / "depth/0001.png", ImageRgb8(7, 5, 3));
+  fs::resize_file(set / "depth/0001.png", length);
+  const Ran ran =
+      Dtr({"render", set.string(), "--renderer", "cpu", "--like", "0002", "-o", In("view.png")});
+  EXPECT_EQ(ran.code, kFailed);
+  EXPECT_EQ(ran.ErrorLines().size(), 1u) << ran.err;
+  EXPECT_THAT(ran.err, HasSubstr("depth/0001.png: expected "));
+  EXPECT_FALSE(fs::exists(In("view.png")));
+}
+
+TEST_F(BadInput, PicturesThatCannotBeAskedForOrWritten) {
+  ExpectRefused(Render({"--like", "nobody", "-o", In("view.png")}), kWrongUsage,
+                "no view is named 'nobody'");
+  ExpectRefused(Render({"-o", In("view.png")}), kWrongUsage, "Exactly 1 option from");
+  ExpectRefused(Render({"--like", "0001", "-o", In("view.xyz")}), kWrongUsage,
+                "expected a name ending in .png or .jpg or .jpeg, found '.xyz'");
+  ExpectRefused(Render({"--like", "0001", "-o", In("absent/view.png")}), kWrongUsage,
+                "expected an existing folder to write into, found nothing");
+  ExpectRefused(Render({"--fly-through", "3", "-o", In("path.png")}), kWrongUsage,
+                "several frames need a folder or an .mp4 file");
+  ExpectRefused(Render({"--like", "0001", "-o", In("view.png"), "--size", "0x0"}), kWrongUsage,
+                "expected at least one side above 0");
+  ExpectRefused(Render({"--like", "0001", "-o", In("view.png"), "--depth-out", In("d.png")}),
+                kWrongUsage, "expected a name ending in .exr, found '.png'");
+  ExpectRefused(Render({"--camera", In("absent.json"), "-o", In("view.png")}), kFailed,
+                "cannot be read: No such file or directory");
+  EXPECT_THAT(Contents(folder_.path()), IsEmpty());
+}
+
+TEST_F(BadInput, ACameraThatNoViewServesGivesAnEmptyPictureAndAWarning) {
+  const Ran ran = Render({"--like", "0001", "--exclude", "0001", "--max-angle", "0.001", "-o",
+                          In("view.png"), "--json", In("render.json")});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.err, HasSubstr("WARNING: 0001: no view is valid for this camera"));
+  const Json frame = Json::parse(Text(In("render.json")))["frames"][0];
+  EXPECT_EQ(frame["views_used"].size(), 0u);
+  EXPECT_EQ(frame["coverage"], 0);
+  const ImageRgb8 picture = io::ReadImage(In("view.png"));
+  for (const auto value : picture.data()) ASSERT_EQ(value, 0);
+}
+
+}  // namespace
+}  // namespace dtr::testing
