@@ -7,7 +7,8 @@
 namespace dtr::cli {
 namespace {
 
-const std::map<std::string, RenderMethod> kMethods{{"two-pass", RenderMethod::kTwoPass}};
+const std::map<std::string, RenderMethod> kMethods{{"two-pass", RenderMethod::kTwoPass},
+                                                   {"deferred", RenderMethod::kDeferred}};
 const std::map<std::string, Primitive> kPrimitives{{"mesh", Primitive::kMesh},
                                                    {"splat", Primitive::kSplat}};
 const std::map<std::string, BlendWeight> kBlends{{"cosine", BlendWeight::kCosine},

@@ -79,8 +79,11 @@ StateGuard::StateGuard() {
   glGetIntegerv(GL_ACTIVE_TEXTURE, &active_unit_);
   glGetIntegerv(GL_ARRAY_BUFFER_BINDING, &array_buffer_);
   glGetIntegerv(GL_SHADER_STORAGE_BUFFER_BINDING, &storage_buffer_);
-  glGetIntegeri_v(GL_SHADER_STORAGE_BUFFER_BINDING, 0, &storage_buffer_0_);
-  glGetIntegeri_v(GL_SHADER_STORAGE_BUFFER_BINDING, 1, &storage_buffer_1_);
+  glGetIntegerv(GL_UNIFORM_BUFFER_BINDING, &uniform_buffer_);
+  glGetIntegeri_v(GL_UNIFORM_BUFFER_BINDING, 0, &uniform_buffer_0_);
+  for (GLuint i = 0; i < 3; ++i) {
+    glGetIntegeri_v(GL_SHADER_STORAGE_BUFFER_BINDING, i, &storage_buffers_[i]);
+  }
   glGetIntegerv(GL_PIXEL_PACK_BUFFER_BINDING, &pack_buffer_);
   glGetIntegerv(GL_PIXEL_UNPACK_BUFFER_BINDING, &unpack_buffer_);
   for (int i = 0; i < 4; ++i) {
@@ -131,8 +134,11 @@ StateGuard::~StateGuard() {
   glBindFramebuffer(GL_READ_FRAMEBUFFER, name(read_framebuffer_));
   glViewport(viewport_[0], viewport_[1], viewport_[2], viewport_[3]);
   glBindBuffer(GL_ARRAY_BUFFER, name(array_buffer_));
-  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, name(storage_buffer_0_));
-  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 1, name(storage_buffer_1_));
+  glBindBufferBase(GL_UNIFORM_BUFFER, 0, name(uniform_buffer_0_));
+  glBindBuffer(GL_UNIFORM_BUFFER, name(uniform_buffer_));
+  for (GLuint i = 0; i < 3; ++i) {
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, i, name(storage_buffers_[i]));
+  }
   glBindBuffer(GL_SHADER_STORAGE_BUFFER, name(storage_buffer_));
   glBindBuffer(GL_PIXEL_PACK_BUFFER, name(pack_buffer_));
   glBindBuffer(GL_PIXEL_UNPACK_BUFFER, name(unpack_buffer_));

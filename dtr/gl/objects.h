@@ -87,7 +87,8 @@ class StateGuard {
   std::array<Capability, 14> capabilities_;
   GLint program_ = 0, vertex_array_ = 0, draw_framebuffer_ = 0, read_framebuffer_ = 0;
   GLint viewport_[4] = {}, active_unit_ = 0;
-  GLint array_buffer_ = 0, storage_buffer_ = 0, storage_buffer_0_ = 0, storage_buffer_1_ = 0;
+  GLint array_buffer_ = 0, storage_buffer_ = 0, storage_buffers_[3] = {};
+  GLint uniform_buffer_ = 0, uniform_buffer_0_ = 0;
   GLint pack_buffer_ = 0, unpack_buffer_ = 0;
   GLint pack_[4] = {}, unpack_[4] = {};
   GLint blend_equation_rgb_ = 0, blend_equation_alpha_ = 0;

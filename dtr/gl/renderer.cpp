@@ -5,6 +5,7 @@
 #include <set>
 
 #include "dtr/base/error.h"
+#include "dtr/gl/drawing.h"
 #include "dtr/gl/objects.h"
 #include "dtr/gl/program.h"
 #include "dtr/gl/view_store.h"
@@ -18,11 +19,15 @@ namespace {
 
 #include "dtr/gl/shaders/view_block.glsl"
 
-static_assert(sizeof(ViewBlock) == 7 * 16, "std430: seven vec4");
+static_assert(sizeof(ViewBlock) == 9 * 16, "std430: nine vec4");
 
 constexpr int kOldestVersion = 43;
-// Unit 0 has the layers; images follow.
+// Unit 0 has the layers; the arrays of images and depths follow.
 constexpr int kMaxImageArrays = StateGuard::kTextureUnits - 1;
+// Beyond this many pixels of disparity from the coarse depth a view shows another surface.
+constexpr double kSameSurfacePx = 2;
+// Invocations in a row of work groups of coarse_depth.glsl: the least limit that a driver may have.
+constexpr int kGroupSize = 64, kGroupsPerRow = 65535;
 // Variants of the resolving shader hold so many views, doubled until all fit.
 constexpr int kFewestViews = 8;
 
@@ -30,87 +35,6 @@ std::array<float, 4> Row(const Eigen::Vector3d& row, double last) {
   return {static_cast<float>(row.x()), static_cast<float>(row.y()), static_cast<float>(row.z()),
           static_cast<float>(last)};
 }
-
-/// The program in use, with its uniforms by name; names that the compiler left out do nothing.
-class Uniforms {
- public:
-  explicit Uniforms(const Program& program) : program_(program.name()) { glUseProgram(program_); }
-  void Set(const char* name, int value) const { glUniform1i(At(name), value); }
-  void Set(const char* name, double value) const {
-    glUniform1f(At(name), static_cast<float>(value));
-  }
-  void Set(const char* name, double a, double b) const {
-    glUniform2f(At(name), static_cast<float>(a), static_cast<float>(b));
-  }
-  void Set(const char* name, const Eigen::Vector3d& v) const {
-    const Eigen::Vector3f f = v.cast<float>();
-    glUniform3fv(At(name), 1, f.data());
-  }
-  void Set(const char* name, const Eigen::Vector4d& v) const {
-    const Eigen::Vector4f f = v.cast<float>();
-    glUniform4fv(At(name), 1, f.data());
-  }
-  void Set(const char* name, const Eigen::Matrix3d& m) const {
-    const Eigen::Matrix3f f = m.cast<float>();  // column-major, as in GLSL
-    glUniformMatrix3fv(At(name), 1, GL_FALSE, f.data());
-  }
-
- private:
-  GLint At(const char* name) const { return glGetUniformLocation(program_, name); }
-  GLuint program_;
-};
-
-Eigen::Vector4d Intrinsics(const PinholeCamera& camera) {
-  return {camera.fx_px(), camera.fy_px(), camera.cx_px(), camera.cy_px()};
-}
-
-/// A texture to draw into, of one band's size.
-Texture MakeTarget(GLenum target, GLenum format, int width, int height, int layers) {
-  Texture texture = Texture::Make();
-  glBindTexture(target, texture.name());
-  if (target == GL_TEXTURE_2D_ARRAY) {
-    glTexStorage3D(target, 1, format, width, height, layers);
-  } else {
-    glTexStorage2D(target, 1, format, width, height);
-  }
-  glTexParameteri(target, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
-  glTexParameteri(target, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
-  return texture;
-}
-
-/// Everything drawn into, for bands of one size; kept from frame to frame.
-struct Targets {
-  int width = 0, rows = 0, layer_count = 0;
-  Texture layers, image, depth, marks;
-  Framebuffer layer_framebuffer, result_framebuffer;
-
-  void Fit(int new_width, int new_rows, int new_layers) {
-    if (width == new_width && rows == new_rows && layer_count >= new_layers) return;
-    *this = Targets{};
-    width = new_width, rows = new_rows, layer_count = new_layers;
-    layers = MakeTarget(GL_TEXTURE_2D_ARRAY, GL_R32F, width, rows, layer_count);
-    image = MakeTarget(GL_TEXTURE_2D_ARRAY, GL_RGBA8, width, rows, 1);
-    depth = MakeTarget(GL_TEXTURE_2D_ARRAY, GL_R32F, width, rows, 1);
-    marks = MakeTarget(GL_TEXTURE_2D_ARRAY, GL_RGBA8UI, width, rows, 1);
-    layer_framebuffer = Framebuffer::Make();
-    result_framebuffer = Framebuffer::Make();
-    glBindFramebuffer(GL_FRAMEBUFFER, result_framebuffer.name());
-    const GLuint names[3] = {image.name(), depth.name(), marks.name()};
-    GLenum attachments[3];
-    for (GLenum i = 0; i < 3; ++i) {
-      attachments[i] = GL_COLOR_ATTACHMENT0 + i;
-      glFramebufferTextureLayer(GL_FRAMEBUFFER, attachments[i], names[i], 0, 0);
-    }
-    glDrawBuffers(3, attachments);
-    if (glCheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE) {
-      throw Error(
-          "OpenGL: this driver cannot draw into RGBA8, R32F and RGBA8UI at once; "
-          "use --renderer cpu");
-    }
-    ThrowOnError("a picture of " + std::to_string(width) + "x" + std::to_string(rows) +
-                 " pixels from " + std::to_string(layer_count) + " views");
-  }
-};
 
 int BlendNumber(BlendWeight blend) { return static_cast<int>(blend); }  // as in weights.glsl
 static_assert(static_cast<int>(BlendWeight::kCosine) == 0 &&
@@ -127,7 +51,8 @@ struct Frame {
   bool per_pixel = false;
   std::vector<const View*> views;
   std::vector<ViewPlacement> placements;
-  std::vector<int> image_arrays;  ///< store numbers, by the slot they are bound to
+  std::vector<int> image_arrays, depth_arrays;  ///< store numbers, by the slot they are bound to
+  bool deferred() const { return options.method == RenderMethod::kDeferred; }
 };
 
 /// Rows [first, first + count) of the picture.
@@ -147,6 +72,7 @@ class Renderer::Implementation {
     GLint max_size = 0;
     glGetIntegerv(GL_MAX_TEXTURE_SIZE, &max_size);
     max_target_px_ = max_size;
+    glGetIntegerv(GL_MAX_UNIFORM_BLOCK_SIZE, &max_uniform_bytes_);
     empty_array_ = VertexArray::Make();
     view_buffer_ = Buffer::Make();
   }
@@ -154,9 +80,6 @@ class Renderer::Implementation {
   RenderResult Render(const RenderScene& scene, const PinholeCamera& novel,
                       const Pose& novel_from_world, const RenderOptions& options) {
     CheckRenderOptions(options);
-    if (options.method != RenderMethod::kTwoPass) {
-      throw UsageError("--method: expected two-pass, found deferred");
-    }
     CheckNovelCamera(novel, novel_from_world);
     RenderResult result = EmptyResult(novel);
     const ViewSelection selection = SelectViews(scene, novel_from_world, options);
@@ -179,7 +102,7 @@ class Renderer::Implementation {
   static Frame MakeFrame(const RenderScene& scene, const PinholeCamera& novel,
                          const Pose& novel_from_world, const RenderOptions& options,
                          const ViewSelection& selection) {
-    Frame frame{scene, novel, options, selection.per_pixel, {}, {}, {}};
+    Frame frame{scene, novel, options, selection.per_pixel, {}, {}, {}, {}};
     for (const int index : CanonicalOrder(scene, selection.views)) {
       const View& view = *scene.views[static_cast<size_t>(index)];
       frame.views.push_back(&view);
@@ -192,7 +115,7 @@ class Renderer::Implementation {
     while (glGetError() != GL_NO_ERROR) {  // the caller's own errors are not ours
     }
     const StateGuard guard;
-    const int views = static_cast<int>(frame.views.size());
+    int views = static_cast<int>(frame.views.size());
     GLint max_layers = 0;
     glGetIntegerv(GL_MAX_ARRAY_TEXTURE_LAYERS, &max_layers);
     if (views > max_layers) {
@@ -200,21 +123,48 @@ class Renderer::Implementation {
                   " candidate views on this driver, found " + std::to_string(views) +
                   "; use --renderer cpu or --exclude");
     }
-    store_.Prepare(frame.views, frame.options);
+    if (frame.deferred()) {
+      store_.PrepareDeferred(frame.views, frame.options);
+      // What no sample is left of at this resolution shows nothing.
+      for (size_t i = frame.views.size(); i-- > 0;) {
+        if (store_.DeferredOf(*frame.views[i]) != nullptr) continue;
+        frame.views.erase(frame.views.begin() + static_cast<std::ptrdiff_t>(i));
+        frame.placements.erase(frame.placements.begin() + static_cast<std::ptrdiff_t>(i));
+      }
+      if (frame.views.empty()) return;
+    } else {
+      store_.Prepare(frame.views, frame.options);
+    }
     UploadBlocks(frame);
     const int width = frame.novel.width_px(), height = frame.novel.height_px();
+    views = static_cast<int>(frame.views.size());
+    const int layers = frame.deferred() ? 1 : views;
     const size_t row_bytes =
-        sizeof(float) * static_cast<size_t>(width) * static_cast<size_t>(views);
+        sizeof(float) * static_cast<size_t>(width) * static_cast<size_t>(layers);
     const int rows = static_cast<int>(
         std::clamp<size_t>(settings_.layer_bytes / row_bytes, 1, static_cast<size_t>(height)));
-    targets_.Fit(width, rows, views);
+    targets_.Fit(width, rows, layers);
     for (Band band; band.first < height; band.first += band.count) {
       band.count = std::min(rows, height - band.first);
-      for (int i = 0; i < views; ++i) DrawView(frame, band, i);
+      if (frame.deferred()) {
+        DrawCoarseDepth(frame, band);
+      } else {
+        for (int i = 0; i < views; ++i) DrawView(frame, band, i);
+      }
       Resolve(frame, band);
       ReadBack(band, result);
     }
     ThrowOnError("drawing");
+  }
+
+  static int RoomFor(int views) {
+    int room = kFewestViews;
+    while (room < views) room *= 2;
+    return room;
+  }
+  bool BlocksFitUniforms(int views) const {
+    return static_cast<size_t>(RoomFor(views)) * sizeof(ViewBlock) <=
+           static_cast<size_t>(max_uniform_bytes_);
   }
 
   /// What the resolving shader knows of each view; puts the images on the GPU.
@@ -235,25 +185,42 @@ class Renderer::Implementation {
       block.row_z = Row(placed.rotation.row(2), placed.translation.z());
       const Eigen::Vector4d camera = Intrinsics(view.camera);
       block.camera = Row(camera.head<3>(), camera.w());
-      block.gain = Row(view.gain, 0);
-      block.limits =
-          Row({static_cast<double>(view.image.width()), static_cast<double>(view.image.height()),
-               ThresholdsOf(view, frame.options).delta},
-              0);
-      block.image = {SlotOf(frame, slot.array), slot.layer, view.mask.empty() ? 0 : 1, 0};
+      RenderOptions same_surface = frame.options;
+      same_surface.delta_px = kSameSurfacePx;
+      const InverseDepthThresholds thresholds = ThresholdsOf(view, frame.options);
+      block.gain = Row(view.gain, ThresholdsOf(view, same_surface).delta);
+      block.limits = Row({static_cast<double>(view.image.width()),
+                          static_cast<double>(view.image.height()), thresholds.delta},
+                         thresholds.depth_break);
+      block.image = {SlotOf(frame, frame.image_arrays, slot.array), slot.layer,
+                     view.mask.empty() ? 0 : 1, 0};
+      if (frame.deferred()) SetDepthGrid(frame, view, block);
       blocks.push_back(block);
     }
+    blocks.resize(static_cast<size_t>(RoomFor(static_cast<int>(blocks.size()))), ViewBlock{});
     glBindBuffer(GL_SHADER_STORAGE_BUFFER, view_buffer_.name());
     glBufferData(GL_SHADER_STORAGE_BUFFER,
                  static_cast<GLsizeiptr>(blocks.size() * sizeof(ViewBlock)), blocks.data(),
                  GL_STREAM_DRAW);
   }
 
-  static int SlotOf(Frame& frame, int array) {
-    std::vector<int>& bound = frame.image_arrays;
+  /// SPEC 5.2: sample (i, j)'s centre is at (i + 0.5, j + 0.5) of the grid that shaders see.
+  void SetDepthGrid(Frame& frame, const View& view, ViewBlock& block) {
+    const ViewStore::Deferred& deferred = *store_.DeferredOf(view);
+    const PinholeCamera camera = view.DepthCamera();
+    const double step = deferred.step;
+    const auto centre = [&](double c) { return (c - deferred.offset - 0.5) / step + 0.5; };
+    block.depth_grid = Row({camera.fx_px() / step, camera.fy_px() / step, centre(camera.cx_px())},
+                           centre(camera.cy_px()));
+    block.depth_slot = {SlotOf(frame, frame.depth_arrays, deferred.depth.array),
+                        deferred.depth.layer, deferred.columns, deferred.rows};
+  }
+
+  static int SlotOf(const Frame& frame, std::vector<int>& bound, int array) {
     const auto found = std::find(bound.begin(), bound.end(), array);
     if (found != bound.end()) return static_cast<int>(found - bound.begin());
-    if (bound.size() == static_cast<size_t>(kMaxImageArrays)) {
+    if (frame.image_arrays.size() + frame.depth_arrays.size() ==
+        static_cast<size_t>(kMaxImageArrays)) {
       throw Error("OpenGL: expected images of at most " + std::to_string(kMaxImageArrays) +
                   " sizes in one picture (or 1 GiB each), found more; use --renderer cpu or fewer "
                   "--views");
@@ -326,18 +293,59 @@ class Renderer::Implementation {
     glDisable(GL_BLEND);
   }
 
+  /// SPEC 5.1: the nearest surface of all views, from their coarse surfaces.
+  void DrawCoarseDepth(const Frame& frame, const Band& band) {
+    const auto pixels = static_cast<GLsizeiptr>(targets_.width) * targets_.rows;
+    if (!depth_buffer_) depth_buffer_ = Buffer::Make();
+    glBindBuffer(GL_SHADER_STORAGE_BUFFER, depth_buffer_.name());
+    if (depth_pixels_ != pixels) {
+      glBufferData(GL_SHADER_STORAGE_BUFFER, pixels * GLsizeiptr{sizeof(GLuint)}, nullptr,
+                   GL_STREAM_COPY);
+      depth_pixels_ = pixels;
+    }
+    glClearBufferData(GL_SHADER_STORAGE_BUFFER, GL_R32UI, GL_RED_INTEGER, GL_UNSIGNED_INT, nullptr);
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 2, depth_buffer_.name());
+    for (const char* file : {"coarse_blocks.comp", "coarse_splats.comp"}) {
+      const bool splats = std::string(file) == "coarse_splats.comp";
+      const Uniforms set(ProgramOf({{GL_COMPUTE_SHADER, file}}, {}));
+      for (size_t i = 0; i < frame.views.size(); ++i) {
+        const View& view = *frame.views[i];
+        const CoarseGeometry& coarse = store_.DeferredOf(view)->coarse;
+        const int count = splats ? coarse.splat_count : coarse.block_count;
+        if (count == 0) continue;
+        set.Set("depth_camera", Intrinsics(view.DepthCamera()));
+        set.Set("novel_from_view", frame.placements[i].rotation);
+        set.Set("view_centre", frame.placements[i].translation);
+        set.Set("near_z", frame.placements[i].near_z);
+        set.Set("novel_camera", Intrinsics(frame.novel));
+        set.Set("width_px", frame.novel.width_px());
+        set.Set("first_row", band.first);
+        set.Set("rows", band.count);
+        set.Set("primitive_count", count);
+        set.Set("sample_step", static_cast<double>(frame.options.resolution));
+        glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 1,
+                         splats ? coarse.splats.name() : coarse.blocks.name());
+        const int groups = (count + kGroupSize - 1) / kGroupSize;
+        glDispatchCompute(static_cast<GLuint>(std::min(groups, kGroupsPerRow)),
+                          static_cast<GLuint>((groups + kGroupsPerRow - 1) / kGroupsPerRow), 1);
+      }
+    }
+    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+  }
+
   /// SPEC 4.2 to 4.7: one pass over the pixels.
   void Resolve(const Frame& frame, const Band& band) {
     const RenderOptions& options = frame.options;
     const BlendParameters blend = BlendParametersOf(options, frame.novel.fx_px());
     const int views = static_cast<int>(frame.views.size());
-    int room = kFewestViews;
-    while (room < views) room *= 2;
+    const int room = RoomFor(views);
     const int arrays = static_cast<int>(frame.image_arrays.size());
     const Program& program =
         ProgramOf({{GL_VERTEX_SHADER, "full_screen.vert"}, {GL_FRAGMENT_SHADER, "resolve.frag"}},
                   {"MAX_VIEWS " + std::to_string(room), "IMAGE_ARRAYS " + std::to_string(arrays),
+                   "DEPTH_ARRAYS " + std::to_string(frame.depth_arrays.size()),
                    "BLEND " + std::to_string(BlendNumber(options.blend)),
+                   std::string("VIEWS_IN_UNIFORMS ") + (BlocksFitUniforms(views) ? "1" : "0"),
                    std::string("PER_PIXEL ") + (frame.per_pixel ? "1" : "0"),
                    std::string("LINEAR_LIGHT ") + (options.blend_in_linear_light ? "1" : "0")});
     const Uniforms set(program);
@@ -351,21 +359,29 @@ class Renderer::Implementation {
     set.Set("blend_k", blend.blend_k);
     set.Set("max_angle_rad", blend.max_angle_rad);
     set.Set("pixel_angle_rad", blend.pixel_angle_rad);
+    set.Set("width_px", frame.novel.width_px());
     set.Set("layers", 0);
     glActiveTexture(GL_TEXTURE0);
     glBindTexture(GL_TEXTURE_2D_ARRAY, targets_.layers.name());
-    for (int slot = 0; slot < arrays; ++slot) {
-      set.Set(("images[" + std::to_string(slot) + "]").c_str(), slot + 1);
-      glActiveTexture(GL_TEXTURE1 + static_cast<GLenum>(slot));
-      glBindTexture(GL_TEXTURE_2D_ARRAY,
-                    store_.image_array(frame.image_arrays[static_cast<size_t>(slot)]));
-    }
+    BindArrays(set, "images", frame.image_arrays, 1);
+    BindArrays(set, "depths", frame.depth_arrays, 1 + arrays);
     glActiveTexture(GL_TEXTURE0);
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, view_buffer_.name());
+    glBindBufferBase(BlocksFitUniforms(views) ? GL_UNIFORM_BUFFER : GL_SHADER_STORAGE_BUFFER, 0,
+                     view_buffer_.name());
     glBindFramebuffer(GL_FRAMEBUFFER, targets_.result_framebuffer.name());
     glViewport(0, 0, frame.novel.width_px(), band.count);
     glBindVertexArray(empty_array_.name());
     glDrawArrays(GL_TRIANGLES, 0, 3);
+  }
+
+  void BindArrays(const Uniforms& set, const std::string& name, const std::vector<int>& arrays,
+                  int first_unit) const {
+    for (size_t slot = 0; slot < arrays.size(); ++slot) {
+      const int unit = first_unit + static_cast<int>(slot);
+      set.Set((name + "[" + std::to_string(slot) + "]").c_str(), unit);
+      glActiveTexture(GL_TEXTURE0 + static_cast<GLenum>(unit));
+      glBindTexture(GL_TEXTURE_2D_ARRAY, store_.texture_array(arrays[slot]));
+    }
   }
 
   void ReadBack(const Band& band, RenderResult& result) {
@@ -391,11 +407,13 @@ class Renderer::Implementation {
 
   const RendererSettings settings_;
   int max_target_px_ = 0;
+  GLint max_uniform_bytes_ = 0;
   ViewStore store_;
   std::map<std::string, Program> programs_;
   Targets targets_;
   VertexArray empty_array_;
-  Buffer view_buffer_;
+  Buffer view_buffer_, depth_buffer_;
+  GLsizeiptr depth_pixels_ = 0;
 };
 
 Renderer::Renderer(RendererSettings settings)

@@ -33,12 +33,12 @@ class Renderer {
   Renderer(const Renderer&) = delete;
   Renderer& operator=(const Renderer&) = delete;
 
-  /// SPEC 1 to 4, 6 and 7 as cpu::Render. Views that are drawn stay on the GPU: they must not
-  /// change or die as long as this renderer draws them (Forget() ends that). The result does not
-  /// depend on the order of the views; equal calls give equal bytes.
-  /// Throws dtr::UsageError for options without a meaning and for pictures beyond 2^28 pixels, and
-  /// dtr::Error for a pose that is not finite, for what the driver cannot hold (naming its limit)
-  /// and for a shader that does not compile (file and line).
+  /// SPEC 1 to 4, 6 and 7 as cpu::Render, and SPEC 5, which cpu::Render does not know. Views that
+  /// are drawn stay on the GPU: they must not change or die as long as this renderer draws them
+  /// (Forget() ends that). The result does not depend on the order of the views; equal calls give
+  /// equal bytes. Throws dtr::UsageError for options without a meaning and for pictures beyond 2^28
+  /// pixels, and dtr::Error for a pose that is not finite, for what the driver cannot hold (naming
+  /// its limit) and for a shader that does not compile (file and line).
   RenderResult Render(const RenderScene& scene, const PinholeCamera& novel,
                       const Pose& novel_from_world, const RenderOptions& options);
 

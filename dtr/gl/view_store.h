@@ -20,9 +20,15 @@ struct Geometry {
   GLsizei index_count = 0;
 };
 
-/// Where a view's image lies.
+/// SPEC 5: a view's coarse surface and full-resolution depth.
+struct CoarseGeometry {
+  Buffer blocks, splats;
+  int block_count = 0, splat_count = 0;
+};
+
+/// Where a view's image or depth lies.
 struct ImageSlot {
-  int array = 0;  ///< index into ViewStore::image_arrays
+  int array = 0;  ///< index of a texture array of the store
   int layer = 0;
 };
 
@@ -35,9 +41,21 @@ class ViewStore {
   /// Makes the meshes or splats of several views at once, on all cores.
   void Prepare(const std::vector<const View*>& views, const RenderOptions& options);
 
+  /// SPEC 5: the same for the deferred method: coarse surfaces and depth arrays.
+  void PrepareDeferred(const std::vector<const View*>& views, const RenderOptions& options);
+  struct Deferred {
+    CoarseGeometry coarse;
+    ImageSlot depth;
+    int columns = 0, rows = 0, step = 1, offset = 0;  ///< of the grid of samples
+  };
+  /// After PrepareDeferred with the same options; null where R leaves no sample.
+  const Deferred* DeferredOf(const View& view);
+
   /// `expected_views`: how many views of this size may follow; sets the first array's length.
   ImageSlot ImageOf(const View& view, int expected_views);
-  GLuint image_array(int index) const { return arrays_[static_cast<size_t>(index)].texture.name(); }
+  GLuint texture_array(int index) const {
+    return arrays_[static_cast<size_t>(index)].texture.name();
+  }
   void Clear();
 
  private:
@@ -47,15 +65,17 @@ class ViewStore {
     const void *image_data = nullptr, *depth_data = nullptr;
     std::map<Primitive, std::pair<GeometryKey, Geometry>> geometry;
     std::optional<ImageSlot> image;
+    std::optional<std::pair<GeometryKey, Deferred>> deferred;
   };
   struct ImageArray {
     Texture texture;
+    GLenum format = GL_NONE;
     int width_px = 0, height_px = 0, layers = 0, used = 0;
   };
 
   Stored& Find(const View& view);
   static GeometryKey KeyOf(const RenderOptions& options);
-  ImageSlot NewSlot(int width_px, int height_px, int expected_views);
+  ImageSlot NewSlot(GLenum format, int width_px, int height_px, int expected_views);
 
   std::map<const View*, Stored> views_;
   std::vector<ImageArray> arrays_;

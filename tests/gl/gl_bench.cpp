@@ -79,6 +79,12 @@ int main(int argc, char** argv) {
   const RenderResult two_pass = Measure("OpenGL two-pass", kFrames, [&] {
     return renderer.Render(scene, novel.camera, novel.cam_from_world, options);
   });
-  std::printf("two-pass to reference: %.2f dB\n", Psnr(reference, two_pass));
+  options.method = dtr::RenderMethod::kDeferred;
+  const RenderResult deferred = Measure("OpenGL deferred", kFrames, [&] {
+    return renderer.Render(scene, novel.camera, novel.cam_from_world, options);
+  });
+  std::printf("to the reference: two-pass %.2f dB, deferred %.2f dB; coverage %.4f, %.4f, %.4f\n",
+              Psnr(reference, two_pass), Psnr(reference, deferred), reference.coverage_share,
+              two_pass.coverage_share, deferred.coverage_share);
   return 0;
 }

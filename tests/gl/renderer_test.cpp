@@ -153,6 +153,7 @@ TEST_F(Render, RandomCamerasGiveNoNanAndNoContradiction) {
       RenderOptions options;
       options.primitive = k % 2 == 0 ? Primitive::kMesh : Primitive::kSplat;
       options.blend = kAllWeights[k % 5];
+      options.method = k % 3 == 1 ? RenderMethod::kDeferred : RenderMethod::kTwoPass;
       options.max_angle_rad = std::numbers::pi;
       options.exponent = k % 5 == 0 ? 1000 : 8;
       ExpectSound(renderer.Render(views, shot.camera, shot.cam_from_world, options));

@@ -11,7 +11,12 @@ vec4 ColourAt(ViewBlock view, vec2 pixel) {
   vec2 share = position - vec2(low);
   vec4 weight = vec4((1.0 - share.x) * (1.0 - share.y), share.x * (1.0 - share.y),
                      (1.0 - share.x) * share.y, share.x * share.y);
-  int slot = view.image.x, layer = view.image.y;
+#if IMAGE_ARRAYS == 1
+  const int slot = 0;  // known to the compiler: no choice between samplers at every fetch
+#else
+  int slot = view.image.x;
+#endif
+  int layer = view.image.y;
   vec4 texel[4] = vec4[](texelFetch(images[slot], ivec3(low, layer), 0),
                          texelFetch(images[slot], ivec3(high.x, low.y, layer), 0),
                          texelFetch(images[slot], ivec3(low.x, high.y, layer), 0),

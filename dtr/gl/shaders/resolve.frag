@@ -1,13 +1,25 @@
 // SPEC 4.2 to 4.7 and 6: what the views' nearest fragments say together, pixel by pixel. One sum in
 // the views' canonical order and one division: nothing depends on the order they were drawn in.
-// Defines: MAX_VIEWS, IMAGE_ARRAYS, BLEND, PER_PIXEL, LINEAR_LIGHT.
+// Defines: MAX_VIEWS, IMAGE_ARRAYS, DEPTH_ARRAYS (0: two passes, else SPEC 5), BLEND, PER_PIXEL,
+// LINEAR_LIGHT, VIEWS_IN_UNIFORMS.
+#if DEPTH_ARRAYS
+layout(std430, binding = 2) readonly buffer Depth { uint nearest[]; };  // SPEC 5.1
+uniform sampler2DArray depths[DEPTH_ARRAYS];
+uniform int width_px;
+#else
 uniform sampler2DArray layers;  // 1/z in the novel camera, a layer per view; 0: no fragment
+#endif
 uniform sampler2DArray images[IMAGE_ARRAYS];
 #include "view_block.glsl"
 #include "colour.glsl"
 #include "weights.glsl"
 
+// Uniforms where they suffice: software rasterisers read storage buffers lane by lane.
+#if VIEWS_IN_UNIFORMS
+layout(std140, binding = 0) uniform Views { ViewBlock views[MAX_VIEWS]; };
+#else
 layout(std430, binding = 0) readonly buffer Views { ViewBlock views[]; };
+#endif
 
 uniform int view_count;
 uniform int nearest_views;     // K, for the per-pixel rule
@@ -23,7 +35,8 @@ const float kBorderShare = 1e-4;       // SPEC 6.2
 const float kLargestFloat = 3.4e38;
 
 float fragment[MAX_VIEWS];  // 1/z; 0: absent
-float angle[MAX_VIEWS];     // SPEC 4.5, at the point; then the logarithm of the weight
+float angle[MAX_VIEWS];     // SPEC 4.5, at the point
+float log_weight[MAX_VIEWS];
 
 vec3 Centre(ViewBlock view) { return vec3(view.row_x.w, view.row_y.w, view.row_z.w); }
 
@@ -38,6 +51,10 @@ vec3 PointInView(ViewBlock view, vec3 ray, float w) {
   vec3 p = ray - Centre(view) * w;
   return view.row_x.xyz * p.x + view.row_y.xyz * p.y + view.row_z.xyz * p.z;
 }
+
+#if DEPTH_ARRAYS
+#include "own_depth.glsl"
+#endif
 
 vec2 SourcePixel(ViewBlock view, vec3 p) { return view.camera.xy * (p.xy / p.z) + view.camera.zw; }
 
@@ -80,9 +97,17 @@ void main() {
   out_marks = uvec4(0u);
 
   // SPEC 4.2: front and border.
+#if DEPTH_ARRAYS
+  float coarse = uintBitsToFloat(nearest[target.y * width_px + target.x]);
+  if (!(coarse > 0.0)) return;
+#endif
   float front = 0.0, border = -kLargestFloat;
   for (int i = 0; i < view_count; ++i) {
+#if DEPTH_ARRAYS
+    float w = OwnFragment(views[i], ray, coarse);
+#else
     float w = texelFetch(layers, ivec3(target, i), 0).r;
+#endif
     fragment[i] = 0.0;
     if (!(w > 0.0) || !Exists(views[i], ray, w)) continue;
     fragment[i] = w;
@@ -131,9 +156,9 @@ void main() {
   int blended = 0;
   for (int i = 0; i < view_count; ++i) {
     if (fragment[i] == 0.0) continue;
-    float log_weight = LogWeight(angle[i], next_angle);
-    if (log_weight > kNoWeight) ++blended;
-    largest = max(largest, log_weight);
+    log_weight[i] = LogWeight(angle[i], next_angle);
+    if (log_weight[i] > kNoWeight) ++blended;
+    largest = max(largest, log_weight[i]);
   }
   bool all_zero = blended == 0;  // then those at the smallest angle share
 
@@ -141,9 +166,8 @@ void main() {
   vec4 sum = vec4(0.0);
   for (int i = 0; i < view_count; ++i) {
     if (fragment[i] == 0.0) continue;
-    float log_weight = LogWeight(angle[i], next_angle);
     float weight = all_zero ? (angle[i] == smallest ? 1.0 : 0.0)
-                            : (log_weight > kNoWeight ? exp(log_weight - largest) : 0.0);
+                            : (log_weight[i] > kNoWeight ? exp(log_weight[i] - largest) : 0.0);
     if (!(weight > 0.0)) continue;
     if (all_zero) ++blended;
     ViewBlock view = views[i];

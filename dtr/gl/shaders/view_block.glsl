@@ -12,9 +12,11 @@ struct ViewBlock {
   vec4 row_y;   // second row, translation y
   vec4 row_z;   // third row, translation z
   vec4 camera;  // fx, fy, cx, cy of the view's image, pixels
-  vec4 gain;    // linear RGB factor, unused
-  vec4 limits;  // image width, height (pixels), Delta (difference of 1/z), unused
+  vec4 gain;    // linear RGB factor; what still is the same surface (SPEC 5.2)
+  vec4 limits;  // image width, height (pixels), Delta, depth break (differences of 1/z)
   ivec4 image;  // texture array, layer in it, 1 if the view has a mask, unused
+  vec4 depth_grid;   // fx, fy, cx, cy of the grid of samples (SPEC 5.2)
+  ivec4 depth_slot;  // texture array, layer in it, columns, rows
 };
 #ifdef __cplusplus
 #undef vec4
