@@ -38,7 +38,8 @@ std::shared_ptr<RenderOptions> AddRenderOptions(CLI::App& command) {
   RenderOptions& options = *shared;
   AddChoice(command, "--method", options.method, kMethods, "Algorithm [two-pass]");
   AddChoice(command, "--primitive", options.primitive, kPrimitives, "What is drawn [mesh]");
-  AddChoice(command, "--blend", options.blend, kBlends, "Weight of a view by angle [cosine]");
+  AddChoice(command, "--blend", options.blend, kBlends,
+            "Weight of a view by angle [inverse-angle]");
   command.add_option("--views", options.views, "Blend at most the K nearest valid views [8]")
       ->check(CLI::Range(1, 1024))
       ->type_name("K");
@@ -54,7 +55,7 @@ std::shared_ptr<RenderOptions> AddRenderOptions(CLI::App& command) {
   command.add_option("--falloff", options.falloff, "exponential: fall-off per radian [8]")
       ->check(CLI::Range(0.0, 1e6))
       ->type_name("C");
-  command.add_option("--blend-k", options.blend_k, "k-nearest: K; inverse-angle: power [3]")
+  command.add_option("--blend-k", options.blend_k, "k-nearest: K; inverse-angle: power [2]")
       ->check(CLI::Range(1, 64))
       ->type_name("K");
   command
@@ -85,8 +86,11 @@ std::shared_ptr<RenderOptions> AddRenderOptions(CLI::App& command) {
       ->check(CLI::PositiveNumber)
       ->type_name("UNITS");
   command.add_flag_callback(
+      "--blend-linear", [&options] { options.blend_in_linear_light = true; },
+      "Blend linear light instead of sRGB values");
+  command.add_flag_callback(
       "--blend-srgb", [&options] { options.blend_in_linear_light = false; },
-      "Blend sRGB values instead of linear light");
+      "Blend sRGB values, the default");
   command.add_flag("--fill-holes", options.fill_holes, "Fill unseen pixels from the background");
   return shared;
 }

@@ -16,10 +16,19 @@
 namespace dtr {
 namespace {
 
-// A cell counts (farthest / own inverse depth)^4: a quarter nearer halves its say, twice as near
-// leaves a sixteenth, at any scale; a hard limit would draw the blocks of the pyramid into slanted
-// ground.
-constexpr double kBackgroundPower = 4;
+// Depths that are tried for a hole, between its farthest and its nearest guess (SPEC 7.2).
+constexpr int kTriedDepths = 8;
+
+/// Which of the cells around a hole have the most say.
+enum class Favour { kFar, kNone };
+
+/// The fourth power: a cell twice as near as the farthest keeps a sixteenth of its say, at any
+/// scale; a hard limit would draw the blocks of the pyramid into slanted ground.
+double Say(double inverse_depth, double farthest, Favour favour) {
+  if (favour == Favour::kNone) return 1;
+  const double ratio = farthest / inverse_depth;
+  return ratio * ratio * ratio * ratio;
+}
 
 /// A cell of the pyramid: colour (linear), inverse depth and how much of it is known.
 struct Cell {
@@ -29,10 +38,11 @@ struct Cell {
 };
 using Level = Grid<Cell>;
 
-/// Weighted mean of the background among some cells; weight 0 when none is known. `taps` are the
-/// interpolation weights.
+/// Weighted mean of some cells, most of the favoured ones; weight 0 when none is known. `taps` are
+/// the interpolation weights.
 template <size_t N>
-Cell BackgroundMean(const std::array<const Cell*, N>& cells, const std::array<double, N>& taps) {
+Cell FavouredMean(const std::array<const Cell*, N>& cells, const std::array<double, N>& taps,
+                  Favour favour) {
   double farthest = 0;
   bool any = false;
   for (size_t i = 0; i < N; ++i) {
@@ -44,8 +54,8 @@ Cell BackgroundMean(const std::array<const Cell*, N>& cells, const std::array<do
   if (!any) return mean;
   for (size_t i = 0; i < N; ++i) {
     if (cells[i] == nullptr || !(cells[i]->weight > 0)) continue;
-    const double nearness = std::pow(farthest / cells[i]->inverse_depth, kBackgroundPower);
-    const double weight = cells[i]->weight * taps[i] * nearness;
+    const double weight =
+        cells[i]->weight * taps[i] * Say(cells[i]->inverse_depth, farthest, favour);
     mean.colour += weight * cells[i]->colour;
     mean.inverse_depth += weight * cells[i]->inverse_depth;
     mean.weight += weight;
@@ -75,15 +85,15 @@ Level FinestLevel(const RenderResult& result) {
   return level;
 }
 
-/// Pull: each coarse cell is the background of its four children.
-Level Coarser(const Level& fine) {
+/// Pull: each coarse cell is the favoured mean of its four children.
+Level Coarser(const Level& fine, Favour favour) {
   Level coarse((fine.width() + 1) / 2, (fine.height() + 1) / 2);
   for (int y = 0; y < coarse.height(); ++y) {
     for (int x = 0; x < coarse.width(); ++x) {
       const std::array<const Cell*, 4> children = {
           CellAt(fine, 2 * x, 2 * y), CellAt(fine, 2 * x + 1, 2 * y),
           CellAt(fine, 2 * x, 2 * y + 1), CellAt(fine, 2 * x + 1, 2 * y + 1)};
-      Cell cell = BackgroundMean<4>(children, {1, 1, 1, 1});
+      Cell cell = FavouredMean<4>(children, {1, 1, 1, 1}, favour);
       cell.weight = std::min(cell.weight, 1.0);
       coarse(x, y) = cell;
     }
@@ -91,17 +101,18 @@ Level Coarser(const Level& fine) {
   return coarse;
 }
 
-/// Push: unknown fine cells take the bilinear background of the four coarse cells around them.
-void FillFrom(const Level& coarse, Level& fine) {
+/// Push: unknown fine cells take the bilinear favoured mean of the four coarse cells around them.
+void FillFrom(const Level& coarse, Favour favour, Level& fine) {
   for (int y = 0; y < fine.height(); ++y) {
     for (int x = 0; x < fine.width(); ++x) {
       if (fine(x, y).weight > 0) continue;
       const double cx = 0.5 * (x + 0.5) - 0.5, cy = 0.5 * (y + 0.5) - 0.5;
       const int x0 = static_cast<int>(std::floor(cx)), y0 = static_cast<int>(std::floor(cy));
       const double fx = cx - x0, fy = cy - y0;
-      Cell cell = BackgroundMean<4>({CellAt(coarse, x0, y0), CellAt(coarse, x0 + 1, y0),
-                                     CellAt(coarse, x0, y0 + 1), CellAt(coarse, x0 + 1, y0 + 1)},
-                                    {(1 - fx) * (1 - fy), fx * (1 - fy), (1 - fx) * fy, fx * fy});
+      Cell cell =
+          FavouredMean<4>({CellAt(coarse, x0, y0), CellAt(coarse, x0 + 1, y0),
+                           CellAt(coarse, x0, y0 + 1), CellAt(coarse, x0 + 1, y0 + 1)},
+                          {(1 - fx) * (1 - fy), fx * (1 - fy), (1 - fx) * fy, fx * fy}, favour);
       if (cell.weight > 0) cell.weight = 1;
       fine(x, y) = cell;
     }
@@ -109,13 +120,13 @@ void FillFrom(const Level& coarse, Level& fine) {
 }
 
 /// Fills every unknown cell of the finest level from the known ones.
-void PushPull(Level& finest) {
+void PushPull(Favour favour, Level& finest) {
   std::vector<Level> pyramid = {std::move(finest)};
   while (pyramid.back().width() > 1 || pyramid.back().height() > 1) {
-    pyramid.push_back(Coarser(pyramid.back()));
+    pyramid.push_back(Coarser(pyramid.back(), favour));
   }
   for (size_t level = pyramid.size() - 1; level > 0; --level) {
-    FillFrom(pyramid[level], pyramid[level - 1]);
+    FillFrom(pyramid[level], favour, pyramid[level - 1]);
   }
   finest = std::move(pyramid.front());
 }
@@ -134,6 +145,16 @@ void WriteHoles(const Level& level, RenderResult& result) {
 bool HasHoles(const RenderResult& result) {
   const auto& covered = result.coverage.data();
   return std::find(covered.begin(), covered.end(), 0) != covered.end();
+}
+
+/// True where the view measured something behind the guessed point: it sees through it.
+bool SeesThrough(const View& view, double delta_inverse_depth, const Eigen::Vector3d& p_in_cam) {
+  const auto pixel = view.camera.PixelFromCam(p_in_cam);
+  if (!pixel || !view.camera.Contains(*pixel)) return false;
+  const float depth = view.depth(static_cast<int>(pixel->x()) / view.depth_scale,
+                                 static_cast<int>(pixel->y()) / view.depth_scale);
+  return !DepthImage::IsHole(depth) &&
+         1.0 / static_cast<double>(depth) < 1 / p_in_cam.z() - delta_inverse_depth;
 }
 
 /// What a view shows of a guessed point; empty where it looks at something nearer, or off its
@@ -179,6 +200,15 @@ class GuessedColours {
     }
   }
 
+  /// False where a view saw something behind the point.
+  bool Possible(int x, int y, double inverse_depth) const {
+    const Eigen::Vector3d point = novel_.RayFromPixel({x + 0.5, y + 0.5}) / inverse_depth;
+    return std::none_of(views_.begin(), views_.end(), [&](const Placed& placed) {
+      return SeesThrough(*placed.view, placed.delta_inverse_depth,
+                         placed.view_from_novel * (point - placed.center_in_novel));
+    });
+  }
+
   std::optional<Eigen::Vector3d> At(int x, int y, double inverse_depth) const {
     const Eigen::Vector3d point = novel_.RayFromPixel({x + 0.5, y + 0.5}) / inverse_depth;
     std::vector<double> angles;
@@ -207,15 +237,37 @@ class GuessedColours {
   };
   const PinholeCamera novel_;
   const BlendParameters blend_;
-  std::vector<Placed> views_;
+  std::vector<Placed> views_;  ///< in the order of the ids
 };
+
+/// SPEC 7.2: inverse depth for each hole: the nearest of those tried that no view sees through.
+Grid<double> GuessDepth(const Level& known, const GuessedColours& colours, int threads) {
+  Level far = known, even = known;
+  PushPull(Favour::kFar, far);
+  PushPull(Favour::kNone, even);
+  Grid<double> guess(known.width(), known.height());
+  ParallelFor(0, known.height(), threads, [&](int y) {
+    for (int x = 0; x < known.width(); ++x) {
+      if (known(x, y).weight > 0 || !(far(x, y).weight > 0)) continue;
+      const double farthest = far(x, y).inverse_depth, nearest = even(x, y).inverse_depth;
+      guess(x, y) = farthest;
+      for (int k = kTriedDepths - 1; k > 0; --k) {
+        const double tried = farthest + (nearest - farthest) * k / (kTriedDepths - 1);
+        if (!colours.Possible(x, y, tried)) continue;
+        guess(x, y) = tried;
+        break;
+      }
+    }
+  });
+  return guess;
+}
 
 }  // namespace
 
 void FillHoles(RenderResult& result) {
   if (!HasHoles(result)) return;
   Level level = FinestLevel(result);
-  PushPull(level);
+  PushPull(Favour::kFar, level);
   WriteHoles(level, result);
 }
 
@@ -224,17 +276,16 @@ void FillHolesFromViews(const RenderScene& scene, const PinholeCamera& novel,
                         RenderResult& result) {
   if (!HasHoles(result)) return;
   Level known = FinestLevel(result);
-  Level guess = known;
-  PushPull(guess);
   const GuessedColours colours(scene, result.views_used, novel, novel_from_world, options);
+  const Grid<double> guess = GuessDepth(known, colours, options.threads);
   ParallelFor(0, known.height(), options.threads, [&](int y) {
     for (int x = 0; x < known.width(); ++x) {
-      if (known(x, y).weight > 0 || !(guess(x, y).weight > 0)) continue;
-      const auto colour = colours.At(x, y, guess(x, y).inverse_depth);
-      if (colour) known(x, y) = {*colour, guess(x, y).inverse_depth, 1};
+      if (known(x, y).weight > 0 || !(guess(x, y) > 0)) continue;
+      const auto colour = colours.At(x, y, guess(x, y));
+      if (colour) known(x, y) = {*colour, guess(x, y), 1};
     }
   });
-  PushPull(known);
+  PushPull(Favour::kFar, known);
   WriteHoles(known, result);
 }
 

@@ -13,8 +13,9 @@ namespace dtr {
 /// nearer. Work is linear in the pixels. A picture without any covered pixel stays black.
 void FillHoles(RenderResult& result);
 
-/// SPEC 7.2. The same, but the guess is of depth: push-pull gives each hole an inverse depth, the
-/// views used show what colour they see at that point (where they see nothing nearer), and only
+/// SPEC 7.2. The same, but the guess is of depth: push-pull gives each hole a range of inverse
+/// depth, of which the nearest counts that no view sees through; the views used show what colour
+/// they see at that point (where they see nothing nearer), and only
 /// what none of them shows is filled from its surroundings. Skies and textureless walls, where
 /// depth maps have holes and photos do not, come out as photographed. `result` is the picture
 /// Render made of `scene` with the other arguments, before any filling. Does not depend on the

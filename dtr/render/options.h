@@ -33,19 +33,20 @@ struct RenderOptions {
   int views = 8;            ///< K: at most so many of the valid views, the nearest by angle
   int resolution = 1;       ///< R: every R-th depth pixel per axis
   double point_size = 1.0;  ///< splats: factor on the footprint
-  BlendWeight blend = BlendWeight::kCosine;
+  // Defaults are what held-out views of real photos liked best, docs/ACCURACY.md.
+  BlendWeight blend = BlendWeight::kInverseAngle;
   double exponent = 8.0;                        ///< n of kCosine
   double falloff = 8.0;                         ///< c of kExponential, per radian
-  int blend_k = 3;                              ///< k of kKNearest, power of kInverseAngle
+  int blend_k = 2;                              ///< k of kKNearest, power of kInverseAngle
   double max_angle_rad = std::numbers::pi / 3;  ///< valid views, SPEC 1
   double delta_px = 1.0;                        ///< Delta of SPEC 4, pixels of disparity
   double depth_break_px = 1.0;  ///< break threshold of SPEC 2.3, pixels of disparity
   /// The report's absolute thresholds, in scene units; when set they replace the scale-free ones.
   std::optional<double> absolute_delta;
   std::optional<double> absolute_depth_break;
-  bool blend_in_linear_light = true;  ///< else in sRGB values
-  bool fill_holes = false;            ///< SPEC 7, a separate step; never counted as seen
-  int threads = 0;                    ///< 0: all cores; the result does not depend on it
+  bool blend_in_linear_light = false;  ///< else in sRGB values
+  bool fill_holes = false;             ///< SPEC 7, a separate step; never counted as seen
+  int threads = 0;                     ///< 0: all cores; the result does not depend on it
 };
 
 /// Throws dtr::UsageError naming the option when a value has no meaning.
