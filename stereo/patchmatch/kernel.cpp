@@ -21,6 +21,12 @@ namespace dtr::stereo::patchmatch::HWY_NAMESPACE {
 
 /// Candidates per visit: the pixel's own plane, 4 near and 4 far regions.
 constexpr int kPlanes = 9;
+/// A view sees a pixel when more than this many candidates match well in it and fewer than that
+/// badly. ACMH's 2 and 3 take the sight from all views next to silhouettes and behind thin things.
+constexpr float kGoodPlanes = 1.0f, kBadPlanes = 7.0f;
+/// Views with less than this share of the best view's weight have no say. On plaza, share of all
+/// true pixels within 1 %: 77.7 % with 0.1, 79.7 % with 0.3, 79.8 % with 0.5 and less precise.
+constexpr float kLeastWeight = 0.4f;
 constexpr int kNearSamples = 7, kFarSamples = 11;
 
 /// Candidate planes of a group and what each costs in each view.
@@ -132,7 +138,8 @@ void ChooseViews(const Level& level, const Sweep& sweep, const State& state, con
       const VF e = hn::Exp(d, hn::Mul(hn::Mul(cost, cost), hn::Set(d, -1.0f / 0.18f)));
       score = hn::Add(score, hn::IfThenElseZero(is_good, e));
     }
-    const auto sees = hn::And(hn::Gt(good, hn::Set(d, 2.0f)), hn::Lt(bad, hn::Set(d, 3.0f)));
+    const auto sees =
+        hn::And(hn::Gt(good, hn::Set(d, kGoodPlanes)), hn::Lt(bad, hn::Set(d, kBadPlanes)));
     score = hn::IfThenElse(sees, hn::Div(score, hn::Max(good, one)),
                            hn::Set(d, std::exp(-tau * tau / 0.32f)));
     VF prior = zero;
@@ -145,8 +152,7 @@ void ChooseViews(const Level& level, const Sweep& sweep, const State& state, con
     hn::Store(score, d, best->weight[v]);
     largest = hn::Max(largest, score);
   }
-  // A view with little weight only costs time.
-  const VF least = hn::Mul(largest, hn::Set(d, 0.1f));
+  const VF least = hn::Mul(largest, hn::Set(d, kLeastWeight));
   for (int v = 0; v < views; ++v) {
     VF weight = hn::Load(d, best->weight[v]);
     weight = hn::IfThenZeroElse(hn::Lt(weight, least), weight);

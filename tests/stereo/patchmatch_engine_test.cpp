@@ -1,6 +1,7 @@
 #include "stereo/patchmatch/patchmatch_engine.h"
 
 #include <gtest/gtest.h>
+#include <hwy/highway.h>
 
 #include <algorithm>
 #include <cmath>
@@ -142,6 +143,25 @@ TEST(PatchMatchEngine, TheNumberOfThreadsChangesNoBit) {
     EXPECT_EQ(one.depth, other.depth);
     EXPECT_EQ(one.inverse_depth_sigma, other.inverse_depth_sigma);
   }
+}
+
+TEST(PatchMatchEngine, InstructionSetsDifferInTheLastBitsOfTheSearchOnly) {
+  const auto shots = Shots(SphereBeforeWall(), {Facing({0, 0, 0}), Facing({kBaseline, 0, 0}),
+                                                Facing({0, kBaseline, 0})});
+  const auto views = ViewsOf(shots);
+  const Quality best = Judge(EstimateFirst(views), shots[0].truth);
+  for (std::int64_t left = hwy::SupportedTargets() & HWY_TARGETS; left != 0; left &= left - 1) {
+    SCOPED_TRACE(hwy::TargetName(left & -left));
+    hwy::SetSupportedTargetsForTest(left & -left);
+    hwy::GetChosenTarget().DeInit();
+    const Quality q = Judge(EstimateFirst(views), shots[0].truth);
+    // Rounding sends the random search other ways; what it finds is as good.
+    EXPECT_NEAR(q.kept, best.kept, 0.01);
+    EXPECT_NEAR(q.median_px, best.median_px, 0.005);
+    EXPECT_NEAR(q.bad_share, best.bad_share, 0.01);
+  }
+  hwy::SetSupportedTargetsForTest(0);
+  hwy::GetChosenTarget().DeInit();
 }
 
 TEST(PatchMatchEngine, SigmaDescribesTheError) {
