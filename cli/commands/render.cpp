@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 
 #include "cli/command.h"
 #include "cli/novel_frames.h"
@@ -13,10 +14,12 @@
 #include "cli/video.h"
 #include "cli/view_names.h"
 #include "dtr/base/error.h"
+#include "dtr/base/parallel_for.h"
 #include "dtr/io/depth_io.h"
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/scene.h"
+#include "dtr/render/valid_views.h"
 
 namespace dtr::cli {
 namespace {
@@ -99,6 +102,23 @@ nlohmann::ordered_json FrameJson(const std::string& file, double ms, const Rende
   return {{"file", file}, {"ms", ms}, {"views_used", used}, {"coverage", result.coverage_share}};
 }
 
+// Loads the pixels of the views that the frames draw from, and of no others.
+void LoadNeeded(const fs::path& folder, const RenderScene& scene,
+                const std::vector<NovelFrame>& cameras, const RenderOptions& options, DtrSet& set) {
+  std::vector<Pose> poses;
+  for (const NovelFrame& camera : cameras) poses.push_back(camera.cam_from_world);
+  std::set<const View*> needed;
+  for (const int index : ViewsNeeded(scene, poses, options)) {
+    needed.insert(scene.views[static_cast<size_t>(index)]);
+  }
+  std::vector<View>& views = set.frames.front().views;
+  ParallelFor(0, static_cast<int>(views.size()), options.threads, [&](int i) {
+    View& view = views[static_cast<size_t>(i)];
+    if (needed.contains(&view)) io::LoadPixels(folder, view, {});
+  });
+  for (const View* view : needed) RequireLoaded(*view);
+}
+
 int RunRender(const Options& options, const Context& context) {
   const DtrSet described = io::ReadSet(options.set);
   const auto cameras = NovelFrames(described, options.request);
@@ -110,10 +130,10 @@ int RunRender(const Options& options, const Context& context) {
   // Before anything is loaded: a machine without OpenGL should say so at once.
   const eval::RenderFunction render_view = MakeRenderer(options.renderer);
   context.console.Stage("loading views", 0);
-  io::LoadOptions load;
-  load.threads = render.threads;
-  const DtrSet set = io::LoadSet(options.set, load);
-  const RenderScene scene = MakeRenderScene(set, excluded);
+  DtrSet set = described;
+  io::CollapseDuplicates(set);
+  const RenderScene scene = DescribeRenderScene(set, excluded);
+  LoadNeeded(options.set, scene, cameras, render, set);
 
   FrameSink sink(options.output, several);
   nlohmann::ordered_json json{{"frames", nlohmann::ordered_json::array()}};

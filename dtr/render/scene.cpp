@@ -23,6 +23,14 @@ void RequireSize(const View& view, const char* what, int width_px, int height_px
               (width_px == 0 ? "none" : SizeText(width_px, height_px)));
 }
 
+bool SameContent(const View& a, const View& b) {
+  return a.camera == b.camera && a.cam_from_world.translation == b.cam_from_world.translation &&
+         a.cam_from_world.rotation.coeffs() == b.cam_from_world.rotation.coeffs() &&
+         a.gain == b.gain && a.depth == b.depth && a.image == b.image && a.mask == b.mask;
+}
+
+}  // namespace
+
 void RequireLoaded(const View& view) {
   RequireSize(view, "image", view.image.width(), view.image.height(), view.camera);
   if (view.image.channels() != 3) throw Error(view.name + ": expected an image of 3 channels");
@@ -39,15 +47,7 @@ void RequireLoaded(const View& view) {
   }
 }
 
-bool SameContent(const View& a, const View& b) {
-  return a.camera == b.camera && a.cam_from_world.translation == b.cam_from_world.translation &&
-         a.cam_from_world.rotation.coeffs() == b.cam_from_world.rotation.coeffs() &&
-         a.gain == b.gain && a.depth == b.depth && a.image == b.image && a.mask == b.mask;
-}
-
-}  // namespace
-
-RenderScene MakeRenderScene(const DtrSet& set, std::span<const std::string> excluded_names) {
+RenderScene DescribeRenderScene(const DtrSet& set, std::span<const std::string> excluded_names) {
   if (set.frames.empty()) throw Error("set: expected at least one frame, found none");
   const std::vector<View>& views = set.frames.front().views;
   for (const std::string& name : excluded_names) {
@@ -64,11 +64,16 @@ RenderScene MakeRenderScene(const DtrSet& set, std::span<const std::string> excl
     const auto names_it = [&](const std::string& n) { return n == view.id || n == view.name; };
     if (view.role != ViewRole::kSource) continue;
     if (std::any_of(excluded_names.begin(), excluded_names.end(), names_it)) continue;
-    RequireLoaded(view);
     scene.views.push_back(&view);
   }
   std::stable_sort(scene.views.begin(), scene.views.end(),
                    [](const View* a, const View* b) { return a->id < b->id; });
+  return scene;
+}
+
+RenderScene MakeRenderScene(const DtrSet& set, std::span<const std::string> excluded_names) {
+  RenderScene scene = DescribeRenderScene(set, excluded_names);
+  for (const View* view : scene.views) RequireLoaded(*view);
   std::vector<const View*> distinct;
   for (const View* view : scene.views) {
     if (std::none_of(distinct.begin(), distinct.end(),

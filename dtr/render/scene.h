@@ -12,7 +12,7 @@ namespace dtr {
 
 /// The source views to draw from. The views must outlive the scene.
 struct RenderScene {
-  std::vector<const View*> views;  ///< with image and depth; in byte order of their ids
+  std::vector<const View*> views;  ///< in byte order of their ids; those drawn from are loaded
   Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< DtrSet::scene_center
   Bounds bounds;
 };
@@ -23,6 +23,16 @@ struct RenderScene {
 /// Throws dtr::Error when the set has no frame or a source view is not loaded or has the wrong
 /// size, and dtr::UsageError for an excluded name that no view has.
 RenderScene MakeRenderScene(const DtrSet& set, std::span<const std::string> excluded_names = {});
+
+/// The same scene of views that need no pixels yet: enough to choose views by (ViewsNeeded), whose
+/// pixels are then loaded into `set`. The views must be distinct, as io::CollapseDuplicates leaves
+/// them; without pixels nothing here can tell.
+RenderScene DescribeRenderScene(const DtrSet& set,
+                                std::span<const std::string> excluded_names = {});
+
+/// Throws dtr::Error unless the view has an image and a plane-z depth map in memory, both (and a
+/// mask, if any) of its camera's size, and a finite pose.
+void RequireLoaded(const View& view);
 
 /// SPEC 0.3. The baseline of every figure in pixels of disparity for this view, scene units: its
 /// reference_baseline, or, for a view that has none (a lone camera), a tenth of its median depth.

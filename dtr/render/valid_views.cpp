@@ -1,6 +1,7 @@
 #include "dtr/render/valid_views.h"
 
 #include <algorithm>
+#include <set>
 #include <tuple>
 
 #include "dtr/render/geometry.h"
@@ -48,6 +49,16 @@ ViewSelection SelectViews(const RenderScene& scene, const Pose& novel_from_world
   }
   for (const Candidate& candidate : candidates) selection.views.push_back(candidate.index);
   return selection;
+}
+
+std::vector<int> ViewsNeeded(const RenderScene& scene, std::span<const Pose> novel_from_world,
+                             const RenderOptions& options) {
+  std::set<int> needed;
+  for (const Pose& pose : novel_from_world) {
+    const ViewSelection selection = SelectViews(scene, pose, options);
+    needed.insert(selection.views.begin(), selection.views.end());
+  }
+  return {needed.begin(), needed.end()};
 }
 
 }  // namespace dtr

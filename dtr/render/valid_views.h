@@ -1,5 +1,6 @@
 // dtr/render/valid_views.h -- SPEC 1: which views may show something of a novel view.
 #pragma once
+#include <span>
 #include <vector>
 
 #include "dtr/render/options.h"
@@ -24,5 +25,10 @@ bool NeedsPerPixelRule(const RenderScene& scene, const Pose& novel_from_world);
 /// SPEC 1. Ties go to the smaller id. Empty when no view is valid.
 ViewSelection SelectViews(const RenderScene& scene, const Pose& novel_from_world,
                           const RenderOptions& options);
+
+/// Indices, ascending, of the views that pictures from all these cameras draw from: what must be
+/// loaded. Needs no pixels (DescribeRenderScene).
+std::vector<int> ViewsNeeded(const RenderScene& scene, std::span<const Pose> novel_from_world,
+                             const RenderOptions& options);
 
 }  // namespace dtr

@@ -7,6 +7,7 @@
 #include "dtr/base/random.h"
 #include "dtr/cpu/renderer.h"
 #include "dtr/render/scene.h"
+#include "dtr/render/valid_views.h"
 #include "tests/cpu/render_testing.h"
 
 namespace dtr::cpu {
@@ -200,6 +201,82 @@ TEST(Render, RandomCamerasGiveNoNanAndNoInfinity) {
     ExpectSound(Render(scene, novel.camera, pose, options));
     if (HasFatalFailure()) return;
   }
+}
+
+/// A scene whose views have no pixels, and the views that `novel` needs.
+std::vector<int> Unload(const Pose& novel_from_world, const RenderOptions& options, DtrSet& set) {
+  for (View& view : set.frames[0].views) {
+    view.image = {};
+    view.depth = {};
+  }
+  return ViewsNeeded(DescribeRenderScene(set), std::span(&novel_from_world, 1), options);
+}
+
+TEST(PartlyLoadedScene, DrawsTheSamePictureAsTheWholeOne) {
+  const DtrSet whole = testing::SquareBeforePlane();
+  const View novel = whole.frames[0].views[1];
+  RenderOptions options;
+  options.views = 2;
+  options.fill_holes = true;
+  DtrSet part = whole;
+  const std::vector<int> needed = Unload(novel.cam_from_world, options, part);
+  EXPECT_EQ(needed.size(), 2u);
+  const RenderScene scene = DescribeRenderScene(part);
+  for (const int index : needed) {
+    const auto slot =
+        static_cast<size_t>(scene.views[static_cast<size_t>(index)] - part.frames[0].views.data());
+    part.frames[0].views[slot] = whole.frames[0].views[slot];
+  }
+  const RenderResult expected =
+      cpu::Render(MakeRenderScene(whole), novel.camera, novel.cam_from_world, options);
+  const RenderResult found = cpu::Render(scene, novel.camera, novel.cam_from_world, options);
+  testing::ExpectSameBytes(found, expected);
+  EXPECT_EQ(found.views_used, expected.views_used);
+}
+
+TEST(PartlyLoadedScene, ViewWithoutPixelsIsNeverDrawnAsEmpty) {
+  DtrSet set = testing::SquareBeforePlane();
+  const View novel = set.frames[0].views[1];
+  Unload(novel.cam_from_world, {}, set);
+  EXPECT_THROW(cpu::Render(DescribeRenderScene(set), novel.camera, novel.cam_from_world, {}),
+               Error);
+  EXPECT_THROW(MakeRenderScene(set), Error);
+}
+
+TEST(FillHolesFromViews, GroundBetweenSparseSamplesStaysGround) {
+  // A floor 1 below the cameras; of every view's depth one sample in 50 is left.
+  const testing::Surface floor = testing::Plane({0, 1, 0}, 1);
+  DtrSet set;
+  set.frames.resize(1);
+  Random random(5);
+  for (int i = 0; i < 4; ++i) {
+    set.frames[0].views.push_back(testing::Photograph(
+        floor, testing::ShotFrom("v" + std::to_string(i), {0.3 * i, 0, 0}, {0.5, 1, 3})));
+  }
+  FinishGeometry(set);
+  const View novel = set.frames[0].views[1];
+  for (View& view : set.frames[0].views) {
+    for (float& depth : view.depth.grid().data()) {
+      if (random.Index(50) != 0) depth = 0;
+    }
+  }
+  RenderOptions options;
+  options.fill_holes = true;
+  const std::vector<std::string> excluded = {novel.id};
+  const RenderResult result =
+      cpu::Render(MakeRenderScene(set, excluded), novel.camera, novel.cam_from_world, options);
+  EXPECT_LT(result.coverage_share, 0.2);
+  double sum = 0;
+  int count = 0;
+  for (int y = 0; y < novel.camera.height_px(); ++y) {
+    for (int x = 0; x < novel.camera.width_px(); ++x) {
+      if (DepthImage::IsHole(novel.depth(x, y))) continue;
+      sum += testing::PixelDifference(result.image, novel.image, x, y);
+      ++count;
+    }
+  }
+  constexpr double kMeanLevels = 5;  // 4.3 here; the farthest guess alone gives 6.3
+  EXPECT_LT(sum / count, kMeanLevels);
 }
 
 }  // namespace
