@@ -45,7 +45,7 @@ void AddBuildCommand(CLI::App& app) {
             ->type_name("every:N|NAME,...");
         command.add_flag("--holdout-strict", options->holdout_strict,
                          "Keep them out of SfM too and register them afterwards");
-        command.add_option("--engine", options->engine, "Depth engine [sgbm]")
+        command.add_option("--engine", options->engine, "Depth engine [patchmatch]")
             ->check(CLI::IsMember({"sgbm", "patchmatch", "none"}))
             ->type_name("sgbm|patchmatch|none");
         command

@@ -11,14 +11,14 @@ namespace dtr::cli {
 void AddStereoCommand(CLI::App& app) {
   AddCommand(
       app, "stereo", "Compute depth maps for a calibrated set",
-      "dtr stereo scene.dtr --engine sgbm -o with_depth.dtr", [](CLI::App& command) -> Action {
+      "dtr stereo scene.dtr --engine patchmatch -o with_depth.dtr", [](CLI::App& command) -> Action {
         auto options = std::make_shared<pipeline::RecomputeOptions>();
         command.add_option("SET", options->set, "The set")->required();
         command
             .add_option("-o,--output", options->output,
                         "The set to write; without it SET itself is replaced, whole or not at all")
             ->type_name("SET2");
-        command.add_option("--engine", options->engine, "Depth engine [sgbm]")
+        command.add_option("--engine", options->engine, "Depth engine [patchmatch]")
             ->check(CLI::IsMember({"sgbm", "patchmatch"}))
             ->type_name("sgbm|patchmatch");
         command.add_flag("--force", options->force, "Replace SET2 when it exists");

@@ -16,7 +16,7 @@ struct BuildOptions {
   std::filesystem::path output;  ///< NAME.dtr
   std::string holdout;           ///< "", "every:N" or names
   bool holdout_strict = false;
-  std::string engine = "sgbm";  ///< "sgbm", "patchmatch" or "none"
+  std::string engine = "patchmatch";  ///< "sgbm", "patchmatch" or "none"
   std::string preset = "balanced";
   int max_size_px = -1;  ///< long side; 0 = full size, -1 = what the preset says
   double memory_gb = 4;

@@ -11,7 +11,7 @@ namespace dtr::pipeline {
 struct RecomputeOptions {
   std::filesystem::path set;
   std::filesystem::path output;  ///< empty: `set` itself is replaced
-  std::string engine = "sgbm";
+  std::string engine = "patchmatch";
   bool force = false;
   int threads = 0;
   std::uint64_t seed = 0;
