@@ -29,8 +29,8 @@ struct BuildOptions {
 /// What was built.
 struct BuildReport {
   DtrSet set;                                                ///< without pixels
-  std::vector<std::string> not_registered;           ///< photos that found no camera
-  std::vector<std::string> held_out_not_registered;  ///< of them, those that were held out
+  std::vector<std::string> not_registered;                   ///< photos that found no camera
+  std::vector<std::string> held_out_not_registered;          ///< of them, those that were held out
   std::vector<std::pair<std::string, std::string>> skipped;  ///< file, reason
   bool validated = false, validation_passed = false;
   std::string json;  ///< for --json

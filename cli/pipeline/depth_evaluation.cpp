@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "calib/similarity.h"
+#include "cli/pipeline/cast_truth.h"
 #include "dtr/base/error.h"
 #include "dtr/eval/visibility.h"
 #include "dtr/io/formats/cameras_json.h"
@@ -82,14 +83,24 @@ Mask ScoredPixels(const fs::path& folder, const std::string& stem, int width_px,
   return scored;
 }
 
+// Truth as it lies on disk, which must be on the view's grid.
+ViewTruth StoredTruth(const fs::path& folder, const io::NamedCamera& named, const View& view) {
+  eval::RequireSameGrid(named.camera, view.camera, view.name);
+  const int width_px = view.camera.width_px(), height_px = view.camera.height_px();
+  return {ToPlaneZ(io::ReadForeignDepth(folder / "depth" / named.depth_file, named.depth_kind, 1,
+                                        width_px, height_px),
+                   view.camera),
+          ScoredPixels(folder, fs::path(view.name).stem().string(), width_px, height_px)};
+}
+
 }  // namespace
 
 eval::DepthScores EvaluateDepth(const DtrSet& set, const fs::path& truth, int threads,
                                 Progress& progress) {
-  static_cast<void>(threads);
   const io::CameraList list = io::ReadCamerasJson(truth / "cameras.json");
   const std::vector<Pair> pairs = PairByName(set, list, truth);
   const double scale = ScaleFromTruth(set, list, pairs, progress);
+  const auto cast = CastTruth::FromFolder(truth, list);
   eval::DepthScorer scorer;
   progress.Stage("scoring depth", static_cast<int>(pairs.size()));
   int done = 0;
@@ -97,15 +108,12 @@ eval::DepthScores EvaluateDepth(const DtrSet& set, const fs::path& truth, int th
     progress.ThrowIfInterrupted();
     const View& view = *pair.view;
     if (view.role != ViewRole::kSource || view.depth.empty()) continue;
-    eval::RequireSameGrid(pair.truth->camera, view.camera, view.name);
-    const DepthImage true_depth = ToPlaneZ(
-        io::ReadForeignDepth(truth / "depth" / pair.truth->depth_file, pair.truth->depth_kind, 1,
-                             view.camera.width_px(), view.camera.height_px()),
-        view.camera);
-    const Mask scored = ScoredPixels(truth, fs::path(view.name).stem().string(),
-                                     view.camera.width_px(), view.camera.height_px());
-    scorer.Add(view.depth, eval::SubsampleTruth(true_depth, view.depth_scale),
-               eval::SubsampleMask(scored, view.depth_scale), scale,
+    const ViewTruth found =
+        cast && !eval::IsSameGrid(pair.truth->camera, view.camera)
+            ? cast->On(view, static_cast<size_t>(pair.truth - list.cameras.data()), threads)
+            : StoredTruth(truth, *pair.truth, view);
+    scorer.Add(view.depth, eval::SubsampleTruth(found.depth, view.depth_scale),
+               eval::SubsampleMask(found.scored, view.depth_scale), scale,
                view.DepthCamera().fx_px() * view.reference_baseline);
     progress.Update(++done);
   }

@@ -124,14 +124,16 @@ Mask SubsampleMask(const Mask& mask, int s) {
   return small;
 }
 
+bool IsSameGrid(const PinholeCamera& truth, const PinholeCamera& view) {
+  const auto near = [](double a, double b) { return std::abs(a - b) <= kSameIntrinsicsPx; };
+  return truth.width_px() == view.width_px() && truth.height_px() == view.height_px() &&
+         near(truth.fx_px(), view.fx_px()) && near(truth.fy_px(), view.fy_px()) &&
+         near(truth.cx_px(), view.cx_px()) && near(truth.cy_px(), view.cy_px());
+}
+
 void RequireSameGrid(const PinholeCamera& truth, const PinholeCamera& view,
                      const std::string& name) {
-  const auto near = [](double a, double b) { return std::abs(a - b) <= kSameIntrinsicsPx; };
-  if (truth.width_px() == view.width_px() && truth.height_px() == view.height_px() &&
-      near(truth.fx_px(), view.fx_px()) && near(truth.fy_px(), view.fy_px()) &&
-      near(truth.cx_px(), view.cx_px()) && near(truth.cy_px(), view.cy_px())) {
-    return;
-  }
+  if (IsSameGrid(truth, view)) return;
   throw Error(fmt::format(
       "{}: expected truth on the set's grid ({}x{}, fx {:.6f}, cx {:.6f}, cy {:.6f}), found {}x{}, "
       "fx {:.6f}, cx {:.6f}, cy {:.6f}; cast the truth again on the set's cameras",

@@ -55,6 +55,9 @@ class DepthScorer {
 DepthImage SubsampleTruth(const DepthImage& truth, int s);
 Mask SubsampleMask(const Mask& mask, int s);
 
+/// True when both cameras have one size and intrinsics equal to 1e-6 px.
+bool IsSameGrid(const PinholeCamera& truth, const PinholeCamera& view);
+
 /// Throws Error unless both cameras have one size and intrinsics equal to 1e-6 px: depth maps of
 /// different grids are not compared.
 void RequireSameGrid(const PinholeCamera& truth, const PinholeCamera& view,

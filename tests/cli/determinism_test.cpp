@@ -29,7 +29,7 @@ class Building : public ::testing::Test {
     return {"build",     (courtyard / "images").string(),
             "-o",        set.string(),
             "--poses",   (courtyard / "sparse").string(),
-            "--holdout", "every:4",
+            "--holdout", "every:2",
             "--threads", threads};
   }
   TemporaryFolder folder_;

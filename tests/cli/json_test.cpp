@@ -33,8 +33,9 @@ TEST(JsonInterface, NamesAreThoseOfTheDesign) {
   const TemporaryFolder folder;
   MakeSmallCourtyard(folder / "c");
   const std::string set = (folder / "set.dtr").string();
-  const Json build = OnStdout({"build", (folder / "c/images").string(), "-o", set, "--poses",
-                               (folder / "c/sparse").string(), "--holdout", "every:4"});
+  const Json build =
+      OnStdout({"build", (folder / "c/images").string(), "-o", set, "--poses",
+                (folder / "c/sparse").string(), "--holdout", "every:4", "--max-size", "96"});
   ExpectNames(build, {"set", "views", "not_registered", "skipped", "validation_passed", "stages",
                       "peak_memory_mib"});
   ExpectNames(build["views"].at(0), {"name", "role", "width_px", "height_px"});

@@ -62,7 +62,7 @@ class TwoCaptures : public ::testing::Test {
 };
 
 TEST_F(TwoCaptures, WithFrozenPosesAHeldOutPhotoChangesNoByteOutsideHeldOut) {
-  Build({"--poses", (folder_ / "a" / "sparse").string(), "--engine", "sgbm", "--threads", "2"});
+  Build({"--poses", (folder_ / "a" / "sparse").string(), "--engine", "sgbm", "--max-size", "96"});
   EXPECT_THAT(Differences(),
               ::testing::ElementsAre("held_out/files.json",
                                      "held_out/images/" + std::string(kChanged) + ".png"));

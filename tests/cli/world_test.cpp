@@ -80,6 +80,25 @@ TEST_F(Worlds, AWorldOfAnotherSizeLooksTheSame) {
   ExpectSamePictures(plain, Import("large", 1e3, {0, 0, 0}));
 }
 
+TEST_F(Worlds, ExactTruthIsCastAnewForASetOfAnotherGrid) {
+  // Stored depth of half the size, judged by a truth of the whole size: equal but for its coding.
+  constexpr double kMedianOfCoding = 1e-4;  // half a step of 65534 in 1/z over a range of 20 : 1
+  const fs::path large = folder_ / "large", small = folder_ / "small", set = folder_ / "small.dtr";
+  MakeSmallCourtyard(large, 10, kUtmOffset);
+  DtrOk({"dataset", "make", "courtyard", "-o", small.string(), "--layout", "arc", "--views",
+         std::to_string(kCourtyardViews), "--width", std::to_string(kCourtyardWidthPx / 2),
+         "--height", std::to_string(kCourtyardHeightPx / 2), "--scale", "10", "--world-offset",
+         "500000", "4500000", "100"});
+  DtrOk({"import", "--cameras", (small / "cameras.json").string(), "--images",
+         (small / "images").string(), "--depth", (small / "depth").string(), "-o", set.string()});
+  const Ran ran = DtrOk({"evaluate", set.string(), "--depth", large.string(), "--json", "-"});
+  const auto depth = nlohmann::json::parse(ran.out)["depth"];
+  EXPECT_EQ(depth["share_within_1pct"], 1) << depth;
+  EXPECT_EQ(depth["depth_completeness"], 1) << depth;
+  EXPECT_LT(depth["median_relative_error"].get<double>(), kMedianOfCoding) << depth;
+  EXPECT_GT(depth["truth_pixels"], kCourtyardViews * kCourtyardWidthPx * kCourtyardHeightPx / 8);
+}
+
 // Import of a COLMAP model, export, and a build with the exported model.
 class CameraTrip : public Worlds {
  protected:
