@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <filesystem>
 
 #include "cli/output_file.h"
+#include "dtr/base/error.h"
 #include "dtr/base/files.h"
 
 namespace dtr::cli {
@@ -37,6 +39,10 @@ void AddCommand(CLI::App& app, const std::string& name, const std::string& descr
   command->callback([common, action] {
     if (!common->json_target.empty() && common->json_target != "-") {
       RequireFolderOf(common->json_target, "--json");
+      if (std::filesystem::is_directory(common->json_target)) {
+        throw UsageError("--json " + common->json_target +
+                         ": expected a file name, found a folder");
+      }
     }
     Console console(common->json_target == "-");
     const int code = action(Context{*common, console});

@@ -4,6 +4,7 @@
 
 #include <charconv>
 #include <cmath>
+#include <set>
 
 #include "cli/view_names.h"
 #include "dtr/base/error.h"
@@ -55,6 +56,14 @@ std::vector<NovelFrame> FromFile(const DtrSet& set, const std::filesystem::path&
         {std::filesystem::path(named.name).stem().string(), named.camera, cam_from_world});
   }
   if (cameras.empty()) throw Error(file.string() + ": expected at least one camera, found none");
+  // Two cameras of one stem (left/0.jpg, right/0.jpg) must not overwrite each other's pictures.
+  std::set<std::string> stems;
+  for (const NovelFrame& frame : cameras) stems.insert(frame.name);
+  if (stems.size() < cameras.size()) {
+    for (size_t i = 0; i < cameras.size(); ++i) {
+      cameras[i].name = fmt::format("{:06}_{}", i, cameras[i].name);
+    }
+  }
   return cameras;
 }
 
@@ -67,7 +76,11 @@ std::vector<NovelFrame> NovelFrames(const DtrSet& set, const NovelCameraRequest&
     cameras.push_back({view.id, view.camera, view.cam_from_world});
   } else if (!request.camera_file.empty()) {
     cameras = FromFile(set, request.camera_file);
-    cameras.resize(1, cameras.front());
+    if (cameras.size() > 1) {
+      throw UsageError(
+          fmt::format("--camera {}: expected one camera, found {}; give --path for several",
+                      request.camera_file.string(), cameras.size()));
+    }
   } else if (!request.path_file.empty()) {
     cameras = FromFile(set, request.path_file);
   } else if (request.fly_through_frames > 0) {

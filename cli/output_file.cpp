@@ -19,11 +19,16 @@ void RequireFolderOf(const fs::path& file, const std::string& option) {
       fs::exists(folder, ignored) ? "a file" : "nothing", folder.string()));
 }
 
-void RequireOutputFile(const fs::path& file, const std::string& option,
-                       const std::vector<std::string>& extensions) {
+std::string LowerExtension(const fs::path& file) {
   std::string extension = file.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
+  return extension;
+}
+
+void RequireOutputFile(const fs::path& file, const std::string& option,
+                       const std::vector<std::string>& extensions) {
+  const std::string extension = LowerExtension(file);
   if (std::find(extensions.begin(), extensions.end(), extension) == extensions.end()) {
     throw UsageError(fmt::format("{} {}: expected a name ending in {}, found '{}'", option,
                                  file.string(), fmt::join(extensions, " or "), extension));

@@ -130,8 +130,9 @@ Pose WrittenPose(const Pose& cam_from_scene, double scale, const Eigen::Vector3d
           scale * cam_from_scene.translation - cam_from_scene.rotation * world_offset};
 }
 
-void MakeDataset(const DatasetSpec& given, const fs::path& out_folder, int threads,
+void MakeDataset(const DatasetSpec& given, const fs::path& given_folder, int threads,
                  Progress& progress) {
+  const fs::path out_folder = WithoutTrailingSlash(given_folder);
   DatasetSpec spec = given;
   Check(spec);
   if (fs::exists(out_folder)) {

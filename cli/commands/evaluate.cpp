@@ -52,14 +52,15 @@ void SayScore(const eval::ViewScore& score, Console& console) {
 }
 
 void SayReport(const eval::EvaluationReport& report, Console& console) {
-  if (report.views.empty()) return;
-  console.Say(fmt::format("{:<28} {:>9} {:>13} {:>7} {:>10}",
-                          report.leave_one_out ? "left out" : "held out", "PSNR dB", "on seen dB",
-                          "SSIM", "seen"));
-  for (const eval::ViewScore& score : report.views) SayScore(score, console);
-  eval::ViewScore mean = report.mean;
-  mean.name = "mean";
-  SayScore(mean, console);
+  if (!report.views.empty()) {
+    console.Say(fmt::format("{:<28} {:>9} {:>13} {:>7} {:>10}",
+                            report.leave_one_out ? "left out" : "held out", "PSNR dB", "on seen dB",
+                            "SSIM", "seen"));
+    for (const eval::ViewScore& score : report.views) SayScore(score, console);
+    eval::ViewScore mean = report.mean;
+    mean.name = "mean";
+    SayScore(mean, console);
+  }
   for (const std::string& name : report.not_registered) {
     console.Say("not registered, so not in the means: " + name);
   }
@@ -103,7 +104,9 @@ int RunEvaluate(const Options& options, const Context& context) {
                   [](const View& view) { return view.role == ViewRole::kHeldOut; });
   eval::EvaluationReport report;
   // With truth alone there is still something to measure.
-  if (options.leave_one_out || has_held_out || !depth) {
+  if (!options.leave_one_out && !has_held_out && !evaluate.not_registered.empty()) {
+    report.not_registered = evaluate.not_registered;  // every held-out photo is lost: counted
+  } else if (options.leave_one_out || has_held_out || !depth) {
     report = eval::EvaluateHeldOut(set, evaluate, MakeRenderer(options.renderer), context.console);
   }
   SayReport(report, context.console);

@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <map>
@@ -8,6 +9,7 @@
 #include "cli/command.h"
 #include "cli/output_file.h"
 #include "dtr/base/error.h"
+#include "dtr/base/files.h"
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
 
@@ -42,7 +44,8 @@ void ExportImages(const fs::path& folder, const DtrSet& set, const fs::path& tar
   }
 }
 
-int RunExport(const Options& options, const Context& context) {
+int RunExport(Options options, const Context& context) {
+  options.output = WithoutTrailingSlash(options.output);
   if (fs::exists(options.output)) {
     throw UsageError(
         fmt::format("{}: exists already; choose another folder", options.output.string()));
@@ -57,12 +60,18 @@ int RunExport(const Options& options, const Context& context) {
   const SparseScene sparse = set.sparse_file ? io::LoadSparse(options.set, set) : SparseScene{};
   const calib::SfmModel model = colmap::ModelFromViews(set, sparse);
 
-  const fs::path partial = options.output.string() + ".partial";
-  fs::remove_all(partial);
-  ExportImages(options.set, set, partial / "images");
-  colmap::WriteModel(partial / "sparse", model,
-                     options.text ? colmap::Format::kText : colmap::Format::kBinary);
-  fs::rename(partial, options.output);
+  // A name no other program uses: NAME.partial may be somebody's interrupted work.
+  const fs::path partial = fmt::format("{}.export{}", options.output.string(), getpid());
+  try {
+    ExportImages(options.set, set, partial / "images");
+    colmap::WriteModel(partial / "sparse", model,
+                       options.text ? colmap::Format::kText : colmap::Format::kBinary);
+    fs::rename(partial, options.output);
+  } catch (...) {
+    std::error_code ignored;
+    fs::remove_all(partial, ignored);
+    throw;
+  }
   context.console.Say(fmt::format("{}: {} images, {} points", options.output.string(),
                                   model.images.size(), model.points.size()));
   context.EmitJson(

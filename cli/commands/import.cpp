@@ -22,6 +22,9 @@ struct Options {
 int RunImport(Options options, const Context& context) {
   const auto cameras =
       pipeline::ReadCameraFile(options.cameras, options.format, options.import.images_dir);
+  if (!options.import.mask_dir.empty() && !std::filesystem::is_directory(options.import.mask_dir)) {
+    throw UsageError(fmt::format("--masks {}: no such folder", options.import.mask_dir.string()));
+  }
   if (options.depth_kind == "z") options.import.depth_kind = DepthKind::kPlaneZ;
   if (options.depth_kind == "ray") options.import.depth_kind = DepthKind::kRayDistance;
   options.import.held_out = pipeline::NamesHeldOut(options.held_out, cameras.list);

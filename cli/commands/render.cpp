@@ -51,7 +51,7 @@ class FrameSink {
     }
     const fs::path file = several_ ? output_ / (camera.name + ".png") : output_;
     // What no view saw is black with alpha 0, unless it was filled.
-    if (filled || file.extension() != ".png") {
+    if (filled || LowerExtension(file) != ".png") {
       io::WriteImage(file, result.image);
     } else {
       io::WriteImageWithAlpha(file, result.image, result.coverage);
@@ -123,7 +123,7 @@ int RunRender(const Options& options, const Context& context) {
   const DtrSet described = io::ReadSet(options.set);
   const auto cameras = NovelFrames(described, options.request);
   const auto excluded = ResolveViewNames(described, options.exclude);
-  const bool several = cameras.size() > 1;
+  const bool several = !options.request.path_file.empty() || options.request.fly_through_frames > 0;
   RequireOutputs(options, several);
   RenderOptions render = *options.render;
   render.threads = context.common.threads;

@@ -11,7 +11,8 @@ namespace dtr::cli {
 void AddStereoCommand(CLI::App& app) {
   AddCommand(
       app, "stereo", "Compute depth maps for a calibrated set",
-      "dtr stereo scene.dtr --engine patchmatch -o with_depth.dtr", [](CLI::App& command) -> Action {
+      "dtr stereo scene.dtr --engine patchmatch -o with_depth.dtr",
+      [](CLI::App& command) -> Action {
         auto options = std::make_shared<pipeline::RecomputeOptions>();
         command.add_option("SET", options->set, "The set")->required();
         command
@@ -29,9 +30,10 @@ void AddStereoCommand(CLI::App& app) {
           context.console.Say(fmt::format("{}: {} depth maps, {:.1f} % of the pixels have depth",
                                           report.written.string(), report.depth_maps,
                                           100 * report.depth_completeness));
-          context.EmitJson(
-              fmt::format("{{\"set\": \"{}\", \"depth_maps\": {}, \"depth_completeness\": {}}}",
-                          report.written.string(), report.depth_maps, report.depth_completeness));
+          const nlohmann::ordered_json json = {{"set", report.written.string()},
+                                               {"depth_maps", report.depth_maps},
+                                               {"depth_completeness", report.depth_completeness}};
+          context.EmitJson(json.dump(1));
           return kDone;
         };
       });

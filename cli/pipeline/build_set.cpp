@@ -12,15 +12,14 @@
 #include "cli/pipeline/depth_stage.h"
 #include "cli/pipeline/holdout.h"
 #include "cli/pipeline/run_log.h"
+#include "cli/pipeline/set_page.h"
 #include "cli/pipeline/validate_set.h"
 #include "dtr/base/error.h"
-#include "dtr/base/files.h"
 #include "dtr/base/hash.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/eval/json.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/geometry.h"
-#include "dtr/report/set_report.h"
 #include "stereo/engine.h"
 
 namespace dtr::pipeline {
@@ -173,25 +172,6 @@ calib::ValidationReport Validate(DtrSet& set, const SparseScene& sparse, BuildRe
   return validation;
 }
 
-// The page people look at: sources only, as pixels of held-out photos stay in held_out/, and
-// without times, so that equal builds stay equal.
-std::string PageOf(const DtrSet& set, const BuildOptions& options, const BuildReport& report,
-                   const calib::ValidationReport& validation) {
-  DtrSet sources = set;
-  std::erase_if(sources.frames.front().views,
-                [](const View& view) { return view.role == ViewRole::kHeldOut; });
-  report::SetReportInfo info;
-  info.title = "D+TR set " + options.output.stem().string();
-  info.facts = {{"views", std::to_string(sources.frames.front().views.size())},
-                {"held out", std::to_string(set.frames.front().views.size() -
-                                            sources.frames.front().views.size())},
-                {"depth engine", options.engine},
-                {"not registered", std::to_string(report.not_registered.size())}};
-  info.checks = validation.tests;
-  for (const auto& [name, reason] : report.skipped) info.skipped.push_back({name, reason});
-  return report::SetReport(sources, info);
-}
-
 Json ReportJson(const BuildReport& report, const RunLog& log, const std::filesystem::path& output) {
   Json json;
   json["set"] = output.string();
@@ -230,6 +210,11 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
   const int max_size_px =
       options.max_size_px >= 0 ? options.max_size_px : MaxSizeOfPreset(options.preset);
   const auto engine = options.engine == "none" ? nullptr : stereo::MakeEngine(options.engine);
+  if (options.holdout_strict && (options.holdout.empty() || !options.poses.empty())) {
+    throw UsageError(
+        "--holdout-strict: keeps the photos of --holdout out of SfM; it needs --holdout and "
+        "no --poses");
+  }
   BuildReport report;
   RunLog log;
 
@@ -286,9 +271,9 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
   set.provenance_json =
       ProvenanceJson(options, option_values, PhotosJson(photos, is_source), calibrated, report)
           .dump();
-  std::filesystem::create_directories(writer.folder() / "report");
-  WriteFileAtomically(writer.folder() / "report" / "index.html",
-                      PageOf(set, options, report, validation));
+  WriteSetPage(writer, set,
+               {options.output.stem().string(), options.engine, validation.tests, report.skipped,
+                report.not_registered.size()});
   log.End();
   io::WriteRunRecord(writer.folder(), log.Record(ResolveThreads(options.threads)));
   writer.Finish(set);

@@ -3,8 +3,12 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/pipeline/depth_stage.h"
+#include "cli/pipeline/run_log.h"
+#include "cli/pipeline/set_page.h"
+#include "cli/pipeline/validate_set.h"
 #include "dtr/base/error.h"
 #include "dtr/base/hash.h"
+#include "dtr/base/parallel_for.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/geometry.h"
 #include "stereo/engine.h"
@@ -59,6 +63,8 @@ double Completeness(const std::vector<View>& views, int& maps) {
 RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& progress) {
   const auto engine = stereo::MakeEngine(options.engine);
   const bool in_place = options.output.empty();
+  RunLog log;
+  log.Begin("depth");
   RecomputeReport report;
   report.written = in_place ? options.set : options.output;
   DtrSet set = LoadForDepth(options.set, options.threads);
@@ -77,8 +83,15 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& progre
   writer.WriteSparse(set, sparse);
   nlohmann::ordered_json provenance = nlohmann::ordered_json::parse(set.provenance_json);
   provenance["depth_engine"] = options.engine;
+  provenance["options"]["engine"] = options.engine;
+  provenance["options"]["seed"] = options.seed;
   set.provenance_json = provenance.dump();
   report.depth_completeness = Completeness(views, report.depth_maps);
+  const auto validation = ValidateSet(set, sparse, {}, options.threads);
+  WriteSetPage(writer, set,
+               {report.written.stem().string(), options.engine, validation.tests, {}, 0});
+  log.End();
+  io::WriteRunRecord(writer.folder(), log.Record(ResolveThreads(options.threads)));
   writer.Finish(set);
   return report;
 }

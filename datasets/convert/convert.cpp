@@ -5,6 +5,7 @@
 
 #include "datasets/convert/converters.h"
 #include "dtr/base/error.h"
+#include "dtr/base/files.h"
 #include "dtr/io/depth_io.h"
 #include "dtr/io/image_io.h"
 
@@ -106,7 +107,8 @@ std::vector<std::string> ConvertibleKinds() {
   return names;
 }
 
-void ConvertDataset(const std::string& kind, const fs::path& source, const fs::path& out) {
+void ConvertDataset(const std::string& kind, const fs::path& source, const fs::path& given_out) {
+  const fs::path out = WithoutTrailingSlash(given_out);
   const auto found = std::find_if(kKinds.begin(), kKinds.end(),
                                   [&](const Kind& candidate) { return kind == candidate.name; });
   if (found == kKinds.end()) {

@@ -28,6 +28,10 @@ std::string ReadFile(const fs::path& file, std::uintmax_t limit_bytes) {
   return content;
 }
 
+fs::path WithoutTrailingSlash(const fs::path& path) {
+  return path.has_filename() || !path.has_relative_path() ? path : path.parent_path();
+}
+
 namespace {
 
 // Writes and syncs; returns errno of the first failure, or 0.
