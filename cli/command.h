@@ -43,6 +43,7 @@ void AddStereoCommand(CLI::App& app);
 void AddInfoCommand(CLI::App& app);
 void AddRenderCommand(CLI::App& app);
 void AddEvaluateCommand(CLI::App& app);
+void AddBenchCommand(CLI::App& app);
 void AddImportCommand(CLI::App& app);
 void AddExportCommand(CLI::App& app);
 void AddDatasetCommand(CLI::App& app);

@@ -21,6 +21,7 @@ int Run(int argc, char** argv) {
   dtr::cli::AddInfoCommand(app);
   dtr::cli::AddRenderCommand(app);
   dtr::cli::AddEvaluateCommand(app);
+  dtr::cli::AddBenchCommand(app);
   dtr::cli::AddImportCommand(app);
   dtr::cli::AddExportCommand(app);
   dtr::cli::AddDatasetCommand(app);

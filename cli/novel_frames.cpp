@@ -27,23 +27,6 @@ int ParseSide(const std::string& size, const std::string& digits) {
   return side;
 }
 
-PinholeCamera WithSize(const PinholeCamera& camera, const std::string& size) {
-  if (size.empty()) return camera;
-  const size_t x = size.find('x');
-  if (x == std::string::npos) {
-    throw UsageError(fmt::format("--size {}: expected WxH, such as 1280x720", size));
-  }
-  int width = ParseSide(size, size.substr(0, x));
-  int height = ParseSide(size, size.substr(x + 1));
-  if (width == 0 && height == 0) {
-    throw UsageError(fmt::format("--size {}: expected at least one side above 0", size));
-  }
-  const double aspect = static_cast<double>(camera.width_px()) / camera.height_px();
-  if (width == 0) width = std::max(1, static_cast<int>(std::lround(height * aspect)));
-  if (height == 0) height = std::max(1, static_cast<int>(std::lround(width / aspect)));
-  return camera.Resized(width, height);
-}
-
 // A file's poses act on p_world - its origin, the set's on p_world - the set's.
 std::vector<NovelFrame> FromFile(const DtrSet& set, const std::filesystem::path& file) {
   const io::CameraList list = io::ReadCamerasJson(file);
@@ -68,6 +51,23 @@ std::vector<NovelFrame> FromFile(const DtrSet& set, const std::filesystem::path&
 }
 
 }  // namespace
+
+PinholeCamera WithSize(const PinholeCamera& camera, const std::string& size) {
+  if (size.empty()) return camera;
+  const size_t x = size.find('x');
+  if (x == std::string::npos) {
+    throw UsageError(fmt::format("--size {}: expected WxH, such as 1280x720", size));
+  }
+  int width = ParseSide(size, size.substr(0, x));
+  int height = ParseSide(size, size.substr(x + 1));
+  if (width == 0 && height == 0) {
+    throw UsageError(fmt::format("--size {}: expected at least one side above 0", size));
+  }
+  const double aspect = static_cast<double>(camera.width_px()) / camera.height_px();
+  if (width == 0) width = std::max(1, static_cast<int>(std::lround(height * aspect)));
+  if (height == 0) height = std::max(1, static_cast<int>(std::lround(width / aspect)));
+  return camera.Resized(width, height);
+}
 
 std::vector<NovelFrame> NovelFrames(const DtrSet& set, const NovelCameraRequest& request) {
   std::vector<NovelFrame> cameras;

@@ -29,4 +29,7 @@ struct NovelCameraRequest {
 /// The cameras of a request. Throws UsageError for a malformed one, Error for a broken file.
 std::vector<NovelFrame> NovelFrames(const DtrSet& set, const NovelCameraRequest& request);
 
+/// The camera at a size given as "WxH" (empty: its own). Throws UsageError for a malformed one.
+PinholeCamera WithSize(const PinholeCamera& camera, const std::string& size);
+
 }  // namespace dtr::cli

@@ -36,8 +36,15 @@ void AddChoice(CLI::App& command, const std::string& flag, T& target,
 std::shared_ptr<RenderOptions> AddRenderOptions(CLI::App& command) {
   auto shared = std::make_shared<RenderOptions>();
   RenderOptions& options = *shared;
-  AddChoice(command, "--method", options.method, kMethods, "Algorithm [two-pass]");
-  AddChoice(command, "--primitive", options.primitive, kPrimitives, "What is drawn [mesh]");
+  AddChoice(command, "--method", options.method, kMethods,
+            "Algorithm [deferred; with --primitive splat two-pass]");
+  AddChoice(command, "--primitive", options.primitive, kPrimitives,
+            "What two-pass draws; deferred knows meshes only [mesh]");
+  command.parse_complete_callback([&command, &options] {
+    if (options.primitive == Primitive::kSplat && command.count("--method") == 0) {
+      options.method = RenderMethod::kTwoPass;
+    }
+  });
   AddChoice(command, "--blend", options.blend, kBlends,
             "Weight of a view by angle [inverse-angle]");
   command.add_option("--views", options.views, "Blend at most the K nearest valid views [8]")
@@ -74,6 +81,12 @@ std::shared_ptr<RenderOptions> AddRenderOptions(CLI::App& command) {
       .add_option("--depth-break", options.depth_break_px,
                   "Triangles across larger depth steps are dropped, in pixels of disparity")
       ->check(CLI::PositiveNumber)
+      ->type_name("PX");
+  command
+      .add_option("--mesh-tolerance", options.mesh_tolerance_px,
+                  "deferred: how far the reduced mesh may lie off the depth, in pixels of "
+                  "disparity [0.5]")
+      ->check(CLI::NonNegativeNumber)
       ->type_name("PX");
   command
       .add_option("--absolute-delta", options.absolute_delta,

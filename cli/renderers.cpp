@@ -1,5 +1,8 @@
 #include "cli/renderers.h"
 
+#include <fmt/format.h>
+
+#include "dtr/base/error.h"
 #include "dtr/cpu/renderer.h"
 
 namespace dtr::cli {
@@ -14,26 +17,64 @@ std::vector<std::string> Names() {
 #endif
 }
 
+void CheckShaderFolder(const RendererChoice& choice) {
+  const std::filesystem::path& folder = choice.shader_folder;
+  if (folder.empty()) return;
+  if (choice.name != "gl") {
+    throw UsageError(fmt::format("--shader-dir {}: expected --renderer gl with it, found {}",
+                                 folder.string(), choice.name));
+  }
+  if (!std::filesystem::is_directory(folder)) {
+    throw UsageError(
+        fmt::format("--shader-dir {}: expected a folder of shaders such as dtr/gl/shaders, found "
+                    "none",
+                    folder.string()));
+  }
+}
+
 }  // namespace
 
 std::string DefaultRenderer() { return Names().front(); }
 
-void AddRendererOption(CLI::App& command, std::string& name) {
-  name = DefaultRenderer();
+void AddRendererOptions(CLI::App& command, RendererChoice& choice) {
+  choice.name = DefaultRenderer();
   std::string type;
   for (const std::string& known : Names()) type += (type.empty() ? "" : "|") + known;
   command
-      .add_option("--renderer", name,
-                  "OpenGL, or the slow double-precision reference [" + name + "]")
+      .add_option("--renderer", choice.name,
+                  "OpenGL, or the slow double-precision reference [" + choice.name + "]")
       ->check(CLI::IsMember(Names()))
       ->type_name(type);
+#ifdef DTR_WITH_GL
+  command
+      .add_option("--shader-dir", choice.shader_folder,
+                  "Shaders of this folder instead of the program's own, for work on them")
+      ->type_name("DIR");
+  command
+      .add_option("--gpu-memory", choice.gpu_memory_gb,
+                  "Memory for the views on the GPU; others are dropped and put there again [4]")
+      ->check(CLI::PositiveNumber)
+      ->check(CLI::Range(0.0, kMostGigabytes))
+      ->type_name("GB");
+#endif
 }
 
-eval::RenderFunction MakeRenderer(const std::string& name) {
+eval::RenderFunction MakeRenderer(const RendererChoice& choice,
+                                  [[maybe_unused]] Progress& console) {
+  CheckShaderFolder(choice);
 #ifdef DTR_WITH_GL
-  if (name == "gl") return MakeGlRenderer();
+  if (choice.name == "gl") return MakeGlRenderer(choice, console);
 #endif
   return &cpu::Render;
+}
+
+std::unique_ptr<eval::TimedRenderer> MakeTimedRenderer(const RendererChoice& choice,
+                                                       [[maybe_unused]] Progress& console) {
+  CheckShaderFolder(choice);
+#ifdef DTR_WITH_GL
+  if (choice.name == "gl") return MakeTimedGlRenderer(choice, console);
+#endif
+  return eval::TimeOnCpu("dtr/cpu, the reference renderer", &cpu::Render);
 }
 
 }  // namespace dtr::cli

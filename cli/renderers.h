@@ -1,24 +1,46 @@
 // cli/renderers.h -- the renderers by name, as --renderer knows them.
 #pragma once
 #include <CLI/CLI.hpp>
+#include <filesystem>
+#include <memory>
 #include <string>
 
+#include "dtr/base/progress.h"
 #include "dtr/eval/held_out.h"
+#include "dtr/eval/timed_renderer.h"
 
 namespace dtr::cli {
 
-/// Adds --renderer to a command; `name` gets its value.
-void AddRendererOption(CLI::App& command, std::string& name);
+/// Memory on the command line: its unit, and a bound that no machine reaches and no size overflows
+/// at.
+inline constexpr double kBytesPerGigabyte = 1 << 30, kMostGigabytes = 1e6;
+
+/// What --renderer, --shader-dir and --gpu-memory say.
+struct RendererChoice {
+  std::string name;                     ///< "gl" or "cpu"
+  std::filesystem::path shader_folder;  ///< empty: the shaders inside the program
+  double gpu_memory_gb = 4;             ///< for the views on the GPU, "gl" only
+};
+
+/// Adds --renderer and, in programs built with OpenGL, --shader-dir and --gpu-memory to a command.
+void AddRendererOptions(CLI::App& command, RendererChoice& choice);
 
 /// The default: "gl" in programs built with OpenGL, else "cpu".
 std::string DefaultRenderer();
 
-/// The renderer of that name, ready to draw: a context is opened here for "gl", on the thread that
-/// must draw with it too. Throws dtr::Error, one line that names --renderer cpu, where the machine
-/// has no OpenGL 4.3: nothing falls back silently.
-eval::RenderFunction MakeRenderer(const std::string& name);
+/// The renderer of that choice, ready to draw: a context is opened here for "gl", on the thread
+/// that must draw with it too. Throws dtr::Error, one line that names --renderer cpu, where the
+/// machine has no OpenGL 4.3: nothing falls back silently. Throws UsageError for a shader folder
+/// that is not there or goes with another renderer. `console` must outlive the renderer: it is told
+/// when memory holds fewer views than a picture asks for.
+eval::RenderFunction MakeRenderer(const RendererChoice& choice, Progress& console);
+/// The same, for its frames to be timed.
+std::unique_ptr<eval::TimedRenderer> MakeTimedRenderer(const RendererChoice& choice,
+                                                       Progress& console);
 
 /// "gl"; only in programs built with OpenGL.
-eval::RenderFunction MakeGlRenderer();
+eval::RenderFunction MakeGlRenderer(const RendererChoice& choice, Progress& console);
+std::unique_ptr<eval::TimedRenderer> MakeTimedGlRenderer(const RendererChoice& choice,
+                                                         Progress& console);
 
 }  // namespace dtr::cli

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "dtr/base/parallel_for.h"
+#include "stereo/rounds.h"
 
 namespace dtr::stereo {
 namespace {
@@ -33,10 +34,12 @@ class Run {
                const std::function<void(int, DepthEstimate&&, const DepthRange&)>& on_view) {
     const std::vector<int> wanted = Wanted(already_done);
     const std::vector<int> needed = Needed(wanted);
+    if (engine_.Rounds() > 0) RunRounds(Together(), needed, Planes(), progress_);
     progress_.Stage("depth", static_cast<int>(needed.size()));
     // A view's pairs fill so many threads; with more, several views run side by side.
     const int threads = ResolveThreads(options_.engine.threads);
-    const int side_by_side = std::max(1, threads / std::max(1, options_.neighbours.count));
+    const int side_by_side =
+        engine_.Rounds() > 0 ? 1 : std::max(1, threads / std::max(1, options_.neighbours.count));
     size_t done = 0, next_wanted = 0;
     while (done < needed.size()) {
       progress_.ThrowIfInterrupted();
@@ -92,12 +95,22 @@ class Run {
     });
   }
 
-  DepthEstimate EstimateOne(int view, const EngineOptions& engine_options) const {
+  Collection Together() const { return {views_, neighbours_, ranges_, &engine_, options_.engine}; }
+  PlaneMapStore& Planes() { return options_.planes != nullptr ? *options_.planes : in_memory_; }
+
+  DepthEstimate EstimateOne(int view, const EngineOptions& engine_options) {
     const PinholeCamera& camera = views_[static_cast<size_t>(view)].camera;
     const auto holes = [&] {
       return DepthEstimate{DepthImage(camera.width_px(), camera.height_px()),
                            Grid<float>(camera.width_px(), camera.height_px())};
     };
+    if (engine_.Rounds() > 0) {
+      // Stores belong to one thread; batches of engines with rounds are of one view.
+      const PlanesAround around(Together(), Planes(), engine_.Rounds(), view);
+      if (!around.HasOwn()) return holes();
+      return engine_.Judge(views_, view, NeighboursOf(view), ranges_[static_cast<size_t>(view)],
+                           around.maps(), engine_options);
+    }
     if (NeighboursOf(view).empty()) {
       progress_.Note("view " + std::to_string(view) + ": no neighbours, no depth");
       return holes();
@@ -142,6 +155,7 @@ class Run {
   Progress& progress_;
   std::vector<ViewNeighbours> neighbours_;
   std::vector<DepthRange> ranges_;
+  PlaneMapsInMemory in_memory_;
   std::vector<std::optional<DepthEstimate>> raw_;  ///< unfiltered maps still waited for
   std::vector<int> waiting_;                       ///< how many results still need each of them
 };

@@ -11,6 +11,7 @@
 #include "dtr/types/depth_image.h"
 #include "dtr/types/grid.h"
 #include "dtr/types/pose.h"
+#include "stereo/plane_map.h"
 
 namespace dtr::stereo {
 
@@ -45,7 +46,8 @@ class NoUsablePair : public Error {
   using Error::Error;
 };
 
-/// Computes the depth of one reference view from its neighbours.
+/// Computes the depth of one reference view from its neighbours; engines with rounds also that of
+/// a collection, each view held to what the others found (RunRounds).
 /// Deterministic: same input, options and seed give the same bytes for any number of threads.
 class Engine {
  public:
@@ -57,6 +59,28 @@ class Engine {
   virtual DepthEstimate Estimate(std::span<const StereoView> views, int reference,
                                  std::span<const int> neighbours, const DepthRange& range,
                                  const EngineOptions& options) const = 0;
+
+  /// How many neighbours of a view it makes use of.
+  virtual int Neighbours() const { return 5; }
+
+  /// Rounds in which views take account of each other's planes; 0: Estimate is all there is.
+  virtual int Rounds() const { return 0; }
+  /// The planes behind Estimate, nothing rejected. Engines with rounds only.
+  virtual PlaneMap Match(std::span<const StereoView> views, int reference,
+                         std::span<const int> neighbours, const DepthRange& range,
+                         const EngineOptions& options) const;
+  /// One round: the planes of `reference` anew, starting from `maps[reference]` and held to the
+  /// planes of its neighbours. `maps` has one entry per view, null where there is none; `round`
+  /// counts from 1.
+  virtual PlaneMap Refine(std::span<const StereoView> views, int reference,
+                          std::span<const int> neighbours, const DepthRange& range,
+                          std::span<const PlaneMap* const> maps, int round,
+                          const EngineOptions& options) const;
+  /// What of the planes after the last round is believed, and how much.
+  virtual DepthEstimate Judge(std::span<const StereoView> views, int reference,
+                              std::span<const int> neighbours, const DepthRange& range,
+                              std::span<const PlaneMap* const> maps,
+                              const EngineOptions& options) const;
 };
 
 /// Engine by its name on the command line ("sgbm"). Throws UsageError for unknown names.

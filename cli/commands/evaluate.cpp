@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 struct Options {
   fs::path set, pictures, truth;
   bool leave_one_out = false;
-  std::string renderer;
+  RendererChoice renderer;
   std::shared_ptr<RenderOptions> render;
 };
 
@@ -75,11 +75,19 @@ void SayDepth(const eval::DepthScores& depth, Console& console) {
       percent(depth.depth_completeness), percent(depth.share_within_1pct),
       percent(depth.share_within_2pct), percent(depth.share_within_1px),
       percent(depth.outlier_share)));
+  console.Say(fmt::format(
+      "depth edges: displaced by {} px, grown by {} px, {} found; errors within 1, 2, 3 sigma: {}, "
+      "{}, {}; sparsification {} times the oracle's",
+      Figure(depth.edges.displacement_px, "{:.2f}"), Figure(depth.edges.fattening_px, "{:.2f}"),
+      percent(depth.edges.found_share), percent(depth.sigma.share_within_1_sigma),
+      percent(depth.sigma.share_within_2_sigma), percent(depth.sigma.share_within_3_sigma),
+      Figure(depth.sigma.sparsification_ratio, "{:.2f}")));
 }
 
 int RunEvaluate(const Options& options, const Context& context) {
   io::LoadOptions load;
   load.held_out = true;
+  load.sigma = !options.truth.empty();
   load.threads = context.common.threads;
   const DtrSet set = io::LoadSet(options.set, load);
 
@@ -107,7 +115,8 @@ int RunEvaluate(const Options& options, const Context& context) {
   if (!options.leave_one_out && !has_held_out && !evaluate.not_registered.empty()) {
     report.not_registered = evaluate.not_registered;  // every held-out photo is lost: counted
   } else if (options.leave_one_out || has_held_out || !depth) {
-    report = eval::EvaluateHeldOut(set, evaluate, MakeRenderer(options.renderer), context.console);
+    report = eval::EvaluateHeldOut(set, evaluate, MakeRenderer(options.renderer, context.console),
+                                   context.console);
   }
   SayReport(report, context.console);
   if (depth) SayDepth(*depth, context.console);
@@ -131,7 +140,7 @@ void AddEvaluateCommand(CLI::App& app) {
             .add_option("--pictures", options->pictures,
                         "Write rendering | photo | difference for every view")
             ->type_name("DIR");
-        AddRendererOption(command, options->renderer);
+        AddRendererOptions(command, options->renderer);
         options->render = AddRenderOptions(command);
         return [options](const Context& context) { return RunEvaluate(*options, context); };
       });

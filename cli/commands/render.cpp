@@ -4,7 +4,6 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <set>
 
 #include "cli/command.h"
 #include "cli/novel_frames.h"
@@ -14,12 +13,11 @@
 #include "cli/video.h"
 #include "cli/view_names.h"
 #include "dtr/base/error.h"
-#include "dtr/base/parallel_for.h"
 #include "dtr/io/depth_io.h"
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/scene.h"
-#include "dtr/render/valid_views.h"
+#include "dtr/render/view_stream.h"
 
 namespace dtr::cli {
 namespace {
@@ -30,7 +28,9 @@ constexpr int kFramesPerSecond = 24;
 struct Options {
   fs::path set, output, depth_out, coverage_out;
   NovelCameraRequest request;
-  std::string exclude, renderer;
+  std::string exclude;
+  RendererChoice renderer;
+  double memory_gb = 4;
   std::shared_ptr<RenderOptions> render;
 };
 
@@ -102,21 +102,14 @@ nlohmann::ordered_json FrameJson(const std::string& file, double ms, const Rende
   return {{"file", file}, {"ms", ms}, {"views_used", used}, {"coverage", result.coverage_share}};
 }
 
-// Loads the pixels of the views that the frames draw from, and of no others.
-void LoadNeeded(const fs::path& folder, const RenderScene& scene,
-                const std::vector<NovelFrame>& cameras, const RenderOptions& options, DtrSet& set) {
-  std::vector<Pose> poses;
-  for (const NovelFrame& camera : cameras) poses.push_back(camera.cam_from_world);
-  std::set<const View*> needed;
-  for (const int index : ViewsNeeded(scene, poses, options)) {
-    needed.insert(scene.views[static_cast<size_t>(index)]);
-  }
-  std::vector<View>& views = set.frames.front().views;
-  ParallelFor(0, static_cast<int>(views.size()), options.threads, [&](int i) {
-    View& view = views[static_cast<size_t>(i)];
-    if (needed.contains(&view)) io::LoadPixels(folder, view, {});
-  });
-  for (const View* view : needed) RequireLoaded(*view);
+ViewStream MakeStream(const Options& options, const RenderScene& described, DtrSet& set,
+                      Console& console) {
+  ViewStream::Settings settings;
+  settings.host_bytes = static_cast<size_t>(options.memory_gb * kBytesPerGigabyte);
+  settings.threads = options.render->threads;
+  settings.warn = [&console](const std::string& line) { console.Note(line); };
+  return {set, described, [folder = options.set](View& view) { io::LoadPixels(folder, view, {}); },
+          std::move(settings)};
 }
 
 int RunRender(const Options& options, const Context& context) {
@@ -128,18 +121,19 @@ int RunRender(const Options& options, const Context& context) {
   RenderOptions render = *options.render;
   render.threads = context.common.threads;
   // Before anything is loaded: a machine without OpenGL should say so at once.
-  const eval::RenderFunction render_view = MakeRenderer(options.renderer);
-  context.console.Stage("loading views", 0);
+  const eval::RenderFunction render_view = MakeRenderer(options.renderer, context.console);
   DtrSet set = described;
   io::CollapseDuplicates(set);
-  const RenderScene scene = DescribeRenderScene(set, excluded);
-  LoadNeeded(options.set, scene, cameras, render, set);
+  ViewStream stream = MakeStream(options, DescribeRenderScene(set, excluded), set, context.console);
 
   FrameSink sink(options.output, several);
   nlohmann::ordered_json json{{"frames", nlohmann::ordered_json::array()}};
   context.console.Stage("rendering", static_cast<int>(cameras.size()));
   for (size_t i = 0; i < cameras.size(); ++i) {
     context.console.ThrowIfInterrupted();
+    const RenderScene scene =
+        stream.SceneFor(cameras[i].cam_from_world, render, ViewStream::Wait::kForAll);
+    if (i + 1 < cameras.size()) stream.Prefetch(cameras[i + 1].cam_from_world, render);
     const auto start = std::chrono::steady_clock::now();
     const RenderResult result =
         render_view(scene, cameras[i].camera, cameras[i].cam_from_world, render);
@@ -158,6 +152,10 @@ int RunRender(const Options& options, const Context& context) {
   sink.Finish(context.console);
   context.console.Say(
       fmt::format("{}: {} frame{}", options.output.string(), cameras.size(), several ? "s" : ""));
+  json["skipped"] = nlohmann::ordered_json::array();
+  for (const auto& [name, reason] : stream.lost()) {
+    json["skipped"].push_back({{"name", name}, {"reason", reason}});
+  }
   context.EmitJson(json.dump(1));
   return kDone;
 }
@@ -191,7 +189,13 @@ void AddRenderCommand(CLI::App& app) {
             ->type_name("WxH");
         command.add_option("--exclude", options->exclude, "Views not to render from")
             ->type_name("NAME,...");
-        AddRendererOption(command, options->renderer);
+        AddRendererOptions(command, options->renderer);
+        command
+            .add_option("--memory", options->memory_gb,
+                        "Memory for the views' pixels; others are dropped and read again [4]")
+            ->check(CLI::PositiveNumber)
+            ->check(CLI::Range(0.0, kMostGigabytes))
+            ->type_name("GB");
         command.add_option("--depth-out", options->depth_out, "Write the depth as float EXR")
             ->type_name("FILE");
         command.add_option("--coverage-out", options->coverage_out, "Write what was seen as PNG")

@@ -11,6 +11,7 @@
 #include "cli/pipeline/calibrated_photos.h"
 #include "cli/pipeline/depth_stage.h"
 #include "cli/pipeline/holdout.h"
+#include "cli/pipeline/mesh_stage.h"
 #include "cli/pipeline/run_log.h"
 #include "cli/pipeline/set_page.h"
 #include "cli/pipeline/validate_set.h"
@@ -265,6 +266,7 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
 
   log.Begin("finishing");
   FinishGeometry(set, SourcePoints(sparse, views));
+  MeshStage(set, writer, options.threads);
   const calib::ValidationReport validation =
       Validate(set, sparse, report, options.threads, progress);
   writer.WriteSparse(set, sparse);

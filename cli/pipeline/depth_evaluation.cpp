@@ -114,7 +114,8 @@ eval::DepthScores EvaluateDepth(const DtrSet& set, const fs::path& truth, int th
             : StoredTruth(truth, *pair.truth, view);
     scorer.Add(view.depth, eval::SubsampleTruth(found.depth, view.depth_scale),
                eval::SubsampleMask(found.scored, view.depth_scale), scale,
-               view.DepthCamera().fx_px() * view.reference_baseline);
+               view.DepthCamera().fx_px() * view.reference_baseline,
+               view.inverse_depth_sigma ? &*view.inverse_depth_sigma : nullptr);
     progress.Update(++done);
   }
   return scorer.Scores();

@@ -1,5 +1,6 @@
 #include "cli/pipeline/depth_stage.h"
 
+#include "cli/pipeline/plane_files.h"
 #include "stereo/depth_maps.h"
 
 namespace dtr::pipeline {
@@ -42,10 +43,13 @@ void DepthStage(std::vector<View>& views, const SparseScene& sparse, const stere
   }
 
   stereo::DepthMapsOptions depth_options;
+  depth_options.neighbours.count = engine->Neighbours();
   depth_options.engine.threads = options.threads;
   depth_options.engine.seed = options.seed;
   // The other half holds the photos, and maps that wait for their neighbours to be done.
   depth_options.engine.memory_gb = options.memory_gb / 2;
+  PlaneFiles planes(writer.work_folder() / "planes");
+  depth_options.planes = &planes;
   const auto view_of = [&](int source) -> View& {
     return views[static_cast<size_t>(sources[static_cast<size_t>(source)])];
   };

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/pipeline/depth_stage.h"
+#include "cli/pipeline/mesh_stage.h"
 #include "cli/pipeline/run_log.h"
 #include "cli/pipeline/set_page.h"
 #include "cli/pipeline/validate_set.h"
@@ -32,6 +33,7 @@ DtrSet LoadForDepth(const std::filesystem::path& folder, int threads) {
     io::LoadPixels(folder, view, load);
     view.depth_file.reset();
     view.sigma_file.reset();
+    view.mesh_file.reset();
     view.near_z = view.far_z = 0;
     view.depth_scale = 1;
   }
@@ -80,6 +82,7 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& progre
   DepthStage(views, sparse, engine.get(), {options.threads, options.seed, 4}, set.unit, writer,
              progress);
   FinishGeometry(set);
+  MeshStage(set, writer, options.threads);
   writer.WriteSparse(set, sparse);
   nlohmann::ordered_json provenance = nlohmann::ordered_json::parse(set.provenance_json);
   provenance["depth_engine"] = options.engine;

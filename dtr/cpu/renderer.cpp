@@ -1,10 +1,11 @@
 #include "dtr/cpu/renderer.h"
 
 #include <algorithm>
+#include <limits>
 
-#include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/cpu/layer.h"
+#include "dtr/cpu/own_depth.h"
 #include "dtr/cpu/resolve.h"
 #include "dtr/render/fill_holes.h"
 #include "dtr/render/frame.h"
@@ -28,14 +29,47 @@ int RowsPerBand(const PinholeCamera& novel, size_t views) {
   return static_cast<int>(std::min<size_t>(rows, static_cast<size_t>(novel.height_px())));
 }
 
-}  // namespace
-
-RenderResult Render(const RenderScene& scene, const PinholeCamera& novel,
-                    const Pose& novel_from_world, const RenderOptions& options) {
-  CheckRenderOptions(options);
-  if (options.method != RenderMethod::kTwoPass) {
-    throw UsageError("--method: expected two-pass with --renderer cpu, found deferred");
+/// Moves a start depth nearer by pixels of disparity, the smallest that any of the views has.
+void MoveStart(const std::vector<ViewInNovel>& views, const RenderOptions& options, double shift_px,
+               std::vector<double>& start) {
+  double pixel = std::numeric_limits<double>::infinity();
+  for (const ViewInNovel& view : views) {
+    pixel = std::min(pixel, ThresholdsOf(*view.view, options).pixel);
   }
+  for (double& w : start) {
+    if (w > 0) w = std::max(w + shift_px * pixel, 0.0);
+  }
+}
+
+/// One layer per view: SPEC 2 and 3, or SPEC 5.
+std::vector<Layer> DrawLayers(const std::vector<ViewInNovel>& views, const PinholeCamera& novel,
+                              const RenderOptions& options, const Band& band,
+                              double start_shift_px) {
+  const bool deferred = options.method == RenderMethod::kDeferred;
+  RenderOptions drawn = options;
+  if (deferred) drawn.primitive = Primitive::kMesh;  // SPEC 5.1
+  const int count = static_cast<int>(views.size());
+  std::vector<Layer> layers(views.size(), Layer(Band{}));
+  const auto fill = [&](const auto& make_layer) {
+    ParallelFor(0, count, options.threads, [&](int i) {
+      const auto k = static_cast<size_t>(i);
+      layers[k] = make_layer(views[k]);
+    });
+  };
+  fill([&](const ViewInNovel& view) { return DrawView(view, novel, drawn, band); });
+  if (!deferred) return layers;
+  std::vector<double> start = NearestSurface(layers);
+  if (start_shift_px != 0) MoveStart(views, options, start_shift_px, start);
+  KeepSurfacesThatViewsHold(views, novel, options, band, start);
+  fill(
+      [&](const ViewInNovel& view) { return FindOwnFragments(view, novel, options, band, start); });
+  return layers;
+}
+
+RenderResult Draw(const RenderScene& scene, const PinholeCamera& novel,
+                  const Pose& novel_from_world, const RenderOptions& options,
+                  double start_shift_px) {
+  CheckRenderOptions(options);
   CheckNovelCamera(novel, novel_from_world);
   RenderResult result = EmptyResult(novel);
   const ViewSelection selection = SelectViews(scene, novel_from_world, options);
@@ -64,15 +98,10 @@ RenderResult Render(const RenderScene& scene, const PinholeCamera& novel,
   settings.linear_light = options.blend_in_linear_light;
 
   const int rows_per_band = RowsPerBand(novel, views.size());
-  const int count = static_cast<int>(views.size());
   for (int first_row = 0; first_row < novel.height_px(); first_row += rows_per_band) {
     const Band band{novel.width_px(), first_row,
                     std::min(rows_per_band, novel.height_px() - first_row)};
-    std::vector<Layer> layers(views.size(), Layer(Band{}));
-    ParallelFor(0, count, options.threads, [&](int i) {
-      const auto k = static_cast<size_t>(i);
-      layers[k] = DrawView(placed[k], novel, options, band);
-    });
+    const std::vector<Layer> layers = DrawLayers(placed, novel, options, band, start_shift_px);
     for (size_t i = 0; i < views.size(); ++i) views[i].layer = &layers[i];
     ParallelFor(band.first_row, band.first_row + band.rows, options.threads,
                 [&](int y) { ResolveRow(settings, views, y, result); });
@@ -80,6 +109,19 @@ RenderResult Render(const RenderScene& scene, const PinholeCamera& novel,
   result.coverage_share = CoverageShare(result.coverage);
   if (options.fill_holes) FillHolesFromViews(scene, novel, novel_from_world, options, result);
   return result;
+}
+
+}  // namespace
+
+RenderResult Render(const RenderScene& scene, const PinholeCamera& novel,
+                    const Pose& novel_from_world, const RenderOptions& options) {
+  return Draw(scene, novel, novel_from_world, options, 0);
+}
+
+RenderResult RenderFromMovedStart(const RenderScene& scene, const PinholeCamera& novel,
+                                  const Pose& novel_from_world, const RenderOptions& options,
+                                  double start_shift_px) {
+  return Draw(scene, novel, novel_from_world, options, start_shift_px);
 }
 
 }  // namespace dtr::cpu

@@ -9,7 +9,8 @@
 namespace dtr::cpu {
 
 /// Renders the scene as seen by `novel` at `novel_from_world` (the world of the scene's views),
-/// in double precision, by the two-pass method of Verlani et al. 2006 as RENDER_SPEC states it.
+/// in double precision, by the two-pass method of Verlani et al. 2006 or by the deferred one, as
+/// RENDER_SPEC states them.
 /// The result does not depend on the order of the views or on the number of threads. Where no view
 /// is valid the picture is empty: black, no depth, no coverage.
 /// With options.fill_holes, FillHolesFromViews is applied to the finished picture.
@@ -17,5 +18,12 @@ namespace dtr::cpu {
 /// dtr::Error for a pose that is not finite.
 RenderResult Render(const RenderScene& scene, const PinholeCamera& novel,
                     const Pose& novel_from_world, const RenderOptions& options);
+
+/// The same by the deferred method with the start of SPEC 5.1 moved nearer by so many pixels of
+/// disparity (of the view whose pixel is smallest). Other renderers may start that far off: where
+/// this changes the picture two of them may rightly differ, and comparisons judge apart.
+RenderResult RenderFromMovedStart(const RenderScene& scene, const PinholeCamera& novel,
+                                  const Pose& novel_from_world, const RenderOptions& options,
+                                  double start_shift_px);
 
 }  // namespace dtr::cpu

@@ -84,7 +84,7 @@ class RowResolver {
     const auto pixel = source.camera.PixelFromCam(point_in_view);
     if (!pixel || !pixel->allFinite()) return false;
     fragment.source_pixel = *pixel;
-    return source.mask.empty() || ColourAt(source, fragment.source_pixel).has_value();
+    return source.mask.empty() || ColourAt(source, fragment.source_pixel, false).has_value();
   }
 
   /// SPEC 4.2, pass 1: where Delta pushes a fragment; only the compared depth moves.
@@ -136,18 +136,14 @@ class RowResolver {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     for (size_t i = 0; i < fragments_.size(); ++i) {
       const Fragment& f = fragments_[i];
-      const auto linear = ColourAt(*f.view->in_novel->view, f.source_pixel);
-      assert(linear.has_value());  // Collect left out the others
-      sum += shares_[i] * (settings_.linear_light ? *linear : Srgb(*linear));
+      const auto colour = ColourAt(*f.view->in_novel->view, f.source_pixel, settings_.linear_light);
+      assert(colour.has_value());  // Collect left out the others
+      sum += shares_[i] * *colour;
     }
     for (int channel = 0; channel < 3; ++channel) {
       result.image(x, y, channel) =
           settings_.linear_light ? Srgb8FromLinear(sum[channel]) : Srgb8FromSrgb(sum[channel]);
     }
-  }
-
-  static Eigen::Vector3d Srgb(const Eigen::Vector3d& linear) {
-    return {SrgbFromLinear(linear[0]), SrgbFromLinear(linear[1]), SrgbFromLinear(linear[2])};
   }
 
   const ResolveSettings& settings_;

@@ -36,7 +36,8 @@ void RequireScale(int s, int width, int height) {
 }  // namespace
 
 void DepthScorer::Add(const DepthImage& estimate, const DepthImage& truth, const Mask& scored,
-                      double set_units_per_truth_unit, double px_per_inverse_depth) {
+                      double set_units_per_truth_unit, double px_per_inverse_depth,
+                      const Grid<float>* inverse_depth_sigma) {
   if (estimate.width() != truth.width() || estimate.height() != truth.height()) {
     throw Error(
         fmt::format("depth truth: expected truth on the grid of the estimate ({}x{}), found "
@@ -46,6 +47,12 @@ void DepthScorer::Add(const DepthImage& estimate, const DepthImage& truth, const
   if (!scored.empty() && (scored.width() != truth.width() || scored.height() != truth.height())) {
     throw Error(fmt::format("depth truth: expected a mask of {}x{}, found {}x{}", truth.width(),
                             truth.height(), scored.width(), scored.height()));
+  }
+  if (inverse_depth_sigma != nullptr && (inverse_depth_sigma->width() != truth.width() ||
+                                         inverse_depth_sigma->height() != truth.height())) {
+    throw Error(fmt::format("depth truth: expected sigmas of {}x{}, found {}x{}", truth.width(),
+                            truth.height(), inverse_depth_sigma->width(),
+                            inverse_depth_sigma->height()));
   }
   if (estimate.kind() != DepthKind::kPlaneZ || truth.kind() != DepthKind::kPlaneZ) {
     throw Error("depth truth: expected plane z, found ray distances; convert with ToPlaneZ");
@@ -72,8 +79,13 @@ void DepthScorer::Add(const DepthImage& estimate, const DepthImage& truth, const
         within_half_px_ += px <= 0.5;
         within_1px_ += px <= 1;
         within_2px_ += px <= 2;
+        const float sigma = inverse_depth_sigma != nullptr ? (*inverse_depth_sigma)(x, y) : 0.0f;
+        if (sigma > 0) sigma_.Add(px, px_per_inverse_depth * static_cast<double>(sigma));
       }
     }
+  }
+  if (px_per_inverse_depth > 0) {
+    edges_.Add(estimate, truth, scored, set_units_per_truth_unit, px_per_inverse_depth);
   }
 }
 
@@ -95,6 +107,8 @@ DepthScores DepthScorer::Scores() const {
   scores.outlier_share = Share(above(kOutlier), kept);
   scores.outlier_share_5pct = Share(above(kGrossOutlier), kept);
   scores.share_estimated_without_truth = Share(estimated_without_truth_, without_truth_);
+  scores.sigma = sigma_.Scores();
+  scores.edges = edges_.Scores();
   if (kept > 0) {
     std::vector<float> errors = relative_errors_;
     const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);

@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "dtr/eval/edge_scores.h"
+#include "dtr/eval/sigma_scores.h"
 #include "dtr/types/camera.h"
 #include "dtr/types/depth_image.h"
 #include "dtr/types/grid.h"
@@ -25,6 +27,8 @@ struct DepthScores {
   std::optional<double> outlier_share_5pct;     ///< kept pixels with an error above 5 %
   /// Pixels of the image that have no true surface (sky) but an estimated depth.
   std::optional<double> share_estimated_without_truth;
+  SigmaScores sigma;  ///< of kept pixels that state a standard deviation, errors in px of disparity
+  EdgeScores edges;   ///< places of depth edges
 };
 
 /// Gathers the errors of any number of maps; figures over several pool their pixels.
@@ -35,10 +39,13 @@ class DepthScorer {
   /// `set_units_per_truth_unit`: what true depths are multiplied with, 1 for generator truth, else
   /// the scale of the similarity that aligns the truth's cameras with the set's.
   /// `px_per_inverse_depth`: fx of the depth grid's camera times the view's reference baseline, for
-  /// the shares in pixels (0: those stay empty).
+  /// the shares in pixels, the edges and the order of sigmas (0: those stay empty).
+  /// `inverse_depth_sigma`: stated standard deviations of 1/z in set units, grid of `estimate`, 0
+  /// where none is stated; null: the map states none.
   /// Throws Error when sizes or kinds differ or a factor is not positive and finite.
   void Add(const DepthImage& estimate, const DepthImage& truth, const Mask& scored,
-           double set_units_per_truth_unit, double px_per_inverse_depth);
+           double set_units_per_truth_unit, double px_per_inverse_depth,
+           const Grid<float>* inverse_depth_sigma = nullptr);
 
   DepthScores Scores() const;
 
@@ -47,6 +54,8 @@ class DepthScorer {
   long long truth_pixels_ = 0, pixels_with_disparity_ = 0;
   long long within_half_px_ = 0, within_1px_ = 0, within_2px_ = 0;
   long long without_truth_ = 0, estimated_without_truth_ = 0;
+  SigmaScorer sigma_;
+  EdgeScorer edges_;
 };
 
 /// Truth on the grid of a depth map that is 1/s of the image per axis: the depth map's centre

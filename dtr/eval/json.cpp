@@ -34,6 +34,13 @@ Json Value(const DepthScores& s) {
           {"outlier_share_5pct", Number(s.outlier_share_5pct)},
           {"depth_completeness", Number(s.depth_completeness)},
           {"share_estimated_without_truth", Number(s.share_estimated_without_truth)},
+          {"edge_displacement_px", Number(s.edges.displacement_px)},
+          {"edge_fattening_px", Number(s.edges.fattening_px)},
+          {"edges_found_share", Number(s.edges.found_share)},
+          {"share_within_1_sigma", Number(s.sigma.share_within_1_sigma)},
+          {"share_within_2_sigma", Number(s.sigma.share_within_2_sigma)},
+          {"share_within_3_sigma", Number(s.sigma.share_within_3_sigma)},
+          {"sparsification_ratio", Number(s.sigma.sparsification_ratio)},
           {"truth_pixels", s.truth_pixels},
           {"kept_pixels", s.kept_pixels}};
 }

@@ -18,6 +18,12 @@ namespace {
 // Compute shaders and storage buffers came with 4.3; 4.5 is asked for first.
 constexpr std::array<std::pair<int, int>, 3> kVersions{{{4, 5}, {4, 4}, {4, 3}}};
 
+#ifdef NDEBUG
+constexpr EGLint kContextFlags = 0;
+#else
+constexpr EGLint kContextFlags = EGL_CONTEXT_OPENGL_DEBUG_BIT_KHR;
+#endif
+
 [[noreturn]] void Refuse(const std::string& found) {
   throw Error("OpenGL: expected a context of version 4.3 or newer through EGL, found " + found +
               "; use --renderer cpu");
@@ -88,6 +94,8 @@ EGLContext CreateContext(EGLDisplay display) {
                                  minor,
                                  EGL_CONTEXT_OPENGL_PROFILE_MASK,
                                  EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
+                                 EGL_CONTEXT_FLAGS_KHR,
+                                 kContextFlags,
                                  EGL_NONE};
     const EGLContext context = eglCreateContext(display, config, EGL_NO_CONTEXT, attributes);
     if (context != EGL_NO_CONTEXT) return context;
@@ -95,9 +103,12 @@ EGLContext CreateContext(EGLDisplay display) {
   return EGL_NO_CONTEXT;
 }
 
-void APIENTRY OnMessage(GLenum source, GLenum type, GLuint, GLenum, GLsizei, const GLchar* message,
-                        const void* user) {
-  if (type != GL_DEBUG_TYPE_ERROR && type != GL_DEBUG_TYPE_UNDEFINED_BEHAVIOR) return;
+void APIENTRY OnMessage(GLenum source, GLenum type, GLuint, GLenum severity, GLsizei,
+                        const GLchar* message, const void* user) {
+  if (type != GL_DEBUG_TYPE_ERROR && type != GL_DEBUG_TYPE_UNDEFINED_BEHAVIOR &&
+      severity != GL_DEBUG_SEVERITY_HIGH) {
+    return;
+  }
   // Whoever compiles a shader reads its log and throws.
   if (source == GL_DEBUG_SOURCE_SHADER_COMPILER) return;
   ++*static_cast<int*>(const_cast<void*>(user));
@@ -144,7 +155,9 @@ void EglContext::MakeCurrent() {
   }
 }
 
-std::string EglContext::Description() const {
+std::string EglContext::Description() const { return CurrentContextDescription(); }
+
+std::string CurrentContextDescription() {
   const auto text = [](GLenum name) {
     const GLubyte* value = glGetString(name);
     return std::string(value == nullptr ? "unknown" : reinterpret_cast<const char*>(value));

@@ -26,8 +26,12 @@ class EglContext {
   std::unique_ptr<State> state_;
 };
 
-/// From now on the current context counts its errors and undefined behaviour reported by the
-/// driver (KHR_debug), and prints them to stderr. For tests and development.
+/// The same of whatever context is current.
+std::string CurrentContextDescription();
+
+/// From now on the current context counts the errors, undefined behaviour and messages of high
+/// severity that the driver reports (KHR_debug), and prints them to stderr. For tests and development;
+/// builds without NDEBUG make their contexts as debug contexts, in which drivers say more.
 class DebugOutput {
  public:
   DebugOutput();

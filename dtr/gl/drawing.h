@@ -52,6 +52,8 @@ inline Texture MakeTarget(GLenum target, GLenum format, int width, int height, i
   } else {
     glTexStorage2D(target, 1, format, width, height);
   }
+  ThrowOnError("a picture of " + std::to_string(width) + "x" + std::to_string(height) +
+               " pixels from " + std::to_string(layers) + " views");
   glTexParameteri(target, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
   glTexParameteri(target, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
   return texture;
@@ -60,17 +62,18 @@ inline Texture MakeTarget(GLenum target, GLenum format, int width, int height, i
 /// Everything drawn into, for bands of one size; kept from frame to frame.
 struct Targets {
   int width = 0, rows = 0, layer_count = 0;
-  Texture layers, image, depth, marks;
+  Texture layers;  ///< depth of each view's nearest fragments: near_z / z, 0 where none is
+  Texture image, depth, marks;
   Framebuffer layer_framebuffer, result_framebuffer;
 
   void Fit(int new_width, int new_rows, int new_layers) {
     if (width == new_width && rows == new_rows && layer_count >= new_layers) return;
     *this = Targets{};
-    width = new_width, rows = new_rows, layer_count = new_layers;
-    layers = MakeTarget(GL_TEXTURE_2D_ARRAY, GL_R32F, width, rows, layer_count);
-    image = MakeTarget(GL_TEXTURE_2D_ARRAY, GL_RGBA8, width, rows, 1);
-    depth = MakeTarget(GL_TEXTURE_2D_ARRAY, GL_R32F, width, rows, 1);
-    marks = MakeTarget(GL_TEXTURE_2D_ARRAY, GL_RGBA8UI, width, rows, 1);
+    layers =
+        MakeTarget(GL_TEXTURE_2D_ARRAY, GL_DEPTH_COMPONENT32F, new_width, new_rows, new_layers);
+    image = MakeTarget(GL_TEXTURE_2D_ARRAY, GL_RGBA8, new_width, new_rows, 1);
+    depth = MakeTarget(GL_TEXTURE_2D_ARRAY, GL_R32F, new_width, new_rows, 1);
+    marks = MakeTarget(GL_TEXTURE_2D_ARRAY, GL_RGBA8UI, new_width, new_rows, 1);
     layer_framebuffer = Framebuffer::Make();
     result_framebuffer = Framebuffer::Make();
     glBindFramebuffer(GL_FRAMEBUFFER, result_framebuffer.name());
@@ -86,8 +89,19 @@ struct Targets {
           "OpenGL: this driver cannot draw into RGBA8, R32F and RGBA8UI at once; "
           "use --renderer cpu");
     }
-    ThrowOnError("a picture of " + std::to_string(width) + "x" + std::to_string(rows) +
-                 " pixels from " + std::to_string(layer_count) + " views");
+    ThrowOnError("a picture of " + std::to_string(new_width) + "x" + std::to_string(new_rows) +
+                 " pixels");
+    width = new_width, rows = new_rows, layer_count = new_layers;  // now it holds
+  }
+
+  /// A picture that no view shows anything of.
+  void ClearResults() const {
+    glBindFramebuffer(GL_FRAMEBUFFER, result_framebuffer.name());
+    const GLfloat nothing[4] = {0, 0, 0, 0};
+    const GLuint no_marks[4] = {0, 0, 0, 0};
+    glClearBufferfv(GL_COLOR, 0, nothing);
+    glClearBufferfv(GL_COLOR, 1, nothing);
+    glClearBufferuiv(GL_COLOR, 2, no_marks);
   }
 };
 

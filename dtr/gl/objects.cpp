@@ -9,7 +9,7 @@ constexpr GLenum kPackNames[4] = {GL_PACK_ALIGNMENT, GL_PACK_ROW_LENGTH, GL_PACK
                                   GL_PACK_SKIP_PIXELS};
 constexpr GLenum kUnpackNames[4] = {GL_UNPACK_ALIGNMENT, GL_UNPACK_ROW_LENGTH, GL_UNPACK_SKIP_ROWS,
                                     GL_UNPACK_SKIP_PIXELS};
-constexpr std::array<GLenum, 14> kCapabilities{GL_BLEND,
+constexpr std::array<GLenum, 15> kCapabilities{GL_BLEND,
                                                GL_DEPTH_TEST,
                                                GL_SCISSOR_TEST,
                                                GL_STENCIL_TEST,
@@ -19,6 +19,7 @@ constexpr std::array<GLenum, 14> kCapabilities{GL_BLEND,
                                                GL_PRIMITIVE_RESTART,
                                                GL_FRAMEBUFFER_SRGB,
                                                GL_DEPTH_CLAMP,
+                                               GL_POLYGON_OFFSET_FILL,
                                                GL_DITHER,
                                                GL_SAMPLE_MASK,
                                                GL_SAMPLE_COVERAGE,
@@ -35,36 +36,30 @@ const char* ErrorName(GLenum error) {
   }
 }
 
+GLuint OneName(void (*generate)(GLsizei, GLuint*)) {
+  GLuint name = 0;
+  generate(1, &name);
+  return name;
+}
+
 void SetEnabled(GLenum name, bool on) { on ? glEnable(name) : glDisable(name); }
 
 }  // namespace
 
-GLuint TextureKind::Create() {
-  GLuint name = 0;
-  glGenTextures(1, &name);
-  return name;
-}
-GLuint BufferKind::Create() {
-  GLuint name = 0;
-  glGenBuffers(1, &name);
-  return name;
-}
-GLuint VertexArrayKind::Create() {
-  GLuint name = 0;
-  glGenVertexArrays(1, &name);
-  return name;
-}
-GLuint FramebufferKind::Create() {
-  GLuint name = 0;
-  glGenFramebuffers(1, &name);
-  return name;
-}
+GLuint TextureKind::Create() { return OneName(glGenTextures); }
+GLuint BufferKind::Create() { return OneName(glGenBuffers); }
+GLuint VertexArrayKind::Create() { return OneName(glGenVertexArrays); }
+GLuint FramebufferKind::Create() { return OneName(glGenFramebuffers); }
 
 void ThrowOnError(const std::string& what) {
   const GLenum error = glGetError();
   if (error == GL_NO_ERROR) return;
   throw Error("OpenGL: " + what + ": " + ErrorName(error) + " (code " + std::to_string(error) +
-              "); use --renderer cpu, or fewer views or a smaller size");
+              "); use --renderer cpu, or a smaller --gpu-memory or --size, or fewer --views");
+}
+
+bool HasClipControl() {
+  return epoxy_gl_version() >= 45 || epoxy_has_gl_extension("GL_ARB_clip_control");
 }
 
 StateGuard::StateGuard() {
@@ -81,7 +76,7 @@ StateGuard::StateGuard() {
   glGetIntegerv(GL_SHADER_STORAGE_BUFFER_BINDING, &storage_buffer_);
   glGetIntegerv(GL_UNIFORM_BUFFER_BINDING, &uniform_buffer_);
   glGetIntegeri_v(GL_UNIFORM_BUFFER_BINDING, 0, &uniform_buffer_0_);
-  for (GLuint i = 0; i < 3; ++i) {
+  for (GLuint i = 0; i < storage_buffers_.size(); ++i) {
     glGetIntegeri_v(GL_SHADER_STORAGE_BUFFER_BINDING, i, &storage_buffers_[i]);
   }
   glGetIntegerv(GL_PIXEL_PACK_BUFFER_BINDING, &pack_buffer_);
@@ -97,6 +92,14 @@ StateGuard::StateGuard() {
   glGetIntegerv(GL_POLYGON_MODE, polygon_mode_);
   glGetIntegerv(GL_PROVOKING_VERTEX, &provoking_vertex_);
   glGetBooleanv(GL_COLOR_WRITEMASK, color_mask_);
+  glGetBooleanv(GL_DEPTH_WRITEMASK, &depth_mask_);
+  glGetIntegerv(GL_DEPTH_FUNC, &depth_func_);
+  glGetDoublev(GL_DEPTH_RANGE, depth_range_);
+  if (HasClipControl()) {
+    glGetIntegerv(GL_CLIP_ORIGIN, &clip_origin_);
+    glGetIntegerv(GL_CLIP_DEPTH_MODE, &clip_depth_mode_);
+    glClipControl(GL_LOWER_LEFT, GL_NEGATIVE_ONE_TO_ONE);
+  }
   for (int i = 0; i < kTextureUnits; ++i) {
     Unit& unit = units_[static_cast<size_t>(i)];
     glActiveTexture(GL_TEXTURE0 + static_cast<GLenum>(i));
@@ -114,6 +117,8 @@ StateGuard::StateGuard() {
   }
   glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
   glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+  glDepthMask(GL_TRUE);
+  glDepthRange(0, 1);
 }
 
 StateGuard::~StateGuard() {
@@ -136,7 +141,7 @@ StateGuard::~StateGuard() {
   glBindBuffer(GL_ARRAY_BUFFER, name(array_buffer_));
   glBindBufferBase(GL_UNIFORM_BUFFER, 0, name(uniform_buffer_0_));
   glBindBuffer(GL_UNIFORM_BUFFER, name(uniform_buffer_));
-  for (GLuint i = 0; i < 3; ++i) {
+  for (GLuint i = 0; i < storage_buffers_.size(); ++i) {
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, i, name(storage_buffers_[i]));
   }
   glBindBuffer(GL_SHADER_STORAGE_BUFFER, name(storage_buffer_));
@@ -151,6 +156,10 @@ StateGuard::~StateGuard() {
   glFrontFace(name(front_face_));
   glPolygonMode(GL_FRONT_AND_BACK, name(polygon_mode_[0]));
   glProvokingVertex(name(provoking_vertex_));
+  glDepthMask(depth_mask_);
+  glDepthFunc(name(depth_func_));
+  glDepthRange(depth_range_[0], depth_range_[1]);
+  if (HasClipControl()) glClipControl(name(clip_origin_), name(clip_depth_mode_));
   glColorMask(color_mask_[0], color_mask_[1], color_mask_[2], color_mask_[3]);
 }
 

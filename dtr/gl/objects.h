@@ -65,6 +65,9 @@ using Shader = Owned<ShaderKind>;
 /// all). Errors from before the last call count too, so callers clear them first.
 void ThrowOnError(const std::string& what);
 
+/// Whether the driver lets clip space's z run from 0 to 1: OpenGL 4.5 or GL_ARB_clip_control.
+bool HasClipControl();
+
 /// Puts the context's state, as far as this library changes it, back at the end of the scope.
 class StateGuard {
  public:
@@ -84,17 +87,20 @@ class StateGuard {
     GLboolean on;
   };
   std::array<Unit, kTextureUnits> units_;
-  std::array<Capability, 14> capabilities_;
+  std::array<Capability, 15> capabilities_;
   GLint program_ = 0, vertex_array_ = 0, draw_framebuffer_ = 0, read_framebuffer_ = 0;
   GLint viewport_[4] = {}, active_unit_ = 0;
-  GLint array_buffer_ = 0, storage_buffer_ = 0, storage_buffers_[3] = {};
+  GLint array_buffer_ = 0, storage_buffer_ = 0;
+  std::array<GLint, 6> storage_buffers_{};
   GLint uniform_buffer_ = 0, uniform_buffer_0_ = 0;
   GLint pack_buffer_ = 0, unpack_buffer_ = 0;
   GLint pack_[4] = {}, unpack_[4] = {};
   GLint blend_equation_rgb_ = 0, blend_equation_alpha_ = 0;
   GLint cull_face_ = 0, front_face_ = 0, polygon_mode_[2] = {};
   GLint provoking_vertex_ = 0;
-  GLboolean color_mask_[4] = {};
+  GLboolean color_mask_[4] = {}, depth_mask_ = GL_TRUE;
+  GLint depth_func_ = 0, clip_origin_ = 0, clip_depth_mode_ = 0;
+  GLdouble depth_range_[2] = {};
 };
 
 }  // namespace dtr::gl

@@ -115,4 +115,13 @@ Program BuildProgram(const std::vector<Stage>& stages, const std::vector<std::st
   return program;
 }
 
+const Program& ProgramCache::Get(const std::vector<Stage>& stages,
+                                 const std::vector<std::string>& defines) {
+  std::string key = stages.back().file;
+  for (const std::string& define : defines) key += "|" + define;
+  const auto found = programs_.find(key);
+  if (found != programs_.end()) return found->second;
+  return programs_.emplace(key, BuildProgram(stages, defines, shader_folder_)).first->second;
+}
+
 }  // namespace dtr::gl

@@ -1,5 +1,6 @@
 // dtr/gl/program.h -- shaders: found by name, joined by #include, compiled with honest errors.
 #pragma once
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -26,5 +27,19 @@ struct Stage {
 /// Throws dtr::Error "file:line: message" of the first compile error.
 Program BuildProgram(const std::vector<Stage>& stages, const std::vector<std::string>& defines,
                      const std::string& shader_folder);
+
+/// The programs of one context, each built when it is first asked for.
+class ProgramCache {
+ public:
+  /// Empty `shader_folder`: the embedded shaders.
+  explicit ProgramCache(std::string shader_folder) : shader_folder_(std::move(shader_folder)) {}
+
+  /// As BuildProgram; the last stage's file and the defines tell programs apart.
+  const Program& Get(const std::vector<Stage>& stages, const std::vector<std::string>& defines);
+
+ private:
+  const std::string shader_folder_;
+  std::map<std::string, Program> programs_;
+};
 
 }  // namespace dtr::gl

@@ -1,8 +1,10 @@
 // dtr/gl/renderer.h -- RENDER_SPEC with OpenGL 4.3; no GL header is needed to use it.
 #pragma once
 #include <cstddef>
+#include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "dtr/render/options.h"
 #include "dtr/render/result.h"
@@ -12,12 +14,36 @@
 
 namespace dtr::gl {
 
-/// What does not change the picture.
+/// Who draws the surface that the deferred method starts from (SPEC 5.1).
+enum class CoarseDrawer {
+  kFitting,    ///< shaders, or our own code where the driver itself draws on the CPU
+  kShaders,    ///< compute shaders
+  kProcessor,  ///< our own code, on the CPU
+};
+
+/// What does not change the picture, beyond the last digits.
 struct RendererSettings {
   /// Where shaders come from, for development; empty: from the program itself.
   std::string shader_folder;
   /// Memory for the views' fragments; a picture that needs more is drawn in bands of rows.
   size_t layer_bytes = size_t{256} << 20;
+  /// Memory for the views themselves. Those drawn longest ago make room for others; where one
+  /// picture's do not fit, it is drawn from the nearest that do, and `warn` is told so once.
+  size_t gpu_bytes = size_t{4} << 30;
+  std::function<void(const std::string&)> warn = [](const std::string&) {};
+  CoarseDrawer coarse_drawer = CoarseDrawer::kFitting;
+  /// Leave unused what the driver has beyond OpenGL 4.3, as on one that has no more.
+  bool only_opengl_43 = false;
+};
+
+/// A picture that was drawn and lies on the GPU: names of GL_TEXTURE_2D_ARRAY textures of one layer
+/// that belong to the renderer and hold the picture until its next call. Row 0 is the top row.
+struct DrawnPicture {
+  unsigned image = 0;  ///< RGBA8, sRGB values; alpha 1 where some view saw the pixel, else 0
+  unsigned depth = 0;  ///< R32F, plane z in scene units; 0 where unseen
+  unsigned marks = 0;  ///< RGBA8UI: views blended; 255 at the Delta border (SPEC 6.2)
+  int width_px = 0, height_px = 0;
+  std::vector<int> views_used;  ///< as RenderResult::views_used
 };
 
 /// Draws scenes with the OpenGL context that is current, into targets of its own, and leaves the
@@ -33,17 +59,31 @@ class Renderer {
   Renderer(const Renderer&) = delete;
   Renderer& operator=(const Renderer&) = delete;
 
-  /// SPEC 1 to 4, 6 and 7 as cpu::Render, and SPEC 5, which cpu::Render does not know. Views that
-  /// are drawn stay on the GPU: they must not change or die as long as this renderer draws them
-  /// (Forget() ends that). The result does not depend on the order of the views; equal calls give
+  /// SPEC 1 to 4, 6 and 7 as cpu::Render, and SPEC 5. Views that are drawn stay on the GPU within
+  /// RendererSettings::gpu_bytes: they must not change or die as long as this renderer draws them
+  /// (Forget() ends that); their pixels may go and be read again in between, as ViewStream does.
+  /// The result does not depend on the order of the views; equal calls give
   /// equal bytes. Throws dtr::UsageError for options without a meaning and for pictures beyond 2^28
   /// pixels, and dtr::Error for a pose that is not finite, for what the driver cannot hold (naming
   /// its limit) and for a shader that does not compile (file and line).
   RenderResult Render(const RenderScene& scene, const PinholeCamera& novel,
                       const Pose& novel_from_world, const RenderOptions& options);
 
+  /// The same without leaving the GPU, for windows and for timing: nothing is read back and nothing
+  /// filled (options.fill_holes is not looked at). Drawn at once, whatever layer_bytes says. May
+  /// return before the GPU has finished. Throws as Render.
+  DrawnPicture Draw(const RenderScene& scene, const PinholeCamera& novel,
+                    const Pose& novel_from_world, const RenderOptions& options);
+
+  /// The picture of the last Draw, which must be the last call that drew (std::logic_error): what
+  /// Render gives without filling.
+  RenderResult ReadBack();
+
   /// Frees what lies on the GPU of every view.
   void Forget();
+
+  /// What the views on the GPU take now, of RendererSettings::gpu_bytes.
+  size_t gpu_bytes() const;
 
  private:
   class Implementation;

@@ -1,5 +1,6 @@
 #include "dtr/gl/view_mesh.h"
 
+#include <algorithm>
 #include <array>
 
 #include "dtr/base/error.h"
@@ -9,6 +10,10 @@
 
 namespace dtr::gl {
 namespace {
+
+// Side of the squares in which blocks are listed: 13 x 13 vertices of a tile fit the caches of
+// transformed vertices that drivers have (llvmpipe: 256; a row of the whole map fits none).
+constexpr int kTileBlocks = 12;
 
 BreakRule RuleOf(const View& view, const RenderOptions& options) {
   return {ThresholdsOf(view, options).depth_break, options.absolute_depth_break};
@@ -30,8 +35,8 @@ class MeshMaker {
         AddPoint({samples_.Centre(i), samples_.Centre(j), w(i, j)});
     }
     // Blocks reach one sample beyond the grid: its border cells are closed too (SPEC 2.6).
-    for (int j = -1; j < w.height(); ++j) {
-      for (int i = -1; i < w.width(); ++i) AddBlock(i, j);
+    for (int top = -1; top < w.height(); top += kTileBlocks) {
+      for (int left = -1; left < w.width(); left += kTileBlocks) AddTile(left, top);
     }
     return std::move(mesh_);
   }
@@ -45,6 +50,14 @@ class MeshMaker {
     mesh_.points.push_back(static_cast<float>(point.v));
     mesh_.points.push_back(static_cast<float>(point.inverse_depth));
     return static_cast<std::uint32_t>(mesh_.points.size() / 3 - 1);
+  }
+
+  /// Tile by tile, so that a vertex is in a cache when its neighbours below are drawn.
+  void AddTile(int left, int top) {
+    const Grid<double>& w = samples_.inverse_depth;
+    for (int j = top; j < std::min(top + kTileBlocks, w.height()); ++j) {
+      for (int i = left; i < std::min(left + kTileBlocks, w.width()); ++i) AddBlock(i, j);
+    }
   }
 
   void AddBlock(int i, int j) {

@@ -4,18 +4,14 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
-#include "dtr/gl/coarse_surface.h"
+#include "dtr/gl/stored_depth.h"
+#include "dtr/render/texture.h"
 #include "dtr/render/triangulation.h"
 
 namespace dtr::gl {
 namespace {
 
-// An array texture takes its memory at once on some drivers; a larger one would be refused whole.
-constexpr GLsizeiptr kMaxArrayBytes = GLsizeiptr{1} << 30;
-constexpr int kFloatsPerPoint = 3, kFloatsPerSplat = 5, kFloatsPerBlock = 7;
-// What a block may differ from the depth map it stands for, in pixels of disparity: the refinement
-// (SPEC 5.2) takes it back.
-constexpr double kFlatnessPx = 0.5;
+constexpr int kFloatsPerPoint = 3, kFloatsPerSplat = 5;
 
 Geometry UploadMesh(const View& view, const ViewMesh& mesh) {
   Geometry geometry;
@@ -33,6 +29,7 @@ Geometry UploadMesh(const View& view, const ViewMesh& mesh) {
                static_cast<GLsizeiptr>(mesh.indices.size() * sizeof(std::uint32_t)),
                mesh.indices.data(), GL_STATIC_DRAW);
   geometry.index_count = static_cast<GLsizei>(mesh.indices.size());
+  geometry.bytes = mesh.points.size() * sizeof(float) + mesh.indices.size() * sizeof(std::uint32_t);
   ThrowOnError(view.name + ": its mesh");
   return geometry;
 }
@@ -71,33 +68,65 @@ Geometry UploadSplats(const View& view, const std::vector<float>& splats) {
                static_cast<GLsizeiptr>(indices.size() * sizeof(std::uint32_t)), indices.data(),
                GL_STATIC_DRAW);
   geometry.index_count = static_cast<GLsizei>(indices.size());
+  geometry.bytes = splats.size() * sizeof(float) + indices.size() * sizeof(std::uint32_t);
   ThrowOnError(view.name + ": its splats");
   return geometry;
-}
-
-/// RGB and, as alpha, whether the pixel is usable.
-std::vector<std::uint8_t> Rgba(const View& view) {
-  const size_t pixels = view.image.data().size() / 3;
-  std::vector<std::uint8_t> rgba(4 * pixels);
-  for (size_t p = 0; p < pixels; ++p) {
-    for (size_t c = 0; c < 3; ++c) rgba[4 * p + c] = view.image.data()[3 * p + c];
-    rgba[4 * p + 3] = view.mask.empty() || view.mask.data()[p] != 0 ? 255 : 0;
-  }
-  return rgba;
 }
 
 }  // namespace
 
 void ViewStore::Clear() {
   views_.clear();
-  arrays_.clear();
+  arrays_.Clear();
+}
+
+void ViewStore::Empty(Stored& stored) {
+  if (stored.image) arrays_.Give(*stored.image);
+  DropDepth(stored);
+  stored = Stored{};
+}
+
+void ViewStore::DropDepth(Stored& stored) {
+  if (stored.deferred && stored.deferred->second.columns > 0) {
+    arrays_.Give(stored.deferred->second.depth);
+  }
+  stored.deferred.reset();
+}
+
+void ViewStore::DropUnusedBy(const RenderOptions& options, const View& view) {
+  const bool deferred = options.method == RenderMethod::kDeferred;
+  Stored& stored = Find(view);
+  if (!deferred) DropDepth(stored);
+  std::erase_if(stored.geometry, [&](const auto& geometry) {
+    return deferred || geometry.first != options.primitive;
+  });
+}
+
+void ViewStore::Drop(const View& view) {
+  const auto found = views_.find(&view);
+  if (found == views_.end()) return;
+  Empty(found->second);
+  views_.erase(found);
+}
+
+size_t ViewStore::BytesOf(const View& view) {
+  const auto found = views_.find(&view);
+  if (found == views_.end()) return 0;
+  const Stored& stored = found->second;
+  size_t bytes = 0;
+  for (const auto& [primitive, geometry] : stored.geometry) bytes += geometry.second.bytes;
+  if (stored.image) bytes += arrays_.LayerBytes(*stored.image);
+  if (stored.deferred && stored.deferred->second.columns > 0) {
+    bytes += arrays_.LayerBytes(stored.deferred->second.depth);
+  }
+  return bytes;
 }
 
 ViewStore::Stored& ViewStore::Find(const View& view) {
   Stored& stored = views_[&view];
   const void *image = view.image.data().data(), *depth = view.depth.grid().data().data();
   if (stored.image_data != image || stored.depth_data != depth) {
-    stored = Stored{};
+    Empty(stored);
     stored.image_data = image;
     stored.depth_data = depth;
   }
@@ -141,8 +170,8 @@ const Geometry& ViewStore::GeometryOf(const View& view, const RenderOptions& opt
   return Find(view).geometry.at(options.primitive).second;
 }
 
-void ViewStore::PrepareDeferred(const std::vector<const View*>& views,
-                                const RenderOptions& options) {
+void ViewStore::PrepareDeferred(const std::vector<const View*>& views, const RenderOptions& options,
+                                const LayersFor& new_layers) {
   const GeometryKey key = KeyOf(options);
   std::vector<const View*> missing;
   for (const View* view : views) {
@@ -150,44 +179,36 @@ void ViewStore::PrepareDeferred(const std::vector<const View*>& views,
     if (!deferred || deferred->first != key) missing.push_back(view);
   }
   std::vector<SampleGrid> grids(missing.size());
-  std::vector<CoarseSurface> surfaces(missing.size());
-  RenderOptions tolerance = options;
-  tolerance.depth_break_px = kFlatnessPx;
+  std::vector<StoredDepth> depths(missing.size());
   ParallelFor(0, static_cast<int>(missing.size()), options.threads, [&](int i) {
     const auto k = static_cast<size_t>(i);
     const View& view = *missing[k];
     grids[k] = MakeSampleGrid(view, options.resolution);
-    surfaces[k] = MakeCoarseSurface(
-        grids[k], {ThresholdsOf(view, options).depth_break, options.absolute_depth_break},
-        ThresholdsOf(view, tolerance).depth_break);
+    depths[k] = StoreDepth(view, grids[k]);
   });
   for (size_t k = 0; k < missing.size(); ++k) {
     const View& view = *missing[k];
     const Grid<double>& w = grids[k].inverse_depth;
     Stored& stored = Find(view);
+    DropDepth(stored);
     Deferred deferred;
     deferred.columns = w.width(), deferred.rows = w.height();
     deferred.step = grids[k].step, deferred.offset = grids[k].offset;
     if (!w.empty()) {
-      deferred.coarse.blocks = UploadStorage(view, surfaces[k].blocks);
-      deferred.coarse.splats = UploadStorage(view, surfaces[k].splats);
-      deferred.coarse.block_count = static_cast<int>(surfaces[k].blocks.size()) / kFloatsPerBlock;
-      deferred.coarse.splat_count = static_cast<int>(surfaces[k].splats.size()) / kFloatsPerSplat;
-      // Another break threshold keeps its slot; another resolution has a grid of another size.
-      const bool same_size = stored.deferred && stored.deferred->second.columns == w.width() &&
-                             stored.deferred->second.rows == w.height();
+      const bool coded = !depths[k].codes.empty();
+      deferred.depth_offset = depths[k].offset, deferred.depth_factor = depths[k].factor;
       deferred.depth =
-          same_size ? stored.deferred->second.depth
-                    : NewSlot(GL_R32F, w.width(), w.height(), static_cast<int>(views.size()));
-      const std::vector<float> values(w.data().begin(), w.data().end());
+          arrays_.Take(coded ? GL_R16 : GL_R32F, w.width(), w.height(), new_layers(view));
       glBindTexture(GL_TEXTURE_2D_ARRAY, texture_array(deferred.depth.array));
       glTexSubImage3D(GL_TEXTURE_2D_ARRAY, 0, 0, 0, deferred.depth.layer, w.width(), w.height(), 1,
-                      GL_RED, GL_FLOAT, values.data());
+                      GL_RED, coded ? GL_UNSIGNED_SHORT : GL_FLOAT,
+                      coded ? static_cast<const void*>(depths[k].codes.data())
+                            : static_cast<const void*>(depths[k].values.data()));
       ThrowOnError(view.name + ": its depth");
     }
     stored.deferred.emplace(key, std::move(deferred));
     grids[k] = {};
-    surfaces[k] = {};
+    depths[k] = {};
   }
 }
 
@@ -196,50 +217,18 @@ const ViewStore::Deferred* ViewStore::DeferredOf(const View& view) {
   return stored && stored->second.columns > 0 ? &stored->second : nullptr;
 }
 
-ImageSlot ViewStore::NewSlot(GLenum format, int width_px, int height_px, int expected_views) {
-  for (size_t i = 0; i < arrays_.size(); ++i) {
-    ImageArray& array = arrays_[i];
-    if (array.format == format && array.width_px == width_px && array.height_px == height_px &&
-        array.used < array.layers) {
-      return {static_cast<int>(i), array.used++};
-    }
+void ViewStore::PrepareImages(const std::vector<const View*>& views, const LayersFor& new_layers) {
+  for (const View* view : views) {
+    Stored& stored = Find(*view);
+    if (stored.image) continue;
+    const int width = view->image.width(), height = view->image.height();
+    stored.image = arrays_.Take(GL_RGBA8, width, height, new_layers(*view));
+    const std::vector<std::uint8_t> rgba = SampledImage(*view);
+    glBindTexture(GL_TEXTURE_2D_ARRAY, texture_array(stored.image->array));
+    glTexSubImage3D(GL_TEXTURE_2D_ARRAY, 0, 0, 0, stored.image->layer, width, height, 1, GL_RGBA,
+                    GL_UNSIGNED_BYTE, rgba.data());
+    ThrowOnError(view->name + ": its image");
   }
-  GLint max_layers = 0, max_size = 0;
-  glGetIntegerv(GL_MAX_ARRAY_TEXTURE_LAYERS, &max_layers);
-  glGetIntegerv(GL_MAX_TEXTURE_SIZE, &max_size);
-  if (width_px > max_size || height_px > max_size) {
-    throw Error("OpenGL: expected images of at most " + std::to_string(max_size) +
-                " pixels a side, found " + std::to_string(width_px) + "x" +
-                std::to_string(height_px) + "; use --renderer cpu");
-  }
-  const GLsizeiptr layer_bytes = GLsizeiptr{4} * width_px * height_px;
-  const auto by_bytes = static_cast<int>(std::max<GLsizeiptr>(1, kMaxArrayBytes / layer_bytes));
-  ImageArray array{Texture::Make(),
-                   format,
-                   width_px,
-                   height_px,
-                   std::min({std::max(expected_views, 1), max_layers, by_bytes}),
-                   1};
-  glBindTexture(GL_TEXTURE_2D_ARRAY, array.texture.name());
-  glTexStorage3D(GL_TEXTURE_2D_ARRAY, 1, format, width_px, height_px, array.layers);
-  glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
-  glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
-  ThrowOnError("room for " + std::to_string(array.layers) + " images");
-  arrays_.push_back(std::move(array));
-  return {static_cast<int>(arrays_.size()) - 1, 0};
-}
-
-ImageSlot ViewStore::ImageOf(const View& view, int expected_views) {
-  Stored& stored = Find(view);
-  if (stored.image) return *stored.image;
-  const int width = view.image.width(), height = view.image.height();
-  stored.image = NewSlot(GL_SRGB8_ALPHA8, width, height, expected_views);
-  const std::vector<std::uint8_t> rgba = Rgba(view);
-  glBindTexture(GL_TEXTURE_2D_ARRAY, texture_array(stored.image->array));
-  glTexSubImage3D(GL_TEXTURE_2D_ARRAY, 0, 0, 0, stored.image->layer, width, height, 1, GL_RGBA,
-                  GL_UNSIGNED_BYTE, rgba.data());
-  ThrowOnError(view.name + ": its image");
-  return *stored.image;
 }
 
 }  // namespace dtr::gl

@@ -1,6 +1,7 @@
 // dtr/gl/view_store.h -- what lies on the GPU of each view: its geometry and its image, put there
 // when the view is first drawn. Only dtr/gl's own .cpp files include this.
 #pragma once
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -8,6 +9,7 @@
 #include <vector>
 
 #include "dtr/gl/objects.h"
+#include "dtr/gl/texture_arrays.h"
 #include "dtr/gl/view_mesh.h"
 #include "dtr/render/scene.h"
 
@@ -18,18 +20,7 @@ struct Geometry {
   VertexArray array;
   Buffer points, indices;
   GLsizei index_count = 0;
-};
-
-/// SPEC 5: a view's coarse surface and full-resolution depth.
-struct CoarseGeometry {
-  Buffer blocks, splats;
-  int block_count = 0, splat_count = 0;
-};
-
-/// Where a view's image or depth lies.
-struct ImageSlot {
-  int array = 0;  ///< index of a texture array of the store
-  int layer = 0;
+  size_t bytes = 0;  ///< on the GPU
 };
 
 class ViewStore {
@@ -41,21 +32,30 @@ class ViewStore {
   /// Makes the meshes or splats of several views at once, on all cores.
   void Prepare(const std::vector<const View*>& views, const RenderOptions& options);
 
-  /// SPEC 5: the same for the deferred method: coarse surfaces and depth arrays.
-  void PrepareDeferred(const std::vector<const View*>& views, const RenderOptions& options);
+  /// How long a new texture array should be where a view needs one.
+  using LayersFor = std::function<int(const View&)>;
+
+  /// SPEC 5: the depths of the deferred method.
+  void PrepareDeferred(const std::vector<const View*>& views, const RenderOptions& options,
+                       const LayersFor& new_layers);
   struct Deferred {
-    CoarseGeometry coarse;
     ImageSlot depth;
+    double depth_offset = 0, depth_factor = 1;        ///< StoredDepth: 1/z from a texel
     int columns = 0, rows = 0, step = 1, offset = 0;  ///< of the grid of samples
   };
   /// After PrepareDeferred with the same options; null where R leaves no sample.
   const Deferred* DeferredOf(const View& view);
 
-  /// `expected_views`: how many views of this size may follow; sets the first array's length.
-  ImageSlot ImageOf(const View& view, int expected_views);
-  GLuint texture_array(int index) const {
-    return arrays_[static_cast<size_t>(index)].texture.name();
-  }
+  void PrepareImages(const std::vector<const View*>& views, const LayersFor& new_layers);
+  /// After PrepareImages.
+  ImageSlot ImageOf(const View& view) { return Find(view).image.value(); }
+  GLuint texture_array(int index) const { return arrays_.name(index); }
+
+  /// What lies on the GPU of a view.
+  size_t BytesOf(const View& view);
+  void Drop(const View& view);
+  /// Drops what was made of the view for other methods and primitives.
+  void DropUnusedBy(const RenderOptions& options, const View& view);
   void Clear();
 
  private:
@@ -67,18 +67,13 @@ class ViewStore {
     std::optional<ImageSlot> image;
     std::optional<std::pair<GeometryKey, Deferred>> deferred;
   };
-  struct ImageArray {
-    Texture texture;
-    GLenum format = GL_NONE;
-    int width_px = 0, height_px = 0, layers = 0, used = 0;
-  };
-
   Stored& Find(const View& view);
   static GeometryKey KeyOf(const RenderOptions& options);
-  ImageSlot NewSlot(GLenum format, int width_px, int height_px, int expected_views);
+  void Empty(Stored& stored);
+  void DropDepth(Stored& stored);
 
   std::map<const View*, Stored> views_;
-  std::vector<ImageArray> arrays_;
+  TextureArrays arrays_;
 };
 
 }  // namespace dtr::gl

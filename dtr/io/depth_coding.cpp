@@ -7,11 +7,11 @@
 
 #include "dtr/base/error.h"
 #include "dtr/io/depth_io.h"
+#include "dtr/types/inverse_depth_code.h"
 
 namespace dtr::io {
 namespace {
 
-constexpr int kInverseSteps = 65534;      // between code 1 (far) and code 65535 (near)
 constexpr double kMillimetres = 1000;     // codes per metre
 constexpr float kHalfMax = 65504;         // largest finite half
 constexpr float kHalfMin = 0x1.0p-14f;    // smallest half with full precision
@@ -29,7 +29,7 @@ std::string Number(double value) {
 }
 
 void ExpectRange(double near_z, double far_z) {
-  if (near_z > 0 && near_z < far_z && std::isfinite(far_z)) return;
+  if (InverseDepthCode::IsRange(near_z, far_z)) return;
   throw Error("depth range: expected 0 < near < far, found near " + Number(near_z) + ", far " +
               Number(far_z));
 }
@@ -101,30 +101,22 @@ const char* ExtensionOf(DepthCoding coding) {
 
 Grid<std::uint16_t> EncodePng16Inverse(const DepthImage& depth, double near_z, double far_z) {
   ExpectRange(near_z, far_z);
-  const double inverse_far = 1 / far_z, inverse_range = 1 / near_z - 1 / far_z;
+  const InverseDepthCode code(near_z, far_z);
   Grid<std::uint16_t> codes;
   ForEachDepth(depth, [&](int x, int y, float z) {
     ExpectWithin(x, y, z, near_z, far_z);
     if (codes.empty()) codes = Grid<std::uint16_t>(depth.width(), depth.height());
-    const double share = std::clamp((1.0 / z - inverse_far) / inverse_range, 0.0, 1.0);
-    codes(x, y) = static_cast<std::uint16_t>(1 + std::lround(share * kInverseSteps));
+    codes(x, y) = code.Encode(z);
   });
   return codes.empty() ? Grid<std::uint16_t>(depth.width(), depth.height()) : codes;
 }
 
 DepthImage DecodePng16Inverse(const Grid<std::uint16_t>& codes, double near_z, double far_z) {
   ExpectRange(near_z, far_z);
-  const double inverse_far = 1 / far_z, inverse_range = 1 / near_z - 1 / far_z;
+  const InverseDepthCode code(near_z, far_z);
   DepthImage depth(codes.width(), codes.height());
-  for (size_t i = 0; i < codes.data().size(); ++i) {
-    const std::uint16_t code = codes.data()[i];
-    if (code == 0) continue;
-    double z = 1 / (inverse_far + (code - 1) * inverse_range / kInverseSteps);
-    // 1 / (1 / z) may miss z by an ulp; the ends of the range are exact by definition.
-    if (code == 1) z = far_z;
-    if (code == UINT16_MAX) z = near_z;
-    depth.grid().data()[i] = static_cast<float>(std::clamp(z, near_z, far_z));
-  }
+  std::transform(codes.data().begin(), codes.data().end(), depth.grid().data().begin(),
+                 [&](std::uint16_t c) { return code.Decode(c); });
   return depth;
 }
 

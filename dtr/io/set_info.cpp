@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <chrono>
 #include <ctime>
-#include <fstream>
 #include <sstream>
 
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
+#include "dtr/base/machine.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/io/depth_io.h"
 #include "dtr/io/json_fields.h"
@@ -23,7 +23,8 @@ namespace fs = std::filesystem;
 
 std::uint64_t BytesOf(const View& view) {
   std::uint64_t bytes = 0;
-  for (const auto* file : {&view.image_file, &view.mask_file, &view.depth_file, &view.sigma_file}) {
+  for (const auto* file :
+       {&view.image_file, &view.mask_file, &view.depth_file, &view.sigma_file, &view.mesh_file}) {
     if (*file) bytes += (*file)->bytes;
   }
   return bytes;
@@ -80,17 +81,6 @@ std::string VerdictLine(const DtrSet& set) {
   return "FAILED" + (failed.empty() ? "" : ": " + failed) + "; dtr validate says more";
 }
 
-std::string ProcessorName() {
-  std::ifstream in("/proc/cpuinfo");
-  for (std::string line; std::getline(in, line);) {
-    const size_t colon = line.find(": ");
-    if (line.rfind("model name", 0) == 0 && colon != std::string::npos) {
-      return line.substr(colon + 2);
-    }
-  }
-  return "unknown";
-}
-
 std::string UtcNow() {
   const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
   std::tm parts{};
@@ -105,7 +95,7 @@ Json HostInfo() {
   uname(&names);
   return {{"name", names.nodename},
           {"system", std::string(names.sysname) + " " + names.release},
-          {"processor", ProcessorName()},
+          {"processor", CpuModel()},
           {"cores", ResolveThreads(0)}};
 }
 

@@ -24,7 +24,7 @@ DtrSet ReadSet(const std::filesystem::path& set_folder);
 /// What LoadSet and LoadPixels bring into memory.
 struct LoadOptions {
   bool images = true;  ///< images and masks
-  bool depth = true;   ///< depth maps
+  bool depth = true;   ///< depth maps, and their reduced meshes where the set has them
   bool sigma = false;  ///< standard deviations of inverse depth, where a view has them
   bool held_out =
       false;  ///< false: held-out views are left out altogether, so no renderer sees one
@@ -102,6 +102,10 @@ class SetWriter {
   /// scale, range, baseline, gain). Pixels are not loaded: LoadPixels(folder(), view, ...) does.
   /// The caller looks at view.depth_file to see how far the view had got.
   bool RestoreView(View& view) const;
+
+  /// Writes mesh/ID.bin of a view whose depth was written: its hashes are filled in here. Writing
+  /// the view's depth again takes the mesh away.
+  void WriteMesh(View& view, StoredMesh mesh);
 
   /// Writes sparse.bin; views are indices into frames[0].views.
   void WriteSparse(DtrSet& set, const SparseScene& scene);

@@ -175,6 +175,7 @@ void FilesFrom(const JsonObject& object, View& view, Json& extra) {
   read("image", view.image_file);
   read("mask", view.mask_file);
   read("sigma", view.sigma_file);
+  read("mesh", view.mesh_file);
   if (object.Has("depth")) {
     const JsonObject depth = object.Object("depth");
     Nest(extra, "depth", DepthFrom(depth, view));
@@ -183,10 +184,12 @@ void FilesFrom(const JsonObject& object, View& view, Json& extra) {
     object.Fail(view.depth_file ? "depth" : "sigma", "no depth in a held-out view");
   }
   if (view.sigma_file && !view.depth_file) object.Fail("sigma", "a sigma only beside a depth");
+  if (view.mesh_file && !view.depth_file) object.Fail("mesh", "a mesh only beside a depth");
   ExpectFolder(object, view, view.image_file, "image");
   ExpectFolder(object, view, view.mask_file, "mask");
   ExpectFolder(object, view, view.depth_file, "depth");
   ExpectFolder(object, view, view.sigma_file, "sigma");
+  ExpectFolder(object, view, view.mesh_file, "mesh");
 }
 
 View ViewFrom(const JsonObject& object) {
@@ -237,9 +240,11 @@ Json ToJson(const View& view, Hashes hashes) {
   if (view.mask_file) object["mask"] = entry(*view.mask_file);
   if (view.depth_file) object["depth"] = DepthToJson(view);
   if (view.sigma_file) object["sigma"] = entry(*view.sigma_file);
+  if (view.mesh_file) object["mesh"] = entry(*view.mesh_file);
   object["reference_baseline"] = view.reference_baseline;
   object["gain_linear_rgb"] = NumbersToJson(view.gain);
-  Restore(object, view.extra_json, {"camera", "cam_from_world", "image", "mask", "depth", "sigma"});
+  Restore(object, view.extra_json,
+          {"camera", "cam_from_world", "image", "mask", "depth", "sigma", "mesh"});
   return object;
 }
 
@@ -391,6 +396,7 @@ std::vector<NamedFile> FilesOf(const DtrSet& set) {
       add(view.mask_file, field + "mask");
       add(view.depth_file, field + "depth");
       add(view.sigma_file, field + "sigma");
+      add(view.mesh_file, field + "mesh");
     }
   }
   return files;

@@ -8,6 +8,7 @@
 #include "dtr/base/parallel_for.h"
 #include "dtr/io/depth_io.h"
 #include "dtr/io/held_out_files.h"
+#include "dtr/io/mesh_io.h"
 #include "dtr/io/set_io.h"
 #include "dtr/io/set_json.h"
 #include "dtr/io/sparse_io.h"
@@ -114,6 +115,15 @@ void LoadPixels(const fs::path& set_folder, View& view, const LoadOptions& optio
     const DepthFormat format{view.depth_coding, view.near_z, view.far_z, LengthUnit::kUnknown};
     view.depth =
         ReadDepth(set_folder / view.depth_file->path, format, depth_width_px, depth_height_px);
+  }
+  view.mesh.reset();
+  if (options.depth && view.mesh_file && view.depth_file) {
+    StoredMesh mesh = ReadMesh(set_folder / view.mesh_file->path);
+    // Of other depth or another mask it is of no use; renderers make their own.
+    const std::string mask = view.mask_file ? view.mask_file->sha256 : "";
+    if (mesh.depth_sha256 == view.depth_file->sha256 && mesh.mask_sha256 == mask) {
+      view.mesh = std::move(mesh);
+    }
   }
   if (options.sigma && view.sigma_file) {
     view.inverse_depth_sigma =

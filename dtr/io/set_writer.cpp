@@ -14,6 +14,7 @@
 #include "dtr/io/depth_io.h"
 #include "dtr/io/held_out_files.h"
 #include "dtr/io/json_fields.h"
+#include "dtr/io/mesh_io.h"
 #include "dtr/io/set_io.h"
 #include "dtr/io/set_json.h"
 #include "dtr/io/sparse_io.h"
@@ -28,7 +29,7 @@ constexpr char kFingerprint[] = "work/fingerprint.json";
 constexpr char kLock[] = "work/lock";
 constexpr char kSparseFile[] = "sparse.bin";
 constexpr std::uintmax_t kRecordLimitBytes = 1 << 24;
-constexpr const char* kPixelFolders[] = {"images", "mask", "depth", "sigma", "held_out"};
+constexpr const char* kPixelFolders[] = {"images", "mask", "depth", "sigma", "mesh", "held_out"};
 
 // "a/b.dtr/" and "a/b.dtr" are one folder.
 fs::path WithoutSlash(const fs::path& target) {
@@ -285,6 +286,8 @@ void SetWriter::State::WriteView(View& view, LengthUnit unit) const {
     const DepthFormat format{view.depth_coding, view.near_z, view.far_z, unit};
     view.depth_file = Store(PathOf(view, "depth", ExtensionOf(view.depth_coding)),
                             [&](const fs::path& file) { WriteDepth(file, view.depth, format); });
+    view.mesh_file.reset();  // it was of other depth
+    view.mesh.reset();
   }
   if (view.inverse_depth_sigma) {
     view.sigma_file = Store(PathOf(view, "sigma", ".exr"), [&](const fs::path& file) {
@@ -336,6 +339,17 @@ bool SetWriter::State::RestoreView(View& view) const {
   view.gain = stored.gain;
   view.extra_json = stored.extra_json;
   return true;
+}
+
+void SetWriter::WriteMesh(View& view, StoredMesh mesh) {
+  if (!view.depth_file || !IsSafeId(view.id)) {
+    throw Error("view '" + view.name + "': expected stored depth before its mesh");
+  }
+  mesh.depth_sha256 = view.depth_file->sha256;
+  mesh.mask_sha256 = view.mask_file ? view.mask_file->sha256 : "";
+  view.mesh_file = state_->Store("mesh/" + view.id + ".bin",
+                                 [&](const fs::path& file) { dtr::io::WriteMesh(file, mesh); });
+  view.mesh = std::move(mesh);
 }
 
 void SetWriter::WriteSparse(DtrSet& set, const SparseScene& scene) {

@@ -13,6 +13,31 @@ constexpr double kNoWeight = -std::numeric_limits<double>::infinity();
 
 double LogOrNone(double weight) { return weight > 0 ? std::log(weight) : kNoWeight; }
 
+double Power(double base, int exponent) {
+  double power = 1;
+  for (; exponent > 0; exponent /= 2, base *= base) {
+    if (exponent % 2 == 1) power *= base;
+  }
+  return power;
+}
+
+/// The default weight, divided by the largest before it is raised: in no danger at any k, and
+/// without a logarithm and an exponential for every view of every pixel.
+void InverseAngleWeights(const BlendParameters& parameters, std::span<const double> angles_rad,
+                         std::span<double> weights) {
+  const double smallest =
+      *std::min_element(angles_rad.begin(), angles_rad.end()) + parameters.pixel_angle_rad;
+  for (size_t i = 0; i < angles_rad.size(); ++i) {
+    weights[i] = Power(smallest / (angles_rad[i] + parameters.pixel_angle_rad), parameters.blend_k);
+  }
+}
+
+void DivideBySum(std::span<double> shares) {
+  double sum = 0;
+  for (const double share : shares) sum += share;
+  for (double& share : shares) share /= sum;
+}
+
 }  // namespace
 
 BlendParameters BlendParametersOf(const RenderOptions& options, double novel_fx_px) {
@@ -48,6 +73,12 @@ double NextAngle(const BlendParameters& parameters, std::span<const double> angl
 int BlendShares(const BlendParameters& parameters, std::span<const double> angles_rad,
                 std::span<double> shares) {
   if (angles_rad.empty()) return 0;
+  shares = shares.first(angles_rad.size());
+  if (parameters.blend == BlendWeight::kInverseAngle) {
+    InverseAngleWeights(parameters, angles_rad, shares);
+    DivideBySum(shares);
+    return static_cast<int>(shares.size());
+  }
   const double next_angle =
       parameters.blend == BlendWeight::kKNearest ? NextAngle(parameters, angles_rad) : 0;
   int positive = 0;
@@ -65,12 +96,8 @@ int BlendShares(const BlendParameters& parameters, std::span<const double> angle
     }
     return positive;
   }
-  double sum = 0;
-  for (double& share : shares) {
-    share = std::exp(share - largest);
-    sum += share;
-  }
-  for (double& share : shares) share /= sum;
+  for (double& share : shares) share = std::exp(share - largest);
+  DivideBySum(shares);
   return positive;
 }
 

@@ -30,6 +30,8 @@ void CheckRenderOptions(const RenderOptions& options) {
   Require(AtLeastZero(options.delta_px), "--delta", "0 or more", options.delta_px);
   Require(AtLeastZero(options.depth_break_px), "--depth-break", "0 or more",
           options.depth_break_px);
+  Require(AtLeastZero(options.mesh_tolerance_px), "--mesh-tolerance", "0 or more",
+          options.mesh_tolerance_px);
   Require(AtLeastZero(options.absolute_delta.value_or(0)), "absolute delta", "0 or more",
           options.absolute_delta.value_or(0));
   Require(AtLeastZero(options.absolute_depth_break.value_or(0)), "absolute depth break",

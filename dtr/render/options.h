@@ -28,8 +28,8 @@ enum class BlendWeight {
 /// Options of `dtr render`, by the same names. Thresholds are in pixels of disparity at the view's
 /// reference baseline, so they mean the same at any scale of the world.
 struct RenderOptions {
-  RenderMethod method = RenderMethod::kTwoPass;
-  Primitive primitive = Primitive::kMesh;
+  RenderMethod method = RenderMethod::kDeferred;
+  Primitive primitive = Primitive::kMesh;  ///< of kTwoPass; says nothing to kDeferred
   int views = 8;            ///< K: at most so many of the valid views, the nearest by angle
   int resolution = 1;       ///< R: every R-th depth pixel per axis
   double point_size = 1.0;  ///< splats: factor on the footprint
@@ -40,7 +40,8 @@ struct RenderOptions {
   int blend_k = 2;                              ///< k of kKNearest, power of kInverseAngle
   double max_angle_rad = std::numbers::pi / 3;  ///< valid views, SPEC 1
   double delta_px = 1.0;                        ///< Delta of SPEC 4, pixels of disparity
-  double depth_break_px = 1.0;  ///< break threshold of SPEC 2.3, pixels of disparity
+  double depth_break_px = 1.0;     ///< break threshold of SPEC 2.3, pixels of disparity
+  double mesh_tolerance_px = 0.5;  ///< of SPEC 5.1's reduced mesh, pixels of disparity
   /// The report's absolute thresholds, in scene units; when set they replace the scale-free ones.
   std::optional<double> absolute_delta;
   std::optional<double> absolute_depth_break;

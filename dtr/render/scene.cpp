@@ -99,7 +99,8 @@ double DisparityBaseline(const View& view) {
 
 InverseDepthThresholds ThresholdsOf(const View& view, const RenderOptions& options) {
   const double inverse_depth_per_px = 1 / (view.camera.fx_px() * DisparityBaseline(view));
-  return {options.delta_px * inverse_depth_per_px, options.depth_break_px * inverse_depth_per_px};
+  return {options.delta_px * inverse_depth_per_px, options.depth_break_px * inverse_depth_per_px,
+          inverse_depth_per_px, options.mesh_tolerance_px * inverse_depth_per_px};
 }
 
 }  // namespace dtr

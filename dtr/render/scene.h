@@ -1,6 +1,7 @@
 // dtr/render/scene.h -- what a renderer is given: source views and where the scene is.
 #pragma once
 #include <Eigen/Core>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -15,6 +16,8 @@ struct RenderScene {
   std::vector<const View*> views;  ///< in byte order of their ids; those drawn from are loaded
   Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< DtrSet::scene_center
   Bounds bounds;
+  /// SPEC 1.3 decided beforehand, for one novel camera and from more views than these.
+  std::optional<bool> per_pixel;
 };
 
 /// SPEC 0.4. The source views of the set's first frame, without those whose id or name is in
@@ -43,6 +46,8 @@ double DisparityBaseline(const View& view);
 struct InverseDepthThresholds {
   double delta = 0;
   double depth_break = 0;
+  double pixel = 0;           ///< one pixel of disparity
+  double mesh_tolerance = 0;  ///< SPEC 5.1: of a reduced mesh
 };
 InverseDepthThresholds ThresholdsOf(const View& view, const RenderOptions& options);
 

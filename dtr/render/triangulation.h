@@ -27,6 +27,7 @@ SampleGrid MakeSampleGrid(const View& view, int resolution);
 struct BreakRule {
   double inverse_depth = 0;              ///< scale-free threshold, a difference of 1/z
   std::optional<double> absolute_depth;  ///< the report's: largest difference of z, scene units
+  bool operator==(const BreakRule&) const = default;
 };
 
 /// SPEC 2.3. True when the edge from sample (x, y) to (x + dx, y + dy), neither of them empty,

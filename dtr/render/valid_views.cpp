@@ -9,6 +9,7 @@
 namespace dtr {
 
 bool NeedsPerPixelRule(const RenderScene& scene, const Pose& novel_from_world) {
+  if (scene.per_pixel) return *scene.per_pixel;
   if (!((novel_from_world * scene.center).z() > 0)) return true;
   size_t seeing = 0;
   for (const View* view : scene.views) {

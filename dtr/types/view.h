@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "dtr/types/block_cover.h"
 #include "dtr/types/camera.h"
 #include "dtr/types/depth_image.h"
 #include "dtr/types/grid.h"
@@ -55,8 +56,9 @@ struct View {
   double reference_baseline = 0;  ///< DESIGN section 3; the baseline of every figure in px
   Eigen::Vector3d gain = Eigen::Vector3d::Ones();  ///< linear RGB factor towards the set's mean
 
-  std::optional<StoredFile> image_file, depth_file, sigma_file, mask_file;
-  std::string extra_json;  ///< fields this version does not know, kept verbatim ("" = none)
+  std::optional<StoredFile> image_file, depth_file, sigma_file, mask_file, mesh_file;
+  std::optional<StoredMesh> mesh;  ///< of mesh_file, for this very depth and mask; may be absent
+  std::string extra_json;          ///< fields this version does not know, kept verbatim ("" = none)
 
   /// Camera of the depth grid: K scaled so that pixel (i, j)'s centre maps to s (i + 0.5, j + 0.5).
   PinholeCamera DepthCamera() const;

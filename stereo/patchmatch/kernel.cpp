@@ -19,8 +19,8 @@
 HWY_BEFORE_NAMESPACE();
 namespace dtr::stereo::patchmatch::HWY_NAMESPACE {
 
-/// Candidates per visit: the pixel's own plane, 4 near and 4 far regions.
-constexpr int kPlanes = 9;
+/// Candidates per visit: the pixel's own plane, 4 near and 4 far regions, 2 guesses.
+constexpr int kPlanes = 11;
 /// A view sees a pixel when more than this many candidates match well in it and fewer than that
 /// badly. ACMH's 2 and 3 take the sight from all views next to silhouettes and behind thin things.
 constexpr float kGoodPlanes = 1.0f, kBadPlanes = 7.0f;
@@ -115,6 +115,17 @@ void CollectCandidates(const State& state, const Group& g, int far_regions, Cand
   for (int i = 0; i < far_regions; ++i) {
     AddRegion(state, g, kDirections[i][0], kDirections[i][1], true, c);
   }
+  for (const State::Guess& guess : state.guesses) {
+    const VF w = LoadColour(guess.w, g.x, g.y);
+    const auto given = hn::Gt(w, hn::Zero(d));
+    if (hn::AllFalse(d, given)) continue;
+    const int n = c->count++;
+    hn::Store(hn::IfThenElse(given, w, hn::Load(d, c->w[0])), d, c->w[n]);
+    hn::Store(hn::IfThenElse(given, LoadColour(guess.a, g.x, g.y), hn::Load(d, c->a[0])), d,
+              c->a[n]);
+    hn::Store(hn::IfThenElse(given, LoadColour(guess.b, g.x, g.y), hn::Load(d, c->b[0])), d,
+              c->b[n]);
+  }
 }
 
 /// Joint view selection of ACMH without its sampling: a view in which several candidates match well
@@ -171,7 +182,7 @@ VF TotalCost(const Level& level, const Group& g, const Best& best, VF w, VF a, V
   for (size_t v = 0; v < level.sources.size(); ++v) {
     const VF weight = hn::Load(d, best.weight[v]);
     if (hn::AllTrue(d, hn::Eq(weight, hn::Zero(d)))) continue;
-    total = hn::MulAdd(weight, ScoreView(g, level.sources[v], v, w, a, b), total);
+    total = hn::MulAdd(weight, CostInView(g, level.sources[v], v, w, a, b), total);
     if (hn::AllTrue(d, hn::Ge(total, limit))) break;
   }
   return total;
@@ -199,7 +210,7 @@ void ChooseJointly(const Level& level, const Sweep& sweep, const State& state, c
     const VF w = hn::Load(d, c->w[n]), a = hn::Load(d, c->a[n]), b = hn::Load(d, c->b[n]);
     const auto outside = hn::Or(hn::Lt(w, w_min), hn::Gt(w, w_max));
     for (size_t v = 0; v < level.sources.size(); ++v) {
-      const VF cost = ScoreView(g, level.sources[v], v, w, a, b);
+      const VF cost = CostInView(g, level.sources[v], v, w, a, b);
       hn::Store(hn::IfThenElse(outside, hn::Set(d, kWorstCost), cost), d, c->cost[n][v]);
     }
   }
@@ -216,23 +227,6 @@ void ChooseJointly(const Level& level, const Sweep& sweep, const State& state, c
     hn::Store(hn::IfThenElse(less, hn::Load(d, c->w[n]), hn::Load(d, best->w)), d, best->w);
     hn::Store(hn::IfThenElse(less, hn::Load(d, c->a[n]), hn::Load(d, best->a)), d, best->a);
     hn::Store(hn::IfThenElse(less, hn::Load(d, c->b[n]), hn::Load(d, best->b)), d, best->b);
-  }
-}
-
-/// The same with the view weights the pixel has.
-void ChooseWithKnownViews(const Level& level, const State& state, const Group& g,
-                          const Candidates& c, Best* best) {
-  const DF d;
-  for (size_t v = 0; v < level.sources.size(); ++v) {
-    hn::Store(LoadColour(state.weight[v], g.x, g.y), d, best->weight[v]);
-  }
-  const VF infinity = hn::Set(d, std::numeric_limits<float>::infinity());
-  hn::Store(hn::Load(d, c.w[0]), d, best->w);
-  hn::Store(hn::Load(d, c.a[0]), d, best->a);
-  hn::Store(hn::Load(d, c.b[0]), d, best->b);
-  hn::Store(infinity, d, best->cost);
-  for (int n = 0; n < c.count; ++n) {
-    TryPlane(level, g, hn::Load(d, c.w[n]), hn::Load(d, c.a[n]), hn::Load(d, c.b[n]), best);
   }
 }
 
@@ -293,17 +287,12 @@ void SweepRowImpl(const Level& level, const Sweep& sweep, int y, State* state) {
   for (int x = (y + sweep.colour) % 2; x < width; x += 2 * static_cast<int>(kLanes)) {
     PrepareGroup(level, x, y, &g);
     CollectCandidates(*state, g, sweep.far_regions, &candidates);
-    if (sweep.choose_views) {
-      ChooseJointly(level, sweep, *state, g, &candidates, &best);
-    } else {
-      ChooseWithKnownViews(level, *state, g, candidates, &best);
-    }
+    ChooseJointly(level, sweep, *state, g, &candidates, &best);
     Refine(level, sweep, *state, g, &best);
     StoreColour(hn::Load(d, best.w), x, y, width, &state->w);
     StoreColour(hn::Load(d, best.a), x, y, width, &state->a);
     StoreColour(hn::Load(d, best.b), x, y, width, &state->b);
     StoreColour(hn::Load(d, best.cost), x, y, width, &state->cost);
-    if (!sweep.choose_views) continue;
     for (size_t v = 0; v < level.sources.size(); ++v) {
       StoreColour(hn::Load(d, best.weight[v]), x, y, width, &state->weight[v]);
     }
@@ -367,23 +356,57 @@ HWY_INLINE VF Vertex(VF before, VF here, VF after, VF* curvature) {
   return hn::Min(hn::Max(at, hn::Set(d, -1.0f)), hn::Set(d, 1.0f));
 }
 
+/// Shares of the views in a verdict. After rounds, a view counts by how well it agrees, in looks
+/// and in place; before, by what the sweeps found.
+void WeighViews(const Level& level, const State& state, const Group& g, VF w, VF a, VF b,
+                float (*weights)[kLanes]) {
+  const DF d;
+  VF largest = hn::Zero(d), sum = hn::Zero(d);
+  for (size_t v = 0; v < level.sources.size(); ++v) {
+    VF weight = LoadColour(state.weight[v], g.x, g.y);
+    if (level.sources[v].surface != nullptr) {
+      const VF cost = CostInView(g, level.sources[v], v, w, a, b);
+      weight = hn::Exp(d, hn::Mul(hn::Mul(cost, cost), hn::Set(d, -1.0f / 0.18f)));
+    }
+    largest = hn::Max(largest, weight);
+    hn::Store(weight, d, weights[v]);
+  }
+  const VF least = hn::Mul(largest, hn::Set(d, kLeastWeight));
+  for (size_t v = 0; v < level.sources.size(); ++v) {
+    const VF weight = hn::Load(d, weights[v]);
+    const VF kept = hn::IfThenZeroElse(hn::Lt(weight, least), weight);
+    hn::Store(kept, d, weights[v]);
+    sum = hn::Add(sum, kept);
+  }
+  for (size_t v = 0; v < level.sources.size(); ++v) {
+    hn::Store(hn::Div(hn::Load(d, weights[v]), sum), d, weights[v]);
+  }
+}
+
 void JudgeGroup(const Level& level, const State& state, const Group& g, Verdict* out) {
   const DF d;
   const VF zero = hn::Zero(d), one = hn::Set(d, 1.0f);
   HWY_ALIGN float weights[kMaxViews][kLanes];
-  for (size_t v = 0; v < level.sources.size(); ++v) {
-    hn::Store(LoadColour(state.weight[v], g.x, g.y), d, weights[v]);
-  }
   const VF w = LoadColour(state.w, g.x, g.y), a = LoadColour(state.a, g.x, g.y);
   const VF b = LoadColour(state.b, g.x, g.y);
+  WeighViews(level, state, g, w, a, b, weights);
   const VF px = DisparityPerInverseDepth(g, level, w, weights);
   const VF step = hn::Div(hn::Set(d, kJudgeStepPx), px);
-  VF before = zero, here = zero, after = zero, agreeing = zero;
+  VF before = zero, here = zero, after = zero, agreeing = zero, consistent = zero;
   HWY_ALIGN float vertex[kMaxViews][kLanes];
   HWY_ALIGN float certainty[kMaxViews][kLanes];
   for (size_t v = 0; v < level.sources.size(); ++v) {
     const Source& s = level.sources[v];
     const VF weight = hn::Load(d, weights[v]);
+    if (s.surface != nullptr) {
+      const VF off_px = RoundTripPx(g, s, LocateAllowed(g, s, v, w, a, b));
+      const auto is_near = hn::Lt(off_px, hn::Set(d, kConsistentPx));
+      consistent = hn::Add(consistent, hn::IfThenElseZero(is_near, one));
+    }
+    hn::Store(zero, d, vertex[v]);
+    hn::Store(zero, d, certainty[v]);
+    const auto counts = hn::Gt(weight, zero);
+    if (hn::AllFalse(d, counts)) continue;
     const VF c0 = ScoreView(g, s, v, hn::Sub(w, step), a, b), c1 = ScoreView(g, s, v, w, a, b);
     const VF c2 = ScoreView(g, s, v, hn::Add(w, step), a, b);
     before = hn::MulAdd(weight, c0, before);
@@ -391,7 +414,8 @@ void JudgeGroup(const Level& level, const State& state, const Group& g, Verdict*
     after = hn::MulAdd(weight, c2, after);
     VF curvature;
     const VF at = Vertex(c0, c1, c2, &curvature);
-    const auto agrees = hn::And(hn::Lt(c1, hn::Set(d, kAgreeingCost)), hn::Gt(curvature, zero));
+    const auto agrees =
+        hn::And(counts, hn::And(hn::Lt(c1, hn::Set(d, kAgreeingCost)), hn::Gt(curvature, zero)));
     agreeing = hn::Add(agreeing, hn::IfThenElseZero(agrees, one));
     hn::Store(at, d, vertex[v]);
     hn::Store(hn::IfThenElseZero(agrees, hn::Mul(weight, curvature)), d, certainty[v]);
@@ -411,15 +435,21 @@ void JudgeGroup(const Level& level, const State& state, const Group& g, Verdict*
   const VF noise =
       hn::Div(hn::Mul(hn::Set(d, 2.0f / kTaps), here), hn::Max(curvature, hn::Set(d, 1e-6f)));
   const VF sigma = hn::Mul(step, hn::Sqrt(hn::Add(noise, spread)));
-  HWY_ALIGN float lanes[5][kLanes];
+  HWY_ALIGN float lanes[6][kLanes];
+  hn::Store(consistent, d, lanes[5]);
   hn::Store(hn::MulAdd(step, at, w), d, lanes[0]);
   hn::Store(sigma, d, lanes[1]);
   hn::Store(here, d, lanes[2]);
   hn::Store(px, d, lanes[3]);
   hn::Store(agreeing, d, lanes[4]);
   for (int i = 0; i < static_cast<int>(kLanes) && g.x + 2 * i < level.reference.width; ++i) {
-    out[g.x + 2 * i] = {lanes[0][i], lanes[1][i],  lanes[2][i],
-                        lanes[3][i], g.texture[i], static_cast<int>(lanes[4][i])};
+    out[g.x + 2 * i] = {lanes[0][i],
+                        lanes[1][i],
+                        lanes[2][i],
+                        lanes[3][i],
+                        g.texture[i],
+                        static_cast<int>(lanes[4][i]),
+                        static_cast<int>(lanes[5][i])};
   }
 }
 

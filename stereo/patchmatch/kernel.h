@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "dtr/types/grid.h"
+#include "stereo/plane_map.h"
 
 namespace dtr::stereo::patchmatch {
 
@@ -27,18 +28,20 @@ constexpr int kTextureBorder = 16;
 constexpr float kWorstCost = 2.0f;
 
 /// A grid with `kBorder` extra pixels on every side, addressed from -kBorder on.
-class BorderedGrid {
+template <typename T>
+class Bordered {
  public:
-  BorderedGrid() = default;
-  BorderedGrid(int width, int height, float value)
+  Bordered() = default;
+  Bordered(int width, int height, T value)
       : grid_(width + 2 * kBorder, height + 2 * kBorder, 1, value) {}
   int stride() const { return grid_.width(); }
-  float* at(int x, int y) { return grid_.row(y + kBorder) + x + kBorder; }
-  const float* at(int x, int y) const { return grid_.row(y + kBorder) + x + kBorder; }
+  T* at(int x, int y) { return grid_.row(y + kBorder) + x + kBorder; }
+  const T* at(int x, int y) const { return grid_.row(y + kBorder) + x + kBorder; }
 
  private:
-  Grid<float> grid_;
+  Grid<T> grid_;
 };
+using BorderedGrid = Bordered<float>;
 
 /// A grey image as 8-bit blocks of 2x2: one 32-bit load fetches what bilinear sampling needs.
 struct Texture {
@@ -54,19 +57,32 @@ struct Source {
   /// Projection to texture index coordinates (pixel centre i at i + kTextureBorder).
   float m[9] = {};
   float k[3] = {};
+  /// The neighbour's own planes of the round before, if there was one; the factor from their
+  /// inverse depths to the level's; and the projection back, from texture index coordinates to
+  /// pixels of the reference.
+  const PlaneMap* surface = nullptr;
+  float surface_scale = 1;
+  float back_m[9] = {};
+  float back_k[3] = {};
 };
 
 /// The reference at one level; pixels outside the image have usable = 0.
 struct Reference {
   int width = 0, height = 0;
-  BorderedGrid grey;    ///< 0..255
-  BorderedGrid usable;  ///< 1 or 0
+  BorderedGrid grey;           ///< 0..255
+  Bordered<std::int32_t> rgb;  ///< r | g << 8 | b << 16, sRGB-coded
+  BorderedGrid usable;         ///< 1 or 0
 };
 
 /// Planes, costs and view weights of all pixels. Outside the image the cost is infinite.
 struct State {
   BorderedGrid w, a, b, cost;
   std::vector<BorderedGrid> weight;  ///< per source; they sum to 1
+  /// Planes that the neighbours' maps suggest, tried where w > 0; may be none.
+  struct Guess {
+    BorderedGrid w, a, b;
+  };
+  std::vector<Guess> guesses;
 };
 
 /// One level: what is matched. Inverse depths are in units in which the range's near end is 1.
@@ -79,23 +95,23 @@ struct Level {
 
 /// What one visit of a pixel tries.
 struct Sweep {
-  int colour = 0;            ///< of the checkerboard: pixels with (x + y) % 2 == colour
-  int round = 0;             ///< names the random numbers
-  int iteration = 0;         ///< of this level; the test for good views gets stricter
-  int far_regions = 4;       ///< strips of far pixels whose best plane is tried, 0 or 4
-  bool choose_views = true;  ///< work out view weights anew (costs all views for all planes)
-  bool jump = true;          ///< try a random inverse depth from the whole range
-  float step_px = 4;         ///< largest random change, pixels of disparity at the window's centre
+  int colour = 0;       ///< of the checkerboard: pixels with (x + y) % 2 == colour
+  int round = 0;        ///< names the random numbers
+  int iteration = 0;    ///< of this level; the test for good views gets stricter
+  int far_regions = 4;  ///< strips of far pixels whose best plane is tried, 0 or 4
+  bool jump = true;     ///< try a random inverse depth from the whole range
+  float step_px = 4;    ///< largest random change, pixels of disparity at the window's centre
 };
 
 /// Verdict on one pixel.
 struct Verdict {
-  float w = 0;        ///< inverse depth at the minimum of the cost
-  float sigma = 0;    ///< its standard deviation by the cost's curvature and the views' agreement
-  float cost = 0;     ///< weighted mean of 1 - NCC
-  float px = 0;       ///< pixels of disparity per unit of w in the views used
-  float texture = 0;  ///< variance of the window's pixels like its centre, grey levels squared
-  int agreeing = 0;   ///< views that see the same surface there
+  float w = 0;         ///< inverse depth at the minimum of the cost
+  float sigma = 0;     ///< its standard deviation by the cost's curvature and the views' agreement
+  float cost = 0;      ///< weighted mean of 1 - NCC
+  float px = 0;        ///< pixels of disparity per unit of w in the views used
+  float texture = 0;   ///< variance of the window's pixels like its centre, grey levels squared
+  int agreeing = 0;    ///< views that see the same surface there
+  int consistent = 0;  ///< views whose own planes lead back to the pixel (after rounds)
 };
 
 /// First guess: tries `samples` inverse depths spread over the range, half of them with a random

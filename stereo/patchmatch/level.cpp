@@ -37,6 +37,29 @@ Eigen::Matrix3d MatrixOf(const PinholeCamera& camera) {
   return k;
 }
 
+/// Colours of a photo shrunk to blocks of `side` pixels: the mean of those its mask allows.
+Bordered<std::int32_t> ColourOf(const StereoView& view, int width, int height, int side) {
+  const ImageRgb8& image = *view.image;
+  const bool masked = view.mask != nullptr && !view.mask->empty();
+  Bordered<std::int32_t> colour(width, height, 0);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      int sum[3] = {}, count = 0;
+      for (int j = side * y; j < side * (y + 1); ++j) {
+        for (int i = side * x; i < side * (x + 1); ++i) {
+          if (masked && (*view.mask)(i, j) == 0) continue;
+          for (int c = 0; c < 3; ++c) sum[c] += image(i, j, c);
+          ++count;
+        }
+      }
+      std::int32_t packed = 0;
+      for (int c = 0; c < 3 && count > 0; ++c) packed |= (sum[c] + count / 2) / count << (8 * c);
+      *colour.at(x, y) = packed;
+    }
+  }
+  return colour;
+}
+
 }  // namespace
 
 std::vector<Picture> Pyramid(Picture full, int levels) {
@@ -72,6 +95,7 @@ Level MakeLevel(const StereoView& view, const Picture& reference,
     std::copy_n(reference.grey.row(y), r.width, r.grey.at(0, y));
     for (int x = 0; x < r.width; ++x) *r.usable.at(x, y) = reference.usable(x, y) != 0 ? 1 : 0;
   }
+  r.rgb = ColourOf(view, r.width, r.height, 1 << index);
   const Eigen::Matrix3d reference_inverse = MatrixOf(reference.camera).inverse();
   // Texture index coordinates: pixel centre i + 0.5 lies at i + kTextureBorder.
   Eigen::Matrix3d shift = Eigen::Matrix3d::Identity();
@@ -87,9 +111,18 @@ Level MakeLevel(const StereoView& view, const Picture& reference,
     const Eigen::Matrix3d project = shift * MatrixOf(s.cameras[index]);
     const Eigen::Matrix3d m = project * rotation * reference_inverse;
     const Eigen::Vector3d k = project * t / range.near_z;
-    Source source{&s.textures[index], {}, {}};
+    const Eigen::Matrix3d unproject = project.inverse();
+    const Eigen::Matrix3d back = MatrixOf(reference.camera) * rotation.transpose();
+    const Eigen::Matrix3d back_m = back * unproject;
+    const Eigen::Vector3d back_k = -back * t / range.near_z;
+    Source source;
+    source.texture = &s.textures[index];
+    source.surface = index == 0 ? s.surface : nullptr;
+    source.surface_scale = static_cast<float>(range.near_z);
     for (int i = 0; i < 9; ++i) source.m[i] = static_cast<float>(m(i / 3, i % 3));
     for (int i = 0; i < 3; ++i) source.k[i] = static_cast<float>(k(i));
+    for (int i = 0; i < 9; ++i) source.back_m[i] = static_cast<float>(back_m(i / 3, i % 3));
+    for (int i = 0; i < 3; ++i) source.back_k[i] = static_cast<float>(back_k(i));
     level.sources.push_back(source);
   }
   return level;
@@ -103,6 +136,34 @@ State EmptyState(const Level& level) {
   state.cost = BorderedGrid(w, h, std::numeric_limits<float>::infinity());
   const float equal = 1.0f / static_cast<float>(level.sources.size());
   state.weight.assign(level.sources.size(), BorderedGrid(w, h, equal));
+  return state;
+}
+
+PlaneMap PlanesOf(const Level& level, const State& state, const DepthRange& range) {
+  const int w = level.reference.width, h = level.reference.height;
+  PlaneMap map{Grid<float>(w, h), Grid<float>(w, h), Grid<float>(w, h)};
+  const auto scale = static_cast<float>(1 / range.near_z);
+  for (int y = 0; y < h; ++y) {
+    for (int x = 0; x < w; ++x) {
+      map.inverse_depth(x, y) = scale * *state.w.at(x, y);
+      map.slope_x(x, y) = scale * *state.a.at(x, y);
+      map.slope_y(x, y) = scale * *state.b.at(x, y);
+    }
+  }
+  return map;
+}
+
+State StateOf(const Level& level, const PlaneMap& map, const DepthRange& range) {
+  State state = EmptyState(level);
+  const auto scale = static_cast<float>(range.near_z);
+  for (int y = 0; y < level.reference.height; ++y) {
+    for (int x = 0; x < level.reference.width; ++x) {
+      *state.w.at(x, y) = std::clamp(scale * map.inverse_depth(x, y), level.w_min, level.w_max);
+      *state.a.at(x, y) = scale * map.slope_x(x, y);
+      *state.b.at(x, y) = scale * map.slope_y(x, y);
+      *state.cost.at(x, y) = kWorstCost;
+    }
+  }
   return state;
 }
 

@@ -14,6 +14,7 @@ struct SourcePyramid {
   const StereoView* view = nullptr;
   std::vector<PinholeCamera> cameras;
   std::vector<Texture> textures;
+  const PlaneMap* surface = nullptr;  ///< its planes at full size, if known; borrowed
 };
 
 /// The picture and its halvings, `levels` in all. Requires sizes of at least 2^(levels - 1).
@@ -29,6 +30,10 @@ Level MakeLevel(const StereoView& view, const Picture& reference,
 
 /// Planes of nothing: cost infinite everywhere, equal weights.
 State EmptyState(const Level& level);
+
+/// Planes of all pixels in scene units, and back; weights and costs are not kept.
+PlaneMap PlanesOf(const Level& level, const State& state, const DepthRange& range);
+State StateOf(const Level& level, const PlaneMap& map, const DepthRange& range);
 
 /// Planes of a coarser level on the grid of the next finer one.
 State Upsampled(const State& coarse, const Level& coarse_level, const Level& level);

@@ -6,6 +6,7 @@
 
 #include "dtr/base/parallel_for.h"
 #include "dtr/base/random.h"
+#include "stereo/patchmatch/guesses.h"
 #include "stereo/patchmatch/level.h"
 #include "stereo/patchmatch/trust.h"
 
@@ -20,8 +21,15 @@ constexpr int kSmallestSidePx = 24;
 /// The first guess tries one inverse depth per pixel of disparity, within these bounds.
 constexpr double kLeastSamples = 48, kMostSamples = 128;
 /// Visits per pixel and level.
-constexpr int kCoarsestIterations = 5, kIterations = 3, kFinestIterations = 2;
+constexpr int kCoarsestIterations = 5, kIterations = 3, kFinestIterations = 1;
 constexpr float kFirstStepPx = 4.0f, kFinestStepPx = 1.0f;
+/// Rounds of geometric consistency, and visits per pixel in each.
+constexpr int kRounds = 2, kRefineIterations = 1;
+constexpr int kFirstRoundNumber = 1000;  // names random numbers apart from the search's
+/// Neighbours that the search asks; the rounds, which cost less, ask all: what few far views see,
+/// they settle. On plaza, share of all true pixels within 1 % before any check, with 5 and with 8
+/// in the rounds: 86.6 % and 88.0 %.
+constexpr int kSearchViews = 5;
 /// A pair whose rays to the middle of the range meet at less than this has no baseline.
 constexpr double kSmallestDisparityPx = 0.5;
 
@@ -50,14 +58,15 @@ double RangePx(const StereoView& view, const StereoView& other, const DepthRange
 /// The neighbours with a baseline, as pyramids.
 std::vector<SourcePyramid> MakeSources(std::span<const StereoView> views, int reference,
                                        std::span<const int> neighbours, const DepthRange& range,
-                                       int levels, int threads) {
-  std::vector<const StereoView*> usable;
+                                       std::span<const PlaneMap* const> maps, int most, int levels,
+                                       int threads) {
+  std::vector<int> usable;
   for (const int n : neighbours) {
     const StereoView& other = views[static_cast<size_t>(n)];
     if (RangePx(views[static_cast<size_t>(reference)], other, range) < kSmallestDisparityPx) {
       continue;
     }
-    if (static_cast<int>(usable.size()) < kMaxViews) usable.push_back(&other);
+    if (static_cast<int>(usable.size()) < most) usable.push_back(n);
   }
   if (usable.empty()) {
     throw NoUsablePair("view " + std::to_string(reference) + ": none of its " +
@@ -66,7 +75,8 @@ std::vector<SourcePyramid> MakeSources(std::span<const StereoView> views, int re
   std::vector<SourcePyramid> sources(usable.size());
   ParallelFor(0, static_cast<int>(usable.size()), threads, [&](int i) {
     const auto k = static_cast<size_t>(i);
-    sources[k] = MakeSource(*usable[k], levels);
+    sources[k] = MakeSource(views[static_cast<size_t>(usable[k])], levels);
+    if (!maps.empty()) sources[k].surface = maps[static_cast<size_t>(usable[k])];
   });
   return sources;
 }
@@ -138,20 +148,79 @@ State SearchPyramid(const StereoView& view, std::span<const Picture> pictures,
   return state;
 }
 
+/// What is matched with what, at all sizes.
+struct Problem {
+  Problem(std::span<const StereoView> views, int reference, std::span<const int> neighbours,
+          const DepthRange& depth_range, std::span<const PlaneMap* const> maps, int most_sources,
+          const EngineOptions& options)
+      : view(&views[static_cast<size_t>(reference)]), range(depth_range) {
+    CheckRequest(views, reference, neighbours, range);
+    const int levels = maps.empty() ? LevelsFor(views, reference, neighbours) : 1;
+    pictures = Pyramid(MakePicture(*view), levels);
+    sources = MakeSources(views, reference, neighbours, range, maps, most_sources, levels,
+                          options.threads);
+  }
+
+  State Search(const EngineOptions& options) {
+    return SearchPyramid(*view, pictures, sources, range, options, &finest);
+  }
+
+  State Resume(const PlaneMap& map, const EngineOptions& options) {
+    finest = MakeLevel(*view, pictures[0], sources, 0, range, HashOf(options.seed, 0));
+    return StateOf(finest, map, range);
+  }
+
+  const StereoView* view;
+  DepthRange range;
+  std::vector<Picture> pictures;
+  std::vector<SourcePyramid> sources;
+  Level finest;
+};
+
 }  // namespace
+
+int PatchMatchEngine::Rounds() const { return kRounds; }
+
+int PatchMatchEngine::Neighbours() const { return kMaxViews; }
 
 DepthEstimate PatchMatchEngine::Estimate(std::span<const StereoView> views, int reference,
                                          std::span<const int> neighbours, const DepthRange& range,
                                          const EngineOptions& options) const {
-  CheckRequest(views, reference, neighbours, range);
-  const StereoView& view = views[static_cast<size_t>(reference)];
-  const int levels = LevelsFor(views, reference, neighbours);
-  const std::vector<Picture> pictures = Pyramid(MakePicture(view), levels);
-  const std::vector<SourcePyramid> sources =
-      MakeSources(views, reference, neighbours, range, levels, options.threads);
-  Level level;
-  const State state = SearchPyramid(view, pictures, sources, range, options, &level);
-  return TrustedDepth(level, state, view, range, options.threads);
+  Problem problem(views, reference, neighbours, range, {}, kMaxViews, options);
+  const State state = problem.Search(options);
+  return TrustedDepth(problem.finest, state, *problem.view, range, options.threads);
+}
+
+PlaneMap PatchMatchEngine::Match(std::span<const StereoView> views, int reference,
+                                 std::span<const int> neighbours, const DepthRange& range,
+                                 const EngineOptions& options) const {
+  Problem problem(views, reference, neighbours, range, {}, kSearchViews, options);
+  return PlanesOf(problem.finest, problem.Search(options), range);
+}
+
+PlaneMap PatchMatchEngine::Refine(std::span<const StereoView> views, int reference,
+                                  std::span<const int> neighbours, const DepthRange& range,
+                                  std::span<const PlaneMap* const> maps, int round,
+                                  const EngineOptions& options) const {
+  Problem problem(views, reference, neighbours, range, maps, kMaxViews, options);
+  State state = problem.Resume(*maps[static_cast<size_t>(reference)], options);
+  GuessFromSurfaces(problem.finest, &state);
+  Sweep sweep;
+  sweep.jump = false;
+  sweep.far_regions = 0;  // far planes have come as near as they could
+  int number = kFirstRoundNumber * round;
+  RunSweeps(problem.finest, sweep, kRefineIterations, kFinestStepPx, options.threads, &number,
+            &state);
+  return PlanesOf(problem.finest, state, range);
+}
+
+DepthEstimate PatchMatchEngine::Judge(std::span<const StereoView> views, int reference,
+                                      std::span<const int> neighbours, const DepthRange& range,
+                                      std::span<const PlaneMap* const> maps,
+                                      const EngineOptions& options) const {
+  Problem problem(views, reference, neighbours, range, maps, kMaxViews, options);
+  const State state = problem.Resume(*maps[static_cast<size_t>(reference)], options);
+  return TrustedDepth(problem.finest, state, *problem.view, range, options.threads);
 }
 
 }  // namespace dtr::stereo

@@ -6,17 +6,31 @@ namespace dtr::stereo {
 
 /// PatchMatch multi-view stereo: a plane in inverse depth per pixel, spread over a checkerboard
 /// from near and far pixels, judged by bilateral NCC in the views that see the pixel, coarse to
-/// fine (Bleyer et al., BMVC 2011; Galliani et al., ICCV 2015; Xu and Tao, CVPR 2019). View weights
-/// are the selection probabilities themselves, random numbers are hashes of the pixel: nothing
-/// depends on history or threads. At most the first 8 neighbours are used. Memory does not depend
-/// on the number of threads: about 60 bytes per pixel of the reference and 6 per pixel of each
-/// neighbour.
+/// fine (Bleyer et al., BMVC 2011; Galliani et al., ICCV 2015; Xu and Tao, CVPR 2019). Then two
+/// rounds in which the neighbours' planes of the round before suggest planes of their own and a
+/// plane costs more the farther its round trip through a neighbour's map misses the pixel (Xu and
+/// Tao, sec. 4.2). View weights are the selection probabilities themselves, random numbers are
+/// hashes of the pixel: nothing depends on history or threads. The search uses the first 5
+/// neighbours, the rounds and Estimate, which is the search alone, the first 8. Memory does not
+/// depend on the number of threads: about 100 bytes per pixel of the reference and 18 per pixel of
+/// each neighbour.
 class PatchMatchEngine final : public Engine {
  public:
   std::string name() const override { return "patchmatch"; }
   DepthEstimate Estimate(std::span<const StereoView> views, int reference,
                          std::span<const int> neighbours, const DepthRange& range,
                          const EngineOptions& options) const override;
+  int Rounds() const override;
+  int Neighbours() const override;
+  PlaneMap Match(std::span<const StereoView> views, int reference, std::span<const int> neighbours,
+                 const DepthRange& range, const EngineOptions& options) const override;
+  PlaneMap Refine(std::span<const StereoView> views, int reference, std::span<const int> neighbours,
+                  const DepthRange& range, std::span<const PlaneMap* const> maps, int round,
+                  const EngineOptions& options) const override;
+  DepthEstimate Judge(std::span<const StereoView> views, int reference,
+                      std::span<const int> neighbours, const DepthRange& range,
+                      std::span<const PlaneMap* const> maps,
+                      const EngineOptions& options) const override;
 };
 
 }  // namespace dtr::stereo

@@ -8,13 +8,19 @@
 namespace dtr::stereo::patchmatch {
 namespace {
 
-/// Largest cost (1 - NCC, weighted mean of the views that count) of a pixel that is kept.
-constexpr float kLargestCost = 0.8f;
-/// Largest standard deviation of a kept pixel, pixels of disparity.
-constexpr float kLargestSigmaPx = 1.0f;
-/// Views that must see the surface. One is enough: what no second one sees, or sees elsewhere, the
-/// check against the neighbours' maps takes out.
-constexpr int kViewsThatMustAgree = 1;
+/// What a pixel must meet to be kept.
+struct Limits {
+  float cost;      ///< largest 1 - NCC, weighted mean of the views that count
+  float sigma_px;  ///< largest standard deviation, pixels of disparity
+  int agreeing;    ///< least number of views that see the surface
+};
+/// One view is enough: what no second one sees, or sees elsewhere, the check against the
+/// neighbours' maps takes out.
+constexpr Limits kAfterSearch{0.8f, 1.0f, 1};
+/// Rounds have settled the planes by what all views know: looks may differ more. On plaza, share of
+/// all true pixels within 1 % and outliers after all checks: 79.8 % and 1.1 % with the limits
+/// above, 84.2 % and 2.8 % with these.
+constexpr Limits kAfterRounds{1.0f, 4.0f, 0};
 /// Least variance of the pixels that look like the centre (grey levels squared). A window of sky at
 /// a roof has the roof's texture, and would get its depth.
 constexpr float kLeastTexture = 3.0f;
@@ -22,9 +28,13 @@ constexpr float kLeastTexture = 3.0f;
 /// connect across at most this many pixels of disparity.
 constexpr double kSpeckleShare = 1e-4;
 constexpr float kSpeckleStepPx = 1.0f;
+/// Bars of a fence and leaves are small too; they stay when on average so many views' planes lead
+/// to them. On plaza 0.6 % more true pixels within 1 %, 0.2 % more outliers.
+constexpr float kSpeckleSupport = 1.5f;
 
-/// Makes holes of small connected areas.
-void RemoveSpeckles(const Grid<float>& px_per_w, float near_z, DepthEstimate* estimate) {
+/// Makes holes of small connected areas. `consistent`: views whose planes lead to the pixel.
+void RemoveSpeckles(const Grid<float>& px_per_w, const Grid<std::uint8_t>& consistent, float near_z,
+                    DepthEstimate* estimate) {
   const int w = px_per_w.width(), h = px_per_w.height();
   const int least = static_cast<int>(std::ceil(kSpeckleShare * w * h));
   DepthImage& depth = estimate->depth;
@@ -47,9 +57,18 @@ void RemoveSpeckles(const Grid<float>& px_per_w, float near_z, DepthEstimate* es
         }
       }
       if (static_cast<int>(area.size()) >= least) continue;
+      int support = 0;
+      for (const auto& [x, y] : area) support += consistent(x, y);
+      if (static_cast<float>(support) >= kSpeckleSupport * static_cast<float>(area.size()))
+        continue;
       for (const auto& [x, y] : area) depth(x, y) = estimate->inverse_depth_sigma(x, y) = 0;
     }
   }
+}
+
+bool HasSurfaces(const Level& level) {
+  return std::any_of(level.sources.begin(), level.sources.end(),
+                     [](const Source& s) { return s.surface != nullptr; });
 }
 
 }  // namespace
@@ -59,23 +78,26 @@ DepthEstimate TrustedDepth(const Level& level, const State& state, const StereoV
   const int w = level.reference.width, h = level.reference.height;
   DepthEstimate result{DepthImage(w, h), Grid<float>(w, h)};
   Grid<float> px_per_w(w, h);
+  Grid<std::uint8_t> consistent(w, h);
+  const Limits limits = HasSurfaces(level) ? kAfterRounds : kAfterSearch;
   ParallelFor(0, h, threads, [&](int y) {
     std::vector<Verdict> row(static_cast<size_t>(w));
     JudgeRow(level, state, y, row.data());
     for (int x = 0; x < w; ++x) {
       const Verdict& v = row[static_cast<size_t>(x)];
       if (view.mask != nullptr && !view.mask->empty() && (*view.mask)(x, y) == 0) continue;
-      if (!(v.cost <= kLargestCost) || v.agreeing < kViewsThatMustAgree) continue;
+      if (!(v.cost <= limits.cost) || v.agreeing < limits.agreeing) continue;
       if (!(v.texture >= kLeastTexture)) continue;
-      if (!(v.sigma * v.px <= kLargestSigmaPx) || !(v.sigma > 0)) continue;
+      if (!(v.sigma * v.px <= limits.sigma_px) || !(v.sigma > 0)) continue;
       if (!(v.w >= level.w_min) || !(v.w <= level.w_max)) continue;
       result.depth(x, y) = static_cast<float>(range.near_z / static_cast<double>(v.w));
       result.inverse_depth_sigma(x, y) =
           static_cast<float>(static_cast<double>(v.sigma) / range.near_z);
       px_per_w(x, y) = v.px;
+      consistent(x, y) = static_cast<std::uint8_t>(v.consistent);
     }
   });
-  RemoveSpeckles(px_per_w, static_cast<float>(range.near_z), &result);
+  RemoveSpeckles(px_per_w, consistent, static_cast<float>(range.near_z), &result);
   return result;
 }
 

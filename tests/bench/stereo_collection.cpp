@@ -107,11 +107,11 @@ void Run(int argc, char** argv) {
   fs::create_directories(out);
   const Collection c = Load(argv[1], argv[2]);
   stereo::DepthMapsOptions options;
-  options.neighbours.count = number("--neighbours", options.neighbours.count);
   options.consistency.min_agreeing = number("--agree", options.consistency.min_agreeing);
   options.engine.threads = number("--threads", 0);
   const int every = number("--every", 1);
   const auto engine = stereo::MakeEngine(given.count("--engine") ? given["--engine"] : "sgbm");
+  options.neighbours.count = number("--neighbours", engine->Neighbours());
   TerminalProgress progress;
   const auto start = std::chrono::steady_clock::now();
   stereo::ComputeDepthMaps(

@@ -9,6 +9,7 @@
 #include "tests/calib/colmap/fake_colmap.h"
 #include "tests/cli/run_dtr.h"
 #include "tests/cli/small_courtyard.h"
+#include "tests/support/environment.h"
 #include "tests/support/test_data.h"
 
 namespace dtr::testing {
@@ -21,31 +22,12 @@ using ::testing::IsEmpty;
 
 constexpr int kFailed = 1, kWrongUsage = 2;
 
-// Sets an environment variable for its life time.
-class Environment {
- public:
-  Environment(const char* name, const std::string& value) : name_(name) {
-    if (const char* old = std::getenv(name)) old_ = old;
-    setenv(name, value.c_str(), 1);
-  }
-  ~Environment() { setenv(name_, old_.c_str(), 1); }
-  Environment(const Environment&) = delete;
-  Environment& operator=(const Environment&) = delete;
-
- private:
-  const char* name_;
-  std::string old_;
-};
-
 class BadInput : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     shared_ = new TemporaryFolder;
     MakeSmallCourtyard(*shared_ / "courtyard");
-    const fs::path c = *shared_ / "courtyard";
-    DtrOk({"import", "--cameras", (c / "cameras.json").string(), "--images",
-           (c / "images").string(), "--depth", (c / "depth").string(), "--holdout", "every:4", "-o",
-           (*shared_ / "good.dtr").string()});
+    ImportSmallCourtyard(*shared_ / "courtyard", *shared_ / "good.dtr");
   }
   static void TearDownTestSuite() { delete shared_; }
   static std::string Shared(const std::string& name) { return (*shared_ / name).string(); }
@@ -243,12 +225,34 @@ TEST_F(BadInput, SetsWithMissingOrDamagedFiles) {
   const auto length = fs::file_size(set / "depth/0001.png");
   io::WriteImage(set / "depth/0001.png", ImageRgb8(7, 5, 3));
   fs::resize_file(set / "depth/0001.png", length);
-  const Ran ran =
-      Dtr({"render", set.string(), "--renderer", "cpu", "--like", "0002", "-o", In("view.png")});
+  const Ran ran = Dtr({"evaluate", set.string(), "--renderer", "cpu"});
   EXPECT_EQ(ran.code, kFailed);
   EXPECT_EQ(ran.ErrorLines().size(), 1u) << ran.err;
   EXPECT_THAT(ran.err, HasSubstr("depth/0001.png: expected "));
-  EXPECT_FALSE(fs::exists(In("view.png")));
+}
+
+TEST_F(BadInput, AViewThatCannotBeReadIsLeftOutOfAPictureAndNamed) {
+  const fs::path set = Copy();
+  for (const char* file : {"depth/0001.png", "depth/0002.png"}) {
+    // The recorded length, another content: only reading it can tell.
+    WriteFileAtomically(set / file, std::string(fs::file_size(set / file), '?'));
+  }
+  const Ran ran = Dtr({"render", set.string(), "--renderer", "cpu", "--like", "0001", "-o",
+                       In("view.png"), "--json", In("render.json")});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.err, HasSubstr("WARNING: 0001.jpg is left out: "));
+  EXPECT_THAT(ran.err, HasSubstr("depth/0001.png: "));
+  const Json json = Json::parse(Text(In("render.json")));
+  ASSERT_EQ(json["skipped"].size(), 2u);
+  for (const Json& skipped : json["skipped"]) {
+    EXPECT_NE(skipped["name"], "");
+    EXPECT_THAT(skipped["reason"].get<std::string>(), HasSubstr("depth/000"));
+  }
+  for (const Json& name : json["frames"][0]["views_used"]) {
+    EXPECT_NE(name, "0001.jpg");
+    EXPECT_NE(name, "0002.jpg");
+  }
+  EXPECT_GT(json["frames"][0]["coverage"], 0.2);
 }
 
 TEST_F(BadInput, PicturesThatCannotBeAskedForOrWritten) {

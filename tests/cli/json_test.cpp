@@ -56,10 +56,12 @@ TEST(JsonInterface, NamesAreThoseOfTheDesign) {
   }
   EXPECT_EQ(evaluate["views"].at(0)["name"], "0000.jpg");
   ExpectNames(evaluate["depth"], {"share_within_1pct", "share_within_2pct", "median_relative_error",
-                                  "outlier_share", "depth_completeness"});
+                                  "outlier_share", "depth_completeness", "edge_displacement_px",
+                                  "share_within_1_sigma", "sparsification_ratio"});
 
   const Json render = OnStdout(
       {"render", set, "--renderer", "cpu", "--like", "0000", "-o", (folder / "view.png").string()});
+  EXPECT_TRUE(render["skipped"].is_array());
   ExpectNames(render["frames"].at(0), {"file", "ms", "views_used", "coverage"});
 
   const Json passed = OnStdout({"validate", set});

@@ -116,4 +116,11 @@ int FilesIn(const fs::path& folder) {
 
 std::string Text(const fs::path& file) { return ReadFile(file, kLimitBytes); }
 
+void ImportSmallCourtyard(const std::filesystem::path& courtyard,
+                          const std::filesystem::path& set) {
+  DtrOk({"import", "--cameras", (courtyard / "cameras.json").string(), "--images",
+         (courtyard / "images").string(), "--depth", (courtyard / "depth").string(), "--holdout",
+         "every:4", "-o", set.string()});
+}
+
 }  // namespace dtr::testing

@@ -49,4 +49,7 @@ int FilesIn(const std::filesystem::path& folder);
 
 std::string Text(const std::filesystem::path& file);
 
+/// A set of the folder that MakeSmallCourtyard made: true depth, every 4th view held out.
+void ImportSmallCourtyard(const std::filesystem::path& courtyard, const std::filesystem::path& set);
+
 }  // namespace dtr::testing

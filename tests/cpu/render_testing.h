@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <vector>
 
@@ -16,6 +17,14 @@ namespace dtr::testing {
 inline constexpr BlendWeight kAllWeights[] = {BlendWeight::kCosine, BlendWeight::kExponential,
                                               BlendWeight::kAngle, BlendWeight::kInverseAngle,
                                               BlendWeight::kKNearest};
+
+inline constexpr RenderMethod kBothMethods[] = {RenderMethod::kTwoPass, RenderMethod::kDeferred};
+
+inline RenderOptions OptionsOf(RenderMethod method) {
+  RenderOptions options;
+  options.method = method;
+  return options;
+}
 
 inline DtrSet SetOf(std::vector<View> views) {
   DtrSet set;
@@ -66,6 +75,20 @@ inline void ExpectSameBytes(const RenderResult& a, const RenderResult& b) {
   EXPECT_EQ(a.coverage.data(), b.coverage.data());
   EXPECT_EQ(a.view_count.data(), b.view_count.data());
   EXPECT_EQ(a.delta_border.data(), b.delta_border.data());
+}
+
+/// Every field of a result agrees with the others, and nothing is NaN or infinite.
+inline void ExpectSound(const RenderResult& result) {
+  for (size_t p = 0; p < result.coverage.data().size(); ++p) {
+    const float depth = result.depth.grid().data()[p];
+    ASSERT_TRUE(std::isfinite(depth) && depth >= 0);
+    const bool seen = result.coverage.data()[p] != 0;
+    ASSERT_EQ(seen, depth > 0);
+    ASSERT_EQ(seen, result.view_count.data()[p] > 0);
+    if (!seen) {
+      for (size_t c = 0; c < 3; ++c) ASSERT_EQ(result.image.data()[3 * p + c], 0);
+    }
+  }
 }
 
 }  // namespace dtr::testing

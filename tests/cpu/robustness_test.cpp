@@ -15,20 +15,6 @@ namespace {
 
 using namespace dtr::testing;
 
-/// Every field of a result agrees with the others, and nothing is NaN or infinite.
-void ExpectSound(const RenderResult& result) {
-  for (size_t p = 0; p < result.coverage.data().size(); ++p) {
-    const float depth = result.depth.grid().data()[p];
-    ASSERT_TRUE(std::isfinite(depth) && depth >= 0);
-    const bool seen = result.coverage.data()[p] != 0;
-    ASSERT_EQ(seen, depth > 0);
-    ASSERT_EQ(seen, result.view_count.data()[p] > 0);
-    if (!seen) {
-      for (size_t c = 0; c < 3; ++c) ASSERT_EQ(result.image.data()[3 * p + c], 0);
-    }
-  }
-}
-
 bool Empty(const RenderResult& result) {
   const auto& covered = result.coverage.data();
   return std::count(covered.begin(), covered.end(), 0) ==
@@ -44,7 +30,7 @@ TEST(Render, NoValidViewGivesAnEmptyPicture) {
   EXPECT_TRUE(result.views_used.empty());
   EXPECT_EQ(result.coverage_share, 0);
   ExpectSound(result);
-  RenderOptions filled;
+  RenderOptions filled = OptionsOf(RenderMethod::kTwoPass);
   filled.fill_holes = true;
   ExpectSound(Render(MakeRenderScene(set), behind.camera, behind.cam_from_world, filled));
   ExpectSound(Render(RenderScene{}, behind.camera, behind.cam_from_world, {}));
@@ -53,7 +39,7 @@ TEST(Render, NoValidViewGivesAnEmptyPicture) {
 TEST(Render, TheBackOfASurfaceIsNotShown) {
   const DtrSet set = SquareBeforePlane();
   for (const Primitive primitive : {Primitive::kMesh, Primitive::kSplat}) {
-    RenderOptions options;
+    RenderOptions options = OptionsOf(RenderMethod::kTwoPass);
     options.primitive = primitive;
     options.max_angle_rad = std::numbers::pi;
     const Shot behind = ShotFrom("n", {0, 0, 30}, {0, 0, 10});
@@ -80,7 +66,7 @@ TEST(Render, ACameraInsideTheGeometryCutsWhatIsBehindIt) {
     }
   }
   EXPECT_GT(seen, 1000);
-  RenderOptions splats;
+  RenderOptions splats = OptionsOf(RenderMethod::kTwoPass);
   splats.primitive = Primitive::kSplat;
   ExpectSound(Render(MakeRenderScene(set), novel.camera, novel.cam_from_world, splats));
 }
@@ -89,7 +75,7 @@ TEST(Render, OneTriangleThroughTheNearPlane) {
   // Two samples per axis and a camera between them: every triangle is cut.
   View view = Photograph(Plane({0, -1, 0.2}, -1), ShotFrom("a", {0, 0, 0}, {0, 1, 1}));
   DtrSet set = SetOf({view});
-  RenderOptions options;
+  RenderOptions options = OptionsOf(RenderMethod::kTwoPass);
   options.resolution = 40;
   options.max_angle_rad = std::numbers::pi;
   const Shot novel = ShotFrom("n", {0, 0.9, 1}, {0, 1.5, 2.6});
@@ -108,7 +94,7 @@ TEST(Render, SmallestPicturesAndEmptyDepth) {
   for (View& view : set.frames[0].views) view.depth = DepthImage(96, 72);
   const RenderResult none = Render(MakeRenderScene(set), pixel, LookAt({0, 0, 0}, {0, 0, 10}), {});
   EXPECT_TRUE(Empty(none));
-  RenderOptions coarse;
+  RenderOptions coarse = OptionsOf(RenderMethod::kTwoPass);
   coarse.resolution = 1000;
   EXPECT_TRUE(Empty(Render(MakeRenderScene(set), pixel, LookAt({0, 0, 0}, {0, 0, 10}), coarse)));
 }
@@ -137,7 +123,7 @@ TEST(Render, RefusesWhatHasNoMeaning) {
   EXPECT_THROW(Render(scene, Shot{}.camera, pose, {}), Error);
   const PinholeCamera huge(1 << 20, 1 << 20, 1, 1, 0, 0);
   EXPECT_THROW(Render(scene, huge, Pose{}, {}), UsageError);
-  RenderOptions options;
+  RenderOptions options = OptionsOf(RenderMethod::kTwoPass);
   options.views = 0;
   EXPECT_THROW(Render(scene, Shot{}.camera, Pose{}, options), UsageError);
 }
@@ -182,8 +168,9 @@ TEST(Render, RandomCamerasGiveNoNanAndNoInfinity) {
     for (int i = 0; i <= random.Index(5); ++i) views.push_back(RandomView(random, i));
     for (const View& view : views) scene.views.push_back(&view);
     const View novel = RandomView(random, 99);
-    RenderOptions options;
+    RenderOptions options = OptionsOf(RenderMethod::kTwoPass);
     options.views = 1 + random.Index(6);
+    options.method = static_cast<RenderMethod>(n % 2);
     options.primitive = static_cast<Primitive>(random.Index(2));
     options.blend = static_cast<BlendWeight>(random.Index(5));
     options.exponent = std::pow(10.0, random.Uniform(-3, 3));
@@ -215,7 +202,7 @@ std::vector<int> Unload(const Pose& novel_from_world, const RenderOptions& optio
 TEST(PartlyLoadedScene, DrawsTheSamePictureAsTheWholeOne) {
   const DtrSet whole = testing::SquareBeforePlane();
   const View novel = whole.frames[0].views[1];
-  RenderOptions options;
+  RenderOptions options = OptionsOf(RenderMethod::kTwoPass);
   options.views = 2;
   options.fill_holes = true;
   DtrSet part = whole;
@@ -260,7 +247,7 @@ TEST(FillHolesFromViews, GroundBetweenSparseSamplesStaysGround) {
       if (random.Index(50) != 0) depth = 0;
     }
   }
-  RenderOptions options;
+  RenderOptions options = OptionsOf(RenderMethod::kTwoPass);
   options.fill_holes = true;
   const std::vector<std::string> excluded = {novel.id};
   const RenderResult result =

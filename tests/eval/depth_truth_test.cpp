@@ -63,6 +63,19 @@ TEST(DepthScorer, TruthIsScaledToTheSet) {
   EXPECT_FALSE(scorer.Scores().share_within_1px.has_value());
 }
 
+TEST(DepthScorer, JudgesStatedSigmasAndSkipsPixelsWithoutOne) {
+  const Worked w;
+  Grid<float> sigma(8, 1);
+  sigma(1, 0) = 1e-3f;  // error 0.0005: inside
+  sigma(3, 0) = 2e-3f;  // error 0.0029: outside
+  DepthScorer scorer;
+  scorer.Add(w.estimate, w.truth, w.scored, 1, 500, &sigma);
+  EXPECT_DOUBLE_EQ(*scorer.Scores().sigma.share_within_1_sigma, 1 / 2.0);
+  EXPECT_DOUBLE_EQ(*scorer.Scores().sigma.share_within_2_sigma, 1.0);
+  const Grid<float> other(4, 1);
+  EXPECT_THROW(scorer.Add(w.estimate, w.truth, w.scored, 1, 500, &other), Error);
+}
+
 TEST(DepthScorer, NothingToScoreGivesNoFigures) {
   DepthScorer scorer;
   EXPECT_FALSE(scorer.Scores().share_within_1pct.has_value());

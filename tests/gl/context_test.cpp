@@ -8,6 +8,7 @@
 #include <fstream>
 
 #include "dtr/base/error.h"
+#include "dtr/gl/frame_timer.h"
 #include "dtr/gl/objects.h"
 #include "dtr/gl/program.h"
 #include "tests/gl/gl_testing.h"
@@ -44,6 +45,45 @@ TEST(EglContextDeathTest, AMachineWithoutADriverIsRefusedInOneLineThatNamesTheCp
               "OpenGL: expected a context of version 4.3 or newer.*--renderer cpu");
 }
 
+// What GlTest relies on: a call that the driver objects to does not pass unseen.
+TEST_F(Context, DebugOutputCountsWhatTheDriverObjectsTo) {
+  const DebugOutput output;
+  EXPECT_EQ(output.errors(), 0);
+  glEnable(GL_TEXTURE_WRAP_S);  // no capability
+  EXPECT_EQ(output.errors(), 1);
+  const char* const alarm = "a message of high severity";
+  glDebugMessageInsert(GL_DEBUG_SOURCE_APPLICATION, GL_DEBUG_TYPE_PERFORMANCE, 1,
+                       GL_DEBUG_SEVERITY_HIGH, -1, alarm);
+  EXPECT_EQ(output.errors(), 2);
+  glDebugMessageInsert(GL_DEBUG_SOURCE_APPLICATION, GL_DEBUG_TYPE_PERFORMANCE, 1,
+                       GL_DEBUG_SEVERITY_LOW, -1, "a hint");
+  EXPECT_EQ(output.errors(), 2);
+  EXPECT_EQ(glGetError(), GLenum{GL_INVALID_ENUM});
+}
+
+#ifndef NDEBUG
+TEST_F(Context, IsADebugContextInDevelopmentBuilds) {
+  GLint flags = 0;
+  glGetIntegerv(GL_CONTEXT_FLAGS, &flags);
+  EXPECT_NE(flags & GL_CONTEXT_FLAG_DEBUG_BIT, 0);
+}
+#endif
+
+TEST_F(Context, FramesOfASoftwareRasteriserHaveNoGpuClock) {
+  std::string why;
+  FrameTimer timer;
+  bool drew = false;
+  const auto ms = timer.GpuMilliseconds([&] {
+    glFlush();
+    drew = true;
+  });
+  EXPECT_TRUE(drew);
+  EXPECT_EQ(ms.has_value(), timer.has_gpu_clock());
+  if (SharedContext(&why)->Description().find("llvmpipe") != std::string::npos) {
+    EXPECT_FALSE(timer.has_gpu_clock());
+  }
+}
+
 TEST_F(Context, SaysWhatItIs) {
   std::string why;
   EXPECT_NE(SharedContext(&why)->Description().find("OpenGL 4."), std::string::npos);
@@ -74,7 +114,7 @@ TEST_F(Context, AShaderThatDoesNotCompileIsNamedWithItsLine) {
 }
 
 TEST_F(Context, EveryEmbeddedShaderSaysWhichStepItIs) {
-  EXPECT_EQ(EmbeddedShaders().size(), 13u);
+  EXPECT_EQ(EmbeddedShaders().size(), 17u);
   for (const EmbeddedShader& shader : EmbeddedShaders()) {
     EXPECT_FALSE(shader.text.empty()) << shader.name;
   }

@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "dtr/base/error.h"
 #include "dtr/gl/objects.h"
 #include "tests/gl/gl_testing.h"
+#include "tests/gl/moved_worlds.h"
 
 namespace dtr::gl {
 namespace {
@@ -15,61 +17,16 @@ namespace {
 using namespace dtr::testing;
 using Render = GlTest;
 
-// Single precision moves a vertex by 1e-4 px at most; a pixel on an outline may change hands, any
-// other by one level of 255.
-constexpr int kSameLevels = 1;
-constexpr double kOutlineShare = 0.005;
-
 RenderResult RenderOnce(const DtrSet& set, const Shot& novel, const RenderOptions& options = {}) {
   Renderer renderer;
   return renderer.Render(MakeRenderScene(set), novel.camera, novel.cam_from_world, options);
-}
-
-double ShareApart(const RenderResult& a, const RenderResult& b) {
-  long long apart = 0;
-  for (int y = 0; y < a.image.height(); ++y) {
-    for (int x = 0; x < a.image.width(); ++x) {
-      apart += PixelDifference(a.image, b.image, x, y) > kSameLevels ||
-               a.coverage(x, y) != b.coverage(x, y);
-    }
-  }
-  return static_cast<double>(apart) / static_cast<double>(a.coverage.data().size());
-}
-
-void ExpectSound(const RenderResult& result) {
-  for (size_t p = 0; p < result.coverage.data().size(); ++p) {
-    const float depth = result.depth.grid().data()[p];
-    ASSERT_TRUE(std::isfinite(depth) && depth >= 0);
-    const bool seen = result.coverage.data()[p] != 0;
-    ASSERT_EQ(seen, depth > 0);
-    ASSERT_EQ(seen, result.view_count.data()[p] > 0);
-    if (!seen) {
-      for (size_t c = 0; c < 3; ++c) ASSERT_EQ(result.image.data()[3 * p + c], 0);
-    }
-  }
-}
-
-/// The world scaled and moved; the picture must not know.
-DtrSet Moved(DtrSet set, double scale, const Eigen::Vector3d& offset) {
-  for (View& view : set.frames[0].views) {
-    const Eigen::Vector3d centre = scale * view.CenterInWorld() + offset;
-    view.cam_from_world.translation = -(view.cam_from_world.rotation * centre);
-    for (float& depth : view.depth.grid().data()) depth *= static_cast<float>(scale);
-  }
-  FinishGeometry(set);
-  return set;
-}
-Shot Moved(Shot shot, double scale, const Eigen::Vector3d& offset) {
-  const Eigen::Vector3d centre = scale * shot.cam_from_world.TargetOriginInSource() + offset;
-  shot.cam_from_world.translation = -(shot.cam_from_world.rotation * centre);
-  return shot;
 }
 
 TEST_F(Render, AnInputCameraAloneGivesItsOwnImageBack) {
   const DtrSet set = SquareBeforePlane();
   const View& view = set.frames[0].views[1];
   for (const Primitive primitive : {Primitive::kMesh, Primitive::kSplat}) {
-    RenderOptions options;
+    RenderOptions options = OptionsOf(RenderMethod::kTwoPass);
     options.views = 1;
     options.primitive = primitive;
     Renderer renderer;
@@ -80,21 +37,6 @@ TEST_F(Render, AnInputCameraAloneGivesItsOwnImageBack) {
   }
 }
 
-TEST_F(Render, DoesNotDependOnTheOrderOfTheViews) {
-  const NamedScene scene = ParityScenes()[1];
-  DtrSet reversed = scene.set;
-  std::reverse(reversed.frames[0].views.begin(), reversed.frames[0].views.end());
-  ExpectSameBytes(RenderOnce(scene.set, scene.novel), RenderOnce(reversed, scene.novel));
-  // A scene whose list is not sorted is drawn the same, too.
-  RenderScene views = MakeRenderScene(scene.set);
-  Renderer renderer;
-  const RenderResult expected =
-      renderer.Render(views, scene.novel.camera, scene.novel.cam_from_world, {});
-  std::rotate(views.views.begin(), views.views.begin() + 2, views.views.end());
-  ExpectSameBytes(expected,
-                  renderer.Render(views, scene.novel.camera, scene.novel.cam_from_world, {}));
-}
-
 TEST_F(Render, RepeatedCallsGiveTheSameBytes) {
   const NamedScene scene = ParityScenes()[1];
   const RenderScene views = MakeRenderScene(scene.set);
@@ -103,7 +45,7 @@ TEST_F(Render, RepeatedCallsGiveTheSameBytes) {
     return renderer.Render(views, scene.novel.camera, scene.novel.cam_from_world, options);
   };
   const RenderResult first = render({});
-  RenderOptions splats;
+  RenderOptions splats = OptionsOf(RenderMethod::kTwoPass);
   splats.primitive = Primitive::kSplat;
   splats.resolution = 2;
   render(splats);
@@ -113,70 +55,53 @@ TEST_F(Render, RepeatedCallsGiveTheSameBytes) {
   ExpectSameBytes(first, RenderOnce(scene.set, scene.novel));
 }
 
-TEST_F(Render, DoesNotDependOnTheUnitOrTheOriginOfTheWorld) {
+TEST_F(Render, APictureLeftOnTheGpuIsTheOneThatRenderReads) {
+  const NamedScene scene = ParityScenes()[1];
+  const RenderScene views = MakeRenderScene(scene.set);
+  Renderer renderer;
+  EXPECT_THROW(renderer.ReadBack(), std::logic_error);
+  for (const RenderMethod method : {RenderMethod::kTwoPass, RenderMethod::kDeferred}) {
+    RenderOptions options = OptionsOf(RenderMethod::kTwoPass);
+    options.method = method;
+    options.fill_holes = true;  // Draw fills nothing
+    const DrawnPicture drawn =
+        renderer.Draw(views, scene.novel.camera, scene.novel.cam_from_world, options);
+    EXPECT_TRUE(glIsTexture(drawn.image) && glIsTexture(drawn.depth) && glIsTexture(drawn.marks));
+    EXPECT_EQ(drawn.width_px, scene.novel.camera.width_px());
+    EXPECT_EQ(drawn.height_px, scene.novel.camera.height_px());
+    const RenderResult read = renderer.ReadBack();
+    options.fill_holes = false;
+    const RenderResult rendered =
+        renderer.Render(views, scene.novel.camera, scene.novel.cam_from_world, options);
+    ExpectSameBytes(read, rendered);
+    EXPECT_EQ(read.views_used, rendered.views_used);
+    EXPECT_EQ(drawn.views_used, rendered.views_used);
+    EXPECT_EQ(read.coverage_share, rendered.coverage_share);
+    EXPECT_GT(read.coverage_share, 0.5);
+    EXPECT_THROW(renderer.ReadBack(), std::logic_error);
+    RendererSettings little_memory;
+    little_memory.layer_bytes = 1;  // Render would go row by row
+    Renderer whole(little_memory);
+    whole.Draw(views, scene.novel.camera, scene.novel.cam_from_world, options);
+    ExpectSameBytes(whole.ReadBack(), rendered);
+  }
+  RenderOptions nothing_valid;
+  nothing_valid.max_angle_rad = 1e-9;
+  renderer.Draw(views, scene.novel.camera, scene.novel.cam_from_world, nothing_valid);
+  const RenderResult empty = renderer.ReadBack();
+  EXPECT_EQ(empty.coverage_share, 0);
+  ExpectSound(empty);
+}
+
+TEST_F(Render, WithoutClipControlTheSameIsSeen) {
+  RendererSettings plain;
+  plain.only_opengl_43 = true;
   for (const NamedScene& scene : ParityScenes()) {
-    const RenderResult expected = RenderOnce(scene.set, scene.novel);
-    for (const double scale : {1e-3, 1e3}) {
-      EXPECT_LE(ShareApart(expected, RenderOnce(Moved(scene.set, scale, {0, 0, 0}),
-                                                Moved(scene.novel, scale, {0, 0, 0}))),
-                kOutlineShare)
-          << scene.name << " x " << scale;
-    }
-    const Eigen::Vector3d offset(1e7, -1e7, 1e7);
-    EXPECT_LE(ShareApart(expected,
-                         RenderOnce(Moved(scene.set, 1, offset), Moved(scene.novel, 1, offset))),
-              kOutlineShare)
-        << scene.name << " at 1e7";
-  }
-}
-
-TEST_F(Render, RandomCamerasGiveNoNanAndNoContradiction) {
-  const std::vector<NamedScene> scenes = ParityScenes();
-  Random random(11);
-  for (const NamedScene& scene : scenes) {
-    const RenderScene views = MakeRenderScene(scene.set);
-    Renderer renderer;
-    for (int k = 0; k < 40; ++k) {
-      Shot shot;
-      const double degrees = k % 4 == 0 ? 170 : k % 4 == 1 ? 5 : random.Uniform(20, 120);
-      const int width = k % 7 == 0 ? 1 : 48, height = k % 7 == 0 ? 1 : 36;
-      const double focal = 0.5 * width / std::tan(degrees / 360 * 3.14159265358979323846);
-      shot.camera = PinholeCamera(width, height, focal, focal, width / 2.0, height / 2.0);
-      const View& near =
-          *views.views[static_cast<size_t>(random.Index(static_cast<int>(views.views.size())))];
-      // At an input camera, inside the geometry, anywhere.
-      const double reach = k % 3 == 0 ? 0 : k % 3 == 1 ? 1e-4 : 12;
-      const Eigen::Vector3d centre =
-          near.CenterInWorld() +
-          reach * Eigen::Vector3d(random.Normal(), random.Normal(), random.Normal());
-      shot.cam_from_world = LookAt(centre, {random.Normal(), random.Normal(), 8});
-      RenderOptions options;
-      options.primitive = k % 2 == 0 ? Primitive::kMesh : Primitive::kSplat;
-      options.blend = kAllWeights[k % 5];
-      options.method = k % 3 == 1 ? RenderMethod::kDeferred : RenderMethod::kTwoPass;
-      options.max_angle_rad = std::numbers::pi;
-      options.exponent = k % 5 == 0 ? 1000 : 8;
-      ExpectSound(renderer.Render(views, shot.camera, shot.cam_from_world, options));
-    }
-  }
-}
-
-TEST_F(Render, NoViewAndNoDepthGiveAnEmptyPicture) {
-  DtrSet set = SquareBeforePlane();
-  const Shot behind = ShotFrom("n", {0, 0, 30}, {0, 0, 10});
-  const RenderResult none = RenderOnce(set, behind);
-  EXPECT_TRUE(none.views_used.empty());
-  EXPECT_EQ(none.coverage_share, 0);
-  ExpectSound(none);
-  for (View& view : set.frames[0].views) {
-    std::fill(view.depth.grid().data().begin(), view.depth.grid().data().end(), 0.0f);
-  }
-  for (const Primitive primitive : {Primitive::kMesh, Primitive::kSplat}) {
-    RenderOptions options;
-    options.primitive = primitive;
-    const RenderResult holes = RenderOnce(set, ShotFrom("n", {0, 0, 0}, {0, 0, 10}), options);
-    EXPECT_EQ(holes.coverage_share, 0);
-    ExpectSound(holes);
+    Renderer renderer(plain);
+    const RenderResult found = renderer.Render(MakeRenderScene(scene.set), scene.novel.camera,
+                                               scene.novel.cam_from_world, {});
+    EXPECT_LE(ShareApart(RenderOnce(scene.set, scene.novel), found), kOutlineShare) << scene.name;
+    ExpectSound(found);
   }
 }
 
@@ -184,7 +109,7 @@ TEST_F(Render, ALargePictureIsDrawnInBandsWithoutASeam) {
   for (const NamedScene& scene : ParityScenes()) {
     const RenderScene views = MakeRenderScene(scene.set);
     for (const Primitive primitive : {Primitive::kMesh, Primitive::kSplat}) {
-      RenderOptions options;
+      RenderOptions options = OptionsOf(RenderMethod::kTwoPass);
       options.primitive = primitive;
       Renderer whole;
       Renderer banded({"", 20000});  // some 10 rows of 96 pixels from 5 views
@@ -199,10 +124,14 @@ TEST_F(Render, ALargePictureIsDrawnInBandsWithoutASeam) {
 }
 
 TEST_F(Render, LeavesTheContextsStateAsItWas) {
-  const GLenum on[] = {GL_DEPTH_TEST, GL_SCISSOR_TEST, GL_CULL_FACE, GL_BLEND,
-                       GL_PRIMITIVE_RESTART};
+  const GLenum on[] = {GL_POLYGON_OFFSET_FILL, GL_DEPTH_TEST, GL_SCISSOR_TEST,
+                       GL_CULL_FACE,           GL_BLEND,      GL_PRIMITIVE_RESTART};
   for (const GLenum name : on) glEnable(name);
   glViewport(3, 5, 70, 90);
+  glDepthFunc(GL_NOTEQUAL);
+  glDepthMask(GL_FALSE);
+  glDepthRange(0.25, 0.75);
+  if (HasClipControl()) glClipControl(GL_UPPER_LEFT, GL_ZERO_TO_ONE);
   glBlendEquation(GL_FUNC_REVERSE_SUBTRACT);
   glCullFace(GL_FRONT);
   glFrontFace(GL_CW);
@@ -230,6 +159,21 @@ TEST_F(Render, LeavesTheContextsStateAsItWas) {
     return std::vector<GLint>(v, v + 4);
   };
   EXPECT_EQ(value(GL_VIEWPORT), (std::vector<GLint>{3, 5, 70, 90}));
+  EXPECT_EQ(value(GL_DEPTH_FUNC)[0], GL_NOTEQUAL);
+  GLboolean depth_mask = GL_TRUE;
+  glGetBooleanv(GL_DEPTH_WRITEMASK, &depth_mask);
+  EXPECT_EQ(depth_mask, GL_FALSE);
+  GLdouble depth_range[2];
+  glGetDoublev(GL_DEPTH_RANGE, depth_range);
+  EXPECT_EQ(depth_range[0], 0.25);
+  EXPECT_EQ(depth_range[1], 0.75);
+  if (HasClipControl()) {
+    EXPECT_EQ(value(GL_CLIP_ORIGIN)[0], GL_UPPER_LEFT);
+    EXPECT_EQ(value(GL_CLIP_DEPTH_MODE)[0], GL_ZERO_TO_ONE);
+    glClipControl(GL_LOWER_LEFT, GL_NEGATIVE_ONE_TO_ONE);
+  }
+  glDepthMask(GL_TRUE);
+  glDepthRange(0, 1);
   EXPECT_EQ(value(GL_BLEND_EQUATION_RGB)[0], GL_FUNC_REVERSE_SUBTRACT);
   EXPECT_EQ(value(GL_CULL_FACE_MODE)[0], GL_FRONT);
   EXPECT_EQ(value(GL_FRONT_FACE)[0], GL_CW);
@@ -259,7 +203,7 @@ TEST_F(Render, WhatCannotBeDrawnIsNamed) {
   const NamedScene scene = ParityScenes().front();
   Renderer renderer;
   const RenderScene views = MakeRenderScene(scene.set);
-  RenderOptions options;
+  RenderOptions options = OptionsOf(RenderMethod::kTwoPass);
   options.views = 0;
   EXPECT_THROW(renderer.Render(views, scene.novel.camera, scene.novel.cam_from_world, options),
                UsageError);

@@ -86,6 +86,10 @@ TEST(Colour, EightBitValuesSurviveLinearLight) {
     EXPECT_NEAR(SrgbFromLinear(LinearFromSrgb(v / 255.0)), v / 255.0,
                 1e-7);  // the curve's own kink
   }
+  for (int i = 1; i < 100000; ++i) {
+    const double linear = i / 100000.0;
+    EXPECT_EQ(Srgb8FromLinear(linear), Srgb8FromSrgb(SrgbFromLinear(linear))) << linear;
+  }
   EXPECT_NEAR(LinearFromSrgb(0.5), 0.21404114048223255, 1e-15);
   EXPECT_EQ(Srgb8FromLinear(std::nan("")), 0);
   EXPECT_EQ(Srgb8FromLinear(-1), 0);

@@ -33,6 +33,50 @@ class WallEngine final : public Engine {
   int refuse = -1;
 };
 
+/// A plane's inverse depth is 1/4 + 0.001 view at first; a round adds a tenth of what the view and
+/// its neighbours had: any other order, or a map of the wrong round, shows.
+class RoundsEngine final : public Engine {
+ public:
+  std::string name() const override { return "rounds"; }
+  int Rounds() const override { return 2; }
+  DepthEstimate Estimate(std::span<const StereoView>, int, std::span<const int>, const DepthRange&,
+                         const EngineOptions&) const override {
+    throw Error("Estimate is not for engines with rounds");
+  }
+  PlaneMap Match(std::span<const StereoView>, int reference, std::span<const int>,
+                 const DepthRange&, const EngineOptions&) const override {
+    ++calls;
+    if (reference == refuse) throw NoUsablePair("view " + std::to_string(reference) + ": no pair");
+    return Flat(0.25f + 0.001f * static_cast<float>(reference));
+  }
+  PlaneMap Refine(std::span<const StereoView>, int reference, std::span<const int> neighbours,
+                  const DepthRange&, std::span<const PlaneMap* const> maps, int,
+                  const EngineOptions&) const override {
+    ++calls;
+    float sum = maps[static_cast<size_t>(reference)]->inverse_depth(0, 0);
+    for (const int n : neighbours) {
+      const PlaneMap* map = maps[static_cast<size_t>(n)];
+      if (map != nullptr) sum += 0.1f * map->inverse_depth(0, 0);
+    }
+    return Flat(sum);
+  }
+  DepthEstimate Judge(std::span<const StereoView>, int reference, std::span<const int>,
+                      const DepthRange&, std::span<const PlaneMap* const> maps,
+                      const EngineOptions&) const override {
+    DepthEstimate e{DepthImage(64, 48), Grid<float>(64, 48, 1, 0.01f)};
+    const float w = maps[static_cast<size_t>(reference)]->inverse_depth(0, 0);
+    for (float& z : e.depth.grid().data()) z = 1 / w;
+    return e;
+  }
+  mutable int calls = 0;
+  int refuse = -1;
+
+ private:
+  static PlaneMap Flat(float w) {
+    return {Grid<float>(64, 48, 1, w), Grid<float>(64, 48), Grid<float>(64, 48)};
+  }
+};
+
 class Recorder final : public Progress {
  public:
   void Stage(const std::string&, int) override {}
@@ -151,6 +195,53 @@ TEST(ComputeDepthMaps, GivenRangesReplaceThePoints) {
   EXPECT_EQ(Compute(row, engine, options, progress).size(), 3u);
   options.given_ranges.pop_back();
   EXPECT_THROW(Compute(row, engine, options, progress), UsageError);
+}
+
+TEST(RunRounds, ARoundReadsOnlyTheRoundBefore) {
+  RoundsEngine engine;
+  Recorder progress;
+  const Row row = Cameras(3);
+  const Results results = Compute(row, engine, Options(2, 4, 0), progress);
+  ASSERT_EQ(results.size(), 3u);
+  // By hand: w0 = 0.250, 0.251, 0.252; each round w_i += 0.1 (sum of the others).
+  double w[3] = {0.250, 0.251, 0.252};
+  for (int round = 0; round < 2; ++round) {
+    const double sum = w[0] + w[1] + w[2];
+    for (double& value : w) value += 0.1 * (sum - value);
+  }
+  for (size_t v = 0; v < 3; ++v) EXPECT_NEAR(results[v].second.depth(5, 5), 1 / w[v], 1e-5);
+  EXPECT_EQ(engine.calls, 9);
+}
+
+TEST(RunRounds, GoesOnFromWhatTheStoreHasToTheSameBytes) {
+  RoundsEngine engine;
+  Recorder progress;
+  const Row row = Cameras(4);
+  const Results undisturbed = Compute(row, engine, Options(2, 1, 0), progress);
+  engine.calls = 0;
+  PlaneMapsInMemory planes;
+  DepthMapsOptions options = Options(2, 1, 0);
+  options.planes = &planes;
+  Recorder impatient;
+  impatient.stop_after = 3;  // of the first round
+  EXPECT_THROW(Compute(row, engine, options, impatient), Interrupted);
+  EXPECT_EQ(engine.calls, 3);
+  const Results resumed = Compute(row, engine, options, progress);
+  EXPECT_EQ(engine.calls, 12);
+  ASSERT_EQ(resumed.size(), 4u);
+  for (size_t v = 0; v < 4; ++v) {
+    EXPECT_EQ(resumed[v].second.depth, undisturbed[v].second.depth);
+  }
+}
+
+TEST(RunRounds, AViewWithoutAPairHasNoPlanesForItsNeighboursEither) {
+  RoundsEngine engine;
+  engine.refuse = 1;
+  Recorder progress;
+  const Results results = Compute(Cameras(4), engine, Options(3, 1, 0), progress);
+  EXPECT_TRUE(DepthImage::IsHole(results[1].second.depth(32, 24)));
+  EXPECT_FALSE(DepthImage::IsHole(results[0].second.depth(32, 24)));
+  EXPECT_EQ(progress.notes.size(), 1u);
 }
 
 /// Two views of a wall; the second's map is at `other_z` everywhere.

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tests/stereo/synthetic_scene.h"
+#include "tests/stereo/engine_rig.h"
 
 namespace dtr::stereo {
 namespace {
@@ -14,7 +14,11 @@ namespace {
 using Eigen::Vector3d;
 using testing::Facing;
 using testing::Photograph;
+using testing::Quality;
 using testing::Shot;
+using testing::Slanted;
+using testing::SphereBeforeWall;
+using testing::ViewsOf;
 
 constexpr int kWidth = 160, kHeight = 120;
 constexpr double kFocal = 140;
@@ -26,61 +30,17 @@ constexpr double kMedianPx = 0.05;
 
 const PinholeCamera kCamera(kWidth, kHeight, kFocal, kFocal, 0.5 * kWidth, 0.5 * kHeight);
 
-testing::Surface Slanted() {
-  return testing::Plane(Vector3d(0.25, -0.35, 1).normalized(), 4 / Vector3d(0.25, -0.35, 1).norm());
-}
-
-testing::Surface SphereBeforeWall() {
-  return testing::Union({testing::Sphere({0, 0, 4}, 0.9), testing::Plane({0, 0, 1}, 6)});
-}
-
 std::vector<Shot> Shots(const testing::Surface& surface, const std::vector<Pose>& poses) {
-  std::vector<Shot> shots;
-  for (const Pose& pose : poses) shots.push_back(Photograph(surface, kCamera, pose, 0.35));
-  return shots;
+  return testing::ShotsOf(surface, kCamera, poses);
 }
 
 DepthEstimate EstimateFirst(const std::vector<StereoView>& views, const DepthRange& range = kRange,
                             int threads = 2) {
-  std::vector<int> neighbours;
-  for (int i = 1; i < static_cast<int>(views.size()); ++i) neighbours.push_back(i);
-  return MakeEngine("patchmatch")->Estimate(views, 0, neighbours, range, {.threads = threads});
+  return testing::EstimateFirstBy("patchmatch", views, range, threads);
 }
 
-std::vector<StereoView> ViewsOf(const std::vector<Shot>& shots) {
-  std::vector<StereoView> views;
-  for (const Shot& shot : shots) views.push_back(shot.View());
-  return views;
-}
-
-struct Quality {
-  double kept = 0, median_px = 0, mean_px = 0, bad_share = 0;
-};
-
-/// Errors in px of disparity at kBaseline; `mean_px` is signed, without outliers over 2 px.
 Quality Judge(const DepthEstimate& estimate, const DepthImage& truth) {
-  std::vector<double> errors;
-  double sum = 0;
-  int near = 0;
-  for (int y = 0; y < truth.height(); ++y) {
-    for (int x = 0; x < truth.width(); ++x) {
-      if (DepthImage::IsHole(estimate.depth(x, y))) continue;
-      const double off = kFocal * kBaseline * (1.0 / estimate.depth(x, y) - 1.0 / truth(x, y));
-      errors.push_back(std::abs(off));
-      if (std::abs(off) <= 2) sum += off, ++near;
-    }
-  }
-  Quality q;
-  if (errors.empty()) return q;
-  q.kept = static_cast<double>(errors.size()) / (truth.width() * truth.height());
-  q.bad_share = static_cast<double>(
-                    std::count_if(errors.begin(), errors.end(), [](double e) { return e > 1; })) /
-                static_cast<double>(errors.size());
-  std::nth_element(errors.begin(), errors.begin() + static_cast<long>(errors.size() / 2),
-                   errors.end());
-  q.median_px = errors[errors.size() / 2];
-  q.mean_px = near > 0 ? sum / near : 0;
-  return q;
+  return testing::JudgeAt(kFocal * kBaseline, estimate, truth);
 }
 
 TEST(PatchMatchEngine, FindsASlantedPlaneToAFractionOfAPixelFromTwoViews) {
@@ -156,6 +116,79 @@ TEST(PatchMatchEngine, InstructionSetsDifferInTheLastBitsOfTheSearchOnly) {
     hwy::GetChosenTarget().DeInit();
     const Quality q = Judge(EstimateFirst(views), shots[0].truth);
     // Rounding sends the random search other ways; what it finds is as good.
+    EXPECT_NEAR(q.kept, best.kept, 0.01);
+    EXPECT_NEAR(q.median_px, best.median_px, 0.005);
+    EXPECT_NEAR(q.bad_share, best.bad_share, 0.01);
+  }
+  hwy::SetSupportedTargetsForTest(0);
+  hwy::GetChosenTarget().DeInit();
+}
+
+/// The first view after all rounds, with every other view as everyone's neighbour.
+DepthEstimate AfterRounds(const std::vector<StereoView>& views, int threads = 2) {
+  const auto engine = MakeEngine("patchmatch");
+  const int count = static_cast<int>(views.size());
+  const auto others = [&](int view) {
+    std::vector<int> list;
+    for (int i = 0; i < count; ++i) {
+      if (i != view) list.push_back(i);
+    }
+    return list;
+  };
+  std::vector<PlaneMap> maps, next;
+  std::vector<const PlaneMap*> known(views.size());
+  for (int v = 0; v < count; ++v) {
+    maps.push_back(engine->Match(views, v, others(v), kRange, {.threads = threads}));
+  }
+  for (int round = 1; round <= engine->Rounds(); ++round, maps = std::move(next)) {
+    for (size_t v = 0; v < views.size(); ++v) known[v] = &maps[v];
+    next.clear();
+    for (int v = 0; v < count; ++v) {
+      next.push_back(
+          engine->Refine(views, v, others(v), kRange, known, round, {.threads = threads}));
+    }
+  }
+  for (size_t v = 0; v < views.size(); ++v) known[v] = &maps[v];
+  return engine->Judge(views, 0, others(0), kRange, known, {.threads = threads});
+}
+
+/// The sphere from the first `count` of: the middle, right, left, below, above.
+std::vector<Shot> SphereFrom(size_t count) {
+  std::vector<Pose> poses = {Facing({0, 0, 0}), Facing({kBaseline, 0, 0}),
+                             Facing({-kBaseline, 0, 0}), Facing({0, kBaseline, 0}),
+                             Facing({0, -kBaseline, 0})};
+  poses.resize(count);
+  return Shots(SphereBeforeWall(), poses);
+}
+
+TEST(PatchMatchEngine, RoundsFillWhatOneViewAloneGetsWrong) {
+  const auto shots = SphereFrom(5);
+  const auto views = ViewsOf(shots);
+  const Quality alone = Judge(EstimateFirst(views), shots[0].truth);
+  const Quality together = Judge(AfterRounds(views), shots[0].truth);
+  EXPECT_GT(together.kept * (1 - together.bad_share), alone.kept * (1 - alone.bad_share));
+  EXPECT_GT(together.kept, 0.97);
+  EXPECT_LT(together.median_px, kMedianPx);
+  EXPECT_LT(together.bad_share, 0.03);
+}
+
+TEST(PatchMatchEngine, TheNumberOfThreadsChangesNoBitOfTheRounds) {
+  const auto shots = SphereFrom(3);
+  const auto views = ViewsOf(shots);
+  const DepthEstimate one = AfterRounds(views, 1), three = AfterRounds(views, 3);
+  EXPECT_EQ(one.depth, three.depth);
+  EXPECT_EQ(one.inverse_depth_sigma, three.inverse_depth_sigma);
+}
+
+TEST(PatchMatchEngine, InstructionSetsDifferInTheLastBitsOfTheRoundsOnly) {
+  const auto shots = SphereFrom(2);
+  const auto views = ViewsOf(shots);
+  const Quality best = Judge(AfterRounds(views), shots[0].truth);
+  for (std::int64_t left = hwy::SupportedTargets() & HWY_TARGETS; left != 0; left &= left - 1) {
+    SCOPED_TRACE(hwy::TargetName(left & -left));
+    hwy::SetSupportedTargetsForTest(left & -left);
+    hwy::GetChosenTarget().DeInit();
+    const Quality q = Judge(AfterRounds(views), shots[0].truth);
     EXPECT_NEAR(q.kept, best.kept, 0.01);
     EXPECT_NEAR(q.median_px, best.median_px, 0.005);
     EXPECT_NEAR(q.bad_share, best.bad_share, 0.01);

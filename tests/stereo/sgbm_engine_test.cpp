@@ -6,7 +6,7 @@
 #include <cmath>
 #include <opencv2/core/utility.hpp>
 
-#include "tests/stereo/synthetic_scene.h"
+#include "tests/stereo/engine_rig.h"
 
 namespace dtr::stereo {
 namespace {
@@ -14,7 +14,11 @@ namespace {
 using Eigen::Vector3d;
 using testing::Facing;
 using testing::Photograph;
+using testing::Quality;
 using testing::Shot;
+using testing::Slanted;
+using testing::SphereBeforeWall;
+using testing::ViewsOf;
 
 constexpr int kWidth = 240, kHeight = 180;
 constexpr double kFocal = 200;
@@ -28,60 +32,17 @@ constexpr double kMinKept = 0.75;
 
 const PinholeCamera kCamera(kWidth, kHeight, kFocal, kFocal, 0.5 * kWidth, 0.5 * kHeight);
 
-testing::Surface Slanted() {
-  return testing::Plane(Vector3d(0.25, -0.35, 1).normalized(), 4 / Vector3d(0.25, -0.35, 1).norm());
-}
-
-testing::Surface SphereBeforeWall() {
-  return testing::Union({testing::Sphere({0, 0, 4}, 0.9), testing::Plane({0, 0, 1}, 6)});
-}
-
 std::vector<Shot> Shots(const testing::Surface& surface, const std::vector<Pose>& poses) {
-  std::vector<Shot> shots;
-  for (const Pose& pose : poses) shots.push_back(Photograph(surface, kCamera, pose, 0.35));
-  return shots;
+  return testing::ShotsOf(surface, kCamera, poses);
 }
 
 DepthEstimate EstimateFirst(const std::vector<StereoView>& views, const DepthRange& range = kRange,
                             int threads = 2) {
-  std::vector<int> neighbours;
-  for (int i = 1; i < static_cast<int>(views.size()); ++i) neighbours.push_back(i);
-  return MakeEngine("sgbm")->Estimate(views, 0, neighbours, range, {.threads = threads});
+  return testing::EstimateFirstBy("sgbm", views, range, threads);
 }
 
-std::vector<StereoView> ViewsOf(const std::vector<Shot>& shots) {
-  std::vector<StereoView> views;
-  for (const Shot& shot : shots) views.push_back(shot.View());
-  return views;
-}
-
-struct Quality {
-  double kept = 0, median_px = 0, mean_px = 0, bad_share = 0;
-};
-
-/// Errors in px of disparity at kBaseline; `mean_px` is signed, without outliers over 2 px.
 Quality Judge(const DepthEstimate& estimate, const DepthImage& truth) {
-  std::vector<double> errors;
-  double sum = 0;
-  int near = 0;
-  for (int y = 0; y < truth.height(); ++y) {
-    for (int x = 0; x < truth.width(); ++x) {
-      if (DepthImage::IsHole(estimate.depth(x, y))) continue;
-      const double off = kFocal * kBaseline * (1.0 / estimate.depth(x, y) - 1.0 / truth(x, y));
-      errors.push_back(std::abs(off));
-      if (std::abs(off) <= 2) sum += off, ++near;
-    }
-  }
-  Quality q;
-  if (errors.empty()) return q;
-  q.kept = static_cast<double>(errors.size()) / (truth.width() * truth.height());
-  q.bad_share = static_cast<double>(
-                    std::count_if(errors.begin(), errors.end(), [](double e) { return e > 1; })) /
-                static_cast<double>(errors.size());
-  std::nth_element(errors.begin(), errors.begin() + errors.size() / 2, errors.end());
-  q.median_px = errors[errors.size() / 2];
-  q.mean_px = sum / near;
-  return q;
+  return testing::JudgeAt(kFocal * kBaseline, estimate, truth);
 }
 
 TEST(SgbmEngine, FindsASlantedPlaneFromTwoViews) {

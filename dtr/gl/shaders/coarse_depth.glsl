@@ -1,31 +1,31 @@
-// SPEC 5.1: what the two rasterisers of the coarse surface share. Depth is kept as the bits of a
+// SPEC 5.1: what the rasterisers of the reduced meshes share. Depth is kept as the bits of a
 // positive float, whose order is that of unsigned numbers: atomicMax is exact and needs no order.
 layout(std430, binding = 2) buffer Depth { uint nearest[]; };
-layout(std430, binding = 1) readonly buffer Primitives { float primitives[]; };
+// What a group of invocations draws: first primitive; number of them, and from bit 8 on the
+// logarithm to base 2 of how many invocations share each.
+layout(std430, binding = 3) readonly buffer Batches { uvec2 batches[]; };
 
-uniform vec4 depth_camera;  // fx, fy, cx, cy of the depth grid, pixels
-uniform mat3 novel_from_view;
-uniform vec3 view_centre;   // in the novel frame, scene units
-uniform vec4 novel_camera;  // fx, fy, cx, cy, pixels
+// Position in half samples (x, y, 1) to the novel screen, homogeneous: x, y in pixels times z.
+uniform mat3 screen_from_grid;
+uniform vec3 screen_from_centre;  // the same for the view's centre; to be multiplied by 1/z
 uniform int width_px;
 uniform int first_row, rows;  // of the band
-uniform float near_z;       // scene units
-uniform int primitive_count;
+uniform float near_z;         // scene units
+uniform int first_batch, batch_count;  // of the view
 
-const int kGroup = 64;
-const int kRow = 65535 * kGroup;  // invocations in a row of groups, the least a driver allows
+// What this invocation's group draws.
+uvec2 Batch() {
+  int group = int(gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x);
+  return group < batch_count ? batches[first_batch + group] : uvec2(0u);
+}
 
-int Primitive() { return int(gl_GlobalInvocationID.y) * kRow + int(gl_GlobalInvocationID.x); }
-
-// The point at a depth-grid position, times its inverse depth w, in the novel frame.
-vec3 Homogeneous(vec2 position, float w) {
-  return novel_from_view * vec3((position - depth_camera.zw) / depth_camera.xy, 1.0) +
-         view_centre * w;
+// The point at a position of the grid, times its inverse depth w, on the novel screen.
+vec3 Homogeneous(uint half_samples, float w) {
+  return screen_from_grid * vec3(half_samples & 0xffffu, half_samples >> 16, 1.0) +
+         screen_from_centre * w;
 }
 
 bool InFront(vec3 q, float w) { return q.z > 0.0 && q.z >= near_z * w; }
-
-vec2 Screen(vec3 q) { return novel_camera.xy * (q.xy / q.z) + novel_camera.zw; }
 
 // First and last pixel whose centres lie in [low, high], cut to [begin, end); empty: first > last.
 ivec2 PixelRange(float low, float high, int begin, int end) {

@@ -1,9 +1,21 @@
-// SPEC 4.4: the colour a view shows at a point. Images are sRGB textures: texelFetch gives linear
-// light; alpha is 1 where a pixel is usable. Weighted by hand, since a texture unit blends with 8
-// bits and knows no mask. Expects `images`, an array of sampler2DArray.
+// SPEC 4.4: the colour a view shows at a point. Images hold sRGB values (SampledImage); alpha is 1
+// where a pixel is usable. Weighted by hand, since a texture unit blends with 8 bits. Expects
+// `images`, an array of sampler2DArray, and LINEAR_LIGHT.
 #include "view_block.glsl"
 
-// Linear RGB and 1; all 0 where every pixel around is masked. `pixel`: centre of the first at 0.5.
+vec3 SrgbFromLinear(vec3 linear) {
+  vec3 c = max(linear, 0.0);
+  return mix(1.055 * pow(c, vec3(1.0 / 2.4)) - 0.055, 12.92 * c,
+             lessThanEqual(c, vec3(0.0031308)));
+}
+
+vec3 LinearFromSrgb(vec3 srgb) {
+  return mix(pow((srgb + 0.055) / 1.055, vec3(2.4)), srgb / 12.92,
+             lessThanEqual(srgb, vec3(0.04045)));
+}
+
+// RGB in the values that are blended, and 1; all 0 where every pixel around is masked. `pixel`:
+// centre of the first at 0.5.
 vec4 ColourAt(ViewBlock view, vec2 pixel) {
   vec2 position = clamp(pixel - 0.5, vec2(0.0), view.limits.xy - 1.0);
   ivec2 low = ivec2(position);
@@ -21,16 +33,14 @@ vec4 ColourAt(ViewBlock view, vec2 pixel) {
                          texelFetch(images[slot], ivec3(high.x, low.y, layer), 0),
                          texelFetch(images[slot], ivec3(low.x, high.y, layer), 0),
                          texelFetch(images[slot], ivec3(high, layer), 0));
-  vec4 sum = vec4(0.0);
+  vec3 sum = vec3(0.0);
+  float usable = 0.0;
   for (int i = 0; i < 4; ++i) {
-    if (texel[i].a > 0.5) sum += weight[i] * vec4(texel[i].rgb, 1.0);
+#if LINEAR_LIGHT
+    texel[i].rgb = LinearFromSrgb(texel[i].rgb);
+#endif
+    sum += weight[i] * texel[i].rgb;
+    usable += weight[i] * texel[i].a;
   }
-  if (!(sum.a > 0.0)) return vec4(0.0);
-  return vec4(sum.rgb / sum.a * view.gain.rgb, 1.0);
-}
-
-vec3 SrgbFromLinear(vec3 linear) {
-  vec3 c = max(linear, 0.0);
-  return mix(1.055 * pow(c, vec3(1.0 / 2.4)) - 0.055, 12.92 * c,
-             lessThanEqual(c, vec3(0.0031308)));
+  return usable > 0.0 ? vec4(sum, 1.0) : vec4(0.0);
 }

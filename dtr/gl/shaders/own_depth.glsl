@@ -1,50 +1,97 @@
-// SPEC 5.2: a view's own fragment at a pixel, found on its full-resolution depth map from the
-// coarse depth. Expects `depths`, an array of sampler2DArray with 1/z per sample (0: none), and
-// PointInView, Centre.
-const int kRefinements = 3;
+// SPEC 5.2, 5.3: what a view's full-resolution depth map says of a surface at a pixel, and the
+// view's own fragment there. Expects `depths`, an array of sampler2DArray with one value per sample
+// (0: none) that a view's OwnMap turns into 1/z, filtered to the nearest and clamped to the edge.
+// No branch: software rasterisers run both sides of one anyway.
+struct OwnMap {
+  vec4 grid;    // 1 / columns, 1 / rows, columns / 2, rows / 2
+  vec4 stored;  // 1/z of a stored value v: x + y v; depth break and pixel of disparity (of 1/z)
+  int slot;     // of depths
+  int layer;    // in it
+};
 
-// Inverse depth of the view's surface at a position on the sample grid (centre of the first at
-// 0.5): bilinear where the four samples around belong together, else the nearest; 0: none.
-float OwnInverseDepth(ViewBlock view, vec2 position) {
-  ivec2 last = view.depth_slot.zw - 1;
-  vec2 p = position - 0.5;
-  if (any(lessThan(position, vec2(0.0))) || any(greaterThan(p, vec2(last) + 0.5))) return 0.0;
-  ivec2 low = clamp(ivec2(floor(p)), ivec2(0), last);
-  ivec2 high = min(low + 1, last);
-  vec2 share = clamp(p - vec2(low), 0.0, 1.0);
-#if DEPTH_ARRAYS == 1
-  const int slot = 0;
-#else
-  int slot = view.depth_slot.x;
-#endif
-  int layer = view.depth_slot.y;
-  vec4 w = vec4(texelFetch(depths[slot], ivec3(low, layer), 0).r,
-                texelFetch(depths[slot], ivec3(high.x, low.y, layer), 0).r,
-                texelFetch(depths[slot], ivec3(low.x, high.y, layer), 0).r,
-                texelFetch(depths[slot], ivec3(high, layer), 0).r);
-  float lowest = min(min(w.x, w.y), min(w.z, w.w)), highest = max(max(w.x, w.y), max(w.z, w.w));
-  if (lowest > 0.0 && highest - lowest <= view.limits.w) {
-    return mix(mix(w.x, w.y, share.x), mix(w.z, w.w, share.x), share.y);
-  }
-  return share.y < 0.5 ? (share.x < 0.5 ? w.x : w.y) : (share.x < 0.5 ? w.z : w.w);
+// SPEC 5.2: what the views say of a surface.
+struct Votes {
+  float held, refused;
+  float behind;  // 1/z of the nearest surface that a view sees through it; 0: none
+};
+
+const float kFirstBeforePx = 1.0, kBeforePx = 0.5, kBehindPx = 2.0, kSettledPx = 0.25;
+const float kHoleSay = 0.25;
+const int kTriedSurfaces = 3;
+
+bool IsWithin(OwnMap map, float nearer, float before_px) {
+  return nearer <= before_px * map.stored.w && nearer >= -kBehindPx * map.stored.w;
 }
 
-// The inverse depth in the novel camera at which the ray meets the view's surface near `coarse`;
-// 0 where the view shows another surface there, or none.
-float OwnFragment(ViewBlock view, vec3 ray, float coarse) {
-  float w = coarse;
-  float along_ray = PointInView(view, ray, 0.0).z;  // z in the view is (along_ray - away w) / w
-  float away = dot(vec3(view.row_x.z, view.row_y.z, view.row_z.z), Centre(view));
-  for (int i = 0; i < kRefinements; ++i) {
-    vec3 p = PointInView(view, ray, w);
-    if (!(p.z > 0.0)) return 0.0;
-    vec2 position = view.depth_grid.xy * (p.xy / p.z) + view.depth_grid.zw;
-    float own = OwnInverseDepth(view, position);
-    if (!(own > 0.0)) return 0.0;
-    float next = own * along_ray / (1.0 + own * away);
-    // The tolerance of the coarse surface and of a sample drawn flat: beyond it is another surface.
-    if (!(abs(next - coarse) <= view.gain.w)) return 0.0;
-    w = next;
-  }
-  return w > 0.0 ? w : 0.0;
+// On the map, whose first sample's centre is at 0.5; `q`: position, homogeneous.
+bool IsOnMap(OwnMap map, vec3 q, vec2 position) {
+  return q.z > 0.0 && all(lessThanEqual(abs(position - map.grid.zw), map.grid.zw));
+}
+
+#if DEPTH_ARRAYS == 1
+#define DEPTHS(map) depths[0]
+#else
+#define DEPTHS(map) depths[map.slot]
+#endif
+
+// At inverse depth w the pixel's ray is at (base + away w) on the view's grid of samples,
+// homogeneous. The first step from `surface`: the inverse depth in the novel camera at which the
+// ray meets the nearest sample, taken flat; 0: there is none. `on_map`: the view looks there at all.
+float FirstStep(OwnMap map, vec3 base, vec3 away, float surface, out bool on_map) {
+  vec3 q = base + away * surface;
+  vec2 position = q.xy / q.z;
+  on_map = surface > 0.0 && IsOnMap(map, q, position);
+  position = on_map ? position : vec2(0.0);  // what is not a number addresses no texel
+  float stored = textureLod(DEPTHS(map), vec3(position * map.grid.xy, map.layer), 0.0).r;
+  float own = map.stored.x + map.stored.y * stored;
+  float facing = 1.0 - own * away.z;
+  return on_map && stored > 0.0 && facing > 0.0 ? own * base.z / facing : 0.0;
+}
+
+// The view's say of `surface`, where its first step led to `seen`.
+void AddVote(OwnMap map, float surface, float seen, bool on_map, float say, inout Votes votes) {
+  say = on_map ? say : 0.0;
+  float nearer = seen - surface;
+  bool hole = !(seen > 0.0);
+  bool through = !hole && nearer < -kBehindPx * map.stored.w;
+  bool holds = !hole && !through && nearer <= kFirstBeforePx * map.stored.w;
+  votes.refused += hole ? kHoleSay * say : (through ? say : 0.0);
+  votes.held += holds ? say : 0.0;
+  votes.behind = max(votes.behind, on_map && through ? seen : 0.0);
+}
+
+// The second step, from where the first led: the inverse depth at which the ray meets the tangent
+// of the bilinear patch where the four samples around belong together, else the nearest sample; 0
+// where the view shows another surface there, or none. `position`: of the fragment, on the grid.
+float SecondStep(OwnMap map, vec3 base, vec3 away, float surface, float first, out vec2 position) {
+  vec3 q = base + away * first;
+  position = q.xy / q.z;
+  bool found = first > 0.0 && IsWithin(map, first - surface, kFirstBeforePx) &&
+               IsOnMap(map, q, position);
+  position = found ? position : vec2(0.0);
+
+  vec2 low = floor(position - 0.5), share = position - 0.5 - low;
+  // The corner between the four, so that rounding cannot choose others than `share` speaks of.
+  vec4 s = textureGather(DEPTHS(map), vec3((low + 1.0) * map.grid.xy, map.layer)).wzxy;
+  float lowest = min(min(s.x, s.y), min(s.z, s.w)), highest = max(max(s.x, s.y), max(s.z, s.w));
+  bool whole = lowest > 0.0 && map.stored.y * (highest - lowest) <= map.stored.z;
+  float top = mix(s.x, s.y, share.x), bottom = mix(s.z, s.w, share.x);
+  vec2 column = share.x < 0.5 ? s.xz : s.yw;
+  float stored = whole ? mix(top, bottom, share.y) : (share.y < 0.5 ? column.x : column.y);
+  vec2 slope =
+      (whole ? map.stored.y : 0.0) * vec2(mix(s.y - s.x, s.w - s.z, share.y), bottom - top);
+  float own = map.stored.x + map.stored.y * stored;
+
+  // The view's own 1/z at grid point q is w / q.z, so that plane . q = w on the tangent plane.
+  vec3 plane = vec3(slope, own - dot(slope, position));
+  float facing = 1.0 - dot(plane, away);
+  float w = dot(plane, base) / facing;
+  q = base + away * w;
+  position = q.xy / q.z;
+  // The first step took the nearest sample flat: half a sample's slope is its error.
+  float room = kSettledPx * map.stored.w + 0.5 * (abs(slope.x) + abs(slope.y));
+  found = found && stored > 0.0 && facing > 0.0 && w > 0.0 &&
+          IsWithin(map, w - surface, kBeforePx) && abs(w - first) <= room && q.z > 0.0;
+  position = found ? position : vec2(0.0);
+  return found ? w : 0.0;
 }

@@ -7,7 +7,7 @@ layout(std430, binding = 2) readonly buffer Depth { uint nearest[]; };  // SPEC 
 uniform sampler2DArray depths[DEPTH_ARRAYS];
 uniform int width_px;
 #else
-uniform sampler2DArray layers;  // 1/z in the novel camera, a layer per view; 0: no fragment
+uniform sampler2DArray layers;  // near_z / z in the novel camera, a layer per view; 0: none
 #endif
 uniform sampler2DArray images[IMAGE_ARRAYS];
 #include "view_block.glsl"
@@ -54,6 +54,54 @@ vec3 PointInView(ViewBlock view, vec3 ray, float w) {
 
 #if DEPTH_ARRAYS
 #include "own_depth.glsl"
+
+OwnMap MapOf(ViewBlock view) {
+  vec2 size = vec2(view.depth_slot.zw);
+  return OwnMap(vec4(1.0 / size, 0.5 * size),
+                vec4(view.stored_depth.xy, view.limits.w, view.stored_depth.z), view.depth_slot.x,
+                view.depth_slot.y);
+}
+
+// A point of the view's frame on its grid of samples, homogeneous.
+vec3 OnGrid(ViewBlock view, vec3 p) {
+  return vec3(view.depth_grid.xy * p.xy + view.depth_grid.zw * p.z, p.z);
+}
+vec3 BaseOf(ViewBlock view, vec3 ray) { return OnGrid(view, PointInView(view, ray, 0.0)); }
+vec3 AwayOf(ViewBlock view) { return OnGrid(view, PointInView(view, vec3(0.0), 1.0)); }
+
+// 1 / (tan^2 t + t_pixel^2), t the angle of SPEC 4.5 at the point ray / w; 0 from 90 degrees on.
+float Say(ViewBlock view, vec3 ray, float w) {
+  vec3 to_view = Centre(view) * w - ray;
+  float along = dot(to_view, -ray);
+  if (!(along > 0.0)) return 0.0;
+  vec3 across = cross(to_view, ray);
+  return 1.0 / (dot(across, across) / (along * along) + pixel_angle_rad * pixel_angle_rad);
+}
+
+// SPEC 5.2, 5.3: every view's fragment on the nearest surface that the views hold together.
+bool FindOwnFragments(vec3 ray, float surface) {
+  bool held = false;
+  for (int tried = 0; tried < kTriedSurfaces && surface > 0.0 && !held; ++tried) {
+    Votes votes = Votes(0.0, 0.0, 0.0);
+    for (int i = 0; i < view_count; ++i) {
+      ViewBlock view = views[i];
+      OwnMap map = MapOf(view);
+      bool on_map;
+      fragment[i] = FirstStep(map, BaseOf(view, ray), AwayOf(view), surface, on_map);
+      AddVote(map, surface, fragment[i], on_map, Say(view, ray, surface), votes);
+    }
+    held = votes.held >= votes.refused;
+    if (!held) surface = votes.behind;
+  }
+  if (!held) return false;
+  for (int i = 0; i < view_count; ++i) {
+    ViewBlock view = views[i];
+    vec2 position;
+    fragment[i] =
+        SecondStep(MapOf(view), BaseOf(view, ray), AwayOf(view), surface, fragment[i], position);
+  }
+  return true;
+}
 #endif
 
 vec2 SourcePixel(ViewBlock view, vec3 p) { return view.camera.xy * (p.xy / p.z) + view.camera.zw; }
@@ -98,15 +146,16 @@ void main() {
 
   // SPEC 4.2: front and border.
 #if DEPTH_ARRAYS
-  float coarse = uintBitsToFloat(nearest[target.y * width_px + target.x]);
-  if (!(coarse > 0.0)) return;
+  float surface = uintBitsToFloat(nearest[target.y * width_px + target.x]);
+  if (!FindOwnFragments(ray, surface)) return;
 #endif
   float front = 0.0, border = -kLargestFloat;
   for (int i = 0; i < view_count; ++i) {
 #if DEPTH_ARRAYS
-    float w = OwnFragment(views[i], ray, coarse);
+    float w = fragment[i];
 #else
-    float w = texelFetch(layers, ivec3(target, i), 0).r;
+    float depth = texelFetch(layers, ivec3(target, i), 0).r;
+    float w = depth < 1.0 ? depth * views[i].stored_depth.y : 0.0;  // SPEC 2.5; beyond: rounding
 #endif
     fragment[i] = 0.0;
     if (!(w > 0.0) || !Exists(views[i], ray, w)) continue;
@@ -172,9 +221,6 @@ void main() {
     if (all_zero) ++blended;
     ViewBlock view = views[i];
     vec3 colour = ColourAt(view, SourcePixel(view, PointInView(view, ray, fragment[i]))).rgb;
-#if !LINEAR_LIGHT
-    colour = SrgbFromLinear(colour);
-#endif
     sum += weight * vec4(colour, 1.0);
   }
   vec3 mean = sum.rgb / sum.a;

@@ -12,7 +12,7 @@ uniform float near_z;         // scene units
 uniform float sample_step;    // R, depth pixels
 uniform float point_size;
 
-flat out vec4 square;  // centre (pixels), half side (pixels), inverse depth
+flat out vec4 square;  // centre (pixels), half side (pixels), near_z / z
 
 const float kSubpixels = 2048.0;   // SPEC 2.4
 const float kLargestHalfPx = 32.0; // SPEC 3.2
@@ -41,7 +41,7 @@ void main() {
   float half_px = min(0.5 * point_size * max(extent.x, extent.y), kLargestHalfPx);
   vec2 centre = novel_camera.xy * (q.xy / q.z) + novel_camera.zw;
   centre = floor(centre * kSubpixels + 0.5) / kSubpixels;
-  square = vec4(centre, half_px, w / q.z);
+  square = vec4(centre, half_px, near_z * w / q.z);
 
   int corner = gl_VertexID & 3;
   vec2 side = vec2((corner & 1) == 0 ? -1.0 : 1.0, (corner & 2) == 0 ? -1.0 : 1.0);

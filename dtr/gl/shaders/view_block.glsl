@@ -1,4 +1,4 @@
-// One view as the shaders know it; the same text is read by C++ (dtr/gl/renderer.cpp) and GLSL.
+// One view as the shaders know it; the same text is read by C++ (dtr/gl/resolve.cpp) and GLSL.
 // Lengths stay in scene units, so nothing here depends on the world's origin: positions are
 // relative to the novel camera and were formed in double precision (SPEC 0.5).
 #ifdef __cplusplus
@@ -12,11 +12,13 @@ struct ViewBlock {
   vec4 row_y;   // second row, translation y
   vec4 row_z;   // third row, translation z
   vec4 camera;  // fx, fy, cx, cy of the view's image, pixels
-  vec4 gain;    // linear RGB factor; what still is the same surface (SPEC 5.2)
   vec4 limits;  // image width, height (pixels), Delta, depth break (differences of 1/z)
   ivec4 image;  // texture array, layer in it, 1 if the view has a mask, unused
-  vec4 depth_grid;   // fx, fy, cx, cy of the grid of samples (SPEC 5.2)
+  vec4 depth_grid;   // fx, fy, cx, cy of the grid of samples (SPEC 5.3)
   ivec4 depth_slot;  // texture array, layer in it, columns, rows
+  // 1/z of a stored value v is x + y v (two passes: of the layer's); z: a pixel of disparity as a
+  // difference of 1/z (SPEC 0.3)
+  vec4 stored_depth;
 };
 #ifdef __cplusplus
 #undef vec4

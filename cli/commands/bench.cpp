@@ -1,0 +1,137 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <thread>
+
+#include "cli/bench_tables.h"
+#include "cli/command.h"
+#include "cli/novel_frames.h"
+#include "cli/render_options.h"
+#include "cli/renderers.h"
+#include "cli/view_names.h"
+#include "dtr/base/machine.h"
+#include "dtr/eval/bench_json.h"
+#include "dtr/io/set_io.h"
+
+namespace dtr::cli {
+namespace {
+
+struct Options {
+  std::filesystem::path set;
+  std::string table = "report", size, like;
+  std::vector<int> views, resolutions = {1, 2};
+  int repeats = 10, cameras = 2;
+  RendererChoice renderer;
+  std::shared_ptr<RenderOptions> render;
+};
+
+eval::BenchMachine MachineOf(const eval::TimedRenderer& renderer) {
+  return {CpuModel(), static_cast<int>(std::thread::hardware_concurrency()), renderer.Description(),
+          DTR_VERSION, renderer.HasGpuClock() ? "gpu timer" : "wall"};
+}
+
+int RunReportTable(const Options& options, const RenderOptions& render, const DtrSet& set,
+                   eval::TimedRenderer& renderer, const Context& context) {
+  eval::BenchOptions bench;
+  bench.render = render;
+  bench.views = options.views;
+  std::sort(bench.views.begin(), bench.views.end());
+  bench.resolutions = options.resolutions;
+  bench.repeats = options.repeats;
+  bench.cameras = options.cameras;
+  bench.timed_camera = [&](const PinholeCamera& camera) { return WithSize(camera, options.size); };
+  const eval::BenchReport report = eval::MeasureReportTable(set, bench, renderer, context.console);
+  const eval::BenchMachine machine = MachineOf(renderer);
+  SayReportTable(report, machine, context.console);
+  context.EmitJson(eval::ToJson(report, machine));
+  return kDone;
+}
+
+int RunGrowthTable(const Options& options, RenderOptions render, const DtrSet& set,
+                   eval::TimedRenderer& renderer, const Context& context) {
+  if (!options.views.empty()) render.views = options.views.front();
+  render.resolution = options.resolutions.front();
+  NovelCamera novel;
+  if (options.like.empty()) {
+    // Between cameras, where no view has the picture already; the middle is seen by most.
+    constexpr int kStepsOfPath = 9;
+    novel = FlyThrough(set, kStepsOfPath)[kStepsOfPath / 2];
+  } else {
+    const View& view = FindView(set, options.like);
+    novel = {view.camera, view.cam_from_world};
+  }
+  novel.camera = WithSize(novel.camera, options.size);
+  const auto series =
+      eval::MeasureGrowth(set, novel, {render, options.repeats}, renderer, context.console);
+  const eval::BenchMachine machine = MachineOf(renderer);
+  SayGrowthTable(series, render.method, machine, context.console);
+  context.EmitJson(eval::ToJson(series, render.method, machine));
+  return kDone;
+}
+
+int RunBench(const Options& options, const Context& context) {
+  // Before anything is loaded: a machine without OpenGL should say so at once.
+  const auto renderer = MakeTimedRenderer(options.renderer, context.console);
+  RenderOptions render = *options.render;
+  render.threads = context.common.threads;
+  io::LoadOptions load;
+  load.held_out = true;
+  load.threads = context.common.threads;
+  const DtrSet set = io::LoadSet(options.set, load);
+  return options.table == "growth" ? RunGrowthTable(options, render, set, *renderer, context)
+                                   : RunReportTable(options, render, set, *renderer, context);
+}
+
+void DeclareOptions(CLI::App& command, Options& options) {
+  command.add_option("SET", options.set, "The set")->required();
+  command
+      .add_option("--table", options.table,
+                  "report: frames a second by views used and resolution, with the truth beside; "
+                  "growth: how times grow with views, pixels and the size of the set [report]")
+      ->check(CLI::IsMember({"report", "growth"}))
+      ->type_name("report|growth");
+  command.add_option("--size", options.size, "Size of the timed pictures; 0 keeps the proportions")
+      ->type_name("WxH");
+  command
+      .add_option("--repeats", options.repeats, "Timed frames per row, after an untimed one [10]")
+      ->check(CLI::Range(1, 100000))
+      ->type_name("N");
+  command
+      .add_option("--cameras", options.cameras,
+                  "report: so many held-out photos (or left-out ones) to look from [2]")
+      ->check(CLI::Range(1, 100000))
+      ->type_name("N");
+  command.add_option("--like", options.like, "growth: from a view's place [between two]")
+      ->type_name("VIEW");
+  AddRendererOptions(command, options.renderer);
+  options.render = AddRenderOptions(command);
+  // Here rows have them, one after the other; filling is timed apart.
+  for (const char* single : {"--views", "--resolution", "--fill-holes"}) {
+    command.remove_option(command.get_option(single));
+  }
+  command
+      .add_option("--views", options.views,
+                  "Numbers of views used, a row each [3,5,6,8,9,12,14]; growth: the one for rows "
+                  "that do not change it [8]")
+      ->delimiter(',')
+      ->check(CLI::Range(1, 1024))
+      ->type_name("K,...");
+  command.add_option("--resolution", options.resolutions, "Every R-th depth pixel per axis [1,2]")
+      ->delimiter(',')
+      ->check(CLI::Range(1, 1024))
+      ->type_name("R,...");
+}
+
+}  // namespace
+
+void AddBenchCommand(CLI::App& app) {
+  AddCommand(app, "bench", "Time a set's frames and measure what they are worth",
+             "dtr bench scene.dtr --table report", [](CLI::App& command) -> Action {
+               auto options = std::make_shared<Options>();
+               DeclareOptions(command, *options);
+               return [options](const Context& context) { return RunBench(*options, context); };
+             });
+}
+
+}  // namespace dtr::cli

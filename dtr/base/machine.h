@@ -1,0 +1,14 @@
+// dtr/base/machine.h -- what a measurement ran on, and how much of it it used.
+#pragma once
+#include <string>
+
+namespace dtr {
+
+/// The processor as it calls itself, "unknown" where the system does not say.
+std::string CpuModel();
+
+/// Processor time of this process so far, all threads, in milliseconds. Unlike a clock on the wall
+/// it does not count what other programs used.
+double ProcessCpuMilliseconds();
+
+}  // namespace dtr

@@ -1,0 +1,213 @@
+#include "dtr/cpu/own_depth.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dtr/base/parallel_for.h"
+#include "dtr/render/blend_weights.h"
+#include "dtr/render/scene.h"
+#include "dtr/render/triangulation.h"
+
+namespace dtr::cpu {
+namespace {
+
+// SPEC 5.2 and 5.3, in pixels of disparity.
+constexpr double kFirstBeforePx = 1, kBeforePx = 0.5, kBehindPx = 2, kSettledPx = 0.25;
+
+// SPEC 5.2: a hole says less against a surface than a depth behind it; so many surfaces of a pixel
+// are tried.
+constexpr double kHoleSay = 0.25;
+constexpr int kTriedSurfaces = 3;
+
+/// What the views say of a surface; shares of their weights.
+struct Votes {
+  double held = 0, refused = 0;
+  double behind = 0;  ///< 1/z of the nearest surface that a view sees through it; 0: none
+};
+
+/// The view's surface around a position of its grid: w = inverse_depth at the position, slopes per
+/// sample.
+struct Patch {
+  double inverse_depth = 0;  ///< 0: none
+  Eigen::Vector2d slope = Eigen::Vector2d::Zero();
+};
+
+class OwnFragmentFinder {
+ public:
+  OwnFragmentFinder(const ViewInNovel& view_in_novel, const RenderOptions& options)
+      : samples_(MakeSampleGrid(*view_in_novel.view, options.resolution)),
+        thresholds_(ThresholdsOf(*view_in_novel.view, options)),
+        center_(view_in_novel.translation) {
+    const PinholeCamera camera = view_in_novel.view->DepthCamera();
+    const double origin = samples_.Centre(0), step = samples_.step;
+    Eigen::Matrix3d grid_from_view;
+    grid_from_view << camera.fx_px() / step, 0, (camera.cx_px() - origin) / step,  //
+        0, camera.fy_px() / step, (camera.cy_px() - origin) / step,                //
+        0, 0, 1;
+    grid_from_novel_ = grid_from_view * view_in_novel.rotation.transpose();
+    minus_center_ = -grid_from_novel_ * view_in_novel.translation;
+  }
+
+  bool HasSamples() const { return !samples_.inverse_depth.empty(); }
+
+  /// Adds what the view says of a surface at 1/z = `start` on `ray`.
+  void Vote(const Eigen::Vector3d& ray, double start, double pixel_angle_rad, Votes& votes) const {
+    const Eigen::Vector3d base = grid_from_novel_ * ray;
+    const auto position = PositionOnGrid(base, start);
+    if (!position) return;
+    const double say = Say(ray, start, pixel_angle_rad);
+    const double seen = Meet(base, *position, {NearestSample(*position)});
+    if (!(seen > 0)) {
+      votes.refused += kHoleSay * say;
+    } else if (seen - start < -kBehindPx * thresholds_.pixel) {
+      votes.refused += say;
+      votes.behind = std::max(votes.behind, seen);
+    } else if (seen - start <= kFirstBeforePx * thresholds_.pixel) {
+      votes.held += say;
+    }  // else the view looks at something before it
+  }
+
+  /// 1/z in the novel camera where `ray` (z = 1, novel frame) meets the view's surface near
+  /// `start`; 0 where the view shows another surface there, or none.
+  double Find(const Eigen::Vector3d& ray, double start) const {
+    const Eigen::Vector3d base = grid_from_novel_ * ray;
+    const auto position = PositionOnGrid(base, start);
+    if (!position) return 0;
+    const double first = Meet(base, *position, {NearestSample(*position)});
+    if (!Within(first - start, kFirstBeforePx)) return 0;
+    const auto settled = PositionOnGrid(base, first);
+    if (!settled) return 0;
+    const Patch patch = PatchAt(*settled);
+    const double w = Meet(base, *settled, patch);
+    if (!Within(w - start, kBeforePx)) return 0;
+    // The first step took the nearest sample flat: half a sample's slope is its error.
+    const double room = kSettledPx * thresholds_.pixel + 0.5 * patch.slope.lpNorm<1>();
+    return w > 0 && std::abs(w - first) <= room && (base + minus_center_ * w).z() > 0 ? w : 0;
+  }
+
+ private:
+  bool Within(double nearer, double before_px) const {
+    return nearer <= before_px * thresholds_.pixel && nearer >= -kBehindPx * thresholds_.pixel;
+  }
+
+  /// 1 / (tan^2 t + t_pixel^2), t the angle of SPEC 4.5 at the point ray / w; 0 from 90 degrees on.
+  double Say(const Eigen::Vector3d& ray, double w, double pixel_angle_rad) const {
+    const Eigen::Vector3d to_view = center_ * w - ray;
+    const double dot = to_view.dot(-ray);
+    if (!(dot > 0)) return 0;
+    const double tangent_squared = to_view.cross(ray).squaredNorm() / (dot * dot);
+    return 1 / (tangent_squared + pixel_angle_rad * pixel_angle_rad);
+  }
+
+  /// Where the point at inverse depth w on the ray falls on the grid of samples, the centre of the
+  /// first at (0, 0); empty behind the view and off the depth map. `base`: the ray on the grid.
+  std::optional<Eigen::Vector2d> PositionOnGrid(const Eigen::Vector3d& base, double w) const {
+    const Eigen::Vector3d q = base + minus_center_ * w;
+    if (!(w > 0) || !(q.z() > 0)) return std::nullopt;
+    const Eigen::Vector2d position = q.head<2>() / q.z();
+    const Grid<double>& grid = samples_.inverse_depth;
+    const bool inside = position.x() >= -0.5 && position.y() >= -0.5 &&
+                        position.x() <= grid.width() - 0.5 && position.y() <= grid.height() - 0.5;
+    return inside ? std::optional(position) : std::nullopt;
+  }
+
+  double NearestSample(const Eigen::Vector2d& position) const {
+    const Grid<double>& grid = samples_.inverse_depth;
+    return grid(std::clamp(static_cast<int>(std::floor(position.x() + 0.5)), 0, grid.width() - 1),
+                std::clamp(static_cast<int>(std::floor(position.y() + 0.5)), 0, grid.height() - 1));
+  }
+
+  /// The tangent of the bilinear patch where the four samples around belong together, else the
+  /// nearest sample, flat.
+  Patch PatchAt(const Eigen::Vector2d& position) const {
+    const Grid<double>& grid = samples_.inverse_depth;
+    const double left = std::floor(position.x()), top = std::floor(position.y());
+    const double u = position.x() - left, v = position.y() - top;
+    const int x0 = std::max(static_cast<int>(left), 0), y0 = std::max(static_cast<int>(top), 0);
+    const int x1 = std::min(static_cast<int>(left) + 1, grid.width() - 1);
+    const int y1 = std::min(static_cast<int>(top) + 1, grid.height() - 1);
+    const double a = grid(x0, y0), b = grid(x1, y0), c = grid(x0, y1), d = grid(x1, y1);
+    const auto [lowest, highest] = std::minmax({a, b, c, d});
+    if (!(lowest > 0 && highest - lowest <= thresholds_.depth_break)) {
+      return {NearestSample(position)};
+    }
+    return {(1 - v) * ((1 - u) * a + u * b) + v * ((1 - u) * c + u * d),
+            {(1 - v) * (b - a) + v * (d - c), (1 - u) * (c - a) + u * (d - b)}};
+  }
+
+  /// 1/z in the novel camera where the ray meets the patch's plane; 0 where it shows its back or
+  /// there is no patch.
+  double Meet(const Eigen::Vector3d& base, const Eigen::Vector2d& position,
+              const Patch& patch) const {
+    if (!(patch.inverse_depth > 0)) return 0;
+    // The view's own w at grid point q is w_novel / q.z: on the plane (slope, rest) . q = w_novel.
+    const Eigen::Vector3d plane(patch.slope.x(), patch.slope.y(),
+                                patch.inverse_depth - patch.slope.dot(position));
+    const double facing = 1 - plane.dot(minus_center_);
+    return facing > 0 ? plane.dot(base) / facing : 0;
+  }
+
+  const SampleGrid samples_;
+  const InverseDepthThresholds thresholds_;
+  const Eigen::Vector3d center_;  // of the view, in the novel frame
+  // Grid position, homogeneous, of the point ray / w: grid_from_novel_ ray + minus_center_ w.
+  Eigen::Matrix3d grid_from_novel_;
+  Eigen::Vector3d minus_center_;
+};
+
+}  // namespace
+
+std::vector<double> NearestSurface(std::span<const Layer> layers) {
+  std::vector<double> nearest = layers.front().inverse_depth;
+  for (const Layer& layer : layers.subspan(1)) {
+    for (size_t p = 0; p < nearest.size(); ++p) {
+      nearest[p] = std::max(nearest[p], layer.inverse_depth[p]);
+    }
+  }
+  return nearest;
+}
+
+void KeepSurfacesThatViewsHold(std::span<const ViewInNovel> views, const PinholeCamera& novel,
+                               const RenderOptions& options, const Band& band,
+                               std::span<double> start) {
+  std::vector<OwnFragmentFinder> finders;
+  for (const ViewInNovel& view : views) {
+    finders.emplace_back(view, options);
+    if (!finders.back().HasSamples()) finders.pop_back();
+  }
+  const double pixel_angle_rad = BlendParametersOf(options, novel.fx_px()).pixel_angle_rad;
+  const auto held = [&](const Eigen::Vector3d& ray, double surface) {
+    for (int tried = 0; tried < kTriedSurfaces && surface > 0; ++tried) {
+      Votes votes;
+      for (const auto& finder : finders) finder.Vote(ray, surface, pixel_angle_rad, votes);
+      if (votes.held >= votes.refused) return surface;
+      surface = votes.behind;
+    }
+    return 0.0;
+  };
+  ParallelFor(0, band.rows, options.threads, [&](int row) {
+    for (int x = 0; x < band.width_px; ++x) {
+      double& surface = start[static_cast<size_t>(row) * static_cast<size_t>(band.width_px) +
+                              static_cast<size_t>(x)];
+      surface = held(novel.RayFromPixel({x + 0.5, band.first_row + row + 0.5}), surface);
+    }
+  });
+}
+
+Layer FindOwnFragments(const ViewInNovel& view_in_novel, const PinholeCamera& novel,
+                       const RenderOptions& options, const Band& band,
+                       std::span<const double> start) {
+  Layer layer(band);
+  const OwnFragmentFinder finder(view_in_novel, options);
+  if (!finder.HasSamples()) return layer;
+  size_t p = 0;
+  for (int y = band.first_row; y < band.first_row + band.rows; ++y) {
+    for (int x = 0; x < band.width_px; ++x, ++p) {
+      if (!(start[p] > 0)) continue;
+      layer.inverse_depth[p] = finder.Find(novel.RayFromPixel({x + 0.5, y + 0.5}), start[p]);
+    }
+  }
+  return layer;
+}
+
+}  // namespace dtr::cpu

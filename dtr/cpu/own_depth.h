@@ -1,0 +1,27 @@
+// dtr/cpu/own_depth.h -- SPEC 5: each view's fragments on its own depth map.
+#pragma once
+#include <span>
+#include <vector>
+
+#include "dtr/cpu/layer.h"
+
+namespace dtr::cpu {
+
+/// SPEC 5.1: the nearest surface of all views at each pixel of their band, 1/z; 0: none. All layers
+/// are of one band; there is at least one.
+std::vector<double> NearestSurface(std::span<const Layer> layers);
+
+/// SPEC 5.2: of each pixel's surface `start` (1/z, row-major; 0: none) what the views hold
+/// together; where they refuse it the next one behind, or none. Does not depend on the number of
+/// threads.
+void KeepSurfacesThatViewsHold(std::span<const ViewInNovel> views, const PinholeCamera& novel,
+                               const RenderOptions& options, const Band& band,
+                               std::span<double> start);
+
+/// SPEC 5.3: the view's own fragments at the pixels of `band`, found on its depth map from `start`
+/// (1/z per pixel of the band, row-major; 0: nothing there).
+Layer FindOwnFragments(const ViewInNovel& view_in_novel, const PinholeCamera& novel,
+                       const RenderOptions& options, const Band& band,
+                       std::span<const double> start);
+
+}  // namespace dtr::cpu

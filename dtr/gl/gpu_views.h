@@ -1,0 +1,57 @@
+// dtr/gl/gpu_views.h -- the views that lie on the GPU, within a number of bytes. Only dtr/gl's own
+// .cpp files include this.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <vector>
+
+#include "dtr/gl/frame.h"
+#include "dtr/gl/mesh_store.h"
+#include "dtr/gl/view_store.h"
+
+namespace dtr::gl {
+
+/// Puts on the GPU what pictures are drawn from; the views used longest ago make room. What counts
+/// is what views use: geometry, meshes, and their layers of texture arrays. The arrays are as long
+/// as views of one size fit, so their empty layers are room for the next views.
+class GpuViews {
+ public:
+  /// `meshes_for_shaders` as MeshStore; else meshes take no room on the GPU.
+  GpuViews(size_t room_bytes, bool meshes_for_shaders)
+      : room_bytes_(room_bytes), meshes_(meshes_for_shaders) {}
+
+  /// Puts there what the frame's method draws of its views, nearest first; those that do not fit
+  /// beside nearer ones leave the frame (at least one view stays). This depends on the views and
+  /// the bytes alone, not on what was drawn before. While a view is put there, it may lie beside as
+  /// much as fits. Returns how many views fit.
+  size_t Prepare(Frame& frame, const std::vector<const View*>& nearest_first);
+
+  size_t bytes() const;
+  ViewStore& store() { return store_; }
+  const MeshStore& meshes() const { return meshes_; }
+  void Clear();
+
+ private:
+  struct Used {
+    size_t bytes = 0;
+    std::uint64_t last = 0;  ///< number of the frame; odd: a frame will use it again
+  };
+
+  size_t PutWithinRoom(Frame& frame, const std::vector<const View*>& nearest_first);
+  void Put(const Frame& frame, const std::vector<const View*>& views);
+  size_t BytesOf(const View& view) { return store_.BytesOf(view) + meshes_.BytesOf(view); }
+  /// As many views of this view's size as the scene has and the room holds.
+  int LayersFor(const Frame& frame, const View& view);
+  bool DropOldest();
+  void Drop(const View& view);
+  void DropUnused(const Frame& frame, const View& view);
+
+  const size_t room_bytes_;
+  ViewStore store_;
+  MeshStore meshes_;
+  std::map<const View*, Used> used_;  ///< the views on the GPU
+  std::uint64_t now_ = 0;
+};
+
+}  // namespace dtr::gl

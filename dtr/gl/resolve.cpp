@@ -1,0 +1,172 @@
+#include "dtr/gl/resolve.h"
+
+#include <algorithm>
+#include <array>
+
+#include "dtr/base/error.h"
+#include "dtr/render/blend_weights.h"
+
+namespace dtr::gl {
+namespace {
+
+#include "dtr/gl/shaders/view_block.glsl"
+
+static_assert(sizeof(ViewBlock) == 9 * 16, "std430: nine vec4");
+
+// Unit 0 has the layers; the arrays of images and depths follow.
+constexpr int kMaxImageArrays = StateGuard::kTextureUnits - 1;
+// Variants of the resolving shader hold so many views, doubled until all fit.
+constexpr int kFewestViews = 8;
+constexpr GLuint kViewsBinding = 0, kCoarseDepthBinding = 2;  // as in resolve.frag
+
+std::array<float, 4> Row(const Eigen::Vector3d& row, double last) {
+  return {static_cast<float>(row.x()), static_cast<float>(row.y()), static_cast<float>(row.z()),
+          static_cast<float>(last)};
+}
+
+int BlendNumber(BlendWeight blend) { return static_cast<int>(blend); }  // as in weights.glsl
+static_assert(static_cast<int>(BlendWeight::kCosine) == 0 &&
+              static_cast<int>(BlendWeight::kExponential) == 1 &&
+              static_cast<int>(BlendWeight::kAngle) == 2 &&
+              static_cast<int>(BlendWeight::kInverseAngle) == 3 &&
+              static_cast<int>(BlendWeight::kKNearest) == 4);
+
+int RoomFor(int views) {
+  int room = kFewestViews;
+  while (room < views) room *= 2;
+  return room;
+}
+
+/// What both methods need to know of a view; slots are set by the caller.
+ViewBlock BlockOf(const View& view, const ViewPlacement& placed, const RenderOptions& options) {
+  ViewBlock block;
+  block.row_x = Row(placed.rotation.row(0), placed.translation.x());
+  block.row_y = Row(placed.rotation.row(1), placed.translation.y());
+  block.row_z = Row(placed.rotation.row(2), placed.translation.z());
+  const Eigen::Vector4d camera = Intrinsics(view.camera);
+  block.camera = Row(camera.head<3>(), camera.w());
+  const InverseDepthThresholds thresholds = ThresholdsOf(view, options);
+  block.limits = Row({static_cast<double>(view.image.width()),
+                      static_cast<double>(view.image.height()), thresholds.delta},
+                     thresholds.depth_break);
+  block.stored_depth = {0, static_cast<float>(1 / placed.near_z),
+                        static_cast<float>(thresholds.pixel), 0};
+  return block;
+}
+
+/// SPEC 5.3: sample (i, j)'s centre is at (i + 0.5, j + 0.5) of the grid that shaders see.
+void SetDepthGrid(const View& view, const ViewStore::Deferred& deferred, int slot,
+                  ViewBlock& block) {
+  const PinholeCamera camera = view.DepthCamera();
+  const double step = deferred.step;
+  const auto centre = [&](double c) { return (c - deferred.offset - 0.5) / step + 0.5; };
+  block.depth_grid = Row({camera.fx_px() / step, camera.fy_px() / step, centre(camera.cx_px())},
+                         centre(camera.cy_px()));
+  block.stored_depth[0] = static_cast<float>(deferred.depth_offset);
+  block.stored_depth[1] = static_cast<float>(deferred.depth_factor);
+  block.depth_slot = {slot, deferred.depth.layer, deferred.columns, deferred.rows};
+}
+
+void BindArrays(const Uniforms& set, const std::string& name, const std::vector<int>& arrays,
+                int first_unit, const ViewStore& store) {
+  for (size_t slot = 0; slot < arrays.size(); ++slot) {
+    const int unit = first_unit + static_cast<int>(slot);
+    set.Set((name + "[" + std::to_string(slot) + "]").c_str(), unit);
+    glActiveTexture(GL_TEXTURE0 + static_cast<GLenum>(unit));
+    glBindTexture(GL_TEXTURE_2D_ARRAY, store.texture_array(arrays[slot]));
+  }
+}
+
+}  // namespace
+
+Resolver::Resolver() : empty_array_(VertexArray::Make()), view_buffer_(Buffer::Make()) {
+  glGetIntegerv(GL_MAX_UNIFORM_BLOCK_SIZE, &max_uniform_bytes_);
+}
+
+bool Resolver::BlocksFitUniforms(int views) const {
+  return static_cast<size_t>(RoomFor(views)) * sizeof(ViewBlock) <=
+         static_cast<size_t>(max_uniform_bytes_);
+}
+
+int Resolver::SlotOf(std::vector<int>& bound, int array) const {
+  const auto found = std::find(bound.begin(), bound.end(), array);
+  if (found != bound.end()) return static_cast<int>(found - bound.begin());
+  if (image_arrays_.size() + depth_arrays_.size() == static_cast<size_t>(kMaxImageArrays)) {
+    throw Error("OpenGL: expected images of at most " + std::to_string(kMaxImageArrays) +
+                " sizes in one picture (or 1 GiB each), found more; use --renderer cpu or fewer "
+                "--views");
+  }
+  bound.push_back(array);
+  return static_cast<int>(bound.size()) - 1;
+}
+
+void Resolver::SetViews(const Frame& frame, ViewStore& store) {
+  image_arrays_.clear();
+  depth_arrays_.clear();
+  std::vector<ViewBlock> blocks;
+  for (size_t i = 0; i < frame.views.size(); ++i) {
+    const View& view = *frame.views[i];
+    const ImageSlot slot = store.ImageOf(view);
+    ViewBlock block = BlockOf(view, frame.placements[i], frame.options);
+    block.image = {SlotOf(image_arrays_, slot.array), slot.layer, view.mask.empty() ? 0 : 1, 0};
+    if (frame.deferred()) {
+      const ViewStore::Deferred& deferred = *store.DeferredOf(view);
+      SetDepthGrid(view, deferred, SlotOf(depth_arrays_, deferred.depth.array), block);
+    }
+    blocks.push_back(block);
+  }
+  blocks.resize(static_cast<size_t>(RoomFor(static_cast<int>(blocks.size()))), ViewBlock{});
+  glBindBuffer(GL_SHADER_STORAGE_BUFFER, view_buffer_.name());
+  glBufferData(GL_SHADER_STORAGE_BUFFER, static_cast<GLsizeiptr>(blocks.size() * sizeof(ViewBlock)),
+               blocks.data(), GL_STREAM_DRAW);
+}
+
+const Program& Resolver::ProgramFor(const Frame& frame, ProgramCache& programs) const {
+  const int views = static_cast<int>(frame.views.size());
+  const auto define = [](const char* name, auto value) {
+    return std::string(name) + " " + std::to_string(static_cast<long>(value));
+  };
+  return programs.Get(
+      {{GL_VERTEX_SHADER, "full_screen.vert"}, {GL_FRAGMENT_SHADER, "resolve.frag"}},
+      {define("MAX_VIEWS", RoomFor(views)), define("IMAGE_ARRAYS", image_arrays_.size()),
+       define("DEPTH_ARRAYS", depth_arrays_.size()),
+       define("BLEND", BlendNumber(frame.options.blend)),
+       define("VIEWS_IN_UNIFORMS", BlocksFitUniforms(views)), define("PER_PIXEL", frame.per_pixel),
+       define("LINEAR_LIGHT", frame.options.blend_in_linear_light)});
+}
+
+void Resolver::Draw(const Frame& frame, const Band& band, const ViewStore& store,
+                    ProgramCache& programs, const Targets& targets, GLuint coarse_depth) {
+  const RenderOptions& options = frame.options;
+  const BlendParameters blend = BlendParametersOf(options, frame.novel.fx_px());
+  const int views = static_cast<int>(frame.views.size());
+  const Uniforms set(ProgramFor(frame, programs));
+  set.Set("view_count", views);
+  set.Set("nearest_views", options.views);
+  set.Set("novel_camera", Intrinsics(frame.novel));
+  set.Set("first_row", static_cast<double>(band.first));
+  set.Set("absolute_delta", options.absolute_delta.value_or(-1.0));
+  set.Set("exponent", blend.exponent);
+  set.Set("falloff", blend.falloff);
+  set.Set("blend_k", blend.blend_k);
+  set.Set("max_angle_rad", blend.max_angle_rad);
+  set.Set("pixel_angle_rad", blend.pixel_angle_rad);
+  set.Set("width_px", frame.novel.width_px());
+  set.Set("layers", 0);
+  glActiveTexture(GL_TEXTURE0);
+  glBindTexture(GL_TEXTURE_2D_ARRAY, targets.layers.name());
+  BindArrays(set, "images", image_arrays_, 1, store);
+  BindArrays(set, "depths", depth_arrays_, 1 + static_cast<int>(image_arrays_.size()), store);
+  glActiveTexture(GL_TEXTURE0);
+  glBindBufferBase(BlocksFitUniforms(views) ? GL_UNIFORM_BUFFER : GL_SHADER_STORAGE_BUFFER,
+                   kViewsBinding, view_buffer_.name());
+  if (frame.deferred()) {
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, kCoarseDepthBinding, coarse_depth);
+  }
+  glBindFramebuffer(GL_FRAMEBUFFER, targets.result_framebuffer.name());
+  glViewport(0, 0, frame.novel.width_px(), band.count);
+  glBindVertexArray(empty_array_.name());
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+}
+
+}  // namespace dtr::gl

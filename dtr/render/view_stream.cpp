@@ -1,0 +1,254 @@
+#include "dtr/render/view_stream.h"
+
+#include <algorithm>
+#include <cassert>
+#include <condition_variable>
+#include <deque>
+#include <exception>
+#include <mutex>
+#include <numeric>
+#include <optional>
+#include <stdexcept>
+#include <thread>
+
+#include "dtr/base/error.h"
+#include "dtr/base/parallel_for.h"
+#include "dtr/render/valid_views.h"
+
+namespace dtr {
+namespace {
+
+size_t PixelsOf(int width_px, int height_px) {
+  return static_cast<size_t>(width_px) * static_cast<size_t>(height_px);
+}
+
+/// What RenderScene's readers keep of a view: 8-bit RGB, float depth, a mask where there is one.
+size_t BytesOf(const View& view) {
+  const size_t image = PixelsOf(view.camera.width_px(), view.camera.height_px());
+  const size_t depth = PixelsOf(view.camera.width_px() / view.depth_scale,
+                                view.camera.height_px() / view.depth_scale);
+  // A rectangle of a mesh takes 2 bytes in the file.
+  const size_t mesh =
+      view.mesh_file ? view.mesh_file->bytes / 2 * sizeof(BlockCover::Rectangle) : 0;
+  return image * (view.mask_file ? 4 : 3) + depth * sizeof(float) + mesh;
+}
+
+void DropPixels(View& view) {
+  view.image = {};
+  view.mask = {};
+  view.depth = {};
+  view.inverse_depth_sigma.reset();
+  view.mesh.reset();
+}
+
+}  // namespace
+
+/// The threads that read; requests go in and views come out under one lock.
+class ViewStream::Readers {
+ public:
+  struct Result {
+    size_t slot = 0;
+    View view;
+    std::string error;  ///< empty: read
+  };
+
+  Readers(Loader load, int threads) : load_(std::move(load)) {
+    for (int i = 0; i < threads; ++i) {
+      threads_.emplace_back([this](const std::stop_token& stop) { Run(stop); });
+    }
+  }
+
+  void Ask(size_t slot, View description) {
+    {
+      const std::lock_guard lock(mutex_);
+      requests_.push_back({slot, std::move(description), {}});
+    }
+    asked_.notify_one();
+  }
+
+  /// Empties the list of what was read; with `wait` not before there is something.
+  std::vector<Result> Take(bool wait) {
+    std::unique_lock lock(mutex_);
+    if (wait) read_.wait(lock, [this] { return !results_.empty(); });
+    return std::exchange(results_, {});
+  }
+
+ private:
+  void Run(const std::stop_token& stop) {
+    for (;;) {
+      std::optional<Result> request;
+      {
+        std::unique_lock lock(mutex_);
+        if (!asked_.wait(lock, stop, [this] { return !requests_.empty(); })) return;
+        if (stop.stop_requested()) return;  // what is still asked for is of no use
+        request = std::move(requests_.front());
+        requests_.pop_front();
+      }
+      try {
+        load_(request->view);
+        RequireLoaded(request->view);
+      } catch (const std::exception& error) {
+        request->error = error.what();
+      }
+      {
+        const std::lock_guard lock(mutex_);
+        results_.push_back(std::move(*request));
+      }
+      read_.notify_one();
+    }
+  }
+
+  const Loader load_;
+  std::mutex mutex_;
+  std::condition_variable_any asked_, read_;
+  std::deque<Result> requests_;
+  std::vector<Result> results_;
+  std::vector<std::jthread> threads_;  // last: they stop before the rest goes
+};
+
+ViewStream::ViewStream(DtrSet& set, RenderScene described, Loader load, Settings settings)
+    : described_(std::move(described)), settings_(std::move(settings)) {
+  if (set.frames.empty()) throw std::invalid_argument("ViewStream: a set without a frame");
+  std::vector<View>& views = set.frames.front().views;
+  for (const View* view : described_.views) {
+    const auto own = std::find_if(views.begin(), views.end(),
+                                  [&](const View& candidate) { return &candidate == view; });
+    if (own == views.end()) throw std::invalid_argument("ViewStream: a view of another set");
+    slots_.push_back({&*own, State::kAbsent, BytesOf(*own), 0});
+  }
+  readers_ = std::make_unique<Readers>(std::move(load), ResolveThreads(settings_.threads));
+}
+
+ViewStream::~ViewStream() = default;
+
+std::vector<size_t> ViewStream::NotLost() const {
+  std::vector<size_t> slots;
+  for (size_t i = 0; i < slots_.size(); ++i) {
+    if (slots_[i].state != State::kLost) slots.push_back(i);
+  }
+  return slots;
+}
+
+RenderScene ViewStream::SceneOf(const std::vector<size_t>& slots) const {
+  RenderScene scene = described_;
+  scene.views.clear();
+  for (const size_t slot : slots) scene.views.push_back(slots_[slot].view);
+  return scene;
+}
+
+ViewStream::Needed ViewStream::NeededFor(const Pose& novel_from_world,
+                                         const RenderOptions& options) const {
+  const std::vector<size_t> candidates = NotLost();
+  RenderScene scene = SceneOf(candidates);
+  // From all views: what was lost so far may depend on what was read ahead.
+  scene.per_pixel = NeedsPerPixelRule(described_, novel_from_world);
+  const ViewSelection selection = SelectViews(scene, novel_from_world, options);
+  Needed needed{{}, selection.per_pixel, selection.views.size()};
+  size_t bytes = 0;
+  for (const int index : selection.views) {
+    const size_t slot = candidates[static_cast<size_t>(index)];
+    bytes += slots_[slot].bytes;
+    if (bytes > settings_.host_bytes && !needed.slots.empty()) break;
+    needed.slots.push_back(slot);
+  }
+  return needed;
+}
+
+bool ViewStream::MakeRoom(size_t bytes) {
+  while (bytes_ + bytes > settings_.host_bytes) {
+    Slot* oldest = nullptr;
+    for (Slot& slot : slots_) {
+      if (slot.state != State::kPresent || slot.last_used == now_) continue;
+      if (oldest == nullptr || slot.last_used < oldest->last_used) oldest = &slot;
+    }
+    if (oldest == nullptr) return bytes_ == 0;  // one view is kept, however large
+    DropPixels(*oldest->view);
+    oldest->state = State::kAbsent;
+    bytes_ -= oldest->bytes;
+  }
+  return true;
+}
+
+void ViewStream::Request(const std::vector<size_t>& slots) {
+  for (const size_t index : slots) {
+    Slot& slot = slots_[index];
+    if (slot.state != State::kAbsent) continue;
+    if (!MakeRoom(slot.bytes)) return;
+    slot.state = State::kReading;
+    bytes_ += slot.bytes;
+    ++reading_;
+    readers_->Ask(index, *slot.view);
+  }
+}
+
+void ViewStream::Collect(bool wait) {
+  for (Readers::Result& result : readers_->Take(wait)) {
+    Slot& slot = slots_[result.slot];
+    --reading_;
+    if (result.error.empty()) {
+      slot.view->image = std::move(result.view.image);
+      slot.view->mask = std::move(result.view.mask);
+      slot.view->depth = std::move(result.view.depth);
+      slot.view->inverse_depth_sigma = std::move(result.view.inverse_depth_sigma);
+      slot.view->mesh = std::move(result.view.mesh);
+      slot.state = State::kPresent;
+      continue;
+    }
+    slot.state = State::kLost;
+    bytes_ -= slot.bytes;
+    lost_.push_back({slot.view->name, result.error});
+    settings_.warn("WARNING: " + slot.view->name + " is left out: " + result.error);
+  }
+}
+
+void ViewStream::WarnOfRoom(size_t fitting, size_t wanted) {
+  if (std::exchange(warned_of_room_, true)) return;
+  settings_.warn("WARNING: drawn from the nearest " + std::to_string(fitting) + " of " +
+                 std::to_string(wanted) + " views: more do not fit into " +
+                 std::to_string(settings_.host_bytes >> 20) + " MiB of memory; give --memory");
+}
+
+RenderScene ViewStream::SceneFor(const Pose& novel_from_world, const RenderOptions& options,
+                                 Wait wait) {
+  Collect(false);
+  Needed needed;
+  for (;;) {
+    ++now_;
+    if (!slots_.empty() && NotLost().empty()) {
+      throw Error("views: expected at least one that can be read, found none; the first: " +
+                  lost_.front().reason);
+    }
+    needed = NeededFor(novel_from_world, options);
+    for (const size_t slot : needed.slots) slots_[slot].last_used = now_;
+    Request(needed.slots);
+    const auto there = [this](size_t slot) { return slots_[slot].state == State::kPresent; };
+    if (wait == Wait::kForNone || std::all_of(needed.slots.begin(), needed.slots.end(), there)) {
+      break;
+    }
+    // Needed views fit in memory once nothing else does: what is missing is being read, or waits
+    // for the room of an earlier request. A view that turns out lost makes place for another.
+    assert(reading_ > 0);
+    Collect(true);
+  }
+  const bool all_fit = needed.slots.size() == needed.wanted;
+  if (!all_fit) WarnOfRoom(needed.slots.size(), needed.wanted);
+  std::vector<size_t> drawn = NotLost();
+  if (wait == Wait::kForNone) {
+    std::erase_if(drawn, [&](size_t slot) { return slots_[slot].state != State::kPresent; });
+  } else if (!all_fit) {
+    drawn = needed.slots;
+    std::sort(drawn.begin(), drawn.end());
+  }
+  RenderScene scene = SceneOf(drawn);
+  scene.per_pixel = needed.per_pixel;
+  return scene;
+}
+
+void ViewStream::Prefetch(const Pose& novel_from_world, const RenderOptions& options) {
+  Collect(false);
+  const Needed needed = NeededFor(novel_from_world, options);
+  for (const size_t slot : needed.slots) slots_[slot].last_used = now_;  // not for each other
+  Request(needed.slots);
+}
+
+}  // namespace dtr

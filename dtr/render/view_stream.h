@@ -1,0 +1,105 @@
+// dtr/render/view_stream.h -- the pixels of a set that may be larger than memory: read in the
+// background when a picture needs them, dropped when others need the room.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "dtr/render/options.h"
+#include "dtr/render/scene.h"
+#include "dtr/types/dtr_set.h"
+#include "dtr/types/pose.h"
+
+namespace dtr {
+
+/// Keeps the pixels of the source views that pictures are drawn from, those used last, within a
+/// number of bytes. All members belong to one thread; reading runs on others, which see copies of
+/// the views only, so that the pixels of a view change inside calls of this class and nowhere else.
+/// What a waiting call gives depends on the set, the camera, the options and the bytes alone.
+class ViewStream {
+ public:
+  /// Reads image, mask and depth of a view that is described; throws dtr::Error where it cannot.
+  /// Called on several threads at once.
+  using Loader = std::function<void(View&)>;
+
+  struct Settings {
+    size_t host_bytes = size_t{4} << 30;  ///< pixels in memory; one view is always kept
+    int threads = 0;                      ///< that read; 0: all cores
+    std::function<void(const std::string&)> warn = [](const std::string&) {};
+  };
+
+  enum class Wait {
+    kForAll,   ///< still frames: until every view that the picture needs is there or lost
+    kForNone,  ///< moving pictures: what is there, and the rest is asked for
+  };
+
+  /// A view that could not be read: it is never drawn from again.
+  struct Lost {
+    std::string name, reason;
+  };
+
+  /// `set` is as io::ReadSet gives it, without pixels; `described` is DescribeRenderScene of it.
+  /// Both outlive the stream, and the views stay where they are.
+  ViewStream(DtrSet& set, RenderScene described, Loader load, Settings settings);
+  /// Waits for what is being read just now.
+  ~ViewStream();
+  ViewStream(const ViewStream&) = delete;
+  ViewStream& operator=(const ViewStream&) = delete;
+
+  /// The scene to draw a picture of this camera from: SelectViews of it names only views whose
+  /// pixels are in memory. They stay there until the next call. Where the bytes do not hold all
+  /// that the picture needs, the nearest that fit are drawn from, which is said once. A view that
+  /// cannot be read is left out, which is said, and another takes its place.
+  /// Throws dtr::Error when no view of the set can be read.
+  RenderScene SceneFor(const Pose& novel_from_world, const RenderOptions& options, Wait wait);
+
+  /// Begins to read what a later picture needs, as far as there is room beside the last one's.
+  void Prefetch(const Pose& novel_from_world, const RenderOptions& options);
+
+  const std::vector<Lost>& lost() const { return lost_; }
+  /// Pixels in memory or being read.
+  size_t bytes() const { return bytes_; }
+
+ private:
+  enum class State { kAbsent, kReading, kPresent, kLost };
+  struct Slot {
+    View* view = nullptr;
+    State state = State::kAbsent;
+    size_t bytes = 0;             ///< its pixels, from its description
+    std::uint64_t last_used = 0;  ///< number of the call that needed it last
+  };
+  class Readers;
+
+  /// Indices into slots_ of what the picture needs, nearest first, as many as the bytes hold.
+  struct Needed {
+    std::vector<size_t> slots;
+    bool per_pixel = false;
+    size_t wanted = 0;  ///< what SelectViews asks for
+  };
+  Needed NeededFor(const Pose& novel_from_world, const RenderOptions& options) const;
+  RenderScene SceneOf(const std::vector<size_t>& slots) const;
+  std::vector<size_t> NotLost() const;
+  /// Asks for the absent ones of these, as far as dropping others gives room.
+  void Request(const std::vector<size_t>& slots);
+  bool MakeRoom(size_t bytes);
+  /// Takes over what was read; waits for at least one when `wait`.
+  void Collect(bool wait);
+  void WarnOfRoom(size_t fitting, size_t wanted);
+
+  const RenderScene described_;
+  const Settings settings_;
+  std::vector<Slot> slots_;  ///< as described_.views
+  std::vector<Lost> lost_;
+  size_t bytes_ = 0;
+  int reading_ = 0;
+  std::uint64_t now_ = 0;  ///< number of this call
+  bool warned_of_room_ = false;
+  std::unique_ptr<Readers> readers_;
+};
+
+}  // namespace dtr

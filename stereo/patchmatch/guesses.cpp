@@ -1,0 +1,77 @@
+#include "stereo/patchmatch/guesses.h"
+
+#include <Eigen/Dense>
+#include <cmath>
+
+namespace dtr::stereo::patchmatch {
+namespace {
+
+using Matrix = Eigen::Matrix3f;
+using Vector = Eigen::Vector3f;
+
+/// Closer planes than this, in pixels of disparity, are what the pixel has already.
+constexpr float kSamePx = 0.5f;
+
+/// Pixels that a point at the image's centre moves in a source per unit of inverse depth.
+float PxPerInverseDepth(const Level& level, const Source& s) {
+  const Matrix m = Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(s.m);
+  const Vector k = Eigen::Map<const Vector>(s.k);
+  const Vector centre(0.5f * static_cast<float>(level.reference.width),
+                      0.5f * static_cast<float>(level.reference.height), 1.0f);
+  const auto seen_at = [&](float w) -> Eigen::Vector2f {
+    return (m * centre + w * k).hnormalized();
+  };
+  return (seen_at(level.w_max) - seen_at(level.w_min)).norm() / (level.w_max - level.w_min);
+}
+
+void Put(State::Guess* guess, int x, int y, float w, const Vector& plane) {
+  *guess->w.at(x, y) = w;
+  *guess->a.at(x, y) = plane.x();
+  *guess->b.at(x, y) = plane.y();
+}
+
+}  // namespace
+
+void GuessFromSurfaces(const Level& level, State* state) {
+  const int width = level.reference.width, height = level.reference.height;
+  const BorderedGrid none(width, height, 0);
+  state->guesses.assign(2, {none, none, none});
+  State::Guess *nearest = &state->guesses[0], *farthest = &state->guesses[1];
+  for (const Source& s : level.sources) {
+    if (s.surface == nullptr) continue;
+    const Matrix m = Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(s.back_m);
+    const Vector k = Eigen::Map<const Vector>(s.back_k);
+    const float same = kSamePx / PxPerInverseDepth(level, s);
+    const PlaneMap& map = *s.surface;
+    for (int v = 0; v < map.inverse_depth.height(); ++v) {
+      for (int u = 0; u < map.inverse_depth.width(); ++u) {
+        const float w = s.surface_scale * map.inverse_depth(u, v);
+        if (!(w > 0)) continue;
+        const Vector at(static_cast<float>(u + kTextureBorder),
+                        static_cast<float>(v + kTextureBorder), 1.0f);
+        const Vector seen = m * at + w * k;
+        if (!(seen.z() > 0)) continue;
+        const float px = seen.x() / seen.z(), py = seen.y() / seen.z();
+        if (!(px >= 0) || !(py >= 0) || !(px < static_cast<float>(width)) ||
+            !(py < static_cast<float>(height))) {
+          continue;
+        }
+        const int x = static_cast<int>(px), y = static_cast<int>(py);
+        // In the source 1/z = n . (u, v, 1), so H = m + k n^T and here 1/z = H^-T n . (x, y, 1).
+        Vector n(s.surface_scale * map.slope_x(u, v), s.surface_scale * map.slope_y(u, v), 0);
+        n.z() = w - n.dot(at);
+        const Matrix h = m + k * n.transpose();
+        const Vector plane = h.inverse().transpose() * n;
+        const float here =
+            plane.dot(Vector(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f, 1.0f));
+        if (!(here >= level.w_min) || !(here <= level.w_max)) continue;
+        if (std::abs(here - *state->w.at(x, y)) < same) continue;
+        if (here > *nearest->w.at(x, y)) Put(nearest, x, y, here, plane);
+        const float far = *farthest->w.at(x, y);
+        if (far == 0 || here < far) Put(farthest, x, y, here, plane);
+      }
+    }
+  }
+}
+
+}  // namespace dtr::stereo::patchmatch

@@ -1,0 +1,52 @@
+// stereo/plane_map.h -- a slanted plane per pixel: what views tell each other between rounds.
+#pragma once
+#include <map>
+#include <memory>
+#include <utility>
+
+#include "dtr/types/grid.h"
+
+namespace dtr::stereo {
+
+/// Planes of all pixels of a view, linear in inverse depth:
+/// 1/z (x + dx, y + dy) = inverse_depth + slope_x dx + slope_y dy, dx and dy in pixels from the
+/// pixel's centre. Scene units; shapes (height, width). Nothing is rejected yet; inverse_depth 0 is
+/// a pixel without a plane. Empty grids: the view has no planes at all.
+struct PlaneMap {
+  Grid<float> inverse_depth, slope_x, slope_y;
+  bool empty() const { return inverse_depth.empty(); }
+  bool operator==(const PlaneMap&) const = default;
+};
+
+/// Where the planes of a collection wait between rounds. Used from one thread.
+class PlaneMapStore {
+ public:
+  virtual ~PlaneMapStore() = default;
+  /// True when Save was called for this round and view, perhaps by an earlier run of the same job.
+  virtual bool Has(int round, int view) const = 0;
+  /// Requires Has(round, view).
+  virtual std::shared_ptr<const PlaneMap> Load(int round, int view) = 0;
+  virtual void Save(int round, int view, PlaneMap&& map) = 0;
+  /// Nothing of this round is wanted any more.
+  virtual void Drop(int round) = 0;
+};
+
+/// Keeps everything in memory: 12 bytes per pixel, view and round.
+class PlaneMapsInMemory final : public PlaneMapStore {
+ public:
+  bool Has(int round, int view) const override { return maps_.contains({round, view}); }
+  std::shared_ptr<const PlaneMap> Load(int round, int view) override {
+    return maps_.at({round, view});
+  }
+  void Save(int round, int view, PlaneMap&& map) override {
+    maps_[{round, view}] = std::make_shared<const PlaneMap>(std::move(map));
+  }
+  void Drop(int round) override {
+    std::erase_if(maps_, [&](const auto& entry) { return entry.first.first == round; });
+  }
+
+ private:
+  std::map<std::pair<int, int>, std::shared_ptr<const PlaneMap>> maps_;
+};
+
+}  // namespace dtr::stereo

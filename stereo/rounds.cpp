@@ -1,0 +1,99 @@
+#include "stereo/rounds.h"
+
+#include <algorithm>
+#include <string>
+
+#include "dtr/base/error.h"
+
+namespace dtr::stereo {
+namespace {
+
+const std::vector<int>& NeighboursOf(const Collection& c, int view) {
+  return c.neighbours[static_cast<size_t>(view)].views;
+}
+
+/// Which views each round must still compute: what the next one lacks needs all around it.
+std::vector<std::vector<int>> Missing(const Collection& c, std::span<const int> needed,
+                                      const PlaneMapStore& store) {
+  const int rounds = c.engine->Rounds();
+  std::vector<std::vector<int>> missing(static_cast<size_t>(rounds) + 1);
+  std::vector<bool> wanted(c.views.size(), false);
+  for (const int v : needed) wanted[static_cast<size_t>(v)] = true;
+  for (int round = rounds; round >= 0; --round) {
+    std::vector<int>& here = missing[static_cast<size_t>(round)];
+    for (int v = 0; v < static_cast<int>(wanted.size()); ++v) {
+      if (wanted[static_cast<size_t>(v)] && !store.Has(round, v)) here.push_back(v);
+    }
+    wanted.assign(wanted.size(), false);
+    for (const int v : here) {
+      wanted[static_cast<size_t>(v)] = true;
+      for (const int n : NeighboursOf(c, v)) wanted[static_cast<size_t>(n)] = true;
+    }
+  }
+  return missing;
+}
+
+PlaneMap First(const Collection& c, int view, Progress& progress) {
+  if (NeighboursOf(c, view).empty()) {
+    progress.Note("view " + std::to_string(view) + ": no neighbours, no depth");
+    return {};
+  }
+  try {
+    return c.engine->Match(c.views, view, NeighboursOf(c, view),
+                           c.ranges[static_cast<size_t>(view)], c.options);
+  } catch (const NoUsablePair& error) {
+    progress.Note(std::string(error.what()) + ": no depth");
+    return {};
+  }
+}
+
+PlaneMap Next(const Collection& c, PlaneMapStore& store, int round, int view) {
+  const PlanesAround around(c, store, round - 1, view);
+  if (!around.HasOwn()) return {};
+  return c.engine->Refine(c.views, view, NeighboursOf(c, view), c.ranges[static_cast<size_t>(view)],
+                          around.maps(), round, c.options);
+}
+
+}  // namespace
+
+PlanesAround::PlanesAround(const Collection& collection, PlaneMapStore& store, int round, int view)
+    : maps_(collection.views.size(), nullptr), own_(static_cast<size_t>(view)) {
+  std::vector<int> around = NeighboursOf(collection, view);
+  around.push_back(view);
+  for (const int v : around) {
+    held_.push_back(store.Load(round, v));
+    const PlaneMap& map = *held_.back();
+    const PinholeCamera& camera = collection.views[static_cast<size_t>(v)].camera;
+    for (const Grid<float>* grid : {&map.inverse_depth, &map.slope_x, &map.slope_y}) {
+      if (map.empty() ||
+          (grid->width() == camera.width_px() && grid->height() == camera.height_px()))
+        continue;
+      throw Error("planes of view " + std::to_string(v) + ": expected " +
+                  std::to_string(camera.width_px()) + "x" + std::to_string(camera.height_px()) +
+                  " as the view, found " + std::to_string(grid->width()) + "x" +
+                  std::to_string(grid->height()) + "; delete the partial set and build again");
+    }
+    if (!held_.back()->empty()) maps_[static_cast<size_t>(v)] = held_.back().get();
+  }
+}
+
+void RunRounds(const Collection& collection, std::span<const int> needed, PlaneMapStore& store,
+               Progress& progress) {
+  const std::vector<std::vector<int>> missing = Missing(collection, needed, store);
+  for (int round = 0; round < static_cast<int>(missing.size()); ++round) {
+    const std::vector<int>& views = missing[static_cast<size_t>(round)];
+    progress.Stage(round == 0 ? "matching" : "consistency round " + std::to_string(round),
+                   static_cast<int>(views.size()));
+    int done = 0;
+    for (const int view : views) {
+      progress.ThrowIfInterrupted();
+      store.Save(
+          round, view,
+          round == 0 ? First(collection, view, progress) : Next(collection, store, round, view));
+      progress.Update(++done);
+    }
+    if (round > 0) store.Drop(round - 1);
+  }
+}
+
+}  // namespace dtr::stereo

@@ -1,0 +1,46 @@
+// stereo/rounds.h -- planes of a collection, round after round.
+#pragma once
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "dtr/base/progress.h"
+#include "stereo/engine.h"
+#include "stereo/neighbours.h"
+
+namespace dtr::stereo {
+
+/// What a run over a collection works on; borrowed.
+struct Collection {
+  std::span<const StereoView> views;
+  std::span<const ViewNeighbours> neighbours;
+  std::span<const DepthRange> ranges;
+  const Engine* engine = nullptr;
+  EngineOptions options;
+};
+
+/// The planes that concern one view: its own and its neighbours', kept alive.
+class PlanesAround {
+ public:
+  PlanesAround(const Collection& collection, PlaneMapStore& store, int round, int view);
+  /// One entry per view of the collection; null where there are no planes or the view is none of
+  /// these.
+  std::span<const PlaneMap* const> maps() const { return maps_; }
+  bool HasOwn() const { return maps_[own_] != nullptr; }
+
+ private:
+  std::vector<std::shared_ptr<const PlaneMap>> held_;
+  std::vector<const PlaneMap*> maps_;
+  size_t own_;
+};
+
+/// Sees to it that `store` has the planes of the engine's last round for all `needed` views. A
+/// round of a view reads only the round before, so the order of views has no influence; what the
+/// store has already is not computed again. One view is worked on at a time, so memory beside the
+/// store is bounded by one view with its neighbours. A view without neighbours, or for which the
+/// engine finds no usable pair, gets empty planes and a note. Throws what the engine throws, and
+/// Interrupted between views.
+void RunRounds(const Collection& collection, std::span<const int> needed, PlaneMapStore& store,
+               Progress& progress);
+
+}  // namespace dtr::stereo

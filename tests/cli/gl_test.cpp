@@ -1,0 +1,137 @@
+// What `dtr` says where OpenGL cannot do the job, and `dtr bench`.
+#include <nlohmann/json.hpp>
+
+#include "dtr/base/files.h"
+#include "tests/cli/run_dtr.h"
+#include "tests/cli/small_courtyard.h"
+#include "tests/support/environment.h"
+#include "tests/support/test_data.h"
+
+namespace dtr::testing {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+using ::testing::HasSubstr;
+
+constexpr int kFailed = 1, kWrongUsage = 2;
+constexpr size_t kMaxShaderBytes = 1 << 20;
+
+class OpenGl : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    shared_ = new TemporaryFolder;
+    MakeSmallCourtyard(*shared_ / "courtyard");
+    ImportSmallCourtyard(*shared_ / "courtyard", Set());
+  }
+  static void TearDownTestSuite() { delete shared_; }
+  static std::string Set() { return (*shared_ / "good.dtr").string(); }
+  std::string In(const std::string& name) const { return (folder_ / name).string(); }
+  Ran Render(std::vector<std::string> further = {}) {
+    further.insert(further.begin(),
+                   {"render", Set(), "--like", "0001", "-o", In("v.png"), "--size", "60x0"});
+    return Dtr(further);
+  }
+  void SkipWithoutOpenGl() {
+    const Ran ran = Render();
+    if (ran.code != 0) GTEST_SKIP() << ran.err;
+  }
+  static TemporaryFolder* shared_;
+  TemporaryFolder folder_;
+};
+TemporaryFolder* OpenGl::shared_ = nullptr;
+
+TEST_F(OpenGl, AMachineWithoutItIsToldInOneLine) {
+  const Environment no_driver("__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent");
+  for (const char* command : {"render", "evaluate", "bench"}) {
+    std::vector<std::string> args{command, Set()};
+    if (std::string(command) == "render")
+      args = {command, Set(), "--like", "0001", "-o", In("v.png")};
+    const Ran ran = Dtr(args);
+    ExpectRefused(ran, kFailed,
+                  "OpenGL: expected a context of version 4.3 or newer through EGL, found");
+    EXPECT_THAT(ran.err, HasSubstr("; use --renderer cpu"));
+  }
+  EXPECT_FALSE(fs::exists(In("v.png")));
+  EXPECT_EQ(Render({"--renderer", "cpu"}).code, 0);
+}
+
+TEST_F(OpenGl, AnOlderContextIsToldInOneLine) {
+  const Environment old("MESA_GL_VERSION_OVERRIDE", "3.3");
+  ExpectRefused(Render(), kFailed,
+                "OpenGL: expected a context of version 4.3 or newer through EGL, found");
+}
+
+TEST_F(OpenGl, ShadersComeFromAFolderWhereOneIsGiven) {
+  SkipWithoutOpenGl();
+  fs::copy("dtr/gl/shaders", In("shaders"));  // tests run in the root of the sources
+  const std::string embedded = Text(In("v.png"));
+  ASSERT_EQ(Render({"--shader-dir", In("shaders")}).code, 0);
+  EXPECT_EQ(Text(In("v.png")), embedded);
+
+  const std::string file = In("shaders/mesh.vert");
+  WriteFileAtomically(file, "// one\nvoid main() { nothing = 1; }\n");
+  const Ran broken = Render({"--method", "two-pass", "--shader-dir", In("shaders")});
+  ExpectRefused(broken, kFailed, "shader mesh.vert:2: ");
+  EXPECT_THAT(broken.err, HasSubstr("; use --renderer cpu"));
+  fs::remove(file);
+  ExpectRefused(Render({"--method", "two-pass", "--shader-dir", In("shaders")}), kFailed,
+                "mesh.vert: cannot be read");
+  ExpectRefused(Render({"--shader-dir", In("absent")}), kWrongUsage,
+                "expected a folder of shaders such as dtr/gl/shaders, found none");
+  ExpectRefused(Render({"--shader-dir", In("shaders"), "--renderer", "cpu"}), kWrongUsage,
+                "expected --renderer gl with it, found cpu");
+}
+
+TEST_F(OpenGl, AskingForSplatsPicksTheMethodThatHasThem) {
+  SkipWithoutOpenGl();
+  ASSERT_EQ(Render({"--primitive", "splat"}).code, 0);
+  const std::string splats = Text(In("v.png"));
+  ASSERT_EQ(Render({"--primitive", "splat", "--method", "two-pass"}).code, 0);
+  EXPECT_EQ(Text(In("v.png")), splats);
+  ASSERT_EQ(Render({"--method", "two-pass"}).code, 0);
+  EXPECT_NE(Text(In("v.png")), splats);
+}
+
+TEST_F(OpenGl, BenchPrintsATableForPeopleAndOneForPrograms) {
+  SkipWithoutOpenGl();
+  for (const char* renderer : {"gl", "cpu"}) {
+    const Ran ran =
+        DtrOk({"bench", Set(), "--table", "report", "--size", "60x0", "--repeats", "1", "--views",
+               "2,3", "--cameras", "1", "--renderer", renderer, "--json", In("bench.json")});
+    EXPECT_THAT(ran.out, HasSubstr("two-pass"));
+    EXPECT_THAT(ran.out, HasSubstr("times as fast at 3 views and resolution 1"));
+    const Json json = Json::parse(Text(In("bench.json")));
+    ASSERT_EQ(json["rows"].size(), 8u);  // 2 resolutions x 2 numbers of views x 2 methods
+    for (const Json& row : json["rows"]) {
+      for (const char* name : {"method", "views_in_set", "views_used", "resolution", "ms", "fps",
+                               "psnr_db", "cpu_ms", "spread_ms"}) {
+        EXPECT_TRUE(row.contains(name)) << name;
+      }
+      EXPECT_GT(row["ms"], 0);
+      EXPECT_GT(row["psnr_db"], 15);  // the two pictures are of one place
+    }
+    EXPECT_TRUE(json["ratio_two_pass_over_deferred"].is_number());
+    EXPECT_TRUE(json["loss_db"].is_number());
+    for (const char* name : {"cpu", "renderer", "version"}) EXPECT_NE(json["machine"][name], "");
+  }
+}
+
+TEST_F(OpenGl, BenchMeasuresGrowth) {
+  SkipWithoutOpenGl();
+  const Ran ran = DtrOk({"bench", Set(), "--table", "growth", "--size", "40x0", "--repeats", "1",
+                         "--views", "2", "--json", "-"});
+  const Json json = Json::parse(ran.out);
+  ASSERT_EQ(json["series"].size(), 3u);
+  for (const Json& series : json["series"]) EXPECT_GE(series["rows"].size(), 2u);
+}
+
+TEST_F(OpenGl, BenchOfNothingOrOfWordsThatMeanNothing) {
+  ExpectRefused(Dtr({"bench", Set(), "--table", "magic", "--renderer", "cpu"}), kWrongUsage,
+                "--table: magic not in {report,growth}");
+  ExpectRefused(Dtr({"bench", In("absent.dtr"), "--renderer", "cpu"}), kFailed,
+                "expected the folder of a D+TR set, found nothing");
+}
+
+}  // namespace
+}  // namespace dtr::testing

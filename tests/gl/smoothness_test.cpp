@@ -1,0 +1,114 @@
+// S25: the picture changes smoothly as the camera moves, also where the K nearest views change.
+//
+// The measure: along FlyThrough's path of 100 steps, the change of a frame is the largest change of
+// any pixel (of 255, of three channels) from the frame before; pixels within 2 of a depth break
+// (SPEC 2.3) in either frame, or unseen in either, are not judged. The largest change may be 3
+// times the median of all frames: texture that moves changes pixels, a view that pops changes them
+// all at once.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <vector>
+
+#include "dtr/render/camera_path.h"
+#include "tests/gl/comparison.h"
+#include "tests/gl/exact_scenes.h"
+
+namespace dtr::gl {
+namespace {
+
+using namespace dtr::testing;
+
+constexpr int kSteps = 100;
+constexpr double kLargestOfMedian = 3;
+
+struct Smoothness {
+  double largest = 0, median = 0;
+  double judged_share = 0;
+  double ratio() const { return largest / median; }
+};
+
+using Draw = std::function<RenderResult(const NovelCamera&, int frame)>;
+
+Smoothness MeasureSmoothness(const RenderScene& views, const std::vector<NovelCamera>& path,
+                             const RenderOptions& options, const Draw& draw) {
+  const BreakRule rule = StrictestBreaks(views, options);
+  Smoothness smoothness;
+  std::vector<double> changes;
+  RenderResult last;
+  Mask last_breaks;
+  for (size_t f = 0; f < path.size(); ++f) {
+    RenderResult frame = draw(path[f], static_cast<int>(f));
+    Mask breaks = NearBreaks(frame, rule);
+    int largest = 0;
+    long long judged = 0;
+    for (int y = 0; f > 0 && y < breaks.height(); ++y) {
+      for (int x = 0; x < breaks.width(); ++x) {
+        if (breaks(x, y) != 0 || last_breaks(x, y) != 0) continue;
+        if (frame.coverage(x, y) == 0 || last.coverage(x, y) == 0) continue;
+        largest = std::max(largest, PixelDifference(frame.image, last.image, x, y));
+        ++judged;
+      }
+    }
+    if (f > 0) changes.push_back(largest);
+    smoothness.judged_share += static_cast<double>(judged) /
+                               static_cast<double>(breaks.data().size()) / (path.size() - 1.0);
+    last = std::move(frame);
+    last_breaks = std::move(breaks);
+  }
+  smoothness.largest = *std::max_element(changes.begin(), changes.end());
+  const auto middle = changes.begin() + static_cast<std::ptrdiff_t>(changes.size() / 2);
+  std::nth_element(changes.begin(), middle, changes.end());
+  smoothness.median = *middle;
+  return smoothness;
+}
+
+class SmoothPath : public GlTest, public ::testing::WithParamInterface<std::string> {};
+
+TEST_P(SmoothPath, ChangesByNoMoreThanThriceTheMedian) {
+  const NamedScene scene = ExactOrDamagedScene(GetParam(), 9, 96, 64);
+  const RenderScene views = MakeRenderScene(scene.set);
+  const std::vector<NovelCamera> path = FlyThrough(scene.set, kSteps + 1);
+  Renderer renderer;
+  for (const RenderMethod method : kBothMethods) {
+    for (const int nearest : {3, 8}) {  // of 9 views: which are nearest changes along the path
+      RenderOptions options = OptionsOf(method);
+      options.views = nearest;
+      const Smoothness s =
+          MeasureSmoothness(views, path, options, [&](const NovelCamera& novel, int) {
+            return renderer.Render(views, novel.camera, novel.cam_from_world, options);
+          });
+      std::printf(
+          "%-10s %-8s K = %d: largest change %.0f, median %.0f, %.2f times; judged %.0f %%\n",
+          GetParam().c_str(), method == RenderMethod::kTwoPass ? "two-pass" : "deferred", nearest,
+          s.largest, s.median, s.ratio(), 100 * s.judged_share);
+      EXPECT_LE(s.ratio(), kLargestOfMedian);
+      EXPECT_GT(s.judged_share, 0.2);
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(, SmoothPath, ::testing::Values("courtyard", "stairs", "damaged"),
+                         [](const auto& test) { return test.param; });
+
+using Smooth = GlTest;
+
+TEST_F(Smooth, TheMeasureWouldSeeAPop) {
+  const NamedScene scene = ExactOrDamagedScene("stairs", 9, 96, 64);
+  const RenderScene views = MakeRenderScene(scene.set);
+  const std::vector<NovelCamera> path = FlyThrough(scene.set, kSteps + 1);
+  Renderer renderer;
+  for (const bool pops : {false, true}) {
+    const Smoothness s =
+        MeasureSmoothness(views, path, {}, [&](const NovelCamera& novel, int frame) {
+          // The pop: for one frame the picture of a place 12 steps ahead.
+          const NovelCamera& from = pops && frame == 40 ? path[52] : novel;
+          return renderer.Render(views, from.camera, from.cam_from_world, {});
+        });
+    EXPECT_EQ(s.ratio() <= kLargestOfMedian, !pops) << s.largest << " " << s.median;
+  }
+}
+
+}  // namespace
+}  // namespace dtr::gl
