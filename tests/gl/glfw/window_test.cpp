@@ -5,6 +5,7 @@
 
 #include "dtr/base/error.h"
 #include "tests/gl/gl_testing.h"
+#include "tests/support/virtual_display.h"
 
 namespace dtr::gl {
 namespace {
@@ -33,10 +34,11 @@ TEST(WindowDeathTest, WithoutADisplayIsRefusedInOneLine) {
 class WindowTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (std::getenv("DISPLAY") == nullptr) {
-      GTEST_SKIP() << "no DISPLAY, and no xvfb-run when this was configured";
-    }
+    if (!display_.up()) GTEST_SKIP() << "no display: Xvfb is missing or did not come up";
   }
+
+ private:
+  VirtualDisplay display_;
 };
 
 TEST_F(WindowTest, DrawsWhatAContextWithoutAWindowDraws) {
