@@ -18,7 +18,8 @@ namespace dtr::testing {
 ///
 /// The server chooses a free number itself and writes it once it takes connections. `xvfb-run` waits
 /// for a signal instead, which is lost when it comes before the wait or is ignored by the caller: then
-/// it waits for ever.
+/// it waits for ever. Nor does it start anew when its last window closes, for whoever opens the next one
+/// meanwhile is turned away.
 class VirtualDisplay {
  public:
   VirtualDisplay() {
@@ -52,8 +53,8 @@ class VirtualDisplay {
     const int silence = open("/dev/null", O_RDWR);
     for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) dup2(silence, fd);
     const std::string number = std::to_string(number_fd);
-    execlp("Xvfb", "Xvfb", "-displayfd", number.c_str(), "-screen", "0", "1280x800x24", "-nolisten",
-           "tcp", static_cast<char*>(nullptr));
+    execlp("Xvfb", "Xvfb", "-noreset", "-displayfd", number.c_str(), "-screen", "0", "1280x800x24",
+           "-nolisten", "tcp", static_cast<char*>(nullptr));
     _exit(127);
   }
 
