@@ -74,9 +74,10 @@ Program::Program() {
         "camera poses so that it is not needed");
   }
   for (const std::string& line : LinesOf({kProgram, "help"})) {
-    if (line.find("COLMAP") == std::string::npos) continue;
+    // "(Commit ... on ... with CUDA)", or without.
+    if (line.find("with CUDA") != std::string::npos) has_cuda_ = true;
+    if (!version_.empty() || line.find("COLMAP") == std::string::npos) continue;
     version_ = line.substr(line.find("COLMAP"));
-    break;
   }
   if (version_.empty()) {
     throw Error(FindProgram(kProgram).string() +

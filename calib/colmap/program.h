@@ -20,12 +20,15 @@ class Program {
   Program();
 
   const std::string& version() const { return version_; }
+  /// Whether it was built with CUDA, by its own words.
+  bool has_cuda() const { return has_cuda_; }
 
   /// The first of `names` that `command` understands, or nullptr.
   const char* FindOption(const std::string& command, std::initializer_list<const char*> names);
 
  private:
   std::string version_;
+  bool has_cuda_ = false;
   std::map<std::string, std::set<std::string>> options_;  // by command, as asked so far
 };
 

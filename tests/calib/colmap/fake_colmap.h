@@ -15,7 +15,8 @@ namespace dtr::colmap::testing {
 /// Puts fake_colmap.sh, called colmap, first on the PATH for its life time. Told by files in its
 /// folder: `fail.COMMAND` holds shell lines that the command runs first; `model.N` are the models
 /// the mapper leaves; `database` is what the extractor leaves, `output` what the triangulator and
-/// registrator leave (their input without it). Every call is noted in `calls`.
+/// registrator leave (their input without it), `maps` what patch_match_stereo leaves; with a file
+/// `cuda` it claims to have been built with CUDA. Every call is noted in `calls`.
 class FakeColmap {
  public:
   /// `new_names`: with the option names of later versions.
@@ -79,6 +80,7 @@ class FakeColmap {
         "--SequentialMatching.quadratic_overlap\n--Mapper.num_threads\n"
         "--Mapper.ba_refine_focal_length\n--Mapper.ba_refine_principal_point\n"
         "--Mapper.ba_refine_extra_params\n--Mapper.tri_ignore_two_view_tracks\n";
+    options += "--workspace_path\n--PatchMatchStereo.geom_consistency\n";
     options += new_names ? "--default_random_seed\n" : "--random_seed\n";
     for (const char* name : {".use_gpu", ".num_threads", ".max_image_size"}) {
       for (const char* stage : {"Extraction", "Matching"}) {

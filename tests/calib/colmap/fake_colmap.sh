@@ -1,7 +1,11 @@
 #!/bin/sh
 # Stands in for `colmap` in tests; fake_colmap.h says what the files in $FAKE_COLMAP mean.
 here=$FAKE_COLMAP
-if [ "$1" = help ]; then echo "COLMAP 3.8 (a fake one)"; exit 0; fi
+if [ "$1" = help ]; then
+  echo "COLMAP 3.8 (a fake one)"
+  if [ -f "$here/cuda" ]; then echo "(Commit 0 on never with CUDA)"; fi
+  exit 0
+fi
 if [ "$2" = -h ]; then sed 's/.*/  & arg (=0)/' "$here/options"; exit 0; fi
 command=$1
 echo "$*" >> "$here/calls"
@@ -12,6 +16,7 @@ while [ $# -gt 1 ]; do
     --input_path) input=$2 ;;
     --image_list_path) list=$2 ;;
     --image_path) images=$2 ;;
+    --workspace_path) workspace=$2 ;;
   esac
   shift
 done
@@ -32,6 +37,8 @@ case $command in
     for model in "$here"/model.*; do
       if [ -d "$model" ]; then cp -r "$model" "$output/${model##*.}"; fi
     done ;;
+  patch_match_stereo)
+    cp "$here"/maps/* "$workspace/stereo/depth_maps" ;;
   point_triangulator | image_registrator)
     if [ -d "$here/output" ]; then input=$here/output; fi
     cp "$input"/* "$output" ;;
