@@ -1,5 +1,7 @@
 #include "stereo/engine.h"
 
+#include <stdexcept>
+
 #include "stereo/patchmatch/patchmatch_engine.h"
 #include "stereo/sgbm/sgbm_engine.h"
 
@@ -21,9 +23,23 @@ DepthEstimate Engine::Judge(std::span<const StereoView>, int, std::span<const in
   throw std::logic_error(name() + ": has no rounds");
 }
 
-std::unique_ptr<Engine> MakeEngine(const std::string& name) {
-  if (name == "sgbm") return std::make_unique<SgbmEngine>();
-  if (name == "patchmatch") return std::make_unique<PatchMatchEngine>();
+namespace {
+
+void CheckRange(const char* what, int value, int least, int most) {
+  if (value >= least && value <= most) return;
+  throw UsageError(std::string(what) + ": expected " + std::to_string(least) + " to " +
+                   std::to_string(most) + ", found " + std::to_string(value));
+}
+
+}  // namespace
+
+std::unique_ptr<Engine> MakeEngine(const std::string& name, const Effort& effort) {
+  CheckRange("neighbours", effort.neighbours, 1, 8);
+  CheckRange("neighbours in the rounds", effort.round_neighbours, 1, 8);
+  CheckRange("iterations", effort.iterations, 1, 20);
+  CheckRange("rounds", effort.rounds, 0, 8);
+  if (name == "sgbm") return std::make_unique<SgbmEngine>(PairLimits{}, effort.neighbours);
+  if (name == "patchmatch") return std::make_unique<PatchMatchEngine>(effort);
   throw UsageError("stereo engine: expected one of patchmatch, sgbm, found '" + name + "'");
 }
 

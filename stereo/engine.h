@@ -34,6 +34,17 @@ struct DepthEstimate {
   Grid<float> inverse_depth_sigma;  ///< standard deviation of 1/z; 0 where depth is a hole
 };
 
+/// How much work goes into a depth map. Every value may change the result.
+struct Effort {
+  int neighbours = 5;        ///< views that the search asks, at most
+  int round_neighbours = 8;  ///< views that the rounds and the verdict ask, at most 8
+  /// Visits per pixel on the levels between the coarsest (two more) and full size (two fewer, but
+  /// one at least).
+  int iterations = 3;
+  int rounds = 2;  ///< rounds in which views take account of each other's planes
+  bool operator==(const Effort&) const = default;
+};
+
 struct EngineOptions {
   int threads = 0;         ///< 0: all cores; the result does not depend on it
   std::uint64_t seed = 0;  ///< for engines that draw random numbers
@@ -83,7 +94,9 @@ class Engine {
                               const EngineOptions& options) const;
 };
 
-/// Engine by its name on the command line ("sgbm"). Throws UsageError for unknown names.
-std::unique_ptr<Engine> MakeEngine(const std::string& name);
+/// Engine by its name on the command line ("sgbm"), which makes use of `neighbours` alone.
+/// Throws UsageError for unknown names and for an effort out of range: 1 to 8 neighbours, 1 to 20
+/// iterations, 0 to 8 rounds.
+std::unique_ptr<Engine> MakeEngine(const std::string& name, const Effort& effort = {});
 
 }  // namespace dtr::stereo

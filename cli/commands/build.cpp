@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "cli/command.h"
+#include "cli/depth_options.h"
 #include "cli/pipeline/build_set.h"
 
 namespace dtr::cli {
@@ -45,13 +46,9 @@ void AddBuildCommand(CLI::App& app) {
             ->type_name("every:N|NAME,...");
         command.add_flag("--holdout-strict", options->holdout_strict,
                          "Keep them out of SfM too and register them afterwards");
-        command.add_option("--engine", options->engine, "Depth engine [patchmatch]")
-            ->check(CLI::IsMember({"sgbm", "patchmatch", "none"}))
-            ->type_name("sgbm|patchmatch|none");
-        command
-            .add_option("--preset", options->preset, "Long side 800, 1024 or full size [balanced]")
-            ->check(CLI::IsMember({"fast", "balanced", "best"}))
-            ->type_name("fast|balanced|best");
+        AddDepthOptions(command, {"sgbm", "patchmatch", "colmap", "none"},
+                        "Long side 800, 1024 or full size, and work spent on depth [balanced]",
+                        options->depth);
         command
             .add_option("--max-size", options->max_size_px,
                         "Long side of the set's images; 0 = full size; overrides the preset")

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/command.h"
+#include "cli/depth_options.h"
 #include "cli/pipeline/recompute_depth.h"
 
 namespace dtr::cli {
@@ -19,9 +20,9 @@ void AddStereoCommand(CLI::App& app) {
             .add_option("-o,--output", options->output,
                         "The set to write; without it SET itself is replaced, whole or not at all")
             ->type_name("SET2");
-        command.add_option("--engine", options->engine, "Depth engine [patchmatch]")
-            ->check(CLI::IsMember({"sgbm", "patchmatch"}))
-            ->type_name("sgbm|patchmatch");
+        AddDepthOptions(command, {"sgbm", "patchmatch", "colmap"},
+                        "Work spent on a depth map; the images keep their size [balanced]",
+                        options->depth);
         command.add_flag("--force", options->force, "Replace SET2 when it exists");
         return [options](const Context& context) -> int {
           options->threads = context.common.threads;

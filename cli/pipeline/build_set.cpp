@@ -9,19 +9,19 @@
 #include "calib/undistort.h"
 #include "capture/ingest.h"
 #include "cli/pipeline/calibrated_photos.h"
+#include "cli/pipeline/depth_engine.h"
 #include "cli/pipeline/depth_stage.h"
 #include "cli/pipeline/holdout.h"
+#include "cli/pipeline/input_hash.h"
 #include "cli/pipeline/mesh_stage.h"
 #include "cli/pipeline/run_log.h"
 #include "cli/pipeline/set_page.h"
 #include "cli/pipeline/validate_set.h"
 #include "dtr/base/error.h"
-#include "dtr/base/hash.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/eval/json.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/geometry.h"
-#include "stereo/engine.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -34,14 +34,15 @@ std::vector<std::string> NamesOf(const capture::Capture& capture) {
   return names;
 }
 
-Json OptionsJson(const BuildOptions& options, int max_size_px) {
+Json OptionsJson(const BuildOptions& options, const stereo::Effort& effort, int max_size_px) {
   // Everything that can change a byte of the set, and nothing else: threads and memory do not.
-  return {{"engine", options.engine},
-          {"max_size_px", max_size_px},
-          {"holdout", options.holdout},
-          {"holdout_strict", options.holdout_strict},
-          {"poses", options.poses.filename().string()},
-          {"seed", options.seed}};
+  Json json = SettingsJson(options.depth.engine, effort);
+  json["max_size_px"] = max_size_px;
+  json["holdout"] = options.holdout;
+  json["holdout_strict"] = options.holdout_strict;
+  json["poses"] = options.poses.filename().string();
+  json["seed"] = options.seed;
+  return json;
 }
 
 // Photos by name, size and content: equal values mean the same input. Hashes of held-out photos are
@@ -55,19 +56,6 @@ Json PhotosJson(const capture::Capture& capture, const std::vector<bool>& with_h
     if (with_hash[i]) photos.back()["sha256"] = photo.source_sha256;
   }
   return photos;
-}
-
-std::string PosesHash(const std::filesystem::path& poses) {
-  if (poses.empty()) return "";
-  if (!std::filesystem::is_directory(poses)) return Sha256OfFile(poses);
-  std::vector<std::filesystem::path> files;
-  for (const auto& entry : std::filesystem::directory_iterator(poses)) {
-    if (entry.is_regular_file()) files.push_back(entry.path());
-  }
-  std::sort(files.begin(), files.end());
-  std::string all;
-  for (const auto& file : files) all += file.filename().string() + Sha256OfFile(file);
-  return Sha256(std::as_bytes(std::span(all)));
 }
 
 // Views of the registered photos, in the photos' order, with pixels on the set's grid.
@@ -148,7 +136,7 @@ Json ProvenanceJson(const BuildOptions& options, const Json& option_values, cons
   provenance["tool_version"] = DTR_VERSION;
   provenance["calibration"] = Json::parse(calibrated.report_json);
   provenance["calibration"]["engine"] = calibrated.engine;
-  provenance["depth_engine"] = options.engine;
+  provenance["depth_engine"] = options.depth.engine;
   provenance["options"] = option_values;
   provenance["photos"] = photos;
   provenance["not_registered"] = report.not_registered;
@@ -200,17 +188,11 @@ Json ReportJson(const BuildReport& report, const RunLog& log, const std::filesys
 
 }  // namespace
 
-int MaxSizeOfPreset(const std::string& preset) {
-  if (preset == "fast") return 800;
-  if (preset == "balanced") return 1024;
-  if (preset == "best") return 0;
-  throw UsageError(fmt::format("--preset: expected fast, balanced or best, found '{}'", preset));
-}
-
 BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
-  const int max_size_px =
-      options.max_size_px >= 0 ? options.max_size_px : MaxSizeOfPreset(options.preset);
-  const auto engine = options.engine == "none" ? nullptr : stereo::MakeEngine(options.engine);
+  const int max_size_px = options.max_size_px >= 0 ? options.max_size_px
+                                                   : PresetCalled(options.depth.preset).max_size_px;
+  const stereo::Effort effort = EffortOf(options.depth);
+  RequireEngine(options.depth);
   if (options.holdout_strict && (options.holdout.empty() || !options.poses.empty())) {
     throw UsageError(
         "--holdout-strict: keeps the photos of --holdout out of SfM; it needs --holdout and "
@@ -228,12 +210,13 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
   const std::vector<bool> held_out = ChooseHeldOut(options.holdout, NamesOf(photos));
   std::vector<bool> is_source = held_out;
   is_source.flip();
-  const Json option_values = OptionsJson(options, max_size_px);
+  const Json option_values = OptionsJson(options, effort, max_size_px);
   const Json fingerprint = {
       {"tool_version", DTR_VERSION},
       {"options", option_values},
       {"photos", PhotosJson(photos, std::vector<bool>(held_out.size(), true))},
-      {"poses_sha256", PosesHash(options.poses)}};
+      {"poses_sha256", InputHash(options.poses)},
+      {"workspace_sha256", InputHash(options.depth.workspace)}};
   io::SetWriter writer(options.output, fingerprint.dump(), options.force);
 
   log.Begin("calibration");
@@ -261,8 +244,8 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
   const SparseScene sparse = SparseOf(calibrated, views);
 
   log.Begin("depth");
-  DepthStage(views, sparse, engine.get(), {options.threads, options.seed, options.memory_gb},
-             set.unit, writer, progress);
+  DepthStage(set, sparse, options.depth, effort, {options.threads, options.seed, options.memory_gb},
+             writer, progress);
 
   log.Begin("finishing");
   FinishGeometry(set, SourcePoints(sparse, views));
@@ -274,8 +257,8 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
       ProvenanceJson(options, option_values, PhotosJson(photos, is_source), calibrated, report)
           .dump();
   WriteSetPage(writer, set,
-               {options.output.stem().string(), options.engine, validation.tests, report.skipped,
-                report.not_registered.size()});
+               {options.output.stem().string(), options.depth.engine, validation.tests,
+                report.skipped, report.not_registered.size()});
   log.End();
   io::WriteRunRecord(writer.folder(), log.Record(ResolveThreads(options.threads)));
   writer.Finish(set);

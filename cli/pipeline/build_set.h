@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "cli/pipeline/depth_settings.h"
 #include "dtr/base/progress.h"
 #include "dtr/types/dtr_set.h"
 
@@ -16,8 +17,7 @@ struct BuildOptions {
   std::filesystem::path output;  ///< NAME.dtr
   std::string holdout;           ///< "", "every:N" or names
   bool holdout_strict = false;
-  std::string engine = "patchmatch";  ///< "sgbm", "patchmatch" or "none"
-  std::string preset = "balanced";
+  DepthChoice depth;
   int max_size_px = -1;  ///< long side; 0 = full size, -1 = what the preset says
   double memory_gb = 4;
   std::filesystem::path poses;
@@ -39,8 +39,5 @@ struct BuildReport {
 /// Builds a set. Continues an interrupted run of the same input and options; throws UsageError when
 /// the output exists (without force) or belongs to another run.
 BuildReport BuildSet(const BuildOptions& options, Progress& progress);
-
-/// Long side of the stored images for a preset: fast 800, balanced 1024, best 0 (full size).
-int MaxSizeOfPreset(const std::string& preset);
 
 }  // namespace dtr::pipeline

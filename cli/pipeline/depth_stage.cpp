@@ -1,5 +1,6 @@
 #include "cli/pipeline/depth_stage.h"
 
+#include "cli/pipeline/depth_engine.h"
 #include "cli/pipeline/plane_files.h"
 #include "stereo/depth_maps.h"
 
@@ -24,23 +25,30 @@ SparseScene SourceScene(const SparseScene& sparse, const std::vector<View>& view
 
 }  // namespace
 
-void DepthStage(std::vector<View>& views, const SparseScene& sparse, const stereo::Engine* engine,
-                const DepthStageOptions& options, LengthUnit unit, io::SetWriter& writer,
-                Progress& progress) {
+void DepthStage(DtrSet& set, const SparseScene& sparse, const DepthChoice& choice,
+                const stereo::Effort& effort, const DepthStageOptions& options,
+                io::SetWriter& writer, Progress& progress) {
+  std::vector<View>& views = set.frames.front().views;
   std::vector<int> sources;
   std::vector<stereo::StereoView> stereo_views;
   for (size_t i = 0; i < views.size(); ++i) {
     View& view = views[i];
     // Images first: what an interrupted run wrote is recognised and not written again.
-    if (!writer.RestoreView(view)) writer.WriteView(view, unit);
+    if (!writer.RestoreView(view)) writer.WriteView(view, set.unit);
     if (view.role != ViewRole::kSource) continue;
     sources.push_back(static_cast<int>(i));
     stereo_views.push_back({view.camera, view.cam_from_world, &view.image, &view.mask});
   }
-  if (engine == nullptr) {
+  if (choice.engine == "none") {
     progress.Note("depth left out: --engine none");
     return;
   }
+
+  const SparseScene scene = SourceScene(sparse, views, sources);
+  const auto engine = MakeDepthEngine(choice, effort,
+                                      {views, sources, stereo_views, &scene, set.world_origin,
+                                       writer.folder(), writer.work_folder()},
+                                      progress);
 
   stereo::DepthMapsOptions depth_options;
   depth_options.neighbours.count = engine->Neighbours();
@@ -54,13 +62,13 @@ void DepthStage(std::vector<View>& views, const SparseScene& sparse, const stere
     return views[static_cast<size_t>(sources[static_cast<size_t>(source)])];
   };
   stereo::ComputeDepthMaps(
-      stereo_views, SourceScene(sparse, views, sources), *engine, depth_options, progress,
+      stereo_views, scene, *engine, depth_options, progress,
       [&](int source) { return view_of(source).depth_file.has_value(); },
       [&](int source, stereo::DepthEstimate&& estimate, const stereo::DepthRange&) {
         View& view = view_of(source);
         view.depth = std::move(estimate.depth);
         view.inverse_depth_sigma = std::move(estimate.inverse_depth_sigma);
-        writer.WriteView(view, unit);
+        writer.WriteView(view, set.unit);
       });
   // What follows uses the stored maps, so that a resumed run and an undisturbed one agree.
   for (const int i : sources) {

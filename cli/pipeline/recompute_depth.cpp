@@ -2,7 +2,9 @@
 
 #include <nlohmann/json.hpp>
 
+#include "cli/pipeline/depth_engine.h"
 #include "cli/pipeline/depth_stage.h"
+#include "cli/pipeline/input_hash.h"
 #include "cli/pipeline/mesh_stage.h"
 #include "cli/pipeline/run_log.h"
 #include "cli/pipeline/set_page.h"
@@ -12,7 +14,6 @@
 #include "dtr/base/parallel_for.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/geometry.h"
-#include "stereo/engine.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -63,7 +64,9 @@ double Completeness(const std::vector<View>& views, int& maps) {
 }  // namespace
 
 RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& progress) {
-  const auto engine = stereo::MakeEngine(options.engine);
+  const stereo::Effort effort = EffortOf(options.depth);
+  RequireEngine(options.depth);
+  const nlohmann::ordered_json settings = SettingsJson(options.depth.engine, effort);
   const bool in_place = options.output.empty();
   RunLog log;
   log.Begin("depth");
@@ -73,26 +76,30 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& progre
   const SparseScene sparse = io::LoadSparse(options.set, set);
 
   const nlohmann::json fingerprint = {{"tool_version", DTR_VERSION},
-                                      {"engine", options.engine},
+                                      {"settings", settings},
                                       {"seed", options.seed},
+                                      {"workspace_sha256", InputHash(options.depth.workspace)},
                                       {"set_sha256", Sha256OfFile(options.set / "set.json")},
                                       {"held_out", HeldOutHashes(set)}};
   io::SetWriter writer(report.written, fingerprint.dump(), in_place || options.force);
   std::vector<View>& views = set.frames.front().views;
-  DepthStage(views, sparse, engine.get(), {options.threads, options.seed, 4}, set.unit, writer,
+  DepthStage(set, sparse, options.depth, effort, {options.threads, options.seed, 4}, writer,
              progress);
   FinishGeometry(set);
   MeshStage(set, writer, options.threads);
   writer.WriteSparse(set, sparse);
   nlohmann::ordered_json provenance = nlohmann::ordered_json::parse(set.provenance_json);
-  provenance["depth_engine"] = options.engine;
-  provenance["options"]["engine"] = options.engine;
+  provenance["depth_engine"] = options.depth.engine;
+  for (const char* old : {"neighbours", "round_neighbours", "iterations", "rounds"}) {
+    provenance["options"].erase(old);
+  }
+  provenance["options"].update(settings);
   provenance["options"]["seed"] = options.seed;
   set.provenance_json = provenance.dump();
   report.depth_completeness = Completeness(views, report.depth_maps);
   const auto validation = ValidateSet(set, sparse, {}, options.threads);
   WriteSetPage(writer, set,
-               {report.written.stem().string(), options.engine, validation.tests, {}, 0});
+               {report.written.stem().string(), options.depth.engine, validation.tests, {}, 0});
   log.End();
   io::WriteRunRecord(writer.folder(), log.Record(ResolveThreads(options.threads)));
   writer.Finish(set);

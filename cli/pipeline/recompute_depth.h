@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <string>
 
+#include "cli/pipeline/depth_settings.h"
 #include "dtr/base/progress.h"
 
 namespace dtr::pipeline {
@@ -11,7 +12,7 @@ namespace dtr::pipeline {
 struct RecomputeOptions {
   std::filesystem::path set;
   std::filesystem::path output;  ///< empty: `set` itself is replaced
-  std::string engine = "patchmatch";
+  DepthChoice depth;
   bool force = false;
   int threads = 0;
   std::uint64_t seed = 0;

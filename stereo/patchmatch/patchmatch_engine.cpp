@@ -20,16 +20,12 @@ constexpr int kCoarsestSidePx = 256;
 constexpr int kSmallestSidePx = 24;
 /// The first guess tries one inverse depth per pixel of disparity, within these bounds.
 constexpr double kLeastSamples = 48, kMostSamples = 128;
-/// Visits per pixel and level.
-constexpr int kCoarsestIterations = 5, kIterations = 3, kFinestIterations = 1;
+/// Visits per pixel on the coarsest level more than on those between, and on the finest fewer.
+constexpr int kMoreIterations = 2;
 constexpr float kFirstStepPx = 4.0f, kFinestStepPx = 1.0f;
-/// Rounds of geometric consistency, and visits per pixel in each.
-constexpr int kRounds = 2, kRefineIterations = 1;
+/// Visits per pixel in each round of geometric consistency.
+constexpr int kRefineIterations = 1;
 constexpr int kFirstRoundNumber = 1000;  // names random numbers apart from the search's
-/// Neighbours that the search asks; the rounds, which cost less, ask all: what few far views see,
-/// they settle. On plaza, share of all true pixels within 1 % before any check, with 5 and with 8
-/// in the rounds: 86.6 % and 88.0 %.
-constexpr int kSearchViews = 5;
 /// A pair whose rays to the middle of the range meet at less than this has no baseline.
 constexpr double kSmallestDisparityPx = 0.5;
 
@@ -112,7 +108,7 @@ void RunSweeps(const Level& level, Sweep sweep, int iterations, float step_px, i
 
 /// Planes of the finest level.
 State SearchPyramid(const StereoView& view, std::span<const Picture> pictures,
-                    std::span<const SourcePyramid> sources, const DepthRange& range,
+                    std::span<const SourcePyramid> sources, const DepthRange& range, int iterations,
                     const EngineOptions& options, Level* finest) {
   State state;
   Level level, coarser;
@@ -137,11 +133,11 @@ State SearchPyramid(const StereoView& view, std::span<const Picture> pictures,
     }
     Sweep sweep;
     sweep.jump = index > 0 || coarsest;
-    const int iterations = coarsest     ? kCoarsestIterations
-                           : index == 0 ? kFinestIterations
-                                        : kIterations;
-    RunSweeps(level, sweep, iterations, coarsest ? kFirstStepPx : kFinestStepPx * 2,
-              options.threads, &round, &state);
+    const int visits = coarsest     ? iterations + kMoreIterations
+                       : index == 0 ? std::max(1, iterations - kMoreIterations)
+                                    : iterations;
+    RunSweeps(level, sweep, visits, coarsest ? kFirstStepPx : kFinestStepPx * 2, options.threads,
+              &round, &state);
     if (index == 0) break;
   }
   *finest = std::move(level);
@@ -161,8 +157,8 @@ struct Problem {
                           options.threads);
   }
 
-  State Search(const EngineOptions& options) {
-    return SearchPyramid(*view, pictures, sources, range, options, &finest);
+  State Search(int iterations, const EngineOptions& options) {
+    return SearchPyramid(*view, pictures, sources, range, iterations, options, &finest);
   }
 
   State Resume(const PlaneMap& map, const EngineOptions& options) {
@@ -179,30 +175,32 @@ struct Problem {
 
 }  // namespace
 
-int PatchMatchEngine::Rounds() const { return kRounds; }
+int PatchMatchEngine::Rounds() const { return effort_.rounds; }
 
-int PatchMatchEngine::Neighbours() const { return kMaxViews; }
+int PatchMatchEngine::Neighbours() const {
+  return std::min(kMaxViews, std::max(effort_.neighbours, effort_.round_neighbours));
+}
 
 DepthEstimate PatchMatchEngine::Estimate(std::span<const StereoView> views, int reference,
                                          std::span<const int> neighbours, const DepthRange& range,
                                          const EngineOptions& options) const {
-  Problem problem(views, reference, neighbours, range, {}, kMaxViews, options);
-  const State state = problem.Search(options);
+  Problem problem(views, reference, neighbours, range, {}, Neighbours(), options);
+  const State state = problem.Search(effort_.iterations, options);
   return TrustedDepth(problem.finest, state, *problem.view, range, options.threads);
 }
 
 PlaneMap PatchMatchEngine::Match(std::span<const StereoView> views, int reference,
                                  std::span<const int> neighbours, const DepthRange& range,
                                  const EngineOptions& options) const {
-  Problem problem(views, reference, neighbours, range, {}, kSearchViews, options);
-  return PlanesOf(problem.finest, problem.Search(options), range);
+  Problem problem(views, reference, neighbours, range, {}, effort_.neighbours, options);
+  return PlanesOf(problem.finest, problem.Search(effort_.iterations, options), range);
 }
 
 PlaneMap PatchMatchEngine::Refine(std::span<const StereoView> views, int reference,
                                   std::span<const int> neighbours, const DepthRange& range,
                                   std::span<const PlaneMap* const> maps, int round,
                                   const EngineOptions& options) const {
-  Problem problem(views, reference, neighbours, range, maps, kMaxViews, options);
+  Problem problem(views, reference, neighbours, range, maps, effort_.round_neighbours, options);
   State state = problem.Resume(*maps[static_cast<size_t>(reference)], options);
   GuessFromSurfaces(problem.finest, &state);
   Sweep sweep;
@@ -218,7 +216,7 @@ DepthEstimate PatchMatchEngine::Judge(std::span<const StereoView> views, int ref
                                       std::span<const int> neighbours, const DepthRange& range,
                                       std::span<const PlaneMap* const> maps,
                                       const EngineOptions& options) const {
-  Problem problem(views, reference, neighbours, range, maps, kMaxViews, options);
+  Problem problem(views, reference, neighbours, range, maps, effort_.round_neighbours, options);
   const State state = problem.Resume(*maps[static_cast<size_t>(reference)], options);
   return TrustedDepth(problem.finest, state, *problem.view, range, options.threads);
 }

@@ -6,16 +6,18 @@ namespace dtr::stereo {
 
 /// PatchMatch multi-view stereo: a plane in inverse depth per pixel, spread over a checkerboard
 /// from near and far pixels, judged by bilateral NCC in the views that see the pixel, coarse to
-/// fine (Bleyer et al., BMVC 2011; Galliani et al., ICCV 2015; Xu and Tao, CVPR 2019). Then two
+/// fine (Bleyer et al., BMVC 2011; Galliani et al., ICCV 2015; Xu and Tao, CVPR 2019). Then
 /// rounds in which the neighbours' planes of the round before suggest planes of their own and a
 /// plane costs more the farther its round trip through a neighbour's map misses the pixel (Xu and
 /// Tao, sec. 4.2). View weights are the selection probabilities themselves, random numbers are
-/// hashes of the pixel: nothing depends on history or threads. The search uses the first 5
-/// neighbours, the rounds and Estimate, which is the search alone, the first 8. Memory does not
+/// hashes of the pixel: nothing depends on history or threads. The search uses the first
+/// Effort::neighbours, the rounds the first Effort::round_neighbours, Estimate, which is the search
+/// alone, the more of both. Memory does not
 /// depend on the number of threads: about 100 bytes per pixel of the reference and 18 per pixel of
 /// each neighbour.
 class PatchMatchEngine final : public Engine {
  public:
+  explicit PatchMatchEngine(const Effort& effort = {}) : effort_(effort) {}
   std::string name() const override { return "patchmatch"; }
   DepthEstimate Estimate(std::span<const StereoView> views, int reference,
                          std::span<const int> neighbours, const DepthRange& range,
@@ -31,6 +33,9 @@ class PatchMatchEngine final : public Engine {
                       std::span<const int> neighbours, const DepthRange& range,
                       std::span<const PlaneMap* const> maps,
                       const EngineOptions& options) const override;
+
+ private:
+  Effort effort_;
 };
 
 }  // namespace dtr::stereo

@@ -8,14 +8,17 @@ namespace dtr::stereo {
 /// Rectifies the reference with each neighbour, matches, and lets the pairs vote per pixel.
 class SgbmEngine final : public Engine {
  public:
-  explicit SgbmEngine(const PairLimits& limits = {}) : limits_(limits) {}
+  explicit SgbmEngine(const PairLimits& limits = {}, int neighbours = 5)
+      : limits_(limits), neighbours_(neighbours) {}
   std::string name() const override { return "sgbm"; }
+  int Neighbours() const override { return neighbours_; }
   DepthEstimate Estimate(std::span<const StereoView> views, int reference,
                          std::span<const int> neighbours, const DepthRange& range,
                          const EngineOptions& options) const override;
 
  private:
   PairLimits limits_;
+  int neighbours_;
 };
 
 }  // namespace dtr::stereo

@@ -1,0 +1,37 @@
+#include "cli/depth_options.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+namespace dtr::cli {
+
+void AddDepthOptions(CLI::App& command, const std::vector<std::string>& engines,
+                     const std::string& preset_help, pipeline::DepthChoice& choice) {
+  command.add_option("--engine", choice.engine, "Depth engine [patchmatch]")
+      ->check(CLI::IsMember(engines))
+      ->type_name(fmt::format("{}", fmt::join(engines, "|")));
+  std::vector<std::string> presets;
+  for (const pipeline::Preset& preset : pipeline::Presets()) presets.emplace_back(preset.name);
+  command.add_option("--preset", choice.preset, preset_help)
+      ->check(CLI::IsMember(presets))
+      ->type_name(fmt::format("{}", fmt::join(presets, "|")));
+  const auto overriding = [&](const char* name, std::optional<int>& value, const char* help,
+                              int least, int most) {
+    command.add_option(name, value, std::string(help) + "; overrides the preset")
+        ->check(CLI::Range(least, most))
+        ->type_name("N");
+  };
+  command
+      .add_option("--workspace", choice.workspace,
+                  "A dense workspace of this set for --engine colmap; without it COLMAP is run, "
+                  "which needs CUDA")
+      ->check(CLI::ExistingDirectory)
+      ->type_name("DIR");
+  overriding("--neighbours", choice.neighbours, "Views that the search asks", 1, 8);
+  overriding("--round-neighbours", choice.round_neighbours, "Views that the rounds ask", 1, 8);
+  overriding("--iterations", choice.iterations, "Visits per pixel and level of the search", 1, 20);
+  overriding("--rounds", choice.rounds, "Rounds in which views are held to each other's planes", 0,
+             8);
+}
+
+}  // namespace dtr::cli

@@ -1,0 +1,40 @@
+// cli/pipeline/depth_settings.h -- presets, and what of them the command line overrides.
+#pragma once
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "stereo/engine.h"
+
+namespace dtr::pipeline {
+
+/// Settings that belong together, by name.
+struct Preset {
+  const char* name;
+  int max_size_px;  ///< long side of the images of a set that is built; 0: full size
+  stereo::Effort effort;
+};
+
+/// The table of presets, cheapest first. docs/ACCURACY.md shows what each costs and gives.
+std::span<const Preset> Presets();
+/// Throws UsageError for unknown names.
+const Preset& PresetCalled(const std::string& name);
+
+/// What was asked for: a preset, and what overrides it.
+struct DepthChoice {
+  std::string engine = "patchmatch";  ///< "none": no depth
+  std::string preset = "balanced";
+  std::optional<int> neighbours, round_neighbours, iterations, rounds;
+  std::filesystem::path workspace;  ///< for engine "colmap"; empty: the program fills one
+};
+
+/// The effort that a choice comes to.
+stereo::Effort EffortOf(const DepthChoice& choice);
+
+/// What of the engine and its effort decides the bytes of a depth map, by the names of the options:
+/// given explicitly, they make the same maps whatever preset they came from.
+nlohmann::ordered_json SettingsJson(const std::string& engine, const stereo::Effort& effort);
+
+}  // namespace dtr::pipeline

@@ -1,0 +1,154 @@
+// Presets, what overrides them, what of it a set remembers; depth that COLMAP makes.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "dtr/base/files.h"
+#include "dtr/io/set_io.h"
+#include "tests/calib/colmap/fake_colmap.h"
+#include "tests/cli/run_dtr.h"
+#include "tests/cli/small_courtyard.h"
+#include "tests/support/test_data.h"
+
+namespace dtr::testing {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+using ::testing::Contains;
+using ::testing::IsEmpty;
+
+class DepthSettings : public ::testing::Test {
+ protected:
+  // Cameras once for all tests: a set of 4 source views without depth.
+  static void SetUpTestSuite() {
+    shared_ = new TemporaryFolder;
+    const fs::path courtyard = *shared_ / "courtyard";
+    MakeSmallCourtyard(courtyard);
+    DtrOk({"build", (courtyard / "images").string(), "-o", Cameras().string(), "--poses",
+           (courtyard / "sparse").string(), "--holdout", "0001,0003,0005", "--engine", "none"});
+  }
+  static void TearDownTestSuite() { delete shared_; }
+  static fs::path Cameras() { return *shared_ / "cameras.dtr"; }
+
+  // Depth by `dtr stereo` with these options.
+  static fs::path Stereo(const std::string& run, std::vector<std::string> options) {
+    const fs::path set = *shared_ / run / "set.dtr";
+    fs::create_directories(set.parent_path());
+    options.insert(options.begin(),
+                   {"stereo", Cameras().string(), "-o", set.string(), "--threads", "2"});
+    DtrOk(options);
+    return set;
+  }
+  // By the cheapest preset; made once.
+  static fs::path Fast() {
+    const fs::path set = *shared_ / "fast" / "set.dtr";
+    return fs::exists(set) ? set : Stereo("fast", {"--preset", "fast"});
+  }
+  static Json OptionsOf(const fs::path& set) {
+    return Json::parse(Text(set / "set.json")).at("provenance").at("options");
+  }
+
+  static TemporaryFolder* shared_;
+  TemporaryFolder folder_;
+};
+TemporaryFolder* DepthSettings::shared_ = nullptr;
+
+TEST_F(DepthSettings, BalancedIsWhatRunsUnlessToldOtherwise) {
+  const auto plain = Contents(Stereo("plain", {}));
+  EXPECT_THAT(DifferingFiles(plain, Contents(Stereo("named", {"--preset", "balanced"}))),
+              IsEmpty());
+  EXPECT_THAT(DifferingFiles(plain, Contents(Fast())), Contains("depth/0000.png"));
+}
+
+TEST_F(DepthSettings, WhatASetRecordsGivenExplicitlyMakesTheSameBytes) {
+  const Json recorded = OptionsOf(Fast());
+  std::vector<std::string> explicitly;
+  for (const char* name : {"neighbours", "round_neighbours", "iterations", "rounds"}) {
+    std::string option = std::string("--") + name;
+    std::replace(option.begin() + 2, option.end(), '_', '-');
+    explicitly.insert(explicitly.end(), {option, std::to_string(recorded.at(name).get<int>())});
+  }
+  EXPECT_THAT(DifferingFiles(Contents(Fast()), Contents(Stereo("explicit", explicitly))),
+              IsEmpty());
+}
+
+TEST_F(DepthSettings, AnExplicitOptionOverridesThePreset) {
+  const Json options = OptionsOf(Stereo("override", {"--preset", "fast", "--rounds", "0"}));
+  EXPECT_EQ(options.at("rounds"), 0);
+  EXPECT_EQ(options.at("neighbours"), OptionsOf(Fast()).at("neighbours"));
+}
+
+TEST_F(DepthSettings, AnEngineRecordsOnlyWhatItMakesUseOf) {
+  const Json options = OptionsOf(Stereo("sgbm", {"--engine", "sgbm"}));
+  EXPECT_TRUE(options.contains("neighbours"));
+  EXPECT_FALSE(options.contains("rounds"));
+}
+
+// A colmap that leaves the true depth of the courtyard, in files called as images of a set are.
+class DepthByColmap : public DepthSettings {
+ protected:
+  void SetUp() override {
+    ImportSmallCourtyard(*shared_ / "courtyard", folder_ / "true.dtr");
+    truth_ = io::LoadSet(folder_ / "true.dtr");
+  }
+  void WriteMaps(const fs::path& folder, const std::string& extension) const {
+    fs::create_directories(folder);
+    for (const View& view : truth_.frames.front().views) {
+      std::string bytes =
+          fmt::format("{}&{}&1&", view.depth.grid().width(), view.depth.grid().height());
+      bytes.append(reinterpret_cast<const char*>(view.depth.grid().data().data()),
+                   view.depth.grid().data().size() * sizeof(float));
+      const std::string stem = fs::path(view.name).replace_extension().string();
+      WriteFileAtomically(folder / (stem + extension + ".geometric.bin"), bytes);
+    }
+  }
+  DtrSet truth_;
+};
+
+TEST_F(DepthByColmap, RunsWhereThereIsCudaAndReadsWhatAWorkspaceHas) {
+  colmap::testing::FakeColmap fake;
+  WriteFileAtomically(fake / "cuda", "");
+  WriteMaps(fake / "maps", ".png");
+  const fs::path computed = Stereo("computed", {"--engine", "colmap"});
+  DtrSet set = io::LoadSet(computed);
+  int views = 0;
+  for (const View& view : set.frames.front().views) {
+    for (const View& exact : truth_.frames.front().views) {
+      if (exact.name != view.name) continue;
+      ++views;
+      int kept = 0;
+      for (int y = 0; y < kCourtyardHeightPx; ++y) {
+        for (int x = 0; x < kCourtyardWidthPx; ++x) {
+          if (DepthImage::IsHole(view.depth(x, y))) continue;
+          ++kept;
+          EXPECT_NEAR(view.depth(x, y), exact.depth(x, y), 1e-3 * exact.depth(x, y));
+        }
+      }
+      EXPECT_GT(kept, kCourtyardWidthPx * kCourtyardHeightPx / 3) << view.name;
+    }
+  }
+  EXPECT_GE(views, 2);
+
+  const fs::path workspace = folder_ / "workspace";
+  DtrOk({"export", Cameras().string(), "--format", "colmap", "-o", workspace.string()});
+  WriteMaps(workspace / "stereo/depth_maps", ".png");
+  const fs::path read = Stereo("read", {"--engine", "colmap", "--workspace", workspace.string()});
+  EXPECT_THAT(DifferingFiles(Contents(computed), Contents(read)), IsEmpty());
+}
+
+TEST_F(DepthByColmap, SaysWhatToDoWhereThereIsNoCuda) {
+  const colmap::testing::FakeColmap fake;
+  ExpectRefused(Dtr({"stereo", Cameras().string(), "-o", (folder_ / "no.dtr").string(), "--engine",
+                     "colmap"}),
+                1, "colmap patch_match_stereo: expected a COLMAP with CUDA");
+  EXPECT_FALSE(fs::exists(folder_ / "no.dtr.partial"));
+  ExpectRefused(Dtr({"stereo", Cameras().string(), "-o", (folder_ / "no.dtr").string(),
+                     "--workspace", folder_.path().string()}),
+                2, "--workspace: is read by --engine colmap");
+}
+
+}  // namespace
+}  // namespace dtr::testing
