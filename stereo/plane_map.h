@@ -9,11 +9,14 @@
 namespace dtr::stereo {
 
 /// Planes of all pixels of a view, linear in inverse depth:
-/// 1/z (x + dx, y + dy) = inverse_depth + slope_x dx + slope_y dy, dx and dy in pixels from the
-/// pixel's centre. Scene units; shapes (height, width). Nothing is rejected yet; inverse_depth 0 is
-/// a pixel without a plane. Empty grids: the view has no planes at all.
+/// unit_z / z (x + dx, y + dy) = inverse_depth + slope_x dx + slope_y dy, dx and dy in pixels from
+/// the pixel's centre. Shapes (height, width). Nothing is rejected yet; inverse_depth 0 is a pixel
+/// without a plane. Empty grids: the view has no planes at all.
 struct PlaneMap {
   Grid<float> inverse_depth, slope_x, slope_y;
+  /// Depth in scene units at which inverse_depth is 1. Numbers relative to it round alike whatever
+  /// the unit of the world is.
+  double unit_z = 1;
   bool empty() const { return inverse_depth.empty(); }
   bool operator==(const PlaneMap&) const = default;
 };

@@ -17,6 +17,7 @@ constexpr std::uintmax_t kLimitBytes = std::uintmax_t{1} << 36;
 
 struct Header {
   std::int32_t width = 0, height = 0;
+  double unit_z = 1;
 };
 
 void Append(const Grid<float>& grid, std::string& bytes) {
@@ -48,13 +49,14 @@ std::shared_ptr<const stereo::PlaneMap> PlaneFiles::Load(int round, int view) {
   const size_t count =
       sizes_fit ? static_cast<size_t>(header.width) * static_cast<size_t>(header.height) : 0;
   const size_t expected = sizeof(header) + 3 * count * sizeof(float);
-  if (!sizes_fit || bytes.size() != expected) {
+  if (!sizes_fit || bytes.size() != expected || !(header.unit_z > 0)) {
     throw Error(
         fmt::format("{}: expected planes of {}x{} in {} bytes, found {}; delete the partial set "
                     "and build again",
                     file.string(), header.width, header.height, expected, bytes.size()));
   }
   auto map = std::make_shared<stereo::PlaneMap>();
+  map->unit_z = header.unit_z;
   if (count == 0) return map;
   const char* next = bytes.data() + sizeof(header);
   for (Grid<float>* grid : {&map->inverse_depth, &map->slope_x, &map->slope_y}) {
@@ -73,7 +75,7 @@ std::shared_ptr<const stereo::PlaneMap> PlaneFiles::Load(int round, int view) {
 }
 
 void PlaneFiles::Save(int round, int view, stereo::PlaneMap&& map) {
-  const Header header{map.inverse_depth.width(), map.inverse_depth.height()};
+  const Header header{map.inverse_depth.width(), map.inverse_depth.height(), map.unit_z};
   std::string bytes(reinterpret_cast<const char*>(&header), sizeof(header));
   bytes.reserve(sizeof(header) + 3 * map.inverse_depth.data().size() * sizeof(float));
   if (!map.empty()) {

@@ -29,6 +29,11 @@ constexpr float kGoodPlanes = 1.0f, kBadPlanes = 7.0f;
 constexpr float kLeastWeight = 0.4f;
 constexpr int kNearSamples = 7, kFarSamples = 11;
 
+/// Inverse depth and cost of a candidate that a lane does not have, for its neighbours have one:
+/// comparisons with it are false, so it is no good plane, no bad one and never the cheapest, and
+/// what a pixel gets does not depend on the pixels it shares a register with.
+constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
+
 /// Candidate planes of a group and what each costs in each view.
 struct Candidates {
   int count = 0;
@@ -46,11 +51,6 @@ struct Best {
   HWY_ALIGN float cost[kLanes];
   HWY_ALIGN float weight[kMaxViews][kLanes];
 };
-
-/// Every second value of a row from x on.
-HWY_INLINE VF LoadColour(const BorderedGrid& grid, int x, int y) {
-  return hn::GatherIndex(DF(), grid.at(x, y), EverySecond());
-}
 
 /// Stores lanes whose pixel lies in the image.
 HWY_INLINE void StoreColour(VF value, int x, int y, int width, BorderedGrid* grid) {
@@ -120,11 +120,9 @@ void CollectCandidates(const State& state, const Group& g, int far_regions, Cand
     const auto given = hn::Gt(w, hn::Zero(d));
     if (hn::AllFalse(d, given)) continue;
     const int n = c->count++;
-    hn::Store(hn::IfThenElse(given, w, hn::Load(d, c->w[0])), d, c->w[n]);
-    hn::Store(hn::IfThenElse(given, LoadColour(guess.a, g.x, g.y), hn::Load(d, c->a[0])), d,
-              c->a[n]);
-    hn::Store(hn::IfThenElse(given, LoadColour(guess.b, g.x, g.y), hn::Load(d, c->b[0])), d,
-              c->b[n]);
+    hn::Store(hn::IfThenElse(given, w, hn::Set(d, kNothing)), d, c->w[n]);
+    hn::Store(LoadColour(guess.a, g.x, g.y), d, c->a[n]);
+    hn::Store(LoadColour(guess.b, g.x, g.y), d, c->b[n]);
   }
 }
 
@@ -209,9 +207,11 @@ void ChooseJointly(const Level& level, const Sweep& sweep, const State& state, c
   for (int n = 0; n < c->count; ++n) {
     const VF w = hn::Load(d, c->w[n]), a = hn::Load(d, c->a[n]), b = hn::Load(d, c->b[n]);
     const auto outside = hn::Or(hn::Lt(w, w_min), hn::Gt(w, w_max));
+    const auto there = hn::Eq(w, w);
     for (size_t v = 0; v < level.sources.size(); ++v) {
-      const VF cost = CostInView(g, level.sources[v], v, w, a, b);
-      hn::Store(hn::IfThenElse(outside, hn::Set(d, kWorstCost), cost), d, c->cost[n][v]);
+      VF cost = CostInView(g, level.sources[v], v, w, a, b);
+      cost = hn::IfThenElse(outside, hn::Set(d, kWorstCost), cost);
+      hn::Store(hn::IfThenElse(there, cost, hn::Set(d, kNothing)), d, c->cost[n][v]);
     }
   }
   ChooseViews(level, sweep, state, g, *c, best);
@@ -278,7 +278,7 @@ void Refine(const Level& level, const Sweep& sweep, const State& state, const Gr
   TryPlane(level, g, w3, hn::Mul(tilt, hn::Load(d, r[1])), hn::Mul(tilt, hn::Load(d, r[2])), best);
 }
 
-void SweepRowImpl(const Level& level, const Sweep& sweep, int y, State* state) {
+std::int64_t SweepRowImpl(const Level& level, const Sweep& sweep, int y, State* state) {
   const DF d;
   const int width = level.reference.width;
   Candidates candidates;
@@ -297,9 +297,10 @@ void SweepRowImpl(const Level& level, const Sweep& sweep, int y, State* state) {
       StoreColour(hn::Load(d, best.weight[v]), x, y, width, &state->weight[v]);
     }
   }
+  return g.samples;
 }
 
-void SearchRowImpl(const Level& level, int samples, int y, State* state) {
+std::int64_t SearchRowImpl(const Level& level, int samples, int y, State* state) {
   const DF d;
   const int width = level.reference.width;
   const size_t views = level.sources.size();
@@ -344,6 +345,7 @@ void SearchRowImpl(const Level& level, int samples, int y, State* state) {
       }
     }
   }
+  return g.samples;
 }
 
 /// Vertex of the parabola through costs at -1, 0, 1; `curvature` is its second derivative.
@@ -473,14 +475,19 @@ namespace dtr::stereo::patchmatch {
 
 HWY_EXPORT(SearchRowImpl);
 HWY_EXPORT(SweepRowImpl);
+HWY_EXPORT(ScoreRowImpl);
 HWY_EXPORT(JudgeRowImpl);
 HWY_EXPORT(TargetName);
 
-void SearchRow(const Level& level, int samples, int y, State* state) {
-  HWY_DYNAMIC_DISPATCH(SearchRowImpl)(level, samples, y, state);
+std::int64_t SearchRow(const Level& level, int samples, int y, State* state) {
+  return HWY_DYNAMIC_DISPATCH(SearchRowImpl)(level, samples, y, state);
 }
-void SweepRow(const Level& level, const Sweep& sweep, int y, State* state) {
-  HWY_DYNAMIC_DISPATCH(SweepRowImpl)(level, sweep, y, state);
+std::int64_t SweepRow(const Level& level, const Sweep& sweep, int y, State* state) {
+  return HWY_DYNAMIC_DISPATCH(SweepRowImpl)(level, sweep, y, state);
+}
+std::int64_t ScoreRow(const Level& level, const State& state, int y, std::span<const float> steps,
+                      float* costs) {
+  return HWY_DYNAMIC_DISPATCH(ScoreRowImpl)(level, state, y, steps, costs);
 }
 void JudgeRow(const Level& level, const State& state, int y, Verdict* out) {
   HWY_DYNAMIC_DISPATCH(JudgeRowImpl)(level, state, y, out);

@@ -6,6 +6,7 @@
 // (homogeneous), m = K' R K^-1 and k = K' t, so a plane's homography needs no inverse.
 #pragma once
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "dtr/types/grid.h"
@@ -115,16 +116,23 @@ struct Verdict {
 };
 
 /// First guess: tries `samples` inverse depths spread over the range, half of them with a random
-/// slant, and keeps the one with the least mean cost in the two best views.
-void SearchRow(const Level& level, int samples, int y, State* state);
+/// slant, and keeps the one with the least mean cost in the two best views. Returns the number of
+/// samples that were compared, as SweepRow does: a benchmark divides it by the time.
+std::int64_t SearchRow(const Level& level, int samples, int y, State* state);
 
 /// Works out the cost and the view weights of the plane each pixel of one colour has, its
 /// neighbours' and some new ones (Galliani et al., ICCV 2015; Xu and Tao, CVPR 2019) and keeps the
 /// best. Reads only pixels of the other colour, so rows may run in any order.
-void SweepRow(const Level& level, const Sweep& sweep, int y, State* state);
+std::int64_t SweepRow(const Level& level, const Sweep& sweep, int y, State* state);
 
 /// Finds the minimum of the cost to a fraction of a pixel and judges it. `out` has a row's length.
 void JudgeRow(const Level& level, const State& state, int y, Verdict* out);
+
+/// Photometric cost, 1 - NCC, of each pixel's plane in the first source, moved by each of `steps`
+/// in inverse depth: costs[n * width + x]. Nothing but the kernel, for tests and benchmarks;
+/// returns the number of samples.
+std::int64_t ScoreRow(const Level& level, const State& state, int y, std::span<const float> steps,
+                      float* costs);
 
 /// Name of the instruction set in use, for reports.
 const char* InstructionSet();

@@ -49,9 +49,16 @@ struct Group {
   HWY_ALIGN float variance[kLanes];
   HWY_ALIGN float texture[kLanes];  ///< variance of the pixels like the centre, grey levels squared
   HWY_ALIGN float ray[kMaxViews][3][kLanes];  ///< m (x, y, 1) per source
+  /// Samples of windows that fitted, kTaps each, since the group was made: what benchmarks count.
+  mutable std::int64_t samples = 0;
 };
 
 HWY_INLINE VI EverySecond() { return hn::Add(hn::Iota(DI(), 0), hn::Iota(DI(), 0)); }
+
+/// Every second value of a row from x on.
+HWY_INLINE VF LoadColour(const BorderedGrid& grid, int x, int y) {
+  return hn::GatherIndex(DF(), grid.at(x, y), EverySecond());
+}
 
 /// Largest difference of a channel.
 HWY_INLINE VI ColourDifference(VI a, VI b) {
@@ -172,6 +179,7 @@ VF ScoreWindow(const Group& g, const Source& s, Warp p) {
   const DI di;
   const VF worst = hn::Set(d, kWorstCost);
   if (hn::AllFalse(d, p.fits)) return worst;
+  g.samples += kTaps * static_cast<std::int64_t>(hn::CountTrue(d, p.fits));
   // Lanes that do not fit read some place that exists.
   const VF corner = hn::Set(d, kTextureBorder);
   p.u = hn::IfThenElse(p.fits, p.u, corner);
@@ -229,6 +237,30 @@ HWY_INLINE Warp LocateAllowed(const Group& g, const Source& s, size_t view, VF w
 /// Photometric cost of a plane in one view.
 VF ScoreView(const Group& g, const Source& s, size_t view, VF w, VF a, VF b) {
   return ScoreWindow(g, s, LocateAllowed(g, s, view, w, a, b));
+}
+
+std::int64_t ScoreRowImpl(const Level& level, const State& state, int y,
+                          std::span<const float> steps, float* costs) {
+  const DF d;
+  const int width = level.reference.width;
+  HWY_ALIGN float lanes[kLanes];
+  Group g;
+  for (int start = 0; start < 2; ++start) {
+    for (int x = start; x < width; x += 2 * static_cast<int>(kLanes)) {
+      PrepareGroup(level, x, y, &g);
+      const VF w = LoadColour(state.w, x, y);
+      const VF a = LoadColour(state.a, x, y), b = LoadColour(state.b, x, y);
+      for (size_t n = 0; n < steps.size(); ++n) {
+        const VF moved = hn::Add(w, hn::Set(d, steps[n]));
+        hn::Store(ScoreView(g, level.sources[0], 0, moved, a, b), d, lanes);
+        float* row = costs + n * static_cast<size_t>(width);
+        for (int i = 0; i < static_cast<int>(kLanes) && x + 2 * i < width; ++i) {
+          row[x + 2 * i] = lanes[i];
+        }
+      }
+    }
+  }
+  return g.samples;
 }
 
 /// Distance between a pixel and where it comes back to when its point is carried into the source

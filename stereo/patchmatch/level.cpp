@@ -9,6 +9,9 @@
 namespace dtr::stereo::patchmatch {
 namespace {
 
+/// Binary digits of a camera's place relative to another's.
+constexpr double kGapBits = 18;
+
 Texture MakeTexture(const Picture& picture) {
   Texture t;
   t.width = picture.grey.width();
@@ -35,6 +38,19 @@ Eigen::Matrix3d MatrixOf(const PinholeCamera& camera) {
   Eigen::Matrix3d k;
   k << camera.fx_px(), 0, camera.cx_px(), 0, camera.fy_px(), camera.cy_px(), 0, 0, 1;
   return k;
+}
+
+/// From the other camera's centre to the view's, in units of `unit`. From centres, so that an
+/// offset of the world cancels before anything is multiplied by it; and in steps of less than 1e-5
+/// of its length: at 1e7 from the origin doubles carry noise of 1e-9, and noise of any size sends a
+/// random search other ways.
+Eigen::Vector3d GapBetween(const StereoView& view, const StereoView& other, double unit) {
+  const Eigen::Vector3d gap =
+      (view.cam_from_world.TargetOriginInSource() - other.cam_from_world.TargetOriginInSource()) /
+      unit;
+  if (!(gap.norm() > 0)) return gap;
+  const double step = std::exp2(std::round(std::log2(gap.norm())) - kGapBits);
+  return (gap / step).array().round() * step;
 }
 
 /// Colours of a photo shrunk to blocks of `side` pixels: the mean of those its mask allows.
@@ -101,24 +117,24 @@ Level MakeLevel(const StereoView& view, const Picture& reference,
   Eigen::Matrix3d shift = Eigen::Matrix3d::Identity();
   shift(0, 2) = shift(1, 2) = kTextureBorder - 0.5;
   for (const SourcePyramid& s : sources) {
-    // From centres, so that an offset of the world cancels before anything is multiplied by it.
-    const Eigen::Vector3d gap =
-        view.cam_from_world.TargetOriginInSource() - s.view->cam_from_world.TargetOriginInSource();
-    const Eigen::Vector3d t = s.view->cam_from_world.rotation * gap;
+    const Eigen::Vector3d t =
+        s.view->cam_from_world.rotation * GapBetween(view, *s.view, range.near_z);
     const Eigen::Matrix3d rotation =
         (s.view->cam_from_world.rotation * view.cam_from_world.rotation.conjugate())
             .toRotationMatrix();
     const Eigen::Matrix3d project = shift * MatrixOf(s.cameras[index]);
     const Eigen::Matrix3d m = project * rotation * reference_inverse;
-    const Eigen::Vector3d k = project * t / range.near_z;
+    const Eigen::Vector3d k = project * t;
     const Eigen::Matrix3d unproject = project.inverse();
     const Eigen::Matrix3d back = MatrixOf(reference.camera) * rotation.transpose();
     const Eigen::Matrix3d back_m = back * unproject;
-    const Eigen::Vector3d back_k = -back * t / range.near_z;
+    const Eigen::Vector3d back_k = -back * t;
     Source source;
     source.texture = &s.textures[index];
     source.surface = index == 0 ? s.surface : nullptr;
-    source.surface_scale = static_cast<float>(range.near_z);
+    if (source.surface != nullptr) {
+      source.surface_scale = static_cast<float>(range.near_z / source.surface->unit_z);
+    }
     for (int i = 0; i < 9; ++i) source.m[i] = static_cast<float>(m(i / 3, i % 3));
     for (int i = 0; i < 3; ++i) source.k[i] = static_cast<float>(k(i));
     for (int i = 0; i < 9; ++i) source.back_m[i] = static_cast<float>(back_m(i / 3, i % 3));
@@ -141,13 +157,12 @@ State EmptyState(const Level& level) {
 
 PlaneMap PlanesOf(const Level& level, const State& state, const DepthRange& range) {
   const int w = level.reference.width, h = level.reference.height;
-  PlaneMap map{Grid<float>(w, h), Grid<float>(w, h), Grid<float>(w, h)};
-  const auto scale = static_cast<float>(1 / range.near_z);
+  PlaneMap map{Grid<float>(w, h), Grid<float>(w, h), Grid<float>(w, h), range.near_z};
   for (int y = 0; y < h; ++y) {
     for (int x = 0; x < w; ++x) {
-      map.inverse_depth(x, y) = scale * *state.w.at(x, y);
-      map.slope_x(x, y) = scale * *state.a.at(x, y);
-      map.slope_y(x, y) = scale * *state.b.at(x, y);
+      map.inverse_depth(x, y) = *state.w.at(x, y);
+      map.slope_x(x, y) = *state.a.at(x, y);
+      map.slope_y(x, y) = *state.b.at(x, y);
     }
   }
   return map;
@@ -155,7 +170,7 @@ PlaneMap PlanesOf(const Level& level, const State& state, const DepthRange& rang
 
 State StateOf(const Level& level, const PlaneMap& map, const DepthRange& range) {
   State state = EmptyState(level);
-  const auto scale = static_cast<float>(range.near_z);
+  const auto scale = static_cast<float>(range.near_z / map.unit_z);
   for (int y = 0; y < level.reference.height; ++y) {
     for (int x = 0; x < level.reference.width; ++x) {
       *state.w.at(x, y) = std::clamp(scale * map.inverse_depth(x, y), level.w_min, level.w_max);

@@ -24,6 +24,8 @@ constexpr Limits kAfterRounds{1.0f, 4.0f, 0};
 /// Least variance of the pixels that look like the centre (grey levels squared). A window of sky at
 /// a roof has the roof's texture, and would get its depth.
 constexpr float kLeastTexture = 3.0f;
+/// Inverse depths may miss the range by so many standard deviations.
+constexpr float kRangeSigmas = 3.0f;
 /// Connected areas smaller than this share of the image are taken for chance matches. Pixels
 /// connect across at most this many pixels of disparity.
 constexpr double kSpeckleShare = 1e-4;
@@ -89,8 +91,11 @@ DepthEstimate TrustedDepth(const Level& level, const State& state, const StereoV
       if (!(v.cost <= limits.cost) || v.agreeing < limits.agreeing) continue;
       if (!(v.texture >= kLeastTexture)) continue;
       if (!(v.sigma * v.px <= limits.sigma_px) || !(v.sigma > 0)) continue;
-      if (!(v.w >= level.w_min) || !(v.w <= level.w_max)) continue;
-      result.depth(x, y) = static_cast<float>(range.near_z / static_cast<double>(v.w));
+      // What lies beyond the range by no more than it may be wrong lies at its end.
+      const float slack = kRangeSigmas * v.sigma;
+      if (!(v.w >= level.w_min - slack) || !(v.w <= level.w_max + slack)) continue;
+      const float inside = std::clamp(v.w, level.w_min, level.w_max);
+      result.depth(x, y) = static_cast<float>(range.near_z / static_cast<double>(inside));
       result.inverse_depth_sigma(x, y) =
           static_cast<float>(static_cast<double>(v.sigma) / range.near_z);
       px_per_w(x, y) = v.px;

@@ -82,9 +82,12 @@ struct Shot {
   StereoView View() const { return {camera, cam_from_world, &image, nullptr}; }
 };
 
-/// Photographs a textured surface, 2x2 rays per pixel.
+/// Grey value, 0..255, of the point `p` seen along `direction` (world frame).
+using Paint = std::function<double(const Vector3d& p, const Vector3d& direction)>;
+
+/// Photographs a painted surface, 2x2 rays per pixel.
 inline Shot Photograph(const Surface& surface, const PinholeCamera& camera,
-                       const Pose& cam_from_world, double texture_size) {
+                       const Pose& cam_from_world, const Paint& paint) {
   const int w = camera.width_px(), h = camera.height_px();
   Shot shot{camera, cam_from_world, ImageRgb8(w, h, 3), DepthImage(w, h)};
   const Vector3d origin = cam_from_world.TargetOriginInSource();
@@ -98,13 +101,20 @@ inline Shot Photograph(const Surface& surface, const PinholeCamera& camera,
       double grey = 0;
       for (int k = 0; k < 4; ++k) {
         const auto [t, ray] = cast(x + 0.25 + 0.5 * (k % 2), y + 0.25 + 0.5 * (k / 2));
-        if (t) grey += 0.25 * Texture(origin + *t * ray, texture_size);
+        if (t) grey += 0.25 * paint(origin + *t * ray, ray);
       }
       for (int c = 0; c < 3; ++c) shot.image(x, y, c) = static_cast<std::uint8_t>(grey + 0.5);
       shot.truth(x, y) = static_cast<float>(cast(x + 0.5, y + 0.5).first.value_or(0));
     }
   }
   return shot;
+}
+
+/// Photographs a surface with a texture whose coarsest detail has this size.
+inline Shot Photograph(const Surface& surface, const PinholeCamera& camera,
+                       const Pose& cam_from_world, double texture_size) {
+  return Photograph(surface, camera, cam_from_world,
+                    [=](const Vector3d& p, const Vector3d&) { return Texture(p, texture_size); });
 }
 
 /// A camera at `centre` looking along +z of the world, rolled about its axis.
