@@ -37,7 +37,13 @@ fs::path PlaneFiles::File(int round, int view) const {
   return folder_ / fmt::format("round{}_view{}.planes", round, view);
 }
 
-bool PlaneFiles::Has(int round, int view) const { return fs::exists(File(round, view)); }
+bool PlaneFiles::Has(int round, int view) const {
+  const fs::path file = File(round, view);
+  std::error_code error;
+  const bool found = fs::exists(file, error);
+  if (error) throw Error(file.string() + ": cannot be looked for: " + error.message());
+  return found;
+}
 
 std::shared_ptr<const stereo::PlaneMap> PlaneFiles::Load(int round, int view) {
   const fs::path file = File(round, view);
@@ -88,9 +94,15 @@ void PlaneFiles::Save(int round, int view, stereo::PlaneMap&& map) {
 
 void PlaneFiles::Drop(int round) {
   const std::string prefix = fmt::format("round{}_view", round);
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder_)) {
-    if (entry.path().filename().string().starts_with(prefix)) fs::remove(entry.path());
+  std::error_code error;
+  fs::directory_iterator entry(folder_, error);
+  for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
+    const fs::path file = entry->path();
+    if (!file.filename().string().starts_with(prefix)) continue;
+    fs::remove(file, error);
+    if (error) throw Error(file.string() + ": cannot be removed: " + error.message());
   }
+  if (error) throw Error(folder_.string() + ": cannot be listed: " + error.message());
 }
 
 }  // namespace dtr::pipeline

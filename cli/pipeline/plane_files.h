@@ -10,7 +10,7 @@ namespace dtr::pipeline {
 /// stopped, and memory holds only the planes in use. Bytes of a file: int32 width, height (both 0:
 /// no planes), then inverse depths and both slopes as float32, row-major, in the host's byte order.
 /// Files appear whole or not at all. Load throws Error naming the file when it is not what Save
-/// writes.
+/// writes; so do Has and Drop where the folder cannot be read or a file not removed.
 class PlaneFiles final : public stereo::PlaneMapStore {
  public:
   /// Creates the folder.

@@ -63,5 +63,18 @@ TEST_F(PlaneFilesTest, RefusesEveryTruncatedOrDamagedFile) {
   EXPECT_THROW(files.Load(0, 0), Error);
 }
 
+TEST_F(PlaneFilesTest, AFolderThatIsGoneIsOneLine) {
+  PlaneFiles files(folder_);
+  files.Save(0, 0, Planes());
+  fs::remove_all(folder_);
+  WriteFileAtomically(folder_, "a file");  // what lies below can neither be looked for nor listed
+  EXPECT_THROW(files.Drop(0), Error);
+  EXPECT_FALSE(files.Has(0, 0));
+  fs::remove(folder_);
+  fs::create_directory_symlink(folder_, folder_);  // a circle
+  EXPECT_THROW(files.Has(0, 0), Error);
+  EXPECT_THROW(files.Drop(0), Error);
+}
+
 }  // namespace
 }  // namespace dtr::pipeline
