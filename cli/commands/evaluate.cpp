@@ -89,6 +89,7 @@ int RunEvaluate(const Options& options, const Context& context) {
   load.held_out = true;
   load.sigma = !options.truth.empty();
   load.threads = context.common.threads;
+  load.warn = [&context](const std::string& line) { context.console.Note(line); };
   const DtrSet set = io::LoadSet(options.set, load);
 
   std::optional<eval::DepthScores> depth;

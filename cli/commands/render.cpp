@@ -2,8 +2,13 @@
 
 #include <chrono>
 #include <filesystem>
+#include <functional>
+#include <memory>
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
+#include <string>
 
 #include "cli/command.h"
 #include "cli/novel_frames.h"
@@ -102,13 +107,28 @@ nlohmann::ordered_json FrameJson(const std::string& file, double ms, const Rende
   return {{"file", file}, {"ms", ms}, {"views_used", used}, {"coverage", result.coverage_share}};
 }
 
+/// A view that made room for others is read again, and would be complained of again.
+std::function<void(const std::string&)> SayOnce(Console& console) {
+  struct Said {
+    std::mutex mutex;
+    std::set<std::string> lines;
+  };
+  return [&console, said = std::make_shared<Said>()](const std::string& line) {
+    const std::lock_guard lock(said->mutex);
+    if (said->lines.insert(line).second) console.Note(line);
+  };
+}
+
 ViewStream MakeStream(const Options& options, const RenderScene& described, DtrSet& set,
                       Console& console) {
   ViewStream::Settings settings;
   settings.host_bytes = static_cast<size_t>(options.memory_gb * kBytesPerGigabyte);
   settings.threads = options.render->threads;
   settings.warn = [&console](const std::string& line) { console.Note(line); };
-  return {set, described, [folder = options.set](View& view) { io::LoadPixels(folder, view, {}); },
+  io::LoadOptions load;
+  load.warn = SayOnce(console);
+  return {set, described,
+          [folder = options.set, load](View& view) { io::LoadPixels(folder, view, load); },
           std::move(settings)};
 }
 

@@ -2,19 +2,19 @@
 
 #include <epoxy/gl.h>
 
-#include <string_view>
+#include "dtr/gl/driver.h"
 
 namespace dtr::gl {
 namespace {
 
-bool IsSoftware() {
-  const GLubyte* text = glGetString(GL_RENDERER);
-  const std::string_view renderer = text == nullptr ? "" : reinterpret_cast<const char*>(text);
-  for (const std::string_view name : {"llvmpipe", "softpipe", "swr", "SwiftShader"}) {
-    if (renderer.find(name) != std::string_view::npos) return true;
-  }
-  return false;
-}
+/// An elapsed-time query that ends with the scope, however that is left: a context allows one only.
+class Elapsed {
+ public:
+  explicit Elapsed(GLuint query) { glBeginQuery(GL_TIME_ELAPSED, query); }
+  ~Elapsed() { glEndQuery(GL_TIME_ELAPSED); }
+  Elapsed(const Elapsed&) = delete;
+  Elapsed& operator=(const Elapsed&) = delete;
+};
 
 }  // namespace
 
@@ -24,7 +24,9 @@ struct FrameTimer::Queries {
   ~Queries() { glDeleteQueries(1, &elapsed); }
 };
 
-FrameTimer::FrameTimer() : queries_(IsSoftware() ? nullptr : std::make_unique<Queries>()) {}
+FrameTimer::FrameTimer() : FrameTimer(!DrawsOnProcessor()) {}
+FrameTimer::FrameTimer(bool gpu_clock)
+    : queries_(gpu_clock ? std::make_unique<Queries>() : nullptr) {}
 FrameTimer::~FrameTimer() = default;
 
 std::optional<double> FrameTimer::GpuMilliseconds(const std::function<void()>& draw) {
@@ -34,9 +36,10 @@ std::optional<double> FrameTimer::GpuMilliseconds(const std::function<void()>& d
     glFinish();
     return std::nullopt;
   }
-  glBeginQuery(GL_TIME_ELAPSED, queries_->elapsed);
-  draw();
-  glEndQuery(GL_TIME_ELAPSED);
+  {
+    const Elapsed elapsed(queries_->elapsed);
+    draw();
+  }
   GLuint64 nanoseconds = 0;
   glGetQueryObjectui64v(queries_->elapsed, GL_QUERY_RESULT, &nanoseconds);  // waits
   glFinish();

@@ -11,20 +11,19 @@ namespace {
 constexpr size_t kMostBytesOfMesh = 320, kMostBytesOfSplats = 48, kMostBytesOfReducedMesh = 80;
 constexpr size_t kBytesPerPixel = 4;  // GL_RGBA8
 
-size_t PixelsOf(const PinholeCamera& camera) {
-  return static_cast<size_t>(camera.width_px()) * static_cast<size_t>(camera.height_px());
+size_t PixelsOf(const LayerSize& size) {
+  return static_cast<size_t>(size.width_px) * static_cast<size_t>(size.height_px);
 }
 
-size_t MostBytesOf(const View& view, const RenderOptions& options) {
+LayerSize SizeOf(const PinholeCamera& camera) { return {camera.width_px(), camera.height_px()}; }
+
+size_t MostBytesOf(const View& view, const RenderOptions& options, const LayerSizes& sizes) {
   const size_t per_sample = options.method == RenderMethod::kDeferred ? kMostBytesOfReducedMesh
                             : options.primitive == Primitive::kSplat  ? kMostBytesOfSplats
                                                                       : kMostBytesOfMesh;
-  return kBytesPerPixel * PixelsOf(view.camera) + per_sample * PixelsOf(view.DepthCamera());
-}
-
-bool SameSize(const View& a, const View& b) {
-  return a.camera.width_px() == b.camera.width_px() &&
-         a.camera.height_px() == b.camera.height_px() && a.depth_scale == b.depth_scale;
+  return kBytesPerPixel * PixelsOf(sizes.LayerFor(SizeOf(view.camera))) +
+         kBytesPerPixel * PixelsOf(sizes.LayerFor(SamplesOf(view, options.resolution))) +
+         per_sample * PixelsOf(SizeOf(view.DepthCamera()));
 }
 
 }  // namespace
@@ -60,9 +59,12 @@ bool GpuViews::DropOldest() {
 
 int GpuViews::LayersFor(const Frame& frame, const View& view) {
   const std::vector<const View*>& all = frame.scene.views;
-  const auto alike = std::count_if(all.begin(), all.end(),
-                                   [&](const View* other) { return SameSize(*other, view); });
-  const size_t fitting = room_bytes_ / (BytesOf(view) + 2 * kBytesPerPixel * PixelsOf(view.camera));
+  const LayerSize layer = sizes_.LayerFor(SizeOf(view.camera));
+  const auto alike = std::count_if(all.begin(), all.end(), [&](const View* other) {
+    return sizes_.LayerFor(SizeOf(other->camera)) == layer &&
+           other->depth_scale == view.depth_scale;
+  });
+  const size_t fitting = room_bytes_ / (BytesOf(view) + 2 * kBytesPerPixel * PixelsOf(layer));
   return static_cast<int>(
       std::clamp<size_t>(fitting, 1, std::max<size_t>(1, static_cast<size_t>(alike))));
 }
@@ -76,8 +78,8 @@ void GpuViews::Put(const Frame& frame, const std::vector<const View*>& views) {
   std::map<const View*, int> layers;  // by what the geometry takes, before images and depths do
   for (const View* view : views) layers[view] = LayersFor(frame, *view);
   const auto new_layers = [&](const View& view) { return layers.at(&view); };
-  store_.PrepareImages(views, new_layers);
-  if (frame.deferred()) store_.PrepareDeferred(views, frame.options, new_layers);
+  store_.PrepareImages(views, sizes_, new_layers);
+  if (frame.deferred()) store_.PrepareDeferred(views, frame.options, sizes_, new_layers);
   for (const View* view : views) used_[view] = {BytesOf(*view), now_};
 }
 
@@ -98,11 +100,14 @@ size_t GpuViews::Prepare(Frame& frame, const std::vector<const View*>& nearest_f
 
 size_t GpuViews::PutWithinRoom(Frame& frame, const std::vector<const View*>& nearest_first) {
   now_ += 2;
+  GLint most_px = 0;
+  glGetIntegerv(GL_MAX_TEXTURE_SIZE, &most_px);
+  sizes_ = LayerSizes(frame.scene.views, frame.options.resolution, most_px);
   size_t most = 0;
   for (const View* view : nearest_first) {
     const auto found = used_.find(view);
     if (found != used_.end()) found->second.last = now_ - 1;  // others go first
-    most += MostBytesOf(*view, frame.options);
+    most += MostBytesOf(*view, frame.options, sizes_);
   }
   if (most <= room_bytes_) {  // then all fit, whatever they look like: made on all cores
     Put(frame, nearest_first);

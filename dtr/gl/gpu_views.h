@@ -17,9 +17,9 @@ namespace dtr::gl {
 /// as views of one size fit, so their empty layers are room for the next views.
 class GpuViews {
  public:
-  /// `meshes_for_shaders` as MeshStore; else meshes take no room on the GPU.
-  GpuViews(size_t room_bytes, bool meshes_for_shaders)
-      : room_bytes_(room_bytes), meshes_(meshes_for_shaders) {}
+  /// `meshes_for_shaders` and `warn` as MeshStore; else meshes take no room on the GPU.
+  GpuViews(size_t room_bytes, bool meshes_for_shaders, MeshStore::Warn warn)
+      : room_bytes_(room_bytes), meshes_(meshes_for_shaders, std::move(warn)) {}
 
   /// Puts there what the frame's method draws of its views, nearest first; those that do not fit
   /// beside nearer ones leave the frame (at least one view stays). This depends on the views and
@@ -48,6 +48,7 @@ class GpuViews {
   void DropUnused(const Frame& frame, const View& view);
 
   const size_t room_bytes_;
+  LayerSizes sizes_;  ///< of the present frame's scene: the same for each of its cameras
   ViewStore store_;
   MeshStore meshes_;
   std::map<const View*, Used> used_;  ///< the views on the GPU

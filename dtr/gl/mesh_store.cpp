@@ -5,6 +5,7 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
+#include "dtr/gl/driver.h"
 
 namespace dtr::gl {
 namespace {
@@ -24,9 +25,8 @@ std::vector<AdaptiveMesh::Vertex> Corners(const AdaptiveMesh& mesh) {
 template <typename T>
 Buffer Upload(const View& view, const std::vector<T>& values, size_t& bytes) {
   const size_t size = values.size() * sizeof(T);
-  GLint64 limit = 0;
-  glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &limit);
-  if (size > static_cast<size_t>(limit)) {
+  const size_t limit = MostStorageBytes();
+  if (size > limit) {
     throw Error(view.name + ": expected a reduced mesh within this driver's storage block of " +
                 std::to_string(limit) + " bytes, found " + std::to_string(size) +
                 "; use --renderer cpu, a larger --mesh-tolerance or a larger --resolution");
@@ -55,12 +55,18 @@ void MeshStore::Prepare(const std::vector<const View*>& views, const RenderOptio
     }
   }
   std::vector<AdaptiveMesh> meshes(missing.size());
+  std::vector<std::string> unfit(missing.size());
   // One view alone has all cores; of several each has one.
   const int threads_each = missing.size() > 1 ? 1 : options.threads;
   ParallelFor(0, static_cast<int>(missing.size()), options.threads, [&](int i) {
     const auto k = static_cast<size_t>(i);
-    meshes[k] = MakeAdaptiveMesh(*missing[k], options, threads_each);
+    meshes[k] = MakeAdaptiveMesh(*missing[k], options, threads_each, unfit[k]);
   });
+  for (size_t k = 0; k < missing.size(); ++k) {
+    if (unfit[k].empty()) continue;
+    warn_("WARNING: " + missing[k]->name +
+          ": its stored mesh does not fit its depth map and was made anew: " + unfit[k]);
+  }
   for (size_t k = 0; k < missing.size(); ++k) {
     Stored stored{KeyOf(*missing[k], options), {}};
     CoarseMesh& mesh = stored.mesh;

@@ -2,7 +2,10 @@
 // files include this.
 #pragma once
 #include <cstddef>
+#include <functional>
 #include <map>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "dtr/gl/objects.h"
@@ -24,8 +27,11 @@ struct CoarseMesh {
 /// Keeps one mesh per view; other options replace it.
 class MeshStore {
  public:
-  /// `for_shaders`: on the GPU; else in memory, for CoarseRaster.
-  explicit MeshStore(bool for_shaders) : for_shaders_(for_shaders) {}
+  using Warn = std::function<void(const std::string&)>;
+
+  /// `for_shaders`: on the GPU; else in memory, for CoarseRaster. `warn` is told of stored meshes
+  /// that are of no use.
+  MeshStore(bool for_shaders, Warn warn) : for_shaders_(for_shaders), warn_(std::move(warn)) {}
 
   /// Makes the missing meshes of several views, on all cores. Throws
   /// dtr::Error, naming the limit, for a mesh that the driver cannot hold.
@@ -52,6 +58,7 @@ class MeshStore {
   static Key KeyOf(const View& view, const RenderOptions& options);
 
   const bool for_shaders_;
+  const Warn warn_;
   std::map<const View*, Stored> views_;
 };
 

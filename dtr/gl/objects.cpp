@@ -1,6 +1,7 @@
 #include "dtr/gl/objects.h"
 
 #include "dtr/base/error.h"
+#include "dtr/gl/driver.h"
 
 namespace dtr::gl {
 namespace {
@@ -9,21 +10,38 @@ constexpr GLenum kPackNames[4] = {GL_PACK_ALIGNMENT, GL_PACK_ROW_LENGTH, GL_PACK
                                   GL_PACK_SKIP_PIXELS};
 constexpr GLenum kUnpackNames[4] = {GL_UNPACK_ALIGNMENT, GL_UNPACK_ROW_LENGTH, GL_UNPACK_SKIP_ROWS,
                                     GL_UNPACK_SKIP_PIXELS};
-constexpr std::array<GLenum, 15> kCapabilities{GL_BLEND,
-                                               GL_DEPTH_TEST,
-                                               GL_SCISSOR_TEST,
-                                               GL_STENCIL_TEST,
-                                               GL_CULL_FACE,
-                                               GL_COLOR_LOGIC_OP,
-                                               GL_RASTERIZER_DISCARD,
-                                               GL_PRIMITIVE_RESTART,
-                                               GL_FRAMEBUFFER_SRGB,
-                                               GL_DEPTH_CLAMP,
-                                               GL_POLYGON_OFFSET_FILL,
-                                               GL_DITHER,
-                                               GL_SAMPLE_MASK,
-                                               GL_SAMPLE_COVERAGE,
-                                               GL_PRIMITIVE_RESTART_FIXED_INDEX};
+constexpr GLuint kDrawBuffers = 8;  // any driver has them
+
+/// What may be on and would change what is drawn.
+std::vector<GLenum> Capabilities() {
+  std::vector<GLenum> names{GL_DEPTH_TEST,
+                            GL_SCISSOR_TEST,
+                            GL_STENCIL_TEST,
+                            GL_CULL_FACE,
+                            GL_COLOR_LOGIC_OP,
+                            GL_RASTERIZER_DISCARD,
+                            GL_PRIMITIVE_RESTART,
+                            GL_PRIMITIVE_RESTART_FIXED_INDEX,
+                            GL_FRAMEBUFFER_SRGB,
+                            GL_DEPTH_CLAMP,
+                            GL_POLYGON_OFFSET_FILL,
+                            GL_POLYGON_SMOOTH,
+                            GL_DITHER,
+                            GL_SAMPLE_MASK,
+                            GL_SAMPLE_COVERAGE,
+                            GL_SAMPLE_ALPHA_TO_COVERAGE,
+                            GL_SAMPLE_ALPHA_TO_ONE};
+  GLint distances = 0, profile = 0;
+  glGetIntegerv(GL_MAX_CLIP_DISTANCES, &distances);
+  for (GLint i = 0; i < distances; ++i) {
+    names.push_back(GL_CLIP_DISTANCE0 + static_cast<GLenum>(i));
+  }
+  glGetIntegerv(GL_CONTEXT_PROFILE_MASK, &profile);
+  if ((profile & GL_CONTEXT_COMPATIBILITY_PROFILE_BIT) != 0) {
+    names.insert(names.end(), {GL_ALPHA_TEST, GL_POLYGON_STIPPLE});
+  }
+  return names;
+}
 
 const char* ErrorName(GLenum error) {
   switch (error) {
@@ -58,13 +76,33 @@ void ThrowOnError(const std::string& what) {
               "); use --renderer cpu, or a smaller --gpu-memory or --size, or fewer --views");
 }
 
-bool HasClipControl() {
-  return epoxy_gl_version() >= 45 || epoxy_has_gl_extension("GL_ARB_clip_control");
+StateGuard::IndexedBuffer StateGuard::IndexedBuffer::Of(GLenum target, GLuint index) {
+  const bool uniform = target == GL_UNIFORM_BUFFER;
+  IndexedBuffer bound;
+  glGetIntegeri_v(uniform ? GL_UNIFORM_BUFFER_BINDING : GL_SHADER_STORAGE_BUFFER_BINDING, index,
+                  &bound.buffer);
+  glGetInteger64i_v(uniform ? GL_UNIFORM_BUFFER_START : GL_SHADER_STORAGE_BUFFER_START, index,
+                    &bound.start);
+  glGetInteger64i_v(uniform ? GL_UNIFORM_BUFFER_SIZE : GL_SHADER_STORAGE_BUFFER_SIZE, index,
+                    &bound.size);
+  return bound;
+}
+
+void StateGuard::IndexedBuffer::Bind(GLenum target, GLuint index) const {
+  const auto name = static_cast<GLuint>(buffer);
+  if (buffer != 0 && size > 0) {
+    glBindBufferRange(target, index, name, static_cast<GLintptr>(start),
+                      static_cast<GLsizeiptr>(size));
+  } else {
+    glBindBufferBase(target, index, name);
+  }
 }
 
 StateGuard::StateGuard() {
-  for (size_t i = 0; i < kCapabilities.size(); ++i) {
-    capabilities_[i] = {kCapabilities[i], glIsEnabled(kCapabilities[i])};
+  for (const GLenum name : Capabilities()) capabilities_.push_back({name, glIsEnabled(name)});
+  for (GLuint i = 0; i < kDrawBuffers; ++i) {
+    blend_[i] = glIsEnabledi(GL_BLEND, i);
+    glGetBooleani_v(GL_COLOR_WRITEMASK, i, color_masks_[i].data());
   }
   glGetIntegerv(GL_CURRENT_PROGRAM, &program_);
   glGetIntegerv(GL_VERTEX_ARRAY_BINDING, &vertex_array_);
@@ -75,9 +113,9 @@ StateGuard::StateGuard() {
   glGetIntegerv(GL_ARRAY_BUFFER_BINDING, &array_buffer_);
   glGetIntegerv(GL_SHADER_STORAGE_BUFFER_BINDING, &storage_buffer_);
   glGetIntegerv(GL_UNIFORM_BUFFER_BINDING, &uniform_buffer_);
-  glGetIntegeri_v(GL_UNIFORM_BUFFER_BINDING, 0, &uniform_buffer_0_);
+  uniform_buffer_0_ = IndexedBuffer::Of(GL_UNIFORM_BUFFER, 0);
   for (GLuint i = 0; i < storage_buffers_.size(); ++i) {
-    glGetIntegeri_v(GL_SHADER_STORAGE_BUFFER_BINDING, i, &storage_buffers_[i]);
+    storage_buffers_[i] = IndexedBuffer::Of(GL_SHADER_STORAGE_BUFFER, i);
   }
   glGetIntegerv(GL_PIXEL_PACK_BUFFER_BINDING, &pack_buffer_);
   glGetIntegerv(GL_PIXEL_UNPACK_BUFFER_BINDING, &unpack_buffer_);
@@ -85,13 +123,9 @@ StateGuard::StateGuard() {
     glGetIntegerv(kPackNames[i], &pack_[i]);
     glGetIntegerv(kUnpackNames[i], &unpack_[i]);
   }
-  glGetIntegerv(GL_BLEND_EQUATION_RGB, &blend_equation_rgb_);
-  glGetIntegerv(GL_BLEND_EQUATION_ALPHA, &blend_equation_alpha_);
   glGetIntegerv(GL_CULL_FACE_MODE, &cull_face_);
   glGetIntegerv(GL_FRONT_FACE, &front_face_);
   glGetIntegerv(GL_POLYGON_MODE, polygon_mode_);
-  glGetIntegerv(GL_PROVOKING_VERTEX, &provoking_vertex_);
-  glGetBooleanv(GL_COLOR_WRITEMASK, color_mask_);
   glGetBooleanv(GL_DEPTH_WRITEMASK, &depth_mask_);
   glGetIntegerv(GL_DEPTH_FUNC, &depth_func_);
   glGetDoublev(GL_DEPTH_RANGE, depth_range_);
@@ -108,7 +142,8 @@ StateGuard::StateGuard() {
     glBindSampler(static_cast<GLuint>(i), 0);
   }
   // What both passes take for granted.
-  for (const GLenum name : kCapabilities) glDisable(name);
+  for (const Capability& capability : capabilities_) glDisable(capability.name);
+  glDisable(GL_BLEND);
   glBindBuffer(GL_PIXEL_PACK_BUFFER, 0);
   glBindBuffer(GL_PIXEL_UNPACK_BUFFER, 0);
   for (int i = 0; i < 4; ++i) {
@@ -133,16 +168,21 @@ StateGuard::~StateGuard() {
   for (const Capability& capability : capabilities_) {
     SetEnabled(capability.name, capability.on == GL_TRUE);
   }
+  for (GLuint i = 0; i < kDrawBuffers; ++i) {
+    blend_[i] == GL_TRUE ? glEnablei(GL_BLEND, i) : glDisablei(GL_BLEND, i);
+    const auto& mask = color_masks_[i];
+    glColorMaski(i, mask[0], mask[1], mask[2], mask[3]);
+  }
   glUseProgram(name(program_));
   glBindVertexArray(name(vertex_array_));
   glBindFramebuffer(GL_DRAW_FRAMEBUFFER, name(draw_framebuffer_));
   glBindFramebuffer(GL_READ_FRAMEBUFFER, name(read_framebuffer_));
   glViewport(viewport_[0], viewport_[1], viewport_[2], viewport_[3]);
   glBindBuffer(GL_ARRAY_BUFFER, name(array_buffer_));
-  glBindBufferBase(GL_UNIFORM_BUFFER, 0, name(uniform_buffer_0_));
+  uniform_buffer_0_.Bind(GL_UNIFORM_BUFFER, 0);
   glBindBuffer(GL_UNIFORM_BUFFER, name(uniform_buffer_));
   for (GLuint i = 0; i < storage_buffers_.size(); ++i) {
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, i, name(storage_buffers_[i]));
+    storage_buffers_[i].Bind(GL_SHADER_STORAGE_BUFFER, i);
   }
   glBindBuffer(GL_SHADER_STORAGE_BUFFER, name(storage_buffer_));
   glBindBuffer(GL_PIXEL_PACK_BUFFER, name(pack_buffer_));
@@ -151,16 +191,13 @@ StateGuard::~StateGuard() {
     glPixelStorei(kPackNames[i], pack_[i]);
     glPixelStorei(kUnpackNames[i], unpack_[i]);
   }
-  glBlendEquationSeparate(name(blend_equation_rgb_), name(blend_equation_alpha_));
   glCullFace(name(cull_face_));
   glFrontFace(name(front_face_));
   glPolygonMode(GL_FRONT_AND_BACK, name(polygon_mode_[0]));
-  glProvokingVertex(name(provoking_vertex_));
   glDepthMask(depth_mask_);
   glDepthFunc(name(depth_func_));
   glDepthRange(depth_range_[0], depth_range_[1]);
   if (HasClipControl()) glClipControl(name(clip_origin_), name(clip_depth_mode_));
-  glColorMask(color_mask_[0], color_mask_[1], color_mask_[2], color_mask_[3]);
 }
 
 }  // namespace dtr::gl

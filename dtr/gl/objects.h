@@ -6,6 +6,7 @@
 #include <array>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace dtr::gl {
 
@@ -65,9 +66,6 @@ using Shader = Owned<ShaderKind>;
 /// all). Errors from before the last call count too, so callers clear them first.
 void ThrowOnError(const std::string& what);
 
-/// Whether the driver lets clip space's z run from 0 to 1: OpenGL 4.5 or GL_ARB_clip_control.
-bool HasClipControl();
-
 /// Puts the context's state, as far as this library changes it, back at the end of the scope.
 class StateGuard {
  public:
@@ -86,19 +84,27 @@ class StateGuard {
     GLenum name;
     GLboolean on;
   };
+  /// A buffer at an indexed binding point: whole, or the part that is seen there.
+  struct IndexedBuffer {
+    GLint buffer = 0;
+    GLint64 start = 0, size = 0;  ///< size 0: the whole buffer
+    static IndexedBuffer Of(GLenum target, GLuint index);
+    void Bind(GLenum target, GLuint index) const;
+  };
   std::array<Unit, kTextureUnits> units_;
-  std::array<Capability, 15> capabilities_;
+  std::vector<Capability> capabilities_;
   GLint program_ = 0, vertex_array_ = 0, draw_framebuffer_ = 0, read_framebuffer_ = 0;
   GLint viewport_[4] = {}, active_unit_ = 0;
   GLint array_buffer_ = 0, storage_buffer_ = 0;
-  std::array<GLint, 6> storage_buffers_{};
-  GLint uniform_buffer_ = 0, uniform_buffer_0_ = 0;
+  std::array<IndexedBuffer, 6> storage_buffers_{};
+  GLint uniform_buffer_ = 0;
+  IndexedBuffer uniform_buffer_0_;
   GLint pack_buffer_ = 0, unpack_buffer_ = 0;
   GLint pack_[4] = {}, unpack_[4] = {};
-  GLint blend_equation_rgb_ = 0, blend_equation_alpha_ = 0;
   GLint cull_face_ = 0, front_face_ = 0, polygon_mode_[2] = {};
-  GLint provoking_vertex_ = 0;
-  GLboolean color_mask_[4] = {}, depth_mask_ = GL_TRUE;
+  std::array<GLboolean, 8> blend_{};                       ///< by draw buffer
+  std::array<std::array<GLboolean, 4>, 8> color_masks_{};  ///< by draw buffer
+  GLboolean depth_mask_ = GL_TRUE;
   GLint depth_func_ = 0, clip_origin_ = 0, clip_depth_mode_ = 0;
   GLdouble depth_range_[2] = {};
 };

@@ -46,8 +46,16 @@ bool MaskNeedsNoTest(const View& view, const RenderOptions& options) {
   return view.mask.empty() || (view.depth_scale == 1 && options.resolution == 1);
 }
 
+/// The shader takes the first view's sizes for all; layers of one array may hold pictures of
+/// several.
+bool AreOfOneSize(const View& a, const View& b) {
+  return a.image.width() == b.image.width() && a.image.height() == b.image.height() &&
+         a.depth_scale == b.depth_scale;
+}
+
 QuickBlock BlockOf(const View& view, const ViewPlacement& placed, const RenderOptions& options,
-                   const ViewStore::Deferred& deferred, int image_layer) {
+                   const ViewStore::Deferred& deferred, const ViewStore& store,
+                   const ImageSlot& image) {
   QuickBlock block;
   const PinholeCamera camera = view.DepthCamera();
   const double step = deferred.step, shift = deferred.offset + 0.5 - 0.5 * step;
@@ -65,15 +73,16 @@ QuickBlock BlockOf(const View& view, const ViewPlacement& placed, const RenderOp
   block.grid_z = row(2);
   const Eigen::Vector3d& centre = placed.translation;
   block.centre = Vector(centre.x(), centre.y(), centre.z(), centre.squaredNorm());
-  block.map = Vector(1.0 / deferred.columns, 1.0 / deferred.rows, 0.5 * deferred.columns,
-                     0.5 * deferred.rows);
+  const LayerSize depth_layer = store.SizeOf(deferred.depth), image_layer = store.SizeOf(image);
+  block.map = Vector(1.0 / depth_layer.width_px, 1.0 / depth_layer.height_px,
+                     0.5 * deferred.columns, 0.5 * deferred.rows);
   const InverseDepthThresholds thresholds = ThresholdsOf(view, options);
   block.stored = Vector(deferred.depth_offset, deferred.depth_factor, thresholds.depth_break,
                         thresholds.pixel);
   const double scale = view.depth_scale;
-  const double x = scale / view.image.width(), y = scale / view.image.height();
+  const double x = scale / image_layer.width_px, y = scale / image_layer.height_px;
   block.colour = Vector(step * x, step * y, shift * x, shift * y);
-  block.limits = Vector(thresholds.delta, image_layer, deferred.depth.layer, 0);
+  block.limits = Vector(thresholds.delta, image.layer, deferred.depth.layer, 0);
   return block;
 }
 
@@ -100,10 +109,10 @@ bool QuickResolver::SetViews(const Frame& frame, ViewStore& store) {
       depth_array_ = deferred.depth.array;
     }
     if (image.array != image_array_ || deferred.depth.array != depth_array_ ||
-        view.depth_scale != frame.views.front()->depth_scale) {
+        !AreOfOneSize(view, *frame.views.front())) {
       return false;
     }
-    blocks.push_back(BlockOf(view, frame.placements[i], options, deferred, image.layer));
+    blocks.push_back(BlockOf(view, frame.placements[i], options, deferred, store, image));
   }
   glBindBuffer(GL_UNIFORM_BUFFER, view_buffer_.name());
   glBufferData(GL_UNIFORM_BUFFER, static_cast<GLsizeiptr>(blocks.size() * sizeof(QuickBlock)),

@@ -7,6 +7,7 @@
 #include "dtr/base/error.h"
 #include "dtr/gl/deferred.h"
 #include "dtr/gl/drawing.h"
+#include "dtr/gl/driver.h"
 #include "dtr/gl/frame.h"
 #include "dtr/gl/gpu_views.h"
 #include "dtr/gl/objects.h"
@@ -34,12 +35,7 @@ void CheckContext() {
 }
 
 bool CoarseByShaders(CoarseDrawer drawer) {
-  if (drawer != CoarseDrawer::kFitting) return drawer == CoarseDrawer::kShaders;
-  const auto* renderer = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
-  const std::string name = renderer != nullptr ? renderer : "";
-  constexpr const char* kDrawOnTheCpu[] = {"llvmpipe", "softpipe", "SwiftShader"};
-  return std::none_of(std::begin(kDrawOnTheCpu), std::end(kDrawOnTheCpu),
-                      [&](const char* part) { return name.find(part) != std::string::npos; });
+  return drawer == CoarseDrawer::kFitting ? !DrawsOnProcessor() : drawer == CoarseDrawer::kShaders;
 }
 
 void CheckPictureSize(const PinholeCamera& novel) {
@@ -79,8 +75,9 @@ class Renderer::Implementation {
  public:
   explicit Implementation(RendererSettings settings)
       : settings_(std::move(settings)),
+        most_storage_bytes_(std::min(settings_.most_storage_bytes, MostStorageBytes())),
         coarse_by_shaders_(CoarseByShaders(settings_.coarse_drawer)),
-        views_(settings_.gpu_bytes, coarse_by_shaders_),
+        views_(settings_.gpu_bytes, coarse_by_shaders_, settings_.warn),
         programs_(settings_.shader_folder),
         coarse_depth_(coarse_by_shaders_) {}
 
@@ -177,6 +174,7 @@ class Renderer::Implementation {
     const StateGuard guard;
     CheckViewCount(frame.views.size());
     if (!frame.views.empty()) Prepare(frame, views_used);
+    CheckStorage(frame);
     FitTargets(frame, frame.novel.height_px());
     if (frame.views.empty()) {
       targets_.ClearResults();
@@ -217,12 +215,28 @@ class Renderer::Implementation {
     return frame.deferred() ? 1 : std::max(1, static_cast<int>(frame.views.size()));
   }
 
-  /// Rows of a band: as many as the memory for layers allows.
+  static size_t LayerRowBytes(const Frame& frame) {
+    return sizeof(float) * static_cast<size_t>(frame.novel.width_px());
+  }
+
+  /// Rows of a band: as many as the memory for layers allows and, for the deferred method's depth,
+  /// a storage block holds.
   int RowsWithinMemory(const Frame& frame) const {
-    const size_t row_bytes = sizeof(float) * static_cast<size_t>(frame.novel.width_px()) *
-                             static_cast<size_t>(LayersOf(frame));
-    return static_cast<int>(std::clamp<size_t>(settings_.layer_bytes / row_bytes, 1,
-                                               static_cast<size_t>(frame.novel.height_px())));
+    const size_t row_bytes = LayerRowBytes(frame);
+    size_t rows = settings_.layer_bytes / (row_bytes * static_cast<size_t>(LayersOf(frame)));
+    if (frame.deferred()) rows = std::min(rows, most_storage_bytes_ / row_bytes);
+    return static_cast<int>(
+        std::clamp<size_t>(rows, 1, static_cast<size_t>(frame.novel.height_px())));
+  }
+
+  void CheckStorage(const Frame& frame) const {
+    const size_t bytes = LayerRowBytes(frame) * static_cast<size_t>(frame.novel.height_px());
+    if (!frame.deferred() || bytes <= most_storage_bytes_) return;
+    throw Error("OpenGL: expected a picture whose depth is within this driver's storage block of " +
+                std::to_string(most_storage_bytes_) + " bytes, found " +
+                std::to_string(frame.novel.width_px()) + "x" +
+                std::to_string(frame.novel.height_px()) +
+                " pixels of 4 bytes; use --renderer cpu, --method two-pass or a smaller --size");
   }
 
   void FitTargets(const Frame& frame, int rows) {
@@ -230,6 +244,7 @@ class Renderer::Implementation {
   }
 
   const RendererSettings settings_;
+  const size_t most_storage_bytes_;
   const bool coarse_by_shaders_;
   GpuViews views_;
   bool warned_of_room_ = false;

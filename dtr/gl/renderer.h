@@ -1,6 +1,7 @@
 // dtr/gl/renderer.h -- RENDER_SPEC with OpenGL 4.3; no GL header is needed to use it.
 #pragma once
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
@@ -30,10 +31,13 @@ struct RendererSettings {
   /// Memory for the views themselves. Those drawn longest ago make room for others; where one
   /// picture's do not fit, it is drawn from the nearest that do, and `warn` is told so once.
   size_t gpu_bytes = size_t{4} << 30;
+  /// Told of what the picture goes without, a line each, on the thread that draws.
   std::function<void(const std::string&)> warn = [](const std::string&) {};
   CoarseDrawer coarse_drawer = CoarseDrawer::kFitting;
   /// Leave unused what the driver has beyond OpenGL 4.3, as on one that has no more.
   bool only_opengl_43 = false;
+  /// Take its storage blocks for no larger than this, as on one that has smaller ones.
+  size_t most_storage_bytes = SIZE_MAX;
 };
 
 /// A picture that was drawn and lies on the GPU: names of GL_TEXTURE_2D_ARRAY textures of one layer
@@ -71,7 +75,8 @@ class Renderer {
 
   /// The same without leaving the GPU, for windows and for timing: nothing is read back and nothing
   /// filled (options.fill_holes is not looked at). Drawn at once, whatever layer_bytes says. May
-  /// return before the GPU has finished. Throws as Render.
+  /// return before the GPU has finished. Throws as Render; also dtr::Error where the deferred
+  /// method's depth (4 bytes a pixel) is more than one storage block of this driver.
   DrawnPicture Draw(const RenderScene& scene, const PinholeCamera& novel,
                     const Pose& novel_from_world, const RenderOptions& options);
 

@@ -11,7 +11,7 @@ namespace {
 
 #include "dtr/gl/shaders/view_block.glsl"
 
-static_assert(sizeof(ViewBlock) == 9 * 16, "std430: nine vec4");
+static_assert(sizeof(ViewBlock) == 10 * 16, "std430: ten vec4");
 
 // Unit 0 has the layers; the arrays of images and depths follow.
 constexpr int kMaxImageArrays = StateGuard::kTextureUnits - 1;
@@ -55,8 +55,8 @@ ViewBlock BlockOf(const View& view, const ViewPlacement& placed, const RenderOpt
 }
 
 /// SPEC 5.3: sample (i, j)'s centre is at (i + 0.5, j + 0.5) of the grid that shaders see.
-void SetDepthGrid(const View& view, const ViewStore::Deferred& deferred, int slot,
-                  ViewBlock& block) {
+void SetDepthGrid(const View& view, const ViewStore::Deferred& deferred, const LayerSize& layer,
+                  int slot, ViewBlock& block) {
   const PinholeCamera camera = view.DepthCamera();
   const double step = deferred.step;
   const auto centre = [&](double c) { return (c - deferred.offset - 0.5) / step + 0.5; };
@@ -64,7 +64,9 @@ void SetDepthGrid(const View& view, const ViewStore::Deferred& deferred, int slo
                          centre(camera.cy_px()));
   block.stored_depth[0] = static_cast<float>(deferred.depth_offset);
   block.stored_depth[1] = static_cast<float>(deferred.depth_factor);
-  block.depth_slot = {slot, deferred.depth.layer, deferred.columns, deferred.rows};
+  block.depth_slot = {slot, deferred.depth.layer, 0, 0};
+  block.map = Row({1.0 / layer.width_px, 1.0 / layer.height_px, 0.5 * deferred.columns},
+                  0.5 * deferred.rows);
 }
 
 void BindArrays(const Uniforms& set, const std::string& name, const std::vector<int>& arrays,
@@ -92,9 +94,12 @@ int Resolver::SlotOf(std::vector<int>& bound, int array) const {
   const auto found = std::find(bound.begin(), bound.end(), array);
   if (found != bound.end()) return static_cast<int>(found - bound.begin());
   if (image_arrays_.size() + depth_arrays_.size() == static_cast<size_t>(kMaxImageArrays)) {
-    throw Error("OpenGL: expected images of at most " + std::to_string(kMaxImageArrays) +
-                " sizes in one picture (or 1 GiB each), found more; use --renderer cpu or fewer "
-                "--views");
+    // Sizes are few (LayerSizes): there are more arrays where one would be larger than 1 GiB.
+    throw Error(
+        "OpenGL: expected the images and depth maps of one picture in at most " +
+        std::to_string(kMaxImageArrays) +
+        " texture arrays of up to 1 GiB, found more; use --renderer cpu, fewer --views or a "
+        "smaller --gpu-memory");
   }
   bound.push_back(array);
   return static_cast<int>(bound.size()) - 1;
@@ -111,7 +116,8 @@ void Resolver::SetViews(const Frame& frame, ViewStore& store) {
     block.image = {SlotOf(image_arrays_, slot.array), slot.layer, view.mask.empty() ? 0 : 1, 0};
     if (frame.deferred()) {
       const ViewStore::Deferred& deferred = *store.DeferredOf(view);
-      SetDepthGrid(view, deferred, SlotOf(depth_arrays_, deferred.depth.array), block);
+      SetDepthGrid(view, deferred, store.SizeOf(deferred.depth),
+                   SlotOf(depth_arrays_, deferred.depth.array), block);
     }
     blocks.push_back(block);
   }

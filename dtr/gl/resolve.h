@@ -18,7 +18,7 @@ class Resolver {
   Resolver();
 
   /// Puts what the shader knows of each view on the GPU. The views must have been prepared. Throws
-  /// dtr::Error where the images have more sizes than this driver has texture units for.
+  /// dtr::Error where their images and depths lie in more texture arrays than there are units for.
   void SetViews(const Frame& frame, ViewStore& store);
 
   /// From the layers of `targets` (two passes) or the depth in `coarse_depth` (deferred; a storage

@@ -92,6 +92,11 @@ void TextureArrays::Give(const ImageSlot& slot) {
   if (std::find(array.used.begin(), array.used.end(), true) == array.used.end()) array = Array{};
 }
 
+LayerSize TextureArrays::SizeOf(const ImageSlot& slot) const {
+  const Array& array = arrays_[static_cast<size_t>(slot.array)];
+  return {array.width_px, array.height_px};
+}
+
 size_t TextureArrays::LayerBytes(const ImageSlot& slot) const {
   const Array& array = arrays_[static_cast<size_t>(slot.array)];
   return LayerBytesOf(array.format, array.width_px, array.height_px);

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "dtr/gl/layer_sizes.h"
 #include "dtr/gl/objects.h"
 
 namespace dtr::gl {
@@ -28,6 +29,7 @@ class TextureArrays {
 
   GLuint name(int array) const { return arrays_[static_cast<size_t>(array)].texture.name(); }
   size_t LayerBytes(const ImageSlot& slot) const;
+  LayerSize SizeOf(const ImageSlot& slot) const;
   void Clear() { arrays_.clear(); }
 
  private:

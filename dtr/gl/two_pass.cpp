@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <string_view>
+
+#include "dtr/gl/driver.h"
 
 namespace dtr::gl {
 namespace {
@@ -12,14 +13,8 @@ namespace {
 // A GPU would only lose by it.
 constexpr GLsizei kIndicesPerFlush = 3 * 50000;
 
-bool RasterisesInSoftware() {
-  const auto* renderer = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
-  return renderer != nullptr &&
-         std::string_view(renderer).find("llvmpipe") != std::string_view::npos;
-}
-
 void DrawTriangles(GLsizei index_count) {
-  if (!RasterisesInSoftware()) {
+  if (!DrawsOnProcessor()) {
     glDrawElements(GL_TRIANGLES, index_count, GL_UNSIGNED_INT, nullptr);
     return;
   }

@@ -4,6 +4,7 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
+#include "dtr/gl/driver.h"
 #include "dtr/gl/stored_depth.h"
 #include "dtr/render/texture.h"
 #include "dtr/render/triangulation.h"
@@ -36,9 +37,7 @@ Geometry UploadMesh(const View& view, const ViewMesh& mesh) {
 
 /// Floats for shaders to read.
 Buffer UploadStorage(const View& view, const std::vector<float>& values) {
-  const auto bytes = static_cast<GLsizeiptr>(values.size() * sizeof(float));
-  GLint64 limit = 0;
-  glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &limit);
+  const size_t bytes = values.size() * sizeof(float), limit = MostStorageBytes();
   if (bytes > limit) {
     throw Error(view.name + ": expected surface samples within this driver's storage block of " +
                 std::to_string(limit) + " bytes, found " + std::to_string(bytes) +
@@ -46,7 +45,8 @@ Buffer UploadStorage(const View& view, const std::vector<float>& values) {
   }
   Buffer buffer = Buffer::Make();
   glBindBuffer(GL_SHADER_STORAGE_BUFFER, buffer.name());
-  glBufferData(GL_SHADER_STORAGE_BUFFER, bytes, values.data(), GL_STATIC_DRAW);
+  glBufferData(GL_SHADER_STORAGE_BUFFER, static_cast<GLsizeiptr>(bytes), values.data(),
+               GL_STATIC_DRAW);
   ThrowOnError(view.name + ": its surface");
   return buffer;
 }
@@ -171,12 +171,16 @@ const Geometry& ViewStore::GeometryOf(const View& view, const RenderOptions& opt
 }
 
 void ViewStore::PrepareDeferred(const std::vector<const View*>& views, const RenderOptions& options,
-                                const LayersFor& new_layers) {
+                                const LayerSizes& sizes, const LayersFor& new_layers) {
   const GeometryKey key = KeyOf(options);
   std::vector<const View*> missing;
   for (const View* view : views) {
     const auto& deferred = Find(*view).deferred;
-    if (!deferred || deferred->first != key) missing.push_back(view);
+    const bool there = deferred && deferred->first == key &&
+                       (deferred->second.columns == 0 ||
+                        SizeOf(deferred->second.depth) ==
+                            sizes.LayerFor({deferred->second.columns, deferred->second.rows}));
+    if (!there) missing.push_back(view);
   }
   std::vector<SampleGrid> grids(missing.size());
   std::vector<StoredDepth> depths(missing.size());
@@ -197,14 +201,11 @@ void ViewStore::PrepareDeferred(const std::vector<const View*>& views, const Ren
     if (!w.empty()) {
       const bool coded = !depths[k].codes.empty();
       deferred.depth_offset = depths[k].offset, deferred.depth_factor = depths[k].factor;
-      deferred.depth =
-          arrays_.Take(coded ? GL_R16 : GL_R32F, w.width(), w.height(), new_layers(view));
-      glBindTexture(GL_TEXTURE_2D_ARRAY, texture_array(deferred.depth.array));
-      glTexSubImage3D(GL_TEXTURE_2D_ARRAY, 0, 0, 0, deferred.depth.layer, w.width(), w.height(), 1,
-                      GL_RED, coded ? GL_UNSIGNED_SHORT : GL_FLOAT,
-                      coded ? static_cast<const void*>(depths[k].codes.data())
-                            : static_cast<const void*>(depths[k].values.data()));
-      ThrowOnError(view.name + ": its depth");
+      const LayerSize size{w.width(), w.height()};
+      deferred.depth = coded ? Put(view, depths[k].codes.data(),
+                                   {GL_R16, GL_RED, GL_UNSIGNED_SHORT, 1}, size, sizes, new_layers)
+                             : Put(view, depths[k].values.data(), {GL_R32F, GL_RED, GL_FLOAT, 1},
+                                   size, sizes, new_layers);
     }
     stored.deferred.emplace(key, std::move(deferred));
     grids[k] = {};
@@ -217,18 +218,33 @@ const ViewStore::Deferred* ViewStore::DeferredOf(const View& view) {
   return stored && stored->second.columns > 0 ? &stored->second : nullptr;
 }
 
-void ViewStore::PrepareImages(const std::vector<const View*>& views, const LayersFor& new_layers) {
+void ViewStore::PrepareImages(const std::vector<const View*>& views, const LayerSizes& sizes,
+                              const LayersFor& new_layers) {
   for (const View* view : views) {
     Stored& stored = Find(*view);
-    if (stored.image) continue;
-    const int width = view->image.width(), height = view->image.height();
-    stored.image = arrays_.Take(GL_RGBA8, width, height, new_layers(*view));
-    const std::vector<std::uint8_t> rgba = SampledImage(*view);
-    glBindTexture(GL_TEXTURE_2D_ARRAY, texture_array(stored.image->array));
-    glTexSubImage3D(GL_TEXTURE_2D_ARRAY, 0, 0, 0, stored.image->layer, width, height, 1, GL_RGBA,
-                    GL_UNSIGNED_BYTE, rgba.data());
-    ThrowOnError(view->name + ": its image");
+    const LayerSize size{view->image.width(), view->image.height()};
+    if (stored.image && SizeOf(*stored.image) == sizes.LayerFor(size)) continue;
+    if (stored.image) arrays_.Give(*stored.image);
+    stored.image.reset();
+    stored.image = Put(*view, SampledImage(*view).data(), {GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE, 4},
+                       size, sizes, new_layers);
   }
+}
+
+template <typename T>
+ImageSlot ViewStore::Put(const View& view, const T* values, const PixelFormat& format,
+                         const LayerSize& size, const LayerSizes& sizes,
+                         const LayersFor& new_layers) {
+  const LayerSize layer = sizes.LayerFor(size), taken = SizeWithEdge(size, layer);
+  const ImageSlot slot =
+      arrays_.Take(format.stored, layer.width_px, layer.height_px, new_layers(view));
+  std::vector<T> with_edge;
+  if (taken != size) with_edge = WithEdge(values, size, format.channels, taken);
+  glBindTexture(GL_TEXTURE_2D_ARRAY, texture_array(slot.array));
+  glTexSubImage3D(GL_TEXTURE_2D_ARRAY, 0, 0, 0, slot.layer, taken.width_px, taken.height_px, 1,
+                  format.given, format.type, taken == size ? values : with_edge.data());
+  ThrowOnError(view.name + (format.channels == 1 ? ": its depth" : ": its image"));
+  return slot;
 }
 
 }  // namespace dtr::gl

@@ -37,7 +37,7 @@ class ViewStore {
 
   /// SPEC 5: the depths of the deferred method.
   void PrepareDeferred(const std::vector<const View*>& views, const RenderOptions& options,
-                       const LayersFor& new_layers);
+                       const LayerSizes& sizes, const LayersFor& new_layers);
   struct Deferred {
     ImageSlot depth;
     double depth_offset = 0, depth_factor = 1;        ///< StoredDepth: 1/z from a texel
@@ -46,9 +46,12 @@ class ViewStore {
   /// After PrepareDeferred with the same options; null where R leaves no sample.
   const Deferred* DeferredOf(const View& view);
 
-  void PrepareImages(const std::vector<const View*>& views, const LayersFor& new_layers);
+  void PrepareImages(const std::vector<const View*>& views, const LayerSizes& sizes,
+                     const LayersFor& new_layers);
   /// After PrepareImages.
   ImageSlot ImageOf(const View& view) { return Find(view).image.value(); }
+  /// Of the layer that a picture lies in, which may be larger.
+  LayerSize SizeOf(const ImageSlot& slot) const { return arrays_.SizeOf(slot); }
   GLuint texture_array(int index) const { return arrays_.name(index); }
 
   /// What lies on the GPU of a view.
@@ -69,6 +72,13 @@ class ViewStore {
   };
   Stored& Find(const View& view);
   static GeometryKey KeyOf(const RenderOptions& options);
+  struct PixelFormat {
+    GLenum stored, given, type;
+    int channels;
+  };
+  template <typename T>
+  ImageSlot Put(const View& view, const T* values, const PixelFormat& format, const LayerSize& size,
+                const LayerSizes& sizes, const LayersFor& new_layers);
   void Empty(Stored& stored);
   void DropDepth(Stored& stored);
 

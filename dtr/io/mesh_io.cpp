@@ -73,7 +73,7 @@ class Bytes {
   size_t left() const { return rest_.size(); }
   [[noreturn]] void Fail(const std::string& expected, const std::string& found) const {
     throw Error(file_.string() + ": reduced mesh: expected " + expected + ", found " + found +
-                "; delete the file's entry from set.json, it can be made anew");
+                "; `dtr stereo` writes it anew");
   }
 
  private:

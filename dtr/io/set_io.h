@@ -2,6 +2,7 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -16,7 +17,8 @@ namespace dtr::io {
 /// Reads and checks set.json, without any pixel. Everything that can be known from the metadata is
 /// checked: version, unit, sizes, finite numbers, unit quaternions, positive focal lengths,
 /// near < far, depth scales, unique safe ids; every named file must lie inside the set's folder
-/// (symbolic links followed) and have its size in bytes.
+/// (symbolic links followed) and have its size in bytes (reduced meshes may be damaged or missing:
+/// see LoadPixels).
 /// Throws Error naming file and field:
 /// `set.json: frames[0].views[3].camera.fx_px: expected a positive number, found -1`.
 DtrSet ReadSet(const std::filesystem::path& set_folder);
@@ -30,6 +32,8 @@ struct LoadOptions {
       false;  ///< false: held-out views are left out altogether, so no renderer sees one
   bool collapse_duplicates = true;  ///< views of equal camera and content count once
   int threads = 0;                  ///< 0: all cores
+  /// Told of what is left out of a view that loads all the same; called from any thread.
+  std::function<void(const std::string&)> warn = [](const std::string&) {};
 };
 
 /// ReadSet, then the pixels of its views. Throws Error; never gives half a set.
@@ -38,7 +42,8 @@ DtrSet LoadSet(const std::filesystem::path& set_folder, const LoadOptions& optio
 /// Loads the pixels that `options` ask for into a view of ReadSet; `held_out` and
 /// `collapse_duplicates` do not matter here. Sizes are checked against the view before any pixel is
 /// read. A view without depth or sigma keeps them empty. The depth is the stored one: rounded to
-/// its coding.
+/// its coding. A reduced mesh that is missing, damaged (also in a single bit: its hash is checked)
+/// or of an earlier depth map is left out, which `options.warn` is told: renderers make their own.
 void LoadPixels(const std::filesystem::path& set_folder, View& view, const LoadOptions& options);
 
 /// Points and observations behind the calibration; views are indices into frames[0].views as

@@ -383,8 +383,9 @@ View ViewFromJson(const std::string& text, const std::string& file) {
 
 std::vector<NamedFile> FilesOf(const DtrSet& set) {
   std::vector<NamedFile> files;
-  const auto add = [&](const std::optional<StoredFile>& file, const std::string& field) {
-    if (file) files.push_back({&*file, field});
+  const auto add = [&](const std::optional<StoredFile>& file, const std::string& field,
+                       bool only_saves_time = false) {
+    if (file) files.push_back({&*file, field, only_saves_time});
   };
   add(set.sparse_file, "sparse");
   for (size_t f = 0; f < set.frames.size(); ++f) {
@@ -396,23 +397,30 @@ std::vector<NamedFile> FilesOf(const DtrSet& set) {
       add(view.mask_file, field + "mask");
       add(view.depth_file, field + "depth");
       add(view.sigma_file, field + "sigma");
-      add(view.mesh_file, field + "mesh");
+      add(view.mesh_file, field + "mesh", true);
     }
   }
   return files;
 }
 
-std::string ProblemOf(const fs::path& set_folder, const NamedFile& named) {
+std::string PlaceProblemOf(const fs::path& set_folder, const NamedFile& named) {
   std::error_code error;
   const fs::path root = fs::canonical(set_folder, error);
   if (error) return named.field + ".path: the set's folder cannot be read: " + error.message();
   const fs::path full = fs::weakly_canonical(root / named.file->path, error);
-  const std::string shown = "'" + named.file->path + "'";
   if (error ||
       std::mismatch(root.begin(), root.end(), full.begin(), full.end()).first != root.end()) {
-    return named.field + ".path: expected a file inside the set's folder, found " + shown +
-           ", which leads to " + full.string();
+    return named.field + ".path: expected a file inside the set's folder, found '" +
+           named.file->path + "', which leads to " + full.string();
   }
+  return "";
+}
+
+std::string ProblemOf(const fs::path& set_folder, const NamedFile& named) {
+  if (std::string problem = PlaceProblemOf(set_folder, named); !problem.empty()) return problem;
+  std::error_code error;
+  const fs::path full = set_folder / named.file->path;
+  const std::string shown = "'" + named.file->path + "'";
   if (!fs::is_regular_file(full, error)) {
     return named.field + ".path: expected a file, found nothing at " + shown;
   }
@@ -426,7 +434,9 @@ std::string ProblemOf(const fs::path& set_folder, const NamedFile& named) {
 
 void ExpectFiles(const fs::path& set_folder, const DtrSet& set) {
   for (const NamedFile& named : FilesOf(set)) {
-    const std::string problem = ProblemOf(set_folder, named);
+    // A mesh only saves time: whoever loads it says what is wrong with it and goes on without.
+    const std::string problem =
+        named.only_saves_time ? PlaceProblemOf(set_folder, named) : ProblemOf(set_folder, named);
     if (!problem.empty()) throw Error((set_folder / kSetFile).string() + ": " + problem);
   }
 }

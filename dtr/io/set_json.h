@@ -33,12 +33,13 @@ bool IsSafeId(const std::string& id);
 struct NamedFile {
   const StoredFile* file = nullptr;
   std::string field;
+  bool only_saves_time = false;  ///< a set is whole without it: made of what else is there
 };
 /// All files a set names.
 std::vector<NamedFile> FilesOf(const DtrSet& set);
 
 /// Throws Error unless every named file lies inside the folder, also when symbolic links are
-/// followed, and has its size.
+/// followed, and, where it does not only save time, has its size.
 void ExpectFiles(const std::filesystem::path& set_folder, const DtrSet& set);
 /// The problem of one file, or "".
 std::string ProblemOf(const std::filesystem::path& set_folder, const NamedFile& named);

@@ -47,6 +47,29 @@ void ExpectViewSize(const fs::path& file, const View& view, int width_px, int he
               std::to_string(width_px) + "x" + std::to_string(height_px));
 }
 
+/// The view's reduced mesh; none, and a warning, where it cannot be used.
+std::optional<StoredMesh> UsableMesh(const fs::path& set_folder, const View& view,
+                                     const LoadOptions& options) {
+  const fs::path file = set_folder / view.mesh_file->path;
+  std::string problem;
+  try {
+    if (Sha256OfFile(file) != view.mesh_file->sha256) {
+      throw Error(file.string() + ": expected the content that set.json records, found another");
+    }
+    StoredMesh mesh = ReadMesh(file);
+    const std::string mask = view.mask_file ? view.mask_file->sha256 : "";
+    if (mesh.depth_sha256 == view.depth_file->sha256 && mesh.mask_sha256 == mask) return mesh;
+    problem = file.string() +
+              ": expected a reduced mesh of this depth map and mask, found one of "
+              "others";
+  } catch (const Error& error) {
+    problem = error.what();
+  }
+  options.warn("WARNING: " + view.name +
+               ": its reduced mesh is left out and made anew: " + problem);
+  return std::nullopt;
+}
+
 // What equal stored pixels and cameras have in common.
 bool AreDuplicates(const View& a, const View& b) {
   const auto same = [](const std::optional<StoredFile>& x, const std::optional<StoredFile>& y) {
@@ -118,12 +141,7 @@ void LoadPixels(const fs::path& set_folder, View& view, const LoadOptions& optio
   }
   view.mesh.reset();
   if (options.depth && view.mesh_file && view.depth_file) {
-    StoredMesh mesh = ReadMesh(set_folder / view.mesh_file->path);
-    // Of other depth or another mask it is of no use; renderers make their own.
-    const std::string mask = view.mask_file ? view.mask_file->sha256 : "";
-    if (mesh.depth_sha256 == view.depth_file->sha256 && mesh.mask_sha256 == mask) {
-      view.mesh = std::move(mesh);
-    }
+    view.mesh = UsableMesh(set_folder, view, options);
   }
   if (options.sigma && view.sigma_file) {
     view.inverse_depth_sigma =

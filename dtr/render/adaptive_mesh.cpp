@@ -296,7 +296,9 @@ AdaptiveMesh MakeAdaptiveMesh(const SampleGrid& samples, const BreakRule& rule,
   return MeshMaker(samples, rule, cover).Make();
 }
 
-AdaptiveMesh MakeAdaptiveMesh(const View& view, const RenderOptions& options, int threads) {
+AdaptiveMesh MakeAdaptiveMesh(const View& view, const RenderOptions& options, int threads,
+                              std::string& unfit) {
+  unfit.clear();
   const SampleGrid samples = MakeSampleGrid(view, options.resolution);
   const MeshRule rule = MeshRuleOf(view, options);
   if (view.mesh && view.mesh->resolution == options.resolution &&
@@ -305,7 +307,7 @@ AdaptiveMesh MakeAdaptiveMesh(const View& view, const RenderOptions& options, in
     try {
       return MakeAdaptiveMesh(samples, rule.breaks, view.mesh->cover);
     } catch (const Error& error) {
-      throw Error(view.name + ": its stored mesh does not fit its depth map: " + error.what());
+      unfit = error.what();
     }
   }
   return MakeAdaptiveMesh(samples, rule.breaks,

@@ -43,7 +43,8 @@ int main(int argc, char** argv) {
     double triangles = 0, cells = 0, ms = 0;
     for (const dtr::View& view : set.frames[0].views) {
       const double start = CpuMilliseconds();
-      const dtr::AdaptiveMesh mesh = dtr::MakeAdaptiveMesh(view, options, 1);
+      std::string unfit;
+      const dtr::AdaptiveMesh mesh = dtr::MakeAdaptiveMesh(view, options, 1, unfit);
       ms += CpuMilliseconds() - start;
       triangles += double(mesh.indices.size()) / 3;
       cells += double(mesh.cells.size());

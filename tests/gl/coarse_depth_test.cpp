@@ -22,7 +22,8 @@ struct Placed {
 
   Placed(const DtrSet& set, const PinholeCamera& novel, const Pose& novel_from_world) {
     for (const View& view : set.frames[0].views) {
-      meshes.push_back(MakeAdaptiveMesh(view, RenderOptions{}, 1));
+      std::string unfit;
+      meshes.push_back(MakeAdaptiveMesh(view, RenderOptions{}, 1, unfit));
     }
     for (size_t i = 0; i < meshes.size(); ++i) {
       const View& view = set.frames[0].views[i];

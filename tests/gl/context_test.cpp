@@ -8,6 +8,7 @@
 #include <fstream>
 
 #include "dtr/base/error.h"
+#include "dtr/gl/driver.h"
 #include "dtr/gl/frame_timer.h"
 #include "dtr/gl/objects.h"
 #include "dtr/gl/program.h"
@@ -82,6 +83,26 @@ TEST_F(Context, FramesOfASoftwareRasteriserHaveNoGpuClock) {
   if (SharedContext(&why)->Description().find("llvmpipe") != std::string::npos) {
     EXPECT_FALSE(timer.has_gpu_clock());
   }
+}
+
+TEST_F(Context, ATimerWhoseFrameFailsMayTimeTheNextOne) {
+  FrameTimer timer(true);
+  EXPECT_TRUE(timer.has_gpu_clock());
+  EXPECT_THROW(timer.GpuMilliseconds([] { throw Error("no frame"); }), Error);
+  GLint open = -1;
+  glGetQueryiv(GL_TIME_ELAPSED, GL_CURRENT_QUERY, &open);
+  EXPECT_EQ(open, 0);
+  EXPECT_TRUE(timer.GpuMilliseconds([] { glFlush(); }).has_value());
+}
+
+TEST(Driver, SoftwareRasterisersAreKnownByName) {
+  EXPECT_TRUE(IsSoftwareRasteriser("llvmpipe (LLVM 15.0.6, 256 bits)"));
+  EXPECT_TRUE(IsSoftwareRasteriser("softpipe"));
+  EXPECT_TRUE(IsSoftwareRasteriser("Gallium 0.4 on SWR (LLVM 8.0, 256 bits)"));
+  EXPECT_TRUE(IsSoftwareRasteriser("ANGLE (Google, Vulkan (SwiftShader Device), SwiftShader)"));
+  EXPECT_FALSE(IsSoftwareRasteriser("NVIDIA H200/PCIe/SSE2"));
+  EXPECT_FALSE(IsSoftwareRasteriser("Mesa Intel(R) UHD Graphics 620 (KBL GT2)"));
+  EXPECT_FALSE(IsSoftwareRasteriser(""));
 }
 
 TEST_F(Context, SaysWhatItIs) {

@@ -4,10 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <stdexcept>
 
 #include "dtr/base/error.h"
+#include "dtr/cpu/renderer.h"
+#include "dtr/gl/driver.h"
+#include "dtr/gl/layer_sizes.h"
 #include "dtr/gl/objects.h"
+#include "dtr/render/triangulation.h"
 #include "tests/gl/gl_testing.h"
 #include "tests/gl/moved_worlds.h"
 
@@ -197,6 +202,146 @@ TEST_F(Render, LeavesTheContextsStateAsItWas) {
   for (const GLenum name : on) glDisable(name);
   glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
   glBindFramebuffer(GL_FRAMEBUFFER, 0);
+}
+
+/// Photos of `count` sizes around a scene, each with depth at its own scale.
+DtrSet OfManySizes(int count) {
+  const Surface surface = Union(Square(0.3, 0.2, 5, 1), Plane({0.2, 0, 1}, 9));
+  std::vector<View> views;
+  for (int i = 0; i < count; ++i) {
+    const double angle = 2 * 3.14159265358979323846 * i / count;
+    Shot shot = ShotFrom("v" + std::to_string(100 + i),
+                         {0.7 * std::cos(angle), 0.5 * std::sin(angle), 0.02 * i}, {0, 0, 9});
+    const PinholeCamera& c = shot.camera;
+    const int width = c.width_px() + 4 * i, height = c.height_px() - 2 * i;
+    shot.camera = PinholeCamera(width, height, c.fx_px(), c.fy_px(), 0.5 * width, 0.5 * height);
+    shot.depth_scale = 1 + i % 2;
+    views.push_back(Photograph(surface, shot));
+  }
+  return SetOf(std::move(views));
+}
+
+TEST_F(Render, ViewsOfAnyNumberOfSizesMakeOnePicture) {
+  const DtrSet set = OfManySizes(20);
+  const RenderScene scene = MakeRenderScene(set);
+  const Shot novel = ShotFrom("n", {0.17, 0.11, 0.3}, {0.2, -0.1, 10});
+  for (const RenderMethod method : {RenderMethod::kTwoPass, RenderMethod::kDeferred}) {
+    RenderOptions options = OptionsOf(method);
+    options.views = 20;
+    Renderer renderer;
+    const RenderResult found = renderer.Render(scene, novel.camera, novel.cam_from_world, options);
+    EXPECT_EQ(found.views_used.size(), 20u);
+    const RenderResult expected = cpu::Render(scene, novel.camera, novel.cam_from_world, options);
+    EXPECT_LE(ShareApart(expected, found), kOutlineShare);
+    // Few sizes lie in layers of their own: the same picture but for how it is added up.
+    options.views = 3;
+    const RenderResult padded = renderer.Render(scene, novel.camera, novel.cam_from_world, options);
+    RenderScene few = scene;
+    few.views.clear();
+    for (const int i : padded.views_used) few.views.push_back(scene.views[static_cast<size_t>(i)]);
+    Renderer fresh;
+    EXPECT_LE(ShareApart(fresh.Render(few, novel.camera, novel.cam_from_world, options), padded),
+              kOutlineShare);
+    ExpectSound(padded);
+  }
+}
+
+TEST(LayerSizes, AreTheViewsOwnWhereTheseAreFewAndElseFewAndLargeEnough) {
+  const DtrSet set = OfManySizes(20);
+  std::vector<const View*> views;
+  for (const View& view : set.frames[0].views) views.push_back(&view);
+  constexpr int kLimit = 4096;
+  const LayerSizes own({views.begin(), views.begin() + 5}, 1, kLimit);
+  EXPECT_EQ(own.step_px(), 1);
+  EXPECT_EQ(own.LayerFor({97, 63}), (LayerSize{97, 63}));
+  for (const int resolution : {1, 3}) {
+    const LayerSizes few(views, resolution, kLimit);
+    std::set<LayerSize> images, depths;
+    for (const View* view : views) {
+      const LayerSize image{view->image.width(), view->image.height()};
+      const LayerSize layer = few.LayerFor(image), depth = SamplesOf(*view, resolution);
+      EXPECT_GE(layer.width_px, image.width_px);
+      EXPECT_GE(layer.height_px, image.height_px);
+      EXPECT_GE(few.LayerFor(depth).width_px, depth.width_px);
+      const SampleGrid samples = MakeSampleGrid(*view, resolution);
+      EXPECT_EQ(depth, (LayerSize{samples.inverse_depth.width(), samples.inverse_depth.height()}));
+      images.insert(layer);
+      depths.insert(few.LayerFor(depth));
+    }
+    EXPECT_LE(images.size(), static_cast<size_t>(LayerSizes::kMostSizes));
+    EXPECT_LE(depths.size(), static_cast<size_t>(LayerSizes::kMostSizes));
+  }
+  const LayerSizes tight(views, 1, 100);  // no layer beyond the driver's limit
+  EXPECT_LE(tight.LayerFor({97, 63}).width_px, 100);
+  const std::vector<int> edge = WithEdge(std::vector<int>{1, 2, 3, 4}.data(), {2, 2}, 1, {3, 3});
+  EXPECT_EQ(edge, (std::vector<int>{1, 2, 2, 3, 4, 4, 3, 4, 4}));
+}
+
+// Hosts such as OpenSceneGraph bind parts of buffers and cut with clip planes.
+TEST_F(Render, LeavesBufferRangesClipDistancesAndStateOfDrawBuffersAsTheyWere) {
+  const Buffer buffer = Buffer::Make();
+  glBindBuffer(GL_UNIFORM_BUFFER, buffer.name());
+  glBufferData(GL_UNIFORM_BUFFER, 4096, nullptr, GL_STATIC_DRAW);
+  constexpr GLint64 kStart = 512, kSize = 256;  // any driver's alignment is a divisor of 256
+  glBindBufferRange(GL_UNIFORM_BUFFER, 0, buffer.name(), kStart, kSize);
+  for (const GLuint i : {0u, 1u, 2u, 3u}) {
+    glBindBufferRange(GL_SHADER_STORAGE_BUFFER, i, buffer.name(), kStart + 256 * i, kSize);
+  }
+  glEnable(GL_CLIP_DISTANCE0);
+  glEnable(GL_CLIP_DISTANCE3);
+  glEnablei(GL_BLEND, 2);
+  glColorMaski(1, GL_FALSE, GL_TRUE, GL_FALSE, GL_TRUE);
+
+  for (const RenderMethod method : {RenderMethod::kTwoPass, RenderMethod::kDeferred}) {
+    const NamedScene scene = ParityScenes().front();
+    EXPECT_GT(RenderOnce(scene.set, scene.novel, OptionsOf(method)).coverage_share, 0.3);
+    const auto expect_range = [&](GLenum start, GLenum size, GLuint index, GLint64 expected) {
+      GLint64 value = 0;
+      glGetInteger64i_v(start, index, &value);
+      EXPECT_EQ(value, expected) << index;
+      glGetInteger64i_v(size, index, &value);
+      EXPECT_EQ(value, kSize) << index;
+    };
+    expect_range(GL_UNIFORM_BUFFER_START, GL_UNIFORM_BUFFER_SIZE, 0, kStart);
+    for (const GLuint i : {0u, 1u, 2u, 3u}) {
+      expect_range(GL_SHADER_STORAGE_BUFFER_START, GL_SHADER_STORAGE_BUFFER_SIZE, i,
+                   kStart + 256 * i);
+    }
+    for (GLuint i = 0; i < 6; ++i) {
+      EXPECT_EQ(glIsEnabled(GL_CLIP_DISTANCE0 + i), i == 0 || i == 3) << i;
+      EXPECT_EQ(glIsEnabledi(GL_BLEND, i), i == 2) << i;
+      GLboolean mask[4];
+      glGetBooleani_v(GL_COLOR_WRITEMASK, i, mask);
+      EXPECT_EQ(mask[0], i != 1) << i;
+      EXPECT_TRUE(mask[1]) << i;
+    }
+  }
+  glDisable(GL_CLIP_DISTANCE0);
+  glDisable(GL_CLIP_DISTANCE3);
+  glDisablei(GL_BLEND, 2);
+  glColorMaski(1, GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+  for (const GLuint i : {0u, 1u, 2u, 3u}) glBindBufferBase(GL_SHADER_STORAGE_BUFFER, i, 0);
+  glBindBufferBase(GL_UNIFORM_BUFFER, 0, 0);
+}
+
+TEST_F(Render, DepthBeyondAStorageBlockGoesInBandsOrIsRefusedNamingTheLimit) {
+  const NamedScene scene = ParityScenes()[1];
+  const RenderScene views = MakeRenderScene(scene.set);
+  RendererSettings small;
+  small.most_storage_bytes = 4 * 96 * 10;  // ten rows
+  Renderer renderer(small);
+  const RenderResult banded =
+      renderer.Render(views, scene.novel.camera, scene.novel.cam_from_world, {});
+  EXPECT_LE(ShareApart(RenderOnce(scene.set, scene.novel), banded), kOutlineShare);
+  try {
+    renderer.Draw(views, scene.novel.camera, scene.novel.cam_from_world, {});
+    FAIL() << "it was drawn";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("storage block of 3840 bytes"), std::string::npos)
+        << error.what();
+  }
+  RenderOptions two_pass = OptionsOf(RenderMethod::kTwoPass);
+  renderer.Draw(views, scene.novel.camera, scene.novel.cam_from_world, two_pass);
 }
 
 TEST_F(Render, WhatCannotBeDrawnIsNamed) {

@@ -1,5 +1,6 @@
 #include "dtr/io/mesh_io.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <limits>
@@ -14,6 +15,10 @@
 namespace dtr::io {
 namespace {
 
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
 using testing::TemporaryFolder;
 
 constexpr size_t kFirstRoot = 8 + 4 * 4 + 2 * 32 + 3 * 8 + 8;  // docs/FORMAT.md
@@ -143,12 +148,59 @@ TEST(MeshFile, IsLoadedWithItsDepthAndOnlyForThatDepth) {
   // The first one's mesh says it is of another depth map.
   writer.Finish(set);
   EXPECT_TRUE(VerifySet(folder / "small.dtr").empty());
-  DtrSet loaded = LoadSet(folder / "small.dtr");
-  EXPECT_TRUE(loaded.frames[0].views[0].mesh.has_value());
+  LoadOptions load;
+  load.threads = 1;
+  std::vector<std::string> warnings;
+  load.warn = [&](const std::string& line) { warnings.push_back(line); };
+  DtrSet loaded = LoadSet(folder / "small.dtr", load);
+  View& first = loaded.frames[0].views[0];
+  EXPECT_TRUE(first.mesh.has_value());
   EXPECT_FALSE(loaded.frames[0].views[1].mesh.has_value());
-  loaded.frames[0].views[0].depth_file->sha256 = std::string(64, 'b');
-  LoadPixels(folder / "small.dtr", loaded.frames[0].views[0], {});
-  EXPECT_FALSE(loaded.frames[0].views[0].mesh.has_value());
+  EXPECT_THAT(warnings, IsEmpty());
+  first.depth_file->sha256 = std::string(64, 'b');
+  LoadPixels(folder / "small.dtr", first, load);
+  EXPECT_FALSE(first.mesh.has_value());
+  EXPECT_THAT(warnings, ElementsAre(HasSubstr(first.name + ": its reduced mesh is left out")));
+}
+
+TEST(MeshFile, ADamagedOrMissingOneCostsAWarningAndNotTheView) {
+  const TemporaryFolder folder;
+  const std::filesystem::path target = folder / "small.dtr";
+  {
+    SetWriter writer(target, testing_support::kFingerprint, false);
+    DtrSet set = testing_support::EmptySet();
+    set.frames[0].views = {testing_support::SmallView(0)};
+    View& view = set.frames[0].views[0];
+    writer.WriteView(view, set.unit);
+    StoredMesh mesh;
+    mesh.cover.columns = view.depth.width(), mesh.cover.rows = view.depth.height();
+    writer.WriteMesh(view, mesh);
+    writer.Finish(set);
+  }
+  const std::filesystem::path file = target / LoadSet(target).frames[0].views[0].mesh_file->path;
+  const std::string whole = ReadFile(file, 1 << 20);
+  const auto expect_left_out = [&](const char* what) {
+    std::vector<std::string> warnings;
+    LoadOptions load;
+    load.warn = [&](const std::string& line) { warnings.push_back(line); };
+    const DtrSet set = LoadSet(target, load);
+    ASSERT_THAT(set.frames[0].views, SizeIs(1)) << what;
+    EXPECT_FALSE(set.frames[0].views[0].mesh.has_value()) << what;
+    EXPECT_FALSE(set.frames[0].views[0].depth.grid().empty()) << what;
+    ASSERT_THAT(warnings, SizeIs(1)) << what;
+    EXPECT_THAT(warnings[0], HasSubstr(file.filename().string())) << what;
+    EXPECT_THAT(VerifySet(target), SizeIs(1)) << what;  // `dtr info --verify` still says so
+  };
+  for (const size_t at : {size_t{0}, size_t{40}, whole.size() - 1}) {
+    std::string damaged = whole;
+    damaged[at] = static_cast<char>(damaged[at] ^ 1);
+    WriteFileAtomically(file, damaged);
+    expect_left_out("a bit");
+  }
+  WriteFileAtomically(file, whole.substr(0, whole.size() / 2));
+  expect_left_out("half");
+  std::filesystem::remove(file);
+  expect_left_out("nothing");
 }
 
 }  // namespace

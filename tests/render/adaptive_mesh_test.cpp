@@ -187,6 +187,33 @@ TEST(AdaptiveMesh, RefusesTheCoverOfAnotherDepthMap) {
   EXPECT_THROW(MakeAdaptiveMesh(Samples(40, 40, with_hole), rule, cover), Error);
 }
 
+TEST(AdaptiveMesh, AStoredCoverOfAnotherDepthMapIsMadeAnewAndNamed) {
+  View view;
+  view.camera = PinholeCamera(40, 40, 40, 40, 20, 20);
+  view.reference_baseline = 1.0 / 40;  // a pixel of disparity is 1 of 1/z
+  const auto photograph = [&](double (*w)(int, int)) {
+    view.depth = DepthImage(40, 40);
+    for (int y = 0; y < 40; ++y) {
+      for (int x = 0; x < 40; ++x) {
+        view.depth(x, y) = w(x, y) > 0 ? static_cast<float>(1 / w(x, y)) : 0;
+      }
+    }
+  };
+  photograph(Hills);
+  view.mesh = MakeStoredMesh(view, {}, 1);
+  std::string unfit = "?";
+  const AdaptiveMesh stored = MakeAdaptiveMesh(view, {}, 1, unfit);
+  EXPECT_EQ(unfit, "");
+  photograph([](int x, int y) { return x == 16 && y == 16 ? 0 : Hills(x, y); });
+  const AdaptiveMesh anew = MakeAdaptiveMesh(view, {}, 1, unfit);
+  EXPECT_NE(unfit, "");
+  view.mesh.reset();
+  const AdaptiveMesh without = MakeAdaptiveMesh(view, {}, 1, unfit);
+  EXPECT_EQ(unfit, "");
+  EXPECT_EQ(anew.indices, without.indices);
+  EXPECT_NE(anew.indices, stored.indices);
+}
+
 TEST(AdaptiveMesh, MapsTooSmallForBlocksAreCells) {
   EXPECT_TRUE(MeshOf(SampleGrid{}).tiles.empty());
   const AdaptiveMesh line = MeshOf(Samples(5, 1, Hills));

@@ -1,9 +1,10 @@
 // SPEC 5.2, 5.3: what a view's full-resolution depth map says of a surface at a pixel, and the
 // view's own fragment there. Expects `depths`, an array of sampler2DArray with one value per sample
-// (0: none) that a view's OwnMap turns into 1/z, filtered to the nearest and clamped to the edge.
+// (0: none) that a view's OwnMap turns into 1/z, filtered to the nearest and clamped to the edge or
+// with the edge once more.
 // No branch: software rasterisers run both sides of one anyway.
 struct OwnMap {
-  vec4 grid;    // 1 / columns, 1 / rows, columns / 2, rows / 2
+  vec4 grid;    // 1 / width, 1 / height of the layer; columns / 2, rows / 2 of the samples in it
   vec4 stored;  // 1/z of a stored value v: x + y v; depth break and pixel of disparity (of 1/z)
   int slot;     // of depths
   int layer;    // in it

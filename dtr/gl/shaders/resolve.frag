@@ -56,10 +56,8 @@ vec3 PointInView(ViewBlock view, vec3 ray, float w) {
 #include "own_depth.glsl"
 
 OwnMap MapOf(ViewBlock view) {
-  vec2 size = vec2(view.depth_slot.zw);
-  return OwnMap(vec4(1.0 / size, 0.5 * size),
-                vec4(view.stored_depth.xy, view.limits.w, view.stored_depth.z), view.depth_slot.x,
-                view.depth_slot.y);
+  return OwnMap(view.map, vec4(view.stored_depth.xy, view.limits.w, view.stored_depth.z),
+                view.depth_slot.x, view.depth_slot.y);
 }
 
 // A point of the view's frame on its grid of samples, homogeneous.

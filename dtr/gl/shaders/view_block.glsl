@@ -15,7 +15,8 @@ struct ViewBlock {
   vec4 limits;  // image width, height (pixels), Delta, depth break (differences of 1/z)
   ivec4 image;  // texture array, layer in it, 1 if the view has a mask, unused
   vec4 depth_grid;   // fx, fy, cx, cy of the grid of samples (SPEC 5.3)
-  ivec4 depth_slot;  // texture array, layer in it, columns, rows
+  ivec4 depth_slot;  // texture array, layer in it, unused
+  vec4 map;          // 1 / width, 1 / height of that layer; columns / 2, rows / 2 of the grid
   // 1/z of a stored value v is x + y v (two passes: of the layer's); z: a pixel of disparity as a
   // difference of 1/z (SPEC 0.3)
   vec4 stored_depth;

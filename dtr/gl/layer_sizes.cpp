@@ -1,0 +1,56 @@
+#include "dtr/gl/layer_sizes.h"
+
+#include <algorithm>
+#include <set>
+
+namespace dtr::gl {
+namespace {
+
+// Finer steps would hardly leave fewer sizes.
+constexpr int kFirstStepPx = 64;
+
+int Rounded(int side_px, int step_px, int most_px) {
+  const int rounded = (side_px + step_px - 1) / step_px * step_px;
+  return std::max(side_px, std::min(rounded, most_px));
+}
+
+}  // namespace
+
+LayerSizes::LayerSizes(const std::vector<const View*>& views, int resolution, int most_px)
+    : most_px_(most_px) {
+  std::vector<LayerSize> images, depths;
+  for (const View* view : views) {
+    images.push_back({view->camera.width_px(), view->camera.height_px()});
+    depths.push_back(SamplesOf(*view, resolution));
+  }
+  while (step_px_ < most_px && !(AreFew(images) && AreFew(depths))) {
+    step_px_ = step_px_ == 1 ? kFirstStepPx : 2 * step_px_;
+  }
+}
+
+bool LayerSizes::AreFew(const std::vector<LayerSize>& pictures) const {
+  std::set<LayerSize> layers;
+  for (const LayerSize& picture : pictures) layers.insert(LayerFor(picture));
+  return layers.size() <= static_cast<size_t>(kMostSizes);
+}
+
+LayerSize LayerSizes::LayerFor(const LayerSize& picture) const {
+  return {Rounded(picture.width_px, step_px_, most_px_),
+          Rounded(picture.height_px, step_px_, most_px_)};
+}
+
+LayerSize SamplesOf(const View& view, int resolution) {
+  const PinholeCamera camera = view.DepthCamera();
+  const int first = resolution / 2;
+  const auto along = [&](int pixels) {
+    return pixels > first ? (pixels - first + resolution - 1) / resolution : 0;
+  };
+  return {along(camera.width_px()), along(camera.height_px())};
+}
+
+LayerSize SizeWithEdge(const LayerSize& picture, const LayerSize& layer) {
+  return {std::min(picture.width_px + 1, layer.width_px),
+          std::min(picture.height_px + 1, layer.height_px)};
+}
+
+}  // namespace dtr::gl
