@@ -42,6 +42,30 @@ std::string Row(const eval::BenchRow& row) {
                      row.frame.spread_ms, row.cpu.median_ms, row.fps(), Decibel(row.psnr_db));
 }
 
+void SayWhatWasMeasured(const eval::BenchReport& report, const eval::BenchMachine& machine,
+                        Console& console) {
+  console.Say(Machine(machine));
+  std::string names;
+  for (const std::string& name : report.cameras) names += (names.empty() ? "" : ", ") + name;
+  console.Say(
+      fmt::format("{} source views, {}x{}, seen from {} {}; medians of {} frames, spread is "
+                  "the interquartile range",
+                  report.views_in_set, report.width_px, report.height_px,
+                  report.left_out ? "left-out" : "held-out", names, report.repeats));
+  console.Say("");
+}
+
+/// "*" where no other weight of this method and number of views gives a better whole frame.
+const char* BestMark(const eval::BenchReport& report, const eval::BenchRow& row) {
+  for (const eval::BenchRow& other : report.rows) {
+    if (other.method == row.method && other.views_used == row.views_used &&
+        other.psnr_db > row.psnr_db) {
+      return " ";
+    }
+  }
+  return "*";
+}
+
 std::string Axis(const eval::GrowthSeries& series) {
   if (series.axis == "views_used") return "views used";
   if (series.axis == "pixels") return "output, megapixels";
@@ -52,15 +76,7 @@ std::string Axis(const eval::GrowthSeries& series) {
 
 void SayReportTable(const eval::BenchReport& report, const eval::BenchMachine& machine,
                     Console& console) {
-  console.Say(Machine(machine));
-  std::string names;
-  for (const std::string& name : report.cameras) names += (names.empty() ? "" : ", ") + name;
-  console.Say(
-      fmt::format("{} source views, {}x{}, seen from {} {}; medians of {} frames, spread is "
-                  "the interquartile range",
-                  report.views_in_set, report.width_px, report.height_px,
-                  report.left_out ? "left-out" : "held-out", names, report.repeats));
-  console.Say("");
+  SayWhatWasMeasured(report, machine, console);
   console.Say(fmt::format("{:>3} {:>5}  {:^39}  {:^39}  {:>6} {:>6} {:>5}  {:>5} {:>6}", "", "",
                           "two-pass", "deferred", "", "", "", "", ""));
   const std::string head =
@@ -91,6 +107,27 @@ void SayReportTable(const eval::BenchReport& report, const eval::BenchMachine& m
         eval::NameOf(row.method), row.whole_ms(), row.whole_cpu_ms(), row.cpu.median_ms,
         row.read_back_cpu.median_ms, row.fill_cpu.median_ms));
   }
+}
+
+void SayWeightTable(const eval::BenchReport& report, const eval::BenchMachine& machine,
+                    Console& console) {
+  SayWhatWasMeasured(report, machine, console);
+  console.Say(fmt::format("{:>5} {:<13}  {:^31}  {:^31}", "", "", "two-pass", "deferred"));
+  const std::string head = fmt::format("{:>8} {:>8} {:>6} {:>6}", "CPU ms", "dB", "seen", "share");
+  console.Say(fmt::format("{:>5} {:<13}  {}  {}", "views", "weight", head, head));
+  const auto figures = [&](const eval::BenchRow& row) {
+    return fmt::format("{:>8.1f} {:>7}{} {:>6} {:>5.1f}%", row.cpu.median_ms, Decibel(row.psnr_db),
+                       BestMark(report, row), Decibel(row.psnr_covered_db), 100 * row.coverage);
+  };
+  for (size_t i = 0; i + 1 < report.rows.size(); i += 2) {
+    const eval::BenchRow &two_pass = report.rows[i], &deferred = report.rows[i + 1];
+    console.Say(fmt::format("{:>5} {:<13}  {}  {}", two_pass.views_used,
+                            eval::NameOf(two_pass.blend), figures(two_pass), figures(deferred)));
+  }
+  console.Say("");
+  console.Say(
+      "dB: whole frame, holes filled, * the best of its method and number of views; seen: dB on "
+      "pixels that some view saw, and their share; CPU ms: drawing alone");
 }
 
 void SayGrowthTable(const std::vector<eval::GrowthSeries>& series, RenderMethod method,

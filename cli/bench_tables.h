@@ -12,6 +12,11 @@ namespace dtr::cli {
 void SayReportTable(const eval::BenchReport& report, const eval::BenchMachine& machine,
                     Console& console);
 
+/// One line per number of views and weight, the methods side by side; the best quality of each
+/// method and number of views is marked.
+void SayWeightTable(const eval::BenchReport& report, const eval::BenchMachine& machine,
+                    Console& console);
+
 void SayGrowthTable(const std::vector<eval::GrowthSeries>& series, RenderMethod method,
                     const eval::BenchMachine& machine, Console& console);
 

@@ -31,8 +31,8 @@ eval::BenchMachine MachineOf(const eval::TimedRenderer& renderer) {
           DTR_VERSION, renderer.HasGpuClock() ? "gpu timer" : "wall"};
 }
 
-int RunReportTable(const Options& options, const RenderOptions& render, const DtrSet& set,
-                   eval::TimedRenderer& renderer, const Context& context) {
+int RunPhotoTable(const Options& options, const RenderOptions& render, const DtrSet& set,
+                  eval::TimedRenderer& renderer, const Context& context) {
   eval::BenchOptions bench;
   bench.render = render;
   bench.views = options.views;
@@ -41,10 +41,12 @@ int RunReportTable(const Options& options, const RenderOptions& render, const Dt
   bench.repeats = options.repeats;
   bench.cameras = options.cameras;
   bench.timed_camera = [&](const PinholeCamera& camera) { return WithSize(camera, options.size); };
-  const eval::BenchReport report = eval::MeasureReportTable(set, bench, renderer, context.console);
+  const bool weights = options.table == "weights";
+  const eval::BenchReport report = (weights ? eval::MeasureWeightTable : eval::MeasureReportTable)(
+      set, bench, renderer, context.console);
   const eval::BenchMachine machine = MachineOf(renderer);
-  SayReportTable(report, machine, context.console);
-  context.EmitJson(eval::ToJson(report, machine));
+  (weights ? SayWeightTable : SayReportTable)(report, machine, context.console);
+  context.EmitJson(eval::ToJson(options.table, report, machine));
   return kDone;
 }
 
@@ -78,9 +80,10 @@ int RunBench(const Options& options, const Context& context) {
   io::LoadOptions load;
   load.held_out = true;
   load.threads = context.common.threads;
+  load.warn = [&context](const std::string& line) { context.console.Note(line); };
   const DtrSet set = io::LoadSet(options.set, load);
   return options.table == "growth" ? RunGrowthTable(options, render, set, *renderer, context)
-                                   : RunReportTable(options, render, set, *renderer, context);
+                                   : RunPhotoTable(options, render, set, *renderer, context);
 }
 
 void DeclareOptions(CLI::App& command, Options& options) {
@@ -88,9 +91,10 @@ void DeclareOptions(CLI::App& command, Options& options) {
   command
       .add_option("--table", options.table,
                   "report: frames a second by views used and resolution, with the truth beside; "
-                  "growth: how times grow with views, pixels and the size of the set [report]")
-      ->check(CLI::IsMember({"report", "growth"}))
-      ->type_name("report|growth");
+                  "weights: every blend weight and number of views, quality and cost; growth: how "
+                  "times grow with views, pixels and the size of the set [report]")
+      ->check(CLI::IsMember({"report", "weights", "growth"}))
+      ->type_name("report|weights|growth");
   command.add_option("--size", options.size, "Size of the timed pictures; 0 keeps the proportions")
       ->type_name("WxH");
   command
@@ -99,7 +103,7 @@ void DeclareOptions(CLI::App& command, Options& options) {
       ->type_name("N");
   command
       .add_option("--cameras", options.cameras,
-                  "report: so many held-out photos (or left-out ones) to look from [2]")
+                  "report, weights: so many held-out photos (or left-out ones) to look from [2]")
       ->check(CLI::Range(1, 100000))
       ->type_name("N");
   command.add_option("--like", options.like, "growth: from a view's place [between two]")
@@ -111,9 +115,10 @@ void DeclareOptions(CLI::App& command, Options& options) {
     command.remove_option(command.get_option(single));
   }
   command
-      .add_option("--views", options.views,
-                  "Numbers of views used, a row each [3,5,6,8,9,12,14]; growth: the one for rows "
-                  "that do not change it [8]")
+      .add_option(
+          "--views", options.views,
+          "Numbers of views used, a row each [3,5,6,8,9,12,14; weights: 1,2,4,8]; growth: the "
+          "one for rows that do not change it [8]")
       ->delimiter(',')
       ->check(CLI::Range(1, 1024))
       ->type_name("K,...");

@@ -26,6 +26,7 @@ struct BenchOptions {
 /// One line of a table; times are means over the cameras of the medians over the repeats.
 struct BenchRow {
   RenderMethod method = RenderMethod::kTwoPass;
+  BlendWeight blend = BlendWeight::kInverseAngle;
   int resolution = 1;
   int views_used = 0;  ///< valid views that took part: K, or what there is
   Times frame, cpu;    ///< drawing alone
@@ -49,20 +50,35 @@ struct BenchComparison {
   std::optional<double> loss_db;            ///< PSNR of two-pass less that of deferred
 };
 
+/// Why a resolution has no rows of more views.
+struct BenchEnd {
+  int resolution = 1;
+  int views_used = 0, views_asked = 0;  ///< of its last row
+  bool for_memory = false;  ///< the renderer's memory held no more; else no more were valid
+};
+
 struct BenchReport {
   int views_in_set = 0, width_px = 0, height_px = 0, repeats = 0;
   bool left_out = false;             ///< photos compared with were left out of the set's sources
   std::vector<std::string> cameras;  ///< names of the photos compared with
   std::vector<BenchRow> rows;        ///< by resolution, views, method (two-pass first)
+  std::vector<BenchEnd> ends;        ///< of each resolution whose rows end early
   std::optional<BenchComparison> comparison;
 };
 
 /// The founding report's tables (section 2.8): frames a second by the number of views used and the
 /// resolution, here of both methods. Novel cameras are held-out photos, else source photos left out
-/// in turn. The methods take turns, so that what else the machine does meets both alike.
+/// in turn. The methods take turns, so that what else the machine does meets both alike. Rows of a
+/// resolution end where a method draws fewer views than asked for, which `ends` and a note tell.
 /// `set` must be loaded with images, depth and held-out views. Throws UsageError when no photo is
 /// left to compare with, and what the renderer throws.
 BenchReport MeasureReportTable(const DtrSet& set, const BenchOptions& options,
+                               TimedRenderer& renderer, Progress& progress);
+
+/// Every weight (SPEC 4.5, with the parameters of options.render) with both methods and K views,
+/// {1, 2, 4, 8} by default, at the first resolution: rows by K, weight, method. Photos, turns,
+/// times, ends and errors as MeasureReportTable; there is no comparison.
+BenchReport MeasureWeightTable(const DtrSet& set, const BenchOptions& options,
                                TimedRenderer& renderer, Progress& progress);
 
 }  // namespace dtr::eval

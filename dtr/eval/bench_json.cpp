@@ -22,6 +22,7 @@ Json Value(const BenchMachine& machine) {
 
 Json Value(const BenchRow& row, int views_in_set) {
   return {{"method", NameOf(row.method)},
+          {"blend", NameOf(row.blend)},
           {"views_in_set", views_in_set},
           {"views_used", row.views_used},
           {"resolution", row.resolution},
@@ -47,13 +48,41 @@ const char* NameOf(RenderMethod method) {
   return method == RenderMethod::kTwoPass ? "two-pass" : "deferred";
 }
 
-std::string ToJson(const BenchReport& report, const BenchMachine& machine) {
+const char* NameOf(BlendWeight blend) {
+  switch (blend) {
+    case BlendWeight::kCosine:
+      return "cosine";
+    case BlendWeight::kExponential:
+      return "exponential";
+    case BlendWeight::kAngle:
+      return "angle";
+    case BlendWeight::kInverseAngle:
+      return "inverse-angle";
+    case BlendWeight::kKNearest:
+      return "k-nearest";
+  }
+  return "";
+}
+
+std::string ToJson(const std::string& table, const BenchReport& report,
+                   const BenchMachine& machine) {
   Json rows = Json::array();
   for (const BenchRow& row : report.rows) rows.push_back(Value(row, report.views_in_set));
-  Json json{{"table", "report"},           {"views_in_set", report.views_in_set},
-            {"width_px", report.width_px}, {"height_px", report.height_px},
-            {"repeats", report.repeats},   {"left_out", report.left_out},
-            {"cameras", report.cameras},   {"rows", rows}};
+  Json json{{"table", table},
+            {"views_in_set", report.views_in_set},
+            {"width_px", report.width_px},
+            {"height_px", report.height_px},
+            {"repeats", report.repeats},
+            {"left_out", report.left_out},
+            {"cameras", report.cameras},
+            {"rows", rows}};
+  json["ends"] = Json::array();
+  for (const BenchEnd& end : report.ends) {
+    json["ends"].push_back({{"resolution", end.resolution},
+                            {"views_used", end.views_used},
+                            {"views_asked", end.views_asked},
+                            {"reason", end.for_memory ? "memory" : "valid views"}});
+  }
   json["ratio_two_pass_over_deferred"] = nullptr;
   json["loss_db"] = nullptr;
   json["compared_at"] = nullptr;

@@ -17,15 +17,19 @@ struct BenchMachine {
   std::string clock;     ///< what `ms` was measured by: "gpu timer" or "wall"
 };
 
-/// {table:"report",views_in_set,width_px,height_px,repeats,left_out,cameras,
-///  rows:[{method,views_in_set,views_used,resolution,ms,spread_ms,fps,cpu_ms,cpu_spread_ms,
+/// `table`: "report" or "weights" (which has no comparison).
+/// {table,views_in_set,width_px,height_px,repeats,left_out,cameras,
+///  rows:[{method,blend,views_in_set,views_used,resolution,ms,spread_ms,fps,cpu_ms,cpu_spread_ms,
 ///         read_back_ms,read_back_cpu_ms,fill_ms,fill_cpu_ms,whole_ms,whole_cpu_ms,psnr_db,
 ///         psnr_covered_db,coverage}],
+///  ends:[{resolution,views_used,views_asked,reason}] (why there are no more rows: "memory" or
+///  "valid views"),
 ///  ratio_two_pass_over_deferred,loss_db,compared_at:{views_used,resolution},
 ///  machine:{cpu,cores,renderer,version,clock}}.
 /// Spreads are interquartile ranges. What is not defined (no row pair, no pixel to compare) is
 /// null.
-std::string ToJson(const BenchReport& report, const BenchMachine& machine);
+std::string ToJson(const std::string& table, const BenchReport& report,
+                   const BenchMachine& machine);
 
 /// {table:"growth",method,series:[{axis,worst_growth,rows:[{value,ms,spread_ms,cpu_ms,
 ///  cpu_spread_ms}]}],machine:{...}}.
@@ -34,5 +38,7 @@ std::string ToJson(const std::vector<GrowthSeries>& series, RenderMethod method,
 
 /// "two-pass" or "deferred", as --method takes them.
 const char* NameOf(RenderMethod method);
+/// As --blend takes them.
+const char* NameOf(BlendWeight blend);
 
 }  // namespace dtr::eval

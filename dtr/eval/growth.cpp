@@ -123,11 +123,11 @@ std::vector<Frame> ByPixels(const RenderScene& scene, const PinholeCamera& camer
 /// The nearest views first, so that every set has the four that are used.
 std::vector<Frame> ByViewsInSet(const RenderScene& scene, const PinholeCamera& camera,
                                 RenderOptions options, const std::vector<int>& nearest_first,
-                                const std::vector<View>& copies) {
+                                const std::vector<View>& copies, const std::vector<int>& counts) {
   // Copies have no pixels: they stand for what a large set adds, and are never drawn.
   options.views = std::min<int>(kUsedOfLargeSet, static_cast<int>(nearest_first.size()));
   std::vector<Frame> frames;
-  for (const int count : kViewsInSet) {
+  for (const int count : counts) {
     RenderScene part = scene;
     part.views.clear();
     for (size_t i = 0; i < static_cast<size_t>(count); ++i) {
@@ -140,6 +140,16 @@ std::vector<Frame> ByViewsInSet(const RenderScene& scene, const PinholeCamera& c
     frames.push_back({static_cast<double>(count), std::move(part), camera, options});
   }
   return frames;
+}
+
+/// Sizes of the sets. By the per-pixel rule every view of a set is drawn, copies too: then sets are
+/// of the `valid` views alone.
+std::vector<int> SizesOfSets(int valid, bool per_pixel) {
+  std::vector<int> counts(kViewsInSet.begin(), kViewsInSet.end());
+  if (!per_pixel) return counts;
+  std::erase_if(counts, [&](int count) { return count >= valid; });
+  counts.push_back(valid);
+  return counts;
 }
 
 }  // namespace
@@ -155,16 +165,21 @@ std::vector<GrowthSeries> MeasureGrowth(const DtrSet& set, const NovelCamera& no
   const ViewSelection nearest = SelectViews(scene, novel.cam_from_world, all);
   if (nearest.views.empty()) throw UsageError("bench: no view of the set is valid for the camera");
   const auto valid = static_cast<int>(nearest.views.size());
+  const std::vector<int> counts = SizesOfSets(valid, nearest.per_pixel);
+  if (nearest.per_pixel) {
+    progress.Note("every view is drawn by the per-pixel rule (SPEC 1.3): sets of up to the " +
+                  std::to_string(valid) + " views there are, and their cost may grow");
+  }
   const std::vector<View> copies =
       TurnedCopies(scene, nearest.views, novel.cam_from_world, render.max_angle_rad,
-                   std::max(0, kViewsInSet.back() - valid));
+                   std::max(0, counts.back() - valid));
   const auto measure = [&](const std::string& axis, const std::vector<Frame>& frames, bool linear) {
     return Measure(axis, frames, linear, novel.cam_from_world, options.repeats, renderer, progress);
   };
   return {measure("views_used", ByViewsUsed(scene, novel.camera, render, valid), true),
           measure("pixels", ByPixels(scene, novel.camera, render), true),
-          measure("views_in_set", ByViewsInSet(scene, novel.camera, render, nearest.views, copies),
-                  false)};
+          measure("views_in_set",
+                  ByViewsInSet(scene, novel.camera, render, nearest.views, copies, counts), false)};
 }
 
 }  // namespace dtr::eval

@@ -34,8 +34,10 @@ struct GrowthSeries {
 /// Draws the frame of `novel` with 1...16 views (as many as are valid), at a quarter to four times
 /// its pixels, and from sets of 4...256 views with four of them used: those of `set` and, when it
 /// has fewer, copies of its cameras turned about the scene's centre, valid but too far off to be
-/// used. The repeats run through all rows of a series in turn, so that what else the machine does
-/// meets all alike. Throws UsageError when no view is valid for the camera.
+/// used. Where the per-pixel rule (SPEC 1.3) draws every view of a set, there are no copies, and
+/// the series ends with the views there are. The repeats run through all rows of a series in turn,
+/// so that what else the machine does meets all alike. Throws UsageError when no view is valid for
+/// the camera.
 std::vector<GrowthSeries> MeasureGrowth(const DtrSet& set, const NovelCamera& novel,
                                         const GrowthOptions& options, TimedRenderer& renderer,
                                         Progress& progress);

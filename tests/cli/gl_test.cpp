@@ -117,6 +117,20 @@ TEST_F(OpenGl, BenchPrintsATableForPeopleAndOneForPrograms) {
   }
 }
 
+TEST_F(OpenGl, BenchPutsQualityAndCostOfEveryWeightSideBySide) {
+  SkipWithoutOpenGl();
+  const Ran ran = DtrOk({"bench", Set(), "--table", "weights", "--size", "40x0", "--repeats", "1",
+                         "--views", "1,2", "--cameras", "1", "--json", In("weights.json")});
+  EXPECT_THAT(ran.out, HasSubstr("inverse-angle"));
+  const Json json = Json::parse(Text(In("weights.json")));
+  EXPECT_EQ(json["table"], "weights");
+  ASSERT_EQ(json["rows"].size(), 20u);  // 2 numbers of views x 5 weights x 2 methods
+  for (const Json& row : json["rows"]) {
+    EXPECT_GT(row["psnr_db"], 15);
+    EXPECT_GT(row["cpu_ms"], 0);
+  }
+}
+
 TEST_F(OpenGl, BenchMeasuresGrowth) {
   SkipWithoutOpenGl();
   const Ran ran = DtrOk({"bench", Set(), "--table", "growth", "--size", "40x0", "--repeats", "1",
@@ -128,7 +142,7 @@ TEST_F(OpenGl, BenchMeasuresGrowth) {
 
 TEST_F(OpenGl, BenchOfNothingOrOfWordsThatMeanNothing) {
   ExpectRefused(Dtr({"bench", Set(), "--table", "magic", "--renderer", "cpu"}), kWrongUsage,
-                "--table: magic not in {report,growth}");
+                "--table: magic not in {report,weights,growth}");
   ExpectRefused(Dtr({"bench", In("absent.dtr"), "--renderer", "cpu"}), kFailed,
                 "expected the folder of a D+TR set, found nothing");
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "dtr/base/error.h"
 #include "dtr/eval/bench_json.h"
@@ -48,10 +49,12 @@ class Clockwork final : public TimedRenderer {
                  const RenderOptions& options) override {
     EXPECT_FALSE(options.fill_holes);
     methods.push_back(options.method);
+    blends.insert(options.blend);
     widths.push_back(novel.width_px());
     views_in_scene.push_back(static_cast<int>(scene.views.size()));
     const bool deferred = options.method == RenderMethod::kDeferred;
-    const int used = std::min<int>(options.views, static_cast<int>(scene.views.size()));
+    const int used =
+        std::min({options.views, static_cast<int>(scene.views.size()), room_for_views});
     drawn_ = RenderResult{};
     drawn_.image = ImageRgb8(novel.width_px(), novel.height_px(), 3, deferred ? 110 : 102);
     drawn_.coverage = Mask(novel.width_px(), novel.height_px(), 1, 255);
@@ -65,7 +68,9 @@ class Clockwork final : public TimedRenderer {
   RenderResult ReadBack() override { return drawn_; }
 
   std::vector<RenderMethod> methods;
+  std::set<BlendWeight> blends;
   std::vector<int> widths, views_in_scene;
+  int room_for_views = 1000;  ///< more are left out, as memory does
 
  private:
   const bool gpu_;
@@ -163,6 +168,70 @@ TEST(MeasureReportTable, EndsARowBlockWhenMoreViewsAreNotValid) {
   EXPECT_EQ(report.rows.back().views_used, 4);
 }
 
+class Listener final : public Progress {
+ public:
+  void Stage(const std::string&, int) override {}
+  void Update(int) override {}
+  void Note(const std::string& line) override { notes.push_back(line); }
+  std::vector<std::string> notes;
+};
+
+TEST(MeasureReportTable, SaysWhyThereAreNoMoreRows) {
+  BenchOptions options;
+  options.repeats = 1;
+  options.views = {3, 5, 6, 8};
+  options.resolutions = {2};
+  const BenchMachine machine{"cpu", 2, "clockwork", "0.1.0", "wall"};
+  for (const bool memory : {true, false}) {
+    Listener listener;
+    Clockwork clockwork(false);
+    if (memory) clockwork.room_for_views = 4;
+    const BenchReport report =
+        MeasureReportTable(Planes(memory ? 9 : 4, true), options, clockwork, listener);
+    ASSERT_EQ(report.rows.size(), 4u);  // of 3 views, and of the 4 that there are
+    ASSERT_EQ(report.ends.size(), 1u);
+    EXPECT_EQ(report.ends[0].views_used, 4);
+    EXPECT_EQ(report.ends[0].views_asked, 5);
+    EXPECT_EQ(report.ends[0].for_memory, memory);
+    ASSERT_THAT(listener.notes, ::testing::SizeIs(1));
+    EXPECT_THAT(listener.notes[0],
+                ::testing::HasSubstr(memory ? "memory holds only 4 of them; give --gpu-memory"
+                                            : "only 4 are valid here"));
+    const auto json = nlohmann::json::parse(ToJson("report", report, machine));
+    EXPECT_EQ(json["ends"][0]["reason"], memory ? "memory" : "valid views");
+  }
+  Listener listener;
+  Clockwork clockwork(false);
+  EXPECT_TRUE(MeasureReportTable(Planes(9, true), options, clockwork, listener).ends.empty());
+  EXPECT_TRUE(listener.notes.empty());
+}
+
+TEST(MeasureWeightTable, HasARowForEveryNumberOfViewsWeightAndMethod) {
+  SilentProgress progress;
+  BenchOptions options;
+  options.repeats = 1;
+  options.render.falloff = 5;
+  Clockwork clockwork(false);
+  const BenchReport report = MeasureWeightTable(Planes(6, true), options, clockwork, progress);
+  ASSERT_EQ(report.rows.size(), 4u * 5 * 2);  // 1, 2, 4 and, of 8, the 6 that there are
+  for (size_t i = 0; i < report.rows.size(); ++i) {
+    const BenchRow& row = report.rows[i];
+    EXPECT_EQ(row.method, i % 2 == 0 ? RenderMethod::kTwoPass : RenderMethod::kDeferred);
+    EXPECT_EQ(row.blend, static_cast<BlendWeight>(i / 2 % 5));
+    EXPECT_EQ(row.views_used, std::vector({1, 2, 4, 6})[i / 10]);
+    EXPECT_DOUBLE_EQ(row.cpu.median_ms, (i % 2 == 0 ? 120.0 : 10.0) * row.views_used);
+    EXPECT_TRUE(row.psnr_db.has_value());
+  }
+  EXPECT_EQ(report.ends.size(), 1u);
+  EXPECT_THAT(clockwork.blends, ::testing::SizeIs(::testing::Ge(5u)));
+  const auto json =
+      nlohmann::json::parse(ToJson("weights", report, {"cpu", 2, "clockwork", "0.1.0", "wall"}));
+  EXPECT_EQ(json["table"], "weights");
+  EXPECT_EQ(json["rows"][0]["blend"], "cosine");
+  EXPECT_EQ(json["rows"][7]["blend"], "inverse-angle");
+  EXPECT_EQ(json["rows"][9]["blend"], "k-nearest");
+}
+
 TEST(MeasureGrowth, HandWorkedSeries) {
   SilentProgress progress;
   const DtrSet set = Planes(6, false);
@@ -216,6 +285,25 @@ TEST(MeasureGrowth, AnySizeOfSetDrawsFromTheSameFourViews) {
   EXPECT_EQ(selector.selected[64], selector.selected[4]);
 }
 
+TEST(MeasureGrowth, ThePerPixelRuleDrawsNoCopiesWithoutPixels) {
+  DtrSet set = Planes(6, false);
+  set.scene_center = {1, 0, -10};  // behind every camera
+  const View& first = set.frames[0].views[0];
+  Listener listener;
+  Selector selector;
+  const auto series =
+      MeasureGrowth(set, {first.camera, first.cam_from_world}, {{}, 1}, selector, listener);
+  std::vector<double> sizes;
+  for (const GrowthRow& row : series[2].rows) sizes.push_back(row.value);
+  EXPECT_THAT(sizes, ElementsAre(4, 6));
+  for (const auto& [views, selected] : selector.selected) {
+    EXPECT_EQ(selected.size(), static_cast<size_t>(views));
+    for (const std::string& id : selected) EXPECT_EQ(id.substr(0, 1), "v");
+  }
+  ASSERT_THAT(listener.notes, ::testing::SizeIs(1));
+  EXPECT_THAT(listener.notes[0], ::testing::HasSubstr("per-pixel rule"));
+}
+
 TEST(BenchJson, NamesAreTheInterface) {
   SilentProgress progress;
   BenchOptions options;
@@ -225,7 +313,7 @@ TEST(BenchJson, NamesAreTheInterface) {
   Clockwork clockwork(false);
   const BenchReport report = MeasureReportTable(Planes(9, true), options, clockwork, progress);
   const BenchMachine machine{"cpu", 2, "llvmpipe", "0.1.0", "wall"};
-  const auto json = nlohmann::json::parse(ToJson(report, machine));
+  const auto json = nlohmann::json::parse(ToJson("report", report, machine));
   for (const char* name : {"rows", "ratio_two_pass_over_deferred", "loss_db", "machine"}) {
     EXPECT_TRUE(json.contains(name)) << name;
   }
@@ -235,6 +323,7 @@ TEST(BenchJson, NamesAreTheInterface) {
                            "psnr_db", "cpu_ms", "spread_ms"}) {
     EXPECT_TRUE(row.contains(name)) << name;
   }
+  EXPECT_EQ(row["blend"], "inverse-angle");
   EXPECT_EQ(row["method"], "two-pass");
   EXPECT_EQ(json["rows"][1]["method"], "deferred");
   EXPECT_DOUBLE_EQ(json["ratio_two_pass_over_deferred"], 12);
