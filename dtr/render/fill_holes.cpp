@@ -5,8 +5,8 @@
 #include "dtr/base/parallel_for.h"
 #include "dtr/render/colour.h"
 #include "dtr/render/guessed_colours.h"
+#include "dtr/render/large_holes.h"
 #include "dtr/render/push_pull.h"
-#include "dtr/render/sweep.h"
 
 namespace dtr {
 namespace {
@@ -85,19 +85,34 @@ void FillFromViews(const GuessedColours& guesses, int threads, KnownDepth& known
   });
 }
 
-/// SPEC 7.3: asks again where the views agree better on another depth than the guess.
+/// SPEC 7.3: asks again where the views agree better on a plane than on the guess.
 void FillLargeHoles(const KnownDepth& seen, const GuessedColours& guesses, int threads,
                     KnownDepth& known, RenderResult& result) {
-  const SweptDepth swept = SweepLargeHoles(seen, known, guesses, threads);
+  const HolePlanes planes = ChooseHolePlanes(seen, known, guesses, threads);
+  const std::array<double, 256>& linear = LinearFromSrgb8();
   ParallelFor(0, known.height(), threads, [&](int y) {
     GuessedColours::Row row(guesses, y);
     for (int x = 0; x < known.width(); ++x) {
-      const double inverse_depth = swept.At(x, y);
-      if (!(inverse_depth > 0)) continue;
-      const auto guess = row.At(x, inverse_depth, inverse_depth);
-      if (!guess) continue;
-      Write(guess->linear_rgb, &result.image(x, y));
-      known(x, y) = static_cast<float>(1 / guess->inverse_depth);
+      if (result.coverage(x, y) != 0) continue;
+      const HolePlanes::Mix mix = planes.At(x, y);
+      Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+      double answered = 0, guessed = 1, most = 0, depth = 0;
+      for (size_t i = 0; i < static_cast<size_t>(mix.count); ++i) {
+        guessed -= mix.share[i];
+        const auto colour = row.At(x, mix.inverse_depth[i], mix.inverse_depth[i]);
+        if (!colour) continue;
+        sum += mix.share[i] * colour->linear_rgb;
+        answered += mix.share[i];
+        if (mix.share[i] > most) most = mix.share[i], depth = 1 / mix.inverse_depth[i];
+      }
+      if (!(answered > 0)) continue;
+      if (known(x, y) > 0 && guessed > 0) {
+        const std::uint8_t* rgb = &result.image(x, y);
+        sum += guessed * Eigen::Vector3d(linear[rgb[0]], linear[rgb[1]], linear[rgb[2]]);
+        answered += guessed;
+      }
+      Write(sum / answered, &result.image(x, y));
+      if (!(known(x, y) > 0) || most > guessed) known(x, y) = static_cast<float>(depth);
     }
   });
 }
@@ -119,7 +134,8 @@ void FillHolesFromViews(const RenderScene& scene, const PinholeCamera& novel,
                         RenderResult& result) {
   if (!HasHoles(result)) return;
   KnownDepth known = DepthOf(result);
-  const GuessedColours guesses(scene, result.views_used, novel, novel_from_world, options);
+  GuessedColours guesses(scene, result.views_used, novel, novel_from_world, options);
+  guesses.MatchExposures(known, result.image);
   const KnownDepth seen = known;
   FillFromViews(guesses, options.threads, known, result);
   FillLargeHoles(seen, guesses, options.threads, known, result);

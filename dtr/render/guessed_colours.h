@@ -1,6 +1,7 @@
 // dtr/render/guessed_colours.h -- SPEC 7.2: what the views show where no surface was measured.
 #pragma once
 #include <Eigen/Core>
+#include <cmath>
 #include <optional>
 #include <vector>
 
@@ -8,9 +9,17 @@
 #include "dtr/render/options.h"
 #include "dtr/render/scene.h"
 #include "dtr/types/camera.h"
+#include "dtr/types/grid.h"
 #include "dtr/types/pose.h"
 
 namespace dtr {
+
+/// Linear light in [0, 1] in another exposure: times `exposure` (above 0) in the dark, bent so that
+/// white stays white, for what a photo clipped is as bright in any. Rising; 1 / exposure undoes it.
+inline double Exposed(double linear, double exposure) {
+  const auto fourth = [](double v) { return v * v * v * v; };
+  return exposure * linear / std::sqrt(std::sqrt(1 + (fourth(exposure) - 1) * fourth(linear)));
+}
 
 /// A colour for a pixel that no view saw, and the inverse depth it was found at.
 struct GuessedColour {
@@ -33,7 +42,12 @@ class GuessedColours {
     Eigen::Vector3d pixel_per_inverse_depth;  ///< infinity, and what 1/z adds to it
     Eigen::Vector3d center_in_novel;
     double delta_inverse_depth;
+    Eigen::Vector3d exposure = Eigen::Vector3d::Ones();  ///< as Exposed takes it
   };
+  /// SPEC 7.4: the views in the picture's exposure from here on. `seen`: plane z, 0 at holes;
+  /// `image`: the picture.
+  void MatchExposures(const Grid<float>& seen, const ImageRgb8& image);
+
   /// In the order of the ids.
   const std::vector<Placed>& views() const { return views_; }
   const PinholeCamera& novel() const { return novel_; }
@@ -61,7 +75,7 @@ class GuessedColours {
     int y_;
     std::vector<Asked> asked_;
     size_t sceptic_ = 0;  ///< the view that saw through a guess last: likely the next one's too
-    std::vector<double> dots_, angles_, shares_;
+    std::vector<double> dots_, angles_, shares_, fades_;
     std::vector<Eigen::Vector3d> colours_;
   };
 

@@ -306,7 +306,8 @@ TEST(FillHolesFromViews, ASkyWithoutDepthComesOutAsPhotographedAndIsNotSeen) {
         continue;
       }
       ++holes;
-      off += filled.image(x, y, 0) != 210;
+      // A level: the exposures of SPEC 7.4 are measured on the square.
+      off += std::abs(filled.image(x, y, 0) - 210) > 1;
     }
   }
   EXPECT_GT(holes, 3000);
