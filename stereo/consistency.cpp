@@ -11,6 +11,11 @@ namespace {
 /// Four depths farther apart than this (largest over smallest) are not one surface.
 constexpr float kSmoothRatio = 1.03f;
 
+/// Exponent by which sigma grows with the share of the maps that refute a kept pixel: their log
+/// odds in a logistic regression of depths that are wrong by more than 2 pixels on plaza
+/// (ACCURACY.md).
+constexpr double kDoubtPerRefuting = 5;
+
 /// Inverse depth of a map at a pixel position: bilinear on one surface, else the nearest pixel's.
 std::optional<double> InverseDepthAt(const DepthImage& depth, const Eigen::Vector2d& pixel) {
   const double x = pixel.x() - 0.5, y = pixel.y() - 0.5;
@@ -29,6 +34,10 @@ std::optional<double> InverseDepthAt(const DepthImage& depth, const Eigen::Vecto
             yn = static_cast<int>(std::floor(pixel.y()));
   if (!depth.Contains(xn, yn) || DepthImage::IsHole(depth(xn, yn))) return std::nullopt;
   return 1.0 / depth(xn, yn);
+}
+
+float Doubt(int confirming, int refuting) {
+  return static_cast<float>(std::exp(kDoubtPerRefuting * refuting / (confirming + refuting + 1)));
 }
 
 /// What is needed of another view, worked out once per map.
@@ -76,7 +85,10 @@ DepthEstimate FilterByConsistency(const StereoView& view, const DepthEstimate& e
         confirming += verdict > 0;
         refuting += verdict < 0;
       }
-      if (confirming >= options.min_agreeing && confirming >= refuting) continue;
+      if (confirming >= options.min_agreeing && confirming >= refuting) {
+        if (refuting > 0) result.inverse_depth_sigma(x, y) *= Doubt(confirming, refuting);
+        continue;
+      }
       result.depth(x, y) = 0;
       result.inverse_depth_sigma(x, y) = 0;
     }

@@ -34,6 +34,28 @@ constexpr float kSpeckleStepPx = 1.0f;
 /// to them. On plaza 0.6 % more true pixels within 1 %, 0.2 % more outliers.
 constexpr float kSpeckleSupport = 1.5f;
 
+/// Log odds that a kept depth is wrong by more than 2 pixels of disparity, as a logistic regression
+/// on plaza gives them (exact cameras, 2.3 million pixels; ACCURACY.md): the views' photos differ,
+/// few of them have a minimum there, the minimum is flat.
+constexpr float kOddsOfWrong = -2.7f, kOddsPerCost = 3.6f, kOddsPerView = -0.44f;
+constexpr float kOddsPerLogSigma = 0.44f, kLeastSigmaPx = 0.02f;
+/// What a wrong depth adds to sigma, pixels of disparity. Wrong depths are wrong by tens of pixels;
+/// as much as that would make the right ones that look like them, which are more, too modest.
+constexpr float kWrongByPx = 5.0f;
+
+/// How likely the depth is wrong, from 0 to 1.
+float ProbabilityOfWrong(const Verdict& v) {
+  const float odds = kOddsOfWrong + kOddsPerCost * std::min(v.cost, 1.0f) +
+                     kOddsPerView * static_cast<float>(v.agreeing) +
+                     kOddsPerLogSigma * std::log(v.sigma * v.px + kLeastSigmaPx);
+  return 1 / (1 + std::exp(-odds));
+}
+
+/// Standard deviation of a depth that is exact to v.sigma unless it is wrong.
+float SigmaWithDoubt(const Verdict& v) {
+  return std::hypot(v.sigma, ProbabilityOfWrong(v) * kWrongByPx / v.px);
+}
+
 /// Makes holes of small connected areas. `consistent`: views whose planes lead to the pixel.
 void RemoveSpeckles(const Grid<float>& px_per_w, const Grid<std::uint8_t>& consistent, float near_z,
                     DepthEstimate* estimate) {
@@ -97,7 +119,7 @@ DepthEstimate TrustedDepth(const Level& level, const State& state, const StereoV
       const float inside = std::clamp(v.w, level.w_min, level.w_max);
       result.depth(x, y) = static_cast<float>(range.near_z / static_cast<double>(inside));
       result.inverse_depth_sigma(x, y) =
-          static_cast<float>(static_cast<double>(v.sigma) / range.near_z);
+          static_cast<float>(static_cast<double>(SigmaWithDoubt(v)) / range.near_z);
       px_per_w(x, y) = v.px;
       consistent(x, y) = static_cast<std::uint8_t>(v.consistent);
     }

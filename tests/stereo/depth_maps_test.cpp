@@ -271,5 +271,24 @@ TEST(FilterByConsistency, RemovesWhatNobodyElseSees) {
   EXPECT_FALSE(DepthImage::IsHole(kept.depth(5, 24)));
 }
 
+TEST(FilterByConsistency, DoubtsWhatItKeepsAlthoughAMapRefutesIt) {
+  const StereoView a{kCamera, Facing({0, 0, 0}), nullptr, nullptr};
+  const StereoView b{kCamera, Facing({0.4, 0, 0}), nullptr, nullptr};
+  const StereoView c{kCamera, Facing({0, 0.4, 0}), nullptr, nullptr};
+  DepthEstimate mine{DepthImage(64, 48), Grid<float>(64, 48, 1, 0.01f)};
+  for (float& z : mine.depth.grid().data()) z = kWallZ;
+  DepthEstimate same = mine, farther = mine, nearer = mine;
+  for (float& z : farther.depth.grid().data()) z = 2 * kWallZ;
+  for (float& z : nearer.depth.grid().data()) z = 0.5f * kWallZ;
+  const auto sigma = [&](const DepthEstimate& other) {
+    const OtherDepth others[] = {{&b, &same}, {&c, &other}};
+    return FilterByConsistency(a, mine, others, {.min_agreeing = 1, .tolerance_px = 1}, 2)
+        .inverse_depth_sigma(32, 24);
+  };
+  EXPECT_FLOAT_EQ(sigma(same), 0.01f);
+  EXPECT_FLOAT_EQ(sigma(nearer), 0.01f);                           // hides the point: says nothing
+  EXPECT_FLOAT_EQ(sigma(farther), 0.01f * std::exp(5.0f / 3.0f));  // one of two, and one to spare
+}
+
 }  // namespace
 }  // namespace dtr::stereo
