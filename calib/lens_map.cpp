@@ -78,59 +78,13 @@ double FirstPositiveRoot(const Polynomial& p) {
 
 }  // namespace
 
-LensMap::LensMap(const LensCamera& camera) {
-  camera.Check();
-  const PinholeCamera pinhole = camera.Pinhole();
-  fx_px_ = pinhole.fx_px();
-  fy_px_ = pinhole.fy_px();
-  cx_px_ = pinhole.cx_px();
-  cy_px_ = pinhole.cy_px();
-  const std::vector<double>& p = camera.params;
-  switch (camera.model) {
-    case LensModel::kSimplePinhole:
-    case LensModel::kPinhole:
-      break;
-    case LensModel::kSimpleRadialFisheye:
-      fisheye_ = true;
-      [[fallthrough]];
-    case LensModel::kSimpleRadial:
-      numerator_ = {p[3], 0, 0, 0};
-      break;
-    case LensModel::kRadialFisheye:
-      fisheye_ = true;
-      [[fallthrough]];
-    case LensModel::kRadial:
-      numerator_ = {p[3], p[4], 0, 0};
-      break;
-    case LensModel::kOpenCv:
-      numerator_ = {p[4], p[5], 0, 0};
-      p1_ = p[6];
-      p2_ = p[7];
-      break;
-    case LensModel::kOpenCvFisheye:
-      fisheye_ = true;
-      numerator_ = {p[4], p[5], p[6], p[7]};
-      break;
-    case LensModel::kFullOpenCv:
-      numerator_ = {p[4], p[5], p[8], 0};
-      p1_ = p[6];
-      p2_ = p[7];
-      denominator_ = {p[9], p[10], p[11]};
-      break;
-    case LensModel::kFov:
-      fov_ = p[4] != 0;  // the limit omega -> 0 is the pinhole camera
-      omega_ = std::abs(p[4]);
-      break;
-    case LensModel::kThinPrismFisheye:
-      fisheye_ = true;
-      numerator_ = {p[4], p[5], p[8], p[9]};
-      p1_ = p[6];
-      p2_ = p[7];
-      sx_ = p[10];
-      sy_ = p[11];
-      break;
+LensMap::LensMap(const LensCamera& camera)
+    : formula_((camera.Check(), FormulaOf(camera.model, camera.params.data()))) {
+  if (camera.model == LensModel::kFov) {
+    fov_ = camera.params[4] != 0;  // the limit omega -> 0 is the pinhole camera
+    omega_ = std::abs(camera.params[4]);
   }
-  decentred_ = p1_ != 0 || p2_ != 0 || sx_ != 0 || sy_ != 0;
+  decentred_ = formula_.p1 != 0 || formula_.p2 != 0 || formula_.sx != 0 || formula_.sy != 0;
   max_radius_ = FindMaxRadius();
 }
 
@@ -138,8 +92,9 @@ LensMap::LensMap(const LensCamera& camera) {
 // as D stays positive.
 double LensMap::FindMaxRadius() const {
   if (fov_) return omega_ < std::numbers::pi ? kInfinity : 0;
-  const Polynomial n{1, numerator_[0], numerator_[1], numerator_[2], numerator_[3]};
-  const Polynomial d{1, denominator_[0], denominator_[1], denominator_[2]};
+  const auto& k = formula_.numerator;
+  const Polynomial n{1, k[0], k[1], k[2], k[3]};
+  const Polynomial d{1, formula_.denominator[0], formula_.denominator[1], formula_.denominator[2]};
   const Polynomial two_s{0, 2};
   Polynomial slope = Product(two_s, Derivative(n));
   for (size_t i = 0; i < n.size(); ++i) slope[i] += n[i];
@@ -147,46 +102,36 @@ double LensMap::FindMaxRadius() const {
   const Polynomial minus = Product(two_s, Product(n, Derivative(d)));
   for (size_t i = 0; i < minus.size(); ++i) slope[i] -= minus[i];
   const double radius = std::sqrt(std::min(FirstPositiveRoot(slope), FirstPositiveRoot(d)));
-  return fisheye_ ? std::min(radius, std::numbers::pi) : radius;
+  return formula_.fisheye ? std::min(radius, std::numbers::pi) : radius;
 }
 
 LensMap::RadialValue LensMap::RadialFactor(double s) const {
-  const auto& k = numerator_;
-  const auto& d = denominator_;
-  const double n = 1 + s * (k[0] + s * (k[1] + s * (k[2] + s * k[3])));
+  const auto& k = formula_.numerator;
+  const auto& d = formula_.denominator;
   const double n_slope = k[0] + s * (2 * k[1] + s * (3 * k[2] + s * 4 * k[3]));
-  const double m = 1 + s * (d[0] + s * (d[1] + s * d[2]));
+  const double m = formula_.RadialDenominator(s);
   const double m_slope = d[0] + s * (2 * d[1] + s * 3 * d[2]);
-  const double factor = n / m;
+  const double factor = formula_.RadialNumerator(s) / m;
   return {factor, (n_slope - factor * m_slope) / m};
 }
 
 LensMap::Distorted LensMap::Distort(const Eigen::Vector2d& q) const {
-  const double x = q.x(), y = q.y(), s = q.squaredNorm();
-  const auto [factor, slope] = RadialFactor(s);
+  const double x = q.x(), y = q.y();
+  const double p1 = formula_.p1, p2 = formula_.p2;
+  const auto [factor, slope] = RadialFactor(q.squaredNorm());
   Distorted out;
-  out.point = {x * factor + 2 * p1_ * x * y + p2_ * (s + 2 * x * x) + sx_ * s,
-               y * factor + 2 * p2_ * x * y + p1_ * (s + 2 * y * y) + sy_ * s};
-  out.jacobian << factor + 2 * x * x * slope + 2 * p1_ * y + 6 * p2_ * x + 2 * sx_ * x,
-      2 * x * y * slope + 2 * p1_ * x + 2 * p2_ * y + 2 * sx_ * y,
-      2 * x * y * slope + 2 * p2_ * y + 2 * p1_ * x + 2 * sy_ * x,
-      factor + 2 * y * y * slope + 2 * p2_ * x + 6 * p1_ * y + 2 * sy_ * y;
+  formula_.Distort(q.data(), out.point.data());
+  out.jacobian << factor + 2 * x * x * slope + 2 * p1 * y + 6 * p2 * x + 2 * formula_.sx * x,
+      2 * x * y * slope + 2 * p1 * x + 2 * p2 * y + 2 * formula_.sx * y,
+      2 * x * y * slope + 2 * p2 * y + 2 * p1 * x + 2 * formula_.sy * x,
+      factor + 2 * y * y * slope + 2 * p2 * x + 6 * p1 * y + 2 * formula_.sy * y;
   return out;
 }
 
 std::optional<Eigen::Vector2d> LensMap::PlaneFromCam(const Eigen::Vector3d& p_in_cam) const {
-  if (!p_in_cam.allFinite()) return std::nullopt;
-  if (!fisheye_) {
-    if (!(p_in_cam.z() > 0)) return std::nullopt;
-    return Eigen::Vector2d(p_in_cam.x() / p_in_cam.z(), p_in_cam.y() / p_in_cam.z());
-  }
-  const double radius = std::hypot(p_in_cam.x(), p_in_cam.y());
-  if (radius == 0) {
-    if (!(p_in_cam.z() > 0)) return std::nullopt;
-    return Eigen::Vector2d::Zero();
-  }
-  const double angle = std::atan2(radius, p_in_cam.z());
-  return Eigen::Vector2d(p_in_cam.x() / radius * angle, p_in_cam.y() / radius * angle);
+  Eigen::Vector2d q;
+  if (!p_in_cam.allFinite() || !formula_.Plane(p_in_cam.data(), q.data())) return std::nullopt;
+  return q;
 }
 
 std::optional<Eigen::Vector2d> LensMap::PixelFromCam(const Eigen::Vector3d& p_in_cam) const {
@@ -207,7 +152,8 @@ std::optional<Eigen::Vector2d> LensMap::PixelFromCam(const Eigen::Vector3d& p_in
     distorted = d.point;
   }
   if (!distorted.allFinite()) return std::nullopt;
-  return Eigen::Vector2d(fx_px_ * distorted.x() + cx_px_, fy_px_ * distorted.y() + cy_px_);
+  return Eigen::Vector2d(formula_.fx_px * distorted.x() + formula_.cx_px,
+                         formula_.fy_px * distorted.y() + formula_.cy_px);
 }
 
 // Newton on r N / D - target inside a bracket that bisection shrinks whenever Newton leaves it.
@@ -283,9 +229,10 @@ std::optional<Eigen::Vector2d> LensMap::Undistort(const Eigen::Vector2d& distort
 
 std::optional<Eigen::Vector3d> LensMap::RayFromPixel(const Eigen::Vector2d& pixel) const {
   if (!pixel.allFinite()) return std::nullopt;
-  const auto q = Undistort({(pixel.x() - cx_px_) / fx_px_, (pixel.y() - cy_px_) / fy_px_});
+  const auto q = Undistort({(pixel.x() - formula_.cx_px) / formula_.fx_px,
+                            (pixel.y() - formula_.cy_px) / formula_.fy_px});
   if (!q) return std::nullopt;
-  if (!fisheye_) return Eigen::Vector3d(q->x(), q->y(), 1).normalized();
+  if (!formula_.fisheye) return Eigen::Vector3d(q->x(), q->y(), 1).normalized();
   const double angle = q->norm();
   if (angle == 0) return Eigen::Vector3d::UnitZ();
   const double sine = std::sin(angle);
