@@ -38,6 +38,7 @@ void AddCommand(CLI::App& app, const std::string& name, const std::string& descr
 void AddBuildCommand(CLI::App& app);
 void AddCaptureCommand(CLI::App& app);
 void AddCalibrateCommand(CLI::App& app);
+void AddCalibrateBoardCommand(CLI::App& calibrate);  ///< below `calibrate`
 void AddValidateCommand(CLI::App& app);
 void AddStereoCommand(CLI::App& app);
 void AddInfoCommand(CLI::App& app);

@@ -123,19 +123,24 @@ void WriteBinary(const fs::path& folder, const calib::SfmModel& model) {
 }
 
 // fmt's "{}" of a double is the shortest text that reads back to the same bits.
-void WriteText(const fs::path& folder, const calib::SfmModel& model) {
-  std::string cameras, images, points;
+std::string CamerasText(const std::map<std::uint32_t, calib::LensCamera>& all) {
+  std::string cameras;
   const auto add_camera = std::back_inserter(cameras);
   fmt::format_to(add_camera,
                  "# One camera per line: CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n"
                  "# Number of cameras: {}\n",
-                 model.cameras.size());
-  for (const auto& [id, camera] : model.cameras) {
+                 all.size());
+  for (const auto& [id, camera] : all) {
     fmt::format_to(add_camera, "{} {} {} {}", id, calib::NameOf(camera.model), camera.width_px,
                    camera.height_px);
     for (const double value : camera.params) fmt::format_to(add_camera, " {}", value);
     cameras.push_back('\n');
   }
+  return cameras;
+}
+
+void WriteText(const fs::path& folder, const calib::SfmModel& model) {
+  std::string images, points;
   const auto add_image = std::back_inserter(images);
   fmt::format_to(add_image,
                  "# Two lines per image: IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME,\n"
@@ -174,7 +179,7 @@ void WriteText(const fs::path& folder, const calib::SfmModel& model) {
     }
     points.push_back('\n');
   }
-  WriteFileAtomically(folder / "cameras.txt", cameras);
+  WriteFileAtomically(folder / "cameras.txt", CamerasText(model.cameras));
   WriteFileAtomically(folder / "images.txt", images);
   WriteFileAtomically(folder / "points3D.txt", points);
 }
@@ -221,6 +226,22 @@ void WriteModel(const fs::path& folder, const calib::SfmModel& model, Format for
   if (failure) throw Error(folder.string() + ": cannot be made: " + failure.message());
   RefuseOtherFiles(folder, format == Format::kBinary ? ".bin" : ".txt");
   format == Format::kBinary ? WriteBinary(folder, model) : WriteText(folder, model);
+}
+
+std::map<std::uint32_t, calib::LensCamera> ReadCamerasText(const fs::path& file) {
+  std::map<std::uint32_t, calib::LensCamera> cameras;
+  for (const RawModel::Camera& camera : ReadTextCameras(file)) {
+    if (!cameras.emplace(camera.id, camera.camera).second) {
+      throw Error(
+          fmt::format("{}: camera {}: expected one, found it twice", file.string(), camera.id));
+    }
+  }
+  return cameras;
+}
+
+void WriteCamerasText(const fs::path& file,
+                      const std::map<std::uint32_t, calib::LensCamera>& cameras) {
+  WriteFileAtomically(file, CamerasText(cameras));
 }
 
 }  // namespace dtr::colmap

@@ -1,6 +1,8 @@
 // calib/colmap/model_io.h -- COLMAP's sparse models on disk, binary and text.
 #pragma once
+#include <cstdint>
 #include <filesystem>
+#include <map>
 
 #include "calib/sfm_model.h"
 
@@ -24,5 +26,12 @@ calib::SfmModel ReadModel(const std::filesystem::path& folder);
 /// Throws Error on a model that ReadModel would refuse, when the folder holds files of a model in
 /// the other format, or when a file cannot be written.
 void WriteModel(const std::filesystem::path& folder, const calib::SfmModel& model, Format format);
+
+/// The cameras of a cameras.txt alone, by id. Throws Error as ReadModel does.
+std::map<std::uint32_t, calib::LensCamera> ReadCamerasText(const std::filesystem::path& file);
+
+/// Writes a cameras.txt. Doubles survive bit for bit.
+void WriteCamerasText(const std::filesystem::path& file,
+                      const std::map<std::uint32_t, calib::LensCamera>& cameras);
 
 }  // namespace dtr::colmap

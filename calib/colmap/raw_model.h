@@ -34,6 +34,7 @@ struct RawModel {
 /// Parsers of the two formats. They throw Error on malformed records and on values that cannot be.
 RawModel ReadBinaryModel(const std::filesystem::path& folder);
 RawModel ReadTextModel(const std::filesystem::path& folder);
+std::vector<RawModel::Camera> ReadTextCameras(const std::filesystem::path& file);
 
 /// Checks of a single record, shared by both formats. `where` starts the message ("file: camera
 /// 3").

@@ -143,30 +143,6 @@ class TextReader {
   std::optional<std::uint64_t> announced_;
 };
 
-void ReadCameras(RawModel& raw) {
-  TextReader in(raw.cameras_file);
-  while (auto line = in.NextRecord()) {
-    RawModel::Camera camera;
-    camera.id = line->Take<std::uint32_t>("a camera id");
-    const std::string name(line->TakeWord("a camera model"));
-    const auto model = calib::LensModelFromName(name);
-    if (!model) {
-      throw Error(
-          fmt::format("{}: expected a camera model SIMPLE_PINHOLE to THIN_PRISM_FISHEYE, "
-                      "found '{}'; undistort the images first (colmap image_undistorter)",
-                      line->where(), name));
-    }
-    const auto width_px = line->Take<std::uint64_t>("a width");
-    const auto height_px = line->Take<std::uint64_t>("a height");
-    std::vector<double> params;
-    while (!line->AtEnd()) params.push_back(line->Take<double>("a camera parameter"));
-    camera.camera = CheckedCamera(line->where(), static_cast<int>(*model), width_px, height_px,
-                                  std::move(params));
-    raw.cameras.push_back(std::move(camera));
-  }
-  in.ExpectAnnouncedCount();
-}
-
 std::uint64_t TakePointId(Fields& line) {
   const std::string_view word = line.TakeWord("a point id");
   if (word == "-1") return calib::SfmFeature::kNoPoint;
@@ -227,12 +203,38 @@ void ReadPoints(RawModel& raw) {
 
 }  // namespace
 
+std::vector<RawModel::Camera> ReadTextCameras(const std::filesystem::path& file) {
+  std::vector<RawModel::Camera> cameras;
+  TextReader in(file);
+  while (auto line = in.NextRecord()) {
+    RawModel::Camera camera;
+    camera.id = line->Take<std::uint32_t>("a camera id");
+    const std::string name(line->TakeWord("a camera model"));
+    const auto model = calib::LensModelFromName(name);
+    if (!model) {
+      throw Error(
+          fmt::format("{}: expected a camera model SIMPLE_PINHOLE to THIN_PRISM_FISHEYE, "
+                      "found '{}'; undistort the images first (colmap image_undistorter)",
+                      line->where(), name));
+    }
+    const auto width_px = line->Take<std::uint64_t>("a width");
+    const auto height_px = line->Take<std::uint64_t>("a height");
+    std::vector<double> params;
+    while (!line->AtEnd()) params.push_back(line->Take<double>("a camera parameter"));
+    camera.camera = CheckedCamera(line->where(), static_cast<int>(*model), width_px, height_px,
+                                  std::move(params));
+    cameras.push_back(std::move(camera));
+  }
+  in.ExpectAnnouncedCount();
+  return cameras;
+}
+
 RawModel ReadTextModel(const std::filesystem::path& folder) {
   RawModel raw;
   raw.cameras_file = folder / "cameras.txt";
   raw.images_file = folder / "images.txt";
   raw.points_file = folder / "points3D.txt";
-  ReadCameras(raw);
+  raw.cameras = ReadTextCameras(raw.cameras_file);
   ReadImages(raw);
   ReadPoints(raw);
   return raw;

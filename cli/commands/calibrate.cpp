@@ -54,6 +54,7 @@ int RunCalibratePhotos(const Options& options, const Context& context) {
 void AddCalibrateCommand(CLI::App& app) {
   CLI::App* calibrate = app.add_subcommand("calibrate", "Find cameras");
   calibrate->require_subcommand(1);
+  AddCalibrateBoardCommand(*calibrate);
   AddCommand(*calibrate, "photos", "Calibrate a folder of photos by structure from motion",
              "dtr calibrate photos photos/ -o calibration/", [](CLI::App& command) -> Action {
                auto options = std::make_shared<Options>();

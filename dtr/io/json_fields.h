@@ -1,4 +1,5 @@
-// dtr/io/json_fields.h -- internal to dtr/io: JSON read with errors that name the field.
+// dtr/io/json_fields.h -- for sources that read our JSON files: errors that name the field. Headers
+// of ours do not include it.
 #pragma once
 #include <Eigen/Core>
 #include <cstdint>

@@ -1,0 +1,65 @@
+// calib/files/calibration.h -- a calibration with everything it was made from.
+#pragma once
+#include <Eigen/Core>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calib/boards/board.h"
+#include "calib/boards/observations.h"
+#include "calib/models/board_model.h"
+#include "dtr/types/pose.h"
+
+namespace dtr::calib {
+
+/// A camera as a solve left it.
+struct CalibratedCamera {
+  std::string name;
+  BoardModel model = BoardModel::kPinhole;
+  LensCamera camera;
+  Eigen::MatrixXd covariance;       ///< of FreeParameterNames(model)
+  double rms_px = 0, sigma_px = 0;  ///< as BoardSolution has them
+};
+
+/// A view of the board: what was seen, and how the calibration explains it.
+struct CalibratedView {
+  BoardView seen;
+  size_t camera = 0;  ///< index into Calibration::cameras
+  Pose cam_from_board;
+  std::vector<int> outliers;  ///< rising ids of corners that were not used
+};
+
+/// A lens model that was tried.
+struct TriedModel {
+  BoardModel model = BoardModel::kPinhole;
+  bool chosen = false;
+  std::optional<double> held_out_rms_px;  ///< empty where it was refused
+  double low_px = 0, high_px = 0;         ///< interval of the difference to the best model's
+  std::string refused;                    ///< why; empty where it was not
+};
+
+struct Calibration {
+  Board board;
+  std::vector<CalibratedCamera> cameras;
+  std::vector<CalibratedView> views;
+  std::vector<LeftOut> left_out;
+  std::vector<TriedModel> models;  ///< of --model auto
+};
+
+/// Reads what WriteCalibration wrote (docs/CALIBRATION.md has the fields). Safe on any bytes: sizes
+/// are bounded, every number finite, ids inside the board, covariances symmetric with positive
+/// diagonals, poses rotations. Throws Error naming file and field.
+Calibration ReadCalibration(const std::filesystem::path& file);
+
+/// Writes a .json file, atomically. Doubles read back exactly.
+void WriteCalibration(const std::filesystem::path& file, const Calibration& calibration);
+
+/// The camera, views (name, RMS, corner count, outliers) and models as JSON for --json: the same
+/// field names, without the observations.
+std::string SummaryJson(const Calibration& calibration);
+
+/// Largest calibration file that is read: 100 000 views of 50 corners.
+inline constexpr std::uintmax_t kLargestCalibrationBytes = 256u << 20;
+
+}  // namespace dtr::calib

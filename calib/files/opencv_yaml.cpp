@@ -1,0 +1,231 @@
+#include "calib/files/opencv_yaml.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <charconv>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <string_view>
+
+#include "dtr/base/error.h"
+#include "dtr/base/files.h"
+
+namespace dtr::calib {
+namespace {
+
+constexpr double kCentreOffsetPx = 0.5;
+constexpr std::uintmax_t kLargestFileBytes = 16u << 20;  // OpenCV's samples write the points too
+constexpr int kLongestSidePx = 1'000'000;
+
+// What stands behind a key at the margin: the rest of its line and the indented lines below.
+using Fields = std::map<std::string, std::string>;
+
+std::string_view Trimmed(std::string_view text) {
+  const auto first = text.find_first_not_of(" \t\r");
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
+}
+
+// Top-level keys of a YAML file in the block style that FileStorage and ROS write.
+Fields FieldsOf(const std::string& text, const std::string& where) {
+  Fields fields;
+  std::string* open = nullptr;
+  for (size_t at = 0; at < text.size();) {
+    const size_t end = std::min(text.find('\n', at), text.size());
+    const std::string_view line(text.data() + at, end - at);
+    at = end + 1;
+    const std::string_view words = Trimmed(line);
+    if (words.empty() || words[0] == '#' || words[0] == '%' || words == "---" || words == "...") {
+      continue;
+    }
+    const bool at_margin = line[0] != ' ' && line[0] != '\t' && line[0] != '-';
+    const size_t colon = line.find(':');
+    if (at_margin && colon != std::string_view::npos) {
+      const std::string key(Trimmed(line.substr(0, colon)));
+      const auto [place, is_new] = fields.emplace(key, Trimmed(line.substr(colon + 1)));
+      if (!is_new) throw Error(where + ": the key '" + key + "' stands twice");
+      open = &place->second;
+    } else if (open != nullptr) {
+      *open += '\n';
+      *open += words;
+    } else {
+      throw Error(where + ": expected YAML with keys at the margin, found '" +
+                  std::string(words.substr(0, 40)) + "'");
+    }
+  }
+  return fields;
+}
+
+std::optional<double> NumberFrom(std::string_view word) {
+  word = Trimmed(word);
+  if (!word.empty() && word[0] == '+') word.remove_prefix(1);
+  double value = 0;
+  const auto [end, failure] = std::from_chars(word.data(), word.data() + word.size(), value);
+  // "3." is how FileStorage writes whole numbers; from_chars takes it.
+  if (failure != std::errc() || end != word.data() + word.size() || !std::isfinite(value))
+    return {};
+  return value;
+}
+
+const std::string& Field(const Fields& fields, const char* key, const std::string& where) {
+  const auto found = fields.find(key);
+  if (found == fields.end())
+    throw Error(fmt::format("{}: {}: expected it, found nothing", where, key));
+  return found->second;
+}
+
+// The numbers of a matrix's "data: [ ... ]".
+std::vector<double> MatrixData(const Fields& fields, const char* key, const std::string& where) {
+  const std::string& text = Field(fields, key, where);
+  const size_t data = text.find("data:");
+  const size_t open = data == std::string::npos ? data : text.find('[', data);
+  const size_t close = open == std::string::npos ? open : text.find(']', open);
+  if (close == std::string::npos) {
+    throw Error(fmt::format("{}: {}: expected a matrix with data: [ ... ], found '{}'", where, key,
+                            text.substr(0, 40)));
+  }
+  std::vector<double> values;
+  const std::string_view list(text.data() + open + 1, close - open - 1);
+  for (size_t at = 0; at <= list.size();) {
+    const size_t end = std::min(list.find(',', at), list.size());
+    std::string word(list.substr(at, end - at));
+    for (char& c : word) c = c == '\n' ? ' ' : c;
+    at = end + 1;
+    if (Trimmed(word).empty() && list.find_first_not_of(" \n\t\r") == std::string_view::npos) break;
+    const auto value = NumberFrom(word);
+    if (!value) {
+      throw Error(fmt::format("{}: {}: expected a finite number, found '{}'", where, key,
+                              std::string(Trimmed(word)).substr(0, 40)));
+    }
+    values.push_back(*value);
+  }
+  return values;
+}
+
+int SideFrom(const Fields& fields, const char* key, const std::string& where) {
+  const auto value = NumberFrom(Field(fields, key, where));
+  if (!value || *value != std::floor(*value) || *value < 1 || *value > kLongestSidePx) {
+    throw Error(fmt::format("{}: {}: expected a whole number of 1 to {}, found '{}'", where, key,
+                            kLongestSidePx, fields.at(key).substr(0, 40)));
+  }
+  return static_cast<int>(*value);
+}
+
+bool IsFisheye(const Fields& fields) {
+  const auto flag = fields.find("fisheye_model");
+  const auto model = fields.find("distortion_model");
+  const auto says = [](const std::string& text, const char* word) {
+    return text.find(word) != std::string::npos;
+  };
+  return (flag != fields.end() && NumberFrom(flag->second).value_or(0) != 0) ||
+         (model != fields.end() &&
+          (says(model->second, "equidistant") || says(model->second, "fisheye")));
+}
+
+// Coefficients in OpenCV's order, which is that of FULL_OPENCV: k1 k2 p1 p2 k3 k4 k5 k6.
+void AddCoefficients(std::vector<double> coefficients, bool fisheye, const std::string& where,
+                     LensCamera& camera) {
+  const size_t count = coefficients.size();
+  for (size_t i = 8; i < count; ++i) {
+    if (coefficients[i] != 0) {
+      throw Error(where +
+                  ": distortion_coefficients: expected no thin prism or tilted sensor, found "
+                  "such terms; calibrate without CALIB_THIN_PRISM_MODEL, CALIB_TILTED_MODEL");
+    }
+  }
+  const bool known = fisheye ? count == 4 : count <= 14 && count != 1 && count != 2 && count != 3;
+  if (!known) {
+    throw Error(fmt::format("{}: distortion_coefficients: expected {}, found {}", where,
+                            fisheye ? "4" : "0, 4, 5, 8, 12 or 14", count));
+  }
+  if (fisheye) {
+    camera.model = LensModel::kOpenCvFisheye;
+  } else if (count == 0) {
+    camera.model = LensModel::kPinhole;
+  } else {
+    camera.model = count == 4 ? LensModel::kOpenCv : LensModel::kFullOpenCv;
+    coefficients.resize(count == 4 ? 4 : 8, 0.0);
+  }
+  camera.params.insert(camera.params.end(), coefficients.begin(), coefficients.end());
+}
+
+std::vector<double> OpenCvCoefficients(const LensCamera& camera) {
+  const std::vector<double>& p = camera.params;
+  switch (camera.model) {
+    case LensModel::kSimplePinhole:
+    case LensModel::kPinhole:
+      return {0, 0, 0, 0};
+    case LensModel::kSimpleRadial:
+      return {p[3], 0, 0, 0};
+    case LensModel::kRadial:
+      return {p[3], p[4], 0, 0};
+    case LensModel::kSimpleRadialFisheye:
+      return {p[3], 0, 0, 0};
+    case LensModel::kRadialFisheye:
+      return {p[3], p[4], 0, 0};
+    case LensModel::kOpenCv:
+    case LensModel::kOpenCvFisheye:
+      return {p[4], p[5], p[6], p[7]};
+    case LensModel::kFullOpenCv: {
+      const bool rational = p[9] != 0 || p[10] != 0 || p[11] != 0;
+      return {p.begin() + 4, p.begin() + (rational ? 12 : 9)};
+    }
+    case LensModel::kFov:
+    case LensModel::kThinPrismFisheye:
+      break;
+  }
+  throw Error("OpenCV has no lens model " + NameOf(camera.model) + "; write a COLMAP cameras.txt");
+}
+
+bool IsFisheye(LensModel model) {
+  return model == LensModel::kOpenCvFisheye || model == LensModel::kSimpleRadialFisheye ||
+         model == LensModel::kRadialFisheye;
+}
+
+std::string Matrix(const char* key, int rows, const std::vector<double>& data) {
+  return fmt::format("{}: !!opencv-matrix\n   rows: {}\n   cols: {}\n   dt: d\n   data: [ {} ]\n",
+                     key, rows, data.size() / static_cast<size_t>(rows), fmt::join(data, ", "));
+}
+
+}  // namespace
+
+LensCamera ReadOpenCvYaml(const std::filesystem::path& file) {
+  const std::string where = file.string();
+  const Fields fields = FieldsOf(ReadFile(file, kLargestFileBytes), where);
+  LensCamera camera;
+  camera.width_px = SideFrom(fields, "image_width", where);
+  camera.height_px = SideFrom(fields, "image_height", where);
+  const std::vector<double> k = MatrixData(fields, "camera_matrix", where);
+  if (k.size() != 9 || k[1] != 0 || k[3] != 0 || k[6] != 0 || k[7] != 0 || k[8] != 1) {
+    throw Error(where +
+                ": camera_matrix: expected [fx, 0, cx, 0, fy, cy, 0, 0, 1]; skew is not "
+                "supported");
+  }
+  camera.params = {k[0], k[4], k[2] + kCentreOffsetPx, k[5] + kCentreOffsetPx};
+  AddCoefficients(MatrixData(fields, "distortion_coefficients", where), IsFisheye(fields), where,
+                  camera);
+  try {
+    camera.Check();
+  } catch (const std::invalid_argument& error) {
+    throw Error(where + ": camera_matrix: " + error.what());
+  }
+  return camera;
+}
+
+void WriteOpenCvYaml(const std::filesystem::path& file, const LensCamera& camera) {
+  const PinholeCamera k = camera.Pinhole();
+  const std::vector<double> coefficients = OpenCvCoefficients(camera);
+  std::string text =
+      "%YAML:1.0\n---\n# The centre of the first pixel is (0, 0), as OpenCV has it.\n";
+  text += fmt::format("image_width: {}\nimage_height: {}\n", camera.width_px, camera.height_px);
+  if (IsFisheye(camera.model)) text += "fisheye_model: 1\n";
+  text += Matrix("camera_matrix", 3,
+                 {k.fx_px(), 0, k.cx_px() - kCentreOffsetPx, 0, k.fy_px(),
+                  k.cy_px() - kCentreOffsetPx, 0, 0, 1});
+  text += Matrix("distortion_coefficients", static_cast<int>(coefficients.size()), coefficients);
+  WriteFileAtomically(file, text);
+}
+
+}  // namespace dtr::calib

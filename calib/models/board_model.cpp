@@ -1,0 +1,97 @@
+#include "calib/models/board_model.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+
+#include "calib/lens_map.h"
+
+namespace dtr::calib {
+namespace {
+
+struct ModelFacts {
+  BoardModel model;
+  const char* name;
+  LensModel lens;
+  int free_parameters;
+};
+
+constexpr std::array<ModelFacts, 5> kFacts{{
+    {BoardModel::kPinhole, "pinhole", LensModel::kPinhole, 4},
+    {BoardModel::kBrown4, "brown4", LensModel::kOpenCv, 8},
+    {BoardModel::kBrown5, "brown5", LensModel::kFullOpenCv, 9},
+    {BoardModel::kBrown8, "brown8", LensModel::kFullOpenCv, 12},
+    {BoardModel::kFisheye, "fisheye", LensModel::kOpenCvFisheye, 8},
+}};
+
+const ModelFacts& FactsOf(BoardModel model) {
+  for (const ModelFacts& facts : kFacts) {
+    if (facts.model == model) return facts;
+  }
+  throw std::invalid_argument("BoardModel: unknown value");
+}
+
+}  // namespace
+
+std::string NameOf(BoardModel model) { return FactsOf(model).name; }
+
+std::optional<BoardModel> BoardModelFromName(const std::string& name) {
+  for (const ModelFacts& facts : kFacts) {
+    if (name == facts.name) return facts.model;
+  }
+  return std::nullopt;
+}
+
+LensModel LensModelOf(BoardModel model) { return FactsOf(model).lens; }
+
+int FreeParameterCount(BoardModel model) { return FactsOf(model).free_parameters; }
+
+std::vector<std::string> FreeParameterNames(BoardModel model) {
+  static constexpr const char* kBrown[] = {"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"};
+  static constexpr const char* kFisheye[] = {"k1", "k2", "k3", "k4"};
+  std::vector<std::string> names{"fx_px", "fy_px", "cx_px", "cy_px"};
+  const char* const* coefficients = model == BoardModel::kFisheye ? kFisheye : kBrown;
+  for (int i = 4; i < FreeParameterCount(model); ++i) names.emplace_back(coefficients[i - 4]);
+  return names;
+}
+
+LensCamera CameraFrom(BoardModel model, int width_px, int height_px,
+                      std::span<const double> free_params) {
+  if (free_params.size() != static_cast<size_t>(FreeParameterCount(model))) {
+    throw std::invalid_argument("CameraFrom: " + NameOf(model) + " has " +
+                                std::to_string(FreeParameterCount(model)) + " parameters, found " +
+                                std::to_string(free_params.size()));
+  }
+  LensCamera camera{LensModelOf(model), width_px, height_px,
+                    std::vector<double>(free_params.begin(), free_params.end())};
+  camera.params.resize(static_cast<size_t>(ParameterCount(camera.model)), 0.0);
+  camera.Check();
+  return camera;
+}
+
+bool CoversImage(const LensCamera& camera) {
+  const LensMap lens(camera);
+  const double w = camera.width_px, h = camera.height_px;
+  std::vector<Eigen::Vector2d> places;
+  if (camera.model == LensModel::kOpenCvFisheye) {
+    const PinholeCamera k = camera.Pinhole();
+    const Eigen::Vector2d middle(k.cx_px(), k.cy_px());
+    const double radius = std::min({middle.x(), w - middle.x(), middle.y(), h - middle.y()});
+    for (int i = 0; i < 16; ++i) {
+      const double turn = i * std::numbers::pi / 8;
+      places.emplace_back(middle + radius * Eigen::Vector2d(std::cos(turn), std::sin(turn)));
+    }
+  } else {
+    // The farthest pixel is a corner; the middles of the sides are looked at for tangential terms
+    // that reach far.
+    for (const double x : {0.0, w / 2, w}) {
+      for (const double y : {0.0, h / 2, h}) places.emplace_back(x, y);
+    }
+  }
+  return std::all_of(places.begin(), places.end(),
+                     [&](const Eigen::Vector2d& pixel) { return lens.RayFromPixel(pixel); });
+}
+
+}  // namespace dtr::calib

@@ -1,0 +1,436 @@
+#include "calib/solve/board_solve.h"
+
+#include <fmt/format.h>
+
+#include <glog/logging.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "calib/models/lens_formula.h"
+#include "calib/solve/board_start.h"
+#include "calib/solve/reprojection.h"
+#include "dtr/base/error.h"
+
+namespace dtr::calib {
+namespace {
+
+constexpr size_t kFewestViews = 3;
+constexpr size_t kFewestCorners = 4;        // of a view: a pose has 6 unknowns, these 8 numbers
+constexpr double kLeastAgreeing = 1.0 / 3;  // of a view's corners; else its pose is a guess
+constexpr double kLeastTiltDeg = 3;         // between two boards: below, they count as parallel
+constexpr double kLargestFocalError = 0.1;  // relative; above, the solution is of no use
+constexpr double kCauchySigmas = 3;         // scale of the robust loss
+constexpr double kSmallestSigmaPx = 1e-7;   // exact corners are no reason to call rounding outliers
+constexpr double kSameScale = 0.05;         // relative change at which the robust loss is settled
+constexpr int kMostRobustPasses = 6, kMostOutlierPasses = 10;
+
+using Used = std::vector<std::vector<bool>>;  // per view, per corner
+
+// What is being solved: the views in it, the camera and poses so far.
+struct State {
+  std::vector<const BoardView*> views;
+  std::vector<Pose> cam_from_board;
+  LensCamera camera;
+  Used used;
+};
+
+[[noreturn]] void Refuse(const std::string& what) { throw Error("calibration: " + what); }
+
+std::vector<std::vector<double>> Lengths(const Board& board, const State& state) {
+  std::vector<std::vector<double>> lengths;
+  for (size_t i = 0; i < state.views.size(); ++i) {
+    lengths.push_back(
+        ResidualLengths(board, *state.views[i], state.camera, state.cam_from_board[i]));
+  }
+  return lengths;
+}
+
+double SigmaOfUsed(const std::vector<std::vector<double>>& lengths, const Used& used) {
+  std::vector<double> all;
+  for (size_t i = 0; i < lengths.size(); ++i) {
+    for (size_t j = 0; j < lengths[i].size(); ++j) {
+      if (used[i][j]) all.push_back(lengths[i][j]);
+    }
+  }
+  if (all.empty()) Refuse("expected corners that a camera explains, found none");
+  return std::max(RobustSigma(std::move(all)), kSmallestSigmaPx);
+}
+
+// Corners nearer than `limit_px` to their predictions.
+Used Within(const std::vector<std::vector<double>>& lengths, double limit_px) {
+  Used used;
+  for (const auto& view : lengths) {
+    used.emplace_back();
+    for (const double length : view) used.back().push_back(length < limit_px);
+  }
+  return used;
+}
+
+// Largest |q| of a used corner: how far out the lens is seen.
+double LargestRadius(const Board& board, const State& state) {
+  const auto lens = FormulaOf(state.camera.model, state.camera.params.data());
+  double largest = 1e-3;
+  for (size_t i = 0; i < state.views.size(); ++i) {
+    for (size_t j = 0; j < state.used[i].size(); ++j) {
+      const Eigen::Vector3d p =
+          state.cam_from_board[i] * board.Corner(state.views[i]->corners[j].id);
+      Eigen::Vector2d q;
+      if (state.used[i][j] && lens.Plane(p.data(), q.data())) largest = std::max(largest, q.norm());
+    }
+  }
+  return largest;
+}
+
+ceres::Solver::Options SolverOptions() {
+  // Ceres tells stderr of every step that fails; the next one is shorter, and the end is judged
+  // here.
+  FLAGS_minloglevel = google::GLOG_ERROR;
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::DENSE_SCHUR;
+  options.num_threads = 1;  // sums in one order: the same bits every time
+  options.max_num_iterations = 200;
+  options.function_tolerance = 1e-12;
+  options.parameter_tolerance = 1e-10;
+  options.gradient_tolerance = 1e-12;
+  options.logging_type = ceres::SILENT;
+  return options;
+}
+
+// Least squares over the used corners from where the state is; Cauchy's loss where a scale is
+// given.
+void Minimise(const Board& board, BoardModel model, std::optional<double> cauchy_px, State& state) {
+  const Eigen::Vector3d pivot = MiddleOf(board);
+  const LensCoordinates lens = CoordinatesAround(model, state.camera, LargestRadius(board, state));
+  std::vector<PoseCoordinates> poses;
+  for (const Pose& pose : state.cam_from_board) poses.push_back(CoordinatesAround(pose, pivot));
+  std::array<double, kMostLensParameters> theta{};
+  std::vector<std::array<double, 6>> motions(poses.size(), std::array<double, 6>{});
+  ceres::Solver::Options options = SolverOptions();
+  options.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+  ceres::Problem problem;
+  for (size_t i = 0; i < poses.size(); ++i) {
+    for (size_t j = 0; j < state.used[i].size(); ++j) {
+      if (!state.used[i][j]) continue;
+      const BoardCorner& corner = state.views[i]->corners[j];
+      problem.AddResidualBlock(
+          ReprojectionCost(lens, poses[i], board.Corner(corner.id) - pivot, corner.pixel).release(),
+          cauchy_px ? new ceres::CauchyLoss(*cauchy_px) : nullptr, theta.data(), motions[i].data());
+    }
+    if (problem.HasParameterBlock(motions[i].data())) {
+      options.linear_solver_ordering->AddElementToGroup(motions[i].data(), 0);
+    }
+  }
+  options.linear_solver_ordering->AddElementToGroup(theta.data(), 1);
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &problem, &summary);
+  if (!summary.IsSolutionUsable()) Refuse("the corners have no least-squares solution");
+  std::vector<double> params;
+  for (int k = 0; k < FreeParameterCount(model); ++k) {
+    const auto i = static_cast<size_t>(k);
+    params.push_back(lens.centre[i] + lens.scale[i] * theta[i]);
+  }
+  try {
+    state.camera = CameraFrom(model, state.camera.width_px, state.camera.height_px, params);
+  } catch (const std::invalid_argument&) {
+    Refuse(
+        fmt::format("no camera of the model {} explains the corners; take views of the board "
+                    "from more directions",
+                    NameOf(model)));
+  }
+  for (size_t i = 0; i < poses.size(); ++i) {
+    state.cam_from_board[i] = PoseAt(poses[i], motions[i].data(), pivot);
+  }
+}
+
+double SumOfSquares(const std::vector<double>& lengths, const std::vector<bool>& used) {
+  double sum = 0;
+  for (size_t j = 0; j < lengths.size(); ++j) sum += used[j] ? lengths[j] * lengths[j] : 0;
+  return sum;
+}
+
+// A plane can be seen in two poses that differ little. Which is right is clear only when the lens
+// is known, so views are looked at once more. Returns true when a pose was exchanged.
+bool RepairPoses(const Board& board, State& state) {
+  bool repaired = false;
+  for (size_t i = 0; i < state.views.size(); ++i) {
+    const auto other = PoseOfBoard(board, *state.views[i], state.camera);
+    if (!other) continue;
+    const auto& used = state.used[i];
+    const auto now = ResidualLengths(board, *state.views[i], state.camera, state.cam_from_board[i]);
+    const auto then = ResidualLengths(board, *state.views[i], state.camera, *other);
+    if (SumOfSquares(then, used) < SumOfSquares(now, used)) {
+      state.cam_from_board[i] = *other;
+      repaired = true;
+    }
+  }
+  return repaired;
+}
+
+void TakeOutView(size_t index, const std::string& reason, State& state,
+                 std::vector<LeftOut>& left_out) {
+  const auto at = static_cast<long>(index);
+  left_out.push_back({state.views[index]->name, reason});
+  state.views.erase(state.views.begin() + at);
+  state.cam_from_board.erase(state.cam_from_board.begin() + at);
+  state.used.erase(state.used.begin() + at);
+}
+
+void TakeOutDisagreeing(State& state, std::vector<LeftOut>& left_out) {
+  for (size_t i = state.views.size(); i-- > 0;) {
+    const auto& used = state.used[i];
+    const auto agreeing = static_cast<size_t>(std::count(used.begin(), used.end(), true));
+    if (agreeing >= kFewestCorners &&
+        static_cast<double>(agreeing) >= kLeastAgreeing * static_cast<double>(used.size())) {
+      continue;
+    }
+    TakeOutView(i,
+                fmt::format("only {} of {} corners lie where a flat board can have them", agreeing,
+                            used.size()),
+                state, left_out);
+  }
+  if (state.views.size() < kFewestViews) {
+    Refuse(fmt::format("expected at least {} images that one camera explains, found {}",
+                       kFewestViews, state.views.size()));
+  }
+}
+
+void SolveRobustly(const Board& board, BoardModel model, double outlier_sigmas, State& state,
+                   std::vector<LeftOut>& left_out) {
+  state.used = Within(Lengths(board, state), std::numeric_limits<double>::infinity());
+  double scale = kCauchySigmas * SigmaOfUsed(Lengths(board, state), state.used);
+  for (int pass = 0; pass < kMostRobustPasses; ++pass) {
+    Minimise(board, model, scale, state);
+    const bool repaired = RepairPoses(board, state);
+    const double next = kCauchySigmas * SigmaOfUsed(Lengths(board, state), state.used);
+    const bool settled = std::abs(next - scale) < kSameScale * scale;
+    scale = next;
+    if (settled && !repaired) break;
+  }
+  state.used = Within(Lengths(board, state), outlier_sigmas * scale / kCauchySigmas);
+  TakeOutDisagreeing(state, left_out);
+  for (int pass = 0; pass < kMostOutlierPasses; ++pass) {
+    Minimise(board, model, {}, state);
+    const auto lengths = Lengths(board, state);
+    Used used = Within(lengths, outlier_sigmas * SigmaOfUsed(lengths, state.used));
+    if (used == state.used) break;
+    state.used = std::move(used);
+    TakeOutDisagreeing(state, left_out);
+  }
+}
+
+void SolveQuadratically(const Board& board, BoardModel model, State& state) {
+  state.used = Within(Lengths(board, state), std::numeric_limits<double>::infinity());
+  Minimise(board, model, {}, state);
+  // Corners that the start could not draw count now.
+  state.used = Within(Lengths(board, state), std::numeric_limits<double>::infinity());
+  for (const auto& used : state.used) {
+    if (std::count(used.begin(), used.end(), false) > 0) {
+      Refuse(
+          "with a quadratic loss every corner counts, and some have no place in the image; "
+          "leave the loss robust");
+    }
+  }
+  RepairPoses(board, state);
+  Minimise(board, model, {}, state);
+}
+
+void RefuseParallelBoards(const State& state) {
+  double least_cosine = 1;
+  const auto normal = [&](size_t i) -> Eigen::Vector3d {
+    return state.cam_from_board[i].rotation * Eigen::Vector3d::UnitZ();
+  };
+  for (size_t i = 0; i < state.views.size(); ++i) {
+    for (size_t j = 0; j < i; ++j) {
+      least_cosine = std::min(least_cosine, std::abs(normal(i).dot(normal(j))));
+    }
+  }
+  const double tilt_deg = std::acos(std::min(1.0, least_cosine)) * 180 / std::numbers::pi;
+  if (tilt_deg < kLeastTiltDeg) {
+    Refuse(
+        fmt::format("parallel boards: expected boards tilted against each other by at least {} "
+                    "degrees, found {:.2f}; focal length and distance cannot be told apart; "
+                    "tilt the board by 20 to 45 degrees, to different sides",
+                    kLeastTiltDeg, tilt_deg));
+  }
+}
+
+// Residuals' derivatives by natural lens parameters and by motions, over all used corners.
+ArrowInformation InformationOf(const Board& board, BoardModel model, const State& state) {
+  const int parameters = FreeParameterCount(model);
+  const Eigen::Vector3d pivot = MiddleOf(board);
+  LensCoordinates lens = CoordinatesAround(model, state.camera, 1);
+  lens.scale.fill(1);
+  ArrowInformation information(parameters);
+  const std::array<double, kMostLensParameters> theta{};
+  const std::array<double, 6> motion{};
+  const double* blocks[] = {theta.data(), motion.data()};
+  for (size_t i = 0; i < state.views.size(); ++i) {
+    const PoseCoordinates pose = CoordinatesAround(state.cam_from_board[i], pivot);
+    const auto rows = 2 * std::count(state.used[i].begin(), state.used[i].end(), true);
+    Eigen::MatrixXd by_lens(rows, parameters), by_pose(rows, 6);
+    long row = 0;
+    for (size_t j = 0; j < state.used[i].size(); ++j) {
+      if (!state.used[i][j]) continue;
+      const BoardCorner& corner = state.views[i]->corners[j];
+      const auto cost = ReprojectionCost(lens, pose, board.Corner(corner.id) - pivot, corner.pixel);
+      Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor> lens_rows(2, parameters);
+      Eigen::Matrix<double, 2, 6, Eigen::RowMajor> pose_rows;
+      Eigen::Vector2d residual;
+      double* jacobians[] = {lens_rows.data(), pose_rows.data()};
+      if (!cost->Evaluate(blocks, residual.data(), jacobians)) Refuse("a corner left the lens");
+      by_lens.middleRows<2>(row) = lens_rows;
+      by_pose.middleRows<2>(row) = pose_rows;
+      row += 2;
+    }
+    information.AddPose(by_lens, by_pose);
+  }
+  return information;
+}
+
+void InvertOrRefuse(BoardModel model, ArrowInformation& information) {
+  if (information.Invert()) return;
+  std::string which = "a pose of the board";
+  if (information.weakest().size() > 0) {
+    long index = 0;
+    information.weakest().cwiseAbs().maxCoeff(&index);
+    which = FreeParameterNames(model)[static_cast<size_t>(index)];
+  }
+  Refuse(
+      fmt::format("the corners do not determine {} of the model {}; take more views, tilted and "
+                  "into the corners of the image, or choose a model with fewer coefficients",
+                  which, NameOf(model)));
+}
+
+void RefuseUseless(const BoardSolution& solution, bool cover_image) {
+  const double error = std::sqrt(std::max(solution.covariance(0, 0), solution.covariance(1, 1)));
+  const double focal = std::min(solution.camera.params[0], solution.camera.params[1]);
+  if (!(error < kLargestFocalError * focal)) {
+    Refuse(
+        fmt::format("the focal length is not determined, {:.4g} px +- {:.2g}: the boards are too "
+                    "parallel to each other, too few or too far away; fill the image and tilt "
+                    "them by 20 to 45 degrees, to different sides",
+                    focal, error));
+  }
+  if (cover_image && !CoversImage(solution.camera)) {
+    Refuse(
+        fmt::format("the distortion of the model {} turns back before the corner of the image; "
+                    "show the board near the corners, or choose fewer coefficients",
+                    NameOf(solution.model)));
+  }
+}
+
+void Describe(const Board& board, const State& state, BoardSolution& solution) {
+  const auto lengths = Lengths(board, state);
+  double sum = 0;
+  for (size_t i = 0; i < state.views.size(); ++i) {
+    SolvedView view{state.views[i]->name, state.cam_from_board[i], {}, 0};
+    const double squares = SumOfSquares(lengths[i], state.used[i]);
+    const auto count = std::count(state.used[i].begin(), state.used[i].end(), true);
+    for (size_t j = 0; j < state.used[i].size(); ++j) {
+      if (!state.used[i][j]) view.outliers.push_back(state.views[i]->corners[j].id);
+    }
+    view.rms_px = std::sqrt(squares / static_cast<double>(count));
+    solution.corners += static_cast<int>(count);
+    solution.outliers += static_cast<int>(view.outliers.size());
+    solution.views.push_back(std::move(view));
+    sum += squares;
+  }
+  const auto unknowns = static_cast<double>(FreeParameterCount(solution.model)) +
+                        6.0 * static_cast<double>(state.views.size());
+  const double freedom = 2.0 * solution.corners - unknowns;
+  if (!(freedom > 0)) {
+    Refuse(fmt::format("expected more corners than half of {} unknowns, found {}; take more views",
+                       unknowns, solution.corners));
+  }
+  solution.rms_px = std::sqrt(sum / solution.corners);
+  solution.sigma_px = std::sqrt(sum / freedom);
+}
+
+State StateFrom(const Board& board, std::span<const BoardView> views, int width_px, int height_px,
+                BoardModel model, std::vector<LeftOut>& left_out) {
+  const BoardStart start = StartBoard(board, views, width_px, height_px, model);
+  State state;
+  state.camera = start.camera;
+  for (size_t i = 0; i < views.size(); ++i) {
+    if (start.cam_from_board[i]) {
+      state.views.push_back(&views[i]);
+      state.cam_from_board.push_back(*start.cam_from_board[i]);
+    } else {
+      left_out.push_back({views[i].name, "no pose of a flat board explains its corners"});
+    }
+  }
+  return state;
+}
+
+}  // namespace
+
+bool Holds(std::span<const int> ids, int id) {
+  return std::binary_search(ids.begin(), ids.end(), id);
+}
+
+Eigen::Vector3d MiddleOf(const Board& board) {
+  return 0.5 * (board.Corner(0) + board.Corner(board.CornerCount() - 1));
+}
+
+std::vector<double> BoardSolution::FreeParameters() const {
+  return {camera.params.begin(), camera.params.begin() + FreeParameterCount(model)};
+}
+
+BoardSolution SolveBoard(const Board& board, std::span<const BoardView> views, int width_px,
+                         int height_px, BoardModel model, const SolveOptions& options) {
+  if (views.size() < kFewestViews) {
+    Refuse(fmt::format("expected at least {} images with the board, found {}", kFewestViews,
+                       views.size()));
+  }
+  BoardSolution solution;
+  solution.model = model;
+  State state = StateFrom(board, views, width_px, height_px, model, solution.left_out);
+  if (options.loss == Loss::kRobust) {
+    SolveRobustly(board, model, options.outlier_sigmas, state, solution.left_out);
+  } else {
+    SolveQuadratically(board, model, state);
+  }
+  RefuseParallelBoards(state);
+  solution.camera = state.camera;
+  Describe(board, state, solution);
+  solution.information = InformationOf(board, model, state);
+  InvertOrRefuse(model, solution.information);
+  solution.covariance =
+      solution.sigma_px * solution.sigma_px * solution.information.lens_covariance();
+  RefuseUseless(solution, options.cover_image);
+  return solution;
+}
+
+std::optional<Pose> SolvePose(const Board& board, const BoardView& view, const LensCamera& camera,
+                              std::span<const int> ignored) {
+  if (camera.model == LensModel::kFov) {
+    throw Error("calibration: a pose cannot be solved with the lens model FOV; use another one");
+  }
+  const auto start = PoseOfBoard(board, view, camera);
+  if (!start) return std::nullopt;
+  const Eigen::Vector3d pivot = MiddleOf(board);
+  const PoseCoordinates pose = CoordinatesAround(*start, pivot);
+  const auto lengths = ResidualLengths(board, view, camera, *start);
+  std::array<double, 6> motion{};
+  ceres::Problem problem;
+  for (size_t j = 0; j < view.corners.size(); ++j) {
+    const BoardCorner& corner = view.corners[j];
+    if (Holds(ignored, corner.id) || !std::isfinite(lengths[j])) continue;
+    problem.AddResidualBlock(
+        PoseCost(camera, pose, board.Corner(corner.id) - pivot, corner.pixel).release(), nullptr,
+        motion.data());
+  }
+  if (problem.NumResidualBlocks() < static_cast<int>(kFewestCorners)) return std::nullopt;
+  ceres::Solver::Options options = SolverOptions();
+  options.linear_solver_type = ceres::DENSE_QR;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &problem, &summary);
+  if (!summary.IsSolutionUsable()) return std::nullopt;
+  return PoseAt(pose, motion.data(), pivot);
+}
+
+}  // namespace dtr::calib

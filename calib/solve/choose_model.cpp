@@ -1,0 +1,209 @@
+#include "calib/solve/choose_model.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <map>
+#include <set>
+
+#include "calib/solve/board_start.h"
+#include "dtr/base/error.h"
+#include "dtr/base/parallel_for.h"
+#include "dtr/base/random.h"
+
+namespace dtr::calib {
+namespace {
+
+constexpr size_t kFewestViews = 5;  // 4 to solve from, 1 to hold out
+
+// Sum of squared residual lengths over a view's corners, and their number.
+struct ViewError {
+  double squares = 0;
+  int corners = 0;
+};
+
+double Rms(std::span<const ViewError> errors, std::span<const size_t> picked) {
+  double squares = 0;
+  int corners = 0;
+  for (const size_t i : picked) {
+    squares += errors[i].squares;
+    corners += errors[i].corners;
+  }
+  return std::sqrt(squares / std::max(1, corners));
+}
+
+// Ids of corners per view that no solution uses: not the lens is to blame for them.
+std::map<std::string, std::vector<int>> DisbelievedByAll(std::span<const ModelScore> scores,
+                                                         std::span<const BoardView> views) {
+  std::map<std::string, std::vector<int>> disbelieved;
+  for (const BoardView& view : views) {
+    std::set<int> left;
+    for (const BoardCorner& corner : view.corners) left.insert(corner.id);
+    for (const ModelScore& score : scores) {
+      if (!score.solution) continue;
+      const auto& solved = score.solution->views;
+      const auto found = std::find_if(solved.begin(), solved.end(),
+                                      [&](const SolvedView& s) { return s.name == view.name; });
+      if (found == solved.end()) continue;
+      for (const BoardCorner& corner : view.corners) {
+        if (!Holds(found->outliers, corner.id)) left.erase(corner.id);
+      }
+    }
+    disbelieved[view.name].assign(left.begin(), left.end());
+  }
+  return disbelieved;
+}
+
+ViewError HeldOutError(const Board& board, const BoardView& view, const LensCamera& camera,
+                       std::span<const int> ignored) {
+  const auto pose = SolvePose(board, view, camera, ignored);
+  if (!pose) throw Error(view.name + ": held out, no pose explains its corners");
+  const auto lengths = ResidualLengths(board, view, camera, *pose);
+  ViewError error;
+  for (size_t j = 0; j < lengths.size(); ++j) {
+    if (Holds(ignored, view.corners[j].id)) continue;
+    if (!std::isfinite(lengths[j])) throw Error(view.name + ": held out, a corner has no pixel");
+    error.squares += lengths[j] * lengths[j];
+    ++error.corners;
+  }
+  return error;
+}
+
+// Errors per view of one fold, by the camera that the other folds give.
+std::vector<std::pair<size_t, ViewError>> FoldErrors(
+    const Board& board, std::span<const BoardView> views, const BoardSolution& whole, size_t fold,
+    size_t folds, const SolveOptions& options,
+    const std::map<std::string, std::vector<int>>& disbelieved) {
+  std::vector<BoardView> training;
+  for (size_t i = 0; i < views.size(); ++i) {
+    if (i % folds != fold) training.push_back(views[i]);
+  }
+  // Started from scratch: the solution of all views has seen what is held out. It only has to
+  // explain boards; whether the image is covered was asked of the whole.
+  SolveOptions training_options = options;
+  training_options.cover_image = false;
+  const LensCamera camera = SolveBoard(board, training, whole.camera.width_px,
+                                       whole.camera.height_px, whole.model, training_options)
+                                .camera;
+  std::vector<std::pair<size_t, ViewError>> errors;
+  for (size_t i = fold; i < views.size(); i += folds) {
+    const auto& ignored = disbelieved.at(views[i].name);
+    if (ignored.size() + 4 > views[i].corners.size()) continue;
+    errors.emplace_back(i, HeldOutError(board, views[i], camera, ignored));
+  }
+  return errors;
+}
+
+std::vector<ModelScore> SolveAll(const Board& board, std::span<const BoardView> views, int width_px,
+                                 int height_px, const ChoiceOptions& options) {
+  std::vector<ModelScore> scores(std::size(kBoardModels));
+  ParallelFor(0, static_cast<int>(scores.size()), options.threads, [&](int m) {
+    ModelScore& score = scores[static_cast<size_t>(m)];
+    score.model = kBoardModels[m];
+    score.coefficients = FreeParameterCount(score.model);
+    try {
+      score.solution = SolveBoard(board, views, width_px, height_px, score.model, options.solve);
+    } catch (const Error& error) {
+      score.refused = error.what();
+    }
+  });
+  return scores;
+}
+
+using ErrorsByModel = std::vector<std::vector<ViewError>>;
+
+ErrorsByModel HoldOut(const Board& board, std::span<const BoardView> views,
+                      const ChoiceOptions& options, std::vector<ModelScore>& scores) {
+  const auto disbelieved = DisbelievedByAll(scores, views);
+  const size_t folds = std::min(views.size(), static_cast<size_t>(std::max(2, options.folds)));
+  ErrorsByModel errors(scores.size(), std::vector<ViewError>(views.size()));
+  std::vector<std::string> refused(scores.size() * folds);
+  ParallelFor(0, static_cast<int>(refused.size()), options.threads, [&](int task) {
+    const auto at = static_cast<size_t>(task);
+    const size_t m = at / folds, fold = at % folds;
+    if (!scores[m].solution) return;
+    try {
+      for (const auto& [i, error] :
+           FoldErrors(board, views, *scores[m].solution, fold, folds, options.solve, disbelieved)) {
+        errors[m][i] = error;
+      }
+    } catch (const Error& error) {
+      refused[at] = error.what();
+    }
+  });
+  for (size_t at = 0; at < refused.size(); ++at) {
+    ModelScore& score = scores[at / folds];
+    if (!refused[at].empty() && score.refused.empty()) {
+      score.refused = fmt::format("without a part of the views: {}", refused[at]);
+    }
+  }
+  return errors;
+}
+
+// Percentile interval of RMS(model) - RMS(best) over resampled views.
+void Bootstrap(const ErrorsByModel& errors, size_t best, const ChoiceOptions& options,
+               std::vector<ModelScore>& scores) {
+  const size_t views = errors[best].size();
+  std::vector<std::vector<double>> differences(scores.size());
+  Random random(HashOf(options.seed, 0xb007));
+  for (int k = 0; k < options.resamples; ++k) {
+    std::vector<size_t> picked(views);
+    for (size_t& i : picked) i = static_cast<size_t>(random.Index(static_cast<int>(views)));
+    const double of_best = Rms(errors[best], picked);
+    for (size_t m = 0; m < scores.size(); ++m) {
+      if (scores[m].refused.empty()) {
+        differences[m].push_back(Rms(errors[m], picked) - of_best);
+      }
+    }
+  }
+  const double tail = 0.5 * (1 - options.confidence);
+  for (size_t m = 0; m < scores.size(); ++m) {
+    auto& d = differences[m];
+    if (d.empty()) continue;
+    std::sort(d.begin(), d.end());
+    const auto last = static_cast<double>(d.size() - 1);
+    scores[m].low_px = d[static_cast<size_t>(tail * last)];
+    scores[m].high_px = d[static_cast<size_t>((1 - tail) * last)];
+  }
+}
+
+}  // namespace
+
+ModelChoice ChooseModel(const Board& board, std::span<const BoardView> views, int width_px,
+                        int height_px, const ChoiceOptions& options) {
+  if (views.size() < kFewestViews) {
+    throw Error(
+        fmt::format("--model auto: expected at least {} images with the board to hold some "
+                    "out, found {}; take more, or name a model",
+                    kFewestViews, views.size()));
+  }
+  ModelChoice choice;
+  choice.scores = SolveAll(board, views, width_px, height_px, options);
+  const ErrorsByModel errors = HoldOut(board, views, options, choice.scores);
+  std::vector<size_t> all(views.size());
+  for (size_t i = 0; i < all.size(); ++i) all[i] = i;
+  std::vector<size_t> counting;
+  for (size_t m = 0; m < choice.scores.size(); ++m) {
+    if (!choice.scores[m].refused.empty()) continue;
+    choice.scores[m].held_out_rms_px = Rms(errors[m], all);
+    counting.push_back(m);
+  }
+  if (counting.empty()) throw Error(choice.scores.front().refused);
+  const auto by_error = [&](size_t a, size_t b) {
+    return choice.scores[a].held_out_rms_px < choice.scores[b].held_out_rms_px;
+  };
+  choice.best = *std::min_element(counting.begin(), counting.end(), by_error);
+  Bootstrap(errors, choice.best, options, choice.scores);
+  choice.chosen = choice.best;
+  for (const size_t m : counting) {
+    const ModelScore &score = choice.scores[m], &chosen = choice.scores[choice.chosen];
+    const bool fewer = score.coefficients < chosen.coefficients ||
+                       (score.coefficients == chosen.coefficients && by_error(m, choice.chosen));
+    if (score.low_px <= 0 && fewer) choice.chosen = m;
+  }
+  return choice;
+}
+
+}  // namespace dtr::calib

@@ -1,0 +1,49 @@
+// calib/solve/choose_model.h -- the lens model that unseen views call for.
+#pragma once
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "calib/solve/board_solve.h"
+
+namespace dtr::calib {
+
+struct ChoiceOptions {
+  SolveOptions solve;
+  int folds = 10;            ///< at most; never more than there are views
+  int resamples = 2000;      ///< of the bootstrap
+  double confidence = 0.95;  ///< of its intervals
+  std::uint64_t seed = 0;
+  int threads = 0;  ///< 0: all cores; the result is the same for any number
+};
+
+/// How a model did on views that its solution had not seen.
+struct ModelScore {
+  BoardModel model = BoardModel::kPinhole;
+  int coefficients = 0;                   ///< FreeParameterCount
+  std::optional<BoardSolution> solution;  ///< of all views; empty when the model was refused
+  double held_out_rms_px = 0;
+  /// Interval of (its held-out RMS - the best model's); both zero for the best one.
+  double low_px = 0, high_px = 0;
+  std::string refused;  ///< why the model does not count; empty when it does
+};
+
+struct ModelChoice {
+  std::vector<ModelScore> scores;  ///< in the order of kBoardModels
+  size_t best = 0;                 ///< least held-out RMS
+  size_t chosen = 0;
+};
+
+/// Held-out error: the views are dealt to `folds` groups in turn; each group is predicted by a
+/// camera solved from all the others, its poses alone fitted (SolvePose). Corners that no model's
+/// solution of all views uses are left out for every model. The best model is the one with the
+/// least held-out RMS. A model with fewer coefficients is as good when the bootstrap interval of
+/// the difference of their RMS (views drawn with replacement, the same for both; Efron & Tibshirani
+/// 1993) reaches zero. Chosen is, of those, the one with the fewest coefficients, and of equal ones
+/// that with the smaller error. Throws Error when there are fewer than 5 views, or no model holds.
+ModelChoice ChooseModel(const Board& board, std::span<const BoardView> views, int width_px,
+                        int height_px, const ChoiceOptions& options = {});
+
+}  // namespace dtr::calib

@@ -1,0 +1,53 @@
+// calib/solve/reprojection.h -- internal to calib/solve: one corner's residual, for Ceres.
+#pragma once
+#include <ceres/ceres.h>
+
+#include <Eigen/Core>
+#include <array>
+#include <memory>
+
+#include "calib/models/board_model.h"
+#include "dtr/types/pose.h"
+
+namespace dtr::calib {
+
+/// Lens parameters as the solver sees them: params = centre + scale * theta, theta near zero and of
+/// order one whatever the unit. The scales are such that one unit of any theta moves the pixels at
+/// the edge of what was seen by about as much.
+struct LensCoordinates {
+  BoardModel model = BoardModel::kPinhole;
+  std::array<double, kMostLensParameters> centre{}, scale{};
+};
+
+/// Coordinates around `camera` for corners drawn at up to `largest_radius` on the plane of
+/// LensFormula.
+LensCoordinates CoordinatesAround(BoardModel model, const LensCamera& camera,
+                                  double largest_radius);
+
+/// A board's pose as the solver sees it: six numbers (w, v) that stand for
+///   p_in_cam = exp(w) R (p_in_board - pivot) + translation + scale * v,
+/// a rotation w about the pivot, in radians and along the camera's axes, and a shift v.
+struct PoseCoordinates {
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();  ///< of the pivot in the camera frame
+  double scale = 1;
+};
+
+PoseCoordinates CoordinatesAround(const Pose& cam_from_board, const Eigen::Vector3d& pivot);
+/// The pose at the coordinates (w, v).
+Pose PoseAt(const PoseCoordinates& coordinates, const double motion[6],
+            const Eigen::Vector3d& pivot);
+
+/// Predicted minus observed pixel of a corner; parameter blocks theta and (w, v). Fails where the
+/// corner has no pixel. `lens`, `pose` are borrowed. `corner` is p_in_board - pivot.
+std::unique_ptr<ceres::CostFunction> ReprojectionCost(const LensCoordinates& lens,
+                                                      const PoseCoordinates& pose,
+                                                      const Eigen::Vector3d& corner,
+                                                      const Eigen::Vector2d& observed_px);
+
+/// The same with the lens as given, of any model but kFov; parameter block (w, v) alone.
+std::unique_ptr<ceres::CostFunction> PoseCost(const LensCamera& camera, const PoseCoordinates& pose,
+                                              const Eigen::Vector3d& corner,
+                                              const Eigen::Vector2d& observed_px);
+
+}  // namespace dtr::calib

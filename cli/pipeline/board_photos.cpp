@@ -1,0 +1,120 @@
+#include "cli/pipeline/board_photos.h"
+
+#include <fmt/format.h>
+#include <fnmatch.h>
+
+#include <algorithm>
+#include <atomic>
+#include <map>
+
+#include "calib/boards/repeats.h"
+#include "capture/ingest.h"
+#include "dtr/base/error.h"
+#include "dtr/base/parallel_for.h"
+#include "dtr/io/image_io.h"
+
+namespace dtr::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<std::string> MatchingNames(const fs::path& folder, const std::string& pattern) {
+  if (!fs::is_directory(folder)) {
+    throw UsageError(fmt::format("{}: expected a folder of photos of a board, found {}",
+                                 folder.string(),
+                                 fs::exists(folder) ? "something else" : "nothing"));
+  }
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with('.') && entry.is_regular_file() &&
+        capture::IsImageExtension(entry.path().extension().string()) &&
+        fnmatch(pattern.c_str(), name.c_str(), 0) == 0) {
+      names.push_back(name);
+    }
+  }
+  if (names.empty()) {
+    throw UsageError(
+        fmt::format("{}: expected photos matching '{}', found none", folder.string(), pattern));
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+struct Looked {
+  int width_px = 0, height_px = 0;  // 0: no image
+  calib::Detection found;
+};
+
+Looked LookAt(const fs::path& file, const calib::Board& board,
+              const calib::DetectOptions& options) {
+  Looked looked;
+  try {
+    const ImageRgb8 image = io::ReadImage(file);
+    looked.found = calib::DetectBoard(calib::GreyOf(image), board, options);
+    looked.width_px = image.width();
+    looked.height_px = image.height();
+  } catch (const Error& error) {
+    looked.found.reason = error.what();
+  }
+  return looked;
+}
+
+// The size most photos have; of equally frequent ones the larger.
+std::pair<int, int> UsualSize(const std::vector<Looked>& all) {
+  std::map<std::pair<int, int>, int> counts;
+  for (const Looked& looked : all) {
+    if (!looked.found.corners.empty()) ++counts[{looked.width_px, looked.height_px}];
+  }
+  std::pair<int, int> usual;
+  int most = 0;
+  for (const auto& [size, count] : counts) {
+    if (count >= most) {
+      usual = size;
+      most = count;
+    }
+  }
+  return usual;
+}
+
+}  // namespace
+
+BoardPhotos ReadBoardPhotos(const fs::path& folder, const std::string& pattern,
+                            const calib::Board& board, const calib::DetectOptions& options,
+                            int threads, Progress& progress) {
+  const std::vector<std::string> names = MatchingNames(folder, pattern);
+  std::vector<Looked> all(names.size());
+  progress.Stage("looking for the board", static_cast<int>(names.size()));
+  std::atomic<int> done = 0;
+  ParallelFor(0, static_cast<int>(names.size()), threads, [&](int i) {
+    if (progress.StopRequested()) throw Interrupted("interrupted; nothing was written");
+    const auto at = static_cast<size_t>(i);
+    all[at] = LookAt(folder / names[at], board, options);
+    progress.Update(++done);
+  });
+  BoardPhotos photos;
+  std::tie(photos.width_px, photos.height_px) = UsualSize(all);
+  for (size_t i = 0; i < names.size(); ++i) {
+    if (all[i].found.corners.empty()) {
+      photos.left_out.push_back({names[i], all[i].found.reason});
+    } else if (all[i].width_px != photos.width_px || all[i].height_px != photos.height_px) {
+      photos.left_out.push_back(
+          {names[i],
+           fmt::format("expected {} x {} px as most photos have, found {} x {}", photos.width_px,
+                       photos.height_px, all[i].width_px, all[i].height_px)});
+    } else {
+      photos.views.push_back({names[i], all[i].found.corners, all[i].found.noise_px});
+    }
+  }
+  if (photos.views.empty()) {
+    throw Error(fmt::format(
+        "{}: expected photos of a {}, found it in none of {}; the first says: {}", folder.string(),
+        calib::TextOf(board), names.size(), photos.left_out.front().reason));
+  }
+  auto repeats =
+      calib::TakeOutRepeats(calib::NearestViewsPx(photos.width_px, photos.height_px), photos.views);
+  photos.left_out.insert(photos.left_out.end(), repeats.begin(), repeats.end());
+  return photos;
+}
+
+}  // namespace dtr::pipeline

@@ -1,0 +1,29 @@
+// cli/pipeline/board_photos.h -- a folder of photos of a board becomes views of it.
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "calib/boards/board.h"
+#include "calib/boards/detect.h"
+#include "dtr/base/progress.h"
+
+namespace dtr::pipeline {
+
+struct BoardPhotos {
+  int width_px = 0, height_px = 0;
+  std::vector<calib::BoardView> views;   ///< in byte order of names
+  std::vector<calib::LeftOut> left_out;  ///< photos without a usable board, of another size, or
+                                         ///< that repeat another one (calib/boards/repeats.h)
+};
+
+/// Looks for the board in the photos of `folder` whose names match `pattern` (a shell pattern as
+/// left*.jpg). Pixels are taken as stored: EXIF orientation would turn some photos of a camera and
+/// not others. The size is that of the most photos. The result is the same for any number of
+/// threads. Throws UsageError when the folder does not exist or nothing matches, Error when no
+/// photo shows the board.
+BoardPhotos ReadBoardPhotos(const std::filesystem::path& folder, const std::string& pattern,
+                            const calib::Board& board, const calib::DetectOptions& options,
+                            int threads, Progress& progress);
+
+}  // namespace dtr::pipeline

@@ -1,0 +1,245 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <opencv2/calib3d.hpp>
+
+#include "calib/colmap/model_io.h"
+#include "calib/files/calibration.h"
+#include "calib/files/opencv_yaml.h"
+#include "calib/lens_map.h"
+#include "dtr/base/error.h"
+#include "dtr/base/files.h"
+#include "tests/calib/solve/synthetic_views.h"
+#include "tests/support/test_data.h"
+#include "tests/support/truncation.h"
+
+namespace dtr::calib {
+namespace {
+
+using testing::ExactViews;
+using testing::kBoard;
+using testing::TypicalCamera;
+constexpr double kSamePixelPx = 1e-9;  // the same formula in double; half a pixel is 5e8 of it
+
+Calibration Example(BoardModel model) {
+  const LensCamera camera = TypicalCamera(model);
+  const auto exact = ExactViews(camera, 3, 4);
+  Calibration calibration;
+  calibration.board = kBoard;
+  const int n = FreeParameterCount(model);
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Constant(n, n, 1.0 / 3);
+  covariance.diagonal().array() += 1.0 / 7;
+  calibration.cameras.push_back({"left", model, camera, covariance, 0.187, 0.13});
+  for (size_t i = 0; i < exact.views.size(); ++i) {
+    calibration.views.push_back({exact.views[i], 0, exact.cam_from_board[i], {3, 8}});
+  }
+  calibration.views[0].seen.noise_px = std::nan("");
+  calibration.left_out.push_back({"blurred.jpg", "expected the whole board"});
+  calibration.models.push_back({model, true, 0.2, -0.01, 0.02, ""});
+  calibration.models.push_back({BoardModel::kBrown8, false, {}, 0, 0, "turns back"});
+  return calibration;
+}
+
+TEST(CalibrationFile, EverythingSurvivesWritingAndReading) {
+  const dtr::testing::TemporaryFolder folder;
+  for (const BoardModel model : kBoardModels) {
+    const Calibration written = Example(model);
+    WriteCalibration(folder / "calib.json", written);
+    const Calibration read = ReadCalibration(folder / "calib.json");
+    EXPECT_EQ(read.board, written.board);
+    ASSERT_EQ(read.cameras.size(), 1u);
+    EXPECT_EQ(read.cameras[0].name, "left");
+    EXPECT_EQ(read.cameras[0].model, model);
+    EXPECT_EQ(read.cameras[0].camera.params, written.cameras[0].camera.params);
+    EXPECT_EQ(read.cameras[0].covariance, written.cameras[0].covariance);
+    EXPECT_EQ(read.cameras[0].sigma_px, 0.13);
+    ASSERT_EQ(read.views.size(), 3u);
+    EXPECT_TRUE(std::isnan(read.views[0].seen.noise_px));
+    for (size_t i = 0; i < read.views.size(); ++i) {
+      EXPECT_EQ(read.views[i].outliers, written.views[i].outliers);
+      EXPECT_LT(
+          (read.views[i].cam_from_board.translation - written.views[i].cam_from_board.translation)
+              .norm(),
+          1e-15);
+      EXPECT_LT(read.views[i].cam_from_board.rotation.angularDistance(
+                    written.views[i].cam_from_board.rotation),
+                1e-14);
+      ASSERT_EQ(read.views[i].seen.corners.size(), 54u);
+      EXPECT_EQ(read.views[i].seen.corners[7].pixel, written.views[i].seen.corners[7].pixel);
+    }
+    EXPECT_EQ(read.left_out[0].reason, "expected the whole board");
+    EXPECT_EQ(read.models[0].held_out_rms_px, 0.2);
+    EXPECT_EQ(read.models[1].refused, "turns back");
+    EXPECT_FALSE(read.models[1].held_out_rms_px);
+  }
+}
+
+TEST(CalibrationFile, EveryPrefixIsAnError) {
+  const dtr::testing::TemporaryFolder folder;
+  WriteCalibration(folder / "calib.json", Example(BoardModel::kBrown4));
+  // The file ends in "}\n": the line break alone may go.
+  const std::string whole = ReadFile(folder / "calib.json", 1 << 20);
+  WriteFileAtomically(folder / "calib.json", whole.substr(0, whole.size() - 1));
+  dtr::testing::ExpectEveryPrefixIsAnError(folder / "calib.json", 97,
+                                           [&] { ReadCalibration(folder / "calib.json"); });
+}
+
+TEST(CalibrationFile, WrongFieldsAreNamed) {
+  const dtr::testing::TemporaryFolder folder;
+  const auto file = folder / "calib.json";
+  WriteCalibration(file, Example(BoardModel::kBrown4));
+  const std::string good = ReadFile(file, 1 << 20);
+  const std::tuple<const char*, const char*, const char*> spoiled[] = {
+      {"\"dtr-calibration\"", "\"other\"", "format"},
+      {"\"version\": 1", "\"version\": 2", "version"},
+      {"chessboard:9x6", "chessboard:9x99999", "board"},
+      {"\"brown4\"", "\"brown6\"", "model"},
+      {"\"fx_px\": ", "\"fx_px\": -", "focal"},
+      {"\"width_px\": 640", "\"width_px\": 2000000000", "width_px"},
+      {"\"sigma_px\": 0.13", "\"sigma_px\": 0", "sigma_px"},
+      {"[0.476", "[-0.476", "covariance"},
+      {"\"camera\": 0", "\"camera\": 7", "camera"},
+      {"[0, ", "[54, ", "corners"},
+      {"[1, ", "[0, ", "corners"},
+      {"\"outliers\": [3, 8]", "\"outliers\": [8, 3]", "outliers"},
+      {"\"outliers\": [3, 8]", "\"outliers\": [3, 800]", "outliers"},
+      {"\"outliers\": [3, 8]", "\"outliers\": 5", "outliers"}};
+  for (const auto& [from, to, named] : spoiled) {
+    const size_t at = good.find(from);
+    ASSERT_NE(at, std::string::npos) << from;
+    std::string bad = good;
+    WriteFileAtomically(file, bad.replace(at, std::string(from).size(), to));
+    try {
+      ReadCalibration(file);
+      ADD_FAILURE() << "read: " << to;
+    } catch (const Error& error) {
+      EXPECT_THAT(error.what(), ::testing::HasSubstr(named)) << to;
+    }
+  }
+}
+
+// Points in front of the camera, some far off the axis.
+std::vector<cv::Point3d> Points() {
+  std::vector<cv::Point3d> points;
+  for (double x = -0.5; x <= 0.5; x += 0.25) {
+    for (double y = -0.4; y <= 0.4; y += 0.2) points.emplace_back(x, y, 1.0);
+  }
+  return points;
+}
+
+TEST(OpenCvYaml, OpenCvReadsItAndProjectsToTheSamePixels) {
+  const dtr::testing::TemporaryFolder folder;
+  for (const BoardModel model : kBoardModels) {
+    const LensCamera camera = TypicalCamera(model);
+    WriteOpenCvYaml(folder / "camera.yml", camera);
+    cv::FileStorage storage((folder / "camera.yml").string(), cv::FileStorage::READ);
+    cv::Mat k, distortion;
+    storage["camera_matrix"] >> k;
+    storage["distortion_coefficients"] >> distortion;
+    ASSERT_EQ(static_cast<int>(storage["image_width"]), 640);
+    const auto points = Points();
+    std::vector<cv::Point2d> pixels;
+    const cv::Vec3d zero(0, 0, 0);
+    if (model == BoardModel::kFisheye) {
+      ASSERT_EQ(static_cast<int>(storage["fisheye_model"]), 1);
+      cv::fisheye::projectPoints(points, pixels, zero, zero, k, distortion);
+    } else {
+      cv::projectPoints(points, zero, zero, k, distortion, pixels);
+    }
+    for (size_t i = 0; i < points.size(); ++i) {
+      const auto ours = camera.PixelFromCam({points[i].x, points[i].y, points[i].z});
+      ASSERT_TRUE(ours);
+      // OpenCV has the centre of the first pixel at (0, 0), we at (0.5, 0.5).
+      EXPECT_NEAR(pixels[i].x + 0.5, ours->x(), kSamePixelPx) << NameOf(model);
+      EXPECT_NEAR(pixels[i].y + 0.5, ours->y(), kSamePixelPx) << NameOf(model);
+    }
+  }
+}
+
+TEST(OpenCvYaml, WhatOpenCvWritesIsReadToTheSamePixels) {
+  const dtr::testing::TemporaryFolder folder;
+  const std::string file = (folder / "camera.yml").string();
+  const cv::Matx33d k(530, 0, 321.5, 0, 532, 235.5, 0, 0, 1);
+  for (const int count : {4, 5, 8, 14}) {
+    cv::Mat distortion = cv::Mat::zeros(1, count, CV_64F);
+    const double values[] = {-0.28, 0.08, 1e-3, -5e-4, 0.03, 0.01, 0.02, 0.003};
+    for (int i = 0; i < std::min(count, 8); ++i) distortion.at<double>(i) = values[i];
+    {
+      cv::FileStorage storage(file, cv::FileStorage::WRITE);
+      storage << "calibration_time"
+              << "Sat 21 Nov 2026 10:00:00"
+              << "nframes" << 13 << "image_width" << 640 << "image_height" << 480 << "camera_matrix"
+              << cv::Mat(k) << "distortion_coefficients" << distortion << "avg_reprojection_error"
+              << 0.19;
+    }
+    const LensCamera camera = ReadOpenCvYaml(file);
+    const auto points = Points();
+    std::vector<cv::Point2d> pixels;
+    const cv::Vec3d zero(0, 0, 0);
+    cv::projectPoints(points, zero, zero, k, distortion, pixels);
+    for (size_t i = 0; i < points.size(); ++i) {
+      const auto ours = camera.PixelFromCam({points[i].x, points[i].y, points[i].z});
+      ASSERT_TRUE(ours);
+      EXPECT_NEAR(pixels[i].x + 0.5, ours->x(), kSamePixelPx) << count;
+      EXPECT_NEAR(pixels[i].y + 0.5, ours->y(), kSamePixelPx) << count;
+    }
+  }
+}
+
+TEST(OpenCvYaml, RosFilesAreRead) {
+  const dtr::testing::TemporaryFolder folder;
+  WriteFileAtomically(folder / "ros.yaml",
+                      "image_width: 640\nimage_height: 480\ncamera_name: left\n"
+                      "camera_matrix:\n  rows: 3\n  cols: 3\n"
+                      "  data: [530., 0, 321.5, 0, 532, 235.5,\n         0, 0, 1]\n"
+                      "distortion_model: equidistant\n"
+                      "distortion_coefficients:\n  rows: 1\n  cols: 4\n  data: [0.1, 0, 0, 0]\n");
+  const LensCamera camera = ReadOpenCvYaml(folder / "ros.yaml");
+  EXPECT_EQ(camera.model, LensModel::kOpenCvFisheye);
+  EXPECT_EQ(camera.params, (std::vector<double>{530, 532, 322, 236, 0.1, 0, 0, 0}));
+}
+
+TEST(OpenCvYaml, WhatIsNoCameraIsAnError) {
+  const dtr::testing::TemporaryFolder folder;
+  const auto file = folder / "camera.yml";
+  WriteOpenCvYaml(file, TypicalCamera(BoardModel::kBrown5));
+  const std::string good = ReadFile(file, 1 << 16);
+  // Whole but for blanks after the last bracket.
+  WriteFileAtomically(file, good.substr(0, good.rfind(']') + 1));
+  dtr::testing::ExpectEveryPrefixIsAnError(file, 1, [&] { ReadOpenCvYaml(file); });
+  const std::pair<const char*, const char*> spoiled[] = {{"image_width: 640", "image_width: 0"},
+                                                         {"image_width: 640", "image_width: 1e300"},
+                                                         {"[ 530", "[ -530"},
+                                                         {"[ 530, 0", "[ 530, 0.1"},
+                                                         {"[ 530", "[ nan"},
+                                                         {"[ -0.28", "[ -0.28, 1e999"},
+                                                         {"camera_matrix", "matrix"},
+                                                         {"[ -0.28, 0.08", "[ -0.28, , 0.08"}};
+  for (const auto& [from, to] : spoiled) {
+    std::string bad = good;
+    const size_t at = bad.find(from);
+    ASSERT_NE(at, std::string::npos) << from;
+    WriteFileAtomically(file, bad.replace(at, std::string(from).size(), to));
+    EXPECT_THROW(ReadOpenCvYaml(file), Error) << to;
+  }
+}
+
+TEST(ColmapCameras, SurviveWritingAndReading) {
+  const dtr::testing::TemporaryFolder folder;
+  std::map<std::uint32_t, LensCamera> cameras;
+  for (const BoardModel model : kBoardModels) {
+    cameras.emplace(static_cast<std::uint32_t>(cameras.size() + 1), TypicalCamera(model));
+  }
+  colmap::WriteCamerasText(folder / "cameras.txt", cameras);
+  const auto read = colmap::ReadCamerasText(folder / "cameras.txt");
+  ASSERT_EQ(read.size(), cameras.size());
+  for (const auto& [id, camera] : cameras) {
+    EXPECT_EQ(read.at(id).model, camera.model);
+    EXPECT_EQ(read.at(id).params, camera.params);
+    // COLMAP counts from the outer corner of the first pixel as we do: no shift.
+    EXPECT_EQ(read.at(id).params[2], camera.params[2]);
+  }
+}
+
+}  // namespace
+}  // namespace dtr::calib
