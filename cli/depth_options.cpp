@@ -22,6 +22,11 @@ void AddDepthOptions(CLI::App& command, const std::vector<std::string>& engines,
         ->type_name("N");
   };
   command
+      .add_option("--memory", choice.memory_gb,
+                  "Memory to stay within; without it 4, or what the largest view needs")
+      ->check(CLI::Range(0.001, 4096.0))
+      ->type_name("GB");
+  command
       .add_option("--workspace", choice.workspace,
                   "A dense workspace of this set for --engine colmap; without it COLMAP is run, "
                   "which needs CUDA")

@@ -1,6 +1,7 @@
 #include "stereo/depth_maps.h"
 
 #include <algorithm>
+#include <limits>
 #include <optional>
 #include <string>
 
@@ -22,7 +23,11 @@ class Run {
         neighbours_(ChooseNeighbours(views, scene, options.neighbours)),
         ranges_(options.given_ranges.empty() ? DepthRangesFromPoints(views, scene, options.range)
                                              : options.given_ranges),
-        raw_(views.size()),
+        pages_(options.memory_bytes > 0 ? options.memory_bytes
+                                        : std::numeric_limits<std::uint64_t>::max()),
+        planes_(options.planes != nullptr ? *options.planes : planes_in_memory_, pages_, views),
+        estimates_(options.estimates != nullptr ? *options.estimates : estimates_in_memory_, pages_,
+                   views),
         waiting_(views.size(), 0) {
     if (ranges_.size() != views.size()) {
       throw UsageError("depth ranges: expected one per view (" + std::to_string(views.size()) +
@@ -34,12 +39,13 @@ class Run {
                const std::function<void(int, DepthEstimate&&, const DepthRange&)>& on_view) {
     const std::vector<int> wanted = Wanted(already_done);
     const std::vector<int> needed = Needed(wanted);
-    if (engine_.Rounds() > 0) RunRounds(Together(), needed, Planes(), progress_);
+    CheckMemory(needed);
+    if (engine_.Rounds() > 0) RunRounds(Together(), needed, planes_, progress_);
     progress_.Stage("depth", static_cast<int>(needed.size()));
     // A view's pairs fill so many threads; with more, several views run side by side.
     const int threads = ResolveThreads(options_.engine.threads);
     const int side_by_side =
-        engine_.Rounds() > 0 ? 1 : std::max(1, threads / std::max(1, options_.neighbours.count));
+        Alone() ? 1 : std::max(1, threads / std::max(1, options_.neighbours.count));
     size_t done = 0, next_wanted = 0;
     while (done < needed.size()) {
       progress_.ThrowIfInterrupted();
@@ -56,11 +62,27 @@ class Run {
   }
 
  private:
+  /// One view at a time: stores and pages belong to one thread, and a limit is for one view.
+  bool Alone() const {
+    return engine_.Rounds() > 0 || options_.memory_bytes > 0 || options_.load_pixels != nullptr;
+  }
   bool Filters() const { return options_.consistency.min_agreeing > 0; }
   const std::vector<int>& NeighboursOf(int view) const {
     return neighbours_[static_cast<size_t>(view)].views;
   }
-  std::optional<DepthEstimate>& Raw(int view) { return raw_[static_cast<size_t>(view)]; }
+
+  void CheckMemory(const std::vector<int>& needed) const {
+    if (options_.memory_bytes == 0) return;
+    std::uint64_t least = 0;
+    for (const int v : needed) {
+      least = std::max(least, LeastBytes(views_, engine_, v, NeighboursOf(v),
+                                         static_cast<bool>(options_.load_pixels), Filters()));
+    }
+    if (least <= options_.memory_bytes) return;
+    throw NotEnoughMemory("depth maps: expected memory of at least " + std::to_string(least) +
+                              " bytes, found " + std::to_string(options_.memory_bytes),
+                          least);
+  }
 
   std::vector<int> Wanted(const std::function<bool(int)>& already_done) const {
     std::vector<int> wanted;
@@ -89,14 +111,17 @@ class Run {
     engine_options.threads = std::max(1, threads_each);
     engine_options.memory_gb /= static_cast<double>(batch.size());
     const int at_once = static_cast<int>(batch.size());
+    std::vector<std::optional<DepthEstimate>> estimates(batch.size());
     ParallelFor(0, at_once, at_once, [&](int i) {
-      const int view = batch[static_cast<size_t>(i)];
-      Raw(view) = EstimateOne(view, engine_options);
+      const auto k = static_cast<size_t>(i);
+      estimates[k] = EstimateOne(batch[k], engine_options);
     });
+    for (size_t k = 0; k < batch.size(); ++k) estimates_.Save(batch[k], std::move(*estimates[k]));
   }
 
-  Collection Together() const { return {views_, neighbours_, ranges_, &engine_, options_.engine}; }
-  PlaneMapStore& Planes() { return options_.planes != nullptr ? *options_.planes : in_memory_; }
+  Collection Together() {
+    return {views_, neighbours_, ranges_, &engine_, options_.engine, options_.load_pixels, &pages_};
+  }
 
   DepthEstimate EstimateOne(int view, const EngineOptions& engine_options) {
     const PinholeCamera& camera = views_[static_cast<size_t>(view)].camera;
@@ -105,19 +130,21 @@ class Run {
                            Grid<float>(camera.width_px(), camera.height_px())};
     };
     if (engine_.Rounds() > 0) {
-      // Stores belong to one thread; batches of engines with rounds are of one view.
-      const PlanesAround around(Together(), Planes(), engine_.Rounds(), view);
+      const PlanesAround around(Together(), planes_, engine_.Rounds(), view);
       if (!around.HasOwn()) return holes();
-      return engine_.Judge(views_, view, NeighboursOf(view), ranges_[static_cast<size_t>(view)],
-                           around.maps(), engine_options);
+      const Room room(Together(), view);
+      return engine_.Judge(room.views(), view, NeighboursOf(view),
+                           ranges_[static_cast<size_t>(view)], around.maps(), engine_options);
     }
     if (NeighboursOf(view).empty()) {
       progress_.Note("view " + std::to_string(view) + ": no neighbours, no depth");
       return holes();
     }
     try {
-      return engine_.Estimate(views_, view, NeighboursOf(view), ranges_[static_cast<size_t>(view)],
-                              engine_options);
+      std::optional<Room> room;
+      if (Alone()) room.emplace(Together(), view);
+      return engine_.Estimate(room ? room->views() : views_, view, NeighboursOf(view),
+                              ranges_[static_cast<size_t>(view)], engine_options);
     } catch (const NoUsablePair& error) {
       progress_.Note(std::string(error.what()) + ": no depth");
       return holes();
@@ -125,25 +152,31 @@ class Run {
   }
 
   bool Ready(int view) {
-    if (!Raw(view)) return false;
+    if (!estimates_.Has(view)) return false;
     return !Filters() || std::all_of(NeighboursOf(view).begin(), NeighboursOf(view).end(),
-                                     [&](int n) { return Raw(n).has_value(); });
+                                     [&](int n) { return estimates_.Has(n); });
   }
 
   DepthEstimate Final(int view) {
-    if (!Filters()) return *Raw(view);
+    const std::shared_ptr<const DepthEstimate> own = estimates_.Load(view);
+    if (!Filters()) return *own;
+    std::vector<std::shared_ptr<const DepthEstimate>> held;
     std::vector<OtherDepth> others;
     for (const int n : NeighboursOf(view)) {
-      others.push_back({&views_[static_cast<size_t>(n)], &*Raw(n)});
+      held.push_back(estimates_.Load(n));
+      others.push_back({&views_[static_cast<size_t>(n)], held.back().get()});
     }
-    return FilterByConsistency(views_[static_cast<size_t>(view)], *Raw(view), others,
+    // What makes room here also leaves it for writing the result.
+    const Pages::Reservation result(
+        pages_, kResultCopies * EstimateBytes(views_[static_cast<size_t>(view)].camera));
+    return FilterByConsistency(views_[static_cast<size_t>(view)], *own, others,
                                options_.consistency, options_.engine.threads);
   }
 
   /// Drops raw maps nobody waits for any more.
   void Release(int view) {
     const auto drop = [&](int v) {
-      if (--waiting_[static_cast<size_t>(v)] == 0) Raw(v).reset();
+      if (--waiting_[static_cast<size_t>(v)] == 0) estimates_.Drop(v);
     };
     if (Filters()) std::for_each(NeighboursOf(view).begin(), NeighboursOf(view).end(), drop);
     drop(view);
@@ -155,9 +188,12 @@ class Run {
   Progress& progress_;
   std::vector<ViewNeighbours> neighbours_;
   std::vector<DepthRange> ranges_;
-  PlaneMapsInMemory in_memory_;
-  std::vector<std::optional<DepthEstimate>> raw_;  ///< unfiltered maps still waited for
-  std::vector<int> waiting_;                       ///< how many results still need each of them
+  Pages pages_;
+  PlaneMapsInMemory planes_in_memory_;
+  EstimatesInMemory estimates_in_memory_;
+  PagedPlanes planes_;
+  PagedEstimates estimates_;  ///< unfiltered maps still waited for
+  std::vector<int> waiting_;  ///< how many results still need each of them
 };
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "stereo/depth_range.h"
 #include "stereo/engine.h"
 #include "stereo/neighbours.h"
+#include "stereo/view_paging.h"
 
 namespace dtr::stereo {
 
@@ -21,6 +22,26 @@ struct DepthMapsOptions {
   /// Where planes wait between the rounds of engines that have any, so that an interrupted run can
   /// go on from there; null: in memory, 24 bytes per pixel and view. Borrowed.
   PlaneMapStore* planes = nullptr;
+  /// Where unfiltered depth maps wait for their neighbours'; null: in memory. Borrowed.
+  EstimateStore* estimates = nullptr;
+  /// Reads the pixels of views that do not have them in memory; null: all have.
+  PixelLoader load_pixels;
+  /// What pixels, planes, unfiltered maps and the engine's work may take together; what was loaded
+  /// stays as long as there is room. 0: no limit. Needs both stores; without `load_pixels` the
+  /// views' own pixels come on top. No effect on the result.
+  std::uint64_t memory_bytes = 0;
+};
+
+/// The limit is too low for a single view with its neighbours.
+class NotEnoughMemory : public Error {
+ public:
+  NotEnoughMemory(const std::string& message, std::uint64_t least_bytes)
+      : Error(message), least_bytes_(least_bytes) {}
+  /// The least limit that works.
+  std::uint64_t least_bytes() const { return least_bytes_; }
+
+ private:
+  std::uint64_t least_bytes_;
 };
 
 /// Computes the depth map of every view for which `already_done(view)` is false and hands it to
@@ -30,8 +51,8 @@ struct DepthMapsOptions {
 /// one. With an engine that has rounds, all views go through one round before the next begins (see
 /// RunRounds), and maps are handed out after the last. A view without neighbours, or for which the
 /// engine finds no usable pair, gets a map of holes and a note. Throws what the engine throws,
-/// Error when a depth range is unknown, Interrupted between views, UsageError when `given_ranges`
-/// has the wrong length.
+/// Error when a depth range is unknown, Interrupted between views, NotEnoughMemory before
+/// any work, UsageError when `given_ranges` has the wrong length.
 void ComputeDepthMaps(
     std::span<const StereoView> views, const SparseScene& scene, const Engine& engine,
     const DepthMapsOptions& options, Progress& progress,

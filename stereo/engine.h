@@ -74,6 +74,13 @@ class Engine {
   /// How many neighbours of a view it makes use of.
   virtual int Neighbours() const { return 5; }
 
+  /// Bytes that one call for this view takes at most, its result included and what it is given
+  /// not, for any number of threads; 0 where the engine does not say.
+  virtual std::uint64_t WorkBytes(std::span<const StereoView> /*views*/, int /*reference*/,
+                                  std::span<const int> /*neighbours*/) const {
+    return 0;
+  }
+
   /// Rounds in which views take account of each other's planes; 0: Estimate is all there is.
   virtual int Rounds() const { return 0; }
   /// The planes behind Estimate, nothing rejected. Engines with rounds only.

@@ -39,7 +39,8 @@ PlaneMap First(const Collection& c, int view, Progress& progress) {
     return {};
   }
   try {
-    return c.engine->Match(c.views, view, NeighboursOf(c, view),
+    const Room room(c, view);
+    return c.engine->Match(room.views(), view, NeighboursOf(c, view),
                            c.ranges[static_cast<size_t>(view)], c.options);
   } catch (const NoUsablePair& error) {
     progress.Note(std::string(error.what()) + ": no depth");
@@ -50,11 +51,18 @@ PlaneMap First(const Collection& c, int view, Progress& progress) {
 PlaneMap Next(const Collection& c, PlaneMapStore& store, int round, int view) {
   const PlanesAround around(c, store, round - 1, view);
   if (!around.HasOwn()) return {};
-  return c.engine->Refine(c.views, view, NeighboursOf(c, view), c.ranges[static_cast<size_t>(view)],
-                          around.maps(), round, c.options);
+  const Room room(c, view);
+  return c.engine->Refine(room.views(), view, NeighboursOf(c, view),
+                          c.ranges[static_cast<size_t>(view)], around.maps(), round, c.options);
 }
 
 }  // namespace
+
+Room::Room(const Collection& c, int view)
+    : around_(c.views, c.load_pixels, c.pages != nullptr ? *c.pages : unlimited_, view,
+              NeighboursOf(c, view)),
+      work_(c.pages != nullptr ? *c.pages : unlimited_,
+            c.engine->WorkBytes(c.views, view, NeighboursOf(c, view))) {}
 
 PlanesAround::PlanesAround(const Collection& collection, PlaneMapStore& store, int round, int view)
     : maps_(collection.views.size(), nullptr), own_(static_cast<size_t>(view)) {

@@ -7,6 +7,7 @@
 #include "dtr/base/progress.h"
 #include "stereo/engine.h"
 #include "stereo/neighbours.h"
+#include "stereo/view_paging.h"
 
 namespace dtr::stereo {
 
@@ -17,6 +18,20 @@ struct Collection {
   std::span<const DepthRange> ranges;
   const Engine* engine = nullptr;
   EngineOptions options;
+  PixelLoader load_pixels = {};  ///< null: the views have theirs in memory
+  Pages* pages = nullptr;        ///< what bounds the memory; null: nothing does
+};
+
+/// What an engine's call for one view takes: the pixels it sees, and room for its work.
+class Room {
+ public:
+  Room(const Collection& collection, int view);
+  std::span<const StereoView> views() const { return around_.views(); }
+
+ private:
+  Pages unlimited_;
+  ViewsAround around_;
+  Pages::Reservation work_;
 };
 
 /// The planes that concern one view: its own and its neighbours', kept alive.

@@ -54,9 +54,6 @@ void AddBuildCommand(CLI::App& app) {
                         "Long side of the set's images; 0 = full size; overrides the preset")
             ->check(CLI::Range(0, 65536))
             ->type_name("PX");
-        command.add_option("--memory", options->memory_gb, "Memory to stay within [4]")
-            ->check(CLI::Range(0.5, 4096.0))
-            ->type_name("GB");
         command
             .add_option(
                 "--poses", options->poses,

@@ -11,9 +11,9 @@
 #include "cli/pipeline/calibrated_photos.h"
 #include "cli/pipeline/depth_engine.h"
 #include "cli/pipeline/depth_stage.h"
+#include "cli/pipeline/finishing.h"
 #include "cli/pipeline/holdout.h"
 #include "cli/pipeline/input_hash.h"
-#include "cli/pipeline/mesh_stage.h"
 #include "cli/pipeline/run_log.h"
 #include "cli/pipeline/set_page.h"
 #include "cli/pipeline/validate_set.h"
@@ -21,7 +21,6 @@
 #include "dtr/base/parallel_for.h"
 #include "dtr/eval/json.h"
 #include "dtr/io/set_io.h"
-#include "dtr/render/geometry.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -58,11 +57,12 @@ Json PhotosJson(const capture::Capture& capture, const std::vector<bool>& with_h
   return photos;
 }
 
-// Views of the registered photos, in the photos' order, with pixels on the set's grid.
+// Views of the registered photos, in the photos' order; their pixels, on the set's grid, are
+// written one by one.
 std::vector<View> UndistortPhotos(const capture::Capture& capture,
                                   const CalibratedPhotos& calibrated,
                                   const std::vector<bool>& held_out, int max_size_px, int threads,
-                                  Progress& progress) {
+                                  io::SetWriter& writer, Progress& progress) {
   std::map<std::string, const calib::SfmImage*> registered;
   for (const auto& image : calibrated.model.images) registered[image.name] = &image;
   const bool undistorted =
@@ -95,6 +95,7 @@ std::vector<View> UndistortPhotos(const capture::Capture& capture,
     view.cam_from_world = found->second->cam_from_world;
     view.image = std::move(flat.image);
     view.mask = std::move(flat.mask);
+    StoreImage(view, calibrated.unit, writer);
     views.push_back(std::move(view));
     progress.Update(static_cast<int>(views.size()));
   }
@@ -118,9 +119,15 @@ std::vector<SparsePoint> SourcePoints(const SparseScene& sparse, const std::vect
   return RestrictToViews(sparse, is_source).points;
 }
 
-void RequireTwoSources(const std::vector<View>& views, const CalibratedPhotos& calibrated) {
-  const auto sources = std::count_if(
-      views.begin(), views.end(), [](const View& view) { return view.role == ViewRole::kSource; });
+void RequireTwoSources(const capture::Capture& capture, const std::vector<bool>& held_out,
+                       const CalibratedPhotos& calibrated) {
+  int sources = 0;
+  for (size_t i = 0; i < capture.photos.size(); ++i) {
+    const auto& images = calibrated.model.images;
+    sources += !held_out[i] && std::any_of(images.begin(), images.end(), [&](const auto& image) {
+      return image.name == capture.photos[i].name;
+    });
+  }
   if (sources >= 2) return;
   throw Error(
       fmt::format("calibration: expected at least 2 photos to build from, found {} with a camera "
@@ -223,7 +230,7 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
   const CalibratedPhotos calibrated =
       CalibratePhotos(photos,
                       {options.poses, held_out, options.holdout_strict, options.threads,
-                       options.seed, options.memory_gb},
+                       options.seed, options.depth.memory_gb.value_or(kDefaultMemoryGb)},
                       writer.work_folder() / "calibration", progress);
   report.not_registered = calibrated.not_registered;
   for (size_t i = 0; i < held_out.size(); ++i) {
@@ -239,17 +246,17 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
   set.world_origin = calibrated.world_origin;
   set.frames.resize(1);
   std::vector<View>& views = set.frames.front().views;
-  views = UndistortPhotos(photos, calibrated, held_out, max_size_px, options.threads, progress);
-  RequireTwoSources(views, calibrated);
+  RequireTwoSources(photos, held_out, calibrated);
+  views =
+      UndistortPhotos(photos, calibrated, held_out, max_size_px, options.threads, writer, progress);
   const SparseScene sparse = SparseOf(calibrated, views);
 
   log.Begin("depth");
-  DepthStage(set, sparse, options.depth, effort, {options.threads, options.seed, options.memory_gb},
-             writer, progress);
+  DepthStage(set, sparse, options.depth, effort, {options.threads, options.seed}, writer, progress);
 
   log.Begin("finishing");
-  FinishGeometry(set, SourcePoints(sparse, views));
-  MeshStage(set, writer, options.threads);
+  FinishScene(set, SourcePoints(sparse, views), writer, options.threads);
+  WriteMeshes(set, writer, options.threads);
   const calib::ValidationReport validation =
       Validate(set, sparse, report, options.threads, progress);
   writer.WriteSparse(set, sparse);
@@ -258,7 +265,7 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
           .dump();
   WriteSetPage(writer, set,
                {options.output.stem().string(), options.depth.engine, validation.tests,
-                report.skipped, report.not_registered.size()});
+                report.skipped, report.not_registered.size(), options.threads});
   log.End();
   io::WriteRunRecord(writer.folder(), log.Record(ResolveThreads(options.threads)));
   writer.Finish(set);

@@ -19,7 +19,6 @@ struct BuildOptions {
   bool holdout_strict = false;
   DepthChoice depth;
   int max_size_px = -1;  ///< long side; 0 = full size, -1 = what the preset says
-  double memory_gb = 4;
   std::filesystem::path poses;
   bool force = false;
   int threads = 0;

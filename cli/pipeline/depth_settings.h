@@ -22,11 +22,15 @@ std::span<const Preset> Presets();
 /// Throws UsageError for unknown names.
 const Preset& PresetCalled(const std::string& name);
 
+/// Memory to stay within unless told otherwise.
+inline constexpr double kDefaultMemoryGb = 4;
+
 /// What was asked for: a preset, and what overrides it.
 struct DepthChoice {
   std::string engine = "patchmatch";  ///< "none": no depth
   std::string preset = "balanced";
   std::optional<int> neighbours, round_neighbours, iterations, rounds;
+  std::optional<double> memory_gb;  ///< 1e9 bytes; absent: kDefaultMemoryGb, or what is needed
   std::filesystem::path workspace;  ///< for engine "colmap"; empty: the program fills one
 };
 

@@ -1,7 +1,14 @@
 #include "cli/pipeline/depth_stage.h"
 
+#include <fmt/format.h>
+
+#include <cmath>
+#include <functional>
+#include <optional>
+
 #include "cli/pipeline/depth_engine.h"
 #include "cli/pipeline/plane_files.h"
+#include "dtr/base/error.h"
 #include "stereo/depth_maps.h"
 
 namespace dtr::pipeline {
@@ -23,61 +30,116 @@ SparseScene SourceScene(const SparseScene& sparse, const std::vector<View>& view
   return scene;
 }
 
+// What the program itself takes: code, libraries, points and whatever is not counted one by one.
+constexpr std::uint64_t kProgramBytes = std::uint64_t{256} << 20;
+constexpr double kBytesPerGb = 1e9;
+
+// Runs `compute` within the memory chosen.
+void ComputeWithin(const std::optional<double>& memory_gb, stereo::DepthMapsOptions& options,
+                   Progress& progress, const std::function<void()>& compute) {
+  const auto allowed =
+      static_cast<std::uint64_t>(memory_gb.value_or(kDefaultMemoryGb) * kBytesPerGb);
+  options.memory_bytes = allowed > kProgramBytes ? allowed - kProgramBytes : 1;
+  try {
+    compute();
+  } catch (const stereo::NotEnoughMemory& error) {
+    // Rounded up, so that the number printed works when it is given.
+    const double least_gb =
+        std::ceil(1e3 * static_cast<double>(error.least_bytes() + kProgramBytes) / kBytesPerGb) /
+        1e3;
+    if (memory_gb) {
+      throw UsageError(fmt::format(
+          "--memory {}: expected at least {:.3f} (GB) for a view with its neighbours; give as "
+          "much, fewer --neighbours or smaller images",
+          *memory_gb, least_gb));
+    }
+    progress.Note(
+        fmt::format("depth takes {:.3f} GB of memory: what a view with its neighbours "
+                    "needs",
+                    least_gb));
+    options.memory_bytes = error.least_bytes();
+    compute();
+  }
+}
+
+// The source views of a set, in its order.
+struct Sources {
+  explicit Sources(const std::vector<View>& views) {
+    for (size_t i = 0; i < views.size(); ++i) {
+      if (views[i].role != ViewRole::kSource) continue;
+      indices.push_back(static_cast<int>(i));
+      stereo.push_back({views[i].camera, views[i].cam_from_world, nullptr, nullptr});
+    }
+  }
+  std::vector<int> indices;
+  std::vector<stereo::StereoView> stereo;
+};
+
+// The image and mask of a view as its set stores them.
+stereo::StereoPixels ReadPixels(const std::filesystem::path& folder, View view, int threads) {
+  io::LoadOptions load;
+  load.depth = false;
+  load.threads = threads;
+  io::LoadPixels(folder, view, load);
+  return {std::move(view.image), std::move(view.mask)};
+}
+
+void WriteDepth(View& view, stereo::DepthEstimate&& estimate, LengthUnit unit,
+                io::SetWriter& writer) {
+  view.depth = std::move(estimate.depth);
+  view.inverse_depth_sigma = std::move(estimate.inverse_depth_sigma);
+  writer.WriteView(view, unit);
+  view.depth = {};
+  view.inverse_depth_sigma.reset();
+}
+
 }  // namespace
+
+void StoreImage(View& view, LengthUnit unit, io::SetWriter& writer) {
+  if (!writer.RestoreView(view)) writer.WriteView(view, unit);
+  view.image = {};
+  view.mask = {};
+}
 
 void DepthStage(DtrSet& set, const SparseScene& sparse, const DepthChoice& choice,
                 const stereo::Effort& effort, const DepthStageOptions& options,
                 io::SetWriter& writer, Progress& progress) {
-  std::vector<View>& views = set.frames.front().views;
-  std::vector<int> sources;
-  std::vector<stereo::StereoView> stereo_views;
-  for (size_t i = 0; i < views.size(); ++i) {
-    View& view = views[i];
-    // Images first: what an interrupted run wrote is recognised and not written again.
-    if (!writer.RestoreView(view)) writer.WriteView(view, set.unit);
-    if (view.role != ViewRole::kSource) continue;
-    sources.push_back(static_cast<int>(i));
-    stereo_views.push_back({view.camera, view.cam_from_world, &view.image, &view.mask});
-  }
   if (choice.engine == "none") {
     progress.Note("depth left out: --engine none");
     return;
   }
-
-  const SparseScene scene = SourceScene(sparse, views, sources);
+  std::vector<View>& views = set.frames.front().views;
+  const Sources sources(views);
+  const SparseScene scene = SourceScene(sparse, views, sources.indices);
   const auto engine = MakeDepthEngine(choice, effort,
-                                      {views, sources, stereo_views, &scene, set.world_origin,
-                                       writer.folder(), writer.work_folder()},
+                                      {views, sources.indices, sources.stereo, &scene,
+                                       set.world_origin, writer.folder(), writer.work_folder()},
                                       progress);
+  const auto view_of = [&](int source) -> View& {
+    return views[static_cast<size_t>(sources.indices[static_cast<size_t>(source)])];
+  };
 
   stereo::DepthMapsOptions depth_options;
   depth_options.neighbours.count = engine->Neighbours();
   depth_options.engine.threads = options.threads;
   depth_options.engine.seed = options.seed;
-  // The other half holds the photos, and maps that wait for their neighbours to be done.
-  depth_options.engine.memory_gb = options.memory_gb / 2;
+  // The other half holds photos, and maps that wait for their neighbours to be done.
+  depth_options.engine.memory_gb = choice.memory_gb.value_or(kDefaultMemoryGb) / 2;
   PlaneFiles planes(writer.work_folder() / "planes");
+  EstimateFiles estimates(writer.work_folder() / "estimates");
   depth_options.planes = &planes;
-  const auto view_of = [&](int source) -> View& {
-    return views[static_cast<size_t>(sources[static_cast<size_t>(source)])];
+  depth_options.estimates = &estimates;
+  depth_options.load_pixels = [&](int source) {
+    return ReadPixels(writer.folder(), view_of(source), options.threads);
   };
-  stereo::ComputeDepthMaps(
-      stereo_views, scene, *engine, depth_options, progress,
-      [&](int source) { return view_of(source).depth_file.has_value(); },
-      [&](int source, stereo::DepthEstimate&& estimate, const stereo::DepthRange&) {
-        View& view = view_of(source);
-        view.depth = std::move(estimate.depth);
-        view.inverse_depth_sigma = std::move(estimate.inverse_depth_sigma);
-        writer.WriteView(view, set.unit);
-      });
-  // What follows uses the stored maps, so that a resumed run and an undisturbed one agree.
-  for (const int i : sources) {
-    io::LoadOptions load;
-    load.images = false;
-    load.sigma = true;
-    load.threads = options.threads;
-    io::LoadPixels(writer.folder(), views[static_cast<size_t>(i)], load);
-  }
+  ComputeWithin(choice.memory_gb, depth_options, progress, [&] {
+    stereo::ComputeDepthMaps(
+        sources.stereo, scene, *engine, depth_options, progress,
+        [&](int source) { return view_of(source).depth_file.has_value(); },
+        [&](int source, stereo::DepthEstimate&& estimate, const stereo::DepthRange&) {
+          WriteDepth(view_of(source), std::move(estimate), set.unit, writer);
+        });
+  });
 }
 
 }  // namespace dtr::pipeline

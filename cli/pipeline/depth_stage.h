@@ -13,13 +13,17 @@ namespace dtr::pipeline {
 struct DepthStageOptions {
   int threads = 0;
   std::uint64_t seed = 0;
-  double memory_gb = 4;
 };
 
+/// Writes the pixels of a view, or finds them written by an earlier, interrupted run, and frees
+/// them.
+void StoreImage(View& view, LengthUnit unit, io::SetWriter& writer);
+
 /// Computes the depth of every source view with the engine chosen ("none": none, all holes are
-/// refused later by renderers) and writes every view, held-out ones without depth, through
-/// `writer`. Views finished by an earlier, interrupted run are taken from the writer. Only source
-/// views and the points they alone know reach the engine.
+/// refused later by renderers) and writes it through `writer`, which has the views' images
+/// (StoreImage). Views finished by an earlier, interrupted run are taken from the writer. Only
+/// source views and the points they alone know reach the engine. Pixels are in memory only as long
+/// as they are worked with, within the memory chosen: UsageError when that is too little.
 void DepthStage(DtrSet& set, const SparseScene& sparse, const DepthChoice& choice,
                 const stereo::Effort& effort, const DepthStageOptions& options,
                 io::SetWriter& writer, Progress& progress);

@@ -1,16 +1,16 @@
-// cli/pipeline/plane_files.h -- planes of a run between its rounds, as files.
+// cli/pipeline/plane_files.h -- what a run keeps between its steps, as files.
 #pragma once
 #include <filesystem>
 
 #include "stereo/plane_map.h"
+#include "stereo/view_paging.h"
 
 namespace dtr::pipeline {
 
-/// One file per round and view in a folder of working files: an interrupted run goes on where it
-/// stopped, and memory holds only the planes in use. Bytes of a file: int32 width, height (both 0:
-/// no planes), then inverse depths and both slopes as float32, row-major, in the host's byte order.
-/// Files appear whole or not at all. Load throws Error naming the file when it is not what Save
-/// writes; so do Has and Drop where the folder cannot be read or a file not removed.
+/// Planes: one file (grid_files.h) per round and view in a folder of working files: an interrupted
+/// run goes on where it stopped, and memory holds only the planes in use. Load throws Error naming
+/// the file when it is not what Save writes; so do Has and Drop where the folder cannot be read or
+/// a file not removed.
 class PlaneFiles final : public stereo::PlaneMapStore {
  public:
   /// Creates the folder.
@@ -22,6 +22,22 @@ class PlaneFiles final : public stereo::PlaneMapStore {
 
  private:
   std::filesystem::path File(int round, int view) const;
+  std::filesystem::path folder_;
+};
+
+/// Unfiltered depth maps: one file per view. They belong to one run; those of an interrupted one
+/// are not looked at.
+class EstimateFiles final : public stereo::EstimateStore {
+ public:
+  /// Creates the folder and empties it.
+  explicit EstimateFiles(const std::filesystem::path& folder);
+  bool Has(int view) const override;
+  std::shared_ptr<const stereo::DepthEstimate> Load(int view) override;
+  void Save(int view, stereo::DepthEstimate&& estimate) override;
+  void Drop(int view) override;
+
+ private:
+  std::filesystem::path File(int view) const;
   std::filesystem::path folder_;
 };
 

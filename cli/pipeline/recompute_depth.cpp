@@ -4,8 +4,8 @@
 
 #include "cli/pipeline/depth_engine.h"
 #include "cli/pipeline/depth_stage.h"
+#include "cli/pipeline/finishing.h"
 #include "cli/pipeline/input_hash.h"
-#include "cli/pipeline/mesh_stage.h"
 #include "cli/pipeline/run_log.h"
 #include "cli/pipeline/set_page.h"
 #include "cli/pipeline/validate_set.h"
@@ -13,13 +13,12 @@
 #include "dtr/base/hash.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/io/set_io.h"
-#include "dtr/render/geometry.h"
 
 namespace dtr::pipeline {
 namespace {
 
-// The set with images in memory and without any depth.
-DtrSet LoadForDepth(const std::filesystem::path& folder, int threads) {
+// The set without pixels and without any depth.
+DtrSet ReadForDepth(const std::filesystem::path& folder) {
   DtrSet set = io::ReadSet(folder);
   if (!set.sparse_file) {
     throw Error(
@@ -27,11 +26,7 @@ DtrSet LoadForDepth(const std::filesystem::path& folder, int threads) {
         ": expected sparse points to find depth ranges from, found none; build the set from "
         "its photos with dtr build");
   }
-  io::LoadOptions load;
-  load.depth = false;
-  load.threads = threads;
   for (View& view : set.frames.front().views) {
-    io::LoadPixels(folder, view, load);
     view.depth_file.reset();
     view.sigma_file.reset();
     view.mesh_file.reset();
@@ -50,15 +45,17 @@ nlohmann::json HeldOutHashes(const DtrSet& set) {
   return hashes;
 }
 
-double Completeness(const std::vector<View>& views, int& maps) {
-  long with_depth = 0, pixels = 0;
-  for (const View& view : views) {
-    if (view.depth.empty()) continue;
-    ++maps;
-    for (const float z : view.depth.grid().data()) with_depth += !DepthImage::IsHole(z);
-    pixels += static_cast<long>(view.depth.grid().data().size());
+// The images of the old set in the new one.
+void CopyImages(const std::filesystem::path& from, DtrSet& set, int threads, io::SetWriter& writer,
+                Progress& progress) {
+  io::LoadOptions load;
+  load.depth = false;
+  load.threads = threads;
+  for (View& view : set.frames.front().views) {
+    progress.ThrowIfInterrupted();
+    io::LoadPixels(from, view, load);
+    StoreImage(view, set.unit, writer);
   }
-  return pixels > 0 ? static_cast<double>(with_depth) / static_cast<double>(pixels) : 0;
 }
 
 }  // namespace
@@ -72,7 +69,7 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& progre
   log.Begin("depth");
   RecomputeReport report;
   report.written = in_place ? options.set : options.output;
-  DtrSet set = LoadForDepth(options.set, options.threads);
+  DtrSet set = ReadForDepth(options.set);
   const SparseScene sparse = io::LoadSparse(options.set, set);
 
   const nlohmann::json fingerprint = {{"tool_version", DTR_VERSION},
@@ -82,11 +79,10 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& progre
                                       {"set_sha256", Sha256OfFile(options.set / "set.json")},
                                       {"held_out", HeldOutHashes(set)}};
   io::SetWriter writer(report.written, fingerprint.dump(), in_place || options.force);
-  std::vector<View>& views = set.frames.front().views;
-  DepthStage(set, sparse, options.depth, effort, {options.threads, options.seed, 4}, writer,
-             progress);
-  FinishGeometry(set);
-  MeshStage(set, writer, options.threads);
+  CopyImages(options.set, set, options.threads, writer, progress);
+  DepthStage(set, sparse, options.depth, effort, {options.threads, options.seed}, writer, progress);
+  FinishScene(set, {}, writer, options.threads);
+  const DepthCount count = WriteMeshes(set, writer, options.threads);
   writer.WriteSparse(set, sparse);
   nlohmann::ordered_json provenance = nlohmann::ordered_json::parse(set.provenance_json);
   provenance["depth_engine"] = options.depth.engine;
@@ -96,10 +92,16 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& progre
   provenance["options"].update(settings);
   provenance["options"]["seed"] = options.seed;
   set.provenance_json = provenance.dump();
-  report.depth_completeness = Completeness(views, report.depth_maps);
+  report.depth_maps = count.maps;
+  report.depth_completeness = count.Completeness();
   const auto validation = ValidateSet(set, sparse, {}, options.threads);
   WriteSetPage(writer, set,
-               {report.written.stem().string(), options.depth.engine, validation.tests, {}, 0});
+               {report.written.stem().string(),
+                options.depth.engine,
+                validation.tests,
+                {},
+                0,
+                options.threads});
   log.End();
   io::WriteRunRecord(writer.folder(), log.Record(ResolveThreads(options.threads)));
   writer.Finish(set);

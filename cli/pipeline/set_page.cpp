@@ -17,6 +17,14 @@ void WriteSetPage(const io::SetWriter& writer, const DtrSet& set, const SetPageF
                 {"depth engine", facts.engine},
                 {"not registered", std::to_string(facts.not_registered)}};
   info.checks = facts.checks;
+  info.load = [&](const View& view) {
+    View loaded = view;
+    io::LoadOptions load;
+    load.sigma = true;
+    load.threads = facts.threads;
+    io::LoadPixels(writer.folder(), loaded, load);
+    return loaded;
+  };
   for (const auto& [name, reason] : facts.skipped) info.skipped.push_back({name, reason});
   std::filesystem::create_directories(writer.folder() / "report");
   WriteFileAtomically(writer.folder() / "report" / "index.html", report::SetReport(sources, info));

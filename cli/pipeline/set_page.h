@@ -17,11 +17,12 @@ struct SetPageFacts {
   std::vector<Check> checks;
   std::vector<std::pair<std::string, std::string>> skipped;  ///< file, reason
   size_t not_registered = 0;
+  int threads = 0;
 };
 
 /// Writes report/index.html into the writer's folder: source views only, as pixels of held-out
-/// photos stay in held_out/, and without times, so that equal builds stay equal. The source views'
-/// pixels must be loaded.
+/// photos stay in held_out/, and without times, so that equal builds stay equal. Pixels are read
+/// from there, one view at a time.
 void WriteSetPage(const io::SetWriter& writer, const DtrSet& set, const SetPageFacts& facts);
 
 }  // namespace dtr::pipeline

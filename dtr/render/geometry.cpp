@@ -99,17 +99,24 @@ std::vector<double> ReferenceBaselines(std::span<const Pose> cam_from_world,
   return baselines;
 }
 
-SceneExtent SceneExtentFromDepth(std::span<const View> views) {
-  std::vector<double> coordinates[3];
-  for (const View& view : views) {
-    if (HasDepth(view)) AppendPoints(view, coordinates);
-  }
-  if (coordinates[0].empty()) {
+void DepthSamples::Add(const View& view) {
+  if (HasDepth(view)) AppendPoints(view, coordinates_);
+}
+
+SceneExtent DepthSamples::Extent() const {
+  if (empty()) {
     throw Error(
         "scene extent: expected source views with depth, found no depth sample; "
         "run `dtr stereo` or give sparse points");
   }
+  std::vector<double> coordinates[3] = {coordinates_[0], coordinates_[1], coordinates_[2]};
   return ExtentOf(coordinates);
+}
+
+SceneExtent SceneExtentFromDepth(std::span<const View> views) {
+  DepthSamples samples;
+  for (const View& view : views) samples.Add(view);
+  return samples.Extent();
 }
 
 Eigen::Vector3d SceneCenterFromDepth(std::span<const View> views) {
@@ -136,8 +143,11 @@ void FinishGeometry(DtrSet& set, std::span<const SparsePoint> points) {
   if (set.frames.empty()) throw Error("set: expected at least one frame, found none");
   std::vector<View>& views = set.frames.front().views;
   const bool has_depth = std::any_of(views.begin(), views.end(), HasDepth);
-  const SceneExtent extent =
-      has_depth || points.empty() ? SceneExtentFromDepth(views) : SceneExtentFromPoints(points);
+  FinishGeometry(set, has_depth || points.empty() ? SceneExtentFromDepth(views)
+                                                  : SceneExtentFromPoints(points));
+}
+
+void FinishGeometry(DtrSet& set, const SceneExtent& extent) {
   set.scene_center = extent.center;
   set.bounds = extent.bounds;
   for (Frame& frame : set.frames) {

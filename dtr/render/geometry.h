@@ -59,6 +59,20 @@ struct SceneExtent {
 /// sampled on a regular grid of at most 64x64 per view. Does not depend on the views' order.
 /// Throws dtr::Error when no source view has a depth.
 SceneExtent SceneExtentFromDepth(std::span<const View> views);
+
+/// The same, view by view, for sets whose depth maps do not fit into memory together.
+class DepthSamples {
+ public:
+  /// Adds the samples of a source view that has its depth loaded; passes over others.
+  void Add(const View& view);
+  bool empty() const { return coordinates_[0].empty(); }
+  /// Throws dtr::Error when there is no sample.
+  SceneExtent Extent() const;
+
+ private:
+  std::vector<double> coordinates_[3];
+};
+
 Eigen::Vector3d SceneCenterFromDepth(std::span<const View> views);
 
 /// SPEC 0.2, from sparse points. Throws dtr::Error when there is no finite point.
@@ -69,5 +83,7 @@ Eigen::Vector3d SceneCenterFromPoints(std::span<const SparsePoint> points);
 /// of the source views, or from `points` where no view has depth yet; baselines to source cameras
 /// only, so that held-out views change nothing. Throws dtr::Error when there is neither.
 void FinishGeometry(DtrSet& set, std::span<const SparsePoint> points = {});
+/// The same from an extent that is known.
+void FinishGeometry(DtrSet& set, const SceneExtent& extent);
 
 }  // namespace dtr

@@ -43,9 +43,10 @@ std::vector<Cell> ViewRow(const View& view, bool with_sigma, int side_px) {
   return row;
 }
 
-void AddViews(HtmlReport& page, const std::vector<View>& views, int side_px) {
-  const bool with_sigma = std::any_of(views.begin(), views.end(), [](const View& v) {
-    return v.inverse_depth_sigma.has_value() && !v.inverse_depth_sigma->empty();
+void AddViews(HtmlReport& page, const std::vector<View>& views, const SetReportInfo& info) {
+  const bool with_sigma = std::any_of(views.begin(), views.end(), [&](const View& v) {
+    return (info.load && v.sigma_file) ||
+           (v.inverse_depth_sigma.has_value() && !v.inverse_depth_sigma->empty());
   });
   std::vector<std::string> header{"Photo", "Depth"};
   if (with_sigma) header.emplace_back("Uncertainty");
@@ -53,7 +54,9 @@ void AddViews(HtmlReport& page, const std::vector<View>& views, int side_px) {
     header.emplace_back(name);
   }
   std::vector<std::vector<Cell>> rows;
-  for (const View& view : views) rows.push_back(ViewRow(view, with_sigma, side_px));
+  for (const View& view : views) {
+    rows.push_back(ViewRow(info.load ? info.load(view) : view, with_sigma, info.thumbnail_px));
+  }
   page.Section("Views");
   page.Paragraph(std::string("Depth: closer is brighter, green is a hole.") +
                  (with_sigma ? " Uncertainty of inverse depth: dark is certain." : ""));
@@ -90,7 +93,7 @@ void AddSetSections(HtmlReport& page, const DtrSet& set, const SetReportInfo& in
     page.Section("Can the calibration be trusted?");
     AddChecks(page, info.checks);
   }
-  for (const Frame& frame : set.frames) AddViews(page, frame.views, info.thumbnail_px);
+  for (const Frame& frame : set.frames) AddViews(page, frame.views, info);
   if (!info.skipped.empty()) {
     std::vector<std::vector<Cell>> rows;
     for (const SkippedItem& item : info.skipped) rows.push_back({item.name, item.reason});

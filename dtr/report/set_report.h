@@ -1,5 +1,6 @@
 // dtr/report/set_report.h -- what a set is and how it came about, as a page.
 #pragma once
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -29,6 +30,8 @@ struct SetReportInfo {
   std::vector<SkippedItem> skipped;
   std::vector<StageTime> stages;
   int thumbnail_px = 240;  ///< long side
+  /// A view with its pixels, for sets that do not fit into memory; null: what the views have.
+  std::function<View(const View&)> load;
 };
 
 /// Adds: facts, verdict and checks, the table of views (thumbnails of image, depth and sigma where

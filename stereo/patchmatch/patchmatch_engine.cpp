@@ -29,6 +29,13 @@ constexpr int kFirstRoundNumber = 1000;  // names random numbers apart from the 
 /// A pair whose rays to the middle of the range meet at less than this has no baseline.
 constexpr double kSmallestDisparityPx = 0.5;
 
+/// Bytes per pixel: the reference's grey values, colours and mask; planes and costs; the weight of
+/// a view; two guesses, and a grid they are made from; its picture with all halvings; planes to
+/// hand out; a depth map with what judging it takes; a neighbour's textures with all halvings.
+constexpr double kReferenceBytes = 12, kStateBytes = 16, kWeightBytes = 4, kGuessBytes = 28,
+                 kPictureBytes = 7, kPlaneBytes = 12, kVerdictBytes = 38, kSourceBytes = 7;
+constexpr double kSmallThingsBytes = 1 << 18;
+
 void CheckRequest(std::span<const StereoView> views, int reference, std::span<const int> neighbours,
                   const DepthRange& range) {
   const auto exists = [&](int i) { return i >= 0 && static_cast<size_t>(i) < views.size(); };
@@ -179,6 +186,28 @@ int PatchMatchEngine::Rounds() const { return effort_.rounds; }
 
 int PatchMatchEngine::Neighbours() const {
   return std::min(kMaxViews, std::max(effort_.neighbours, effort_.round_neighbours));
+}
+
+std::uint64_t PatchMatchEngine::WorkBytes(std::span<const StereoView> views, int reference,
+                                          std::span<const int> neighbours) const {
+  const auto area = [](double width, double height, double border) {
+    return (width + 2 * border) * (height + 2 * border);
+  };
+  const PinholeCamera& camera = views[static_cast<size_t>(reference)].camera;
+  const double w = camera.width_px(), h = camera.height_px();
+  const size_t sources = std::min<size_t>(neighbours.size(), static_cast<size_t>(Neighbours()));
+  const double state = kReferenceBytes + kStateBytes + kWeightBytes * static_cast<double>(sources);
+  const double search = area(w, h, kBorder) * state + std::max(area(w / 2, h / 2, kBorder) * state,
+                                                               area(w, h, 0) * kVerdictBytes);
+  const double round = effort_.rounds == 0 ? 0
+                                           : area(w, h, kBorder) * (state + kGuessBytes) +
+                                                 area(w, h, 0) * kPlaneBytes;
+  double bytes = kSmallThingsBytes + std::max(search, round) + area(w, h, 0) * kPictureBytes;
+  for (size_t i = 0; i < sources; ++i) {
+    const PinholeCamera& c = views[static_cast<size_t>(neighbours[i])].camera;
+    bytes += kSourceBytes * area(c.width_px(), c.height_px(), kTextureBorder);
+  }
+  return static_cast<std::uint64_t>(bytes);
 }
 
 DepthEstimate PatchMatchEngine::Estimate(std::span<const StereoView> views, int reference,

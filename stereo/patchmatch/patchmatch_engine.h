@@ -12,9 +12,8 @@ namespace dtr::stereo {
 /// Tao, sec. 4.2). View weights are the selection probabilities themselves, random numbers are
 /// hashes of the pixel: nothing depends on history or threads. The search uses the first
 /// Effort::neighbours, the rounds the first Effort::round_neighbours, Estimate, which is the search
-/// alone, the more of both. Memory does not
-/// depend on the number of threads: about 100 bytes per pixel of the reference and 18 per pixel of
-/// each neighbour.
+/// alone, the more of both. Memory (WorkBytes) does not depend on the number of threads: at full
+/// size about 140 bytes per pixel of the reference and 7 per pixel of each neighbour.
 class PatchMatchEngine final : public Engine {
  public:
   explicit PatchMatchEngine(const Effort& effort = {}) : effort_(effort) {}
@@ -24,6 +23,8 @@ class PatchMatchEngine final : public Engine {
                          const EngineOptions& options) const override;
   int Rounds() const override;
   int Neighbours() const override;
+  std::uint64_t WorkBytes(std::span<const StereoView> views, int reference,
+                          std::span<const int> neighbours) const override;
   PlaneMap Match(std::span<const StereoView> views, int reference, std::span<const int> neighbours,
                  const DepthRange& range, const EngineOptions& options) const override;
   PlaneMap Refine(std::span<const StereoView> views, int reference, std::span<const int> neighbours,

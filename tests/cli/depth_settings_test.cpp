@@ -87,6 +87,21 @@ TEST_F(DepthSettings, AnEngineRecordsOnlyWhatItMakesUseOf) {
   EXPECT_FALSE(options.contains("rounds"));
 }
 
+TEST_F(DepthSettings, TheLeastMemoryThatWorksIsNamedAndMakesTheSameBytes) {
+  const std::string set = (folder_ / "tight/set.dtr").string();
+  fs::create_directories(folder_ / "tight");
+  const auto with_memory = [&](const std::string& gb) {
+    return Dtr({"stereo", Cameras().string(), "-o", set, "--preset", "fast", "--memory", gb});
+  };
+  const Ran refused = with_memory("0.27");
+  ExpectRefused(refused, 2, "--memory 0.27: expected at least");
+  const std::string words = "expected at least ";
+  const std::string least =
+      refused.err.substr(refused.err.find(words) + words.size(), std::string("0.000").size());
+  EXPECT_EQ(with_memory(least).code, 0) << least;
+  EXPECT_THAT(DifferingFiles(Contents(Fast()), Contents(set)), IsEmpty());
+}
+
 // A colmap that leaves the true depth of the courtyard, in files called as images of a set are.
 class DepthByColmap : public DepthSettings {
  protected:

@@ -1,0 +1,29 @@
+// cli/pipeline/finishing.h -- what is worked out once all depth maps lie in the set's folder, one
+// view in memory at a time.
+#pragma once
+#include <span>
+
+#include "dtr/io/set_io.h"
+#include "dtr/types/dtr_set.h"
+#include "dtr/types/sparse_scene.h"
+
+namespace dtr::pipeline {
+
+/// Scene centre, bounds and baselines: from the stored depth maps or, without any, from `points`.
+void FinishScene(DtrSet& set, std::span<const SparsePoint> points, const io::SetWriter& writer,
+                 int threads);
+
+/// How much of the source views has a depth.
+struct DepthCount {
+  int maps = 0;
+  long with_depth = 0, pixels = 0;
+  double Completeness() const {
+    return pixels > 0 ? static_cast<double>(with_depth) / static_cast<double>(pixels) : 0;
+  }
+};
+
+/// Writes the reduced mesh (SPEC 5.1) of every source view that has depth, as renderers make it
+/// with their default options. After FinishScene: thresholds need the baselines.
+DepthCount WriteMeshes(DtrSet& set, io::SetWriter& writer, int threads);
+
+}  // namespace dtr::pipeline

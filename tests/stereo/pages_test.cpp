@@ -1,0 +1,73 @@
+#include "stereo/pages.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+namespace dtr::stereo {
+namespace {
+
+PageKey Planes(int view, int round = 0) { return {PageKey::Kind::kPlanes, round, view}; }
+
+class PagesTest : public ::testing::Test {
+ protected:
+  std::shared_ptr<const int> Get(Pages& pages, int view, std::uint64_t bytes = 10) {
+    return pages.Get<int>(Planes(view), bytes, [&] {
+      loaded.push_back(view);
+      return std::make_shared<const int>(view);
+    });
+  }
+  std::vector<int> loaded;
+};
+
+TEST_F(PagesTest, WhatWasUsedTheLongestAgoMakesRoom) {
+  Pages pages(40);  // three pages, and one more on its way
+  for (const int view : {0, 1, 2}) Get(pages, view);
+  EXPECT_EQ(*Get(pages, 0), 0);  // still there, and now used later than 1
+  Get(pages, 3);
+  loaded.clear();
+  for (const int view : {0, 2, 3}) Get(pages, view);
+  EXPECT_TRUE(loaded.empty());
+  Get(pages, 1);
+  EXPECT_EQ(loaded, std::vector<int>{1});
+  EXPECT_EQ(pages.held(), 30u);
+}
+
+TEST_F(PagesTest, WhatIsInUseStaysAndIsNeverExceeded) {
+  Pages pages(30);
+  const auto a = Get(pages, 0), b = Get(pages, 1);
+  EXPECT_THROW(Get(pages, 2), std::logic_error);
+  EXPECT_EQ(pages.held(), 20u);
+  loaded.clear();
+  Get(pages, 0);
+  EXPECT_TRUE(loaded.empty());
+}
+
+TEST_F(PagesTest, WorkTakesRoomAsLongAsItIsReserved) {
+  Pages pages(40);
+  Get(pages, 0);
+  Get(pages, 1);
+  {
+    const Pages::Reservation work(pages, 25);
+    EXPECT_EQ(pages.held(), 35u);  // one page had to go
+    EXPECT_THROW(Pages::Reservation(pages, 41), std::logic_error);
+  }
+  EXPECT_LE(pages.held(), 10u);
+  EXPECT_LE(pages.peak(), 40u);
+}
+
+TEST_F(PagesTest, DroppedPagesAreLoadedAnew) {
+  Pages pages(100);
+  Get(pages, 0);
+  Get(pages, 1);
+  pages.Drop([](const PageKey& key) { return key.view == 0; });
+  EXPECT_EQ(pages.held(), 10u);
+  loaded.clear();
+  Get(pages, 1);
+  Get(pages, 0);
+  EXPECT_EQ(loaded, std::vector<int>{0});
+}
+
+}  // namespace
+}  // namespace dtr::stereo
