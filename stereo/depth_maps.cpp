@@ -7,6 +7,7 @@
 
 #include "dtr/base/parallel_for.h"
 #include "stereo/rounds.h"
+#include "stereo/widen.h"
 
 namespace dtr::stereo {
 namespace {
@@ -40,6 +41,8 @@ class Run {
     const std::vector<int> wanted = Wanted(already_done);
     const std::vector<int> needed = Needed(wanted);
     CheckMemory(needed);
+    // All of them: rounds also match what is not needed itself, and must do so alike every time.
+    if (!needed.empty()) ranges_ = Widened(Together(), options_.widenings, progress_);
     if (engine_.Rounds() > 0) RunRounds(Together(), needed, planes_, progress_);
     progress_.Stage("depth", static_cast<int>(needed.size()));
     // A view's pairs fill so many threads; with more, several views run side by side.

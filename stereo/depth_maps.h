@@ -17,6 +17,7 @@ struct DepthMapsOptions {
   NeighbourOptions neighbours;
   DepthRangeOptions range;
   std::vector<DepthRange> given_ranges;  ///< one per view; empty: from the sparse points
+  int widenings = 0;  ///< ends of ranges that prove too narrow move out so often at most (Widened)
   ConsistencyOptions consistency;
   EngineOptions engine;
   /// Where planes wait between the rounds of engines that have any, so that an interrupted run can

@@ -71,6 +71,8 @@ class Engine {
                                  std::span<const int> neighbours, const DepthRange& range,
                                  const EngineOptions& options) const = 0;
 
+  /// Whether the range bounds what it finds.
+  virtual bool Searches() const { return true; }
   /// How many neighbours of a view it makes use of.
   virtual int Neighbours() const { return 5; }
 

@@ -25,6 +25,7 @@ class ColmapEngine final : public Engine {
                std::span<const StereoView> views, const Eigen::Vector3d& world_origin);
 
   std::string name() const override { return "colmap"; }
+  bool Searches() const override { return false; }
   /// The map of the reference. Throws NoUsablePair when the workspace has none.
   DepthEstimate Estimate(std::span<const StereoView> views, int reference,
                          std::span<const int> neighbours, const DepthRange& range,
