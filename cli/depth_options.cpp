@@ -22,6 +22,13 @@ void AddDepthOptions(CLI::App& command, const std::vector<std::string>& engines,
         ->type_name("N");
   };
   command
+      .add_option("--time-budget", choice.time_budget_s,
+                  "Seconds for the depth stage on this machine: a measured probe picks neighbours, "
+                  "iterations "
+                  "and rounds, which the set records")
+      ->check(CLI::Range(1e-6, 1e9))
+      ->type_name("S");
+  command
       .add_option("--memory", choice.memory_gb,
                   "Memory to stay within; without it 4, or what the largest view needs")
       ->check(CLI::Range(0.001, 4096.0))

@@ -217,10 +217,10 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
   const std::vector<bool> held_out = ChooseHeldOut(options.holdout, NamesOf(photos));
   std::vector<bool> is_source = held_out;
   is_source.flip();
-  const Json option_values = OptionsJson(options, effort, max_size_px);
   const Json fingerprint = {
       {"tool_version", DTR_VERSION},
-      {"options", option_values},
+      {"options", OptionsJson(options, effort, max_size_px)},
+      {"time_budget_s", options.depth.time_budget_s.value_or(0)},
       {"photos", PhotosJson(photos, std::vector<bool>(held_out.size(), true))},
       {"poses_sha256", InputHash(options.poses)},
       {"workspace_sha256", InputHash(options.depth.workspace)}};
@@ -252,7 +252,8 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
   const SparseScene sparse = SparseOf(calibrated, views);
 
   log.Begin("depth");
-  DepthStage(set, sparse, options.depth, effort, {options.threads, options.seed}, writer, progress);
+  const stereo::Effort spent = DepthStage(set, sparse, options.depth, effort,
+                                          {options.threads, options.seed}, writer, progress);
 
   log.Begin("finishing");
   FinishScene(set, SourcePoints(sparse, views), writer, options.threads);
@@ -260,9 +261,9 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
   const calib::ValidationReport validation =
       Validate(set, sparse, report, options.threads, progress);
   writer.WriteSparse(set, sparse);
-  set.provenance_json =
-      ProvenanceJson(options, option_values, PhotosJson(photos, is_source), calibrated, report)
-          .dump();
+  set.provenance_json = ProvenanceJson(options, OptionsJson(options, spent, max_size_px),
+                                       PhotosJson(photos, is_source), calibrated, report)
+                            .dump();
   WriteSetPage(writer, set,
                {options.output.stem().string(), options.depth.engine, validation.tests,
                 report.skipped, report.not_registered.size(), options.threads});

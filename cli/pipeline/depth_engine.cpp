@@ -63,6 +63,10 @@ void RequireEngine(const DepthChoice& choice) {
     throw UsageError(
         fmt::format("--workspace: is read by --engine colmap, found --engine {}", choice.engine));
   }
+  if (choice.time_budget_s && choice.engine != "patchmatch") {
+    throw UsageError(fmt::format("--time-budget: picks settings of --engine patchmatch, found {}",
+                                 choice.engine));
+  }
   if (choice.engine == "colmap" && choice.workspace.empty()) colmap::RequireCuda();
 }
 

@@ -24,8 +24,8 @@ struct DepthSources {
 };
 
 /// Refuses, before anything costs time, a choice that cannot be carried out on this machine:
-/// UsageError for a workspace without engine `colmap`; Error when `colmap` shall compute and has no
-/// CUDA.
+/// UsageError for a workspace without engine `colmap` or a time budget without `patchmatch`; Error
+/// when `colmap` shall compute and has no CUDA.
 void RequireEngine(const DepthChoice& choice);
 
 /// The engine of a choice; null for "none". Engine `colmap` without a workspace has one filled by

@@ -36,13 +36,30 @@ const Preset& PresetCalled(const std::string& name) {
   throw UsageError(fmt::format("--preset: expected fast, balanced or best, found '{}'", name));
 }
 
-stereo::Effort EffortOf(const DepthChoice& choice) {
-  stereo::Effort effort = PresetCalled(choice.preset).effort;
+stereo::Effort Overridden(stereo::Effort effort, const DepthChoice& choice) {
   effort.neighbours = choice.neighbours.value_or(effort.neighbours);
   effort.round_neighbours = choice.round_neighbours.value_or(effort.round_neighbours);
   effort.iterations = choice.iterations.value_or(effort.iterations);
   effort.rounds = choice.rounds.value_or(effort.rounds);
   return effort;
+}
+
+stereo::Effort EffortOf(const DepthChoice& choice) {
+  return Overridden(PresetCalled(choice.preset).effort, choice);
+}
+
+stereo::Effort EffortFromJson(const std::string& text, const std::string& where) {
+  try {
+    const auto json = nlohmann::json::parse(text);
+    return {.neighbours = json.at("neighbours"),
+            .round_neighbours = json.at("round_neighbours"),
+            .iterations = json.at("iterations"),
+            .rounds = json.at("rounds")};
+  } catch (const nlohmann::json::exception&) {
+    throw Error(where +
+                ": expected the settings that a time budget picked, found something else; delete "
+                "the partial set and build again");
+  }
 }
 
 nlohmann::ordered_json SettingsJson(const std::string& engine, const stereo::Effort& effort) {

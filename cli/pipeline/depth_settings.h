@@ -30,15 +30,21 @@ struct DepthChoice {
   std::string engine = "patchmatch";  ///< "none": no depth
   std::string preset = "balanced";
   std::optional<int> neighbours, round_neighbours, iterations, rounds;
-  std::optional<double> memory_gb;  ///< 1e9 bytes; absent: kDefaultMemoryGb, or what is needed
-  std::filesystem::path workspace;  ///< for engine "colmap"; empty: the program fills one
+  std::optional<double> time_budget_s;  ///< picks what is not given explicitly
+  std::optional<double> memory_gb;      ///< 1e9 bytes; absent: kDefaultMemoryGb, or what is needed
+  std::filesystem::path workspace;      ///< for engine "colmap"; empty: the program fills one
 };
 
-/// The effort that a choice comes to.
+/// An effort with what the choice gives explicitly in its place.
+stereo::Effort Overridden(stereo::Effort effort, const DepthChoice& choice);
+
+/// The effort that a choice comes to, but for a time budget.
 stereo::Effort EffortOf(const DepthChoice& choice);
 
 /// What of the engine and its effort decides the bytes of a depth map, by the names of the options:
 /// given explicitly, they make the same maps whatever preset they came from.
 nlohmann::ordered_json SettingsJson(const std::string& engine, const stereo::Effort& effort);
+/// The effort in what SettingsJson gave for `patchmatch`. Throws Error naming `where`.
+stereo::Effort EffortFromJson(const std::string& text, const std::string& where);
 
 }  // namespace dtr::pipeline

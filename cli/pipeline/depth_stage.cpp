@@ -8,6 +8,7 @@
 
 #include "cli/pipeline/depth_engine.h"
 #include "cli/pipeline/plane_files.h"
+#include "cli/pipeline/time_budget.h"
 #include "dtr/base/error.h"
 #include "stereo/depth_maps.h"
 
@@ -33,6 +34,7 @@ SparseScene SourceScene(const SparseScene& sparse, const std::vector<View>& view
 // What the program itself takes: code, libraries, points and whatever is not counted one by one.
 constexpr std::uint64_t kProgramBytes = std::uint64_t{256} << 20;
 constexpr double kBytesPerGb = 1e9;
+constexpr int kWidenings = 3;
 
 // Runs `compute` within the memory chosen.
 void ComputeWithin(const std::optional<double>& memory_gb, stereo::DepthMapsOptions& options,
@@ -93,6 +95,20 @@ void WriteDepth(View& view, stereo::DepthEstimate&& estimate, LengthUnit unit,
   view.inverse_depth_sigma.reset();
 }
 
+// The effort that fits into the time budget, by a probe with as many neighbours as any effort asks.
+stereo::Effort WithinBudget(std::span<const stereo::StereoView> views, const SparseScene& scene,
+                            const DepthChoice& choice, const stereo::DepthMapsOptions& options,
+                            const std::filesystem::path& record, Progress& progress) {
+  stereo::NeighbourOptions most;
+  most.count = stereo::MakeEngine("patchmatch")->Neighbours();
+  const auto neighbours = stereo::ChooseNeighbours(views, scene, most);
+  const auto ranges = stereo::DepthRangesFromPoints(views, scene, options.range);
+  stereo::Pages pages;
+  return EffortWithinBudget(
+      {views, neighbours, ranges, nullptr, options.engine, options.load_pixels, &pages}, choice,
+      record, progress);
+}
+
 }  // namespace
 
 void StoreImage(View& view, LengthUnit unit, io::SetWriter& writer) {
@@ -101,37 +117,42 @@ void StoreImage(View& view, LengthUnit unit, io::SetWriter& writer) {
   view.mask = {};
 }
 
-void DepthStage(DtrSet& set, const SparseScene& sparse, const DepthChoice& choice,
-                const stereo::Effort& effort, const DepthStageOptions& options,
-                io::SetWriter& writer, Progress& progress) {
+stereo::Effort DepthStage(DtrSet& set, const SparseScene& sparse, const DepthChoice& choice,
+                          const stereo::Effort& asked, const DepthStageOptions& options,
+                          io::SetWriter& writer, Progress& progress) {
   if (choice.engine == "none") {
     progress.Note("depth left out: --engine none");
-    return;
+    return asked;
   }
   std::vector<View>& views = set.frames.front().views;
   const Sources sources(views);
   const SparseScene scene = SourceScene(sparse, views, sources.indices);
-  const auto engine = MakeDepthEngine(choice, effort,
-                                      {views, sources.indices, sources.stereo, &scene,
-                                       set.world_origin, writer.folder(), writer.work_folder()},
-                                      progress);
   const auto view_of = [&](int source) -> View& {
     return views[static_cast<size_t>(sources.indices[static_cast<size_t>(source)])];
   };
 
   stereo::DepthMapsOptions depth_options;
-  depth_options.neighbours.count = engine->Neighbours();
+  depth_options.widenings = kWidenings;
   depth_options.engine.threads = options.threads;
   depth_options.engine.seed = options.seed;
+  depth_options.load_pixels = [&](int source) {
+    return ReadPixels(writer.folder(), view_of(source), options.threads);
+  };
+  const stereo::Effort effort = choice.time_budget_s
+                                    ? WithinBudget(sources.stereo, scene, choice, depth_options,
+                                                   writer.work_folder() / "effort.json", progress)
+                                    : asked;
+  const auto engine = MakeDepthEngine(choice, effort,
+                                      {views, sources.indices, sources.stereo, &scene,
+                                       set.world_origin, writer.folder(), writer.work_folder()},
+                                      progress);
+  depth_options.neighbours.count = engine->Neighbours();
   // The other half holds photos, and maps that wait for their neighbours to be done.
   depth_options.engine.memory_gb = choice.memory_gb.value_or(kDefaultMemoryGb) / 2;
   PlaneFiles planes(writer.work_folder() / "planes");
   EstimateFiles estimates(writer.work_folder() / "estimates");
   depth_options.planes = &planes;
   depth_options.estimates = &estimates;
-  depth_options.load_pixels = [&](int source) {
-    return ReadPixels(writer.folder(), view_of(source), options.threads);
-  };
   ComputeWithin(choice.memory_gb, depth_options, progress, [&] {
     stereo::ComputeDepthMaps(
         sources.stereo, scene, *engine, depth_options, progress,
@@ -140,6 +161,7 @@ void DepthStage(DtrSet& set, const SparseScene& sparse, const DepthChoice& choic
           WriteDepth(view_of(source), std::move(estimate), set.unit, writer);
         });
   });
+  return effort;
 }
 
 }  // namespace dtr::pipeline

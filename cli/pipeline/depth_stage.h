@@ -23,9 +23,10 @@ void StoreImage(View& view, LengthUnit unit, io::SetWriter& writer);
 /// refused later by renderers) and writes it through `writer`, which has the views' images
 /// (StoreImage). Views finished by an earlier, interrupted run are taken from the writer. Only
 /// source views and the points they alone know reach the engine. Pixels are in memory only as long
-/// as they are worked with, within the memory chosen: UsageError when that is too little.
-void DepthStage(DtrSet& set, const SparseScene& sparse, const DepthChoice& choice,
-                const stereo::Effort& effort, const DepthStageOptions& options,
-                io::SetWriter& writer, Progress& progress);
+/// as they are worked with, within the memory chosen: UsageError when that is too little. Returns
+/// the effort spent: `effort` or, with a time budget, what fitted into that.
+stereo::Effort DepthStage(DtrSet& set, const SparseScene& sparse, const DepthChoice& choice,
+                          const stereo::Effort& effort, const DepthStageOptions& options,
+                          io::SetWriter& writer, Progress& progress);
 
 }  // namespace dtr::pipeline

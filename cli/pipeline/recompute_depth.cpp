@@ -63,7 +63,6 @@ void CopyImages(const std::filesystem::path& from, DtrSet& set, int threads, io:
 RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& progress) {
   const stereo::Effort effort = EffortOf(options.depth);
   RequireEngine(options.depth);
-  const nlohmann::ordered_json settings = SettingsJson(options.depth.engine, effort);
   const bool in_place = options.output.empty();
   RunLog log;
   log.Begin("depth");
@@ -73,14 +72,16 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& progre
   const SparseScene sparse = io::LoadSparse(options.set, set);
 
   const nlohmann::json fingerprint = {{"tool_version", DTR_VERSION},
-                                      {"settings", settings},
+                                      {"settings", SettingsJson(options.depth.engine, effort)},
+                                      {"time_budget_s", options.depth.time_budget_s.value_or(0)},
                                       {"seed", options.seed},
                                       {"workspace_sha256", InputHash(options.depth.workspace)},
                                       {"set_sha256", Sha256OfFile(options.set / "set.json")},
                                       {"held_out", HeldOutHashes(set)}};
   io::SetWriter writer(report.written, fingerprint.dump(), in_place || options.force);
   CopyImages(options.set, set, options.threads, writer, progress);
-  DepthStage(set, sparse, options.depth, effort, {options.threads, options.seed}, writer, progress);
+  const stereo::Effort spent = DepthStage(set, sparse, options.depth, effort,
+                                          {options.threads, options.seed}, writer, progress);
   FinishScene(set, {}, writer, options.threads);
   const DepthCount count = WriteMeshes(set, writer, options.threads);
   writer.WriteSparse(set, sparse);
@@ -89,7 +90,7 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& progre
   for (const char* old : {"neighbours", "round_neighbours", "iterations", "rounds"}) {
     provenance["options"].erase(old);
   }
-  provenance["options"].update(settings);
+  provenance["options"].update(SettingsJson(options.depth.engine, spent));
   provenance["options"]["seed"] = options.seed;
   set.provenance_json = provenance.dump();
   report.depth_maps = count.maps;

@@ -51,6 +51,17 @@ class DepthSettings : public ::testing::Test {
     return Json::parse(Text(set / "set.json")).at("provenance").at("options");
   }
 
+  // Options that say what a set recorded.
+  static std::vector<std::string> ExplicitlyAs(const Json& recorded) {
+    std::vector<std::string> options;
+    for (const std::string name : {"neighbours", "round_neighbours", "iterations", "rounds"}) {
+      std::string option = "--" + name;
+      std::replace(option.begin(), option.end(), '_', '-');
+      options.insert(options.end(), {option, std::to_string(recorded.at(name).get<int>())});
+    }
+    return options;
+  }
+
   static TemporaryFolder* shared_;
   TemporaryFolder folder_;
 };
@@ -64,15 +75,22 @@ TEST_F(DepthSettings, BalancedIsWhatRunsUnlessToldOtherwise) {
 }
 
 TEST_F(DepthSettings, WhatASetRecordsGivenExplicitlyMakesTheSameBytes) {
-  const Json recorded = OptionsOf(Fast());
-  std::vector<std::string> explicitly;
-  for (const char* name : {"neighbours", "round_neighbours", "iterations", "rounds"}) {
-    std::string option = std::string("--") + name;
-    std::replace(option.begin() + 2, option.end(), '_', '-');
-    explicitly.insert(explicitly.end(), {option, std::to_string(recorded.at(name).get<int>())});
-  }
+  const auto explicitly = ExplicitlyAs(OptionsOf(Fast()));
   EXPECT_THAT(DifferingFiles(Contents(Fast()), Contents(Stereo("explicit", explicitly))),
               IsEmpty());
+}
+
+TEST_F(DepthSettings, ATimeBudgetPicksSettingsThatMakeTheSameBytesAgain) {
+  const fs::path hurried = Stereo("hurried", {"--time-budget", "0.001"});
+  EXPECT_EQ(OptionsOf(hurried).at("rounds"), 0);
+  const auto again = Contents(Stereo("unhurried", ExplicitlyAs(OptionsOf(hurried))));
+  EXPECT_THAT(DifferingFiles(Contents(hurried), again), IsEmpty());
+  // What is given explicitly stays.
+  EXPECT_EQ(OptionsOf(Stereo("partly", {"--time-budget", "0.001", "--rounds", "1"})).at("rounds"),
+            1);
+  ExpectRefused(Dtr({"stereo", Cameras().string(), "-o", (folder_ / "no.dtr").string(), "--engine",
+                     "sgbm", "--time-budget", "9"}),
+                2, "--time-budget: picks settings of --engine patchmatch");
 }
 
 TEST_F(DepthSettings, AnExplicitOptionOverridesThePreset) {

@@ -14,7 +14,8 @@ namespace {
 namespace fs = std::filesystem;
 
 stereo::PlaneMap Planes() {
-  stereo::PlaneMap map{Grid<float>(3, 2, 1, 0.5f), Grid<float>(3, 2, 1, -1e-3f), Grid<float>(3, 2), 2.5};
+  stereo::PlaneMap map{Grid<float>(3, 2, 1, 0.5f), Grid<float>(3, 2, 1, -1e-3f), Grid<float>(3, 2),
+                       2.5};
   map.inverse_depth(2, 1) = 0.25f;
   return map;
 }
