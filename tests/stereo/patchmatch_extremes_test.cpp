@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numbers>
 
 #include "tests/stereo/extremes_rig.h"
 
@@ -177,6 +176,28 @@ TEST(PatchMatchExtremes, AWallWithoutTextureHasNoDepthAfterAllRounds) {
   }
   const auto views = ViewsOf(shots);
   EXPECT_LT(ScoreFirst(views, WholeRun(views, kRange), shots[0].truth).kept, 0.01);
+}
+
+TEST(PatchMatchExtremes, AMirrorHarmsNothingBesideIt) {
+  // Left of the middle, a mirror of things far away; the wall it hangs on beside it.
+  std::vector<Shot> shots;
+  for (const Vector3d& centre :
+       {Vector3d(0, 0, 0), Vector3d(0.4, 0, 0), Vector3d(-0.4, 0, 0), Vector3d(0, 0.4, 0)}) {
+    const auto paint = [](const Vector3d& p, const Vector3d& direction) {
+      const Vector3d mirrored(direction.x(), direction.y(), -direction.z());
+      return p.x() < 0 ? Texture(4 * mirrored.normalized(), kTextureSize)
+                       : Texture(p, kTextureSize);
+    };
+    shots.push_back(Photograph(Plane({0, 0, 1}, 4), kCamera, Facing(centre), paint));
+  }
+  const auto views = ViewsOf(shots);
+  const DepthEstimate estimate = WholeRun(views, kRange);
+  // The windows are 7 pixels wide.
+  const Score beside =
+      ScoreFirst(views, estimate, shots[0].truth, [](int x, int) { return x > kWidth / 2 + 3; });
+  EXPECT_GT(beside.kept, 0.95);
+  EXPECT_LT(beside.median_px, LimitPx(shots[0], {1, 0}));
+  EXPECT_LT(beside.past_1px, 0.01);
 }
 
 TEST(PatchMatchExtremes, PicturesOfEightPixels) {
