@@ -9,6 +9,7 @@
 #include "dtr/cpu/resolve.h"
 #include "dtr/render/fill_holes.h"
 #include "dtr/render/frame.h"
+#include "dtr/render/texture.h"
 #include "dtr/render/valid_views.h"
 
 namespace dtr::cpu {
@@ -66,6 +67,16 @@ std::vector<Layer> DrawLayers(const std::vector<ViewInNovel>& views, const Pinho
   return layers;
 }
 
+/// SPEC 1.4; `order`: the views' indices into the scene.
+void SetCutFactors(const ViewSelection& selection, const std::vector<int>& order,
+                   std::vector<ResolveView>& views) {
+  const std::vector<double> factors = CutFactors(selection, selection.views.size());
+  for (size_t k = 0; k < factors.size(); ++k) {
+    const auto at = std::find(order.begin(), order.end(), selection.views[k]);
+    views[static_cast<size_t>(at - order.begin())].cut_factor = factors[k];
+  }
+}
+
 RenderResult Draw(const RenderScene& scene, const PinholeCamera& novel,
                   const Pose& novel_from_world, const RenderOptions& options,
                   double start_shift_px) {
@@ -89,6 +100,11 @@ RenderResult Draw(const RenderScene& scene, const PinholeCamera& novel,
         -(placed[i].rotation.transpose() * placed[i].translation);
     views[i].delta_inverse_depth = ThresholdsOf(*placed[i].view, options).delta;
   }
+  ParallelFor(0, static_cast<int>(views.size()), options.threads, [&](int i) {
+    ResolveView& view = views[static_cast<size_t>(i)];
+    view.rim_factors = RimFactors(*view.in_novel->view);
+  });
+  SetCutFactors(selection, order, views);
   ResolveSettings settings;
   settings.novel = novel;
   settings.blend = BlendParametersOf(options, novel.fx_px());

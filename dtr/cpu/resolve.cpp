@@ -8,6 +8,7 @@
 #include "dtr/render/colour.h"
 #include "dtr/render/geometry.h"
 #include "dtr/render/texture.h"
+#include "dtr/render/valid_views.h"
 
 namespace dtr::cpu {
 namespace {
@@ -117,21 +118,32 @@ class RowResolver {
   /// SPEC 1.3: per pixel the K nearest by angle; views tied with the K-th stay.
   void KeepNearestByAngle() {
     const auto count = static_cast<size_t>(settings_.views);
+    cut_rad_ = settings_.blend.max_angle_rad;
     if (fragments_.size() <= count) return;
     std::vector<double> angles;
     for (const Fragment& f : fragments_) angles.push_back(f.angle_rad);
-    std::nth_element(angles.begin(), angles.begin() + static_cast<std::ptrdiff_t>(count) - 1,
-                     angles.end());
+    std::sort(angles.begin(), angles.end());
     const double limit = angles[count - 1];
+    cut_rad_ = angles[count];
     std::erase_if(fragments_, [&](const Fragment& f) { return f.angle_rad > limit; });
   }
 
-  /// SPEC 4.5 to 4.7: weights, one sum, one division.
+  /// SPEC 1.4 and 4.8.
+  double FactorOf(const Fragment& f) const {
+    const double cut =
+        settings_.per_pixel_rule ? CutFactor(f.angle_rad, cut_rad_) : f.view->cut_factor;
+    return cut * RimFactorAt(f.view->rim_factors, f.source_pixel);
+  }
+
+  /// SPEC 4.5 to 4.8: weights, one sum, one division.
   void Blend(int x, int y, RenderResult& result) {
     angles_.clear();
     for (const Fragment& f : fragments_) angles_.push_back(f.angle_rad);
     shares_.resize(angles_.size());
     const int blended = BlendShares(settings_.blend, angles_, shares_);
+    factors_.clear();
+    for (const Fragment& f : fragments_) factors_.push_back(FactorOf(f));
+    FadeShares(factors_, shares_);
     result.view_count(x, y) = static_cast<std::uint8_t>(std::min(blended, 255));
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     for (size_t i = 0; i < fragments_.size(); ++i) {
@@ -149,7 +161,8 @@ class RowResolver {
   const ResolveSettings& settings_;
   const std::span<const ResolveView> views_;
   std::vector<Fragment> fragments_;
-  std::vector<double> angles_, shares_;
+  std::vector<double> angles_, shares_, factors_;
+  double cut_rad_ = 0;  ///< SPEC 1.4, with the per-pixel rule
 };
 
 }  // namespace

@@ -15,6 +15,8 @@ struct ResolveView {
   Eigen::Matrix3d view_from_novel_rotation = Eigen::Matrix3d::Identity();
   Eigen::Vector3d view_from_novel_translation = Eigen::Vector3d::Zero();
   double delta_inverse_depth = 0;  ///< Delta of this view as a difference of 1/z
+  double cut_factor = 1;           ///< SPEC 1.4
+  Grid<std::uint8_t> rim_factors;  ///< SPEC 4.8
 };
 
 /// What it needs to know about the picture.

@@ -37,6 +37,8 @@ void CoarseDepth::AddBatches(int first, int count, int log2_sharing) {
 
 void CoarseDepth::Draw(const Frame& frame, const Band& band, const MeshStore& meshes,
                        ProgramCache& programs, const Targets& targets) {
+  if (!by_shaders_) DrawOnProcessor(frame, band, meshes);
+  if (frame.on_processor) return;
   const auto pixels = static_cast<GLsizeiptr>(targets.width) * targets.rows;
   if (!buffer_) buffer_ = Buffer::Make();
   glBindBuffer(GL_SHADER_STORAGE_BUFFER, buffer_.name());
@@ -48,7 +50,9 @@ void CoarseDepth::Draw(const Frame& frame, const Band& band, const MeshStore& me
   if (by_shaders_) {
     DrawByShaders(frame, band, meshes, programs);
   } else {
-    DrawOnProcessor(frame, band, meshes);
+    glBufferSubData(GL_SHADER_STORAGE_BUFFER, 0,
+                    static_cast<GLsizeiptr>(raster_.nearest().size() * sizeof(float)),
+                    raster_.nearest().data());
   }
 }
 
@@ -59,9 +63,6 @@ void CoarseDepth::DrawOnProcessor(const Frame& frame, const Band& band, const Me
     placed.push_back({&mesh, PlaceGrid(*frame.views[i], mesh, frame.placements[i], frame.novel)});
   }
   raster_.Draw(placed, frame.novel.width_px(), band, frame.options.threads);
-  glBufferSubData(GL_SHADER_STORAGE_BUFFER, 0,
-                  static_cast<GLsizeiptr>(raster_.nearest().size() * sizeof(float)),
-                  raster_.nearest().data());
 }
 
 void CoarseDepth::DrawByShaders(const Frame& frame, const Band& band, const MeshStore& meshes,

@@ -27,6 +27,9 @@ class CoarseDepth {
   /// targets' width, the band's first row first. Valid after Draw.
   GLuint buffer() const { return buffer_.name(); }
 
+  /// The same in memory, for frames that are drawn on the processor; there is no buffer of those.
+  const std::vector<float>& nearest() const { return raster_.nearest(); }
+
  private:
   /// What a group of invocations draws, as coarse_depth.glsl says.
   struct Batch {

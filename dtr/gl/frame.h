@@ -15,9 +15,18 @@ struct Frame {
   const RenderScene& scene;
   const PinholeCamera& novel;
   const RenderOptions& options;
-  bool per_pixel = false;  ///< SPEC 1.3
+  bool per_pixel = false;     ///< SPEC 1.3
+  bool on_processor = false;  ///< ProcessorResolver draws it
   std::vector<const View*> views;
   std::vector<ViewPlacement> placements;  ///< of the views
+  std::vector<double> cut_factors;        ///< SPEC 1.4, of the views
+
+  void Erase(size_t view) {
+    const auto at = static_cast<std::ptrdiff_t>(view);
+    views.erase(views.begin() + at);
+    placements.erase(placements.begin() + at);
+    cut_factors.erase(cut_factors.begin() + at);
+  }
   bool deferred() const { return options.method == RenderMethod::kDeferred; }
 };
 

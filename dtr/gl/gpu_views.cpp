@@ -37,12 +37,14 @@ size_t GpuViews::bytes() const {
 void GpuViews::Clear() {
   store_.Clear();
   meshes_.Clear();
+  sampled_.Clear();
   used_.clear();
 }
 
 void GpuViews::Drop(const View& view) {
   store_.Drop(view);
   meshes_.Drop(view);
+  sampled_.Drop(view);
   used_.erase(&view);
 }
 
@@ -69,22 +71,39 @@ int GpuViews::LayersFor(const Frame& frame, const View& view) {
       std::clamp<size_t>(fitting, 1, std::max<size_t>(1, static_cast<size_t>(alike))));
 }
 
+void GpuViews::PutTextures(const Frame& frame, const std::vector<const View*>& views) {
+  std::map<const View*, int> layers;  // by what the geometry takes, before images and depths do
+  for (const View* view : views) layers[view] = LayersFor(frame, *view);
+  const auto new_layers = [&](const View& view) { return layers.at(&view); };
+  store_.PrepareImages(views, sizes_, new_layers);
+  if (frame.deferred()) store_.PrepareDeferred(views, frame.options, sizes_, new_layers);
+}
+
 void GpuViews::Put(const Frame& frame, const std::vector<const View*>& views) {
   if (frame.deferred()) {
     meshes_.Prepare(views, frame.options);
   } else {
     store_.Prepare(views, frame.options);
   }
-  std::map<const View*, int> layers;  // by what the geometry takes, before images and depths do
-  for (const View* view : views) layers[view] = LayersFor(frame, *view);
-  const auto new_layers = [&](const View& view) { return layers.at(&view); };
-  store_.PrepareImages(views, sizes_, new_layers);
-  if (frame.deferred()) store_.PrepareDeferred(views, frame.options, sizes_, new_layers);
+  if (frame.on_processor) {
+    sampled_.Prepare(views, frame.options);
+  } else {
+    PutTextures(frame, views);
+  }
   for (const View* view : views) used_[view] = {BytesOf(*view), now_};
 }
 
+bool GpuViews::HasSamples(const Frame& frame, const View& view) {
+  return frame.on_processor ? sampled_.Of(view).columns > 0 : store_.DeferredOf(view) != nullptr;
+}
+
 void GpuViews::DropUnused(const Frame& frame, const View& view) {
-  store_.DropUnusedBy(frame.options, view);
+  if (frame.on_processor) {
+    store_.Drop(view);
+  } else {
+    store_.DropUnusedBy(frame.options, view);
+    sampled_.Drop(view);
+  }
   if (!frame.deferred()) meshes_.Drop(view);
   used_[&view].bytes = BytesOf(view);
 }
@@ -130,8 +149,7 @@ size_t GpuViews::PutWithinRoom(Frame& frame, const std::vector<const View*>& nea
   for (size_t k = fitting; k < nearest_first.size(); ++k) {
     if (used_.contains(nearest_first[k])) Drop(*nearest_first[k]);
     const auto at = std::find(frame.views.begin(), frame.views.end(), nearest_first[k]);
-    frame.placements.erase(frame.placements.begin() + (at - frame.views.begin()));
-    frame.views.erase(at);
+    frame.Erase(static_cast<size_t>(at - frame.views.begin()));
   }
   return fitting;
 }

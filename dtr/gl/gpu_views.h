@@ -8,6 +8,7 @@
 
 #include "dtr/gl/frame.h"
 #include "dtr/gl/mesh_store.h"
+#include "dtr/gl/sampled_views.h"
 #include "dtr/gl/view_store.h"
 
 namespace dtr::gl {
@@ -30,6 +31,11 @@ class GpuViews {
   size_t bytes() const;
   ViewStore& store() { return store_; }
   const MeshStore& meshes() const { return meshes_; }
+  /// Of frames that are drawn on the processor; counted as what lies on the GPU, for it takes the
+  /// place of that.
+  const SampledViews& sampled() const { return sampled_; }
+  /// After Prepare, for the deferred method: false where R leaves no sample of the view.
+  bool HasSamples(const Frame& frame, const View& view);
   void Clear();
 
  private:
@@ -40,7 +46,10 @@ class GpuViews {
 
   size_t PutWithinRoom(Frame& frame, const std::vector<const View*>& nearest_first);
   void Put(const Frame& frame, const std::vector<const View*>& views);
-  size_t BytesOf(const View& view) { return store_.BytesOf(view) + meshes_.BytesOf(view); }
+  void PutTextures(const Frame& frame, const std::vector<const View*>& views);
+  size_t BytesOf(const View& view) {
+    return store_.BytesOf(view) + meshes_.BytesOf(view) + sampled_.BytesOf(view);
+  }
   /// As many views of this view's size as the scene has and the room holds.
   int LayersFor(const Frame& frame, const View& view);
   bool DropOldest();
@@ -51,6 +60,7 @@ class GpuViews {
   LayerSizes sizes_;  ///< of the present frame's scene: the same for each of its cameras
   ViewStore store_;
   MeshStore meshes_;
+  SampledViews sampled_;
   std::map<const View*, Used> used_;  ///< the views on the GPU
   std::uint64_t now_ = 0;
 };

@@ -11,8 +11,8 @@
 #include "dtr/gl/frame.h"
 #include "dtr/gl/gpu_views.h"
 #include "dtr/gl/objects.h"
+#include "dtr/gl/processor_resolve.h"
 #include "dtr/gl/program.h"
-#include "dtr/gl/quick_resolve.h"
 #include "dtr/gl/read_back.h"
 #include "dtr/gl/resolve.h"
 #include "dtr/gl/two_pass.h"
@@ -59,14 +59,26 @@ void CheckViewCount(size_t views) {
 }
 
 Frame MakeFrame(const RenderScene& scene, const PinholeCamera& novel, const Pose& novel_from_world,
-                const RenderOptions& options, const ViewSelection& selection) {
-  Frame frame{scene, novel, options, selection.per_pixel, {}, {}};
+                const RenderOptions& options, const ViewSelection& selection, bool processor_fits) {
+  Frame frame{scene, novel, options, selection.per_pixel, false, {}, {}, {}};
   for (const int index : CanonicalOrder(scene, selection.views)) {
     const View& view = *scene.views[static_cast<size_t>(index)];
     frame.views.push_back(&view);
     frame.placements.push_back(PlaceView(view, novel_from_world));
+    frame.cut_factors.push_back(1);
   }
+  frame.on_processor = processor_fits && ProcessorResolver::Draws(frame);
   return frame;
+}
+
+/// SPEC 1.4, where the `count` nearest of the selection's views are drawn.
+void SetCutFactors(const ViewSelection& selection, size_t count, Frame& frame) {
+  const std::vector<double> factors = CutFactors(selection, count);
+  for (size_t k = 0; k < count; ++k) {
+    const View* view = frame.scene.views[static_cast<size_t>(selection.views[k])];
+    const auto at = std::find(frame.views.begin(), frame.views.end(), view);
+    frame.cut_factors[static_cast<size_t>(at - frame.views.begin())] = factors[k];
+  }
 }
 
 }  // namespace
@@ -90,7 +102,8 @@ class Renderer::Implementation {
     result.views_used = selection.views;
     if (selection.views.empty()) return result;
     CheckPictureSize(novel);
-    DrawInBands(MakeFrame(scene, novel, novel_from_world, options, selection), result);
+    DrawInBands(MakeFrame(scene, novel, novel_from_world, options, selection, !coarse_by_shaders_),
+                selection, result);
     result.coverage_share = CoverageShare(result.coverage);
     if (options.fill_holes) FillHolesFromViews(scene, novel, novel_from_world, options, result);
     return result;
@@ -101,10 +114,12 @@ class Renderer::Implementation {
     CheckRenderOptions(options);
     CheckNovelCamera(novel, novel_from_world);
     CheckPictureSize(novel);
-    ViewSelection selection = SelectViews(scene, novel_from_world, options);
-    DrawWhole(MakeFrame(scene, novel, novel_from_world, options, selection), selection.views);
+    const ViewSelection selection = SelectViews(scene, novel_from_world, options);
+    std::vector<int> views_used = DrawWhole(
+        MakeFrame(scene, novel, novel_from_world, options, selection, !coarse_by_shaders_),
+        selection);
     drawn_ = DrawnPicture{targets_.image.name(), targets_.depth.name(), targets_.marks.name(),
-                          novel.width_px(),      novel.height_px(),     selection.views};
+                          novel.width_px(),      novel.height_px(),     std::move(views_used)};
     return *drawn_;
   }
 
@@ -122,23 +137,25 @@ class Renderer::Implementation {
   size_t gpu_bytes() const { return views_.bytes(); }
 
  private:
-  /// Puts on the GPU what the frame's method draws of its views; `views_used`, nearest first, loses
-  /// those that do not fit.
-  void Prepare(Frame& frame, std::vector<int>& views_used) {
+  /// Puts on the GPU what the frame's method draws of its views. Returns those that fit, nearest
+  /// first: the frame's K.
+  std::vector<int> Prepare(Frame& frame, const ViewSelection& selection) {
     std::vector<const View*> nearest_first;
-    for (const int index : views_used) {
+    for (const int index : selection.views) {
       nearest_first.push_back(frame.scene.views[static_cast<size_t>(index)]);
     }
+    const size_t wanted = selection.views.size();
     const size_t fitting = views_.Prepare(frame, nearest_first);
-    if (fitting < views_used.size()) WarnOfRoom(fitting, views_used.size());
-    views_used.resize(fitting);
-    if (!frame.deferred()) return;
-    // What no sample is left of at this resolution shows nothing.
-    for (size_t i = frame.views.size(); i-- > 0;) {
-      if (views_.store().DeferredOf(*frame.views[i]) != nullptr) continue;
-      frame.views.erase(frame.views.begin() + static_cast<std::ptrdiff_t>(i));
-      frame.placements.erase(frame.placements.begin() + static_cast<std::ptrdiff_t>(i));
+    if (fitting < wanted) WarnOfRoom(fitting, wanted);
+    SetCutFactors(selection, fitting, frame);
+    if (frame.deferred()) {
+      // What no sample is left of at this resolution shows nothing.
+      for (size_t i = frame.views.size(); i-- > 0;) {
+        if (!views_.HasSamples(frame, *frame.views[i])) frame.Erase(i);
+      }
     }
+    return {selection.views.begin(),
+            selection.views.begin() + static_cast<std::ptrdiff_t>(fitting)};
   }
 
   void WarnOfRoom(size_t fitting, size_t wanted) {
@@ -150,14 +167,14 @@ class Renderer::Implementation {
   }
 
   /// Band by band, so that the views' fragments stay within the memory for them.
-  void DrawInBands(Frame frame, RenderResult& result) {
+  void DrawInBands(Frame frame, const ViewSelection& selection, RenderResult& result) {
     drawn_.reset();
     ForgetErrors();
     const StateGuard guard;
     CheckViewCount(frame.views.size());
-    Prepare(frame, result.views_used);
+    result.views_used = Prepare(frame, selection);
     if (frame.views.empty()) return;
-    SetViews(frame);
+    if (!frame.on_processor) resolver_.SetViews(frame, views_.store());
     const int rows = RowsWithinMemory(frame);
     FitTargets(frame, rows);
     for (Band band; band.first < frame.novel.height_px(); band.first += band.count) {
@@ -168,26 +185,24 @@ class Renderer::Implementation {
     ThrowOnError("drawing");
   }
 
-  void DrawWhole(Frame frame, std::vector<int>& views_used) {
+  /// The whole picture at once; returns what it was drawn from, nearest first.
+  std::vector<int> DrawWhole(Frame frame, const ViewSelection& selection) {
     drawn_.reset();
     ForgetErrors();
     const StateGuard guard;
     CheckViewCount(frame.views.size());
-    if (!frame.views.empty()) Prepare(frame, views_used);
+    std::vector<int> views_used;
+    if (!frame.views.empty()) views_used = Prepare(frame, selection);
     CheckStorage(frame);
     FitTargets(frame, frame.novel.height_px());
     if (frame.views.empty()) {
       targets_.ClearResults();
     } else {
-      SetViews(frame);
+      if (!frame.on_processor) resolver_.SetViews(frame, views_.store());
       DrawBand(frame, {0, frame.novel.height_px()});
     }
     ThrowOnError("drawing");
-  }
-
-  void SetViews(const Frame& frame) {
-    quick_ = quick_resolver_.SetViews(frame, views_.store());
-    if (!quick_) resolver_.SetViews(frame, views_.store());
+    return views_used;
   }
 
   void DrawBand(const Frame& frame, const Band& band) {
@@ -197,9 +212,8 @@ class Renderer::Implementation {
       DrawViewLayers(frame, band, views_.store(), programs_, targets_,
                      HasClipControl() && !settings_.only_opengl_43);
     }
-    if (quick_) {
-      quick_resolver_.Draw(frame, band, views_.store(), programs_, targets_,
-                           coarse_depth_.buffer());
+    if (frame.on_processor) {
+      processor_resolver_.Draw(frame, band, views_.sampled(), targets_, coarse_depth_.nearest());
     } else {
       resolver_.Draw(frame, band, views_.store(), programs_, targets_, coarse_depth_.buffer());
     }
@@ -252,8 +266,7 @@ class Renderer::Implementation {
   Targets targets_;
   CoarseDepth coarse_depth_;
   Resolver resolver_;
-  QuickResolver quick_resolver_;
-  bool quick_ = false;                 ///< who draws the present frame
+  ProcessorResolver processor_resolver_;
   std::optional<DrawnPicture> drawn_;  ///< while it lies in targets_
 };
 

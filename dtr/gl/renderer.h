@@ -15,7 +15,8 @@
 
 namespace dtr::gl {
 
-/// Who draws the surface that the deferred method starts from (SPEC 5.1).
+/// Who draws the deferred method: the surface that it starts from (SPEC 5.1), and its pixels where
+/// ProcessorResolver knows how.
 enum class CoarseDrawer {
   kFitting,    ///< shaders, or our own code where the driver itself draws on the CPU
   kShaders,    ///< compute shaders

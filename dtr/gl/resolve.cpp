@@ -38,7 +38,8 @@ int RoomFor(int views) {
 }
 
 /// What both methods need to know of a view; slots are set by the caller.
-ViewBlock BlockOf(const View& view, const ViewPlacement& placed, const RenderOptions& options) {
+ViewBlock BlockOf(const View& view, const ViewPlacement& placed, double cut_factor,
+                  const RenderOptions& options) {
   ViewBlock block;
   block.row_x = Row(placed.rotation.row(0), placed.translation.x());
   block.row_y = Row(placed.rotation.row(1), placed.translation.y());
@@ -50,7 +51,7 @@ ViewBlock BlockOf(const View& view, const ViewPlacement& placed, const RenderOpt
                       static_cast<double>(view.image.height()), thresholds.delta},
                      thresholds.depth_break);
   block.stored_depth = {0, static_cast<float>(1 / placed.near_z),
-                        static_cast<float>(thresholds.pixel), 0};
+                        static_cast<float>(thresholds.pixel), static_cast<float>(cut_factor)};
   return block;
 }
 
@@ -112,7 +113,7 @@ void Resolver::SetViews(const Frame& frame, ViewStore& store) {
   for (size_t i = 0; i < frame.views.size(); ++i) {
     const View& view = *frame.views[i];
     const ImageSlot slot = store.ImageOf(view);
-    ViewBlock block = BlockOf(view, frame.placements[i], frame.options);
+    ViewBlock block = BlockOf(view, frame.placements[i], frame.cut_factors[i], frame.options);
     block.image = {SlotOf(image_arrays_, slot.array), slot.layer, view.mask.empty() ? 0 : 1, 0};
     if (frame.deferred()) {
       const ViewStore::Deferred& deferred = *store.DeferredOf(view);

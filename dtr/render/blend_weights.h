@@ -32,4 +32,8 @@ double NextAngle(const BlendParameters& parameters, std::span<const double> angl
 int BlendShares(const BlendParameters& parameters, std::span<const double> angles_rad,
                 std::span<double> shares);
 
+/// SPEC 4.8. Shares of views that fade by `factors` (above 0, at most 1), their sum 1 before and
+/// after.
+void FadeShares(std::span<const double> factors, std::span<double> shares);
+
 }  // namespace dtr

@@ -18,6 +18,8 @@ struct RenderScene {
   Bounds bounds;
   /// SPEC 1.3 decided beforehand, for one novel camera and from more views than these.
   std::optional<bool> per_pixel;
+  /// What memory holds; K is at most this.
+  std::optional<size_t> most_views;
 };
 
 /// SPEC 0.4. The source views of the set's first frame, without those whose id or name is in

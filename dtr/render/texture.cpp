@@ -44,13 +44,83 @@ Rgb MeanOfNeighbours(const View& view, int x, int y) {
   return mean;
 }
 
+// SPEC 4.8: the rim's width is this share of the image's longer side, in whole pixels, at least:
+constexpr double kRimShare = 1.0 / 48;
+constexpr int kLeastRimPx = 8;
+
+int RimWidth(const View& view) {
+  const int side = std::max(view.image.width(), view.image.height());
+  return std::max(kLeastRimPx, static_cast<int>(kRimShare * side));
+}
+
+/// Chessboard distance to the nearest pixel that is masked or off the image, at most `most`.
+/// Rosenfeld & Pfaltz 1966: two passes, each over the half of the neighbours that it has met.
+Grid<int> DistanceToUnusable(const View& view, int most) {
+  const int width = view.image.width(), height = view.image.height();
+  Grid<int> distance(width, height);
+  const auto at = [&](int x, int y) { return distance.Contains(x, y) ? distance(x, y) : 0; };
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const int least = std::min({at(x - 1, y), at(x - 1, y - 1), at(x, y - 1), at(x + 1, y - 1)});
+      distance(x, y) = Usable(view, x, y) ? std::min(least + 1, most) : 0;
+    }
+  }
+  for (int y = height - 1; y >= 0; --y) {
+    for (int x = width - 1; x >= 0; --x) {
+      const int least = std::min({at(x + 1, y), at(x + 1, y + 1), at(x, y + 1), at(x - 1, y + 1)});
+      distance(x, y) = std::min(distance(x, y), least + 1);
+    }
+  }
+  return distance;
+}
+
+/// The four pixel centres around a position, and their bilinear weights.
+struct Taps {
+  int columns[4], rows[4];
+  double weights[4];
+  Taps(int width, int height, const Eigen::Vector2d& pixel) {
+    const double x = std::clamp(pixel.x() - 0.5, 0.0, width - 1.0);
+    const double y = std::clamp(pixel.y() - 0.5, 0.0, height - 1.0);
+    const int x0 = static_cast<int>(x), y0 = static_cast<int>(y);
+    const double fx = x - x0, fy = y - y0;
+    for (int tap = 0; tap < 4; ++tap) {
+      const bool right = (tap & 1) != 0, below = tap >= 2;
+      columns[tap] = right ? std::min(x0 + 1, width - 1) : x0;
+      rows[tap] = below ? std::min(y0 + 1, height - 1) : y0;
+      weights[tap] = (right ? fx : 1 - fx) * (below ? fy : 1 - fy);
+    }
+  }
+};
+
 Rgb Sample(const View& view, int x, int y) {
   return Usable(view, x, y) ? Corrected(view, x, y) : MeanOfNeighbours(view, x, y);
 }
 
 }  // namespace
 
+Grid<std::uint8_t> RimFactors(const View& view) {
+  const int width = RimWidth(view);
+  const Grid<int> distance = DistanceToUnusable(view, width + 1);
+  Grid<std::uint8_t> factors(view.image.width(), view.image.height());
+  for (size_t p = 0; p < factors.data().size(); ++p) {
+    const int steps = distance.data()[p] - 1;  // from the outermost usable pixel
+    factors.data()[p] =
+        steps < 0 ? 0 : static_cast<std::uint8_t>(std::max(1, (255 * steps + width / 2) / width));
+  }
+  return factors;
+}
+
+double RimFactorAt(const Grid<std::uint8_t>& factors, const Eigen::Vector2d& pixel) {
+  const Taps taps(factors.width(), factors.height(), pixel);
+  double sum = 0;
+  for (size_t tap = 0; tap < 4; ++tap) {
+    sum += taps.weights[tap] * factors(taps.columns[tap], taps.rows[tap]);
+  }
+  return std::max(sum, 1.0) / 255;
+}
+
 std::vector<std::uint8_t> SampledImage(const View& view) {
+  const Grid<std::uint8_t> factors = RimFactors(view);
   const int width = view.image.width();
   std::vector<std::uint8_t> rgba(view.image.data().size() / 3 * 4);
   size_t at = 0;
@@ -58,7 +128,7 @@ std::vector<std::uint8_t> SampledImage(const View& view) {
     for (int x = 0; x < width; ++x, at += 4) {
       const Rgb rgb = Sample(view, x, y);
       std::copy(rgb.begin(), rgb.end(), rgba.begin() + static_cast<std::ptrdiff_t>(at));
-      rgba[at + 3] = Usable(view, x, y) ? 255 : 0;
+      rgba[at + 3] = factors(x, y);
     }
   }
   return rgba;
@@ -68,22 +138,16 @@ std::optional<Eigen::Vector3d> ColourAt(const View& view, const Eigen::Vector2d&
                                         bool linear_light) {
   const ImageRgb8& image = view.image;
   const std::array<double, 256>& linear = LinearFromSrgb8();
-  const double x = std::clamp(pixel.x() - 0.5, 0.0, image.width() - 1.0);
-  const double y = std::clamp(pixel.y() - 0.5, 0.0, image.height() - 1.0);
-  const int x0 = static_cast<int>(x), y0 = static_cast<int>(y);
-  const int x1 = std::min(x0 + 1, image.width() - 1), y1 = std::min(y0 + 1, image.height() - 1);
-  const double fx = x - x0, fy = y - y0;
-  const double weights[4] = {(1 - fx) * (1 - fy), fx * (1 - fy), (1 - fx) * fy, fx * fy};
-  const int columns[4] = {x0, x1, x0, x1}, rows[4] = {y0, y0, y1, y1};
+  const Taps taps(image.width(), image.height(), pixel);
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   bool usable = false;
   for (size_t tap = 0; tap < 4; ++tap) {
-    if (!(weights[tap] > 0)) continue;
-    usable = usable || Usable(view, columns[tap], rows[tap]);
-    const Rgb rgb = Sample(view, columns[tap], rows[tap]);
+    if (!(taps.weights[tap] > 0)) continue;
+    usable = usable || Usable(view, taps.columns[tap], taps.rows[tap]);
+    const Rgb rgb = Sample(view, taps.columns[tap], taps.rows[tap]);
     for (size_t c = 0; c < 3; ++c) {
       sum[static_cast<Eigen::Index>(c)] +=
-          weights[tap] * (linear_light ? linear[rgb[c]] : rgb[c] / 255.0);
+          taps.weights[tap] * (linear_light ? linear[rgb[c]] : rgb[c] / 255.0);
     }
   }
   if (!usable) return std::nullopt;

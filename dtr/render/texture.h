@@ -9,9 +9,16 @@
 
 namespace dtr {
 
+/// SPEC 4.8: what a view keeps of its weight at each pixel of its image, of 255. All but near the
+/// photo's rim and masked pixels; never 0 but at masked pixels.
+Grid<std::uint8_t> RimFactors(const View& view);
+
+/// The same at image position `pixel`, at most 1: bilinear, clamped at the border.
+double RimFactorAt(const Grid<std::uint8_t>& factors, const Eigen::Vector2d& pixel);
+
 /// The view's image as renderers sample it, RGBA, row by row: the photo times the view's gain (in
-/// linear light, cut at white, rounded to 8 bits of sRGB) with alpha 255. A masked pixel has alpha
-/// 0 and the mean of the usable ones among its 8 neighbours, black where there is none.
+/// linear light, cut at white, rounded to 8 bits of sRGB) with RimFactors as alpha. A masked pixel
+/// has the mean of the usable ones among its 8 neighbours, black where there is none.
 std::vector<std::uint8_t> SampledImage(const View& view);
 
 /// The colour at image position `pixel` (pixels, centre of the first at 0.5): bilinear between the

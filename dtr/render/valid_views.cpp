@@ -7,6 +7,26 @@
 #include "dtr/render/geometry.h"
 
 namespace dtr {
+namespace {
+
+// SPEC 1.4: factors fall over this share of the cut's angle, and never to 0.
+constexpr double kFallingShare = 0.25, kLeastFactor = 1.0 / 255;
+
+}  // namespace
+
+double CutFactor(double angle_rad, double cut_rad) {
+  if (!(cut_rad > 0)) return 1;
+  return std::clamp((cut_rad - angle_rad) / (kFallingShare * cut_rad), kLeastFactor, 1.0);
+}
+
+std::vector<double> CutFactors(const ViewSelection& selection, size_t count) {
+  std::vector<double> factors(count, 1.0);
+  if (selection.per_pixel) return factors;
+  const double cut_rad =
+      count < selection.angles_rad.size() ? selection.angles_rad[count] : selection.next_angle_rad;
+  for (size_t i = 0; i < count; ++i) factors[i] = CutFactor(selection.angles_rad[i], cut_rad);
+  return factors;
+}
 
 bool NeedsPerPixelRule(const RenderScene& scene, const Pose& novel_from_world) {
   if (scene.per_pixel) return *scene.per_pixel;
@@ -45,10 +65,17 @@ ViewSelection SelectViews(const RenderScene& scene, const Pose& novel_from_world
     return std::tie(a.angle_rad, a.distance, id_a, a.index) <
            std::tie(b.angle_rad, b.distance, id_b, b.index);
   });
-  if (!selection.per_pixel && candidates.size() > static_cast<size_t>(options.views)) {
-    candidates.resize(static_cast<size_t>(options.views));
+  selection.next_angle_rad = options.max_angle_rad;
+  const size_t most =
+      std::min(static_cast<size_t>(options.views), scene.most_views.value_or(candidates.size()));
+  if (!selection.per_pixel && candidates.size() > most) {
+    selection.next_angle_rad = candidates[most].angle_rad;
+    candidates.resize(most);
   }
-  for (const Candidate& candidate : candidates) selection.views.push_back(candidate.index);
+  for (const Candidate& candidate : candidates) {
+    selection.views.push_back(candidate.index);
+    selection.angles_rad.push_back(candidate.angle_rad);
+  }
   return selection;
 }
 

@@ -16,7 +16,18 @@ struct ViewSelection {
   /// True where the angle at the scene centre says nothing (SPEC 1.3): then renderers apply
   /// max_angle and K per pixel, at the 3D point (views tied with the K-th stay).
   bool per_pixel = false;
+  /// Sphere rule: the angles of `views` at the scene centre, and that of the nearest valid view
+  /// that is not among them, `max_angle_rad` where there is none.
+  std::vector<double> angles_rad;
+  double next_angle_rad = 0;
 };
+
+/// SPEC 1.4. What a view at angle a keeps of its weight where views beyond `cut_rad` count nothing.
+double CutFactor(double angle_rad, double cut_rad);
+
+/// SPEC 1.4 for the first `count` of the selection's views, as if K were `count`; with the
+/// per-pixel rule all are 1, for there angles at the point decide.
+std::vector<double> CutFactors(const ViewSelection& selection, size_t count);
 
 /// SPEC 1.3: true when the sphere rule cannot hold: the novel camera does not have the scene
 /// centre in front of it, or no more than half of the views have it inside their image.

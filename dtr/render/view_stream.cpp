@@ -235,11 +235,12 @@ RenderScene ViewStream::SceneFor(const Pose& novel_from_world, const RenderOptio
   std::vector<size_t> drawn = NotLost();
   if (wait == Wait::kForNone) {
     std::erase_if(drawn, [&](size_t slot) { return slots_[slot].state != State::kPresent; });
-  } else if (!all_fit) {
+  } else if (!all_fit && needed.per_pixel) {
     drawn = needed.slots;
     std::sort(drawn.begin(), drawn.end());
   }
   RenderScene scene = SceneOf(drawn);
+  if (!all_fit && wait == Wait::kForAll) scene.most_views = needed.slots.size();
   scene.per_pixel = needed.per_pixel;
   return scene;
 }

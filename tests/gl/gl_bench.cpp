@@ -54,7 +54,7 @@ int main(int argc, char** argv) {
   if (argc > 2) options.views = std::atoi(argv[2]);
   if (argc > 3) options.resolution = std::atoi(argv[3]);
   const dtr::gl::EglContext context;
-  dtr::gl::Frame frame{scene, novel.camera, options, false, {}, {}};
+  dtr::gl::Frame frame{scene, novel.camera, options, false, false, {}, {}, {}};
   double triangles = 0;
   for (const int index : dtr::SelectViews(scene, novel.cam_from_world, options).views) {
     const dtr::View& view = *scene.views[static_cast<size_t>(index)];

@@ -129,5 +129,35 @@ TEST(BlendShares, CountsTheViewsWithAWeight) {
   EXPECT_EQ(BlendShares(p, std::vector<double>{0.9, 0.6, 0.7}, shares), 1);
 }
 
+std::vector<double> Faded(std::vector<double> shares, const std::vector<double>& factors) {
+  FadeShares(factors, shares);
+  return shares;
+}
+
+TEST(FadeShares, HandWorkedNumbers) {
+  constexpr double kNear = 1e-5;  // what stands for others where there are none is 1e-6
+  // 0.8 falls to 0.2 of itself against 0.2 that stays: 0.8 * 0.2 * 0.2 / (0.2 + 0.8 * 0.8) =
+  // 0.0381.
+  const std::vector<double> faded = Faded({0.8, 0.2}, {0.2, 1});
+  EXPECT_NEAR(faded[0], 0.16, kNear);
+  EXPECT_NEAR(faded[1], 0.84, kNear);
+  EXPECT_EQ(Faded({0.8, 0.2}, {1, 1}), (std::vector<double>{0.8, 0.2}));
+  EXPECT_EQ(Faded({1}, {1.0 / 255}), std::vector<double>{1});  // alone it shows what it sees
+  EXPECT_EQ(Faded({0.5, 0.5}, {0.3, 0.3}), (std::vector<double>{0.5, 0.5}));
+}
+
+TEST(FadeShares, AShareFallsLinearlyHoweverMuchItWeighs) {
+  Random random(5);
+  for (int draw = 0; draw < 1000; ++draw) {
+    const double share = 1 - std::pow(10.0, random.Uniform(-4, -0.1));
+    const double part = random.Uniform(0, 1), factor = random.Uniform(1.0 / 255, 1);
+    const std::vector<double> faded =
+        Faded({share, part * (1 - share), (1 - part) * (1 - share)}, {factor, 1, 1});
+    ASSERT_NEAR(faded[0], factor * share, 0.01) << share;  // 1e-6 against others of 1e-4
+    ASSERT_NEAR(faded[0] + faded[1] + faded[2], 1, 1e-12);
+    ASSERT_NEAR(faded[1] * (1 - part), faded[2] * part, 1e-12);
+  }
+}
+
 }  // namespace
 }  // namespace dtr

@@ -69,6 +69,63 @@ TEST(SelectViews, NoViewMayBeValid) {
   EXPECT_TRUE(SelectedIds(Ring({100, 180, -90}), kFront, {}).empty());
 }
 
+TEST(CutFactors, FallTowardsTheNextViewAndTheLimit) {
+  constexpr double kRound = 1e-9;
+  const DtrSet set = Ring({5, -10, 29, 32, 59});
+  const RenderScene scene = MakeRenderScene(set);
+  RenderOptions options;
+  options.views = 3;
+  const ViewSelection three = SelectViews(scene, kFront, options);
+  // Cut at 32 degrees, factors fall from 24 on.
+  const std::vector<double> cut = CutFactors(three, 3);
+  EXPECT_EQ(cut[0], 1);
+  EXPECT_EQ(cut[1], 1);
+  EXPECT_NEAR(cut[2], 3.0 / 8, kRound);
+  // As if K were 2: cut at 29 degrees.
+  EXPECT_EQ(CutFactors(three, 2), (std::vector<double>{1, 1}));
+  EXPECT_NEAR(CutFactors(three, 1)[0], 1, kRound);
+  options.views = 8;  // no view is left: the limit of 60 degrees
+  const std::vector<double> all = CutFactors(SelectViews(scene, kFront, options), 5);
+  EXPECT_EQ(std::vector<double>(all.begin(), all.begin() + 4), (std::vector<double>{1, 1, 1, 1}));
+  EXPECT_NEAR(all[4], 1.0 / 15, kRound);
+  EXPECT_EQ(CutFactor(0, 0), 1);  // all views in one direction
+  EXPECT_EQ(CutFactor(0.5, 0.5), 1.0 / 255);
+}
+
+TEST(CutFactors, AViewThatComesInTakesThePlaceOfOneWithoutAJump) {
+  constexpr double kStepDeg = 0.05;
+  const DtrSet set = Ring({-30, -10, 12, 33});
+  const RenderScene scene = MakeRenderScene(set);
+  RenderOptions options;
+  options.views = 3;
+  std::vector<double> last;
+  for (double deg = -5; deg < 8; deg += kStepDeg) {
+    const Eigen::Vector3d out(std::sin(deg * kDegree), 0, -std::cos(deg * kDegree));
+    const ViewSelection selection =
+        SelectViews(scene, LookAt(Eigen::Vector3d(0, 0, 10) + 10 * out, {0, 0, 10}), options);
+    std::vector<double> factor(4, 0.0);
+    const std::vector<double> factors = CutFactors(selection, selection.views.size());
+    for (size_t k = 0; k < factors.size(); ++k) {
+      factor[static_cast<size_t>(selection.views[k])] = factors[k];
+    }
+    for (size_t i = 0; i < 4 && !last.empty(); ++i) EXPECT_NEAR(factor[i], last[i], 0.02) << deg;
+    last = factor;
+  }
+}
+
+TEST(SelectViews, MemoryThatHoldsFewerIsASmallerK) {
+  const DtrSet set = Ring({5, -10, 29, 32});
+  RenderScene scene = MakeRenderScene(set);
+  scene.most_views = 2;
+  RenderOptions fewer;
+  fewer.views = 2;
+  const ViewSelection held = SelectViews(scene, kFront, {});
+  scene.most_views.reset();
+  const ViewSelection expected = SelectViews(scene, kFront, fewer);
+  EXPECT_EQ(held.views, expected.views);
+  EXPECT_EQ(held.next_angle_rad, expected.next_angle_rad);
+}
+
 TEST(SelectViews, InsideOutCapturesUseThePerPixelRule) {
   const DtrSet inwards = Ring({0, 90, 180, 270}), outwards = Ring({0, 90, 180, 270}, true);
   EXPECT_FALSE(NeedsPerPixelRule(MakeRenderScene(inwards), kFront));

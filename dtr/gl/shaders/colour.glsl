@@ -1,7 +1,9 @@
-// SPEC 4.4: the colour a view shows at a point. Images hold sRGB values (SampledImage); alpha is 1
-// where a pixel is usable. Weighted by hand, since a texture unit blends with 8 bits. Expects
+// SPEC 4.4: the colour a view shows at a point. Images hold sRGB values (SampledImage); alpha is
+// SPEC 4.8's factor at the rim, 0 only where a pixel is masked. Weighted by hand, since a texture unit blends with 8 bits. Expects
 // `images`, an array of sampler2DArray, and LINEAR_LIGHT.
 #include "view_block.glsl"
+
+const float kLeastFactor = 1.0 / 255.0;  // SPEC 1.4, 4.8
 
 vec3 SrgbFromLinear(vec3 linear) {
   vec3 c = max(linear, 0.0);
@@ -14,7 +16,7 @@ vec3 LinearFromSrgb(vec3 srgb) {
              lessThanEqual(srgb, vec3(0.04045)));
 }
 
-// RGB in the values that are blended, and 1; all 0 where every pixel around is masked. `pixel`:
+// RGB in the values that are blended, and the factor; all 0 where every pixel around is masked. `pixel`:
 // centre of the first at 0.5.
 vec4 ColourAt(ViewBlock view, vec2 pixel) {
   vec2 position = clamp(pixel - 0.5, vec2(0.0), view.limits.xy - 1.0);
@@ -42,5 +44,5 @@ vec4 ColourAt(ViewBlock view, vec2 pixel) {
     sum += weight[i] * texel[i].rgb;
     usable += weight[i] * texel[i].a;
   }
-  return usable > 0.0 ? vec4(sum, 1.0) : vec4(0.0);
+  return usable > 0.0 ? vec4(sum, max(usable, kLeastFactor)) : vec4(0.0);
 }

@@ -1,4 +1,4 @@
-// SPEC 4.2 to 4.7 and 6: what the views' nearest fragments say together, pixel by pixel. One sum in
+// SPEC 4.2 to 4.8 and 6: what the views' nearest fragments say together, pixel by pixel. One sum in
 // the views' canonical order and one division: nothing depends on the order they were drawn in.
 // Defines: MAX_VIEWS, IMAGE_ARRAYS, DEPTH_ARRAYS (0: two passes, else SPEC 5), BLEND, PER_PIXEL,
 // LINEAR_LIGHT, VIEWS_IN_UNIFORMS.
@@ -36,7 +36,7 @@ const float kLargestFloat = 3.4e38;
 
 float fragment[MAX_VIEWS];  // 1/z; 0: absent
 float angle[MAX_VIEWS];     // SPEC 4.5, at the point
-float log_weight[MAX_VIEWS];
+float log_weight[MAX_VIEWS], weight[MAX_VIEWS];
 
 vec3 Centre(ViewBlock view) { return vec3(view.row_x.w, view.row_y.w, view.row_z.w); }
 
@@ -119,6 +119,11 @@ bool Exists(ViewBlock view, vec3 ray, float w) {
   return view.image.z == 0 || ColourAt(view, SourcePixel(view, p)).a > 0.0;
 }
 
+// SPEC 1.4.
+float CutFactor(float t, float cut) {
+  return cut > 0.0 ? clamp((cut - t) / (0.25 * cut), kLeastFactor, 1.0) : 1.0;
+}
+
 // The rank-th smallest angle (0: the smallest) among the fragments that are left.
 float RankedAngle(int rank) {
   for (int i = 0; i < view_count; ++i) {
@@ -182,8 +187,10 @@ void main() {
     smallest = min(smallest, angle[i]);
   }
 #if PER_PIXEL
+  float cut = max_angle_rad;  // SPEC 1.4
   if (left > nearest_views) {  // SPEC 1.3; views tied with the K-th stay
     float limit = RankedAngle(nearest_views - 1);
+    cut = RankedAngle(nearest_views);
     left = 0;
     for (int i = 0; i < view_count; ++i) {
       if (fragment[i] == 0.0) continue;
@@ -209,17 +216,27 @@ void main() {
   }
   bool all_zero = blended == 0;  // then those at the smallest angle share
 
-  // SPEC 4.7.
-  vec4 sum = vec4(0.0);
+  float total = 0.0;
   for (int i = 0; i < view_count; ++i) {
     if (fragment[i] == 0.0) continue;
-    float weight = all_zero ? (angle[i] == smallest ? 1.0 : 0.0)
-                            : (log_weight[i] > kNoWeight ? exp(log_weight[i] - largest) : 0.0);
-    if (!(weight > 0.0)) continue;
-    if (all_zero) ++blended;
+    weight[i] = all_zero ? (angle[i] == smallest ? 1.0 : 0.0)
+                         : (log_weight[i] > kNoWeight ? exp(log_weight[i] - largest) : 0.0);
+    if (all_zero && weight[i] > 0.0) ++blended;
+    total += weight[i];
+  }
+
+  // SPEC 4.7, 4.8.
+  vec4 sum = vec4(0.0);
+  for (int i = 0; i < view_count; ++i) {
+    if (fragment[i] == 0.0 || !(weight[i] > 0.0)) continue;
     ViewBlock view = views[i];
-    vec3 colour = ColourAt(view, SourcePixel(view, PointInView(view, ray, fragment[i]))).rgb;
-    sum += weight * vec4(colour, 1.0);
+    vec4 colour = ColourAt(view, SourcePixel(view, PointInView(view, ray, fragment[i])));
+#if PER_PIXEL
+    float factor = colour.a * CutFactor(angle[i], cut);
+#else
+    float factor = colour.a * view.stored_depth.w;
+#endif
+    sum += FadedWeight(weight[i], factor, total) * vec4(colour.rgb, 1.0);
   }
   vec3 mean = sum.rgb / sum.a;
 #if LINEAR_LIGHT

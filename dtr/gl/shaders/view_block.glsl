@@ -18,7 +18,7 @@ struct ViewBlock {
   ivec4 depth_slot;  // texture array, layer in it, unused
   vec4 map;          // 1 / width, 1 / height of that layer; columns / 2, rows / 2 of the grid
   // 1/z of a stored value v is x + y v (two passes: of the layer's); z: a pixel of disparity as a
-  // difference of 1/z (SPEC 0.3)
+  // difference of 1/z (SPEC 0.3); w: SPEC 1.4's factor
   vec4 stored_depth;
 };
 #ifdef __cplusplus

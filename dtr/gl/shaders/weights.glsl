@@ -16,6 +16,12 @@ const float kHalfPi = 1.57079632679;
 
 float LogOrNone(float weight) { return weight > 0.0 ? log(weight) : kNoWeight; }
 
+// SPEC 4.8: what is left of a weight, of which the pixel's views have `total` together.
+float FadedWeight(float weight, float factor, float total) {
+  float others = max(total - weight, 0.0) + 1e-6 * total;
+  return weight * factor * others / (others + (1.0 - factor) * weight);
+}
+
 // Logarithm of the weight at angle t >= 0 (radians); next_angle is t_(k+1).
 float LogWeight(float t, float next_angle) {
 #if BLEND == COSINE

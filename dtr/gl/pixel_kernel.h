@@ -1,0 +1,53 @@
+// dtr/gl/pixel_kernel.h -- SPEC 4 to 6 for a row of pixels of the deferred method, several at once
+// with the processor's vector instructions. Only dtr/gl's own .cpp files include this.
+#pragma once
+#include <cstdint>
+#include <span>
+
+namespace dtr::gl {
+
+/// A view as the kernel knows it. Everything is relative to the novel camera and was formed in
+/// double precision. Grid positions: centre of the first sample at 0.5.
+struct PixelView {
+  /// Novel ray r (z = 1) at inverse depth w to the grid of samples, homogeneous: x = grid_x[0..2] .
+  /// r
+  /// + grid_x[3] w, y and z likewise.
+  float grid_x[4], grid_y[4], grid_z[4];
+  float centre[3], centre_squared;  ///< the view's, in the novel frame; its squared length
+  int columns, rows;                ///< of the samples
+  /// The samples with the outermost ones once more around them, row by row, `stride` in a row; one
+  /// of the two. 1/z of a sample v > 0 is depth_offset + depth_factor v; 0: none.
+  const std::uint16_t* codes;
+  const float* values;
+  int stride;
+  float depth_offset, depth_factor;
+  float depth_break, pixel, delta;  ///< differences of 1/z: SPEC 2.3, 0.3, 4.2
+  float cut_factor;                 ///< SPEC 1.4
+  /// SampledImage; in its pixels, the centre of the first at 0, a grid position is at
+  /// image_per_sample * position + image_offset.
+  const std::uint32_t* rgba;
+  int width_px, height_px;
+  float image_per_sample[2], image_offset[2];
+};
+
+/// A row of the picture.
+struct PixelRow {
+  int width_px;
+  float inverse_fx, inverse_fy, cx, cy;  ///< of the novel camera, pixels
+  float y;                               ///< of the row's centre, pixels
+  float pixel_angle_rad;                 ///< t_pixel of SPEC 4.5
+  int power;                             ///< k of its `inverse-angle`
+  const float* surface;                  ///< SPEC 5.1: 1/z; 0: none
+  // What SPEC 6 asks for.
+  std::uint32_t* image;  ///< RGBA, sRGB, alpha 255 where seen
+  float* depth;          ///< plane z, 0 where unseen
+  std::uint32_t* marks;  ///< views blended; from bit 8 on 255 at the Delta border
+};
+
+/// Most views of a picture.
+inline constexpr int kMostPixelViews = 64;
+
+/// SPEC 5.2, 5.3 and 4.2 to 4.8 with the weight `inverse-angle`; views in canonical order.
+void ResolvePixelRow(const PixelRow& row, std::span<const PixelView> views);
+
+}  // namespace dtr::gl

@@ -1,0 +1,118 @@
+#include "dtr/gl/processor_resolve.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "dtr/base/parallel_for.h"
+#include "dtr/render/blend_weights.h"
+
+namespace dtr::gl {
+namespace {
+
+// exp(80) fits float32 and so does the sum of its like: no logarithms need to be compared
+// (SPEC 4.6).
+constexpr double kLargestLogWeight = 80;
+constexpr int kRowsTogether = 16;
+
+bool WeightsFitFloat(const BlendParameters& blend) {
+  return std::abs(LogWeight(blend, 0, 0)) <= kLargestLogWeight &&
+         std::abs(LogWeight(blend, std::numbers::pi, 0)) <= kLargestLogWeight;
+}
+
+/// A sample then has a usable pixel of the image at its centre, and no colour is asked for whose
+/// four pixels are all masked.
+bool MaskNeedsNoTest(const View& view, const RenderOptions& options) {
+  return view.mask.empty() || (view.depth_scale == 1 && options.resolution == 1);
+}
+
+PixelView PlaceView(const View& view, const ViewPlacement& placed, double cut_factor,
+                    const RenderOptions& options, const SampledView& sampled) {
+  PixelView out{};
+  const PinholeCamera camera = view.DepthCamera();
+  const double step = sampled.step, shift = sampled.offset + 0.5 - 0.5 * step;
+  Eigen::Matrix3d grid_from_view;
+  grid_from_view << camera.fx_px() / step, 0, (camera.cx_px() - shift) / step,  //
+      0, camera.fy_px() / step, (camera.cy_px() - shift) / step,                //
+      0, 0, 1;
+  const Eigen::Matrix3d grid_from_novel = grid_from_view * placed.rotation.transpose();
+  const Eigen::Vector3d away = -grid_from_novel * placed.translation;
+  float* const rows[3] = {out.grid_x, out.grid_y, out.grid_z};
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) rows[i][j] = static_cast<float>(grid_from_novel(i, j));
+    rows[i][3] = static_cast<float>(away[i]);
+    out.centre[i] = static_cast<float>(placed.translation[i]);
+  }
+  out.centre_squared = static_cast<float>(placed.translation.squaredNorm());
+  out.columns = sampled.columns, out.rows = sampled.rows, out.stride = sampled.columns + 2;
+  out.codes = sampled.codes.empty() ? nullptr : sampled.codes.data();
+  out.values = sampled.values.data();
+  out.depth_offset = static_cast<float>(sampled.depth_offset);
+  out.depth_factor = static_cast<float>(sampled.depth_factor);
+  const InverseDepthThresholds thresholds = ThresholdsOf(view, options);
+  out.depth_break = static_cast<float>(thresholds.depth_break);
+  out.pixel = static_cast<float>(thresholds.pixel);
+  out.delta = static_cast<float>(thresholds.delta);
+  out.cut_factor = static_cast<float>(cut_factor);
+  out.rgba = reinterpret_cast<const std::uint32_t*>(sampled.rgba.data());
+  out.width_px = view.image.width(), out.height_px = view.image.height();
+  const double scale = view.depth_scale;
+  for (int axis = 0; axis < 2; ++axis) {
+    out.image_per_sample[axis] = static_cast<float>(scale * step);
+    out.image_offset[axis] = static_cast<float>(scale * shift - 0.5);
+  }
+  return out;
+}
+
+}  // namespace
+
+bool ProcessorResolver::Draws(const Frame& frame) {
+  const RenderOptions& options = frame.options;
+  return frame.deferred() && !frame.per_pixel && !options.blend_in_linear_light &&
+         !options.absolute_delta && options.blend == BlendWeight::kInverseAngle &&
+         frame.views.size() <= static_cast<size_t>(kMostPixelViews) &&
+         WeightsFitFloat(BlendParametersOf(options, frame.novel.fx_px())) &&
+         std::all_of(frame.views.begin(), frame.views.end(),
+                     [&](const View* view) { return MaskNeedsNoTest(*view, options); });
+}
+
+void ProcessorResolver::Draw(const Frame& frame, const Band& band, const SampledViews& sampled,
+                             const Targets& targets, const std::vector<float>& surface) {
+  std::vector<PixelView> views;
+  for (size_t i = 0; i < frame.views.size(); ++i) {
+    const View& view = *frame.views[i];
+    views.push_back(PlaceView(view, frame.placements[i], frame.cut_factors[i], frame.options,
+                              sampled.Of(view)));
+  }
+  const auto width = static_cast<size_t>(targets.width);
+  const size_t pixels = width * static_cast<size_t>(band.count);
+  image_.resize(pixels);
+  depth_.resize(pixels);
+  marks_.resize(pixels);
+  const BlendParameters blend = BlendParametersOf(frame.options, frame.novel.fx_px());
+  const PinholeCamera& novel = frame.novel;
+  // A thread's rows lie together: they read the same pixels of the views.
+  const int pieces = (band.count + kRowsTogether - 1) / kRowsTogether;
+  ParallelFor(0, pieces, frame.options.threads, [&](int piece) {
+    const int end = std::min((piece + 1) * kRowsTogether, band.count);
+    for (int y = piece * kRowsTogether; y < end; ++y) {
+      const size_t first = static_cast<size_t>(y) * width;
+      ResolvePixelRow({targets.width, static_cast<float>(1 / novel.fx_px()),
+                       static_cast<float>(1 / novel.fy_px()), static_cast<float>(novel.cx_px()),
+                       static_cast<float>(novel.cy_px()), static_cast<float>(band.first + y) + 0.5f,
+                       static_cast<float>(blend.pixel_angle_rad), blend.blend_k, &surface[first],
+                       &image_[first], &depth_[first], &marks_[first]},
+                      views);
+    }
+  });
+  const auto copy = [&](const Texture& texture, GLenum format, GLenum type, const void* data) {
+    glBindTexture(GL_TEXTURE_2D_ARRAY, texture.name());
+    glTexSubImage3D(GL_TEXTURE_2D_ARRAY, 0, 0, 0, 0, targets.width, band.count, 1, format, type,
+                    data);
+  };
+  copy(targets.image, GL_RGBA, GL_UNSIGNED_BYTE, image_.data());
+  copy(targets.depth, GL_RED, GL_FLOAT, depth_.data());
+  copy(targets.marks, GL_RGBA_INTEGER, GL_UNSIGNED_BYTE, marks_.data());
+}
+
+}  // namespace dtr::gl

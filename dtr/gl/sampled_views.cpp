@@ -1,0 +1,76 @@
+#include "dtr/gl/sampled_views.h"
+
+#include <algorithm>
+
+#include "dtr/base/parallel_for.h"
+#include "dtr/gl/stored_depth.h"
+#include "dtr/render/texture.h"
+#include "dtr/render/triangulation.h"
+
+namespace dtr::gl {
+namespace {
+
+/// The grid with its outermost samples once more around it, and one more value: codes are read in
+/// pairs.
+template <typename T>
+std::vector<T> WithBorder(const std::vector<T>& grid, int columns, int rows) {
+  std::vector<T> bordered;
+  if (grid.empty()) return bordered;
+  bordered.reserve(static_cast<size_t>(columns + 2) * static_cast<size_t>(rows + 2) + 1);
+  for (int y = -1; y <= rows; ++y) {
+    const T* row =
+        &grid[static_cast<size_t>(std::clamp(y, 0, rows - 1)) * static_cast<size_t>(columns)];
+    bordered.push_back(row[0]);
+    bordered.insert(bordered.end(), row, row + columns);
+    bordered.push_back(row[columns - 1]);
+  }
+  bordered.push_back(T{});
+  return bordered;
+}
+
+SampledView Sample(const View& view, int resolution) {
+  const SampleGrid grid = MakeSampleGrid(view, resolution);
+  const Grid<double>& w = grid.inverse_depth;
+  SampledView sampled;
+  if (w.empty()) return sampled;
+  sampled.columns = w.width(), sampled.rows = w.height();
+  sampled.step = grid.step, sampled.offset = grid.offset;
+  const StoredDepth depth = StoreDepth(view, grid);
+  sampled.codes = WithBorder(depth.codes, w.width(), w.height());
+  sampled.values = WithBorder(depth.values, w.width(), w.height());
+  sampled.depth_offset = depth.offset;
+  // StoredDepth reads codes as shares of the largest.
+  sampled.depth_factor = depth.codes.empty() ? depth.factor : depth.factor / UINT16_MAX;
+  sampled.rgba = SampledImage(view);
+  return sampled;
+}
+
+}  // namespace
+
+void SampledViews::Prepare(const std::vector<const View*>& views, const RenderOptions& options) {
+  std::vector<Stored*> missing;
+  std::vector<const View*> missing_views;
+  for (const View* view : views) {
+    Stored& stored = views_[view];
+    const Stored wanted{
+        options.resolution, view->image.data().data(), view->depth.grid().data().data(), {}};
+    if (stored.resolution == wanted.resolution && stored.image_data == wanted.image_data &&
+        stored.depth_data == wanted.depth_data) {
+      continue;
+    }
+    stored = wanted;
+    missing.push_back(&stored);
+    missing_views.push_back(view);
+  }
+  ParallelFor(0, static_cast<int>(missing.size()), options.threads, [&](int i) {
+    const auto k = static_cast<size_t>(i);
+    missing[k]->sampled = Sample(*missing_views[k], options.resolution);
+  });
+}
+
+size_t SampledViews::BytesOf(const View& view) const {
+  const auto found = views_.find(&view);
+  return found == views_.end() ? 0 : found->second.sampled.bytes();
+}
+
+}  // namespace dtr::gl

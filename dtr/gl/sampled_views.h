@@ -1,0 +1,48 @@
+// dtr/gl/sampled_views.h -- views as ResolvePixelRow reads them, in the processor's memory. Only
+// dtr/gl's own .cpp files include this.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <vector>
+
+#include "dtr/render/options.h"
+#include "dtr/types/view.h"
+
+namespace dtr::gl {
+
+/// A view's samples, with a border as PixelView says, and its image.
+struct SampledView {
+  int columns = 0, rows = 0, step = 1,
+      offset = 0;                    ///< of the grid of samples; columns 0: none left
+  std::vector<std::uint16_t> codes;  ///< one of the two
+  std::vector<float> values;
+  double depth_offset = 0, depth_factor = 1;  ///< 1/z from a code or a value
+  std::vector<std::uint8_t> rgba;             ///< SampledImage
+  size_t bytes() const {
+    return codes.size() * sizeof(codes[0]) + values.size() * sizeof(values[0]) + rgba.size();
+  }
+};
+
+/// Keeps one per view; another resolution replaces it.
+class SampledViews {
+ public:
+  /// Makes the missing ones of several views, on all cores.
+  void Prepare(const std::vector<const View*>& views, const RenderOptions& options);
+  /// After Prepare.
+  const SampledView& Of(const View& view) const { return views_.at(&view).sampled; }
+
+  size_t BytesOf(const View& view) const;
+  void Drop(const View& view) { views_.erase(&view); }
+  void Clear() { views_.clear(); }
+
+ private:
+  struct Stored {
+    int resolution = 0;
+    const void *image_data = nullptr, *depth_data = nullptr;
+    SampledView sampled;
+  };
+  std::map<const View*, Stored> views_;
+};
+
+}  // namespace dtr::gl
