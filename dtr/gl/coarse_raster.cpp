@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "dtr/base/parallel_for.h"
+#include "dtr/gl/triangle_kernel.h"
 
 namespace dtr::gl {
 namespace {
@@ -13,9 +14,6 @@ namespace {
 constexpr float kMarginPx = 1.0f / 64, kLeastArea = 1e-6f;
 // Strips of rows are drawn at once; thinner ones would set up too many triangles twice.
 constexpr int kFewestRows = 64;
-
-// Triangles of so few pixels a side are asked pixel by pixel: most are beside depth breaks.
-constexpr int kFewPixels = 3;
 
 /// Pixel ranges never reach farther, so that they fit an int.
 constexpr float kFarPx = 1e6f;
@@ -52,6 +50,7 @@ struct FloatPlacement {
 struct CoarseRaster::Strip {
   float* pixels;  ///< of the first row
   int width, first, last;
+  int small_px;  ///< triangles of up to so many columns are drawn a row at once
 
   float* RowAt(int y) const {
     return pixels + static_cast<size_t>(y - first) * static_cast<size_t>(width);
@@ -79,16 +78,21 @@ struct CoarseRaster::Strip {
                       (acw * abx - abw * acx) * per_area,
                       std::min({a.inverse_depth, b.inverse_depth, c.inverse_depth}),
                       std::max({a.inverse_depth, b.inverse_depth, c.inverse_depth})};
-    if (right - left < kFewPixels && bottom - top < kFewPixels) {
-      const Edge edges[3] = {{a, abx, aby}, {b, c.x - b.x, c.y - b.y}, {c, -acx, -acy}};
-      for (int y = y0; y <= y1; ++y) {
-        for (int x = left; x <= right; ++x) {
-          if (edges[0].Has(x, y) && edges[1].Has(x, y) && edges[2].Has(x, y)) {
-            float& nearest = RowAt(y)[x];
-            nearest = std::max(nearest, plane.At(x, y));
-          }
-        }
-      }
+    if (right - left < small_px) {
+      const SmallTriangle triangle{
+          {Edge(a, abx, aby), Edge(b, c.x - b.x, c.y - b.y), Edge(c, -acx, -acy)},
+          plane.x,
+          plane.y,
+          plane.w,
+          plane.along_x,
+          plane.along_y,
+          plane.farther,
+          plane.nearer,
+          left,
+          right,
+          y0,
+          y1};
+      DrawSmallTriangle(triangle, RowAt(y0), width);
       return;
     }
     const float first_centre = static_cast<float>(top) + 0.5f;
@@ -118,26 +122,12 @@ struct CoarseRaster::Strip {
       return w + along_x * (static_cast<float>(px) + 0.5f - x) +
              along_y * (static_cast<float>(py) + 0.5f - y);
     }
-    float At(int px, int py) const {
-      return std::min(std::max(Unbounded(px, py), farther), nearer);
-    }
   };
 
-  /// A side of a triangle that runs clockwise, and the pixels inside of it.
-  struct Edge {
-    float x, y, along_x, along_y, reach;
-    Edge(const Point& from, float to_x, float to_y)
-        : x(from.x),
-          y(from.y),
-          along_x(to_x),
-          along_y(to_y),
-          reach(-kMarginPx * (std::abs(to_x) + std::abs(to_y))) {}
-    bool Has(int px, int py) const {
-      return along_x * (static_cast<float>(py) + 0.5f - y) -
-                 along_y * (static_cast<float>(px) + 0.5f - x) >=
-             reach;
-    }
-  };
+  /// A side of a triangle that runs clockwise.
+  static SmallTriangle::Side Edge(const Point& from, float to_x, float to_y) {
+    return {from.x, from.y, to_x, to_y, -kMarginPx * (std::abs(to_x) + std::abs(to_y))};
+  }
 
   /// The same, row by row: where it goes down it bounds rows on the right, else on the left.
   struct Side {
@@ -254,13 +244,14 @@ void CoarseRaster::Draw(const std::vector<PlacedMesh>& meshes, int width_px, con
     Project(meshes[k], points_[k]);
   });
   nearest_.assign(static_cast<size_t>(width_px) * static_cast<size_t>(band.count), 0);
+  const int small_px = SmallTriangleWidth() <= width_px ? SmallTriangleWidth() : 0;
   const int most = std::max(1, band.count / kFewestRows);
   const int strips = std::min(most, ResolveThreads(threads));
   ParallelFor(0, strips, threads, [&](int s) {
     const int from = static_cast<int>(static_cast<long long>(band.count) * s / strips);
     const int to = static_cast<int>(static_cast<long long>(band.count) * (s + 1) / strips);
     const Strip strip{nearest_.data() + static_cast<size_t>(from) * static_cast<size_t>(width_px),
-                      width_px, band.first + from, band.first + to - 1};
+                      width_px, band.first + from, band.first + to - 1, small_px};
     for (size_t k = 0; k < meshes.size(); ++k) strip.Mesh(meshes[k], points_[k]);
   });
 }
