@@ -7,6 +7,7 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
+#include "tests/support/test_data.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -21,10 +22,11 @@ stereo::PlaneMap Planes() {
 }
 
 class PlaneFilesTest : public ::testing::Test {
+ private:
+  testing::TemporaryFolder parent_;  // of this test alone: several run at a time
+
  protected:
-  PlaneFilesTest() { fs::remove_all(folder_); }
-  ~PlaneFilesTest() override { fs::remove_all(folder_); }
-  fs::path folder_ = fs::path(::testing::TempDir()) / "plane_files_test";
+  fs::path folder_ = parent_ / "planes";
 };
 
 TEST_F(PlaneFilesTest, GivesBackWhatWasSavedAlsoToALaterRun) {

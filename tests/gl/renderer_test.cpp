@@ -233,12 +233,17 @@ TEST_F(Render, ViewsOfAnyNumberOfSizesMakeOnePicture) {
     EXPECT_EQ(found.views_used.size(), 20u);
     const RenderResult expected = cpu::Render(scene, novel.camera, novel.cam_from_world, options);
     EXPECT_LE(ShareApart(expected, found), kOutlineShare);
-    // Few sizes lie in layers of their own: the same picture but for how it is added up.
-    options.views = 3;
-    const RenderResult padded = renderer.Render(scene, novel.camera, novel.cam_from_world, options);
+    // Few sizes lie in layers of their own: the same picture but for how it is added up. The view
+    // after the last one stays, for the others fade by its angle.
+    options.views = 4;
     RenderScene few = scene;
     few.views.clear();
-    for (const int i : padded.views_used) few.views.push_back(scene.views[static_cast<size_t>(i)]);
+    for (const int i :
+         renderer.Render(scene, novel.camera, novel.cam_from_world, options).views_used) {
+      few.views.push_back(scene.views[static_cast<size_t>(i)]);
+    }
+    options.views = 3;
+    const RenderResult padded = renderer.Render(scene, novel.camera, novel.cam_from_world, options);
     Renderer fresh;
     EXPECT_LE(ShareApart(fresh.Render(few, novel.camera, novel.cam_from_world, options), padded),
               kOutlineShare);
