@@ -87,11 +87,13 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& progre
   writer.WriteSparse(set, sparse);
   nlohmann::ordered_json provenance = nlohmann::ordered_json::parse(set.provenance_json);
   provenance["depth_engine"] = options.depth.engine;
+  auto& recorded = provenance["options"];
+  if (!recorded.is_object()) recorded = nlohmann::ordered_json::object();  // an imported set
   for (const char* old : {"neighbours", "round_neighbours", "iterations", "rounds"}) {
-    provenance["options"].erase(old);
+    recorded.erase(old);
   }
-  provenance["options"].update(SettingsJson(options.depth.engine, spent));
-  provenance["options"]["seed"] = options.seed;
+  recorded.update(SettingsJson(options.depth.engine, spent));
+  recorded["seed"] = options.seed;
   set.provenance_json = provenance.dump();
   report.depth_maps = count.maps;
   report.depth_completeness = count.Completeness();

@@ -67,6 +67,15 @@ class DepthSettings : public ::testing::Test {
 };
 TemporaryFolder* DepthSettings::shared_ = nullptr;
 
+TEST_F(DepthSettings, AnImportedSetThatKnowsNoneGetsThem) {
+  const fs::path courtyard = *shared_ / "courtyard", set = folder_ / "imported.dtr";
+  DtrOk({"import", "--format", "colmap", "--cameras", (courtyard / "sparse").string(), "--images",
+         (courtyard / "images").string(), "-o", set.string()});
+  ASSERT_FALSE(Json::parse(Text(set / "set.json")).at("provenance").contains("options"));
+  DtrOk({"stereo", set.string(), "--preset", "fast", "--threads", "2"});
+  EXPECT_EQ(OptionsOf(set).at("engine"), "patchmatch");
+}
+
 TEST_F(DepthSettings, BalancedIsWhatRunsUnlessToldOtherwise) {
   const auto plain = Contents(Stereo("plain", {}));
   EXPECT_THAT(DifferingFiles(plain, Contents(Stereo("named", {"--preset", "balanced"}))),
