@@ -9,9 +9,8 @@ namespace dtr::gl {
 /// A view as the kernel knows it. Everything is relative to the novel camera and was formed in
 /// double precision. Grid positions: centre of the first sample at 0.5.
 struct PixelView {
-  /// Novel ray r (z = 1) at inverse depth w to the grid of samples, homogeneous: x = grid_x[0..2] .
-  /// r
-  /// + grid_x[3] w, y and z likewise.
+  /// Novel ray r (z = 1) at inverse depth w to the grid of samples, homogeneous: x is the dot
+  /// product of grid_x[0..2] and r, plus grid_x[3] w; y and z likewise.
   float grid_x[4], grid_y[4], grid_z[4];
   float centre[3], centre_squared;  ///< the view's, in the novel frame; its squared length
   int columns, rows;                ///< of the samples
