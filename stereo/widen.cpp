@@ -13,11 +13,6 @@ constexpr double kEndBand = 1.03;
 constexpr double kSuspiciousShare = 0.01;
 constexpr double kNearStep = 1.5, kFarStep = 2.0;
 
-int LookSide(const PinholeCamera& camera) {
-  const int side = std::max(camera.width_px(), camera.height_px());
-  return std::clamp(side / kLookShrink, 1, kLookSidePx);
-}
-
 std::vector<SmallView> SmallViews(const Collection& c, Progress& progress) {
   std::vector<SmallView> small;
   progress.Stage("depth ranges", static_cast<int>(c.views.size()));
@@ -56,6 +51,11 @@ std::string Summary(std::span<const DepthRange> before, std::span<const DepthRan
 }
 
 }  // namespace
+
+int LookSide(const PinholeCamera& camera) {
+  const int side = std::max(camera.width_px(), camera.height_px());
+  return std::clamp(side / kLookShrink, 1, kLookSidePx);
+}
 
 SmallView Shrink(const StereoView& view, int max_size_px) {
   const PinholeCamera& camera = view.camera;

@@ -17,6 +17,9 @@ struct SmallView {
 /// Long side at most `max_size_px`. The view has its pixels.
 SmallView Shrink(const StereoView& view, int max_size_px);
 
+/// Long side of the copies that Widened looks at.
+int LookSide(const PinholeCamera& camera);
+
 /// Share of the depths kept that lie at an end of their range.
 struct EndShares {
   double at_near = 0, at_far = 0;

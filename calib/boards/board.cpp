@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <iterator>
@@ -83,10 +84,12 @@ int DictionaryNumber(const std::string& name) {
 }
 
 void CheckBoard(const Board& board, const std::string& where) {
+  // OpenCV finds no chessboard with fewer than 3.
+  const int least = board.kind == Board::Kind::kChessboard ? 3 : 2;
   for (const int side : {board.columns, board.rows}) {
-    if (side < 2 || side > kMostCornersPerSide) {
-      throw Error(fmt::format("{}: expected 2 to {} inner corners per side, found {} x {}", where,
-                              kMostCornersPerSide, board.columns, board.rows));
+    if (side < least || side > kMostCornersPerSide) {
+      throw Error(fmt::format("{}: expected {} to {} inner corners per side, found {} x {}", where,
+                              least, kMostCornersPerSide, board.columns, board.rows));
     }
   }
   if (!(board.square > 0) || !std::isfinite(board.square)) {
@@ -123,10 +126,14 @@ Board BoardFromText(const std::string& text) {
   board.square = square->value;
   size_t next = 3;
   if (charuco) {
+    if (std::min(board.columns, board.rows) < 0) RefuseText(text, "no size in '" + parts[1] + "'");
     board.columns -= 1;  // squares to inner corners
     board.rows -= 1;
     const auto marker = LengthFrom(parts[next++]);
     if (!marker) RefuseText(text, "no marker size in '" + parts[3] + "'");
+    if (marker->has_unit && !square->has_unit) {
+      RefuseText(text, "a marker with a unit on a square without one");
+    }
     board.marker_share = marker->has_unit ? marker->value / square->value : marker->value;
     if (next < parts.size() && parts[next] != "inverted") board.dictionary = parts[next++];
     if (next < parts.size() && parts[next] == "inverted") {

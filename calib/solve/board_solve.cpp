@@ -87,8 +87,11 @@ double LargestRadius(const Board& board, const State& state) {
 
 ceres::Solver::Options SolverOptions() {
   // Ceres tells stderr of every step that fails; the next one is shorter, and the end is judged
-  // here.
-  FLAGS_minloglevel = google::GLOG_ERROR;
+  // here. The level belongs to the process: it is set once, before any thread of ours reads it.
+  [[maybe_unused]] static const bool quiet = [] {
+    FLAGS_minloglevel = google::GLOG_ERROR;
+    return true;
+  }();
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::DENSE_SCHUR;
   options.num_threads = 1;  // sums in one order: the same bits every time

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <functional>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "dtr/base/files.h"
 #include "stereo/widen.h"
@@ -43,6 +44,19 @@ double PixelsOf(const PinholeCamera& camera) {
   return static_cast<double>(camera.width_px()) * static_cast<double>(camera.height_px());
 }
 
+/// Costs of the first view that can be matched at all; nothing when there is none.
+std::optional<ProbedCosts> FirstProbe(const stereo::Collection& c) {
+  for (size_t v = 0; v < c.neighbours.size(); ++v) {
+    if (c.neighbours[v].views.empty()) continue;
+    try {
+      return ProbeCosts(c, static_cast<int>(v));
+    } catch (const stereo::NoUsablePair&) {
+      // Small copies have small disparities: another view may do.
+    }
+  }
+  return {};
+}
+
 double SecondsOf(const std::function<void()>& work) {
   const auto start = std::chrono::steady_clock::now();
   work();
@@ -69,7 +83,8 @@ ProbedCosts ProbeCosts(const stereo::Collection& c, int view) {
   std::vector<int> around{view};
   around.insert(around.end(), neighbours.begin(), neighbours.end());
   for (const int v : around) {
-    const stereo::ViewsAround alone(c.views, c.load_pixels, *c.pages, v, {});
+    stereo::Pages one_view;  // only its small copy is kept
+    const stereo::ViewsAround alone(c.views, c.load_pixels, one_view, v, {});
     small.push_back(stereo::Shrink(alone.views()[static_cast<size_t>(v)], kProbeSidePx));
   }
   std::vector<stereo::StereoView> views;
@@ -113,6 +128,12 @@ double PredictSeconds(const ProbedCosts& costs, const stereo::Effort& effort,
   double seconds = 0;
   for (const stereo::StereoView& view : views) {
     const double visits = VisitsPerPixel(effort.iterations, LevelsOf(view.camera));
+    // Every range is looked at once before the search (stereo/widen.h); how many of them move, and
+    // are looked at again, is not known yet.
+    const double side = std::max(view.camera.width_px(), view.camera.height_px());
+    const double shrink = stereo::LookSide(view.camera) / side;
+    seconds += PixelsOf(view.camera) * shrink * shrink * costs.search_s *
+               std::max(searched, asked) * VisitsPerPixel(effort.iterations, 1);
     seconds += PixelsOf(view.camera) * (costs.search_s * searched * visits +
                                         (costs.round_s * effort.rounds + costs.verdict_s) * asked);
   }
@@ -136,19 +157,18 @@ stereo::Effort EffortWithinBudget(const stereo::Collection& c, const DepthChoice
   if (std::filesystem::exists(record)) {
     return EffortFromJson(ReadFile(record, kLargestRecord), record.string());
   }
-  const auto view = std::find_if(c.neighbours.begin(), c.neighbours.end(),
-                                 [](const auto& n) { return !n.views.empty(); });
   stereo::Effort effort = Overridden(kLadder[0], choice);
-  if (view != c.neighbours.end()) {
-    const ProbedCosts costs = ProbeCosts(c, static_cast<int>(view - c.neighbours.begin()));
-    effort = PickEffort(costs, choice, c.views);
-    const double expected_s = PredictSeconds(costs, effort, c.views);
+  if (const auto costs = FirstProbe(c)) {
+    effort = PickEffort(*costs, choice, c.views);
+    const double expected_s = PredictSeconds(*costs, effort, c.views);
     progress.Note(fmt::format(
         "time budget {} s: {} neighbours, {} in {} rounds, {} iterations; expected {:.1f} s{}",
         *choice.time_budget_s, effort.neighbours, effort.round_neighbours, effort.rounds,
         effort.iterations, expected_s,
         expected_s > *choice.time_budget_s ? ", MORE than the budget: nothing cheaper is left"
                                            : ""));
+  } else {
+    progress.Note("time budget: no view has a usable pair to try; the least effort is taken");
   }
   WriteFileAtomically(record, SettingsJson("patchmatch", effort).dump());
   return effort;

@@ -290,12 +290,13 @@ HWY_INLINE Colour ColourAt(const PixelView& view, VF x, VF y) {
           mixed(Channel<24>(a), Channel<24>(b), Channel<24>(c), Channel<24>(e))};
 }
 
-/// SPEC 4.8: what is left of a weight, of which the pixel's views have `total` together.
-HWY_INLINE VF FadedWeight(VF weight, VF factor, VF total) {
+/// SPEC 4.8: what is left of a view's share of the weights. Of shares, since the product of two
+/// weights need not fit float32.
+HWY_INLINE VF FadedShare(VF share, VF factor) {
   const VF others =
-      hn::MulAdd(total, Constant(kLeastOthers), hn::Max(hn::Sub(total, weight), hn::Zero(DF())));
-  const VF rest = hn::MulAdd(hn::Sub(Constant(1), factor), weight, others);
-  return hn::Div(hn::Mul(hn::Mul(weight, factor), others), rest);
+      hn::Add(Constant(kLeastOthers), hn::Max(hn::Sub(Constant(1), share), hn::Zero(DF())));
+  const VF rest = hn::MulAdd(hn::Sub(Constant(1), factor), share, others);
+  return hn::Div(hn::Mul(hn::Mul(share, factor), others), rest);
 }
 
 /// Asks for what the later steps read of a view around where the first step looked: the processor
@@ -399,13 +400,14 @@ HWY_INLINE Pixels ResolveGroup(const PixelRow& row, std::span<const PixelView> v
 
   // SPEC 4.4, 4.7, 4.8.
   VF r = zero, g = zero, b = zero, sum = zero;
+  const VF per_total = hn::Div(Constant(1), total);
   for (size_t i = 0; i < views.size(); ++i) {
     const VF weight = hn::Load(d, group->weight[i]);
     if (hn::AllFalse(d, hn::Gt(weight, zero))) continue;
     const Colour colour =
         ColourAt(views[i], hn::Load(d, group->image_x[i]), hn::Load(d, group->image_y[i]));
     const VF factor = hn::Mul(hn::Max(colour.a, Constant(1)), Constant(views[i].cut_factor / 255));
-    const VF faded = FadedWeight(weight, factor, total);
+    const VF faded = FadedShare(hn::Mul(weight, per_total), factor);
     r = hn::MulAdd(faded, colour.r, r);
     g = hn::MulAdd(faded, colour.g, g);
     b = hn::MulAdd(faded, colour.b, b);

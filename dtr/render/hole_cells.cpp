@@ -74,7 +74,9 @@ Grid<float> HoleCells::Shrunk(const GuessedColours::Placed& placed) const {
       });
       if (count == 0) continue;
       for (int c = 0; c < 3; ++c) {
-        const double level = LinearFromSrgb(static_cast<double>(sum[c]) / count / 255);
+        // The exposure is that of the photo times its gain.
+        const double level =
+            std::min(1.0, view.gain[c] * LinearFromSrgb(static_cast<double>(sum[c]) / count / 255));
         small(x, y, c) =
             static_cast<float>(255 * SrgbFromLinear(Exposed(level, placed.exposure[c])));
       }

@@ -251,6 +251,23 @@ TEST_F(Render, ViewsOfAnyNumberOfSizesMakeOnePicture) {
   }
 }
 
+// The product of two weights of one pixel need not fit float32 though each of them does.
+TEST_F(Render, LargePowersOfTheInverseAngleDrawWhatTheReferenceDraws) {
+  const DtrSet set = OfManySizes(5);
+  const RenderScene scene = MakeRenderScene(set);
+  const View& photo = set.frames[0].views[2];
+  for (const int power : {1, 10, 13, 16, 20}) {
+    RenderOptions options = OptionsOf(RenderMethod::kDeferred);
+    options.blend_k = power;
+    const RenderResult expected = cpu::Render(scene, photo.camera, photo.cam_from_world, options);
+    EXPECT_GT(expected.coverage_share, 0.5);
+    Renderer renderer;
+    const RenderResult found = renderer.Render(scene, photo.camera, photo.cam_from_world, options);
+    EXPECT_LE(ShareApart(expected, found), kOutlineShare) << power;
+    ExpectSound(found);
+  }
+}
+
 TEST(LayerSizes, AreTheViewsOwnWhereTheseAreFewAndElseFewAndLargeEnough) {
   const DtrSet set = OfManySizes(20);
   std::vector<const View*> views;

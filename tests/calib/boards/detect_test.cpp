@@ -71,7 +71,8 @@ TEST(BoardText, RefusesWhatIsNoBoard) {
         "chessboard:9x6:0", "chessboard:9x6:-1", "chessboard:9x6:1km", "chessboard:9x6:1:2",
         "chessboard:9x6:nan", "chessboard:99999x6:1", "circles:9x6:1", "charuco:4x5:1",
         "charuco:4x5:1:1.5", "charuco:4x5:1:0.7:DICT_9X9",
-        "charuco:4x5:1:0.7:DICT_4X4_50:upside-down"}) {
+        "charuco:4x5:1:0.7:DICT_4X4_50:upside-down", "charuco:4x5:30:22mm", "chessboard:2x6:1",
+        "charuco:-2147483648x5:1:0.5"}) {
     EXPECT_THROW(BoardFromText(text), UsageError) << text;
   }
 }
