@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 const Board kChessboard{Board::Kind::kChessboard, 9, 6, 1, 0, "", false};
-constexpr double kSameRms = 1e-3;    // relative; the acceptance of issue D
+constexpr double kSameRms = 1e-3;    // relative; what is asked of it
 constexpr double kPublished = 5e-4;  // px: the published figures have three decimals
 
 fs::path Folder() { return dtr::testing::DataFolder() / "chessboard_stereo_640x480"; }
