@@ -10,12 +10,11 @@
 #include <opencv2/imgproc.hpp>
 
 #include "calib/boards/corner_noise.h"
+#include "calib/boards/opencv_pixels.h"
 
 namespace dtr::calib {
 namespace {
 
-// OpenCV has pixel centres at whole numbers, we at halves.
-constexpr double kCentreOffsetPx = 0.5;
 constexpr int kSmallestHalfWindowPx = 2;
 constexpr size_t kFewestCorners = 4;  // a homography needs as many
 // Of the way to the next corner; more, and the window sees that corner's edges too.
@@ -153,7 +152,7 @@ Detection DetectBoard(const Grid<std::uint8_t>& grey, const Board& board,
   const int half_window_px = HalfWindow(found, board, options.half_window_px);
   Refine(image, half_window_px, found);
   for (const auto& [id, corner] : found) {
-    detection.corners.push_back({id, {corner.x + kCentreOffsetPx, corner.y + kCentreOffsetPx}});
+    detection.corners.push_back({id, {corner.x + kOpenCvOffsetPx, corner.y + kOpenCvOffsetPx}});
   }
   detection.noise_px = CornerNoise(grey, detection.corners, half_window_px);
   return detection;

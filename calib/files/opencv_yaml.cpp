@@ -9,13 +9,13 @@
 #include <optional>
 #include <string_view>
 
+#include "calib/boards/opencv_pixels.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 
 namespace dtr::calib {
 namespace {
 
-constexpr double kCentreOffsetPx = 0.5;
 constexpr std::uintmax_t kLargestFileBytes = 16u << 20;  // OpenCV's samples write the points too
 constexpr int kLongestSidePx = 1'000'000;
 
@@ -203,7 +203,7 @@ LensCamera ReadOpenCvYaml(const std::filesystem::path& file) {
                 ": camera_matrix: expected [fx, 0, cx, 0, fy, cy, 0, 0, 1]; skew is not "
                 "supported");
   }
-  camera.params = {k[0], k[4], k[2] + kCentreOffsetPx, k[5] + kCentreOffsetPx};
+  camera.params = {k[0], k[4], k[2] + kOpenCvOffsetPx, k[5] + kOpenCvOffsetPx};
   AddCoefficients(MatrixData(fields, "distortion_coefficients", where), IsFisheye(fields), where,
                   camera);
   try {
@@ -222,8 +222,8 @@ void WriteOpenCvYaml(const std::filesystem::path& file, const LensCamera& camera
   text += fmt::format("image_width: {}\nimage_height: {}\n", camera.width_px, camera.height_px);
   if (IsFisheye(camera.model)) text += "fisheye_model: 1\n";
   text += Matrix("camera_matrix", 3,
-                 {k.fx_px(), 0, k.cx_px() - kCentreOffsetPx, 0, k.fy_px(),
-                  k.cy_px() - kCentreOffsetPx, 0, 0, 1});
+                 {k.fx_px(), 0, k.cx_px() - kOpenCvOffsetPx, 0, k.fy_px(),
+                  k.cy_px() - kOpenCvOffsetPx, 0, 0, 1});
   text += Matrix("distortion_coefficients", static_cast<int>(coefficients.size()), coefficients);
   WriteFileAtomically(file, text);
 }

@@ -8,6 +8,7 @@
 #include <limits>
 #include <opencv2/calib3d.hpp>
 
+#include "calib/boards/opencv_pixels.h"
 #include "calib/lens_map.h"
 #include "dtr/base/error.h"
 
@@ -100,8 +101,8 @@ std::vector<double> CandidateFocals(const Board& board, std::span<const BoardVie
     for (const BoardCorner& corner : view.corners) {
       const Eigen::Vector3d p = board.Corner(corner.id) / board.square;
       corners.back().emplace_back(static_cast<float>(p.x()), static_cast<float>(p.y()), 0.0f);
-      pixels.back().emplace_back(static_cast<float>(corner.pixel.x() - 0.5),
-                                 static_cast<float>(corner.pixel.y() - 0.5));
+      pixels.back().emplace_back(static_cast<float>(corner.pixel.x() - kOpenCvOffsetPx),
+                                 static_cast<float>(corner.pixel.y() - kOpenCvOffsetPx));
     }
   }
   try {

@@ -1,4 +1,4 @@
-// The acceptance of board calibration in full: 1000 solves, every parameter on its own.
+// Predicted uncertainties in full: 1000 solves, every parameter on its own.
 #include "tests/calib/solve/monte_carlo.h"
 
 namespace dtr::calib {
