@@ -1,0 +1,92 @@
+// viewer/osg/context_renderers.h -- what lies on the GPU of a scene, for every graphics context it
+// is drawn in.
+#pragma once
+#include <osg/State>
+#include <osg/ref_ptr>
+
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <vector>
+
+#include "dtr/gl/compositor.h"
+#include "dtr/gl/renderer.h"
+#include "viewer/osg/loaded_scene.h"
+
+namespace osgDTR {
+
+/// A renderer of one graphics context, and what its last picture was of.
+class ContextRenderer {
+ public:
+  ContextRenderer();
+
+  /// A picture of what `drawn` says, made anew only when one of these differs from the last call's:
+  /// a viewer draws a still scene again and again.
+  template <typename Draw>
+  dtr::gl::DrawnPicture Picture(std::shared_ptr<const LoadedScene> scene, unsigned settings_version,
+                                const dtr::PinholeCamera& camera, const dtr::Pose& pose,
+                                const Draw& draw) {
+    if (scene != scene_) {
+      renderer.Forget();  // while the old views still live
+      last_.reset();
+      scene_ = std::move(scene);
+    }
+    Last now{settings_version, camera, pose, {}};
+    if (!last_ || !now.SameAs(*last_)) {
+      last_.reset();
+      now.picture = draw();
+      last_ = std::move(now);
+    }
+    return last_->picture;
+  }
+
+  dtr::gl::Renderer renderer;
+  dtr::gl::Compositor compositor;
+
+ private:
+  struct Last {
+    unsigned settings_version;
+    dtr::PinholeCamera camera;
+    dtr::Pose pose;
+    dtr::gl::DrawnPicture picture;
+    bool SameAs(const Last& other) const {
+      return settings_version == other.settings_version && camera == other.camera &&
+             pose.rotation.coeffs() == other.pose.rotation.coeffs() &&
+             pose.translation == other.pose.translation;
+    }
+  };
+  std::shared_ptr<const LoadedScene> scene_;
+  std::optional<Last> last_;
+};
+
+/// The renderers of one drawable, by graphics context. Contexts that share their objects still have
+/// a renderer each: vertex arrays and framebuffers are never shared. Renderers die where their
+/// context is current: when OpenSceneGraph flushes it or closes its window. Any thread.
+class ContextRenderers {
+ public:
+  ContextRenderers();
+  ~ContextRenderers();
+  ContextRenderers(const ContextRenderers&) = delete;
+  ContextRenderers& operator=(const ContextRenderers&) = delete;
+
+  /// That of the context of `state`, which is current on this thread; made at the first call.
+  std::shared_ptr<ContextRenderer> Of(osg::State& state);
+
+  /// Gives up the renderer of a context, or all of them (null); they die as said above.
+  void Release(const osg::State* state);
+
+  /// Renderers that are in use now.
+  size_t count() const;
+
+ private:
+  class Owner;
+  struct Entry {
+    const osg::State* state = nullptr;
+    osg::ref_ptr<Owner> owner;
+    std::weak_ptr<ContextRenderer> renderer;
+  };
+  mutable std::mutex mutex_;
+  std::vector<Entry> entries_;
+};
+
+}  // namespace osgDTR
