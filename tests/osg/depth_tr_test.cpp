@@ -18,12 +18,6 @@ using osgDTR::DepthTR;
 
 constexpr double kShareOfBorderPixels = 2e-4;
 
-/// How many pixels differ by more than one level, of those where both show the scene.
-struct Comparison {
-  double differing_share = 0;
-  int background = 0;  ///< pixels that no view saw
-};
-
 /// A picture as dtr/gl draws it, in a context of its own.
 RenderResult DrawnAlone(const DtrSet& set, const Shot& novel, const RenderOptions& options) {
   const gl::EglContext context;

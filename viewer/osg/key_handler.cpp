@@ -1,0 +1,143 @@
+#include "viewer/osg/key_handler.h"
+
+#include <osg/Notify>
+#include <osgGA/CameraManipulator>
+#include <osgViewer/View>
+
+#include <algorithm>
+#include <cmath>
+
+namespace osgDTR {
+namespace {
+
+using dtr::BlendWeight;
+using dtr::RenderOptions;
+
+/// The camera at an input view, in the world's coordinates: rigid, however the node is scaled.
+struct Eye {
+  osg::Vec3d position, target, up;
+};
+
+Eye EyeOf(const DepthTR& node, int vn) {
+  const osg::MatrixList to_world = node.getWorldMatrices();
+  const osg::Matrixd world_from_local = to_world.empty() ? osg::Matrixd() : to_world.front();
+  const osg::Matrixd local_from_eye = osg::Matrixd::inverse(node.getInputViewMatrix(vn));
+  const osg::Vec3d position = osg::Vec3d(0, 0, 0) * local_from_eye;
+  const osg::Vec3d forward = osg::Matrixd::transform3x3(osg::Vec3d(0, 0, -1), local_from_eye);
+  const osg::Vec3d up = osg::Matrixd::transform3x3(osg::Vec3d(0, 1, 0), local_from_eye);
+  // Manipulators turn about the target: as far away as the scene's centre.
+  const Eigen::Vector3d center = node.getScene()->scene.center;
+  const double distance =
+      (osg::Vec3d(center.x(), center.y(), center.z()) - position).length();
+  Eye eye;
+  eye.position = position * world_from_local;
+  eye.target = (position + forward * std::max(distance, 1e-6)) * world_from_local;
+  eye.up = osg::Matrixd::transform3x3(up, world_from_local);
+  eye.up.normalize();
+  return eye;
+}
+
+const char* Next(BlendWeight& blend) {
+  static constexpr const char* kNames[] = {"cosine", "exponential", "angle", "inverse-angle",
+                                           "k-nearest"};
+  blend = static_cast<BlendWeight>((static_cast<int>(blend) + 1) % 5);
+  return kNames[static_cast<int>(blend)];
+}
+
+/// Deferred, two passes with meshes, two passes with splats.
+const char* NextMethod(RenderOptions& options) {
+  if (options.method == dtr::RenderMethod::kDeferred) {
+    options.method = dtr::RenderMethod::kTwoPass;
+    options.primitive = dtr::Primitive::kMesh;
+    return "two passes, meshes";
+  }
+  if (options.primitive == dtr::Primitive::kMesh) {
+    options.primitive = dtr::Primitive::kSplat;
+    return "two passes, splats";
+  }
+  options.method = dtr::RenderMethod::kDeferred;
+  options.primitive = dtr::Primitive::kMesh;
+  return "deferred";
+}
+
+constexpr int kCoarsestResolution = 4;
+
+}  // namespace
+
+KeyHandler::KeyHandler(DepthTR* node, bool starts_at_input)
+    : node_(node), starts_at_input_(starts_at_input) {}
+
+void KeyHandler::GoTo(int vn, osgGA::GUIActionAdapter& viewer) const {
+  osg::ref_ptr<DepthTR> node;
+  if (vn < 0 || !node_.lock(node)) return;
+  const Eye eye = EyeOf(*node, vn);
+  osg::View* const view = viewer.asView();
+  if (auto* const with_manipulator = dynamic_cast<osgViewer::View*>(view);
+      with_manipulator != nullptr && with_manipulator->getCameraManipulator() != nullptr) {
+    osgGA::CameraManipulator& manipulator = *with_manipulator->getCameraManipulator();
+    manipulator.setAutoComputeHomePosition(false);
+    manipulator.setHomePosition(eye.position, eye.target, eye.up);
+    manipulator.home(0);
+  } else if (view != nullptr) {
+    view->getCamera()->setViewMatrixAsLookAt(eye.position, eye.target, eye.up);
+  }
+  viewer.requestRedraw();
+}
+
+bool KeyHandler::handle(const osgGA::GUIEventAdapter& event, osgGA::GUIActionAdapter& viewer) {
+  osg::ref_ptr<DepthTR> node;
+  if (!node_.lock(node) || !node->isLoaded()) return false;
+  if (event.getEventType() == osgGA::GUIEventAdapter::FRAME && starts_at_input_) {
+    starts_at_input_ = false;
+    GoTo(node->nextView(), viewer);
+    return false;
+  }
+  if (event.getEventType() != osgGA::GUIEventAdapter::KEYDOWN || event.getHandled()) return false;
+  RenderOptions options = node->getRenderOptions();
+  switch (event.getKey()) {
+    case 'n':
+    case 'N':
+      GoTo(node->nextView(event.getKey() == 'n' ? 1 : -1), viewer);
+      return true;
+    case 'v':
+      OSG_NOTICE << "D+TR blend weight: " << Next(options.blend) << std::endl;
+      break;
+    case 'k':
+      OSG_NOTICE << "D+TR method: " << NextMethod(options) << std::endl;
+      break;
+    case 'r':
+      options.resolution =
+          options.resolution >= kCoarsestResolution ? 1 : 2 * options.resolution;
+      OSG_NOTICE << "D+TR resolution: " << options.resolution << std::endl;
+      break;
+    case '[':
+    case ']':
+      options.views = std::clamp(options.views + (event.getKey() == ']' ? 1 : -1), 1,
+                                 std::max(1, node->numberOfInputViews()));
+      OSG_NOTICE << "D+TR views: " << options.views << std::endl;
+      break;
+    case 'x': {
+      const bool gpu = node->getDrawPath() == DrawPath::kReadBack;
+      node->setDrawPath(gpu ? DrawPath::kGpu : DrawPath::kReadBack);
+      OSG_NOTICE << "D+TR path: " << (gpu ? "GPU" : "read back, two passes") << std::endl;
+      viewer.requestRedraw();
+      return true;
+    }
+    default:
+      return false;
+  }
+  node->setRenderOptions(options);
+  viewer.requestRedraw();
+  return true;
+}
+
+void KeyHandler::getUsage(osg::ApplicationUsage& usage) const {
+  usage.addKeyboardMouseBinding("D+TR: n, N", "Go to the next, the previous input camera");
+  usage.addKeyboardMouseBinding("D+TR: v", "Next blend weight");
+  usage.addKeyboardMouseBinding("D+TR: k", "Deferred, two passes with meshes, with splats");
+  usage.addKeyboardMouseBinding("D+TR: r", "Every pixel, 2nd, 4th pixel of the depth maps");
+  usage.addKeyboardMouseBinding("D+TR: [, ]", "One view less, one more");
+  usage.addKeyboardMouseBinding("D+TR: x", "Read back and blend on the processor, on and off");
+}
+
+}  // namespace osgDTR

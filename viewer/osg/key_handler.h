@@ -1,0 +1,29 @@
+// viewer/osg/key_handler.h -- the founding report's keys (its section 3.2.3).
+#pragma once
+#include <osg/observer_ptr>
+#include <osgGA/GUIEventHandler>
+
+#include "viewer/osg/depth_tr.h"
+
+namespace osgDTR {
+
+/// Keys for a DepthTR: n N next and previous input view, v blend weight, k method and primitive,
+/// r resolution, [ ] number of views, x the report's read-back path. Add it to a viewer's event
+/// handlers, or to a node's event callbacks, as the osgDB plugin does.
+class KeyHandler : public osgGA::GUIEventHandler {
+ public:
+  /// `starts_at_input`: home, which is where viewers start, becomes the first input camera.
+  explicit KeyHandler(DepthTR* node, bool starts_at_input = false);
+
+  using osgGA::GUIEventHandler::handle;
+  bool handle(const osgGA::GUIEventAdapter& event, osgGA::GUIActionAdapter& viewer) override;
+  void getUsage(osg::ApplicationUsage& usage) const override;
+
+ private:
+  void GoTo(int vn, osgGA::GUIActionAdapter& viewer) const;
+
+  const osg::observer_ptr<DepthTR> node_;
+  bool starts_at_input_;
+};
+
+}  // namespace osgDTR
