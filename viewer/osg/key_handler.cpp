@@ -67,7 +67,8 @@ constexpr int kCoarsestResolution = 4;
 KeyHandler::KeyHandler(DepthTR* node, bool starts_at_input)
     : node_(node), starts_at_input_(starts_at_input) {}
 
-void KeyHandler::GoTo(int vn, osgGA::GUIActionAdapter& viewer) const {
+void KeyHandler::GoTo(int vn, const osgGA::GUIEventAdapter& event,
+                      osgGA::GUIActionAdapter& viewer) const {
   osg::ref_ptr<DepthTR> node;
   if (vn < 0 || !node_.lock(node)) return;
   const Eye eye = EyeOf(*node, vn);
@@ -77,7 +78,7 @@ void KeyHandler::GoTo(int vn, osgGA::GUIActionAdapter& viewer) const {
     osgGA::CameraManipulator& manipulator = *with_manipulator->getCameraManipulator();
     manipulator.setAutoComputeHomePosition(false);
     manipulator.setHomePosition(eye.position, eye.target, eye.up);
-    manipulator.home(0);
+    manipulator.home(event, viewer);
   } else if (view != nullptr) {
     view->getCamera()->setViewMatrixAsLookAt(eye.position, eye.target, eye.up);
   }
@@ -89,7 +90,7 @@ bool KeyHandler::handle(const osgGA::GUIEventAdapter& event, osgGA::GUIActionAda
   if (!node_.lock(node) || !node->isLoaded()) return false;
   if (event.getEventType() == osgGA::GUIEventAdapter::FRAME && starts_at_input_) {
     starts_at_input_ = false;
-    GoTo(node->nextView(), viewer);
+    GoTo(node->nextView(), event, viewer);
     return false;
   }
   if (event.getEventType() != osgGA::GUIEventAdapter::KEYDOWN || event.getHandled()) return false;
@@ -97,7 +98,7 @@ bool KeyHandler::handle(const osgGA::GUIEventAdapter& event, osgGA::GUIActionAda
   switch (event.getKey()) {
     case 'n':
     case 'N':
-      GoTo(node->nextView(event.getKey() == 'n' ? 1 : -1), viewer);
+      GoTo(node->nextView(event.getKey() == 'n' ? 1 : -1), event, viewer);
       return true;
     case 'v':
       OSG_NOTICE << "D+TR blend weight: " << Next(options.blend) << std::endl;

@@ -20,7 +20,7 @@ class KeyHandler : public osgGA::GUIEventHandler {
   void getUsage(osg::ApplicationUsage& usage) const override;
 
  private:
-  void GoTo(int vn, osgGA::GUIActionAdapter& viewer) const;
+  void GoTo(int vn, const osgGA::GUIEventAdapter& event, osgGA::GUIActionAdapter& viewer) const;
 
   const osg::observer_ptr<DepthTR> node_;
   bool starts_at_input_;
