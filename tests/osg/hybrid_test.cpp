@@ -24,10 +24,9 @@ enum class Front { kModel, kScene, kNothing };
 struct KnownBox {
   Eigen::Vector3d center, half;
   osg::ref_ptr<osg::Node> Node() const {
-    osg::ref_ptr<osg::ShapeDrawable> shape = new osg::ShapeDrawable(
-        new osg::Box(osg::Vec3d(center.x(), center.y(), center.z()),
-                     static_cast<float>(2 * half.x()), static_cast<float>(2 * half.y()),
-                     static_cast<float>(2 * half.z())));
+    osg::ref_ptr<osg::ShapeDrawable> shape = new osg::ShapeDrawable(new osg::Box(
+        osg::Vec3d(center.x(), center.y(), center.z()), static_cast<float>(2 * half.x()),
+        static_cast<float>(2 * half.y()), static_cast<float>(2 * half.z())));
     shape->setColor({1, 0, 0, 1});
     osg::ref_ptr<osg::Geode> geode = new osg::Geode;
     geode->addDrawable(shape);
@@ -53,9 +52,9 @@ Grid<Front> Truth(const datasets::Scene& scene, const KnownBox& box, const Shot&
           world_from_cam.rotation * novel.camera.RayFromPixel({x + 0.5, y + 0.5})};
       const auto hit = scene.Intersect(ray);
       const double of_scene = hit ? hit->t : datasets::kNoHit, of_box = box.Intersect(ray);
-      truth(x, y) = of_box < of_scene                 ? Front::kModel
+      truth(x, y) = of_box < of_scene             ? Front::kModel
                     : of_scene < datasets::kNoHit ? Front::kScene
-                                                      : Front::kNothing;
+                                                  : Front::kNothing;
     }
   }
   return truth;
@@ -111,8 +110,8 @@ struct Placement {
 };
 
 std::vector<Placement> Placements() {
-  const osg::Matrixd turned = osg::Matrixd::rotate(0.7, osg::Vec3d(0.3, -0.2, 0.9)) *
-                              osg::Matrixd::translate(30, -12, 5);
+  const osg::Matrixd turned =
+      osg::Matrixd::rotate(0.7, osg::Vec3d(0.3, -0.2, 0.9)) * osg::Matrixd::translate(30, -12, 5);
   return {{"identity", osg::Matrixd()},
           {"turned and moved", turned},
           {"three times as large", osg::Matrixd::scale(3, 3, 3) * turned}};
@@ -126,25 +125,24 @@ TEST_F(HybridTest, ModelAndSceneHideEachOther) {
   const auto focus = hybrid.scene.framing().focus;
   hybrid.box = {focus + Eigen::Vector3d(0.6, 0.9, -0.1), {0.9, 0.5, 0.9}};
   const Grid<Front> truth = Truth(hybrid.scene, hybrid.box, hybrid.named.novel);
-  for (const auto threading :
-       {osgViewer::ViewerBase::SingleThreaded,
-        osgViewer::ViewerBase::CullThreadPerCameraDrawThreadPerContext}) {
+  for (const auto threading : {osgViewer::ViewerBase::SingleThreaded,
+                               osgViewer::ViewerBase::CullThreadPerCameraDrawThreadPerContext}) {
     for (const Placement& placement : Placements()) {
       SCOPED_TRACE(placement.name);
       osg::ref_ptr<DepthTR> node = new DepthTR;
       node->setScene(hybrid.named.set);
-      osg::ref_ptr<osg::MatrixTransform> root = new osg::MatrixTransform(placement.world_from_scene);
+      osg::ref_ptr<osg::MatrixTransform> root =
+          new osg::MatrixTransform(placement.world_from_scene);
       root->addChild(node);
       root->addChild(hybrid.box.Node());
       OffscreenViewer viewer(root.get(), hybrid.named.novel.camera, {}, threading);
-      osg::Matrixd eye_from_scene =
-          osg::Matrixd::inverse(placement.world_from_scene) *
-          osgDTR::ViewMatrixOf(hybrid.named.novel.cam_from_world);
+      osg::Matrixd eye_from_scene = osg::Matrixd::inverse(placement.world_from_scene) *
+                                    osgDTR::ViewMatrixOf(hybrid.named.novel.cam_from_world);
       // A camera in the world is as large as the world: only the node is scaled.
-      const double scale = osg::Vec3d(placement.world_from_scene(0, 0),
-                                      placement.world_from_scene(0, 1),
-                                      placement.world_from_scene(0, 2))
-                               .length();
+      const double scale =
+          osg::Vec3d(placement.world_from_scene(0, 0), placement.world_from_scene(0, 1),
+                     placement.world_from_scene(0, 2))
+              .length();
       eye_from_scene = eye_from_scene * osg::Matrixd::scale(scale, scale, scale);
       viewer.viewer.getCamera()->setViewMatrix(eye_from_scene);
       const Shown& shown = viewer.Draw(3);

@@ -71,8 +71,7 @@ TEST_F(SceneGraphTest, MovesTurnsAndGrowsWithWhatStandsAboveIt) {
 
 TEST_F(SceneGraphTest, UnevenScalesAndMirrorsAreRefusedNotShownWrong) {
   for (const osg::Vec3d& scale : {osg::Vec3d(1, 2, 1), osg::Vec3d(-1, 1, 1)}) {
-    osg::ref_ptr<osg::MatrixTransform> above =
-        new osg::MatrixTransform(osg::Matrixd::scale(scale));
+    osg::ref_ptr<osg::MatrixTransform> above = new osg::MatrixTransform(osg::Matrixd::scale(scale));
     above->addChild(SquareNode());
     EXPECT_EQ(Drawn(Draw(above.get())), 0);
   }

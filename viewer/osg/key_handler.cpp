@@ -27,8 +27,7 @@ Eye EyeOf(const DepthTR& node, int vn) {
   const osg::Vec3d up = osg::Matrixd::transform3x3(osg::Vec3d(0, 1, 0), local_from_eye);
   // Manipulators turn about the target: as far away as the scene's centre.
   const Eigen::Vector3d center = node.getScene()->scene.center;
-  const double distance =
-      (osg::Vec3d(center.x(), center.y(), center.z()) - position).length();
+  const double distance = (osg::Vec3d(center.x(), center.y(), center.z()) - position).length();
   Eye eye;
   eye.position = position * world_from_local;
   eye.target = (position + forward * std::max(distance, 1e-6)) * world_from_local;
@@ -107,8 +106,7 @@ bool KeyHandler::handle(const osgGA::GUIEventAdapter& event, osgGA::GUIActionAda
       OSG_NOTICE << "D+TR method: " << NextMethod(options) << std::endl;
       break;
     case 'r':
-      options.resolution =
-          options.resolution >= kCoarsestResolution ? 1 : 2 * options.resolution;
+      options.resolution = options.resolution >= kCoarsestResolution ? 1 : 2 * options.resolution;
       OSG_NOTICE << "D+TR resolution: " << options.resolution << std::endl;
       break;
     case '[':

@@ -29,7 +29,8 @@ int WholeNumber(const std::string& name, const std::string& value) {
   } catch (const std::exception&) {
   }
   if (used == 0 || used != value.size()) {
-    throw dtr::UsageError("osgdb_dtr: option " + name + ": expected a whole number, found " + value);
+    throw dtr::UsageError("osgdb_dtr: option " + name + ": expected a whole number, found " +
+                          value);
   }
   return number;
 }
@@ -66,18 +67,17 @@ PluginOptions Parse(const osgDB::Options* given) {
                                    {"k-nearest", dtr::BlendWeight::kKNearest}});
     }
     if (name == "method") {
-      options.render.method =
-          OneOf<dtr::RenderMethod>(name, value,
-                                   {{"deferred", dtr::RenderMethod::kDeferred},
-                                    {"two-pass", dtr::RenderMethod::kTwoPass}});
+      options.render.method = OneOf<dtr::RenderMethod>(
+          name, value,
+          {{"deferred", dtr::RenderMethod::kDeferred}, {"two-pass", dtr::RenderMethod::kTwoPass}});
     }
     if (name == "primitive") {
       options.render.primitive = OneOf<dtr::Primitive>(
           name, value, {{"mesh", dtr::Primitive::kMesh}, {"splat", dtr::Primitive::kSplat}});
     }
     if (name == "path") {
-      options.path = OneOf<DrawPath>(
-          name, value, {{"gpu", DrawPath::kGpu}, {"read-back", DrawPath::kReadBack}});
+      options.path = OneOf<DrawPath>(name, value,
+                                     {{"gpu", DrawPath::kGpu}, {"read-back", DrawPath::kReadBack}});
     }
     if (name == "keys") {
       options.keys = OneOf<bool>(name, value, {{"on", true}, {"off", false}});
