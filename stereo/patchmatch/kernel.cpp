@@ -14,6 +14,7 @@
 #include <hwy/contrib/math/math-inl.h>
 
 #include "stereo/patchmatch/kernel_ncc-inl.h"
+#include "stereo/patchmatch/kernel_verdict-inl.h"
 // clang-format on
 
 HWY_BEFORE_NAMESPACE();
@@ -24,9 +25,6 @@ constexpr int kPlanes = 11;
 /// A view sees a pixel when more than this many candidates match well in it and fewer than that
 /// badly. ACMH's 2 and 3 take the sight from all views next to silhouettes and behind thin things.
 constexpr float kGoodPlanes = 1.0f, kBadPlanes = 7.0f;
-/// Views with less than this share of the best view's weight have no say. On plaza, share of all
-/// true pixels within 1 %: 77.7 % with 0.1, 79.7 % with 0.3, 79.8 % with 0.5 and less precise.
-constexpr float kLeastWeight = 0.4f;
 constexpr int kNearSamples = 7, kFarSamples = 11;
 
 /// Inverse depth and cost of a candidate that a lane does not have, for its neighbours have one:
@@ -348,123 +346,6 @@ std::int64_t SearchRowImpl(const Level& level, int samples, int y, State* state)
   return g.samples;
 }
 
-/// Vertex of the parabola through costs at -1, 0, 1; `curvature` is its second derivative.
-HWY_INLINE VF Vertex(VF before, VF here, VF after, VF* curvature) {
-  const DF d;
-  const VF two = hn::Set(d, 2.0f);
-  *curvature = hn::Sub(hn::Add(before, after), hn::Mul(two, here));
-  const VF safe = hn::Max(*curvature, hn::Set(d, 1e-6f));
-  const VF at = hn::Div(hn::Mul(hn::Set(d, 0.5f), hn::Sub(before, after)), safe);
-  return hn::Min(hn::Max(at, hn::Set(d, -1.0f)), hn::Set(d, 1.0f));
-}
-
-/// Shares of the views in a verdict. After rounds, a view counts by how well it agrees, in looks
-/// and in place; before, by what the sweeps found.
-void WeighViews(const Level& level, const State& state, const Group& g, VF w, VF a, VF b,
-                float (*weights)[kLanes]) {
-  const DF d;
-  VF largest = hn::Zero(d), sum = hn::Zero(d);
-  for (size_t v = 0; v < level.sources.size(); ++v) {
-    VF weight = LoadColour(state.weight[v], g.x, g.y);
-    if (level.sources[v].surface != nullptr) {
-      const VF cost = CostInView(g, level.sources[v], v, w, a, b);
-      weight = hn::Exp(d, hn::Mul(hn::Mul(cost, cost), hn::Set(d, -1.0f / 0.18f)));
-    }
-    largest = hn::Max(largest, weight);
-    hn::Store(weight, d, weights[v]);
-  }
-  const VF least = hn::Mul(largest, hn::Set(d, kLeastWeight));
-  for (size_t v = 0; v < level.sources.size(); ++v) {
-    const VF weight = hn::Load(d, weights[v]);
-    const VF kept = hn::IfThenZeroElse(hn::Lt(weight, least), weight);
-    hn::Store(kept, d, weights[v]);
-    sum = hn::Add(sum, kept);
-  }
-  for (size_t v = 0; v < level.sources.size(); ++v) {
-    hn::Store(hn::Div(hn::Load(d, weights[v]), sum), d, weights[v]);
-  }
-}
-
-void JudgeGroup(const Level& level, const State& state, const Group& g, Verdict* out) {
-  const DF d;
-  const VF zero = hn::Zero(d), one = hn::Set(d, 1.0f);
-  HWY_ALIGN float weights[kMaxViews][kLanes];
-  const VF w = LoadColour(state.w, g.x, g.y), a = LoadColour(state.a, g.x, g.y);
-  const VF b = LoadColour(state.b, g.x, g.y);
-  WeighViews(level, state, g, w, a, b, weights);
-  const VF px = DisparityPerInverseDepth(g, level, w, weights);
-  const VF step = hn::Div(hn::Set(d, kJudgeStepPx), px);
-  VF before = zero, here = zero, after = zero, agreeing = zero, consistent = zero;
-  HWY_ALIGN float vertex[kMaxViews][kLanes];
-  HWY_ALIGN float certainty[kMaxViews][kLanes];
-  for (size_t v = 0; v < level.sources.size(); ++v) {
-    const Source& s = level.sources[v];
-    const VF weight = hn::Load(d, weights[v]);
-    if (s.surface != nullptr) {
-      const VF off_px = RoundTripPx(g, s, LocateAllowed(g, s, v, w, a, b));
-      const auto is_near = hn::Lt(off_px, hn::Set(d, kConsistentPx));
-      consistent = hn::Add(consistent, hn::IfThenElseZero(is_near, one));
-    }
-    hn::Store(zero, d, vertex[v]);
-    hn::Store(zero, d, certainty[v]);
-    const auto counts = hn::Gt(weight, zero);
-    if (hn::AllFalse(d, counts)) continue;
-    const VF c0 = ScoreView(g, s, v, hn::Sub(w, step), a, b), c1 = ScoreView(g, s, v, w, a, b);
-    const VF c2 = ScoreView(g, s, v, hn::Add(w, step), a, b);
-    before = hn::MulAdd(weight, c0, before);
-    here = hn::MulAdd(weight, c1, here);
-    after = hn::MulAdd(weight, c2, after);
-    VF curvature;
-    const VF at = Vertex(c0, c1, c2, &curvature);
-    const auto agrees =
-        hn::And(counts, hn::And(hn::Lt(c1, hn::Set(d, kAgreeingCost)), hn::Gt(curvature, zero)));
-    agreeing = hn::Add(agreeing, hn::IfThenElseZero(agrees, one));
-    hn::Store(at, d, vertex[v]);
-    hn::Store(hn::IfThenElseZero(agrees, hn::Mul(weight, curvature)), d, certainty[v]);
-  }
-  VF curvature;
-  const VF at = Vertex(before, here, after, &curvature);
-  // Spread of the views' own minima about the common one, weighted like the minimum itself.
-  VF spread = zero, sum = zero;
-  for (size_t v = 0; v < level.sources.size(); ++v) {
-    const VF off = hn::Sub(hn::Load(d, vertex[v]), at), c = hn::Load(d, certainty[v]);
-    spread = hn::MulAdd(c, hn::Mul(off, off), spread);
-    sum = hn::Add(sum, c);
-  }
-  spread = hn::Div(spread, hn::Mul(hn::Max(sum, hn::Set(d, 1e-6f)), hn::Max(agreeing, one)));
-  // Least squares: the sum over the window of squared differences of normalised patches is
-  // 2 kTaps c, so the noise per sample is 2 c and the variance of the minimum 2 c / (kTaps c'').
-  const VF noise =
-      hn::Div(hn::Mul(hn::Set(d, 2.0f / kTaps), here), hn::Max(curvature, hn::Set(d, 1e-6f)));
-  const VF sigma = hn::Mul(step, hn::Sqrt(hn::Add(noise, spread)));
-  HWY_ALIGN float lanes[6][kLanes];
-  hn::Store(consistent, d, lanes[5]);
-  hn::Store(hn::MulAdd(step, at, w), d, lanes[0]);
-  hn::Store(sigma, d, lanes[1]);
-  hn::Store(here, d, lanes[2]);
-  hn::Store(px, d, lanes[3]);
-  hn::Store(agreeing, d, lanes[4]);
-  for (int i = 0; i < static_cast<int>(kLanes) && g.x + 2 * i < level.reference.width; ++i) {
-    out[g.x + 2 * i] = {lanes[0][i],
-                        lanes[1][i],
-                        lanes[2][i],
-                        lanes[3][i],
-                        g.texture[i],
-                        static_cast<int>(lanes[4][i]),
-                        static_cast<int>(lanes[5][i])};
-  }
-}
-
-void JudgeRowImpl(const Level& level, const State& state, int y, Verdict* out) {
-  Group g;
-  for (int start = 0; start < 2; ++start) {
-    for (int x = start; x < level.reference.width; x += 2 * static_cast<int>(kLanes)) {
-      PrepareGroup(level, x, y, &g);
-      JudgeGroup(level, state, g, out);
-    }
-  }
-}
-
 const char* TargetName() { return hwy::TargetName(HWY_TARGET); }
 
 }  // namespace dtr::stereo::patchmatch::HWY_NAMESPACE
@@ -477,6 +358,7 @@ HWY_EXPORT(SearchRowImpl);
 HWY_EXPORT(SweepRowImpl);
 HWY_EXPORT(ScoreRowImpl);
 HWY_EXPORT(JudgeRowImpl);
+HWY_EXPORT(AmbiguousRowImpl);
 HWY_EXPORT(TargetName);
 
 std::int64_t SearchRow(const Level& level, int samples, int y, State* state) {
@@ -491,6 +373,9 @@ std::int64_t ScoreRow(const Level& level, const State& state, int y, std::span<c
 }
 void JudgeRow(const Level& level, const State& state, int y, Verdict* out) {
   HWY_DYNAMIC_DISPATCH(JudgeRowImpl)(level, state, y, out);
+}
+void AmbiguousRow(const Level& level, const State& state, int y, std::uint8_t* ambiguous) {
+  HWY_DYNAMIC_DISPATCH(AmbiguousRowImpl)(level, state, y, ambiguous);
 }
 const char* InstructionSet() { return HWY_DYNAMIC_DISPATCH(TargetName)(); }
 

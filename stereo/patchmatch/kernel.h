@@ -128,6 +128,11 @@ std::int64_t SweepRow(const Level& level, const Sweep& sweep, int y, State* stat
 /// Finds the minimum of the cost to a fraction of a pixel and judges it. `out` has a row's length.
 void JudgeRow(const Level& level, const State& state, int y, Verdict* out);
 
+/// Whether other places on a pixel's ray match about as well as its plane: where a texture repeats
+/// within 12 pixels of disparity, and at infinity, where pictures are copies or mirrors show far
+/// things. Worked out for pixels 0, 2, 4, ... of the row: ambiguous[x / 2] is 1 or 0.
+void AmbiguousRow(const Level& level, const State& state, int y, std::uint8_t* ambiguous);
+
 /// Photometric cost, 1 - NCC, of each pixel's plane in the first source, moved by each of `steps`
 /// in inverse depth: costs[n * width + x]. Nothing but the kernel, for tests and benchmarks;
 /// returns the number of samples.

@@ -35,11 +35,9 @@ static_assert(kLargestStretch * kRadius <= kTextureBorder - 2);
 constexpr float kSmallestArea = 0.05f;
 /// Geometric consistency, as in ACMM: cost per pixel by which a round trip misses, and its cap.
 constexpr float kCostPerRoundTripPx = 0.2f, kLargestRoundTripPx = 3.0f;
-/// Steps of the judging parabola and the cost of a view that sees the same surface.
-constexpr float kJudgeStepPx = 0.5f;
-constexpr float kAgreeingCost = 0.4f;
-/// Round trips that miss by less end on the same surface.
-constexpr float kConsistentPx = 1.0f;
+/// Views with less than this share of the best view's weight have no say. On plaza, share of all
+/// true pixels within 1 %: 77.7 % with 0.1, 79.7 % with 0.3, 79.8 % with 0.5 and less precise.
+constexpr float kLeastWeight = 0.4f;
 
 /// Pixels x, x + 2, x + 4, ... of a row with their windows of the reference.
 struct Group {

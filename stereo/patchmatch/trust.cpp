@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "dtr/base/parallel_for.h"
 
@@ -24,6 +25,11 @@ constexpr Limits kAfterRounds{1.0f, 4.0f, 0};
 /// Least variance of the pixels that look like the centre (grey levels squared). A window of sky at
 /// a roof has the roof's texture, and would get its depth.
 constexpr float kLeastTexture = 3.0f;
+/// One row of so many is asked whether its pixels are ambiguous: what repeats covers more.
+constexpr int kAskedRows = 8;
+/// Single pixels find other places by chance, whole areas because their texture repeats: more than
+/// half of the pixels asked, so many columns and rows of them to every side, must be ambiguous.
+constexpr int kAskedAsideX = 6, kAskedAsideY = 1;
 /// Inverse depths may miss the range by so many standard deviations.
 constexpr float kRangeSigmas = 3.0f;
 /// Connected areas smaller than this share of the image are taken for chance matches. Pixels
@@ -90,6 +96,33 @@ void RemoveSpeckles(const Grid<float>& px_per_w, const Grid<std::uint8_t>& consi
   }
 }
 
+/// Makes holes of areas whose texture leaves several places open.
+void RemoveAmbiguous(const Level& level, const State& state, int threads, DepthEstimate* estimate) {
+  const int w = level.reference.width, h = level.reference.height;
+  Grid<std::uint8_t> asked((w + 1) / 2, (h + kAskedRows - 1) / kAskedRows);
+  ParallelFor(0, asked.height(), threads, [&](int v) {
+    AmbiguousRow(level, state, std::min(h - 1, kAskedRows * v + kAskedRows / 2), asked.row(v));
+  });
+  ParallelFor(0, asked.height(), threads, [&](int v) {
+    for (int u = 0; u < asked.width(); ++u) {
+      int ambiguous = 0, all = 0;
+      for (int j = std::max(0, v - kAskedAsideY);
+           j <= std::min(asked.height() - 1, v + kAskedAsideY); ++j) {
+        for (int i = std::max(0, u - kAskedAsideX);
+             i <= std::min(asked.width() - 1, u + kAskedAsideX); ++i, ++all) {
+          ambiguous += asked(i, j);
+        }
+      }
+      if (2 * ambiguous <= all) continue;
+      for (int y = kAskedRows * v; y < std::min(h, kAskedRows * (v + 1)); ++y) {
+        for (int x = 2 * u; x < std::min(w, 2 * u + 2); ++x) {
+          estimate->depth(x, y) = estimate->inverse_depth_sigma(x, y) = 0;
+        }
+      }
+    }
+  });
+}
+
 bool HasSurfaces(const Level& level) {
   return std::any_of(level.sources.begin(), level.sources.end(),
                      [](const Source& s) { return s.surface != nullptr; });
@@ -125,6 +158,7 @@ DepthEstimate TrustedDepth(const Level& level, const State& state, const StereoV
     }
   });
   RemoveSpeckles(px_per_w, consistent, static_cast<float>(range.near_z), &result);
+  RemoveAmbiguous(level, state, threads, &result);
   return result;
 }
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "tests/stereo/extremes_rig.h"
 
@@ -178,7 +179,7 @@ TEST(PatchMatchExtremes, AWallWithoutTextureHasNoDepthAfterAllRounds) {
   EXPECT_LT(ScoreFirst(views, WholeRun(views, kRange), shots[0].truth).kept, 0.01);
 }
 
-TEST(PatchMatchExtremes, AMirrorHarmsNothingBesideIt) {
+TEST(PatchMatchExtremes, AMirrorHasNoDepthAndHarmsNothingBesideIt) {
   // Left of the middle, a mirror of things far away; the wall it hangs on beside it.
   std::vector<Shot> shots;
   for (const Vector3d& centre :
@@ -192,12 +193,52 @@ TEST(PatchMatchExtremes, AMirrorHarmsNothingBesideIt) {
   }
   const auto views = ViewsOf(shots);
   const DepthEstimate estimate = WholeRun(views, kRange);
+  const Score mirror =
+      ScoreFirst(views, estimate, shots[0].truth, [](int x, int) { return x < kWidth / 2 - 3; });
+  EXPECT_LT(mirror.kept, 0.05);
   // The windows are 7 pixels wide.
   const Score beside =
       ScoreFirst(views, estimate, shots[0].truth, [](int x, int) { return x > kWidth / 2 + 3; });
   EXPECT_GT(beside.kept, 0.95);
   EXPECT_LT(beside.median_px, LimitPx(shots[0], {1, 0}));
   EXPECT_LT(beside.past_1px, 0.01);
+}
+
+TEST(PatchMatchExtremes, WallpaperThatRepeatsWithinTheRangeHasNoDepth) {
+  // A period of 5 px of disparity; the range has 15. Other views on both sides at equal distances:
+  // every period is as right in all of them.
+  std::vector<Shot> shots;
+  for (const double x : {0.0, 0.4, -0.4}) {
+    const auto paint = [](const Vector3d& p, const Vector3d&) {
+      const double turn = 2 * std::numbers::pi * kFocal / (5 * 4);
+      return 127 + 50 * std::sin(turn * p.x()) + 30 * std::cos(2 * turn * p.x()) +
+             25 * std::sin(turn * p.y());
+    };
+    shots.push_back(Photograph(Plane({0, 0, 1}, 4), kCamera, Facing({x, 0, 0}), paint));
+  }
+  for (const size_t count : {2, 3}) {
+    std::vector<StereoView> views = ViewsOf(shots);
+    views.resize(count);
+    EXPECT_LT(ScoreFirst(views, WholeRun(views, {2, 16}), shots[0].truth).kept, 0.05) << count;
+  }
+}
+
+TEST(PatchMatchExtremes, CopiesOfOnePhotoFromDifferentPlacesHaveNoDepth) {
+  // All lies at infinity, which the range excludes.
+  for (const size_t count : {2, 3}) {
+    auto shots =
+        ShotsFrom(Slanted(), {Facing({0, 0, 0}), Facing({0.4, 0, 0}), Facing({-0.4, 0.2, 0})});
+    shots.resize(count);
+    for (Shot& shot : shots) shot.image = shots[0].image;
+    const auto views = ViewsOf(shots);
+    EXPECT_LT(ScoreFirst(views, WholeRun(views, kRange), shots[0].truth).kept, 0.05) << count;
+  }
+}
+
+TEST(PatchMatchExtremes, CopiesOfOnePhotoFromOnePlaceHaveNoDepth) {
+  const auto shots = ShotsFrom(Slanted(), {Facing({0, 0, 0}), Facing({0, 0, 0})});
+  const auto views = ViewsOf(shots);
+  EXPECT_EQ(ScoreFirst(views, WholeRun(views, kRange), shots[0].truth).kept, 0);
 }
 
 TEST(PatchMatchExtremes, PicturesOfEightPixels) {

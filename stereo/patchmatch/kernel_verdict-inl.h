@@ -1,0 +1,273 @@
+// stereo/patchmatch/kernel_verdict-inl.h -- what a pixel's plane is worth. Compiled per instruction
+// set: include only from kernel.cpp.
+#if defined(DTR_STEREO_PATCHMATCH_KERNEL_VERDICT_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef DTR_STEREO_PATCHMATCH_KERNEL_VERDICT_INL_H_
+#undef DTR_STEREO_PATCHMATCH_KERNEL_VERDICT_INL_H_
+#else
+#define DTR_STEREO_PATCHMATCH_KERNEL_VERDICT_INL_H_
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace dtr::stereo::patchmatch::HWY_NAMESPACE {
+
+/// Steps of the judging parabola and the cost of a view that sees the same surface.
+constexpr float kJudgeStepPx = 0.5f;
+constexpr float kAgreeingCost = 0.4f;
+/// How far, in pixels of disparity, other places that match are looked for, and from where on
+/// infinity is another place.
+constexpr int kRivalReachPx = 12;
+constexpr float kRivalApartPx = 2.0f;
+/// Largest cost of a place that matches; places match alike whose costs differ by about this part
+/// of the pixel's own cost and what resampling costs. On room, courtyard and plaza 0.2 % of the
+/// pixels that are right by a pixel have such a place, and 3 % of the wrong ones.
+constexpr float kRivalCost = 0.4f, kRivalNoise = 0.1f, kLeastRivalNoise = 0.03f;
+/// The first look, at a place not found to a fraction of a pixel yet, may cost so much more.
+constexpr float kRivalScoutSlack = 0.15f;
+/// Nobody knows where a pixel is when the other places together are this likely against its own.
+constexpr float kMostRivalOdds = 0.5f;
+/// Round trips that miss by less end on the same surface.
+constexpr float kConsistentPx = 1.0f;
+
+/// Vertex of the parabola through costs at -1, 0, 1; `curvature` is its second derivative.
+HWY_INLINE VF Vertex(VF before, VF here, VF after, VF* curvature) {
+  const DF d;
+  const VF two = hn::Set(d, 2.0f);
+  *curvature = hn::Sub(hn::Add(before, after), hn::Mul(two, here));
+  const VF safe = hn::Max(*curvature, hn::Set(d, 1e-6f));
+  const VF at = hn::Div(hn::Mul(hn::Set(d, 0.5f), hn::Sub(before, after)), safe);
+  return hn::Min(hn::Max(at, hn::Set(d, -1.0f)), hn::Set(d, 1.0f));
+}
+
+/// Shares of the views in a verdict. After rounds, a view counts by how well it agrees, in looks
+/// and in place; before, by what the sweeps found.
+void WeighViews(const Level& level, const State& state, const Group& g, VF w, VF a, VF b,
+                float (*weights)[kLanes]) {
+  const DF d;
+  VF largest = hn::Zero(d), sum = hn::Zero(d);
+  for (size_t v = 0; v < level.sources.size(); ++v) {
+    VF weight = LoadColour(state.weight[v], g.x, g.y);
+    if (level.sources[v].surface != nullptr) {
+      const VF cost = CostInView(g, level.sources[v], v, w, a, b);
+      weight = hn::Exp(d, hn::Mul(hn::Mul(cost, cost), hn::Set(d, -1.0f / 0.18f)));
+    }
+    largest = hn::Max(largest, weight);
+    hn::Store(weight, d, weights[v]);
+  }
+  const VF least = hn::Mul(largest, hn::Set(d, kLeastWeight));
+  for (size_t v = 0; v < level.sources.size(); ++v) {
+    const VF weight = hn::Load(d, weights[v]);
+    const VF kept = hn::IfThenZeroElse(hn::Lt(weight, least), weight);
+    hn::Store(kept, d, weights[v]);
+    sum = hn::Add(sum, kept);
+  }
+  for (size_t v = 0; v < level.sources.size(); ++v) {
+    hn::Store(hn::Div(hn::Load(d, weights[v]), sum), d, weights[v]);
+  }
+}
+
+/// Photometric cost of a plane in those of the views that count into which it falls.
+VF MeanScore(const Level& level, const Group& g, const float (*weights)[kLanes], VF w, VF a, VF b) {
+  const DF d;
+  const VF worst = hn::Set(d, kWorstCost);
+  VF total = hn::Zero(d), say = hn::Zero(d);
+  for (size_t v = 0; v < level.sources.size(); ++v) {
+    const VF weight = hn::Load(d, weights[v]);
+    if (hn::AllTrue(d, hn::Eq(weight, hn::Zero(d)))) continue;
+    const VF cost = ScoreView(g, level.sources[v], v, w, a, b);
+    const VF counts = hn::IfThenElseZero(hn::Lt(cost, worst), weight);
+    total = hn::MulAdd(counts, cost, total);
+    say = hn::Add(say, counts);
+  }
+  return hn::IfThenElse(hn::Gt(say, hn::Zero(d)), hn::Div(total, say), worst);
+}
+
+/// Least photometric cost within a quarter of a pixel of disparity, `pixel` being the
+/// change of inverse depth that is one.
+VF LeastScore(const Level& level, const Group& g, const float (*weights)[kLanes], VF w, VF a, VF b,
+              VF pixel) {
+  const DF d;
+  const VF step = hn::Mul(hn::Set(d, 0.25f), pixel);
+  const VF before = MeanScore(level, g, weights, hn::Sub(w, step), a, b);
+  const VF here = MeanScore(level, g, weights, w, a, b);
+  const VF after = MeanScore(level, g, weights, hn::Add(w, step), a, b);
+  VF curvature;
+  const VF at = Vertex(before, here, after, &curvature);
+  // Of the parabola at its vertex, at most a step away.
+  const VF slope = hn::Mul(hn::Set(d, 0.5f), hn::Sub(after, before));
+  const VF bend = hn::Mul(hn::Set(d, 0.5f), hn::Max(curvature, hn::Zero(d)));
+  return hn::Max(hn::Zero(d), hn::MulAdd(at, hn::MulAdd(bend, at, slope), here));
+}
+
+/// The view that has the most say in a group.
+size_t LoudestView(const Level& level, const float (*weights)[kLanes]) {
+  size_t loudest = 0;
+  float most = -1;
+  for (size_t v = 0; v < level.sources.size(); ++v) {
+    const float say = hn::GetLane(hn::SumOfLanes(DF(), hn::Load(DF(), weights[v])));
+    if (say > most) most = say, loudest = v;
+  }
+  return loudest;
+}
+
+/// Odds that the pixel lies at another place that costs `cost`, where `asked` says so.
+VF RivalOdds(VF own, VF cost, hn::Mask<DF> asked) {
+  const DF d;
+  const VF noise = hn::MulAdd(hn::Set(d, kRivalNoise), own, hn::Set(d, kLeastRivalNoise));
+  const VF more = hn::Max(hn::Div(hn::Sub(cost, own), noise), hn::Set(d, -20.0f));
+  return hn::IfThenElseZero(hn::And(asked, hn::Lt(cost, hn::Set(d, kRivalCost))),
+                            hn::Exp(d, hn::Neg(more)));
+}
+
+/// Looks for other places on the pixels' rays that match as well: valleys of the cost in the view
+/// with the most say, up to kRivalReachPx away, and infinity, where all lies that the range leaves
+/// out behind it: mirrored things, and everything in photos that are copies of one another. They
+/// are then held to all views that count. Returns the odds of all these places together against the
+/// pixel's own.
+VF RivalsOdds(const Level& level, const Group& g, const float (*weights)[kLanes], VF w, VF a, VF b,
+              VF px, VF own) {
+  const DF d;
+  const VF zero = hn::Zero(d);
+  // What is much worse in one view is not as good in all.
+  const VF limit = hn::Min(hn::Set(d, kRivalCost), hn::Add(own, hn::Set(d, kRivalScoutSlack)));
+  VF odds = zero;
+  const size_t scout = LoudestView(level, weights);
+  const Source& s = level.sources[scout];
+  const VF step = hn::Div(hn::Set(d, 1.0f), px);
+  for (const float side : {-1.0f, 1.0f}) {
+    VF before = zero, here = zero;  // no valley at the first two steps: that is the own one
+    for (int k = 1; k <= kRivalReachPx + 1; ++k) {
+      const VF moved = hn::MulAdd(hn::Set(d, side * static_cast<float>(k)), step, w);
+      const VF after = ScoreView(g, s, scout, moved, a, b);
+      auto valley = hn::And(hn::Lt(here, before), hn::Le(here, after));
+      valley = hn::And(valley, hn::Ge(moved, zero));
+      if (!hn::AllFalse(d, valley)) {
+        VF curvature;
+        const VF at = Vertex(before, here, after, &curvature);
+        const VF away = hn::Mul(hn::Mul(step, hn::Set(d, side)),
+                                hn::Add(hn::Set(d, static_cast<float>(k - 1)), at));
+        const VF guess = hn::Add(w, away);
+        valley = hn::And(valley, hn::Lt(ScoreView(g, s, scout, guess, a, b), limit));
+        if (!hn::AllFalse(d, valley)) {
+          const VF cost = LeastScore(level, g, weights, guess, a, b, step);
+          odds = hn::Add(odds, RivalOdds(own, cost, valley));
+        }
+      }
+      before = here;
+      here = after;
+    }
+  }
+  const auto apart = hn::Gt(hn::Mul(w, px), hn::Set(d, kRivalApartPx));
+  const VF far = ScoreView(g, s, scout, zero, zero, zero);
+  const auto maybe = hn::And(apart, hn::Lt(far, limit));
+  if (!hn::AllFalse(d, maybe)) {
+    const VF cost = MeanScore(level, g, weights, zero, zero, zero);
+    odds = hn::Add(odds, RivalOdds(own, cost, maybe));
+  }
+  return odds;
+}
+
+/// See AmbiguousRow.
+void AmbiguousRowImpl(const Level& level, const State& state, int y, std::uint8_t* ambiguous) {
+  const DF d;
+  const int width = level.reference.width;
+  HWY_ALIGN float weights[kMaxViews][kLanes];
+  HWY_ALIGN float odds[kLanes];
+  Group g;
+  for (int x = 0; x < width; x += 2 * static_cast<int>(kLanes)) {
+    PrepareGroup(level, x, y, &g);
+    const VF w = LoadColour(state.w, x, y);
+    const VF a = LoadColour(state.a, x, y), b = LoadColour(state.b, x, y);
+    WeighViews(level, state, g, w, a, b, weights);
+    const VF px = DisparityPerInverseDepth(g, level, w, weights);
+    const VF own = MeanScore(level, g, weights, w, a, b);
+    hn::Store(RivalsOdds(level, g, weights, w, a, b, px, own), d, odds);
+    for (int i = 0; i < static_cast<int>(kLanes) && x + 2 * i < width; ++i) {
+      ambiguous[x / 2 + i] = odds[i] > kMostRivalOdds;
+    }
+  }
+}
+
+void JudgeGroup(const Level& level, const State& state, const Group& g, Verdict* out) {
+  const DF d;
+  const VF zero = hn::Zero(d), one = hn::Set(d, 1.0f);
+  HWY_ALIGN float weights[kMaxViews][kLanes];
+  const VF w = LoadColour(state.w, g.x, g.y), a = LoadColour(state.a, g.x, g.y);
+  const VF b = LoadColour(state.b, g.x, g.y);
+  WeighViews(level, state, g, w, a, b, weights);
+  const VF px = DisparityPerInverseDepth(g, level, w, weights);
+  const VF step = hn::Div(hn::Set(d, kJudgeStepPx), px);
+  VF before = zero, here = zero, after = zero, agreeing = zero, consistent = zero;
+  HWY_ALIGN float vertex[kMaxViews][kLanes];
+  HWY_ALIGN float certainty[kMaxViews][kLanes];
+  for (size_t v = 0; v < level.sources.size(); ++v) {
+    const Source& s = level.sources[v];
+    const VF weight = hn::Load(d, weights[v]);
+    if (s.surface != nullptr) {
+      const VF off_px = RoundTripPx(g, s, LocateAllowed(g, s, v, w, a, b));
+      const auto is_near = hn::Lt(off_px, hn::Set(d, kConsistentPx));
+      consistent = hn::Add(consistent, hn::IfThenElseZero(is_near, one));
+    }
+    hn::Store(zero, d, vertex[v]);
+    hn::Store(zero, d, certainty[v]);
+    const auto counts = hn::Gt(weight, zero);
+    if (hn::AllFalse(d, counts)) continue;
+    const VF c0 = ScoreView(g, s, v, hn::Sub(w, step), a, b), c1 = ScoreView(g, s, v, w, a, b);
+    const VF c2 = ScoreView(g, s, v, hn::Add(w, step), a, b);
+    before = hn::MulAdd(weight, c0, before);
+    here = hn::MulAdd(weight, c1, here);
+    after = hn::MulAdd(weight, c2, after);
+    VF curvature;
+    const VF at = Vertex(c0, c1, c2, &curvature);
+    const auto agrees =
+        hn::And(counts, hn::And(hn::Lt(c1, hn::Set(d, kAgreeingCost)), hn::Gt(curvature, zero)));
+    agreeing = hn::Add(agreeing, hn::IfThenElseZero(agrees, one));
+    hn::Store(at, d, vertex[v]);
+    hn::Store(hn::IfThenElseZero(agrees, hn::Mul(weight, curvature)), d, certainty[v]);
+  }
+  VF curvature;
+  const VF at = Vertex(before, here, after, &curvature);
+  // Spread of the views' own minima about the common one, weighted like the minimum itself.
+  VF spread = zero, sum = zero;
+  for (size_t v = 0; v < level.sources.size(); ++v) {
+    const VF off = hn::Sub(hn::Load(d, vertex[v]), at), c = hn::Load(d, certainty[v]);
+    spread = hn::MulAdd(c, hn::Mul(off, off), spread);
+    sum = hn::Add(sum, c);
+  }
+  spread = hn::Div(spread, hn::Mul(hn::Max(sum, hn::Set(d, 1e-6f)), hn::Max(agreeing, one)));
+  // Least squares: the sum over the window of squared differences of normalised patches is
+  // 2 kTaps c, so the noise per sample is 2 c and the variance of the minimum 2 c / (kTaps c'').
+  const VF noise =
+      hn::Div(hn::Mul(hn::Set(d, 2.0f / kTaps), here), hn::Max(curvature, hn::Set(d, 1e-6f)));
+  const VF sigma = hn::Mul(step, hn::Sqrt(hn::Add(noise, spread)));
+  HWY_ALIGN float lanes[6][kLanes];
+  hn::Store(consistent, d, lanes[5]);
+  hn::Store(hn::MulAdd(step, at, w), d, lanes[0]);
+  hn::Store(sigma, d, lanes[1]);
+  hn::Store(here, d, lanes[2]);
+  hn::Store(px, d, lanes[3]);
+  hn::Store(agreeing, d, lanes[4]);
+  for (int i = 0; i < static_cast<int>(kLanes) && g.x + 2 * i < level.reference.width; ++i) {
+    out[g.x + 2 * i] = {lanes[0][i],
+                        lanes[1][i],
+                        lanes[2][i],
+                        lanes[3][i],
+                        g.texture[i],
+                        static_cast<int>(lanes[4][i]),
+                        static_cast<int>(lanes[5][i])};
+  }
+}
+
+void JudgeRowImpl(const Level& level, const State& state, int y, Verdict* out) {
+  Group g;
+  for (int start = 0; start < 2; ++start) {
+    for (int x = start; x < level.reference.width; x += 2 * static_cast<int>(kLanes)) {
+      PrepareGroup(level, x, y, &g);
+      JudgeGroup(level, state, g, out);
+    }
+  }
+}
+
+}  // namespace dtr::stereo::patchmatch::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif
