@@ -2,6 +2,7 @@
 #pragma once
 #include <CLI/CLI.hpp>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <string>
@@ -34,11 +35,15 @@ using Action = std::function<int(const Context&)>;
 void AddCommand(CLI::App& app, const std::string& name, const std::string& description,
                 const std::string& example, const std::function<Action(CLI::App&)>& prepare);
 
+/// --lens FILE of the commands that take a known lens.
+void AddLensOption(CLI::App& command, std::filesystem::path& lens);
+
 // One function per command, each in commands/NAME.cpp.
 void AddBuildCommand(CLI::App& app);
 void AddCaptureCommand(CLI::App& app);
 void AddCalibrateCommand(CLI::App& app);
-void AddCalibrateBoardCommand(CLI::App& calibrate);  ///< below `calibrate`
+void AddCalibrateBoardCommand(CLI::App& calibrate);
+void AddCalibrateRefineCommand(CLI::App& calibrate);  ///< below `calibrate`
 void AddValidateCommand(CLI::App& app);
 void AddStereoCommand(CLI::App& app);
 void AddInfoCommand(CLI::App& app);

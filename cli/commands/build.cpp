@@ -59,6 +59,8 @@ void AddBuildCommand(CLI::App& app) {
                 "--poses", options->poses,
                 "Known cameras: a COLMAP model, cameras.json or poses_bounds.npy; no SfM then")
             ->type_name("FILE");
+        command.add_flag("!--no-refine", options->refine,
+                         "Take COLMAP's cameras as they are, without bundle adjustment");
         command.add_flag("--force", options->force, "Replace a set that exists");
         return [options](const Context& context) -> int {
           options->threads = context.common.threads;

@@ -7,6 +7,7 @@
 #include "capture/ingest.h"
 #include "cli/command.h"
 #include "cli/pipeline/calibrated_photos.h"
+#include "cli/pipeline/lens_file.h"
 #include "dtr/base/error.h"
 
 namespace dtr::cli {
@@ -17,6 +18,8 @@ namespace fs = std::filesystem;
 struct Options {
   fs::path photos, output;
   double memory_gb = 4;
+  bool refine = true;
+  fs::path lens;
 };
 
 int RunCalibratePhotos(const Options& options, const Context& context) {
@@ -30,6 +33,8 @@ int RunCalibratePhotos(const Options& options, const Context& context) {
   calibrate.threads = context.common.threads;
   calibrate.seed = context.common.seed;
   calibrate.memory_gb = options.memory_gb;
+  calibrate.refine = options.refine;
+  if (!options.lens.empty()) calibrate.lens = pipeline::ReadLens(options.lens);
   // The workspace stays: it holds COLMAP's arguments, logs and database, and lets a run continue.
   const auto calibrated =
       pipeline::CalibratePhotos(photos, calibrate, options.output / "workspace", context.console);
@@ -55,6 +60,7 @@ void AddCalibrateCommand(CLI::App& app) {
   CLI::App* calibrate = app.add_subcommand("calibrate", "Find cameras");
   calibrate->require_subcommand(1);
   AddCalibrateBoardCommand(*calibrate);
+  AddCalibrateRefineCommand(*calibrate);
   AddCommand(*calibrate, "photos", "Calibrate a folder of photos by structure from motion",
              "dtr calibrate photos photos/ -o calibration/", [](CLI::App& command) -> Action {
                auto options = std::make_shared<Options>();
@@ -67,6 +73,9 @@ void AddCalibrateCommand(CLI::App& app) {
                command.add_option("--memory", options->memory_gb, "Memory to stay within [4]")
                    ->check(CLI::Range(0.5, 4096.0))
                    ->type_name("GB");
+               command.add_flag("!--no-refine", options->refine,
+                                "Take COLMAP's cameras as they are, without bundle adjustment");
+               AddLensOption(command, options->lens);
                return [options](const Context& context) {
                  return RunCalibratePhotos(*options, context);
                };

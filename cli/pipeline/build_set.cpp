@@ -40,6 +40,7 @@ Json OptionsJson(const BuildOptions& options, const stereo::Effort& effort, int 
   json["holdout"] = options.holdout;
   json["holdout_strict"] = options.holdout_strict;
   json["poses"] = options.poses.filename().string();
+  json["refine"] = options.refine;
   json["seed"] = options.seed;
   return json;
 }
@@ -229,8 +230,14 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
   log.Begin("calibration");
   const CalibratedPhotos calibrated =
       CalibratePhotos(photos,
-                      {options.poses, held_out, options.holdout_strict, options.threads,
-                       options.seed, options.depth.memory_gb.value_or(kDefaultMemoryGb)},
+                      {options.poses,
+                       held_out,
+                       options.holdout_strict,
+                       options.threads,
+                       options.seed,
+                       options.depth.memory_gb.value_or(kDefaultMemoryGb),
+                       options.refine,
+                       {}},
                       writer.work_folder() / "calibration", progress);
   report.not_registered = calibrated.not_registered;
   for (size_t i = 0; i < held_out.size(); ++i) {

@@ -20,6 +20,7 @@ struct BuildOptions {
   DepthChoice depth;
   int max_size_px = -1;  ///< long side; 0 = full size, -1 = what the preset says
   std::filesystem::path poses;
+  bool refine = true;  ///< bundle adjustment after SfM, where it pays
   bool force = false;
   int threads = 0;
   std::uint64_t seed = 0;

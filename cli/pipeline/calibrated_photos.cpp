@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "calib/bundle/refine.h"
 #include "calib/colmap/program.h"
 #include "calib/colmap/sfm.h"
 #include "capture/sfm_images.h"
@@ -39,6 +40,23 @@ Json SfmJson(const colmap::SfmReport& report, const calib::SfmModel& model) {
   return json;
 }
 
+// Bundle adjustment of the frozen model, where it pays; deterministic.
+void RefineModel(const CalibrateOptions& options, calib::SfmModel& model, Json& report,
+                 Progress& progress) {
+  progress.Stage("bundle adjustment", 0);
+  calib::RefineOptions refine;
+  refine.threads = options.threads;
+  refine.seed = options.seed;
+  if (options.lens) {
+    refine.known_lenses.emplace();
+    for (const auto& [id, camera] : model.cameras) refine.known_lenses->emplace(id, *options.lens);
+  }
+  calib::Refined refined = calib::Refine(model, refine);
+  report["bundle_adjustment"] = Json::parse(calib::ToJson(refined));
+  if (!refined.changed) progress.Note("bundle adjustment left out: " + refined.reason);
+  model = std::move(refined.model);
+}
+
 CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions& options,
                          const fs::path& workspace, Progress& progress) {
   std::vector<bool> in_sfm(capture.photos.size(), true);
@@ -54,8 +72,10 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
 
   CalibratedPhotos calibrated;
   calibrated.engine = sfm.report.version;
-  calibrated.report_json = SfmJson(sfm.report, sfm.model).dump();
+  Json report = SfmJson(sfm.report, sfm.model);
   calibrated.model = std::move(sfm.model);
+  if (options.refine || options.lens) RefineModel(options, calibrated.model, report, progress);
+  calibrated.report_json = report.dump();
   if (options.strict) {
     RegisterHeldOutPhotos(Subset(capture, options.held_out), inputs, workspace, sfm_options,
                           calibrated.model, progress);

@@ -2,6 +2,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,8 @@ struct CalibrateOptions {
   int threads = 0;
   std::uint64_t seed = 0;
   double memory_gb = 4;
+  bool refine = true;  ///< bundle adjustment after SfM, where held-out sights say that it pays
+  std::optional<calib::LensCamera> lens;  ///< of all photos, known: SfM's own is replaced by it
 };
 
 /// Calibrated photos, frozen: everything later depends on this model alone.

@@ -1,0 +1,316 @@
+#include "calib/bundle/adjust.h"
+
+#include <ceres/ceres.h>
+#include <fmt/format.h>
+#include <glog/logging.h>
+
+#include <Eigen/Geometry>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <optional>
+
+#include "calib/bundle/lens_params.h"
+#include "calib/bundle/normalised.h"
+#include "calib/similarity.h"
+#include "calib/solve/board_start.h"
+#include "dtr/base/error.h"
+
+namespace dtr::calib {
+namespace {
+
+constexpr double kSmallestSigmaPx = 1e-7;  // exact sights are no reason to call rounding outliers
+constexpr double kSameScale = 0.05;        // relative change at which the robust loss is settled
+constexpr double kCauchySigmas = 2;        // scale of the robust loss
+constexpr int kMostRobustPasses = 5, kMostOutlierPasses = 4;
+constexpr int kDenseImages = 100;  // up to here the cameras' system is solved as a dense one
+
+[[noreturn]] void Refuse(const std::string& what) { throw Error("bundle adjustment: " + what); }
+
+std::vector<Eigen::Vector2d> ResidualsOf(const Bundle& bundle, const Normalised& n) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  std::vector<Eigen::Vector2d> residuals(bundle.observations.size(),
+                                         Eigen::Vector2d::Constant(kNone));
+  for (size_t i = 0; i < residuals.size(); ++i) {
+    Eigen::Vector2d r;
+    if (n.Residual(bundle, bundle.observations[i], &r)) residuals[i] = r;
+  }
+  return residuals;
+}
+
+double SigmaOf(const std::vector<Eigen::Vector2d>& residuals) {
+  std::vector<double> lengths;
+  for (const Eigen::Vector2d& r : residuals) {
+    if (r.allFinite()) lengths.push_back(r.norm());
+  }
+  if (lengths.empty()) Refuse("expected points in front of the cameras that see them, found none");
+  return std::max(RobustSigma(std::move(lengths)), kSmallestSigmaPx);
+}
+
+// Sights nearer than `limit_px` to their predictions.
+std::vector<bool> Within(const std::vector<Eigen::Vector2d>& residuals, double limit_px) {
+  std::vector<bool> within;
+  for (const Eigen::Vector2d& r : residuals) within.push_back(r.allFinite() && r.norm() < limit_px);
+  return within;
+}
+
+void Describe(const std::vector<Eigen::Vector2d>& residuals, Adjusted& out) {
+  double squared = 0;
+  std::vector<bool> image_used(out.bundle.images.size()), point_used(out.bundle.points.size());
+  for (size_t i = 0; i < residuals.size(); ++i) {
+    out.without_pixel += !residuals[i].allFinite();
+    if (!out.used[i]) continue;
+    const BundleObservation& o = out.bundle.observations[i];
+    squared += residuals[i].squaredNorm();
+    ++out.sights;
+    image_used[static_cast<size_t>(o.image)] = point_used[static_cast<size_t>(o.point)] = true;
+  }
+  out.rms_px = std::sqrt(squared / std::max(1, out.sights));
+  const auto count = [](const std::vector<bool>& v) {
+    return static_cast<double>(std::count(v.begin(), v.end(), true));
+  };
+  const double unknowns = 3 * count(point_used) + 6 * count(image_used) - 7;
+  const double freedom = 2.0 * out.sights - unknowns;
+  out.sigma_px = freedom > 0 ? std::sqrt(squared / freedom) : 0;
+}
+
+void CheckPriors(const Bundle& bundle, const AdjustOptions& options) {
+  const auto images = static_cast<int>(bundle.images.size());
+  const auto known = [images](int i) { return i >= 0 && i < images; };
+  for (const PositionPrior& p : options.positions) {
+    if (!known(p.image) || !p.centre.allFinite() || !(p.sigma.array() > 0).all() ||
+        !p.sigma.allFinite()) {
+      Refuse("expected known positions of its images, finite and with sigmas above 0");
+    }
+  }
+  for (const DistancePrior& d : options.distances) {
+    if (!known(d.image_a) || !known(d.image_b) || d.image_a == d.image_b || !(d.distance > 0) ||
+        !(d.sigma > 0) || !std::isfinite(d.distance + d.sigma)) {
+      Refuse("expected known distances between two of its images, above 0 and with sigmas above 0");
+    }
+  }
+}
+
+// (centre - known) / sigma, in units of a sight's sigma so that both sums can be added.
+struct PositionCost {
+  Eigen::Vector3d offset, weight;  // of the normalised centre
+  template <typename T>
+  bool operator()(const T* motion, T* residual) const {
+    for (int i = 0; i < 3; ++i) residual[i] = weight[i] * (motion[3 + i] + offset[i]);
+    return true;
+  }
+};
+
+struct DistanceCost {
+  Eigen::Vector3d a, b;
+  double distance, weight;
+  template <typename T>
+  bool operator()(const T* motion_a, const T* motion_b, T* residual) const {
+    T d[3];
+    for (int i = 0; i < 3; ++i) d[i] = a[i] + motion_a[3 + i] - b[i] - motion_b[3 + i];
+    const T squared = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+    if (!(squared > T(0))) return false;
+    residual[0] = weight * (sqrt(squared) - distance);
+    return true;
+  }
+};
+
+void AddPriors(const AdjustOptions& options, double sigma_px, Normalised& n,
+               ceres::Problem& problem) {
+  for (const PositionPrior& p : options.positions) {
+    const auto i = static_cast<size_t>(p.image);
+    const Eigen::Vector3d weight = sigma_px * n.unit * p.sigma.cwiseInverse();
+    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<PositionCost, 3, 6>(new PositionCost{
+                                 n.poses[i].centre - (p.centre - n.origin) / n.unit, weight}),
+                             nullptr, n.motion[i].data());
+  }
+  for (const DistancePrior& d : options.distances) {
+    const auto a = static_cast<size_t>(d.image_a), b = static_cast<size_t>(d.image_b);
+    problem.AddResidualBlock(
+        new ceres::AutoDiffCostFunction<DistanceCost, 1, 6, 6>(
+            new DistanceCost{n.poses[a].centre, n.poses[b].centre, d.distance / n.unit,
+                             sigma_px * n.unit / d.sigma}),
+        nullptr, n.motion[a].data(), n.motion[b].data());
+  }
+}
+
+void FixLens(const LensFrame& lens, LensFreedom freedom, double* theta, ceres::Problem& problem) {
+  if (freedom == LensFreedom::kFixed) problem.SetParameterBlockConstant(theta);
+  if (freedom != LensFreedom::kNoPrincipalPoint) return;
+  const int centre = static_cast<int>(FocalCount(lens.model));
+  problem.SetManifold(
+      theta, new ceres::SubsetManifold(static_cast<int>(lens.centre.size()), {centre, centre + 1}));
+}
+
+ceres::Solver::Options SolverOptions(size_t images, bool robust) {
+  // Ceres tells stderr of every step that fails; the next one is shorter, and the end is judged
+  // here. The level belongs to the process: it is set once, before any thread of ours reads it.
+  [[maybe_unused]] static const bool quiet = [] {
+    FLAGS_minloglevel = google::GLOG_ERROR;
+    return true;
+  }();
+  ceres::Solver::Options options;
+  options.linear_solver_type = images <= kDenseImages ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
+  options.num_threads = 1;  // sums in one order: the same bits every time
+  // Under the robust loss Ceres converges by a constant factor a step: it is left when the cameras
+  // have settled, and least squares, which converges quadratically, does the rest.
+  options.max_num_iterations = robust ? 8 : 100;
+  options.function_tolerance = robust ? 1e-3 : 1e-11;
+  options.parameter_tolerance = 1e-12;
+  options.gradient_tolerance = 1e-12;
+  options.logging_type = ceres::SILENT;
+  options.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+  return options;
+}
+
+// One solve over the sights with used[i]; Cauchy's loss where a scale is given.
+ceres::Solver::Summary Minimise(const Bundle& bundle, const AdjustOptions& options,
+                                const std::vector<bool>& used, double sigma_px, double cauchy_px,
+                                Normalised& n) {
+  ceres::Solver::Options solver = SolverOptions(bundle.images.size(), cauchy_px > 0);
+  ceres::Problem problem;
+  for (size_t i = 0; i < bundle.observations.size(); ++i) {
+    if (!used[i]) continue;
+    const BundleObservation& sight = bundle.observations[i];
+    const auto image = static_cast<size_t>(sight.image);
+    const auto lens = static_cast<size_t>(bundle.images[image].lens);
+    problem.AddResidualBlock(n.Cost(bundle, sight).release(),
+                             cauchy_px > 0 ? new ceres::CauchyLoss(cauchy_px) : nullptr,
+                             n.theta[lens].data(), n.motion[image].data(),
+                             n.place[static_cast<size_t>(sight.point)].data());
+  }
+  AddPriors(options, sigma_px, n, problem);
+  const auto add = [&](double* block, int group) {
+    if (problem.HasParameterBlock(block)) {
+      solver.linear_solver_ordering->AddElementToGroup(block, group);
+    }
+  };
+  for (auto& place : n.place) add(place.data(), 0);
+  for (auto& motion : n.motion) {
+    add(motion.data(), 1);
+    if (options.fix_poses && problem.HasParameterBlock(motion.data())) {
+      problem.SetParameterBlockConstant(motion.data());
+    }
+  }
+  for (size_t i = 0; i < n.theta.size(); ++i) {
+    if (!problem.HasParameterBlock(n.theta[i].data())) continue;
+    // A group of its own: within a group Ceres orders unknowns by their addresses, and where one
+    // array lies with respect to another differs from run to run.
+    add(n.theta[i].data(), 2);
+    FixLens(n.lenses[i], options.lens, n.theta[i].data(), problem);
+  }
+  ceres::Solver::Summary summary;
+  ceres::Solve(solver, &problem, &summary);
+  if (!summary.IsSolutionUsable()) Refuse("the sights have no least-squares solution");
+  return summary;
+}
+
+// The similarity that gives the cameras back the mean centre, spread and mean turn of the start.
+Similarity BackToStart(const Bundle& now, const Bundle& start) {
+  const auto count = static_cast<double>(now.images.size());
+  Eigen::Vector3d middle_now = Eigen::Vector3d::Zero(), middle_start = middle_now;
+  Eigen::Matrix3d turns = Eigen::Matrix3d::Zero();
+  for (size_t i = 0; i < now.images.size(); ++i) {
+    const Pose &a = now.images[i].cam_from_world, &b = start.images[i].cam_from_world;
+    middle_now += a.TargetOriginInSource() / count;
+    middle_start += b.TargetOriginInSource() / count;
+    turns += (b.rotation.conjugate() * a.rotation).toRotationMatrix();  // start from now
+  }
+  // The mean of rotations: the orthogonal matrix next to their sum (Moakher 2002).
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(turns, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Matrix3d rotation = svd.matrixU() * svd.matrixV().transpose();
+  if (rotation.determinant() < 0) {
+    Eigen::Matrix3d u = svd.matrixU();
+    u.col(2) = -u.col(2);
+    rotation = u * svd.matrixV().transpose();
+  }
+  double spread_now = 0, spread_start = 0;
+  for (size_t i = 0; i < now.images.size(); ++i) {
+    const Pose &a = now.images[i].cam_from_world, &b = start.images[i].cam_from_world;
+    spread_now += (a.TargetOriginInSource() - middle_now).squaredNorm();
+    spread_start += (b.TargetOriginInSource() - middle_start).squaredNorm();
+  }
+  Similarity start_from_now;
+  if (spread_now > 0 && spread_start > 0) {
+    start_from_now.scale = std::sqrt(spread_start / spread_now);
+  }
+  start_from_now.rotation = Eigen::Quaterniond(rotation);
+  start_from_now.translation =
+      middle_start - start_from_now.scale * (start_from_now.rotation * middle_now);
+  return start_from_now;
+}
+
+void Move(const Similarity& b_from_a, Bundle& bundle) {
+  for (BundleImage& image : bundle.images) {
+    image.cam_from_world = b_from_a.CamFromB(image.cam_from_world);
+  }
+  for (Eigen::Vector4d& h : bundle.points) {
+    const Eigen::Vector3d turned = b_from_a.rotation * h.head<3>();
+    h.head<3>() = b_from_a.scale * turned + h[3] * b_from_a.translation;
+  }
+}
+
+}  // namespace
+
+const char* NameOf(LensFreedom freedom) {
+  switch (freedom) {
+    case LensFreedom::kFixed:
+      return "fixed";
+    case LensFreedom::kNoPrincipalPoint:
+      return "no-principal-point";
+    case LensFreedom::kAll:
+      return "all";
+  }
+  return "";
+}
+
+std::vector<Eigen::Vector2d> Residuals(const Bundle& bundle) {
+  return ResidualsOf(bundle, Normalised::Around(bundle));
+}
+
+Adjusted Adjust(const Bundle& bundle, const AdjustOptions& options) {
+  CheckBundle(bundle);
+  CheckPriors(bundle, options);
+  Normalised n = Normalised::Around(bundle);
+  const Bundle start = n.LocalAt(bundle);
+  Adjusted out;
+  out.lens = options.lens;
+  std::vector<Eigen::Vector2d> residuals = ResidualsOf(bundle, n);
+  double sigma = SigmaOf(residuals);
+  const auto solve = [&](const std::vector<bool>& used, double cauchy_px) {
+    const auto summary = Minimise(bundle, options, used, sigma, cauchy_px, n);
+    out.iterations += static_cast<int>(summary.iterations.size());
+    residuals = ResidualsOf(bundle, n);
+    return summary.termination_type == ceres::CONVERGENCE;
+  };
+  const double none = std::numeric_limits<double>::infinity();
+  for (int pass = 0; options.outlier_sigmas > 0 && pass < kMostRobustPasses; ++pass) {
+    solve(Within(residuals, none), kCauchySigmas * sigma);
+    const double next = SigmaOf(residuals);
+    const bool settled = std::abs(next - sigma) <= kSameScale * sigma;
+    sigma = next;
+    if (settled) break;
+  }
+  const auto limit = [&] {
+    return options.outlier_sigmas > 0 ? options.outlier_sigmas * sigma : none;
+  };
+  out.used = Within(residuals, limit());
+  for (int pass = 0; pass < kMostOutlierPasses; ++pass) {
+    out.converged = solve(out.used, 0);
+    sigma = SigmaOf(residuals);
+    std::vector<bool> used = Within(residuals, limit());
+    if (used == out.used) break;
+    if (pass + 1 < kMostOutlierPasses) out.used = std::move(used);
+  }
+  out.bundle = n.LocalAt(bundle);
+  if (options.positions.empty() && options.distances.empty() && !options.fix_poses) {
+    Move(BackToStart(out.bundle, start), out.bundle);
+  }
+  n.ToWorld(out.bundle);
+  Describe(residuals, out);
+  return out;
+}
+
+}  // namespace dtr::calib

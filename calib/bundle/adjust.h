@@ -1,0 +1,72 @@
+// calib/bundle/adjust.h -- bundle adjustment: all cameras, poses and points at once.
+#pragma once
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "calib/bundle/bundle.h"
+
+namespace dtr::calib {
+
+/// Which numbers of the lenses may move.
+enum class LensFreedom {
+  kFixed,             ///< none: the lenses are known
+  kNoPrincipalPoint,  ///< focal lengths and distortion, as COLMAP does
+  kAll,
+};
+/// "fixed", "no-principal-point", "all".
+const char* NameOf(LensFreedom freedom);
+
+/// Where a camera's centre is known to be (GPS): in the bundle's own world and unit.
+struct PositionPrior {
+  int image = 0;
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  Eigen::Vector3d sigma = Eigen::Vector3d::Ones();  ///< per axis, > 0
+};
+
+/// A measured distance between two cameras' centres.
+struct DistancePrior {
+  int image_a = 0, image_b = 0;
+  double distance = 0, sigma = 1;  ///< both > 0
+};
+
+struct AdjustOptions {
+  LensFreedom lens = LensFreedom::kNoPrincipalPoint;
+  /// Sights farther from their predictions than this many standard deviations (robust: of the
+  /// better third) do not count; 0: all count.
+  double outlier_sigmas = 5;
+  bool fix_poses = false;  ///< only points (and lenses, as `lens` says) move
+  std::vector<PositionPrior> positions;
+  std::vector<DistancePrior> distances;
+};
+
+/// How a solve ended.
+struct Adjusted {
+  Bundle bundle;
+  LensFreedom lens = LensFreedom::kFixed;
+  std::vector<bool> used;  ///< per sight: false for outliers and sights without a pixel
+  int sights = 0;          ///< used ones
+  double sigma_px = 0;     ///< standard deviation of a used sight's coordinate, unknowns counted
+  double rms_px = 0;       ///< root mean squared residual length of the used sights
+  int without_pixel = 0;   ///< sights whose point has no pixel: behind the camera
+  int iterations = 0;
+  bool converged = false;
+};
+
+/// Minimises the sum over sights of |predicted - observed|^2, starting at `bundle`: under Cauchy's
+/// loss until cameras and scale have settled, then least squares of the sights that agree.
+///
+/// Inside, the world is centred and scaled, and points are directions with inverse distances
+/// (sight_cost.h). The gauge is that of the start: without priors, the result is turned, scaled and
+/// moved as a whole so that the cameras' mean centre, their spread and their mean turn are those of
+/// the start; no camera is singled out. With priors on positions, these decide.
+///
+/// One thread, sums in one order: the same bits every time. Throws Error as CheckBundle does, on
+/// priors that cannot be meant, and when no sight has a pixel or the solver finds no finite
+/// solution. What the sights cannot decide is told by Judge (judge.h), not here.
+Adjusted Adjust(const Bundle& bundle, const AdjustOptions& options);
+
+/// Residuals predicted - observed in px, NaN where the point has no pixel; the bundle's order.
+std::vector<Eigen::Vector2d> Residuals(const Bundle& bundle);
+
+}  // namespace dtr::calib

@@ -1,0 +1,181 @@
+#include "calib/bundle/bundle.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+#include <map>
+
+#include "dtr/base/error.h"
+
+namespace dtr::calib {
+namespace {
+
+// Sights of the points that at least two images see, sorted; points in the order of their keys.
+struct Track {
+  std::vector<std::pair<int, Eigen::Vector2d>> sights;  // image, pixel
+};
+
+void AddSight(Track& track, int image, const Eigen::Vector2d& pixel) {
+  const bool again = std::any_of(track.sights.begin(), track.sights.end(),
+                                 [image](const auto& sight) { return sight.first == image; });
+  if (!again) track.sights.emplace_back(image, pixel);
+}
+
+void AppendPoint(const Eigen::Vector3d& p_in_world, const Track& track, Bundle& bundle) {
+  const int point = static_cast<int>(bundle.points.size());
+  bundle.points.push_back(p_in_world.homogeneous());
+  for (const auto& [image, pixel] : track.sights) {
+    bundle.observations.push_back({image, point, pixel});
+  }
+}
+
+// How far from the middle of the cameras a place may be, in units of their spread, before it is as
+// good as at infinity: beyond, its parallax is below any pixel.
+constexpr double kAsGoodAsInfinite = 1e7;
+
+double Spread(const Bundle& bundle, Eigen::Vector3d* middle) {
+  *middle = Eigen::Vector3d::Zero();
+  for (const BundleImage& image : bundle.images) {
+    *middle += image.cam_from_world.TargetOriginInSource();
+  }
+  *middle /= static_cast<double>(bundle.images.size());
+  double squared = 0;
+  for (const BundleImage& image : bundle.images) {
+    squared += (image.cam_from_world.TargetOriginInSource() - *middle).squaredNorm();
+  }
+  return std::sqrt(squared / static_cast<double>(bundle.images.size()));
+}
+
+}  // namespace
+
+Bundle BundleOf(const SfmModel& model, bool separate_lenses) {
+  Bundle bundle;
+  std::map<std::uint32_t, int> lens_of_camera;
+  std::map<std::uint64_t, Track> tracks;
+  for (size_t i = 0; i < model.images.size(); ++i) {
+    const SfmImage& image = model.images[i];
+    const auto next = static_cast<int>(bundle.lenses.size());
+    const std::uint32_t key = separate_lenses ? static_cast<std::uint32_t>(i) : image.camera_id;
+    const auto [lens, made] = lens_of_camera.try_emplace(key, next);
+    if (made) bundle.lenses.push_back(model.cameras.at(image.camera_id));
+    bundle.images.push_back({image.name, lens->second, image.cam_from_world});
+    for (const SfmFeature& feature : image.features) {
+      if (feature.point_id == SfmFeature::kNoPoint) continue;
+      AddSight(tracks[feature.point_id], static_cast<int>(i), feature.pixel);
+    }
+  }
+  for (const auto& [id, track] : tracks) {
+    if (track.sights.size() < 2) continue;
+    bundle.point_ids.push_back(id);
+    AppendPoint(model.points.at(id).p_in_world, track, bundle);
+  }
+  return bundle;
+}
+
+Bundle BundleOf(std::span<const PinholeCamera> cameras, std::span<const Pose> cam_from_world,
+                std::span<const std::string> names, const SparseScene& scene) {
+  Bundle bundle;
+  std::map<std::vector<double>, int> lens_of;
+  for (size_t i = 0; i < cameras.size(); ++i) {
+    const PinholeCamera& c = cameras[i];
+    const LensCamera lens{LensModel::kPinhole,
+                          c.width_px(),
+                          c.height_px(),
+                          {c.fx_px(), c.fy_px(), c.cx_px(), c.cy_px()}};
+    std::vector<double> key = lens.params;
+    key.push_back(c.width_px());
+    key.push_back(c.height_px());
+    const auto [at, made] =
+        lens_of.try_emplace(std::move(key), static_cast<int>(bundle.lenses.size()));
+    if (made) bundle.lenses.push_back(lens);
+    bundle.images.push_back({names[i], at->second, cam_from_world[i]});
+  }
+  std::vector<Track> tracks(scene.points.size());
+  for (const SparseObservation& o : scene.observations) {
+    AddSight(tracks.at(static_cast<size_t>(o.point)), o.view, o.pixel);
+  }
+  for (size_t p = 0; p < tracks.size(); ++p) {
+    if (tracks[p].sights.size() >= 2) {
+      AppendPoint(scene.points[p].p_in_world, tracks[p], bundle);
+    }
+  }
+  return bundle;
+}
+
+SfmModel ModelOf(const Bundle& bundle, const SfmModel& model, bool separate_lenses, int* dropped) {
+  SfmModel out = model;
+  if (separate_lenses) out.cameras.clear();
+  for (size_t i = 0; i < bundle.images.size(); ++i) {
+    SfmImage& image = out.images[i];
+    if (separate_lenses) image.camera_id = static_cast<std::uint32_t>(i + 1);
+    image.cam_from_world = bundle.images[i].cam_from_world;
+    out.cameras[image.camera_id] = bundle.lenses[static_cast<size_t>(bundle.images[i].lens)];
+  }
+  Eigen::Vector3d middle;
+  const double reach = kAsGoodAsInfinite * Spread(bundle, &middle);
+  std::map<std::uint64_t, SfmPoint> points;
+  for (size_t p = 0; p < bundle.points.size(); ++p) {
+    const Eigen::Vector4d& h = bundle.points[p];
+    const Eigen::Vector3d place = h.head<3>() / h[3];
+    if (!(h[3] > 0) || !place.allFinite() || !((place - middle).norm() <= reach)) continue;
+    SfmPoint point = model.points.at(bundle.point_ids[p]);
+    point.p_in_world = place;
+    points.emplace(bundle.point_ids[p], point);
+  }
+  if (dropped != nullptr) *dropped = static_cast<int>(model.points.size() - points.size());
+  out.points = std::move(points);
+  for (SfmImage& image : out.images) {
+    for (SfmFeature& feature : image.features) {
+      if (!out.points.contains(feature.point_id)) feature.point_id = SfmFeature::kNoPoint;
+    }
+  }
+  return out;
+}
+
+void CheckBundle(const Bundle& bundle) {
+  const auto refuse = [](const std::string& what) { throw Error("bundle adjustment: " + what); };
+  if (bundle.images.size() < 2) {
+    refuse(fmt::format("expected at least 2 images, found {}", bundle.images.size()));
+  }
+  if (bundle.observations.empty()) refuse("expected points that two images see, found none");
+  for (const LensCamera& lens : bundle.lenses) {
+    try {
+      lens.Check();
+    } catch (const std::invalid_argument& error) {
+      refuse(error.what());
+    }
+    if (lens.model == LensModel::kFov) {
+      refuse("expected a lens model other than FOV; undistort the images first");
+    }
+  }
+  const auto lenses = static_cast<int>(bundle.lenses.size());
+  for (const BundleImage& image : bundle.images) {
+    if (image.lens < 0 || image.lens >= lenses) {
+      refuse(
+          fmt::format("{}: expected a lens 0 to {}, found {}", image.name, lenses - 1, image.lens));
+    }
+    if (!image.cam_from_world.rotation.coeffs().allFinite() ||
+        !image.cam_from_world.translation.allFinite()) {
+      refuse(image.name + ": expected a finite pose");
+    }
+  }
+  for (size_t p = 0; p < bundle.points.size(); ++p) {
+    if (!bundle.points[p].allFinite() || bundle.points[p].isZero()) {
+      refuse(fmt::format("point {}: expected a finite place or direction", p));
+    }
+  }
+  const auto images = static_cast<int>(bundle.images.size());
+  const auto points = static_cast<int>(bundle.points.size());
+  for (const BundleObservation& o : bundle.observations) {
+    if (o.image < 0 || o.image >= images || o.point < 0 || o.point >= points ||
+        !o.pixel.allFinite()) {
+      refuse(
+          fmt::format("expected observations of images 0 to {} and points 0 to {} at finite "
+                      "pixels, found image {}, point {}",
+                      images - 1, points - 1, o.image, o.point));
+    }
+  }
+}
+
+}  // namespace dtr::calib

@@ -1,0 +1,15 @@
+// calib/bundle/lens_params.h -- which number of a lens is which.
+#pragma once
+#include <string>
+#include <vector>
+
+#include "calib/lens_camera.h"
+
+namespace dtr::calib {
+
+/// "f_px" or "fx_px", "fy_px", then "cx_px", "cy_px", then the coefficients, in LensModel's order.
+std::vector<std::string> ParameterNames(LensModel model);
+/// 1 or 2: focal lengths come first, the principal point follows.
+size_t FocalCount(LensModel model);
+
+}  // namespace dtr::calib

@@ -1,0 +1,42 @@
+// calib/bundle/normalised.h -- internal to calib/bundle: a bundle in the solver's coordinates.
+#pragma once
+#include <Eigen/Core>
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "calib/bundle/bundle.h"
+#include "calib/bundle/sight_cost.h"
+
+namespace dtr::calib {
+
+/// A bundle around the place where a solve starts: the world moved so that the cameras' mean centre
+/// is the origin, and scaled so that their centres are 1 from it (root mean square), or, where all
+/// stand in one place, the points' median distance is. Offsets of 1e6 and scales of 1e-6 to 1e6
+/// therefore change nothing but rounding.
+struct Normalised {
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+  double unit = 1;  ///< world units per unit here
+  std::vector<LensFrame> lenses;
+  std::vector<PoseFrame> poses;
+  std::vector<PointFrame> points;
+  std::vector<std::array<double, kMostParams>> theta;
+  std::vector<std::array<double, 6>> motion;
+  std::vector<std::array<double, 3>> place;
+
+  static Normalised Around(const Bundle& bundle);
+  /// The bundle at the unknowns' present values, in normalised coordinates.
+  Bundle LocalAt(const Bundle& bundle) const;
+  /// Takes a bundle from normalised coordinates back into the world.
+  void ToWorld(Bundle& bundle) const;
+  /// Centre of a camera and a point's place (homogeneous) in normalised coordinates.
+  Eigen::Vector3d Centre(size_t image) const;
+  Eigen::Vector4d Place(size_t point) const;
+  std::unique_ptr<ceres::CostFunction> Cost(const Bundle& bundle,
+                                            const BundleObservation& sight) const;
+  /// Residual in px (predicted minus observed); false where there is none.
+  bool Residual(const Bundle& bundle, const BundleObservation& sight,
+                Eigen::Vector2d* residual) const;
+};
+
+}  // namespace dtr::calib

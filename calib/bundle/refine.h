@@ -1,0 +1,60 @@
+// calib/bundle/refine.h -- is a model better after bundle adjustment? Only if held-out sights say
+// so.
+#pragma once
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calib/bundle/adjust.h"
+#include "calib/sfm_model.h"
+
+namespace dtr::calib {
+
+struct RefineOptions {
+  /// Lenses that are known, by camera id: they are held, and replace the model's.
+  std::optional<std::map<std::uint32_t, LensCamera>> known_lenses;
+  bool separate_lenses = false;  ///< every image a lens of its own
+  int threads = 0;
+  std::uint64_t seed = 0;  ///< of the sights that are held out
+};
+
+/// A way to refine, and what it does to sights it has not seen.
+struct RefineCandidate {
+  std::string name;                 ///< "as given", or a LensFreedom
+  std::optional<LensFreedom> lens;  ///< empty: cameras as given
+  double held_out_px = 0;           ///< root mean of Cauchy's loss over the held-out sights
+  /// 95 % bootstrap interval of this candidate's mean loss less that of the one before it in the
+  /// list which was preferred to it, in px^2; points drawn with replacement. 0 for the first.
+  double low_px2 = 0, high_px2 = 0;
+};
+
+struct Refined {
+  SfmModel model;        ///< the chosen one
+  bool changed = false;  ///< false: the model is as it was given
+  std::string reason;    ///< why nothing was changed; empty otherwise
+  std::vector<RefineCandidate> candidates;
+  int held_out_sights = 0;  ///< that the candidates were compared on
+  std::optional<LensFreedom> lens;
+  Adjusted adjusted;  ///< of the chosen candidate, all sights; bundle emptied
+  int points_dropped = 0;
+};
+
+/// Bundle adjustment of `model` where it pays. One sight of every point with four or more is held
+/// out; the cameras as given, and those adjusted with and without the principal point to the rest,
+/// predict it, from points placed by the rest alone. Adjusted cameras are taken only if they
+/// predict better than the given ones, which have seen the held-out sights in structure from
+/// motion: the comparison favours leaving the model alone. The principal point is freed only if
+/// that is better beyond the bootstrap interval. The chosen way is then run on all sights.
+///
+/// With known lenses, poses and points are adjusted to them without being asked whether it pays.
+/// Deterministic for any number of threads. What cannot be refined (a lens model FOV, too few
+/// points) comes back unchanged, with the reason; errors of broken models are thrown.
+Refined Refine(const SfmModel& model, const RefineOptions& options);
+
+/// JSON object: refined, reason, lens, candidates[].{name,held_out_px}, held_out_sights, sigma_px,
+/// rms_px, iterations, points_dropped.
+std::string ToJson(const Refined& refined);
+
+}  // namespace dtr::calib

@@ -1,0 +1,49 @@
+// calib/bundle/sight_cost.h -- internal to calib/bundle: one sight's residual, for Ceres.
+#pragma once
+#include <ceres/ceres.h>
+
+#include <Eigen/Core>
+#include <memory>
+#include <vector>
+
+#include "calib/bundle/bundle.h"
+
+namespace dtr::calib {
+
+/// The solver's coordinates. Every unknown is a number near zero, of order one:
+///   lens    params = centre + scale * theta
+///   pose    p_in_cam ~ exp(w) R (p - (centre + v)): a turn w about the camera's own centre, in
+///           radians along its axes, and a shift v of the centre, in units of the normalised world
+///   point   p ~ anchor + (d + a e1 + b e2) / rho: a direction from a fixed place (the centre of a
+///           camera that sees it, where the solve starts) and an inverse distance. rho = 0 is a
+///           point at infinity, where nothing special happens (Civera et al. 2008).
+/// The projection needs p only up to a positive factor: d + rho (anchor - centre - v).
+inline constexpr size_t kMostParams = 12;
+struct LensFrame {
+  LensModel model = LensModel::kPinhole;
+  std::vector<double> centre, scale;
+};
+struct PoseFrame {
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+};
+struct PointFrame {
+  Eigen::Vector3d anchor = Eigen::Vector3d::Zero();
+  Eigen::Vector3d direction = Eigen::Vector3d::UnitZ(), e1, e2;  ///< an orthonormal frame
+  double rho = 0;  ///< where the solve starts; the unknown is added to it
+};
+
+/// Scales of a lens's parameters such that one unit of each moves the pixels at the edge of what is
+/// seen, |q| = largest_radius on the plane of LensFormula, by about as much: the focal length in px
+/// times largest_radius.
+LensFrame FrameAround(const LensCamera& lens, double largest_radius);
+std::vector<double> ParamsAt(const LensFrame& frame, const double* theta);
+PointFrame FrameAround(const Eigen::Vector4d& point, const Eigen::Vector3d& anchor);
+
+/// Predicted minus observed pixel; parameter blocks lens, pose (w, v), point (a, b, rho). Fails
+/// where the point has no pixel. The frames are borrowed.
+std::unique_ptr<ceres::CostFunction> SightCost(const LensFrame& lens, const PoseFrame& pose,
+                                               const PointFrame& point,
+                                               const Eigen::Vector2d& observed_px);
+
+}  // namespace dtr::calib

@@ -1,0 +1,83 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "calib/bundle/refine.h"
+#include "calib/colmap/model_io.h"
+#include "cli/command.h"
+#include "cli/pipeline/lens_file.h"
+#include "dtr/base/error.h"
+
+namespace dtr::cli {
+namespace {
+
+struct Options {
+  std::filesystem::path model, output, lens;
+  bool separate = false;
+};
+
+int RunRefine(const Options& options, const Context& context) {
+  if (std::filesystem::exists(options.output / "cameras.bin")) {
+    throw UsageError(fmt::format("{}: holds a model already; remove it or choose another folder",
+                                 options.output.string()));
+  }
+  const calib::SfmModel model = colmap::ReadModel(options.model);
+  calib::RefineOptions refine;
+  refine.separate_lenses = options.separate;
+  refine.threads = context.common.threads;
+  refine.seed = context.common.seed;
+  if (!options.lens.empty()) {
+    const calib::LensCamera lens = pipeline::ReadLens(options.lens);
+    refine.known_lenses.emplace();
+    for (const auto& [id, camera] : model.cameras) refine.known_lenses->emplace(id, lens);
+  }
+  const calib::Refined refined = calib::Refine(model, refine);
+  for (const auto& candidate : refined.candidates) {
+    context.console.Say(
+        fmt::format("{:<20} held-out sights: {:.4f} px", candidate.name, candidate.held_out_px));
+  }
+  if (!refined.changed) {
+    context.console.Say("left as given: " + refined.reason);
+  } else {
+    context.console.Say(
+        fmt::format("refined, lenses {}: RMS {:.4f} px, sigma {:.4f} px per "
+                    "coordinate, {} points dropped",
+                    NameOf(*refined.lens), refined.adjusted.rms_px, refined.adjusted.sigma_px,
+                    refined.points_dropped));
+  }
+  colmap::WriteModel(options.output, refined.model, colmap::Format::kBinary);
+  context.EmitJson(calib::ToJson(refined));
+  return kDone;
+}
+
+}  // namespace
+
+void AddLensOption(CLI::App& command, std::filesystem::path& lens) {
+  command
+      .add_option("--lens", lens,
+                  "The lens of all photos, known: a .json of `dtr calibrate board`, a .yml of "
+                  "OpenCV or a cameras.txt; it is not changed")
+      ->check(CLI::ExistingFile)
+      ->type_name("FILE");
+}
+
+void AddCalibrateRefineCommand(CLI::App& calibrate) {
+  AddCommand(calibrate, "refine",
+             "Bundle adjustment of a COLMAP model, where held-out observations say that it pays",
+             "dtr calibrate refine sparse/0 -o refined/ --lens camera.json",
+             [](CLI::App& command) -> Action {
+               auto options = std::make_shared<Options>();
+               command.add_option("MODEL", options->model, "Folder of the COLMAP model")
+                   ->required()
+                   ->check(CLI::ExistingDirectory);
+               command.add_option("-o,--output", options->output, "Folder for the new model")
+                   ->required()
+                   ->type_name("DIR");
+               AddLensOption(command, options->lens);
+               command.add_flag("--separate-lenses", options->separate,
+                                "Every photo a lens of its own, as with a zoom that was moved");
+               return [options](const Context& context) { return RunRefine(*options, context); };
+             });
+}
+
+}  // namespace dtr::cli

@@ -1,0 +1,283 @@
+#include "calib/bundle/adjust.h"
+
+#include <gtest/gtest.h>
+
+#include "calib/bundle/normalised.h"
+#include "dtr/base/error.h"
+#include "tests/calib/bundle/synthetic_bundle.h"
+
+namespace dtr::calib {
+namespace {
+
+using testing::ArcPose;
+using testing::LargestDifference;
+using testing::LookAt;
+using testing::MakeBundle;
+using testing::Moved;
+using testing::Perturbed;
+using testing::Projections;
+using testing::SceneSpec;
+
+constexpr double kSamePx = 1e-6;  // the bound of issue "stiff cases"; seen: below 1e-8
+
+AdjustOptions With(LensFreedom lens) {
+  AdjustOptions options;
+  options.lens = lens;
+  return options;
+}
+
+// Largest difference between the cost's derivatives and central differences, relative to the
+// largest derivative of its block.
+double WorstDerivativeError(const ceres::CostFunction& cost, std::vector<double> theta,
+                            const double* motion, const double* shift) {
+  std::vector<std::vector<double>> blocks{theta, {motion, motion + 6}, {shift, shift + 3}};
+  const auto at = [&](double* residual, double** jacobians) {
+    const double* pointers[] = {blocks[0].data(), blocks[1].data(), blocks[2].data()};
+    EXPECT_TRUE(cost.Evaluate(pointers, residual, jacobians));
+  };
+  std::vector<std::vector<double>> analytic;
+  for (const auto& block : blocks) analytic.emplace_back(2 * block.size());
+  double* jacobians[] = {analytic[0].data(), analytic[1].data(), analytic[2].data()};
+  double residual[2];
+  at(residual, jacobians);
+  constexpr double kStep = 1e-6;  // cube root of rounding, for unknowns of order one
+  double worst = 0;
+  for (size_t b = 0; b < blocks.size(); ++b) {
+    const auto [low, high] = std::minmax_element(analytic[b].begin(), analytic[b].end());
+    const double scale = std::max(std::abs(*low), std::abs(*high));
+    for (size_t k = 0; k < blocks[b].size(); ++k) {
+      const double here = blocks[b][k];
+      double ahead[2], behind[2];
+      blocks[b][k] = here + kStep;
+      at(ahead, nullptr);
+      blocks[b][k] = here - kStep;
+      at(behind, nullptr);
+      blocks[b][k] = here;
+      for (size_t row = 0; row < 2; ++row) {
+        const double numeric = (ahead[row] - behind[row]) / (2 * kStep);
+        worst =
+            std::max(worst, std::abs(numeric - analytic[b][row * blocks[b].size() + k]) / scale);
+      }
+    }
+  }
+  return worst;
+}
+
+TEST(SightCost, DerivativesAgreeWithDifferencesForEveryLens) {
+  const std::pair<LensModel, std::vector<double>> lenses[] = {
+      {LensModel::kSimplePinhole, {900, 500, 400}},
+      {LensModel::kPinhole, {900, 905, 500, 400}},
+      {LensModel::kSimpleRadial, {900, 500, 400, 0.05}},
+      {LensModel::kRadial, {900, 500, 400, 0.05, -0.01}},
+      {LensModel::kOpenCv, {900, 905, 500, 400, 0.05, -0.01, 1e-3, -2e-3}},
+      {LensModel::kOpenCvFisheye, {500, 505, 500, 400, 0.02, -0.01, 1e-3, -2e-4}},
+      {LensModel::kFullOpenCv, {900, 905, 500, 400, .05, -.01, 1e-3, -2e-3, .01, .02, -.01, .003}},
+      {LensModel::kSimpleRadialFisheye, {500, 500, 400, 0.05}},
+      {LensModel::kRadialFisheye, {500, 500, 400, 0.05, -0.01}},
+      {LensModel::kThinPrismFisheye,
+       {500, 505, 500, 400, .02, -.01, 1e-3, -2e-3, .001, .002, 1e-3, 2e-3}},
+  };
+  const PoseFrame pose{ArcPose(1, 5).rotation.toRotationMatrix(),
+                       ArcPose(1, 5).TargetOriginInSource()};
+  for (const double weight : {1.0, 1e-3, 0.0}) {  // a near point, a far one, one at infinity
+    const Eigen::Vector3d near(0.3, 0.2, -0.4);
+    Eigen::Vector4d place = near.homogeneous();
+    if (weight < 1) place << near - pose.centre, weight;
+    const PointFrame point = FrameAround(place, ArcPose(3, 5).TargetOriginInSource());
+    for (const auto& [model, params] : lenses) {
+      const LensFrame lens = FrameAround({model, 1000, 800, params}, 0.6);
+      const auto cost = SightCost(lens, pose, point, {480, 410});
+      const double theta[kMostParams] = {0.01, -0.02, 0.015, 0.01, 0.02, -0.01, 0.01, 0.01};
+      const double motion[6] = {0.02, -0.01, 0.03, 0.05, 0.02, -0.04};
+      const double shift[3] = {0.01, -0.02, 0.003};
+      EXPECT_LT(WorstDerivativeError(*cost, {theta, theta + params.size()}, motion, shift), 1e-6)
+          << NameOf(model) << ", weight " << weight;
+    }
+  }
+}
+
+TEST(Adjust, ExactSightsGiveTheTruthBackFromAStartThatIsOff) {
+  const Bundle truth = MakeBundle({});
+  const Adjusted out = Adjust(Perturbed(truth, 0.02), With(LensFreedom::kAll));
+  EXPECT_TRUE(out.converged);
+  EXPECT_LT(out.rms_px, 1e-6);
+  EXPECT_NEAR(out.bundle.lenses[0].params[0], 900, 1e-4);
+  EXPECT_NEAR(out.bundle.lenses[0].params[1], 504, 1e-4);
+}
+
+TEST(Adjust, FocalLengthThirtyPercentOffIsFound) {
+  Bundle start = MakeBundle({});
+  start.lenses[0].params[0] *= 1.3;
+  const Adjusted out = Adjust(start, With(LensFreedom::kAll));
+  EXPECT_NEAR(out.bundle.lenses[0].params[0], 900, 1e-3);
+}
+
+TEST(Adjust, KnownLensIsNotMoved) {
+  const Bundle truth = MakeBundle({.noise_px = 0.3});
+  const Adjusted out = Adjust(truth, With(LensFreedom::kFixed));
+  EXPECT_EQ(out.bundle.lenses[0].params, truth.lenses[0].params);
+}
+
+TEST(Adjust, PrincipalPointStaysWhereItIsWantedToStay) {
+  const Bundle truth = MakeBundle({.noise_px = 0.3});
+  const Adjusted out = Adjust(truth, With(LensFreedom::kNoPrincipalPoint));
+  EXPECT_EQ(out.bundle.lenses[0].params[1], 504);
+  EXPECT_EQ(out.bundle.lenses[0].params[2], 397);
+  EXPECT_NE(out.bundle.lenses[0].params[0], 900);
+}
+
+TEST(Adjust, SigmaIsTheNoiseThatWasAdded) {
+  const Adjusted out =
+      Adjust(MakeBundle({.points = 1000, .noise_px = 0.4}), With(LensFreedom::kAll));
+  EXPECT_NEAR(out.sigma_px, 0.4, 0.4 * 0.02);  // 6000 sights and more: 1 % is one sigma
+}
+
+TEST(Adjust, WorldOffsetChangesNothing) {
+  const Bundle at_home = MakeBundle({.noise_px = 0.3});
+  Similarity far_away;
+  far_away.translation << 5e5, 4.5e6, 100;
+  const auto here = Adjust(at_home, With(LensFreedom::kAll));
+  const auto there = Adjust(Moved(at_home, far_away), With(LensFreedom::kAll));
+  EXPECT_LT(LargestDifference(Projections(here.bundle), Projections(there.bundle)), kSamePx);
+}
+
+TEST(Adjust, WorldScaleChangesNothing) {
+  const Bundle at_home = MakeBundle({.noise_px = 0.3});
+  const auto here = Adjust(at_home, With(LensFreedom::kAll));
+  for (const double scale : {1e-6, 1e-3, 1e3, 1e6}) {
+    Similarity scaled;
+    scaled.scale = scale;
+    const auto there = Adjust(Moved(at_home, scaled), With(LensFreedom::kAll));
+    EXPECT_LT(LargestDifference(Projections(here.bundle), Projections(there.bundle)), kSamePx)
+        << scale;
+  }
+}
+
+TEST(Adjust, GaugeOfTheStartIsKept) {
+  const Bundle start = MakeBundle({.noise_px = 0.3});
+  const Bundle out = Adjust(start, With(LensFreedom::kAll)).bundle;
+  Eigen::Vector3d middle[2] = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+  double spread[2] = {0, 0};
+  const Bundle* bundles[] = {&start, &out};
+  for (int k = 0; k < 2; ++k) {
+    for (const auto& image : bundles[k]->images) {
+      middle[k] += image.cam_from_world.TargetOriginInSource() / 8;
+    }
+    for (const auto& image : bundles[k]->images) {
+      spread[k] += (image.cam_from_world.TargetOriginInSource() - middle[k]).squaredNorm();
+    }
+  }
+  EXPECT_LT((middle[0] - middle[1]).norm(), 1e-12);
+  EXPECT_NEAR(spread[0], spread[1], 1e-10);
+}
+
+TEST(Adjust, TheSameBitsEveryTime) {
+  const Bundle start = Perturbed(MakeBundle({.noise_px = 0.3}), 0.01);
+  const Bundle a = Adjust(start, With(LensFreedom::kAll)).bundle;
+  const Bundle b = Adjust(start, With(LensFreedom::kAll)).bundle;
+  EXPECT_EQ(a.lenses[0].params, b.lenses[0].params);
+  for (size_t i = 0; i < a.points.size(); ++i) EXPECT_EQ(a.points[i], b.points[i]);
+}
+
+TEST(Adjust, OneSightAMillionPixelsOffDoesNotMatter) {
+  const Bundle clean = MakeBundle({.noise_px = 0.1});
+  Bundle spoiled = clean;
+  spoiled.observations[5].pixel.x() += 1e6;
+  const auto good = Adjust(clean, With(LensFreedom::kAll));
+  const auto out = Adjust(spoiled, With(LensFreedom::kAll));
+  EXPECT_FALSE(out.used[5]);
+  EXPECT_NEAR(out.bundle.lenses[0].params[0], good.bundle.lenses[0].params[0], 0.1);
+  EXPECT_LT(out.rms_px, 0.2);
+}
+
+TEST(Adjust, HalfTheSightsWrongDoNotMatter) {
+  const Bundle clean = MakeBundle({.points = 400, .noise_px = 0.1});
+  Bundle spoiled = clean;
+  Random random(3);
+  for (auto& sight : spoiled.observations) {
+    if (random.Uniform() < 0.5) continue;
+    const double x = random.Uniform(-80, 80);
+    sight.pixel += Eigen::Vector2d(x, random.Uniform(-80, 80));
+  }
+  const auto out = Adjust(spoiled, With(LensFreedom::kNoPrincipalPoint));
+  EXPECT_NEAR(out.bundle.lenses[0].params[0], 900, 5);
+  EXPECT_LT(out.sigma_px, 0.3);
+}
+
+TEST(Adjust, PointsAtInfinityAreNothingSpecial) {
+  Bundle bundle = MakeBundle({.noise_px = 0.1});
+  const LensCamera& lens = bundle.lenses[0];
+  Random random(5);
+  const size_t before = bundle.points.size();
+  for (int k = 0; k < 40; ++k) {
+    const double x = random.Uniform(-0.3, 0.3);
+    const Eigen::Vector3d direction(x, 1, random.Uniform(-0.4, 0.1));
+    const int point = static_cast<int>(bundle.points.size());
+    for (int i = 0; i < 8; ++i) {
+      const auto pixel = lens.PixelFromCam(
+          bundle.images[static_cast<size_t>(i)].cam_from_world.rotation * direction);
+      if (pixel) bundle.observations.push_back({i, point, *pixel});
+    }
+    Eigen::Vector4d h;
+    h << direction, 0;
+    bundle.points.push_back(h);
+    bundle.point_ids.push_back(bundle.points.size());
+  }
+  const auto out = Adjust(Perturbed(bundle, 1e-3), With(LensFreedom::kAll));
+  EXPECT_TRUE(out.converged);
+  EXPECT_LT(out.rms_px, 0.2);
+  for (size_t p = before; p < out.bundle.points.size(); ++p) {
+    const Eigen::Vector4d& h = out.bundle.points[p];
+    EXPECT_TRUE(h.allFinite());
+    EXPECT_LT(std::abs(h[3]) / h.head<3>().norm(), 1e-3);  // a thousand units away or beyond
+  }
+}
+
+TEST(Adjust, PositionsThatAreKnownDecideTheGauge) {
+  const Bundle truth = MakeBundle({.noise_px = 0.1});
+  Similarity world;
+  world.scale = 1.02;
+  world.translation << 0.3, -0.2, 0.1;
+  AdjustOptions options = With(LensFreedom::kFixed);
+  for (int i = 0; i < 8; ++i) {
+    options.positions.push_back(
+        {i, world * truth.images[static_cast<size_t>(i)].cam_from_world.TargetOriginInSource(),
+         Eigen::Vector3d::Constant(1e-3)});
+  }
+  const Bundle out = Adjust(truth, options).bundle;
+  for (size_t i = 0; i < 8; ++i) {
+    EXPECT_LT(
+        (out.images[i].cam_from_world.TargetOriginInSource() - options.positions[i].centre).norm(),
+        3e-3);
+  }
+}
+
+TEST(Adjust, AKnownDistanceDecidesTheScale) {
+  const Bundle truth = MakeBundle({.noise_px = 0.1});
+  AdjustOptions options = With(LensFreedom::kFixed);
+  options.distances = {{0, 7, 20.0, 1e-3}};
+  const Bundle out = Adjust(truth, options).bundle;
+  EXPECT_NEAR((out.images[0].cam_from_world.TargetOriginInSource() -
+               out.images[7].cam_from_world.TargetOriginInSource())
+                  .norm(),
+              20.0, 1e-3);
+}
+
+TEST(Adjust, RefusesWhatCannotBeMeant) {
+  Bundle bundle = MakeBundle({});
+  Bundle broken = bundle;
+  broken.observations[3].pixel.x() = std::nan("");
+  EXPECT_THROW(Adjust(broken, {}), Error);
+  broken = bundle;
+  broken.observations[3].point = 100000;
+  EXPECT_THROW(Adjust(broken, {}), Error);
+  broken = bundle;
+  broken.images.resize(1);
+  EXPECT_THROW(Adjust(broken, {}), Error);
+  AdjustOptions options;
+  options.positions = {{99, Eigen::Vector3d::Zero(), Eigen::Vector3d::Ones()}};
+  EXPECT_THROW(Adjust(bundle, options), Error);
+}
+
+}  // namespace
+}  // namespace dtr::calib

@@ -1,0 +1,117 @@
+#include "calib/bundle/refine.h"
+
+#include <gtest/gtest.h>
+
+#include "dtr/base/error.h"
+#include "tests/calib/bundle/synthetic_bundle.h"
+
+namespace dtr::calib {
+namespace {
+
+using testing::MakeBundle;
+using testing::SceneSpec;
+
+// The model of a bundle, as COLMAP would hand it over.
+SfmModel ModelFrom(const Bundle& bundle) {
+  SfmModel model;
+  model.cameras[1] = bundle.lenses[0];
+  for (size_t i = 0; i < bundle.images.size(); ++i) {
+    model.images.push_back({static_cast<std::uint32_t>(i + 1),
+                            bundle.images[i].name,
+                            1,
+                            bundle.images[i].cam_from_world,
+                            {}});
+  }
+  for (size_t p = 0; p < bundle.points.size(); ++p) {
+    model.points[bundle.point_ids[p]].p_in_world = bundle.points[p].head<3>();
+  }
+  for (const BundleObservation& o : bundle.observations) {
+    model.images[static_cast<size_t>(o.image)].features.push_back(
+        {o.pixel, bundle.point_ids[static_cast<size_t>(o.point)]});
+  }
+  return model;
+}
+
+SceneSpec Noisy() { return {.points = 400, .noise_px = 0.3}; }
+
+TEST(Refine, FreesThePrincipalPointWhereItIsWrong) {
+  SfmModel model = ModelFrom(MakeBundle(Noisy()));
+  model.cameras[1].params[1] += 12;  // as COLMAP leaves it: in the middle, and nothing adjusted
+  const Refined refined = Refine(model, {});
+  ASSERT_TRUE(refined.changed);
+  EXPECT_EQ(refined.lens, LensFreedom::kAll);
+  EXPECT_NEAR(refined.model.cameras.at(1).params[1], 504, 2);
+}
+
+TEST(Refine, LeavesThePrincipalPointWhereTheDataDoNotAskForIt) {
+  SfmModel model = ModelFrom(MakeBundle(Noisy()));
+  model.cameras[1].params[0] *= 1.01;
+  const Refined refined = Refine(model, {});
+  ASSERT_TRUE(refined.changed);
+  EXPECT_EQ(refined.lens, LensFreedom::kNoPrincipalPoint);
+  EXPECT_EQ(refined.model.cameras.at(1).params[1], 504);
+  EXPECT_NEAR(refined.model.cameras.at(1).params[0], 900, 2);
+}
+
+TEST(Refine, LeavesATrueModelAlone) {
+  const SfmModel model = ModelFrom(MakeBundle(Noisy()));
+  const Refined refined = Refine(model, {});
+  EXPECT_FALSE(refined.changed);
+  EXPECT_FALSE(refined.reason.empty());
+  EXPECT_EQ(refined.model.cameras.at(1).params, model.cameras.at(1).params);
+}
+
+TEST(Refine, TheSameForAnyNumberOfThreads) {
+  SfmModel model = ModelFrom(MakeBundle(Noisy()));
+  model.cameras[1].params[1] += 12;
+  RefineOptions options;
+  options.threads = 1;
+  const Refined one = Refine(model, options);
+  options.threads = 4;
+  const Refined four = Refine(model, options);
+  EXPECT_EQ(ToJson(one), ToJson(four));
+  EXPECT_EQ(one.model.cameras.at(1).params, four.model.cameras.at(1).params);
+  for (size_t i = 0; i < one.model.images.size(); ++i) {
+    EXPECT_EQ(one.model.images[i].cam_from_world.translation,
+              four.model.images[i].cam_from_world.translation);
+  }
+}
+
+TEST(Refine, AKnownLensReplacesTheModels) {
+  SfmModel model = ModelFrom(MakeBundle(Noisy()));
+  const LensCamera known = model.cameras[1];
+  model.cameras[1].params[0] *= 1.02;
+  RefineOptions options;
+  options.known_lenses = {{1, known}};
+  const Refined refined = Refine(model, options);
+  EXPECT_EQ(refined.model.cameras.at(1).params, known.params);
+  EXPECT_LT(refined.adjusted.sigma_px, 0.32);
+}
+
+TEST(Refine, AKnownLensOfAnotherSizeIsRefused) {
+  SfmModel model = ModelFrom(MakeBundle(Noisy()));
+  LensCamera known = model.cameras[1];
+  known.width_px *= 2;
+  RefineOptions options;
+  options.known_lenses = {{1, known}};
+  EXPECT_THROW(Refine(model, options), Error);
+}
+
+TEST(Refine, SeparateLensesAreOnePerImage) {
+  SfmModel model = ModelFrom(MakeBundle(Noisy()));
+  model.cameras[1].params[0] *= 1.02;
+  RefineOptions options;
+  options.separate_lenses = true;
+  const Refined refined = Refine(model, options);
+  ASSERT_TRUE(refined.changed);
+  EXPECT_EQ(refined.model.cameras.size(), model.images.size());
+}
+
+TEST(Refine, TooFewPointsAreLeftAlone) {
+  const Refined refined = Refine(ModelFrom(MakeBundle({.points = 50})), {});
+  EXPECT_FALSE(refined.changed);
+  EXPECT_NE(refined.reason.find("expected 100"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace dtr::calib
