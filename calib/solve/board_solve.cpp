@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <glog/logging.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -12,7 +10,9 @@
 
 #include "calib/models/lens_formula.h"
 #include "calib/solve/board_start.h"
+#include "calib/solve/least_squares.h"
 #include "calib/solve/reprojection.h"
+#include "calib/solve/rig_system.h"
 #include "dtr/base/error.h"
 
 namespace dtr::calib {
@@ -23,12 +23,6 @@ constexpr size_t kFewestCorners = 4;        // of a view: a pose has 6 unknowns,
 constexpr double kLeastAgreeing = 1.0 / 3;  // of a view's corners; else its pose is a guess
 constexpr double kLeastTiltDeg = 3;         // between two boards: below, they count as parallel
 constexpr double kLargestFocalError = 0.1;  // relative; above, the solution is of no use
-constexpr double kCauchySigmas = 3;         // scale of the robust loss
-constexpr double kSmallestSigmaPx = 1e-7;   // exact corners are no reason to call rounding outliers
-constexpr double kSameScale = 0.05;         // relative change at which the robust loss is settled
-constexpr int kMostRobustPasses = 6, kMostOutlierPasses = 10;
-
-using Used = std::vector<std::vector<bool>>;  // per view, per corner
 
 // What is being solved: the views in it, the camera and poses so far.
 struct State {
@@ -38,8 +32,6 @@ struct State {
   Used used;
 };
 
-[[noreturn]] void Refuse(const std::string& what) { throw Error("calibration: " + what); }
-
 std::vector<std::vector<double>> Lengths(const Board& board, const State& state) {
   std::vector<std::vector<double>> lengths;
   for (size_t i = 0; i < state.views.size(); ++i) {
@@ -47,27 +39,6 @@ std::vector<std::vector<double>> Lengths(const Board& board, const State& state)
         ResidualLengths(board, *state.views[i], state.camera, state.cam_from_board[i]));
   }
   return lengths;
-}
-
-double SigmaOfUsed(const std::vector<std::vector<double>>& lengths, const Used& used) {
-  std::vector<double> all;
-  for (size_t i = 0; i < lengths.size(); ++i) {
-    for (size_t j = 0; j < lengths[i].size(); ++j) {
-      if (used[i][j]) all.push_back(lengths[i][j]);
-    }
-  }
-  if (all.empty()) Refuse("expected corners that a camera explains, found none");
-  return std::max(RobustSigma(std::move(all)), kSmallestSigmaPx);
-}
-
-// Corners nearer than `limit_px` to their predictions.
-Used Within(const std::vector<std::vector<double>>& lengths, double limit_px) {
-  Used used;
-  for (const auto& view : lengths) {
-    used.emplace_back();
-    for (const double length : view) used.back().push_back(length < limit_px);
-  }
-  return used;
 }
 
 // Largest |q| of a used corner: how far out the lens is seen.
@@ -83,24 +54,6 @@ double LargestRadius(const Board& board, const State& state) {
     }
   }
   return largest;
-}
-
-ceres::Solver::Options SolverOptions() {
-  // Ceres tells stderr of every step that fails; the next one is shorter, and the end is judged
-  // here. The level belongs to the process: it is set once, before any thread of ours reads it.
-  [[maybe_unused]] static const bool quiet = [] {
-    FLAGS_minloglevel = google::GLOG_ERROR;
-    return true;
-  }();
-  ceres::Solver::Options options;
-  options.linear_solver_type = ceres::DENSE_SCHUR;
-  options.num_threads = 1;  // sums in one order: the same bits every time
-  options.max_num_iterations = 200;
-  options.function_tolerance = 1e-12;
-  options.parameter_tolerance = 1e-10;
-  options.gradient_tolerance = 1e-12;
-  options.logging_type = ceres::SILENT;
-  return options;
 }
 
 // Least squares over the used corners from where the state is; Cauchy's loss where a scale is
@@ -261,51 +214,19 @@ void RefuseParallelBoards(const State& state) {
   }
 }
 
-// Residuals' derivatives by natural lens parameters and by motions, over all used corners.
 ArrowInformation InformationOf(const Board& board, BoardModel model, const State& state) {
-  const int parameters = FreeParameterCount(model);
-  const Eigen::Vector3d pivot = MiddleOf(board);
-  LensCoordinates lens = CoordinatesAround(model, state.camera, 1);
-  lens.scale.fill(1);
-  ArrowInformation information(parameters);
-  const std::array<double, kMostLensParameters> theta{};
-  const std::array<double, 6> motion{};
-  const double* blocks[] = {theta.data(), motion.data()};
+  Rig rig;
+  rig.cameras.push_back({"", model, state.camera, {}});
+  rig.rig_from_board = state.cam_from_board;
   for (size_t i = 0; i < state.views.size(); ++i) {
-    const PoseCoordinates pose = CoordinatesAround(state.cam_from_board[i], pivot);
-    const auto rows = 2 * std::count(state.used[i].begin(), state.used[i].end(), true);
-    Eigen::MatrixXd by_lens(rows, parameters), by_pose(rows, 6);
-    long row = 0;
+    RigView view{0, i, *state.views[i], {}};
     for (size_t j = 0; j < state.used[i].size(); ++j) {
-      if (!state.used[i][j]) continue;
-      const BoardCorner& corner = state.views[i]->corners[j];
-      const auto cost = ReprojectionCost(lens, pose, board.Corner(corner.id) - pivot, corner.pixel);
-      Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor> lens_rows(2, parameters);
-      Eigen::Matrix<double, 2, 6, Eigen::RowMajor> pose_rows;
-      Eigen::Vector2d residual;
-      double* jacobians[] = {lens_rows.data(), pose_rows.data()};
-      if (!cost->Evaluate(blocks, residual.data(), jacobians)) Refuse("a corner left the lens");
-      by_lens.middleRows<2>(row) = lens_rows;
-      by_pose.middleRows<2>(row) = pose_rows;
-      row += 2;
+      if (!state.used[i][j]) view.outliers.push_back(view.seen.corners[j].id);
     }
-    information.AddPose(by_lens, by_pose);
+    rig.views.push_back(std::move(view));
   }
-  return information;
-}
-
-void InvertOrRefuse(BoardModel model, ArrowInformation& information) {
-  if (information.Invert()) return;
-  std::string which = "a pose of the board";
-  if (information.weakest().size() > 0) {
-    long index = 0;
-    information.weakest().cwiseAbs().maxCoeff(&index);
-    which = FreeParameterNames(model)[static_cast<size_t>(index)];
-  }
-  Refuse(
-      fmt::format("the corners do not determine {} of the model {}; take more views, tilted and "
-                  "into the corners of the image, or choose a model with fewer coefficients",
-                  which, NameOf(model)));
+  const RigLayout layout(rig.cameras, true);
+  return calib::InformationOf(RowsOf(board, rig, layout), layout);
 }
 
 void RefuseUseless(const BoardSolution& solution, bool cover_image) {
@@ -401,7 +322,6 @@ BoardSolution SolveBoard(const Board& board, std::span<const BoardView> views, i
   solution.camera = state.camera;
   Describe(board, state, solution);
   solution.information = InformationOf(board, model, state);
-  InvertOrRefuse(model, solution.information);
   solution.covariance =
       solution.sigma_px * solution.sigma_px * solution.information.lens_covariance();
   RefuseUseless(solution, options.cover_image);

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <type_traits>
 #include <vector>
 
 #include "calib/models/lens_formula.h"
@@ -13,19 +14,37 @@
 namespace dtr::calib {
 namespace {
 
-// Residual of a corner (turned by pose.rotation already) after a motion, seen through the lens.
+// A point (turned by pose.rotation already) after a motion.
+template <typename T, typename P>
+void Move(const PoseCoordinates& pose, const P turned[3], const T* motion, T moved[3]) {
+  const T point[3] = {T(turned[0]), T(turned[1]), T(turned[2])};
+  ceres::AngleAxisRotatePoint(motion, point, moved);
+  for (int i = 0; i < 3; ++i) moved[i] += pose.translation[i] + pose.scale * motion[3 + i];
+}
+
 template <typename T>
-bool Residual(const LensFormula<T>& lens, const PoseCoordinates& pose,
-              const Eigen::Vector3d& corner, const Eigen::Vector2d& observed_px, const T* motion,
+void Turn(const Eigen::Matrix3d& rotation, const T point[3], T turned[3]) {
+  for (int i = 0; i < 3; ++i) {
+    turned[i] = rotation(i, 0) * point[0] + rotation(i, 1) * point[1] + rotation(i, 2) * point[2];
+  }
+}
+
+template <typename T>
+bool Residual(const LensFormula<T>& lens, const T p_in_cam[3], const Eigen::Vector2d& observed_px,
               T* residual) {
-  const T turned[3] = {T(corner[0]), T(corner[1]), T(corner[2])};
-  T p_in_cam[3];
-  ceres::AngleAxisRotatePoint(motion, turned, p_in_cam);
-  for (int i = 0; i < 3; ++i) p_in_cam[i] += pose.translation[i] + pose.scale * motion[3 + i];
   if (!lens.Project(p_in_cam, residual)) return false;
   residual[0] -= observed_px[0];
   residual[1] -= observed_px[1];
   return true;
+}
+
+template <int kFree, typename T>
+LensFormula<T> LensAt(const LensCoordinates& lens, const T* theta) {
+  T params[kMostLensParameters];
+  for (size_t i = 0; i < kMostLensParameters; ++i) {
+    params[i] = i < kFree ? lens.centre[i] + lens.scale[i] * theta[i] : T(0);
+  }
+  return FormulaOf(LensModelOf(lens.model), params);
 }
 
 template <int kFree>
@@ -37,12 +56,26 @@ struct Reprojection {
 
   template <typename T>
   bool operator()(const T* theta, const T* motion, T* residual) const {
-    T params[kMostLensParameters];
-    for (size_t i = 0; i < kMostLensParameters; ++i) {
-      params[i] = i < kFree ? lens.centre[i] + lens.scale[i] * theta[i] : T(0);
-    }
-    return Residual(FormulaOf(LensModelOf(lens.model), params), pose, corner, observed_px, motion,
-                    residual);
+    T p_in_cam[3];
+    Move(pose, corner.data(), motion, p_in_cam);
+    return Residual(LensAt<kFree>(lens, theta), p_in_cam, observed_px, residual);
+  }
+};
+
+template <int kFree>
+struct RigReprojection {
+  const LensCoordinates& lens;
+  const PoseCoordinates &cam_from_rig, &rig_from_board;
+  Eigen::Vector3d corner;
+  Eigen::Vector2d observed_px;
+
+  template <typename T>
+  bool operator()(const T* theta, const T* place, const T* motion, T* residual) const {
+    T p_in_rig[3], turned[3], p_in_cam[3];
+    Move(rig_from_board, corner.data(), motion, p_in_rig);
+    Turn(cam_from_rig.rotation, p_in_rig, turned);
+    Move(cam_from_rig, turned, place, p_in_cam);
+    return Residual(LensAt<kFree>(lens, theta), p_in_cam, observed_px, residual);
   }
 };
 
@@ -51,22 +84,34 @@ struct PoseReprojection {
   const PoseCoordinates& pose;
   Eigen::Vector3d corner;
   Eigen::Vector2d observed_px;
+  Eigen::Matrix3d cam_from_rig;
+  Eigen::Vector3d rig_in_cam;
 
   template <typename T>
   bool operator()(const T* motion, T* residual) const {
     const std::vector<T> params(camera.params.begin(), camera.params.end());
-    return Residual(FormulaOf(camera.model, params.data()), pose, corner, observed_px, motion,
-                    residual);
+    T p_in_rig[3], p_in_cam[3];
+    Move(pose, corner.data(), motion, p_in_rig);
+    Turn(cam_from_rig, p_in_rig, p_in_cam);
+    for (int i = 0; i < 3; ++i) p_in_cam[i] += rig_in_cam[i];
+    return Residual(FormulaOf(camera.model, params.data()), p_in_cam, observed_px, residual);
   }
 };
 
-template <int kFree>
-std::unique_ptr<ceres::CostFunction> Cost(const LensCoordinates& lens, const PoseCoordinates& pose,
-                                          const Eigen::Vector3d& corner,
-                                          const Eigen::Vector2d& observed_px) {
-  using Functor = Reprojection<kFree>;
-  return std::make_unique<ceres::AutoDiffCostFunction<Functor, 2, kFree, 6>>(
-      new Functor{lens, pose, pose.rotation * corner, observed_px});
+// Calls `make` with the model's number of parameters as a type.
+template <typename Make>
+std::unique_ptr<ceres::CostFunction> WithParameterCount(BoardModel model, const Make& make) {
+  switch (FreeParameterCount(model)) {
+    case 4:
+      return make(std::integral_constant<int, 4>{});
+    case 8:
+      return make(std::integral_constant<int, 8>{});
+    case 9:
+      return make(std::integral_constant<int, 9>{});
+    case 12:
+      return make(std::integral_constant<int, 12>{});
+  }
+  throw std::logic_error("ReprojectionCost: no model has this number of parameters");
 }
 
 }  // namespace
@@ -116,24 +161,32 @@ std::unique_ptr<ceres::CostFunction> ReprojectionCost(const LensCoordinates& len
                                                       const PoseCoordinates& pose,
                                                       const Eigen::Vector3d& corner,
                                                       const Eigen::Vector2d& observed_px) {
-  switch (FreeParameterCount(lens.model)) {
-    case 4:
-      return Cost<4>(lens, pose, corner, observed_px);
-    case 8:
-      return Cost<8>(lens, pose, corner, observed_px);
-    case 9:
-      return Cost<9>(lens, pose, corner, observed_px);
-    case 12:
-      return Cost<12>(lens, pose, corner, observed_px);
-  }
-  throw std::logic_error("ReprojectionCost: no model has this number of parameters");
+  return WithParameterCount(lens.model, [&](auto count) {
+    using Functor = Reprojection<count()>;
+    return std::make_unique<ceres::AutoDiffCostFunction<Functor, 2, count(), 6>>(
+        new Functor{lens, pose, pose.rotation * corner, observed_px});
+  });
 }
 
 std::unique_ptr<ceres::CostFunction> PoseCost(const LensCamera& camera, const PoseCoordinates& pose,
                                               const Eigen::Vector3d& corner,
-                                              const Eigen::Vector2d& observed_px) {
+                                              const Eigen::Vector2d& observed_px,
+                                              const Pose& cam_from_rig) {
   return std::make_unique<ceres::AutoDiffCostFunction<PoseReprojection, 2, 6>>(
-      new PoseReprojection{camera, pose, pose.rotation * corner, observed_px});
+      new PoseReprojection{camera, pose, pose.rotation * corner, observed_px,
+                           cam_from_rig.rotation.toRotationMatrix(), cam_from_rig.translation});
+}
+
+std::unique_ptr<ceres::CostFunction> RigCost(const LensCoordinates& lens,
+                                             const PoseCoordinates& cam_from_rig,
+                                             const PoseCoordinates& rig_from_board,
+                                             const Eigen::Vector3d& corner,
+                                             const Eigen::Vector2d& observed_px) {
+  return WithParameterCount(lens.model, [&](auto count) {
+    using Functor = RigReprojection<count()>;
+    return std::make_unique<ceres::AutoDiffCostFunction<Functor, 2, count(), 6, 6>>(new Functor{
+        lens, cam_from_rig, rig_from_board, rig_from_board.rotation * corner, observed_px});
+  });
 }
 
 }  // namespace dtr::calib

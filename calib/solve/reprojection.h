@@ -45,9 +45,19 @@ std::unique_ptr<ceres::CostFunction> ReprojectionCost(const LensCoordinates& len
                                                       const Eigen::Vector3d& corner,
                                                       const Eigen::Vector2d& observed_px);
 
-/// The same with the lens as given, of any model but kFov; parameter block (w, v) alone.
+/// The same with the lens as given, of any model but kFov; parameter block (w, v) alone. For
+/// cameras of a rig the pose is rig_from_board, and `cam_from_rig` is given too.
 std::unique_ptr<ceres::CostFunction> PoseCost(const LensCamera& camera, const PoseCoordinates& pose,
                                               const Eigen::Vector3d& corner,
-                                              const Eigen::Vector2d& observed_px);
+                                              const Eigen::Vector2d& observed_px,
+                                              const Pose& cam_from_rig = {});
+
+/// The same for a camera of a rig; parameter blocks theta, (w, v) of cam_from_rig, about the rig's
+/// origin, and (w, v) of rig_from_board, about the board's pivot.
+std::unique_ptr<ceres::CostFunction> RigCost(const LensCoordinates& lens,
+                                             const PoseCoordinates& cam_from_rig,
+                                             const PoseCoordinates& rig_from_board,
+                                             const Eigen::Vector3d& corner,
+                                             const Eigen::Vector2d& observed_px);
 
 }  // namespace dtr::calib

@@ -1,0 +1,54 @@
+#include "calib/solve/least_squares.h"
+
+#include <glog/logging.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "calib/solve/board_start.h"
+#include "dtr/base/error.h"
+
+namespace dtr::calib {
+
+void Refuse(const std::string& what) { throw Error("calibration: " + what); }
+
+ceres::Solver::Options SolverOptions() {
+  // Ceres tells stderr of every step that fails; the next one is shorter, and the end is judged
+  // by the caller. The level belongs to the process: it is set once, before any thread of ours
+  // reads it.
+  [[maybe_unused]] static const bool quiet = [] {
+    FLAGS_minloglevel = google::GLOG_ERROR;
+    return true;
+  }();
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::DENSE_SCHUR;
+  options.num_threads = 1;  // sums in one order: the same bits every time
+  options.max_num_iterations = 200;
+  options.function_tolerance = 1e-12;
+  options.parameter_tolerance = 1e-10;
+  options.gradient_tolerance = 1e-12;
+  options.logging_type = ceres::SILENT;
+  return options;
+}
+
+Used Within(const std::vector<std::vector<double>>& lengths_px, double limit_px) {
+  Used used;
+  for (const auto& view : lengths_px) {
+    used.emplace_back();
+    for (const double length : view) used.back().push_back(length < limit_px);
+  }
+  return used;
+}
+
+double SigmaOfUsed(const std::vector<std::vector<double>>& lengths_px, const Used& used) {
+  std::vector<double> all;
+  for (size_t i = 0; i < lengths_px.size(); ++i) {
+    for (size_t j = 0; j < lengths_px[i].size(); ++j) {
+      if (used[i][j]) all.push_back(lengths_px[i][j]);
+    }
+  }
+  if (all.empty()) Refuse("expected corners that a camera explains, found none");
+  return std::max(RobustSigma(std::move(all)), kSmallestSigmaPx);
+}
+
+}  // namespace dtr::calib

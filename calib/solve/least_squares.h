@@ -1,0 +1,32 @@
+// calib/solve/least_squares.h -- internal to calib/solve: what the solves of boards and rigs share.
+#pragma once
+#include <ceres/ceres.h>
+
+#include <string>
+#include <vector>
+
+#include "dtr/types/pose.h"
+
+namespace dtr::calib {
+
+/// Throws Error: "calibration: " and what is missing.
+[[noreturn]] void Refuse(const std::string& what);
+
+/// Levenberg-Marquardt to the last digits, one thread, silent: the same bits every time.
+ceres::Solver::Options SolverOptions();
+
+constexpr double kCauchySigmas = 3;        // scale of the robust loss
+constexpr double kSameScale = 0.05;        // relative change at which the robust loss is settled
+constexpr double kSmallestSigmaPx = 1e-7;  // exact corners are no reason to call rounding outliers
+constexpr int kMostRobustPasses = 6, kMostOutlierPasses = 10;
+
+using Used = std::vector<std::vector<bool>>;  // per view, per corner
+
+/// Corners nearer than `limit_px` to their predictions.
+Used Within(const std::vector<std::vector<double>>& lengths_px, double limit_px);
+
+/// RobustSigma of the lengths that are used, at least kSmallestSigmaPx. Refuses where there are
+/// none.
+double SigmaOfUsed(const std::vector<std::vector<double>>& lengths_px, const Used& used);
+
+}  // namespace dtr::calib

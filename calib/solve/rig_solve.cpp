@@ -1,0 +1,481 @@
+#include "calib/solve/rig_solve.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "calib/models/lens_formula.h"
+#include "calib/solve/board_start.h"
+#include "calib/solve/least_squares.h"
+#include "calib/solve/reprojection.h"
+#include "calib/solve/rig_start.h"
+#include "dtr/base/error.h"
+
+namespace dtr::calib {
+namespace {
+
+constexpr size_t kFewestCorners = 4;        // of a view that counts
+constexpr double kLeastAgreeing = 1.0 / 3;  // of a view's corners
+constexpr double kFitCauchyPx = 1;          // scale for frames alone, before a sigma is known
+const Eigen::Vector3d kRigOrigin = Eigen::Vector3d::Zero();
+
+using Lengths = std::vector<std::vector<double>>;
+
+// What counts, as the solver takes it: per view, per corner.
+Used UsedOf(const Rig& rig) {
+  Used used;
+  for (const RigView& view : rig.views) {
+    used.emplace_back();
+    for (const BoardCorner& corner : view.seen.corners) {
+      used.back().push_back(!Holds(view.outliers, corner.id));
+    }
+  }
+  return used;
+}
+
+void SetUsed(const Used& used, Rig& rig) {
+  for (size_t v = 0; v < rig.views.size(); ++v) {
+    rig.views[v].outliers.clear();
+    for (size_t j = 0; j < used[v].size(); ++j) {
+      if (!used[v][j]) rig.views[v].outliers.push_back(rig.views[v].seen.corners[j].id);
+    }
+  }
+}
+
+// Largest |q| that each camera sees a corner at.
+std::vector<double> LargestRadii(const Board& board, const Rig& rig, const Used& used) {
+  std::vector<double> radii(rig.cameras.size(), 1e-3);
+  for (size_t v = 0; v < rig.views.size(); ++v) {
+    const RigView& view = rig.views[v];
+    const RigCamera& camera = rig.cameras[view.camera];
+    const auto lens = FormulaOf(camera.camera.model, camera.camera.params.data());
+    const Pose cam_from_board = camera.cam_from_rig * rig.rig_from_board[view.frame];
+    for (size_t j = 0; j < view.seen.corners.size(); ++j) {
+      const Eigen::Vector3d p = cam_from_board * board.Corner(view.seen.corners[j].id);
+      Eigen::Vector2d q;
+      if (used[v][j] && lens.Plane(p.data(), q.data())) {
+        radii[view.camera] = std::max(radii[view.camera], q.norm());
+      }
+    }
+  }
+  return radii;
+}
+
+// Unknowns of the joint problem in the solver's coordinates.
+struct Unknowns {
+  std::vector<LensCoordinates> lenses;
+  std::vector<PoseCoordinates> places, frames;
+  std::vector<std::array<double, kMostLensParameters>> thetas;
+  std::vector<std::array<double, 6>> place_motions, frame_motions;
+};
+
+Unknowns UnknownsOf(const Board& board, const Rig& rig, const Used& used) {
+  Unknowns u;
+  const auto radii = LargestRadii(board, rig, used);
+  std::vector<double> distances{1e-300};
+  for (const Pose& pose : rig.rig_from_board) {
+    u.frames.push_back(CoordinatesAround(pose, MiddleOf(board)));
+    distances.push_back(u.frames.back().scale);
+  }
+  // Cameras may stand in one point: their shifts are measured by how far the boards are.
+  const double distance = *std::max_element(distances.begin(), distances.end());
+  for (size_t c = 0; c < rig.cameras.size(); ++c) {
+    u.lenses.push_back(CoordinatesAround(rig.cameras[c].model, rig.cameras[c].camera, radii[c]));
+    u.places.push_back(CoordinatesAround(rig.cameras[c].cam_from_rig, kRigOrigin));
+    u.places.back().scale = distance;
+  }
+  u.thetas.resize(rig.cameras.size(), {});
+  u.place_motions.resize(rig.cameras.size(), {});
+  u.frame_motions.resize(rig.rig_from_board.size(), {});
+  return u;
+}
+
+void TakeOver(const Board& board, const Unknowns& u, Rig& rig) {
+  for (size_t c = 0; c < rig.cameras.size(); ++c) {
+    RigCamera& camera = rig.cameras[c];
+    std::vector<double> params;
+    for (int k = 0; k < FreeParameterCount(camera.model); ++k) {
+      const auto i = static_cast<size_t>(k);
+      params.push_back(u.lenses[c].centre[i] + u.lenses[c].scale[i] * u.thetas[c][i]);
+    }
+    try {
+      camera.camera =
+          CameraFrom(camera.model, camera.camera.width_px, camera.camera.height_px, params);
+    } catch (const std::invalid_argument&) {
+      Refuse(fmt::format("camera {}: no lens of the model {} explains the corners", camera.name,
+                         calib::NameOf(camera.model)));
+    }
+    camera.cam_from_rig = PoseAt(u.places[c], u.place_motions[c].data(), kRigOrigin);
+  }
+  for (size_t f = 0; f < rig.rig_from_board.size(); ++f) {
+    rig.rig_from_board[f] = PoseAt(u.frames[f], u.frame_motions[f].data(), MiddleOf(board));
+  }
+}
+
+// Least squares over the used corners from where the rig is; Cauchy's loss where a scale is given.
+void Minimise(const Board& board, bool free_lenses, std::optional<double> cauchy_px,
+              const Used& used, Rig& rig) {
+  const Eigen::Vector3d pivot = MiddleOf(board);
+  Unknowns u = UnknownsOf(board, rig, used);
+  ceres::Problem problem;
+  for (size_t v = 0; v < rig.views.size(); ++v) {
+    const RigView& view = rig.views[v];
+    for (size_t j = 0; j < view.seen.corners.size(); ++j) {
+      if (!used[v][j]) continue;
+      const BoardCorner& corner = view.seen.corners[j];
+      problem.AddResidualBlock(
+          RigCost(u.lenses[view.camera], u.places[view.camera], u.frames[view.frame],
+                  board.Corner(corner.id) - pivot, corner.pixel)
+              .release(),
+          cauchy_px ? new ceres::CauchyLoss(*cauchy_px) : nullptr, u.thetas[view.camera].data(),
+          u.place_motions[view.camera].data(), u.frame_motions[view.frame].data());
+    }
+  }
+  ceres::Solver::Options options = SolverOptions();
+  options.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+  for (auto& motion : u.frame_motions) {
+    if (!problem.HasParameterBlock(motion.data())) continue;
+    options.linear_solver_ordering->AddElementToGroup(motion.data(), 0);
+  }
+  for (size_t c = 0; c < rig.cameras.size(); ++c) {
+    if (!problem.HasParameterBlock(u.thetas[c].data())) continue;
+    options.linear_solver_ordering->AddElementToGroup(u.thetas[c].data(), 1);
+    options.linear_solver_ordering->AddElementToGroup(u.place_motions[c].data(), 1);
+    if (!free_lenses) problem.SetParameterBlockConstant(u.thetas[c].data());
+    if (c == 0) problem.SetParameterBlockConstant(u.place_motions[c].data());
+  }
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &problem, &summary);
+  if (!summary.IsSolutionUsable()) Refuse("the corners of the rig have no least-squares solution");
+  TakeOver(board, u, rig);
+}
+
+std::vector<double> LengthsOf(const Board& board, const Rig& rig, const RigView& view) {
+  const RigCamera& camera = rig.cameras[view.camera];
+  return ResidualLengths(board, view.seen, camera.camera,
+                         camera.cam_from_rig * rig.rig_from_board[view.frame]);
+}
+
+// Cauchy's cost of some views; corners without a pixel cost as much as far ones.
+double RobustCost(const Board& board, const Rig& rig, const std::vector<size_t>& views,
+                  double scale_px) {
+  constexpr double kWithoutPixel = 100;
+  double sum = 0;
+  for (const size_t v : views) {
+    const RigView& view = rig.views[v];
+    const auto lengths = LengthsOf(board, rig, view);
+    for (size_t j = 0; j < lengths.size(); ++j) {
+      if (Holds(view.outliers, view.seen.corners[j].id)) continue;
+      const double r = lengths[j] / scale_px;
+      sum += std::isfinite(r) ? std::log1p(r * r) : kWithoutPixel;
+    }
+  }
+  return sum;
+}
+
+std::vector<std::vector<size_t>> ViewsByFrame(const Rig& rig) {
+  std::vector<std::vector<size_t>> views(rig.rig_from_board.size());
+  for (size_t v = 0; v < rig.views.size(); ++v) views[rig.views[v].frame].push_back(v);
+  return views;
+}
+
+// One view of a frame may be wrong, and a plane has two poses that look alike: of the poses that
+// each view by itself gives the board, the one that fits all views of the frame is taken.
+void ChooseFramePoses(const Board& board, double scale_px, Rig& rig) {
+  const auto by_frame = ViewsByFrame(rig);
+  for (size_t f = 0; f < by_frame.size(); ++f) {
+    if (by_frame[f].empty()) continue;
+    Pose best = rig.rig_from_board[f];
+    double least = RobustCost(board, rig, by_frame[f], scale_px);
+    for (const size_t v : by_frame[f]) {
+      const RigCamera& camera = rig.cameras[rig.views[v].camera];
+      const auto own = PoseOfBoard(board, rig.views[v].seen, camera.camera);
+      if (!own) continue;
+      rig.rig_from_board[f] = camera.cam_from_rig.Inverse() * *own;
+      const double cost = RobustCost(board, rig, by_frame[f], scale_px);
+      if (cost < least) {
+        least = cost;
+        best = rig.rig_from_board[f];
+      }
+    }
+    rig.rig_from_board[f] = best;
+  }
+}
+
+void TakeOutDisagreeing(Rig& rig, std::vector<LeftOut>& left_out) {
+  std::erase_if(rig.views, [&](const RigView& view) {
+    const size_t all = view.seen.corners.size(), agreeing = all - view.outliers.size();
+    if (agreeing >= kFewestCorners &&
+        static_cast<double>(agreeing) >= kLeastAgreeing * static_cast<double>(all)) {
+      return false;
+    }
+    left_out.push_back(
+        {view.seen.name,
+         fmt::format("only {} of {} corners lie where a flat board can have them", agreeing, all)});
+    return true;
+  });
+}
+
+// Robust sigma per camera; that of all where a camera has no view.
+std::vector<double> CameraSigmas(const Rig& rig, const Lengths& lengths, const Used& used) {
+  std::vector<double> sigmas(rig.cameras.size(), SigmaOfUsed(lengths, used));
+  for (size_t c = 0; c < rig.cameras.size(); ++c) {
+    Lengths own;
+    Used own_used;
+    for (size_t v = 0; v < rig.views.size(); ++v) {
+      if (rig.views[v].camera != c) continue;
+      own.push_back(lengths[v]);
+      own_used.push_back(used[v]);
+    }
+    if (!own.empty()) sigmas[c] = SigmaOfUsed(own, own_used);
+  }
+  return sigmas;
+}
+
+Used Drawable(const Lengths& lengths) {
+  return Within(lengths, std::numeric_limits<double>::infinity());
+}
+
+// Names as outliers what is farther off than its camera's sigmas allow. False when nothing changed.
+bool NameOutliers(const Board& board, double outlier_sigmas, Rig& rig) {
+  const Lengths lengths = ResidualLengths(board, rig);
+  const Used before = UsedOf(rig);
+  const auto sigmas = CameraSigmas(rig, lengths, before);
+  Used used = before;
+  for (size_t v = 0; v < lengths.size(); ++v) {
+    for (size_t j = 0; j < lengths[v].size(); ++j) {
+      used[v][j] = lengths[v][j] < outlier_sigmas * sigmas[rig.views[v].camera];
+    }
+  }
+  SetUsed(used, rig);
+  return used != before;
+}
+
+void SolveRobustly(const Board& board, const RigOptions& options, Rig& rig,
+                   std::vector<LeftOut>& left_out) {
+  double scale = kCauchySigmas * SigmaOfUsed(ResidualLengths(board, rig), UsedOf(rig));
+  ChooseFramePoses(board, scale, rig);
+  for (int pass = 0; pass < kMostRobustPasses; ++pass) {
+    Minimise(board, options.free_lenses, scale, Drawable(ResidualLengths(board, rig)), rig);
+    ChooseFramePoses(board, scale, rig);
+    const double next = kCauchySigmas * SigmaOfUsed(ResidualLengths(board, rig), UsedOf(rig));
+    const bool settled = std::abs(next - scale) < kSameScale * scale;
+    scale = next;
+    if (settled) break;
+  }
+  NameOutliers(board, options.solve.outlier_sigmas, rig);
+  TakeOutDisagreeing(rig, left_out);
+  for (int pass = 0; pass < kMostOutlierPasses; ++pass) {
+    Minimise(board, options.free_lenses, {}, UsedOf(rig), rig);
+    if (!NameOutliers(board, options.solve.outlier_sigmas, rig)) break;
+    TakeOutDisagreeing(rig, left_out);
+  }
+}
+
+void SolveQuadratically(const Board& board, const RigOptions& options, Rig& rig) {
+  ChooseFramePoses(board, kCauchySigmas * SigmaOfUsed(ResidualLengths(board, rig), UsedOf(rig)),
+                   rig);
+  Minimise(board, options.free_lenses, {}, Drawable(ResidualLengths(board, rig)), rig);
+  // Corners that the start could not draw count now.
+  if (Drawable(ResidualLengths(board, rig)) != UsedOf(rig)) {
+    Refuse(
+        "with a quadratic loss every corner counts, and some have no place in the image; leave "
+        "the loss robust");
+  }
+  Minimise(board, options.free_lenses, {}, UsedOf(rig), rig);
+}
+
+void Describe(const Board& board, RigSolution& solution) {
+  solution.layout = RigLayout(solution.rig.cameras, solution.layout.free_lenses());
+  solution.rows = RowsOf(board, solution.rig, solution.layout);
+  solution.information = InformationOf(solution.rows, solution.layout);
+  const size_t cameras = solution.rig.cameras.size();
+  std::vector<double> squares(cameras, 0), corners(cameras, 0);
+  double sum = 0;
+  for (const FrameRows& frame : solution.rows) {
+    for (size_t i = 0; i < frame.origins.size(); ++i) {
+      const size_t camera = solution.rig.views[frame.origins[i].view].camera;
+      const double square = frame.residuals.segment<2>(2 * static_cast<long>(i)).squaredNorm();
+      squares[camera] += square;
+      corners[camera] += 1;
+      sum += square;
+      ++solution.corners;
+    }
+  }
+  for (const RigView& view : solution.rig.views) {
+    solution.outliers += static_cast<int>(view.outliers.size());
+  }
+  for (size_t c = 0; c < cameras; ++c) {
+    solution.camera_rms_px.push_back(std::sqrt(squares[c] / std::max(1.0, corners[c])));
+  }
+  solution.freedom = 2.0 * solution.corners - solution.layout.size() -
+                     6.0 * static_cast<double>(solution.rows.size());
+  if (!(solution.freedom > 0)) {
+    Refuse(
+        fmt::format("expected more numbers than unknowns, found {} corners in {} frames; take "
+                    "more views",
+                    solution.corners, solution.rows.size()));
+  }
+  solution.rms_px = std::sqrt(sum / solution.corners);
+  solution.sigma_px = std::sqrt(sum / solution.freedom);
+  solution.covariance =
+      solution.sigma_px * solution.sigma_px * solution.information.lens_covariance();
+}
+
+std::vector<BoardView> ViewsOf(const std::vector<RigView>& views, size_t camera,
+                               std::vector<size_t>& where) {
+  std::vector<BoardView> own;
+  for (size_t v = 0; v < views.size(); ++v) {
+    if (views[v].camera != camera) continue;
+    own.push_back(views[v].seen);
+    where.push_back(v);
+  }
+  return own;
+}
+
+void DropOutliers(std::vector<RigView>& views) {
+  for (RigView& view : views) {
+    std::erase_if(view.seen.corners,
+                  [&](const BoardCorner& corner) { return Holds(view.outliers, corner.id); });
+    view.outliers.clear();
+  }
+}
+
+// A camera and the boards' poses from its own views alone.
+RigCamera StartCamera(const Board& board, const RigCameraInput& input,
+                      std::span<const BoardView> own, const SolveOptions& options,
+                      std::vector<std::optional<Pose>>& poses) {
+  RigCamera camera{input.name, input.model, {}, {}};
+  poses.assign(own.size(), std::nullopt);
+  if (input.given) {
+    camera.camera = *input.given;
+    for (size_t i = 0; i < own.size(); ++i) poses[i] = PoseOfBoard(board, own[i], camera.camera);
+    return camera;
+  }
+  try {
+    const BoardSolution solution =
+        SolveBoard(board, own, input.width_px, input.height_px, input.model, options);
+    camera.camera = solution.camera;
+    size_t next = 0;  // solved views keep the order; those left out are missing
+    for (size_t i = 0; i < own.size() && next < solution.views.size(); ++i) {
+      if (own[i].name == solution.views[next].name) {
+        poses[i] = solution.views[next++].cam_from_board;
+      }
+    }
+  } catch (const Error& error) {
+    if (input.name.empty()) throw;
+    throw Error(fmt::format("camera {}: {}", input.name, error.what()));
+  }
+  return camera;
+}
+
+// Least squares over a frame's used corners by the board's pose alone.
+void MinimiseFrame(const Board& board, const std::vector<size_t>& views, const Used& used,
+                   std::optional<double> cauchy_px, size_t frame, Rig& rig) {
+  const Eigen::Vector3d pivot = MiddleOf(board);
+  const PoseCoordinates pose = CoordinatesAround(rig.rig_from_board[frame], pivot);
+  std::array<double, 6> motion{};
+  ceres::Problem problem;
+  for (const size_t v : views) {
+    const RigCamera& camera = rig.cameras[rig.views[v].camera];
+    for (size_t j = 0; j < used[v].size(); ++j) {
+      if (!used[v][j]) continue;
+      const BoardCorner& corner = rig.views[v].seen.corners[j];
+      problem.AddResidualBlock(PoseCost(camera.camera, pose, board.Corner(corner.id) - pivot,
+                                        corner.pixel, camera.cam_from_rig)
+                                   .release(),
+                               cauchy_px ? new ceres::CauchyLoss(*cauchy_px) : nullptr,
+                               motion.data());
+    }
+  }
+  if (problem.NumResidualBlocks() < static_cast<int>(kFewestCorners)) return;
+  ceres::Solver::Options options = SolverOptions();
+  options.linear_solver_type = ceres::DENSE_QR;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &problem, &summary);
+  if (summary.IsSolutionUsable()) {
+    rig.rig_from_board[frame] = PoseAt(pose, motion.data(), pivot);
+  }
+}
+
+}  // namespace
+
+std::vector<std::vector<double>> ResidualLengths(const Board& board, const Rig& rig) {
+  Lengths lengths;
+  for (const RigView& view : rig.views) lengths.push_back(LengthsOf(board, rig, view));
+  return lengths;
+}
+
+RigSolution SolveRig(const Board& board, std::span<const RigCameraInput> cameras,
+                     std::vector<RigView> views, size_t frames, const RigOptions& options) {
+  RigSolution solution;
+  DropOutliers(views);
+  std::vector<RigCamera> started;
+  std::vector<PosedView> posed;
+  for (size_t c = 0; c < cameras.size(); ++c) {
+    std::vector<size_t> where;
+    const auto own = ViewsOf(views, c, where);
+    std::vector<std::optional<Pose>> poses;
+    started.push_back(StartCamera(board, cameras[c], own, options.solve, poses));
+    for (size_t i = 0; i < where.size(); ++i) {
+      if (poses[i]) {
+        posed.push_back({views[where[i]], *poses[i]});
+      } else {
+        solution.left_out.push_back({own[i].name, "no pose of a flat board explains its corners"});
+      }
+    }
+  }
+  RigStart start = StartRig(board, std::move(started), std::move(posed), frames);
+  solution.rig = std::move(start.rig);
+  solution.flipped = std::move(start.flipped);
+  if (solution.rig.views.empty()) Refuse("no view of the board can be used");
+  solution.layout = RigLayout(solution.rig.cameras, options.free_lenses);
+  if (options.solve.loss == Loss::kRobust) {
+    SolveRobustly(board, options, solution.rig, solution.left_out);
+  } else {
+    SolveQuadratically(board, options, solution.rig);
+  }
+  Describe(board, solution);
+  return solution;
+}
+
+Rig FitFrames(const Board& board, std::vector<RigCamera> cameras, std::vector<RigView> views,
+              size_t frames, const SolveOptions& options, std::vector<LeftOut>& left_out) {
+  Rig rig;
+  rig.cameras = std::move(cameras);
+  rig.rig_from_board.resize(frames);
+  for (RigView& view : views) {
+    const RigCamera& camera = rig.cameras[view.camera];
+    const auto pose = PoseOfBoard(board, view.seen, camera.camera);
+    if (!pose) {
+      left_out.push_back({view.seen.name, "no pose of a flat board explains its corners"});
+      continue;
+    }
+    rig.rig_from_board[view.frame] = camera.cam_from_rig.Inverse() * *pose;
+    rig.views.push_back(std::move(view));
+  }
+  if (rig.views.empty()) return rig;
+  ChooseFramePoses(board, kFitCauchyPx, rig);
+  const auto by_frame = ViewsByFrame(rig);
+  const auto minimise = [&](std::optional<double> cauchy_px) {
+    Used used = UsedOf(rig);
+    const Used drawable = Drawable(ResidualLengths(board, rig));
+    for (size_t v = 0; v < used.size(); ++v) {
+      for (size_t j = 0; j < used[v].size(); ++j) used[v][j] = used[v][j] && drawable[v][j];
+    }
+    for (size_t f = 0; f < by_frame.size(); ++f) {
+      MinimiseFrame(board, by_frame[f], used, cauchy_px, f, rig);
+    }
+  };
+  if (options.loss == Loss::kRobust) {
+    minimise(kCauchySigmas * SigmaOfUsed(ResidualLengths(board, rig), UsedOf(rig)));
+    NameOutliers(board, options.outlier_sigmas, rig);
+  }
+  minimise({});
+  return rig;
+}
+
+}  // namespace dtr::calib
