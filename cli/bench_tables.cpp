@@ -5,6 +5,8 @@
 #include <optional>
 #include <string>
 
+#include "dtr/render/option_names.h"
+
 namespace dtr::cli {
 namespace {
 
@@ -104,7 +106,7 @@ void SayReportTable(const eval::BenchReport& report, const eval::BenchMachine& m
     console.Say(fmt::format(
         "a whole picture by {}: {:.1f} ms, {:.1f} CPU ms (drawn {:.1f}, read back {:.1f}, holes "
         "filled {:.1f} CPU ms)",
-        eval::NameOf(row.method), row.whole_ms(), row.whole_cpu_ms(), row.cpu.median_ms,
+        NameOf(row.method), row.whole_ms(), row.whole_cpu_ms(), row.cpu.median_ms,
         row.read_back_cpu.median_ms, row.fill_cpu.median_ms));
   }
 }
@@ -122,7 +124,7 @@ void SayWeightTable(const eval::BenchReport& report, const eval::BenchMachine& m
   for (size_t i = 0; i + 1 < report.rows.size(); i += 2) {
     const eval::BenchRow &two_pass = report.rows[i], &deferred = report.rows[i + 1];
     console.Say(fmt::format("{:>5} {:<13}  {}  {}", two_pass.views_used,
-                            eval::NameOf(two_pass.blend), figures(two_pass), figures(deferred)));
+                            NameOf(two_pass.blend), figures(two_pass), figures(deferred)));
   }
   console.Say("");
   console.Say(
@@ -133,7 +135,7 @@ void SayWeightTable(const eval::BenchReport& report, const eval::BenchMachine& m
 void SayGrowthTable(const std::vector<eval::GrowthSeries>& series, RenderMethod method,
                     const eval::BenchMachine& machine, Console& console) {
   console.Say(Machine(machine));
-  console.Say(fmt::format("method {}", eval::NameOf(method)));
+  console.Say(fmt::format("method {}", NameOf(method)));
   for (const eval::GrowthSeries& one : series) {
     console.Say("");
     console.Say(fmt::format("{:>28} {:>9} {:>7} {:>9} {:>7}", Axis(one), "ms", "spread", "CPU ms",

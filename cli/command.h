@@ -50,6 +50,7 @@ void AddInfoCommand(CLI::App& app);
 void AddRenderCommand(CLI::App& app);
 void AddEvaluateCommand(CLI::App& app);
 void AddBenchCommand(CLI::App& app);
+void AddViewCommand(CLI::App& app);  ///< in programs built with windows
 void AddImportCommand(CLI::App& app);
 void AddExportCommand(CLI::App& app);
 void AddDatasetCommand(CLI::App& app);

@@ -20,6 +20,9 @@ int Run(int argc, char** argv) {
   dtr::cli::AddStereoCommand(app);
   dtr::cli::AddInfoCommand(app);
   dtr::cli::AddRenderCommand(app);
+#ifdef DTR_WITH_WINDOWS
+  dtr::cli::AddViewCommand(app);
+#endif
   dtr::cli::AddEvaluateCommand(app);
   dtr::cli::AddBenchCommand(app);
   dtr::cli::AddImportCommand(app);

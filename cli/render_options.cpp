@@ -1,21 +1,28 @@
 #include "cli/render_options.h"
 
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
 #include <map>
 #include <numbers>
 #include <string>
 
+#include "dtr/render/option_names.h"
+
 namespace dtr::cli {
 namespace {
 
-const std::map<std::string, RenderMethod> kMethods{{"two-pass", RenderMethod::kTwoPass},
-                                                   {"deferred", RenderMethod::kDeferred}};
-const std::map<std::string, Primitive> kPrimitives{{"mesh", Primitive::kMesh},
-                                                   {"splat", Primitive::kSplat}};
-const std::map<std::string, BlendWeight> kBlends{{"cosine", BlendWeight::kCosine},
-                                                 {"exponential", BlendWeight::kExponential},
-                                                 {"angle", BlendWeight::kAngle},
-                                                 {"inverse-angle", BlendWeight::kInverseAngle},
-                                                 {"k-nearest", BlendWeight::kKNearest}};
+template <typename T, size_t N>
+std::map<std::string, T> ByName(const std::array<T, N>& values) {
+  std::map<std::string, T> by_name;
+  for (const T value : values) by_name[NameOf(value)] = value;
+  return by_name;
+}
+
+const std::map<std::string, RenderMethod> kMethods = ByName(kRenderMethods);
+const std::map<std::string, Primitive> kPrimitiveNames = ByName(kPrimitives);
+const std::map<std::string, BlendWeight> kBlends = ByName(kBlendWeights);
 
 // An option whose value is one of the names of `values`.
 template <typename T>
@@ -31,14 +38,77 @@ void AddChoice(CLI::App& command, const std::string& flag, T& target,
       ->type_name(names);
 }
 
+double RadiansOf(double degrees) { return degrees * std::numbers::pi / 180; }
+
+/// Degrees with as few digits as come back as the same bits.
+std::string DegreesOf(double radians) {
+  constexpr int kMostDigits = 17;
+  const double degrees = radians * 180 / std::numbers::pi;
+  for (int digits = 1; digits <= kMostDigits; ++digits) {
+    const double rounded = std::stod(fmt::format("{:.{}g}", degrees, digits));
+    if (RadiansOf(rounded) == radians) return fmt::format("{}", rounded);
+  }
+  // The way back rounds, too: the neighbours are what is left.
+  const double above = std::nextafter(degrees, HUGE_VAL);
+  return fmt::format("{}", RadiansOf(above) == radians ? above : std::nextafter(degrees, 0));
+}
+
+/// Collects "--flag VALUE" of what is not the default.
+class Arguments {
+ public:
+  template <typename T>
+  void Add(const char* flag, const T& value, const T& by_default) {
+    if (value != by_default) Append(flag, fmt::format("{}", value));
+  }
+  void Append(const char* flag, std::string value) {
+    arguments_.emplace_back(flag);
+    arguments_.push_back(std::move(value));
+  }
+  void Flag(const char* flag) { arguments_.emplace_back(flag); }
+  std::vector<std::string> Take() { return std::move(arguments_); }
+
+ private:
+  std::vector<std::string> arguments_;
+};
+
 }  // namespace
+
+std::vector<std::string> RenderOptionArguments(const RenderOptions& options) {
+  const RenderOptions usual;
+  Arguments arguments;
+  // Asking for splats alone would change the method, too.
+  const bool splats = options.primitive == Primitive::kSplat;
+  if (splats || options.method != usual.method)
+    arguments.Append("--method", NameOf(options.method));
+  if (splats) arguments.Append("--primitive", NameOf(options.primitive));
+  if (options.blend != usual.blend) arguments.Append("--blend", NameOf(options.blend));
+  arguments.Add("--views", options.views, usual.views);
+  arguments.Add("--resolution", options.resolution, usual.resolution);
+  arguments.Add("--point-size", options.point_size, usual.point_size);
+  arguments.Add("--exponent", options.exponent, usual.exponent);
+  arguments.Add("--falloff", options.falloff, usual.falloff);
+  arguments.Add("--blend-k", options.blend_k, usual.blend_k);
+  if (options.max_angle_rad != usual.max_angle_rad) {
+    arguments.Append("--max-angle", DegreesOf(options.max_angle_rad));
+  }
+  arguments.Add("--delta", options.delta_px, usual.delta_px);
+  arguments.Add("--depth-break", options.depth_break_px, usual.depth_break_px);
+  arguments.Add("--mesh-tolerance", options.mesh_tolerance_px, usual.mesh_tolerance_px);
+  if (options.absolute_delta) arguments.Add("--absolute-delta", *options.absolute_delta, 0.0);
+  if (options.absolute_depth_break) {
+    arguments.Add("--absolute-depth-break", *options.absolute_depth_break, 0.0);
+  }
+  if (options.blend_in_linear_light) arguments.Flag("--blend-linear");
+  if (options.fill_holes) arguments.Flag("--fill-holes");
+  return arguments.Take();
+}
 
 std::shared_ptr<RenderOptions> AddRenderOptions(CLI::App& command) {
   auto shared = std::make_shared<RenderOptions>();
   RenderOptions& options = *shared;
   AddChoice(command, "--method", options.method, kMethods,
             "Algorithm [deferred; with --primitive splat two-pass]");
-  AddChoice(command, "--primitive", options.primitive, kPrimitives,
+  AddChoice(command, "--primitive", options.primitive, kPrimitiveNames,
             "What two-pass draws; deferred knows meshes only [mesh]");
   command.parse_complete_callback([&command, &options] {
     if (options.primitive == Primitive::kSplat && command.count("--method") == 0) {
@@ -67,8 +137,7 @@ std::shared_ptr<RenderOptions> AddRenderOptions(CLI::App& command) {
       ->type_name("K");
   command
       .add_option_function<double>(
-          "--max-angle",
-          [&options](double degrees) { options.max_angle_rad = degrees * std::numbers::pi / 180; },
+          "--max-angle", [&options](double degrees) { options.max_angle_rad = RadiansOf(degrees); },
           "Views farther than this angle at the scene centre are not valid [60]")
       ->check(CLI::Range(0.0, 180.0))
       ->type_name("DEG");

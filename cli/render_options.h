@@ -2,6 +2,8 @@
 #pragma once
 #include <CLI/CLI.hpp>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "dtr/render/options.h"
 
@@ -10,5 +12,10 @@ namespace dtr::cli {
 /// Declares the rendering options on `command`; the returned value holds them after parsing.
 /// Angles are given in degrees and arrive in radians.
 std::shared_ptr<RenderOptions> AddRenderOptions(CLI::App& command);
+
+/// The other way round: the arguments that give these options, without those that are the default.
+/// Parsing them gives every option bit by bit (angles: those that come of degrees), but for the
+/// number of threads.
+std::vector<std::string> RenderOptionArguments(const RenderOptions& options);
 
 }  // namespace dtr::cli

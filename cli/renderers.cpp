@@ -46,6 +46,11 @@ void AddRendererOptions(CLI::App& command, RendererChoice& choice) {
       ->check(CLI::IsMember(Names()))
       ->type_name(type);
 #ifdef DTR_WITH_GL
+  AddOpenGlOptions(command, choice);
+#endif
+}
+
+void AddOpenGlOptions(CLI::App& command, RendererChoice& choice) {
   command
       .add_option("--shader-dir", choice.shader_folder,
                   "Shaders of this folder instead of the program's own, for work on them")
@@ -56,7 +61,6 @@ void AddRendererOptions(CLI::App& command, RendererChoice& choice) {
       ->check(CLI::PositiveNumber)
       ->check(CLI::Range(0.0, kMostGigabytes))
       ->type_name("GB");
-#endif
 }
 
 eval::RenderFunction MakeRenderer(const RendererChoice& choice,

@@ -25,6 +25,9 @@ struct RendererChoice {
 /// Adds --renderer and, in programs built with OpenGL, --shader-dir and --gpu-memory to a command.
 void AddRendererOptions(CLI::App& command, RendererChoice& choice);
 
+/// Adds --shader-dir and --gpu-memory, for what draws with OpenGL alone.
+void AddOpenGlOptions(CLI::App& command, RendererChoice& choice);
+
 /// The default: "gl" in programs built with OpenGL, else "cpu".
 std::string DefaultRenderer();
 

@@ -2,12 +2,9 @@
 
 #include <chrono>
 #include <filesystem>
-#include <functional>
 #include <memory>
-#include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <set>
 #include <string>
 
 #include "cli/command.h"
@@ -15,6 +12,7 @@
 #include "cli/output_file.h"
 #include "cli/render_options.h"
 #include "cli/renderers.h"
+#include "cli/set_stream.h"
 #include "cli/video.h"
 #include "cli/view_names.h"
 #include "dtr/base/error.h"
@@ -107,31 +105,6 @@ nlohmann::ordered_json FrameJson(const std::string& file, double ms, const Rende
   return {{"file", file}, {"ms", ms}, {"views_used", used}, {"coverage", result.coverage_share}};
 }
 
-/// A view that made room for others is read again, and would be complained of again.
-std::function<void(const std::string&)> SayOnce(Console& console) {
-  struct Said {
-    std::mutex mutex;
-    std::set<std::string> lines;
-  };
-  return [&console, said = std::make_shared<Said>()](const std::string& line) {
-    const std::lock_guard lock(said->mutex);
-    if (said->lines.insert(line).second) console.Note(line);
-  };
-}
-
-ViewStream MakeStream(const Options& options, const RenderScene& described, DtrSet& set,
-                      Console& console) {
-  ViewStream::Settings settings;
-  settings.host_bytes = static_cast<size_t>(options.memory_gb * kBytesPerGigabyte);
-  settings.threads = options.render->threads;
-  settings.warn = [&console](const std::string& line) { console.Note(line); };
-  io::LoadOptions load;
-  load.warn = SayOnce(console);
-  return {set, described,
-          [folder = options.set, load](View& view) { io::LoadPixels(folder, view, load); },
-          std::move(settings)};
-}
-
 int RunRender(const Options& options, const Context& context) {
   const DtrSet described = io::ReadSet(options.set);
   const auto cameras = NovelFrames(described, options.request);
@@ -144,7 +117,8 @@ int RunRender(const Options& options, const Context& context) {
   const eval::RenderFunction render_view = MakeRenderer(options.renderer, context.console);
   DtrSet set = described;
   io::CollapseDuplicates(set);
-  ViewStream stream = MakeStream(options, DescribeRenderScene(set, excluded), set, context.console);
+  const auto stream = StreamOf(options.set, set, DescribeRenderScene(set, excluded),
+                               {options.memory_gb, render.threads}, context.console);
 
   FrameSink sink(options.output, several);
   nlohmann::ordered_json json{{"frames", nlohmann::ordered_json::array()}};
@@ -152,8 +126,8 @@ int RunRender(const Options& options, const Context& context) {
   for (size_t i = 0; i < cameras.size(); ++i) {
     context.console.ThrowIfInterrupted();
     const RenderScene scene =
-        stream.SceneFor(cameras[i].cam_from_world, render, ViewStream::Wait::kForAll);
-    if (i + 1 < cameras.size()) stream.Prefetch(cameras[i + 1].cam_from_world, render);
+        stream->SceneFor(cameras[i].cam_from_world, render, ViewStream::Wait::kForAll);
+    if (i + 1 < cameras.size()) stream->Prefetch(cameras[i + 1].cam_from_world, render);
     const auto start = std::chrono::steady_clock::now();
     const RenderResult result =
         render_view(scene, cameras[i].camera, cameras[i].cam_from_world, render);
@@ -173,7 +147,7 @@ int RunRender(const Options& options, const Context& context) {
   context.console.Say(
       fmt::format("{}: {} frame{}", options.output.string(), cameras.size(), several ? "s" : ""));
   json["skipped"] = nlohmann::ordered_json::array();
-  for (const auto& [name, reason] : stream.lost()) {
+  for (const auto& [name, reason] : stream->lost()) {
     json["skipped"].push_back({{"name", name}, {"reason", reason}});
   }
   context.EmitJson(json.dump(1));
@@ -210,12 +184,7 @@ void AddRenderCommand(CLI::App& app) {
         command.add_option("--exclude", options->exclude, "Views not to render from")
             ->type_name("NAME,...");
         AddRendererOptions(command, options->renderer);
-        command
-            .add_option("--memory", options->memory_gb,
-                        "Memory for the views' pixels; others are dropped and read again [4]")
-            ->check(CLI::PositiveNumber)
-            ->check(CLI::Range(0.0, kMostGigabytes))
-            ->type_name("GB");
+        AddMemoryOption(command, options->memory_gb);
         command.add_option("--depth-out", options->depth_out, "Write the depth as float EXR")
             ->type_name("FILE");
         command.add_option("--coverage-out", options->coverage_out, "Write what was seen as PNG")

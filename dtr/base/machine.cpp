@@ -1,5 +1,6 @@
 #include "dtr/base/machine.h"
 
+#include <sys/resource.h>
 #include <time.h>
 
 #include <fstream>
@@ -21,6 +22,12 @@ double ProcessCpuMilliseconds() {
   timespec t{};
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
   return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
+}
+
+size_t PeakMemoryBytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<size_t>(usage.ru_maxrss) << 10;
 }
 
 }  // namespace dtr

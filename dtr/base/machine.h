@@ -1,5 +1,6 @@
 // dtr/base/machine.h -- what a measurement ran on, and how much of it it used.
 #pragma once
+#include <cstddef>
 #include <string>
 
 namespace dtr {
@@ -10,5 +11,8 @@ std::string CpuModel();
 /// Processor time of this process so far, all threads, in milliseconds. Unlike a clock on the wall
 /// it does not count what other programs used.
 double ProcessCpuMilliseconds();
+
+/// The most physical memory this process had so far.
+size_t PeakMemoryBytes();
 
 }  // namespace dtr

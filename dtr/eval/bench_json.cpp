@@ -3,6 +3,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "dtr/render/option_names.h"
+
 namespace dtr::eval {
 namespace {
 
@@ -43,26 +45,6 @@ Json Value(const BenchRow& row, int views_in_set) {
 }
 
 }  // namespace
-
-const char* NameOf(RenderMethod method) {
-  return method == RenderMethod::kTwoPass ? "two-pass" : "deferred";
-}
-
-const char* NameOf(BlendWeight blend) {
-  switch (blend) {
-    case BlendWeight::kCosine:
-      return "cosine";
-    case BlendWeight::kExponential:
-      return "exponential";
-    case BlendWeight::kAngle:
-      return "angle";
-    case BlendWeight::kInverseAngle:
-      return "inverse-angle";
-    case BlendWeight::kKNearest:
-      return "k-nearest";
-  }
-  return "";
-}
 
 std::string ToJson(const std::string& table, const BenchReport& report,
                    const BenchMachine& machine) {

@@ -36,9 +36,4 @@ std::string ToJson(const std::string& table, const BenchReport& report,
 std::string ToJson(const std::vector<GrowthSeries>& series, RenderMethod method,
                    const BenchMachine& machine);
 
-/// "two-pass" or "deferred", as --method takes them.
-const char* NameOf(RenderMethod method);
-/// As --blend takes them.
-const char* NameOf(BlendWeight blend);
-
 }  // namespace dtr::eval

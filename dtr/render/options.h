@@ -48,6 +48,7 @@ struct RenderOptions {
   bool blend_in_linear_light = false;  ///< else in sRGB values
   bool fill_holes = false;             ///< SPEC 7, a separate step; never counted as seen
   int threads = 0;                     ///< 0: all cores; the result does not depend on it
+  bool operator==(const RenderOptions&) const = default;
 };
 
 /// Throws dtr::UsageError naming the option when a value has no meaning.

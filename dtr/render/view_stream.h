@@ -64,6 +64,8 @@ class ViewStream {
   const std::vector<Lost>& lost() const { return lost_; }
   /// Pixels in memory or being read.
   size_t bytes() const { return bytes_; }
+  /// Views that are being read, as of the last call of SceneFor or Prefetch.
+  int reading() const { return reading_; }
 
  private:
   enum class State { kAbsent, kReading, kPresent, kLost };

@@ -1,0 +1,218 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "cli/command.h"
+#include "cli/novel_frames.h"
+#include "cli/output_file.h"
+#include "cli/render_options.h"
+#include "cli/renderers.h"
+#include "cli/set_stream.h"
+#include "cli/shell_words.h"
+#include "cli/view_names.h"
+#include "dtr/base/error.h"
+#include "dtr/base/files.h"
+#include "dtr/base/machine.h"
+#include "dtr/io/set_io.h"
+#include "viewer/glfw/app.h"
+
+namespace dtr::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+struct Options {
+  fs::path set, output = ".", screenshot, state_file;
+  NovelCameraRequest request;
+  std::string size = "1280x800", exclude;
+  RendererChoice renderer;
+  double memory_gb = 4;
+  int frames = 0;
+  bool no_panel = false;
+  std::shared_ptr<RenderOptions> render;
+};
+
+/// A set that the window shows; the console outlives it.
+std::unique_ptr<viewer::OpenedSet> Open(const Options& options, const Context& context,
+                                        const std::vector<std::string>& excluded) {
+  auto opened = std::make_unique<viewer::OpenedSet>();
+  opened->set = io::ReadSet(options.set);
+  io::CollapseDuplicates(opened->set);
+  opened->stream = StreamOf(options.set, opened->set, DescribeRenderScene(opened->set, excluded),
+                            {options.memory_gb, context.common.threads}, context.console);
+  return opened;
+}
+
+std::string CommandLine(const Options& options, const fs::path& camera_file,
+                        const RenderOptions& render) {
+  std::vector<std::string> words{"dtr",
+                                 "render",
+                                 fs::absolute(options.set).string(),
+                                 "--camera",
+                                 fs::absolute(camera_file).string(),
+                                 "-o",
+                                 fs::absolute(camera_file).replace_extension(".png").string()};
+  if (!options.exclude.empty()) words.insert(words.end(), {"--exclude", options.exclude});
+  const auto further = RenderOptionArguments(render);
+  words.insert(words.end(), further.begin(), further.end());
+  return ShellLine(words);
+}
+
+Json StateJson(const viewer::AppState& state) {
+  const PinholeCamera& lens = state.camera.camera;
+  const Eigen::Quaterniond& q = state.camera.cam_from_world.rotation;
+  const Eigen::Vector3d center = state.camera.cam_from_world.TargetOriginInSource();
+  return {{"still", state.still},
+          {"at_view", state.at_view},
+          {"shown", state.shown},
+          {"divisor", state.divisor},
+          {"width_px", lens.width_px()},
+          {"height_px", lens.height_px()},
+          {"fx_px", lens.fx_px()},
+          {"fy_px", lens.fy_px()},
+          {"cam_from_world_wxyz", {q.w(), q.x(), q.y(), q.z()}},
+          {"center_in_world", {center.x(), center.y(), center.z()}},
+          {"views_used", state.views_used},
+          {"coverage", state.coverage},
+          {"fly_speed", state.fly_speed},
+          {"help", state.help},
+          {"panel", state.panel},
+          {"message", state.message},
+          {"render_options", RenderOptionArguments(state.render)}};
+}
+
+Json ReportJson(const viewer::AppReport& report) {
+  const int moving = report.moving_frames;
+  const auto per_frame = [moving](double ms) { return moving > 0 ? Json(ms / moving) : Json(); };
+  return {{"frames", report.last.frames},
+          {"first_picture_ms", report.first_picture_ms},
+          {"moving",
+           {{"frames", moving},
+            {"ms", per_frame(report.moving_ms)},
+            {"cpu_ms", per_frame(report.moving_cpu_ms)},
+            {"fps", moving > 0 ? Json(1e3 * moving / report.moving_ms) : Json()},
+            {"largest_divisor", report.largest_divisor}}},
+          {"view_bytes", report.view_bytes},
+          {"peak_rss_bytes", PeakMemoryBytes()},
+          {"last", StateJson(report.last)}};
+}
+
+viewer::Host MakeHost(const Options& options, const Context& context,
+                      const std::vector<std::string>& excluded) {
+  viewer::Host host;
+  host.open = [&, excluded](const auto&) { return Open(options, context, excluded); };
+  host.command_line = [&](const fs::path& camera_file, const RenderOptions& render) {
+    return CommandLine(options, camera_file, render);
+  };
+  host.say = [&](const std::string& line) { context.console.Note(line); };
+  if (!options.state_file.empty()) {
+    host.state_changed = [&, last = std::string()](const viewer::AppState& state) mutable {
+      const std::string text = StateJson(state).dump(1, ' ', false, Json::error_handler_t::replace);
+      if (text == last) return;
+      WriteFileAtomically(options.state_file, text + "\n");
+      last = text;
+    };
+  }
+  return host;
+}
+
+viewer::AppSettings SettingsOf(const Options& options, const Context& context, const DtrSet& set) {
+  viewer::AppSettings settings;
+  const PinholeCamera size = WithSize({1280, 800, 1, 1, 0, 0}, options.size);
+  settings.title = WithoutTrailingSlash(options.set).filename().string() + " - dtr view";
+  settings.width_px = size.width_px();
+  settings.height_px = size.height_px();
+  settings.render = *options.render;
+  settings.render.threads = context.common.threads;
+  settings.gpu_bytes = static_cast<size_t>(options.renderer.gpu_memory_gb * kBytesPerGigabyte);
+  settings.shader_folder = options.renderer.shader_folder.string();
+  settings.output = options.output;
+  settings.output_stem = WithoutTrailingSlash(options.set).stem().string();
+  settings.panel = !options.no_panel;
+  settings.frames = options.frames;
+  settings.screenshot = options.screenshot;
+  const NovelCameraRequest& request = options.request;
+  if (request.like.empty() && request.camera_file.empty() && request.path_file.empty() &&
+      request.fly_through_frames == 0) {
+    return settings;
+  }
+  const std::vector<NovelFrame> frames = NovelFrames(set, request);
+  settings.start = NovelCamera{frames.front().camera, frames.front().cam_from_world};
+  if (frames.size() > 1) {
+    for (const NovelFrame& frame : frames) {
+      settings.play.push_back({frame.camera, frame.cam_from_world});
+    }
+  }
+  return settings;
+}
+
+int RunView(const Options& options, const Context& context) {
+  if (!options.screenshot.empty()) {
+    RequireOutputFile(options.screenshot, "--screenshot", {".png", ".jpg", ".jpeg"});
+    if (options.frames == 0) throw UsageError("--screenshot: expected --frames N with it");
+  }
+  if (!fs::is_directory(options.output)) {
+    throw UsageError("-o " + options.output.string() + ": expected a folder to save into, found none");
+  }
+  const DtrSet set = io::ReadSet(options.set);
+  const auto excluded = ResolveViewNames(set, options.exclude);
+  const viewer::AppReport report =
+      viewer::RunViewer(SettingsOf(options, context, set), MakeHost(options, context, excluded));
+  context.EmitJson(ReportJson(report).dump(1, ' ', false, Json::error_handler_t::replace));
+  return kDone;
+}
+
+}  // namespace
+
+void AddViewCommand(CLI::App& app) {
+  AddCommand(
+      app, "view", "Look at a set in a window; ? lists the keys", "dtr view scene.dtr",
+      [](CLI::App& command) -> Action {
+        auto options = std::make_shared<Options>();
+        command.add_option("SET", options->set, "The set")->required();
+        command
+            .add_option("-o,--output", options->output,
+                        "Folder for pictures, cameras and paths that are saved [.]")
+            ->type_name("DIR");
+        auto* where = command.add_option_group("where", "Where to start (at most one)");
+        where->add_option("--like", options->request.like, "At a view's place")->type_name("VIEW");
+        where->add_option("--camera", options->request.camera_file, "At a cameras.json's camera")
+            ->type_name("FILE");
+        where->add_option("--path", options->request.path_file, "Fly along a cameras.json first")
+            ->type_name("FILE");
+        where
+            ->add_option("--fly-through", options->request.fly_through_frames,
+                         "Fly along the set's own cameras first, N frames")
+            ->check(CLI::Range(2, 100000))
+            ->type_name("N");
+        where->require_option(0, 1);
+        command.add_option("--size", options->size, "Size of the window [1280x800]")
+            ->type_name("WxH");
+        command.add_option("--exclude", options->exclude, "Views not to render from")
+            ->type_name("NAME,...");
+        command
+            .add_option("--frames", options->frames,
+                        "Close after N frames, once the picture is whole; for scripts")
+            ->check(CLI::Range(1, 100'000'000))
+            ->type_name("N");
+        command
+            .add_option("--screenshot", options->screenshot,
+                        "Save the window before it closes by --frames")
+            ->type_name("FILE");
+        command.add_flag("--no-panel", options->no_panel, "Begin without the panel");
+        command
+            .add_option("--state-file", options->state_file,
+                        "Keep FILE telling, as JSON, what the window shows; for scripts")
+            ->type_name("FILE");
+        AddOpenGlOptions(command, options->renderer);
+        AddMemoryOption(command, options->memory_gb);
+        options->render = AddRenderOptions(command);
+        return [options](const Context& context) { return RunView(*options, context); };
+      });
+}
+
+}  // namespace dtr::cli

@@ -1,0 +1,28 @@
+// cli/set_stream.h -- the views of a set on disk, read when a picture needs them.
+#pragma once
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <memory>
+
+#include "dtr/base/progress.h"
+#include "dtr/render/view_stream.h"
+
+namespace dtr::cli {
+
+/// What --memory and --threads say.
+struct StreamLimits {
+  double memory_gb = 4;
+  int threads = 0;
+};
+
+/// Adds --memory, for the views' pixels.
+void AddMemoryOption(CLI::App& command, double& memory_gb);
+
+/// A stream of the pixels in `folder`. `set` is what ReadSet gave, its duplicates collapsed;
+/// `described` is of it. `console` is told, once each, of what is left out; it and `set` must
+/// outlive the stream.
+std::unique_ptr<ViewStream> StreamOf(const std::filesystem::path& folder, DtrSet& set,
+                                     const RenderScene& described, const StreamLimits& limits,
+                                     Progress& console);
+
+}  // namespace dtr::cli

@@ -1,0 +1,79 @@
+#include "cli/render_options.h"
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "cli/shell_words.h"
+#include "dtr/base/process.h"
+#include "dtr/base/random.h"
+#include "dtr/render/option_names.h"
+
+namespace dtr::cli {
+namespace {
+
+RenderOptions Parsed(const std::vector<std::string>& arguments) {
+  CLI::App app;
+  const auto options = AddRenderOptions(app);
+  std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());  // CLI11's order
+  app.parse(reversed);
+  return *options;
+}
+
+double OneOf(Random& random, double by_default) {
+  return random.Index(2) == 0 ? by_default : random.Uniform(0.01, 50);
+}
+
+RenderOptions RandomOptions(Random& random) {
+  RenderOptions options;
+  options.method = kRenderMethods[static_cast<size_t>(random.Index(2))];
+  options.primitive = kPrimitives[static_cast<size_t>(random.Index(2))];
+  options.blend = kBlendWeights[static_cast<size_t>(random.Index(5))];
+  options.views = 1 + random.Index(64);
+  options.resolution = 1 + random.Index(8);
+  options.blend_k = 1 + random.Index(8);
+  options.point_size = OneOf(random, 1);
+  options.exponent = OneOf(random, 8);
+  options.falloff = OneOf(random, 8);
+  options.delta_px = OneOf(random, 1);
+  options.depth_break_px = OneOf(random, 1);
+  options.mesh_tolerance_px = OneOf(random, 0.5);
+  const double degrees = random.Index(2) == 0 ? 1 + random.Index(180) : random.Uniform(1, 180);
+  options.max_angle_rad = degrees * std::numbers::pi / 180;
+  if (random.Index(2) == 0) options.absolute_delta = random.Uniform(1e-6, 1e3);
+  if (random.Index(2) == 0) options.absolute_depth_break = 3.5;
+  options.blend_in_linear_light = random.Index(2) == 0;
+  options.fill_holes = random.Index(2) == 0;
+  return options;
+}
+
+TEST(RenderOptionArguments, SayNothingOfDefaults) {
+  EXPECT_TRUE(RenderOptionArguments({}).empty());
+  RenderOptions options;
+  options.max_angle_rad = 50 * std::numbers::pi / 180;
+  EXPECT_EQ(RenderOptionArguments(options), (std::vector<std::string>{"--max-angle", "50"}));
+}
+
+TEST(RenderOptionArguments, GiveTheSameOptionsBitByBit) {
+  Random random(11);
+  for (int draw = 0; draw < 500; ++draw) {
+    const RenderOptions options = RandomOptions(random);
+    const auto arguments = RenderOptionArguments(options);
+    EXPECT_EQ(Parsed(arguments), options) << ShellLine(arguments);
+  }
+}
+
+TEST(ShellLine, GivesAShellTheSameWords) {
+  const std::vector<std::string> words{"printf",    "[%s]\\n", "plain",     "",
+                                       "two words", "it's",    "$HOME;`x`", "\"*\" ?"};
+  std::vector<std::string> lines;
+  ProcessOptions options;
+  options.on_line = [&](const std::string& line) { lines.push_back(line); };
+  ASSERT_TRUE(RunProcess({"sh", "-c", ShellLine(words)}, options).Ok());
+  std::vector<std::string> expected;
+  for (size_t i = 2; i < words.size(); ++i) expected.push_back("[" + words[i] + "]");
+  EXPECT_EQ(lines, expected);
+}
+
+}  // namespace
+}  // namespace dtr::cli

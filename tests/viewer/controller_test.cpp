@@ -1,0 +1,228 @@
+#include "viewer/controller.h"
+
+#include <gtest/gtest.h>
+
+#include "dtr/base/random.h"
+
+namespace dtr::viewer {
+namespace {
+
+constexpr double kSame = 1e-9;
+constexpr int kWidthPx = 640, kHeightPx = 400;
+const Eigen::Vector3d kUp(0, -1, 0);
+
+/// Four cameras in a row, 10 before the middle of a scene, and a held-out one.
+DtrSet FourCameras() {
+  DtrSet set;
+  set.bounds = {{-4, -4, -4}, {4, 4, 4}};
+  set.frames.resize(1);
+  for (int i = 0; i < 5; ++i) {
+    View view;
+    view.id = std::string(1, static_cast<char>('d' - i));  // d, c, b, a and `
+    view.name = view.id + ".jpg";
+    view.camera = {320, 200, 250, 250, 160, 100};
+    const Eigen::Vector3d center(i, 0, -10);
+    view.cam_from_world = LookAlong(center, -center, kUp);
+    if (i == 4) view.role = ViewRole::kHeldOut;
+    set.frames[0].views.push_back(view);
+  }
+  return set;
+}
+
+class ControllerTest : public ::testing::Test {
+ protected:
+  Controller Make() {
+    return {SurroundingsOf(set_), kWidthPx, kHeightPx,
+            [this](const Eigen::Vector2d&) { return depth_; }};
+  }
+  static void Wait(Controller& controller, double seconds) {
+    for (double t = 0; t < seconds; t += 0.05) controller.Advance(0.05);
+  }
+  static Eigen::Vector3d Center(const Controller& controller) {
+    return controller.camera().cam_from_world.TargetOriginInSource();
+  }
+  DtrSet set_ = FourCameras();
+  std::optional<double> depth_ = 10;
+};
+
+TEST_F(ControllerTest, BeginsAtTheFirstInputCameraAndStepsThroughThemInOrder) {
+  Controller controller = Make();
+  EXPECT_EQ(controller.surroundings().views.size(), 4u);  // not the held-out one
+  std::string visited;
+  for (int i = 0; i < 5; ++i) {
+    ASSERT_TRUE(controller.at_view());
+    visited += controller.surroundings().views[*controller.at_view()]->id;
+    controller.StepViews(1);
+    EXPECT_TRUE(controller.moving());
+    Wait(controller, 1);
+    EXPECT_FALSE(controller.moving());
+  }
+  EXPECT_EQ(visited, "abcda");
+  controller.StepViews(-2);
+  Wait(controller, 1);
+  EXPECT_EQ(controller.at_view(), 3u);
+  // Steps asked for while on the way add up.
+  controller.StepViews(1);
+  controller.Advance(0.05);
+  controller.StepViews(1);
+  Wait(controller, 1);
+  EXPECT_EQ(controller.at_view(), 1u);
+  EXPECT_EQ(controller.camera().camera, FitLens(set_.frames[0].views[0].camera, 640, 400));
+}
+
+TEST_F(ControllerTest, AfterADragStepsGoOnFromTheNearestView) {
+  Controller controller = Make();
+  controller.JumpTo({controller.camera().camera,
+                     LookAlong({0.2, 0, -10}, {0, 0, 1}, kUp)});  // beside "d", the last
+  EXPECT_FALSE(controller.at_view());
+  controller.StepViews(1);
+  Wait(controller, 1);
+  EXPECT_EQ(controller.at_view(), 0u);
+}
+
+TEST_F(ControllerTest, LeftDragOrbitsAboutThePointUnderTheCursor) {
+  Controller controller = Make();
+  const Eigen::Vector2d start(200, 150);
+  const Eigen::Vector3d pivot = WorldPoint(controller.camera(), start, *depth_);
+  controller.Handle(ButtonEvent{Button::kLeft, true, start.x(), start.y()});
+  for (int x = 201; x <= 300; x += 9) controller.Handle(MoveEvent{static_cast<double>(x), 180});
+  controller.Handle(ButtonEvent{Button::kLeft, false, 300, 180});
+  const auto pixel =
+      controller.camera().camera.PixelFromCam(controller.camera().cam_from_world * pivot);
+  ASSERT_TRUE(pixel);
+  EXPECT_LT((*pixel - start).norm(), 1e-6);
+  EXPECT_FALSE(controller.at_view());
+  const Pose after = controller.camera().cam_from_world;
+  controller.Handle(MoveEvent{50, 50});  // let go: nothing more
+  EXPECT_EQ(after.translation, controller.camera().cam_from_world.translation);
+}
+
+TEST_F(ControllerTest, RightDragLooksMiddleDragMovesAcross) {
+  Controller controller = Make();
+  const Eigen::Vector3d center = Center(controller);
+  controller.Handle(ButtonEvent{Button::kRight, true, 200, 150});
+  controller.Handle(MoveEvent{260, 150});
+  controller.Handle(ButtonEvent{Button::kRight, false, 260, 150});
+  EXPECT_LT((Center(controller) - center).norm(), kSame);
+  EXPECT_FALSE(controller.at_view());
+  const Eigen::Vector3d point = WorldPoint(controller.camera(), {200, 150}, *depth_);
+  controller.Handle(ButtonEvent{Button::kMiddle, true, 200, 150});
+  controller.Handle(MoveEvent{230, 170});
+  controller.Handle(MoveEvent{260, 100});
+  const auto pixel =
+      controller.camera().camera.PixelFromCam(controller.camera().cam_from_world * point);
+  EXPECT_LT((*pixel - Eigen::Vector2d(260, 100)).norm(), 1e-6);
+}
+
+TEST_F(ControllerTest, TheWheelApproachesOrChangesTheSpeedOfFlight) {
+  Controller controller = Make();
+  const double speed = controller.fly_speed();
+  const Eigen::Vector3d point = WorldPoint(controller.camera(), {100, 90}, *depth_);
+  const double distance = (Center(controller) - point).norm();
+  controller.Handle(ScrollEvent{2, 100, 90});
+  EXPECT_LT((Center(controller) - point).norm(), 0.8 * distance);
+  EXPECT_EQ(controller.fly_speed(), speed);
+  const Eigen::Vector3d here = Center(controller);
+  controller.Handle(FlyEvent{FlyKey::kForward, true});
+  controller.Handle(ScrollEvent{2, 100, 90});
+  EXPECT_GT(controller.fly_speed(), 1.5 * speed);
+  EXPECT_EQ(Center(controller), here);
+  for (int i = 0; i < 1000; ++i) controller.Handle(ScrollEvent{-10, 0, 0});
+  EXPECT_GT(controller.fly_speed(), 0);
+}
+
+TEST_F(ControllerTest, FlyKeysMoveAlongTheCamerasAxesAsLongAsTheyAreHeld) {
+  for (const auto& [key, direction] : {std::pair(FlyKey::kForward, Eigen::Vector3d(0, 0, 1)),
+                                       {FlyKey::kLeft, {-1, 0, 0}},
+                                       {FlyKey::kUp, {0, -1, 0}}}) {
+    Controller controller = Make();
+    const Pose before = controller.camera().cam_from_world;
+    controller.Handle(FlyEvent{key, true});
+    EXPECT_TRUE(controller.moving());
+    for (int i = 0; i < 10; ++i) controller.Advance(0.05);
+    controller.Handle(FlyEvent{key, false});
+    EXPECT_FALSE(controller.moving());
+    const Eigen::Vector3d way = before * Center(controller);
+    EXPECT_LT((way - 0.5 * controller.fly_speed() * direction).norm(), kSame * 100);
+  }
+}
+
+TEST_F(ControllerTest, AKeyTappedBetweenTwoFramesStillMoves) {
+  Controller controller = Make();
+  const Eigen::Vector3d before = Center(controller);
+  controller.Handle(FlyEvent{FlyKey::kForward, true});
+  controller.Handle(FlyEvent{FlyKey::kForward, false});
+  EXPECT_TRUE(controller.moving());
+  controller.Advance(0.001);
+  EXPECT_GT((Center(controller) - before).norm(), 0);
+  EXPECT_FALSE(controller.moving());
+}
+
+TEST_F(ControllerTest, AWindowThatLosesItsInputLetsGoOfEverything) {
+  Controller controller = Make();
+  controller.Handle(FlyEvent{FlyKey::kForward, true});
+  controller.Handle(ButtonEvent{Button::kLeft, true, 5, 5});
+  controller.Advance(0.05);
+  controller.Handle(FocusLostEvent{});
+  EXPECT_FALSE(controller.moving());
+  EXPECT_FALSE(controller.dragging());
+}
+
+TEST_F(ControllerTest, WhereNothingIsSeenTheScenesMiddleSaysHowFar) {
+  depth_.reset();
+  Controller controller = Make();
+  const double before = Center(controller).norm();
+  controller.Handle(ScrollEvent{1, 320, 200});
+  EXPECT_LT(Center(controller).norm(), before);
+  EXPECT_GT(Center(controller).norm(), 0.5 * before);
+}
+
+TEST_F(ControllerTest, ShowAllSeesTheWholeScene) {
+  Controller controller = Make();
+  controller.ShowAll();
+  Wait(controller, 1);
+  for (const double x : {-4, 4}) {
+    const auto pixel = controller.camera().camera.PixelFromCam(controller.camera().cam_from_world *
+                                                               Eigen::Vector3d(x, x, 4));
+    ASSERT_TRUE(pixel);
+    EXPECT_GE(pixel->x(), -1e-6);
+    EXPECT_LE(pixel->y(), kHeightPx + 1e-6);
+  }
+}
+
+TEST_F(ControllerTest, AnyInputLeavesAFinitePose) {
+  Random random(7);
+  Controller controller = Make();
+  for (int i = 0; i < 20000; ++i) {
+    const double x = random.Uniform(-100, 800), y = random.Uniform(-100, 600);
+    depth_ = random.Index(3) == 0 ? std::nullopt : std::optional(random.Uniform(1e-3, 1e3));
+    switch (random.Index(7)) {
+      case 0:
+        controller.Handle(
+            ButtonEvent{static_cast<Button>(random.Index(3)), random.Index(2) == 0, x, y});
+        break;
+      case 1:
+      case 2:
+        controller.Handle(MoveEvent{x, y});
+        break;
+      case 3:
+        controller.Handle(ScrollEvent{random.Uniform(-3, 3), x, y});
+        break;
+      case 4:
+        controller.Handle(
+            FlyEvent{static_cast<FlyKey>(random.Index(kFlyKeys)), random.Index(2) == 0});
+        break;
+      case 5:
+        controller.StepViews(random.Index(7) - 3);
+        break;
+      default:
+        controller.Advance(random.Uniform(0, 0.2));
+    }
+    const Pose& pose = controller.camera().cam_from_world;
+    ASSERT_TRUE(pose.translation.allFinite()) << i;
+    ASSERT_NEAR(pose.rotation.norm(), 1, 1e-6) << i;
+  }
+}
+
+}  // namespace
+}  // namespace dtr::viewer

@@ -1,0 +1,188 @@
+// `dtr view` in a real window: keys, drags and the wheel by xdotool.
+#include "dtr/io/image_io.h"
+#include "tests/cli/small_courtyard.h"
+#include "tests/support/environment.h"
+#include "tests/support/virtual_display.h"
+#include "tests/viewer/viewer_program.h"
+
+namespace dtr::testing {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+using ::testing::HasSubstr;
+
+constexpr int kFailed = 1, kWrongUsage = 2;
+
+class ViewerWindow : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    shared_ = new TemporaryFolder;
+    MakeSmallCourtyard(*shared_ / "courtyard");
+    ImportSmallCourtyard(*shared_ / "courtyard", Set());
+  }
+  static void TearDownTestSuite() { delete shared_; }
+  static std::string Set() { return (*shared_ / "good.dtr").string(); }
+  void NeedDisplay() {
+    if (!display_.up()) GTEST_SKIP() << "no display: Xvfb is missing or did not come up";
+    if (FindProgram("xdotool").empty()) GTEST_SKIP() << "xdotool is missing";
+  }
+  fs::path In(const std::string& name) const { return folder_ / name; }
+
+  static double Moved(const Json& a, const Json& b) {
+    double sum = 0;
+    for (size_t i = 0; i < 3; ++i) {
+      const double d =
+          a["center_in_world"][i].get<double>() - b["center_in_world"][i].get<double>();
+      sum += d * d;
+    }
+    return std::sqrt(sum);
+  }
+  static std::function<bool(const Json&)> MovedFrom(const Json& before) {
+    return [before](const Json& now) { return Moved(before, now) > 1e-3; };
+  }
+  static bool Anything(const Json&) { return true; }
+
+  static TemporaryFolder* shared_;
+  TemporaryFolder folder_;
+  VirtualDisplay display_;
+};
+TemporaryFolder* ViewerWindow::shared_ = nullptr;
+
+TEST_F(ViewerWindow, KeysDragsAndTheWheelMoveTheCamera) {
+  NeedDisplay();
+  if (IsSkipped()) return;
+  ViewerProgram viewer(Set(), folder_.path(), {"--size", "600x400", "--no-panel"});
+  const Json start = viewer.WaitFor("the first picture", Anything);
+  EXPECT_EQ(start["at_view"], "0001.jpg");  // 0000 is held out
+  EXPECT_EQ(start["width_px"], 600);
+  EXPECT_GT(start["coverage"], 0.5);
+  EXPECT_EQ(start["divisor"], 1);
+
+  ViewerProgram::Do({"mousemove", "300", "220", "key", "Right"});
+  const Json next = viewer.WaitFor("the next input camera",
+                                   [](const Json& s) { return s["at_view"] == "0002.jpg"; });
+  EXPECT_GT(Moved(start, next), 0.01);
+  ViewerProgram::Do({"key", "Left"});
+  viewer.WaitFor("the input camera before",
+                 [](const Json& s) { return s["at_view"] == "0001.jpg"; });
+
+  ViewerProgram::Do(
+      {"mousedown", "1", "mousemove", "340", "230", "mousemove", "380", "240", "mouseup", "1"});
+  const Json orbited = viewer.WaitFor("an orbit", MovedFrom(start));
+  EXPECT_EQ(orbited["at_view"], "");
+
+  ViewerProgram::Do({"mousemove", "300", "220", "click", "4"});
+  const Json nearer = viewer.WaitFor("the wheel", MovedFrom(orbited));
+  ViewerProgram::Do({"key", "w"});
+  const Json flown = viewer.WaitFor("a flight", MovedFrom(nearer));
+  ViewerProgram::Do({"key", "v"});
+  const Json all = viewer.WaitFor("all in view", MovedFrom(flown));
+  ViewerProgram::Do({"key", "c"});
+  const Json back =
+      viewer.WaitFor("the nearest input camera", [](const Json& s) { return s["at_view"] != ""; });
+  EXPECT_GT(Moved(all, back), 0.01);
+
+  ViewerProgram::Do({"key", "question"});
+  viewer.WaitFor("help", [](const Json& s) { return s["help"].get<bool>(); });
+  ViewerProgram::Do({"key", "F1"});
+  viewer.WaitFor("no help", [](const Json& s) { return !s["help"].get<bool>(); });
+  ViewerProgram::Do({"key", "ctrl+q"});
+  EXPECT_EQ(viewer.WaitForEnd(), 0);
+}
+
+TEST_F(ViewerWindow, TheCommandLineDrawsThePictureInTheWindow) {
+  NeedDisplay();
+  if (IsSkipped()) return;
+  for (const auto& options : std::vector<std::vector<std::string>>{
+           {}, {"--views", "3", "--fill-holes", "--blend", "cosine", "--max-angle", "50"}}) {
+    std::vector<std::string> args{"--size", "320x240", "--no-panel"};
+    args.insert(args.end(), options.begin(), options.end());
+    const TemporaryFolder folder;
+    ViewerProgram viewer(Set(), folder.path(), args);
+    const Json start = viewer.WaitFor("the first picture", Anything);
+    ViewerProgram::Do(
+        {"mousemove", "150", "120", "mousedown", "1", "mousemove", "170", "124", "mouseup", "1"});
+    viewer.WaitFor("an orbit", MovedFrom(start));
+    ViewerProgram::Do({"key", "p"});
+    const fs::path picture = folder / "good-picture-001.png";
+    viewer.WaitFor("a saved picture", [&](const Json&) { return fs::exists(picture); });
+    ViewerProgram::Do({"key", "l"});
+    const Json state = viewer.WaitFor("a command line", [](const Json& s) {
+      return s["message"].get<std::string>().starts_with("dtr render ");
+    });
+    const std::string command = state["message"].get<std::string>();
+    for (const std::string& option : options) EXPECT_THAT(command, HasSubstr(option));
+    const std::string run = std::string(DTR_PROGRAM) + command.substr(3);
+    ASSERT_TRUE(RunProcess({"sh", "-c", run}, {}).Ok()) << run;
+    EXPECT_EQ(io::ReadImage(folder / "good-camera-001.png").data(), io::ReadImage(picture).data())
+        << command;
+    EXPECT_EQ(Text(folder / "good-camera-001.png"), Text(picture)) << "alpha";
+  }
+}
+
+TEST_F(ViewerWindow, ThePanelTakesItsClicksAndTheWindowIsSaved) {
+  NeedDisplay();
+  if (IsSkipped()) return;
+  ViewerProgram viewer(Set(), folder_.path(), {"--size", "900x700"});
+  const Json start = viewer.WaitFor("the first picture", Anything);
+  EXPECT_TRUE(start["panel"].get<bool>());
+  ViewerProgram::Do({"mousemove", "100", "690", "mousedown", "1", "mousemove", "200", "690",
+                     "mouseup", "1", "click", "4"});
+  ViewerProgram::Do({"mousemove", "700", "400", "key", "Down"});
+  const Json depth = viewer.WaitFor("depth", [](const Json& s) { return s["shown"] == "depth"; });
+  EXPECT_EQ(Moved(start, depth), 0) << "a drag on the panel moved the camera";
+  ViewerProgram::Do({"key", "F12"});
+  const fs::path first = In("good-window-001.png"), second = In("good-window-002.png");
+  viewer.WaitFor("a saved window", [&](const Json&) { return fs::exists(first); });
+  ViewerProgram::Do({"key", "Tab"});
+  viewer.WaitFor("no panel", [](const Json& s) { return !s["panel"].get<bool>(); });
+  ViewerProgram::Do({"key", "F12"});
+  viewer.WaitFor("another", [&](const Json&) { return fs::exists(second); });
+  const ImageRgb8 with = io::ReadImage(first), without = io::ReadImage(second);
+  ASSERT_EQ(with.width(), 900);
+  int left = 0, right = 0;  // of the panel's right border, away from the line at the foot
+  for (int y = 0; y < 600; ++y) {
+    for (int x = 0; x < 900; ++x) (x < 340 ? left : right) += with(x, y) != without(x, y);
+  }
+  EXPECT_GT(left, 50000);
+  EXPECT_EQ(right, 0);
+}
+
+TEST_F(ViewerWindow, AFlightIsTimedAndItsEndIsSaved) {
+  NeedDisplay();
+  if (IsSkipped()) return;
+  const Ran ran =
+      DtrOk({"view", Set(), "--size", "320x240", "--fly-through", "12", "--frames", "20", "-o",
+             folder_.path().string(), "--screenshot", In("end.png").string(), "--json", "-"});
+  const Json json = Json::parse(ran.out);
+  EXPECT_GE(json["frames"], 20);
+  EXPECT_GE(json["moving"]["frames"], 10);
+  EXPECT_GT(json["moving"]["fps"], 0);
+  EXPECT_GT(json["first_picture_ms"], 0);
+  EXPECT_TRUE(json["last"]["still"].get<bool>());
+  EXPECT_EQ(io::ReadImage(In("end.png")).height(), 240);
+}
+
+TEST_F(ViewerWindow, WhatCannotWorkIsSaidInOneLine) {
+  {
+    const Environment no_display("DISPLAY", "");
+    ExpectRefused(Dtr({"view", Set()}), kFailed,
+                  "window: expected a display to open it on, found none");
+    EXPECT_THAT(Dtr({"view", Set()}).err, HasSubstr("dtr render"));
+  }
+  ExpectRefused(Dtr({"view", In("absent.dtr").string()}), kFailed,
+                "expected the folder of a D+TR set, found nothing");
+  ExpectRefused(Dtr({"view", Set(), "--screenshot", In("a.png").string()}), kWrongUsage,
+                "--screenshot: expected --frames N with it");
+  ExpectRefused(Dtr({"view", Set(), "-o", In("absent").string()}), kWrongUsage,
+                "expected a folder to save into, found none");
+  NeedDisplay();
+  if (IsSkipped()) return;
+  const Environment old("MESA_GL_VERSION_OVERRIDE", "3.3");
+  ExpectRefused(Dtr({"view", Set()}), kFailed,
+                "window: expected OpenGL 4.3 or newer on this display");
+}
+
+}  // namespace
+}  // namespace dtr::testing

@@ -1,0 +1,260 @@
+#include "viewer/controller.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "dtr/render/geometry.h"
+
+namespace dtr::viewer {
+namespace {
+
+constexpr double kRadPerWindow = std::numbers::pi;  // dragging across the picture's longer side
+constexpr double kScrollFactor = 0.85;      // of the distance that is left after a step
+constexpr double kSpeedFactor = 1.25;       // per step of the wheel
+constexpr double kSceneSizesPerSecond = 0.3;
+constexpr double kLeastSpeedShare = 1e-4, kMostSpeedShare = 100;  // of the scene's size per second
+constexpr double kGlideSeconds = 0.35;
+constexpr double kTapSeconds = 1.0 / 30;     // what a short press of a fly key moves
+constexpr double kLongestStepSeconds = 0.1;  // a slow frame must not throw the camera far
+constexpr double kSameCenterShare = 1e-9, kSameAxisRad = 1e-9;
+
+Eigen::Vector3d DirectionOf(FlyKey key) {
+  switch (key) {
+    case FlyKey::kForward:
+      return {0, 0, 1};
+    case FlyKey::kBack:
+      return {0, 0, -1};
+    case FlyKey::kLeft:
+      return {-1, 0, 0};
+    case FlyKey::kRight:
+      return {1, 0, 0};
+    case FlyKey::kUp:
+      return {0, -1, 0};
+    case FlyKey::kDown:
+      return {0, 1, 0};
+  }
+  return Eigen::Vector3d::Zero();
+}
+
+std::vector<Pose> PosesOf(const std::vector<const View*>& views) {
+  std::vector<Pose> poses;
+  for (const View* view : views) poses.push_back(view->cam_from_world);
+  return poses;
+}
+
+/// How far the cameras stand from the middle of the scene; bounds can reach to the horizon.
+double SizeOf(const Surroundings& surroundings) {
+  std::vector<double> distances;
+  for (const View* view : surroundings.views) {
+    distances.push_back((view->CenterInWorld() - surroundings.center).norm());
+  }
+  if (distances.empty()) return 1;
+  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::nth_element(distances.begin(), middle, distances.end());
+  return *middle > 0 && std::isfinite(*middle) ? *middle : 1;
+}
+
+bool SamePose(const Pose& a, const Pose& b, double scene_size) {
+  return (a.TargetOriginInSource() - b.TargetOriginInSource()).norm() <=
+             kSameCenterShare * scene_size &&
+         a.rotation.angularDistance(b.rotation) <= kSameAxisRad;
+}
+
+}  // namespace
+
+Surroundings SurroundingsOf(const DtrSet& set) {
+  Surroundings surroundings;
+  surroundings.bounds = set.bounds;
+  surroundings.center = set.scene_center;
+  for (const View& view : set.frames.front().views) {
+    if (view.role == ViewRole::kSource) surroundings.views.push_back(&view);
+  }
+  std::sort(surroundings.views.begin(), surroundings.views.end(),
+            [](const View* a, const View* b) { return a->id < b->id; });
+  return surroundings;
+}
+
+Controller::Controller(Surroundings surroundings, int width_px, int height_px, DepthAt depth_at)
+    : surroundings_(std::move(surroundings)),
+      depth_at_(std::move(depth_at)),
+      up_(WorldUp(PosesOf(surroundings_.views))),
+      fly_speed_(kSceneSizesPerSecond * SizeOf(surroundings_)) {
+  if (surroundings_.views.empty()) {
+    camera_ = {FitLens({3, 2, 3, 3, 1.5, 1}, width_px, height_px), {}};
+    return;
+  }
+  const View& first = *surroundings_.views.front();
+  camera_ = {FitLens(first.camera, width_px, height_px), first.cam_from_world};
+  stepped_to_ = 0;
+}
+
+double Controller::scene_size() const { return SizeOf(surroundings_); }
+
+void Controller::set_fly_speed(double units_per_s) {
+  const double size = scene_size();
+  fly_speed_ = std::clamp(units_per_s, kLeastSpeedShare * size, kMostSpeedShare * size);
+}
+
+void Controller::Handle(const InputEvent& event) {
+  std::visit([this](const auto& e) { On(e); }, event);
+}
+
+double Controller::DepthOrUsual(const Eigen::Vector2d& pixel) const {
+  if (const auto depth = depth_at_(pixel); depth && *depth > 0) return *depth;
+  // Where nothing is seen: as far away as the middle of the scene, if that is in front.
+  const double z = (camera_.cam_from_world * surroundings_.center).z();
+  return z > 0 ? z : 0.5 * scene_size();
+}
+
+void Controller::On(const ButtonEvent& event) {
+  const Eigen::Vector2d pixel(event.x_px, event.y_px);
+  if (!event.pressed) {
+    if (drag_ && drag_->button == event.button) drag_.reset();
+    return;
+  }
+  if (drag_) return;  // one drag at a time
+  glide_.reset();
+  const double z = DepthOrUsual(pixel);
+  drag_ = Drag{event.button, pixel, WorldPoint(camera_, pixel, z), z};
+}
+
+void Controller::On(const MoveEvent& event) {
+  if (!drag_) return;
+  const Eigen::Vector2d to(event.x_px, event.y_px);
+  const Eigen::Vector2d by = to - drag_->last_px;
+  if (by.isZero(0)) return;
+  const double rad_per_px =
+      kRadPerWindow / std::max(camera_.camera.width_px(), camera_.camera.height_px());
+  Pose& pose = camera_.cam_from_world;
+  switch (drag_->button) {
+    case Button::kLeft:
+      // The scene follows the hand: to the right turns the camera to the left about it.
+      pose = Orbit(pose, drag_->pivot, up_, -by.x() * rad_per_px, -by.y() * rad_per_px);
+      break;
+    case Button::kRight: {
+      const PinholeCamera& lens = camera_.camera;
+      pose = Look(pose, up_, -by.x() / lens.fx_px(), -by.y() / lens.fy_px());
+      break;
+    }
+    case Button::kMiddle:
+      pose = Pan(camera_, drag_->last_px, to, drag_->pivot_z);
+      break;
+  }
+  drag_->last_px = to;
+}
+
+void Controller::On(const ScrollEvent& event) {
+  if (flying() || (drag_ && drag_->button == Button::kRight)) {
+    set_fly_speed(fly_speed_ * std::pow(kSpeedFactor, event.steps));
+    return;
+  }
+  glide_.reset();
+  const Eigen::Vector2d pixel(event.x_px, event.y_px);
+  const Eigen::Vector3d point = WorldPoint(camera_, pixel, DepthOrUsual(pixel));
+  camera_.cam_from_world =
+      Approach(camera_.cam_from_world, point, std::pow(kScrollFactor, event.steps));
+}
+
+void Controller::On(const FlyEvent& event) {
+  const auto key = static_cast<size_t>(event.key);
+  if (event.pressed && !held_[key]) {
+    glide_.reset();
+    owed_s_[key] = std::max(owed_s_[key], kTapSeconds);
+  }
+  held_[key] = event.pressed;
+}
+
+void Controller::On(const FocusLostEvent&) {
+  held_.fill(false);
+  drag_.reset();
+}
+
+bool Controller::flying() const {
+  return std::any_of(held_.begin(), held_.end(), [](bool held) { return held; });
+}
+
+bool Controller::moving() const {
+  return glide_.has_value() || flying() ||
+         std::any_of(owed_s_.begin(), owed_s_.end(), [](double owed) { return owed > 0; });
+}
+
+void Controller::Advance(double seconds) {
+  const double step = std::clamp(seconds, 0.0, kLongestStepSeconds);
+  if (glide_) {
+    glide_->elapsed_s += step;
+    const double linear = std::min(1.0, glide_->elapsed_s / kGlideSeconds);
+    const double share = linear * linear * (3 - 2 * linear);
+    camera_ = share < 1 ? Between(glide_->from, glide_->to, share) : glide_->to;
+    if (linear >= 1) glide_.reset();
+  }
+  Eigen::Vector3d way = Eigen::Vector3d::Zero();
+  for (int key = 0; key < kFlyKeys; ++key) {
+    const auto at = static_cast<size_t>(key);
+    const double flown = std::max(held_[at] ? step : 0.0, owed_s_[at]);
+    owed_s_[at] = 0;
+    way += flown * DirectionOf(static_cast<FlyKey>(key));
+  }
+  if (!way.isZero(0)) camera_.cam_from_world = MoveInCam(camera_.cam_from_world, fly_speed_ * way);
+}
+
+void Controller::Resize(int width_px, int height_px) {
+  camera_.camera = FitLens(camera_.camera, width_px, height_px);
+  if (glide_) {
+    glide_->from.camera = FitLens(glide_->from.camera, width_px, height_px);
+    glide_->to.camera = FitLens(glide_->to.camera, width_px, height_px);
+  }
+}
+
+void Controller::JumpTo(const NovelCamera& camera) {
+  glide_.reset();
+  drag_.reset();
+  camera_ = {FitLens(camera.camera, camera_.camera.width_px(), camera_.camera.height_px()),
+             camera.cam_from_world};
+}
+
+void Controller::GoTo(const NovelCamera& camera) {
+  drag_.reset();
+  const NovelCamera to{
+      FitLens(camera.camera, camera_.camera.width_px(), camera_.camera.height_px()),
+      camera.cam_from_world};
+  glide_ = Glide{camera_, to};
+}
+
+void Controller::GoToView(size_t index) {
+  if (index >= surroundings_.views.size()) return;
+  stepped_to_ = index;
+  GoTo({surroundings_.views[index]->camera, surroundings_.views[index]->cam_from_world});
+}
+
+void Controller::StepViews(int by) {
+  const auto count = static_cast<int>(surroundings_.views.size());
+  if (count == 0) return;
+  const bool on_the_way = glide_.has_value() || at_view() == stepped_to_;
+  const std::optional<size_t> from = on_the_way ? stepped_to_ : nearest_view();
+  const int to = (static_cast<int>(from.value_or(0)) + by % count + count) % count;
+  GoToView(static_cast<size_t>(to));
+}
+
+void Controller::GoToNearestView() {
+  if (const auto nearest = nearest_view()) GoToView(*nearest);
+}
+
+void Controller::ShowAll() {
+  GoTo({camera_.camera,
+        ViewAll(surroundings_.bounds, PosesOf(surroundings_.views), up_, camera_.camera)});
+}
+
+std::optional<size_t> Controller::nearest_view() const {
+  return NearestView(surroundings_.views, camera_.cam_from_world, scene_size());
+}
+
+std::optional<size_t> Controller::at_view() const {
+  const auto nearest = nearest_view();
+  if (!nearest) return std::nullopt;
+  const Pose& view = surroundings_.views[*nearest]->cam_from_world;
+  if (!SamePose(view, camera_.cam_from_world, scene_size())) return std::nullopt;
+  return nearest;
+}
+
+}  // namespace dtr::viewer

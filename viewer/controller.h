@@ -1,0 +1,99 @@
+// viewer/controller.h -- turns input into the motion of a camera.
+#pragma once
+#include <array>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "dtr/types/dtr_set.h"
+#include "viewer/input.h"
+#include "viewer/navigation.h"
+
+namespace dtr::viewer {
+
+/// What the controller knows of the scene. The views must outlive it.
+struct Surroundings {
+  std::vector<const View*>
+      views;  ///< input cameras, in the order in which they are stepped through
+  Bounds bounds;
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();
+};
+/// Source views of the set's first frame, in byte order of their ids.
+Surroundings SurroundingsOf(const DtrSet& set);
+
+/// The camera of a window and how it moves. Left drag: orbit about the point under the cursor.
+/// Right drag: look around. Middle drag: pan. Wheel: towards the point under the cursor; while
+/// flying or looking, the speed of flight. Fly keys: fly.
+class Controller {
+ public:
+  /// Plane z of what the picture shows at a pixel; none where it shows nothing.
+  using DepthAt = std::function<std::optional<double>(const Eigen::Vector2d& pixel)>;
+
+  /// Starts at the first input camera, or nowhere in particular without one. Sizes in pixels.
+  Controller(Surroundings surroundings, int width_px, int height_px, DepthAt depth_at);
+
+  const NovelCamera& camera() const { return camera_; }
+  /// Scene units per second.
+  double fly_speed() const { return fly_speed_; }
+  void set_fly_speed(double units_per_s);
+  Eigen::Vector3d up() const { return up_; }
+  const Surroundings& surroundings() const { return surroundings_; }
+
+  void Handle(const InputEvent& event);
+  /// Time passes: flight and glides go on. Glides and steps never depend on how long a frame took
+  /// in where they end.
+  void Advance(double seconds);
+  /// True while the camera moves, or will with the next Advance.
+  bool moving() const;
+  bool dragging() const { return drag_.has_value(); }
+
+  void Resize(int width_px, int height_px);
+
+  /// All of these glide; a drag or a key stops them where they are.
+  void GoTo(const NovelCamera& camera);
+  void GoToView(size_t index);
+  void StepViews(int by);  ///< from the view stepped to last, or the nearest
+  void GoToNearestView();
+  void ShowAll();
+  /// At once, without a glide.
+  void JumpTo(const NovelCamera& camera);
+
+  /// Index of the view whose camera this is just now; none between views.
+  std::optional<size_t> at_view() const;
+  std::optional<size_t> nearest_view() const;
+  double scene_size() const;
+
+ private:
+  struct Drag {
+    Button button;
+    Eigen::Vector2d last_px;
+    Eigen::Vector3d pivot;  ///< world
+    double pivot_z;         ///< plane z, scene units
+  };
+  struct Glide {
+    NovelCamera from, to;
+    double elapsed_s = 0;
+  };
+
+  void On(const ButtonEvent& event);
+  void On(const MoveEvent& event);
+  void On(const ScrollEvent& event);
+  void On(const FlyEvent& event);
+  void On(const FocusLostEvent&);
+  double DepthOrUsual(const Eigen::Vector2d& pixel) const;
+  bool flying() const;
+
+  const Surroundings surroundings_;
+  const DepthAt depth_at_;
+  const Eigen::Vector3d up_;
+  NovelCamera camera_;
+  double fly_speed_;
+  std::optional<Drag> drag_;
+  std::optional<Glide> glide_;
+  std::optional<size_t> stepped_to_;
+  std::array<bool, kFlyKeys> held_{};
+  /// Seconds of flight owed by keys that were pressed, also those let go since.
+  std::array<double, kFlyKeys> owed_s_{};
+};
+
+}  // namespace dtr::viewer

@@ -1,0 +1,83 @@
+#include "viewer/glfw/keeper.h"
+
+// epoxy's header must come before any other GL header.
+#include <epoxy/gl.h>
+// clang-format keeps this group apart.
+#include <GLFW/glfw3.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
+#include "dtr/base/error.h"
+#include "dtr/io/formats/cameras_json.h"
+#include "dtr/io/image_io.h"
+
+namespace dtr::viewer {
+
+namespace fs = std::filesystem;
+
+fs::path Keeper::Free(const std::string& kind, const std::string& extension) const {
+  constexpr int kMostFiles = 100000;
+  for (int number = 1; number < kMostFiles; ++number) {
+    fs::path file = folder_ / fmt::format("{}-{}-{:03}{}", stem_, kind, number, extension);
+    if (!fs::exists(file)) return file;
+  }
+  throw Error(folder_.string() + ": expected a free name for " + stem_ + "-" + kind +
+              ", found all taken; give another folder");
+}
+
+fs::path Keeper::SavePicture(PictureMaker& maker) const {
+  const MadePicture& picture = maker.picture();
+  const RenderResult& result = maker.Result();
+  const fs::path file = Free("picture", ".png");
+  if (picture.shown != Shown::kColour) {
+    io::WriteImage(file, FalseColour(picture.shown, result, picture.options.views));
+  } else if (picture.options.fill_holes) {
+    io::WriteImage(file, result.image);
+  } else {
+    io::WriteImageWithAlpha(file, result.image, result.coverage);
+  }
+  return file;
+}
+
+fs::path Keeper::SaveWindow(GLFWwindow* window) const {
+  const fs::path file = Free("window", ".png");
+  SaveWindowAs(file, window);
+  return file;
+}
+
+fs::path Keeper::SaveCamera(const NovelCamera& camera, const DtrSet& set) const {
+  const fs::path file = Free("camera", ".json");
+  io::CameraList list;
+  list.unit = set.unit;
+  list.world_origin = set.world_origin;
+  io::NamedCamera named;
+  named.name = file.stem().string() + ".png";
+  named.camera = camera.camera;
+  named.cam_from_world = camera.cam_from_world;
+  list.cameras.push_back(named);
+  io::WriteCamerasJson(file, list);
+  return file;
+}
+
+void SaveWindowAs(const fs::path& file, GLFWwindow* window) {
+  int width_px = 0, height_px = 0;
+  glfwGetFramebufferSize(window, &width_px, &height_px);
+  ImageRgb8 image(std::max(width_px, 1), std::max(height_px, 1), 3);
+  ImageRgb8 upside_down = image;
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, 0);
+  glReadBuffer(GL_BACK);
+  glPixelStorei(GL_PACK_ALIGNMENT, 1);
+  glReadPixels(0, 0, image.width(), image.height(), GL_RGB, GL_UNSIGNED_BYTE,
+               upside_down.data().data());
+  const auto row_bytes = static_cast<std::ptrdiff_t>(3) * image.width();
+  for (int y = 0; y < image.height(); ++y) {
+    const std::uint8_t* row = upside_down.row(image.height() - 1 - y);
+    std::copy(row, row + row_bytes, image.row(y));
+  }
+  io::WriteImage(file, image);
+}
+
+}  // namespace dtr::viewer

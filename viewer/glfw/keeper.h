@@ -1,0 +1,37 @@
+// viewer/glfw/keeper.h -- files that the user of the window asks for.
+#pragma once
+#include <filesystem>
+#include <string>
+
+#include "dtr/types/dtr_set.h"
+#include "viewer/glfw/picture_maker.h"
+
+struct GLFWwindow;
+
+namespace dtr::viewer {
+
+/// Writes into one folder under names that are still free: STEM-picture-001.png, ... Everything
+/// throws dtr::Error where it cannot write.
+class Keeper {
+ public:
+  Keeper(std::filesystem::path folder, std::string stem)
+      : folder_(std::move(folder)), stem_(std::move(stem)) {}
+
+  /// The last picture made: colours as `dtr render` writes them, false colours as shown.
+  std::filesystem::path SavePicture(PictureMaker& maker) const;
+  /// The window as drawn but not yet presented.
+  std::filesystem::path SaveWindow(GLFWwindow* window) const;
+  /// cameras.json of one camera in the set's world.
+  std::filesystem::path SaveCamera(const NovelCamera& camera, const DtrSet& set) const;
+
+ private:
+  std::filesystem::path Free(const std::string& kind, const std::string& extension) const;
+
+  std::filesystem::path folder_;
+  std::string stem_;
+};
+
+/// What is in framebuffer 0 of the current context, as PNG or JPEG by the file's extension.
+void SaveWindowAs(const std::filesystem::path& file, GLFWwindow* window);
+
+}  // namespace dtr::viewer

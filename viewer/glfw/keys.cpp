@@ -1,0 +1,75 @@
+#include "viewer/glfw/keys.h"
+
+#include <GLFW/glfw3.h>
+
+#include <array>
+
+namespace dtr::viewer {
+namespace {
+
+constexpr std::array kHelp{
+    HelpLine{"left drag", "orbit about the point under the cursor"},
+    HelpLine{"right drag", "look around"},
+    HelpLine{"middle drag", "move across"},
+    HelpLine{"wheel", "towards the point under the cursor; while flying: speed"},
+    HelpLine{"W A S D", "fly forward, left, back, right"},
+    HelpLine{"E Q", "fly up, down"},
+    HelpLine{"Right, Left", "next, previous input camera"},
+    HelpLine{"C", "nearest input camera"},
+    HelpLine{"V", "view all"},
+    HelpLine{"Down, Up", "show the next, the previous kind of picture"},
+    HelpLine{"P", "save the picture"},
+    HelpLine{"F12", "save the window"},
+    HelpLine{"L", "command line of this picture, to the clipboard and the terminal"},
+    HelpLine{"Tab", "panel on, off"},
+    HelpLine{"? or F1", "this help"},
+    HelpLine{"Ctrl Q", "quit"},
+};
+
+struct Binding {
+  int key;
+  Action action;
+};
+constexpr std::array kBindings{
+    Binding{GLFW_KEY_RIGHT, Action::kNextView}, Binding{GLFW_KEY_LEFT, Action::kPreviousView},
+    Binding{GLFW_KEY_C, Action::kNearestView},  Binding{GLFW_KEY_V, Action::kShowAll},
+    Binding{GLFW_KEY_HOME, Action::kShowAll},   Binding{GLFW_KEY_F1, Action::kHelp},
+    Binding{GLFW_KEY_TAB, Action::kPanel},      Binding{GLFW_KEY_P, Action::kSavePicture},
+    Binding{GLFW_KEY_F12, Action::kSaveWindow}, Binding{GLFW_KEY_L, Action::kCopyCommand},
+    Binding{GLFW_KEY_DOWN, Action::kNextShown}, Binding{GLFW_KEY_UP, Action::kPreviousShown},
+};
+
+}  // namespace
+
+std::span<const HelpLine> HelpLines() { return kHelp; }
+
+std::optional<Action> ActionOf(int glfw_key, int glfw_mods) {
+  if ((glfw_mods & GLFW_MOD_CONTROL) != 0) {
+    return glfw_key == GLFW_KEY_Q ? std::optional(Action::kQuit) : std::nullopt;
+  }
+  for (const Binding& binding : kBindings) {
+    if (binding.key == glfw_key) return binding.action;
+  }
+  return std::nullopt;
+}
+
+std::optional<FlyKey> FlyKeyOf(int glfw_key) {
+  switch (glfw_key) {
+    case GLFW_KEY_W:
+      return FlyKey::kForward;
+    case GLFW_KEY_S:
+      return FlyKey::kBack;
+    case GLFW_KEY_A:
+      return FlyKey::kLeft;
+    case GLFW_KEY_D:
+      return FlyKey::kRight;
+    case GLFW_KEY_E:
+      return FlyKey::kUp;
+    case GLFW_KEY_Q:
+      return FlyKey::kDown;
+    default:
+      return std::nullopt;
+  }
+}
+
+}  // namespace dtr::viewer

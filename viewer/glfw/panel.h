@@ -1,0 +1,30 @@
+// viewer/glfw/panel.h -- the panel and the help window.
+#pragma once
+#include <string>
+#include <vector>
+
+#include "viewer/controller.h"
+#include "viewer/glfw/keys.h"
+#include "viewer/glfw/picture_maker.h"
+#include "viewer/glfw/user_interface.h"
+
+namespace dtr::viewer {
+
+/// What the panel shows and changes.
+struct PanelModel {
+  const MadePicture& picture;
+  Controller& controller;
+  RenderOptions& options;
+  Shown& shown;
+  const std::string& message;
+  double window_ms = 0;          ///< of the window itself: panels, copying, waiting for the display
+  double frames_per_second = 0;  ///< of moving frames; 0: none of late
+  std::vector<Action> pressed;   ///< buttons of the panel
+};
+
+void DrawPanel(UserInterface& interface, PanelModel& model);
+void DrawHelp(UserInterface& interface, bool& open);
+/// One line at the foot of the window.
+void DrawMessage(UserInterface& interface, const std::string& message);
+
+}  // namespace dtr::viewer

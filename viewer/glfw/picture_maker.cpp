@@ -1,0 +1,87 @@
+#include "viewer/glfw/picture_maker.h"
+
+#include <algorithm>
+#include <chrono>
+
+#include "dtr/gl/frame_timer.h"
+#include "dtr/render/fill_holes.h"
+
+namespace dtr::viewer {
+namespace {
+
+/// Milliseconds since it was made or asked last.
+class Laps {
+ public:
+  double Lap() {
+    const auto now = std::chrono::steady_clock::now();
+    const std::chrono::duration<double, std::milli> ms = now - last_;
+    last_ = now;
+    return ms.count();
+  }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+PinholeCamera Smaller(const PinholeCamera& camera, int divisor) {
+  return camera.Resized(std::max(1, camera.width_px() / divisor),
+                        std::max(1, camera.height_px() / divisor));
+}
+
+}  // namespace
+
+PictureMaker::PictureMaker(ViewStream& stream, gl::RendererSettings settings)
+    : stream_(stream), renderer_(std::move(settings)) {}
+
+void PictureMaker::MakeMoving(const PictureOrder& order, int divisor) {
+  Make(order, divisor, ViewStream::Wait::kForNone);
+  picture_.whole = false;
+}
+
+void PictureMaker::MakeStill(const PictureOrder& order) {
+  stream_.Prefetch(order.camera.cam_from_world, order.options);
+  // Once nothing is on its way it is the picture that dtr render makes.
+  const bool whole = stream_.reading() == 0;
+  Make(order, 1, whole ? ViewStream::Wait::kForAll : ViewStream::Wait::kForNone);
+  picture_.whole = whole;
+}
+
+void PictureMaker::Make(const PictureOrder& order, int divisor, ViewStream::Wait wait) {
+  Laps laps;
+  result_.reset();
+  const Pose& pose = order.camera.cam_from_world;
+  picture_.scene = stream_.SceneFor(pose, order.options, wait);
+  picture_.camera = {Smaller(order.camera.camera, divisor), pose};
+  picture_.divisor = divisor;
+  picture_.shown = order.shown;
+  picture_.options = order.options;
+  picture_.ms.views = laps.Lap();
+  const gl::DrawnPicture drawn =
+      renderer_.Draw(picture_.scene, picture_.camera.camera, pose, order.options);
+  gl::WaitForGpu();
+  picture_.views_used = drawn.views_used;
+  picture_.ms.draw = laps.Lap();
+  Show(order, drawn, divisor == 1);
+  picture_.ms.inspect = laps.Lap();
+}
+
+void PictureMaker::Show(const PictureOrder& order, const gl::DrawnPicture& drawn, bool still) {
+  if (order.shown != Shown::kColour) {
+    picture_.texture.Upload(FalseColour(order.shown, Result(), order.options.views));
+  } else if (still && order.options.fill_holes) {
+    Result();
+    FillHolesFromViews(picture_.scene, picture_.camera.camera, picture_.camera.cam_from_world,
+                       order.options, *result_);
+    picture_.texture.Upload(result_->image);
+  } else {
+    picture_.texture.Take(drawn);
+  }
+  if (still) picture_.coverage = Result().coverage_share;
+}
+
+const RenderResult& PictureMaker::Result() {
+  if (!result_) result_ = renderer_.ReadBack();
+  return *result_;
+}
+
+}  // namespace dtr::viewer

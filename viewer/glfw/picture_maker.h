@@ -1,0 +1,67 @@
+// viewer/glfw/picture_maker.h -- the pictures the window shows, drawn with the current context.
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dtr/gl/renderer.h"
+#include "dtr/render/camera_path.h"
+#include "dtr/render/view_stream.h"
+#include "viewer/glfw/picture_texture.h"
+#include "viewer/shown.h"
+
+namespace dtr::viewer {
+
+/// What is asked for.
+struct PictureOrder {
+  NovelCamera camera;
+  RenderOptions options;
+  Shown shown = Shown::kColour;
+};
+
+/// Milliseconds that each stage of a picture took.
+struct StageTimes {
+  double views = 0;    ///< choosing and waiting for views
+  double draw = 0;     ///< dtr/gl, until the GPU was done
+  double inspect = 0;  ///< reading back, filling, false colours
+};
+
+/// A picture with all that is known of it.
+struct MadePicture {
+  PictureTexture texture;
+  NovelCamera camera;  ///< as drawn: smaller than asked for by `divisor`
+  int divisor = 1;
+  bool whole = false;  ///< in full resolution, of all views that it needs
+  Shown shown = Shown::kColour;
+  RenderOptions options;
+  RenderScene scene;
+  std::vector<int> views_used;
+  double coverage = 0;  ///< where the result was read back
+  StageTimes ms;
+};
+
+class PictureMaker {
+ public:
+  /// The stream must outlive it.
+  PictureMaker(ViewStream& stream, gl::RendererSettings settings);
+
+  /// Quickly: each side divided by `divisor`, of the views that are in memory, not filled.
+  void MakeMoving(const PictureOrder& order, int divisor);
+  /// In full, of the views that are there; whole once no view is being read any more.
+  void MakeStill(const PictureOrder& order);
+
+  const MadePicture& picture() const { return picture_; }
+  /// Of the last picture; the first call after it reads it back from the GPU.
+  const RenderResult& Result();
+
+ private:
+  void Make(const PictureOrder& order, int divisor, ViewStream::Wait wait);
+  void Show(const PictureOrder& order, const gl::DrawnPicture& drawn, bool still);
+
+  ViewStream& stream_;
+  gl::Renderer renderer_;
+  MadePicture picture_;
+  std::optional<RenderResult> result_;
+};
+
+}  // namespace dtr::viewer

@@ -1,0 +1,34 @@
+// viewer/glfw/picture_texture.h -- a picture on the GPU that stays when the renderer draws another.
+#pragma once
+#include "dtr/gl/renderer.h"
+#include "dtr/types/grid.h"
+
+namespace dtr::viewer {
+
+/// A GL_TEXTURE_2D of 8-bit sRGB values with alpha (255: to be shown). Belongs to the context it
+/// was made with.
+class PictureTexture {
+ public:
+  PictureTexture() = default;
+  ~PictureTexture();
+  PictureTexture(const PictureTexture&) = delete;
+  PictureTexture& operator=(const PictureTexture&) = delete;
+
+  /// Copies what the renderer drew, on the GPU.
+  void Take(const gl::DrawnPicture& drawn);
+  /// `alpha` empty: all of it is shown; else of the image's size.
+  void Upload(const ImageRgb8& image, const Mask& alpha = {});
+
+  bool empty() const { return width_px_ == 0; }
+  unsigned name() const { return name_; }
+  int width_px() const { return width_px_; }
+  int height_px() const { return height_px_; }
+
+ private:
+  void Fit(int width_px, int height_px);
+
+  unsigned name_ = 0;
+  int width_px_ = 0, height_px_ = 0;
+};
+
+}  // namespace dtr::viewer

@@ -1,0 +1,54 @@
+// viewer/glfw/user_interface.h -- Dear ImGui in a GLFW window, and the input that is not ImGui's.
+#pragma once
+#include <Eigen/Core>
+#include <array>
+#include <variant>
+#include <vector>
+
+#include "viewer/glfw/keys.h"
+#include "viewer/input.h"
+
+struct GLFWwindow;
+
+namespace dtr::viewer {
+
+using UserInput = std::variant<InputEvent, Action>;
+
+/// One at a time; its context must be current. Input is kept in order, also what comes and goes
+/// between two frames. What is done over a panel or typed into a field is ImGui's alone.
+class UserInterface {
+ public:
+  explicit UserInterface(GLFWwindow* window);
+  ~UserInterface();
+  UserInterface(const UserInterface&) = delete;
+  UserInterface& operator=(const UserInterface&) = delete;
+
+  /// What came since the last call.
+  std::vector<UserInput> Take();
+  /// True when anything came since the last call, also for ImGui.
+  bool TakeAnyInput();
+
+  void BeginFrame();
+  /// Draws what was asked for of ImGui since BeginFrame into framebuffer 0.
+  void EndFrame();
+  /// To be called inside an ImGui window: the cursor over it is ImGui's.
+  void ThisPanelIsOurs();
+
+  /// The cursor, pixels of the picture; off it where the cursor is.
+  Eigen::Vector2d cursor_px() const { return cursor_px_; }
+  bool CursorOverPanels() const;
+
+ private:
+  struct Callbacks;
+  friend struct Callbacks;
+  Eigen::Vector2d ToPicture(double x, double y) const;
+
+  GLFWwindow* window_;
+  std::vector<UserInput> inputs_;
+  std::vector<std::array<float, 4>> panels_, new_panels_;  ///< left, top, right, bottom
+  Eigen::Vector2d cursor_px_{-1, -1};
+  std::array<bool, 3> buttons_down_{};
+  bool any_input_ = true;
+};
+
+}  // namespace dtr::viewer

@@ -1,0 +1,65 @@
+// viewer/navigation.h -- how a camera moves: pure functions on poses and lenses.
+#pragma once
+#include <Eigen/Core>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "dtr/render/camera_path.h"
+#include "dtr/types/dtr_set.h"
+
+namespace dtr::viewer {
+
+/// A camera for a window of this size that shows at least what `camera` shows: K is scaled by one
+/// factor for both axes and its principal point keeps its place relative to the middle.
+PinholeCamera FitLens(const PinholeCamera& camera, int width_px, int height_px);
+
+/// Which way is up in the world: the mean of what is up in the views' images, unit length. Views
+/// without a common up (looking at the ground from all sides) give the first view's.
+Eigen::Vector3d WorldUp(std::span<const Pose> cams_from_world);
+
+/// The world point a pixel shows. `depth_z` > 0, scene units.
+Eigen::Vector3d WorldPoint(const NovelCamera& from, const Eigen::Vector2d& pixel, double depth_z);
+
+/// Turns the camera about `pivot` (world): `yaw_rad` about `up`, then `pitch_rad` about the
+/// camera's x axis. The pixel that shows the pivot goes on showing it. The camera never tilts over:
+/// its axis stays kPoleRad away from straight up and down.
+Pose Orbit(const Pose& cam_from_world, const Eigen::Vector3d& pivot, const Eigen::Vector3d& up,
+           double yaw_rad, double pitch_rad);
+inline constexpr double kPoleRad = 0.05;
+
+/// Turns the camera where it stands.
+Pose Look(const Pose& cam_from_world, const Eigen::Vector3d& up, double yaw_rad, double pitch_rad);
+
+/// Moves the camera by `offset`, scene units along its own axes (x right, y down, z forward).
+Pose MoveInCam(const Pose& cam_from_world, const Eigen::Vector3d& offset);
+
+/// Moves the camera towards (factor < 1) or away from a world point, which keeps its pixel:
+/// `factor` > 0 is the share of the distance that is left.
+Pose Approach(const Pose& cam_from_world, const Eigen::Vector3d& point, double factor);
+
+/// Moves the camera across its axis so that the point it sees at `from_px` at depth `depth_z`
+/// is seen at `to_px`.
+Pose Pan(const NovelCamera& camera, const Eigen::Vector2d& from_px, const Eigen::Vector2d& to_px,
+         double depth_z);
+
+/// Part of the way from one camera to another, 0 to 1: centres along a line, rotations along the
+/// shortest arc, lenses in between. Both must have one size.
+NovelCamera Between(const NovelCamera& from, const NovelCamera& to, double share);
+
+/// The view whose camera is most like this one: by distance over `scene_size` plus the angle
+/// between the axes in radians. Index into `views`; none when there is no view.
+std::optional<size_t> NearestView(std::span<const View* const> views, const Pose& cam_from_world,
+                                  double scene_size);
+
+/// A pose from which all of `bounds` is inside the picture of `lens`. It looks at the middle along
+/// the mean axis of the cameras, level with `up`; where the cameras look in all directions along
+/// the first one's.
+Pose ViewAll(const Bounds& bounds, std::span<const Pose> cams_from_world, const Eigen::Vector3d& up,
+             const PinholeCamera& lens);
+
+/// Pose of a camera at `center` that looks along `forward` with `up` upwards in the picture.
+Pose LookAlong(const Eigen::Vector3d& center, const Eigen::Vector3d& forward,
+               const Eigen::Vector3d& up);
+
+}  // namespace dtr::viewer
