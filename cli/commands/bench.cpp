@@ -13,6 +13,9 @@
 #include "dtr/base/machine.h"
 #include "dtr/eval/bench_json.h"
 #include "dtr/io/set_io.h"
+#ifdef DTR_HAS_OSG
+#include "cli/osg_bench.h"
+#endif
 
 namespace dtr::cli {
 namespace {
@@ -72,16 +75,55 @@ int RunGrowthTable(const Options& options, RenderOptions render, const DtrSet& s
   return kDone;
 }
 
-int RunBench(const Options& options, const Context& context) {
-  // Before anything is loaded: a machine without OpenGL should say so at once.
-  const auto renderer = MakeTimedRenderer(options.renderer, context.console);
-  RenderOptions render = *options.render;
-  render.threads = context.common.threads;
+DtrSet LoadWhole(const Options& options, const Context& context) {
   io::LoadOptions load;
   load.held_out = true;
   load.threads = context.common.threads;
   load.warn = [&context](const std::string& line) { context.console.Note(line); };
-  const DtrSet set = io::LoadSet(options.set, load);
+  return io::LoadSet(options.set, load);
+}
+
+#ifdef DTR_HAS_OSG
+int RunOsgTable(const Options& options, const RenderOptions& render, const Context& context) {
+  std::vector<RenderOptions> variants;
+  const std::vector<int> views = options.views.empty() ? std::vector{3, 5, 8} : options.views;
+  for (const int resolution : options.resolutions) {
+    for (const int count : views) {
+      variants.push_back(render);
+      variants.back().resolution = resolution;
+      variants.back().views = count;
+    }
+  }
+  DtrSet set = LoadWhole(options, context);
+  std::vector<NovelCamera> path = FlyThrough(set, options.repeats);
+  for (NovelCamera& novel : path) novel.camera = WithSize(novel.camera, options.size);
+  const OsgBench bench = MeasureOnOsg(std::move(set), path, variants, context.console);
+  const eval::BenchMachine machine{
+      CpuModel(), static_cast<int>(std::thread::hardware_concurrency()), bench.renderer,
+      DTR_VERSION, bench.drawn_by_processor ? "processor" : "wall"};
+  SayOsgTable(bench, machine, context.console);
+  context.EmitJson(OsgJson(bench, machine));
+  return kDone;
+}
+#else
+int RunOsgTable(const Options&, const RenderOptions&, const Context&) {
+  throw Error(
+      "bench --table osg: expected a program built with OpenSceneGraph, found one without; install "
+      "libopenscenegraph-dev and build again");
+}
+#endif
+
+int RunBench(const Options& options, const Context& context) {
+  if (options.table == "osg") {
+    RenderOptions render = *options.render;
+    render.threads = context.common.threads;
+    return RunOsgTable(options, render, context);
+  }
+  // Before anything is loaded: a machine without OpenGL should say so at once.
+  const auto renderer = MakeTimedRenderer(options.renderer, context.console);
+  RenderOptions render = *options.render;
+  render.threads = context.common.threads;
+  const DtrSet set = LoadWhole(options, context);
   return options.table == "growth" ? RunGrowthTable(options, render, set, *renderer, context)
                                    : RunPhotoTable(options, render, set, *renderer, context);
 }
@@ -92,13 +134,15 @@ void DeclareOptions(CLI::App& command, Options& options) {
       .add_option("--table", options.table,
                   "report: frames a second by views used and resolution, with the truth beside; "
                   "weights: every blend weight and number of views, quality and cost; growth: how "
-                  "times grow with views, pixels and the size of the set [report]")
-      ->check(CLI::IsMember({"report", "weights", "growth"}))
-      ->type_name("report|weights|growth");
+                  "times grow with views, pixels and the size of the set; osg: what a frame takes "
+                  "in OpenSceneGraph, beside the same frame alone [report]")
+      ->check(CLI::IsMember({"report", "weights", "growth", "osg"}))
+      ->type_name("report|weights|growth|osg");
   command.add_option("--size", options.size, "Size of the timed pictures; 0 keeps the proportions")
       ->type_name("WxH");
   command
-      .add_option("--repeats", options.repeats, "Timed frames per row, after an untimed one [10]")
+      .add_option("--repeats", options.repeats,
+                  "Timed frames per row, after an untimed one (osg: after a lap of them) [10]")
       ->check(CLI::Range(1, 100000))
       ->type_name("N");
   command
@@ -115,10 +159,10 @@ void DeclareOptions(CLI::App& command, Options& options) {
     command.remove_option(command.get_option(single));
   }
   command
-      .add_option(
-          "--views", options.views,
-          "Numbers of views used, a row each [3,5,6,8,9,12,14; weights: 1,2,4,8]; growth: the "
-          "one for rows that do not change it [8]")
+      .add_option("--views", options.views,
+                  "Numbers of views used, a row each [3,5,6,8,9,12,14; weights: 1,2,4,8; osg: "
+                  "3,5,8]; growth: the "
+                  "one for rows that do not change it [8]")
       ->delimiter(',')
       ->check(CLI::Range(1, 1024))
       ->type_name("K,...");
