@@ -4,6 +4,7 @@
 #include <osgViewer/Viewer>
 
 #include <algorithm>
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 
 #include "dtr/base/error.h"
@@ -24,16 +25,20 @@ class WaitCallback : public osg::Camera::DrawCallback {
   void operator()(osg::RenderInfo&) const override { gl::WaitForGpu(); }
 };
 
-/// A viewer as any program's, its window in memory.
+/// A viewer as any program's. It draws into a framebuffer object: what it takes to bring pixels to
+/// a screen is not the scene graph's, and dtr/gl alone does not do it.
 class Host {
  public:
   Host(osgDTR::DepthTR* node, const PinholeCamera& camera) : camera_(camera) {
+    const char* const display = std::getenv("DISPLAY");  // without one, OSG would take ":0"
     osg::ref_ptr<osg::GraphicsContext::Traits> traits = new osg::GraphicsContext::Traits;
     traits->readDISPLAY();
     traits->width = camera.width_px();
     traits->height = camera.height_px();
     traits->pbuffer = true;
-    context_ = osg::GraphicsContext::createGraphicsContext(traits.get());
+    if (display != nullptr && *display != 0) {
+      context_ = osg::GraphicsContext::createGraphicsContext(traits.get());
+    }
     if (!context_) {
       throw Error(
           "bench --table osg: expected a display for OpenSceneGraph's window, found none; set "
@@ -45,8 +50,9 @@ class Host {
     osg::Camera* const view = viewer_.getCamera();
     view->setGraphicsContext(context_);
     view->setViewport(0, 0, camera.width_px(), camera.height_px());
-    view->setDrawBuffer(GL_FRONT);
-    view->setReadBuffer(GL_FRONT);
+    view->setRenderTargetImplementation(osg::Camera::FRAME_BUFFER_OBJECT);
+    view->attach(osg::Camera::COLOR_BUFFER, GL_RGBA8);
+    view->attach(osg::Camera::DEPTH_BUFFER, GL_DEPTH_COMPONENT24);
     view->setProjectionMatrix(osgDTR::ProjectionMatrixOf(camera, 1, 100));
     view->setFinalDrawCallback(new WaitCallback);
     viewer_.setSceneData(node);
