@@ -6,6 +6,7 @@
 #include "tests/cli/small_courtyard.h"
 #include "tests/support/environment.h"
 #include "tests/support/test_data.h"
+#include "tests/support/virtual_display.h"
 
 namespace dtr::testing {
 namespace {
@@ -54,6 +55,33 @@ TEST_F(OpenGl, AMachineWithoutItIsToldInOneLine) {
   }
   EXPECT_FALSE(fs::exists(In("v.png")));
   EXPECT_EQ(Render({"--renderer", "cpu"}).code, 0);
+}
+
+TEST_F(OpenGl, OpenSceneGraphsTableSaysWhatItAdds) {
+  const std::vector<std::string> arguments{
+      "bench", Set(),       "--table", "osg",    "--views", "2",      "--resolution",
+      "1",     "--repeats", "2",       "--size", "60x0",    "--json", "-"};
+  {
+    const Environment no_display("DISPLAY", "");
+    const Ran refused = Dtr(arguments);
+    if (refused.err.find("built with OpenSceneGraph") != std::string::npos) {
+      GTEST_SKIP() << refused.err;
+    }
+    ExpectRefused(refused, kFailed, "expected a display for OpenSceneGraph's window, found none");
+  }
+  const VirtualDisplay display;
+  if (!display.up()) GTEST_SKIP() << "no display: Xvfb is missing or did not come up";
+  const Ran ran = Dtr(arguments);
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  const Json json = Json::parse(ran.out);
+  ASSERT_EQ(json["rows"].size(), 2U);
+  EXPECT_EQ(json["rows"][0]["path"], "gpu");
+  EXPECT_EQ(json["rows"][0]["views_used"], 2);
+  EXPECT_GT(json["rows"][0]["gl_cpu_ms"], 0);
+  EXPECT_GT(json["rows"][0]["seconds_per_frame"], 0);
+  EXPECT_EQ(json["largest_ratio_osg_over_gl"], json["rows"][0]["ratio_osg_over_gl"]);
+  EXPECT_EQ(json["rows"][1]["path"], "read-back");
+  EXPECT_TRUE(json["rows"][1]["ratio_osg_over_gl"].is_null());
 }
 
 TEST_F(OpenGl, AnOlderContextIsToldInOneLine) {
@@ -142,7 +170,7 @@ TEST_F(OpenGl, BenchMeasuresGrowth) {
 
 TEST_F(OpenGl, BenchOfNothingOrOfWordsThatMeanNothing) {
   ExpectRefused(Dtr({"bench", Set(), "--table", "magic", "--renderer", "cpu"}), kWrongUsage,
-                "--table: magic not in {report,weights,growth}");
+                "--table: magic not in {report,weights,growth,osg}");
   ExpectRefused(Dtr({"bench", In("absent.dtr"), "--renderer", "cpu"}), kFailed,
                 "expected the folder of a D+TR set, found nothing");
 }
