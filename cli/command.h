@@ -54,5 +54,6 @@ void AddViewCommand(CLI::App& app);  ///< in programs built with windows
 void AddImportCommand(CLI::App& app);
 void AddExportCommand(CLI::App& app);
 void AddDatasetCommand(CLI::App& app);
+void AddManualCommands(CLI::App& app, const std::string& version);  ///< of the whole of `app`
 
 }  // namespace dtr::cli

@@ -28,6 +28,7 @@ int Run(int argc, char** argv) {
   dtr::cli::AddImportCommand(app);
   dtr::cli::AddExportCommand(app);
   dtr::cli::AddDatasetCommand(app);
+  dtr::cli::AddManualCommands(app, DTR_VERSION);
   // CLI11 would say that a command is missing, not that this one does not exist.
   const auto is_called = [&](const CLI::App* command) { return command->get_name() == argv[1]; };
   if (argc > 1 && argv[1][0] != '-' && app.get_subcommands(is_called).empty()) {

@@ -1,0 +1,15 @@
+#include <fmt/format.h>
+
+#include "cli/command.h"
+#include "cli/manual.h"
+
+namespace dtr::cli {
+
+void AddManualCommands(CLI::App& app, const std::string& version) {
+  app.add_subcommand("manual", "Print the man page: dtr manual | man -l -")
+      ->callback([&app, version] { fmt::print("{}", ManualPage(app, version)); });
+  app.add_subcommand("completion", "Print a completion script for bash: source <(dtr completion)")
+      ->callback([&app] { fmt::print("{}", BashCompletion(app)); });
+}
+
+}  // namespace dtr::cli

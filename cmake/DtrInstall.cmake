@@ -1,0 +1,64 @@
+# `cmake --install`: the program with man page and completion (component runtime), OpenSceneGraph's
+# plugin (osg), the libraries with headers and dtrConfig.cmake (dev). `cpack` makes two Debian packages:
+# dtr of the first two, libdtr-dev of the third.
+include(CMakePackageConfigHelpers)
+
+install(TARGETS dtr RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT runtime)
+
+# Both pages come from the program's own parser, so that they cannot fall behind it.
+foreach(page manual completion)
+  add_custom_command(OUTPUT ${PROJECT_BINARY_DIR}/dtr.${page}
+    COMMAND dtr ${page} > ${PROJECT_BINARY_DIR}/dtr.${page} DEPENDS dtr VERBATIM)
+endforeach()
+add_custom_target(dtr_manual ALL DEPENDS ${PROJECT_BINARY_DIR}/dtr.manual ${PROJECT_BINARY_DIR}/dtr.completion)
+install(FILES ${PROJECT_BINARY_DIR}/dtr.manual RENAME dtr.1
+  DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT runtime)
+install(FILES ${PROJECT_BINARY_DIR}/dtr.completion RENAME dtr
+  DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions COMPONENT runtime)
+install(FILES README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT runtime)
+install(FILES LICENSE RENAME copyright DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT runtime)
+
+install(DIRECTORY dtr capture calib stereo datasets viewer DESTINATION ${DTR_INSTALL_HEADERS} COMPONENT dev
+  FILES_MATCHING PATTERN "*.h" PATTERN shaders EXCLUDE PATTERN examples EXCLUDE PATTERN plaza EXCLUDE)
+install(DIRECTORY cli/pipeline DESTINATION ${DTR_INSTALL_HEADERS}/cli COMPONENT dev FILES_MATCHING PATTERN "*.h")
+set(config ${CMAKE_INSTALL_LIBDIR}/cmake/dtr)
+configure_package_config_file(cmake/dtrConfig.cmake.in ${PROJECT_BINARY_DIR}/dtrConfig.cmake
+  INSTALL_DESTINATION ${config})
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/dtrConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/dtrConfig.cmake ${PROJECT_BINARY_DIR}/dtrConfigVersion.cmake
+  cmake/DtrDependencies.cmake cmake/OpenSceneGraph.cmake DESTINATION ${config} COMPONENT dev)
+install(EXPORT dtrTargets NAMESPACE dtr:: DESTINATION ${config} COMPONENT dev)
+
+set(CPACK_GENERATOR DEB)
+set(CPACK_PACKAGE_CONTACT "D+TR toolkit developers")
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_STRIP_FILES ON)
+set(CPACK_DEB_COMPONENT_INSTALL ON)
+set(CPACK_COMPONENTS_GROUPING ONE_PER_GROUP)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_SECTION graphics)
+set(CPACK_COMPONENT_GROUP_PROGRAM_DESCRIPTION
+  "photos in, novel views out
+ Calibrates and validates the cameras of a photo collection, computes depth maps
+ without CUDA, keeps the scene as a D+TR set (depth, texture, calibration) and
+ renders new views of it: to files, in a window, in OpenSceneGraph.")
+set(CPACK_DEBIAN_PROGRAM_PACKAGE_NAME dtr)
+set(CPACK_DEBIAN_PROGRAM_PACKAGE_SHLIBDEPS ON)
+# Programs that dtr runs, and the drivers that open a context where there is no screen.
+set(CPACK_DEBIAN_PROGRAM_PACKAGE_DEPENDS "colmap, ffmpeg, libegl1, libgl1-mesa-dri, libegl-mesa0")
+set(CPACK_DEBIAN_PROGRAM_PACKAGE_RECOMMENDS openscenegraph)
+set(CPACK_COMPONENT_GROUP_LIBRARIES_DESCRIPTION "libraries and headers of the D+TR toolkit
+ Static libraries to load, render and measure D+TR sets; find_package(dtr).")
+set(CPACK_DEBIAN_LIBRARIES_PACKAGE_NAME libdtr-dev)
+set(CPACK_DEBIAN_LIBRARIES_PACKAGE_SECTION libdevel)
+# What scripts/packages.txt has of development files: the libraries are static.
+file(STRINGS scripts/packages.txt packages REGEX "^(lib.*-dev|nlohmann-json3-dev|openimageio-tools|pkg-config)$")
+list(FILTER packages EXCLUDE REGEX "gtest|gmock|cli11")
+list(JOIN packages ", " packages)
+set(CPACK_DEBIAN_LIBRARIES_PACKAGE_DEPENDS "dtr (= ${PROJECT_VERSION}), ${packages}")
+include(CPack)
+cpack_add_component(runtime GROUP program)
+cpack_add_component(osg GROUP program)
+cpack_add_component(dev GROUP libraries)
+cpack_add_component_group(program)
+cpack_add_component_group(libraries)
