@@ -33,7 +33,7 @@ constexpr double kSmallestDisparityPx = 0.5;
 /// a view; two guesses, and a grid they are made from; its picture with all halvings; planes to
 /// hand out; a depth map with what judging it takes; a neighbour's textures with all halvings.
 constexpr double kReferenceBytes = 12, kStateBytes = 16, kWeightBytes = 4, kGuessBytes = 28,
-                 kPictureBytes = 7, kPlaneBytes = 12, kVerdictBytes = 38, kSourceBytes = 7;
+                 kPictureBytes = 7, kPlaneBytes = 12, kVerdictBytes = 46, kSourceBytes = 7;
 constexpr double kSmallThingsBytes = 1 << 18;
 
 void CheckRequest(std::span<const StereoView> views, int reference, std::span<const int> neighbours,
@@ -214,8 +214,8 @@ DepthEstimate PatchMatchEngine::Estimate(std::span<const StereoView> views, int 
                                          std::span<const int> neighbours, const DepthRange& range,
                                          const EngineOptions& options) const {
   Problem problem(views, reference, neighbours, range, {}, Neighbours(), options);
-  const State state = problem.Search(effort_.iterations, options);
-  return TrustedDepth(problem.finest, state, *problem.view, range, options.threads);
+  State state = problem.Search(effort_.iterations, options);
+  return TrustedDepth(problem.finest, *problem.view, range, options.threads, &state);
 }
 
 PlaneMap PatchMatchEngine::Match(std::span<const StereoView> views, int reference,
@@ -246,8 +246,8 @@ DepthEstimate PatchMatchEngine::Judge(std::span<const StereoView> views, int ref
                                       std::span<const PlaneMap* const> maps,
                                       const EngineOptions& options) const {
   Problem problem(views, reference, neighbours, range, maps, effort_.round_neighbours, options);
-  const State state = problem.Resume(*maps[static_cast<size_t>(reference)], options);
-  return TrustedDepth(problem.finest, state, *problem.view, range, options.threads);
+  State state = problem.Resume(*maps[static_cast<size_t>(reference)], options);
+  return TrustedDepth(problem.finest, *problem.view, range, options.threads, &state);
 }
 
 }  // namespace dtr::stereo

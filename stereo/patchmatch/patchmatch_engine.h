@@ -13,7 +13,7 @@ namespace dtr::stereo {
 /// hashes of the pixel: nothing depends on history or threads. The search uses the first
 /// Effort::neighbours, the rounds the first Effort::round_neighbours, Estimate, which is the search
 /// alone, the more of both. Memory (WorkBytes) does not depend on the number of threads: at full
-/// size 107 bytes per pixel of the reference and 7 per pixel of each neighbour.
+/// size 113 bytes per pixel of the reference and 7 per pixel of each neighbour.
 class PatchMatchEngine final : public Engine {
  public:
   explicit PatchMatchEngine(const Effort& effort = {}) : effort_(effort) {}

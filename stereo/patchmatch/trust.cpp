@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "dtr/base/parallel_for.h"
+#include "stereo/patchmatch/planar_prior.h"
 
 namespace dtr::stereo::patchmatch {
 namespace {
@@ -25,6 +26,10 @@ constexpr Limits kAfterRounds{1.0f, 4.0f, 0};
 /// Least variance of the pixels that look like the centre (grey levels squared). A window of sky at
 /// a roof has the roof's texture, and would get its depth.
 constexpr float kLeastTexture = 3.0f;
+/// Largest cost where the texture is weak: that of noise, which is 1, and its scatter.
+constexpr float kWeakCost = 1.1f, kLeastWeakCost = 1e-6f;
+/// The planes around a pixel may cost so much more than its own, chosen as the cheapest.
+constexpr float kPriorCost = 0.1f;
 /// One row of so many is asked whether its pixels are ambiguous: what repeats covers more.
 constexpr int kAskedRows = 8;
 /// Single pixels find other places by chance, whole areas because their texture repeats: more than
@@ -60,6 +65,15 @@ float ProbabilityOfWrong(const Verdict& v) {
 /// Standard deviation of a depth that is exact to v.sigma unless it is wrong.
 float SigmaWithDoubt(const Verdict& v) {
   return std::hypot(v.sigma, ProbabilityOfWrong(v) * kWrongByPx / v.px);
+}
+
+/// What the pictures say of a pixel and what the planes around it do, as independent measurements.
+void Combine(float prior, Verdict* v) {
+  const float prior_sigma = kPriorSigmaPx / v->px;
+  const float seen = v->sigma > 0 ? 1 / (v->sigma * v->sigma) : 0;
+  const float expected = 1 / (prior_sigma * prior_sigma);
+  v->w = (seen * v->w + expected * prior) / (seen + expected);
+  v->sigma = 1 / std::sqrt(seen + expected);
 }
 
 /// Makes holes of small connected areas. `consistent`: views whose planes lead to the pixel.
@@ -130,35 +144,52 @@ bool HasSurfaces(const Level& level) {
 
 }  // namespace
 
-DepthEstimate TrustedDepth(const Level& level, const State& state, const StereoView& view,
-                           const DepthRange& range, int threads) {
+DepthEstimate TrustedDepth(const Level& level, const StereoView& view, const DepthRange& range,
+                           int threads, State* state) {
   const int w = level.reference.width, h = level.reference.height;
   DepthEstimate result{DepthImage(w, h), Grid<float>(w, h)};
   Grid<float> px_per_w(w, h);
   Grid<std::uint8_t> consistent(w, h);
+  Grid<float> weak_cost(w, h);  // 0: reliable, or nothing
   const Limits limits = HasSurfaces(level) ? kAfterRounds : kAfterSearch;
+  const auto keep = [&](int x, int y, const Verdict& v) {
+    // What lies beyond the range by no more than it may be wrong lies at its end.
+    const float slack = kRangeSigmas * v.sigma;
+    if (!(v.w >= level.w_min - slack) || !(v.w <= level.w_max + slack)) return;
+    const float inside = std::clamp(v.w, level.w_min, level.w_max);
+    result.depth(x, y) = static_cast<float>(range.near_z / static_cast<double>(inside));
+    result.inverse_depth_sigma(x, y) =
+        static_cast<float>(static_cast<double>(SigmaWithDoubt(v)) / range.near_z);
+    consistent(x, y) = static_cast<std::uint8_t>(v.consistent);
+  };
   ParallelFor(0, h, threads, [&](int y) {
     std::vector<Verdict> row(static_cast<size_t>(w));
-    JudgeRow(level, state, y, row.data());
+    JudgeRow(level, *state, y, row.data());
     for (int x = 0; x < w; ++x) {
       const Verdict& v = row[static_cast<size_t>(x)];
       if (view.mask != nullptr && !view.mask->empty() && (*view.mask)(x, y) == 0) continue;
-      if (!(v.cost <= limits.cost) || v.agreeing < limits.agreeing) continue;
-      if (!(v.texture >= kLeastTexture)) continue;
-      if (!(v.sigma * v.px <= limits.sigma_px) || !(v.sigma > 0)) continue;
-      // What lies beyond the range by no more than it may be wrong lies at its end.
-      const float slack = kRangeSigmas * v.sigma;
-      if (!(v.w >= level.w_min - slack) || !(v.w <= level.w_max + slack)) continue;
-      const float inside = std::clamp(v.w, level.w_min, level.w_max);
-      result.depth(x, y) = static_cast<float>(range.near_z / static_cast<double>(inside));
-      result.inverse_depth_sigma(x, y) =
-          static_cast<float>(static_cast<double>(SigmaWithDoubt(v)) / range.near_z);
       px_per_w(x, y) = v.px;
-      consistent(x, y) = static_cast<std::uint8_t>(v.consistent);
+      const bool weak = !(v.texture >= kLeastTexture) || !(v.sigma * v.px <= limits.sigma_px);
+      if (weak && v.cost <= kWeakCost) weak_cost(x, y) = std::max(v.cost, kLeastWeakCost);
+      if (weak || !(v.cost <= limits.cost) || v.agreeing < limits.agreeing) continue;
+      if (v.sigma > 0) keep(x, y, v);
     }
   });
   RemoveSpeckles(px_per_w, consistent, static_cast<float>(range.near_z), &result);
-  RemoveAmbiguous(level, state, threads, &result);
+  const Grid<float> prior = PlanarPrior(weak_cost, result.depth, px_per_w, threads, state);
+  ParallelFor(0, h, threads, [&](int y) {
+    const float* first = prior.row(y);
+    if (std::all_of(first, first + w, [](float known) { return known == 0; })) return;
+    std::vector<Verdict> row(static_cast<size_t>(w));
+    JudgeRow(level, *state, y, row.data());
+    for (int x = 0; x < w; ++x) {
+      Verdict& v = row[static_cast<size_t>(x)];
+      if (prior(x, y) == 0 || !(v.cost <= weak_cost(x, y) + kPriorCost)) continue;
+      Combine(prior(x, y), &v);
+      keep(x, y, v);
+    }
+  });
+  RemoveAmbiguous(level, *state, threads, &result);
   return result;
 }
 

@@ -6,8 +6,11 @@
 namespace dtr::stereo::patchmatch {
 
 /// Depth and sigma from the planes of the finest level. Holes where the cost is high, too few views
-/// agree, the minimum is flat, the mask forbids, or a small patch of surface stands alone.
-DepthEstimate TrustedDepth(const Level& level, const State& state, const StereoView& view,
-                           const DepthRange& range, int threads);
+/// agree, the minimum is flat, the mask forbids, a small patch of surface stands alone, or a
+/// texture repeats. Where texture is weak or the minimum flat, reliable planes all around give a
+/// prior (PlanarPrior) that the pixel's own plane is combined with, or that stands in its place in
+/// `state` if the photos say no more against it.
+DepthEstimate TrustedDepth(const Level& level, const StereoView& view, const DepthRange& range,
+                           int threads, State* state);
 
 }  // namespace dtr::stereo::patchmatch

@@ -179,6 +179,39 @@ TEST(PatchMatchExtremes, AWallWithoutTextureHasNoDepthAfterAllRounds) {
   EXPECT_LT(ScoreFirst(views, WholeRun(views, kRange), shots[0].truth).kept, 0.01);
 }
 
+TEST(PatchMatchExtremes, SpotsWithoutTextureGetTheDepthOfTheWallTheyAreOn) {
+  // A row of round spots, 15 px wide, of one grey.
+  const auto in_spot = [](const Vector3d& p) {
+    const double x = p.x() / 1.4;
+    return std::hypot(1.4 * (x - std::round(x)), p.y()) < 0.36;
+  };
+  const auto paint = [&](const Vector3d& p, const Vector3d&) {
+    return in_spot(p) ? 128.0 : Texture(p, kTextureSize);
+  };
+  std::vector<Shot> shots;
+  for (const double x : {0.0, 0.4, -0.4}) {
+    shots.push_back(Photograph(Plane({0, 0, 1}, 4), kCamera, Facing({x, 0, 0}), paint));
+  }
+  const auto views = ViewsOf(shots);
+  const DepthEstimate estimate = WholeRun(views, kRange);
+  // Inside, where a window sees nothing else: 3 px from the rim.
+  const auto inside = [&](int x, int y) {
+    const Vector3d p = kCamera.CamFromPixel({x + 0.5, y + 0.5}, 4, DepthKind::kPlaneZ);
+    for (const double dx : {-3.5, 0.0, 3.5}) {
+      for (const double dy : {-3.5, 0.0, 3.5}) {
+        if (!in_spot(p + Vector3d(dx, dy, 0) * 4 / kFocal)) return false;
+      }
+    }
+    return true;
+  };
+  const Score score = ScoreFirst(views, estimate, shots[0].truth, inside);
+  EXPECT_GT(score.kept, 0.8);
+  EXPECT_LT(score.past_1px, 0.01);
+  EXPECT_GT(score.within_3_sigma, 0.95);
+  // What is not seen but supposed is less sure.
+  EXPECT_GT(score.median_sigma_px, 0.5);
+}
+
 TEST(PatchMatchExtremes, AMirrorHasNoDepthAndHarmsNothingBesideIt) {
   // Left of the middle, a mirror of things far away; the wall it hangs on beside it.
   std::vector<Shot> shots;
