@@ -371,8 +371,8 @@ std::int64_t ScoreRow(const Level& level, const State& state, int y, std::span<c
                       float* costs) {
   return HWY_DYNAMIC_DISPATCH(ScoreRowImpl)(level, state, y, steps, costs);
 }
-void JudgeRow(const Level& level, const State& state, int y, Verdict* out) {
-  HWY_DYNAMIC_DISPATCH(JudgeRowImpl)(level, state, y, out);
+void JudgeRow(const Level& level, const State& state, int y, const float* wanted, Verdict* out) {
+  HWY_DYNAMIC_DISPATCH(JudgeRowImpl)(level, state, y, wanted, out);
 }
 void AmbiguousRow(const Level& level, const State& state, int y, std::uint8_t* ambiguous) {
   HWY_DYNAMIC_DISPATCH(AmbiguousRowImpl)(level, state, y, ambiguous);

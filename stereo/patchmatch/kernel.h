@@ -125,8 +125,9 @@ std::int64_t SearchRow(const Level& level, int samples, int y, State* state);
 /// best. Reads only pixels of the other colour, so rows may run in any order.
 std::int64_t SweepRow(const Level& level, const Sweep& sweep, int y, State* state);
 
-/// Finds the minimum of the cost to a fraction of a pixel and judges it. `out` has a row's length.
-void JudgeRow(const Level& level, const State& state, int y, Verdict* out);
+/// Finds the minimum of the cost to a fraction of a pixel and judges it. `out` has a row's length,
+/// as has `wanted`: pixels where that is 0 may be left out. Null: all are wanted.
+void JudgeRow(const Level& level, const State& state, int y, const float* wanted, Verdict* out);
 
 /// Whether other places on a pixel's ray match about as well as its plane: where a texture repeats
 /// within 12 pixels of disparity, and at infinity, where pictures are copies or mirrors show far

@@ -257,10 +257,20 @@ void JudgeGroup(const Level& level, const State& state, const Group& g, Verdict*
   }
 }
 
-void JudgeRowImpl(const Level& level, const State& state, int y, Verdict* out) {
+/// Whether any pixel of a group is wanted.
+bool AnyWanted(const float* wanted, int x, int width) {
+  for (int i = 0; i < static_cast<int>(kLanes) && x + 2 * i < width; ++i) {
+    if (wanted[x + 2 * i] != 0) return true;
+  }
+  return false;
+}
+
+void JudgeRowImpl(const Level& level, const State& state, int y, const float* wanted,
+                  Verdict* out) {
   Group g;
   for (int start = 0; start < 2; ++start) {
     for (int x = start; x < level.reference.width; x += 2 * static_cast<int>(kLanes)) {
+      if (wanted != nullptr && !AnyWanted(wanted, x, level.reference.width)) continue;
       PrepareGroup(level, x, y, &g);
       JudgeGroup(level, state, g, out);
     }

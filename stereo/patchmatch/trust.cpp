@@ -164,7 +164,7 @@ DepthEstimate TrustedDepth(const Level& level, const StereoView& view, const Dep
   };
   ParallelFor(0, h, threads, [&](int y) {
     std::vector<Verdict> row(static_cast<size_t>(w));
-    JudgeRow(level, *state, y, row.data());
+    JudgeRow(level, *state, y, nullptr, row.data());
     for (int x = 0; x < w; ++x) {
       const Verdict& v = row[static_cast<size_t>(x)];
       if (view.mask != nullptr && !view.mask->empty() && (*view.mask)(x, y) == 0) continue;
@@ -178,10 +178,8 @@ DepthEstimate TrustedDepth(const Level& level, const StereoView& view, const Dep
   RemoveSpeckles(px_per_w, consistent, static_cast<float>(range.near_z), &result);
   const Grid<float> prior = PlanarPrior(weak_cost, result.depth, px_per_w, threads, state);
   ParallelFor(0, h, threads, [&](int y) {
-    const float* first = prior.row(y);
-    if (std::all_of(first, first + w, [](float known) { return known == 0; })) return;
     std::vector<Verdict> row(static_cast<size_t>(w));
-    JudgeRow(level, *state, y, row.data());
+    JudgeRow(level, *state, y, prior.row(y), row.data());
     for (int x = 0; x < w; ++x) {
       Verdict& v = row[static_cast<size_t>(x)];
       if (prior(x, y) == 0 || !(v.cost <= weak_cost(x, y) + kPriorCost)) continue;
