@@ -4,17 +4,15 @@
 #include <fmt/format.h>
 #include <glog/logging.h>
 
-#include <Eigen/Geometry>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>
 #include <optional>
 
+#include "calib/bundle/gauge.h"
 #include "calib/bundle/lens_params.h"
 #include "calib/bundle/normalised.h"
-#include "calib/similarity.h"
 #include "calib/solve/board_start.h"
 #include "dtr/base/error.h"
 
@@ -207,51 +205,6 @@ ceres::Solver::Summary Minimise(const Bundle& bundle, const AdjustOptions& optio
   return summary;
 }
 
-// The similarity that gives the cameras back the mean centre, spread and mean turn of the start.
-Similarity BackToStart(const Bundle& now, const Bundle& start) {
-  const auto count = static_cast<double>(now.images.size());
-  Eigen::Vector3d middle_now = Eigen::Vector3d::Zero(), middle_start = middle_now;
-  Eigen::Matrix3d turns = Eigen::Matrix3d::Zero();
-  for (size_t i = 0; i < now.images.size(); ++i) {
-    const Pose &a = now.images[i].cam_from_world, &b = start.images[i].cam_from_world;
-    middle_now += a.TargetOriginInSource() / count;
-    middle_start += b.TargetOriginInSource() / count;
-    turns += (b.rotation.conjugate() * a.rotation).toRotationMatrix();  // start from now
-  }
-  // The mean of rotations: the orthogonal matrix next to their sum (Moakher 2002).
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(turns, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Matrix3d rotation = svd.matrixU() * svd.matrixV().transpose();
-  if (rotation.determinant() < 0) {
-    Eigen::Matrix3d u = svd.matrixU();
-    u.col(2) = -u.col(2);
-    rotation = u * svd.matrixV().transpose();
-  }
-  double spread_now = 0, spread_start = 0;
-  for (size_t i = 0; i < now.images.size(); ++i) {
-    const Pose &a = now.images[i].cam_from_world, &b = start.images[i].cam_from_world;
-    spread_now += (a.TargetOriginInSource() - middle_now).squaredNorm();
-    spread_start += (b.TargetOriginInSource() - middle_start).squaredNorm();
-  }
-  Similarity start_from_now;
-  if (spread_now > 0 && spread_start > 0) {
-    start_from_now.scale = std::sqrt(spread_start / spread_now);
-  }
-  start_from_now.rotation = Eigen::Quaterniond(rotation);
-  start_from_now.translation =
-      middle_start - start_from_now.scale * (start_from_now.rotation * middle_now);
-  return start_from_now;
-}
-
-void Move(const Similarity& b_from_a, Bundle& bundle) {
-  for (BundleImage& image : bundle.images) {
-    image.cam_from_world = b_from_a.CamFromB(image.cam_from_world);
-  }
-  for (Eigen::Vector4d& h : bundle.points) {
-    const Eigen::Vector3d turned = b_from_a.rotation * h.head<3>();
-    h.head<3>() = b_from_a.scale * turned + h[3] * b_from_a.translation;
-  }
-}
-
 }  // namespace
 
 const char* NameOf(LensFreedom freedom) {
@@ -306,7 +259,7 @@ Adjusted Adjust(const Bundle& bundle, const AdjustOptions& options) {
   }
   out.bundle = n.LocalAt(bundle);
   if (options.positions.empty() && options.distances.empty() && !options.fix_poses) {
-    Move(BackToStart(out.bundle, start), out.bundle);
+    MoveToGaugeOf(start, out.bundle);
   }
   n.ToWorld(out.bundle);
   Describe(residuals, out);

@@ -58,8 +58,8 @@ struct Adjusted {
 ///
 /// Inside, the world is centred and scaled, and points are directions with inverse distances
 /// (sight_cost.h). The gauge is that of the start: without priors, the result is turned, scaled and
-/// moved as a whole so that the cameras' mean centre, their spread and their mean turn are those of
-/// the start; no camera is singled out. With priors on positions, these decide.
+/// moved as a whole to be as near to the start's cameras as can be (gauge.h); no camera is singled
+/// out. With priors on positions, these decide.
 ///
 /// One thread, sums in one order: the same bits every time. Throws Error as CheckBundle does, on
 /// priors that cannot be meant, and when no sight has a pixel or the solver finds no finite

@@ -1,0 +1,315 @@
+#include "calib/bundle/covariance.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "calib/bundle/gauge.h"
+#include "calib/bundle/lens_params.h"
+#include "calib/bundle/normalised.h"
+
+namespace dtr::calib {
+namespace {
+
+// Eigenvalues of a matrix with a unit diagonal below this are rounding: of sums of thousands.
+constexpr double kSingular = 1e-13;
+// A direction of the gauge is settled when the priors' information about it is more than this share
+// of the sights' typical information.
+constexpr double kSettled = 1e-12;
+
+using RowJacobian = Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor>;
+
+struct SightRows {
+  RowJacobian lens;
+  Eigen::Matrix<double, 2, 6, Eigen::RowMajor> pose;
+  Eigen::Matrix<double, 2, 3, Eigen::RowMajor> point;
+};
+
+bool Rows(const Normalised& n, const Bundle& bundle, const BundleObservation& sight,
+          SightRows& rows) {
+  const auto image = static_cast<size_t>(sight.image);
+  const auto lens = static_cast<size_t>(bundle.images[image].lens);
+  const double* blocks[] = {n.theta[lens].data(), n.motion[image].data(),
+                            n.place[static_cast<size_t>(sight.point)].data()};
+  rows.lens.resize(2, static_cast<long>(n.lenses[lens].centre.size()));
+  double* jacobians[] = {rows.lens.data(), rows.pose.data(), rows.point.data()};
+  Eigen::Vector2d residual;
+  return n.Cost(bundle, sight)->Evaluate(blocks, residual.data(), jacobians) &&
+         rows.lens.allFinite() && rows.pose.allFinite() && rows.point.allFinite();
+}
+
+std::vector<int> FreeParams(const LensCamera& lens, LensFreedom freedom) {
+  std::vector<int> free;
+  const int focals = static_cast<int>(FocalCount(lens.model));
+  for (int k = 0; k < ParameterCount(lens.model); ++k) {
+    const bool centre = k >= focals && k < focals + 2;
+    if (freedom == LensFreedom::kAll || (freedom == LensFreedom::kNoPrincipalPoint && !centre)) {
+      free.push_back(k);
+    }
+  }
+  return free;
+}
+
+// Adds what the sights of one point, the point eliminated, say about lenses and poses.
+void AddPoint(const Normalised& n, const Bundle& bundle, const BundleCovariance& layout,
+              const std::vector<const BundleObservation*>& sights, Eigen::MatrixXd& information) {
+  std::vector<int> columns;  // unknowns these sights depend on
+  std::vector<SightRows> rows;
+  std::vector<std::pair<int, int>> lens_image;
+  const auto column_of = [&](int unknown) {
+    const auto found = std::find(columns.begin(), columns.end(), unknown);
+    if (found != columns.end()) return static_cast<long>(found - columns.begin());
+    columns.push_back(unknown);
+    return static_cast<long>(columns.size()) - 1;
+  };
+  for (const BundleObservation* sight : sights) {
+    SightRows made;
+    if (!Rows(n, bundle, *sight, made)) continue;
+    const int lens = bundle.images[static_cast<size_t>(sight->image)].lens;
+    for (size_t k = 0; k < layout.free_params[static_cast<size_t>(lens)].size(); ++k) {
+      column_of(layout.lens_at[static_cast<size_t>(lens)] + static_cast<int>(k));
+    }
+    for (int k = 0; k < 6; ++k) {
+      column_of(layout.image_at[static_cast<size_t>(sight->image)] + k);
+    }
+    rows.push_back(std::move(made));
+    lens_image.emplace_back(lens, sight->image);
+  }
+  const auto height = 2 * static_cast<long>(rows.size());
+  if (height < 4) return;  // one sight says nothing about anything but its point
+  Eigen::MatrixXd by_point(height, 3);
+  Eigen::MatrixXd by_rest = Eigen::MatrixXd::Zero(height, static_cast<long>(columns.size()));
+  for (size_t i = 0; i < rows.size(); ++i) {
+    const auto at = 2 * static_cast<long>(i);
+    by_point.middleRows<2>(at) = rows[i].point;
+    const auto [lens, image] = lens_image[i];
+    const auto& free = layout.free_params[static_cast<size_t>(lens)];
+    for (size_t k = 0; k < free.size(); ++k) {
+      by_rest.block<2, 1>(at, column_of(layout.lens_at[static_cast<size_t>(lens)] +
+                                        static_cast<int>(k))) = rows[i].lens.col(free[k]);
+    }
+    for (int k = 0; k < 6; ++k) {
+      by_rest.block<2, 1>(at, column_of(layout.image_at[static_cast<size_t>(image)] + k)) =
+          rows[i].pose.col(k);
+    }
+  }
+  // Orthogonal elimination: subtracting W V^-1 W^T would lose the digits that tell far points'
+  // depth.
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(by_point);
+  const Eigen::MatrixXd turned = qr.householderQ().adjoint() * by_rest;
+  const Eigen::MatrixXd left = turned.bottomRows(height - qr.rank());
+  const Eigen::MatrixXd product = left.transpose() * left;
+  for (size_t i = 0; i < columns.size(); ++i) {
+    for (size_t j = 0; j < columns.size(); ++j) {
+      information(columns[i], columns[j]) += product(static_cast<long>(i), static_cast<long>(j));
+    }
+  }
+}
+
+// Orthonormal directions of the unknowns that move the world as a whole: three shifts, three turns,
+// a scale (which none is where all cameras stand in one place).
+Eigen::MatrixXd GaugeDirections(const Normalised& n, const BundleCovariance& layout,
+                                long unknowns) {
+  const Eigen::MatrixXd columns = GaugeColumns(n.poses);
+  Eigen::MatrixXd directions = Eigen::MatrixXd::Zero(unknowns, 7);
+  for (size_t i = 0; i < n.poses.size(); ++i) {
+    directions.middleRows<6>(layout.image_at[i]) = columns.middleRows<6>(6 * static_cast<long>(i));
+  }
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(directions);
+  const Eigen::MatrixXd thin =
+      qr.householderQ() * Eigen::MatrixXd::Identity(unknowns, std::min<long>(7, unknowns));
+  return thin.leftCols(qr.rank());
+}
+
+Eigen::MatrixXd PriorInformation(const Normalised& n, const BundleCovariance& layout,
+                                 const AdjustOptions& options, long unknowns) {
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(unknowns, unknowns);
+  const double unit_px = layout.sigma_px * n.unit;  // sights' units: everything is scaled by sigma
+  for (const PositionPrior& p : options.positions) {
+    const long at = layout.image_at[static_cast<size_t>(p.image)] + 3;
+    for (int k = 0; k < 3; ++k) {
+      information(at + k, at + k) += std::pow(unit_px / p.sigma[k], 2);
+    }
+  }
+  for (const DistancePrior& d : options.distances) {
+    const auto a = static_cast<size_t>(d.image_a), b = static_cast<size_t>(d.image_b);
+    const Eigen::Vector3d along = (n.poses[a].centre - n.poses[b].centre).normalized();
+    Eigen::VectorXd row = Eigen::VectorXd::Zero(unknowns);
+    row.segment<3>(layout.image_at[a] + 3) = unit_px / d.sigma * along;
+    row.segment<3>(layout.image_at[b] + 3) = -unit_px / d.sigma * along;
+    information += row * row.transpose();
+  }
+  return information;
+}
+
+// The directions of the gauge that no prior settles.
+Eigen::MatrixXd OpenDirections(const Eigen::MatrixXd& gauge, const Eigen::MatrixXd& priors,
+                               double typical) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(gauge.transpose() * priors * gauge);
+  long open = 0;
+  while (open < gauge.cols() && eigen.eigenvalues()[open] <= kSettled * typical) ++open;
+  return gauge * eigen.eigenvectors().leftCols(open);
+}
+
+std::string NameOfUnknown(const Bundle& bundle, const BundleCovariance& layout, long unknown) {
+  for (size_t i = 0; i < layout.free_params.size(); ++i) {
+    const long k = unknown - layout.lens_at[i];
+    if (k < 0 || k >= static_cast<long>(layout.free_params[i].size())) continue;
+    const auto names = ParameterNames(bundle.lenses[i].model);
+    return fmt::format("{} of lens {}",
+                       names[static_cast<size_t>(layout.free_params[i][static_cast<size_t>(k)])],
+                       i + 1);
+  }
+  for (size_t i = 0; i < layout.image_at.size(); ++i) {
+    const long k = unknown - layout.image_at[i];
+    if (k < 0 || k >= 6) continue;
+    return fmt::format("{} of {}", k < 3 ? "turn" : "place", bundle.images[i].name);
+  }
+  return "";
+}
+
+// Inverts the information with the gauge's directions left out.
+void Invert(const Bundle& bundle, const Eigen::MatrixXd& information, const Eigen::MatrixXd& open,
+            BundleCovariance& out) {
+  const long unknowns = information.rows();
+  const double typical = information.trace() / static_cast<double>(unknowns);
+  const Eigen::MatrixXd closed = information + typical * open * open.transpose();
+  const Eigen::VectorXd diagonal = closed.diagonal();
+  if (!closed.allFinite() || !(diagonal.array() > 0).all()) {
+    long index = 0;
+    diagonal.minCoeff(&index);
+    out.determined = false;
+    out.weakest = NameOfUnknown(bundle, out, index);
+    out.condition = std::numeric_limits<double>::infinity();
+    return;
+  }
+  const Eigen::VectorXd scale = diagonal.cwiseSqrt().cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * closed *
+                                                             scale.asDiagonal());
+  const double least = eigen.eigenvalues()[0], most = eigen.eigenvalues()[unknowns - 1];
+  long index = 0;
+  eigen.eigenvectors().col(0).cwiseAbs().maxCoeff(&index);
+  out.weakest = NameOfUnknown(bundle, out, index);
+  out.condition = least > 0 ? std::sqrt(most / least) : std::numeric_limits<double>::infinity();
+  out.determined = least > kSingular;
+  if (!out.determined) return;
+  const Eigen::MatrixXd half = scale.asDiagonal() * eigen.eigenvectors() *
+                               eigen.eigenvalues().cwiseSqrt().cwiseInverse().asDiagonal();
+  out.matrix = half * half.transpose() - open * open.transpose() / typical;
+  out.matrix *= out.sigma_px * out.sigma_px;
+}
+
+// From the solver's units to parameters, radians and world units.
+void ToUnits(const Normalised& n, BundleCovariance& out) {
+  Eigen::VectorXd units = Eigen::VectorXd::Ones(out.matrix.rows());
+  for (size_t i = 0; i < out.lens_at.size(); ++i) {
+    for (size_t k = 0; k < out.free_params[i].size(); ++k) {
+      units[out.lens_at[i] + static_cast<long>(k)] =
+          n.lenses[i].scale[static_cast<size_t>(out.free_params[i][k])];
+    }
+  }
+  for (const int at : out.image_at) units.segment<3>(at + 3).setConstant(n.unit);
+  out.matrix = units.asDiagonal() * out.matrix * units.asDiagonal();
+}
+
+}  // namespace
+
+Eigen::MatrixXd BundleCovariance::OfImage(int image) const {
+  const long at = image_at[static_cast<size_t>(image)];
+  return matrix.block<6, 6>(at, at);
+}
+
+Eigen::MatrixXd BundleCovariance::OfLens(const Bundle& bundle, int lens) const {
+  const auto& free = free_params[static_cast<size_t>(lens)];
+  const long size = static_cast<long>(bundle.lenses[static_cast<size_t>(lens)].params.size());
+  Eigen::MatrixXd of_lens = Eigen::MatrixXd::Zero(size, size);
+  const long at = lens_at[static_cast<size_t>(lens)];
+  for (size_t i = 0; i < free.size(); ++i) {
+    for (size_t j = 0; j < free.size(); ++j) {
+      of_lens(free[i], free[j]) = matrix(at + static_cast<long>(i), at + static_cast<long>(j));
+    }
+  }
+  return of_lens;
+}
+
+BundleCovariance CovarianceOf(const Adjusted& adjusted, const AdjustOptions& options) {
+  const Bundle& bundle = adjusted.bundle;
+  BundleCovariance out;
+  out.sigma_px = adjusted.sigma_px;
+  int unknowns = 0;
+  for (const LensCamera& lens : bundle.lenses) {
+    out.free_params.push_back(FreeParams(lens, options.lens));
+    out.lens_at.push_back(unknowns);
+    unknowns += static_cast<int>(out.free_params.back().size());
+  }
+  for (size_t i = 0; i < bundle.images.size(); ++i) {
+    out.image_at.push_back(unknowns);
+    unknowns += 6;
+  }
+  if (unknowns > kMostUnknowns) return out;
+  out.computed = true;
+  const Normalised n = Normalised::Around(bundle);
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(unknowns, unknowns);
+  std::vector<std::vector<const BundleObservation*>> tracks(bundle.points.size());
+  for (size_t i = 0; i < bundle.observations.size(); ++i) {
+    if (!adjusted.used[i]) continue;
+    tracks[static_cast<size_t>(bundle.observations[i].point)].push_back(&bundle.observations[i]);
+  }
+  for (const auto& sights : tracks) AddPoint(n, bundle, out, sights, information);
+  const Eigen::MatrixXd priors = PriorInformation(n, out, options, unknowns);
+  const Eigen::MatrixXd open =
+      OpenDirections(GaugeDirections(n, out, unknowns), priors, information.trace() / unknowns);
+  out.gauge_freedom = static_cast<int>(open.cols());
+  Invert(bundle, information + priors, open, out);
+  if (out.determined) ToUnits(n, out);
+  return out;
+}
+
+Eigen::Matrix2d TransferCovariance(const Bundle& bundle, const BundleCovariance& covariance,
+                                   const Eigen::Vector3d& p_in_world, int a, int b, int seen_in) {
+  const Eigen::Matrix2d none = Eigen::Matrix2d::Constant(std::numeric_limits<double>::quiet_NaN());
+  Bundle one;
+  one.lenses = bundle.lenses;
+  one.points = {p_in_world.homogeneous()};
+  const int images[] = {a, b, seen_in};
+  for (int i = 0; i < 3; ++i) {
+    one.images.push_back(bundle.images[static_cast<size_t>(images[i])]);
+    one.observations.push_back({i, 0, Eigen::Vector2d::Zero()});
+  }
+  const Normalised n = Normalised::Around(one);
+  SightRows rows[3];
+  for (size_t i = 0; i < 3; ++i) {
+    if (!Rows(n, one, one.observations[i], rows[i])) return none;
+  }
+  Eigen::Matrix<double, 4, 3> by_point;
+  by_point << rows[0].point, rows[1].point;
+  const Eigen::ColPivHouseholderQR<Eigen::Matrix<double, 4, 3>> qr(by_point);
+  if (qr.rank() < 3) return none;
+  // The point moves with a and b by -(A^T A)^-1 A^T B, so that its pixels in them stay.
+  const Eigen::Matrix<double, 2, 4> follows = rows[2].point * qr.solve(Eigen::Matrix4d::Identity());
+  Eigen::MatrixXd by_all = Eigen::MatrixXd::Zero(2, covariance.matrix.rows());
+  for (size_t i = 0; i < 3; ++i) {
+    const auto lens = static_cast<size_t>(one.images[i].lens);
+    const Eigen::Matrix2d lever =
+        i < 2 ? Eigen::Matrix2d(-follows.block<2, 2>(0, 2 * static_cast<long>(i)))
+              : Eigen::Matrix2d::Identity();
+    const auto& free = covariance.free_params[lens];
+    for (size_t k = 0; k < free.size(); ++k) {
+      by_all.col(covariance.lens_at[lens] + static_cast<long>(k)) +=
+          lever * rows[i].lens.col(free[k]) / n.lenses[lens].scale[static_cast<size_t>(free[k])];
+    }
+    const long at = covariance.image_at[static_cast<size_t>(images[i])];
+    by_all.middleCols<3>(at) += lever * rows[i].pose.leftCols<3>();
+    by_all.middleCols<3>(at + 3) += lever * rows[i].pose.rightCols<3>() / n.unit;
+  }
+  return by_all * covariance.matrix * by_all.transpose();
+}
+
+}  // namespace dtr::calib

@@ -1,0 +1,21 @@
+// calib/bundle/gauge.h -- internal to calib/bundle: the seven ways to move a world as a whole.
+#pragma once
+#include <Eigen/Core>
+#include <vector>
+
+#include "calib/bundle/bundle.h"
+#include "calib/bundle/sight_cost.h"
+
+namespace dtr::calib {
+
+/// Derivatives of all poses (6 rows each: turn w, shift v of the centre, as in sight_cost.h) by a
+/// shift, a turn and a growth of the world: 7 columns, the last zero where all stand in the origin.
+Eigen::MatrixXd GaugeColumns(const std::vector<PoseFrame>& poses);
+
+/// Moves `now` as a whole so that its cameras are as near as can be to those of `start`: least
+/// squares over turns (radians) and centres together (units of the bundle). At the minimum the
+/// difference is orthogonal to every GaugeColumn: these are the inner constraints of a free network
+/// (Triggs et al. 2000, sec. 9.4), to which the free network's covariance belongs.
+void MoveToGaugeOf(const Bundle& start, Bundle& now);
+
+}  // namespace dtr::calib
