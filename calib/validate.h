@@ -56,6 +56,7 @@ struct ValidationReport {
   /// model that does not fit shows here first.
   std::array<ResidualStats, kRegionsPerAxis * kRegionsPerAxis> regions;
   std::vector<std::string> untested;  ///< cameras with too few tested observations
+  std::string adjustment_json;  ///< what a fresh bundle adjustment says (bundle/judge.h); may be ""
   bool passed() const { return AllPassed(tests); }
 };
 
@@ -84,8 +85,8 @@ ValidationReport ValidateReprojection(std::span<const PinholeCamera> cameras,
 
 /// JSON object: passed, tests[].{name,value,limit,passed,reason},
 /// cameras[].{name,held_out,stored,short_tracks,weak_geometry,impossible}, held_out, stored,
-/// regions[9], untested[]; residuals as {count,rms_px,median_px,p95_px,worst_px,mean_x_px,
-/// mean_y_px}.
+/// regions[9], untested[], adjustment (where there is one); residuals as
+/// {count,rms_px,median_px,p95_px,worst_px,mean_x_px, mean_y_px}.
 std::string ToJson(const ValidationReport& report);
 
 }  // namespace dtr::calib

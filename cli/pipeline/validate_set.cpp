@@ -3,7 +3,8 @@
 namespace dtr::pipeline {
 
 calib::ValidationReport ValidateSet(const DtrSet& set, const SparseScene& sparse,
-                                    const calib::ValidateLimits& limits, int threads) {
+                                    const calib::ValidateLimits& limits, int threads,
+                                    const calib::JudgeLimits& judge_limits) {
   std::vector<PinholeCamera> cameras;
   std::vector<Pose> poses;
   std::vector<std::string> names;
@@ -12,7 +13,13 @@ calib::ValidationReport ValidateSet(const DtrSet& set, const SparseScene& sparse
     poses.push_back(view.cam_from_world);
     names.push_back(view.name);
   }
-  return calib::ValidateReprojection(cameras, poses, sparse, limits, names, threads);
+  calib::ValidationReport report =
+      calib::ValidateReprojection(cameras, poses, sparse, limits, names, threads);
+  const calib::Judgement judgement =
+      calib::Judge(calib::BundleOf(cameras, poses, names, sparse), judge_limits, threads);
+  report.tests.insert(report.tests.end(), judgement.tests.begin(), judgement.tests.end());
+  report.adjustment_json = calib::ToJson(judgement);
+  return report;
 }
 
 }  // namespace dtr::pipeline

@@ -1,5 +1,6 @@
 // cli/pipeline/validate_set.h -- the reprojection tests on everything a set knows.
 #pragma once
+#include "calib/bundle/judge.h"
 #include "calib/validate.h"
 #include "dtr/types/dtr_set.h"
 #include "dtr/types/sparse_scene.h"
@@ -7,8 +8,10 @@
 namespace dtr::pipeline {
 
 /// Tests every view of the set's first frame, held-out ones included. Views of `sparse` are indices
-/// into that frame. Pixels need not be loaded.
+/// into that frame. Pixels need not be loaded. Then the set is judged by a fresh bundle adjustment
+/// (calib/bundle/judge.h), whose tests and figures join the report.
 calib::ValidationReport ValidateSet(const DtrSet& set, const SparseScene& sparse,
-                                    const calib::ValidateLimits& limits, int threads);
+                                    const calib::ValidateLimits& limits, int threads,
+                                    const calib::JudgeLimits& judge_limits = {});
 
 }  // namespace dtr::pipeline

@@ -1,0 +1,80 @@
+// calib/bundle/judge.h -- is a stored calibration right, do its data suffice, and does it show?
+#pragma once
+#include <string>
+#include <vector>
+
+#include "calib/bundle/covariance.h"
+#include "dtr/types/check.h"
+
+namespace dtr::calib {
+
+struct JudgeLimits {
+  /// Stored against freshly solved, in predicted standard deviations (Mahalanobis length): of six
+  /// unknowns of a pose, chance alone exceeds 5 once in 3000.
+  double max_sigmas = 5;
+  /// A difference that moves the scene's points by less than this in the image is no fault, however
+  /// many standard deviations it is.
+  double negligible_px = 0.1;
+  /// Two disjoint halves of the points, solved apart: RMS of their difference over the predicted.
+  double max_halves_ratio = 3;
+  /// 95 % of a third view's points, as its two best neighbours place them: standard deviation.
+  double max_picture_shift_px = 1;
+  double max_focal_share = 0.1;  ///< standard deviation of a focal length over itself
+};
+
+/// A way in which the views do not suffice, by name.
+struct Degeneracy {
+  std::string name;      ///< "pure_rotation", "collinear_centres", ...
+  std::string detail;    ///< what was found, in numbers
+  bool harmful = false;  ///< something is undetermined for it; else it is only worth knowing
+};
+
+/// What is known of one camera (image) after the fresh solve.
+struct CameraJudgement {
+  std::string name;
+  double sigmas = 0;            ///< stored pose against the fresh one
+  double moved_px = 0;          ///< RMS over its sights, stored camera against fresh one
+  double turn_sigma_rad = 0;    ///< largest axis of the turn's uncertainty
+  double centre_sigma = 0;      ///< of the centre's, world units, in the free network's gauge
+  double picture_shift_px = 0;  ///< 95 %; NaN where no two neighbours place its points
+};
+
+/// What is known of one lens: differences and uncertainties of its parameters.
+struct LensJudgement {
+  std::vector<std::string> names;
+  std::vector<double> stored, fresh, sigma;
+  double sigmas = 0, moved_px = 0;
+};
+
+struct Judgement {
+  std::string not_judged;  ///< why there is no judgement; empty where there is one
+  std::vector<Check> tests;
+  std::vector<CameraJudgement> cameras;
+  std::vector<LensJudgement> lenses;
+  std::vector<Degeneracy> degeneracies;
+  double sigma_px = 0, condition = 0, halves_ratio = 0;
+  int sights = 0;
+};
+
+/// Judges cameras and poses of undistorted views against their own sights:
+///  - all are solved for anew from the sights, distortion included, and the stored ones compared
+///    with that, each pose and each lens as a Mahalanobis distance;
+///  - two halves of the points, dealt by chance, are solved apart and compared; where they differ
+///    by more than predicted, all uncertainties are widened by that factor;
+///  - the covariance is carried to a third view's pixels (TransferCovariance);
+///  - degeneracies are looked for by name.
+/// At most 4000 points, drawn by their index, take part. Deterministic for any number of threads.
+/// Throws Error on a broken bundle only.
+Judgement Judge(const Bundle& stored, const JudgeLimits& limits, int threads = 0);
+
+/// Degeneracies of a solution (degeneracy.cpp says how each is recognised). `covariance` may be one
+/// that is not determined.
+std::vector<Degeneracy> FindDegeneracies(const Adjusted& adjusted,
+                                         const BundleCovariance& covariance,
+                                         double max_focal_share);
+
+/// JSON object: sigma_px, condition, halves_ratio, sights, lenses[], cameras[], degeneracies[],
+/// not_judged.
+std::string ToJson(const Judgement& judgement);
+
+}  // namespace dtr::calib

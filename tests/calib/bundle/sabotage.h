@@ -1,0 +1,172 @@
+// tests/calib/bundle/sabotage.h -- photo sets spoiled by seed, and whether that is found.
+#pragma once
+#include <Eigen/LU>
+#include <iostream>
+
+#include "calib/bundle/covariance.h"
+#include "calib/bundle/judge.h"
+#include "tests/calib/bundle/synthetic_bundle.h"
+
+namespace dtr::testing {
+
+using namespace calib;  // NOLINT: the tests' own short-hand
+
+inline const LensCamera kPinholeLens{LensModel::kPinhole, 1000, 800, {900, 905, 504, 397}};
+
+inline AdjustOptions AllFree() {
+  AdjustOptions options;
+  options.lens = LensFreedom::kAll;
+  return options;
+}
+
+// A set as `dtr build` leaves it: adjusted to its own noisy sights.
+inline Bundle Honest(std::uint64_t seed, int points = 300) {
+  const Bundle seen = MakeBundle(
+      {.images = 7, .points = points, .lens = kPinholeLens, .noise_px = 0.3, .seed = seed});
+  return Adjust(seen, AllFree()).bundle;
+}
+
+inline const Check* Failed(const Judgement& judgement, const std::string& name) {
+  for (const Check& test : judgement.tests) {
+    if (test.name == name && !test.passed) return &test;
+  }
+  return nullptr;
+}
+
+inline std::string Broken(const Judgement& judgement) {
+  std::string names;
+  for (const Check& test : judgement.tests) {
+    if (!test.passed) names += test.name + " (" + test.reason + ") ";
+  }
+  return names;
+}
+
+// How many standard deviations a stored calibration is off, as the honest one's covariance has it.
+struct Sabotaged {
+  Bundle bundle;
+  double sigmas = 0;
+  std::string test, word;  // that must fail, and what its reason must name
+};
+
+inline Eigen::Vector3d Direction(Random& random) {
+  const double x = random.Normal(), y = random.Normal();
+  return Eigen::Vector3d(x, y, random.Normal()).normalized();
+}
+
+inline Sabotaged Sabotage(const Bundle& honest, int kind, Random& random) {
+  Sabotaged s{honest, 0, "", ""};
+  const Adjusted adjusted = Adjust(honest, AllFree());
+  const BundleCovariance covariance = CovarianceOf(adjusted, AllFree());
+  const double wanted = random.Uniform(8, 40);
+  const int image = random.Index(static_cast<int>(honest.images.size()));
+  Pose& pose = s.bundle.images[static_cast<size_t>(image)].cam_from_world;
+  std::vector<double>& params = s.bundle.lenses[0].params;
+  const Eigen::MatrixXd of_lens = covariance.OfLens(honest, 0);
+  const Eigen::MatrixXd of_image = covariance.OfImage(image);
+  switch (kind) {
+    case 0:  // focal lengths
+      s.sigmas = wanted;
+      params[0] += wanted * std::sqrt(of_lens(0, 0));
+      params[1] += wanted * std::sqrt(of_lens(0, 0));
+      s.test = "lens_difference_sigmas";
+      s.word = "px: stored";
+      break;
+    case 1:  // principal point
+      s.sigmas = wanted;
+      params[2] += wanted * std::sqrt(of_lens(2, 2));
+      s.test = "lens_difference_sigmas";
+      s.word = "px: stored";
+      break;
+    case 2: {  // a camera is moved
+      const Eigen::Vector3d d = Direction(random);
+      const Eigen::Matrix3d m = of_image.bottomRightCorner<3, 3>();
+      const double length = wanted / std::sqrt(d.dot(m.inverse() * d));
+      s.sigmas = wanted;
+      pose.translation -= pose.rotation * (length * d);
+      s.test = "camera_difference_sigmas";
+      s.word = honest.images[static_cast<size_t>(image)].name;
+      break;
+    }
+    case 3: {  // a camera is turned
+      const Eigen::Vector3d d = Direction(random);
+      const Eigen::Matrix3d m = of_image.topLeftCorner<3, 3>();
+      const double angle = wanted / std::sqrt(d.dot(m.inverse() * d));
+      s.sigmas = wanted;
+      const Eigen::Vector3d centre = pose.TargetOriginInSource();
+      pose.rotation = (Eigen::AngleAxisd(angle, d) * pose.rotation).normalized();
+      pose.translation = -(pose.rotation * centre);
+      s.test = "camera_difference_sigmas";
+      s.word = honest.images[static_cast<size_t>(image)].name;
+      break;
+    }
+    case 4: {  // two cameras are swapped
+      s.sigmas = 1e3;
+      const int other = (image + 1) % static_cast<int>(honest.images.size());
+      std::swap(pose, s.bundle.images[static_cast<size_t>(other)].cam_from_world);
+      s.test = "camera_difference_sigmas";
+      s.word = "pose";
+      break;
+    }
+    case 5:  // an image twice
+      s.sigmas = 1e3;
+      s.bundle.images.push_back(honest.images[static_cast<size_t>(image)]);
+      s.bundle.images.back().name = "copy";
+      for (const BundleObservation& o : honest.observations) {
+        if (o.image != image) continue;
+        s.bundle.observations.push_back(o);
+        s.bundle.observations.back().image = static_cast<int>(honest.images.size());
+      }
+      std::stable_sort(s.bundle.observations.begin(), s.bundle.observations.end(),
+                       [](const auto& a, const auto& b) {
+                         return std::pair(a.point, a.image) < std::pair(b.point, b.image);
+                       });
+      s.test = "degeneracies";
+      s.word = "duplicate_images";
+      break;
+    default: {  // pixels as another lens would have undistorted them
+      s.sigmas = 1e3;
+      for (BundleObservation& o : s.bundle.observations) {
+        const Eigen::Vector2d q((o.pixel.x() - 504) / 900, (o.pixel.y() - 397) / 905);
+        const double factor = 0.02 * q.squaredNorm();
+        o.pixel += factor * Eigen::Vector2d(900 * q.x(), 905 * q.y());
+      }
+      s.test = "lens_difference_sigmas";
+      s.word = "stored";
+      break;
+    }
+  }
+  return s;
+}
+
+// Sabotages drawn by seed: how many that can be seen were caught, with the right test named.
+struct Score {
+  int caught = 0, missed = 0, not_detectable = 0, honest_passed = 0;
+};
+
+inline Score SabotageAll(int count, std::uint64_t seed) {
+  Score score;
+  for (int k = 0; k < count; ++k) {
+    Random random(HashOf(seed, static_cast<std::uint64_t>(k)));
+    const Bundle honest = Honest(HashOf(seed, static_cast<std::uint64_t>(k), 5));
+    const Judgement good = Judge(honest, {}, 1);
+    score.honest_passed += AllPassed(good.tests);
+    if (!AllPassed(good.tests)) std::cout << "honest " << k << ": " << Broken(good) << "\n";
+    const Sabotaged bad = Sabotage(honest, k % 7, random);
+    const Judgement judged = Judge(bad.bundle, {}, 1);
+    const Check* failed = Failed(judged, bad.test);
+    if (failed != nullptr && failed->reason.find(bad.word) != std::string::npos) {
+      ++score.caught;
+      continue;
+    }
+    double moved = 0;
+    for (const auto& camera : judged.cameras) moved = std::max(moved, camera.moved_px);
+    const bool invisible = moved <= JudgeLimits{}.negligible_px;
+    (invisible ? score.not_detectable : score.missed) += 1;
+    std::cout << (invisible ? "not detectable: " : "missed: ") << "kind " << k % 7 << ", "
+              << bad.sigmas << " sigmas, points move by " << moved << " px; " << Broken(judged)
+              << "\n";
+  }
+  return score;
+}
+
+}  // namespace dtr::testing
