@@ -251,9 +251,19 @@ void AddHalves(const JudgeLimits& limits, const Adjusted halves[2], Judgement& j
   judgement.halves_ratio = covariances[0].determined && covariances[1].determined
                                ? HalvesRatio(halves, covariances)
                                : kNothing;
-  judgement.tests.push_back(
+  Check check =
       AtMost("halves_ratio", judgement.halves_ratio, limits.max_halves_ratio,
-             "two halves of the points, solved apart: their poses' difference over the predicted"));
+             "two halves of the points, solved apart: their poses' difference over the predicted");
+  double moved_px = 0;
+  for (const double px : Moved(halves[0].bundle, halves[1].bundle)) {
+    if (px > moved_px) moved_px = px;
+  }
+  // Exact sights leave rounding, of which no ratio means anything.
+  if (moved_px <= limits.negligible_px) {
+    check.passed = true;
+    check.reason += fmt::format("; points move by {:.2g} px at most", moved_px);
+  }
+  judgement.tests.push_back(std::move(check));
 }
 
 std::string LensReason(const LensJudgement& lens) {
