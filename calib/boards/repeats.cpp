@@ -6,11 +6,8 @@
 #include <cmath>
 
 namespace dtr::calib {
-namespace {
 
-// Mean distance of the corners of `view` to the same ones of `earlier`; infinite where one is
-// missing.
-double DistancePx(const BoardView& view, const BoardView& earlier) {
+double MeanDistancePx(const BoardView& view, const BoardView& earlier) {
   double sum = 0;
   auto other = earlier.corners.begin();
   for (const BoardCorner& corner : view.corners) {
@@ -21,8 +18,6 @@ double DistancePx(const BoardView& view, const BoardView& earlier) {
   return sum / static_cast<double>(std::max<size_t>(1, view.corners.size()));
 }
 
-}  // namespace
-
 double NearestViewsPx(int width_px, int height_px) {
   return 0.002 * std::hypot(width_px, height_px);
 }
@@ -32,7 +27,7 @@ std::vector<LeftOut> TakeOutRepeats(double nearest_px, std::vector<BoardView>& v
   std::vector<LeftOut> left_out;
   for (BoardView& view : views) {
     const auto repeated = std::find_if(kept.begin(), kept.end(), [&](const BoardView& earlier) {
-      return DistancePx(view, earlier) < nearest_px;
+      return MeanDistancePx(view, earlier) < nearest_px;
     });
     if (repeated == kept.end()) {
       kept.push_back(std::move(view));

@@ -6,6 +6,10 @@
 
 namespace dtr::calib {
 
+/// Mean distance of the corners of `view` to the same ones of `earlier`, px; infinite where one is
+/// missing there.
+double MeanDistancePx(const BoardView& view, const BoardView& earlier);
+
 /// Takes out of `views` each one that shows the board where an earlier one (in the order given)
 /// showed it: it sees no corner that the earlier one does not, and the corners lie on average less
 /// than `nearest_px` away. Errors of such views are the same errors again (of the print, the pixel

@@ -18,14 +18,19 @@ struct CalibratedCamera {
   std::string name;
   BoardModel model = BoardModel::kPinhole;
   LensCamera camera;
-  Eigen::MatrixXd covariance;       ///< of FreeParameterNames(model)
+  Eigen::MatrixXd covariance;       ///< of FreeParameterNames(model); zero where the lens was given
   double rms_px = 0, sigma_px = 0;  ///< as BoardSolution has them
+  /// Of a rig; frame `rig` is the first camera's. The covariance, 6 x 6, is of (w, v) as RigLayout
+  /// (solve/rig.h) has them; empty for the first camera and outside of rigs.
+  Pose cam_from_rig{};
+  Eigen::MatrixXd place_covariance{};
 };
 
 /// A view of the board: what was seen, and how the calibration explains it.
 struct CalibratedView {
   BoardView seen;
   size_t camera = 0;  ///< index into Calibration::cameras
+  size_t frame = 0;   ///< views of one frame show the board at the same instant; in order of time
   Pose cam_from_board;
   std::vector<int> outliers;  ///< rising ids of corners that were not used
 };
@@ -45,7 +50,11 @@ struct Calibration {
   std::vector<CalibratedView> views;
   std::vector<LeftOut> left_out;
   std::vector<TriedModel> models;  ///< of --model auto
+  bool lenses_given = false;       ///< of a rig whose lenses were not solved for
 };
+
+/// Largest frame number in a file.
+inline constexpr size_t kLargestFrame = 1'000'000;
 
 /// Reads what WriteCalibration wrote (docs/CALIBRATION.md has the fields). Safe on any bytes: sizes
 /// are bounded, every number finite, ids inside the board, covariances symmetric with positive

@@ -33,29 +33,35 @@ Json ParamsJson(const CalibratedCamera& camera) {
   return json;
 }
 
-Json CameraJson(const CalibratedCamera& camera) {
-  Json covariance = Json::array();
-  for (long i = 0; i < camera.covariance.rows(); ++i) {
-    const Eigen::VectorXd row = camera.covariance.row(i);
-    covariance.push_back(std::vector<double>(row.begin(), row.end()));
+Json MatrixJson(const Eigen::MatrixXd& matrix) {
+  Json rows = Json::array();
+  for (long i = 0; i < matrix.rows(); ++i) {
+    const Eigen::VectorXd row = matrix.row(i);
+    rows.push_back(std::vector<double>(row.begin(), row.end()));
   }
-  return {{"name", camera.name},
-          {"model", NameOf(camera.model)},
-          {"width_px", camera.camera.width_px},
-          {"height_px", camera.camera.height_px},
-          {"params", ParamsJson(camera)},
-          {"covariance", covariance},
-          {"rms_px", camera.rms_px},
-          {"sigma_px", camera.sigma_px}};
+  return rows;
 }
 
 Json PoseJson(const Pose& pose) {
-  const Eigen::Matrix3d rotation = pose.rotation.toRotationMatrix();
-  Json rows = Json::array();
-  for (int i = 0; i < 3; ++i) {
-    rows.push_back({rotation(i, 0), rotation(i, 1), rotation(i, 2), pose.translation[i]});
+  Eigen::Matrix<double, 3, 4> matrix;
+  matrix << pose.rotation.toRotationMatrix(), pose.translation;
+  return MatrixJson(matrix);
+}
+
+Json CameraJson(const CalibratedCamera& camera) {
+  Json json{{"name", camera.name},
+            {"model", NameOf(camera.model)},
+            {"width_px", camera.camera.width_px},
+            {"height_px", camera.camera.height_px},
+            {"params", ParamsJson(camera)},
+            {"covariance", MatrixJson(camera.covariance)},
+            {"rms_px", camera.rms_px},
+            {"sigma_px", camera.sigma_px}};
+  if (camera.place_covariance.size() > 0) {
+    json["cam_from_rig"] = PoseJson(camera.cam_from_rig);
+    json["place_covariance"] = MatrixJson(camera.place_covariance);
   }
-  return rows;
+  return json;
 }
 
 Json ViewJson(const CalibratedView& view) {
@@ -65,6 +71,7 @@ Json ViewJson(const CalibratedView& view) {
   }
   return {{"name", view.seen.name},
           {"camera", view.camera},
+          {"frame", view.frame},
           {"noise_px", Number(view.seen.noise_px)},
           {"cam_from_board", PoseJson(view.cam_from_board)},
           {"corners", corners},
@@ -109,36 +116,58 @@ double ViewRmsPx(const Calibration& calibration, const CalibratedView& view) {
   return count == 0 ? std::numeric_limits<double>::quiet_NaN() : std::sqrt(sum / count);
 }
 
-Eigen::MatrixXd ReadCovariance(const JsonObject& object, int size) {
-  const Json& rows = object.Array("covariance");
-  if (rows.size() != static_cast<size_t>(size)) {
-    object.Fail("covariance", fmt::format("{} rows", size), fmt::format("{}", rows.size()));
+// A list of `count` rows of `columns` numbers.
+Eigen::MatrixXd ReadMatrix(const JsonObject& object, const char* key, int count, int columns) {
+  const Json& rows = object.Array(key);
+  const std::string expected = fmt::format("{} rows of {} numbers", count, columns);
+  if (rows.size() != static_cast<size_t>(count)) {
+    object.Fail(key, expected, fmt::format("{} rows", rows.size()));
   }
-  Eigen::MatrixXd covariance(size, size);
-  for (int i = 0; i < size; ++i) {
+  Eigen::MatrixXd matrix(count, columns);
+  for (int i = 0; i < count; ++i) {
     const Json& row = rows[static_cast<size_t>(i)];
-    if (!row.is_array() || row.size() != static_cast<size_t>(size)) {
-      object.Fail("covariance", fmt::format("rows of {} numbers", size), row.dump().substr(0, 60));
+    if (!row.is_array() || row.size() != static_cast<size_t>(columns)) {
+      object.Fail(key, expected, row.dump().substr(0, 60));
     }
-    for (int j = 0; j < size; ++j) {
+    for (int j = 0; j < columns; ++j) {
       const Json& item = row[static_cast<size_t>(j)];
-      if (!item.is_number()) object.Fail("covariance", "numbers", item.dump().substr(0, 60));
-      covariance(i, j) = item.get<double>();
+      if (!item.is_number()) object.Fail(key, "numbers", item.dump().substr(0, 60));
+      matrix(i, j) = item.get<double>();
     }
   }
+  return matrix;
+}
+
+// `all_zero`: what a lens has that was given, not solved for.
+Eigen::MatrixXd ReadCovariance(const JsonObject& object, const char* key, int size,
+                               bool all_zero = false) {
+  Eigen::MatrixXd covariance = ReadMatrix(object, key, size, size);
+  if (all_zero) {
+    if (!covariance.isZero(0)) object.Fail(key, "zeros, the lenses were given");
+    return covariance;
+  }
   for (int i = 0; i < size; ++i) {
-    if (!(covariance(i, i) > 0)) object.Fail("covariance", "a positive diagonal");
+    if (!(covariance(i, i) > 0)) object.Fail(key, "a positive diagonal");
     for (int j = 0; j < i; ++j) {
       const double scale = std::sqrt(covariance(i, i)) * std::sqrt(covariance(j, j));
       if (!(std::abs(covariance(i, j) - covariance(j, i)) <= kSymmetric * scale)) {
-        object.Fail("covariance", "a symmetric matrix");
+        object.Fail(key, "a symmetric matrix");
       }
     }
   }
   return covariance;
 }
 
-CalibratedCamera ReadCamera(const JsonObject& object, const std::string& file) {
+Pose ReadPose(const JsonObject& object, const char* key) {
+  const Eigen::MatrixXd matrix = ReadMatrix(object, key, 3, 4);
+  const Eigen::Matrix3d rotation = matrix.leftCols<3>();
+  const double off =
+      (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  if (!(off < kRotation) || !(rotation.determinant() > 0)) object.Fail(key, "a rotation");
+  return {Eigen::Quaterniond(rotation).normalized(), matrix.col(3)};
+}
+
+CalibratedCamera ReadCamera(const JsonObject& object, const std::string& file, bool lens_given) {
   CalibratedCamera camera;
   camera.name = object.String("name");
   const auto model = BoardModelFromName(object.String("model"));
@@ -155,31 +184,14 @@ CalibratedCamera ReadCamera(const JsonObject& object, const std::string& file) {
   } catch (const std::invalid_argument& error) {
     throw Error(file + ": cameras: params: " + error.what());
   }
-  camera.covariance = ReadCovariance(object, FreeParameterCount(*model));
+  camera.covariance = ReadCovariance(object, "covariance", FreeParameterCount(*model), lens_given);
+  if (object.Has("cam_from_rig")) {
+    camera.cam_from_rig = ReadPose(object, "cam_from_rig");
+    camera.place_covariance = ReadCovariance(object, "place_covariance", 6);
+  }
   camera.rms_px = object.Number("rms_px");
   camera.sigma_px = object.Positive("sigma_px");
   return camera;
-}
-
-Pose ReadPose(const JsonObject& object) {
-  const char* key = "cam_from_board";
-  const Json& rows = object.Array(key);
-  Eigen::Matrix<double, 3, 4> matrix;
-  if (rows.size() != 3) object.Fail(key, "3 rows of 4 numbers");
-  for (int i = 0; i < 3; ++i) {
-    const Json& row = rows[static_cast<size_t>(i)];
-    if (!row.is_array() || row.size() != 4) object.Fail(key, "3 rows of 4 numbers");
-    for (int j = 0; j < 4; ++j) {
-      const Json& item = row[static_cast<size_t>(j)];
-      if (!item.is_number()) object.Fail(key, "numbers");
-      matrix(i, j) = item.get<double>();
-    }
-  }
-  const Eigen::Matrix3d rotation = matrix.leftCols<3>();
-  const double off =
-      (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-  if (!(off < kRotation) || !(rotation.determinant() > 0)) object.Fail(key, "a rotation");
-  return {Eigen::Quaterniond(rotation).normalized(), matrix.col(3)};
 }
 
 std::vector<BoardCorner> ReadCorners(const JsonObject& object, const Board& board) {
@@ -208,7 +220,10 @@ CalibratedView ReadView(const JsonObject& object, const Calibration& calibration
   }
   view.seen.noise_px =
       object.Has("noise_px") ? object.Number("noise_px") : std::numeric_limits<double>::quiet_NaN();
-  view.cam_from_board = ReadPose(object);
+  // Absent: every view by itself.
+  view.frame = object.Has("frame") ? object.Unsigned("frame") : calibration.views.size();
+  if (view.frame > kLargestFrame) object.Fail("frame", fmt::format("at most {}", kLargestFrame));
+  view.cam_from_board = ReadPose(object, "cam_from_board");
   view.seen.corners = ReadCorners(object, calibration.board);
   for (const Json& item : object.Array("outliers")) {
     if (!item.is_number_integer() || (!view.outliers.empty() && item <= view.outliers.back())) {
@@ -251,6 +266,7 @@ Board ReadBoard(const JsonObject& object) {
 
 void WriteCalibration(const std::filesystem::path& file, const Calibration& calibration) {
   Json json{{"format", kFormat}, {"version", kVersion}, {"board", TextOf(calibration.board)}};
+  if (calibration.lenses_given) json["lenses_given"] = true;
   json["cameras"] = Json::array();
   for (const auto& camera : calibration.cameras) json["cameras"].push_back(CameraJson(camera));
   json["models"] = ModelsJson(calibration.models);
@@ -271,8 +287,10 @@ Calibration ReadCalibration(const std::filesystem::path& file) {
   const auto each = [&](const char* key, const auto& read) {
     for (size_t i = 0; i < root.Array(key).size(); ++i) read(root.Item(key, i));
   };
-  each("cameras",
-       [&](const JsonObject& item) { calibration.cameras.push_back(ReadCamera(item, where)); });
+  calibration.lenses_given = root.Has("lenses_given") && root.Value("lenses_given") == Json(true);
+  each("cameras", [&](const JsonObject& item) {
+    calibration.cameras.push_back(ReadCamera(item, where, calibration.lenses_given));
+  });
   if (calibration.cameras.empty()) root.Fail("cameras", "at least one camera");
   each("models", [&](const JsonObject& item) { calibration.models.push_back(ReadTried(item)); });
   each("left_out", [&](const JsonObject& item) {
@@ -291,6 +309,7 @@ std::string SummaryJson(const Calibration& calibration) {
   for (const auto& view : calibration.views) {
     json["views"].push_back({{"name", view.seen.name},
                              {"camera", view.camera},
+                             {"frame", view.frame},
                              {"corners", view.seen.corners.size()},
                              {"rms_px", Number(ViewRmsPx(calibration, view))},
                              {"noise_px", Number(view.seen.noise_px)},

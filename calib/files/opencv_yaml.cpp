@@ -189,6 +189,23 @@ std::string Matrix(const char* key, int rows, const std::vector<double>& data) {
                      key, rows, data.size() / static_cast<size_t>(rows), fmt::join(data, ", "));
 }
 
+constexpr const char* kHead =
+    "%YAML:1.0\n---\n# The centre of the first pixel is (0, 0), as OpenCV has it.\n";
+
+std::string SizeAndKind(const LensCamera& camera) {
+  return fmt::format("image_width: {}\nimage_height: {}\n{}", camera.width_px, camera.height_px,
+                     IsFisheye(camera.model) ? "fisheye_model: 1\n" : "");
+}
+
+std::string MatricesOf(const LensCamera& camera, const char* k_name, const char* d_name) {
+  const PinholeCamera k = camera.Pinhole();
+  const std::vector<double> coefficients = OpenCvCoefficients(camera);
+  return Matrix(k_name, 3,
+                {k.fx_px(), 0, k.cx_px() - kOpenCvOffsetPx, 0, k.fy_px(),
+                 k.cy_px() - kOpenCvOffsetPx, 0, 0, 1}) +
+         Matrix(d_name, static_cast<int>(coefficients.size()), coefficients);
+}
+
 }  // namespace
 
 LensCamera ReadOpenCvYaml(const std::filesystem::path& file) {
@@ -215,17 +232,20 @@ LensCamera ReadOpenCvYaml(const std::filesystem::path& file) {
 }
 
 void WriteOpenCvYaml(const std::filesystem::path& file, const LensCamera& camera) {
-  const PinholeCamera k = camera.Pinhole();
-  const std::vector<double> coefficients = OpenCvCoefficients(camera);
-  std::string text =
-      "%YAML:1.0\n---\n# The centre of the first pixel is (0, 0), as OpenCV has it.\n";
-  text += fmt::format("image_width: {}\nimage_height: {}\n", camera.width_px, camera.height_px);
-  if (IsFisheye(camera.model)) text += "fisheye_model: 1\n";
-  text += Matrix("camera_matrix", 3,
-                 {k.fx_px(), 0, k.cx_px() - kOpenCvOffsetPx, 0, k.fy_px(),
-                  k.cy_px() - kOpenCvOffsetPx, 0, 0, 1});
-  text += Matrix("distortion_coefficients", static_cast<int>(coefficients.size()), coefficients);
-  WriteFileAtomically(file, text);
+  WriteFileAtomically(file, kHead + SizeAndKind(camera) +
+                                MatricesOf(camera, "camera_matrix", "distortion_coefficients"));
+}
+
+void WriteOpenCvStereoYaml(const std::filesystem::path& file, const LensCamera& first,
+                           const LensCamera& second, const Pose& second_from_first) {
+  const Eigen::Matrix3d r = second_from_first.rotation.toRotationMatrix();
+  const Eigen::Vector3d& t = second_from_first.translation;
+  WriteFileAtomically(file, kHead + SizeAndKind(first) + MatricesOf(first, "M1", "D1") +
+                                MatricesOf(second, "M2", "D2") +
+                                Matrix("R", 3,
+                                       {r(0, 0), r(0, 1), r(0, 2), r(1, 0), r(1, 1), r(1, 2),
+                                        r(2, 0), r(2, 1), r(2, 2)}) +
+                                Matrix("T", 3, {t.x(), t.y(), t.z()}));
 }
 
 }  // namespace dtr::calib

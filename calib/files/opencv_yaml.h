@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "calib/lens_camera.h"
+#include "dtr/types/pose.h"
 
 namespace dtr::calib {
 
@@ -18,5 +19,11 @@ LensCamera ReadOpenCvYaml(const std::filesystem::path& file);
 /// Writes such a file, atomically; doubles read back exactly, but for the half pixel.
 /// Throws Error for lens models that OpenCV does not have (FOV, THIN_PRISM_FISHEYE).
 void WriteOpenCvYaml(const std::filesystem::path& file, const LensCamera& camera);
+
+/// Writes two cameras as OpenCV's stereo_calib sample names them: M1, D1, M2, D2, R and T with
+/// p_second = R p_first + T, and image_width, image_height of the first. Atomically; throws as
+/// WriteOpenCvYaml does.
+void WriteOpenCvStereoYaml(const std::filesystem::path& file, const LensCamera& first,
+                           const LensCamera& second, const Pose& second_from_first);
 
 }  // namespace dtr::calib

@@ -61,6 +61,7 @@ void AddCalibrateCommand(CLI::App& app) {
   calibrate->require_subcommand(1);
   AddCalibrateBoardCommand(*calibrate);
   AddCalibrateRefineCommand(*calibrate);
+  AddCalibrateRigCommand(*calibrate);
   AddCommand(*calibrate, "photos", "Calibrate a folder of photos by structure from motion",
              "dtr calibrate photos photos/ -o calibration/", [](CLI::App& command) -> Action {
                auto options = std::make_shared<Options>();

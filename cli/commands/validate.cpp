@@ -2,8 +2,11 @@
 
 #include <filesystem>
 
+#include "calib/judge/judge.h"
 #include "cli/command.h"
+#include "cli/commands/validate_calibration.h"
 #include "cli/pipeline/validate_set.h"
+#include "dtr/base/error.h"
 #include "dtr/io/set_io.h"
 
 namespace dtr::cli {
@@ -12,6 +15,7 @@ namespace {
 struct Options {
   std::filesystem::path set;
   calib::ValidateLimits limits;
+  ValidateCalibrationOptions calibration;
 };
 
 void SayReport(const calib::ValidationReport& report, Console& console) {
@@ -32,7 +36,22 @@ void SayReport(const calib::ValidationReport& report, Console& console) {
   }
 }
 
-int RunValidate(const Options& options, const Context& context) {
+void RefuseForSets(const ValidateCalibrationOptions& options) {
+  for (const auto& [given, name] :
+       {std::pair{options.images.has_value(), "--images"},
+        std::pair{options.report.has_value(), "--report"},
+        std::pair{options.max_uncertainty_px.has_value(), "--max-uncertainty"}}) {
+    if (given) throw UsageError(fmt::format("{}: is for calibration files, not for sets", name));
+  }
+}
+
+int RunValidate(Options options, const Context& context) {
+  if (std::filesystem::is_regular_file(options.set)) {
+    options.calibration.file = options.set;
+    return RunValidateCalibration(options.calibration, context);
+  }
+  RefuseForSets(options.calibration);
+  options.limits.max_rms_px = options.calibration.max_rms_px.value_or(options.limits.max_rms_px);
   const DtrSet set = io::ReadSet(options.set);
   const SparseScene sparse = io::LoadSparse(options.set, set);
   const auto report = pipeline::ValidateSet(set, sparse, options.limits, context.common.threads);
@@ -44,18 +63,42 @@ int RunValidate(const Options& options, const Context& context) {
 }  // namespace
 
 void AddValidateCommand(CLI::App& app) {
-  AddCommand(app, "validate", "Reprojection tests of a set's calibration; exit 1 when one fails",
-             "dtr validate scene.dtr --max-rms 1.0", [](CLI::App& command) -> Action {
-               auto options = std::make_shared<Options>();
-               command.add_option("SET", options->set, "The set")->required();
-               command
-                   .add_option("--max-rms", options->limits.max_rms_px,
-                               fmt::format("Limit of the held-out RMS of all cameras [{}]",
-                                           options->limits.max_rms_px))
-                   ->check(CLI::PositiveNumber)
-                   ->type_name("PX");
-               return [options](const Context& context) { return RunValidate(*options, context); };
-             });
+  AddCommand(
+      app, "validate",
+      "Reprojection tests of a set's or a board's calibration; exit 1 when one fails",
+      "dtr validate left.json --images unseen/ --report left.html",
+      [](CLI::App& command) -> Action {
+        auto options = std::make_shared<Options>();
+        command
+            .add_option("SET|CALIB", options->set,
+                        "A set, or a .json file of calibrate board or calibrate rig")
+            ->required();
+        ValidateCalibrationOptions& calibration = options->calibration;
+        command
+            .add_option("--max-rms", calibration.max_rms_px,
+                        fmt::format("Limit of the RMS on what the calibration has not seen [{} for "
+                                    "sets, {} for calibration files]",
+                                    options->limits.max_rms_px, calib::JudgeLimits{}.max_rms_px))
+            ->check(CLI::PositiveNumber)
+            ->type_name("PX");
+        command
+            .add_option("--images", calibration.images,
+                        "Photos of the board that the calibration has not seen; without them it is "
+                        "judged on those it was made from")
+            ->type_name("DIR");
+        command
+            .add_option("--max-uncertainty", calibration.max_uncertainty_px,
+                        fmt::format("Limit of the projections' standard deviation at the boards' "
+                                    "distance [{}]",
+                                    calib::JudgeLimits{}.max_uncertainty_px))
+            ->check(CLI::PositiveNumber)
+            ->type_name("PX");
+        command
+            .add_option("--report", calibration.report,
+                        "The report as a page: residuals, coverage, uncertainty, worst views")
+            ->type_name("FILE.html");
+        return [options](const Context& context) { return RunValidate(*options, context); };
+      });
 }
 
 }  // namespace dtr::cli

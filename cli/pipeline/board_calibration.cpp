@@ -28,7 +28,8 @@ void AddViews(const BoardPhotos& photos, const calib::BoardSolution& solution,
   for (const calib::SolvedView& solved : solution.views) {
     const auto seen = std::find_if(photos.views.begin(), photos.views.end(),
                                    [&](const auto& view) { return view.name == solved.name; });
-    calibration.views.push_back({*seen, 0, solved.cam_from_board, solved.outliers});
+    calibration.views.push_back(
+        {*seen, 0, calibration.views.size(), solved.cam_from_board, solved.outliers});
   }
   calibration.left_out = photos.left_out;
   calibration.left_out.insert(calibration.left_out.end(), solution.left_out.begin(),

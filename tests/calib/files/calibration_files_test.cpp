@@ -31,7 +31,7 @@ Calibration Example(BoardModel model) {
   covariance.diagonal().array() += 1.0 / 7;
   calibration.cameras.push_back({"left", model, camera, covariance, 0.187, 0.13});
   for (size_t i = 0; i < exact.views.size(); ++i) {
-    calibration.views.push_back({exact.views[i], 0, exact.cam_from_board[i], {3, 8}});
+    calibration.views.push_back({exact.views[i], 0, 2 * i, exact.cam_from_board[i], {3, 8}});
   }
   calibration.views[0].seen.noise_px = std::nan("");
   calibration.left_out.push_back({"blurred.jpg", "expected the whole board"});
@@ -57,6 +57,7 @@ TEST(CalibrationFile, EverythingSurvivesWritingAndReading) {
     EXPECT_TRUE(std::isnan(read.views[0].seen.noise_px));
     for (size_t i = 0; i < read.views.size(); ++i) {
       EXPECT_EQ(read.views[i].outliers, written.views[i].outliers);
+      EXPECT_EQ(read.views[i].frame, 2 * i);
       EXPECT_LT(
           (read.views[i].cam_from_board.translation - written.views[i].cam_from_board.translation)
               .norm(),
@@ -72,6 +73,26 @@ TEST(CalibrationFile, EverythingSurvivesWritingAndReading) {
     EXPECT_EQ(read.models[1].refused, "turns back");
     EXPECT_FALSE(read.models[1].held_out_rms_px);
   }
+}
+
+TEST(CalibrationFile, ARigSurvivesToo) {
+  const dtr::testing::TemporaryFolder folder;
+  Calibration written = Example(BoardModel::kBrown4);
+  written.lenses_given = true;
+  written.cameras[0].covariance.setZero();
+  written.cameras.push_back(written.cameras[0]);
+  written.cameras[1].name = "right";
+  written.cameras[1].cam_from_rig = written.views[0].cam_from_board;
+  written.cameras[1].place_covariance = 2 * Eigen::MatrixXd::Identity(6, 6);
+  written.views[1].camera = 1;
+  WriteCalibration(folder / "rig.json", written);
+  const Calibration read = ReadCalibration(folder / "rig.json");
+  EXPECT_TRUE(read.lenses_given);
+  ASSERT_EQ(read.cameras.size(), 2u);
+  EXPECT_EQ(read.cameras[0].place_covariance.size(), 0);
+  EXPECT_EQ(read.cameras[1].place_covariance, written.cameras[1].place_covariance);
+  EXPECT_EQ(read.cameras[1].cam_from_rig.translation, written.cameras[1].cam_from_rig.translation);
+  EXPECT_TRUE(read.cameras[0].covariance.isZero(0));
 }
 
 TEST(CalibrationFile, EveryPrefixIsAnError) {

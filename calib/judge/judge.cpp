@@ -1,0 +1,637 @@
+#include "calib/judge/judge.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <map>
+
+#include "calib/judge/distributions.h"
+#include "calib/lens_map.h"
+#include "dtr/base/error.h"
+#include "dtr/base/parallel_for.h"
+
+namespace dtr::calib {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr size_t kFolds = 5;
+constexpr int kFewestInRegion = 20;  // corners; below, a region's RMS is a guess
+constexpr double kMostOfImage = 0.95;
+constexpr double kFar = 1000;  // times the boards' distance: as good as at infinity
+
+ResidualStats StatsOf(const std::vector<Eigen::Vector2d>& residuals) {
+  ResidualStats stats;
+  std::vector<double> lengths;
+  double sum = 0;
+  for (const Eigen::Vector2d& r : residuals) {
+    lengths.push_back(r.norm());
+    sum += r.squaredNorm();
+    stats.mean_px += r / static_cast<double>(residuals.size());
+  }
+  if (lengths.empty()) return stats;
+  std::sort(lengths.begin(), lengths.end());
+  const auto at = [&](double q) {
+    return lengths[static_cast<size_t>(q * static_cast<double>(lengths.size() - 1))];
+  };
+  stats.count = static_cast<int>(lengths.size());
+  stats.rms_px = std::sqrt(sum / static_cast<double>(lengths.size()));
+  stats.median_px = at(0.5);
+  stats.p95_px = at(0.95);
+  stats.worst_px = lengths.back();
+  return stats;
+}
+
+std::vector<RigCameraInput> InputsOf(const JudgedCalibration& calibration) {
+  std::vector<RigCameraInput> inputs;
+  for (const RigCamera& c : calibration.cameras) {
+    inputs.push_back({c.name, c.model, c.camera.width_px, c.camera.height_px, {}});
+    if (!calibration.free_lenses) inputs.back().given = c.camera;
+  }
+  return inputs;
+}
+
+// A solve from scratch, or why there is none.
+struct Fresh {
+  std::optional<RigSolution> solution;
+  std::string refused;
+};
+
+// With the corners that the file calls outliers left out, the rest all counts: the stored
+// calibration's own least-squares problem.
+Fresh Solve(const JudgedCalibration& calibration, std::vector<RigView> views, size_t frames,
+            Loss loss) {
+  RigOptions options;
+  options.solve.loss = loss;
+  options.solve.cover_image = false;
+  options.free_lenses = calibration.free_lenses;
+  Fresh fresh;
+  try {
+    fresh.solution =
+        SolveRig(calibration.board, InputsOf(calibration), std::move(views), frames, options);
+  } catch (const Error& error) {
+    fresh.refused = error.what();
+  }
+  return fresh;
+}
+
+std::vector<RigView> FramesWhere(const std::vector<RigView>& views,
+                                 const std::function<bool(size_t)>& wanted) {
+  std::vector<RigView> some;
+  std::copy_if(views.begin(), views.end(), std::back_inserter(some),
+               [&](const RigView& view) { return wanted(view.frame); });
+  return some;
+}
+
+// Frames are dealt in turn; those without a view do not take part.
+std::map<size_t, size_t> OrderOfFrames(const std::vector<RigView>& views) {
+  std::map<size_t, size_t> order;
+  for (const RigView& view : views) order.emplace(view.frame, 0);
+  size_t next = 0;
+  for (auto& [frame, place] : order) place = next++;
+  return order;
+}
+
+Check Refused(const char* name, double limit, const std::string& why) {
+  return {name, kNaN, limit, false, why};
+}
+
+Check AtMost(const char* name, double value, double limit, std::string reason) {
+  return {name, value, limit, value <= limit, std::move(reason)};
+}
+
+Check AtLeast(const char* name, double value, double limit, std::string reason) {
+  return {name, value, limit, value >= limit, std::move(reason)};
+}
+
+// Residuals of a rig whose frames were fitted, by camera; outliers apart.
+struct Residuals {
+  std::vector<std::vector<Eigen::Vector2d>> by_camera;
+  std::vector<std::vector<ResidualArrow>> arrows;
+  double squares = 0;
+  int corners = 0, outliers = 0;
+};
+
+std::vector<ResidualArrow> ArrowsOf(const Board& board, const Rig& rig, const RigView& view) {
+  const RigCamera& camera = rig.cameras[view.camera];
+  const LensMap lens(camera.camera);
+  const Pose cam_from_board = camera.cam_from_rig * rig.rig_from_board[view.frame];
+  std::vector<ResidualArrow> arrows;
+  for (const BoardCorner& corner : view.seen.corners) {
+    if (Holds(view.outliers, corner.id)) continue;
+    const auto pixel = lens.PixelFromCam(cam_from_board * board.Corner(corner.id));
+    if (pixel) arrows.push_back({corner.pixel, *pixel - corner.pixel});
+  }
+  return arrows;
+}
+
+void AddResiduals(const Board& board, const Rig& rig, Residuals& out) {
+  out.by_camera.resize(rig.cameras.size());
+  out.arrows.resize(rig.cameras.size());
+  for (const RigView& view : rig.views) {
+    const auto arrows = ArrowsOf(board, rig, view);
+    for (const ResidualArrow& arrow : arrows) {
+      out.by_camera[view.camera].push_back(arrow.residual_px);
+      out.arrows[view.camera].push_back(arrow);
+      out.squares += arrow.residual_px.squaredNorm();
+    }
+    out.corners += static_cast<int>(arrows.size());
+    out.outliers += static_cast<int>(view.seen.corners.size() - arrows.size());
+  }
+}
+
+// Per coordinate, with the poses' 6 unknowns per frame taken off.
+double SigmaOf(const Residuals& residuals, size_t frames) {
+  const double freedom = 2.0 * residuals.corners - 6.0 * static_cast<double>(frames);
+  return freedom > 0 ? std::sqrt(residuals.squares / freedom) : kNaN;
+}
+
+Residuals HeldOut(const JudgedCalibration& calibration, int threads, std::string* refused) {
+  const auto order = OrderOfFrames(calibration.kept);
+  const size_t folds = std::min(kFolds, order.size());
+  std::vector<Residuals> by_fold(folds);
+  std::vector<std::string> why(folds);
+  ParallelFor(0, static_cast<int>(folds), threads, [&](int k) {
+    const auto fold = static_cast<size_t>(k);
+    const auto held = [&](size_t frame) { return order.at(frame) % folds == fold; };
+    const Fresh fresh =
+        Solve(calibration, FramesWhere(calibration.kept, [&](size_t f) { return !held(f); }),
+              calibration.kept_frames, Loss::kQuadratic);
+    if (!fresh.solution) {
+      why[fold] = fresh.refused;
+      return;
+    }
+    SolveOptions quadratic;
+    quadratic.loss = Loss::kQuadratic;
+    std::vector<LeftOut> left_out;
+    AddResiduals(calibration.board,
+                 FitFrames(calibration.board, fresh.solution->rig.cameras,
+                           FramesWhere(calibration.kept, held), calibration.kept_frames, quadratic,
+                           left_out),
+                 by_fold[fold]);
+  });
+  Residuals all;
+  all.by_camera.resize(calibration.cameras.size());
+  for (size_t fold = 0; fold < folds; ++fold) {
+    if (!why[fold].empty()) {
+      *refused = "without a part of the views: " + why[fold];
+      continue;
+    }
+    for (size_t c = 0; c < by_fold[fold].by_camera.size(); ++c) {
+      const auto& own = by_fold[fold].by_camera[c];
+      all.by_camera[c].insert(all.by_camera[c].end(), own.begin(), own.end());
+    }
+    all.squares += by_fold[fold].squares;
+    all.corners += by_fold[fold].corners;
+  }
+  return all;
+}
+
+// Mahalanobis distance of a part of the unknowns.
+double Distance(const Eigen::VectorXd& difference, const Eigen::MatrixXd& covariance, int at,
+                int count) {
+  const Eigen::VectorXd d = difference.segment(at, count);
+  // Unknowns differ by many orders of magnitude: in units of their own sigmas they do not.
+  const Eigen::VectorXd scale = covariance.diagonal().segment(at, count).cwiseSqrt().cwiseInverse();
+  const Eigen::MatrixXd correlation =
+      scale.asDiagonal() * covariance.block(at, at, count, count) * scale.asDiagonal();
+  const Eigen::VectorXd z = scale.cwiseProduct(d);
+  return std::sqrt(std::max(0.0, z.dot(correlation.ldlt().solve(z))));
+}
+
+std::string LargestPart(const RigLayout& layout, const Eigen::VectorXd& difference,
+                        const Eigen::MatrixXd& covariance, int at, int count) {
+  int worst = at;
+  double most = -1;
+  for (int i = at; i < at + count; ++i) {
+    const double sigmas = std::abs(difference[i]) / std::sqrt(covariance(i, i));
+    if (sigmas > most) {
+      most = sigmas;
+      worst = i;
+    }
+  }
+  return fmt::format("{} differs by {:.4g} = {:.1f} sigma", layout.NameOf(worst), difference[worst],
+                     most);
+}
+
+// All that is tested, step by step.
+class Judging {
+ public:
+  Judging(const JudgedCalibration& calibration, const std::optional<UnseenViews>& unseen,
+          const JudgeLimits& limits, int threads)
+      : calibration_(calibration), unseen_(unseen), limits_(limits), threads_(threads) {
+    report_.unseen = unseen.has_value();
+    for (const RigCamera& camera : calibration.cameras) {
+      report_.cameras.push_back({});
+      report_.cameras.back().name = camera.name;
+    }
+  }
+
+  JudgeReport Run() {
+    if (!calibration_.kept.empty()) {
+      kept_ = Solve(calibration_, calibration_.kept, calibration_.kept_frames, Loss::kQuadratic);
+    } else {
+      kept_.refused = "the file keeps no observations";
+    }
+    if (unseen_) fresh_ = Solve(calibration_, unseen_->views, unseen_->frames, Loss::kRobust);
+    if (kept_.solution) {
+      report_.sigma_px = kept_.solution->sigma_px;
+      report_.condition = kept_.solution->information.condition();
+    }
+    FitStored();
+    TestResiduals();
+    TestStoredAgainstFresh();
+    TestData();
+    TestUncertainty();
+    TestHalves();
+    TestPatterns();
+    return std::move(report_);
+  }
+
+ private:
+  void Add(Check check) { report_.tests.push_back(std::move(check)); }
+
+  // The views that the stored calibration is held against.
+  const std::vector<RigView>& Tested() const {
+    return unseen_ ? unseen_->views : calibration_.kept;
+  }
+  size_t TestedFrames() const { return unseen_ ? unseen_->frames : calibration_.kept_frames; }
+
+  void FitStored() {
+    SolveOptions options;
+    options.loss = unseen_ ? Loss::kRobust : Loss::kQuadratic;
+    std::vector<LeftOut> left_out;
+    fitted_ = FitFrames(calibration_.board, calibration_.cameras, Tested(), TestedFrames(), options,
+                        left_out);
+    AddResiduals(calibration_.board, fitted_, stored_);
+    for (const LeftOut& item : left_out) {
+      for (const RigView& view : Tested()) {
+        if (view.seen.name == item.name) {
+          stored_.outliers += static_cast<int>(view.seen.corners.size());
+        }
+      }
+    }
+    for (size_t c = 0; c < report_.cameras.size(); ++c) {
+      JudgedCamera& camera = report_.cameras[c];
+      camera.stored = StatsOf(stored_.by_camera.empty() ? std::vector<Eigen::Vector2d>{}
+                                                        : stored_.by_camera[c]);
+      camera.distance = BoardDistance(calibration_.board, fitted_, c);
+      camera.coverage = CoverageOf(calibration_, c);
+      camera.noise_px = MedianNoise(c);
+      FillRegions(c);
+      FillViews(c);
+    }
+  }
+
+  double MedianNoise(size_t camera) const {
+    std::vector<double> noise;
+    for (const RigView& view : Tested()) {
+      if (view.camera == camera && std::isfinite(view.seen.noise_px)) {
+        noise.push_back(view.seen.noise_px);
+      }
+    }
+    if (noise.empty()) return kNaN;
+    std::sort(noise.begin(), noise.end());
+    return noise[noise.size() / 2];
+  }
+
+  void FillRegions(size_t c) {
+    if (stored_.arrows.empty()) return;
+    const LensCamera& lens = calibration_.cameras[c].camera;
+    std::array<std::vector<Eigen::Vector2d>, kRegionsPerAxis * kRegionsPerAxis> regions;
+    for (const ResidualArrow& arrow : stored_.arrows[c]) {
+      const auto cell = [](double at, int size) {
+        return std::clamp(static_cast<int>(kRegionsPerAxis * at / size), 0, kRegionsPerAxis - 1);
+      };
+      regions[static_cast<size_t>(cell(arrow.pixel.y(), lens.height_px) * kRegionsPerAxis +
+                                  cell(arrow.pixel.x(), lens.width_px))]
+          .push_back(arrow.residual_px);
+    }
+    for (size_t i = 0; i < regions.size(); ++i) {
+      report_.cameras[c].regions[i] = StatsOf(regions[i]);
+    }
+  }
+
+  void FillViews(size_t c) {
+    JudgedCamera& camera = report_.cameras[c];
+    for (const RigView& view : fitted_.views) {
+      if (view.camera != c) continue;
+      JudgedView judged{view.seen.name, 0, 0, 0, 0, ArrowsOf(calibration_.board, fitted_, view)};
+      std::vector<Eigen::Vector2d> residuals;
+      for (const ResidualArrow& arrow : judged.arrows) residuals.push_back(arrow.residual_px);
+      const ResidualStats stats = StatsOf(residuals);
+      judged.rms_px = stats.rms_px;
+      judged.worst_px = stats.worst_px;
+      judged.corners = stats.count;
+      judged.outliers = static_cast<int>(view.seen.corners.size() - residuals.size());
+      camera.views.push_back(std::move(judged));
+    }
+    std::stable_sort(camera.views.begin(), camera.views.end(),
+                     [](const auto& a, const auto& b) { return a.rms_px > b.rms_px; });
+  }
+
+  void TestResiduals() {
+    Residuals judged = stored_;
+    std::string refused;
+    if (!unseen_) {
+      judged = HeldOut(calibration_, threads_, &refused);
+      for (size_t c = 0; c < report_.cameras.size(); ++c) {
+        report_.cameras[c].held_out = StatsOf(judged.by_camera[c]);
+      }
+    }
+    const char* rms_name = unseen_ ? "unseen_rms_px" : "held_out_rms_px";
+    const char* ratio_name = unseen_ ? "unseen_rms_ratio" : "held_out_rms_ratio";
+    const size_t frames =
+        unseen_ ? OrderOfFrames(fitted_.views).size() : OrderOfFrames(calibration_.kept).size();
+    if (judged.corners == 0 || !refused.empty()) {
+      const std::string why = refused.empty() ? "no view could be predicted" : refused;
+      Add(Refused(rms_name, limits_.max_rms_px, why));
+      Add(Refused(ratio_name, limits_.max_rms_ratio, why));
+    } else {
+      std::string noise;
+      for (const JudgedCamera& camera : report_.cameras) {
+        noise +=
+            fmt::format("{}{}: {:.3f}", noise.empty() ? "" : ", ", camera.name, camera.noise_px);
+      }
+      Add(AtMost(rms_name, std::sqrt(judged.squares / judged.corners), limits_.max_rms_px,
+                 fmt::format("{} corners {}; noise of the pixels alone, per coordinate: {}",
+                             judged.corners,
+                             unseen_ ? "that the calibration has not seen"
+                                     : "predicted by solves of the other views",
+                             noise)));
+      const double promised = kept_.solution    ? kept_.solution->sigma_px
+                              : fresh_.solution ? fresh_.solution->sigma_px
+                                                : kNaN;
+      Add(AtMost(ratio_name, SigmaOf(judged, frames) / promised, limits_.max_rms_ratio,
+                 fmt::format("scatter per coordinate over the {:.4f} px that the solve promises",
+                             promised)));
+    }
+    TestRegions();
+    const double all = stored_.corners + stored_.outliers;
+    Add(AtMost("outlier_share", all > 0 ? stored_.outliers / all : kNaN, limits_.max_outlier_share,
+               fmt::format("{} of {} corners are left out as outliers", stored_.outliers, all)));
+  }
+
+  void TestRegions() {
+    double worst = 0;
+    std::string where = "no region has enough corners";
+    for (const JudgedCamera& camera : report_.cameras) {
+      std::vector<double> rms;
+      for (const ResidualStats& region : camera.regions) {
+        if (region.count >= kFewestInRegion) rms.push_back(region.rms_px);
+      }
+      if (rms.empty()) continue;
+      std::sort(rms.begin(), rms.end());
+      const double typical = rms[rms.size() / 2];
+      for (size_t i = 0; i < camera.regions.size(); ++i) {
+        const ResidualStats& region = camera.regions[i];
+        if (region.count < kFewestInRegion || !(region.rms_px / typical > worst)) continue;
+        worst = region.rms_px / typical;
+        where = fmt::format(
+            "{}: row {}, column {} of 3 x 3 has RMS {:.3f} px, the median region "
+            "{:.3f} px",
+            camera.name, i / kRegionsPerAxis + 1, i % kRegionsPerAxis + 1, region.rms_px, typical);
+      }
+    }
+    Add(AtMost("worst_region_ratio", worst > 0 ? worst : kNaN, limits_.max_region_ratio, where));
+  }
+
+  void TestStoredAgainstFresh() {
+    const Fresh& fresh = unseen_ ? fresh_ : kept_;
+    const double self = limits_.max_self_difference_sigmas;
+    if (!fresh.solution) {
+      Add(Refused("lens_difference_sigmas", self, fresh.refused));
+      if (calibration_.cameras.size() > 1) {
+        Add(Refused("place_difference_sigmas", self, fresh.refused));
+      }
+      return;
+    }
+    const RigSolution& solution = *fresh.solution;
+    const Eigen::VectorXd difference =
+        Difference(solution.layout, calibration_.cameras, solution.rig.cameras);
+    Eigen::MatrixXd covariance = solution.covariance;
+    // Unseen views: both calibrations err.
+    if (unseen_ && kept_.solution) covariance += kept_.solution->covariance;
+    const auto limit = [&](int count) {
+      return unseen_ ? std::sqrt(ChiSquaredLimit(limits_.min_p, count)) : self;
+    };
+    const ProjectionSensitivity sensitivity(solution);
+    Check lens{"lens_difference_sigmas", -1, limit(8), true, ""};
+    Check place{"place_difference_sigmas", -1, limit(6), true, ""};
+    for (size_t c = 0; c < calibration_.cameras.size(); ++c) {
+      JudgedCamera& camera = report_.cameras[c];
+      camera.difference = ShiftMap(solution, sensitivity, difference, c,
+                                   BoardDistance(calibration_.board, solution.rig, c));
+      if (solution.layout.LensAt(c) >= 0) {
+        const int count = FreeParameterCount(calibration_.cameras[c].model);
+        Hold(difference, covariance, solution.layout, solution.layout.LensAt(c), count,
+             limit(count), c, lens);
+      }
+      if (solution.layout.PlaceAt(c) >= 0) {
+        Hold(difference, covariance, solution.layout, solution.layout.PlaceAt(c), 6, limit(6), c,
+             place);
+      }
+    }
+    if (solution.layout.free_lenses()) Add(lens);
+    if (calibration_.cameras.size() < 2) return;
+    Add(place);
+    TestScale(solution, covariance, difference);
+  }
+
+  // Keeps in `check` the part that is farthest beyond its limit.
+  void Hold(const Eigen::VectorXd& difference, const Eigen::MatrixXd& covariance,
+            const RigLayout& layout, int at, int count, double limit, size_t camera, Check& check) {
+    const double distance = Distance(difference, covariance, at, count);
+    if (check.value >= 0 && !(distance / limit > check.value / check.limit)) return;
+    check.value = distance;
+    check.limit = limit;
+    check.passed = distance <= limit;
+    check.reason =
+        fmt::format("{}: stored less {} solve; {}; up to {:.3g} px in the image",
+                    calibration_.cameras[camera].name, unseen_ ? "the unseen views'" : "fresh",
+                    LargestPart(layout, difference, covariance, at, count),
+                    report_.cameras[camera].difference.Largest());
+  }
+
+  // One factor on all shifts: another size of the board.
+  void TestScale(const RigSolution& solution, const Eigen::MatrixXd& covariance,
+                 const Eigen::VectorXd& difference) {
+    Eigen::VectorXd direction = Eigen::VectorXd::Zero(difference.size());
+    for (size_t c = 1; c < solution.rig.cameras.size(); ++c) {
+      direction.segment<3>(solution.layout.PlaceAt(c) + 3) =
+          solution.rig.cameras[c].cam_from_rig.translation;
+    }
+    const double squares = direction.squaredNorm();
+    if (!(squares > 0)) return;  // cameras in one point: no length to compare
+    const double scale = direction.dot(difference) / squares;
+    const double sigma = std::sqrt(direction.dot(covariance * direction)) / squares;
+    const double limit =
+        unseen_ ? std::sqrt(ChiSquaredLimit(limits_.min_p, 1)) : limits_.max_self_difference_sigmas;
+    Add(AtMost("rig_scale_sigmas", std::abs(scale) / sigma, limit,
+               fmt::format("stored distances between cameras are {:+.4f} % (+- {:.4f} %) off what "
+                           "squares of {} say",
+                           100 * scale, 100 * sigma, calibration_.board.square)));
+  }
+
+  void TestData() {
+    Rig fitted = fitted_;
+    if (unseen_ && kept_.solution) fitted = kept_.solution->rig;
+    Add(TestBoardsFromBehind(calibration_, fitted_));
+    if (calibration_.kept.empty()) return;
+    Add(TestViewCount(calibration_, limits_.min_views));
+    Add(TestRepeats(calibration_, kept_.solution ? kept_.solution->sigma_px : 0));
+    Add(TestCoverage(calibration_, limits_.min_coverage));
+    Add(TestTilt(calibration_, fitted, limits_.min_tilt_deg));
+  }
+
+  // What the tests below are made on: the views that made the calibration, where they are kept.
+  const Fresh& Base() const { return calibration_.kept.empty() ? fresh_ : kept_; }
+
+  void TestUncertainty() {
+    if (!Base().solution) {
+      Add(Refused("projection_uncertainty_px", limits_.max_uncertainty_px, Base().refused));
+      Add(Refused("far_projection_uncertainty_px", limits_.max_far_uncertainty_px, Base().refused));
+      return;
+    }
+    const RigSolution& solution = *Base().solution;
+    const ProjectionSensitivity sensitivity(solution);
+    ParallelFor(0, static_cast<int>(report_.cameras.size()), threads_, [&](int c) {
+      const auto at = static_cast<size_t>(c);
+      const double distance = BoardDistance(calibration_.board, solution.rig, at);
+      report_.cameras[at].near_uncertainty =
+          UncertaintyMap(solution, sensitivity, solution.covariance, at, distance);
+      report_.cameras[at].far_uncertainty =
+          UncertaintyMap(solution, sensitivity, solution.covariance, at, kFar * distance);
+    });
+    AddUncertainty("projection_uncertainty_px", limits_.max_uncertainty_px, "the boards' distance",
+                   [](const JudgedCamera& c) -> const ImageMap& { return c.near_uncertainty; });
+    AddUncertainty("far_projection_uncertainty_px", limits_.max_far_uncertainty_px, "infinity",
+                   [](const JudgedCamera& c) -> const ImageMap& { return c.far_uncertainty; });
+  }
+
+  template <typename MapOf>
+  void AddUncertainty(const char* name, double limit, const char* where, const MapOf& map_of) {
+    Check check{name, kNaN, limit, false, "no pixel has a ray"};
+    for (const JudgedCamera& camera : report_.cameras) {
+      const double value = map_of(camera).Quantile(kMostOfImage);
+      if (!std::isfinite(value) || value <= check.value) continue;
+      check.value = value;
+      check.reason = fmt::format(
+          "{}: standard deviation of a projection at {}, exceeded in 5 % of "
+          "the image; median {:.3g} px, worst {:.3g} px",
+          camera.name, where, map_of(camera).Median(), map_of(camera).Largest());
+    }
+    check.passed = check.value <= limit;
+    Add(std::move(check));
+  }
+
+  void TestHalves() {
+    const char* name = "min_halves_p";
+    const std::vector<RigView>& views = calibration_.kept.empty() ? Tested() : calibration_.kept;
+    const size_t frames = calibration_.kept.empty() ? TestedFrames() : calibration_.kept_frames;
+    const auto order = OrderOfFrames(views);
+    std::array<Fresh, 2> halves;
+    ParallelFor(0, 2, threads_, [&](int half) {
+      const auto in_half = [&](size_t f) { return order.at(f) % 2 == static_cast<size_t>(half); };
+      halves[static_cast<size_t>(half)] =
+          Solve(calibration_, FramesWhere(views, in_half), frames,
+                calibration_.kept.empty() ? Loss::kRobust : Loss::kQuadratic);
+    });
+    for (const Fresh& half : halves) {
+      if (half.solution) continue;
+      Add(Refused(name, limits_.min_p, "half of the views: " + half.refused));
+      return;
+    }
+    const RigSolution &a = *halves[0].solution, &b = *halves[1].solution;
+    const Eigen::VectorXd difference = Difference(a.layout, a.rig.cameras, b.rig.cameras);
+    const Eigen::MatrixXd covariance = a.covariance + b.covariance;
+    const double distance = Distance(difference, covariance, 0, a.layout.size());
+    const double unknowns = a.layout.size();
+    const ProjectionSensitivity sensitivity(a);
+    double shift = 0, predicted = 0;
+    for (size_t c = 0; c < report_.cameras.size(); ++c) {
+      const double board = BoardDistance(calibration_.board, a.rig, c);
+      shift = std::max(shift, ShiftMap(a, sensitivity, difference, c, board).Largest());
+      predicted =
+          std::max(predicted, UncertaintyMap(a, sensitivity, covariance, c, board).Largest());
+    }
+    Add(AtLeast(
+        name,
+        FisherSurvival(distance * distance / unknowns, unknowns, std::min(a.freedom, b.freedom)),
+        limits_.min_p,
+        fmt::format("two halves, solved apart, differ by {:.3g} px at most, predicted "
+                    "sigma {:.3g} px; this or more by chance",
+                    shift, predicted)));
+  }
+
+  void TestPatterns() {
+    const double limit = limits_.max_pattern_px;
+    if (!Base().solution) {
+      Add(Refused("regional_pattern_px", limit, Base().refused));
+      return;
+    }
+    const RigSolution& solution = *Base().solution;
+    const auto add = [&](const char* name, const PatternTest& test, const std::string& what) {
+      const bool chance = test.p >= limits_.min_p;
+      Add(AtMost(name, chance ? 0 : test.amplitude_px, limit,
+                 fmt::format("{}: {:.4f} px RMS per coordinate; p = {:.2g}{}", what,
+                             test.amplitude_px, test.p, chance ? ", what noise does" : "")));
+    };
+    add("radial_pattern_px", TestRadial(solution),
+        "residuals along the radius that the lens model cannot follow");
+    add("regional_pattern_px", TestRegional(solution),
+        "mean residuals of image regions that the lens model cannot follow");
+    add("board_shape_px", TestBoardShape(calibration_.board, solution),
+        "residuals as of a board that is bent");
+    add("rolling_shutter_px", TestRollingShutter(calibration_.board, solution),
+        "residuals as of boards that move while the rows are read");
+    if (solution.rig.cameras.size() < 2) return;
+    TestDelays(solution);
+  }
+
+  void TestDelays(const RigSolution& solution) {
+    const PatternTest late = TestTimeOffset(solution);
+    Check check{"time_offset_sigmas", 0, limits_.max_time_offset_sigmas, true,
+                "not determined: the board stands still, or its frames do not follow each other"};
+    for (size_t c = 0; c < late.coefficients.size(); ++c) {
+      const double sigmas = std::abs(late.coefficients[c]) / late.sigmas[c];
+      if (sigmas < check.value) continue;
+      check.value = sigmas;
+      check.reason = fmt::format("{}: its images are {:+.4f} +- {:.4f} frames later than {}'s",
+                                 solution.rig.cameras[c + 1].name, late.coefficients[c],
+                                 late.sigmas[c], solution.rig.cameras[0].name);
+    }
+    check.passed = check.value <= check.limit;
+    Add(std::move(check));
+  }
+
+  const JudgedCalibration& calibration_;
+  const std::optional<UnseenViews>& unseen_;
+  const JudgeLimits& limits_;
+  int threads_;
+  JudgeReport report_;
+  Fresh kept_, fresh_;
+  Rig fitted_;
+  Residuals stored_;
+};
+
+}  // namespace
+
+JudgeReport Judge(const JudgedCalibration& calibration, const std::optional<UnseenViews>& unseen,
+                  const JudgeLimits& limits, int threads) {
+  const auto& views = unseen ? unseen->views : calibration.kept;
+  for (size_t c = 0; c < calibration.cameras.size(); ++c) {
+    if (std::none_of(views.begin(), views.end(), [&](const auto& v) { return v.camera == c; })) {
+      throw Error(fmt::format("validate: camera {}: expected views of the board {}, found none",
+                              calibration.cameras[c].name,
+                              unseen ? "among the images" : "in the file; give --images"));
+    }
+  }
+  return Judging(calibration, unseen, limits, threads).Run();
+}
+
+}  // namespace dtr::calib

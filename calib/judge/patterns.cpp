@@ -1,0 +1,286 @@
+#include "calib/judge/patterns.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+
+#include "calib/judge/distributions.h"
+
+namespace dtr::calib {
+namespace {
+
+constexpr int kRings = 6, kRegions = 4;
+constexpr double kDependent = 1e-7;  // of columns of length 1: what is left of one that others span
+
+// What is left of the rows of `rest` where the columns of `own` are fitted for this frame alone.
+Eigen::MatrixXd Eliminated(const Eigen::MatrixXd& own, const Eigen::MatrixXd& rest, long* rank) {
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(own.rows(), own.cols());
+  qr.setThreshold(kDependent);
+  Eigen::MatrixXd scaled = own;
+  for (long i = 0; i < scaled.cols(); ++i) {
+    const double length = scaled.col(i).norm();
+    if (length > 0) scaled.col(i) /= length;
+  }
+  qr.compute(scaled);
+  *rank = qr.rank();
+  const Eigen::MatrixXd turned = qr.householderQ().adjoint() * rest;
+  return turned.bottomRows(rest.rows() - qr.rank());
+}
+
+// The triangle of more rows on top of it.
+void Stack(const Eigen::MatrixXd& rows, Eigen::MatrixXd& triangle) {
+  Eigen::MatrixXd all(triangle.rows() + rows.rows(), triangle.cols());
+  all << triangle, rows;
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(all);
+  triangle = qr.matrixQR().topRows(triangle.cols()).triangularView<Eigen::Upper>();
+}
+
+PatternTest Judged(const RigSolution& solution, double explained, double left, int freedom) {
+  PatternTest test;
+  test.freedom = freedom;
+  const double below = solution.freedom - freedom;
+  if (freedom <= 0 || !(below > 0)) return test;
+  const double of_noise = freedom * left / below;
+  test.amplitude_px = std::sqrt(std::max(0.0, explained - of_noise) / (2.0 * solution.corners));
+  test.p = FisherSurvival((explained / freedom) / (left / below), freedom, below);
+  return test;
+}
+
+// Where the i-th corner of a frame is drawn. Not where it was seen: patterns made of what was seen
+// hold the residual itself.
+Eigen::Vector2d PixelOf(const RigSolution& solution, const FrameRows& rows, size_t i) {
+  const RowOrigin& origin = rows.origins[i];
+  return solution.rig.views[origin.view].seen.corners[origin.corner].pixel +
+         rows.residuals.segment<2>(2 * static_cast<long>(i));
+}
+size_t CameraOf(const RigSolution& solution, const FrameRows& rows, size_t i) {
+  return solution.rig.views[rows.origins[i].view].camera;
+}
+
+}  // namespace
+
+PatternTest TestSharedPattern(const RigSolution& solution, const PatternColumns& columns) {
+  const long shared = solution.layout.size();
+  long count = -1;
+  Eigen::MatrixXd triangle;
+  for (const FrameRows& frame : solution.rows) {
+    const Eigen::MatrixXd pattern = columns(frame);
+    if (count < 0) {
+      count = pattern.cols();
+      triangle = Eigen::MatrixXd::Zero(shared + count + 1, shared + count + 1);
+    }
+    Eigen::MatrixXd rest(frame.residuals.size(), shared + count + 1);
+    rest << frame.by_shared, pattern, frame.residuals;
+    long rank = 0;
+    Stack(Eliminated(frame.by_motion, rest, &rank), triangle);
+  }
+  if (count <= 0) return {};
+  Eigen::MatrixXd own = triangle.block(shared, shared, count, count);
+  const Eigen::VectorXd right = triangle.block(shared, shared + count, count, 1);
+  const Eigen::VectorXd lengths =
+      triangle.middleCols(shared, count).colwise().norm().cwiseMax(1e-300).transpose();
+  own = own * lengths.cwiseInverse().asDiagonal();
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(own.rows(), own.cols());
+  qr.setThreshold(kDependent);
+  qr.compute(own);
+  const Eigen::VectorXd turned = qr.householderQ().adjoint() * right;
+  const double explained = turned.head(qr.rank()).squaredNorm();
+  const double left =
+      std::pow(triangle(shared + count, shared + count), 2) + right.squaredNorm() - explained;
+  PatternTest test = Judged(solution, explained, left, static_cast<int>(qr.rank()));
+  if (qr.rank() == count) {
+    const Eigen::VectorXd c = qr.solve(right).cwiseQuotient(lengths);
+    const Eigen::MatrixXd inverse =
+        (lengths.cwiseInverse().asDiagonal() * (own.transpose() * own).inverse().eval() *
+         lengths.cwiseInverse().asDiagonal());
+    const double variance = left / std::max(1.0, solution.freedom - static_cast<double>(count));
+    for (long i = 0; i < count; ++i) {
+      test.coefficients.push_back(c[i]);
+      test.sigmas.push_back(std::sqrt(variance * inverse(i, i)));
+    }
+  }
+  return test;
+}
+
+namespace {
+
+// Least sum of squares with `own` fitted per frame, `shared` for all; by how many unknowns.
+struct Fit {
+  double squares = 0;
+  long unknowns = 0;
+};
+
+Fit FitOf(const RigSolution& solution, const PatternColumns& own, const PatternColumns& shared) {
+  Eigen::MatrixXd triangle;
+  Fit fit;
+  for (const FrameRows& frame : solution.rows) {
+    const Eigen::MatrixXd own_columns =
+        own ? own(frame) : Eigen::MatrixXd(frame.residuals.size(), 0);
+    const Eigen::MatrixXd shared_columns =
+        shared ? shared(frame) : Eigen::MatrixXd(frame.residuals.size(), 0);
+    Eigen::MatrixXd mine(frame.residuals.size(), frame.by_motion.cols() + own_columns.cols());
+    mine << frame.by_motion, own_columns;
+    const long count = frame.by_shared.cols() + shared_columns.cols();
+    Eigen::MatrixXd rest(frame.residuals.size(), count + 1);
+    rest << frame.by_shared, shared_columns, frame.residuals;
+    if (triangle.size() == 0) triangle = Eigen::MatrixXd::Zero(count + 1, count + 1);
+    long rank = 0;
+    Stack(Eliminated(mine, rest, &rank), triangle);
+    fit.unknowns += rank;
+  }
+  // Shared columns may depend on each other: their part is solved with pivots.
+  const long count = triangle.cols() - 1;
+  Eigen::MatrixXd part = triangle.topLeftCorner(count, count);
+  for (long i = 0; i < count; ++i) {
+    const double length = part.col(i).norm();
+    if (length > 0) part.col(i) /= length;
+  }
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(count, count);
+  qr.setThreshold(kDependent);
+  qr.compute(part);
+  const Eigen::VectorXd turned = qr.householderQ().adjoint() * triangle.topRightCorner(count, 1);
+  fit.squares = turned.tail(count - qr.rank()).squaredNorm() + std::pow(triangle(count, count), 2);
+  fit.unknowns += qr.rank();
+  return fit;
+}
+
+// Columns for all corners of the board to lie elsewhere: x, y, z of each.
+PatternColumns CornersElsewhere(const Board& board, const RigSolution& solution) {
+  return [&board, &solution](const FrameRows& frame) {
+    const Eigen::Matrix3d rotation =
+        solution.rig.rig_from_board[frame.frame].rotation.toRotationMatrix();
+    Eigen::MatrixXd columns =
+        Eigen::MatrixXd::Zero(frame.residuals.size(), 3 * board.CornerCount());
+    for (size_t i = 0; i < frame.origins.size(); ++i) {
+      const RowOrigin& origin = frame.origins[i];
+      const int id = solution.rig.views[origin.view].seen.corners[origin.corner].id;
+      const auto at = 2 * static_cast<long>(i);
+      columns.block<2, 3>(at, 3 * id) =
+          frame.by_motion.block<2, 3>(at, 3) * rotation * (board.square / frame.distance);
+    }
+    return columns;
+  };
+}
+
+}  // namespace
+
+PatternTest TestFramePattern(const RigSolution& solution, const PatternColumns& columns,
+                             const PatternColumns& nuisance) {
+  const Fit without = FitOf(solution, {}, nuisance), with = FitOf(solution, columns, nuisance);
+  return Judged(solution, without.squares - with.squares, with.squares,
+                static_cast<int>(with.unknowns - without.unknowns));
+}
+
+PatternTest TestRadial(const RigSolution& solution) {
+  const size_t cameras = solution.rig.cameras.size();
+  std::vector<double> reach(cameras, 1);
+  const auto from_middle = [&](const FrameRows& frame, size_t i) -> Eigen::Vector2d {
+    const PinholeCamera k = solution.rig.cameras[CameraOf(solution, frame, i)].camera.Pinhole();
+    return PixelOf(solution, frame, i) - Eigen::Vector2d(k.cx_px(), k.cy_px());
+  };
+  for (const FrameRows& frame : solution.rows) {
+    for (size_t i = 0; i < frame.origins.size(); ++i) {
+      double& r = reach[CameraOf(solution, frame, i)];
+      r = std::max(r, from_middle(frame, i).norm());
+    }
+  }
+  return TestSharedPattern(solution, [&](const FrameRows& frame) {
+    Eigen::MatrixXd columns =
+        Eigen::MatrixXd::Zero(frame.residuals.size(), static_cast<long>(cameras) * kRings);
+    for (size_t i = 0; i < frame.origins.size(); ++i) {
+      const size_t camera = CameraOf(solution, frame, i);
+      const Eigen::Vector2d way = from_middle(frame, i);
+      const double radius = way.norm();
+      if (!(radius > 0)) continue;
+      // Hat functions centred on the outer edges of the rings: none at the middle, where there is
+      // no direction.
+      const double place = kRings * radius / reach[camera];
+      for (int ring = 0; ring < kRings; ++ring) {
+        const double weight = 1 - std::abs(place - (ring + 1));
+        if (weight <= 0) continue;
+        columns.block<2, 1>(2 * static_cast<long>(i), static_cast<long>(camera) * kRings + ring) =
+            weight * way / radius;
+      }
+    }
+    return columns;
+  });
+}
+
+PatternTest TestRegional(const RigSolution& solution) {
+  const long per_camera = 2 * kRegions * kRegions;
+  const long count = static_cast<long>(solution.rig.cameras.size()) * per_camera;
+  return TestSharedPattern(solution, [&](const FrameRows& frame) {
+    Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(frame.residuals.size(), count);
+    for (size_t i = 0; i < frame.origins.size(); ++i) {
+      const size_t camera = CameraOf(solution, frame, i);
+      const LensCamera& lens = solution.rig.cameras[camera].camera;
+      const Eigen::Vector2d pixel = PixelOf(solution, frame, i);
+      const auto cell = [](double at, int size) {
+        return std::clamp(static_cast<int>(kRegions * at / size), 0, kRegions - 1);
+      };
+      const long at =
+          static_cast<long>(camera) * per_camera +
+          2 * (cell(pixel.y(), lens.height_px) * kRegions + cell(pixel.x(), lens.width_px));
+      columns(2 * static_cast<long>(i), at) = 1;
+      columns(2 * static_cast<long>(i) + 1, at + 1) = 1;
+    }
+    return columns;
+  });
+}
+
+PatternTest TestBoardShape(const Board& board, const RigSolution& solution) {
+  const PatternColumns corners = CornersElsewhere(board, solution);
+  // z = x^2, xy, y^2, x^3, x^2 y, x y^2, y^3 with x and y from -1 to 1.
+  Eigen::MatrixXd shapes = Eigen::MatrixXd::Zero(3 * board.CornerCount(), 7);
+  const Eigen::Vector3d middle = MiddleOf(board), last = board.Corner(board.CornerCount() - 1);
+  for (int id = 0; id < board.CornerCount(); ++id) {
+    const Eigen::Vector3d place = board.Corner(id) - middle;
+    const double x = place.x() / (last - middle).x(), y = place.y() / (last - middle).y();
+    shapes.row(3 * id + 2) << x * x, x * y, y * y, x * x * x, x * x * y, x * y * y, y * y * y;
+  }
+  return TestSharedPattern(
+      solution, [&](const FrameRows& frame) -> Eigen::MatrixXd { return corners(frame) * shapes; });
+}
+
+PatternTest TestRollingShutter(const Board& board, const RigSolution& solution) {
+  const auto shutter = [&](const FrameRows& frame) {
+    Eigen::MatrixXd columns = frame.by_motion;
+    for (size_t i = 0; i < frame.origins.size(); ++i) {
+      const double height = solution.rig.cameras[CameraOf(solution, frame, i)].camera.height_px;
+      columns.middleRows<2>(2 * static_cast<long>(i)) *=
+          PixelOf(solution, frame, i).y() / height - 0.5;
+    }
+    return columns;
+  };
+  return TestFramePattern(solution, shutter, CornersElsewhere(board, solution));
+}
+
+PatternTest TestTimeOffset(const RigSolution& solution) {
+  const size_t cameras = solution.rig.cameras.size();
+  if (cameras < 2) return {};
+  std::vector<const FrameRows*> by_frame(solution.rig.rig_from_board.size(), nullptr);
+  for (const FrameRows& frame : solution.rows) by_frame[frame.frame] = &frame;
+  return TestSharedPattern(solution, [&](const FrameRows& frame) {
+    Eigen::MatrixXd columns =
+        Eigen::MatrixXd::Zero(frame.residuals.size(), static_cast<long>(cameras) - 1);
+    const size_t f = frame.frame;
+    if (f == 0 || f + 1 >= by_frame.size() || !by_frame[f - 1] || !by_frame[f + 1]) return columns;
+    const auto& poses = solution.rig.rig_from_board;
+    const Eigen::AngleAxisd turn(poses[f + 1].rotation * poses[f - 1].rotation.conjugate());
+    Eigen::Matrix<double, 6, 1> speed;  // per frame
+    speed << 0.5 * turn.angle() * turn.axis(),
+        (by_frame[f + 1]->middle_in_rig - by_frame[f - 1]->middle_in_rig) / (2 * frame.distance);
+    for (size_t i = 0; i < frame.origins.size(); ++i) {
+      const size_t camera = CameraOf(solution, frame, i);
+      if (camera == 0) continue;
+      const long at = 2 * static_cast<long>(i);
+      // Residuals are predicted less observed: an image that is late shows the board ahead.
+      columns.block<2, 1>(at, static_cast<long>(camera) - 1) =
+          -frame.by_motion.middleRows<2>(at) * speed;
+    }
+    return columns;
+  });
+}
+
+}  // namespace dtr::calib

@@ -1,0 +1,150 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "cli/command.h"
+#include "cli/output_file.h"
+#include "cli/pipeline/lens_file.h"
+#include "cli/pipeline/rig_calibration.h"
+#include "dtr/base/error.h"
+
+namespace dtr::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Options {
+  fs::path folder;
+  std::vector<fs::path> outputs;
+  std::string board, model = "auto", loss = "robust", lenses = "free";
+  std::vector<std::string> given;
+};
+
+std::optional<calib::BoardModel> ModelFrom(const std::string& name) {
+  if (name == "auto") return std::nullopt;
+  const auto model = calib::BoardModelFromName(name);
+  if (!model) throw UsageError("--model " + name + ": expected auto or the name of a model");
+  return model;
+}
+
+void SayRig(const calib::Calibration& calibration, const pipeline::RigSummary& summary,
+            Console& console) {
+  for (const calib::CalibratedCamera& camera : calibration.cameras) {
+    console.Say(fmt::format("{}: {}, {} x {} px, RMS {:.4f} px", camera.name,
+                            calib::NameOf(camera.model), camera.camera.width_px,
+                            camera.camera.height_px, camera.rms_px));
+    const auto names = calib::FreeParameterNames(camera.model);
+    for (size_t i = 0; i < names.size(); ++i) {
+      const auto at = static_cast<long>(i);
+      console.Say(fmt::format("  {:<7} {:>14.6g} +- {:.2g}", names[i], camera.camera.params[i],
+                              std::sqrt(camera.covariance(at, at))));
+    }
+    if (camera.place_covariance.size() == 0) continue;
+    const Eigen::Vector3d t = camera.cam_from_rig.translation;
+    const Eigen::VectorXd sigma = camera.place_covariance.diagonal().cwiseSqrt();
+    const Eigen::AngleAxisd turn(camera.cam_from_rig.rotation);
+    const Eigen::Vector3d w = turn.angle() * turn.axis();
+    console.Say(fmt::format("  turn    {:.5f}, {:.5f}, {:.5f} rad +- {:.1g}, {:.1g}, {:.1g}", w.x(),
+                            w.y(), w.z(), sigma[0], sigma[1], sigma[2]));
+    console.Say(fmt::format("  shift   {:.5g}, {:.5g}, {:.5g} +- {:.1g}, {:.1g}, {:.1g}", t.x(),
+                            t.y(), t.z(), sigma[3], sigma[4], sigma[5]));
+  }
+  for (const std::string& name : summary.flipped) {
+    console.Say("counted from the other end, repaired: " + name);
+  }
+  for (const calib::CalibratedView& view : calibration.views) {
+    if (view.outliers.empty()) continue;
+    console.Say(
+        fmt::format("outliers: {}: corners {}", view.seen.name, fmt::join(view.outliers, ", ")));
+  }
+  console.Say(fmt::format("left out: {} images, see the file", calibration.left_out.size()));
+  console.Say(
+      fmt::format("{} frames, {} views, {} corners, {} outliers; RMS {:.4f} px, sigma "
+                  "{:.4f} px per coordinate",
+                  summary.frames, calibration.views.size(), summary.corners, summary.outliers,
+                  summary.rms_px, summary.sigma_px));
+}
+
+int RunCalibrateRig(const Options& options, const Context& context) {
+  const calib::Board board = calib::BoardFromText(options.board);
+  for (const fs::path& output : options.outputs) {
+    RequireOutputFile(output, "-o", {".json", ".yml", ".yaml", ".txt"});
+  }
+  pipeline::RigCalibrationOptions calibrate;
+  calibrate.model = ModelFrom(options.model);
+  calibrate.solve.loss =
+      options.loss == "quadratic" ? calib::Loss::kQuadratic : calib::Loss::kRobust;
+  calibrate.fixed_lenses = options.lenses == "fixed";
+  calibrate.threads = context.common.threads;
+  calibrate.seed = context.common.seed;
+  for (const std::string& given : options.given) {
+    const size_t at = given.find('=');
+    if (at == std::string::npos || at == 0) {
+      throw UsageError("--camera " + given + ": expected NAME=FILE");
+    }
+    const std::string file = given.substr(at + 1);
+    calibrate.given[given.substr(0, at)] = pipeline::GivenLens(pipeline::ReadLens(file), file);
+  }
+  const auto photos =
+      pipeline::ReadRigPhotos(options.folder, board, {}, context.common.threads, context.console);
+  pipeline::RigSummary summary;
+  const auto calibration = pipeline::CalibrateRig(board, photos, calibrate, &summary);
+  for (const fs::path& output : options.outputs) pipeline::WriteRigFile(output, calibration);
+  SayRig(calibration, summary, context.console);
+  context.EmitJson(calib::SummaryJson(calibration));
+  return kDone;
+}
+
+}  // namespace
+
+void AddCalibrateRigCommand(CLI::App& calibrate) {
+  AddCommand(
+      calibrate, "rig", "Calibrate cameras that are fixed to each other from a board that they see",
+      "dtr calibrate rig pairs/ --board chessboard:9x6:25mm -o rig.json -o rig.yml",
+      [](CLI::App& command) -> Action {
+        auto options = std::make_shared<Options>();
+        command
+            .add_option("DIR", options->folder,
+                        "Sub-folders, one per camera, with photos of equal names; or photos named "
+                        "CAMERA and a number, as left01.jpg; or videos, one per camera, with or "
+                        "without timestamps.csv")
+            ->required();
+        command
+            .add_option("-o,--output", options->outputs,
+                        "The calibration, by its name: .json with its observations, .yml of two "
+                        "cameras as OpenCV's stereo programs take it, .txt COLMAP's cameras.txt; "
+                        "may be given more than once")
+            ->required()
+            ->type_name("FILE");
+        command.add_option("--board", options->board, "As calibrate board takes it")
+            ->required()
+            ->type_name("BOARD");
+        command
+            .add_option("--model", options->model,
+                        "Lens model of every camera: pinhole, brown4, brown5, brown8, fisheye, or "
+                        "auto, each camera's own by photos held out [auto]")
+            ->type_name("MODEL");
+        command
+            .add_option("--camera", options->given,
+                        "Lens of a camera that is calibrated already, a .json, .yml or .txt file; "
+                        "all cameras or none")
+            ->type_name("NAME=FILE");
+        command
+            .add_option("--lenses", options->lenses,
+                        "free: solved for together with the rig; fixed: as given by --camera, or "
+                        "as each camera's own boards say [free; fixed with --camera]")
+            ->check(CLI::IsMember({"free", "fixed"}))
+            ->type_name("NAME");
+        command
+            .add_option("--loss", options->loss,
+                        "robust: outliers are named and left out; quadratic: every corner counts "
+                        "[robust]")
+            ->check(CLI::IsMember({"robust", "quadratic"}))
+            ->type_name("NAME");
+        return [options](const Context& context) { return RunCalibrateRig(*options, context); };
+      });
+}
+
+}  // namespace dtr::cli

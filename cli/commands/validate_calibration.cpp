@@ -1,0 +1,71 @@
+#include "cli/commands/validate_calibration.h"
+
+#include <fmt/format.h>
+
+#include "cli/output_file.h"
+#include "cli/pipeline/judge_calibration.h"
+#include "dtr/base/error.h"
+#include "dtr/base/files.h"
+
+namespace dtr::cli {
+namespace {
+
+void SayStats(const std::string& camera, const char* what, const calib::ResidualStats& stats,
+              double noise_px, Console& console) {
+  if (stats.count == 0) return;
+  console.Say(fmt::format("{:<16} {:<10} {:>7} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.3f}",
+                          camera, what, stats.count, stats.rms_px, stats.median_px, stats.p95_px,
+                          stats.worst_px, noise_px));
+}
+
+void SayReport(const calib::JudgeReport& report, Console& console) {
+  console.Say(fmt::format("{:<16} {:<10} {:>7} {:>8} {:>8} {:>8} {:>8} {:>8}", "camera, px",
+                          "corners", "count", "RMS", "median", "95 %", "worst", "noise"));
+  for (const calib::JudgedCamera& camera : report.cameras) {
+    SayStats(camera.name, report.unseen ? "unseen" : "kept", camera.stored, camera.noise_px,
+             console);
+    SayStats(camera.name, "held out", camera.held_out, camera.noise_px, console);
+  }
+  for (const Check& test : report.tests) {
+    console.Say(fmt::format("{} {}: {:.4g} (limit {:.4g}): {}", test.passed ? "passed" : "FAILED",
+                            test.name, test.value, test.limit, test.reason));
+  }
+  if (!report.unseen) {
+    console.Say(
+        "judged on the views that made the calibration; --images DIR with photos of the board "
+        "that it has not seen says more");
+  }
+}
+
+}  // namespace
+
+int RunValidateCalibration(const ValidateCalibrationOptions& options, const Context& context) {
+  if (options.report) RequireOutputFile(*options.report, "--report", {".html"});
+  const calib::Calibration calibration = calib::ReadCalibration(options.file);
+  if (calibration.views.empty() && !options.images) {
+    throw UsageError(fmt::format("{}: keeps no observations; give photos of the board by --images",
+                                 options.file.string()));
+  }
+  calib::JudgeLimits limits;
+  limits.max_rms_px = options.max_rms_px.value_or(limits.max_rms_px);
+  limits.max_uncertainty_px = options.max_uncertainty_px.value_or(limits.max_uncertainty_px);
+  std::optional<calib::UnseenViews> unseen;
+  if (options.images) {
+    unseen =
+        pipeline::ReadUnseen(calibration, *options.images, context.common.threads, context.console);
+  }
+  const calib::JudgeReport report =
+      calib::Judge(pipeline::JudgedFrom(calibration), unseen, limits, context.common.threads);
+  SayReport(report, context.console);
+  if (options.report) {
+    WriteFileAtomically(*options.report,
+                        pipeline::CalibrationPage(calibration, report,
+                                                  "Calibration " + options.file.filename().string(),
+                                                  options.images));
+    context.console.Say("report: " + options.report->string());
+  }
+  context.EmitJson(calib::ToJson(report));
+  return report.passed() ? kDone : kFailed;
+}
+
+}  // namespace dtr::cli

@@ -1,0 +1,19 @@
+// cli/commands/validate_calibration.h -- `dtr validate` of a calibration file.
+#pragma once
+#include <filesystem>
+#include <optional>
+
+#include "cli/command.h"
+
+namespace dtr::cli {
+
+struct ValidateCalibrationOptions {
+  std::filesystem::path file;
+  std::optional<std::filesystem::path> images, report;
+  std::optional<double> max_rms_px, max_uncertainty_px;
+};
+
+/// Judges, prints one line per test, writes the page where asked for; kFailed when a test breaks.
+int RunValidateCalibration(const ValidateCalibrationOptions& options, const Context& context);
+
+}  // namespace dtr::cli

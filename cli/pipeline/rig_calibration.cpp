@@ -1,0 +1,151 @@
+#include "cli/pipeline/rig_calibration.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "calib/files/opencv_yaml.h"
+#include "calib/solve/choose_model.h"
+#include "cli/pipeline/board_calibration.h"
+#include "dtr/base/error.h"
+
+namespace dtr::pipeline {
+namespace {
+
+std::vector<calib::BoardView> ViewsOf(const RigPhotos& photos, size_t camera) {
+  std::vector<calib::BoardView> views;
+  for (const calib::RigView& view : photos.views) {
+    if (view.camera == camera) views.push_back(view.seen);
+  }
+  return views;
+}
+
+// Each camera with its model: given, named, or chosen by this camera's own held-out views.
+std::vector<calib::RigCameraInput> InputsOf(const calib::Board& board, const RigPhotos& photos,
+                                            const RigCalibrationOptions& options) {
+  std::vector<calib::RigCameraInput> inputs;
+  for (size_t c = 0; c < photos.cameras.size(); ++c) {
+    const RigPhotoCamera& camera = photos.cameras[c];
+    calib::RigCameraInput input{
+        camera.name, calib::BoardModel::kPinhole, camera.width_px, camera.height_px, {}};
+    const auto given = options.given.find(camera.name);
+    if (given != options.given.end()) {
+      input.model = given->second.model;
+      input.given = given->second.given;
+      if (input.given->width_px != camera.width_px || input.given->height_px != camera.height_px) {
+        throw Error(fmt::format("--camera {}: expected a lens of {} x {} px, found {} x {}",
+                                camera.name, camera.width_px, camera.height_px,
+                                input.given->width_px, input.given->height_px));
+      }
+    } else if (options.model) {
+      input.model = *options.model;
+    } else {
+      calib::ChoiceOptions choose;
+      choose.solve = options.solve;
+      choose.threads = options.threads;
+      choose.seed = options.seed;
+      try {
+        const auto choice = calib::ChooseModel(board, ViewsOf(photos, c), camera.width_px,
+                                               camera.height_px, choose);
+        input.model = choice.scores[choice.chosen].model;
+      } catch (const Error& error) {
+        throw Error(fmt::format("camera {}: {}", camera.name, error.what()));
+      }
+    }
+    inputs.push_back(std::move(input));
+  }
+  return inputs;
+}
+
+void RequireGiven(const RigPhotos& photos, const RigCalibrationOptions& options) {
+  if (options.given.empty()) return;
+  for (const RigPhotoCamera& camera : photos.cameras) {
+    if (!options.given.contains(camera.name)) {
+      throw UsageError(
+          fmt::format("--camera: expected a lens for every camera or for none, found "
+                      "none for {}",
+                      camera.name));
+    }
+  }
+  for (const auto& [name, lens] : options.given) {
+    if (std::none_of(photos.cameras.begin(), photos.cameras.end(),
+                     [&](const auto& camera) { return camera.name == name; })) {
+      throw UsageError(fmt::format("--camera {}: no such camera; the first one is {}", name,
+                                   photos.cameras.front().name));
+    }
+  }
+}
+
+}  // namespace
+
+calib::Calibration CalibrateRig(const calib::Board& board, const RigPhotos& photos,
+                                const RigCalibrationOptions& options, RigSummary* summary) {
+  RequireGiven(photos, options);
+  calib::RigOptions rig_options;
+  rig_options.solve = options.solve;
+  rig_options.free_lenses = !options.fixed_lenses && options.given.empty();
+  const calib::RigSolution solution = calib::SolveRig(
+      board, InputsOf(board, photos, options), photos.views, photos.frames.size(), rig_options);
+  calib::Calibration calibration;
+  calibration.board = board;
+  calibration.lenses_given = !rig_options.free_lenses;
+  for (size_t c = 0; c < solution.rig.cameras.size(); ++c) {
+    const calib::RigCamera& camera = solution.rig.cameras[c];
+    const int count = calib::FreeParameterCount(camera.model);
+    calib::CalibratedCamera out{camera.name,
+                                camera.model,
+                                camera.camera,
+                                Eigen::MatrixXd::Zero(count, count),
+                                solution.camera_rms_px[c],
+                                solution.sigma_px,
+                                camera.cam_from_rig,
+                                {}};
+    const int lens = solution.layout.LensAt(c), place = solution.layout.PlaceAt(c);
+    if (lens >= 0) out.covariance = solution.covariance.block(lens, lens, count, count);
+    if (place >= 0) out.place_covariance = solution.covariance.block(place, place, 6, 6);
+    calibration.cameras.push_back(std::move(out));
+  }
+  for (const calib::RigView& view : solution.rig.views) {
+    calibration.views.push_back(
+        {view.seen, view.camera, view.frame,
+         solution.rig.cameras[view.camera].cam_from_rig * solution.rig.rig_from_board[view.frame],
+         view.outliers});
+  }
+  calibration.left_out = photos.left_out;
+  calibration.left_out.insert(calibration.left_out.end(), solution.left_out.begin(),
+                              solution.left_out.end());
+  *summary = {solution.rows.size(), solution.corners,  solution.outliers,
+              solution.rms_px,      solution.sigma_px, solution.flipped};
+  return calibration;
+}
+
+calib::RigCameraInput GivenLens(const calib::LensCamera& camera, const std::string& where) {
+  calib::RigCameraInput input;
+  for (const calib::BoardModel model : calib::kBoardModels) {
+    // The first model, so the one with the fewest coefficients, that says the same.
+    if (calib::LensModelOf(model) != camera.model) continue;
+    const auto first_unused = camera.params.begin() + calib::FreeParameterCount(model);
+    if (std::any_of(first_unused, camera.params.end(), [](double p) { return p != 0; })) continue;
+    input.model = model;
+    input.given = camera;
+    return input;
+  }
+  throw Error(fmt::format("{}: expected a lens that boards are solved with, found {}", where,
+                          calib::NameOf(camera.model)));
+}
+
+void WriteRigFile(const std::filesystem::path& file, const calib::Calibration& calibration) {
+  const std::string extension = file.extension().string();
+  if (extension != ".yml" && extension != ".yaml") {
+    WriteCameraFile(file, calibration);
+    return;
+  }
+  if (calibration.cameras.size() != 2) {
+    throw Error(fmt::format("{}: OpenCV's stereo file has 2 cameras, found {}; write a .json",
+                            file.string(), calibration.cameras.size()));
+  }
+  calib::WriteOpenCvStereoYaml(file, calibration.cameras[0].camera, calibration.cameras[1].camera,
+                               calibration.cameras[1].cam_from_rig);
+}
+
+}  // namespace dtr::pipeline

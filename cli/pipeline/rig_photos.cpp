@@ -1,0 +1,382 @@
+#include "cli/pipeline/rig_photos.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <charconv>
+#include <functional>
+#include <map>
+#include <optional>
+#include <sstream>
+
+#include "calib/boards/repeats.h"
+#include "capture/ingest.h"
+#include "cli/pipeline/video_frames.h"
+#include "dtr/base/error.h"
+#include "dtr/base/files.h"
+#include "dtr/base/parallel_for.h"
+#include "dtr/io/image_io.h"
+
+namespace dtr::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::uintmax_t kLargestTableBytes = 64u << 20;
+constexpr size_t kFramesAtOnce = 16;  // of a video, in memory
+
+// One photo, or one frame of a video, and what was found in it.
+struct Shot {
+  fs::path file;      // of a photo; of a video where number >= 0
+  int number = -1;    // frame of a video
+  std::string name;   // to list it by
+  std::string frame;  // instant
+  size_t camera = 0;
+  int width_px = 0, height_px = 0;
+  calib::Detection found;
+};
+
+struct Layout {
+  std::vector<std::string> cameras;
+  std::vector<Shot> shots;
+  std::vector<std::string> frames;  // in order of time
+};
+
+std::vector<fs::path> Sorted(const fs::path& folder,
+                             const std::function<bool(const fs::path&)>& take) {
+  std::vector<fs::path> paths;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (!entry.path().filename().string().starts_with('.') && take(entry.path())) {
+      paths.push_back(entry.path());
+    }
+  }
+  std::sort(paths.begin(), paths.end());
+  return paths;
+}
+
+bool IsPhoto(const fs::path& path) {
+  return fs::is_regular_file(path) && capture::IsImageExtension(path.extension().string());
+}
+
+// The digits at the end of a name; empty where there are none.
+std::string DigitsAtEnd(const std::string& name) {
+  size_t at = name.size();
+  while (at > 0 && name[at - 1] >= '0' && name[at - 1] <= '9') --at;
+  return name.substr(at);
+}
+
+// Numbers in names are compared as such: 2 comes before 10.
+bool EarlierName(const std::string& a, const std::string& b) {
+  const std::string x = DigitsAtEnd(a), y = DigitsAtEnd(b);
+  const std::string p = a.substr(0, a.size() - x.size()), q = b.substr(0, b.size() - y.size());
+  if (p != q) return p < q;
+  const auto bare = [](const std::string& digits) {
+    const size_t at = digits.find_first_not_of('0');
+    return at == std::string::npos ? std::string() : digits.substr(at);
+  };
+  const std::string m = bare(x), n = bare(y);
+  if (m.size() != n.size()) return m.size() < n.size();
+  return m != n ? m < n : a < b;
+}
+
+void OrderFrames(Layout& layout) {
+  for (const Shot& shot : layout.shots) layout.frames.push_back(shot.frame);
+  std::sort(layout.frames.begin(), layout.frames.end(), EarlierName);
+  layout.frames.erase(std::unique(layout.frames.begin(), layout.frames.end()), layout.frames.end());
+}
+
+Layout FromSubfolders(const std::vector<fs::path>& folders) {
+  Layout layout;
+  for (const fs::path& folder : folders) {
+    for (const fs::path& photo : Sorted(folder, IsPhoto)) {
+      Shot shot;
+      shot.file = photo;
+      shot.name = folder.filename().string() + "/" + photo.filename().string();
+      shot.frame = photo.stem().string();
+      shot.camera = layout.cameras.size();
+      layout.shots.push_back(std::move(shot));
+    }
+    layout.cameras.push_back(folder.filename().string());
+  }
+  OrderFrames(layout);
+  return layout;
+}
+
+Layout FromNames(const std::vector<fs::path>& photos) {
+  Layout layout;
+  std::map<std::string, size_t> cameras;
+  for (const fs::path& photo : photos) {
+    const std::string stem = photo.stem().string(), digits = DigitsAtEnd(stem);
+    const std::string camera = stem.substr(0, stem.size() - digits.size());
+    if (!digits.empty() && !camera.empty()) cameras.emplace(camera, 0);
+  }
+  for (auto& [name, index] : cameras) {
+    index = layout.cameras.size();
+    layout.cameras.push_back(name);
+  }
+  for (const fs::path& photo : photos) {
+    const std::string stem = photo.stem().string(), digits = DigitsAtEnd(stem);
+    const auto camera = cameras.find(stem.substr(0, stem.size() - digits.size()));
+    if (digits.empty() || camera == cameras.end()) continue;
+    Shot shot;
+    shot.file = photo;
+    shot.name = photo.filename().string();
+    shot.frame = digits;
+    shot.camera = camera->second;
+    layout.shots.push_back(std::move(shot));
+  }
+  OrderFrames(layout);
+  return layout;
+}
+
+std::optional<int> IntFrom(const std::string& word) {
+  int value = 0;
+  const auto [end, failure] = std::from_chars(word.data(), word.data() + word.size(), value);
+  if (failure != std::errc() || end != word.data() + word.size() || value < 0) return {};
+  return value;
+}
+
+// Which frame of which camera belongs to which instant.
+using Instants = std::map<std::pair<int, int>, int>;  // (cam_id, frame_index) -> sync_index
+
+Instants ReadTimestamps(const fs::path& file) {
+  std::istringstream lines(ReadFile(file, kLargestTableBytes));
+  Instants instants;
+  std::string line;
+  std::map<std::string, size_t> columns;
+  for (int number = 1; std::getline(lines, line); ++number) {
+    if (!line.empty() && line.back() == '\r') line.pop_back();
+    if (line.empty()) continue;
+    std::vector<std::string> words;
+    std::istringstream parts(line);
+    for (std::string word; std::getline(parts, word, ',');) words.push_back(word);
+    if (columns.empty()) {
+      for (size_t i = 0; i < words.size(); ++i) columns[words[i]] = i;
+      for (const char* name : {"sync_index", "cam_id", "frame_index"}) {
+        if (!columns.contains(name)) {
+          throw Error(fmt::format("{}: expected a column {}, found none", file.string(), name));
+        }
+      }
+      continue;
+    }
+    const auto value = [&](const char* name) {
+      const size_t at = columns[name];
+      const auto number_found = at < words.size() ? IntFrom(words[at]) : std::nullopt;
+      if (!number_found) {
+        throw Error(
+            fmt::format("{}: line {}: {}: expected a whole number", file.string(), number, name));
+      }
+      return *number_found;
+    };
+    instants[{value("cam_id"), value("frame_index")}] = value("sync_index");
+  }
+  return instants;
+}
+
+Layout FromVideos(const fs::path& folder, const std::vector<fs::path>& videos) {
+  Layout layout;
+  Instants instants;
+  const bool timed = fs::exists(folder / "timestamps.csv");
+  if (timed) instants = ReadTimestamps(folder / "timestamps.csv");
+  for (const fs::path& video : videos) {
+    const std::string name = video.stem().string();
+    const auto id = IntFrom(DigitsAtEnd(name));
+    if (timed && !id) {
+      throw Error(
+          fmt::format("{}: expected a number at the end of the name, the cam_id of "
+                      "timestamps.csv",
+                      video.string()));
+    }
+    int frames = 0;
+    ForEachFrame(video, [&](int number, const ImageRgb8&) {
+      frames = number + 1;
+      return true;
+    });
+    for (int number = 0; number < frames; ++number) {
+      Shot shot;
+      shot.file = video;
+      shot.number = number;
+      shot.name = fmt::format("{}/{}", name, number);
+      shot.camera = layout.cameras.size();
+      shot.frame = fmt::format("{}", number);
+      if (timed) {
+        const auto at = instants.find({*id, number});
+        if (at == instants.end()) continue;  // a frame without an instant says nothing of the rig
+        shot.frame = fmt::format("{}", at->second);
+      }
+      layout.shots.push_back(std::move(shot));
+    }
+    layout.cameras.push_back(name);
+  }
+  OrderFrames(layout);
+  return layout;
+}
+
+Layout LayoutOf(const fs::path& folder) {
+  if (!fs::is_directory(folder)) {
+    throw UsageError(fmt::format("{}: expected a folder of what the cameras of a rig saw, found {}",
+                                 folder.string(),
+                                 fs::exists(folder) ? "something else" : "nothing"));
+  }
+  const auto folders = Sorted(folder, [](const fs::path& path) {
+    return fs::is_directory(path) && !Sorted(path, IsPhoto).empty();
+  });
+  Layout layout;
+  if (folders.size() >= 2) {
+    layout = FromSubfolders(folders);
+  } else if (const auto videos = Sorted(folder,
+                                        [](const fs::path& p) {
+                                          return fs::is_regular_file(p) &&
+                                                 IsVideoExtension(p.extension().string());
+                                        });
+             videos.size() >= 2) {
+    layout = FromVideos(folder, videos);
+  } else {
+    layout = FromNames(Sorted(folder, IsPhoto));
+  }
+  if (layout.cameras.size() < 2) {
+    throw UsageError(
+        fmt::format("{}: expected at least 2 cameras: sub-folders with photos, photos "
+                    "named CAMERA and a number, or videos; found {}",
+                    folder.string(), layout.cameras.size()));
+  }
+  return layout;
+}
+
+void Look(const ImageRgb8& image, const calib::Board& board, const calib::DetectOptions& options,
+          Shot& shot) {
+  shot.found = calib::DetectBoard(calib::GreyOf(image), board, options);
+  shot.width_px = image.width();
+  shot.height_px = image.height();
+}
+
+// Looks for the board in every shot: photos side by side, videos a few frames at a time.
+void LookAtAll(const calib::Board& board, const calib::DetectOptions& options, int threads,
+               Progress& progress, Layout& layout) {
+  progress.Stage("looking for the board", static_cast<int>(layout.shots.size()));
+  std::atomic<int> done = 0;
+  const auto step = [&] {
+    if (progress.StopRequested()) throw Interrupted("interrupted; nothing was written");
+    progress.Update(++done);
+  };
+  std::vector<size_t> photos;
+  std::map<fs::path, std::map<int, size_t>> videos;
+  for (size_t i = 0; i < layout.shots.size(); ++i) {
+    const Shot& shot = layout.shots[i];
+    if (shot.number < 0) {
+      photos.push_back(i);
+    } else {
+      videos[shot.file][shot.number] = i;
+    }
+  }
+  ParallelFor(0, static_cast<int>(photos.size()), threads, [&](int k) {
+    Shot& shot = layout.shots[photos[static_cast<size_t>(k)]];
+    try {
+      Look(io::ReadImage(shot.file), board, options, shot);
+    } catch (const Error& error) {
+      shot.found.reason = error.what();
+    }
+    step();
+  });
+  for (const auto& [video, wanted] : videos) {
+    std::vector<std::pair<size_t, ImageRgb8>> pending;
+    const auto flush = [&] {
+      ParallelFor(0, static_cast<int>(pending.size()), threads, [&](int k) {
+        auto& [index, image] = pending[static_cast<size_t>(k)];
+        Look(image, board, options, layout.shots[index]);
+        step();
+      });
+      pending.clear();
+    };
+    ForEachFrame(video, [&](int number, const ImageRgb8& image) {
+      const auto at = wanted.find(number);
+      if (at != wanted.end()) pending.emplace_back(at->second, image);
+      if (pending.size() >= kFramesAtOnce) flush();
+      return true;
+    });
+    flush();
+  }
+}
+
+// Leaves out frames that show every camera what an earlier frame showed it.
+void TakeOutRepeatedFrames(RigPhotos& photos) {
+  std::map<size_t, std::vector<const calib::RigView*>> by_frame;
+  for (const calib::RigView& view : photos.views) by_frame[view.frame].push_back(&view);
+  std::vector<size_t> kept;
+  std::map<size_t, size_t> repeats;  // frame -> the earlier one
+  for (const auto& [frame, views] : by_frame) {
+    const auto repeated = std::find_if(kept.begin(), kept.end(), [&](size_t earlier) {
+      return std::all_of(views.begin(), views.end(), [&](const calib::RigView* view) {
+        const auto& camera = photos.cameras[view->camera];
+        const double nearest = calib::NearestViewsPx(camera.width_px, camera.height_px);
+        const auto& others = by_frame[earlier];
+        return std::any_of(others.begin(), others.end(), [&](const calib::RigView* other) {
+          return other->camera == view->camera &&
+                 calib::MeanDistancePx(view->seen, other->seen) < nearest;
+        });
+      });
+    });
+    if (repeated == kept.end()) {
+      kept.push_back(frame);
+    } else {
+      repeats[frame] = *repeated;
+    }
+  }
+  for (const auto& [frame, earlier] : repeats) {
+    photos.left_out.push_back({"frame " + photos.frames[frame],
+                               fmt::format("adds nothing: the board is where frame {} shows it",
+                                           photos.frames[earlier])});
+  }
+  std::erase_if(photos.views,
+                [&](const calib::RigView& view) { return repeats.contains(view.frame); });
+}
+
+}  // namespace
+
+RigPhotos ReadRigPhotos(const fs::path& folder, const calib::Board& board,
+                        const calib::DetectOptions& options, int threads, Progress& progress) {
+  Layout layout = LayoutOf(folder);
+  LookAtAll(board, options, threads, progress, layout);
+  RigPhotos photos;
+  for (const std::string& name : layout.cameras) photos.cameras.push_back({name, 0, 0});
+  std::map<std::string, size_t> frames;
+  for (size_t i = 0; i < layout.frames.size(); ++i) frames[layout.frames[i]] = i;
+  photos.frames = layout.frames;
+  for (Shot& shot : layout.shots) {
+    if (shot.found.corners.empty()) {
+      photos.left_out.push_back({shot.name, shot.found.reason});
+      continue;
+    }
+    RigPhotoCamera& camera = photos.cameras[shot.camera];
+    if (camera.width_px == 0) {
+      camera.width_px = shot.width_px;
+      camera.height_px = shot.height_px;
+    }
+    if (camera.width_px != shot.width_px || camera.height_px != shot.height_px) {
+      photos.left_out.push_back(
+          {shot.name,
+           fmt::format("expected {} x {} px as the camera's first photo has, found {} "
+                       "x {}",
+                       camera.width_px, camera.height_px, shot.width_px, shot.height_px)});
+      continue;
+    }
+    photos.views.push_back({shot.camera,
+                            frames.at(shot.frame),
+                            {shot.name, std::move(shot.found.corners), shot.found.noise_px},
+                            {}});
+  }
+  for (const RigPhotoCamera& camera : photos.cameras) {
+    if (camera.width_px == 0) {
+      throw Error(fmt::format("{}: camera {}: expected photos of a {}, found it in none",
+                              folder.string(), camera.name, calib::TextOf(board)));
+    }
+  }
+  std::stable_sort(photos.views.begin(), photos.views.end(), [](const auto& a, const auto& b) {
+    return std::pair(a.frame, a.camera) < std::pair(b.frame, b.camera);
+  });
+  TakeOutRepeatedFrames(photos);
+  return photos;
+}
+
+}  // namespace dtr::pipeline

@@ -1,0 +1,40 @@
+// cli/pipeline/rig_photos.h -- what the cameras of a rig saw of a board, from photos or videos.
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "calib/boards/board.h"
+#include "calib/boards/detect.h"
+#include "calib/solve/rig.h"
+#include "dtr/base/progress.h"
+
+namespace dtr::pipeline {
+
+struct RigPhotoCamera {
+  std::string name;
+  int width_px = 0, height_px = 0;
+};
+
+struct RigPhotos {
+  std::vector<RigPhotoCamera> cameras;  ///< in byte order of names
+  std::vector<std::string> frames;      ///< in order of time
+  std::vector<calib::RigView> views;    ///< rising frame, then camera
+  std::vector<calib::LeftOut> left_out;
+};
+
+/// Three layouts, told apart by what the folder holds:
+///  - sub-folders, one per camera, with photos; photos of the same name (without extension) are of
+///    one instant;
+///  - photos named CAMERA and a number, as left01.jpg and right01.jpg; same number, same instant;
+///  - videos, one per camera; frames of the same number are of one instant, or as timestamps.csv
+///    beside them says (columns sync_index, cam_id, frame_index; cam_id is the number at the end of
+///    the video's name).
+/// Photos without the board are listed in left_out; frames in which no camera sees it are dropped
+/// from the views, but keep their place in time. The result is the same for any number of threads.
+/// Throws UsageError when the folder holds none of these, Error when no photo shows the board or a
+/// camera's photos differ in size.
+RigPhotos ReadRigPhotos(const std::filesystem::path& folder, const calib::Board& board,
+                        const calib::DetectOptions& options, int threads, Progress& progress);
+
+}  // namespace dtr::pipeline

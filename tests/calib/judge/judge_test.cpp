@@ -1,0 +1,107 @@
+#include "calib/judge/judge.h"
+
+#include <gmock/gmock.h>
+
+#include "tests/calib/judge/sabotage.h"
+
+namespace dtr::calib {
+namespace {
+
+using namespace testing;
+using ::testing::HasSubstr;
+
+const Check& TestOf(const JudgeReport& report, const std::string& name) {
+  static const Check kNone;
+  for (const Check& test : report.tests) {
+    if (test.name == name) return test;
+  }
+  ADD_FAILURE() << "no test " << name;
+  return kNone;
+}
+
+TEST(Judge, AnHonestCalibrationPasses) {
+  Tally tally;
+  JudgeHonest(1, tally);
+  JudgeHonest(2, tally);
+  EXPECT_EQ(tally.honest_passed, tally.honest);
+}
+
+// One of each kind that is quick; the slow test has them all, by seed.
+class JudgeSabotaged : public ::testing::TestWithParam<Sabotage> {};
+
+TEST_P(JudgeSabotaged, IsCaughtByTheTestThatIsMeantForIt) {
+  Tally tally;
+  for (std::uint64_t seed = 5; tally.sabotages < 1; ++seed) {
+    JudgeSabotage(GetParam(), seed, tally);
+  }
+  EXPECT_EQ(tally.caught, 1);
+}
+
+INSTANTIATE_TEST_SUITE_P(Kinds, JudgeSabotaged,
+                         ::testing::Values(Sabotage::kFocal, Sabotage::kMirroredBoard,
+                                           Sabotage::kSquareSize, Sabotage::kRollingShutter,
+                                           Sabotage::kRepeatedViews, Sabotage::kFewViews,
+                                           Sabotage::kFrontoParallel));
+
+TEST(Judge, UnseenViewsTellOfAWrongLens) {
+  Scene scene = OneCamera(24, 9);
+  const RigSolution solution = SolveScene(scene, kCornerNoisePx, 1);
+  Scene others = OneCamera(24, 9 + 3000);
+  others.cameras = scene.cameras;
+  const auto exact = ExactViews(scene.cameras[0].camera, 24, 77);
+  UnseenViews unseen;
+  for (const BoardView& view : Noisy(exact.views, kCornerNoisePx, 2)) {
+    unseen.views.push_back({0, unseen.frames++, view, {}});
+  }
+  JudgedCalibration calibration = CalibrationOf(solution);
+  const JudgeReport good = Judge(calibration, unseen, {});
+  EXPECT_TRUE(TestOf(good, "lens_difference_sigmas").passed)
+      << TestOf(good, "lens_difference_sigmas").reason;
+  EXPECT_TRUE(TestOf(good, "unseen_rms_px").passed);
+  // The noise is 0.1 px per coordinate: 0.141 px the length.
+  EXPECT_NEAR(TestOf(good, "unseen_rms_px").value, 0.141, 0.01);
+  calibration.cameras[0].camera.params[0] *= 1.01;
+  calibration.cameras[0].camera.params[1] *= 1.01;
+  const JudgeReport bad = Judge(calibration, unseen, {});
+  EXPECT_FALSE(TestOf(bad, "lens_difference_sigmas").passed);
+  EXPECT_THAT(TestOf(bad, "lens_difference_sigmas").reason, HasSubstr("f"));
+}
+
+TEST(Judge, PredictedProjectionUncertaintyIsTheSpreadOfManySolves) {
+  const Scene scene = OneCamera(12, 4);
+  const RigSolution one = SolveScene(scene, kCornerNoisePx, 1);
+  const ProjectionSensitivity sensitivity(one);
+  const double distance = BoardDistance(kBoard, one.rig, 0);
+  const Eigen::Vector2d pixel(560, 400);
+  const Eigen::MatrixXd by_shared = *sensitivity.At(0, pixel, distance);
+  const double predicted = std::sqrt((by_shared * one.covariance * by_shared.transpose()).trace());
+  constexpr int kSolves = 40;
+  double squares = 0;
+  for (int k = 0; k < kSolves; ++k) {
+    const RigSolution other = SolveScene(scene, kCornerNoisePx, 100 + static_cast<unsigned>(k));
+    const Eigen::VectorXd off = Difference(one.layout, scene.cameras, other.rig.cameras);
+    squares += (by_shared * off).squaredNorm() / kSolves;
+  }
+  // The spread of 40 draws of two coordinates is known within 11 %.
+  EXPECT_NEAR(std::sqrt(squares) / predicted, 1, 0.35);
+}
+
+TEST(Judge, WithoutViewsThereIsNothingToJudge) {
+  JudgedCalibration calibration;
+  calibration.board = kBoard;
+  calibration.cameras.push_back(
+      {"cam", BoardModel::kPinhole, TypicalCamera(BoardModel::kPinhole), {}});
+  EXPECT_THROW(Judge(calibration, {}, {}), Error);
+}
+
+TEST(Judge, TheReportIsJsonWithTheDocumentedNames) {
+  const SabotageCase honest = Honest(1);
+  const std::string json = ToJson(Judge(honest.calibration, {}, {}));
+  for (const char* name : {"\"passed\"", "\"tests\"", "\"limit\"", "\"reason\"", "\"cameras\"",
+                           "\"uncertainty_px\"", "\"condition\""}) {
+    EXPECT_THAT(json, HasSubstr(name));
+  }
+}
+
+}  // namespace
+}  // namespace dtr::calib
