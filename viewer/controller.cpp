@@ -10,8 +10,8 @@ namespace dtr::viewer {
 namespace {
 
 constexpr double kRadPerWindow = std::numbers::pi;  // dragging across the picture's longer side
-constexpr double kScrollFactor = 0.85;      // of the distance that is left after a step
-constexpr double kSpeedFactor = 1.25;       // per step of the wheel
+constexpr double kScrollFactor = 0.85;              // of the distance that is left after a step
+constexpr double kSpeedFactor = 1.25;               // per step of the wheel
 constexpr double kSceneSizesPerSecond = 0.3;
 constexpr double kLeastSpeedShare = 1e-4, kMostSpeedShare = 100;  // of the scene's size per second
 constexpr double kGlideSeconds = 0.35;

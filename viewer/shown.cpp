@@ -1,9 +1,12 @@
 #include "viewer/shown.h"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
+#include "dtr/cpu/contributions.h"
 #include "dtr/report/false_color.h"
+#include "viewer/navigation.h"
 
 namespace dtr::viewer {
 namespace {
@@ -24,6 +27,53 @@ ImageRgb8 Painted(const RenderResult& result, const ColourAt& colour_at) {
   return image;
 }
 
+cpu::Contributions ContributionsOf(const Drawn& drawn) {
+  return cpu::ContributionsTo(drawn.result.depth, drawn.scene, drawn.camera.camera,
+                              drawn.camera.cam_from_world, drawn.options);
+}
+
+/// The views' colours, mixed by their shares.
+ImageRgb8 WeightPicture(const Drawn& drawn) {
+  const cpu::Contributions found = ContributionsOf(drawn);
+  return Painted(drawn.result, [&](size_t p) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (size_t i = 0; i < found.views.size(); ++i) {
+      const Rgb colour = ViewColour(found.views[i]);
+      sum += found.shares[i].data()[p] * Eigen::Vector3d(colour[0], colour[1], colour[2]);
+    }
+    Rgb mixed{};
+    for (int c = 0; c < 3; ++c) {
+      mixed[static_cast<size_t>(c)] =
+          static_cast<std::uint8_t>(std::lround(std::clamp(sum[c], 0.0, 255.0)));
+    }
+    return mixed;
+  });
+}
+
+/// Standard deviation of depth over depth, by the views' shares; 0 where no view has one.
+Grid<float> SigmaPicture(const Drawn& drawn, const SigmaOf& sigma_of) {
+  const cpu::Contributions found = ContributionsOf(drawn);
+  const DepthImage& depth = drawn.result.depth;
+  Grid<float> picture(depth.width(), depth.height());
+  for (int y = 0; y < depth.height(); ++y) {
+    for (int x = 0; x < depth.width(); ++x) {
+      double sum = 0, shares = 0;
+      for (size_t i = 0; i < found.views.size(); ++i) {
+        const double share = found.shares[i](x, y), w = found.inverse_depth[i](x, y);
+        if (!(share > 0) || !(w > 0)) continue;
+        const View& view = *drawn.scene.views[static_cast<size_t>(found.views[i])];
+        const Eigen::Vector3d point = WorldPoint(drawn.camera, {x + 0.5, y + 0.5}, 1 / w);
+        const auto sigma_z = SigmaZ(view, point, sigma_of);
+        if (!sigma_z) continue;
+        sum += share * *sigma_z / (view.cam_from_world * point).z();
+        shares += share;
+      }
+      if (shares > 0) picture(x, y) = static_cast<float>(sum / shares);
+    }
+  }
+  return picture;
+}
+
 }  // namespace
 
 const char* NameOf(Shown shown) {
@@ -32,6 +82,10 @@ const char* NameOf(Shown shown) {
       return "colour";
     case Shown::kDepth:
       return "depth";
+    case Shown::kSigma:
+      return "sigma";
+    case Shown::kWeights:
+      return "weights";
     case Shown::kViewCount:
       return "view count";
     case Shown::kCoverage:
@@ -46,6 +100,10 @@ const char* LegendOf(Shown shown) {
       return "what the views show, blended";
     case Shown::kDepth:
       return "closer is brighter; green: no view saw it";
+    case Shown::kSigma:
+      return "standard deviation of depth over depth: dark is certain; green: not known";
+    case Shown::kWeights:
+      return "each view's colour, mixed by its share of the pixel";
     case Shown::kViewCount:
       return "brighter: more views blended; green: none";
     case Shown::kCoverage:
@@ -54,17 +112,35 @@ const char* LegendOf(Shown shown) {
   return "";
 }
 
-ImageRgb8 FalseColour(Shown shown, const RenderResult& result, int views) {
+std::array<std::uint8_t, 3> ViewColour(int index) {
+  // Hues a golden angle apart: no two of a handful are alike.
+  constexpr double kGolden = 0.61803398874989485;
+  const double hue = 6 * (index * kGolden - std::floor(index * kGolden));
+  Rgb colour{};
+  for (int c = 0; c < 3; ++c) {
+    const double away = std::abs(std::fmod(hue + 6 - 2 * c, 6) - 3);
+    colour[static_cast<size_t>(c)] =
+        static_cast<std::uint8_t>(std::lround(60 + 180 * std::clamp(away - 1, 0.0, 1.0)));
+  }
+  return colour;
+}
+
+ImageRgb8 FalseColour(Shown shown, const Drawn& drawn, const SigmaOf& sigma_of) {
+  const RenderResult& result = drawn.result;
   switch (shown) {
     case Shown::kColour:
       break;
     case Shown::kDepth:
       return report::ColorizeDepth(result.depth);
+    case Shown::kSigma:
+      return report::ColorizeSigma(SigmaPicture(drawn, sigma_of));
+    case Shown::kWeights:
+      return WeightPicture(drawn);
     case Shown::kViewCount:
       return Painted(result, [&](size_t p) {
         return report::PaletteColor(
             report::Palette::kColor,
-            static_cast<double>(result.view_count.data()[p]) / std::max(views, 1));
+            static_cast<double>(result.view_count.data()[p]) / std::max(drawn.options.views, 1));
       });
     case Shown::kCoverage:
       return Painted(result, [](size_t) { return kSeen; });

@@ -105,6 +105,14 @@ viewer::Host MakeHost(const Options& options, const Context& context,
                       const std::vector<std::string>& excluded) {
   viewer::Host host;
   host.open = [&, excluded](const auto&) { return Open(options, context, excluded); };
+  host.load_sigma = [&](const View& view) {
+    View with_sigma = view;
+    io::LoadOptions load;
+    load.images = load.depth = false;
+    load.sigma = true;
+    io::LoadPixels(options.set, with_sigma, load);
+    return with_sigma.inverse_depth_sigma.value_or(Grid<float>());
+  };
   host.command_line = [&](const fs::path& camera_file, const RenderOptions& render) {
     return CommandLine(options, camera_file, render);
   };

@@ -7,9 +7,9 @@
 #include "dtr/cpu/layer.h"
 #include "dtr/cpu/own_depth.h"
 #include "dtr/cpu/resolve.h"
+#include "dtr/cpu/setup.h"
 #include "dtr/render/fill_holes.h"
 #include "dtr/render/frame.h"
-#include "dtr/render/texture.h"
 #include "dtr/render/valid_views.h"
 
 namespace dtr::cpu {
@@ -18,11 +18,6 @@ namespace {
 // Layers of all views over one band stay below this; a larger picture takes several bands.
 constexpr size_t kBandBytes = size_t{256} << 20;
 constexpr size_t kLayerBytesPerPixel = sizeof(double);
-
-ViewInNovel InNovel(const View& view, const Pose& novel_from_world) {
-  const ViewPlacement placed = PlaceView(view, novel_from_world);
-  return {&view, placed.rotation, placed.translation, placed.near_z};
-}
 
 int RowsPerBand(const PinholeCamera& novel, size_t views) {
   const size_t bytes_per_row = views * static_cast<size_t>(novel.width_px()) * kLayerBytesPerPixel;
@@ -67,16 +62,6 @@ std::vector<Layer> DrawLayers(const std::vector<ViewInNovel>& views, const Pinho
   return layers;
 }
 
-/// SPEC 1.4; `order`: the views' indices into the scene.
-void SetCutFactors(const ViewSelection& selection, const std::vector<int>& order,
-                   std::vector<ResolveView>& views) {
-  const std::vector<double> factors = CutFactors(selection, selection.views.size());
-  for (size_t k = 0; k < factors.size(); ++k) {
-    const auto at = std::find(order.begin(), order.end(), selection.views[k]);
-    views[static_cast<size_t>(at - order.begin())].cut_factor = factors[k];
-  }
-}
-
 RenderResult Draw(const RenderScene& scene, const PinholeCamera& novel,
                   const Pose& novel_from_world, const RenderOptions& options,
                   double start_shift_px) {
@@ -87,40 +72,18 @@ RenderResult Draw(const RenderScene& scene, const PinholeCamera& novel,
   result.views_used = selection.views;
   if (selection.views.empty()) return result;
 
-  const std::vector<int> order = CanonicalOrder(scene, selection.views);
-  std::vector<ViewInNovel> placed;
-  std::vector<ResolveView> views(order.size());
-  for (const int index : order) {
-    placed.push_back(InNovel(*scene.views[static_cast<size_t>(index)], novel_from_world));
-  }
-  for (size_t i = 0; i < placed.size(); ++i) {
-    views[i].in_novel = &placed[i];
-    views[i].view_from_novel_rotation = placed[i].rotation.transpose();
-    views[i].view_from_novel_translation =
-        -(placed[i].rotation.transpose() * placed[i].translation);
-    views[i].delta_inverse_depth = ThresholdsOf(*placed[i].view, options).delta;
-  }
-  ParallelFor(0, static_cast<int>(views.size()), options.threads, [&](int i) {
-    ResolveView& view = views[static_cast<size_t>(i)];
-    view.rim_factors = RimFactors(*view.in_novel->view);
-  });
-  SetCutFactors(selection, order, views);
-  ResolveSettings settings;
-  settings.novel = novel;
-  settings.blend = BlendParametersOf(options, novel.fx_px());
-  settings.absolute_delta = options.absolute_delta;
-  settings.per_pixel_rule = selection.per_pixel;
-  settings.views = options.views;
-  settings.linear_light = options.blend_in_linear_light;
+  Setup setup = MakeSetup(scene, selection, novel, novel_from_world, options);
+  std::vector<ResolveView>& views = setup.views;
 
   const int rows_per_band = RowsPerBand(novel, views.size());
   for (int first_row = 0; first_row < novel.height_px(); first_row += rows_per_band) {
     const Band band{novel.width_px(), first_row,
                     std::min(rows_per_band, novel.height_px() - first_row)};
-    const std::vector<Layer> layers = DrawLayers(placed, novel, options, band, start_shift_px);
+    const std::vector<Layer> layers =
+        DrawLayers(setup.placed, novel, options, band, start_shift_px);
     for (size_t i = 0; i < views.size(); ++i) views[i].layer = &layers[i];
     ParallelFor(band.first_row, band.first_row + band.rows, options.threads,
-                [&](int y) { ResolveRow(settings, views, y, result); });
+                [&](int y) { ResolveRow(setup.settings, views, y, result); });
   }
   result.coverage_share = CoverageShare(result.coverage);
   if (options.fill_holes) FillHolesFromViews(scene, novel, novel_from_world, options, result);

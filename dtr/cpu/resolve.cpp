@@ -31,8 +31,9 @@ double AngleAtPoint(const Fragment& f) {
 
 class RowResolver {
  public:
-  RowResolver(const ResolveSettings& settings, std::span<const ResolveView> views)
-      : settings_(settings), views_(views) {}
+  RowResolver(const ResolveSettings& settings, std::span<const ResolveView> views,
+              std::span<Grid<float>> shares_of_views)
+      : settings_(settings), views_(views), shares_of_views_(shares_of_views) {}
 
   void Resolve(int x, int y, RenderResult& result) {
     Collect(x, y);
@@ -144,6 +145,10 @@ class RowResolver {
     factors_.clear();
     for (const Fragment& f : fragments_) factors_.push_back(FactorOf(f));
     FadeShares(factors_, shares_);
+    for (size_t i = 0; i < fragments_.size() && !shares_of_views_.empty(); ++i) {
+      const auto view = static_cast<size_t>(fragments_[i].view - views_.data());
+      shares_of_views_[view](x, y) = static_cast<float>(shares_[i]);
+    }
     result.view_count(x, y) = static_cast<std::uint8_t>(std::min(blended, 255));
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     for (size_t i = 0; i < fragments_.size(); ++i) {
@@ -160,6 +165,7 @@ class RowResolver {
 
   const ResolveSettings& settings_;
   const std::span<const ResolveView> views_;
+  const std::span<Grid<float>> shares_of_views_;  ///< empty: nobody asks
   std::vector<Fragment> fragments_;
   std::vector<double> angles_, shares_, factors_;
   double cut_rad_ = 0;  ///< SPEC 1.4, with the per-pixel rule
@@ -168,8 +174,8 @@ class RowResolver {
 }  // namespace
 
 void ResolveRow(const ResolveSettings& settings, std::span<const ResolveView> views, int y,
-                RenderResult& result) {
-  RowResolver resolver(settings, views);
+                RenderResult& result, std::span<Grid<float>> shares) {
+  RowResolver resolver(settings, views, shares);
   for (int x = 0; x < settings.novel.width_px(); ++x) resolver.Resolve(x, y, result);
 }
 

@@ -31,7 +31,8 @@ struct ResolveSettings {
 
 /// Resolves row `y` of the picture into `result`. The views must come in canonical order: sums run
 /// in that order, so that the bits depend on nothing else.
+/// With `shares`, a grid of the picture's size per view, each is also told its share of the colour.
 void ResolveRow(const ResolveSettings& settings, std::span<const ResolveView> views, int y,
-                RenderResult& result);
+                RenderResult& result, std::span<Grid<float>> shares = {});
 
 }  // namespace dtr::cpu

@@ -7,7 +7,10 @@
 #include <fmt/format.h>
 #include <imgui.h>
 
+#include <algorithm>
 #include <chrono>
+#include <map>
+#include <utility>
 
 #include "dtr/base/error.h"
 #include "dtr/base/machine.h"
@@ -46,7 +49,8 @@ class App {
         opened_(host.open([this](const std::string& line) { Tell(line); })),
         window_({settings.width_px, settings.height_px, settings.title, true}),
         interface_(window_.handle()),
-        maker_(*opened_->stream, MakerSettings()),
+        maker_(*opened_->stream, MakerSettings(),
+               [this](const View& view) { return SigmaOfView(view); }),
         controller_(SurroundingsOf(opened_->set), settings.width_px, settings.height_px,
                     [this](const Eigen::Vector2d& pixel) { return DepthAt(pixel); }),
         keeper_(settings.output, settings.output_stem),
@@ -93,6 +97,13 @@ class App {
     settings.gpu_bytes = settings_.gpu_bytes;
     settings.warn = [this](const std::string& line) { Tell(line); };
     return settings;
+  }
+
+  /// Read when first asked for and kept.
+  const Grid<float>* SigmaOfView(const View& view) {
+    const auto known = sigmas_.find(&view);
+    if (known != sigmas_.end()) return &known->second;
+    return &(sigmas_[&view] = host_.load_sigma(view));
   }
 
   void FitToWindow() {
@@ -316,6 +327,7 @@ class App {
   const Host& host_;
   std::string message_;
   std::unique_ptr<OpenedSet> opened_;
+  std::map<const View*, Grid<float>> sigmas_;
   gl::Window window_;
   UserInterface interface_;
   PictureMaker maker_;

@@ -57,6 +57,8 @@ struct Host {
   /// Reads the set anew. `note` is told of what is left out, on the thread that draws.
   std::function<std::unique_ptr<OpenedSet>(const std::function<void(const std::string&)>& note)>
       open;
+  /// Sigmas of a view's inverse depth from the disk; empty where it has none.
+  std::function<Grid<float>(const View&)> load_sigma;
   /// The command that draws the picture of the one camera in a file (cameras.json).
   std::function<std::string(const std::filesystem::path& camera_file, const RenderOptions&)>
       command_line;

@@ -33,7 +33,7 @@ fs::path Keeper::SavePicture(PictureMaker& maker) const {
   const RenderResult& result = maker.Result();
   const fs::path file = Free("picture", ".png");
   if (picture.shown != Shown::kColour) {
-    io::WriteImage(file, FalseColour(picture.shown, result, picture.options.views));
+    io::WriteImage(file, maker.InFalseColour());
   } else if (picture.options.fill_holes) {
     io::WriteImage(file, result.image);
   } else {

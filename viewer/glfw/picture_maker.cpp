@@ -30,8 +30,13 @@ PinholeCamera Smaller(const PinholeCamera& camera, int divisor) {
 
 }  // namespace
 
-PictureMaker::PictureMaker(ViewStream& stream, gl::RendererSettings settings)
-    : stream_(stream), renderer_(std::move(settings)) {}
+PictureMaker::PictureMaker(ViewStream& stream, gl::RendererSettings settings, SigmaOf sigma_of)
+    : stream_(stream), renderer_(std::move(settings)), sigma_of_(std::move(sigma_of)) {}
+
+ImageRgb8 PictureMaker::InFalseColour() {
+  return FalseColour(picture_.shown, {Result(), picture_.scene, picture_.camera, picture_.options},
+                     sigma_of_);
+}
 
 void PictureMaker::MakeMoving(const PictureOrder& order, int divisor) {
   Make(order, divisor, ViewStream::Wait::kForNone);
@@ -67,7 +72,7 @@ void PictureMaker::Make(const PictureOrder& order, int divisor, ViewStream::Wait
 
 void PictureMaker::Show(const PictureOrder& order, const gl::DrawnPicture& drawn, bool still) {
   if (order.shown != Shown::kColour) {
-    picture_.texture.Upload(FalseColour(order.shown, Result(), order.options.views));
+    picture_.texture.Upload(InFalseColour());
   } else if (still && order.options.fill_holes) {
     Result();
     FillHolesFromViews(picture_.scene, picture_.camera.camera, picture_.camera.cam_from_world,

@@ -43,7 +43,7 @@ struct MadePicture {
 class PictureMaker {
  public:
   /// The stream must outlive it.
-  PictureMaker(ViewStream& stream, gl::RendererSettings settings);
+  PictureMaker(ViewStream& stream, gl::RendererSettings settings, SigmaOf sigma_of);
 
   /// Quickly: each side divided by `divisor`, of the views that are in memory, not filled.
   void MakeMoving(const PictureOrder& order, int divisor);
@@ -51,6 +51,8 @@ class PictureMaker {
   void MakeStill(const PictureOrder& order);
 
   const MadePicture& picture() const { return picture_; }
+  /// What the picture shows in false colours (of the last result).
+  ImageRgb8 InFalseColour();
   /// Of the last picture; the first call after it reads it back from the GPU.
   const RenderResult& Result();
 
@@ -60,6 +62,7 @@ class PictureMaker {
 
   ViewStream& stream_;
   gl::Renderer renderer_;
+  const SigmaOf sigma_of_;
   MadePicture picture_;
   std::optional<RenderResult> result_;
 };

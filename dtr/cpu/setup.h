@@ -1,0 +1,24 @@
+// dtr/cpu/setup.h -- what is the same for all pixels of a picture.
+#pragma once
+#include <vector>
+
+#include "dtr/cpu/resolve.h"
+#include "dtr/render/scene.h"
+#include "dtr/render/valid_views.h"
+
+namespace dtr::cpu {
+
+/// The views of a picture in canonical order. `views` points into `placed`; layers are the
+/// caller's to fill in.
+struct Setup {
+  std::vector<int> order;  ///< indices into the scene's views
+  std::vector<ViewInNovel> placed;
+  std::vector<ResolveView> views;
+  ResolveSettings settings;
+};
+
+Setup MakeSetup(const RenderScene& scene, const ViewSelection& selection,
+                const PinholeCamera& novel, const Pose& novel_from_world,
+                const RenderOptions& options);
+
+}  // namespace dtr::cpu
