@@ -8,6 +8,7 @@
 #include "cli/command.h"
 #include "cli/novel_frames.h"
 #include "cli/output_file.h"
+#include "cli/pipeline/validate_set.h"
 #include "cli/render_options.h"
 #include "cli/renderers.h"
 #include "cli/set_stream.h"
@@ -48,7 +49,7 @@ std::unique_ptr<viewer::OpenedSet> Open(const Options& options, const Context& c
 }
 
 std::string CommandLine(const Options& options, const fs::path& camera_file,
-                        const RenderOptions& render) {
+                        const RenderOptions& render, const std::vector<std::string>& hidden) {
   std::vector<std::string> words{"dtr",
                                  "render",
                                  fs::absolute(options.set).string(),
@@ -56,7 +57,9 @@ std::string CommandLine(const Options& options, const fs::path& camera_file,
                                  fs::absolute(camera_file).string(),
                                  "-o",
                                  fs::absolute(camera_file).replace_extension(".png").string()};
-  if (!options.exclude.empty()) words.insert(words.end(), {"--exclude", options.exclude});
+  std::string excluded = options.exclude;
+  for (const std::string& name : hidden) excluded += (excluded.empty() ? "" : ",") + name;
+  if (!excluded.empty()) words.insert(words.end(), {"--exclude", excluded});
   const auto further = RenderOptionArguments(render);
   words.insert(words.end(), further.begin(), further.end());
   return ShellLine(words);
@@ -81,6 +84,12 @@ Json StateJson(const viewer::AppState& state) {
           {"fly_speed", state.fly_speed},
           {"help", state.help},
           {"panel", state.panel},
+          {"cameras", state.cameras},
+          {"magnifier", state.magnifier},
+          {"compared", state.compared},
+          {"hidden", state.hidden},
+          {"under_cursor", state.under_cursor},
+          {"distance", state.distance},
           {"message", state.message},
           {"render_options", RenderOptionArguments(state.render)}};
 }
@@ -101,6 +110,23 @@ Json ReportJson(const viewer::AppReport& report) {
           {"last", StateJson(report.last)}};
 }
 
+/// Each camera's held-out error against the limit for the worst one.
+std::map<std::string, viewer::ViewVerdict> Verdicts(const Options& options,
+                                                    const Context& context) {
+  const DtrSet set = io::ReadSet(options.set);
+  std::map<std::string, viewer::ViewVerdict> verdicts;
+  if (!set.sparse_file) return verdicts;  // nothing to judge by
+  const calib::ValidateLimits limits;
+  const auto report =
+      pipeline::ValidateSet(set, io::LoadSparse(options.set, set), limits, context.common.threads);
+  for (const auto& camera : report.cameras) {
+    if (camera.held_out.count < limits.min_observations) continue;
+    verdicts[camera.name] = {camera.held_out.rms_px <= limits.max_camera_rms_px,
+                             fmt::format("{:.2f} px", camera.held_out.rms_px)};
+  }
+  return verdicts;
+}
+
 viewer::Host MakeHost(const Options& options, const Context& context,
                       const std::vector<std::string>& excluded) {
   viewer::Host host;
@@ -113,9 +139,11 @@ viewer::Host MakeHost(const Options& options, const Context& context,
     io::LoadPixels(options.set, with_sigma, load);
     return with_sigma.inverse_depth_sigma.value_or(Grid<float>());
   };
-  host.command_line = [&](const fs::path& camera_file, const RenderOptions& render) {
-    return CommandLine(options, camera_file, render);
+  host.command_line = [&](const fs::path& camera_file, const RenderOptions& render,
+                          const std::vector<std::string>& hidden) {
+    return CommandLine(options, camera_file, render, hidden);
   };
+  host.verdicts = [&] { return Verdicts(options, context); };
   host.say = [&](const std::string& line) { context.console.Note(line); };
   if (!options.state_file.empty()) {
     host.state_changed = [&, last = std::string()](const viewer::AppState& state) mutable {
@@ -164,7 +192,8 @@ int RunView(const Options& options, const Context& context) {
     if (options.frames == 0) throw UsageError("--screenshot: expected --frames N with it");
   }
   if (!fs::is_directory(options.output)) {
-    throw UsageError("-o " + options.output.string() + ": expected a folder to save into, found none");
+    throw UsageError("-o " + options.output.string() +
+                     ": expected a folder to save into, found none");
   }
   const DtrSet set = io::ReadSet(options.set);
   const auto excluded = ResolveViewNames(set, options.exclude);

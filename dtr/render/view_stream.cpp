@@ -124,9 +124,13 @@ ViewStream::~ViewStream() = default;
 std::vector<size_t> ViewStream::NotLost() const {
   std::vector<size_t> slots;
   for (size_t i = 0; i < slots_.size(); ++i) {
-    if (slots_[i].state != State::kLost) slots.push_back(i);
+    if (slots_[i].state != State::kLost && !IsHidden(slots_[i])) slots.push_back(i);
   }
   return slots;
+}
+
+bool ViewStream::IsHidden(const Slot& slot) const {
+  return std::find(hidden_.begin(), hidden_.end(), slot.view) != hidden_.end();
 }
 
 RenderScene ViewStream::SceneOf(const std::vector<size_t>& slots) const {
@@ -141,7 +145,11 @@ ViewStream::Needed ViewStream::NeededFor(const Pose& novel_from_world,
   const std::vector<size_t> candidates = NotLost();
   RenderScene scene = SceneOf(candidates);
   // From all views: what was lost so far may depend on what was read ahead.
-  scene.per_pixel = NeedsPerPixelRule(described_, novel_from_world);
+  RenderScene all = described_;
+  std::erase_if(all.views, [this](const View* view) {
+    return std::find(hidden_.begin(), hidden_.end(), view) != hidden_.end();
+  });
+  scene.per_pixel = NeedsPerPixelRule(all, novel_from_world);
   const ViewSelection selection = SelectViews(scene, novel_from_world, options);
   Needed needed{{}, selection.per_pixel, selection.views.size()};
   size_t bytes = 0;
@@ -214,7 +222,7 @@ RenderScene ViewStream::SceneFor(const Pose& novel_from_world, const RenderOptio
   Needed needed;
   for (;;) {
     ++now_;
-    if (!slots_.empty() && NotLost().empty()) {
+    if (!slots_.empty() && lost_.size() == slots_.size()) {
       throw Error("views: expected at least one that can be read, found none; the first: " +
                   lost_.front().reason);
     }

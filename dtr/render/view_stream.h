@@ -61,6 +61,9 @@ class ViewStream {
   /// Begins to read what a later picture needs, as far as there is room beside the last one's.
   void Prefetch(const Pose& novel_from_world, const RenderOptions& options);
 
+  /// Leaves out these views (pointers into the set), as --exclude does, until the next call.
+  void Hide(std::vector<const View*> views) { hidden_ = std::move(views); }
+
   const std::vector<Lost>& lost() const { return lost_; }
   /// Pixels in memory or being read.
   size_t bytes() const { return bytes_; }
@@ -85,7 +88,8 @@ class ViewStream {
   };
   Needed NeededFor(const Pose& novel_from_world, const RenderOptions& options) const;
   RenderScene SceneOf(const std::vector<size_t>& slots) const;
-  std::vector<size_t> NotLost() const;
+  std::vector<size_t> NotLost() const;  ///< nor hidden
+  bool IsHidden(const Slot& slot) const;
   /// Asks for the absent ones of these, as far as dropping others gives room.
   void Request(const std::vector<size_t>& slots);
   bool MakeRoom(size_t bytes);
@@ -97,6 +101,7 @@ class ViewStream {
   const Settings settings_;
   std::vector<Slot> slots_;  ///< as described_.views
   std::vector<Lost> lost_;
+  std::vector<const View*> hidden_;
   size_t bytes_ = 0;
   int reading_ = 0;
   std::uint64_t now_ = 0;  ///< number of this call

@@ -9,12 +9,15 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
+#include <future>
 #include <map>
 #include <utility>
 
 #include "dtr/base/error.h"
 #include "dtr/base/machine.h"
 #include "dtr/gl/glfw/window.h"
+#include "viewer/glfw/inspection.h"
 #include "viewer/glfw/keeper.h"
 #include "viewer/glfw/panel.h"
 #include "viewer/glfw/picture_maker.h"
@@ -38,7 +41,15 @@ double SecondsSince(Clock::time_point start) {
 bool SameOrder(const PictureOrder& a, const PictureOrder& b) {
   const Pose &p = a.camera.cam_from_world, &q = b.camera.cam_from_world;
   return a.camera.camera == b.camera.camera && p.translation == q.translation &&
-         p.rotation.coeffs() == q.rotation.coeffs() && a.options == b.options && a.shown == b.shown;
+         p.rotation.coeffs() == q.rotation.coeffs() && a.options == b.options &&
+         a.shown == b.shown && a.hidden == b.hidden;
+}
+
+/// All but what only changes what pixels mean: it can wait for the whole picture.
+bool SamePlace(const PictureOrder& a, PictureOrder b) {
+  b.shown = a.shown;
+  b.hidden = a.hidden;
+  return SameOrder(a, b);
 }
 
 class App {
@@ -58,6 +69,7 @@ class App {
         panel_(settings.panel) {
     glfwSwapInterval(1);
     FitToWindow();
+    inspection_.unit = opened_->set.unit == LengthUnit::kMetre ? "m" : "units";
     if (settings.start) controller_.JumpTo(*settings.start);
   }
 
@@ -133,8 +145,12 @@ class App {
   void HandleInput() {
     if (interface_.TakeAnyInput()) settling_ = kSettlingFrames;
     for (const UserInput& input : interface_.Take()) {
-      if (const auto* action = std::get_if<Action>(&input)) {
-        Do(*action);
+      if (const auto* key = std::get_if<ActionInput>(&input)) {
+        if (key->action == Action::kMark) {
+          to_mark_.push_back(key->cursor_px);
+        } else {
+          Do(key->action);
+        }
       } else {
         controller_.Handle(std::get<InputEvent>(input));
       }
@@ -166,6 +182,25 @@ class App {
       case Action::kCopyCommand:
         copy_command_ = true;
         return;
+      case Action::kCameras:
+        inspection_.cameras = !inspection_.cameras;
+        return;
+      case Action::kMagnifier:
+        inspection_.magnifier = !inspection_.magnifier;
+        return;
+      case Action::kCompare: {
+        const auto next = static_cast<size_t>(inspection_.compared) + 1;
+        inspection_.compared = kAllCompared[next % kAllCompared.size()];
+        return;
+      }
+      case Action::kHideView:
+        if (const auto nearest = controller_.nearest_view()) {
+          inspection_.Toggle(*controller_.surroundings().views[*nearest]);
+        }
+        return;
+      case Action::kMark:
+        to_mark_.push_back(interface_.cursor_px());
+        return;
       case Action::kNextShown:
         return StepShown(1);
       case Action::kPreviousShown:
@@ -189,26 +224,31 @@ class App {
 
   bool playing() const { return played_ < settings_.play.size(); }
 
-  PictureOrder Order() const { return {controller_.camera(), options_, shown_}; }
+  PictureOrder Order() const {
+    return {controller_.camera(), options_, shown_, inspection_.hidden};
+  }
 
   /// Returns true when it drew a moving picture.
   bool MakePicture() {
     const PictureOrder order = Order();
     const bool changed = !made_ || !SameOrder(order, *made_);
-    if (changed) last_change_ = Clock::now();
+    if (made_ && !SamePlace(order, *made_)) last_change_ = Clock::now();
     const bool moving = playing() || controller_.moving() || (changed && made_) ||
                         SecondsSince(last_change_) < kStillAfterSeconds;
     try {
       // The very first picture need not wait for stillness.
       if (moving && made_) {
         if (!changed) return false;
-        maker_.MakeMoving(order, governor_.divisor());
+        maker_.MakeMoving(order, governors_[static_cast<size_t>(shown_)].divisor());
         made_ = order;
+        other_made_.reset();
         return true;
       }
       if (!changed && (maker_.picture().whole || refused_)) return false;
       maker_.MakeStill(order);
       refused_ = false;
+      other_made_.reset();
+      probed_.reset();
     } catch (const Error& error) {
       refused_ = true;
       Tell(error.what());
@@ -217,7 +257,80 @@ class App {
     return false;
   }
 
+  /// What is shown beside and over the whole picture.
+  void Inspect() {
+    if (!whole()) {
+      inspection_.under_cursor.reset();
+      probed_.reset();
+      return;
+    }
+    try {
+      const auto other = OptionsOf(inspection_.compared, options_);
+      if (other && !(other_made_ && *other_made_ == *other)) {
+        maker_.MakeOther(*other);
+        other_made_ = *other;
+      }
+      const Eigen::Vector2d cursor = interface_.cursor_px();
+      if (cursor != last_cursor_) {
+        last_cursor_ = cursor;
+        cursor_rests_since_ = Clock::now();
+      }
+      const bool rests = SecondsSince(cursor_rests_since_) >= kStillAfterSeconds;
+      if (inspection_.magnifier && rests && probed_ != cursor) {
+        inspection_.under_cursor = ProbeAt(cursor);
+        probed_ = cursor;
+      }
+      for (const Eigen::Vector2d& pixel : std::exchange(to_mark_, {})) {
+        if (const auto probe = ProbeAt(pixel)) inspection_.Mark(*probe);
+      }
+    } catch (const Error& error) {
+      inspection_.compared = Compared::kNothing;
+      Tell(error.what());
+    }
+  }
+
+  std::optional<Probe> ProbeAt(const Eigen::Vector2d& pixel) {
+    const int x = static_cast<int>(std::floor(pixel.x()));
+    const int y = static_cast<int>(std::floor(pixel.y()));
+    const MadePicture& picture = maker_.picture();
+    const DepthImage& depth = maker_.Result().depth;
+    if (!depth.Contains(x, y) || DepthImage::IsHole(depth(x, y))) return std::nullopt;
+    return ProbePixel(picture.scene, picture.camera, picture.options, x, y, depth(x, y),
+                      [this](const View& view) { return SigmaOfView(view); });
+  }
+
+  void AskForVerdicts() {
+    if (!inspection_.cameras || !host_.verdicts) return;
+    if (!verdicts_coming_.valid() && !verdicts_asked_) {
+      verdicts_asked_ = true;
+      verdicts_coming_ = std::async(std::launch::async, host_.verdicts);
+    }
+    if (verdicts_coming_.valid() &&
+        verdicts_coming_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) {
+      try {
+        verdicts_ = verdicts_coming_.get();
+      } catch (const Error& error) {
+        Tell(error.what());
+      }
+    }
+  }
+
+  void DrawOverlay() {
+    AskForVerdicts();
+    const auto nearest = controller_.nearest_view();
+    if (inspection_.compared == Compared::kPhoto && nearest) {
+      overlay_.DrawPhoto(inspection_, *controller_.surroundings().views[*nearest],
+                         controller_.camera());
+    } else if (other_made_ && inspection_.compared != Compared::kNothing) {
+      overlay_.DrawCompared(inspection_, maker_.other());
+    }
+    if (inspection_.cameras) overlay_.DrawCameras(controller_, inspection_, verdicts_);
+    overlay_.DrawMarks(inspection_, controller_.camera());
+    if (inspection_.magnifier) overlay_.DrawMagnifier(inspection_, maker_.picture().texture);
+  }
+
   void DrawInterface() {
+    Inspect();
     interface_.BeginFrame();
     const MadePicture& picture = maker_.picture();
     if (!picture.texture.empty()) {
@@ -225,8 +338,9 @@ class App {
       ImGui::GetBackgroundDrawList()->AddImage(reinterpret_cast<ImTextureID>(id), {0, 0},
                                                ImGui::GetIO().DisplaySize);
     }
+    DrawOverlay();
     if (panel_) {
-      PanelModel model{picture,  controller_, options_,    shown_,
+      PanelModel model{picture,  controller_, options_,    shown_, inspection_,
                        message_, window_ms_,  moving_fps_, {}};
       DrawPanel(interface_, model);
       for (const Action action : model.pressed) Do(action);
@@ -263,9 +377,15 @@ class App {
 
   void CopyCommand() {
     const auto file = keeper_.SaveCamera(made_->camera, opened_->set);
-    const std::string command = host_.command_line(file, options_);
+    const std::string command = host_.command_line(file, options_, HiddenNames());
     glfwSetClipboardString(window_.handle(), command.c_str());
     Tell(command);
+  }
+
+  std::vector<std::string> HiddenNames() const {
+    std::vector<std::string> names;
+    for (const View* view : inspection_.hidden) names.push_back(view->name);
+    return names;
   }
 
   bool ReachedFrames() const {
@@ -274,7 +394,7 @@ class App {
   }
 
   void CountMoving(double ms, double cpu_ms) {
-    governor_.Drawn(maker_.picture().divisor, ms);
+    governors_[static_cast<size_t>(maker_.picture().shown)].Drawn(maker_.picture().divisor, ms);
     moving_fps_ = 1e3 / ms;
     ++report_.moving_frames;
     report_.moving_ms += ms;
@@ -317,6 +437,16 @@ class App {
     state.fly_speed = controller_.fly_speed();
     state.help = help_;
     state.panel = panel_;
+    state.cameras = inspection_.cameras;
+    state.magnifier = inspection_.magnifier;
+    state.compared = NameOf(inspection_.compared);
+    state.hidden = HiddenNames();
+    state.distance = inspection_.DistanceText();
+    if (inspection_.magnifier && inspection_.under_cursor) {
+      for (const ProbeView& view : inspection_.under_cursor->views) {
+        state.under_cursor.push_back(view.name);
+      }
+    }
     state.message = message_;
     state.render = options_;
     return state;
@@ -333,7 +463,8 @@ class App {
   PictureMaker maker_;
   Controller controller_;
   Keeper keeper_;
-  ResolutionGovernor governor_{kMovingTargetMs};
+  /// One each: some pictures cost several times as much as others.
+  std::vector<ResolutionGovernor> governors_{kAllShown.size(), ResolutionGovernor(kMovingTargetMs)};
   RenderOptions options_;
   Shown shown_ = Shown::kColour;
   std::optional<PictureOrder> made_;  ///< what the shown picture was made for
@@ -341,6 +472,16 @@ class App {
   Clock::time_point last_change_ = Clock::now();
   bool panel_, help_ = false, quit_ = false;
   bool save_picture_ = false, save_window_ = false, copy_command_ = false;
+  Inspection inspection_;
+  InspectionOverlay overlay_;
+  std::optional<RenderOptions> other_made_;  ///< options of the other picture beside this one
+  Eigen::Vector2d last_cursor_{-1, -1};
+  std::optional<Eigen::Vector2d> probed_;  ///< where the cursor rested
+  Clock::time_point cursor_rests_since_ = Clock::now();
+  std::future<std::map<std::string, ViewVerdict>> verdicts_coming_;
+  std::map<std::string, ViewVerdict> verdicts_;
+  bool verdicts_asked_ = false;
+  std::vector<Eigen::Vector2d> to_mark_;  ///< waits for a whole picture
   size_t played_ = 0;
   int settling_ = kSettlingFrames;
   double window_ms_ = 0, moving_fps_ = 0;

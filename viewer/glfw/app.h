@@ -2,6 +2,7 @@
 #pragma once
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -36,6 +37,12 @@ struct AppSettings {
   std::filesystem::path screenshot;  ///< of the window, written at the end; empty: none
 };
 
+/// What validation says of a view's calibration.
+struct ViewVerdict {
+  bool good = false;
+  std::string text;  ///< one line
+};
+
 /// What the window shows just now.
 struct AppState {
   int frames = 0;      ///< drawn so far
@@ -47,8 +54,12 @@ struct AppState {
   std::vector<std::string> views_used;
   double coverage = 0;   ///< share of pixels that some view saw; of still pictures
   double fly_speed = 0;  ///< scene units per second
-  bool help = false, panel = true;
-  std::string message;  ///< the last one in the window
+  bool help = false, panel = true, cameras = false, magnifier = false;
+  std::string compared;                   ///< with what: "nothing", "nearest photo", ...
+  std::vector<std::string> hidden;        ///< views left out
+  std::vector<std::string> under_cursor;  ///< views that the magnifier names, largest share first
+  std::string distance;                   ///< between two marks; empty: none
+  std::string message;                    ///< the last one in the window
   RenderOptions render;
 };
 
@@ -59,9 +70,13 @@ struct Host {
       open;
   /// Sigmas of a view's inverse depth from the disk; empty where it has none.
   std::function<Grid<float>(const View&)> load_sigma;
-  /// The command that draws the picture of the one camera in a file (cameras.json).
-  std::function<std::string(const std::filesystem::path& camera_file, const RenderOptions&)>
+  /// The command that draws the picture of the one camera in a file (cameras.json) without some
+  /// views, by name.
+  std::function<std::string(const std::filesystem::path& camera_file, const RenderOptions&,
+                            const std::vector<std::string>& hidden)>
       command_line;
+  /// What validation says of each view, by its name. Called on a thread of its own.
+  std::function<std::map<std::string, ViewVerdict>()> verdicts;
   /// A line for whoever started the program.
   std::function<void(const std::string&)> say;
   /// Told whenever the window has a whole picture; null: nobody asks.

@@ -18,6 +18,11 @@ constexpr std::array kHelp{
     HelpLine{"C", "nearest input camera"},
     HelpLine{"V", "view all"},
     HelpLine{"Down, Up", "show the next, the previous kind of picture"},
+    HelpLine{"F", "input cameras with their photos and verdicts on, off"},
+    HelpLine{"G", "magnifying glass: depth, sigma, views and weights under the cursor"},
+    HelpLine{"X", "compare: with the nearest photo, the other method, splats"},
+    HelpLine{"H", "leave the nearest view out, take it in again"},
+    HelpLine{"M", "mark the point under the cursor; two marks: their distance"},
     HelpLine{"P", "save the picture"},
     HelpLine{"F12", "save the window"},
     HelpLine{"L", "command line of this picture, to the clipboard and the terminal"},
@@ -37,6 +42,9 @@ constexpr std::array kBindings{
     Binding{GLFW_KEY_TAB, Action::kPanel},      Binding{GLFW_KEY_P, Action::kSavePicture},
     Binding{GLFW_KEY_F12, Action::kSaveWindow}, Binding{GLFW_KEY_L, Action::kCopyCommand},
     Binding{GLFW_KEY_DOWN, Action::kNextShown}, Binding{GLFW_KEY_UP, Action::kPreviousShown},
+    Binding{GLFW_KEY_F, Action::kCameras},      Binding{GLFW_KEY_G, Action::kMagnifier},
+    Binding{GLFW_KEY_X, Action::kCompare},      Binding{GLFW_KEY_H, Action::kHideView},
+    Binding{GLFW_KEY_M, Action::kMark},
 };
 
 }  // namespace

@@ -135,6 +135,26 @@ void WhereControls(PanelModel& model) {
   if (speed != controller.fly_speed()) controller.set_fly_speed(speed);
 }
 
+void InspectControls(PanelModel& model) {
+  Inspection& inspection = model.inspection;
+  ImGui::Checkbox("cameras", &inspection.cameras);
+  ImGui::SameLine();
+  ImGui::Checkbox("magnifier", &inspection.magnifier);
+  Choice("compare with", inspection.compared, kAllCompared);
+  if (inspection.compared != Compared::kNothing) {
+    ImGui::SliderFloat("border", &inspection.border, 0, 1, "%.2f", ImGuiSliderFlags_AlwaysClamp);
+  }
+  const std::string distance = inspection.DistanceText();
+  Text(distance.empty() ? "M marks points to measure between" : "distance " + distance);
+  if (!ImGui::TreeNode("views to draw from")) return;
+  for (const View* view : model.controller.surroundings().views) {
+    bool on = !inspection.IsHidden(*view);
+    if (ImGui::Checkbox(view->name.c_str(), &on)) inspection.Toggle(*view);
+  }
+  if (ImGui::Button("all")) inspection.hidden.clear();
+  ImGui::TreePop();
+}
+
 }  // namespace
 
 void DrawPanel(UserInterface& interface, PanelModel& model) {
@@ -148,6 +168,7 @@ void DrawPanel(UserInterface& interface, PanelModel& model) {
     ImGui::Separator();
     Choice("shown", model.shown, kAllShown);
     ImGui::TextWrapped("%s", LegendOf(model.shown));
+    if (ImGui::CollapsingHeader("Inspect", ImGuiTreeNodeFlags_DefaultOpen)) InspectControls(model);
     if (ImGui::CollapsingHeader("Where", ImGuiTreeNodeFlags_DefaultOpen)) WhereControls(model);
     if (ImGui::CollapsingHeader("Render options", ImGuiTreeNodeFlags_DefaultOpen)) {
       RenderControls(model.options);

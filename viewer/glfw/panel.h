@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "viewer/controller.h"
+#include "viewer/glfw/inspection.h"
 #include "viewer/glfw/keys.h"
 #include "viewer/glfw/picture_maker.h"
 #include "viewer/glfw/user_interface.h"
@@ -16,6 +17,7 @@ struct PanelModel {
   Controller& controller;
   RenderOptions& options;
   Shown& shown;
+  Inspection& inspection;
   const std::string& message;
   double window_ms = 0;          ///< of the window itself: panels, copying, waiting for the display
   double frames_per_second = 0;  ///< of moving frames; 0: none of late

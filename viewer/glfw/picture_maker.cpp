@@ -44,6 +44,7 @@ void PictureMaker::MakeMoving(const PictureOrder& order, int divisor) {
 }
 
 void PictureMaker::MakeStill(const PictureOrder& order) {
+  stream_.Hide(order.hidden);
   stream_.Prefetch(order.camera.cam_from_world, order.options);
   // Once nothing is on its way it is the picture that dtr render makes.
   const bool whole = stream_.reading() == 0;
@@ -54,6 +55,7 @@ void PictureMaker::MakeStill(const PictureOrder& order) {
 void PictureMaker::Make(const PictureOrder& order, int divisor, ViewStream::Wait wait) {
   Laps laps;
   result_.reset();
+  stream_.Hide(order.hidden);
   const Pose& pose = order.camera.cam_from_world;
   picture_.scene = stream_.SceneFor(pose, order.options, wait);
   picture_.camera = {Smaller(order.camera.camera, divisor), pose};
@@ -82,6 +84,18 @@ void PictureMaker::Show(const PictureOrder& order, const gl::DrawnPicture& drawn
     picture_.texture.Take(drawn);
   }
   if (still) picture_.coverage = Result().coverage_share;
+}
+
+void PictureMaker::MakeOther(const RenderOptions& options) {
+  Result();  // before the renderer forgets it
+  const NovelCamera& camera = picture_.camera;
+  const RenderScene scene =
+      stream_.SceneFor(camera.cam_from_world, options, ViewStream::Wait::kForAll);
+  if (!options.fill_holes) {
+    other_.Take(renderer_.Draw(scene, camera.camera, camera.cam_from_world, options));
+    return;
+  }
+  other_.Upload(renderer_.Render(scene, camera.camera, camera.cam_from_world, options).image);
 }
 
 const RenderResult& PictureMaker::Result() {

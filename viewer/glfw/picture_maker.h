@@ -17,6 +17,7 @@ struct PictureOrder {
   NovelCamera camera;
   RenderOptions options;
   Shown shown = Shown::kColour;
+  std::vector<const View*> hidden;  ///< views not to draw from
 };
 
 /// Milliseconds that each stage of a picture took.
@@ -50,6 +51,10 @@ class PictureMaker {
   /// In full, of the views that are there; whole once no view is being read any more.
   void MakeStill(const PictureOrder& order);
 
+  /// Another picture of the same camera beside the whole one, with other options.
+  void MakeOther(const RenderOptions& options);
+  const PictureTexture& other() const { return other_; }
+
   const MadePicture& picture() const { return picture_; }
   /// What the picture shows in false colours (of the last result).
   ImageRgb8 InFalseColour();
@@ -64,6 +69,7 @@ class PictureMaker {
   gl::Renderer renderer_;
   const SigmaOf sigma_of_;
   MadePicture picture_;
+  PictureTexture other_;
   std::optional<RenderResult> result_;
 };
 

@@ -50,7 +50,8 @@ struct UserInterface::Callbacks {
       self.inputs_.emplace_back(FlyEvent{*fly, pressed});
     }
     if (!pressed || typing) return;
-    if (const auto bound = ActionOf(key, mods)) self.inputs_.emplace_back(*bound);
+    if (const auto bound = ActionOf(key, mods))
+      self.inputs_.emplace_back(ActionInput{*bound, self.cursor_px_});
   }
 
   static void Character(GLFWwindow* window, unsigned code) {
@@ -58,7 +59,9 @@ struct UserInterface::Callbacks {
     UserInterface& self = Of(window);
     self.any_input_ = true;
     // Where '?' is differs between keyboards.
-    if (code == '?' && !ImGui::GetIO().WantTextInput) self.inputs_.emplace_back(Action::kHelp);
+    if (code == '?' && !ImGui::GetIO().WantTextInput) {
+      self.inputs_.emplace_back(ActionInput{Action::kHelp, self.cursor_px_});
+    }
   }
 
   static void MouseButton(GLFWwindow* window, int glfw_button, int action, int mods) {

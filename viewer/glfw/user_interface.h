@@ -12,7 +12,12 @@ struct GLFWwindow;
 
 namespace dtr::viewer {
 
-using UserInput = std::variant<InputEvent, Action>;
+/// A key, and where the cursor was just then.
+struct ActionInput {
+  Action action = Action::kHelp;
+  Eigen::Vector2d cursor_px{0, 0};
+};
+using UserInput = std::variant<InputEvent, ActionInput>;
 
 /// One at a time; its context must be current. Input is kept in order, also what comes and goes
 /// between two frames. What is done over a panel or typed into a field is ImGui's alone.

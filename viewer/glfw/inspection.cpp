@@ -1,0 +1,228 @@
+#include "viewer/glfw/inspection.h"
+
+#include <fmt/format.h>
+#include <imgui.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "dtr/report/contact_sheet.h"
+
+namespace dtr::viewer {
+namespace {
+
+constexpr ImU32 kGround = IM_COL32(28, 30, 33, 255), kLine = IM_COL32(255, 255, 255, 220);
+constexpr ImU32 kGood = IM_COL32(90, 220, 120, 255), kBad = IM_COL32(255, 80, 70, 255);
+constexpr ImU32 kUntested = IM_COL32(120, 170, 255, 255), kOff = IM_COL32(130, 130, 130, 255);
+constexpr ImU32 kMark = IM_COL32(255, 225, 60, 255);
+constexpr double kFrustumShare = 0.06;  // of the scene's size: length of a drawn camera
+constexpr int kThumbnailPx = 128;
+constexpr int kMagnifiedPx = 25, kMagnification = 8;
+
+ImTextureID IdOf(const PictureTexture& texture) {
+  return reinterpret_cast<ImTextureID>(static_cast<std::intptr_t>(texture.name()));
+}
+
+/// On the display; none behind the camera.
+std::optional<ImVec2> Project(const NovelCamera& camera, const Eigen::Vector3d& p_in_world) {
+  constexpr double kFar = 1e5;  // beyond it, single precision draws nonsense
+  const auto pixel = camera.camera.PixelFromCam(camera.cam_from_world * p_in_world);
+  if (!pixel || !(pixel->cwiseAbs().maxCoeff() < kFar)) return std::nullopt;
+  const ImVec2 display = ImGui::GetIO().DisplaySize;
+  return ImVec2(static_cast<float>(pixel->x() * display.x / camera.camera.width_px()),
+                static_cast<float>(pixel->y() * display.y / camera.camera.height_px()));
+}
+
+void CoverRight(ImDrawList& list, float border) {
+  const ImVec2 display = ImGui::GetIO().DisplaySize;
+  list.PushClipRect({border * display.x, 0}, display);
+  list.AddRectFilled({0, 0}, display, kGround);
+}
+
+void EndRight(ImDrawList& list, float border) {
+  list.PopClipRect();
+  const ImVec2 display = ImGui::GetIO().DisplaySize;
+  list.AddLine({border * display.x, 0}, {border * display.x, display.y}, kLine, 2);
+}
+
+void Text(const std::string& line) { ImGui::TextUnformatted(line.c_str()); }
+
+}  // namespace
+
+const char* NameOf(Compared compared) {
+  switch (compared) {
+    case Compared::kNothing:
+      return "nothing";
+    case Compared::kPhoto:
+      return "nearest photo";
+    case Compared::kOtherMethod:
+      return "other method";
+    case Compared::kSplats:
+      return "splats";
+  }
+  return "";
+}
+
+std::optional<RenderOptions> OptionsOf(Compared compared, const RenderOptions& options) {
+  RenderOptions other = options;
+  if (compared == Compared::kOtherMethod) {
+    other.method = options.method == RenderMethod::kDeferred ? RenderMethod::kTwoPass
+                                                             : RenderMethod::kDeferred;
+    other.primitive = Primitive::kMesh;
+    return other;
+  }
+  if (compared == Compared::kSplats) {
+    other.method = RenderMethod::kTwoPass;
+    other.primitive = Primitive::kSplat;
+    return other;
+  }
+  return std::nullopt;
+}
+
+bool Inspection::IsHidden(const View& view) const {
+  return std::find(hidden.begin(), hidden.end(), &view) != hidden.end();
+}
+
+void Inspection::Toggle(const View& view) {
+  if (std::erase(hidden, &view) == 0) hidden.push_back(&view);
+}
+
+void Inspection::Mark(const Probe& probe) {
+  if (marks.size() >= 2) marks.clear();
+  marks.push_back(probe);
+}
+
+std::string Inspection::DistanceText() const {
+  if (marks.size() < 2) return "";
+  const Distance distance = DistanceBetween(marks[0], marks[1]);
+  return fmt::format("{:.5g}{} {}", distance.length,
+                     distance.sigma ? fmt::format(" +- {:.2g}", *distance.sigma) : " (no sigma)",
+                     unit);
+}
+
+void InspectionOverlay::DrawCompared(const Inspection& inspection, const PictureTexture& other) {
+  ImDrawList& list = *ImGui::GetBackgroundDrawList();
+  CoverRight(list, inspection.border);
+  list.AddImage(IdOf(other), {0, 0}, ImGui::GetIO().DisplaySize);
+  EndRight(list, inspection.border);
+}
+
+void InspectionOverlay::DrawPhoto(const Inspection& inspection, const View& view,
+                                  const NovelCamera& camera) {
+  ImDrawList& list = *ImGui::GetBackgroundDrawList();
+  CoverRight(list, inspection.border);
+  if (photo_of_ != &view && !view.image.empty()) {
+    photo_.Upload(view.image);
+    photo_of_ = &view;
+  }
+  if (photo_of_ == &view) {
+    const PinholeCamera &to = camera.camera, &from = view.camera;
+    const ImVec2 display = ImGui::GetIO().DisplaySize;
+    const auto place = [&](double u, double v) {
+      const double x = to.cx_px() + (u - from.cx_px()) * to.fx_px() / from.fx_px();
+      const double y = to.cy_px() + (v - from.cy_px()) * to.fy_px() / from.fy_px();
+      return ImVec2(static_cast<float>(x * display.x / to.width_px()),
+                    static_cast<float>(y * display.y / to.height_px()));
+    };
+    list.AddImage(IdOf(photo_), place(0, 0), place(from.width_px(), from.height_px()));
+  }
+  EndRight(list, inspection.border);
+}
+
+void InspectionOverlay::DrawCameras(const Controller& controller, const Inspection& inspection,
+                                    const std::map<std::string, ViewVerdict>& verdicts) {
+  ImDrawList& list = *ImGui::GetBackgroundDrawList();
+  const NovelCamera& camera = controller.camera();
+  const double length = kFrustumShare * controller.scene_size();
+  for (const View* view : controller.surroundings().views) {
+    const Pose world_from_cam = view->cam_from_world.Inverse();
+    const auto centre = Project(camera, world_from_cam.translation);
+    const double w = view->camera.width_px(), h = view->camera.height_px();
+    std::array<std::optional<ImVec2>, 4> corners;
+    const Eigen::Vector2d pixels[4] = {{0, 0}, {w, 0}, {w, h}, {0, h}};
+    for (size_t i = 0; i < 4; ++i) {
+      corners[i] =
+          Project(camera, world_from_cam * (length * view->camera.RayFromPixel(pixels[i])));
+    }
+    const auto verdict = verdicts.find(view->name);
+    const ImU32 colour = inspection.IsHidden(*view)  ? kOff
+                         : verdict == verdicts.end() ? kUntested
+                         : verdict->second.good      ? kGood
+                                                     : kBad;
+    const bool all = std::all_of(corners.begin(), corners.end(), [](const auto& c) { return c; });
+    auto& thumbnail = thumbnails_[view];
+    if (!thumbnail && !view->image.empty()) {
+      thumbnail = std::make_unique<PictureTexture>();
+      thumbnail->Upload(report::Shrink(view->image, kThumbnailPx));
+    }
+    if (all && thumbnail) {
+      list.AddImageQuad(IdOf(*thumbnail), *corners[0], *corners[1], *corners[2], *corners[3],
+                        {0, 0}, {1, 0}, {1, 1}, {0, 1}, IM_COL32(255, 255, 255, 200));
+    }
+    for (size_t i = 0; i < 4; ++i) {
+      if (centre && corners[i]) list.AddLine(*centre, *corners[i], colour, 1.5F);
+      const auto& next = corners[(i + 1) % 4];
+      if (corners[i] && next) list.AddLine(*corners[i], *next, colour, 1.5F);
+    }
+    if (corners[3]) {
+      std::string label = view->name;
+      if (verdict != verdicts.end()) label += " " + verdict->second.text;
+      list.AddText(*corners[3], colour, label.c_str());
+    }
+  }
+}
+
+void InspectionOverlay::DrawMarks(const Inspection& inspection, const NovelCamera& camera) {
+  ImDrawList& list = *ImGui::GetBackgroundDrawList();
+  std::vector<ImVec2> at;
+  for (const Probe& mark : inspection.marks) {
+    const auto on_display = Project(camera, mark.p_in_world);
+    if (!on_display) continue;
+    at.push_back(*on_display);
+    list.AddCircle(*on_display, 6, kMark, 0, 2);
+  }
+  if (at.size() < 2) return;
+  list.AddLine(at[0], at[1], kMark, 2);
+  const ImVec2 middle(0.5F * (at[0].x + at[1].x) + 8, 0.5F * (at[0].y + at[1].y));
+  const std::string text = inspection.DistanceText();
+  const ImVec2 size = ImGui::CalcTextSize(text.c_str());
+  list.AddRectFilled({middle.x - 4, middle.y - 2}, {middle.x + size.x + 4, middle.y + size.y + 2},
+                     kGround);
+  list.AddText(middle, kMark, text.c_str());
+}
+
+void InspectionOverlay::DrawMagnifier(const Inspection& inspection, const PictureTexture& picture) {
+  const ImVec2 display = ImGui::GetIO().DisplaySize;
+  ImGui::SetNextWindowPos({display.x - 8, 8}, ImGuiCond_Always, {1, 0});
+  ImGui::SetNextWindowBgAlpha(0.9F);
+  constexpr auto kFlags = ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize |
+                          ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoInputs |
+                          ImGuiWindowFlags_NoFocusOnAppearing;
+  if (ImGui::Begin("magnifier", nullptr, kFlags)) {
+    const ImVec2 at = ImGui::GetMousePos();
+    const float half = 0.5F * kMagnifiedPx, side = kMagnifiedPx * kMagnification;
+    if (!picture.empty()) {
+      ImGui::Image(IdOf(picture), {side, side},
+                   {(at.x - half) / display.x, (at.y - half) / display.y},
+                   {(at.x + half) / display.x, (at.y + half) / display.y});
+    }
+    if (inspection.under_cursor) {
+      const Probe& probe = *inspection.under_cursor;
+      const Eigen::Vector3d& p = probe.p_in_world;
+      Text(fmt::format("depth {:.5g}{} {}", probe.depth_z,
+                       probe.sigma_z ? fmt::format(" +- {:.2g}", *probe.sigma_z) : "",
+                       inspection.unit));
+      Text(fmt::format("world {:.5g}, {:.5g}, {:.5g}", p.x(), p.y(), p.z()));
+      for (const ProbeView& view : probe.views) {
+        Text(fmt::format("{:5.1f} %  {}  z {:.5g}{}  {:+.2f} px", 100 * view.share, view.name,
+                         view.depth_z, view.sigma_z ? fmt::format(" +- {:.2g}", *view.sigma_z) : "",
+                         view.behind_px));
+      }
+    } else {
+      Text("no view sees this pixel, or the picture moves");
+    }
+  }
+  ImGui::End();
+}
+
+}  // namespace dtr::viewer

@@ -1,0 +1,62 @@
+// viewer/glfw/inspection.h -- what lies over the picture: cameras, another picture, figures of a
+// point.
+#pragma once
+#include <array>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "viewer/controller.h"
+#include "viewer/glfw/app.h"
+#include "viewer/glfw/picture_maker.h"
+#include "viewer/probe.h"
+
+namespace dtr::viewer {
+
+/// What the right part of the window shows instead.
+enum class Compared { kNothing, kPhoto, kOtherMethod, kSplats };
+inline constexpr std::array kAllCompared{Compared::kNothing, Compared::kPhoto,
+                                         Compared::kOtherMethod, Compared::kSplats};
+const char* NameOf(Compared compared);
+/// The options of the other picture; none where it is no rendering.
+std::optional<RenderOptions> OptionsOf(Compared compared, const RenderOptions& options);
+
+/// What the user asked to see over the picture.
+struct Inspection {
+  bool cameras = false, magnifier = false;
+  Compared compared = Compared::kNothing;
+  float border = 0.5F;                ///< share of the window left of the other picture
+  std::vector<const View*> hidden;    ///< not drawn from
+  std::vector<Probe> marks;           ///< at most two: a distance
+  std::optional<Probe> under_cursor;  ///< of the last cursor at rest
+  std::string unit;                   ///< of lengths: "m" or "units"
+
+  bool IsHidden(const View& view) const;
+  void Toggle(const View& view);
+  /// Adds a mark; a third begins anew.
+  void Mark(const Probe& probe);
+  /// "2.310 +- 0.021 m"; empty without two marks.
+  std::string DistanceText() const;
+};
+
+/// Draws it with ImGui. Thumbnails are made of the views that are in memory.
+class InspectionOverlay {
+ public:
+  /// The other picture, right of the border.
+  void DrawCompared(const Inspection& inspection, const PictureTexture& other);
+  /// The photo of `view` where it would lie if this were its camera.
+  void DrawPhoto(const Inspection& inspection, const View& view, const NovelCamera& camera);
+  void DrawCameras(const Controller& controller, const Inspection& inspection,
+                   const std::map<std::string, ViewVerdict>& verdicts);
+  void DrawMarks(const Inspection& inspection, const NovelCamera& camera);
+  void DrawMagnifier(const Inspection& inspection, const PictureTexture& picture);
+
+ private:
+  std::map<const View*, std::unique_ptr<PictureTexture>> thumbnails_;
+  PictureTexture photo_;
+  const View* photo_of_ = nullptr;
+};
+
+}  // namespace dtr::viewer
