@@ -23,6 +23,7 @@ int Run(int argc, char** argv) {
 #ifdef DTR_WITH_WINDOWS
   dtr::cli::AddViewCommand(app);
 #endif
+  dtr::cli::AddInspectCommand(app);
   dtr::cli::AddEvaluateCommand(app);
   dtr::cli::AddBenchCommand(app);
   dtr::cli::AddImportCommand(app);

@@ -1,0 +1,135 @@
+#include <fmt/format.h>
+
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "cli/command.h"
+#include "cli/output_file.h"
+#include "cli/pipeline/validate_set.h"
+#include "cli/set_stream.h"
+#include "dtr/base/error.h"
+#include "dtr/base/files.h"
+#include "dtr/io/set_io.h"
+#include "viewer/inspect_page.h"
+
+namespace dtr::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+constexpr std::uintmax_t kMostRecordBytes = 64 << 20;
+
+struct Options {
+  fs::path set, output;
+  double memory_gb = 4;
+};
+
+double NumberOr(const Json& object, const char* name, double otherwise) {
+  const auto found = object.find(name);
+  return found != object.end() && found->is_number() ? found->get<double>() : otherwise;
+}
+
+std::string TextOr(const Json& object, const char* name) {
+  const auto found = object.find(name);
+  return found != object.end() && found->is_string() ? found->get<std::string>() : "";
+}
+
+/// The list below `name`, empty where there is none.
+Json ListOf(const Json& object, const char* name) {
+  if (!object.is_object() || !object.contains(name) || !object[name].is_array())
+    return Json::array();
+  return object[name];
+}
+
+std::vector<Check> ChecksOf(const DtrSet& set) {
+  std::vector<Check> checks;
+  for (const Json& test : ListOf(Json::parse(set.verdict_json, nullptr, false), "tests")) {
+    if (!test.is_object()) continue;
+    const auto passed = test.find("passed");
+    checks.push_back({TextOr(test, "name"), NumberOr(test, "value", NAN),
+                      NumberOr(test, "limit", NAN),
+                      passed != test.end() && passed->is_boolean() && passed->get<bool>(),
+                      TextOr(test, "reason")});
+  }
+  return checks;
+}
+
+/// Of report/run.json; a set may have none, or that of another program.
+std::vector<viewer::StageCost> StagesOf(const fs::path& set) {
+  const fs::path file = set / "report" / "run.json";
+  std::vector<viewer::StageCost> stages;
+  if (!fs::exists(file)) return stages;
+  const Json record = Json::parse(ReadFile(file, kMostRecordBytes), nullptr, false);
+  if (record.is_discarded()) {
+    throw Error(file.string() + ": expected JSON, found something else; remove it or build anew");
+  }
+  for (const Json& stage : ListOf(record, "stages")) {
+    if (!stage.is_object()) continue;
+    stages.push_back({TextOr(stage, "name"), NumberOr(stage, "wall_s", 0),
+                      NumberOr(stage, "cpu_s", 0), 1024 * NumberOr(stage, "peak_rss_kib", 0)});
+  }
+  return stages;
+}
+
+viewer::InspectFacts FactsOf(const Options& options, const DtrSet& set, int threads) {
+  viewer::InspectFacts facts;
+  facts.name = WithoutTrailingSlash(options.set).filename().string();
+  facts.checks = ChecksOf(set);
+  facts.stages = StagesOf(options.set);
+  const calib::ValidateLimits limits;
+  facts.error_limit_px = limits.max_camera_rms_px;
+  if (set.sparse_file) {
+    const auto report =
+        pipeline::ValidateSet(set, io::LoadSparse(options.set, set), limits, threads);
+    for (const auto& camera : report.cameras) {
+      if (camera.held_out.count < limits.min_observations) continue;
+      facts.error_px[camera.name] = camera.held_out.rms_px;
+    }
+  }
+  facts.load = [folder = options.set, threads](const View& view) {
+    View loaded = view;
+    io::LoadOptions load;
+    load.sigma = true;
+    load.threads = threads;
+    io::LoadPixels(folder, loaded, load);
+    return loaded;
+  };
+  return facts;
+}
+
+int RunInspect(const Options& options, const Context& context) {
+  RequireOutputFile(options.output, "-o", {".html", ".htm"});
+  const int threads = context.common.threads;
+  DtrSet set = io::ReadSet(options.set);
+  const viewer::InspectFacts facts = FactsOf(options, set, threads);
+  io::CollapseDuplicates(set);
+  const auto stream = StreamOf(options.set, set, DescribeRenderScene(set),
+                               {options.memory_gb, threads}, context.console);
+  RenderOptions render;
+  render.threads = threads;
+  WriteFileAtomically(options.output,
+                      viewer::InspectPage(set, *stream, facts, render, context.console));
+  context.console.Say(options.output.string());
+  context.EmitJson(nlohmann::ordered_json{{"file", options.output.string()}}.dump(1));
+  return kDone;
+}
+
+}  // namespace
+
+void AddInspectCommand(CLI::App& app) {
+  AddCommand(
+      app, "inspect", "One offline page of what is good and bad in a set",
+      "dtr inspect scene.dtr -o report.html", [](CLI::App& command) -> Action {
+        auto options = std::make_shared<Options>();
+        command.add_option("SET", options->set, "The set")->required();
+        command.add_option("-o,--output", options->output, "The page, an .html file")->required();
+        AddMemoryOption(command, options->memory_gb);
+        return [options](const Context& context) { return RunInspect(*options, context); };
+      });
+}
+
+}  // namespace dtr::cli

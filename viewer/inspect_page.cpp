@@ -1,0 +1,287 @@
+#include "viewer/inspect_page.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "dtr/cpu/contributions.h"
+#include "dtr/cpu/renderer.h"
+#include "dtr/eval/metrics.h"
+#include "dtr/report/contact_sheet.h"
+#include "dtr/report/false_color.h"
+#include "dtr/report/html.h"
+#include "dtr/report/set_report.h"
+#include "dtr/types/area_average.h"
+#include "viewer/controller.h"
+#include "viewer/map_from_above.h"
+#include "viewer/shown.h"
+
+namespace dtr::viewer {
+namespace {
+
+constexpr int kSheetColumns = 5, kSheetCellPx = 180, kMapCells = 420;
+constexpr int kSmallPx = 240;  // long side of a view that is rendered without its photo
+constexpr size_t kWorstViews = 5;
+constexpr int kNamedShares = 4;  // contributors that are named
+constexpr size_t kSheetViews = 100;
+
+/// What was found about one source view.
+struct ViewFindings {
+  const View* view = nullptr;
+  double depth_share = 0;                ///< of its pixels that have depth
+  std::optional<double> sigma_px;        ///< median of sigma in px of disparity
+  std::optional<double> psnr_db;         ///< rendered without it, over what was seen
+  double coverage = 0;                   ///< of its picture, seen by the others
+  std::map<std::string, double> shares;  ///< of the picture, by the other views' names
+  ImageRgb8 photo, rendered, weights;    ///< small
+};
+
+struct Findings {
+  std::vector<ViewFindings> views;
+  std::vector<ImageRgb8> photos, depths, sigmas;  ///< thumbnails
+  ImageRgb8 coverage;
+  Ground ground;
+};
+
+double DepthShare(const DepthImage& depth) {
+  const auto& z = depth.grid().data();
+  if (z.empty()) return 0;
+  const auto kept =
+      std::count_if(z.begin(), z.end(), [](float v) { return !DepthImage::IsHole(v); });
+  return static_cast<double>(kept) / static_cast<double>(z.size());
+}
+
+std::optional<double> MedianSigmaPx(const View& view) {
+  if (!view.inverse_depth_sigma) return std::nullopt;
+  std::vector<float> sigmas;
+  for (const float sigma : view.inverse_depth_sigma->data()) {
+    if (sigma > 0 && std::isfinite(sigma)) sigmas.push_back(sigma);
+  }
+  if (sigmas.empty()) return std::nullopt;
+  const auto middle = sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2);
+  std::nth_element(sigmas.begin(), middle, sigmas.end());
+  return *middle * view.camera.fx_px() * DisparityBaseline(view);
+}
+
+/// The view as the others show it. `loaded` has its photo.
+void RenderWithoutItself(const View& view, const View& loaded, ViewStream& stream,
+                         RenderOptions options, ViewFindings& findings) {
+  const auto [width, height] =
+      TargetSize(view.camera.width_px(), view.camera.height_px(), kSmallPx);
+  const PinholeCamera small = view.camera.Resized(width, height);
+  // Depth no finer than the picture: the page is not to take an hour.
+  options.resolution = std::max(1, view.camera.width_px() / view.depth_scale / width);
+  stream.Hide({&view});
+  const RenderScene scene =
+      stream.SceneFor(view.cam_from_world, options, ViewStream::Wait::kForAll);
+  const RenderResult result = cpu::Render(scene, small, view.cam_from_world, options);
+  findings.photo = AreaAverage(loaded.image, width, height);
+  Mask mask = result.coverage;
+  if (!loaded.mask.empty()) mask = eval::Intersect(mask, ShrinkMask(loaded.mask, width, height));
+  findings.psnr_db = eval::Psnr(result.image, findings.photo, mask);
+  findings.coverage = result.coverage_share;
+  const NovelCamera camera{small, view.cam_from_world};
+  findings.weights = FalseColour(Shown::kWeights, {result, scene, camera, options},
+                                 [](const View&) { return nullptr; });
+  const cpu::Contributions found =
+      cpu::ContributionsTo(result.depth, scene, small, view.cam_from_world, options);
+  for (size_t i = 0; i < found.views.size(); ++i) {
+    double sum = 0;
+    for (const float share : found.shares[i].data()) sum += share;
+    findings.shares[scene.views[static_cast<size_t>(found.views[i])]->name] =
+        sum / static_cast<double>(found.shares[i].data().size());
+  }
+  findings.rendered = result.image;
+}
+
+Findings FindOut(const DtrSet& set, ViewStream& stream, const InspectFacts& facts,
+                 const RenderOptions& options, Progress& progress) {
+  Findings findings;
+  findings.ground = GroundOf(set);
+  CoverageFromAbove coverage(findings.ground, kMapCells);
+  const std::vector<const View*> views = SurroundingsOf(set).views;
+  progress.Stage("inspecting", static_cast<int>(views.size()));
+  for (const View* view : views) {
+    progress.ThrowIfInterrupted();
+    const View loaded = facts.load(*view);
+    ViewFindings found;
+    found.view = view;
+    found.depth_share = DepthShare(loaded.depth);
+    found.sigma_px = MedianSigmaPx(loaded);
+    coverage.Add(loaded);
+    if (findings.photos.size() < kSheetViews) {
+      findings.photos.push_back(report::Shrink(loaded.image, kSheetCellPx));
+      findings.depths.push_back(
+          loaded.depth.empty() ? ImageRgb8()
+                               : report::Shrink(report::ColorizeDepth(loaded.depth), kSheetCellPx));
+      findings.sigmas.push_back(
+          loaded.inverse_depth_sigma
+              ? report::Shrink(report::ColorizeSigma(*loaded.inverse_depth_sigma), kSheetCellPx)
+              : ImageRgb8());
+    }
+    if (views.size() > 1) RenderWithoutItself(*view, loaded, stream, options, found);
+    findings.views.push_back(std::move(found));
+    progress.Update(static_cast<int>(findings.views.size()));
+  }
+  stream.Hide({});
+  findings.coverage = coverage.Picture(static_cast<int>(views.size()));
+  return findings;
+}
+
+std::string Percent(double share) { return fmt::format("{:.1f} %", 100 * share); }
+
+void AddVerdict(report::HtmlReport& page, const InspectFacts& facts) {
+  page.Section("Can the calibration be trusted?");
+  if (facts.checks.empty()) {
+    page.Verdict(false, "This set was never validated: run dtr validate");
+    return;
+  }
+  const bool good = AllPassed(facts.checks);
+  page.Verdict(good, good ? "The calibration passed its checks"
+                          : "The calibration broke at least one check");
+  report::AddChecks(page, facts.checks);
+}
+
+void AddSheets(report::HtmlReport& page, const Findings& findings) {
+  page.Section("Photos, depth, uncertainty");
+  page.Paragraph(fmt::format(
+      "In the order of the views' ids{}. Depth: closer is brighter, green is "
+      "a hole. Uncertainty of inverse depth: dark is certain.",
+      findings.views.size() > kSheetViews ? fmt::format(", the first {}", kSheetViews) : ""));
+  page.Image("photos", report::ContactSheet(findings.photos, kSheetColumns, kSheetCellPx));
+  page.Image("depth", report::ContactSheet(findings.depths, kSheetColumns, kSheetCellPx));
+  const bool any = std::any_of(findings.sigmas.begin(), findings.sigmas.end(),
+                               [](const ImageRgb8& sigma) { return !sigma.empty(); });
+  if (any) page.Image("sigma", report::ContactSheet(findings.sigmas, kSheetColumns, kSheetCellPx));
+}
+
+void AddMaps(report::HtmlReport& page, const DtrSet& set, const Findings& findings,
+             const InspectFacts& facts) {
+  page.Section("From above");
+  page.Svg("cameras: green holds, red is above its limit, blue was not tested",
+           CameraMapSvg(set, findings.ground, [&](const View& view) -> std::string {
+             const auto error = facts.error_px.find(view.name);
+             if (error == facts.error_px.end()) return "#3b6fd4";
+             return error->second <= facts.error_limit_px ? "#2c9c4b" : "#d43b2f";
+           }));
+  page.Image(
+      "places by the number of views that have depth there: brighter is more, green is none; "
+      "the same window as the map of cameras",
+      findings.coverage);
+}
+
+std::string LargestShares(const std::map<std::string, double>& shares) {
+  std::vector<std::pair<double, std::string>> sorted;
+  for (const auto& [name, share] : shares) sorted.push_back({-share, name});
+  std::sort(sorted.begin(), sorted.end());
+  std::string text;
+  for (int i = 0; i < std::min<int>(kNamedShares, static_cast<int>(sorted.size())); ++i) {
+    const auto& [share, name] = sorted[static_cast<size_t>(i)];
+    text += fmt::format("{}{} {}", i == 0 ? "" : ", ", name, Percent(-share));
+  }
+  return text;
+}
+
+void AddContributions(report::HtmlReport& page, const Findings& findings) {
+  std::map<std::string, double> total;
+  std::vector<std::vector<report::Cell>> rows;
+  for (const ViewFindings& found : findings.views) {
+    for (const auto& [name, share] : found.shares) total[name] += share;
+  }
+  const auto count = static_cast<double>(findings.views.size());
+  for (const ViewFindings& found : findings.views) {
+    rows.push_back({report::Picture{found.weights, "weights of " + found.view->name},
+                    found.view->name, LargestShares(found.shares), Percent(found.coverage),
+                    Percent(total[found.view->name] / count)});
+  }
+  page.Section("Which view contributes where");
+  page.Paragraph(
+      "Every view is rendered without its own photo. The picture mixes one colour per other view "
+      "by "
+      "their shares of each pixel; green is what none of them saw. The last column is what the "
+      "view "
+      "itself gives to the pictures of all the others: one near 0 % could be left out.");
+  page.Table({"Shares", "In place of", "Largest shares of the picture", "Seen by the others",
+              "Gives to the others"},
+             rows);
+}
+
+std::string Decibels(const std::optional<double>& psnr_db) {
+  return psnr_db && std::isfinite(*psnr_db) ? fmt::format("{:.1f} dB", *psnr_db) : "-";
+}
+
+void AddWorstViews(report::HtmlReport& page, const Findings& findings, const InspectFacts& facts) {
+  std::vector<const ViewFindings*> worst;
+  for (const ViewFindings& found : findings.views) worst.push_back(&found);
+  std::stable_sort(worst.begin(), worst.end(), [](const auto* a, const auto* b) {
+    constexpr double kNothingSeen = -1;
+    return a->psnr_db.value_or(kNothingSeen) < b->psnr_db.value_or(kNothingSeen);
+  });
+  const auto row = [&](const ViewFindings& found) -> std::vector<report::Cell> {
+    const auto error = facts.error_px.find(found.view->name);
+    return {
+        found.view->name,
+        Decibels(found.psnr_db),
+        Percent(found.coverage),
+        Percent(found.depth_share),
+        found.sigma_px ? fmt::format("{:.3f} px", *found.sigma_px) : std::string("-"),
+        error != facts.error_px.end() ? fmt::format("{:.2f} px", error->second) : std::string("-")};
+  };
+  const std::vector<std::string> header{"View",       "PSNR without it", "Seen by the others",
+                                        "With depth", "Median sigma",    "Reprojection"};
+  std::vector<std::vector<report::Cell>> pictures, rows;
+  for (size_t i = 0; i < std::min(kWorstViews, worst.size()); ++i) {
+    pictures.push_back({report::Picture{worst[i]->photo, "photo"},
+                        report::Picture{worst[i]->rendered, "rendered without it"},
+                        worst[i]->view->name, Decibels(worst[i]->psnr_db)});
+  }
+  for (const ViewFindings* found : worst) rows.push_back(row(*found));
+  page.Section("Worst views");
+  page.Paragraph(fmt::format(
+      "Worst first, by how well the other views show what this one photographed, at {} px, over "
+      "the pixels that they see. Sigma and reprojection are in pixels of this view.",
+      kSmallPx));
+  page.Table({"Photo", "Rendered without it", "View", "PSNR without it"}, pictures);
+  page.Table(header, rows);
+}
+
+void AddCosts(report::HtmlReport& page, const InspectFacts& facts) {
+  if (facts.stages.empty()) return;
+  std::vector<std::vector<report::Cell>> rows;
+  StageCost all{"all", 0, 0, 0};
+  const auto row = [](const StageCost& cost) -> std::vector<report::Cell> {
+    return {cost.name, fmt::format("{:.1f} s", cost.wall_s), fmt::format("{:.1f} s", cost.cpu_s),
+            fmt::format("{:.0f} MB", cost.peak_bytes / 1e6)};
+  };
+  for (const StageCost& stage : facts.stages) {
+    rows.push_back(row(stage));
+    all.wall_s += stage.wall_s;
+    all.cpu_s += stage.cpu_s;
+    all.peak_bytes = std::max(all.peak_bytes, stage.peak_bytes);
+  }
+  rows.push_back(row(all));
+  page.Section("What every stage cost");
+  page.Table({"Stage", "Wall clock", "Processor", "Most memory"}, rows);
+}
+
+}  // namespace
+
+std::string InspectPage(const DtrSet& set, ViewStream& stream, const InspectFacts& facts,
+                        const RenderOptions& options, Progress& progress) {
+  const Findings findings = FindOut(set, stream, facts, options, progress);
+  report::HtmlReport page("Inspection of " + facts.name);
+  page.Paragraph(fmt::format("{} source views; lengths in {}.", findings.views.size(),
+                             set.unit == LengthUnit::kMetre ? "metres" : "scene units"));
+  AddVerdict(page, facts);
+  AddSheets(page, findings);
+  AddMaps(page, set, findings, facts);
+  AddWorstViews(page, findings, facts);
+  AddContributions(page, findings);
+  AddCosts(page, facts);
+  return page.Finish();
+}
+
+}  // namespace dtr::viewer
