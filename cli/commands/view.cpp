@@ -33,7 +33,7 @@ struct Options {
   RendererChoice renderer;
   double memory_gb = 4;
   int frames = 0;
-  bool no_panel = false;
+  bool no_panel = false, cameras = false, photo = false;
   std::shared_ptr<RenderOptions> render;
 };
 
@@ -169,6 +169,8 @@ viewer::AppSettings SettingsOf(const Options& options, const Context& context, c
   settings.output = options.output;
   settings.output_stem = WithoutTrailingSlash(options.set).stem().string();
   settings.panel = !options.no_panel;
+  settings.cameras = options.cameras;
+  settings.photo = options.photo;
   settings.frames = options.frames;
   settings.screenshot = options.screenshot;
   const NovelCameraRequest& request = options.request;
@@ -241,6 +243,9 @@ void AddViewCommand(CLI::App& app) {
                         "Save the window before it closes by --frames")
             ->type_name("FILE");
         command.add_flag("--no-panel", options->no_panel, "Begin without the panel");
+        command.add_flag("--cameras", options->cameras, "Begin with the input cameras shown");
+        command.add_flag("--photo", options->photo,
+                         "Begin with the nearest photo beside the picture");
         command
             .add_option("--state-file", options->state_file,
                         "Keep FILE telling, as JSON, what the window shows; for scripts")

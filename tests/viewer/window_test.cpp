@@ -121,6 +121,60 @@ TEST_F(ViewerWindow, TheCommandLineDrawsThePictureInTheWindow) {
   }
 }
 
+TEST_F(ViewerWindow, APathIsRecordedThatRenderAndViewRead) {
+  NeedDisplay();
+  if (IsSkipped()) return;
+  const fs::path path = In("good-path-001.json");
+  {
+    ViewerProgram viewer(Set(), folder_.path(), {"--size", "320x240", "--no-panel"});
+    viewer.WaitFor("the first picture", Anything);
+    ViewerProgram::Do({"mousemove", "150", "120", "key", "k"});
+    viewer.WaitFor("a path", [&](const Json&) { return fs::exists(path); });
+    ViewerProgram::Do({"key", "Right"});
+    viewer.WaitFor("the next view", [](const Json& s) { return s["at_view"] == "0002.jpg"; });
+    const auto one = Text(path);
+    ViewerProgram::Do({"key", "k"});
+    viewer.WaitFor("a longer path", [&](const Json&) { return Text(path) != one; });
+  }
+  DtrOk({"render", Set(), "--path", path.string(), "-o", In("frames").string()});
+  EXPECT_EQ(FilesIn(In("frames")), 2);
+  const Ran ran = DtrOk({"view", Set(), "--path", path.string(), "--frames", "2", "--json", "-",
+                         "-o", folder_.path().string()});
+  EXPECT_EQ(Json::parse(ran.out)["last"]["at_view"], "0002.jpg");
+}
+
+TEST_F(ViewerWindow, WhatIsInspectedIsSaid) {
+  NeedDisplay();
+  if (IsSkipped()) return;
+  ViewerProgram viewer(Set(), folder_.path(), {"--size", "400x300", "--no-panel"});
+  viewer.WaitFor("the first picture", Anything);
+  ViewerProgram::Do({"mousemove", "200", "200", "key", "g"});
+  const Json probed = viewer.WaitFor("figures under the cursor",
+                                     [](const Json& s) { return !s["under_cursor"].empty(); });
+  EXPECT_EQ(probed["under_cursor"][0], "0001.jpg");  // at its place nothing weighs more
+  ViewerProgram::Do({"key", "h"});
+  const Json hidden = viewer.WaitFor("a view left out", [](const Json& s) {
+    return s["hidden"] == Json::array({"0001.jpg"}) && !s["under_cursor"].empty();
+  });
+  EXPECT_NE(hidden["under_cursor"][0], "0001.jpg");
+  for (const Json& name : hidden["views_used"]) EXPECT_NE(name, "0001.jpg");
+  ViewerProgram::Do({"key", "m", "mousemove", "260", "210", "key", "m"});
+  const Json measured =
+      viewer.WaitFor("a distance", [](const Json& s) { return s["distance"] != ""; });
+  EXPECT_FALSE(measured["distance"].get<std::string>().starts_with("0 "));
+  for (const char* compared : {"nearest photo", "other method", "splats", "nothing"}) {
+    ViewerProgram::Do({"key", "x"});
+    viewer.WaitFor(compared, [&](const Json& s) { return s["compared"] == compared; });
+  }
+  for (const char* shown : {"depth", "sigma", "weights", "view count", "coverage", "colour"}) {
+    ViewerProgram::Do({"key", "Down"});
+    viewer.WaitFor(shown, [&](const Json& s) { return s["shown"] == shown; });
+  }
+  ViewerProgram::Do({"key", "f"});
+  viewer.WaitFor("cameras", [](const Json& s) { return s["cameras"].get<bool>(); });
+  EXPECT_EQ(viewer.WaitFor("no complaint", Anything)["message"], "");
+}
+
 TEST_F(ViewerWindow, ThePanelTakesItsClicksAndTheWindowIsSaved) {
   NeedDisplay();
   if (IsSkipped()) return;

@@ -69,6 +69,8 @@ class App {
         panel_(settings.panel) {
     glfwSwapInterval(1);
     FitToWindow();
+    inspection_.cameras = settings.cameras;
+    if (settings.photo) inspection_.compared = Compared::kPhoto;
     inspection_.unit = opened_->set.unit == LengthUnit::kMetre ? "m" : "units";
     if (settings.start) controller_.JumpTo(*settings.start);
   }
@@ -201,6 +203,8 @@ class App {
       case Action::kMark:
         to_mark_.push_back(interface_.cursor_px());
         return;
+      case Action::kAddKey:
+        return AddKey();
       case Action::kNextShown:
         return StepShown(1);
       case Action::kPreviousShown:
@@ -372,6 +376,15 @@ class App {
     } catch (const Error& error) {
       Tell(error.what());
       if (last_frame) throw;  // a script asked for it
+    }
+  }
+
+  void AddKey() {
+    try {
+      const auto file = keeper_.AddToPath(controller_.camera(), opened_->set);
+      Tell("added to " + file.string());
+    } catch (const Error& error) {
+      Tell(error.what());
     }
   }
 

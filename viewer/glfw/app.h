@@ -26,10 +26,10 @@ struct AppSettings {
   int width_px = 1280, height_px = 800;
   RenderOptions render;
   size_t gpu_bytes = size_t{4} << 30;
-  std::string shader_folder;           ///< as gl::RendererSettings
-  std::filesystem::path output = ".";  ///< folder for what the user saves
-  std::string output_stem = "view";    ///< first part of those files' names
-  bool panel = true;
+  std::string shader_folder;                          ///< as gl::RendererSettings
+  std::filesystem::path output = ".";                 ///< folder for what the user saves
+  std::string output_stem = "view";                   ///< first part of those files' names
+  bool panel = true, cameras = false, photo = false;  ///< shown from the start; photo: compared
   /// Cameras to fly along at once, one a frame, as while moving; empty: none.
   std::vector<NovelCamera> play;
   std::optional<NovelCamera> start;  ///< none: the first input camera

@@ -18,6 +18,26 @@ namespace dtr::viewer {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+/// Named by the file and their numbers.
+void WriteCameras(const fs::path& file, const std::vector<NovelCamera>& cameras,
+                  const DtrSet& set) {
+  io::CameraList list;
+  list.unit = set.unit;
+  list.world_origin = set.world_origin;
+  for (const NovelCamera& camera : cameras) {
+    io::NamedCamera named;
+    named.name = fmt::format("{}-{:04}.png", file.stem().string(), list.cameras.size() + 1);
+    named.camera = camera.camera;
+    named.cam_from_world = camera.cam_from_world;
+    list.cameras.push_back(named);
+  }
+  io::WriteCamerasJson(file, list);
+}
+
+}  // namespace
+
 fs::path Keeper::Free(const std::string& kind, const std::string& extension) const {
   constexpr int kMostFiles = 100000;
   for (int number = 1; number < kMostFiles; ++number) {
@@ -50,16 +70,15 @@ fs::path Keeper::SaveWindow(GLFWwindow* window) const {
 
 fs::path Keeper::SaveCamera(const NovelCamera& camera, const DtrSet& set) const {
   const fs::path file = Free("camera", ".json");
-  io::CameraList list;
-  list.unit = set.unit;
-  list.world_origin = set.world_origin;
-  io::NamedCamera named;
-  named.name = file.stem().string() + ".png";
-  named.camera = camera.camera;
-  named.cam_from_world = camera.cam_from_world;
-  list.cameras.push_back(named);
-  io::WriteCamerasJson(file, list);
+  WriteCameras(file, {camera}, set);
   return file;
+}
+
+fs::path Keeper::AddToPath(const NovelCamera& camera, const DtrSet& set) {
+  if (path_file_.empty()) path_file_ = Free("path", ".json");
+  path_.push_back(camera);
+  WriteCameras(path_file_, path_, set);
+  return path_file_;
 }
 
 void SaveWindowAs(const fs::path& file, GLFWwindow* window) {

@@ -23,6 +23,7 @@ constexpr std::array kHelp{
     HelpLine{"X", "compare: with the nearest photo, the other method, splats"},
     HelpLine{"H", "leave the nearest view out, take it in again"},
     HelpLine{"M", "mark the point under the cursor; two marks: their distance"},
+    HelpLine{"K", "add this camera to the path file, for --path"},
     HelpLine{"P", "save the picture"},
     HelpLine{"F12", "save the window"},
     HelpLine{"L", "command line of this picture, to the clipboard and the terminal"},
@@ -44,7 +45,7 @@ constexpr std::array kBindings{
     Binding{GLFW_KEY_DOWN, Action::kNextShown}, Binding{GLFW_KEY_UP, Action::kPreviousShown},
     Binding{GLFW_KEY_F, Action::kCameras},      Binding{GLFW_KEY_G, Action::kMagnifier},
     Binding{GLFW_KEY_X, Action::kCompare},      Binding{GLFW_KEY_H, Action::kHideView},
-    Binding{GLFW_KEY_M, Action::kMark},
+    Binding{GLFW_KEY_M, Action::kMark},         Binding{GLFW_KEY_K, Action::kAddKey},
 };
 
 }  // namespace

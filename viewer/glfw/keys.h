@@ -22,6 +22,7 @@ enum class Action {
   kCompare,
   kHideView,
   kMark,
+  kAddKey,
   kNextShown,
   kPreviousShown,
   kQuit,

@@ -175,6 +175,7 @@ void DrawPanel(UserInterface& interface, PanelModel& model) {
     }
     if (ImGui::CollapsingHeader("Keep", ImGuiTreeNodeFlags_DefaultOpen)) {
       if (ImGui::Button("copy command line")) model.pressed.push_back(Action::kCopyCommand);
+      if (ImGui::Button("add camera to path")) model.pressed.push_back(Action::kAddKey);
       if (ImGui::Button("save picture")) model.pressed.push_back(Action::kSavePicture);
       ImGui::SameLine();
       if (ImGui::Button("save window")) model.pressed.push_back(Action::kSaveWindow);
