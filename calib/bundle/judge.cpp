@@ -245,7 +245,7 @@ int LeastSights(const Bundle& bundle) {
   return *std::min_element(sights.begin(), sights.end());
 }
 
-void AddHalves(const JudgeLimits& limits, const Adjusted halves[2], Judgement& judgement) {
+void AddHalves(const BundleLimits& limits, const Adjusted halves[2], Judgement& judgement) {
   const BundleCovariance covariances[2] = {CovarianceOf(halves[0], AllFree()),
                                            CovarianceOf(halves[1], AllFree())};
   judgement.halves_ratio = covariances[0].determined && covariances[1].determined
@@ -282,7 +282,7 @@ std::string LensReason(const LensJudgement& lens) {
 }
 
 // A difference fails where it is beyond chance and can be seen.
-Check Difference(const char* name, double sigmas, double moved_px, const JudgeLimits& limits,
+Check Difference(const char* name, double sigmas, double moved_px, const BundleLimits& limits,
                  const std::string& reason) {
   Check check = AtMost(name, sigmas, limits.max_sigmas, reason);
   if (!check.passed && moved_px <= limits.negligible_px) {
@@ -309,7 +309,7 @@ void WidenByHalves(Judgement& judgement) {
   }
 }
 
-void AddDifferences(const JudgeLimits& limits, Judgement& judgement) {
+void AddDifferences(const BundleLimits& limits, Judgement& judgement) {
   const auto rank = [&](const auto& item) {
     return item.moved_px > limits.negligible_px ? item.sigmas : 0.0;
   };
@@ -336,7 +336,7 @@ void AddDegeneracies(Judgement& judgement) {
       AtMost("degeneracies", harmful, 0, reason.empty() ? "none that matters" : reason));
 }
 
-void AddPicture(const JudgeLimits& limits, Judgement& judgement) {
+void AddPicture(const BundleLimits& limits, Judgement& judgement) {
   const CameraJudgement* worst = nullptr;
   for (const CameraJudgement& camera : judgement.cameras) {
     if (std::isfinite(camera.picture_shift_px) &&
@@ -355,7 +355,7 @@ void AddPicture(const JudgeLimits& limits, Judgement& judgement) {
 
 }  // namespace
 
-Judgement Judge(const Bundle& given, const JudgeLimits& limits, int threads) {
+Judgement Judge(const Bundle& given, const BundleLimits& limits, int threads) {
   Judgement judgement;
   const double share = kMostPoints / static_cast<double>(given.points.size());
   const Bundle stored = WithDistortion(WithoutUnseen(WithPoints(given, [&](std::uint64_t p) {

@@ -8,7 +8,7 @@
 
 namespace dtr::calib {
 
-struct JudgeLimits {
+struct BundleLimits {
   /// Stored against freshly solved, in predicted standard deviations (Mahalanobis length): of six
   /// unknowns of a pose, chance alone exceeds 5 once in 3000.
   double max_sigmas = 5;
@@ -65,7 +65,7 @@ struct Judgement {
 ///  - degeneracies are looked for by name.
 /// At most 4000 points, drawn by their index, take part. Deterministic for any number of threads.
 /// Throws Error on a broken bundle only.
-Judgement Judge(const Bundle& stored, const JudgeLimits& limits, int threads = 0);
+Judgement Judge(const Bundle& stored, const BundleLimits& limits, int threads = 0);
 
 /// Degeneracies of a solution (degeneracy.cpp says how each is recognised). `covariance` may be one
 /// that is not determined.

@@ -4,7 +4,7 @@ namespace dtr::pipeline {
 
 calib::ValidationReport ValidateSet(const DtrSet& set, const SparseScene& sparse,
                                     const calib::ValidateLimits& limits, int threads,
-                                    const calib::JudgeLimits& judge_limits) {
+                                    const calib::BundleLimits& judge_limits) {
   std::vector<PinholeCamera> cameras;
   std::vector<Pose> poses;
   std::vector<std::string> names;

@@ -12,6 +12,6 @@ namespace dtr::pipeline {
 /// (calib/bundle/judge.h), whose tests and figures join the report.
 calib::ValidationReport ValidateSet(const DtrSet& set, const SparseScene& sparse,
                                     const calib::ValidateLimits& limits, int threads,
-                                    const calib::JudgeLimits& judge_limits = {});
+                                    const calib::BundleLimits& judge_limits = {});
 
 }  // namespace dtr::pipeline
