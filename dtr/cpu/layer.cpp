@@ -30,7 +30,7 @@ class ViewPainter {
         novel_(novel),
         depth_camera_(view_in_novel.view->DepthCamera()),
         samples_(MakeSampleGrid(*view_in_novel.view, options.resolution)),
-        rule_{ThresholdsOf(*view_in_novel.view, options).depth_break, options.absolute_depth_break},
+        rule_(BreakRuleOf(*view_in_novel.view, options)),
         point_size_(options.point_size),
         layer_(band) {}
 

@@ -12,7 +12,7 @@ namespace dtr::cpu {
 namespace {
 
 // SPEC 5.2 and 5.3, in pixels of disparity.
-constexpr double kFirstBeforePx = 1, kBeforePx = 0.5, kBehindPx = 2, kSettledPx = 0.25;
+constexpr double kHeldBeforePx = 1, kBeforePx = 0.5, kBehindPx = 2;
 
 // SPEC 5.2: a hole says less against a surface than a depth behind it; so many surfaces of a pixel
 // are tried.
@@ -22,6 +22,7 @@ constexpr int kTriedSurfaces = 3;
 /// What the views say of a surface; shares of their weights.
 struct Votes {
   double held = 0, refused = 0;
+  double front = 0;   ///< 1/z of the nearest whole patch of those that hold it; 0: none
   double behind = 0;  ///< 1/z of the nearest surface that a view sees through it; 0: none
 };
 
@@ -30,6 +31,7 @@ struct Votes {
 struct Patch {
   double inverse_depth = 0;  ///< 0: none
   Eigen::Vector2d slope = Eigen::Vector2d::Zero();
+  bool whole = false;  ///< of four samples that belong together
 };
 
 class OwnFragmentFinder {
@@ -37,6 +39,7 @@ class OwnFragmentFinder {
   OwnFragmentFinder(const ViewInNovel& view_in_novel, const RenderOptions& options)
       : samples_(MakeSampleGrid(*view_in_novel.view, options.resolution)),
         thresholds_(ThresholdsOf(*view_in_novel.view, options)),
+        breaks_(BreakRuleOf(*view_in_novel.view, options)),
         center_(view_in_novel.translation) {
     const PinholeCamera camera = view_in_novel.view->DepthCamera();
     const double origin = samples_.Centre(0), step = samples_.step;
@@ -56,38 +59,34 @@ class OwnFragmentFinder {
     const auto position = PositionOnGrid(base, start);
     if (!position) return;
     const double say = Say(ray, start, pixel_angle_rad);
-    const double seen = Meet(base, *position, {NearestSample(*position)});
+    const Patch patch = PatchAt(*position);
+    const double seen = Meet(base, *position, patch);
     if (!(seen > 0)) {
       votes.refused += kHoleSay * say;
     } else if (seen - start < -kBehindPx * thresholds_.pixel) {
       votes.refused += say;
       votes.behind = std::max(votes.behind, seen);
-    } else if (seen - start <= kFirstBeforePx * thresholds_.pixel) {
+    } else if (seen - start <= kHeldBeforePx * thresholds_.pixel) {
       votes.held += say;
+      if (patch.whole && seen - start <= kBeforePx * thresholds_.pixel) {
+        votes.front = std::max(votes.front, seen);
+      }
     }  // else the view looks at something before it
   }
 
   /// 1/z in the novel camera where `ray` (z = 1, novel frame) meets the view's surface near
-  /// `start`; 0 where the view shows another surface there, or none.
-  double Find(const Eigen::Vector3d& ray, double start) const {
+  /// `held`; 0 where the view shows another surface there, or none.
+  double Find(const Eigen::Vector3d& ray, double held) const {
     const Eigen::Vector3d base = grid_from_novel_ * ray;
-    const auto position = PositionOnGrid(base, start);
+    const auto position = PositionOnGrid(base, held);
     if (!position) return 0;
-    const double first = Meet(base, *position, {NearestSample(*position)});
-    if (!Within(first - start, kFirstBeforePx)) return 0;
-    const auto settled = PositionOnGrid(base, first);
-    if (!settled) return 0;
-    const Patch patch = PatchAt(*settled);
-    const double w = Meet(base, *settled, patch);
-    if (!Within(w - start, kBeforePx)) return 0;
-    // The first step took the nearest sample flat: half a sample's slope is its error.
-    const double room = kSettledPx * thresholds_.pixel + 0.5 * patch.slope.lpNorm<1>();
-    return w > 0 && std::abs(w - first) <= room && (base + minus_center_ * w).z() > 0 ? w : 0;
+    const double w = Meet(base, *position, PatchAt(*position));
+    return w > 0 && Within(w - held) && (base + minus_center_ * w).z() > 0 ? w : 0;
   }
 
  private:
-  bool Within(double nearer, double before_px) const {
-    return nearer <= before_px * thresholds_.pixel && nearer >= -kBehindPx * thresholds_.pixel;
+  bool Within(double nearer) const {
+    return nearer <= kBeforePx * thresholds_.pixel && nearer >= -kBehindPx * thresholds_.pixel;
   }
 
   /// 1 / (tan^2 t + t_pixel^2), t the angle of SPEC 4.5 at the point ray / w; 0 from 90 degrees on.
@@ -121,18 +120,16 @@ class OwnFragmentFinder {
   /// nearest sample, flat.
   Patch PatchAt(const Eigen::Vector2d& position) const {
     const Grid<double>& grid = samples_.inverse_depth;
-    const double left = std::floor(position.x()), top = std::floor(position.y());
+    const int left = static_cast<int>(std::floor(position.x()));
+    const int top = static_cast<int>(std::floor(position.y()));
+    if (!IsWholeBlock(grid, left, top, breaks_)) return {NearestSample(position)};
     const double u = position.x() - left, v = position.y() - top;
-    const int x0 = std::max(static_cast<int>(left), 0), y0 = std::max(static_cast<int>(top), 0);
-    const int x1 = std::min(static_cast<int>(left) + 1, grid.width() - 1);
-    const int y1 = std::min(static_cast<int>(top) + 1, grid.height() - 1);
+    const int x0 = std::max(left, 0), x1 = std::min(left + 1, grid.width() - 1);
+    const int y0 = std::max(top, 0), y1 = std::min(top + 1, grid.height() - 1);
     const double a = grid(x0, y0), b = grid(x1, y0), c = grid(x0, y1), d = grid(x1, y1);
-    const auto [lowest, highest] = std::minmax({a, b, c, d});
-    if (!(lowest > 0 && highest - lowest <= thresholds_.depth_break)) {
-      return {NearestSample(position)};
-    }
     return {(1 - v) * ((1 - u) * a + u * b) + v * ((1 - u) * c + u * d),
-            {(1 - v) * (b - a) + v * (d - c), (1 - u) * (c - a) + u * (d - b)}};
+            {(1 - v) * (b - a) + v * (d - c), (1 - u) * (c - a) + u * (d - b)},
+            true};
   }
 
   /// 1/z in the novel camera where the ray meets the patch's plane; 0 where it shows its back or
@@ -149,6 +146,7 @@ class OwnFragmentFinder {
 
   const SampleGrid samples_;
   const InverseDepthThresholds thresholds_;
+  const BreakRule breaks_;
   const Eigen::Vector3d center_;  // of the view, in the novel frame
   // Grid position, homogeneous, of the point ray / w: grid_from_novel_ ray + minus_center_ w.
   Eigen::Matrix3d grid_from_novel_;
@@ -169,7 +167,7 @@ std::vector<double> NearestSurface(std::span<const Layer> layers) {
 
 void KeepSurfacesThatViewsHold(std::span<const ViewInNovel> views, const PinholeCamera& novel,
                                const RenderOptions& options, const Band& band,
-                               std::span<double> start) {
+                               std::span<double> surfaces) {
   std::vector<OwnFragmentFinder> finders;
   for (const ViewInNovel& view : views) {
     finders.emplace_back(view, options);
@@ -180,15 +178,15 @@ void KeepSurfacesThatViewsHold(std::span<const ViewInNovel> views, const Pinhole
     for (int tried = 0; tried < kTriedSurfaces && surface > 0; ++tried) {
       Votes votes;
       for (const auto& finder : finders) finder.Vote(ray, surface, pixel_angle_rad, votes);
-      if (votes.held >= votes.refused) return surface;
+      if (votes.held >= votes.refused) return votes.front > 0 ? votes.front : surface;
       surface = votes.behind;
     }
     return 0.0;
   };
   ParallelFor(0, band.rows, options.threads, [&](int row) {
     for (int x = 0; x < band.width_px; ++x) {
-      double& surface = start[static_cast<size_t>(row) * static_cast<size_t>(band.width_px) +
-                              static_cast<size_t>(x)];
+      double& surface = surfaces[static_cast<size_t>(row) * static_cast<size_t>(band.width_px) +
+                                 static_cast<size_t>(x)];
       surface = held(novel.RayFromPixel({x + 0.5, band.first_row + row + 0.5}), surface);
     }
   });
@@ -196,15 +194,15 @@ void KeepSurfacesThatViewsHold(std::span<const ViewInNovel> views, const Pinhole
 
 Layer FindOwnFragments(const ViewInNovel& view_in_novel, const PinholeCamera& novel,
                        const RenderOptions& options, const Band& band,
-                       std::span<const double> start) {
+                       std::span<const double> surfaces) {
   Layer layer(band);
   const OwnFragmentFinder finder(view_in_novel, options);
   if (!finder.HasSamples()) return layer;
   size_t p = 0;
   for (int y = band.first_row; y < band.first_row + band.rows; ++y) {
     for (int x = 0; x < band.width_px; ++x, ++p) {
-      if (!(start[p] > 0)) continue;
-      layer.inverse_depth[p] = finder.Find(novel.RayFromPixel({x + 0.5, y + 0.5}), start[p]);
+      if (!(surfaces[p] > 0)) continue;
+      layer.inverse_depth[p] = finder.Find(novel.RayFromPixel({x + 0.5, y + 0.5}), surfaces[p]);
     }
   }
   return layer;

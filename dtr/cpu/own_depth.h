@@ -11,17 +11,17 @@ namespace dtr::cpu {
 /// are of one band; there is at least one.
 std::vector<double> NearestSurface(std::span<const Layer> layers);
 
-/// SPEC 5.2: of each pixel's surface `start` (1/z, row-major; 0: none) what the views hold
-/// together; where they refuse it the next one behind, or none. Does not depend on the number of
-/// threads.
+/// SPEC 5.2: replaces each pixel's surface (1/z, row-major; 0: none) with what the views hold
+/// together, where their patches have it; where they refuse it with the next one behind, or none.
+/// Does not depend on the number of threads.
 void KeepSurfacesThatViewsHold(std::span<const ViewInNovel> views, const PinholeCamera& novel,
                                const RenderOptions& options, const Band& band,
-                               std::span<double> start);
+                               std::span<double> surfaces);
 
-/// SPEC 5.3: the view's own fragments at the pixels of `band`, found on its depth map from `start`
-/// (1/z per pixel of the band, row-major; 0: nothing there).
+/// SPEC 5.3: the view's own fragments at the pixels of `band`, found on its depth map from the
+/// surfaces that are held (1/z per pixel of the band, row-major; 0: nothing there).
 Layer FindOwnFragments(const ViewInNovel& view_in_novel, const PinholeCamera& novel,
                        const RenderOptions& options, const Band& band,
-                       std::span<const double> start);
+                       std::span<const double> surfaces);
 
 }  // namespace dtr::cpu

@@ -54,11 +54,12 @@ std::vector<Layer> DrawLayers(const std::vector<ViewInNovel>& views, const Pinho
   };
   fill([&](const ViewInNovel& view) { return DrawView(view, novel, drawn, band); });
   if (!deferred) return layers;
-  std::vector<double> start = NearestSurface(layers);
-  if (start_shift_px != 0) MoveStart(views, options, start_shift_px, start);
-  KeepSurfacesThatViewsHold(views, novel, options, band, start);
-  fill(
-      [&](const ViewInNovel& view) { return FindOwnFragments(view, novel, options, band, start); });
+  std::vector<double> surfaces = NearestSurface(layers);
+  if (start_shift_px != 0) MoveStart(views, options, start_shift_px, surfaces);
+  KeepSurfacesThatViewsHold(views, novel, options, band, surfaces);
+  fill([&](const ViewInNovel& view) {
+    return FindOwnFragments(view, novel, options, band, surfaces);
+  });
   return layers;
 }
 

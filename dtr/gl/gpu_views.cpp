@@ -22,7 +22,7 @@ size_t MostBytesOf(const View& view, const RenderOptions& options, const LayerSi
                             : options.primitive == Primitive::kSplat  ? kMostBytesOfSplats
                                                                       : kMostBytesOfMesh;
   return kBytesPerPixel * PixelsOf(sizes.LayerFor(SizeOf(view.camera))) +
-         kBytesPerPixel * PixelsOf(sizes.LayerFor(SamplesOf(view, options.resolution))) +
+         kBytesPerPixel * PixelsOf(sizes.LayerFor(DepthPictureSize(view, options.resolution))) +
          per_sample * PixelsOf(SizeOf(view.DepthCamera()));
 }
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <set>
 
+#include "dtr/gl/stored_depth.h"
+
 namespace dtr::gl {
 namespace {
 
@@ -21,7 +23,7 @@ LayerSizes::LayerSizes(const std::vector<const View*>& views, int resolution, in
   std::vector<LayerSize> images, depths;
   for (const View* view : views) {
     images.push_back({view->camera.width_px(), view->camera.height_px()});
-    depths.push_back(SamplesOf(*view, resolution));
+    depths.push_back(DepthPictureSize(*view, resolution));
   }
   while (step_px_ < most_px && !(AreFew(images) && AreFew(depths))) {
     step_px_ = step_px_ == 1 ? kFirstStepPx : 2 * step_px_;
@@ -39,13 +41,19 @@ LayerSize LayerSizes::LayerFor(const LayerSize& picture) const {
           Rounded(picture.height_px, step_px_, most_px_)};
 }
 
-LayerSize SamplesOf(const View& view, int resolution) {
+LayerSize DepthPictureSize(int columns, int rows) {
+  if (columns == 0 || rows == 0) return {};
+  const int rows_of_bits = (rows + 1 + kBlocksPerTexel - 1) / kBlocksPerTexel;
+  return {columns + 1, rows + 1 + rows_of_bits};
+}
+
+LayerSize DepthPictureSize(const View& view, int resolution) {
   const PinholeCamera camera = view.DepthCamera();
   const int first = resolution / 2;
   const auto along = [&](int pixels) {
     return pixels > first ? (pixels - first + resolution - 1) / resolution : 0;
   };
-  return {along(camera.width_px()), along(camera.height_px())};
+  return DepthPictureSize(along(camera.width_px()), along(camera.height_px()));
 }
 
 LayerSize SizeWithEdge(const LayerSize& picture, const LayerSize& layer) {

@@ -24,7 +24,7 @@ using MF = hn::Mask<DF>;
 constexpr size_t kLanes = hn::MaxLanes(DF());
 
 // As in own_depth.glsl and resolve.frag.
-constexpr float kFirstBeforePx = 1.0f, kBeforePx = 0.5f, kBehindPx = 2.0f, kSettledPx = 0.25f;
+constexpr float kHeldBeforePx = 1.0f, kBeforePx = 0.5f, kBehindPx = 2.0f;
 constexpr float kHoleSay = 0.25f;
 constexpr int kTriedSurfaces = 3;
 constexpr float kBorderShare = 1e-4f;
@@ -37,7 +37,7 @@ HWY_INLINE VF Lerp(VF a, VF b, VF share) { return hn::MulAdd(share, hn::Sub(b, a
 
 /// The pixels of a group and what the views say of them.
 struct Group {
-  HWY_ALIGN float inverse_depth[kMostPixelViews][kLanes];  ///< first steps, then fragments; 0: none
+  HWY_ALIGN float inverse_depth[kMostPixelViews][kLanes];  ///< fragments; 0: none
   HWY_ALIGN float image_x[kMostPixelViews][kLanes];        ///< on the view's image
   HWY_ALIGN float image_y[kMostPixelViews][kLanes];
   HWY_ALIGN float weight[kMostPixelViews][kLanes];
@@ -91,11 +91,6 @@ HWY_INLINE VF UpperCode(VI pairs) {
   return hn::ConvertTo(DF(), hn::BitCast(DI(), hn::ShiftRight<16>(hn::BitCast(DU(), pairs))));
 }
 
-HWY_INLINE VF SampleAt(const PixelView& view, VI index) {
-  if (view.codes != nullptr) return LowerCode(PairsOfCodes(view, index));
-  return hn::GatherIndex(DF(), view.values, index);
-}
-
 struct FourSamples {
   VF a, b, c, d;  ///< a b above c d
 };
@@ -112,37 +107,89 @@ HWY_INLINE FourSamples SamplesAt(const PixelView& view, VI index) {
           hn::GatherIndex(DF(), view.values, hn::Add(below, one))};
 }
 
-/// The first step of SPEC 5.3: 1/z at which the ray meets the sample nearest to where the surface
-/// lies on the map, taken flat; 0: none.
-HWY_INLINE VF FirstStep(const PixelView& view, const RayOnGrid& base, const Position& position) {
-  const DF d;
-  const VF stored = SampleAt(
-      view, IndexOf(view, hn::ConvertTo(DI(), position.x), hn::ConvertTo(DI(), position.y)));
-  const VF own = hn::MulAdd(stored, Constant(view.depth_factor), Constant(view.depth_offset));
-  const VF facing = hn::NegMulAdd(own, Constant(view.grid_z[3]), Constant(1));
-  const MF exists =
-      hn::And(hn::And(position.on_map, hn::Gt(stored, hn::Zero(d))), hn::Gt(facing, hn::Zero(d)));
-  return hn::IfThenElseZero(exists, hn::Div(hn::Mul(own, base.z), facing));
+/// SPEC 5.3: the blocks whose four samples belong together.
+HWY_INLINE MF IsWhole(const PixelView& view, VI index) {
+  const VU bit = hn::BitCast(DU(), index);
+  const VU words = hn::GatherIndex(DU(), view.whole_blocks, hn::ShiftRight<5>(index));
+  const VU found = hn::And(hn::Shr(words, hn::And(bit, hn::Set(DU(), 31))), hn::Set(DU(), 1));
+  return hn::RebindMask(DF(), hn::Ne(found, hn::Zero(DU())));
+}
+
+/// The view's surface around a position of its grid.
+struct Patch {
+  VF inverse_depth, slope_x, slope_y;  ///< 1/z at the position; its change per sample
+  MF exists, whole;                    ///< of four samples that belong together
+};
+
+/// SPEC 5.3: the tangent of the bilinear patch, else the nearest sample, flat.
+HWY_INLINE Patch PatchAt(const PixelView& view, const Position& position) {
+  const VF zero = hn::Zero(DF()), half = Constant(0.5f);
+  const VF low_x = hn::Floor(hn::Sub(position.x, half));
+  const VF low_y = hn::Floor(hn::Sub(position.y, half));
+  const VF u = hn::Sub(hn::Sub(position.x, half), low_x);
+  const VF v = hn::Sub(hn::Sub(position.y, half), low_y);
+  const VI index = IndexOf(view, hn::ConvertTo(DI(), low_x), hn::ConvertTo(DI(), low_y));
+  const FourSamples s = SamplesAt(view, index);
+  const VF lowest = hn::Min(hn::Min(s.a, s.b), hn::Min(s.c, s.d));
+  const VF highest = hn::Max(hn::Max(s.a, s.b), hn::Max(s.c, s.d));
+  const VF factor = Constant(view.depth_factor);
+  const MF full = hn::Gt(lowest, zero);
+  MF whole =
+      hn::And(full, hn::Le(hn::Mul(factor, hn::Sub(highest, lowest)), Constant(view.level_range)));
+  if (!hn::AllFalse(DF(), hn::AndNot(whole, full))) whole = hn::And(full, IsWhole(view, index));
+  const VF top = Lerp(s.a, s.b, u), bottom = Lerp(s.c, s.d, u);
+  const MF left = hn::Lt(u, half), upper = hn::Lt(v, half);
+  const VF nearest =
+      hn::IfThenElse(upper, hn::IfThenElse(left, s.a, s.b), hn::IfThenElse(left, s.c, s.d));
+  const VF stored = hn::IfThenElse(whole, Lerp(top, bottom, v), nearest);
+  const VF slope_x = Lerp(hn::Sub(s.b, s.a), hn::Sub(s.d, s.c), v);
+  return {hn::MulAdd(stored, factor, Constant(view.depth_offset)),
+          hn::IfThenElseZero(whole, hn::Mul(factor, slope_x)),
+          hn::IfThenElseZero(whole, hn::Mul(factor, hn::Sub(bottom, top))),
+          hn::And(position.on_map, hn::Gt(stored, zero)), whole};
+}
+
+/// 1/z at which the ray meets the patch's plane; 0 where it shows its back or there is none.
+HWY_INLINE VF Meet(const PixelView& view, const RayOnGrid& base, const Position& position,
+                   const Patch& patch) {
+  // The view's own 1/z at grid point q is w / q.z, so that plane . q = w on the tangent plane.
+  const VF rest = hn::NegMulAdd(patch.slope_y, position.y,
+                                hn::NegMulAdd(patch.slope_x, position.x, patch.inverse_depth));
+  const VF facing =
+      hn::NegMulAdd(patch.slope_x, Constant(view.grid_x[3]),
+                    hn::NegMulAdd(patch.slope_y, Constant(view.grid_y[3]),
+                                  hn::NegMulAdd(rest, Constant(view.grid_z[3]), Constant(1))));
+  const VF w = hn::Div(
+      hn::MulAdd(patch.slope_x, base.x, hn::MulAdd(patch.slope_y, base.y, hn::Mul(rest, base.z))),
+      facing);
+  const MF meets = hn::And(hn::Gt(facing, hn::Zero(DF())),
+                           hn::And(hn::Ge(w, Constant(kLeast)), hn::Le(w, Constant(kMost))));
+  return hn::IfThenElseZero(hn::And(patch.exists, meets), w);
 }
 
 /// SPEC 5.2: what the views say of a surface.
 struct Votes {
   VF held, refused;
+  VF front;   ///< 1/z of the nearest whole patch of those that hold it; 0: none
   VF behind;  ///< 1/z of the nearest surface that a view sees through it; 0: none
 };
 
-HWY_INLINE void AddVote(const PixelView& view, VF surface, VF seen, VF say, Votes* votes) {
+HWY_INLINE void AddVote(const PixelView& view, VF surface, VF seen, MF whole, VF say,
+                        Votes* votes) {
   const DF d;
   const VF nearer = hn::Sub(seen, surface), zero = hn::Zero(d);
   const MF shows = hn::Gt(seen, zero);
   const MF through = hn::And(shows, hn::Lt(nearer, Constant(-kBehindPx * view.pixel)));
   const MF holds =
-      hn::And(hn::AndNot(through, shows), hn::Le(nearer, Constant(kFirstBeforePx * view.pixel)));
+      hn::And(hn::AndNot(through, shows), hn::Le(nearer, Constant(kHeldBeforePx * view.pixel)));
   const VF hole_say = hn::Mul(Constant(kHoleSay), say);
   votes->refused =
       hn::Add(votes->refused, hn::IfThenElse(shows, hn::IfThenElseZero(through, say), hole_say));
   votes->held = hn::Add(votes->held, hn::IfThenElseZero(holds, say));
   votes->behind = hn::Max(votes->behind, hn::IfThenElseZero(through, seen));
+  const MF near = hn::Le(nearer, Constant(kBeforePx * view.pixel));
+  votes->front =
+      hn::Max(votes->front, hn::IfThenElseZero(hn::And(hn::And(holds, whole), near), seen));
 }
 
 /// The angle t of SPEC 4.5 at the point at inverse depth w: its sine squared and its cosine, both
@@ -192,61 +239,22 @@ HWY_INLINE VF WeightAt(const Angle& angle, const PixelRow& row) {
   return weight;
 }
 
-/// The second step of SPEC 5.3 from `first`, where the first led; 0: the view shows another surface
-/// there, or none. Leaves where the fragment lies on the image.
-HWY_INLINE VF SecondStep(const PixelView& view, const RayOnGrid& base, VF surface, VF first,
-                         float* image_x, float* image_y) {
+/// SPEC 5.3: the view's fragment near `surface`; 0: the view shows another surface there, or none.
+/// Leaves where the fragment lies on the image.
+HWY_INLINE VF FragmentAt(const PixelView& view, const RayOnGrid& base, VF surface, float* image_x,
+                         float* image_y) {
   const DF d;
-  const VF zero = hn::Zero(d), half = Constant(0.5f);
-  const auto within = [&](VF nearer, float before_px) {
-    return hn::And(hn::Le(nearer, Constant(before_px * view.pixel)),
-                   hn::Ge(nearer, Constant(-kBehindPx * view.pixel)));
-  };
-  MF found = hn::And(hn::Gt(first, zero), within(hn::Sub(first, surface), kFirstBeforePx));
-  if (hn::AllFalse(d, found)) return zero;
-  const Position position = PositionAt(view, base, hn::IfThenElseZero(found, first));
-  found = hn::And(found, position.on_map);
-
-  const VF low_x = hn::Floor(hn::Sub(position.x, half)),
-           low_y = hn::Floor(hn::Sub(position.y, half));
-  const VF u = hn::Sub(hn::Sub(position.x, half), low_x);
-  const VF v = hn::Sub(hn::Sub(position.y, half), low_y);
-  const FourSamples s =
-      SamplesAt(view, IndexOf(view, hn::ConvertTo(DI(), low_x), hn::ConvertTo(DI(), low_y)));
-  const VF lowest = hn::Min(hn::Min(s.a, s.b), hn::Min(s.c, s.d));
-  const VF highest = hn::Max(hn::Max(s.a, s.b), hn::Max(s.c, s.d));
-  const VF factor = Constant(view.depth_factor);
-  const MF whole = hn::And(hn::Gt(lowest, zero), hn::Le(hn::Mul(factor, hn::Sub(highest, lowest)),
-                                                        Constant(view.depth_break)));
-  const VF top = Lerp(s.a, s.b, u), bottom = Lerp(s.c, s.d, u);
-  const MF left = hn::Lt(u, half), upper = hn::Lt(v, half);
-  const VF nearest =
-      hn::IfThenElse(upper, hn::IfThenElse(left, s.a, s.b), hn::IfThenElse(left, s.c, s.d));
-  const VF stored = hn::IfThenElse(whole, Lerp(top, bottom, v), nearest);
-  const VF slope_x =
-      hn::IfThenElseZero(whole, hn::Mul(factor, Lerp(hn::Sub(s.b, s.a), hn::Sub(s.d, s.c), v)));
-  const VF slope_y = hn::IfThenElseZero(whole, hn::Mul(factor, hn::Sub(bottom, top)));
-  const VF own = hn::MulAdd(stored, factor, Constant(view.depth_offset));
-
-  // The view's own 1/z at grid point q is w / q.z, so that plane . q = w on the tangent plane.
-  const VF rest = hn::NegMulAdd(slope_y, position.y, hn::NegMulAdd(slope_x, position.x, own));
-  const VF away_x = Constant(view.grid_x[3]), away_y = Constant(view.grid_y[3]);
-  const VF away_z = Constant(view.grid_z[3]);
-  const VF facing = hn::NegMulAdd(
-      slope_x, away_x, hn::NegMulAdd(slope_y, away_y, hn::NegMulAdd(rest, away_z, Constant(1))));
-  const VF w = hn::Div(
-      hn::MulAdd(slope_x, base.x, hn::MulAdd(slope_y, base.y, hn::Mul(rest, base.z))), facing);
-  const VF z = hn::MulAdd(w, away_z, base.z);
-  // The first step took the nearest sample flat: half a sample's slope is its error.
-  const VF room = hn::MulAdd(half, hn::Add(hn::Abs(slope_x), hn::Abs(slope_y)),
-                             Constant(kSettledPx * view.pixel));
-  found = hn::And(found, hn::And(hn::Gt(stored, zero), hn::Gt(facing, zero)));
-  found = hn::And(found, hn::And(hn::Ge(w, Constant(kLeast)), hn::Le(w, Constant(kMost))));
-  found = hn::And(found, within(hn::Sub(w, surface), kBeforePx));
-  found = hn::And(found, hn::And(hn::Le(hn::Abs(hn::Sub(w, first)), room), hn::Gt(z, zero)));
+  const Position position = PositionAt(view, base, surface);
+  if (hn::AllFalse(d, position.on_map)) return hn::Zero(d);
+  const VF w = Meet(view, base, position, PatchAt(view, position));
+  const VF nearer = hn::Sub(w, surface);
+  const VF z = hn::MulAdd(w, Constant(view.grid_z[3]), base.z);
+  MF found = hn::And(hn::Gt(w, hn::Zero(d)), hn::Gt(z, hn::Zero(d)));
+  found = hn::And(found, hn::And(hn::Le(nearer, Constant(kBeforePx * view.pixel)),
+                                 hn::Ge(nearer, Constant(-kBehindPx * view.pixel))));
   const VF per_z = hn::Div(Constant(1), z);
-  const VF x = hn::Mul(hn::MulAdd(w, away_x, base.x), per_z);
-  const VF y = hn::Mul(hn::MulAdd(w, away_y, base.y), per_z);
+  const VF x = hn::Mul(hn::MulAdd(w, Constant(view.grid_x[3]), base.x), per_z);
+  const VF y = hn::Mul(hn::MulAdd(w, Constant(view.grid_y[3]), base.y), per_z);
   hn::Store(hn::IfThenElseZero(found, hn::MulAdd(x, Constant(view.image_per_sample[0]),
                                                  Constant(view.image_offset[0]))),
             d, image_x);
@@ -321,32 +329,32 @@ HWY_INLINE void PrefetchAround(const PixelView& view, const Position& position) 
   }
 }
 
-/// SPEC 5.2. Leaves the first steps from the surface that is held, which it returns; 0 where none
-/// is.
+/// SPEC 5.2: the surface that is held; 0 where none is.
 HWY_INLINE VF HeldSurface(const PixelRow& row, std::span<const PixelView> views, VF ray_x,
-                          float ray_y, VF ray_squared, VF surface, Group* group) {
+                          float ray_y, VF ray_squared, VF surface) {
   const DF d;
   const VF zero = hn::Zero(d);
+  VF held = zero;
   MF asked = hn::Gt(surface, zero);
   for (int tried = 0; tried < kTriedSurfaces && !hn::AllFalse(d, asked); ++tried) {
-    Votes votes{zero, zero, zero};
-    for (size_t i = 0; i < views.size(); ++i) {
-      const RayOnGrid base(views[i], ray_x, ray_y);
-      const Position position = PositionAt(views[i], base, surface);
-      const MF on_map = position.on_map;
-      if (tried == 0 && !hn::AllFalse(d, on_map)) PrefetchAround(views[i], position);
-      const VF seen = FirstStep(views[i], base, position);
-      const VF kept = tried == 0 ? zero : hn::Load(d, group->inverse_depth[i]);
-      hn::Store(hn::IfThenElse(asked, seen, kept), d, group->inverse_depth[i]);
-      if (hn::AllFalse(d, on_map)) continue;
-      const VF say = SayAt({views[i], ray_x, ray_y, ray_squared, surface}, row.pixel_angle_rad);
-      AddVote(views[i], surface, seen, hn::IfThenElseZero(on_map, say), &votes);
+    Votes votes{zero, zero, zero, zero};
+    for (const PixelView& view : views) {
+      const RayOnGrid base(view, ray_x, ray_y);
+      const Position position = PositionAt(view, base, surface);
+      if (hn::AllFalse(d, position.on_map)) continue;
+      if (tried == 0) PrefetchAround(view, position);
+      const Patch patch = PatchAt(view, position);
+      const VF seen = Meet(view, base, position, patch);
+      const VF say = SayAt({view, ray_x, ray_y, ray_squared, surface}, row.pixel_angle_rad);
+      AddVote(view, surface, seen, patch.whole, hn::IfThenElseZero(position.on_map, say), &votes);
     }
-    const MF refused = hn::AndNot(hn::Ge(votes.held, votes.refused), asked);
-    surface = hn::IfThenElse(refused, votes.behind, surface);
-    asked = hn::And(refused, hn::Gt(votes.behind, zero));
+    const MF holds = hn::And(asked, hn::Ge(votes.held, votes.refused));
+    const VF front = hn::IfThenElse(hn::Gt(votes.front, zero), votes.front, surface);
+    held = hn::IfThenElse(holds, front, held);
+    surface = votes.behind;
+    asked = hn::And(hn::AndNot(holds, asked), hn::Gt(surface, zero));
   }
-  return hn::IfThenElse(asked, zero, surface);  // those refused to the end are not held
+  return held;
 }
 
 struct Pixels {
@@ -362,15 +370,14 @@ HWY_INLINE Pixels ResolveGroup(const PixelRow& row, std::span<const PixelView> v
   const float ray_y = (row.y - row.cy) * row.inverse_fy;
   const VF ray_squared = hn::MulAdd(ray_x, ray_x, Constant(ray_y * ray_y + 1));
   const Pixels none{hn::Zero(DU()), hn::Zero(DU()), zero};
-  surface = HeldSurface(row, views, ray_x, ray_y, ray_squared, surface, group);
+  surface = HeldSurface(row, views, ray_x, ray_y, ray_squared, surface);
   const MF held = hn::Gt(surface, zero);
   if (hn::AllFalse(d, held)) return none;
 
   // SPEC 5.3 and 4.2.
   VF front = zero, border = Constant(kFar);
   for (size_t i = 0; i < views.size(); ++i) {
-    const VF first = hn::IfThenElseZero(held, hn::Load(d, group->inverse_depth[i]));
-    const VF w = SecondStep(views[i], {views[i], ray_x, ray_y}, surface, first, group->image_x[i],
+    const VF w = FragmentAt(views[i], {views[i], ray_x, ray_y}, surface, group->image_x[i],
                             group->image_y[i]);
     hn::Store(w, d, group->inverse_depth[i]);
     front = hn::Max(front, w);

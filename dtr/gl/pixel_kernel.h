@@ -19,9 +19,12 @@ struct PixelView {
   const std::uint16_t* codes;
   const float* values;
   int stride;
+  /// A bit for the block right of and below each of these samples: IsWholeBlock.
+  const std::uint32_t* whole_blocks;
   float depth_offset, depth_factor;
-  float depth_break, pixel, delta;  ///< differences of 1/z: SPEC 2.3, 0.3, 4.2
-  float cut_factor;                 ///< SPEC 1.4
+  float pixel, delta;  ///< differences of 1/z: SPEC 0.3, 4.2
+  float level_range;   ///< blocks whose samples differ by no more are whole; below 0: ask the bits
+  float cut_factor;    ///< SPEC 1.4
   /// SampledImage; in its pixels, the centre of the first at 0, a grid position is at
   /// image_per_sample * position + image_offset.
   const std::uint32_t* rgba;

@@ -47,10 +47,12 @@ PixelView PlaceView(const View& view, const ViewPlacement& placed, double cut_fa
   out.columns = sampled.columns, out.rows = sampled.rows, out.stride = sampled.columns + 2;
   out.codes = sampled.codes.empty() ? nullptr : sampled.codes.data();
   out.values = sampled.values.data();
+  out.whole_blocks = sampled.whole_blocks.data();
   out.depth_offset = static_cast<float>(sampled.depth_offset);
   out.depth_factor = static_cast<float>(sampled.depth_factor);
   const InverseDepthThresholds thresholds = ThresholdsOf(view, options);
-  out.depth_break = static_cast<float>(thresholds.depth_break);
+  out.level_range =
+      options.absolute_depth_break ? -1.0f : static_cast<float>(thresholds.depth_break);
   out.pixel = static_cast<float>(thresholds.pixel);
   out.delta = static_cast<float>(thresholds.delta);
   out.cut_factor = static_cast<float>(cut_factor);

@@ -49,7 +49,7 @@ ViewBlock BlockOf(const View& view, const ViewPlacement& placed, double cut_fact
   const InverseDepthThresholds thresholds = ThresholdsOf(view, options);
   block.limits = Row({static_cast<double>(view.image.width()),
                       static_cast<double>(view.image.height()), thresholds.delta},
-                     thresholds.depth_break);
+                     0);
   block.stored_depth = {0, static_cast<float>(1 / placed.near_z),
                         static_cast<float>(thresholds.pixel), static_cast<float>(cut_factor)};
   return block;
@@ -65,6 +65,7 @@ void SetDepthGrid(const View& view, const ViewStore::Deferred& deferred, const L
                          centre(camera.cy_px()));
   block.stored_depth[0] = static_cast<float>(deferred.depth_offset);
   block.stored_depth[1] = static_cast<float>(deferred.depth_factor);
+  block.limits[3] = static_cast<float>(deferred.largest_bits);
   block.depth_slot = {slot, deferred.depth.layer, 0, 0};
   block.map = Row({1.0 / layer.width_px, 1.0 / layer.height_px, 0.5 * deferred.columns},
                   0.5 * deferred.rows);

@@ -28,7 +28,21 @@ std::vector<T> WithBorder(const std::vector<T>& grid, int columns, int rows) {
   return bordered;
 }
 
-SampledView Sample(const View& view, int resolution) {
+/// A bit per sample of the grid with its border.
+std::vector<std::uint32_t> WholeBlocks(const Grid<double>& w, const BreakRule& breaks) {
+  const size_t stride = static_cast<size_t>(w.width()) + 2;
+  std::vector<std::uint32_t> bits((stride * (static_cast<size_t>(w.height()) + 2) + 31) / 32);
+  for (int y = -1; y < w.height(); ++y) {
+    for (int x = -1; x < w.width(); ++x) {
+      if (!IsWholeBlock(w, x, y, breaks)) continue;
+      const size_t bit = static_cast<size_t>(y + 1) * stride + static_cast<size_t>(x + 1);
+      bits[bit / 32] |= std::uint32_t{1} << (bit % 32);
+    }
+  }
+  return bits;
+}
+
+SampledView Sample(const View& view, int resolution, const BreakRule& breaks) {
   const SampleGrid grid = MakeSampleGrid(view, resolution);
   const Grid<double>& w = grid.inverse_depth;
   SampledView sampled;
@@ -41,6 +55,7 @@ SampledView Sample(const View& view, int resolution) {
   sampled.depth_offset = depth.offset;
   // StoredDepth reads codes as shares of the largest.
   sampled.depth_factor = depth.codes.empty() ? depth.factor : depth.factor / UINT16_MAX;
+  sampled.whole_blocks = WholeBlocks(w, breaks);
   sampled.rgba = SampledImage(view);
   return sampled;
 }
@@ -52,10 +67,13 @@ void SampledViews::Prepare(const std::vector<const View*>& views, const RenderOp
   std::vector<const View*> missing_views;
   for (const View* view : views) {
     Stored& stored = views_[view];
-    const Stored wanted{
-        options.resolution, view->image.data().data(), view->depth.grid().data().data(), {}};
-    if (stored.resolution == wanted.resolution && stored.image_data == wanted.image_data &&
-        stored.depth_data == wanted.depth_data) {
+    const Stored wanted{options.resolution,
+                        BreakRuleOf(*view, options),
+                        view->image.data().data(),
+                        view->depth.grid().data().data(),
+                        {}};
+    if (stored.resolution == wanted.resolution && stored.breaks == wanted.breaks &&
+        stored.image_data == wanted.image_data && stored.depth_data == wanted.depth_data) {
       continue;
     }
     stored = wanted;
@@ -64,7 +82,7 @@ void SampledViews::Prepare(const std::vector<const View*>& views, const RenderOp
   }
   ParallelFor(0, static_cast<int>(missing.size()), options.threads, [&](int i) {
     const auto k = static_cast<size_t>(i);
-    missing[k]->sampled = Sample(*missing_views[k], options.resolution);
+    missing[k]->sampled = Sample(*missing_views[k], missing[k]->resolution, missing[k]->breaks);
   });
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dtr/render/options.h"
+#include "dtr/render/triangulation.h"
 #include "dtr/types/view.h"
 
 namespace dtr::gl {
@@ -17,14 +18,16 @@ struct SampledView {
       offset = 0;                    ///< of the grid of samples; columns 0: none left
   std::vector<std::uint16_t> codes;  ///< one of the two
   std::vector<float> values;
+  std::vector<std::uint32_t> whole_blocks;    ///< as PixelView has them
   double depth_offset = 0, depth_factor = 1;  ///< 1/z from a code or a value
   std::vector<std::uint8_t> rgba;             ///< SampledImage
   size_t bytes() const {
-    return codes.size() * sizeof(codes[0]) + values.size() * sizeof(values[0]) + rgba.size();
+    return codes.size() * sizeof(codes[0]) + values.size() * sizeof(values[0]) +
+           whole_blocks.size() * sizeof(whole_blocks[0]) + rgba.size();
   }
 };
 
-/// Keeps one per view; another resolution replaces it.
+/// Keeps one per view; another resolution or rule of depth breaks replaces it.
 class SampledViews {
  public:
   /// Makes the missing ones of several views, on all cores.
@@ -39,6 +42,7 @@ class SampledViews {
  private:
   struct Stored {
     int resolution = 0;
+    BreakRule breaks;
     const void *image_data = nullptr, *depth_data = nullptr;
     SampledView sampled;
   };

@@ -15,14 +15,10 @@ namespace {
 // transformed vertices that drivers have (llvmpipe: 256; a row of the whole map fits none).
 constexpr int kTileBlocks = 12;
 
-BreakRule RuleOf(const View& view, const RenderOptions& options) {
-  return {ThresholdsOf(view, options).depth_break, options.absolute_depth_break};
-}
-
 class MeshMaker {
  public:
   MeshMaker(const View& view, const RenderOptions& options)
-      : samples_(MakeSampleGrid(view, options.resolution)), rule_(RuleOf(view, options)) {}
+      : samples_(MakeSampleGrid(view, options.resolution)), rule_(BreakRuleOf(view, options)) {}
 
   ViewMesh Make() {
     const Grid<double>& w = samples_.inverse_depth;
@@ -106,7 +102,7 @@ ViewMesh MakeViewMesh(const View& view, const RenderOptions& options) {
 
 std::vector<float> MakeSplats(const View& view, const RenderOptions& options) {
   const SampleGrid samples = MakeSampleGrid(view, options.resolution);
-  const BreakRule rule = RuleOf(view, options);
+  const BreakRule rule = BreakRuleOf(view, options);
   const Grid<double>& w = samples.inverse_depth;
   std::vector<float> splats;
   splats.reserve(5 * w.data().size());

@@ -176,10 +176,11 @@ void ViewStore::PrepareDeferred(const std::vector<const View*>& views, const Ren
   std::vector<const View*> missing;
   for (const View* view : views) {
     const auto& deferred = Find(*view).deferred;
-    const bool there = deferred && deferred->first == key &&
-                       (deferred->second.columns == 0 ||
-                        SizeOf(deferred->second.depth) ==
-                            sizes.LayerFor({deferred->second.columns, deferred->second.rows}));
+    const bool there =
+        deferred && deferred->first == key &&
+        (deferred->second.columns == 0 ||
+         SizeOf(deferred->second.depth) ==
+             sizes.LayerFor(DepthPictureSize(deferred->second.columns, deferred->second.rows)));
     if (!there) missing.push_back(view);
   }
   std::vector<SampleGrid> grids(missing.size());
@@ -189,6 +190,10 @@ void ViewStore::PrepareDeferred(const std::vector<const View*>& views, const Ren
     const View& view = *missing[k];
     grids[k] = MakeSampleGrid(view, options.resolution);
     depths[k] = StoreDepth(view, grids[k]);
+    const Grid<double>& w = grids[k].inverse_depth;
+    const BreakRule breaks = BreakRuleOf(view, options);
+    if (!depths[k].codes.empty()) depths[k].codes = DepthPicture(depths[k].codes, w, breaks);
+    if (!depths[k].values.empty()) depths[k].values = DepthPicture(depths[k].values, w, breaks);
   });
   for (size_t k = 0; k < missing.size(); ++k) {
     const View& view = *missing[k];
@@ -201,11 +206,15 @@ void ViewStore::PrepareDeferred(const std::vector<const View*>& views, const Ren
     if (!w.empty()) {
       const bool coded = !depths[k].codes.empty();
       deferred.depth_offset = depths[k].offset, deferred.depth_factor = depths[k].factor;
-      const LayerSize size{w.width(), w.height()};
-      deferred.depth = coded ? Put(view, depths[k].codes.data(),
-                                   {GL_R16, GL_RED, GL_UNSIGNED_SHORT, 1}, size, sizes, new_layers)
-                             : Put(view, depths[k].values.data(), {GL_R32F, GL_RED, GL_FLOAT, 1},
-                                   size, sizes, new_layers);
+      const LayerSize size = DepthPictureSize(w.width(), w.height());
+      if (coded) {
+        deferred.largest_bits = UINT16_MAX;
+        deferred.depth = Put(view, depths[k].codes.data(), {GL_R16, GL_RED, GL_UNSIGNED_SHORT, 1},
+                             size, sizes, new_layers);
+      } else {
+        deferred.depth = Put(view, depths[k].values.data(), {GL_R32F, GL_RED, GL_FLOAT, 1}, size,
+                             sizes, new_layers);
+      }
     }
     stored.deferred.emplace(key, std::move(deferred));
     grids[k] = {};

@@ -41,6 +41,7 @@ class ViewStore {
   struct Deferred {
     ImageSlot depth;
     double depth_offset = 0, depth_factor = 1;        ///< StoredDepth: 1/z from a texel
+    double largest_bits = 1;                          ///< what a texel of 1 stands for as a number
     int columns = 0, rows = 0, step = 1, offset = 0;  ///< of the grid of samples
   };
   /// After PrepareDeferred with the same options; null where R leaves no sample.

@@ -277,7 +277,7 @@ class MeshMaker {
 
 MeshRule MeshRuleOf(const View& view, const RenderOptions& options) {
   const InverseDepthThresholds thresholds = ThresholdsOf(view, options);
-  return {{thresholds.depth_break, options.absolute_depth_break}, thresholds.mesh_tolerance};
+  return {BreakRuleOf(view, options), thresholds.mesh_tolerance};
 }
 
 AdaptiveMesh MakeAdaptiveMesh(const SampleGrid& samples, const BreakRule& rule,

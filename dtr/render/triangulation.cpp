@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dtr/render/scene.h"
+
 namespace dtr {
 namespace {
 
@@ -51,6 +53,10 @@ SampleGrid MakeSampleGrid(const View& view, int resolution) {
     }
   }
   return samples;
+}
+
+BreakRule BreakRuleOf(const View& view, const RenderOptions& options) {
+  return {ThresholdsOf(view, options).depth_break, options.absolute_depth_break};
 }
 
 bool EdgeBreaks(const Grid<double>& inverse_depth, int x, int y, int dx, int dy,
@@ -105,6 +111,18 @@ BlockTriangles TrianglesOfBlock(const Grid<double>& inverse_depth, int x, int y,
     if (cd && ac) triangles.corners[1] = kA | kD | kC;
   }
   return triangles;
+}
+
+bool IsWholeBlock(const Grid<double>& inverse_depth, int x, int y, const BreakRule& rule) {
+  const int left = std::max(x, 0), right = std::min(x + 1, inverse_depth.width() - 1);
+  const int top = std::max(y, 0), bottom = std::min(y + 1, inverse_depth.height() - 1);
+  if (left < right && top < bottom) {
+    const BlockTriangles triangles = TrianglesOfBlock(inverse_depth, left, top, rule);
+    return triangles.corners[0] != 0 && triangles.corners[1] != 0;
+  }
+  if (!(inverse_depth(left, top) > 0 && inverse_depth(right, bottom) > 0)) return false;
+  if (left == right && top == bottom) return true;
+  return !EdgeBreaks(inverse_depth, left, top, right - left, bottom - top, rule);
 }
 
 }  // namespace dtr

@@ -29,6 +29,7 @@ struct BreakRule {
   std::optional<double> absolute_depth;  ///< the report's: largest difference of z, scene units
   bool operator==(const BreakRule&) const = default;
 };
+BreakRule BreakRuleOf(const View& view, const RenderOptions& options);
 
 /// SPEC 2.3. True when the edge from sample (x, y) to (x + dx, y + dy), neither of them empty,
 /// crosses a depth break. Differences of inverse depth up to the threshold never break; a steeper
@@ -48,5 +49,10 @@ struct BlockTriangles {
 };
 BlockTriangles TrianglesOfBlock(const Grid<double>& inverse_depth, int x, int y,
                                 const BreakRule& rule);
+
+/// SPEC 5.3. True when the samples of a block belong to one surface: both its triangles are drawn.
+/// x from -1 to width - 1 and y likewise: around the grid its outermost samples stand once more, so
+/// that a block there is an edge or a single sample.
+bool IsWholeBlock(const Grid<double>& inverse_depth, int x, int y, const BreakRule& rule);
 
 }  // namespace dtr

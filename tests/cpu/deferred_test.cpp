@@ -74,23 +74,48 @@ TEST(FindOwnFragments, AnotherSurfaceAHoleAndWhatLiesOffTheMapGiveNone) {
   EXPECT_NEAR(pair.Fragment(41, 30, w), w, 1e-8);
 }
 
-TEST(FindOwnFragments, WhatDoesNotSettleIsNone) {
-  // Every other column of the map lies 0.4 px of disparity nearer and breaks are finer than that:
-  // from 2.5 to the side that is one column, so that each step lands where the next is sent back.
-  Pair pair(Plane({0, 0, 1}, 10), {2.5, 0, 0});
+TEST(FindOwnFragments, FollowsSlopesSteeperThanTheDepthBreak) {
+  // w changes by a pixel of disparity from column to column, twice the depth break: the nearest
+  // sample alone would be off by up to half of that. A straight run is one surface (SPEC 2.3).
+  constexpr double kLeft = 1e-7;  // float32 depth: 2^-24 of w, which is below 1
+  Pair pair(Plane({0, 0, 1}, 10), {0.05, 0, 0});
+  const auto truth_at = [](double column) { return 0.1 + kPixelOfDisparity * column; };
   for (int y = 0; y < 72; ++y) {
-    for (int x = 0; x < 96; x += 2) pair.view.depth(x, y) = static_cast<float>(1 / 0.104);
+    for (int x = 0; x < 96; ++x) pair.view.depth(x, y) = static_cast<float>(1 / truth_at(x));
   }
   RenderOptions fine;
-  fine.depth_break_px = 0.1;
-  int settled = 0, none = 0;
-  for (int x = 20; x < 60; ++x) {
-    const double w = pair.Fragment(x, 30, 0.104, fine);
-    none += w == 0;
-    settled += std::abs(w - 0.1) < 1e-7 || std::abs(w - 0.104) < 1e-7;
+  fine.depth_break_px = 0.5;
+  int found = 0;
+  for (int x = 20; x < 80; ++x) {
+    // The pixel's ray meets w = 0.1 + 0.01 u at u = x + 5 w, u from the first sample's centre.
+    const double w = (0.1 + kPixelOfDisparity * x) / (1 - 5 * kPixelOfDisparity);
+    const double fragment = pair.Fragment(x, 30, w, fine);
+    EXPECT_NEAR(fragment, w, kLeft) << x;
+    found += fragment > 0;
   }
-  EXPECT_EQ(none + settled, 40);
-  EXPECT_GT(none, 10);
+  EXPECT_EQ(found, 60);
+}
+
+TEST(KeepSurfacesThatViewsHold, PutsASurfaceWhereTheViewsPatchHasIt) {
+  // As in RefinesAWrongStartToTheViewsOwnSurface: what is left of the start's error is 0.015 of it.
+  const Surface plane = Plane({-0.3, 0, 1}, 10);
+  const Pair pair(plane, {0.5, 0, 0});
+  const Band band{pair.novel.width_px(), 0, pair.novel.height_px()};
+  const auto pixel = static_cast<size_t>(30 * band.width_px + 40);
+  const double truth = 1 / plane({0.5, 0, 0}, pair.novel.RayFromPixel({40.5, 30.5}));
+  const auto held = [&](double wrong_px) {
+    std::vector<double> surfaces(static_cast<size_t>(band.width_px * band.rows), 0.0);
+    surfaces[pixel] = truth + wrong_px * kPixelOfDisparity;
+    KeepSurfacesThatViewsHold({&pair.in_novel, 1}, pair.novel, {}, band, surfaces);
+    return surfaces[pixel];
+  };
+  for (const double wrong_px : {-0.45, 0.0, 0.45, 1.9}) {
+    EXPECT_NEAR(held(wrong_px), truth, 1e-8) << wrong_px;  // float32 depth
+  }
+  // Held by the view, but it lies more than half a pixel before the surface: that stays.
+  EXPECT_EQ(held(-0.9), truth - 0.9 * kPixelOfDisparity);
+  EXPECT_EQ(held(-1.1), truth - 1.1 * kPixelOfDisparity);  // no say at all
+  EXPECT_NEAR(held(2.1), truth, 1e-8);  // seen through: the view's own takes its place
 }
 
 TEST(FindOwnFragments, DepthIsNeverMixedAcrossABreak) {

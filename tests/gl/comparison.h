@@ -27,10 +27,9 @@ struct Comparison {
   double undecided_share() const { return Share(undecided, judged + undecided); }
   double apart_share() const { return Share(apart, compared); }
   double coverage_share() const { return Share(coverage_apart, judged); }
-  /// `factor` times the shares, for pictures of which little is judged.
-  bool Holds(double factor = 1) const {
-    return apart_share() <= factor * kApartShare && coverage_share() <= factor * kCoverageShare &&
-           border_share() <= kBorderShare && undecided_share() <= factor * kBorderShare;
+  bool Holds() const {
+    return apart_share() <= kApartShare && coverage_share() <= kCoverageShare &&
+           border_share() <= kBorderShare && undecided_share() <= kBorderShare;
   }
   void Add(const Comparison& o) {
     compared += o.compared, apart += o.apart, judged += o.judged;

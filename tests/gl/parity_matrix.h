@@ -36,10 +36,6 @@ inline Comparison ExpectParity(gl::Renderer& renderer, const NamedScene& scene,
   return Compare(expected, found, StrictestBreaks(views, options), undecided);
 }
 
-/// Every R-th sample alone, most of a picture lies near a depth break, and the nearest samples that
-/// SPEC 5.3 takes on slopes are steps, on which the start decides: 0.30 % apart, 2.2 % undecided.
-inline constexpr double kCoarseDeferredFactor = 2.5;
-
 /// Resolutions 1, 2, 4 x all weights of one method and primitive, `views` blended; every one must
 /// hold, and their sum. Prints a line.
 inline void ExpectParityOf(gl::Renderer& renderer, const NamedScene& scene, RenderMethod method,
@@ -55,10 +51,8 @@ inline void ExpectParityOf(gl::Renderer& renderer, const NamedScene& scene, Rend
       options.blend = blend;
       options.views = views;
       const Comparison c = ExpectParity(renderer, scene, options);
-      const bool coarse = method == RenderMethod::kDeferred && resolution > 1;
-      EXPECT_TRUE(c.Holds(coarse ? kCoarseDeferredFactor : 1))
-          << scene.name << " " << what << " R" << resolution << " weight "
-          << static_cast<int>(blend) << ": " << c.Text();
+      EXPECT_TRUE(c.Holds()) << scene.name << " " << what << " R" << resolution << " weight "
+                             << static_cast<int>(blend) << ": " << c.Text();
       all.Add(c);
     }
   }

@@ -281,12 +281,13 @@ TEST(LayerSizes, AreTheViewsOwnWhereTheseAreFewAndElseFewAndLargeEnough) {
     std::set<LayerSize> images, depths;
     for (const View* view : views) {
       const LayerSize image{view->image.width(), view->image.height()};
-      const LayerSize layer = few.LayerFor(image), depth = SamplesOf(*view, resolution);
+      const LayerSize layer = few.LayerFor(image), depth = DepthPictureSize(*view, resolution);
       EXPECT_GE(layer.width_px, image.width_px);
       EXPECT_GE(layer.height_px, image.height_px);
       EXPECT_GE(few.LayerFor(depth).width_px, depth.width_px);
       const SampleGrid samples = MakeSampleGrid(*view, resolution);
-      EXPECT_EQ(depth, (LayerSize{samples.inverse_depth.width(), samples.inverse_depth.height()}));
+      EXPECT_EQ(depth,
+                DepthPictureSize(samples.inverse_depth.width(), samples.inverse_depth.height()));
       images.insert(layer);
       depths.insert(few.LayerFor(depth));
     }

@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "dtr/gl/layer_sizes.h"
 #include "dtr/types/inverse_depth_code.h"
 #include "tests/gl/gl_testing.h"
 
@@ -85,6 +86,40 @@ TEST(StoredDepth, WhatCodesCannotHoldStaysFloat) {
   view.depth_coding = DepthCoding::kPng16InverseDepth;
   view.near_z = view.far_z = 0;  // a view that never was on disk
   EXPECT_TRUE(StoreDepth(view, samples).codes.empty());
+}
+
+TEST(DepthPicture, HasTheEdgeOnceMoreAndThenABitPerBlock) {
+  Grid<double> w(19, 35);
+  std::vector<float> values;
+  Random random(5);
+  for (int y = 0; y < 35; ++y) {
+    for (int x = 0; x < 19; ++x) {
+      w(x, y) = random.Uniform(0, 1) < 0.1 ? 0 : random.Uniform(1, 1.02);
+      values.push_back(static_cast<float>(w(x, y)));
+    }
+  }
+  const BreakRule rule{0.01, std::nullopt};
+  const std::vector<float> picture = DepthPicture(values, w, rule);
+  const LayerSize size = DepthPictureSize(19, 35);
+  ASSERT_EQ(size, (LayerSize{20, 36 + 3}));
+  ASSERT_EQ(picture.size(), 20u * 39u);
+  const auto at = [&](int x, int y) { return picture[static_cast<size_t>(y * 20 + x)]; };
+  int whole = 0;
+  for (int y = -1; y < 35; ++y) {
+    for (int x = -1; x < 19; ++x) {
+      if (x >= 0 && y >= 0) {
+        EXPECT_EQ(at(x, y), static_cast<float>(w(x, y)));
+      }
+      const auto bits = static_cast<unsigned>(at(x + 1, 36 + (y + 1) / 16));
+      EXPECT_EQ(bits >> ((y + 1) % 16) & 1, IsWholeBlock(w, x, y, rule) ? 1u : 0u) << x << " " << y;
+      whole += IsWholeBlock(w, x, y, rule);
+    }
+  }
+  EXPECT_GT(whole, 50);
+  EXPECT_LT(whole, 650);
+  EXPECT_EQ(at(19, 7), at(18, 7));
+  EXPECT_EQ(at(3, 35), at(3, 34));
+  EXPECT_EQ(at(19, 35), at(18, 34));
 }
 
 TEST_F(StoredDepthPicture, IsThatOfFloatDepth) {

@@ -96,6 +96,32 @@ TEST(TrianglesOfBlock, ACornerAcrossAStepIsCutOff) {
   EXPECT_EQ(triangles.corners[1], 0);
 }
 
+TEST(IsWholeBlock, WhereBothTrianglesAreDrawnAndAlongTheBorder) {
+  // Straight and steep along x, a step of 30 before row 4, a hole in the last column.
+  Grid<double> grid(6, 6);
+  for (int y = 0; y < 6; ++y) {
+    for (int x = 0; x < 6; ++x) grid(x, y) = 10 + 5 * x + (y < 4 ? 0 : 30);
+  }
+  grid(5, 1) = 0;
+  const BreakRule rule{1, std::nullopt};
+  EXPECT_TRUE(IsWholeBlock(grid, 0, 0, rule));
+  EXPECT_TRUE(IsWholeBlock(grid, 2, 2, rule));
+  EXPECT_FALSE(IsWholeBlock(grid, 2, 3, rule));  // across the step
+  EXPECT_FALSE(IsWholeBlock(grid, 4, 0, rule));  // the hole
+  EXPECT_FALSE(IsWholeBlock(grid, 4, 1, rule));
+  EXPECT_TRUE(IsWholeBlock(grid, 0, 0, BreakRule{0, 0.04}));
+  EXPECT_FALSE(IsWholeBlock(grid, 0, 0, BreakRule{0, 0.03}));  // 1/10 - 1/15
+  // Around the grid: edges and single samples.
+  EXPECT_TRUE(IsWholeBlock(grid, -1, 2, rule));
+  EXPECT_FALSE(IsWholeBlock(grid, -1, 3, rule));
+  EXPECT_TRUE(IsWholeBlock(grid, 1, -1, rule));
+  EXPECT_FALSE(IsWholeBlock(grid, 5, 0, rule));
+  EXPECT_TRUE(IsWholeBlock(grid, 5, 5, rule));
+  EXPECT_TRUE(IsWholeBlock(grid, -1, -1, rule));
+  grid(0, 0) = 0;
+  EXPECT_FALSE(IsWholeBlock(grid, -1, -1, rule));
+}
+
 TEST(MakeSampleGrid, TakesTheMiddleOfEveryRPixels) {
   View view;
   view.camera = PinholeCamera(7, 5, 10, 10, 3.5, 2.5);

@@ -1,11 +1,12 @@
 // SPEC 5.2, 5.3: what a view's full-resolution depth map says of a surface at a pixel, and the
-// view's own fragment there. Expects `depths`, an array of sampler2DArray with one value per sample
-// (0: none) that a view's OwnMap turns into 1/z, filtered to the nearest and clamped to the edge or
-// with the edge once more.
+// view's own fragment there. Expects `depths`, an array of sampler2DArray laid out as DepthPicture
+// (dtr/gl/stored_depth.h) says: one value per sample (0: none) that a view's OwnMap turns into 1/z,
+// the last row and column once more, then which blocks are whole. Filtered to the nearest.
 // No branch: software rasterisers run both sides of one anyway.
 struct OwnMap {
   vec4 grid;    // 1 / width, 1 / height of the layer; columns / 2, rows / 2 of the samples in it
-  vec4 stored;  // 1/z of a stored value v: x + y v; depth break and pixel of disparity (of 1/z)
+  vec3 stored;  // 1/z of a stored value v: x + y v; z: a pixel of disparity (of 1/z)
+  float largest_bits;  // what 1.0 stands for where values are bits
   int slot;     // of depths
   int layer;    // in it
 };
@@ -13,16 +14,13 @@ struct OwnMap {
 // SPEC 5.2: what the views say of a surface.
 struct Votes {
   float held, refused;
+  float front;   // 1/z of the nearest whole patch of those that hold it; 0: none
   float behind;  // 1/z of the nearest surface that a view sees through it; 0: none
 };
 
-const float kFirstBeforePx = 1.0, kBeforePx = 0.5, kBehindPx = 2.0, kSettledPx = 0.25;
+const float kHeldBeforePx = 1.0, kBeforePx = 0.5, kBehindPx = 2.0;
 const float kHoleSay = 0.25;
 const int kTriedSurfaces = 3;
-
-bool IsWithin(OwnMap map, float nearer, float before_px) {
-  return nearer <= before_px * map.stored.w && nearer >= -kBehindPx * map.stored.w;
-}
 
 // On the map, whose first sample's centre is at 0.5; `q`: position, homogeneous.
 bool IsOnMap(OwnMap map, vec3 q, vec2 position) {
@@ -35,47 +33,28 @@ bool IsOnMap(OwnMap map, vec3 q, vec2 position) {
 #define DEPTHS(map) depths[map.slot]
 #endif
 
+// SPEC 5.3: the four samples right of and below `low` belong together.
+bool IsWholeBlock(OwnMap map, vec2 low) {
+  ivec2 block = ivec2(low) + 1;
+  int first_row = int(2.0 * map.grid.w) + 1;
+  ivec3 texel = ivec3(block.x, first_row + block.y / 16, map.layer);
+  uint bits = uint(texelFetch(DEPTHS(map), texel, 0).r * map.largest_bits + 0.5);
+  return (bits >> uint(block.y % 16) & 1u) != 0u;
+}
+
 // At inverse depth w the pixel's ray is at (base + away w) on the view's grid of samples,
-// homogeneous. The first step from `surface`: the inverse depth in the novel camera at which the
-// ray meets the nearest sample, taken flat; 0: there is none. `on_map`: the view looks there at all.
-float FirstStep(OwnMap map, vec3 base, vec3 away, float surface, out bool on_map) {
+// homogeneous. SPEC 5.3: the inverse depth in the novel camera at which the ray meets the tangent
+// of the bilinear patch around where `surface` lies, else the nearest sample, flat; 0: it meets
+// none. `on_map`: the view looks there at all; `whole`: a patch of four samples was there.
+float OwnDepth(OwnMap map, vec3 base, vec3 away, float surface, out bool on_map, out bool whole) {
   vec3 q = base + away * surface;
   vec2 position = q.xy / q.z;
   on_map = surface > 0.0 && IsOnMap(map, q, position);
   position = on_map ? position : vec2(0.0);  // what is not a number addresses no texel
-  float stored = textureLod(DEPTHS(map), vec3(position * map.grid.xy, map.layer), 0.0).r;
-  float own = map.stored.x + map.stored.y * stored;
-  float facing = 1.0 - own * away.z;
-  return on_map && stored > 0.0 && facing > 0.0 ? own * base.z / facing : 0.0;
-}
-
-// The view's say of `surface`, where its first step led to `seen`.
-void AddVote(OwnMap map, float surface, float seen, bool on_map, float say, inout Votes votes) {
-  say = on_map ? say : 0.0;
-  float nearer = seen - surface;
-  bool hole = !(seen > 0.0);
-  bool through = !hole && nearer < -kBehindPx * map.stored.w;
-  bool holds = !hole && !through && nearer <= kFirstBeforePx * map.stored.w;
-  votes.refused += hole ? kHoleSay * say : (through ? say : 0.0);
-  votes.held += holds ? say : 0.0;
-  votes.behind = max(votes.behind, on_map && through ? seen : 0.0);
-}
-
-// The second step, from where the first led: the inverse depth at which the ray meets the tangent
-// of the bilinear patch where the four samples around belong together, else the nearest sample; 0
-// where the view shows another surface there, or none. `position`: of the fragment, on the grid.
-float SecondStep(OwnMap map, vec3 base, vec3 away, float surface, float first, out vec2 position) {
-  vec3 q = base + away * first;
-  position = q.xy / q.z;
-  bool found = first > 0.0 && IsWithin(map, first - surface, kFirstBeforePx) &&
-               IsOnMap(map, q, position);
-  position = found ? position : vec2(0.0);
-
   vec2 low = floor(position - 0.5), share = position - 0.5 - low;
   // The corner between the four, so that rounding cannot choose others than `share` speaks of.
   vec4 s = textureGather(DEPTHS(map), vec3((low + 1.0) * map.grid.xy, map.layer)).wzxy;
-  float lowest = min(min(s.x, s.y), min(s.z, s.w)), highest = max(max(s.x, s.y), max(s.z, s.w));
-  bool whole = lowest > 0.0 && map.stored.y * (highest - lowest) <= map.stored.z;
+  whole = IsWholeBlock(map, low);
   float top = mix(s.x, s.y, share.x), bottom = mix(s.z, s.w, share.x);
   vec2 column = share.x < 0.5 ? s.xz : s.yw;
   float stored = whole ? mix(top, bottom, share.y) : (share.y < 0.5 ? column.x : column.y);
@@ -87,12 +66,31 @@ float SecondStep(OwnMap map, vec3 base, vec3 away, float surface, float first, o
   vec3 plane = vec3(slope, own - dot(slope, position));
   float facing = 1.0 - dot(plane, away);
   float w = dot(plane, base) / facing;
-  q = base + away * w;
-  position = q.xy / q.z;
-  // The first step took the nearest sample flat: half a sample's slope is its error.
-  float room = kSettledPx * map.stored.w + 0.5 * (abs(slope.x) + abs(slope.y));
-  found = found && stored > 0.0 && facing > 0.0 && w > 0.0 &&
-          IsWithin(map, w - surface, kBeforePx) && abs(w - first) <= room && q.z > 0.0;
-  position = found ? position : vec2(0.0);
+  return on_map && stored > 0.0 && facing > 0.0 && w > 0.0 ? w : 0.0;
+}
+
+// The view's say of `surface`, where its own patch lies at `seen` on the ray.
+void AddVote(OwnMap map, float surface, float seen, bool whole, bool on_map, float say,
+             inout Votes votes) {
+  say = on_map ? say : 0.0;
+  float nearer = seen - surface;
+  bool hole = !(seen > 0.0);
+  bool through = !hole && nearer < -kBehindPx * map.stored.z;
+  bool holds = !hole && !through && nearer <= kHeldBeforePx * map.stored.z;
+  votes.refused += hole ? kHoleSay * say : (through ? say : 0.0);
+  votes.held += holds ? say : 0.0;
+  bool near = holds && whole && nearer <= kBeforePx * map.stored.z;
+  votes.front = max(votes.front, near ? seen : 0.0);
+  votes.behind = max(votes.behind, on_map && through ? seen : 0.0);
+}
+
+// The view's fragment near `surface`, which the views hold; 0 where this one shows another there, or
+// none.
+float Fragment(OwnMap map, vec3 base, vec3 away, float surface) {
+  bool on_map, whole;
+  float w = OwnDepth(map, base, away, surface, on_map, whole);
+  float nearer = w - surface;
+  bool found = w > 0.0 && nearer <= kBeforePx * map.stored.z &&
+               nearer >= -kBehindPx * map.stored.z && base.z + away.z * w > 0.0;
   return found ? w : 0.0;
 }

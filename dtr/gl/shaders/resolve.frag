@@ -56,8 +56,8 @@ vec3 PointInView(ViewBlock view, vec3 ray, float w) {
 #include "own_depth.glsl"
 
 OwnMap MapOf(ViewBlock view) {
-  return OwnMap(view.map, vec4(view.stored_depth.xy, view.limits.w, view.stored_depth.z),
-                view.depth_slot.x, view.depth_slot.y);
+  return OwnMap(view.map, view.stored_depth.xyz, view.limits.w, view.depth_slot.x,
+                view.depth_slot.y);
 }
 
 // A point of the view's frame on its grid of samples, homogeneous.
@@ -80,23 +80,21 @@ float Say(ViewBlock view, vec3 ray, float w) {
 bool FindOwnFragments(vec3 ray, float surface) {
   bool held = false;
   for (int tried = 0; tried < kTriedSurfaces && surface > 0.0 && !held; ++tried) {
-    Votes votes = Votes(0.0, 0.0, 0.0);
+    Votes votes = Votes(0.0, 0.0, 0.0, 0.0);
     for (int i = 0; i < view_count; ++i) {
       ViewBlock view = views[i];
       OwnMap map = MapOf(view);
-      bool on_map;
-      fragment[i] = FirstStep(map, BaseOf(view, ray), AwayOf(view), surface, on_map);
-      AddVote(map, surface, fragment[i], on_map, Say(view, ray, surface), votes);
+      bool on_map, whole;
+      float seen = OwnDepth(map, BaseOf(view, ray), AwayOf(view), surface, on_map, whole);
+      AddVote(map, surface, seen, whole, on_map, Say(view, ray, surface), votes);
     }
     held = votes.held >= votes.refused;
-    if (!held) surface = votes.behind;
+    surface = !held ? votes.behind : votes.front > 0.0 ? votes.front : surface;
   }
   if (!held) return false;
   for (int i = 0; i < view_count; ++i) {
     ViewBlock view = views[i];
-    vec2 position;
-    fragment[i] =
-        SecondStep(MapOf(view), BaseOf(view, ray), AwayOf(view), surface, fragment[i], position);
+    fragment[i] = Fragment(MapOf(view), BaseOf(view, ray), AwayOf(view), surface);
   }
   return true;
 }

@@ -12,7 +12,7 @@ struct ViewBlock {
   vec4 row_y;   // second row, translation y
   vec4 row_z;   // third row, translation z
   vec4 camera;  // fx, fy, cx, cy of the view's image, pixels
-  vec4 limits;  // image width, height (pixels), Delta, depth break (differences of 1/z)
+  vec4 limits;  // image width, height (pixels), Delta (of 1/z); bits of a stored value of 1
   ivec4 image;  // texture array, layer in it, 1 if the view has a mask, unused
   vec4 depth_grid;   // fx, fy, cx, cy of the grid of samples (SPEC 5.3)
   ivec4 depth_slot;  // texture array, layer in it, unused
