@@ -19,6 +19,15 @@ constexpr double kHeldBeforePx = 1, kBeforePx = 0.5, kBehindPx = 2;
 constexpr double kHoleSay = 0.25;
 constexpr int kTriedSurfaces = 3;
 
+// SPEC 5.3: a position this close to a sample, or to the middle between two, is on it. From an input
+// camera's own place every position is, and rounding would choose between blocks.
+constexpr double kOnGrid = 1e-6;
+
+double OnGrid(double position) {
+  const double half = std::round(2 * position) / 2;
+  return std::abs(position - half) < kOnGrid ? half : position;
+}
+
 /// What the views say of a surface; shares of their weights.
 struct Votes {
   double held = 0, refused = 0;
@@ -103,7 +112,7 @@ class OwnFragmentFinder {
   std::optional<Eigen::Vector2d> PositionOnGrid(const Eigen::Vector3d& base, double w) const {
     const Eigen::Vector3d q = base + minus_center_ * w;
     if (!(w > 0) || !(q.z() > 0)) return std::nullopt;
-    const Eigen::Vector2d position = q.head<2>() / q.z();
+    const Eigen::Vector2d position(OnGrid(q.x() / q.z()), OnGrid(q.y() / q.z()));
     const Grid<double>& grid = samples_.inverse_depth;
     const bool inside = position.x() >= -0.5 && position.y() >= -0.5 &&
                         position.x() <= grid.width() - 0.5 && position.y() <= grid.height() - 0.5;
