@@ -57,6 +57,8 @@ struct ValidationReport {
   std::array<ResidualStats, kRegionsPerAxis * kRegionsPerAxis> regions;
   std::vector<std::string> untested;  ///< cameras with too few tested observations
   std::string adjustment_json;  ///< what a fresh bundle adjustment says (bundle/judge.h); may be ""
+  /// Why no fresh bundle adjustment judged it; empty where one did.
+  std::string not_judged;
   bool passed() const { return AllPassed(tests); }
 };
 

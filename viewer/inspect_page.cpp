@@ -191,11 +191,12 @@ void AddContributions(report::HtmlReport& page, const Findings& findings) {
   for (const ViewFindings& found : findings.views) {
     for (const auto& [name, share] : found.shares) total[name] += share;
   }
-  const auto count = static_cast<double>(findings.views.size());
+  // A view's own picture is drawn without it.
+  const auto others = static_cast<double>(std::max<size_t>(2, findings.views.size()) - 1);
   for (const ViewFindings& found : findings.views) {
     rows.push_back({report::Picture{found.weights, "weights of " + found.view->name},
                     found.view->name, LargestShares(found.shares), Percent(found.coverage),
-                    Percent(total[found.view->name] / count)});
+                    Percent(total[found.view->name] / others)});
   }
   page.Section("Which view contributes where");
   page.Paragraph(

@@ -99,15 +99,17 @@ Eigen::VectorXd ParamDifference(const LensCamera& from, const LensCamera& to) {
          Eigen::Map<const Eigen::VectorXd>(from.params.data(), n);
 }
 
-// RMS over the fresh points of an image of how far another camera draws them; per image.
-std::vector<double> Moved(const Bundle& fresh, const Bundle& other_cameras) {
+// RMS over the fresh points that an image's used sights show of how far another camera draws them;
+// per image. Points that outliers made say nothing of cameras.
+std::vector<double> Moved(const Adjusted& solved, const Bundle& other_cameras) {
+  const Bundle& fresh = solved.bundle;
   Bundle other = fresh;
   other.lenses = other_cameras.lenses;
   other.images = other_cameras.images;
   const auto a = Residuals(fresh), b = Residuals(other);
   std::vector<double> squared(fresh.images.size()), count(fresh.images.size());
   for (size_t i = 0; i < a.size(); ++i) {
-    if (!a[i].allFinite() || !b[i].allFinite()) continue;
+    if (!solved.used[i] || !a[i].allFinite() || !b[i].allFinite()) continue;
     const auto image = static_cast<size_t>(fresh.observations[i].image);
     squared[image] += (a[i] - b[i]).squaredNorm();
     count[image] += 1;
@@ -185,10 +187,10 @@ void PictureShifts(const Adjusted& fresh, const BundleCovariance& covariance, in
 
 void CompareWithStored(const Bundle& stored, const Adjusted& fresh,
                        const BundleCovariance& covariance, Judgement& judgement) {
-  const std::vector<double> moved = Moved(fresh.bundle, stored);
+  const std::vector<double> moved = Moved(fresh, stored);
   Bundle only_lenses = fresh.bundle;
   only_lenses.lenses = stored.lenses;
-  const std::vector<double> moved_by_lens = Moved(fresh.bundle, only_lenses);
+  const std::vector<double> moved_by_lens = Moved(fresh, only_lenses);
   for (size_t i = 0; i < stored.images.size(); ++i) {
     CameraJudgement camera;
     camera.name = stored.images[i].name;
@@ -255,11 +257,11 @@ void AddHalves(const BundleLimits& limits, const Adjusted halves[2], Judgement& 
       AtMost("halves_ratio", judgement.halves_ratio, limits.max_halves_ratio,
              "two halves of the points, solved apart: their poses' difference over the predicted");
   double moved_px = 0;
-  for (const double px : Moved(halves[0].bundle, halves[1].bundle)) {
+  for (const double px : Moved(halves[0], halves[1].bundle)) {
     if (px > moved_px) moved_px = px;
   }
   // Exact sights leave rounding, of which no ratio means anything.
-  if (moved_px <= limits.negligible_px) {
+  if (moved_px <= NegligiblePx(limits, judgement.sigma_px)) {
     check.passed = true;
     check.reason += fmt::format("; points move by {:.2g} px at most", moved_px);
   }
@@ -282,12 +284,12 @@ std::string LensReason(const LensJudgement& lens) {
 }
 
 // A difference fails where it is beyond chance and can be seen.
-Check Difference(const char* name, double sigmas, double moved_px, const BundleLimits& limits,
-                 const std::string& reason) {
-  Check check = AtMost(name, sigmas, limits.max_sigmas, reason);
-  if (!check.passed && moved_px <= limits.negligible_px) {
+Check Difference(const char* name, double sigmas, double moved_px, double max_sigmas,
+                 double negligible_px, const std::string& reason) {
+  Check check = AtMost(name, sigmas, max_sigmas, reason);
+  if (!check.passed && moved_px <= negligible_px) {
     check.passed = true;
-    check.reason += fmt::format(", which is too little to matter ({} px)", limits.negligible_px);
+    check.reason += fmt::format(", which is too little to matter ({:.2g} px)", negligible_px);
   }
   return check;
 }
@@ -310,16 +312,19 @@ void WidenByHalves(Judgement& judgement) {
 }
 
 void AddDifferences(const BundleLimits& limits, Judgement& judgement) {
+  const double negligible_px = NegligiblePx(limits, judgement.sigma_px);
+  // What could not be computed is the worst, not the best.
   const auto rank = [&](const auto& item) {
-    return item.moved_px > limits.negligible_px ? item.sigmas : 0.0;
+    if (item.moved_px <= negligible_px) return 0.0;
+    return std::isfinite(item.sigmas) ? item.sigmas : std::numeric_limits<double>::infinity();
   };
   const auto by_rank = [&](const auto& a, const auto& b) { return rank(a) < rank(b); };
   const auto lens = std::max_element(judgement.lenses.begin(), judgement.lenses.end(), by_rank);
   judgement.tests.push_back(Difference("lens_difference_sigmas", lens->sigmas, lens->moved_px,
-                                       limits, LensReason(*lens)));
+                                       limits.max_sigmas, negligible_px, LensReason(*lens)));
   const auto camera = std::max_element(judgement.cameras.begin(), judgement.cameras.end(), by_rank);
   judgement.tests.push_back(Difference(
-      "camera_difference_sigmas", camera->sigmas, camera->moved_px, limits,
+      "camera_difference_sigmas", camera->sigmas, camera->moved_px, limits.max_sigmas, negligible_px,
       fmt::format("{}: its stored pose against a fresh solve; its points move by {:.3g} px",
                   camera->name, camera->moved_px)));
 }
@@ -355,6 +360,11 @@ void AddPicture(const BundleLimits& limits, Judgement& judgement) {
 
 }  // namespace
 
+double NegligiblePx(const BundleLimits& limits, double sigma_px) {
+  return std::clamp(limits.negligible_sigmas * sigma_px, limits.least_negligible_px,
+                    limits.most_negligible_px);
+}
+
 Judgement Judge(const Bundle& given, const BundleLimits& limits, int threads) {
   Judgement judgement;
   const double share = kMostPoints / static_cast<double>(given.points.size());
@@ -366,9 +376,10 @@ Judgement Judge(const Bundle& given, const BundleLimits& limits, int threads) {
                                        kFewestPoints, given.points.size());
     return judgement;
   }
+  const bool halves = LeastSights(stored) >= kFewestSightsOfHalf;
   Adjusted solved[3];  // all points, two halves
   try {
-    ParallelFor(0, 3, threads, [&](int i) {
+    ParallelFor(0, halves ? 3 : 1, threads, [&](int i) {
       const Bundle part = WithPoints(stored, [&](std::uint64_t p) {
         return i == 0 || (HashOf(p, kHalf) & 1) == static_cast<std::uint64_t>(i - 1);
       });
@@ -386,13 +397,18 @@ Judgement Judge(const Bundle& given, const BundleLimits& limits, int threads) {
   judgement.degeneracies = FindDegeneracies(fresh, covariance, limits.max_focal_share);
   AddDegeneracies(judgement);
   if (!covariance.computed) {
-    judgement.not_judged = fmt::format("more than {} unknowns", kMostUnknowns);
+    judgement.not_judged = fmt::format("more than {} unknowns: too many for their covariance", kMostUnknowns);
     return judgement;
   }
   if (!covariance.determined) return judgement;
+  if (!fresh.converged) {
+    judgement.not_judged =
+        fmt::format("the fresh solve did not settle in {} steps", fresh.iterations);
+    return judgement;
+  }
   CompareWithStored(stored, fresh, covariance, judgement);
   PictureShifts(fresh, covariance, threads, judgement);
-  if (LeastSights(stored) >= kFewestSightsOfHalf) AddHalves(limits, solved + 1, judgement);
+  if (halves) AddHalves(limits, solved + 1, judgement);
   WidenByHalves(judgement);
   AddDifferences(limits, judgement);
   AddPicture(limits, judgement);

@@ -12,15 +12,21 @@ struct BundleLimits {
   /// Stored against freshly solved, in predicted standard deviations (Mahalanobis length): of six
   /// unknowns of a pose, chance alone exceeds 5 once in 3000.
   double max_sigmas = 5;
-  /// A difference that moves the scene's points by less than this in the image is no fault, however
-  /// many standard deviations it is.
-  double negligible_px = 0.1;
+  /// A difference that moves the scene's points in the image by less than this many standard
+  /// deviations of one sight's coordinate, but between the least and the most, is no fault, however
+  /// many standard deviations of the cameras it is: solvers that treat outliers otherwise differ by
+  /// as much.
+  double negligible_sigmas = 3;
+  double least_negligible_px = 0.1, most_negligible_px = 0.4;
   /// Two disjoint halves of the points, solved apart: RMS of their difference over the predicted.
   double max_halves_ratio = 3;
   /// 95 % of a third view's points, as its two best neighbours place them: standard deviation.
   double max_picture_shift_px = 1;
   double max_focal_share = 0.1;  ///< standard deviation of a focal length over itself
 };
+
+/// What of a difference is too little to matter, where a sight's coordinate has `sigma_px`.
+double NegligiblePx(const BundleLimits& limits, double sigma_px);
 
 /// A way in which the views do not suffice, by name.
 struct Degeneracy {

@@ -104,9 +104,20 @@ AdjustOptions OptionsFor(const std::optional<LensFreedom>& lens) {
   return options;
 }
 
-// Compares the candidates on held-out sights; index of the one to take.
-size_t Choose(const Bundle& bundle, const RefineOptions& options, Refined& refined) {
-  const Split split = SplitSights(SomePoints(bundle, kMostPoints, options.seed), options.seed);
+// Cameras that have seen all sights, held-out ones too; points that have not.
+std::vector<double> LossesOfCameras(const Bundle& cameras, const Split& split, double scale_px) {
+  Bundle asked = split.training;
+  asked.lenses = cameras.lenses;
+  asked.images = cameras.images;
+  asked.points = cameras.points;
+  return Losses(Adjust(asked, OptionsFor({})).bundle, split.held_out, scale_px);
+}
+
+// Which lens parameters to free, by held-out sights; index of the candidate. The model as given has
+// seen the held-out sights and cannot be compared with candidates that have not: it is first by
+// name only, and its figures are of cameras that saw all.
+size_t Choose(const Bundle& bundle, const Split& split, const RefineOptions& options,
+              Refined& refined) {
   refined.held_out_sights = static_cast<int>(split.held_out.size());
   refined.candidates = {
       {"as given", {}, 0, 0, 0},
@@ -124,15 +135,19 @@ size_t Choose(const Bundle& bundle, const RefineOptions& options, Refined& refin
         Losses(trained[i].bundle, split.held_out, kLossSigmas * trained.front().sigma_px));
     candidates[i].held_out_px = std::sqrt(Mean(losses[i]));
   }
-  size_t chosen = 0;
-  for (size_t i = 1; i < candidates.size(); ++i) {
-    std::tie(candidates[i].low_px2, candidates[i].high_px2) =
-        Bootstrap(losses[i], losses[chosen], options.seed);
-    const bool better = candidates[i].held_out_px < candidates[chosen].held_out_px;
-    // More freedom than the candidate before must be worth it beyond chance.
-    if (better && (chosen == 0 || candidates[i].high_px2 < 0)) chosen = i;
-  }
-  return chosen;
+  std::tie(candidates[2].low_px2, candidates[2].high_px2) =
+      Bootstrap(losses[2], losses[1], options.seed);
+  // More freedom must be worth it beyond chance.
+  const size_t chosen = candidates[2].high_px2 < 0 ? 2 : 1;
+  // Now like with like: adjusted to all sights, as the given model was.
+  refined.adjusted = Adjust(bundle, OptionsFor(candidates[chosen].lens));
+  const auto adjusted = LossesOfCameras(refined.adjusted.bundle, split,
+                                        kLossSigmas * trained.front().sigma_px);
+  RefineCandidate last{"adjusted to all", candidates[chosen].lens, std::sqrt(Mean(adjusted)), 0, 0};
+  std::tie(last.low_px2, last.high_px2) = Bootstrap(adjusted, losses[0], options.seed);
+  candidates.push_back(last);
+  // Beyond chance: a model that saw fewer sights, or none, need not be wrong for it.
+  return last.high_px2 < 0 ? chosen : 0;
 }
 
 bool Refinable(const SfmModel& model, std::string* reason) {
@@ -148,9 +163,7 @@ bool Refinable(const SfmModel& model, std::string* reason) {
   return true;
 }
 
-void Finish(const Bundle& bundle, const SfmModel& model, const RefineOptions& options,
-            Refined& refined) {
-  refined.adjusted = Adjust(bundle, OptionsFor(refined.lens));
+void Finish(const SfmModel& model, const RefineOptions& options, Refined& refined) {
   refined.model =
       ModelOf(refined.adjusted.bundle, model, options.separate_lenses, &refined.points_dropped);
   refined.adjusted.bundle = {};
@@ -183,25 +196,28 @@ Refined Refine(const SfmModel& model, const RefineOptions& options) {
   if (options.known_lenses) {
     const SfmModel known = WithLenses(model, *options.known_lenses);
     refined.lens = LensFreedom::kFixed;
-    Finish(BundleOf(known), known, options, refined);
+    refined.adjusted = Adjust(BundleOf(known), OptionsFor(refined.lens));
+    Finish(known, options, refined);
     return refined;
   }
   if (!Refinable(model, &refined.reason)) return refined;
   const Bundle bundle = BundleOf(model, options.separate_lenses);
-  const auto enough = SplitSights(bundle, options.seed).held_out.size();
+  const Split split = SplitSights(SomePoints(bundle, kMostPoints, options.seed), options.seed);
+  const auto enough = split.held_out.size();
   if (enough < kFewestHeldOut) {
     refined.held_out_sights = static_cast<int>(enough);
     refined.reason = fmt::format("expected {} points that {} or more images see, found {}",
                                  kFewestHeldOut, kMinTrack, enough);
     return refined;
   }
-  const size_t chosen = Choose(bundle, options, refined);
+  const size_t chosen = Choose(bundle, split, options, refined);
   refined.lens = refined.candidates[chosen].lens;
   if (chosen == 0) {
     refined.reason = "held-out sights are predicted no better";
+    refined.adjusted = {};
     return refined;
   }
-  Finish(bundle, model, options, refined);
+  Finish(model, options, refined);
   return refined;
 }
 

@@ -22,11 +22,12 @@ struct RefineOptions {
 
 /// A way to refine, and what it does to sights it has not seen.
 struct RefineCandidate {
-  std::string name;                 ///< "as given", or a LensFreedom
+  std::string name;                 ///< "as given", a LensFreedom, or "adjusted to all"
   std::optional<LensFreedom> lens;  ///< empty: cameras as given
   double held_out_px = 0;           ///< root mean of Cauchy's loss over the held-out sights
-  /// 95 % bootstrap interval of this candidate's mean loss less that of the one before it in the
-  /// list which was preferred to it, in px^2; points drawn with replacement. 0 for the first.
+  /// 95 % bootstrap interval of this candidate's mean loss less another's, in px^2; points drawn
+  /// with replacement. With the principal point: less that without; "adjusted to all": less "as
+  /// given"; else 0.
   double low_px2 = 0, high_px2 = 0;
 };
 
@@ -42,11 +43,11 @@ struct Refined {
 };
 
 /// Bundle adjustment of `model` where it pays. One sight of every point with four or more is held
-/// out; the cameras as given, and those adjusted with and without the principal point to the rest,
-/// predict it, from points placed by the rest alone. Adjusted cameras are taken only if they
-/// predict better than the given ones, which have seen the held-out sights in structure from
-/// motion: the comparison favours leaving the model alone. The principal point is freed only if
-/// that is better beyond the bootstrap interval. The chosen way is then run on all sights.
+/// out. Cameras adjusted to the rest, with and without the principal point, predict it: the
+/// principal point is freed only if that is better beyond the bootstrap interval. The chosen way is
+/// then run on all sights, as structure from motion was; the result is taken only if its cameras
+/// place points, from the rest alone, so that they predict the held-out sights better than with the
+/// cameras as given, beyond the bootstrap interval.
 ///
 /// With known lenses, poses and points are adjusted to them without being asked whether it pays.
 /// Deterministic for any number of threads. What cannot be refined (a lens model FOV, too few

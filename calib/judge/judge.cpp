@@ -200,7 +200,9 @@ double Distance(const Eigen::VectorXd& difference, const Eigen::MatrixXd& covari
   const Eigen::MatrixXd correlation =
       scale.asDiagonal() * covariance.block(at, at, count, count) * scale.asDiagonal();
   const Eigen::VectorXd z = scale.cwiseProduct(d);
-  return std::sqrt(std::max(0.0, z.dot(correlation.ldlt().solve(z))));
+  const double squared = z.dot(correlation.ldlt().solve(z));
+  // Beyond what a covariance can say: no distance passes for none.
+  return squared >= 0 ? std::sqrt(squared) : std::numeric_limits<double>::infinity();
 }
 
 std::string LargestPart(const RigLayout& layout, const Eigen::VectorXd& difference,

@@ -142,8 +142,9 @@ void Minimise(const Board& board, bool free_lenses, std::optional<double> cauchy
   }
   for (size_t c = 0; c < rig.cameras.size(); ++c) {
     if (!problem.HasParameterBlock(u.thetas[c].data())) continue;
-    options.linear_solver_ordering->AddElementToGroup(u.thetas[c].data(), 1);
+    // Groups of their own: within one Ceres orders by address, which differs from run to run.
     options.linear_solver_ordering->AddElementToGroup(u.place_motions[c].data(), 1);
+    options.linear_solver_ordering->AddElementToGroup(u.thetas[c].data(), 2);
     if (!free_lenses) problem.SetParameterBlockConstant(u.thetas[c].data());
     if (c == 0) problem.SetParameterBlockConstant(u.place_motions[c].data());
   }

@@ -84,7 +84,7 @@ viewer::InspectFacts FactsOf(const Options& options, const DtrSet& set, int thre
   facts.error_limit_px = limits.max_camera_rms_px;
   if (set.sparse_file) {
     const auto report =
-        pipeline::ValidateSet(set, io::LoadSparse(options.set, set), limits, threads);
+        pipeline::ReprojectionOfSet(set, io::LoadSparse(options.set, set), limits, threads);
     for (const auto& camera : report.cameras) {
       if (camera.held_out.count < limits.min_observations) continue;
       facts.error_px[camera.name] = camera.held_out.rms_px;

@@ -31,6 +31,9 @@ void SayReport(const calib::ValidationReport& report, Console& console) {
     console.Say(fmt::format("{} {}: {:.4g} (limit {:.4g}): {}", test.passed ? "passed" : "FAILED",
                             test.name, test.value, test.limit, test.reason));
   }
+  if (!report.not_judged.empty()) {
+    console.Say("not judged by a fresh bundle adjustment: " + report.not_judged);
+  }
   for (const std::string& name : report.untested) {
     console.Say("not tested, too few observations: " + name);
   }

@@ -118,7 +118,7 @@ std::map<std::string, viewer::ViewVerdict> Verdicts(const Options& options,
   if (!set.sparse_file) return verdicts;  // nothing to judge by
   const calib::ValidateLimits limits;
   const auto report =
-      pipeline::ValidateSet(set, io::LoadSparse(options.set, set), limits, context.common.threads);
+      pipeline::ReprojectionOfSet(set, io::LoadSparse(options.set, set), limits, context.common.threads);
   for (const auto& camera : report.cameras) {
     if (camera.held_out.count < limits.min_observations) continue;
     verdicts[camera.name] = {camera.held_out.rms_px <= limits.max_camera_rms_px,

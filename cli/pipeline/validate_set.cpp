@@ -2,23 +2,42 @@
 
 namespace dtr::pipeline {
 
-calib::ValidationReport ValidateSet(const DtrSet& set, const SparseScene& sparse,
-                                    const calib::ValidateLimits& limits, int threads,
-                                    const calib::BundleLimits& judge_limits) {
+namespace {
+
+struct Cameras {
   std::vector<PinholeCamera> cameras;
   std::vector<Pose> poses;
   std::vector<std::string> names;
+};
+
+Cameras CamerasOf(const DtrSet& set) {
+  Cameras of;
   for (const View& view : set.frames.front().views) {
-    cameras.push_back(view.camera);
-    poses.push_back(view.cam_from_world);
-    names.push_back(view.name);
+    of.cameras.push_back(view.camera);
+    of.poses.push_back(view.cam_from_world);
+    of.names.push_back(view.name);
   }
-  calib::ValidationReport report =
-      calib::ValidateReprojection(cameras, poses, sparse, limits, names, threads);
+  return of;
+}
+
+}  // namespace
+
+calib::ValidationReport ReprojectionOfSet(const DtrSet& set, const SparseScene& sparse,
+                                          const calib::ValidateLimits& limits, int threads) {
+  const Cameras of = CamerasOf(set);
+  return calib::ValidateReprojection(of.cameras, of.poses, sparse, limits, of.names, threads);
+}
+
+calib::ValidationReport ValidateSet(const DtrSet& set, const SparseScene& sparse,
+                                    const calib::ValidateLimits& limits, int threads,
+                                    const calib::BundleLimits& judge_limits) {
+  calib::ValidationReport report = ReprojectionOfSet(set, sparse, limits, threads);
+  const Cameras of = CamerasOf(set);
   const calib::Judgement judgement =
-      calib::Judge(calib::BundleOf(cameras, poses, names, sparse), judge_limits, threads);
+      calib::Judge(calib::BundleOf(of.cameras, of.poses, of.names, sparse), judge_limits, threads);
   report.tests.insert(report.tests.end(), judgement.tests.begin(), judgement.tests.end());
   report.adjustment_json = calib::ToJson(judgement);
+  report.not_judged = judgement.not_judged;
   return report;
 }
 

@@ -8,8 +8,12 @@
 namespace dtr::pipeline {
 
 /// Tests every view of the set's first frame, held-out ones included. Views of `sparse` are indices
-/// into that frame. Pixels need not be loaded. Then the set is judged by a fresh bundle adjustment
-/// (calib/bundle/judge.h), whose tests and figures join the report.
+/// into that frame. Pixels need not be loaded.
+calib::ValidationReport ReprojectionOfSet(const DtrSet& set, const SparseScene& sparse,
+                                          const calib::ValidateLimits& limits, int threads);
+
+/// The same, and then the set is judged by a fresh bundle adjustment (calib/bundle/judge.h), whose
+/// tests and figures join the report: some seconds.
 calib::ValidationReport ValidateSet(const DtrSet& set, const SparseScene& sparse,
                                     const calib::ValidateLimits& limits, int threads,
                                     const calib::BundleLimits& judge_limits = {});

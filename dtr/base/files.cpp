@@ -14,15 +14,20 @@ namespace fs = std::filesystem;
 
 std::string ReadFile(const fs::path& file, std::uintmax_t limit_bytes) {
   std::error_code error;
-  const auto size = fs::file_size(file, error);
+  std::ignore = fs::file_size(file, error);  // says why, and refuses folders, which open
   if (error) throw Error(file.string() + ": cannot be read: " + error.message());
+  // The size of what is open: another file may take the name at any time.
+  std::ifstream in(file, std::ios::binary | std::ios::ate);
+  const auto end = static_cast<std::streamoff>(in.tellg());
+  if (!in || end < 0) throw Error(file.string() + ": cannot be read");
+  const auto size = static_cast<std::uintmax_t>(end);
   if (size > limit_bytes) {
     throw Error(file.string() + ": expected at most " + std::to_string(limit_bytes) +
                 " bytes, found " + std::to_string(size));
   }
   std::string content(size, '\0');
-  std::ifstream in(file, std::ios::binary);
-  if (!in || !in.read(content.data(), static_cast<std::streamsize>(size))) {
+  in.seekg(0);
+  if (!in.read(content.data(), static_cast<std::streamsize>(size))) {
     throw Error(file.string() + ": cannot be read to its end");
   }
   return content;

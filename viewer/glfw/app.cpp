@@ -132,7 +132,7 @@ class App {
 
   /// What the shown picture shows there, as plane z of the present camera.
   std::optional<double> DepthAt(const Eigen::Vector2d& pixel) {
-    if (!made_) return std::nullopt;
+    if (!made_ || refused_) return std::nullopt;
     const NovelCamera& shown = maker_.picture().camera;
     const PinholeCamera& now = controller_.camera().camera;
     const auto x = static_cast<int>(pixel.x() * shown.camera.width_px() / now.width_px());
@@ -255,7 +255,8 @@ class App {
       probed_.reset();
     } catch (const Error& error) {
       refused_ = true;
-      Tell(error.what());
+      refusal_ = error.what();
+      Tell(refusal_);
     }
     made_ = order;
     return false;
@@ -313,7 +314,7 @@ class App {
         verdicts_coming_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) {
       try {
         verdicts_ = verdicts_coming_.get();
-      } catch (const Error& error) {
+      } catch (const std::exception& error) {
         Tell(error.what());
       }
     }
@@ -401,9 +402,12 @@ class App {
     return names;
   }
 
+  /// Throws Error where the last frame's picture could not be made: nobody is there to see why.
   bool ReachedFrames() const {
-    return settings_.frames > 0 && report_.last.frames + 1 >= settings_.frames && !playing() &&
-           whole() && settling_ <= 0;
+    const bool last =
+        settings_.frames > 0 && report_.last.frames + 1 >= settings_.frames && !playing();
+    if (last && refused_) throw Error(refusal_);
+    return last && whole() && settling_ <= 0;
   }
 
   void CountMoving(double ms, double cpu_ms) {
@@ -482,6 +486,7 @@ class App {
   Shown shown_ = Shown::kColour;
   std::optional<PictureOrder> made_;  ///< what the shown picture was made for
   bool refused_ = false;              ///< it could not be made
+  std::string refusal_;               ///< why
   Clock::time_point last_change_ = Clock::now();
   bool panel_, help_ = false, quit_ = false;
   bool save_picture_ = false, save_window_ = false, copy_command_ = false;

@@ -55,6 +55,9 @@ void PictureMaker::MakeStill(const PictureOrder& order) {
 void PictureMaker::Make(const PictureOrder& order, int divisor, ViewStream::Wait wait) {
   Laps laps;
   result_.reset();
+  // What is thrown from here on leaves no figures of another scene behind.
+  picture_.views_used.clear();
+  picture_.whole = false;
   stream_.Hide(order.hidden);
   const Pose& pose = order.camera.cam_from_world;
   picture_.scene = stream_.SceneFor(pose, order.options, wait);

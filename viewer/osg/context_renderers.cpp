@@ -27,6 +27,14 @@ class ContextRenderers::Owner final : public osg::GraphicsObjectManager {
  public:
   explicit Owner(unsigned context_id) : GraphicsObjectManager("osgDTR", context_id) {}
 
+  /// The owner for a context ID. OpenSceneGraph looks managers up without a lock, and contexts that
+  /// share an ID draw in threads of their own: each would make one.
+  static Owner* Of(unsigned context_id) {
+    static std::mutex mutex;
+    const std::lock_guard lock(mutex);
+    return osg::get<Owner>(context_id);
+  }
+
   std::weak_ptr<ContextRenderer> Make(osg::State& state) {
     Tenant tenant{state.getGraphicsContext(), state.getGraphicsContext() != nullptr, false,
                   std::make_shared<ContextRenderer>()};
@@ -95,6 +103,7 @@ class ContextRenderers::Owner final : public osg::GraphicsObjectManager {
     static std::mutex mutex;
     static auto* const abandoned = new std::vector<Tenant>;
     const std::scoped_lock lock(mutex_, mutex);
+    for (const Tenant& tenant : tenants_) tenant.renderer->abandoned = true;
     std::move(tenants_.begin(), tenants_.end(), std::back_inserter(*abandoned));
     tenants_.clear();
   }
@@ -107,10 +116,10 @@ ContextRenderers::ContextRenderers() = default;
 ContextRenderers::~ContextRenderers() { Release(nullptr); }
 
 std::shared_ptr<ContextRenderer> ContextRenderers::Of(osg::State& state) {
-  Owner* const owner = osg::get<Owner>(state.getContextID());
+  Owner* const owner = Owner::Of(state.getContextID());
   const std::lock_guard lock(mutex_);
-  // Numbers and addresses of contexts are used again: what belongs to an earlier one has expired.
-  std::erase_if(entries_, [](const Entry& entry) { return entry.renderer.expired(); });
+  // Numbers and addresses of contexts are used again: what belongs to an earlier one is dead.
+  std::erase_if(entries_, [](const Entry& entry) { return !entry.Alive(); });
   for (const Entry& entry : entries_) {
     if (entry.state == &state && entry.owner == owner) return entry.renderer.lock();
   }
@@ -122,7 +131,7 @@ void ContextRenderers::Release(const osg::State* state) {
   const std::lock_guard lock(mutex_);
   std::erase_if(entries_, [&](const Entry& entry) {
     if (state != nullptr && entry.state != state) return false;
-    if (const auto renderer = entry.renderer.lock()) entry.owner->GiveUp(renderer);
+    if (const auto renderer = entry.Alive()) entry.owner->GiveUp(renderer);
     return true;
   });
 }
@@ -130,7 +139,7 @@ void ContextRenderers::Release(const osg::State* state) {
 size_t ContextRenderers::count() const {
   const std::lock_guard lock(mutex_);
   return static_cast<size_t>(std::count_if(entries_.begin(), entries_.end(),
-                                           [](const Entry& e) { return !e.renderer.expired(); }));
+                                           [](const Entry& e) { return e.Alive() != nullptr; }));
 }
 
 }  // namespace osgDTR

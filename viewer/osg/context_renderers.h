@@ -4,6 +4,7 @@
 #include <osg/State>
 #include <osg/ref_ptr>
 
+#include <atomic>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -42,6 +43,7 @@ class ContextRenderer {
 
   dtr::gl::Renderer renderer;
   dtr::gl::Compositor compositor;
+  std::atomic<bool> abandoned = false;  ///< its context is gone: kept, but never used again
 
  private:
   struct Last {
@@ -84,6 +86,11 @@ class ContextRenderers {
     const osg::State* state = nullptr;
     osg::ref_ptr<Owner> owner;
     std::weak_ptr<ContextRenderer> renderer;
+    /// Null where the renderer or its context is gone.
+    std::shared_ptr<ContextRenderer> Alive() const {
+      auto locked = renderer.lock();
+      return locked && !locked->abandoned ? locked : nullptr;
+    }
   };
   mutable std::mutex mutex_;
   std::vector<Entry> entries_;

@@ -160,7 +160,7 @@ inline Score SabotageAll(int count, std::uint64_t seed) {
     }
     double moved = 0;
     for (const auto& camera : judged.cameras) moved = std::max(moved, camera.moved_px);
-    const bool invisible = moved <= BundleLimits{}.negligible_px;
+    const bool invisible = moved <= NegligiblePx({}, judged.sigma_px);
     (invisible ? score.not_detectable : score.missed) += 1;
     std::cout << (invisible ? "not detectable: " : "missed: ") << "kind " << k % 7 << ", "
               << bad.sigmas << " sigmas, points move by " << moved << " px; " << Broken(judged)
