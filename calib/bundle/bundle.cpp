@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <limits>
 #include <map>
+#include <set>
 
+#include "calib/bundle/adjust.h"
 #include "dtr/base/error.h"
 
 namespace dtr::calib {
@@ -103,6 +105,33 @@ Bundle BundleOf(std::span<const PinholeCamera> cameras, std::span<const Pose> ca
   return bundle;
 }
 
+namespace {
+
+// Sights of points they do not belong to, as structure from motion leaves them out, too (COLMAP:
+// more than 4 px).
+struct Wrong {
+  std::set<std::pair<int, std::uint64_t>> of_images;  ///< image, point id
+  std::map<std::uint64_t, int> right_of_point;        ///< sights that stay
+};
+
+Wrong WrongSights(const Bundle& bundle) {
+  constexpr double kMostPx = 4;
+  Wrong wrong;
+  const auto residuals = Residuals(bundle);
+  for (size_t i = 0; i < residuals.size(); ++i) {
+    const BundleObservation& o = bundle.observations[i];
+    const auto id = bundle.point_ids[static_cast<size_t>(o.point)];
+    if (residuals[i].norm() <= kMostPx) {
+      ++wrong.right_of_point[id];
+    } else {
+      wrong.of_images.insert({o.image, id});  // NaN, too: no pixel
+    }
+  }
+  return wrong;
+}
+
+}  // namespace
+
 SfmModel ModelOf(const Bundle& bundle, const SfmModel& model, bool separate_lenses, int* dropped) {
   SfmModel out = model;
   if (separate_lenses) out.cameras.clear();
@@ -123,11 +152,20 @@ SfmModel ModelOf(const Bundle& bundle, const SfmModel& model, bool separate_lens
     point.p_in_world = place;
     points.emplace(bundle.point_ids[p], point);
   }
+  const auto wrong = WrongSights(bundle);
+  for (auto at = points.begin(); at != points.end();) {
+    const auto found = wrong.right_of_point.find(at->first);
+    const bool placed = found != wrong.right_of_point.end() && found->second >= 2;
+    at = placed ? std::next(at) : points.erase(at);
+  }
   if (dropped != nullptr) *dropped = static_cast<int>(model.points.size() - points.size());
   out.points = std::move(points);
-  for (SfmImage& image : out.images) {
-    for (SfmFeature& feature : image.features) {
-      if (!out.points.contains(feature.point_id)) feature.point_id = SfmFeature::kNoPoint;
+  for (size_t i = 0; i < out.images.size(); ++i) {
+    for (SfmFeature& feature : out.images[i].features) {
+      if (!out.points.contains(feature.point_id) ||
+          wrong.of_images.contains({static_cast<int>(i), feature.point_id})) {
+        feature.point_id = SfmFeature::kNoPoint;
+      }
     }
   }
   return out;
