@@ -37,6 +37,13 @@ class Node {
     }
     return items;
   }
+  /// The field's value; nothing where there is none or it is null.
+  std::optional<Node> Optional(const char* key) const {
+    if (!value_.is_object()) Fail("an object");
+    const auto found = value_.find(key);
+    if (found == value_.end() || found->is_null()) return {};
+    return Node(*found, where_ + "." + key);
+  }
   bool IsNull() const { return value_.is_null(); }
   const std::string& where() const { return where_; }
 
@@ -73,10 +80,13 @@ class Node {
 constexpr double kHuge = std::numeric_limits<double>::max();
 
 Json ToJson(const Screening& screening) {
+  Json faults = Json::array();
+  for (const Fault fault : screening.faults) faults.push_back(NameOf(fault));
   return {{"sharpness", screening.sharpness},
           {"overexposed_share", screening.overexposed_share},
           {"underexposed_share", screening.underexposed_share},
           {"duplicate_of", screening.duplicate_of},
+          {"faults", faults},
           {"remarks", screening.remarks}};
 }
 
@@ -102,6 +112,10 @@ Json ToJson(const Photo& photo) {
   json["lens_model"] = photo.lens_model;
   json["date_time"] = photo.date_time;
   json["gps"] = photo.gps ? ToJson(*photo.gps) : Json();
+  if (const auto& frame = photo.video_frame) {
+    json["video_frame"] = {
+        {"video", frame->video}, {"number", frame->number}, {"time_s", frame->time_s}};
+  }
   json["source_sha256"] = photo.source_sha256;
   json["screening"] = photo.screening ? ToJson(*photo.screening) : Json();
   return json;
@@ -113,7 +127,17 @@ Screening ScreeningFrom(const Node& node) {
   screening.overexposed_share = node["overexposed_share"].Number(0, 1);
   screening.underexposed_share = node["underexposed_share"].Number(0, 1);
   screening.duplicate_of = node["duplicate_of"].Text();
+  if (const auto faults = node.Optional("faults")) {
+    for (const Node& name : faults->Items()) {
+      const auto fault = FaultCalled(name.Text());
+      if (!fault) name.Fail("blurred, overexposed, underexposed or duplicate");
+      screening.faults.push_back(*fault);
+    }
+  }
   for (const Node& remark : node["remarks"].Items()) screening.remarks.push_back(remark.Text());
+  if (screening.faults.size() > screening.remarks.size()) {
+    node["faults"].Fail("a remark for each fault");
+  }
   return screening;
 }
 
@@ -155,6 +179,11 @@ Photo PhotoFrom(const Node& node) {
   photo.lens_model = node["lens_model"].Text();
   photo.date_time = node["date_time"].Text();
   if (!node["gps"].IsNull()) photo.gps = GpsFrom(node["gps"]);
+  if (const auto frame = node.Optional("video_frame")) {
+    photo.video_frame = {(*frame)["video"].Text(),
+                         (*frame)["number"].Int(0, std::numeric_limits<int>::max()),
+                         (*frame)["time_s"].Number(-kHuge, kHuge)};
+  }
   photo.source_sha256 = node["source_sha256"].Text();
   if (!node["screening"].IsNull()) photo.screening = ScreeningFrom(node["screening"]);
   return photo;

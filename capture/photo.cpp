@@ -1,8 +1,54 @@
 #include "capture/photo.h"
 
+#include <algorithm>
+#include <array>
+#include <utility>
+
 #include "dtr/base/error.h"
 
 namespace dtr::capture {
+namespace {
+
+constexpr std::array<std::pair<Fault, const char*>, 4> kFaults{
+    {{Fault::kBlurred, "blurred"},
+     {Fault::kOverexposed, "overexposed"},
+     {Fault::kUnderexposed, "underexposed"},
+     {Fault::kDuplicate, "duplicate"}}};
+
+}  // namespace
+
+std::string NameOf(Fault fault) {
+  return std::find_if(kFaults.begin(), kFaults.end(),
+                      [&](const auto& f) { return f.first == fault; })
+      ->second;
+}
+
+std::optional<Fault> FaultCalled(const std::string& name) {
+  for (const auto& [fault, called] : kFaults) {
+    if (name == called) return fault;
+  }
+  return {};
+}
+
+void DropFaulty(Capture& capture, const std::vector<Fault>& faults) {
+  std::vector<Photo> kept;
+  for (Photo& photo : capture.photos) {
+    std::string reason;
+    for (size_t i = 0; photo.screening && i < photo.screening->faults.size(); ++i) {
+      const Fault fault = photo.screening->faults[i];
+      if (std::find(faults.begin(), faults.end(), fault) == faults.end()) continue;
+      reason += (reason.empty() ? "dropped: " : "; ") + photo.screening->remarks[i];
+    }
+    if (reason.empty()) {
+      kept.push_back(std::move(photo));
+    } else {
+      capture.skipped.push_back({photo.name, reason});
+    }
+  }
+  capture.photos = std::move(kept);
+  std::sort(capture.skipped.begin(), capture.skipped.end(),
+            [](const Skipped& a, const Skipped& b) { return a.name < b.name; });
+}
 
 void RequireEnoughPhotos(const Capture& capture, const std::filesystem::path& where) {
   if (capture.photos.size() >= 2) return;

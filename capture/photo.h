@@ -10,15 +10,35 @@
 
 namespace dtr::capture {
 
+/// What may be wrong with a photo.
+enum class Fault { kBlurred, kOverexposed, kUnderexposed, kDuplicate };
+
+/// "blurred", "overexposed", "underexposed", "duplicate".
+std::string NameOf(Fault fault);
+/// The fault of that name; empty for any other text.
+std::optional<Fault> FaultCalled(const std::string& name);
+
 /// What the pixels and bytes of a photo say about its use. It is told, never acted upon here.
 struct Screening {
   /// Variance of the 4-neighbour Laplacian over the variance of the brightness itself: falls with
   /// blur, does not change with contrast. 0 for a photo of one colour.
   double sharpness = 0;
-  double overexposed_share = 0;      ///< pixels with a channel at 254 or 255
-  double underexposed_share = 0;     ///< pixels with all channels at 0 or 1
-  std::string duplicate_of;          ///< name of the first photo with the same bytes, or empty
-  std::vector<std::string> remarks;  ///< one line for each thing worth a look
+  double overexposed_share = 0;   ///< pixels with a channel at 254 or 255
+  double underexposed_share = 0;  ///< pixels with all channels at 0 or 1
+  /// Name of the first photo with the same bytes, else of an earlier one that shows the same
+  /// picture; empty where there is none.
+  std::string duplicate_of;
+  std::vector<Fault> faults;
+  std::vector<std::string> remarks;  ///< one line for each fault, with the measure that says so
+  /// Luma of the whole photo on at most 64x64 pixels, 1/256 levels; not stored with a capture.
+  Grid<std::uint16_t> thumbnail;
+};
+
+/// Where a frame of a video comes from.
+struct VideoFrame {
+  std::string video;  ///< file name
+  int number = 0;     ///< from 0
+  double time_s = 0;  ///< when the video shows it
 };
 
 /// One photo. Sizes and pixels are meant upright, after the EXIF orientation.
@@ -38,6 +58,8 @@ struct Photo {
   std::string date_time;  ///< "YYYY:MM:DD HH:MM:SS" or empty
   std::optional<io::GpsPosition> gps;
 
+  std::optional<VideoFrame> video_frame;
+
   std::string source_sha256;  ///< of the original file
   std::optional<Screening> screening;
 };
@@ -53,6 +75,9 @@ struct Capture {
   std::vector<Photo> photos;
   std::vector<Skipped> skipped;
 };
+
+/// Takes out the photos that have one of these faults and lists them under `skipped`.
+void DropFaulty(Capture& capture, const std::vector<Fault>& faults);
 
 /// A scene needs two photos. Throws Error naming `where`, the number found and what was skipped.
 void RequireEnoughPhotos(const Capture& capture, const std::filesystem::path& where);

@@ -1,9 +1,15 @@
 #include "capture/screening.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
-#include <cstdio>
+#include <cmath>
+#include <limits>
 #include <map>
+#include <utility>
+
+#include "dtr/types/area_average.h"
 
 namespace dtr::capture {
 namespace {
@@ -12,9 +18,9 @@ constexpr int kBright = 254, kDark = 1;  // a level of slack: JPEG moves clipped
 constexpr double kBlurred = 0.25;        // of the median sharpness of photos of the same camera
 constexpr double kClipped = 0.25;        // share of a photo's pixels
 constexpr size_t kPhotosForAMedian = 3;
-
-// Rec. 601 luma in 1/256 levels, as integers so that sums are exact.
-int Luma(const std::uint8_t* rgb) { return 77 * rgb[0] + 150 * rgb[1] + 29 * rgb[2]; }
+constexpr int kThumbnailSidePx = 64;
+constexpr double kSamePicture = 0.03;  // of the thumbnail's contrast
+constexpr size_t kPhotosLookedBackAt = 100;
 
 // Sums of a value and its square, exact within a row, rows added in their order.
 struct Moments {
@@ -31,6 +37,77 @@ struct Moments {
     return std::max(0.0, squares / n - (sum / n) * (sum / n));
   }
 };
+
+std::string Percent(double share) { return fmt::format("{:.0f} %", 100 * share); }
+
+Grid<std::uint16_t> Thumbnail(const ImageRgb8& photo) {
+  const auto [width, height] = TargetSize(photo.width(), photo.height(), kThumbnailSidePx);
+  const ImageRgb8 small = AreaAverage(photo, width, height);
+  Grid<std::uint16_t> luma(width, height);
+  for (size_t i = 0; i < luma.data().size(); ++i) {
+    luma.data()[i] = static_cast<std::uint16_t>(Luma(&small.data()[3 * i]));
+  }
+  return luma;
+}
+
+// Root mean square of a thumbnail about its mean: its contrast.
+double ContrastOf(const Grid<std::uint16_t>& thumbnail) {
+  Moments moments;
+  for (const std::int64_t value : thumbnail.data()) moments.AddRow(value, value * value, 1);
+  return std::sqrt(moments.Variance());
+}
+
+// Root mean square of what two thumbnails differ by; infinite where their sizes do.
+double DifferenceOf(const Grid<std::uint16_t>& a, const Grid<std::uint16_t>& b) {
+  if (a.width() != b.width() || a.height() != b.height()) {
+    return std::numeric_limits<double>::infinity();
+  }
+  std::int64_t squares = 0;
+  for (size_t i = 0; i < a.data().size(); ++i) {
+    const std::int64_t difference = a.data()[i] - b.data()[i];
+    squares += difference * difference;
+  }
+  return std::sqrt(static_cast<double>(squares) / static_cast<double>(a.data().size()));
+}
+
+void Add(Screening& screening, Fault fault, std::string remark) {
+  screening.faults.push_back(fault);
+  screening.remarks.push_back(std::move(remark));
+}
+
+// An earlier photo that shows the same picture as photos[index].
+void FindSamePicture(std::vector<Photo>& photos, size_t index) {
+  Screening& screening = *photos[index].screening;
+  const double contrast = ContrastOf(screening.thumbnail);
+  const size_t first = index - std::min(index, kPhotosLookedBackAt);
+  for (size_t other = first; other < index; ++other) {
+    const auto& earlier = photos[other].screening;
+    if (!earlier || earlier->thumbnail.empty() || !earlier->duplicate_of.empty()) continue;
+    const double difference = DifferenceOf(screening.thumbnail, earlier->thumbnail);
+    if (!(difference < kSamePicture * contrast)) continue;
+    screening.duplicate_of = photos[other].name;
+    return Add(screening, Fault::kDuplicate,
+               fmt::format("shows the same picture as {}: they differ by {:.1f} % of its contrast",
+                           photos[other].name, 100 * difference / contrast));
+  }
+}
+
+std::map<std::string, double> MedianSharpnessByCamera(const std::vector<Photo>& photos) {
+  std::map<std::string, std::vector<double>> all;
+  for (const Photo& photo : photos) {
+    if (photo.screening) all[photo.camera_group].push_back(photo.screening->sharpness);
+  }
+  std::map<std::string, double> medians;
+  for (auto& [group, values] : all) {
+    if (values.size() < kPhotosForAMedian) continue;
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    medians[group] = *middle;
+  }
+  return medians;
+}
+
+}  // namespace
 
 double Sharpness(const ImageRgb8& photo) {
   const int width = photo.width(), height = photo.height();
@@ -64,29 +141,6 @@ double Sharpness(const ImageRgb8& photo) {
   return brightness.Variance() > kNoVariance ? laplacian.Variance() / brightness.Variance() : 0;
 }
 
-std::string Percent(double share) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.0f %%", 100 * share);
-  return text;
-}
-
-std::map<std::string, double> MedianSharpnessByCamera(const std::vector<Photo>& photos) {
-  std::map<std::string, std::vector<double>> all;
-  for (const Photo& photo : photos) {
-    if (photo.screening) all[photo.camera_group].push_back(photo.screening->sharpness);
-  }
-  std::map<std::string, double> medians;
-  for (auto& [group, values] : all) {
-    if (values.size() < kPhotosForAMedian) continue;
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    medians[group] = *middle;
-  }
-  return medians;
-}
-
-}  // namespace
-
 Screening MeasurePhoto(const ImageRgb8& photo) {
   Screening screening;
   screening.sharpness = Sharpness(photo);
@@ -100,31 +154,40 @@ Screening MeasurePhoto(const ImageRgb8& photo) {
   }
   screening.overexposed_share = static_cast<double>(over) / static_cast<double>(pixels);
   screening.underexposed_share = static_cast<double>(under) / static_cast<double>(pixels);
+  screening.thumbnail = Thumbnail(photo);
   return screening;
 }
 
 void JudgePhotos(std::vector<Photo>& photos) {
   const auto medians = MedianSharpnessByCamera(photos);
   std::map<std::string, std::string> first_with_content;
-  for (Photo& photo : photos) {
+  for (size_t i = 0; i < photos.size(); ++i) {
+    const Photo& photo = photos[i];
     if (!photo.screening) continue;
-    Screening& screening = *photo.screening;
+    Screening& screening = *photos[i].screening;
+    screening.duplicate_of.clear();
+    screening.faults.clear();
+    screening.remarks.clear();
     const auto [first, is_new] = first_with_content.emplace(photo.source_sha256, photo.name);
     if (!is_new) {
       screening.duplicate_of = first->second;
-      screening.remarks.push_back("has the same bytes as " + first->second);
+      Add(screening, Fault::kDuplicate, "has the same bytes as " + first->second);
+    } else if (!screening.thumbnail.empty()) {
+      FindSamePicture(photos, i);
     }
     const auto median = medians.find(photo.camera_group);
     if (median != medians.end() && screening.sharpness < kBlurred * median->second) {
-      screening.remarks.push_back("may be blurred: sharpness is " +
-                                  Percent(screening.sharpness / median->second) +
-                                  " of its camera's median");
+      Add(screening, Fault::kBlurred,
+          "may be blurred: sharpness is " + Percent(screening.sharpness / median->second) +
+              " of its camera's median");
     }
     if (screening.overexposed_share > kClipped) {
-      screening.remarks.push_back(Percent(screening.overexposed_share) + " of it is overexposed");
+      Add(screening, Fault::kOverexposed,
+          Percent(screening.overexposed_share) + " of it is overexposed");
     }
     if (screening.underexposed_share > kClipped) {
-      screening.remarks.push_back(Percent(screening.underexposed_share) + " of it is underexposed");
+      Add(screening, Fault::kUnderexposed,
+          Percent(screening.underexposed_share) + " of it is underexposed");
     }
   }
 }

@@ -6,10 +6,19 @@
 
 namespace dtr::capture {
 
-/// Sharpness and clipping of a photo (its pixels only: no duplicates, no remarks).
+/// Rec. 601 luma of an R, G, B triple in 1/256 levels, as an integer so that sums are exact.
+inline int Luma(const std::uint8_t* rgb) { return 77 * rgb[0] + 150 * rgb[1] + 29 * rgb[2]; }
+
+/// Screening::sharpness.
+double Sharpness(const ImageRgb8& photo);
+
+/// Sharpness, clipping and thumbnail of a photo (its pixels only: no duplicates, no remarks).
 Screening MeasurePhoto(const ImageRgb8& photo);
 
-/// Compares the photos with each other: names duplicates and adds the remarks.
+/// Compares the photos with each other: names duplicates, faults and remarks, in place of those
+/// that were there. A photo is a duplicate of an earlier one that has the same bytes, or of one
+/// among the 100 before it whose thumbnail differs by less than 3 % of its own contrast (root mean
+/// squares): a picture that moved by more than about 0.15 % of its width differs by more.
 void JudgePhotos(std::vector<Photo>& photos);
 
 }  // namespace dtr::capture

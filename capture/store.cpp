@@ -19,12 +19,6 @@ void Require(const std::error_code& error, const fs::path& file) {
   if (error) throw Error(file.string() + ": cannot be written: " + error.message());
 }
 
-// "capture/" and "capture" are the same folder; only the second has a name to add to.
-fs::path WithoutTrailingSlash(const fs::path& folder) {
-  const fs::path clean = folder.lexically_normal();
-  return clean.has_filename() ? clean : clean.parent_path();
-}
-
 void RefuseOccupied(const fs::path& folder, bool replace) {
   std::error_code error;
   if (!fs::exists(fs::symlink_status(folder, error))) return;
@@ -90,6 +84,10 @@ void MoveIntoPlace(const fs::path& partial, const fs::path& folder) {
 }
 
 }  // namespace
+
+void RequireRoom(const fs::path& folder, const StoreOptions& options) {
+  RefuseOccupied(WithoutTrailingSlash(folder), options.replace);
+}
 
 void WriteCapture(const Capture& capture, const fs::path& target, const StoreOptions& options,
                   Progress& progress) {

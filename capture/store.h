@@ -9,11 +9,17 @@ namespace dtr::capture {
 
 /// Name of the file that makes a folder a capture.
 inline constexpr char kCaptureFile[] = "capture.json";
+/// What `dtr capture` adds for people: all photos on one, and a page about them.
+inline constexpr char kContactSheetFile[] = "contact_sheet.jpg";
+inline constexpr char kPageFile[] = "index.html";
 
 struct StoreOptions {
   bool replace = false;  ///< an earlier capture in the folder may be replaced
   int threads = 0;       ///< 0: all cores
 };
+
+/// Throws UsageError where WriteCapture would for want of an empty place; before any work is done.
+void RequireRoom(const std::filesystem::path& folder, const StoreOptions& options);
 
 /// Writes `folder`/images/<id>.<extension> and, last, `folder`/capture.json. A photo that is
 /// upright already keeps its bytes; a turned one becomes a PNG with exactly its pixels. The folder

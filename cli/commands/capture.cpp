@@ -1,28 +1,58 @@
-#include "capture/capture.h"
-
 #include <fmt/format.h>
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "capture/capture.h"
 #include "cli/command.h"
+#include "cli/pipeline/capture_page.h"
+#include "cli/pipeline/ingest.h"
+#include "cli/video_options.h"
+#include "dtr/base/error.h"
+#include "dtr/base/files.h"
+#include "dtr/io/image_io.h"
 
 namespace dtr::cli {
 namespace {
 
+namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
+
+struct Options {
+  fs::path source, output;
+  capture::VideoOptions video;
+  std::vector<std::string> drop;
+  bool force = false;
+};
+
+Json ToJson(const capture::Photo& photo) {
+  Json json{{"name", photo.name},
+            {"width_px", photo.width_px},
+            {"height_px", photo.height_px},
+            {"focal_prior_px", photo.focal_prior_px ? Json(*photo.focal_prior_px) : Json(nullptr)},
+            {"camera_group", photo.camera_group}};
+  if (const auto& frame = photo.video_frame) {
+    json["video"] = frame->video;
+    json["frame"] = frame->number;
+    json["time_s"] = frame->time_s;
+  }
+  if (const auto& screening = photo.screening) {
+    json["sharpness"] = screening->sharpness;
+    json["overexposed_share"] = screening->overexposed_share;
+    json["underexposed_share"] = screening->underexposed_share;
+    json["faults"] = Json::array();
+    for (const capture::Fault fault : screening->faults) {
+      json["faults"].push_back(capture::NameOf(fault));
+    }
+    json["remarks"] = screening->remarks;
+  }
+  return json;
+}
 
 std::string ToJson(const capture::Capture& capture) {
   Json json;
   json["photos"] = Json::array();
-  for (const auto& photo : capture.photos) {
-    json["photos"].push_back(
-        {{"name", photo.name},
-         {"width_px", photo.width_px},
-         {"height_px", photo.height_px},
-         {"focal_prior_px", photo.focal_prior_px ? Json(*photo.focal_prior_px) : Json(nullptr)},
-         {"camera_group", photo.camera_group}});
-  }
+  for (const auto& photo : capture.photos) json["photos"].push_back(ToJson(photo));
   json["skipped"] = Json::array();
   for (const auto& skipped : capture.skipped) {
     json["skipped"].push_back({{"name", skipped.name}, {"reason", skipped.reason}});
@@ -30,30 +60,88 @@ std::string ToJson(const capture::Capture& capture) {
   return json.dump(1);
 }
 
+std::vector<capture::Fault> FaultsIn(const std::vector<std::string>& names) {
+  std::vector<capture::Fault> faults;
+  for (const std::string& name : names) {
+    const auto fault = capture::FaultCalled(name);
+    if (!fault) {
+      throw UsageError(
+          fmt::format("--drop {}: expected blurred, overexposed, underexposed or duplicate", name));
+    }
+    faults.push_back(*fault);
+  }
+  return faults;
+}
+
+void Say(const capture::Capture& capture, const fs::path& output, Console& console) {
+  console.Say(fmt::format("{}: {} photos", output.string(), capture.photos.size()));
+  for (const auto& photo : capture.photos) {
+    if (!photo.screening) continue;
+    for (const auto& remark : photo.screening->remarks) {
+      console.Say(fmt::format("  {}: {}", photo.name, remark));
+    }
+  }
+  for (const auto& skipped : capture.skipped) {
+    console.Say(fmt::format("  skipped: {}: {}", skipped.name, skipped.reason));
+  }
+  console.Say(fmt::format("  to look at: {}", (output / capture::kPageFile).string()));
+}
+
+// Removes the frames of a video once they lie in the capture, or nothing is to come of them.
+struct FramesFolder {
+  fs::path path;
+  ~FramesFolder() {
+    std::error_code ignored;
+    fs::remove_all(path, ignored);
+  }
+};
+
+int Run(const Options& options, const Context& context) {
+  const std::vector<capture::Fault> drop = FaultsIn(options.drop);
+  const capture::StoreOptions store{options.force, context.common.threads};
+  capture::RequireRoom(options.output, store);
+  const fs::path output = WithoutTrailingSlash(options.output);
+  const FramesFolder frames{output.string() + ".frames.partial"};
+  capture::VideoOptions video = options.video;
+  video.threads = context.common.threads;
+  capture::Capture ingested = pipeline::Ingest(options.source, video, frames.path, context.console);
+  capture::DropFaulty(ingested, drop);
+  if (ingested.photos.empty()) {
+    throw Error(fmt::format("{}: expected photos without the faults of --drop, found none",
+                            options.source.string()));
+  }
+  const auto look = pipeline::LookAt(ingested, "Photos of " + options.source.filename().string(),
+                                     context.common.threads, context.console);
+  capture::WriteCapture(ingested, output, store, context.console);
+  io::WriteImage(output / capture::kContactSheetFile, look.contact_sheet);
+  WriteFileAtomically(output / capture::kPageFile, look.page);
+  Say(ingested, output, context.console);
+  context.EmitJson(ToJson(ingested));
+  return kDone;
+}
+
 }  // namespace
 
 void AddCaptureCommand(CLI::App& app) {
-  struct Options {
-    std::filesystem::path source, output;
-  };
-  AddCommand(
-      app, "capture", "Ingest a folder of photos: orientation, EXIF priors, screening",
-      "dtr capture photos/ -o capture/", [](CLI::App& command) -> Action {
-        auto options = std::make_shared<Options>();
-        command.add_option("SRC", options->source, "Folder of photos")->required();
-        command.add_option("-o,--output", options->output, "Folder to write")->required();
-        return [options](const Context& context) -> int {
-          const auto ingested = capture::IngestPhotos(options->source, {}, context.console);
-          capture::WriteCapture(ingested, options->output, context.common.threads);
-          context.console.Say(
-              fmt::format("{}: {} photos", options->output.string(), ingested.photos.size()));
-          for (const auto& skipped : ingested.skipped) {
-            context.console.Say(fmt::format("  skipped: {}: {}", skipped.name, skipped.reason));
-          }
-          context.EmitJson(ToJson(ingested));
-          return kDone;
-        };
-      });
+  AddCommand(app, "capture", "Ingest photos or videos: frames, orientation, EXIF priors, screening",
+             "dtr capture walk.mp4 -o capture/ --max-frames 100", [](CLI::App& command) -> Action {
+               auto options = std::make_shared<Options>();
+               command
+                   .add_option("SRC", options->source,
+                               "Folder of photos, a video, or a folder of nothing but videos")
+                   ->required();
+               command.add_option("-o,--output", options->output, "Folder to write")->required();
+               command
+                   .add_option(
+                       "--drop", options->drop,
+                       "Leave photos with these faults out: blurred, overexposed, underexposed, "
+                       "duplicate; else they are only named")
+                   ->delimiter(',')
+                   ->type_name("FAULT,...");
+               AddVideoOptions(command, options->video);
+               command.add_flag("--force", options->force, "Replace a capture that exists");
+               return [options](const Context& context) { return Run(*options, context); };
+             });
 }
 
 }  // namespace dtr::cli

@@ -12,7 +12,7 @@
 
 #include "calib/boards/repeats.h"
 #include "capture/ingest.h"
-#include "cli/pipeline/video_frames.h"
+#include "capture/video/frames.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/base/parallel_for.h"
@@ -189,7 +189,7 @@ Layout FromVideos(const fs::path& folder, const std::vector<fs::path>& videos) {
                       video.string()));
     }
     int frames = 0;
-    ForEachFrame(video, [&](int number, const ImageRgb8&) {
+    capture::ForEachFrame(video, [&](int number, const ImageRgb8&) {
       frames = number + 1;
       return true;
     });
@@ -228,7 +228,7 @@ Layout LayoutOf(const fs::path& folder) {
   } else if (const auto videos = Sorted(folder,
                                         [](const fs::path& p) {
                                           return fs::is_regular_file(p) &&
-                                                 IsVideoExtension(p.extension().string());
+                                                 capture::IsVideoExtension(p.extension().string());
                                         });
              videos.size() >= 2) {
     layout = FromVideos(folder, videos);
@@ -289,7 +289,7 @@ void LookAtAll(const calib::Board& board, const calib::DetectOptions& options, i
       });
       pending.clear();
     };
-    ForEachFrame(video, [&](int number, const ImageRgb8& image) {
+    capture::ForEachFrame(video, [&](int number, const ImageRgb8& image) {
       const auto at = wanted.find(number);
       if (at != wanted.end()) pending.emplace_back(at->second, image);
       if (pending.size() >= kFramesAtOnce) flush();

@@ -7,6 +7,7 @@
 
 #include "capture/screening.h"
 #include "dtr/base/error.h"
+#include "dtr/base/random.h"
 #include "tests/capture/photo_files.h"
 #include "tests/support/test_data.h"
 
@@ -236,6 +237,51 @@ TEST(Screening, DuplicatesBlurAndClippingAreRemarkedAndNothingIsDropped) {
   EXPECT_THAT(capture.photos[1].screening->remarks.back(), HasSubstr("overexposed"));
   EXPECT_THAT(capture.photos[2].screening->remarks, IsEmpty());
   EXPECT_EQ(capture.photos[6].screening->duplicate_of, "sharp1.png");
+}
+
+// A photo of soft blobs, seen from `shift` pixels further right, with noise of that many levels.
+ImageRgb8 Blobs(double shift_px, int noise, std::uint64_t seed) {
+  Random random(seed);
+  ImageRgb8 image(400, 300, 3);
+  for (int y = 0; y < 300; ++y) {
+    for (int x = 0; x < 400; ++x) {
+      const double value = 120 + 60 * std::sin((x + shift_px) / 9) * std::cos(y / 7.0);
+      const int grain = noise > 0 ? static_cast<int>(random.Index(2 * noise + 1)) - noise : 0;
+      for (int c = 0; c < 3; ++c) image(x, y, c) = static_cast<std::uint8_t>(value + grain);
+    }
+  }
+  return image;
+}
+
+TEST(JudgePhotos, ShotsOfOnePictureAreDuplicatesAndASmallStepIsNone) {
+  const TemporaryFolder folder;
+  io::WriteImage(folder / "a.png", Blobs(0, 3, 1));
+  io::WriteImage(folder / "b.png", Blobs(0, 3, 2));  // from the same tripod
+  io::WriteImage(folder / "c.png", Blobs(2, 3, 3));  // half a per cent of the picture further
+  io::WriteImage(folder / "d.png", Blobs(2, 3, 4));
+  const Capture capture = Ingest(folder.path());
+  ASSERT_EQ(capture.photos.size(), 4u);
+  EXPECT_THAT(capture.photos[0].screening->faults, IsEmpty());
+  EXPECT_THAT(capture.photos[1].screening->faults, ElementsAre(Fault::kDuplicate));
+  EXPECT_EQ(capture.photos[1].screening->duplicate_of, "a.png");
+  EXPECT_THAT(capture.photos[1].screening->remarks[0], HasSubstr("same picture as a.png"));
+  EXPECT_EQ(capture.photos[2].screening->duplicate_of, "");
+  EXPECT_EQ(capture.photos[3].screening->duplicate_of, "c.png");
+}
+
+TEST(DropFaulty, TakesOutWhatIsAskedForAndListsIt) {
+  const TemporaryFolder folder;
+  io::WriteImage(folder / "a.png", Blobs(0, 3, 1));
+  io::WriteImage(folder / "b.png", Blobs(0, 3, 2));
+  io::WriteImage(folder / "white.png", ImageRgb8(400, 300, 3, 255));
+  Capture capture = Ingest(folder.path());
+  DropFaulty(capture, {});
+  EXPECT_EQ(capture.photos.size(), 3u);
+  DropFaulty(capture, {Fault::kOverexposed, Fault::kDuplicate});
+  EXPECT_THAT(NamesOf(capture), ElementsAre("a.png"));
+  ASSERT_EQ(capture.skipped.size(), 2u);
+  EXPECT_EQ(capture.skipped[0].name, "b.png");
+  EXPECT_THAT(capture.skipped[1].reason, HasSubstr("dropped: 100 % of it is overexposed"));
 }
 
 TEST(MeasurePhoto, SharpnessIgnoresContrastAndFallsWithBlur) {

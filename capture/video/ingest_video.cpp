@@ -1,0 +1,233 @@
+#include "capture/video/ingest_video.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <memory>
+
+#include "capture/ingest.h"
+#include "capture/screening.h"
+#include "capture/video/frame_chooser.h"
+#include "capture/video/frames.h"
+#include "dtr/base/error.h"
+#include "dtr/base/parallel_for.h"
+#include "dtr/io/image_io.h"
+#include "dtr/types/area_average.h"
+
+namespace dtr::capture {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr int kSmallSidePx = 320;   // motion is looked at in such pictures
+constexpr int kJpegQuality = 98;    // the video lost more before
+constexpr double kSameRate = 1e-3;  // relative
+constexpr double kCutShort = 0.98;  // of the promised frames; headers count a few too many
+constexpr int kSaidEvery = 10;      // frames between two words of progress
+
+using Videos = std::vector<fs::path>;
+
+// Videos whose frames are taken together: one, or those of a rig.
+class Together {
+ public:
+  explicit Together(const Videos& files) : files_(files) {
+    for (const fs::path& file : files) readers_.push_back(std::make_unique<VideoReader>(file));
+  }
+
+  // To the next instant; false once one of the videos has no more.
+  bool Next() {
+    bool all = true;
+    for (const auto& reader : readers_) all = reader->Next() && all;
+    return all;
+  }
+  int number() const { return readers_.front()->number(); }
+  double time_s() const { return readers_.front()->time_s(); }
+  const std::vector<std::unique_ptr<VideoReader>>& readers() const { return readers_; }
+
+  void RequireOneRate() const {
+    const double first = readers_.front()->frames_per_second();
+    for (size_t i = 1; i < readers_.size(); ++i) {
+      const double rate = readers_[i]->frames_per_second();
+      if (std::abs(rate - first) <= kSameRate * first) continue;
+      throw Error(
+          fmt::format("{}: expected {:.3f} frames per second as in {}, found {:.3f}; synchronised "
+                      "videos run at one rate",
+                      files_[i].string(), first, files_.front().string(), rate));
+    }
+  }
+
+ private:
+  const Videos& files_;
+  std::vector<std::unique_ptr<VideoReader>> readers_;
+};
+
+Grid<std::uint8_t> SmallGrey(const ImageRgb8& picture) {
+  const auto [width, height] = TargetSize(picture.width(), picture.height(), kSmallSidePx);
+  const ImageRgb8 small = AreaAverage(picture, width, height);
+  Grid<std::uint8_t> grey(width, height);
+  for (size_t i = 0; i < grey.data().size(); ++i) {
+    grey.data()[i] = static_cast<std::uint8_t>(Luma(&small.data()[3 * i]) / 256);
+  }
+  return grey;
+}
+
+double MeanSharpness(const std::vector<ImageRgb8>& pictures) {
+  double product = 1;
+  for (const ImageRgb8& picture : pictures) product *= Sharpness(picture);
+  return std::pow(product, 1.0 / static_cast<double>(pictures.size()));
+}
+
+std::vector<ImageRgb8> PicturesOf(const Together& videos) {
+  std::vector<ImageRgb8> pictures;
+  for (const auto& reader : videos.readers()) pictures.push_back(reader->Picture());
+  return pictures;
+}
+
+struct Choice {
+  std::vector<ChosenFrame> frames;
+  int seen = 0;  // frames that could be decoded of all videos
+};
+
+Choice ChooseFrames(const Videos& files, const VideoOptions& options, Progress& progress) {
+  Together videos(files);
+  videos.RequireOneRate();
+  progress.Stage("choosing frames", videos.readers().front()->frames_promised());
+  Choice choice;
+  FrameChooser chooser(options.motion);
+  while (videos.Next()) {
+    progress.ThrowIfInterrupted();
+    const int number = videos.number();
+    choice.seen = number + 1;
+    if (choice.seen % kSaidEvery == 0) progress.Update(choice.seen);
+    if (options.every > 0) {
+      if (number % options.every != 0) continue;
+      const double sharpness = options.most > 0 ? MeanSharpness(PicturesOf(videos)) : 0;
+      choice.frames.push_back({number, videos.time_s(), 0, sharpness});
+      continue;
+    }
+    const std::vector<ImageRgb8> pictures = PicturesOf(videos);
+    Instant instant{number, videos.time_s(), {}, [&] { return MeanSharpness(pictures); }};
+    for (const ImageRgb8& picture : pictures) instant.greys.push_back(SmallGrey(picture));
+    chooser.Add(std::move(instant));
+  }
+  progress.Update(choice.seen);
+  if (choice.seen == 0) {
+    throw Error(fmt::format("{}: expected frames, found none", files.front().string()));
+  }
+  if (options.every == 0) choice.frames = chooser.Finish();
+  if (choice.frames.empty()) {
+    throw Error(fmt::format("{}: expected frames with texture, found none among {}; give --every",
+                            files.front().string(), choice.seen));
+  }
+  choice.frames = Thinned(choice.frames, options.most);
+  return choice;
+}
+
+// Writes the chosen frames and notes under its name what each is.
+void WriteFrames(const Videos& files, const std::vector<fs::path>& folders,
+                 const std::vector<ChosenFrame>& frames, const fs::path& top, int threads,
+                 std::map<std::string, VideoFrame>& origins, Progress& progress) {
+  progress.Stage("writing frames", static_cast<int>(frames.size()));
+  for (const fs::path& folder : folders) fs::create_directories(top / folder);
+  Together videos(files);
+  for (size_t next = 0; next < frames.size() && videos.Next();) {
+    if (videos.number() != frames[next].number) continue;
+    progress.ThrowIfInterrupted();
+    const std::vector<ImageRgb8> pictures = PicturesOf(videos);
+    ParallelFor(0, static_cast<int>(pictures.size()), threads, [&](int i) {
+      const fs::path name =
+          folders[static_cast<size_t>(i)] / fmt::format("frame_{:06}.jpg", frames[next].number);
+      io::WriteImage(top / name, pictures[static_cast<size_t>(i)], kJpegQuality);
+    });
+    for (size_t i = 0; i < files.size(); ++i) {
+      const fs::path name = folders[i] / fmt::format("frame_{:06}.jpg", frames[next].number);
+      origins[name.generic_string()] = {files[i].filename().string(), frames[next].number,
+                                        frames[next].time_s};
+    }
+    progress.Update(static_cast<int>(++next));
+  }
+}
+
+// Videos that hold less than they promise, or more than is taken of them.
+void ListLosses(const Videos& files, int seen, std::vector<Skipped>& skipped) {
+  for (const fs::path& file : files) {
+    const int promised = VideoReader(file).frames_promised();
+    if (seen >= kCutShort * promised) continue;
+    skipped.push_back(
+        {file.filename().string(),
+         fmt::format("frames from {} on: the file says it has {}; {}", seen, promised,
+                     files.size() > 1 ? "it or another of the synchronised videos ends there"
+                                      : "it is cut short or damaged there")});
+  }
+}
+
+// Where a video's frames go: nowhere special where it is alone.
+fs::path FolderFor(const fs::path& video, const Videos& videos) {
+  if (videos.size() == 1) return {};
+  const auto called = std::count_if(videos.begin(), videos.end(), [&](const fs::path& other) {
+    return other.stem() == video.stem();
+  });
+  return called == 1 ? video.stem() : video.filename();
+}
+
+void RequireOptions(const VideoOptions& options) {
+  if (options.every < 0) throw UsageError("--every: expected a number of frames above 0");
+  if (options.most < 0) throw UsageError("--max-frames: expected a number of frames above 0");
+  if (!(options.motion > 0 && options.motion <= 1)) {
+    throw UsageError(fmt::format(
+        "--motion: expected a share of the picture above 0 and up to 1, found {}", options.motion));
+  }
+}
+
+}  // namespace
+
+Videos VideosOf(const fs::path& source) {
+  std::error_code error;
+  if (fs::is_regular_file(source, error)) {
+    return IsVideoExtension(source.extension().string()) ? Videos{source} : Videos{};
+  }
+  Videos videos;
+  fs::directory_iterator entries(source, error);
+  for (; !error && entries != fs::directory_iterator(); entries.increment(error)) {
+    const fs::path& path = entries->path();
+    if (path.filename().string().front() == '.') continue;
+    std::error_code ignored;
+    if (entries->is_directory(ignored)) return {};  // photos may lie below
+    if (IsImageExtension(path.extension().string())) return {};
+    if (IsVideoExtension(path.extension().string())) videos.push_back(path);
+  }
+  std::sort(videos.begin(), videos.end());
+  return videos;
+}
+
+Capture IngestVideos(const Videos& videos, const VideoOptions& options, const fs::path& folder,
+                     Progress& progress) {
+  RequireOptions(options);
+  std::vector<Videos> groups;
+  if (options.synchronised) {
+    groups.push_back(videos);
+  } else {
+    for (const fs::path& video : videos) groups.push_back({video});
+  }
+  std::map<std::string, VideoFrame> origins;
+  std::vector<Skipped> losses;
+  for (const Videos& group : groups) {
+    std::vector<fs::path> folders;
+    for (const fs::path& video : group) folders.push_back(FolderFor(video, videos));
+    const Choice choice = ChooseFrames(group, options, progress);
+    ListLosses(group, choice.seen, losses);
+    WriteFrames(group, folders, choice.frames, folder, options.threads, origins, progress);
+  }
+  Capture capture = IngestPhotos(folder, {.threads = options.threads}, progress);
+  for (Photo& photo : capture.photos) {
+    photo.video_frame = origins.at(photo.name);
+    photo.camera_group =
+        fmt::format("video {}|{}x{}", photo.video_frame->video, photo.width_px, photo.height_px);
+  }
+  capture.skipped.insert(capture.skipped.end(), losses.begin(), losses.end());
+  JudgePhotos(capture.photos);
+  return capture;
+}
+
+}  // namespace dtr::capture

@@ -1,0 +1,37 @@
+// capture/video/picture_motion.h -- how far the picture of a camera has moved.
+#pragma once
+#include <memory>
+
+#include "dtr/types/grid.h"
+
+namespace dtr::capture {
+
+/// Follows corners of one picture through the pictures after it (Shi & Tomasi 1994, "Good features
+/// to track"; Lucas & Kanade with pyramids, Bouguet 2000), there and back: a corner that does not
+/// come back to where it was is dropped.
+class PictureMotion {
+ public:
+  /// What has become of the first picture's corners.
+  struct State {
+    double moved = 0;  ///< median way of those still followed, of the picture's long side
+    double kept = 1;   ///< share of them still followed
+  };
+
+  /// `grey`: 8-bit luma, one channel. Some 300 px wide do: the way of corners is wanted, not
+  /// detail.
+  explicit PictureMotion(const Grid<std::uint8_t>& grey);
+  ~PictureMotion();
+  PictureMotion(PictureMotion&&) noexcept;
+  PictureMotion& operator=(PictureMotion&&) noexcept;
+
+  /// False where the first picture has too few corners to say anything.
+  bool has_texture() const;
+  /// `grey` is the next picture, of the same size.
+  State Follow(const Grid<std::uint8_t>& grey);
+
+ private:
+  struct Corners;
+  std::unique_ptr<Corners> corners_;
+};
+
+}  // namespace dtr::capture
