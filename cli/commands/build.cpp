@@ -5,6 +5,7 @@
 #include "cli/command.h"
 #include "cli/depth_options.h"
 #include "cli/pipeline/build_set.h"
+#include "cli/video_options.h"
 
 namespace dtr::cli {
 namespace {
@@ -33,13 +34,17 @@ void SayResult(const pipeline::BuildOptions& options, const pipeline::BuildRepor
 
 void AddBuildCommand(CLI::App& app) {
   AddCommand(
-      app, "build", "Build a D+TR set from a folder of photos",
+      app, "build", "Build a D+TR set from photos or videos",
       "dtr build photos/ -o scene.dtr --holdout every:8", [](CLI::App& command) -> Action {
         auto options = std::make_shared<pipeline::BuildOptions>();
-        command.add_option("PHOTOS", options->photos, "Folder of photos")->required();
+        command
+            .add_option("PHOTOS", options->photos,
+                        "Folder of photos, a video, or a folder of videos")
+            ->required();
         command.add_option("-o,--output", options->output, "The set to write, NAME.dtr")
             ->required()
             ->type_name("SET.dtr");
+        AddVideoOptions(command, options->video);
         command
             .add_option("--holdout", options->holdout,
                         "Photos kept out of depth and textures, to measure with")

@@ -8,11 +8,13 @@
 #include "calib/sparse_from_sfm.h"
 #include "calib/undistort.h"
 #include "capture/ingest.h"
+#include "capture/store.h"
 #include "cli/pipeline/calibrated_photos.h"
 #include "cli/pipeline/depth_engine.h"
 #include "cli/pipeline/depth_stage.h"
 #include "cli/pipeline/finishing.h"
 #include "cli/pipeline/holdout.h"
+#include "cli/pipeline/ingest.h"
 #include "cli/pipeline/input_hash.h"
 #include "cli/pipeline/run_log.h"
 #include "cli/pipeline/set_page.h"
@@ -54,8 +56,35 @@ Json PhotosJson(const capture::Capture& capture, const std::vector<bool>& with_h
     photos.push_back(
         {{"name", photo.name}, {"width_px", photo.width_px}, {"height_px", photo.height_px}});
     if (with_hash[i]) photos.back()["sha256"] = photo.source_sha256;
+    if (const auto& frame = photo.video_frame) {
+      photos.back()["video"] = frame->video;
+      photos.back()["frame"] = frame->number;
+    }
   }
   return photos;
+}
+
+// What a video is known by before its frames are chosen: equal values give the same frames.
+Json VideoJson(const BuildOptions& options) {
+  return {{"sha256", InputHash(options.photos)},
+          {"every", options.video.every},
+          {"motion", options.video.motion},
+          {"max_frames", options.video.most},
+          {"synchronised", options.video.synchronised}};
+}
+
+// The frames of a video, chosen once: a later run of the same build finds them in `folder`.
+capture::Capture FramesOf(const BuildOptions& options, const std::filesystem::path& folder,
+                          Progress& progress) {
+  const std::filesystem::path kept = folder / "capture", fresh = folder / "frames";
+  if (!std::filesystem::exists(kept / capture::kCaptureFile)) {
+    capture::VideoOptions video = options.video;
+    video.threads = options.threads;
+    const capture::Capture frames = Ingest(options.photos, video, fresh, progress);
+    capture::WriteCapture(frames, kept, {.replace = false, .threads = options.threads}, progress);
+    std::filesystem::remove_all(fresh);
+  }
+  return capture::ReadCapture(kept);
 }
 
 // Views of the registered photos, in the photos' order; their pixels, on the set's grid, are
@@ -211,21 +240,34 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
 
   RequireCalibration(options.poses);
   log.Begin("capture");
-  const capture::Capture photos = capture::IngestPhotos(options.photos, {}, progress);
-  capture::RequireEnoughPhotos(photos, options.photos);
-  for (const auto& skipped : photos.skipped)
-    report.skipped.emplace_back(skipped.name, skipped.reason);
-  const std::vector<bool> held_out = ChooseHeldOut(options.holdout, NamesOf(photos));
-  std::vector<bool> is_source = held_out;
-  is_source.flip();
+  const bool from_video = !capture::VideosOf(options.photos).empty();
+  capture::Capture photos;
+  std::vector<bool> held_out;
+  const auto look = [&] {
+    capture::RequireEnoughPhotos(photos, options.photos);
+    held_out = ChooseHeldOut(options.holdout, NamesOf(photos));
+  };
+  if (!from_video) {
+    photos = capture::IngestPhotos(options.photos, {.threads = options.threads}, progress);
+    look();
+  }
   const Json fingerprint = {
       {"tool_version", DTR_VERSION},
       {"options", OptionsJson(options, effort, max_size_px)},
       {"time_budget_s", options.depth.time_budget_s.value_or(0)},
-      {"photos", PhotosJson(photos, std::vector<bool>(held_out.size(), true))},
+      {"photos", from_video ? VideoJson(options)
+                            : PhotosJson(photos, std::vector<bool>(held_out.size(), true))},
       {"poses_sha256", InputHash(options.poses)},
       {"workspace_sha256", InputHash(options.depth.workspace)}};
   io::SetWriter writer(options.output, fingerprint.dump(), options.force);
+  if (from_video) {
+    photos = FramesOf(options, writer.work_folder(), progress);
+    look();
+  }
+  for (const auto& skipped : photos.skipped)
+    report.skipped.emplace_back(skipped.name, skipped.reason);
+  std::vector<bool> is_source = held_out;
+  is_source.flip();
 
   log.Begin("calibration");
   const CalibratedPhotos calibrated =

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "capture/video/ingest_video.h"
 #include "cli/pipeline/depth_settings.h"
 #include "dtr/base/progress.h"
 #include "dtr/types/dtr_set.h"
@@ -13,7 +14,8 @@ namespace dtr::pipeline {
 
 /// Options of `dtr build`, by the same names.
 struct BuildOptions {
-  std::filesystem::path photos;  ///< folder
+  std::filesystem::path photos;  ///< folder, a video, or a folder of nothing but videos
+  capture::VideoOptions video;   ///< its threads are those below
   std::filesystem::path output;  ///< NAME.dtr
   std::string holdout;           ///< "", "every:N" or names
   bool holdout_strict = false;
