@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cmath>
 #include <numbers>
+#include <stdexcept>
 
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
@@ -71,7 +72,37 @@ void Sample(const ImageRgb8& photo, const Eigen::Vector2d& pixel, std::uint8_t* 
   for (size_t c = 0; c < 3; ++c) rgb[c] = ToByte(sum[c]);
 }
 
-UndistortedPhoto UndistortFullSize(const ImageRgb8& photo, const LensCamera& lens, int threads) {
+// False where one of the 4 pixels about `pixel` may not be used. `usable` may be empty.
+bool IsUsable(const Mask& usable, const Eigen::Vector2d& pixel) {
+  if (usable.empty()) return true;
+  const int x = static_cast<int>(std::floor(pixel.x() - 0.5));
+  const int y = static_cast<int>(std::floor(pixel.y() - 0.5));
+  for (int j = y; j <= y + 1; ++j) {
+    for (int i = x; i <= x + 1; ++i) {
+      if (usable(std::clamp(i, 0, usable.width() - 1), std::clamp(j, 0, usable.height() - 1)) ==
+          0) {
+        return false;
+      }
+    }
+  }
+  return true;
+}
+
+// Without a lens only the mask remains to be applied.
+UndistortedPhoto AsItIs(const ImageRgb8& photo, const Mask& usable, const LensCamera& lens) {
+  UndistortedPhoto out{photo, {}, lens.Pinhole()};
+  const bool all = std::all_of(usable.data().begin(), usable.data().end(),
+                               [](auto value) { return value != 0; });
+  if (all) return out;
+  out.mask = usable;
+  for (size_t i = 0; i < out.mask.data().size(); ++i) {
+    if (out.mask.data()[i] == 0) std::fill_n(&out.image.data()[3 * i], 3, std::uint8_t{0});
+  }
+  return out;
+}
+
+UndistortedPhoto UndistortFullSize(const ImageRgb8& photo, const Mask& usable,
+                                   const LensCamera& lens, int threads) {
   const LensMap map(lens);
   const int width = photo.width(), height = photo.height();
   UndistortedPhoto out{ImageRgb8(width, height, 3), Mask(width, height), lens.Pinhole()};
@@ -81,7 +112,7 @@ UndistortedPhoto UndistortFullSize(const ImageRgb8& photo, const LensCamera& len
     for (int x = 0; x < width; ++x) {
       const auto pixel = map.PixelFromCam(out.camera.RayFromPixel({x + 0.5, y + 0.5}));
       const bool has_source = pixel && pixel->x() >= 0 && pixel->y() >= 0 && pixel->x() <= width &&
-                              pixel->y() <= height;
+                              pixel->y() <= height && IsUsable(usable, *pixel);
       missing |= !has_source;
       if (!has_source) continue;
       out.mask(x, y) = 255;
@@ -109,7 +140,15 @@ void Shrink(UndistortedPhoto& photo, int width, int height) {
 
 UndistortedPhoto Undistort(const ImageRgb8& photo, const LensCamera& lens, int max_size_px,
                            int threads) {
+  return Undistort(photo, {}, lens, max_size_px, threads);
+}
+
+UndistortedPhoto Undistort(const ImageRgb8& photo, const Mask& usable, const LensCamera& lens,
+                           int max_size_px, int threads) {
   lens.Check();
+  if (!usable.empty() && (usable.width() != photo.width() || usable.height() != photo.height())) {
+    throw std::invalid_argument("Undistort: mask and photo differ in size");
+  }
   if (photo.width() != lens.width_px || photo.height() != lens.height_px || photo.channels() != 3) {
     throw Error("undistortion: expected a photo of " + std::to_string(lens.width_px) + "x" +
                 std::to_string(lens.height_px) +
@@ -117,8 +156,8 @@ UndistortedPhoto Undistort(const ImageRgb8& photo, const LensCamera& lens, int m
                 "x" + std::to_string(photo.height()) + " and " + std::to_string(photo.channels()) +
                 "; calibrate with the photo as it is");
   }
-  UndistortedPhoto out = lens.IsUndistorted() ? UndistortedPhoto{photo, {}, lens.Pinhole()}
-                                              : UndistortFullSize(photo, lens, threads);
+  UndistortedPhoto out = lens.IsUndistorted() ? AsItIs(photo, usable, lens)
+                                              : UndistortFullSize(photo, usable, lens, threads);
   const auto [width, height] = TargetSize(photo.width(), photo.height(), max_size_px);
   if (width != photo.width() || height != photo.height()) Shrink(out, width, height);
   return out;

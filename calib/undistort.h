@@ -31,6 +31,10 @@ struct UndistortedPhoto {
 /// std::invalid_argument when the lens is impossible.
 UndistortedPhoto Undistort(const ImageRgb8& photo, const LensCamera& lens, int max_size_px,
                            int threads);
+/// The same for a photo of which only part may be used (`usable` not 0; empty: all): pixels whose
+/// value lies between others that may not be used are masked too.
+UndistortedPhoto Undistort(const ImageRgb8& photo, const Mask& usable, const LensCamera& lens,
+                           int max_size_px, int threads);
 
 /// Where a pixel of the photo lies on the undistorted (and possibly shrunk) grid; may be off the
 /// image. Empty where the lens has no ray or the ray does not point forward.

@@ -116,6 +116,9 @@ Json ToJson(const Photo& photo) {
     json["video_frame"] = {
         {"video", frame->video}, {"number", frame->number}, {"time_s", frame->time_s}};
   }
+  if (!photo.mask_file.empty()) {
+    json["mask"] = {{"file", photo.mask_file.generic_string()}, {"sha256", photo.mask_sha256}};
+  }
   json["source_sha256"] = photo.source_sha256;
   json["screening"] = photo.screening ? ToJson(*photo.screening) : Json();
   return json;
@@ -183,6 +186,12 @@ Photo PhotoFrom(const Node& node) {
     photo.video_frame = {(*frame)["video"].Text(),
                          (*frame)["number"].Int(0, std::numeric_limits<int>::max()),
                          (*frame)["time_s"].Number(-kHuge, kHuge)};
+  }
+  if (const auto mask = node.Optional("mask")) {
+    const std::string mask_file = (*mask)["file"].Text();
+    io::RequireSafeName(mask_file, (*mask)["file"].where());
+    photo.mask_file = mask_file;
+    photo.mask_sha256 = (*mask)["sha256"].Text();
   }
   photo.source_sha256 = node["source_sha256"].Text();
   if (!node["screening"].IsNull()) photo.screening = ScreeningFrom(node["screening"]);

@@ -4,6 +4,8 @@
 #include <atomic>
 #include <cmath>
 #include <cstdio>
+#include <cstring>
+#include <map>
 #include <set>
 #include <system_error>
 
@@ -60,7 +62,8 @@ std::string PrintableName(const std::string& name) {
 }
 
 struct Listing {
-  std::vector<std::string> names;  // relative, '/' between parts
+  std::vector<std::string> names;            // of photos; relative, '/' between parts
+  std::map<std::string, std::string> masks;  // by the photo's name
   std::vector<Skipped> skipped;
   int ignored = 0;  // files without an image extension
 };
@@ -112,6 +115,27 @@ void ListFolder(const fs::path& top, const std::string& below, bool recurse, Lis
   listing.skipped.push_back({PrintableName(below), reason});
 }
 
+std::string WithoutExtension(const std::string& name) {
+  return fs::path(name).replace_extension().generic_string();
+}
+
+// Tells masks from photos: "a_mask.png" is one where there is an "a.jpg".
+void SeparateMasks(Listing& listing) {
+  constexpr char kEnd[] = "_mask";
+  std::multimap<std::string, std::string> by_stem;
+  for (const std::string& name : listing.names) by_stem.emplace(WithoutExtension(name), name);
+  std::vector<std::string> photos;
+  for (const std::string& name : listing.names) {
+    const std::string stem = WithoutExtension(name);
+    const auto [first, last] = EndsWith(stem, kEnd)
+                                   ? by_stem.equal_range(stem.substr(0, stem.size() - strlen(kEnd)))
+                                   : std::pair(by_stem.end(), by_stem.end());
+    for (auto photo = first; photo != last; ++photo) listing.masks.emplace(photo->second, name);
+    if (first == last) photos.push_back(name);
+  }
+  listing.names = std::move(photos);
+}
+
 std::string CameraGroup(const Photo& photo, const io::ImageHeader& header) {
   const auto known = [](const std::string& text) { return text.empty() ? "unknown" : text; };
   char focal[48] = "unknown";
@@ -128,7 +152,8 @@ std::string CameraGroup(const Photo& photo, const io::ImageHeader& header) {
   return group;
 }
 
-Photo InspectPhoto(const fs::path& file, const std::string& name, bool screen) {
+Photo InspectPhoto(const fs::path& file, const std::string& name, const fs::path& mask,
+                   bool screen) {
   std::error_code error;
   if (!fs::is_regular_file(file, error)) throw Error("is no regular file");
   const io::ImageHeader header = io::ReadImageHeader(file);
@@ -149,6 +174,11 @@ Photo InspectPhoto(const fs::path& file, const std::string& name, bool screen) {
   photo.gps = header.gps;
   photo.camera_group = CameraGroup(photo, header);
   photo.source_sha256 = Sha256OfFile(file);
+  if (!mask.empty()) {
+    photo.mask_file = mask;
+    photo.mask_sha256 = Sha256OfFile(mask);
+    (void)ReadPhotoMask(photo);  // one that cannot be used is known now
+  }
   if (screen) photo.screening = MeasurePhoto(ReadPhoto(photo));
   return photo;
 }
@@ -226,6 +256,7 @@ Capture IngestPhotos(const fs::path& folder, const IngestOptions& options, Progr
   Listing listing;
   ListFolder(folder, "", options.recurse, listing);
   std::sort(listing.names.begin(), listing.names.end());
+  SeparateMasks(listing);
 
   const int count = static_cast<int>(listing.names.size());
   progress.Stage("photos", count);
@@ -237,7 +268,10 @@ Capture IngestPhotos(const fs::path& folder, const IngestOptions& options, Progr
     const auto index = static_cast<size_t>(i);
     const std::string& name = listing.names[index];
     try {
-      photos[index] = InspectPhoto(folder / name, name, options.screen);
+      const auto mask = listing.masks.find(name);
+      photos[index] = InspectPhoto(folder / name, name,
+                                   mask == listing.masks.end() ? fs::path() : folder / mask->second,
+                                   options.screen);
     } catch (const Error& e) {
       reasons[index] = ReasonFrom(e.what(), folder / name, name);
     }

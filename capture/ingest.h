@@ -21,10 +21,10 @@ struct IngestOptions {
 /// image format that OpenImageIO reads (any case). Hidden files and folders and files with other
 /// extensions are ignored. Skipped, with the reason: files with such an extension that hold no
 /// readable image, names that are no UTF-8, links to folders, and sub-folders that are D+TR sets or
-/// captures. A folder that WriteCapture made is read as that capture, with its original names.
-/// The result is the same for any number of threads.
-/// Throws UsageError when the folder does not exist, Error when it cannot be listed or holds no
-/// photo at all.
+/// captures. NAME_mask.EXT beside a photo NAME.EXT is its mask and no photo; a photo whose mask
+/// cannot be used is skipped. A folder that WriteCapture made is read as that capture, with its
+/// original names. The result is the same for any number of threads. Throws UsageError when the
+/// folder does not exist, Error when it cannot be listed or holds no photo at all.
 Capture IngestPhotos(const std::filesystem::path& folder, const IngestOptions& options,
                      Progress& progress);
 

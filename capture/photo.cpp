@@ -1,5 +1,7 @@
 #include "capture/photo.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <utility>
@@ -70,6 +72,24 @@ ImageRgb8 ReadPhoto(const Photo& photo) {
                 "; ingest the photos again");
   }
   return image;
+}
+
+Mask ReadPhotoMask(const Photo& photo) {
+  if (photo.mask_file.empty()) return {};
+  Mask mask = io::ReadMask(photo.mask_file);
+  if (mask.width() != photo.width_px || mask.height() != photo.height_px) {
+    throw Error(
+        fmt::format("{}: expected a mask of {}x{} pixels as its photo {} upright, found {}x{}",
+                    photo.mask_file.string(), photo.width_px, photo.height_px, photo.name,
+                    mask.width(), mask.height()));
+  }
+  if (std::none_of(mask.data().begin(), mask.data().end(), [](auto value) { return value != 0; })) {
+    throw Error(
+        fmt::format("{}: expected a mask that leaves something of its photo {}, found it "
+                    "dark throughout; dark is not used",
+                    photo.mask_file.string(), photo.name));
+  }
+  return mask;
 }
 
 }  // namespace dtr::capture

@@ -60,6 +60,12 @@ struct Photo {
 
   std::optional<VideoFrame> video_frame;
 
+  /// What of the photo may be used, NAME_mask.EXT beside NAME.EXT: an upright picture of its size,
+  /// dark where the photo is not to be used (moving things, the photographer, the turntable).
+  /// Empty: all of it.
+  std::filesystem::path mask_file;
+  std::string mask_sha256;  ///< of that file, or empty
+
   std::string source_sha256;  ///< of the original file
   std::optional<Screening> screening;
 };
@@ -85,5 +91,9 @@ void RequireEnoughPhotos(const Capture& capture, const std::filesystem::path& wh
 /// The photo upright, 8-bit sRGB. Throws Error when the file is unreadable or has no longer the
 /// size it had when it was ingested.
 ImageRgb8 ReadPhoto(const Photo& photo);
+
+/// What of the photo may be used; empty where it has no mask. Throws Error when the mask is
+/// unreadable, is not of the photo's size or leaves nothing.
+Mask ReadPhotoMask(const Photo& photo);
 
 }  // namespace dtr::capture

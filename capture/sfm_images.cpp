@@ -56,6 +56,20 @@ void Rewrite(const Photo& photo, const io::ImageHeader& header, std::pair<int, i
   Require(error, to);
 }
 
+void MakeFolderOf(const fs::path& file) {
+  std::error_code error;
+  fs::create_directories(file.parent_path(), error);
+  Require(error, file.parent_path());
+}
+
+void PrepareMask(const Photo& photo, const fs::path& to, int max_size_px) {
+  MakeFolderOf(to);
+  Mask mask = ReadPhotoMask(photo);
+  const auto [width, height] = TargetSize(photo.width_px, photo.height_px, max_size_px);
+  if (width != mask.width() || height != mask.height()) mask = ShrinkMask(mask, width, height);
+  io::WriteMask(to, mask);
+}
+
 void PreparePhoto(const Photo& photo, const fs::path& to, int max_size_px) {
   const io::ImageHeader header = io::ReadImageHeader(photo.file);
   const auto size = TargetSize(photo.width_px, photo.height_px, max_size_px);
@@ -65,8 +79,7 @@ void PreparePhoto(const Photo& photo, const fs::path& to, int max_size_px) {
   const bool unchanged = readable_by_colmap && photo.exif_orientation == 1 &&
                          size == std::pair(photo.width_px, photo.height_px);
   std::error_code error;
-  fs::create_directories(to.parent_path(), error);
-  Require(error, to.parent_path());
+  MakeFolderOf(to);
   fs::remove(to, error);
   Require(error, to);
   if (unchanged) {
@@ -87,8 +100,13 @@ void PrepareSfmImages(const Capture& capture, const fs::path& folder, int max_si
     progress.ThrowIfInterrupted();
     const Photo& photo = capture.photos[static_cast<size_t>(i)];
     PreparePhoto(photo, folder / photo.name, max_size_px);
+    if (!photo.mask_file.empty()) PrepareMask(photo, SfmMaskFile(folder, photo), max_size_px);
     progress.Update(++done);
   });
+}
+
+fs::path SfmMaskFile(const fs::path& folder, const Photo& photo) {
+  return fs::path(folder.string() + ".masks") / (photo.name + ".png");
 }
 
 void PrepareSfmImages(const Capture& capture, const fs::path& folder, int max_size_px,

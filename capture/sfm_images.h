@@ -14,6 +14,7 @@ namespace dtr::capture {
 /// 98 with their EXIF focal length under names that end in .jpg or .jpeg, else as PNG, whatever the
 /// name ends in: COLMAP goes by the content. A shrunk photo has another camera: K is scaled per
 /// axis by the ratios of the sizes, TargetSize(width_px, height_px, max_size_px) over the photo's.
+/// A photo's mask is written to SfmMaskFile, of the size that the photo has there.
 /// What is there already is replaced, never written into: it may be a link to an original.
 /// Throws Error when a photo cannot be read or a file cannot be written.
 void PrepareSfmImages(const Capture& capture, const std::filesystem::path& folder, int max_size_px,
@@ -21,5 +22,8 @@ void PrepareSfmImages(const Capture& capture, const std::filesystem::path& folde
 /// The same without progress.
 void PrepareSfmImages(const Capture& capture, const std::filesystem::path& folder, int max_size_px,
                       int threads);
+
+/// Where PrepareSfmImages(..., folder, ...) puts the mask of a photo.
+std::filesystem::path SfmMaskFile(const std::filesystem::path& folder, const Photo& photo);
 
 }  // namespace dtr::capture

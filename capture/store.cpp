@@ -65,6 +65,10 @@ Photo StorePhoto(const Photo& photo, const fs::path& folder) {
     stored.exif_orientation = 1;
     io::WriteImage(folder / stored.file, ReadPhoto(photo));
   }
+  if (!photo.mask_file.empty()) {
+    stored.mask_file = fs::path("masks") / (photo.id + ".png");
+    io::WriteMask(folder / stored.mask_file, ReadPhotoMask(photo));
+  }
   return stored;
 }
 
@@ -95,6 +99,9 @@ void WriteCapture(const Capture& capture, const fs::path& target, const StoreOpt
   RefuseOccupied(folder, options.replace);
   const fs::path partial = folder.string() + ".partial";
   MakePartial(partial);
+  const bool masked = std::any_of(capture.photos.begin(), capture.photos.end(),
+                                  [](const Photo& photo) { return !photo.mask_file.empty(); });
+  if (masked) fs::create_directory(partial / "masks");
 
   const int count = static_cast<int>(capture.photos.size());
   progress.Stage("writing photos", count);
@@ -126,6 +133,12 @@ Capture ReadCapture(const fs::path& folder) {
     if (!fs::is_regular_file(photo.file, error)) {
       throw Error(list.string() + ": photo \"" + photo.name + "\": expected the file " +
                   photo.file.string() + ", found none; ingest the photos again");
+    }
+    if (photo.mask_file.empty()) continue;
+    photo.mask_file = folder / photo.mask_file;
+    if (!fs::is_regular_file(photo.mask_file, error)) {
+      throw Error(list.string() + ": photo \"" + photo.name + "\": expected the mask " +
+                  photo.mask_file.string() + ", found none; ingest the photos again");
     }
   }
   return capture;

@@ -21,11 +21,11 @@ struct StoreOptions {
 /// Throws UsageError where WriteCapture would for want of an empty place; before any work is done.
 void RequireRoom(const std::filesystem::path& folder, const StoreOptions& options);
 
-/// Writes `folder`/images/<id>.<extension> and, last, `folder`/capture.json. A photo that is
-/// upright already keeps its bytes; a turned one becomes a PNG with exactly its pixels. The folder
-/// appears whole or not at all: work goes on in `folder`.partial. Throws UsageError when the folder
-/// holds something already (other than a capture to be replaced), Error when a photo cannot be read
-/// or a file cannot be written.
+/// Writes `folder`/images/<id>.<extension>, masks/<id>.png where there are masks and, last,
+/// `folder`/capture.json. A photo that is upright already keeps its bytes; a turned one becomes a
+/// PNG with exactly its pixels. The folder appears whole or not at all: work goes on in
+/// `folder`.partial. Throws UsageError when the folder holds something already (other than a
+/// capture to be replaced), Error when a photo cannot be read or a file cannot be written.
 void WriteCapture(const Capture& capture, const std::filesystem::path& folder,
                   const StoreOptions& options, Progress& progress);
 /// The same without progress.

@@ -158,6 +158,10 @@ void ExtractFeatures(Workspace& workspace, const std::filesystem::path& database
              std::to_string(std::min<size_t>(static_cast<size_t>(plan.threads), names.size())))
         .Add({"SiftExtraction.max_image_size", "FeatureExtraction.max_image_size"},
              std::to_string(plan.max_image_size_px));
+    const bool masked = std::any_of(group.images.begin(), group.images.end(), [&](size_t i) {
+      return !workspace.images()[i].mask_file.empty();
+    });
+    if (masked) arguments.Add({"ImageReader.mask_path"}, workspace.masks_folder().string());
     if (group.camera_id) {
       arguments.Add({"ImageReader.existing_camera_id"}, std::to_string(*group.camera_id));
     } else {

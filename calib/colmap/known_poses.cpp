@@ -59,6 +59,7 @@ std::vector<SfmImageInput> InputsOf(std::span<const PosedImage> images) {
     input.name = image.name;
     input.width_px = image.camera.width_px;
     input.height_px = image.camera.height_px;
+    input.mask_file = image.mask_file;
   }
   return inputs;
 }

@@ -15,6 +15,7 @@ struct PosedImage {
   std::string name;  ///< file below images_dir
   calib::LensCamera camera;
   Pose cam_from_world;
+  std::filesystem::path mask_file = {};  ///< as SfmImageInput has
 };
 
 /// COLMAP may return a pose it was told to keep with its quaternion normalised once more; more

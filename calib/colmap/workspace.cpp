@@ -118,6 +118,7 @@ Workspace::Workspace(const fs::path& folder, const fs::path& images_dir,
   std::sort(images_.begin(), images_.end(),
             [](const auto& a, const auto& b) { return a.name < b.name; });
   RemoveAll(images_folder());
+  RemoveAll(masks_folder());
   for (const char* part : {"images", "logs", "lists"}) MakeFolder(folder_ / part);
   json names = json::object(), identity = json::array();
   for (size_t i = 0; i < images_.size(); ++i) {
@@ -131,9 +132,13 @@ Workspace::Workspace(const fs::path& folder, const fs::path& images_dir,
     }
     const fs::path file = images_dir / image.name;
     identity.push_back({image.name, image.width_px, image.height_px, Sha256OfFile(file)});
+    if (!image.mask_file.empty()) identity.back().push_back(Sha256OfFile(image.mask_file));
     aliases_.push_back(AliasFor(alias_prefix, i, image.name));
     names[aliases_.back()] = image.name;
     Link(file, FileOf(i));
+    if (image.mask_file.empty()) continue;
+    MakeFolder(masks_folder());
+    Link(image.mask_file, masks_folder() / (AliasOf(i) + ".png"));  // COLMAP's name for it
   }
   constexpr int kIndent = 1;
   const auto replace = json::error_handler_t::replace;  // names need not be UTF-8

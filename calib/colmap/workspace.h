@@ -26,6 +26,7 @@ class Workspace {
 
   const std::filesystem::path& folder() const { return folder_; }
   std::filesystem::path images_folder() const { return folder_ / "images"; }
+  std::filesystem::path masks_folder() const { return folder_ / "masks"; }
   std::filesystem::path database() const { return folder_ / "database.db"; }
   const std::vector<SfmImageInput>& images() const { return images_; }
   std::filesystem::path FileOf(size_t image) const { return images_folder() / AliasOf(image); }

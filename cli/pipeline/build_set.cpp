@@ -56,6 +56,9 @@ Json PhotosJson(const capture::Capture& capture, const std::vector<bool>& with_h
     photos.push_back(
         {{"name", photo.name}, {"width_px", photo.width_px}, {"height_px", photo.height_px}});
     if (with_hash[i]) photos.back()["sha256"] = photo.source_sha256;
+    if (with_hash[i] && !photo.mask_sha256.empty()) {
+      photos.back()["mask_sha256"] = photo.mask_sha256;
+    }
     if (const auto& frame = photo.video_frame) {
       photos.back()["video"] = frame->video;
       photos.back()["frame"] = frame->number;
@@ -115,8 +118,8 @@ std::vector<View> UndistortPhotos(const capture::Capture& capture,
                       "these photos",
                       photo.name, lens.width_px, lens.height_px, photo.width_px, photo.height_px));
     }
-    calib::UndistortedPhoto flat =
-        calib::Undistort(capture::ReadPhoto(photo), lens, max_size_px, threads);
+    calib::UndistortedPhoto flat = calib::Undistort(
+        capture::ReadPhoto(photo), capture::ReadPhotoMask(photo), lens, max_size_px, threads);
     View view;
     view.id = photo.id;
     view.name = photo.name;

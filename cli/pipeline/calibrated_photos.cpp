@@ -64,7 +64,7 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
     for (size_t i = 0; i < in_sfm.size(); ++i) in_sfm[i] = !options.held_out[i];
   }
   const capture::Capture photos = Subset(capture, in_sfm);
-  const std::vector<colmap::SfmImageInput> inputs = SfmInputs(photos);
+  const std::vector<colmap::SfmImageInput> inputs = SfmInputs(photos, workspace / "photos");
   const colmap::SfmOptions sfm_options = SfmOptionsFor(options);
   capture::PrepareSfmImages(photos, workspace / "photos", 0, options.threads);
   colmap::SfmResult sfm =
@@ -85,11 +85,16 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
 
 }  // namespace
 
-std::vector<colmap::SfmImageInput> SfmInputs(const capture::Capture& capture) {
+fs::path MaskForSfm(const capture::Photo& photo, const fs::path& folder) {
+  return photo.mask_file.empty() ? fs::path() : capture::SfmMaskFile(folder, photo);
+}
+
+std::vector<colmap::SfmImageInput> SfmInputs(const capture::Capture& capture,
+                                             const fs::path& folder) {
   std::vector<colmap::SfmImageInput> inputs;
   for (const capture::Photo& photo : capture.photos) {
-    inputs.push_back(
-        {photo.name, photo.width_px, photo.height_px, photo.focal_prior_px, photo.camera_group});
+    inputs.push_back({photo.name, photo.width_px, photo.height_px, photo.focal_prior_px,
+                      photo.camera_group, MaskForSfm(photo, folder)});
   }
   return inputs;
 }

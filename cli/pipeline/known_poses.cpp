@@ -102,8 +102,10 @@ CalibratedPhotos FromCameraList(const capture::Capture& capture, const Calibrate
     const auto found = by_name.find(capture.photos[i].name);
     if (found == by_name.end()) continue;
     const io::NamedCamera& named = *found->second;
+    const capture::Photo& photo = capture.photos[i];
     (options.held_out[i] ? held_out : sources)
-        .push_back({named.name, colmap::FromPinhole(named.camera), named.cam_from_world});
+        .push_back({named.name, colmap::FromPinhole(named.camera), named.cam_from_world,
+                    MaskForSfm(photo, workspace / "photos")});
     if (!options.held_out[i]) source_photos.photos.push_back(capture.photos[i]);
   }
   RequireSharedNames(sources.size(), options.poses,
@@ -131,9 +133,9 @@ void RegisterHeldOutPhotos(const capture::Capture& held_out,
                            calib::SfmModel& model, Progress& progress) {
   if (held_out.photos.empty()) return;
   capture::PrepareSfmImages(held_out, workspace / "photos", 0, options.threads);
-  const colmap::HeldOutResult placed =
-      colmap::RegisterHeldOut(workspace / "photos", SfmInputs(held_out), model, sources,
-                              workspace / "sfm", workspace / "held_out", options, progress);
+  const colmap::HeldOutResult placed = colmap::RegisterHeldOut(
+      workspace / "photos", SfmInputs(held_out, workspace / "photos"), model, sources,
+      workspace / "sfm", workspace / "held_out", options, progress);
   for (const calib::SfmImage& image : placed.images) {
     // The pose alone: what the photo shows of the points would enter the set outside held_out/.
     AddImage({0, image.name, 0, image.cam_from_world, {}}, placed.cameras.at(image.camera_id),

@@ -8,8 +8,12 @@
 
 namespace dtr::pipeline {
 
-/// Photos as COLMAP is told about them.
-std::vector<colmap::SfmImageInput> SfmInputs(const capture::Capture& capture);
+/// capture::SfmMaskFile, or nothing for a photo without a mask.
+std::filesystem::path MaskForSfm(const capture::Photo& photo, const std::filesystem::path& folder);
+
+/// Photos as COLMAP is told about them; `folder` is what capture::PrepareSfmImages fills.
+std::vector<colmap::SfmImageInput> SfmInputs(const capture::Capture& capture,
+                                             const std::filesystem::path& folder);
 colmap::SfmOptions SfmOptionsFor(const CalibrateOptions& options);
 
 /// Cameras from options.poses: the folder of a COLMAP model, a cameras.json or a poses_bounds.npy.

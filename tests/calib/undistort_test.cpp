@@ -118,6 +118,42 @@ TEST(Undistort, CornersOfAPincushionPhotoAreMaskedAndItsCentreIsNot) {
   EXPECT_EQ(photo.mask(kWidth / 2, kHeight / 2), 255);
 }
 
+TEST(Undistort, WhatMayNotBeUsedIsMaskedWhereTheLensShowsIt) {
+  for (const LensCamera& lens :
+       {kBarrel, kPincushion,
+        LensCamera{LensModel::kPinhole, kWidth, kHeight, {kFocal, kFocal, 83, 58}}}) {
+    Mask usable(kWidth, kHeight, 1, 255);
+    for (int y = 30; y < 60; ++y) {
+      for (int x = 20; x < 50; ++x) usable(x, y) = 0;
+    }
+    const UndistortedPhoto photo = Undistort(PhotoOf(lens), usable, lens, 0, 2);
+    const UndistortedPhoto whole = Undistort(PhotoOf(lens), lens, 0, 2);
+    ASSERT_FALSE(photo.mask.empty());
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < kWidth; ++x) {
+        const auto source = lens.PixelFromCam(photo.camera.RayFromPixel({x + 0.5, y + 0.5}));
+        const bool inside = source && source->x() >= 20 && source->x() < 50 && source->y() >= 30 &&
+                            source->y() < 60;
+        const bool near =
+            source && source->x() > 19 && source->x() < 51 && source->y() > 29 && source->y() < 61;
+        if (inside) {
+          ASSERT_EQ(photo.mask(x, y), 0) << x << " " << y;
+          ASSERT_EQ(photo.image(x, y, 0), 0);
+        } else if (!near) {
+          ASSERT_EQ(photo.mask(x, y), whole.mask.empty() ? 255 : whole.mask(x, y));
+          ASSERT_EQ(photo.image(x, y, 1), whole.image(x, y, 1));
+        }
+      }
+    }
+    const UndistortedPhoto all =
+        Undistort(PhotoOf(lens), Mask(kWidth, kHeight, 1, 255), lens, 0, 1);
+    EXPECT_EQ(all.mask, whole.mask);
+    EXPECT_EQ(all.image, whole.image);
+  }
+  EXPECT_THROW(Undistort(PhotoOf(kBarrel), Mask(8, 8, 1, 255), kBarrel, 0, 1),
+               std::invalid_argument);
+}
+
 TEST(Undistort, RaysBeyondTheModelsReachAreMasked) {
   // The distortion turns back at r = 0.58, inside the picture: nothing beyond may be shown.
   const LensCamera lens{LensModel::kSimpleRadial, kWidth, kHeight, {60, 80, 60, -1.0}};

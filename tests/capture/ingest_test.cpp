@@ -6,6 +6,8 @@
 #include <cmath>
 
 #include "capture/screening.h"
+#include "capture/sfm_images.h"
+#include "capture/store.h"
 #include "dtr/base/error.h"
 #include "dtr/base/random.h"
 #include "tests/capture/photo_files.h"
@@ -282,6 +284,40 @@ TEST(DropFaulty, TakesOutWhatIsAskedForAndListsIt) {
   ASSERT_EQ(capture.skipped.size(), 2u);
   EXPECT_EQ(capture.skipped[0].name, "b.png");
   EXPECT_THAT(capture.skipped[1].reason, HasSubstr("dropped: 100 % of it is overexposed"));
+}
+
+TEST(IngestPhotos, AMaskBesideAPhotoIsItsMaskAndNoPhoto) {
+  const TemporaryFolder folder;
+  fs::create_directories(folder / "left");
+  Mask mask(64, 48, 1, 255);
+  for (int x = 0; x < 20; ++x) mask(x, 7) = 0;
+  io::WriteImage(folder / "a.jpg", NoisePhoto(64, 48, 1));
+  io::WriteMask(folder / "a_mask.png", mask);
+  io::WriteImage(folder / "b.jpg", NoisePhoto(64, 48, 2));
+  io::WriteMask(folder / "left/b_mask.png", mask);  // of no photo there: a photo
+  io::WriteImage(folder / "c.jpg", NoisePhoto(64, 48, 3));
+  io::WriteMask(folder / "c_mask.png", Mask(32, 24, 1, 255));
+  io::WriteImage(folder / "d.jpg", NoisePhoto(64, 48, 4));
+  io::WriteMask(folder / "d_mask.png", Mask(64, 48, 1, 0));
+  const Capture capture = Ingest(folder.path());
+  EXPECT_THAT(NamesOf(capture), ElementsAre("a.jpg", "b.jpg", "left/b_mask.png"));
+  EXPECT_EQ(ReadPhotoMask(capture.photos[0]), mask);
+  EXPECT_TRUE(ReadPhotoMask(capture.photos[1]).empty());
+  ASSERT_EQ(capture.skipped.size(), 2u);
+  EXPECT_THAT(capture.skipped[0].reason, HasSubstr("expected a mask of 64x48 pixels"));
+  EXPECT_THAT(capture.skipped[0].reason, HasSubstr("found 32x24"));
+  EXPECT_THAT(capture.skipped[1].reason, HasSubstr("dark throughout"));
+  // A capture keeps it, and SfM gets it of the size that the photo has there.
+  WriteCapture(capture, folder / "capture", 2);
+  const Capture read = ReadCapture(folder / "capture");
+  EXPECT_EQ(ReadPhotoMask(read.photos[0]), mask);
+  EXPECT_EQ(read.photos[0].mask_sha256, capture.photos[0].mask_sha256);
+  PrepareSfmImages(read, folder / "sfm", 32, 2);
+  const Mask small = io::ReadMask(SfmMaskFile(folder / "sfm", read.photos[0]));
+  EXPECT_EQ(small.width(), 32);
+  EXPECT_EQ(small(5, 3), 0);
+  EXPECT_EQ(small(15, 3), 255);
+  EXPECT_FALSE(fs::exists(SfmMaskFile(folder / "sfm", read.photos[1])));
 }
 
 TEST(MeasurePhoto, SharpnessIgnoresContrastAndFallsWithBlur) {

@@ -75,7 +75,7 @@ class FakeColmap {
     std::string options =
         "--database_path\n--image_path\n--image_list_path\n--match_list_path\n--match_type\n"
         "--input_path\n--output_path\n--ImageReader.camera_model\n--ImageReader.single_camera\n"
-        "--ImageReader.camera_params\n--ImageReader.existing_camera_id\n"
+        "--ImageReader.camera_params\n--ImageReader.existing_camera_id\n--ImageReader.mask_path\n"
         "--ExhaustiveMatching.block_size\n--SequentialMatching.overlap\n"
         "--SequentialMatching.quadratic_overlap\n--Mapper.num_threads\n"
         "--Mapper.ba_refine_focal_length\n--Mapper.ba_refine_principal_point\n"

@@ -211,6 +211,28 @@ TEST_F(RunSfmWithFake, MissingProgramSaysWhatToInstall) {
   EXPECT_THAT(message, AllOf(HasSubstr("not found on the PATH"), HasSubstr("apt-get install")));
 }
 
+TEST_F(RunSfmWithFake, MasksLieWhereColmapLooksForThem) {
+  Run();
+  for (const std::string& call : fake_.Calls()) EXPECT_THAT(call, Not(HasSubstr("mask_path")));
+  fake_.ForgetCalls();
+  WriteFileAtomically(photos_ / "mask.png", "first");
+  images_[1].mask_file = photos_ / "mask.png";
+  Run();
+  ASSERT_FALSE(fake_.Calls().empty()) << "a new mask is new input";
+  EXPECT_THAT(fake_.Calls()[0],
+              HasSubstr("--ImageReader.mask_path " + (workspace_ / "sfm/masks").string()));
+  const auto at = std::find(sorted_.begin(), sorted_.end(), images_[1].name) - sorted_.begin();
+  EXPECT_EQ(ReadFile(workspace_ / "sfm/masks" / (Aliases()[static_cast<size_t>(at)] + ".png"), 100),
+            "first");
+  fake_.ForgetCalls();
+  Run();
+  EXPECT_TRUE(fake_.Calls().empty());
+  fs::remove(photos_ / "mask.png");
+  WriteFileAtomically(photos_ / "mask.png", "second");
+  Run();
+  EXPECT_FALSE(fake_.Calls().empty());
+}
+
 TEST_F(RunSfmWithFake, CamerasAreSharedByGroupAndSize) {
   images_[1].camera_group = "camera two";
   images_[1].focal_prior_px.reset();
