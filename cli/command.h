@@ -53,6 +53,7 @@ void AddEvaluateCommand(CLI::App& app);
 void AddBenchCommand(CLI::App& app);
 void AddViewCommand(CLI::App& app);  ///< in programs built with windows
 void AddInspectCommand(CLI::App& app);
+void AddAdviseCommand(CLI::App& app);
 void AddImportCommand(CLI::App& app);
 void AddExportCommand(CLI::App& app);
 void AddDatasetCommand(CLI::App& app);

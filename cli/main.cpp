@@ -24,6 +24,7 @@ int Run(int argc, char** argv) {
   dtr::cli::AddViewCommand(app);
 #endif
   dtr::cli::AddInspectCommand(app);
+  dtr::cli::AddAdviseCommand(app);
   dtr::cli::AddEvaluateCommand(app);
   dtr::cli::AddBenchCommand(app);
   dtr::cli::AddImportCommand(app);

@@ -48,6 +48,13 @@ TEST(JsonInterface, NamesAreThoseOfTheDesign) {
   EXPECT_EQ(info["views"].at(0)["role"], "held_out");
   EXPECT_EQ(info["views"].at(1)["role"], "source");
 
+  const Json advise = OnStdout({"advise", set, "-o", (folder / "advice.html").string()});
+  ExpectNames(advise, {"places", "add", "adds_nothing"});
+  ASSERT_FALSE(advise["places"].empty());
+  ExpectNames(advise["places"].at(0), {"where", "center", "looks_along", "seen_share",
+                                       "depthless_share", "unseen_share", "gap_deg", "poor"});
+  EXPECT_THAT(Text(folder / "advice.html"), ::testing::HasSubstr("Cameras to add"));
+
   const Json evaluate =
       OnStdout({"evaluate", set, "--renderer", "cpu", "--depth", (folder / "c").string()});
   ExpectNames(evaluate, {"views", "mean", "not_registered", "depth"});

@@ -1,0 +1,19 @@
+// dtr/advise/places.h -- from where people will look at a scene.
+#pragma once
+#include <span>
+#include <vector>
+
+#include "dtr/advise/advise.h"
+
+namespace dtr::advise {
+
+/// The `count` views nearest to a place whose axes turn less than 60 degrees from its own, nearest
+/// first; of equally near ones the first.
+std::vector<size_t> NearestViews(std::span<const CoarseView> views, const Pose& cam_from_world,
+                                 size_t count);
+
+/// Half-way between each view and its 3 nearest, each pair once, and half a step from each view
+/// away from its nearest.
+std::vector<Place> PlacesAmong(std::span<const CoarseView> views);
+
+}  // namespace dtr::advise
