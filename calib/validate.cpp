@@ -141,38 +141,10 @@ void TestTrack(std::span<const Sight> sights, std::span<Verdict*> verdicts) {
   }
 }
 
-ResidualStats Summarise(const std::vector<Eigen::Vector2d>& residuals) {
-  ResidualStats stats;
-  stats.count = static_cast<int>(residuals.size());
-  if (residuals.empty()) return stats;
-  std::vector<double> lengths;
-  lengths.reserve(residuals.size());
-  double squared = 0;
-  for (const Eigen::Vector2d& r : residuals) {
-    squared += r.squaredNorm();
-    stats.mean_px += r;
-    lengths.push_back(r.norm());
-  }
-  const auto count = static_cast<double>(residuals.size());
-  stats.mean_px /= count;
-  stats.rms_px = std::sqrt(squared / count);
-  std::sort(lengths.begin(), lengths.end());
-  // Nearest-rank percentiles: the smallest value with at least the share at or below it.
-  const auto rank = [&](double share) {
-    return lengths[static_cast<size_t>(std::max(0.0, std::ceil(share * count) - 1))];
-  };
-  stats.median_px = rank(0.5);
-  stats.p95_px = rank(0.95);
-  stats.worst_px = lengths.back();
-  return stats;
-}
-
 size_t RegionOf(const PinholeCamera& camera, const Eigen::Vector2d& pixel) {
-  const auto third = [](double at, int size) {
-    return std::clamp(static_cast<int>(at * kRegionsPerAxis / size), 0, kRegionsPerAxis - 1);
-  };
-  return static_cast<size_t>(third(pixel.y(), camera.height_px()) * kRegionsPerAxis +
-                             third(pixel.x(), camera.width_px()));
+  const int row = CellOf(pixel.y(), camera.height_px(), kRegionsPerAxis);
+  return static_cast<size_t>(row * kRegionsPerAxis +
+                             CellOf(pixel.x(), camera.width_px(), kRegionsPerAxis));
 }
 
 /// The camera for which `value` is largest among those with enough observations; -1 if none.
@@ -272,6 +244,37 @@ void AddTests(const ValidateLimits& limits, ValidationReport* report) {
 }
 
 }  // namespace
+
+ResidualStats Summarise(const std::vector<Eigen::Vector2d>& residuals) {
+  ResidualStats stats;
+  stats.count = static_cast<int>(residuals.size());
+  if (residuals.empty()) return stats;
+  std::vector<double> lengths;
+  lengths.reserve(residuals.size());
+  double squared = 0;
+  for (const Eigen::Vector2d& r : residuals) {
+    squared += r.squaredNorm();
+    stats.mean_px += r;
+    lengths.push_back(r.norm());
+  }
+  const auto count = static_cast<double>(residuals.size());
+  stats.mean_px /= count;
+  stats.rms_px = std::sqrt(squared / count);
+  std::sort(lengths.begin(), lengths.end());
+  // Nearest-rank percentiles: the smallest value with at least the share at or below it.
+  const auto rank = [&](double share) {
+    return lengths[static_cast<size_t>(std::max(0.0, std::ceil(share * count) - 1))];
+  };
+  stats.median_px = rank(0.5);
+  stats.p95_px = rank(0.95);
+  stats.worst_px = lengths.back();
+  return stats;
+}
+
+int CellOf(double at_px, int size_px, int cells) {
+  const double cell = cells * at_px / size_px;
+  return cell > 0 ? static_cast<int>(std::min(cell, cells - 1.0)) : 0;
+}
 
 ValidationReport ValidateReprojection(std::span<const PinholeCamera> cameras,
                                       std::span<const Pose> cam_from_world,

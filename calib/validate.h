@@ -48,6 +48,13 @@ struct CameraValidation {
 /// Number of image regions per axis.
 inline constexpr int kRegionsPerAxis = 3;
 
+/// Which of `cells` equal parts of [0, size_px) holds `at_px`; the nearest one for a number off it,
+/// however large, and the first for NaN.
+int CellOf(double at_px, int size_px, int cells);
+
+/// Percentiles by nearest rank: the smallest length with at least the share at or below it.
+ResidualStats Summarise(const std::vector<Eigen::Vector2d>& residuals);
+
 struct ValidationReport {
   std::vector<Check> tests;
   std::vector<CameraValidation> cameras;  ///< in the order given

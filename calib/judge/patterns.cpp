@@ -4,13 +4,17 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "calib/judge/distributions.h"
+#include "calib/validate.h"
 
 namespace dtr::calib {
 namespace {
 
 constexpr int kRings = 6, kRegions = 4;
+// Every corner that may lie elsewhere is three unknowns, and work grows with their cube.
+constexpr int kMostCornersOfShutter = 150;
 constexpr double kDependent = 1e-7;  // of columns of length 1: what is left of one that others span
 
 // What is left of the rows of `rest` where the columns of `own` are fitted for this frame alone.
@@ -36,13 +40,13 @@ void Stack(const Eigen::MatrixXd& rows, Eigen::MatrixXd& triangle) {
   triangle = qr.matrixQR().topRows(triangle.cols()).triangularView<Eigen::Upper>();
 }
 
-PatternTest Judged(const RigSolution& solution, double explained, double left, int freedom) {
+// Of `rows` residuals; `below` is what they number less all unknowns.
+PatternTest Judged(double rows, double explained, double left, int freedom, double below) {
   PatternTest test;
   test.freedom = freedom;
-  const double below = solution.freedom - freedom;
   if (freedom <= 0 || !(below > 0)) return test;
   const double of_noise = freedom * left / below;
-  test.amplitude_px = std::sqrt(std::max(0.0, explained - of_noise) / (2.0 * solution.corners));
+  test.amplitude_px = std::sqrt(std::max(0.0, explained - of_noise) / rows);
   test.p = FisherSurvival((explained / freedom) / (left / below), freedom, below);
   return test;
 }
@@ -64,12 +68,16 @@ PatternTest TestSharedPattern(const RigSolution& solution, const PatternColumns&
   const long shared = solution.layout.size();
   long count = -1;
   Eigen::MatrixXd triangle;
+  Eigen::VectorXd squares, rows;
   for (const FrameRows& frame : solution.rows) {
     const Eigen::MatrixXd pattern = columns(frame);
     if (count < 0) {
       count = pattern.cols();
+      squares = rows = Eigen::VectorXd::Zero(count);
       triangle = Eigen::MatrixXd::Zero(shared + count + 1, shared + count + 1);
     }
+    squares += pattern.colwise().squaredNorm();
+    rows += (pattern.array() != 0).cast<double>().matrix().colwise().sum();
     Eigen::MatrixXd rest(frame.residuals.size(), shared + count + 1);
     rest << frame.by_shared, pattern, frame.residuals;
     long rank = 0;
@@ -88,7 +96,9 @@ PatternTest TestSharedPattern(const RigSolution& solution, const PatternColumns&
   const double explained = turned.head(qr.rank()).squaredNorm();
   const double left =
       std::pow(triangle(shared + count, shared + count), 2) + right.squaredNorm() - explained;
-  PatternTest test = Judged(solution, explained, left, static_cast<int>(qr.rank()));
+  const auto freedom = static_cast<int>(qr.rank());
+  PatternTest test =
+      Judged(2.0 * solution.corners, explained, left, freedom, solution.freedom - freedom);
   if (qr.rank() == count) {
     const Eigen::VectorXd c = qr.solve(right).cwiseQuotient(lengths);
     const Eigen::MatrixXd inverse =
@@ -98,6 +108,7 @@ PatternTest TestSharedPattern(const RigSolution& solution, const PatternColumns&
     for (long i = 0; i < count; ++i) {
       test.coefficients.push_back(c[i]);
       test.sigmas.push_back(std::sqrt(variance * inverse(i, i)));
+      test.effects_px.push_back(std::abs(c[i]) * std::sqrt(squares[i] / std::max(1.0, rows[i])));
     }
   }
   return test;
@@ -105,16 +116,18 @@ PatternTest TestSharedPattern(const RigSolution& solution, const PatternColumns&
 
 namespace {
 
-// Least sum of squares with `own` fitted per frame, `shared` for all; by how many unknowns.
+// Least sum of squares of `rows` residuals with `own` fitted per frame, `shared` for all; by how
+// many unknowns.
 struct Fit {
   double squares = 0;
-  long unknowns = 0;
+  long rows = 0, unknowns = 0;
 };
 
-Fit FitOf(const RigSolution& solution, const PatternColumns& own, const PatternColumns& shared) {
+Fit FitOf(std::span<const FrameRows> frames, const PatternColumns& own,
+          const PatternColumns& shared) {
   Eigen::MatrixXd triangle;
   Fit fit;
-  for (const FrameRows& frame : solution.rows) {
+  for (const FrameRows& frame : frames) {
     const Eigen::MatrixXd own_columns =
         own ? own(frame) : Eigen::MatrixXd(frame.residuals.size(), 0);
     const Eigen::MatrixXd shared_columns =
@@ -128,7 +141,9 @@ Fit FitOf(const RigSolution& solution, const PatternColumns& own, const PatternC
     long rank = 0;
     Stack(Eliminated(mine, rest, &rank), triangle);
     fit.unknowns += rank;
+    fit.rows += frame.residuals.size();
   }
+  if (triangle.size() == 0) return fit;
   // Shared columns may depend on each other: their part is solved with pivots.
   const long count = triangle.cols() - 1;
   Eigen::MatrixXd part = triangle.topLeftCorner(count, count);
@@ -145,31 +160,61 @@ Fit FitOf(const RigSolution& solution, const PatternColumns& own, const PatternC
   return fit;
 }
 
-// Columns for all corners of the board to lie elsewhere: x, y, z of each.
-PatternColumns CornersElsewhere(const Board& board, const RigSolution& solution) {
-  return [&board, &solution](const FrameRows& frame) {
-    const Eigen::Matrix3d rotation =
-        solution.rig.rig_from_board[frame.frame].rotation.toRotationMatrix();
-    Eigen::MatrixXd columns =
-        Eigen::MatrixXd::Zero(frame.residuals.size(), 3 * board.CornerCount());
+// How the pixel of the i-th corner of a frame follows the corner's place on the board.
+Eigen::Matrix<double, 2, 3> ByCorner(const Board& board, const RigSolution& solution,
+                                     const FrameRows& frame, size_t i) {
+  const Eigen::Matrix3d rotation =
+      solution.rig.rig_from_board[frame.frame].rotation.toRotationMatrix();
+  return frame.by_motion.block<2, 3>(2 * static_cast<long>(i), 3) * rotation *
+         (board.square / frame.distance);
+}
+int IdOf(const RigSolution& solution, const FrameRows& rows, size_t i) {
+  const RowOrigin& origin = rows.origins[i];
+  return solution.rig.views[origin.view].seen.corners[origin.corner].id;
+}
+
+// The rows of the corners that `place` knows; the others are left out.
+std::vector<FrameRows> RowsOfCorners(const RigSolution& solution, const std::vector<int>& place) {
+  std::vector<FrameRows> some;
+  for (const FrameRows& frame : solution.rows) {
+    FrameRows part = frame;
+    part.origins.clear();
+    std::vector<long> kept;
     for (size_t i = 0; i < frame.origins.size(); ++i) {
-      const RowOrigin& origin = frame.origins[i];
-      const int id = solution.rig.views[origin.view].seen.corners[origin.corner].id;
-      const auto at = 2 * static_cast<long>(i);
-      columns.block<2, 3>(at, 3 * id) =
-          frame.by_motion.block<2, 3>(at, 3) * rotation * (board.square / frame.distance);
+      if (place[static_cast<size_t>(IdOf(solution, frame, i))] < 0) continue;
+      part.origins.push_back(frame.origins[i]);
+      kept.insert(kept.end(), {2 * static_cast<long>(i), 2 * static_cast<long>(i) + 1});
     }
-    return columns;
-  };
+    if (kept.empty()) continue;
+    part.residuals = frame.residuals(kept);
+    part.by_shared = frame.by_shared(kept, Eigen::all);
+    part.by_motion = frame.by_motion(kept, Eigen::all);
+    some.push_back(std::move(part));
+  }
+  return some;
+}
+
+// At most `most` corners of the board, spread evenly over it: their places in the list, -1 for the
+// others. Multiples of the golden ratio leave gaps of nearly equal length.
+std::vector<int> SomeCorners(int corners, int most) {
+  std::vector<int> place(static_cast<size_t>(corners), -1);
+  int next = 0;
+  for (int id = 0; id < corners; ++id) {
+    const double turns = std::numbers::phi * id;
+    const bool taken = corners <= most || (turns - std::floor(turns)) * corners < most;
+    if (taken && next < most) place[static_cast<size_t>(id)] = next++;
+  }
+  return place;
 }
 
 }  // namespace
 
-PatternTest TestFramePattern(const RigSolution& solution, const PatternColumns& columns,
+PatternTest TestFramePattern(std::span<const FrameRows> rows, const PatternColumns& columns,
                              const PatternColumns& nuisance) {
-  const Fit without = FitOf(solution, {}, nuisance), with = FitOf(solution, columns, nuisance);
-  return Judged(solution, without.squares - with.squares, with.squares,
-                static_cast<int>(with.unknowns - without.unknowns));
+  const Fit without = FitOf(rows, {}, nuisance), with = FitOf(rows, columns, nuisance);
+  return Judged(static_cast<double>(with.rows), without.squares - with.squares, with.squares,
+                static_cast<int>(with.unknowns - without.unknowns),
+                static_cast<double>(with.rows - with.unknowns));
 }
 
 PatternTest TestRadial(const RigSolution& solution) {
@@ -216,12 +261,9 @@ PatternTest TestRegional(const RigSolution& solution) {
       const size_t camera = CameraOf(solution, frame, i);
       const LensCamera& lens = solution.rig.cameras[camera].camera;
       const Eigen::Vector2d pixel = PixelOf(solution, frame, i);
-      const auto cell = [](double at, int size) {
-        return std::clamp(static_cast<int>(kRegions * at / size), 0, kRegions - 1);
-      };
-      const long at =
-          static_cast<long>(camera) * per_camera +
-          2 * (cell(pixel.y(), lens.height_px) * kRegions + cell(pixel.x(), lens.width_px));
+      const int row = CellOf(pixel.y(), lens.height_px, kRegions);
+      const int column = CellOf(pixel.x(), lens.width_px, kRegions);
+      const long at = static_cast<long>(camera) * per_camera + 2 * (row * kRegions + column);
       columns(2 * static_cast<long>(i), at) = 1;
       columns(2 * static_cast<long>(i) + 1, at + 1) = 1;
     }
@@ -230,7 +272,6 @@ PatternTest TestRegional(const RigSolution& solution) {
 }
 
 PatternTest TestBoardShape(const Board& board, const RigSolution& solution) {
-  const PatternColumns corners = CornersElsewhere(board, solution);
   // z = x^2, xy, y^2, x^3, x^2 y, x y^2, y^3 with x and y from -1 to 1.
   Eigen::MatrixXd shapes = Eigen::MatrixXd::Zero(3 * board.CornerCount(), 7);
   const Eigen::Vector3d middle = MiddleOf(board), last = board.Corner(board.CornerCount() - 1);
@@ -239,8 +280,14 @@ PatternTest TestBoardShape(const Board& board, const RigSolution& solution) {
     const double x = place.x() / (last - middle).x(), y = place.y() / (last - middle).y();
     shapes.row(3 * id + 2) << x * x, x * y, y * y, x * x * x, x * x * y, x * y * y, y * y * y;
   }
-  return TestSharedPattern(
-      solution, [&](const FrameRows& frame) -> Eigen::MatrixXd { return corners(frame) * shapes; });
+  return TestSharedPattern(solution, [&](const FrameRows& frame) {
+    Eigen::MatrixXd columns(frame.residuals.size(), shapes.cols());
+    for (size_t i = 0; i < frame.origins.size(); ++i) {
+      columns.middleRows<2>(2 * static_cast<long>(i)) =
+          ByCorner(board, solution, frame, i) * shapes.middleRows<3>(3 * IdOf(solution, frame, i));
+    }
+    return columns;
+  });
 }
 
 PatternTest TestRollingShutter(const Board& board, const RigSolution& solution) {
@@ -253,7 +300,17 @@ PatternTest TestRollingShutter(const Board& board, const RigSolution& solution) 
     }
     return columns;
   };
-  return TestFramePattern(solution, shutter, CornersElsewhere(board, solution));
+  const std::vector<int> place = SomeCorners(board.CornerCount(), kMostCornersOfShutter);
+  const long count = 3 * std::min(board.CornerCount(), kMostCornersOfShutter);
+  const auto corners_elsewhere = [&](const FrameRows& frame) {
+    Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(frame.residuals.size(), count);
+    for (size_t i = 0; i < frame.origins.size(); ++i) {
+      const int at = place[static_cast<size_t>(IdOf(solution, frame, i))];
+      columns.block<2, 3>(2 * static_cast<long>(i), 3 * at) = ByCorner(board, solution, frame, i);
+    }
+    return columns;
+  };
+  return TestFramePattern(RowsOfCorners(solution, place), shutter, corners_elsewhere);
 }
 
 PatternTest TestTimeOffset(const RigSolution& solution) {

@@ -17,7 +17,9 @@ struct PatternTest {
   /// RMS over all coordinates of what the pattern explains, less what it would explain of noise.
   double amplitude_px = 0;
   int freedom = 0;  ///< patterns that are independent of the unknowns and of each other
-  std::vector<double> coefficients, sigmas;  ///< per column, of shared patterns alone
+  // Per column, of shared patterns alone.
+  std::vector<double> coefficients, sigmas;
+  std::vector<double> effects_px;  ///< what the coefficient does to a coordinate it acts on, RMS
 };
 
 /// Columns of a pattern for the rows of a frame. Shared: one coefficient per column for all frames.
@@ -25,7 +27,7 @@ using PatternColumns = std::function<Eigen::MatrixXd(const FrameRows&)>;
 PatternTest TestSharedPattern(const RigSolution& solution, const PatternColumns& columns);
 /// With coefficients of its own for every frame. `nuisance`: patterns with shared coefficients that
 /// are fitted in any case and are not what is tested for.
-PatternTest TestFramePattern(const RigSolution& solution, const PatternColumns& columns,
+PatternTest TestFramePattern(std::span<const FrameRows> rows, const PatternColumns& columns,
                              const PatternColumns& nuisance = {});
 
 /// Residuals along the radius from the principal point, as a function of the radius: hat functions
@@ -38,7 +40,7 @@ PatternTest TestRegional(const RigSolution& solution);
 PatternTest TestBoardShape(const Board& board, const RigSolution& solution);
 /// A motion of the board, free for each frame, times the row of the image: what a shutter that
 /// reads row by row does to a moving board. What a board of another shape does is taken out before:
-/// every corner may lie elsewhere on it.
+/// every corner may lie elsewhere on it. Of boards with more than 150 corners, 150 take part.
 PatternTest TestRollingShutter(const Board& board, const RigSolution& solution);
 /// Per camera but the first: an image that is late by a time, in frames; the board's speed from the
 /// frames before and after. coefficients: the delays. p is 1 for a single camera.

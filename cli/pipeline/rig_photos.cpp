@@ -213,6 +213,19 @@ Layout FromVideos(const fs::path& folder, const std::vector<fs::path>& videos) {
   return layout;
 }
 
+// One camera sees an instant once.
+void RequireOneShotPerFrame(const Layout& layout) {
+  std::map<std::pair<size_t, std::string>, const Shot*> seen;
+  for (const Shot& shot : layout.shots) {
+    const auto [earlier, fresh] = seen.emplace(std::pair(shot.camera, shot.frame), &shot);
+    if (fresh) continue;
+    throw Error(fmt::format(
+        "{}: frame {} of camera {}: expected one image of every camera in a frame, found also {}; "
+        "remove one of them",
+        shot.name, shot.frame, layout.cameras[shot.camera], earlier->second->name));
+  }
+}
+
 Layout LayoutOf(const fs::path& folder) {
   if (!fs::is_directory(folder)) {
     throw UsageError(fmt::format("{}: expected a folder of what the cameras of a rig saw, found {}",
@@ -241,6 +254,7 @@ Layout LayoutOf(const fs::path& folder) {
                     "named CAMERA and a number, or videos; found {}",
                     folder.string(), layout.cameras.size()));
   }
+  RequireOneShotPerFrame(layout);
   return layout;
 }
 

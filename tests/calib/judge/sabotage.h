@@ -249,7 +249,8 @@ inline void TimeOffset(std::uint64_t seed, Random& random, SabotageCase& out) {
   const PatternTest exact = TestTimeOffset(SolveScene(scene, 0, 0));
   out.calibration = CalibrationOf(SolveScene(scene, kCornerNoisePx, seed));
   const PatternTest noisy = TestTimeOffset(SolveScene(scene, kCornerNoisePx, seed));
-  out.predicted_sigmas = std::abs(exact.coefficients.at(1)) / noisy.sigmas.at(1);
+  out.predicted_sigmas = std::min(std::abs(exact.coefficients.at(1)) / noisy.sigmas.at(1),
+                                  5 * exact.effects_px.at(1) / JudgeLimits{}.max_pattern_px);
 }
 
 inline SabotageCase Spoiled(Sabotage kind, std::uint64_t seed) {
