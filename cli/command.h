@@ -36,7 +36,7 @@ void AddCommand(CLI::App& app, const std::string& name, const std::string& descr
                 const std::string& example, const std::function<Action(CLI::App&)>& prepare);
 
 /// --lens FILE of the commands that take a known lens.
-void AddLensOption(CLI::App& command, std::filesystem::path& lens);
+CLI::Option* AddLensOption(CLI::App& command, std::filesystem::path& lens);
 
 // One function per command, each in commands/NAME.cpp.
 void AddBuildCommand(CLI::App& app);

@@ -113,7 +113,10 @@ std::vector<double> LossesOfCameras(const Bundle& cameras, const Split& split, d
   return Losses(Adjust(asked, OptionsFor({})).bundle, split.held_out, scale_px);
 }
 
-// Which lens parameters to free, by held-out sights; index of the candidate. The model as given has
+constexpr size_t kNoneConverged = ~size_t{0};
+
+// Which lens parameters to free, by held-out sights; index of the candidate, or kNoneConverged. A
+// candidate whose solve did not converge is not taken. The model as given has
 // seen the held-out sights and cannot be compared with candidates that have not: it is first by
 // name only, and its figures are of cameras that saw all.
 size_t Choose(const Bundle& bundle, const Split& split, const RefineOptions& options,
@@ -137,15 +140,24 @@ size_t Choose(const Bundle& bundle, const Split& split, const RefineOptions& opt
   }
   std::tie(candidates[2].low_px2, candidates[2].high_px2) =
       Bootstrap(losses[2], losses[1], options.seed);
+  for (size_t i = 0; i < candidates.size(); ++i) candidates[i].converged = trained[i].converged;
+  if (!trained[0].converged || !(trained[1].converged || trained[2].converged)) {
+    return kNoneConverged;
+  }
   // More freedom must be worth it beyond chance.
-  const size_t chosen = candidates[2].high_px2 < 0 ? 2 : 1;
+  const bool more = trained[2].converged && (!trained[1].converged || candidates[2].high_px2 < 0);
+  const size_t chosen = more ? 2 : 1;
   // Now like with like: adjusted to all sights, as the given model was.
   refined.adjusted = Adjust(bundle, OptionsFor(candidates[chosen].lens));
-  const auto adjusted = LossesOfCameras(refined.adjusted.bundle, split,
-                                        kLossSigmas * trained.front().sigma_px);
-  RefineCandidate last{"adjusted to all", candidates[chosen].lens, std::sqrt(Mean(adjusted)), 0, 0};
+  const auto adjusted =
+      LossesOfCameras(refined.adjusted.bundle, split, kLossSigmas * trained.front().sigma_px);
+  RefineCandidate last{
+      "adjusted to all",          candidates[chosen].lens, std::sqrt(Mean(adjusted)), 0, 0,
+      refined.adjusted.converged,
+  };
   std::tie(last.low_px2, last.high_px2) = Bootstrap(adjusted, losses[0], options.seed);
   candidates.push_back(last);
+  if (!last.converged) return kNoneConverged;
   // Beyond chance: a model that saw fewer sights, or none, need not be wrong for it.
   return last.high_px2 < 0 ? chosen : 0;
 }
@@ -197,6 +209,12 @@ Refined Refine(const SfmModel& model, const RefineOptions& options) {
     const SfmModel known = WithLenses(model, *options.known_lenses);
     refined.lens = LensFreedom::kFixed;
     refined.adjusted = Adjust(BundleOf(known), OptionsFor(refined.lens));
+    if (!refined.adjusted.converged) {
+      throw Error(fmt::format(
+          "bundle adjustment: expected to converge with the lens that was given, found none of it "
+          "after {} iterations; is it the lens of these photos?",
+          refined.adjusted.iterations));
+    }
     Finish(known, options, refined);
     return refined;
   }
@@ -211,14 +229,38 @@ Refined Refine(const SfmModel& model, const RefineOptions& options) {
     return refined;
   }
   const size_t chosen = Choose(bundle, split, options, refined);
-  refined.lens = refined.candidates[chosen].lens;
-  if (chosen == 0) {
-    refined.reason = "held-out sights are predicted no better";
+  if (chosen == kNoneConverged || chosen == 0) {
+    refined.reason =
+        chosen == 0 ? "held-out sights are predicted no better" : "the solve did not converge";
     refined.adjusted = {};
     return refined;
   }
+  refined.lens = refined.candidates[chosen].lens;
   Finish(model, options, refined);
   return refined;
+}
+
+std::vector<Degeneracy> DegeneraciesOf(const SfmModel& model, const RefineOptions& options) {
+  for (const auto& [id, camera] : model.cameras) {
+    if (camera.model == LensModel::kFov) return {};
+  }
+  const Bundle bundle =
+      SomePoints(BundleOf(model, options.separate_lenses), kMostPoints, options.seed);
+  const AdjustOptions adjust =
+      OptionsFor(options.known_lenses ? LensFreedom::kFixed : LensFreedom::kNoPrincipalPoint);
+  const Adjusted adjusted = Adjust(bundle, adjust);
+  return FindDegeneracies(adjusted, CovarianceOf(adjusted, adjust), BundleLimits{}.max_focal_share);
+}
+
+void RequireDetermined(const SfmModel& model, const RefineOptions& options,
+                       const std::string& what) {
+  for (const Degeneracy& d : DegeneraciesOf(model, options)) {
+    if (!d.harmful || d.name == "duplicate_images" || d.name == "too_few_views") continue;
+    throw Error(
+        fmt::format("{}: {}: {}; expected views that determine the cameras; "
+                    "docs/CALIBRATION.md says what to do",
+                    what, d.name, d.detail));
+  }
 }
 
 std::string ToJson(const Refined& refined) {
@@ -232,7 +274,8 @@ std::string ToJson(const Refined& refined) {
     json["candidates"].push_back({{"name", c.name},
                                   {"held_out_px", c.held_out_px},
                                   {"low_px2", c.low_px2},
-                                  {"high_px2", c.high_px2}});
+                                  {"high_px2", c.high_px2},
+                                  {"converged", c.converged}});
   }
   if (refined.changed) {
     json["sigma_px"] = refined.adjusted.sigma_px;

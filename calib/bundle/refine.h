@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "calib/bundle/adjust.h"
+#include "calib/bundle/judge.h"
 #include "calib/sfm_model.h"
 
 namespace dtr::calib {
@@ -29,6 +30,7 @@ struct RefineCandidate {
   /// with replacement. With the principal point: less that without; "adjusted to all": less "as
   /// given"; else 0.
   double low_px2 = 0, high_px2 = 0;
+  bool converged = false;  ///< else it is not taken
 };
 
 struct Refined {
@@ -54,8 +56,18 @@ struct Refined {
 /// points) comes back unchanged, with the reason; errors of broken models are thrown.
 Refined Refine(const SfmModel& model, const RefineOptions& options);
 
-/// JSON object: refined, reason, lens, candidates[].{name,held_out_px}, held_out_sights, sigma_px,
-/// rms_px, iterations, points_dropped.
+/// In what ways the views of a model do not suffice (judge.h), its poses, points and lenses free as
+/// Refine leaves them. At most 4000 points take part. A model with a FOV lens has none to tell of.
+std::vector<Degeneracy> DegeneraciesOf(const SfmModel& model, const RefineOptions& options);
+
+/// Throws Error naming the degeneracy where one leaves poses, points or focal lengths undetermined.
+/// `what`: the model or photos, for the message. (Copies of an image and models of two determine
+/// their cameras; `dtr validate` tells of them.)
+void RequireDetermined(const SfmModel& model, const RefineOptions& options,
+                       const std::string& what);
+
+/// JSON object: refined, reason, lens, candidates[].{name,held_out_px,converged}, held_out_sights,
+/// sigma_px, rms_px, iterations, points_dropped.
 std::string ToJson(const Refined& refined);
 
 }  // namespace dtr::calib

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "calib/bundle/refine.h"
 #include "calib/colmap/model_io.h"
 #include "capture/ingest.h"
 #include "cli/command.h"
@@ -38,6 +39,10 @@ int RunCalibratePhotos(const Options& options, const Context& context) {
   // The workspace stays: it holds COLMAP's arguments, logs and database, and lets a run continue.
   const auto calibrated =
       pipeline::CalibratePhotos(photos, calibrate, options.output / "workspace", context.console);
+  calib::RefineOptions judged;
+  judged.seed = context.common.seed;
+  if (calibrate.lens) judged.known_lenses.emplace();
+  calib::RequireDetermined(calibrated.model, judged, options.photos.string());
   colmap::WriteModel(options.output, calibrated.model, colmap::Format::kBinary);
 
   context.console.Say(fmt::format("{}: {} of {} photos have a camera; {} points",
@@ -74,9 +79,11 @@ void AddCalibrateCommand(CLI::App& app) {
                command.add_option("--memory", options->memory_gb, "Memory to stay within [4]")
                    ->check(CLI::Range(0.5, 4096.0))
                    ->type_name("GB");
-               command.add_flag("!--no-refine", options->refine,
-                                "Take COLMAP's cameras as they are, without bundle adjustment");
-               AddLensOption(command, options->lens);
+               CLI::Option* no_refine =
+                   command.add_flag("!--no-refine", options->refine,
+                                    "Take COLMAP's cameras as they are, without bundle adjustment");
+               // A lens that is given replaces COLMAP's: poses and points must follow it.
+               AddLensOption(command, options->lens)->excludes(no_refine);
                return [options](const Context& context) {
                  return RunCalibratePhotos(*options, context);
                };

@@ -31,6 +31,7 @@ int RunRefine(const Options& options, const Context& context) {
     refine.known_lenses.emplace();
     for (const auto& [id, camera] : model.cameras) refine.known_lenses->emplace(id, lens);
   }
+  calib::RequireDetermined(model, refine, options.model.string());
   const calib::Refined refined = calib::Refine(model, refine);
   for (const auto& candidate : refined.candidates) {
     context.console.Say(
@@ -52,8 +53,8 @@ int RunRefine(const Options& options, const Context& context) {
 
 }  // namespace
 
-void AddLensOption(CLI::App& command, std::filesystem::path& lens) {
-  command
+CLI::Option* AddLensOption(CLI::App& command, std::filesystem::path& lens) {
+  return command
       .add_option("--lens", lens,
                   "The lens of all photos, known: a .json of `dtr calibrate board`, a .yml of "
                   "OpenCV or a cameras.txt; it is not changed")

@@ -113,5 +113,20 @@ TEST(Refine, TooFewPointsAreLeftAlone) {
   EXPECT_NE(refined.reason.find("expected 100"), std::string::npos);
 }
 
+TEST(Refine, CamerasThatTurnOnTheSpotAreRefusedByName) {
+  const SfmModel good = ModelFrom(MakeBundle(Noisy()));
+  EXPECT_NO_THROW(RequireDetermined(good, {}, "model"));
+  SceneSpec turning = Noisy();
+  turning.pose = [](int i, int n) {
+    return testing::LookAt({0, -6, 1}, {1.5 * (2.0 * i / (n - 1) - 1), 0, 0});
+  };
+  try {
+    RequireDetermined(ModelFrom(MakeBundle(turning)), {}, "model");
+    FAIL() << "nothing was refused";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("pure_rotation"), std::string::npos) << error.what();
+  }
+}
+
 }  // namespace
 }  // namespace dtr::calib
