@@ -6,6 +6,7 @@
 
 #include "cli/bench_tables.h"
 #include "cli/command.h"
+#include "cli/commands/bench_sweep.h"
 #include "cli/novel_frames.h"
 #include "cli/render_options.h"
 #include "cli/renderers.h"
@@ -22,28 +23,37 @@ namespace {
 
 struct Options {
   std::filesystem::path set;
-  std::string table = "report", size, like;
-  std::vector<int> views, resolutions = {1, 2};
+  std::string table, size, like;  // table empty: a sweep
+  std::vector<int> views, resolutions;
   int repeats = 10, cameras = 2;
   RendererChoice renderer;
   std::shared_ptr<RenderOptions> render;
+  SweepRequest sweep;
 };
 
-eval::BenchMachine MachineOf(const eval::TimedRenderer& renderer) {
-  return {CpuModel(), static_cast<int>(std::thread::hardware_concurrency()), renderer.Description(),
-          DTR_VERSION, renderer.HasGpuClock() ? "gpu timer" : "wall"};
+/// Of the rows of tables.
+std::vector<int> ResolutionsOf(const Options& options) {
+  return options.resolutions.empty() ? std::vector{1, 2} : options.resolutions;
+}
+
+eval::BenchOptions BenchOptionsOf(const Options& options, const RenderOptions& render) {
+  eval::BenchOptions bench;
+  bench.render = render;
+  bench.views = options.views;
+  bench.resolutions = options.resolutions;
+  bench.repeats = options.repeats;
+  bench.cameras = options.cameras;
+  bench.timed_camera = [size = options.size](const PinholeCamera& camera) {
+    return WithSize(camera, size);
+  };
+  return bench;
 }
 
 int RunPhotoTable(const Options& options, const RenderOptions& render, const DtrSet& set,
                   eval::TimedRenderer& renderer, const Context& context) {
-  eval::BenchOptions bench;
-  bench.render = render;
-  bench.views = options.views;
+  eval::BenchOptions bench = BenchOptionsOf(options, render);
   std::sort(bench.views.begin(), bench.views.end());
-  bench.resolutions = options.resolutions;
-  bench.repeats = options.repeats;
-  bench.cameras = options.cameras;
-  bench.timed_camera = [&](const PinholeCamera& camera) { return WithSize(camera, options.size); };
+  bench.resolutions = ResolutionsOf(options);
   const bool weights = options.table == "weights";
   const eval::BenchReport report = (weights ? eval::MeasureWeightTable : eval::MeasureReportTable)(
       set, bench, renderer, context.console);
@@ -56,7 +66,7 @@ int RunPhotoTable(const Options& options, const RenderOptions& render, const Dtr
 int RunGrowthTable(const Options& options, RenderOptions render, const DtrSet& set,
                    eval::TimedRenderer& renderer, const Context& context) {
   if (!options.views.empty()) render.views = options.views.front();
-  render.resolution = options.resolutions.front();
+  render.resolution = ResolutionsOf(options).front();
   NovelCamera novel;
   if (options.like.empty()) {
     // Between cameras, where no view has the picture already; the middle is seen by most.
@@ -87,7 +97,7 @@ DtrSet LoadWhole(const Options& options, const Context& context) {
 int RunOsgTable(const Options& options, const RenderOptions& render, const Context& context) {
   std::vector<RenderOptions> variants;
   const std::vector<int> views = options.views.empty() ? std::vector{3, 5, 8} : options.views;
-  for (const int resolution : options.resolutions) {
+  for (const int resolution : ResolutionsOf(options)) {
     for (const int count : views) {
       variants.push_back(render);
       variants.back().resolution = resolution;
@@ -114,15 +124,19 @@ int RunOsgTable(const Options&, const RenderOptions&, const Context&) {
 #endif
 
 int RunBench(const Options& options, const Context& context) {
-  if (options.table == "osg") {
-    RenderOptions render = *options.render;
-    render.threads = context.common.threads;
-    return RunOsgTable(options, render, context);
-  }
-  // Before anything is loaded: a machine without OpenGL should say so at once.
-  const auto renderer = MakeTimedRenderer(options.renderer, context.console);
   RenderOptions render = *options.render;
   render.threads = context.common.threads;
+  if (options.table.empty()) {
+    SweepRequest request = options.sweep;
+    request.set = options.set;
+    request.bench = BenchOptionsOf(options, render);
+    request.size = options.size;
+    request.renderer = options.renderer;
+    return RunSweep(request, context);
+  }
+  if (options.table == "osg") return RunOsgTable(options, render, context);
+  // Before anything is loaded: a machine without OpenGL should say so at once.
+  const auto renderer = MakeTimedRenderer(options.renderer, context.console);
   const DtrSet set = LoadWhole(options, context);
   return options.table == "growth" ? RunGrowthTable(options, render, set, *renderer, context)
                                    : RunPhotoTable(options, render, set, *renderer, context);
@@ -130,14 +144,17 @@ int RunBench(const Options& options, const Context& context) {
 
 void DeclareOptions(CLI::App& command, Options& options) {
   command.add_option("SET", options.set, "The set")->required();
-  command
-      .add_option("--table", options.table,
-                  "report: frames a second by views used and resolution, with the truth beside; "
-                  "weights: every blend weight and number of views, quality and cost; growth: how "
-                  "times grow with views, pixels and the size of the set; osg: what a frame takes "
-                  "in OpenSceneGraph, beside the same frame alone [report]")
-      ->check(CLI::IsMember({"report", "weights", "growth", "osg"}))
-      ->type_name("report|weights|growth|osg");
+  CLI::Option* table =
+      command
+          .add_option(
+              "--table", options.table,
+              "Without: error against cost, by stage. report: frames a second by views used and "
+              "resolution, with the truth beside; "
+              "weights: every blend weight and number of views, quality and cost; growth: how "
+              "times grow with views, pixels and the size of the set; osg: what a frame takes "
+              "in OpenSceneGraph, beside the same frame alone")
+          ->check(CLI::IsMember({"report", "weights", "growth", "osg"}))
+          ->type_name("report|weights|growth|osg");
   command.add_option("--size", options.size, "Size of the timed pictures; 0 keeps the proportions")
       ->type_name("WxH");
   command
@@ -146,27 +163,32 @@ void DeclareOptions(CLI::App& command, Options& options) {
       ->check(CLI::Range(1, 100000))
       ->type_name("N");
   command
-      .add_option("--cameras", options.cameras,
-                  "report, weights: so many held-out photos (or left-out ones) to look from [2]")
+      .add_option(
+          "--cameras", options.cameras,
+          "render, report, weights: so many held-out photos (or left-out ones) to look from [2]")
       ->check(CLI::Range(1, 100000))
       ->type_name("N");
   command.add_option("--like", options.like, "growth: from a view's place [between two]")
       ->type_name("VIEW");
   AddRendererOptions(command, options.renderer);
   options.render = AddRenderOptions(command);
+  AddSweepOptions(command, table, options.sweep);
   // Here rows have them, one after the other; filling is timed apart.
   for (const char* single : {"--views", "--resolution", "--fill-holes"}) {
     command.remove_option(command.get_option(single));
   }
   command
       .add_option("--views", options.views,
-                  "Numbers of views used, a row each [3,5,6,8,9,12,14; weights: 1,2,4,8; osg: "
+                  "Numbers of views used, a row each; render: to try, the first the default "
+                  "[8,1,2,3,4,6,12; report: 3,5,6,8,9,12,14; weights: 1,2,4,8; osg: "
                   "3,5,8]; growth: the "
                   "one for rows that do not change it [8]")
       ->delimiter(',')
       ->check(CLI::Range(1, 1024))
       ->type_name("K,...");
-  command.add_option("--resolution", options.resolutions, "Every R-th depth pixel per axis [1,2]")
+  command
+      .add_option("--resolution", options.resolutions,
+                  "Every R-th depth pixel per axis [1,2; render: 1,2,4]")
       ->delimiter(',')
       ->check(CLI::Range(1, 1024))
       ->type_name("R,...");
@@ -175,8 +197,8 @@ void DeclareOptions(CLI::App& command, Options& options) {
 }  // namespace
 
 void AddBenchCommand(CLI::App& app) {
-  AddCommand(app, "bench", "Time a set's frames and measure what they are worth",
-             "dtr bench scene.dtr --table report", [](CLI::App& command) -> Action {
+  AddCommand(app, "bench", "Measure what settings cost and what they are worth",
+             "dtr bench scene.dtr --stage render,storage", [](CLI::App& command) -> Action {
                auto options = std::make_shared<Options>();
                DeclareOptions(command, *options);
                return [options](const Context& context) { return RunBench(*options, context); };

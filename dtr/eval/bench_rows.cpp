@@ -47,6 +47,8 @@ std::vector<const View*> EvenlyAmong(const std::vector<const View*>& views, int 
 void Add(const Times& times, Times& sum) {
   sum.median_ms += times.median_ms;
   sum.spread_ms += times.spread_ms;
+  sum.least_ms += times.least_ms;
+  sum.most_ms += times.most_ms;
 }
 
 void Add(const std::optional<double>& value, std::optional<double>& sum, int& count) {
@@ -135,6 +137,8 @@ BenchRow RowSums::Mean(const RenderOptions& options) const {
        {&row.frame, &row.cpu, &row.read_back, &row.read_back_cpu, &row.fill, &row.fill_cpu}) {
     times->median_ms /= cameras_;
     times->spread_ms /= cameras_;
+    times->least_ms /= cameras_;
+    times->most_ms /= cameras_;
   }
   if (row.psnr_db) *row.psnr_db /= psnr_count_;
   if (row.psnr_covered_db) *row.psnr_covered_db /= psnr_covered_count_;

@@ -52,7 +52,8 @@ std::unique_ptr<TimedRenderer> TimeOnCpu(std::string description, OnCpu::Functio
 Times TimesOf(std::vector<double> milliseconds) {
   if (milliseconds.empty()) throw std::invalid_argument("TimesOf: nothing was measured");
   std::sort(milliseconds.begin(), milliseconds.end());
-  return {Quantile(milliseconds, 0.5), Quantile(milliseconds, 0.75) - Quantile(milliseconds, 0.25)};
+  return {Quantile(milliseconds, 0.5), Quantile(milliseconds, 0.75) - Quantile(milliseconds, 0.25),
+          milliseconds.front(), milliseconds.back()};
 }
 
 void FrameTimes::Add(const FrameTime& time) {

@@ -39,6 +39,8 @@ td img { display: block; max-width: 20rem; height: auto; border-radius: .25rem; 
 figure { margin: 1rem 0; }
 figure img { display: block; max-width: 100%; height: auto; border-radius: .4rem; }
 figure img.plot { background: #fff; padding: .5rem; border: 1px solid var(--line); }
+figure.plot svg { display: block; width: 100%; height: auto; border: 1px solid var(--line);
+  border-radius: .4rem; }
 figcaption { color: var(--soft); font-size: .9rem; margin-top: .35rem; overflow-wrap: break-word; }
 @media print { body { background: #fff; color: #000; max-width: none; } }
 )css";
@@ -125,6 +127,11 @@ void HtmlReport::Svg(std::string_view caption, std::string_view svg) {
   body_ += "<figure><img class=\"plot\" alt=\"" + EscapeHtml(caption) +
            "\" src=\"data:image/svg+xml;base64," + Base64(svg) + "\"><figcaption>" +
            EscapeHtml(caption) + "</figcaption></figure>\n";
+}
+
+void HtmlReport::Plot(std::string_view caption, std::string_view svg) {
+  body_ += "<figure class=\"plot\">" + std::string(svg) + "<figcaption>" + EscapeHtml(caption) +
+           "</figcaption></figure>\n";
 }
 
 std::string HtmlReport::Finish() const {

@@ -32,6 +32,9 @@ class HtmlReport {
   void Image(std::string_view caption, const ImageRgb8& image);
   /// `svg`: a whole SVG document.
   void Svg(std::string_view caption, std::string_view svg);
+  /// `svg`: what ScatterSvg gives. It becomes part of the page, so that its points tell what they
+  /// are; nothing else may come this way, as it is not escaped.
+  void Plot(std::string_view caption, std::string_view svg);
 
   /// The page. The report can be continued afterwards.
   std::string Finish() const;

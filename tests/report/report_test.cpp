@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <regex>
 #include <stdexcept>
 
 #include "dtr/base/error.h"
@@ -11,6 +12,7 @@
 #include "dtr/report/encode.h"
 #include "dtr/report/false_color.h"
 #include "dtr/report/html.h"
+#include "dtr/report/plot.h"
 #include "dtr/report/set_report.h"
 
 namespace dtr::report {
@@ -200,6 +202,91 @@ TEST(SetReport, ShowsViewsSkippedPhotosChecksAndTimes) {
   }
   EXPECT_THAT(html, Not(HasSubstr("Uncertainty")));
   EXPECT_EQ(html, SetReport(set, info));
+}
+
+Plot TwoGroups() {
+  Plot plot;
+  plot.x_label = "CPU ms a frame";
+  plot.y_label = "error <levels>";
+  plot.groups = {"deferred", "two-pass"};
+  plot.points.resize(3);
+  for (size_t i = 0; i < plot.points.size(); ++i) {
+    plot.points[i].x = std::pow(10, i);
+    plot.points[i].y = std::pow(10, 2.0 - static_cast<double>(i));
+  }
+  plot.points[0].tip = "cheap";
+  plot.points[1].tip = "a & b\n--views 3";
+  plot.points[1].x_low = 8;
+  plot.points[1].x_high = 13;
+  plot.points[2].tip = "good";
+  plot.points[2].group = 1;
+  plot.points[2].label = "knee";
+  plot.points[2].ringed = true;
+  plot.front = {0, 1, 2};
+  return plot;
+}
+
+TEST(ScatterSvg, EqualFactorsAreEqualDistancesAndPointsSayWhatTheyAre) {
+  const std::string svg = ScatterSvg(TwoGroups());
+  // The middles of the points' invisible rims, in order.
+  std::vector<double> xs, ys;
+  const std::regex rim("<circle cx=\"([0-9.]+)\" cy=\"([0-9.]+)\" r=\"11\"");
+  for (std::sregex_iterator at(svg.begin(), svg.end(), rim), end; at != end; ++at) {
+    xs.push_back(std::stod((*at)[1]));
+    ys.push_back(std::stod((*at)[2]));
+  }
+  ASSERT_EQ(xs.size(), 3u);
+  constexpr double kPrinted = 0.11;  // one decimal each
+  EXPECT_NEAR(xs[1] - xs[0], xs[2] - xs[1], kPrinted);
+  EXPECT_NEAR(ys[1] - ys[0], ys[2] - ys[1], kPrinted);
+  EXPECT_LT(xs[0], xs[1]);
+  EXPECT_LT(ys[0], ys[1]);  // downwards, as errors fall
+  EXPECT_NE(svg.find("<title>a &amp; b\n--views 3</title>"), std::string::npos);
+  EXPECT_NE(svg.find("error &lt;levels&gt;"), std::string::npos);
+  EXPECT_NE(svg.find(">knee</text>"), std::string::npos);
+  EXPECT_EQ(svg.find("script"), std::string::npos);
+  EXPECT_EQ(svg, ScatterSvg(TwoGroups()));
+}
+
+TEST(ScatterSvg, RefusesWhatNoLogarithmHas) {
+  Plot plot = TwoGroups();
+  plot.points[1].y = 0;
+  EXPECT_THROW(ScatterSvg(plot), std::invalid_argument);
+  plot = TwoGroups();
+  plot.points[1].x = std::numeric_limits<double>::infinity();
+  EXPECT_THROW(ScatterSvg(plot), std::invalid_argument);
+  plot = TwoGroups();
+  plot.points[0].group = 2;
+  EXPECT_THROW(ScatterSvg(plot), std::invalid_argument);
+  plot = TwoGroups();
+  plot.front = {3};
+  EXPECT_THROW(ScatterSvg(plot), std::invalid_argument);
+  EXPECT_THROW(ScatterSvg(Plot{}), std::invalid_argument);
+}
+
+TEST(ScatterSvg, OnePointHasAPlace) {
+  Plot plot = TwoGroups();
+  plot.points.resize(1);
+  plot.front = {0};
+  EXPECT_EQ(ScatterSvg(plot).find("nan"), std::string::npos);
+}
+
+TEST(LogTicks, AreDecadesOrFinerWhereThereAreFew) {
+  EXPECT_EQ(LogTicks(0.5, 2000), (std::vector<double>{1, 10, 100, 1000}));
+  const std::vector<double> finer = LogTicks(3, 60);
+  EXPECT_EQ(finer, (std::vector<double>{5, 10, 20, 50}));
+  const std::vector<double> even = LogTicks(11.2, 13.9);
+  ASSERT_EQ(even.size(), 5u);
+  EXPECT_NEAR(even[0], 11.5, 1e-9);
+  EXPECT_NEAR(even[4], 13.5, 1e-9);
+}
+
+TEST(HtmlReport, APlotIsPartOfThePage) {
+  HtmlReport page("plots");
+  page.Plot("caption", ScatterSvg(TwoGroups()));
+  const std::string html = page.Finish();
+  EXPECT_NE(html.find("<figure class=\"plot\"><svg"), std::string::npos);
+  EXPECT_NE(html.find("<title>good</title>"), std::string::npos);
 }
 
 }  // namespace

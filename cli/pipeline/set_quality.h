@@ -1,0 +1,30 @@
+// cli/pipeline/set_quality.h -- what a finished set is worth in pictures, for sweeps.
+#pragma once
+#include <filesystem>
+
+#include "dtr/base/progress.h"
+#include "dtr/eval/held_out.h"
+#include "dtr/eval/sweep.h"
+
+namespace dtr::pipeline {
+
+/// Removes a folder when it goes.
+struct TemporaryFolder {
+  explicit TemporaryFolder(std::filesystem::path path) : folder(std::move(path)) {}
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  ~TemporaryFolder();
+  std::filesystem::path folder;
+};
+
+/// A set with its images, depth and held-out photos.
+DtrSet LoadToJudge(const std::filesystem::path& folder, bool sigma, int threads,
+                   Progress& progress);
+
+/// Fills in PSNR, error (RMS levels) and figures from renderings of the held-out photos, or of
+/// every source view left out in turn where there are none. Throws Error when nothing can be
+/// compared.
+void JudgePictures(const DtrSet& set, const RenderOptions& render,
+                   const eval::RenderFunction& renderer, eval::SweepMeasurement& measured);
+
+}  // namespace dtr::pipeline

@@ -1,0 +1,55 @@
+// cli/sweep_output.h -- what a sweep found: table, JSON, CSV, page.
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "cli/console.h"
+#include "dtr/eval/bench_json.h"
+#include "dtr/eval/sweep.h"
+#include "dtr/report/plot.h"
+
+namespace dtr::cli {
+
+/// A stage that was swept, and what is to be said of it.
+struct SweptStage {
+  eval::SweepStage stage;
+  std::vector<eval::SweepPoint> points;
+  std::vector<std::string> commands;  ///< that measure each point alone
+  std::string conditions;             ///< "3 held-out photos, 960x640, medians of 5 frames"
+  double max_loss_db = 0;
+  std::optional<double> budget;  ///< of cost, where one was given for this stage
+
+  std::vector<size_t> front;
+  std::optional<size_t> knee;  ///< index into points, as those below
+  std::optional<size_t> cheapest, within_budget;
+  std::optional<eval::DefaultVerdict> usual;
+  /// Fills in the last five from the points.
+  void Judge();
+};
+
+/// All of a run of `dtr bench`.
+struct SweepRun {
+  std::string set;
+  eval::BenchMachine machine;
+  std::vector<SweptStage> stages;
+};
+
+/// One line: is the default on the front, and if not what beats it?
+std::string DefaultSentence(const SweptStage& swept);
+
+void SaySweep(const SweepRun& run, Console& console);
+/// {set, machine:{cpu,cores,renderer,version,clock}, stages:[{stage,cost,error,conditions,
+///  points:[{setting,options:{AXIS:VALUE},command,cost,cost_least,cost_most,error,psnr_db,
+///  machine_ms,on_front,figures:{...}}], front:[index], knee, max_loss_db, cheapest_within_loss,
+///  budget, best_within_budget, default:{at,on_front,beaten_by,within_spread},
+///  machine_ms:{least,median,most}}]}. What is not there is null.
+std::string SweepJson(const SweepRun& run);
+/// A line per point: stage,setting,cost,cost_least,cost_most,error,psnr_db,on_front,machine_ms,
+/// command.
+std::string SweepCsv(const SweepRun& run);
+/// An offline page: a plot of each stage, error over cost on logarithmic axes, and its table.
+std::string SweepPage(const SweepRun& run);
+report::Plot PlotOf(const SweptStage& swept);
+
+}  // namespace dtr::cli

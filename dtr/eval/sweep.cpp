@@ -1,0 +1,238 @@
+// Which settings to measure, and in which order.
+#include "dtr/eval/sweep.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <stdexcept>
+
+#include "dtr/base/error.h"
+#include "dtr/base/machine.h"
+
+namespace dtr::eval {
+namespace {
+
+/// A place on the plane of logarithms.
+struct LogPoint {
+  double cost = 0, error = 0;
+};
+
+LogPoint LogOf(const SweepMeasurement& measured) {
+  return {std::log(measured.cost), std::log(measured.error)};
+}
+
+SweepSetting With(SweepSetting setting, size_t axis, int value) {
+  setting[axis] = value;
+  return setting;
+}
+
+/// The value of axis 0 on which another axis is tried alone.
+std::optional<int> BaseOf(const SweepStage& stage, size_t axis) {
+  SweepSetting setting(stage.axes.size(), 0);
+  for (int value = 0; value < static_cast<int>(stage.axes[0].values.size()); ++value) {
+    setting[0] = value;
+    if (stage.applies(setting, axis)) return value;
+  }
+  return std::nullopt;
+}
+
+/// What each value did when it was alone.
+class Effects {
+ public:
+  Effects(const SweepStage& stage, std::span<const SweepPoint> points) : stage_(stage) {
+    for (const SweepPoint& point : points) measured_[point.setting] = LogOf(point.measured);
+  }
+
+  /// Empty where something it needs was not measured.
+  std::optional<LogPoint> Predict(const SweepSetting& setting) const {
+    SweepSetting base(setting.size(), 0);
+    base[0] = setting[0];
+    const auto start = measured_.find(base);
+    if (start == measured_.end()) return std::nullopt;
+    LogPoint sum = start->second;
+    for (size_t axis = 1; axis < setting.size(); ++axis) {
+      if (setting[axis] == 0) continue;
+      const std::optional<LogPoint> effect = Alone(axis, setting[axis]);
+      if (!effect) return std::nullopt;
+      sum.cost += effect->cost;
+      sum.error += effect->error;
+    }
+    return sum;
+  }
+
+  bool Measured(const SweepSetting& setting) const { return measured_.contains(setting); }
+
+ private:
+  std::optional<LogPoint> Alone(size_t axis, int value) const {
+    const std::optional<int> base_value = BaseOf(stage_, axis);
+    if (!base_value) return std::nullopt;
+    const SweepSetting base = With(SweepSetting(stage_.axes.size(), 0), 0, *base_value);
+    const auto without = measured_.find(base), with = measured_.find(With(base, axis, value));
+    if (without == measured_.end() || with == measured_.end()) return std::nullopt;
+    return LogPoint{with->second.cost - without->second.cost,
+                    with->second.error - without->second.error};
+  }
+
+  const SweepStage& stage_;
+  std::map<SweepSetting, LogPoint> measured_;
+};
+
+/// Calls `visit` with every setting of the full product that means something throughout.
+template <typename Visit>
+void ForEachSetting(const SweepStage& stage, const Visit& visit) {
+  SweepSetting setting(stage.axes.size(), 0);
+  for (;;) {
+    bool meaningful = true;
+    for (size_t axis = 1; axis < setting.size() && meaningful; ++axis) {
+      meaningful = setting[axis] == 0 || stage.applies(setting, axis);
+    }
+    if (meaningful) visit(setting);
+    size_t axis = 0;
+    while (axis < setting.size() &&
+           ++setting[axis] == static_cast<int>(stage.axes[axis].values.size())) {
+      setting[axis++] = 0;
+    }
+    if (axis == setting.size()) return;
+  }
+}
+
+/// How far `point` lies beyond `front`: the share of the extents by which every point of the front
+/// would have to move to equal it in both (additive epsilon indicator, Zitzler et al., IEEE TEC
+/// 2003). Negative where a point of the front is better in both.
+double GainOver(const std::vector<LogPoint>& front, const LogPoint& extent, const LogPoint& point) {
+  double gain = HUGE_VAL;
+  for (const LogPoint& other : front) {
+    gain = std::min(gain, std::max((other.cost - point.cost) / extent.cost,
+                                   (other.error - point.error) / extent.error));
+  }
+  return gain;
+}
+
+}  // namespace
+
+std::vector<SweepSetting> OneAtATime(const SweepStage& stage) {
+  if (stage.axes.empty()) throw std::invalid_argument("OneAtATime: a stage without choices");
+  const SweepSetting usual(stage.axes.size(), 0);
+  std::vector<SweepSetting> settings;
+  for (size_t value = 0; value < stage.axes[0].values.size(); ++value) {
+    settings.push_back(With(usual, 0, static_cast<int>(value)));
+  }
+  for (size_t axis = 1; axis < stage.axes.size(); ++axis) {
+    const std::optional<int> base = BaseOf(stage, axis);
+    if (!base) continue;
+    for (size_t value = 1; value < stage.axes[axis].values.size(); ++value) {
+      settings.push_back(With(With(usual, 0, *base), axis, static_cast<int>(value)));
+    }
+  }
+  return settings;
+}
+
+std::vector<SweepSetting> Promising(const SweepStage& stage, std::span<const SweepPoint> points,
+                                    int count) {
+  constexpr double kLeastPromise = 0.01;  // of the front's extent: below what repeats tell apart
+  const std::vector<size_t> indices = ParetoFront(points);
+  if (indices.size() < 2) return {};
+  std::vector<LogPoint> front;
+  for (const size_t i : indices) front.push_back(LogOf(points[i].measured));
+  const LogPoint extent{front.back().cost - front.front().cost,
+                        front.front().error - front.back().error};
+  const Effects effects(stage, points);
+  struct Candidate {
+    SweepSetting setting;
+    LogPoint predicted;
+  };
+  std::vector<Candidate> candidates;
+  ForEachSetting(stage, [&](const SweepSetting& setting) {
+    if (effects.Measured(setting)) return;
+    const std::optional<LogPoint> predicted = effects.Predict(setting);
+    if (predicted && GainOver(front, extent, *predicted) > kLeastPromise) {
+      candidates.push_back({setting, *predicted});
+    }
+  });
+  std::vector<SweepSetting> chosen;
+  while (static_cast<int>(chosen.size()) < count) {
+    double most = kLeastPromise;
+    const Candidate* best = nullptr;
+    for (const Candidate& candidate : candidates) {
+      if (const double gain = GainOver(front, extent, candidate.predicted); gain > most) {
+        most = gain;
+        best = &candidate;
+      }
+    }
+    if (best == nullptr) break;
+    chosen.push_back(best->setting);
+    front.push_back(best->predicted);  // so that the next one is elsewhere
+  }
+  return chosen;
+}
+
+SweepPoint MeasurePoint(const SweepStage& stage, const SweepSetting& setting) {
+  const double before_ms = stage.cost_is_time ? CalibrationLoop() : 0;
+  SweepMeasurement measured = stage.measure(setting);
+  if (stage.cost_is_time) measured.machine_ms = (before_ms + CalibrationLoop()) / 2;
+  if (!(measured.cost > 0) || !(measured.error > 0)) {
+    throw Error("bench " + stage.name + ": " + Describe(stage, setting) +
+                ": expected a cost and an error above 0, found none");
+  }
+  return {setting, std::move(measured)};
+}
+
+std::vector<SweepPoint> Sweep(const SweepStage& stage, int most_points, SweepStore& store,
+                              Progress& progress) {
+  constexpr int kPerRound = 4;
+  std::vector<SweepPoint> points;
+  progress.Stage("bench " + stage.name, most_points);
+  const auto add = [&](const SweepSetting& setting) {
+    if (static_cast<int>(points.size()) >= most_points) return;
+    progress.ThrowIfInterrupted();
+    if (std::optional<SweepMeasurement> known = store.Find(setting)) {
+      points.push_back({setting, std::move(*known)});
+    } else {
+      points.push_back(MeasurePoint(stage, setting));
+      store.Keep(setting, points.back().measured);
+    }
+    progress.Update(static_cast<int>(points.size()));
+  };
+  for (const SweepSetting& setting : OneAtATime(stage)) add(setting);
+  while (static_cast<int>(points.size()) < most_points) {
+    const std::vector<SweepSetting> round = Promising(stage, points, kPerRound);
+    if (round.empty()) break;
+    for (const SweepSetting& setting : round) add(setting);
+  }
+  return points;
+}
+
+double CalibrationLoop() {
+  constexpr size_t kNumbers = (2 << 20) / sizeof(float);
+  constexpr int kLaps = 6, kRuns = 3;
+  std::vector<float> buffer(kNumbers, 1.0f);
+  std::vector<double> times_ms;
+  for (int run = 0; run < kRuns; ++run) {
+    const double start_ms = ProcessCpuMilliseconds();
+    for (int lap = 0; lap < kLaps; ++lap) {
+      float carry = static_cast<float>(lap);
+      for (float& number : buffer) {
+        carry = carry * 0.5f + number;  // each waits for the one before: no vectoriser helps
+        number = carry;
+      }
+    }
+    // Looked at, so that it cannot be left out.
+    if (!(buffer[kNumbers / 2] > 0)) throw std::logic_error("CalibrationLoop: numbers went astray");
+    times_ms.push_back(ProcessCpuMilliseconds() - start_ms);
+    std::fill(buffer.begin(), buffer.end(), 1.0f);
+  }
+  std::sort(times_ms.begin(), times_ms.end());
+  return times_ms[kRuns / 2];
+}
+
+std::string Describe(const SweepStage& stage, const SweepSetting& setting) {
+  std::string words;
+  for (size_t axis = 0; axis < setting.size(); ++axis) {
+    if (setting[axis] == 0) continue;
+    words += (words.empty() ? "" : " ") + stage.axes[axis].name + "=" +
+             stage.axes[axis].values[static_cast<size_t>(setting[axis])];
+  }
+  return words.empty() ? "default" : words;
+}
+
+}  // namespace dtr::eval
