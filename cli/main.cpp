@@ -30,6 +30,7 @@ int Run(int argc, char** argv) {
   dtr::cli::AddImportCommand(app);
   dtr::cli::AddExportCommand(app);
   dtr::cli::AddDatasetCommand(app);
+  dtr::cli::AddSelftestCommand(app);
   dtr::cli::AddManualCommands(app, DTR_VERSION);
   // CLI11 would say that a command is missing, not that this one does not exist.
   const auto is_called = [&](const CLI::App* command) { return command->get_name() == argv[1]; };

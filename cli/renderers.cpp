@@ -9,14 +9,6 @@ namespace dtr::cli {
 
 namespace {
 
-std::vector<std::string> Names() {
-#ifdef DTR_WITH_GL
-  return {"gl", "cpu"};
-#else
-  return {"cpu"};
-#endif
-}
-
 void CheckShaderFolder(const RendererChoice& choice) {
   const std::filesystem::path& folder = choice.shader_folder;
   if (folder.empty()) return;
@@ -34,16 +26,24 @@ void CheckShaderFolder(const RendererChoice& choice) {
 
 }  // namespace
 
-std::string DefaultRenderer() { return Names().front(); }
+std::vector<std::string> RendererNames() {
+#ifdef DTR_WITH_GL
+  return {"gl", "cpu"};
+#else
+  return {"cpu"};
+#endif
+}
+
+std::string DefaultRenderer() { return RendererNames().front(); }
 
 void AddRendererOptions(CLI::App& command, RendererChoice& choice) {
   choice.name = DefaultRenderer();
   std::string type;
-  for (const std::string& known : Names()) type += (type.empty() ? "" : "|") + known;
+  for (const std::string& known : RendererNames()) type += (type.empty() ? "" : "|") + known;
   command
       .add_option("--renderer", choice.name,
                   "OpenGL, or the slow double-precision reference [" + choice.name + "]")
-      ->check(CLI::IsMember(Names()))
+      ->check(CLI::IsMember(RendererNames()))
       ->type_name(type);
 #ifdef DTR_WITH_GL
   AddOpenGlOptions(command, choice);

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "dtr/base/progress.h"
 #include "dtr/eval/held_out.h"
@@ -27,6 +28,9 @@ void AddRendererOptions(CLI::App& command, RendererChoice& choice);
 
 /// Adds --shader-dir and --gpu-memory, for what draws with OpenGL alone.
 void AddOpenGlOptions(CLI::App& command, RendererChoice& choice);
+
+/// The names that --renderer knows, the default first.
+std::vector<std::string> RendererNames();
 
 /// The default: "gl" in programs built with OpenGL, else "cpu".
 std::string DefaultRenderer();

@@ -15,7 +15,7 @@ namespace {
 // An inverse distance that is not this many standard deviations from zero is no distance.
 constexpr double kSeesDistance = 4;
 constexpr double kSmallAngleDeg = 1;      // COLMAP's stereo refuses below 1 degree
-constexpr double kCollinear = 0.01;       // second over first extent of the centres
+constexpr double kCollinear = 0.01;       // second over first extent of the centres, or points
 constexpr double kPlanar = 0.03;          // third over second extent of the points
 constexpr double kForwardDeg = 20;        // between the way and the axis
 constexpr double kMostTracksOfTwo = 0.9;  // share of points
@@ -197,7 +197,13 @@ std::vector<Degeneracy> FindDegeneracies(const Adjusted& adjusted,
   }
   if (!no_distance && places.size() >= 4) {
     const Eigen::Vector3d flat = Extents(places, &unused);
-    if (flat[2] < kPlanar * flat[1]) {
+    if (flat[1] < kCollinear * flat[0]) {
+      add("collinear_points",
+          fmt::format(
+              "the points lie on a line, to {:.2g} of its length: cameras may turn about it",
+              flat[1] / flat[0]),
+          harmful);
+    } else if (flat[2] < kPlanar * flat[1]) {
       add("planar_scene",
           fmt::format("the points lie in a plane, to {:.2g} of its extent", flat[2] / flat[1]),
           harmful);

@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -51,6 +52,24 @@ Eigen::Vector3d GapBetween(const StereoView& view, const StereoView& other, doub
   if (!(gap.norm() > 0)) return gap;
   const double step = std::exp2(std::round(std::log2(gap.norm())) - kGapBits);
   return (gap / step).array().round() * step;
+}
+
+/// False for pictures of so few colours that every texture is made of them: line art, thresholded
+/// scans. There a window's weights by colour would leave one colour of it, and no texture.
+bool ColoursTellSurfacesApart(const ImageRgb8& image) {
+  constexpr size_t kFewColours = 4;
+  std::array<std::array<std::uint8_t, 3>, kFewColours> seen{};
+  size_t count = 0;
+  for (int y = 0; y < image.height(); ++y) {
+    for (int x = 0; x < image.width(); ++x) {
+      const std::array<std::uint8_t, 3> colour{image(x, y, 0), image(x, y, 1), image(x, y, 2)};
+      const auto end = seen.begin() + static_cast<std::ptrdiff_t>(count);
+      if (std::find(seen.begin(), end, colour) != end) continue;
+      if (count == kFewColours) return true;  // photos end here within a few pixels
+      seen[count++] = colour;
+    }
+  }
+  return false;
 }
 
 /// Colours of a photo shrunk to blocks of `side` pixels: the mean of those its mask allows.
@@ -111,7 +130,8 @@ Level MakeLevel(const StereoView& view, const Picture& reference,
     std::copy_n(reference.grey.row(y), r.width, r.grey.at(0, y));
     for (int x = 0; x < r.width; ++x) *r.usable.at(x, y) = reference.usable(x, y) != 0 ? 1 : 0;
   }
-  r.rgb = ColourOf(view, r.width, r.height, 1 << index);
+  r.rgb = ColoursTellSurfacesApart(*view.image) ? ColourOf(view, r.width, r.height, 1 << index)
+                                                : Bordered<std::int32_t>(r.width, r.height, 0);
   const Eigen::Matrix3d reference_inverse = MatrixOf(reference.camera).inverse();
   // Texture index coordinates: pixel centre i + 0.5 lies at i + kTextureBorder.
   Eigen::Matrix3d shift = Eigen::Matrix3d::Identity();

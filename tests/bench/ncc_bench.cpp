@@ -16,7 +16,7 @@
 
 #include "stereo/patchmatch/guesses.h"
 #include "stereo/patchmatch/level.h"
-#include "tests/stereo/engine_rig.h"
+#include "datasets/exact/stereo_quality.h"
 
 namespace {
 

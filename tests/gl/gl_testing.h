@@ -54,20 +54,6 @@ struct NamedScene {
   Shot novel;
 };
 
-inline DtrSet FromAround(const Surface& surface, int count, double spread,
-                         const Eigen::Vector3d& target, int depth_scale = 1) {
-  std::vector<View> views;
-  for (int i = 0; i < count; ++i) {
-    const double angle = 2 * 3.14159265358979323846 * i / count;
-    Shot shot =
-        ShotFrom("v" + std::to_string(i),
-                 {spread * std::cos(angle), 0.7 * spread * std::sin(angle), 0.1 * i}, target);
-    shot.depth_scale = depth_scale;
-    views.push_back(Photograph(surface, shot));
-  }
-  return SetOf(std::move(views));
-}
-
 /// A plane that leans, spheres before it, a step, a map with holes and masks and gains, thin rods,
 /// and cameras that look outwards from the middle of a room (the per-pixel rule).
 inline std::vector<NamedScene> ParityScenes() {

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "tests/gl/moved_worlds.h"
+#include "tests/gl/gl_testing.h"
 
 namespace dtr::gl {
 namespace {

@@ -14,7 +14,7 @@
 #include "dtr/gl/objects.h"
 #include "dtr/render/triangulation.h"
 #include "tests/gl/gl_testing.h"
-#include "tests/gl/moved_worlds.h"
+#include "tests/gl/gl_testing.h"
 
 namespace dtr::gl {
 namespace {

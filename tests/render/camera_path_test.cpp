@@ -7,7 +7,7 @@
 
 #include "dtr/base/error.h"
 #include "dtr/render/geometry.h"
-#include "tests/support/analytic_scene.h"
+#include "datasets/exact/analytic_scene.h"
 
 namespace dtr {
 namespace {

@@ -11,7 +11,7 @@
 #include "dtr/base/random.h"
 #include "dtr/render/geometry.h"
 #include "dtr/render/valid_views.h"
-#include "tests/support/analytic_scene.h"
+#include "datasets/exact/analytic_scene.h"
 
 namespace dtr {
 namespace {

@@ -11,7 +11,7 @@
 #include "calib/colmap/export.h"
 #include "calib/colmap/model_io.h"
 #include "dtr/base/files.h"
-#include "tests/stereo/engine_rig.h"
+#include "datasets/exact/stereo_quality.h"
 #include "tests/support/test_data.h"
 #include "tests/support/truncation.h"
 

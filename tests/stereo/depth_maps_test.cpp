@@ -5,7 +5,7 @@
 #include <atomic>
 #include <cmath>
 
-#include "tests/stereo/synthetic_scene.h"
+#include "datasets/exact/stereo_scene.h"
 
 namespace dtr::stereo {
 namespace {

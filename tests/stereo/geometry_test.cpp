@@ -8,7 +8,7 @@
 #include "stereo/neighbours.h"
 #include "stereo/sgbm/planes.h"
 #include "stereo/sgbm/rectify.h"
-#include "tests/stereo/synthetic_scene.h"
+#include "datasets/exact/stereo_scene.h"
 
 namespace dtr::stereo {
 namespace {

@@ -9,7 +9,7 @@
 #include <new>
 
 #include "stereo/depth_maps.h"
-#include "tests/stereo/engine_rig.h"
+#include "datasets/exact/stereo_quality.h"
 #include "tests/support/test_data.h"
 
 namespace {

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <optional>
 
-#include "tests/stereo/engine_rig.h"
+#include "datasets/exact/stereo_quality.h"
 
 namespace dtr::stereo {
 namespace {

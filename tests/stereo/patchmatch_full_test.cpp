@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "tests/stereo/extremes_rig.h"
+#include "datasets/exact/stereo_score.h"
 
 namespace dtr::stereo {
 namespace {

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "dtr/io/image_io.h"
-#include "tests/stereo/engine_rig.h"
+#include "datasets/exact/stereo_quality.h"
 #include "tests/support/test_data.h"
 
 namespace dtr::stereo {

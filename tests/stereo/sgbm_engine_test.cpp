@@ -6,7 +6,7 @@
 #include <cmath>
 #include <opencv2/core/utility.hpp>
 
-#include "tests/stereo/engine_rig.h"
+#include "datasets/exact/stereo_quality.h"
 
 namespace dtr::stereo {
 namespace {

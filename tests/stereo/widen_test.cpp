@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "stereo/depth_maps.h"
-#include "tests/stereo/engine_rig.h"
+#include "datasets/exact/stereo_quality.h"
 
 namespace dtr::stereo::testing {
 namespace {

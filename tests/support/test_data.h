@@ -7,6 +7,8 @@
 #include <filesystem>
 #include <string>
 
+#include "dtr/base/temporary_folder.h"
+
 namespace dtr::testing {
 
 /// Folder of the real data sets: $DTR_DATA, else ../shared/data beside the checkout.
@@ -15,26 +17,7 @@ inline std::filesystem::path DataFolder() {
   return given != nullptr ? given : "../shared/data";
 }
 
-/// A fresh folder, removed with everything in it at the end of the scope.
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "dtr_test_XXXXXX").string();
-    if (mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("no temporary folder");
-    path_ = pattern;
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  const std::filesystem::path& path() const { return path_; }
-  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
-
- private:
-  std::filesystem::path path_;
-};
+using dtr::TemporaryFolder;
 
 }  // namespace dtr::testing
 

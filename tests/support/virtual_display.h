@@ -1,4 +1,5 @@
-// tests/support/virtual_display.h -- a display of a test's own, so that no window opens on the user's.
+// tests/support/virtual_display.h -- a display of a test's own, so that no window opens on the
+// user's.
 #pragma once
 #include <fcntl.h>
 #include <poll.h>
@@ -16,10 +17,10 @@ namespace dtr::testing {
 
 /// An X server without a screen (Xvfb), and DISPLAY set to it, for the length of a scope.
 ///
-/// The server chooses a free number itself and writes it once it takes connections. `xvfb-run` waits
-/// for a signal instead, which is lost when it comes before the wait or is ignored by the caller: then
-/// it waits for ever. Nor does it start anew when its last window closes, for whoever opens the next one
-/// meanwhile is turned away.
+/// The server chooses a free number itself and writes it once it takes connections. `xvfb-run`
+/// waits for a signal instead, which is lost when it comes before the wait or is ignored by the
+/// caller: then it waits for ever. Nor does it start anew when its last window closes, for whoever
+/// opens the next one meanwhile is turned away.
 class VirtualDisplay {
  public:
   VirtualDisplay() {

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tests/support/analytic_scene.h"
+#include "datasets/exact/analytic_scene.h"
 
 namespace dtr::viewer {
 namespace {

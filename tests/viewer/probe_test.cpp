@@ -6,7 +6,7 @@
 
 #include "dtr/cpu/contributions.h"
 #include "dtr/cpu/renderer.h"
-#include "tests/support/analytic_scene.h"
+#include "datasets/exact/analytic_scene.h"
 #include "viewer/navigation.h"
 #include "viewer/shown.h"
 

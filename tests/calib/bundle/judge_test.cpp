@@ -46,33 +46,6 @@ TEST(Judge, PureRotationIsNamed) {
   EXPECT_FALSE(AllPassed(judgement.tests));
 }
 
-TEST(Judge, AFlatSceneFacedSquarelyIsNamed) {
-  SceneSpec spec{.images = 6, .points = 200, .lens = kPinholeLens, .noise_px = 0.3};
-  spec.pose = [](int i, int) {  // parallel views of a wall: focal length and distance are one
-    const Eigen::Vector3d c(0.5 * (i % 3) - 0.5, -6, 0.5 * (i / 3));
-    return LookAt(c, c + Eigen::Vector3d::UnitY());
-  };
-  spec.point = [](Random& random) {
-    const double x = random.Uniform(-2, 2);
-    return Eigen::Vector3d(x, 0, random.Uniform(-1.5, 1.5));
-  };
-  const Judgement judgement = Judge(MakeBundle(spec), {});
-  EXPECT_TRUE(Names(judgement, "planar_scene")) << ToJson(judgement);
-  EXPECT_FALSE(AllPassed(judgement.tests));
-}
-
-TEST(Judge, SmallAnglesAreNamed) {
-  SceneSpec spec{.images = 3, .points = 200, .lens = kPinholeLens, .noise_px = 0.02};
-  spec.pose = [](int i, int) {  // 0.1 degrees at the scene's distance
-    const Eigen::Vector3d c(0.0052 * i, -6, 0.003 * (i == 1));
-    return LookAt(c, {0, 0, 0});
-  };
-  const Judgement judgement = Judge(MakeBundle(spec), {});
-  const bool named = Names(judgement, "small_angles") || Names(judgement, "pure_rotation");
-  EXPECT_TRUE(named) << ToJson(judgement);
-  EXPECT_FALSE(AllPassed(judgement.tests));
-}
-
 TEST(Judge, DegenerateWaysAreRecognised) {
   SceneSpec spec{.images = 6, .points = 300, .lens = kPinholeLens, .noise_px = 0.3};
   spec.pose = [](int i, int) { return LookAt({0.3 * i, -6 + 0.0 * i, 1}, {0.3 * i, 0, 1}); };

@@ -1,12 +1,12 @@
-// tests/stereo/engine_rig.h -- what the tests of the depth engines share: pictures of a surface
-// from some places, an estimate for the first of them, and how good it is.
+// datasets/exact/stereo_quality.h -- what the tests of the depth engines share: pictures of a
+// surface from some places, an estimate for the first of them, and how good it is.
 #pragma once
 #include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
 
-#include "tests/stereo/synthetic_scene.h"
+#include "datasets/exact/stereo_scene.h"
 
 namespace dtr::stereo::testing {
 

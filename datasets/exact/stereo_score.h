@@ -1,4 +1,4 @@
-// tests/stereo/extremes_rig.h -- what a depth engine can at best know about a scene, and how an
+// datasets/exact/stereo_score.h -- what a depth engine can at best know about a scene, and how an
 // estimate compares with that.
 #pragma once
 #include <Eigen/Dense>
@@ -7,10 +7,10 @@
 #include <numeric>
 #include <vector>
 
+#include "datasets/exact/stereo_quality.h"
 #include "dtr/base/progress.h"
 #include "stereo/consistency.h"
 #include "stereo/rounds.h"
-#include "tests/stereo/engine_rig.h"
 
 namespace dtr::stereo::testing {
 

@@ -1,4 +1,4 @@
-// tests/stereo/synthetic_scene.h -- textured surfaces with exact depth, for the tests of stereo.
+// datasets/exact/stereo_scene.h -- textured surfaces with exact depth, for stereo.
 #pragma once
 #include <Eigen/Geometry>
 #include <cmath>

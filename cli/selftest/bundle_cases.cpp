@@ -1,0 +1,331 @@
+// Bundle adjustment where numbers, geometry or data are at their limits.
+#include <algorithm>
+#include <numbers>
+
+#include "calib/bundle/judge.h"
+#include "cli/selftest/cases.h"
+#include "datasets/exact/bundle.h"
+#include "dtr/base/error.h"
+
+namespace dtr::selftest {
+namespace {
+
+using calib::Adjust;
+using calib::Adjusted;
+using calib::AdjustOptions;
+using calib::Bundle;
+using calib::LensCamera;
+using calib::LensFreedom;
+using calib::LensModel;
+using calib::Similarity;
+using testing::bundle::LargestDifference;
+using testing::bundle::LookAt;
+using testing::bundle::MakeBundle;
+using testing::bundle::Moved;
+using testing::bundle::Perturbed;
+using testing::bundle::Projections;
+using testing::bundle::SceneSpec;
+
+constexpr const char* kStage = "Bundle adjustment";
+
+Adjusted Solve(const Bundle& start, LensFreedom lens, Outcome& outcome) {
+  AdjustOptions options;
+  options.lens = lens;
+  Adjusted out = Adjust(start, options);
+  for (const auto& point : out.bundle.points) outcome.LookAtAll(point);
+  for (const auto& each : out.bundle.lenses) outcome.LookAtAll(each.params);
+  for (const auto& image : out.bundle.images) {
+    outcome.LookAtAll(image.cam_from_world.translation);
+    outcome.LookAtAll(image.cam_from_world.rotation.coeffs());
+  }
+  outcome.Look(out.sigma_px);
+  outcome.Look(out.rms_px);
+  return out;
+}
+
+/// Largest change of a predicted pixel when the world is scaled and moved before the solve.
+double ChangeInWorld(const Bundle& at_home, const Bundle& elsewhere, Outcome& outcome) {
+  const Adjusted here = Solve(at_home, LensFreedom::kAll, outcome);
+  const Adjusted there = Solve(elsewhere, LensFreedom::kAll, outcome);
+  return LargestDifference(Projections(here.bundle), Projections(there.bundle));
+}
+
+Outcome Scaled(double scale) {
+  Outcome outcome;
+  Similarity scaled;
+  scaled.scale = scale;
+  const Bundle home = MakeBundle({.noise_px = 0.3});
+  outcome.Add(AtMost("largest change of a predicted pixel, px",
+                     ChangeInWorld(home, Moved(home, scaled), outcome), 1e-6,
+                     "a millionth of a pixel: rounding, not another solution"));
+  return outcome;
+}
+
+Outcome FarFromTheOrigin(const Conditions&) {
+  Outcome outcome;
+  Similarity moved;
+  moved.translation << 1e7, -1e7, 1e7;
+  const Bundle home = MakeBundle({.noise_px = 0.3}), there = Moved(home, moved);
+  // What writing the same world with its numbers rounded at 1e7 does to a pixel, without a solve.
+  const double rounding_px = LargestDifference(Projections(home), Projections(there));
+  outcome.Add(AtMost("change of a predicted pixel over that of writing the world at 1e7",
+                     ChangeInWorld(home, there, outcome) / rounding_px, 4,
+                     "written once and solved: two roundings of poses, two of points"));
+  outcome.Add(AtMost("that of writing the world at 1e7, px", rounding_px, 1e-5,
+                     "positions at 1e7 are multiples of 2e-9; 900 px of focal length at 4 units"));
+  return outcome;
+}
+
+/// Errors of a lens's parameters over those that noise of `noise_px` explains: RMS against noise.
+void AddNoiseLevel(const Adjusted& out, double noise_px, Outcome& outcome) {
+  outcome.Add(Exactly("converged", out.converged, 1, "the solver ends at a minimum"));
+  outcome.Add(AtMost("sigma of the sights over the noise added", out.sigma_px / noise_px, 1.1,
+                     "1 where the solution is the best one; 2000 sights scatter by 2 %"));
+}
+
+void AddFocalError(const Adjusted& out, double truth_px, double bound, const char* reason,
+                   Outcome& outcome) {
+  outcome.Add(AtMost("error of the focal length, share",
+                     std::abs(out.bundle.lenses[0].params[0] / truth_px - 1), bound, reason));
+}
+
+// One focal length of 9000 px beside coefficients of 0.01; points from 4 to 40 000 units away; a
+// start that is off.
+Outcome MixedMagnitudes(const Conditions&) {
+  Outcome outcome;
+  SceneSpec spec{
+      .points = 400,
+      .lens = {LensModel::kOpenCv, 8000, 6000, {9000, 9020, 4010, 2990, -0.05, 0.01, 2e-4, -1e-4}},
+      .noise_px = 0.3};
+  spec.point = [](Random& random) {
+    const double x = random.Uniform(-2, 2), z = random.Uniform(-1.5, 1.5);
+    const double far = random.Index(2) == 0 ? 1 : std::pow(10, random.Uniform(0, 4));
+    return Eigen::Vector3d(x * far, random.Uniform(-2, 2) + 6 * (far - 1), z * far);
+  };
+  const Adjusted out = Solve(Perturbed(MakeBundle(spec), 0.01), LensFreedom::kAll, outcome);
+  AddNoiseLevel(out, 0.3, outcome);
+  AddFocalError(out, 9000, 1e-3, "0.3 px of noise in 2000 sights and more; seen: below 1e-4",
+                outcome);
+  return outcome;
+}
+
+Outcome NearlyFlat(const Conditions&) {
+  Outcome outcome;
+  SceneSpec spec{.points = 400, .noise_px = 0.3};
+  spec.point = [](Random& random) {  // a slab of 4 x 3 units, a thousandth thick
+    const double x = random.Uniform(-2, 2), y = random.Uniform(-1e-3, 1e-3);
+    return Eigen::Vector3d(x, y, random.Uniform(-1.5, 1.5));
+  };
+  const Adjusted out =
+      Solve(Perturbed(MakeBundle(spec), 0.01), LensFreedom::kNoPrincipalPoint, outcome);
+  AddNoiseLevel(out, 0.3, outcome);
+  AddFocalError(out, 900, 0.01, "seen from directions 80 degrees apart, a plane gives it to 1 %",
+                outcome);
+  return outcome;
+}
+
+bool Names(const calib::Judgement& judgement, std::initializer_list<const char*> names) {
+  return std::ranges::any_of(judgement.degeneracies, [&](const calib::Degeneracy& d) {
+    return std::ranges::any_of(names, [&](const char* name) { return d.name == name; });
+  });
+}
+
+const LensCamera kPinhole{LensModel::kSimplePinhole, 1000, 800, {900, 500, 400}};
+
+/// What the judge says of data that cannot decide: a named reason and a failed test.
+Outcome Undecided(const SceneSpec& spec, std::initializer_list<const char*> names,
+                  const Conditions& conditions) {
+  Outcome outcome;
+  const Bundle bundle = MakeBundle(spec);
+  Solve(bundle, LensFreedom::kNoPrincipalPoint, outcome);
+  const calib::Judgement judgement = calib::Judge(bundle, {}, conditions.threads);
+  for (const Check& test : judgement.tests) outcome.not_finite += std::isnan(test.value);
+  outcome.Add(Exactly("the judge names the degeneracy", Names(judgement, names), 1,
+                      "what the views cannot decide is told, not guessed"));
+  outcome.Add(Exactly("the judge passes the calibration", AllPassed(judgement.tests), 0,
+                      "numbers that nothing supports must not pass"));
+  for (const calib::Degeneracy& d : judgement.degeneracies) {
+    if (d.harmful) outcome.refusal = d.name + ": " + d.detail;
+  }
+  return outcome;
+}
+
+Outcome FlatFacedSquarely(const Conditions& conditions) {
+  SceneSpec spec{.images = 6, .points = 200, .lens = kPinhole, .noise_px = 0.3};
+  spec.pose = [](int i, int) {  // parallel views of a wall: focal length and distance are one
+    const Eigen::Vector3d c(0.5 * (i % 3) - 0.5, -6, 0.5 * (i / 3));
+    return LookAt(c, c + Eigen::Vector3d::UnitY());
+  };
+  spec.point = [](Random& random) {
+    const double x = random.Uniform(-2, 2);
+    return Eigen::Vector3d(x, 0, random.Uniform(-1.5, 1.5));
+  };
+  return Undecided(spec, {"planar_scene"}, conditions);
+}
+
+Outcome CentresOnALine(const Conditions&) {
+  Outcome outcome;
+  SceneSpec spec{.images = 8, .points = 400, .lens = kPinhole, .noise_px = 0.3};
+  spec.pose = [](int i, int) {
+    return LookAt({-1.4 + 0.4 * i, -6 + 1e-6 * (i % 2), 1}, {0, 0, 0});
+  };
+  const Adjusted out =
+      Solve(Perturbed(MakeBundle(spec), 0.01), LensFreedom::kNoPrincipalPoint, outcome);
+  AddNoiseLevel(out, 0.3, outcome);
+  AddFocalError(out, 900, 0.01, "the points are no line: everything is determined", outcome);
+  return outcome;
+}
+
+// Points within a millionth of a line: every camera may turn about it.
+Outcome PointsOnALine(const Conditions& conditions) {
+  SceneSpec spec{.images = 6, .points = 200, .lens = kPinhole, .noise_px = 0.3};
+  spec.point = [](Random& random) {
+    const double y = 1e-6 * random.Normal();
+    return Eigen::Vector3d(random.Uniform(-2, 2), y, 1e-6 * random.Normal());
+  };
+  return Undecided(spec, {"collinear_points"}, conditions);
+}
+
+// 1 degree across: 57 296 px of focal length for 1000 px.
+Outcome NarrowLens(const Conditions&) {
+  Outcome outcome;
+  const double focal = 500 / std::tan(0.5 * std::numbers::pi / 180);
+  SceneSpec spec{.points = 400,
+                 .lens = {LensModel::kSimplePinhole, 1000, 800, {focal, 500, 400}},
+                 .noise_px = 0.3};
+  spec.point = [](Random& random) {
+    const double x = random.Uniform(-0.04, 0.04), y = random.Uniform(-0.04, 0.04);
+    return Eigen::Vector3d(x, y, random.Uniform(-0.03, 0.03));
+  };
+  // The lens is known: so narrow a one cannot be told from its distance.
+  const Adjusted out = Solve(MakeBundle(spec), LensFreedom::kFixed, outcome);
+  AddNoiseLevel(out, 0.3, outcome);
+  return outcome;
+}
+
+Outcome NarrowLensFree(const Conditions& conditions) {
+  SceneSpec spec{.images = 3, .points = 200, .lens = kPinhole, .noise_px = 0.02};
+  spec.pose = [](int i, int) {  // 0.1 degrees at the scene's distance
+    const Eigen::Vector3d c(0.0052 * i, -6, 0.003 * (i == 1));
+    return LookAt(c, {0, 0, 0});
+  };
+  return Undecided(spec, {"small_angles", "pure_rotation"}, conditions);
+}
+
+// 190 degrees across: points beside and behind the cameras' plane, all around.
+Outcome FisheyeOf190Degrees(const Conditions&) {
+  Outcome outcome;
+  const double half = 95 * std::numbers::pi / 180, focal = 500 / half;
+  SceneSpec spec{
+      .points = 400,
+      .lens = {LensModel::kOpenCvFisheye, 1000, 1000, {focal, focal, 500, 500, 0.01, -0.002, 0, 0}},
+      .noise_px = 0.3};
+  spec.pose = [](int i, int) {
+    return LookAt({0.8 * (i % 3) - 0.8, 0.7 * (i / 3) - 0.7, 0.4 * (i % 2)},
+                  {0.5 * (i % 2), 20, 0.3 * (i % 3)});
+  };
+  spec.point = [](Random& random) {
+    const Eigen::Vector3d direction(random.Normal(), random.Normal(), random.Normal());
+    return Eigen::Vector3d(direction.normalized() * random.Uniform(4, 8));
+  };
+  const Bundle truth = MakeBundle(spec);
+  long long behind = 0;
+  for (const auto& sight : truth.observations) {
+    const Pose& pose = truth.images[static_cast<size_t>(sight.image)].cam_from_world;
+    const Eigen::Vector3d p = truth.points[static_cast<size_t>(sight.point)].head<3>();
+    behind += (pose * p).z() < 0;
+  }
+  outcome.Add(AtLeast("sights beyond 90 degrees", static_cast<double>(behind), 20,
+                      "the case is about them"));
+  const Adjusted out = Solve(Perturbed(truth, 0.01), LensFreedom::kNoPrincipalPoint, outcome);
+  AddNoiseLevel(out, 0.3, outcome);
+  AddFocalError(out, focal, 0.005, "sights all around leave the focal length no freedom", outcome);
+  return outcome;
+}
+
+Outcome HalfAreOutliers(const Conditions&) {
+  Outcome outcome;
+  Bundle spoiled = MakeBundle({.points = 400, .noise_px = 0.1});
+  Random random(3);
+  for (auto& sight : spoiled.observations) {
+    if (random.Uniform() < 0.5) continue;
+    const double x = random.Uniform(-80, 80);
+    sight.pixel += Eigen::Vector2d(x, random.Uniform(-80, 80));
+  }
+  const Adjusted out = Solve(spoiled, LensFreedom::kNoPrincipalPoint, outcome);
+  outcome.Add(AtMost("sigma of the sights that count, px", out.sigma_px, 0.3,
+                     "0.1 px of noise, and wrong sights that agree by chance within 5 sigmas"));
+  AddFocalError(out, 900, 5.0 / 900, "half of the sights decide as well as all, but for sqrt(2)",
+                outcome);
+  return outcome;
+}
+
+Outcome AMillionPixelsOff(const Conditions&) {
+  Outcome outcome;
+  const Bundle clean = MakeBundle({.noise_px = 0.1});
+  Bundle spoiled = clean;
+  spoiled.observations[5].pixel.x() += 1e6;
+  const Adjusted good = Solve(clean, LensFreedom::kAll, outcome);
+  const Adjusted out = Solve(spoiled, LensFreedom::kAll, outcome);
+  outcome.Add(Exactly("the sight counts", out.used[5], 0, "it agrees with nothing"));
+  outcome.Add(AtMost("change of the focal length, px",
+                     std::abs(out.bundle.lenses[0].params[0] - good.bundle.lenses[0].params[0]),
+                     0.1, "one sight of 1600 less"));
+  return outcome;
+}
+
+Outcome FocalThirtyPercentOff(const Conditions&) {
+  Outcome outcome;
+  Bundle start = MakeBundle({});
+  start.lenses[0].params[0] *= 1.3;
+  const Adjusted out = Solve(start, LensFreedom::kAll, outcome);
+  AddFocalError(out, 900, 1e-6, "exact sights: what is left is where the solver stops", outcome);
+  return outcome;
+}
+
+Outcome AllThirtyPercentOff(const Conditions&) {
+  Outcome outcome;
+  const Bundle truth = MakeBundle({.noise_px = 0.3});
+  const Adjusted best = Solve(truth, LensFreedom::kNoPrincipalPoint, outcome);
+  const Adjusted out = Solve(Perturbed(truth, 0.3), LensFreedom::kNoPrincipalPoint, outcome);
+  AddNoiseLevel(out, 0.3, outcome);
+  outcome.Add(AtMost("largest change of a predicted pixel, px",
+                     LargestDifference(Projections(best.bundle), Projections(out.bundle)), 0.01,
+                     "the same minimum; the solver stops when the cost falls by less than 1e-6 of "
+                     "itself or so"));
+  return outcome;
+}
+
+Outcome BrokenNumbers(const Conditions&) {
+  Outcome outcome;
+  Bundle broken = MakeBundle({});
+  broken.observations[3].pixel.x() = std::nan("");
+  ExpectRefusal(outcome, "a sight at NaN", [&] { Adjust(broken, {}); });
+  return outcome;
+}
+
+}  // namespace
+
+std::vector<Case> BundleCases() {
+  const auto scaled = [](double scale) {
+    return [scale](const Conditions&) { return Scaled(scale); };
+  };
+  return {{kStage, "world in a unit of 1e-6", true, scaled(1e-6)},
+          {kStage, "world in a unit of 1e6", true, scaled(1e6)},
+          {kStage, "world 1e7 units from its origin", true, FarFromTheOrigin},
+          {kStage, "mixed magnitudes: f 9000 px, depths 1 : 10 000", true, MixedMagnitudes},
+          {kStage, "nearly planar: a slab 4 x 3 x 0.002", true, NearlyFlat},
+          {kStage, "a plane faced squarely, lens unknown", true, FlatFacedSquarely},
+          {kStage, "camera centres on a line", true, CentresOnALine},
+          {kStage, "points on a line", false, PointsOnALine},
+          {kStage, "a lens of 1 degree, known", true, NarrowLens},
+          {kStage, "rays 0.1 degrees apart, lens unknown", true, NarrowLensFree},
+          {kStage, "a fisheye lens of 190 degrees", true, FisheyeOf190Degrees},
+          {kStage, "half of the sights are outliers", true, HalfAreOutliers},
+          {kStage, "one sight a million pixels off", true, AMillionPixelsOff},
+          {kStage, "focal length 30 % off at the start", true, FocalThirtyPercentOff},
+          {kStage, "everything 30 % off at the start", true, AllThirtyPercentOff},
+          {kStage, "a sight that is no number", true, BrokenNumbers}};
+}
+
+}  // namespace dtr::selftest

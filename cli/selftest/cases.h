@@ -1,0 +1,80 @@
+// cli/selftest/cases.h -- what a stability case is, and the cases of every stage.
+#pragma once
+#include <Eigen/Core>
+#include <cmath>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "dtr/eval/held_out.h"
+
+namespace dtr::selftest {
+
+/// How a value must lie to its bound. A value that is no number holds none of them.
+enum class Relation { kAtMost, kAtLeast, kEquals };
+
+/// One number of a case and what it must be.
+struct Measure {
+  std::string what;  ///< what is measured, its unit in the words
+  double value = 0;
+  Relation relation = Relation::kAtMost;
+  double bound = 0;
+  std::string reason;  ///< why this bound
+};
+bool Holds(const Measure& measure);
+
+inline Measure AtMost(std::string what, double value, double bound, std::string reason) {
+  return {std::move(what), value, Relation::kAtMost, bound, std::move(reason)};
+}
+inline Measure AtLeast(std::string what, double value, double bound, std::string reason) {
+  return {std::move(what), value, Relation::kAtLeast, bound, std::move(reason)};
+}
+inline Measure Exactly(std::string what, double value, double bound, std::string reason) {
+  return {std::move(what), value, Relation::kEquals, bound, std::move(reason)};
+}
+
+/// What a case found.
+struct Outcome {
+  std::vector<Measure> measures;
+  long long not_finite = 0;  ///< NaNs and infinities among all that was put out; must be 0
+  std::string refusal;  ///< how an input that cannot be solved is refused, in the program's words
+
+  void Add(Measure measure) { measures.push_back(std::move(measure)); }
+  /// Counts what is not finite.
+  void Look(double value) { not_finite += !std::isfinite(value); }
+  template <typename Values>
+  void LookAtAll(const Values& values) {
+    for (const auto value : values) Look(static_cast<double>(value));
+  }
+};
+
+/// Calls `work`, which must throw dtr::Error; its words are kept. A measure says whether it did.
+void ExpectRefusal(Outcome& outcome, const std::string& what, const std::function<void()>& work);
+
+/// A renderer by name; every case makes its own.
+struct NamedRenderer {
+  std::string name;  ///< "cpu" or "gl"
+  std::function<eval::RenderFunction()> make;
+};
+
+/// What the cases run with.
+struct Conditions {
+  int threads = 0;  ///< 0: all cores; no value depends on it
+};
+
+/// One stiff or extreme case. What it throws fails it.
+struct Case {
+  std::string stage, name;
+  bool quick = false;  ///< part of the short form
+  std::function<Outcome(const Conditions&)> run;
+};
+
+std::vector<Case> BundleCases();
+std::vector<Case> StereoCases();
+std::vector<Case> DepthCodingCases();
+std::vector<Case> BlendingCases();
+/// Every case once for each renderer.
+std::vector<Case> RenderingCases(std::span<const NamedRenderer> renderers);
+
+}  // namespace dtr::selftest

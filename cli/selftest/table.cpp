@@ -1,0 +1,173 @@
+#include "cli/selftest/table.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "dtr/base/error.h"
+
+namespace dtr::selftest {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+const char* Sign(Relation relation) {
+  if (relation == Relation::kAtMost) return "<=";
+  return relation == Relation::kAtLeast ? ">=" : "=";
+}
+
+std::string Verdict(bool holds) { return holds ? "holds" : "FAILS"; }
+
+/// Three digits: more differ from one mathematical library to the next.
+std::string Number(double value) { return fmt::format("{:.3g}", value); }
+
+std::string BoundOf(const Measure& m) {
+  return fmt::format("{} {:.6g}", Sign(m.relation), m.bound);
+}
+
+/// What else fails a row, in words; empty where nothing does.
+std::string OtherFaults(const Row& row) {
+  if (!row.error.empty()) return "ended with: " + row.error;
+  if (row.outcome.not_finite > 0) {
+    return fmt::format("{} numbers are NaN or infinite", row.outcome.not_finite);
+  }
+  return "";
+}
+
+Json ToJson(const Measure& m) {
+  Json json = {{"what", m.what},   {"value", nullptr},   {"relation", Sign(m.relation)},
+               {"bound", m.bound}, {"passed", Holds(m)}, {"reason", m.reason}};
+  if (std::isfinite(m.value)) json["value"] = m.value;
+  return json;
+}
+
+/// A cell of a Markdown table.
+std::string Cell(std::string text) {
+  for (size_t at = 0; (at = text.find('|', at)) != std::string::npos; at += 2) {
+    text.insert(at, "\\");
+  }
+  return text;
+}
+
+void AddRow(const Row& row, std::string& text) {
+  std::string name = Cell(row.name);
+  for (const Measure& m : row.outcome.measures) {
+    text += fmt::format("| {} | {} | {} | {} | {} | {} |\n", name, Cell(m.what), Number(m.value),
+                        BoundOf(m), Verdict(Holds(m)), Cell(m.reason));
+    name.clear();
+  }
+  if (!row.outcome.refusal.empty()) {
+    text += fmt::format("| {} | refused with: `{}` | | | | |\n", name, Cell(row.outcome.refusal));
+    name.clear();
+  }
+  const std::string faults = OtherFaults(row);
+  if (!faults.empty()) text += fmt::format("| {} | {} | | | FAILS | |\n", name, Cell(faults));
+}
+
+constexpr const char* kIntroduction =
+    "# Stability on stiff and extreme cases\n\n"
+    "Written by `dtr selftest --stability -o docs/STABILITY.md`; do not edit. A case holds when\n"
+    "every value holds its bound and no number that was put out is NaN or infinite. The command\n"
+    "exits with 1 where a case fails. `dtr selftest` runs the short form (cases marked *), which\n"
+    "`./check` runs too. No value depends on the number of threads.\n";
+
+}  // namespace
+
+bool Holds(const Measure& m) {
+  if (m.relation == Relation::kAtMost) return m.value <= m.bound;
+  if (m.relation == Relation::kAtLeast) return m.value >= m.bound;
+  return m.value == m.bound;
+}
+
+void ExpectRefusal(Outcome& outcome, const std::string& what, const std::function<void()>& work) {
+  bool refused = false;
+  try {
+    work();
+  } catch (const Error& error) {
+    refused = true;
+    outcome.refusal = error.what();
+  }
+  outcome.Add(Exactly(what + " is refused", refused, 1, "nothing is solved that cannot be"));
+}
+
+bool Row::passed() const {
+  return OtherFaults(*this).empty() && !outcome.measures.empty() &&
+         std::ranges::all_of(outcome.measures, Holds);
+}
+
+std::vector<Row> RunCases(const std::vector<Case>& cases, const Conditions& conditions,
+                          bool quick_only, Progress& progress) {
+  std::vector<const Case*> chosen;
+  for (const Case& each : cases) {
+    if (each.quick || !quick_only) chosen.push_back(&each);
+  }
+  progress.Stage("stability", static_cast<int>(chosen.size()));
+  std::vector<Row> rows;
+  for (const Case* each : chosen) {
+    if (progress.StopRequested()) break;
+    Row row{each->stage, each->name, each->quick, {}, {}};
+    try {
+      row.outcome = each->run(conditions);
+    } catch (const std::exception& error) {  // a case that ends the program judges no other case
+      row.error = error.what();
+    }
+    rows.push_back(std::move(row));
+    progress.Update(static_cast<int>(rows.size()));
+  }
+  return rows;
+}
+
+bool AllPassed(const std::vector<Row>& rows) { return std::ranges::all_of(rows, &Row::passed); }
+
+std::vector<std::string> TextLines(const Row& row) {
+  std::vector<std::string> lines;
+  for (const Measure& m : row.outcome.measures) {
+    lines.push_back(fmt::format("{:<5} {}: {}: {}: {} ({})", Verdict(Holds(m)), row.stage, row.name,
+                                m.what, Number(m.value), BoundOf(m)));
+  }
+  if (!row.outcome.refusal.empty()) lines.push_back("      refused with: " + row.outcome.refusal);
+  const std::string faults = OtherFaults(row);
+  if (!faults.empty())
+    lines.push_back(fmt::format("FAILS {}: {}: {}", row.stage, row.name, faults));
+  return lines;
+}
+
+std::string ToJson(const std::vector<Row>& rows) {
+  Json root = {{"passed", AllPassed(rows)}, {"rows", Json::array()}};
+  for (const Row& row : rows) {
+    Json json = {{"stage", row.stage},
+                 {"case", row.name},
+                 {"quick", row.quick},
+                 {"passed", row.passed()},
+                 {"not_finite", row.outcome.not_finite},
+                 {"refusal", row.outcome.refusal},
+                 {"error", row.error},
+                 {"measures", Json::array()}};
+    for (const Measure& m : row.outcome.measures) json["measures"].push_back(ToJson(m));
+    root["rows"].push_back(std::move(json));
+  }
+  return root.dump(2) + "\n";
+}
+
+std::string ToMarkdown(const std::vector<Row>& rows) {
+  const auto held = std::ranges::count_if(rows, &Row::passed);
+  std::string text = kIntroduction;
+  text += fmt::format("\n{} of {} cases hold.\n", held, rows.size());
+  std::string stage;
+  for (const Row& row : rows) {
+    if (row.stage != stage) {
+      stage = row.stage;
+      text += fmt::format(
+          "\n## {}\n\n| case | measured | value | bound | verdict | why this bound |\n"
+          "|---|---|---|---|---|---|\n",
+          stage);
+    }
+    Row marked = row;
+    if (row.quick) marked.name += " *";
+    AddRow(marked, text);
+  }
+  return text;
+}
+
+}  // namespace dtr::selftest
