@@ -10,13 +10,18 @@ foreach(page manual completion)
   add_custom_command(OUTPUT ${PROJECT_BINARY_DIR}/dtr.${page}
     COMMAND dtr ${page} > ${PROJECT_BINARY_DIR}/dtr.${page} DEPENDS dtr VERBATIM)
 endforeach()
-add_custom_target(dtr_manual ALL DEPENDS ${PROJECT_BINARY_DIR}/dtr.manual ${PROJECT_BINARY_DIR}/dtr.completion)
-install(FILES ${PROJECT_BINARY_DIR}/dtr.manual RENAME dtr.1
-  DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT runtime)
+add_custom_target(dtr_manual ALL DEPENDS ${PROJECT_BINARY_DIR}/dtr.1.gz ${PROJECT_BINARY_DIR}/dtr.completion)
 install(FILES ${PROJECT_BINARY_DIR}/dtr.completion RENAME dtr
   DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions COMPONENT runtime)
-install(FILES README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT runtime)
 install(FILES LICENSE RENAME copyright DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT runtime)
+install(FILES README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT runtime)
+install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT runtime FILES_MATCHING PATTERN "*.md"
+  PATTERN images EXCLUDE)
+# Compressed as Debian asks; -n leaves the time out, so that equal pages are equal files.
+add_custom_command(OUTPUT ${PROJECT_BINARY_DIR}/dtr.1.gz
+  COMMAND gzip -9nc ${PROJECT_BINARY_DIR}/dtr.manual > ${PROJECT_BINARY_DIR}/dtr.1.gz
+  DEPENDS ${PROJECT_BINARY_DIR}/dtr.manual VERBATIM)
+install(FILES ${PROJECT_BINARY_DIR}/dtr.1.gz DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT runtime)
 
 install(DIRECTORY dtr capture calib stereo datasets viewer DESTINATION ${DTR_INSTALL_HEADERS} COMPONENT dev
   FILES_MATCHING PATTERN "*.h" PATTERN shaders EXCLUDE PATTERN examples EXCLUDE PATTERN plaza EXCLUDE)
@@ -37,18 +42,18 @@ set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_COMPONENTS_GROUPING ONE_PER_GROUP)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SECTION graphics)
-set(CPACK_COMPONENT_GROUP_PROGRAM_DESCRIPTION
-  "photos in, novel views out
- Calibrates and validates the cameras of a photo collection, computes depth maps
- without CUDA, keeps the scene as a D+TR set (depth, texture, calibration) and
- renders new views of it: to files, in a window, in OpenSceneGraph.")
+set(CPACK_DEBIAN_PROGRAM_DESCRIPTION
+  "Calibrates and validates the cameras of a photo collection, computes depth maps
+without CUDA, keeps the scene as a D+TR set (depth, texture, calibration) and
+renders new views of it: to files, in a window, in OpenSceneGraph.")
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_NAME dtr)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SHLIBDEPS ON)
 # Programs that dtr runs, and the drivers that open a context where there is no screen.
-set(CPACK_DEBIAN_PROGRAM_PACKAGE_DEPENDS "colmap, ffmpeg, libegl1, libgl1-mesa-dri, libegl-mesa0")
+set(CPACK_DEBIAN_PROGRAM_PACKAGE_DEPENDS "colmap (>= 3.8), ffmpeg, libegl1, libgl1-mesa-dri, libegl-mesa0")
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_RECOMMENDS openscenegraph)
-set(CPACK_COMPONENT_GROUP_LIBRARIES_DESCRIPTION "libraries and headers of the D+TR toolkit
- Static libraries to load, render and measure D+TR sets; find_package(dtr).")
+set(CPACK_DEBIAN_LIBRARIES_DESCRIPTION
+  "Static libraries and headers to load, render and measure D+TR sets in programs of
+one's own: find_package(dtr).")
 set(CPACK_DEBIAN_LIBRARIES_PACKAGE_NAME libdtr-dev)
 set(CPACK_DEBIAN_LIBRARIES_PACKAGE_SECTION libdevel)
 # What scripts/packages.txt has of development files: the libraries are static.

@@ -23,6 +23,7 @@ function(dtr_library name)
   add_library(dtr::${name} ALIAS ${name})
   target_include_directories(${name} PUBLIC
     $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:${DTR_INSTALL_HEADERS}>)
+  target_compile_features(${name} PUBLIC cxx_std_20)  # the headers need it, whoever includes them
   target_link_libraries(${name} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
   dtr_compile_options(${name})
   install(TARGETS ${name} EXPORT dtrTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT dev)
