@@ -28,6 +28,14 @@ std::string_view Trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
 }
 
+// The beginning of what was found, fit for a message of one line.
+std::string Shown(std::string_view text) {
+  constexpr size_t kLongest = 40;
+  std::string shown(Trimmed(text.substr(0, kLongest)));
+  for (char& c : shown) c = static_cast<unsigned char>(c) < ' ' ? ' ' : c;
+  return shown;
+}
+
 // Top-level keys of a YAML file in the block style that FileStorage and ROS write.
 Fields FieldsOf(const std::string& text, const std::string& where) {
   Fields fields;
@@ -45,14 +53,13 @@ Fields FieldsOf(const std::string& text, const std::string& where) {
     if (at_margin && colon != std::string_view::npos) {
       const std::string key(Trimmed(line.substr(0, colon)));
       const auto [place, is_new] = fields.emplace(key, Trimmed(line.substr(colon + 1)));
-      if (!is_new) throw Error(where + ": the key '" + key + "' stands twice");
+      if (!is_new) throw Error(where + ": the key '" + Shown(key) + "' stands twice");
       open = &place->second;
     } else if (open != nullptr) {
       *open += '\n';
       *open += words;
     } else {
-      throw Error(where + ": expected YAML with keys at the margin, found '" +
-                  std::string(words.substr(0, 40)) + "'");
+      throw Error(where + ": expected YAML with keys at the margin, found '" + Shown(words) + "'");
     }
   }
   return fields;
@@ -84,7 +91,7 @@ std::vector<double> MatrixData(const Fields& fields, const char* key, const std:
   const size_t close = open == std::string::npos ? open : text.find(']', open);
   if (close == std::string::npos) {
     throw Error(fmt::format("{}: {}: expected a matrix with data: [ ... ], found '{}'", where, key,
-                            text.substr(0, 40)));
+                            Shown(text)));
   }
   std::vector<double> values;
   const std::string_view list(text.data() + open + 1, close - open - 1);
@@ -97,7 +104,7 @@ std::vector<double> MatrixData(const Fields& fields, const char* key, const std:
     const auto value = NumberFrom(word);
     if (!value) {
       throw Error(fmt::format("{}: {}: expected a finite number, found '{}'", where, key,
-                              std::string(Trimmed(word)).substr(0, 40)));
+                              Shown(Trimmed(word))));
     }
     values.push_back(*value);
   }
@@ -108,7 +115,7 @@ int SideFrom(const Fields& fields, const char* key, const std::string& where) {
   const auto value = NumberFrom(Field(fields, key, where));
   if (!value || *value != std::floor(*value) || *value < 1 || *value > kLongestSidePx) {
     throw Error(fmt::format("{}: {}: expected a whole number of 1 to {}, found '{}'", where, key,
-                            kLongestSidePx, fields.at(key).substr(0, 40)));
+                            kLongestSidePx, Shown(fields.at(key))));
   }
   return static_cast<int>(*value);
 }

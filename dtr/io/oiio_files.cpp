@@ -2,12 +2,11 @@
 
 #include <OpenImageIO/filesystem.h>
 
-#include <array>
-#include <fstream>
 #include <mutex>
 #include <vector>
 
 #include "dtr/base/error.h"
+#include "dtr/io/file_checks.h"
 
 namespace dtr::io {
 namespace {
@@ -32,37 +31,8 @@ void SetUpOnce() {
   });
 }
 
-constexpr size_t kPngSignatureBytes = 8;
 // Photos come out 7 % larger than at zlib's own level 6, in a third of the time (docs/FORMAT.md).
 constexpr int kPngLevel = 2;
-
-bool IsPng(std::ifstream& in) {
-  std::array<char, kPngSignatureBytes> start{};
-  in.read(start.data(), start.size());
-  return in.gcount() == static_cast<std::streamsize>(start.size()) &&
-         std::string(start.data(), start.size()) == "\x89PNG\r\n\x1a\n";
-}
-
-// libpng stops after the last row, so a file that lost its end would pass; walk its chunks
-// (PNG specification, section 5.3) up to IEND instead.
-void ExpectWholePng(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  if (!IsPng(in)) return;
-  const std::uintmax_t size = fs::file_size(file);
-  std::uintmax_t at = kPngSignatureBytes;
-  while (at + 12 <= size) {  // length, type and checksum are 4 bytes each
-    std::array<unsigned char, 8> head{};
-    in.seekg(static_cast<std::streamoff>(at));
-    if (!in.read(reinterpret_cast<char*>(head.data()), head.size())) break;
-    const std::uintmax_t length = (std::uintmax_t{head[0]} << 24) |
-                                  (std::uintmax_t{head[1]} << 16) | (std::uintmax_t{head[2]} << 8) |
-                                  head[3];
-    at += 12 + length;
-    if (std::string(head.begin() + 4, head.end()) == "IEND" && at <= size) return;
-  }
-  throw Error(file.string() + ": PNG cut short: expected chunks up to IEND, found " +
-              std::to_string(size) + " bytes; copy the file again");
-}
 
 }  // namespace
 
@@ -73,7 +43,7 @@ std::unique_ptr<OIIO::ImageInput> OpenImage(const fs::path& file, std::uint64_t 
     throw Error(file.string() + ": expected an image file, found " +
                 (fs::exists(file, error) ? "something else" : "nothing"));
   }
-  ExpectWholePng(file);
+  ExpectWholeFile(file);
   OIIO::ImageSpec wishes;  // raw colours: alpha is dropped, not multiplied in
   wishes.attribute("oiio:UnassociatedAlpha", 1);
   auto in = OIIO::ImageInput::open(file.string(), &wishes);
@@ -90,6 +60,7 @@ std::unique_ptr<OIIO::ImageInput> OpenImage(const fs::path& file, std::uint64_t 
     throw Error(file.string() + ": expected at most " + std::to_string(limit_px) +
                 " pixels, found " + std::to_string(spec.width) + "x" + std::to_string(spec.height));
   }
+  ExpectPlausibleSize(file, spec.width, spec.height);
   return in;
 }
 

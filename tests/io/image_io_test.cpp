@@ -1,6 +1,7 @@
 #include "dtr/io/image_io.h"
 
 #include <OpenImageIO/imageio.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -128,6 +129,45 @@ TEST(ReadImage, RefusesTextFoldersAbsentFilesAndTooManyPixels) {
   WriteImage(folder / "a.png", ImageRgb8(10, 10, 3));
   EXPECT_NO_THROW(ReadImage(folder / "a.png", {.limit_px = 100}));
   EXPECT_THROW(ReadImage(folder / "a.png", {.limit_px = 99}), Error);
+}
+
+std::string RefusalOf(const std::filesystem::path& file) {
+  try {
+    ReadImage(file);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+// OpenEXR would allocate what the header claims, up to 2 GiB, before it reads.
+TEST(ReadImage, AnExrThatClaimsMoreThanItHoldsIsRefusedBeforeAllocation) {
+  const TemporaryFolder folder;
+  const auto file = folder / "a.exr";
+  WriteForeign<float>(file, ImageSpec(1, 1, 3, TypeDesc::FLOAT), {0.5f, 0.25f, 0.125f});
+  const std::string good = ReadFile(file, 1 << 20);
+  EXPECT_NO_THROW(ReadImage(file));
+  const size_t length_at = good.find("chlist") + std::string("chlist").size() + 1;
+  for (const char* claim : {"\x7f\0\0\x6f", "\0\0\0\0", "\xff\xff\xff\xff"}) {
+    std::string bad = good;
+    bad.replace(length_at, 4, claim, 4);
+    WriteFileAtomically(file, bad);
+    EXPECT_THAT(RefusalOf(file), ::testing::HasSubstr("damaged EXR"));
+  }
+  std::string channels = good;  // the list of channels runs on past its own length
+  channels[good.find("compression") - 1] = 'x';
+  WriteFileAtomically(file, channels);
+  EXPECT_THAT(RefusalOf(file), ::testing::HasSubstr("damaged EXR"));
+}
+
+TEST(ReadImage, ASizeThatTheFileCannotHoldIsRefusedBeforeAllocation) {
+  const TemporaryFolder folder;
+  WriteFileAtomically(folder / "a.ppm", "P6\n19999 19999\n255\n" + std::string(300, 'x'));
+  EXPECT_THAT(RefusalOf(folder / "a.ppm"),
+              ::testing::HasSubstr("expected as many pixels as 319 bytes can hold, found 19999x"));
+  // White masks of photos are small files, and real.
+  WriteMask(folder / "m.png", Mask(3000, 2000, 1, 255));
+  EXPECT_EQ(ReadMask(folder / "m.png").width(), 3000);
 }
 
 TEST(ReadImage, TurnsThePhotoUprightOnRequest) {

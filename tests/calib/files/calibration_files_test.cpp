@@ -245,6 +245,18 @@ TEST(OpenCvYaml, WhatIsNoCameraIsAnError) {
   }
 }
 
+TEST(OpenCvYaml, WhatIsFoundIsSaidInOneLine) {
+  const dtr::testing::TemporaryFolder folder;
+  const auto file = folder / "camera.yml";
+  WriteFileAtomically(file, "image_width: 640\n  and more\n");
+  try {
+    ReadOpenCvYaml(file);
+    ADD_FAILURE() << "read";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("found '640 and more'"));
+  }
+}
+
 TEST(ColmapCameras, SurviveWritingAndReading) {
   const dtr::testing::TemporaryFolder folder;
   std::map<std::uint32_t, LensCamera> cameras;

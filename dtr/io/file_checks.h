@@ -1,0 +1,17 @@
+// dtr/io/file_checks.h -- internal to dtr/io: what image libraries do not look at before they
+// allocate or end early, looked at first.
+#pragma once
+#include <cstdint>
+#include <filesystem>
+
+namespace dtr::io {
+
+/// Throws Error for a PNG that lacks its end and for an EXR whose header names values longer than
+/// the file; other files pass.
+void ExpectWholeFile(const std::filesystem::path& file);
+
+/// Throws Error for an image so large that a file of this size cannot hold it: header fields that
+/// were made up, before anybody allocates for them.
+void ExpectPlausibleSize(const std::filesystem::path& file, int width_px, int height_px);
+
+}  // namespace dtr::io

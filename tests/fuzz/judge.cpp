@@ -1,0 +1,84 @@
+#include "tests/fuzz/judge.h"
+
+#include <fcntl.h>
+#include <sys/time.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <ctime>
+#include <stdexcept>
+
+#include "dtr/base/error.h"
+#include "tests/fuzz/memory_watch.h"
+
+namespace dtr::fuzz {
+namespace {
+
+namespace fs = std::filesystem;
+constexpr int kEndlessS = 20;  // then the process ends by SIGPROF, and the input stays
+
+double CpuS() {
+  timespec now{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+void Put(const fs::path& file, std::string_view bytes) {
+  const int fd = open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  const bool whole =
+      fd >= 0 && write(fd, bytes.data(), bytes.size()) == static_cast<ssize_t>(bytes.size());
+  if (fd < 0 || close(fd) != 0 || !whole) throw std::runtime_error("no room for fuzzed inputs");
+}
+
+void EndAfter(int seconds) {
+  const itimerval timer{{0, 0}, {seconds, 0}};
+  setitimer(ITIMER_PROF, &timer, nullptr);
+}
+
+// The words of a refusal must be one line, so that a program can show them.
+std::string TroubleWithWords(const std::string& words) {
+  if (words.empty()) return "refused without a word";
+  for (const char c : words) {
+    if (c == '\n' || c == '\r' || c == '\0') return "refused in more than one line: " + words;
+  }
+  return "";
+}
+
+}  // namespace
+
+Verdict Judge(const Reader& reader, std::string_view input) {
+  Put(reader.file, input);
+  Verdict verdict;
+  EndAfter(kEndlessS);
+  const double start_s = CpuS();
+  const MemoryWatch memory;
+  try {
+    reader.read();
+    verdict.accepted = true;
+  } catch (const Error& error) {
+    verdict.trouble = TroubleWithWords(error.what());
+  } catch (const std::exception& error) {
+    verdict.trouble = std::string("threw something else than Error: ") + error.what();
+  }
+  const long peak_bytes = memory.PeakBytes();
+  const double used_s = CpuS() - start_s;
+  EndAfter(0);
+  if (peak_bytes > AllowedBytes(input.size()) + reader.buffer_bytes) {
+    verdict.trouble = "allocated " + std::to_string(peak_bytes) + " bytes for an input of " +
+                      std::to_string(input.size());
+  } else if (used_s > kHangS) {
+    verdict.trouble = "took " + std::to_string(used_s) + " s";
+  }
+  return verdict;
+}
+
+fs::path MakeFolder() {
+  const fs::path memory = "/dev/shm";
+  const bool usable = access(memory.c_str(), W_OK | X_OK) == 0;
+  std::string pattern =
+      ((usable ? memory : fs::temp_directory_path()) / "dtr_fuzz_XXXXXX").string();
+  if (mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("no temporary folder");
+  return pattern;
+}
+
+}  // namespace dtr::fuzz

@@ -1,0 +1,135 @@
+// Cameras and float maps of other programs.
+#include <bit>
+#include <cstdint>
+
+#include "dtr/base/error.h"
+#include "dtr/base/files.h"
+#include "dtr/io/formats/foreign_depth.h"
+#include "dtr/io/formats/llff.h"
+#include "dtr/io/formats/npy.h"
+#include "dtr/io/formats/pfm.h"
+#include "dtr/io/formats/text_cameras.h"
+#include "dtr/io/formats/transforms_json.h"
+#include "tests/fuzz/readers.h"
+
+namespace dtr::fuzz {
+namespace {
+
+namespace fs = std::filesystem;
+constexpr std::uintmax_t kSeedLimitBytes = 1 << 20;
+
+// numpy's format 1: magic, version, length of the header, the header padded to 64 bytes.
+template <typename Number>
+std::string Npy(const std::string& shape, const std::vector<Number>& values) {
+  std::string header = std::string("{'descr': '<f") + std::to_string(sizeof(Number)) +
+                       "', 'fortran_order': False, 'shape': " + shape + ", }";
+  while ((10 + header.size() + 1) % 64 != 0) header += ' ';
+  header += '\n';
+  std::string bytes = "\x93NUMPY\x01";
+  bytes += '\0';
+  bytes += static_cast<char>(header.size() & 0xff);
+  bytes += static_cast<char>(header.size() >> 8);
+  bytes += header;
+  bytes.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(Number));
+  return bytes;
+}
+
+Reader OpenNpy(const fs::path& folder) {
+  const fs::path file = folder / "array.npy";
+  return {file,
+          {Npy<double>("(2, 3)", {1, 2, 3, 4, 5, 6}), Npy<float>("(4,)", {1, 2, 3, 4}),
+           Npy<double>("()", {7})},
+          [=] { io::ReadNpy(file); }};
+}
+
+Reader OpenLlff(const fs::path& folder) {
+  const fs::path file = folder / "poses_bounds.npy";
+  // Axes [down, right, backwards], centre, [height, width, focal], near and far: two rows.
+  std::vector<double> rows;
+  for (const double x : {0.0, 0.5}) {
+    for (const double value : {0., 1., 0., x, 30., -1., 0., 0., 0., 40., 0., 0., 1., 0., 50.}) {
+      rows.push_back(value);
+    }
+    rows.push_back(1);
+    rows.push_back(6);
+  }
+  return {file, {Npy("(2, 17)", rows)}, [=] {
+            io::ReadLlff(file, {{"a.png", 40, 30}, {"b.png", 40, 30}});
+          }};
+}
+
+Reader OpenPfm(const fs::path& folder) {
+  const fs::path file = folder / "map.pfm";
+  std::vector<std::string> seeds;
+  for (const int channels : {1, 3}) {
+    Grid<float> grid(5, 4, channels, 1.5f);
+    io::WritePfm(file, grid, channels == 1);
+    seeds.push_back(ReadFile(file, kSeedLimitBytes));
+  }
+  return {file, seeds, [=] {
+            if (io::ReadPfm(file).channels() != 1) return;
+            io::ReadForeignDepth(file, DepthKind::kPlaneZ, 1, 10, 8);
+          }};
+}
+
+// NeRF's, instant-ngp's and nerfstudio's ways to say the same.
+Reader OpenTransforms(const fs::path& folder) {
+  const fs::path file = folder / "transforms.json";
+  const std::string frames =
+      R"("frames": [{"file_path": "./images/a", "depth_file_path": "depth/a.png",
+  "transform_matrix": [[1,0,0,7],[0,0,-1,8],[0,1,0,9],[0,0,0,1]]}, {"file_path": "./images/b",
+  "transform_matrix": [[1,0,0,7.5],[0,0,-1,8],[0,1,0,9],[0,0,0,1]]}]})";
+  return {file,
+          {R"({"w": 40, "h": 30, "fl_x": 50, "fl_y": 51, "cx": 21, "cy": 14, "k1": 0, )" + frames,
+           R"({"camera_angle_x": 0.9, "aabb_scale": 4, )" + frames},
+          [=] {
+            io::ReadTransformsJson(file, [](const std::string& path) {
+              return io::SizedImage{path + ".png", 20, 15};
+            });
+          }};
+}
+
+Reader OpenPar(const fs::path& folder) {
+  const fs::path file = folder / "par.txt";
+  return {file,
+          {"2\na.png 50 0 20 0 50 15 0 0 1 1 0 0 0 1 0 0 0 1 0 0 0\n"
+           "b.png 50 0 20 0 50 15 0 0 1 1 0 0 0 1 0 0 0 1 0.5 0 0\n"},
+          [=] { io::ReadMiddleburyPar(file); }};
+}
+
+Reader OpenStrecha(const fs::path& folder) {
+  const fs::path file = folder / "0000.png.camera";
+  return {file, {"50 0 20\n0 50 15\n0 0 1\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 2 3\n40 30\n"}, [=] {
+            io::ReadStrechaCamera(file);
+          }};
+}
+
+Reader OpenLog(const fs::path& folder) {
+  const fs::path file = folder / "trajectory.log";
+  return {
+      file,
+      {"0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n1 1 2\n1 0 0 0.5\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"},
+      [=] { io::ReadOpen3dLog(file); }};
+}
+
+Reader OpenMatrixText(const fs::path& folder) {
+  const fs::path file = folder / "frame.pose.txt";
+  return {file, {"1 0 0 0.5\n0 1 0 1\n0 0 1 2\n0 0 0 1\n", "585 0 320 0 585 240 0 0 1\n"}, [=] {
+            try {
+              io::ReadWorldFromCamText(file);
+            } catch (const Error&) {
+              io::ReadMatrix3Text(file);
+            }
+          }};
+}
+
+constexpr ReaderKind kReaders[] = {
+    {"npy", OpenNpy}, {"llff", OpenLlff},       {"pfm", OpenPfm}, {"transforms", OpenTransforms},
+    {"par", OpenPar}, {"strecha", OpenStrecha}, {"log", OpenLog}, {"matrix-text", OpenMatrixText},
+};
+
+}  // namespace
+
+std::span<const ReaderKind> CameraReaders() { return kReaders; }
+
+}  // namespace dtr::fuzz

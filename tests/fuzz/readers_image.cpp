@@ -1,0 +1,81 @@
+// Photos and masks. Decoders are others' (OpenImageIO and below it libjpeg, libpng, libtiff,
+// OpenEXR): what is tried is that our reader holds them to a size, and that damage ends in an
+// Error.
+#include "dtr/base/files.h"
+#include "dtr/io/depth_io.h"
+#include "dtr/io/image_io.h"
+#include "tests/fuzz/readers.h"
+
+namespace dtr::fuzz {
+namespace {
+
+namespace fs = std::filesystem;
+constexpr std::uintmax_t kSeedLimitBytes = 1 << 20;
+constexpr std::uint64_t kLimitPx = 1 << 20;  // 3 MB as 8 bits, 12 MB as float
+
+ImageRgb8 SomeImage() {
+  ImageRgb8 image(24, 18, 3);
+  for (int y = 0; y < image.height(); ++y) {
+    for (int x = 0; x < image.width(); ++x) {
+      for (int c = 0; c < 3; ++c) {
+        image(x, y, c) = static_cast<std::uint8_t>(10 * x + 3 * y * (c + 1) + (x * y * 7) % 13);
+      }
+    }
+  }
+  return image;
+}
+
+Reader ReaderOf(const fs::path& file, std::vector<std::string> seeds) {
+  return {file, std::move(seeds),
+          [=] {
+            io::ReadImageHeader(file);
+            io::ReadImage(file, {.apply_exif_orientation = true, .limit_px = kLimitPx});
+            io::ReadMask(file, kLimitPx);
+          },
+          kImageBufferBytes};
+}
+
+Reader OpenJpeg(const fs::path& folder) {
+  const fs::path file = folder / "photo.jpg";
+  std::vector<std::string> seeds;
+  io::WriteImage(file, SomeImage());
+  seeds.push_back(ReadFile(file, kSeedLimitBytes));
+  io::WriteJpegWithExif(file, SomeImage(), 90, {5.0, 28.0, "Maker", "Model"});
+  seeds.push_back(ReadFile(file, kSeedLimitBytes));
+  return ReaderOf(file, std::move(seeds));
+}
+
+Reader OpenPng(const fs::path& folder) {
+  const fs::path file = folder / "photo.png";
+  std::vector<std::string> seeds;
+  io::WriteImage(file, SomeImage());
+  seeds.push_back(ReadFile(file, kSeedLimitBytes));
+  io::WriteImageWithAlpha(file, SomeImage(), Mask(24, 18, 1, 128));
+  seeds.push_back(ReadFile(file, kSeedLimitBytes));
+  io::WriteMask(file, Mask(24, 18, 1, 255));
+  seeds.push_back(ReadFile(file, kSeedLimitBytes));
+  return ReaderOf(file, std::move(seeds));
+}
+
+Reader OpenExr(const fs::path& folder) {
+  const fs::path file = folder / "photo.exr";
+  io::WriteExr(file, Grid<float>(24, 18, 1, 0.25f), true);
+  return ReaderOf(file, {ReadFile(file, kSeedLimitBytes)});
+}
+
+constexpr ReaderKind kReaders[] = {{"jpeg", OpenJpeg}, {"png", OpenPng}, {"exr", OpenExr}};
+
+}  // namespace
+
+std::span<const ReaderKind> ImageReaders() { return kReaders; }
+
+std::vector<ReaderKind> AllReaders() {
+  std::vector<ReaderKind> all;
+  for (const auto& some :
+       {SetReaders(), CameraReaders(), ColmapReaders(), CalibReaders(), ImageReaders()}) {
+    all.insert(all.end(), some.begin(), some.end());
+  }
+  return all;
+}
+
+}  // namespace dtr::fuzz
