@@ -1,5 +1,6 @@
 // cli/sweep_output.h -- what a sweep found: table, JSON, CSV, page.
 #pragma once
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -7,7 +8,6 @@
 #include "cli/console.h"
 #include "dtr/eval/bench_json.h"
 #include "dtr/eval/sweep.h"
-#include "dtr/report/plot.h"
 
 namespace dtr::cli {
 
@@ -50,6 +50,8 @@ std::string SweepJson(const SweepRun& run);
 std::string SweepCsv(const SweepRun& run);
 /// An offline page: a plot of each stage, error over cost on logarithmic axes, and its table.
 std::string SweepPage(const SweepRun& run);
-report::Plot PlotOf(const SweptStage& swept);
+/// The plots of a run as SVG, by name: one per stage, and `build` where depth was swept on a set
+/// that records what its calibration took: the error over the time of a whole build.
+std::map<std::string, std::string> SweepPlots(const SweepRun& run);
 
 }  // namespace dtr::cli

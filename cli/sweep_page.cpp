@@ -5,6 +5,7 @@
 
 #include "cli/sweep_output.h"
 #include "dtr/report/html.h"
+#include "dtr/report/plot.h"
 
 namespace dtr::cli {
 namespace {
@@ -37,6 +38,51 @@ std::string Tip(const SweptStage& swept, size_t i) {
   return tip + "\n" + swept.commands[i];
 }
 
+report::Plot PlotOf(const SweptStage& swept) {
+  report::Plot plot;
+  plot.x_label = swept.stage.cost_name;
+  plot.y_label = swept.stage.error_name;
+  plot.groups = swept.stage.axes.front().values;
+  plot.front = swept.front;
+  for (size_t i = 0; i < swept.points.size(); ++i) {
+    const eval::SweepPoint& point = swept.points[i];
+    const eval::CostRange range = eval::RangeOf(point, swept.points);
+    const std::string marks = MarksOf(swept, i);
+    plot.points.push_back({.x = point.measured.cost,
+                           .y = point.measured.error,
+                           .x_low = range.least,
+                           .x_high = range.most,
+                           .group = static_cast<size_t>(point.setting.front()),
+                           .tip = Tip(swept, i),
+                           .label = marks,
+                           .ringed = !marks.empty()});
+  }
+  return plot;
+}
+
+constexpr const char* kBuildCost = "build_cpu_s";
+
+bool KnowsBuilds(const SweptStage& swept) {
+  return std::all_of(swept.points.begin(), swept.points.end(), [](const eval::SweepPoint& point) {
+    return point.measured.figures.contains(kBuildCost);
+  });
+}
+
+/// The same points over the time of everything from photos to the set.
+report::Plot BuildPlotOf(const SweptStage& swept) {
+  report::Plot plot = PlotOf(swept);
+  plot.x_label = "CPU s of the whole build";
+  for (size_t i = 0; i < plot.points.size(); ++i) {
+    report::PlotPoint& point = plot.points[i];
+    const eval::SweepMeasurement& measured = swept.points[i].measured;
+    const double others = measured.figures.at(kBuildCost) - measured.cost;
+    point.x += others;
+    point.x_low += others;
+    point.x_high += others;
+  }
+  return plot;
+}
+
 void AddTable(report::HtmlReport& page, const SweptStage& swept) {
   std::vector<std::string> header{
       "setting", swept.stage.cost_name, swept.stage.error_name, "PSNR dB", "front", "remarks",
@@ -67,6 +113,12 @@ void AddStage(report::HtmlReport& page, const SweptStage& swept) {
       "Both axes are logarithmic; bars are the range in which another run may lie. Rest the "
       "pointer on a point for its command.",
       report::ScatterSvg(PlotOf(swept)));
+  if (KnowsBuilds(swept)) {
+    page.Plot(
+        "The same over the processor time of the whole build: what the set records of "
+        "calibration and the other stages, and depth.",
+        report::ScatterSvg(BuildPlotOf(swept)));
+  }
   std::string found;
   if (swept.knee) {
     found +=
@@ -90,26 +142,13 @@ void AddStage(report::HtmlReport& page, const SweptStage& swept) {
 
 }  // namespace
 
-report::Plot PlotOf(const SweptStage& swept) {
-  report::Plot plot;
-  plot.x_label = swept.stage.cost_name;
-  plot.y_label = swept.stage.error_name;
-  plot.groups = swept.stage.axes.front().values;
-  plot.front = swept.front;
-  for (size_t i = 0; i < swept.points.size(); ++i) {
-    const eval::SweepPoint& point = swept.points[i];
-    const eval::CostRange range = eval::RangeOf(point, swept.points);
-    const std::string marks = MarksOf(swept, i);
-    plot.points.push_back({.x = point.measured.cost,
-                           .y = point.measured.error,
-                           .x_low = range.least,
-                           .x_high = range.most,
-                           .group = static_cast<size_t>(point.setting.front()),
-                           .tip = Tip(swept, i),
-                           .label = marks,
-                           .ringed = !marks.empty()});
+std::map<std::string, std::string> SweepPlots(const SweepRun& run) {
+  std::map<std::string, std::string> plots;
+  for (const SweptStage& swept : run.stages) {
+    plots[swept.stage.name] = report::ScatterSvg(PlotOf(swept));
+    if (KnowsBuilds(swept)) plots["build"] = report::ScatterSvg(BuildPlotOf(swept));
   }
-  return plot;
+  return plots;
 }
 
 std::string SweepPage(const SweepRun& run) {

@@ -293,9 +293,10 @@ void AddSweepOptions(CLI::App& command, CLI::Option* table, SweepRequest& reques
       ->excludes(table)
       ->type_name("SETTING");
   command
-      .add_option("-o,--output", request.output,
-                  "Folder for bench.json, bench.csv, bench.html and work.json, from which the same "
-                  "command goes on [NAME-bench beside the set]")
+      .add_option(
+          "-o,--output", request.output,
+          "Folder for bench.json, .csv, .html, the plots and work.json, from which the same "
+          "command goes on [NAME-bench beside the set]")
       ->excludes(table)
       ->type_name("DIR");
   command.add_option("--max-points", request.most_points, "Most settings measured per stage [60]")
@@ -353,6 +354,9 @@ int RunSweep(const SweepRequest& request, const Context& context) {
     WriteFileAtomically(output / "bench.json", SweepJson(run) + "\n");
     WriteFileAtomically(output / "bench.csv", SweepCsv(run));
     WriteFileAtomically(output / "bench.html", SweepPage(run));
+    for (const auto& [name, svg] : SweepPlots(run)) {
+      WriteFileAtomically(output / (name + ".svg"), svg);
+    }
   }
   SaySweep(run, context.console);
   if (!one_point) context.console.Say("written: " + (output / "bench.html").string());

@@ -10,8 +10,8 @@
 #include "cli/output_file.h"
 #include "cli/pipeline/validate_set.h"
 #include "cli/set_stream.h"
-#include "dtr/base/error.h"
 #include "dtr/base/files.h"
+#include "dtr/io/run_record.h"
 #include "dtr/io/set_io.h"
 #include "viewer/inspect_page.h"
 
@@ -21,7 +21,6 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
-constexpr std::uintmax_t kMostRecordBytes = 64 << 20;
 
 struct Options {
   fs::path set, output;
@@ -60,17 +59,10 @@ std::vector<Check> ChecksOf(const DtrSet& set) {
 
 /// Of report/run.json; a set may have none, or that of another program.
 std::vector<viewer::StageCost> StagesOf(const fs::path& set) {
-  const fs::path file = set / "report" / "run.json";
   std::vector<viewer::StageCost> stages;
-  if (!fs::exists(file)) return stages;
-  const Json record = Json::parse(ReadFile(file, kMostRecordBytes), nullptr, false);
-  if (record.is_discarded()) {
-    throw Error(file.string() + ": expected JSON, found something else; remove it or build anew");
-  }
-  for (const Json& stage : ListOf(record, "stages")) {
-    if (!stage.is_object()) continue;
-    stages.push_back({TextOr(stage, "name"), NumberOr(stage, "wall_s", 0),
-                      NumberOr(stage, "cpu_s", 0), 1024 * NumberOr(stage, "peak_rss_kib", 0)});
+  for (const io::RunStage& stage : io::ReadRunStages(set)) {
+    stages.push_back(
+        {stage.name, stage.wall_s, stage.cpu_s, 1024 * static_cast<double>(stage.peak_rss_kib)});
   }
   return stages;
 }

@@ -11,6 +11,7 @@
 #include "cli/pipeline/set_quality.h"
 #include "dtr/base/error.h"
 #include "dtr/base/machine.h"
+#include "dtr/io/run_record.h"
 #include "dtr/io/set_io.h"
 #include "dtr/types/area_average.h"
 
@@ -54,6 +55,17 @@ std::vector<std::string> SizeValues(const std::vector<int>& given, int own) {
     if (std::find(values.begin(), values.end(), name) == values.end()) values.push_back(name);
   }
   return values;
+}
+
+/// Empty where the set's record knows of no calibration: a build without it is no whole build.
+std::optional<double> OtherStages(const std::filesystem::path& set) {
+  double sum_s = 0;
+  bool calibrated = false;
+  for (const io::RunStage& stage : io::ReadRunStages(set)) {
+    if (stage.name != "depth") sum_s += stage.cpu_s;
+    calibrated = calibrated || (stage.name == "calibration" && stage.cpu_s > 0);
+  }
+  return calibrated ? std::optional(sum_s) : std::nullopt;
 }
 
 double ErrorByTruth(const eval::DepthScores& scores, eval::SweepMeasurement& measured) {
@@ -114,6 +126,7 @@ void WriteResized(const std::filesystem::path& from, const std::filesystem::path
 StereoSweep::StereoSweep(StereoSweepOptions options, Progress& progress)
     : options_(std::move(options)), progress_(progress) {
   const int own = LongSide(options_.set);
+  other_stages_s_ = OtherStages(options_.set);
   axes_ = {{"engine", {"patchmatch", "sgbm"}},
            {"preset", {DepthChoice{}.preset}},
            {"max-size", SizeValues(options_.max_sizes_px, own)}};
@@ -146,6 +159,7 @@ eval::SweepMeasurement StereoSweep::Measure(const eval::SweepSetting& setting) c
   eval::SweepMeasurement measured;
   measured.cost = (ProcessCpuMilliseconds() - start_ms) / kMillisecondsPerSecond;
   measured.cost_least = measured.cost_most = measured.cost;
+  if (other_stages_s_) measured.figures["build_cpu_s"] = *other_stages_s_ + measured.cost;
   measured.figures["share_with_depth"] = report.depth_completeness;
 
   const DtrSet set = LoadToJudge(made.folder, !options_.truth.empty(), options_.threads, notes);

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "cli/pipeline/depth_settings.h"
@@ -30,7 +31,9 @@ struct StereoSweepOptions {
 /// Cost: processor seconds of RecomputeDepth, which is what `dtr stereo` does; images of another
 /// size are made before (area averages, as in `dtr build`). Error: with truth the share of true
 /// pixels without a depth within 1 %, else RMS levels of held-out photos (of source views left out
-/// in turn where there are none), which are always compared at their own size.
+/// in turn where there are none), which are always compared at their own size. Figure
+/// `build_cpu_s`, where the set records what its calibration took: the cost, and all that `dtr
+/// build` spent on other stages.
 class StereoSweep {
  public:
   /// Throws Error for a broken set, UsageError for one without source views.
@@ -43,6 +46,7 @@ class StereoSweep {
   StereoSweepOptions options_;
   Progress& progress_;
   std::vector<eval::SweepAxis> axes_;
+  std::optional<double> other_stages_s_;  ///< processor time of the build but for depth
 };
 
 /// Writes a copy of a set, without depth, whose source images have at most this long side; held-out

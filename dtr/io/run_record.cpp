@@ -1,0 +1,42 @@
+#include "dtr/io/run_record.h"
+
+#include <nlohmann/json.hpp>
+
+#include "dtr/base/error.h"
+#include "dtr/base/files.h"
+
+namespace dtr::io {
+namespace {
+
+using Json = nlohmann::json;
+constexpr std::uintmax_t kMostRecordBytes = 64 << 20;
+
+double NumberOr0(const Json& object, const char* name) {
+  const auto found = object.find(name);
+  return found != object.end() && found->is_number() ? found->get<double>() : 0;
+}
+
+}  // namespace
+
+std::vector<RunStage> ReadRunStages(const std::filesystem::path& set_folder) {
+  const std::filesystem::path file = set_folder / "report" / "run.json";
+  std::vector<RunStage> stages;
+  if (!std::filesystem::exists(file)) return stages;
+  const Json record = Json::parse(ReadFile(file, kMostRecordBytes), nullptr, false);
+  if (record.is_discarded()) {
+    throw Error(file.string() + ": expected JSON, found something else; remove it or build anew");
+  }
+  if (!record.is_object() || !record.contains("stages") || !record["stages"].is_array()) {
+    return stages;
+  }
+  for (const Json& stage : record["stages"]) {
+    if (!stage.is_object()) continue;
+    const auto name = stage.find("name");
+    stages.push_back({name != stage.end() && name->is_string() ? name->get<std::string>() : "",
+                      NumberOr0(stage, "wall_s"), NumberOr0(stage, "cpu_s"),
+                      static_cast<long>(NumberOr0(stage, "peak_rss_kib"))});
+  }
+  return stages;
+}
+
+}  // namespace dtr::io
