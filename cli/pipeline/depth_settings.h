@@ -17,7 +17,7 @@ struct Preset {
   stereo::Effort effort;
 };
 
-/// The table of presets, cheapest first. scripts/depth-presets prints what each costs and gives.
+/// The table of presets, cheapest first. `dtr bench --stage stereo` measures what each costs and gives.
 std::span<const Preset> Presets();
 /// Throws UsageError for unknown names.
 const Preset& PresetCalled(const std::string& name);

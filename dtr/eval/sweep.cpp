@@ -2,7 +2,9 @@
 #include "dtr/eval/sweep.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <set>
 #include <stdexcept>
 
@@ -203,23 +205,26 @@ std::vector<SweepPoint> Sweep(const SweepStage& stage, int most_points, SweepSto
 }
 
 double CalibrationLoop() {
-  constexpr size_t kNumbers = (2 << 20) / sizeof(float);
-  constexpr int kLaps = 6, kRuns = 3;
-  std::vector<float> buffer(kNumbers, 1.0f);
+  constexpr std::uint32_t kNumbers = (8u << 20) / sizeof(float);
+  constexpr int kLaps = 300'000, kRuns = 3;
+  constexpr size_t kStreams = 8;  // independent of each other: the core is kept busy
+  const std::vector<float> buffer(kNumbers, 1.0f);
   std::vector<double> times_ms;
   for (int run = 0; run < kRuns; ++run) {
+    std::array<float, kStreams> sums{};
+    std::uint32_t place = 1;
     const double start_ms = ProcessCpuMilliseconds();
     for (int lap = 0; lap < kLaps; ++lap) {
-      float carry = static_cast<float>(lap);
-      for (float& number : buffer) {
-        carry = carry * 0.5f + number;  // each waits for the one before: no vectoriser helps
-        number = carry;
+      place = place * 1664525u + 1013904223u;  // Knuth, TAOCP 2, 3.3.4: anywhere in the buffer
+      for (std::uint32_t k = 0; k < kStreams; ++k) {
+        sums[k] = sums[k] * 0.75f + buffer[((place >> 8) + k * (kNumbers / kStreams)) % kNumbers];
       }
     }
-    // Looked at, so that it cannot be left out.
-    if (!(buffer[kNumbers / 2] > 0)) throw std::logic_error("CalibrationLoop: numbers went astray");
     times_ms.push_back(ProcessCpuMilliseconds() - start_ms);
-    std::fill(buffer.begin(), buffer.end(), 1.0f);
+    // Looked at, so that it cannot be left out.
+    for (const float sum : sums) {
+      if (!(sum > 0)) throw std::logic_error("CalibrationLoop: numbers went astray");
+    }
   }
   std::sort(times_ms.begin(), times_ms.end());
   return times_ms[kRuns / 2];

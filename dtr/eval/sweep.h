@@ -49,7 +49,8 @@ struct SweepStage {
 };
 
 /// Costs that another run of the setting may show: the range of the repeats, widened by as much as
-/// the machine's speed moved during the whole sweep. Equal numbers where the cost is not a time.
+/// the machine's speed moved during the whole sweep and by a tenth for what only another process
+/// shows. Equal numbers where the cost is not a time.
 struct CostRange {
   double least = 0, most = 0;
 };
@@ -114,8 +115,8 @@ SweepPoint MeasurePoint(const SweepStage& stage, const SweepSetting& setting);
 std::vector<SweepPoint> Sweep(const SweepStage& stage, int most_points, SweepStore& store,
                               Progress& progress);
 
-/// Processor milliseconds, the median of three, of a fixed piece of work (arithmetic over a buffer
-/// of 2 MiB, one thread): how fast the machine is just now.
+/// Processor milliseconds, the median of three, of a fixed piece of work (arithmetic on numbers from
+/// all over a buffer of 8 MiB, one thread): how fast core, caches and memory are just now.
 double CalibrationLoop();
 
 /// "--name" values of the setting that are not the default: "views=3 resolution=2"; "default".

@@ -63,9 +63,9 @@ TEST(RangeOf, IsWidenedByHowMuchTheMachineMoved) {
   points[0].measured.cost_most = 12;
   points[0].measured.machine_ms = 4;
   points[1].measured.machine_ms = 5;
-  EXPECT_DOUBLE_EQ(RangeOf(points[0], points).least, 9);
-  EXPECT_DOUBLE_EQ(RangeOf(points[0], points).most, 12 * 5 / 4.0);
-  EXPECT_DOUBLE_EQ(RangeOf(points[1], points).least, 20 * 4 / 5.0);
+  EXPECT_DOUBLE_EQ(RangeOf(points[0], points).least, 0.9 * 9);
+  EXPECT_DOUBLE_EQ(RangeOf(points[0], points).most, 1.1 * 12 * 5 / 4);
+  EXPECT_DOUBLE_EQ(RangeOf(points[1], points).least, 0.9 * 20 * 4 / 5);
   points[1].measured.machine_ms = 0;  // bytes do not depend on it
   EXPECT_DOUBLE_EQ(RangeOf(points[1], points).least, 20);
 }
@@ -78,7 +78,7 @@ TEST(JudgeDefault, NamesWhatSavesMost) {
   EXPECT_FALSE(verdict->on_front);
   EXPECT_EQ(verdict->beaten_by, 3u);
   EXPECT_FALSE(verdict->within_spread);
-  points[3].measured.cost_most = 10.5;
+  points[3].measured.cost_most = 10.5;  // of a cost that is no time
   EXPECT_TRUE(JudgeDefault(points, ParetoFront(points))->within_spread);
   points[0].measured.error = 1.5;
   EXPECT_TRUE(JudgeDefault(points, ParetoFront(points))->on_front);
