@@ -8,6 +8,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "dtr/base/machine.h"
+
 namespace dtr::cli {
 namespace {
 
@@ -18,9 +20,16 @@ void OnInterrupt(int signal_number) {
   signal(signal_number, SIG_DFL);  // the second one ends the program at once
 }
 
+constexpr double kWorthTellingS = 1;  // in plain lines; shorter stages would be noise
+
 std::string Duration(double seconds) {
   if (seconds < 60) return fmt::format("{:.0f} s", seconds);
   return fmt::format("{:.0f} min {:02.0f} s", std::floor(seconds / 60), std::fmod(seconds, 60));
+}
+
+// Of this process so far; COLMAP's are not in it.
+std::string PeakMemory() {
+  return fmt::format("at most {:.0f} MiB", static_cast<double>(PeakMemoryBytes()) / (1 << 20));
 }
 
 }  // namespace
@@ -79,10 +88,14 @@ void Console::Say(const std::string& line) {
 bool Console::StopRequested() const { return g_interrupted != 0; }
 
 void Console::FinishStage() {
-  if (!terminal_ || stage_.empty()) return;
-  ClearBar();
+  if (stage_.empty()) return;
   const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - stage_start_;
-  fmt::print(stderr, "   {} ({})\n", stage_, Duration(spent.count()));
+  if (terminal_) {
+    ClearBar();
+    fmt::print(stderr, "   {} ({}, {})\n", stage_, Duration(spent.count()), PeakMemory());
+  } else if (spent.count() >= kWorthTellingS) {
+    fmt::print(stderr, "   {}: {}, {}\n", stage_, Duration(spent.count()), PeakMemory());
+  }
 }
 
 void Console::DrawBar() {
@@ -97,6 +110,7 @@ void Console::DrawBar() {
     tail = fmt::format("{:3.0f} %", 100 * share);
     if (done_ > 0) tail += ", " + Duration(spent.count() * (1 - share) / share) + " left";
   }
+  tail += ", " + PeakMemory();
   fmt::print(stderr, "\r\033[K   [{}{}] {} {}", std::string(static_cast<size_t>(filled), '='),
              std::string(static_cast<size_t>(kBarWidth - filled), ' '), stage_, tail);
   std::fflush(stderr);

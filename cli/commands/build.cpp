@@ -5,6 +5,7 @@
 #include "cli/command.h"
 #include "cli/depth_options.h"
 #include "cli/pipeline/build_set.h"
+#include "cli/pipeline/force_stage.h"
 #include "cli/video_options.h"
 
 namespace dtr::cli {
@@ -67,6 +68,11 @@ void AddBuildCommand(CLI::App& app) {
         command.add_flag("!--no-refine", options->refine,
                          "Take COLMAP's cameras as they are, without bundle adjustment");
         command.add_flag("--force", options->force, "Replace a set that exists");
+        command
+            .add_option("--force-stage", options->force_stage,
+                        "Of an interrupted build: do this stage and all after it again")
+            ->check(CLI::IsMember(pipeline::StagesKept()))
+            ->type_name("NAME");
         return [options](const Context& context) -> int {
           options->threads = context.common.threads;
           options->seed = context.common.seed;

@@ -13,6 +13,7 @@
 #include "cli/pipeline/depth_engine.h"
 #include "cli/pipeline/depth_stage.h"
 #include "cli/pipeline/finishing.h"
+#include "cli/pipeline/force_stage.h"
 #include "cli/pipeline/holdout.h"
 #include "cli/pipeline/ingest.h"
 #include "cli/pipeline/input_hash.h"
@@ -263,6 +264,7 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
       {"poses_sha256", InputHash(options.poses)},
       {"workspace_sha256", InputHash(options.depth.workspace)}};
   io::SetWriter writer(options.output, fingerprint.dump(), options.force);
+  if (!options.force_stage.empty()) ForgetStage(writer.folder(), options.force_stage);
   if (from_video) {
     photos = FramesOf(options, writer.work_folder(), progress);
     look();

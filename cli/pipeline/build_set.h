@@ -24,6 +24,7 @@ struct BuildOptions {
   std::filesystem::path poses;
   bool refine = true;  ///< bundle adjustment after SfM, where it pays
   bool force = false;
+  std::string force_stage;  ///< of an interrupted run: done again with all after it; "": none
   int threads = 0;
   std::uint64_t seed = 0;
 };
