@@ -6,9 +6,8 @@
 #include <charconv>
 #include <cmath>
 #include <iterator>
-#include <optional>
-#include <string_view>
 
+#include "calib/boards/length.h"
 #include "dtr/base/error.h"
 
 namespace dtr::calib {
@@ -44,10 +43,15 @@ std::vector<std::string> Split(const std::string& text) {
   return parts;
 }
 
-struct Length {
-  double value = 0;
-  bool has_unit = false;  // then in metres
-};
+bool SizeFrom(std::string_view word, int* width, int* height) {
+  const char* last = word.data() + word.size();
+  const auto first = std::from_chars(word.data(), last, *width);
+  if (first.ec != std::errc() || first.ptr == last || *first.ptr != 'x') return false;
+  const auto second = std::from_chars(first.ptr + 1, last, *height);
+  return second.ec == std::errc() && second.ptr == last;
+}
+
+}  // namespace
 
 std::optional<Length> LengthFrom(std::string_view word) {
   Length length;
@@ -60,16 +64,6 @@ std::optional<Length> LengthFrom(std::string_view word) {
   if (unit != "" && unit != "mm" && unit != "cm" && unit != "m") return {};
   return length;
 }
-
-bool SizeFrom(std::string_view word, int* width, int* height) {
-  const char* last = word.data() + word.size();
-  const auto first = std::from_chars(word.data(), last, *width);
-  if (first.ec != std::errc() || first.ptr == last || *first.ptr != 'x') return false;
-  const auto second = std::from_chars(first.ptr + 1, last, *height);
-  return second.ec == std::errc() && second.ptr == last;
-}
-
-}  // namespace
 
 Eigen::Vector3d Board::Corner(int id) const {
   const double first = kind == Kind::kCharuco ? 1 : 0;

@@ -67,6 +67,7 @@ void AddCalibrateCommand(CLI::App& app) {
   AddCalibrateBoardCommand(*calibrate);
   AddCalibrateRefineCommand(*calibrate);
   AddCalibrateRigCommand(*calibrate);
+  AddCalibrateScaleCommand(*calibrate);
   AddCommand(*calibrate, "photos", "Calibrate a folder of photos by structure from motion",
              "dtr calibrate photos photos/ -o calibration/", [](CLI::App& command) -> Action {
                auto options = std::make_shared<Options>();

@@ -1,0 +1,180 @@
+#include "calib/scale.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "dtr/base/error.h"
+
+namespace dtr::calib {
+namespace {
+
+constexpr double kMostRelativeSigma = 0.1;  // above, a scale says little more than an order of size
+constexpr double kMostDisagreement = 5;     // sigmas
+constexpr double kOutlierSigmas = 4;
+constexpr size_t kFewestPositions = 4;
+constexpr int kMostPasses = 20;
+// The median length of a 3D vector of independent normal coordinates is 1.538 sigma.
+constexpr double kMedianLength = 1.538;
+
+double RelativeSigma(const MeasuredDistance& d) {
+  const Eigen::Vector3d way = d.b - d.a;
+  const double length = way.norm();
+  const Eigen::Vector3d along = way / length;
+  const double variance = along.dot((d.covariance_a + d.covariance_b) * along);
+  return std::hypot(std::sqrt(variance) / length, d.sigma_m / d.length_m);
+}
+
+Eigen::Vector3d MeanOf(std::span<const Eigen::Vector3d> points) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& p : points) mean += p / static_cast<double>(points.size());
+  return mean;
+}
+
+// How well the similarity is known where each coordinate errs by `sigma_m`.
+void FillUncertainty(std::span<const Eigen::Vector3d> centres, double sigma_m,
+                     PositionScale& scale) {
+  const Eigen::Vector3d mean = MeanOf(centres);
+  double squares = 0;
+  Eigen::Matrix3d about_axes = Eigen::Matrix3d::Zero();
+  for (const Eigen::Vector3d& centre : centres) {
+    const Eigen::Vector3d arm = scale.metric_from_scene.scale * (centre - mean);
+    squares += arm.squaredNorm();
+    about_axes += arm.squaredNorm() * Eigen::Matrix3d::Identity() - arm * arm.transpose();
+  }
+  scale.relative_sigma = sigma_m / std::sqrt(squares);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(about_axes, Eigen::EigenvaluesOnly);
+  scale.turn_sigma_rad = sigma_m / std::sqrt(std::max(eigen.eigenvalues()[0], 0.0));
+}
+
+}  // namespace
+
+DistanceScale ScaleFromDistances(std::span<const MeasuredDistance> distances) {
+  if (distances.empty()) throw Error("scale: expected a measured distance, found none");
+  std::vector<double> scales, sigmas;
+  double weights = 0, mean = 0;
+  for (const MeasuredDistance& d : distances) {
+    const double length = (d.b - d.a).norm();
+    const double relative = length > 0 ? RelativeSigma(d) : std::numeric_limits<double>::infinity();
+    if (!(relative <= kMostRelativeSigma)) {
+      throw Error(fmt::format(
+          "{}: expected points whose distance is known to 10 %, found {:.4g} +- {:.2g} units; take "
+          "points farther apart, or click each of them in more views",
+          d.name, length, length > 0 ? relative * length : 0));
+    }
+    scales.push_back(d.length_m / length);
+    // The smallest error anybody can claim keeps the weights finite.
+    sigmas.push_back(std::max(relative, 1e-12));
+    const double weight = 1 / (sigmas.back() * sigmas.back());
+    weights += weight;
+    mean += weight * std::log(scales.back());
+  }
+  mean /= weights;
+  DistanceScale scale;
+  scale.metres_per_unit = distances.size() == 1 ? scales[0] : std::exp(mean);
+  double squares = 0;
+  for (size_t i = 0; i < scales.size(); ++i) {
+    const double off = (std::log(scales[i]) - mean) / sigmas[i];
+    // What the mean itself errs with it is not held against it.
+    const double own = 1 - 1 / (sigmas[i] * sigmas[i] * weights);
+    scale.sigmas.push_back(distances.size() == 1 ? 0 : std::abs(off) / std::sqrt(own));
+    squares += off * off;
+  }
+  const auto worst = std::max_element(scale.sigmas.begin(), scale.sigmas.end());
+  if (*worst > kMostDisagreement) {
+    const auto i = static_cast<size_t>(worst - scale.sigmas.begin());
+    throw Error(fmt::format(
+        "{}: expected distances that agree, found {:.5g} m per unit here and {:.5g} in all, {:.1f} "
+        "standard deviations apart; is it the right pair of points?",
+        distances[i].name, scales[i], scale.metres_per_unit, *worst));
+  }
+  scale.relative_sigma = 1 / std::sqrt(weights);
+  if (scales.size() > 1) {
+    scale.relative_sigma *=
+        std::max(1.0, std::sqrt(squares / static_cast<double>(scales.size() - 1)));
+  }
+  return scale;
+}
+
+Eigen::Vector3d EarthFromGeodetic(double latitude_deg, double longitude_deg, double height_m) {
+  constexpr double kRadius = 6378137, kFlattening = 1 / 298.257223563;  // WGS 84
+  constexpr double kDegree = std::numbers::pi / 180;
+  constexpr double kSquare = kFlattening * (2 - kFlattening);
+  const double latitude = latitude_deg * kDegree, longitude = longitude_deg * kDegree;
+  const double normal = kRadius / std::sqrt(1 - kSquare * std::pow(std::sin(latitude), 2));
+  const double out = (normal + height_m) * std::cos(latitude);
+  return {out * std::cos(longitude), out * std::sin(longitude),
+          (normal * (1 - kSquare) + height_m) * std::sin(latitude)};
+}
+
+Eigen::Matrix3d EnuFromEarth(double latitude_deg, double longitude_deg) {
+  constexpr double kDegree = std::numbers::pi / 180;
+  const double sin_lat = std::sin(latitude_deg * kDegree),
+               cos_lat = std::cos(latitude_deg * kDegree);
+  const double sin_lon = std::sin(longitude_deg * kDegree),
+               cos_lon = std::cos(longitude_deg * kDegree);
+  Eigen::Matrix3d axes;
+  axes << -sin_lon, cos_lon, 0,                         //
+      -sin_lat * cos_lon, -sin_lat * sin_lon, cos_lat,  //
+      cos_lat * cos_lon, cos_lat * sin_lon, sin_lat;
+  return axes;
+}
+
+PositionScale ScaleFromPositions(std::span<const Eigen::Vector3d> centres,
+                                 std::span<const Eigen::Vector3d> positions_m) {
+  if (centres.size() != positions_m.size() || centres.size() < kFewestPositions) {
+    throw Error(fmt::format("scale: expected at least {} positions, found {}", kFewestPositions,
+                            std::min(centres.size(), positions_m.size())));
+  }
+  PositionScale scale;
+  std::vector<bool> used(centres.size(), true);
+  std::vector<Eigen::Vector3d> a, b;
+  for (int pass = 0; pass < kMostPasses; ++pass) {
+    a.clear();
+    b.clear();
+    for (size_t i = 0; i < centres.size(); ++i) {
+      if (!used[i]) continue;
+      a.push_back(centres[i]);
+      b.push_back(positions_m[i]);
+    }
+    if (a.size() < kFewestPositions || 2 * a.size() < centres.size()) {
+      throw Error(fmt::format(
+          "scale: expected positions that agree with the cameras, found that {} of {} do", a.size(),
+          centres.size()));
+    }
+    scale.metric_from_scene = AlignPoints(a, b);
+    std::vector<double> lengths;
+    for (size_t i = 0; i < centres.size(); ++i) {
+      lengths.push_back((scale.metric_from_scene * centres[i] - positions_m[i]).norm());
+    }
+    std::vector<double> sorted = lengths;
+    const auto middle = sorted.begin() + static_cast<long>(sorted.size() / 2);
+    std::nth_element(sorted.begin(), middle, sorted.end());
+    // A millionth of the extent: exact positions leave rounding alone.
+    const double limit = kOutlierSigmas * *middle / kMedianLength +
+                         1e-6 * (positions_m[0] - MeanOf(positions_m)).norm();
+    std::vector<bool> next;
+    for (const double length : lengths) next.push_back(length <= limit);
+    if (next == used) break;
+    used = std::move(next);
+  }
+  for (size_t i = 0; i < centres.size(); ++i) {
+    if (!used[i]) scale.left_out.push_back(i);
+  }
+  scale.rms_m = AlignmentRms(scale.metric_from_scene, a, b);
+  const double freedom = 3.0 * static_cast<double>(a.size()) - 7;
+  FillUncertainty(a, scale.rms_m * std::sqrt(static_cast<double>(a.size()) / freedom), scale);
+  if (!(scale.relative_sigma <= kMostRelativeSigma)) {
+    throw Error(
+        fmt::format("scale: expected a scale known to 10 %, found one to {:.0f} %: positions that "
+                    "err by {:.2g} "
+                    "m RMS, of cameras that stand too near to each other for that",
+                    100 * scale.relative_sigma, scale.rms_m));
+  }
+  return scale;
+}
+
+}  // namespace dtr::calib

@@ -1,0 +1,55 @@
+// calib/scale.h -- how long one unit of a scene is: from measured distances, or from places on
+// Earth.
+#pragma once
+#include <Eigen/Core>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "calib/similarity.h"
+
+namespace dtr::calib {
+
+/// A distance between two points of a scene that somebody has measured.
+struct MeasuredDistance {
+  std::string name;                            ///< for errors
+  Eigen::Vector3d a, b;                        ///< in the scene
+  Eigen::Matrix3d covariance_a, covariance_b;  ///< scene units squared
+  double length_m = 0, sigma_m = 0;            ///< > 0; >= 0
+};
+
+struct DistanceScale {
+  double metres_per_unit = 1;
+  double relative_sigma = 0;   ///< standard deviation of metres_per_unit over itself
+  std::vector<double> sigmas;  ///< per distance: how far it is off that scale, in its own sigmas
+};
+
+/// The weighted mean of the scales that the distances say, their errors independent. Where several
+/// disagree by more than their own errors allow, the uncertainty is widened by as much.
+/// Throws Error, naming a distance, where points coincide or are so uncertain that the scale would
+/// be by more than 10 %, and where one is more than 5 standard deviations off the others.
+DistanceScale ScaleFromDistances(std::span<const MeasuredDistance> distances);
+
+/// Geodetic coordinates (WGS 84) as metres in the Earth's frame (EPSG 4978).
+Eigen::Vector3d EarthFromGeodetic(double latitude_deg, double longitude_deg, double height_m);
+/// Axes east, north, up at that place, as rows: p_in_enu = rotation * (p -
+/// EarthFromGeodetic(place)).
+Eigen::Matrix3d EnuFromEarth(double latitude_deg, double longitude_deg);
+
+struct PositionScale {
+  Similarity metric_from_scene;
+  double relative_sigma = 0;     ///< of its scale
+  double turn_sigma_rad = 0;     ///< of its rotation, about the axis known worst
+  double rms_m = 0;              ///< distances of the positions that were used
+  std::vector<size_t> left_out;  ///< positions that do not agree with the others
+};
+
+/// The similarity that carries camera centres to the places where they are said to have been.
+/// Positions more than 4 robust standard deviations off are left out. Errors are taken as
+/// independent; those of one receiver go together over minutes, and then the truth is less certain.
+/// Throws Error with fewer than 4 positions, where fewer than half agree, where the centres lie in
+/// one point or on a line to rounding, and where the scale would be uncertain by more than 10 %.
+PositionScale ScaleFromPositions(std::span<const Eigen::Vector3d> centres,
+                                 std::span<const Eigen::Vector3d> positions_m);
+
+}  // namespace dtr::calib

@@ -1,0 +1,275 @@
+#include "cli/pipeline/scale_set.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "calib/scale.h"
+#include "cli/pipeline/finishing.h"
+#include "cli/pipeline/run_log.h"
+#include "cli/pipeline/set_page.h"
+#include "cli/pipeline/validate_set.h"
+#include "dtr/base/error.h"
+#include "dtr/base/hash.h"
+#include "dtr/base/parallel_for.h"
+#include "dtr/io/set_io.h"
+
+namespace dtr::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr double kMostTurnSigma = 5 * std::numbers::pi / 180;
+
+// The way into metres, and what is told of it.
+struct Found {
+  calib::Similarity metric_from_scene;
+  bool keeps_axes = true;
+  double relative_sigma = 0;
+  Json json;
+  std::vector<std::string> lines;
+};
+
+Found FromDistances(const ScaleOptions& options, const DtrSet& set) {
+  std::vector<calib::MeasuredDistance> distances;
+  for (const ScaleDistance& d : options.distances) {
+    const PlacedPoint a = Place(options.set, set, d.a), b = Place(options.set, set, d.b);
+    distances.push_back({"--distance " + d.text, a.p_in_world, b.p_in_world, a.covariance,
+                         b.covariance, d.length_m, d.sigma_m});
+  }
+  const calib::DistanceScale scale = calib::ScaleFromDistances(distances);
+  Found found;
+  found.metric_from_scene.scale = scale.metres_per_unit;
+  found.relative_sigma = scale.relative_sigma;
+  found.json["method"] = "distance";
+  found.json["distances"] = Json::array();
+  for (size_t i = 0; i < distances.size(); ++i) {
+    const double units = (distances[i].b - distances[i].a).norm();
+    found.json["distances"].push_back({{"text", options.distances[i].text},
+                                       {"units", units},
+                                       {"length_m", distances[i].length_m},
+                                       {"sigmas_off", scale.sigmas[i]}});
+    found.lines.push_back(fmt::format("{}: {:.6g} units, {:.2f} standard deviations off",
+                                      options.distances[i].text, units, scale.sigmas[i]));
+  }
+  return found;
+}
+
+struct Located {
+  std::vector<std::string> names;
+  std::vector<Eigen::Vector3d> centres, positions_m;
+  io::GpsPosition origin;
+};
+
+// Cameras whose photo says where it was taken: metres east, north and up of the first of them.
+Located Locate(const fs::path& photos, const DtrSet& set, Found& found) {
+  Located located;
+  std::vector<io::GpsPosition> places;
+  for (const View& view : set.frames.front().views) {
+    const fs::path photo = photos / view.name;
+    if (!fs::is_regular_file(photo)) {
+      found.lines.push_back("not in the folder: " + view.name);
+      continue;
+    }
+    const auto gps = io::ReadImageHeader(photo).gps;
+    if (!gps || !gps->altitude_m) {
+      found.lines.push_back((gps ? "without altitude: " : "without GPS: ") + view.name);
+      continue;
+    }
+    located.names.push_back(view.name);
+    located.centres.push_back(view.CenterInWorld());
+    places.push_back(*gps);
+  }
+  if (places.size() < 4) {
+    throw Error(fmt::format(
+        "{}: expected at least 4 photos of the set with latitude, longitude and altitude, found {}",
+        photos.string(), places.size()));
+  }
+  const auto earth = [](const io::GpsPosition& p) {
+    return calib::EarthFromGeodetic(p.latitude_deg, p.longitude_deg, *p.altitude_m);
+  };
+  located.origin = places.front();
+  const Eigen::Matrix3d axes =
+      calib::EnuFromEarth(located.origin.latitude_deg, located.origin.longitude_deg);
+  for (const io::GpsPosition& place : places) {
+    located.positions_m.push_back(axes * (earth(place) - earth(located.origin)));
+  }
+  return located;
+}
+
+Found FromGps(const ScaleOptions& options, const DtrSet& set) {
+  Found found;
+  const Located located = Locate(options.gps, set, found);
+  const calib::PositionScale scale =
+      calib::ScaleFromPositions(located.centres, located.positions_m);
+  found.relative_sigma = scale.relative_sigma;
+  found.keeps_axes = !(scale.turn_sigma_rad <= kMostTurnSigma);
+  found.metric_from_scene = scale.metric_from_scene;
+  if (found.keeps_axes) {
+    found.metric_from_scene = {};
+    found.metric_from_scene.scale = scale.metric_from_scene.scale;
+  }
+  std::vector<std::string> left_out;
+  for (const size_t i : scale.left_out) left_out.push_back(located.names[i]);
+  const double turn_deg = scale.turn_sigma_rad * 180 / std::numbers::pi;
+  found.json["method"] = "gps";
+  found.json["photos"] = located.names.size();
+  found.json["left_out"] = left_out;
+  found.json["rms_m"] = scale.rms_m;
+  found.json["turn_sigma_deg"] = turn_deg;
+  found.json["axes"] = found.keeps_axes ? "as before" : "east, north, up";
+  if (!found.keeps_axes) {
+    found.json["origin"] = {{"latitude_deg", located.origin.latitude_deg},
+                            {"longitude_deg", located.origin.longitude_deg},
+                            {"altitude_m", *located.origin.altitude_m}};
+  }
+  found.lines.push_back(fmt::format("{} positions, {:.2f} m RMS; turn known to {:.2g} degrees",
+                                    located.names.size() - left_out.size(), scale.rms_m, turn_deg));
+  if (!left_out.empty()) {
+    found.lines.push_back(fmt::format("do not agree, left out: {}", fmt::join(left_out, ", ")));
+  }
+  found.lines.push_back(found.keeps_axes
+                            ? "the cameras stand nearly on a line, and the turn about it is not "
+                              "known: axes are left as they were"
+                            : "axes: x east, y north, z up, from the first photo's place");
+  return found;
+}
+
+Bounds Carried(const Bounds& bounds, const calib::Similarity& b_from_a) {
+  if (bounds.empty()) return bounds;
+  Bounds carried;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Eigen::Vector3d p =
+        b_from_a * Eigen::Vector3d((corner & 1 ? bounds.max : bounds.min).x(),
+                                   (corner & 2 ? bounds.max : bounds.min).y(),
+                                   (corner & 4 ? bounds.max : bounds.min).z());
+    carried.min = corner == 0 ? p : Eigen::Vector3d(carried.min.cwiseMin(p));
+    carried.max = corner == 0 ? p : Eigen::Vector3d(carried.max.cwiseMax(p));
+  }
+  return carried;
+}
+
+// All that set.json says in lengths. Where axes stay, so does the user's origin.
+void Carry(const Found& found, DtrSet& set) {
+  const calib::Similarity& metric = found.metric_from_scene;
+  set.unit = LengthUnit::kMetre;
+  set.world_origin =
+      found.keeps_axes ? Eigen::Vector3d(metric.scale * set.world_origin) : Eigen::Vector3d::Zero();
+  set.scene_center = metric * set.scene_center;
+  set.bounds = Carried(set.bounds, metric);
+  for (Frame& frame : set.frames) {
+    for (View& view : frame.views) {
+      view.cam_from_world = metric.CamFromB(view.cam_from_world);
+      view.reference_baseline *= metric.scale;
+      view.near_z *= metric.scale;
+      view.far_z *= metric.scale;
+    }
+  }
+}
+
+void CopyFile(const fs::path& from, const fs::path& to, const std::optional<StoredFile>& file) {
+  if (!file) return;
+  fs::create_directories((to / file->path).parent_path());
+  fs::copy_file(from / file->path, to / file->path, fs::copy_options::overwrite_existing);
+}
+
+// Depth and sigma of the old view, times the scale, written for the new one. Float rounding must
+// not carry a depth past the ends of its range, which are rounded apart from it.
+void CarryDepth(const fs::path& from, View old_view, double scale, View& view, LengthUnit unit,
+                io::SetWriter& writer) {
+  io::LoadOptions load;
+  load.images = false;
+  load.sigma = true;
+  load.threads = 1;
+  io::LoadPixels(from, old_view, load);
+  const auto near = static_cast<float>(view.near_z), far = static_cast<float>(view.far_z);
+  for (float& z : old_view.depth.grid().data()) {
+    if (!DepthImage::IsHole(z)) z = std::clamp(static_cast<float>(scale * z), near, far);
+  }
+  if (old_view.inverse_depth_sigma) {
+    for (float& sigma : old_view.inverse_depth_sigma->data()) {
+      sigma = static_cast<float>(sigma / scale);
+    }
+  }
+  view.depth = std::move(old_view.depth);
+  view.inverse_depth_sigma = std::move(old_view.inverse_depth_sigma);
+  writer.WriteView(view, unit);
+  view.depth = {};
+  view.inverse_depth_sigma.reset();
+}
+
+void WriteViews(const ScaleOptions& options, const DtrSet& old_set, double scale, DtrSet& set,
+                io::SetWriter& writer, Progress& progress) {
+  for (size_t f = 0; f < set.frames.size(); ++f) {
+    auto& views = set.frames[f].views;
+    progress.Stage("writing in metres", static_cast<int>(views.size()));
+    for (size_t i = 0; i < views.size(); ++i) {
+      progress.ThrowIfInterrupted();
+      const View& old_view = old_set.frames[f].views[i];
+      CopyFile(options.set, writer.folder(), old_view.image_file);
+      CopyFile(options.set, writer.folder(), old_view.mask_file);
+      if (old_view.depth_file) CarryDepth(options.set, old_view, scale, views[i], set.unit, writer);
+      progress.Update(static_cast<int>(i) + 1);
+    }
+  }
+}
+
+void Record(const Found& found, DtrSet& set, ScaleReport& report) {
+  Json entry = {{"metres_per_unit", found.metric_from_scene.scale},
+                {"relative_sigma", found.relative_sigma}};
+  entry.update(found.json);
+  Json provenance = Json::parse(set.provenance_json);
+  if (!provenance["scale"].is_array()) provenance["scale"] = Json::array();
+  provenance["scale"].push_back(entry);
+  set.provenance_json = provenance.dump();
+  entry["set"] = report.written.string();
+  entry["unit"] = NameOf(set.unit);
+  report.json = entry.dump(1);
+  report.metres_per_unit = found.metric_from_scene.scale;
+  report.relative_sigma = found.relative_sigma;
+  report.lines = found.lines;
+}
+
+}  // namespace
+
+ScaleReport ScaleSet(const ScaleOptions& options, Progress& progress) {
+  RunLog log;
+  log.Begin("scale");
+  const DtrSet old_set = io::ReadSet(options.set);
+  const Found found =
+      options.gps.empty() ? FromDistances(options, old_set) : FromGps(options, old_set);
+  const bool in_place = options.output.empty();
+  ScaleReport report;
+  report.written = in_place ? options.set : options.output;
+  DtrSet set = old_set;
+  Carry(found, set);
+  const Json fingerprint = {{"tool_version", DTR_VERSION},
+                            {"scale", found.metric_from_scene.scale},
+                            {"method", found.json},
+                            {"set_sha256", Sha256OfFile(options.set / "set.json")}};
+  io::SetWriter writer(report.written, fingerprint.dump(), in_place || options.force);
+  WriteViews(options, old_set, found.metric_from_scene.scale, set, writer, progress);
+  WriteMeshes(set, writer, options.threads);
+  std::vector<Check> checks;
+  if (set.sparse_file) {
+    SparseScene sparse = io::LoadSparse(options.set, old_set);
+    for (SparsePoint& point : sparse.points) {
+      point.p_in_world = found.metric_from_scene * point.p_in_world;
+    }
+    writer.WriteSparse(set, sparse);
+    checks = ValidateSet(set, sparse, {}, options.threads).tests;
+  }
+  Record(found, set, report);
+  WriteSetPage(writer, set, {report.written.stem().string(), "", checks, {}, 0, options.threads});
+  log.End();
+  io::WriteRunRecord(writer.folder(), log.Record(ResolveThreads(options.threads)));
+  writer.Finish(set);
+  return report;
+}
+
+}  // namespace dtr::pipeline

@@ -1,0 +1,145 @@
+#include "calib/scale.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "dtr/base/error.h"
+#include "dtr/base/random.h"
+
+namespace dtr::calib {
+namespace {
+
+MeasuredDistance Between(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double length_m,
+                         double sigma = 1e-3) {
+  const Eigen::Matrix3d covariance = sigma * sigma * Eigen::Matrix3d::Identity();
+  return {"--distance", a, b, covariance, covariance, length_m, 0};
+}
+
+Eigen::Vector3d Draw(Random& random) {
+  const double x = random.Normal(), y = random.Normal();
+  return {x, y, random.Normal()};
+}
+
+TEST(ScaleFromDistances, OneDistanceSaysIt) {
+  const MeasuredDistance one = Between({0, 0, 0}, {3, 4, 0}, 2.5);
+  const DistanceScale scale = ScaleFromDistances(std::span(&one, 1));
+  EXPECT_DOUBLE_EQ(scale.metres_per_unit, 0.5);
+  // Two ends that err by 1e-3 each along 5 units.
+  EXPECT_NEAR(scale.relative_sigma, std::sqrt(2.0) * 1e-3 / 5, 1e-12);
+}
+
+TEST(ScaleFromDistances, PredictedUncertaintyIsWhatNoiseDoes) {
+  Random random(3);
+  constexpr int kSolves = 2000;
+  double squares = 0;
+  for (int k = 0; k < kSolves; ++k) {
+    std::vector<MeasuredDistance> distances;
+    for (const double length : {1.0, 2.0, 4.0}) {
+      distances.push_back(Between(
+          0.01 * Draw(random), Eigen::Vector3d(length, 0, 0) + 0.01 * Draw(random), length, 0.01));
+    }
+    const DistanceScale scale = ScaleFromDistances(distances);
+    // Unwidened: what the weights alone say.
+    const double predicted = 1 / std::sqrt((1 + 4 + 16) / (2 * 1e-4));
+    squares += std::pow((scale.metres_per_unit - 1) / predicted, 2);
+  }
+  // The mean of 2000 squares of normal numbers is within 1 +- 0.095 in three of its sigmas.
+  EXPECT_NEAR(squares / kSolves, 1, 0.1);
+}
+
+TEST(ScaleFromDistances, WhatDoesNotFitIsRefusedByName) {
+  const MeasuredDistance together = Between({1, 1, 1}, {1, 1, 1}, 2);
+  EXPECT_THROW(ScaleFromDistances(std::span(&together, 1)), Error);
+  const MeasuredDistance near = Between({0, 0, 0}, {0.005, 0, 0}, 2);
+  EXPECT_THROW(ScaleFromDistances(std::span(&near, 1)), Error);
+  const std::vector<MeasuredDistance> apart = {Between({0, 0, 0}, {1, 0, 0}, 2),
+                                               Between({0, 0, 0}, {1, 0, 0}, 2.1)};
+  EXPECT_THROW(ScaleFromDistances(apart), Error);
+  EXPECT_THROW(ScaleFromDistances({}), Error);
+}
+
+TEST(ScaleFromDistances, DisagreementWidensTheUncertainty) {
+  const std::vector<MeasuredDistance> agree = {Between({0, 0, 0}, {1, 0, 0}, 2),
+                                               Between({0, 0, 0}, {0, 1, 0}, 2)};
+  const std::vector<MeasuredDistance> differ = {Between({0, 0, 0}, {1, 0, 0}, 2),
+                                                Between({0, 0, 0}, {0, 1, 0}, 2.01)};
+  EXPECT_GT(ScaleFromDistances(differ).relative_sigma,
+            2 * ScaleFromDistances(agree).relative_sigma);
+}
+
+TEST(Earth, AKnownPlace) {
+  // The equator's and the pole's radii of WGS 84, by hand.
+  EXPECT_LT((EarthFromGeodetic(0, 0, 0) - Eigen::Vector3d(6378137, 0, 0)).norm(), 1e-6);
+  EXPECT_LT((EarthFromGeodetic(90, 0, 10) - Eigen::Vector3d(0, 0, 6356752.314245 + 10)).norm(),
+            1e-5);
+  const Eigen::Vector3d here = EarthFromGeodetic(55.698, 13.195, 37);
+  const Eigen::Vector3d north = EarthFromGeodetic(55.6981, 13.195, 37);
+  const Eigen::Vector3d up = EarthFromGeodetic(55.698, 13.195, 38);
+  const Eigen::Matrix3d axes = EnuFromEarth(55.698, 13.195);
+  EXPECT_LT((axes * (up - here) - Eigen::Vector3d(0, 0, 1)).norm(), 1e-6);
+  const Eigen::Vector3d step = axes * (north - here);
+  // The meridian's radius there, a (1 - e^2) / (1 - e^2 sin^2)^1.5 + 37 m = 6379141 m, by 1e-4
+  // degrees.
+  EXPECT_NEAR(step.y(), 11.1337, 1e-4);
+  EXPECT_NEAR(step.x(), 0, 1e-9);
+}
+
+struct Walk {
+  std::vector<Eigen::Vector3d> centres, positions;
+};
+
+Walk MakeWalk(double noise_m, std::uint64_t seed) {
+  Random random(seed);
+  const Similarity truth{3.0, Eigen::Quaterniond(0.8, 0.2, -0.4, 0.4).normalized(), {5, -7, 90}};
+  Walk walk;
+  for (int i = 0; i < 30; ++i) {
+    walk.centres.emplace_back(0.5 * i, std::sin(0.4 * i), 0.1 * std::cos(0.9 * i));
+    walk.positions.push_back(truth * walk.centres.back() + noise_m * Draw(random));
+  }
+  return walk;
+}
+
+TEST(ScaleFromPositions, ExactPositionsGiveTheSimilarity) {
+  const Walk walk = MakeWalk(0, 1);
+  const PositionScale scale = ScaleFromPositions(walk.centres, walk.positions);
+  EXPECT_NEAR(scale.metric_from_scene.scale, 3, 1e-9);
+  EXPECT_TRUE(scale.left_out.empty());
+}
+
+TEST(ScaleFromPositions, PredictedUncertaintyIsWhatNoiseDoes) {
+  double squares = 0;
+  constexpr int kSolves = 500;
+  for (std::uint64_t k = 0; k < kSolves; ++k) {
+    const Walk walk = MakeWalk(0.1, k);
+    const PositionScale scale = ScaleFromPositions(walk.centres, walk.positions);
+    squares += std::pow((scale.metric_from_scene.scale / 3 - 1) / scale.relative_sigma, 2);
+  }
+  EXPECT_NEAR(squares / kSolves, 1, 0.2);  // 3 sigmas of the mean of 500
+}
+
+TEST(ScaleFromPositions, PositionsThatAreFarOffAreLeftOut) {
+  Walk walk = MakeWalk(0.1, 2);
+  walk.positions[4] += Eigen::Vector3d(300, 0, 0);
+  walk.positions[17] += Eigen::Vector3d(0, -40, 8);
+  const PositionScale scale = ScaleFromPositions(walk.centres, walk.positions);
+  EXPECT_EQ(scale.left_out, (std::vector<size_t>{4, 17}));
+  EXPECT_NEAR(scale.metric_from_scene.scale, 3, 5 * 3 * scale.relative_sigma);
+}
+
+TEST(ScaleFromPositions, WhatSaysNothingIsRefused) {
+  const Walk vague = MakeWalk(60, 3);
+  EXPECT_THROW(ScaleFromPositions(vague.centres, vague.positions), Error);
+  Walk line = MakeWalk(0, 4);
+  for (size_t i = 0; i < line.centres.size(); ++i) {
+    line.centres[i] = Eigen::Vector3d(static_cast<double>(i), 0, 0);
+    line.positions[i] = Eigen::Vector3d(0, static_cast<double>(i), 0);
+  }
+  EXPECT_THROW(ScaleFromPositions(line.centres, line.positions), Error);
+  EXPECT_THROW(
+      ScaleFromPositions(std::span(line.centres).first(3), std::span(line.positions).first(3)),
+      Error);
+}
+
+}  // namespace
+}  // namespace dtr::calib
