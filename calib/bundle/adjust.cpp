@@ -13,6 +13,7 @@
 #include "calib/bundle/gauge.h"
 #include "calib/bundle/lens_params.h"
 #include "calib/bundle/normalised.h"
+#include "calib/bundle/rig_adjust.h"
 #include "calib/solve/board_start.h"
 #include "dtr/base/error.h"
 
@@ -54,7 +55,8 @@ std::vector<bool> Within(const std::vector<Eigen::Vector2d>& residuals, double l
   return within;
 }
 
-void Describe(const std::vector<Eigen::Vector2d>& residuals, Adjusted& out) {
+// `rigs`: of how many rigs the images move; 0: every image for itself.
+void Describe(const std::vector<Eigen::Vector2d>& residuals, size_t rigs, Adjusted& out) {
   double squared = 0;
   std::vector<bool> image_used(out.bundle.images.size()), point_used(out.bundle.points.size());
   for (size_t i = 0; i < residuals.size(); ++i) {
@@ -69,7 +71,9 @@ void Describe(const std::vector<Eigen::Vector2d>& residuals, Adjusted& out) {
   const auto count = [](const std::vector<bool>& v) {
     return static_cast<double>(std::count(v.begin(), v.end(), true));
   };
-  const double unknowns = 3 * count(point_used) + 6 * count(image_used) - 7;
+  // A rig's own lengths leave six ways to move the world as a whole, else there are seven.
+  const double moved = rigs > 0 ? 6 * static_cast<double>(rigs) - 6 : 6 * count(image_used) - 7;
+  const double unknowns = 3 * count(point_used) + moved;
   const double freedom = 2.0 * out.sights - unknowns;
   out.sigma_px = freedom > 0 ? std::sqrt(squared / freedom) : 0;
 }
@@ -174,10 +178,9 @@ ceres::Solver::Summary Minimise(const Bundle& bundle, const AdjustOptions& optio
     const BundleObservation& sight = bundle.observations[i];
     const auto image = static_cast<size_t>(sight.image);
     const auto lens = static_cast<size_t>(bundle.images[image].lens);
-    problem.AddResidualBlock(n.Cost(bundle, sight).release(),
-                             cauchy_px > 0 ? new ceres::CauchyLoss(cauchy_px) : nullptr,
-                             n.theta[lens].data(), n.motion[image].data(),
-                             n.place[static_cast<size_t>(sight.point)].data());
+    problem.AddResidualBlock(
+        n.Cost(bundle, sight).release(), cauchy_px > 0 ? new ceres::CauchyLoss(cauchy_px) : nullptr,
+        n.theta[lens].data(), n.MotionOf(image), n.place[static_cast<size_t>(sight.point)].data());
   }
   AddPriors(options, sigma_px, n, problem);
   const auto add = [&](double* block, int group) {
@@ -186,7 +189,7 @@ ceres::Solver::Summary Minimise(const Bundle& bundle, const AdjustOptions& optio
     }
   };
   for (auto& place : n.place) add(place.data(), 0);
-  for (auto& motion : n.motion) {
+  for (auto& motion : n.members.empty() ? n.motion : n.rig_motion) {
     add(motion.data(), 1);
     if (options.fix_poses && problem.HasParameterBlock(motion.data())) {
       problem.SetParameterBlockConstant(motion.data());
@@ -202,6 +205,7 @@ ceres::Solver::Summary Minimise(const Bundle& bundle, const AdjustOptions& optio
   ceres::Solver::Summary summary;
   ceres::Solve(solver, &problem, &summary);
   if (!summary.IsSolutionUsable()) Refuse("the sights have no least-squares solution");
+  n.FollowRig();
   return summary;
 }
 
@@ -223,10 +227,9 @@ std::vector<Eigen::Vector2d> Residuals(const Bundle& bundle) {
   return ResidualsOf(bundle, Normalised::Around(bundle));
 }
 
-Adjusted Adjust(const Bundle& bundle, const AdjustOptions& options) {
-  CheckBundle(bundle);
-  CheckPriors(bundle, options);
-  Normalised n = Normalised::Around(bundle);
+namespace {
+
+Adjusted Solve(const Bundle& bundle, const AdjustOptions& options, Normalised& n) {
   const Bundle start = n.LocalAt(bundle);
   Adjusted out;
   out.lens = options.lens;
@@ -258,12 +261,47 @@ Adjusted Adjust(const Bundle& bundle, const AdjustOptions& options) {
     if (pass + 1 < kMostOutlierPasses) out.used = std::move(used);
   }
   out.bundle = n.LocalAt(bundle);
-  if (options.positions.empty() && options.distances.empty() && !options.fix_poses) {
+  if (options.positions.empty() && options.distances.empty() && !options.fix_poses &&
+      n.members.empty()) {
     MoveToGaugeOf(start, out.bundle);
   }
   n.ToWorld(out.bundle);
-  Describe(residuals, out);
+  Describe(residuals, n.rig_motion.size(), out);
   return out;
+}
+
+}  // namespace
+
+Adjusted Adjust(const Bundle& bundle, const AdjustOptions& options) {
+  CheckBundle(bundle);
+  CheckPriors(bundle, options);
+  Normalised n = Normalised::Around(bundle);
+  return Solve(bundle, options, n);
+}
+
+Adjusted AdjustRig(const Bundle& bundle, std::span<const RigImage> images,
+                   const std::vector<Pose>& rig_from_world, const AdjustOptions& options) {
+  if (images.size() != bundle.images.size() || options.fix_poses || !options.positions.empty() ||
+      !options.distances.empty()) {
+    Refuse("expected a rig with a place for every image, and no poses or priors beside it");
+  }
+  Bundle rigid = bundle;
+  for (size_t i = 0; i < images.size(); ++i) {
+    const auto frame = static_cast<size_t>(images[i].frame);
+    if (images[i].frame < 0 || frame >= rig_from_world.size()) Refuse("expected a known frame");
+    rigid.images[i].cam_from_world = images[i].cam_from_rig * rig_from_world[frame];
+  }
+  CheckBundle(rigid);
+  Normalised n = Normalised::Around(rigid);
+  n.rig_motion.assign(rig_from_world.size(), {});
+  for (const RigImage& image : images) {
+    const Pose& rig = rig_from_world[static_cast<size_t>(image.frame)];
+    n.frames.push_back(image.frame);
+    n.members.push_back({image.cam_from_rig.rotation.toRotationMatrix(),
+                         rig.rotation.conjugate().toRotationMatrix(),
+                         image.cam_from_rig.TargetOriginInSource() / n.unit});
+  }
+  return Solve(rigid, options, n);
 }
 
 }  // namespace dtr::calib

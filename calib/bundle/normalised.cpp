@@ -86,6 +86,10 @@ Normalised Normalised::Around(const Bundle& bundle) {
   return n;
 }
 
+void Normalised::FollowRig() {
+  for (size_t i = 0; i < members.size(); ++i) members[i].Motion(MotionOf(i), motion[i].data());
+}
+
 Eigen::Vector3d Normalised::Centre(size_t image) const {
   return poses[image].centre + Eigen::Map<const Eigen::Vector3d>(motion[image].data() + 3);
 }
@@ -134,7 +138,8 @@ std::unique_ptr<ceres::CostFunction> Normalised::Cost(const Bundle& bundle,
                                                       const BundleObservation& sight) const {
   const auto image = static_cast<size_t>(sight.image);
   return SightCost(lenses[static_cast<size_t>(bundle.images[image].lens)], poses[image],
-                   points[static_cast<size_t>(sight.point)], sight.pixel);
+                   points[static_cast<size_t>(sight.point)], sight.pixel,
+                   members.empty() ? nullptr : &members[image]);
 }
 
 bool Normalised::Residual(const Bundle& bundle, const BundleObservation& sight,

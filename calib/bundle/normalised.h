@@ -29,6 +29,18 @@ struct Normalised {
   Bundle LocalAt(const Bundle& bundle) const;
   /// Takes a bundle from normalised coordinates back into the world.
   void ToWorld(Bundle& bundle) const;
+  /// The images of a rig, and one motion a frame; empty where every image moves for itself.
+  std::vector<RigMember> members;
+  std::vector<int> frames;  ///< per image
+  std::vector<std::array<double, 6>> rig_motion;
+  /// The unknowns that move an image: its own, or its frame's.
+  double* MotionOf(size_t image) {
+    return members.empty() ? motion[image].data()
+                           : rig_motion[static_cast<size_t>(frames[image])].data();
+  }
+  /// Carries the frames' motions to their images.
+  void FollowRig();
+
   /// Centre of a camera and a point's place (homogeneous) in normalised coordinates.
   Eigen::Vector3d Centre(size_t image) const;
   Eigen::Vector4d Place(size_t point) const;

@@ -46,10 +46,28 @@ struct Sighting {
 };
 
 template <int kLens>
+struct RigSighting {
+  Sighting<kLens> sighting;
+  const RigMember& member;
+
+  template <typename T>
+  bool operator()(const T* theta, const T* rig_motion, const T* place, T* residual) const {
+    T motion[6];
+    member.Motion(rig_motion, motion);
+    return sighting(theta, motion, place, residual);
+  }
+};
+
+template <int kLens>
 std::unique_ptr<ceres::CostFunction> Cost(const LensFrame& lens, const PoseFrame& pose,
                                           const PointFrame& point,
-                                          const Eigen::Vector2d& observed_px) {
+                                          const Eigen::Vector2d& observed_px,
+                                          const RigMember* member) {
   using Functor = Sighting<kLens>;
+  if (member != nullptr) {
+    return std::make_unique<ceres::AutoDiffCostFunction<RigSighting<kLens>, 2, kLens, 6, 3>>(
+        new RigSighting<kLens>{{lens, pose, point, observed_px}, *member});
+  }
   return std::make_unique<ceres::AutoDiffCostFunction<Functor, 2, kLens, 6, 3>>(
       new Functor{lens, pose, point, observed_px});
 }
@@ -108,18 +126,19 @@ PointFrame FrameAround(const Eigen::Vector4d& point, const Eigen::Vector3d& anch
 
 std::unique_ptr<ceres::CostFunction> SightCost(const LensFrame& lens, const PoseFrame& pose,
                                                const PointFrame& point,
-                                               const Eigen::Vector2d& observed_px) {
+                                               const Eigen::Vector2d& observed_px,
+                                               const RigMember* member) {
   switch (ParameterCount(lens.model)) {
     case 3:
-      return Cost<3>(lens, pose, point, observed_px);
+      return Cost<3>(lens, pose, point, observed_px, member);
     case 4:
-      return Cost<4>(lens, pose, point, observed_px);
+      return Cost<4>(lens, pose, point, observed_px, member);
     case 5:
-      return Cost<5>(lens, pose, point, observed_px);
+      return Cost<5>(lens, pose, point, observed_px, member);
     case 8:
-      return Cost<8>(lens, pose, point, observed_px);
+      return Cost<8>(lens, pose, point, observed_px, member);
     case 12:
-      return Cost<12>(lens, pose, point, observed_px);
+      return Cost<12>(lens, pose, point, observed_px, member);
   }
   throw std::logic_error("SightCost: no model has this number of parameters");
 }

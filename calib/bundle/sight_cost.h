@@ -1,6 +1,7 @@
 // calib/bundle/sight_cost.h -- internal to calib/bundle: one sight's residual, for Ceres.
 #pragma once
 #include <ceres/ceres.h>
+#include <ceres/rotation.h>
 
 #include <Eigen/Core>
 #include <memory>
@@ -40,10 +41,39 @@ LensFrame FrameAround(const LensCamera& lens, double largest_radius);
 std::vector<double> ParamsAt(const LensFrame& frame, const double* theta);
 PointFrame FrameAround(const Eigen::Vector4d& point, const Eigen::Vector3d& anchor);
 
+/// A camera on a rig: its motion follows from the rig's, which has the same form about the rig's
+/// own origin.
+struct RigMember {
+  Eigen::Matrix3d cam_from_rig = Eigen::Matrix3d::Identity();  ///< rotation
+  Eigen::Matrix3d world_from_rig =
+      Eigen::Matrix3d::Identity();                          ///< rotation, where the solve starts
+  Eigen::Vector3d centre_in_rig = Eigen::Vector3d::Zero();  ///< in the normalised unit
+
+  /// With p_in_rig ~ exp(w) R (p - (c + v)): the camera turns by cam_from_rig w, and its centre
+  /// moves by v + R^T (exp(-w) - 1) centre_in_rig.
+  template <typename T>
+  void Motion(const T* rig_motion, T* motion) const {
+    const T back[3] = {-rig_motion[0], -rig_motion[1], -rig_motion[2]};
+    const T arm[3] = {T(centre_in_rig[0]), T(centre_in_rig[1]), T(centre_in_rig[2])};
+    T turned[3];
+    ceres::AngleAxisRotatePoint(back, arm, turned);
+    for (int i = 0; i < 3; ++i) {
+      motion[i] = T(0);
+      motion[3 + i] = rig_motion[3 + i];
+      for (int k = 0; k < 3; ++k) {
+        motion[i] += cam_from_rig(i, k) * rig_motion[k];
+        motion[3 + i] += world_from_rig(i, k) * (turned[k] - arm[k]);
+      }
+    }
+  }
+};
+
 /// Predicted minus observed pixel; parameter blocks lens, pose (w, v), point (a, b, rho). Fails
-/// where the point has no pixel. The frames are borrowed.
+/// where the point has no pixel. With `member` the pose block is the rig's. The frames are
+/// borrowed.
 std::unique_ptr<ceres::CostFunction> SightCost(const LensFrame& lens, const PoseFrame& pose,
                                                const PointFrame& point,
-                                               const Eigen::Vector2d& observed_px);
+                                               const Eigen::Vector2d& observed_px,
+                                               const RigMember* member = nullptr);
 
 }  // namespace dtr::calib

@@ -1,0 +1,188 @@
+#include "calib/bundle/rig_adjust.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "dtr/base/error.h"
+
+namespace dtr::calib {
+namespace {
+
+constexpr double kMostScaleSpread = 0.2;
+constexpr double kMostSigmaGrowth = 1.5;
+// A camera that has moved shows as outliers, not as residuals: what disagrees is left out.
+constexpr double kLeastSights = 0.9;
+// Errors of a sight's own size are no contradiction, however exact the photos are.
+constexpr double kHarmlessSigmaPx = 0.5;
+
+[[noreturn]] void Refuse(const std::string& what) { throw Error("rig: " + what); }
+
+SfmModel WithLenses(SfmModel model, const KnownRig& rig,
+                    const std::map<std::string, RigPhoto>& photo_of) {
+  const auto old = std::move(model.cameras);
+  model.cameras.clear();
+  for (size_t c = 0; c < rig.lenses.size(); ++c) {
+    model.cameras[static_cast<std::uint32_t>(c + 1)] = rig.lenses[c];
+  }
+  for (SfmImage& image : model.images) {
+    const auto photo = photo_of.find(image.name);
+    if (photo == photo_of.end()) Refuse(image.name + ": expected a photo of the rig");
+    const LensCamera& lens = rig.lenses[photo->second.camera];
+    const LensCamera& was = old.at(image.camera_id);
+    if (lens.width_px != was.width_px || lens.height_px != was.height_px) {
+      Refuse(fmt::format("{}: expected {} x {} px as the calibration has, found {} x {}",
+                         image.name, lens.width_px, lens.height_px, was.width_px, was.height_px));
+    }
+    image.camera_id = static_cast<std::uint32_t>(photo->second.camera + 1);
+  }
+  return model;
+}
+
+double Median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<long>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// Images of each frame, indices into the bundle.
+struct Frames {
+  std::vector<RigImage> images;
+  std::vector<std::vector<size_t>> members;
+};
+
+Frames FramesOf(const Bundle& bundle, const KnownRig& rig,
+                const std::map<std::string, RigPhoto>& photo_of) {
+  Frames frames;
+  std::map<std::string, int> numbers;
+  for (size_t i = 0; i < bundle.images.size(); ++i) {
+    const RigPhoto& photo = photo_of.at(bundle.images[i].name);
+    const int frame = numbers.emplace(photo.frame, static_cast<int>(numbers.size())).first->second;
+    if (static_cast<size_t>(frame) == frames.members.size()) frames.members.emplace_back();
+    frames.images.push_back({frame, rig.cam_from_rig[photo.camera]});
+    frames.members[static_cast<size_t>(frame)].push_back(i);
+  }
+  return frames;
+}
+
+void FindScale(const Bundle& bundle, const Frames& frames, RigRefined& refined) {
+  std::vector<double> scales;
+  for (const auto& members : frames.members) {
+    for (const size_t a : members) {
+      for (const size_t b : members) {
+        if (b <= a) continue;
+        const double apart = (frames.images[a].cam_from_rig.TargetOriginInSource() -
+                              frames.images[b].cam_from_rig.TargetOriginInSource())
+                                 .norm();
+        const double found = (bundle.images[a].cam_from_world.TargetOriginInSource() -
+                              bundle.images[b].cam_from_world.TargetOriginInSource())
+                                 .norm();
+        if (apart > 0 && found > 0) scales.push_back(apart / found);
+      }
+    }
+  }
+  if (scales.empty()) {
+    Refuse("expected an instant that two cameras saw from different places, found none");
+  }
+  refined.pairs = static_cast<int>(scales.size());
+  refined.scale = Median(scales);
+  for (double& s : scales) s = std::abs(s - refined.scale);
+  refined.scale_spread = 1.4826 * Median(scales) / refined.scale;
+  if (refined.scale_spread > kMostScaleSpread) {
+    Refuse(
+        fmt::format("expected photos of this rig, found distances between its cameras that "
+                    "scatter by {:.0f} %",
+                    100 * refined.scale_spread));
+  }
+}
+
+// Of the poses that a frame's images say the rig has, the one nearest to the others.
+Pose RigOf(const Bundle& bundle, const Frames& frames, const std::vector<size_t>& members) {
+  std::vector<Pose> said;
+  for (const size_t i : members) {
+    said.push_back(frames.images[i].cam_from_rig.Inverse() * bundle.images[i].cam_from_world);
+  }
+  size_t best = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (size_t a = 0; a < said.size(); ++a) {
+    double sum = 0;
+    for (const Pose& other : said) sum += said[a].rotation.angularDistance(other.rotation);
+    if (sum < least) {
+      least = sum;
+      best = a;
+    }
+  }
+  Pose rig = said[best];
+  // Its place is the mean of what all say: single turns carry it less than single shifts.
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  for (const Pose& pose : said) {
+    centre += pose.TargetOriginInSource() / static_cast<double>(said.size());
+  }
+  rig.translation = -(rig.rotation * centre);
+  return rig;
+}
+
+void Scale(double scale, Bundle& bundle) {
+  for (BundleImage& image : bundle.images) image.cam_from_world.translation *= scale;
+  for (Eigen::Vector4d& point : bundle.points) point.head<3>() *= scale;
+}
+
+void RequireConverged(const Adjusted& adjusted, const char* what) {
+  if (!adjusted.converged) {
+    Refuse(fmt::format("expected the solve {} to converge, found none of it after {} iterations",
+                       what, adjusted.iterations));
+  }
+}
+
+}  // namespace
+
+RigRefined RefineRig(const SfmModel& model, const KnownRig& rig,
+                     const std::map<std::string, RigPhoto>& photo_of) {
+  const SfmModel known = WithLenses(model, rig, photo_of);
+  RigRefined refined;
+  AdjustOptions options;
+  options.lens = LensFreedom::kFixed;
+  const Adjusted free = Adjust(BundleOf(known), options);
+  RequireConverged(free, "with the rig's lenses");
+  refined.free_sigma_px = free.sigma_px;
+  Bundle bundle = free.bundle;
+  const Frames frames = FramesOf(bundle, rig, photo_of);
+  refined.frames = static_cast<int>(frames.members.size());
+  FindScale(bundle, frames, refined);
+  Scale(refined.scale, bundle);
+  std::vector<Pose> rig_from_world;
+  for (const auto& members : frames.members) {
+    rig_from_world.push_back(RigOf(bundle, frames, members));
+  }
+  refined.adjusted = AdjustRig(bundle, frames.images, rig_from_world, options);
+  RequireConverged(refined.adjusted, "with the rig's places");
+  const double most = std::max(kMostSigmaGrowth * free.sigma_px, kHarmlessSigmaPx);
+  const bool enough = refined.adjusted.sights >= kLeastSights * free.sights;
+  if (!(refined.adjusted.sigma_px <= most) || !enough) {
+    Refuse(fmt::format(
+        "expected photos of this rig, found residuals of {:.2f} px per coordinate and {} "
+        "observations that agree with its places held, {:.2f} px and {} without; was a camera "
+        "moved since?",
+        refined.adjusted.sigma_px, refined.adjusted.sights, free.sigma_px, free.sights));
+  }
+  refined.model = ModelOf(refined.adjusted.bundle, known, false, &refined.points_dropped);
+  refined.adjusted.bundle = {};
+  return refined;
+}
+
+std::string ToJson(const RigRefined& refined) {
+  const nlohmann::ordered_json json = {{"scale", refined.scale},
+                                       {"scale_spread", refined.scale_spread},
+                                       {"frames", refined.frames},
+                                       {"pairs", refined.pairs},
+                                       {"free_sigma_px", refined.free_sigma_px},
+                                       {"sigma_px", refined.adjusted.sigma_px},
+                                       {"rms_px", refined.adjusted.rms_px},
+                                       {"iterations", refined.adjusted.iterations},
+                                       {"points_dropped", refined.points_dropped}};
+  return json.dump();
+}
+
+}  // namespace dtr::calib
