@@ -55,6 +55,7 @@ void AddBenchCommand(CLI::App& app);
 void AddViewCommand(CLI::App& app);  ///< in programs built with windows
 void AddInspectCommand(CLI::App& app);
 void AddAdviseCommand(CLI::App& app);
+void AddPruneCommand(CLI::App& app);
 void AddImportCommand(CLI::App& app);
 void AddExportCommand(CLI::App& app);
 void AddDatasetCommand(CLI::App& app);

@@ -39,6 +39,13 @@ void AddDepthOptions(CLI::App& command, const std::vector<std::string>& engines,
                   "which needs CUDA")
       ->check(CLI::ExistingDirectory)
       ->type_name("DIR");
+  command
+      .add_option(
+          "--depth-error", choice.depth_error_px,
+          "Store depth in a fraction of the bytes, off by at most so many pixels of disparity "
+          "[as good as exact]")
+      ->check(CLI::Range(1e-6, 100.0))
+      ->type_name("PX");
   overriding("--neighbours", choice.neighbours, "Views that the search asks", 1, 8);
   overriding("--round-neighbours", choice.round_neighbours, "Views that the rounds ask", 1, 8);
   overriding("--iterations", choice.iterations, "Visits per pixel and level of the search", 1, 20);

@@ -27,6 +27,7 @@ int Run(int argc, char** argv) {
   dtr::cli::AddAdviseCommand(app);
   dtr::cli::AddEvaluateCommand(app);
   dtr::cli::AddBenchCommand(app);
+  dtr::cli::AddPruneCommand(app);
   dtr::cli::AddImportCommand(app);
   dtr::cli::AddExportCommand(app);
   dtr::cli::AddDatasetCommand(app);

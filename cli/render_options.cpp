@@ -8,6 +8,7 @@
 #include <numbers>
 #include <string>
 
+#include "dtr/base/error.h"
 #include "dtr/render/option_names.h"
 
 namespace dtr::cli {
@@ -101,6 +102,24 @@ std::vector<std::string> RenderOptionArguments(const RenderOptions& options) {
   if (options.blend_in_linear_light) arguments.Flag("--blend-linear");
   if (options.fill_holes) arguments.Flag("--fill-holes");
   return arguments.Take();
+}
+
+void UseStoredArguments(CLI::App& command, const std::vector<std::string>& arguments) {
+  const auto is_flag = [](const std::string& text) { return text.rfind("--", 0) == 0; };
+  for (size_t i = 0; i < arguments.size(); ++i) {
+    const bool has_value = i + 1 < arguments.size() && !is_flag(arguments[i + 1]);
+    const std::string value = has_value ? arguments[i + 1] : "true";
+    CLI::Option* option =
+        is_flag(arguments[i]) ? command.get_option_no_throw(arguments[i]) : nullptr;
+    i += has_value;
+    if (option == nullptr || option->count() > 0) continue;
+    try {
+      option->add_result(value);
+      option->run_callback();
+    } catch (const CLI::ParseError& error) {
+      throw Error(std::string("set.json: pruned.render_arguments: ") + error.what());
+    }
+  }
 }
 
 std::shared_ptr<RenderOptions> AddRenderOptions(CLI::App& command) {

@@ -18,4 +18,9 @@ std::shared_ptr<RenderOptions> AddRenderOptions(CLI::App& command);
 /// number of threads.
 std::vector<std::string> RenderOptionArguments(const RenderOptions& options);
 
+/// Gives `command`, after parsing, those of the arguments (as RenderOptionArguments makes them) that
+/// its user did not give: what a set was pruned for is its default. Options that the command lacks
+/// are passed over. Throws Error for a value that an option refuses.
+void UseStoredArguments(CLI::App& command, const std::vector<std::string>& arguments);
+
 }  // namespace dtr::cli

@@ -12,6 +12,7 @@
 #include "dtr/eval/held_out.h"
 #include "dtr/eval/json.h"
 #include "dtr/io/image_io.h"
+#include "dtr/io/pruned.h"
 #include "dtr/io/set_io.h"
 
 namespace dtr::cli {
@@ -143,7 +144,10 @@ void AddEvaluateCommand(CLI::App& app) {
             ->type_name("DIR");
         AddRendererOptions(command, options->renderer);
         options->render = AddRenderOptions(command);
-        return [options](const Context& context) { return RunEvaluate(*options, context); };
+        return [options, &command](const Context& context) {
+          UseStoredArguments(command, io::RenderArguments(io::ReadSet(options->set)));
+          return RunEvaluate(*options, context);
+        };
       });
 }
 

@@ -18,6 +18,7 @@
 #include "dtr/base/error.h"
 #include "dtr/io/depth_io.h"
 #include "dtr/io/image_io.h"
+#include "dtr/io/pruned.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/scene.h"
 #include "dtr/render/view_stream.h"
@@ -190,7 +191,10 @@ void AddRenderCommand(CLI::App& app) {
         command.add_option("--coverage-out", options->coverage_out, "Write what was seen as PNG")
             ->type_name("FILE");
         options->render = AddRenderOptions(command);
-        return [options](const Context& context) { return RunRender(*options, context); };
+        return [options, &command](const Context& context) {
+          UseStoredArguments(command, io::RenderArguments(io::ReadSet(options->set)));
+          return RunRender(*options, context);
+        };
       });
 }
 

@@ -17,6 +17,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/base/machine.h"
+#include "dtr/io/pruned.h"
 #include "dtr/io/set_io.h"
 #include "viewer/glfw/app.h"
 
@@ -117,8 +118,8 @@ std::map<std::string, viewer::ViewVerdict> Verdicts(const Options& options,
   std::map<std::string, viewer::ViewVerdict> verdicts;
   if (!set.sparse_file) return verdicts;  // nothing to judge by
   const calib::ValidateLimits limits;
-  const auto report =
-      pipeline::ReprojectionOfSet(set, io::LoadSparse(options.set, set), limits, context.common.threads);
+  const auto report = pipeline::ReprojectionOfSet(set, io::LoadSparse(options.set, set), limits,
+                                                  context.common.threads);
   for (const auto& camera : report.cameras) {
     if (camera.held_out.count < limits.min_observations) continue;
     verdicts[camera.name] = {camera.held_out.rms_px <= limits.max_camera_rms_px,
@@ -253,7 +254,10 @@ void AddViewCommand(CLI::App& app) {
         AddOpenGlOptions(command, options->renderer);
         AddMemoryOption(command, options->memory_gb);
         options->render = AddRenderOptions(command);
-        return [options](const Context& context) { return RunView(*options, context); };
+        return [options, &command](const Context& context) {
+          UseStoredArguments(command, io::RenderArguments(io::ReadSet(options->set)));
+          return RunView(*options, context);
+        };
       });
 }
 

@@ -45,6 +45,7 @@ Json OptionsJson(const BuildOptions& options, const stereo::Effort& effort, int 
   json["poses"] = options.poses.filename().string();
   json["refine"] = options.refine;
   json["seed"] = options.seed;
+  if (options.depth.depth_error_px) json["depth_error_px"] = *options.depth.depth_error_px;
   return json;
 }
 
@@ -311,6 +312,9 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
 
   log.Begin("finishing");
   FinishScene(set, SourcePoints(sparse, views), writer, options.threads);
+  if (options.depth.depth_error_px) {
+    RecodeDepth(set, *options.depth.depth_error_px, writer, options.threads);
+  }
   WriteMeshes(set, writer, options.threads);
   const calib::ValidationReport validation =
       Validate(set, sparse, report, options.threads, progress);

@@ -32,6 +32,8 @@ struct DepthChoice {
   std::optional<int> neighbours, round_neighbours, iterations, rounds;
   std::optional<double> time_budget_s;  ///< picks what is not given explicitly
   std::optional<double> memory_gb;      ///< 1e9 bytes; absent: kDefaultMemoryGb, or what is needed
+  /// Pixels of disparity that storing may move a depth; absent: png16-inverse, practically exact.
+  std::optional<double> depth_error_px;
   std::filesystem::path workspace;      ///< for engine "colmap"; empty: the program fills one
 };
 

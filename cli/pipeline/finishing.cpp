@@ -1,8 +1,13 @@
 #include "cli/pipeline/finishing.h"
 
+#include <vector>
+
+#include "dtr/base/parallel_for.h"
+#include "dtr/io/depth_io.h"
 #include "dtr/render/adaptive_mesh.h"
 #include "dtr/render/geometry.h"
 #include "dtr/render/options.h"
+#include "dtr/render/scene.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -32,6 +37,21 @@ void FinishScene(DtrSet& set, std::span<const SparsePoint> points, const io::Set
   }
   FinishGeometry(set,
                  has_depth || points.empty() ? samples.Extent() : SceneExtentFromPoints(points));
+}
+
+void RecodeDepth(DtrSet& set, double error_px, io::SetWriter& writer, int threads) {
+  std::vector<View>& views = set.frames.front().views;
+  ParallelFor(0, static_cast<int>(views.size()), threads, [&](int i) {
+    View& view = views[static_cast<size_t>(i)];
+    if (!HasDepth(view)) return;
+    View loaded = Loaded(view, writer, false, 1);
+    io::SetDepthError(loaded, error_px * ThresholdsOf(loaded, {}).pixel);
+    writer.RecodeDepth(loaded, set.unit);
+    view.depth_coding = loaded.depth_coding;
+    view.depth_steps = loaded.depth_steps;
+    view.depth_file = loaded.depth_file;
+    view.mesh_file.reset();
+  });
 }
 
 DepthCount WriteMeshes(DtrSet& set, io::SetWriter& writer, int threads) {

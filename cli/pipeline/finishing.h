@@ -13,6 +13,11 @@ namespace dtr::pipeline {
 void FinishScene(DtrSet& set, std::span<const SparsePoint> points, const io::SetWriter& writer,
                  int threads);
 
+/// Stores the depth of every source view anew as zstd-inverse, with 1/z off by at most `error_px`
+/// pixels of disparity from what the stereo engine gave. After FinishScene: pixels of disparity
+/// need the baselines. Throws Error where 16 bits cannot keep the bound.
+void RecodeDepth(DtrSet& set, double error_px, io::SetWriter& writer, int threads);
+
 /// How much of the source views has a depth.
 struct DepthCount {
   int maps = 0;

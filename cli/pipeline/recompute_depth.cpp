@@ -32,6 +32,10 @@ DtrSet ReadForDepth(const std::filesystem::path& folder) {
     view.mesh_file.reset();
     view.near_z = view.far_z = 0;
     view.depth_scale = 1;
+    if (view.depth_coding == DepthCoding::kZstdInverseDepth) {
+      view.depth_coding = View{}.depth_coding;  // its steps were for the old range
+      view.depth_steps = 0;
+    }
   }
   return set;
 }
@@ -74,6 +78,7 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& progre
   const nlohmann::json fingerprint = {{"tool_version", DTR_VERSION},
                                       {"settings", SettingsJson(options.depth.engine, effort)},
                                       {"time_budget_s", options.depth.time_budget_s.value_or(0)},
+                                      {"depth_error_px", options.depth.depth_error_px.value_or(0)},
                                       {"seed", options.seed},
                                       {"workspace_sha256", InputHash(options.depth.workspace)},
                                       {"set_sha256", Sha256OfFile(options.set / "set.json")},
@@ -83,6 +88,9 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& progre
   const stereo::Effort spent = DepthStage(set, sparse, options.depth, effort,
                                           {options.threads, options.seed}, writer, progress);
   FinishScene(set, {}, writer, options.threads);
+  if (options.depth.depth_error_px) {
+    RecodeDepth(set, *options.depth.depth_error_px, writer, options.threads);
+  }
   const DepthCount count = WriteMeshes(set, writer, options.threads);
   writer.WriteSparse(set, sparse);
   nlohmann::ordered_json provenance = nlohmann::ordered_json::parse(set.provenance_json);
@@ -94,6 +102,8 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& progre
   }
   recorded.update(SettingsJson(options.depth.engine, spent));
   recorded["seed"] = options.seed;
+  recorded.erase("depth_error_px");
+  if (options.depth.depth_error_px) recorded["depth_error_px"] = *options.depth.depth_error_px;
   set.provenance_json = provenance.dump();
   report.depth_maps = count.maps;
   report.depth_completeness = count.Completeness();

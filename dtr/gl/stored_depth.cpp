@@ -1,18 +1,30 @@
 #include "dtr/gl/stored_depth.h"
 
+#include <optional>
+
 #include "dtr/gl/layer_sizes.h"
 #include "dtr/types/inverse_depth_code.h"
 
 namespace dtr::gl {
 namespace {
 
+/// That the view's depth was stored in; none where it was in no code of inverse depth.
+std::optional<InverseDepthCode> CodeOf(const View& view) {
+  if (!InverseDepthCode::IsRange(view.near_z, view.far_z)) return std::nullopt;
+  if (view.depth_coding == DepthCoding::kPng16InverseDepth) {
+    return InverseDepthCode(view.near_z, view.far_z);
+  }
+  const bool in_steps = view.depth_coding == DepthCoding::kZstdInverseDepth &&
+                        view.depth_steps >= 1 && view.depth_steps <= InverseDepthCode::kSteps;
+  if (!in_steps) return std::nullopt;
+  return InverseDepthCode(view.near_z, view.far_z, view.depth_steps);
+}
+
 /// Empty where some depth is not exactly that of a code.
 std::vector<std::uint16_t> ExactCodes(const View& view, const SampleGrid& samples) {
-  if (view.depth_coding != DepthCoding::kPng16InverseDepth ||
-      !InverseDepthCode::IsRange(view.near_z, view.far_z)) {
-    return {};
-  }
-  const InverseDepthCode code(view.near_z, view.far_z);
+  const std::optional<InverseDepthCode> found = CodeOf(view);
+  if (!found) return {};
+  const InverseDepthCode& code = *found;
   const Grid<double>& w = samples.inverse_depth;
   std::vector<std::uint16_t> codes(w.data().size());
   size_t k = 0;
@@ -39,7 +51,7 @@ StoredDepth StoreDepth(const View& view, const SampleGrid& samples) {
     stored.values.assign(w.begin(), w.end());
     return stored;
   }
-  const InverseDepthCode code(view.near_z, view.far_z);
+  const InverseDepthCode code = *CodeOf(view);
   stored.offset = code.first();
   stored.factor = code.step() * UINT16_MAX;
   return stored;

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <sstream>
+#include <vector>
 
 #include "dtr/base/error.h"
 #include "dtr/io/depth_io.h"
@@ -32,6 +33,12 @@ void ExpectRange(double near_z, double far_z) {
   if (InverseDepthCode::IsRange(near_z, far_z)) return;
   throw Error("depth range: expected 0 < near < far, found near " + Number(near_z) + ", far " +
               Number(far_z));
+}
+
+void ExpectSteps(int steps) {
+  if (steps >= 1 && steps <= InverseDepthCode::kSteps) return;
+  throw Error("depth steps: expected 1 to " + std::to_string(InverseDepthCode::kSteps) +
+              ", found " + std::to_string(steps));
 }
 
 // Calls `visit(x, y, z)` for every pixel with depth. Only 0 may stand for a hole: NaN, infinity
@@ -79,6 +86,8 @@ const char* NameOf(DepthCoding coding) {
       return "exr-half";
     case DepthCoding::kPng16Millimetre:
       return "png16-mm";
+    case DepthCoding::kZstdInverseDepth:
+      return "zstd-inverse";
     case DepthCoding::kPng16InverseDepth:
       break;
   }
@@ -86,22 +95,33 @@ const char* NameOf(DepthCoding coding) {
 }
 
 DepthCoding DepthCodingFromName(const std::string& name) {
-  for (const auto coding : {DepthCoding::kExrFloat, DepthCoding::kExrHalf,
-                            DepthCoding::kPng16Millimetre, DepthCoding::kPng16InverseDepth}) {
+  for (const auto coding :
+       {DepthCoding::kExrFloat, DepthCoding::kExrHalf, DepthCoding::kPng16Millimetre,
+        DepthCoding::kPng16InverseDepth, DepthCoding::kZstdInverseDepth}) {
     if (name == NameOf(coding)) return coding;
   }
   throw UsageError(
-      "depth coding: expected exr-float, exr-half, png16-mm or png16-inverse, found '" + name +
-      "'");
+      "depth coding: expected exr-float, exr-half, png16-mm, png16-inverse or zstd-inverse, "
+      "found '" +
+      name + "'");
 }
 
 const char* ExtensionOf(DepthCoding coding) {
+  if (coding == DepthCoding::kZstdInverseDepth) return ".dtz";
   return coding == DepthCoding::kExrFloat || coding == DepthCoding::kExrHalf ? ".exr" : ".png";
 }
 
-Grid<std::uint16_t> EncodePng16Inverse(const DepthImage& depth, double near_z, double far_z) {
+DepthFormat FormatOf(const View& view, LengthUnit unit) {
+  DepthFormat format{view.depth_coding, view.near_z, view.far_z, unit};
+  if (view.depth_coding == DepthCoding::kZstdInverseDepth) format.steps = view.depth_steps;
+  return format;
+}
+
+Grid<std::uint16_t> EncodeInverseDepth(const DepthImage& depth, double near_z, double far_z,
+                                       int steps) {
   ExpectRange(near_z, far_z);
-  const InverseDepthCode code(near_z, far_z);
+  ExpectSteps(steps);
+  const InverseDepthCode code(near_z, far_z, steps);
   Grid<std::uint16_t> codes;
   ForEachDepth(depth, [&](int x, int y, float z) {
     ExpectWithin(x, y, z, near_z, far_z);
@@ -111,13 +131,44 @@ Grid<std::uint16_t> EncodePng16Inverse(const DepthImage& depth, double near_z, d
   return codes.empty() ? Grid<std::uint16_t>(depth.width(), depth.height()) : codes;
 }
 
-DepthImage DecodePng16Inverse(const Grid<std::uint16_t>& codes, double near_z, double far_z) {
+DepthImage DecodeInverseDepth(const Grid<std::uint16_t>& codes, double near_z, double far_z,
+                              int steps) {
   ExpectRange(near_z, far_z);
-  const InverseDepthCode code(near_z, far_z);
+  ExpectSteps(steps);
+  const InverseDepthCode code(near_z, far_z, steps);
+  std::vector<float> depth_of(static_cast<size_t>(steps) + 2);  // few codes, many pixels
+  for (size_t c = 0; c < depth_of.size(); ++c) {
+    depth_of[c] = code.Decode(static_cast<std::uint16_t>(c));
+  }
   DepthImage depth(codes.width(), codes.height());
   std::transform(codes.data().begin(), codes.data().end(), depth.grid().data().begin(),
-                 [&](std::uint16_t c) { return code.Decode(c); });
+                 [&](std::uint16_t c) {
+                   if (c < depth_of.size()) return depth_of[c];
+                   throw Error("depth codes: expected at most " + std::to_string(steps + 1) +
+                               ", found " + std::to_string(c));
+                 });
   return depth;
+}
+
+int StepsForError(double near_z, double far_z, double error) {
+  ExpectRange(near_z, far_z);
+  // Reading back rounds z to float32, which moves 1/z by 2^-24 of itself at most (and a little, as
+  // the nearest code was found with rounded numbers).
+  const double of_step = error - 0x1.02p-24 / near_z;
+  const double steps = std::ceil((1 / near_z - 1 / far_z) / (2 * of_step));
+  if (of_step > 0 && steps <= InverseDepthCode::kSteps) return std::max(1, static_cast<int>(steps));
+  throw Error("depth error: expected a bound that 16 bits can keep over depths of " +
+              Number(near_z) + " to " + Number(far_z) + ", found " + Number(error) +
+              " of inverse depth; allow a larger one");
+}
+
+void SetDepthError(View& view, double error) {
+  const DepthFormat format = FormatOf(view, LengthUnit::kUnknown);
+  const bool in_steps = format.coding == DepthCoding::kPng16InverseDepth ||
+                        format.coding == DepthCoding::kZstdInverseDepth;
+  if (in_steps) error -= InverseDepthCode(view.near_z, view.far_z, StepsOf(format)).step() / 2;
+  view.depth_steps = StepsForError(view.near_z, view.far_z, error);
+  view.depth_coding = DepthCoding::kZstdInverseDepth;
 }
 
 Grid<std::uint16_t> EncodePng16Millimetre(const DepthImage& depth_m) {
@@ -142,11 +193,18 @@ DepthImage DecodePng16Millimetre(const Grid<std::uint16_t>& codes) {
   return depth;
 }
 
+int StepsOf(const DepthFormat& format) {
+  return format.coding == DepthCoding::kZstdInverseDepth ? format.steps : InverseDepthCode::kSteps;
+}
+
 DepthImage RoundToCoding(const DepthImage& depth, const DepthFormat& format) {
   switch (format.coding) {
     case DepthCoding::kPng16InverseDepth:
-      return DecodePng16Inverse(EncodePng16Inverse(depth, format.near_z, format.far_z),
-                                format.near_z, format.far_z);
+    case DepthCoding::kZstdInverseDepth: {
+      const int steps = StepsOf(format);
+      return DecodeInverseDepth(EncodeInverseDepth(depth, format.near_z, format.far_z, steps),
+                                format.near_z, format.far_z, steps);
+    }
     case DepthCoding::kPng16Millimetre:
       if (format.unit != LengthUnit::kMetre) {
         throw Error("depth coding png16-mm: expected a set in metres; choose another depth coding");

@@ -5,6 +5,7 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
+#include "dtr/io/code_bands.h"
 #include "dtr/io/oiio_files.h"
 
 namespace dtr::io {
@@ -67,6 +68,7 @@ double RoundingOf(DepthCoding coding, double z) {
       return 0.50001e-3;  // half a code, and float's rounding
     case DepthCoding::kExrFloat:
     case DepthCoding::kPng16InverseDepth:
+    case DepthCoding::kZstdInverseDepth:
       break;  // both ends are stored exactly
   }
   return 0;
@@ -111,6 +113,15 @@ void ExpectSigma(const fs::path& file, const Grid<float>& sigma) {
                   std::to_string(value));
     }
   }
+}
+
+// Codes say by themselves that they lie in the range.
+DepthImage ReadBands(const fs::path& file, const DepthFormat& format, int width_px, int height_px) {
+  const std::string bytes = ReadFile(file, MostBandBytes(width_px, height_px));
+  return Naming(file, [&] {
+    return DecodeInverseDepth(DecodeBands(bytes, width_px, height_px), format.near_z, format.far_z,
+                              format.steps);
+  });
 }
 
 }  // namespace
@@ -163,13 +174,19 @@ void WriteDepth(const fs::path& file, const DepthImage& depth, const DepthFormat
     case DepthCoding::kPng16Millimetre:
       return WritePng16(file, EncodePng16Millimetre(stored));
     case DepthCoding::kPng16InverseDepth:
+    case DepthCoding::kZstdInverseDepth:
       break;
   }
   // Encoding the rounded map again gives the same codes (tested), so nothing is rounded twice.
-  WritePng16(file, EncodePng16Inverse(stored, format.near_z, format.far_z));
+  const auto codes = EncodeInverseDepth(stored, format.near_z, format.far_z, StepsOf(format));
+  if (format.coding == DepthCoding::kPng16InverseDepth) return WritePng16(file, codes);
+  WriteFileAtomically(file, EncodeBands(codes));
 }
 
 DepthImage ReadDepth(const fs::path& file, const DepthFormat& format, int width_px, int height_px) {
+  if (format.coding == DepthCoding::kZstdInverseDepth) {
+    return ReadBands(file, format, width_px, height_px);
+  }
   const auto in = OpenImage(file, kImageLimitPx);
   ExpectSize(*in, file, width_px, height_px);
   return Naming(file, [&] {
@@ -183,8 +200,10 @@ DepthImage ReadDepth(const fs::path& file, const DepthFormat& format, int width_
         depth = DecodePng16Millimetre(ReadCodesOf(*in, "depth"));
         break;
       case DepthCoding::kPng16InverseDepth:
-        depth = DecodePng16Inverse(ReadCodesOf(*in, "depth"), format.near_z, format.far_z);
+        depth = DecodeInverseDepth(ReadCodesOf(*in, "depth"), format.near_z, format.far_z);
         break;
+      case DepthCoding::kZstdInverseDepth:
+        break;  // read above
     }
     ExpectInRange(depth, format, format.coding);
     return depth;

@@ -6,6 +6,7 @@
 
 #include "dtr/io/image_io.h"
 #include "dtr/types/dtr_set.h"
+#include "dtr/types/inverse_depth_code.h"
 
 namespace dtr::io {
 
@@ -30,22 +31,37 @@ struct DepthFormat {
   /// Every depth lies in this range, scene units; exr-half and png16-mm may round one past its end.
   double near_z = 0, far_z = 0;
   LengthUnit unit = LengthUnit::kUnknown;  ///< kPng16Millimetre needs kMetre
+  int steps = InverseDepthCode::kSteps;    ///< of kZstdInverseDepth
 };
+/// Steps of inverse depth: `steps`, or 65534 where the coding has no other number of them.
+int StepsOf(const DepthFormat& format);
+/// Of the depth of a view in a set of that unit.
+DepthFormat FormatOf(const View& view, LengthUnit unit);
 
-/// "exr-float", "exr-half", "png16-mm", "png16-inverse".
+/// "exr-float", "exr-half", "png16-mm", "png16-inverse", "zstd-inverse".
 const char* NameOf(DepthCoding coding);
 /// Inverse. Throws UsageError naming the known codings.
 DepthCoding DepthCodingFromName(const std::string& name);
-/// ".exr" or ".png".
+/// ".exr", ".png" or ".dtz".
 const char* ExtensionOf(DepthCoding coding);
 
-/// 16-bit inverse depth: code 0 a hole, c = 1..65535:
-/// 1/z = 1/far + (c - 1)/65534 * (1/near - 1/far); c = 65535 is exactly near, c = 1 exactly far.
-/// |error of 1/z| is at most half a step of (1/near - 1/far)/65534.
-/// Throws Error unless 0 < near < far < infinity and every depth lies in [near, far] (compared as
-/// float32); the map must be plane z.
-Grid<std::uint16_t> EncodePng16Inverse(const DepthImage& depth, double near_z, double far_z);
-DepthImage DecodePng16Inverse(const Grid<std::uint16_t>& codes, double near_z, double far_z);
+/// Inverse depth in n steps, 1 <= n <= 65534: code 0 a hole, c = 1..n + 1:
+/// 1/z = 1/far + (c - 1)/n * (1/near - 1/far); c = n + 1 is exactly near, c = 1 exactly far.
+/// |error of 1/z| is at most half a step of (1/near - 1/far)/n, and float32's rounding of z.
+/// Throws Error unless 0 < near < far < infinity, every depth lies in [near, far] (compared as
+/// float32) and every code is at most n + 1; the map must be plane z.
+Grid<std::uint16_t> EncodeInverseDepth(const DepthImage& depth, double near_z, double far_z,
+                                       int steps = InverseDepthCode::kSteps);
+DepthImage DecodeInverseDepth(const Grid<std::uint16_t>& codes, double near_z, double far_z,
+                              int steps = InverseDepthCode::kSteps);
+
+/// The fewest steps with which every stored 1/z, read back as float32 z, is off by at most `error`
+/// (1/scene unit). Throws Error where 65534 steps, or float32, are not that exact.
+int StepsForError(double near_z, double far_z, double error);
+/// Makes zstd-inverse the view's coding, with the fewest steps that keep every 1/z within `error`
+/// (1/scene unit) of what it was before the view's depth was stored: what its coding now may have
+/// rounded is taken off. Throws Error as StepsForError.
+void SetDepthError(View& view, double error);
 
 /// 16-bit millimetres of a depth in metres: code 0 a hole. Throws Error for depths that round to
 /// less than 1 mm or to more than 65.535 m.

@@ -13,6 +13,7 @@
 #include "dtr/base/parallel_for.h"
 #include "dtr/io/depth_io.h"
 #include "dtr/io/json_fields.h"
+#include "dtr/io/pruned.h"
 #include "dtr/io/set_io.h"
 #include "dtr/io/set_json.h"
 
@@ -51,6 +52,7 @@ Json ViewInfo(const View& view, size_t frame) {
                {"has_sigma", view.sigma_file.has_value()}};
   if (view.depth_file) {
     info["depth_coding"] = NameOf(view.depth_coding);
+    if (view.depth_coding == DepthCoding::kZstdInverseDepth) info["depth_steps"] = view.depth_steps;
     info["depth_scale"] = view.depth_scale;
     info["near_z"] = view.near_z;
     info["far_z"] = view.far_z;
@@ -125,7 +127,7 @@ std::string DescribeSet(const DtrSet& set) {
       << set.frames.size() << (set.frames.size() == 1 ? " frame, " : " frames, ")
       << Megabytes(bytes) << "\nunit: " << NameOf(set.unit) << "\nscene centre: ("
       << set.scene_center.transpose() << ")\nverdict: " << VerdictLine(set) << "\nviews:\n";
-  return out.str() + lines.str();
+  return out.str() + lines.str() + DescribePruned(set);
 }
 
 std::string InfoJson(const DtrSet& set) {
@@ -142,6 +144,9 @@ std::string InfoJson(const DtrSet& set) {
                {"views", Json::array()}};
   if (!set.bounds.empty()) {
     info["bounds"] = {{"min", Numbers(set.bounds.min)}, {"max", Numbers(set.bounds.max)}};
+  }
+  if (const std::string pruned = PrunedJson(set); !pruned.empty()) {
+    info["pruned"] = ParseJson(pruned, "pruned");
   }
   std::uint64_t bytes = set.sparse_file ? set.sparse_file->bytes : 0;
   for (size_t f = 0; f < set.frames.size(); ++f) {

@@ -108,6 +108,19 @@ class SetWriter {
   /// The caller looks at view.depth_file to see how far the view had got.
   bool RestoreView(View& view) const;
 
+  /// Writes the depth that the view has in memory once more, in its coding as it is now, beside the
+  /// file of before. The checkpoint of WriteView stays: a run that is interrupted goes on from the
+  /// depth as that one wrote it. Takes the mesh away.
+  void RecodeDepth(View& view, LengthUnit unit);
+
+  /// Writes the image that the view has in memory as JPEG of that quality, 1...100 (4:4:4), in the
+  /// place of the one before. Source views only: held-out photos are measured with.
+  void WriteJpeg(View& view, int quality);
+
+  /// Copies the files that the view's entries name from a finished set, byte by byte. Throws Error
+  /// where one has another content than its entry says.
+  void CopyFiles(const std::filesystem::path& set_folder, const View& view);
+
   /// Writes mesh/ID.bin of a view whose depth was written: its hashes are filled in here. Writing
   /// the view's depth again takes the mesh away.
   void WriteMesh(View& view, StoredMesh mesh);

@@ -127,7 +127,11 @@ Json DepthFrom(const JsonObject& object, View& view) {
   try {
     view.depth_coding = DepthCodingFromName(coding);
   } catch (const UsageError&) {
-    object.Fail("coding", "exr-float, exr-half, png16-mm or png16-inverse");
+    object.Fail("coding", "exr-float, exr-half, png16-mm, png16-inverse or zstd-inverse");
+  }
+  if (view.depth_coding == DepthCoding::kZstdInverseDepth) {
+    view.depth_steps = object.PositiveInt("steps");
+    if (view.depth_steps > InverseDepthCode::kSteps) object.Fail("steps", "1 to 65534");
   }
   if (object.String("kind") != "plane-z") object.Fail("kind", "\"plane-z\"");
   view.depth_scale = object.PositiveInt("scale");
@@ -145,6 +149,7 @@ Json DepthFrom(const JsonObject& object, View& view) {
 Json DepthToJson(const View& view) {
   Json depth = JsonFromStoredFile(*view.depth_file);
   depth["coding"] = NameOf(view.depth_coding);
+  if (view.depth_coding == DepthCoding::kZstdInverseDepth) depth["steps"] = view.depth_steps;
   depth["kind"] = "plane-z";
   depth["scale"] = view.depth_scale;
   depth["near_z"] = view.near_z;

@@ -77,8 +77,9 @@ bool AreDuplicates(const View& a, const View& b) {
   };
   const bool same_depth =
       same(a.depth_file, b.depth_file) &&
-      (!a.depth_file || (a.depth_coding == b.depth_coding && a.depth_scale == b.depth_scale &&
-                         a.near_z == b.near_z && a.far_z == b.far_z));
+      (!a.depth_file ||
+       (a.depth_coding == b.depth_coding && a.depth_steps == b.depth_steps &&
+        a.depth_scale == b.depth_scale && a.near_z == b.near_z && a.far_z == b.far_z));
   return a.image_file && a.role == b.role && a.camera == b.camera &&
          a.cam_from_world.rotation.coeffs() == b.cam_from_world.rotation.coeffs() &&
          a.cam_from_world.translation == b.cam_from_world.translation &&
@@ -135,7 +136,7 @@ void LoadPixels(const fs::path& set_folder, View& view, const LoadOptions& optio
   const int depth_height_px = view.camera.height_px() / view.depth_scale;
   if (options.depth && view.depth_file) {
     // The unit was checked with set.json, and reading does not depend on it.
-    const DepthFormat format{view.depth_coding, view.near_z, view.far_z, LengthUnit::kUnknown};
+    const DepthFormat format = FormatOf(view, LengthUnit::kUnknown);
     view.depth =
         ReadDepth(set_folder / view.depth_file->path, format, depth_width_px, depth_height_px);
   }

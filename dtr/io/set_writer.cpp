@@ -151,6 +151,7 @@ struct SetWriter::State {
   std::string PathOf(const View& view, const std::string& kind, const std::string& extension) const;
   template <typename Write>
   StoredFile Store(const std::string& path, const Write& write) const;
+  void WriteDepthFile(View& view, LengthUnit unit) const;
   void WriteView(View& view, LengthUnit unit) const;
   bool RestoreView(View& view) const;
   void RemoveUnnamed(const DtrSet& set) const;
@@ -283,11 +284,7 @@ void SetWriter::State::WriteView(View& view, LengthUnit unit) const {
       view.near_z = range.near_z;
       view.far_z = range.far_z;
     }
-    const DepthFormat format{view.depth_coding, view.near_z, view.far_z, unit};
-    view.depth_file = Store(PathOf(view, "depth", ExtensionOf(view.depth_coding)),
-                            [&](const fs::path& file) { WriteDepth(file, view.depth, format); });
-    view.mesh_file.reset();  // it was of other depth
-    view.mesh.reset();
+    WriteDepthFile(view, unit);
   }
   if (view.inverse_depth_sigma) {
     view.sigma_file = Store(PathOf(view, "sigma", ".exr"), [&](const fs::path& file) {
@@ -300,6 +297,47 @@ void SetWriter::State::WriteView(View& view, LengthUnit unit) const {
   fs::create_directories(record.parent_path(), error);
   if (error) throw Error(record.string() + ": its folder cannot be made: " + error.message());
   WriteFileAtomically(record, JsonFromView(view, "view '" + view.name + "'"));
+}
+
+void SetWriter::State::WriteDepthFile(View& view, LengthUnit unit) const {
+  const DepthFormat format = FormatOf(view, unit);
+  view.depth_file = Store(PathOf(view, "depth", ExtensionOf(view.depth_coding)),
+                          [&](const fs::path& file) { WriteDepth(file, view.depth, format); });
+  view.mesh_file.reset();  // it was of other depth
+  view.mesh.reset();
+}
+
+void SetWriter::RecodeDepth(View& view, LengthUnit unit) {
+  ExpectPixels(view);
+  if (view.depth.empty()) throw Error("view '" + view.name + "': expected depth to store");
+  AsError([&] { state_->WriteDepthFile(view, unit); });
+}
+
+void SetWriter::WriteJpeg(View& view, int quality) {
+  ExpectPixels(view);
+  if (view.image.empty() || view.role != ViewRole::kSource) {
+    throw Error("view '" + view.name + "': expected the image of a source view to write as JPEG");
+  }
+  view.image_file = AsError([&] {
+    return state_->Store(state_->PathOf(view, "images", ".jpg"),
+                         [&](const fs::path& file) { WriteImage(file, view.image, quality); });
+  });
+}
+
+void SetWriter::CopyFiles(const fs::path& set_folder, const View& view) {
+  for (const auto* file :
+       {&view.image_file, &view.mask_file, &view.depth_file, &view.sigma_file, &view.mesh_file}) {
+    if (!*file) continue;
+    const StoredFile copied = AsError([&] {
+      return state_->Store((*file)->path, [&](const fs::path& target) {
+        fs::copy_file(set_folder / (*file)->path, target, fs::copy_options::overwrite_existing);
+      });
+    });
+    if (copied == **file) continue;
+    throw Error((set_folder / (*file)->path).string() +
+                ": expected the content that the set records, found another; `dtr info --verify` "
+                "names every such file");
+  }
 }
 
 bool SetWriter::RestoreView(View& view) const {
@@ -332,6 +370,7 @@ bool SetWriter::State::RestoreView(View& view) const {
   view.depth_file = stored.depth_file;
   view.sigma_file = stored.sigma_file;
   view.depth_coding = stored.depth_coding;
+  view.depth_steps = stored.depth_steps;
   view.depth_scale = stored.depth_scale;
   view.near_z = stored.near_z;
   view.far_z = stored.far_z;

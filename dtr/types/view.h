@@ -26,6 +26,7 @@ enum class DepthCoding {
   kExrHalf,            ///< "exr-half": half EXR; refuses depths beyond half's range
   kPng16Millimetre,    ///< "png16-mm": 16-bit PNG, millimetres; unit metre required, <= 65.535 m
   kPng16InverseDepth,  ///< "png16-inverse": 16-bit PNG linear in 1/z between far and near
+  kZstdInverseDepth,   ///< "zstd-inverse": the same in `depth_steps` steps, our own compression
 };
 
 /// A file of the set: path relative to the set's folder, content hash (hex SHA-256), size.
@@ -51,6 +52,7 @@ struct View {
   std::optional<Grid<float>> inverse_depth_sigma;  ///< std. deviation of 1/z, grid of `depth`
 
   DepthCoding depth_coding = DepthCoding::kPng16InverseDepth;
+  int depth_steps = 0;            ///< of kZstdInverseDepth, 1...65534; 0 with other codings
   int depth_scale = 1;            ///< s: the depth map is 1/s of the image per axis
   double near_z = 0, far_z = 0;   ///< range of the stored depth; 0 for held-out views
   double reference_baseline = 0;  ///< DESIGN section 3; the baseline of every figure in px

@@ -43,6 +43,27 @@ View RandomDepth(double near_z, double far_z) {
 // Four roundings of float: the texel, the offset, the factor and their sum.
 constexpr double kRoundings = 4 * 0x1.0p-24;
 
+TEST(StoredDepth, CodesInFewerStepsStayCodes) {
+  View view = RandomDepth(2, 90);
+  constexpr int kSteps = 300;
+  view.depth_coding = DepthCoding::kZstdInverseDepth;
+  view.depth_steps = kSteps;
+  const InverseDepthCode code(2, 90, kSteps);
+  for (float& z : view.depth.grid().data())
+    z = code.Decode(DepthImage::IsHole(z) ? 0 : code.Encode(z));
+  const SampleGrid samples = MakeSampleGrid(view, 1);
+  const StoredDepth stored = StoreDepth(view, samples);
+  ASSERT_EQ(stored.codes.size(), samples.inverse_depth.data().size());
+  for (size_t i = 0; i < stored.codes.size(); ++i) {
+    const double expected = samples.inverse_depth.data()[i];
+    ASSERT_LE(stored.codes[i], kSteps + 1);
+    ASSERT_EQ(stored.codes[i] == 0, expected == 0);
+    if (expected == 0) continue;
+    ASSERT_NEAR(stored.offset + stored.factor * stored.codes[i] / UINT16_MAX, expected,
+                1e-7 * expected);
+  }
+}
+
 TEST(StoredDepth, CodesDecodeToTheLoadedDepthWithinFloatRounding) {
   for (const auto& [near_z, far_z] :
        {std::pair(0.5, 1.0), std::pair(2.0, 90.0), std::pair(1e-3, 1e3), std::pair(1e5, 1e9)}) {

@@ -33,7 +33,7 @@ TEST(Png16Inverse, HandWorkedCodes) {
   depth(0, 0) = 1;      // near
   depth(1, 0) = 2;      // far
   depth(2, 0) = 1.25f;  // 1/z = 0.8: share 0.6 of [0.5, 1]
-  const auto codes = EncodePng16Inverse(depth, 1, 2);
+  const auto codes = EncodeInverseDepth(depth, 1, 2);
   EXPECT_EQ(codes(0, 0), 65535);
   EXPECT_EQ(codes(1, 0), 1);
   EXPECT_EQ(codes(2, 0), 1 + 39320);  // round(0.6 * 65534) = 39320
@@ -48,7 +48,7 @@ TEST(Png16Inverse, ErrorIsAtMostHalfAStepAndHolesAndEndsAreExact) {
     const auto far_z = static_cast<float>(near_z * std::exp(random.Uniform(0.01, 5)));
     const DepthImage depth = RandomDepth(random, 40, 30, near_z, far_z);
     const DepthImage back =
-        DecodePng16Inverse(EncodePng16Inverse(depth, near_z, far_z), near_z, far_z);
+        DecodeInverseDepth(EncodeInverseDepth(depth, near_z, far_z), near_z, far_z);
     const double half_step = 0.5 * (1.0 / near_z - 1.0 / far_z) / 65534;
     for (size_t i = 0; i < depth.grid().data().size(); ++i) {
       const float z = depth.grid().data()[i], stored = back.grid().data()[i];
@@ -68,28 +68,28 @@ TEST(Png16Inverse, IsMonotoneAndStableOverAllCodes) {
     codes.data()[i] = static_cast<std::uint16_t>(i);
   }
   // A range ratio of 30: neighbouring codes differ by more than float's rounding at both ends.
-  const DepthImage depth = DecodePng16Inverse(codes, 0.3, 9.0);
+  const DepthImage depth = DecodeInverseDepth(codes, 0.3, 9.0);
   const auto& z = depth.grid().data();
   EXPECT_EQ(z[0], 0);
   for (size_t i = 2; i < z.size(); ++i) ASSERT_LT(z[i], z[i - 1]) << i;
-  EXPECT_EQ(EncodePng16Inverse(depth, 0.3, 9.0), codes);
+  EXPECT_EQ(EncodeInverseDepth(depth, 0.3, 9.0), codes);
 }
 
 TEST(Png16Inverse, RefusesDepthOutsideTheRangeAndBadRanges) {
   DepthImage depth(2, 2);
   depth(1, 1) = 3;
-  EXPECT_THROW(EncodePng16Inverse(depth, 1, 2), Error);
-  EXPECT_THROW(EncodePng16Inverse(depth, 4, 5), Error);
+  EXPECT_THROW(EncodeInverseDepth(depth, 1, 2), Error);
+  EXPECT_THROW(EncodeInverseDepth(depth, 4, 5), Error);
   for (const auto& [near_z, far_z] :
        {std::pair(0.0, 5.0), {-1.0, 5.0}, {3.0, 3.0}, {5.0, 1.0}, {1.0, HUGE_VAL}, {NAN, 5.0}}) {
-    EXPECT_THROW(EncodePng16Inverse(depth, near_z, far_z), Error);
-    EXPECT_THROW(DecodePng16Inverse(Grid<std::uint16_t>(1, 1), near_z, far_z), Error);
+    EXPECT_THROW(EncodeInverseDepth(depth, near_z, far_z), Error);
+    EXPECT_THROW(DecodeInverseDepth(Grid<std::uint16_t>(1, 1), near_z, far_z), Error);
   }
   for (const float bad : {-1.0f, HUGE_VALF, std::numeric_limits<float>::quiet_NaN()}) {
     depth(1, 1) = bad;
-    EXPECT_THROW(EncodePng16Inverse(depth, 1, 2), Error);
+    EXPECT_THROW(EncodeInverseDepth(depth, 1, 2), Error);
   }
-  EXPECT_THROW(EncodePng16Inverse(DepthImage(2, 2, DepthKind::kRayDistance), 1, 2), Error);
+  EXPECT_THROW(EncodeInverseDepth(DepthImage(2, 2, DepthKind::kRayDistance), 1, 2), Error);
 }
 
 TEST(Png16Millimetre, RoundsToAMillimetreAndRefusesWhatDoesNotFit) {
@@ -162,7 +162,8 @@ TEST_P(DepthFiles, RefuseDepthOutsideTheRange) {
 INSTANTIATE_TEST_SUITE_P(AllCodings, DepthFiles,
                          ::testing::Values(DepthCoding::kExrFloat, DepthCoding::kExrHalf,
                                            DepthCoding::kPng16Millimetre,
-                                           DepthCoding::kPng16InverseDepth),
+                                           DepthCoding::kPng16InverseDepth,
+                                           DepthCoding::kZstdInverseDepth),
                          [](const auto& coding) {
                            std::string name = NameOf(coding.param);
                            std::erase(name, '-');
@@ -185,8 +186,8 @@ TEST(RangeOf, CoversTheMapAlsoWhenItIsFlatOrEmpty) {
   EXPECT_EQ(RangeOf(depth).near_z, 7.3f);
   EXPECT_GT(RangeOf(depth).far_z, 7.3f);
   const auto range = RangeOf(depth);
-  const auto codes = EncodePng16Inverse(depth, range.near_z, range.far_z);
-  EXPECT_EQ(DecodePng16Inverse(codes, range.near_z, range.far_z), depth);
+  const auto codes = EncodeInverseDepth(depth, range.near_z, range.far_z);
+  EXPECT_EQ(DecodeInverseDepth(codes, range.near_z, range.far_z), depth);
 }
 
 TEST(Sigma, KeepsEightBits) {

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 #include <map>
 #include <memory>
@@ -237,8 +238,9 @@ TEST(SetWriter, ViewsThatDoNotFitAreRefused) {
 }
 
 TEST(SetWriter, EveryCodingIsReadBackWithinItsRange) {
-  for (const auto coding : {DepthCoding::kExrFloat, DepthCoding::kExrHalf,
-                            DepthCoding::kPng16Millimetre, DepthCoding::kPng16InverseDepth}) {
+  for (const auto coding :
+       {DepthCoding::kExrFloat, DepthCoding::kExrHalf, DepthCoding::kPng16Millimetre,
+        DepthCoding::kPng16InverseDepth, DepthCoding::kZstdInverseDepth}) {
     const TemporaryFolder folder;
     DtrSet set = EmptySet();
     set.frames[0].views = {SmallView(0), SmallView(3)};
@@ -247,16 +249,68 @@ TEST(SetWriter, EveryCodingIsReadBackWithinItsRange) {
       SetWriter writer(folder / "small.dtr", kFingerprint, false);
       for (View& view : set.frames[0].views) {
         view.depth_coding = coding;
+        if (coding == DepthCoding::kZstdInverseDepth) view.depth_steps = 1000;
         writer.WriteView(view, set.unit);
       }
       writer.Finish(set);
     }
     const DtrSet loaded = LoadSet(folder / "small.dtr");
     const View& view = set.frames[0].views[0];
-    EXPECT_EQ(loaded.frames[0].views[0].depth,
-              RoundToCoding(view.depth, {coding, view.near_z, view.far_z, set.unit}));
+    EXPECT_EQ(loaded.frames[0].views[0].depth, RoundToCoding(view.depth, FormatOf(view, set.unit)));
     EXPECT_EQ(loaded.frames[0].views[1].depth, set.frames[0].views[1].depth);
   }
+}
+
+TEST(SetWriter, RecodedDepthKeepsItsBoundItsRangeAndTheCheckpoint) {
+  const TemporaryFolder folder;
+  DtrSet set = EmptySet();
+  set.frames[0].views = {SmallView(0)};
+  View& view = set.frames[0].views[0];
+  constexpr double kError = 1e-3;  // 1 / metre
+  const auto before = view.depth;
+  SetWriter writer(folder / "small.dtr", kFingerprint, false);
+  writer.WriteView(view, set.unit);
+  const auto first = *view.depth_file;
+  SetDepthError(view, kError);
+  writer.RecodeDepth(view, set.unit);
+  View restored = SmallView(0);
+  ASSERT_TRUE(writer.RestoreView(restored));
+  EXPECT_EQ(restored.depth_file, first);  // so that an interrupted run recodes the same depth
+  writer.Finish(set);
+  const View loaded = LoadSet(folder / "small.dtr").frames[0].views[0];
+  EXPECT_EQ(loaded.depth_steps, view.depth_steps);
+  EXPECT_EQ(loaded.depth_file->path, "depth/view0.dtz");
+  EXPECT_FALSE(fs::exists(folder / "small.dtr" / first.path));
+  for (size_t i = 0; i < before.grid().data().size(); ++i) {
+    const double z = before.grid().data()[i], stored = loaded.depth.grid().data()[i];
+    ASSERT_EQ(z == 0, stored == 0);
+    if (z == 0) continue;
+    ASSERT_LE(std::abs(1 / stored - 1 / z), kError);
+  }
+  EXPECT_THAT(VerifySet(folder / "small.dtr"), IsEmpty());
+}
+
+TEST(SetWriter, CopiesFilesAndRefusesDamagedOnes) {
+  const TemporaryFolder folder;
+  const DtrSet from = WriteSmallSet(folder / "from.dtr");
+  {
+    SetWriter writer(folder / "to.dtr", kFingerprint, false);
+    DtrSet copy = from;
+    copy.sparse_file.reset();
+    for (View& view : copy.frames[0].views) writer.CopyFiles(folder / "from.dtr", view);
+    View& view = copy.frames[0].views[0];
+    view.image = SmallView(0).image;
+    writer.WriteJpeg(view, 80);
+    EXPECT_EQ(view.image_file->path, "images/view0.jpg");
+    writer.Finish(copy);
+  }
+  const DtrSet to = LoadSet(folder / "to.dtr", {.held_out = true});
+  EXPECT_EQ(to.frames[0].views[1].image_file, from.frames[0].views[1].image_file);
+  EXPECT_EQ(to.frames[0].views[2].image_file->sha256, from.frames[0].views[2].image_file->sha256);
+  const fs::path depth = folder / "from.dtr" / from.frames[0].views[0].depth_file->path;
+  WriteFileAtomically(depth, "else");
+  SetWriter writer(folder / "third.dtr", kFingerprint, false);
+  EXPECT_THROW(writer.CopyFiles(folder / "from.dtr", from.frames[0].views[0]), Error);
 }
 
 TEST(SetWriter, JpegIsForSourcesOnly) {

@@ -1,0 +1,106 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <memory>
+
+#include "cli/command.h"
+#include "cli/pipeline/prune_set.h"
+#include "cli/render_options.h"
+#include "cli/renderers.h"
+#include "dtr/io/pruned.h"
+#include "dtr/io/set_io.h"
+
+namespace dtr::cli {
+namespace {
+
+struct Options {
+  pipeline::PruneSetOptions prune;
+  RendererChoice renderer;
+  std::shared_ptr<RenderOptions> render;
+};
+
+void SayResult(const Options& options, const pipeline::PruneSetReport& report, Console& console) {
+  const prune::PruneReport& pruned = report.pruned;
+  const auto megabytes = [](std::uint64_t bytes) { return static_cast<double>(bytes) / 1e6; };
+  console.Say(fmt::format(
+      "{}: {:.1f} MB of {:.1f} ({:.1f} times fewer bytes), frames {:.1f} ms of {:.1f} ({:.1f} "
+      "times "
+      "as fast), {:.3f} dB lost of {:g} allowed",
+      options.prune.output.string(), megabytes(report.bytes_after), megabytes(report.bytes_before),
+      static_cast<double>(report.bytes_before) / static_cast<double>(report.bytes_after),
+      report.frame_after.median_ms, report.frame_before.median_ms,
+      report.frame_before.median_ms / report.frame_after.median_ms, pruned.loss_db(),
+      options.prune.prune.max_loss_db));
+  console.Say(fmt::format("  between input cameras: {:.3f} dB; on held-out photos: {}",
+                          pruned.checked_probe_loss_db,
+                          pruned.photo_loss_db ? fmt::format("{:.3f} dB", *pruned.photo_loss_db)
+                                               : std::string("there are none")));
+  if (!pruned.put_back.empty()) {
+    console.Say(fmt::format("  {} decisions taken back, as other places showed more loss",
+                            pruned.put_back.size()));
+  }
+  console.Say(fmt::format("  dtr info {} says what was left out; drawn with: {}",
+                          options.prune.output.string(),
+                          report.render_arguments.empty()
+                              ? std::string("the usual options")
+                              : fmt::format("{}", fmt::join(report.render_arguments, " "))));
+}
+
+int RunPrune(Options& options, const Context& context) {
+  options.prune.threads = context.common.threads;
+  options.prune.prune.seed = context.common.seed;
+  options.prune.prune.render = *options.render;
+  options.prune.arguments_of = &RenderOptionArguments;
+  options.prune.make_renderer = [&] { return MakeRenderer(options.renderer, context.console); };
+  options.prune.make_timed_renderer = [&] {
+    return MakeTimedRenderer(options.renderer, context.console);
+  };
+  // Before anything is loaded: a machine without OpenGL should say so at once.
+  (void)options.prune.make_renderer();
+  const auto report = pipeline::PruneSet(options.prune, context.console);
+  SayResult(options, report, context.console);
+  context.EmitJson(report.json);
+  return kDone;
+}
+
+}  // namespace
+
+void AddPruneCommand(CLI::App& app) {
+  AddCommand(
+      app, "prune", "Leave out what a set's pictures do not need",
+      "dtr prune scene.dtr -o small.dtr --max-loss-db 0.1", [](CLI::App& command) -> Action {
+        auto options = std::make_shared<Options>();
+        prune::PruneOptions& prune = options->prune.prune;
+        command.add_option("SET", options->prune.set, "The set; it is only read")->required();
+        command.add_option("-o,--output", options->prune.output, "The set to write")
+            ->required()
+            ->type_name("SET2.dtr");
+        command
+            .add_option(
+                "--max-loss-db", prune.max_loss_db,
+                "How much worse pictures may get, PSNR in dB, mean over places that decided "
+                "nothing [0.1]")
+            ->check(CLI::Range(0.0, 20.0))
+            ->type_name("L");
+        command.add_option("--probes", prune.probes, "Novel cameras that decide [12]")
+            ->check(CLI::Range(1, 1000))
+            ->type_name("N");
+        command.add_option("--checks", prune.checks, "Other novel cameras, that check [8]")
+            ->check(CLI::Range(1, 1000))
+            ->type_name("N");
+        command
+            .add_option("--probe-shrink", prune.probe_shrink,
+                        "Deciding pictures are 1/N of their size; checking ones are whole [2]")
+            ->check(CLI::Range(1, 16))
+            ->type_name("N");
+        command.add_flag("--force", options->prune.force, "Replace SET2 when it exists");
+        AddRendererOptions(command, options->renderer);
+        options->render = AddRenderOptions(command);
+        return [options, &command](const Context& context) {
+          UseStoredArguments(command, io::RenderArguments(io::ReadSet(options->prune.set)));
+          return RunPrune(*options, context);
+        };
+      });
+}
+
+}  // namespace dtr::cli

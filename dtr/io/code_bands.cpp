@@ -1,0 +1,310 @@
+#include "dtr/io/code_bands.h"
+
+#include <zstd.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstring>
+#include <memory>
+#include <vector>
+
+#include "dtr/base/error.h"
+#include "dtr/base/parallel_for.h"
+
+namespace dtr::io {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "bytes are copied as they lie in memory");
+
+using Bytes = std::vector<std::uint8_t>;
+
+constexpr char kMagic[9] = "DTRBAND1";
+constexpr size_t kHeaderBytes = 8 + 3 * 4;
+// Enough pixels for the entropy coder's tables to pay, few enough that photos have several bands.
+constexpr int kRowsPerBand = 128;
+constexpr int kMostRowsPerBand = 1 << 16;
+constexpr int kLevel = 19;           // written once, read often; decoding is no slower for it
+constexpr std::uint8_t kWide = 255;  // the residual's 16 bits stand among the wide ones
+
+/// What a band is stored as, each a zstd frame with checksum, or nothing where empty.
+struct Parts {
+  Bytes validity;   ///< a bit a pixel, rows padded to bytes, each row XOR the one above
+  Bytes residuals;  ///< a byte for each pixel that is no hole
+  Bytes wide;       ///< u16 for each residual kWide
+};
+constexpr size_t kParts = 3;
+using PartSizes = std::array<std::uint32_t, kParts>;
+
+struct BandRange {
+  int first_row = 0, rows = 0;
+};
+
+[[noreturn]] void Fail(const std::string& expected, const std::string& found) {
+  throw Error("coded depth: expected " + expected + ", found " + found +
+              "; the file is damaged or cut short");
+}
+
+size_t RowBytes(int width_px) { return (static_cast<size_t>(width_px) + 7) / 8; }
+
+/// MED of JPEG-LS (Weinberger, Seroussi, Sapiro, IEEE TIP 2000, eq. 1), as the median of three.
+int Predict(int left, int above, int above_left) {
+  const int low = std::min(left, above), high = std::max(left, above);
+  return std::max(low, std::min(high, left + above - above_left));
+}
+
+/// 0, -1, 1, -2, ... as 0, 1, 2, 3, ...; differences are taken modulo 2^16.
+std::uint16_t Folded(int difference) {
+  const auto d = static_cast<std::int16_t>(difference);
+  return static_cast<std::uint16_t>((d << 1) ^ (d >> 15));
+}
+int Unfolded(unsigned folded) {
+  return static_cast<int>(folded >> 1) ^ -static_cast<int>(folded & 1);
+}
+
+/// The rows that predictions are made from. A hole is taken for what was predicted there, so that
+/// surfaces go on behind it.
+class Surface {
+ public:
+  explicit Surface(int width_px) : row_(static_cast<size_t>(width_px) + 1, 0) {}
+  /// Start of a row: what lies beyond its left end is what lies above that.
+  void BeginRow(bool first) {
+    first_ = first;
+    above_left_ = left_ = first ? 0 : row_[1];
+  }
+  int Prediction(int x) const {
+    const int above = first_ ? left_ : row_[static_cast<size_t>(x) + 1];
+    return first_ ? left_ : Predict(left_, above, above_left_);
+  }
+  void Put(int x, int value) {
+    int& cell = row_[static_cast<size_t>(x) + 1];
+    above_left_ = cell;
+    cell = left_ = value;
+  }
+
+ private:
+  std::vector<int> row_;  ///< of the row above from x on, of this one before; [0] is not used
+  int left_ = 0, above_left_ = 0;
+  bool first_ = true;
+};
+
+Parts Split(const Grid<std::uint16_t>& codes, const BandRange& band) {
+  const int width = codes.width();
+  const size_t row_bytes = RowBytes(width);
+  Parts parts;
+  parts.validity.assign(row_bytes * static_cast<size_t>(band.rows), 0);
+  Surface surface(width);
+  for (int j = 0; j < band.rows; ++j) {
+    const std::uint16_t* row = codes.row(band.first_row + j);
+    std::uint8_t* bits = &parts.validity[row_bytes * static_cast<size_t>(j)];
+    surface.BeginRow(j == 0);
+    for (int x = 0; x < width; ++x) {
+      const int predicted = surface.Prediction(x);
+      if (row[x] == 0) {
+        surface.Put(x, predicted);
+        continue;
+      }
+      surface.Put(x, row[x]);
+      bits[x / 8] = static_cast<std::uint8_t>(bits[x / 8] | 1 << (x % 8));
+      const std::uint16_t folded = Folded(row[x] - predicted);
+      parts.residuals.push_back(static_cast<std::uint8_t>(std::min<int>(folded, kWide)));
+      if (folded < kWide) continue;
+      parts.wide.push_back(static_cast<std::uint8_t>(folded & 255));
+      parts.wide.push_back(static_cast<std::uint8_t>(folded >> 8));
+    }
+  }
+  for (size_t i = parts.validity.size(); i-- > row_bytes;) {
+    parts.validity[i] =
+        static_cast<std::uint8_t>(parts.validity[i] ^ parts.validity[i - row_bytes]);
+  }
+  return parts;
+}
+
+std::string Compressed(const Bytes& part) {
+  if (part.empty()) return "";
+  const std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)> context(ZSTD_createCCtx(),
+                                                                     &ZSTD_freeCCtx);
+  if (!context) throw std::bad_alloc();
+  ZSTD_CCtx_setParameter(context.get(), ZSTD_c_compressionLevel, kLevel);
+  ZSTD_CCtx_setParameter(context.get(), ZSTD_c_checksumFlag, 1);
+  std::string out(ZSTD_compressBound(part.size()), '\0');
+  const size_t size =
+      ZSTD_compress2(context.get(), out.data(), out.size(), part.data(), part.size());
+  if (ZSTD_isError(size)) throw Error(std::string("zstd: ") + ZSTD_getErrorName(size));
+  out.resize(size);
+  return out;
+}
+
+/// Exactly `size` bytes out of exactly the bytes given.
+Bytes Decompressed(std::string_view frame, size_t size) {
+  if (size == 0) {
+    if (!frame.empty()) Fail("no bytes for an empty part", std::to_string(frame.size()));
+    return {};
+  }
+  const auto told = ZSTD_getFrameContentSize(frame.data(), frame.size());
+  if (told != size) Fail("a part of " + std::to_string(size) + " bytes", "another");
+  if (ZSTD_findFrameCompressedSize(frame.data(), frame.size()) != frame.size()) {
+    Fail("one zstd frame", "part of one, or more");
+  }
+  Bytes bytes(size);
+  const size_t got = ZSTD_decompress(bytes.data(), size, frame.data(), frame.size());
+  if (ZSTD_isError(got)) Fail("a zstd frame", ZSTD_getErrorName(got));
+  if (got != size) Fail(std::to_string(size) + " bytes", std::to_string(got));
+  return bytes;
+}
+
+size_t CountValid(Bytes& validity, int width_px) {
+  const size_t row_bytes = RowBytes(width_px);
+  for (size_t i = row_bytes; i < validity.size(); ++i) {
+    validity[i] = static_cast<std::uint8_t>(validity[i] ^ validity[i - row_bytes]);
+  }
+  const int used_bits = (width_px - 1) % 8 + 1;
+  const int padding = 255 & ~((1 << used_bits) - 1);
+  size_t valid = 0;
+  for (size_t i = 0; i < validity.size(); ++i) {
+    if ((i + 1) % row_bytes == 0 && (validity[i] & padding) != 0) Fail("0 beyond a row", "1");
+    valid += static_cast<size_t>(std::popcount(validity[i]));
+  }
+  return valid;
+}
+
+Parts DecompressedParts(std::string_view bytes, const PartSizes& sizes, int width_px, int rows) {
+  const auto frame = [&](size_t part) {
+    size_t begin = 0;
+    for (size_t i = 0; i < part; ++i) begin += sizes[i];
+    return bytes.substr(begin, sizes[part]);
+  };
+  Parts parts;
+  parts.validity = Decompressed(frame(0), RowBytes(width_px) * static_cast<size_t>(rows));
+  parts.residuals = Decompressed(frame(1), CountValid(parts.validity, width_px));
+  const auto wide = std::count(parts.residuals.begin(), parts.residuals.end(), kWide);
+  parts.wide = Decompressed(frame(2), 2 * static_cast<size_t>(wide));
+  return parts;
+}
+
+/// `parts` are consistent with each other: DecompressedParts saw to it.
+void Join(const Parts& parts, const BandRange& band, Grid<std::uint16_t>& codes) {
+  const int width = codes.width();
+  const size_t row_bytes = RowBytes(width);
+  const std::uint8_t* residual = parts.residuals.data();
+  const std::uint8_t* wide = parts.wide.data();
+  bool zero = false;
+  Surface surface(width);
+  for (int j = 0; j < band.rows; ++j) {
+    std::uint16_t* row = codes.row(band.first_row + j);
+    const std::uint8_t* bits = &parts.validity[row_bytes * static_cast<size_t>(j)];
+    surface.BeginRow(j == 0);
+    for (int x = 0; x < width; ++x) {
+      const int predicted = surface.Prediction(x);
+      if ((bits[x / 8] >> (x % 8) & 1) == 0) {
+        surface.Put(x, predicted);
+        continue;
+      }
+      unsigned folded = *residual++;
+      if (folded == kWide) {
+        folded = wide[0] | static_cast<unsigned>(wide[1]) << 8;
+        wide += 2;
+      }
+      const auto code = static_cast<std::uint16_t>(predicted + Unfolded(folded));
+      zero |= code == 0;
+      row[x] = code;
+      surface.Put(x, code);
+    }
+  }
+  if (zero) Fail("codes of at least 1 where there is depth", "0");
+}
+
+template <typename T>
+void Append(std::string& out, T value) {
+  out.append(reinterpret_cast<const char*>(&value), sizeof(T));
+}
+
+std::uint32_t U32At(std::string_view bytes, size_t at) {
+  std::uint32_t value;
+  std::memcpy(&value, bytes.data() + at, sizeof value);
+  return value;
+}
+
+int BandsOf(int height_px, int rows_per_band) {
+  return (height_px + rows_per_band - 1) / rows_per_band;
+}
+
+BandRange RangeOfBand(int band, int rows_per_band, int height_px) {
+  const int first = band * rows_per_band;
+  return {first, std::min(rows_per_band, height_px - first)};
+}
+
+}  // namespace
+
+std::string EncodeBands(const Grid<std::uint16_t>& codes, int threads) {
+  if (codes.empty() || codes.channels() != 1) {
+    throw Error("coded depth: expected one channel of 16 bits to write");
+  }
+  const int bands = BandsOf(codes.height(), kRowsPerBand);
+  std::vector<std::array<std::string, kParts>> frames(static_cast<size_t>(bands));
+  ParallelFor(0, bands, threads, [&](int band) {
+    const Parts parts = Split(codes, RangeOfBand(band, kRowsPerBand, codes.height()));
+    frames[static_cast<size_t>(band)] = {Compressed(parts.validity), Compressed(parts.residuals),
+                                         Compressed(parts.wide)};
+  });
+  std::string out(kMagic, 8);
+  for (const int number : {codes.width(), codes.height(), kRowsPerBand}) {
+    Append(out, static_cast<std::uint32_t>(number));
+  }
+  for (const auto& band : frames) {
+    for (const std::string& frame : band) Append(out, static_cast<std::uint32_t>(frame.size()));
+  }
+  for (const auto& band : frames) {
+    for (const std::string& frame : band) out += frame;
+  }
+  return out;
+}
+
+Grid<std::uint16_t> DecodeBands(std::string_view bytes, int width_px, int height_px, int threads) {
+  if (bytes.size() < kHeaderBytes || bytes.substr(0, 8) != std::string_view(kMagic, 8)) {
+    Fail("the magic DTRBAND1 and a header", "another beginning");
+  }
+  const std::uint32_t width = U32At(bytes, 8), height = U32At(bytes, 12), rows = U32At(bytes, 16);
+  if (width != static_cast<std::uint32_t>(width_px) ||
+      height != static_cast<std::uint32_t>(height_px)) {
+    Fail(std::to_string(width_px) + "x" + std::to_string(height_px) + " pixels",
+         std::to_string(width) + "x" + std::to_string(height));
+  }
+  if (rows == 0 || rows > kMostRowsPerBand) {
+    Fail("1 to 65536 rows a band", std::to_string(rows));
+  }
+  const int rows_per_band = static_cast<int>(rows);
+  const int bands = BandsOf(height_px, rows_per_band);
+  const size_t table_bytes = static_cast<size_t>(bands) * sizeof(PartSizes);
+  if (bytes.size() - kHeaderBytes < table_bytes) {
+    Fail("the sizes of " + std::to_string(bands) + " bands", "the end");
+  }
+  std::vector<PartSizes> sizes(static_cast<size_t>(bands));
+  std::memcpy(sizes.data(), bytes.data() + kHeaderBytes, table_bytes);
+  std::vector<size_t> begins;
+  size_t end = kHeaderBytes + table_bytes;
+  for (const PartSizes& band : sizes) {
+    begins.push_back(end);
+    for (const std::uint32_t size : band) end += size;
+  }
+  if (end != bytes.size()) {
+    Fail(std::to_string(end) + " bytes", std::to_string(bytes.size()));
+  }
+  Grid<std::uint16_t> codes(width_px, height_px);
+  ParallelFor(0, bands, threads, [&](int band) {
+    const auto i = static_cast<size_t>(band);
+    const BandRange range = RangeOfBand(band, rows_per_band, height_px);
+    Join(DecompressedParts(bytes.substr(begins[i]), sizes[i], width_px, range.rows), range, codes);
+  });
+  return codes;
+}
+
+std::uint64_t MostBandBytes(int width_px, int height_px) {
+  // Bands of one row at worst; 64 bytes are more than zstd adds to what does not compress at all.
+  constexpr std::uint64_t kFrameBytes = 64;
+  const auto pixels = static_cast<std::uint64_t>(width_px) * static_cast<std::uint64_t>(height_px);
+  return kHeaderBytes + 4 * pixels + pixels / 64 +
+         static_cast<std::uint64_t>(height_px) * (sizeof(PartSizes) + kParts * kFrameBytes);
+}
+
+}  // namespace dtr::io

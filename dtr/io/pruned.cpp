@@ -1,0 +1,95 @@
+#include "dtr/io/pruned.h"
+
+#include <sstream>
+
+#include "dtr/base/error.h"
+#include "dtr/io/json_fields.h"
+
+namespace dtr::io {
+namespace {
+
+constexpr char kPruned[] = "pruned";
+constexpr char kWhere[] = "set.json: pruned";
+
+Json ExtraOf(const DtrSet& set) {
+  return set.extra_json.empty() ? Json::object() : ParseJson(set.extra_json, kWhere);
+}
+
+/// A number of an object, if it has one of that name.
+std::optional<double> NumberAt(const Json& object, const char* key) {
+  const auto found = object.find(key);
+  if (found == object.end() || !found->is_number()) return std::nullopt;
+  return found->get<double>();
+}
+
+std::string TextAt(const Json& object, const char* key) {
+  const auto found = object.find(key);
+  return found != object.end() && found->is_string() ? found->get<std::string>() : "?";
+}
+
+}  // namespace
+
+std::string PrunedJson(const DtrSet& set) {
+  const Json extra = ExtraOf(set);
+  const auto found = extra.find(kPruned);
+  if (found == extra.end()) return "";
+  if (!found->is_object()) {
+    throw Error(std::string(kWhere) + ": expected an object, found " + found->dump());
+  }
+  return found->dump();
+}
+
+void SetPrunedJson(DtrSet& set, const std::string& json) {
+  Json extra = ExtraOf(set);
+  extra[kPruned] = ParseJson(json, kWhere);
+  set.extra_json = extra.dump();
+}
+
+std::vector<std::string> RenderArguments(const DtrSet& set) {
+  const std::string text = PrunedJson(set);
+  if (text.empty()) return {};
+  const Json pruned = ParseJson(text, kWhere);
+  const auto found = pruned.find("render_arguments");
+  if (found == pruned.end()) return {};
+  std::vector<std::string> arguments;
+  for (const Json& argument : found->is_array() ? *found : Json::array({nullptr})) {
+    if (!argument.is_string()) {
+      throw Error(std::string(kWhere) + ".render_arguments: expected a list of strings, found " +
+                  found->dump());
+    }
+    arguments.push_back(argument.get<std::string>());
+  }
+  return arguments;
+}
+
+std::string DescribePruned(const DtrSet& set) {
+  const std::string text = PrunedJson(set);
+  if (text.empty()) return "";
+  const Json pruned = ParseJson(text, kWhere);
+  std::ostringstream out;
+  out.precision(3);
+  const auto loss_db = NumberAt(pruned, "loss_db"), most_db = NumberAt(pruned, "max_loss_db");
+  out << "left out by dtr prune";
+  if (loss_db && most_db) out << ", " << *loss_db << " dB lost of " << *most_db << " allowed";
+  out << ":\n";
+  const auto removed = pruned.find("removed");
+  const bool listed = removed != pruned.end() && removed->is_array();
+  for (const Json& removal : listed ? *removed : Json::array()) {
+    if (!removal.is_object()) continue;  // of another tool: no reason to refuse the set
+    out << "  " << TextAt(removal, "kind") << ": " << TextAt(removal, "what");
+    if (const auto loss = NumberAt(removal, "loss_db")) out << ", " << *loss << " dB";
+    if (const auto bytes = NumberAt(removal, "bytes_share")) {
+      out << ", " << 100 * *bytes << " % of the bytes";
+    }
+    if (const auto frame = NumberAt(removal, "frame_share"); frame && *frame > 0) {
+      out << ", " << 100 * *frame << " % of a frame's work";
+    }
+    out << "\n";
+  }
+  std::string arguments;
+  for (const std::string& argument : RenderArguments(set)) arguments += " " + argument;
+  out << "drawn by default with:" << (arguments.empty() ? " the usual options" : arguments) << "\n";
+  return out.str();
+}
+
+}  // namespace dtr::io

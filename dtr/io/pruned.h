@@ -1,0 +1,23 @@
+// dtr/io/pruned.h -- what set.json says about what was left out of a set (docs/FORMAT.md, 2.1).
+#pragma once
+#include <string>
+#include <vector>
+
+#include "dtr/types/dtr_set.h"
+
+namespace dtr::io {
+
+/// The object `pruned` of the set as JSON text; "" for a set that nothing was left out of. Throws
+/// Error where it is no object.
+std::string PrunedJson(const DtrSet& set);
+/// Puts it there, in the place of one before.
+void SetPrunedJson(DtrSet& set, const std::string& json);
+
+/// `pruned.render_arguments`: the options of `dtr render` that the set was pruned for, which are
+/// its defaults. Empty where there are none; throws Error where they are no list of strings.
+std::vector<std::string> RenderArguments(const DtrSet& set);
+
+/// For people: what was left out and why, a line each; "" for a set that nothing was left out of.
+std::string DescribePruned(const DtrSet& set);
+
+}  // namespace dtr::io

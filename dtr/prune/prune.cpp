@@ -1,0 +1,455 @@
+#include "dtr/prune/prune.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <sstream>
+
+#include "dtr/base/error.h"
+#include "dtr/prune/probes.h"
+
+namespace dtr::prune {
+namespace {
+
+// Half-size pictures from few places decide, others check: a decided loss this much smaller than
+// the budget mostly holds at once.
+constexpr double kDecidingShare = 0.85;
+// Differences of a loss below this are chance; without a floor, what costs nothing would divide by
+// 0.
+constexpr double kSmallestLossDb = 1e-3;
+constexpr size_t kFewestViews = 2;
+constexpr int kLossPhotos = 6;  // without held-out photos: source views left out in turn
+
+enum class Kind { kView, kViewsUsed, kImages, kDepth, kSize, kMesh };
+constexpr std::array kLevelled = {Kind::kViewsUsed, Kind::kImages, Kind::kDepth, Kind::kSize,
+                                  Kind::kMesh};
+
+const char* NameOf(Kind kind) {
+  switch (kind) {
+    case Kind::kView:
+      return "view";
+    case Kind::kViewsUsed:
+      return "views-used";
+    case Kind::kImages:
+      return "images";
+    case Kind::kDepth:
+      return "depth";
+    case Kind::kSize:
+      return "size";
+    case Kind::kMesh:
+      break;
+  }
+  return "mesh";
+}
+
+/// Steps of each kind, dearest first.
+std::vector<double> LevelsOf(Kind kind) {
+  switch (kind) {
+    case Kind::kViewsUsed:
+      return {8, 6, 5, 4, 3, 2, 1};
+    case Kind::kImages:
+      return {95, 90, 85, 80, 70, 60, 45};
+    case Kind::kDepth:
+      return {0.125, 0.25, 0.5, 1};
+    case Kind::kSize:
+      return {2};
+    case Kind::kMesh:
+      return {1, 2, 4};
+    case Kind::kView:
+      break;
+  }
+  return {};
+}
+
+struct Move {
+  Kind kind = Kind::kView;
+  std::string view;  ///< its id
+  double level = 0;
+};
+
+/// The setting after a move; nothing where it changes nothing or goes back.
+std::optional<Setting> After(Setting setting, const Move& move) {
+  Coding& coding = setting.coding;
+  const auto lower = [&](auto& value) {
+    const auto level = static_cast<std::remove_reference_t<decltype(value)>>(move.level);
+    if (value != 0 && level >= value) return false;
+    value = level;
+    return true;
+  };
+  const auto raise = [&](auto& value) {
+    const auto level = static_cast<std::remove_reference_t<decltype(value)>>(move.level);
+    if (level <= value) return false;
+    value = level;
+    return true;
+  };
+  bool changed = false;
+  switch (move.kind) {
+    case Kind::kView:
+      setting.without.push_back(move.view);
+      changed = true;
+      break;
+    case Kind::kViewsUsed:
+      changed = lower(setting.render.views);
+      break;
+    case Kind::kImages:
+      changed = lower(coding.jpeg_quality);
+      break;
+    case Kind::kDepth:
+      changed = raise(coding.depth_error_px);
+      break;
+    case Kind::kSize:
+      changed = raise(coding.shrink);
+      break;
+    case Kind::kMesh:
+      changed = raise(coding.mesh_tolerance_px);
+      setting.render.mesh_tolerance_px = coding.mesh_tolerance_px;
+      break;
+  }
+  return changed ? std::optional(setting) : std::nullopt;
+}
+
+struct Measured {
+  double loss_db = 0;
+  double bytes = 0;
+  double frame = 0;  ///< views that a pixel looks at: what its time is proportional to
+};
+
+struct Candidate {
+  Move move;
+  Setting after;
+  Measured measured;
+  int round = -1;    ///< when that was measured
+  double worth = 0;  ///< saving per dB
+};
+
+class Pruner {
+ public:
+  Pruner(const DtrSet& set, const PruneOptions& options, const CodeFunction& code,
+         const RendererMaker& make_renderer, Progress& progress)
+      : set_(set), options_(options), code_(code), make_(make_renderer), progress_(progress) {}
+
+  PruneReport Run() {
+    Probes probes = DrawProbes(set_, options_.probes, options_.checks, options_.seed);
+    deciding_ = Shrunk(std::move(probes.deciding), options_.probe_shrink);
+    checking_ = std::move(probes.checking);
+    Begin();
+    while (DecideOne()) {
+    }
+    return Checked();
+  }
+
+ private:
+  using Coded = std::shared_ptr<const CodedSet>;
+
+  const eval::RenderFunction& RendererFor(const Coded& coded) {
+    if (drawn_ != coded || !render_) {
+      render_ = nullptr;  // before the next: it owns the current context
+      drawn_ = coded;     // holds what the renderer points into
+      render_ = make_();
+    }
+    return render_;
+  }
+
+  /// The current setting's set, or one coded for a trial; the last trial is kept.
+  Coded CodedAs(const Coding& coding) {
+    if (current_ && coding == current_coding_) return current_;
+    if (!trial_ || coding != trial_coding_) {
+      progress_.ThrowIfInterrupted();
+      if (drawn_ == trial_) {
+        render_ = nullptr;
+        drawn_ = nullptr;
+      }
+      trial_ = nullptr;  // first: two trials at once would be three sets in memory
+      trial_ = std::make_shared<const CodedSet>(code_(coding));
+      trial_coding_ = coding;
+    }
+    return trial_;
+  }
+
+  void Begin() {
+    Setting setting{{}, Coding{}, options_.render};
+    setting.coding.mesh_tolerance_px = options_.render.mesh_tolerance_px;
+    current_ = CodedAs(setting.coding);
+    current_coding_ = setting.coding;
+    trial_ = nullptr;
+    const auto& render = RendererFor(current_);
+    progress_.Stage("reference pictures", 4);
+    deciding_error_ = ErrorAgainstPhotos(current_->set, setting.render, options_.probe_shrink,
+                                         kLossPhotos, render);
+    progress_.Update(1);
+    checking_error_ = ErrorAgainstPhotos(current_->set, setting.render, 1, kLossPhotos, render);
+    progress_.Update(2);
+    deciding_before_ = Pictures(current_->set, {}, deciding_, setting.render, render);
+    progress_.Update(3);
+    checking_before_ = Pictures(current_->set, {}, checking_, setting.render, render);
+    psnr_before_ = PhotoPsnr(current_->set, {}, setting.render, render);
+    progress_.Update(4);
+    now_ = {0, BytesOf(setting, *current_), FrameOf(setting)};
+    history_.push_back(setting);
+    LeaveOutSigma();
+    for (const Kind kind : kLevelled) AddNext(kind, 0);
+    for (const View& view : set_.frames.front().views) {
+      if (view.role != ViewRole::kSource) continue;
+      candidates_.push_back({{Kind::kView, view.id, 0}, {}, {}, -1, 0});
+    }
+    progress_.Stage("measuring what could be left out", static_cast<int>(candidates_.size()));
+    for (size_t i = 0; i < candidates_.size(); ++i) {
+      Measure(candidates_[i]);
+      progress_.Update(static_cast<int>(i) + 1);
+    }
+  }
+
+  /// No renderer looks at standard deviations: nothing to measure.
+  void LeaveOutSigma() {
+    const auto& views = set_.frames.front().views;
+    if (std::none_of(views.begin(), views.end(), [](const View& v) { return v.sigma_file; })) {
+      return;
+    }
+    Setting after = history_.back();
+    after.coding.sigma = false;
+    const Coded coded = CodedAs(after.coding);
+    Candidate sigma;
+    sigma.after = after;
+    sigma.measured = {0, BytesOf(after, *coded), FrameOf(after)};
+    Take(sigma, "sigma", "of every depth");
+  }
+
+  double BytesOf(const Setting& setting, const CodedSet& coded) const {
+    double bytes = 0;
+    const auto& views = coded.set.frames.front().views;
+    for (size_t i = 0; i < views.size(); ++i) {
+      const auto& without = setting.without;
+      if (std::find(without.begin(), without.end(), views[i].id) != without.end()) continue;
+      bytes += static_cast<double>(coded.bytes[i]);
+    }
+    return std::max(bytes, 1.0);
+  }
+
+  size_t SourcesLeft(const Setting& setting) const {
+    const auto& views = set_.frames.front().views;
+    const auto sources = std::count_if(views.begin(), views.end(), [](const View& view) {
+      return view.role == ViewRole::kSource;
+    });
+    return static_cast<size_t>(sources) - setting.without.size();
+  }
+
+  /// The deferred method's frames take time in proportion to the views that a pixel looks at
+  /// (docs/ACCURACY.md): times themselves would make decisions depend on the machine.
+  double FrameOf(const Setting& setting) const {
+    return static_cast<double>(
+        std::min(static_cast<size_t>(setting.render.views), SourcesLeft(setting)));
+  }
+
+  Measured MeasuredOf(const Setting& setting) {
+    const Coded coded = CodedAs(setting.coding);
+    const auto pictures =
+        Pictures(coded->set, setting.without, deciding_, setting.render, RendererFor(coded));
+    return {LossDb(deciding_before_, pictures, deciding_error_), BytesOf(setting, *coded),
+            FrameOf(setting)};
+  }
+
+  void Measure(Candidate& candidate) {
+    progress_.ThrowIfInterrupted();
+    candidate.round = round_;
+    const auto after = After(history_.back(), candidate.move);
+    candidate.worth = -std::numeric_limits<double>::infinity();
+    candidate.measured.loss_db = std::numeric_limits<double>::infinity();
+    if (!after || SourcesLeft(*after) < kFewestViews) return;
+    candidate.after = *after;
+    candidate.measured = MeasuredOf(*after);
+    const double saving = std::log(now_.bytes / candidate.measured.bytes) +
+                          std::log(now_.frame / candidate.measured.frame);
+    candidate.worth = saving / std::max(candidate.measured.loss_db - now_.loss_db, kSmallestLossDb);
+  }
+
+  /// The first level of a kind, from index `from` on, that changes the current setting.
+  bool AddNext(Kind kind, size_t from) {
+    const std::vector<double> levels = LevelsOf(kind);
+    for (size_t i = from; i < levels.size(); ++i) {
+      const Move move{kind, "", levels[i]};
+      if (kind == Kind::kSize && !CanShrink(set_, static_cast<int>(levels[i]))) continue;
+      if (!After(history_.back(), move)) continue;
+      candidates_.push_back({move, {}, {}, -1, 0});
+      return true;
+    }
+    return false;
+  }
+
+  size_t LevelAfter(const Move& move) const {
+    const std::vector<double> levels = LevelsOf(move.kind);
+    return static_cast<size_t>(std::find(levels.begin(), levels.end(), move.level) -
+                               levels.begin()) +
+           1;
+  }
+
+  /// Takes the best that fits; false when nothing is left that does.
+  bool DecideOne() {
+    while (!candidates_.empty()) {
+      const auto best = std::max_element(
+          candidates_.begin(), candidates_.end(),
+          [](const Candidate& a, const Candidate& b) { return a.worth < b.worth; });
+      if (best->round != round_) {
+        Measure(*best);
+        continue;
+      }
+      const Candidate candidate = *best;
+      candidates_.erase(best);
+      const bool levelled = candidate.move.kind != Kind::kView;
+      if (!(candidate.worth > 0)) {
+        // A step that saves nothing (images are JPEG already): perhaps the next one does.
+        if (levelled && std::isfinite(candidate.measured.loss_db) &&
+            AddNext(candidate.move.kind, LevelAfter(candidate.move))) {
+          Measure(candidates_.back());
+        }
+        continue;
+      }
+      if (candidate.measured.loss_db > kDecidingShare * options_.max_loss_db) continue;
+      Take(candidate, NameOf(candidate.move.kind), WordsFor(candidate));
+      if (levelled && AddNext(candidate.move.kind, LevelAfter(candidate.move))) {
+        Measure(candidates_.back());
+      }
+      return true;
+    }
+    return false;
+  }
+
+  std::string WordsFor(const Candidate& candidate) const {
+    std::ostringstream words;
+    switch (candidate.move.kind) {
+      case Kind::kView:
+        for (const View& view : set_.frames.front().views) {
+          if (view.id == candidate.move.view) words << view.name;
+        }
+        break;
+      case Kind::kViewsUsed:
+        words << "at most " << candidate.move.level << " views a pixel";
+        break;
+      case Kind::kImages:
+        words << "JPEG quality " << candidate.move.level;
+        break;
+      case Kind::kDepth:
+        words << "within " << candidate.move.level << " px of disparity";
+        break;
+      case Kind::kSize:
+        words << "images and depth at 1/" << candidate.move.level << " of their size";
+        break;
+      case Kind::kMesh:
+        words << "tolerance " << candidate.move.level << " px";
+        break;
+    }
+    return words.str();
+  }
+
+  void Take(const Candidate& candidate, const std::string& kind, const std::string& what) {
+    const Measured& after = candidate.measured;
+    report_.removed.push_back({kind, what, after.loss_db - now_.loss_db,
+                               1 - after.bytes / now_.bytes, 1 - after.frame / now_.frame});
+    if (candidate.after.coding != current_coding_) {
+      current_ = CodedAs(candidate.after.coding);
+      current_coding_ = candidate.after.coding;
+      trial_ = nullptr;
+    }
+    history_.push_back(candidate.after);
+    now_ = after;
+    losses_.push_back(after.loss_db);
+    ++round_;
+    std::ostringstream line;
+    line.precision(3);
+    line << "left out: " << kind << ", " << what << ": " << after.loss_db << " dB so far, "
+         << 100 * report_.removed.back().bytes_share << " % of the bytes";
+    progress_.Note(line.str());
+  }
+
+  struct Check {
+    double probe_loss_db = 0;
+    std::optional<double> photo_loss_db;
+    bool Holds(double most) const {
+      return probe_loss_db <= most && photo_loss_db.value_or(0) <= most;
+    }
+  };
+
+  Check CheckOf(const Setting& setting) {
+    progress_.ThrowIfInterrupted();
+    const Coded coded = CodedAs(setting.coding);
+    const auto& render = RendererFor(coded);
+    Check check;
+    check.probe_loss_db = LossDb(
+        checking_before_, Pictures(coded->set, setting.without, checking_, setting.render, render),
+        checking_error_);
+    const auto psnr_after = PhotoPsnr(coded->set, setting.without, setting.render, render);
+    if (psnr_after.empty()) return check;
+    double sum_db = 0;
+    for (size_t i = 0; i < psnr_after.size(); ++i) sum_db += psnr_before_[i] - psnr_after[i];
+    check.photo_loss_db = sum_db / static_cast<double>(psnr_after.size());
+    return check;
+  }
+
+  /// The longest run of decisions that the check bears out, by halving: losses grow with decisions.
+  PruneReport Checked() {
+    progress_.Stage("checking from other places", 0);
+    size_t holds = 0, fails = history_.size();
+    Check check_of_holding;
+    for (size_t next = history_.size() - 1; holds < next; next = (holds + fails) / 2) {
+      const Check check = CheckOf(history_[next]);
+      std::ostringstream line;
+      line.precision(3);
+      line << "checked: " << next << " decisions cost " << check.probe_loss_db << " dB";
+      if (check.photo_loss_db) line << ", " << *check.photo_loss_db << " dB on held-out photos";
+      progress_.Note(line.str());
+      if (check.Holds(options_.max_loss_db)) {
+        holds = next;
+        check_of_holding = check;
+      } else {
+        fails = next;
+      }
+    }
+    const auto first_back = report_.removed.begin() + static_cast<std::ptrdiff_t>(holds);
+    report_.put_back.assign(first_back, report_.removed.end());
+    report_.removed.erase(first_back, report_.removed.end());
+    report_.setting = history_[holds];
+    report_.decided_loss_db = holds == 0 ? 0 : losses_[holds - 1];
+    report_.checked_probe_loss_db = check_of_holding.probe_loss_db;
+    report_.photo_loss_db = check_of_holding.photo_loss_db;
+    if (holds == 0 && !psnr_before_.empty()) report_.photo_loss_db = 0;
+    report_.error_db = 10 * std::log10(255 * 255 / checking_error_);
+    render_ = nullptr;
+    return report_;
+  }
+
+  const DtrSet& set_;
+  const PruneOptions& options_;
+  const CodeFunction& code_;
+  const RendererMaker& make_;
+  Progress& progress_;
+
+  std::vector<NovelCamera> deciding_, checking_;
+  std::vector<ImageRgb8> deciding_before_, checking_before_;
+  std::vector<double> psnr_before_;
+  double deciding_error_ = 1, checking_error_ = 1;
+
+  Coded current_, trial_, drawn_;
+  Coding current_coding_, trial_coding_;
+  eval::RenderFunction render_;
+
+  std::vector<Candidate> candidates_;
+  std::vector<Setting> history_;  ///< [n]: after n decisions
+  std::vector<double> losses_;    ///< [n]: after n + 1 decisions
+  Measured now_;
+  int round_ = 0;
+  PruneReport report_;
+};
+
+}  // namespace
+
+PruneReport Prune(const DtrSet& set, const PruneOptions& options, const CodeFunction& code,
+                  const RendererMaker& make_renderer, Progress& progress) {
+  if (!(options.max_loss_db >= 0) || options.probes < 1 || options.checks < 1 ||
+      options.probe_shrink < 1) {
+    throw UsageError("pruning: expected a loss of at least 0 dB and at least one probe and check");
+  }
+  return Pruner(set, options, code, make_renderer, progress).Run();
+}
+
+}  // namespace dtr::prune

@@ -1,0 +1,222 @@
+// Decisions on small exact scenes where it is known what is needed.
+#include "dtr/prune/prune.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "dtr/base/error.h"
+#include "dtr/cpu/renderer.h"
+#include "dtr/prune/probes.h"
+#include "dtr/render/scene.h"
+#include "tests/support/analytic_scene.h"
+
+namespace dtr::prune {
+namespace {
+
+using ::testing::Contains;
+using ::testing::IsEmpty;
+using ::testing::Not;
+
+constexpr int kViews = 6;
+
+/// Cameras in a row before a slanted plane and a sphere; every view sees nearly everything.
+DtrSet Row(int views = kViews) {
+  const auto surface =
+      testing::Union(testing::Plane({0, 0, -1}, -6), testing::Sphere({0, 0, 4.5}, 0.7));
+  DtrSet set;
+  set.scene_center = {0, 0, 5};
+  set.frames.resize(1);
+  for (int i = 0; i < views; ++i) {
+    const double x = 0.25 * (i - 0.5 * (views - 1));
+    testing::Shot shot;
+    shot.id = std::string("view") + static_cast<char>('a' + i);
+    shot.cam_from_world = testing::LookAt({x, 0, 0}, {0, 0, 5});
+    View view = testing::Photograph(surface, shot);
+    view.reference_baseline = 0.4;
+    view.near_z = 3, view.far_z = 8;
+    view.image_file = StoredFile{"images/" + shot.id + ".png", "", 10000};
+    view.depth_file = StoredFile{"depth/" + shot.id + ".png", "", 6000};
+    set.frames[0].views.push_back(std::move(view));
+  }
+  return set;
+}
+
+/// Bytes by rule, pixels as bad as the coding says: JPEG adds a pattern of its own, depth errors
+/// move every depth. Counts how often it was asked.
+class FakeStore {
+ public:
+  explicit FakeStore(const DtrSet& set) : set_(set) {}
+  CodedSet operator()(const Coding& coding) {
+    ++calls;
+    CodedSet coded{set_, {}};
+    for (View& view : coded.set.frames[0].views) {
+      if (view.role != ViewRole::kSource) {
+        coded.bytes.push_back(0);
+        continue;
+      }
+      if (coding.shrink > 1) view = ShrunkView(view, coding.shrink);
+      std::uint64_t bytes = 6000;
+      if (coding.jpeg_quality > 0) {
+        bytes = 60 * static_cast<std::uint64_t>(coding.jpeg_quality);
+        const int amount = (100 - coding.jpeg_quality) / 2;
+        for (size_t i = 0; i < view.image.data().size(); i += 2) {
+          auto& value = view.image.data()[i];
+          value = static_cast<std::uint8_t>(std::min(255, value + amount));
+        }
+      }
+      if (coding.depth_error_px > 0) {
+        bytes += 1000;
+        const double error = coding.depth_error_px * ThresholdsOf(view, {}).pixel;
+        for (float& z : view.depth.grid().data()) {
+          if (!DepthImage::IsHole(z)) z = static_cast<float>(1 / (1.0 / z + error));
+        }
+      } else {
+        bytes += 6000;
+      }
+      if (coding.sigma && view.sigma_file) bytes += view.sigma_file->bytes;
+      coded.bytes.push_back(bytes / static_cast<std::uint64_t>(coding.shrink * coding.shrink));
+    }
+    return coded;
+  }
+  int calls = 0;
+
+ private:
+  const DtrSet& set_;
+};
+
+PruneOptions SmallOptions(double max_loss_db) {
+  PruneOptions options;
+  options.max_loss_db = max_loss_db;
+  options.probes = 4;
+  options.checks = 3;
+  return options;
+}
+
+PruneReport PruneWith(const DtrSet& set, const PruneOptions& options) {
+  FakeStore store(set);
+  SilentProgress progress;
+  return Prune(
+      set, options, std::ref(store), [] { return &cpu::Render; }, progress);
+}
+
+TEST(DrawProbes, LiesBetweenTwoCamerasAndDoesNotDependOnTheirOrder) {
+  DtrSet set = Row();
+  const Probes probes = DrawProbes(set, 6, 5, 7);
+  ASSERT_EQ(probes.deciding.size(), 6u);
+  ASSERT_EQ(probes.checking.size(), 5u);
+  for (const NovelCamera& novel : probes.deciding) {
+    const Eigen::Vector3d center = novel.cam_from_world.TargetOriginInSource();
+    EXPECT_NEAR(center.y(), 0, 1e-12);
+    EXPECT_LT(std::abs(center.x()), 0.25 * 0.5 * (kViews - 1));
+    for (const View& view : set.frames[0].views) {
+      EXPECT_GT((center - view.CenterInWorld()).norm(), 1e-3) << "no novel place";
+    }
+    for (const NovelCamera& other : probes.checking) {
+      EXPECT_NE(novel.cam_from_world.translation, other.cam_from_world.translation);
+    }
+  }
+  std::reverse(set.frames[0].views.begin(), set.frames[0].views.end());
+  const Probes again = DrawProbes(set, 6, 5, 7);
+  for (size_t i = 0; i < 6; ++i) {
+    EXPECT_EQ(again.deciding[i].cam_from_world.translation,
+              probes.deciding[i].cam_from_world.translation);
+  }
+  EXPECT_NE(DrawProbes(set, 6, 5, 8).deciding[0].cam_from_world.translation,
+            probes.deciding[0].cam_from_world.translation);
+  EXPECT_THROW(DrawProbes(Row(1), 1, 1, 0), Error);
+}
+
+TEST(LossDb, IsWhatTheErrorOnTopMakesOfThePsnr) {
+  const ImageRgb8 before(4, 4, 3, 100), after(4, 4, 3, 103);
+  const std::vector<ImageRgb8> a = {before, before}, b = {before, after};
+  EXPECT_EQ(LossDb(a, a, 9), 0);
+  // Of two pictures one has a squared difference of 9 on top of an error of 9: 3.01 dB.
+  EXPECT_NEAR(LossDb(a, b, 9), 0.5 * 10 * std::log10(2.0), 1e-12);
+}
+
+TEST(Prune, AllowedNoLossLeavesOutOnlyWhatNobodySees) {
+  DtrSet set = Row();
+  for (View& view : set.frames[0].views) view.sigma_file = StoredFile{"s", "", 5000};
+  PruneOptions options = SmallOptions(0);
+  const PruneReport report = PruneWith(set, options);
+  EXPECT_EQ(report.loss_db(), 0);
+  EXPECT_FALSE(report.setting.coding.sigma);
+  ASSERT_FALSE(report.removed.empty());
+  EXPECT_EQ(report.removed[0].kind, "sigma");
+  for (const Removal& removal : report.removed) {
+    EXPECT_EQ(removal.loss_db, 0) << removal.kind << " " << removal.what;
+  }
+  EXPECT_EQ(report.setting.coding.jpeg_quality, 0);
+  EXPECT_EQ(report.setting.coding.depth_error_px, 0);
+}
+
+TEST(Prune, KeepsItsPromiseAndSavesMoreWhereMoreIsAllowed) {
+  const DtrSet set = Row();
+  double saved_before = 0;
+  for (const double allowed_db : {0.1, 4.0}) {
+    const PruneReport report = PruneWith(set, SmallOptions(allowed_db));
+    EXPECT_LE(report.loss_db(), allowed_db);
+    EXPECT_FALSE(report.photo_loss_db);
+    double share = 1;
+    for (const Removal& removal : report.removed) share *= 1 - removal.bytes_share;
+    double frames = 1;
+    for (const Removal& removal : report.removed) frames *= 1 - removal.frame_share;
+    const double saved = -std::log(share * frames);
+    EXPECT_GE(saved, saved_before) << allowed_db;
+    saved_before = saved;
+  }
+  EXPECT_GT(saved_before, std::log(4.0));
+}
+
+TEST(Prune, ACopyOfAViewGoesForNothingAndTheOtherStays) {
+  DtrSet set = Row(4);
+  View copy = set.frames[0].views[1];
+  copy.id = copy.name = "copy";
+  set.frames[0].views.push_back(copy);
+  const PruneReport report = PruneWith(set, SmallOptions(0));
+  ASSERT_FALSE(report.removed.empty());
+  const std::string first = report.removed[0].what;
+  EXPECT_TRUE(first == "copy" || first == "viewb") << first;
+  EXPECT_EQ(report.setting.without.size(), 1u) << "all others are seen";
+  EXPECT_EQ(report.loss_db(), 0);
+}
+
+TEST(Prune, HeldOutPhotosJudgeButAreNeverLeftOut) {
+  DtrSet set = Row();
+  View& photo = set.frames[0].views[2];
+  photo.role = ViewRole::kHeldOut;
+  photo.depth = {};
+  photo.depth_file.reset();
+  const PruneReport report = PruneWith(set, SmallOptions(2));
+  ASSERT_TRUE(report.photo_loss_db);
+  EXPECT_LE(*report.photo_loss_db, 2);
+  EXPECT_THAT(report.setting.without, Not(Contains(photo.id)));
+  EXPECT_LE(report.setting.without.size(), kViews - 1 - 2u);
+}
+
+TEST(Prune, DecidesTheSameForAnyNumberOfThreads) {
+  DtrSet set = Row(4);
+  PruneOptions options = SmallOptions(0.5);
+  options.render.threads = 1;
+  const PruneReport one = PruneWith(set, options);
+  options.render.threads = 3;
+  const PruneReport three = PruneWith(set, options);
+  EXPECT_EQ(one.setting.without, three.setting.without);
+  EXPECT_EQ(one.setting.coding, three.setting.coding);
+  EXPECT_EQ(one.loss_db(), three.loss_db());
+}
+
+TEST(Prune, RefusesOptionsWithoutAMeaning) {
+  const DtrSet set = Row(3);
+  EXPECT_THROW(PruneWith(set, SmallOptions(-1)), UsageError);
+  EXPECT_THROW(PruneWith(set, SmallOptions(std::nan(""))), UsageError);
+  PruneOptions options = SmallOptions(1);
+  options.checks = 0;
+  EXPECT_THROW(PruneWith(set, options), UsageError);
+}
+
+}  // namespace
+}  // namespace dtr::prune
