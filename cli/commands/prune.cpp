@@ -82,15 +82,19 @@ void AddPruneCommand(CLI::App& app) {
                 "nothing [0.1]")
             ->check(CLI::Range(0.0, 20.0))
             ->type_name("L");
-        command.add_option("--probes", prune.probes, "Novel cameras that decide [12]")
+        command
+            .add_option("--probes", prune.probes,
+                        "Source views whose photos decide, each left out in turn [12]")
             ->check(CLI::Range(1, 1000))
             ->type_name("N");
-        command.add_option("--checks", prune.checks, "Other novel cameras, that check [8]")
+        command
+            .add_option("--checks", prune.checks,
+                        "Novel cameras between input cameras, that check [8]")
             ->check(CLI::Range(1, 1000))
             ->type_name("N");
         command
             .add_option("--probe-shrink", prune.probe_shrink,
-                        "Deciding pictures are 1/N of their size; checking ones are whole [2]")
+                        "Deciding photos are 1/N of their size; checking pictures are whole [2]")
             ->check(CLI::Range(1, 16))
             ->type_name("N");
         command.add_flag("--force", options->prune.force, "Replace SET2 when it exists");

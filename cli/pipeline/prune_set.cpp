@@ -197,7 +197,7 @@ PruneSetReport PruneSet(const PruneSetOptions& options, Progress& progress) {
   DtrSet pruned = WritePruned(options, set, coder, setting, writer, progress);
   io::SetPrunedJson(pruned, PrunedJson(options, report).dump());
   log.Begin("timing");
-  const auto cameras = prune::DrawProbes(set, 1, kTimedCameras, prune.seed).checking;
+  const auto cameras = prune::DrawProbes(set, kTimedCameras, prune.seed);
   {
     const auto renderer = options.make_timed_renderer();
     report.frame_before = FrameOf(set, cameras, prune.render, *renderer);

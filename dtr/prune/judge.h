@@ -14,29 +14,47 @@ namespace dtr::prune {
 /// Makes a renderer anew. One exists at a time: renderers with OpenGL own the current context.
 using RendererMaker = std::function<eval::RenderFunction()>;
 
-/// Pictures from some cameras, holes filled, source views in `without` left out.
+/// A place to look from. Where a photo was taken, it is there too.
+struct Place {
+  NovelCamera novel;
+  ImageRgb8 photo;  ///< of the camera's size; empty: nobody has been there
+  Mask mask;        ///< what of the photo is usable
+  /// Ids of the source views whose place it is (one, and its copies); a picture from here goes
+  /// without them.
+  std::vector<std::string> left_out;
+};
+
+/// The held-out photos of the set's first frame.
+std::vector<Place> HeldOutPlaces(const DtrSet& set);
+/// `count` source views spread evenly over the set in byte order of their ids (all where there are
+/// fewer), to be left out when drawing from their places, at 1/shrink of their size.
+std::vector<Place> LeftOutPlaces(const DtrSet& set, int count, int shrink);
+/// Places without photos.
+std::vector<Place> NovelPlaces(std::vector<NovelCamera> cameras);
+
+/// Pictures from the places, holes filled, without the source views in `without` and each place's
+/// own.
 std::vector<ImageRgb8> Pictures(const DtrSet& set, std::span<const std::string> without,
-                                std::span<const NovelCamera> cameras, const RenderOptions& options,
+                                std::span<const Place> places, const RenderOptions& options,
                                 const eval::RenderFunction& render);
 
-/// How far a set's pictures are from photos: the mean squared difference of 8-bit values, over all
-/// pixels, holes filled, at photos it was not made from, or, where the set has none, at up to
-/// `at_most` source views, each left out in turn. Photos are shrunk by `shrink` first.
-double ErrorAgainstPhotos(const DtrSet& set, const RenderOptions& options, int shrink, int at_most,
-                          const eval::RenderFunction& render);
+/// Mean squared differences of 8-bit values over all usable pixels of all places with photos.
+struct Errors {
+  double before = 0, after = 0;  ///< of pictures against photos
+  double change = 0;             ///< of pictures after against those before
+  double psnr_loss_db = 0;       ///< mean over places of PSNR before - PSNR after
+  /// Of a change of a picture's pixels, the part that is new error: (after - before) / change. 1
+  /// where it is independent of what was wrong already, 0 where it puts one error in the place of
+  /// another. At least kLeastShare: what is unseen from here may show elsewhere.
+  double NewErrorShare() const;
+};
+inline constexpr double kLeastShare = 0.1;
+Errors CompareWithPhotos(std::span<const Place> places, std::span<const ImageRgb8> before,
+                         std::span<const ImageRgb8> after);
 
-/// PSNR of each held-out photo against the picture from its place, dB; empty where there are none.
-std::vector<double> PhotoPsnr(const DtrSet& set, std::span<const std::string> without,
-                              const RenderOptions& options, const eval::RenderFunction& render);
-
-/// What a difference between pictures before and after a change means, as a loss of PSNR against
-/// photos that nobody has from there, mean over the pictures in dB:
-/// 10 log10(1 + D / E), D the mean squared difference of a picture and E that of pictures before
-/// the change against photos (`error`): the change's error comes on top of what was wrong already.
-/// It assumes the two errors independent; where photos exist they are asked themselves.
-double LossDb(std::span<const ImageRgb8> before, std::span<const ImageRgb8> after, double error);
-
-/// Cameras with pictures of 1/shrink the size.
-std::vector<NovelCamera> Shrunk(std::vector<NovelCamera> cameras, int shrink);
+/// What a change means from places that have no photo, mean in dB: 10 log10(1 + share D / E), D the
+/// mean squared difference of a picture after and before, E and share from where photos are.
+double LossDb(std::span<const ImageRgb8> before, std::span<const ImageRgb8> after,
+              const Errors& where_photos_are);
 
 }  // namespace dtr::prune

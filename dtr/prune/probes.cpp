@@ -52,23 +52,18 @@ NovelCamera Between(const View& a, const View& b, double share) {
 
 }  // namespace
 
-Probes DrawProbes(const DtrSet& set, int deciding, int checking, std::uint64_t seed) {
+std::vector<NovelCamera> DrawProbes(const DtrSet& set, int count, std::uint64_t seed) {
   const std::vector<const View*> sources = Sources(set);
-  const auto draw = [&](int count, std::uint64_t kind) {
-    std::vector<NovelCamera> cameras;
-    for (int i = 0; i < count; ++i) {
-      Random random(HashOf(seed, kind, static_cast<std::uint64_t>(i)));
-      // Half a stride aside, the two kinds start from different views where there are enough.
-      const double place = (i + 0.5 * static_cast<double>(kind)) / count;
-      const auto n = static_cast<size_t>(place * static_cast<double>(sources.size()));
-      const View& view = *sources[n % sources.size()];
-      const auto near = NeighboursOf(view, sources);
-      const auto partner = static_cast<size_t>(random.Index(static_cast<int>(near.size())));
-      cameras.push_back(Between(view, *near[partner], random.Uniform(kNearest, kFarthest)));
-    }
-    return cameras;
-  };
-  return {draw(deciding, 0), draw(checking, 1)};
+  std::vector<NovelCamera> cameras;
+  for (int i = 0; i < count; ++i) {
+    Random random(HashOf(seed, static_cast<std::uint64_t>(i)));
+    const auto n = static_cast<size_t>((i + 0.5) / count * static_cast<double>(sources.size()));
+    const View& view = *sources[n % sources.size()];
+    const auto near = NeighboursOf(view, sources);
+    const auto partner = static_cast<size_t>(random.Index(static_cast<int>(near.size())));
+    cameras.push_back(Between(view, *near[partner], random.Uniform(kNearest, kFarthest)));
+  }
+  return cameras;
 }
 
 }  // namespace dtr::prune

@@ -7,16 +7,11 @@
 
 namespace dtr::prune {
 
-/// Novel cameras: those that decide what is left out, and others that check the outcome.
-struct Probes {
-  std::vector<NovelCamera> deciding, checking;
-};
-
 /// Cameras between source views of the set's first frame and one of their nearest neighbours: the
 /// centre on the line between the two, the rotation between theirs, the intrinsics of the first.
 /// First views are spread evenly over the set in byte order of their ids, so that every part of it
-/// is looked at; partner and place are drawn from the seed, the two kinds at different draws.
+/// is looked at; partner and place are drawn from the seed.
 /// Does not depend on the order of the views. Throws dtr::Error for less than 2 source views.
-Probes DrawProbes(const DtrSet& set, int deciding, int checking, std::uint64_t seed);
+std::vector<NovelCamera> DrawProbes(const DtrSet& set, int count, std::uint64_t seed);
 
 }  // namespace dtr::prune

@@ -19,8 +19,7 @@ constexpr double kDecidingShare = 0.85;
 // Differences of a loss below this are chance; without a floor, what costs nothing would divide by
 // 0.
 constexpr double kSmallestLossDb = 1e-3;
-constexpr size_t kFewestViews = 2;
-constexpr int kLossPhotos = 6;  // without held-out photos: source views left out in turn
+constexpr size_t kFewestViews = 3;  // where one is left out to look from its place, two remain
 
 enum class Kind { kView, kViewsUsed, kImages, kDepth, kSize, kMesh };
 constexpr std::array kLevelled = {Kind::kViewsUsed, Kind::kImages, Kind::kDepth, Kind::kSize,
@@ -131,9 +130,6 @@ class Pruner {
       : set_(set), options_(options), code_(code), make_(make_renderer), progress_(progress) {}
 
   PruneReport Run() {
-    Probes probes = DrawProbes(set_, options_.probes, options_.checks, options_.seed);
-    deciding_ = Shrunk(std::move(probes.deciding), options_.probe_shrink);
-    checking_ = std::move(probes.checking);
     Begin();
     while (DecideOne()) {
     }
@@ -175,16 +171,15 @@ class Pruner {
     current_coding_ = setting.coding;
     trial_ = nullptr;
     const auto& render = RendererFor(current_);
-    progress_.Stage("reference pictures", 4);
-    deciding_error_ = ErrorAgainstPhotos(current_->set, setting.render, options_.probe_shrink,
-                                         kLossPhotos, render);
+    progress_.Stage("pictures of the whole set", 4);
+    deciding_ = LeftOutPlaces(current_->set, options_.probes, options_.probe_shrink);
+    checking_ = NovelPlaces(DrawProbes(set_, options_.checks, options_.seed));
+    photos_ = HeldOutPlaces(current_->set);
     progress_.Update(1);
-    checking_error_ = ErrorAgainstPhotos(current_->set, setting.render, 1, kLossPhotos, render);
-    progress_.Update(2);
     deciding_before_ = Pictures(current_->set, {}, deciding_, setting.render, render);
     progress_.Update(3);
     checking_before_ = Pictures(current_->set, {}, checking_, setting.render, render);
-    psnr_before_ = PhotoPsnr(current_->set, {}, setting.render, render);
+    photos_before_ = Pictures(current_->set, {}, photos_, setting.render, render);
     progress_.Update(4);
     now_ = {0, BytesOf(setting, *current_), FrameOf(setting)};
     history_.push_back(setting);
@@ -246,8 +241,8 @@ class Pruner {
     const Coded coded = CodedAs(setting.coding);
     const auto pictures =
         Pictures(coded->set, setting.without, deciding_, setting.render, RendererFor(coded));
-    return {LossDb(deciding_before_, pictures, deciding_error_), BytesOf(setting, *coded),
-            FrameOf(setting)};
+    const Errors errors = CompareWithPhotos(deciding_, deciding_before_, pictures);
+    return {errors.psnr_loss_db, BytesOf(setting, *coded), FrameOf(setting)};
   }
 
   void Measure(Candidate& candidate) {
@@ -365,6 +360,7 @@ class Pruner {
   struct Check {
     double probe_loss_db = 0;
     std::optional<double> photo_loss_db;
+    Errors errors;  ///< where photos are
     bool Holds(double most) const {
       return probe_loss_db <= most && photo_loss_db.value_or(0) <= most;
     }
@@ -374,15 +370,15 @@ class Pruner {
     progress_.ThrowIfInterrupted();
     const Coded coded = CodedAs(setting.coding);
     const auto& render = RendererFor(coded);
+    const auto pictures = [&](const std::vector<Place>& places) {
+      return Pictures(coded->set, setting.without, places, setting.render, render);
+    };
     Check check;
-    check.probe_loss_db = LossDb(
-        checking_before_, Pictures(coded->set, setting.without, checking_, setting.render, render),
-        checking_error_);
-    const auto psnr_after = PhotoPsnr(coded->set, setting.without, setting.render, render);
-    if (psnr_after.empty()) return check;
-    double sum_db = 0;
-    for (size_t i = 0; i < psnr_after.size(); ++i) sum_db += psnr_before_[i] - psnr_after[i];
-    check.photo_loss_db = sum_db / static_cast<double>(psnr_after.size());
+    check.errors = photos_.empty()
+                       ? CompareWithPhotos(deciding_, deciding_before_, pictures(deciding_))
+                       : CompareWithPhotos(photos_, photos_before_, pictures(photos_));
+    if (!photos_.empty()) check.photo_loss_db = check.errors.psnr_loss_db;
+    check.probe_loss_db = LossDb(checking_before_, pictures(checking_), check.errors);
     return check;
   }
 
@@ -412,8 +408,11 @@ class Pruner {
     report_.decided_loss_db = holds == 0 ? 0 : losses_[holds - 1];
     report_.checked_probe_loss_db = check_of_holding.probe_loss_db;
     report_.photo_loss_db = check_of_holding.photo_loss_db;
-    if (holds == 0 && !psnr_before_.empty()) report_.photo_loss_db = 0;
-    report_.error_db = 10 * std::log10(255 * 255 / checking_error_);
+    if (holds == 0 && !photos_.empty()) report_.photo_loss_db = 0;
+    const Errors errors = photos_.empty()
+                              ? CompareWithPhotos(deciding_, deciding_before_, deciding_before_)
+                              : CompareWithPhotos(photos_, photos_before_, photos_before_);
+    report_.error_db = 10 * std::log10(255 * 255 / errors.before);
     render_ = nullptr;
     return report_;
   }
@@ -424,10 +423,8 @@ class Pruner {
   const RendererMaker& make_;
   Progress& progress_;
 
-  std::vector<NovelCamera> deciding_, checking_;
-  std::vector<ImageRgb8> deciding_before_, checking_before_;
-  std::vector<double> psnr_before_;
-  double deciding_error_ = 1, checking_error_ = 1;
+  std::vector<Place> deciding_, checking_, photos_;
+  std::vector<ImageRgb8> deciding_before_, checking_before_, photos_before_;
 
   Coded current_, trial_, drawn_;
   Coding current_coding_, trial_coding_;

@@ -21,8 +21,8 @@ struct Setting {
 
 struct PruneOptions {
   double max_loss_db = 0.1;
-  int probes = 12;  ///< novel cameras that decide
-  int checks = 8;   ///< others, which check
+  int probes = 12;  ///< source views whose photos decide, each left out in turn
+  int checks = 8;   ///< novel cameras, which check
   int probe_shrink =
       2;  ///< deciding pictures are this much smaller per axis; checking ones are not
   RenderOptions render;  ///< what the set is drawn with before
@@ -33,7 +33,7 @@ struct PruneOptions {
 struct Removal {
   std::string kind;        ///< "sigma", "view", "views-used", "images", "depth", "size", "mesh"
   std::string what;        ///< a view's name, or what became of the rest: "JPEG quality 90"
-  double loss_db = 0;      ///< what this one added, on the deciding probes
+  double loss_db = 0;      ///< what this one added, on the deciding photos
   double bytes_share = 0;  ///< of the bytes of before that it saved
   double frame_share = 0;  ///< of the work of a frame of before (views used) that it saved
 };
@@ -42,7 +42,7 @@ struct PruneReport {
   Setting setting;
   std::vector<Removal> removed;
   std::vector<Removal> put_back;        ///< decided, but the check did not bear it out
-  double decided_loss_db = 0;           ///< of `removed`, on the deciding probes
+  double decided_loss_db = 0;           ///< of `removed`, on the deciding photos
   double checked_probe_loss_db = 0;     ///< whole pictures, at cameras that decided nothing
   std::optional<double> photo_loss_db;  ///< mean over held-out photos; none: there are none
   double error_db = 0;                  ///< PSNR against photos before, to which a loss is relative
@@ -52,10 +52,11 @@ struct PruneReport {
 
 /// Greedy: of all that could be left out next (a view; a step of image quality, depth error, size,
 /// mesh tolerance or number of views used) what saves most bytes and work per dB that it is
-/// measured to cost, until nothing fits the loss. `set`: loaded with images and depth, and held-out
-/// photos where it has some: they only judge. The outcome is then looked at anew, at full size,
-/// from other cameras and against the photos, and the last decisions are taken back until the loss
-/// holds. Depends on the set, the options and the renderer alone, not on threads or times.
+/// measured to cost at source views left out in turn, until nothing fits the loss. `set`: loaded
+/// with images and depth, and held-out photos where it has some: they only judge. The outcome is
+/// then looked at anew, at full size, from other cameras and against the photos, and the last
+/// decisions are taken back until the loss holds. Depends on the set, the options and the renderer
+/// alone, not on threads or times.
 PruneReport Prune(const DtrSet& set, const PruneOptions& options, const CodeFunction& code,
                   const RendererMaker& make_renderer, Progress& progress);
 

@@ -104,37 +104,45 @@ PruneReport PruneWith(const DtrSet& set, const PruneOptions& options) {
 
 TEST(DrawProbes, LiesBetweenTwoCamerasAndDoesNotDependOnTheirOrder) {
   DtrSet set = Row();
-  const Probes probes = DrawProbes(set, 6, 5, 7);
-  ASSERT_EQ(probes.deciding.size(), 6u);
-  ASSERT_EQ(probes.checking.size(), 5u);
-  for (const NovelCamera& novel : probes.deciding) {
+  const auto probes = DrawProbes(set, 6, 7);
+  ASSERT_EQ(probes.size(), 6u);
+  for (const NovelCamera& novel : probes) {
     const Eigen::Vector3d center = novel.cam_from_world.TargetOriginInSource();
     EXPECT_NEAR(center.y(), 0, 1e-12);
     EXPECT_LT(std::abs(center.x()), 0.25 * 0.5 * (kViews - 1));
     for (const View& view : set.frames[0].views) {
       EXPECT_GT((center - view.CenterInWorld()).norm(), 1e-3) << "no novel place";
     }
-    for (const NovelCamera& other : probes.checking) {
-      EXPECT_NE(novel.cam_from_world.translation, other.cam_from_world.translation);
-    }
   }
   std::reverse(set.frames[0].views.begin(), set.frames[0].views.end());
-  const Probes again = DrawProbes(set, 6, 5, 7);
+  const auto again = DrawProbes(set, 6, 7);
   for (size_t i = 0; i < 6; ++i) {
-    EXPECT_EQ(again.deciding[i].cam_from_world.translation,
-              probes.deciding[i].cam_from_world.translation);
+    EXPECT_EQ(again[i].cam_from_world.translation, probes[i].cam_from_world.translation);
   }
-  EXPECT_NE(DrawProbes(set, 6, 5, 8).deciding[0].cam_from_world.translation,
-            probes.deciding[0].cam_from_world.translation);
-  EXPECT_THROW(DrawProbes(Row(1), 1, 1, 0), Error);
+  EXPECT_NE(DrawProbes(set, 6, 8)[0].cam_from_world.translation,
+            probes[0].cam_from_world.translation);
+  EXPECT_THROW(DrawProbes(Row(1), 1, 0), Error);
 }
 
-TEST(LossDb, IsWhatTheErrorOnTopMakesOfThePsnr) {
-  const ImageRgb8 before(4, 4, 3, 100), after(4, 4, 3, 103);
-  const std::vector<ImageRgb8> a = {before, before}, b = {before, after};
-  EXPECT_EQ(LossDb(a, a, 9), 0);
-  // Of two pictures one has a squared difference of 9 on top of an error of 9: 3.01 dB.
-  EXPECT_NEAR(LossDb(a, b, 9), 0.5 * 10 * std::log10(2.0), 1e-12);
+TEST(Errors, TellNewErrorFromOneThatTakesAnothersPlace) {
+  // The photo is 100; before, pictures are 103 everywhere.
+  const std::vector<Place> places = {{{}, ImageRgb8(4, 4, 3, 100), {}, {}}};
+  const std::vector<ImageRgb8> before = {ImageRgb8(4, 4, 3, 103)};
+  // 97 is as wrong as 103, so nothing is lost however far the two are apart.
+  const Errors swapped = CompareWithPhotos(places, before, std::vector{ImageRgb8(4, 4, 3, 97)});
+  EXPECT_EQ(swapped.before, 9);
+  EXPECT_EQ(swapped.after, 9);
+  EXPECT_EQ(swapped.change, 36);
+  EXPECT_EQ(swapped.psnr_loss_db, 0);
+  EXPECT_EQ(swapped.NewErrorShare(), kLeastShare);
+  // 106 is four times as wrong: 6.02 dB.
+  const Errors worse = CompareWithPhotos(places, before, std::vector{ImageRgb8(4, 4, 3, 106)});
+  EXPECT_NEAR(worse.psnr_loss_db, 10 * std::log10(4.0), 1e-12);
+  EXPECT_EQ(worse.NewErrorShare(), 27.0 / 9);
+  // From a place without a photo: a difference of 9, three times that is new error, on top of 9.
+  const std::vector<ImageRgb8> a = {before[0], before[0]}, b = {before[0], ImageRgb8(4, 4, 3, 106)};
+  EXPECT_EQ(LossDb(a, a, worse), 0);
+  EXPECT_NEAR(LossDb(a, b, worse), 0.5 * 10 * std::log10(4.0), 1e-12);
 }
 
 TEST(Prune, AllowedNoLossLeavesOutOnlyWhatNobodySees) {
@@ -146,9 +154,6 @@ TEST(Prune, AllowedNoLossLeavesOutOnlyWhatNobodySees) {
   EXPECT_FALSE(report.setting.coding.sigma);
   ASSERT_FALSE(report.removed.empty());
   EXPECT_EQ(report.removed[0].kind, "sigma");
-  for (const Removal& removal : report.removed) {
-    EXPECT_EQ(removal.loss_db, 0) << removal.kind << " " << removal.what;
-  }
   EXPECT_EQ(report.setting.coding.jpeg_quality, 0);
   EXPECT_EQ(report.setting.coding.depth_error_px, 0);
 }
@@ -171,17 +176,19 @@ TEST(Prune, KeepsItsPromiseAndSavesMoreWhereMoreIsAllowed) {
   EXPECT_GT(saved_before, std::log(4.0));
 }
 
-TEST(Prune, ACopyOfAViewGoesForNothingAndTheOtherStays) {
+TEST(LeftOutPlaces, AreSeenWithoutTheViewAndItsCopies) {
   DtrSet set = Row(4);
   View copy = set.frames[0].views[1];
   copy.id = copy.name = "copy";
+  copy.image.data()[0] ^= 1;
   set.frames[0].views.push_back(copy);
-  const PruneReport report = PruneWith(set, SmallOptions(0));
-  ASSERT_FALSE(report.removed.empty());
-  const std::string first = report.removed[0].what;
-  EXPECT_TRUE(first == "copy" || first == "viewb") << first;
-  EXPECT_EQ(report.setting.without.size(), 1u) << "all others are seen";
-  EXPECT_EQ(report.loss_db(), 0);
+  const auto places = LeftOutPlaces(set, 10, 2);
+  ASSERT_EQ(places.size(), 5u);
+  EXPECT_THAT(places[0].left_out, ::testing::UnorderedElementsAre("copy", "viewb"));
+  EXPECT_THAT(places[1].left_out, ::testing::ElementsAre("viewa"));
+  EXPECT_EQ(places[1].photo.width(), 48);
+  const auto pictures = Pictures(set, {}, std::span(places).first(1), {}, &cpu::Render);
+  EXPECT_NE(pictures[0], places[0].photo);
 }
 
 TEST(Prune, HeldOutPhotosJudgeButAreNeverLeftOut) {
