@@ -45,7 +45,6 @@ void AddCalibrateCommand(CLI::App& app);
 void AddCalibrateBoardCommand(CLI::App& calibrate);
 void AddCalibrateRefineCommand(CLI::App& calibrate);  ///< below `calibrate`
 void AddCalibrateRigCommand(CLI::App& calibrate);
-void AddCalibrateScaleCommand(CLI::App& calibrate);
 void AddValidateCommand(CLI::App& app);
 void AddStereoCommand(CLI::App& app);
 void AddInfoCommand(CLI::App& app);

@@ -7,6 +7,7 @@
 #include "calib/colmap/model_io.h"
 #include "capture/ingest.h"
 #include "cli/command.h"
+#include "cli/commands/calibrate_scale.h"
 #include "cli/pipeline/calibrated_photos.h"
 #include "cli/pipeline/lens_file.h"
 #include "dtr/base/error.h"

@@ -5,7 +5,7 @@
 #include <filesystem>
 
 #include "calib/boards/length.h"
-#include "cli/command.h"
+#include "cli/commands/calibrate_scale.h"
 #include "cli/pipeline/scale_set.h"
 #include "cli/view_names.h"
 #include "dtr/base/error.h"
