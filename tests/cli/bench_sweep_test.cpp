@@ -150,9 +150,9 @@ TEST_F(BenchSweep, DepthByEngineAndSize) {
 
 TEST_F(BenchSweep, StorageByBytes) {
   DtrOk({"bench", Shared("true.dtr"), "--stage", "storage", "--renderer", "cpu", "--max-points",
-         "3", "-o", (folder_ / "out").string()});
+         "2", "-o", (folder_ / "out").string()});
   const Json stage = Json::parse(Text(folder_ / "out/bench.json"))["stages"][0];
-  ASSERT_EQ(stage["points"].size(), 3u);
+  ASSERT_EQ(stage["points"].size(), 2u);
   const Json &inverse = stage["points"][0], &exact = stage["points"][1];
   EXPECT_EQ(inverse["options"]["depth"], "png16-inverse");
   EXPECT_EQ(exact["options"]["depth"], "exr-float");
