@@ -8,6 +8,7 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
+#include "dtr/io/jpeg_cmyk.h"
 #include "dtr/io/oiio_files.h"
 
 namespace dtr::io {
@@ -156,7 +157,10 @@ ImageHeader ReadImageHeader(const fs::path& file) {
 
 ImageRgb8 ReadImage(const fs::path& file, const ImageReadOptions& options) {
   const auto in = OpenImage(file, options.limit_px);
-  Grid<std::uint8_t> pixels = ReadColours(*in, file);
+  const bool cmyk = in->spec().get_string_attribute("jpeg:ColorSpace") == "CMYK";
+  std::optional<Grid<std::uint8_t>> plain;
+  if (cmyk) plain = ReadPlainCmykJpeg(file);
+  Grid<std::uint8_t> pixels = plain ? std::move(*plain) : ReadColours(*in, file);
   if (pixels.channels() == 1) pixels = RgbFromGrey(pixels);
   if (!options.apply_exif_orientation) return pixels;
   return ApplyExifOrientation(pixels, ExifOrientationOf(in->spec()));

@@ -47,7 +47,7 @@ struct ImageReadOptions {
 
 /// Reads an image as 8-bit sRGB of 3 channels.
 /// Grey becomes RGB; alpha is dropped (not multiplied in); CMYK JPEG is converted without a colour
-/// profile, taken to be inverted as Adobe's programs write it.
+/// profile, taken to be inverted where it bears Adobe's marker, as Adobe's programs write it.
 /// Integer samples are taken as sRGB-coded and rounded to 8 bits. Float and half samples (EXR, HDR,
 /// float TIFF) are taken as linear light in the sRGB primaries, clipped to [0, 1] and sRGB-coded;
 /// NaN and infinity among them are refused. Only the first image of a file is read.

@@ -4,8 +4,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <cstdio>
 #include <limits>
+
+#include <jpeglib.h>  // needs cstdio before it
 
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
@@ -168,6 +172,62 @@ TEST(ReadImage, ASizeThatTheFileCannotHoldIsRefusedBeforeAllocation) {
   // White masks of photos are small files, and real.
   WriteMask(folder / "m.png", Mask(3000, 2000, 1, 255));
   EXPECT_EQ(ReadMask(folder / "m.png").width(), 3000);
+}
+
+// One colour in four inks, with Adobe's marker or without.
+void WriteCmykJpeg(const std::filesystem::path& file, std::array<JSAMPLE, 4> inks, bool marker) {
+  std::FILE* out = std::fopen(file.c_str(), "wb");
+  ASSERT_NE(out, nullptr);
+  jpeg_compress_struct jpeg{};
+  jpeg_error_mgr errors{};
+  jpeg.err = jpeg_std_error(&errors);
+  jpeg_create_compress(&jpeg);
+  jpeg_stdio_dest(&jpeg, out);
+  jpeg.image_width = jpeg.image_height = 16;
+  jpeg.input_components = 4;
+  jpeg.in_color_space = JCS_CMYK;
+  jpeg_set_defaults(&jpeg);
+  jpeg_set_quality(&jpeg, 100, TRUE);
+  jpeg.write_Adobe_marker = marker ? TRUE : FALSE;
+  jpeg_start_compress(&jpeg, TRUE);
+  std::vector<JSAMPLE> row;
+  for (int x = 0; x < 16; ++x) row.insert(row.end(), inks.begin(), inks.end());
+  JSAMPROW pointer = row.data();
+  for (int y = 0; y < 16; ++y) jpeg_write_scanlines(&jpeg, &pointer, 1);
+  jpeg_finish_compress(&jpeg);
+  jpeg_destroy_compress(&jpeg);
+  std::fclose(out);
+}
+
+TEST(ReadImage, InksOfAJpegAreInvertedWhereAdobesMarkerSaysSo) {
+  const TemporaryFolder folder;
+  // C 20, M 100, Y 200, K 51: (255 - C) (255 - 51) / 255 = 188, 124, 44.
+  const std::vector<std::uint8_t> expected{188, 124, 44};
+  WriteCmykJpeg(folder / "plain.jpg", {20, 100, 200, 51}, false);
+  WriteCmykJpeg(folder / "adobe.jpg", {235, 155, 55, 204}, true);
+  for (const char* name : {"plain.jpg", "adobe.jpg"}) {
+    const ImageRgb8 image = ReadImage(folder / name);
+    ASSERT_EQ(image.width(), 16) << name;
+    for (int c = 0; c < 3; ++c)
+      EXPECT_NEAR(image(7, 7, c), expected[static_cast<size_t>(c)], 1) << name;
+  }
+  testing::ExpectEveryPrefixIsAnError(folder / "plain.jpg", 40,
+                                      [&] { ReadImage(folder / "plain.jpg"); });
+}
+
+TEST(ReadImage, ProgressiveJpegIsReadAsWell) {
+  const TemporaryFolder folder;
+  const ImageRgb8 image = SmoothImage(32, 24);
+  ImageSpec spec(32, 24, 3, TypeDesc::UINT8);
+  spec.attribute("CompressionQuality", 95);
+  spec.attribute("jpeg:progressive", 1);
+  WriteForeign<std::uint8_t>(folder / "a.jpg", spec, {image.data().begin(), image.data().end()});
+  // SOF2 says that it is progressive (ITU T.81, table B.1).
+  ASSERT_NE(ReadFile(folder / "a.jpg", 1 << 20).find("\xff\xc2"), std::string::npos);
+  const ImageRgb8 read = ReadImage(folder / "a.jpg");
+  for (size_t i = 0; i < image.data().size(); ++i) {
+    ASSERT_NEAR(read.data()[i], image.data()[i], 12) << i;
+  }
 }
 
 TEST(ReadImage, TurnsThePhotoUprightOnRequest) {
