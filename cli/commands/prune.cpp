@@ -93,8 +93,9 @@ void AddPruneCommand(CLI::App& app) {
             ->check(CLI::Range(1, 1000))
             ->type_name("N");
         command
-            .add_option("--probe-shrink", prune.probe_shrink,
-                        "Deciding photos are 1/N of their size; checking pictures are whole [2]")
+            .add_option("--probe-crop", prune.probe_crop,
+                        "Of deciding photos a window of 1/N per axis counts; checking pictures are "
+                        "whole [2]")
             ->check(CLI::Range(1, 16))
             ->type_name("N");
         command.add_flag("--force", options->prune.force, "Replace SET2 when it exists");

@@ -67,7 +67,7 @@ std::string Fingerprint(const PruneSetOptions& options, const DtrSet& set) {
               {"max_loss_db", prune.max_loss_db},
               {"probes", prune.probes},
               {"checks", prune.checks},
-              {"probe_shrink", prune.probe_shrink},
+              {"probe_crop", prune.probe_crop},
               {"render", options.arguments_of(prune.render)},
               {"seed", prune.seed}}
       .dump();

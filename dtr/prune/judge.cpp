@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "dtr/eval/metrics.h"
-#include "dtr/types/area_average.h"
 
 namespace dtr::prune {
 namespace {
@@ -31,6 +30,15 @@ std::vector<Place> HeldOutPlaces(const DtrSet& set) {
 
 namespace {
 
+Grid<std::uint8_t> Window(const Grid<std::uint8_t>& image, int x, int y, int width, int height) {
+  Grid<std::uint8_t> window(width, height, image.channels());
+  for (int j = 0; j < height; ++j) {
+    std::copy_n(image.row(y + j) + static_cast<std::ptrdiff_t>(x) * image.channels(),
+                static_cast<std::ptrdiff_t>(width) * image.channels(), window.row(j));
+  }
+  return window;
+}
+
 std::vector<std::string> IdsAt(const View& place, const DtrSet& set) {
   std::vector<std::string> ids;
   for (const View& view : set.frames.front().views) {
@@ -45,17 +53,23 @@ std::vector<std::string> IdsAt(const View& place, const DtrSet& set) {
 
 }  // namespace
 
-std::vector<Place> LeftOutPlaces(const DtrSet& set, int count, int shrink) {
+std::vector<Place> LeftOutPlaces(const DtrSet& set, int count, int crop) {
   const RenderScene scene = MakeRenderScene(set);
   const size_t views = scene.views.size(), n = std::min(views, static_cast<size_t>(count));
   std::vector<Place> places;
   for (size_t i = 0; i < n; ++i) {
     const View& view = *scene.views[i * views / n];
-    const int width = std::max(1, view.camera.width_px() / shrink);
-    const int height = std::max(1, view.camera.height_px() / shrink);
-    places.push_back({{view.camera.Resized(width, height), view.cam_from_world},
-                      AreaAverage(view.image, width, height),
-                      view.mask.empty() ? Mask() : ShrinkMask(view.mask, width, height),
+    const auto cell = static_cast<int>(i) % (crop * crop);
+    const PinholeCamera& camera = view.camera;
+    const int width = std::max(1, camera.width_px() / crop);
+    const int height = std::max(1, camera.height_px() / crop);
+    const int x = std::min(cell % crop * width, camera.width_px() - width);
+    const int y = std::min(cell / crop * height, camera.height_px() - height);
+    const PinholeCamera window(width, height, camera.fx_px(), camera.fy_px(), camera.cx_px() - x,
+                               camera.cy_px() - y);
+    places.push_back({{window, view.cam_from_world},
+                      Window(view.image, x, y, width, height),
+                      view.mask.empty() ? Mask() : Window(view.mask, x, y, width, height),
                       IdsAt(view, set)});
   }
   return places;

@@ -27,8 +27,10 @@ struct Place {
 /// The held-out photos of the set's first frame.
 std::vector<Place> HeldOutPlaces(const DtrSet& set);
 /// `count` source views spread evenly over the set in byte order of their ids (all where there are
-/// fewer), to be left out when drawing from their places, at 1/shrink of their size.
-std::vector<Place> LeftOutPlaces(const DtrSet& set, int count, int shrink);
+/// fewer), to be left out when drawing from their places: of each photo a window of 1/crop of its
+/// size per axis, at another part of the frame each time. Windows and not smaller pictures: these
+/// would favour smaller images, since renderers do not filter.
+std::vector<Place> LeftOutPlaces(const DtrSet& set, int count, int crop);
 /// Places without photos.
 std::vector<Place> NovelPlaces(std::vector<NovelCamera> cameras);
 

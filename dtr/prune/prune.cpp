@@ -172,7 +172,7 @@ class Pruner {
     trial_ = nullptr;
     const auto& render = RendererFor(current_);
     progress_.Stage("pictures of the whole set", 4);
-    deciding_ = LeftOutPlaces(current_->set, options_.probes, options_.probe_shrink);
+    deciding_ = LeftOutPlaces(current_->set, options_.probes, options_.probe_crop);
     checking_ = NovelPlaces(DrawProbes(set_, options_.checks, options_.seed));
     photos_ = HeldOutPlaces(current_->set);
     progress_.Update(1);
@@ -443,7 +443,7 @@ class Pruner {
 PruneReport Prune(const DtrSet& set, const PruneOptions& options, const CodeFunction& code,
                   const RendererMaker& make_renderer, Progress& progress) {
   if (!(options.max_loss_db >= 0) || options.probes < 1 || options.checks < 1 ||
-      options.probe_shrink < 1) {
+      options.probe_crop < 1) {
     throw UsageError("pruning: expected a loss of at least 0 dB and at least one probe and check");
   }
   return Pruner(set, options, code, make_renderer, progress).Run();

@@ -21,10 +21,9 @@ struct Setting {
 
 struct PruneOptions {
   double max_loss_db = 0.1;
-  int probes = 12;  ///< source views whose photos decide, each left out in turn
-  int checks = 8;   ///< novel cameras, which check
-  int probe_shrink =
-      2;  ///< deciding pictures are this much smaller per axis; checking ones are not
+  int probes = 12;       ///< source views whose photos decide, each left out in turn
+  int checks = 8;        ///< novel cameras, which check
+  int probe_crop = 2;    ///< of deciding photos a window of 1/this per axis counts
   RenderOptions render;  ///< what the set is drawn with before
   std::uint64_t seed = 0;
 };

@@ -187,6 +187,11 @@ TEST(LeftOutPlaces, AreSeenWithoutTheViewAndItsCopies) {
   EXPECT_THAT(places[0].left_out, ::testing::UnorderedElementsAre("copy", "viewb"));
   EXPECT_THAT(places[1].left_out, ::testing::ElementsAre("viewa"));
   EXPECT_EQ(places[1].photo.width(), 48);
+  // The second place's window is the right upper quarter: the same pixels, seen by the same rays.
+  const View& view = set.frames[0].views[0];
+  EXPECT_EQ(places[1].photo(3, 5, 1), view.image(48 + 3, 5, 1));
+  const Eigen::Vector3d ray = places[1].novel.camera.RayFromPixel({3.5, 5.5});
+  EXPECT_NEAR((ray - view.camera.RayFromPixel({51.5, 5.5})).norm(), 0, 1e-12);
   const auto pictures = Pictures(set, {}, std::span(places).first(1), {}, &cpu::Render);
   EXPECT_NE(pictures[0], places[0].photo);
 }
