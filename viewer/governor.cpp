@@ -24,8 +24,8 @@ void ResolutionGovernor::Drawn(int divisor, double ms) {
   if (ms > kJumpFactor * target_ms_ || typical_ms_ > target_ms_) {
     typical_ms_ = std::max(typical_ms_, ms);
     int smaller = divisor_ + 1;
-    while (smaller < kMostDivisor && PredictedMs(smaller) > target_ms_) ++smaller;
-    divisor_ = std::min(smaller, kMostDivisor);
+    while (smaller < most_divisor_ && PredictedMs(smaller) > target_ms_) ++smaller;
+    divisor_ = std::min(smaller, most_divisor_);
     typical_ms_ = 0;
     calm_frames_ = 0;
     return;

@@ -1,5 +1,6 @@
 // viewer/governor.h -- how much smaller pictures must be while the camera moves.
 #pragma once
+#include <algorithm>
 
 namespace dtr::viewer {
 
@@ -9,10 +10,14 @@ class ResolutionGovernor {
  public:
   static constexpr int kMostDivisor = 8;
 
-  /// `target_ms`: what a moving frame may take.
-  explicit ResolutionGovernor(double target_ms) : target_ms_(target_ms) {}
+  /// `target_ms`: what a moving frame may take. `most_divisor`, 1 to kMostDivisor: pictures are
+  /// never made smaller than that, whatever they take.
+  explicit ResolutionGovernor(double target_ms, int most_divisor = kMostDivisor)
+      : target_ms_(target_ms),
+        most_divisor_(std::clamp(most_divisor, 1, kMostDivisor)),
+        divisor_(std::min(2, most_divisor_)) {}
 
-  /// Divisor of the next moving frame, 1 to kMostDivisor.
+  /// Divisor of the next moving frame.
   int divisor() const { return divisor_; }
 
   /// A frame with this divisor took so long. Times of the slowest of late decide about larger
@@ -23,7 +28,8 @@ class ResolutionGovernor {
   double PredictedMs(int divisor) const;
 
   double target_ms_;
-  int divisor_ = 2;
+  int most_divisor_;
+  int divisor_;
   double typical_ms_ = 0;  ///< of frames at divisor_, smoothed; 0: none yet
   int calm_frames_ = 0;    ///< in a row for which a larger picture would have been fast enough
 };

@@ -95,6 +95,11 @@ Pose Pan(const NovelCamera& camera, const Eigen::Vector2d& from_px, const Eigen:
   return MoveInCam(camera.cam_from_world, from - to);
 }
 
+NovelCamera InMovedWorld(NovelCamera camera, const Eigen::Vector3d& origin_shift) {
+  camera.cam_from_world.translation += camera.cam_from_world.rotation * origin_shift;
+  return camera;
+}
+
 NovelCamera Between(const NovelCamera& from, const NovelCamera& to, double share) {
   const auto mix = [share](double a, double b) { return a + share * (b - a); };
   const PinholeCamera &a = from.camera, &b = to.camera;

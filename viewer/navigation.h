@@ -43,6 +43,9 @@ Pose Approach(const Pose& cam_from_world, const Eigen::Vector3d& point, double f
 Pose Pan(const NovelCamera& camera, const Eigen::Vector2d& from_px, const Eigen::Vector2d& to_px,
          double depth_z);
 
+/// The same camera where stored points are less by `origin_shift` than before: the origin moved.
+NovelCamera InMovedWorld(NovelCamera camera, const Eigen::Vector3d& origin_shift);
+
 /// Part of the way from one camera to another, 0 to 1: centres along a line, rotations along the
 /// shortest arc, lenses in between. Both must have one size.
 NovelCamera Between(const NovelCamera& from, const NovelCamera& to, double share);

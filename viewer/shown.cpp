@@ -90,6 +90,8 @@ const char* NameOf(Shown shown) {
       return "view count";
     case Shown::kCoverage:
       return "coverage";
+    case Shown::kWireframe:
+      return "wireframe";
   }
   return "";
 }
@@ -108,6 +110,8 @@ const char* LegendOf(Shown shown) {
       return "brighter: more views blended; green: none";
     case Shown::kCoverage:
       return "light: some view saw it; green: none did";
+    case Shown::kWireframe:
+      return "the views' reduced meshes, one colour per view; the nearest view's on top";
   }
   return "";
 }
@@ -129,6 +133,7 @@ ImageRgb8 FalseColour(Shown shown, const Drawn& drawn, const SigmaOf& sigma_of) 
   const RenderResult& result = drawn.result;
   switch (shown) {
     case Shown::kColour:
+    case Shown::kWireframe:
       break;
     case Shown::kDepth:
       return report::ColorizeDepth(result.depth);
@@ -145,7 +150,7 @@ ImageRgb8 FalseColour(Shown shown, const Drawn& drawn, const SigmaOf& sigma_of) 
     case Shown::kCoverage:
       return Painted(result, [](size_t) { return kSeen; });
   }
-  throw std::invalid_argument("FalseColour: colours are not false");
+  throw std::invalid_argument("FalseColour: not a false colour");
 }
 
 }  // namespace dtr::viewer

@@ -10,9 +10,10 @@
 
 namespace dtr::viewer {
 
-enum class Shown { kColour, kDepth, kSigma, kWeights, kViewCount, kCoverage };
-inline constexpr std::array kAllShown{Shown::kColour,  Shown::kDepth,     Shown::kSigma,
-                                      Shown::kWeights, Shown::kViewCount, Shown::kCoverage};
+enum class Shown { kColour, kDepth, kSigma, kWeights, kViewCount, kCoverage, kWireframe };
+inline constexpr std::array kAllShown{Shown::kColour,   Shown::kDepth,     Shown::kSigma,
+                                      Shown::kWeights,  Shown::kViewCount, Shown::kCoverage,
+                                      Shown::kWireframe};
 
 /// As people and scripts call it: "colour", "depth", ...
 const char* NameOf(Shown shown);
@@ -28,7 +29,7 @@ struct Drawn {
 };
 
 /// A false-colour picture; unseen pixels have report::kHoleColor. Not for kColour, which is the
-/// picture itself.
+/// picture itself, nor for kWireframe, which keeps meshes (viewer/wireframe.h).
 ImageRgb8 FalseColour(Shown shown, const Drawn& drawn, const SigmaOf& sigma_of);
 
 /// The colour that kWeights gives a view, by its index into the scene's views: neighbours differ.

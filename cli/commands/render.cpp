@@ -13,13 +13,13 @@
 #include "cli/render_options.h"
 #include "cli/renderers.h"
 #include "cli/set_stream.h"
-#include "cli/video.h"
 #include "cli/view_names.h"
 #include "dtr/base/error.h"
 #include "dtr/io/depth_io.h"
 #include "dtr/io/image_io.h"
 #include "dtr/io/pruned.h"
 #include "dtr/io/set_io.h"
+#include "dtr/io/video.h"
 #include "dtr/render/scene.h"
 #include "dtr/render/view_stream.h"
 
@@ -27,7 +27,6 @@ namespace dtr::cli {
 namespace {
 
 namespace fs = std::filesystem;
-constexpr int kFramesPerSecond = 24;
 
 struct Options {
   fs::path set, output, depth_out, coverage_out;
@@ -43,7 +42,7 @@ class FrameSink {
  public:
   FrameSink(const fs::path& output, bool several) : output_(output), several_(several) {
     if (output.extension() == ".mp4") {
-      video_.emplace(output, kFramesPerSecond);
+      video_.emplace(output, io::kVideoFramesPerSecond);
     } else if (several) {
       fs::create_directories(output);
     }
@@ -69,7 +68,7 @@ class FrameSink {
  private:
   fs::path output_;
   bool several_;
-  std::optional<VideoWriter> video_;
+  std::optional<io::VideoWriter> video_;
 };
 
 // Everything about the outputs that can be known before the work.

@@ -1,4 +1,6 @@
 #include <fmt/format.h>
+#include <malloc.h>
+#include <sys/stat.h>
 
 #include <filesystem>
 #include <memory>
@@ -20,6 +22,7 @@
 #include "dtr/io/pruned.h"
 #include "dtr/io/set_io.h"
 #include "viewer/glfw/app.h"
+#include "viewer/governor.h"
 
 namespace dtr::cli {
 namespace {
@@ -33,7 +36,7 @@ struct Options {
   std::string size = "1280x800", exclude;
   RendererChoice renderer;
   double memory_gb = 4;
-  int frames = 0;
+  int frames = 0, laps = 1, largest_divisor = 8;
   bool no_panel = false, cameras = false, photo = false;
   std::shared_ptr<RenderOptions> render;
 };
@@ -63,6 +66,14 @@ std::string CommandLine(const Options& options, const fs::path& camera_file,
   if (!excluded.empty()) words.insert(words.end(), {"--exclude", excluded});
   const auto further = RenderOptionArguments(render);
   words.insert(words.end(), further.begin(), further.end());
+  // Where memory holds fewer views than a picture asks for, it is another picture.
+  const Options defaults;
+  if (options.memory_gb != defaults.memory_gb) {
+    words.insert(words.end(), {"--memory", fmt::format("{}", options.memory_gb)});
+  }
+  if (options.renderer.gpu_memory_gb != defaults.renderer.gpu_memory_gb) {
+    words.insert(words.end(), {"--gpu-memory", fmt::format("{}", options.renderer.gpu_memory_gb)});
+  }
   return ShellLine(words);
 }
 
@@ -91,23 +102,40 @@ Json StateJson(const viewer::AppState& state) {
           {"hidden", state.hidden},
           {"under_cursor", state.under_cursor},
           {"distance", state.distance},
+          {"path_keys", state.path_keys},
+          {"recording", state.recording},
+          {"reloads", state.reloads},
           {"message", state.message},
           {"render_options", RenderOptionArguments(state.render)}};
 }
 
+Json TimesJson(const viewer::FrameTimes& times) {
+  const int n = times.frames;
+  const auto per_frame = [n](double ms) { return n > 0 ? Json(ms / n) : Json(); };
+  return {{"frames", n},
+          {"ms", per_frame(times.ms)},
+          {"cpu_ms", per_frame(times.cpu_ms)},
+          {"fps", n > 0 ? Json(1e3 * n / times.ms) : Json()}};
+}
+
 Json ReportJson(const viewer::AppReport& report) {
-  const int moving = report.moving_frames;
-  const auto per_frame = [moving](double ms) { return moving > 0 ? Json(ms / moving) : Json(); };
+  Json moving = TimesJson(report.moving);
+  moving["largest_divisor"] =
+      report.moving_by_divisor.empty() ? 1 : report.moving_by_divisor.rbegin()->first;
+  moving["by_divisor"] = Json::array();
+  for (const auto& [divisor, times] : report.moving_by_divisor) {
+    Json one = TimesJson(times);
+    one["divisor"] = divisor;
+    moving["by_divisor"].push_back(one);
+  }
   return {{"frames", report.last.frames},
           {"first_picture_ms", report.first_picture_ms},
-          {"moving",
-           {{"frames", moving},
-            {"ms", per_frame(report.moving_ms)},
-            {"cpu_ms", per_frame(report.moving_cpu_ms)},
-            {"fps", moving > 0 ? Json(1e3 * moving / report.moving_ms) : Json()},
-            {"largest_divisor", report.largest_divisor}}},
+          {"first_picture_cpu_ms", report.first_picture_cpu_ms},
+          {"moving", moving},
           {"view_bytes", report.view_bytes},
           {"peak_rss_bytes", PeakMemoryBytes()},
+          {"frames_per_sample", viewer::AppReport::kFramesPerSample},
+          {"rss_bytes", report.memory_bytes},
           {"last", StateJson(report.last)}};
 }
 
@@ -128,10 +156,30 @@ std::map<std::string, viewer::ViewVerdict> Verdicts(const Options& options,
   return verdicts;
 }
 
+/// Of the file that is written last when a set is made. Not its bytes: a set is not read for it.
+std::string StampOf(const fs::path& set) {
+  struct stat found {};
+  if (stat((set / "set.json").c_str(), &found) != 0) return "";
+  return fmt::format("{} {} {}.{}", found.st_ino, found.st_size, found.st_mtim.tv_sec,
+                     found.st_mtim.tv_nsec);
+}
+
+std::vector<NovelCamera> CamerasOf(const std::vector<NovelFrame>& frames) {
+  std::vector<NovelCamera> cameras;
+  for (const NovelFrame& frame : frames) cameras.push_back({frame.camera, frame.cam_from_world});
+  return cameras;
+}
+
 viewer::Host MakeHost(const Options& options, const Context& context,
                       const std::vector<std::string>& excluded) {
   viewer::Host host;
-  host.open = [&, excluded](const auto&) { return Open(options, context, excluded); };
+  host.open = [&, excluded] { return Open(options, context, excluded); };
+  host.stamp = [&] { return StampOf(options.set); };
+  host.read_path = [](const DtrSet& set, const fs::path& file) {
+    NovelCameraRequest request;
+    request.path_file = file;
+    return CamerasOf(NovelFrames(set, request));
+  };
   host.load_sigma = [&](const View& view) {
     View with_sigma = view;
     io::LoadOptions load;
@@ -173,6 +221,8 @@ viewer::AppSettings SettingsOf(const Options& options, const Context& context, c
   settings.cameras = options.cameras;
   settings.photo = options.photo;
   settings.frames = options.frames;
+  settings.laps = options.laps;
+  settings.largest_divisor = options.largest_divisor;
   settings.screenshot = options.screenshot;
   const NovelCameraRequest& request = options.request;
   if (request.like.empty() && request.camera_file.empty() && request.path_file.empty() &&
@@ -181,12 +231,19 @@ viewer::AppSettings SettingsOf(const Options& options, const Context& context, c
   }
   const std::vector<NovelFrame> frames = NovelFrames(set, request);
   settings.start = NovelCamera{frames.front().camera, frames.front().cam_from_world};
-  if (frames.size() > 1) {
-    for (const NovelFrame& frame : frames) {
-      settings.play.push_back({frame.camera, frame.cam_from_world});
-    }
-  }
+  if (frames.size() > 1) settings.play = CamerasOf(frames);
   return settings;
+}
+
+/// Views come and go for as long as the window is open: what glibc keeps of the big blocks that
+/// were freed, in as many arenas as there are threads, is memory that others cannot have.
+void ReturnFreedMemory() {
+#ifdef __GLIBC__
+  constexpr int kBlockBytes = 256 << 10;
+  mallopt(M_MMAP_THRESHOLD, kBlockBytes);
+  mallopt(M_TRIM_THRESHOLD, kBlockBytes);
+  mallopt(M_ARENA_MAX, 2);
+#endif
 }
 
 int RunView(const Options& options, const Context& context) {
@@ -198,6 +255,7 @@ int RunView(const Options& options, const Context& context) {
     throw UsageError("-o " + options.output.string() +
                      ": expected a folder to save into, found none");
   }
+  ReturnFreedMemory();
   const DtrSet set = io::ReadSet(options.set);
   const auto excluded = ResolveViewNames(set, options.exclude);
   const viewer::AppReport report =
@@ -230,6 +288,14 @@ void AddViewCommand(CLI::App& app) {
             ->check(CLI::Range(2, 100000))
             ->type_name("N");
         where->require_option(0, 1);
+        command.add_option("--laps", options->laps, "How often to fly along it [1]")
+            ->check(CLI::Range(1, 1'000'000))
+            ->type_name("N");
+        command
+            .add_option("--largest-divisor", options->largest_divisor,
+                        "While the camera moves, divide the picture's sides by no more than N [8]")
+            ->check(CLI::Range(1, viewer::ResolutionGovernor::kMostDivisor))
+            ->type_name("N");
         command.add_option("--size", options->size, "Size of the window [1280x800]")
             ->type_name("WxH");
         command.add_option("--exclude", options->exclude, "Views not to render from")

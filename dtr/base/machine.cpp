@@ -2,6 +2,7 @@
 
 #include <sys/resource.h>
 #include <time.h>
+#include <unistd.h>
 
 #include <fstream>
 
@@ -28,6 +29,13 @@ size_t PeakMemoryBytes() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   return static_cast<size_t>(usage.ru_maxrss) << 10;
+}
+
+size_t MemoryBytes() {
+  std::ifstream in("/proc/self/statm");  // pages: virtual, physical, ...
+  size_t all = 0, physical = 0;
+  if (!(in >> all >> physical)) return 0;
+  return physical * static_cast<size_t>(sysconf(_SC_PAGESIZE));
 }
 
 }  // namespace dtr

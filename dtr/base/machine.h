@@ -14,5 +14,7 @@ double ProcessCpuMilliseconds();
 
 /// The most physical memory this process had so far.
 size_t PeakMemoryBytes();
+/// What it has just now; 0 where the system does not say.
+size_t MemoryBytes();
 
 }  // namespace dtr

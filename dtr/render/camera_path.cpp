@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "dtr/base/error.h"
 
@@ -12,7 +13,7 @@ constexpr size_t kMaxKeys = 8;        // more keys make a path follow the photog
 constexpr int kStepsPerSegment = 64;  // of the table that evens out the speed
 
 struct Key {
-  const View* view;
+  const View* view;  ///< null: of no view
   Eigen::Vector3d center;
   Eigen::Quaterniond world_from_cam;
 };
@@ -99,7 +100,6 @@ class Spline {
   }
 
   size_t segments() const { return keys_.size() - 1; }
-  const View& first_view() const { return *keys_.front().view; }
 
   /// Segment and share of it, both from s in [0, segments].
   Eigen::Vector3d Position(double s) const {
@@ -178,25 +178,47 @@ std::vector<double> EvenParameters(const Spline& spline, int frames) {
   return parameters;
 }
 
+/// All with one lens.
+std::vector<NovelCamera> Along(const std::vector<Key>& keys, const PinholeCamera& lens,
+                               int frames) {
+  const Spline spline(keys);
+  std::vector<NovelCamera> path;
+  for (const double s : EvenParameters(spline, frames)) {
+    const Eigen::Quaterniond cam_from_world = spline.Rotation(s).conjugate();
+    path.push_back({lens, {cam_from_world, -(cam_from_world * spline.Position(s))}});
+  }
+  return path;
+}
+
+void RequireFrames(int frames) {
+  if (frames >= 1) return;
+  throw UsageError("frames: expected at least 1, found " + std::to_string(frames));
+}
+
 }  // namespace
 
 std::vector<NovelCamera> FlyThrough(const DtrSet& set, int frames) {
-  if (frames < 1) {
-    throw UsageError("frames: expected at least 1, found " + std::to_string(frames));
-  }
+  RequireFrames(frames);
   const std::vector<Key> keys = Thinned(Chain(SourceKeys(set)));
   if (keys.size() == 1) {
     return std::vector<NovelCamera>(static_cast<size_t>(frames),
                                     {keys[0].view->camera, keys[0].view->cam_from_world});
   }
-  const Spline spline(keys);
-  std::vector<NovelCamera> path;
-  for (const double s : EvenParameters(spline, frames)) {
-    const Eigen::Quaterniond cam_from_world = spline.Rotation(s).conjugate();
-    path.push_back(
-        {spline.first_view().camera, {cam_from_world, -(cam_from_world * spline.Position(s))}});
+  return Along(keys, keys.front().view->camera, frames);
+}
+
+std::vector<NovelCamera> PathThrough(std::span<const NovelCamera> cameras, int frames) {
+  RequireFrames(frames);
+  if (cameras.empty()) throw std::invalid_argument("PathThrough: no camera");
+  if (cameras.size() == 1) {
+    return std::vector<NovelCamera>(static_cast<size_t>(frames), cameras.front());
   }
-  return path;
+  std::vector<Key> keys;
+  for (const NovelCamera& camera : cameras) {
+    keys.push_back({nullptr, camera.cam_from_world.TargetOriginInSource(),
+                    camera.cam_from_world.rotation.conjugate()});
+  }
+  return Along(keys, cameras.front().camera, frames);
 }
 
 }  // namespace dtr

@@ -1,5 +1,6 @@
 // dtr/render/camera_path.h -- a fly-through between the cameras of a set.
 #pragma once
+#include <span>
 #include <vector>
 
 #include "dtr/types/camera.h"
@@ -21,5 +22,9 @@ struct NovelCamera {
 /// All frames have the first key's intrinsics. Deterministic; does not depend on the order of the
 /// views. Throws dtr::UsageError when frames < 1 and dtr::Error when there is no source view.
 std::vector<NovelCamera> FlyThrough(const DtrSet& set, int frames);
+
+/// The same through given cameras in their order, none left out. One key gives a path that stands
+/// still. Throws dtr::UsageError when frames < 1 and std::invalid_argument without a key.
+std::vector<NovelCamera> PathThrough(std::span<const NovelCamera> keys, int frames);
 
 }  // namespace dtr

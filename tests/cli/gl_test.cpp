@@ -2,10 +2,8 @@
 #include <nlohmann/json.hpp>
 
 #include "dtr/base/files.h"
-#include "tests/cli/run_dtr.h"
-#include "tests/cli/small_courtyard.h"
 #include "tests/support/environment.h"
-#include "tests/support/test_data.h"
+#include "tests/support/small_courtyard_set.h"
 #include "tests/support/virtual_display.h"
 
 namespace dtr::testing {
@@ -18,16 +16,8 @@ using ::testing::HasSubstr;
 constexpr int kFailed = 1, kWrongUsage = 2;
 constexpr size_t kMaxShaderBytes = 1 << 20;
 
-class OpenGl : public ::testing::Test {
+class OpenGl : public SmallCourtyardSet {
  protected:
-  static void SetUpTestSuite() {
-    shared_ = new TemporaryFolder;
-    MakeSmallCourtyard(*shared_ / "courtyard");
-    ImportSmallCourtyard(*shared_ / "courtyard", Set());
-  }
-  static void TearDownTestSuite() { delete shared_; }
-  static std::string Set() { return (*shared_ / "good.dtr").string(); }
-  std::string In(const std::string& name) const { return (folder_ / name).string(); }
   Ran Render(std::vector<std::string> further = {}) {
     further.insert(further.begin(),
                    {"render", Set(), "--like", "0001", "-o", In("v.png"), "--size", "60x0"});
@@ -37,10 +27,7 @@ class OpenGl : public ::testing::Test {
     const Ran ran = Render();
     if (ran.code != 0) GTEST_SKIP() << ran.err;
   }
-  static TemporaryFolder* shared_;
-  TemporaryFolder folder_;
 };
-TemporaryFolder* OpenGl::shared_ = nullptr;
 
 TEST_F(OpenGl, AMachineWithoutItIsToldInOneLine) {
   const Environment no_driver("__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent");

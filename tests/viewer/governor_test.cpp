@@ -30,6 +30,14 @@ TEST(ResolutionGovernor, FindsTheLargestPictureThatIsFastEnoughAndStaysThere) {
   }
 }
 
+TEST(ResolutionGovernor, NeverGoesBelowTheLeastSizeAskedFor) {
+  for (const int most : {1, 2, 5}) {
+    ResolutionGovernor governor(kTargetMs, most);
+    EXPECT_LE(governor.divisor(), most);
+    EXPECT_EQ(Settle(governor, 1e6, 5), std::set<int>{most});
+  }
+}
+
 TEST(ResolutionGovernor, HoldsTheTargetWhereAnyPictureCan) {
   for (double whole_ms = 10; whole_ms < 3000; whole_ms *= 1.3) {
     ResolutionGovernor governor(kTargetMs);

@@ -2,9 +2,7 @@
 #include <nlohmann/json.hpp>
 
 #include "dtr/base/files.h"
-#include "tests/cli/run_dtr.h"
-#include "tests/cli/small_courtyard.h"
-#include "tests/support/test_data.h"
+#include "tests/support/small_courtyard_set.h"
 
 namespace dtr::testing {
 namespace {
@@ -14,20 +12,7 @@ using ::testing::Not;
 
 constexpr int kFailed = 1, kWrongUsage = 2;
 
-class Inspect : public ::testing::Test {
- protected:
-  static void SetUpTestSuite() {
-    shared_ = new TemporaryFolder;
-    MakeSmallCourtyard(*shared_ / "courtyard");
-    ImportSmallCourtyard(*shared_ / "courtyard", Set());
-  }
-  static void TearDownTestSuite() { delete shared_; }
-  static std::string Set() { return (*shared_ / "good.dtr").string(); }
-  std::string In(const std::string& name) const { return (folder_ / name).string(); }
-  static TemporaryFolder* shared_;
-  TemporaryFolder folder_;
-};
-TemporaryFolder* Inspect::shared_ = nullptr;
+using Inspect = SmallCourtyardSet;
 
 TEST_F(Inspect, WritesOnePageThatNeedsNothingElseTheSameEveryTime) {
   DtrOk({"inspect", Set(), "-o", In("one.html"), "--threads", "1"});

@@ -1,7 +1,8 @@
 // `dtr view` in a real window: keys, drags and the wheel by xdotool.
+#include "dtr/base/files.h"
 #include "dtr/io/image_io.h"
-#include "tests/cli/small_courtyard.h"
 #include "tests/support/environment.h"
+#include "tests/support/small_courtyard_set.h"
 #include "tests/support/virtual_display.h"
 #include "tests/viewer/viewer_program.h"
 
@@ -14,21 +15,12 @@ using ::testing::HasSubstr;
 
 constexpr int kFailed = 1, kWrongUsage = 2;
 
-class ViewerWindow : public ::testing::Test {
+class ViewerWindow : public SmallCourtyardSet {
  protected:
-  static void SetUpTestSuite() {
-    shared_ = new TemporaryFolder;
-    MakeSmallCourtyard(*shared_ / "courtyard");
-    ImportSmallCourtyard(*shared_ / "courtyard", Set());
-  }
-  static void TearDownTestSuite() { delete shared_; }
-  static std::string Set() { return (*shared_ / "good.dtr").string(); }
   void NeedDisplay() {
     if (!display_.up()) GTEST_SKIP() << "no display: Xvfb is missing or did not come up";
     if (FindProgram("xdotool").empty()) GTEST_SKIP() << "xdotool is missing";
   }
-  fs::path In(const std::string& name) const { return folder_ / name; }
-
   static double Moved(const Json& a, const Json& b) {
     double sum = 0;
     for (size_t i = 0; i < 3; ++i) {
@@ -43,11 +35,8 @@ class ViewerWindow : public ::testing::Test {
   }
   static bool Anything(const Json&) { return true; }
 
-  static TemporaryFolder* shared_;
-  TemporaryFolder folder_;
   VirtualDisplay display_;
 };
-TemporaryFolder* ViewerWindow::shared_ = nullptr;
 
 TEST_F(ViewerWindow, KeysDragsAndTheWheelMoveTheCamera) {
   NeedDisplay();
@@ -95,7 +84,10 @@ TEST_F(ViewerWindow, TheCommandLineDrawsThePictureInTheWindow) {
   NeedDisplay();
   if (IsSkipped()) return;
   for (const auto& options : std::vector<std::vector<std::string>>{
-           {}, {"--views", "3", "--fill-holes", "--blend", "cosine", "--max-angle", "50"}}) {
+           {},
+           {"--views", "3", "--fill-holes", "--blend", "cosine", "--max-angle", "50"},
+           // One view fits: without its words the command would draw from more.
+           {"--memory", "0.0003"}}) {
     std::vector<std::string> args{"--size", "320x240", "--no-panel"};
     args.insert(args.end(), options.begin(), options.end());
     const TemporaryFolder folder;
@@ -124,7 +116,7 @@ TEST_F(ViewerWindow, TheCommandLineDrawsThePictureInTheWindow) {
 TEST_F(ViewerWindow, APathIsRecordedThatRenderAndViewRead) {
   NeedDisplay();
   if (IsSkipped()) return;
-  const fs::path path = In("good-path-001.json");
+  const std::string path = In("good-path-001.json");
   {
     ViewerProgram viewer(Set(), folder_.path(), {"--size", "320x240", "--no-panel"});
     viewer.WaitFor("the first picture", Anything);
@@ -136,11 +128,97 @@ TEST_F(ViewerWindow, APathIsRecordedThatRenderAndViewRead) {
     ViewerProgram::Do({"key", "k"});
     viewer.WaitFor("a longer path", [&](const Json&) { return Text(path) != one; });
   }
-  DtrOk({"render", Set(), "--path", path.string(), "-o", In("frames").string()});
+  DtrOk({"render", Set(), "--path", path, "-o", In("frames")});
   EXPECT_EQ(FilesIn(In("frames")), 2);
-  const Ran ran = DtrOk({"view", Set(), "--path", path.string(), "--frames", "2", "--json", "-",
-                         "-o", folder_.path().string()});
+  const Ran ran = DtrOk({"view", Set(), "--path", path, "--frames", "2", "--json", "-", "-o",
+                         folder_.path().string()});
   EXPECT_EQ(Json::parse(ran.out)["last"]["at_view"], "0002.jpg");
+}
+
+TEST_F(ViewerWindow, APathIsLoadedAndFilmedInTheWindow) {
+  NeedDisplay();
+  if (IsSkipped()) return;
+  if (FindProgram("ffmpeg").empty()) GTEST_SKIP() << "ffmpeg is missing";
+  const std::string path = In("two-path-001.json");
+  {
+    const Json cameras =
+        Json::parse(Text(fs::path(Set()).parent_path() / "courtyard" / "cameras.json"));
+    Json two = cameras;
+    two["views"] = Json::array({cameras["views"][1], cameras["views"][3]});
+    WriteFileAtomically(path, two.dump());
+  }
+  ViewerProgram viewer(Set(), folder_.path(), {"--size", "162x122", "--no-panel"});
+  viewer.WaitFor("the first picture", Anything);
+  ViewerProgram::Do({"mousemove", "80", "60", "key", "r"});
+  const Json none = viewer.WaitFor("no path to film", [](const Json& s) {
+    return s["message"].get<std::string>().starts_with("a video needs a path");
+  });
+  EXPECT_FALSE(none["recording"].get<bool>());
+  const auto load = [](const std::string& file) {
+    ViewerProgram::Do({"key", "o", "sleep", "0.5", "type", "--delay", "20", file});
+    ViewerProgram::Do({"key", "Return"});
+  };
+  load(In("absent.json"));
+  viewer.WaitFor("a refusal", [](const Json& s) {
+    return s["message"].get<std::string>().find("absent.json") != std::string::npos;
+  });
+  load(path);
+  viewer.WaitFor("a path", [](const Json& s) { return s["path_keys"] == 2; });
+  ViewerProgram::Do({"key", "r"});
+  const std::string video = In("good-video-001.mp4");
+  viewer.WaitFor("a video",
+                 [&](const Json& s) { return !s["recording"].get<bool>() && fs::exists(video); });
+  DtrOk({"render", Set(), "--path", In("good-video-001.json"), "-o", In("frames")});
+  EXPECT_EQ(FilesIn(In("frames")), 2);
+  std::string probed;
+  ProcessOptions listen;
+  listen.on_line = [&](const std::string& line) { probed += line; };
+  EXPECT_TRUE(RunProcess({"ffprobe", "-v", "error", "-count_frames", "-show_entries",
+                          "stream=width,height,nb_read_frames", "-of", "csv=p=0", video},
+                         listen)
+                  .Ok());
+  EXPECT_EQ(probed, "162,122,2");
+  EXPECT_EQ(io::ReadImage(In("frames") + "/good-video-001-0001.png").width(), 162);
+  ViewerProgram::Do({"key", "space"});
+  viewer.WaitFor("the end of a flight", [](const Json& s) { return s["at_view"] == "0003.jpg"; });
+}
+
+TEST_F(ViewerWindow, TheSetOnTheDiskIsReadAnewAndItsLossIsNoCrash) {
+  NeedDisplay();
+  if (IsSkipped()) return;
+  const fs::path set = In("mine.dtr");
+  fs::copy(Set(), set, fs::copy_options::recursive);
+  ViewerProgram viewer(set, folder_.path(), {"--size", "320x240", "--no-panel"});
+  viewer.WaitFor("the first picture", Anything);
+  ViewerProgram::Do({"mousemove", "150", "120", "key", "Right"});
+  viewer.WaitFor("another view", [](const Json& s) { return s["at_view"] == "0002.jpg"; });
+  const std::string good = Text(set / "set.json");
+
+  WriteFileAtomically(set / "set.json", good.substr(0, good.size() / 2));
+  const Json broken = viewer.WaitFor("word of a broken set", [](const Json& s) {
+    return s["message"].get<std::string>().find("set.json") != std::string::npos;
+  });
+  EXPECT_EQ(broken["at_view"], "0002.jpg");
+  EXPECT_GT(broken["coverage"], 0.5);
+
+  fs::rename(set, In("away.dtr"));
+  viewer.WaitFor("word of a set that vanished", [](const Json& s) {
+    return s["message"].get<std::string>().find("found nothing") != std::string::npos;
+  });
+  ViewerProgram::Do({"key", "Left"});  // it goes on with what it has
+  viewer.WaitFor("a view before", [](const Json& s) { return s["at_view"] == "0001.jpg"; });
+
+  Json without = Json::parse(good);  // comes back with one view less
+  Json& views = without["frames"][0]["views"];
+  for (size_t i = 0; i < views.size(); ++i) {
+    if (views[i]["name"] == "0003.jpg") views.erase(i);
+  }
+  WriteFileAtomically(In("away.dtr/set.json"), without.dump());
+  fs::rename(In("away.dtr"), set);
+  const Json anew = viewer.WaitFor("the new set", [](const Json& s) { return s["reloads"] == 1; });
+  EXPECT_EQ(anew["at_view"], "0001.jpg");  // the camera stays
+  for (const Json& name : anew["views_used"]) EXPECT_NE(name, "0003.jpg");
+  EXPECT_FALSE(anew["views_used"].empty());
 }
 
 TEST_F(ViewerWindow, WhatIsInspectedIsSaid) {
@@ -162,11 +240,12 @@ TEST_F(ViewerWindow, WhatIsInspectedIsSaid) {
   const Json measured =
       viewer.WaitFor("a distance", [](const Json& s) { return s["distance"] != ""; });
   EXPECT_FALSE(measured["distance"].get<std::string>().starts_with("0 "));
-  for (const char* compared : {"nearest photo", "other method", "splats", "nothing"}) {
+  for (const char* compared : {"nearest photo", "other method", "other primitive", "nothing"}) {
     ViewerProgram::Do({"key", "x"});
     viewer.WaitFor(compared, [&](const Json& s) { return s["compared"] == compared; });
   }
-  for (const char* shown : {"depth", "sigma", "weights", "view count", "coverage", "colour"}) {
+  for (const char* shown :
+       {"depth", "sigma", "weights", "view count", "coverage", "wireframe", "colour"}) {
     ViewerProgram::Do({"key", "Down"});
     viewer.WaitFor(shown, [&](const Json& s) { return s["shown"] == shown; });
   }
@@ -208,7 +287,7 @@ TEST_F(ViewerWindow, AFlightIsTimedAndItsEndIsSaved) {
   if (IsSkipped()) return;
   const Ran ran =
       DtrOk({"view", Set(), "--size", "320x240", "--fly-through", "12", "--frames", "20", "-o",
-             folder_.path().string(), "--screenshot", In("end.png").string(), "--json", "-"});
+             folder_.path().string(), "--screenshot", In("end.png"), "--json", "-"});
   const Json json = Json::parse(ran.out);
   EXPECT_GE(json["frames"], 20);
   EXPECT_GE(json["moving"]["frames"], 10);
@@ -225,11 +304,11 @@ TEST_F(ViewerWindow, WhatCannotWorkIsSaidInOneLine) {
                   "window: expected a display to open it on, found none");
     EXPECT_THAT(Dtr({"view", Set()}).err, HasSubstr("dtr render"));
   }
-  ExpectRefused(Dtr({"view", In("absent.dtr").string()}), kFailed,
+  ExpectRefused(Dtr({"view", In("absent.dtr")}), kFailed,
                 "expected the folder of a D+TR set, found nothing");
-  ExpectRefused(Dtr({"view", Set(), "--screenshot", In("a.png").string()}), kWrongUsage,
+  ExpectRefused(Dtr({"view", Set(), "--screenshot", In("a.png")}), kWrongUsage,
                 "--screenshot: expected --frames N with it");
-  ExpectRefused(Dtr({"view", Set(), "-o", In("absent").string()}), kWrongUsage,
+  ExpectRefused(Dtr({"view", Set(), "-o", In("absent")}), kWrongUsage,
                 "expected a folder to save into, found none");
   NeedDisplay();
   if (IsSkipped()) return;

@@ -32,8 +32,10 @@ struct AppSettings {
   bool panel = true, cameras = false, photo = false;  ///< shown from the start; photo: compared
   /// Cameras to fly along at once, one a frame, as while moving; empty: none.
   std::vector<NovelCamera> play;
+  int laps = 1;                      ///< so many times
   std::optional<NovelCamera> start;  ///< none: the first input camera
   int frames = 0;                    ///< close after so many, once the picture is whole; 0: never
+  int largest_divisor = 8;           ///< of the sides of pictures while moving
   std::filesystem::path screenshot;  ///< of the window, written at the end; empty: none
 };
 
@@ -59,15 +61,22 @@ struct AppState {
   std::vector<std::string> hidden;        ///< views left out
   std::vector<std::string> under_cursor;  ///< views that the magnifier names, largest share first
   std::string distance;                   ///< between two marks; empty: none
-  std::string message;                    ///< the last one in the window
+  int path_keys = 0;                      ///< cameras of the path
+  int reloads = 0;                        ///< how often the set was read anew
+  bool recording = false;
+  std::string message;  ///< the last one in the window
   RenderOptions render;
 };
 
 /// What the viewer leaves to the program around it.
 struct Host {
-  /// Reads the set anew. `note` is told of what is left out, on the thread that draws.
-  std::function<std::unique_ptr<OpenedSet>(const std::function<void(const std::string&)>& note)>
-      open;
+  /// Reads the set anew; throws dtr::Error where it cannot.
+  std::function<std::unique_ptr<OpenedSet>()> open;
+  /// Differs whenever another set lies on the disk, or none: then it is read anew. Cheap. Null:
+  /// nothing is watched.
+  std::function<std::string()> stamp;
+  /// The cameras of a path file, in the set's stored world. Throws dtr::Error.
+  std::function<std::vector<NovelCamera>(const DtrSet&, const std::filesystem::path&)> read_path;
   /// Sigmas of a view's inverse depth from the disk; empty where it has none.
   std::function<Grid<float>(const View&)> load_sigma;
   /// The command that draws the picture of the one camera in a file (cameras.json) without some
@@ -83,13 +92,22 @@ struct Host {
   std::function<void(const AppState&)> state_changed;
 };
 
+/// Moving frames together: time on the wall and of the processor, in milliseconds.
+struct FrameTimes {
+  int frames = 0;
+  double ms = 0, cpu_ms = 0;
+};
+
 /// What a run of the viewer measured.
 struct AppReport {
   AppState last;
-  double first_picture_ms = 0;  ///< from the call of RunViewer to the first whole picture shown
-  int moving_frames = 0;
-  double moving_ms = 0, moving_cpu_ms = 0;  ///< of all moving frames together
-  int largest_divisor = 1;
+  /// From the call of RunViewer to the first whole picture shown.
+  double first_picture_ms = 0, first_picture_cpu_ms = 0;
+  FrameTimes moving;
+  std::map<int, FrameTimes> moving_by_divisor;  ///< of the picture's sides
+  /// Physical memory held, sampled every so many frames: what grows shows.
+  static constexpr int kFramesPerSample = 500;
+  std::vector<size_t> memory_bytes;
   size_t view_bytes = 0;  ///< decoded pixels in memory at the end
 };
 

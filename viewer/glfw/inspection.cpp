@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dtr/render/option_names.h"
 #include "dtr/report/contact_sheet.h"
 
 namespace dtr::viewer {
@@ -45,6 +46,18 @@ void EndRight(ImDrawList& list, float border) {
   list.AddLine({border * display.x, 0}, {border * display.x, display.y}, kLine, 2);
 }
 
+/// A line of text that can be read on any picture.
+void Label(ImDrawList& list, const ImVec2& at, ImU32 colour, const std::string& text) {
+  const ImVec2 size = ImGui::CalcTextSize(text.c_str());
+  list.AddRectFilled({at.x - 4, at.y - 2}, {at.x + size.x + 4, at.y + size.y + 2}, kGround);
+  list.AddText(at, colour, text.c_str());
+}
+
+std::string Described(const RenderOptions& options) {
+  if (options.method == RenderMethod::kDeferred) return NameOf(options.method);
+  return fmt::format("{}, {}", NameOf(options.method), NameOf(options.primitive));
+}
+
 void Text(const std::string& line) { ImGui::TextUnformatted(line.c_str()); }
 
 }  // namespace
@@ -57,8 +70,8 @@ const char* NameOf(Compared compared) {
       return "nearest photo";
     case Compared::kOtherMethod:
       return "other method";
-    case Compared::kSplats:
-      return "splats";
+    case Compared::kOtherPrimitive:
+      return "other primitive";
   }
   return "";
 }
@@ -71,9 +84,11 @@ std::optional<RenderOptions> OptionsOf(Compared compared, const RenderOptions& o
     other.primitive = Primitive::kMesh;
     return other;
   }
-  if (compared == Compared::kSplats) {
+  if (compared == Compared::kOtherPrimitive) {
+    const bool splats =
+        options.method == RenderMethod::kTwoPass && options.primitive == Primitive::kSplat;
     other.method = RenderMethod::kTwoPass;
-    other.primitive = Primitive::kSplat;
+    other.primitive = splats ? Primitive::kMesh : Primitive::kSplat;
     return other;
   }
   return std::nullopt;
@@ -100,11 +115,17 @@ std::string Inspection::DistanceText() const {
                      unit);
 }
 
-void InspectionOverlay::DrawCompared(const Inspection& inspection, const PictureTexture& other) {
+void InspectionOverlay::DrawCompared(const Inspection& inspection, const PictureTexture& other,
+                                     const RenderOptions& left, const RenderOptions& right) {
   ImDrawList& list = *ImGui::GetBackgroundDrawList();
+  const ImVec2 display = ImGui::GetIO().DisplaySize;
   CoverRight(list, inspection.border);
-  list.AddImage(IdOf(other), {0, 0}, ImGui::GetIO().DisplaySize);
+  list.AddImage(IdOf(other), {0, 0}, display);
   EndRight(list, inspection.border);
+  const std::string names[] = {Described(left), Described(right)};
+  const float at = inspection.border * display.x;
+  const float x[] = {at - ImGui::CalcTextSize(names[0].c_str()).x - 10, at + 10};
+  for (size_t side = 0; side < 2; ++side) Label(list, {x[side], 8}, kLine, names[side]);
 }
 
 void InspectionOverlay::DrawPhoto(const Inspection& inspection, const View& view,
@@ -184,11 +205,7 @@ void InspectionOverlay::DrawMarks(const Inspection& inspection, const NovelCamer
   if (at.size() < 2) return;
   list.AddLine(at[0], at[1], kMark, 2);
   const ImVec2 middle(0.5F * (at[0].x + at[1].x) + 8, 0.5F * (at[0].y + at[1].y));
-  const std::string text = inspection.DistanceText();
-  const ImVec2 size = ImGui::CalcTextSize(text.c_str());
-  list.AddRectFilled({middle.x - 4, middle.y - 2}, {middle.x + size.x + 4, middle.y + size.y + 2},
-                     kGround);
-  list.AddText(middle, kMark, text.c_str());
+  Label(list, middle, kMark, inspection.DistanceText());
 }
 
 void InspectionOverlay::DrawMagnifier(const Inspection& inspection, const PictureTexture& picture) {

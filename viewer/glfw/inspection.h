@@ -15,10 +15,11 @@
 
 namespace dtr::viewer {
 
-/// What the right part of the window shows instead.
-enum class Compared { kNothing, kPhoto, kOtherMethod, kSplats };
+/// What the right part of the window shows instead. The other primitive: splats beside a mesh, a
+/// mesh beside splats (S65 of the founding report), both by two passes.
+enum class Compared { kNothing, kPhoto, kOtherMethod, kOtherPrimitive };
 inline constexpr std::array kAllCompared{Compared::kNothing, Compared::kPhoto,
-                                         Compared::kOtherMethod, Compared::kSplats};
+                                         Compared::kOtherMethod, Compared::kOtherPrimitive};
 const char* NameOf(Compared compared);
 /// The options of the other picture; none where it is no rendering.
 std::optional<RenderOptions> OptionsOf(Compared compared, const RenderOptions& options);
@@ -44,8 +45,9 @@ struct Inspection {
 /// Draws it with ImGui. Thumbnails are made of the views that are in memory.
 class InspectionOverlay {
  public:
-  /// The other picture, right of the border.
-  void DrawCompared(const Inspection& inspection, const PictureTexture& other);
+  /// The other picture, right of the border, and what each side is drawn by.
+  void DrawCompared(const Inspection& inspection, const PictureTexture& other,
+                    const RenderOptions& left, const RenderOptions& right);
   /// The photo of `view` where it would lie if this were its camera.
   void DrawPhoto(const Inspection& inspection, const View& view, const NovelCamera& camera);
   void DrawCameras(const Controller& controller, const Inspection& inspection,

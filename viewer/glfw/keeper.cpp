@@ -50,14 +50,11 @@ fs::path Keeper::Free(const std::string& kind, const std::string& extension) con
 
 fs::path Keeper::SavePicture(PictureMaker& maker) const {
   const MadePicture& picture = maker.picture();
-  const RenderResult& result = maker.Result();
   const fs::path file = Free("picture", ".png");
-  if (picture.shown != Shown::kColour) {
-    io::WriteImage(file, maker.InFalseColour());
-  } else if (picture.options.fill_holes) {
-    io::WriteImage(file, result.image);
+  if (picture.shown != Shown::kColour || picture.options.fill_holes) {
+    io::WriteImage(file, maker.Image());
   } else {
-    io::WriteImageWithAlpha(file, result.image, result.coverage);
+    io::WriteImageWithAlpha(file, maker.Image(), maker.Result().coverage);
   }
   return file;
 }
@@ -74,11 +71,16 @@ fs::path Keeper::SaveCamera(const NovelCamera& camera, const DtrSet& set) const 
   return file;
 }
 
-fs::path Keeper::AddToPath(const NovelCamera& camera, const DtrSet& set) {
+fs::path Keeper::SavePath(const std::vector<NovelCamera>& path, const DtrSet& set) {
   if (path_file_.empty()) path_file_ = Free("path", ".json");
-  path_.push_back(camera);
-  WriteCameras(path_file_, path_, set);
+  WriteCameras(path_file_, path, set);
   return path_file_;
+}
+
+fs::path Keeper::NameVideo(const std::vector<NovelCamera>& frames, const DtrSet& set) const {
+  const fs::path video = Free("video", ".mp4");
+  WriteCameras(fs::path(video).replace_extension(".json"), frames, set);
+  return video;
 }
 
 void SaveWindowAs(const fs::path& file, GLFWwindow* window) {

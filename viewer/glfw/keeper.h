@@ -24,9 +24,13 @@ class Keeper {
   std::filesystem::path SaveWindow(GLFWwindow* window) const;
   /// cameras.json of one camera in the set's world.
   std::filesystem::path SaveCamera(const NovelCamera& camera, const DtrSet& set) const;
-  /// Adds a camera to the path of this session, a cameras.json that `dtr render --path` reads; the
-  /// first one begins a new file.
-  std::filesystem::path AddToPath(const NovelCamera& camera, const DtrSet& set);
+  /// cameras.json of a path in the set's world, that `dtr render --path` reads, always into the
+  /// same file; the first call begins a new one.
+  std::filesystem::path SavePath(const std::vector<NovelCamera>& path, const DtrSet& set);
+  /// Leaves that file as it is: the next path goes into another.
+  void BeginNewPath() { path_file_.clear(); }
+  /// A name for a video, and beside it cameras.json of its frames.
+  std::filesystem::path NameVideo(const std::vector<NovelCamera>& frames, const DtrSet& set) const;
 
  private:
   std::filesystem::path Free(const std::string& kind, const std::string& extension) const;
@@ -34,7 +38,6 @@ class Keeper {
   std::filesystem::path folder_;
   std::string stem_;
   std::filesystem::path path_file_;  ///< empty: none yet
-  std::vector<NovelCamera> path_;
 };
 
 /// What is in framebuffer 0 of the current context, as PNG or JPEG by the file's extension.

@@ -20,10 +20,13 @@ constexpr std::array kHelp{
     HelpLine{"Down, Up", "show the next, the previous kind of picture"},
     HelpLine{"F", "input cameras with their photos and verdicts on, off"},
     HelpLine{"G", "magnifying glass: depth, sigma, views and weights under the cursor"},
-    HelpLine{"X", "compare: with the nearest photo, the other method, splats"},
+    HelpLine{"X", "compare: with the nearest photo, the other method, the other primitive"},
     HelpLine{"H", "leave the nearest view out, take it in again"},
     HelpLine{"M", "mark the point under the cursor; two marks: their distance"},
-    HelpLine{"K", "add this camera to the path file, for --path"},
+    HelpLine{"K", "add this camera to the path"},
+    HelpLine{"O", "load a path file; or drop one onto the window"},
+    HelpLine{"Space", "fly along the path, stop"},
+    HelpLine{"R", "record the path as MP4, stop"},
     HelpLine{"P", "save the picture"},
     HelpLine{"F12", "save the window"},
     HelpLine{"L", "command line of this picture, to the clipboard and the terminal"},
@@ -46,6 +49,8 @@ constexpr std::array kBindings{
     Binding{GLFW_KEY_F, Action::kCameras},      Binding{GLFW_KEY_G, Action::kMagnifier},
     Binding{GLFW_KEY_X, Action::kCompare},      Binding{GLFW_KEY_H, Action::kHideView},
     Binding{GLFW_KEY_M, Action::kMark},         Binding{GLFW_KEY_K, Action::kAddKey},
+    Binding{GLFW_KEY_O, Action::kOpenPath},     Binding{GLFW_KEY_SPACE, Action::kFlyPath},
+    Binding{GLFW_KEY_R, Action::kRecord},
 };
 
 }  // namespace

@@ -155,6 +155,24 @@ void InspectControls(PanelModel& model) {
   ImGui::TreePop();
 }
 
+void PathControls(PanelModel& model) {
+  Flight& flight = model.flight;
+  const int frames = flight.keys().empty()
+                         ? 0
+                         : static_cast<int>(flight.keys().size() - 1) * flight.frames_per_key + 1;
+  Text(fmt::format("{} cameras, {} frames", flight.keys().size(), frames));
+  Whole("frames per camera", flight.frames_per_key, 1, Flight::kMostFramesPerKey);
+  if (ImGui::Button("add camera")) model.pressed.push_back(Action::kAddKey);
+  ImGui::SameLine();
+  if (ImGui::Button("load...")) model.pressed.push_back(Action::kOpenPath);
+  if (ImGui::Button(flight.flying() ? "stop" : "fly")) model.pressed.push_back(Action::kFlyPath);
+  ImGui::SameLine();
+  if (ImGui::Button(model.recording.empty() ? "record MP4" : "stop recording")) {
+    model.pressed.push_back(Action::kRecord);
+  }
+  if (!model.recording.empty()) Text(model.recording);
+}
+
 }  // namespace
 
 void DrawPanel(UserInterface& interface, PanelModel& model) {
@@ -173,9 +191,9 @@ void DrawPanel(UserInterface& interface, PanelModel& model) {
     if (ImGui::CollapsingHeader("Render options", ImGuiTreeNodeFlags_DefaultOpen)) {
       RenderControls(model.options);
     }
+    if (ImGui::CollapsingHeader("Path", ImGuiTreeNodeFlags_DefaultOpen)) PathControls(model);
     if (ImGui::CollapsingHeader("Keep", ImGuiTreeNodeFlags_DefaultOpen)) {
       if (ImGui::Button("copy command line")) model.pressed.push_back(Action::kCopyCommand);
-      if (ImGui::Button("add camera to path")) model.pressed.push_back(Action::kAddKey);
       if (ImGui::Button("save picture")) model.pressed.push_back(Action::kSavePicture);
       ImGui::SameLine();
       if (ImGui::Button("save window")) model.pressed.push_back(Action::kSaveWindow);

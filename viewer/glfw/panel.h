@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "viewer/controller.h"
+#include "viewer/flight.h"
 #include "viewer/glfw/inspection.h"
 #include "viewer/glfw/keys.h"
 #include "viewer/glfw/picture_maker.h"
@@ -18,6 +19,8 @@ struct PanelModel {
   RenderOptions& options;
   Shown& shown;
   Inspection& inspection;
+  Flight& flight;
+  std::string recording;  ///< how far a video is; empty: none
   const std::string& message;
   double window_ms = 0;          ///< of the window itself: panels, copying, waiting for the display
   double frames_per_second = 0;  ///< of moving frames; 0: none of late

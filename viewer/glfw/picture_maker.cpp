@@ -34,8 +34,13 @@ PictureMaker::PictureMaker(ViewStream& stream, gl::RendererSettings settings, Si
     : stream_(stream), renderer_(std::move(settings)), sigma_of_(std::move(sigma_of)) {}
 
 ImageRgb8 PictureMaker::InFalseColour() {
-  return FalseColour(picture_.shown, {Result(), picture_.scene, picture_.camera, picture_.options},
-                     sigma_of_);
+  const Drawn drawn{Result(), picture_.scene, picture_.camera, picture_.options};
+  if (picture_.shown == Shown::kWireframe) return wireframe_.Draw(drawn);
+  return FalseColour(picture_.shown, drawn, sigma_of_);
+}
+
+ImageRgb8 PictureMaker::Image() {
+  return picture_.shown == Shown::kColour ? Result().image : InFalseColour();
 }
 
 void PictureMaker::MakeMoving(const PictureOrder& order, int divisor) {

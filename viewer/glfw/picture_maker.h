@@ -9,6 +9,7 @@
 #include "dtr/render/view_stream.h"
 #include "viewer/glfw/picture_texture.h"
 #include "viewer/shown.h"
+#include "viewer/wireframe.h"
 
 namespace dtr::viewer {
 
@@ -56,18 +57,20 @@ class PictureMaker {
   const PictureTexture& other() const { return other_; }
 
   const MadePicture& picture() const { return picture_; }
-  /// What the picture shows in false colours (of the last result).
-  ImageRgb8 InFalseColour();
+  /// The picture's pixels as they are kept: colours as `dtr render` writes them, else as shown.
+  ImageRgb8 Image();
   /// Of the last picture; the first call after it reads it back from the GPU.
   const RenderResult& Result();
 
  private:
   void Make(const PictureOrder& order, int divisor, ViewStream::Wait wait);
+  ImageRgb8 InFalseColour();
   void Show(const PictureOrder& order, const gl::DrawnPicture& drawn, bool still);
 
   ViewStream& stream_;
   gl::Renderer renderer_;
   const SigmaOf sigma_of_;
+  Wireframe wireframe_;
   MadePicture picture_;
   PictureTexture other_;
   std::optional<RenderResult> result_;

@@ -108,6 +108,12 @@ struct UserInterface::Callbacks {
     Of(window).any_input_ = true;
   }
 
+  static void Drop(GLFWwindow* window, int count, const char** files) {
+    UserInterface& self = Of(window);
+    self.any_input_ = true;
+    for (int i = 0; i < count; ++i) self.inputs_.emplace_back(FileInput{files[i]});
+  }
+
   static void Changed(GLFWwindow* window) { Of(window).any_input_ = true; }
   static void SizeChanged(GLFWwindow* window, int, int) { Of(window).any_input_ = true; }
 };
@@ -129,6 +135,7 @@ UserInterface::UserInterface(GLFWwindow* window) : window_(window) {
   glfwSetWindowFocusCallback(window, &Callbacks::Focus);
   glfwSetCursorEnterCallback(window, &Callbacks::Enter);
   glfwSetWindowRefreshCallback(window, &Callbacks::Changed);
+  glfwSetDropCallback(window, &Callbacks::Drop);
   glfwSetFramebufferSizeCallback(window, &Callbacks::SizeChanged);
 }
 
@@ -141,6 +148,7 @@ UserInterface::~UserInterface() {
   glfwSetWindowFocusCallback(window_, nullptr);
   glfwSetCursorEnterCallback(window_, nullptr);
   glfwSetWindowRefreshCallback(window_, nullptr);
+  glfwSetDropCallback(window_, nullptr);
   glfwSetFramebufferSizeCallback(window_, nullptr);
   ImGui_ImplOpenGL3_Shutdown();
   ImGui_ImplGlfw_Shutdown();

@@ -2,6 +2,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <array>
+#include <filesystem>
 #include <variant>
 #include <vector>
 
@@ -17,7 +18,11 @@ struct ActionInput {
   Action action = Action::kHelp;
   Eigen::Vector2d cursor_px{0, 0};
 };
-using UserInput = std::variant<InputEvent, ActionInput>;
+/// A file that was dropped onto the window.
+struct FileInput {
+  std::filesystem::path file;
+};
+using UserInput = std::variant<InputEvent, ActionInput, FileInput>;
 
 /// One at a time; its context must be current. Input is kept in order, also what comes and goes
 /// between two frames. What is done over a panel or typed into a field is ImGui's alone.

@@ -1,4 +1,4 @@
-#include "cli/video.h"
+#include "dtr/io/video.h"
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -7,7 +7,7 @@
 #include "dtr/base/process.h"
 #include "dtr/io/image_io.h"
 
-namespace dtr::cli {
+namespace dtr::io {
 namespace fs = std::filesystem;
 
 VideoWriter::VideoWriter(fs::path target, int frames_per_second)
@@ -27,7 +27,7 @@ VideoWriter::~VideoWriter() {
 }
 
 void VideoWriter::Add(const ImageRgb8& frame) {
-  io::WriteImage(frames_ / fmt::format("{:06}.png", count_++), frame);
+  WriteImage(frames_ / fmt::format("{:06}.png", count_++), frame);
 }
 
 void VideoWriter::Finish(const Progress& progress) {
@@ -52,4 +52,4 @@ void VideoWriter::Finish(const Progress& progress) {
   fs::rename(encoded, target_);
 }
 
-}  // namespace dtr::cli
+}  // namespace dtr::io

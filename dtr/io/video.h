@@ -1,4 +1,4 @@
-// cli/video.h -- frames into an MP4 file, by the ffmpeg program.
+// dtr/io/video.h -- frames into an MP4 file, by the ffmpeg program.
 #pragma once
 #include <filesystem>
 #include <memory>
@@ -6,7 +6,10 @@
 #include "dtr/base/progress.h"
 #include "dtr/types/grid.h"
 
-namespace dtr::cli {
+namespace dtr::io {
+
+/// Of what `dtr` records.
+inline constexpr int kVideoFramesPerSecond = 24;
 
 /// Collects frames and encodes them (H.264, yuv420p, constant quality) when finished. The target
 /// appears whole or not at all. Throws Error when ffmpeg is missing or fails.
@@ -26,4 +29,4 @@ class VideoWriter {
   int count_ = 0;
 };
 
-}  // namespace dtr::cli
+}  // namespace dtr::io

@@ -1,0 +1,86 @@
+#include "viewer/glfw/inspector.h"
+
+#include <chrono>
+#include <cmath>
+#include <exception>
+#include <utility>
+
+#include "dtr/base/error.h"
+
+namespace dtr::viewer {
+
+void Inspector::Look(bool whole, const RenderOptions& options, const Eigen::Vector2d& cursor_px) {
+  if (std::exchange(picture_, from_.schedule.count()) != picture_) {
+    other_made_.reset();
+    probed_.reset();
+  }
+  if (!whole) {
+    inspection_.under_cursor.reset();
+    probed_.reset();
+    return;
+  }
+  try {
+    const auto other = OptionsOf(inspection_.compared, options);
+    if (other && !(other_made_ && *other_made_ == *other)) {
+      from_.maker.MakeOther(*other);
+      other_made_ = *other;
+    }
+    if (cursor_px != last_cursor_) {
+      last_cursor_ = cursor_px;
+      cursor_rests_.Restart();
+    }
+    const bool rests = cursor_rests_.seconds() >= kStillAfterSeconds;
+    if (inspection_.magnifier && rests && probed_ != cursor_px) {
+      inspection_.under_cursor = ProbeAt(cursor_px);
+      probed_ = cursor_px;
+    }
+    for (const Eigen::Vector2d& pixel : std::exchange(to_mark_, {})) {
+      if (const auto probe = ProbeAt(pixel)) inspection_.Mark(*probe);
+    }
+  } catch (const Error& error) {
+    inspection_.compared = Compared::kNothing;
+    from_.tell(error.what());
+  }
+}
+
+std::optional<Probe> Inspector::ProbeAt(const Eigen::Vector2d& pixel) {
+  const int x = static_cast<int>(std::floor(pixel.x()));
+  const int y = static_cast<int>(std::floor(pixel.y()));
+  const MadePicture& picture = from_.maker.picture();
+  const DepthImage& depth = from_.maker.Result().depth;
+  if (!depth.Contains(x, y) || DepthImage::IsHole(depth(x, y))) return std::nullopt;
+  return ProbePixel(picture.scene, picture.camera, picture.options, x, y, depth(x, y),
+                    from_.sigma_of);
+}
+
+void Inspector::AskForVerdicts() {
+  if (!inspection_.cameras || !from_.verdicts) return;
+  if (!std::exchange(verdicts_asked_, true)) {
+    verdicts_coming_ = std::async(std::launch::async, from_.verdicts);
+  }
+  if (verdicts_coming_.valid() &&
+      verdicts_coming_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) {
+    try {
+      verdicts_ = verdicts_coming_.get();
+    } catch (const std::exception& error) {
+      from_.tell(error.what());
+    }
+  }
+}
+
+void Inspector::Draw(const RenderOptions& options) {
+  AskForVerdicts();
+  const Controller& controller = from_.controller;
+  const auto nearest = controller.nearest_view();
+  if (inspection_.compared == Compared::kPhoto && nearest) {
+    overlay_.DrawPhoto(inspection_, *controller.surroundings().views[*nearest],
+                       controller.camera());
+  } else if (other_made_ && inspection_.compared != Compared::kNothing) {
+    overlay_.DrawCompared(inspection_, from_.maker.other(), options, *other_made_);
+  }
+  if (inspection_.cameras) overlay_.DrawCameras(controller, inspection_, verdicts_);
+  overlay_.DrawMarks(inspection_, controller.camera());
+  if (inspection_.magnifier) overlay_.DrawMagnifier(inspection_, from_.maker.picture().texture);
+}
+
+}  // namespace dtr::viewer

@@ -1,0 +1,61 @@
+// viewer/glfw/inspector.h -- what is looked up about the whole picture, and drawn over it.
+#pragma once
+#include <functional>
+#include <future>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "viewer/controller.h"
+#include "viewer/glfw/app.h"
+#include "viewer/glfw/inspection.h"
+#include "viewer/glfw/picture_maker.h"
+#include "viewer/glfw/picture_schedule.h"
+#include "viewer/probe.h"
+
+namespace dtr::viewer {
+
+/// Of one set: everything here points to its views.
+class Inspector {
+ public:
+  using Verdicts = std::map<std::string, ViewVerdict>;
+  struct Sources {
+    PictureMaker& maker;
+    const PictureSchedule& schedule;
+    const Controller& controller;
+    SigmaOf sigma_of;
+    std::function<Verdicts()> verdicts;  ///< may be null; called on a thread of its own
+    std::function<void(const std::string&)> tell;
+  };
+  explicit Inspector(Sources sources) : from_(std::move(sources)) {}
+
+  Inspection& inspection() { return inspection_; }
+  const Inspection& inspection() const { return inspection_; }
+
+  /// To be marked on the next whole picture.
+  void MarkAt(const Eigen::Vector2d& pixel) { to_mark_.push_back(pixel); }
+  /// Looks up what is asked for, of a whole picture; otherwise forgets what was of another.
+  void Look(bool whole, const RenderOptions& options, const Eigen::Vector2d& cursor_px);
+  /// Draws it with ImGui.
+  void Draw(const RenderOptions& options);
+
+ private:
+  std::optional<Probe> ProbeAt(const Eigen::Vector2d& pixel);
+  void AskForVerdicts();
+
+  const Sources from_;
+  Inspection inspection_;
+  InspectionOverlay overlay_;
+  int picture_ = -1;                         ///< number of the picture that what follows is of
+  std::optional<RenderOptions> other_made_;  ///< options of the other picture beside it
+  std::optional<Eigen::Vector2d> probed_;    ///< where the cursor rested
+  Eigen::Vector2d last_cursor_{-1, -1};
+  Stopwatch cursor_rests_;
+  std::vector<Eigen::Vector2d> to_mark_;
+  std::future<Verdicts> verdicts_coming_;
+  Verdicts verdicts_;
+  bool verdicts_asked_ = false;
+};
+
+}  // namespace dtr::viewer

@@ -1,0 +1,121 @@
+#include "viewer/glfw/path_tools.h"
+
+#include <fmt/format.h>
+#include <imgui.h>
+
+#include <algorithm>
+#include <system_error>
+#include <utility>
+
+#include "dtr/base/error.h"
+
+namespace dtr::viewer {
+
+namespace fs = std::filesystem;
+
+void PathTools::AddKey(const NovelCamera& camera, const DtrSet& set) {
+  try {
+    flight_.AddKey(camera);
+    tell_("added to " + keeper_.SavePath(flight_.keys(), set).string());
+  } catch (const Error& error) {
+    tell_(error.what());
+  }
+}
+
+void PathTools::Load(const fs::path& file, const DtrSet& set) {
+  try {
+    flight_.Replace(host_.read_path(set, file));
+    keeper_.BeginNewPath();
+    tell_(fmt::format("{}: {} cameras", file.string(), flight_.keys().size()));
+  } catch (const Error& error) {
+    tell_(error.what());
+  }
+}
+
+void PathTools::StartOrStopRecording(const PinholeCamera& like, const DtrSet& set) {
+  if (recording_) return Abort("stopped by hand");
+  try {
+    std::vector<NovelCamera> frames = flight_.Frames(like);
+    if (frames.empty()) {
+      return tell_("a video needs a path: K adds cameras to it, O loads one from a file");
+    }
+    const fs::path video = keeper_.NameVideo(frames, set);
+    flight_.Stop();
+    recording_ = std::make_unique<Recording>(video, std::move(frames));
+  } catch (const Error& error) {
+    tell_(error.what());
+  }
+}
+
+std::string PathTools::Progress() const {
+  if (!recording_) return "";
+  if (!recording_->Wanted()) return "encoding " + recording_->target().filename().string();
+  return fmt::format("recording {} of {}", recording_->drawn() + 1, recording_->frames());
+}
+
+void PathTools::Filmed(const ImageRgb8& picture) {
+  try {
+    recording_->Add(picture);
+  } catch (const Error& error) {
+    Abort(error.what());
+  }
+}
+
+void PathTools::Tend() {
+  if (!recording_) return;
+  try {
+    if (!recording_->Done()) return;
+    tell_(fmt::format("saved {} ({} frames)", recording_->target().string(), recording_->frames()));
+    recording_.reset();
+  } catch (const Error& error) {
+    Abort(error.what());
+  }
+}
+
+void PathTools::Abort(const std::string& why) {
+  const fs::path target = recording_->target();
+  recording_.reset();
+  std::error_code ignored;
+  fs::remove(fs::path(target).replace_extension(".json"), ignored);
+  tell_(target.string() + ": not recorded: " + why);
+}
+
+void PathDialog::Open() {
+  open_ = focus_ = true;
+  files_.clear();
+  std::fill(text_.begin(), text_.end(), char{0});
+  std::error_code error;
+  for (fs::directory_iterator it(folder_, error), end; !error && it != end; it.increment(error)) {
+    const std::string name = it->path().filename().string();
+    const bool path =
+        name.find("-path-") != std::string::npos || name.find("-video-") != std::string::npos;
+    if (path && it->path().extension() == ".json") files_.push_back(it->path());
+  }
+  std::sort(files_.begin(), files_.end());
+}
+
+std::optional<fs::path> PathDialog::Draw(UserInterface& interface) {
+  std::optional<fs::path> chosen;
+  const ImVec2 display = ImGui::GetIO().DisplaySize;
+  ImGui::SetNextWindowPos({0.5F * display.x, 0.3F * display.y}, ImGuiCond_Always, {0.5F, 0});
+  constexpr auto kFlags = ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_AlwaysAutoResize |
+                          ImGuiWindowFlags_NoCollapse;
+  if (ImGui::Begin("Load a path", &open_, kFlags)) {
+    if (std::exchange(focus_, false)) ImGui::SetKeyboardFocusHere();
+    constexpr float kFieldWidth = 420;
+    ImGui::SetNextItemWidth(kFieldWidth);
+    const bool entered =
+        ImGui::InputText("file", text_.data(), text_.size(), ImGuiInputTextFlags_EnterReturnsTrue);
+    if ((entered || ImGui::Button("load")) && text_.front() != 0) chosen = text_.data();
+    for (const fs::path& file : files_) {
+      if (ImGui::Selectable(file.filename().string().c_str())) chosen = file;
+    }
+    if (ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Escape))) open_ = false;
+  }
+  interface.ThisPanelIsOurs();
+  ImGui::End();
+  if (chosen) open_ = false;
+  return chosen;
+}
+
+}  // namespace dtr::viewer

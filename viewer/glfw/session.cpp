@@ -1,0 +1,77 @@
+#include "viewer/glfw/session.h"
+
+#include <algorithm>
+
+#include "viewer/navigation.h"
+
+namespace dtr::viewer {
+namespace {
+
+gl::RendererSettings MakerSettings(const AppSettings& settings, const Session::Tell& tell) {
+  gl::RendererSettings renderer;
+  renderer.shader_folder = settings.shader_folder;
+  renderer.gpu_bytes = settings.gpu_bytes;
+  renderer.warn = tell;
+  return renderer;
+}
+
+}  // namespace
+
+Session::Session(const AppSettings& settings, const Host& host, const Tell& tell, int width_px,
+                 int height_px)
+    : host_(host),
+      opened_(host.open()),
+      maker(*opened_->stream, MakerSettings(settings, tell),
+            [this](const View& view) { return SigmaOfView(view); }),
+      schedule(maker, settings.largest_divisor, tell),
+      controller(SurroundingsOf(opened_->set), width_px, height_px,
+                 [this](const Eigen::Vector2d& pixel) { return DepthAt(pixel); }),
+      inspector({maker, schedule, controller,
+                 [this](const View& view) { return SigmaOfView(view); }, host.verdicts, tell}) {
+  inspector.inspection().unit = opened_->set.unit == LengthUnit::kMetre ? "m" : "units";
+}
+
+Eigen::Vector3d Session::ContinueFrom(const Session& before) {
+  // Stored worlds are relative to their sets' origins.
+  const Eigen::Vector3d shift = opened_->set.world_origin - before.opened_->set.world_origin;
+  controller.JumpTo(InMovedWorld(before.controller.camera(), shift));
+  controller.set_fly_speed(before.controller.fly_speed());
+  Inspection& mine = inspector.inspection();
+  const Inspection& theirs = before.inspector.inspection();
+  mine.cameras = theirs.cameras;
+  mine.magnifier = theirs.magnifier;
+  mine.compared = theirs.compared;
+  mine.border = theirs.border;
+  const std::vector<std::string> hidden = before.HiddenNames();
+  for (const View* view : controller.surroundings().views) {
+    if (std::find(hidden.begin(), hidden.end(), view->name) != hidden.end()) mine.Toggle(*view);
+  }
+  return shift;
+}
+
+const Grid<float>* Session::SigmaOfView(const View& view) {
+  const auto known = sigmas_.find(&view);
+  if (known != sigmas_.end()) return &known->second;
+  return &(sigmas_[&view] = host_.load_sigma(view));
+}
+
+std::optional<double> Session::DepthAt(const Eigen::Vector2d& pixel) {
+  if (!schedule.has_picture()) return std::nullopt;
+  const NovelCamera& shown = maker.picture().camera;
+  const PinholeCamera& now = controller.camera().camera;
+  const auto x = static_cast<int>(pixel.x() * shown.camera.width_px() / now.width_px());
+  const auto y = static_cast<int>(pixel.y() * shown.camera.height_px() / now.height_px());
+  const DepthImage& depth = maker.Result().depth;
+  if (!depth.Contains(x, y) || DepthImage::IsHole(depth(x, y))) return std::nullopt;
+  const Eigen::Vector3d p_in_world = WorldPoint(shown, {x + 0.5, y + 0.5}, depth(x, y));
+  const double z = (controller.camera().cam_from_world * p_in_world).z();
+  return z > 0 ? std::optional(z) : std::nullopt;
+}
+
+std::vector<std::string> Session::HiddenNames() const {
+  std::vector<std::string> names;
+  for (const View* view : inspector.inspection().hidden) names.push_back(view->name);
+  return names;
+}
+
+}  // namespace dtr::viewer

@@ -1,0 +1,53 @@
+// viewer/glfw/session.h -- a set in the window, with all that points into it.
+#pragma once
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "viewer/controller.h"
+#include "viewer/glfw/app.h"
+#include "viewer/glfw/inspector.h"
+#include "viewer/glfw/picture_maker.h"
+#include "viewer/glfw/picture_schedule.h"
+
+namespace dtr::viewer {
+
+/// Replaced as a whole when the set is read anew. Belongs to the current context, as gl::Renderer.
+class Session {
+ public:
+  using Tell = std::function<void(const std::string&)>;
+  /// Opens the set; throws dtr::Error where it cannot. The settings and the host outlive it. Sizes
+  /// of the window in pixels.
+  Session(const AppSettings& settings, const Host& host, const Tell& tell, int width_px,
+          int height_px);
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
+
+  /// Goes on where another set was left, by what both call the same: the camera's place in the
+  /// world, views by their names. Returns what is to be added to points of this stored world to get
+  /// the other's: this origin less the other's.
+  Eigen::Vector3d ContinueFrom(const Session& before);
+
+  const OpenedSet& opened() const { return *opened_; }
+  /// What the shown picture shows there, as plane z of the present camera.
+  std::optional<double> DepthAt(const Eigen::Vector2d& pixel);
+  std::vector<std::string> HiddenNames() const;
+
+ private:
+  /// Read when first asked for and kept.
+  const Grid<float>* SigmaOfView(const View& view);
+
+  const Host& host_;
+  const std::unique_ptr<OpenedSet> opened_;
+  std::map<const View*, Grid<float>> sigmas_;
+
+ public:
+  PictureMaker maker;
+  PictureSchedule schedule;
+  Controller controller;
+  Inspector inspector;
+};
+
+}  // namespace dtr::viewer
