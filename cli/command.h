@@ -58,6 +58,7 @@ void AddPruneCommand(CLI::App& app);
 void AddImportCommand(CLI::App& app);
 void AddExportCommand(CLI::App& app);
 void AddDatasetCommand(CLI::App& app);
+void AddJoinCommand(CLI::App& app);
 void AddSelftestCommand(CLI::App& app);
 void AddManualCommands(CLI::App& app, const std::string& version);  ///< of the whole of `app`
 

@@ -30,6 +30,7 @@ int Run(int argc, char** argv) {
   dtr::cli::AddPruneCommand(app);
   dtr::cli::AddImportCommand(app);
   dtr::cli::AddExportCommand(app);
+  dtr::cli::AddJoinCommand(app);
   dtr::cli::AddDatasetCommand(app);
   dtr::cli::AddSelftestCommand(app);
   dtr::cli::AddManualCommands(app, DTR_VERSION);

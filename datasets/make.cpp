@@ -26,6 +26,7 @@ constexpr int kMinSidePx = 16, kMaxSidePx = 16384;
 // less than this.
 constexpr double kMaxScale = 1e6;
 constexpr double kMaxOffset = 1e9;
+constexpr double kMaxSeconds = 1;  // then the ball leaves the pictures
 constexpr double kMaxDriftStops = 10;
 constexpr int kMinVisibleOthers = 2;  // DESIGN section 5: "seen in at least 2 other views"
 
@@ -48,6 +49,7 @@ void Check(const DatasetSpec& spec) {
   for (int k = 0; k < 3; ++k) {
     CheckRange("world offset", spec.world_offset[k], -kMaxOffset, kMaxOffset);
   }
+  CheckRange("time", spec.time_s, -kMaxSeconds, kMaxSeconds);
   CheckRange("JPEG quality", spec.jpeg_quality, 1, 100);
 }
 
@@ -140,7 +142,7 @@ void MakeDataset(const DatasetSpec& given, const fs::path& given_folder, int thr
                      ": expected a folder that does not exist yet; remove "
                      "it or choose another name");
   }
-  const Scene scene = MakeScene(spec.scene, spec.seed);
+  const Scene scene = MakeScene(spec.scene, spec.seed, spec.time_s);
   if (spec.layout.empty()) spec.layout = scene.framing().layouts.front();
   const std::vector<Pose> poses = MakeLayout(scene, spec.layout, spec.views);
 

@@ -128,11 +128,14 @@ Lighting Daylight() {
 
 std::vector<std::string> SceneNames() { return {"courtyard", "plane", "stairs", "sphere", "room"}; }
 
-Scene MakeScene(const std::string& name, std::uint64_t seed) {
+Scene MakeScene(const std::string& name, std::uint64_t seed, double time_s) {
+  if (name == "sphere") return MakeSphere(seed, time_s);
+  if (time_s != 0) {
+    throw UsageError("--time: expected 0 for " + name + ", where nothing moves; sphere moves");
+  }
   if (name == "courtyard") return MakeCourtyard(seed);
   if (name == "plane") return MakePlane(seed);
   if (name == "stairs") return MakeStairs(seed);
-  if (name == "sphere") return MakeSphere(seed);
   if (name == "room") return MakeRoom(seed);
   throw UsageError("scene: expected courtyard, plane, stairs, sphere or room, found '" + name +
                    "'; see `dtr dataset list`");

@@ -52,6 +52,6 @@ Scene MakeCourtyard(std::uint64_t seed);
 Scene MakeRoom(std::uint64_t seed);
 Scene MakePlane(std::uint64_t seed);
 Scene MakeStairs(std::uint64_t seed);
-Scene MakeSphere(std::uint64_t seed);
+Scene MakeSphere(std::uint64_t seed, double time_s = 0);
 
 }  // namespace dtr::datasets

@@ -11,7 +11,8 @@ using Eigen::Vector3d;
 using Pattern = Material::Pattern;
 
 constexpr double kPlaneTiltDeg = 25;  // against the viewing direction of the middle camera
-constexpr double kPlaneHalf = 200;    // wide enough to fill every frame of its layouts
+constexpr double kBallRadius = 1.5, kRollingSpeed = 1;  // scene units, and per second
+constexpr double kPlaneHalf = 200;  // wide enough to fill every frame of its layouts
 
 }  // namespace
 
@@ -30,7 +31,7 @@ Scene MakePlane(std::uint64_t seed) {
   return std::move(b).Build("plane", Daylight(), framing);
 }
 
-Scene MakeSphere(std::uint64_t seed) {
+Scene MakeSphere(std::uint64_t seed, double time_s) {
   SceneBuilder b(seed);
   const int ball = b.Add({.pattern = Pattern::kMarble,
                           .color = {0.75, 0.45, 0.25},
@@ -42,9 +43,12 @@ Scene MakeSphere(std::uint64_t seed) {
                            .color = {0.45, 0.42, 0.38},
                            .color2 = {0.12, 0.11, 0.10},
                            .cell = 0.6});
-  b.Sphere(Vector3d::Zero(), 1.5, ball);
+  // It rolls along x without slipping; its marble turns with it.
+  Primitive& rolling = b.Sphere({kRollingSpeed * time_s, 0, 0}, kBallRadius, ball);
+  const double turn_rad = kRollingSpeed * time_s / kBallRadius;
+  rolling.local_from_world = Eigen::AngleAxisd(-turn_rad, Vector3d::UnitY()).toRotationMatrix();
   b.Rectangle({0, 4, 0}, 40 * Vector3d::UnitX(), 40 * Vector3d::UnitZ(), backdrop);
-  b.Rectangle({0, 0, -1.5}, 40 * Vector3d::UnitX(), 40 * Vector3d::UnitY(), floor);
+  b.Rectangle({0, 0, -kBallRadius}, 40 * Vector3d::UnitX(), 40 * Vector3d::UnitY(), floor);
   AddSky(b, 100);
   Framing framing;
   framing.distance = 6;

@@ -14,6 +14,7 @@
 #include "dtr/io/image_io.h"
 #include "dtr/io/pruned.h"
 #include "dtr/io/set_io.h"
+#include "dtr/render/instants.h"
 
 namespace dtr::cli {
 namespace {
@@ -92,6 +93,7 @@ int RunEvaluate(const Options& options, const Context& context) {
   load.threads = context.common.threads;
   load.warn = [&context](const std::string& line) { context.console.Note(line); };
   const DtrSet set = io::LoadSet(options.set, load);
+  RequireOneFrame(set);
 
   std::optional<eval::DepthScores> depth;
   if (!options.truth.empty()) {

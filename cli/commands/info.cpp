@@ -21,8 +21,10 @@ void AddInfoCommand(CLI::App& app) {
         return [options](const Context& context) -> int {
           const DtrSet set = io::ReadSet(options->set);
           if (options->held_out_names) {
-            for (const View& view : set.frames.front().views) {
-              if (view.role == ViewRole::kHeldOut) context.console.Say(view.name);
+            for (const Frame& frame : set.frames) {
+              for (const View& view : frame.views) {
+                if (view.role == ViewRole::kHeldOut) context.console.Say(view.name);
+              }
             }
             return kDone;
           }

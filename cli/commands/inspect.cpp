@@ -13,6 +13,7 @@
 #include "dtr/base/files.h"
 #include "dtr/io/run_record.h"
 #include "dtr/io/set_io.h"
+#include "dtr/render/instants.h"
 #include "viewer/inspect_page.h"
 
 namespace dtr::cli {
@@ -97,6 +98,7 @@ int RunInspect(const Options& options, const Context& context) {
   RequireOutputFile(options.output, "-o", {".html", ".htm"});
   const int threads = context.common.threads;
   DtrSet set = io::ReadSet(options.set);
+  RequireOneFrame(set);
   const viewer::InspectFacts facts = FactsOf(options, set, threads);
   io::CollapseDuplicates(set);
   const auto stream = StreamOf(options.set, set, DescribeRenderScene(set),

@@ -8,18 +8,18 @@
 #include <string>
 
 #include "cli/command.h"
+#include "cli/moving_scene.h"
 #include "cli/novel_frames.h"
 #include "cli/output_file.h"
 #include "cli/render_options.h"
 #include "cli/renderers.h"
-#include "cli/set_stream.h"
-#include "cli/view_names.h"
 #include "dtr/base/error.h"
 #include "dtr/io/depth_io.h"
 #include "dtr/io/image_io.h"
 #include "dtr/io/pruned.h"
 #include "dtr/io/set_io.h"
 #include "dtr/io/video.h"
+#include "dtr/render/instants.h"
 #include "dtr/render/scene.h"
 #include "dtr/render/view_stream.h"
 
@@ -32,6 +32,8 @@ struct Options {
   fs::path set, output, depth_out, coverage_out;
   NovelCameraRequest request;
   std::string exclude;
+  std::optional<size_t> frame;  ///< of a moving set
+  bool play = false;
   RendererChoice renderer;
   double memory_gb = 4;
   std::shared_ptr<RenderOptions> render;
@@ -96,38 +98,63 @@ void WritePlanes(const Options& options, const RenderResult& result) {
   if (!options.coverage_out.empty()) io::WriteMask(options.coverage_out, result.coverage);
 }
 
-nlohmann::ordered_json FrameJson(const std::string& file, double ms, const RenderScene& scene,
-                                 const RenderResult& result) {
+nlohmann::ordered_json FrameJson(const std::string& file, double ms, size_t shown,
+                                 const RenderScene& scene, const RenderResult& result) {
   auto used = nlohmann::ordered_json::array();
   for (const int index : result.views_used) {
     used.push_back(scene.views[static_cast<size_t>(index)]->name);
   }
-  return {{"file", file}, {"ms", ms}, {"views_used", used}, {"coverage", result.coverage_share}};
+  return {{"file", file},
+          {"ms", ms},
+          {"frame", shown},
+          {"views_used", used},
+          {"coverage", result.coverage_share}};
+}
+
+// With --play, one camera sees every frame of the set.
+std::vector<NovelFrame> CamerasOf(const Options& options, const DtrSet& set) {
+  std::vector<NovelFrame> cameras =
+      NovelFrames(AtFrame(set, options.frame.value_or(0)), options.request);
+  if (!options.play) return cameras;
+  if (cameras.size() != 1 || options.frame) {
+    throw UsageError("--play: expected --like or --camera with it, and no --frame");
+  }
+  std::vector<NovelFrame> all(set.frames.size(), cameras.front());
+  for (size_t i = 0; i < all.size(); ++i) all[i].name = fmt::format("{:06}", i);
+  return all;
+}
+
+// The frame of the set that picture `i` shows; paths run through time.
+size_t FrameShown(const Options& options, const DtrSet& set, size_t i, size_t pictures) {
+  return options.frame ? *options.frame : FrameOfPicture(i, pictures, set.frames.size());
 }
 
 int RunRender(const Options& options, const Context& context) {
   const DtrSet described = io::ReadSet(options.set);
-  const auto cameras = NovelFrames(described, options.request);
-  const auto excluded = ResolveViewNames(described, options.exclude);
-  const bool several = !options.request.path_file.empty() || options.request.fly_through_frames > 0;
+  const auto cameras = CamerasOf(options, described);
+  const bool several =
+      options.play || !options.request.path_file.empty() || options.request.fly_through_frames > 0;
   RequireOutputs(options, several);
   RenderOptions render = *options.render;
   render.threads = context.common.threads;
   // Before anything is loaded: a machine without OpenGL should say so at once.
   const eval::RenderFunction render_view = MakeRenderer(options.renderer, context.console);
-  DtrSet set = described;
-  io::CollapseDuplicates(set);
-  const auto stream = StreamOf(options.set, set, DescribeRenderScene(set, excluded),
-                               {options.memory_gb, render.threads}, context.console);
+  MovingScene moving(options.set, described, options.exclude, {options.memory_gb, render.threads},
+                     context.console);
+  moving.At(FrameShown(options, described, 0, cameras.size()));  // names are checked here
 
   FrameSink sink(options.output, several);
   nlohmann::ordered_json json{{"frames", nlohmann::ordered_json::array()}};
   context.console.Stage("rendering", static_cast<int>(cameras.size()));
   for (size_t i = 0; i < cameras.size(); ++i) {
     context.console.ThrowIfInterrupted();
+    const size_t shown = FrameShown(options, described, i, cameras.size());
+    ViewStream& stream = moving.At(shown);
     const RenderScene scene =
-        stream->SceneFor(cameras[i].cam_from_world, render, ViewStream::Wait::kForAll);
-    if (i + 1 < cameras.size()) stream->Prefetch(cameras[i + 1].cam_from_world, render);
+        stream.SceneFor(cameras[i].cam_from_world, render, ViewStream::Wait::kForAll);
+    if (i + 1 < cameras.size() && FrameShown(options, described, i + 1, cameras.size()) == shown) {
+      stream.Prefetch(cameras[i + 1].cam_from_world, render);
+    }
     const auto start = std::chrono::steady_clock::now();
     const RenderResult result =
         render_view(scene, cameras[i].camera, cameras[i].cam_from_world, render);
@@ -140,14 +167,14 @@ int RunRender(const Options& options, const Context& context) {
     }
     const std::string file = sink.Add(cameras[i], result, render.fill_holes);
     WritePlanes(options, result);
-    json["frames"].push_back(FrameJson(file, ms.count(), scene, result));
+    json["frames"].push_back(FrameJson(file, ms.count(), shown, scene, result));
     context.console.Update(static_cast<int>(i) + 1);
   }
   sink.Finish(context.console);
   context.console.Say(
       fmt::format("{}: {} frame{}", options.output.string(), cameras.size(), several ? "s" : ""));
   json["skipped"] = nlohmann::ordered_json::array();
-  for (const auto& [name, reason] : stream->lost()) {
+  for (const auto& [name, reason] : moving.lost()) {
     json["skipped"].push_back({{"name", name}, {"reason", reason}});
   }
   context.EmitJson(json.dump(1));
@@ -181,6 +208,13 @@ void AddRenderCommand(CLI::App& app) {
         where->require_option(1);
         command.add_option("--size", options->request.size, "Size; 0 keeps the proportions")
             ->type_name("WxH");
+        command
+            .add_option("--frame", options->frame,
+                        "Of a moving set: the frame to show, from 0 [a path runs through all]")
+            ->check(CLI::Range(0, 1 << 30))
+            ->type_name("N");
+        command.add_flag("--play", options->play,
+                         "Of a moving set: every frame in turn, from one place");
         command.add_option("--exclude", options->exclude, "Views not to render from")
             ->type_name("NAME,...");
         AddRendererOptions(command, options->renderer);

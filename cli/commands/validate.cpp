@@ -8,6 +8,7 @@
 #include "cli/pipeline/validate_set.h"
 #include "dtr/base/error.h"
 #include "dtr/io/set_io.h"
+#include "dtr/render/instants.h"
 
 namespace dtr::cli {
 namespace {
@@ -56,6 +57,7 @@ int RunValidate(Options options, const Context& context) {
   RefuseForSets(options.calibration);
   options.limits.max_rms_px = options.calibration.max_rms_px.value_or(options.limits.max_rms_px);
   const DtrSet set = io::ReadSet(options.set);
+  RequireOneFrame(set);
   const SparseScene sparse = io::LoadSparse(options.set, set);
   const auto report = pipeline::ValidateSet(set, sparse, options.limits, context.common.threads);
   SayReport(report, context.console);

@@ -26,7 +26,7 @@ std::optional<CastTruth> CastTruth::FromFolder(const fs::path& folder, const io:
 }
 
 CastTruth::CastTruth(datasets::DatasetSpec spec, const io::CameraList& list)
-    : spec_(std::move(spec)), scene_(datasets::MakeScene(spec_.scene, spec_.seed)) {
+    : spec_(std::move(spec)), scene_(datasets::MakeScene(spec_.scene, spec_.seed, spec_.time_s)) {
   for (const io::NamedCamera& named : list.cameras) {
     cams_from_scene_.push_back(ScenePose(named.cam_from_world, spec_, list.world_origin));
   }

@@ -13,6 +13,7 @@
 #include "dtr/base/hash.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/io/set_io.h"
+#include "dtr/render/instants.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -20,6 +21,7 @@ namespace {
 // The set without pixels and without any depth.
 DtrSet ReadForDepth(const std::filesystem::path& folder) {
   DtrSet set = io::ReadSet(folder);
+  RequireOneFrame(set);
   if (!set.sparse_file) {
     throw Error(
         folder.string() +

@@ -7,7 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "dtr/eval/held_out.h"
+#include "dtr/render/result.h"
+#include "dtr/render/scene.h"
+#include "dtr/types/camera.h"
+#include "dtr/types/pose.h"
 
 namespace dtr::selftest {
 
@@ -52,10 +55,15 @@ struct Outcome {
 /// Calls `work`, which must throw dtr::Error; its words are kept. A measure says whether it did.
 void ExpectRefusal(Outcome& outcome, const std::string& what, const std::function<void()>& work);
 
+/// Any renderer: cpu::Render, or one that draws with OpenGL.
+using RenderFunction =
+    std::function<RenderResult(const RenderScene& scene, const PinholeCamera& novel,
+                               const Pose& novel_from_world, const RenderOptions& options)>;
+
 /// A renderer by name; every case makes its own.
 struct NamedRenderer {
   std::string name;  ///< "cpu" or "gl"
-  std::function<eval::RenderFunction()> make;
+  std::function<RenderFunction()> make;
 };
 
 /// What the cases run with.

@@ -11,7 +11,6 @@
 namespace dtr::selftest {
 namespace {
 
-using eval::RenderFunction;
 using testing::kBothMethods;
 using testing::kNoHit;
 using testing::Moved;

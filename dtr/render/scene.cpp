@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "dtr/base/error.h"
+#include "dtr/render/instants.h"
 
 namespace dtr {
 namespace {
@@ -48,7 +49,7 @@ void RequireLoaded(const View& view) {
 }
 
 RenderScene DescribeRenderScene(const DtrSet& set, std::span<const std::string> excluded_names) {
-  if (set.frames.empty()) throw Error("set: expected at least one frame, found none");
+  RequireOneFrame(set);
   const std::vector<View>& views = set.frames.front().views;
   for (const std::string& name : excluded_names) {
     if (std::none_of(views.begin(), views.end(),

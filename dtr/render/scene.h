@@ -22,11 +22,12 @@ struct RenderScene {
   std::optional<size_t> most_views;
 };
 
-/// SPEC 0.4. The source views of the set's first frame, without those whose id or name is in
-/// `excluded_names`; held-out views are never among them. Views with the same camera, pose, image,
-/// depth and mask count once (the first by id), so that a duplicate cannot pull the blend.
-/// Throws dtr::Error when the set has no frame or a source view is not loaded or has the wrong
-/// size, and dtr::UsageError for an excluded name that no view has.
+/// SPEC 0.4. The source views of the set's only frame (AtFrame chooses it), without those whose id
+/// or name is in `excluded_names`; held-out views are never among them. Views with the same camera,
+/// pose, image, depth and mask count once (the first by id), so that a duplicate cannot pull the
+/// blend. Throws dtr::UsageError when the set has several frames, and dtr::Error when it has none
+/// or a source view is not loaded or has the wrong size, and dtr::UsageError for an excluded name
+/// that no view has.
 RenderScene MakeRenderScene(const DtrSet& set, std::span<const std::string> excluded_names = {});
 
 /// The same scene of views that need no pixels yet: enough to choose views by (ViewsNeeded), whose

@@ -33,6 +33,8 @@ size_t BytesOf(const View& view) {
   return image * (view.mask_file ? 4 : 3) + depth * sizeof(float) + mesh;
 }
 
+}  // namespace
+
 void DropPixels(View& view) {
   view.image = {};
   view.mask = {};
@@ -40,8 +42,6 @@ void DropPixels(View& view) {
   view.inverse_depth_sigma.reset();
   view.mesh.reset();
 }
-
-}  // namespace
 
 /// The threads that read; requests go in and views come out under one lock.
 class ViewStream::Readers {

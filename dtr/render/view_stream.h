@@ -17,6 +17,9 @@
 
 namespace dtr {
 
+/// Frees the pixels of a view, and what was made of them; its description stays.
+void DropPixels(View& view);
+
 /// Keeps the pixels of the source views that pictures are drawn from, those used last, within a
 /// number of bytes. All members belong to one thread; reading runs on others, which see copies of
 /// the views only, so that the pixels of a view change inside calls of this class and nowhere else.

@@ -18,5 +18,9 @@ TEST(StabilityTable, HoldsWithTheSameBytesForOneThreadAndTwo) {
   EXPECT_EQ(one.out, two.out);
 }
 
+TEST(StabilityTable, APageNeedsTheWholeTable) {
+  ExpectRefused(Dtr({"selftest", "-o", "table.md"}), 2, "expected --stability with it");
+}
+
 }  // namespace
 }  // namespace dtr::testing

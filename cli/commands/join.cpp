@@ -1,0 +1,45 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "cli/command.h"
+#include "cli/join_sets.h"
+
+namespace dtr::cli {
+
+void AddJoinCommand(CLI::App& app) {
+  struct Options {
+    std::vector<std::filesystem::path> sets;
+    std::filesystem::path output;
+    JoinOptions join;
+  };
+  AddCommand(
+      app, "join", "Make a moving set of sets of single instants, in their order",
+      "dtr join t0.dtr t1.dtr -o moving.dtr --fps 24", [](CLI::App& command) -> Action {
+        auto options = std::make_shared<Options>();
+        command.add_option("SETS", options->sets, "A set for each instant, first to last")
+            ->required();
+        command.add_option("-o,--output", options->output, "The set to write, NAME.dtr")
+            ->required()
+            ->type_name("SET.dtr");
+        command
+            .add_option("--fps", options->join.frames_per_second, "Frames per second of time [24]")
+            ->check(CLI::PositiveNumber)
+            ->type_name("F");
+        command.add_flag("--force", options->join.force, "Replace a set that exists");
+        return [options](const Context& context) -> int {
+          JoinOptions join = options->join;
+          join.threads = context.common.threads;
+          JoinSets(options->sets, options->output, join, context.console);
+          context.console.Say(
+              fmt::format("{}: {} frames", options->output.string(), options->sets.size()));
+          context.EmitJson(
+              nlohmann::json{{"set", options->output.string()}, {"frames", options->sets.size()}}
+                  .dump(1));
+          return kDone;
+        };
+      });
+}
+
+}  // namespace dtr::cli

@@ -1,0 +1,146 @@
+// A set of two instants: made, joined, told of, drawn through time, and refused where only still
+// scenes are known.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "dtr/io/image_io.h"
+#include "dtr/io/set_io.h"
+#include "dtr/render/instants.h"
+#include "tests/cli/run_dtr.h"
+#include "tests/support/test_data.h"
+
+namespace dtr::testing {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+/// A ball that rolls by a third of its radius between two instants, seen by four cameras.
+class MovingSet : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = new TemporaryFolder;
+    std::vector<std::string> join = {"join"};
+    for (const char* time : {"0", "0.5"}) {
+      const std::string photos = At(std::string("t") + time), set = photos + ".dtr";
+      DtrOk({"dataset", "make", "sphere", "-o", photos, "--views", "4", "--width", "96", "--height",
+             "64", "--time", time});
+      DtrOk({"import", "--cameras", photos + "/cameras.json", "--images", photos + "/images",
+             "--depth", photos + "/depth", "-o", set});
+      join.push_back(set);
+    }
+    join.insert(join.end(), {"-o", Set(), "--fps", "2"});
+    DtrOk(join);
+  }
+  static void TearDownTestSuite() {
+    delete folder_;
+    folder_ = nullptr;
+  }
+  static std::string At(const std::string& name) { return (*folder_ / name).string(); }
+  static std::string Set() { return At("moving.dtr"); }
+
+ private:
+  static TemporaryFolder* folder_;
+};
+TemporaryFolder* MovingSet::folder_ = nullptr;
+
+double MeanDifference(const fs::path& a_file, const fs::path& b_file) {
+  const ImageRgb8 a = io::ReadImage(a_file), b = io::ReadImage(b_file);
+  EXPECT_EQ(a.data().size(), b.data().size());
+  double sum = 0;
+  for (size_t i = 0; i < a.data().size(); ++i) sum += std::abs(a.data()[i] - b.data()[i]);
+  return sum / static_cast<double>(a.data().size());
+}
+
+TEST_F(MovingSet, HasBothInstantsAndEveryFileItsHash) {
+  const Json info = Json::parse(DtrOk({"info", Set(), "--verify", "--json", "-"}).out);
+  EXPECT_EQ(info["frames"], 2);
+  EXPECT_EQ(info["views"].size(), 8u);
+  const DtrSet set = io::LoadSet(Set());
+  ASSERT_EQ(set.frames.size(), 2u);
+  EXPECT_EQ(set.frames[0].time_s, 0);
+  EXPECT_EQ(set.frames[1].time_s, 0.5);
+  for (size_t i = 0; i < 4; ++i) {
+    const View &before = set.frames[0].views[i], &after = set.frames[1].views[i];
+    EXPECT_EQ(before.name, after.name);
+    EXPECT_EQ(before.cam_from_world.translation, after.cam_from_world.translation);
+    EXPECT_NE(before.depth.grid(), after.depth.grid());
+  }
+}
+
+TEST_F(MovingSet, PixelsAreThoseOfTheSetsThatWereJoined) {
+  const DtrSet moving = io::LoadSet(Set());
+  for (const auto& [name, frame] : {std::pair{"t0.dtr", 0u}, std::pair{"t0.5.dtr", 1u}}) {
+    const DtrSet still = io::LoadSet(At(name));
+    for (size_t i = 0; i < 4; ++i) {
+      const View &joined = moving.frames[frame].views[i], &alone = still.frames[0].views[i];
+      EXPECT_EQ(joined.image, alone.image);
+      EXPECT_EQ(joined.depth.grid(), alone.depth.grid());
+    }
+  }
+}
+
+TEST_F(MovingSet, EachFrameShowsItsOwnInstant) {
+  const std::string name[] = {"t0", "t0.5"};
+  for (const size_t frame : {0u, 1u}) {
+    const std::string picture = At("frame" + std::to_string(frame) + ".png");
+    DtrOk({"render", Set(), "--renderer", "cpu", "--like", "0001.jpg", "--frame",
+           std::to_string(frame), "-o", picture});
+    // JPEG and blending of four views: below 3 levels; the ball elsewhere: above 6.
+    EXPECT_LT(MeanDifference(picture, At(name[frame] + "/images/0001.jpg")), 3);
+    EXPECT_GT(MeanDifference(picture, At(name[1 - frame] + "/images/0001.jpg")), 6);
+  }
+}
+
+TEST_F(MovingSet, PlaysFromOnePlaceAndAlongAPath) {
+  const Json played = Json::parse(DtrOk({"render", Set(), "--renderer", "cpu", "--like", "0001.jpg",
+                                         "--play", "-o", At("played"), "--json", "-"})
+                                      .out);
+  ASSERT_EQ(played["frames"].size(), 2u);
+  EXPECT_EQ(played["frames"][0]["frame"], 0);
+  EXPECT_EQ(played["frames"][1]["frame"], 1);
+  EXPECT_GT(MeanDifference(At("played/000000.png"), At("played/000001.png")), 3);
+
+  const Json flown = Json::parse(DtrOk({"render", Set(), "--renderer", "cpu", "--fly-through", "6",
+                                        "-o", At("flown.mp4"), "--json", "-"})
+                                     .out);
+  std::vector<int> shown;
+  for (const Json& frame : flown["frames"]) shown.push_back(frame["frame"]);
+  EXPECT_EQ(shown, (std::vector<int>{0, 0, 0, 1, 1, 1}));
+  EXPECT_GT(fs::file_size(At("flown.mp4")), 1000u);
+}
+
+TEST_F(MovingSet, WhatKnowsStillScenesAloneSaysSo) {
+  const std::string words = "expected one frame, found 2";
+  for (const std::vector<std::string>& command : std::vector<std::vector<std::string>>{
+           {"evaluate", Set(), "--renderer", "cpu", "--leave-one-out"},
+           {"validate", Set()},
+           {"stereo", Set()},
+           {"inspect", Set(), "-o", At("page.html")},
+           {"bench", Set(), "--renderer", "cpu"}}) {
+    SCOPED_TRACE(command.front());
+    ExpectRefused(Dtr(command), 2, words);
+  }
+  ExpectRefused(Dtr({"render", Set(), "--renderer", "cpu", "--like", "0001.jpg", "--frame", "2",
+                     "-o", At("none.png")}),
+                2, "expected 0 to 1, the set has 2 frames");
+  ExpectRefused(Dtr({"render", Set(), "--renderer", "cpu", "--fly-through", "4", "--play", "-o",
+                     At("none.mp4")}),
+                2, "--play: expected --like or --camera with it");
+  ExpectRefused(Dtr({"join", Set(), Set(), "-o", At("again.dtr")}), 2,
+                "expected a set of one frame, found 2");
+  ExpectRefused(Dtr({"dataset", "make", "plane", "-o", At("p"), "--time", "1"}), 2,
+                "where nothing moves");
+}
+
+TEST(FrameOfPicture, GivesEveryFrameItsShare) {
+  EXPECT_EQ(FrameOfPicture(0, 1, 5), 0u);
+  EXPECT_EQ(FrameOfPicture(9, 10, 2), 1u);
+  EXPECT_EQ(FrameOfPicture(4, 10, 2), 0u);
+  EXPECT_EQ(FrameOfPicture(2, 3, 7), 4u);
+}
+
+}  // namespace
+}  // namespace dtr::testing
