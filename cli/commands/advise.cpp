@@ -11,6 +11,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/io/set_io.h"
+#include "dtr/render/instants.h"
 #include "viewer/advice_page.h"
 
 namespace dtr::cli {
@@ -109,6 +110,7 @@ int Run(Options options, const Context& context) {
   if (!options.output.empty()) RequireOutputFile(options.output, "-o", {".html", ".htm"});
   options.advise.threads = context.common.threads;
   DtrSet set = io::ReadSet(options.set);
+  RequireOneFrame(set);
   io::CollapseDuplicates(set);
   const auto views = CoarseViewsOf(options.set, set, context.common.threads, context.console);
   const advise::Advice advice = advise::Advise(views, options.advise, context.console);

@@ -16,6 +16,7 @@
 #include "dtr/io/set_io.h"
 #ifdef DTR_HAS_OSG
 #include "cli/osg_bench.h"
+#include "dtr/render/instants.h"
 #endif
 
 namespace dtr::cli {
@@ -132,6 +133,7 @@ int RunBench(const Options& options, const Context& context) {
     request.bench = BenchOptionsOf(options, render);
     request.size = options.size;
     request.renderer = options.renderer;
+    RequireOneFrame(io::ReadSet(options.set));
     return RunSweep(request, context);
   }
   if (options.table == "osg") return RunOsgTable(options, render, context);

@@ -10,6 +10,7 @@
 #include "cli/view_names.h"
 #include "dtr/base/error.h"
 #include "dtr/io/set_io.h"
+#include "dtr/render/instants.h"
 
 namespace dtr::cli {
 namespace {
@@ -93,6 +94,7 @@ int RunScale(Options options, const Context& context) {
                      std::string(options.distances.empty() ? "neither" : "both"));
   }
   const DtrSet set = io::ReadSet(options.scale.set);
+  RequireOneFrame(set);
   for (const std::string& text : options.distances) {
     options.scale.distances.push_back(DistanceFrom(set, text));
   }
