@@ -17,6 +17,9 @@ constexpr double kMostDisagreement = 5;     // sigmas
 constexpr double kOutlierSigmas = 4;
 constexpr size_t kFewestPositions = 4;
 constexpr int kMostPasses = 20;
+// A length without a stated error is taken to be measured to a thousandth, as with a tape.
+constexpr double kUnstatedRelativeSigma = 1e-3;
+
 // The median length of a 3D vector of independent normal coordinates is 1.538 sigma.
 constexpr double kMedianLength = 1.538;
 
@@ -25,7 +28,8 @@ double RelativeSigma(const MeasuredDistance& d) {
   const double length = way.norm();
   const Eigen::Vector3d along = way / length;
   const double variance = along.dot((d.covariance_a + d.covariance_b) * along);
-  return std::hypot(std::sqrt(variance) / length, d.sigma_m / d.length_m);
+  const double measured = d.sigma_m > 0 ? d.sigma_m / d.length_m : kUnstatedRelativeSigma;
+  return std::hypot(std::sqrt(variance) / length, measured);
 }
 
 Eigen::Vector3d MeanOf(std::span<const Eigen::Vector3d> points) {
@@ -79,7 +83,7 @@ DistanceScale ScaleFromDistances(std::span<const MeasuredDistance> distances) {
   for (size_t i = 0; i < scales.size(); ++i) {
     const double off = (std::log(scales[i]) - mean) / sigmas[i];
     // What the mean itself errs with it is not held against it.
-    const double own = 1 - 1 / (sigmas[i] * sigmas[i] * weights);
+    const double own = std::max(1 - 1 / (sigmas[i] * sigmas[i] * weights), 1e-9);
     scale.sigmas.push_back(distances.size() == 1 ? 0 : std::abs(off) / std::sqrt(own));
     squares += off * off;
   }

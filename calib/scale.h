@@ -15,7 +15,8 @@ struct MeasuredDistance {
   std::string name;                            ///< for errors
   Eigen::Vector3d a, b;                        ///< in the scene
   Eigen::Matrix3d covariance_a, covariance_b;  ///< scene units squared
-  double length_m = 0, sigma_m = 0;            ///< > 0; >= 0
+  double length_m = 0;                         ///< > 0
+  double sigma_m = 0;  ///< >= 0; 0: not stated, a thousandth of the length is assumed
 };
 
 struct DistanceScale {

@@ -130,7 +130,14 @@ void SeparateMasks(Listing& listing) {
     const auto [first, last] = EndsWith(stem, kEnd)
                                    ? by_stem.equal_range(stem.substr(0, stem.size() - strlen(kEnd)))
                                    : std::pair(by_stem.end(), by_stem.end());
-    for (auto photo = first; photo != last; ++photo) listing.masks.emplace(photo->second, name);
+    bool used = first == last;
+    for (auto photo = first; photo != last; ++photo) {
+      used = listing.masks.emplace(photo->second, name).second || used;
+    }
+    if (!used) {
+      listing.skipped.push_back(
+          {name, "a second mask of " + first->second + "; remove one of them"});
+    }
     if (first == last) photos.push_back(name);
   }
   listing.names = std::move(photos);

@@ -2,11 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
 #include <numbers>
 #include <string>
+#include <string_view>
 
 #include "dtr/base/error.h"
 #include "dtr/render/option_names.h"
@@ -74,6 +76,16 @@ class Arguments {
 
 }  // namespace
 
+// What RenderOptionArguments writes, and nothing else: a set comes from anywhere, and must not set
+// what files a command writes.
+constexpr std::array<std::string_view, 17> kStored{
+    "--method",         "--primitive",      "--blend",
+    "--views",          "--resolution",     "--point-size",
+    "--exponent",       "--falloff",        "--blend-k",
+    "--max-angle",      "--delta",          "--depth-break",
+    "--mesh-tolerance", "--absolute-delta", "--absolute-depth-break",
+    "--blend-linear",   "--fill-holes"};
+
 std::vector<std::string> RenderOptionArguments(const RenderOptions& options) {
   const RenderOptions usual;
   Arguments arguments;
@@ -109,9 +121,13 @@ void UseStoredArguments(CLI::App& command, const std::vector<std::string>& argum
   for (size_t i = 0; i < arguments.size(); ++i) {
     const bool has_value = i + 1 < arguments.size() && !is_flag(arguments[i + 1]);
     const std::string value = has_value ? arguments[i + 1] : "true";
-    CLI::Option* option =
-        is_flag(arguments[i]) ? command.get_option_no_throw(arguments[i]) : nullptr;
+    const std::string& name = arguments[i];
     i += has_value;
+    if (std::find(kStored.begin(), kStored.end(), name) == kStored.end()) {
+      throw Error("set.json: pruned.render_arguments: expected options of rendering, found " +
+                  name);
+    }
+    CLI::Option* option = command.get_option_no_throw(name);
     if (option == nullptr || option->count() > 0) continue;
     try {
       option->add_result(value);

@@ -14,9 +14,9 @@
 #include "dtr/base/machine.h"
 #include "dtr/eval/bench_json.h"
 #include "dtr/io/set_io.h"
+#include "dtr/render/instants.h"
 #ifdef DTR_HAS_OSG
 #include "cli/osg_bench.h"
-#include "dtr/render/instants.h"
 #endif
 
 namespace dtr::cli {

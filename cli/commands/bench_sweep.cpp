@@ -8,6 +8,7 @@
 #include <sstream>
 #include <thread>
 
+#include "cli/pipeline/input_hash.h"
 #include "cli/pipeline/set_quality.h"
 #include "cli/pipeline/stereo_sweep.h"
 #include "cli/pipeline/storage_sweep.h"
@@ -151,6 +152,11 @@ std::string ContextOf(const SweepRequest& request, const eval::SweepStage& stage
                      machine.renderer + "\n" + machine.cpu + "\n" +
                      std::to_string(context.common.threads) + " " +
                      std::to_string(context.common.seed) + "\n" + ShellLine(arguments);
+  // Photos to measure with, and truth: set.json knows neither.
+  for (const View& view : io::ReadSet(request.set).frames.front().views) {
+    if (view.role == ViewRole::kHeldOut && view.image_file) text += "\n" + view.image_file->sha256;
+  }
+  if (!request.truth.empty()) text += "\n" + pipeline::InputHash(request.truth);
   for (const eval::SweepAxis& axis : stage.axes) {
     text += "\n" + axis.name + "=" + axis.values.front();
   }

@@ -1,7 +1,10 @@
 #include "cli/pipeline/finishing.h"
 
+#include <fmt/format.h>
+
 #include <vector>
 
+#include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/io/depth_io.h"
 #include "dtr/render/adaptive_mesh.h"
@@ -45,7 +48,12 @@ void RecodeDepth(DtrSet& set, double error_px, io::SetWriter& writer, int thread
     View& view = views[static_cast<size_t>(i)];
     if (!HasDepth(view)) return;
     View loaded = Loaded(view, writer, false, 1);
-    io::SetDepthError(loaded, error_px * ThresholdsOf(loaded, {}).pixel);
+    if (!io::TrySetDepthError(loaded, error_px * ThresholdsOf(loaded, {}).pixel)) {
+      throw Error(fmt::format(
+          "--depth-error {}: {}: expected a bound that 16 bits can keep over its depths of {:.4g} "
+          "to {:.4g}; allow a larger one",
+          error_px, view.name, view.near_z, view.far_z));
+    }
     writer.RecodeDepth(loaded, set.unit);
     view.depth_coding = loaded.depth_coding;
     view.depth_steps = loaded.depth_steps;

@@ -91,7 +91,7 @@ Json PrunedJson(const PruneSetOptions& options, const PruneSetReport& report) {
   return {{"max_loss_db", options.prune.max_loss_db},
           {"loss_db", pruned.loss_db()},
           {"probe_loss_db", pruned.checked_probe_loss_db},
-          {"photo_loss_db", pruned.photo_loss_db ? Json(*pruned.photo_loss_db) : Json(nullptr)},
+          {"witness_loss_db", pruned.witness_loss_db},
           {"decided_loss_db", pruned.decided_loss_db},
           {"psnr_before_db", pruned.error_db},
           {"probes", options.prune.probes},
@@ -165,6 +165,8 @@ eval::Times FrameOf(const DtrSet& set, const std::vector<NovelCamera>& cameras,
 Json ReportJson(const PruneSetOptions& options, const PruneSetReport& report) {
   Json json = {{"set", options.output.string()}};
   json.update(PrunedJson(options, report));
+  const auto& photo_loss_db = report.pruned.photo_loss_db;
+  json["photo_loss_db"] = photo_loss_db ? Json(*photo_loss_db) : Json(nullptr);
   json["bytes_before"] = report.bytes_before;
   json["bytes_after"] = report.bytes_after;
   json["bytes_ratio"] =

@@ -12,6 +12,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/hash.h"
 #include "dtr/base/parallel_for.h"
+#include "dtr/io/pruned.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/instants.h"
 
@@ -89,6 +90,11 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& progre
   CopyImages(options.set, set, options.threads, writer, progress);
   const stereo::Effort spent = DepthStage(set, sparse, options.depth, effort,
                                           {options.threads, options.seed}, writer, progress);
+  // What was left out of the former depth says nothing of this.
+  if (!io::PrunedJson(set).empty()) {
+    progress.Note("the record of what was pruned goes with the depth that was pruned");
+    io::SetPrunedJson(set, "");
+  }
   FinishScene(set, {}, writer, options.threads);
   if (options.depth.depth_error_px) {
     RecodeDepth(set, *options.depth.depth_error_px, writer, options.threads);

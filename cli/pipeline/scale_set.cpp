@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -16,6 +17,8 @@
 #include "dtr/base/error.h"
 #include "dtr/base/hash.h"
 #include "dtr/base/parallel_for.h"
+#include "dtr/io/pruned.h"
+#include "dtr/io/run_record.h"
 #include "dtr/io/set_io.h"
 
 namespace dtr::pipeline {
@@ -154,6 +157,28 @@ Bounds Carried(const Bounds& bounds, const calib::Similarity& b_from_a) {
   return carried;
 }
 
+// Thresholds in scene units among the options that the set was pruned for.
+void CarryStoredOptions(double scale, DtrSet& set) {
+  const std::string text = io::PrunedJson(set);
+  if (text.empty()) return;
+  Json pruned = Json::parse(text);
+  std::vector<std::string> arguments = io::RenderArguments(set);
+  for (size_t i = 0; i + 1 < arguments.size(); ++i) {
+    if (arguments[i] != "--absolute-delta" && arguments[i] != "--absolute-depth-break") continue;
+    double value = 0;
+    const std::string& number = arguments[i + 1];
+    const auto [end, failure] =
+        std::from_chars(number.data(), number.data() + number.size(), value);
+    if (failure != std::errc() || end != number.data() + number.size()) {
+      throw Error(fmt::format("set.json: pruned.render_arguments: {}: expected a number, found {}",
+                              arguments[i], number));
+    }
+    arguments[i + 1] = fmt::format("{}", scale * value);
+  }
+  if (pruned.contains("render_arguments")) pruned["render_arguments"] = arguments;
+  io::SetPrunedJson(set, pruned.dump());
+}
+
 // All that set.json says in lengths. Where axes stay, so does the user's origin.
 void Carry(const Found& found, DtrSet& set) {
   const calib::Similarity& metric = found.metric_from_scene;
@@ -162,6 +187,7 @@ void Carry(const Found& found, DtrSet& set) {
       found.keeps_axes ? Eigen::Vector3d(metric.scale * set.world_origin) : Eigen::Vector3d::Zero();
   set.scene_center = metric * set.scene_center;
   set.bounds = Carried(set.bounds, metric);
+  CarryStoredOptions(metric.scale, set);
   for (Frame& frame : set.frames) {
     for (View& view : frame.views) {
       view.cam_from_world = metric.CamFromB(view.cam_from_world);
@@ -267,7 +293,11 @@ ScaleReport ScaleSet(const ScaleOptions& options, Progress& progress) {
   Record(found, set, report);
   WriteSetPage(writer, set, {report.written.stem().string(), "", checks, {}, 0, options.threads});
   log.End();
-  io::WriteRunRecord(writer.folder(), log.Record(ResolveThreads(options.threads)));
+  // What the stages before cost is still what this set cost.
+  io::RunRecord record = log.Record(ResolveThreads(options.threads));
+  const std::vector<io::RunStage> earlier = io::ReadRunStages(options.set);
+  record.stages.insert(record.stages.begin(), earlier.begin(), earlier.end());
+  io::WriteRunRecord(writer.folder(), record);
   writer.Finish(set);
   return report;
 }

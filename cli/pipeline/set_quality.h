@@ -17,6 +17,10 @@ struct TemporaryFolder {
   std::filesystem::path folder;
 };
 
+/// A new folder below `folder` (made when absent) for sets that are measured and removed again:
+/// whatever else lies there, sets of people included, is left alone. Throws Error.
+std::filesystem::path ScratchFolder(const std::filesystem::path& folder);
+
 /// A set with its images, depth and held-out photos.
 DtrSet LoadToJudge(const std::filesystem::path& folder, bool sigma, int threads,
                    Progress& progress);

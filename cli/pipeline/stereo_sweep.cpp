@@ -142,7 +142,9 @@ eval::SweepMeasurement StereoSweep::Measure(const eval::SweepSetting& setting) c
     return axes_[axis].values.at(static_cast<size_t>(setting.at(axis)));
   };
   NotesOnly notes(progress_);
-  const TemporaryFolder resized{options_.work / "resized.dtr"}, made{options_.work / "stereo.dtr"};
+  const TemporaryFolder scratch{ScratchFolder(options_.work)};
+  const TemporaryFolder resized{scratch.folder / "resized.dtr"},
+      made{scratch.folder / "stereo.dtr"};
   WriteResized(options_.set, resized.folder, std::stoi(value(kMaxSize)), options_.threads, notes);
   std::filesystem::remove_all(made.folder.string() + ".partial");
 

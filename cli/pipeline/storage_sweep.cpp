@@ -86,7 +86,8 @@ eval::SweepMeasurement StorageSweep::Measure(const eval::SweepSetting& setting) 
   const auto value = [&](Axis axis) {
     return axes_[axis].values.at(static_cast<size_t>(setting.at(axis)));
   };
-  const TemporaryFolder made{options_.work / "storage.dtr"};
+  const TemporaryFolder scratch{ScratchFolder(options_.work)};
+  const TemporaryFolder made{scratch.folder / "storage.dtr"};
   // Nothing is resumed: the folder is this run's own.
   std::filesystem::remove_all(made.folder.string() + ".partial");
   DtrSet set = io::ReadSet(options_.set);
@@ -104,6 +105,7 @@ eval::SweepMeasurement StorageSweep::Measure(const eval::SweepSetting& setting) 
       view.mesh_file.reset();
       if (view.role == ViewRole::kSource) {
         view.depth_coding = io::DepthCodingFromName(value(kDepth));
+        io::ClampToRange(view);
       }
       writer.WriteView(view, set.unit);
       view.image = {};

@@ -44,7 +44,8 @@ View ViewCoder::Recoded(const View& view, const prune::Coding& coding) const {
   recoded.inverse_depth_sigma.reset();
   if (coding.depth_error_px > 0) {
     const double error = coding.depth_error_px * ThresholdsOf(view, {}).pixel;
-    if (!IsCoarser(view, error)) io::SetDepthError(recoded, error);
+    // A view of too wide a range for that bound keeps its coding.
+    if (!IsCoarser(view, error)) (void)io::TrySetDepthError(recoded, error);
   }
   return recoded;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <optional>
 #include <sstream>
 #include <vector>
 
@@ -150,25 +151,54 @@ DepthImage DecodeInverseDepth(const Grid<std::uint16_t>& codes, double near_z, d
   return depth;
 }
 
-int StepsForError(double near_z, double far_z, double error) {
+namespace {
+
+// The steps; none where 16 bits or float32 are not that exact.
+std::optional<int> StepsKeeping(double near_z, double far_z, double error) {
   ExpectRange(near_z, far_z);
   // Reading back rounds z to float32, which moves 1/z by 2^-24 of itself at most (and a little, as
   // the nearest code was found with rounded numbers).
   const double of_step = error - 0x1.02p-24 / near_z;
   const double steps = std::ceil((1 / near_z - 1 / far_z) / (2 * of_step));
   if (of_step > 0 && steps <= InverseDepthCode::kSteps) return std::max(1, static_cast<int>(steps));
+  return {};
+}
+
+// `error` without what the view's coding may have rounded already.
+double ErrorLeft(const View& view, double error) {
+  const DepthFormat format = FormatOf(view, LengthUnit::kUnknown);
+  const bool in_steps = format.coding == DepthCoding::kPng16InverseDepth ||
+                        format.coding == DepthCoding::kZstdInverseDepth;
+  if (in_steps) error -= InverseDepthCode(view.near_z, view.far_z, StepsOf(format)).step() / 2;
+  return error;
+}
+
+}  // namespace
+
+int StepsForError(double near_z, double far_z, double error) {
+  if (const auto steps = StepsKeeping(near_z, far_z, error)) return *steps;
   throw Error("depth error: expected a bound that 16 bits can keep over depths of " +
               Number(near_z) + " to " + Number(far_z) + ", found " + Number(error) +
               " of inverse depth; allow a larger one");
 }
 
 void SetDepthError(View& view, double error) {
-  const DepthFormat format = FormatOf(view, LengthUnit::kUnknown);
-  const bool in_steps = format.coding == DepthCoding::kPng16InverseDepth ||
-                        format.coding == DepthCoding::kZstdInverseDepth;
-  if (in_steps) error -= InverseDepthCode(view.near_z, view.far_z, StepsOf(format)).step() / 2;
-  view.depth_steps = StepsForError(view.near_z, view.far_z, error);
+  view.depth_steps = StepsForError(view.near_z, view.far_z, ErrorLeft(view, error));
   view.depth_coding = DepthCoding::kZstdInverseDepth;
+  ClampToRange(view);
+}
+
+bool TrySetDepthError(View& view, double error) {
+  if (!StepsKeeping(view.near_z, view.far_z, ErrorLeft(view, error))) return false;
+  SetDepthError(view, error);
+  return true;
+}
+
+void ClampToRange(View& view) {
+  const auto near = static_cast<float>(view.near_z), far = static_cast<float>(view.far_z);
+  for (float& z : view.depth.grid().data()) {
+    if (!DepthImage::IsHole(z)) z = std::clamp(z, near, far);
+  }
 }
 
 Grid<std::uint16_t> EncodePng16Millimetre(const DepthImage& depth_m) {

@@ -60,8 +60,13 @@ DepthImage DecodeInverseDepth(const Grid<std::uint16_t>& codes, double near_z, d
 int StepsForError(double near_z, double far_z, double error);
 /// Makes zstd-inverse the view's coding, with the fewest steps that keep every 1/z within `error`
 /// (1/scene unit) of what it was before the view's depth was stored: what its coding now may have
-/// rounded is taken off. Throws Error as StepsForError.
+/// rounded is taken off. Depths that other codings rounded past the ends of the range, by less than
+/// their own error, are put at the ends. Throws Error as StepsForError.
 void SetDepthError(View& view, double error);
+/// The same where it can be done; false, and the view as it was, where 16 bits are not that exact.
+bool TrySetDepthError(View& view, double error);
+/// Puts the view's depths into [near, far], compared as float32, as codes of 1/z want them.
+void ClampToRange(View& view);
 
 /// 16-bit millimetres of a depth in metres: code 0 a hole. Throws Error for depths that round to
 /// less than 1 mm or to more than 65.535 m.

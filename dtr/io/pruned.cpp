@@ -41,7 +41,11 @@ std::string PrunedJson(const DtrSet& set) {
 
 void SetPrunedJson(DtrSet& set, const std::string& json) {
   Json extra = ExtraOf(set);
-  extra[kPruned] = ParseJson(json, kWhere);
+  if (json.empty()) {
+    extra.erase(kPruned);
+  } else {
+    extra[kPruned] = ParseJson(json, kWhere);
+  }
   set.extra_json = extra.dump();
 }
 

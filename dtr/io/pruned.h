@@ -10,7 +10,7 @@ namespace dtr::io {
 /// The object `pruned` of the set as JSON text; "" for a set that nothing was left out of. Throws
 /// Error where it is no object.
 std::string PrunedJson(const DtrSet& set);
-/// Puts it there, in the place of one before.
+/// Puts it there, in the place of one before; "" takes that out.
 void SetPrunedJson(DtrSet& set, const std::string& json);
 
 /// `pruned.render_arguments`: the options of `dtr render` that the set was pruned for, which are

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "dtr/eval/metrics.h"
 
@@ -73,6 +74,22 @@ std::vector<Place> LeftOutPlaces(const DtrSet& set, int count, int crop) {
                       IdsAt(view, set)});
   }
   return places;
+}
+
+std::vector<Place> WitnessPlaces(const DtrSet& set, std::span<const Place> deciding, int count) {
+  constexpr int kAll = std::numeric_limits<int>::max(), kWhole = 1;
+  std::vector<Place> all = LeftOutPlaces(set, kAll, kWhole), others;
+  for (const Place& place : all) {
+    const bool decides = std::any_of(deciding.begin(), deciding.end(), [&](const Place& other) {
+      return other.left_out == place.left_out;
+    });
+    if (!decides) others.push_back(place);
+  }
+  if (others.empty()) others = std::move(all);
+  const size_t n = std::min(others.size(), static_cast<size_t>(count));
+  std::vector<Place> witnesses;
+  for (size_t i = 0; i < n; ++i) witnesses.push_back(std::move(others[i * others.size() / n]));
+  return witnesses;
 }
 
 std::vector<Place> NovelPlaces(std::vector<NovelCamera> cameras) {

@@ -31,6 +31,9 @@ std::vector<Place> HeldOutPlaces(const DtrSet& set);
 /// size per axis, at another part of the frame each time. Windows and not smaller pictures: these
 /// would favour smaller images, since renderers do not filter.
 std::vector<Place> LeftOutPlaces(const DtrSet& set, int count, int crop);
+/// `count` of the source views that are not among `deciding`, spread as above, their photos whole;
+/// where all decide, of all.
+std::vector<Place> WitnessPlaces(const DtrSet& set, std::span<const Place> deciding, int count);
 /// Places without photos.
 std::vector<Place> NovelPlaces(std::vector<NovelCamera> cameras);
 

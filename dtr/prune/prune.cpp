@@ -174,11 +174,13 @@ class Pruner {
     progress_.Stage("pictures of the whole set", 4);
     deciding_ = LeftOutPlaces(current_->set, options_.probes, options_.probe_crop);
     checking_ = NovelPlaces(DrawProbes(set_, options_.checks, options_.seed));
+    witnesses_ = WitnessPlaces(current_->set, deciding_, options_.checks);
     photos_ = HeldOutPlaces(current_->set);
     progress_.Update(1);
     deciding_before_ = Pictures(current_->set, {}, deciding_, setting.render, render);
     progress_.Update(3);
     checking_before_ = Pictures(current_->set, {}, checking_, setting.render, render);
+    witnesses_before_ = Pictures(current_->set, {}, witnesses_, setting.render, render);
     photos_before_ = Pictures(current_->set, {}, photos_, setting.render, render);
     progress_.Update(4);
     now_ = {0, BytesOf(setting, *current_), FrameOf(setting)};
@@ -360,10 +362,8 @@ class Pruner {
   struct Check {
     double probe_loss_db = 0;
     std::optional<double> photo_loss_db;
-    Errors errors;  ///< where photos are
-    bool Holds(double most) const {
-      return probe_loss_db <= most && photo_loss_db.value_or(0) <= most;
-    }
+    double witness_loss_db = 0;
+    bool Holds(double most) const { return probe_loss_db <= most && witness_loss_db <= most; }
   };
 
   Check CheckOf(const Setting& setting) {
@@ -373,12 +373,16 @@ class Pruner {
     const auto pictures = [&](const std::vector<Place>& places) {
       return Pictures(coded->set, setting.without, places, setting.render, render);
     };
+    // Held-out photos are looked at and heeded in nothing: the set would be chosen by what it is
+    // measured with.
     Check check;
-    check.errors = photos_.empty()
-                       ? CompareWithPhotos(deciding_, deciding_before_, pictures(deciding_))
-                       : CompareWithPhotos(photos_, photos_before_, pictures(photos_));
-    if (!photos_.empty()) check.photo_loss_db = check.errors.psnr_loss_db;
-    check.probe_loss_db = LossDb(checking_before_, pictures(checking_), check.errors);
+    if (!photos_.empty()) {
+      check.photo_loss_db =
+          CompareWithPhotos(photos_, photos_before_, pictures(photos_)).psnr_loss_db;
+    }
+    const Errors errors = CompareWithPhotos(witnesses_, witnesses_before_, pictures(witnesses_));
+    check.witness_loss_db = errors.psnr_loss_db;
+    check.probe_loss_db = LossDb(checking_before_, pictures(checking_), errors);
     return check;
   }
 
@@ -391,7 +395,8 @@ class Pruner {
       const Check check = CheckOf(history_[next]);
       std::ostringstream line;
       line.precision(3);
-      line << "checked: " << next << " decisions cost " << check.probe_loss_db << " dB";
+      line << "checked: " << next << " decisions cost " << check.probe_loss_db << " dB, "
+           << check.witness_loss_db << " dB on photos that did not decide";
       if (check.photo_loss_db) line << ", " << *check.photo_loss_db << " dB on held-out photos";
       progress_.Note(line.str());
       if (check.Holds(options_.max_loss_db)) {
@@ -407,11 +412,10 @@ class Pruner {
     report_.setting = history_[holds];
     report_.decided_loss_db = holds == 0 ? 0 : losses_[holds - 1];
     report_.checked_probe_loss_db = check_of_holding.probe_loss_db;
+    report_.witness_loss_db = check_of_holding.witness_loss_db;
     report_.photo_loss_db = check_of_holding.photo_loss_db;
     if (holds == 0 && !photos_.empty()) report_.photo_loss_db = 0;
-    const Errors errors = photos_.empty()
-                              ? CompareWithPhotos(deciding_, deciding_before_, deciding_before_)
-                              : CompareWithPhotos(photos_, photos_before_, photos_before_);
+    const Errors errors = CompareWithPhotos(witnesses_, witnesses_before_, witnesses_before_);
     report_.error_db = 10 * std::log10(255 * 255 / errors.before);
     render_ = nullptr;
     return report_;
@@ -423,8 +427,8 @@ class Pruner {
   const RendererMaker& make_;
   Progress& progress_;
 
-  std::vector<Place> deciding_, checking_, photos_;
-  std::vector<ImageRgb8> deciding_before_, checking_before_, photos_before_;
+  std::vector<Place> deciding_, checking_, witnesses_, photos_;
+  std::vector<ImageRgb8> deciding_before_, checking_before_, witnesses_before_, photos_before_;
 
   Coded current_, trial_, drawn_;
   Coding current_coding_, trial_coding_;

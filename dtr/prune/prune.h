@@ -40,13 +40,16 @@ struct Removal {
 struct PruneReport {
   Setting setting;
   std::vector<Removal> removed;
-  std::vector<Removal> put_back;        ///< decided, but the check did not bear it out
-  double decided_loss_db = 0;           ///< of `removed`, on the deciding photos
-  double checked_probe_loss_db = 0;     ///< whole pictures, at cameras that decided nothing
-  std::optional<double> photo_loss_db;  ///< mean over held-out photos; none: there are none
-  double error_db = 0;                  ///< PSNR against photos before, to which a loss is relative
+  std::vector<Removal> put_back;     ///< decided, but the check did not bear it out
+  double decided_loss_db = 0;        ///< of `removed`, on the deciding photos
+  double checked_probe_loss_db = 0;  ///< whole pictures, at cameras that decided nothing
+  /// Mean over photos of source views that did not decide (of all, where all decide).
+  double witness_loss_db = 0;
+  /// Mean over held-out photos, which decide nothing; none: there are none.
+  std::optional<double> photo_loss_db;
+  double error_db = 0;  ///< PSNR against photos before, to which a loss is relative
   /// The larger of the two checked losses: what is promised not to exceed max_loss_db.
-  double loss_db() const { return std::max(checked_probe_loss_db, photo_loss_db.value_or(0)); }
+  double loss_db() const { return std::max(checked_probe_loss_db, witness_loss_db); }
 };
 
 /// Greedy: of all that could be left out next (a view; a step of image quality, depth error, size,

@@ -13,7 +13,8 @@ namespace {
 MeasuredDistance Between(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double length_m,
                          double sigma = 1e-3) {
   const Eigen::Matrix3d covariance = sigma * sigma * Eigen::Matrix3d::Identity();
-  return {"--distance", a, b, covariance, covariance, length_m, 0};
+  constexpr double kExact = 1e-12;  // metres
+  return {"--distance", a, b, covariance, covariance, length_m, kExact};
 }
 
 Eigen::Vector3d Draw(Random& random) {
@@ -57,6 +58,24 @@ TEST(ScaleFromDistances, WhatDoesNotFitIsRefusedByName) {
                                                Between({0, 0, 0}, {1, 0, 0}, 2.1)};
   EXPECT_THROW(ScaleFromDistances(apart), Error);
   EXPECT_THROW(ScaleFromDistances({}), Error);
+}
+
+TEST(ScaleFromDistances, ALengthWithoutAnErrorIsNotTakenForExact) {
+  // Camera centres have no covariance here; their distances differ as those of real rigs do.
+  const auto centres = [](double length, double length_m) {
+    MeasuredDistance d = Between({0, 0, 0}, {length, 0, 0}, length_m, 0);
+    d.sigma_m = 0;
+    return d;
+  };
+  const std::vector<MeasuredDistance> two = {centres(1, 0.12), centres(1.001, 0.12)};
+  const DistanceScale scale = ScaleFromDistances(two);
+  EXPECT_NEAR(scale.metres_per_unit, 0.12, 1e-3);
+  EXPECT_GT(scale.relative_sigma, 5e-4);
+  // One that says far more than the other leaves it no weight, and no NaN either.
+  std::vector<MeasuredDistance> unequal = {centres(1, 0.12),
+                                           Between({0, 0, 0}, {1, 0, 0}, 0.1199, 0.01)};
+  unequal[0].sigma_m = 1e-15;
+  for (const double sigmas : ScaleFromDistances(unequal).sigmas) EXPECT_TRUE(std::isfinite(sigmas));
 }
 
 TEST(ScaleFromDistances, DisagreementWidensTheUncertainty) {

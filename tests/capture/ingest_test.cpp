@@ -294,6 +294,7 @@ TEST(IngestPhotos, AMaskBesideAPhotoIsItsMaskAndNoPhoto) {
   io::WriteImage(folder / "a.jpg", NoisePhoto(64, 48, 1));
   io::WriteMask(folder / "a_mask.png", mask);
   io::WriteImage(folder / "b.jpg", NoisePhoto(64, 48, 2));
+  fs::copy_file(folder / "a_mask.png", folder / "a_mask.tif");
   io::WriteMask(folder / "left/b_mask.png", mask);  // of no photo there: a photo
   io::WriteImage(folder / "c.jpg", NoisePhoto(64, 48, 3));
   io::WriteMask(folder / "c_mask.png", Mask(32, 24, 1, 255));
@@ -303,10 +304,12 @@ TEST(IngestPhotos, AMaskBesideAPhotoIsItsMaskAndNoPhoto) {
   EXPECT_THAT(NamesOf(capture), ElementsAre("a.jpg", "b.jpg", "left/b_mask.png"));
   EXPECT_EQ(ReadPhotoMask(capture.photos[0]), mask);
   EXPECT_TRUE(ReadPhotoMask(capture.photos[1]).empty());
-  ASSERT_EQ(capture.skipped.size(), 2u);
-  EXPECT_THAT(capture.skipped[0].reason, HasSubstr("expected a mask of 64x48 pixels"));
-  EXPECT_THAT(capture.skipped[0].reason, HasSubstr("found 32x24"));
-  EXPECT_THAT(capture.skipped[1].reason, HasSubstr("dark throughout"));
+  ASSERT_EQ(capture.skipped.size(), 3u);
+  EXPECT_EQ(capture.skipped[0].name, "a_mask.tif");
+  EXPECT_THAT(capture.skipped[0].reason, HasSubstr("a second mask of a.jpg"));
+  EXPECT_THAT(capture.skipped[1].reason, HasSubstr("expected a mask of 64x48 pixels"));
+  EXPECT_THAT(capture.skipped[1].reason, HasSubstr("found 32x24"));
+  EXPECT_THAT(capture.skipped[2].reason, HasSubstr("dark throughout"));
   // A capture keeps it, and SfM gets it of the size that the photo has there.
   WriteCapture(capture, folder / "capture", 2);
   const Capture read = ReadCapture(folder / "capture");

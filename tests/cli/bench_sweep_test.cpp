@@ -149,6 +149,10 @@ TEST_F(BenchSweep, DepthByEngineAndSize) {
 }
 
 TEST_F(BenchSweep, StorageByBytes) {
+  // A set of the user's that lies where the sweep writes.
+  fs::create_directories(folder_ / "out");
+  fs::copy(Shared("true.dtr"), folder_ / "out/storage.dtr", fs::copy_options::recursive);
+  const auto before = Contents(folder_ / "out/storage.dtr");
   DtrOk({"bench", Shared("true.dtr"), "--stage", "storage", "--renderer", "cpu", "--max-points",
          "2", "-o", (folder_ / "out").string()});
   const Json stage = Json::parse(Text(folder_ / "out/bench.json"))["stages"][0];
@@ -161,7 +165,10 @@ TEST_F(BenchSweep, StorageByBytes) {
   EXPECT_NEAR(exact["error"], inverse["error"], 0.01 * inverse["error"].get<double>());
   EXPECT_EQ(inverse["cost_least"], inverse["cost_most"]);
   EXPECT_TRUE(stage["machine_ms"].is_null());
-  EXPECT_FALSE(fs::exists(folder_ / "out/storage.dtr"));
+  EXPECT_TRUE(DifferingFiles(Contents(folder_ / "out/storage.dtr"), before).empty());
+  for (const auto& entry : fs::directory_iterator(folder_ / "out")) {
+    EXPECT_NE(entry.path().filename().string().front(), '.') << entry.path() << " was left";
+  }
 }
 
 TEST_F(BenchSweep, WhatCannotBeMeasuredIsRefused) {

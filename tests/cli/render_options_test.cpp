@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "cli/shell_words.h"
+#include "dtr/base/error.h"
 #include "dtr/base/process.h"
 #include "dtr/base/random.h"
 #include "dtr/render/option_names.h"
@@ -60,6 +61,35 @@ TEST(RenderOptionArguments, GiveTheSameOptionsBitByBit) {
     const RenderOptions options = RandomOptions(random);
     const auto arguments = RenderOptionArguments(options);
     EXPECT_EQ(Parsed(arguments), options) << ShellLine(arguments);
+  }
+}
+
+TEST(UseStoredArguments, TakesOptionsOfRenderingAndNothingElse) {
+  for (const std::vector<std::string>& hostile : {std::vector<std::string>{"--json", "/tmp/x"},
+                                                  {"--views", "3", "--force"},
+                                                  {"views", "3"}}) {
+    CLI::App app;
+    std::string json;
+    bool force = false;
+    app.add_option("--json", json);
+    app.add_flag("--force", force);
+    (void)AddRenderOptions(app);
+    app.parse(std::vector<std::string>{});
+    EXPECT_THROW(UseStoredArguments(app, hostile), Error) << ShellLine(hostile);
+    EXPECT_EQ(json, "");
+    EXPECT_FALSE(force);
+  }
+  // All that is ever stored may be used, and what the user asked for stays.
+  Random random(12);
+  for (int draw = 0; draw < 200; ++draw) {
+    const RenderOptions stored = RandomOptions(random);
+    CLI::App app;
+    const auto options = AddRenderOptions(app);
+    app.parse(std::vector<std::string>{"7", "--views"});  // CLI11's order
+    UseStoredArguments(app, RenderOptionArguments(stored));
+    RenderOptions expected = stored;
+    expected.views = 7;
+    EXPECT_EQ(*options, expected);
   }
 }
 

@@ -159,7 +159,7 @@ TEST(Prune, AllowedNoLossLeavesOutOnlyWhatNobodySees) {
 }
 
 TEST(Prune, KeepsItsPromiseAndSavesMoreWhereMoreIsAllowed) {
-  const DtrSet set = Row();
+  const DtrSet set = Row(10);
   double saved_before = 0;
   for (const double allowed_db : {0.1, 4.0}) {
     const PruneReport report = PruneWith(set, SmallOptions(allowed_db));
@@ -173,7 +173,8 @@ TEST(Prune, KeepsItsPromiseAndSavesMoreWhereMoreIsAllowed) {
     EXPECT_GE(saved, saved_before) << allowed_db;
     saved_before = saved;
   }
-  EXPECT_GT(saved_before, std::log(4.0));
+  // Ten views in a row are few to take any from: what goes is told by photos that did not decide.
+  EXPECT_GT(saved_before, std::log(1.5));
 }
 
 TEST(LeftOutPlaces, AreSeenWithoutTheViewAndItsCopies) {
@@ -196,7 +197,7 @@ TEST(LeftOutPlaces, AreSeenWithoutTheViewAndItsCopies) {
   EXPECT_NE(pictures[0], places[0].photo);
 }
 
-TEST(Prune, HeldOutPhotosJudgeButAreNeverLeftOut) {
+TEST(Prune, HeldOutPhotosAreToldOfAndDecideNothing) {
   DtrSet set = Row();
   View& photo = set.frames[0].views[2];
   photo.role = ViewRole::kHeldOut;
@@ -204,7 +205,12 @@ TEST(Prune, HeldOutPhotosJudgeButAreNeverLeftOut) {
   photo.depth_file.reset();
   const PruneReport report = PruneWith(set, SmallOptions(2));
   ASSERT_TRUE(report.photo_loss_db);
-  EXPECT_LE(*report.photo_loss_db, 2);
+  for (auto& value : photo.image.data()) value = static_cast<std::uint8_t>(255 - value);
+  const PruneReport other = PruneWith(set, SmallOptions(2));
+  EXPECT_NE(*report.photo_loss_db, *other.photo_loss_db);
+  EXPECT_EQ(report.loss_db(), other.loss_db());
+  EXPECT_EQ(report.setting.without, other.setting.without);
+  EXPECT_EQ(report.setting.coding, other.setting.coding);
   EXPECT_THAT(report.setting.without, Not(Contains(photo.id)));
   EXPECT_LE(report.setting.without.size(), kViews - 1 - 2u);
 }
