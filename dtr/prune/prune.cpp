@@ -15,6 +15,7 @@ namespace {
 
 // Half-size pictures from few places decide, others check: a decided loss this much smaller than
 // the budget mostly holds at once.
+constexpr int kMostTriedAgain = 24;  // decisions after one that was at fault
 constexpr double kDecidingShare = 0.85;
 // Differences of a loss below this are chance; without a floor, what costs nothing would divide by
 // 0.
@@ -350,7 +351,6 @@ class Pruner {
     }
     history_.push_back(candidate.after);
     now_ = after;
-    losses_.push_back(after.loss_db);
     ++round_;
     std::ostringstream line;
     line.precision(3);
@@ -386,35 +386,76 @@ class Pruner {
     return check;
   }
 
+  /// What a decision changed, done to another setting.
+  static Setting Redone(Setting on, const Setting& before, const Setting& after) {
+    on.without.insert(on.without.end(),
+                      after.without.begin() + static_cast<std::ptrdiff_t>(before.without.size()),
+                      after.without.end());
+    const auto carry = [](auto& to, const auto& from, const auto& was) {
+      if (from != was) to = from;
+    };
+    carry(on.coding.jpeg_quality, after.coding.jpeg_quality, before.coding.jpeg_quality);
+    carry(on.coding.depth_error_px, after.coding.depth_error_px, before.coding.depth_error_px);
+    carry(on.coding.shrink, after.coding.shrink, before.coding.shrink);
+    carry(on.coding.mesh_tolerance_px, after.coding.mesh_tolerance_px,
+          before.coding.mesh_tolerance_px);
+    carry(on.coding.sigma, after.coding.sigma, before.coding.sigma);
+    carry(on.render.views, after.render.views, before.render.views);
+    carry(on.render.mesh_tolerance_px, after.render.mesh_tolerance_px,
+          before.render.mesh_tolerance_px);
+    return on;
+  }
+
+  Check CheckAloud(const Setting& setting, const std::string& what) {
+    const Check check = CheckOf(setting);
+    std::ostringstream line;
+    line.precision(3);
+    line << "checked: " << what << ": " << check.probe_loss_db << " dB, " << check.witness_loss_db
+         << " dB on photos that did not decide";
+    if (check.photo_loss_db) line << ", " << *check.photo_loss_db << " dB on held-out photos";
+    progress_.Note(line.str());
+    return check;
+  }
+
   /// The longest run of decisions that the check bears out, by halving: losses grow with decisions.
+  /// The decision after it is at fault; of those that came later each is tried again without it.
   PruneReport Checked() {
     progress_.Stage("checking from other places", 0);
     size_t holds = 0, fails = history_.size();
-    Check check_of_holding;
+    Check accepted;
     for (size_t next = history_.size() - 1; holds < next; next = (holds + fails) / 2) {
-      const Check check = CheckOf(history_[next]);
-      std::ostringstream line;
-      line.precision(3);
-      line << "checked: " << next << " decisions cost " << check.probe_loss_db << " dB, "
-           << check.witness_loss_db << " dB on photos that did not decide";
-      if (check.photo_loss_db) line << ", " << *check.photo_loss_db << " dB on held-out photos";
-      progress_.Note(line.str());
+      const Check check = CheckAloud(history_[next], std::to_string(next) + " decisions");
       if (check.Holds(options_.max_loss_db)) {
         holds = next;
-        check_of_holding = check;
+        accepted = check;
       } else {
         fails = next;
       }
     }
-    const auto first_back = report_.removed.begin() + static_cast<std::ptrdiff_t>(holds);
-    report_.put_back.assign(first_back, report_.removed.end());
-    report_.removed.erase(first_back, report_.removed.end());
-    report_.setting = history_[holds];
-    report_.decided_loss_db = holds == 0 ? 0 : losses_[holds - 1];
-    report_.checked_probe_loss_db = check_of_holding.probe_loss_db;
-    report_.witness_loss_db = check_of_holding.witness_loss_db;
-    report_.photo_loss_db = check_of_holding.photo_loss_db;
-    if (holds == 0 && !photos_.empty()) report_.photo_loss_db = 0;
+    Setting setting = history_[holds];
+    const std::vector<Removal> decisions = std::move(report_.removed);
+    report_.removed.assign(decisions.begin(),
+                           decisions.begin() + static_cast<std::ptrdiff_t>(holds));
+    int tries = 0;
+    for (size_t n = holds; n < decisions.size(); ++n) {
+      const Setting candidate = Redone(setting, history_[n], history_[n + 1]);
+      const bool tried = n > holds && tries < kMostTriedAgain;
+      const Check check = tried ? CheckAloud(candidate, "again " + decisions[n].what) : Check{};
+      tries += tried;
+      if (tried && check.Holds(options_.max_loss_db)) {
+        setting = candidate;
+        accepted = check;
+        report_.removed.push_back(decisions[n]);
+      } else {
+        report_.put_back.push_back(decisions[n]);
+      }
+    }
+    report_.setting = setting;
+    for (const Removal& removal : report_.removed) report_.decided_loss_db += removal.loss_db;
+    report_.checked_probe_loss_db = accepted.probe_loss_db;
+    report_.witness_loss_db = accepted.witness_loss_db;
+    report_.photo_loss_db = accepted.photo_loss_db;
+    if (report_.removed.empty() && !photos_.empty()) report_.photo_loss_db = 0;
     const Errors errors = CompareWithPhotos(witnesses_, witnesses_before_, witnesses_before_);
     report_.error_db = 10 * std::log10(255 * 255 / errors.before);
     render_ = nullptr;
@@ -436,7 +477,6 @@ class Pruner {
 
   std::vector<Candidate> candidates_;
   std::vector<Setting> history_;  ///< [n]: after n decisions
-  std::vector<double> losses_;    ///< [n]: after n + 1 decisions
   Measured now_;
   int round_ = 0;
   PruneReport report_;

@@ -174,7 +174,7 @@ TEST(Prune, KeepsItsPromiseAndSavesMoreWhereMoreIsAllowed) {
     saved_before = saved;
   }
   // Ten views in a row are few to take any from: what goes is told by photos that did not decide.
-  EXPECT_GT(saved_before, std::log(1.5));
+  EXPECT_GT(saved_before, std::log(4.0));
 }
 
 TEST(LeftOutPlaces, AreSeenWithoutTheViewAndItsCopies) {
