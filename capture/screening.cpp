@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "dtr/types/area_average.h"
+#include "dtr/types/luma.h"
 
 namespace dtr::capture {
 namespace {
@@ -39,16 +40,6 @@ struct Moments {
 };
 
 std::string Percent(double share) { return fmt::format("{:.0f} %", 100 * share); }
-
-Grid<std::uint16_t> Thumbnail(const ImageRgb8& photo) {
-  const auto [width, height] = TargetSize(photo.width(), photo.height(), kThumbnailSidePx);
-  const ImageRgb8 small = AreaAverage(photo, width, height);
-  Grid<std::uint16_t> luma(width, height);
-  for (size_t i = 0; i < luma.data().size(); ++i) {
-    luma.data()[i] = static_cast<std::uint16_t>(Luma(&small.data()[3 * i]));
-  }
-  return luma;
-}
 
 // Root mean square of a thumbnail about its mean: its contrast.
 double ContrastOf(const Grid<std::uint16_t>& thumbnail) {
@@ -141,6 +132,16 @@ double Sharpness(const ImageRgb8& photo) {
   return brightness.Variance() > kNoVariance ? laplacian.Variance() / brightness.Variance() : 0;
 }
 
+Grid<std::uint16_t> SmallLuma(const ImageRgb8& photo, int side_px) {
+  const auto [width, height] = TargetSize(photo.width(), photo.height(), side_px);
+  const ImageRgb8 small = AreaAverage(photo, width, height);
+  Grid<std::uint16_t> luma(width, height);
+  for (size_t i = 0; i < luma.data().size(); ++i) {
+    luma.data()[i] = static_cast<std::uint16_t>(Luma(&small.data()[3 * i]));
+  }
+  return luma;
+}
+
 Screening MeasurePhoto(const ImageRgb8& photo) {
   Screening screening;
   screening.sharpness = Sharpness(photo);
@@ -154,7 +155,7 @@ Screening MeasurePhoto(const ImageRgb8& photo) {
   }
   screening.overexposed_share = static_cast<double>(over) / static_cast<double>(pixels);
   screening.underexposed_share = static_cast<double>(under) / static_cast<double>(pixels);
-  screening.thumbnail = Thumbnail(photo);
+  screening.thumbnail = SmallLuma(photo, kThumbnailSidePx);
   return screening;
 }
 

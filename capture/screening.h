@@ -6,11 +6,11 @@
 
 namespace dtr::capture {
 
-/// Rec. 601 luma of an R, G, B triple in 1/256 levels, as an integer so that sums are exact.
-inline int Luma(const std::uint8_t* rgb) { return 77 * rgb[0] + 150 * rgb[1] + 29 * rgb[2]; }
-
 /// Screening::sharpness.
 double Sharpness(const ImageRgb8& photo);
+
+/// Luma of the whole photo in 1/256 levels, on a grid of at most `side_px` along its long side.
+Grid<std::uint16_t> SmallLuma(const ImageRgb8& photo, int side_px);
 
 /// Sharpness, clipping and thumbnail of a photo (its pixels only: no duplicates, no remarks).
 Screening MeasurePhoto(const ImageRgb8& photo);

@@ -106,6 +106,7 @@ void PrepareSfmImages(const Capture& capture, const fs::path& folder, int max_si
 }
 
 fs::path SfmMaskFile(const fs::path& folder, const Photo& photo) {
+  if (photo.mask_file.empty()) return {};
   return fs::path(folder.string() + ".masks") / (photo.name + ".png");
 }
 

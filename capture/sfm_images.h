@@ -23,7 +23,7 @@ void PrepareSfmImages(const Capture& capture, const std::filesystem::path& folde
 void PrepareSfmImages(const Capture& capture, const std::filesystem::path& folder, int max_size_px,
                       int threads);
 
-/// Where PrepareSfmImages(..., folder, ...) puts the mask of a photo.
+/// Where PrepareSfmImages(..., folder, ...) puts the mask of a photo; empty for one without.
 std::filesystem::path SfmMaskFile(const std::filesystem::path& folder, const Photo& photo);
 
 }  // namespace dtr::capture

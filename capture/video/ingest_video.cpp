@@ -14,7 +14,6 @@
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/io/image_io.h"
-#include "dtr/types/area_average.h"
 
 namespace dtr::capture {
 namespace fs = std::filesystem;
@@ -63,12 +62,10 @@ class Together {
 };
 
 Grid<std::uint8_t> SmallGrey(const ImageRgb8& picture) {
-  const auto [width, height] = TargetSize(picture.width(), picture.height(), kSmallSidePx);
-  const ImageRgb8 small = AreaAverage(picture, width, height);
-  Grid<std::uint8_t> grey(width, height);
-  for (size_t i = 0; i < grey.data().size(); ++i) {
-    grey.data()[i] = static_cast<std::uint8_t>(Luma(&small.data()[3 * i]) / 256);
-  }
+  const Grid<std::uint16_t> luma = SmallLuma(picture, kSmallSidePx);
+  Grid<std::uint8_t> grey(luma.width(), luma.height());
+  std::transform(luma.data().begin(), luma.data().end(), grey.data().begin(),
+                 [](std::uint16_t value) { return static_cast<std::uint8_t>(value / 256); });
   return grey;
 }
 

@@ -96,7 +96,7 @@ void AddPruneCommand(CLI::App& app) {
             ->type_name("N");
         command
             .add_option("--checks", prune.checks,
-                        "Novel cameras between input cameras, that check [8]")
+                        "So many novel cameras, and photos that did not decide, check [8]")
             ->check(CLI::Range(1, 1000))
             ->type_name("N");
         command

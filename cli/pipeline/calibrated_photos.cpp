@@ -85,16 +85,12 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
 
 }  // namespace
 
-fs::path MaskForSfm(const capture::Photo& photo, const fs::path& folder) {
-  return photo.mask_file.empty() ? fs::path() : capture::SfmMaskFile(folder, photo);
-}
-
 std::vector<colmap::SfmImageInput> SfmInputs(const capture::Capture& capture,
                                              const fs::path& folder) {
   std::vector<colmap::SfmImageInput> inputs;
   for (const capture::Photo& photo : capture.photos) {
     inputs.push_back({photo.name, photo.width_px, photo.height_px, photo.focal_prior_px,
-                      photo.camera_group, MaskForSfm(photo, folder)});
+                      photo.camera_group, capture::SfmMaskFile(folder, photo)});
   }
   return inputs;
 }

@@ -105,7 +105,7 @@ CalibratedPhotos FromCameraList(const capture::Capture& capture, const Calibrate
     const capture::Photo& photo = capture.photos[i];
     (options.held_out[i] ? held_out : sources)
         .push_back({named.name, colmap::FromPinhole(named.camera), named.cam_from_world,
-                    MaskForSfm(photo, workspace / "photos")});
+                    capture::SfmMaskFile(workspace / "photos", photo)});
     if (!options.held_out[i]) source_photos.photos.push_back(capture.photos[i]);
   }
   RequireSharedNames(sources.size(), options.poses,

@@ -8,9 +8,6 @@
 
 namespace dtr::pipeline {
 
-/// capture::SfmMaskFile, or nothing for a photo without a mask.
-std::filesystem::path MaskForSfm(const capture::Photo& photo, const std::filesystem::path& folder);
-
 /// Photos as COLMAP is told about them; `folder` is what capture::PrepareSfmImages fills.
 std::vector<colmap::SfmImageInput> SfmInputs(const capture::Capture& capture,
                                              const std::filesystem::path& folder);

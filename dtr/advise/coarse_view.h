@@ -30,6 +30,9 @@ enum class Sight {
   kBeyond,   ///< its surface is further away: it looks through the point
 };
 
+/// Tolerance of SightOf between coarse samples of one surface.
+inline constexpr double kOneSurface = 0.03;
+
 /// `tolerance`: difference of inverse depths, relative, up to which two are of one surface; the
 /// nearest of the 3x3 samples about the point's pixel counts, as coarse slopes demand.
 Sight SightOf(const CoarseView& view, const Eigen::Vector3d& p_in_world, double tolerance);

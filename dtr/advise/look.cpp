@@ -11,11 +11,9 @@
 namespace dtr::advise {
 namespace {
 
-constexpr size_t kViewsAsked = 16;
-constexpr double kOneSurface = 0.03;  // of inverse depth, between coarse samples
-constexpr double kOverlap = 1.2;      // of footprints, so that tilted surfaces stay closed
+constexpr double kOverlap = 1.2;  // of footprints, so that tilted surfaces stay closed
 constexpr int kLargestFootprintPx = 32;
-constexpr double kUsualDepth = 1, kFarDepths[] = {1, 4, 100};  // of the median seen
+constexpr double kFarDepths[] = {1, 4, 100};  // of the median seen
 constexpr double kPercentile = 0.95;
 
 struct Buffer {
@@ -97,7 +95,7 @@ Look LookFrom(const Place& place, std::span<const CoarseView> views) {
       Glance& glance = look.glances.emplace_back();
       const float z = buffer.depth(x, y);
       if (DepthImage::IsHole(z)) {
-        glance.point = at(std::max(usual, 1e-30) * kUsualDepth).cast<float>();
+        glance.point = at(std::max(usual, 1e-30)).cast<float>();
         for (const double times : kFarDepths) {
           const bool looked_at =
               usual > 0 && std::any_of(near.begin(), near.end(), [&](size_t i) {

@@ -7,6 +7,9 @@
 
 namespace dtr::advise {
 
+/// So many views, the nearest, are asked what they know of a point: the others hardly know more.
+inline constexpr size_t kViewsAsked = 16;
+
 /// The `count` views nearest to a place whose axes turn less than 60 degrees from its own, nearest
 /// first; of equally near ones the first.
 std::vector<size_t> NearestViews(std::span<const CoarseView> views, const Pose& cam_from_world,

@@ -11,10 +11,8 @@
 namespace dtr::advise {
 namespace {
 
-constexpr size_t kOthersAsked = 16;
-constexpr double kOneSurface = 0.03;  // of inverse depth, between coarse samples
-constexpr double kAsLarge = 0.7;      // pixels per length on the surface
-constexpr int kEvery = 2;             // sample of the coarse grid, per axis
+constexpr double kAsLarge = 0.7;  // pixels per length on the surface
+constexpr int kEvery = 2;         // sample of the coarse grid, per axis
 
 // Which others show each point of a view: bit k is others[k].
 struct Shown {
@@ -30,7 +28,7 @@ double Magnification(const CoarseView& view, const Eigen::Vector3d& p_in_world) 
 Shown ShownOf(std::span<const CoarseView> views, size_t index, double max_angle_rad) {
   const CoarseView& view = views[index];
   Shown shown;
-  shown.others = NearestViews(views, view.cam_from_world, kOthersAsked + 1);
+  shown.others = NearestViews(views, view.cam_from_world, kViewsAsked + 1);
   std::erase(shown.others, index);
   const Pose world_from_cam = view.cam_from_world.Inverse();
   const Eigen::Vector3d center = view.CenterInWorld();
@@ -41,7 +39,7 @@ Shown ShownOf(std::span<const CoarseView> views, size_t index, double max_angle_
       const Eigen::Vector3d p =
           world_from_cam * view.camera.CamFromPixel({x + 0.5, y + 0.5}, z, DepthKind::kPlaneZ);
       std::uint32_t bits = 0;
-      for (size_t k = 0; k < shown.others.size() && k < kOthersAsked; ++k) {
+      for (size_t k = 0; k < shown.others.size() && k < kViewsAsked; ++k) {
         const CoarseView& other = views[shown.others[k]];
         const bool covers = SightOf(other, p, kOneSurface) == Sight::kSeen &&
                             AngleBetween(center - p, other.CenterInWorld() - p) <= max_angle_rad &&
@@ -56,7 +54,7 @@ Shown ShownOf(std::span<const CoarseView> views, size_t index, double max_angle_
 
 double CoveredShare(const Shown& shown, const std::vector<bool>& stays) {
   std::uint32_t active = 0;
-  for (size_t k = 0; k < shown.others.size() && k < kOthersAsked; ++k) {
+  for (size_t k = 0; k < shown.others.size() && k < kViewsAsked; ++k) {
     if (stays[shown.others[k]]) active |= 1U << k;
   }
   if (shown.points.empty()) return 0;

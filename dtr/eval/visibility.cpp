@@ -8,6 +8,7 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
+#include "dtr/types/luma.h"
 
 namespace dtr::eval {
 namespace {
@@ -104,7 +105,7 @@ Mask TexturedMask(const ImageRgb8& image) {
   for (int y = 0; y < height; ++y) {
     long long row_sum = 0, row_squares = 0;
     for (int x = 0; x < width; ++x) {
-      const long long v = 77 * image(x, y, 0) + 150 * image(x, y, 1) + 29 * image(x, y, 2);
+      const long long v = Luma(&image(x, y));
       row_sum += v;
       row_squares += v * v;
       const size_t here = (static_cast<size_t>(y) + 1) * stride + static_cast<size_t>(x) + 1;

@@ -7,9 +7,9 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "datasets/exact/analytic_scene.h"
 #include "dtr/advise/look.h"
 #include "dtr/advise/places.h"
-#include "tests/support/analytic_scene.h"
 
 namespace dtr::advise {
 namespace {

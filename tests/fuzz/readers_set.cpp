@@ -8,6 +8,7 @@
 #include "dtr/io/set_io.h"
 #include "dtr/io/sparse_io.h"
 #include "tests/fuzz/readers.h"
+#include "tests/io/small_mesh.h"
 #include "tests/io/small_set.h"
 
 namespace dtr::fuzz {
@@ -86,14 +87,7 @@ Reader OpenSparse(const fs::path& folder) {
 
 Reader OpenMesh(const fs::path& folder) {
   const fs::path file = folder / "mesh.bin";
-  StoredMesh mesh;
-  mesh.depth_sha256 = std::string(62, '0') + "9f";
-  mesh.resolution = 2;
-  mesh.tolerance = 0.5;
-  mesh.depth_break = 1.25;
-  mesh.cover.columns = 34;
-  mesh.cover.rows = 18;
-  mesh.cover.rectangles = {{0, 0, 16, 16}, {16, 3, 5, 1}, {32, 0, 1, 16}, {30, 16, 2, 1}};
+  StoredMesh mesh = io::testing_support::SmallMesh();
   std::vector<std::string> seeds;
   for (const bool everything : {false, true}) {
     if (everything) {

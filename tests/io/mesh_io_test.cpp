@@ -8,6 +8,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/io/set_io.h"
+#include "tests/io/small_mesh.h"
 #include "tests/io/small_set.h"
 #include "tests/support/test_data.h"
 #include "tests/support/truncation.h"
@@ -20,20 +21,9 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 using testing::TemporaryFolder;
+using testing_support::SmallMesh;
 
 constexpr size_t kFirstRoot = 8 + 4 * 4 + 2 * 32 + 3 * 8 + 8;  // docs/FORMAT.md
-
-StoredMesh SmallMesh() {
-  StoredMesh mesh;
-  mesh.depth_sha256 = std::string(62, '0') + "9f";
-  mesh.resolution = 2;
-  mesh.tolerance = 0.5;
-  mesh.depth_break = 1.25;
-  mesh.cover.columns = 34;
-  mesh.cover.rows = 18;
-  mesh.cover.rectangles = {{0, 0, 16, 16}, {16, 3, 5, 1}, {32, 0, 1, 16}, {30, 16, 2, 1}};
-  return mesh;
-}
 
 TEST(MeshFile, RoundTripsExactlyAndIsTheSameBytesTwice) {
   const TemporaryFolder folder;

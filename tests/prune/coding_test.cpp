@@ -5,8 +5,8 @@
 
 #include <cmath>
 
+#include "datasets/exact/analytic_scene.h"
 #include "dtr/render/scene.h"
-#include "tests/support/analytic_scene.h"
 
 namespace dtr::prune {
 namespace {

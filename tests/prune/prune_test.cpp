@@ -7,11 +7,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "datasets/exact/analytic_scene.h"
 #include "dtr/base/error.h"
 #include "dtr/cpu/renderer.h"
 #include "dtr/prune/probes.h"
 #include "dtr/render/scene.h"
-#include "tests/support/analytic_scene.h"
 
 namespace dtr::prune {
 namespace {

@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "datasets/exact/analytic_scene.h"
 #include "dtr/cpu/renderer.h"
-#include "tests/support/analytic_scene.h"
 
 namespace dtr::viewer {
 namespace {
