@@ -14,7 +14,7 @@ struct ModelFacts {
   LensModel model;
   const char* name;
   int parameters;
-  int focal_lengths;  // 1 or 2; the principal point follows, then the distortion
+  int focal_lengths;
   bool fisheye;
 };
 
@@ -42,6 +42,8 @@ const ModelFacts& FactsOf(LensModel model) {
 }  // namespace
 
 int ParameterCount(LensModel model) { return FactsOf(model).parameters; }
+
+int FocalCount(LensModel model) { return FactsOf(model).focal_lengths; }
 
 std::string NameOf(LensModel model) { return FactsOf(model).name; }
 

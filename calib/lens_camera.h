@@ -28,6 +28,8 @@ enum class LensModel : int {
 
 /// Number of parameters of a model.
 int ParameterCount(LensModel model);
+/// 1 or 2: focal lengths come first, the principal point follows, then the distortion.
+int FocalCount(LensModel model);
 /// "OPENCV" and the like.
 std::string NameOf(LensModel model);
 /// Inverse of NameOf; empty for names this version does not know.

@@ -102,10 +102,10 @@ UndistortedPhoto AsItIs(const ImageRgb8& photo, const Mask& usable, const LensCa
 }
 
 UndistortedPhoto UndistortFullSize(const ImageRgb8& photo, const Mask& usable,
-                                   const LensCamera& lens, int threads) {
+                                   const LensCamera& lens, const PinholeCamera& onto, int threads) {
   const LensMap map(lens);
   const int width = photo.width(), height = photo.height();
-  UndistortedPhoto out{ImageRgb8(width, height, 3), Mask(width, height), lens.Pinhole()};
+  UndistortedPhoto out{ImageRgb8(width, height, 3), Mask(width, height), onto};
   std::atomic<bool> anything_missing{false};
   ParallelFor(0, height, threads, [&](int y) {
     bool missing = false;
@@ -145,6 +145,11 @@ UndistortedPhoto Undistort(const ImageRgb8& photo, const LensCamera& lens, int m
 
 UndistortedPhoto Undistort(const ImageRgb8& photo, const Mask& usable, const LensCamera& lens,
                            int max_size_px, int threads) {
+  return Undistort(photo, usable, lens, lens.Pinhole(), max_size_px, threads);
+}
+
+UndistortedPhoto Undistort(const ImageRgb8& photo, const Mask& usable, const LensCamera& lens,
+                           const PinholeCamera& onto, int max_size_px, int threads) {
   lens.Check();
   if (!usable.empty() && (usable.width() != photo.width() || usable.height() != photo.height())) {
     throw std::invalid_argument("Undistort: mask and photo differ in size");
@@ -156,8 +161,12 @@ UndistortedPhoto Undistort(const ImageRgb8& photo, const Mask& usable, const Len
                 "x" + std::to_string(photo.height()) + " and " + std::to_string(photo.channels()) +
                 "; calibrate with the photo as it is");
   }
-  UndistortedPhoto out = lens.IsUndistorted() ? AsItIs(photo, usable, lens)
-                                              : UndistortFullSize(photo, usable, lens, threads);
+  if (onto.width_px() != photo.width() || onto.height_px() != photo.height()) {
+    throw std::invalid_argument("Undistort: the camera to draw on and the photo differ in size");
+  }
+  UndistortedPhoto out = lens.IsUndistorted() && onto == lens.Pinhole()
+                             ? AsItIs(photo, usable, lens)
+                             : UndistortFullSize(photo, usable, lens, onto, threads);
   const auto [width, height] = TargetSize(photo.width(), photo.height(), max_size_px);
   if (width != photo.width() || height != photo.height()) Shrink(out, width, height);
   return out;

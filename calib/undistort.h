@@ -35,6 +35,10 @@ UndistortedPhoto Undistort(const ImageRgb8& photo, const LensCamera& lens, int m
 /// value lies between others that may not be used are masked too.
 UndistortedPhoto Undistort(const ImageRgb8& photo, const Mask& usable, const LensCamera& lens,
                            int max_size_px, int threads);
+/// The same, drawn as the camera `onto` would have taken it, which has the photo's size: photos
+/// that a stabiliser shifted against each other become those of one camera.
+UndistortedPhoto Undistort(const ImageRgb8& photo, const Mask& usable, const LensCamera& lens,
+                           const PinholeCamera& onto, int max_size_px, int threads);
 
 /// Where a pixel of the photo lies on the undistorted (and possibly shrunk) grid; may be off the
 /// image. Empty where the lens has no ray or the ray does not point forward.

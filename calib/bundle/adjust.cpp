@@ -73,7 +73,9 @@ void Describe(const std::vector<Eigen::Vector2d>& residuals, size_t rigs, Adjust
   };
   // A rig's own lengths leave six ways to move the world as a whole, else there are seven.
   const double moved = rigs > 0 ? 6 * static_cast<double>(rigs) - 6 : 6 * count(image_used) - 7;
-  const double unknowns = 3 * count(point_used) + moved;
+  const double shifted =
+      out.lens == LensFreedom::kPrincipalPointPerImage ? 2 * count(image_used) : 0;
+  const double unknowns = 3 * count(point_used) + moved + shifted;
   const double freedom = 2.0 * out.sights - unknowns;
   out.sigma_px = freedom > 0 ? std::sqrt(squared / freedom) : 0;
 }
@@ -119,6 +121,32 @@ struct DistanceCost {
   }
 };
 
+// An image's shift, in units of its standard deviation and of a sight's.
+struct ShiftCost {
+  Eigen::Vector2d start_px;
+  double scale_px, weight;
+  template <typename T>
+  bool operator()(const T* shift, T* residual) const {
+    for (int i = 0; i < 2; ++i) residual[i] = weight * (start_px[i] + scale_px * shift[i]);
+    return true;
+  }
+};
+
+// How far stabilisers move the principal point, of the image's long side: about a degree.
+constexpr double kShiftShare = 0.01;
+
+void AddShiftPriors(const Bundle& bundle, double sigma_px, Normalised& n, ceres::Problem& problem) {
+  for (size_t i = 0; i < n.shift.size(); ++i) {
+    if (!problem.HasParameterBlock(n.shift[i].data())) continue;
+    const BundleImage& image = bundle.images[i];
+    const LensCamera& lens = bundle.lenses[static_cast<size_t>(image.lens)];
+    const double known_px = kShiftShare * std::max(lens.width_px, lens.height_px);
+    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<ShiftCost, 2, 2>(new ShiftCost{
+                                 image.shift_px, n.ShiftScalePx(bundle, i), sigma_px / known_px}),
+                             nullptr, n.shift[i].data());
+  }
+}
+
 void AddPriors(const AdjustOptions& options, double sigma_px, Normalised& n,
                ceres::Problem& problem) {
   for (const PositionPrior& p : options.positions) {
@@ -141,7 +169,7 @@ void AddPriors(const AdjustOptions& options, double sigma_px, Normalised& n,
 void FixLens(const LensFrame& lens, LensFreedom freedom, double* theta, ceres::Problem& problem) {
   if (freedom == LensFreedom::kFixed) problem.SetParameterBlockConstant(theta);
   if (freedom != LensFreedom::kNoPrincipalPoint) return;
-  const int centre = static_cast<int>(FocalCount(lens.model));
+  const int centre = FocalCount(lens.model);
   problem.SetManifold(
       theta, new ceres::SubsetManifold(static_cast<int>(lens.centre.size()), {centre, centre + 1}));
 }
@@ -178,11 +206,14 @@ ceres::Solver::Summary Minimise(const Bundle& bundle, const AdjustOptions& optio
     const BundleObservation& sight = bundle.observations[i];
     const auto image = static_cast<size_t>(sight.image);
     const auto lens = static_cast<size_t>(bundle.images[image].lens);
-    problem.AddResidualBlock(
-        n.Cost(bundle, sight).release(), cauchy_px > 0 ? new ceres::CauchyLoss(cauchy_px) : nullptr,
-        n.theta[lens].data(), n.MotionOf(image), n.place[static_cast<size_t>(sight.point)].data());
+    std::vector<double*> blocks{n.theta[lens].data(), n.MotionOf(image),
+                                n.place[static_cast<size_t>(sight.point)].data()};
+    if (!n.shift.empty()) blocks.push_back(n.shift[image].data());
+    problem.AddResidualBlock(n.Cost(bundle, sight).release(),
+                             cauchy_px > 0 ? new ceres::CauchyLoss(cauchy_px) : nullptr, blocks);
   }
   AddPriors(options, sigma_px, n, problem);
+  AddShiftPriors(bundle, sigma_px, n, problem);
   const auto add = [&](double* block, int group) {
     if (problem.HasParameterBlock(block)) {
       solver.linear_solver_ordering->AddElementToGroup(block, group);
@@ -202,6 +233,7 @@ ceres::Solver::Summary Minimise(const Bundle& bundle, const AdjustOptions& optio
     add(n.theta[i].data(), 2);
     FixLens(n.lenses[i], options.lens, n.theta[i].data(), problem);
   }
+  for (auto& shift : n.shift) add(shift.data(), 3);
   ceres::Solver::Summary summary;
   ceres::Solve(solver, &problem, &summary);
   if (!summary.IsSolutionUsable()) Refuse("the sights have no least-squares solution");
@@ -219,6 +251,8 @@ const char* NameOf(LensFreedom freedom) {
       return "no-principal-point";
     case LensFreedom::kAll:
       return "all";
+    case LensFreedom::kPrincipalPointPerImage:
+      return "principal-point-per-image";
   }
   return "";
 }
@@ -276,14 +310,20 @@ Adjusted Adjust(const Bundle& bundle, const AdjustOptions& options) {
   CheckBundle(bundle);
   CheckPriors(bundle, options);
   Normalised n = Normalised::Around(bundle);
+  if (options.lens == LensFreedom::kPrincipalPointPerImage) {
+    if (options.fix_poses) Refuse("principal points per image: expected poses that may move");
+    n.shift.assign(bundle.images.size(), {});
+  }
   return Solve(bundle, options, n);
 }
 
 Adjusted AdjustRig(const Bundle& bundle, std::span<const RigImage> images,
                    const std::vector<Pose>& rig_from_world, const AdjustOptions& options) {
   if (images.size() != bundle.images.size() || options.fix_poses || !options.positions.empty() ||
-      !options.distances.empty()) {
-    Refuse("expected a rig with a place for every image, and no poses or priors beside it");
+      !options.distances.empty() || options.lens == LensFreedom::kPrincipalPointPerImage) {
+    Refuse(
+        "expected a rig with a place for every image, and no poses, priors or principal points "
+        "of images beside it");
   }
   Bundle rigid = bundle;
   for (size_t i = 0; i < images.size(); ++i) {

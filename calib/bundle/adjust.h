@@ -13,8 +13,12 @@ enum class LensFreedom {
   kFixed,             ///< none: the lenses are known
   kNoPrincipalPoint,  ///< focal lengths and distortion, as COLMAP does
   kAll,
+  /// All, and the principal point of every image by itself, as image stabilisers move it. It is
+  /// held near its lens's by a standard deviation of 1 % of the image's long side, so that what the
+  /// sights cannot tell stays put. Not with poses that are fixed, nor for rigs.
+  kPrincipalPointPerImage,
 };
-/// "fixed", "no-principal-point", "all".
+/// "fixed", "no-principal-point", "all", "principal-point-per-image".
 const char* NameOf(LensFreedom freedom);
 
 /// Where a camera's centre is known to be (GPS): in the bundle's own world and unit.

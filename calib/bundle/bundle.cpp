@@ -8,6 +8,7 @@
 #include <set>
 
 #include "calib/bundle/adjust.h"
+#include "calib/lens_groups.h"
 #include "dtr/base/error.h"
 
 namespace dtr::calib {
@@ -49,19 +50,61 @@ double Spread(const Bundle& bundle, Eigen::Vector3d* middle) {
   return std::sqrt(squared / static_cast<double>(bundle.images.size()));
 }
 
+void AddOwnLenses(const SfmModel& model, Bundle& bundle) {
+  for (const SfmImage& image : model.images) {
+    bundle.images.push_back(
+        {image.name, static_cast<int>(bundle.lenses.size()), image.cam_from_world});
+    bundle.lenses.push_back(model.cameras.at(image.camera_id));
+  }
+}
+
+Eigen::Vector2d PrincipalPoint(const LensCamera& lens) {
+  const auto at = static_cast<size_t>(FocalCount(lens.model));
+  return {lens.params[at], lens.params[at + 1]};
+}
+
+void AddSharedLenses(const SfmModel& model, Bundle& bundle) {
+  std::map<std::uint32_t, int> lens_of_camera;
+  for (const LensGroup& group : LensGroups(model.cameras)) {
+    for (const std::uint32_t id : group.cameras) {
+      lens_of_camera[id] = static_cast<int>(bundle.lenses.size());
+    }
+    bundle.lenses.push_back(group.lens);
+  }
+  for (const SfmImage& image : model.images) {
+    const int lens = lens_of_camera.at(image.camera_id);
+    bundle.images.push_back({image.name, lens, image.cam_from_world,
+                             PrincipalPoint(model.cameras.at(image.camera_id)) -
+                                 PrincipalPoint(bundle.lenses[static_cast<size_t>(lens)])});
+  }
+}
+
+bool AnyShift(const Bundle& bundle) {
+  return std::any_of(bundle.images.begin(), bundle.images.end(),
+                     [](const BundleImage& image) { return !image.shift_px.isZero(0); });
+}
+
+/// The image's camera: its lens, with its own principal point.
+LensCamera CameraOf(const Bundle& bundle, const BundleImage& image) {
+  LensCamera camera = bundle.lenses[static_cast<size_t>(image.lens)];
+  const auto at = static_cast<size_t>(FocalCount(camera.model));
+  camera.params[at] += image.shift_px.x();
+  camera.params[at + 1] += image.shift_px.y();
+  return camera;
+}
+
 }  // namespace
 
 Bundle BundleOf(const SfmModel& model, bool separate_lenses) {
   Bundle bundle;
-  std::map<std::uint32_t, int> lens_of_camera;
   std::map<std::uint64_t, Track> tracks;
+  if (separate_lenses) {
+    AddOwnLenses(model, bundle);
+  } else {
+    AddSharedLenses(model, bundle);
+  }
   for (size_t i = 0; i < model.images.size(); ++i) {
     const SfmImage& image = model.images[i];
-    const auto next = static_cast<int>(bundle.lenses.size());
-    const std::uint32_t key = separate_lenses ? static_cast<std::uint32_t>(i) : image.camera_id;
-    const auto [lens, made] = lens_of_camera.try_emplace(key, next);
-    if (made) bundle.lenses.push_back(model.cameras.at(image.camera_id));
-    bundle.images.push_back({image.name, lens->second, image.cam_from_world});
     for (const SfmFeature& feature : image.features) {
       if (feature.point_id == SfmFeature::kNoPoint) continue;
       AddSight(tracks[feature.point_id], static_cast<int>(i), feature.pixel);
@@ -134,12 +177,13 @@ Wrong WrongSights(const Bundle& bundle) {
 
 SfmModel ModelOf(const Bundle& bundle, const SfmModel& model, bool separate_lenses, int* dropped) {
   SfmModel out = model;
-  if (separate_lenses) out.cameras.clear();
+  const bool own_cameras = separate_lenses || AnyShift(bundle);
+  if (own_cameras) out.cameras.clear();
   for (size_t i = 0; i < bundle.images.size(); ++i) {
     SfmImage& image = out.images[i];
-    if (separate_lenses) image.camera_id = static_cast<std::uint32_t>(i + 1);
+    if (own_cameras) image.camera_id = static_cast<std::uint32_t>(i + 1);
     image.cam_from_world = bundle.images[i].cam_from_world;
-    out.cameras[image.camera_id] = bundle.lenses[static_cast<size_t>(bundle.images[i].lens)];
+    out.cameras[image.camera_id] = CameraOf(bundle, bundle.images[i]);
   }
   Eigen::Vector3d middle;
   const double reach = kAsGoodAsInfinite * Spread(bundle, &middle);
@@ -193,9 +237,9 @@ void CheckBundle(const Bundle& bundle) {
       refuse(
           fmt::format("{}: expected a lens 0 to {}, found {}", image.name, lenses - 1, image.lens));
     }
-    if (!image.cam_from_world.rotation.coeffs().allFinite() ||
+    if (!image.shift_px.allFinite() || !image.cam_from_world.rotation.coeffs().allFinite() ||
         !image.cam_from_world.translation.allFinite()) {
-      refuse(image.name + ": expected a finite pose");
+      refuse(image.name + ": expected a finite pose and principal point");
     }
   }
   for (size_t p = 0; p < bundle.points.size(); ++p) {

@@ -19,6 +19,9 @@ struct BundleImage {
   std::string name;
   int lens = 0;
   Pose cam_from_world;
+  /// How far from its lens's principal point this image has its own: optical image stabilisers move
+  /// it between two photos, by some 1 % of their size.
+  Eigen::Vector2d shift_px = Eigen::Vector2d::Zero();
 };
 
 /// Image `image` sees point `point` at `pixel`, on the image as its lens draws it.
@@ -39,7 +42,8 @@ struct Bundle {
 
 /// The bundle of a model; an image that shows a point twice keeps the first of the two.
 /// With `separate_lenses` every image gets a lens of its own, else images share what the model
-/// shares. Points that fewer than two images see are left out.
+/// shares: a camera, or all of it but the principal point (SharedLenses, lens_groups.h). Points
+/// that fewer than two images see are left out.
 Bundle BundleOf(const SfmModel& model, bool separate_lenses = false);
 
 /// The bundle of undistorted views. Views with equal cameras share one lens, since one lens made
@@ -47,8 +51,9 @@ Bundle BundleOf(const SfmModel& model, bool separate_lenses = false);
 Bundle BundleOf(std::span<const PinholeCamera> cameras, std::span<const Pose> cam_from_world,
                 std::span<const std::string> names, const SparseScene& scene);
 
-/// `model` with the bundle's cameras, poses and points; features keep their pixels. Sights that miss
-/// their point by more than 4 px leave its track. Points that are not in the bundle, lie at infinity
+/// `model` with the bundle's cameras, poses and points; features keep their pixels. Where images
+/// have shifts, each gets a camera of its own. Sights that miss their point by more than 4 px leave
+/// its track. Points that are not in the bundle, lie at infinity
 /// or keep fewer than two sights leave the model; `dropped` says how many.
 /// Requires a bundle that BundleOf made of this model.
 SfmModel ModelOf(const Bundle& bundle, const SfmModel& model, bool separate_lenses, int* dropped);

@@ -47,10 +47,12 @@ bool Rows(const Normalised& n, const Bundle& bundle, const BundleObservation& si
 
 std::vector<int> FreeParams(const LensCamera& lens, LensFreedom freedom) {
   std::vector<int> free;
-  const int focals = static_cast<int>(FocalCount(lens.model));
+  const int focals = FocalCount(lens.model);
   for (int k = 0; k < ParameterCount(lens.model); ++k) {
     const bool centre = k >= focals && k < focals + 2;
-    if (freedom == LensFreedom::kAll || (freedom == LensFreedom::kNoPrincipalPoint && !centre)) {
+    const bool with_centre =
+        freedom == LensFreedom::kAll || freedom == LensFreedom::kPrincipalPointPerImage;
+    if (with_centre || (freedom == LensFreedom::kNoPrincipalPoint && !centre)) {
       free.push_back(k);
     }
   }

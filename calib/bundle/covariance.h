@@ -8,10 +8,10 @@
 
 namespace dtr::calib {
 
-/// Covariance of all lenses and poses, points eliminated (Schur complement, Triggs et al. 2000,
-/// sec. 6.1), in units of the bundle's world. Unknowns, in order: per lens its free parameters, per
-/// image a turn w (radians, along the camera's axes: p_in_cam = exp(w) p_in_cam) and the centre's
-/// shift (world units).
+/// Covariance of all lenses and poses (shifts of images are taken as known), points eliminated
+/// (Schur complement, Triggs et al. 2000, sec. 6.1), in units of the bundle's world. Unknowns, in
+/// order: per lens its free parameters, per image a turn w (radians, along the camera's axes:
+/// p_in_cam = exp(w) p_in_cam) and the centre's shift (world units).
 ///
 /// The gauge: where the sights do not tell a common turn, shift or scale of everything, the
 /// covariance is that of the free network: no camera is held, the sum of the variances is the least

@@ -34,6 +34,4 @@ std::vector<std::string> ParameterNames(LensModel model) {
   return {};
 }
 
-size_t FocalCount(LensModel model) { return ParameterNames(model).front() == "f_px" ? 1 : 2; }
-
 }  // namespace dtr::calib

@@ -9,7 +9,5 @@ namespace dtr::calib {
 
 /// "f_px" or "fx_px", "fy_px", then "cx_px", "cy_px", then the coefficients, in LensModel's order.
 std::vector<std::string> ParameterNames(LensModel model);
-/// 1 or 2: focal lengths come first, the principal point follows.
-size_t FocalCount(LensModel model);
 
 }  // namespace dtr::calib

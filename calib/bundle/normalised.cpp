@@ -116,6 +116,10 @@ Bundle Normalised::LocalAt(const Bundle& bundle) const {
     pose.rotation = (turn * Eigen::Quaterniond(poses[i].rotation)).normalized();
     pose.translation = -(pose.rotation * Centre(i));
   }
+  for (size_t i = 0; i < shift.size(); ++i) {
+    out.images[i].shift_px +=
+        ShiftScalePx(bundle, i) * Eigen::Map<const Eigen::Vector2d>(shift[i].data());
+  }
   for (size_t p = 0; p < points.size(); ++p) out.points[p] = Place(p);
   return out;
 }
@@ -137,9 +141,17 @@ void Normalised::ToWorld(Bundle& bundle) const {
 std::unique_ptr<ceres::CostFunction> Normalised::Cost(const Bundle& bundle,
                                                       const BundleObservation& sight) const {
   const auto image = static_cast<size_t>(sight.image);
+  SightExtras extras;
+  if (!members.empty()) extras.member = &members[image];
+  if (!shift.empty()) extras.shift_scale_px = ShiftScalePx(bundle, image);
   return SightCost(lenses[static_cast<size_t>(bundle.images[image].lens)], poses[image],
-                   points[static_cast<size_t>(sight.point)], sight.pixel,
-                   members.empty() ? nullptr : &members[image]);
+                   points[static_cast<size_t>(sight.point)],
+                   sight.pixel - bundle.images[image].shift_px, extras);
+}
+
+double Normalised::ShiftScalePx(const Bundle& bundle, size_t image) const {
+  const LensFrame& lens = lenses[static_cast<size_t>(bundle.images[image].lens)];
+  return lens.scale[static_cast<size_t>(FocalCount(lens.model))];
 }
 
 bool Normalised::Residual(const Bundle& bundle, const BundleObservation& sight,
@@ -147,7 +159,8 @@ bool Normalised::Residual(const Bundle& bundle, const BundleObservation& sight,
   const auto image = static_cast<size_t>(sight.image);
   const auto lens = static_cast<size_t>(bundle.images[image].lens);
   const double* blocks[] = {theta[lens].data(), motion[image].data(),
-                            place[static_cast<size_t>(sight.point)].data()};
+                            place[static_cast<size_t>(sight.point)].data(),
+                            shift.empty() ? nullptr : shift[image].data()};
   return Cost(bundle, sight)->Evaluate(blocks, residual->data(), nullptr) && residual->allFinite();
 }
 

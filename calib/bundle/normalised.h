@@ -23,6 +23,8 @@ struct Normalised {
   std::vector<std::array<double, kMostParams>> theta;
   std::vector<std::array<double, 6>> motion;
   std::vector<std::array<double, 3>> place;
+  /// Per image, added to its shift in units of ShiftScalePx; empty where shifts are known.
+  std::vector<std::array<double, 2>> shift;
 
   static Normalised Around(const Bundle& bundle);
   /// The bundle at the unknowns' present values, in normalised coordinates.
@@ -38,6 +40,8 @@ struct Normalised {
     return members.empty() ? motion[image].data()
                            : rig_motion[static_cast<size_t>(frames[image])].data();
   }
+  /// Pixels of an image's shift per unit of its unknown: those of the lens's principal point.
+  double ShiftScalePx(const Bundle& bundle, size_t image) const;
   /// Carries the frames' motions to their images.
   void FollowRig();
 

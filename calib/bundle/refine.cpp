@@ -20,6 +20,8 @@ constexpr double kLossSigmas = 2;    // scale of the loss that held-out sights a
 constexpr int kMostPoints = 4000;    // that the candidates are compared on
 constexpr int kResamples = 1000;
 constexpr double kConfidence = 0.95;
+constexpr std::array kRisingFreedom{LensFreedom::kNoPrincipalPoint, LensFreedom::kAll,
+                                    LensFreedom::kPrincipalPointPerImage};
 constexpr std::uint64_t kPick = 0x401d, kBoot = 0xb007, kSome = 0x50e;  // of random sequences
 
 struct Split {
@@ -122,10 +124,12 @@ constexpr size_t kNoneConverged = ~size_t{0};
 size_t Choose(const Bundle& bundle, const Split& split, const RefineOptions& options,
               Refined& refined) {
   refined.held_out_sights = static_cast<int>(split.held_out.size());
-  refined.candidates = {
-      {"as given", {}, 0, 0, 0},
-      {NameOf(LensFreedom::kNoPrincipalPoint), LensFreedom::kNoPrincipalPoint, 0, 0, 0},
-      {NameOf(LensFreedom::kAll), LensFreedom::kAll, 0, 0, 0}};
+  refined.candidates = {{"as given", {}, 0, 0, 0}};
+  for (const LensFreedom freedom : kRisingFreedom) {
+    // A lens for every image has its principal point already.
+    if (freedom == LensFreedom::kPrincipalPointPerImage && options.separate_lenses) continue;
+    refined.candidates.push_back({NameOf(freedom), freedom, 0, 0, 0});
+  }
   auto& candidates = refined.candidates;
   std::vector<Adjusted> trained(candidates.size());
   ParallelFor(0, static_cast<int>(candidates.size()), options.threads, [&](int i) {
@@ -138,15 +142,18 @@ size_t Choose(const Bundle& bundle, const Split& split, const RefineOptions& opt
         Losses(trained[i].bundle, split.held_out, kLossSigmas * trained.front().sigma_px));
     candidates[i].held_out_px = std::sqrt(Mean(losses[i]));
   }
-  std::tie(candidates[2].low_px2, candidates[2].high_px2) =
-      Bootstrap(losses[2], losses[1], options.seed);
   for (size_t i = 0; i < candidates.size(); ++i) candidates[i].converged = trained[i].converged;
-  if (!trained[0].converged || !(trained[1].converged || trained[2].converged)) {
-    return kNoneConverged;
+  size_t chosen = 0;
+  for (size_t i = 1; i < candidates.size(); ++i) {
+    RefineCandidate& candidate = candidates[i];
+    if (chosen > 0) {
+      std::tie(candidate.low_px2, candidate.high_px2) =
+          Bootstrap(losses[i], losses[chosen], options.seed);
+    }
+    // More freedom must be worth it beyond chance.
+    if (candidate.converged && (chosen == 0 || candidate.high_px2 < 0)) chosen = i;
   }
-  // More freedom must be worth it beyond chance.
-  const bool more = trained[2].converged && (!trained[1].converged || candidates[2].high_px2 < 0);
-  const size_t chosen = more ? 2 : 1;
+  if (!trained[0].converged || chosen == 0) return kNoneConverged;
   // Now like with like: adjusted to all sights, as the given model was.
   refined.adjusted = Adjust(bundle, OptionsFor(candidates[chosen].lens));
   const auto adjusted =

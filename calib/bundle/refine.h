@@ -27,8 +27,8 @@ struct RefineCandidate {
   std::optional<LensFreedom> lens;  ///< empty: cameras as given
   double held_out_px = 0;           ///< root mean of Cauchy's loss over the held-out sights
   /// 95 % bootstrap interval of this candidate's mean loss less another's, in px^2; points drawn
-  /// with replacement. With the principal point: less that without; "adjusted to all": less "as
-  /// given"; else 0.
+  /// with replacement. With more freedom: less that of the best candidate with less; "adjusted to
+  /// all": less "as given"; else 0.
   double low_px2 = 0, high_px2 = 0;
   bool converged = false;  ///< else it is not taken
 };
@@ -45,8 +45,9 @@ struct Refined {
 };
 
 /// Bundle adjustment of `model` where it pays. One sight of every point with four or more is held
-/// out. Cameras adjusted to the rest, with and without the principal point, predict it: the
-/// principal point is freed only if that is better beyond the bootstrap interval. The chosen way is
+/// out. Cameras adjusted to the rest, without the principal point, with it, and with one for every
+/// image (stabilised lenses), predict it: more is freed only if that is better beyond the bootstrap
+/// interval. The chosen way is
 /// then run on all sights, as structure from motion was; the result is taken only if its cameras
 /// place points, from the rest alone, so that they predict the held-out sights better than with the
 /// cameras as given, beyond the bootstrap interval.

@@ -46,6 +46,21 @@ struct Sighting {
 };
 
 template <int kLens>
+struct ShiftedSighting {
+  Sighting<kLens> sighting;
+  double shift_scale_px;
+
+  template <typename T>
+  bool operator()(const T* theta, const T* motion, const T* place, const T* shift,
+                  T* residual) const {
+    if (!sighting(theta, motion, place, residual)) return false;
+    residual[0] += shift_scale_px * shift[0];
+    residual[1] += shift_scale_px * shift[1];
+    return true;
+  }
+};
+
+template <int kLens>
 struct RigSighting {
   Sighting<kLens> sighting;
   const RigMember& member;
@@ -62,8 +77,13 @@ template <int kLens>
 std::unique_ptr<ceres::CostFunction> Cost(const LensFrame& lens, const PoseFrame& pose,
                                           const PointFrame& point,
                                           const Eigen::Vector2d& observed_px,
-                                          const RigMember* member) {
+                                          const SightExtras& extras) {
   using Functor = Sighting<kLens>;
+  if (extras.shift_scale_px > 0) {
+    return std::make_unique<ceres::AutoDiffCostFunction<ShiftedSighting<kLens>, 2, kLens, 6, 3, 2>>(
+        new ShiftedSighting<kLens>{{lens, pose, point, observed_px}, extras.shift_scale_px});
+  }
+  const RigMember* member = extras.member;
   if (member != nullptr) {
     return std::make_unique<ceres::AutoDiffCostFunction<RigSighting<kLens>, 2, kLens, 6, 3>>(
         new RigSighting<kLens>{{lens, pose, point, observed_px}, *member});
@@ -90,7 +110,7 @@ double LeverOf(LensModel model, size_t coefficient, double r) {
 
 LensFrame FrameAround(const LensCamera& lens, double largest_radius) {
   const double r = largest_radius;
-  const size_t focals = FocalCount(lens.model);
+  const auto focals = static_cast<size_t>(FocalCount(lens.model));
   LensFrame frame{lens.model, lens.params, std::vector<double>(lens.params.size(), 1)};
   for (size_t i = 0; i < frame.scale.size(); ++i) {
     if (i < focals) {
@@ -127,18 +147,18 @@ PointFrame FrameAround(const Eigen::Vector4d& point, const Eigen::Vector3d& anch
 std::unique_ptr<ceres::CostFunction> SightCost(const LensFrame& lens, const PoseFrame& pose,
                                                const PointFrame& point,
                                                const Eigen::Vector2d& observed_px,
-                                               const RigMember* member) {
+                                               const SightExtras& extras) {
   switch (ParameterCount(lens.model)) {
     case 3:
-      return Cost<3>(lens, pose, point, observed_px, member);
+      return Cost<3>(lens, pose, point, observed_px, extras);
     case 4:
-      return Cost<4>(lens, pose, point, observed_px, member);
+      return Cost<4>(lens, pose, point, observed_px, extras);
     case 5:
-      return Cost<5>(lens, pose, point, observed_px, member);
+      return Cost<5>(lens, pose, point, observed_px, extras);
     case 8:
-      return Cost<8>(lens, pose, point, observed_px, member);
+      return Cost<8>(lens, pose, point, observed_px, extras);
     case 12:
-      return Cost<12>(lens, pose, point, observed_px, member);
+      return Cost<12>(lens, pose, point, observed_px, extras);
   }
   throw std::logic_error("SightCost: no model has this number of parameters");
 }

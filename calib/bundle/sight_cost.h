@@ -68,12 +68,18 @@ struct RigMember {
   }
 };
 
+/// What not every sight has; one of the two at most.
+struct SightExtras {
+  const RigMember* member = nullptr;  ///< borrowed; the pose block is the rig's
+  /// Above 0: a fourth block of two numbers, times this, moves the image's principal point.
+  double shift_scale_px = 0;
+};
+
 /// Predicted minus observed pixel; parameter blocks lens, pose (w, v), point (a, b, rho). Fails
-/// where the point has no pixel. With `member` the pose block is the rig's. The frames are
-/// borrowed.
+/// where the point has no pixel. The frames are borrowed.
 std::unique_ptr<ceres::CostFunction> SightCost(const LensFrame& lens, const PoseFrame& pose,
                                                const PointFrame& point,
                                                const Eigen::Vector2d& observed_px,
-                                               const RigMember* member = nullptr);
+                                               const SightExtras& extras = {});
 
 }  // namespace dtr::calib

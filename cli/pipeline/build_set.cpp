@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "calib/lens_groups.h"
 #include "calib/sparse_from_sfm.h"
 #include "calib/undistort.h"
 #include "capture/ingest.h"
@@ -92,6 +93,20 @@ capture::Capture FramesOf(const BuildOptions& options, const std::filesystem::pa
   return capture::ReadCapture(kept);
 }
 
+// The pinhole camera that photos of each camera are drawn on. Cameras that a stabiliser made of one
+// lens share one, as their photos are resampled anyway; without distortion pixels stay as they are.
+std::map<std::uint32_t, PinholeCamera> CamerasToDrawOn(
+    const std::map<std::uint32_t, calib::LensCamera>& cameras) {
+  std::map<std::uint32_t, PinholeCamera> onto;
+  for (const calib::LensGroup& group : calib::LensGroups(cameras)) {
+    for (const std::uint32_t id : group.cameras) {
+      const calib::LensCamera& own = cameras.at(id);
+      onto.emplace(id, own.IsUndistorted() ? own.Pinhole() : group.lens.Pinhole());
+    }
+  }
+  return onto;
+}
+
 // Views of the registered photos, in the photos' order; their pixels, on the set's grid, are
 // written one by one.
 std::vector<View> UndistortPhotos(const capture::Capture& capture,
@@ -104,6 +119,7 @@ std::vector<View> UndistortPhotos(const capture::Capture& capture,
       std::all_of(calibrated.model.cameras.begin(), calibrated.model.cameras.end(),
                   [](const auto& camera) { return camera.second.IsUndistorted(); });
   if (undistorted) progress.Note("undistortion left out: no camera has distortion");
+  const std::map<std::uint32_t, PinholeCamera> onto = CamerasToDrawOn(calibrated.model.cameras);
   progress.Stage(undistorted ? "reading photos" : "undistorting",
                  static_cast<int>(registered.size()));
 
@@ -120,8 +136,9 @@ std::vector<View> UndistortPhotos(const capture::Capture& capture,
                       "these photos",
                       photo.name, lens.width_px, lens.height_px, photo.width_px, photo.height_px));
     }
-    calib::UndistortedPhoto flat = calib::Undistort(
-        capture::ReadPhoto(photo), capture::ReadPhotoMask(photo), lens, max_size_px, threads);
+    calib::UndistortedPhoto flat =
+        calib::Undistort(capture::ReadPhoto(photo), capture::ReadPhotoMask(photo), lens,
+                         onto.at(found->second->camera_id), max_size_px, threads);
     View view;
     view.id = photo.id;
     view.name = photo.name;

@@ -83,6 +83,18 @@ TEST(Undistort, GivesBackTheSceneThatTheLensDistorted) {
   }
 }
 
+TEST(Undistort, DrawsOntoACameraWhosePrincipalPointLiesElsewhere) {
+  for (const LensCamera& lens : {kBarrel, kFisheye}) {
+    const PinholeCamera onto(kWidth, kHeight, kFocal, kFocal, 80.25, 60.5);
+    const UndistortedPhoto photo = Undistort(PhotoOf(lens), {}, lens, onto, 0, 2);
+    EXPECT_EQ(photo.camera, onto);
+    EXPECT_LT(WorstDifference(photo, 0, 4), kIntensity) << NameOf(lens.model);
+    EXPECT_GT(WorstDifference(photo, 0.1, 4), kIntensity) << NameOf(lens.model);
+  }
+  EXPECT_THROW(Undistort(PhotoOf(kBarrel), {}, kBarrel, PinholeCamera(8, 8, 9, 9, 4, 4), 0, 1),
+               std::invalid_argument);
+}
+
 TEST(Undistort, MaskTellsExactlyWhichPixelsTheLensSaw) {
   for (const LensCamera& lens : {kBarrel, kPincushion, kFisheye}) {
     const UndistortedPhoto photo = Undistort(PhotoOf(lens), lens, 0, 1);

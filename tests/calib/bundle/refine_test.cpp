@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "dtr/base/error.h"
 #include "tests/calib/bundle/synthetic_bundle.h"
 
@@ -32,6 +34,16 @@ SfmModel ModelFrom(const Bundle& bundle) {
   return model;
 }
 
+// What a stabiliser of up to 10 px does to the sights of image i.
+Eigen::Vector2d ShiftOf(int image) {
+  return {10 * std::sin(2.4 * image), 7 * std::cos(1.7 * image)};
+}
+
+Bundle Stabilised(Bundle bundle) {
+  for (BundleObservation& o : bundle.observations) o.pixel += ShiftOf(o.image);
+  return bundle;
+}
+
 SceneSpec Noisy() { return {.points = 400, .noise_px = 0.3}; }
 
 TEST(Refine, FreesThePrincipalPointWhereItIsWrong) {
@@ -51,6 +63,26 @@ TEST(Refine, LeavesThePrincipalPointWhereTheDataDoNotAskForIt) {
   EXPECT_EQ(refined.lens, LensFreedom::kNoPrincipalPoint);
   EXPECT_EQ(refined.model.cameras.at(1).params[1], 504);
   EXPECT_NEAR(refined.model.cameras.at(1).params[0], 900, 2);
+}
+
+TEST(Refine, GivesEveryImageItsPrincipalPointWhereTheLensIsStabilised) {
+  const Refined refined = Refine(ModelFrom(Stabilised(MakeBundle(Noisy()))), {});
+  ASSERT_TRUE(refined.changed);
+  EXPECT_EQ(refined.lens, LensFreedom::kPrincipalPointPerImage);
+  EXPECT_NEAR(refined.adjusted.sigma_px, 0.3, 0.03);
+  const SfmModel& model = refined.model;
+  ASSERT_EQ(model.cameras.size(), model.images.size());
+  for (size_t i = 0; i < model.images.size(); ++i) {
+    const LensCamera& camera = model.cameras.at(model.images[i].camera_id);
+    const LensCamera& first = model.cameras.at(model.images[0].camera_id);
+    EXPECT_EQ(camera.params[0], first.params[0]) << "one focal length";
+    const Eigen::Vector2d apart = ShiftOf(static_cast<int>(i)) - ShiftOf(0);
+    EXPECT_NEAR(camera.params[1] - first.params[1], apart.x(), 2) << i;
+    EXPECT_NEAR(camera.params[2] - first.params[2], apart.y(), 2) << i;
+  }
+  // As one lens again, and settled: nothing is left to refine.
+  EXPECT_EQ(BundleOf(model).lenses.size(), 1u);
+  EXPECT_FALSE(Refine(model, {}).changed);
 }
 
 TEST(Refine, LeavesATrueModelAlone) {

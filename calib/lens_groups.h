@@ -1,0 +1,23 @@
+// calib/lens_groups.h -- which cameras of a model are one lens.
+#pragma once
+#include <cstdint>
+#include <map>
+#include <vector>
+
+#include "calib/lens_camera.h"
+
+namespace dtr::calib {
+
+/// Cameras of one lens, with what they have in common.
+struct LensGroup {
+  LensCamera lens;  ///< the cameras', with the mean of their principal points
+  std::vector<std::uint32_t> cameras;
+};
+
+/// Cameras that differ by their principal points alone, by at most 5 % of the image's long side
+/// from the mean, are one lens whose image stabiliser moved between the photos. Others, equal ones
+/// too, are groups of one. Each camera is in one group; groups are in the order of their first
+/// cameras.
+std::vector<LensGroup> LensGroups(const std::map<std::uint32_t, LensCamera>& cameras);
+
+}  // namespace dtr::calib
