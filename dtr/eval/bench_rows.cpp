@@ -58,12 +58,12 @@ void Add(const std::optional<double>& value, std::optional<double>& sum, int& co
 }
 
 void Measure(const Place& place, const std::vector<RenderOptions>& variants, int repeats,
-             TimedRenderer& renderer, std::vector<RowSums>& sums) {
+             TimedRenderer& renderer, HoleFiller& filler, std::vector<RowSums>& sums) {
   const Pose& pose = place.photo->cam_from_world;
   const size_t count = variants.size();
   std::vector<FrameTimes> frames(count), read_backs(count), fills(count);
   const auto fill = [&](size_t m, const PinholeCamera& camera, RenderResult& result) {
-    FillHolesFromViews(place.scene, camera, pose, variants[m], result);
+    filler.Fill(place.scene, camera, pose, variants[m], result);
   };
   for (size_t m = 0; m < count; ++m) {
     // Untimed: shaders are compiled and meshes made. Its picture serves the quality.
@@ -150,9 +150,10 @@ std::vector<RowSums> MeasureRows(const std::vector<Place>& places,
                                  const std::vector<RenderOptions>& variants, int repeats,
                                  TimedRenderer& renderer, const Progress& progress) {
   std::vector<RowSums> sums(variants.size());
+  HoleFiller filler;
   for (const Place& place : places) {
     progress.ThrowIfInterrupted();
-    Measure(place, variants, repeats, renderer, sums);
+    Measure(place, variants, repeats, renderer, filler, sums);
   }
   return sums;
 }

@@ -105,7 +105,7 @@ class Renderer::Implementation {
     DrawInBands(MakeFrame(scene, novel, novel_from_world, options, selection, !coarse_by_shaders_),
                 selection, result);
     result.coverage_share = CoverageShare(result.coverage);
-    if (options.fill_holes) FillHolesFromViews(scene, novel, novel_from_world, options, result);
+    if (options.fill_holes) hole_filler_.Fill(scene, novel, novel_from_world, options, result);
     return result;
   }
 
@@ -133,7 +133,10 @@ class Renderer::Implementation {
     return result;
   }
 
-  void Forget() { views_.Clear(); }
+  void Forget() {
+    views_.Clear();
+    hole_filler_.Forget();
+  }
   size_t gpu_bytes() const { return views_.bytes(); }
 
  private:
@@ -267,6 +270,7 @@ class Renderer::Implementation {
   CoarseDepth coarse_depth_;
   Resolver resolver_;
   ProcessorResolver processor_resolver_;
+  HoleFiller hole_filler_;
   std::optional<DrawnPicture> drawn_;  ///< while it lies in targets_
 };
 

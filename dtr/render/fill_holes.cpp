@@ -60,9 +60,9 @@ void FillFromSurroundings(const KnownDepth& known, int threads, RenderResult& re
   });
 }
 
-/// SPEC 7.2: asks the views for every hole; what they answer becomes known.
-void FillFromViews(const GuessedColours& guesses, int threads, KnownDepth& known,
-                   RenderResult& result) {
+/// SPEC 7.2: inverse depths of the holes where some view answers, else 0; these become known.
+Grid<double> GuessDepths(const GuessedColours& guesses, const Mask& coverage, int threads,
+                         KnownDepth& known) {
   using Depths = PushPull<0>;
   const Mask holes = HolesOf(known);
   const HolePyramid pyramid(holes);
@@ -71,51 +71,117 @@ void FillFromViews(const GuessedColours& guesses, int threads, KnownDepth& known
   };
   const Depths far(pyramid, Favour::kFar, threads, finest);
   const Depths even(pyramid, Favour::kNone, threads, finest);
+  Grid<double> guessed(known.width(), known.height());
   ParallelFor(0, known.height(), threads, [&](int y) {
-    GuessedColours::Row row(guesses, y);
+    std::vector<GuessedColours::Row::Hole> asked;
     for (int x = 0; x < known.width(); ++x) {
-      if (holes(x, y) == 0 || result.coverage(x, y) != 0) continue;
+      if (holes(x, y) == 0 || coverage(x, y) != 0) continue;
       const Depths::Cell farthest = far.At(x, y);
       if (!(farthest.weight > 0)) continue;
-      const auto guess = row.At(x, farthest.inverse_depth, even.At(x, y).inverse_depth);
-      if (!guess) continue;
-      Write(guess->linear_rgb, &result.image(x, y));
-      known(x, y) = static_cast<float>(1 / guess->inverse_depth);
+      asked.push_back({x, farthest.inverse_depth, even.At(x, y).inverse_depth});
+    }
+    if (asked.empty()) return;
+    GuessedColours::Row row(guesses, y);
+    const std::vector<double>& found = row.DepthsOf(asked);
+    for (size_t i = 0; i < asked.size(); ++i) {
+      if (!(found[i] > 0)) continue;
+      guessed(asked[i].x, y) = found[i];
+      known(asked[i].x, y) = static_cast<float>(1 / found[i]);
     }
   });
+  return guessed;
 }
 
-/// SPEC 7.3: asks again where the views agree better on a plane than on the guess.
-void FillLargeHoles(const KnownDepth& seen, const GuessedColours& guesses, int threads,
-                    KnownDepth& known, RenderResult& result) {
-  const HolePlanes planes = ChooseHolePlanes(seen, known, guesses, threads);
-  const std::array<double, 256>& linear = LinearFromSrgb8();
-  ParallelFor(0, known.height(), threads, [&](int y) {
-    GuessedColours::Row row(guesses, y);
-    for (int x = 0; x < known.width(); ++x) {
-      if (result.coverage(x, y) != 0) continue;
-      const HolePlanes::Mix mix = planes.At(x, y);
-      Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-      double answered = 0, guessed = 1, most = 0, depth = 0;
-      for (size_t i = 0; i < static_cast<size_t>(mix.count); ++i) {
-        guessed -= mix.share[i];
-        const auto colour = row.At(x, mix.inverse_depth[i], mix.inverse_depth[i]);
-        if (!colour) continue;
-        sum += mix.share[i] * colour->linear_rgb;
-        answered += mix.share[i];
-        if (mix.share[i] > most) most = mix.share[i], depth = 1 / mix.inverse_depth[i];
+/// A row's holes between what was guessed and the planes of SPEC 7.3.
+class HoleRow {
+ public:
+  HoleRow(const GuessedColours& guesses, const HolePlanes& planes, const Grid<double>& guessed,
+          const Mask& coverage, int y)
+      : row_(guesses, y) {
+    for (int x = 0; x < guessed.width(); ++x) {
+      if (coverage(x, y) != 0) continue;
+      Hole hole{x, planes.At(x, y), guessed(x, y)};
+      for (size_t i = 0; i < static_cast<size_t>(hole.mix.count); ++i) {
+        hole.rest -= hole.mix.share[i];
       }
-      if (!(answered > 0)) continue;
-      if (known(x, y) > 0 && guessed > 0) {
-        const std::uint8_t* rgb = &result.image(x, y);
-        sum += guessed * Eigen::Vector3d(linear[rgb[0]], linear[rgb[1]], linear[rgb[2]]);
-        answered += guessed;
-      }
-      Write(sum / answered, &result.image(x, y));
-      if (!(known(x, y) > 0) || most > guessed) known(x, y) = static_cast<float>(depth);
+      if (hole.mix.count > 0 || hole.guess > 0) holes_.push_back(hole);
     }
-  });
-}
+  }
+
+  /// What is answered becomes known.
+  void Colour(int y, KnownDepth& known, ImageRgb8& image) {
+    AskOnPlanes();
+    AskAtGuesses();
+    for (const Hole& hole : holes_) {
+      if (!(hole.answered > 0)) continue;
+      Write(hole.sum / hole.answered, &image(hole.x, y));
+      if (!(hole.guess > 0) || hole.most > hole.rest) {
+        known(hole.x, y) = static_cast<float>(hole.depth);
+      }
+    }
+  }
+
+ private:
+  struct Hole {
+    int x;
+    HolePlanes::Mix mix;
+    double guess;     ///< 1/z; 0: none
+    double rest = 1;  ///< the guess's share
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    double answered = 0;         ///< share of what stands in `sum`
+    double most = 0, depth = 0;  ///< of the planes that answered
+  };
+
+  void AskOnPlanes() {
+    points_.clear();
+    for (const Hole& hole : holes_) {
+      for (size_t i = 0; i < static_cast<size_t>(hole.mix.count); ++i) {
+        points_.push_back({hole.x, hole.mix.inverse_depth[i]});
+      }
+    }
+    auto colour = row_.ColoursAt(points_).begin();
+    for (Hole& hole : holes_) {
+      for (size_t i = 0; i < static_cast<size_t>(hole.mix.count); ++i, ++colour) {
+        if (!*colour) continue;
+        const double share = hole.mix.share[i];
+        hole.sum += share * **colour;
+        hole.answered += share;
+        if (share > hole.most) hole.most = share, hole.depth = 1 / hole.mix.inverse_depth[i];
+      }
+    }
+  }
+
+  /// Only where something of the guess remains. As the picture would show it alone, in 8 bits.
+  void AskAtGuesses() {
+    const auto needed = [](const Hole& hole) {
+      return hole.guess > 0 && (hole.rest > 0 || !(hole.answered > 0));
+    };
+    points_.clear();
+    for (const Hole& hole : holes_) {
+      if (needed(hole)) points_.push_back({hole.x, hole.guess});
+    }
+    const std::array<double, 256>& linear = LinearFromSrgb8();
+    auto colour = row_.ColoursAt(points_).begin();
+    for (Hole& hole : holes_) {
+      if (!needed(hole)) continue;
+      const auto& shown = *colour++;
+      if (!shown) continue;
+      std::uint8_t rgb[3];
+      Write(*shown, rgb);
+      const Eigen::Vector3d level(linear[rgb[0]], linear[rgb[1]], linear[rgb[2]]);
+      if (!(hole.answered > 0)) {
+        hole.sum = level, hole.answered = 1, hole.rest = 1;
+      } else {
+        hole.sum += hole.rest * level;
+        hole.answered += hole.rest;
+      }
+    }
+  }
+
+  GuessedColours::Row row_;
+  std::vector<Hole> holes_;
+  std::vector<GuessedColours::Row::Point> points_;
+};
 
 bool HasHoles(const RenderResult& result) {
   const auto& covered = result.coverage.data();
@@ -129,17 +195,27 @@ void FillHoles(RenderResult& result) {
   FillFromSurroundings(DepthOf(result), 1, result);
 }
 
+void HoleFiller::Fill(const RenderScene& scene, const PinholeCamera& novel,
+                      const Pose& novel_from_world, const RenderOptions& options,
+                      RenderResult& result) {
+  if (!HasHoles(result)) return;
+  const int threads = options.threads;
+  KnownDepth known = DepthOf(result);
+  GuessedColours guesses(scene, result.views_used, novel, novel_from_world, options);
+  guesses.MatchExposures(known, result.image, threads);
+  const KnownDepth seen = known;
+  const Grid<double> guessed = GuessDepths(guesses, result.coverage, threads, known);
+  const HolePlanes planes = ChooseHolePlanes(seen, known, guesses, photos_, threads);
+  ParallelFor(0, known.height(), threads, [&](int y) {
+    HoleRow(guesses, planes, guessed, result.coverage, y).Colour(y, known, result.image);
+  });
+  FillFromSurroundings(known, threads, result);
+}
+
 void FillHolesFromViews(const RenderScene& scene, const PinholeCamera& novel,
                         const Pose& novel_from_world, const RenderOptions& options,
                         RenderResult& result) {
-  if (!HasHoles(result)) return;
-  KnownDepth known = DepthOf(result);
-  GuessedColours guesses(scene, result.views_used, novel, novel_from_world, options);
-  guesses.MatchExposures(known, result.image);
-  const KnownDepth seen = known;
-  FillFromViews(guesses, options.threads, known, result);
-  FillLargeHoles(seen, guesses, options.threads, known, result);
-  FillFromSurroundings(known, options.threads, result);
+  HoleFiller().Fill(scene, novel, novel_from_world, options, result);
 }
 
 }  // namespace dtr

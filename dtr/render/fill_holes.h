@@ -3,6 +3,7 @@
 #include "dtr/render/options.h"
 #include "dtr/render/result.h"
 #include "dtr/render/scene.h"
+#include "dtr/render/shrunk_photos.h"
 
 namespace dtr {
 
@@ -23,5 +24,18 @@ void FillHoles(RenderResult& result);
 void FillHolesFromViews(const RenderScene& scene, const PinholeCamera& novel,
                         const Pose& novel_from_world, const RenderOptions& options,
                         RenderResult& result);
+
+/// FillHolesFromViews for many pictures of a scene, to the same bytes: keeps what depends on the
+/// views alone (ShrunkPhotos). Several threads may fill pictures of theirs at once.
+class HoleFiller {
+ public:
+  void Fill(const RenderScene& scene, const PinholeCamera& novel, const Pose& novel_from_world,
+            const RenderOptions& options, RenderResult& result);
+  /// Views of the same address may be others from here on.
+  void Forget() { photos_.Clear(); }
+
+ private:
+  ShrunkPhotos photos_;
+};
 
 }  // namespace dtr

@@ -17,23 +17,21 @@ namespace dtr {
 /// acos loses half its digits and can give NaN. 0 if a direction is the zero vector.
 double AngleBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b);
 
+/// Abramowitz & Stegun, Handbook of Mathematical Functions, 4.4.49; highest power first.
+inline constexpr double kQuickAngleSeries[] = {0.0028662257,  -0.0161657367, 0.0429096138,
+                                               -0.0752896400, 0.1065626393,  -0.1420889944,
+                                               0.1999355085,  -0.3333314528, 1};
+
 /// The same angle from the length of the cross product (not negative) and the dot product, to
 /// within 2e-8 rad and at a quarter of the cost: for weights, of which a picture needs millions.
-/// Abramowitz & Stegun, Handbook of Mathematical Functions, 4.4.49.
 inline double QuickAngle(double cross_length, double dot) {
   const double side = std::abs(dot);
   const double longer = std::max(cross_length, side);
   if (!(longer > 0)) return 0;
   const double x = std::min(cross_length, side) / longer, q = x * x;
-  const double first_octant =
-      x *
-      (1 +
-       q * (-0.3333314528 +
-            q * (0.1999355085 +
-                 q * (-0.1420889944 +
-                      q * (0.1065626393 +
-                           q * (-0.0752896400 +
-                                q * (0.0429096138 + q * (-0.0161657367 + q * 0.0028662257))))))));
+  double series = 0;
+  for (const double coefficient : kQuickAngleSeries) series = coefficient + q * series;
+  const double first_octant = x * series;
   const double first_quadrant =
       cross_length > side ? std::numbers::pi / 2 - first_octant : first_octant;
   return dot < 0 ? std::numbers::pi - first_quadrant : first_quadrant;

@@ -1,26 +1,21 @@
 #include "dtr/render/guessed_colours.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
+#include "dtr/base/parallel_for.h"
 #include "dtr/render/colour.h"
 #include "dtr/render/frame.h"
-#include "dtr/render/geometry.h"
 #include "dtr/render/texture.h"
 
 namespace dtr {
 namespace {
 
-// Depths that are tried for a hole, between its farthest and its nearest guess (SPEC 7.2).
-constexpr int kTriedDepths = 8;
-
 // SPEC 7.4.
 constexpr double kExposureSamples = 20000, kNearWhite = 0.85, kMostExposure = 2,
                  kExposureNoise = 0.01;
 constexpr int kFewestExposed = 200;
-constexpr double kRimShare = 0.05,
-                 kLeastFade = 1e-3;  // of the shorter side; a lone view answers too
+constexpr double kRimShare = 0.05;  // of the shorter side
 
 Eigen::Matrix3d CalibrationOf(const PinholeCamera& camera) {
   Eigen::Matrix3d k;
@@ -34,14 +29,28 @@ float DepthAt(const View& view, int x, int y) {
   return view.depth(x / view.depth_scale, y / view.depth_scale);
 }
 
-/// From nearly 0 at the rim of a photo to 1 where it is farther in: no border of a photo shows in
-/// what is filled.
-double FadeAtRim(const PinholeCamera& camera, const Eigen::Vector2d& pixel) {
-  const double to_rim = std::min(
-      {pixel.x(), pixel.y(), camera.width_px() - pixel.x(), camera.height_px() - pixel.y()});
-  const double width = kRimShare * std::min(camera.width_px(), camera.height_px());
-  const double t = std::clamp(to_rim / width, kLeastFade, 1.0);
-  return t * t * (3 - 2 * t);
+bool Usable(const View& view, const BilinearTaps& taps, size_t tap) {
+  return view.mask.empty() || view.mask(taps.columns[tap], taps.rows[tap]) != 0;
+}
+
+/// As ColourAt in linear light. False where all pixels around are masked.
+bool ColourOf(const GuessedColours::Placed& placed, const Eigen::Vector2d& pixel,
+              Eigen::Vector3d& rgb) {
+  const ImageRgb8& image = placed.view->image;
+  const BilinearTaps taps(image.width(), image.height(), pixel);
+  rgb.setZero();
+  for (size_t tap = 0; tap < 4; ++tap) {
+    if (!Usable(*placed.view, taps, tap)) {
+      const auto colour = ColourAt(*placed.view, pixel, true);
+      if (colour) rgb = *colour;
+      return colour.has_value();
+    }
+    const std::uint8_t* levels = &image(taps.columns[tap], taps.rows[tap]);
+    for (size_t c = 0; c < 3; ++c) {
+      rgb[static_cast<Eigen::Index>(c)] += taps.weights[tap] * placed.linear[c][levels[c]];
+    }
+  }
+  return true;
 }
 
 /// What the view shows of a surface that the picture shows at a pixel; none where it measured
@@ -57,7 +66,9 @@ std::optional<Eigen::Vector3d> ColourOfSurface(const GuessedColours::Placed& pla
   if (DepthImage::IsHole(z)) return std::nullopt;
   const double off = 1 / static_cast<double>(z) - inverse_depth / p.z();
   if (std::abs(off) > placed.delta_inverse_depth) return std::nullopt;
-  return ColourAt(*placed.view, pixel, true);
+  Eigen::Vector3d rgb;
+  if (!ColourOf(placed, pixel, rgb)) return std::nullopt;
+  return rgb;
 }
 
 }  // namespace
@@ -78,14 +89,18 @@ GuessedColours::GuessedColours(const RenderScene& scene, const std::vector<int>&
     views_.push_back({&view, pixel_from_novel * ray_from_pixel,
                       -(pixel_from_novel * placed.translation), placed.translation,
                       ThresholdsOf(view, options).delta});
+    for (int c = 0; c < 3; ++c) {
+      views_.back().linear[static_cast<size_t>(c)] = LinearAfterGain(view, c);
+    }
   }
 }
 
-void GuessedColours::MatchExposures(const Grid<float>& seen, const ImageRgb8& image) {
+void GuessedColours::MatchExposures(const Grid<float>& seen, const ImageRgb8& image, int threads) {
   const std::array<double, 256>& linear = LinearFromSrgb8();
   const double pixels = static_cast<double>(seen.width()) * seen.height();
   const int step = std::max(1, static_cast<int>(std::sqrt(pixels / kExposureSamples)));
-  for (Placed& placed : views_) {
+  ParallelFor(0, static_cast<int>(views_.size()), threads, [&](int v) {
+    Placed& placed = views_[static_cast<size_t>(v)];
     Eigen::Vector3d in_picture = Eigen::Vector3d::Zero(), in_view = Eigen::Vector3d::Zero();
     int count = 0;
     for (int y = step / 2; y < seen.height(); y += step) {
@@ -100,104 +115,132 @@ void GuessedColours::MatchExposures(const Grid<float>& seen, const ImageRgb8& im
         ++count;
       }
     }
-    if (count < kFewestExposed) continue;
+    if (count < kFewestExposed) return;
     for (int c = 0; c < 3; ++c) {
       if (!(in_view[c] > 0)) continue;
       const double exposure =
           std::clamp(in_picture[c] / in_view[c], 1 / kMostExposure, kMostExposure);
       if (std::abs(exposure - 1) > kExposureNoise) placed.exposure[c] = exposure;
     }
-  }
+  });
 }
 
 GuessedColours::Row::Row(const GuessedColours& guesses, int y)
-    : guesses_(guesses), y_(y), asked_(guesses.views_.size()) {
-  for (size_t i = 0; i < asked_.size(); ++i) {
-    const Eigen::Matrix3d& from_novel = guesses.views_[i].pixel_from_novel_pixel;
-    asked_[i].pixel_per_x = from_novel.col(0);
-    asked_[i].pixel_at_0 = from_novel * Eigen::Vector3d(0.5, y + 0.5, 1);
+    : guesses_(guesses),
+      row_{guesses.novel_.fx_px(), guesses.novel_.cx_px(),
+           guesses.novel_.RayFromPixel({0.5, y + 0.5}).y()} {
+  for (const Placed& placed : guesses.views_) {
+    const View& view = *placed.view;
+    GuessView asked{};
+    const auto copy = [](const Eigen::Vector3d& from, double* to) {
+      Eigen::Map<Eigen::Vector3d>{to} = from;
+    };
+    copy(placed.pixel_from_novel_pixel * Eigen::Vector3d(0.5, y + 0.5, 1), asked.pixel_at_0);
+    copy(placed.pixel_from_novel_pixel.col(0), asked.pixel_per_x);
+    copy(placed.pixel_per_inverse_depth, asked.pixel_per_inverse_depth);
+    copy(placed.center_in_novel, asked.centre);
+    copy(placed.exposure, asked.exposure);
+    asked.delta = placed.delta_inverse_depth;
+    asked.width_px = view.camera.width_px(), asked.height_px = view.camera.height_px();
+    asked.depth = view.depth.grid().data().data();
+    asked.depth_columns = view.depth.grid().width(), asked.depth_scale = view.depth_scale;
+    asked.fade_width_px = kRimShare * std::min(asked.width_px, asked.height_px);
+    views_.push_back(asked);
   }
+  answers_.views.resize(views_.size());
 }
 
-/// Puts the point before every view. False as soon as one measured something behind it, unless
-/// that shall not matter; then asked_ is not complete.
-bool GuessedColours::Row::Ask(int x, double inverse_depth, bool despite_what_is_seen) {
-  for (size_t n = 0; n < asked_.size(); ++n) {
-    // The last sceptic first, then in turn: order decides nothing but the time.
-    const size_t i = n == 0 ? sceptic_ : n - (n <= sceptic_ ? 1 : 0);
-    const Placed& placed = guesses_.views_[i];
-    Asked& asked = asked_[i];
-    asked.answers = false;
-    const Eigen::Vector3d p =
-        asked.pixel_at_0 + x * asked.pixel_per_x + inverse_depth * placed.pixel_per_inverse_depth;
-    if (!(p.z() > 0)) continue;
-    const double per_z = 1 / p.z();
-    asked.pixel = p.head<2>() * per_z;
-    const View& view = *placed.view;
-    if (!view.camera.Contains(asked.pixel)) continue;
-    asked.answers = true;
-    const double measured = static_cast<double>(
-        DepthAt(view, static_cast<int>(asked.pixel.x()), static_cast<int>(asked.pixel.y())));
-    if (!(measured > 0)) continue;
-    const double inverse_depth_in_view = inverse_depth * per_z, delta = placed.delta_inverse_depth;
-    asked.answers = measured * (inverse_depth_in_view + delta) >= 1;
-    if (!despite_what_is_seen && measured * (inverse_depth_in_view - delta) > 1) {
-      sceptic_ = i;
-      return false;
+/// Whether any view that answers shows more than masked pixels.
+bool GuessedColours::Row::AnyUsable(size_t lane) const {
+  for (size_t i = 0; i < views_.size(); ++i) {
+    const GuessAnswers::OfView& of = answers_.views[i];
+    if (of.answers[lane] == 0) continue;
+    const View& view = *guesses_.views_[i].view;
+    const Eigen::Vector2d pixel(of.pixel_x[lane], of.pixel_y[lane]);
+    const BilinearTaps taps(view.image.width(), view.image.height(), pixel);
+    for (size_t tap = 0; tap < 4; ++tap) {
+      if (taps.weights[tap] > 0 && Usable(view, taps, tap)) return true;
     }
   }
-  return true;
+  return false;
 }
 
-std::optional<Eigen::Vector3d> GuessedColours::Row::Blend(int x, double inverse_depth) {
-  const Eigen::Vector3d ray = guesses_.novel_.RayFromPixel({x + 0.5, y_ + 0.5});
-  const double ray_squared = ray.squaredNorm();
-  dots_.clear();
-  angles_.clear();
-  colours_.clear();
-  fades_.clear();
-  for (size_t i = 0; i < asked_.size(); ++i) {
-    if (!asked_[i].answers) continue;
-    const auto colour = ColourAt(*guesses_.views_[i].view, asked_[i].pixel, true);
-    if (!colour) continue;
-    const Eigen::Vector3d& exposure = guesses_.views_[i].exposure;
-    colours_.emplace_back(Exposed(colour->x(), exposure.x()), Exposed(colour->y(), exposure.y()),
-                          Exposed(colour->z(), exposure.z()));
-    fades_.push_back(FadeAtRim(guesses_.views_[i].view->camera, asked_[i].pixel));
-    // Angle at the point ray / w between c - ray / w and -ray / w, both times w.
-    const Eigen::Vector3d c = inverse_depth * guesses_.views_[i].center_in_novel;
-    angles_.push_back(c.cross(ray).norm());
-    dots_.push_back(ray_squared - c.dot(ray));
+const std::vector<double>& GuessedColours::Row::DepthsOf(std::span<const Hole> holes) {
+  depths_.resize(holes.size());
+  for (size_t first = 0; first < holes.size(); first += kGuessesTogether) {
+    const size_t count = std::min(kGuessesTogether, holes.size() - first);
+    GuessLanes x, farthest, nearest, found;
+    for (size_t lane = 0; lane < kGuessesTogether; ++lane) {
+      const Hole& hole = holes[first + std::min(lane, count - 1)];
+      x[lane] = hole.x, farthest[lane] = hole.farthest, nearest[lane] = hole.nearest;
+    }
+    FindGuesses(views_, x, farthest, nearest, sceptic_, found);
+    AskViews(views_, x, found, answers_);
+    for (size_t lane = 0; lane < count; ++lane) {
+      depths_[first + lane] = AnyUsable(lane) ? found[lane] : 0;
+    }
   }
-  if (colours_.empty()) return std::nullopt;
-  if (colours_.size() == 1) return colours_.front();
-  for (size_t i = 0; i < angles_.size(); ++i) angles_[i] = QuickAngle(angles_[i], dots_[i]);
-  shares_.resize(angles_.size());
-  BlendShares(guesses_.blend_, angles_, shares_);
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  double shares = 0;
-  for (size_t i = 0; i < colours_.size(); ++i) {
-    sum += shares_[i] * fades_[i] * colours_[i];
-    shares += shares_[i] * fades_[i];
-  }
-  if (shares > 0) return sum / shares;
-  return colours_.front();  // all shares are too small to be told from 0
+  return depths_;
 }
 
-std::optional<GuessedColour> GuessedColours::Row::At(int x, double farthest, double nearest) {
-  double tried = farthest;
-  bool possible = false;
-  for (int k = kTriedDepths - 1; k > 0 && nearest > farthest && !possible; --k) {
-    tried = farthest + (nearest - farthest) * k / (kTriedDepths - 1);
-    possible = Ask(x, tried, false);
+void GuessedColours::Row::AskColours(size_t count) {
+  for (size_t i = 0; i < views_.size(); ++i) {
+    GuessAnswers::OfView& of = answers_.views[i];
+    for (size_t lane = 0; lane < kGuessesTogether; ++lane) {
+      Eigen::Vector3d rgb = Eigen::Vector3d::Zero();
+      if (lane >= count || of.answers[lane] == 0 ||
+          !ColourOf(guesses_.views_[i], {of.pixel_x[lane], of.pixel_y[lane]}, rgb)) {
+        of.answers[lane] = 0;
+      }
+      for (size_t c = 0; c < 3; ++c) of.rgb[c][lane] = rgb[static_cast<Eigen::Index>(c)];
+    }
   }
-  if (!possible) {
-    tried = farthest;
-    Ask(x, tried, true);
+}
+
+/// SPEC 4.5, 4.6.
+void GuessedColours::Row::Share() {
+  const BlendParameters& blend = guesses_.blend_;
+  if (blend.blend == BlendWeight::kInverseAngle) {
+    ShareByInverseAngle(blend.pixel_angle_rad, blend.blend_k, answers_);
+    return;
   }
-  const auto colour = Blend(x, tried);
-  if (!colour) return std::nullopt;
-  return GuessedColour{*colour, tried};
+  for (size_t lane = 0; lane < kGuessesTogether; ++lane) {
+    angles_.clear();
+    for (const auto& of : answers_.views) {
+      if (of.answers[lane] != 0) angles_.push_back(of.angle_rad[lane]);
+    }
+    shares_.resize(angles_.size());
+    BlendShares(blend, angles_, shares_);
+    size_t next = 0;
+    for (auto& of : answers_.views) {
+      of.share[lane] = of.answers[lane] != 0 ? shares_[next++] : 0;
+    }
+  }
+}
+
+const std::vector<std::optional<Eigen::Vector3d>>& GuessedColours::Row::ColoursAt(
+    std::span<const Point> points) {
+  colours_.resize(points.size());
+  for (size_t first = 0; first < points.size(); first += kGuessesTogether) {
+    const size_t count = std::min(kGuessesTogether, points.size() - first);
+    GuessLanes x, w, rgb[3], answered;
+    for (size_t lane = 0; lane < kGuessesTogether; ++lane) {
+      const Point& point = points[first + std::min(lane, count - 1)];
+      x[lane] = point.x, w[lane] = point.inverse_depth;
+    }
+    AskViews(views_, x, w, answers_);
+    AskColours(count);
+    AnglesOfViews(views_, row_, x, w, answers_);
+    Share();
+    MixAnswers(views_, answers_, rgb, answered);
+    for (size_t lane = 0; lane < count; ++lane) {
+      colours_[first + lane].reset();
+      if (answered[lane] != 0) {
+        colours_[first + lane].emplace(rgb[0][lane], rgb[1][lane], rgb[2][lane]);
+      }
+    }
+  }
+  return colours_;
 }
 
 }  // namespace dtr

@@ -1,11 +1,14 @@
 // dtr/render/guessed_colours.h -- SPEC 7.2: what the views show where no surface was measured.
 #pragma once
 #include <Eigen/Core>
+#include <array>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "dtr/render/blend_weights.h"
+#include "dtr/render/guess_kernel.h"
 #include "dtr/render/options.h"
 #include "dtr/render/scene.h"
 #include "dtr/types/camera.h"
@@ -20,12 +23,6 @@ inline double Exposed(double linear, double exposure) {
   const auto fourth = [](double v) { return v * v * v * v; };
   return exposure * linear / std::sqrt(std::sqrt(1 + (fourth(exposure) - 1) * fourth(linear)));
 }
-
-/// A colour for a pixel that no view saw, and the inverse depth it was found at.
-struct GuessedColour {
-  Eigen::Vector3d linear_rgb;
-  double inverse_depth = 0;  ///< plane z of the novel camera
-};
 
 /// The views of one picture, asked pixel by pixel. The views must outlive it.
 class GuessedColours {
@@ -43,40 +40,49 @@ class GuessedColours {
     Eigen::Vector3d center_in_novel;
     double delta_inverse_depth;
     Eigen::Vector3d exposure = Eigen::Vector3d::Ones();  ///< as Exposed takes it
+    std::array<std::array<double, 256>, 3> linear{};     ///< of the photo's values: LinearAfterGain
   };
   /// SPEC 7.4: the views in the picture's exposure from here on. `seen`: plane z, 0 at holes;
   /// `image`: the picture.
-  void MatchExposures(const Grid<float>& seen, const ImageRgb8& image);
+  void MatchExposures(const Grid<float>& seen, const ImageRgb8& image, int threads);
 
   /// In the order of the ids.
   const std::vector<Placed>& views() const { return views_; }
   const PinholeCamera& novel() const { return novel_; }
 
-  /// Answers for the pixels of one row. One per thread: it holds what a pixel needs while it is
+  /// Answers for the pixels of one row. One per thread: it holds what pixels need while they are
   /// worked on.
   class Row {
    public:
     Row(const GuessedColours& guesses, int y);
-    /// Of some inverse depths from `nearest` to `farthest` (both above 0) the nearest that no view
-    /// sees through; the colour that the views show there. Empty where none of them shows any.
-    std::optional<GuessedColour> At(int x, double farthest, double nearest);
+
+    struct Hole {
+      int x;
+      double farthest, nearest;  ///< inverse depths, above 0
+    };
+    /// Of some inverse depths in each hole's range the nearest that no view sees through; 0 where
+    /// no view shows anything there.
+    const std::vector<double>& DepthsOf(std::span<const Hole> holes);
+
+    struct Point {
+      int x;
+      double inverse_depth;
+    };
+    /// The colours that the views show at points, linear light; empty where none shows any.
+    const std::vector<std::optional<Eigen::Vector3d>>& ColoursAt(std::span<const Point> points);
 
    private:
-    /// A view's line of homogeneous pixels p + w k along this row, and what it says of a guess.
-    struct Asked {
-      Eigen::Vector3d pixel_per_x, pixel_at_0;
-      Eigen::Vector2d pixel;
-      bool answers = false;
-    };
-    bool Ask(int x, double inverse_depth, bool despite_what_is_seen);
-    std::optional<Eigen::Vector3d> Blend(int x, double inverse_depth);
+    bool AnyUsable(size_t lane) const;
+    void AskColours(size_t count);
+    void Share();
 
     const GuessedColours& guesses_;
-    int y_;
-    std::vector<Asked> asked_;
-    size_t sceptic_ = 0;  ///< the view that saw through a guess last: likely the next one's too
-    std::vector<double> dots_, angles_, shares_, fades_;
-    std::vector<Eigen::Vector3d> colours_;
+    const GuessRow row_;
+    std::vector<GuessView> views_;
+    size_t sceptic_ = 0;  ///< as FindGuesses has it: likely the next pixels' too
+    GuessAnswers answers_;
+    std::vector<double> depths_, angles_, shares_;
+    std::vector<std::optional<Eigen::Vector3d>> colours_;
   };
 
  private:

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "dtr/base/random.h"
+#include "dtr/render/plane_support.h"
 
 namespace dtr {
 namespace {
@@ -17,42 +18,51 @@ constexpr double kCloser = 0.6;        // from one fit to the next
 constexpr double kReach = 0.4;         // of the longer side, from a triple's first position
 constexpr double kLeastArea = 0.0004;  // of all, of a triple's triangle
 
-struct Sample {
-  Eigen::Vector3d position;  ///< x, y, 1
-  double inverse_depth;
-};
-
-std::vector<Sample> SamplesOf(const Grid<double>& inverse_depth) {
+PlaneSamples SamplesOf(const Grid<double>& inverse_depth) {
   const double count = static_cast<double>(inverse_depth.width()) * inverse_depth.height();
   const int step = std::max(1, static_cast<int>(std::ceil(std::sqrt(count / kMostSamples))));
-  std::vector<Sample> samples;
+  PlaneSamples samples;
   for (int y = step / 2; y < inverse_depth.height(); y += step) {
     for (int x = step / 2; x < inverse_depth.width(); x += step) {
-      if (inverse_depth(x, y) > 0) samples.push_back({{x + 0.5, y + 0.5, 1}, inverse_depth(x, y)});
+      if (!(inverse_depth(x, y) > 0)) continue;
+      samples.x.push_back(x + 0.5);
+      samples.y.push_back(y + 0.5);
+      samples.inverse_depth.push_back(inverse_depth(x, y));
     }
   }
   return samples;
 }
 
-bool LiesOn(const PicturePlane& plane, const Sample& sample, double tolerance) {
-  return std::abs(plane.dot(sample.position) - sample.inverse_depth) <= tolerance;
+Eigen::Vector3d PositionOf(const PlaneSamples& samples, size_t i) {
+  return {samples.x[i], samples.y[i], 1};
 }
 
-std::ptrdiff_t Support(const PicturePlane& plane, const std::vector<Sample>& samples,
-                       double tolerance) {
-  return std::count_if(samples.begin(), samples.end(),
-                       [&](const Sample& sample) { return LiesOn(plane, sample, tolerance); });
+bool LiesOn(const PicturePlane& plane, const PlaneSamples& samples, size_t i, double tolerance) {
+  return std::abs(plane.dot(PositionOf(samples, i)) - samples.inverse_depth[i]) <= tolerance;
+}
+
+/// What does not lie within `tolerance` of the plane.
+PlaneSamples Without(const PicturePlane& plane, const PlaneSamples& samples, double tolerance) {
+  PlaneSamples left;
+  for (size_t i = 0; i < samples.size(); ++i) {
+    if (LiesOn(plane, samples, i, tolerance)) continue;
+    left.x.push_back(samples.x[i]);
+    left.y.push_back(samples.y[i]);
+    left.inverse_depth.push_back(samples.inverse_depth[i]);
+  }
+  return left;
 }
 
 /// Least squares over what lies on the plane already, closer and closer.
-PicturePlane Fitted(PicturePlane plane, const std::vector<Sample>& samples, double tolerance) {
+PicturePlane Fitted(PicturePlane plane, const PlaneSamples& samples, double tolerance) {
   for (int i = 0; i < kFits; ++i, tolerance *= kCloser) {
     Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
     Eigen::Vector3d right = Eigen::Vector3d::Zero();
-    for (const Sample& sample : samples) {
-      if (!LiesOn(plane, sample, tolerance)) continue;
-      normal += sample.position * sample.position.transpose();
-      right += sample.inverse_depth * sample.position;
+    for (size_t k = 0; k < samples.size(); ++k) {
+      if (!LiesOn(plane, samples, k, tolerance)) continue;
+      const Eigen::Vector3d position = PositionOf(samples, k);
+      normal += position * position.transpose();
+      right += samples.inverse_depth[k] * position;
     }
     const PicturePlane next = normal.ldlt().solve(right);
     if (!next.allFinite()) break;
@@ -64,25 +74,25 @@ PicturePlane Fitted(PicturePlane plane, const std::vector<Sample>& samples, doub
 /// The plane of most support among those through random triples; support 0: none was found.
 struct Found {
   PicturePlane plane = PicturePlane::Zero();
-  std::ptrdiff_t support = 0;
+  size_t support = 0;
 };
-Found BestOfTriples(const std::vector<Sample>& samples, double reach, double least_area,
-                    double tolerance, Random& random) {
+Found BestOfTriples(const PlaneSamples& samples, double reach, double least_area, double tolerance,
+                    Random& random) {
   Found best;
-  const auto pick = [&]() -> const Sample& {
-    return samples[static_cast<size_t>(random.Index(static_cast<int>(samples.size())))];
+  const auto pick = [&] {
+    return static_cast<size_t>(random.Index(static_cast<int>(samples.size())));
   };
   for (int trial = 0; trial < kTrials; ++trial) {
-    const Sample &a = pick(), &b = pick(), &c = pick();
-    if ((b.position - a.position).norm() > reach || (c.position - a.position).norm() > reach) {
-      continue;
-    }
+    const size_t i = pick(), j = pick(), k = pick();
+    const Eigen::Vector3d a = PositionOf(samples, i), b = PositionOf(samples, j),
+                          c = PositionOf(samples, k);
+    if ((b - a).norm() > reach || (c - a).norm() > reach) continue;
     Eigen::Matrix3d positions;
-    positions << a.position.transpose(), b.position.transpose(), c.position.transpose();
+    positions << a.transpose(), b.transpose(), c.transpose();
     if (std::abs(positions.determinant()) < 2 * least_area) continue;
-    const PicturePlane plane =
-        positions.inverse() * Eigen::Vector3d(a.inverse_depth, b.inverse_depth, c.inverse_depth);
-    const std::ptrdiff_t support = Support(plane, samples, tolerance);
+    const std::vector<double>& w = samples.inverse_depth;
+    const PicturePlane plane = positions.inverse() * Eigen::Vector3d(w[i], w[j], w[k]);
+    const size_t support = PlaneSupport(samples, plane.x(), plane.y(), plane.z(), tolerance);
     if (support > best.support) best = {plane, support};
   }
   return best;
@@ -91,22 +101,18 @@ Found BestOfTriples(const std::vector<Sample>& samples, double reach, double lea
 }  // namespace
 
 std::vector<PicturePlane> FindPlanes(const Grid<double>& inverse_depth, double tolerance) {
-  std::vector<Sample> samples = SamplesOf(inverse_depth);
-  const auto least =
-      static_cast<std::ptrdiff_t>(kLeastShare * static_cast<double>(samples.size())) + 3;
+  PlaneSamples samples = SamplesOf(inverse_depth);
+  const auto least = static_cast<size_t>(kLeastShare * static_cast<double>(samples.size())) + 3;
   const double reach = kReach * std::max(inverse_depth.width(), inverse_depth.height());
   const double least_area = kLeastArea * inverse_depth.width() * inverse_depth.height();
   Random random(1);
   std::vector<PicturePlane> planes;
-  while (static_cast<int>(planes.size()) < kMostPlanes &&
-         static_cast<std::ptrdiff_t>(samples.size()) >= least) {
+  while (static_cast<int>(planes.size()) < kMostPlanes && samples.size() >= least) {
     const Found best = BestOfTriples(samples, reach, least_area, tolerance, random);
     if (best.support < least) break;
     planes.push_back(Fitted(best.plane, samples, tolerance));
     // What lies near it would only give the same plane again.
-    std::erase_if(samples, [&](const Sample& sample) {
-      return LiesOn(planes.back(), sample, 2 * tolerance);
-    });
+    samples = Without(planes.back(), samples, 2 * tolerance);
   }
   return planes;
 }

@@ -55,10 +55,10 @@ Depths ChooseDepths(const Grid<float>& seen, const GuessedColours& guesses, int 
 class LargeHoles {
  public:
   LargeHoles(const Grid<float>& seen, const Grid<float>& guessed, const GuessedColours& guesses,
-             int threads)
+             ShrunkPhotos& photos, int threads)
       : guessed_(guessed),
         threads_(threads),
-        cells_(seen, guesses, threads),
+        cells_(seen, guesses, photos, threads),
         depths_(ChooseDepths(seen, guesses, cells_.cell_px())) {}
 
   HolePlanes Run() const {
@@ -95,76 +95,75 @@ class LargeHoles {
   Grid<double> Swept() const {
     const auto depths = static_cast<size_t>(depths_.count);
     const size_t guess = depths;
-    SemiGlobal sweep(cells_.columns(), cells_.rows(), depths + 1);
+    SemiGlobal sweep(cells_.columns(), cells_.rows(), depths + 1,
+                     {depths, kNextDepth, kOtherDepth});
+    std::vector<double> inverse_depths;
+    for (int k = 0; k < depths_.count; ++k) inverse_depths.push_back(depths_.At(k));
     ParallelFor(0, cells_.rows(), threads_, [&](int y) {
+      std::vector<float> costs(depths);
       for (int x = 0; x < cells_.columns(); ++x) {
-        float* costs = sweep.CostsOf(x, y);
         const bool seen = cells_.known(x, y) > 0;
+        if (!seen) cells_.CostsAt(cells_.Centre(x, y), inverse_depths, costs.data());
         for (size_t k = 0; k < depths; ++k) {
-          const double w = depths_.At(static_cast<double>(k));
-          costs[k] =
-              seen ? CostOfSeen(x, y, w) : cells_.CostAt(cells_.Centre(x, y), w) + kSweepBonus;
+          sweep.SetCost(x, y, k,
+                        seen ? CostOfSeen(x, y, inverse_depths[k]) : costs[k] + kSweepBonus);
         }
-        costs[guess] = seen ? 0 : CostOfGuess(x, y);
+        sweep.SetCost(x, y, guess, seen ? 0 : CostOfGuess(x, y));
       }
     });
-    sweep.Solve(threads_, [guess](const float* before, float least, size_t label) {
-      float best = std::min(before[label], least + kOtherDepth);
-      if (label > 0 && label != guess) best = std::min(best, before[label - 1] + kNextDepth);
-      if (label + 1 < guess) best = std::min(best, before[label + 1] + kNextDepth);
-      return best;
-    });
+    sweep.Solve(threads_);
     Grid<double> swept(cells_.columns(), cells_.rows());
     for (int y = 0; y < cells_.rows(); ++y) {
       for (int x = 0; x < cells_.columns(); ++x) {
         const double known = cells_.known(x, y);
-        swept(x, y) = known > 0 ? known : BetweenSteps(sweep.SumsOf(x, y), sweep.Best(x, y));
+        swept(x, y) = known > 0 ? known : BetweenSteps(sweep, x, y);
       }
     }
     return swept;
   }
 
   /// The cheapest inverse depth, between the steps by a parabola; 0 where the guess is.
-  double BetweenSteps(const float* sums, int label) const {
-    if (label == depths_.count) return 0;
+  double BetweenSteps(const SemiGlobal& sweep, int x, int y) const {
+    const size_t label = sweep.Best(x, y), guess = static_cast<size_t>(depths_.count);
+    if (label == guess) return 0;
     double offset = 0;
-    if (label > 0 && label + 1 < depths_.count) {
-      const double before = static_cast<double>(sums[label - 1] - sums[label]);
-      const double after = static_cast<double>(sums[label + 1] - sums[label]);
+    if (label > 0 && label + 1 < guess) {
+      const float sum = sweep.SumOf(x, y, label);
+      const auto before = static_cast<double>(sweep.SumOf(x, y, label - 1) - sum);
+      const auto after = static_cast<double>(sweep.SumOf(x, y, label + 1) - sum);
       if (before + after > 0) offset = 0.5 * (before - after) / (before + after);
     }
-    return depths_.At(label + offset);
+    return depths_.At(static_cast<double>(label) + offset);
   }
 
   void Choose(HolePlanes& found) const {
     const size_t planes = found.planes.size(), guess = planes;
-    SemiGlobal choice(cells_.columns(), cells_.rows(), planes + 1);
+    SemiGlobal choice(cells_.columns(), cells_.rows(), planes + 1, {0, 0, kOtherPlane});
     ParallelFor(0, cells_.rows(), threads_, [&](int y) {
+      std::vector<double> w(planes);
+      std::vector<float> costs(planes);
       for (int x = 0; x < cells_.columns(); ++x) {
-        float* costs = choice.CostsOf(x, y);
         const Eigen::Vector2d centre = cells_.Centre(x, y);
         const float seen = cells_.seen_share(x, y), hole = 1 - seen;
+        for (size_t k = 0; k < planes; ++k) w[k] = found.planes[k].dot(centre.homogeneous());
+        if (hole > 0) cells_.CostsAt(centre, w, costs.data());
         for (size_t k = 0; k < planes; ++k) {
-          const double w = found.planes[k].dot(centre.homogeneous());
-          costs[k] = 0;
-          if (seen > 0) costs[k] += seen * CostOfSeen(x, y, w);
-          if (hole > 0) {
-            costs[k] += hole * (w > 0 ? cells_.CostAt(centre, w) + kPlaneBonus : 4 * kMostCost);
-          }
+          float cost = 0;
+          if (seen > 0) cost += seen * CostOfSeen(x, y, w[k]);
+          if (hole > 0) cost += hole * (w[k] > 0 ? costs[k] + kPlaneBonus : 4 * kMostCost);
+          choice.SetCost(x, y, k, cost);
         }
         // The guess goes on from what was seen: it costs nothing there.
-        costs[guess] = hole > 0 ? hole * CostOfGuess(x, y) : 0;
+        choice.SetCost(x, y, guess, hole > 0 ? hole * CostOfGuess(x, y) : 0);
       }
     });
-    choice.Solve(threads_, [](const float* before, float least, size_t label) {
-      return std::min(before[label], least + kOtherPlane);
-    });
+    choice.Solve(threads_);
     found.chosen = Grid<int>(cells_.columns(), cells_.rows());
     for (int y = 0; y < cells_.rows(); ++y) {
       for (int x = 0; x < cells_.columns(); ++x) {
-        const int label = choice.Best(x, y);
+        const size_t label = choice.Best(x, y);
         const bool whole = cells_.seen_share(x, y) == 1;
-        found.chosen(x, y) = whole || label == static_cast<int>(guess) ? HolePlanes::kGuess : label;
+        found.chosen(x, y) = whole || label == guess ? HolePlanes::kGuess : static_cast<int>(label);
       }
     }
   }
@@ -205,8 +204,8 @@ HolePlanes::Mix HolePlanes::At(int x, int y) const {
 }
 
 HolePlanes ChooseHolePlanes(const Grid<float>& seen, const Grid<float>& guessed,
-                            const GuessedColours& guesses, int threads) {
-  return LargeHoles(seen, guessed, guesses, threads).Run();
+                            const GuessedColours& guesses, ShrunkPhotos& photos, int threads) {
+  return LargeHoles(seen, guessed, guesses, photos, threads).Run();
 }
 
 }  // namespace dtr

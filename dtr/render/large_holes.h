@@ -5,6 +5,7 @@
 
 #include "dtr/render/guessed_colours.h"
 #include "dtr/render/hole_planes.h"
+#include "dtr/render/shrunk_photos.h"
 #include "dtr/types/grid.h"
 
 namespace dtr {
@@ -29,8 +30,8 @@ struct HolePlanes {
 
 /// `seen`: plane z where the picture was seen, 0 at holes. `guessed`: the same with the guesses of
 /// SPEC 7.2. Empty where there is nothing to choose from. Bounded: at most 2^15 cells and 256
-/// inverse depths. Does not depend on the number of threads.
+/// inverse depths. Does not depend on the number of threads, nor on what `photos` kept before.
 HolePlanes ChooseHolePlanes(const Grid<float>& seen, const Grid<float>& guessed,
-                            const GuessedColours& guesses, int threads);
+                            const GuessedColours& guesses, ShrunkPhotos& photos, int threads);
 
 }  // namespace dtr

@@ -74,24 +74,6 @@ Grid<int> DistanceToUnusable(const View& view, int most) {
   return distance;
 }
 
-/// The four pixel centres around a position, and their bilinear weights.
-struct Taps {
-  int columns[4], rows[4];
-  double weights[4];
-  Taps(int width, int height, const Eigen::Vector2d& pixel) {
-    const double x = std::clamp(pixel.x() - 0.5, 0.0, width - 1.0);
-    const double y = std::clamp(pixel.y() - 0.5, 0.0, height - 1.0);
-    const int x0 = static_cast<int>(x), y0 = static_cast<int>(y);
-    const double fx = x - x0, fy = y - y0;
-    for (int tap = 0; tap < 4; ++tap) {
-      const bool right = (tap & 1) != 0, below = tap >= 2;
-      columns[tap] = right ? std::min(x0 + 1, width - 1) : x0;
-      rows[tap] = below ? std::min(y0 + 1, height - 1) : y0;
-      weights[tap] = (right ? fx : 1 - fx) * (below ? fy : 1 - fy);
-    }
-  }
-};
-
 Rgb Sample(const View& view, int x, int y) {
   return Usable(view, x, y) ? Corrected(view, x, y) : MeanOfNeighbours(view, x, y);
 }
@@ -111,7 +93,7 @@ Grid<std::uint8_t> RimFactors(const View& view) {
 }
 
 double RimFactorAt(const Grid<std::uint8_t>& factors, const Eigen::Vector2d& pixel) {
-  const Taps taps(factors.width(), factors.height(), pixel);
+  const BilinearTaps taps(factors.width(), factors.height(), pixel);
   double sum = 0;
   for (size_t tap = 0; tap < 4; ++tap) {
     sum += taps.weights[tap] * factors(taps.columns[tap], taps.rows[tap]);
@@ -134,11 +116,19 @@ std::vector<std::uint8_t> SampledImage(const View& view) {
   return rgba;
 }
 
+std::array<double, 256> LinearAfterGain(const View& view, int channel) {
+  std::array<double, 256> linear = LinearFromSrgb8();
+  const double gain = view.gain[channel];
+  if (gain == 1) return linear;
+  for (double& light : linear) light = LinearFromSrgb8()[Srgb8FromLinear(gain * light)];
+  return linear;
+}
+
 std::optional<Eigen::Vector3d> ColourAt(const View& view, const Eigen::Vector2d& pixel,
                                         bool linear_light) {
   const ImageRgb8& image = view.image;
   const std::array<double, 256>& linear = LinearFromSrgb8();
-  const Taps taps(image.width(), image.height(), pixel);
+  const BilinearTaps taps(image.width(), image.height(), pixel);
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   bool usable = false;
   for (size_t tap = 0; tap < 4; ++tap) {

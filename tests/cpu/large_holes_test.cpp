@@ -5,6 +5,7 @@
 
 #include "dtr/cpu/renderer.h"
 #include "dtr/render/colour.h"
+#include "dtr/render/fill_holes.h"
 #include "dtr/render/guessed_colours.h"
 #include "tests/cpu/render_testing.h"
 
@@ -84,6 +85,30 @@ TEST(LargeHoles, GroundAtTheFeetContinuesWithoutCellsShowing) {
               at_borders / borders, inside / insides);
   EXPECT_LE(sum / count, 6);
   EXPECT_LE(at_borders / borders, 1.3 * inside / insides + 0.2);
+}
+
+TEST(HoleFiller, GivesTheBytesOfAPictureFilledAloneWhateverItKeeps) {
+  DtrSet set = GroundWithoutDepth({1, 1.2, 1, 0.8});
+  const Shot novel = Wide("n", {0.1, 0.05, 0.2});
+  const RenderOptions options;
+  HoleFiller filler;
+  const auto expect_same = [&] {
+    const RenderScene scene = MakeRenderScene(set);
+    RenderResult alone = Render(scene, novel.camera, novel.cam_from_world, options);
+    RenderResult kept = alone;
+    FillHolesFromViews(scene, novel.camera, novel.cam_from_world, options, alone);
+    filler.Fill(scene, novel.camera, novel.cam_from_world, options, kept);
+    ExpectSameBytes(kept, alone);
+  };
+  expect_same();
+  expect_same();
+  const ImageRgb8 old = set.frames[0].views[1].image;
+  std::vector<std::uint8_t> darker = old.data();
+  for (std::uint8_t& level : darker) level = static_cast<std::uint8_t>(level / 2);
+  ImageRgb8 other(old.width(), old.height(), 3);
+  other.data() = darker;
+  std::swap(set.frames[0].views[1].image, other);  // what was there stays allocated
+  expect_same();
 }
 
 TEST(LargeHoles, WhatIsFilledIsExposedAsWhatWasSeen) {

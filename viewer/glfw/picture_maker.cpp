@@ -85,8 +85,8 @@ void PictureMaker::Show(const PictureOrder& order, const gl::DrawnPicture& drawn
     picture_.texture.Upload(InFalseColour());
   } else if (still && order.options.fill_holes) {
     Result();
-    FillHolesFromViews(picture_.scene, picture_.camera.camera, picture_.camera.cam_from_world,
-                       order.options, *result_);
+    filler_.Fill(picture_.scene, picture_.camera.camera, picture_.camera.cam_from_world,
+                 order.options, *result_);
     picture_.texture.Upload(result_->image);
   } else {
     picture_.texture.Take(drawn);

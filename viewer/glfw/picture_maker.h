@@ -6,6 +6,7 @@
 
 #include "dtr/gl/renderer.h"
 #include "dtr/render/camera_path.h"
+#include "dtr/render/fill_holes.h"
 #include "dtr/render/view_stream.h"
 #include "viewer/glfw/picture_texture.h"
 #include "viewer/shown.h"
@@ -74,6 +75,7 @@ class PictureMaker {
   MadePicture picture_;
   PictureTexture other_;
   std::optional<RenderResult> result_;
+  HoleFiller filler_;
 };
 
 }  // namespace dtr::viewer
