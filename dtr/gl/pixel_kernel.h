@@ -1,10 +1,16 @@
 // dtr/gl/pixel_kernel.h -- SPEC 4 to 6 for a row of pixels of the deferred method, several at once
 // with the processor's vector instructions. Only dtr/gl's own .cpp files include this.
 #pragma once
+#include <cstddef>
 #include <cstdint>
 #include <span>
 
+#include "dtr/render/options.h"
+
 namespace dtr::gl {
+
+/// Values are read by whole vectors: so many beyond the last one that is asked for may be, too.
+inline constexpr size_t kReadBeyond = 64;
 
 /// A view as the kernel knows it. Everything is relative to the novel camera and was formed in
 /// double precision. Grid positions: centre of the first sample at 0.5.
@@ -15,7 +21,8 @@ struct PixelView {
   float centre[3], centre_squared;  ///< the view's, in the novel frame; its squared length
   int columns, rows;                ///< of the samples
   /// The samples with the outermost ones once more around them, row by row, `stride` in a row; one
-  /// of the two. 1/z of a sample v > 0 is depth_offset + depth_factor v; 0: none.
+  /// of the two. kReadBeyond more codes follow. 1/z of a sample v > 0 is depth_offset +
+  /// depth_factor v; 0: none.
   const std::uint16_t* codes;
   const float* values;
   int stride;
@@ -25,9 +32,10 @@ struct PixelView {
   float pixel, delta;  ///< differences of 1/z: SPEC 0.3, 4.2
   float level_range;   ///< blocks whose samples differ by no more are whole; below 0: ask the bits
   float cut_factor;    ///< SPEC 1.4
-  /// SampledImage; in its pixels, the centre of the first at 0, a grid position is at
-  /// image_per_sample * position + image_offset.
+  /// SampledImage, after which a row and kReadBeyond more pixels follow; in its pixels, the centre
+  /// of the first at 0, a grid position is at image_per_sample * position + image_offset.
   const std::uint32_t* rgba;
+  bool masked;  ///< some colours may be asked for whose four pixels are all masked
   int width_px, height_px;
   float image_per_sample[2], image_offset[2];
 };
@@ -38,8 +46,10 @@ struct PixelRow {
   float inverse_fx, inverse_fy, cx, cy;  ///< of the novel camera, pixels
   float y;                               ///< of the row's centre, pixels
   float pixel_angle_rad;                 ///< t_pixel of SPEC 4.5
-  int power;                             ///< k of its `inverse-angle`
-  const float* surface;                  ///< SPEC 5.1: 1/z; 0: none
+  BlendWeight blend;                     ///< and its parameters, as BlendParameters has them
+  float exponent, falloff, max_angle_rad;
+  int blend_k;
+  const float* surface;  ///< SPEC 5.1: 1/z; 0: none
   // What SPEC 6 asks for.
   std::uint32_t* image;  ///< RGBA, sRGB, alpha 255 where seen
   float* depth;          ///< plane z, 0 where unseen
@@ -49,7 +59,8 @@ struct PixelRow {
 /// Most views of a picture.
 inline constexpr int kMostPixelViews = 64;
 
-/// SPEC 5.2, 5.3 and 4.2 to 4.8 with the weight `inverse-angle`; views in canonical order.
+/// SPEC 5.2, 5.3 and 4.2 to 4.8; views in canonical order. Weights `inverse-angle` must fit
+/// float32.
 void ResolvePixelRow(const PixelRow& row, std::span<const PixelView> views);
 
 }  // namespace dtr::gl

@@ -13,17 +13,30 @@ namespace {
 // exp(80) fits float32 and so does the sum of its like: no logarithms need to be compared
 // (SPEC 4.6).
 constexpr double kLargestLogWeight = 80;
+// Larger exponents leave nothing of a logarithm's float32 digits.
+constexpr double kLargestFactor = 1e5;
 constexpr int kRowsTogether = 16;
 
 bool WeightsFitFloat(const BlendParameters& blend) {
-  return std::abs(LogWeight(blend, 0, 0)) <= kLargestLogWeight &&
-         std::abs(LogWeight(blend, std::numbers::pi, 0)) <= kLargestLogWeight;
+  switch (blend.blend) {
+    case BlendWeight::kInverseAngle:
+      return std::abs(LogWeight(blend, 0, 0)) <= kLargestLogWeight &&
+             std::abs(LogWeight(blend, std::numbers::pi, 0)) <= kLargestLogWeight;
+    case BlendWeight::kCosine:
+      return blend.exponent <= kLargestFactor;
+    case BlendWeight::kExponential:
+      return blend.falloff <= kLargestFactor;
+    case BlendWeight::kAngle:
+    case BlendWeight::kKNearest:
+      return true;
+  }
+  return false;
 }
 
-/// A sample then has a usable pixel of the image at its centre, and no colour is asked for whose
-/// four pixels are all masked.
-bool MaskNeedsNoTest(const View& view, const RenderOptions& options) {
-  return view.mask.empty() || (view.depth_scale == 1 && options.resolution == 1);
+/// Where false, a sample has a usable pixel of the image at its centre, and no colour is asked for
+/// whose four pixels are all masked.
+bool MaskNeedsTest(const View& view, const RenderOptions& options) {
+  return !view.mask.empty() && (view.depth_scale != 1 || options.resolution != 1);
 }
 
 PixelView PlaceView(const View& view, const ViewPlacement& placed, double cut_factor,
@@ -57,6 +70,7 @@ PixelView PlaceView(const View& view, const ViewPlacement& placed, double cut_fa
   out.delta = static_cast<float>(thresholds.delta);
   out.cut_factor = static_cast<float>(cut_factor);
   out.rgba = reinterpret_cast<const std::uint32_t*>(sampled.rgba.data());
+  out.masked = MaskNeedsTest(view, options);
   out.width_px = view.image.width(), out.height_px = view.image.height();
   const double scale = view.depth_scale;
   for (int axis = 0; axis < 2; ++axis) {
@@ -71,11 +85,8 @@ PixelView PlaceView(const View& view, const ViewPlacement& placed, double cut_fa
 bool ProcessorResolver::Draws(const Frame& frame) {
   const RenderOptions& options = frame.options;
   return frame.deferred() && !frame.per_pixel && !options.blend_in_linear_light &&
-         !options.absolute_delta && options.blend == BlendWeight::kInverseAngle &&
-         frame.views.size() <= static_cast<size_t>(kMostPixelViews) &&
-         WeightsFitFloat(BlendParametersOf(options, frame.novel.fx_px())) &&
-         std::all_of(frame.views.begin(), frame.views.end(),
-                     [&](const View* view) { return MaskNeedsNoTest(*view, options); });
+         !options.absolute_delta && frame.views.size() <= static_cast<size_t>(kMostPixelViews) &&
+         WeightsFitFloat(BlendParametersOf(options, frame.novel.fx_px()));
 }
 
 void ProcessorResolver::Draw(const Frame& frame, const Band& band, const SampledViews& sampled,
@@ -102,7 +113,9 @@ void ProcessorResolver::Draw(const Frame& frame, const Band& band, const Sampled
       ResolvePixelRow({targets.width, static_cast<float>(1 / novel.fx_px()),
                        static_cast<float>(1 / novel.fy_px()), static_cast<float>(novel.cx_px()),
                        static_cast<float>(novel.cy_px()), static_cast<float>(band.first + y) + 0.5f,
-                       static_cast<float>(blend.pixel_angle_rad), blend.blend_k, &surface[first],
+                       static_cast<float>(blend.pixel_angle_rad), blend.blend,
+                       static_cast<float>(blend.exponent), static_cast<float>(blend.falloff),
+                       static_cast<float>(blend.max_angle_rad), blend.blend_k, &surface[first],
                        &image_[first], &depth_[first], &marks_[first]},
                       views);
     }

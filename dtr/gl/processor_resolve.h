@@ -16,8 +16,7 @@ namespace dtr::gl {
 class ProcessorResolver {
  public:
   /// False for frames that it does not draw: two passes, the per-pixel rule, linear light, the
-  /// report's absolute Delta, other weights than `inverse-angle`, masks on other grids than the
-  /// samples', more views than kMostPixelViews.
+  /// report's absolute Delta, weights out of float32's reach, more views than kMostPixelViews.
   static bool Draws(const Frame& frame);
 
   /// As Resolver::Draw; `surface`: SPEC 5.1, 1/z of the band's pixels. The views must have been

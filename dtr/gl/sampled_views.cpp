@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "dtr/base/parallel_for.h"
+#include "dtr/gl/pixel_kernel.h"
 #include "dtr/gl/stored_depth.h"
 #include "dtr/render/texture.h"
 #include "dtr/render/triangulation.h"
@@ -10,13 +11,12 @@
 namespace dtr::gl {
 namespace {
 
-/// The grid with its outermost samples once more around it, and one more value: codes are read in
-/// pairs.
+/// The grid with its outermost samples once more around it, and kReadBeyond more values.
 template <typename T>
 std::vector<T> WithBorder(const std::vector<T>& grid, int columns, int rows) {
   std::vector<T> bordered;
   if (grid.empty()) return bordered;
-  bordered.reserve(static_cast<size_t>(columns + 2) * static_cast<size_t>(rows + 2) + 1);
+  bordered.reserve(static_cast<size_t>(columns + 2) * static_cast<size_t>(rows + 2) + kReadBeyond);
   for (int y = -1; y <= rows; ++y) {
     const T* row =
         &grid[static_cast<size_t>(std::clamp(y, 0, rows - 1)) * static_cast<size_t>(columns)];
@@ -24,7 +24,7 @@ std::vector<T> WithBorder(const std::vector<T>& grid, int columns, int rows) {
     bordered.insert(bordered.end(), row, row + columns);
     bordered.push_back(row[columns - 1]);
   }
-  bordered.push_back(T{});
+  bordered.resize(bordered.size() + kReadBeyond);
   return bordered;
 }
 
@@ -57,6 +57,8 @@ SampledView Sample(const View& view, int resolution, const BreakRule& breaks) {
   sampled.depth_factor = depth.codes.empty() ? depth.factor : depth.factor / UINT16_MAX;
   sampled.whole_blocks = WholeBlocks(w, breaks);
   sampled.rgba = SampledImage(view);
+  sampled.rgba.resize(sampled.rgba.size() +
+                      4 * (static_cast<size_t>(view.image.width()) + kReadBeyond));
   return sampled;
 }
 

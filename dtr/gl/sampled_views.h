@@ -20,7 +20,7 @@ struct SampledView {
   std::vector<float> values;
   std::vector<std::uint32_t> whole_blocks;    ///< as PixelView has them
   double depth_offset = 0, depth_factor = 1;  ///< 1/z from a code or a value
-  std::vector<std::uint8_t> rgba;             ///< SampledImage
+  std::vector<std::uint8_t> rgba;  ///< SampledImage, and what PixelView asks for after it
   size_t bytes() const {
     return codes.size() * sizeof(codes[0]) + values.size() * sizeof(values[0]) +
            whole_blocks.size() * sizeof(whole_blocks[0]) + rgba.size();

@@ -32,6 +32,14 @@ INSTANTIATE_TEST_SUITE_P(, ShapeParity, ::testing::Range(0, 6));
 
 using Parity = GlTest;
 
+// What a GPU draws, also where the processor has a kernel of its own (ProcessorResolver).
+TEST_F(Parity, HoldsForTheShadersOfAGpu) {
+  RendererSettings settings;
+  settings.coarse_drawer = CoarseDrawer::kShaders;
+  Renderer renderer(settings);
+  ExpectParityOf(renderer, ParityScenes()[3], RenderMethod::kDeferred, Primitive::kMesh, 4);
+}
+
 TEST_F(Parity, HoldsForTheReportsAbsoluteThresholdsAndInLinearLight) {
   Renderer renderer;
   for (const NamedScene& scene : ParityScenes()) {
