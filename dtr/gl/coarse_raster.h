@@ -3,6 +3,7 @@
 #pragma once
 #include <vector>
 
+#include "dtr/gl/coarse_strip.h"
 #include "dtr/gl/frame.h"
 #include "dtr/gl/grid_placement.h"
 #include "dtr/render/adaptive_mesh.h"
@@ -29,15 +30,7 @@ class CoarseRaster {
   const std::vector<float>& nearest() const { return nearest_; }
 
  private:
-  /// A vertex on the novel screen.
-  struct Point {
-    float x = 0, y = 0;       ///< pixels
-    float inverse_depth = 0;  ///< of the novel camera; 0: not in front of the near plane
-  };
-  struct Strip;
-  void Project(const PlacedMesh& placed, std::vector<Point>& points) const;
-
-  std::vector<std::vector<Point>> points_;
+  std::vector<std::vector<ScreenPoint>> points_;  ///< of the meshes
   std::vector<float> nearest_;
 };
 
