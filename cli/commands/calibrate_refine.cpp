@@ -35,7 +35,7 @@ int RunRefine(const Options& options, const Context& context) {
   const calib::Refined refined = calib::Refine(model, refine);
   for (const auto& candidate : refined.candidates) {
     context.console.Say(
-        fmt::format("{:<20} held-out sights: {:.4f} px", candidate.name, candidate.held_out_px));
+        fmt::format("{:<26} held-out sights: {:.4f} px", candidate.name, candidate.held_out_px));
   }
   if (!refined.changed) {
     context.console.Say("left as given: " + refined.reason);
