@@ -10,6 +10,53 @@ namespace {
 /// Stabilisers move by some 1 % of the image's size. Farther apart lie pictures that were cropped.
 constexpr double kMostShiftShare = 0.05;
 
+double Median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return 0.5 * (values[(values.size() - 1) / 2] + values[values.size() / 2]);
+}
+
+using Cameras = std::map<std::uint32_t, LensCamera>;
+
+/// Those of `ids` that lie near the median principal point.
+std::vector<std::uint32_t> NearTheMedian(const Cameras& cameras,
+                                         const std::vector<std::uint32_t>& ids) {
+  const LensCamera& any = cameras.at(ids.front());
+  const auto centre = static_cast<size_t>(FocalCount(any.model));
+  const double most = kMostShiftShare * std::max(any.width_px, any.height_px);
+  std::vector<std::uint32_t> near = ids;
+  for (const size_t axis : {centre, centre + 1}) {
+    std::vector<double> places;
+    for (const std::uint32_t id : ids) places.push_back(cameras.at(id).params[axis]);
+    const double median = Median(places);
+    std::erase_if(near, [&](std::uint32_t id) {
+      return std::abs(cameras.at(id).params[axis] - median) > most;
+    });
+  }
+  return near;
+}
+
+/// One lens of the given cameras; one each where they are equal.
+void AddGroups(const Cameras& cameras, const std::vector<std::uint32_t>& ids,
+               std::vector<LensGroup>& groups) {
+  const bool moved = std::any_of(ids.begin(), ids.end(), [&](std::uint32_t id) {
+    return cameras.at(id).params != cameras.at(ids.front()).params;
+  });
+  if (!moved) {
+    for (const std::uint32_t id : ids) groups.push_back({cameras.at(id), {id}});
+    return;
+  }
+  LensGroup group{cameras.at(ids.front()), ids};
+  const auto centre = static_cast<size_t>(FocalCount(group.lens.model));
+  for (const size_t axis : {centre, centre + 1}) {
+    double sum = 0;
+    for (const std::uint32_t id : ids) sum += cameras.at(id).params[axis];
+    group.lens.params[axis] = sum / static_cast<double>(ids.size());
+  }
+  groups.push_back(std::move(group));
+}
+
+}  // namespace
+
 bool SameButForPrincipalPoint(const LensCamera& a, const LensCamera& b) {
   if (a.model != b.model || a.width_px != b.width_px || a.height_px != b.height_px) return false;
   const auto centre = static_cast<size_t>(FocalCount(a.model));
@@ -19,45 +66,25 @@ bool SameButForPrincipalPoint(const LensCamera& a, const LensCamera& b) {
   return true;
 }
 
-/// The group's lens with the mean principal point; false where the cameras are no such group.
-bool TakeMeanPrincipalPoint(const std::map<std::uint32_t, LensCamera>& cameras, LensGroup& group) {
-  const auto centre = static_cast<size_t>(FocalCount(group.lens.model));
-  const double most = kMostShiftShare * std::max(group.lens.width_px, group.lens.height_px);
-  bool moved = false;
-  for (const size_t axis : {centre, centre + 1}) {
-    double sum = 0;
-    for (const std::uint32_t id : group.cameras) sum += cameras.at(id).params[axis];
-    const double mean = sum / static_cast<double>(group.cameras.size());
-    for (const std::uint32_t id : group.cameras) {
-      const double shift = std::abs(cameras.at(id).params[axis] - mean);
-      if (shift > most) return false;
-      moved |= cameras.at(id).params[axis] != group.lens.params[axis];
-    }
-    group.lens.params[axis] = mean;
-  }
-  return moved;
-}
-
-}  // namespace
-
 std::vector<LensGroup> LensGroups(const std::map<std::uint32_t, LensCamera>& cameras) {
-  std::vector<LensGroup> alike, groups;
+  std::vector<std::vector<std::uint32_t>> alike;
   for (const auto& [id, camera] : cameras) {
-    const auto found = std::find_if(alike.begin(), alike.end(), [&](const LensGroup& group) {
-      return SameButForPrincipalPoint(group.lens, camera);
+    const auto found = std::find_if(alike.begin(), alike.end(), [&](const auto& ids) {
+      return SameButForPrincipalPoint(cameras.at(ids.front()), camera);
     });
     if (found != alike.end()) {
-      found->cameras.push_back(id);
+      found->push_back(id);
     } else {
-      alike.push_back({camera, {id}});
+      alike.push_back({id});
     }
   }
-  for (LensGroup& group : alike) {
-    LensGroup shared = group;
-    if (TakeMeanPrincipalPoint(cameras, shared)) {
-      groups.push_back(std::move(shared));
-    } else {
-      for (const std::uint32_t id : group.cameras) groups.push_back({cameras.at(id), {id}});
+  std::vector<LensGroup> groups;
+  for (const auto& ids : alike) {
+    const std::vector<std::uint32_t> near = NearTheMedian(cameras, ids);
+    if (!near.empty()) AddGroups(cameras, near, groups);
+    for (const std::uint32_t id : ids) {
+      if (std::binary_search(near.begin(), near.end(), id)) continue;
+      groups.push_back({cameras.at(id), {id}});
     }
   }
   std::sort(groups.begin(), groups.end(), [](const LensGroup& a, const LensGroup& b) {

@@ -14,9 +14,12 @@ struct LensGroup {
   std::vector<std::uint32_t> cameras;
 };
 
+/// Whether all but the principal points is equal, to the bit.
+bool SameButForPrincipalPoint(const LensCamera& a, const LensCamera& b);
+
 /// Cameras that differ by their principal points alone, by at most 5 % of the image's long side
-/// from the mean, are one lens whose image stabiliser moved between the photos. Others, equal ones
-/// too, are groups of one. Each camera is in one group; groups are in the order of their first
+/// from the median, are one lens whose image stabiliser moved between the photos. Others, equal
+/// ones too, are groups of one. Each camera is in one group; groups are in the order of their first
 /// cameras.
 std::vector<LensGroup> LensGroups(const std::map<std::uint32_t, LensCamera>& cameras);
 

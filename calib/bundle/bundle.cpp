@@ -64,8 +64,12 @@ Eigen::Vector2d PrincipalPoint(const LensCamera& lens) {
 }
 
 void AddSharedLenses(const SfmModel& model, Bundle& bundle) {
+  std::map<std::uint32_t, LensCamera> used;  // a lens without sights would be undetermined
+  for (const SfmImage& image : model.images) {
+    used.emplace(image.camera_id, model.cameras.at(image.camera_id));
+  }
   std::map<std::uint32_t, int> lens_of_camera;
-  for (const LensGroup& group : LensGroups(model.cameras)) {
+  for (const LensGroup& group : LensGroups(used)) {
     for (const std::uint32_t id : group.cameras) {
       lens_of_camera[id] = static_cast<int>(bundle.lenses.size());
     }
@@ -77,11 +81,6 @@ void AddSharedLenses(const SfmModel& model, Bundle& bundle) {
                              PrincipalPoint(model.cameras.at(image.camera_id)) -
                                  PrincipalPoint(bundle.lenses[static_cast<size_t>(lens)])});
   }
-}
-
-bool AnyShift(const Bundle& bundle) {
-  return std::any_of(bundle.images.begin(), bundle.images.end(),
-                     [](const BundleImage& image) { return !image.shift_px.isZero(0); });
 }
 
 /// The image's camera: its lens, with its own principal point.
@@ -173,17 +172,39 @@ Wrong WrongSights(const Bundle& bundle) {
   return wrong;
 }
 
+// Gives the model the bundle's cameras. Images that shared a camera, but have shifts, get one each,
+// with ids above all others; what they shared stays as their lens, under its id, though no image
+// uses it: the database that the model came from knows the lens by it.
+void TakeCameras(const Bundle& bundle, bool separate_lenses, SfmModel& model) {
+  const std::uint32_t first_own =
+      model.cameras.empty() || separate_lenses ? 1 : model.cameras.rbegin()->first + 1;
+  std::map<std::uint32_t, int> users;
+  std::vector<bool> shifted(bundle.lenses.size());
+  for (size_t i = 0; i < bundle.images.size(); ++i) {
+    ++users[model.images[i].camera_id];
+    const auto lens = static_cast<size_t>(bundle.images[i].lens);
+    shifted[lens] = shifted[lens] || !bundle.images[i].shift_px.isZero(0);
+  }
+  model.cameras.clear();
+  for (size_t i = 0; i < bundle.images.size(); ++i) {
+    const BundleImage& of = bundle.images[i];
+    const auto lens = static_cast<size_t>(of.lens);
+    std::uint32_t& id = model.images[i].camera_id;
+    if (separate_lenses || (shifted[lens] && users.at(id) > 1)) {
+      if (!separate_lenses) model.cameras[id] = bundle.lenses[lens];
+      id = first_own + static_cast<std::uint32_t>(i);
+    }
+    model.cameras[id] = CameraOf(bundle, of);
+  }
+}
+
 }  // namespace
 
 SfmModel ModelOf(const Bundle& bundle, const SfmModel& model, bool separate_lenses, int* dropped) {
   SfmModel out = model;
-  const bool own_cameras = separate_lenses || AnyShift(bundle);
-  if (own_cameras) out.cameras.clear();
+  TakeCameras(bundle, separate_lenses, out);
   for (size_t i = 0; i < bundle.images.size(); ++i) {
-    SfmImage& image = out.images[i];
-    if (own_cameras) image.camera_id = static_cast<std::uint32_t>(i + 1);
-    image.cam_from_world = bundle.images[i].cam_from_world;
-    out.cameras[image.camera_id] = CameraOf(bundle, bundle.images[i]);
+    out.images[i].cam_from_world = bundle.images[i].cam_from_world;
   }
   Eigen::Vector3d middle;
   const double reach = kAsGoodAsInfinite * Spread(bundle, &middle);

@@ -51,10 +51,10 @@ Bundle BundleOf(const SfmModel& model, bool separate_lenses = false);
 Bundle BundleOf(std::span<const PinholeCamera> cameras, std::span<const Pose> cam_from_world,
                 std::span<const std::string> names, const SparseScene& scene);
 
-/// `model` with the bundle's cameras, poses and points; features keep their pixels. Where images
-/// have shifts, each gets a camera of its own. Sights that miss their point by more than 4 px leave
-/// its track. Points that are not in the bundle, lie at infinity
-/// or keep fewer than two sights leave the model; `dropped` says how many.
+/// `model` with the bundle's cameras, poses and points; features keep their pixels. Where images of
+/// a lens have shifts, each gets a camera of its own, and the lens keeps the id it had. Sights that
+/// miss their point by more than 4 px leave its track. Points that are not in the bundle, lie at
+/// infinity or keep fewer than two sights leave the model; `dropped` says how many.
 /// Requires a bundle that BundleOf made of this model.
 SfmModel ModelOf(const Bundle& bundle, const SfmModel& model, bool separate_lenses, int* dropped);
 

@@ -10,6 +10,7 @@
 #include "calib/colmap/model_io.h"
 #include "calib/colmap/pairs.h"
 #include "calib/colmap/sfm_steps.h"
+#include "calib/lens_groups.h"
 #include "dtr/base/error.h"
 #include "dtr/base/hash.h"
 #include "dtr/base/parallel_for.h"
@@ -30,6 +31,18 @@ struct Frozen {
   std::string fingerprint;  // of the model
 };
 
+// The camera of an image, or, where a stabiliser made one lens a camera for every image, the lens
+// they have in common: under the id that the database knows, which no image uses any more.
+std::uint32_t LensOf(const calib::SfmModel& model, std::uint32_t camera_id) {
+  const calib::LensCamera& camera = model.cameras.at(camera_id);
+  for (const auto& [id, other] : model.cameras) {
+    const bool used = std::any_of(model.images.begin(), model.images.end(),
+                                  [key = id](const auto& image) { return image.camera_id == key; });
+    if (!used && calib::SameButForPrincipalPoint(camera, other)) return id;
+  }
+  return camera_id;
+}
+
 // The frozen camera of a source with the photo's group and size, if one is registered.
 std::optional<std::uint32_t> SharedCamera(const Frozen& frozen, const SfmImageInput& photo,
                                           bool share) {
@@ -41,7 +54,7 @@ std::optional<std::uint32_t> SharedCamera(const Frozen& frozen, const SfmImageIn
     if (source == frozen.sources.end() || source->name != image.name) continue;
     if (source->camera_group == photo.camera_group && source->width_px == photo.width_px &&
         source->height_px == photo.height_px) {
-      return image.camera_id;
+      return LensOf(frozen.model, image.camera_id);
     }
   }
   return std::nullopt;

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "calib/lens_groups.h"
 #include "calib/sparse_from_sfm.h"
@@ -93,18 +95,36 @@ capture::Capture FramesOf(const BuildOptions& options, const std::filesystem::pa
   return capture::ReadCapture(kept);
 }
 
-// The pinhole camera that photos of each camera are drawn on. Cameras that a stabiliser made of one
-// lens share one, as their photos are resampled anyway; without distortion pixels stay as they are.
-std::map<std::uint32_t, PinholeCamera> CamerasToDrawOn(
-    const std::map<std::uint32_t, calib::LensCamera>& cameras) {
-  std::map<std::uint32_t, PinholeCamera> onto;
-  for (const calib::LensGroup& group : calib::LensGroups(cameras)) {
-    for (const std::uint32_t id : group.cameras) {
-      const calib::LensCamera& own = cameras.at(id);
-      onto.emplace(id, own.IsUndistorted() ? own.Pinhole() : group.lens.Pinhole());
+// Lenses that a stabiliser moved, with the mean principal point of the photos to render from: those
+// that are held out move nothing.
+std::vector<calib::LensCamera> StabilisedLenses(const capture::Capture& capture,
+                                                const std::vector<bool>& held_out,
+                                                const calib::SfmModel& model) {
+  std::set<std::string> sources;
+  for (size_t i = 0; i < capture.photos.size(); ++i) {
+    if (!held_out[i]) sources.insert(capture.photos[i].name);
+  }
+  std::map<std::uint32_t, calib::LensCamera> used;
+  for (const calib::SfmImage& image : model.images) {
+    if (sources.contains(image.name)) {
+      used.emplace(image.camera_id, model.cameras.at(image.camera_id));
     }
   }
-  return onto;
+  std::vector<calib::LensCamera> lenses;
+  for (const calib::LensGroup& group : calib::LensGroups(used)) {
+    if (group.cameras.size() > 1) lenses.push_back(group.lens);
+  }
+  return lenses;
+}
+
+// The pinhole camera that photos of a camera are drawn on. Those of one stabilised lens share one,
+// as they are resampled anyway; without distortion pixels stay as they are.
+PinholeCamera CameraToDrawOn(const calib::LensCamera& camera,
+                             const std::vector<calib::LensCamera>& stabilised) {
+  const auto lens = std::find_if(stabilised.begin(), stabilised.end(), [&](const auto& other) {
+    return calib::SameButForPrincipalPoint(other, camera);
+  });
+  return lens == stabilised.end() || camera.IsUndistorted() ? camera.Pinhole() : lens->Pinhole();
 }
 
 // Views of the registered photos, in the photos' order; their pixels, on the set's grid, are
@@ -119,7 +139,7 @@ std::vector<View> UndistortPhotos(const capture::Capture& capture,
       std::all_of(calibrated.model.cameras.begin(), calibrated.model.cameras.end(),
                   [](const auto& camera) { return camera.second.IsUndistorted(); });
   if (undistorted) progress.Note("undistortion left out: no camera has distortion");
-  const std::map<std::uint32_t, PinholeCamera> onto = CamerasToDrawOn(calibrated.model.cameras);
+  const auto stabilised = StabilisedLenses(capture, held_out, calibrated.model);
   progress.Stage(undistorted ? "reading photos" : "undistorting",
                  static_cast<int>(registered.size()));
 
@@ -138,7 +158,7 @@ std::vector<View> UndistortPhotos(const capture::Capture& capture,
     }
     calib::UndistortedPhoto flat =
         calib::Undistort(capture::ReadPhoto(photo), capture::ReadPhotoMask(photo), lens,
-                         onto.at(found->second->camera_id), max_size_px, threads);
+                         CameraToDrawOn(lens, stabilised), max_size_px, threads);
     View view;
     view.id = photo.id;
     view.name = photo.name;

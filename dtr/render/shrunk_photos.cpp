@@ -81,8 +81,18 @@ std::vector<std::shared_ptr<const ShrunkPhoto>> ShrunkPhotos::Of(
     });
     kept_.push_front({KeyOf(*views[i], cell_px), photos[i]});
   }
-  if (kept_.size() > kMostKept) kept_.resize(kMostKept);
+  ForgetTooMany(views.size());
   return photos;
+}
+
+void ShrunkPhotos::ForgetTooMany(size_t asked) {
+  size_t bytes = 0, stay = 0;
+  for (const Kept& kept : kept_) {
+    bytes += kept.photo->light.data().size() * sizeof(double) + kept.photo->usable.data().size();
+    if (stay >= asked && bytes > most_bytes_) break;
+    ++stay;
+  }
+  kept_.resize(stay);
 }
 
 void ShrunkPhotos::Clear() {

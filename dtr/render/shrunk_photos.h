@@ -20,10 +20,11 @@ struct ShrunkPhoto {
 };
 
 /// Makes a view's shrunk photo once; of the views asked for longest ago it forgets those that are
-/// too many. Several threads may ask.
+/// too many, but never one of the last call's. Several threads may ask.
 class ShrunkPhotos {
  public:
-  static constexpr size_t kMostKept = 64;
+  static constexpr size_t kMostBytes = size_t{64} << 20;  ///< some 30 photos of 5 Mpx
+  explicit ShrunkPhotos(size_t most_bytes = kMostBytes) : most_bytes_(most_bytes) {}
 
   /// In the order of the views; missing ones are made on up to `threads` threads. Photos whose
   /// views are loaded anew are noticed.
@@ -47,7 +48,10 @@ class ShrunkPhotos {
   };
   static Key KeyOf(const View& view, int cell_px);
   std::shared_ptr<const ShrunkPhoto> Find(const Key& key);
+  /// Those asked for longest ago, beyond the last call's `asked`. The mutex is held.
+  void ForgetTooMany(size_t asked);
 
+  const size_t most_bytes_;
   std::mutex mutex_;
   std::list<Kept> kept_;  ///< asked for last first
 };

@@ -34,6 +34,15 @@ TEST(LensGroups, EqualCamerasStayApart) {
   EXPECT_EQ(groups.size(), 2u);
 }
 
+TEST(LensGroups, AStrayCameraLeavesTheOthersTogether) {
+  const auto groups = LensGroups(
+      {{1, Shifted(400, 0)}, {2, Shifted(1, 0)}, {3, Shifted(0, 2)}, {4, Shifted(-4, 4)}});
+  ASSERT_EQ(groups.size(), 2u);
+  EXPECT_EQ(groups[0].cameras, std::vector<std::uint32_t>{1});
+  EXPECT_EQ(groups[1].cameras, (std::vector<std::uint32_t>{2, 3, 4}));
+  EXPECT_EQ(groups[1].lens.params, (std::vector<double>{800, 499, 377, 0.05, -0.02}));
+}
+
 TEST(LensGroups, CroppedPicturesAreNoStabilisersWork) {
   // 5 % of 1000 px: means lie between the two, half of their distance from each.
   EXPECT_EQ(LensGroups({{1, kPhone}, {2, Shifted(99, 0)}}).size(), 1u);

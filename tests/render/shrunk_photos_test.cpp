@@ -60,14 +60,19 @@ TEST(ShrunkPhotos, AreMadeOnceAndAnewWhereSomethingElseIsAskedFor) {
 
 TEST(ShrunkPhotos, ThoseAskedForLongestAgoAreForgotten) {
   std::vector<View> views;
-  for (size_t i = 0; i < ShrunkPhotos::kMostKept + 1; ++i) {
-    views.push_back(PhotoOf(static_cast<std::uint8_t>(i)));
-  }
-  ShrunkPhotos photos;
+  for (std::uint8_t i = 0; i < 6; ++i) views.push_back(PhotoOf(i));
+  constexpr size_t kPhotoBytes = 3 * 2 * (3 * sizeof(double) + 1);  // cells of 20x10 px
+  ShrunkPhotos photos(5 * kPhotoBytes);
   std::vector<std::weak_ptr<const ShrunkPhoto>> made;
   for (const View& view : views) made.push_back(photos.Of({&view}, 8, 1).front());
   EXPECT_TRUE(made.front().expired());
   for (size_t i = 1; i < made.size(); ++i) EXPECT_FALSE(made[i].expired()) << i;
+  // What one picture needs is kept even where it is too much.
+  ShrunkPhotos small(kPhotoBytes);
+  std::vector<const View*> all;
+  for (const View& view : views) all.push_back(&view);
+  const auto first = small.Of(all, 8, 2);
+  EXPECT_EQ(small.Of(all, 8, 2), first);
 }
 
 TEST(ShrunkPhotos, SeveralThreadsMayAsk) {

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "calib/lens_groups.h"
 #include "dtr/base/error.h"
 #include "tests/calib/bundle/synthetic_bundle.h"
 
@@ -71,7 +72,9 @@ TEST(Refine, GivesEveryImageItsPrincipalPointWhereTheLensIsStabilised) {
   EXPECT_EQ(refined.lens, LensFreedom::kPrincipalPointPerImage);
   EXPECT_NEAR(refined.adjusted.sigma_px, 0.3, 0.03);
   const SfmModel& model = refined.model;
-  ASSERT_EQ(model.cameras.size(), model.images.size());
+  ASSERT_EQ(model.cameras.size(), model.images.size() + 1) << "the lens keeps its id";
+  EXPECT_TRUE(SameButForPrincipalPoint(model.cameras.at(1), model.cameras.at(2)));
+  EXPECT_NO_THROW(RequireDetermined(model, {}, "a camera that no image uses hurts nobody"));
   for (size_t i = 0; i < model.images.size(); ++i) {
     const LensCamera& camera = model.cameras.at(model.images[i].camera_id);
     const LensCamera& first = model.cameras.at(model.images[0].camera_id);
