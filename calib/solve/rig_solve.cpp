@@ -434,6 +434,9 @@ RigSolution SolveRig(const Board& board, std::span<const RigCameraInput> cameras
   solution.flipped = std::move(start.flipped);
   if (solution.rig.views.empty()) Refuse("no view of the board can be used");
   solution.layout = RigLayout(solution.rig.cameras, options.free_lenses);
+  if (solution.layout.size() == 0) {
+    Refuse("expected something to solve for, found one camera whose lens is given");
+  }
   if (options.solve.loss == Loss::kRobust) {
     SolveRobustly(board, options, solution.rig, solution.left_out);
   } else {

@@ -123,6 +123,22 @@ TEST(RigSolve, CamerasThatNoFrameConnectsAreNamed) {
   }
 }
 
+TEST(RigSolve, OneCameraWhoseLensIsGivenLeavesNothingToSolveFor) {
+  const auto cameras = RowOfCameras(1, 0.1);
+  auto inputs = InputsOf(cameras);
+  inputs[0].given = cameras[0].camera;
+  RigOptions options;
+  options.free_lenses = false;
+  try {
+    SolveRig(kBoard, inputs, ExactRig(cameras, 8, 3).views, 8, options);
+    FAIL() << "was solved";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("found one camera whose lens is given"),
+              std::string::npos)
+        << error.what();
+  }
+}
+
 // The stereo pairs of OpenCV's own set, intrinsics from each side alone, every corner counted.
 TEST(RigSolve, TheStereoPairHasOpenCvsRms) {
   const fs::path folder = dtr::testing::DataFolder() / "chessboard_stereo_640x480";
