@@ -133,6 +133,7 @@ Json ReportJson(const viewer::AppReport& report) {
           {"first_picture_cpu_ms", report.first_picture_cpu_ms},
           {"moving", moving},
           {"view_bytes", report.view_bytes},
+          {"view_bytes_held", report.view_bytes_held},
           {"peak_rss_bytes", PeakMemoryBytes()},
           {"frames_per_sample", viewer::AppReport::kFramesPerSample},
           {"rss_bytes", report.memory_bytes},

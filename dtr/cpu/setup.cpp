@@ -10,6 +10,7 @@ namespace dtr::cpu {
 namespace {
 
 ViewInNovel InNovel(const View& view, const Pose& novel_from_world) {
+  RequireLoaded(view);
   const ViewPlacement placed = PlaceView(view, novel_from_world);
   return {&view, placed.rotation, placed.translation, placed.near_z};
 }

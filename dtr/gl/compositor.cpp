@@ -139,7 +139,7 @@ class Compositor::Implementation {
     Bind(0, depth_.name());
     glTexSubImage3D(GL_TEXTURE_2D_ARRAY, 0, 0, 0, 0, width, height, 1, GL_RED, GL_FLOAT,
                     result.depth.grid().data().data());
-    return {image_.name(), depth_.name(), 0, width, height, result.views_used};
+    return {image_.name(), depth_.name(), 0, width, height, result.views_used, false};
   }
 
  private:

@@ -26,6 +26,12 @@ size_t MostBytesOf(const View& view, const RenderOptions& options, const LayerSi
          per_sample * PixelsOf(SizeOf(view.DepthCamera()));
 }
 
+LayerSizes SizesFor(const Frame& frame) {
+  GLint most_px = 0;
+  glGetIntegerv(GL_MAX_TEXTURE_SIZE, &most_px);
+  return {frame.scene.views, frame.options.resolution, most_px};
+}
+
 }  // namespace
 
 size_t GpuViews::bytes() const {
@@ -117,18 +123,21 @@ size_t GpuViews::Prepare(Frame& frame, const std::vector<const View*>& nearest_f
   }
 }
 
+bool GpuViews::AllFit(const Frame& frame) const {
+  const LayerSizes sizes = SizesFor(frame);
+  size_t most = 0;
+  for (const View* view : frame.views) most += MostBytesOf(*view, frame.options, sizes);
+  return most <= room_bytes_;
+}
+
 size_t GpuViews::PutWithinRoom(Frame& frame, const std::vector<const View*>& nearest_first) {
   now_ += 2;
-  GLint most_px = 0;
-  glGetIntegerv(GL_MAX_TEXTURE_SIZE, &most_px);
-  sizes_ = LayerSizes(frame.scene.views, frame.options.resolution, most_px);
-  size_t most = 0;
+  sizes_ = SizesFor(frame);
   for (const View* view : nearest_first) {
     const auto found = used_.find(view);
     if (found != used_.end()) found->second.last = now_ - 1;  // others go first
-    most += MostBytesOf(*view, frame.options, sizes_);
   }
-  if (most <= room_bytes_) {  // then all fit, whatever they look like: made on all cores
+  if (AllFit(frame)) {  // made on all cores
     Put(frame, nearest_first);
     for (const View* view : nearest_first) {
       if (bytes() > room_bytes_) DropUnused(frame, *view);

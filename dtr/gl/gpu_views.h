@@ -36,6 +36,12 @@ class GpuViews {
   const SampledViews& sampled() const { return sampled_; }
   /// After Prepare, for the deferred method: false where R leaves no sample of the view.
   bool HasSamples(const Frame& frame, const View& view);
+  /// True when all of the frame's views fit, whatever they look like: none makes room for another.
+  bool AllFit(const Frame& frame) const;
+  /// Of a frame that the processor draws and that fits: true when no pixels of the view are needed.
+  bool HoldsFor(const RenderOptions& options, const View& view) const {
+    return sampled_.Has(view, options) && meshes_.Has(view, options);
+  }
   void Clear();
 
  private:

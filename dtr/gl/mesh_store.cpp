@@ -1,6 +1,7 @@
 #include "dtr/gl/mesh_store.h"
 
 #include <cstdint>
+#include <stdexcept>
 #include <string>
 
 #include "dtr/base/error.h"
@@ -49,8 +50,11 @@ MeshStore::Key MeshStore::KeyOf(const View& view, const RenderOptions& options) 
 void MeshStore::Prepare(const std::vector<const View*>& views, const RenderOptions& options) {
   std::vector<const View*> missing;
   for (const View* view : views) {
-    const auto found = views_.find(view);
-    if (found == views_.end() || found->second.key != KeyOf(*view, options)) {
+    if (Has(*view, options)) {
+      views_.at(view).key.depth_data = view->depth.grid().data().data();
+    } else if (view->depth.empty()) {
+      throw std::logic_error(view->name + ": neither its depth is there nor its mesh");
+    } else {
       missing.push_back(view);
     }
   }
@@ -78,6 +82,15 @@ void MeshStore::Prepare(const std::vector<const View*>& views, const RenderOptio
     mesh.mesh = std::move(meshes[k]);
     views_.insert_or_assign(missing[k], std::move(stored));
   }
+}
+
+bool MeshStore::Has(const View& view, const RenderOptions& options) const {
+  const auto found = views_.find(&view);
+  if (found == views_.end()) return false;
+  Key wanted = KeyOf(view, options);
+  const void* const stored = found->second.key.depth_data;
+  if (view.depth.empty() || stored == nullptr) wanted.depth_data = stored;
+  return found->second.key == wanted;
 }
 
 size_t MeshStore::BytesOf(const View& view) const {

@@ -33,12 +33,16 @@ class MeshStore {
   /// that are of no use.
   MeshStore(bool for_shaders, Warn warn) : for_shaders_(for_shaders), warn_(std::move(warn)) {}
 
-  /// Makes the missing meshes of several views, on all cores. Throws
-  /// dtr::Error, naming the limit, for a mesh that the driver cannot hold.
+  /// Makes the missing meshes of several views, on all cores. Throws dtr::Error, naming the limit,
+  /// for a mesh that the driver cannot hold. A view without pixels needs to have one
+  /// (std::logic_error), which stays when they come back.
   void Prepare(const std::vector<const View*>& views, const RenderOptions& options);
 
   /// After Prepare.
   const CoarseMesh& MeshOf(const View& view) const { return views_.at(&view).mesh; }
+
+  /// True when nothing would be made of its pixels.
+  bool Has(const View& view, const RenderOptions& options) const;
 
   size_t BytesOf(const View& view) const;
   void Drop(const View& view) { views_.erase(&view); }
@@ -48,6 +52,7 @@ class MeshStore {
   struct Key {
     int resolution = 0;
     MeshRule rule;
+    /// Null after a frame in which the pixels were not there: those that come back are the same.
     const void* depth_data = nullptr;
     bool operator==(const Key&) const = default;
   };

@@ -36,7 +36,8 @@ bool WeightsFitFloat(const BlendParameters& blend) {
 /// Where false, a sample has a usable pixel of the image at its centre, and no colour is asked for
 /// whose four pixels are all masked.
 bool MaskNeedsTest(const View& view, const RenderOptions& options) {
-  return !view.mask.empty() && (view.depth_scale != 1 || options.resolution != 1);
+  const bool masked = !view.mask.empty() || view.mask_file;  // the mask may be gone: CanDraw
+  return masked && (view.depth_scale != 1 || options.resolution != 1);
 }
 
 PixelView PlaceView(const View& view, const ViewPlacement& placed, double cut_factor,
@@ -71,7 +72,7 @@ PixelView PlaceView(const View& view, const ViewPlacement& placed, double cut_fa
   out.cut_factor = static_cast<float>(cut_factor);
   out.rgba = reinterpret_cast<const std::uint32_t*>(sampled.rgba.data());
   out.masked = MaskNeedsTest(view, options);
-  out.width_px = view.image.width(), out.height_px = view.image.height();
+  out.width_px = view.camera.width_px(), out.height_px = view.camera.height_px();
   const double scale = view.depth_scale;
   for (int axis = 0; axis < 2; ++axis) {
     out.image_per_sample[axis] = static_cast<float>(scale * step);

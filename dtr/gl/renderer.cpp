@@ -71,6 +71,12 @@ Frame MakeFrame(const RenderScene& scene, const PinholeCamera& novel, const Pose
   return frame;
 }
 
+/// SPEC 0.3: a view without a stored baseline has one by its depths.
+bool ThresholdsNeedNoPixels(const std::vector<const View*>& views) {
+  return std::all_of(views.begin(), views.end(),
+                     [](const View* view) { return view->reference_baseline > 0; });
+}
+
 /// SPEC 1.4, where the `count` nearest of the selection's views are drawn.
 void SetCutFactors(const ViewSelection& selection, size_t count, Frame& frame) {
   const std::vector<double> factors = CutFactors(selection, count);
@@ -102,8 +108,10 @@ class Renderer::Implementation {
     result.views_used = selection.views;
     if (selection.views.empty()) return result;
     CheckPictureSize(novel);
-    DrawInBands(MakeFrame(scene, novel, novel_from_world, options, selection, !coarse_by_shaders_),
-                selection, result);
+    Frame frame =
+        MakeFrame(scene, novel, novel_from_world, options, selection, !coarse_by_shaders_);
+    RequirePixels(frame);
+    DrawInBands(std::move(frame), selection, result);
     result.coverage_share = CoverageShare(result.coverage);
     if (options.fill_holes) hole_filler_.Fill(scene, novel, novel_from_world, options, result);
     return result;
@@ -115,12 +123,29 @@ class Renderer::Implementation {
     CheckNovelCamera(novel, novel_from_world);
     CheckPictureSize(novel);
     const ViewSelection selection = SelectViews(scene, novel_from_world, options);
-    std::vector<int> views_used = DrawWhole(
-        MakeFrame(scene, novel, novel_from_world, options, selection, !coarse_by_shaders_),
-        selection);
-    drawn_ = DrawnPicture{targets_.image.name(), targets_.depth.name(), targets_.marks.name(),
-                          novel.width_px(),      novel.height_px(),     std::move(views_used)};
+    Frame frame =
+        MakeFrame(scene, novel, novel_from_world, options, selection, !coarse_by_shaders_);
+    RequirePixels(frame);
+    const bool held = Holds(frame);
+    std::vector<int> views_used = DrawWhole(std::move(frame), selection);
+    drawn_ = DrawnPicture{targets_.image.name(),
+                          targets_.depth.name(),
+                          targets_.marks.name(),
+                          novel.width_px(),
+                          novel.height_px(),
+                          std::move(views_used),
+                          held};
     return *drawn_;
+  }
+
+  bool CanDraw(const RenderScene& scene, const PinholeCamera& novel, const Pose& novel_from_world,
+               const RenderOptions& options) const {
+    const ViewSelection selection = SelectViews(scene, novel_from_world, options);
+    const Frame frame =
+        MakeFrame(scene, novel, novel_from_world, options, selection, !coarse_by_shaders_);
+    return std::none_of(frame.views.begin(), frame.views.end(), [&](const View* view) {
+      return view->image.empty() && !HoldsOf(frame, *view);
+    });
   }
 
   RenderResult ReadBack() {
@@ -159,6 +184,22 @@ class Renderer::Implementation {
     }
     return {selection.views.begin(),
             selection.views.begin() + static_cast<std::ptrdiff_t>(fitting)};
+  }
+
+  /// True when pictures like this one, once drawn, need no pixels of its views any more.
+  bool Holds(const Frame& frame) const {
+    return frame.on_processor && ThresholdsNeedNoPixels(frame.views) && views_.AllFit(frame);
+  }
+
+  bool HoldsOf(const Frame& frame, const View& view) const {
+    return Holds(frame) && views_.HoldsFor(frame.options, view);
+  }
+
+  /// Of views whose pixels went nothing else is needed than what was made of them.
+  void RequirePixels(const Frame& frame) const {
+    for (const View* view : frame.views) {
+      if (!view->image.empty() || !HoldsOf(frame, *view)) RequireLoaded(*view);
+    }
   }
 
   void WarnOfRoom(size_t fitting, size_t wanted) {
@@ -288,6 +329,11 @@ RenderResult Renderer::Render(const RenderScene& scene, const PinholeCamera& nov
 DrawnPicture Renderer::Draw(const RenderScene& scene, const PinholeCamera& novel,
                             const Pose& novel_from_world, const RenderOptions& options) {
   return implementation_->Draw(scene, novel, novel_from_world, options);
+}
+
+bool Renderer::CanDraw(const RenderScene& scene, const PinholeCamera& novel,
+                       const Pose& novel_from_world, const RenderOptions& options) const {
+  return implementation_->CanDraw(scene, novel, novel_from_world, options);
 }
 
 RenderResult Renderer::ReadBack() { return implementation_->ReadBack(); }

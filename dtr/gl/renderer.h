@@ -49,6 +49,10 @@ struct DrawnPicture {
   unsigned marks = 0;  ///< RGBA8UI: views blended; 255 at the Delta border (SPEC 6.2)
   int width_px = 0, height_px = 0;
   std::vector<int> views_used;  ///< as RenderResult::views_used
+  /// The renderer holds all that pictures by these options need of these views: their pixels may go
+  /// and need not come back for them (CanDraw). So where it draws on the processor; it then has
+  /// what it made of them in memory.
+  bool views_held = false;
 };
 
 /// Draws scenes with the OpenGL context that is current, into targets of its own, and leaves the
@@ -80,6 +84,11 @@ class Renderer {
   /// method's depth (4 bytes a pixel) is more than one storage block of this driver.
   DrawnPicture Draw(const RenderScene& scene, const PinholeCamera& novel,
                     const Pose& novel_from_world, const RenderOptions& options);
+
+  /// True when this picture can be drawn though the pixels of some of its views went: the renderer
+  /// holds what it would make of them. (Of others it has what it needs: the pixels.)
+  bool CanDraw(const RenderScene& scene, const PinholeCamera& novel, const Pose& novel_from_world,
+               const RenderOptions& options) const;
 
   /// The picture of the last Draw, which must be the last call that drew (std::logic_error): what
   /// Render gives without filling.

@@ -1,6 +1,7 @@
 #include "dtr/gl/sampled_views.h"
 
 #include <algorithm>
+#include <stdexcept>
 
 #include "dtr/base/parallel_for.h"
 #include "dtr/gl/pixel_kernel.h"
@@ -64,21 +65,35 @@ SampledView Sample(const View& view, int resolution, const BreakRule& breaks) {
 
 }  // namespace
 
+bool SampledViews::Stored::IsFor(const View& view, const RenderOptions& options) const {
+  if (resolution != options.resolution || breaks != BreakRuleOf(view, options)) return false;
+  const void *image = view.image.data().data(), *depth = view.depth.grid().data().data();
+  return view.image.empty() || image_data == nullptr ||
+         (image_data == image && depth_data == depth);
+}
+
+bool SampledViews::Has(const View& view, const RenderOptions& options) const {
+  const auto found = views_.find(&view);
+  return found != views_.end() && found->second.IsFor(view, options);
+}
+
 void SampledViews::Prepare(const std::vector<const View*>& views, const RenderOptions& options) {
   std::vector<Stored*> missing;
   std::vector<const View*> missing_views;
   for (const View* view : views) {
     Stored& stored = views_[view];
-    const Stored wanted{options.resolution,
-                        BreakRuleOf(*view, options),
-                        view->image.data().data(),
-                        view->depth.grid().data().data(),
-                        {}};
-    if (stored.resolution == wanted.resolution && stored.breaks == wanted.breaks &&
-        stored.image_data == wanted.image_data && stored.depth_data == wanted.depth_data) {
-      continue;
+    const bool there = stored.IsFor(*view, options);
+    if (!there && view->image.empty()) {
+      throw std::logic_error(view->name +
+                             ": neither its pixels are there nor what was made of them");
     }
-    stored = wanted;
+    // Null where the pixels are gone.
+    stored.image_data = view->image.data().data();
+    stored.depth_data = view->depth.grid().data().data();
+    if (there) continue;
+    stored.resolution = options.resolution;
+    stored.breaks = BreakRuleOf(*view, options);
+    stored.sampled = {};
     missing.push_back(&stored);
     missing_views.push_back(view);
   }

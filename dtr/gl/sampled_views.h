@@ -30,10 +30,14 @@ struct SampledView {
 /// Keeps one per view; another resolution or rule of depth breaks replaces it.
 class SampledViews {
  public:
-  /// Makes the missing ones of several views, on all cores.
+  /// Makes the missing ones of several views, on all cores. A view without pixels needs to have one
+  /// (std::logic_error), which stays when they come back.
   void Prepare(const std::vector<const View*>& views, const RenderOptions& options);
   /// After Prepare.
   const SampledView& Of(const View& view) const { return views_.at(&view).sampled; }
+
+  /// True when nothing would be made of its pixels.
+  bool Has(const View& view, const RenderOptions& options) const;
 
   size_t BytesOf(const View& view) const;
   void Drop(const View& view) { views_.erase(&view); }
@@ -43,8 +47,10 @@ class SampledViews {
   struct Stored {
     int resolution = 0;
     BreakRule breaks;
+    /// Null after a frame in which the pixels were not there: those that come back are the same.
     const void *image_data = nullptr, *depth_data = nullptr;
     SampledView sampled;
+    bool IsFor(const View& view, const RenderOptions& options) const;
   };
   std::map<const View*, Stored> views_;
 };

@@ -44,7 +44,6 @@ double CoverageShare(const Mask& coverage) {
 }
 
 ViewPlacement PlaceView(const View& view, const Pose& novel_from_world) {
-  RequireLoaded(view);
   const Eigen::Quaterniond novel_rotation = novel_from_world.rotation.normalized();
   const Eigen::Quaterniond view_rotation = view.cam_from_world.rotation.normalized();
   ViewPlacement placed;

@@ -83,6 +83,7 @@ GuessedColours::GuessedColours(const RenderScene& scene, const std::vector<int>&
   const Eigen::Matrix3d ray_from_pixel = CalibrationOf(novel).inverse();
   for (const int index : CanonicalOrder(scene, nearest)) {
     const View& view = *scene.views[static_cast<size_t>(index)];
+    RequireLoaded(view);
     const ViewPlacement placed = PlaceView(view, novel_from_world);
     const Eigen::Matrix3d pixel_from_novel =
         CalibrationOf(view.camera) * placed.rotation.transpose();

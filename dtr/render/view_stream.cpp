@@ -114,7 +114,7 @@ ViewStream::ViewStream(DtrSet& set, RenderScene described, Loader load, Settings
     const auto own = std::find_if(views.begin(), views.end(),
                                   [&](const View& candidate) { return &candidate == view; });
     if (own == views.end()) throw std::invalid_argument("ViewStream: a view of another set");
-    slots_.push_back({&*own, State::kAbsent, BytesOf(*own), 0});
+    slots_.push_back({&*own, State::kAbsent, false, BytesOf(*own), 0});
   }
   readers_ = std::make_unique<Readers>(std::move(load), ResolveThreads(settings_.threads));
 }
@@ -177,10 +177,33 @@ bool ViewStream::MakeRoom(size_t bytes) {
   return true;
 }
 
-void ViewStream::Request(const std::vector<size_t>& slots) {
+bool ViewStream::IsThere(size_t slot, Pixels pixels) const {
+  return slots_[slot].state == State::kPresent ||
+         (slots_[slot].released && pixels == Pixels::kOrReleased);
+}
+
+void ViewStream::Release(const View& view) {
+  const auto slot = std::find_if(slots_.begin(), slots_.end(),
+                                 [&](const Slot& candidate) { return candidate.view == &view; });
+  if (slot == slots_.end() || slot->state != State::kPresent) return;
+  DropPixels(*slot->view);
+  slot->state = State::kAbsent;
+  slot->released = true;
+  bytes_ -= slot->bytes;
+}
+
+size_t ViewStream::decoded_bytes() const {
+  size_t bytes = bytes_;
+  for (const Slot& slot : slots_) {
+    if (slot.released && slot.state == State::kAbsent) bytes += slot.bytes;
+  }
+  return bytes;
+}
+
+void ViewStream::Request(const std::vector<size_t>& slots, Pixels pixels) {
   for (const size_t index : slots) {
     Slot& slot = slots_[index];
-    if (slot.state != State::kAbsent) continue;
+    if (slot.state != State::kAbsent || IsThere(index, pixels)) continue;
     if (!MakeRoom(slot.bytes)) return;
     slot.state = State::kReading;
     bytes_ += slot.bytes;
@@ -193,6 +216,7 @@ void ViewStream::Collect(bool wait) {
   for (Readers::Result& result : readers_->Take(wait)) {
     Slot& slot = slots_[result.slot];
     --reading_;
+    slot.released = false;
     if (result.error.empty()) {
       slot.view->image = std::move(result.view.image);
       slot.view->mask = std::move(result.view.mask);
@@ -217,7 +241,7 @@ void ViewStream::WarnOfRoom(size_t fitting, size_t wanted) {
 }
 
 RenderScene ViewStream::SceneFor(const Pose& novel_from_world, const RenderOptions& options,
-                                 Wait wait) {
+                                 Wait wait, Pixels pixels) {
   Collect(false);
   Needed needed;
   for (;;) {
@@ -228,8 +252,13 @@ RenderScene ViewStream::SceneFor(const Pose& novel_from_world, const RenderOptio
     }
     needed = NeededFor(novel_from_world, options);
     for (const size_t slot : needed.slots) slots_[slot].last_used = now_;
-    Request(needed.slots);
-    const auto there = [this](size_t slot) { return slots_[slot].state == State::kPresent; };
+    if (pixels == Pixels::kInMemory &&
+        std::any_of(needed.slots.begin(), needed.slots.end(),
+                    [this](size_t slot) { return slots_[slot].released; })) {
+      wait = Wait::kForAll;
+    }
+    Request(needed.slots, pixels);
+    const auto there = [&](size_t slot) { return IsThere(slot, pixels); };
     if (wait == Wait::kForNone || std::all_of(needed.slots.begin(), needed.slots.end(), there)) {
       break;
     }
@@ -242,7 +271,7 @@ RenderScene ViewStream::SceneFor(const Pose& novel_from_world, const RenderOptio
   if (!all_fit) WarnOfRoom(needed.slots.size(), needed.wanted);
   std::vector<size_t> drawn = NotLost();
   if (wait == Wait::kForNone) {
-    std::erase_if(drawn, [&](size_t slot) { return slots_[slot].state != State::kPresent; });
+    std::erase_if(drawn, [&](size_t slot) { return !IsThere(slot, pixels); });
   } else if (!all_fit && needed.per_pixel) {
     drawn = needed.slots;
     std::sort(drawn.begin(), drawn.end());
@@ -253,11 +282,12 @@ RenderScene ViewStream::SceneFor(const Pose& novel_from_world, const RenderOptio
   return scene;
 }
 
-void ViewStream::Prefetch(const Pose& novel_from_world, const RenderOptions& options) {
+void ViewStream::Prefetch(const Pose& novel_from_world, const RenderOptions& options,
+                          Pixels pixels) {
   Collect(false);
   const Needed needed = NeededFor(novel_from_world, options);
   for (const size_t slot : needed.slots) slots_[slot].last_used = now_;  // not for each other
-  Request(needed.slots);
+  Request(needed.slots, pixels);
 }
 
 }  // namespace dtr

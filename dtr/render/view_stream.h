@@ -41,6 +41,12 @@ class ViewStream {
     kForNone,  ///< moving pictures: what is there, and the rest is asked for
   };
 
+  /// What pictures are drawn from.
+  enum class Pixels {
+    kInMemory,    ///< views whose pixels are there
+    kOrReleased,  ///< and those whose pixels were released, for a renderer that holds what it needs
+  };
+
   /// A view that could not be read: it is never drawn from again.
   struct Lost {
     std::string name, reason;
@@ -55,14 +61,21 @@ class ViewStream {
   ViewStream& operator=(const ViewStream&) = delete;
 
   /// The scene to draw a picture of this camera from: SelectViews of it names only views whose
-  /// pixels are in memory. They stay there until the next call. Where the bytes do not hold all
-  /// that the picture needs, the nearest that fit are drawn from, which is said once. A view that
-  /// cannot be read is left out, which is said, and another takes its place.
-  /// Throws dtr::Error when no view of the set can be read.
-  RenderScene SceneFor(const Pose& novel_from_world, const RenderOptions& options, Wait wait);
+  /// pixels are in memory. They stay there until the next call. Released pixels that it needs are
+  /// waited for, whatever `wait` says: a moving picture would lose what it had. Where the bytes do
+  /// not hold all that the picture needs, the nearest that fit are drawn from, which is said once.
+  /// A view that cannot be read is left out, which is said, and another takes its place. Throws
+  /// dtr::Error when no view of the set can be read.
+  RenderScene SceneFor(const Pose& novel_from_world, const RenderOptions& options, Wait wait,
+                       Pixels pixels = Pixels::kInMemory);
 
   /// Begins to read what a later picture needs, as far as there is room beside the last one's.
-  void Prefetch(const Pose& novel_from_world, const RenderOptions& options);
+  void Prefetch(const Pose& novel_from_world, const RenderOptions& options,
+                Pixels pixels = Pixels::kInMemory);
+
+  /// Drops the pixels of a view that is in memory: a renderer made its own of them. They are read
+  /// again when a picture needs them itself.
+  void Release(const View& view);
 
   /// Leaves out these views (pointers into the set), as --exclude does, until the next call.
   void Hide(std::vector<const View*> views) { hidden_ = std::move(views); }
@@ -70,6 +83,8 @@ class ViewStream {
   const std::vector<Lost>& lost() const { return lost_; }
   /// Pixels in memory or being read.
   size_t bytes() const { return bytes_; }
+  /// The same with the pixels that were released: what the views drawn from take, decoded.
+  size_t decoded_bytes() const;
   /// Views that are being read, as of the last call of SceneFor or Prefetch.
   int reading() const { return reading_; }
 
@@ -78,6 +93,7 @@ class ViewStream {
   struct Slot {
     View* view = nullptr;
     State state = State::kAbsent;
+    bool released = false;        ///< a renderer holds what it made of pixels that are not there
     size_t bytes = 0;             ///< its pixels, from its description
     std::uint64_t last_used = 0;  ///< number of the call that needed it last
   };
@@ -94,7 +110,8 @@ class ViewStream {
   std::vector<size_t> NotLost() const;  ///< nor hidden
   bool IsHidden(const Slot& slot) const;
   /// Asks for the absent ones of these, as far as dropping others gives room.
-  void Request(const std::vector<size_t>& slots);
+  void Request(const std::vector<size_t>& slots, Pixels pixels);
+  bool IsThere(size_t slot, Pixels pixels) const;
   bool MakeRoom(size_t bytes);
   /// Takes over what was read; waits for at least one when `wait`.
   void Collect(bool wait);

@@ -182,5 +182,66 @@ TEST_F(GpuMemoryFull, IsSaidInOneLine) {
   }
 }
 
+TEST_F(GpuMemory, WhatIsHeldIsDrawnWithoutPixels) {
+  DtrSet set = ManyViews();
+  std::vector<View>& views = set.frames[0].views;
+  const std::vector<View> with_pixels = views;
+  const RenderScene scene = MakeRenderScene(set);
+  RendererSettings settings;
+  settings.coarse_drawer = CoarseDrawer::kProcessor;
+  Renderer renderer(settings);
+  const Shot novel = CameraAt(0.1);
+  const auto draw = [&](const RenderOptions& options) {
+    const DrawnPicture drawn = renderer.Draw(scene, novel.camera, novel.cam_from_world, options);
+    return std::pair(renderer.ReadBack(), drawn);
+  };
+  const auto can_draw = [&](const RenderOptions& options) {
+    return renderer.CanDraw(scene, novel.camera, novel.cam_from_world, options);
+  };
+  const auto drop = [&](const std::vector<int>& used) {
+    for (const int index : used) {
+      View& view = views[static_cast<size_t>(index)];
+      view.image = {};
+      view.depth = {};
+    }
+  };
+  const RenderOptions deferred = Options(RenderMethod::kDeferred);
+  const auto [first, drawn] = draw(deferred);
+  ASSERT_TRUE(drawn.views_held);
+  ASSERT_GT(first.coverage_share, 0.5);
+  drop(drawn.views_used);
+  EXPECT_TRUE(can_draw(deferred));
+  EXPECT_EQ(draw(deferred).first.image, first.image);
+  EXPECT_EQ(draw(deferred).first.depth, first.depth);
+  // Others need the pixels: other samples, other views, meshes for every pixel.
+  RenderOptions coarser = deferred, more = deferred;
+  coarser.resolution = 2;
+  more.views = 5;
+  EXPECT_FALSE(can_draw(coarser));
+  EXPECT_FALSE(can_draw(Options(RenderMethod::kTwoPass)));
+  EXPECT_TRUE(can_draw(more)) << "the fifth has its pixels";
+
+  views = with_pixels;  // as they are read again: elsewhere in memory
+  EXPECT_EQ(draw(deferred).first.image, first.image);
+  EXPECT_FALSE(draw(Options(RenderMethod::kTwoPass)).second.views_held);
+  EXPECT_EQ(draw(coarser).first.image, DrawAlone(scene, 0.1, coarser).result.image);
+  drop(drawn.views_used);
+  EXPECT_THROW(draw(deferred), Error) << "what it held was of coarser samples";
+}
+
+TEST_F(GpuMemory, NothingIsHeldWhereViewsMakeRoomForOneAnother) {
+  const DtrSet set = ManyViews();
+  const RenderScene scene = MakeRenderScene(set);
+  const RenderOptions deferred = Options(RenderMethod::kDeferred);
+  RendererSettings settings;
+  settings.coarse_drawer = CoarseDrawer::kProcessor;
+  settings.gpu_bytes = DrawAlone(scene, 0.1, deferred).bytes;  // as long as none lies beside them
+  Renderer renderer(settings);
+  const Shot novel = CameraAt(0.1);
+  const DrawnPicture drawn = renderer.Draw(scene, novel.camera, novel.cam_from_world, deferred);
+  EXPECT_EQ(drawn.views_used.size(), 4u);
+  EXPECT_FALSE(drawn.views_held);
+}
+
 }  // namespace
 }  // namespace dtr::gl

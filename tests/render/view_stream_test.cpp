@@ -7,11 +7,11 @@
 #include <map>
 #include <mutex>
 
+#include "datasets/exact/analytic_scene.h"
 #include "dtr/base/error.h"
 #include "dtr/base/random.h"
 #include "dtr/render/geometry.h"
 #include "dtr/render/valid_views.h"
-#include "datasets/exact/analytic_scene.h"
 
 namespace dtr {
 namespace {
@@ -225,6 +225,37 @@ TEST(ViewStream, GivesTheSameForAnyThreadsRoomAndHistory) {
       }
     }
   }
+}
+
+TEST(ViewStream, ReleasedViewsAreDrawnFromWithoutPixelsAndReadAgainWhenThoseAreNeeded) {
+  Disk disk;
+  ViewStream stream(disk.set, DescribeRenderScene(disk.set), disk.Loader(), Room(4 << 20));
+  const Pose camera = disk.Camera(-1.2);
+  const std::vector<std::string> expected = Expected(disk, camera, Nearest(3));
+  RenderScene scene = stream.SceneFor(camera, Nearest(3), ViewStream::Wait::kForAll);
+  const View& nearest =
+      *scene.views[static_cast<size_t>(SelectViews(scene, camera, Nearest(3)).views.front())];
+  stream.Release(nearest);
+  EXPECT_TRUE(nearest.image.empty());
+  EXPECT_TRUE(nearest.depth.empty());
+  EXPECT_EQ(stream.bytes(), 2 * disk.view_bytes);
+  EXPECT_EQ(stream.decoded_bytes(), 3 * disk.view_bytes);
+  for (const auto wait : {ViewStream::Wait::kForNone, ViewStream::Wait::kForAll}) {
+    scene = stream.SceneFor(camera, Nearest(3), wait, ViewStream::Pixels::kOrReleased);
+    std::vector<std::string> ids;
+    for (const int index : SelectViews(scene, camera, Nearest(3)).views) {
+      ids.push_back(scene.views[static_cast<size_t>(index)]->id);
+    }
+    EXPECT_EQ(ids, expected);
+    EXPECT_EQ(disk.reads, 3);
+    EXPECT_TRUE(nearest.image.empty());
+  }
+  // A moving picture that needs the pixels does not go without the view it had.
+  scene = stream.SceneFor(camera, Nearest(3), ViewStream::Wait::kForNone);
+  EXPECT_EQ(Drawn(disk, scene, camera, Nearest(3)), expected);
+  EXPECT_EQ(disk.reads, 4);
+  EXPECT_EQ(stream.bytes(), 3 * disk.view_bytes);
+  EXPECT_EQ(stream.decoded_bytes(), 3 * disk.view_bytes);
 }
 
 }  // namespace

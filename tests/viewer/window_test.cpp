@@ -207,6 +207,12 @@ TEST_F(ViewerWindow, TheSetOnTheDiskIsReadAnewAndItsLossIsNoCrash) {
   });
   ViewerProgram::Do({"key", "Left"});  // it goes on with what it has
   viewer.WaitFor("a view before", [](const Json& s) { return s["at_view"] == "0001.jpg"; });
+  ViewerProgram::Do({"key", "g"});  // wants the photos themselves
+  const Json refused = viewer.WaitFor("word of lost pixels", [](const Json& s) {
+    return s["message"].get<std::string>().find("be read") != std::string::npos;
+  });
+  EXPECT_FALSE(refused["magnifier"].get<bool>());
+  EXPECT_GT(refused["coverage"], 0.5);
 
   Json without = Json::parse(good);  // comes back with one view less
   Json& views = without["frames"][0]["views"];
@@ -252,6 +258,48 @@ TEST_F(ViewerWindow, WhatIsInspectedIsSaid) {
   ViewerProgram::Do({"key", "f"});
   viewer.WaitFor("cameras", [](const Json& s) { return s["cameras"].get<bool>(); });
   EXPECT_EQ(viewer.WaitFor("no complaint", Anything)["message"], "");
+}
+
+TEST_F(ViewerWindow, PixelsGoOnceTheyAreSampledAndComeBackForWhoLooksAtThem) {
+  NeedDisplay();
+  if (IsSkipped()) return;
+  const auto bytes = [&](const std::vector<std::string>& further) {
+    std::vector<std::string> words{
+        "view", Set(),    "--size", "320x240", "--no-panel",           "--frames",
+        "1",    "--json", "-",      "-o",      folder_.path().string()};
+    words.insert(words.end(), further.begin(), further.end());
+    const Json json = Json::parse(DtrOk(words).out);
+    return std::pair(json["view_bytes"].get<size_t>(), json["view_bytes_held"].get<size_t>());
+  };
+  const auto [decoded, held] = bytes({});
+  EXPECT_GT(decoded, 0u);
+  EXPECT_EQ(held, 0u) << "the display's OpenGL draws on the processor";
+  EXPECT_EQ(bytes({"--photo"}), std::pair(decoded, decoded));
+  EXPECT_EQ(bytes({"--fill-holes"}), std::pair(decoded, decoded));
+
+  ViewerProgram viewer(Set(), folder_.path(), {"--size", "320x240", "--no-panel"});
+  viewer.WaitFor("the first picture", Anything);
+  int saved = 0;
+  const auto save = [&] {
+    const fs::path file = In("good-picture-00" + std::to_string(++saved) + ".png");
+    ViewerProgram::Do({"key", "p"});
+    viewer.WaitFor("a saved picture", [&](const Json&) { return fs::exists(file); });
+    return io::ReadImage(file);
+  };
+  ViewerProgram::Do({"mousemove", "160", "120"});
+  const ImageRgb8 first = save();
+  ViewerProgram::Do({"key", "g"});
+  viewer.WaitFor("figures under the cursor",
+                 [](const Json& s) { return !s["under_cursor"].empty(); });
+  ViewerProgram::Do({"key", "g"});
+  viewer.WaitFor("no magnifier", [](const Json& s) { return s["under_cursor"].empty(); });
+  ViewerProgram::Do({"key", "Down"});
+  viewer.WaitFor("depth", [](const Json& s) { return s["shown"] == "depth"; });
+  ViewerProgram::Do({"key", "Up"});
+  viewer.WaitFor("colour", [](const Json& s) { return s["shown"] == "colour"; });
+  EXPECT_EQ(save().data(), first.data());
+  EXPECT_EQ(viewer.WaitFor("no complaint", Anything)["message"].get<std::string>().find("cannot"),
+            std::string::npos);
 }
 
 TEST_F(ViewerWindow, ThePanelTakesItsClicksAndTheWindowIsSaved) {

@@ -72,7 +72,8 @@ class App {
       FinishFrame();
     }
     report_.last = State();
-    report_.view_bytes = session_->opened().stream->bytes();
+    report_.view_bytes = session_->opened().stream->decoded_bytes();
+    report_.view_bytes_held = session_->opened().stream->bytes();
     return report_;
   }
 
@@ -235,7 +236,8 @@ class App {
   PictureOrder Order() const {
     const NovelCamera* wanted = paths_.Wanted();  // of its own size, whatever the window's is now
     return {wanted ? *wanted : session_->controller.camera(), options_, shown_,
-            session_->inspector.inspection().hidden};
+            session_->inspector.inspection().hidden,
+            session_->inspector.inspection().LooksAtPixels()};
   }
 
   bool whole() const { return session_->schedule.WholeFor(Order()); }

@@ -108,7 +108,8 @@ struct AppReport {
   /// Physical memory held, sampled every so many frames: what grows shows.
   static constexpr int kFramesPerSample = 500;
   std::vector<size_t> memory_bytes;
-  size_t view_bytes = 0;  ///< decoded pixels in memory at the end
+  size_t view_bytes = 0;       ///< decoded pixels of the views drawn from at the end
+  size_t view_bytes_held = 0;  ///< those of them that are in memory: the renderer may have its own
 };
 
 /// Shows the set until the window is closed. Throws dtr::Error where no window can be opened, the

@@ -7,7 +7,6 @@
 #include <cmath>
 
 #include "dtr/render/option_names.h"
-#include "dtr/report/contact_sheet.h"
 
 namespace dtr::viewer {
 namespace {
@@ -17,7 +16,6 @@ constexpr ImU32 kGood = IM_COL32(90, 220, 120, 255), kBad = IM_COL32(255, 80, 70
 constexpr ImU32 kUntested = IM_COL32(120, 170, 255, 255), kOff = IM_COL32(130, 130, 130, 255);
 constexpr ImU32 kMark = IM_COL32(255, 225, 60, 255);
 constexpr double kFrustumShare = 0.06;  // of the scene's size: length of a drawn camera
-constexpr int kThumbnailPx = 128;
 constexpr int kMagnifiedPx = 25, kMagnification = 8;
 
 ImTextureID IdOf(const PictureTexture& texture) {
@@ -151,7 +149,8 @@ void InspectionOverlay::DrawPhoto(const Inspection& inspection, const View& view
 }
 
 void InspectionOverlay::DrawCameras(const Controller& controller, const Inspection& inspection,
-                                    const std::map<std::string, ViewVerdict>& verdicts) {
+                                    const std::map<std::string, ViewVerdict>& verdicts,
+                                    PictureMaker& maker) {
   ImDrawList& list = *ImGui::GetBackgroundDrawList();
   const NovelCamera& camera = controller.camera();
   const double length = kFrustumShare * controller.scene_size();
@@ -172,9 +171,9 @@ void InspectionOverlay::DrawCameras(const Controller& controller, const Inspecti
                                                      : kBad;
     const bool all = std::all_of(corners.begin(), corners.end(), [](const auto& c) { return c; });
     auto& thumbnail = thumbnails_[view];
-    if (!thumbnail && !view->image.empty()) {
+    if (const ImageRgb8* small = thumbnail ? nullptr : maker.ThumbnailOf(*view)) {
       thumbnail = std::make_unique<PictureTexture>();
-      thumbnail->Upload(report::Shrink(view->image, kThumbnailPx));
+      thumbnail->Upload(*small);
     }
     if (all && thumbnail) {
       list.AddImageQuad(IdOf(*thumbnail), *corners[0], *corners[1], *corners[2], *corners[3],

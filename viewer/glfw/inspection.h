@@ -34,6 +34,8 @@ struct Inspection {
   std::optional<Probe> under_cursor;  ///< of the last cursor at rest
   std::string unit;                   ///< of lengths: "m" or "units"
 
+  /// True while the views' own pixels are looked at.
+  bool LooksAtPixels() const { return magnifier || compared != Compared::kNothing; }
   bool IsHidden(const View& view) const;
   void Toggle(const View& view);
   /// Adds a mark; a third begins anew.
@@ -42,7 +44,7 @@ struct Inspection {
   std::string DistanceText() const;
 };
 
-/// Draws it with ImGui. Thumbnails are made of the views that are in memory.
+/// Draws it with ImGui. Thumbnails are there of the views that were drawn from.
 class InspectionOverlay {
  public:
   /// The other picture, right of the border, and what each side is drawn by.
@@ -51,7 +53,7 @@ class InspectionOverlay {
   /// The photo of `view` where it would lie if this were its camera.
   void DrawPhoto(const Inspection& inspection, const View& view, const NovelCamera& camera);
   void DrawCameras(const Controller& controller, const Inspection& inspection,
-                   const std::map<std::string, ViewVerdict>& verdicts);
+                   const std::map<std::string, ViewVerdict>& verdicts, PictureMaker& maker);
   void DrawMarks(const Inspection& inspection, const NovelCamera& camera);
   void DrawMagnifier(const Inspection& inspection, const PictureTexture& picture);
 

@@ -20,6 +20,7 @@ void Inspector::Look(bool whole, const RenderOptions& options, const Eigen::Vect
     return;
   }
   try {
+    if (inspection_.LooksAtPixels()) from_.maker.BringPixels();
     const auto other = OptionsOf(inspection_.compared, options);
     if (other && !(other_made_ && *other_made_ == *other)) {
       from_.maker.MakeOther(*other);
@@ -39,6 +40,7 @@ void Inspector::Look(bool whole, const RenderOptions& options, const Eigen::Vect
     }
   } catch (const Error& error) {
     inspection_.compared = Compared::kNothing;
+    inspection_.magnifier = false;  // would fail again with every frame
     from_.tell(error.what());
   }
 }
@@ -49,6 +51,7 @@ std::optional<Probe> Inspector::ProbeAt(const Eigen::Vector2d& pixel) {
   const MadePicture& picture = from_.maker.picture();
   const DepthImage& depth = from_.maker.Result().depth;
   if (!depth.Contains(x, y) || DepthImage::IsHole(depth(x, y))) return std::nullopt;
+  from_.maker.BringPixels();
   return ProbePixel(picture.scene, picture.camera, picture.options, x, y, depth(x, y),
                     from_.sigma_of);
 }
@@ -78,7 +81,7 @@ void Inspector::Draw(const RenderOptions& options) {
   } else if (other_made_ && inspection_.compared != Compared::kNothing) {
     overlay_.DrawCompared(inspection_, from_.maker.other(), options, *other_made_);
   }
-  if (inspection_.cameras) overlay_.DrawCameras(controller, inspection_, verdicts_);
+  if (inspection_.cameras) overlay_.DrawCameras(controller, inspection_, verdicts_, from_.maker);
   overlay_.DrawMarks(inspection_, controller.camera());
   if (inspection_.magnifier) overlay_.DrawMagnifier(inspection_, from_.maker.picture().texture);
 }

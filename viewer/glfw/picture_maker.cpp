@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <chrono>
 
+#include "dtr/base/error.h"
 #include "dtr/gl/frame_timer.h"
 #include "dtr/render/fill_holes.h"
+#include "dtr/report/contact_sheet.h"
 
 namespace dtr::viewer {
 namespace {
@@ -22,6 +24,14 @@ class Laps {
  private:
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
+
+constexpr int kThumbnailPx = 128;
+
+/// Filling, false colours and those who inspect read the views' own pixels.
+ViewStream::Pixels PixelsFor(const PictureOrder& order) {
+  const bool needed = order.inspected || order.options.fill_holes || order.shown != Shown::kColour;
+  return needed ? ViewStream::Pixels::kInMemory : ViewStream::Pixels::kOrReleased;
+}
 
 PinholeCamera Smaller(const PinholeCamera& camera, int divisor) {
   return camera.Resized(std::max(1, camera.width_px() / divisor),
@@ -50,11 +60,20 @@ void PictureMaker::MakeMoving(const PictureOrder& order, int divisor) {
 
 void PictureMaker::MakeStill(const PictureOrder& order) {
   stream_.Hide(order.hidden);
-  stream_.Prefetch(order.camera.cam_from_world, order.options);
+  stream_.Prefetch(order.camera.cam_from_world, order.options, PixelsFor(order));
   // Once nothing is on its way it is the picture that dtr render makes.
   const bool whole = stream_.reading() == 0;
   Make(order, 1, whole ? ViewStream::Wait::kForAll : ViewStream::Wait::kForNone);
   picture_.whole = whole;
+}
+
+RenderScene PictureMaker::SceneFor(const PictureOrder& order, const PinholeCamera& camera,
+                                   ViewStream::Wait wait) {
+  const Pose& pose = order.camera.cam_from_world;
+  RenderScene scene = stream_.SceneFor(pose, order.options, wait, PixelsFor(order));
+  if (renderer_.CanDraw(scene, camera, pose, order.options)) return scene;
+  // Other options than what was made of the released pixels is for.
+  return stream_.SceneFor(pose, order.options, wait);
 }
 
 void PictureMaker::Make(const PictureOrder& order, int divisor, ViewStream::Wait wait) {
@@ -65,8 +84,8 @@ void PictureMaker::Make(const PictureOrder& order, int divisor, ViewStream::Wait
   picture_.whole = false;
   stream_.Hide(order.hidden);
   const Pose& pose = order.camera.cam_from_world;
-  picture_.scene = stream_.SceneFor(pose, order.options, wait);
   picture_.camera = {Smaller(order.camera.camera, divisor), pose};
+  picture_.scene = SceneFor(order, picture_.camera.camera, wait);
   picture_.divisor = divisor;
   picture_.shown = order.shown;
   picture_.options = order.options;
@@ -77,7 +96,37 @@ void PictureMaker::Make(const PictureOrder& order, int divisor, ViewStream::Wait
   picture_.views_used = drawn.views_used;
   picture_.ms.draw = laps.Lap();
   Show(order, drawn, divisor == 1);
+  if (drawn.views_held && PixelsFor(order) == ViewStream::Pixels::kOrReleased) ReleasePixels();
   picture_.ms.inspect = laps.Lap();
+}
+
+void PictureMaker::ReleasePixels() {
+  for (const int index : picture_.views_used) {
+    const View& view = *picture_.scene.views[static_cast<size_t>(index)];
+    if (view.image.empty()) continue;
+    ThumbnailOf(view);
+    stream_.Release(view);
+  }
+}
+
+const ImageRgb8* PictureMaker::ThumbnailOf(const View& view) {
+  const auto found = thumbnails_.find(&view);
+  if (found != thumbnails_.end()) return &found->second;
+  if (view.image.empty()) return nullptr;
+  return &(thumbnails_[&view] = report::Shrink(view.image, kThumbnailPx));
+}
+
+void PictureMaker::BringPixels() {
+  const auto there = [this](int index) {
+    return !picture_.scene.views[static_cast<size_t>(index)]->image.empty();
+  };
+  const std::vector<int>& used = picture_.views_used;
+  if (std::all_of(used.begin(), used.end(), there)) return;
+  const RenderScene scene =
+      stream_.SceneFor(picture_.camera.cam_from_world, picture_.options, ViewStream::Wait::kForAll);
+  if (scene.views != picture_.scene.views) {
+    throw Error("a view of the picture cannot be read any more");
+  }
 }
 
 void PictureMaker::Show(const PictureOrder& order, const gl::DrawnPicture& drawn, bool still) {
@@ -96,6 +145,7 @@ void PictureMaker::Show(const PictureOrder& order, const gl::DrawnPicture& drawn
 
 void PictureMaker::MakeOther(const RenderOptions& options) {
   Result();  // before the renderer forgets it
+  BringPixels();
   const NovelCamera& camera = picture_.camera;
   const RenderScene scene =
       stream_.SceneFor(camera.cam_from_world, options, ViewStream::Wait::kForAll);

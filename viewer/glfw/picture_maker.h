@@ -1,5 +1,6 @@
 // viewer/glfw/picture_maker.h -- the pictures the window shows, drawn with the current context.
 #pragma once
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -20,6 +21,9 @@ struct PictureOrder {
   RenderOptions options;
   Shown shown = Shown::kColour;
   std::vector<const View*> hidden;  ///< views not to draw from
+  /// Something will look at the views' own pixels: they stay in memory. Else they go where the
+  /// renderer holds what it made of them.
+  bool inspected = false;
 };
 
 /// Milliseconds that each stage of a picture took.
@@ -58,6 +62,12 @@ class PictureMaker {
   const PictureTexture& other() const { return other_; }
 
   const MadePicture& picture() const { return picture_; }
+  /// Brings the pixels of a whole picture's views back into memory, for those who look at them.
+  /// Throws dtr::Error where one cannot be read any more.
+  void BringPixels();
+  /// A small picture of the view's photo; null until it was drawn from.
+  const ImageRgb8* ThumbnailOf(const View& view);
+
   /// The picture's pixels as they are kept: colours as `dtr render` writes them, else as shown.
   ImageRgb8 Image();
   /// Of the last picture; the first call after it reads it back from the GPU.
@@ -65,6 +75,9 @@ class PictureMaker {
 
  private:
   void Make(const PictureOrder& order, int divisor, ViewStream::Wait wait);
+  RenderScene SceneFor(const PictureOrder& order, const PinholeCamera& camera,
+                       ViewStream::Wait wait);
+  void ReleasePixels();
   ImageRgb8 InFalseColour();
   void Show(const PictureOrder& order, const gl::DrawnPicture& drawn, bool still);
 
@@ -76,6 +89,7 @@ class PictureMaker {
   PictureTexture other_;
   std::optional<RenderResult> result_;
   HoleFiller filler_;
+  std::map<const View*, ImageRgb8> thumbnails_;
 };
 
 }  // namespace dtr::viewer
