@@ -42,7 +42,7 @@ struct Bundle {
 
 /// The bundle of a model; an image that shows a point twice keeps the first of the two.
 /// With `separate_lenses` every image gets a lens of its own, else images share what the model
-/// shares: a camera, or all of it but the principal point (SharedLenses, lens_groups.h). Points
+/// shares: a camera, or all of it but the principal point (LensGroups, lens_groups.h). Points
 /// that fewer than two images see are left out.
 Bundle BundleOf(const SfmModel& model, bool separate_lenses = false);
 
