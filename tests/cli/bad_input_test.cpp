@@ -20,8 +20,6 @@ using Json = nlohmann::json;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-constexpr int kFailed = 1, kWrongUsage = 2;
-
 class BadInput : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {

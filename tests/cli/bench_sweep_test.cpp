@@ -14,7 +14,6 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 using Json = nlohmann::json;
-constexpr int kFailed = 1, kWrongUsage = 2;
 
 /// A set with true depth and sparse points, held-out photos among its views; made once.
 class BenchSweep : public ::testing::Test {

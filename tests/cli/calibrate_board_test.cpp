@@ -8,8 +8,7 @@
 #include "calib/files/calibration.h"
 #include "calib/files/opencv_yaml.h"
 #include "dtr/io/image_io.h"
-#include "tests/cli/run_dtr.h"
-#include "tests/support/test_data.h"
+#include "tests/cli/chessboard_set.h"
 
 namespace dtr::testing {
 namespace {
@@ -18,18 +17,14 @@ namespace fs = std::filesystem;
 using Json = nlohmann::json;
 using ::testing::HasSubstr;
 
-constexpr int kFailed = 1, kWrongUsage = 2;
 const std::string kChessboard = "chessboard:9x6:1";
 
-class CalibrateBoard : public ::testing::Test {
+class CalibrateBoard : public ChessboardSet {
  protected:
-  static fs::path Photos() { return DataFolder() / "chessboard_stereo_640x480"; }
-  std::string In(const std::string& name) const { return (folder_ / name).string(); }
   Ran Board(const std::string& photos, std::vector<std::string> further) {
     further.insert(further.begin(), {"calibrate", "board", photos});
     return Dtr(further);
   }
-  TemporaryFolder folder_;
 };
 
 TEST_F(CalibrateBoard, TheChessboardSetGivesOneCameraInThreeFormats) {

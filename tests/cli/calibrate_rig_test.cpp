@@ -6,8 +6,7 @@
 
 #include "dtr/base/files.h"
 #include "dtr/io/image_io.h"
-#include "tests/cli/run_dtr.h"
-#include "tests/support/test_data.h"
+#include "tests/cli/chessboard_set.h"
 
 namespace dtr::testing {
 namespace {
@@ -16,13 +15,10 @@ namespace fs = std::filesystem;
 using Json = nlohmann::json;
 using ::testing::HasSubstr;
 
-constexpr int kFailed = 1, kWrongUsage = 2;
 const std::string kChessboard = "chessboard:9x6:25mm";
 
-class CalibrateRig : public ::testing::Test {
+class CalibrateRig : public ChessboardSet {
  protected:
-  static fs::path Photos() { return DataFolder() / "chessboard_stereo_640x480"; }
-  std::string In(const std::string& name) const { return (folder_ / name).string(); }
   Ran Rig(const std::string& photos, std::vector<std::string> further) {
     further.insert(further.begin(), {"calibrate", "rig", photos, "--board", kChessboard});
     return Dtr(further);
@@ -45,7 +41,6 @@ class CalibrateRig : public ::testing::Test {
     WriteFileAtomically(folder_ / name, json.dump());
     return In(name);
   }
-  TemporaryFolder folder_;
 };
 
 TEST_F(CalibrateRig, TheStereoSetGivesTwoCamerasAndTheirPlaces) {

@@ -17,7 +17,6 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
-constexpr int kFailed = 1, kWrongUsage = 2;
 constexpr double kUnit = 2.5;  // metres that a unit of the set is
 
 class CalibrateScale : public ::testing::Test {

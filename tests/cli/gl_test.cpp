@@ -13,7 +13,6 @@ namespace fs = std::filesystem;
 using Json = nlohmann::json;
 using ::testing::HasSubstr;
 
-constexpr int kFailed = 1, kWrongUsage = 2;
 constexpr size_t kMaxShaderBytes = 1 << 20;
 
 class OpenGl : public SmallCourtyardSet {

@@ -11,6 +11,9 @@
 
 namespace dtr::testing {
 
+/// Exit codes beside 0, done.
+inline constexpr int kFailed = 1, kWrongUsage = 2;
+
 /// How a run of the program ended.
 struct Ran {
   int code = 0;    ///< exit code; meaningful when signal == 0

@@ -10,8 +10,6 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-constexpr int kFailed = 1, kWrongUsage = 2;
-
 using Inspect = SmallCourtyardSet;
 
 TEST_F(Inspect, WritesOnePageThatNeedsNothingElseTheSameEveryTime) {

@@ -13,8 +13,6 @@ namespace fs = std::filesystem;
 using Json = nlohmann::json;
 using ::testing::HasSubstr;
 
-constexpr int kFailed = 1, kWrongUsage = 2;
-
 class ViewerWindow : public SmallCourtyardSet {
  protected:
   void NeedDisplay() {
