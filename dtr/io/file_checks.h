@@ -6,8 +6,13 @@
 
 namespace dtr::io {
 
-/// Throws Error for a PNG that lacks its end and for an EXR whose header names values longer than
-/// the file; other files pass.
+/// Throws Error for a file that begins like no format of photos (TGA, which has no such mark,
+/// passes by its name). OpenImageIO would try every decoder it has on such a file, and some of them
+/// allocate what they take for a size.
+void ExpectImageKind(const std::filesystem::path& file);
+
+/// Throws Error for a PNG that lacks its end and for an EXR that ExpectPlausibleExr refuses; other
+/// files pass.
 void ExpectWholeFile(const std::filesystem::path& file);
 
 /// Throws Error for an image so large that a file of this size cannot hold it: header fields that

@@ -43,6 +43,7 @@ std::unique_ptr<OIIO::ImageInput> OpenImage(const fs::path& file, std::uint64_t 
     throw Error(file.string() + ": expected an image file, found " +
                 (fs::exists(file, error) ? "something else" : "nothing"));
   }
+  ExpectImageKind(file);
   ExpectWholeFile(file);
   OIIO::ImageSpec wishes;  // raw colours: alpha is dropped, not multiplied in
   wishes.attribute("oiio:UnassociatedAlpha", 1);

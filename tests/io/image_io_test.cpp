@@ -6,24 +6,26 @@
 
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
+#include <cstring>
 #include <limits>
-
-#include <jpeglib.h>  // needs cstdio before it
+#include <utility>
 
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/base/random.h"
+#include "tests/support/photo_kinds.h"
 #include "tests/support/test_data.h"
 #include "tests/support/truncation.h"
 
 namespace dtr::io {
 namespace {
 
-using OIIO::ImageOutput;
 using OIIO::ImageSpec;
 using OIIO::TypeDesc;
 using testing::TemporaryFolder;
+using testing::WriteForeign;
 
 ImageRgb8 RandomImage(int width_px, int height_px, std::uint64_t seed) {
   Random random(seed);
@@ -43,16 +45,6 @@ ImageRgb8 SmoothImage(int width_px, int height_px) {
     }
   }
   return image;
-}
-
-// Writes a file as some other program would.
-template <typename T>
-void WriteForeign(const std::filesystem::path& file, const ImageSpec& spec,
-                  const std::vector<T>& values) {
-  const auto out = ImageOutput::create(file.string());
-  ASSERT_TRUE(out && out->open(file.string(), spec)) << file;
-  ASSERT_TRUE(out->write_image(OIIO::BaseTypeFromC<T>::value, values.data()));
-  ASSERT_TRUE(out->close());
 }
 
 TEST(WriteImage, PngRoundTripsExactlyAndTheSameBytesTwice) {
@@ -164,6 +156,48 @@ TEST(ReadImage, AnExrThatClaimsMoreThanItHoldsIsRefusedBeforeAllocation) {
   EXPECT_THAT(RefusalOf(file), ::testing::HasSubstr("damaged EXR"));
 }
 
+// OpenEXR allocates a chunk's pixels and the table of all chunks by the header alone.
+TEST(ReadImage, AnExrOfMoreOrLargerChunksThanItsFileHoldsIsRefused) {
+  const TemporaryFolder folder;
+  const auto file = folder / "a.exr";
+  WriteForeign<float>(file, ImageSpec(4, 4, 1, TypeDesc::FLOAT), std::vector<float>(16, 0.5f));
+  const std::string good = ReadFile(file, 1 << 20);
+  EXPECT_NO_THROW(ReadImage(file));
+  const std::string name = std::string("dataWindow") + '\0' + "box2i" + '\0';
+  const size_t window_at = good.find(name) + name.size() + 4;
+  const auto with_window = [&](std::int32_t right, std::int32_t bottom) {
+    std::string bad = good;
+    std::memcpy(bad.data() + window_at + 8, &right, 4);
+    std::memcpy(bad.data() + window_at + 12, &bottom, 4);
+    return bad;
+  };
+  const std::vector<std::pair<std::string, const char*>> cases{
+      {with_window(3, 2000000000), "a table of chunks that fits"},
+      {with_window(2000000000, 3), "chunks that can be packed"},
+      {with_window(-7, 3), "at least one pixel"},
+      {with_window(3, -1), "at least one pixel"}};
+  for (const auto& [bad, complaint] : cases) {
+    WriteFileAtomically(file, bad);
+    EXPECT_THAT(RefusalOf(file), ::testing::HasSubstr(complaint));
+  }
+}
+
+// Without this OpenImageIO offers the file to every decoder it has.
+TEST(ReadImage, AFileThatBeginsLikeNoImageIsRefusedWithItsBeginning) {
+  const TemporaryFolder folder;
+  WriteImage(folder / "a.png", SmoothImage(8, 6));
+  std::string bytes = ReadFile(folder / "a.png", 1 << 20);
+  EXPECT_NO_THROW(ReadImage(folder / "a.png"));
+  bytes[1] = 'Q';
+  WriteFileAtomically(folder / "a.png", bytes);
+  EXPECT_THAT(RefusalOf(folder / "a.png"), ::testing::HasSubstr("begins with \".QNG"));
+  WriteFileAtomically(folder / "notes.jpg", "These are no pixels.");
+  EXPECT_THAT(RefusalOf(folder / "notes.jpg"),
+              ::testing::HasSubstr("no readable image: expected a PNG, JPEG"));
+  WriteFileAtomically(folder / "empty.jpg", "");
+  EXPECT_THAT(RefusalOf(folder / "empty.jpg"), ::testing::HasSubstr("begins with \"\""));
+}
+
 TEST(ReadImage, ASizeThatTheFileCannotHoldIsRefusedBeforeAllocation) {
   const TemporaryFolder folder;
   WriteFileAtomically(folder / "a.ppm", "P6\n19999 19999\n255\n" + std::string(300, 'x'));
@@ -174,37 +208,19 @@ TEST(ReadImage, ASizeThatTheFileCannotHoldIsRefusedBeforeAllocation) {
   EXPECT_EQ(ReadMask(folder / "m.png").width(), 3000);
 }
 
-// One colour in four inks, with Adobe's marker or without.
-void WriteCmykJpeg(const std::filesystem::path& file, std::array<JSAMPLE, 4> inks, bool marker) {
-  std::FILE* out = std::fopen(file.c_str(), "wb");
-  ASSERT_NE(out, nullptr);
-  jpeg_compress_struct jpeg{};
-  jpeg_error_mgr errors{};
-  jpeg.err = jpeg_std_error(&errors);
-  jpeg_create_compress(&jpeg);
-  jpeg_stdio_dest(&jpeg, out);
-  jpeg.image_width = jpeg.image_height = 16;
-  jpeg.input_components = 4;
-  jpeg.in_color_space = JCS_CMYK;
-  jpeg_set_defaults(&jpeg);
-  jpeg_set_quality(&jpeg, 100, TRUE);
-  jpeg.write_Adobe_marker = marker ? TRUE : FALSE;
-  jpeg_start_compress(&jpeg, TRUE);
-  std::vector<JSAMPLE> row;
-  for (int x = 0; x < 16; ++x) row.insert(row.end(), inks.begin(), inks.end());
-  JSAMPROW pointer = row.data();
-  for (int y = 0; y < 16; ++y) jpeg_write_scanlines(&jpeg, &pointer, 1);
-  jpeg_finish_compress(&jpeg);
-  jpeg_destroy_compress(&jpeg);
-  std::fclose(out);
+// 16x16 pixels of one colour.
+void WriteInksOf(const std::filesystem::path& file, std::array<JSAMPLE, 4> inks, bool marker) {
+  std::vector<JSAMPLE> values;
+  for (int i = 0; i < 16 * 16; ++i) values.insert(values.end(), inks.begin(), inks.end());
+  testing::WriteInks(file, 16, 16, values, marker);
 }
 
 TEST(ReadImage, InksOfAJpegAreInvertedWhereAdobesMarkerSaysSo) {
   const TemporaryFolder folder;
   // C 20, M 100, Y 200, K 51: (255 - C) (255 - 51) / 255 = 188, 124, 44.
   const std::vector<std::uint8_t> expected{188, 124, 44};
-  WriteCmykJpeg(folder / "plain.jpg", {20, 100, 200, 51}, false);
-  WriteCmykJpeg(folder / "adobe.jpg", {235, 155, 55, 204}, true);
+  WriteInksOf(folder / "plain.jpg", {20, 100, 200, 51}, false);
+  WriteInksOf(folder / "adobe.jpg", {235, 155, 55, 204}, true);
   for (const char* name : {"plain.jpg", "adobe.jpg"}) {
     const ImageRgb8 image = ReadImage(folder / name);
     ASSERT_EQ(image.width(), 16) << name;
