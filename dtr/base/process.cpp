@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
+#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -48,8 +49,13 @@ class LineSplitter {
 };
 
 // Only async-signal-safe calls between fork and exec.
-[[noreturn]] void ExecChild(const std::vector<char*>& argv, const char* directory, int output) {
-  setpgid(0, 0);  // Ctrl-C reaches us alone; we stop the child in order
+[[noreturn]] void ExecChild(pid_t parent, const std::vector<char*>& argv, const char* directory,
+                            int output) {
+  // We may be killed without a word; a program left running would go on writing into the folder
+  // that the next run continues in. (Of the thread that forked: it waits here until the end.)
+  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (getppid() != parent) _exit(127);  // killed before that call
+  setpgid(0, 0);                        // Ctrl-C reaches us alone; we stop the child in order
   const int null_input = open("/dev/null", O_RDONLY);
   dup2(null_input, STDIN_FILENO);
   dup2(output, STDOUT_FILENO);
@@ -125,13 +131,16 @@ ProcessResult RunProcess(const std::vector<std::string>& argv, const ProcessOpti
     throw Error(argv.front() + ": no pipe: " + std::strerror(errno));
   }
   const auto start = std::chrono::steady_clock::now();
+  const pid_t parent = getpid();
   const pid_t child = fork();
   if (child < 0) {
     close(ends[0]);
     close(ends[1]);
     throw Error(argv.front() + ": cannot start: " + std::strerror(errno));
   }
-  if (child == 0) ExecChild(pointers, directory.empty() ? nullptr : directory.c_str(), ends[1]);
+  if (child == 0) {
+    ExecChild(parent, pointers, directory.empty() ? nullptr : directory.c_str(), ends[1]);
+  }
   setpgid(child, child);  // as the child does: whoever is first, stopping it then reaches it
   close(ends[1]);
   Drain(child, ends[0], options);

@@ -28,7 +28,8 @@ struct ProcessOptions {
 /// Full path of `program` on the PATH, or empty when it is not there.
 std::filesystem::path FindProgram(const std::string& program);
 
-/// Runs argv[0] with its arguments and waits for it. Throws Error when it cannot be started.
+/// Runs argv[0] with its arguments and waits for it. The program ends with us, however we end: a
+/// kill -9 leaves no orphan that writes on. Throws Error when it cannot be started.
 ProcessResult RunProcess(const std::vector<std::string>& argv, const ProcessOptions& options);
 
 }  // namespace dtr

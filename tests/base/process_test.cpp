@@ -3,6 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <thread>
 
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
@@ -50,6 +55,42 @@ TEST(RunProcess, StopsTheProgramOnRequest) {
   const auto result = RunProcess({"sleep", "60"}, options);
   EXPECT_EQ(result.signal, SIGTERM);
   EXPECT_LT(result.wall_s, 30.0);
+}
+
+bool Within(std::chrono::seconds limit, const std::function<bool()>& holds) {
+  const auto end = std::chrono::steady_clock::now() + limit;
+  while (!holds()) {
+    if (std::chrono::steady_clock::now() > end) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  return true;
+}
+
+// Ended, though perhaps not yet waited for by whoever inherited it.
+bool IsGone(pid_t process) {
+  const std::filesystem::path status = "/proc/" + std::to_string(process) + "/status";
+  std::error_code ignored;
+  if (!std::filesystem::exists(status, ignored)) return true;
+  return ReadFile(status, kLogLimit).find("State:\tZ") != std::string::npos;
+}
+
+TEST(RunProcess, TheProgramEndsWithUsWhenWeAreKilled) {
+  const testing::TemporaryFolder folder;
+  const std::filesystem::path ready = folder / "ready", pid_file = folder / "pid";
+  const std::string script =
+      "echo $$ > '" + pid_file.string() + "'; touch '" + ready.string() + "'; exec sleep 600";
+  const pid_t runner = fork();
+  if (runner == 0) {
+    RunProcess({"sh", "-c", script}, {});
+    _exit(0);
+  }
+  ASSERT_TRUE(Within(std::chrono::seconds(60), [&] { return std::filesystem::exists(ready); }));
+  const pid_t program = std::stoi(ReadFile(pid_file, kLogLimit));
+  EXPECT_FALSE(IsGone(program));
+  kill(runner, SIGKILL);
+  waitpid(runner, nullptr, 0);
+  EXPECT_TRUE(Within(std::chrono::seconds(60), [&] { return IsGone(program); }));
+  kill(program, SIGKILL);
 }
 
 TEST(RunProcess, ASignalIsNotAnExitCode) {

@@ -5,10 +5,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include "datasets/make.h"
 #include "dtr/base/files.h"
 #include "dtr/base/hash.h"
 #include "dtr/base/process.h"
+#include "tests/cli/arc_photos.h"
 #include "tests/cli/run_dtr.h"
 #include "tests/support/test_data.h"
 
@@ -20,17 +20,6 @@ using Json = nlohmann::json;
 
 constexpr size_t kChanged = 4;  // every:4 holds out 0000, 0004 and 0008
 constexpr char kChangedPhoto[] = "0004.jpg";
-
-void MakePhotos(const fs::path& folder, double noise) {
-  datasets::DatasetSpec spec;
-  spec.layout = "arc";
-  spec.views = 9;
-  spec.width_px = 480;  // the smallest at which SIFT finds enough here
-  spec.height_px = 320;
-  spec.noise = noise;
-  SilentProgress silent;
-  datasets::MakeDataset(spec, folder, 2, silent);
-}
 
 // Makes a partial set that of a build from these photos, as if that had been interrupted.
 void ClaimPhotos(const fs::path& partial, const fs::path& photos) {
@@ -45,8 +34,8 @@ void ClaimPhotos(const fs::path& partial, const fs::path& photos) {
 TEST(StrictHoldout, APhotoChangesNothingButItsOwnPoseFromThePhotosOn) {
   if (FindProgram("colmap").empty()) GTEST_SKIP() << "colmap is absent";
   const TemporaryFolder folder;
-  MakePhotos(folder / "a", 0);
-  MakePhotos(folder / "noisy", 4);
+  MakeArcPhotos(folder / "a");
+  MakeArcPhotos(folder / "noisy", 4);
   fs::copy(folder / "a", folder / "b", fs::copy_options::recursive);
   // The same EXIF, other pixels: it still registers, elsewhere.
   fs::copy_file(folder / "noisy/images" / kChangedPhoto, folder / "b/images" / kChangedPhoto,

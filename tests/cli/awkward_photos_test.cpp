@@ -1,0 +1,121 @@
+// Photos as people have them, one of each kind, behind names and links that scripts stumble over:
+// `dtr build` makes of them what it makes of plain ones.
+#include <nlohmann/json.hpp>
+
+#include "calib/colmap/model_io.h"
+#include "dtr/io/set_io.h"
+#include "tests/cli/run_dtr.h"
+#include "tests/cli/small_courtyard.h"
+#include "tests/support/photo_kinds.h"
+#include "tests/support/test_data.h"
+
+namespace dtr::testing {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Kind {
+  const char* name;  ///< of the photo's file; in the order in which `dtr` takes them
+  void (*write)(const fs::path&, const ImageRgb8&);
+  int apart;  ///< levels of 255 that the way of writing may cost
+};
+constexpr Kind kKinds[kCourtyardViews] = {
+    {"$HOME; rm -rf.jpg", WriteCmyk, 4},
+    {"- alpha.png", WriteAlpha, 0},
+    {"a b  c.tif", WriteTurned, 0},
+    {"linear.exr", WriteLinear, 0},
+    {"progressive.jpeg", WriteProgressive, 40},  // colour at half the resolution
+    {"sixteen bits.PNG", WriteSixteenBits, 0},
+    {"\xc3\x84rger \xe5\x86\x99\xe7\x9c\x9f.png",
+     [](const fs::path& file, const ImageRgb8& image) { io::WriteImage(file, image); }, 0},
+};
+
+std::vector<std::string> Build(const fs::path& photos, const fs::path& model, const fs::path& set) {
+  return {"build",        photos.string(),
+          "-o",           set.string(),
+          "--poses",      model.string(),
+          "--max-size",   "96",
+          "--rounds",     "1",
+          "--iterations", "2",
+          "--neighbours", "2",
+          "--threads",    "2"};
+}
+
+// The views of a set, by the names in `names`.
+std::vector<View> Views(const fs::path& set_folder, const std::vector<std::string>& names) {
+  DtrSet set = io::ReadSet(set_folder);
+  std::vector<View> views;
+  for (const std::string& name : names) {
+    for (View& view : set.frames.at(0).views) {
+      if (view.name != name) continue;
+      io::LoadPixels(set_folder, view, {});
+      views.push_back(view);
+    }
+  }
+  return views;
+}
+
+void ExpectSameImage(const View& plain, const View& awkward, int apart) {
+  ASSERT_EQ(awkward.image.width(), plain.image.width());
+  ASSERT_EQ(awkward.image.height(), plain.image.height());
+  for (size_t i = 0; i < plain.image.data().size(); ++i) {
+    ASSERT_NEAR(awkward.image.data()[i], plain.image.data()[i], apart) << i;
+  }
+}
+
+// Depth is found where it was found, and is the same to a few percent almost everywhere: every
+// view is matched with one whose pixels changed a little.
+void ExpectSameDepth(const View& plain, const View& awkward) {
+  int both = 0, either = 0, same = 0;
+  for (int y = 0; y < plain.depth.height(); ++y) {
+    for (int x = 0; x < plain.depth.width(); ++x) {
+      const float a = plain.depth(x, y), b = awkward.depth(x, y);
+      either += a > 0 || b > 0;
+      both += a > 0 && b > 0;
+      same += a > 0 && b > 0 && std::abs(a - b) < 0.03f * a;
+    }
+  }
+  EXPECT_GT(both, either * 8 / 10);
+  EXPECT_GT(same, both * 9 / 10);
+}
+
+TEST(AwkwardPhotos, GiveTheSetOfPlainOnes) {
+  const TemporaryFolder folder;
+  const fs::path courtyard = folder / "c", photos = folder / "photos of \"mine\"";
+  MakeSmallCourtyard(courtyard);
+  fs::create_directories(photos);
+  fs::create_directories(folder / "elsewhere");
+  calib::SfmModel model = colmap::ReadModel(courtyard / "sparse");
+  ASSERT_EQ(model.images.size(), static_cast<size_t>(kCourtyardViews));
+  std::vector<std::string> plain_names, names;
+  for (size_t i = 0; i < model.images.size(); ++i) {
+    const Kind& kind = kKinds[i];
+    // Every second one is a link to a file that may not be written.
+    const fs::path file = (i % 2 == 0 ? photos : folder / "elsewhere") / kind.name;
+    kind.write(file, io::ReadImage(courtyard / "images" / model.images[i].name));
+    fs::permissions(file, fs::perms::owner_read);
+    if (i % 2 == 1) fs::create_symlink(file, photos / kind.name);
+    plain_names.push_back(model.images[i].name);
+    names.push_back(model.images[i].name = kind.name);
+  }
+  WriteForeign<float>(photos / "not finite.exr", {64, 48, 3, OIIO::TypeDesc::FLOAT},
+                      std::vector<float>(64 * 48 * 3, NAN));
+  colmap::WriteModel(folder / "model", model, colmap::Format::kBinary);
+  fs::create_directory_symlink(photos, folder / "link");
+
+  DtrOk(Build(courtyard / "images", courtyard / "sparse", folder / "plain.dtr"));
+  const Ran ran = DtrOk(Build(folder / "link", folder / "model", folder / "awkward.dtr"));
+  EXPECT_THAT(ran.err, ::testing::HasSubstr("skipped: not finite.exr"));
+  const std::vector<View> plain = Views(folder / "plain.dtr", plain_names);
+  const std::vector<View> awkward = Views(folder / "awkward.dtr", names);
+  ASSERT_EQ(plain.size(), static_cast<size_t>(kCourtyardViews));
+  ASSERT_EQ(awkward.size(), plain.size());
+  for (size_t i = 0; i < plain.size(); ++i) {
+    SCOPED_TRACE(kKinds[i].name);
+    ExpectSameImage(plain[i], awkward[i], kKinds[i].apart);
+    ExpectSameDepth(plain[i], awkward[i]);
+  }
+}
+
+}  // namespace
+}  // namespace dtr::testing

@@ -1,0 +1,104 @@
+// `dtr build` killed before its calibration stands. COLMAP is not repeatable, so what is asked of
+// the finished set is the same scene, not the same bytes.
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <algorithm>
+#include <chrono>
+#include <optional>
+
+#include "calib/similarity.h"
+#include "dtr/base/process.h"
+#include "dtr/base/random.h"
+#include "dtr/io/set_io.h"
+#include "tests/cli/arc_photos.h"
+#include "tests/cli/run_dtr.h"
+#include "tests/support/test_data.h"
+
+namespace dtr::testing {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+using Points = std::vector<Eigen::Vector3d>;
+
+constexpr int kKills = 10;
+constexpr double kMostShift = 0.01;  // of the median distance to the next camera
+
+std::vector<std::string> Build(const fs::path& photos, const fs::path& set) {
+  return {"build", photos.string(), "-o", set.string(), "--max-size", "96", "--rounds",
+          "1",     "--iterations",  "1",  "--threads",  "1"};
+}
+
+// In the order of their names, whatever the order of registration.
+Points Centres(const fs::path& set_folder) {
+  DtrSet set = io::ReadSet(set_folder);
+  std::vector<View>& views = set.frames.at(0).views;
+  std::sort(views.begin(), views.end(),
+            [](const View& a, const View& b) { return a.name < b.name; });
+  Points centres;
+  for (const View& view : views) centres.push_back(view.CenterInWorld());
+  return centres;
+}
+
+double MedianNeighbourBaseline(const Points& centres) {
+  std::vector<double> distances;
+  for (size_t i = 1; i < centres.size(); ++i) {
+    distances.push_back((centres[i] - centres[i - 1]).norm());
+  }
+  std::nth_element(distances.begin(), distances.begin() + distances.size() / 2, distances.end());
+  return distances[distances.size() / 2];
+}
+
+void ExpectSameCameras(const Points& expected, const Points& found) {
+  ASSERT_EQ(found.size(), expected.size()) << "a photo did not register";
+  const calib::Similarity aligned = calib::AlignPoints(found, expected);
+  const double baseline = MedianNeighbourBaseline(expected);
+  for (size_t i = 0; i < found.size(); ++i) {
+    EXPECT_LT((aligned * found[i] - expected[i]).norm(), kMostShift * baseline) << i;
+  }
+}
+
+TEST(ResumingSfm, KilledBeforeItsCheckpointTheSameSceneComesOut) {
+  if (FindProgram("colmap").empty()) GTEST_SKIP() << "SKIPPED: colmap is absent";
+  const TemporaryFolder folder;
+  MakeArcPhotos(folder / "arc");
+  const fs::path photos = folder / "arc/images";
+  const auto start = Clock::now();
+  std::optional<Clock::time_point> calibrated_at;
+  const fs::path undisturbed = folder / "undisturbed.dtr";
+  const Ran whole =
+      Dtr(Build(photos, undisturbed),
+          {SIGKILL, [&] {
+             if (!calibrated_at && FilesIn(undisturbed.string() + ".partial/images") > 0) {
+               calibrated_at = Clock::now();
+             }
+             return false;
+           }});
+  ASSERT_EQ(whole.code, 0) << whole.err;
+  ASSERT_TRUE(calibrated_at);
+  const Points expected = Centres(undisturbed);
+  ASSERT_EQ(expected.size(), size_t{kArcPhotos});
+
+  Random random(7);
+  for (int killed = 0; killed < kKills;) {
+    const fs::path set = folder / ("killed" + std::to_string(killed) + ".dtr");
+    const auto moment = random.Uniform(0, 1) * (*calibrated_at - start);
+    const auto begun = Clock::now();
+    const Ran cut =
+        Dtr(Build(photos, set), {SIGKILL, [&] { return Clock::now() - begun >= moment; }});
+    ASSERT_EQ(cut.signal, SIGKILL) << cut.err;
+    // The moment was past the checkpoint of a faster run: that is resume_full_test's matter.
+    if (FilesIn(set.string() + ".partial/images") == 0) {
+      DtrOk(Build(photos, set));
+      EXPECT_FALSE(fs::exists(set.string() + ".partial"));
+      ExpectSameCameras(expected, Centres(set));
+      ++killed;
+    }
+    fs::remove_all(set);
+    fs::remove_all(set.string() + ".partial");
+  }
+}
+
+}  // namespace
+}  // namespace dtr::testing
