@@ -9,6 +9,7 @@
 #include "dtr/render/adaptive_mesh.h"
 #include "dtr/render/frame.h"
 #include "tests/gl/gl_testing.h"
+#include "tests/support/instruction_sets.h"
 
 namespace dtr::testing {
 namespace {
@@ -119,6 +120,17 @@ TEST(CoarseRaster, WhatIsLeftOutBeforeDrawingWouldNotHaveShown) {
   }
   EXPECT_GT(left_out, 100);
   EXPECT_GT(drawn, 100);
+}
+
+TEST(CoarseRaster, DrawsTheSameWithEveryInstructionSet) {
+  const auto scenes = ParityScenes();
+  const PinholeCamera novel(200, 150, 180, 180, 100, 75);
+  Random random(9);
+  for (const NamedScene& scene : scenes) {
+    const Placed placed(scene.set, novel, RandomPose(random, 0.5));
+    const std::vector<float> best = Raster(placed.placed, novel, 1);
+    WithEachInstructionSet([&](auto) { EXPECT_EQ(Raster(placed.placed, novel, 1), best); });
+  }
 }
 
 TEST_F(CoarseDepthGl, ShadersAndOurOwnRasteriserAgree) {

@@ -7,6 +7,7 @@
 #include "dtr/cpu/renderer.h"
 #include "tests/gl/comparison.h"
 #include "tests/gl/parity_matrix.h"
+#include "tests/support/instruction_sets.h"
 
 namespace dtr::gl {
 namespace {
@@ -32,12 +33,28 @@ INSTANTIATE_TEST_SUITE_P(, ShapeParity, ::testing::Range(0, 6));
 
 using Parity = GlTest;
 
-// What a GPU draws, also where the processor has a kernel of its own (ProcessorResolver).
-TEST_F(Parity, HoldsForTheShadersOfAGpu) {
+// What a GPU draws: also where the processor has a kernel of its own (ProcessorResolver).
+void ExpectParityOfShaders(const NamedScene& scene) {
   RendererSettings settings;
   settings.coarse_drawer = CoarseDrawer::kShaders;
   Renderer renderer(settings);
-  ExpectParityOf(renderer, ParityScenes()[3], RenderMethod::kDeferred, Primitive::kMesh, 4);
+  ExpectParityOf(renderer, scene, RenderMethod::kDeferred, Primitive::kMesh, 4);
+}
+
+TEST_P(ExactSceneParity, HoldsForTheShadersOfAGpu) {
+  ExpectParityOfShaders(ExactOrDamagedScene(GetParam(), 5, 192, 128));
+}
+
+TEST_P(ShapeParity, HoldsForTheShadersOfAGpu) {
+  ExpectParityOfShaders(ParityScenes()[static_cast<size_t>(GetParam())]);
+}
+
+// The kernel of the deferred method is chosen by the processor; every choice draws the reference.
+TEST_F(Parity, HoldsWithEveryInstructionSet) {
+  WithEachInstructionSet([](auto) {
+    Renderer renderer;
+    ExpectParityOf(renderer, ParityScenes()[3], RenderMethod::kDeferred, Primitive::kMesh, 4);
+  });
 }
 
 TEST_F(Parity, HoldsForTheReportsAbsoluteThresholdsAndInLinearLight) {

@@ -15,6 +15,7 @@
 #include "dtr/render/guessed_colours.h"
 #include "dtr/render/hole_cost.h"
 #include "dtr/render/plane_support.h"
+#include "tests/support/instruction_sets.h"
 
 namespace dtr {
 namespace {
@@ -151,7 +152,7 @@ float PlainCost(const CostPlace& place, const std::vector<CostView>& views,
   return asked > 0 ? cost + 40 * static_cast<float>(through / asked) : cost;
 }
 
-TEST(HoleCosts, AreThoseOfPlainDoublesToTheBit) {
+void CheckHoleCosts() {
   Random random(11);
   std::array<int, 9> met{};  // by the number of views that answered
   for (int trial = 0; trial < 1000; ++trial) {
@@ -173,6 +174,10 @@ TEST(HoleCosts, AreThoseOfPlainDoublesToTheBit) {
     }
   }
   for (size_t answers = 0; answers < 6; ++answers) EXPECT_GT(met[answers], 20) << answers;
+}
+
+TEST(HoleCosts, AreThoseOfPlainDoublesToTheBit) {
+  testing::WithEachInstructionSet([](auto) { CheckHoleCosts(); });
 }
 
 /// Pixels of a row before some views, and the views.
@@ -222,7 +227,7 @@ struct Guesses {
   }
 };
 
-TEST(FindGuesses, FindsTheNearestDepthThatNoViewSeesThrough) {
+void CheckFindGuesses() {
   Random random(12);
   int farthest = 0, others = 0;
   for (int trial = 0; trial < 500; ++trial) {
@@ -252,6 +257,10 @@ TEST(FindGuesses, FindsTheNearestDepthThatNoViewSeesThrough) {
   EXPECT_GT(others, 300);
 }
 
+TEST(FindGuesses, FindsTheNearestDepthThatNoViewSeesThrough) {
+  testing::WithEachInstructionSet([](auto) { CheckFindGuesses(); });
+}
+
 /// As SPEC 7.4 fades a photo of 44 rows, whose rim is 2.2 px wide.
 double PlainFade(const V2& pixel) {
   const double to_rim = std::min({pixel.x(), pixel.y(), kWidth - pixel.x(), kHeight - pixel.y()});
@@ -259,7 +268,7 @@ double PlainFade(const V2& pixel) {
   return t * t * (3 - 2 * t);
 }
 
-TEST(GuessAnswers, AreThoseOfPlainDoublesToTheBit) {
+void CheckGuessAnswers() {
   constexpr double kPixelAngle = 1e-3;
   constexpr int kPower = 3;
   Random random(13);
@@ -321,7 +330,11 @@ TEST(GuessAnswers, AreThoseOfPlainDoublesToTheBit) {
   for (size_t views = 0; views < 5; ++views) EXPECT_GT(met[views], 50) << views;
 }
 
-TEST(PlaneSupport, CountsAsPlainDoublesDo) {
+TEST(GuessAnswers, AreThoseOfPlainDoublesToTheBit) {
+  testing::WithEachInstructionSet([](auto) { CheckGuessAnswers(); });
+}
+
+void CheckPlaneSupport() {
   Random random(14);
   for (const int count : {0, 1, 7, 8, 9, 1000}) {
     PlaneSamples samples;
@@ -340,6 +353,10 @@ TEST(PlaneSupport, CountsAsPlainDoublesDo) {
     }
     EXPECT_EQ(PlaneSupport(samples, plane.x(), plane.y(), plane.z(), 0.05), expected) << count;
   }
+}
+
+TEST(PlaneSupport, CountsAsPlainDoublesDo) {
+  testing::WithEachInstructionSet([](auto) { CheckPlaneSupport(); });
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "dtr/base/random.h"
+#include "tests/support/instruction_sets.h"
 
 namespace dtr {
 namespace {
@@ -50,7 +51,7 @@ std::vector<float> PlainSums(const Problem& problem) {
   return sums;
 }
 
-TEST(SemiGlobal, GivesThePlainSumsToTheBitForAnyNumberOfLabelsAndThreads) {
+void CheckSums() {
   Random random(7);
   for (const auto& [labels, steps] : {std::pair<size_t, size_t>{1, 0},
                                       {9, 0},
@@ -85,6 +86,10 @@ TEST(SemiGlobal, GivesThePlainSumsToTheBitForAnyNumberOfLabelsAndThreads) {
       }
     }
   }
+}
+
+TEST(SemiGlobal, GivesThePlainSumsToTheBitForAnyNumberOfLabelsAndThreads) {
+  testing::WithEachInstructionSet([](auto) { CheckSums(); });
 }
 
 TEST(SemiGlobal, OfEqualLabelsTheFirstIsBest) {

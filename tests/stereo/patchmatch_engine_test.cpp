@@ -1,13 +1,13 @@
 #include "stereo/patchmatch/patchmatch_engine.h"
 
 #include <gtest/gtest.h>
-#include <hwy/highway.h>
 
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
 #include "datasets/exact/stereo_quality.h"
+#include "tests/support/instruction_sets.h"
 
 namespace dtr::stereo {
 namespace {
@@ -115,19 +115,13 @@ bool Fuses(std::int64_t target) { return (target & (HWY_AVX2 | HWY_AVX3 | HWY_AV
 template <typename Estimate>
 void ExpectTheSameFromAllInstructionSets(const DepthImage& truth, Estimate estimate) {
   std::optional<DepthEstimate> first[2];
-  for (std::int64_t left = hwy::SupportedTargets() & HWY_TARGETS; left != 0; left &= left - 1) {
-    const std::int64_t target = left & -left;
-    SCOPED_TRACE(hwy::TargetName(target));
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().DeInit();
+  testing::WithEachInstructionSet([&](std::int64_t target) {
     const DepthEstimate found = estimate();
     std::optional<DepthEstimate>& same = first[Fuses(target)];
     if (!same) same = found;
     EXPECT_EQ(found.depth, same->depth);
     EXPECT_EQ(found.inverse_depth_sigma, same->inverse_depth_sigma);
-  }
-  hwy::SetSupportedTargetsForTest(0);
-  hwy::GetChosenTarget().DeInit();
+  });
   if (!first[0] || !first[1]) return;
   const Quality plain = Judge(*first[0], truth), fused = Judge(*first[1], truth);
   EXPECT_NEAR(plain.kept, fused.kept, 0.01);
