@@ -9,6 +9,7 @@
 #include <map>
 #include <utility>
 
+#include "dtr/base/order_statistics.h"
 #include "dtr/types/area_average.h"
 #include "dtr/types/luma.h"
 
@@ -91,9 +92,7 @@ std::map<std::string, double> MedianSharpnessByCamera(const std::vector<Photo>& 
   std::map<std::string, double> medians;
   for (auto& [group, values] : all) {
     if (values.size() < kPhotosForAMedian) continue;
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    medians[group] = *middle;
+    medians[group] = UpperMedian(values);
   }
   return medians;
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "dtr/base/order_statistics.h"
 #include "dtr/render/geometry.h"
 
 namespace dtr::viewer {
@@ -50,9 +51,8 @@ double SizeOf(const Surroundings& surroundings) {
     distances.push_back((view->CenterInWorld() - surroundings.center).norm());
   }
   if (distances.empty()) return 1;
-  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
-  return *middle > 0 && std::isfinite(*middle) ? *middle : 1;
+  const auto middle = UpperMedian(distances);
+  return middle > 0 && std::isfinite(middle) ? middle : 1;
 }
 
 bool SamePose(const Pose& a, const Pose& b, double scene_size) {

@@ -7,6 +7,7 @@
 #include <limits>
 #include <optional>
 
+#include "dtr/base/order_statistics.h"
 #include "dtr/cpu/contributions.h"
 #include "dtr/cpu/renderer.h"
 #include "dtr/eval/metrics.h"
@@ -61,9 +62,7 @@ std::optional<double> MedianSigmaPx(const View& view) {
     if (sigma > 0 && std::isfinite(sigma)) sigmas.push_back(sigma);
   }
   if (sigmas.empty()) return std::nullopt;
-  const auto middle = sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2);
-  std::nth_element(sigmas.begin(), middle, sigmas.end());
-  return *middle * view.camera.fx_px() * DisparityBaseline(view);
+  return UpperMedian(sigmas) * view.camera.fx_px() * DisparityBaseline(view);
 }
 
 /// The view as the others show it. `loaded` has its photo.

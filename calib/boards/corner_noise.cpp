@@ -7,6 +7,8 @@
 #include <optional>
 #include <vector>
 
+#include "dtr/base/order_statistics.h"
+
 namespace dtr::calib {
 namespace {
 
@@ -15,12 +17,6 @@ constexpr double kMedianOfNormal = 0.67449;  // of |x| for a standard normal x
 constexpr double kMaskGain = 6;              // root of the sum of squares of Immerkaer's mask
 constexpr double kLeastConditioned = 1e-3;   // smaller over larger eigenvalue: an edge, no corner
 constexpr size_t kFewestCorners = 4;
-
-double MedianOf(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<long>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 Eigen::Vector2d GradientAt(const Grid<std::uint8_t>& grey, int x, int y) {
   return {0.5 * (grey(x + 1, y) - grey(x - 1, y)), 0.5 * (grey(x, y + 1) - grey(x, y - 1))};
@@ -91,7 +87,7 @@ double PixelNoise(const Grid<std::uint8_t>& grey, std::span<const BoardCorner> c
     }
   }
   if (answers.empty()) return kRoundingLevels;
-  return std::max(MedianOf(answers) / (kMedianOfNormal * kMaskGain), kRoundingLevels);
+  return std::max(UpperMedian(answers) / (kMedianOfNormal * kMaskGain), kRoundingLevels);
 }
 
 double CornerNoise(const Grid<std::uint8_t>& grey, std::span<const BoardCorner> corners,
@@ -103,7 +99,7 @@ double CornerNoise(const Grid<std::uint8_t>& grey, std::span<const BoardCorner> 
     }
   }
   if (gains.size() < kFewestCorners) return std::numeric_limits<double>::quiet_NaN();
-  return PixelNoise(grey, corners) * MedianOf(gains);
+  return PixelNoise(grey, corners) * UpperMedian(gains);
 }
 
 }  // namespace dtr::calib

@@ -8,6 +8,7 @@
 
 #include "calib/bundle/judge.h"
 #include "calib/bundle/lens_params.h"
+#include "dtr/base/order_statistics.h"
 
 namespace dtr::calib {
 namespace {
@@ -45,9 +46,7 @@ Geometry GeometryOf(const Adjusted& adjusted) {
 
 double Median(std::vector<double> values) {
   if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
-  const auto middle = values.begin() + static_cast<long>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  return UpperMedian(values);
 }
 
 // Singular values of points about their mean: extents along their principal axes.

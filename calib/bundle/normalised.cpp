@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "calib/models/lens_formula.h"
+#include "dtr/base/order_statistics.h"
 
 namespace dtr::calib {
 namespace {
@@ -39,9 +40,8 @@ double MedianDistance(const Bundle& bundle, const Eigen::Vector3d& from) {
     if (h[3] > 0) distances.push_back((h.head<3>() / h[3] - from).norm());
   }
   if (distances.empty()) return 1;
-  const auto middle = distances.begin() + static_cast<long>(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
-  return *middle > 0 ? *middle : 1;
+  const auto middle = UpperMedian(distances);
+  return middle > 0 ? middle : 1;
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 
 #include "calib/colmap/database.h"
 #include "dtr/base/error.h"
+#include "dtr/base/order_statistics.h"
 
 namespace dtr::colmap {
 namespace {
@@ -63,12 +64,6 @@ std::vector<double> FirstGuess(calib::LensModel model, const SfmImageInput& imag
   params[next++] = 0.5 * image.height_px;
   if (model == calib::LensModel::kFov) params[next] = kFovStart;
   return params;
-}
-
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // COLMAP skips what it cannot read and ends with 0.
@@ -127,7 +122,7 @@ std::vector<CameraGroup> GroupCameras(const std::vector<SfmImageInput>& images,
       if (images[i].focal_prior_px) priors.push_back(*images[i].focal_prior_px);
     }
     if (!priors.empty()) {
-      group.params = FirstGuess(model, images[group.images.front()], Median(std::move(priors)));
+      group.params = FirstGuess(model, images[group.images.front()], UpperMedian(priors));
     }
   }
   return groups;

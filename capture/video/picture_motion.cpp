@@ -7,6 +7,8 @@
 #include <opencv2/video/tracking.hpp>
 #include <vector>
 
+#include "dtr/base/order_statistics.h"
+
 namespace dtr::capture {
 namespace {
 
@@ -83,9 +85,7 @@ PictureMotion::State PictureMotion::Follow(const Grid<std::uint8_t>& grey) {
     ways.push_back(Distance(corners.now[i], corners.start[i]) / corners.long_side);
   }
   if (ways.empty()) return state;
-  const auto middle = ways.begin() + static_cast<std::ptrdiff_t>(ways.size() / 2);
-  std::nth_element(ways.begin(), middle, ways.end());
-  state.moved = *middle;
+  state.moved = UpperMedian(ways);
   return state;
 }
 

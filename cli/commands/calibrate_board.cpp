@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <algorithm>
 #include <cmath>
 #include <filesystem>
 
@@ -10,6 +9,7 @@
 #include "cli/output_file.h"
 #include "cli/pipeline/board_calibration.h"
 #include "dtr/base/error.h"
+#include "dtr/base/order_statistics.h"
 
 namespace dtr::cli {
 namespace {
@@ -81,12 +81,11 @@ void SayCamera(const calib::Calibration& calibration, Console& console) {
                   "coordinate",
                   calibration.views.size(), corners, outliers, camera.rms_px, camera.sigma_px));
   if (noise.empty()) return;
-  const auto middle = noise.begin() + static_cast<long>(noise.size() / 2);
-  std::nth_element(noise.begin(), middle, noise.end());
+  const auto middle = UpperMedian(noise);
   console.Say(
       fmt::format("the noise of the pixels alone would make {:.4f} px (median view); what is "
                   "above that is lens model, board, blur or motion",
-                  *middle));
+                  middle));
 }
 
 int RunCalibrateBoard(const Options& options, const Context& context) {

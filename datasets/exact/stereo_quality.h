@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "datasets/exact/stereo_scene.h"
+#include "dtr/base/order_statistics.h"
 
 namespace dtr::stereo::testing {
 
@@ -63,9 +64,7 @@ inline Quality JudgeAt(double px, const DepthEstimate& estimate, const DepthImag
   q.bad_share = static_cast<double>(
                     std::count_if(errors.begin(), errors.end(), [](double e) { return e > 1; })) /
                 static_cast<double>(errors.size());
-  const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
-  std::nth_element(errors.begin(), middle, errors.end());
-  q.median_px = *middle;
+  q.median_px = UpperMedian(errors);
   q.mean_px = near > 0 ? sum / near : 0;
   return q;
 }

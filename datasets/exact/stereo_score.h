@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "datasets/exact/stereo_quality.h"
+#include "dtr/base/order_statistics.h"
 #include "dtr/base/progress.h"
 #include "stereo/consistency.h"
 #include "stereo/rounds.h"
@@ -61,9 +62,7 @@ inline double MatchingLimitPx(const ImageRgb8& image, const Eigen::Vector2d& alo
       limits.push_back(noise * std::sqrt(2 / std::max(squares, 1e-9)));
     }
   }
-  const auto middle = limits.begin() + static_cast<std::ptrdiff_t>(limits.size() / 2);
-  std::nth_element(limits.begin(), middle, limits.end());
-  return *middle;
+  return UpperMedian(limits);
 }
 
 /// An estimate against truth, on the pixels that `counts` names.
@@ -102,12 +101,8 @@ Score ScoreFirst(const std::vector<StereoView>& views, const DepthEstimate& esti
   Score score;
   if (errors.empty()) return score;
   const auto kept = static_cast<double>(errors.size());
-  const auto median = [](std::vector<double>* values) {
-    const auto middle = values->begin() + static_cast<std::ptrdiff_t>(values->size() / 2);
-    std::nth_element(values->begin(), middle, values->end());
-    return *middle;
-  };
-  score = {kept / all, median(&errors), past / kept, one / kept, three / kept, median(&sigmas)};
+  score = {kept / all, UpperMedian(errors), past / kept,
+           one / kept, three / kept,        UpperMedian(sigmas)};
   return score;
 }
 

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "dtr/advise/places.h"
+#include "dtr/base/order_statistics.h"
 #include "dtr/render/geometry.h"
 
 namespace dtr::advise {
@@ -59,9 +60,7 @@ double MedianOf(const DepthImage& depth) {
     }
   }
   if (seen.empty()) return 0;
-  const auto middle = seen.begin() + static_cast<std::ptrdiff_t>(seen.size() / 2);
-  std::nth_element(seen.begin(), middle, seen.end());
-  return *middle;
+  return UpperMedian(seen);
 }
 
 // A photo that shows the point.
@@ -148,10 +147,7 @@ void Measure(const Look& look, const AdviseOptions& options, Place& place) {
   place.single_share = seen > 0 ? static_cast<double>(single) / static_cast<double>(seen) : 0;
   place.gap_deg = 0;
   if (!angles.empty()) {
-    const auto at = angles.begin() + static_cast<std::ptrdiff_t>(
-                                         kPercentile * static_cast<double>(angles.size() - 1));
-    std::nth_element(angles.begin(), at, angles.end());
-    place.gap_deg = *at * 180 / std::numbers::pi;
+    place.gap_deg = QuantileOf(angles, kPercentile) * 180 / std::numbers::pi;
   }
   place.poor = place.unseen_share > options.max_unseen || place.gap_deg > options.max_gap_deg;
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "dtr/base/error.h"
+#include "dtr/base/order_statistics.h"
 
 namespace dtr::eval {
 namespace {
@@ -111,9 +112,7 @@ DepthScores DepthScorer::Scores() const {
   scores.edges = edges_.Scores();
   if (kept > 0) {
     std::vector<float> errors = relative_errors_;
-    const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
-    std::nth_element(errors.begin(), middle, errors.end());
-    scores.median_relative_error = *middle;
+    scores.median_relative_error = UpperMedian(errors);
   }
   return scores;
 }

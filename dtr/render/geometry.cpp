@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "dtr/base/error.h"
+#include "dtr/base/order_statistics.h"
 
 namespace dtr {
 namespace {
@@ -13,13 +14,6 @@ constexpr int kNeighbours = 4;           // DESIGN section 3
 constexpr int kSamplesPerAxis = 64;      // 4096 points a view place a median to a percent or two
 constexpr double kLowPercentile = 0.01;  // beyond lie stray points of stereo and SfM
 constexpr double kHighPercentile = 0.99;
-
-/// The element of rank floor(share * (n - 1)); reorders `values`, which must not be empty.
-double Percentile(std::vector<double>& values, double share) {
-  const auto rank = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), values.begin() + rank, values.end());
-  return values[static_cast<size_t>(rank)];
-}
 
 /// Middle value, or the mean of the two middle ones.
 double Median(std::vector<double> values) {
@@ -32,9 +26,9 @@ SceneExtent ExtentOf(std::vector<double> (&coordinates)[3]) {
   SceneExtent extent;
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double>& values = coordinates[axis];
-    extent.center[axis] = Percentile(values, 0.5);
-    extent.bounds.min[axis] = Percentile(values, kLowPercentile);
-    extent.bounds.max[axis] = Percentile(values, kHighPercentile);
+    extent.center[axis] = QuantileOf(values, 0.5);
+    extent.bounds.min[axis] = QuantileOf(values, kLowPercentile);
+    extent.bounds.max[axis] = QuantileOf(values, kHighPercentile);
   }
   return extent;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dtr/base/order_statistics.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/render/hole_cells.h"
 #include "dtr/render/semi_global.h"
@@ -34,11 +35,7 @@ Depths ChooseDepths(const Grid<float>& seen, const GuessedColours& guesses, int 
     if (z > 0) inverse.push_back(1 / z);
   }
   if (inverse.empty() || guesses.views().size() < 2) return depths;
-  const auto ranked = [&](double share) {
-    const auto rank = static_cast<std::ptrdiff_t>(share * static_cast<double>(inverse.size() - 1));
-    std::nth_element(inverse.begin(), inverse.begin() + rank, inverse.end());
-    return static_cast<double>(inverse[static_cast<size_t>(rank)]);
-  };
+  const auto ranked = [&](double share) { return static_cast<double>(QuantileOf(inverse, share)); };
   depths.farthest = kBeyondFarthest * ranked(kStrayShare);
   const double range = kBeforeNearest * ranked(1 - kStrayShare) - depths.farthest;
   std::vector<double> baselines;

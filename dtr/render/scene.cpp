@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "dtr/base/error.h"
+#include "dtr/base/order_statistics.h"
 #include "dtr/render/instants.h"
 
 namespace dtr {
@@ -93,9 +94,7 @@ double DisparityBaseline(const View& view) {
     if (!DepthImage::IsHole(depth)) depths.push_back(depth);
   }
   if (depths.empty()) return 1;  // nothing will be drawn; any positive number does
-  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
-  std::nth_element(depths.begin(), middle, depths.end());
-  return kLoneCameraBaseline * static_cast<double>(*middle);
+  return kLoneCameraBaseline * static_cast<double>(UpperMedian(depths));
 }
 
 InverseDepthThresholds ThresholdsOf(const View& view, const RenderOptions& options) {

@@ -6,6 +6,7 @@
 #include <map>
 
 #include "calib/colmap/dense.h"
+#include "dtr/base/order_statistics.h"
 
 namespace dtr::stereo {
 namespace {
@@ -94,9 +95,7 @@ double MedianBaseline(std::span<const StereoView> views, int reference,
     return views[static_cast<size_t>(view)].cam_from_world.TargetOriginInSource();
   };
   for (const int n : neighbours) baselines.push_back((centre(n) - centre(reference)).norm());
-  const auto middle = baselines.begin() + static_cast<std::ptrdiff_t>(baselines.size() / 2);
-  std::nth_element(baselines.begin(), middle, baselines.end());
-  return *middle;
+  return UpperMedian(baselines);
 }
 
 }  // namespace
