@@ -26,6 +26,10 @@ constexpr int kPlanes = 11;
 /// badly. ACMH's 2 and 3 take the sight from all views next to silhouettes and behind thin things.
 constexpr float kGoodPlanes = 1.0f, kBadPlanes = 7.0f;
 constexpr int kNearSamples = 7, kFarSamples = 11;
+/// What a first guess costs more when one view alone speaks for it. By the mean of two a surface
+/// that a single neighbour sees is never found, and no later step looks for it: fountain's far
+/// facade, 27.3 dB held out instead of 28.0. Without any surcharge chance decides more often.
+constexpr float kLoneView = 0.1f;
 
 /// Inverse depth and cost of a candidate that a lane does not have, for its neighbours have one:
 /// comparisons with it are false, so it is no good plane, no bad one and never the cheapest, and
@@ -328,8 +332,9 @@ std::int64_t SearchRowImpl(const Level& level, int samples, int y, State* state)
           first = hn::Min(first, cost);
         }
         const VF mean = views == 1 ? first : hn::Mul(half, hn::Add(first, second));
-        const auto less = hn::Lt(mean, best);
-        best = hn::IfThenElse(less, mean, best);
+        const VF cost = hn::Min(mean, hn::Add(first, hn::Set(d, kLoneView)));
+        const auto less = hn::Lt(cost, best);
+        best = hn::IfThenElse(less, cost, best);
         best_w = hn::IfThenElse(less, w, best_w);
         best_a = hn::IfThenElse(less, a, best_a);
         best_b = hn::IfThenElse(less, b, best_b);

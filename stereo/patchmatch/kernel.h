@@ -116,8 +116,9 @@ struct Verdict {
 };
 
 /// First guess: tries `samples` inverse depths spread over the range, half of them with a random
-/// slant, and keeps the one with the least mean cost in the two best views. Returns the number of
-/// samples that were compared, as SweepRow does: a benchmark divides it by the time.
+/// slant, and keeps the one with the least mean cost in the two best views, or in the best alone
+/// with a surcharge. Returns the number of samples that were compared, as SweepRow does: a
+/// benchmark divides it by the time.
 std::int64_t SearchRow(const Level& level, int samples, int y, State* state);
 
 /// Works out the cost and the view weights of the plane each pixel of one colour has, its

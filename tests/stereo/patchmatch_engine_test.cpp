@@ -73,6 +73,36 @@ TEST(PatchMatchEngine, FindsASphereBeforeAWallFromFourNeighbours) {
   EXPECT_LT(q.bad_share, 0.03);
 }
 
+// Past the edge of a near wall the far one is seen by one neighbour of five. By the mean of the two
+// best the search found 4 % of these pixels.
+TEST(PatchMatchEngine, FindsWhatOneNeighbourAloneSees) {
+  constexpr double kNear = 3, kFar = 7, kEdge = -0.3, kLeft = -0.8;
+  const testing::Surface walls =
+      testing::Union(testing::Square(kEdge - 2, 0, kNear, 2), testing::Plane({0, 0, 1}, kFar));
+  const auto views = ViewsOf(Shots(
+      walls, {Facing({0, 0, 0}), Facing({kBaseline, 0, 0}), Facing({kLeft, 0, 0}),
+              Facing({kLeft - 0.1, 0.1, 0}), Facing({kLeft, -0.2, 0}), Facing({kLeft, 0.2, 0})}));
+  const PlaneMap planes =
+      MakeEngine("patchmatch")
+          ->Match(views, 0, std::vector{1, 2, 3, 4, 5}, {2.5, 8}, {.threads = 2});
+  // Where the edge as seen from x lies on the far wall, and that in pixels of the first view.
+  const auto behind = [&](double x) {
+    const double far_x = x + (kEdge - x) * kFar / kNear;
+    return static_cast<int>(0.5 * kWidth + kFocal * far_x / kFar);
+  };
+  constexpr int kWindow = 4;  // a window that reaches beyond the strip sees something else
+  int found = 0, all = 0;
+  for (int y = 20; y < kHeight - 20; ++y) {
+    for (int x = behind(0) + kWindow; x < behind(kLeft) - kWindow; ++x) {
+      const double w = planes.inverse_depth(x, y) / planes.unit_z;
+      found += std::abs(w - 1 / kFar) * kFocal * kBaseline < 1;
+      ++all;
+    }
+  }
+  ASSERT_GT(all, 800);
+  EXPECT_GT(found, all * 9 / 10);
+}
+
 TEST(PatchMatchEngine, AnyDirectionOfTheBaselineWillDo) {
   const struct {
     const char* name;
