@@ -11,6 +11,9 @@
 namespace dtr::gl {
 namespace {
 
+/// Alpha of what was filled, not seen; composite.frag knows it as neither 0 nor 1.
+constexpr std::uint8_t kGuessedAlpha = 128;
+
 /// What compositing changes, put back at the end of the scope. StateGuard would not do: it takes
 /// away what shall hold for the picture (depth test, blending, masks).
 class CompositeGuard {
@@ -120,13 +123,15 @@ class Compositor::Implementation {
     glDrawArrays(GL_TRIANGLES, 0, 3);
   }
 
-  DrawnPicture Upload(const RenderResult& result) {
+  /// Where `depth` has one and no view saw the pixel it is a guess.
+  DrawnPicture Upload(const RenderResult& result, const Grid<float>& depth) {
     const StateGuard guard;
     const int width = result.image.width(), height = result.image.height();
     std::vector<std::uint8_t> rgba(4 * result.coverage.data().size());
     for (size_t p = 0; p < result.coverage.data().size(); ++p) {
       for (size_t c = 0; c < 3; ++c) rgba[4 * p + c] = result.image.data()[3 * p + c];
-      rgba[4 * p + 3] = result.coverage.data()[p];
+      const bool guessed = result.coverage.data()[p] == 0 && depth.data()[p] > 0;
+      rgba[4 * p + 3] = guessed ? kGuessedAlpha : result.coverage.data()[p];
     }
     if (width != width_ || height != height_) {
       image_ = MakeTarget(GL_TEXTURE_2D_ARRAY, GL_RGBA8, width, height, 1);
@@ -138,7 +143,7 @@ class Compositor::Implementation {
                     rgba.data());
     Bind(0, depth_.name());
     glTexSubImage3D(GL_TEXTURE_2D_ARRAY, 0, 0, 0, 0, width, height, 1, GL_RED, GL_FLOAT,
-                    result.depth.grid().data().data());
+                    depth.data().data());
     return {image_.name(), depth_.name(), 0, width, height, result.views_used, false};
   }
 
@@ -158,7 +163,11 @@ void Compositor::Composite(const DrawnPicture& picture, const DepthProjection& p
 }
 
 DrawnPicture Compositor::Upload(const RenderResult& result) {
-  return implementation_->Upload(result);
+  return implementation_->Upload(result, result.depth.grid());
+}
+
+DrawnPicture Compositor::UploadFilled(const RenderResult& result, const Grid<float>& depth) {
+  return implementation_->Upload(result, depth);
 }
 
 }  // namespace dtr::gl

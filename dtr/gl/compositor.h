@@ -25,8 +25,8 @@ struct DepthProjection {
 
 /// Draws pictures into the framebuffer that the current context draws to, pixel for pixel over its
 /// viewport, with depth: the host's depth test, its mask, blending, scissor, stencil and colour
-/// mask hold for them as for anything else. Pixels that no view saw are left as they are. All state
-/// is left as it was. Belongs to the context it was made with, as gl::Renderer.
+/// mask hold for them as for anything else. Pixels of which the picture has nothing are left as
+/// they are. All state is left as it was. Belongs to the context it was made with, as gl::Renderer.
 class Compositor {
  public:
   /// Empty `shader_folder`: the embedded shaders.
@@ -40,8 +40,12 @@ class Compositor {
   /// GL_FRAMEBUFFER_SRGB is on.
   void Composite(const DrawnPicture& picture, const DepthProjection& projection);
 
-  /// A picture from memory, holding until the next Upload.
+  /// A picture from memory, holding until the next upload.
   DrawnPicture Upload(const RenderResult& result);
+  /// The same of a picture whose holes were filled; `depth` is what HoleFiller::Fill gave. What is
+  /// guessed is never cut: beyond the host's near or far plane it lies just within it, for a host
+  /// sets these by what was seen, and skies have no end.
+  DrawnPicture UploadFilled(const RenderResult& result, const Grid<float>& depth);
 
  private:
   class Implementation;

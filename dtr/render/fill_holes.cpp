@@ -61,8 +61,9 @@ void FillFromSurroundings(const KnownDepth& known, int threads, RenderResult& re
 }
 
 /// SPEC 7.2: inverse depths of the holes where some view answers, else 0; these become known.
+/// `background` gets the farthest guess of every hole, plane z.
 Grid<double> GuessDepths(const GuessedColours& guesses, const Mask& coverage, int threads,
-                         KnownDepth& known) {
+                         KnownDepth& known, Grid<float>& background) {
   using Depths = PushPull<0>;
   const Mask holes = HolesOf(known);
   const HolePyramid pyramid(holes);
@@ -78,6 +79,7 @@ Grid<double> GuessDepths(const GuessedColours& guesses, const Mask& coverage, in
       if (holes(x, y) == 0 || coverage(x, y) != 0) continue;
       const Depths::Cell farthest = far.At(x, y);
       if (!(farthest.weight > 0)) continue;
+      background(x, y) = static_cast<float>(1 / farthest.inverse_depth);
       asked.push_back({x, farthest.inverse_depth, even.At(x, y).inverse_depth});
     }
     if (asked.empty()) return;
@@ -108,15 +110,16 @@ class HoleRow {
     }
   }
 
-  /// What is answered becomes known.
-  void Colour(int y, KnownDepth& known, ImageRgb8& image) {
+  /// What is answered becomes known; `background` gets the depth of planes that have most of a
+  /// hole.
+  void Colour(int y, KnownDepth& known, Grid<float>& background, ImageRgb8& image) {
     AskOnPlanes();
     AskAtGuesses();
     for (const Hole& hole : holes_) {
       if (!(hole.answered > 0)) continue;
       Write(hole.sum / hole.answered, &image(hole.x, y));
       if (!(hole.guess > 0) || hole.most > hole.rest) {
-        known(hole.x, y) = static_cast<float>(hole.depth);
+        known(hole.x, y) = background(hole.x, y) = static_cast<float>(hole.depth);
       }
     }
   }
@@ -195,21 +198,24 @@ void FillHoles(RenderResult& result) {
   FillFromSurroundings(DepthOf(result), 1, result);
 }
 
-void HoleFiller::Fill(const RenderScene& scene, const PinholeCamera& novel,
-                      const Pose& novel_from_world, const RenderOptions& options,
-                      RenderResult& result) {
-  if (!HasHoles(result)) return;
-  const int threads = options.threads;
+Grid<float> HoleFiller::Fill(const RenderScene& scene, const PinholeCamera& novel,
+                             const Pose& novel_from_world, const RenderOptions& options,
+                             RenderResult& result) {
   KnownDepth known = DepthOf(result);
+  if (!HasHoles(result)) return known;
+  const int threads = options.threads;
   GuessedColours guesses(scene, result.views_used, novel, novel_from_world, options);
   guesses.MatchExposures(known, result.image, threads);
   const KnownDepth seen = known;
-  const Grid<double> guessed = GuessDepths(guesses, result.coverage, threads, known);
+  Grid<float> background = known;
+  const Grid<double> guessed = GuessDepths(guesses, result.coverage, threads, known, background);
   const HolePlanes planes = ChooseHolePlanes(seen, known, guesses, photos_, threads);
   ParallelFor(0, known.height(), threads, [&](int y) {
-    HoleRow(guesses, planes, guessed, result.coverage, y).Colour(y, known, result.image);
+    HoleRow(guesses, planes, guessed, result.coverage, y)
+        .Colour(y, known, background, result.image);
   });
   FillFromSurroundings(known, threads, result);
+  return background;
 }
 
 void FillHolesFromViews(const RenderScene& scene, const PinholeCamera& novel,

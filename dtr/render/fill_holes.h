@@ -29,8 +29,12 @@ void FillHolesFromViews(const RenderScene& scene, const PinholeCamera& novel,
 /// views alone (ShrunkPhotos). Several threads may fill pictures of theirs at once.
 class HoleFiller {
  public:
-  void Fill(const RenderScene& scene, const PinholeCamera& novel, const Pose& novel_from_world,
-            const RenderOptions& options, RenderResult& result);
+  /// Returns where what the picture shows now lies, for hosts that hide other things by it (SPEC
+  /// 7.5): plane z, seen or guessed; 0 where it is still empty, as nothing at all was seen.
+  /// result.depth stays.
+  Grid<float> Fill(const RenderScene& scene, const PinholeCamera& novel,
+                   const Pose& novel_from_world, const RenderOptions& options,
+                   RenderResult& result);
   /// Views of the same address may be others from here on.
   void Forget() { photos_.Clear(); }
 

@@ -9,7 +9,7 @@
 #include "dtr/io/set_io.h"
 #include "dtr/render/instants.h"
 #include "tests/cli/run_dtr.h"
-#include "tests/support/test_data.h"
+#include "tests/support/moving_sphere_set.h"
 
 namespace dtr::testing {
 namespace {
@@ -17,34 +17,20 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
-/// A ball that rolls by a third of its radius between two instants, seen by four cameras.
-class MovingSet : public ::testing::Test {
- protected:
-  static void SetUpTestSuite() {
-    folder_ = new TemporaryFolder;
-    std::vector<std::string> join = {"join"};
-    for (const char* time : {"0", "0.5"}) {
-      const std::string photos = At(std::string("t") + time), set = photos + ".dtr";
-      DtrOk({"dataset", "make", "sphere", "-o", photos, "--views", "4", "--width", "96", "--height",
-             "64", "--time", time});
-      DtrOk({"import", "--cameras", photos + "/cameras.json", "--images", photos + "/images",
-             "--depth", photos + "/depth", "-o", set});
-      join.push_back(set);
-    }
-    join.insert(join.end(), {"-o", Set(), "--fps", "2"});
-    DtrOk(join);
-  }
-  static void TearDownTestSuite() {
-    delete folder_;
-    folder_ = nullptr;
-  }
-  static std::string At(const std::string& name) { return (*folder_ / name).string(); }
-  static std::string Set() { return At("moving.dtr"); }
+class MovingSet : public MovingSphereSet {};
 
- private:
-  static TemporaryFolder* folder_;
+/// By each renderer: both must know which instant a picture shows.
+class MovingSetBy : public MovingSphereSet, public ::testing::WithParamInterface<const char*> {
+ protected:
+  void SetUp() override {
+    const Ran ran = Dtr({"render", Set(), "--renderer", GetParam(), "--like", "0001.jpg", "--frame",
+                         "0", "-o", In("probe.png")});
+    if (ran.code != 0 && ran.err.find("use --renderer cpu") != std::string::npos) {
+      GTEST_SKIP() << ran.err;
+    }
+  }
 };
-TemporaryFolder* MovingSet::folder_ = nullptr;
+INSTANTIATE_TEST_SUITE_P(Renderers, MovingSetBy, ::testing::Values("cpu", "gl"));
 
 double MeanDifference(const fs::path& a_file, const fs::path& b_file) {
   const ImageRgb8 a = io::ReadImage(a_file), b = io::ReadImage(b_file);
@@ -82,11 +68,11 @@ TEST_F(MovingSet, PixelsAreThoseOfTheSetsThatWereJoined) {
   }
 }
 
-TEST_F(MovingSet, EachFrameShowsItsOwnInstant) {
+TEST_P(MovingSetBy, EachFrameShowsItsOwnInstant) {
   const std::string name[] = {"t0", "t0.5"};
   for (const size_t frame : {0u, 1u}) {
-    const std::string picture = At("frame" + std::to_string(frame) + ".png");
-    DtrOk({"render", Set(), "--renderer", "cpu", "--like", "0001.jpg", "--frame",
+    const std::string picture = In("frame" + std::to_string(frame) + ".png");
+    DtrOk({"render", Set(), "--renderer", GetParam(), "--like", "0001.jpg", "--frame",
            std::to_string(frame), "-o", picture});
     // JPEG and blending of four views: below 3 levels; the ball elsewhere: above 6.
     EXPECT_LT(MeanDifference(picture, At(name[frame] + "/images/0001.jpg")), 3);
@@ -94,22 +80,36 @@ TEST_F(MovingSet, EachFrameShowsItsOwnInstant) {
   }
 }
 
-TEST_F(MovingSet, PlaysFromOnePlaceAndAlongAPath) {
-  const Json played = Json::parse(DtrOk({"render", Set(), "--renderer", "cpu", "--like", "0001.jpg",
-                                         "--play", "-o", At("played"), "--json", "-"})
+TEST_P(MovingSetBy, PlaysFromOnePlaceAndAlongAPath) {
+  const Json played = Json::parse(DtrOk({"render", Set(), "--renderer", GetParam(), "--like",
+                                         "0001.jpg", "--play", "-o", In("played"), "--json", "-"})
                                       .out);
   ASSERT_EQ(played["frames"].size(), 2u);
   EXPECT_EQ(played["frames"][0]["frame"], 0);
   EXPECT_EQ(played["frames"][1]["frame"], 1);
-  EXPECT_GT(MeanDifference(At("played/000000.png"), At("played/000001.png")), 3);
+  EXPECT_GT(MeanDifference(In("played/000000.png"), In("played/000001.png")), 3);
 
-  const Json flown = Json::parse(DtrOk({"render", Set(), "--renderer", "cpu", "--fly-through", "6",
-                                        "-o", At("flown.mp4"), "--json", "-"})
+  const Json flown = Json::parse(DtrOk({"render", Set(), "--renderer", GetParam(), "--fly-through",
+                                        "6", "-o", In("flown.mp4"), "--json", "-"})
                                      .out);
   std::vector<int> shown;
   for (const Json& frame : flown["frames"]) shown.push_back(frame["frame"]);
   EXPECT_EQ(shown, (std::vector<int>{0, 0, 0, 1, 1, 1}));
-  EXPECT_GT(fs::file_size(At("flown.mp4")), 1000u);
+  EXPECT_GT(fs::file_size(In("flown.mp4")), 1000u);
+}
+
+// Pictures from sets of one instant each and from the moving set are the same, to the byte: no
+// view of another instant has a say, nor what a renderer kept of one.
+TEST_P(MovingSetBy, AnInstantOfAMovingSetIsDrawnAsASetOfItsOwn) {
+  DtrOk(
+      {"render", Set(), "--renderer", GetParam(), "--like", "0002.jpg", "--play", "-o", In("all")});
+  const std::string sets[] = {At("t0.dtr"), At("t0.5.dtr")};
+  for (size_t i = 0; i < 2; ++i) {
+    DtrOk({"render", sets[i], "--renderer", GetParam(), "--like", "0002.jpg", "-o", In("one.png")});
+    EXPECT_EQ(io::ReadImage(In("one.png")).data(),
+              io::ReadImage(In("all") + "/00000" + std::to_string(i) + ".png").data())
+        << i;
+  }
 }
 
 TEST_F(MovingSet, WhatKnowsStillScenesAloneSaysSo) {

@@ -20,19 +20,9 @@ constexpr int kEdgePx = 2;
 
 enum class Front { kModel, kScene, kNothing };
 
-/// A box of plain red that nothing of the scene looks like, in the scene's own frame.
+/// In the scene's own frame.
 struct KnownBox {
   Eigen::Vector3d center, half;
-  osg::ref_ptr<osg::Node> Node() const {
-    osg::ref_ptr<osg::ShapeDrawable> shape = new osg::ShapeDrawable(new osg::Box(
-        osg::Vec3d(center.x(), center.y(), center.z()), static_cast<float>(2 * half.x()),
-        static_cast<float>(2 * half.y()), static_cast<float>(2 * half.z())));
-    shape->setColor({1, 0, 0, 1});
-    osg::ref_ptr<osg::Geode> geode = new osg::Geode;
-    geode->addDrawable(shape);
-    geode->getOrCreateStateSet()->setMode(GL_LIGHTING, osg::StateAttribute::OFF);
-    return geode;
-  }
   double Intersect(const datasets::Ray& ray) const {
     datasets::Primitive box;
     box.center = center;
@@ -67,10 +57,6 @@ bool NearEdge(const Grid<Front>& truth, int x, int y) {
     }
   }
   return false;
-}
-
-bool IsRed(const ImageRgb8& image, int x, int y) {
-  return image(x, y, 0) > 250 && image(x, y, 1) < 5 && image(x, y, 2) < 5;
 }
 
 struct Hybrid {
@@ -134,7 +120,7 @@ TEST_F(HybridTest, ModelAndSceneHideEachOther) {
       osg::ref_ptr<osg::MatrixTransform> root =
           new osg::MatrixTransform(placement.world_from_scene);
       root->addChild(node);
-      root->addChild(hybrid.box.Node());
+      root->addChild(RedBox(hybrid.box.center, hybrid.box.half));
       OffscreenViewer viewer(root.get(), hybrid.named.novel.camera, {}, threading);
       osg::Matrixd eye_from_scene = osg::Matrixd::inverse(placement.world_from_scene) *
                                     osgDTR::ViewMatrixOf(hybrid.named.novel.cam_from_world);

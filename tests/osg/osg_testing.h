@@ -2,7 +2,9 @@
 #pragma once
 #include <gtest/gtest.h>
 #include <osg/Camera>
+#include <osg/Geode>
 #include <osg/Image>
+#include <osg/ShapeDrawable>
 #include <osgViewer/Viewer>
 
 #include <memory>
@@ -93,12 +95,35 @@ class OffscreenViewer {
     return read_back_->shown();
   }
 
+  /// The same of one frame at this simulation time, seconds.
+  const Shown& DrawAt(double simulation_time_s) {
+    viewer.frame(simulation_time_s);
+    if (viewer.areThreadsRunning()) viewer.stopThreading();
+    return read_back_->shown();
+  }
+
   osgViewer::Viewer viewer;
 
  private:
   const PinholeCamera camera_;
   osg::ref_ptr<ReadBackCallback> read_back_;
 };
+
+/// A box of plain red that nothing of the exact scenes looks like.
+inline osg::ref_ptr<osg::Node> RedBox(const Eigen::Vector3d& center, const Eigen::Vector3d& half) {
+  osg::ref_ptr<osg::ShapeDrawable> shape = new osg::ShapeDrawable(
+      new osg::Box(osg::Vec3d(center.x(), center.y(), center.z()), static_cast<float>(2 * half.x()),
+                   static_cast<float>(2 * half.y()), static_cast<float>(2 * half.z())));
+  shape->setColor({1, 0, 0, 1});
+  osg::ref_ptr<osg::Geode> geode = new osg::Geode;
+  geode->addDrawable(shape);
+  geode->getOrCreateStateSet()->setMode(GL_LIGHTING, osg::StateAttribute::OFF);
+  return geode;
+}
+
+inline bool IsRed(const ImageRgb8& image, int x, int y) {
+  return image(x, y, 0) > 250 && image(x, y, 1) < 5 && image(x, y, 2) < 5;
+}
 
 /// Skips where there is no X server to be had; one for the whole program.
 class OsgTest : public ::testing::Test {

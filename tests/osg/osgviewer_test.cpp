@@ -13,8 +13,8 @@
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
 #include "tests/osg/osg_testing.h"
-#include "tests/osg/x_screen.h"
 #include "tests/support/test_data.h"
+#include "tests/support/x_screen.h"
 
 namespace dtr::testing {
 namespace {
@@ -136,6 +136,15 @@ TEST_F(OsgViewerTest, ShowsASetFromItsFirstCameraAndGoesOnToTheNext) {
     return ShareOfEqual(image, second) > kEqualShare;
   })) << ShareOfEqual(ReadScreen(kWidth, kHeight), second);
   Keep("osgviewer next", ReadScreen(kWidth, kHeight));
+}
+
+// As shells complete the names of folders.
+TEST_F(OsgViewerTest, ShowsASetWhoseNameEndsWithASlash) {
+  const RenderResult first = FromInputCamera(set_, set_.frames[0].views[0]);
+  const OsgViewerProgram program({(folder_ / "scene.dtr").string() + "/"});
+  EXPECT_TRUE(WaitFor(program, [&](const ImageRgb8& image) {
+    return ShareOfEqual(image, first) > kEqualShare;
+  })) << ShareOfEqual(ReadScreen(kWidth, kHeight), first);
 }
 
 TEST_F(OsgViewerTest, ShowsASetAndAModel) {

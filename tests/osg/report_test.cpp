@@ -230,10 +230,14 @@ TEST(Keys, ChangeWhatTheReportsKeysChange) {
   EXPECT_EQ(node->getRenderOptions().method, RenderMethod::kDeferred);
   EXPECT_TRUE(press('['));
   EXPECT_EQ(node->getRenderOptions().views, 5);  // of 8, where there are 5
+  EXPECT_TRUE(press('u'));
+  EXPECT_TRUE(node->getRenderOptions().fill_holes);
+  EXPECT_TRUE(press('u'));
+  EXPECT_FALSE(node->getRenderOptions().fill_holes);
   EXPECT_TRUE(press('x'));
   EXPECT_EQ(node->getDrawPath(), osgDTR::DrawPath::kReadBack);
   EXPECT_FALSE(press('q'));
-  EXPECT_EQ(viewer.redraws, 7);
+  EXPECT_EQ(viewer.redraws, 9);
 }
 
 }  // namespace

@@ -74,6 +74,32 @@ TEST(FillHoles, TakesTheBackgroundAtADisocclusion) {
   }
 }
 
+// Guesses must neither stand before what hid them nor let through what stands behind all.
+TEST(HoleFiller, SaysHowFarAwayItsGuessesLie) {
+  RenderResult result = Blank(48, 16);
+  for (int y = 0; y < 16; ++y) {
+    for (int x = 0; x < 20; ++x) See(result, x, y, 255, 2);
+    for (int x = 28; x < 48; ++x) See(result, x, y, 20, 20);
+  }
+  const RenderResult before = result;
+  const Grid<float> depth = HoleFiller().Fill({}, {48, 16, 40, 40, 24, 8}, {}, {}, result);
+  EXPECT_EQ(result.depth, before.depth);
+  for (int y = 0; y < 16; ++y) {
+    for (int x = 0; x < 48; ++x) {
+      if (before.coverage(x, y) != 0) {
+        EXPECT_EQ(depth(x, y), before.depth(x, y));
+      } else {
+        // Of the foreground, ten times as near, a ten thousandth has a say.
+        EXPECT_GT(depth(x, y), 19.9) << x << " " << y;
+        EXPECT_LE(depth(x, y), 20.001) << x << " " << y;
+      }
+    }
+  }
+  RenderResult nothing = Blank(5, 4);
+  const Grid<float> none = HoleFiller().Fill({}, {5, 4, 4, 4, 2, 2}, {}, {}, nothing);
+  for (const float z : none.data()) EXPECT_EQ(z, 0);
+}
+
 TEST(FillHoles, NothingSeenStaysBlack) {
   RenderResult result = Blank(5, 4);
   FillHoles(result);

@@ -24,13 +24,13 @@ class ContextRenderer {
   /// A picture of what `drawn` says, made anew only when one of these differs from the last call's:
   /// a viewer draws a still scene again and again.
   template <typename Draw>
-  dtr::gl::DrawnPicture Picture(std::shared_ptr<const LoadedScene> scene, unsigned settings_version,
+  dtr::gl::DrawnPicture Picture(std::shared_ptr<const LoadedSet> set, unsigned settings_version,
                                 const dtr::PinholeCamera& camera, const dtr::Pose& pose,
                                 const Draw& draw) {
-    if (scene != scene_) {
+    if (set != set_) {
       renderer.Forget();  // while the old views still live
       last_.reset();
-      scene_ = std::move(scene);
+      set_ = std::move(set);
     }
     Last now{settings_version, camera, pose, {}};
     if (!last_ || !now.SameAs(*last_)) {
@@ -57,7 +57,7 @@ class ContextRenderer {
              pose.translation == other.pose.translation;
     }
   };
-  std::shared_ptr<const LoadedScene> scene_;
+  std::shared_ptr<const LoadedSet> set_;
   std::optional<Last> last_;
 };
 

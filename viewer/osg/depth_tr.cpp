@@ -1,5 +1,8 @@
 #include "viewer/osg/depth_tr.h"
 
+#include <osg/FrameStamp>
+#include <osg/NodeVisitor>
+
 #include <Eigen/LU>
 #include <algorithm>
 #include <stdexcept>
@@ -17,7 +20,7 @@ namespace {
 // What a matrix given in decimal digits may lack of a rotation.
 constexpr double kRotationError = 1e-6;
 
-osg::ref_ptr<osg::Image> ToOsgImage(const dtr::RenderResult& result) {
+osg::ref_ptr<osg::Image> ToOsgImage(const dtr::RenderResult& result, bool filled) {
   const int width = result.image.width(), height = result.image.height();
   osg::ref_ptr<osg::Image> image = new osg::Image;
   image->allocateImage(width, height, 1, GL_RGBA, GL_UNSIGNED_BYTE);
@@ -25,7 +28,7 @@ osg::ref_ptr<osg::Image> ToOsgImage(const dtr::RenderResult& result) {
     for (int x = 0; x < width; ++x) {
       unsigned char* out = image->data(x, height - 1 - y);
       for (int c = 0; c < 3; ++c) out[c] = result.image(x, y, c);
-      out[3] = result.coverage(x, y);
+      out[3] = filled ? 255 : result.coverage(x, y);
     }
   }
   return image;
@@ -40,7 +43,9 @@ DepthTR::DepthTR(const DepthTR& other, const osg::CopyOp& copyop) : osg::Geode(o
   removeDrawables(0, getNumDrawables());
   init();
   drawable_->state_->settings = other.drawable_->state_->Get();
-  TakeScene(other.getScene());
+  drawable_->dirtyBound();
+  if (isLoaded()) ShowInstant(drawable_->state_->settings.instant);
+  setPlaying(other.playing_);
 }
 
 DepthTR::~DepthTR() = default;
@@ -50,22 +55,78 @@ void DepthTR::init() {
   addDrawable(drawable_.get());
 }
 
-void DepthTR::load(const std::string& set_folder) { TakeScene(LoadScene(set_folder)); }
-void DepthTR::setScene(dtr::DtrSet set) { TakeScene(MakeScene(std::move(set))); }
+void DepthTR::load(const std::string& set_folder) { TakeSet(LoadSet(set_folder)); }
+void DepthTR::setScene(dtr::DtrSet set) { TakeSet(MakeSet(std::move(set))); }
 
-void DepthTR::TakeScene(std::shared_ptr<const LoadedScene> scene) {
-  input_views_.clear();
+void DepthTR::TakeSet(std::shared_ptr<const LoadedSet> set) {
   novel_.reset();
   current_view_ = -1;
-  if (scene) {
-    for (const dtr::View* view : scene->scene.views) input_views_.emplace_back(*view);
-  }
-  drawable_->state_->Set([&](DrawSettings& settings) { settings.scene = std::move(scene); });
+  played_from_s_.reset();
+  drawable_->state_->Set([&](DrawSettings& settings) {
+    settings.set = std::move(set);
+    settings.instant = 0;
+  });
   drawable_->dirtyBound();
+  ShowInstant(0);
 }
 
 std::shared_ptr<const LoadedScene> DepthTR::getScene() const {
-  return drawable_->state_->Get().scene;
+  return drawable_->state_->Get().Scene();
+}
+
+void DepthTR::ShowInstant(size_t instant) {
+  drawable_->state_->Set([&](DrawSettings& settings) { settings.instant = instant; });
+  input_views_.clear();
+  for (const dtr::View* view : getScene()->scene.views) input_views_.emplace_back(*view);
+  if (novel_) setNovelView(novel_->camera, novel_->cam_from_world);  // of these views now
+}
+
+int DepthTR::numberOfInstants() const {
+  const auto set = drawable_->state_->Get().set;
+  return set ? static_cast<int>(set->instants.size()) : 0;
+}
+
+int DepthTR::getInstant() const { return static_cast<int>(drawable_->state_->Get().instant); }
+
+void DepthTR::setInstant(int instant) {
+  if (instant < 0 || instant >= numberOfInstants()) {
+    throw dtr::UsageError("DepthTR: expected an instant from 0 to " +
+                          std::to_string(numberOfInstants() - 1) + ", found " +
+                          std::to_string(instant));
+  }
+  played_from_s_.reset();  // goes on from here
+  ShowInstant(static_cast<size_t>(instant));
+}
+
+double DepthTR::getInstantTime(int instant) const {
+  const auto set = drawable_->state_->Get().set;
+  return set ? set->clock.StartOf(static_cast<size_t>(instant)) : 0;
+}
+
+void DepthTR::setPlaying(bool playing) {
+  if (playing == playing_) return;
+  playing_ = playing;
+  played_from_s_.reset();
+  // Update visitors pass by nodes that nothing below of asks for them.
+  const unsigned asking = getNumChildrenRequiringUpdateTraversal();
+  setNumChildrenRequiringUpdateTraversal(playing ? asking + 1 : asking - 1);
+}
+
+void DepthTR::PlayAt(double simulation_time_s) {
+  const DrawSettings shown = drawable_->state_->Get();
+  if (!shown.set) return;
+  const dtr::FrameClock& clock = shown.set->clock;
+  if (!played_from_s_) played_from_s_ = simulation_time_s - clock.StartOf(shown.instant);
+  const size_t instant = clock.FrameAt(simulation_time_s - *played_from_s_);
+  if (instant != shown.instant) ShowInstant(instant);
+}
+
+void DepthTR::traverse(osg::NodeVisitor& visitor) {
+  if (playing_ && visitor.getVisitorType() == osg::NodeVisitor::UPDATE_VISITOR &&
+      visitor.getFrameStamp() != nullptr) {
+    PlayAt(visitor.getFrameStamp()->getSimulationTime());
+  }
+  osg::Geode::traverse(visitor);
 }
 
 void DepthTR::setRenderOptions(const dtr::RenderOptions& options) {
@@ -176,7 +237,7 @@ osg::ref_ptr<osg::Image> DepthTR::getNovelView(dtr::BlendWeight blendType, int r
   }
   computeWeights(reqNumber, blendType, angles, weights, flags);
   for (size_t i = 0; i < weights.size(); ++i) input_views_[i].weight = weights[i];
-  return ToOsgImage(*novel.result);
+  return ToOsgImage(*novel.result, options.fill_holes);
 }
 
 const dtr::RenderResult& DepthTR::getNovelResult() const {

@@ -33,7 +33,8 @@ enum class DrawPath {
 /// (set.json: world relative to world_origin).
 ///
 /// Drawing may run on any threads beside setters of options, which take hold with the next frame;
-/// load() and setScene() belong into the update phase, as every change of a scene graph's shape.
+/// load(), setScene() and setInstant() belong into the update phase, as every change of a scene
+/// graph's shape.
 /// The report's own operations (setNovelView to saveProjectedImage) keep their results here, belong
 /// to one thread at a time and never touch what is drawn.
 class DepthTR : public osg::Geode {
@@ -48,9 +49,24 @@ class DepthTR : public osg::Geode {
   /// A set in memory, whose source views have image and depth.
   void setScene(dtr::DtrSet set);
   bool isLoaded() const { return getScene() != nullptr; }
+  /// The instant that is shown; null without a set.
   std::shared_ptr<const LoadedScene> getScene() const;
 
-  /// How it is drawn. Throws dtr::UsageError for options without a meaning.
+  // Moving sets. All instants are in memory; to show another is a change for the update phase.
+
+  int numberOfInstants() const;  ///< 1 of a still scene, 0 without a set
+  int getInstant() const;
+  /// From 0; throws dtr::UsageError for others.
+  void setInstant(int instant);
+  /// Seconds from the first instant to this one.
+  double getInstantTime(int instant) const;
+  /// Goes on from the shown instant with the viewer's simulation time, round and round, or stops.
+  void setPlaying(bool playing);
+  bool isPlaying() const { return playing_; }
+  void traverse(osg::NodeVisitor& visitor) override;
+
+  /// How it is drawn; with `fill_holes` what no view saw is drawn, too, and hides and is hidden by
+  /// the depth that filling guesses. Throws dtr::UsageError for options without a meaning.
   void setRenderOptions(const dtr::RenderOptions& options);
   dtr::RenderOptions getRenderOptions() const;
   void setDrawPath(DrawPath path);
@@ -59,7 +75,7 @@ class DepthTR : public osg::Geode {
   /// deferred method (RENDER_SPEC 5).
   void setMode(Mode mode);
 
-  /// The source views.
+  /// The source views of the instant that is shown.
   const std::vector<InputView>& inputViews() const { return input_views_; }
   int numberOfInputViews() const { return static_cast<int>(input_views_.size()); }
   /// OpenSceneGraph's view matrix of an input camera, from this node's coordinates.
@@ -77,8 +93,9 @@ class DepthTR : public osg::Geode {
   /// The same from OpenSceneGraph's matrices, of this node's coordinates.
   void setNovelView(const osg::Matrixd& modelview, const osg::Matrixd& projection, int width,
                     int height);
-  /// The novel view, RGBA with alpha 0 where nothing was seen, first row at the bottom as OSG has
-  /// it; from at most `reqNumber` views. Throws std::logic_error before setNovelView.
+  /// The novel view, RGBA with alpha 0 where nothing was seen (unless the options say to fill
+  /// that), first row at the bottom as OSG has it; from at most `reqNumber` views. Throws
+  /// std::logic_error before setNovelView.
   osg::ref_ptr<osg::Image> getNovelView(dtr::BlendWeight blendType, int reqNumber);
   /// Of the last getNovelView: picture, depth, coverage, views used.
   const dtr::RenderResult& getNovelResult() const;
@@ -123,7 +140,9 @@ class DepthTR : public osg::Geode {
     std::optional<dtr::RenderResult> result;
   };
   void init();  // Shared constructor code, generates the drawable
-  void TakeScene(std::shared_ptr<const LoadedScene> scene);
+  void TakeSet(std::shared_ptr<const LoadedSet> set);
+  void ShowInstant(size_t instant);
+  void PlayAt(double simulation_time_s);
   NovelView& RequireNovelView();
   void BlendBy(dtr::BlendWeight blend, std::optional<int> k, const std::vector<double>& angles,
                std::vector<double>& weights, const std::vector<bool>& flags,
@@ -135,6 +154,9 @@ class DepthTR : public osg::Geode {
   std::vector<InputView> input_views_;
   std::optional<NovelView> novel_;
   int current_view_ = -1;
+  bool playing_ = false;
+  /// The simulation time at which the first instant began; none until the next update.
+  std::optional<double> played_from_s_;
 };
 
 /// What a DepthTR draws with. May hang under several Geodes.

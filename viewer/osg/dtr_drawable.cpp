@@ -7,6 +7,32 @@
 #include "viewer/osg/read_back.h"
 
 namespace osgDTR {
+namespace {
+
+/// As the settings say; what it gives holds until the context's next picture.
+dtr::gl::DrawnPicture DrawPicture(ContextRenderer& context, const DrawSettings& settings,
+                                  const NovelCamera& novel) {
+  dtr::gl::Renderer& renderer = context.renderer;
+  const dtr::RenderScene& scene = settings.set->instants[settings.instant].scene;
+  const dtr::RenderOptions& options = settings.options;
+  const bool on_gpu = settings.path == DrawPath::kGpu;
+  if (on_gpu && !options.fill_holes) {
+    return renderer.Draw(scene, novel.camera, novel.cam_from_local, options);
+  }
+  dtr::RenderResult result;
+  if (on_gpu) {
+    renderer.Draw(scene, novel.camera, novel.cam_from_local, options);
+    result = renderer.ReadBack();
+  } else {
+    result = RenderByReadBack(renderer, scene, novel.camera, novel.cam_from_local, options);
+  }
+  if (!options.fill_holes) return context.compositor.Upload(result);
+  const dtr::Grid<float> depth =
+      settings.set->hole_filler.Fill(scene, novel.camera, novel.cam_from_local, options, result);
+  return context.compositor.UploadFilled(result, depth);
+}
+
+}  // namespace
 
 DepthTR::dtrDrawable::dtrDrawable() : state_(std::make_unique<State>()) {
   setSupportsDisplayList(false);  // every camera sees another picture
@@ -21,8 +47,8 @@ DepthTR::dtrDrawable::dtrDrawable(const dtrDrawable& other, const osg::CopyOp& c
 DepthTR::dtrDrawable::~dtrDrawable() = default;
 
 osg::BoundingBox DepthTR::dtrDrawable::computeBoundingBox() const {
-  const auto scene = state_->Get().scene;
-  return scene ? scene->bounds : osg::BoundingBox();
+  const auto set = state_->Get().set;
+  return set ? set->bounds : osg::BoundingBox();
 }
 
 void DepthTR::dtrDrawable::drawImplementation(osg::RenderInfo& info) const {
@@ -37,21 +63,14 @@ void DepthTR::dtrDrawable::drawImplementation(osg::RenderInfo& info) const {
 void DepthTR::dtrDrawable::Draw(osg::RenderInfo& info) const {
   const DrawSettings settings = state_->Get();
   const dtr::gl::Viewport viewport = dtr::gl::CurrentViewport();
-  if (!settings.scene || viewport.width <= 0 || viewport.height <= 0) return;
+  if (!settings.set || viewport.width <= 0 || viewport.height <= 0) return;
   osg::State& state = *info.getState();
   const NovelCamera novel = NovelCameraOf(state.getModelViewMatrix(), state.getProjectionMatrix(),
                                           viewport.width, viewport.height);
   const std::shared_ptr<ContextRenderer> context = state_->contexts.Of(state);
-  const dtr::RenderScene& scene = settings.scene->scene;
   const dtr::gl::DrawnPicture picture =
-      context->Picture(settings.scene, settings.version, novel.camera, novel.cam_from_local, [&] {
-        dtr::gl::Renderer& renderer = context->renderer;
-        if (settings.path == DrawPath::kGpu) {
-          return renderer.Draw(scene, novel.camera, novel.cam_from_local, settings.options);
-        }
-        return context->compositor.Upload(RenderByReadBack(renderer, scene, novel.camera,
-                                                           novel.cam_from_local, settings.options));
-      });
+      context->Picture(settings.set, settings.version, novel.camera, novel.cam_from_local,
+                       [&] { return DrawPicture(*context, settings, novel); });
   context->compositor.Composite(picture, novel.projection);
 }
 

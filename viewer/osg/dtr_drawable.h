@@ -13,10 +13,15 @@ namespace osgDTR {
 
 /// What a frame is drawn by; copied when the frame begins.
 struct DrawSettings {
-  std::shared_ptr<const LoadedScene> scene;
+  std::shared_ptr<const LoadedSet> set;
+  size_t instant = 0;
   dtr::RenderOptions options;
   DrawPath path = DrawPath::kGpu;
   unsigned version = 0;  ///< rises with every change
+  /// Null without a set.
+  std::shared_ptr<const LoadedScene> Scene() const {
+    return set ? std::shared_ptr<const LoadedScene>(set, &set->instants.at(instant)) : nullptr;
+  }
 };
 
 struct DepthTR::dtrDrawable::State {

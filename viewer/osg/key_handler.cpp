@@ -61,6 +61,27 @@ const char* NextMethod(RenderOptions& options) {
 
 constexpr int kCoarsestResolution = 4;
 
+/// The keys of moving sets; false for others, and for sets that stand still.
+bool HandleTime(int key, DepthTR& node) {
+  const int count = node.numberOfInstants();
+  if (count < 2) return false;
+  switch (key) {
+    case ',':
+    case '.':
+      node.setPlaying(false);
+      node.setInstant((node.getInstant() + (key == '.' ? 1 : count - 1)) % count);
+      OSG_NOTICE << "D+TR instant: " << node.getInstant() << " of " << count << ", "
+                 << node.getInstantTime(node.getInstant()) << " s" << std::endl;
+      return true;
+    case 'j':
+      node.setPlaying(!node.isPlaying());
+      OSG_NOTICE << "D+TR: " << (node.isPlaying() ? "playing" : "still") << std::endl;
+      return true;
+    default:
+      return false;
+  }
+}
+
 }  // namespace
 
 KeyHandler::KeyHandler(DepthTR* node, bool starts_at_input)
@@ -115,6 +136,10 @@ bool KeyHandler::handle(const osgGA::GUIEventAdapter& event, osgGA::GUIActionAda
                                  std::max(1, node->numberOfInputViews()));
       OSG_NOTICE << "D+TR views: " << options.views << std::endl;
       break;
+    case 'u':
+      options.fill_holes = !options.fill_holes;
+      OSG_NOTICE << "D+TR hole filling: " << (options.fill_holes ? "on" : "off") << std::endl;
+      break;
     case 'x': {
       const bool gpu = node->getDrawPath() == DrawPath::kReadBack;
       node->setDrawPath(gpu ? DrawPath::kGpu : DrawPath::kReadBack);
@@ -123,7 +148,9 @@ bool KeyHandler::handle(const osgGA::GUIEventAdapter& event, osgGA::GUIActionAda
       return true;
     }
     default:
-      return false;
+      if (!HandleTime(event.getKey(), *node)) return false;
+      viewer.requestRedraw();
+      return true;
   }
   node->setRenderOptions(options);
   viewer.requestRedraw();
@@ -136,6 +163,9 @@ void KeyHandler::getUsage(osg::ApplicationUsage& usage) const {
   usage.addKeyboardMouseBinding("D+TR: k", "Deferred, two passes with meshes, with splats");
   usage.addKeyboardMouseBinding("D+TR: r", "Every pixel, 2nd, 4th pixel of the depth maps");
   usage.addKeyboardMouseBinding("D+TR: [, ]", "One view less, one more");
+  usage.addKeyboardMouseBinding("D+TR: u", "Fill what no view saw, on and off");
+  usage.addKeyboardMouseBinding("D+TR: comma, full stop", "Previous, next instant of a moving set");
+  usage.addKeyboardMouseBinding("D+TR: j", "Play a moving set, stop");
   usage.addKeyboardMouseBinding("D+TR: x", "Read back and blend on the processor, on and off");
 }
 

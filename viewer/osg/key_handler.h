@@ -8,8 +8,9 @@
 namespace osgDTR {
 
 /// Keys for a DepthTR: n N next and previous input view, v blend weight, k method and primitive,
-/// r resolution, [ ] number of views, x the report's read-back path. Add it to a viewer's event
-/// handlers, or to a node's event callbacks, as the osgDB plugin does.
+/// r resolution, [ ] number of views, u hole filling, x the report's read-back path; of moving sets
+/// , . previous and next instant, j playing. Add it to a viewer's event handlers, or to a node's
+/// event callbacks, as the osgDB plugin does.
 class KeyHandler : public osgGA::GUIEventHandler {
  public:
   /// `starts_at_input`: home, which is where viewers start, becomes the first input camera.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/io/set_io.h"
 
@@ -35,23 +36,30 @@ osg::BoundingBox BoundsOf(const dtr::View& view) {
 
 }  // namespace
 
-std::shared_ptr<const LoadedScene> MakeScene(dtr::DtrSet set) {
-  auto loaded = std::make_shared<LoadedScene>();
-  loaded->set = std::move(set);
-  loaded->scene = dtr::MakeRenderScene(loaded->set);
-  std::vector<osg::BoundingBox> bounds(loaded->scene.views.size());
+std::shared_ptr<const LoadedSet> MakeSet(dtr::DtrSet set) {
+  auto loaded = std::make_shared<LoadedSet>();
+  loaded->clock = dtr::FrameClock(set);
+  std::vector<const dtr::View*> views;
+  for (dtr::DtrSet& still : dtr::SplitFrames(std::move(set))) {
+    LoadedScene& instant = loaded->instants.emplace_back();
+    instant.set = std::move(still);  // its views stay where they are
+    instant.scene = dtr::MakeRenderScene(instant.set);
+    views.insert(views.end(), instant.scene.views.begin(), instant.scene.views.end());
+  }
+  if (loaded->instants.empty()) throw dtr::Error("set: expected at least one frame, found none");
+  std::vector<osg::BoundingBox> bounds(views.size());
   dtr::ParallelFor(0, static_cast<int>(bounds.size()), 0, [&](int i) {
     const auto k = static_cast<size_t>(i);
-    bounds[k] = BoundsOf(*loaded->scene.views[k]);
+    bounds[k] = BoundsOf(*views[k]);
   });
   for (const osg::BoundingBox& one : bounds) loaded->bounds.expandBy(one);
   return loaded;
 }
 
-std::shared_ptr<const LoadedScene> LoadScene(const std::string& set_folder) {
+std::shared_ptr<const LoadedSet> LoadSet(const std::string& set_folder) {
   dtr::io::LoadOptions options;
   options.warn = [](const std::string& line) { OSG_WARN << line << std::endl; };
-  return MakeScene(dtr::io::LoadSet(set_folder, options));
+  return MakeSet(dtr::io::LoadSet(set_folder, options));
 }
 
 }  // namespace osgDTR

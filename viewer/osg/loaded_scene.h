@@ -4,24 +4,35 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
+#include "dtr/render/fill_holes.h"
+#include "dtr/render/instants.h"
 #include "dtr/render/scene.h"
 #include "dtr/types/dtr_set.h"
 
 namespace osgDTR {
 
-/// Never changes once it is made; read by several threads at a time.
+/// One instant of a set.
 struct LoadedScene {
-  dtr::DtrSet set;
-  dtr::RenderScene scene;   ///< of `set`
-  osg::BoundingBox bounds;  ///< of all that can be drawn; set.bounds leaves out the outermost 1 %
+  dtr::DtrSet set;         ///< its only frame is that instant
+  dtr::RenderScene scene;  ///< of `set`
+};
+
+/// Never changes once it is made; used by several threads at a time.
+struct LoadedSet {
+  std::vector<LoadedScene> instants;  ///< one of a still scene
+  dtr::FrameClock clock;              ///< of the instants
+  /// Of all that can be drawn at any instant; DtrSet::bounds leaves out the outermost 1 %.
+  osg::BoundingBox bounds;
+  mutable dtr::HoleFiller hole_filler;  ///< keeps what it makes of the photos, for all who draw
 };
 
 /// Reads the set with images and depth; osg::notify is told of what is left out of it.
 /// Throws dtr::Error.
-std::shared_ptr<const LoadedScene> LoadScene(const std::string& set_folder);
+std::shared_ptr<const LoadedSet> LoadSet(const std::string& set_folder);
 
 /// The same of a set in memory, whose source views are loaded.
-std::shared_ptr<const LoadedScene> MakeScene(dtr::DtrSet set);
+std::shared_ptr<const LoadedSet> MakeSet(dtr::DtrSet set);
 
 }  // namespace osgDTR

@@ -18,7 +18,9 @@ namespace {
 struct PluginOptions {
   dtr::RenderOptions render;
   DrawPath path = DrawPath::kGpu;
-  bool keys = true;  ///< the report's keys, and the first input camera as home
+  int instant = 0;    ///< of a moving set: the first to be shown
+  bool play = false;  ///< from there on
+  bool keys = true;   ///< the report's keys, and the first input camera as home
 };
 
 int WholeNumber(const std::string& name, const std::string& value) {
@@ -45,6 +47,10 @@ T OneOf(const std::string& name, const std::string& value,
   }
   throw dtr::UsageError("osgdb_dtr: option " + name + ": expected one of " + names + ", found " +
                         value);
+}
+
+bool OnOrOff(const std::string& name, const std::string& value) {
+  return OneOf<bool>(name, value, {{"on", true}, {"off", false}});
 }
 
 /// Words without a meaning here belong to other plugins: OpenSceneGraph hands all of them to all.
@@ -79,9 +85,10 @@ PluginOptions Parse(const osgDB::Options* given) {
       options.path = OneOf<DrawPath>(name, value,
                                      {{"gpu", DrawPath::kGpu}, {"read-back", DrawPath::kReadBack}});
     }
-    if (name == "keys") {
-      options.keys = OneOf<bool>(name, value, {{"on", true}, {"off", false}});
-    }
+    if (name == "keys") options.keys = OnOrOff(name, value);
+    if (name == "instant") options.instant = WholeNumber(name, value);
+    if (name == "play") options.play = OnOrOff(name, value);
+    if (name == "fill-holes") options.render.fill_holes = OnOrOff(name, value);
   }
   return options;
 }
@@ -112,6 +119,9 @@ class ReaderWriterDTR : public osgDB::ReaderWriter {
     supportsOption("blend", "cosine|exponential|angle|inverse-angle|k-nearest");
     supportsOption("method", "deferred|two-pass");
     supportsOption("primitive", "mesh|splat, of two-pass");
+    supportsOption("fill-holes", "on|off: fill what no view saw [off]");
+    supportsOption("instant", "Of a moving set: the instant that is shown [0]");
+    supportsOption("play", "on|off: of a moving set: play it, round and round [off]");
     supportsOption("path", "gpu|read-back");
     supportsOption("keys", "on|off: the keys of the founding report [on]");
   }
@@ -135,6 +145,8 @@ class ReaderWriterDTR : public osgDB::ReaderWriter {
       node->setRenderOptions(parsed.render);
       node->setDrawPath(parsed.path);
       node->load(folder.string());
+      node->setInstant(parsed.instant);
+      node->setPlaying(parsed.play);
       node->setName(folder.filename().string());
       if (parsed.keys) node->addEventCallback(new KeyHandler(node.get(), true));
       return node.release();

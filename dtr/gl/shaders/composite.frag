@@ -1,7 +1,7 @@
 // A finished picture into the framebuffer of a host that draws other things too: colour, and depth as
 // the host's own projection would have it.
-uniform sampler2DArray image;  // sRGB; alpha 0 where no view saw anything
-uniform sampler2DArray depth;  // plane z, scene units; 0 where unseen
+uniform sampler2DArray image;  // sRGB; alpha 0: nothing, 1: seen, between: guessed
+uniform sampler2DArray depth;  // plane z, scene units; 0 where there is nothing
 uniform vec4 viewport;         // x, y, width, height in pixels of the framebuffer
 uniform vec4 mapping;  // device z = x + y / z; least device z = z; window z from 0 to 1 = (device z - z) * w
 uniform int clamps;    // 1: the host has GL_DEPTH_CLAMP on
@@ -18,9 +18,11 @@ void main() {
   float z = texelFetch(depth, ivec3(texel, 0), 0).r;
   if (colour.a == 0.0 || !(z > 0.0)) discard;  // the host's background stays
   float device_z = mapping.x + mapping.y / z;
-  // What fixed function clips: nearer than the near plane, farther than the far plane.
-  if (clamps == 0 && (device_z < mapping.z || device_z > 1.0)) discard;
-  float window_z = clamp((device_z - mapping.z) * mapping.w, 0.0, 1.0);
+  // What fixed function clips: nearer than the near plane, farther than the far plane. Guesses stay.
+  bool guessed = colour.a < 1.0;
+  if (!guessed && clamps == 0 && (device_z < mapping.z || device_z > 1.0)) discard;
+  // The last step of 24 bits before the far plane: what is cleared to that must not hide a guess.
+  float window_z = clamp((device_z - mapping.z) * mapping.w, 0.0, guessed ? 0.9999999 : 1.0);
   gl_FragDepth = gl_DepthRange.near + gl_DepthRange.diff * window_z;
   out_colour = vec4(colour.rgb, 1.0);
 }

@@ -1,4 +1,4 @@
-// tests/osg/x_screen.h -- what the X server of DISPLAY shows, and keys for its windows.
+// tests/support/x_screen.h -- what the X server of DISPLAY shows, and keys for its windows.
 #pragma once
 #include "dtr/types/grid.h"
 

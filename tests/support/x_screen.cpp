@@ -1,4 +1,4 @@
-#include "tests/osg/x_screen.h"
+#include "tests/support/x_screen.h"
 
 #include <memory>
 #include <stdexcept>
