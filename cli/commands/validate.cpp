@@ -38,6 +38,9 @@ void SayReport(const calib::ValidationReport& report, Console& console) {
   for (const std::string& name : report.untested) {
     console.Say("not tested, too few observations: " + name);
   }
+  for (const std::string& name : report.kept_apart) {
+    console.Say("not tested, held out without observations; dtr evaluate judges by it: " + name);
+  }
 }
 
 void RefuseForSets(const ValidateCalibrationOptions& options) {

@@ -8,6 +8,7 @@ struct Cameras {
   std::vector<PinholeCamera> cameras;
   std::vector<Pose> poses;
   std::vector<std::string> names;
+  std::vector<bool> held_out;
 };
 
 Cameras CamerasOf(const DtrSet& set) {
@@ -16,6 +17,7 @@ Cameras CamerasOf(const DtrSet& set) {
     of.cameras.push_back(view.camera);
     of.poses.push_back(view.cam_from_world);
     of.names.push_back(view.name);
+    of.held_out.push_back(view.role == ViewRole::kHeldOut);
   }
   return of;
 }
@@ -25,7 +27,8 @@ Cameras CamerasOf(const DtrSet& set) {
 calib::ValidationReport ReprojectionOfSet(const DtrSet& set, const SparseScene& sparse,
                                           const calib::ValidateLimits& limits, int threads) {
   const Cameras of = CamerasOf(set);
-  return calib::ValidateReprojection(of.cameras, of.poses, sparse, limits, of.names, threads);
+  return calib::ValidateReprojection(of.cameras, of.poses, sparse, limits, of.names, threads,
+                                     of.held_out);
 }
 
 calib::ValidationReport ValidateSet(const DtrSet& set, const SparseScene& sparse,
