@@ -1,5 +1,7 @@
 #include "cli/pipeline/validate_set.h"
 
+#include "cli/pipeline/set_rig.h"
+
 namespace dtr::pipeline {
 
 namespace {
@@ -39,6 +41,9 @@ calib::ValidationReport ValidateSet(const DtrSet& set, const SparseScene& sparse
   const calib::Judgement judgement =
       calib::Judge(calib::BundleOf(of.cameras, of.poses, of.names, sparse), judge_limits, threads);
   report.tests.insert(report.tests.end(), judgement.tests.begin(), judgement.tests.end());
+  const auto rig = RigOfSet(set);
+  const auto places = rig ? RigPlaces(set, sparse, *rig) : std::nullopt;
+  if (places) report.tests.push_back(*places);
   report.adjustment_json = calib::ToJson(judgement);
   report.not_judged = judgement.not_judged;
   return report;
