@@ -259,6 +259,15 @@ void AddTests(const ValidateLimits& limits, ValidationReport* report) {
   tests.push_back(Untested(*report, limits));
 }
 
+/// Every n-th of the arrows, so that no more than kMostArrows are left.
+void ThinOut(std::vector<ResidualArrow>& arrows) {
+  const size_t step = (arrows.size() + kMostArrows - 1) / kMostArrows;
+  if (step < 2) return;
+  size_t kept = 0;
+  for (size_t i = 0; i < arrows.size(); i += step) arrows[kept++] = arrows[i];
+  arrows.resize(kept);
+}
+
 }  // namespace
 
 ResidualStats Summarise(const std::vector<Eigen::Vector2d>& residuals) {
@@ -340,6 +349,7 @@ ValidationReport ValidateReprojection(std::span<const PinholeCamera> cameras,
     if (verdict.fate == Fate::kTested) {
       predicted[view].push_back(verdict.held_out_px);
       all_predicted.push_back(verdict.held_out_px);
+      camera.arrows.push_back({scene.observations[i].pixel, -verdict.held_out_px});
       regions[RegionOf(cameras[view], scene.observations[i].pixel)].push_back(verdict.held_out_px);
     }
     if (verdict.stored_in_front) {
@@ -352,6 +362,7 @@ ValidationReport ValidateReprojection(std::span<const PinholeCamera> cameras,
     camera.name = names[i];
     camera.held_out = Summarise(predicted[i]);
     camera.stored = Summarise(stored[i]);
+    ThinOut(camera.arrows);
     if (camera.held_out.count >= limits.min_observations) continue;
     const bool apart = !held_out.empty() && held_out[i] && !observed[i];
     (apart ? report.kept_apart : report.untested).push_back(camera.name);

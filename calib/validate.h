@@ -35,6 +35,21 @@ struct ResidualStats {
   Eigen::Vector2d mean_px = Eigen::Vector2d::Zero();  ///< of the vectors: what is systematic
 };
 
+/// Where something was seen, and its residual there, predicted less observed.
+struct ResidualArrow {
+  Eigen::Vector2d pixel, residual_px;
+};
+
+/// A point of a view, and how uncertain it is where two other views place it: standard deviation
+/// per axis, px.
+struct PlacedPixel {
+  Eigen::Vector2d pixel;
+  double sigma_px = 0;
+};
+
+/// Arrows that a camera keeps at most: enough to see a pattern by, few enough to draw.
+inline constexpr size_t kMostArrows = 1500;
+
 /// What became of one camera's observations.
 struct CameraValidation {
   std::string name;
@@ -43,6 +58,8 @@ struct CameraValidation {
   int short_tracks = 0;    ///< points seen by fewer than 3 cameras: nothing to hold out
   int weak_geometry = 0;   ///< the other cameras do not fix the point well enough to judge
   int impossible = 0;      ///< no point in front of the cameras explains the observations
+  std::vector<ResidualArrow> arrows;  ///< of `held_out`: all, or evenly many of them
+  std::vector<PlacedPixel> placed;  ///< of a fresh bundle adjustment (bundle/judge.h); may be empty
 };
 
 /// Number of image regions per axis.

@@ -1,5 +1,7 @@
 #include "cli/pipeline/validate_set.h"
 
+#include <algorithm>
+
 #include "cli/pipeline/set_rig.h"
 
 namespace dtr::pipeline {
@@ -44,6 +46,12 @@ calib::ValidationReport ValidateSet(const DtrSet& set, const SparseScene& sparse
   const auto rig = RigOfSet(set);
   const auto places = rig ? RigPlaces(set, sparse, *rig) : std::nullopt;
   if (places) report.tests.push_back(*places);
+  for (const calib::CameraJudgement& judged : judgement.cameras) {
+    const auto camera =
+        std::find_if(report.cameras.begin(), report.cameras.end(),
+                     [&](const auto& validated) { return validated.name == judged.name; });
+    if (camera != report.cameras.end()) camera->placed = judged.placed;
+  }
   report.adjustment_json = calib::ToJson(judgement);
   report.not_judged = judgement.not_judged;
   return report;
