@@ -27,6 +27,9 @@ constexpr double kLeastAgreeing = 1.0 / 3;  // of a view's corners
 constexpr double kOutlierSigmas = 5;
 constexpr double kMostRelativeSigma = 0.1;  // as with distances (calib/scale.cpp)
 constexpr double kLeastAngle = 1 * std::numbers::pi / 180;
+// Scatter beyond what a set's own gate allows is no noise: views that contradict each other must
+// not make room for each other.
+constexpr double kMostSigmaPx = 1.5;
 constexpr double kStartScalePx = 2;  // of Cauchy's loss, before a sigma is known
 constexpr size_t kMostOfPairs = 40;  // views whose pairs are tried
 constexpr int kMostSteps = 50;
@@ -240,11 +243,14 @@ std::vector<double> UsedLengths(const Problem& problem, const Similarity& scene_
   return lengths;
 }
 
+double SigmaOf(const Problem& problem, const Similarity& scene_from_board) {
+  return std::clamp(RobustSigma(UsedLengths(problem, scene_from_board)), kSmallestSigmaPx,
+                    kMostSigmaPx);
+}
+
 // Drops corners that are off, and views of which most are. False when nothing changed.
 bool DropOutliers(const Similarity& scene_from_board, Problem& problem) {
-  const double limit =
-      kOutlierSigmas *
-      std::max(kSmallestSigmaPx, RobustSigma(UsedLengths(problem, scene_from_board)));
+  const double limit = kOutlierSigmas * SigmaOf(problem, scene_from_board);
   bool changed = false;
   std::vector<size_t> all(problem.seen.size(), 0), kept(problem.seen.size(), 0);
   for (Corner& corner : problem.corners) {
@@ -345,8 +351,7 @@ BoardScale ScaleFromBoard(const Board& board, std::span<const BoardSight> sights
   double scale_px = kStartScalePx;
   for (int pass = 0; pass < kMostRobustPasses; ++pass) {
     at = Minimised(problem, at, scale_px, &normal);
-    const double next =
-        kCauchySigmas * std::max(kSmallestSigmaPx, RobustSigma(UsedLengths(problem, at)));
+    const double next = kCauchySigmas * SigmaOf(problem, at);
     if (std::abs(next - scale_px) < kSameScale * scale_px) break;
     scale_px = next;
   }

@@ -36,7 +36,7 @@ Pose CamFromBoard(const calib::Board& board, int i) {
 
 class ScaleByBoard : public ::testing::Test {
  protected:
-  // A set of these photos; in those of `moved` the board lies 3 cm aside.
+  // A set of these photos; in those of `moved` the board lies 3 to 5 cm aside, each time elsewhere.
   void MakeSet(const std::string& name, const std::vector<int>& moved = {}) {
     const calib::Board board = calib::BoardFromText(kBoardText);
     const auto photos = folder_ / (name + "_photos");
@@ -46,7 +46,7 @@ class ScaleByBoard : public ::testing::Test {
       const Pose pose = CamFromBoard(board, i);
       Pose seen = pose;
       const bool elsewhere = std::find(moved.begin(), moved.end(), i) != moved.end();
-      if (elsewhere) seen = pose * Pose{{}, Eigen::Vector3d(0.03, 0.01 * i, 0)};
+      if (elsewhere) seen = pose * Pose{{}, Eigen::Vector3d(0.03, 0.02 * (i - 3), 0)};
       const auto grey =
           calib::testing::Photo(board, kCamera, seen, 1, static_cast<std::uint64_t>(i));
       ImageRgb8 image(grey.width(), grey.height(), 3);
