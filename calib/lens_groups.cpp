@@ -7,8 +7,8 @@
 namespace dtr::calib {
 namespace {
 
-/// Stabilisers move by some 1 % of the image's size. Farther apart lie pictures that were cropped.
-constexpr double kMostShiftShare = 0.05;
+/// Farther apart lie pictures that were cropped.
+constexpr double kMostShiftShare = 5 * kStabiliserShare;
 
 double Median(std::vector<double> values) {
   std::sort(values.begin(), values.end());

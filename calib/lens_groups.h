@@ -8,6 +8,9 @@
 
 namespace dtr::calib {
 
+/// How far image stabilisers move the principal point, of the image's long side: about a degree.
+inline constexpr double kStabiliserShare = 0.01;
+
 /// Cameras of one lens, with what they have in common.
 struct LensGroup {
   LensCamera lens;  ///< the cameras', with the mean of their principal points
@@ -17,10 +20,10 @@ struct LensGroup {
 /// Whether all but the principal points is equal, to the bit.
 bool SameButForPrincipalPoint(const LensCamera& a, const LensCamera& b);
 
-/// Cameras that differ by their principal points alone, by at most 5 % of the image's long side
-/// from the median, are one lens whose image stabiliser moved between the photos. Others, equal
-/// ones too, are groups of one. Each camera is in one group; groups are in the order of their first
-/// cameras.
+/// Cameras that differ by their principal points alone, by at most five times kStabiliserShare of
+/// the image's long side from the median, are one lens whose image stabiliser moved between the
+/// photos. Others, equal ones too, are groups of one. Each camera is in one group; groups are in
+/// the order of their first cameras.
 std::vector<LensGroup> LensGroups(const std::map<std::uint32_t, LensCamera>& cameras);
 
 }  // namespace dtr::calib

@@ -35,12 +35,14 @@ struct Verdict {
 };
 
 void CheckInput(std::span<const PinholeCamera> cameras, std::span<const Pose> poses,
-                const SparseScene& scene, std::span<const std::string> names) {
-  if (cameras.size() != poses.size() || cameras.size() != names.size()) {
+                const SparseScene& scene, std::span<const std::string> names,
+                const std::vector<bool>& held_out) {
+  if (cameras.size() != poses.size() || cameras.size() != names.size() ||
+      (!held_out.empty() && held_out.size() != cameras.size())) {
     throw Error(
-        fmt::format("validate: expected as many poses and names as cameras ({}), found {} "
-                    "and {}",
-                    cameras.size(), poses.size(), names.size()));
+        fmt::format("validate: expected as many poses, names and roles as cameras ({}), found {}, "
+                    "{} and {}",
+                    cameras.size(), poses.size(), names.size(), held_out.size()));
   }
   for (size_t i = 0; i < poses.size(); ++i) {
     if (!poses[i].rotation.coeffs().allFinite() || !poses[i].translation.allFinite()) {
@@ -186,6 +188,26 @@ Check OutOfLine(const ValidationReport& report, int worst, const ValidateLimits&
                             camera.name, camera.held_out.rms_px, *middle));
 }
 
+std::string Listed(const std::vector<std::string>& names) {
+  std::string list;
+  for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
+  return list;
+}
+
+Check Untested(const ValidationReport& report, const ValidateLimits& limits) {
+  const bool none = report.untested.empty();
+  std::string reason = none ? fmt::format("every camera has at least {} tested observations",
+                                          limits.min_observations)
+                            : fmt::format("fewer than {} tested observations: {}",
+                                          limits.min_observations, Listed(report.untested));
+  if (!report.kept_apart.empty()) {
+    reason += fmt::format("; not asked of held-out photos that took no part: {}",
+                          Listed(report.kept_apart));
+  }
+  return AtMost("cameras_untested", static_cast<double>(report.untested.size()), 0,
+                std::move(reason));
+}
+
 void AddTests(const ValidateLimits& limits, ValidationReport* report) {
   constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
   const ResidualStats& all = report->held_out;
@@ -234,13 +256,16 @@ void AddTests(const ValidateLimits& limits, ValidationReport* report) {
                          fmt::format("{} of {} observations have no point in front of the cameras "
                                      "that explains them",
                                      impossible, judged)));
-  std::string names;
-  for (const std::string& name : report->untested) names += (names.empty() ? "" : ", ") + name;
-  tests.push_back(AtMost(
-      "cameras_untested", static_cast<double>(report->untested.size()), 0,
-      report->untested.empty()
-          ? fmt::format("every camera has at least {} tested observations", limits.min_observations)
-          : fmt::format("fewer than {} tested observations: {}", limits.min_observations, names)));
+  tests.push_back(Untested(*report, limits));
+}
+
+/// Every n-th of the arrows, so that no more than kMostArrows are left.
+void ThinOut(std::vector<ResidualArrow>& arrows) {
+  const size_t step = (arrows.size() + kMostArrows - 1) / kMostArrows;
+  if (step < 2) return;
+  size_t kept = 0;
+  for (size_t i = 0; i < arrows.size(); i += step) arrows[kept++] = arrows[i];
+  arrows.resize(kept);
 }
 
 }  // namespace
@@ -279,8 +304,9 @@ int CellOf(double at_px, int size_px, int cells) {
 ValidationReport ValidateReprojection(std::span<const PinholeCamera> cameras,
                                       std::span<const Pose> cam_from_world,
                                       const SparseScene& scene, const ValidateLimits& limits,
-                                      std::span<const std::string> names, int threads) {
-  CheckInput(cameras, cam_from_world, scene, names);
+                                      std::span<const std::string> names, int threads,
+                                      const std::vector<bool>& held_out) {
+  CheckInput(cameras, cam_from_world, scene, names, held_out);
   const std::vector<std::vector<int>> tracks = Tracks(scene);
   std::vector<Verdict> verdicts(scene.observations.size());
 
@@ -307,20 +333,23 @@ ValidationReport ValidateReprojection(std::span<const PinholeCamera> cameras,
 
   ValidationReport report;
   report.cameras.resize(cameras.size());
-  std::vector<std::vector<Eigen::Vector2d>> held_out(cameras.size()), stored(cameras.size());
-  std::vector<Eigen::Vector2d> all_held_out, all_stored;
+  std::vector<std::vector<Eigen::Vector2d>> predicted(cameras.size()), stored(cameras.size());
+  std::vector<Eigen::Vector2d> all_predicted, all_stored;
+  std::vector<bool> observed(cameras.size(), false);
   std::array<std::vector<Eigen::Vector2d>, kRegionsPerAxis * kRegionsPerAxis> regions;
   for (size_t i = 0; i < verdicts.size(); ++i) {
     const auto view = static_cast<size_t>(scene.observations[i].view);
     const Verdict& verdict = verdicts[i];
     CameraValidation& camera = report.cameras[view];
+    observed[view] = true;
     if (verdict.fate == Fate::kRepeated) continue;
     camera.short_tracks += verdict.fate == Fate::kShortTrack;
     camera.weak_geometry += verdict.fate == Fate::kWeak;
     camera.impossible += verdict.fate == Fate::kImpossible || !verdict.stored_in_front;
     if (verdict.fate == Fate::kTested) {
-      held_out[view].push_back(verdict.held_out_px);
-      all_held_out.push_back(verdict.held_out_px);
+      predicted[view].push_back(verdict.held_out_px);
+      all_predicted.push_back(verdict.held_out_px);
+      camera.arrows.push_back({scene.observations[i].pixel, -verdict.held_out_px});
       regions[RegionOf(cameras[view], scene.observations[i].pixel)].push_back(verdict.held_out_px);
     }
     if (verdict.stored_in_front) {
@@ -331,11 +360,14 @@ ValidationReport ValidateReprojection(std::span<const PinholeCamera> cameras,
   for (size_t i = 0; i < cameras.size(); ++i) {
     CameraValidation& camera = report.cameras[i];
     camera.name = names[i];
-    camera.held_out = Summarise(held_out[i]);
+    camera.held_out = Summarise(predicted[i]);
     camera.stored = Summarise(stored[i]);
-    if (camera.held_out.count < limits.min_observations) report.untested.push_back(camera.name);
+    ThinOut(camera.arrows);
+    if (camera.held_out.count >= limits.min_observations) continue;
+    const bool apart = !held_out.empty() && held_out[i] && !observed[i];
+    (apart ? report.kept_apart : report.untested).push_back(camera.name);
   }
-  report.held_out = Summarise(all_held_out);
+  report.held_out = Summarise(all_predicted);
   report.stored = Summarise(all_stored);
   for (size_t i = 0; i < regions.size(); ++i) report.regions[i] = Summarise(regions[i]);
   AddTests(limits, &report);

@@ -35,6 +35,21 @@ struct ResidualStats {
   Eigen::Vector2d mean_px = Eigen::Vector2d::Zero();  ///< of the vectors: what is systematic
 };
 
+/// Where something was seen, and its residual there, predicted less observed.
+struct ResidualArrow {
+  Eigen::Vector2d pixel, residual_px;
+};
+
+/// A point of a view, and how uncertain it is where two other views place it: standard deviation
+/// per axis, px.
+struct PlacedPixel {
+  Eigen::Vector2d pixel;
+  double sigma_px = 0;
+};
+
+/// Arrows that a camera keeps at most: enough to see a pattern by, few enough to draw.
+inline constexpr size_t kMostArrows = 1500;
+
 /// What became of one camera's observations.
 struct CameraValidation {
   std::string name;
@@ -43,6 +58,8 @@ struct CameraValidation {
   int short_tracks = 0;    ///< points seen by fewer than 3 cameras: nothing to hold out
   int weak_geometry = 0;   ///< the other cameras do not fix the point well enough to judge
   int impossible = 0;      ///< no point in front of the cameras explains the observations
+  std::vector<ResidualArrow> arrows;  ///< of `held_out`: all, or evenly many of them
+  std::vector<PlacedPixel> placed;  ///< of a fresh bundle adjustment (bundle/judge.h); may be empty
 };
 
 /// Number of image regions per axis.
@@ -63,6 +80,9 @@ struct ValidationReport {
   /// model that does not fit shows here first.
   std::array<ResidualStats, kRegionsPerAxis * kRegionsPerAxis> regions;
   std::vector<std::string> untested;  ///< cameras with too few tested observations
+  /// Held-out cameras without a single observation, as --holdout-strict stores them: nothing here
+  /// can test them, and nothing is asked of them; what they saw judges the set (`dtr evaluate`).
+  std::vector<std::string> kept_apart;
   std::string adjustment_json;  ///< what a fresh bundle adjustment says (bundle/judge.h); may be ""
   /// Why no fresh bundle adjustment judged it; empty where one did.
   std::string not_judged;
@@ -84,17 +104,19 @@ struct ValidationReport {
 /// what a shared shift of all pixels does, which triangulation can absorb: a half-pixel slip of an
 /// importer is a mean residual of half a pixel.
 ///
-/// `names[i]`, `cameras[i]` and `cam_from_world[i]` belong together. The result does not depend on
-/// `threads` (0: all cores). Throws Error when an index is out of range, a number is not finite or
-/// the lists differ in length.
+/// `names[i]`, `cameras[i]` and `cam_from_world[i]` belong together, and `held_out[i]` with them
+/// (empty: none is): a held-out camera without any observation is kept apart instead of failing
+/// `cameras_untested`. The result does not depend on `threads` (0: all cores). Throws Error when an
+/// index is out of range, a number is not finite or the lists differ in length.
 ValidationReport ValidateReprojection(std::span<const PinholeCamera> cameras,
                                       std::span<const Pose> cam_from_world,
                                       const SparseScene& scene, const ValidateLimits& limits,
-                                      std::span<const std::string> names, int threads = 0);
+                                      std::span<const std::string> names, int threads = 0,
+                                      const std::vector<bool>& held_out = {});
 
 /// JSON object: passed, tests[].{name,value,limit,passed,reason},
 /// cameras[].{name,held_out,stored,short_tracks,weak_geometry,impossible}, held_out, stored,
-/// regions[9], untested[], adjustment (where there is one); residuals as
+/// regions[9], untested[], kept_apart[], adjustment (where there is one); residuals as
 /// {count,rms_px,median_px,p95_px,worst_px,mean_x_px, mean_y_px}.
 std::string ToJson(const ValidationReport& report);
 

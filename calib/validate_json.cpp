@@ -27,6 +27,7 @@ std::string ToJson(const ValidationReport& report) {
     json["regions"].push_back(ToJsonValue(region));
   }
   json["untested"] = report.untested;
+  json["kept_apart"] = report.kept_apart;
   if (!report.adjustment_json.empty()) json["adjustment"] = Json::parse(report.adjustment_json);
   // Names come from files: bytes that are no UTF-8 must not make the whole report unreadable.
   return json.dump(2, ' ', false, Json::error_handler_t::replace);

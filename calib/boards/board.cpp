@@ -118,6 +118,7 @@ Board BoardFromText(const std::string& text) {
   const auto square = LengthFrom(parts[2]);
   if (!square) RefuseText(text, "no length in '" + parts[2] + "'");
   board.square = square->value;
+  board.metric = square->has_unit;
   size_t next = 3;
   if (charuco) {
     if (std::min(board.columns, board.rows) < 0) RefuseText(text, "no size in '" + parts[1] + "'");
@@ -145,11 +146,12 @@ Board BoardFromText(const std::string& text) {
 }
 
 std::string TextOf(const Board& board) {
+  const char* unit = board.metric ? "m" : "";
   if (board.kind == Board::Kind::kChessboard) {
-    return fmt::format("chessboard:{}x{}:{}", board.columns, board.rows, board.square);
+    return fmt::format("chessboard:{}x{}:{}{}", board.columns, board.rows, board.square, unit);
   }
-  return fmt::format("charuco:{}x{}:{}:{}:{}{}", board.columns + 1, board.rows + 1, board.square,
-                     board.marker_share, board.dictionary, board.inverted ? ":inverted" : "");
+  return fmt::format("charuco:{}x{}:{}{}:{}:{}{}", board.columns + 1, board.rows + 1, board.square,
+                     unit, board.marker_share, board.dictionary, board.inverted ? ":inverted" : "");
 }
 
 }  // namespace dtr::calib

@@ -20,6 +20,7 @@ struct Board {
   double marker_share = 0;  ///< side of a marker over side of a square
   std::string dictionary;   ///< OpenCV's name: "DICT_4X4_1000"
   bool inverted = false;    ///< printed white on black
+  bool metric = false;      ///< `square` is in metres; else in a unit that is the user's own
 
   int CornerCount() const { return columns * rows; }
   Eigen::Vector3d Corner(int id) const;
@@ -33,7 +34,7 @@ struct Board {
 /// metres. Throws UsageError saying what was expected.
 Board BoardFromText(const std::string& text);
 
-/// The inverse of BoardFromText, lengths without unit.
+/// The inverse of BoardFromText, lengths in metres (`0.025m`) or without a unit.
 std::string TextOf(const Board& board);
 
 /// Throws Error, starting with `where`, unless sizes are within 2..1000, lengths positive and

@@ -14,6 +14,7 @@
 #include "calib/bundle/lens_params.h"
 #include "calib/bundle/normalised.h"
 #include "calib/bundle/rig_adjust.h"
+#include "calib/lens_groups.h"
 #include "calib/solve/board_start.h"
 #include "dtr/base/error.h"
 
@@ -132,15 +133,12 @@ struct ShiftCost {
   }
 };
 
-// How far stabilisers move the principal point, of the image's long side: about a degree.
-constexpr double kShiftShare = 0.01;
-
 void AddShiftPriors(const Bundle& bundle, double sigma_px, Normalised& n, ceres::Problem& problem) {
   for (size_t i = 0; i < n.shift.size(); ++i) {
     if (!problem.HasParameterBlock(n.shift[i].data())) continue;
     const BundleImage& image = bundle.images[i];
     const LensCamera& lens = bundle.lenses[static_cast<size_t>(image.lens)];
-    const double known_px = kShiftShare * std::max(lens.width_px, lens.height_px);
+    const double known_px = kStabiliserShare * std::max(lens.width_px, lens.height_px);
     problem.AddResidualBlock(new ceres::AutoDiffCostFunction<ShiftCost, 2, 2>(new ShiftCost{
                                  image.shift_px, n.ShiftScalePx(bundle, i), sigma_px / known_px}),
                              nullptr, n.shift[i].data());

@@ -14,8 +14,8 @@ enum class LensFreedom {
   kNoPrincipalPoint,  ///< focal lengths and distortion, as COLMAP does
   kAll,
   /// All, and the principal point of every image by itself, as image stabilisers move it. It is
-  /// held near its lens's by a standard deviation of 1 % of the image's long side, so that what the
-  /// sights cannot tell stays put. Not with poses that are fixed, nor for rigs.
+  /// held near its lens's by a standard deviation of kStabiliserShare of the image's long side, so
+  /// that what the sights cannot tell stays put. Not with poses that are fixed, nor for rigs.
   kPrincipalPointPerImage,
 };
 /// "fixed", "no-principal-point", "all", "principal-point-per-image".

@@ -136,11 +136,11 @@ std::vector<std::vector<int>> SightsByImage(const Adjusted& fresh) {
   return sights;
 }
 
-// 95 % over an image's points of the standard deviation (px per axis) of where the two images that
-// share most points with it place them.
-double PictureShift(const Adjusted& fresh, const BundleCovariance& covariance,
-                    const std::vector<std::vector<int>>& sights,
-                    const std::vector<std::vector<int>>& seen_by, int image) {
+// An image's points, and the standard deviation (px per axis) of where the two images that share
+// most points with it place them.
+std::vector<PlacedPixel> Placed(const Adjusted& fresh, const BundleCovariance& covariance,
+                                const std::vector<std::vector<int>>& sights,
+                                const std::vector<std::vector<int>>& seen_by, int image) {
   const auto& own = sights[static_cast<size_t>(image)];
   std::map<int, int> shared;
   for (const int i : own) {
@@ -151,19 +151,27 @@ double PictureShift(const Adjusted& fresh, const BundleCovariance& covariance,
   for (const auto& [other, times] : shared) {
     if (other != image && times > 0) ranked.emplace_back(-times, other);
   }
-  if (ranked.size() < 2) return kNothing;
+  if (ranked.size() < 2) return {};
   std::sort(ranked.begin(), ranked.end());
   const int a = ranked[0].second, b = ranked[1].second;
   const auto step = std::max<size_t>(1, own.size() / kPointsPerView);
-  std::vector<double> shifts;
+  std::vector<PlacedPixel> placed;
   for (size_t k = 0; k < own.size(); k += step) {
     const auto& o = fresh.bundle.observations[static_cast<size_t>(own[k])];
     const Eigen::Vector4d& h = fresh.bundle.points[static_cast<size_t>(o.point)];
     const Eigen::Matrix2d variance =
         TransferCovariance(fresh.bundle, covariance, h.head<3>() / h[3], a, b, image);
-    if (variance.allFinite()) shifts.push_back(std::sqrt(std::max(0.0, variance.trace() / 2)));
+    if (!variance.allFinite()) continue;
+    placed.push_back({o.pixel, std::sqrt(std::max(0.0, variance.trace() / 2))});
   }
-  if (shifts.empty()) return kNothing;
+  return placed;
+}
+
+// 95 % of their standard deviations.
+double PictureShift(const std::vector<PlacedPixel>& placed) {
+  if (placed.empty()) return kNothing;
+  std::vector<double> shifts;
+  for (const PlacedPixel& point : placed) shifts.push_back(point.sigma_px);
   std::sort(shifts.begin(), shifts.end());
   return shifts[static_cast<size_t>(0.95 * static_cast<double>(shifts.size() - 1))];
 }
@@ -180,8 +188,9 @@ void PictureShifts(const Adjusted& fresh, const BundleCovariance& covariance, in
     }
   }
   ParallelFor(0, static_cast<int>(sights.size()), threads, [&](int i) {
-    judgement.cameras[static_cast<size_t>(i)].picture_shift_px =
-        PictureShift(fresh, covariance, sights, seen_by, i);
+    CameraJudgement& camera = judgement.cameras[static_cast<size_t>(i)];
+    camera.placed = Placed(fresh, covariance, sights, seen_by, i);
+    camera.picture_shift_px = PictureShift(camera.placed);
   });
 }
 
@@ -308,6 +317,7 @@ void WidenByHalves(Judgement& judgement) {
     camera.turn_sigma_rad *= factor;
     camera.centre_sigma *= factor;
     camera.picture_shift_px *= factor;
+    for (PlacedPixel& point : camera.placed) point.sigma_px *= factor;
   }
 }
 
@@ -324,7 +334,8 @@ void AddDifferences(const BundleLimits& limits, Judgement& judgement) {
                                        limits.max_sigmas, negligible_px, LensReason(*lens)));
   const auto camera = std::max_element(judgement.cameras.begin(), judgement.cameras.end(), by_rank);
   judgement.tests.push_back(Difference(
-      "camera_difference_sigmas", camera->sigmas, camera->moved_px, limits.max_sigmas, negligible_px,
+      "camera_difference_sigmas", camera->sigmas, camera->moved_px, limits.max_sigmas,
+      negligible_px,
       fmt::format("{}: its stored pose against a fresh solve; its points move by {:.3g} px",
                   camera->name, camera->moved_px)));
 }
@@ -397,7 +408,8 @@ Judgement Judge(const Bundle& given, const BundleLimits& limits, int threads) {
   judgement.degeneracies = FindDegeneracies(fresh, covariance, limits.max_focal_share);
   AddDegeneracies(judgement);
   if (!covariance.computed) {
-    judgement.not_judged = fmt::format("more than {} unknowns: too many for their covariance", kMostUnknowns);
+    judgement.not_judged =
+        fmt::format("more than {} unknowns: too many for their covariance", kMostUnknowns);
     return judgement;
   }
   if (!covariance.determined) return judgement;

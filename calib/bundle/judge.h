@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "calib/bundle/covariance.h"
+#include "calib/validate.h"
 #include "dtr/types/check.h"
 
 namespace dtr::calib {
@@ -38,11 +39,12 @@ struct Degeneracy {
 /// What is known of one camera (image) after the fresh solve.
 struct CameraJudgement {
   std::string name;
-  double sigmas = 0;            ///< stored pose against the fresh one
-  double moved_px = 0;          ///< RMS over its sights, stored camera against fresh one
-  double turn_sigma_rad = 0;    ///< largest axis of the turn's uncertainty
-  double centre_sigma = 0;      ///< of the centre's, world units, in the free network's gauge
-  double picture_shift_px = 0;  ///< 95 %; NaN where no two neighbours place its points
+  double sigmas = 0;                ///< stored pose against the fresh one
+  double moved_px = 0;              ///< RMS over its sights, stored camera against fresh one
+  double turn_sigma_rad = 0;        ///< largest axis of the turn's uncertainty
+  double centre_sigma = 0;          ///< of the centre's, world units, in the free network's gauge
+  double picture_shift_px = 0;      ///< 95 %; NaN where no two neighbours place its points
+  std::vector<PlacedPixel> placed;  ///< the points that it is the 95 % of
 };
 
 /// What is known of one lens: differences and uncertainties of its parameters.

@@ -13,6 +13,16 @@
 
 namespace dtr::calib {
 
+/// Of a rig whose cameras take their pictures when they like.
+struct KeptDelay {
+  /// Its pictures of a frame are later than the first camera's by this, in frames, and the standard
+  /// deviation.
+  double frames = 0, sigma = 0;
+  /// Its corners are kept where they would have been seen at the moment of the frame's camera with
+  /// the least delay.
+  bool corners_moved = false;
+};
+
 /// A camera as a solve left it.
 struct CalibratedCamera {
   std::string name;
@@ -24,6 +34,7 @@ struct CalibratedCamera {
   /// (solve/rig.h) has them; empty for the first camera and outside of rigs.
   Pose cam_from_rig{};
   Eigen::MatrixXd place_covariance{};
+  std::optional<KeptDelay> delay{};
 };
 
 /// A view of the board: what was seen, and how the calibration explains it.

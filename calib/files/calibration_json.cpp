@@ -61,6 +61,11 @@ Json CameraJson(const CalibratedCamera& camera) {
     json["cam_from_rig"] = PoseJson(camera.cam_from_rig);
     json["place_covariance"] = MatrixJson(camera.place_covariance);
   }
+  if (camera.delay) {
+    json["delay"] = {{"frames", camera.delay->frames},
+                     {"sigma_frames", camera.delay->sigma},
+                     {"corners_moved", camera.delay->corners_moved}};
+  }
   return json;
 }
 
@@ -188,6 +193,11 @@ CalibratedCamera ReadCamera(const JsonObject& object, const std::string& file, b
   if (object.Has("cam_from_rig")) {
     camera.cam_from_rig = ReadPose(object, "cam_from_rig");
     camera.place_covariance = ReadCovariance(object, "place_covariance", 6);
+  }
+  if (object.Has("delay")) {
+    const JsonObject delay = object.Object("delay");
+    camera.delay = {delay.Number("frames"), delay.Positive("sigma_frames"),
+                    delay.Has("corners_moved") && delay.Value("corners_moved") == Json(true)};
   }
   camera.rms_px = object.Number("rms_px");
   camera.sigma_px = object.Positive("sigma_px");

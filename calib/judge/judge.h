@@ -50,11 +50,6 @@ struct UnseenViews {
   size_t frames = 0;
 };
 
-/// A corner's residual, predicted less observed.
-struct ResidualArrow {
-  Eigen::Vector2d pixel, residual_px;
-};
-
 struct JudgedView {
   std::string name;
   double rms_px = 0, worst_px = 0;

@@ -65,6 +65,11 @@ void AddBuildCommand(CLI::App& app) {
                 "--poses", options->poses,
                 "Known cameras: a COLMAP model, cameras.json or poses_bounds.npy; no SfM then")
             ->type_name("FILE");
+        command
+            .add_option("--rig", options->rig,
+                        "Calibration of the rig that took all photos, of `dtr calibrate rig`: its "
+                        "lenses, places and scale are held")
+            ->type_name("RIG.json");
         command.add_flag("!--no-refine", options->refine,
                          "Take COLMAP's cameras as they are, without bundle adjustment");
         command.add_flag("--force", options->force, "Replace a set that exists");

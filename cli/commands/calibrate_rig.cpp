@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 struct Options {
   fs::path folder;
   std::vector<fs::path> outputs;
-  std::string board, model = "auto", loss = "robust", lenses = "free";
+  std::string board, model = "auto", loss = "robust", lenses = "free", clocks = "synchronised";
   std::vector<std::string> given;
 };
 
@@ -27,6 +27,34 @@ std::optional<calib::BoardModel> ModelFrom(const std::string& name) {
   const auto model = calib::BoardModelFromName(name);
   if (!model) throw UsageError("--model " + name + ": expected auto or the name of a model");
   return model;
+}
+
+std::string DelayText(const std::string& camera, const std::string& first, double frames,
+                      double sigma) {
+  return fmt::format("{}: its pictures are {:.4f} +- {:.2g} frames {} {}'s", camera,
+                     std::abs(frames), sigma, frames < 0 ? "before" : "after", first);
+}
+
+// When the cameras take their pictures: what was found, or what speaks against one clock.
+void SayDelays(const calib::Calibration& calibration, const pipeline::RigSummary& summary,
+               Console& console) {
+  const std::string& first = calibration.cameras.front().name;
+  for (const calib::CalibratedCamera& camera : calibration.cameras) {
+    if (!camera.delay) continue;
+    console.Say(DelayText(camera.name, first, camera.delay->frames, camera.delay->sigma) +
+                (camera.delay->corners_moved ? "; its corners are moved by as much"
+                                             : ", which may be chance"));
+  }
+  for (size_t c = 1; c < summary.delays.size(); ++c) {
+    const auto& delay = summary.delays[c];
+    if (!delay || std::abs(delay->frames) <= calib::kDelaySigmas * delay->sigma) continue;
+    console.Say(
+        DelayText(calibration.cameras[c].name, first, delay->frames, delay->sigma) +
+        "; if the board moved from frame to frame at one pace, --clocks free allows for that");
+  }
+  if (summary.passes > 1) {
+    console.Say(fmt::format("delays settled after {} solves", summary.passes));
+  }
 }
 
 void SayRig(const calib::Calibration& calibration, const pipeline::RigSummary& summary,
@@ -77,6 +105,7 @@ int RunCalibrateRig(const Options& options, const Context& context) {
   calibrate.solve.loss =
       options.loss == "quadratic" ? calib::Loss::kQuadratic : calib::Loss::kRobust;
   calibrate.fixed_lenses = options.lenses == "fixed";
+  calibrate.free_running = options.clocks == "free";
   calibrate.threads = context.common.threads;
   calibrate.seed = context.common.seed;
   for (const std::string& given : options.given) {
@@ -93,6 +122,7 @@ int RunCalibrateRig(const Options& options, const Context& context) {
   const auto calibration = pipeline::CalibrateRig(board, photos, calibrate, &summary);
   for (const fs::path& output : options.outputs) pipeline::WriteRigFile(output, calibration);
   SayRig(calibration, summary, context.console);
+  SayDelays(calibration, summary, context.console);
   context.EmitJson(calib::SummaryJson(calibration));
   return kDone;
 }
@@ -136,6 +166,13 @@ void AddCalibrateRigCommand(CLI::App& calibrate) {
                         "free: solved for together with the rig; fixed: as given by --camera, or "
                         "as each camera's own boards say [free; fixed with --camera]")
             ->check(CLI::IsMember({"free", "fixed"}))
+            ->type_name("NAME");
+        command
+            .add_option("--clocks", options->clocks,
+                        "synchronised: pictures of a frame are of one moment; free: each camera "
+                        "takes its own when it likes, at the same rate, and its delay is found "
+                        "from the board's motion [synchronised]")
+            ->check(CLI::IsMember({"synchronised", "free"}))
             ->type_name("NAME");
         command
             .add_option("--loss", options->loss,

@@ -18,6 +18,7 @@ namespace {
 struct Options {
   pipeline::ScaleOptions scale;
   std::vector<std::string> distances;
+  std::string board;
 };
 
 [[noreturn]] void Refuse(const std::string& text, const std::string& what) {
@@ -88,11 +89,23 @@ pipeline::ScaleDistance DistanceFrom(const DtrSet& set, const std::string& text)
   return distance;
 }
 
+calib::Board MetricBoard(const std::string& text) {
+  const calib::Board board = calib::BoardFromText(text);
+  if (board.metric) return board;
+  throw UsageError(fmt::format(
+      "--board {}: expected a square in mm, cm or m, found a length without a unit", text));
+}
+
 int RunScale(Options options, const Context& context) {
-  if (options.distances.empty() == options.scale.gps.empty()) {
-    throw UsageError("calibrate scale: expected --distance (once or more) or --gps, found " +
-                     std::string(options.distances.empty() ? "neither" : "both"));
+  const int ways = (options.distances.empty() ? 0 : 1) + (options.scale.gps.empty() ? 0 : 1) +
+                   (options.board.empty() ? 0 : 1);
+  if (ways != 1) {
+    throw UsageError(
+        fmt::format("calibrate scale: expected --distance (once or more), --board or --gps, found "
+                    "{}",
+                    ways == 0 ? "none of them" : "several"));
   }
+  if (!options.board.empty()) options.scale.board = MetricBoard(options.board);
   const DtrSet set = io::ReadSet(options.scale.set);
   RequireOneFrame(set);
   for (const std::string& text : options.distances) {
@@ -129,6 +142,12 @@ void AddCalibrateScaleCommand(CLI::App& calibrate) {
                                "triangulated, or VIEW for the camera itself; LENGTH as 2.5m, or "
                                "2.5m+-5mm with its standard deviation; may be given more than once")
                    ->type_name("A,B=LENGTH");
+               command
+                   .add_option("--board", options->board,
+                               "A board that stood still in the scene and is seen in 3 views or "
+                               "more, as calibrate board takes it, with a unit: "
+                               "chessboard:9x6:25mm")
+                   ->type_name("BOARD");
                command
                    .add_option("--gps", scale.gps,
                                "Folder of the set's photos, whose EXIF says where they were taken")

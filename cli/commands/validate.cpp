@@ -5,8 +5,11 @@
 #include "calib/judge/judge.h"
 #include "cli/command.h"
 #include "cli/commands/validate_calibration.h"
+#include "cli/output_file.h"
 #include "cli/pipeline/validate_set.h"
+#include "cli/pipeline/validation_page.h"
 #include "dtr/base/error.h"
+#include "dtr/base/files.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/instants.h"
 
@@ -38,12 +41,14 @@ void SayReport(const calib::ValidationReport& report, Console& console) {
   for (const std::string& name : report.untested) {
     console.Say("not tested, too few observations: " + name);
   }
+  for (const std::string& name : report.kept_apart) {
+    console.Say("not tested, held out without observations; dtr evaluate judges by it: " + name);
+  }
 }
 
 void RefuseForSets(const ValidateCalibrationOptions& options) {
   for (const auto& [given, name] :
        {std::pair{options.images.has_value(), "--images"},
-        std::pair{options.report.has_value(), "--report"},
         std::pair{options.max_uncertainty_px.has_value(), "--max-uncertainty"}}) {
     if (given) throw UsageError(fmt::format("{}: is for calibration files, not for sets", name));
   }
@@ -56,11 +61,19 @@ int RunValidate(Options options, const Context& context) {
   }
   RefuseForSets(options.calibration);
   options.limits.max_rms_px = options.calibration.max_rms_px.value_or(options.limits.max_rms_px);
+  const auto& page = options.calibration.report;
+  if (page) RequireOutputFile(*page, "--report", {".html"});
   const DtrSet set = io::ReadSet(options.set);
   RequireOneFrame(set);
   const SparseScene sparse = io::LoadSparse(options.set, set);
   const auto report = pipeline::ValidateSet(set, sparse, options.limits, context.common.threads);
   SayReport(report, context.console);
+  if (page) {
+    const std::string name = options.set.lexically_normal().filename().string();
+    WriteFileAtomically(
+        *page, pipeline::ValidationPage(options.set, set, report, "Calibration of " + name));
+    context.console.Say("report: " + page->string());
+  }
   context.EmitJson(calib::ToJson(report));
   return report.passed() ? kDone : kFailed;
 }

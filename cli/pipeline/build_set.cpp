@@ -47,6 +47,7 @@ Json OptionsJson(const BuildOptions& options, const stereo::Effort& effort, int 
   json["holdout_strict"] = options.holdout_strict;
   json["poses"] = options.poses.filename().string();
   json["refine"] = options.refine;
+  if (!options.rig.empty()) json["rig"] = options.rig.filename().string();
   json["seed"] = options.seed;
   if (options.depth.depth_error_px) json["depth_error_px"] = *options.depth.depth_error_px;
   return json;
@@ -191,6 +192,33 @@ std::vector<SparsePoint> SourcePoints(const SparseScene& sparse, const std::vect
   return RestrictToViews(sparse, is_source).points;
 }
 
+// What the options ask for that cannot be had together.
+void RequireOptions(const BuildOptions& options) {
+  if (options.holdout_strict && (options.holdout.empty() || !options.poses.empty())) {
+    throw UsageError(
+        "--holdout-strict: keeps the photos of --holdout out of SfM; it needs --holdout and "
+        "no --poses");
+  }
+  if (options.rig.empty()) return;
+  if (!options.poses.empty()) {
+    throw UsageError("--rig: places what SfM finds; expected no --poses beside it");
+  }
+  if (!options.refine) {
+    throw UsageError("--rig: is bundle adjustment; expected no --no-refine beside it");
+  }
+  if (capture::VideosOf(options.photos).empty()) return;
+  if (!options.video.synchronised) {
+    throw UsageError(
+        "--rig: needs frames of the same instants; expected --synchronised for videos");
+  }
+  if (std::filesystem::exists(options.photos / "timestamps.csv")) {
+    throw UsageError(fmt::format(
+        "--rig {}: expected videos whose frames of equal number are of one instant, found {}, "
+        "which says which are; give photos, one folder per camera, of equal names",
+        options.rig.string(), (options.photos / "timestamps.csv").string()));
+  }
+}
+
 void RequireTwoSources(const capture::Capture& capture, const std::vector<bool>& held_out,
                        const CalibratedPhotos& calibrated) {
   int sources = 0;
@@ -272,11 +300,9 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
                                                    : PresetCalled(options.depth.preset).max_size_px;
   const stereo::Effort effort = EffortOf(options.depth);
   RequireEngine(options.depth);
-  if (options.holdout_strict && (options.holdout.empty() || !options.poses.empty())) {
-    throw UsageError(
-        "--holdout-strict: keeps the photos of --holdout out of SfM; it needs --holdout and "
-        "no --poses");
-  }
+  RequireOptions(options);
+  std::optional<SetRig> rig;
+  if (!options.rig.empty()) rig = ReadSetRig(options.rig);
   BuildReport report;
   RunLog log;
 
@@ -288,12 +314,15 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
   const auto look = [&] {
     capture::RequireEnoughPhotos(photos, options.photos);
     held_out = ChooseHeldOut(options.holdout, NamesOf(photos));
+    if (!rig) return;
+    (void)PhotosOfRig(*rig, photos);  // refused here, before any work
+    TellPhotosTheirLens(*rig, photos);
   };
   if (!from_video) {
     photos = capture::IngestPhotos(options.photos, {.threads = options.threads}, progress);
     look();
   }
-  const Json fingerprint = {
+  Json fingerprint = {
       {"tool_version", DTR_VERSION},
       {"options", OptionsJson(options, effort, max_size_px)},
       {"time_budget_s", options.depth.time_budget_s.value_or(0)},
@@ -301,6 +330,7 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
                             : PhotosJson(photos, std::vector<bool>(held_out.size(), true))},
       {"poses_sha256", InputHash(options.poses)},
       {"workspace_sha256", InputHash(options.depth.workspace)}};
+  if (rig) fingerprint["rig_sha256"] = InputHash(options.rig);
   io::SetWriter writer(options.output, fingerprint.dump(), options.force);
   if (!options.force_stage.empty()) ForgetStage(writer.folder(), options.force_stage);
   if (from_video) {
@@ -322,7 +352,8 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
                        options.seed,
                        options.depth.memory_gb.value_or(kDefaultMemoryGb),
                        options.refine,
-                       {}},
+                       {},
+                       rig},
                       writer.work_folder() / "calibration", progress);
   report.not_registered = calibrated.not_registered;
   for (size_t i = 0; i < held_out.size(); ++i) {
@@ -353,12 +384,12 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
     RecodeDepth(set, *options.depth.depth_error_px, writer, options.threads);
   }
   WriteMeshes(set, writer, options.threads);
-  const calib::ValidationReport validation =
-      Validate(set, sparse, report, options.threads, progress);
-  writer.WriteSparse(set, sparse);
   set.provenance_json = ProvenanceJson(options, OptionsJson(options, spent, max_size_px),
                                        PhotosJson(photos, is_source), calibrated, report)
                             .dump();
+  const calib::ValidationReport validation =
+      Validate(set, sparse, report, options.threads, progress);
+  writer.WriteSparse(set, sparse);
   WriteSetPage(writer, set,
                {options.output.stem().string(), options.depth.engine, validation.tests,
                 report.skipped, report.not_registered.size(), options.threads});

@@ -74,7 +74,13 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
   calibrated.engine = sfm.report.version;
   Json report = SfmJson(sfm.report, sfm.model);
   calibrated.model = std::move(sfm.model);
-  if (options.refine || options.lens) RefineModel(options, calibrated.model, report, progress);
+  if (options.rig) {
+    progress.Stage("bundle adjustment of the rig", 0);
+    report["rig"] = Json::parse(PlaceByRig(*options.rig, capture, calibrated.model));
+    calibrated.unit = options.rig->unit;
+  } else if (options.refine || options.lens) {
+    RefineModel(options, calibrated.model, report, progress);
+  }
   calibrated.report_json = report.dump();
   if (options.strict) {
     RegisterHeldOutPhotos(Subset(capture, options.held_out), inputs, workspace, sfm_options,

@@ -8,6 +8,7 @@
 
 #include "calib/sfm_model.h"
 #include "capture/capture.h"
+#include "cli/pipeline/set_rig.h"
 #include "dtr/base/progress.h"
 #include "dtr/types/dtr_set.h"
 
@@ -24,6 +25,7 @@ struct CalibrateOptions {
   double memory_gb = 4;
   bool refine = true;  ///< bundle adjustment after SfM, where held-out sights say that it pays
   std::optional<calib::LensCamera> lens;  ///< of all photos, known: SfM's own is replaced by it
+  std::optional<SetRig> rig;              ///< took all photos: its lenses, places and scale hold
 };
 
 /// Calibrated photos, frozen: everything later depends on this model alone.

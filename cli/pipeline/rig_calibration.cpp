@@ -84,8 +84,17 @@ calib::Calibration CalibrateRig(const calib::Board& board, const RigPhotos& phot
   calib::RigOptions rig_options;
   rig_options.solve = options.solve;
   rig_options.free_lenses = !options.fixed_lenses && options.given.empty();
-  const calib::RigSolution solution = calib::SolveRig(
-      board, InputsOf(board, photos, options), photos.views, photos.frames.size(), rig_options);
+  const auto inputs = InputsOf(board, photos, options);
+  calib::FreeRunning solved;
+  if (options.free_running) {
+    solved =
+        calib::SolveFreeRunning(board, inputs, photos.views, photos.frames.size(), rig_options);
+  } else {
+    solved.solution =
+        calib::SolveRig(board, inputs, photos.views, photos.frames.size(), rig_options);
+    summary->delays = calib::DelaysOf(board, solved.solution);
+  }
+  const calib::RigSolution& solution = solved.solution;
   calib::Calibration calibration;
   calibration.board = board;
   calibration.lenses_given = !rig_options.free_lenses;
@@ -103,6 +112,9 @@ calib::Calibration CalibrateRig(const calib::Board& board, const RigPhotos& phot
     const int lens = solution.layout.LensAt(c), place = solution.layout.PlaceAt(c);
     if (lens >= 0) out.covariance = solution.covariance.block(lens, lens, count, count);
     if (place >= 0) out.place_covariance = solution.covariance.block(place, place, 6, 6);
+    if (options.free_running && c > 0 && solved.delays[c]) {
+      out.delay = {solved.delays[c]->frames, solved.delays[c]->sigma, solved.moved[c]};
+    }
     calibration.cameras.push_back(std::move(out));
   }
   for (const calib::RigView& view : solution.rig.views) {
@@ -114,8 +126,13 @@ calib::Calibration CalibrateRig(const calib::Board& board, const RigPhotos& phot
   calibration.left_out = photos.left_out;
   calibration.left_out.insert(calibration.left_out.end(), solution.left_out.begin(),
                               solution.left_out.end());
-  *summary = {solution.rows.size(), solution.corners,  solution.outliers,
-              solution.rms_px,      solution.sigma_px, solution.flipped};
+  summary->frames = solution.rows.size();
+  summary->corners = solution.corners;
+  summary->outliers = solution.outliers;
+  summary->rms_px = solution.rms_px;
+  summary->sigma_px = solution.sigma_px;
+  summary->flipped = solution.flipped;
+  summary->passes = solved.passes;
   return calibration;
 }
 

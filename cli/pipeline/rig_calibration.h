@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "calib/files/calibration.h"
+#include "calib/judge/free_running.h"
 #include "calib/solve/rig_solve.h"
 #include "cli/pipeline/rig_photos.h"
 
@@ -17,6 +18,7 @@ struct RigCalibrationOptions {
   std::optional<calib::BoardModel> model;  ///< empty: each camera's own, by held-out views
   calib::SolveOptions solve;
   bool fixed_lenses = false;
+  bool free_running = false;  ///< cameras take their pictures when they like: delays are found too
   std::map<std::string, calib::RigCameraInput> given;  ///< lenses by camera; then they are fixed
   int threads = 0;
   std::uint64_t seed = 0;
@@ -27,6 +29,9 @@ struct RigSummary {
   int corners = 0, outliers = 0;
   double rms_px = 0, sigma_px = 0;
   std::vector<std::string> flipped;
+  int passes = 1;  ///< solves, of free-running cameras
+  /// Of cameras that were taken to be synchronised: what speaks against it (calib/judge).
+  std::vector<std::optional<calib::CameraDelay>> delays;
 };
 
 /// Solves for the rig behind the photos. Throws UsageError when lenses are given for some cameras

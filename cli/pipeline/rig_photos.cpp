@@ -13,6 +13,7 @@
 #include "calib/boards/repeats.h"
 #include "capture/ingest.h"
 #include "capture/video/frames.h"
+#include "cli/pipeline/rig_names.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/base/parallel_for.h"
@@ -59,13 +60,6 @@ bool IsPhoto(const fs::path& path) {
   return fs::is_regular_file(path) && capture::IsImageExtension(path.extension().string());
 }
 
-// The digits at the end of a name; empty where there are none.
-std::string DigitsAtEnd(const std::string& name) {
-  size_t at = name.size();
-  while (at > 0 && name[at - 1] >= '0' && name[at - 1] <= '9') --at;
-  return name.substr(at);
-}
-
 // Numbers in names are compared as such: 2 comes before 10.
 bool EarlierName(const std::string& a, const std::string& b) {
   const std::string x = DigitsAtEnd(a), y = DigitsAtEnd(b);
@@ -93,7 +87,7 @@ Layout FromSubfolders(const std::vector<fs::path>& folders) {
       Shot shot;
       shot.file = photo;
       shot.name = folder.filename().string() + "/" + photo.filename().string();
-      shot.frame = photo.stem().string();
+      shot.frame = RigNameOf(shot.name)->frame;
       shot.camera = layout.cameras.size();
       layout.shots.push_back(std::move(shot));
     }
@@ -107,23 +101,20 @@ Layout FromNames(const std::vector<fs::path>& photos) {
   Layout layout;
   std::map<std::string, size_t> cameras;
   for (const fs::path& photo : photos) {
-    const std::string stem = photo.stem().string(), digits = DigitsAtEnd(stem);
-    const std::string camera = stem.substr(0, stem.size() - digits.size());
-    if (!digits.empty() && !camera.empty()) cameras.emplace(camera, 0);
+    if (const auto named = RigNameOf(photo.filename().string())) cameras.emplace(named->camera, 0);
   }
   for (auto& [name, index] : cameras) {
     index = layout.cameras.size();
     layout.cameras.push_back(name);
   }
   for (const fs::path& photo : photos) {
-    const std::string stem = photo.stem().string(), digits = DigitsAtEnd(stem);
-    const auto camera = cameras.find(stem.substr(0, stem.size() - digits.size()));
-    if (digits.empty() || camera == cameras.end()) continue;
+    const auto named = RigNameOf(photo.filename().string());
+    if (!named) continue;
     Shot shot;
     shot.file = photo;
     shot.name = photo.filename().string();
-    shot.frame = digits;
-    shot.camera = camera->second;
+    shot.frame = named->frame;
+    shot.camera = cameras.at(named->camera);
     layout.shots.push_back(std::move(shot));
   }
   OrderFrames(layout);

@@ -12,6 +12,7 @@
 #include "calib/scale.h"
 #include "cli/pipeline/finishing.h"
 #include "cli/pipeline/run_log.h"
+#include "cli/pipeline/scale_board.h"
 #include "cli/pipeline/set_page.h"
 #include "cli/pipeline/validate_set.h"
 #include "dtr/base/error.h"
@@ -143,6 +144,36 @@ Found FromGps(const ScaleOptions& options, const DtrSet& set) {
   return found;
 }
 
+Found FromBoard(const ScaleOptions& options, const DtrSet& set, Progress& progress) {
+  const calib::Board& board = *options.board;
+  BoardInSet in_set = FindBoard(options.set, set, board, options.threads, progress);
+  calib::BoardScale scale = calib::ScaleFromBoard(board, in_set.sights);
+  Found found;
+  found.metric_from_scene.scale = 1 / scale.scene_from_board.scale;
+  found.relative_sigma = scale.relative_sigma;
+  scale.left_out.insert(scale.left_out.end(), in_set.without.begin(), in_set.without.end());
+  found.json["method"] = "board";
+  found.json["board"] = calib::TextOf(board);
+  found.json["views"] = scale.views;
+  found.json["corners"] = scale.corners;
+  found.json["outliers"] = scale.outliers;
+  found.json["rms_px"] = scale.rms_px;
+  found.json["left_out"] = Json::array();
+  for (const calib::LeftOut& item : scale.left_out) {
+    found.json["left_out"].push_back({{"name", item.name}, {"reason", item.reason}});
+    found.lines.push_back(fmt::format("left out: {}: {}", item.name, item.reason));
+  }
+  found.lines.push_back(fmt::format("the board in {} views: {} corners, {} outliers, RMS {:.3f} px",
+                                    scale.views.size(), scale.corners, scale.outliers,
+                                    scale.rms_px));
+  return found;
+}
+
+Found FindScale(const ScaleOptions& options, const DtrSet& set, Progress& progress) {
+  if (options.board) return FromBoard(options, set, progress);
+  return options.gps.empty() ? FromDistances(options, set) : FromGps(options, set);
+}
+
 Bounds Carried(const Bounds& bounds, const calib::Similarity& b_from_a) {
   if (bounds.empty()) return bounds;
   Bounds carried;
@@ -267,8 +298,7 @@ ScaleReport ScaleSet(const ScaleOptions& options, Progress& progress) {
   RunLog log;
   log.Begin("scale");
   const DtrSet old_set = io::ReadSet(options.set);
-  const Found found =
-      options.gps.empty() ? FromDistances(options, old_set) : FromGps(options, old_set);
+  const Found found = FindScale(options, old_set, progress);
   const bool in_place = options.output.empty();
   ScaleReport report;
   report.written = in_place ? options.set : options.output;

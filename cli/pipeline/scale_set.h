@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "calib/boards/board.h"
 #include "cli/pipeline/scale_points.h"
 #include "dtr/base/progress.h"
 
@@ -22,7 +23,8 @@ struct ScaleOptions {
   std::filesystem::path output;  ///< empty: `set` itself is replaced, whole or not at all
   bool force = false;
   std::vector<ScaleDistance> distances;  ///< or
-  std::filesystem::path gps;             ///< the folder of the set's photos, with GPS in their EXIF
+  std::filesystem::path gps;  ///< the folder of the set's photos, with GPS in their EXIF; or
+  std::optional<calib::Board> board;  ///< that lies in the scene, with a square in metres
   int threads = 0;
 };
 
@@ -36,7 +38,7 @@ struct ScaleReport {
 /// Finds the length of the set's unit and writes the set in metres: cameras, depth, sigma, meshes,
 /// points, scene centre, bounds, baselines, origin. With GPS the world also gets axes east, north
 /// and up, unless the cameras leave the turn uncertain by more than 5 degrees. Images are copied
-/// byte by byte. Throws Error as calib/scale.h does.
+/// byte by byte. Throws Error as calib/scale.h and calib/solve/board_scale.h do.
 ScaleReport ScaleSet(const ScaleOptions& options, Progress& progress);
 
 }  // namespace dtr::pipeline

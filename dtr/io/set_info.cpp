@@ -83,6 +83,32 @@ std::string VerdictLine(const DtrSet& set) {
   return "FAILED" + (failed.empty() ? "" : ": " + failed) + "; dtr validate says more";
 }
 
+// The rig that a set was built with, in a line; nothing for others, or where another tool wrote
+// something else in its place.
+std::string RigLine(const DtrSet& set) {
+  const Json provenance = ParseJson(set.provenance_json, "provenance");
+  const Json none = Json::object();
+  const auto part = [&](const Json& of, const char* key) -> const Json& {
+    return of.is_object() && of.contains(key) ? of[key] : none;
+  };
+  const Json& rig = part(part(provenance, "calibration"), "rig");
+  if (!part(rig, "file").is_string() || !part(rig, "cameras").is_array()) return "";
+  std::ostringstream line;
+  line << "rig: " << rig["file"].get<std::string>() << " with cameras";
+  const char* between = " ";
+  for (const Json& camera : rig["cameras"]) {
+    if (!part(camera, "name").is_string()) return "";
+    line << between << camera["name"].get<std::string>();
+    between = ", ";
+  }
+  line << "; places and scale are the rig's";
+  if (part(rig, "frames").is_number() && part(rig, "scale_spread").is_number()) {
+    line << ", " << rig["frames"] << " instants, whose scales scatter by "
+         << 100 * rig["scale_spread"].get<double>() << " %";
+  }
+  return line.str() + "\n";
+}
+
 std::string UtcNow() {
   const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
   std::tm parts{};
@@ -125,8 +151,9 @@ std::string DescribeSet(const DtrSet& set) {
   std::ostringstream out;
   out << "D+TR set: " << sources << " source views, " << held_out << " held out, "
       << set.frames.size() << (set.frames.size() == 1 ? " frame, " : " frames, ")
-      << Megabytes(bytes) << "\nunit: " << NameOf(set.unit) << "\nscene centre: ("
-      << set.scene_center.transpose() << ")\nverdict: " << VerdictLine(set) << "\nviews:\n";
+      << Megabytes(bytes) << "\nunit: " << NameOf(set.unit) << "\n"
+      << RigLine(set) << "scene centre: (" << set.scene_center.transpose()
+      << ")\nverdict: " << VerdictLine(set) << "\nviews:\n";
   return out.str() + lines.str() + DescribePruned(set);
 }
 

@@ -125,7 +125,7 @@ TEST_F(CalibrateScale, InPlaceTheSetIsReplaced) {
 TEST_F(CalibrateScale, WhatSaysNothingIsRefused) {
   const auto before = Contents(folder_ / "small.dtr");
   ExpectRefused(Scale({}), kWrongUsage,
-                "expected --distance (once or more) or --gps, found neither");
+                "expected --distance (once or more), --board or --gps, found none of them");
   ExpectRefused(Scale({"--distance", "0000,0001"}), kWrongUsage, "found no '='");
   ExpectRefused(Scale({"--distance", "0000,0001=5"}), kWrongUsage, "no length is '5'");
   ExpectRefused(Scale({"--distance", "0000:x:1,0001=5m"}), kWrongUsage, "no pixel is 'x:1'");

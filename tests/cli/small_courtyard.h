@@ -3,6 +3,11 @@
 #include <Eigen/Core>
 #include <filesystem>
 #include <string>
+#include <vector>
+
+#include "calib/sfm_model.h"
+#include "dtr/types/camera.h"
+#include "dtr/types/pose.h"
 
 namespace dtr::testing {
 
@@ -14,6 +19,25 @@ inline constexpr int kCourtyardWidthPx = 192, kCourtyardHeightPx = 128;
 /// calibration that needs no program to be found. The written world is scale * scene + offset.
 void MakeSmallCourtyard(const std::filesystem::path& folder, double scale = 1,
                         const Eigen::Vector3d& offset = Eigen::Vector3d::Zero());
+
+/// A photo of the courtyard: by which camera and from where, in the scene's own frame.
+struct CourtyardPhoto {
+  std::string name;
+  PinholeCamera camera;
+  Pose cam_from_scene;
+};
+
+/// Poses of the courtyard's arc.
+std::vector<Pose> CourtyardArc(int views);
+
+/// Renders the photos below `folder`, by their names.
+void RenderCourtyard(const std::filesystem::path& folder,
+                     const std::vector<CourtyardPhoto>& photos);
+
+/// The true cameras of these photos, and exact points that at least two of them see, as a COLMAP
+/// model; photos with equal cameras share one. The written world is scale * scene + offset.
+calib::SfmModel CourtyardModel(const std::vector<CourtyardPhoto>& photos, double scale = 1,
+                               const Eigen::Vector3d& offset = Eigen::Vector3d::Zero());
 
 /// Replaces a photo by another picture of the same size.
 void ChangePhoto(const std::filesystem::path& photo);

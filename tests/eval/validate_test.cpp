@@ -266,6 +266,32 @@ TEST(Validate, CountsWhatCannotBeTested) {
   EXPECT_NE(Outcome(report, "cameras_untested").reason.find("twin1"), std::string::npos);
 }
 
+TEST(Validate, StrictlyHeldOutCamerasAreKeptApartAndOthersAreNot) {
+  Calibration c = Arc(8, 60, 0);
+  // Without a sight: 2 and 5. With 7 sights, too few to judge: 3.
+  std::erase_if(c.scene.observations, [](const SparseObservation& o) {
+    return o.view == 2 || o.view == 5 || (o.view == 3 && o.point >= 7);
+  });
+  const auto validate = [&](std::vector<bool> held_out) {
+    return ValidateReprojection(c.cameras, c.poses, c.scene, {}, c.names, 0, held_out);
+  };
+  const ValidationReport open = validate({});
+  EXPECT_THAT(open.untested, ::testing::ElementsAre("view2", "view3", "view5"));
+  EXPECT_TRUE(open.kept_apart.empty());
+  // A source without a sight, or a held-out camera with a few, is as suspect as before.
+  const ValidationReport two = validate({false, false, true, true, true, false, false, false});
+  EXPECT_THAT(two.untested, ::testing::ElementsAre("view3", "view5"));
+  EXPECT_THAT(two.kept_apart, ::testing::ElementsAre("view2"));
+  EXPECT_FALSE(Outcome(two, "cameras_untested").passed);
+
+  std::erase_if(c.scene.observations, [](const SparseObservation& o) { return o.view == 3; });
+  const ValidationReport all = validate({false, false, true, true, false, true, false, false});
+  EXPECT_TRUE(all.passed()) << Failures(all);
+  EXPECT_THAT(Outcome(all, "cameras_untested").reason, ::testing::HasSubstr("view2, view3, view5"));
+  EXPECT_EQ(nlohmann::json::parse(ToJson(all))["kept_apart"].size(), 3u);
+  EXPECT_THROW(validate({true}), Error);
+}
+
 TEST(Validate, NoEvidenceIsNotAPass) {
   Calibration c = Arc(4, 30, 0);
   c.scene.observations.clear();

@@ -16,7 +16,7 @@ using testing::LookAt;
 using testing::MakeBundle;
 using testing::SabotageAll;
 using testing::SceneSpec;
-using testing::Score;
+using testing::Tally;
 
 bool Names(const Judgement& judgement, const std::string& degeneracy) {
   for (const Degeneracy& d : judgement.degeneracies) {
@@ -26,7 +26,7 @@ bool Names(const Judgement& judgement, const std::string& degeneracy) {
 }
 
 TEST(Judge, SabotagesAreCaughtAndHonestSetsPass) {
-  const Score score = SabotageAll(7, 2026);
+  const Tally score = SabotageAll(7, 2026);
   EXPECT_EQ(score.missed, 0);
   EXPECT_EQ(score.honest_passed, 7);
   EXPECT_GE(score.caught, 5);

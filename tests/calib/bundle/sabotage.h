@@ -6,6 +6,7 @@
 #include "calib/bundle/covariance.h"
 #include "calib/bundle/judge.h"
 #include "tests/calib/bundle/synthetic_bundle.h"
+#include "tests/calib/sabotage_tally.h"
 
 namespace dtr::testing {
 
@@ -24,21 +25,6 @@ inline Bundle Honest(std::uint64_t seed, int points = 300) {
   const Bundle seen = MakeBundle(
       {.images = 7, .points = points, .lens = kPinholeLens, .noise_px = 0.3, .seed = seed});
   return Adjust(seen, AllFree()).bundle;
-}
-
-inline const Check* Failed(const Judgement& judgement, const std::string& name) {
-  for (const Check& test : judgement.tests) {
-    if (test.name == name && !test.passed) return &test;
-  }
-  return nullptr;
-}
-
-inline std::string Broken(const Judgement& judgement) {
-  std::string names;
-  for (const Check& test : judgement.tests) {
-    if (!test.passed) names += test.name + " (" + test.reason + ") ";
-  }
-  return names;
 }
 
 // How many standard deviations a stored calibration is off, as the honest one's covariance has it.
@@ -139,34 +125,33 @@ inline Sabotaged Sabotage(const Bundle& honest, int kind, Random& random) {
 }
 
 // Sabotages drawn by seed: how many that can be seen were caught, with the right test named.
-struct Score {
-  int caught = 0, missed = 0, not_detectable = 0, honest_passed = 0;
-};
-
-inline Score SabotageAll(int count, std::uint64_t seed) {
-  Score score;
+inline Tally SabotageAll(int count, std::uint64_t seed) {
+  Tally tally;
   for (int k = 0; k < count; ++k) {
     Random random(HashOf(seed, static_cast<std::uint64_t>(k)));
     const Bundle honest = Honest(HashOf(seed, static_cast<std::uint64_t>(k), 5));
     const Judgement good = Judge(honest, {}, 1);
-    score.honest_passed += AllPassed(good.tests);
-    if (!AllPassed(good.tests)) std::cout << "honest " << k << ": " << Broken(good) << "\n";
+    ++tally.honest;
+    tally.honest_passed += AllPassed(good.tests);
+    if (!AllPassed(good.tests)) {
+      std::cout << "honest " << k << ": " << BrokenTests(good.tests) << "\n";
+    }
     const Sabotaged bad = Sabotage(honest, k % 7, random);
     const Judgement judged = Judge(bad.bundle, {}, 1);
-    const Check* failed = Failed(judged, bad.test);
+    const Check* failed = BrokenTest(judged.tests, bad.test);
     if (failed != nullptr && failed->reason.find(bad.word) != std::string::npos) {
-      ++score.caught;
+      ++tally.caught;
       continue;
     }
     double moved = 0;
     for (const auto& camera : judged.cameras) moved = std::max(moved, camera.moved_px);
     const bool invisible = moved <= NegligiblePx({}, judged.sigma_px);
-    (invisible ? score.not_detectable : score.missed) += 1;
+    (invisible ? tally.not_detectable : tally.missed) += 1;
     std::cout << (invisible ? "not detectable: " : "missed: ") << "kind " << k % 7 << ", "
-              << bad.sigmas << " sigmas, points move by " << moved << " px; " << Broken(judged)
-              << "\n";
+              << bad.sigmas << " sigmas, points move by " << moved << " px; "
+              << BrokenTests(judged.tests) << "\n";
   }
-  return score;
+  return tally;
 }
 
 }  // namespace dtr::testing

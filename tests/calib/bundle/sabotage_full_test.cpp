@@ -8,7 +8,7 @@ namespace {
 // 30 sets spoiled at 8 to 40 predicted standard deviations, and the 30 honest ones they come from.
 TEST(Sabotage, AllButOneOfThirtyAreCaughtAndThirtyHonestSetsPass) {
   for (const std::uint64_t seed : {1, 2}) {
-    const testing::Score score = testing::SabotageAll(30, seed);
+    const testing::Tally score = testing::SabotageAll(30, seed);
     std::cout << "seed " << seed << ": caught " << score.caught << ", missed " << score.missed
               << ", not detectable " << score.not_detectable << ", honest passed "
               << score.honest_passed << "\n";

@@ -84,6 +84,7 @@ TEST(CalibrationFile, ARigSurvivesToo) {
   written.cameras[1].name = "right";
   written.cameras[1].cam_from_rig = written.views[0].cam_from_board;
   written.cameras[1].place_covariance = 2 * Eigen::MatrixXd::Identity(6, 6);
+  written.cameras[1].delay = KeptDelay{-0.7071, 0.012, true};
   written.views[1].camera = 1;
   WriteCalibration(folder / "rig.json", written);
   const Calibration read = ReadCalibration(folder / "rig.json");
@@ -93,6 +94,11 @@ TEST(CalibrationFile, ARigSurvivesToo) {
   EXPECT_EQ(read.cameras[1].place_covariance, written.cameras[1].place_covariance);
   EXPECT_EQ(read.cameras[1].cam_from_rig.translation, written.cameras[1].cam_from_rig.translation);
   EXPECT_TRUE(read.cameras[0].covariance.isZero(0));
+  EXPECT_FALSE(read.cameras[0].delay);
+  ASSERT_TRUE(read.cameras[1].delay);
+  EXPECT_EQ(read.cameras[1].delay->frames, -0.7071);
+  EXPECT_EQ(read.cameras[1].delay->sigma, 0.012);
+  EXPECT_TRUE(read.cameras[1].delay->corners_moved);
 }
 
 TEST(CalibrationFile, EveryPrefixIsAnError) {

@@ -31,7 +31,7 @@ class JudgeSabotaged : public ::testing::TestWithParam<Sabotage> {};
 
 TEST_P(JudgeSabotaged, IsCaughtByTheTestThatIsMeantForIt) {
   Tally tally;
-  for (std::uint64_t seed = 5; tally.sabotages < 1; ++seed) {
+  for (std::uint64_t seed = 5; tally.sabotages() < 1; ++seed) {
     JudgeSabotage(GetParam(), seed, tally);
   }
   EXPECT_EQ(tally.caught, 1);

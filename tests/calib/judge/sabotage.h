@@ -15,9 +15,14 @@
 #include "calib/judge/judge.h"
 #include "calib/judge/projection.h"
 #include "dtr/base/error.h"
+#include "tests/calib/sabotage_tally.h"
 #include "tests/calib/solve/synthetic_rig.h"
 
 namespace dtr::calib::testing {
+
+using dtr::testing::BrokenTest;
+using dtr::testing::BrokenTests;
+using dtr::testing::Tally;
 
 inline constexpr double kCornerNoisePx = 0.1;
 
@@ -384,18 +389,6 @@ inline SabotageCase Honest(std::uint64_t seed) {
   return out;
 }
 
-inline std::string BrokenTests(const JudgeReport& report) {
-  std::string names;
-  for (const Check& test : report.tests) {
-    if (!test.passed) names += (names.empty() ? "" : ", ") + test.name;
-  }
-  return names.empty() ? "none" : names;
-}
-
-struct Tally {
-  int sabotages = 0, caught = 0, not_detectable = 0, honest = 0, honest_passed = 0;
-};
-
 inline void JudgeSabotage(Sabotage kind, std::uint64_t seed, Tally& tally) {
   const SabotageCase spoiled = Spoiled(kind, seed);
   if (!(spoiled.predicted_sigmas >= 5)) {
@@ -404,7 +397,6 @@ inline void JudgeSabotage(Sabotage kind, std::uint64_t seed, Tally& tally) {
                 spoiled.predicted_sigmas);
     return;
   }
-  ++tally.sabotages;
   std::string broken;
   bool caught = false;
   if (!spoiled.refused.empty()) {
@@ -414,12 +406,10 @@ inline void JudgeSabotage(Sabotage kind, std::uint64_t seed, Tally& tally) {
     }
   } else {
     const JudgeReport report = Judge(spoiled.calibration, {}, {});
-    broken = BrokenTests(report);
-    for (const Check& test : report.tests) {
-      caught = caught || (test.name == spoiled.expected && !test.passed);
-    }
+    broken = BrokenTests(report.tests);
+    caught = BrokenTest(report.tests, spoiled.expected) != nullptr;
   }
-  tally.caught += caught ? 1 : 0;
+  ++(caught ? tally.caught : tally.missed);
   std::printf("%s: %s, %.1f predicted sigmas: %s\n", caught ? "caught" : "MISSED",
               spoiled.name.c_str(), spoiled.predicted_sigmas, broken.c_str());
 }
@@ -429,7 +419,7 @@ inline void JudgeHonest(std::uint64_t seed, Tally& tally) {
   const JudgeReport report = Judge(honest.calibration, {}, {});
   ++tally.honest;
   tally.honest_passed += report.passed() ? 1 : 0;
-  std::printf("honest %s: %s\n", honest.name.c_str(), BrokenTests(report).c_str());
+  std::printf("honest %s: %s\n", honest.name.c_str(), BrokenTests(report.tests).c_str());
 }
 
 }  // namespace dtr::calib::testing

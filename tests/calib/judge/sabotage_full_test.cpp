@@ -17,13 +17,13 @@ std::uint64_t Seed() {
 TEST(SabotageFull, AllButOneOfThirtyAreCaughtByTheTestThatIsMeantForThem) {
   Tally tally;
   // Drawn on until 30 are strong enough to count.
-  for (int k = 0; tally.sabotages < kCases && k < 4 * kCases; ++k) {
+  for (int k = 0; tally.sabotages() < kCases && k < 4 * kCases; ++k) {
     JudgeSabotage(static_cast<Sabotage>(k % kSabotages),
                   HashOf(Seed(), static_cast<std::uint64_t>(k)) % 1000000, tally);
   }
-  std::printf("%d of %d caught, %d not detectable\n", tally.caught, tally.sabotages,
+  std::printf("%d of %d caught, %d not detectable\n", tally.caught, tally.sabotages(),
               tally.not_detectable);
-  EXPECT_EQ(tally.sabotages, kCases);
+  EXPECT_EQ(tally.sabotages(), kCases);
   EXPECT_GE(tally.caught, kCases - 1);
 }
 

@@ -1,6 +1,7 @@
 // Against OpenCV: the same corners, the same model, the same loss must end at the same camera.
 #include <gtest/gtest.h>
 
+#include <cfloat>
 #include <cmath>
 #include <ctime>
 #include <opencv2/calib3d.hpp>
@@ -14,6 +15,7 @@
 namespace dtr::calib {
 namespace {
 
+using namespace testing;
 namespace fs = std::filesystem;
 const Board kChessboard{Board::Kind::kChessboard, 9, 6, 1, 0, "", false};
 constexpr double kSameRms = 1e-3;    // relative; what is asked of it
@@ -37,14 +39,16 @@ struct OpenCvResult {
   cv::Mat k, distortion;
 };
 
-OpenCvResult SolveWithOpenCv(const std::vector<BoardView>& views, int flags) {
+// OpenCV stops after 30 steps if it is not told otherwise.
+OpenCvResult SolveWithOpenCv(const Board& board, const std::vector<BoardView>& views, int flags,
+                             int steps = 30) {
   std::vector<std::vector<cv::Point3f>> corners;
   std::vector<std::vector<cv::Point2f>> pixels;
   for (const BoardView& view : views) {
     corners.emplace_back();
     pixels.emplace_back();
     for (const BoardCorner& c : view.corners) {
-      const Eigen::Vector3d p = kChessboard.Corner(c.id);
+      const Eigen::Vector3d p = board.Corner(c.id);
       corners.back().emplace_back(p.x(), p.y(), 0);
       pixels.back().emplace_back(c.pixel.x() - 0.5, c.pixel.y() - 0.5);
     }
@@ -52,8 +56,9 @@ OpenCvResult SolveWithOpenCv(const std::vector<BoardView>& views, int flags) {
   OpenCvResult result;
   std::vector<cv::Mat> rotations, translations;
   const std::clock_t start = std::clock();
-  result.rms_px = cv::calibrateCamera(corners, pixels, {640, 480}, result.k, result.distortion,
-                                      rotations, translations, flags);
+  result.rms_px = cv::calibrateCamera(
+      corners, pixels, {640, 480}, result.k, result.distortion, rotations, translations, flags,
+      {cv::TermCriteria::COUNT | cv::TermCriteria::EPS, steps, DBL_EPSILON});
   result.cpu_s = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
   return result;
 }
@@ -66,7 +71,7 @@ TEST(OpenCvParity, TheChessboardSetHasOpenCvsTrainingRms) {
     const std::pair<BoardModel, int> models[] = {{BoardModel::kBrown4, cv::CALIB_FIX_K3},
                                                  {BoardModel::kBrown5, 0}};
     for (const auto& [model, flags] : models) {
-      const OpenCvResult theirs = SolveWithOpenCv(views, flags);
+      const OpenCvResult theirs = SolveWithOpenCv(kChessboard, views, flags);
       SolveOptions options;
       options.loss = Loss::kQuadratic;
       const std::clock_t start = std::clock();
@@ -85,6 +90,75 @@ TEST(OpenCvParity, TheChessboardSetHasOpenCvsTrainingRms) {
         EXPECT_NEAR(ours.rms_px, published_px, kPublished) << side;
       }
     }
+  }
+}
+
+// OpenCV's rational model: k1, k2, p1, p2, k3, k4, k5, k6, the first pixel's centre at 0.
+Eigen::Vector2d DrawnByOpenCv(const Eigen::Vector3d& p_in_cam, const cv::Mat& k,
+                              const cv::Mat& distortion) {
+  std::vector<cv::Point2d> pixels;
+  cv::projectPoints(std::vector<cv::Point3d>{{p_in_cam.x(), p_in_cam.y(), p_in_cam.z()}},
+                    cv::Mat::zeros(3, 1, CV_64F), cv::Mat::zeros(3, 1, CV_64F), k, distortion,
+                    pixels);
+  return {pixels[0].x + 0.5, pixels[0].y + 0.5};
+}
+
+TEST(OpenCvParity, TheRationalModelDrawsPointsWhereOpenCvDoes) {
+  constexpr double kSamePx = 1e-9;  // double; 3e-13 seen
+  const LensCamera camera = TypicalCamera(BoardModel::kBrown8);
+  const auto& p = camera.params;
+  const cv::Mat k = (cv::Mat_<double>(3, 3) << p[0], 0, p[2] - 0.5, 0, p[1], p[3] - 0.5, 0, 0, 1);
+  const cv::Mat distortion(std::vector<double>(p.begin() + 4, p.end()), true);
+  Random random(4);
+  int drawn = 0;
+  for (int i = 0; i < 1000; ++i) {
+    const Eigen::Vector3d point(random.Uniform(-0.6, 0.6), random.Uniform(-0.45, 0.45), 1);
+    const double depth = random.Uniform(0.1, 50);
+    const auto ours = camera.PixelFromCam(depth * point);
+    if (!ours) continue;
+    ++drawn;
+    EXPECT_LT((*ours - DrawnByOpenCv(depth * point, k, distortion)).norm(), kSamePx);
+    const auto ray = camera.RayFromPixel(*ours);
+    ASSERT_TRUE(ray);
+    EXPECT_LT((*ray - point.normalized()).norm(), kSamePx);
+  }
+  EXPECT_EQ(drawn, 1000);
+}
+
+TEST(OpenCvParity, TheRationalModelIsSolvedAsOpenCvDoes) {
+  constexpr double kNoisePx = 0.1;
+  constexpr double kOpenCvRounding = 1e-4;  // relative; pixels rounded to 3e-5 make 5e-6
+  const LensCamera truth = TypicalCamera(BoardModel::kBrown8);
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    const auto views = Noisy(ExactViews(truth, 30, seed).views, kNoisePx, seed + 10);
+    SolveOptions options;
+    options.loss = Loss::kQuadratic;
+    const BoardSolution ours = SolveBoard(kBoard, views, 640, 480, BoardModel::kBrown8, options);
+    const OpenCvResult theirs = SolveWithOpenCv(kBoard, views, cv::CALIB_RATIONAL_MODEL, 300);
+    std::printf("brown8, seed %d: RMS %.6f px (OpenCV %.6f)\n", static_cast<int>(seed), ours.rms_px,
+                theirs.rms_px);
+    // It takes pixels as floats, and may stop short of the minimum, where coefficients hardly
+    // matter; we must not.
+    EXPECT_LE(ours.rms_px, theirs.rms_px * (1 + kOpenCvRounding));
+    EXPECT_GE(ours.rms_px, theirs.rms_px * (1 - kSameRms));
+    // Numerator and denominator make up for each other: the lenses are compared by what they draw,
+    // the truth's by as much as noise moves it, all where boards were seen.
+    double most_px = 0, truth_px = 0;
+    for (double x = 60; x < 600; x += 40) {
+      for (double y = 60; y < 440; y += 40) {
+        const auto ray = ours.camera.RayFromPixel({x, y}), true_ray = truth.RayFromPixel({x, y});
+        ASSERT_TRUE(ray && true_ray);
+        const Eigen::Vector2d other = DrawnByOpenCv(*ray, theirs.k, theirs.distortion);
+        most_px = std::max(most_px, (other - Eigen::Vector2d(x, y)).norm());
+        const auto drawn = ours.camera.PixelFromCam(*true_ray);
+        ASSERT_TRUE(drawn);
+        truth_px = std::max(truth_px, (*drawn - Eigen::Vector2d(x, y)).norm());
+      }
+    }
+    std::printf("  lenses differ by %.4f px at most, from the truth by %.3f px\n", most_px,
+                truth_px);
+    EXPECT_LT(most_px, 0.1);
+    EXPECT_LT(truth_px, 1);
   }
 }
 

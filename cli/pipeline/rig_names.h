@@ -1,0 +1,21 @@
+// cli/pipeline/rig_names.h -- which camera of a rig took a photo, and when, by the photo's name.
+#pragma once
+#include <optional>
+#include <string>
+
+namespace dtr::pipeline {
+
+/// A camera of a rig and an instant, as names say them.
+struct RigName {
+  std::string camera, frame;
+};
+
+/// The digits at the end of a name; empty where there are none.
+std::string DigitsAtEnd(const std::string& name);
+
+/// Of a photo in a folder, "left/0012.jpg", the folder's name and the photo's without extension; of
+/// one beside the others, "left0012.jpg", what stands before the number, and the number. `name`:
+/// below the folder of all photos, '/' between parts. Empty where it has neither form.
+std::optional<RigName> RigNameOf(const std::string& name);
+
+}  // namespace dtr::pipeline

@@ -1,0 +1,151 @@
+// Cameras whose moments differ by a known time: it must be found, and the rig with it.
+#include "calib/judge/free_running.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "calib/judge/patterns.h"
+#include "dtr/base/error.h"
+#include "tests/calib/solve/synthetic_rig.h"
+
+namespace dtr::calib {
+namespace {
+
+using namespace testing;
+
+constexpr double kNoisePx = 0.1;
+constexpr size_t kFrames = 50;
+const std::vector<double> kDelays{0, 0.7, -0.35};
+
+// A board in the hand: no two of its motions have the same period. `speed` 0: it stands still.
+Pose BoardAt(double time, double speed) {
+  const auto swing = [&](double rate, double phase) {
+    return std::sin(speed * rate * time + phase);
+  };
+  const double length = kBoard.square * kBoard.columns;
+  Pose pose;
+  pose.rotation = Eigen::AngleAxisd(0.6 * swing(0.10, 0.3), Eigen::Vector3d::UnitX()) *
+                  Eigen::AngleAxisd(0.6 * swing(0.13, 1.1), Eigen::Vector3d::UnitY()) *
+                  Eigen::AngleAxisd(0.4 * swing(0.07, 2.0), Eigen::Vector3d::UnitZ());
+  pose.translation = Eigen::Vector3d(0.1 + 0.25 * swing(0.09, 0.5), 0.2 * swing(0.12, 4.0),
+                                     2.0 + 0.4 * swing(0.05, 2.5)) *
+                         length -
+                     pose.rotation * MiddleOf(kBoard);
+  return pose;
+}
+
+// What cameras see that are late by `delays`: whole boards, with noise.
+std::vector<RigView> LateViews(const std::vector<RigCamera>& cameras,
+                               const std::vector<double>& delays, std::uint64_t seed,
+                               double speed = 1) {
+  Random random(seed);
+  std::vector<RigView> views;
+  for (size_t f = 0; f < kFrames; ++f) {
+    for (size_t c = 0; c < cameras.size(); ++c) {
+      const LensMap lens(cameras[c].camera);
+      const Pose pose =
+          cameras[c].cam_from_rig * BoardAt(static_cast<double>(f) + delays[c], speed);
+      RigView view{c, f, {cameras[c].name + "/" + std::to_string(f), {}, kNoisePx}, {}};
+      for (int id = 0; id < kBoard.CornerCount(); ++id) {
+        const auto pixel = lens.PixelFromCam(pose * kBoard.Corner(id));
+        const Eigen::Vector2d noise(random.Normal(), random.Normal());
+        if (!pixel || pixel->x() < 0 || pixel->y() < 0 || pixel->x() > 640 || pixel->y() > 480) {
+          break;
+        }
+        view.seen.corners.push_back({id, *pixel + kNoisePx * noise});
+      }
+      if (static_cast<int>(view.seen.corners.size()) == kBoard.CornerCount()) {
+        views.push_back(std::move(view));
+      }
+    }
+  }
+  return views;
+}
+
+double SquaredDistance(const RigSolution& solution, const std::vector<RigCamera>& truth) {
+  const Eigen::VectorXd error = Difference(solution.layout, truth, solution.rig.cameras);
+  return error.dot(solution.covariance.inverse() * error);
+}
+
+TEST(FreeRunning, DelaysAreFoundWithinTheirSigmasAndTheRigWithThem) {
+  const auto cameras = RowOfCameras(3, 0.05);
+  constexpr int kSolves = 8;
+  double squares = 0, rig = 0;
+  for (int k = 0; k < kSolves; ++k) {
+    const auto views = LateViews(cameras, kDelays, 20 + static_cast<std::uint64_t>(k));
+    const FreeRunning free = SolveFreeRunning(kBoard, InputsOf(cameras), views, kFrames);
+    for (size_t c = 1; c < cameras.size(); ++c) {
+      ASSERT_TRUE(free.delays[c]);
+      EXPECT_TRUE(free.moved[c]);
+      const double off = (free.delays[c]->frames - kDelays[c]) / free.delays[c]->sigma;
+      EXPECT_LT(std::abs(off), 3) << "camera " << c << ", draw " << k << ": "
+                                  << free.delays[c]->frames << " +- " << free.delays[c]->sigma;
+      EXPECT_LT(free.delays[c]->sigma, 1e-3);
+      squares += off * off / (2 * kSolves);
+    }
+    EXPECT_NEAR(free.solution.sigma_px, kNoisePx, 0.03 * kNoisePx);
+    rig += SquaredDistance(free.solution, cameras) /
+           (kSolves * static_cast<double>(free.solution.layout.size()));
+    EXPECT_EQ(free.delays[0]->frames, 0);
+  }
+  // Chi-squared of 16 draws over 16 has sigma 0.35; of the rig's 8 x 36 unknowns 0.08.
+  EXPECT_LT(squares, 1 + 3 * 0.35);
+  EXPECT_GT(squares, 0.2);
+  EXPECT_NEAR(rig, 1, 0.35);
+}
+
+TEST(FreeRunning, SolvedAsIfSynchronisedTheRigIsFarOff) {
+  const auto cameras = RowOfCameras(3, 0.05);
+  const auto views = LateViews(cameras, kDelays, 20);
+  const auto as_if = SolveRig(kBoard, InputsOf(cameras), views, kFrames);
+  EXPECT_GT(as_if.rms_px, 5 * kNoisePx);
+  const FreeRunning free = SolveFreeRunning(kBoard, InputsOf(cameras), views, kFrames);
+  // What validate makes of the corners that are kept: nothing of the delays is left in them.
+  const PatternTest left = TestTimeOffset(free.solution);
+  for (size_t c = 0; c < left.coefficients.size(); ++c) {
+    EXPECT_LT(std::abs(left.coefficients[c]), 4.5 * left.sigmas[c]);
+  }
+}
+
+TEST(FreeRunning, SynchronisedCamerasAreLeftAsTheyAre) {
+  const auto cameras = RowOfCameras(2, 0.1);
+  const auto views = LateViews(cameras, {0, 0}, 5);
+  const FreeRunning free = SolveFreeRunning(kBoard, InputsOf(cameras), views, kFrames);
+  EXPECT_EQ(free.passes, 1);
+  EXPECT_FALSE(free.moved[1]);
+  EXPECT_LT(std::abs(free.delays[1]->frames), 4.5 * free.delays[1]->sigma);
+  const auto same = SolveRig(kBoard, InputsOf(cameras), views, kFrames);
+  EXPECT_EQ(same.rms_px, free.solution.rms_px);
+  EXPECT_EQ(same.covariance, free.solution.covariance);
+}
+
+TEST(FreeRunning, MomentsThatNoFrameIsNearAreLeftOutByName) {
+  const auto cameras = RowOfCameras(2, 0.1);
+  auto views = LateViews(cameras, {0, 0.5}, 5);
+  // A gap of 4 frames, and the last frame: nothing follows them.
+  std::erase_if(views, [](const RigView& view) { return view.frame >= 20 && view.frame < 24; });
+  const FreeRunning free = SolveFreeRunning(kBoard, InputsOf(cameras), views, kFrames);
+  std::vector<std::string> names;
+  for (const LeftOut& item : free.solution.left_out) names.push_back(item.name);
+  EXPECT_THAT(names, ::testing::UnorderedElementsAre("cam1/19", "cam1/49"));
+  EXPECT_LT(std::abs(free.delays[1]->frames - 0.5), 3.5 * free.delays[1]->sigma);
+}
+
+TEST(FreeRunning, ABoardThatTellsNoTimeIsRefused) {
+  const auto cameras = RowOfCameras(2, 0.1);
+  auto views = LateViews(cameras, {0, 0.5}, 5);
+  // Every third frame alone: where the board was between them, nobody knows.
+  std::erase_if(views, [](const RigView& view) { return view.frame % 3 != 0; });
+  try {
+    SolveFreeRunning(kBoard, InputsOf(cameras), views, kFrames);
+    FAIL() << "not refused";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(),
+                ::testing::HasSubstr("expected a board that moves through frames that follow"));
+  }
+}
+
+}  // namespace
+}  // namespace dtr::calib

@@ -1,0 +1,116 @@
+#include "calib/solve/board_scale.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "calib/solve/rig_start.h"
+#include "dtr/base/error.h"
+#include "tests/calib/solve/synthetic_views.h"
+
+namespace dtr::calib {
+namespace {
+
+using namespace testing;
+using ::testing::HasSubstr;
+
+constexpr double kUnit = 0.4;  // units of the board per unit of the scene
+constexpr double kNoisePx = 0.1;
+
+// The board in a scene whose unit is kUnit, far from its origin, as `count` cameras see it.
+std::vector<BoardSight> Sights(int count, std::uint64_t seed, double noise_px) {
+  const LensCamera lens = TypicalCamera(BoardModel::kPinhole);
+  const SyntheticViews truth = ExactViews(lens, count, seed);
+  Similarity scene_from_board;
+  scene_from_board.scale = 1 / kUnit;
+  scene_from_board.rotation = Eigen::AngleAxisd(1, Eigen::Vector3d(1, 2, 3).normalized());
+  scene_from_board.translation = {50, -20, 7};
+  Random random(HashOf(seed, 1));
+  std::vector<BoardSight> sights;
+  for (size_t i = 0; i < truth.views.size(); ++i) {
+    BoardSight sight{lens.Pinhole(), scene_from_board.CamFromB(truth.cam_from_board[i]),
+                     truth.views[i]};
+    for (BoardCorner& corner : sight.seen.corners) {
+      corner.pixel += noise_px * Eigen::Vector2d(random.Normal(), random.Normal());
+    }
+    sights.push_back(std::move(sight));
+  }
+  return sights;
+}
+
+// The board lies elsewhere in this view.
+void MoveBoard(BoardSight& sight, double x_px) {
+  for (BoardCorner& corner : sight.seen.corners) corner.pixel.x() += x_px;
+}
+
+void ExpectRefused(const std::vector<BoardSight>& sights, const std::string& text) {
+  try {
+    ScaleFromBoard(kBoard, sights);
+    FAIL() << "not refused";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr(text));
+  }
+}
+
+TEST(BoardScale, ExactCornersGiveTheScaleWhicheverEndTheyAreCountedFrom) {
+  auto sights = Sights(6, 5, 0);
+  for (const size_t turned : {1u, 4u}) {
+    sights[turned].seen = TurnedByHalf(kBoard, sights[turned].seen);
+  }
+  const BoardScale scale = ScaleFromBoard(kBoard, sights);
+  EXPECT_NEAR(scale.scene_from_board.scale * kUnit, 1, 1e-9);
+  EXPECT_LT(scale.rms_px, 1e-6);
+  EXPECT_EQ(scale.views.size(), 6u);
+  EXPECT_EQ(scale.outliers, 0);
+}
+
+TEST(BoardScale, PredictedUncertaintyIsWhatNoiseDoes) {
+  double squares = 0;
+  constexpr int kSolves = 60;
+  for (int k = 0; k < kSolves; ++k) {
+    const BoardScale scale =
+        ScaleFromBoard(kBoard, Sights(8, 100 + static_cast<std::uint64_t>(k), kNoisePx));
+    const double off = std::log(scale.scene_from_board.scale * kUnit) / scale.relative_sigma;
+    EXPECT_LT(std::abs(off), 4.5) << k;
+    squares += off * off / kSolves;
+  }
+  // The larger of two estimates of sigma is taken, so the mean is below 1; the jackknife's sigma
+  // scatters by a fourth with 8 views. 0.73 seen.
+  EXPECT_GT(squares, 0.4);
+  EXPECT_LT(squares, 1.25);
+}
+
+TEST(BoardScale, ViewsOfABoardThatLayElsewhereAreNamedAndDoNoHarm) {
+  auto sights = Sights(8, 9, kNoisePx);
+  MoveBoard(sights[0], 12);
+  MoveBoard(sights[5], -30);
+  sights[3].seen.corners[10].pixel.y() += 400;
+  const BoardScale scale = ScaleFromBoard(kBoard, sights);
+  EXPECT_LT(std::abs(std::log(scale.scene_from_board.scale * kUnit)), 4 * scale.relative_sigma);
+  ASSERT_EQ(scale.left_out.size(), 2u);
+  EXPECT_EQ(scale.left_out[0].name, "view0");
+  EXPECT_EQ(scale.left_out[1].name, "view5");
+  EXPECT_EQ(scale.outliers, 1);
+}
+
+TEST(BoardScale, CamerasThatErrMakeTheScaleLessCertain) {
+  auto sights = Sights(8, 9, kNoisePx);
+  const double honest = ScaleFromBoard(kBoard, sights).relative_sigma;
+  // Every camera looks aside a little: corners of a view err together, which no noise does.
+  for (size_t i = 0; i < sights.size(); ++i) MoveBoard(sights[i], i % 2 == 0 ? 0.5 : -0.5);
+  EXPECT_GT(ScaleFromBoard(kBoard, sights).relative_sigma, 2 * honest);
+}
+
+TEST(BoardScale, WhatSaysNothingIsRefused) {
+  ExpectRefused(Sights(2, 5, 0), "expected the board in 3 views or more, found it in 2");
+  auto same = Sights(4, 5, 0);
+  for (BoardSight& sight : same) sight = same.front();
+  ExpectRefused(same, "expected two views that see the board under an angle of a degree or more");
+  auto moved = Sights(6, 5, kNoisePx);
+  for (size_t i = 1; i < moved.size(); ++i) MoveBoard(moved[i], 17.0 * static_cast<double>(i * i));
+  ExpectRefused(moved, "expected views that agree where the board lies");
+}
+
+}  // namespace
+}  // namespace dtr::calib

@@ -1,0 +1,66 @@
+// `dtr validate SET --report`: what the page tells, on a set with true cameras.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/cli/run_dtr.h"
+#include "tests/cli/small_courtyard.h"
+#include "tests/support/test_data.h"
+
+namespace dtr::testing {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+size_t Times(const std::string& text, const std::string& part) {
+  size_t count = 0;
+  for (size_t at = 0; (at = text.find(part, at)) != std::string::npos; at += part.size()) ++count;
+  return count;
+}
+
+class ValidateReport : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    MakeSmallCourtyard(folder_ / "courtyard");
+    DtrOk({"build", In("courtyard/images"), "-o", In("set.dtr"), "--poses", In("courtyard/sparse"),
+           "--engine", "none"});
+  }
+  std::string In(const std::string& name) const { return (folder_ / name).string(); }
+  TemporaryFolder folder_;
+};
+
+TEST_F(ValidateReport, ThePageShowsTestsViewsMapsAndTheWorstPhotos) {
+  const auto before = Contents(folder_ / "set.dtr");
+  const Ran ran = Dtr({"validate", In("set.dtr"), "--report", In("page.html"), "--json", "-"});
+  ASSERT_TRUE(ran.code == 0 || ran.code == kFailed) << ran.err;
+  const auto json = nlohmann::json::parse(ran.out);
+  const std::string page = Text(folder_ / "page.html");
+  for (const auto& test : json["tests"]) {
+    EXPECT_THAT(page, HasSubstr(test["name"].get<std::string>()));
+  }
+  for (const char* part :
+       {"All views of 192 x 128 px together (7)", "Coverage: tested observations per cell",
+        "Uncertainty: standard deviation", "Residuals by region", "The worst views"}) {
+    EXPECT_THAT(page, HasSubstr(part));
+  }
+  // Residuals, two maps, and four photos.
+  EXPECT_EQ(Times(page, "data:image/svg+xml"), 7u);
+  EXPECT_THAT(page, HasSubstr(json["passed"] ? "The calibration passed its tests"
+                                             : "The calibration broke at least one test"));
+  // It needs no network, and the set is only read.
+  EXPECT_THAT(page, Not(HasSubstr("src=\"http")));
+  EXPECT_TRUE(DifferingFiles(before, Contents(folder_ / "set.dtr")).empty());
+  // The same set gives the same page.
+  Dtr({"validate", In("set.dtr"), "--report", In("again.html"), "--threads", "1"});
+  EXPECT_EQ(page, Text(folder_ / "again.html"));
+}
+
+TEST_F(ValidateReport, APageThatCannotBeWrittenIsRefusedBeforeAnyWork) {
+  ExpectRefused(Dtr({"validate", In("set.dtr"), "--report", In("page.txt")}), kWrongUsage,
+                "expected a name ending in .html, found '.txt'");
+}
+
+}  // namespace
+}  // namespace dtr::testing
