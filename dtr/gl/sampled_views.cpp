@@ -14,8 +14,8 @@ namespace {
 
 /// The grid with its outermost samples once more around it, and kReadBeyond more values.
 template <typename T>
-std::vector<T> WithBorder(const std::vector<T>& grid, int columns, int rows) {
-  std::vector<T> bordered;
+HugeVector<T> WithBorder(const std::vector<T>& grid, int columns, int rows) {
+  HugeVector<T> bordered;
   if (grid.empty()) return bordered;
   bordered.reserve(static_cast<size_t>(columns + 2) * static_cast<size_t>(rows + 2) + kReadBeyond);
   for (int y = -1; y <= rows; ++y) {
@@ -57,9 +57,10 @@ SampledView Sample(const View& view, int resolution, const BreakRule& breaks) {
   // StoredDepth reads codes as shares of the largest.
   sampled.depth_factor = depth.codes.empty() ? depth.factor : depth.factor / UINT16_MAX;
   sampled.whole_blocks = WholeBlocks(w, breaks);
-  sampled.rgba = SampledImage(view);
-  sampled.rgba.resize(sampled.rgba.size() +
-                      4 * (static_cast<size_t>(view.image.width()) + kReadBeyond));
+  const std::vector<std::uint8_t> image = SampledImage(view);
+  sampled.rgba.reserve(image.size() + 4 * (static_cast<size_t>(view.image.width()) + kReadBeyond));
+  sampled.rgba.assign(image.begin(), image.end());
+  sampled.rgba.resize(sampled.rgba.capacity());
   return sampled;
 }
 

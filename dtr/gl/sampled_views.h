@@ -6,6 +6,7 @@
 #include <map>
 #include <vector>
 
+#include "dtr/base/huge_pages.h"
 #include "dtr/render/options.h"
 #include "dtr/render/triangulation.h"
 #include "dtr/types/view.h"
@@ -15,12 +16,12 @@ namespace dtr::gl {
 /// A view's samples, with a border as PixelView says, and its image.
 struct SampledView {
   int columns = 0, rows = 0, step = 1,
-      offset = 0;                    ///< of the grid of samples; columns 0: none left
-  std::vector<std::uint16_t> codes;  ///< one of the two
-  std::vector<float> values;
+      offset = 0;                   ///< of the grid of samples; columns 0: none left
+  HugeVector<std::uint16_t> codes;  ///< one of the two
+  HugeVector<float> values;
   std::vector<std::uint32_t> whole_blocks;    ///< as PixelView has them
   double depth_offset = 0, depth_factor = 1;  ///< 1/z from a code or a value
-  std::vector<std::uint8_t> rgba;  ///< SampledImage, and what PixelView asks for after it
+  HugeVector<std::uint8_t> rgba;  ///< SampledImage, and what PixelView asks for after it
   size_t bytes() const {
     return codes.size() * sizeof(codes[0]) + values.size() * sizeof(values[0]) +
            whole_blocks.size() * sizeof(whole_blocks[0]) + rgba.size();
