@@ -20,6 +20,10 @@ constexpr double kLossSigmas = 2;    // scale of the loss that held-out sights a
 constexpr int kMostPoints = 4000;    // that the candidates are compared on
 constexpr int kResamples = 1000;
 constexpr double kConfidence = 0.95;
+// A principal point for every image also takes up what other faults of a lens model leave, and
+// costs the lens's own principal point: what the images share, nothing but the prior says. So it
+// must predict sights closer by this share; a stabiliser's pixels are worth several times that.
+constexpr double kLeastGainPerImage = 0.05;
 constexpr std::array kRisingFreedom{LensFreedom::kNoPrincipalPoint, LensFreedom::kAll,
                                     LensFreedom::kPrincipalPointPerImage};
 constexpr std::uint64_t kPick = 0x401d, kBoot = 0xb007, kSome = 0x50e;  // of random sequences
@@ -117,6 +121,14 @@ std::vector<double> LossesOfCameras(const Bundle& cameras, const Split& split, d
 
 constexpr size_t kNoneConverged = ~size_t{0};
 
+// Whether more freedom than the chosen candidate's is worth it: beyond chance, and for a number
+// that every image has by itself beyond what is too little to matter.
+bool IsWorthIt(const RefineCandidate& candidate, const RefineCandidate& chosen) {
+  if (!(candidate.high_px2 < 0)) return false;
+  return candidate.lens != LensFreedom::kPrincipalPointPerImage ||
+         candidate.held_out_px < (1 - kLeastGainPerImage) * chosen.held_out_px;
+}
+
 // Which lens parameters to free, by held-out sights; index of the candidate, or kNoneConverged. A
 // candidate whose solve did not converge is not taken. The model as given has
 // seen the held-out sights and cannot be compared with candidates that have not: it is first by
@@ -150,8 +162,8 @@ size_t Choose(const Bundle& bundle, const Split& split, const RefineOptions& opt
       std::tie(candidate.low_px2, candidate.high_px2) =
           Bootstrap(losses[i], losses[chosen], options.seed);
     }
-    // More freedom must be worth it beyond chance.
-    if (candidate.converged && (chosen == 0 || candidate.high_px2 < 0)) chosen = i;
+    const bool better = chosen == 0 || IsWorthIt(candidate, candidates[chosen]);
+    if (candidate.converged && better) chosen = i;
   }
   if (!trained[0].converged || chosen == 0) return kNoneConverged;
   // Now like with like: adjusted to all sights, as the given model was.
