@@ -21,9 +21,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr size_t kWorstViews = 4;
-constexpr size_t kMostDrawn = 6000;   // arrows of a plot; more is a blot
-constexpr int kCoverageColumns = 24;  // of a map that counts
-constexpr int kPlacedColumns = 12;    // of a map with some 40 points per view
+constexpr size_t kMostDrawn = 1500, kMostOfView = 500;  // arrows of a plot; more is a blot
+constexpr int kCoverageColumns = 24;                    // of a map that counts
+constexpr int kPlacedColumns = 12;                      // of a map with some 40 points per view
 constexpr int kPhotoSidePx = 720;
 
 // Views of one size of image, as indices.
@@ -46,8 +46,9 @@ void AddViewTable(report::HtmlReport& page, const std::vector<View>& views,
     rows.push_back({camera.name, std::string(NameOf(views[i].role)), std::to_string(held_out.count),
                     FixedPx(held_out.rms_px), FixedPx(held_out.median_px), FixedPx(held_out.p95_px),
                     FixedPx(held_out.worst_px), FixedPx(camera.stored.rms_px),
-                    FixedPx(camera.stored.mean_px.norm()), std::to_string(camera.short_tracks),
-                    std::to_string(camera.weak_geometry), std::to_string(camera.impossible)});
+                    FixedPx(camera.stored.mean_px.norm()),
+                    std::to_string(camera.short_tracks + camera.weak_geometry),
+                    std::to_string(camera.impossible)});
   }
   page.Section("Residuals of the views, px");
   page.Paragraph(
@@ -56,7 +57,7 @@ void AddViewTable(report::HtmlReport& page, const std::vector<View>& views,
       "points that the others do not fix. Impossible: no point in front of the cameras explains "
       "the observation.");
   page.Table({"View", "Role", "Tested", "RMS", "Median", "95 %", "Worst", "Stored RMS",
-              "Stored mean", "Under 3 views", "Not fixed", "Impossible"},
+              "Stored mean", "Not tested", "Impossible"},
              rows);
   if (!report.kept_apart.empty()) {
     page.Paragraph(fmt::format(
@@ -116,20 +117,26 @@ calib::ImageMap PlacedMap(const PlotSize& size, const calib::ValidationReport& r
   return map;
 }
 
+// Evenly many of the arrows, at most so many.
+std::vector<calib::ResidualArrow> Thinned(const std::vector<calib::ResidualArrow>& arrows,
+                                          size_t most) {
+  const size_t step = std::max<size_t>(1, (arrows.size() + most - 1) / most);
+  std::vector<calib::ResidualArrow> thinned;
+  for (size_t i = 0; i < arrows.size(); i += step) thinned.push_back(arrows[i]);
+  return thinned;
+}
+
 void AddImager(report::HtmlReport& page, const PlotSize& size,
                const calib::ValidationReport& report, const std::vector<size_t>& views) {
-  size_t all = 0;
-  for (const size_t v : views) all += report.cameras[v].arrows.size();
-  const size_t step = std::max<size_t>(1, (all + kMostDrawn - 1) / kMostDrawn);
-  std::vector<calib::ResidualArrow> arrows;
+  std::vector<calib::ResidualArrow> all;
   std::vector<Eigen::Vector2d> residuals;
-  size_t next = 0;
   for (const size_t v : views) {
     for (const calib::ResidualArrow& arrow : report.cameras[v].arrows) {
+      all.push_back(arrow);
       residuals.push_back(arrow.residual_px);
-      if (next++ % step == 0) arrows.push_back(arrow);
     }
   }
+  const std::vector<calib::ResidualArrow> arrows = Thinned(all, kMostDrawn);
   page.Section(fmt::format("All views of {} x {} px together ({})", size.width_px, size.height_px,
                            views.size()));
   if (arrows.empty()) {
@@ -176,7 +183,7 @@ void AddWorstViews(report::HtmlReport& page, const fs::path& folder, const std::
                          camera.name, camera.held_out.rms_px, camera.held_out.worst_px,
                          camera.held_out.count, gain),
              ImagePlot(size, PhotoBehind(size, report::Shrink(view.image, kPhotoSidePx)) +
-                                 Arrows(size, camera.arrows, gain)));
+                                 Arrows(size, Thinned(camera.arrows, kMostOfView), gain)));
   }
 }
 

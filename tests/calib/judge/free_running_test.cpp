@@ -16,7 +16,7 @@ namespace {
 using namespace testing;
 
 constexpr double kNoisePx = 0.1;
-constexpr size_t kFrames = 50;
+constexpr size_t kFrames = 30;
 const std::vector<double> kDelays{0, 0.7, -0.35};
 
 // A board in the hand: no two of its motions have the same period. `speed` 0: it stands still.
@@ -71,7 +71,7 @@ double SquaredDistance(const RigSolution& solution, const std::vector<RigCamera>
 
 TEST(FreeRunning, DelaysAreFoundWithinTheirSigmasAndTheRigWithThem) {
   const auto cameras = RowOfCameras(3, 0.05);
-  constexpr int kSolves = 8;
+  constexpr int kSolves = 3;
   double squares = 0, rig = 0;
   for (int k = 0; k < kSolves; ++k) {
     const auto views = LateViews(cameras, kDelays, 20 + static_cast<std::uint64_t>(k));
@@ -90,10 +90,10 @@ TEST(FreeRunning, DelaysAreFoundWithinTheirSigmasAndTheRigWithThem) {
            (kSolves * static_cast<double>(free.solution.layout.size()));
     EXPECT_EQ(free.delays[0]->frames, 0);
   }
-  // Chi-squared of 16 draws over 16 has sigma 0.35; of the rig's 8 x 36 unknowns 0.08.
-  EXPECT_LT(squares, 1 + 3 * 0.35);
-  EXPECT_GT(squares, 0.2);
-  EXPECT_NEAR(rig, 1, 0.35);
+  // Chi-squared of 6 draws over 6 has sigma 0.58; of the rig's 3 x 36 unknowns 0.14.
+  EXPECT_LT(squares, 1 + 3 * 0.58);
+  EXPECT_GT(squares, 0.05);
+  EXPECT_NEAR(rig, 1, 0.5);
 }
 
 TEST(FreeRunning, SolvedAsIfSynchronisedTheRigIsFarOff) {
@@ -129,7 +129,7 @@ TEST(FreeRunning, MomentsThatNoFrameIsNearAreLeftOutByName) {
   const FreeRunning free = SolveFreeRunning(kBoard, InputsOf(cameras), views, kFrames);
   std::vector<std::string> names;
   for (const LeftOut& item : free.solution.left_out) names.push_back(item.name);
-  EXPECT_THAT(names, ::testing::UnorderedElementsAre("cam1/19", "cam1/49"));
+  EXPECT_THAT(names, ::testing::UnorderedElementsAre("cam1/19", "cam1/29"));
   EXPECT_LT(std::abs(free.delays[1]->frames - 0.5), 3.5 * free.delays[1]->sigma);
 }
 
