@@ -24,7 +24,7 @@ ViewStream& MovingScene::At(size_t frame) {
   if (is_new) set = AtFrame(described_, frame);
   const auto excluded = ResolveViewNames(set, excluded_);
   if (is_new) io::CollapseDuplicates(set);
-  stream_ = StreamOf(folder_, set, DescribeRenderScene(set, excluded), limits_, console_);
+  stream_ = StreamOf(folder_, set, {DescribeRenderScene(set, excluded)}, limits_, console_);
   present_ = frame;
   return *stream_;
 }

@@ -4,6 +4,7 @@
 #include <mutex>
 #include <set>
 #include <string>
+#include <utility>
 
 #include "cli/renderers.h"
 #include "dtr/io/set_io.h"
@@ -35,7 +36,7 @@ void AddMemoryOption(CLI::App& command, double& memory_gb) {
 }
 
 std::unique_ptr<ViewStream> StreamOf(const std::filesystem::path& folder, DtrSet& set,
-                                     const RenderScene& described, const StreamLimits& limits,
+                                     std::vector<RenderScene> described, const StreamLimits& limits,
                                      Progress& console) {
   ViewStream::Settings settings;
   settings.host_bytes = static_cast<size_t>(limits.memory_gb * kBytesPerGigabyte);
@@ -44,7 +45,7 @@ std::unique_ptr<ViewStream> StreamOf(const std::filesystem::path& folder, DtrSet
   io::LoadOptions load;
   load.warn = SayOnce(console);
   return std::make_unique<ViewStream>(
-      set, described, [folder, load](View& view) { io::LoadPixels(folder, view, load); },
+      set, std::move(described), [folder, load](View& view) { io::LoadPixels(folder, view, load); },
       std::move(settings));
 }
 

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <memory>
+#include <vector>
 
 #include "dtr/base/progress.h"
 #include "dtr/render/view_stream.h"
@@ -19,10 +20,10 @@ struct StreamLimits {
 void AddMemoryOption(CLI::App& command, double& memory_gb);
 
 /// A stream of the pixels in `folder`. `set` is what ReadSet gave, its duplicates collapsed;
-/// `described` is of it. `console` is told, once each, of what is left out; it and `set` must
-/// outlive the stream.
+/// `described` is of it, a scene for each frame. `console` is told, once each, of what is left out;
+/// it and `set` must outlive the stream.
 std::unique_ptr<ViewStream> StreamOf(const std::filesystem::path& folder, DtrSet& set,
-                                     const RenderScene& described, const StreamLimits& limits,
+                                     std::vector<RenderScene> described, const StreamLimits& limits,
                                      Progress& console);
 
 }  // namespace dtr::cli

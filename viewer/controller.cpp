@@ -63,11 +63,11 @@ bool SamePose(const Pose& a, const Pose& b, double scene_size) {
 
 }  // namespace
 
-Surroundings SurroundingsOf(const DtrSet& set) {
+Surroundings SurroundingsOf(const DtrSet& set, size_t frame) {
   Surroundings surroundings;
   surroundings.bounds = set.bounds;
   surroundings.center = set.scene_center;
-  for (const View& view : set.frames.front().views) {
+  for (const View& view : set.frames.at(frame).views) {
     if (view.role == ViewRole::kSource) surroundings.views.push_back(&view);
   }
   std::sort(surroundings.views.begin(), surroundings.views.end(),

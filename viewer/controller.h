@@ -3,6 +3,7 @@
 #include <array>
 #include <functional>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "dtr/types/dtr_set.h"
@@ -18,8 +19,8 @@ struct Surroundings {
   Bounds bounds;
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
 };
-/// Source views of the set's first frame, in byte order of their ids.
-Surroundings SurroundingsOf(const DtrSet& set);
+/// Source views of one of the set's frames, in byte order of their ids.
+Surroundings SurroundingsOf(const DtrSet& set, size_t frame = 0);
 
 /// The camera of a window and how it moves. Left drag: orbit about the point under the cursor.
 /// Right drag: look around. Middle drag: pan. Wheel: towards the point under the cursor; while
@@ -38,6 +39,8 @@ class Controller {
   void set_fly_speed(double units_per_s);
   Eigen::Vector3d up() const { return up_; }
   const Surroundings& surroundings() const { return surroundings_; }
+  /// Another instant of the same scene: the camera stays where it is and goes on as it went.
+  void SetSurroundings(Surroundings surroundings) { surroundings_ = std::move(surroundings); }
 
   void Handle(const InputEvent& event);
   /// Time passes: flight and glides go on. Glides and steps never depend on how long a frame took
@@ -83,7 +86,7 @@ class Controller {
   double DepthOrUsual(const Eigen::Vector2d& pixel) const;
   bool flying() const;
 
-  const Surroundings surroundings_;
+  Surroundings surroundings_;
   const DepthAt depth_at_;
   const Eigen::Vector3d up_;
   NovelCamera camera_;

@@ -22,7 +22,6 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
-
 struct Options {
   fs::path set, output;
   double memory_gb = 4;
@@ -101,7 +100,7 @@ int RunInspect(const Options& options, const Context& context) {
   RequireOneFrame(set);
   const viewer::InspectFacts facts = FactsOf(options, set, threads);
   io::CollapseDuplicates(set);
-  const auto stream = StreamOf(options.set, set, DescribeRenderScene(set),
+  const auto stream = StreamOf(options.set, set, {DescribeRenderScene(set)},
                                {options.memory_gb, threads}, context.console);
   RenderOptions render;
   render.threads = threads;

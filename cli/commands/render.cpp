@@ -174,8 +174,8 @@ int RunRender(const Options& options, const Context& context) {
   context.console.Say(
       fmt::format("{}: {} frame{}", options.output.string(), cameras.size(), several ? "s" : ""));
   json["skipped"] = nlohmann::ordered_json::array();
-  for (const auto& [name, reason] : moving.lost()) {
-    json["skipped"].push_back({{"name", name}, {"reason", reason}});
+  for (const ViewStream::Lost& lost : moving.lost()) {
+    json["skipped"].push_back({{"name", lost.name}, {"reason", lost.reason}});
   }
   context.EmitJson(json.dump(1));
   return kDone;

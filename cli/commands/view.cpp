@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 
 #include "cli/command.h"
@@ -21,6 +22,7 @@
 #include "dtr/base/machine.h"
 #include "dtr/io/pruned.h"
 #include "dtr/io/set_io.h"
+#include "dtr/render/instants.h"
 #include "viewer/glfw/app.h"
 #include "viewer/governor.h"
 
@@ -37,7 +39,8 @@ struct Options {
   RendererChoice renderer;
   double memory_gb = 4;
   int frames = 0, laps = 1, largest_divisor = 8;
-  bool no_panel = false, cameras = false, photo = false;
+  size_t instant = 0;
+  bool play = false, no_panel = false, cameras = false, photo = false;
   std::shared_ptr<RenderOptions> render;
 };
 
@@ -47,13 +50,14 @@ std::unique_ptr<viewer::OpenedSet> Open(const Options& options, const Context& c
   auto opened = std::make_unique<viewer::OpenedSet>();
   opened->set = io::ReadSet(options.set);
   io::CollapseDuplicates(opened->set);
-  opened->stream = StreamOf(options.set, opened->set, DescribeRenderScene(opened->set, excluded),
+  opened->stream = StreamOf(options.set, opened->set, DescribeFrames(opened->set, excluded),
                             {options.memory_gb, context.common.threads}, context.console);
   return opened;
 }
 
 std::string CommandLine(const Options& options, const fs::path& camera_file,
-                        const RenderOptions& render, const std::vector<std::string>& hidden) {
+                        const RenderOptions& render, const std::vector<std::string>& hidden,
+                        std::optional<size_t> instant) {
   std::vector<std::string> words{"dtr",
                                  "render",
                                  fs::absolute(options.set).string(),
@@ -61,6 +65,7 @@ std::string CommandLine(const Options& options, const fs::path& camera_file,
                                  fs::absolute(camera_file).string(),
                                  "-o",
                                  fs::absolute(camera_file).replace_extension(".png").string()};
+  if (instant) words.insert(words.end(), {"--frame", std::to_string(*instant)});
   std::string excluded = options.exclude;
   for (const std::string& name : hidden) excluded += (excluded.empty() ? "" : ",") + name;
   if (!excluded.empty()) words.insert(words.end(), {"--exclude", excluded});
@@ -75,6 +80,19 @@ std::string CommandLine(const Options& options, const fs::path& camera_file,
     words.insert(words.end(), {"--gpu-memory", fmt::format("{}", options.renderer.gpu_memory_gb)});
   }
   return ShellLine(words);
+}
+
+Json ControlsJson(const std::vector<viewer::ControlPlace>& controls) {
+  Json json = Json::array();
+  for (const viewer::ControlPlace& one : controls) {
+    json.push_back({{"name", one.name},
+                    {"x", one.x},
+                    {"y", one.y},
+                    {"width", one.width},
+                    {"height", one.height},
+                    {"visible", one.visible}});
+  }
+  return json;
 }
 
 Json StateJson(const viewer::AppState& state) {
@@ -103,8 +121,14 @@ Json StateJson(const viewer::AppState& state) {
           {"under_cursor", state.under_cursor},
           {"distance", state.distance},
           {"path_keys", state.path_keys},
+          {"frames_per_key", state.frames_per_key},
           {"recording", state.recording},
+          {"asks_for_path", state.asks_for_path},
           {"reloads", state.reloads},
+          {"instant", state.instant},
+          {"instants", state.instants},
+          {"playing_time", state.playing_time},
+          {"controls", ControlsJson(state.controls)},
           {"message", state.message},
           {"render_options", RenderOptionArguments(state.render)}};
 }
@@ -157,12 +181,24 @@ std::map<std::string, viewer::ViewVerdict> Verdicts(const Options& options,
   return verdicts;
 }
 
-/// Of the file that is written last when a set is made. Not its bytes: a set is not read for it.
-std::string StampOf(const fs::path& set) {
+/// Not of its bytes: nothing is read for it. Empty where there is no such file.
+std::string FileStamp(const fs::path& file) {
   struct stat found {};
-  if (stat((set / "set.json").c_str(), &found) != 0) return "";
+  if (stat(file.c_str(), &found) != 0) return "";
   return fmt::format("{} {} {}.{}", found.st_ino, found.st_size, found.st_mtim.tv_sec,
                      found.st_mtim.tv_nsec);
+}
+
+/// Of the files that pictures are made of; empty while one is missing.
+std::string ViewStampOf(const fs::path& set, const View& view) {
+  std::string stamp;
+  for (const auto* file : {&view.image_file, &view.mask_file, &view.depth_file}) {
+    if (!file->has_value()) continue;
+    const std::string one = FileStamp(set / (*file)->path);
+    if (one.empty()) return "";
+    stamp += one + ";";
+  }
+  return stamp;
 }
 
 std::vector<NovelCamera> CamerasOf(const std::vector<NovelFrame>& frames) {
@@ -175,11 +211,12 @@ viewer::Host MakeHost(const Options& options, const Context& context,
                       const std::vector<std::string>& excluded) {
   viewer::Host host;
   host.open = [&, excluded] { return Open(options, context, excluded); };
-  host.stamp = [&] { return StampOf(options.set); };
+  host.stamp = [&] { return FileStamp(options.set / "set.json"); };  // written last
+  host.view_stamp = [&](const View& view) { return ViewStampOf(options.set, view); };
   host.read_path = [](const DtrSet& set, const fs::path& file) {
     NovelCameraRequest request;
     request.path_file = file;
-    return CamerasOf(NovelFrames(set, request));
+    return CamerasOf(NovelFrames(AtFrame(set, 0), request));
   };
   host.load_sigma = [&](const View& view) {
     View with_sigma = view;
@@ -190,8 +227,8 @@ viewer::Host MakeHost(const Options& options, const Context& context,
     return with_sigma.inverse_depth_sigma.value_or(Grid<float>());
   };
   host.command_line = [&](const fs::path& camera_file, const RenderOptions& render,
-                          const std::vector<std::string>& hidden) {
-    return CommandLine(options, camera_file, render, hidden);
+                          const std::vector<std::string>& hidden, std::optional<size_t> instant) {
+    return CommandLine(options, camera_file, render, hidden, instant);
   };
   host.verdicts = [&] { return Verdicts(options, context); };
   host.say = [&](const std::string& line) { context.console.Note(line); };
@@ -222,6 +259,8 @@ viewer::AppSettings SettingsOf(const Options& options, const Context& context, c
   settings.cameras = options.cameras;
   settings.photo = options.photo;
   settings.frames = options.frames;
+  settings.instant = options.instant;
+  settings.play_time = options.play;
   settings.laps = options.laps;
   settings.largest_divisor = options.largest_divisor;
   settings.screenshot = options.screenshot;
@@ -230,7 +269,7 @@ viewer::AppSettings SettingsOf(const Options& options, const Context& context, c
       request.fly_through_frames == 0) {
     return settings;
   }
-  const std::vector<NovelFrame> frames = NovelFrames(set, request);
+  const std::vector<NovelFrame> frames = NovelFrames(AtFrame(set, options.instant), request);
   settings.start = NovelCamera{frames.front().camera, frames.front().cam_from_world};
   if (frames.size() > 1) settings.play = CamerasOf(frames);
   return settings;
@@ -258,7 +297,7 @@ int RunView(const Options& options, const Context& context) {
   }
   ReturnFreedMemory();
   const DtrSet set = io::ReadSet(options.set);
-  const auto excluded = ResolveViewNames(set, options.exclude);
+  const auto excluded = ResolveViewNames(AtFrame(set, options.instant), options.exclude);
   const viewer::AppReport report =
       viewer::RunViewer(SettingsOf(options, context, set), MakeHost(options, context, excluded));
   context.EmitJson(ReportJson(report).dump(1, ' ', false, Json::error_handler_t::replace));
@@ -292,6 +331,12 @@ void AddViewCommand(CLI::App& app) {
         command.add_option("--laps", options->laps, "How often to fly along it [1]")
             ->check(CLI::Range(1, 1'000'000))
             ->type_name("N");
+        command
+            .add_option("--frame", options->instant,
+                        "Of a moving set: the frame shown first, from 0 [0]")
+            ->check(CLI::Range(0, 1 << 30))
+            ->type_name("N");
+        command.add_flag("--play", options->play, "Of a moving set: play it at once");
         command
             .add_option("--largest-divisor", options->largest_divisor,
                         "While the camera moves, divide the picture's sides by no more than N [8]")

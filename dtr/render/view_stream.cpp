@@ -106,16 +106,23 @@ class ViewStream::Readers {
   std::vector<std::jthread> threads_;  // last: they stop before the rest goes
 };
 
-ViewStream::ViewStream(DtrSet& set, RenderScene described, Loader load, Settings settings)
+ViewStream::ViewStream(DtrSet& set, std::vector<RenderScene> described, Loader load,
+                       Settings settings)
     : described_(std::move(described)), settings_(std::move(settings)) {
-  if (set.frames.empty()) throw std::invalid_argument("ViewStream: a set without a frame");
-  std::vector<View>& views = set.frames.front().views;
-  for (const View* view : described_.views) {
-    const auto own = std::find_if(views.begin(), views.end(),
-                                  [&](const View& candidate) { return &candidate == view; });
-    if (own == views.end()) throw std::invalid_argument("ViewStream: a view of another set");
-    slots_.push_back({&*own, State::kAbsent, false, BytesOf(*own), 0});
+  if (set.frames.empty() || set.frames.size() != described_.size()) {
+    throw std::invalid_argument("ViewStream: expected a scene of every frame");
   }
+  for (size_t frame = 0; frame < described_.size(); ++frame) {
+    first_slot_.push_back(slots_.size());
+    std::vector<View>& views = set.frames[frame].views;
+    for (const View* view : described_[frame].views) {
+      const auto own = std::find_if(views.begin(), views.end(),
+                                    [&](const View& candidate) { return &candidate == view; });
+      if (own == views.end()) throw std::invalid_argument("ViewStream: a view of another set");
+      slots_.push_back({&*own, State::kAbsent, false, BytesOf(*own), 0, {}});
+    }
+  }
+  first_slot_.push_back(slots_.size());
   readers_ = std::make_unique<Readers>(std::move(load), ResolveThreads(settings_.threads));
 }
 
@@ -123,10 +130,29 @@ ViewStream::~ViewStream() = default;
 
 std::vector<size_t> ViewStream::NotLost() const {
   std::vector<size_t> slots;
-  for (size_t i = 0; i < slots_.size(); ++i) {
+  for (size_t i = first_slot_[shown_]; i < first_slot_[shown_ + 1]; ++i) {
     if (slots_[i].state != State::kLost && !IsHidden(slots_[i])) slots.push_back(i);
   }
   return slots;
+}
+
+void ViewStream::RequireAnyReadable() const {
+  const auto begin = slots_.begin() + static_cast<std::ptrdiff_t>(first_slot_[shown_]);
+  const auto end = slots_.begin() + static_cast<std::ptrdiff_t>(first_slot_[shown_ + 1]);
+  const auto lost = [](const Slot& slot) { return slot.state == State::kLost; };
+  if (begin == end || !std::all_of(begin, end, lost)) return;
+  throw Error("views: expected at least one that can be read, found none; the first: " +
+              begin->told);
+}
+
+size_t ViewStream::RetryLost(const std::function<bool(const View&)>& may_be_read) {
+  return std::erase_if(lost_, [&](const Lost& lost) {
+    if (!may_be_read(*lost.view)) return false;
+    for (Slot& slot : slots_) {
+      if (slot.view == lost.view) slot.state = State::kAbsent;
+    }
+    return true;
+  });
 }
 
 bool ViewStream::IsHidden(const Slot& slot) const {
@@ -134,7 +160,7 @@ bool ViewStream::IsHidden(const Slot& slot) const {
 }
 
 RenderScene ViewStream::SceneOf(const std::vector<size_t>& slots) const {
-  RenderScene scene = described_;
+  RenderScene scene = described_.at(shown_);
   scene.views.clear();
   for (const size_t slot : slots) scene.views.push_back(slots_[slot].view);
   return scene;
@@ -145,7 +171,7 @@ ViewStream::Needed ViewStream::NeededFor(const Pose& novel_from_world,
   const std::vector<size_t> candidates = NotLost();
   RenderScene scene = SceneOf(candidates);
   // From all views: what was lost so far may depend on what was read ahead.
-  RenderScene all = described_;
+  RenderScene all = described_.at(shown_);
   std::erase_if(all.views, [this](const View* view) {
     return std::find(hidden_.begin(), hidden_.end(), view) != hidden_.end();
   });
@@ -228,7 +254,8 @@ void ViewStream::Collect(bool wait) {
     }
     slot.state = State::kLost;
     bytes_ -= slot.bytes;
-    lost_.push_back({slot.view->name, result.error});
+    lost_.push_back({slot.view->name, result.error, slot.view});
+    if (std::exchange(slot.told, result.error) == result.error) continue;
     settings_.warn("WARNING: " + slot.view->name + " is left out: " + result.error);
   }
 }
@@ -246,10 +273,7 @@ RenderScene ViewStream::SceneFor(const Pose& novel_from_world, const RenderOptio
   Needed needed;
   for (;;) {
     ++now_;
-    if (!slots_.empty() && lost_.size() == slots_.size()) {
-      throw Error("views: expected at least one that can be read, found none; the first: " +
-                  lost_.front().reason);
-    }
+    RequireAnyReadable();
     needed = NeededFor(novel_from_world, options);
     for (const size_t slot : needed.slots) slots_[slot].last_used = now_;
     if (pixels == Pixels::kInMemory &&

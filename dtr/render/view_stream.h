@@ -47,14 +47,18 @@ class ViewStream {
     kOrReleased,  ///< and those whose pixels were released, for a renderer that holds what it needs
   };
 
-  /// A view that could not be read: it is never drawn from again.
+  /// A view that could not be read: it is not drawn from again unless RetryLost says so.
   struct Lost {
     std::string name, reason;
+    const View* view = nullptr;
   };
 
-  /// `set` is as io::ReadSet gives it, without pixels; `described` is DescribeRenderScene of it.
-  /// Both outlive the stream, and the views stay where they are.
-  ViewStream(DtrSet& set, RenderScene described, Loader load, Settings settings);
+  /// `set` is as io::ReadSet gives it, without pixels; `described` is DescribeRenderScene of it, or
+  /// of a moving set DescribeFrames. Both outlive the stream, and the views stay where they are.
+  ViewStream(DtrSet& set, std::vector<RenderScene> described, Loader load, Settings settings);
+  ViewStream(DtrSet& set, RenderScene described, Loader load, Settings settings)
+      : ViewStream(set, std::vector<RenderScene>{std::move(described)}, std::move(load),
+                   std::move(settings)) {}
   /// Waits for what is being read just now.
   ~ViewStream();
   ViewStream(const ViewStream&) = delete;
@@ -73,6 +77,10 @@ class ViewStream {
   void Prefetch(const Pose& novel_from_world, const RenderOptions& options,
                 Pixels pixels = Pixels::kInMemory);
 
+  /// Of a moving set: pictures are of this frame until the next call; at first of frame 0. All
+  /// frames share the bytes.
+  void ShowFrame(size_t frame) { shown_ = frame; }
+
   /// Drops the pixels of a view that is in memory: a renderer made its own of them. They are read
   /// again when a picture needs them itself.
   void Release(const View& view);
@@ -80,6 +88,11 @@ class ViewStream {
   /// Leaves out these views (pointers into the set), as --exclude does, until the next call.
   void Hide(std::vector<const View*> views) { hidden_ = std::move(views); }
 
+  /// Lost views for which this says yes are tried anew when a picture needs them: files come back.
+  /// Returns how many. One that fails again for the same reason is not warned of again.
+  size_t RetryLost(const std::function<bool(const View&)>& may_be_read);
+
+  /// Of all frames.
   const std::vector<Lost>& lost() const { return lost_; }
   /// Pixels in memory or being read.
   size_t bytes() const { return bytes_; }
@@ -96,6 +109,7 @@ class ViewStream {
     bool released = false;        ///< a renderer holds what it made of pixels that are not there
     size_t bytes = 0;             ///< its pixels, from its description
     std::uint64_t last_used = 0;  ///< number of the call that needed it last
+    std::string told;             ///< why it was lost, as warned of last
   };
   class Readers;
 
@@ -107,7 +121,8 @@ class ViewStream {
   };
   Needed NeededFor(const Pose& novel_from_world, const RenderOptions& options) const;
   RenderScene SceneOf(const std::vector<size_t>& slots) const;
-  std::vector<size_t> NotLost() const;  ///< nor hidden
+  std::vector<size_t> NotLost() const;  ///< nor hidden; of the shown frame
+  void RequireAnyReadable() const;
   bool IsHidden(const Slot& slot) const;
   /// Asks for the absent ones of these, as far as dropping others gives room.
   void Request(const std::vector<size_t>& slots, Pixels pixels);
@@ -117,9 +132,11 @@ class ViewStream {
   void Collect(bool wait);
   void WarnOfRoom(size_t fitting, size_t wanted);
 
-  const RenderScene described_;
+  const std::vector<RenderScene> described_;  ///< by frame
   const Settings settings_;
-  std::vector<Slot> slots_;  ///< as described_.views
+  std::vector<Slot> slots_;         ///< as the frames' views, one frame after the other
+  std::vector<size_t> first_slot_;  ///< of each frame, and of one more
+  size_t shown_ = 0;                ///< frame
   std::vector<Lost> lost_;
   std::vector<const View*> hidden_;
   size_t bytes_ = 0;

@@ -11,6 +11,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/random.h"
 #include "dtr/render/geometry.h"
+#include "dtr/render/instants.h"
 #include "dtr/render/valid_views.h"
 
 namespace dtr {
@@ -256,6 +257,80 @@ TEST(ViewStream, ReleasedViewsAreDrawnFromWithoutPixelsAndReadAgainWhenThoseAreN
   EXPECT_EQ(disk.reads, 4);
   EXPECT_EQ(stream.bytes(), 3 * disk.view_bytes);
   EXPECT_EQ(stream.decoded_bytes(), 3 * disk.view_bytes);
+}
+
+TEST(ViewStream, FilesThatComeBackAreReadAgain) {
+  Disk disk;
+  std::vector<std::string> warnings;
+  const Pose camera = disk.Camera(0.2);
+  const std::vector<std::string> order = Expected(disk, camera, Nearest(4));
+  disk.broken[order[0]] = "images/x.jpg: gone";
+  ViewStream stream(disk.set, DescribeRenderScene(disk.set), disk.Loader(),
+                    Room(8 * disk.view_bytes, &warnings));
+  const auto drawn = [&] {
+    const RenderScene scene = stream.SceneFor(camera, Nearest(3), ViewStream::Wait::kForAll);
+    return Drawn(disk, scene, camera, Nearest(3));
+  };
+  const std::vector<std::string> without{order[1], order[2], order[3]};
+  const std::vector<std::string> whole{order[0], order[1], order[2]};
+  EXPECT_EQ(drawn(), without);
+  ASSERT_EQ(stream.lost().size(), 1u);
+  EXPECT_EQ(stream.lost()[0].view->id, order[0]);
+  const int reads = disk.reads;
+  EXPECT_EQ(stream.RetryLost([](const View&) { return false; }), 0u);
+  EXPECT_EQ(drawn(), without);
+  EXPECT_EQ(disk.reads, reads);
+  // Tried in vain: lost again, but not complained of again.
+  EXPECT_EQ(stream.RetryLost([](const View&) { return true; }), 1u);
+  EXPECT_EQ(drawn(), without);
+  EXPECT_EQ(stream.lost().size(), 1u);
+  EXPECT_EQ(warnings.size(), 1u);
+  disk.broken.clear();
+  EXPECT_EQ(stream.RetryLost([](const View&) { return true; }), 1u);
+  EXPECT_EQ(drawn(), whole);
+  EXPECT_TRUE(stream.lost().empty());
+  EXPECT_LE(stream.bytes(), 8 * disk.view_bytes);
+}
+
+TEST(ViewStream, FramesOfAMovingSetShareTheRoomAndNothingElse) {
+  Disk disk;
+  Frame later = disk.set.frames[0];
+  for (View& view : later.views) {
+    const View still = disk.files.at(view.id);
+    view.id = "w" + view.id;
+    disk.files[view.id] = still;
+    disk.files[view.id].id = view.id;
+    for (std::uint8_t& level : disk.files[view.id].image.data()) level /= 2;
+  }
+  disk.set.frames.push_back(later);
+  ViewStream stream(disk.set, DescribeFrames(disk.set), disk.Loader(), Room(4 * disk.view_bytes));
+  const Pose camera = disk.Camera(0.2);
+  const auto drawn = [&](size_t frame) {
+    stream.ShowFrame(frame);
+    const RenderScene scene = stream.SceneFor(camera, Nearest(3), ViewStream::Wait::kForAll);
+    EXPECT_LE(stream.bytes(), 4 * disk.view_bytes);
+    return Drawn(disk, scene, camera, Nearest(3));
+  };
+  const std::vector<std::string> first = drawn(0);
+  std::vector<std::string> second = first;
+  for (std::string& id : second) id = "w" + id;
+  EXPECT_EQ(drawn(1), second);
+  EXPECT_EQ(disk.reads, 6);
+  EXPECT_EQ(drawn(1), second);
+  EXPECT_EQ(disk.reads, 6);
+  EXPECT_EQ(drawn(0), first);
+  // An instant of which nothing can be read is no reason to go without the others.
+  for (const auto& [id, view] : disk.files) {
+    if (!id.starts_with("w")) disk.broken[id] = "gone";
+  }
+  ViewStream half(disk.set, DescribeFrames(disk.set), disk.Loader(), Room(1 << 30));
+  for (Frame& frame : disk.set.frames) {
+    for (View& view : frame.views) DropPixels(view);
+  }
+  EXPECT_THROW(half.SceneFor(camera, Nearest(3), ViewStream::Wait::kForAll), Error);
+  half.ShowFrame(1);
+  const RenderScene scene = half.SceneFor(camera, Nearest(3), ViewStream::Wait::kForAll);
+  EXPECT_EQ(Drawn(disk, scene, camera, Nearest(3)), second);
 }
 
 }  // namespace

@@ -23,11 +23,12 @@ namespace dtr::testing {
 /// opens the next one meanwhile is turned away.
 class VirtualDisplay {
  public:
-  VirtualDisplay() {
+  /// `screen` as Xvfb takes it: width x height x bits.
+  explicit VirtualDisplay(const std::string& screen = "1280x800x24") {
     int pipe_fds[2];
     if (pipe(pipe_fds) != 0) return;
     server_ = fork();
-    if (server_ == 0) Serve(pipe_fds[1]);
+    if (server_ == 0) Serve(pipe_fds[1], screen);
     close(pipe_fds[1]);
     const std::string number = ReadLine(pipe_fds[0]);
     close(pipe_fds[0]);
@@ -49,12 +50,12 @@ class VirtualDisplay {
   static constexpr int kPatienceMs = 60'000;
 
   // The child: becomes the server, and ends with the test program, however that ends.
-  [[noreturn]] static void Serve(int number_fd) {
+  [[noreturn]] static void Serve(int number_fd, const std::string& screen) {
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     const int silence = open("/dev/null", O_RDWR);
     for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) dup2(silence, fd);
     const std::string number = std::to_string(number_fd);
-    execlp("Xvfb", "Xvfb", "-noreset", "-displayfd", number.c_str(), "-screen", "0", "1280x800x24",
+    execlp("Xvfb", "Xvfb", "-noreset", "-displayfd", number.c_str(), "-screen", "0", screen.c_str(),
            "-nolisten", "tcp", static_cast<char*>(nullptr));
     _exit(127);
   }

@@ -4,9 +4,9 @@
 
 #include <set>
 
+#include "datasets/exact/analytic_scene.h"
 #include "dtr/cpu/contributions.h"
 #include "dtr/cpu/renderer.h"
-#include "datasets/exact/analytic_scene.h"
 #include "viewer/navigation.h"
 #include "viewer/shown.h"
 

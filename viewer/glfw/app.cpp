@@ -20,6 +20,7 @@
 #include "viewer/glfw/path_tools.h"
 #include "viewer/glfw/session.h"
 #include "viewer/glfw/user_interface.h"
+#include "viewer/time_player.h"
 
 namespace dtr::viewer {
 namespace {
@@ -48,6 +49,8 @@ class App {
     inspection.cameras = settings.cameras;
     if (settings.photo) inspection.compared = Compared::kPhoto;
     if (settings.start) controller().JumpTo(*settings.start);
+    session_->ShowInstant(settings.instant);
+    if (settings.play_time) PlayOrStop();
   }
 
   AppReport Run() {
@@ -61,7 +64,9 @@ class App {
       HandleInput();
       FitToWindow();
       Fly(passed);
+      session_->ShowInstant(time_.Advance(passed, session_->clock(), session_->instant()));
       const bool drew_moving = session_->schedule.Make(Order(), Pace());
+      if (time_.playing()) ReadNextInstant();
       const Stopwatch of_window;
       Film();
       DrawInterface();
@@ -95,6 +100,7 @@ class App {
   void WatchSet() {
     if (!host_.stamp || since_watch_.seconds() < kWatchSeconds) return;
     since_watch_.Restart();
+    session_->RetryLostViews();
     if (std::exchange(stamp_, host_.stamp()) == stamp_) return;
     try {
       std::unique_ptr<Session> next = OpenSession();
@@ -195,6 +201,12 @@ class App {
         return paths_.flight().StartOrStop(controller().camera().camera);
       case Action::kRecord:
         return paths_.StartOrStopRecording(controller().camera().camera, session_->opened().set);
+      case Action::kNextInstant:
+        return StepInstant(1);
+      case Action::kPreviousInstant:
+        return StepInstant(-1);
+      case Action::kPlayTime:
+        return PlayOrStop();
       case Action::kNextShown:
         return StepShown(1);
       case Action::kPreviousShown:
@@ -211,12 +223,36 @@ class App {
     shown_ = kAllShown[static_cast<size_t>((static_cast<int>(at) + by + count) % count)];
   }
 
+  void StepInstant(int by) {
+    const auto count = static_cast<int>(session_->clock().frames());
+    time_.Stop();
+    session_->ShowInstant(
+        static_cast<size_t>((static_cast<int>(session_->instant()) + by + count) % count));
+  }
+
+  void PlayOrStop() {
+    if (session_->clock().frames() > 1) return time_.StartOrStop();
+    Tell(
+        "only moving sets can be played: this one has a single instant (dtr join makes moving "
+        "sets)");
+  }
+
+  /// In the background, so that it is there when its turn comes.
+  void ReadNextInstant() {
+    PictureOrder next = Order();
+    next.instant = (next.instant + 1) % session_->clock().frames();
+    next.hidden.clear();
+    session_->maker.ReadAhead(next);
+  }
+
   /// Where the camera is this frame, unless a hand moves it.
   void Fly(double passed_s) {
     if (playing()) {
       controller().JumpTo(settings_.play[played_++ % settings_.play.size()]);
     } else if (const NovelCamera* wanted = paths_.Wanted()) {
       controller().JumpTo(*wanted);
+      time_.Stop();
+      session_->ShowInstant(paths_.WantedFrame(session_->clock().frames()));
     } else if (const auto flown = paths_.flight().Advance(passed_s, io::kVideoFramesPerSecond)) {
       controller().JumpTo(*flown);
     }
@@ -229,13 +265,21 @@ class App {
 
   PictureSchedule::Pace Pace() const {
     if (paths_.Wanted()) return PictureSchedule::Pace::kWhole;
-    const bool moves = playing() || paths_.flight().flying() || session_->controller.moving();
-    return moves ? PictureSchedule::Pace::kMoving : PictureSchedule::Pace::kResting;
+    return CameraMoves() || time_.playing() ? PictureSchedule::Pace::kMoving
+                                            : PictureSchedule::Pace::kResting;
+  }
+
+  bool CameraMoves() const {
+    return playing() || paths_.Wanted() || paths_.flight().flying() ||
+           session_->controller.moving();
   }
 
   PictureOrder Order() const {
     const NovelCamera* wanted = paths_.Wanted();  // of its own size, whatever the window's is now
-    return {wanted ? *wanted : session_->controller.camera(), options_, shown_,
+    return {wanted ? *wanted : session_->controller.camera(),
+            options_,
+            shown_,
+            session_->instant(),
             session_->inspector.inspection().hidden,
             session_->inspector.inspection().LooksAtPixels()};
   }
@@ -261,20 +305,27 @@ class App {
     }
     session_->inspector.Draw(options_);
     std::vector<Action> pressed;
+    controls_.clear();
     if (panel_) {
+      const size_t instant = session_->instant();
       PanelModel model{picture,
                        controller(),
                        options_,
                        shown_,
                        session_->inspector.inspection(),
                        paths_.flight(),
+                       {static_cast<int>(session_->clock().frames()), static_cast<int>(instant),
+                        session_->clock().StartOf(instant), time_.playing()},
                        paths_.Progress(),
                        message_,
                        window_ms_,
                        moving_fps_,
+                       {},
                        {}};
       DrawPanel(interface_, model);
       pressed = std::move(model.pressed);
+      controls_ = std::move(model.controls);
+      session_->ShowInstant(static_cast<size_t>(model.time.instant));
     }
     if (help_) DrawHelp(interface_, help_);
     if (path_dialog_.open()) {
@@ -312,17 +363,24 @@ class App {
 
   void CopyCommand() {
     const auto file = keeper_.SaveCamera(Order().camera, session_->opened().set);
-    const std::string command = host_.command_line(file, options_, session_->HiddenNames());
+    const bool moving = session_->clock().frames() > 1;
+    const std::string command =
+        host_.command_line(file, options_, session_->HiddenNames(),
+                           moving ? std::optional(session_->instant()) : std::nullopt);
     glfwSetClipboardString(window_.handle(), command.c_str());
     Tell(command);
   }
 
   /// Throws Error where the last frame's picture could not be made: nobody is there to see why.
   bool ReachedFrames() const {
-    const bool last =
-        settings_.frames > 0 && report_.last.frames + 1 >= settings_.frames && !playing();
+    const bool last = LastFrame();
     if (last && session_->schedule.refusal()) throw Error(*session_->schedule.refusal());
     return last && whole() && settling_ <= 0;
+  }
+
+  /// As many frames as were asked for are drawn; a whole picture may still be to come.
+  bool LastFrame() const {
+    return settings_.frames > 0 && report_.last.frames + 1 >= settings_.frames && !playing();
   }
 
   void CountMoving(double ms, double cpu_ms) {
@@ -337,6 +395,7 @@ class App {
   }
 
   void FinishFrame() {
+    if (LastFrame()) time_.Stop();  // what is kept is of a picture that stands still
     if (ReachedFrames()) quit_ = true;
     ++report_.last.frames;
     --settling_;
@@ -348,12 +407,11 @@ class App {
       report_.first_picture_cpu_ms = ProcessCpuMilliseconds() - started_cpu_ms_;
     }
     if (whole() && host_.state_changed) host_.state_changed(State());
-    const bool moves = Pace() != PictureSchedule::Pace::kResting || settling_ > 0 ||
-                       !session_->schedule.MadeFor(Order());
-    if (moves || quit_) return;
-    moving_fps_ = 0;
-    // A still picture is due soon, or when its views have been read; a video is nearly there.
-    const bool due = session_->schedule.Due() || paths_.recording();
+    if (quit_ || settling_ > 0 || CameraMoves() || !session_->schedule.MadeFor(Order())) return;
+    if (!time_.playing()) moving_fps_ = 0;
+    // A still picture is due soon, or when its views have been read; a video is nearly there; so
+    // is the next instant.
+    const bool due = session_->schedule.Due() || paths_.recording() || time_.playing();
     glfwWaitEventsTimeout(due ? kReadingSeconds : kIdleSeconds);
   }
 
@@ -388,8 +446,14 @@ class App {
       }
     }
     state.path_keys = static_cast<int>(paths_.flight().keys().size());
+    state.frames_per_key = paths_.flight().frames_per_key;
     state.recording = paths_.recording();
+    state.asks_for_path = path_dialog_.open();
     state.reloads = reloads_;
+    state.controls = controls_;
+    state.instant = session_->instant();
+    state.instants = session_->clock().frames();
+    state.playing_time = time_.playing();
     state.message = message_;
     state.render = options_;
     return state;
@@ -411,6 +475,8 @@ class App {
   int reloads_ = 0;
   RenderOptions options_;
   Shown shown_ = Shown::kColour;
+  TimePlayer time_;
+  std::vector<ControlPlace> controls_;
   bool panel_, help_ = false, quit_ = false;
   bool save_picture_ = false, save_window_ = false, copy_command_ = false;
   size_t played_ = 0;

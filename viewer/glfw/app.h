@@ -15,7 +15,8 @@
 
 namespace dtr::viewer {
 
-/// A set with what reads its pixels. Stays where it is: the stream points into the set.
+/// A set with what reads the pixels of all its frames. Stays where it is: the stream points into
+/// the set.
 struct OpenedSet {
   DtrSet set;
   std::unique_ptr<ViewStream> stream;
@@ -34,6 +35,8 @@ struct AppSettings {
   std::vector<NovelCamera> play;
   int laps = 1;                      ///< so many times
   std::optional<NovelCamera> start;  ///< none: the first input camera
+  size_t instant = 0;                ///< of a moving set: the frame shown first
+  bool play_time = false;            ///< of a moving set: from there on
   int frames = 0;                    ///< close after so many, once the picture is whole; 0: never
   int largest_divisor = 8;           ///< of the sides of pictures while moving
   std::filesystem::path screenshot;  ///< of the window, written at the end; empty: none
@@ -43,6 +46,14 @@ struct AppSettings {
 struct ViewVerdict {
   bool good = false;
   std::string text;  ///< one line
+};
+
+/// A control of the panel, or an entry of a list that is open: "blend", "blend=cosine". Pixels of
+/// the window; what can be worked, without the words beside it.
+struct ControlPlace {
+  std::string name;
+  float x = 0, y = 0, width = 0, height = 0;
+  bool visible = false;  ///< not scrolled out of the panel
 };
 
 /// What the window shows just now.
@@ -62,9 +73,14 @@ struct AppState {
   std::vector<std::string> under_cursor;  ///< views that the magnifier names, largest share first
   std::string distance;                   ///< between two marks; empty: none
   int path_keys = 0;                      ///< cameras of the path
+  int frames_per_key = 0;                 ///< from one to the next
   int reloads = 0;                        ///< how often the set was read anew
+  size_t instant = 0, instants = 1;       ///< of a moving set: the frame shown, of how many
+  bool playing_time = false;              ///< one instant after the other
   bool recording = false;
-  std::string message;  ///< the last one in the window
+  bool asks_for_path = false;          ///< a window asks for a file
+  std::vector<ControlPlace> controls;  ///< of the panel, from top to bottom
+  std::string message;                 ///< the last one in the window
   RenderOptions render;
 };
 
@@ -80,10 +96,13 @@ struct Host {
   /// Sigmas of a view's inverse depth from the disk; empty where it has none.
   std::function<Grid<float>(const View&)> load_sigma;
   /// The command that draws the picture of the one camera in a file (cameras.json) without some
-  /// views, by name.
+  /// views, by name; of a moving set one of its frames.
   std::function<std::string(const std::filesystem::path& camera_file, const RenderOptions&,
-                            const std::vector<std::string>& hidden)>
+                            const std::vector<std::string>& hidden, std::optional<size_t> instant)>
       command_line;
+  /// Differs whenever other files of a view lie on the disk; empty while one is missing. Cheap.
+  /// Null: views that could not be read are never tried again.
+  std::function<std::string(const View&)> view_stamp;
   /// What validation says of each view, by its name. Called on a thread of its own.
   std::function<std::map<std::string, ViewVerdict>()> verdicts;
   /// A line for whoever started the program.

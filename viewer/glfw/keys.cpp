@@ -23,6 +23,8 @@ constexpr std::array kHelp{
     HelpLine{"X", "compare: with the nearest photo, the other method, the other primitive"},
     HelpLine{"H", "leave the nearest view out, take it in again"},
     HelpLine{"M", "mark the point under the cursor; two marks: their distance"},
+    HelpLine{"T", "play a moving set, stop"},
+    HelpLine{"N, B", "next, previous instant of a moving set"},
     HelpLine{"K", "add this camera to the path"},
     HelpLine{"O", "load a path file; or drop one onto the window"},
     HelpLine{"Space", "fly along the path, stop"},
@@ -50,7 +52,8 @@ constexpr std::array kBindings{
     Binding{GLFW_KEY_X, Action::kCompare},      Binding{GLFW_KEY_H, Action::kHideView},
     Binding{GLFW_KEY_M, Action::kMark},         Binding{GLFW_KEY_K, Action::kAddKey},
     Binding{GLFW_KEY_O, Action::kOpenPath},     Binding{GLFW_KEY_SPACE, Action::kFlyPath},
-    Binding{GLFW_KEY_R, Action::kRecord},
+    Binding{GLFW_KEY_R, Action::kRecord},       Binding{GLFW_KEY_T, Action::kPlayTime},
+    Binding{GLFW_KEY_N, Action::kNextInstant},  Binding{GLFW_KEY_B, Action::kPreviousInstant},
 };
 
 }  // namespace

@@ -3,86 +3,43 @@
 #include <fmt/format.h>
 #include <imgui.h>
 
-#include <numbers>
-
-#include "dtr/render/option_names.h"
+#include "viewer/glfw/widgets.h"
 
 namespace dtr::viewer {
 namespace {
 
 constexpr float kPanelWidth = 330, kMargin = 8, kItemWidth = 150;
-constexpr double kDegreesPerRad = 180 / std::numbers::pi;
 
 void Text(const std::string& line) { ImGui::TextUnformatted(line.c_str()); }
 
-template <typename T, size_t N>
-void Choice(const char* label, T& value, const std::array<T, N>& choices) {
-  if (!ImGui::BeginCombo(label, NameOf(value))) return;
-  for (const T choice : choices) {
-    if (ImGui::Selectable(NameOf(choice), choice == value)) value = choice;
-  }
-  ImGui::EndCombo();
-}
-
-void Whole(const char* label, int& value, int low, int high) {
-  ImGui::SliderInt(label, &value, low, high, "%d",
-                   ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_Logarithmic);
-}
-
-void Real(const char* label, double& value, double low, double high) {
-  ImGui::SliderScalar(label, ImGuiDataType_Double, &value, &low, &high, "%.4g",
-                      ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_Logarithmic);
-}
-
-/// A threshold in scene units that replaces the scale-free one while it is ticked.
-void Absolute(const char* label, std::optional<double>& value) {
-  bool on = value.has_value();
-  ImGui::PushID(label);
-  if (ImGui::Checkbox("##on", &on)) {
-    value = on ? std::optional(3.5) : std::nullopt;  // the founding report's
-  }
-  ImGui::SameLine();
-  double number = value.value_or(3.5);
-  ImGui::BeginDisabled(!on);
-  Real(label, number, 1e-4, 1e4);
-  ImGui::EndDisabled();
-  if (on) value = number;
-  ImGui::PopID();
-}
-
-void RenderControls(RenderOptions& options) {
-  Choice("method", options.method, kRenderMethods);
+void RenderControls(Widgets& widgets, RenderOptions& options) {
+  widgets.Choice("method", options.method, kRenderMethods);
   const Primitive before = options.primitive;
-  Choice("primitive", options.primitive, kPrimitives);
+  widgets.Choice("primitive", options.primitive, kPrimitives);
   // As on the command line: asking for splats picks the method that has them.
   if (options.primitive != before && options.primitive == Primitive::kSplat) {
     options.method = RenderMethod::kTwoPass;
   }
-  Whole("views", options.views, 1, 64);
-  Whole("resolution", options.resolution, 1, 64);
-  Choice("blend", options.blend, kBlendWeights);
-  if (options.blend == BlendWeight::kCosine) Real("exponent", options.exponent, 0, 1000);
-  if (options.blend == BlendWeight::kExponential) Real("falloff", options.falloff, 0, 1000);
+  widgets.Whole("views", options.views, 1, 64);
+  widgets.Whole("resolution", options.resolution, 1, 64);
+  widgets.Choice("blend", options.blend, kBlendWeights);
+  if (options.blend == BlendWeight::kCosine) widgets.Real("exponent", options.exponent, 0, 1000);
+  if (options.blend == BlendWeight::kExponential) widgets.Real("falloff", options.falloff, 0, 1000);
   if (options.blend == BlendWeight::kInverseAngle || options.blend == BlendWeight::kKNearest) {
-    Whole("blend-k", options.blend_k, 1, 64);
+    widgets.Whole("blend-k", options.blend_k, 1, 64);
   }
-  double degrees = options.max_angle_rad * kDegreesPerRad;
-  const double low = 1, high = 180;
-  if (ImGui::SliderScalar("max-angle", ImGuiDataType_Double, &degrees, &low, &high, "%.0f deg",
-                          ImGuiSliderFlags_AlwaysClamp)) {
-    options.max_angle_rad = degrees * std::numbers::pi / 180;
-  }
+  widgets.Degrees("max-angle", options.max_angle_rad, 1, 180);
   if (options.primitive == Primitive::kSplat) {
-    Real("point-size", options.point_size, 0.1, 10);
+    widgets.Real("point-size", options.point_size, 0.1, 10);
   }
-  Real("delta (px)", options.delta_px, 0.01, 100);
-  Real("depth-break (px)", options.depth_break_px, 0.01, 100);
-  Real("mesh-tolerance (px)", options.mesh_tolerance_px, 0, 10);
-  Absolute("absolute-delta", options.absolute_delta);
-  Absolute("absolute-depth-break", options.absolute_depth_break);
-  ImGui::Checkbox("blend linear light", &options.blend_in_linear_light);
-  ImGui::Checkbox("fill holes (when still)", &options.fill_holes);
-  if (ImGui::Button("defaults")) {
+  widgets.Real("delta (px)", options.delta_px, 0.01, 100);
+  widgets.Real("depth-break (px)", options.depth_break_px, 0.01, 100);
+  widgets.Real("mesh-tolerance (px)", options.mesh_tolerance_px, 0, 10);
+  widgets.Absolute("absolute-delta", options.absolute_delta);
+  widgets.Absolute("absolute-depth-break", options.absolute_depth_break);
+  widgets.Check("blend linear light", options.blend_in_linear_light);
+  widgets.Check("fill holes (when still)", options.fill_holes);
+  if (widgets.Button("defaults")) {
     const int threads = options.threads;
     options = {};
     options.threads = threads;
@@ -112,7 +69,7 @@ void Figures(const PanelModel& model) {
                                .c_str());
 }
 
-void WhereControls(PanelModel& model) {
+void WhereControls(Widgets& widgets, PanelModel& model) {
   Controller& controller = model.controller;
   const auto& views = controller.surroundings().views;
   const auto at = controller.at_view(), nearest = controller.nearest_view();
@@ -121,56 +78,77 @@ void WhereControls(PanelModel& model) {
   } else if (nearest) {
     Text("nearest: " + views[*nearest]->name);
   }
-  if (ImGui::ArrowButton("##previous", ImGuiDir_Left)) {
-    model.pressed.push_back(Action::kPreviousView);
-  }
+  if (widgets.Arrow("previous", ImGuiDir_Left)) model.pressed.push_back(Action::kPreviousView);
   ImGui::SameLine();
-  if (ImGui::ArrowButton("##next", ImGuiDir_Right)) model.pressed.push_back(Action::kNextView);
+  if (widgets.Arrow("next", ImGuiDir_Right)) model.pressed.push_back(Action::kNextView);
   ImGui::SameLine();
-  if (ImGui::Button("nearest")) model.pressed.push_back(Action::kNearestView);
+  if (widgets.Button("nearest")) model.pressed.push_back(Action::kNearestView);
   ImGui::SameLine();
-  if (ImGui::Button("view all")) model.pressed.push_back(Action::kShowAll);
+  if (widgets.Button("view all")) model.pressed.push_back(Action::kShowAll);
   double speed = controller.fly_speed();
-  Real("speed per s", speed, 1e-4 * controller.scene_size(), 100 * controller.scene_size());
+  widgets.Real("speed per s", speed, 1e-4 * controller.scene_size(), 100 * controller.scene_size());
   if (speed != controller.fly_speed()) controller.set_fly_speed(speed);
 }
 
-void InspectControls(PanelModel& model) {
+void InspectControls(Widgets& widgets, PanelModel& model) {
   Inspection& inspection = model.inspection;
-  ImGui::Checkbox("cameras", &inspection.cameras);
+  widgets.Check("cameras", inspection.cameras);
   ImGui::SameLine();
-  ImGui::Checkbox("magnifier", &inspection.magnifier);
-  Choice("compare with", inspection.compared, kAllCompared);
+  widgets.Check("magnifier", inspection.magnifier);
+  widgets.Choice("compare with", inspection.compared, kAllCompared);
   if (inspection.compared != Compared::kNothing) {
-    ImGui::SliderFloat("border", &inspection.border, 0, 1, "%.2f", ImGuiSliderFlags_AlwaysClamp);
+    widgets.Share("border", inspection.border);
   }
   const std::string distance = inspection.DistanceText();
   Text(distance.empty() ? "M marks points to measure between" : "distance " + distance);
-  if (!ImGui::TreeNode("views to draw from")) return;
+  if (!widgets.Tree("views to draw from")) return;
   for (const View* view : model.controller.surroundings().views) {
     bool on = !inspection.IsHidden(*view);
-    if (ImGui::Checkbox(view->name.c_str(), &on)) inspection.Toggle(*view);
+    const bool was_on = on;
+    widgets.Check(("view " + view->name).c_str(), view->name.c_str(), on);
+    if (on != was_on) inspection.Toggle(*view);
   }
-  if (ImGui::Button("all")) inspection.hidden.clear();
+  if (widgets.Button("all")) inspection.hidden.clear();
   ImGui::TreePop();
 }
 
-void PathControls(PanelModel& model) {
+void TimeControls(Widgets& widgets, PanelModel& model) {
+  TimeModel& time = model.time;
+  Text(fmt::format("{:.3f} s, instant {} of {}", time.seconds, time.instant + 1, time.instants));
+  widgets.Whole("instant", time.instant, 0, time.instants - 1, false);
+  if (widgets.Arrow("earlier", ImGuiDir_Left)) model.pressed.push_back(Action::kPreviousInstant);
+  ImGui::SameLine();
+  if (widgets.Arrow("later", ImGuiDir_Right)) model.pressed.push_back(Action::kNextInstant);
+  ImGui::SameLine();
+  if (widgets.Button("play", time.playing ? "stand still" : "play")) {
+    model.pressed.push_back(Action::kPlayTime);
+  }
+}
+
+void PathControls(Widgets& widgets, PanelModel& model) {
   Flight& flight = model.flight;
   const int frames = flight.keys().empty()
                          ? 0
                          : static_cast<int>(flight.keys().size() - 1) * flight.frames_per_key + 1;
   Text(fmt::format("{} cameras, {} frames", flight.keys().size(), frames));
-  Whole("frames per camera", flight.frames_per_key, 1, Flight::kMostFramesPerKey);
-  if (ImGui::Button("add camera")) model.pressed.push_back(Action::kAddKey);
+  widgets.Whole("frames per camera", flight.frames_per_key, 1, Flight::kMostFramesPerKey);
+  if (widgets.Button("add camera")) model.pressed.push_back(Action::kAddKey);
   ImGui::SameLine();
-  if (ImGui::Button("load...")) model.pressed.push_back(Action::kOpenPath);
-  if (ImGui::Button(flight.flying() ? "stop" : "fly")) model.pressed.push_back(Action::kFlyPath);
+  if (widgets.Button("load...")) model.pressed.push_back(Action::kOpenPath);
+  if (widgets.Button("fly", flight.flying() ? "stop" : "fly"))
+    model.pressed.push_back(Action::kFlyPath);
   ImGui::SameLine();
-  if (ImGui::Button(model.recording.empty() ? "record MP4" : "stop recording")) {
+  if (widgets.Button("record", model.recording.empty() ? "record MP4" : "stop recording")) {
     model.pressed.push_back(Action::kRecord);
   }
   if (!model.recording.empty()) Text(model.recording);
+}
+
+void KeepControls(Widgets& widgets, PanelModel& model) {
+  if (widgets.Button("copy command line")) model.pressed.push_back(Action::kCopyCommand);
+  if (widgets.Button("save picture")) model.pressed.push_back(Action::kSavePicture);
+  ImGui::SameLine();
+  if (widgets.Button("save window")) model.pressed.push_back(Action::kSaveWindow);
 }
 
 }  // namespace
@@ -184,20 +162,15 @@ void DrawPanel(UserInterface& interface, PanelModel& model) {
     ImGui::PushItemWidth(kItemWidth);
     Figures(model);
     ImGui::Separator();
-    Choice("shown", model.shown, kAllShown);
+    Widgets widgets(model.controls);
+    widgets.Choice("shown", model.shown, kAllShown);
     ImGui::TextWrapped("%s", LegendOf(model.shown));
-    if (ImGui::CollapsingHeader("Inspect", ImGuiTreeNodeFlags_DefaultOpen)) InspectControls(model);
-    if (ImGui::CollapsingHeader("Where", ImGuiTreeNodeFlags_DefaultOpen)) WhereControls(model);
-    if (ImGui::CollapsingHeader("Render options", ImGuiTreeNodeFlags_DefaultOpen)) {
-      RenderControls(model.options);
-    }
-    if (ImGui::CollapsingHeader("Path", ImGuiTreeNodeFlags_DefaultOpen)) PathControls(model);
-    if (ImGui::CollapsingHeader("Keep", ImGuiTreeNodeFlags_DefaultOpen)) {
-      if (ImGui::Button("copy command line")) model.pressed.push_back(Action::kCopyCommand);
-      if (ImGui::Button("save picture")) model.pressed.push_back(Action::kSavePicture);
-      ImGui::SameLine();
-      if (ImGui::Button("save window")) model.pressed.push_back(Action::kSaveWindow);
-    }
+    if (widgets.Header("Inspect")) InspectControls(widgets, model);
+    if (widgets.Header("Where")) WhereControls(widgets, model);
+    if (model.time.instants > 1 && widgets.Header("Time")) TimeControls(widgets, model);
+    if (widgets.Header("Render options")) RenderControls(widgets, model.options);
+    if (widgets.Header("Path")) PathControls(widgets, model);
+    if (widgets.Header("Keep")) KeepControls(widgets, model);
     ImGui::PopItemWidth();
   }
   interface.ThisPanelIsOurs();

@@ -12,6 +12,13 @@
 
 namespace dtr::viewer {
 
+/// Of a moving set.
+struct TimeModel {
+  int instants = 1, instant = 0;
+  double seconds = 0;  ///< since the first instant
+  bool playing = false;
+};
+
 /// What the panel shows and changes.
 struct PanelModel {
   const MadePicture& picture;
@@ -20,11 +27,13 @@ struct PanelModel {
   Shown& shown;
   Inspection& inspection;
   Flight& flight;
+  TimeModel time;
   std::string recording;  ///< how far a video is; empty: none
   const std::string& message;
   double window_ms = 0;          ///< of the window itself: panels, copying, waiting for the display
   double frames_per_second = 0;  ///< of moving frames; 0: none of late
   std::vector<Action> pressed;   ///< buttons of the panel
+  std::vector<ControlPlace> controls;  ///< where they are
 };
 
 void DrawPanel(UserInterface& interface, PanelModel& model);

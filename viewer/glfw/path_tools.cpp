@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "dtr/base/error.h"
+#include "dtr/render/instants.h"
 
 namespace dtr::viewer {
 
@@ -51,6 +52,10 @@ std::string PathTools::Progress() const {
   if (!recording_) return "";
   if (!recording_->Wanted()) return "encoding " + recording_->target().filename().string();
   return fmt::format("recording {} of {}", recording_->drawn() + 1, recording_->frames());
+}
+
+size_t PathTools::WantedFrame(size_t frames) const {
+  return FrameOfPicture(recording_->drawn(), recording_->frames(), frames);
 }
 
 void PathTools::Filmed(const ImageRgb8& picture) {

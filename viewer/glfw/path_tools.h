@@ -33,6 +33,8 @@ class PathTools {
 
   /// The camera whose whole picture is wanted for the video; null: none.
   const NovelCamera* Wanted() const { return recording_ ? recording_->Wanted() : nullptr; }
+  /// Of a moving set with so many frames: the one that picture shows; videos run through time.
+  size_t WantedFrame(size_t frames) const;
   void Filmed(const ImageRgb8& picture);
   /// To be called every frame: ends a recording whose video is there.
   void Tend();

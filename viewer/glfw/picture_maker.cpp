@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <utility>
 
 #include "dtr/base/error.h"
 #include "dtr/gl/frame_timer.h"
@@ -59,12 +60,19 @@ void PictureMaker::MakeMoving(const PictureOrder& order, int divisor) {
 }
 
 void PictureMaker::MakeStill(const PictureOrder& order) {
+  stream_.ShowFrame(order.instant);
   stream_.Hide(order.hidden);
   stream_.Prefetch(order.camera.cam_from_world, order.options, PixelsFor(order));
   // Once nothing is on its way it is the picture that dtr render makes.
   const bool whole = stream_.reading() == 0;
   Make(order, 1, whole ? ViewStream::Wait::kForAll : ViewStream::Wait::kForNone);
   picture_.whole = whole;
+}
+
+void PictureMaker::ReadAhead(const PictureOrder& order) {
+  stream_.ShowFrame(order.instant);
+  stream_.Prefetch(order.camera.cam_from_world, order.options, PixelsFor(order));
+  stream_.ShowFrame(picture_.instant);
 }
 
 RenderScene PictureMaker::SceneFor(const PictureOrder& order, const PinholeCamera& camera,
@@ -82,6 +90,11 @@ void PictureMaker::Make(const PictureOrder& order, int divisor, ViewStream::Wait
   // What is thrown from here on leaves no figures of another scene behind.
   picture_.views_used.clear();
   picture_.whole = false;
+  // Of another instant nothing is there yet that could be shown meanwhile.
+  if (std::exchange(picture_.instant, order.instant) != order.instant) {
+    wait = ViewStream::Wait::kForAll;
+  }
+  stream_.ShowFrame(order.instant);
   stream_.Hide(order.hidden);
   const Pose& pose = order.camera.cam_from_world;
   picture_.camera = {Smaller(order.camera.camera, divisor), pose};

@@ -20,7 +20,8 @@ struct PictureOrder {
   NovelCamera camera;
   RenderOptions options;
   Shown shown = Shown::kColour;
-  std::vector<const View*> hidden;  ///< views not to draw from
+  size_t instant = 0;               ///< of a moving set: its frame
+  std::vector<const View*> hidden;  ///< views of that instant not to draw from
   /// Something will look at the views' own pixels: they stay in memory. Else they go where the
   /// renderer holds what it made of them.
   bool inspected = false;
@@ -40,6 +41,7 @@ struct MadePicture {
   int divisor = 1;
   bool whole = false;  ///< in full resolution, of all views that it needs
   Shown shown = Shown::kColour;
+  size_t instant = 0;
   RenderOptions options;
   RenderScene scene;
   std::vector<int> views_used;
@@ -56,6 +58,9 @@ class PictureMaker {
   void MakeMoving(const PictureOrder& order, int divisor);
   /// In full, of the views that are there; whole once no view is being read any more.
   void MakeStill(const PictureOrder& order);
+
+  /// Begins to read what the same picture of another instant needs, as far as there is room.
+  void ReadAhead(const PictureOrder& order);
 
   /// Another picture of the same camera beside the whole one, with other options.
   void MakeOther(const RenderOptions& options);

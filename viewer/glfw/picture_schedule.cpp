@@ -13,7 +13,7 @@ bool SameOrder(const PictureOrder& a, const PictureOrder& b) {
   const Pose &p = a.camera.cam_from_world, &q = b.camera.cam_from_world;
   return a.camera.camera == b.camera.camera && p.translation == q.translation &&
          p.rotation.coeffs() == q.rotation.coeffs() && a.options == b.options &&
-         a.shown == b.shown && a.hidden == b.hidden;
+         a.shown == b.shown && a.instant == b.instant && a.hidden == b.hidden;
 }
 
 /// All but what only changes what pixels mean: it can wait for the whole picture.

@@ -41,6 +41,8 @@ class PictureSchedule {
 
   /// Makes the picture that is due, if one is. Returns true when it was a moving one.
   bool Make(const PictureOrder& order, Pace pace);
+  /// What was made is not to be relied on any more: the next picture is made anew.
+  void Renew() { made_.reset(); }
   /// How long the window took for the frame of the last moving picture, milliseconds.
   void MovingTook(double ms);
 

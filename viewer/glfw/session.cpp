@@ -1,6 +1,7 @@
 #include "viewer/glfw/session.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "viewer/navigation.h"
 
@@ -21,6 +22,7 @@ Session::Session(const AppSettings& settings, const Host& host, const Tell& tell
                  int height_px)
     : host_(host),
       opened_(host.open()),
+      clock_(opened_->set),
       maker(*opened_->stream, MakerSettings(settings, tell),
             [this](const View& view) { return SigmaOfView(view); }),
       schedule(maker, settings.largest_divisor, tell),
@@ -42,11 +44,33 @@ Eigen::Vector3d Session::ContinueFrom(const Session& before) {
   mine.magnifier = theirs.magnifier;
   mine.compared = theirs.compared;
   mine.border = theirs.border;
-  const std::vector<std::string> hidden = before.HiddenNames();
-  for (const View* view : controller.surroundings().views) {
-    if (std::find(hidden.begin(), hidden.end(), view->name) != hidden.end()) mine.Toggle(*view);
-  }
+  Hide(before.HiddenNames());
+  ShowInstant(std::min(before.instant(), clock_.frames() - 1));
   return shift;
+}
+
+void Session::Hide(const std::vector<std::string>& names) {
+  for (const View* view : controller.surroundings().views) {
+    if (std::find(names.begin(), names.end(), view->name) == names.end()) continue;
+    inspector.inspection().Toggle(*view);
+  }
+}
+
+void Session::ShowInstant(size_t instant) {
+  if (std::exchange(instant_, instant) == instant) return;
+  const std::vector<std::string> hidden = HiddenNames();
+  controller.SetSurroundings(SurroundingsOf(opened_->set, instant));
+  inspector.inspection().hidden.clear();
+  Hide(hidden);
+}
+
+void Session::RetryLostViews() {
+  if (!host_.view_stamp || opened_->stream->lost().empty()) return;
+  const size_t tried = opened_->stream->RetryLost([this](const View& view) {
+    const std::string stamp = host_.view_stamp(view);
+    return !stamp.empty() && std::exchange(tried_stamps_[&view], stamp) != stamp;
+  });
+  if (tried > 0) schedule.Renew();
 }
 
 const Grid<float>* Session::SigmaOfView(const View& view) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "dtr/render/instants.h"
 #include "viewer/controller.h"
 #include "viewer/glfw/app.h"
 #include "viewer/glfw/inspector.h"
@@ -31,16 +32,28 @@ class Session {
   Eigen::Vector3d ContinueFrom(const Session& before);
 
   const OpenedSet& opened() const { return *opened_; }
+
+  /// Of a moving set: the frame that is shown. What is left out of one is left out of all, by name.
+  size_t instant() const { return instant_; }
+  void ShowInstant(size_t instant);
+  const FrameClock& clock() const { return clock_; }
+
+  /// Tries views anew that could not be read and whose files have changed since, or came back.
+  void RetryLostViews();
   /// What the shown picture shows there, as plane z of the present camera.
   std::optional<double> DepthAt(const Eigen::Vector2d& pixel);
   std::vector<std::string> HiddenNames() const;
 
  private:
+  void Hide(const std::vector<std::string>& names);
   /// Read when first asked for and kept.
   const Grid<float>* SigmaOfView(const View& view);
 
   const Host& host_;
   const std::unique_ptr<OpenedSet> opened_;
+  const FrameClock clock_;
+  size_t instant_ = 0;
+  std::map<const View*, std::string> tried_stamps_;  ///< of lost views' files
   std::map<const View*, Grid<float>> sigmas_;
 
  public:
