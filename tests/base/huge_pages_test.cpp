@@ -19,7 +19,9 @@ TEST(HugeVector, HoldsWhatAVectorHolds) {
     huge.resize(bytes + kPage);
     EXPECT_TRUE(std::equal(copy.begin(), copy.end(), huge.begin())) << bytes;
     EXPECT_EQ(huge.back(), 0);
-    if (bytes >= kPage / 2) EXPECT_EQ(reinterpret_cast<std::uintptr_t>(copy.data()) % kPage, 0u);
+    if (bytes >= kPage / 2) {
+      EXPECT_EQ(reinterpret_cast<std::uintptr_t>(copy.data()) % kPage, 0u);
+    }
     const HugeVector<std::uint8_t> moved = std::move(huge);
     EXPECT_EQ(moved[bytes - 1], copy.back());
   }

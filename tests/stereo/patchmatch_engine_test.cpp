@@ -77,8 +77,11 @@ TEST(PatchMatchEngine, FindsASphereBeforeAWallFromFourNeighbours) {
 // best the search found 4 % of these pixels.
 TEST(PatchMatchEngine, FindsWhatOneNeighbourAloneSees) {
   constexpr double kNear = 3, kFar = 7, kEdge = -0.3, kLeft = -0.8;
-  const testing::Surface walls =
-      testing::Union(testing::Square(kEdge - 2, 0, kNear, 2), testing::Plane({0, 0, 1}, kFar));
+  const auto near_wall = [=](const Vector3d& o, const Vector3d& d) -> std::optional<double> {
+    const double t = (kNear - o.z()) / d.z();
+    return t > 0 && o.x() + t * d.x() < kEdge ? std::optional(t) : std::nullopt;
+  };
+  const testing::Surface walls = testing::Union({near_wall, testing::Plane({0, 0, 1}, kFar)});
   const auto views = ViewsOf(Shots(
       walls, {Facing({0, 0, 0}), Facing({kBaseline, 0, 0}), Facing({kLeft, 0, 0}),
               Facing({kLeft - 0.1, 0.1, 0}), Facing({kLeft, -0.2, 0}), Facing({kLeft, 0.2, 0})}));
@@ -145,7 +148,7 @@ bool Fuses(std::int64_t target) { return (target & (HWY_AVX2 | HWY_AVX3 | HWY_AV
 template <typename Estimate>
 void ExpectTheSameFromAllInstructionSets(const DepthImage& truth, Estimate estimate) {
   std::optional<DepthEstimate> first[2];
-  testing::WithEachInstructionSet([&](std::int64_t target) {
+  dtr::testing::WithEachInstructionSet([&](std::int64_t target) {
     const DepthEstimate found = estimate();
     std::optional<DepthEstimate>& same = first[Fuses(target)];
     if (!same) same = found;
