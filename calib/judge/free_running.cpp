@@ -17,7 +17,9 @@ namespace {
 
 constexpr double kMostDelay = 3;    // frames; farther apart, they are paired wrongly
 constexpr double kWidestGap = 1.5;  // frames between neighbours that are interpolated
-constexpr double kSettledSigmas = 0.1;
+// Corners that count in one solve and not in the next move real delays by some tenths of a sigma.
+constexpr double kSettledSigmas = 0.5;
+constexpr double kChanceSigmas = 2;  // a camera that is taken for free stays so above this
 constexpr int kMostPasses = 12;
 constexpr long kReach = 4;  // frames to either side that may be neighbours: kMostDelay and one
 
@@ -270,6 +272,7 @@ FreeRunning SolveFreeRunning(const Board& board, std::span<const RigCameraInput>
   std::vector<std::string> flipped;
   std::vector<RigView> moved = views;
   std::vector<double> moments(frames, 0);
+  std::string last;  // delays, and by how much they changed
   for (free.passes = 1; free.passes <= kMostPasses; ++free.passes) {
     free.solution = SolveRig(board, cameras, std::move(moved), frames, options);
     KeepFlips(board, free.solution.flipped, views);
@@ -278,6 +281,7 @@ FreeRunning SolveFreeRunning(const Board& board, std::span<const RigCameraInput>
     free.delays = MoreDelay(free.solution, path, delays);
     Delays next(cameras.size(), 0);
     bool settled = true, any = false;
+    last.clear();
     for (size_t c = 1; c < cameras.size(); ++c) {
       if (!free.delays[c]) continue;
       any = true;
@@ -290,7 +294,10 @@ FreeRunning SolveFreeRunning(const Board& board, std::span<const RigCameraInput>
             "frames are paired with others than their own",
             cameras[c].name, kMostDelay, cameras[0].name, delay.frames));
       }
-      const bool is_free = std::abs(delay.frames) > kDelaySigmas * delay.sigma;
+      const bool is_free =
+          std::abs(delay.frames) > (free.moved[c] ? kChanceSigmas : kDelaySigmas) * delay.sigma;
+      last += fmt::format("{}{} {:+.4f} +- {:.4f} by {:+.4f}", last.empty() ? "" : ", ",
+                          cameras[c].name, delay.frames, delay.sigma, more);
       settled = settled && is_free == free.moved[c] &&
                 (!is_free || std::abs(more) <= kSettledSigmas * delay.sigma);
       free.moved[c] = is_free;
@@ -314,8 +321,8 @@ FreeRunning SolveFreeRunning(const Board& board, std::span<const RigCameraInput>
   }
   throw Error(
       fmt::format("calibration: expected delays that settle, found them still changing after {} "
-                  "solves; show the board in more frames that follow each other",
-                  kMostPasses));
+                  "solves (frames: {}); show the board in more frames that follow each other",
+                  kMostPasses, last));
 }
 
 }  // namespace dtr::calib

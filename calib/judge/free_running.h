@@ -25,7 +25,8 @@ struct FreeRunning {
   int passes = 0;                                  ///< solves it took
 };
 
-/// Beyond this many standard deviations a delay is no chance.
+/// Beyond this many standard deviations a delay is no chance. (One that corners were moved for once
+/// stays no chance above 2.)
 inline constexpr double kDelaySigmas = 4.5;
 
 /// What a solution of synchronised cameras says against that, per camera, to first order: residuals

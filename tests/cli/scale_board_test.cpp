@@ -2,11 +2,13 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "calib/solve/board_solve.h"
+#include "dtr/io/depth_io.h"
 #include "dtr/io/formats/cameras_json.h"
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
@@ -59,11 +61,17 @@ class ScaleByBoard : public ::testing::Test {
       camera.name = fmt::format("{:04}.png", i);
       camera.camera = kCamera;
       camera.cam_from_world = {pose.rotation, pose.translation / kUnit};
+      camera.depth_file = fmt::format("{:04}.exr", i);
       io::WriteImage(photos / camera.name, image);
+      // Nothing here looks at depth, but a set tells where its scene is: the board's distance.
+      Grid<float> depth(grey.width(), grey.height());
+      std::fill(depth.data().begin(), depth.data().end(), static_cast<float>(0.5 / kUnit));
+      io::WriteExr(photos / camera.depth_file, depth);
       list.cameras.push_back(std::move(camera));
     }
     io::WriteCamerasJson(folder_ / (name + ".json"), list);
-    DtrOk({"import", "--cameras", In(name + ".json"), "--images", photos.string(), "-o", In(name)});
+    DtrOk({"import", "--cameras", In(name + ".json"), "--images", photos.string(), "--depth",
+           photos.string(), "-o", In(name)});
   }
   std::string In(const std::string& name) const { return (folder_ / name).string(); }
   Ran Scale(const std::string& set, const std::string& board) {
