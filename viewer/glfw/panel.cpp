@@ -62,8 +62,9 @@ void Figures(const PanelModel& model) {
   for (const int index : picture.views_used) {
     names += (names.empty() ? "" : ", ") + picture.scene.views[static_cast<size_t>(index)]->name;
   }
-  if (picture.divisor == 1)
-    Text(fmt::format("seen by some view: {:.1f} %", 100 * picture.coverage));
+  // One line always, so that what stands below keeps its place while one clicks.
+  Text(picture.divisor == 1 ? fmt::format("seen by some view: {:.1f} %", 100 * picture.coverage)
+                            : std::string("seen by some view: told when still"));
   ImGui::TextWrapped("%s", fmt::format("drawn from {}: {}", picture.views_used.size(),
                                        names.empty() ? "no view is valid here" : names)
                                .c_str());

@@ -39,8 +39,8 @@ struct UserInterface::Callbacks {
   }
 
   static void Key(GLFWwindow* window, int key, int scancode, int action, int mods) {
-    ImGui_ImplGlfw_KeyCallback(window, key, scancode, action, mods);
     UserInterface& self = Of(window);
+    self.TellImGui({key, scancode, action, mods});
     self.any_input_ = true;
     if (action == GLFW_REPEAT) return;
     const bool pressed = action == GLFW_PRESS;
@@ -155,6 +155,17 @@ UserInterface::~UserInterface() {
   ImGui::DestroyContext();
 }
 
+void UserInterface::TellImGui(const KeyChange& change) {
+  const auto same_key = [&](const KeyChange& pressed) { return pressed.key == change.key; };
+  const bool unseen = std::any_of(unseen_presses_.begin(), unseen_presses_.end(), same_key);
+  if (change.action == GLFW_RELEASE && unseen) {
+    late_releases_.push_back(change);
+    return;
+  }
+  if (change.action == GLFW_PRESS) unseen_presses_.push_back(change);
+  ImGui_ImplGlfw_KeyCallback(window_, change.key, change.scancode, change.action, change.mods);
+}
+
 std::vector<UserInput> UserInterface::Take() { return std::exchange(inputs_, {}); }
 
 bool UserInterface::TakeAnyInput() { return std::exchange(any_input_, false); }
@@ -168,6 +179,11 @@ void UserInterface::BeginFrame() {
 
 void UserInterface::EndFrame() {
   ImGui::Render();
+  unseen_presses_.clear();
+  for (const KeyChange& release : std::exchange(late_releases_, {})) {
+    TellImGui(release);
+    any_input_ = true;  // it takes another frame to see it
+  }
   panels_ = std::exchange(new_panels_, {});
   int width_px = 0, height_px = 0;
   glfwGetFramebufferSize(window_, &width_px, &height_px);

@@ -53,8 +53,16 @@ class UserInterface {
   friend struct Callbacks;
   Eigen::Vector2d ToPicture(double x, double y) const;
 
+  /// As GLFW tells it.
+  struct KeyChange {
+    int key = 0, scancode = 0, action = 0, mods = 0;
+  };
+  /// This ImGui looks at keys once a frame: one that comes and goes in between is let go later.
+  void TellImGui(const KeyChange& change);
+
   GLFWwindow* window_;
   std::vector<UserInput> inputs_;
+  std::vector<KeyChange> unseen_presses_, late_releases_;  ///< since ImGui's last frame
   std::vector<std::array<float, 4>> panels_, new_panels_;  ///< left, top, right, bottom
   Eigen::Vector2d cursor_px_{-1, -1};
   std::array<bool, 3> buttons_down_{};
