@@ -7,6 +7,8 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <fstream>
+#include <iterator>
 #include <thread>
 
 #include "dtr/base/error.h"
@@ -68,17 +70,17 @@ bool Within(std::chrono::seconds limit, const std::function<bool()>& holds) {
 
 // Ended, though perhaps not yet waited for by whoever inherited it.
 bool IsGone(pid_t process) {
-  const std::filesystem::path status = "/proc/" + std::to_string(process) + "/status";
-  std::error_code ignored;
-  if (!std::filesystem::exists(status, ignored)) return true;
-  return ReadFile(status, kLogLimit).find("State:\tZ") != std::string::npos;
+  std::ifstream status("/proc/" + std::to_string(process) + "/status");
+  if (!status) return true;
+  const std::string text((std::istreambuf_iterator<char>(status)), {});
+  return text.find("State:\tZ") != std::string::npos;
 }
 
 TEST(RunProcess, TheProgramEndsWithUsWhenWeAreKilled) {
   const testing::TemporaryFolder folder;
   const std::filesystem::path ready = folder / "ready", pid_file = folder / "pid";
-  const std::string script =
-      "echo $$ > '" + pid_file.string() + "'; touch '" + ready.string() + "'; exec sleep 600";
+  const std::string script = "echo $$ > '" + pid_file.string() + "'; touch '" + ready.string() +
+                             "'; exec sleep 600 > /dev/null 2>&1";
   const pid_t runner = fork();
   if (runner == 0) {
     RunProcess({"sh", "-c", script}, {});

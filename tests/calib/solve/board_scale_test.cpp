@@ -76,7 +76,7 @@ TEST(BoardScale, PredictedUncertaintyIsWhatNoiseDoes) {
     squares += off * off / kSolves;
   }
   // The larger of two estimates of sigma is taken, so the mean is below 1; the jackknife's sigma
-  // scatters by a fourth with 8 views. 0.73 seen.
+  // scatters by a fourth with 8 views.
   EXPECT_GT(squares, 0.4);
   EXPECT_LT(squares, 1.25);
 }

@@ -104,7 +104,7 @@ Eigen::Vector2d DrawnByOpenCv(const Eigen::Vector3d& p_in_cam, const cv::Mat& k,
 }
 
 TEST(OpenCvParity, TheRationalModelDrawsPointsWhereOpenCvDoes) {
-  constexpr double kSamePx = 1e-9;  // double; 3e-13 seen
+  constexpr double kSamePx = 1e-9;  // double precision, with room for sums in another order
   const LensCamera camera = TypicalCamera(BoardModel::kBrown8);
   const auto& p = camera.params;
   const cv::Mat k = (cv::Mat_<double>(3, 3) << p[0], 0, p[2] - 0.5, 0, p[1], p[3] - 0.5, 0, 0, 1);
