@@ -122,14 +122,26 @@ TEST(CoarseRaster, WhatIsLeftOutBeforeDrawingWouldNotHaveShown) {
   EXPECT_GT(drawn, 100);
 }
 
-TEST(CoarseRaster, DrawsTheSameWithEveryInstructionSet) {
+// Where edges of triangles round the other way another one may show; what both show is the same
+// surface.
+TEST(CoarseRaster, DrawsAlikeWithEveryInstructionSet) {
+  constexpr float kSameDepth = 1e-5f;     // relative; single precision, some sums deep
+  constexpr double kLargestShare = 5e-4;  // as between shaders and this rasteriser, below
   const auto scenes = ParityScenes();
   const PinholeCamera novel(200, 150, 180, 180, 100, 75);
   Random random(9);
   for (const NamedScene& scene : scenes) {
     const Placed placed(scene.set, novel, RandomPose(random, 0.5));
     const std::vector<float> best = Raster(placed.placed, novel, 1);
-    WithEachInstructionSet([&](auto) { EXPECT_EQ(Raster(placed.placed, novel, 1), best); });
+    WithEachInstructionSet([&](auto) {
+      const std::vector<float> other = Raster(placed.placed, novel, 1);
+      ASSERT_EQ(other.size(), best.size());
+      int apart = 0;
+      for (size_t i = 0; i < best.size(); ++i) {
+        apart += std::abs(other[i] - best[i]) > kSameDepth * best[i];
+      }
+      EXPECT_LE(apart, kLargestShare * static_cast<double>(best.size())) << scene.name;
+    });
   }
 }
 
