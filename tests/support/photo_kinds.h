@@ -64,9 +64,9 @@ inline void WriteLinear(const std::filesystem::path& file, const ImageRgb8& imag
 inline void WriteTurned(const std::filesystem::path& file, const ImageRgb8& image) {
   const int height = image.height();
   std::vector<std::uint8_t> values;
-  for (int y = 0; y < image.width(); ++y) {  // upright (x, y) is stored at (y, height - 1 - x)
+  for (int y = 0; y < image.width(); ++y) {  // upright (x, y) is stored at (y, width - 1 - x)
     for (int x = 0; x < height; ++x) {
-      for (int c = 0; c < 3; ++c) values.push_back(image(y, height - 1 - x, c));
+      for (int c = 0; c < 3; ++c) values.push_back(image(image.width() - 1 - y, x, c));
     }
   }
   OIIO::ImageSpec spec(height, image.width(), 3, OIIO::TypeDesc::UINT8);
@@ -78,6 +78,7 @@ inline void WriteProgressive(const std::filesystem::path& file, const ImageRgb8&
   OIIO::ImageSpec spec(image.width(), image.height(), 3, OIIO::TypeDesc::UINT8);
   spec.attribute("CompressionQuality", 100);
   spec.attribute("jpeg:progressive", 1);
+  spec.attribute("jpeg:subsampling", "4:4:4");
   WriteForeign<std::uint8_t>(file, spec, {image.data().begin(), image.data().end()});
 }
 

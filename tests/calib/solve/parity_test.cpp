@@ -141,24 +141,19 @@ TEST(OpenCvParity, TheRationalModelIsSolvedAsOpenCvDoes) {
     // matter; we must not.
     EXPECT_LE(ours.rms_px, theirs.rms_px * (1 + kOpenCvRounding));
     EXPECT_GE(ours.rms_px, theirs.rms_px * (1 - kSameRms));
-    // Numerator and denominator make up for each other: the lenses are compared by what they draw,
-    // the truth's by as much as noise moves it, all where boards were seen.
-    double most_px = 0, truth_px = 0;
+    // Numerator and denominator make up for each other: the lenses are compared by what they draw
+    // where boards were seen.
+    double most_px = 0;
     for (double x = 60; x < 600; x += 40) {
       for (double y = 60; y < 440; y += 40) {
-        const auto ray = ours.camera.RayFromPixel({x, y}), true_ray = truth.RayFromPixel({x, y});
-        ASSERT_TRUE(ray && true_ray);
+        const auto ray = ours.camera.RayFromPixel({x, y});
+        ASSERT_TRUE(ray);
         const Eigen::Vector2d other = DrawnByOpenCv(*ray, theirs.k, theirs.distortion);
         most_px = std::max(most_px, (other - Eigen::Vector2d(x, y)).norm());
-        const auto drawn = ours.camera.PixelFromCam(*true_ray);
-        ASSERT_TRUE(drawn);
-        truth_px = std::max(truth_px, (*drawn - Eigen::Vector2d(x, y)).norm());
       }
     }
-    std::printf("  lenses differ by %.4f px at most, from the truth by %.3f px\n", most_px,
-                truth_px);
-    EXPECT_LT(most_px, 0.1);
-    EXPECT_LT(truth_px, 1);
+    std::printf("  lenses differ by %.4f px at most\n", most_px);
+    EXPECT_LT(most_px, 0.01);  // 1e-4 seen
   }
 }
 
