@@ -1,5 +1,8 @@
 // The `dtr` program: parses, calls one function, prints.
 #include <fmt/format.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 #include <exception>
 #include <filesystem>
@@ -53,9 +56,20 @@ int Run(int argc, char** argv) {
   }
 }
 
+/// Every picture and every view takes tens of megabytes and frees them for the next to take again.
+/// glibc would hand them back in between, and the system clear them anew page by page: a tenth of
+/// the time of a picture with holes. What is kept is bounded.
+void KeepFreedMemory() {
+#ifdef __GLIBC__
+  mallopt(M_MMAP_THRESHOLD, 32 << 20);
+  mallopt(M_TRIM_THRESHOLD, 128 << 20);
+#endif
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+  KeepFreedMemory();
   dtr::cli::CatchInterrupts();
   try {
     return Run(argc, argv);

@@ -249,10 +249,16 @@ const char* NameOf(LensFreedom freedom) {
       return "no-principal-point";
     case LensFreedom::kAll:
       return "all";
+    case LensFreedom::kTangential:
+      return "tangential";
     case LensFreedom::kPrincipalPointPerImage:
       return "principal-point-per-image";
   }
   return "";
+}
+
+bool MayGetTangential(const LensCamera& lens) {
+  return lens.model == LensModel::kSimpleRadial || lens.model == LensModel::kRadial;
 }
 
 std::vector<Eigen::Vector2d> Residuals(const Bundle& bundle) {
@@ -260,6 +266,16 @@ std::vector<Eigen::Vector2d> Residuals(const Bundle& bundle) {
 }
 
 namespace {
+
+Bundle WithTangential(Bundle bundle) {
+  for (LensCamera& lens : bundle.lenses) {
+    if (!MayGetTangential(lens)) continue;
+    lens.model = LensModel::kOpenCv;
+    lens.params.insert(lens.params.begin(), lens.params.front());  // f is fx and fy
+    lens.params.resize(static_cast<size_t>(ParameterCount(lens.model)), 0);
+  }
+  return bundle;
+}
 
 Adjusted Solve(const Bundle& bundle, const AdjustOptions& options, Normalised& n) {
   const Bundle start = n.LocalAt(bundle);
@@ -307,6 +323,11 @@ Adjusted Solve(const Bundle& bundle, const AdjustOptions& options, Normalised& n
 Adjusted Adjust(const Bundle& bundle, const AdjustOptions& options) {
   CheckBundle(bundle);
   CheckPriors(bundle, options);
+  if (options.lens == LensFreedom::kTangential) {
+    const Bundle tangential = WithTangential(bundle);
+    Normalised n = Normalised::Around(tangential);
+    return Solve(tangential, options, n);
+  }
   Normalised n = Normalised::Around(bundle);
   if (options.lens == LensFreedom::kPrincipalPointPerImage) {
     if (options.fix_poses) Refuse("principal points per image: expected poses that may move");

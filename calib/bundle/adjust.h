@@ -13,12 +13,16 @@ enum class LensFreedom {
   kFixed,             ///< none: the lenses are known
   kNoPrincipalPoint,  ///< focal lengths and distortion, as COLMAP does
   kAll,
+  /// All, and of radial lenses tangential distortion, too: they become kOpenCv. A lens whose
+  /// elements lie beside each other, or whose sensor leans, has its distortion's centre elsewhere
+  /// than its principal point (Brown 1966).
+  kTangential,
   /// All, and the principal point of every image by itself, as image stabilisers move it. It is
   /// held near its lens's by a standard deviation of kStabiliserShare of the image's long side, so
   /// that what the sights cannot tell stays put. Not with poses that are fixed, nor for rigs.
   kPrincipalPointPerImage,
 };
-/// "fixed", "no-principal-point", "all", "principal-point-per-image".
+/// "fixed", "no-principal-point", "all", "tangential", "principal-point-per-image".
 const char* NameOf(LensFreedom freedom);
 
 /// Where a camera's centre is known to be (GPS): in the bundle's own world and unit.
@@ -43,6 +47,9 @@ struct AdjustOptions {
   std::vector<PositionPrior> positions;
   std::vector<DistancePrior> distances;
 };
+
+/// Whether a lens is one that kTangential gives more numbers.
+bool MayGetTangential(const LensCamera& lens);
 
 /// How a solve ended.
 struct Adjusted {

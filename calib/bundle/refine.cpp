@@ -25,7 +25,7 @@ constexpr double kConfidence = 0.95;
 // must predict sights closer by this share; a stabiliser's pixels are worth several times that.
 constexpr double kLeastGainPerImage = 0.05;
 constexpr std::array kRisingFreedom{LensFreedom::kNoPrincipalPoint, LensFreedom::kAll,
-                                    LensFreedom::kPrincipalPointPerImage};
+                                    LensFreedom::kTangential, LensFreedom::kPrincipalPointPerImage};
 constexpr std::uint64_t kPick = 0x401d, kBoot = 0xb007, kSome = 0x50e;  // of random sequences
 
 struct Split {
@@ -140,6 +140,10 @@ size_t Choose(const Bundle& bundle, const Split& split, const RefineOptions& opt
   for (const LensFreedom freedom : kRisingFreedom) {
     // A lens for every image has its principal point already.
     if (freedom == LensFreedom::kPrincipalPointPerImage && options.separate_lenses) continue;
+    if (freedom == LensFreedom::kTangential &&
+        std::none_of(bundle.lenses.begin(), bundle.lenses.end(), MayGetTangential)) {
+      continue;
+    }
     refined.candidates.push_back({NameOf(freedom), freedom, 0, 0, 0});
   }
   auto& candidates = refined.candidates;

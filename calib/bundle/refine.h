@@ -45,12 +45,12 @@ struct Refined {
 };
 
 /// Bundle adjustment of `model` where it pays. One sight of every point with four or more is held
-/// out. Cameras adjusted to the rest, without the principal point, with it, and with one for every
-/// image (stabilised lenses), predict it: more is freed only if that is better beyond the bootstrap
-/// interval. The chosen way is
-/// then run on all sights, as structure from motion was; the result is taken only if its cameras
-/// place points, from the rest alone, so that they predict the held-out sights better than with the
-/// cameras as given, beyond the bootstrap interval.
+/// out. Cameras adjusted to the rest, without the principal point, with it, with tangential
+/// distortion, and with a principal point for every image (stabilised lenses), predict it: more is
+/// freed only if that is better beyond the bootstrap interval. The chosen way is then run on all
+/// sights, as structure from motion was; the result is taken only if its cameras place points, from
+/// the rest alone, so that they predict the held-out sights better than with the cameras as given,
+/// beyond the bootstrap interval.
 ///
 /// With known lenses, poses and points are adjusted to them without being asked whether it pays.
 /// Deterministic for any number of threads. What cannot be refined (a lens model FOV, too few

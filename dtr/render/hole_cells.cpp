@@ -32,7 +32,7 @@ HoleCells::HoleCells(const Grid<float>& seen, const GuessedColours& guesses, Shr
                      int threads)
     : seen_(seen), guesses_(guesses), cell_px_(kCellPx), pictures_(guesses.views().size()) {
   while (Cells(seen.width()) * Cells(seen.height()) > kMaxCells) ++cell_px_;
-  Summarise();
+  Summarise(threads);
   std::vector<const View*> views;
   for (const auto& placed : guesses_.views()) views.push_back(placed.view);
   const auto shrunk = photos.Of(views, cell_px_, threads);
@@ -67,10 +67,10 @@ void HoleCells::ForEachPixel(int width_px, int height_px, int x, int y, const Bo
   }
 }
 
-void HoleCells::Summarise() {
+void HoleCells::Summarise(int threads) {
   known_ = Grid<double>(Cells(seen_.width()), Cells(seen_.height()));
   seen_share_ = Grid<float>(known_.width(), known_.height());
-  for (int y = 0; y < rows(); ++y) {
+  ParallelFor(0, rows(), threads, [&](int y) {
     for (int x = 0; x < columns(); ++x) {
       double sum = 0;
       int count = 0, all = 0;
@@ -83,7 +83,7 @@ void HoleCells::Summarise() {
       known_(x, y) = count > 0 ? sum / count : 0;
       seen_share_(x, y) = static_cast<float>(count) / static_cast<float>(all);
     }
-  }
+  });
 }
 
 Eigen::Vector2d HoleCells::Centre(int x, int y) const {

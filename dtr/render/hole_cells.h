@@ -40,7 +40,7 @@ class HoleCells {
   int Cells(int pixels) const { return (pixels + cell_px_ - 1) / cell_px_; }
   template <typename Body>
   void ForEachPixel(int width_px, int height_px, int x, int y, const Body& body) const;
-  void Summarise();
+  void Summarise(int threads);
   CostView AskedAbout(const GuessedColours::Placed& placed, const Grid<float>& picture) const;
 
   const Grid<float>& seen_;

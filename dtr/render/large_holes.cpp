@@ -1,6 +1,7 @@
 #include "dtr/render/large_holes.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "dtr/base/order_statistics.h"
@@ -30,14 +31,12 @@ struct Depths {
 /// From what was seen and how far the views stand apart. No depth where there is nothing to sweep.
 Depths ChooseDepths(const Grid<float>& seen, const GuessedColours& guesses, int cell_px) {
   Depths depths;
-  std::vector<float> inverse;
-  for (const float z : seen.data()) {
-    if (z > 0) inverse.push_back(1 / z);
-  }
-  if (inverse.empty() || guesses.views().size() < 2) return depths;
-  const auto ranked = [&](double share) { return static_cast<double>(QuantileOf(inverse, share)); };
-  depths.farthest = kBeyondFarthest * ranked(kStrayShare);
-  const double range = kBeforeNearest * ranked(1 - kStrayShare) - depths.farthest;
+  if (guesses.views().size() < 2) return depths;
+  const std::vector<float> ends =
+      QuantilesOfPositive(seen.data(), std::array{kStrayShare, 1 - kStrayShare});
+  if (ends.empty()) return depths;
+  depths.farthest = kBeyondFarthest / static_cast<double>(ends[1]);
+  const double range = kBeforeNearest / static_cast<double>(ends[0]) - depths.farthest;
   std::vector<double> baselines;
   for (const auto& view : guesses.views()) baselines.push_back(view.center_in_novel.norm());
   std::sort(baselines.begin(), baselines.end());
@@ -92,8 +91,8 @@ class LargeHoles {
   Grid<double> Swept() const {
     const auto depths = static_cast<size_t>(depths_.count);
     const size_t guess = depths;
-    SemiGlobal sweep(cells_.columns(), cells_.rows(), depths + 1,
-                     {depths, kNextDepth, kOtherDepth});
+    SemiGlobal sweep(cells_.columns(), cells_.rows(), depths + 1, {depths, kNextDepth, kOtherDepth},
+                     threads_);
     std::vector<double> inverse_depths;
     for (int k = 0; k < depths_.count; ++k) inverse_depths.push_back(depths_.At(k));
     ParallelFor(0, cells_.rows(), threads_, [&](int y) {
@@ -108,7 +107,7 @@ class LargeHoles {
         sweep.SetCost(x, y, guess, seen ? 0 : CostOfGuess(x, y));
       }
     });
-    sweep.Solve(threads_);
+    sweep.Solve();
     Grid<double> swept(cells_.columns(), cells_.rows());
     for (int y = 0; y < cells_.rows(); ++y) {
       for (int x = 0; x < cells_.columns(); ++x) {
@@ -135,7 +134,7 @@ class LargeHoles {
 
   void Choose(HolePlanes& found) const {
     const size_t planes = found.planes.size(), guess = planes;
-    SemiGlobal choice(cells_.columns(), cells_.rows(), planes + 1, {0, 0, kOtherPlane});
+    SemiGlobal choice(cells_.columns(), cells_.rows(), planes + 1, {0, 0, kOtherPlane}, threads_);
     ParallelFor(0, cells_.rows(), threads_, [&](int y) {
       std::vector<double> w(planes);
       std::vector<float> costs(planes);
@@ -154,7 +153,7 @@ class LargeHoles {
         choice.SetCost(x, y, guess, hole > 0 ? hole * CostOfGuess(x, y) : 0);
       }
     });
-    choice.Solve(threads_);
+    choice.Solve();
     found.chosen = Grid<int>(cells_.columns(), cells_.rows());
     for (int y = 0; y < cells_.rows(); ++y) {
       for (int x = 0; x < cells_.columns(); ++x) {

@@ -1,18 +1,37 @@
 #include "dtr/render/push_pull.h"
 
+#include <algorithm>
+
 namespace dtr {
 namespace {
 
-/// Half the size, rounded up; each cell combines its up to four children.
+/// Half the size, rounded up; each cell combines its up to four children. `combine` must not mind
+/// one that is given twice. Loops that a compiler turns into vectors.
 template <typename Combine>
-Mask Halved(const Mask& fine, std::uint8_t initial, const Combine& combine) {
-  Mask coarse((fine.width() + 1) / 2, (fine.height() + 1) / 2, 1, initial);
-  for (int y = 0; y < fine.height(); ++y) {
-    const std::uint8_t* from = fine.row(y);
-    std::uint8_t* to = coarse.row(y / 2);
-    for (int x = 0; x < fine.width(); ++x) to[x / 2] = combine(to[x / 2], from[x]);
+Mask Halved(const Mask& fine, const Combine& combine) {
+  Mask coarse((fine.width() + 1) / 2, (fine.height() + 1) / 2);
+  const int pairs = fine.width() / 2;
+  std::vector<std::uint8_t> both(static_cast<size_t>(fine.width()));
+  for (int y = 0; y < coarse.height(); ++y) {
+    const std::uint8_t* upper = fine.row(2 * y);
+    const std::uint8_t* lower = fine.row(std::min(2 * y + 1, fine.height() - 1));
+    std::uint8_t *column = both.data(), *to = coarse.row(y);
+    for (int x = 0; x < fine.width(); ++x) column[x] = combine(upper[x], lower[x]);
+    for (int x = 0; x < pairs; ++x) to[x] = combine(column[2 * x], column[2 * x + 1]);
+    if (fine.width() % 2 != 0) to[pairs] = column[2 * pairs];
   }
   return coarse;
+}
+
+/// Marks the children of every marked cell too.
+void MarkChildren(const Mask& coarse, Mask& fine) {
+  const int pairs = fine.width() / 2;
+  for (int y = 0; y < fine.height(); ++y) {
+    const std::uint8_t* from = coarse.row(y / 2);
+    std::uint8_t* to = fine.row(y);
+    for (int x = 0; x < pairs; ++x) to[2 * x] |= from[x], to[2 * x + 1] |= from[x];
+    if (fine.width() % 2 != 0) to[2 * pairs] |= from[pairs];
+  }
 }
 
 /// Not 0 where any of the 3x3 cells around is not 0.
@@ -44,19 +63,15 @@ HolePyramid::HolePyramid(const Mask& hole) : width_(hole.width()), height_(hole.
   constexpr std::uint8_t kUnknown = 255;
   Mask unknown = hole;
   while (unknown.width() > 1 || unknown.height() > 1) {
-    const Mask asking = Halved(unknown, 0, either);
+    const Mask asking = Halved(unknown, either);
     if (std::find(asking.data().begin(), asking.data().end(), kUnknown) == asking.data().end())
       break;
     // A fine cell draws on the coarse cells around it; those must know their own children first.
     needed_.push_back(WithNeighbours(asking));
-    unknown = Halved(unknown, kUnknown, both);
+    unknown = Halved(unknown, both);
   }
   for (size_t level = needed_.size(); level-- > 1;) {
-    const Mask& coarse = needed_[level];
-    Mask& fine = needed_[level - 1];
-    for (int y = 0; y < fine.height(); ++y) {
-      for (int x = 0; x < fine.width(); ++x) fine(x, y) |= coarse(x / 2, y / 2);
-    }
+    MarkChildren(needed_[level], needed_[level - 1]);
   }
 }
 

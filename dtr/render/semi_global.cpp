@@ -87,17 +87,26 @@ size_t WholeVectors(size_t slots) {
 
 }  // namespace
 
-SemiGlobal::SemiGlobal(int columns, int rows, size_t labels, const LabelChanges& changes)
+SemiGlobal::SemiGlobal(int columns, int rows, size_t labels, const LabelChanges& changes,
+                       int threads)
     : columns_(columns),
       rows_(rows),
       changes_(changes),
       // One more: the last step has no other label beside it.
       step_slots_(changes.steps > 0 ? WholeVectors(changes.steps + 1) : 0),
       slots_(step_slots_ + WholeVectors(labels - changes.steps)),
-      costs_(static_cast<size_t>(columns) * static_cast<size_t>(rows) * slots_, kNever),
-      sums_(costs_.size()) {}
+      threads_(threads),
+      costs_(std::make_unique_for_overwrite<float[]>(At(0, rows))),
+      sums_(std::make_unique_for_overwrite<float[]>(At(0, rows))) {
+  // Megabytes that the system hands out page by page: by all threads.
+  ParallelFor(0, rows, threads, [&](int y) {
+    const size_t row = At(0, 1);
+    std::fill_n(&costs_[At(0, y)], row, kNever);
+    std::fill_n(&sums_[At(0, y)], row, 0.0f);
+  });
+}
 
-void SemiGlobal::Solve(int threads) {
+void SemiGlobal::Solve() {
   const auto along = static_cast<std::ptrdiff_t>(slots_), down = along * columns_;
   const auto both_ways = [&](int x, int y, std::ptrdiff_t step, int cells) {
     LabelPath path{&costs_[At(x, y)], &sums_[At(x, y)], step,          cells,
@@ -106,8 +115,8 @@ void SemiGlobal::Solve(int threads) {
     path.costs += step * (cells - 1), path.sums += step * (cells - 1), path.step = -step;
     Follow(path);
   };
-  ParallelFor(0, rows_, threads, [&](int y) { both_ways(0, y, along, columns_); });
-  ParallelFor(0, columns_, threads, [&](int x) { both_ways(x, 0, down, rows_); });
+  ParallelFor(0, rows_, threads_, [&](int y) { both_ways(0, y, along, columns_); });
+  ParallelFor(0, columns_, threads_, [&](int x) { both_ways(x, 0, down, rows_); });
 }
 
 size_t SemiGlobal::Best(int x, int y) const {

@@ -1,7 +1,7 @@
 // dtr/render/semi_global.h -- one label for each cell of a grid, cheap and smooth.
 #pragma once
 #include <cstddef>
-#include <vector>
+#include <memory>
 
 namespace dtr {
 
@@ -15,12 +15,12 @@ struct LabelChanges {
 /// Semi-global matching along rows and columns, both ways (Hirschmueller 2008, eq. 13).
 class SemiGlobal {
  public:
-  SemiGlobal(int columns, int rows, size_t labels, const LabelChanges& changes);
+  SemiGlobal(int columns, int rows, size_t labels, const LabelChanges& changes, int threads);
 
   /// A cell's cost of a label: all are to be set before Solve.
   void SetCost(int x, int y, size_t label, float cost) { costs_[At(x, y) + SlotOf(label)] = cost; }
   /// Does not depend on the number of threads.
-  void Solve(int threads);
+  void Solve();
   /// After Solve: costs summed over all paths to the cell.
   float SumOf(int x, int y, size_t label) const { return sums_[At(x, y) + SlotOf(label)]; }
   /// The label of the least sum, the first of several.
@@ -40,7 +40,8 @@ class SemiGlobal {
   const int columns_, rows_;
   const LabelChanges changes_;
   const size_t step_slots_, slots_;
-  std::vector<float> costs_, sums_;  ///< per cell and slot
+  const int threads_;
+  std::unique_ptr<float[]> costs_, sums_;  ///< per cell and slot
 };
 
 }  // namespace dtr

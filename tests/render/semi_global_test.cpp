@@ -64,7 +64,7 @@ void CheckSums() {
     const Problem problem = RandomProblem(labels, {steps, 4, 24}, random);
     const std::vector<float> expected = PlainSums(problem);
     for (const int threads : {1, 3}) {
-      SemiGlobal solver(kColumns, kRows, labels, problem.changes);
+      SemiGlobal solver(kColumns, kRows, labels, problem.changes, threads);
       for (int y = 0; y < kRows; ++y) {
         for (int x = 0; x < kColumns; ++x) {
           for (size_t l = 0; l < labels; ++l) {
@@ -72,7 +72,7 @@ void CheckSums() {
           }
         }
       }
-      solver.Solve(threads);
+      solver.Solve();
       for (int y = 0; y < kRows; ++y) {
         for (int x = 0; x < kColumns; ++x) {
           const auto first = expected.begin() + static_cast<std::ptrdiff_t>(problem.At(x, y, 0));
@@ -93,13 +93,13 @@ TEST(SemiGlobal, GivesThePlainSumsToTheBitForAnyNumberOfLabelsAndThreads) {
 }
 
 TEST(SemiGlobal, OfEqualLabelsTheFirstIsBest) {
-  SemiGlobal solver(1, 1, 3, {2, 1, 1});
+  SemiGlobal solver(1, 1, 3, {2, 1, 1}, 1);
   for (const size_t label : {0, 1, 2}) solver.SetCost(0, 0, label, 5);
-  solver.Solve(1);
+  solver.Solve();
   EXPECT_EQ(solver.Best(0, 0), 0u);
-  SemiGlobal other(1, 1, 3, {2, 1, 1});
+  SemiGlobal other(1, 1, 3, {2, 1, 1}, 1);
   for (const size_t label : {0, 1, 2}) other.SetCost(0, 0, label, label == 2 ? 4.0f : 5.0f);
-  other.Solve(1);
+  other.Solve();
   EXPECT_EQ(other.Best(0, 0), 2u);
 }
 

@@ -66,6 +66,20 @@ TEST(Refine, LeavesThePrincipalPointWhereTheDataDoNotAskForIt) {
   EXPECT_NEAR(refined.model.cameras.at(1).params[0], 900, 2);
 }
 
+TEST(Refine, AddsTangentialDistortionWhereTheLensHasIt) {
+  SceneSpec spec = Noisy();
+  spec.lens = {LensModel::kOpenCv, 1000, 800, {900, 900, 504, 397, -0.05, 0.01, 2e-3, -3e-3}};
+  SfmModel model = ModelFrom(MakeBundle(spec));
+  model.cameras[1] = {LensModel::kRadial, 1000, 800, {900, 504, 397, -0.05, 0.01}};
+  const Refined refined = Refine(model, {});
+  ASSERT_TRUE(refined.changed);
+  EXPECT_EQ(refined.lens, LensFreedom::kTangential);
+  const LensCamera& lens = refined.model.cameras.at(1);
+  ASSERT_EQ(lens.model, LensModel::kOpenCv);
+  EXPECT_NEAR(lens.params[6], 2e-3, 3e-4);
+  EXPECT_NEAR(lens.params[7], -3e-3, 3e-4);
+}
+
 TEST(Refine, GivesEveryImageItsPrincipalPointWhereTheLensIsStabilised) {
   const Refined refined = Refine(ModelFrom(Stabilised(MakeBundle(Noisy()))), {});
   ASSERT_TRUE(refined.changed);
@@ -91,8 +105,8 @@ TEST(Refine, GivesEveryImageItsPrincipalPointWhereTheLensIsStabilised) {
 // So little that other faults of a lens model do as much: sure, and not worth a number per image.
 TEST(Refine, KeepsOnePrincipalPointWhereImagesGainNextToNothingByTheirOwn) {
   const Refined refined = Refine(ModelFrom(Stabilised(MakeBundle(Noisy()), 0.4)), {});
-  ASSERT_GE(refined.candidates.size(), 4u);
-  const RefineCandidate& own = refined.candidates[3];
+  ASSERT_GE(refined.candidates.size(), 5u);
+  const RefineCandidate& own = refined.candidates[4];
   EXPECT_LT(own.high_px2, 0) << "no longer sure: the test tells nothing";
   EXPECT_LT(own.held_out_px, refined.candidates[2].held_out_px);
   EXPECT_NE(refined.lens, LensFreedom::kPrincipalPointPerImage);
