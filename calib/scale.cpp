@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "dtr/base/error.h"
+#include "dtr/base/order_statistics.h"
 
 namespace dtr::calib {
 namespace {
@@ -155,10 +156,8 @@ PositionScale ScaleFromPositions(std::span<const Eigen::Vector3d> centres,
       lengths.push_back((scale.metric_from_scene * centres[i] - positions_m[i]).norm());
     }
     std::vector<double> sorted = lengths;
-    const auto middle = sorted.begin() + static_cast<long>(sorted.size() / 2);
-    std::nth_element(sorted.begin(), middle, sorted.end());
     // A millionth of the extent: exact positions leave rounding alone.
-    const double limit = kOutlierSigmas * *middle / kMedianLength +
+    const double limit = kOutlierSigmas * UpperMedian(sorted) / kMedianLength +
                          1e-6 * (positions_m[0] - MeanOf(positions_m)).norm();
     std::vector<bool> next;
     for (const double length : lengths) next.push_back(length <= limit);

@@ -9,6 +9,7 @@
 
 #include "calib/triangulate.h"
 #include "dtr/base/error.h"
+#include "dtr/base/order_statistics.h"
 #include "dtr/base/parallel_for.h"
 
 namespace dtr::calib {
@@ -179,13 +180,12 @@ Check OutOfLine(const ValidationReport& report, int worst, const ValidateLimits&
     return AtMost("worst_camera_ratio", std::numeric_limits<double>::quiet_NaN(),
                   limits.max_camera_ratio, "no camera has enough observations to test");
   }
-  const auto middle = rms.begin() + static_cast<std::ptrdiff_t>(rms.size() / 2);
-  std::nth_element(rms.begin(), middle, rms.end());
+  const double typical = UpperMedian(rms);
   const CameraValidation& camera = report.cameras[static_cast<size_t>(worst)];
-  return AtMost("worst_camera_ratio", camera.held_out.rms_px / std::max(*middle, kFinePx),
+  return AtMost("worst_camera_ratio", camera.held_out.rms_px / std::max(typical, kFinePx),
                 limits.max_camera_ratio,
                 fmt::format("camera {}: RMS {:.3g} px where the typical camera has {:.3g} px",
-                            camera.name, camera.held_out.rms_px, *middle));
+                            camera.name, camera.held_out.rms_px, typical));
 }
 
 std::string Listed(const std::vector<std::string>& names) {

@@ -9,11 +9,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
 #include "calib/bundle/gauge.h"
 #include "calib/bundle/lens_params.h"
 #include "calib/bundle/normalised.h"
+#include "calib/bundle/sight_rows.h"
 
 namespace dtr::calib {
 namespace {
@@ -23,39 +23,6 @@ constexpr double kSingular = 1e-13;
 // A direction of the gauge is settled when the priors' information about it is more than this share
 // of the sights' typical information.
 constexpr double kSettled = 1e-12;
-
-using RowJacobian = Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor>;
-
-struct SightRows {
-  RowJacobian lens;
-  Eigen::Matrix<double, 2, 6, Eigen::RowMajor> pose;
-  Eigen::Matrix<double, 2, 3, Eigen::RowMajor> point;
-};
-
-bool Rows(const Normalised& n, const Bundle& bundle, const BundleObservation& sight,
-          SightRows& rows) {
-  const auto image = static_cast<size_t>(sight.image);
-  const auto lens = static_cast<size_t>(bundle.images[image].lens);
-  const double* blocks[] = {n.theta[lens].data(), n.motion[image].data(),
-                            n.place[static_cast<size_t>(sight.point)].data()};
-  rows.lens.resize(2, static_cast<long>(n.lenses[lens].centre.size()));
-  double* jacobians[] = {rows.lens.data(), rows.pose.data(), rows.point.data()};
-  Eigen::Vector2d residual;
-  return n.Cost(bundle, sight)->Evaluate(blocks, residual.data(), jacobians) &&
-         rows.lens.allFinite() && rows.pose.allFinite() && rows.point.allFinite();
-}
-
-std::vector<int> FreeParams(const LensCamera& lens, LensFreedom freedom) {
-  std::vector<int> free;
-  const int focals = FocalCount(lens.model);
-  for (int k = 0; k < ParameterCount(lens.model); ++k) {
-    const bool centre = k >= focals && k < focals + 2;
-    if (freedom != LensFreedom::kFixed && !(freedom == LensFreedom::kNoPrincipalPoint && centre)) {
-      free.push_back(k);
-    }
-  }
-  return free;
-}
 
 // Adds what the sights of one point, the point eliminated, say about lenses and poses.
 void AddPoint(const Normalised& n, const Bundle& bundle, const BundleCovariance& layout,
@@ -71,7 +38,7 @@ void AddPoint(const Normalised& n, const Bundle& bundle, const BundleCovariance&
   };
   for (const BundleObservation* sight : sights) {
     SightRows made;
-    if (!Rows(n, bundle, *sight, made)) continue;
+    if (!RowsOf(n, bundle, *sight, made)) continue;
     const int lens = bundle.images[static_cast<size_t>(sight->image)].lens;
     for (size_t k = 0; k < layout.free_params[static_cast<size_t>(lens)].size(); ++k) {
       column_of(layout.lens_at[static_cast<size_t>(lens)] + static_cast<int>(k));
@@ -100,32 +67,13 @@ void AddPoint(const Normalised& n, const Bundle& bundle, const BundleCovariance&
           rows[i].pose.col(k);
     }
   }
-  // Orthogonal elimination: subtracting W V^-1 W^T would lose the digits that tell far points'
-  // depth.
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(by_point);
-  const Eigen::MatrixXd turned = qr.householderQ().adjoint() * by_rest;
-  const Eigen::MatrixXd left = turned.bottomRows(height - qr.rank());
+  const Eigen::MatrixXd left = WithoutPoint(by_point, by_rest);
   const Eigen::MatrixXd product = left.transpose() * left;
   for (size_t i = 0; i < columns.size(); ++i) {
     for (size_t j = 0; j < columns.size(); ++j) {
       information(columns[i], columns[j]) += product(static_cast<long>(i), static_cast<long>(j));
     }
   }
-}
-
-// Orthonormal directions of the unknowns that move the world as a whole: three shifts, three turns,
-// a scale (which none is where all cameras stand in one place).
-Eigen::MatrixXd GaugeDirections(const Normalised& n, const BundleCovariance& layout,
-                                long unknowns) {
-  const Eigen::MatrixXd columns = GaugeColumns(n.poses);
-  Eigen::MatrixXd directions = Eigen::MatrixXd::Zero(unknowns, 7);
-  for (size_t i = 0; i < n.poses.size(); ++i) {
-    directions.middleRows<6>(layout.image_at[i]) = columns.middleRows<6>(6 * static_cast<long>(i));
-  }
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(directions);
-  const Eigen::MatrixXd thin =
-      qr.householderQ() * Eigen::MatrixXd::Identity(unknowns, std::min<long>(7, unknowns));
-  return thin.leftCols(qr.rank());
 }
 
 Eigen::MatrixXd PriorInformation(const Normalised& n, const BundleCovariance& layout,
@@ -264,8 +212,8 @@ BundleCovariance CovarianceOf(const Adjusted& adjusted, const AdjustOptions& opt
   }
   for (const auto& sights : tracks) AddPoint(n, bundle, out, sights, information);
   const Eigen::MatrixXd priors = PriorInformation(n, out, options, unknowns);
-  const Eigen::MatrixXd open =
-      OpenDirections(GaugeDirections(n, out, unknowns), priors, information.trace() / unknowns);
+  const Eigen::MatrixXd open = OpenDirections(GaugeDirections(n.poses, out.image_at, unknowns),
+                                              priors, information.trace() / unknowns);
   out.gauge_freedom = static_cast<int>(open.cols());
   Invert(bundle, information + priors, open, out);
   if (out.determined) ToUnits(n, out);
@@ -286,7 +234,7 @@ Eigen::Matrix2d TransferCovariance(const Bundle& bundle, const BundleCovariance&
   const Normalised n = Normalised::Around(one);
   SightRows rows[3];
   for (size_t i = 0; i < 3; ++i) {
-    if (!Rows(n, one, one.observations[i], rows[i])) return none;
+    if (!RowsOf(n, one, one.observations[i], rows[i])) return none;
   }
   Eigen::Matrix<double, 4, 3> by_point;
   by_point << rows[0].point, rows[1].point;

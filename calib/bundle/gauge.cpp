@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <Eigen/QR>
+#include <algorithm>
 #include <cmath>
 
 #include "calib/similarity.h"
@@ -51,6 +52,19 @@ Eigen::MatrixXd GaugeColumns(const std::vector<PoseFrame>& poses) {
     columns.block<3, 1>(at + 3, 6) = c;
   }
   return columns;
+}
+
+Eigen::MatrixXd GaugeDirections(const std::vector<PoseFrame>& poses,
+                                const std::vector<int>& image_at, long unknowns) {
+  const Eigen::MatrixXd columns = GaugeColumns(poses);
+  Eigen::MatrixXd directions = Eigen::MatrixXd::Zero(unknowns, 7);
+  for (size_t i = 0; i < poses.size(); ++i) {
+    directions.middleRows<6>(image_at[i]) = columns.middleRows<6>(6 * static_cast<long>(i));
+  }
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(directions);
+  const Eigen::MatrixXd thin =
+      qr.householderQ() * Eigen::MatrixXd::Identity(unknowns, std::min<long>(7, unknowns));
+  return thin.leftCols(qr.rank());
 }
 
 void MoveToGaugeOf(const Bundle& start, Bundle& now) {

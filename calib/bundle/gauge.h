@@ -12,6 +12,12 @@ namespace dtr::calib {
 /// shift, a turn and a growth of the world: 7 columns, the last zero where all stand in the origin.
 Eigen::MatrixXd GaugeColumns(const std::vector<PoseFrame>& poses);
 
+/// Orthonormal directions, one per column, of `unknowns` unknowns that move the world as a whole:
+/// three shifts, three turns, a scale (which none is where all cameras stand in one place). The
+/// pose of image i begins at `image_at[i]`.
+Eigen::MatrixXd GaugeDirections(const std::vector<PoseFrame>& poses,
+                                const std::vector<int>& image_at, long unknowns);
+
 /// Moves `now` as a whole so that its cameras are as near as can be to those of `start`: least
 /// squares over turns (radians) and centres together (units of the bundle). At the minimum the
 /// difference is orthogonal to every GaugeColumn: these are the inner constraints of a free network

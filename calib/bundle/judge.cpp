@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "calib/bundle/lens_params.h"
+#include "calib/bundle/shutter.h"
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/base/random.h"
@@ -369,6 +370,27 @@ void AddPicture(const BundleLimits& limits, Judgement& judgement) {
           : "no view's points are placed by two others"));
 }
 
+void AddShutter(const BundleLimits& limits, const Adjusted& fresh,
+                const BundleCovariance& covariance, Judgement& judgement) {
+  const ShutterTest test = TestShutter(fresh, covariance);
+  if (!test.not_tested.empty()) return;
+  const bool chance = test.p >= limits.min_p;
+  Check check = AtMost(
+      "rolling_shutter_px", chance ? 0 : test.amplitude_px, limits.max_shutter_px,
+      fmt::format("residuals as of cameras that turn while the rows are read: {:.3f} px RMS per "
+                  "coordinate; p = {:.2g}{}",
+                  test.amplitude_px, test.p, chance ? ", what noise does" : ""));
+  if (!check.passed) {
+    const auto surest = static_cast<size_t>(
+        std::max_element(test.sigmas.begin(), test.sigmas.end()) - test.sigmas.begin());
+    check.reason += fmt::format(
+        "; the surest is {}, by {:.3g} degrees from its first row to its "
+        "last",
+        fresh.bundle.images[surest].name, test.turns_rad[surest] * 180 / EIGEN_PI);
+  }
+  judgement.tests.push_back(std::move(check));
+}
+
 }  // namespace
 
 double NegligiblePx(const BundleLimits& limits, double sigma_px) {
@@ -424,6 +446,7 @@ Judgement Judge(const Bundle& given, const BundleLimits& limits, int threads) {
   WidenByHalves(judgement);
   AddDifferences(limits, judgement);
   AddPicture(limits, judgement);
+  AddShutter(limits, fresh, covariance, judgement);
   return judgement;
 }
 

@@ -23,6 +23,10 @@ struct BundleLimits {
   double max_halves_ratio = 3;
   /// 95 % of a third view's points, as its two best neighbours place them: standard deviation.
   double max_picture_shift_px = 1;
+  /// Residuals as of photos whose rows were read while the camera turned: RMS per coordinate that
+  /// such turns explain beyond chance.
+  double max_shutter_px = 0.1;
+  double min_p = 1e-4;           ///< less likely by chance than this is no chance
   double max_focal_share = 0.1;  ///< standard deviation of a focal length over itself
 };
 
@@ -70,7 +74,8 @@ struct Judgement {
 ///  - two halves of the points, dealt by chance, are solved apart and compared; where they differ
 ///    by more than predicted, all uncertainties are widened by that factor;
 ///  - the covariance is carried to a third view's pixels (TransferCovariance);
-///  - degeneracies are looked for by name.
+///  - degeneracies are looked for by name;
+///  - residuals are held against a shutter that reads row by row (shutter.h).
 /// At most 4000 points, drawn by their index, take part. Deterministic for any number of threads.
 /// Throws Error on a broken bundle only.
 Judgement Judge(const Bundle& stored, const BundleLimits& limits, int threads = 0);

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "dtr/base/error.h"
+#include "dtr/base/order_statistics.h"
 
 namespace dtr::calib {
 namespace {
@@ -39,12 +40,6 @@ SfmModel WithLenses(SfmModel model, const KnownRig& rig,
     image.camera_id = static_cast<std::uint32_t>(photo->second.camera + 1);
   }
   return model;
-}
-
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<long>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // Images of each frame, indices into the bundle.
@@ -87,9 +82,9 @@ void FindScale(const Bundle& bundle, const Frames& frames, RigRefined& refined) 
     Refuse("expected an instant that two cameras saw from different places, found none");
   }
   refined.pairs = static_cast<int>(scales.size());
-  refined.scale = Median(scales);
+  refined.scale = UpperMedian(scales);
   for (double& s : scales) s = std::abs(s - refined.scale);
-  refined.scale_spread = 1.4826 * Median(scales) / refined.scale;
+  refined.scale_spread = 1.4826 * UpperMedian(scales) / refined.scale;
   if (refined.scale_spread > kMostScaleSpread) {
     Refuse(
         fmt::format("expected photos of this rig, found distances between its cameras that "

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "calib/judge/judge.h"
 #include "cli/command.h"
 #include "cli/output_file.h"
 #include "cli/pipeline/lens_file.h"
@@ -54,6 +55,13 @@ void SayDelays(const calib::Calibration& calibration, const pipeline::RigSummary
   }
   if (summary.passes > 1) {
     console.Say(fmt::format("delays settled after {} solves", summary.passes));
+  }
+  const calib::JudgeLimits limits;
+  if (summary.unsteady.p < limits.min_p && summary.unsteady.amplitude_px > limits.max_pattern_px) {
+    console.Say(fmt::format(
+        "the cameras keep no common rate: a delay of each picture's own, beyond one per camera, "
+        "explains {:.3f} px RMS per coordinate; what is said to be uncertain is so by more",
+        summary.unsteady.amplitude_px));
   }
 }
 

@@ -96,6 +96,7 @@ calib::Calibration CalibrateRig(const calib::Board& board, const RigPhotos& phot
     summary->delays = calib::DelaysOf(board, solved.solution);
   }
   const calib::RigSolution& solution = solved.solution;
+  summary->unsteady = calib::TestUnsteadyClocks(solution);
   calib::Calibration calibration;
   calibration.board = board;
   calibration.lenses_given = !rig_options.free_lenses;

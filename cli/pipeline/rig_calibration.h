@@ -9,6 +9,7 @@
 
 #include "calib/files/calibration.h"
 #include "calib/judge/free_running.h"
+#include "calib/judge/patterns.h"
 #include "calib/solve/rig_solve.h"
 #include "cli/pipeline/rig_photos.h"
 
@@ -32,6 +33,7 @@ struct RigSummary {
   int passes = 1;  ///< solves, of free-running cameras
   /// Of cameras that were taken to be synchronised: what speaks against it (calib/judge).
   std::vector<std::optional<calib::CameraDelay>> delays;
+  calib::PatternTest unsteady;  ///< pictures that keep no common rate (calib/judge)
 };
 
 /// Solves for the rig behind the photos. Throws UsageError when lenses are given for some cameras

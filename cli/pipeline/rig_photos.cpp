@@ -165,6 +165,22 @@ Instants ReadTimestamps(const fs::path& file) {
   return instants;
 }
 
+// Of one camera: which frame of its video belongs to which instant. A table that has as many rows
+// as the video has frames is a table of them in order, though it may count them from another start:
+// recorders number from when a camera began.
+std::map<int, int> InstantsOf(const Instants& instants, int camera, int frames) {
+  std::map<int, int> own;
+  for (const auto& [key, instant] : instants) {
+    if (key.first == camera) own.emplace(key.second, instant);
+  }
+  if (static_cast<int>(own.size()) != frames) return own;
+  std::map<int, int> in_order;
+  for (const auto& [number, instant] : own) {
+    in_order.emplace(static_cast<int>(in_order.size()), instant);
+  }
+  return in_order;
+}
+
 Layout FromVideos(const fs::path& folder, const std::vector<fs::path>& videos) {
   Layout layout;
   Instants instants;
@@ -184,6 +200,7 @@ Layout FromVideos(const fs::path& folder, const std::vector<fs::path>& videos) {
       frames = number + 1;
       return true;
     });
+    const std::map<int, int> own = timed ? InstantsOf(instants, *id, frames) : std::map<int, int>{};
     for (int number = 0; number < frames; ++number) {
       Shot shot;
       shot.file = video;
@@ -192,8 +209,8 @@ Layout FromVideos(const fs::path& folder, const std::vector<fs::path>& videos) {
       shot.camera = layout.cameras.size();
       shot.frame = fmt::format("{}", number);
       if (timed) {
-        const auto at = instants.find({*id, number});
-        if (at == instants.end()) continue;  // a frame without an instant says nothing of the rig
+        const auto at = own.find(number);
+        if (at == own.end()) continue;  // a frame without an instant says nothing of the rig
         shot.frame = fmt::format("{}", at->second);
       }
       layout.shots.push_back(std::move(shot));

@@ -1,10 +1,12 @@
 // bundle_report MODEL [--truth DIR] [--known-lens]: what bundle adjustment makes of a COLMAP model,
 // beside the model as it is. DIR holds NAME.camera files (Strecha et al. 2008) of images twice as
 // large per axis. Errors after the best similarity between the camera centres: mean angle of the
-// rotations, mean distance of the centres as a share of the median neighbour baseline.
+// rotations (also by the turn that suits them best), mean distance of the centres as a share of the
+// median neighbour baseline.
 #include <time.h>
 
 #include <Eigen/LU>
+#include <Eigen/SVD>
 #include <algorithm>
 #include <cstdio>
 #include <cstring>
@@ -84,8 +86,23 @@ void PrintErrors(const SfmModel& model, const Truth& truth) {
     turn += aligned.rotation.angularDistance(true_poses[i].rotation) * 180 / M_PI;
     shift += (world_from_ours * ours[i] - theirs[i]).norm();
   }
+  // Rotations against rotations: the world turned so that they agree best (chordal mean), which the
+  // centres, that err by themselves, have no part in.
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  for (size_t i = 0; i < ours.size(); ++i) {
+    sum += (poses[i].rotation.conjugate() * true_poses[i].rotation).toRotationMatrix();
+  }
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::Quaterniond ours_from_theirs(
+      Eigen::Matrix3d(svd.matrixU() * svd.matrixV().transpose()));
+  double own_turn = 0;
+  for (size_t i = 0; i < ours.size(); ++i) {
+    own_turn +=
+        (poses[i].rotation * ours_from_theirs).angularDistance(true_poses[i].rotation) * 180 / M_PI;
+  }
   const auto count = static_cast<double>(ours.size());
-  std::printf(" | %.4f | %.3f", turn / count, 100 * shift / count / baseline);
+  std::printf(" | %.4f | %.4f | %.3f", turn / count, own_turn / count,
+              100 * shift / count / baseline);
 }
 
 void PrintLens(const SfmModel& model) {
@@ -109,9 +126,9 @@ int Run(int argc, char** argv) {
     std::printf(" |\n");
   };
   std::printf("| cameras | CPU s%s | lens |\n",
-              truth_folder.empty()
-                  ? ""
-                  : " | mean rotation error, deg | mean position error, % of baseline");
+              truth_folder.empty() ? ""
+                                   : " | mean rotation error, deg | by the best turn, deg | mean "
+                                     "position error, % of baseline");
   row("COLMAP", model, 0);
   double start = CpuSeconds();
   const Refined refined = Refine(model, {});

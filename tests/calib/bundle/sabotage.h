@@ -27,6 +27,8 @@ inline Bundle Honest(std::uint64_t seed, int points = 300) {
   return Adjust(seen, AllFree()).bundle;
 }
 
+inline constexpr int kSabotages = 8;
+
 // How many standard deviations a stored calibration is off, as the honest one's covariance has it.
 struct Sabotaged {
   Bundle bundle;
@@ -37,6 +39,26 @@ struct Sabotaged {
 inline Eigen::Vector3d Direction(Random& random) {
   const double x = random.Normal(), y = random.Normal();
   return Eigen::Vector3d(x, y, random.Normal()).normalized();
+}
+
+// The sights as a camera sees them that turns, by up to this from an image's first row to its last,
+// while the rows are read; the turn is each image's own.
+inline void ReadRowByRow(double largest_turn_rad, Random& random, Bundle& bundle) {
+  std::vector<Eigen::Vector3d> turns;
+  for (size_t i = 0; i < bundle.images.size(); ++i) {
+    turns.push_back(random.Uniform(0, largest_turn_rad) * Direction(random));
+  }
+  for (BundleObservation& o : bundle.observations) {
+    const BundleImage& image = bundle.images[static_cast<size_t>(o.image)];
+    const LensCamera& lens = bundle.lenses[static_cast<size_t>(image.lens)];
+    const Eigen::Vector3d p =
+        image.cam_from_world * bundle.points[static_cast<size_t>(o.point)].hnormalized();
+    const Eigen::Vector3d turn =
+        (o.pixel.y() / lens.height_px - 0.5) * turns[static_cast<size_t>(o.image)];
+    const auto still = lens.PixelFromCam(p);
+    const auto turned = lens.PixelFromCam(Eigen::AngleAxisd(turn.norm(), turn.normalized()) * p);
+    if (still && turned) o.pixel += *turned - *still;
+  }
 }
 
 inline Sabotaged Sabotage(const Bundle& honest, int kind, Random& random) {
@@ -109,6 +131,12 @@ inline Sabotaged Sabotage(const Bundle& honest, int kind, Random& random) {
       s.test = "degeneracies";
       s.word = "duplicate_images";
       break;
+    case 6:  // rows are read one after the other by a camera that turns
+      s.sigmas = 1e3;
+      ReadRowByRow(random.Uniform(0.002, 0.01), random, s.bundle);
+      s.test = "rolling_shutter_px";
+      s.word = "rows are read";
+      break;
     default: {  // pixels as another lens would have undistorted them
       s.sigmas = 1e3;
       for (BundleObservation& o : s.bundle.observations) {
@@ -136,7 +164,7 @@ inline Tally SabotageAll(int count, std::uint64_t seed) {
     if (!AllPassed(good.tests)) {
       std::cout << "honest " << k << ": " << BrokenTests(good.tests) << "\n";
     }
-    const Sabotaged bad = Sabotage(honest, k % 7, random);
+    const Sabotaged bad = Sabotage(honest, k % kSabotages, random);
     const Judgement judged = Judge(bad.bundle, {}, 1);
     const Check* failed = BrokenTest(judged.tests, bad.test);
     if (failed != nullptr && failed->reason.find(bad.word) != std::string::npos) {
@@ -147,7 +175,7 @@ inline Tally SabotageAll(int count, std::uint64_t seed) {
     for (const auto& camera : judged.cameras) moved = std::max(moved, camera.moved_px);
     const bool invisible = moved <= NegligiblePx({}, judged.sigma_px);
     (invisible ? tally.not_detectable : tally.missed) += 1;
-    std::cout << (invisible ? "not detectable: " : "missed: ") << "kind " << k % 7 << ", "
+    std::cout << (invisible ? "not detectable: " : "missed: ") << "kind " << k % kSabotages << ", "
               << bad.sigmas << " sigmas, points move by " << moved << " px; "
               << BrokenTests(judged.tests) << "\n";
   }

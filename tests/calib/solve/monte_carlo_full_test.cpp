@@ -1,4 +1,7 @@
-// Predicted uncertainties in full: 1000 solves, every parameter on its own.
+// Predicted uncertainties in full: 1000 solves (or DTR_MONTE_CARLO_SOLVES), every parameter on its
+// own.
+#include <cstdlib>
+
 #include "tests/calib/solve/monte_carlo.h"
 
 namespace dtr::calib {
@@ -6,10 +9,15 @@ namespace {
 
 using namespace testing;
 
+int Solves() {
+  const char* given = std::getenv("DTR_MONTE_CARLO_SOLVES");
+  return given ? std::atoi(given) : 1000;
+}
+
 class MonteCarloFull : public ::testing::TestWithParam<BoardModel> {};
 
 TEST_P(MonteCarloFull, PredictedUncertaintyIsWhatNoiseDoes) {
-  const MonteCarlo result = RunMonteCarlo(GetParam(), 1000, 12, 0.1);
+  const MonteCarlo result = RunMonteCarlo(GetParam(), Solves(), 12, 0.1);
   EXPECT_GE(result.worst_share, kInsideThreeSigmas);
   for (const double chi_squared : {result.chi_squared, result.lens_chi_squared}) {
     EXPECT_GT(chi_squared, kLeastChiSquared);

@@ -1,13 +1,16 @@
 // Against OpenCV: the same corners, the same model, the same loss must end at the same camera.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cfloat>
 #include <cmath>
 #include <ctime>
+#include <limits>
 #include <opencv2/calib3d.hpp>
 
 #include "calib/boards/detect.h"
 #include "calib/solve/board_solve.h"
+#include "calib/solve/choose_model.h"
 #include "dtr/io/image_io.h"
 #include "tests/calib/solve/synthetic_views.h"
 #include "tests/support/test_data.h"
@@ -90,6 +93,69 @@ TEST(OpenCvParity, TheChessboardSetHasOpenCvsTrainingRms) {
         EXPECT_NEAR(ours.rms_px, published_px, kPublished) << side;
       }
     }
+  }
+}
+
+// The lens of `k` and `distortion` as ours; the first pixel's centre at 0.5.
+LensCamera LensOf(const OpenCvResult& result) {
+  LensCamera lens{LensModel::kFullOpenCv, 640, 480, std::vector<double>(12, 0)};
+  lens.params[0] = result.k.at<double>(0, 0);
+  lens.params[1] = result.k.at<double>(1, 1);
+  lens.params[2] = result.k.at<double>(0, 2) + 0.5;
+  lens.params[3] = result.k.at<double>(1, 2) + 0.5;
+  const auto count = std::min<size_t>(8, result.distortion.total());
+  for (size_t i = 0; i < count; ++i) {
+    lens.params[4 + i] = result.distortion.at<double>(static_cast<int>(i));
+  }
+  return lens;
+}
+
+// RMS of views that OpenCV's solve of the other folds predicts, the boards' poses alone fitted:
+// what ChooseModel does with ours.
+double HeldOutByOpenCv(const std::vector<BoardView>& views, size_t folds, int flags) {
+  double squares = 0;
+  int corners = 0;
+  for (size_t fold = 0; fold < folds; ++fold) {
+    std::vector<BoardView> training;
+    for (size_t i = 0; i < views.size(); ++i) {
+      if (i % folds != fold) training.push_back(views[i]);
+    }
+    const LensCamera lens = LensOf(SolveWithOpenCv(kChessboard, training, flags));
+    for (size_t i = fold; i < views.size(); i += folds) {
+      const auto pose = SolvePose(kChessboard, views[i], lens);
+      for (const BoardCorner& corner : views[i].corners) {
+        const auto pixel = lens.PixelFromCam(pose.value() * kChessboard.Corner(corner.id));
+        squares += (pixel.value() - corner.pixel).squaredNorm();
+        ++corners;
+      }
+    }
+  }
+  return std::sqrt(squares / corners);
+}
+
+TEST(OpenCvParity, TheChosenModelPredictsUnseenViewsAsWellAsOpenCvsBest) {
+  DTR_REQUIRE_DATA(Folder());
+  for (const char* side : {"left", "right"}) {
+    const auto views = Views(side);
+    const ChoiceOptions options;
+    const ModelChoice choice = ChooseModel(kChessboard, views, 640, 480, options);
+    const auto folds = std::min(views.size(), static_cast<size_t>(options.folds));
+    double best = std::numeric_limits<double>::infinity();
+    for (const auto& [name, flags] :
+         {std::pair{"pinhole", cv::CALIB_FIX_K1 | cv::CALIB_FIX_K2 | cv::CALIB_FIX_K3 |
+                                   cv::CALIB_ZERO_TANGENT_DIST},
+          std::pair{"4", static_cast<int>(cv::CALIB_FIX_K3)}, std::pair{"5", 0},
+          std::pair{"8", static_cast<int>(cv::CALIB_RATIONAL_MODEL)}}) {
+      const double held_out = HeldOutByOpenCv(views, folds, flags);
+      std::printf("%s, OpenCV's %s: held out %.4f px\n", side, name, held_out);
+      best = std::min(best, held_out);
+    }
+    const ModelScore &chosen = choice.scores[choice.chosen], &ours = choice.scores[choice.best];
+    std::printf("%s, ours: chosen %s %.4f px, best %s %.4f px, difference from %.4f px\n", side,
+                NameOf(chosen.model).c_str(), chosen.held_out_rms_px, NameOf(ours.model).c_str(),
+                ours.held_out_rms_px, chosen.low_px);
+    EXPECT_LE(ours.held_out_rms_px, best * (1 + kSameRms));
+    EXPECT_LE(chosen.low_px, 0);  // a tie with the best, inside the bootstrap interval
   }
 }
 

@@ -1,0 +1,41 @@
+#include "calib/bundle/sight_rows.h"
+
+#include <Eigen/QR>
+
+#include "calib/bundle/lens_params.h"
+
+namespace dtr::calib {
+
+bool RowsOf(const Normalised& n, const Bundle& bundle, const BundleObservation& sight,
+            SightRows& rows) {
+  const auto image = static_cast<size_t>(sight.image);
+  const auto lens = static_cast<size_t>(bundle.images[image].lens);
+  const double* blocks[] = {n.theta[lens].data(), n.motion[image].data(),
+                            n.place[static_cast<size_t>(sight.point)].data()};
+  rows.lens.resize(2, static_cast<long>(n.lenses[lens].centre.size()));
+  double* jacobians[] = {rows.lens.data(), rows.pose.data(), rows.point.data()};
+  return n.Cost(bundle, sight)->Evaluate(blocks, rows.residual.data(), jacobians) &&
+         rows.lens.allFinite() && rows.pose.allFinite() && rows.point.allFinite();
+}
+
+Eigen::MatrixXd WithoutPoint(const Eigen::MatrixXd& by_point, const Eigen::MatrixXd& rest) {
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(by_point);
+  const Eigen::MatrixXd turned = qr.householderQ().adjoint() * rest;
+  return turned.bottomRows(rest.rows() - qr.rank());
+}
+
+std::vector<int> FreeParams(const LensCamera& lens, LensFreedom freedom) {
+  std::vector<int> free;
+  const int focals = FocalCount(lens.model);
+  for (int k = 0; k < ParameterCount(lens.model); ++k) {
+    const bool centre = k >= focals && k < focals + 2;
+    const bool with_centre = freedom == LensFreedom::kAll || freedom == LensFreedom::kTangential ||
+                             freedom == LensFreedom::kPrincipalPointPerImage;
+    if (with_centre || (freedom == LensFreedom::kNoPrincipalPoint && !centre)) {
+      free.push_back(k);
+    }
+  }
+  return free;
+}
+
+}  // namespace dtr::calib
