@@ -1,4 +1,4 @@
-// The figures of docs/ACCURACY.md, "The reference renderer on true depth".
+// The figures of docs/accuracy/RENDERING.md, "The reference renderer on true depth".
 #include <gtest/gtest.h>
 
 #include "tests/cpu/exact_scenes.h"
