@@ -32,10 +32,10 @@ void SayResult(const Options& options, const pipeline::PruneSetReport& report, C
       report.frame_before.median_ms / report.frame_after.median_ms, pruned.loss_db(),
       options.prune.prune.max_loss_db));
   console.Say(
-      fmt::format("  between input cameras: {:.3f} dB; on photos that did not decide: {:.3f} dB; "
-                  "on held-out ones: "
-                  "{}",
-                  pruned.checked_probe_loss_db, pruned.witness_loss_db,
+      fmt::format("  between input cameras: {:.3f} +- {:.3f} dB; on photos that did not decide: "
+                  "{:.3f} +- {:.3f} dB; on held-out ones: {}",
+                  pruned.checked_probe_loss_db, pruned.probe_error_db, pruned.witness_loss_db,
+                  pruned.witness_error_db,
                   pruned.photo_loss_db ? fmt::format("{:.3f} dB", *pruned.photo_loss_db)
                                        : std::string("there are none")));
   if (pruned.photo_loss_db.value_or(0) > options.prune.prune.max_loss_db) {
@@ -58,6 +58,7 @@ int RunPrune(Options& options, const Context& context) {
   options.prune.prune.seed = context.common.seed;
   options.prune.prune.render = *options.render;
   options.prune.arguments_of = &RenderOptionArguments;
+  options.prune.renderer = options.renderer.name;
   options.prune.make_renderer = [&] { return MakeRenderer(options.renderer, context.console); };
   options.prune.make_timed_renderer = [&] {
     return MakeTimedRenderer(options.renderer, context.console);
@@ -90,13 +91,27 @@ void AddPruneCommand(CLI::App& app) {
             ->check(CLI::Range(0.0, 20.0))
             ->type_name("L");
         command
+            .add_option(
+                "--max-bytes", options->prune.max_bytes,
+                "Enough is left out when the set takes no more than N bytes; exit 1 where the "
+                "loss does not allow that")
+            ->check(CLI::PositiveNumber)
+            ->type_name("N");
+        command
+            .add_option("--frame-ms", options->prune.frame_ms,
+                        "Enough is left out when frames take no more than T ms (with --max-bytes: "
+                        "when both hold); exit 1 where the loss does not allow that")
+            ->check(CLI::PositiveNumber)
+            ->type_name("T");
+        command
             .add_option("--probes", prune.probes,
                         "Source views whose photos decide, each left out in turn [12]")
             ->check(CLI::Range(1, 1000))
             ->type_name("N");
         command
             .add_option("--checks", prune.checks,
-                        "So many novel cameras, and photos that did not decide, check [8]")
+                        "So many novel cameras decide, and as many others, and photos that did not "
+                        "decide, check [8]")
             ->check(CLI::Range(1, 1000))
             ->type_name("N");
         command

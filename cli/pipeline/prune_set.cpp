@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "cli/pipeline/prune_journal.h"
 #include "cli/pipeline/run_log.h"
 #include "cli/pipeline/view_coder.h"
 #include "dtr/base/error.h"
@@ -22,9 +23,16 @@ using Json = nlohmann::ordered_json;
 
 constexpr int kTimedCameras = 3, kTimedRepeats = 3;
 
-std::uint64_t BytesOf(const DtrSet& set, const fs::path& folder) {
-  std::uint64_t bytes = fs::file_size(folder / "set.json");
-  if (set.sparse_file) bytes += set.sparse_file->bytes;
+/// Room for what set.json says of the pruning; it is written when all is decided.
+constexpr std::uint64_t kMostBytesOfReport = 16384;
+
+/// What is in no view's files.
+std::uint64_t OtherBytesOf(const DtrSet& set, const fs::path& folder) {
+  return fs::file_size(folder / "set.json") + (set.sparse_file ? set.sparse_file->bytes : 0);
+}
+
+std::uint64_t BytesOfViews(const DtrSet& set) {
+  std::uint64_t bytes = 0;
   for (const View& view : set.frames.front().views) {
     if (view.role != ViewRole::kSource) continue;
     for (const auto* file :
@@ -33,6 +41,10 @@ std::uint64_t BytesOf(const DtrSet& set, const fs::path& folder) {
     }
   }
   return bytes;
+}
+
+std::uint64_t BytesOf(const DtrSet& set, const fs::path& folder) {
+  return OtherBytesOf(set, folder) + BytesOfViews(set);
 }
 
 DtrSet LoadForPruning(const PruneSetOptions& options, Progress& progress) {
@@ -54,7 +66,7 @@ DtrSet LoadForPruning(const PruneSetOptions& options, Progress& progress) {
   return set;
 }
 
-/// Everything that decides the bytes.
+/// What measurements depend on; what is allowed and what is enough may be others when it goes on.
 std::string Fingerprint(const PruneSetOptions& options, const DtrSet& set) {
   auto held_out = Json::array();
   for (const View& view : set.frames.front().views) {
@@ -64,10 +76,10 @@ std::string Fingerprint(const PruneSetOptions& options, const DtrSet& set) {
   return Json{{"tool_version", DTR_VERSION},
               {"set_sha256", Sha256OfFile(options.set / "set.json")},
               {"held_out", held_out},
-              {"max_loss_db", prune.max_loss_db},
               {"probes", prune.probes},
               {"checks", prune.checks},
               {"probe_crop", prune.probe_crop},
+              {"renderer", options.renderer},
               {"render", options.arguments_of(prune.render)},
               {"seed", prune.seed}}
       .dump();
@@ -91,7 +103,9 @@ Json PrunedJson(const PruneSetOptions& options, const PruneSetReport& report) {
   return {{"max_loss_db", options.prune.max_loss_db},
           {"loss_db", pruned.loss_db()},
           {"probe_loss_db", pruned.checked_probe_loss_db},
+          {"probe_error_db", pruned.probe_error_db},
           {"witness_loss_db", pruned.witness_loss_db},
+          {"witness_error_db", pruned.witness_error_db},
           {"decided_loss_db", pruned.decided_loss_db},
           {"psnr_before_db", pruned.error_db},
           {"probes", options.prune.probes},
@@ -162,6 +176,43 @@ eval::Times FrameOf(const DtrSet& set, const std::vector<NovelCamera>& cameras,
   return eval::TimesOf(ms);
 }
 
+/// Measured once: a run that goes on has the same goal.
+eval::Times FrameBefore(const PruneSetOptions& options, const DtrSet& set,
+                        const std::vector<NovelCamera>& cameras, PruneJournal& journal) {
+  const std::string name = "frame before";
+  auto times = journal.Find(name);
+  if (!times) {
+    RenderOptions render = options.prune.render;
+    render.threads = options.threads;
+    const eval::Times measured = FrameOf(set, cameras, render, *options.make_timed_renderer());
+    times = {measured.median_ms, measured.spread_ms};
+    journal.Add(name, *times);
+  }
+  eval::Times frame;
+  frame.median_ms = (*times)[0];
+  frame.spread_ms = (*times)[1];
+  return frame;
+}
+
+void ExpectGoalsReached(const PruneSetOptions& options, const DtrSet& pruned,
+                        const PruneSetReport& report) {
+  const auto refuse = [&](const std::string& expected, const std::string& found) {
+    throw Error(
+        fmt::format("{}: expected {} within a loss of {:g} dB, found {}; allow more by "
+                    "--max-loss-db",
+                    options.output.string(), expected, options.prune.max_loss_db, found));
+  };
+  const std::uint64_t bytes =
+      OtherBytesOf(pruned, options.set) + kMostBytesOfReport + BytesOfViews(pruned);
+  if (options.max_bytes && bytes > *options.max_bytes) {
+    refuse(fmt::format("at most {} bytes", *options.max_bytes), fmt::format("{}", bytes));
+  }
+  if (options.frame_ms && report.frame_after.median_ms > *options.frame_ms) {
+    refuse(fmt::format("frames of at most {:g} ms", *options.frame_ms),
+           fmt::format("{:.1f} ms", report.frame_after.median_ms));
+  }
+}
+
 Json ReportJson(const PruneSetOptions& options, const PruneSetReport& report) {
   Json json = {{"set", options.output.string()}};
   json.update(PrunedJson(options, report));
@@ -186,9 +237,17 @@ PruneSetReport PruneSet(const PruneSetOptions& options, Progress& progress) {
   io::SetWriter writer(options.output, Fingerprint(options, set), options.force);
   prune::PruneOptions prune = options.prune;
   prune.render.threads = options.threads;
+  prune.other_bytes = static_cast<double>(OtherBytesOf(set, options.set) + kMostBytesOfReport);
+  PruneJournal journal(writer.work_folder() / "measured.jsonl");
+  prune.journal = &journal;
+  const auto cameras = prune::DrawProbes(set, kTimedCameras, prune.seed);
+  PruneSetReport report;
+  report.frame_before = FrameBefore(options, set, cameras, journal);
+  if (options.max_bytes) prune.enough_bytes = static_cast<double>(*options.max_bytes);
+  if (options.frame_ms)
+    prune.enough_frame_share = *options.frame_ms / report.frame_before.median_ms;
   const ViewCoder coder(set, options.set, writer.work_folder() / "trial", prune.render,
                         options.threads);
-  PruneSetReport report;
   report.pruned = prune::Prune(
       set, prune, [&](const prune::Coding& coding) { return coder.Try(coding); },
       options.make_renderer, progress);
@@ -199,11 +258,6 @@ PruneSetReport PruneSet(const PruneSetOptions& options, Progress& progress) {
   DtrSet pruned = WritePruned(options, set, coder, setting, writer, progress);
   io::SetPrunedJson(pruned, PrunedJson(options, report).dump());
   log.Begin("timing");
-  const auto cameras = prune::DrawProbes(set, kTimedCameras, prune.seed);
-  {
-    const auto renderer = options.make_timed_renderer();
-    report.frame_before = FrameOf(set, cameras, prune.render, *renderer);
-  }
   {
     DtrSet loaded = pruned;
     io::LoadOptions load;
@@ -214,6 +268,7 @@ PruneSetReport PruneSet(const PruneSetOptions& options, Progress& progress) {
     const auto renderer = options.make_timed_renderer();
     report.frame_after = FrameOf(loaded, cameras, setting.render, *renderer);
   }
+  ExpectGoalsReached(options, pruned, report);
   log.End();
   io::RunRecord record = log.Record(ResolveThreads(options.threads));
   record.extra_json = Json{{"frame_before_ms", report.frame_before.median_ms},

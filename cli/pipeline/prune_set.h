@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,11 +17,15 @@ namespace dtr::pipeline {
 struct PruneSetOptions {
   std::filesystem::path set, output;
   prune::PruneOptions prune;
+  /// Goals: leaving out ends when they are reached, and it is an Error where they are not.
+  std::optional<std::uint64_t> max_bytes;
+  std::optional<double> frame_ms;  ///< as frame_after is measured
   bool force = false;
   int threads = 0;
   /// Command-line arguments that give these options: what the pruned set keeps as its defaults.
   std::function<std::vector<std::string>(const RenderOptions&)> arguments_of;
   prune::RendererMaker make_renderer;
+  std::string renderer;  ///< its name
   std::function<std::unique_ptr<eval::TimedRenderer>()> make_timed_renderer;
 };
 
@@ -34,7 +39,7 @@ struct PruneSetReport {
 
 /// Writes `output`; `set` is only read. Nothing of `output` exists until it is whole. Throws
 /// UsageError where `output` is there already (and `force` is off), Error for sets of several
-/// instants and of views without depth.
+/// instants and of views without depth, and where the loss does not allow to reach a goal.
 PruneSetReport PruneSet(const PruneSetOptions& options, Progress& progress);
 
 }  // namespace dtr::pipeline

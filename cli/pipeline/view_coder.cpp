@@ -26,6 +26,11 @@ bool IsCoarser(const View& view, double error) {
          InverseDepthCode(view.near_z, view.far_z, format.steps).step() >= error;
 }
 
+/// True where image, mask and depth are as they were before they are coded.
+bool KeepsPixels(const View& view, const prune::Coding& coding) {
+  return coding.shrink == 1 && coding.TilesOf(view) == nullptr;
+}
+
 }  // namespace
 
 ViewCoder::ViewCoder(const DtrSet& original, fs::path folder, fs::path trial_folder,
@@ -39,8 +44,10 @@ ViewCoder::ViewCoder(const DtrSet& original, fs::path folder, fs::path trial_fol
 }
 
 View ViewCoder::Recoded(const View& view, const prune::Coding& coding) const {
-  View recoded = coding.shrink > 1 ? prune::ShrunkView(view, coding.shrink) : view;
-  if (!coding.sigma || coding.shrink > 1) recoded.sigma_file.reset();
+  const auto* tiles = coding.TilesOf(view);
+  View recoded = tiles != nullptr ? prune::WithoutTiles(view, *tiles) : view;
+  if (coding.shrink > 1) recoded = prune::ShrunkView(recoded, coding.shrink);
+  if (!coding.sigma || !KeepsPixels(view, coding)) recoded.sigma_file.reset();
   recoded.inverse_depth_sigma.reset();
   if (coding.depth_error_px > 0) {
     const double error = coding.depth_error_px * ThresholdsOf(view, {}).pixel;
@@ -55,7 +62,58 @@ StoredMesh ViewCoder::MeshOf(const View& stored, const prune::Coding& coding) co
   plain.mesh.reset();
   RenderOptions options = render_;
   options.mesh_tolerance_px = coding.mesh_tolerance_px;
+  options.resolution = coding.mesh_resolution;
   return MakeStoredMesh(plain, options, 1);
+}
+
+std::uint64_t ViewCoder::TryView(View& view, const View& before,
+                                 const prune::Coding& coding) const {
+  view = Recoded(before, coding);
+  const bool same_pixels = KeepsPixels(before, coding);
+  const auto stored_as = [&](const std::string& name, const auto& write, const auto& read) {
+    const fs::path file = trial_folder_ / (view.id + name);
+    write(file);
+    read(file);
+    const std::uint64_t bytes = fs::file_size(file);
+    fs::remove(file);
+    return bytes;
+  };
+  std::uint64_t bytes = BytesOf(view.sigma_file);
+  if (coding.jpeg_quality > 0 || !same_pixels) {
+    bytes += stored_as(
+        coding.jpeg_quality > 0 ? ".jpg" : ".png",
+        [&](const fs::path& file) {
+          io::WriteImage(file, view.image, std::max(1, coding.jpeg_quality));
+        },
+        [&](const fs::path& file) { view.image = io::ReadImage(file); });
+  } else {
+    bytes += BytesOf(before.image_file);
+  }
+  if (!same_pixels && !view.mask.empty()) {
+    bytes += stored_as(
+        "-mask.png", [&](const fs::path& file) { io::WriteMask(file, view.mask); },
+        [](const fs::path&) {});
+  } else {
+    bytes += BytesOf(before.mask_file);
+  }
+  const bool same_depth = view.depth_coding == before.depth_coding &&
+                          view.depth_steps == before.depth_steps && same_pixels;
+  if (!same_depth) {
+    const io::DepthFormat format = io::FormatOf(view, original_.unit);
+    bytes += stored_as(
+        "-depth" + std::string(io::ExtensionOf(format.coding)),
+        [&](const fs::path& file) { io::WriteDepth(file, view.depth, format); },
+        [&](const fs::path& file) {
+          view.depth = io::ReadDepth(file, format, view.depth.width(), view.depth.height());
+        });
+  } else {
+    bytes += BytesOf(before.depth_file);
+  }
+  const bool same_mesh = same_depth && before.mesh &&
+                         coding.mesh_tolerance_px == render_.mesh_tolerance_px &&
+                         coding.mesh_resolution == render_.resolution;
+  if (!same_mesh) view.mesh = MeshOf(view, coding);
+  return bytes + (same_mesh ? BytesOf(before.mesh_file) : BytesOf(*view.mesh));
 }
 
 prune::CodedSet ViewCoder::Try(const prune::Coding& coding) const {
@@ -63,38 +121,9 @@ prune::CodedSet ViewCoder::Try(const prune::Coding& coding) const {
   std::vector<View>& views = coded.set.frames.front().views;
   coded.bytes.assign(views.size(), 0);
   ParallelFor(0, static_cast<int>(views.size()), threads_, [&](int i) {
-    View& view = views[static_cast<size_t>(i)];
-    if (view.role != ViewRole::kSource) return;
-    const View& before = original_.frames.front().views[static_cast<size_t>(i)];
-    view = Recoded(before, coding);
-    std::uint64_t& bytes = coded.bytes[static_cast<size_t>(i)];
-    const bool same_size = coding.shrink == 1;
-    if (coding.jpeg_quality > 0 || !same_size) {
-      const fs::path file = trial_folder_ / (view.id + (coding.jpeg_quality > 0 ? ".jpg" : ".png"));
-      io::WriteImage(file, view.image, std::max(1, coding.jpeg_quality));
-      view.image = io::ReadImage(file);
-      bytes += fs::file_size(file);
-      fs::remove(file);
-    } else {
-      bytes += BytesOf(before.image_file);
-    }
-    const bool same_depth = view.depth_coding == before.depth_coding &&
-                            view.depth_steps == before.depth_steps && same_size;
-    if (!same_depth) {
-      const io::DepthFormat format = io::FormatOf(view, original_.unit);
-      const fs::path file = trial_folder_ / (view.id + "-depth" + io::ExtensionOf(format.coding));
-      io::WriteDepth(file, view.depth, format);
-      view.depth = io::ReadDepth(file, format, view.depth.width(), view.depth.height());
-      bytes += fs::file_size(file);
-      fs::remove(file);
-    } else {
-      bytes += BytesOf(before.depth_file);
-    }
-    bytes += BytesOf(before.mask_file) + BytesOf(view.sigma_file);
-    const bool same_mesh =
-        same_depth && before.mesh && coding.mesh_tolerance_px == render_.mesh_tolerance_px;
-    if (!same_mesh) view.mesh = MeshOf(view, coding);
-    bytes += same_mesh ? BytesOf(before.mesh_file) : BytesOf(*view.mesh);
+    const auto k = static_cast<size_t>(i);
+    if (views[k].role != ViewRole::kSource) return;
+    coded.bytes[k] = TryView(views[k], original_.frames.front().views[k], coding);
   });
   return coded;
 }
@@ -104,14 +133,14 @@ View ViewCoder::Write(const View& view, const prune::Coding& coding, io::SetWrit
   View copied = view;  // entries of the files that stay as they are
   copied.mesh_file.reset();
   copied.sigma_file = recoded.sigma_file;
-  const bool same_size = coding.shrink == 1;
+  const bool same_pixels = KeepsPixels(view, coding);
   const bool same_depth = recoded.depth_coding == view.depth_coding &&
-                          recoded.depth_steps == view.depth_steps && same_size;
-  if (coding.jpeg_quality > 0 || !same_size) copied.image_file.reset();
-  if (!same_size) copied.mask_file.reset();
+                          recoded.depth_steps == view.depth_steps && same_pixels;
+  if (coding.jpeg_quality > 0 || !same_pixels) copied.image_file.reset();
+  if (!same_pixels) copied.mask_file.reset();
   if (!same_depth) copied.depth_file.reset();
   writer.CopyFiles(folder_, copied);
-  if (!same_size) {
+  if (!same_pixels) {
     View pixels = recoded;
     if (coding.jpeg_quality > 0) pixels.image = {};
     writer.WriteView(pixels, original_.unit);

@@ -1,5 +1,6 @@
 // cli/pipeline/view_coder.h -- a set's views in another coding, tried and written.
 #pragma once
+#include <cstdint>
 #include <filesystem>
 
 #include "dtr/io/set_io.h"
@@ -24,6 +25,8 @@ class ViewCoder {
 
  private:
   View Recoded(const View& view, const prune::Coding& coding) const;
+  /// Puts there what a reader would get of `before`; its bytes.
+  std::uint64_t TryView(View& view, const View& before, const prune::Coding& coding) const;
   StoredMesh MeshOf(const View& stored, const prune::Coding& coding) const;
 
   const DtrSet& original_;

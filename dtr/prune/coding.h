@@ -5,17 +5,25 @@
 #include <string>
 #include <vector>
 
+#include "dtr/prune/tiles.h"
 #include "dtr/types/dtr_set.h"
 
 namespace dtr::prune {
 
-/// Of all source views alike.
+/// Of all source views alike, but for the tiles.
 struct Coding {
   int jpeg_quality = 0;            ///< of images; 0: as they are
   double depth_error_px = 0;       ///< bound in pixels of disparity; 0: as it is
   int shrink = 1;                  ///< images and depth maps are 1/shrink of their size per axis
   double mesh_tolerance_px = 0.5;  ///< of the reduced meshes beside them
+  int mesh_resolution = 1;         ///< these are of every so many samples per axis
   bool sigma = true;               ///< false: no standard deviations
+  TilesLeftOut tiles;
+  /// The tiles of one view; null: it keeps all.
+  const std::vector<std::uint8_t>* TilesOf(const View& view) const {
+    const auto found = tiles.find(view.id);
+    return found == tiles.end() ? nullptr : &found->second;
+  }
   bool operator==(const Coding&) const = default;
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "dtr/eval/metrics.h"
 
@@ -31,14 +32,25 @@ std::vector<Place> HeldOutPlaces(const DtrSet& set) {
 
 namespace {
 
-Grid<std::uint8_t> Window(const Grid<std::uint8_t>& image, int x, int y, int width, int height) {
-  Grid<std::uint8_t> window(width, height, image.channels());
-  for (int j = 0; j < height; ++j) {
-    std::copy_n(image.row(y + j) + static_cast<std::ptrdiff_t>(x) * image.channels(),
-                static_cast<std::ptrdiff_t>(width) * image.channels(), window.row(j));
+/// A part of a picture: the n-th of crop x crop, over and over.
+struct WindowOf {
+  WindowOf(const PinholeCamera& whole, int n, int crop)
+      : width(std::max(1, whole.width_px() / crop)),
+        height(std::max(1, whole.height_px() / crop)),
+        x(std::min(n % (crop * crop) % crop * width, whole.width_px() - width)),
+        y(std::min(n % (crop * crop) / crop * height, whole.height_px() - height)),
+        camera(width, height, whole.fx_px(), whole.fy_px(), whole.cx_px() - x, whole.cy_px() - y) {}
+  Grid<std::uint8_t> Of(const Grid<std::uint8_t>& image) const {
+    Grid<std::uint8_t> window(width, height, image.channels());
+    for (int j = 0; j < height; ++j) {
+      std::copy_n(image.row(y + j) + static_cast<std::ptrdiff_t>(x) * image.channels(),
+                  static_cast<std::ptrdiff_t>(width) * image.channels(), window.row(j));
+    }
+    return window;
   }
-  return window;
-}
+  int width, height, x, y;
+  PinholeCamera camera;
+};
 
 std::vector<std::string> IdsAt(const View& place, const DtrSet& set) {
   std::vector<std::string> ids;
@@ -60,17 +72,10 @@ std::vector<Place> LeftOutPlaces(const DtrSet& set, int count, int crop) {
   std::vector<Place> places;
   for (size_t i = 0; i < n; ++i) {
     const View& view = *scene.views[i * views / n];
-    const auto cell = static_cast<int>(i) % (crop * crop);
-    const PinholeCamera& camera = view.camera;
-    const int width = std::max(1, camera.width_px() / crop);
-    const int height = std::max(1, camera.height_px() / crop);
-    const int x = std::min(cell % crop * width, camera.width_px() - width);
-    const int y = std::min(cell / crop * height, camera.height_px() - height);
-    const PinholeCamera window(width, height, camera.fx_px(), camera.fy_px(), camera.cx_px() - x,
-                               camera.cy_px() - y);
-    places.push_back({{window, view.cam_from_world},
-                      Window(view.image, x, y, width, height),
-                      view.mask.empty() ? Mask() : Window(view.mask, x, y, width, height),
+    const WindowOf window(view.camera, static_cast<int>(i), crop);
+    places.push_back({{window.camera, view.cam_from_world},
+                      window.Of(view.image),
+                      view.mask.empty() ? Mask() : window.Of(view.mask),
                       IdsAt(view, set)});
   }
   return places;
@@ -90,6 +95,13 @@ std::vector<Place> WitnessPlaces(const DtrSet& set, std::span<const Place> decid
   std::vector<Place> witnesses;
   for (size_t i = 0; i < n; ++i) witnesses.push_back(std::move(others[i * others.size() / n]));
   return witnesses;
+}
+
+std::vector<NovelCamera> Windows(std::vector<NovelCamera> cameras, int crop) {
+  for (size_t i = 0; i < cameras.size(); ++i) {
+    cameras[i].camera = WindowOf(cameras[i].camera, static_cast<int>(i), crop).camera;
+  }
+  return cameras;
 }
 
 std::vector<Place> NovelPlaces(std::vector<NovelCamera> cameras) {
@@ -122,6 +134,7 @@ double Errors::NewErrorShare() const {
 Errors CompareWithPhotos(std::span<const Place> places, std::span<const ImageRgb8> before,
                          std::span<const ImageRgb8> after) {
   Errors errors;
+  std::vector<double> losses_db;
   long long samples = 0;
   for (size_t i = 0; i < places.size(); ++i) {
     const Place& place = places[i];
@@ -131,25 +144,39 @@ Errors CompareWithPhotos(std::span<const Place> places, std::span<const ImageRgb
     errors.after += is.sum;
     errors.change += eval::CompareSquared(before[i], after[i], place.mask).sum;
     samples += was.samples;
-    errors.psnr_loss_db += PsnrDb(MeanOf(was)) - PsnrDb(MeanOf(is));
+    losses_db.push_back(PsnrDb(MeanOf(was)) - PsnrDb(MeanOf(is)));
   }
   const double count = std::max(1.0, static_cast<double>(samples));
   errors.before = std::max(errors.before / count, kSmallestError);
   errors.after = std::max(errors.after / count, kSmallestError);
   errors.change /= count;
-  errors.psnr_loss_db /= std::max(1.0, static_cast<double>(places.size()));
+  errors.psnr_loss_db = MeanOf(losses_db);
+  errors.psnr_loss_error_db = StandardError(losses_db);
   return errors;
 }
 
-double LossDb(std::span<const ImageRgb8> before, std::span<const ImageRgb8> after,
-              const Errors& where_photos_are) {
+double MeanOf(std::span<const double> values) {
+  const double sum = std::accumulate(values.begin(), values.end(), 0.0);
+  return values.empty() ? 0 : sum / static_cast<double>(values.size());
+}
+
+double StandardError(std::span<const double> values) {
+  if (values.size() < 2) return 0;
+  const double mean = MeanOf(values), count = static_cast<double>(values.size());
+  double squared = 0;
+  for (const double value : values) squared += (value - mean) * (value - mean);
+  return std::sqrt(squared / (count - 1) / count);
+}
+
+std::vector<double> LossesDb(std::span<const ImageRgb8> before, std::span<const ImageRgb8> after,
+                             const Errors& where_photos_are) {
   const double share = where_photos_are.NewErrorShare() / where_photos_are.before;
-  double sum_db = 0;
+  std::vector<double> losses_db;
   for (size_t i = 0; i < before.size(); ++i) {
     const double difference = MeanOf(eval::CompareSquared(before[i], after[i], {}));
-    sum_db += 10 * std::log10(1 + share * difference);
+    losses_db.push_back(10 * std::log10(1 + share * difference));
   }
-  return before.empty() ? 0 : sum_db / static_cast<double>(before.size());
+  return losses_db;
 }
 
 }  // namespace dtr::prune

@@ -34,6 +34,8 @@ std::vector<Place> LeftOutPlaces(const DtrSet& set, int count, int crop);
 /// `count` of the source views that are not among `deciding`, spread as above, their photos whole;
 /// where all decide, of all.
 std::vector<Place> WitnessPlaces(const DtrSet& set, std::span<const Place> deciding, int count);
+/// Of each camera a window of 1/crop of its picture per axis, at another part each time.
+std::vector<NovelCamera> Windows(std::vector<NovelCamera> cameras, int crop);
 /// Places without photos.
 std::vector<Place> NovelPlaces(std::vector<NovelCamera> cameras);
 
@@ -45,21 +47,25 @@ std::vector<ImageRgb8> Pictures(const DtrSet& set, std::span<const std::string> 
 
 /// Mean squared differences of 8-bit values over all usable pixels of all places with photos.
 struct Errors {
-  double before = 0, after = 0;  ///< of pictures against photos
-  double change = 0;             ///< of pictures after against those before
-  double psnr_loss_db = 0;       ///< mean over places of PSNR before - PSNR after
+  double before = 0, after = 0;   ///< of pictures against photos
+  double change = 0;              ///< of pictures after against those before
+  double psnr_loss_db = 0;        ///< mean over places of PSNR before - PSNR after
+  double psnr_loss_error_db = 0;  ///< of that mean: StandardError
   /// Of a change of a picture's pixels, the part that is new error: (after - before) / change. 1
   /// where it is independent of what was wrong already, 0 where it puts one error in the place of
   /// another. At least kLeastShare: what is unseen from here may show elsewhere.
   double NewErrorShare() const;
 };
-inline constexpr double kLeastShare = 0.1;
+inline constexpr double kLeastShare = 1;
+/// Of the mean of `values`, by their spread; 0 for fewer than two.
+double StandardError(std::span<const double> values);
 Errors CompareWithPhotos(std::span<const Place> places, std::span<const ImageRgb8> before,
                          std::span<const ImageRgb8> after);
 
-/// What a change means from places that have no photo, mean in dB: 10 log10(1 + share D / E), D the
-/// mean squared difference of a picture after and before, E and share from where photos are.
-double LossDb(std::span<const ImageRgb8> before, std::span<const ImageRgb8> after,
-              const Errors& where_photos_are);
+/// What a change means from places that have no photo, in dB for each: 10 log10(1 + share D / E), D
+/// the mean squared difference of a picture after and before, E and share from where photos are.
+std::vector<double> LossesDb(std::span<const ImageRgb8> before, std::span<const ImageRgb8> after,
+                             const Errors& where_photos_are);
+double MeanOf(std::span<const double> values);  ///< 0 for none
 
 }  // namespace dtr::prune

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "tests/cli/run_dtr.h"
@@ -24,13 +25,20 @@ class Pruning : public ::testing::Test {
   }
   std::vector<std::string> Arguments(const std::string& output,
                                      const std::string& threads = "2") const {
-    return {"prune",      (folder_ / "set.dtr").string(),
-            "-o",         (folder_ / output).string(),
-            "--max-loss-db", "1",
-            "--probes",   "3",
-            "--checks",   "2",
-            "--renderer", "cpu",
-            "--threads",  threads};
+    return {"prune",
+            (folder_ / "set.dtr").string(),
+            "-o",
+            (folder_ / output).string(),
+            "--max-loss-db",
+            "1",
+            "--probes",
+            "3",
+            "--checks",
+            "2",
+            "--renderer",
+            "cpu",
+            "--threads",
+            threads};
   }
   TemporaryFolder folder_;
 };
@@ -49,11 +57,11 @@ TEST_F(Pruning, KeepsItsPromiseSaysWhatItDidAndIsAnOrdinarySet) {
   // The promise, measured by another command: held-out photos, at the set's own settings.
   const std::string set = (folder_ / "set.dtr").string(), small = (folder_ / "small.dtr").string();
   const auto psnr_of = [&](const std::string& which) {
-    return Json::parse(DtrOk({"evaluate", which, "--renderer", "cpu", "--json", "-"}).out)["mean"]
-                      ["psnr_db"]
-                          .get<double>();
+    return Json::parse(DtrOk({"evaluate", which, "--renderer", "cpu", "--json", "-"})
+                           .out)["mean"]["psnr_db"]
+        .get<double>();
   };
-  EXPECT_LE(psnr_of(set) - psnr_of(small), 1.0);
+  EXPECT_LE(psnr_of(set) - psnr_of(small), 1.0) << report.dump(1);
 
   const Ran info = DtrOk({"info", small, "--verify", "--json", (folder_ / "info.json").string()});
   EXPECT_THAT(info.out, HasSubstr("left out by dtr prune"));
@@ -64,9 +72,8 @@ TEST_F(Pruning, KeepsItsPromiseSaysWhatItDidAndIsAnOrdinarySet) {
 
   // What the set was pruned for is the default, and can be overridden.
   const auto picture = [&](const std::string& name, std::vector<std::string> more) {
-    std::vector<std::string> render = {"render", small,  "--renderer",
-                                       "cpu",    "--like", "0000",
-                                       "-o",     (folder_ / name).string()};
+    std::vector<std::string> render = {"render", small,  "--renderer", "cpu",
+                                       "--like", "0000", "-o",         (folder_ / name).string()};
     render.insert(render.end(), more.begin(), more.end());
     DtrOk(render);
     return Text(folder_ / name);
@@ -74,7 +81,8 @@ TEST_F(Pruning, KeepsItsPromiseSaysWhatItDidAndIsAnOrdinarySet) {
   const auto stored = report["render_arguments"].get<std::vector<std::string>>();
   ASSERT_FALSE(stored.empty()) << "a loss of 1 dB allows fewer views a pixel";
   EXPECT_EQ(picture("default.png", {}), picture("explicit.png", stored));
-  EXPECT_NE(picture("default.png", {}), picture("other.png", {"--views", "1", "--resolution", "4"}));
+  EXPECT_NE(picture("default.png", {}),
+            picture("other.png", {"--views", "1", "--resolution", "4"}));
 
   // Again: what is pruned can be pruned, written over only when asked, and exported.
   ExpectRefused(Dtr(Arguments("small.dtr")), 2, "pass --force to replace it");
@@ -92,6 +100,43 @@ TEST_F(Pruning, GivesTheSameBytesForAnyNumberOfThreadsAndAfterAnInterruption) {
   DtrOk(Arguments("two.dtr"));
   EXPECT_THAT(DifferingFiles(Contents(folder_ / "one.dtr"), Contents(folder_ / "two.dtr")),
               IsEmpty());
+}
+
+TEST_F(Pruning, RefusesAGoalThatTheLossDoesNotAllow) {
+  const std::string set = (folder_ / "set.dtr").string();
+  const std::vector<std::string> prune = {
+      "prune", set,          "-o", (folder_ / "x.dtr").string(), "--probes", "2", "--checks",
+      "1",     "--renderer", "cpu"};
+  const auto with = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), prune.begin(), prune.end());
+    return Dtr(more);
+  };
+  ExpectRefused(with({"--max-bytes", "1000"}), 1,
+                "expected at most 1000 bytes within a loss of 0.1 dB, found");
+  EXPECT_FALSE(fs::exists(folder_ / "x.dtr"));
+  // What was measured for one goal serves the next.
+  ExpectRefused(with({"--frame-ms", "0.001"}), 1, "expected frames of at most");
+  // One that is reached at once by what nobody sees ends the rest.
+  std::uint64_t bytes = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(set)) {
+    if (entry.is_regular_file()) bytes += entry.file_size();
+  }
+  DtrOk([&] {
+    auto arguments = prune;
+    arguments.insert(arguments.end(), {"--max-bytes", std::to_string(2 * bytes), "--json",
+                                       (folder_ / "x.json").string()});
+    return arguments;
+  }());
+  EXPECT_LE(Json::parse(Text(folder_ / "x.json"))["removed"].size(), 1u);
+}
+
+TEST_F(Pruning, RefusesMeasurementsThatAreNone) {
+  std::vector<std::string> arguments = Arguments("cut.dtr");
+  const fs::path journal = folder_ / "cut.dtr.partial/work/measured.jsonl";
+  (void)Dtr(arguments, {SIGINT, [&] { return fs::exists(journal) && fs::file_size(journal) > 0; }});
+  ASSERT_TRUE(fs::exists(journal));
+  std::ofstream(journal, std::ios::app) << "no measurement\n";
+  ExpectRefused(Dtr(arguments), 1, "expected measurements of dtr prune, found");
 }
 
 TEST_F(Pruning, RefusesASetWithoutDepth) {

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "datasets/exact/analytic_scene.h"
 #include "dtr/base/error.h"
@@ -141,8 +142,15 @@ TEST(Errors, TellNewErrorFromOneThatTakesAnothersPlace) {
   EXPECT_EQ(worse.NewErrorShare(), 27.0 / 9);
   // From a place without a photo: a difference of 9, three times that is new error, on top of 9.
   const std::vector<ImageRgb8> a = {before[0], before[0]}, b = {before[0], ImageRgb8(4, 4, 3, 106)};
-  EXPECT_EQ(LossDb(a, a, worse), 0);
-  EXPECT_NEAR(LossDb(a, b, worse), 0.5 * 10 * std::log10(4.0), 1e-12);
+  EXPECT_EQ(MeanOf(LossesDb(a, a, worse)), 0);
+  const std::vector<double> losses_db = LossesDb(a, b, worse);
+  EXPECT_NEAR(MeanOf(losses_db), 0.5 * 10 * std::log10(4.0), 1e-12);
+  // Two values x and 0 have the standard deviation x / sqrt(2), their mean x / 2.
+  EXPECT_NEAR(StandardError(losses_db), 0.5 * 10 * std::log10(4.0), 1e-12);
+  EXPECT_EQ(StandardError(std::span(losses_db).first(1)), 0);
+  const Check lucky{0.05, 0.06, 0.01, 0.02, std::nullopt, 30};
+  EXPECT_FALSE(lucky.Holds(0.1));
+  EXPECT_TRUE(lucky.Holds(0.12));
 }
 
 TEST(Prune, AllowedNoLossLeavesOutOnlyWhatNobodySees) {
@@ -225,6 +233,116 @@ TEST(Prune, DecidesTheSameForAnyNumberOfThreads) {
   EXPECT_EQ(one.setting.without, three.setting.without);
   EXPECT_EQ(one.setting.coding, three.setting.coding);
   EXPECT_EQ(one.loss_db(), three.loss_db());
+}
+
+/// Keeps numbers in memory; stands for a run that is killed after so many new ones.
+class Notes : public Journal {
+ public:
+  explicit Notes(int left) : left_(left) {}
+  std::optional<std::vector<double>> Find(const std::string& name) const override {
+    const auto found = numbers.find(name);
+    return found == numbers.end() ? std::nullopt : std::optional(found->second);
+  }
+  void Add(const std::string& name, const std::vector<double>& added) override {
+    if (left_-- == 0) throw Error("killed");
+    EXPECT_TRUE(numbers.emplace(name, added).second) << name << " measured twice";
+  }
+  void Allow(int more) { left_ = more; }
+  std::map<std::string, std::vector<double>> numbers;
+
+ private:
+  int left_;
+};
+
+TEST(Prune, EveryCauseOfLossIsLogged) {
+  DtrSet set = Row(6);
+  for (View& view : set.frames[0].views) view.sigma_file = StoredFile{"s", "", 5000};
+  const PruneOptions options = SmallOptions(100);  // everything goes, and nothing is put back
+  const PruneReport report = PruneWith(set, options);
+  std::map<std::string, int> logged;
+  for (const Removal& removal : report.removed) ++logged[removal.kind];
+  const Setting& setting = report.setting;
+  const Coding usual;
+  EXPECT_EQ(logged["sigma"] > 0, !setting.coding.sigma);
+  EXPECT_EQ(static_cast<size_t>(logged["view"]), setting.without.size());
+  EXPECT_EQ(logged["views-used"] > 0, setting.render.views != options.render.views);
+  EXPECT_EQ(logged["resolution"] > 0, setting.render.resolution != options.render.resolution);
+  EXPECT_EQ(logged["images"] > 0, setting.coding.jpeg_quality != usual.jpeg_quality);
+  EXPECT_EQ(logged["depth"] > 0, setting.coding.depth_error_px != usual.depth_error_px);
+  EXPECT_EQ(logged["size"] > 0, setting.coding.shrink != usual.shrink);
+  EXPECT_EQ(logged["mesh"] > 0, setting.coding.mesh_tolerance_px != usual.mesh_tolerance_px);
+  if (!setting.coding.tiles.empty()) {
+    EXPECT_GT(logged["tiles"], 0);
+  }
+  // And nothing else is changed: with the logged fields put back, drawing is as it was.
+  RenderOptions render = setting.render;
+  render.views = options.render.views, render.resolution = options.render.resolution;
+  render.mesh_tolerance_px = options.render.mesh_tolerance_px;
+  EXPECT_EQ(render, options.render);
+  EXPECT_GE(logged.size(), 4u) << "too little was left out to tell anything";
+
+  // What the steps are said to have cost is what their sum costs.
+  ASSERT_THAT(report.put_back, IsEmpty());
+  double sum_db = 0;
+  for (const Removal& removal : report.removed) sum_db += removal.loss_db;
+  FakeStore store(set);
+  SilentProgress progress;
+  Mover mover(set, 1);
+  Notes notes(100);
+  const CodeFunction code = std::ref(store);
+  const RendererMaker make = [] { return &cpu::Render; };
+  Measurer measurer(
+      set, {options.probes, options.checks, options.probe_crop, options.seed, 0, options.render},
+      code, make, mover, notes, progress);
+  EXPECT_NEAR(measurer.Measure(setting).loss_db, sum_db, 1e-9);
+  EXPECT_NEAR(report.decided_loss_db, sum_db, 1e-12);
+}
+
+TEST(Prune, GoesOnFromWhatAnInterruptedRunMeasured) {
+  const DtrSet set = Row(5);
+  PruneOptions options = SmallOptions(1);
+  const PruneReport whole = PruneWith(set, options);
+  constexpr int kMany = 100000;
+  Notes notes(12);
+  options.journal = &notes;
+  EXPECT_THROW(PruneWith(set, options), Error);
+  EXPECT_EQ(notes.numbers.size(), 12u);
+  notes.Allow(kMany);
+  const PruneReport resumed = PruneWith(set, options);
+  EXPECT_EQ(resumed.setting.without, whole.setting.without);
+  EXPECT_EQ(resumed.setting.coding, whole.setting.coding);
+  EXPECT_EQ(resumed.setting.render, whole.setting.render);
+  EXPECT_EQ(resumed.loss_db(), whole.loss_db());
+  EXPECT_EQ(resumed.removed.size(), whole.removed.size());
+  // All of it again: nothing is drawn.
+  notes.Allow(0);
+  FakeStore store(set);
+  SilentProgress progress;
+  const PruneReport again = Prune(
+      set, options, std::ref(store), [] { return &cpu::Render; }, progress);
+  EXPECT_EQ(again.loss_db(), whole.loss_db());
+  EXPECT_EQ(store.calls, 0);
+}
+
+TEST(Prune, StopsWhereEnoughIsLeftOut) {
+  const DtrSet set = Row(5);
+  PruneOptions options = SmallOptions(20);
+  options.probes = options.checks = 2;
+  const size_t all = PruneWith(set, options).removed.size();
+  options.enough_bytes = 0.6 * 5 * 12000;
+  const PruneReport small = PruneWith(set, options);
+  double left = 1;
+  for (const Removal& removal : small.removed) {
+    EXPECT_GT(left, 0.6) << "one step more than was needed: " << removal.kind;
+    left *= 1 - removal.bytes_share;
+  }
+  EXPECT_LE(left, 0.6);
+  EXPECT_LT(small.removed.size(), all);
+  options.enough_bytes.reset();
+  options.enough_frame_share = 0.6;
+  left = 1;
+  for (const Removal& removal : PruneWith(set, options).removed) left *= 1 - removal.frame_share;
+  EXPECT_LE(left, 0.6);
 }
 
 TEST(Prune, RefusesOptionsWithoutAMeaning) {

@@ -1,0 +1,43 @@
+#include "cli/pipeline/prune_journal.h"
+
+#include <nlohmann/json.hpp>
+
+#include "dtr/base/error.h"
+
+namespace dtr::pipeline {
+
+using Json = nlohmann::json;
+
+PruneJournal::PruneJournal(const std::filesystem::path& file) : file_(file) {
+  std::uintmax_t whole = 0;
+  if (std::ifstream in(file); in) {
+    std::string line;
+    while (std::getline(in, line) && !in.eof()) {  // at its end: the line has none
+      try {
+        const Json entry = Json::parse(line);
+        known_[entry.at("name")] = entry.at("numbers").get<std::vector<double>>();
+      } catch (const Json::exception& error) {
+        throw Error(file.string() + ": expected measurements of dtr prune, found " + error.what() +
+                    "; delete the folder to start over");
+      }
+      whole += line.size() + 1;
+    }
+    in.close();
+    std::filesystem::resize_file(file, whole);
+  }
+  out_.open(file, std::ios::app);
+  if (!out_) throw Error(file.string() + ": cannot write");
+}
+
+std::optional<std::vector<double>> PruneJournal::Find(const std::string& name) const {
+  const auto found = known_.find(name);
+  return found == known_.end() ? std::nullopt : std::optional(found->second);
+}
+
+void PruneJournal::Add(const std::string& name, const std::vector<double>& numbers) {
+  known_[name] = numbers;
+  out_ << Json{{"name", name}, {"numbers", numbers}}.dump() << std::endl;
+  if (!out_) throw Error(file_.string() + ": cannot write");
+}
+
+}  // namespace dtr::pipeline

@@ -1,0 +1,108 @@
+// dtr/prune/measurer.h -- what settings lose and take, by drawing them.
+#pragma once
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "dtr/base/progress.h"
+#include "dtr/prune/judge.h"
+#include "dtr/prune/setting.h"
+
+namespace dtr::prune {
+
+/// Numbers by name, kept where an interrupted run finds them again.
+class Journal {
+ public:
+  virtual ~Journal() = default;
+  virtual std::optional<std::vector<double>> Find(const std::string& name) const = 0;
+  virtual void Add(const std::string& name, const std::vector<double>& numbers) = 0;
+};
+
+struct Measured {
+  double loss_db = 0;
+  double bytes = 0;
+  double frame = 0;  ///< Mover::FrameOf
+};
+
+/// What an outcome loses at places that decided nothing.
+struct Check {
+  double probe_loss_db = 0, probe_error_db = 0;  ///< mean over places, and its standard error
+  double witness_loss_db = 0, witness_error_db = 0;
+  std::optional<double> photo_loss_db;
+  double error_db = 0;  ///< PSNR of the witnesses' pictures before
+  /// Few places can be lucky: a loss is taken for as large as it may well be elsewhere.
+  bool Holds(double most_db) const {
+    return probe_loss_db + probe_error_db <= most_db &&
+           witness_loss_db + witness_error_db <= most_db;
+  }
+};
+
+struct MeasurerOptions {
+  int probes = 12, checks = 8, probe_crop = 2;
+  std::uint64_t seed = 0;
+  double other_bytes = 0;
+  RenderOptions render;  ///< of the set as it is before
+};
+
+class Measurer {
+ public:
+  /// All but the options must outlive this.
+  Measurer(const DtrSet& set, const MeasurerOptions& options, const CodeFunction& code,
+           const RendererMaker& make_renderer, const Mover& mover, Journal& journal,
+           Progress& progress)
+      : set_(set),
+        options_(options),
+        code_(code),
+        make_(make_renderer),
+        mover_(mover),
+        journal_(journal),
+        progress_(progress) {}
+
+  /// At the deciding places: the larger of the losses at photos and from novel cameras.
+  Measured Measure(const Setting& setting);
+  /// Without looking: for what no picture shows.
+  double BytesOf(const Setting& setting);
+  Check CheckOf(const Setting& setting);
+  /// Keeps this setting's set in memory: the next ones are tried beside it.
+  void Accept(const Setting& setting);
+  /// So many measurements were found in the journal before anything was drawn.
+  int found() const { return found_; }
+
+ private:
+  using Coded = std::shared_ptr<const CodedSet>;
+  struct Looks {
+    std::vector<Place> places;
+    std::vector<ImageRgb8> before;
+  };
+  /// From the journal, else by `measure`.
+  std::vector<double> Numbers(const std::string& name,
+                              const std::function<std::vector<double>()>& measure);
+  const eval::RenderFunction& RendererFor(const Coded& coded);
+  Coded CodedAs(const Coding& coding);
+  double BytesOf(const Setting& setting, const CodedSet& coded) const;
+  Errors AtPhotos(const std::string& what, const Looks& looks, Setting setting);
+  std::vector<double> NovelLossesDb(const Looks& looks, const Setting& setting,
+                                    const Errors& at_photos);
+  /// Pictures of the whole set, once they are needed.
+  void Prepare();
+  std::vector<ImageRgb8> PicturesOf(const Setting& setting, const Coded& coded, const Looks& looks);
+
+  const DtrSet& set_;
+  const MeasurerOptions options_;
+  const CodeFunction& code_;
+  const RendererMaker& make_;
+  const Mover& mover_;
+  Journal& journal_;
+  Progress& progress_;
+
+  bool prepared_ = false;
+  int found_ = 0;
+  Looks deciding_, deciding_novel_, checking_, witnesses_, photos_;
+  Coded current_, trial_, drawn_;
+  Coding current_coding_, trial_coding_;
+  eval::RenderFunction render_;
+};
+
+}  // namespace dtr::prune
