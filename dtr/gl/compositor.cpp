@@ -86,6 +86,14 @@ bool TopRowFirst() {
   return origin == GL_UPPER_LEFT;
 }
 
+/// Per axis the factor (x, y) and what is added (z, w); row 0 of the picture is its top row.
+Eigen::Vector4d TexelFromPixel(const DrawnPicture& picture, const Viewport& viewport) {
+  const double x = static_cast<double>(picture.width_px) / viewport.width;
+  const double y = static_cast<double>(picture.height_px) / viewport.height;
+  if (TopRowFirst()) return {x, y, -x * viewport.x, -y * viewport.y};
+  return {x, -y, -x * viewport.x, y * (viewport.y + viewport.height)};
+}
+
 void Bind(GLenum unit, GLuint texture) {
   glActiveTexture(GL_TEXTURE0 + unit);
   glBindTexture(GL_TEXTURE_2D_ARRAY, texture);
@@ -108,16 +116,17 @@ class Compositor::Implementation {
     const Viewport viewport = CurrentViewport();
     const auto [least, scale] = DeviceDepthRange();
     const CompositeGuard guard;
+    const bool packed = picture.texels != 0;
     const Uniforms set(programs_.Get(
-        {{GL_VERTEX_SHADER, "full_screen.vert"}, {GL_FRAGMENT_SHADER, "composite.frag"}}, {}));
-    set.Set("image", 0);
+        {{GL_VERTEX_SHADER, "full_screen.vert"}, {GL_FRAGMENT_SHADER, "composite.frag"}},
+        {packed ? "PACKED 1" : "PACKED 0"}));
+    set.Set(packed ? "texels" : "image", 0);
     set.Set("depth", 1);
-    set.Set("viewport", Eigen::Vector4d(viewport.x, viewport.y, viewport.width, viewport.height));
+    set.Set("texel_from_pixel", TexelFromPixel(picture, viewport));
     set.Set("mapping",
             Eigen::Vector4d(projection.at_infinity, projection.per_inverse_depth, least, scale));
     set.Set("clamps", glIsEnabled(GL_DEPTH_CLAMP) == GL_TRUE ? 1 : 0);
-    set.Set("top_first", TopRowFirst() ? 1 : 0);
-    Bind(0, picture.image);
+    Bind(0, packed ? picture.texels : picture.image);
     Bind(1, picture.depth);
     glBindVertexArray(empty_array_.name());
     glDrawArrays(GL_TRIANGLES, 0, 3);
@@ -144,7 +153,7 @@ class Compositor::Implementation {
     Bind(0, depth_.name());
     glTexSubImage3D(GL_TEXTURE_2D_ARRAY, 0, 0, 0, 0, width, height, 1, GL_RED, GL_FLOAT,
                     depth.data().data());
-    return {image_.name(), depth_.name(), 0, width, height, result.views_used, false};
+    return {image_.name(), depth_.name(), 0, 0, width, height, result.views_used, false};
   }
 
  private:

@@ -1,10 +1,12 @@
 #include "dtr/gl/processor_resolve.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <numbers>
 
 #include "dtr/base/parallel_for.h"
+#include "dtr/gl/read_back.h"
 #include "dtr/render/blend_weights.h"
 
 namespace dtr::gl {
@@ -93,14 +95,16 @@ bool ProcessorResolver::Draws(const Frame& frame) {
 }
 
 void ProcessorResolver::Draw(const Frame& frame, const Band& band, const SampledViews& sampled,
-                             const Targets& targets, const std::vector<float>& surface) {
+                             const std::vector<float>& surface) {
   std::vector<PixelView> views;
   for (size_t i = 0; i < frame.views.size(); ++i) {
     const View& view = *frame.views[i];
     views.push_back(PlaceView(view, frame.placements[i], frame.cut_factors[i], frame.options,
                               sampled.Of(view)));
   }
-  const auto width = static_cast<size_t>(targets.width);
+  width_px_ = frame.novel.width_px();
+  band_ = band;
+  const auto width = static_cast<size_t>(width_px_);
   const size_t pixels = width * static_cast<size_t>(band.count);
   image_.resize(pixels);
   depth_.resize(pixels);
@@ -113,24 +117,48 @@ void ProcessorResolver::Draw(const Frame& frame, const Band& band, const Sampled
     const int end = std::min((piece + 1) * kRowsTogether, band.count);
     for (int y = piece * kRowsTogether; y < end; ++y) {
       const size_t first = static_cast<size_t>(y) * width;
-      ResolvePixelRow({targets.width, static_cast<float>(1 / novel.fx_px()),
-                       static_cast<float>(1 / novel.fy_px()), static_cast<float>(novel.cx_px()),
-                       static_cast<float>(novel.cy_px()), static_cast<float>(band.first + y) + 0.5f,
-                       static_cast<float>(blend.pixel_angle_rad), blend.blend,
-                       static_cast<float>(blend.exponent), static_cast<float>(blend.falloff),
-                       static_cast<float>(blend.max_angle_rad), blend.blend_k, &surface[first],
-                       &image_[first], &depth_[first], &marks_[first]},
-                      views);
+      ResolvePixelRow(
+          {width_px_, static_cast<float>(1 / novel.fx_px()), static_cast<float>(1 / novel.fy_px()),
+           static_cast<float>(novel.cx_px()), static_cast<float>(novel.cy_px()),
+           static_cast<float>(band.first + y) + 0.5f, static_cast<float>(blend.pixel_angle_rad),
+           blend.blend, static_cast<float>(blend.exponent), static_cast<float>(blend.falloff),
+           static_cast<float>(blend.max_angle_rad), blend.blend_k, &surface[first], &image_[first],
+           &depth_[first], &marks_[first]},
+          views);
     }
   });
+}
+
+void ProcessorResolver::CopyTo(RenderResult& result) const {
+  StoreRows(band_, width_px_, reinterpret_cast<const std::uint8_t*>(image_.data()),
+            reinterpret_cast<const std::uint8_t*>(marks_.data()), result);
+  std::copy(depth_.begin(), depth_.end(), result.depth.row(band_.first));
+}
+
+void ProcessorResolver::Upload(const Targets& targets) const {
   const auto copy = [&](const Texture& texture, GLenum format, GLenum type, const void* data) {
     glBindTexture(GL_TEXTURE_2D_ARRAY, texture.name());
-    glTexSubImage3D(GL_TEXTURE_2D_ARRAY, 0, 0, 0, 0, targets.width, band.count, 1, format, type,
-                    data);
+    glTexSubImage3D(GL_TEXTURE_2D_ARRAY, 0, 0, 0, 0, width_px_, band_.count, 1, format, type, data);
   };
   copy(targets.image, GL_RGBA, GL_UNSIGNED_BYTE, image_.data());
   copy(targets.depth, GL_RED, GL_FLOAT, depth_.data());
   copy(targets.marks, GL_RGBA_INTEGER, GL_UNSIGNED_BYTE, marks_.data());
+}
+
+GLuint ProcessorResolver::UploadPacked() {
+  texels_.resize(2 * depth_.size());
+  for (size_t p = 0; p < depth_.size(); ++p) {
+    texels_[2 * p] = std::bit_cast<std::uint32_t>(depth_[p]);
+    texels_[2 * p + 1] = image_[p];
+  }
+  if (width_px_ != packed_width_px_ || band_.count != packed_rows_) {
+    packed_ = MakeTarget(GL_TEXTURE_2D_ARRAY, GL_RG32UI, width_px_, band_.count, 1);
+    packed_width_px_ = width_px_, packed_rows_ = band_.count;
+  }
+  glBindTexture(GL_TEXTURE_2D_ARRAY, packed_.name());
+  glTexSubImage3D(GL_TEXTURE_2D_ARRAY, 0, 0, 0, 0, width_px_, band_.count, 1, GL_RG_INTEGER,
+                  GL_UNSIGNED_INT, texels_.data());
+  return packed_.name();
 }
 
 }  // namespace dtr::gl

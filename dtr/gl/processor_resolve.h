@@ -8,6 +8,7 @@
 #include "dtr/gl/frame.h"
 #include "dtr/gl/pixel_kernel.h"
 #include "dtr/gl/sampled_views.h"
+#include "dtr/render/result.h"
 
 namespace dtr::gl {
 
@@ -19,14 +20,26 @@ class ProcessorResolver {
   /// report's absolute Delta, weights out of float32's reach, more views than kMostPixelViews.
   static bool Draws(const Frame& frame);
 
-  /// As Resolver::Draw; `surface`: SPEC 5.1, 1/z of the band's pixels. The views must have been
-  /// sampled.
+  /// As Resolver::Draw, but into memory of its own, which holds the band until the next call;
+  /// `surface`: SPEC 5.1, 1/z of the band's pixels. The views must have been sampled.
   void Draw(const Frame& frame, const Band& band, const SampledViews& sampled,
-            const Targets& targets, const std::vector<float>& surface);
+            const std::vector<float>& surface);
+
+  /// SPEC 6: the band into its rows of `result`, which has the picture's size.
+  void CopyTo(RenderResult& result) const;
+  /// The band into the textures of `targets`, which fit it.
+  void Upload(const Targets& targets) const;
+  /// The band as DrawnPicture::texels: the name of a texture that holds until the next call.
+  GLuint UploadPacked();
 
  private:
+  int width_px_ = 0;
+  Band band_;
   std::vector<std::uint32_t> image_, marks_;
   std::vector<float> depth_;
+  std::vector<std::uint32_t> texels_;
+  Texture packed_;
+  int packed_width_px_ = 0, packed_rows_ = 0;
 };
 
 }  // namespace dtr::gl

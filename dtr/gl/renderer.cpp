@@ -127,14 +127,9 @@ class Renderer::Implementation {
         MakeFrame(scene, novel, novel_from_world, options, selection, !coarse_by_shaders_);
     RequirePixels(frame);
     const bool held = Holds(frame);
-    std::vector<int> views_used = DrawWhole(std::move(frame), selection);
-    drawn_ = DrawnPicture{targets_.image.name(),
-                          targets_.depth.name(),
-                          targets_.marks.name(),
-                          novel.width_px(),
-                          novel.height_px(),
-                          std::move(views_used),
-                          held};
+    DrawnPicture drawn = DrawWhole(std::move(frame), selection);
+    drawn.views_held = held;
+    drawn_ = std::move(drawn);
     return *drawn_;
   }
 
@@ -152,7 +147,7 @@ class Renderer::Implementation {
     if (!drawn_) throw std::logic_error("gl::Renderer::ReadBack: nothing was drawn before");
     const StateGuard guard;
     RenderResult result = EmptyResult({drawn_->width_px, drawn_->height_px, 1, 1, 0, 0});
-    gl::ReadBack(targets_, {0, drawn_->height_px}, result);
+    TakeBand({0, drawn_->height_px}, drawn_in_memory_, result);
     result.coverage_share = CoverageShare(result.coverage);
     result.views_used = drawn_->views_used;
     return result;
@@ -220,33 +215,54 @@ class Renderer::Implementation {
     if (frame.views.empty()) return;
     if (!frame.on_processor) resolver_.SetViews(frame, views_.store());
     const int rows = RowsWithinMemory(frame);
-    FitTargets(frame, rows);
+    if (!frame.on_processor) FitTargets(frame, rows);
     for (Band band; band.first < frame.novel.height_px(); band.first += band.count) {
       band.count = std::min(rows, frame.novel.height_px() - band.first);
       DrawBand(frame, band);
-      gl::ReadBack(targets_, band, result);
+      TakeBand(band, frame.on_processor, result);
     }
     ThrowOnError("drawing");
   }
 
-  /// The whole picture at once; returns what it was drawn from, nearest first.
-  std::vector<int> DrawWhole(Frame frame, const ViewSelection& selection) {
+  /// The whole picture at once.
+  DrawnPicture DrawWhole(Frame frame, const ViewSelection& selection) {
     drawn_.reset();
     ForgetErrors();
     const StateGuard guard;
     CheckViewCount(frame.views.size());
-    std::vector<int> views_used;
-    if (!frame.views.empty()) views_used = Prepare(frame, selection);
+    DrawnPicture drawn;
+    drawn.width_px = frame.novel.width_px(), drawn.height_px = frame.novel.height_px();
+    if (!frame.views.empty()) drawn.views_used = Prepare(frame, selection);
     CheckStorage(frame);
-    FitTargets(frame, frame.novel.height_px());
-    if (frame.views.empty()) {
-      targets_.ClearResults();
+    drawn_in_memory_ = frame.on_processor && !frame.views.empty();
+    if (drawn_in_memory_ && settings_.packed) {
+      DrawBand(frame, {0, drawn.height_px});
+      drawn.texels = processor_resolver_.UploadPacked();
     } else {
-      if (!frame.on_processor) resolver_.SetViews(frame, views_.store());
-      DrawBand(frame, {0, frame.novel.height_px()});
+      FitTargets(frame, drawn.height_px);
+      DrawIntoTargets(frame);
+      drawn.image = targets_.image.name();
+      drawn.depth = targets_.depth.name();
+      drawn.marks = targets_.marks.name();
     }
     ThrowOnError("drawing");
-    return views_used;
+    return drawn;
+  }
+
+  void DrawIntoTargets(const Frame& frame) {
+    if (frame.views.empty()) return targets_.ClearResults();
+    if (!frame.on_processor) resolver_.SetViews(frame, views_.store());
+    DrawBand(frame, {0, frame.novel.height_px()});
+    if (frame.on_processor) processor_resolver_.Upload(targets_);
+  }
+
+  /// The band that was drawn last: from the processor's memory, or from the targets.
+  void TakeBand(const Band& band, bool from_memory, RenderResult& result) const {
+    if (from_memory) {
+      processor_resolver_.CopyTo(result);
+    } else {
+      gl::ReadBack(targets_, band, result);
+    }
   }
 
   void DrawBand(const Frame& frame, const Band& band) {
@@ -257,7 +273,7 @@ class Renderer::Implementation {
                      HasClipControl() && !settings_.only_opengl_43);
     }
     if (frame.on_processor) {
-      processor_resolver_.Draw(frame, band, views_.sampled(), targets_, coarse_depth_.nearest());
+      processor_resolver_.Draw(frame, band, views_.sampled(), coarse_depth_.nearest());
     } else {
       resolver_.Draw(frame, band, views_.store(), programs_, targets_, coarse_depth_.buffer());
     }
@@ -312,7 +328,8 @@ class Renderer::Implementation {
   Resolver resolver_;
   ProcessorResolver processor_resolver_;
   HoleFiller hole_filler_;
-  std::optional<DrawnPicture> drawn_;  ///< while it lies in targets_
+  std::optional<DrawnPicture> drawn_;  ///< while it can be read back
+  bool drawn_in_memory_ = false;       ///< it lies in processor_resolver_, else in targets_
 };
 
 Renderer::Renderer(RendererSettings settings) {

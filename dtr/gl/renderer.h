@@ -39,6 +39,8 @@ struct RendererSettings {
   bool only_opengl_43 = false;
   /// Take its storage blocks for no larger than this, as on one that has smaller ones.
   size_t most_storage_bytes = SIZE_MAX;
+  /// Draw() gives pictures that the processor drew as DrawnPicture::texels, for gl::Compositor.
+  bool packed = false;
 };
 
 /// A picture that was drawn and lies on the GPU: names of GL_TEXTURE_2D_ARRAY textures of one layer
@@ -47,6 +49,10 @@ struct DrawnPicture {
   unsigned image = 0;  ///< RGBA8, sRGB values; alpha 1 where some view saw the pixel, else 0
   unsigned depth = 0;  ///< R32F, plane z in scene units; 0 where unseen
   unsigned marks = 0;  ///< RGBA8UI: views blended; 255 at the Delta border (SPEC 6.2)
+  /// RG32UI: the bits of depth's float32; those of image, red the lowest. Where
+  /// RendererSettings::packed asks for it: a software rasteriser fetches one texel in half the time
+  /// of two. The others are 0 then.
+  unsigned texels = 0;
   int width_px = 0, height_px = 0;
   std::vector<int> views_used;  ///< as RenderResult::views_used
   /// The renderer holds all that pictures by these options need of these views: their pixels may go

@@ -4,9 +4,13 @@
 // clang-format keeps this group apart.
 #include <osg/Group>
 
+#include <chrono>
+#include <thread>
+
 #include "dtr/io/image_io.h"
 #include "tests/osg/osg_testing.h"
 #include "viewer/osg/depth_tr.h"
+#include "viewer/stillness.h"
 
 namespace dtr::testing {
 namespace {
@@ -73,6 +77,30 @@ TEST_F(FillTest, ShowsWhatTheRendererFillsByItself) {
     node->setRenderOptions(OptionsOf(method));
     EXPECT_GT(Compare(viewer.Draw(), expected).empty, 0.04) << "off again";
   }
+}
+
+TEST_F(FillTest, WhenStillMeansNotWhileMovingAndOnceItRests) {
+  const NamedScene named = WithHoles(120, 80);
+  osg::ref_ptr<DepthTR> node = new DepthTR;
+  node->setScene(named.set);
+  node->setRenderOptions(Filled(RenderMethod::kDeferred));
+  node->setFillTime(osgDTR::FillTime::kWhenStill);
+  OffscreenViewer viewer(node.get(), named.novel.camera, named.novel.cam_from_world);
+  const RenderResult expected = DrawnAlone(named.set, named.novel, Filled(RenderMethod::kDeferred));
+  EXPECT_EQ(Compare(viewer.Draw(), expected).empty, 0) << "the first picture waits for nothing";
+  Pose aside = named.novel.cam_from_world;
+  aside.translation.x() += 0.01;
+  viewer.Look(aside);
+  EXPECT_GT(Compare(viewer.Draw(), expected).empty, 0.04) << "it moves";
+  viewer.Look(named.novel.cam_from_world);
+  EXPECT_GT(Compare(viewer.Draw(), expected).empty, 0.04) << "it moved just now";
+  std::this_thread::sleep_for(std::chrono::duration<double>(1.1 * dtr::viewer::kStillAfterSeconds));
+  const Wrong wrong = Compare(viewer.Draw(), expected);
+  EXPECT_EQ(wrong.empty, 0) << "it rests";
+  EXPECT_LT(wrong.colour, kShareOfBorderPixels);
+  viewer.Look(aside);
+  node->setFillTime(osgDTR::FillTime::kAlways);
+  EXPECT_EQ(Compare(viewer.Draw(), expected).empty, 0) << "of every picture";
 }
 
 TEST_F(FillTest, TheReadBackPathFillsToo) {

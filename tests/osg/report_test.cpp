@@ -232,12 +232,16 @@ TEST(Keys, ChangeWhatTheReportsKeysChange) {
   EXPECT_EQ(node->getRenderOptions().views, 5);  // of 8, where there are 5
   EXPECT_TRUE(press('u'));
   EXPECT_TRUE(node->getRenderOptions().fill_holes);
+  EXPECT_EQ(node->getFillTime(), osgDTR::FillTime::kWhenStill);
+  EXPECT_TRUE(press('u'));
+  EXPECT_TRUE(node->getRenderOptions().fill_holes);
+  EXPECT_EQ(node->getFillTime(), osgDTR::FillTime::kAlways);
   EXPECT_TRUE(press('u'));
   EXPECT_FALSE(node->getRenderOptions().fill_holes);
   EXPECT_TRUE(press('x'));
   EXPECT_EQ(node->getDrawPath(), osgDTR::DrawPath::kReadBack);
   EXPECT_FALSE(press('q'));
-  EXPECT_EQ(viewer.redraws, 9);
+  EXPECT_EQ(viewer.redraws, 10);
 }
 
 }  // namespace

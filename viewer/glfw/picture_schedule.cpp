@@ -41,11 +41,9 @@ bool PictureSchedule::MadeFor(const PictureOrder& order) const {
 
 bool PictureSchedule::Make(const PictureOrder& order, Pace pace) {
   const bool changed = !MadeFor(order);
-  if (made_ && !SamePlace(order, *made_)) since_change_.Restart();
-  // The very first picture need not wait for stillness.
+  if (made_ && !SamePlace(order, *made_)) stillness_.Moved();
   const bool small =
-      made_ && pace != Pace::kWhole &&
-      (pace == Pace::kMoving || changed || since_change_.seconds() < kStillAfterSeconds);
+      made_ && pace != Pace::kWhole && (pace == Pace::kMoving || changed || !stillness_.still());
   if (!changed && (small || !Due())) return false;
   MakeNow(order, small);
   return small && has_picture_;

@@ -1,6 +1,5 @@
 // viewer/glfw/picture_schedule.h -- when which picture is made.
 #pragma once
-#include <chrono>
 #include <functional>
 #include <optional>
 #include <string>
@@ -8,22 +7,9 @@
 
 #include "viewer/glfw/picture_maker.h"
 #include "viewer/governor.h"
+#include "viewer/stillness.h"
 
 namespace dtr::viewer {
-
-/// How long something must be at rest before what is slow is done for it.
-inline constexpr double kStillAfterSeconds = 0.15;
-
-/// Seconds on a clock that nobody sets.
-class Stopwatch {
- public:
-  double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
-  void Restart() { start_ = Clock::now(); }
-
- private:
-  using Clock = std::chrono::steady_clock;
-  Clock::time_point start_ = Clock::now();
-};
 
 /// Small pictures while something moves, whole ones when nothing does. A picture that cannot be
 /// made is told of and, when it was a small one, tried once more in full.
@@ -69,7 +55,7 @@ class PictureSchedule {
   std::optional<PictureOrder> made_;
   std::optional<std::string> refusal_;
   std::string told_;
-  Stopwatch since_change_;
+  Stillness stillness_;
   bool has_picture_ = false;
   int count_ = 0;
 };

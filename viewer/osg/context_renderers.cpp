@@ -14,6 +14,7 @@ namespace {
 dtr::gl::RendererSettings Settings() {
   dtr::gl::RendererSettings settings;
   settings.warn = [](const std::string& line) { OSG_WARN << line << std::endl; };
+  settings.packed = true;
   return settings;
 }
 

@@ -13,6 +13,7 @@
 #include "dtr/gl/compositor.h"
 #include "dtr/gl/renderer.h"
 #include "viewer/osg/loaded_scene.h"
+#include "viewer/stillness.h"
 
 namespace osgDTR {
 
@@ -21,21 +22,25 @@ class ContextRenderer {
  public:
   ContextRenderer();
 
-  /// A picture of what `drawn` says, made anew only when one of these differs from the last call's:
-  /// a viewer draws a still scene again and again.
+  /// A picture of what is said, made anew only when one of these differs from the last call's: a
+  /// viewer draws a still scene again and again. `draw` is told whether the picture is to be whole:
+  /// with `may_wait` not before nothing has differed for a while.
   template <typename Draw>
   dtr::gl::DrawnPicture Picture(std::shared_ptr<const LoadedSet> set, unsigned settings_version,
                                 const dtr::PinholeCamera& camera, const dtr::Pose& pose,
-                                const Draw& draw) {
+                                bool may_wait, const Draw& draw) {
     if (set != set_) {
       renderer.Forget();  // while the old views still live
       last_.reset();
       set_ = std::move(set);
     }
-    Last now{settings_version, camera, pose, {}};
-    if (!last_ || !now.SameAs(*last_)) {
+    Last now{settings_version, camera, pose, true, {}};
+    const bool same = last_ && now.SameAs(*last_);
+    if (last_ && !same) stillness_.Moved();
+    now.whole = !may_wait || stillness_.still();
+    if (!same || (now.whole && !last_->whole)) {
       last_.reset();
-      now.picture = draw();
+      now.picture = draw(now.whole);
       last_ = std::move(now);
     }
     return last_->picture;
@@ -50,6 +55,7 @@ class ContextRenderer {
     unsigned settings_version;
     dtr::PinholeCamera camera;
     dtr::Pose pose;
+    bool whole;
     dtr::gl::DrawnPicture picture;
     bool SameAs(const Last& other) const {
       return settings_version == other.settings_version && camera == other.camera &&
@@ -59,6 +65,7 @@ class ContextRenderer {
   };
   std::shared_ptr<const LoadedSet> set_;
   std::optional<Last> last_;
+  dtr::viewer::Stillness stillness_;
 };
 
 /// The renderers of one drawable, by graphics context. Contexts that share their objects still have

@@ -140,6 +140,11 @@ void DepthTR::setDrawPath(DrawPath path) {
 }
 DrawPath DepthTR::getDrawPath() const { return drawable_->state_->Get().path; }
 
+void DepthTR::setFillTime(FillTime time) {
+  drawable_->state_->Set([&](DrawSettings& settings) { settings.fill_time = time; });
+}
+FillTime DepthTR::getFillTime() const { return drawable_->state_->Get().fill_time; }
+
 void DepthTR::setMode(Mode mode) {
   drawable_->state_->Set([&](DrawSettings& settings) {
     settings.options.method = dtr::RenderMethod::kTwoPass;

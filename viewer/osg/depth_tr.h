@@ -27,6 +27,12 @@ enum class DrawPath {
   kReadBack,  ///< the report's: views are read back one by one and blended on the processor; slow
 };
 
+/// When holes are filled, where the options say that they are.
+enum class FillTime {
+  kAlways,     ///< every new picture, also while the camera moves
+  kWhenStill,  ///< once nothing has changed for a moment, as in `dtr view`: moving pictures stay fast
+};
+
 /// A scene of depth images that is drawn for the camera that looks at it. A leaf of the scene graph
 /// as any other: under transforms that turn, shift and scale evenly, switches and levels of detail,
 /// any number of times, in any number of windows. Its own coordinates are those of the set
@@ -71,6 +77,10 @@ class DepthTR : public osg::Geode {
   dtr::RenderOptions getRenderOptions() const;
   void setDrawPath(DrawPath path);
   DrawPath getDrawPath() const;
+  /// kAlways by default. A viewer that draws on demand must go on drawing for a moment (twice
+  /// dtr::viewer::kStillAfterSeconds) after the last change to show what kWhenStill fills.
+  void setFillTime(FillTime time);
+  FillTime getFillTime() const;
   /// TRIANGULATION or SPLATTING by two passes, as in the report. By default it is neither: the
   /// deferred method (RENDER_SPEC 5).
   void setMode(Mode mode);

@@ -9,14 +9,14 @@
 namespace osgDTR {
 namespace {
 
-/// As the settings say; what it gives holds until the context's next picture.
+/// As the settings say, filled or not; what it gives holds until the context's next picture.
 dtr::gl::DrawnPicture DrawPicture(ContextRenderer& context, const DrawSettings& settings,
-                                  const NovelCamera& novel) {
+                                  const NovelCamera& novel, bool fill) {
   dtr::gl::Renderer& renderer = context.renderer;
   const dtr::RenderScene& scene = settings.set->instants[settings.instant].scene;
   const dtr::RenderOptions& options = settings.options;
   const bool on_gpu = settings.path == DrawPath::kGpu;
-  if (on_gpu && !options.fill_holes) {
+  if (on_gpu && !fill) {
     return renderer.Draw(scene, novel.camera, novel.cam_from_local, options);
   }
   dtr::RenderResult result;
@@ -26,7 +26,7 @@ dtr::gl::DrawnPicture DrawPicture(ContextRenderer& context, const DrawSettings& 
   } else {
     result = RenderByReadBack(renderer, scene, novel.camera, novel.cam_from_local, options);
   }
-  if (!options.fill_holes) return context.compositor.Upload(result);
+  if (!fill) return context.compositor.Upload(result);
   const dtr::Grid<float> depth =
       settings.set->hole_filler.Fill(scene, novel.camera, novel.cam_from_local, options, result);
   return context.compositor.UploadFilled(result, depth);
@@ -68,9 +68,11 @@ void DepthTR::dtrDrawable::Draw(osg::RenderInfo& info) const {
   const NovelCamera novel = NovelCameraOf(state.getModelViewMatrix(), state.getProjectionMatrix(),
                                           viewport.width, viewport.height);
   const std::shared_ptr<ContextRenderer> context = state_->contexts.Of(state);
-  const dtr::gl::DrawnPicture picture =
-      context->Picture(settings.set, settings.version, novel.camera, novel.cam_from_local,
-                       [&] { return DrawPicture(*context, settings, novel); });
+  const bool fills = settings.options.fill_holes;
+  const bool may_wait = fills && settings.fill_time == FillTime::kWhenStill;
+  const dtr::gl::DrawnPicture picture = context->Picture(
+      settings.set, settings.version, novel.camera, novel.cam_from_local, may_wait,
+      [&](bool whole) { return DrawPicture(*context, settings, novel, fills && whole); });
   context->compositor.Composite(picture, novel.projection);
 }
 

@@ -17,6 +17,7 @@ struct DrawSettings {
   size_t instant = 0;
   dtr::RenderOptions options;
   DrawPath path = DrawPath::kGpu;
+  FillTime fill_time = FillTime::kAlways;
   unsigned version = 0;  ///< rises with every change
   /// Null without a set.
   std::shared_ptr<const LoadedScene> Scene() const {

@@ -59,6 +59,21 @@ const char* NextMethod(RenderOptions& options) {
   return "deferred";
 }
 
+/// None, when still, every picture.
+const char* NextFilling(DepthTR& node, RenderOptions& options) {
+  if (!options.fill_holes) {
+    options.fill_holes = true;
+    node.setFillTime(FillTime::kWhenStill);
+    return "when still";
+  }
+  if (node.getFillTime() == FillTime::kWhenStill) {
+    node.setFillTime(FillTime::kAlways);
+    return "every picture";
+  }
+  options.fill_holes = false;
+  return "off";
+}
+
 constexpr int kCoarsestResolution = 4;
 
 /// The keys of moving sets; false for others, and for sets that stand still.
@@ -137,8 +152,7 @@ bool KeyHandler::handle(const osgGA::GUIEventAdapter& event, osgGA::GUIActionAda
       OSG_NOTICE << "D+TR views: " << options.views << std::endl;
       break;
     case 'u':
-      options.fill_holes = !options.fill_holes;
-      OSG_NOTICE << "D+TR hole filling: " << (options.fill_holes ? "on" : "off") << std::endl;
+      OSG_NOTICE << "D+TR hole filling: " << NextFilling(*node, options) << std::endl;
       break;
     case 'x': {
       const bool gpu = node->getDrawPath() == DrawPath::kReadBack;
@@ -163,7 +177,8 @@ void KeyHandler::getUsage(osg::ApplicationUsage& usage) const {
   usage.addKeyboardMouseBinding("D+TR: k", "Deferred, two passes with meshes, with splats");
   usage.addKeyboardMouseBinding("D+TR: r", "Every pixel, 2nd, 4th pixel of the depth maps");
   usage.addKeyboardMouseBinding("D+TR: [, ]", "One view less, one more");
-  usage.addKeyboardMouseBinding("D+TR: u", "Fill what no view saw, on and off");
+  usage.addKeyboardMouseBinding("D+TR: u",
+                                "Fill what no view saw: when still, in every picture, not");
   usage.addKeyboardMouseBinding("D+TR: comma, full stop", "Previous, next instant of a moving set");
   usage.addKeyboardMouseBinding("D+TR: j", "Play a moving set, stop");
   usage.addKeyboardMouseBinding("D+TR: x", "Read back and blend on the processor, on and off");

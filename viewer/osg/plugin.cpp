@@ -18,6 +18,7 @@ namespace {
 struct PluginOptions {
   dtr::RenderOptions render;
   DrawPath path = DrawPath::kGpu;
+  FillTime fill_time = FillTime::kAlways;
   int instant = 0;    ///< of a moving set: the first to be shown
   bool play = false;  ///< from there on
   bool keys = true;   ///< the report's keys, and the first input camera as home
@@ -88,7 +89,12 @@ PluginOptions Parse(const osgDB::Options* given) {
     if (name == "keys") options.keys = OnOrOff(name, value);
     if (name == "instant") options.instant = WholeNumber(name, value);
     if (name == "play") options.play = OnOrOff(name, value);
-    if (name == "fill-holes") options.render.fill_holes = OnOrOff(name, value);
+    if (name == "fill-holes") {
+      options.render.fill_holes = value != "off";
+      options.fill_time = OneOf<FillTime>(
+          name, value,
+          {{"on", FillTime::kAlways}, {"still", FillTime::kWhenStill}, {"off", FillTime::kAlways}});
+    }
   }
   return options;
 }
@@ -119,7 +125,8 @@ class ReaderWriterDTR : public osgDB::ReaderWriter {
     supportsOption("blend", "cosine|exponential|angle|inverse-angle|k-nearest");
     supportsOption("method", "deferred|two-pass");
     supportsOption("primitive", "mesh|splat, of two-pass");
-    supportsOption("fill-holes", "on|off: fill what no view saw [off]");
+    supportsOption("fill-holes",
+                   "on|still|off: fill what no view saw; still: not while moving [off]");
     supportsOption("instant", "Of a moving set: the instant that is shown [0]");
     supportsOption("play", "on|off: of a moving set: play it, round and round [off]");
     supportsOption("path", "gpu|read-back");
@@ -144,6 +151,7 @@ class ReaderWriterDTR : public osgDB::ReaderWriter {
       osg::ref_ptr<DepthTR> node = new DepthTR;
       node->setRenderOptions(parsed.render);
       node->setDrawPath(parsed.path);
+      node->setFillTime(parsed.fill_time);
       node->load(folder.string());
       node->setInstant(parsed.instant);
       node->setPlaying(parsed.play);
