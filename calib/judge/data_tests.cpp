@@ -11,7 +11,8 @@
 namespace dtr::calib {
 namespace {
 
-constexpr int kCoverColumns = 6, kCoverRows = 4;
+// Fine enough that boards in one part of the image do not count for what lies around it.
+constexpr int kCoverColumns = 12, kCoverRows = 8;
 constexpr double kRepeatSigmas = 0.3;  // two photos of one pose differ by about 1 sigma
 
 // The smallest value over the cameras, and whose it is.

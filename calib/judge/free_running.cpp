@@ -20,7 +20,10 @@ constexpr double kWidestGap = 1.5;  // frames between neighbours that are interp
 // Corners that count in one solve and not in the next move real delays by some tenths of a sigma.
 constexpr double kSettledSigmas = 0.5;
 constexpr double kChanceSigmas = 2;  // a camera that is taken for free stays so above this
-constexpr int kMostPasses = 12;
+constexpr int kMostPasses = 16;
+// From then on the corners that count stay the same: decided anew in every solve, a few at the
+// limit can take turns for ever, and the delays with them.
+constexpr int kDecidedAfter = 5;
 constexpr long kReach = 4;  // frames to either side that may be neighbours: kMostDelay and one
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
@@ -227,8 +230,51 @@ void KeepFlips(const Board& board, const std::vector<std::string>& flipped,
                std::vector<RigView>& views) {
   for (RigView& view : views) {
     if (std::find(flipped.begin(), flipped.end(), view.seen.name) != flipped.end()) {
-      view.seen = TurnedByHalf(board, view.seen);
+      view = TurnedByHalf(board, view);
     }
+  }
+}
+
+const RigView* ViewLike(const std::vector<RigView>& views, const RigView& wanted) {
+  const auto found = std::find_if(views.begin(), views.end(), [&](const RigView& view) {
+    return view.camera == wanted.camera && view.frame == wanted.frame;
+  });
+  return found == views.end() ? nullptr : &*found;
+}
+
+// Views and corners that a solve did not count are not to count any more. (Views that it did not
+// get, for want of frames around their moment, stay.)
+void KeepDecisions(const RigSolution& solution, std::vector<RigView>& views,
+                   std::vector<LeftOut>& decided) {
+  decided = solution.left_out;
+  std::erase_if(views, [&](const RigView& view) {
+    return std::any_of(decided.begin(), decided.end(),
+                       [&](const LeftOut& item) { return item.name == view.seen.name; });
+  });
+  for (RigView& view : views) {
+    const RigView* solved = ViewLike(solution.rig.views, view);
+    if (solved != nullptr) view.outliers = solved->outliers;
+  }
+}
+
+// Outliers that the solve was not given, as it had been decided on them, are views' outliers again.
+void RestoreOutliers(const std::vector<RigView>& given, RigSolution& solution) {
+  for (size_t v = 0; v < solution.rig.views.size(); ++v) {
+    RigView& view = solution.rig.views[v];
+    const RigView* all = ViewLike(given, view);
+    if (all == nullptr || all->outliers.empty()) continue;
+    for (FrameRows& frame : solution.rows) {
+      for (RowOrigin& origin : frame.origins) {
+        if (origin.view != v) continue;
+        const int id = view.seen.corners[origin.corner].id;
+        const auto at = std::find_if(all->seen.corners.begin(), all->seen.corners.end(),
+                                     [&](const BoardCorner& corner) { return corner.id == id; });
+        origin.corner = static_cast<size_t>(at - all->seen.corners.begin());
+      }
+    }
+    view.seen = all->seen;
+    view.outliers = all->outliers;
+    solution.outliers += static_cast<int>(view.outliers.size());
   }
 }
 
@@ -268,15 +314,22 @@ FreeRunning SolveFreeRunning(const Board& board, std::span<const RigCameraInput>
   FreeRunning free;
   Delays delays(cameras.size(), 0);  // that corners are moved by
   free.moved.assign(cameras.size(), false);
-  std::vector<LeftOut> left_out;
+  std::vector<LeftOut> left_out, decided;
   std::vector<std::string> flipped;
   std::vector<RigView> moved = views;
   std::vector<double> moments(frames, 0);
+  RigOptions solve = options;
+  std::vector<RigCameraInput> inputs(cameras.begin(), cameras.end());
   std::string last;  // delays, and by how much they changed
   for (free.passes = 1; free.passes <= kMostPasses; ++free.passes) {
-    free.solution = SolveRig(board, cameras, std::move(moved), frames, options);
+    free.solution = SolveRig(board, inputs, moved, frames, solve);
     KeepFlips(board, free.solution.flipped, views);
+    KeepFlips(board, free.solution.flipped, moved);
     flipped.insert(flipped.end(), free.solution.flipped.begin(), free.solution.flipped.end());
+    // The next solve begins with these lenses; each camera's alone are found once.
+    for (size_t c = 0; c < inputs.size(); ++c) {
+      inputs[c].given = free.solution.rig.cameras[c].camera;
+    }
     const Path path(board, free.solution, moments);
     free.delays = MoreDelay(free.solution, path, delays);
     Delays next(cameras.size(), 0);
@@ -311,9 +364,16 @@ FreeRunning SolveFreeRunning(const Board& board, std::span<const RigCameraInput>
     }
     if (settled) {
       WidenByDelays(path, delays, free.moved, free.solution);
+      RestoreOutliers(moved, free.solution);
       free.solution.flipped = std::move(flipped);
-      free.solution.left_out.insert(free.solution.left_out.end(), left_out.begin(), left_out.end());
+      for (const auto* more : {&decided, &left_out}) {
+        free.solution.left_out.insert(free.solution.left_out.end(), more->begin(), more->end());
+      }
       return free;
+    }
+    if (free.passes == kDecidedAfter && solve.solve.loss == Loss::kRobust) {
+      KeepDecisions(free.solution, views, decided);
+      solve.solve.loss = Loss::kQuadratic;
     }
     delays = next;
     left_out.clear();

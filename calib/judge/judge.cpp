@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "calib/judge/distributions.h"
+#include "calib/distributions.h"
 #include "calib/judge/fresh_solve.h"
 #include "calib/judge/residuals.h"
 #include "dtr/base/error.h"
@@ -414,6 +414,8 @@ class Judging {
         "residuals as of boards that move while the rows are read");
     if (solution.rig.cameras.size() < 2) return;
     TestDelays(solution);
+    add("unsteady_clocks_px", TestUnsteadyClocks(solution),
+        "residuals as of pictures that are not taken at one rate");
   }
 
   void TestDelays(const RigSolution& solution) {

@@ -26,7 +26,7 @@ struct JudgeLimits {
   double max_uncertainty_px = 0.5;  ///< at the boards' distance, in 95 % of the image
   double max_far_uncertainty_px = 1;
   double min_views = 8;       ///< per camera: two halves that can be solved
-  double min_coverage = 0.5;  ///< share of 6 x 4 image regions with a corner, worst camera
+  double min_coverage = 0.5;  ///< share of 12 x 8 image regions with a corner, worst camera
   double min_tilt_deg = 15;   ///< largest angle between two boards, worst camera
   double min_p = 1e-4;        ///< less likely by chance than this is no chance
   /// A pattern in the residuals that is no chance: RMS per coordinate. What OpenCV's corner

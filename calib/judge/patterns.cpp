@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "calib/judge/distributions.h"
+#include "calib/distributions.h"
 #include "calib/validate.h"
 
 namespace dtr::calib {
@@ -313,14 +313,16 @@ PatternTest TestRollingShutter(const Board& board, const RigSolution& solution) 
   return TestFramePattern(RowsOfCorners(solution, place), shutter, corners_elsewhere);
 }
 
-PatternTest TestTimeOffset(const RigSolution& solution) {
-  const size_t cameras = solution.rig.cameras.size();
-  if (cameras < 2) return {};
+namespace {
+
+// How the pixels of a frame follow a delay of each camera but the first, per frame of time; the
+// board's speed from the frames before and after. Zero where there is none.
+PatternColumns ColumnsOfDelays(const RigSolution& solution) {
   std::vector<const FrameRows*> by_frame(solution.rig.rig_from_board.size(), nullptr);
   for (const FrameRows& frame : solution.rows) by_frame[frame.frame] = &frame;
-  return TestSharedPattern(solution, [&](const FrameRows& frame) {
-    Eigen::MatrixXd columns =
-        Eigen::MatrixXd::Zero(frame.residuals.size(), static_cast<long>(cameras) - 1);
+  const auto cameras = static_cast<long>(solution.rig.cameras.size());
+  return [&solution, by_frame, cameras](const FrameRows& frame) {
+    Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(frame.residuals.size(), cameras - 1);
     const size_t f = frame.frame;
     if (f == 0 || f + 1 >= by_frame.size() || !by_frame[f - 1] || !by_frame[f + 1]) return columns;
     const auto& poses = solution.rig.rig_from_board;
@@ -337,7 +339,20 @@ PatternTest TestTimeOffset(const RigSolution& solution) {
           -frame.by_motion.middleRows<2>(at) * speed;
     }
     return columns;
-  });
+  };
+}
+
+}  // namespace
+
+PatternTest TestTimeOffset(const RigSolution& solution) {
+  if (solution.rig.cameras.size() < 2) return {};
+  return TestSharedPattern(solution, ColumnsOfDelays(solution));
+}
+
+PatternTest TestUnsteadyClocks(const RigSolution& solution) {
+  if (solution.rig.cameras.size() < 2) return {};
+  const PatternColumns delays = ColumnsOfDelays(solution);
+  return TestFramePattern(solution.rows, delays, delays);
 }
 
 }  // namespace dtr::calib

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "calib/lens_map.h"
+#include "dtr/base/order_statistics.h"
 
 namespace dtr::calib {
 namespace {
@@ -89,10 +90,7 @@ double ImageMap::Largest() const {
 double ImageMap::Quantile(double share) const {
   auto finite = Finite(values);
   if (finite.empty()) return std::numeric_limits<double>::quiet_NaN();
-  const auto place =
-      finite.begin() + static_cast<long>(share * static_cast<double>(finite.size() - 1));
-  std::nth_element(finite.begin(), place, finite.end());
-  return *place;
+  return QuantileOf(finite, share);
 }
 
 Eigen::Vector2d CellCentre(const ImageMap& map, const LensCamera& camera, int column, int row) {
@@ -133,9 +131,7 @@ double BoardDistance(const Board& board, const Rig& rig, size_t camera) {
             .norm());
   }
   if (distances.empty()) return std::numeric_limits<double>::quiet_NaN();
-  const auto middle = distances.begin() + static_cast<long>(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
-  return *middle;
+  return UpperMedian(distances);
 }
 
 }  // namespace dtr::calib

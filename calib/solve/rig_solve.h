@@ -39,7 +39,9 @@ struct RigCameraInput {
   std::string name;
   BoardModel model = BoardModel::kPinhole;
   int width_px = 0, height_px = 0;
-  std::optional<LensCamera> given;  ///< of the model; empty: found from this camera's own views
+  /// Of the model; empty: found from this camera's own views. Where lenses are free, the solve
+  /// begins with it.
+  std::optional<LensCamera> given;
 };
 
 /// Solves each camera from its own views (SolveBoard), places the cameras by boards that several

@@ -12,6 +12,7 @@
 
 #include "calib/solve/board_solve.h"
 #include "calib/solve/least_squares.h"
+#include "dtr/base/order_statistics.h"
 
 namespace dtr::calib {
 namespace {
@@ -69,10 +70,9 @@ Pose RelativePose(const Board& board, const Shared& shared) {
       for (const auto& [a, b] : shared) {
         misfits.push_back(LeastDisagreement(board, candidate * *a, *b).first);
       }
-      const auto middle = misfits.begin() + static_cast<long>(misfits.size() / 2);
-      std::nth_element(misfits.begin(), middle, misfits.end());
-      if (*middle < least) {
-        least = *middle;
+      const double median = UpperMedian(misfits);
+      if (median < least) {
+        least = median;
         best = candidate;
       }
     }
@@ -123,6 +123,14 @@ BoardView TurnedByHalf(const Board& board, const BoardView& view) {
   return turned;
 }
 
+RigView TurnedByHalf(const Board& board, const RigView& view) {
+  RigView turned = view;
+  turned.seen = TurnedByHalf(board, view.seen);
+  std::reverse(turned.outliers.begin(), turned.outliers.end());
+  for (int& id : turned.outliers) id = board.CornerCount() - 1 - id;
+  return turned;
+}
+
 Pose TurnedByHalf(const Board& board, const Pose& cam_from_board) {
   const Eigen::Quaterniond half(Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitZ()));
   const Eigen::Vector3d middle = MiddleOf(board);
@@ -144,9 +152,7 @@ RigStart StartRig(const Board& board, std::vector<RigCamera> cameras, std::vecto
       rig_from_board = cam_from_rig.Inverse() * posed.cam_from_board;
     } else if (LeastDisagreement(board, cam_from_rig * *rig_from_board, posed.cam_from_board)
                    .second) {
-      posed.view.seen = TurnedByHalf(board, posed.view.seen);
-      for (int& id : posed.view.outliers) id = board.CornerCount() - 1 - id;
-      std::reverse(posed.view.outliers.begin(), posed.view.outliers.end());
+      posed.view = TurnedByHalf(board, posed.view);
       start.flipped.push_back(posed.view.seen.name);
     }
     start.rig.views.push_back(std::move(posed.view));

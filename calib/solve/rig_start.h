@@ -18,6 +18,7 @@ struct PosedView {
 /// A plain chessboard whose corners were counted from the other end: the same board, turned by 180
 /// degrees. Boards with markers cannot be confused so.
 BoardView TurnedByHalf(const Board& board, const BoardView& view);
+RigView TurnedByHalf(const Board& board, const RigView& view);  ///< outliers with their corners
 Pose TurnedByHalf(const Board& board, const Pose& cam_from_board);
 
 /// A rig to start Newton from.

@@ -26,19 +26,20 @@ std::vector<calib::RigCameraInput> InputsOf(const calib::Board& board, const Rig
   std::vector<calib::RigCameraInput> inputs;
   for (size_t c = 0; c < photos.cameras.size(); ++c) {
     const RigPhotoCamera& camera = photos.cameras[c];
-    calib::RigCameraInput input{
-        camera.name, calib::BoardModel::kPinhole, camera.width_px, camera.height_px, {}};
     const auto given = options.given.find(camera.name);
     if (given != options.given.end()) {
-      input.model = given->second.model;
-      input.given = given->second.given;
-      if (input.given->width_px != camera.width_px || input.given->height_px != camera.height_px) {
+      const calib::LensCamera& lens = given->second.given.value();
+      if (lens.width_px != camera.width_px || lens.height_px != camera.height_px) {
         throw Error(fmt::format("--camera {}: expected a lens of {} x {} px, found {} x {}",
-                                camera.name, camera.width_px, camera.height_px,
-                                input.given->width_px, input.given->height_px));
+                                camera.name, camera.width_px, camera.height_px, lens.width_px,
+                                lens.height_px));
       }
-    } else if (options.model) {
-      input.model = *options.model;
+      inputs.push_back({camera.name, given->second.model, camera.width_px, camera.height_px, lens});
+      continue;
+    }
+    calib::BoardModel model = calib::BoardModel::kPinhole;
+    if (options.model) {
+      model = *options.model;
     } else {
       calib::ChoiceOptions choose;
       choose.solve = options.solve;
@@ -47,12 +48,12 @@ std::vector<calib::RigCameraInput> InputsOf(const calib::Board& board, const Rig
       try {
         const auto choice = calib::ChooseModel(board, ViewsOf(photos, c), camera.width_px,
                                                camera.height_px, choose);
-        input.model = choice.scores[choice.chosen].model;
+        model = choice.scores[choice.chosen].model;
       } catch (const Error& error) {
         throw Error(fmt::format("camera {}: {}", camera.name, error.what()));
       }
     }
-    inputs.push_back(std::move(input));
+    inputs.push_back({camera.name, model, camera.width_px, camera.height_px, {}});
   }
   return inputs;
 }

@@ -41,7 +41,7 @@ INSTANTIATE_TEST_SUITE_P(Kinds, JudgeSabotaged,
                          ::testing::Values(Sabotage::kFocal, Sabotage::kMirroredBoard,
                                            Sabotage::kSquareSize, Sabotage::kRollingShutter,
                                            Sabotage::kRepeatedViews, Sabotage::kFewViews,
-                                           Sabotage::kFrontoParallel));
+                                           Sabotage::kClusteredViews, Sabotage::kFrontoParallel));
 
 TEST(Judge, UnseenViewsTellOfAWrongLens) {
   Scene scene = OneCamera(24, 9);

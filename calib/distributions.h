@@ -1,4 +1,4 @@
-// calib/judge/distributions.h -- how often chance alone gives as much.
+// calib/distributions.h -- how often chance alone gives as much.
 #pragma once
 
 namespace dtr::calib {

@@ -1,4 +1,4 @@
-#include "calib/judge/distributions.h"
+#include "calib/distributions.h"
 
 #include <cmath>
 #include <limits>
