@@ -74,8 +74,7 @@ void Describe(const std::vector<Eigen::Vector2d>& residuals, size_t rigs, Adjust
   };
   // A rig's own lengths leave six ways to move the world as a whole, else there are seven.
   const double moved = rigs > 0 ? 6 * static_cast<double>(rigs) - 6 : 6 * count(image_used) - 7;
-  const double shifted =
-      out.lens == LensFreedom::kPrincipalPointPerImage ? 2 * count(image_used) : 0;
+  const double shifted = IsPerImage(out.lens) ? 2 * count(image_used) : 0;
   const double unknowns = 3 * count(point_used) + moved + shifted;
   const double freedom = 2.0 * out.sights - unknowns;
   out.sigma_px = freedom > 0 ? std::sqrt(squared / freedom) : 0;
@@ -253,8 +252,19 @@ const char* NameOf(LensFreedom freedom) {
       return "tangential";
     case LensFreedom::kPrincipalPointPerImage:
       return "principal-point-per-image";
+    case LensFreedom::kTangentialPerImage:
+      return "tangential-per-image";
   }
   return "";
+}
+
+bool IsPerImage(LensFreedom freedom) {
+  return freedom == LensFreedom::kPrincipalPointPerImage ||
+         freedom == LensFreedom::kTangentialPerImage;
+}
+
+bool IsTangential(LensFreedom freedom) {
+  return freedom == LensFreedom::kTangential || freedom == LensFreedom::kTangentialPerImage;
 }
 
 bool MayGetTangential(const LensCamera& lens) {
@@ -323,26 +333,22 @@ Adjusted Solve(const Bundle& bundle, const AdjustOptions& options, Normalised& n
 Adjusted Adjust(const Bundle& bundle, const AdjustOptions& options) {
   CheckBundle(bundle);
   CheckPriors(bundle, options);
-  if (options.lens == LensFreedom::kTangential) {
-    const Bundle tangential = WithTangential(bundle);
-    Normalised n = Normalised::Around(tangential);
-    return Solve(tangential, options, n);
-  }
-  Normalised n = Normalised::Around(bundle);
-  if (options.lens == LensFreedom::kPrincipalPointPerImage) {
+  const Bundle start = IsTangential(options.lens) ? WithTangential(bundle) : bundle;
+  Normalised n = Normalised::Around(start);
+  if (IsPerImage(options.lens)) {
     if (options.fix_poses) Refuse("principal points per image: expected poses that may move");
     n.shift.assign(bundle.images.size(), {});
   }
-  return Solve(bundle, options, n);
+  return Solve(start, options, n);
 }
 
 Adjusted AdjustRig(const Bundle& bundle, std::span<const RigImage> images,
                    const std::vector<Pose>& rig_from_world, const AdjustOptions& options) {
   if (images.size() != bundle.images.size() || options.fix_poses || !options.positions.empty() ||
-      !options.distances.empty() || options.lens == LensFreedom::kPrincipalPointPerImage) {
+      !options.distances.empty() || IsPerImage(options.lens) || IsTangential(options.lens)) {
     Refuse(
-        "expected a rig with a place for every image, and no poses, priors or principal points "
-        "of images beside it");
+        "expected a rig with a place for every image, and no poses, priors, tangential "
+        "distortion or principal points of images beside it");
   }
   Bundle rigid = bundle;
   for (size_t i = 0; i < images.size(); ++i) {

@@ -21,8 +21,10 @@ enum class LensFreedom {
   /// held near its lens's by a standard deviation of kStabiliserShare of the image's long side, so
   /// that what the sights cannot tell stays put. Not with poses that are fixed, nor for rigs.
   kPrincipalPointPerImage,
+  kTangentialPerImage,  ///< both of these
 };
-/// "fixed", "no-principal-point", "all", "tangential", "principal-point-per-image".
+/// "fixed", "no-principal-point", "all", "tangential", "principal-point-per-image",
+/// "tangential-per-image".
 const char* NameOf(LensFreedom freedom);
 
 /// Where a camera's centre is known to be (GPS): in the bundle's own world and unit.
@@ -48,7 +50,10 @@ struct AdjustOptions {
   std::vector<DistancePrior> distances;
 };
 
-/// Whether a lens is one that kTangential gives more numbers.
+/// Whether every image has a principal point of its own.
+bool IsPerImage(LensFreedom freedom);
+/// Whether radial lenses get tangential distortion, and whether this is one.
+bool IsTangential(LensFreedom freedom);
 bool MayGetTangential(const LensCamera& lens);
 
 /// How a solve ended.

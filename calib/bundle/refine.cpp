@@ -7,117 +7,22 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "calib/bundle/held_out.h"
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
-#include "dtr/base/random.h"
 
 namespace dtr::calib {
 namespace {
 
-constexpr int kFewestHeldOut = 100;  // below, the comparison would be a matter of luck
-constexpr int kMinTrack = 4;         // one sight to hold out, three to place the point
-constexpr double kLossSigmas = 2;    // scale of the loss that held-out sights are judged by
-constexpr int kMostPoints = 4000;    // that the candidates are compared on
-constexpr int kResamples = 1000;
-constexpr double kConfidence = 0.95;
+constexpr double kLossSigmas = 2;  // scale of the loss that unseen points and sights are judged by
+constexpr int kMostPoints = 4000;  // that the candidates are compared on
 // A principal point for every image also takes up what other faults of a lens model leave, and
 // costs the lens's own principal point: what the images share, nothing but the prior says. So it
 // must predict sights closer by this share; a stabiliser's pixels are worth several times that.
-constexpr double kLeastGainPerImage = 0.05;
+constexpr double kLeastGainPerImage = 0.01;
 constexpr std::array kRisingFreedom{LensFreedom::kNoPrincipalPoint, LensFreedom::kAll,
-                                    LensFreedom::kTangential, LensFreedom::kPrincipalPointPerImage};
-constexpr std::uint64_t kPick = 0x401d, kBoot = 0xb007, kSome = 0x50e;  // of random sequences
-
-struct Split {
-  Bundle training;
-  std::vector<BundleObservation> held_out;  // one of each point at most
-};
-
-Split SplitSights(const Bundle& bundle, std::uint64_t seed) {
-  Split split{bundle, {}};
-  split.training.observations.clear();
-  const auto& all = bundle.observations;
-  for (size_t begin = 0, end = 0; begin < all.size(); begin = end) {
-    while (end < all.size() && all[end].point == all[begin].point) ++end;
-    size_t picked = end;  // none
-    if (end - begin >= kMinTrack) {
-      Random random(HashOf(seed, kPick, bundle.point_ids[static_cast<size_t>(all[begin].point)]));
-      picked = begin + static_cast<size_t>(random.Index(static_cast<int>(end - begin)));
-    }
-    for (size_t i = begin; i < end; ++i) {
-      (i == picked ? split.held_out : split.training.observations).push_back(all[i]);
-    }
-  }
-  return split;
-}
-
-// About `most` of the points, drawn by their ids: cameras are known from thousands of them well
-// enough to be compared.
-Bundle SomePoints(const Bundle& bundle, int most, std::uint64_t seed) {
-  const double share = static_cast<double>(most) / static_cast<double>(bundle.points.size());
-  if (share >= 1) return bundle;
-  Bundle some = bundle;
-  std::erase_if(some.observations, [&](const BundleObservation& o) {
-    const auto id = bundle.point_ids[static_cast<size_t>(o.point)];
-    return UniformFromHash(HashOf(seed, kSome, id)) >= share;
-  });
-  return some;
-}
-
-// Squared losses of the held-out sights; one whose point has no pixel counts like one far off.
-std::vector<double> Losses(const Bundle& trained, const std::vector<BundleObservation>& held_out,
-                           double scale_px) {
-  Bundle asked = trained;
-  asked.observations = held_out;
-  std::vector<double> losses;
-  const double c2 = scale_px * scale_px;
-  for (const Eigen::Vector2d& r : Residuals(asked)) {
-    const double squared = r.allFinite() ? r.squaredNorm() : 1e4 * c2;
-    losses.push_back(c2 * std::log1p(squared / c2));
-  }
-  return losses;
-}
-
-double Mean(const std::vector<double>& values) {
-  double sum = 0;
-  for (const double v : values) sum += v;
-  return sum / static_cast<double>(values.size());
-}
-
-// Percentile interval of mean(a - b) over resampled points.
-std::pair<double, double> Bootstrap(const std::vector<double>& a, const std::vector<double>& b,
-                                    std::uint64_t seed) {
-  Random random(HashOf(seed, kBoot));
-  std::vector<double> means(kResamples);
-  for (double& mean : means) {
-    double sum = 0;
-    for (size_t i = 0; i < a.size(); ++i) {
-      const auto k = static_cast<size_t>(random.Index(static_cast<int>(a.size())));
-      sum += a[k] - b[k];
-    }
-    mean = sum / static_cast<double>(a.size());
-  }
-  std::sort(means.begin(), means.end());
-  const double tail = 0.5 * (1 - kConfidence) * (kResamples - 1);
-  return {means[static_cast<size_t>(tail)],
-          means[static_cast<size_t>(kResamples - 1 - static_cast<int>(tail))]};
-}
-
-AdjustOptions OptionsFor(const std::optional<LensFreedom>& lens) {
-  AdjustOptions options;
-  options.fix_poses = !lens;
-  options.lens = lens.value_or(LensFreedom::kFixed);
-  return options;
-}
-
-// Cameras that have seen all sights, held-out ones too; points that have not.
-std::vector<double> LossesOfCameras(const Bundle& cameras, const Split& split, double scale_px) {
-  Bundle asked = split.training;
-  asked.lenses = cameras.lenses;
-  asked.images = cameras.images;
-  asked.points = cameras.points;
-  return Losses(Adjust(asked, OptionsFor({})).bundle, split.held_out, scale_px);
-}
+                                    LensFreedom::kTangential, LensFreedom::kPrincipalPointPerImage,
+                                    LensFreedom::kTangentialPerImage};
 
 constexpr size_t kNoneConverged = ~size_t{0};
 
@@ -125,64 +30,84 @@ constexpr size_t kNoneConverged = ~size_t{0};
 // that every image has by itself beyond what is too little to matter.
 bool IsWorthIt(const RefineCandidate& candidate, const RefineCandidate& chosen) {
   if (!(candidate.high_px2 < 0)) return false;
-  return candidate.lens != LensFreedom::kPrincipalPointPerImage ||
-         candidate.held_out_px < (1 - kLeastGainPerImage) * chosen.held_out_px;
+  const bool newly_per_image = IsPerImage(*candidate.lens) && !IsPerImage(*chosen.lens);
+  return !newly_per_image || candidate.held_out_px < (1 - kLeastGainPerImage) * chosen.held_out_px;
 }
 
-// Which lens parameters to free, by held-out sights; index of the candidate, or kNoneConverged. A
-// candidate whose solve did not converge is not taken. The model as given has
-// seen the held-out sights and cannot be compared with candidates that have not: it is first by
-// name only, and its figures are of cameras that saw all.
-size_t Choose(const Bundle& bundle, const Split& split, const RefineOptions& options,
-              Refined& refined) {
-  refined.held_out_sights = static_cast<int>(split.held_out.size());
-  refined.candidates = {{"as given", {}, 0, 0, 0}};
+std::vector<RefineCandidate> CandidatesFor(const Bundle& bundle, bool separate_lenses) {
+  std::vector<RefineCandidate> candidates{{"as given", {}, 0, 0, 0}};
   for (const LensFreedom freedom : kRisingFreedom) {
     // A lens for every image has its principal point already.
-    if (freedom == LensFreedom::kPrincipalPointPerImage && options.separate_lenses) continue;
-    if (freedom == LensFreedom::kTangential &&
+    if (IsPerImage(freedom) && separate_lenses) continue;
+    if (IsTangential(freedom) &&
         std::none_of(bundle.lenses.begin(), bundle.lenses.end(), MayGetTangential)) {
       continue;
     }
-    refined.candidates.push_back({NameOf(freedom), freedom, 0, 0, 0});
+    candidates.push_back({NameOf(freedom), freedom, 0, 0, 0});
   }
-  auto& candidates = refined.candidates;
-  std::vector<Adjusted> trained(candidates.size());
-  ParallelFor(0, static_cast<int>(candidates.size()), options.threads, [&](int i) {
+  return candidates;
+}
+
+/// What each candidate's cameras, adjusted to half of the points, make of the other half; per
+/// candidate and point. The model as given has seen them all and cannot be compared with candidates
+/// that have not: it is first by name only.
+std::vector<std::vector<double>> TryOnUnseenPoints(const Bundle& bundle,
+                                                   const RefineOptions& options, double scale_px,
+                                                   std::vector<RefineCandidate>& candidates) {
+  const std::vector<PointFold> folds = PointFolds(bundle, options.seed);
+  std::vector<std::vector<double>> parts(candidates.size() * folds.size());
+  std::vector<char> converged(parts.size());
+  ParallelFor(0, static_cast<int>(parts.size()), options.threads, [&](int i) {
     const auto at = static_cast<size_t>(i);
-    trained[at] = Adjust(split.training, OptionsFor(candidates[at].lens));
+    const PointFold& fold = folds[at % folds.size()];
+    const Adjusted trained = Adjust(fold.training, OptionsFor(candidates[at / folds.size()].lens));
+    converged[at] = trained.converged;
+    parts[at] = LossesOfUnseenPoints(trained.bundle, fold.asked, scale_px);
   });
-  std::vector<std::vector<double>> losses;
-  for (size_t i = 0; i < candidates.size(); ++i) {
-    losses.push_back(
-        Losses(trained[i].bundle, split.held_out, kLossSigmas * trained.front().sigma_px));
-    candidates[i].held_out_px = std::sqrt(Mean(losses[i]));
+  std::vector<std::vector<double>> losses(candidates.size());
+  for (size_t i = 0; i < parts.size(); ++i) {
+    const size_t k = i / folds.size();
+    losses[k].insert(losses[k].end(), parts[i].begin(), parts[i].end());
+    candidates[k].converged = (i % folds.size() == 0 || candidates[k].converged) && converged[i];
   }
-  for (size_t i = 0; i < candidates.size(); ++i) candidates[i].converged = trained[i].converged;
+  for (size_t k = 0; k < losses.size(); ++k) {
+    candidates[k].held_out_px = std::sqrt(Mean(losses[k]));
+  }
+  return losses;
+}
+
+/// Which lens parameters to free, by points that were not adjusted to; index of the candidate, or
+/// kNoneConverged. A candidate whose solve did not converge is not taken.
+size_t Choose(const Bundle& bundle, const SightSplit& split, const RefineOptions& options,
+              Refined& refined) {
+  auto& candidates = refined.candidates;
+  candidates = CandidatesFor(bundle, options.separate_lenses);
+  double sigma_px = 0;
+  LossesOfUnseenPoints(bundle, split.training, 1, &sigma_px);
+  const double scale_px = kLossSigmas * sigma_px;
+  const auto losses = TryOnUnseenPoints(SomePoints(bundle, kMostPoints, options.seed), options,
+                                        scale_px, candidates);
   size_t chosen = 0;
   for (size_t i = 1; i < candidates.size(); ++i) {
     RefineCandidate& candidate = candidates[i];
     if (chosen > 0) {
       std::tie(candidate.low_px2, candidate.high_px2) =
-          Bootstrap(losses[i], losses[chosen], options.seed);
+          BootstrapOfDifference(losses[i], losses[chosen], options.seed);
     }
     const bool better = chosen == 0 || IsWorthIt(candidate, candidates[chosen]);
     if (candidate.converged && better) chosen = i;
   }
-  if (!trained[0].converged || chosen == 0) return kNoneConverged;
+  if (!candidates[0].converged || chosen == 0) return kNoneConverged;
   // Now like with like: adjusted to all sights, as the given model was.
   refined.adjusted = Adjust(bundle, OptionsFor(candidates[chosen].lens));
-  const auto adjusted =
-      LossesOfCameras(refined.adjusted.bundle, split, kLossSigmas * trained.front().sigma_px);
-  RefineCandidate last{
-      "adjusted to all",          candidates[chosen].lens, std::sqrt(Mean(adjusted)), 0, 0,
-      refined.adjusted.converged,
-  };
-  std::tie(last.low_px2, last.high_px2) = Bootstrap(adjusted, losses[0], options.seed);
-  candidates.push_back(last);
-  if (!last.converged) return kNoneConverged;
+  const auto given = LossesOfHeldOutSights(bundle, split, scale_px);
+  const auto adjusted = LossesOfHeldOutSights(refined.adjusted.bundle, split, scale_px);
+  refined.given_px = std::sqrt(Mean(given));
+  refined.adjusted_px = std::sqrt(Mean(adjusted));
+  refined.held_out_sights = static_cast<int>(split.held_out.size());
+  if (!refined.adjusted.converged) return kNoneConverged;
   // Beyond chance: a model that saw fewer sights, or none, need not be wrong for it.
-  return last.high_px2 < 0 ? chosen : 0;
+  return BootstrapOfDifference(adjusted, given, options.seed).second < 0 ? chosen : 0;
 }
 
 bool Refinable(const SfmModel& model, std::string* reason) {
@@ -243,7 +168,7 @@ Refined Refine(const SfmModel& model, const RefineOptions& options) {
   }
   if (!Refinable(model, &refined.reason)) return refined;
   const Bundle bundle = BundleOf(model, options.separate_lenses);
-  const Split split = SplitSights(SomePoints(bundle, kMostPoints, options.seed), options.seed);
+  const SightSplit split = SplitSights(SomePoints(bundle, kMostPoints, options.seed), options.seed);
   const auto enough = split.held_out.size();
   if (enough < kFewestHeldOut) {
     refined.held_out_sights = static_cast<int>(enough);
@@ -292,6 +217,8 @@ std::string ToJson(const Refined& refined) {
   if (!refined.reason.empty()) json["reason"] = refined.reason;
   if (refined.lens) json["lens"] = NameOf(*refined.lens);
   json["held_out_sights"] = refined.held_out_sights;
+  json["given_px"] = refined.given_px;
+  json["adjusted_px"] = refined.adjusted_px;
   json["candidates"] = nlohmann::ordered_json::array();
   for (const RefineCandidate& c : refined.candidates) {
     json["candidates"].push_back({{"name", c.name},

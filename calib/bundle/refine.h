@@ -23,12 +23,11 @@ struct RefineOptions {
 
 /// A way to refine, and what it does to sights it has not seen.
 struct RefineCandidate {
-  std::string name;                 ///< "as given", a LensFreedom, or "adjusted to all"
+  std::string name;                 ///< "as given" or a LensFreedom
   std::optional<LensFreedom> lens;  ///< empty: cameras as given
-  double held_out_px = 0;           ///< root mean of Cauchy's loss over the held-out sights
-  /// 95 % bootstrap interval of this candidate's mean loss less another's, in px^2; points drawn
-  /// with replacement. With more freedom: less that of the best candidate with less; "adjusted to
-  /// all": less "as given"; else 0.
+  double held_out_px = 0;  ///< root mean of Cauchy's loss over points that were not adjusted to
+  /// 95 % bootstrap interval of this candidate's mean loss less that of the best candidate with
+  /// less freedom, in px^2; points drawn with replacement.
   double low_px2 = 0, high_px2 = 0;
   bool converged = false;  ///< else it is not taken
 };
@@ -38,19 +37,20 @@ struct Refined {
   bool changed = false;  ///< false: the model is as it was given
   std::string reason;    ///< why nothing was changed; empty otherwise
   std::vector<RefineCandidate> candidates;
-  int held_out_sights = 0;  ///< that the candidates were compared on
+  int held_out_sights = 0;  ///< that the model as given and the adjusted one were compared on,
+  double given_px = 0, adjusted_px = 0;  ///< root mean of Cauchy's loss over these
   std::optional<LensFreedom> lens;
   Adjusted adjusted;  ///< of the chosen candidate, all sights; bundle emptied
   int points_dropped = 0;
 };
 
-/// Bundle adjustment of `model` where it pays. One sight of every point with four or more is held
-/// out. Cameras adjusted to the rest, without the principal point, with it, with tangential
-/// distortion, and with a principal point for every image (stabilised lenses), predict it: more is
-/// freed only if that is better beyond the bootstrap interval. The chosen way is then run on all
-/// sights, as structure from motion was; the result is taken only if its cameras place points, from
-/// the rest alone, so that they predict the held-out sights better than with the cameras as given,
-/// beyond the bootstrap interval.
+/// Bundle adjustment of `model` where it pays. Cameras are adjusted to half of the points, without
+/// the principal point, with it, with tangential distortion, and with a principal point for every
+/// image (stabilised lenses), and tried on the other half, and the other way round: more is freed
+/// only if that explains unseen points better beyond the bootstrap interval, and for numbers that
+/// every image has by itself by 1 % at least. The chosen way is then run on all sights, as
+/// structure from motion was; the result is taken only if its cameras predict one sight of each
+/// point from the others better than the cameras as given, beyond the bootstrap interval.
 ///
 /// With known lenses, poses and points are adjusted to them without being asked whether it pays.
 /// Deterministic for any number of threads. What cannot be refined (a lens model FOV, too few
@@ -68,7 +68,7 @@ void RequireDetermined(const SfmModel& model, const RefineOptions& options,
                        const std::string& what);
 
 /// JSON object: refined, reason, lens, candidates[].{name,held_out_px,converged}, held_out_sights,
-/// sigma_px, rms_px, iterations, points_dropped.
+/// given_px, adjusted_px, sigma_px, rms_px, iterations, points_dropped.
 std::string ToJson(const Refined& refined);
 
 }  // namespace dtr::calib

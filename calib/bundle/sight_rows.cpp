@@ -29,9 +29,7 @@ std::vector<int> FreeParams(const LensCamera& lens, LensFreedom freedom) {
   const int focals = FocalCount(lens.model);
   for (int k = 0; k < ParameterCount(lens.model); ++k) {
     const bool centre = k >= focals && k < focals + 2;
-    const bool with_centre = freedom == LensFreedom::kAll || freedom == LensFreedom::kTangential ||
-                             freedom == LensFreedom::kPrincipalPointPerImage;
-    if (with_centre || (freedom == LensFreedom::kNoPrincipalPoint && !centre)) {
+    if (freedom != LensFreedom::kFixed && !(freedom == LensFreedom::kNoPrincipalPoint && centre)) {
       free.push_back(k);
     }
   }

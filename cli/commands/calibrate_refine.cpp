@@ -35,7 +35,12 @@ int RunRefine(const Options& options, const Context& context) {
   const calib::Refined refined = calib::Refine(model, refine);
   for (const auto& candidate : refined.candidates) {
     context.console.Say(
-        fmt::format("{:<26} held-out sights: {:.4f} px", candidate.name, candidate.held_out_px));
+        fmt::format("{:<26} unseen points: {:.4f} px", candidate.name, candidate.held_out_px));
+  }
+  if (refined.held_out_sights > 0) {
+    context.console.Say(fmt::format("{} held-out sights: as given {:.4f} px, adjusted {:.4f} px",
+                                    refined.held_out_sights, refined.given_px,
+                                    refined.adjusted_px));
   }
   if (!refined.changed) {
     context.console.Say("left as given: " + refined.reason);

@@ -19,8 +19,8 @@ constexpr double kHeldBeforePx = 1, kBeforePx = 0.5, kBehindPx = 2;
 constexpr double kHoleSay = 0.25;
 constexpr int kTriedSurfaces = 3;
 
-// SPEC 5.3: a position this close to a sample, or to the middle between two, is on it. From an input
-// camera's own place every position is, and rounding would choose between blocks.
+// SPEC 5.3: a position this close to a sample, or to the middle between two, is on it. From an
+// input camera's own place every position is, and rounding would choose between blocks.
 constexpr double kOnGrid = 1e-6;
 
 double OnGrid(double position) {
@@ -40,7 +40,8 @@ struct Votes {
 struct Patch {
   double inverse_depth = 0;  ///< 0: none
   Eigen::Vector2d slope = Eigen::Vector2d::Zero();
-  bool whole = false;  ///< of four samples that belong together
+  bool whole = false;   ///< of four samples that belong together
+  bool masked = false;  ///< the view does not look there
 };
 
 class OwnFragmentFinder {
@@ -71,7 +72,7 @@ class OwnFragmentFinder {
     const Patch patch = PatchAt(*position);
     const double seen = Meet(base, *position, patch);
     if (!(seen > 0)) {
-      votes.refused += kHoleSay * say;
+      if (!patch.masked) votes.refused += kHoleSay * say;
     } else if (seen - start < -kBehindPx * thresholds_.pixel) {
       votes.refused += say;
       votes.behind = std::max(votes.behind, seen);
@@ -131,14 +132,18 @@ class OwnFragmentFinder {
     const Grid<double>& grid = samples_.inverse_depth;
     const int left = static_cast<int>(std::floor(position.x()));
     const int top = static_cast<int>(std::floor(position.y()));
-    if (!IsWholeBlock(grid, left, top, breaks_)) return {NearestSample(position)};
+    if (!IsWholeBlock(grid, left, top, breaks_)) {
+      return {NearestSample(position), Eigen::Vector2d::Zero(), false,
+              IsMaskedBlock(samples_, left, top)};
+    }
     const double u = position.x() - left, v = position.y() - top;
     const int x0 = std::max(left, 0), x1 = std::min(left + 1, grid.width() - 1);
     const int y0 = std::max(top, 0), y1 = std::min(top + 1, grid.height() - 1);
     const double a = grid(x0, y0), b = grid(x1, y0), c = grid(x0, y1), d = grid(x1, y1);
     return {(1 - v) * ((1 - u) * a + u * b) + v * ((1 - u) * c + u * d),
             {(1 - v) * (b - a) + v * (d - c), (1 - u) * (c - a) + u * (d - b)},
-            true};
+            true,
+            false};
   }
 
   /// 1/z in the novel camera where the ray meets the patch's plane; 0 where it shows its back or

@@ -128,6 +128,10 @@ HWY_INLINE VF FragmentAt(const PixelView& view, const RayOnGrid& base, VF surfac
   const DF d;
   const Position position = PositionAt(view, base, surface);
   if (hn::AllFalse(d, position.on_map)) return hn::Zero(d);
+  if (view.cells != nullptr &&
+      hn::AllFalse(d, hn::And(position.on_map, IsCell(CellsAt(view, position), kCellOfSamples)))) {
+    return hn::Zero(d);
+  }
   const VF w = Meet(view, base, position, PatchAt(view, position));
   const VF nearer = hn::Sub(w, surface);
   const VF z = hn::MulAdd(w, Constant(view.grid_z[3]), base.z);
@@ -184,11 +188,20 @@ HWY_INLINE VF HeldSurface(const PixelRow& row, std::span<const PixelView> views,
       const RayOnGrid base(view, rays);
       const Position position = PositionAt(view, base, surface);
       if (hn::AllFalse(d, position.on_map)) continue;
+      VF say =
+          hn::IfThenElseZero(position.on_map, SayAt({view, rays, surface}, row.pixel_angle_rad));
+      if (view.cells != nullptr) {
+        const VU cells = CellsAt(view, position);
+        if (hn::AllFalse(d, hn::And(position.on_map, IsCell(cells, kCellOfSamples)))) {
+          say = hn::IfThenElseZero(IsCell(cells, kCellOfHoles), say);
+          votes.refused = hn::MulAdd(Constant(kHoleSay), say, votes.refused);
+          continue;
+        }
+      }
       if (tried == 0) PrefetchAround(view, position);
       const Patch patch = PatchAt(view, position);
       const VF seen = Meet(view, base, position, patch);
-      const VF say = SayAt({view, rays, surface}, row.pixel_angle_rad);
-      AddVote(view, surface, seen, patch.whole, hn::IfThenElseZero(position.on_map, say), &votes);
+      AddVote(view, surface, seen, patch.whole, hn::IfThenZeroElse(patch.masked, say), &votes);
     }
     const MF holds = hn::And(asked, hn::Ge(votes.held, votes.refused));
     const VF front = hn::IfThenElse(hn::Gt(votes.front, zero), votes.front, surface);

@@ -12,6 +12,14 @@ namespace dtr::gl {
 /// Values are read by whole vectors: so many beyond the last one that is asked for may be, too.
 inline constexpr size_t kReadBeyond = 64;
 
+/// Squares of a view's samples where there is nothing to look up.
+enum PixelCell : std::uint32_t {
+  kCellOfSamples,  ///< there is one
+  kCellOfHoles,    ///< none, and not all are masked
+  kMaskedCell,     ///< all are masked
+};
+inline constexpr int kLog2PixelCell = 5;
+
 /// A view as the kernel knows it. Everything is relative to the novel camera and was formed in
 /// double precision. Grid positions: centre of the first sample at 0.5.
 struct PixelView {
@@ -26,8 +34,12 @@ struct PixelView {
   const std::uint16_t* codes;
   const float* values;
   int stride;
-  /// A bit for the block right of and below each of these samples: IsWholeBlock.
+  /// A bit for the block right of and below each of these samples: IsWholeBlock or IsMaskedBlock.
   const std::uint32_t* whole_blocks;
+  /// What a square of 2^kLog2PixelCell such blocks per axis holds, a PixelCell each, `cell_stride`
+  /// in a row; null where all hold samples.
+  const std::uint32_t* cells;
+  int cell_stride;
   float depth_offset, depth_factor;
   float pixel, delta;  ///< differences of 1/z: SPEC 0.3, 4.2
   float level_range;   ///< blocks whose samples differ by no more are whole; below 0: ask the bits

@@ -171,10 +171,23 @@ HWY_INLINE MF IsWhole(const PixelView& view, VI index) {
   return hn::RebindMask(DF(), hn::Ne(found, hn::Zero(DU())));
 }
 
+/// A PixelCell for each position; requires cells.
+HWY_INLINE VU CellsAt(const PixelView& view, const Position& position) {
+  // The block left of and above a position, counted from the border's.
+  const VF half = Constant(0.5f);
+  const VI x = hn::ShiftRight<kLog2PixelCell>(hn::ConvertTo(DI(), hn::Add(position.x, half)));
+  const VI y = hn::ShiftRight<kLog2PixelCell>(hn::ConvertTo(DI(), hn::Add(position.y, half)));
+  return hn::GatherIndex(DU(), view.cells, hn::Add(hn::Mul(y, hn::Set(DI(), view.cell_stride)), x));
+}
+HWY_INLINE MF IsCell(VU cells, PixelCell kind) {
+  return hn::RebindMask(DF(), hn::Eq(cells, hn::Set(DU(), kind)));
+}
+
 /// The view's surface around a position of its grid.
 struct Patch {
   VF inverse_depth, slope_x, slope_y;  ///< 1/z at the position; its change per sample
   MF exists, whole;                    ///< of four samples that belong together
+  MF masked;                           ///< the view does not look there
 };
 
 /// SPEC 5.3: the tangent of the bilinear patch, else the nearest sample, flat.
@@ -194,6 +207,8 @@ HWY_INLINE Patch PatchAt(const PixelView& view, const Position& position) {
   MF whole =
       hn::And(full, hn::Le(hn::Mul(factor, hn::Sub(highest, lowest)), Constant(view.level_range)));
   if (!hn::AllFalse(DF(), hn::AndNot(whole, full))) whole = hn::And(full, IsWhole(view, index));
+  MF masked = hn::Eq(highest, zero);
+  if (!hn::AllFalse(DF(), masked)) masked = hn::And(masked, IsWhole(view, index));
   const VF top = Lerp(s.a, s.b, u), bottom = Lerp(s.c, s.d, u);
   const MF left = hn::Lt(u, half), upper = hn::Lt(v, half);
   const VF nearest =
@@ -203,7 +218,9 @@ HWY_INLINE Patch PatchAt(const PixelView& view, const Position& position) {
   return {hn::MulAdd(stored, factor, Constant(view.depth_offset)),
           hn::IfThenElseZero(whole, hn::Mul(factor, slope_x)),
           hn::IfThenElseZero(whole, hn::Mul(factor, hn::Sub(bottom, top))),
-          hn::And(position.on_map, hn::Gt(stored, zero)), whole};
+          hn::And(position.on_map, hn::Gt(stored, zero)),
+          whole,
+          masked};
 }
 
 /// 1/z at which the ray meets the patch's plane; 0 where it shows its back or there is none.

@@ -62,6 +62,8 @@ PixelView PlaceView(const View& view, const ViewPlacement& placed, double cut_fa
   out.codes = sampled.codes.empty() ? nullptr : sampled.codes.data();
   out.values = sampled.values.data();
   out.whole_blocks = sampled.whole_blocks.data();
+  out.cells = sampled.cells.empty() ? nullptr : sampled.cells.data();
+  out.cell_stride = sampled.cell_stride;
   out.depth_offset = static_cast<float>(sampled.depth_offset);
   out.depth_factor = static_cast<float>(sampled.depth_factor);
   const InverseDepthThresholds thresholds = ThresholdsOf(view, options);

@@ -30,17 +30,51 @@ HugeVector<T> WithBorder(const std::vector<T>& grid, int columns, int rows) {
 }
 
 /// A bit per sample of the grid with its border.
-std::vector<std::uint32_t> WholeBlocks(const Grid<double>& w, const BreakRule& breaks) {
+std::vector<std::uint32_t> WholeBlocks(const SampleGrid& samples, const BreakRule& breaks) {
+  const Grid<double>& w = samples.inverse_depth;
   const size_t stride = static_cast<size_t>(w.width()) + 2;
   std::vector<std::uint32_t> bits((stride * (static_cast<size_t>(w.height()) + 2) + 31) / 32);
   for (int y = -1; y < w.height(); ++y) {
     for (int x = -1; x < w.width(); ++x) {
-      if (!IsWholeBlock(w, x, y, breaks)) continue;
+      if (!IsWholeBlock(w, x, y, breaks) && !IsMaskedBlock(samples, x, y)) continue;
       const size_t bit = static_cast<size_t>(y + 1) * stride + static_cast<size_t>(x + 1);
       bits[bit / 32] |= std::uint32_t{1} << (bit % 32);
     }
   }
   return bits;
+}
+
+// A look at the cells costs a twentieth of what it may save; most maps have no large holes.
+constexpr double kCellsWorthAsking = 0.05;
+
+/// As PixelView has them; empty where too few are empty.
+std::vector<std::uint32_t> CellsOf(const SampleGrid& samples, int* stride) {
+  const Grid<double>& w = samples.inverse_depth;
+  constexpr int kSize = 1 << kLog2PixelCell;
+  const int columns = (w.width() + kSize) / kSize, rows = (w.height() + kSize) / kSize;
+  *stride = columns;
+  std::vector<std::uint32_t> cells(static_cast<size_t>(columns) * static_cast<size_t>(rows));
+  double empty = 0;
+  for (int y = 0; y < rows; ++y) {
+    for (int x = 0; x < columns; ++x) {
+      // Blocks -1 + kSize x and on, each of two samples per axis.
+      const int right = std::min(kSize * (x + 1), w.width());
+      const int bottom = std::min(kSize * (y + 1), w.height());
+      bool some = false, looked = samples.masked.empty();
+      for (int j = std::max(0, kSize * y - 1); j < bottom && !some; ++j) {
+        for (int i = std::max(0, kSize * x - 1); i < right && !some; ++i) {
+          some = w(i, j) > 0;
+          looked = looked || samples.masked(i, j) == 0;
+        }
+      }
+      if (some) continue;
+      cells[static_cast<size_t>(y) * static_cast<size_t>(columns) + static_cast<size_t>(x)] =
+          looked ? kCellOfHoles : kMaskedCell;
+      ++empty;
+    }
+  }
+  if (empty < kCellsWorthAsking * static_cast<double>(cells.size())) cells.clear();
+  return cells;
 }
 
 SampledView Sample(const View& view, int resolution, const BreakRule& breaks) {
@@ -56,7 +90,8 @@ SampledView Sample(const View& view, int resolution, const BreakRule& breaks) {
   sampled.depth_offset = depth.offset;
   // StoredDepth reads codes as shares of the largest.
   sampled.depth_factor = depth.codes.empty() ? depth.factor : depth.factor / UINT16_MAX;
-  sampled.whole_blocks = WholeBlocks(w, breaks);
+  sampled.whole_blocks = WholeBlocks(grid, breaks);
+  sampled.cells = CellsOf(grid, &sampled.cell_stride);
   const std::vector<std::uint8_t> image = SampledImage(view);
   sampled.rgba.reserve(image.size() + 4 * (static_cast<size_t>(view.image.width()) + kReadBeyond));
   sampled.rgba.assign(image.begin(), image.end());

@@ -19,12 +19,14 @@ struct SampledView {
       offset = 0;                   ///< of the grid of samples; columns 0: none left
   HugeVector<std::uint16_t> codes;  ///< one of the two
   HugeVector<float> values;
-  std::vector<std::uint32_t> whole_blocks;    ///< as PixelView has them
+  std::vector<std::uint32_t> whole_blocks;  ///< as PixelView has them
+  std::vector<std::uint32_t> cells;         ///< likewise; empty where none would be null
+  int cell_stride = 0;
   double depth_offset = 0, depth_factor = 1;  ///< 1/z from a code or a value
   HugeVector<std::uint8_t> rgba;  ///< SampledImage, and what PixelView asks for after it
   size_t bytes() const {
     return codes.size() * sizeof(codes[0]) + values.size() * sizeof(values[0]) +
-           whole_blocks.size() * sizeof(whole_blocks[0]) + rgba.size();
+           (whole_blocks.size() + cells.size()) * sizeof(whole_blocks[0]) + rgba.size();
   }
 };
 

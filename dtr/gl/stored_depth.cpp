@@ -58,8 +58,9 @@ StoredDepth StoreDepth(const View& view, const SampleGrid& samples) {
 }
 
 template <typename T>
-std::vector<T> DepthPicture(const std::vector<T>& values, const Grid<double>& inverse_depth,
+std::vector<T> DepthPicture(const std::vector<T>& values, const SampleGrid& samples,
                             const BreakRule& breaks) {
+  const Grid<double>& inverse_depth = samples.inverse_depth;
   const int columns = inverse_depth.width(), rows = inverse_depth.height();
   const LayerSize size = DepthPictureSize(columns, rows);
   std::vector<T> picture = WithEdge(values.data(), {columns, rows}, 1, {columns + 1, rows + 1});
@@ -70,14 +71,17 @@ std::vector<T> DepthPicture(const std::vector<T>& values, const Grid<double>& in
     T* const row = bits + width * static_cast<size_t>(y / kBlocksPerTexel);
     const int bit = 1 << (y % kBlocksPerTexel);
     for (int x = 0; x <= columns; ++x) {
-      if (IsWholeBlock(inverse_depth, x - 1, y - 1, breaks)) row[x] = static_cast<T>(row[x] + bit);
+      if (IsWholeBlock(inverse_depth, x - 1, y - 1, breaks) ||
+          IsMaskedBlock(samples, x - 1, y - 1)) {
+        row[x] = static_cast<T>(row[x] + bit);
+      }
     }
   }
   return picture;
 }
 template std::vector<std::uint16_t> DepthPicture(const std::vector<std::uint16_t>&,
-                                                 const Grid<double>&, const BreakRule&);
-template std::vector<float> DepthPicture(const std::vector<float>&, const Grid<double>&,
+                                                 const SampleGrid&, const BreakRule&);
+template std::vector<float> DepthPicture(const std::vector<float>&, const SampleGrid&,
                                          const BreakRule&);
 
 }  // namespace dtr::gl

@@ -22,15 +22,16 @@ struct StoredDepth {
 StoredDepth StoreDepth(const View& view, const SampleGrid& samples);
 
 /// The picture of a grid of samples that own_depth.glsl reads: `values` with the last row and
-/// column once more, and below them IsWholeBlock: of block (x, y) bit (y + 1) % kBlocksPerTexel of
-/// the texel (x + 1, rows + 1 + (y + 1) / kBlocksPerTexel), as a number.
+/// column once more, and below them whether a block is whole or masked (its values are 0 then,
+/// which whole ones' never are): of block (x, y) bit (y + 1) % kBlocksPerTexel of the texel (x + 1,
+/// rows + 1 + (y + 1) / kBlocksPerTexel), as a number.
 inline constexpr int kBlocksPerTexel = 16;
 template <typename T>
-std::vector<T> DepthPicture(const std::vector<T>& values, const Grid<double>& inverse_depth,
+std::vector<T> DepthPicture(const std::vector<T>& values, const SampleGrid& samples,
                             const BreakRule& breaks);
 extern template std::vector<std::uint16_t> DepthPicture(const std::vector<std::uint16_t>&,
-                                                        const Grid<double>&, const BreakRule&);
-extern template std::vector<float> DepthPicture(const std::vector<float>&, const Grid<double>&,
+                                                        const SampleGrid&, const BreakRule&);
+extern template std::vector<float> DepthPicture(const std::vector<float>&, const SampleGrid&,
                                                 const BreakRule&);
 
 }  // namespace dtr::gl

@@ -190,10 +190,10 @@ void ViewStore::PrepareDeferred(const std::vector<const View*>& views, const Ren
     const View& view = *missing[k];
     grids[k] = MakeSampleGrid(view, options.resolution);
     depths[k] = StoreDepth(view, grids[k]);
-    const Grid<double>& w = grids[k].inverse_depth;
     const BreakRule breaks = BreakRuleOf(view, options);
-    if (!depths[k].codes.empty()) depths[k].codes = DepthPicture(depths[k].codes, w, breaks);
-    if (!depths[k].values.empty()) depths[k].values = DepthPicture(depths[k].values, w, breaks);
+    StoredDepth& depth = depths[k];
+    if (!depth.codes.empty()) depth.codes = DepthPicture(depth.codes, grids[k], breaks);
+    if (!depth.values.empty()) depth.values = DepthPicture(depth.values, grids[k], breaks);
   });
   for (size_t k = 0; k < missing.size(); ++k) {
     const View& view = *missing[k];

@@ -47,8 +47,13 @@ SampleGrid MakeSampleGrid(const View& view, int resolution) {
     const int y = samples.offset + j * resolution;
     for (int i = 0; i < columns; ++i) {
       const int x = samples.offset + i * resolution;
+      if (!CellUsable(view, x, y)) {
+        if (samples.masked.empty()) samples.masked = Grid<std::uint8_t>(columns, rows);
+        samples.masked(i, j) = 1;
+        continue;
+      }
       const float depth = view.depth(x, y);
-      if (DepthImage::IsHole(depth) || !CellUsable(view, x, y)) continue;
+      if (DepthImage::IsHole(depth)) continue;
       samples.inverse_depth(i, j) = 1.0 / static_cast<double>(depth);
     }
   }
@@ -123,6 +128,15 @@ bool IsWholeBlock(const Grid<double>& inverse_depth, int x, int y, const BreakRu
   if (!(inverse_depth(left, top) > 0 && inverse_depth(right, bottom) > 0)) return false;
   if (left == right && top == bottom) return true;
   return !EdgeBreaks(inverse_depth, left, top, right - left, bottom - top, rule);
+}
+
+bool IsMaskedBlock(const SampleGrid& samples, int x, int y) {
+  const Grid<std::uint8_t>& masked = samples.masked;
+  if (masked.empty()) return false;
+  const int left = std::max(x, 0), right = std::min(x + 1, masked.width() - 1);
+  const int top = std::max(y, 0), bottom = std::min(y + 1, masked.height() - 1);
+  return masked(left, top) != 0 && masked(right, top) != 0 && masked(left, bottom) != 0 &&
+         masked(right, bottom) != 0;
 }
 
 }  // namespace dtr

@@ -13,8 +13,11 @@ namespace dtr {
 /// (offset + i step, offset + j step).
 struct SampleGrid {
   Grid<double> inverse_depth;  ///< 1/z per sample, 1 / scene units; 0 where there is no sample
-  int step = 1;                ///< R, in depth pixels
-  int offset = 0;              ///< R / 2
+  /// 1 for samples that are no holes of the depth map alone: all image pixels of their cells are
+  /// masked. Empty where there are none.
+  Grid<std::uint8_t> masked;
+  int step = 1;    ///< R, in depth pixels
+  int offset = 0;  ///< R / 2
   /// Position of sample (i, j)'s centre on the depth grid: offset + 0.5 + i step, pixels.
   double Centre(int i) const { return offset + 0.5 + static_cast<double>(i) * step; }
 };
@@ -54,5 +57,9 @@ BlockTriangles TrianglesOfBlock(const Grid<double>& inverse_depth, int x, int y,
 /// x from -1 to width - 1 and y likewise: around the grid its outermost samples stand once more, so
 /// that a block there is an edge or a single sample.
 bool IsWholeBlock(const Grid<double>& inverse_depth, int x, int y, const BreakRule& rule);
+
+/// SPEC 5.2. True when all samples of a block are masked: the view does not look there. x and y as
+/// for IsWholeBlock.
+bool IsMaskedBlock(const SampleGrid& samples, int x, int y);
 
 }  // namespace dtr

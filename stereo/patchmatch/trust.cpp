@@ -6,6 +6,7 @@
 
 #include "dtr/base/parallel_for.h"
 #include "stereo/patchmatch/planar_prior.h"
+#include "stereo/patchmatch/speckles.h"
 
 namespace dtr::stereo::patchmatch {
 namespace {
@@ -37,14 +38,6 @@ constexpr int kAskedRows = 8;
 constexpr int kAskedAsideX = 6, kAskedAsideY = 1;
 /// Inverse depths may miss the range by so many standard deviations.
 constexpr float kRangeSigmas = 3.0f;
-/// Connected areas smaller than this share of the image are taken for chance matches. Pixels
-/// connect across at most this many pixels of disparity.
-constexpr double kSpeckleShare = 1e-4;
-constexpr float kSpeckleStepPx = 1.0f;
-/// Bars of a fence and leaves are small too; they stay when on average so many views' planes lead
-/// to them. On plaza 0.6 % more true pixels within 1 %, 0.2 % more outliers.
-constexpr float kSpeckleSupport = 1.5f;
-
 /// Log odds that a kept depth is wrong by more than 2 pixels of disparity, as a logistic regression
 /// on plaza gives them (exact cameras, 2.3 million pixels; ACCURACY.md): the views' photos differ,
 /// few of them have a minimum there, the minimum is flat.
@@ -74,40 +67,6 @@ void Combine(float prior, Verdict* v) {
   const float expected = 1 / (prior_sigma * prior_sigma);
   v->w = (seen * v->w + expected * prior) / (seen + expected);
   v->sigma = 1 / std::sqrt(seen + expected);
-}
-
-/// Makes holes of small connected areas. `consistent`: views whose planes lead to the pixel.
-void RemoveSpeckles(const Grid<float>& px_per_w, const Grid<std::uint8_t>& consistent, float near_z,
-                    DepthEstimate* estimate) {
-  const int w = px_per_w.width(), h = px_per_w.height();
-  const int least = static_cast<int>(std::ceil(kSpeckleShare * w * h));
-  DepthImage& depth = estimate->depth;
-  Grid<std::uint8_t> seen(w, h);
-  std::vector<std::pair<int, int>> area;
-  for (int y0 = 0; y0 < h; ++y0) {
-    for (int x0 = 0; x0 < w; ++x0) {
-      if (seen(x0, y0) || DepthImage::IsHole(depth(x0, y0))) continue;
-      area.assign(1, {x0, y0});
-      seen(x0, y0) = 1;
-      for (size_t next = 0; next < area.size(); ++next) {
-        const auto [x, y] = area[next];
-        for (const auto& [dx, dy] : {std::pair(1, 0), {-1, 0}, {0, 1}, {0, -1}}) {
-          const int u = x + dx, v = y + dy;
-          if (!depth.Contains(u, v) || seen(u, v) || DepthImage::IsHole(depth(u, v))) continue;
-          const float step = near_z / depth(x, y) - near_z / depth(u, v);
-          if (std::abs(step) * px_per_w(x, y) > kSpeckleStepPx) continue;
-          seen(u, v) = 1;
-          area.emplace_back(u, v);
-        }
-      }
-      if (static_cast<int>(area.size()) >= least) continue;
-      int support = 0;
-      for (const auto& [x, y] : area) support += consistent(x, y);
-      if (static_cast<float>(support) >= kSpeckleSupport * static_cast<float>(area.size()))
-        continue;
-      for (const auto& [x, y] : area) depth(x, y) = estimate->inverse_depth_sigma(x, y) = 0;
-    }
-  }
 }
 
 /// Makes holes of areas whose texture leaves several places open.
@@ -175,7 +134,8 @@ DepthEstimate TrustedDepth(const Level& level, const StereoView& view, const Dep
       if (v.sigma > 0) keep(x, y, v);
     }
   });
-  RemoveSpeckles(px_per_w, consistent, static_cast<float>(range.near_z), &result);
+  RemoveSpeckles(
+      {px_per_w, consistent, static_cast<float>(range.near_z), level.w_max - level.w_min}, &result);
   const Grid<float> prior = PlanarPrior(weak_cost, result.depth, px_per_w, threads, state);
   ParallelFor(0, h, threads, [&](int y) {
     std::vector<Verdict> row(static_cast<size_t>(w));

@@ -239,5 +239,29 @@ TEST(HeldSurfaces, AHoleSaysAQuarterOfADepth) {
   }
 }
 
+TEST(HeldSurfaces, WhatIsMaskedSaysNothing) {
+  // The view at the novel camera's own place outweighs all others: its hole hides what they hold.
+  DtrSet set;
+  WithAPatchInTheAir("none", {0.0, 0.5, 1}, set);
+  const Shot novel = ShotFrom("n", {0, 0, 0}, {0, 0, 10});
+  const auto picture = [&] {
+    return Render(MakeRenderScene(set), novel.camera, novel.cam_from_world,
+                  OptionsOf(RenderMethod::kDeferred));
+  };
+  View& nearest = set.frames[0].views[0];
+  for (float& z : nearest.depth.grid().data()) z = 0;
+  EXPECT_EQ(picture().coverage(48, 36), 0);
+  nearest.mask = Mask(nearest.camera.width_px(), nearest.camera.height_px());
+  const RenderResult masked = picture();
+  EXPECT_NEAR(masked.depth(48, 36), 10, 1e-4);
+  // What a masked view would weigh is the others': the picture is that of the set without it.
+  const std::vector<std::string> without = {nearest.id};
+  ExpectSameBytes(masked, Render(MakeRenderScene(set, without), novel.camera, novel.cam_from_world,
+                                 OptionsOf(RenderMethod::kDeferred)));
+  // Masked samples beside others: these still say what they say.
+  nearest.mask(48, 36) = 255;
+  EXPECT_EQ(picture().coverage(48, 36), 0);
+}
+
 }  // namespace
 }  // namespace dtr::cpu

@@ -73,6 +73,33 @@ TEST_F(Parity, HoldsForTheReportsAbsoluteThresholdsAndInLinearLight) {
   }
 }
 
+// Masked samples are no holes: they say nothing (SPEC 5.2), and squares of them are passed over.
+TEST_F(Parity, HoldsWhereViewsAreMaskedInLargePieces) {
+  NamedScene scene = ExactOrDamagedScene("courtyard", 5, 192, 128);
+  int k = 0;
+  for (View& view : scene.set.frames[0].views) {
+    if (view.mask.empty()) view.mask = Mask(192, 128, 1, 255);
+    for (int y = 0; y < 128; ++y) {
+      for (int x = 0; x < 192; ++x) {
+        const bool masked = (x / 64 + y / 64 + k) % 3 == 0;
+        const bool hole = x < 70 && y > 60 && k % 2 == 0;
+        if (masked) view.mask(x, y) = 0;
+        if (masked || hole) view.depth(x, y) = 0;
+      }
+    }
+    ++k;
+  }
+  RendererSettings shaders;
+  shaders.coarse_drawer = CoarseDrawer::kShaders;
+  Renderer by_processor, by_shaders(shaders);
+  for (const int resolution : {1, 2}) {
+    RenderOptions options = OptionsOf(RenderMethod::kDeferred);
+    options.resolution = resolution;
+    EXPECT_TRUE(ExpectParity(by_processor, scene, options).Holds()) << resolution;
+    EXPECT_TRUE(ExpectParity(by_shaders, scene, options).Holds()) << resolution;
+  }
+}
+
 TEST_F(Parity, WouldSeeHalfAPixel) {
   Renderer renderer;
   for (const std::string& name : ExactSceneNames()) {

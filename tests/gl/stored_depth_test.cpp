@@ -110,17 +110,22 @@ TEST(StoredDepth, WhatCodesCannotHoldStaysFloat) {
 }
 
 TEST(DepthPicture, HasTheEdgeOnceMoreAndThenABitPerBlock) {
-  Grid<double> w(19, 35);
+  SampleGrid samples;
+  samples.inverse_depth = Grid<double>(19, 35);
+  samples.masked = Grid<std::uint8_t>(19, 35);
+  Grid<double>& w = samples.inverse_depth;
   std::vector<float> values;
   Random random(5);
   for (int y = 0; y < 35; ++y) {
     for (int x = 0; x < 19; ++x) {
       w(x, y) = random.Uniform(0, 1) < 0.1 ? 0 : random.Uniform(1, 1.02);
+      const bool masked = x > 14 && y > 20;
+      if (masked) w(x, y) = 0, samples.masked(x, y) = 1;
       values.push_back(static_cast<float>(w(x, y)));
     }
   }
   const BreakRule rule{0.01, std::nullopt};
-  const std::vector<float> picture = DepthPicture(values, w, rule);
+  const std::vector<float> picture = DepthPicture(values, samples, rule);
   const LayerSize size = DepthPictureSize(19, 35);
   ASSERT_EQ(size, (LayerSize{20, 36 + 3}));
   ASSERT_EQ(picture.size(), 20u * 39u);
@@ -132,7 +137,9 @@ TEST(DepthPicture, HasTheEdgeOnceMoreAndThenABitPerBlock) {
         EXPECT_EQ(at(x, y), static_cast<float>(w(x, y)));
       }
       const auto bits = static_cast<unsigned>(at(x + 1, 36 + (y + 1) / 16));
-      EXPECT_EQ(bits >> ((y + 1) % 16) & 1, IsWholeBlock(w, x, y, rule) ? 1u : 0u) << x << " " << y;
+      const bool masked = x > 14 && y > 20;
+      EXPECT_EQ(bits >> ((y + 1) % 16) & 1, masked || IsWholeBlock(w, x, y, rule) ? 1u : 0u)
+          << x << " " << y;
       whole += IsWholeBlock(w, x, y, rule);
     }
   }

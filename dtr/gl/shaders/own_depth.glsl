@@ -1,7 +1,7 @@
 // SPEC 5.2, 5.3: what a view's full-resolution depth map says of a surface at a pixel, and the
 // view's own fragment there. Expects `depths`, an array of sampler2DArray laid out as DepthPicture
 // (dtr/gl/stored_depth.h) says: one value per sample (0: none) that a view's OwnMap turns into 1/z,
-// the last row and column once more, then which blocks are whole. Filtered to the nearest.
+// the last row and column once more, then which blocks are whole or all masked. Filtered to the nearest.
 // No branch: software rasterisers run both sides of one anyway.
 struct OwnMap {
   vec4 grid;    // 1 / width, 1 / height of the layer; columns / 2, rows / 2 of the samples in it
@@ -33,7 +33,8 @@ bool IsOnMap(OwnMap map, vec3 q, vec2 position) {
 #define DEPTHS(map) depths[map.slot]
 #endif
 
-// SPEC 5.3: the four samples right of and below `low` belong together.
+// SPEC 5.3: the four samples right of and below `low` belong together. SPEC 5.2: or they are all
+// masked, 0 in the map.
 bool IsWholeBlock(OwnMap map, vec2 low) {
   ivec2 block = ivec2(low) + 1;
   int first_row = int(2.0 * map.grid.w) + 1;
@@ -45,8 +46,10 @@ bool IsWholeBlock(OwnMap map, vec2 low) {
 // At inverse depth w the pixel's ray is at (base + away w) on the view's grid of samples,
 // homogeneous. SPEC 5.3: the inverse depth in the novel camera at which the ray meets the tangent
 // of the bilinear patch around where `surface` lies, else the nearest sample, flat; 0: it meets
-// none. `on_map`: the view looks there at all; `whole`: a patch of four samples was there.
-float OwnDepth(OwnMap map, vec3 base, vec3 away, float surface, out bool on_map, out bool whole) {
+// none. `on_map`: the place is on the view's map; `whole`: a patch of four samples was there; `masked`:
+// four masked ones were.
+float OwnDepth(OwnMap map, vec3 base, vec3 away, float surface, out bool on_map, out bool whole,
+               out bool masked) {
   vec3 q = base + away * surface;
   vec2 position = q.xy / q.z;
   on_map = surface > 0.0 && IsOnMap(map, q, position);
@@ -58,6 +61,7 @@ float OwnDepth(OwnMap map, vec3 base, vec3 away, float surface, out bool on_map,
   float top = mix(s.x, s.y, share.x), bottom = mix(s.z, s.w, share.x);
   vec2 column = share.x < 0.5 ? s.xz : s.yw;
   float stored = whole ? mix(top, bottom, share.y) : (share.y < 0.5 ? column.x : column.y);
+  masked = whole && !(stored > 0.0);
   vec2 slope =
       (whole ? map.stored.y : 0.0) * vec2(mix(s.y - s.x, s.w - s.z, share.y), bottom - top);
   float own = map.stored.x + map.stored.y * stored;
@@ -70,11 +74,11 @@ float OwnDepth(OwnMap map, vec3 base, vec3 away, float surface, out bool on_map,
 }
 
 // The view's say of `surface`, where its own patch lies at `seen` on the ray.
-void AddVote(OwnMap map, float surface, float seen, bool whole, bool on_map, float say,
-             inout Votes votes) {
-  say = on_map ? say : 0.0;
+void AddVote(OwnMap map, float surface, float seen, bool whole, bool masked, bool on_map,
+             float say, inout Votes votes) {
   float nearer = seen - surface;
   bool hole = !(seen > 0.0);
+  say = on_map && !masked ? say : 0.0;
   bool through = !hole && nearer < -kBehindPx * map.stored.z;
   bool holds = !hole && !through && nearer <= kHeldBeforePx * map.stored.z;
   votes.refused += hole ? kHoleSay * say : (through ? say : 0.0);
@@ -87,8 +91,8 @@ void AddVote(OwnMap map, float surface, float seen, bool whole, bool on_map, flo
 // The view's fragment near `surface`, which the views hold; 0 where this one shows another there, or
 // none.
 float Fragment(OwnMap map, vec3 base, vec3 away, float surface) {
-  bool on_map, whole;
-  float w = OwnDepth(map, base, away, surface, on_map, whole);
+  bool on_map, whole, masked;
+  float w = OwnDepth(map, base, away, surface, on_map, whole, masked);
   float nearer = w - surface;
   bool found = w > 0.0 && nearer <= kBeforePx * map.stored.z &&
                nearer >= -kBehindPx * map.stored.z && base.z + away.z * w > 0.0;

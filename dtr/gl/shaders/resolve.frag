@@ -84,9 +84,10 @@ bool FindOwnFragments(vec3 ray, float surface) {
     for (int i = 0; i < view_count; ++i) {
       ViewBlock view = views[i];
       OwnMap map = MapOf(view);
-      bool on_map, whole;
-      float seen = OwnDepth(map, BaseOf(view, ray), AwayOf(view), surface, on_map, whole);
-      AddVote(map, surface, seen, whole, on_map, Say(view, ray, surface), votes);
+      bool on_map, whole, masked;
+      float seen =
+          OwnDepth(map, BaseOf(view, ray), AwayOf(view), surface, on_map, whole, masked);
+      AddVote(map, surface, seen, whole, masked, on_map, Say(view, ray, surface), votes);
     }
     held = votes.held >= votes.refused;
     surface = !held ? votes.behind : votes.front > 0.0 ? votes.front : surface;

@@ -104,7 +104,7 @@ TEST(Refine, GivesEveryImageItsPrincipalPointWhereTheLensIsStabilised) {
 
 // So little that other faults of a lens model do as much: sure, and not worth a number per image.
 TEST(Refine, KeepsOnePrincipalPointWhereImagesGainNextToNothingByTheirOwn) {
-  const Refined refined = Refine(ModelFrom(Stabilised(MakeBundle(Noisy()), 0.4)), {});
+  const Refined refined = Refine(ModelFrom(Stabilised(MakeBundle(Noisy()), 0.2)), {});
   ASSERT_GE(refined.candidates.size(), 5u);
   const RefineCandidate& own = refined.candidates[4];
   EXPECT_LT(own.high_px2, 0) << "no longer sure: the test tells nothing";
