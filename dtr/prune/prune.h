@@ -50,7 +50,7 @@ struct PruneReport {
   /// Mean over held-out photos, which decide nothing; none: there are none.
   std::optional<double> photo_loss_db;
   double error_db = 0;  ///< PSNR against photos before, to which a loss is relative
-  /// The larger of the two checked losses. With its standard error it does not exceed max_loss_db.
+  /// The larger of the two checked losses. With two standard errors it does not exceed max_loss_db.
   double loss_db() const { return std::max(checked_probe_loss_db, witness_loss_db); }
 };
 

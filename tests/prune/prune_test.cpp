@@ -150,7 +150,8 @@ TEST(Errors, TellNewErrorFromOneThatTakesAnothersPlace) {
   EXPECT_EQ(StandardError(std::span(losses_db).first(1)), 0);
   const Check lucky{0.05, 0.06, 0.01, 0.02, std::nullopt, 30};
   EXPECT_FALSE(lucky.Holds(0.1));
-  EXPECT_TRUE(lucky.Holds(0.12));
+  EXPECT_FALSE(lucky.Holds(0.16));
+  EXPECT_TRUE(lucky.Holds(0.18));
 }
 
 TEST(Prune, AllowedNoLossLeavesOutOnlyWhatNobodySees) {
