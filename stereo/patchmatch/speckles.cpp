@@ -20,8 +20,8 @@ constexpr float kLeastSupport = 1.5f;
 /// this share of the range that was searched, at least so many pixels; of those around, weighted by
 /// their pixels, so many must.
 constexpr int kSquarePx = 16;
-constexpr float kAgreeingShareOfRange = 0.05f, kLeastAgreeingPx = 2.0f;
-constexpr float kLeastCompany = 0.25f;
+constexpr float kAgreeingShareOfRange = 0.03f, kLeastAgreeingPx = 2.0f;
+constexpr float kLeastCompany = 1.0f / 3;
 
 struct Speckle {
   std::vector<std::pair<int, int>> pixels;
