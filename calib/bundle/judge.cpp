@@ -373,7 +373,11 @@ void AddPicture(const BundleLimits& limits, Judgement& judgement) {
 void AddShutter(const BundleLimits& limits, const Adjusted& fresh,
                 const BundleCovariance& covariance, Judgement& judgement) {
   const ShutterTest test = TestShutter(fresh, covariance);
-  if (!test.not_tested.empty()) return;
+  if (!test.not_tested.empty()) {
+    judgement.tests.push_back(
+        AtMost("rolling_shutter_px", 0, limits.max_shutter_px, "not tested: " + test.not_tested));
+    return;
+  }
   const bool chance = test.p >= limits.min_p;
   Check check = AtMost(
       "rolling_shutter_px", chance ? 0 : test.amplitude_px, limits.max_shutter_px,

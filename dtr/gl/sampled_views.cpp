@@ -60,14 +60,17 @@ std::vector<std::uint32_t> CellsOf(const SampleGrid& samples, int* stride) {
       // Blocks -1 + kSize x and on, each of two samples per axis.
       const int right = std::min(kSize * (x + 1), w.width());
       const int bottom = std::min(kSize * (y + 1), w.height());
-      bool some = false, looked = samples.masked.empty();
+      bool some = false, looked = samples.masked.empty(), masked = false;
       for (int j = std::max(0, kSize * y - 1); j < bottom && !some; ++j) {
         for (int i = std::max(0, kSize * x - 1); i < right && !some; ++i) {
           some = w(i, j) > 0;
-          looked = looked || samples.masked(i, j) == 0;
+          const bool hidden = !samples.masked.empty() && samples.masked(i, j) != 0;
+          looked = looked || !hidden;
+          masked = masked || hidden;
         }
       }
-      if (some) continue;
+      // Where a view looks at a part of it alone each block must be asked (SPEC 5.2).
+      if (some || (looked && masked)) continue;
       cells[static_cast<size_t>(y) * static_cast<size_t>(columns) + static_cast<size_t>(x)] =
           looked ? kCellOfHoles : kMaskedCell;
       ++empty;
