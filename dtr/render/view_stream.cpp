@@ -128,23 +128,18 @@ ViewStream::ViewStream(DtrSet& set, std::vector<RenderScene> described, Loader l
 
 ViewStream::~ViewStream() = default;
 
-bool ViewStream::IsLost(const Slot& slot, Pixels pixels) const {
-  const bool held = slot.released && pixels == Pixels::kOrReleased;
-  return slot.state == State::kLost && !held;
-}
-
-std::vector<size_t> ViewStream::NotLost(Pixels pixels) const {
+std::vector<size_t> ViewStream::NotLost() const {
   std::vector<size_t> slots;
   for (size_t i = first_slot_[shown_]; i < first_slot_[shown_ + 1]; ++i) {
-    if (!IsLost(slots_[i], pixels) && !IsHidden(slots_[i])) slots.push_back(i);
+    if (slots_[i].state != State::kLost && !IsHidden(slots_[i])) slots.push_back(i);
   }
   return slots;
 }
 
-void ViewStream::RequireAnyReadable(Pixels pixels) const {
+void ViewStream::RequireAnyReadable() const {
   const auto begin = slots_.begin() + static_cast<std::ptrdiff_t>(first_slot_[shown_]);
   const auto end = slots_.begin() + static_cast<std::ptrdiff_t>(first_slot_[shown_ + 1]);
-  const auto lost = [&](const Slot& slot) { return IsLost(slot, pixels); };
+  const auto lost = [](const Slot& slot) { return slot.state == State::kLost; };
   if (begin == end || !std::all_of(begin, end, lost)) return;
   throw Error("views: expected at least one that can be read, found none; the first: " +
               begin->told);
@@ -171,9 +166,9 @@ RenderScene ViewStream::SceneOf(const std::vector<size_t>& slots) const {
   return scene;
 }
 
-ViewStream::Needed ViewStream::NeededFor(const Pose& novel_from_world, const RenderOptions& options,
-                                         Pixels pixels) const {
-  const std::vector<size_t> candidates = NotLost(pixels);
+ViewStream::Needed ViewStream::NeededFor(const Pose& novel_from_world,
+                                         const RenderOptions& options) const {
+  const std::vector<size_t> candidates = NotLost();
   RenderScene scene = SceneOf(candidates);
   // From all views: what was lost so far may depend on what was read ahead.
   RenderScene all = described_.at(shown_);
@@ -226,8 +221,7 @@ void ViewStream::Release(const View& view) {
 size_t ViewStream::decoded_bytes() const {
   size_t bytes = bytes_;
   for (const Slot& slot : slots_) {
-    const bool there = slot.state == State::kPresent || slot.state == State::kReading;
-    if (slot.released && !there) bytes += slot.bytes;
+    if (slot.released && slot.state == State::kAbsent) bytes += slot.bytes;
   }
   return bytes;
 }
@@ -248,8 +242,8 @@ void ViewStream::Collect(bool wait) {
   for (Readers::Result& result : readers_->Take(wait)) {
     Slot& slot = slots_[result.slot];
     --reading_;
+    slot.released = false;
     if (result.error.empty()) {
-      slot.released = false;
       slot.view->image = std::move(result.view.image);
       slot.view->mask = std::move(result.view.mask);
       slot.view->depth = std::move(result.view.depth);
@@ -279,8 +273,8 @@ RenderScene ViewStream::SceneFor(const Pose& novel_from_world, const RenderOptio
   Needed needed;
   for (;;) {
     ++now_;
-    RequireAnyReadable(pixels);
-    needed = NeededFor(novel_from_world, options, pixels);
+    RequireAnyReadable();
+    needed = NeededFor(novel_from_world, options);
     for (const size_t slot : needed.slots) slots_[slot].last_used = now_;
     if (pixels == Pixels::kInMemory &&
         std::any_of(needed.slots.begin(), needed.slots.end(),
@@ -299,7 +293,7 @@ RenderScene ViewStream::SceneFor(const Pose& novel_from_world, const RenderOptio
   }
   const bool all_fit = needed.slots.size() == needed.wanted;
   if (!all_fit) WarnOfRoom(needed.slots.size(), needed.wanted);
-  std::vector<size_t> drawn = NotLost(pixels);
+  std::vector<size_t> drawn = NotLost();
   if (wait == Wait::kForNone) {
     std::erase_if(drawn, [&](size_t slot) { return !IsThere(slot, pixels); });
   } else if (!all_fit && needed.per_pixel) {
@@ -315,7 +309,7 @@ RenderScene ViewStream::SceneFor(const Pose& novel_from_world, const RenderOptio
 void ViewStream::Prefetch(const Pose& novel_from_world, const RenderOptions& options,
                           Pixels pixels) {
   Collect(false);
-  const Needed needed = NeededFor(novel_from_world, options, pixels);
+  const Needed needed = NeededFor(novel_from_world, options);
   for (const size_t slot : needed.slots) slots_[slot].last_used = now_;  // not for each other
   Request(needed.slots, pixels);
 }

@@ -47,8 +47,7 @@ class ViewStream {
     kOrReleased,  ///< and those whose pixels were released, for a renderer that holds what it needs
   };
 
-  /// A view that could not be read: it is not drawn from again unless RetryLost says so, but where
-  /// Pixels::kOrReleased is asked for and a renderer holds what it made of it before.
+  /// A view that could not be read: it is not drawn from again unless RetryLost says so.
   struct Lost {
     std::string name, reason;
     const View* view = nullptr;
@@ -120,11 +119,10 @@ class ViewStream {
     bool per_pixel = false;
     size_t wanted = 0;  ///< what SelectViews asks for
   };
-  Needed NeededFor(const Pose& novel_from_world, const RenderOptions& options, Pixels pixels) const;
+  Needed NeededFor(const Pose& novel_from_world, const RenderOptions& options) const;
   RenderScene SceneOf(const std::vector<size_t>& slots) const;
-  std::vector<size_t> NotLost(Pixels pixels) const;  ///< nor hidden; of the shown frame
-  bool IsLost(const Slot& slot, Pixels pixels) const;
-  void RequireAnyReadable(Pixels pixels) const;
+  std::vector<size_t> NotLost() const;  ///< nor hidden; of the shown frame
+  void RequireAnyReadable() const;
   bool IsHidden(const Slot& slot) const;
   /// Asks for the absent ones of these, as far as dropping others gives room.
   void Request(const std::vector<size_t>& slots, Pixels pixels);

@@ -259,36 +259,6 @@ TEST(ViewStream, ReleasedViewsAreDrawnFromWithoutPixelsAndReadAgainWhenThoseAreN
   EXPECT_EQ(stream.decoded_bytes(), 3 * disk.view_bytes);
 }
 
-TEST(ViewStream, ReleasedViewsWhoseFilesVanishedAreStillDrawnFromByWhoHoldsThem) {
-  Disk disk;
-  ViewStream stream(disk.set, DescribeRenderScene(disk.set), disk.Loader(), Room(4 << 20));
-  const Pose camera = disk.Camera(-1.2);
-  const std::vector<std::string> with = Expected(disk, camera, Nearest(3));
-  const auto drawn = [&](ViewStream::Pixels pixels) {
-    const RenderScene scene =
-        stream.SceneFor(camera, Nearest(3), ViewStream::Wait::kForAll, pixels);
-    std::vector<std::string> ids;
-    for (const int index : SelectViews(scene, camera, Nearest(3)).views) {
-      ids.push_back(scene.views[static_cast<size_t>(index)]->id);
-    }
-    return ids;
-  };
-  ASSERT_EQ(drawn(ViewStream::Pixels::kInMemory), with);
-  for (View& view : disk.set.frames[0].views) {
-    if (view.id == with[0]) stream.Release(view);
-  }
-  disk.broken[with[0]] = "images/x.jpg: gone";
-  // Who looks at pixels does without it, who holds what it made of them does not.
-  EXPECT_NE(drawn(ViewStream::Pixels::kInMemory), with);
-  ASSERT_EQ(stream.lost().size(), 1u);
-  EXPECT_EQ(drawn(ViewStream::Pixels::kOrReleased), with);
-  EXPECT_NE(drawn(ViewStream::Pixels::kInMemory), with);
-  disk.broken.clear();
-  EXPECT_EQ(stream.RetryLost([](const View&) { return true; }), 1u);
-  EXPECT_EQ(drawn(ViewStream::Pixels::kInMemory), with);
-  EXPECT_TRUE(stream.lost().empty());
-}
-
 TEST(ViewStream, FilesThatComeBackAreReadAgain) {
   Disk disk;
   std::vector<std::string> warnings;
