@@ -18,7 +18,7 @@ constexpr double kLossSigmas = 2;  // scale of the loss that unseen points and s
 constexpr int kMostPoints = 4000;  // that the candidates are compared on
 // A principal point for every image also takes up what other faults of a lens model leave, and
 // costs the lens's own principal point: what the images share, nothing but the prior says. So it
-// must predict sights closer by this share; a stabiliser's pixels are worth several times that.
+// must meet unseen points closer by this share; a stabiliser's pixels are worth several times that.
 constexpr double kLeastGainPerImage = 0.01;
 constexpr std::array kRisingFreedom{LensFreedom::kNoPrincipalPoint, LensFreedom::kAll,
                                     LensFreedom::kTangential, LensFreedom::kPrincipalPointPerImage,

@@ -18,8 +18,8 @@ constexpr TileRule kTileRules[] = {{3, 8}, {2, 12}, {2, 27}, {1, 18}};
 // A view that a pixel looks at and finds a tile left out costs about so much of one that is there:
 // its place is found, nothing is looked up.
 constexpr double kLookAtNothing = 0.3;
-// What frames take of those with default meshes and all samples (docs/ACCURACY.md, courtyard and
-// fern); more of either saves little more.
+// What frames take of those with default meshes and all samples: guesses near what was measured
+// (docs/accuracy/SPEED.md has 0.89 and 0.63 on courtyard); more of either saves little more.
 constexpr double kCoarseMesh = 0.89, kFewerSamples = 0.8;
 
 const TileRule& RuleOf(double level) { return kTileRules[static_cast<size_t>(level) - 1]; }

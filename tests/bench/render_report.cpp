@@ -1,5 +1,5 @@
 // render_report: which rendering options suit a set? PSNR on photos it was not rendered from, one
-// line for every combination of the values given; docs/ACCURACY.md has the figures.
+// line for every combination of the values given; docs/accuracy/RENDERING.md has the figures.
 //
 //   render_report SET.dtr [held-out] [threads=N] [KEY=VALUE[,VALUE...]]...
 //   render_report sceaux.dtr views=1,2,4,8 exponent=8,64 linear=0,1
