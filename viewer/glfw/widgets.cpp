@@ -80,9 +80,13 @@ void Widgets::Absolute(const char* name, std::optional<double>& value) {
   Note(std::string(name) + " on", false);
   ImGui::SameLine();
   double number = value.value_or(kReportsThreshold);
+  // Narrower by the box before it, so that names begin below each other and none is cut.
+  ImGui::PushItemWidth(ImGui::CalcItemWidth() - ImGui::GetFrameHeight() -
+                       ImGui::GetStyle().ItemSpacing.x);
   ImGui::BeginDisabled(!on);
   Real(name, number, 1e-4, 1e4);
   ImGui::EndDisabled();
+  ImGui::PopItemWidth();
   if (on) value = number;
   ImGui::PopID();
 }
