@@ -13,7 +13,7 @@ constexpr float kSmoothRatio = 1.03f;
 
 /// Exponent by which sigma grows with the share of the maps that refute a kept pixel: their log
 /// odds in a logistic regression of depths that are wrong by more than 2 pixels on plaza
-/// (ACCURACY.md).
+/// (docs/accuracy/DEPTH.md).
 constexpr double kDoubtPerRefuting = 5;
 
 /// Inverse depth of a map at a pixel position: bilinear on one surface, else the nearest pixel's.

@@ -206,7 +206,7 @@ void RequireDetermined(const SfmModel& model, const RefineOptions& options,
     if (!d.harmful || d.name == "duplicate_images" || d.name == "too_few_views") continue;
     throw Error(
         fmt::format("{}: {}: {}; expected views that determine the cameras; "
-                    "docs/CALIBRATION.md says what to do",
+                    "docs/VALIDATION.md says what to do",
                     what, d.name, d.detail));
   }
 }

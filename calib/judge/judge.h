@@ -14,7 +14,7 @@
 
 namespace dtr::calib {
 
-/// What a calibration must reach; docs/CALIBRATION.md says why these are the defaults.
+/// What a calibration must reach; docs/VALIDATION.md says why these are the defaults.
 struct JudgeLimits {
   double max_rms_px = 1;            ///< on views that the solve has not seen
   double max_rms_ratio = 1.5;       ///< of that, over what the solve's own residuals promise
@@ -30,7 +30,7 @@ struct JudgeLimits {
   double min_tilt_deg = 15;   ///< largest angle between two boards, worst camera
   double min_p = 1e-4;        ///< less likely by chance than this is no chance
   /// A pattern in the residuals that is no chance: RMS per coordinate. What OpenCV's corner
-  /// refinement does to corners is about 0.03 px (docs/CALIBRATION.md).
+  /// refinement does to corners is about 0.03 px (docs/VALIDATION.md).
   double max_pattern_px = 0.05;
   double max_time_offset_sigmas = 4.5;  ///< of a camera's delay against the first camera
 };
@@ -79,7 +79,7 @@ struct JudgeReport {
   bool passed() const { return AllPassed(tests); }
 };
 
-/// Everything docs/CALIBRATION.md lists, in its order. A test that cannot be made fails and says
+/// Everything docs/VALIDATION.md lists, in its order. A test that cannot be made fails and says
 /// why; a degeneracy is named. Requires kept or unseen views of every camera; throws Error without.
 JudgeReport Judge(const JudgedCalibration& calibration, const std::optional<UnseenViews>& unseen,
                   const JudgeLimits& limits, int threads = 0);

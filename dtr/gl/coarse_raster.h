@@ -18,8 +18,8 @@ struct PlacedMesh {
 
 /// The same surface as coarse_triangles.comp and coarse_cells.comp draw, up to single precision.
 /// Software rasterisers emulate a shader's scattered writes one by one, each an atomic operation;
-/// plain C++ takes a fourth of their CPU time (docs/ACCURACY.md). Keeps its buffers from frame to
-/// frame.
+/// plain C++ takes a fourth of their CPU time (docs/accuracy/SPEED.md). Keeps its buffers from
+/// frame to frame.
 class CoarseRaster {
  public:
   /// The nearest surface of all meshes in the band's pixels; `threads` as ParallelFor, the result

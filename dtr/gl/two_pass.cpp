@@ -9,8 +9,8 @@ namespace dtr::gl {
 namespace {
 
 // llvmpipe keeps what it has set up of a picture (some 200 bytes a triangle) in memory until it is
-// flushed: pieces that fit a core's cache cost a fifth less than whole meshes (docs/ACCURACY.md).
-// A GPU would only lose by it.
+// flushed: pieces that fit a core's cache cost a fifth less than whole meshes
+// (docs/accuracy/SPEED.md). A GPU would only lose by it.
 constexpr GLsizei kIndicesPerFlush = 3 * 50000;
 
 void DrawTriangles(GLsizei index_count) {

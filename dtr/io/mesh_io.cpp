@@ -19,7 +19,6 @@ static_assert(std::endian::native == std::endian::little, "bytes are copied as t
 
 constexpr char kMagic[9] = "DTRMESH1";
 constexpr size_t kHashBytes = 32;
-constexpr size_t kHeaderBytes = 8 + 3 * 4 + 4 + 2 * kHashBytes + 3 * 8 + 8;
 constexpr std::uintmax_t kLimitBytes = std::uintmax_t{512} << 20;
 constexpr int kMostSamples = 1 << 20;  // a side: an image has at most 400 Mpx
 constexpr double kNoAbsoluteBreak = -1;

@@ -33,7 +33,7 @@ struct RenderOptions {
   int views = 8;            ///< K: at most so many of the valid views, the nearest by angle
   int resolution = 1;       ///< R: every R-th depth pixel per axis
   double point_size = 1.0;  ///< splats: factor on the footprint
-  // Defaults are what held-out views of real photos liked best, docs/ACCURACY.md.
+  // Defaults are what held-out views of real photos liked best, docs/accuracy/RENDERING.md.
   BlendWeight blend = BlendWeight::kInverseAngle;
   double exponent = 8.0;                        ///< n of kCosine
   double falloff = 8.0;                         ///< c of kExponential, per radian

@@ -10,7 +10,7 @@ namespace dtr::stereo::patchmatch {
 namespace {
 
 /// Reliable pixels farther away than this say nothing. Sky between branches is enclosed too, but
-/// seldom this closely. See ACCURACY.md.
+/// seldom this closely. See docs/accuracy/DEPTH.md.
 constexpr int kReachPx = 16;
 constexpr int kDirections[4][2] = {{-1, 0}, {1, 0}, {0, -1}, {0, 1}};
 

@@ -39,8 +39,8 @@ constexpr int kAskedAsideX = 6, kAskedAsideY = 1;
 /// Inverse depths may miss the range by so many standard deviations.
 constexpr float kRangeSigmas = 3.0f;
 /// Log odds that a kept depth is wrong by more than 2 pixels of disparity, as a logistic regression
-/// on plaza gives them (exact cameras, 2.3 million pixels; ACCURACY.md): the views' photos differ,
-/// few of them have a minimum there, the minimum is flat.
+/// on plaza gives them (exact cameras, 2.3 million pixels; docs/accuracy/DEPTH.md): the views'
+/// photos differ, few of them have a minimum there, the minimum is flat.
 constexpr float kOddsOfWrong = -2.7f, kOddsPerCost = 3.6f, kOddsPerView = -0.44f;
 constexpr float kOddsPerLogSigma = 0.44f, kLeastSigmaPx = 0.02f;
 /// What a wrong depth adds to sigma, pixels of disparity. Wrong depths are wrong by tens of pixels;

@@ -345,7 +345,7 @@ TEST(Validate, JsonSurvivesHostileNames) {
   }
 }
 
-/// One line per judgement: docs/CALIBRATION.md's tables are made of them.
+/// One line per judgement: docs/VALIDATION.md's tables are made of them.
 bool PassesTold(const char* what, const ValidationReport& report) {
   std::cout << "  " << what;
   for (const Check& c : report.tests) std::cout << "  " << c.name << " " << c.value;

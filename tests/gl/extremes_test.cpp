@@ -1,6 +1,6 @@
 // Cameras, depth and options that nobody would choose: no NaN, no infinity, no contradiction.
-// DTR_EXTREME_CAMERAS sets how many random cameras are tried (200); docs/ACCURACY.md has the
-// longest run.
+// DTR_EXTREME_CAMERAS sets how many random cameras are tried (200); docs/accuracy/RENDERING.md has
+// the longest run.
 #include <gtest/gtest.h>
 
 #include <cmath>
