@@ -11,8 +11,8 @@
 
 namespace dtr::colmap {
 
-/// Unit-length SIFT descriptors of a small image, one per row.
-using SmallFeatures = Eigen::Matrix<float, Eigen::Dynamic, 128, Eigen::RowMajor>;
+/// Unit-length SIFT descriptors of a small image, 128 numbers each, one per row.
+using SmallFeatures = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 inline constexpr int kSmallSidePx = 512;    ///< long side of the small images
 inline constexpr int kSmallFeatures = 384;  ///< the strongest features kept of each

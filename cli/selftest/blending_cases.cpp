@@ -130,8 +130,8 @@ Outcome Duplicates(const Conditions&) {
   Random random(4);
   for (const BlendWeight weight : kWeights) {
     for (int k = 0; k < 100; ++k) {
-      std::vector<double> angles = RandomAngles(4, 1.5, random);
-      angles.insert(angles.end(), {angles[0], angles[0], angles[2]});
+      const std::vector<double> one = RandomAngles(4, 1.5, random);
+      const std::vector<double> angles = {one[0], one[1], one[2], one[3], one[0], one[0], one[2]};
       shares.Draw(Of(weight), angles, outcome);
     }
   }
