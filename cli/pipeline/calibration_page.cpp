@@ -15,6 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr size_t kWorstViews = 4;
+constexpr double kSamePx = 1e-3;  // a map of less than that shows rounding
 
 PlotSize SizeOf(const calib::LensCamera& lens) { return {lens.width_px, lens.height_px}; }
 
@@ -34,6 +35,17 @@ void AddCameraTable(report::HtmlReport& page, const calib::JudgeReport& judged) 
   page.Section("Residuals, px");
   page.Paragraph("Noise: what the noise of the pixels alone makes of a corner's coordinate.");
   page.Table({"Camera", "Corners", "Count", "RMS", "Median", "95 %", "Worst", "Noise"}, rows);
+}
+
+void AddDifference(report::HtmlReport& page, const PlotSize& size,
+                   const calib::ImageMap& difference) {
+  if (difference.Largest() < kSamePx) {
+    page.Paragraph(fmt::format(
+        "What is stored and what a fresh solve makes of it differ by less than {} px everywhere.",
+        kSamePx));
+    return;
+  }
+  AddMap(page, "Stored less fresh solve", " px", size, difference);
 }
 
 void AddWorstViews(report::HtmlReport& page, const calib::LensCamera& lens,
@@ -87,7 +99,7 @@ std::string CalibrationPage(const calib::Calibration& calibration, const calib::
     AddMap(page, "Standard deviation of a projection at the boards' distance", " px", size,
            camera.near_uncertainty);
     AddMap(page, "The same at infinity", " px", size, camera.far_uncertainty);
-    AddMap(page, "Stored less fresh solve", " px", size, camera.difference);
+    AddDifference(page, size, camera.difference);
     page.Paragraph("The worst views:");
     AddWorstViews(page, lens, camera, images);
   }

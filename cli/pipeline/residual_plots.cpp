@@ -14,6 +14,34 @@ namespace {
 constexpr double kDrawnWidth = 720;   // px of a plot
 constexpr double kLongestArrow = 40;  // px of a plot, the 95 % residual
 constexpr int kPhotoQuality = 70;
+// A map that spans more than this is coloured by its logarithm: else all but its worst corner is
+// one colour. What is less than a thousandth of the largest value is as dark as that.
+constexpr double kWideSpan = 20, kWidestSpan = 1000;
+
+// Finite values from the least to the largest as 0 to 1.
+class Shade {
+ public:
+  explicit Shade(const calib::ImageMap& map) : least_(map.Largest()), largest_(map.Largest()) {
+    for (const double v : map.values) {
+      if (std::isfinite(v)) least_ = std::min(least_, v);
+    }
+    by_logarithm_ = least_ > 0 && largest_ > kWideSpan * least_;
+  }
+  double least() const { return least_; }
+  double largest() const { return largest_; }
+  bool by_logarithm() const { return by_logarithm_; }
+  double Of(double value) const {
+    if (by_logarithm_) {
+      const double darkest = std::max(least_, largest_ / kWidestSpan);
+      return std::max(0.0, std::log(value / darkest) / std::log(largest_ / darkest));
+    }
+    return largest_ > 0 ? value / largest_ : 0;
+  }
+
+ private:
+  double least_, largest_;
+  bool by_logarithm_ = false;
+};
 
 }  // namespace
 
@@ -59,29 +87,30 @@ std::string PhotoBehind(const PlotSize& size, const ImageRgb8& photo) {
 
 void AddMap(report::HtmlReport& page, const std::string& what, const std::string& unit,
             const PlotSize& size, const calib::ImageMap& map) {
-  const double largest = map.Largest();
-  if (!std::isfinite(largest)) return;
+  if (!std::isfinite(map.Largest())) return;
+  const Shade shade(map);
   std::string body;
-  double least = largest;
-  for (const double v : map.values) {
-    if (std::isfinite(v)) least = std::min(least, v);
-  }
+  bool blank = false;
   const double w = static_cast<double>(size.width_px) / map.columns;
   const double h = static_cast<double>(size.height_px) / map.rows;
   for (int row = 0; row < map.rows; ++row) {
     for (int column = 0; column < map.columns; ++column) {
       const double v = map.values[static_cast<size_t>(row * map.columns + column)];
-      if (!std::isfinite(v)) continue;
-      const auto color =
-          report::PaletteColor(report::Palette::kColor, largest > 0 ? v / largest : 0);
+      if (!std::isfinite(v)) {
+        blank = true;
+        continue;
+      }
+      const auto color = report::PaletteColor(report::Palette::kColor, shade.Of(v));
       body += fmt::format(
           "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" "
           "fill=\"#{:02x}{:02x}{:02x}\"/>",
           column * w, row * h, w + 0.5, h + 0.5, color[0], color[1], color[2]);
     }
   }
-  page.Svg(fmt::format("{}: {:.3g}{} (dark) to {:.3g}{} (bright), median {:.3g}{}", what, least,
-                       unit, largest, unit, map.Median(), unit),
+  page.Svg(fmt::format("{}: {:.3g}{} (dark) to {:.3g}{} (bright){}, median {:.3g}{}{}", what,
+                       shade.least(), unit, shade.largest(), unit,
+                       shade.by_logarithm() ? ", by the logarithm" : "", map.Median(), unit,
+                       blank ? "; blank: unknown" : ""),
            ImagePlot(size, body));
 }
 

@@ -28,8 +28,9 @@ double ArrowGain(const PlotSize& size, const calib::ResidualStats& stats);
 /// A photo behind what is drawn, pale; it may be smaller than the image.
 std::string PhotoBehind(const PlotSize& size, const ImageRgb8& photo);
 
-/// A map as coloured cells, with its smallest, largest and median value, in `unit`, in the caption.
-/// Nothing is added for a map without a finite value.
+/// A map as coloured cells, with its smallest, largest and median value, in `unit`, in the caption;
+/// one that spans much is coloured by the logarithm, and cells without a value are blank, which the
+/// caption says. Nothing is added for a map without a finite value.
 void AddMap(report::HtmlReport& page, const std::string& what, const std::string& unit,
             const PlotSize& size, const calib::ImageMap& map);
 

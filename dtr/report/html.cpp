@@ -62,8 +62,11 @@ bool LooksLikeNumber(const Cell& cell) {
                               (*text)[i] == '.' || (*text)[i] == 'e')) {
     ++i;
   }
-  return i > first && std::isdigit(static_cast<unsigned char>((*text)[first])) != 0 &&
-         text->size() - i <= 4;
+  const auto is_digit = [&](size_t at) {
+    return std::isdigit(static_cast<unsigned char>((*text)[at])) != 0;
+  };
+  // A unit may follow; what follows a dot is no unit: 0010.jpg is a name.
+  return i > first && is_digit(first) && is_digit(i - 1) && text->size() - i <= 4;
 }
 
 }  // namespace

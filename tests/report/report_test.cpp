@@ -168,6 +168,14 @@ TEST(HtmlReport, NeedsNothingFromOutsideAndRunsNothing) {
   EXPECT_EQ(html, page.Finish());
 }
 
+TEST(HtmlReport, NumbersStandUnderEachOtherAndNamesThatBeginWithDigitsDoNot) {
+  HtmlReport page("t");
+  page.Table({"view", "share"}, {{std::string("0010.jpg"), std::string("12.5 %")}});
+  const std::string html = page.Finish();
+  EXPECT_THAT(html, HasSubstr("<td>0010.jpg"));
+  EXPECT_THAT(html, HasSubstr("class=\"number\">12.5 %"));
+}
+
 TEST(HtmlReport, RowsOfAnotherLengthAreRefused) {
   HtmlReport page("t");
   EXPECT_THROW(page.Table({"a", "b"}, {{std::string("1")}}), std::invalid_argument);
