@@ -4,6 +4,7 @@
 // clang-format keeps this group apart.
 #include <osg/Group>
 
+#include <algorithm>
 #include <chrono>
 #include <thread>
 
@@ -101,6 +102,47 @@ TEST_F(FillTest, WhenStillMeansNotWhileMovingAndOnceItRests) {
   viewer.Look(aside);
   node->setFillTime(osgDTR::FillTime::kAlways);
   EXPECT_EQ(Compare(viewer.Draw(), expected).empty, 0) << "of every picture";
+}
+
+/// Whether a pixel of the window shows nothing.
+bool AnyEmpty(const Shown& shown) {
+  return std::any_of(shown.depth.data().begin(), shown.depth.data().end(),
+                     [](float depth) { return !(depth < 1); });
+}
+
+/// Two cameras beside each other in one window, as split screens are made.
+TEST_F(FillTest, WhenStillAlsoFillsANodeThatAWindowShowsTwice) {
+  const NamedScene named = WithHoles(120, 80);
+  osg::ref_ptr<DepthTR> node = new DepthTR;
+  node->setScene(named.set);
+  node->setRenderOptions(Filled(RenderMethod::kDeferred));
+  node->setFillTime(osgDTR::FillTime::kWhenStill);
+  OffscreenViewer viewer(node.get(), named.novel.camera, named.novel.cam_from_world);
+  osg::Camera* const left = viewer.viewer.getCamera();
+  left->setViewport(0, 0, 60, 80);
+  osg::ref_ptr<osg::Camera> right = new osg::Camera;
+  right->setGraphicsContext(left->getGraphicsContext());
+  right->setViewport(60, 0, 60, 80);
+  right->setRenderOrder(osg::Camera::PRE_RENDER);  // the other reads back when both are there
+  right->setClearColor(left->getClearColor());
+  right->setDrawBuffer(GL_FRONT);
+  const osg::Matrixd aside = osg::Matrixd::translate(0.2, 0, 0);
+  ASSERT_TRUE(viewer.viewer.addSlave(right.get(), osg::Matrixd(), aside));
+  EXPECT_FALSE(AnyEmpty(viewer.Draw())) << "the first pictures wait for nothing";
+  Pose moved = named.novel.cam_from_world;
+  moved.translation.x() += 0.01;
+  viewer.Look(moved);
+  EXPECT_TRUE(AnyEmpty(viewer.Draw())) << "both move";
+  EXPECT_TRUE(AnyEmpty(viewer.Draw())) << "they moved just now";
+  std::this_thread::sleep_for(std::chrono::duration<double>(1.1 * dtr::viewer::kStillAfterSeconds));
+  const Shown rests = viewer.Draw();
+  EXPECT_FALSE(AnyEmpty(rests)) << "both rest";
+  int differing = 0;
+  for (int y = 0; y < 80; ++y) {
+    for (int x = 0; x < 60; ++x) differing += rests.depth(x, y) != rests.depth(x + 60, y);
+  }
+  EXPECT_GT(differing, 1000) << "each shows what it looks at";
+  EXPECT_EQ(viewer.Draw().image.data(), rests.image.data()) << "and goes on to";
 }
 
 TEST_F(FillTest, TheReadBackPathFillsToo) {

@@ -11,6 +11,9 @@
 namespace osgDTR {
 namespace {
 
+// A window that shows a node more often draws all of them anew in every frame.
+constexpr size_t kMostAppearances = 16;
+
 dtr::gl::RendererSettings Settings() {
   dtr::gl::RendererSettings settings;
   settings.warn = [](const std::string& line) { OSG_WARN << line << std::endl; };
@@ -21,6 +24,23 @@ dtr::gl::RendererSettings Settings() {
 }  // namespace
 
 ContextRenderer::ContextRenderer() : renderer(Settings()) {}
+
+ContextRenderer::Appearance& ContextRenderer::Next(std::optional<unsigned> frame) {
+  if (!frame || frame != frame_) {
+    // What the frame before no longer showed has gone from the window.
+    while (appearances_.size() > in_frame_) appearances_.pop_back();
+    shown_before_ = in_frame_ > 0;
+    in_frame_ = 0;
+    frame_ = frame;
+  }
+  // Who draws without counting frames never begins a new one.
+  if (in_frame_ == kMostAppearances) in_frame_ = 0;
+  if (in_frame_ == appearances_.size()) {
+    appearances_.emplace_back();
+    if (shown_before_) appearances_.back().stillness.Moved();  // it came into the picture
+  }
+  return appearances_[in_frame_++];
+}
 
 /// Owns the renderers of all contexts of one context ID; OpenSceneGraph calls it with one of them
 /// current.

@@ -5,6 +5,7 @@
 #include <osg/ref_ptr>
 
 #include <atomic>
+#include <deque>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -13,41 +14,53 @@
 #include "dtr/gl/compositor.h"
 #include "dtr/gl/renderer.h"
 #include "viewer/osg/loaded_scene.h"
+#include "viewer/osg/novel_camera.h"
 #include "viewer/stillness.h"
 
 namespace osgDTR {
 
-/// A renderer of one graphics context, and what its last picture was of.
+/// A picture that was made for one of a node's appearances in a window.
+struct MadePicture {
+  dtr::gl::DrawnPicture picture;
+  bool in_renderer =
+      false;  ///< it holds until the renderer's next; else the compositor's own has it
+};
+
+/// A renderer of one graphics context, and what its last pictures were of.
 class ContextRenderer {
  public:
   ContextRenderer();
 
-  /// A picture of what is said, made anew only when one of these differs from the last call's: a
-  /// viewer draws a still scene again and again. `draw` is told whether the picture is to be whole:
-  /// with `may_wait` not before nothing has differed for a while.
+  /// Puts a picture of what is said into the framebuffer. It is made anew only when one of these
+  /// differs from the frame before: a viewer draws a still scene again and again. A window may show
+  /// a node several times in a frame: the n-th of a frame goes with the n-th of the frame before.
+  /// `draw` is given the compositor to upload to and whether the picture is to be whole: with
+  /// `may_wait` not before nothing has differed for a while. `frame`: OpenSceneGraph's number of
+  /// it; empty: a frame of its own.
   template <typename Draw>
-  dtr::gl::DrawnPicture Picture(std::shared_ptr<const LoadedSet> set, unsigned settings_version,
-                                const dtr::PinholeCamera& camera, const dtr::Pose& pose,
-                                bool may_wait, const Draw& draw) {
+  void Show(std::optional<unsigned> frame, std::shared_ptr<const LoadedSet> set,
+            unsigned settings_version, const NovelCamera& novel, bool may_wait, const Draw& draw) {
     if (set != set_) {
       renderer.Forget();  // while the old views still live
-      last_.reset();
+      appearances_.clear();
+      shown_before_ = false;
       set_ = std::move(set);
     }
-    Last now{settings_version, camera, pose, true, {}};
-    const bool same = last_ && now.SameAs(*last_);
-    if (last_ && !same) stillness_.Moved();
-    now.whole = !may_wait || stillness_.still();
-    if (!same || (now.whole && !last_->whole)) {
-      last_.reset();
-      now.picture = draw(now.whole);
-      last_ = std::move(now);
+    Appearance& shown = Next(frame);
+    const bool same = shown.last && shown.last->Is(settings_version, novel);
+    if (shown.last && !same) shown.stillness.Moved();
+    const bool whole = !may_wait || shown.stillness.still();
+    if (!same || !Holds(*shown.last) || (whole && !shown.last->whole)) {
+      shown.last.reset();
+      ++drawn_;  // also where this fails: the renderer may have begun
+      MadePicture made = draw(shown.compositor, whole);
+      shown.last = Last{settings_version, novel.camera,   novel.cam_from_local, whole,
+                        drawn_,           std::move(made)};
     }
-    return last_->picture;
+    shown.compositor.Composite(shown.last->made.picture, novel.projection);
   }
 
   dtr::gl::Renderer renderer;
-  dtr::gl::Compositor compositor;
   std::atomic<bool> abandoned = false;  ///< its context is gone: kept, but never used again
 
  private:
@@ -56,16 +69,30 @@ class ContextRenderer {
     dtr::PinholeCamera camera;
     dtr::Pose pose;
     bool whole;
-    dtr::gl::DrawnPicture picture;
-    bool SameAs(const Last& other) const {
-      return settings_version == other.settings_version && camera == other.camera &&
-             pose.rotation.coeffs() == other.pose.rotation.coeffs() &&
-             pose.translation == other.pose.translation;
+    unsigned long number;  ///< among all that the renderer was asked for
+    MadePicture made;
+    bool Is(unsigned version, const NovelCamera& novel) const {
+      return settings_version == version && camera == novel.camera &&
+             pose.rotation.coeffs() == novel.cam_from_local.rotation.coeffs() &&
+             pose.translation == novel.cam_from_local.translation;
     }
   };
+  struct Appearance {
+    std::optional<Last> last;
+    dtr::viewer::Stillness stillness;
+    dtr::gl::Compositor compositor;
+  };
+
+  /// The one whose turn it is in this frame.
+  Appearance& Next(std::optional<unsigned> frame);
+  bool Holds(const Last& last) const { return !last.made.in_renderer || last.number == drawn_; }
+
   std::shared_ptr<const LoadedSet> set_;
-  std::optional<Last> last_;
-  dtr::viewer::Stillness stillness_;
+  std::deque<Appearance> appearances_;
+  std::optional<unsigned> frame_;
+  size_t in_frame_ = 0;        ///< appearances shown in it so far
+  bool shown_before_ = false;  ///< in an earlier frame
+  unsigned long drawn_ = 0;
 };
 
 /// The renderers of one drawable, by graphics context. Contexts that share their objects still have

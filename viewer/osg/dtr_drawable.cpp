@@ -1,5 +1,6 @@
 #include "viewer/osg/dtr_drawable.h"
 
+#include <osg/FrameStamp>
 #include <osg/Notify>
 #include <osg/RenderInfo>
 
@@ -9,15 +10,14 @@
 namespace osgDTR {
 namespace {
 
-/// As the settings say, filled or not; what it gives holds until the context's next picture.
-dtr::gl::DrawnPicture DrawPicture(ContextRenderer& context, const DrawSettings& settings,
-                                  const NovelCamera& novel, bool fill) {
-  dtr::gl::Renderer& renderer = context.renderer;
+/// As the settings say, filled or not.
+MadePicture DrawPicture(dtr::gl::Renderer& renderer, dtr::gl::Compositor& compositor,
+                        const DrawSettings& settings, const NovelCamera& novel, bool fill) {
   const dtr::RenderScene& scene = settings.set->instants[settings.instant].scene;
   const dtr::RenderOptions& options = settings.options;
   const bool on_gpu = settings.path == DrawPath::kGpu;
   if (on_gpu && !fill) {
-    return renderer.Draw(scene, novel.camera, novel.cam_from_local, options);
+    return {renderer.Draw(scene, novel.camera, novel.cam_from_local, options), true};
   }
   dtr::RenderResult result;
   if (on_gpu) {
@@ -26,10 +26,10 @@ dtr::gl::DrawnPicture DrawPicture(ContextRenderer& context, const DrawSettings& 
   } else {
     result = RenderByReadBack(renderer, scene, novel.camera, novel.cam_from_local, options);
   }
-  if (!fill) return context.compositor.Upload(result);
+  if (!fill) return {compositor.Upload(result), false};
   const dtr::Grid<float> depth =
       settings.set->hole_filler.Fill(scene, novel.camera, novel.cam_from_local, options, result);
-  return context.compositor.UploadFilled(result, depth);
+  return {compositor.UploadFilled(result, depth), false};
 }
 
 }  // namespace
@@ -70,10 +70,12 @@ void DepthTR::dtrDrawable::Draw(osg::RenderInfo& info) const {
   const std::shared_ptr<ContextRenderer> context = state_->contexts.Of(state);
   const bool fills = settings.options.fill_holes;
   const bool may_wait = fills && settings.fill_time == FillTime::kWhenStill;
-  const dtr::gl::DrawnPicture picture = context->Picture(
-      settings.set, settings.version, novel.camera, novel.cam_from_local, may_wait,
-      [&](bool whole) { return DrawPicture(*context, settings, novel, fills && whole); });
-  context->compositor.Composite(picture, novel.projection);
+  const osg::FrameStamp* const stamp = state.getFrameStamp();
+  context->Show(
+      stamp != nullptr ? std::optional(stamp->getFrameNumber()) : std::nullopt, settings.set,
+      settings.version, novel, may_wait, [&](dtr::gl::Compositor& compositor, bool whole) {
+        return DrawPicture(context->renderer, compositor, settings, novel, fills && whole);
+      });
 }
 
 void DepthTR::dtrDrawable::releaseGLObjects(osg::State* state) const {
