@@ -119,10 +119,7 @@ inline Comparison Compare(const RenderResult& reference, const RenderResult& oth
       const bool border = reference.delta_border(x, y) != 0;
       c.border += border;
       if (border || breaks(x, y) != 0) continue;
-      if (!undecided.empty() && undecided(x, y) != 0) {
-        ++c.undecided;
-        continue;
-      }
+      c.undecided += !undecided.empty() && undecided(x, y) != 0;
       ++c.judged;
       const bool seen = reference.coverage(x, y) != 0;
       if (seen != (other.coverage(x, y) != 0)) ++c.coverage_apart;

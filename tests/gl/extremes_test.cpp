@@ -3,6 +3,8 @@
 // the longest run.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -55,6 +57,36 @@ NamedScene OneView() {
 NamedScene ManyViews() {
   return {"64 views", FromAround(Plane({0.4, 0.1, 0.9}, 8), 64, 0.8, {0, 0, 9}),
           ShotFrom("n", {0, 0, 0}, {0, 0, 9})};
+}
+
+/// Smallest and largest value of any photo, by channel.
+struct Levels {
+  std::array<int, 3> least{255, 255, 255}, most{};
+};
+
+Levels LevelsOf(const DtrSet& set) {
+  Levels levels;
+  for (const View& view : set.frames[0].views) {
+    if (view.gain != Eigen::Vector3d::Ones()) return {{0, 0, 0}, {255, 255, 255}};
+    const auto& values = view.image.data();
+    for (size_t p = 0; p < values.size(); ++p) {
+      levels.least[p % 3] = std::min<int>(levels.least[p % 3], values[p]);
+      levels.most[p % 3] = std::max<int>(levels.most[p % 3], values[p]);
+    }
+  }
+  return levels;
+}
+
+/// Seen pixels that no mean of the photos' colours gives: what a colour that was NaN becomes in 8
+/// bits.
+int PixelsBeyond(const Levels& levels, const RenderResult& result) {
+  int beyond = 0;
+  for (size_t p = 0; p < result.image.data().size(); ++p) {
+    if (result.coverage.data()[p / 3] == 0) continue;
+    const int value = result.image.data()[p];
+    beyond += value < levels.least[p % 3] - 1 || value > levels.most[p % 3] + 1;
+  }
+  return beyond;
 }
 
 /// At an input camera, by a hair beside it, inside the geometry, behind everything, anywhere.
@@ -120,12 +152,15 @@ TEST_F(Extremes, RandomCamerasGiveNoNanAndNoContradiction) {
     scenes.push_back(std::move(odd));
   }
   const int cameras = CamerasToTry();
+  RendererSettings shaders;  // what a GPU would draw with
+  shaders.coarse_drawer = CoarseDrawer::kShaders;
   // Options change less often than cameras: other resolutions and primitives need other meshes.
   const int cameras_per_options = std::max(4, cameras / 500);
   int seen = 0;
   for (size_t i = 0; i < scenes.size(); ++i) {
     const RenderScene views = MakeRenderScene(scenes[i].set);
-    Renderer renderer;
+    const Levels levels = LevelsOf(scenes[i].set);
+    Renderer fitting, by_shaders(shaders);
     RenderOptions options;
     for (int k = static_cast<int>(i); k < cameras; k += static_cast<int>(scenes.size())) {
       Random random(static_cast<std::uint64_t>(k));
@@ -133,8 +168,10 @@ TEST_F(Extremes, RandomCamerasGiveNoNanAndNoContradiction) {
         options = OddOptions(random);
       const Shot shot = OddShot(views, random);
       SCOPED_TRACE(scenes[i].name + ", camera " + std::to_string(k));
+      Renderer& renderer = k / static_cast<int>(scenes.size()) % 2 == 0 ? fitting : by_shaders;
       const RenderResult result = renderer.Render(views, shot.camera, shot.cam_from_world, options);
       ExpectSound(result);
+      EXPECT_EQ(PixelsBeyond(levels, result), 0);
       if (HasFatalFailure()) return;
       seen += result.coverage_share > 0;
     }

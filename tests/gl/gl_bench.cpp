@@ -1,16 +1,18 @@
-// gl_bench SET.dtr [K] [R]: the least CPU time, per triangle, of laying down the views' full meshes
-// (SPEC 4.2) from the middle of the set's own path, without the resolving pass. What `dtr bench`
-// times are whole frames; this is the share of the driver's triangle set-up in them.
+// gl_bench SET.dtr [K] [R]: from the middle of the set's own path the least CPU time of laying down
+// the views' full meshes (SPEC 4.2) and of whole frames: by two passes, by the deferred method as
+// this machine draws it, and by the deferred method's shaders, as a GPU would be asked to.
 #include <epoxy/gl.h>
 
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
+#include <functional>
 #include <vector>
 
 #include "dtr/eval/timed_renderer.h"
 #include "dtr/gl/context.h"
 #include "dtr/gl/driver.h"
+#include "dtr/gl/renderer.h"
 #include "dtr/gl/two_pass.h"
 #include "dtr/gl/view_mesh.h"
 #include "dtr/io/set_io.h"
@@ -21,6 +23,17 @@ namespace {
 
 constexpr int kFrames = 5;
 
+double LeastMilliseconds(const std::function<void()>& draw) {
+  std::vector<double> times;
+  for (int i = 0; i <= kFrames; ++i) {
+    const dtr::eval::StopWatch watch;
+    draw();
+    glFinish();
+    if (i > 0) times.push_back(watch.Elapsed().cpu_ms);  // the first warms up
+  }
+  return *std::min_element(times.begin(), times.end());
+}
+
 double DrawingMilliseconds(const dtr::gl::Frame& frame) {
   const dtr::gl::StateGuard guard;
   dtr::gl::ViewStore store;
@@ -29,14 +42,20 @@ double DrawingMilliseconds(const dtr::gl::Frame& frame) {
   store.Prepare(frame.views, frame.options);
   const dtr::gl::Band band{0, frame.novel.height_px()};
   targets.Fit(frame.novel.width_px(), band.count, static_cast<int>(frame.views.size()));
-  std::vector<double> times;
-  for (int i = 0; i <= kFrames; ++i) {
-    const dtr::eval::StopWatch watch;
+  return LeastMilliseconds([&] {
     dtr::gl::DrawViewLayers(frame, band, store, programs, targets, dtr::gl::HasClipControl());
-    glFinish();
-    if (i > 0) times.push_back(watch.Elapsed().cpu_ms);  // the first warms up
-  }
-  return *std::min_element(times.begin(), times.end());
+  });
+}
+
+double FrameMilliseconds(const dtr::RenderScene& scene, const dtr::NovelCamera& novel,
+                         dtr::RenderOptions options, dtr::RenderMethod method,
+                         dtr::gl::CoarseDrawer drawer) {
+  options.method = method;
+  dtr::gl::RendererSettings settings;
+  settings.coarse_drawer = drawer;
+  dtr::gl::Renderer renderer(settings);
+  return LeastMilliseconds(
+      [&] { renderer.Draw(scene, novel.camera, novel.cam_from_world, options); });
 }
 
 }  // namespace
@@ -66,5 +85,17 @@ int main(int argc, char** argv) {
   std::printf("%s; %dx%d, R %d: %.2f M triangles from %zu views, %.1f CPU ms, %.1f ns each\n",
               context.Description().c_str(), novel.camera.width_px(), novel.camera.height_px(),
               options.resolution, 1e-6 * triangles, frame.views.size(), ms, 1e6 * ms / triangles);
+  const auto whole = [&](dtr::RenderMethod method, dtr::gl::CoarseDrawer drawer) {
+    return FrameMilliseconds(scene, novel, options, method, drawer);
+  };
+  using dtr::gl::CoarseDrawer;
+  const double two_pass = whole(dtr::RenderMethod::kTwoPass, CoarseDrawer::kFitting);
+  const double deferred = whole(dtr::RenderMethod::kDeferred, CoarseDrawer::kFitting);
+  const double shaders = whole(dtr::RenderMethod::kDeferred, CoarseDrawer::kShaders);
+  std::printf(
+      "whole frames: two passes %.1f CPU ms (%.1f ns a triangle, %.1f for each of its two passes), "
+      "deferred %.1f (%.1f times as fast), deferred by shaders %.1f (%.1f)\n",
+      two_pass, 1e6 * two_pass / triangles, 0.5e6 * two_pass / triangles, deferred,
+      two_pass / deferred, shaders, two_pass / shaders);
   return 0;
 }

@@ -10,19 +10,33 @@ namespace {
 
 using namespace dtr::testing;
 
-class Invariance : public GlTest, public ::testing::WithParamInterface<RenderMethod> {
- protected:
-  RenderResult Draw(const DtrSet& set, const Shot& novel, int threads = 0) {
-    RenderOptions options = OptionsOf(GetParam());
-    options.threads = threads;
-    Renderer renderer;
-    return renderer.Render(MakeRenderScene(set), novel.camera, novel.cam_from_world, options);
-  }
+/// What draws: on a machine without a GPU the deferred method has two ways.
+struct Way {
+  const char* name;
+  RenderMethod method;
+  CoarseDrawer drawer;
 };
 
-INSTANTIATE_TEST_SUITE_P(, Invariance, ::testing::ValuesIn(kBothMethods), [](const auto& test) {
-  return test.param == RenderMethod::kTwoPass ? "TwoPass" : "Deferred";
-});
+class Invariance : public GlTest, public ::testing::WithParamInterface<Way> {
+ protected:
+  Invariance() { settings_.coarse_drawer = GetParam().drawer; }
+
+  RenderResult Draw(const DtrSet& set, const Shot& novel, int threads = 0) {
+    RenderOptions options = OptionsOf(GetParam().method);
+    options.threads = threads;
+    Renderer renderer(settings_);
+    return renderer.Render(MakeRenderScene(set), novel.camera, novel.cam_from_world, options);
+  }
+
+  RendererSettings settings_;
+};
+
+INSTANTIATE_TEST_SUITE_P(
+    , Invariance,
+    ::testing::Values(Way{"TwoPass", RenderMethod::kTwoPass, CoarseDrawer::kFitting},
+                      Way{"Deferred", RenderMethod::kDeferred, CoarseDrawer::kFitting},
+                      Way{"DeferredByShaders", RenderMethod::kDeferred, CoarseDrawer::kShaders}),
+    [](const auto& test) { return test.param.name; });
 
 TEST_P(Invariance, OrderOfTheViews) {
   for (const NamedScene& scene : ParityScenes()) {
@@ -33,9 +47,9 @@ TEST_P(Invariance, OrderOfTheViews) {
     // A scene whose list is not sorted is drawn the same, too.
     RenderScene views = MakeRenderScene(scene.set);
     std::rotate(views.views.begin(), views.views.begin() + 2, views.views.end());
-    Renderer renderer;
+    Renderer renderer(settings_);
     ExpectSameBytes(expected, renderer.Render(views, scene.novel.camera, scene.novel.cam_from_world,
-                                              OptionsOf(GetParam())));
+                                              OptionsOf(GetParam().method)));
   }
 }
 
@@ -45,12 +59,12 @@ TEST_P(Invariance, ThreadsAndRepeatedRuns) {
     ExpectSameBytes(expected, Draw(scene.set, scene.novel, 3));
     ExpectSameBytes(expected, Draw(scene.set, scene.novel, 1));
     // Within one renderer, after another picture.
-    Renderer renderer;
+    Renderer renderer(settings_);
     const RenderScene views = MakeRenderScene(scene.set);
     const View& input = *views.views.front();
-    renderer.Render(views, input.camera, input.cam_from_world, OptionsOf(GetParam()));
+    renderer.Render(views, input.camera, input.cam_from_world, OptionsOf(GetParam().method));
     ExpectSameBytes(expected, renderer.Render(views, scene.novel.camera, scene.novel.cam_from_world,
-                                              OptionsOf(GetParam())));
+                                              OptionsOf(GetParam().method)));
   }
 }
 
