@@ -155,6 +155,8 @@ Json ReportJson(const viewer::AppReport& report) {
   return {{"frames", report.last.frames},
           {"first_picture_ms", report.first_picture_ms},
           {"first_picture_cpu_ms", report.first_picture_cpu_ms},
+          {"first_whole_picture_ms", report.first_whole_picture_ms},
+          {"first_whole_picture_cpu_ms", report.first_whole_picture_cpu_ms},
           {"moving", moving},
           {"view_bytes", report.view_bytes},
           {"view_bytes_held", report.view_bytes_held},

@@ -339,6 +339,7 @@ TEST_F(ViewerWindow, AFlightIsTimedAndItsEndIsSaved) {
   EXPECT_GE(json["moving"]["frames"], 10);
   EXPECT_GT(json["moving"]["fps"], 0);
   EXPECT_GT(json["first_picture_ms"], 0);
+  EXPECT_GT(json["first_whole_picture_ms"], json["first_picture_ms"]) << "at the flight's end";
   EXPECT_TRUE(json["last"]["still"].get<bool>());
   EXPECT_EQ(io::ReadImage(In("end.png")).height(), 240);
 }

@@ -394,6 +394,18 @@ class App {
     }
   }
 
+  void TimeFirstPictures() {
+    const auto now = [this](double& ms, double& cpu_ms) {
+      if (ms > 0) return;
+      ms = 1e3 * started_.seconds();
+      cpu_ms = ProcessCpuMilliseconds() - started_cpu_ms_;
+    };
+    const bool any =
+        session_->schedule.has_picture() && !session_->maker.picture().views_used.empty();
+    if (any || whole()) now(report_.first_picture_ms, report_.first_picture_cpu_ms);
+    if (whole()) now(report_.first_whole_picture_ms, report_.first_whole_picture_cpu_ms);
+  }
+
   void FinishFrame() {
     if (LastFrame()) time_.Stop();  // what is kept is of a picture that stands still
     if (ReachedFrames()) quit_ = true;
@@ -402,10 +414,7 @@ class App {
     if (report_.last.frames % AppReport::kFramesPerSample == 0) {
       report_.memory_bytes.push_back(MemoryBytes());
     }
-    if (whole() && !(report_.first_picture_ms > 0)) {
-      report_.first_picture_ms = 1e3 * started_.seconds();
-      report_.first_picture_cpu_ms = ProcessCpuMilliseconds() - started_cpu_ms_;
-    }
+    TimeFirstPictures();
     if (whole() && host_.state_changed) host_.state_changed(State());
     if (quit_ || settling_ > 0 || CameraMoves() || !session_->schedule.MadeFor(Order())) return;
     if (!time_.playing()) moving_fps_ = 0;

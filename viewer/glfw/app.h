@@ -120,8 +120,10 @@ struct FrameTimes {
 /// What a run of the viewer measured.
 struct AppReport {
   AppState last;
-  /// From the call of RunViewer to the first whole picture shown.
+  /// From the call of RunViewer to the first picture shown that has something of the set, of
+  /// whatever size, and to the first whole one: the first after a flight where it begins with one.
   double first_picture_ms = 0, first_picture_cpu_ms = 0;
+  double first_whole_picture_ms = 0, first_whole_picture_cpu_ms = 0;
   FrameTimes moving;
   std::map<int, FrameTimes> moving_by_divisor;  ///< of the picture's sides
   /// Physical memory held, sampled every so many frames: what grows shows.

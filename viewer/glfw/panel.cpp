@@ -12,6 +12,22 @@ constexpr float kPanelWidth = 330, kMargin = 8, kItemWidth = 150;
 
 void Text(const std::string& line) { ImGui::TextUnformatted(line.c_str()); }
 
+/// As many names on a line as fit: ImGui's own wrapping would break them at their dots. A name
+/// wider than the panel is wrapped all the same.
+void WrappedNames(std::string line, const std::vector<std::string>& names) {
+  const float room = ImGui::GetContentRegionAvail().x;
+  for (size_t i = 0; i < names.size(); ++i) {
+    const std::string name = names[i] + (i + 1 < names.size() ? "," : "");
+    if (ImGui::CalcTextSize((line + " " + name).c_str()).x <= room) {
+      line += " " + name;
+      continue;
+    }
+    ImGui::TextWrapped("%s", line.c_str());
+    line = name;
+  }
+  ImGui::TextWrapped("%s", line.c_str());
+}
+
 void RenderControls(Widgets& widgets, RenderOptions& options) {
   widgets.Choice("method", options.method, kRenderMethods);
   const Primitive before = options.primitive;
@@ -58,16 +74,15 @@ void Figures(const PanelModel& model) {
   Text(model.frames_per_second > 0
            ? fmt::format("{:.1f} frames per second while moving", model.frames_per_second)
            : std::string("still"));
-  std::string names;
-  for (const int index : picture.views_used) {
-    names += (names.empty() ? "" : ", ") + picture.scene.views[static_cast<size_t>(index)]->name;
-  }
   // One line always, so that what stands below keeps its place while one clicks.
   Text(picture.divisor == 1 ? fmt::format("seen by some view: {:.1f} %", 100 * picture.coverage)
                             : std::string("seen by some view: told when still"));
-  ImGui::TextWrapped("%s", fmt::format("drawn from {}: {}", picture.views_used.size(),
-                                       names.empty() ? "no view is valid here" : names)
-                               .c_str());
+  std::vector<std::string> names;
+  for (const int index : picture.views_used) {
+    names.push_back(picture.scene.views[static_cast<size_t>(index)]->name);
+  }
+  if (names.empty()) names.push_back("no view is valid here");
+  WrappedNames(fmt::format("drawn from {}:", picture.views_used.size()), names);
 }
 
 void WhereControls(Widgets& widgets, PanelModel& model) {
