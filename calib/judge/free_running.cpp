@@ -312,6 +312,8 @@ std::vector<std::optional<CameraDelay>> DelaysOf(const Board& board, const RigSo
 FreeRunning SolveFreeRunning(const Board& board, std::span<const RigCameraInput> cameras,
                              std::vector<RigView> views, size_t frames, const RigOptions& options) {
   FreeRunning free;
+  // As SolveRig does: from here on outliers are those that are decided on here.
+  DropOutliers(views);
   Delays delays(cameras.size(), 0);  // that corners are moved by
   free.moved.assign(cameras.size(), false);
   std::vector<LeftOut> left_out, decided;

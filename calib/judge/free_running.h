@@ -38,10 +38,11 @@ std::vector<std::optional<CameraDelay>> DelaysOf(const Board& board, const RigSo
 /// was between two frames is interpolated from its poses in up to four of them around (a cubic in
 /// the turn's logarithm and the shift), no two neighbours more than 1.5 frames apart. After five
 /// solves the corners that count stay the same: where some lie at the limit of what is an outlier,
-/// solves that decide on them anew would take turns for ever. `frames` are in order of time and
-/// equally far from each other. Throws Error as SolveRig does, where no delay
-/// can be told (a board that stands still, or frames that do not follow each other), where a delay
-/// is beyond 3 frames, and where the delays do not settle. The same inputs give the same bits.
+/// solves that decide on them anew would take turns for ever. Corners that `views` call outliers
+/// are dropped, as by SolveRig. `frames` are in order of time and equally far from each other.
+/// Throws Error as SolveRig does, where no delay can be told (a board that stands still, or frames
+/// that do not follow each other), where a delay is beyond 3 frames, and where the delays do not
+/// settle. The same inputs give the same bits.
 FreeRunning SolveFreeRunning(const Board& board, std::span<const RigCameraInput> cameras,
                              std::vector<RigView> views, size_t frames,
                              const RigOptions& options = {});

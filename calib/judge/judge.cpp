@@ -430,10 +430,11 @@ class Judging {
       if (counted < check.value) continue;
       check.value = counted;
       check.reason = fmt::format(
-          "{}: its images are {:+.4f} +- {:.4f} frames later than {}'s, which moves a coordinate "
+          "{}: its images are {:.4f} +- {:.4f} frames {} than {}'s, which moves a coordinate "
           "by {:.3f} px RMS{}",
-          solution.rig.cameras[c + 1].name, late.coefficients[c], late.sigmas[c],
-          solution.rig.cameras[0].name, late.effects_px[c],
+          solution.rig.cameras[c + 1].name, std::abs(late.coefficients[c]), late.sigmas[c],
+          late.coefficients[c] < 0 ? "earlier" : "later", solution.rig.cameras[0].name,
+          late.effects_px[c],
           harmless ? ": no chance, but no more than corners err" : "");
     }
     check.passed = check.value <= check.limit;

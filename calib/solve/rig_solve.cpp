@@ -337,14 +337,6 @@ std::vector<BoardView> ViewsOf(const std::vector<RigView>& views, size_t camera,
   return own;
 }
 
-void DropOutliers(std::vector<RigView>& views) {
-  for (RigView& view : views) {
-    std::erase_if(view.seen.corners,
-                  [&](const BoardCorner& corner) { return Holds(view.outliers, corner.id); });
-    view.outliers.clear();
-  }
-}
-
 // A camera and the boards' poses from its own views alone.
 RigCamera StartCamera(const Board& board, const RigCameraInput& input,
                       std::span<const BoardView> own, const SolveOptions& options,

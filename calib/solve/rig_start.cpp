@@ -116,6 +116,14 @@ void PlaceCameras(const Board& board, const std::vector<PosedView>& views,
 
 }  // namespace
 
+void DropOutliers(std::vector<RigView>& views) {
+  for (RigView& view : views) {
+    std::erase_if(view.seen.corners,
+                  [&](const BoardCorner& corner) { return Holds(view.outliers, corner.id); });
+    view.outliers.clear();
+  }
+}
+
 BoardView TurnedByHalf(const Board& board, const BoardView& view) {
   BoardView turned = view;
   std::reverse(turned.corners.begin(), turned.corners.end());

@@ -21,6 +21,9 @@ BoardView TurnedByHalf(const Board& board, const BoardView& view);
 RigView TurnedByHalf(const Board& board, const RigView& view);  ///< outliers with their corners
 Pose TurnedByHalf(const Board& board, const Pose& cam_from_board);
 
+/// Corners that views call outliers, taken out of them: they were decided on before.
+void DropOutliers(std::vector<RigView>& views);
+
 /// A rig to start Newton from.
 struct RigStart {
   Rig rig;                           ///< flipped views have their corners counted anew

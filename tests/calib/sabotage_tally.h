@@ -1,6 +1,8 @@
 // tests/calib/sabotage_tally.h -- what came of spoiled calibrations and of honest ones.
 #pragma once
 #include <algorithm>
+#include <cstdint>
+#include <cstdlib>
 #include <string>
 #include <vector>
 
@@ -14,6 +16,12 @@ struct Tally {
   int honest = 0, honest_passed = 0;
   int sabotages() const { return caught + missed; }
 };
+
+/// What sabotages are drawn by: DTR_SABOTAGE_SEED, or 1.
+inline std::uint64_t SabotageSeed() {
+  const char* given = std::getenv("DTR_SABOTAGE_SEED");
+  return given ? std::strtoull(given, nullptr, 10) : 1;
+}
 
 /// The test of this name where it broke; null where it held or is not there.
 inline const Check* BrokenTest(const std::vector<Check>& tests, const std::string& name) {

@@ -1,6 +1,4 @@
 // The gate in full: 30 spoiled calibrations and 30 honest ones. DTR_SABOTAGE_SEED draws others.
-#include <cstdlib>
-
 #include "tests/calib/judge/sabotage.h"
 
 namespace dtr::calib {
@@ -9,17 +7,13 @@ namespace {
 using namespace testing;
 constexpr int kCases = 30;
 
-std::uint64_t Seed() {
-  const char* given = std::getenv("DTR_SABOTAGE_SEED");
-  return given ? std::strtoull(given, nullptr, 10) : 1;
-}
-
 TEST(SabotageFull, AllButOneOfThirtyAreCaughtByTheTestThatIsMeantForThem) {
   Tally tally;
   // Drawn on until 30 are strong enough to count.
   for (int k = 0; tally.sabotages() < kCases && k < 4 * kCases; ++k) {
     JudgeSabotage(static_cast<Sabotage>(k % kSabotages),
-                  HashOf(Seed(), static_cast<std::uint64_t>(k)) % 1000000, tally);
+                  HashOf(dtr::testing::SabotageSeed(), static_cast<std::uint64_t>(k)) % 1000000,
+                  tally);
   }
   std::printf("%d of %d caught, %d not detectable\n", tally.caught, tally.sabotages(),
               tally.not_detectable);
@@ -30,7 +24,7 @@ TEST(SabotageFull, AllButOneOfThirtyAreCaughtByTheTestThatIsMeantForThem) {
 TEST(SabotageFull, AllButOneOfThirtyHonestOnesPass) {
   Tally tally;
   for (std::uint64_t k = 0; k < kCases; ++k) {
-    JudgeHonest(HashOf(Seed(), 7777, k) % 1000000, tally);
+    JudgeHonest(HashOf(dtr::testing::SabotageSeed(), 7777, k) % 1000000, tally);
   }
   std::printf("%d of %d pass\n", tally.honest_passed, tally.honest);
   EXPECT_GE(tally.honest_passed, kCases - 1);
