@@ -15,7 +15,7 @@ struct Coding {
   int jpeg_quality = 0;            ///< of images; 0: as they are
   double depth_error_px = 0;       ///< bound in pixels of disparity; 0: as it is
   int shrink = 1;                  ///< images and depth maps are 1/shrink of their size per axis
-  double mesh_tolerance_px = 1;  ///< of the reduced meshes beside them
+  double mesh_tolerance_px = 0.7;  ///< of the reduced meshes beside them
   int mesh_resolution = 1;         ///< these are of every so many samples per axis
   bool sigma = true;               ///< false: no standard deviations
   TilesLeftOut tiles;

@@ -19,8 +19,9 @@ constexpr TileRule kTileRules[] = {{3, 8}, {2, 12}, {2, 27}, {1, 18}};
 // its place is found, nothing is looked up.
 constexpr double kLookAtNothing = 0.3;
 // What frames take of those with default meshes and all samples: guesses near what was measured
-// (docs/accuracy/SPEED.md has 0.98 on fern and 0.63 on courtyard); more of either saves little.
-constexpr double kCoarseMesh = 0.97, kFewerSamples = 0.8;
+// on courtyard (docs/accuracy/SPEED.md: 0.89 for 1 px against 0.5, 0.63); more of either saves
+// little more.
+constexpr double kCoarseMesh = 0.95, kFewerSamples = 0.8;
 
 const TileRule& RuleOf(double level) { return kTileRules[static_cast<size_t>(level) - 1]; }
 
@@ -68,7 +69,7 @@ std::vector<double> LevelsOf(Kind kind) {
     case Kind::kSize:
       return {2};
     case Kind::kMesh:
-      return {2, 4};
+      return {1, 2, 4};
     case Kind::kView:
       break;
   }
@@ -194,7 +195,7 @@ double Mover::TilesShare(const Setting& setting) const {
 double Mover::FrameOf(const Setting& setting) const {
   const auto views = std::min(static_cast<size_t>(setting.render.views), SourcesLeft(setting));
   const double tiles = 1 - (1 - kLookAtNothing) * TilesShare(setting);
-  const double mesh = setting.render.mesh_tolerance_px > 1 ? kCoarseMesh : 1;
+  const double mesh = setting.render.mesh_tolerance_px >= 1 ? kCoarseMesh : 1;
   const double samples = setting.render.resolution > 1 ? kFewerSamples : 1;
   return static_cast<double>(views) * tiles * mesh * samples;
 }

@@ -40,8 +40,8 @@ struct RenderOptions {
   int blend_k = 2;                              ///< k of kKNearest, power of kInverseAngle
   double max_angle_rad = std::numbers::pi / 3;  ///< valid views, SPEC 1
   double delta_px = 1.0;                        ///< Delta of SPEC 4, pixels of disparity
-  double depth_break_px = 1.0;   ///< break threshold of SPEC 2.3, pixels of disparity
-  double mesh_tolerance_px = 1;  ///< of SPEC 5.1's reduced mesh, pixels of disparity
+  double depth_break_px = 1.0;     ///< break threshold of SPEC 2.3, pixels of disparity
+  double mesh_tolerance_px = 0.7;  ///< of SPEC 5.1's reduced mesh, pixels of disparity
   /// The report's absolute thresholds, in scene units; when set they replace the scale-free ones.
   std::optional<double> absolute_delta;
   std::optional<double> absolute_depth_break;

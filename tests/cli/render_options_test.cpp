@@ -38,7 +38,7 @@ RenderOptions RandomOptions(Random& random) {
   options.falloff = OneOf(random, 8);
   options.delta_px = OneOf(random, 1);
   options.depth_break_px = OneOf(random, 1);
-  options.mesh_tolerance_px = OneOf(random, 0.5);
+  options.mesh_tolerance_px = OneOf(random, 0.7);
   const double degrees = random.Index(2) == 0 ? 1 + random.Index(180) : random.Uniform(1, 180);
   options.max_angle_rad = degrees * std::numbers::pi / 180;
   if (random.Index(2) == 0) options.absolute_delta = random.Uniform(1e-6, 1e3);

@@ -12,7 +12,7 @@
 
 namespace dtr::testing {
 
-/// Less than SPEC 5.1's tolerance of the reduced mesh (1).
+/// Less than SPEC 5.1's tolerance of the reduced mesh (0.7).
 inline constexpr double kStartShiftPx = 0.1;
 
 /// The reference against dtr/gl. Deferred: pixels at which the reference's own picture hangs on
