@@ -188,8 +188,9 @@ std::shared_ptr<RenderOptions> AddRenderOptions(CLI::App& command) {
       ->type_name("PX");
   command
       .add_option("--mesh-tolerance", options.mesh_tolerance_px,
-                  "deferred: how far the reduced mesh may lie off the depth, in pixels of "
-                  "disparity [0.5]")
+                  fmt::format("deferred: how far the reduced mesh may lie off the depth, in pixels "
+                              "of disparity [{}]",
+                              RenderOptions{}.mesh_tolerance_px))
       ->check(CLI::NonNegativeNumber)
       ->type_name("PX");
   command
