@@ -88,8 +88,9 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& progre
                                       {"held_out", HeldOutHashes(set)}};
   io::SetWriter writer(report.written, fingerprint.dump(), in_place || options.force);
   CopyImages(options.set, set, options.threads, writer, progress);
-  const stereo::Effort spent = DepthStage(set, sparse, options.depth, effort,
-                                          {options.threads, options.seed}, writer, progress);
+  const stereo::Effort spent =
+      DepthStage(set, sparse, options.depth, effort,
+                 {options.threads, options.seed, options.normals}, writer, progress);
   // What was left out of the former depth says nothing of this.
   if (!io::PrunedJson(set).empty()) {
     progress.Note("the record of what was pruned goes with the depth that was pruned");
