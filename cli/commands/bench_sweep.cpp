@@ -193,11 +193,15 @@ eval::SweepSetting SettingOf(const eval::SweepStage& stage, const std::string& t
   return setting;
 }
 
-/// "views=3,resolution=2"
+/// "method=deferred,views=3,...": every axis, so that the command means the same when defaults have
+/// become others.
 std::string PointText(const eval::SweepStage& stage, const eval::SweepSetting& setting) {
-  std::string text = eval::Describe(stage, setting);
-  std::replace(text.begin(), text.end(), ' ', ',');
-  return text;
+  std::vector<std::string> words;
+  for (size_t axis = 0; axis < stage.axes.size(); ++axis) {
+    words.push_back(stage.axes[axis].name + "=" +
+                    stage.axes[axis].values.at(static_cast<size_t>(setting[axis])));
+  }
+  return fmt::format("{}", fmt::join(words, ","));
 }
 
 std::string CommandOf(const SweepRequest& request, const eval::SweepStage& stage,
