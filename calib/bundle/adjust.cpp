@@ -40,15 +40,6 @@ std::vector<Eigen::Vector2d> ResidualsOf(const Bundle& bundle, const Normalised&
   return residuals;
 }
 
-double SigmaOf(const std::vector<Eigen::Vector2d>& residuals) {
-  std::vector<double> lengths;
-  for (const Eigen::Vector2d& r : residuals) {
-    if (r.allFinite()) lengths.push_back(r.norm());
-  }
-  if (lengths.empty()) Refuse("expected points in front of the cameras that see them, found none");
-  return std::max(RobustSigma(std::move(lengths)), kSmallestSigmaPx);
-}
-
 // Sights nearer than `limit_px` to their predictions.
 std::vector<bool> Within(const std::vector<Eigen::Vector2d>& residuals, double limit_px) {
   std::vector<bool> within;
@@ -56,8 +47,47 @@ std::vector<bool> Within(const std::vector<Eigen::Vector2d>& residuals, double l
   return within;
 }
 
+// How many of these sights each point has.
+std::vector<int> SightsOfPoints(const Bundle& bundle, const std::vector<bool>& counts) {
+  std::vector<int> sights(bundle.points.size());
+  for (size_t i = 0; i < counts.size(); ++i) {
+    sights[static_cast<size_t>(bundle.observations[i].point)] += counts[i];
+  }
+  return sights;
+}
+
+// What a point that moves to where its `sights` want it leaves of their residuals: of two sights'
+// four coordinates one is left, which both share, so that their lengths follow a normal law of one
+// dimension, and the third smallest of them is smaller still than the share of the squares says.
+double ShareOfLength(int sights) {
+  constexpr double kOfTwo = 0.338;  // 0.4307 / sqrt(2) over 0.9005: lower terciles of the two laws
+  return sights == 2 ? kOfTwo : std::sqrt(1 - 1.5 / sights);
+}
+
+// Standard deviation of a sight's coordinate. Without regard to what points take up, tracks of two
+// would make it far too small; under the robust loss their points would then settle on one of the
+// two sights, and make it smaller still.
+double SigmaOf(const Bundle& bundle, const std::vector<Eigen::Vector2d>& residuals) {
+  const std::vector<int> sights =
+      SightsOfPoints(bundle, Within(residuals, std::numeric_limits<double>::infinity()));
+  std::vector<double> lengths;
+  for (size_t i = 0; i < residuals.size(); ++i) {
+    const int of_point = sights[static_cast<size_t>(bundle.observations[i].point)];
+    if (residuals[i].allFinite() && of_point > 1) {
+      lengths.push_back(residuals[i].norm() / ShareOfLength(of_point));
+    }
+  }
+  if (lengths.empty()) Refuse("expected points in front of the cameras that see them, found none");
+  return std::max(RobustSigma(std::move(lengths)), kSmallestSigmaPx);
+}
+
 // `rigs`: of how many rigs the images move; 0: every image for itself.
 void Describe(const std::vector<Eigen::Vector2d>& residuals, size_t rigs, Adjusted& out) {
+  // A sight that is alone in seeing its point is met whatever the cameras are.
+  const std::vector<int> sights = SightsOfPoints(out.bundle, out.used);
+  for (size_t i = 0; i < residuals.size(); ++i) {
+    if (sights[static_cast<size_t>(out.bundle.observations[i].point)] < 2) out.used[i] = false;
+  }
   double squared = 0;
   std::vector<bool> image_used(out.bundle.images.size()), point_used(out.bundle.points.size());
   for (size_t i = 0; i < residuals.size(); ++i) {
@@ -292,7 +322,7 @@ Adjusted Solve(const Bundle& bundle, const AdjustOptions& options, Normalised& n
   Adjusted out;
   out.lens = options.lens;
   std::vector<Eigen::Vector2d> residuals = ResidualsOf(bundle, n);
-  double sigma = SigmaOf(residuals);
+  double sigma = SigmaOf(bundle, residuals);
   const auto solve = [&](const std::vector<bool>& used, double cauchy_px) {
     const auto summary = Minimise(bundle, options, used, sigma, cauchy_px, n);
     out.iterations += static_cast<int>(summary.iterations.size());
@@ -302,7 +332,7 @@ Adjusted Solve(const Bundle& bundle, const AdjustOptions& options, Normalised& n
   const double none = std::numeric_limits<double>::infinity();
   for (int pass = 0; options.outlier_sigmas > 0 && pass < kMostRobustPasses; ++pass) {
     solve(Within(residuals, none), kCauchySigmas * sigma);
-    const double next = SigmaOf(residuals);
+    const double next = SigmaOf(bundle, residuals);
     const bool settled = std::abs(next - sigma) <= kSameScale * sigma;
     sigma = next;
     if (settled) break;
@@ -313,7 +343,7 @@ Adjusted Solve(const Bundle& bundle, const AdjustOptions& options, Normalised& n
   out.used = Within(residuals, limit());
   for (int pass = 0; pass < kMostOutlierPasses; ++pass) {
     out.converged = solve(out.used, 0);
-    sigma = SigmaOf(residuals);
+    sigma = SigmaOf(bundle, residuals);
     std::vector<bool> used = Within(residuals, limit());
     if (used == out.used) break;
     if (pass + 1 < kMostOutlierPasses) out.used = std::move(used);

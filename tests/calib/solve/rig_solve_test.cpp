@@ -111,6 +111,29 @@ TEST(RigSolve, TheUnitOfTheBoardScalesTheRigAndNothingElse) {
   }
 }
 
+// Of one camera and of two: whatever focal length a solve is told to begin with.
+TEST(RigSolve, AStartThirtyPercentOffEndsAtTheSameMinimum) {
+  for (const int count : {1, 2}) {
+    const auto cameras = RowOfCameras(count, 0.1);
+    const auto views = NoisyViews(ExactRig(cameras, 15, 3), kNoisePx, 8);
+    const auto best = SolveRig(kBoard, InputsOf(cameras), views, 15);
+    for (const double factor : {0.7, 1.3}) {
+      auto inputs = InputsOf(cameras);
+      for (size_t c = 0; c < inputs.size(); ++c) {
+        inputs[c].given = cameras[c].camera;
+        for (const size_t k : {0, 1}) inputs[c].given->params[k] *= factor;
+      }
+      const auto solution = SolveRig(kBoard, inputs, views, 15);
+      EXPECT_EQ(solution.outliers, best.outliers);
+      EXPECT_NEAR(solution.rms_px, best.rms_px, 1e-9);
+      // Far below what the noise leaves open: the same minimum. And that one is the truth's.
+      const auto moved = Difference(best.layout, best.rig.cameras, solution.rig.cameras);
+      EXPECT_LT(moved.dot(best.covariance.inverse() * moved), 1e-6);
+      EXPECT_LT(NormalisedError(solution, cameras), 2.5);
+    }
+  }
+}
+
 TEST(RigSolve, CamerasThatNoFrameConnectsAreNamed) {
   const auto cameras = RowOfCameras(2, 0.1);
   auto views = ExactRig(cameras, 24, 3, false, 2).views;
