@@ -14,6 +14,7 @@
 #include "calib/bundle/lens_params.h"
 #include "calib/bundle/normalised.h"
 #include "calib/bundle/rig_adjust.h"
+#include "calib/bundle/sight_rows.h"
 #include "calib/lens_groups.h"
 #include "calib/solve/board_start.h"
 #include "dtr/base/error.h"
@@ -81,8 +82,63 @@ double SigmaOf(const Bundle& bundle, const std::vector<Eigen::Vector2d>& residua
   return std::max(RobustSigma(std::move(lengths)), kSmallestSigmaPx);
 }
 
-// `rigs`: of how many rigs the images move; 0: every image for itself.
-void Describe(const std::vector<Eigen::Vector2d>& residuals, size_t rigs, Adjusted& out) {
+// Ways to turn, move and scale everything that sights do not tell, and priors leave open.
+double OpenGauge(const AdjustOptions& options) {
+  const double scale = options.distances.empty() ? 1 : 0;
+  switch (options.positions.size()) {
+    case 0:
+      return 6 + scale;
+    case 1:
+      return 3 + scale;  // turns about the place
+    case 2:
+      return 1;  // a turn about the line between them
+    default:
+      return 0;
+  }
+}
+
+// What the priors miss by, in units of their sigmas, squared; how many numbers they are.
+double PriorSquares(const Bundle& bundle, const AdjustOptions& options, double* numbers) {
+  const auto centre = [&](int image) {
+    return bundle.images[static_cast<size_t>(image)].cam_from_world.TargetOriginInSource();
+  };
+  double squares = 0;
+  for (const PositionPrior& p : options.positions) {
+    squares += (centre(p.image) - p.centre).cwiseQuotient(p.sigma).squaredNorm();
+  }
+  for (const DistancePrior& d : options.distances) {
+    squares += std::pow(((centre(d.image_a) - centre(d.image_b)).norm() - d.distance) / d.sigma, 2);
+  }
+  *numbers = 3 * static_cast<double>(options.positions.size()) +
+             static_cast<double>(options.distances.size());
+  return squares;
+}
+
+// Unknowns of the images that count and their lenses. `rigs`: of how many rigs the images move; 0:
+// every image for itself.
+double CameraUnknowns(const Bundle& bundle, const std::vector<bool>& image_used, size_t rigs,
+                      const AdjustOptions& options) {
+  double images = 0, unknowns = 0;
+  std::vector<bool> lens_used(bundle.lenses.size());
+  for (size_t i = 0; i < image_used.size(); ++i) {
+    if (!image_used[i]) continue;
+    images += 1;
+    lens_used[static_cast<size_t>(bundle.images[i].lens)] = true;
+  }
+  for (size_t i = 0; i < lens_used.size(); ++i) {
+    if (!lens_used[i]) continue;
+    unknowns += static_cast<double>(FreeParams(bundle.lenses[i], options.lens).size());
+  }
+  if (IsPerImage(options.lens)) unknowns += 2 * images;
+  if (options.fix_poses) return unknowns;
+  // A rig's own lengths leave six ways to move the world as a whole.
+  return unknowns +
+         (rigs > 0 ? 6 * static_cast<double>(rigs) - 6 : 6 * images - OpenGauge(options));
+}
+
+// `sigma_px`: what priors were weighted with.
+void Describe(const std::vector<Eigen::Vector2d>& residuals, size_t rigs,
+              const AdjustOptions& options, double sigma_px, Adjusted& out) {
   // A sight that is alone in seeing its point is met whatever the cameras are.
   const std::vector<int> sights = SightsOfPoints(out.bundle, out.used);
   for (size_t i = 0; i < residuals.size(); ++i) {
@@ -99,15 +155,14 @@ void Describe(const std::vector<Eigen::Vector2d>& residuals, size_t rigs, Adjust
     image_used[static_cast<size_t>(o.image)] = point_used[static_cast<size_t>(o.point)] = true;
   }
   out.rms_px = std::sqrt(squared / std::max(1, out.sights));
-  const auto count = [](const std::vector<bool>& v) {
-    return static_cast<double>(std::count(v.begin(), v.end(), true));
-  };
-  // A rig's own lengths leave six ways to move the world as a whole, else there are seven.
-  const double moved = rigs > 0 ? 6 * static_cast<double>(rigs) - 6 : 6 * count(image_used) - 7;
-  const double shifted = IsPerImage(out.lens) ? 2 * count(image_used) : 0;
-  const double unknowns = 3 * count(point_used) + moved + shifted;
-  const double freedom = 2.0 * out.sights - unknowns;
-  out.sigma_px = freedom > 0 ? std::sqrt(squared / freedom) : 0;
+  const auto points = static_cast<double>(std::count(point_used.begin(), point_used.end(), true));
+  double known = 0;
+  squared += sigma_px * sigma_px * PriorSquares(out.bundle, options, &known);
+  const double freedom =
+      2.0 * out.sights + known - 3 * points - CameraUnknowns(out.bundle, image_used, rigs, options);
+  // As many unknowns as numbers: all are explained, and nothing says how well.
+  out.sigma_px =
+      freedom > 0 ? std::sqrt(squared / freedom) : std::numeric_limits<double>::infinity();
 }
 
 void CheckPriors(const Bundle& bundle, const AdjustOptions& options) {
@@ -354,7 +409,7 @@ Adjusted Solve(const Bundle& bundle, const AdjustOptions& options, Normalised& n
     MoveToGaugeOf(start, out.bundle);
   }
   n.ToWorld(out.bundle);
-  Describe(residuals, n.rig_motion.size(), out);
+  Describe(residuals, n.rig_motion.size(), options, sigma, out);
   return out;
 }
 
