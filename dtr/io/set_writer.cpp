@@ -395,9 +395,10 @@ void SetWriter::State::MoveIntoPlace() {
   // A finished set never has checkpoints in it: they leave first (Recover() knows every moment).
   Rename(partial / kWork, done_work);
   try {
+    SyncTree(partial);
     if (replace) Rename(target, aside);
     Rename(partial, target);
-  } catch (const Error&) {
+  } catch (...) {
     if (replace && !fs::exists(target)) Rename(aside, target);
     Rename(done_work, partial / kWork);
     throw;
@@ -425,7 +426,6 @@ void SetWriter::Finish(DtrSet& set) {
     state.RemoveUnnamed(set);
     if (!held_out_text.empty()) WriteFileAtomically(held_out_file, held_out_text);
     WriteFileAtomically(file, text);
-    SyncTree(state.partial);
     state.MoveIntoPlace();
   });
 }

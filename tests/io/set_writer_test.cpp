@@ -197,7 +197,7 @@ TEST(SetWriter, AReplacementCutOffHalfWayGivesTheOldSetBack) {
 }
 
 TEST(SetWriter, KilledAsTheSetComesIntoPlaceLeavesNoWorkInIt) {
-  constexpr int kCheckpoints = 4000;  // deleting them takes longer than noticing the set
+  constexpr int kCheckpoints = 2000;  // deleting them takes longer than noticing the set
   const TemporaryFolder folder;
   const fs::path target = folder / "small.dtr";
   const int watch = inotify_init1(IN_CLOEXEC);
