@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "calib/colmap/model_io.h"
+#include "dtr/base/durable.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/base/hash.h"
@@ -184,6 +185,7 @@ void Workspace::Step(const std::string& name, const std::string& inputs,
   step_ = name;
   const auto first = static_cast<std::ptrdiff_t>(records_.size());
   body();
+  SyncTree(folder_);  // the stamp vouches for what COLMAP wrote, which syncs nothing
   json runs = json::array();
   for (auto it = records_.begin() + first; it != records_.end(); ++it) runs.push_back(ToJson(*it));
   WriteFileAtomically(stamp, json{{"fingerprint", fingerprint_}, {"runs", runs}}.dump(

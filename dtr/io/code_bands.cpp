@@ -135,6 +135,46 @@ std::string Compressed(const Bytes& part) {
   return out;
 }
 
+/// The frames of the band whose bytes begin with `bytes`.
+std::array<std::string_view, kParts> FramesOf(std::string_view bytes, const PartSizes& sizes) {
+  std::array<std::string_view, kParts> frames;
+  size_t begin = 0;
+  for (size_t part = 0; part < kParts; ++part) {
+    frames[part] = bytes.substr(begin, sizes[part]);
+    begin += sizes[part];
+  }
+  return frames;
+}
+
+/// Bytes that a frame says it holds.
+unsigned long long ContentSize(std::string_view frame) {
+  if (frame.empty()) return 0;
+  const auto size = ZSTD_getFrameContentSize(frame.data(), frame.size());
+  if (size == ZSTD_CONTENTSIZE_UNKNOWN || size == ZSTD_CONTENTSIZE_ERROR) {
+    Fail("a zstd frame that says its size", "none");
+  }
+  // RFC 8878: a block holds at most 128 KiB and takes 4 bytes at least.
+  constexpr unsigned long long kMostPerByte = (128 << 10) / 4;
+  if (size > kMostPerByte * frame.size()) {
+    Fail("a zstd frame of " + std::to_string(size) + " bytes",
+         "one too short for them, of " + std::to_string(frame.size()));
+  }
+  return size;
+}
+
+/// Refuses a band that says itself that it is none, before anything is allocated for it.
+void ExpectPlausible(const std::array<std::string_view, kParts>& frames, int width_px, int rows) {
+  const size_t validity = RowBytes(width_px) * static_cast<size_t>(rows);
+  const size_t pixels = static_cast<size_t>(width_px) * static_cast<size_t>(rows);
+  const auto residuals = ContentSize(frames[1]);
+  if (ContentSize(frames[0]) != validity) {
+    Fail("a part of " + std::to_string(validity) + " bytes", "another");
+  }
+  if (residuals > pixels || ContentSize(frames[2]) > 2 * residuals) {
+    Fail("parts of at most " + std::to_string(pixels) + " pixels", "more");
+  }
+}
+
 /// Exactly `size` bytes out of exactly the bytes given.
 Bytes Decompressed(std::string_view frame, size_t size) {
   if (size == 0) {
@@ -168,17 +208,13 @@ size_t CountValid(Bytes& validity, int width_px) {
   return valid;
 }
 
-Parts DecompressedParts(std::string_view bytes, const PartSizes& sizes, int width_px, int rows) {
-  const auto frame = [&](size_t part) {
-    size_t begin = 0;
-    for (size_t i = 0; i < part; ++i) begin += sizes[i];
-    return bytes.substr(begin, sizes[part]);
-  };
+Parts DecompressedParts(const std::array<std::string_view, kParts>& frames, int width_px,
+                        int rows) {
   Parts parts;
-  parts.validity = Decompressed(frame(0), RowBytes(width_px) * static_cast<size_t>(rows));
-  parts.residuals = Decompressed(frame(1), CountValid(parts.validity, width_px));
+  parts.validity = Decompressed(frames[0], RowBytes(width_px) * static_cast<size_t>(rows));
+  parts.residuals = Decompressed(frames[1], CountValid(parts.validity, width_px));
   const auto wide = std::count(parts.residuals.begin(), parts.residuals.end(), kWide);
-  parts.wide = Decompressed(frame(2), 2 * static_cast<size_t>(wide));
+  parts.wide = Decompressed(frames[2], 2 * static_cast<size_t>(wide));
   return parts;
 }
 
@@ -290,11 +326,24 @@ Grid<std::uint16_t> DecodeBands(std::string_view bytes, int width_px, int height
   if (end != bytes.size()) {
     Fail(std::to_string(end) + " bytes", std::to_string(bytes.size()));
   }
+  const auto frames_of = [&](int band) {
+    const auto i = static_cast<size_t>(band);
+    return FramesOf(bytes.substr(begins[i]), sizes[i]);
+  };
+  for (int band = 0; band < bands; ++band) {
+    ExpectPlausible(frames_of(band), width_px, RangeOfBand(band, rows_per_band, height_px).rows);
+  }
+  // What a header says of the first band may be a lie as well: it is decoded before all is taken.
+  const Parts first =
+      DecompressedParts(frames_of(0), width_px, RangeOfBand(0, rows_per_band, height_px).rows);
   Grid<std::uint16_t> codes(width_px, height_px);
   ParallelFor(0, bands, threads, [&](int band) {
-    const auto i = static_cast<size_t>(band);
     const BandRange range = RangeOfBand(band, rows_per_band, height_px);
-    Join(DecompressedParts(bytes.substr(begins[i]), sizes[i], width_px, range.rows), range, codes);
+    if (band == 0) {
+      Join(first, range, codes);
+    } else {
+      Join(DecompressedParts(frames_of(band), width_px, range.rows), range, codes);
+    }
   });
   return codes;
 }

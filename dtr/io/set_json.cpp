@@ -6,6 +6,7 @@
 
 #include "dtr/base/error.h"
 #include "dtr/io/depth_io.h"
+#include "dtr/io/formats/file_names.h"
 #include "dtr/io/held_out_files.h"
 #include "dtr/io/json_fields.h"
 
@@ -202,7 +203,10 @@ View ViewFrom(const JsonObject& object) {
   view.id = object.String("id");
   if (!IsSafeId(view.id)) object.Fail("id", "1 to 200 of the characters A-Z a-z 0-9 . _ -");
   view.name = object.String("name");
-  if (view.name.empty()) object.Fail("name", "the photo's name");
+  // Commands put it behind a folder of photos, or behind one that they write.
+  if (!WhyUnsafeName(view.name).empty()) {
+    object.Fail("name", "the photo's name, a relative path inside its folder");
+  }
   const std::string role = object.String("role");
   if (role != NameOf(ViewRole::kSource) && role != NameOf(ViewRole::kHeldOut)) {
     object.Fail("role", "\"source\" or \"held_out\"");

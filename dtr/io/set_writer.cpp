@@ -1,13 +1,8 @@
 // The writing half of set_io.h.
-#include <fcntl.h>
-#include <sys/file.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <set>
 
+#include "dtr/base/durable.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/base/hash.h"
@@ -26,6 +21,7 @@ namespace fs = std::filesystem;
 
 constexpr char kWork[] = "work";
 constexpr char kFingerprint[] = "work/fingerprint.json";
+constexpr char kLockName[] = "lock";
 constexpr char kLock[] = "work/lock";
 constexpr char kSparseFile[] = "sparse.bin";
 constexpr std::uintmax_t kRecordLimitBytes = 1 << 24;
@@ -47,40 +43,15 @@ std::string Canonical(const std::string& fingerprint_json, const std::string& wh
   return nlohmann::json(parsed).dump(2) + "\n";  // sorts the keys
 }
 
-// True when a partial folder has more in it than what the constructor itself puts there.
+// True when a partial folder has more in it than what the constructor itself puts there. What a
+// killed process had not finished to write is nobody's work.
 bool HoldsWork(const fs::path& partial) {
   for (const auto& entry : fs::recursive_directory_iterator(partial)) {
     const fs::path inside = entry.path().lexically_relative(partial);
-    if (!entry.is_directory() && inside != kFingerprint && inside != kLock) return true;
+    if (entry.is_directory() || IsTemporaryFile(inside)) continue;
+    if (inside != kFingerprint && inside != kLock) return true;
   }
   return false;
-}
-
-void Rename(const fs::path& from, const fs::path& to) {
-  std::error_code error;
-  fs::rename(from, to, error);
-  if (error) {
-    throw Error(from.string() + ": cannot be renamed to " + to.string() + ": " + error.message());
-  }
-}
-
-// A rename is on the disk only when its folder is.
-void SyncFolder(const fs::path& folder) {
-  const int fd = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  const bool synced = fd >= 0 && fsync(fd) == 0;
-  const int failure = errno;
-  if (fd >= 0) close(fd);
-  // Some network file systems cannot sync folders; their renames are as safe as they get.
-  if (!synced && failure != EINVAL && failure != ENOTSUP) {
-    throw Error(folder.string() + ": cannot be synced to disk: " + std::strerror(failure));
-  }
-}
-
-void SyncTree(const fs::path& root) {
-  for (const auto& entry : fs::recursive_directory_iterator(root)) {
-    if (entry.is_directory()) SyncFolder(entry.path());
-  }
-  SyncFolder(root);
 }
 
 StoredFile Describe(const fs::path& folder, const std::string& path) {
@@ -136,17 +107,18 @@ auto AsError(const Function& function) {
 }  // namespace
 
 struct SetWriter::State {
-  fs::path target, partial, aside;
+  fs::path target, partial, aside, done_work;
   bool force = false, resumed = false, finished = false;
   ImageCoding image_coding = ImageCoding::kPng;
-  int lock_fd = -1;
+  std::optional<FileLock> lock;
 
   fs::path RecordOf(const std::string& id) const {
     return partial / kWork / "views" / (id + ".json");
   }
   void Recover() const;
+  void RecoverWork() const;
   void ExpectReplaceable() const;
-  void Lock();
+  std::optional<FileLock> Lock(const fs::path& file) const;
   void OpenPartial(const std::string& fingerprint);
   std::string PathOf(const View& view, const std::string& kind, const std::string& extension) const;
   template <typename Write>
@@ -160,11 +132,25 @@ struct SetWriter::State {
 
 // A replacement that was cut off between its two renames: the old set goes back.
 void SetWriter::State::Recover() const {
+  RecoverWork();
   if (!fs::exists(aside / kSetFile)) return;
   if (fs::exists(target)) {
     fs::remove_all(aside);
   } else {
     Rename(aside, target);
+  }
+}
+
+// A set that was cut off on its way into place has its checkpoints beside it: they go back to one
+// that is not there yet, and are of no more use to one that is.
+void SetWriter::State::RecoverWork() const {
+  const bool ours = fs::exists(done_work / kLockName);
+  if (!ours && !(fs::is_directory(done_work) && fs::is_empty(done_work))) return;
+  const std::optional<FileLock> nobody_at_work = Lock(done_work / kLockName);
+  if (fs::exists(partial) && !fs::exists(partial / kWork)) {
+    Rename(done_work, partial / kWork);
+  } else {
+    RemoveFolder(done_work, kLockName);
   }
 }
 
@@ -181,13 +167,8 @@ void SetWriter::State::ExpectReplaceable() const {
   }
 }
 
-void SetWriter::State::Lock() {
-  const fs::path file = partial / kLock;
-  lock_fd = open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
-  if (lock_fd < 0) throw Error(file.string() + ": cannot be opened: " + std::strerror(errno));
-  if (flock(lock_fd, LOCK_EX | LOCK_NB) == 0) return;
-  close(lock_fd);
-  lock_fd = -1;
+std::optional<FileLock> SetWriter::State::Lock(const fs::path& file) const {
+  if (auto taken = FileLock::Try(file)) return taken;
   throw UsageError(partial.string() + ": another process is writing this set; wait for it");
 }
 
@@ -200,7 +181,10 @@ void SetWriter::State::OpenPartial(const std::string& fingerprint) {
       fs::exists(partial) && HoldsWork(partial) && !fs::exists(partial / kFingerprint);
   if (!foreign) fs::create_directories(partial / kWork, error);
   if (error) throw Error(partial.string() + ": cannot be made: " + error.message());
-  if (!foreign) Lock();
+  if (!foreign) {
+    lock = Lock(partial / kLock);
+    RemoveTemporaryFiles(partial);  // of a run that was killed
+  }
   const bool holds_work = HoldsWork(partial);
   if (holds_work &&
       (foreign || ReadFile(partial / kFingerprint, kRecordLimitBytes) != fingerprint)) {
@@ -234,18 +218,14 @@ SetWriter::SetWriter(const fs::path& target, const std::string& fingerprint_json
   state_->target = WithoutSlash(target);
   state_->partial = Beside(state_->target, ".partial");
   state_->aside = Beside(state_->target, ".replaced");
+  state_->done_work = Beside(state_->target, ".partial.work");
   state_->force = force;
   state_->image_coding = image_coding;
-  try {
-    AsError([&] {
-      state_->Recover();
-      state_->ExpectReplaceable();
-      state_->OpenPartial(fingerprint);
-    });
-  } catch (...) {
-    if (state_->lock_fd >= 0) close(state_->lock_fd);
-    throw;
-  }
+  AsError([&] {
+    state_->Recover();
+    state_->ExpectReplaceable();
+    state_->OpenPartial(fingerprint);
+  });
 }
 
 SetWriter::~SetWriter() {
@@ -256,7 +236,6 @@ SetWriter::~SetWriter() {
   } catch (const fs::filesystem_error&) {
     // The folder was taken away while we worked; there is nothing left to tidy.
   }
-  if (state_->lock_fd >= 0) close(state_->lock_fd);
 }
 
 const fs::path& SetWriter::folder() const { return state_->partial; }
@@ -330,7 +309,7 @@ void SetWriter::CopyFiles(const fs::path& set_folder, const View& view) {
     if (!*file) continue;
     const StoredFile copied = AsError([&] {
       return state_->Store((*file)->path, [&](const fs::path& target) {
-        fs::copy_file(set_folder / (*file)->path, target, fs::copy_options::overwrite_existing);
+        CopyFileAtomically(set_folder / (*file)->path, target);
       });
     });
     if (copied == **file) continue;
@@ -413,21 +392,25 @@ void SetWriter::State::RemoveUnnamed(const DtrSet& set) const {
 void SetWriter::State::MoveIntoPlace() {
   ExpectReplaceable();
   const bool replace = fs::exists(target);
-  if (replace) Rename(target, aside);
+  // A finished set never has checkpoints in it: they leave first (Recover() knows every moment).
+  Rename(partial / kWork, done_work);
   try {
+    SyncTree(partial);
+    if (replace) Rename(target, aside);
     Rename(partial, target);
-  } catch (const Error&) {
-    if (replace) Rename(aside, target);
+  } catch (...) {
+    if (replace && !fs::exists(target)) Rename(aside, target);
+    Rename(done_work, partial / kWork);
     throw;
   }
   SyncFolder(target.parent_path());
   finished = true;
-  std::error_code error;
-  fs::remove_all(target / kWork, error);
-  if (!error && replace) fs::remove_all(aside, error);
-  if (error) {
-    throw Error(target.string() +
-                ": finished, but what it no longer needs cannot be deleted: " + error.message());
+  try {
+    RemoveFolder(done_work, kLockName);
+    if (replace) fs::remove_all(aside);
+  } catch (const fs::filesystem_error& error) {
+    throw Error(target.string() + ": finished, but what it no longer needs cannot be deleted: " +
+                error.code().message());
   }
 }
 
@@ -443,7 +426,6 @@ void SetWriter::Finish(DtrSet& set) {
     state.RemoveUnnamed(set);
     if (!held_out_text.empty()) WriteFileAtomically(held_out_file, held_out_text);
     WriteFileAtomically(file, text);
-    SyncTree(state.partial);
     state.MoveIntoPlace();
   });
 }

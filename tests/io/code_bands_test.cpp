@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <fstream>
+#include <string>
 
 #include "dtr/base/error.h"
 #include "dtr/base/random.h"
@@ -108,6 +110,50 @@ TEST(CodeBands, HostileSizesAreRefusedBeforeAnythingIsAllocated) {
   EXPECT_THROW(DecodeBands(with(kHeaderBytes, 0xffffffff), 8, 8), Error);
   EXPECT_THROW(EncodeBands(Codes()), Error);
   EXPECT_LE(bytes.size(), MostBandBytes(8, 8));
+}
+
+// The most address space this process had so far, in KiB.
+long PeakAddressSpaceKib() {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);) {
+    if (line.rfind("VmPeak:", 0) == 0) return std::stol(line.substr(7));
+  }
+  return 0;
+}
+
+// A file of a few bytes about a map of 400 million pixels: what it says of itself must hold before
+// room for the map is made.
+TEST(CodeBands, AMapThatTheFileCannotHoldTakesNoMemory) {
+  constexpr int kSide = 20000, kRows = 10000;
+  constexpr long kMostKib = 64 << 10;  // the codes alone would be 800 MB
+  const auto file = [&](const std::string& frame) {
+    std::string bytes("DTRBAND1");
+    const auto put = [&](std::uint32_t value) {
+      bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
+    };
+    for (const int number : {kSide, kSide, kRows}) put(static_cast<std::uint32_t>(number));
+    for (int band = 0; band < kSide / kRows; ++band) {
+      put(static_cast<std::uint32_t>(frame.size()));
+      put(0);
+      put(0);
+    }
+    for (int band = 0; band < kSide / kRows; ++band) bytes += frame;
+    return bytes;
+  };
+  // zstd's magic, a single segment with 4 bytes of size, and one block of no bytes (RFC
+  // 8878, 3.1.1)
+  const auto frame = [](std::uint32_t size) {
+    std::string bytes("\x28\xb5\x2f\xfd\xa0", 5);
+    bytes.append(reinterpret_cast<const char*>(&size), sizeof size);
+    return bytes + std::string("\x01\x00\x00", 3);
+  };
+  const long before = PeakAddressSpaceKib();
+  ASSERT_GT(before, 0);
+  EXPECT_THROW(DecodeBands(file(""), kSide, kSide), Error);
+  EXPECT_THROW(DecodeBands(file("no frame at all"), kSide, kSide), Error);
+  EXPECT_THROW(DecodeBands(file(frame(7)), kSide, kSide), Error);
+  EXPECT_THROW(DecodeBands(file(frame(kSide / 8 * kRows)), kSide, kSide), Error);
+  EXPECT_LT(PeakAddressSpaceKib() - before, kMostKib);
 }
 
 DepthImage DepthWithin(Random& random, double near_z, double far_z) {

@@ -152,6 +152,14 @@ TEST_F(EditedSet, IdsMustBeUniqueAndSafe) {
   }
 }
 
+TEST_F(EditedSet, NamesMustStayInTheFolderTheyArePutInto) {
+  for (const char* bad : {"", "/etc/passwd", "../../x.png", "left/../../x.png", "left/", "a\\nb"}) {
+    EXPECT_THAT(ErrorAfter("\"view1\"", "photos/Säule 1.JPG", bad), HasSubstr("views[1].name"))
+        << bad;
+  }
+  EXPECT_EQ(ErrorAfter("\"view1\"", "photos/Säule 1.JPG", "rig/left/..1.JPG"), "");
+}
+
 TEST_F(EditedSet, PathsMustStayInTheSet) {
   for (const char* bad : {"/etc/passwd", "../outside.png", "images/../../x", "images//view0.png",
                           "./images/view0.png", "images\\\\view0.png", "C:x", "", "images/"}) {

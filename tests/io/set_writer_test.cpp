@@ -1,7 +1,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/inotify.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <cmath>
+#include <fstream>
 #include <limits>
 #include <map>
 #include <memory>
@@ -189,6 +194,118 @@ TEST(SetWriter, AReplacementCutOffHalfWayGivesTheOldSetBack) {
   EXPECT_THROW(SetWriter(folder / "small.dtr", kFingerprint, false), UsageError);
   EXPECT_THAT(VerifySet(folder / "small.dtr"), IsEmpty());
   EXPECT_FALSE(fs::exists(folder / "small.dtr.replaced"));
+}
+
+TEST(SetWriter, KilledAsTheSetComesIntoPlaceLeavesNoWorkInIt) {
+  constexpr int kCheckpoints = 2000;  // deleting them takes longer than noticing the set
+  const TemporaryFolder folder;
+  const fs::path target = folder / "small.dtr";
+  const int watch = inotify_init1(IN_CLOEXEC);
+  ASSERT_GE(inotify_add_watch(watch, folder.path().c_str(), IN_MOVED_TO), 0);
+  const pid_t child = fork();
+  if (child == 0) {
+    SetWriter writer(target, kFingerprint, false);
+    for (int i = 0; i < kCheckpoints; ++i) {
+      std::ofstream(writer.work_folder() / ("checkpoint" + std::to_string(i))) << i;
+    }
+    WriteSmallSet(writer);
+    _exit(0);
+  }
+  alignas(inotify_event) char events[1 << 12];
+  while (!fs::exists(target)) ASSERT_GT(read(watch, events, sizeof events), 0);
+  kill(child, SIGKILL);
+  close(watch);
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  EXPECT_FALSE(fs::exists(target / "work"));
+  EXPECT_THAT(VerifySet(target), IsEmpty());
+  EXPECT_THROW(SetWriter(target, kFingerprint, false), UsageError);  // it is there already
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1);
+}
+
+TEST(SetWriter, CutOffBeforeTheSetComesIntoPlaceItGoesOn) {
+  const TemporaryFolder folder;
+  const fs::path target = folder / "small.dtr";
+  WriteSmallSet(target);
+  const auto whole = Contents(target);
+  for (const bool replaced : {false, true}) {
+    if (!replaced) fs::remove_all(target);
+    {
+      SetWriter writer(target, kFingerprint, replaced);
+      View view = SmallView(0);
+      writer.WriteView(view, LengthUnit::kMetre);
+    }
+    fs::rename(folder / "small.dtr.partial/work", folder / "small.dtr.partial.work");
+    if (replaced) fs::rename(target, folder / "small.dtr.replaced");
+    {
+      SetWriter writer(target, kFingerprint, replaced);
+      EXPECT_TRUE(writer.resumed());
+      EXPECT_EQ(fs::exists(target / "set.json"), replaced);
+      View view = SmallView(0);
+      EXPECT_TRUE(writer.RestoreView(view));
+      WriteSmallSet(writer);
+    }
+    EXPECT_EQ(Contents(target), whole);
+    EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1);
+  }
+  // Somebody's folder of that name is left alone.
+  fs::create_directories(folder / "other.dtr.partial.work/thesis");
+  { SetWriter writer(folder / "other.dtr", kFingerprint, false); }
+  EXPECT_TRUE(fs::exists(folder / "other.dtr.partial.work/thesis"));
+}
+
+// A process that is killed while it writes a file leaves the part under a name of its own.
+TEST(SetWriter, WhatAKilledProcessHadBegunToWriteIsInNoSet) {
+  const TemporaryFolder folder;
+  const fs::path target = folder / "small.dtr";
+  WriteSmallSet(folder / "straight.dtr");
+  const auto whole = Contents(folder / "straight.dtr");
+  const std::vector<std::string> begun = {"set.json.tmp77",        "report/run.json.tmp4194304",
+                                          "images/view0.png.tmp1", "held_out/files.json.tmp12",
+                                          "sparse.bin.tmp9",       "work/fingerprint.json.tmp5"};
+  const auto leave = [&](const std::string& name) {
+    const fs::path file = target.string() + ".partial/" + name;
+    fs::create_directories(file.parent_path());
+    std::ofstream(file) << "half";
+  };
+  Random random(3);
+  constexpr int kRuns = 12;
+  for (int run = 0; run < kRuns; ++run) {
+    if (run == 0) {
+      leave("work/fingerprint.json.tmp5");  // all there is: killed at the very first file
+    } else {
+      {
+        SetWriter writer(target, kFingerprint, false);
+        View view = SmallView(0);
+        writer.WriteView(view, LengthUnit::kMetre);
+      }
+      for (int i = 0; i < 3; ++i) {
+        leave(begun[static_cast<size_t>(random.Index(static_cast<int>(begun.size())))]);
+      }
+    }
+    {
+      SetWriter writer(target, kFingerprint, false);
+      EXPECT_EQ(writer.resumed(), run > 0);
+      WriteSmallSet(writer);
+    }
+    ASSERT_EQ(Contents(target), whole) << run;
+    fs::remove_all(target);
+  }
+}
+
+TEST(SetWriter, CopiesOfFilesThatMayOnlyBeReadCanBeReplaced) {
+  const TemporaryFolder folder;
+  const DtrSet set = WriteSmallSet(folder / "from.dtr");
+  const auto& views = set.frames[0].views;
+  for (const View& view : views) {
+    fs::permissions(folder / "from.dtr" / view.image_file->path, fs::perms(0444));
+  }
+  SetWriter writer(folder / "to.dtr", kFingerprint, false);
+  for (const View& view : views) writer.CopyFiles(folder / "from.dtr", view);
+  const fs::path copy = writer.folder() / views[0].image_file->path;
+  EXPECT_NE(fs::status(copy).permissions() & fs::perms::owner_write, fs::perms::none);
+  fs::permissions(copy, fs::perms(0444));  // as an earlier run left it
+  EXPECT_NO_THROW(writer.CopyFiles(folder / "from.dtr", views[0]));
 }
 
 TEST(SetWriter, FinishRefusesWhatReadSetWouldAndKeepsTheWork) {

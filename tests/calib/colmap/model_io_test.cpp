@@ -198,6 +198,15 @@ TEST_F(HandWritten, RecordsThatContradictEachOtherAreRefused) {
   EXPECT_THAT(MessageOf(folder_.path()), HasSubstr("quaternion"));
 }
 
+TEST_F(HandWritten, NamesThatLeaveTheFolderOfPhotosAreRefused) {
+  for (const char* bad : {"/etc/passwd", "../a.jpg", "cam0/../../a.jpg", "cam0/"}) {
+    Write(cameras_, "1 1 0 0 0 0 0 0 1 " + std::string(bad) + "\n\n", "");
+    EXPECT_THAT(MessageOf(folder_.path()), HasSubstr("images.txt: image 1: its name: expected a"));
+  }
+  Write(cameras_, "1 1 0 0 0 0 0 0 1 cam0/0001..jpg\n\n", "");
+  EXPECT_EQ(ReadModel(folder_.path()).images[0].name, "cam0/0001..jpg");
+}
+
 TEST(ReadModel, FolderWithoutAModelIsNamed) {
   const dtr::testing::TemporaryFolder folder;
   EXPECT_THAT(MessageOf(folder.path()), HasSubstr(folder.path().string()));

@@ -1,0 +1,121 @@
+#include "dtr/base/durable.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <system_error>
+#include <vector>
+
+#include "dtr/base/error.h"
+
+namespace dtr {
+namespace fs = std::filesystem;
+namespace {
+
+// errno of the first failure, or 0.
+int Sync(const fs::path& path, int flags) {
+  const int fd = open(path.c_str(), flags | O_CLOEXEC);
+  if (fd < 0) return errno;
+  const int failure = fsync(fd) == 0 ? 0 : errno;
+  close(fd);
+  return failure;
+}
+
+[[noreturn]] void Fail(const fs::path& file, const std::string& what, const std::string& why) {
+  throw Error(file.string() + ": " + what + ": " + why);
+}
+
+}  // namespace
+
+void SyncFile(const fs::path& file) {
+  if (const int failure = Sync(file, O_RDONLY); failure != 0) {
+    Fail(file, "cannot be written", std::strerror(failure));
+  }
+}
+
+void SyncFolder(const fs::path& folder) {
+  const int failure = Sync(folder, O_RDONLY | O_DIRECTORY);
+  // Some network file systems cannot sync folders; their renames are as safe as they get.
+  if (failure != 0 && failure != EINVAL && failure != ENOTSUP) {
+    Fail(folder, "cannot be synced to disk", std::strerror(failure));
+  }
+}
+
+void SyncTree(const fs::path& root) {
+  for (const auto& entry : fs::recursive_directory_iterator(root)) {
+    if (entry.is_symlink()) continue;
+    if (entry.is_regular_file()) SyncFile(entry.path());
+    if (entry.is_directory()) SyncFolder(entry.path());
+  }
+  SyncFolder(root);
+}
+
+void Rename(const fs::path& from, const fs::path& to) {
+  std::error_code error;
+  fs::rename(from, to, error);
+  if (error) Fail(from, "cannot be renamed to " + to.string(), error.message());
+}
+
+void CopyFileAtomically(const fs::path& from, const fs::path& to) {
+  const fs::path temporary = to.string() + ".tmp" + std::to_string(getpid());
+  try {
+    std::error_code error;
+    fs::remove(temporary, error);  // of an earlier process of our number, perhaps to be read only
+    fs::copy_file(from, temporary, error);
+    if (!error) fs::permissions(temporary, fs::perms::owner_write, fs::perm_options::add, error);
+    if (error) Fail(to, "cannot be copied from " + from.string(), error.message());
+    SyncFile(temporary);
+    Rename(temporary, to);
+  } catch (...) {
+    std::error_code ignored;
+    fs::remove(temporary, ignored);
+    throw;
+  }
+}
+
+bool IsTemporaryFile(const fs::path& file) {
+  const std::string name = file.filename().string();
+  const size_t end = name.find_last_not_of("0123456789");
+  constexpr size_t kLength = 4;  // ".tmp"
+  return end != std::string::npos && end + 1 < name.size() && end + 1 >= kLength &&
+         name.compare(end + 1 - kLength, kLength, ".tmp") == 0;
+}
+
+void RemoveTemporaryFiles(const fs::path& folder) {
+  std::vector<fs::path> files;
+  std::error_code error;
+  fs::recursive_directory_iterator entries(folder, error);
+  for (; !error && entries != fs::recursive_directory_iterator(); entries.increment(error)) {
+    if (entries->is_regular_file() && IsTemporaryFile(entries->path())) {
+      files.push_back(entries->path());
+    }
+  }
+  for (size_t i = 0; !error && i < files.size(); ++i) fs::remove(files[i], error);
+  if (error) Fail(folder, "temporary files in it cannot be deleted", error.message());
+}
+
+void RemoveFolder(const fs::path& folder, const std::string& last) {
+  std::vector<fs::path> others;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (entry.path().filename() != last) others.push_back(entry.path());
+  }
+  for (const fs::path& path : others) fs::remove_all(path);
+  fs::remove_all(folder);
+}
+
+std::optional<FileLock> FileLock::Try(const fs::path& file) {
+  const int fd = open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+  if (fd < 0) Fail(file, "cannot be opened", std::strerror(errno));
+  FileLock lock(fd);
+  if (flock(fd, LOCK_EX | LOCK_NB) == 0) return lock;
+  return std::nullopt;
+}
+
+FileLock::~FileLock() {
+  if (fd_ >= 0) close(fd_);
+}
+
+}  // namespace dtr

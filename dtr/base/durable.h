@@ -1,0 +1,56 @@
+// dtr/base/durable.h -- what must hold when the machine stops at any moment: files that are on the
+// disk before something vouches for them, temporary files that are known as such, locks that end
+// with their process.
+#pragma once
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+
+namespace dtr {
+
+/// Waits until the content of `file` is on the disk. Throws Error when that fails.
+void SyncFile(const std::filesystem::path& file);
+/// The same for the names in a folder: a rename is on the disk only when its folder is. File
+/// systems that cannot sync folders are left to what they do.
+void SyncFolder(const std::filesystem::path& folder);
+/// SyncFile and SyncFolder for everything below `root`, and for itself; links are not followed.
+void SyncTree(const std::filesystem::path& root);
+
+/// Throws Error naming both where the system refuses.
+void Rename(const std::filesystem::path& from, const std::filesystem::path& to);
+
+/// Copies content, not permissions to the letter: the copy can be written by its owner even where
+/// the original cannot. As WriteFileAtomically, `to` has the old content or all of the new one,
+/// which is on the disk; a file that may only be read is replaced too. Throws Error.
+void CopyFileAtomically(const std::filesystem::path& from, const std::filesystem::path& to);
+
+/// True for what WriteFileAtomically and CopyFileAtomically leave when they are killed:
+/// NAME.tmp and a number.
+bool IsTemporaryFile(const std::filesystem::path& file);
+/// Deletes all such files below `folder`, of which no process may be at work. Throws Error.
+void RemoveTemporaryFiles(const std::filesystem::path& folder);
+
+/// Deletes a folder and everything in it, the file `last` after all others: as long as anything is
+/// there, it says whose it is. Throws std::filesystem::filesystem_error.
+void RemoveFolder(const std::filesystem::path& folder, const std::string& last);
+
+/// Held by one process at a time; the system releases it when the process ends, however it ends.
+class FileLock {
+ public:
+  /// Empty when another process has the lock. Makes the file where there is none; throws Error
+  /// where it cannot be opened.
+  static std::optional<FileLock> Try(const std::filesystem::path& file);
+  ~FileLock();
+  FileLock(FileLock&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
+  FileLock& operator=(FileLock&& other) noexcept {
+    std::swap(fd_, other.fd_);
+    return *this;
+  }
+
+ private:
+  explicit FileLock(int fd) : fd_(fd) {}
+  int fd_;
+};
+
+}  // namespace dtr

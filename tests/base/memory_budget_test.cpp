@@ -1,0 +1,52 @@
+#include "dtr/base/memory_budget.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <thread>
+
+#include "dtr/base/parallel_for.h"
+
+namespace dtr {
+namespace {
+
+// The most that `threads` threads held at a time when each item takes `bytes`.
+double MostHeld(double room_gb, double bytes, int threads) {
+  MemoryBudget budget(room_gb);
+  std::atomic<int> held{0}, most{0};
+  ParallelFor(0, 60, threads, [&](int) {
+    const auto share = budget.Take(bytes);
+    const int now = ++held;
+    for (int seen = most; now > seen && !most.compare_exchange_weak(seen, now);) {
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    --held;
+  });
+  return most * bytes;
+}
+
+TEST(MemoryBudget, IsNeverExceeded) {
+  EXPECT_LE(MostHeld(1, 0.3e9, 8), 0.9e9);
+  EXPECT_LE(MostHeld(1, 0.9e9, 8), 0.9e9);
+}
+
+TEST(MemoryBudget, LetsThroughOneThatIsLargerThanAllOfIt) { EXPECT_EQ(MostHeld(1, 5e9, 8), 5e9); }
+
+TEST(MemoryBudget, WithoutABoundNobodyWaits) {
+  MemoryBudget budget(0);
+  const auto one = budget.Take(1e12);
+  const auto two = budget.TakeForPhoto(1'000'000, 1'000'000);  // this thread would wait for ever
+}
+
+TEST(MemoryBudget, SharesOfManySizesAllComeThrough) {
+  MemoryBudget budget(1);
+  std::atomic<int> done{0};
+  ParallelFor(0, 200, 8, [&](int i) {
+    const auto share = budget.Take(0.05e9 * (i % 30));
+    ++done;
+  });
+  EXPECT_EQ(done, 200);
+}
+
+}  // namespace
+}  // namespace dtr
