@@ -95,7 +95,7 @@ bool ProcessorResolver::Draws(const Frame& frame) {
 }
 
 void ProcessorResolver::Draw(const Frame& frame, const Band& band, const SampledViews& sampled,
-                             const std::vector<float>& surface, bool for_upload) {
+                             const std::vector<float>& surface) {
   std::vector<PixelView> views;
   for (size_t i = 0; i < frame.views.size(); ++i) {
     const View& view = *frame.views[i];
@@ -109,7 +109,6 @@ void ProcessorResolver::Draw(const Frame& frame, const Band& band, const Sampled
   image_.resize(pixels);
   depth_.resize(pixels);
   marks_.resize(pixels);
-  if (for_upload) texels_.resize(2 * pixels);
   const BlendParameters blend = BlendParametersOf(frame.options, frame.novel.fx_px());
   const PinholeCamera& novel = frame.novel;
   // A thread's rows lie together: they read the same pixels of the views.
@@ -126,17 +125,8 @@ void ProcessorResolver::Draw(const Frame& frame, const Band& band, const Sampled
            static_cast<float>(blend.max_angle_rad), blend.blend_k, &surface[first], &image_[first],
            &depth_[first], &marks_[first]},
           views);
-      if (for_upload) PackRow(first);  // while it is in the core's cache
     }
   });
-}
-
-/// The row of pixels from `first` on, as UploadPacked wants them.
-void ProcessorResolver::PackRow(size_t first) {
-  for (size_t p = first; p < first + static_cast<size_t>(width_px_); ++p) {
-    texels_[2 * p] = std::bit_cast<std::uint32_t>(depth_[p]);
-    texels_[2 * p + 1] = image_[p];
-  }
 }
 
 void ProcessorResolver::CopyTo(RenderResult& result) const {
@@ -156,6 +146,11 @@ void ProcessorResolver::Upload(const Targets& targets) const {
 }
 
 GLuint ProcessorResolver::UploadPacked() {
+  texels_.resize(2 * depth_.size());
+  for (size_t p = 0; p < depth_.size(); ++p) {
+    texels_[2 * p] = std::bit_cast<std::uint32_t>(depth_[p]);
+    texels_[2 * p + 1] = image_[p];
+  }
   if (width_px_ != packed_width_px_ || band_.count != packed_rows_) {
     packed_ = MakeTarget(GL_TEXTURE_2D_ARRAY, GL_RG32UI, width_px_, band_.count, 1);
     packed_width_px_ = width_px_, packed_rows_ = band_.count;

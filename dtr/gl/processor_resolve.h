@@ -21,10 +21,9 @@ class ProcessorResolver {
   static bool Draws(const Frame& frame);
 
   /// As Resolver::Draw, but into memory of its own, which holds the band until the next call;
-  /// `surface`: SPEC 5.1, 1/z of the band's pixels. The views must have been sampled. With
-  /// `for_upload` UploadPacked may follow.
+  /// `surface`: SPEC 5.1, 1/z of the band's pixels. The views must have been sampled.
   void Draw(const Frame& frame, const Band& band, const SampledViews& sampled,
-            const std::vector<float>& surface, bool for_upload);
+            const std::vector<float>& surface);
 
   /// SPEC 6: the band into its rows of `result`, which has the picture's size.
   void CopyTo(RenderResult& result) const;
@@ -34,8 +33,6 @@ class ProcessorResolver {
   GLuint UploadPacked();
 
  private:
-  void PackRow(size_t first);
-
   int width_px_ = 0;
   Band band_;
   std::vector<std::uint32_t> image_, marks_;

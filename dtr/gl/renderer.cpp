@@ -236,7 +236,7 @@ class Renderer::Implementation {
     CheckStorage(frame);
     drawn_in_memory_ = frame.on_processor && !frame.views.empty();
     if (drawn_in_memory_ && settings_.packed) {
-      DrawBand(frame, {0, drawn.height_px}, true);
+      DrawBand(frame, {0, drawn.height_px});
       drawn.texels = processor_resolver_.UploadPacked();
     } else {
       FitTargets(frame, drawn.height_px);
@@ -265,8 +265,7 @@ class Renderer::Implementation {
     }
   }
 
-  /// `for_upload`: ProcessorResolver::UploadPacked is to follow.
-  void DrawBand(const Frame& frame, const Band& band, bool for_upload = false) {
+  void DrawBand(const Frame& frame, const Band& band) {
     if (frame.deferred()) {
       coarse_depth_.Draw(frame, band, views_.meshes(), programs_, targets_);
     } else {
@@ -274,7 +273,7 @@ class Renderer::Implementation {
                      HasClipControl() && !settings_.only_opengl_43);
     }
     if (frame.on_processor) {
-      processor_resolver_.Draw(frame, band, views_.sampled(), coarse_depth_.nearest(), for_upload);
+      processor_resolver_.Draw(frame, band, views_.sampled(), coarse_depth_.nearest());
     } else {
       resolver_.Draw(frame, band, views_.store(), programs_, targets_, coarse_depth_.buffer());
     }

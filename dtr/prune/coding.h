@@ -6,18 +6,20 @@
 #include <vector>
 
 #include "dtr/prune/tiles.h"
+#include "dtr/render/options.h"
 #include "dtr/types/dtr_set.h"
 
 namespace dtr::prune {
 
 /// Of all source views alike, but for the tiles.
 struct Coding {
-  int jpeg_quality = 0;            ///< of images; 0: as they are
-  double depth_error_px = 0;       ///< bound in pixels of disparity; 0: as it is
-  int shrink = 1;                  ///< images and depth maps are 1/shrink of their size per axis
-  double mesh_tolerance_px = 0.7;  ///< of the reduced meshes beside them
-  int mesh_resolution = 1;         ///< these are of every so many samples per axis
-  bool sigma = true;               ///< false: no standard deviations
+  int jpeg_quality = 0;       ///< of images; 0: as they are
+  double depth_error_px = 0;  ///< bound in pixels of disparity; 0: as it is
+  int shrink = 1;             ///< images and depth maps are 1/shrink of their size per axis
+  double mesh_tolerance_px =
+      RenderOptions{}.mesh_tolerance_px;  ///< of the reduced meshes beside them
+  int mesh_resolution = 1;                ///< these are of every so many samples per axis
+  bool sigma = true;                      ///< false: no standard deviations
   TilesLeftOut tiles;
   /// The tiles of one view; null: it keeps all.
   const std::vector<std::uint8_t>* TilesOf(const View& view) const {

@@ -49,6 +49,7 @@ TEST_F(OpenGl, AMachineWithoutItIsToldInOneLine) {
 
 TEST_F(OpenGl, NeedsNoDisplay) {
   if (!HasOpenGl()) GTEST_SKIP() << "no OpenGL 4.3";
+  fs::remove(In("v.png"));
   const Environment no_x("DISPLAY", ""), no_wayland("WAYLAND_DISPLAY", "");
   const Ran ran = Render({"--renderer", "gl"});
   EXPECT_EQ(ran.code, 0) << ran.err;

@@ -11,8 +11,8 @@
 namespace dtr::testing {
 
 /// What two renderers may differ by: 2 of 255 levels (rounding to 8 bits twice, single precision)
-/// on all but a share of the pixels, those where rounding turns a decision. The rest is not judged,
-/// and must be little: the pixels at which the reference itself says that either may be right.
+/// on all but a share of the pixels, those where rounding turns a decision. Those at the Delta
+/// border are not judged, and must be few; so must those at which the reference itself wavers.
 inline constexpr int kLevels = 2;
 inline constexpr double kApartShare = 0.002, kCoverageShare = 0.002, kBorderShare = 0.01;
 
@@ -20,11 +20,11 @@ struct Comparison {
   long long compared = 0, apart = 0;         ///< seen by both and judged; more than kLevels apart
   long long judged = 0, coverage_apart = 0;  ///< neither at a break nor at the Delta border
   long long border = 0, total = 0;           ///< flagged by the reference: at the Delta border
-  long long undecided = 0;                   ///< off breaks, where the reference wavers itself
+  long long undecided = 0;                   ///< of the judged: the reference wavers itself
   int largest = 0;
 
   double border_share() const { return Share(border, total); }
-  double undecided_share() const { return Share(undecided, judged + undecided); }
+  double undecided_share() const { return Share(undecided, judged); }
   double apart_share() const { return Share(apart, compared); }
   double coverage_share() const { return Share(coverage_apart, judged); }
   bool Holds() const {
@@ -108,7 +108,7 @@ inline void MarkApart(const RenderResult& reference, const RenderResult& otherwi
   }
 }
 
-/// The measure: pixels near breaks, at the Delta border and undecided ones are left out.
+/// The measure: pixels near breaks and at the Delta border are left out, undecided ones counted.
 inline Comparison Compare(const RenderResult& reference, const RenderResult& other,
                           const BreakRule& rule, const Mask& undecided = {}) {
   Comparison c;

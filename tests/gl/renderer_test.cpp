@@ -14,7 +14,6 @@
 #include "dtr/gl/objects.h"
 #include "dtr/render/triangulation.h"
 #include "tests/gl/gl_testing.h"
-#include "tests/gl/gl_testing.h"
 
 namespace dtr::gl {
 namespace {

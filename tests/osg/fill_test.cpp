@@ -61,6 +61,19 @@ NamedScene WithHoles(int width_px, int height_px) {
   return named;
 }
 
+osg::ref_ptr<DepthTR> FilledWhenStill(const DtrSet& set) {
+  osg::ref_ptr<DepthTR> node = new DepthTR;
+  node->setScene(set);
+  node->setRenderOptions(Filled());
+  node->setFillTime(osgDTR::FillTime::kWhenStill);
+  return node;
+}
+
+/// Until what has stopped moving counts as still.
+void WaitUntilStill() {
+  std::this_thread::sleep_for(std::chrono::duration<double>(1.1 * dtr::viewer::kStillAfterSeconds));
+}
+
 class FillTest : public OsgTest {};
 
 TEST_F(FillTest, ShowsWhatTheRendererFillsByItself) {
@@ -82,10 +95,7 @@ TEST_F(FillTest, ShowsWhatTheRendererFillsByItself) {
 
 TEST_F(FillTest, WhenStillMeansNotWhileMovingAndOnceItRests) {
   const NamedScene named = WithHoles(120, 80);
-  osg::ref_ptr<DepthTR> node = new DepthTR;
-  node->setScene(named.set);
-  node->setRenderOptions(Filled(RenderMethod::kDeferred));
-  node->setFillTime(osgDTR::FillTime::kWhenStill);
+  const osg::ref_ptr<DepthTR> node = FilledWhenStill(named.set);
   OffscreenViewer viewer(node.get(), named.novel.camera, named.novel.cam_from_world);
   const RenderResult expected = DrawnAlone(named.set, named.novel, Filled(RenderMethod::kDeferred));
   EXPECT_EQ(Compare(viewer.Draw(), expected).empty, 0) << "the first picture waits for nothing";
@@ -95,7 +105,7 @@ TEST_F(FillTest, WhenStillMeansNotWhileMovingAndOnceItRests) {
   EXPECT_GT(Compare(viewer.Draw(), expected).empty, 0.04) << "it moves";
   viewer.Look(named.novel.cam_from_world);
   EXPECT_GT(Compare(viewer.Draw(), expected).empty, 0.04) << "it moved just now";
-  std::this_thread::sleep_for(std::chrono::duration<double>(1.1 * dtr::viewer::kStillAfterSeconds));
+  WaitUntilStill();
   const Wrong wrong = Compare(viewer.Draw(), expected);
   EXPECT_EQ(wrong.empty, 0) << "it rests";
   EXPECT_LT(wrong.colour, kShareOfBorderPixels);
@@ -113,10 +123,7 @@ bool AnyEmpty(const Shown& shown) {
 /// Two cameras beside each other in one window, as split screens are made.
 TEST_F(FillTest, WhenStillAlsoFillsANodeThatAWindowShowsTwice) {
   const NamedScene named = WithHoles(120, 80);
-  osg::ref_ptr<DepthTR> node = new DepthTR;
-  node->setScene(named.set);
-  node->setRenderOptions(Filled(RenderMethod::kDeferred));
-  node->setFillTime(osgDTR::FillTime::kWhenStill);
+  const osg::ref_ptr<DepthTR> node = FilledWhenStill(named.set);
   OffscreenViewer viewer(node.get(), named.novel.camera, named.novel.cam_from_world);
   osg::Camera* const left = viewer.viewer.getCamera();
   left->setViewport(0, 0, 60, 80);
@@ -134,7 +141,7 @@ TEST_F(FillTest, WhenStillAlsoFillsANodeThatAWindowShowsTwice) {
   viewer.Look(moved);
   EXPECT_TRUE(AnyEmpty(viewer.Draw())) << "both move";
   EXPECT_TRUE(AnyEmpty(viewer.Draw())) << "they moved just now";
-  std::this_thread::sleep_for(std::chrono::duration<double>(1.1 * dtr::viewer::kStillAfterSeconds));
+  WaitUntilStill();
   const Shown rests = viewer.Draw();
   EXPECT_FALSE(AnyEmpty(rests)) << "both rest";
   int differing = 0;

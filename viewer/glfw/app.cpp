@@ -18,6 +18,7 @@
 #include "viewer/glfw/keeper.h"
 #include "viewer/glfw/panel.h"
 #include "viewer/glfw/path_tools.h"
+#include "viewer/glfw/run_figures.h"
 #include "viewer/glfw/session.h"
 #include "viewer/glfw/user_interface.h"
 #include "viewer/time_player.h"
@@ -76,10 +77,11 @@ class App {
       if (drew_moving) CountMoving(1e3 * frame.seconds(), ProcessCpuMilliseconds() - cpu_ms);
       FinishFrame();
     }
-    report_.last = State();
-    report_.view_bytes = session_->opened().stream->decoded_bytes();
-    report_.view_bytes_held = session_->opened().stream->bytes();
-    return report_;
+    AppReport report = figures_.report();
+    report.last = State();
+    report.view_bytes = session_->opened().stream->decoded_bytes();
+    report.view_bytes_held = session_->opened().stream->bytes();
+    return report;
   }
 
  private:
@@ -380,41 +382,22 @@ class App {
 
   /// As many frames as were asked for are drawn; a whole picture may still be to come.
   bool LastFrame() const {
-    return settings_.frames > 0 && report_.last.frames + 1 >= settings_.frames && !playing();
+    return settings_.frames > 0 && figures_.frames() + 1 >= settings_.frames && !playing();
   }
 
   void CountMoving(double ms, double cpu_ms) {
     session_->schedule.MovingTook(ms);
     moving_fps_ = 1e3 / ms;
-    const int divisor = session_->maker.picture().divisor;
-    for (FrameTimes* times : {&report_.moving, &report_.moving_by_divisor[divisor]}) {
-      ++times->frames;
-      times->ms += ms;
-      times->cpu_ms += cpu_ms;
-    }
-  }
-
-  void TimeFirstPictures() {
-    const auto now = [this](double& ms, double& cpu_ms) {
-      if (ms > 0) return;
-      ms = 1e3 * started_.seconds();
-      cpu_ms = ProcessCpuMilliseconds() - started_cpu_ms_;
-    };
-    const bool any =
-        session_->schedule.has_picture() && !session_->maker.picture().views_used.empty();
-    if (any || whole()) now(report_.first_picture_ms, report_.first_picture_cpu_ms);
-    if (whole()) now(report_.first_whole_picture_ms, report_.first_whole_picture_cpu_ms);
+    figures_.Moved(session_->maker.picture().divisor, ms, cpu_ms);
   }
 
   void FinishFrame() {
     if (LastFrame()) time_.Stop();  // what is kept is of a picture that stands still
     if (ReachedFrames()) quit_ = true;
-    ++report_.last.frames;
     --settling_;
-    if (report_.last.frames % AppReport::kFramesPerSample == 0) {
-      report_.memory_bytes.push_back(MemoryBytes());
-    }
-    TimeFirstPictures();
+    const bool any =
+        session_->schedule.has_picture() && !session_->maker.picture().views_used.empty();
+    figures_.EndFrame(any, whole());
     if (whole() && host_.state_changed) host_.state_changed(State());
     if (quit_ || settling_ > 0 || CameraMoves() || !session_->schedule.MadeFor(Order())) return;
     if (!time_.playing()) moving_fps_ = 0;
@@ -429,7 +412,7 @@ class App {
     const MadePicture& picture = session_->maker.picture();
     const Controller& controller = session_->controller;
     const Inspection& inspection = session_->inspector.inspection();
-    state.frames = report_.last.frames;
+    state.frames = figures_.frames();
     state.still = whole();
     state.camera = controller.camera();
     if (const auto at = controller.at_view()) {
@@ -468,8 +451,7 @@ class App {
     return state;
   }
 
-  const Stopwatch started_;
-  const double started_cpu_ms_ = ProcessCpuMilliseconds();
+  RunFigures figures_;  // first: it times what follows, too
   const AppSettings& settings_;
   const Host& host_;
   std::string message_;
@@ -491,7 +473,6 @@ class App {
   size_t played_ = 0;
   int settling_ = kSettlingFrames;
   double window_ms_ = 0, moving_fps_ = 0;
-  AppReport report_;
 };
 
 }  // namespace
