@@ -12,28 +12,8 @@ namespace dtr::calib {
 namespace {
 
 using testing::MakeBundle;
+using testing::ModelFrom;
 using testing::SceneSpec;
-
-// The model of a bundle, as COLMAP would hand it over.
-SfmModel ModelFrom(const Bundle& bundle) {
-  SfmModel model;
-  model.cameras[1] = bundle.lenses[0];
-  for (size_t i = 0; i < bundle.images.size(); ++i) {
-    model.images.push_back({static_cast<std::uint32_t>(i + 1),
-                            bundle.images[i].name,
-                            1,
-                            bundle.images[i].cam_from_world,
-                            {}});
-  }
-  for (size_t p = 0; p < bundle.points.size(); ++p) {
-    model.points[bundle.point_ids[p]].p_in_world = bundle.points[p].head<3>();
-  }
-  for (const BundleObservation& o : bundle.observations) {
-    model.images[static_cast<size_t>(o.image)].features.push_back(
-        {o.pixel, bundle.point_ids[static_cast<size_t>(o.point)]});
-  }
-  return model;
-}
 
 // What a stabiliser of up to 10 px does to the sights of image i.
 Eigen::Vector2d ShiftOf(int image) {
