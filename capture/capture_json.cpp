@@ -7,6 +7,7 @@
 
 #include "dtr/base/error.h"
 #include "dtr/io/formats/file_names.h"
+#include "dtr/io/json_fields.h"
 
 namespace dtr::capture {
 namespace {
@@ -67,7 +68,7 @@ class Node {
   }
   [[noreturn]] void Fail(const std::string& expected) const {
     constexpr size_t kShown = 60;
-    std::string found = value_.dump(-1, ' ', true);
+    std::string found = value_.dump(-1, ' ', true, Json::error_handler_t::replace);
     if (found.size() > kShown) found = found.substr(0, kShown) + "...";
     throw Error(where_ + ": expected " + expected + ", found " + found);
   }
@@ -230,12 +231,7 @@ std::string CaptureToJson(const Capture& capture) {
 }
 
 Capture CaptureFromJson(std::string_view text, const std::string& source) {
-  Json json;
-  try {
-    json = Json::parse(text);
-  } catch (const nlohmann::json::exception& e) {
-    throw Error(source + ": expected JSON, found " + e.what());
-  }
+  const Json json = io::ParseJson(std::string(text), source);
   const Node root(json, source);
   if (root["format"].Text() != kFormat) root["format"].Fail(std::string("\"") + kFormat + "\"");
   if (root["version"].Int(0, std::numeric_limits<int>::max()) != kVersion) {

@@ -13,7 +13,9 @@
 #include "capture/store.h"
 #include "dtr/base/error.h"
 #include "dtr/base/hash.h"
+#include "dtr/base/memory_budget.h"
 #include "dtr/base/parallel_for.h"
+#include "dtr/io/formats/utf8.h"
 
 namespace dtr::capture {
 namespace fs = std::filesystem;
@@ -24,31 +26,9 @@ constexpr double kShortestFocal = 0.1, kLongestFocal = 100;  // of the long side
 
 bool IsControl(char c) { return static_cast<unsigned char>(c) < 32 || c == 127; }
 
-// Well-formed UTF-8 (Unicode 15, table 3-7).
-bool IsUtf8(const std::string& text) {
-  const auto byte = [&](size_t i) {
-    return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u;
-  };
-  const auto in = [](unsigned b, unsigned low, unsigned high) { return b >= low && b <= high; };
-  for (size_t i = 0; i < text.size();) {
-    const unsigned b = byte(i), next = byte(i + 1);
-    size_t length = 0;
-    if (b < 0x80) length = 1;
-    if (in(b, 0xc2, 0xdf) && in(next, 0x80, 0xbf)) length = 2;
-    if (in(b, 0xe0, 0xef) && in(next, b == 0xe0 ? 0xa0 : 0x80, b == 0xed ? 0x9f : 0xbf)) length = 3;
-    if (in(b, 0xf0, 0xf4) && in(next, b == 0xf0 ? 0x90 : 0x80, b == 0xf4 ? 0x8f : 0xbf)) length = 4;
-    if (length == 0) return false;
-    for (size_t j = 2; j < length; ++j) {
-      if (!in(byte(i + j), 0x80, 0xbf)) return false;
-    }
-    i += length;
-  }
-  return true;
-}
-
 // A text that prints as one line and that JSON can hold: for names of skipped files and EXIF texts.
 std::string Printable(std::string text) {
-  const bool utf8 = IsUtf8(text);
+  const bool utf8 = io::IsUtf8(text);
   for (char& c : text) {
     if (IsControl(c) || (!utf8 && static_cast<unsigned char>(c) >= 0x80)) c = '?';
   }
@@ -103,7 +83,7 @@ void ListFolder(const fs::path& top, const std::string& below, bool recurse, Lis
       }
     } else if (!IsImageExtension(entries->path().extension().string())) {
       ++listing.ignored;
-    } else if (!IsUtf8(name) || std::any_of(name.begin(), name.end(), IsControl)) {
+    } else if (!io::IsUtf8(name) || std::any_of(name.begin(), name.end(), IsControl)) {
       listing.skipped.push_back({PrintableName(name), "its name is no printable UTF-8; rename it"});
     } else {
       listing.names.push_back(name);
@@ -159,8 +139,8 @@ std::string CameraGroup(const Photo& photo, const io::ImageHeader& header) {
   return group;
 }
 
-Photo InspectPhoto(const fs::path& file, const std::string& name, const fs::path& mask,
-                   bool screen) {
+Photo InspectPhoto(const fs::path& file, const std::string& name, const fs::path& mask, bool screen,
+                   MemoryBudget& memory) {
   std::error_code error;
   if (!fs::is_regular_file(file, error)) throw Error("is no regular file");
   const io::ImageHeader header = io::ReadImageHeader(file);
@@ -181,6 +161,8 @@ Photo InspectPhoto(const fs::path& file, const std::string& name, const fs::path
   photo.gps = header.gps;
   photo.camera_group = CameraGroup(photo, header);
   photo.source_sha256 = Sha256OfFile(file);
+  if (mask.empty() && !screen) return photo;
+  const auto share = memory.TakeForPhoto(photo.width_px, photo.height_px);
   if (!mask.empty()) {
     photo.mask_file = mask;
     photo.mask_sha256 = Sha256OfFile(mask);
@@ -270,6 +252,7 @@ Capture IngestPhotos(const fs::path& folder, const IngestOptions& options, Progr
   std::vector<std::optional<Photo>> photos(listing.names.size());
   std::vector<std::string> reasons(listing.names.size());
   std::atomic<int> done{0};
+  MemoryBudget memory(options.memory_gb);
   ParallelFor(0, count, options.threads, [&](int i) {
     progress.ThrowIfInterrupted();
     const auto index = static_cast<size_t>(i);
@@ -278,7 +261,7 @@ Capture IngestPhotos(const fs::path& folder, const IngestOptions& options, Progr
       const auto mask = listing.masks.find(name);
       photos[index] = InspectPhoto(folder / name, name,
                                    mask == listing.masks.end() ? fs::path() : folder / mask->second,
-                                   options.screen);
+                                   options.screen, memory);
     } catch (const Error& e) {
       reasons[index] = ReasonFrom(e.what(), folder / name, name);
     }

@@ -15,6 +15,9 @@ struct IngestOptions {
   /// Decode every photo: finds damaged ones now instead of hours later, and measures the rest.
   bool screen = true;
   int threads = 0;  ///< 0: all cores
+  /// Photos in memory at a time take at most so many 1e9 bytes (one alone may be larger); 0: no
+  /// bound. Changes nothing of the result.
+  double memory_gb = 0;
 };
 
 /// The photos of a folder in byte order of their names. A photo is a file with the extension of an

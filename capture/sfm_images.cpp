@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "dtr/base/error.h"
+#include "dtr/base/memory_budget.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/io/image_io.h"
 #include "dtr/types/area_average.h"
@@ -92,13 +93,15 @@ void PreparePhoto(const Photo& photo, const fs::path& to, int max_size_px) {
 }  // namespace
 
 void PrepareSfmImages(const Capture& capture, const fs::path& folder, int max_size_px, int threads,
-                      Progress& progress) {
+                      double memory_gb, Progress& progress) {
   const int count = static_cast<int>(capture.photos.size());
   progress.Stage("photos for calibration", count);
   std::atomic<int> done{0};
+  MemoryBudget memory(memory_gb);
   ParallelFor(0, count, threads, [&](int i) {
     progress.ThrowIfInterrupted();
     const Photo& photo = capture.photos[static_cast<size_t>(i)];
+    const auto share = memory.TakeForPhoto(photo.width_px, photo.height_px);
     PreparePhoto(photo, folder / photo.name, max_size_px);
     if (!photo.mask_file.empty()) PrepareMask(photo, SfmMaskFile(folder, photo), max_size_px);
     progress.Update(++done);
@@ -113,7 +116,7 @@ fs::path SfmMaskFile(const fs::path& folder, const Photo& photo) {
 void PrepareSfmImages(const Capture& capture, const fs::path& folder, int max_size_px,
                       int threads) {
   SilentProgress silent;
-  PrepareSfmImages(capture, folder, max_size_px, threads, silent);
+  PrepareSfmImages(capture, folder, max_size_px, threads, 0, silent);
 }
 
 }  // namespace dtr::capture

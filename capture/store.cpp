@@ -2,11 +2,17 @@
 
 #include <algorithm>
 #include <atomic>
+#include <functional>
+#include <optional>
+#include <string>
 #include <system_error>
+#include <vector>
 
 #include "capture/capture_json.h"
+#include "dtr/base/durable.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
+#include "dtr/base/memory_budget.h"
 #include "dtr/base/parallel_for.h"
 
 namespace dtr::capture {
@@ -32,21 +38,22 @@ void RefuseOccupied(const fs::path& folder, bool replace) {
                    "; choose another name" + (replace ? "" : " or give --force"));
 }
 
-// An empty folder for the work. One that a stopped run left is ours to clear; any other is not.
-void MakePartial(const fs::path& partial) {
-  std::error_code error;
-  if (fs::exists(fs::symlink_status(partial, error))) {
-    const bool ours = fs::is_directory(partial, error) &&
-                      (fs::is_empty(partial, error) || fs::is_directory(partial / "images", error));
-    if (!ours) {
-      throw UsageError(partial.string() + ": expected nothing or an unfinished capture, found " +
-                       "something else; move it away");
-    }
-    fs::remove_all(partial, error);
-    Require(error, partial);
+// The lock of a capture in the making, also its mark: a folder without it is not ours to delete.
+constexpr char kLock[] = "capture.lock";
+
+std::optional<FileLock> LockIn(const fs::path& folder) {
+  auto lock = FileLock::Try(folder / kLock);
+  if (lock) return lock;
+  throw UsageError(folder.string() + ": another process is writing this capture; wait for it");
+}
+
+// The file system's own errors, as ours: they name the file already.
+void AsError(const std::function<void()>& function) {
+  try {
+    function();
+  } catch (const fs::filesystem_error& error) {
+    throw Error(std::string("capture cannot be written: ") + error.what());
   }
-  fs::create_directories(partial / "images", error);
-  Require(error, partial);
 }
 
 // Returns the photo as it lies in the capture, `file` relative to its folder.
@@ -57,9 +64,7 @@ Photo StorePhoto(const Photo& photo, const fs::path& folder) {
     std::transform(extension.begin(), extension.end(), extension.begin(),
                    [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
     stored.file = fs::path("images") / (photo.id + extension);
-    std::error_code error;
-    fs::copy_file(photo.file, folder / stored.file, error);
-    Require(error, folder / stored.file);
+    CopyFileAtomically(photo.file, folder / stored.file);
   } else {
     stored.file = fs::path("images") / (photo.id + ".png");
     stored.exif_orientation = 1;
@@ -72,36 +77,110 @@ Photo StorePhoto(const Photo& photo, const fs::path& folder) {
   return stored;
 }
 
-// Puts the finished folder in its place; what was there goes only once the new one is there.
-void MoveIntoPlace(const fs::path& partial, const fs::path& folder) {
-  std::error_code error;
-  const fs::path old = folder.string() + ".replaced";
-  const bool replaces = fs::exists(folder, error);
-  if (replaces) {
-    fs::rename(folder, old, error);
-    Require(error, old);
-  }
-  fs::rename(partial, folder, error);
-  Require(error, folder);
-  if (replaces) fs::remove_all(old, error);
-  Require(error, old);
-}
-
 }  // namespace
 
-void RequireRoom(const fs::path& folder, const StoreOptions& options) {
-  RefuseOccupied(WithoutTrailingSlash(folder), options.replace);
+struct CaptureWriter::State {
+  fs::path folder, partial, aside;
+  StoreOptions options;
+  std::optional<FileLock> lock;
+  bool finished = false;
+
+  void Recover() const;
+  void Open();
+  void MoveIntoPlace();
+};
+
+// A capture that was cut off on its way into place: the old one goes back, or what is left over of
+// both goes.
+void CaptureWriter::State::Recover() const {
+  if (fs::exists(aside / kLock)) {
+    const auto nobody_at_work = LockIn(aside);
+    if (fs::exists(folder)) {
+      RemoveFolder(aside, kLock);
+    } else {
+      Rename(aside, folder);
+    }
+  }
+  if (!fs::exists(folder / kLock) || !fs::exists(folder / kCaptureFile)) return;
+  const auto nobody_at_work = LockIn(folder);
+  fs::remove(folder / kLock);
 }
 
-void WriteCapture(const Capture& capture, const fs::path& target, const StoreOptions& options,
-                  Progress& progress) {
-  const fs::path folder = WithoutTrailingSlash(target);
-  RefuseOccupied(folder, options.replace);
-  const fs::path partial = folder.string() + ".partial";
-  MakePartial(partial);
+// An empty folder for the work. One that a stopped run left is ours to clear; any other is not.
+void CaptureWriter::State::Open() {
+  if (lock) return;
+  if (fs::exists(fs::symlink_status(partial))) {
+    const bool ours = fs::is_directory(partial) &&
+                      (fs::is_empty(partial) || fs::is_regular_file(partial / kLock));
+    if (!ours) {
+      throw UsageError(partial.string() + ": expected nothing or an unfinished capture, found " +
+                       "something else; move it away");
+    }
+  }
+  std::error_code error;
+  fs::create_directories(partial, error);
+  Require(error, partial);
+  lock = LockIn(partial);
+  std::vector<fs::path> stale;
+  for (const auto& entry : fs::directory_iterator(partial)) {
+    if (entry.path().filename() != kLock) stale.push_back(entry.path());
+  }
+  for (const fs::path& path : stale) fs::remove_all(path);
+}
+
+// What was there goes only once the new capture is there.
+void CaptureWriter::State::MoveIntoPlace() {
+  SyncTree(partial);
+  const bool replaces = fs::exists(folder) && !fs::is_empty(folder);
+  std::optional<FileLock> mark;
+  if (replaces) mark = LockIn(folder);  // by it Recover() knows the old capture again
+  try {
+    if (replaces) Rename(folder, aside);
+    Rename(partial, folder);
+  } catch (const Error&) {
+    if (replaces && !fs::exists(folder)) Rename(aside, folder);
+    if (replaces) fs::remove(folder / kLock);
+    throw;
+  }
+  finished = true;
+  SyncFolder(folder.parent_path().empty() ? "." : folder.parent_path());
+  if (replaces) RemoveFolder(aside, kLock);
+  fs::remove(folder / kLock);
+}
+
+CaptureWriter::CaptureWriter(const fs::path& folder, const StoreOptions& options)
+    : state_(std::make_unique<State>()) {
+  state_->folder = WithoutTrailingSlash(folder);
+  state_->partial = state_->folder.string() + ".partial";
+  state_->aside = state_->folder.string() + ".replaced";
+  state_->options = options;
+  AsError([&] { state_->Recover(); });
+  RefuseOccupied(state_->folder, options.replace);
+}
+
+CaptureWriter::~CaptureWriter() {
+  if (!state_->lock || state_->finished) return;
+  try {
+    RemoveFolder(state_->partial, kLock);
+  } catch (const fs::filesystem_error&) {
+    // The next run clears it away.
+  }
+}
+
+fs::path CaptureWriter::Open() {
+  AsError([&] { state_->Open(); });
+  return state_->partial;
+}
+
+void CaptureWriter::Write(const Capture& capture, Progress& progress) {
+  const fs::path partial = Open();
+  RefuseOccupied(state_->folder, state_->options.replace);
   const bool masked = std::any_of(capture.photos.begin(), capture.photos.end(),
                                   [](const Photo& photo) { return !photo.mask_file.empty(); });
-  if (masked) fs::create_directory(partial / "masks");
+  std::error_code error;
+  fs::create_directory(partial / "images", error);
+  if (!error && masked) fs::create_directory(partial / "masks", error);
+  Require(error, partial);
 
   const int count = static_cast<int>(capture.photos.size());
   progress.Stage("writing photos", count);
@@ -109,14 +188,24 @@ void WriteCapture(const Capture& capture, const fs::path& target, const StoreOpt
   stored.skipped = capture.skipped;
   stored.photos.resize(capture.photos.size());
   std::atomic<int> done{0};
-  ParallelFor(0, count, options.threads, [&](int i) {
+  MemoryBudget memory(state_->options.memory_gb);
+  ParallelFor(0, count, state_->options.threads, [&](int i) {
     progress.ThrowIfInterrupted();
     const auto index = static_cast<size_t>(i);
+    const auto share =
+        memory.TakeForPhoto(capture.photos[index].width_px, capture.photos[index].height_px);
     stored.photos[index] = StorePhoto(capture.photos[index], partial);
     progress.Update(++done);
   });
+  fs::remove_all(partial / kFramesFolder, error);
+  Require(error, partial);
   WriteFileAtomically(partial / kCaptureFile, CaptureToJson(stored));
-  MoveIntoPlace(partial, folder);
+  AsError([&] { state_->MoveIntoPlace(); });
+}
+
+void WriteCapture(const Capture& capture, const fs::path& folder, const StoreOptions& options,
+                  Progress& progress) {
+  CaptureWriter(folder, options).Write(capture, progress);
 }
 
 void WriteCapture(const Capture& capture, const fs::path& folder, int threads) {

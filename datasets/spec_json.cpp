@@ -4,6 +4,7 @@
 
 #include "datasets/make.h"
 #include "dtr/base/error.h"
+#include "dtr/io/json_fields.h"
 
 namespace dtr::datasets {
 namespace {
@@ -13,6 +14,13 @@ using Json = nlohmann::ordered_json;
 // Grows when the same spec begins to give other pictures.
 constexpr int kGeneratorVersion = 1;
 
+// The beginning of a wrong value, whatever its strings hold.
+std::string Shown(const Json& value) {
+  constexpr size_t kMost = 60;
+  const std::string text = value.dump(-1, ' ', true, Json::error_handler_t::replace);
+  return text.size() > kMost ? text.substr(0, kMost) + "..." : text;
+}
+
 /// The member `key` as T; throws Error naming it when it is absent or of another kind.
 template <typename T>
 T FieldOf(const Json& object, const char* key, bool (Json::*is)() const noexcept,
@@ -20,7 +28,7 @@ T FieldOf(const Json& object, const char* key, bool (Json::*is)() const noexcept
   const auto found = object.find(key);
   if (found == object.end() || !((*found).*is)()) {
     throw Error(source + ": " + key + ": expected " + expected + ", found " +
-                (found == object.end() ? "nothing" : found->dump()));
+                (found == object.end() ? "nothing" : Shown(*found)));
   }
   return found->get<T>();
 }
@@ -63,10 +71,10 @@ std::string FormatSpecJson(const DatasetSpec& spec) {
 }
 
 DatasetSpec ParseSpecJson(const std::string& text, const std::string& source) {
-  const Json json = Json::parse(text, nullptr, false);
+  const Json json = io::ParseJson(text, source);
   if (!json.is_object()) {
     throw Error(source + ": expected a JSON object as `dtr dataset make` writes it, found " +
-                (json.is_discarded() ? "broken JSON" : json.type_name()));
+                json.type_name());
   }
   const int version = IntOf(json, "generator_version", source);
   if (version != kGeneratorVersion) {
@@ -92,7 +100,7 @@ DatasetSpec ParseSpecJson(const std::string& text, const std::string& source) {
   const Json offset = FieldOf<Json>(json, "world_offset", &Json::is_array, "three numbers", source);
   if (offset.size() != 3 || !offset[0].is_number() || !offset[1].is_number() ||
       !offset[2].is_number()) {
-    throw Error(source + ": world_offset: expected three numbers, found " + offset.dump());
+    throw Error(source + ": world_offset: expected three numbers, found " + Shown(offset));
   }
   for (int k = 0; k < 3; ++k) spec.world_offset[k] = offset[static_cast<size_t>(k)].get<double>();
   spec.scale = NumberOf(json, "scale", source);

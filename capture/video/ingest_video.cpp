@@ -13,6 +13,8 @@
 #include "capture/video/frames.h"
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
+#include "dtr/io/formats/file_names.h"
+#include "dtr/io/formats/utf8.h"
 #include "dtr/io/image_io.h"
 
 namespace dtr::capture {
@@ -128,7 +130,12 @@ void WriteFrames(const Videos& files, const std::vector<fs::path>& folders,
   progress.Stage("writing frames", static_cast<int>(frames.size()));
   for (const fs::path& folder : folders) fs::create_directories(top / folder);
   Together videos(files);
-  for (size_t next = 0; next < frames.size() && videos.Next();) {
+  for (size_t next = 0; next < frames.size();) {
+    if (!videos.Next()) {
+      throw Error(fmt::format(
+          "{}: expected frame {} again, found the end after {} frames; is the file being written?",
+          files.front().string(), frames[next].number, videos.number() + 1));
+    }
     if (videos.number() != frames[next].number) continue;
     progress.ThrowIfInterrupted();
     const std::vector<ImageRgb8> pictures = PicturesOf(videos);
@@ -201,6 +208,11 @@ Videos VideosOf(const fs::path& source) {
 Capture IngestVideos(const Videos& videos, const VideoOptions& options, const fs::path& folder,
                      Progress& progress) {
   RequireOptions(options);
+  for (const fs::path& video : videos) {
+    const std::string name = video.filename().string();
+    if (io::IsUtf8(name) && io::WhyUnsafeName(name).empty()) continue;
+    throw Error(video.string() + ": expected a video whose name is printable UTF-8; rename it");
+  }
   std::vector<Videos> groups;
   if (options.synchronised) {
     groups.push_back(videos);
@@ -216,7 +228,8 @@ Capture IngestVideos(const Videos& videos, const VideoOptions& options, const fs
     ListLosses(group, choice.seen, losses);
     WriteFrames(group, folders, choice.frames, folder, options.threads, origins, progress);
   }
-  Capture capture = IngestPhotos(folder, {.threads = options.threads}, progress);
+  Capture capture =
+      IngestPhotos(folder, {.threads = options.threads, .memory_gb = options.memory_gb}, progress);
   for (Photo& photo : capture.photos) {
     photo.video_frame = origins.at(photo.name);
     photo.camera_group =

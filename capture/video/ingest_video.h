@@ -18,7 +18,8 @@ struct VideoOptions {
   /// The videos began at the same moment and run at the same rate, as a rig's do: the same frames
   /// are taken of each. Else each video is looked at for itself.
   bool synchronised = false;
-  int threads = 0;  ///< 0: all cores
+  int threads = 0;       ///< 0: all cores
+  double memory_gb = 0;  ///< as IngestOptions::memory_gb, of the frames that were taken
 };
 
 /// `source` itself where it is a video; the videos of a folder that has no photos beside them, in
@@ -31,8 +32,9 @@ std::vector<std::filesystem::path> VideosOf(const std::filesystem::path& source)
 /// they are, and those of one video share a camera. What could not be decoded, and of synchronised
 /// videos what is longer than the shortest, is listed under `skipped`. Holds a few pictures at a
 /// time. The same videos and options give the same bytes.
-/// Throws Error where a file is no video, holds no frame or no frame with texture, or synchronised
-/// videos differ in rate; UsageError for options out of range.
+/// Throws Error where a file is no video, has a name that is no UTF-8, holds no frame or no frame
+/// with texture, cannot be decoded a second time, or synchronised videos differ in rate; UsageError
+/// for options out of range.
 Capture IngestVideos(const std::vector<std::filesystem::path>& videos, const VideoOptions& options,
                      const std::filesystem::path& folder, Progress& progress);
 

@@ -6,6 +6,7 @@
 #include "capture/capture.h"
 #include "cli/command.h"
 #include "cli/pipeline/capture_page.h"
+#include "cli/pipeline/depth_settings.h"
 #include "cli/pipeline/ingest.h"
 #include "cli/video_options.h"
 #include "dtr/base/error.h"
@@ -87,34 +88,27 @@ void Say(const capture::Capture& capture, const fs::path& output, Console& conso
   console.Say(fmt::format("  to look at: {}", (output / capture::kPageFile).string()));
 }
 
-// Removes the frames of a video once they lie in the capture, or nothing is to come of them.
-struct FramesFolder {
-  fs::path path;
-  ~FramesFolder() {
-    std::error_code ignored;
-    fs::remove_all(path, ignored);
-  }
-};
-
 int Run(const Options& options, const Context& context) {
   const std::vector<capture::Fault> drop = FaultsIn(options.drop);
-  const capture::StoreOptions store{options.force, context.common.threads};
-  capture::RequireRoom(options.output, store);
+  const capture::StoreOptions store{options.force, context.common.threads, options.video.memory_gb};
   const fs::path output = WithoutTrailingSlash(options.output);
-  const FramesFolder frames{output.string() + ".frames.partial"};
+  capture::CaptureWriter writer(output, store);
   capture::VideoOptions video = options.video;
   video.threads = context.common.threads;
-  capture::Capture ingested = pipeline::Ingest(options.source, video, frames.path, context.console);
+  capture::Capture ingested = pipeline::Ingest(
+      options.source, video, [&] { return writer.Open() / capture::kFramesFolder; },
+      context.console);
   capture::DropFaulty(ingested, drop);
   if (ingested.photos.empty()) {
     throw Error(fmt::format("{}: expected photos without the faults of --drop, found none",
                             options.source.string()));
   }
   const auto look = pipeline::LookAt(ingested, "Photos of " + options.source.filename().string(),
-                                     context.common.threads, context.console);
-  capture::WriteCapture(ingested, output, store, context.console);
-  io::WriteImage(output / capture::kContactSheetFile, look.contact_sheet);
-  WriteFileAtomically(output / capture::kPageFile, look.page);
+                                     context.common.threads, store.memory_gb, context.console);
+  const fs::path unfinished = writer.Open();
+  io::WriteImage(unfinished / capture::kContactSheetFile, look.contact_sheet);
+  WriteFileAtomically(unfinished / capture::kPageFile, look.page);
+  writer.Write(ingested, context.console);
   Say(ingested, output, context.console);
   context.EmitJson(ToJson(ingested));
   return kDone;
@@ -139,6 +133,12 @@ void AddCaptureCommand(CLI::App& app) {
                    ->delimiter(',')
                    ->type_name("FAULT,...");
                AddVideoOptions(command, options->video);
+               options->video.memory_gb = pipeline::kDefaultMemoryGb;
+               command
+                   .add_option("--memory", options->video.memory_gb,
+                               "Memory for photos that are looked at at a time [4]")
+                   ->check(CLI::PositiveNumber)
+                   ->type_name("GB");
                command.add_flag("--force", options->force, "Replace a capture that exists");
                return [options](const Context& context) { return Run(*options, context); };
              });

@@ -89,7 +89,8 @@ capture::Capture FramesOf(const BuildOptions& options, const std::filesystem::pa
   if (!std::filesystem::exists(kept / capture::kCaptureFile)) {
     capture::VideoOptions video = options.video;
     video.threads = options.threads;
-    const capture::Capture frames = Ingest(options.photos, video, fresh, progress);
+    const capture::Capture frames = Ingest(
+        options.photos, video, [&] { return fresh; }, progress);
     capture::WriteCapture(frames, kept, {.replace = false, .threads = options.threads}, progress);
     std::filesystem::remove_all(fresh);
   }

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cmath>
 
+#include "dtr/base/memory_budget.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/report/contact_sheet.h"
 #include "dtr/report/html.h"
@@ -44,14 +45,17 @@ bool IsFaulty(const capture::Photo& photo) {
 }  // namespace
 
 CaptureLook LookAt(const capture::Capture& capture, const std::string& title, int threads,
-                   Progress& progress) {
+                   double memory_gb, Progress& progress) {
   const int count = static_cast<int>(capture.photos.size());
   progress.Stage("contact sheet", count);
   std::vector<ImageRgb8> thumbnails(capture.photos.size());
   std::atomic<int> done{0};
+  MemoryBudget memory(memory_gb);
   ParallelFor(0, count, threads, [&](int i) {
     progress.ThrowIfInterrupted();
     const auto index = static_cast<size_t>(i);
+    const auto share =
+        memory.TakeForPhoto(capture.photos[index].width_px, capture.photos[index].height_px);
     thumbnails[index] = report::Shrink(ReadPhoto(capture.photos[index]), kThumbnailPx);
     progress.Update(++done);
   });

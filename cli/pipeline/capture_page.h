@@ -15,6 +15,6 @@ struct CaptureLook {
   std::string page;
 };
 CaptureLook LookAt(const capture::Capture& capture, const std::string& title, int threads,
-                   Progress& progress);
+                   double memory_gb, Progress& progress);
 
 }  // namespace dtr::pipeline

@@ -1,6 +1,7 @@
 // cli/pipeline/ingest.h -- photos or videos, as a capture.
 #pragma once
 #include <filesystem>
+#include <functional>
 
 #include "capture/photo.h"
 #include "capture/video/ingest_video.h"
@@ -9,9 +10,11 @@
 namespace dtr::pipeline {
 
 /// The photos of a folder, or the chosen frames of a video or of a folder of videos, which are
-/// written into `frames_folder` first (what is there already is removed). Throws as
-/// capture::IngestPhotos and capture::IngestVideos do.
+/// written first into the folder that `frames_folder` names (what is there already is removed); it
+/// is asked once it is known that frames are to come. Throws as capture::IngestPhotos and
+/// capture::IngestVideos do.
 capture::Capture Ingest(const std::filesystem::path& source, const capture::VideoOptions& video,
-                        const std::filesystem::path& frames_folder, Progress& progress);
+                        const std::function<std::filesystem::path()>& frames_folder,
+                        Progress& progress);
 
 }  // namespace dtr::pipeline

@@ -129,13 +129,81 @@ TEST(WriteCapture, ClearsAnUnfinishedCaptureAndNothingElse) {
   const TemporaryFolder folder;
   FillWithPhotos(folder / "photos");
   const Capture capture = Ingest(folder / "photos");
-  fs::create_directories(folder / "out.partial/images");
-  WriteFileAtomically(folder / "out.partial/images/old.png", "stale");
+  const auto leave = [&](const std::string& file) {  // what a killed process or somebody left
+    fs::create_directories((folder / file).parent_path());
+    std::ofstream(folder / file) << "stale";
+  };
+  leave("out.partial/capture.lock");
+  leave("out.partial/images/old.png");
+  leave("out.partial/frames/frame_000001.jpg");
+  leave("out.frames.partial/frame_000001.jpg");
   EXPECT_NO_THROW(WriteCapture(capture, folder / "out", 1));
   EXPECT_FALSE(fs::exists(folder / "out/images/old.png"));
-  fs::create_directories(folder / "more.partial/thesis");
-  EXPECT_THROW(WriteCapture(capture, folder / "more", 1), UsageError);
-  EXPECT_TRUE(fs::exists(folder / "more.partial/thesis"));
+  EXPECT_FALSE(fs::exists(folder / "out/frames"));
+  EXPECT_FALSE(fs::exists(folder / "out/capture.lock"));
+  EXPECT_TRUE(fs::exists(folder / "out.frames.partial/frame_000001.jpg"));
+  // An interrupted `dtr build -o more`, before and with its images, and somebody's own.
+  for (const char* kept :
+       {"more.partial/work/lock", "more.partial/images/a.png", "more.partial/x"}) {
+    leave(kept);
+    EXPECT_THAT(MessageOf<UsageError>([&] { WriteCapture(capture, folder / "more", 1); }),
+                HasSubstr("expected nothing or an unfinished capture"));
+    EXPECT_TRUE(fs::exists(folder / kept));
+    fs::remove_all(folder / "more.partial");
+  }
+}
+
+TEST(WriteCapture, OneProcessAtATime) {
+  const TemporaryFolder folder;
+  FillWithPhotos(folder / "photos");
+  const Capture capture = Ingest(folder / "photos");
+  SilentProgress progress;
+  {
+    CaptureWriter writer(folder / "out", {});
+    EXPECT_FALSE(fs::exists(folder / "out.partial"));  // nothing is made before it is needed
+    WriteFileAtomically(writer.Open() / "index.html", "a page");
+    EXPECT_THAT(MessageOf<UsageError>([&] { WriteCapture(capture, folder / "out", 1); }),
+                HasSubstr("another process is writing this capture"));
+    writer.Write(capture, progress);
+  }
+  EXPECT_TRUE(fs::exists(folder / "out/index.html"));
+  { CaptureWriter(folder / "given up", {}).Open(); }
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 2);  // photos and out
+}
+
+TEST(WriteCapture, AReplacementCutOffHalfWayGivesTheOldCaptureBack) {
+  const TemporaryFolder folder;
+  FillWithPhotos(folder / "photos");
+  const Capture capture = Ingest(folder / "photos");
+  WriteCapture(capture, folder / "out", 1);
+  const std::string list = ReadFile(folder / "out/capture.json", kFileLimit);
+  const auto mark = [&](const std::string& name) { std::ofstream(folder / name / "capture.lock"); };
+  // Killed before the old one was moved aside, and between the two renames.
+  mark("out");
+  { EXPECT_THROW(CaptureWriter(folder / "out", {}), UsageError); }
+  EXPECT_FALSE(fs::exists(folder / "out/capture.lock"));
+  mark("out");
+  fs::rename(folder / "out", folder / "out.replaced");
+  { EXPECT_THROW(CaptureWriter(folder / "out", {}), UsageError); }
+  EXPECT_EQ(ReadFile(folder / "out/capture.json", kFileLimit), list);
+  EXPECT_FALSE(fs::exists(folder / "out/capture.lock"));
+  // Killed after both: the new one stays.
+  fs::copy(folder / "out", folder / "out.replaced", fs::copy_options::recursive);
+  mark("out.replaced");
+  mark("out");
+  { EXPECT_THROW(CaptureWriter(folder / "out", {}), UsageError); }
+  EXPECT_FALSE(fs::exists(folder / "out.replaced"));
+  EXPECT_EQ(ReadCapture(folder / "out").photos.size(), 3u);
+  // Somebody's capture of that name is not ours to delete.
+  fs::copy(folder / "out", folder / "out.replaced", fs::copy_options::recursive);
+  { EXPECT_THROW(CaptureWriter(folder / "out", {}), UsageError); }
+  EXPECT_TRUE(fs::exists(folder / "out.replaced/capture.json"));
+}
+
+TEST(ReadCapture, NestingThatWouldFillTheStackIsRefused) {
+  const std::string deep(1 << 20, '[');
+  EXPECT_THAT(MessageOf<Error>([&] { CaptureFromJson(deep, "capture.json"); }),
+              HasSubstr("capture.json: expected at most 64 levels of nesting"));
 }
 
 TEST(ReadCapture, EveryTruncationIsACleanError) {

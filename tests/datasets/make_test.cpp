@@ -229,6 +229,19 @@ TEST(DatasetSpec, JsonRoundTripsAndRefusesEveryTruncation) {
   for (size_t length = 0; length + 2 < text.size(); ++length) {
     EXPECT_THROW(ParseSpecJson(text.substr(0, length), "dataset.json"), Error) << length;
   }
+  const std::string deep = text.substr(0, text.rfind('}')) +
+                           ", \"more\": " + std::string(100'000, '[') + std::string(100'000, ']') +
+                           "}";
+  EXPECT_THROW(ParseSpecJson(deep, "dataset.json"), Error);
+  // A wrong value is shown by its beginning, whatever it is.
+  const std::string huge = "{\"generator_version\": [" + std::string(50'000, ' ') + "\"" +
+                           std::string(50'000, 'x') + "\"]}";
+  try {
+    ParseSpecJson(huge, "dataset.json");
+    ADD_FAILURE() << "read";
+  } catch (const Error& error) {
+    EXPECT_LT(std::string(error.what()).size(), 200u);
+  }
   for (const auto& [from, to] :
        {std::pair<std::string, std::string>{"\"views\": 4", "\"views\": -4"},
         {"\"views\": 4", "\"views\": 4.5"},

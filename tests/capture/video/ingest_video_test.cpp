@@ -152,6 +152,39 @@ TEST(IngestVideos, AVideoCutShortIsTakenAsFarAsItGoesAndListed) {
   EXPECT_GE(taken, 4);
 }
 
+// Cuts a video once its frames are chosen.
+class CutBeforeWriting final : public Progress {
+ public:
+  explicit CutBeforeWriting(fs::path video) : video_(std::move(video)) {}
+  void Stage(const std::string& name, int) override {
+    if (name == "writing frames") fs::resize_file(video_, fs::file_size(video_) / 2);
+  }
+  void Update(int) override {}
+  void Note(const std::string&) override {}
+
+ private:
+  fs::path video_;
+};
+
+TEST(IngestVideos, AVideoThatChangesWhileItIsReadIsAnErrorAndNotAShorterOne) {
+  const TemporaryFolder folder;
+  WriteVideo(folder / "walk.avi", Places(40, 4));
+  CutBeforeWriting progress(folder / "walk.avi");
+  fs::create_directories(folder / "frames");
+  EXPECT_THAT(MessageOf<Error>([&] {
+                IngestVideos({folder / "walk.avi"}, {.every = 1}, folder / "frames", progress);
+              }),
+              HasSubstr("again, found the end after"));
+}
+
+TEST(IngestVideos, NamesThatJsonCannotHoldAreRefusedFirst) {
+  const TemporaryFolder folder;
+  for (const char* name : {"caf\xe9.avi", "two\nlines.avi"}) {
+    EXPECT_THAT(MessageOf<Error>([&] { Ingest({folder / name}, {}, folder / "frames"); }),
+                HasSubstr("expected a video whose name is printable UTF-8"));
+  }
+}
+
 TEST(VideosOf, AreAVideoOrAFolderOfNothingElse) {
   const TemporaryFolder folder;
   WriteFileAtomically(folder / "b.MP4", "x");
