@@ -18,7 +18,8 @@ namespace {
 
 struct Options {
   std::filesystem::path set;
-  calib::ValidateLimits limits;
+  pipeline::SetLimits limits;
+  std::optional<double> max_cross_px;
   ValidateCalibrationOptions calibration;
 };
 
@@ -56,17 +57,23 @@ void RefuseForSets(const ValidateCalibrationOptions& options) {
 
 int RunValidate(Options options, const Context& context) {
   if (std::filesystem::is_regular_file(options.set)) {
+    if (options.max_cross_px) {
+      throw UsageError("--max-cross: is for sets, not for calibration files");
+    }
     options.calibration.file = options.set;
     return RunValidateCalibration(options.calibration, context);
   }
   RefuseForSets(options.calibration);
-  options.limits.max_rms_px = options.calibration.max_rms_px.value_or(options.limits.max_rms_px);
+  double& max_rms_px = options.limits.reprojection.max_rms_px;
+  max_rms_px = options.calibration.max_rms_px.value_or(max_rms_px);
+  options.limits.max_cross_px = options.max_cross_px.value_or(options.limits.max_cross_px);
   const auto& page = options.calibration.report;
   if (page) RequireOutputFile(*page, "--report", {".html"});
   const DtrSet set = io::ReadSet(options.set);
   RequireOneFrame(set);
   const SparseScene sparse = io::LoadSparse(options.set, set);
-  const auto report = pipeline::ValidateSet(set, sparse, options.limits, context.common.threads);
+  const auto report =
+      pipeline::ValidateSet(options.set, set, sparse, options.limits, context.common.threads);
   SayReport(report, context.console);
   if (page) {
     const std::string name = options.set.lexically_normal().filename().string();
@@ -96,7 +103,15 @@ void AddValidateCommand(CLI::App& app) {
             .add_option("--max-rms", calibration.max_rms_px,
                         fmt::format("Limit of the RMS on what the calibration has not seen [{} for "
                                     "sets, {} for calibration files]",
-                                    options->limits.max_rms_px, calib::JudgeLimits{}.max_rms_px))
+                                    options->limits.reprojection.max_rms_px,
+                                    calib::JudgeLimits{}.max_rms_px))
+            ->check(CLI::PositiveNumber)
+            ->type_name("PX");
+        command
+            .add_option("--max-cross", options->max_cross_px,
+                        fmt::format("Limit of the way of depth into a neighbour and back, median "
+                                    "of a set's pixels; the worst view may have twice as much [{}]",
+                                    options->limits.max_cross_px))
             ->check(CLI::PositiveNumber)
             ->type_name("PX");
         command
