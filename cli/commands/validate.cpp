@@ -50,6 +50,8 @@ void SayReport(const calib::ValidationReport& report, Console& console) {
 void RefuseForSets(const ValidateCalibrationOptions& options) {
   for (const auto& [given, name] :
        {std::pair{options.images.has_value(), "--images"},
+        std::pair{options.pattern.has_value(), "--pattern"},
+        std::pair{options.board.has_value(), "--board"},
         std::pair{options.max_uncertainty_px.has_value(), "--max-uncertainty"}}) {
     if (given) throw UsageError(fmt::format("{}: is for calibration files, not for sets", name));
   }
@@ -96,7 +98,8 @@ void AddValidateCommand(CLI::App& app) {
         auto options = std::make_shared<Options>();
         command
             .add_option("SET|CALIB", options->set,
-                        "A set, or a .json file of calibrate board or calibrate rig")
+                        "A set, a .json file of calibrate board or calibrate rig, or one camera "
+                        "from elsewhere: a .yml of OpenCV, a cameras.txt of COLMAP")
             ->required();
         ValidateCalibrationOptions& calibration = options->calibration;
         command
@@ -119,6 +122,15 @@ void AddValidateCommand(CLI::App& app) {
                         "Photos of the board that the calibration has not seen; without them it is "
                         "judged on those it was made from")
             ->type_name("DIR");
+        command
+            .add_option("--pattern", calibration.pattern,
+                        "Only photos of these names, as 'left*.jpg' [*]")
+            ->type_name("PATTERN");
+        command
+            .add_option("--board", calibration.board,
+                        "The board of the photos, as calibrate board has it; for cameras from "
+                        "elsewhere")
+            ->type_name("BOARD");
         command
             .add_option("--max-uncertainty", calibration.max_uncertainty_px,
                         fmt::format("Limit of the projections' standard deviation at the boards' "
