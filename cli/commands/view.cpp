@@ -22,6 +22,7 @@
 #include "dtr/base/machine.h"
 #include "dtr/io/pruned.h"
 #include "dtr/io/set_io.h"
+#include "dtr/io/verdict.h"
 #include "dtr/render/instants.h"
 #include "viewer/glfw/app.h"
 #include "viewer/governor.h"
@@ -248,7 +249,9 @@ viewer::Host MakeHost(const Options& options, const Context& context,
 viewer::AppSettings SettingsOf(const Options& options, const Context& context, const DtrSet& set) {
   viewer::AppSettings settings;
   const PinholeCamera size = WithSize({1280, 800, 1, 1, 0, 0}, options.size);
+  settings.warning = io::VerdictWarning(set);
   settings.title = WithoutTrailingSlash(options.set).filename().string() + " - dtr view";
+  if (!settings.warning.empty()) settings.title += " - " + settings.warning;
   settings.width_px = size.width_px();
   settings.height_px = size.height_px();
   settings.render = *options.render;
@@ -299,6 +302,8 @@ int RunView(const Options& options, const Context& context) {
   }
   ReturnFreedMemory();
   const DtrSet set = io::ReadSet(options.set);
+  const std::string warning = io::VerdictWarning(set);
+  if (!warning.empty()) context.console.Note(warning);
   const auto excluded = ResolveViewNames(AtFrame(set, options.instant), options.exclude);
   const viewer::AppReport report =
       viewer::RunViewer(SettingsOf(options, context, set), MakeHost(options, context, excluded));

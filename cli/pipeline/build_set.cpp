@@ -257,9 +257,10 @@ Json ProvenanceJson(const BuildOptions& options, const Json& option_values, cons
 }
 
 // The reprojection tests of every calibrated photo, held-out ones included.
-calib::ValidationReport Validate(DtrSet& set, const SparseScene& sparse, BuildReport& report,
-                                 int threads, Progress& progress) {
-  calib::ValidationReport validation = ValidateSet(set, sparse, {}, threads);
+calib::ValidationReport Validate(const std::filesystem::path& folder, DtrSet& set,
+                                 const SparseScene& sparse, BuildReport& report, int threads,
+                                 Progress& progress) {
+  calib::ValidationReport validation = ValidateSet(folder, set, sparse, {}, threads);
   report.validated = true;
   report.validation_passed = validation.passed();
   set.verdict_json = eval::VerdictJson(validation.tests);
@@ -389,7 +390,7 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
                                        PhotosJson(photos, is_source), calibrated, report)
                             .dump();
   const calib::ValidationReport validation =
-      Validate(set, sparse, report, options.threads, progress);
+      Validate(writer.folder(), set, sparse, report, options.threads, progress);
   writer.WriteSparse(set, sparse);
   WriteSetPage(writer, set,
                {options.output.stem().string(), options.depth.engine, validation.tests,

@@ -12,6 +12,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/hash.h"
 #include "dtr/base/parallel_for.h"
+#include "dtr/eval/json.h"
 #include "dtr/io/pruned.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/instants.h"
@@ -116,7 +117,8 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& progre
   set.provenance_json = provenance.dump();
   report.depth_maps = count.maps;
   report.depth_completeness = count.Completeness();
-  const auto validation = ValidateSet(set, sparse, {}, options.threads);
+  const auto validation = ValidateSet(writer.folder(), set, sparse, {}, options.threads);
+  set.verdict_json = eval::VerdictJson(validation.tests);  // other depth, other verdict
   WriteSetPage(writer, set,
                {report.written.stem().string(),
                 options.depth.engine,

@@ -1,6 +1,7 @@
 // `dtr view` in a real window: keys, drags and the wheel by xdotool.
 #include "dtr/base/files.h"
 #include "dtr/io/image_io.h"
+#include "dtr/io/set_io.h"
 #include "tests/support/environment.h"
 #include "tests/support/small_courtyard_set.h"
 #include "tests/support/virtual_display.h"
@@ -342,6 +343,26 @@ TEST_F(ViewerWindow, AFlightIsTimedAndItsEndIsSaved) {
   EXPECT_GT(json["first_whole_picture_ms"], json["first_picture_ms"]) << "at the flight's end";
   EXPECT_TRUE(json["last"]["still"].get<bool>());
   EXPECT_EQ(io::ReadImage(In("end.png")).height(), 240);
+}
+
+TEST_F(ViewerWindow, ASetWhoseCalibrationFailedItsTestsSaysSo) {
+  const fs::path copy = folder_ / "failed.dtr";
+  fs::copy(Set(), copy, fs::copy_options::recursive);
+  DtrSet set = io::ReadSet(copy);
+  set.verdict_json =
+      R"({"passed":false,"tests":[{"name":"held_out_rms_px","passed":false,"value":9,"limit":1}]})";
+  io::RewriteMetadata(copy, set);
+  const char* warning = "WARNING: calibration FAILED: held_out_rms_px";
+  {
+    const Environment no_display("DISPLAY", "");
+    EXPECT_THAT(Dtr({"view", copy.string()}).err, HasSubstr(warning));
+    EXPECT_THAT(Dtr({"view", Set()}).err, ::testing::Not(HasSubstr("WARNING: calibration")));
+  }
+  NeedDisplay();
+  if (IsSkipped()) return;
+  const Json json = Json::parse(
+      DtrOk({"view", copy.string(), "--size", "320x240", "--frames", "3", "--json", "-"}).out);
+  EXPECT_THAT(json["last"]["message"], HasSubstr(warning));
 }
 
 TEST_F(ViewerWindow, WhatCannotWorkIsSaidInOneLine) {

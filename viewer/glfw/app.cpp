@@ -52,6 +52,7 @@ class App {
     if (settings.start) controller().JumpTo(*settings.start);
     session_->ShowInstant(settings.instant);
     if (settings.play_time) PlayOrStop();
+    if (!settings.warning.empty()) message_ = settings.warning;
   }
 
   AppReport Run() {

@@ -24,6 +24,7 @@ struct OpenedSet {
 
 struct AppSettings {
   std::string title;
+  std::string warning;  ///< the first message in the window; empty: none
   int width_px = 1280, height_px = 800;
   RenderOptions render;
   size_t gpu_bytes = size_t{4} << 30;
