@@ -12,7 +12,6 @@
 #include "cli/pipeline/set_quality.h"
 #include "cli/pipeline/stereo_sweep.h"
 #include "cli/pipeline/storage_sweep.h"
-#include "cli/render_options.h"
 #include "cli/shell_words.h"
 #include "cli/sweep_output.h"
 #include "cli/sweep_store.h"
@@ -22,6 +21,7 @@
 #include "dtr/base/machine.h"
 #include "dtr/eval/render_sweep.h"
 #include "dtr/io/set_io.h"
+#include "dtr/render/option_arguments.h"
 
 namespace dtr::cli {
 namespace {
