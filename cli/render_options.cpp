@@ -1,5 +1,7 @@
 #include "cli/render_options.h"
 
+#include <fmt/format.h>
+
 #include <array>
 #include <map>
 #include <numbers>
