@@ -191,26 +191,26 @@ TEST_F(ViewerWindow, CtrlQQuitsOutOfATextFieldAndARecording) {
     ViewerProgram::Do({"key", "ctrl+q"});
     EXPECT_EQ(viewer.WaitForEnd(), 0);
   }
+  const fs::path recorded = In("recorded");  // where no other viewer left its state
+  fs::create_directories(recorded);
   const auto videos = [&] {
     int count = 0;
-    for (const auto& entry : fs::directory_iterator(folder_.path())) {
+    for (const auto& entry : fs::directory_iterator(recorded)) {
       count += entry.path().filename().string().find("-video-") != std::string::npos;
     }
     return count;
   };
-  ViewerProgram viewer(Set(), folder_.path(), {"--size", "320x240", "--no-panel"});
+  ViewerProgram viewer(Set(), recorded, {"--size", "320x240", "--no-panel"});
   viewer.WaitFor("the first picture", Anything);
-  ViewerProgram::Do({"mousemove", "160", "120", "key", "k"});
-  for (int key = 2; key <= 5; ++key) {  // long enough not to be done before it is left
-    const std::string name = "000" + std::to_string(key) + ".jpg";
-    ViewerProgram::Do({"key", "Right"});
-    viewer.WaitFor(name, [&](const Json& s) { return s["at_view"] == name; });
+  ViewerProgram::Do({"mousemove", "160", "120"});
+  for (int key = 1; key <= 5; ++key) {  // long enough not to be done before it is left
     ViewerProgram::Do({"key", "k"});
     viewer.WaitFor("a longer path", [&](const Json& s) { return s["path_keys"] == key; });
+    ViewerProgram::Do({"key", "Right", "sleep", "1"});
   }
   ViewerProgram::Do({"key", "r"});
   viewer.WaitFor("a recording", [](const Json& s) { return s["recording"].get<bool>(); });
-  EXPECT_EQ(videos(), 1) << "the cameras of its frames";
+  EXPECT_GT(videos(), 0) << "the cameras of its frames, and the frames";
   ViewerProgram::Do({"key", "ctrl+q"});
   EXPECT_EQ(viewer.WaitForEnd(), 0);
   EXPECT_EQ(videos(), 0);
