@@ -421,46 +421,18 @@ class App {
 
   AppState State() const {
     AppState state;
-    const MadePicture& picture = session_->maker.picture();
-    const Controller& controller = session_->controller;
-    const Inspection& inspection = session_->inspector.inspection();
+    session_->Describe(state);
     state.frames = figures_.frames();
     state.still = whole();
-    state.camera = controller.camera();
-    if (const auto at = controller.at_view()) {
-      const View& view = *controller.surroundings().cameras[*at];
-      state.at_view = view.name;
-      state.at_held_out = view.role == ViewRole::kHeldOut;
-    }
-    if (const View* photo = session_->inspector.photo()) state.photo = photo->name;
-    state.thumbnails = session_->inspector.thumbnails();
     state.shown = NameOf(shown_);
-    state.divisor = picture.divisor;
-    for (const int index : picture.views_used) {
-      state.views_used.push_back(picture.scene.views[static_cast<size_t>(index)]->name);
-    }
-    state.coverage = picture.coverage;
-    state.fly_speed = controller.fly_speed();
     state.help = help_;
     state.panel = panel_;
-    state.cameras = inspection.cameras;
-    state.magnifier = inspection.magnifier;
-    state.compared = NameOf(inspection.compared);
-    state.hidden = session_->HiddenNames();
-    state.distance = inspection.DistanceText();
-    if (inspection.magnifier && inspection.under_cursor) {
-      for (const ProbeView& view : inspection.under_cursor->views) {
-        state.under_cursor.push_back(view.name);
-      }
-    }
     state.path_keys = static_cast<int>(paths_.flight().keys().size());
     state.frames_per_key = paths_.flight().frames_per_key;
     state.recording = paths_.recording();
     state.asks_for_path = path_dialog_.open();
     state.reloads = reloads_;
     state.controls = controls_;
-    state.instant = session_->instant();
-    state.instants = session_->clock().frames();
     state.playing_time = time_.playing();
     state.message = message_;
     state.render = options_;
