@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <stdexcept>
 
 #include "calib/lens_map.h"
@@ -98,6 +99,21 @@ std::optional<Eigen::Vector2d> LensCamera::PixelFromCam(const Eigen::Vector3d& p
 
 std::optional<Eigen::Vector3d> LensCamera::RayFromPixel(const Eigen::Vector2d& pixel) const {
   return LensMap(*this).RayFromPixel(pixel);
+}
+
+LensCamera WithTwoFocalLengths(LensCamera camera) {
+  static const std::map<LensModel, LensModel> kWider{
+      {LensModel::kSimplePinhole, LensModel::kPinhole},
+      {LensModel::kSimpleRadial, LensModel::kOpenCv},
+      {LensModel::kRadial, LensModel::kOpenCv},
+      {LensModel::kSimpleRadialFisheye, LensModel::kOpenCvFisheye},
+      {LensModel::kRadialFisheye, LensModel::kOpenCvFisheye}};
+  const auto wider = kWider.find(camera.model);
+  if (wider == kWider.end()) return camera;
+  camera.model = wider->second;
+  camera.params.insert(camera.params.begin(), camera.params.front());  // f is fx and fy
+  camera.params.resize(static_cast<size_t>(ParameterCount(camera.model)), 0);
+  return camera;
 }
 
 }  // namespace dtr::calib

@@ -60,4 +60,7 @@ struct LensCamera {
   std::optional<Eigen::Vector3d> RayFromPixel(const Eigen::Vector2d& pixel) const;
 };
 
+/// The same lens, in COLMAP's model of two focal lengths where its own has one.
+LensCamera WithTwoFocalLengths(LensCamera camera);
+
 }  // namespace dtr::calib

@@ -86,6 +86,7 @@ struct CaptureWriter::State {
   bool finished = false;
 
   void Recover() const;
+  void RefuseForeign() const;
   void Open();
   void MoveIntoPlace();
 };
@@ -95,28 +96,32 @@ struct CaptureWriter::State {
 void CaptureWriter::State::Recover() const {
   if (fs::exists(aside / kLock)) {
     const auto nobody_at_work = LockIn(aside);
-    if (fs::exists(folder)) {
+    if (fs::exists(folder / kCaptureFile)) {
       RemoveFolder(aside, kLock);
-    } else {
+    } else if (!fs::exists(folder) || IsEmptyFolder(folder)) {
       Rename(aside, folder);
-    }
+    }  // what is no capture took its place: both stay
   }
   if (!fs::exists(folder / kLock) || !fs::exists(folder / kCaptureFile)) return;
   const auto nobody_at_work = LockIn(folder);
   fs::remove(folder / kLock);
 }
 
+// Before any work: at its end the old capture would find no room.
+void CaptureWriter::State::RefuseForeign() const {
+  for (const fs::path& path : {partial, aside}) {
+    if (path == aside && !options.replace) continue;
+    if (!fs::exists(fs::symlink_status(path)) || IsEmptyFolder(path)) continue;
+    if (path == partial && fs::is_regular_file(path / kLock)) continue;
+    throw UsageError(path.string() + ": expected nothing or an unfinished capture, found " +
+                     "something else; move it away");
+  }
+}
+
 // An empty folder for the work. One that a stopped run left is ours to clear; any other is not.
 void CaptureWriter::State::Open() {
   if (lock) return;
-  if (fs::exists(fs::symlink_status(partial))) {
-    const bool ours = fs::is_directory(partial) &&
-                      (fs::is_empty(partial) || fs::is_regular_file(partial / kLock));
-    if (!ours) {
-      throw UsageError(partial.string() + ": expected nothing or an unfinished capture, found " +
-                       "something else; move it away");
-    }
-  }
+  RefuseForeign();
   std::error_code error;
   fs::create_directories(partial, error);
   Require(error, partial);
@@ -154,7 +159,10 @@ CaptureWriter::CaptureWriter(const fs::path& folder, const StoreOptions& options
   state_->partial = state_->folder.string() + ".partial";
   state_->aside = state_->folder.string() + ".replaced";
   state_->options = options;
-  AsError([&] { state_->Recover(); });
+  AsError([&] {
+    state_->Recover();
+    state_->RefuseForeign();
+  });
   RefuseOccupied(state_->folder, options.replace);
 }
 

@@ -7,17 +7,18 @@
 namespace dtr::stereo {
 namespace {
 
-constexpr double kOffPlane = 0.02;
+constexpr double kMostSigmas = 2;
 
 }  // namespace
 
-Grid<float> NormalsOf(const PlaneMap& planes, const DepthImage& depth,
+Grid<float> NormalsOf(const PlaneMap& planes, const DepthImage& depth, const Grid<float>& sigma,
                       const PinholeCamera& camera) {
   const int width = camera.width_px(), height = camera.height_px();
-  if (depth.width() != width || depth.height() != height ||
+  if (depth.width() != width || depth.height() != height || sigma.width() != width ||
+      sigma.height() != height ||
       (!planes.empty() &&
        (planes.inverse_depth.width() != width || planes.inverse_depth.height() != height))) {
-    throw std::invalid_argument("NormalsOf: planes, depth and camera must have one size");
+    throw std::invalid_argument("NormalsOf: planes, depth, sigma and camera must have one size");
   }
   Grid<float> normals(width, height, 3);
   if (planes.empty()) return normals;
@@ -25,7 +26,8 @@ Grid<float> NormalsOf(const PlaneMap& planes, const DepthImage& depth,
     for (int x = 0; x < width; ++x) {
       if (DepthImage::IsHole(depth(x, y))) continue;
       const double w = planes.inverse_depth(x, y);
-      if (!(std::abs(w * depth(x, y) / planes.unit_z - 1) <= kOffPlane)) continue;
+      const double off = w / planes.unit_z - 1.0 / depth(x, y);
+      if (!(std::abs(off) <= kMostSigmas * sigma(x, y))) continue;
       // unit_z / z = n . (X / Z, Y / Z, 1), so n . (X, Y, Z) = unit_z: n points away.
       const double across = planes.slope_x(x, y) * camera.fx_px();
       const double down = planes.slope_y(x, y) * camera.fy_px();

@@ -233,7 +233,11 @@ void Controller::GoToView(size_t index) {
 void Controller::StepViews(int by) {
   const auto count = static_cast<int>(surroundings_.cameras.size());
   if (count == 0) return;
-  const bool on_the_way = glide_.has_value() || at_view() == stepped_to_;
+  // By its own pose: of two cameras at one place at_view() knows the first alone.
+  const bool there = stepped_to_ && *stepped_to_ < surroundings_.cameras.size() &&
+                     SamePose(surroundings_.cameras[*stepped_to_]->cam_from_world,
+                              camera_.cam_from_world, scene_size());
+  const bool on_the_way = glide_.has_value() || there;
   const std::optional<size_t> from = on_the_way ? stepped_to_ : nearest_view();
   const int to = (static_cast<int>(from.value_or(0)) + by % count + count) % count;
   GoToView(static_cast<size_t>(to));

@@ -25,7 +25,7 @@ constexpr int kSamplesAcross = 480;   // of a depth map
 /// own up is then a direction of the compass, or none. None for other sets.
 std::optional<Eigen::Vector3d> DownOfPicturesFromAbove(const Surroundings& around,
                                                        const Eigen::Vector3d& forward_sum) {
-  // Off the plane, and along its shorter axis, in shares of its longer one.
+  // Off the plane in shares of its shorter axis, and that in shares of its longer one.
   constexpr double kMostOffPlane = 0.2, kLeastAcross = 0.15;
   // A rig before a wall stands in a plane, too, but sees more than where it stands.
   constexpr double kLeastSpreadOverDistance = 0.4;

@@ -17,11 +17,15 @@ class SigmaShelf {
   using Load = std::function<Grid<float>(const View&)>;
   explicit SigmaShelf(Load load) : load_(std::move(load)) {}
 
+  /// Null where it must be read first: the look-up for every pixel.
+  const Grid<float>* Known(const View& view) const {
+    const auto known = kept_.find(&view);
+    return known != kept_.end() ? &known->second : nullptr;
+  }
   /// `in_picture`: the views that may be asked for before the picture changes; all others'
   /// sigmas go when one is read. The pointer holds until then.
   const Grid<float>* Of(const View& view, const std::set<const View*>& in_picture) {
-    const auto known = kept_.find(&view);
-    if (known != kept_.end()) return &known->second;
+    if (const Grid<float>* known = Known(view)) return known;
     std::erase_if(kept_, [&](const auto& one) { return !in_picture.contains(one.first); });
     return &(kept_[&view] = load_(view));
   }

@@ -364,10 +364,7 @@ namespace {
 
 Bundle WithTangential(Bundle bundle) {
   for (LensCamera& lens : bundle.lenses) {
-    if (!MayGetTangential(lens)) continue;
-    lens.model = LensModel::kOpenCv;
-    lens.params.insert(lens.params.begin(), lens.params.front());  // f is fx and fy
-    lens.params.resize(static_cast<size_t>(ParameterCount(lens.model)), 0);
+    if (MayGetTangential(lens)) lens = WithTwoFocalLengths(lens);
   }
   return bundle;
 }

@@ -25,10 +25,11 @@ std::string ToJson(const Adjusted& adjusted, const BundleCovariance& covariance)
   const bool known = covariance.computed && covariance.determined;
   Json json;
   json["sigma_px"] = std::isfinite(covariance.sigma_px) ? Json(covariance.sigma_px) : Json(nullptr);
-  json["condition"] =
-      std::isfinite(covariance.condition) ? Json(covariance.condition) : Json(nullptr);
-  json["gauge_freedom"] = covariance.gauge_freedom;
-  json["determined"] = known;
+  const bool has_condition = covariance.computed && std::isfinite(covariance.condition);
+  json["computed"] = covariance.computed;  // false: more than kMostUnknowns
+  json["condition"] = has_condition ? Json(covariance.condition) : Json(nullptr);
+  json["gauge_freedom"] = covariance.computed ? Json(covariance.gauge_freedom) : Json(nullptr);
+  json["determined"] = covariance.computed ? Json(covariance.determined) : Json(nullptr);
   json["lenses"] = Json::array();
   json["cameras"] = Json::array();
   for (size_t i = 0; known && i < bundle.lenses.size(); ++i) {

@@ -325,13 +325,45 @@ void AddShutter(const BundleLimits& limits, const Adjusted& fresh,
   judgement.tests.push_back(std::move(check));
 }
 
-// Says, as a test that fails, that images were not judged, and why.
-Judgement NotJudged(Judgement judgement, size_t images, const std::string& why) {
+Judgement NotJudged(Judgement judgement, const std::string& why) {
   judgement.not_judged = why;
-  judgement.tests.push_back(
-      AtMost("photos_not_judged", static_cast<double>(images), 0,
-             "no fresh bundle adjustment says whether they are right: " + why));
   return judgement;
+}
+
+// Points to judge by, a share of all by their hash; and all points of images of which the draw
+// could leave too few for halves.
+Bundle Drawn(const Bundle& given, double share) {
+  if (share >= 1) return given;
+  std::vector<int> sights(given.images.size());
+  for (const BundleObservation& o : given.observations) ++sights[static_cast<size_t>(o.image)];
+  std::vector<bool> kept(given.points.size());
+  for (size_t p = 0; p < kept.size(); ++p) kept[p] = UniformFromHash(HashOf(p, kDraw)) < share;
+  for (const BundleObservation& o : given.observations) {
+    const bool few = share * sights[static_cast<size_t>(o.image)] < 2 * kFewestSightsOfHalf;
+    if (few) kept[static_cast<size_t>(o.point)] = true;
+  }
+  return WithPoints(given, [&](std::uint64_t p) { return kept[static_cast<size_t>(p)]; });
+}
+
+// The last test: images of which no part's fresh solve could say anything fail it.
+void AddNotJudged(const Bundle& given, Judgement& all) {
+  std::vector<std::string> lost;
+  for (const BundleImage& image : given.images) {
+    const bool judged =
+        std::any_of(all.cameras.begin(), all.cameras.end(),
+                    [&](const CameraJudgement& camera) { return camera.name == image.name; });
+    if (!judged) lost.push_back(image.name);
+  }
+  if (lost.empty()) {
+    all.not_judged.clear();  // what one part could not judge another has
+  } else if (all.not_judged.empty()) {
+    all.not_judged = fmt::format("fewer than {} sights of what photos beside them see: {}",
+                                 kFewestSights, fmt::join(lost, ", "));
+  }
+  all.tests.push_back(
+      {"photos_not_judged", static_cast<double>(lost.size()), 0, lost.empty(),
+       lost.empty() ? "a fresh bundle adjustment has all"
+                    : "no fresh bundle adjustment says whether they are right: " + all.not_judged});
 }
 
 Judgement JudgePart(const Bundle& given, const BundleLimits& limits, int threads) {
@@ -339,16 +371,17 @@ Judgement JudgePart(const Bundle& given, const BundleLimits& limits, int threads
   std::vector<bool> seen(given.points.size());
   for (const BundleObservation& o : given.observations) seen[static_cast<size_t>(o.point)] = true;
   const auto points = static_cast<size_t>(std::count(seen.begin(), seen.end(), true));
-  const double share = kMostPoints / static_cast<double>(points);
-  const Bundle stored = WithDistortion(WithoutUnseen(
-      WithPoints(
-          given,
-          [&](std::uint64_t p) { return share >= 1 || UniformFromHash(HashOf(p, kDraw)) < share; }),
-      kFewestSights));
-  if (points < kFewestPoints || stored.images.size() < 2) {
-    return NotJudged(judgement, given.images.size(),
+  const Bundle stored = WithDistortion(
+      WithoutUnseen(Drawn(given, kMostPoints / static_cast<double>(points)), kFewestSights));
+  if (points < kFewestPoints) {
+    return NotJudged(judgement,
                      fmt::format("expected {} points or more that two views see, found {}",
                                  kFewestPoints, points));
+  }
+  if (stored.images.size() < 2) {
+    return NotJudged(judgement,
+                     fmt::format("expected two photos or more of {} sights each, found {}",
+                                 kFewestSights, stored.images.size()));
   }
   const Halves halves = HalvesOf(stored);
   Adjusted solved[3];  // all points, two halves
@@ -357,7 +390,7 @@ Judgement JudgePart(const Bundle& given, const BundleLimits& limits, int threads
       solved[i] = Adjust(i == 0 ? stored : halves.parts[static_cast<size_t>(i) - 1], AllFree());
     });
   } catch (const Error& error) {
-    return NotJudged(judgement, stored.images.size(), error.what());
+    return NotJudged(judgement, error.what());
   }
   const Adjusted& fresh = solved[0];
   const BundleCovariance covariance = CovarianceOf(fresh, AllFree());
@@ -367,16 +400,14 @@ Judgement JudgePart(const Bundle& given, const BundleLimits& limits, int threads
   judgement.degeneracies = FindDegeneracies(fresh, covariance, limits.max_focal_share);
   AddDegeneracies(judgement);
   if (!covariance.computed) {
-    return NotJudged(
-        judgement, stored.images.size(),
-        fmt::format("more than {} unknowns: too many for their covariance", kMostUnknowns));
+    return NotJudged(judgement, fmt::format("more than {} unknowns: too many for their covariance",
+                                            kMostUnknowns));
   }
   if (!covariance.determined) {
-    return NotJudged(judgement, stored.images.size(),
-                     "the sights do not determine " + covariance.weakest);
+    return NotJudged(judgement, "the sights do not determine " + covariance.weakest);
   }
   if (!fresh.converged) {
-    return NotJudged(judgement, stored.images.size(),
+    return NotJudged(judgement,
                      fmt::format("the fresh solve did not settle in {} steps", fresh.iterations));
   }
   CompareWithStored(stored, fresh, covariance, judgement);
@@ -386,7 +417,6 @@ Judgement JudgePart(const Bundle& given, const BundleLimits& limits, int threads
   AddDifferences(limits, judgement);
   AddPicture(limits, judgement);
   AddShutter(limits, fresh, covariance, judgement);
-  judgement.tests.push_back(AtMost("photos_not_judged", 0, 0, "a fresh bundle adjustment has all"));
   return judgement;
 }
 
@@ -406,10 +436,6 @@ void JoinTests(const Judgement& part, Judgement& all) {
                                    [&](const Check& other) { return other.name == test.name; });
     if (same == all.tests.end()) {
       all.tests.push_back(test);
-    } else if (test.name == "photos_not_judged") {
-      same->value += test.value;
-      if (!test.passed && same->passed) same->reason = test.reason;
-      same->passed = same->passed && test.passed;
     } else if (IsWorse(test, *same)) {
       *same = test;
     }
@@ -431,7 +457,9 @@ void Join(const Judgement& part, Judgement& all) {
   if (all.not_judged.empty()) all.not_judged = part.not_judged;
   all.sigma_px = std::max(all.sigma_px, part.sigma_px);
   all.condition = std::max(all.condition, part.condition);
-  if (!(part.halves_ratio <= all.halves_ratio)) all.halves_ratio = part.halves_ratio;
+  if (std::isnan(part.halves_ratio) || part.halves_ratio > all.halves_ratio) {
+    all.halves_ratio = part.halves_ratio;  // and NaN, once there, stays
+  }
   all.sights += part.sights;
 }
 
@@ -444,15 +472,23 @@ double NegligiblePx(const BundleLimits& limits, double sigma_px) {
 
 Judgement Judge(const Bundle& given, const BundleLimits& limits, int threads) {
   // With distortion, as it is solved for.
-  const int unknowns = JudgedUnknowns(WithDistortion(given));
-  if (unknowns <= limits.most_unknowns) return JudgePart(given, limits, threads);
-  Judgement all;
+  // Photos of fewer sights are those of the test cameras_untested.
   const Bundle seen = WithoutUnseen(given, kFewestSights);
-  // Half of what one part may have: work grows with the cube.
-  const std::vector<Bundle> parts = PartsOf(seen, limits.most_unknowns / 2);
-  for (const Bundle& part : parts) Join(JudgePart(part, limits, threads), all);
-  all.parts = static_cast<int>(parts.size());
-  if (parts.empty()) return NotJudged(all, given.images.size(), "no photo has points to judge by");
+  if (seen.images.empty()) {
+    Judgement none = NotJudged({}, "no photo has points to judge by");
+    AddNotJudged(given, none);
+    return none;
+  }
+  Judgement all;
+  if (JudgedUnknowns(WithDistortion(seen)) <= limits.most_unknowns) {
+    all = JudgePart(seen, limits, threads);
+  } else {
+    // Half of what one part may have: work grows with the cube.
+    const std::vector<Bundle> parts = PartsOf(seen, limits.most_unknowns / 2);
+    for (const Bundle& part : parts) Join(JudgePart(part, limits, threads), all);
+    all.parts = static_cast<int>(parts.size());
+  }
+  AddNotJudged(seen, all);
   return all;
 }
 

@@ -2,11 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "calib/bundle/covariance.h"
 #include "calib/bundle/covariance_json.h"
 #include "calib/bundle/held_out.h"
 #include "dtr/base/error.h"
@@ -27,6 +29,31 @@ constexpr std::array kRisingFreedom{LensFreedom::kNoPrincipalPoint, LensFreedom:
 
 constexpr size_t kNoneConverged = ~size_t{0}, kNoScale = kNoneConverged - 1;
 constexpr double kLeastSigmaPx = 1e-7;  // exact sights differ by rounding, which no loss can weigh
+
+constexpr double kSurelySigmas = 5;  // errors of real sights go together: predicted ones are small
+
+/// Standard deviations (Mahalanobis length, the largest of all lenses) that a solve of these points
+/// puts a principal point away from where it was given; 0 where it does not tell.
+double PrincipalPointSigmas(const Bundle& bundle) {
+  const AdjustOptions options = OptionsFor(LensFreedom::kAll);
+  const Adjusted free = Adjust(bundle, options);
+  const BundleCovariance covariance = CovarianceOf(free, options);
+  if (!free.converged || !covariance.computed || !covariance.determined) return 0;
+  double most = 0;
+  for (size_t i = 0; i < bundle.lenses.size(); ++i) {
+    const auto& given = bundle.lenses[i].params;
+    const auto& found = free.bundle.lenses[i].params;
+    const int cx = FocalCount(bundle.lenses[i].model);
+    const auto& params = covariance.free_params[i];
+    const auto at = std::find(params.begin(), params.end(), cx) - params.begin();
+    const long first = covariance.lens_at[i] + at;
+    const auto k = static_cast<size_t>(cx);
+    const Eigen::Vector2d moved(found[k] - given[k], found[k + 1] - given[k + 1]);
+    const Eigen::Matrix2d variance = covariance.matrix.block<2, 2>(first, first);
+    most = std::max(most, std::sqrt(moved.dot(variance.inverse() * moved)));
+  }
+  return most;
+}
 
 // Whether more freedom than the chosen candidate's is worth it: beyond chance, and for a number
 // that every image has by itself beyond what is too little to matter.
@@ -89,8 +116,8 @@ size_t Choose(const Bundle& bundle, const SightSplit& split, const RefineOptions
   LossesOfUnseenPoints(bundle, split.training, 1, &sigma_px);
   if (!std::isfinite(sigma_px)) return kNoScale;
   const double scale_px = kLossSigmas * std::max(sigma_px, kLeastSigmaPx);
-  const auto losses = TryOnUnseenPoints(SomePoints(bundle, kMostPoints, options.seed), options,
-                                        scale_px, candidates);
+  const Bundle some = SomePoints(bundle, kMostPoints, options.seed);
+  const auto losses = TryOnUnseenPoints(some, options, scale_px, candidates);
   size_t chosen = 0;
   for (size_t i = 1; i < candidates.size(); ++i) {
     RefineCandidate& candidate = candidates[i];
@@ -98,7 +125,13 @@ size_t Choose(const Bundle& bundle, const SightSplit& split, const RefineOptions
       std::tie(candidate.low_px2, candidate.high_px2) =
           BootstrapOfDifference(losses[i], losses[chosen], options.seed);
     }
-    const bool better = chosen == 0 || IsWorthIt(candidate, candidates[chosen]);
+    bool better = chosen == 0 || IsWorthIt(candidate, candidates[chosen]);
+    if (!better && candidate.lens == LensFreedom::kAll && !(candidate.low_px2 > 0)) {
+      // A principal point off its place is nearly a turn of all cameras, which unseen points hardly
+      // tell; what all sights together say of it is known by its covariance.
+      candidate.principal_point_sigmas = PrincipalPointSigmas(some);
+      better = candidate.principal_point_sigmas > kSurelySigmas;
+    }
     if (candidate.converged && better) chosen = i;
   }
   if (!candidates[0].converged || chosen == 0) return kNoneConverged;
@@ -234,6 +267,7 @@ std::string ToJson(const Refined& refined) {
                                   {"held_out_px", c.held_out_px},
                                   {"low_px2", c.low_px2},
                                   {"high_px2", c.high_px2},
+                                  {"principal_point_sigmas", c.principal_point_sigmas},
                                   {"converged", c.converged}});
   }
   if (refined.changed) {

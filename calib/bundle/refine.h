@@ -31,6 +31,9 @@ struct RefineCandidate {
   /// less freedom, in px^2; points drawn with replacement.
   double low_px2 = 0, high_px2 = 0;
   bool converged = false;  ///< else it is not taken
+  /// How surely the principal point is not where it was given, in standard deviations; 0 where
+  /// nobody asked: unseen points told already.
+  double principal_point_sigmas = 0;
 };
 
 struct Refined {

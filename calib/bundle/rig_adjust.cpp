@@ -153,7 +153,9 @@ RigRefined RefineRig(const SfmModel& model, const KnownRig& rig,
   }
   refined.adjusted = AdjustRig(bundle, frames.images, rig_from_world, options);
   RequireConverged(refined.adjusted, "with the rig's places");
-  const double most = std::max(kMostSigmaGrowth * free.sigma_px, kHarmlessSigmaPx);
+  // Where all was needed for the unknowns nothing is known of the noise, and none is supposed.
+  const double noise = std::isfinite(free.sigma_px) ? free.sigma_px : 0;
+  const double most = std::max(kMostSigmaGrowth * noise, kHarmlessSigmaPx);
   const bool enough = refined.adjusted.sights >= kLeastSights * free.sights;
   if (!(refined.adjusted.sigma_px <= most) || !enough) {
     Refuse(fmt::format(

@@ -269,16 +269,23 @@ class Judging {
   // Keeps in `check` the part that is farthest beyond its limit.
   void Hold(const Reference& reference, const RigLayout& layout, const Eigen::VectorXd& difference,
             const Eigen::MatrixXd& covariance, int at, int count, size_t camera, Check& check) {
-    const double distance = Distance(difference, covariance, at, count);
+    double distance = Distance(difference, covariance, at, count);
     const double limit = reference.Limit(limits_.min_p, limits_.max_self_difference_sigmas, count);
+    std::string reason = fmt::format("{}: stored less {} solve; {}; up to {:.3g} px in the image",
+                                     calibration_.cameras[camera].name, NameOfSolve(reference),
+                                     LargestPart(layout, difference, covariance, at, count),
+                                     report_.cameras[camera].difference.Largest());
+    // What was calibrated elsewhere does not say how uncertain it is: pixels must do.
+    const double shown_px = report_.cameras[camera].difference.Quantile(kMostOfImage);
+    if (calibration_.kept.empty() && distance > limit && shown_px <= limits_.max_uncertainty_px) {
+      reason += fmt::format(
+          "; {:.3g} sigma of that solve alone, for the file does not say what it is uncertain by, "
+          "but at most {:.3g} px in 95 % of the image, where {:.3g} px are allowed",
+          distance, shown_px, limits_.max_uncertainty_px);
+      distance = 0;
+    }
     if (check.value >= 0 && !(distance / limit > check.value / check.limit)) return;
-    check.value = distance;
-    check.limit = limit;
-    check.passed = distance <= limit;
-    check.reason = fmt::format("{}: stored less {} solve; {}; up to {:.3g} px in the image",
-                               calibration_.cameras[camera].name, NameOfSolve(reference),
-                               LargestPart(layout, difference, covariance, at, count),
-                               report_.cameras[camera].difference.Largest());
+    check = {check.name, distance, limit, distance <= limit, std::move(reason)};
   }
 
   // One factor on all shifts: another size of the board.
@@ -349,13 +356,15 @@ class Judging {
       // A lens that has no ray for a pixel that it should show does not know where it looks; what
       // could not be computed is the worst, not the best.
       double value = map_of(camera).Quantile(kMostOfImage);
-      if (!std::isfinite(value)) value = std::numeric_limits<double>::infinity();
+      const bool has_rays = std::isfinite(value);
+      if (!has_rays) value = std::numeric_limits<double>::infinity();
       if (value <= check.value) continue;
       check.value = value;
       check.reason = fmt::format(
           "{}: standard deviation of a projection at {}, exceeded in 5 % of "
-          "the image; median {:.3g} px, worst {:.3g} px",
-          camera.name, where, map_of(camera).Median(), map_of(camera).Largest());
+          "the image; median {:.3g} px, worst {:.3g} px{}",
+          camera.name, where, map_of(camera).Median(), map_of(camera).Largest(),
+          has_rays ? "" : " of those that have a ray: more than 5 % have none");
     }
     check.passed = check.value <= limit;
     Add(std::move(check));

@@ -440,10 +440,11 @@ RigSolution SolveRig(const Board& board, std::span<const RigCameraInput> cameras
 }
 
 void RequireCoveredImages(const Rig& rig) {
-  for (const RigCamera& camera : rig.cameras) {
+  for (size_t c = 0; c < rig.cameras.size(); ++c) {
+    const RigCamera& camera = rig.cameras[c];
     if (CoversImage(camera.camera)) continue;
     const std::string who = camera.name.empty() ? "" : fmt::format("camera {}: ", camera.name);
-    Refuse(who + TurnsBack(camera.model));
+    throw LensTurnsBack(c, "calibration: " + who + TurnsBack(camera.model));
   }
 }
 

@@ -8,6 +8,7 @@
 #include "calib/solve/board_solve.h"
 #include "calib/solve/rig.h"
 #include "calib/solve/rig_system.h"
+#include "dtr/base/error.h"
 
 namespace dtr::calib {
 
@@ -53,7 +54,16 @@ struct RigCameraInput {
 RigSolution SolveRig(const Board& board, std::span<const RigCameraInput> cameras,
                      std::vector<RigView> views, size_t frames, const RigOptions& options = {});
 
-/// Throws Error naming a camera whose distortion turns back inside its image (CoversImage).
+/// A camera's distortion turns back inside its image (CoversImage).
+class LensTurnsBack : public Error {
+ public:
+  LensTurnsBack(size_t camera, const std::string& what) : Error(what), camera_(camera) {}
+  size_t camera() const { return camera_; }
+
+ private:
+  size_t camera_;
+};
+/// Throws LensTurnsBack, naming the camera.
 void RequireCoveredImages(const Rig& rig);
 
 /// Lenses and places as they are; of every frame the board's pose alone is fitted: by each view's

@@ -87,6 +87,7 @@ void SayRig(const calib::Calibration& calibration, const pipeline::RigSummary& s
     console.Say(fmt::format("  shift   {:.5g}, {:.5g}, {:.5g} +- {:.1g}, {:.1g}, {:.1g}", t.x(),
                             t.y(), t.z(), sigma[3], sigma[4], sigma[5]));
   }
+  for (const std::string& line : summary.simpler) console.Say("simpler lens: " + line);
   for (const std::string& name : summary.flipped) {
     console.Say("counted from the other end, repaired: " + name);
   }

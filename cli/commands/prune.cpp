@@ -31,13 +31,14 @@ void SayResult(const Options& options, const pipeline::PruneSetReport& report, C
       report.frame_after.median_ms, report.frame_before.median_ms,
       report.frame_before.median_ms / report.frame_after.median_ms, pruned.loss_db(),
       options.prune.prune.max_loss_db));
-  console.Say(
-      fmt::format("  between input cameras: {:.3f} +- {:.3f} dB; on photos that did not decide: "
-                  "{:.3f} +- {:.3f} dB; on held-out ones: {}",
-                  pruned.checked_probe_loss_db, pruned.probe_error_db, pruned.witness_loss_db,
-                  pruned.witness_error_db,
-                  pruned.photo_loss_db ? fmt::format("{:.3f} dB", *pruned.photo_loss_db)
-                                       : std::string("there are none")));
+  console.Say(fmt::format(
+      "  between input cameras: {:.3f} +- {:.3f} dB; on photos that did not decide: "
+      "{:.3f} +- {:.3f} dB; on held-out ones: {}",
+      pruned.checked_probe_loss_db, pruned.probe_error_db, pruned.witness_loss_db,
+      pruned.witness_error_db,
+      pruned.photo_loss_db ? fmt::format("{:.3f} dB, whole frames {:.3f} dB", *pruned.photo_loss_db,
+                                         pruned.photo_frame_loss_db.value_or(0))
+                           : std::string("there are none")));
   if (pruned.photo_loss_db.value_or(0) > options.prune.prune.max_loss_db) {
     console.Note(
         "WARNING: held-out photos lose more than was allowed; give a smaller --max-loss-db");

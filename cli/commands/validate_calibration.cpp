@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <nlohmann/json.hpp>
+
 #include "calib/boards/board.h"
 #include "cli/output_file.h"
 #include "cli/pipeline/judge_calibration.h"
@@ -79,12 +81,14 @@ int RunValidateCalibration(const ValidateCalibrationOptions& options, const Cont
   limits.max_rms_px = options.max_rms_px.value_or(limits.max_rms_px);
   limits.max_uncertainty_px = options.max_uncertainty_px.value_or(limits.max_uncertainty_px);
   std::optional<calib::UnseenViews> unseen;
+  auto skipped = nlohmann::ordered_json::array();
   if (options.images) {
     pipeline::UnseenPhotos photos =
         pipeline::ReadUnseen(calibration, *options.images, options.pattern.value_or("*"),
                              context.common.threads, context.console);
     for (const calib::LeftOut& photo : photos.left_out) {
       context.console.Say(fmt::format("left out: {}: {}", photo.name, photo.reason));
+      skipped.push_back({{"name", photo.name}, {"reason", photo.reason}});
     }
     unseen = std::move(photos.unseen);
   }
@@ -98,7 +102,9 @@ int RunValidateCalibration(const ValidateCalibrationOptions& options, const Cont
                                                   options.images));
     context.console.Say("report: " + options.report->string());
   }
-  context.EmitJson(calib::ToJson(report));
+  auto json = nlohmann::ordered_json::parse(calib::ToJson(report));
+  json["skipped"] = skipped;
+  context.EmitJson(json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
   return report.passed() ? kDone : kFailed;
 }
 

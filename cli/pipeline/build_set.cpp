@@ -27,6 +27,7 @@
 #include "dtr/base/parallel_for.h"
 #include "dtr/eval/json.h"
 #include "dtr/io/set_io.h"
+#include "dtr/io/verdict.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -265,7 +266,7 @@ calib::ValidationReport Validate(const std::filesystem::path& folder, DtrSet& se
   report.validation_passed = validation.passed();
   set.verdict_json = eval::VerdictJson(validation.tests);
   if (!report.validation_passed) {
-    progress.Note("WARNING: the calibration does not hold; see `dtr validate`");
+    progress.Note(io::VerdictWarning(set));
   }
   return validation;
 }

@@ -9,6 +9,7 @@
 #include "cli/pipeline/depth_engine.h"
 #include "cli/pipeline/plane_files.h"
 #include "cli/pipeline/time_budget.h"
+#include "dtr/base/durable.h"
 #include "dtr/base/error.h"
 #include "dtr/io/depth_io.h"
 #include "stereo/depth_maps.h"
@@ -88,16 +89,31 @@ stereo::StereoPixels ReadPixels(const std::filesystem::path& folder, View view, 
   return {std::move(view.image), std::move(view.mask)};
 }
 
-// Where the normals of a view go.
-std::filesystem::path NormalsFile(const std::filesystem::path& folder, const View& view) {
-  return folder / std::filesystem::path(view.name).replace_extension(".exr");
-}
+// Normals beside the checkpoints of this very run until all are there: what lies in the user's
+// folder may be of another.
+class NormalFiles {
+ public:
+  NormalFiles(const std::filesystem::path& work, const std::filesystem::path& folder)
+      : work_(work / "normals"), folder_(folder) {}
 
-void WriteNormals(const std::filesystem::path& file, const stereo::PlaneMap& planes,
-                  const DepthImage& depth, const PinholeCamera& camera) {
-  std::filesystem::create_directories(file.parent_path());
-  io::WriteExrOfVectors(file, stereo::NormalsOf(planes, depth, camera));
-}
+  bool Has(const View& view) const { return folder_.empty() || exists(work_ / Name(view)); }
+  void Write(const View& view, const stereo::PlaneMap& planes,
+             const stereo::DepthEstimate& estimate) const {
+    std::filesystem::create_directories(work_);
+    io::WriteExrOfVectors(
+        work_ / Name(view),
+        stereo::NormalsOf(planes, estimate.depth, estimate.inverse_depth_sigma, view.camera));
+  }
+  void Deliver(const View& view) const {
+    if (folder_.empty() || !exists(work_ / Name(view))) return;
+    std::filesystem::create_directories(folder_);
+    CopyFileAtomically(work_ / Name(view), folder_ / Name(view));
+  }
+
+ private:
+  static std::string Name(const View& view) { return view.id + ".exr"; }
+  std::filesystem::path work_, folder_;
+};
 
 void WriteDepth(View& view, stereo::DepthEstimate&& estimate, LengthUnit unit,
                 io::SetWriter& writer) {
@@ -168,6 +184,7 @@ stereo::Effort DepthStage(DtrSet& set, const SparseScene& sparse, const DepthCho
   depth_options.engine.memory_gb = choice.memory_gb.value_or(kDefaultMemoryGb) / 2;
   PlaneFiles planes(writer.work_folder() / "planes");
   EstimateFiles estimates(writer.work_folder() / "estimates");
+  const NormalFiles normals(writer.work_folder(), options.normals);
   depth_options.planes = &planes;
   depth_options.estimates = &estimates;
   ComputeWithin(choice.memory_gb, depth_options, progress, [&] {
@@ -175,19 +192,17 @@ stereo::Effort DepthStage(DtrSet& set, const SparseScene& sparse, const DepthCho
         sources.stereo, scene, *engine, depth_options, progress,
         [&](int source) {
           const View& view = view_of(source);
-          return view.depth_file.has_value() &&
-                 (options.normals.empty() ||
-                  std::filesystem::exists(NormalsFile(options.normals, view)));
+          return view.depth_file.has_value() && normals.Has(view);
         },
         [&](int source, stereo::DepthEstimate&& estimate, const stereo::DepthRange&) {
           View& view = view_of(source);
           if (!options.normals.empty()) {
-            WriteNormals(NormalsFile(options.normals, view), *planes.Load(engine->Rounds(), source),
-                         estimate.depth, view.camera);
+            normals.Write(view, *planes.Load(engine->Rounds(), source), estimate);
           }
           WriteDepth(view, std::move(estimate), set.unit, writer);
         });
   });
+  for (const int index : sources.indices) normals.Deliver(views[static_cast<size_t>(index)]);
   return effort;
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "calib/boards/repeats.h"
+#include "calib/solve/rig_start.h"
 #include "cli/pipeline/board_photos.h"
 #include "cli/pipeline/lens_file.h"
 #include "cli/pipeline/rig_calibration.h"
@@ -26,27 +27,26 @@ void RequireSize(const calib::CalibratedCamera& camera, int width_px, int height
                   width_px, height_px));
 }
 
-calib::UnseenViews UnseenOfCamera(const calib::Calibration& calibration,
-                                  const std::filesystem::path& folder, const std::string& pattern,
-                                  int threads, Progress& progress) {
-  calib::UnseenViews unseen;
+UnseenPhotos UnseenOfCamera(const calib::Calibration& calibration,
+                            const std::filesystem::path& folder, const std::string& pattern,
+                            int threads, Progress& progress) {
   const BoardPhotos photos =
       ReadBoardPhotos(folder, pattern, calibration.board, {}, threads, progress);
   RequireSize(calibration.cameras[0], photos.width_px, photos.height_px, folder);
+  UnseenPhotos found{{}, photos.left_out};
+  calib::UnseenViews& unseen = found.unseen;
   for (const auto& view : photos.views) unseen.views.push_back({0, unseen.frames++, view, {}});
-  return unseen;
+  return found;
 }
 
-calib::UnseenViews UnseenOfRig(const calib::Calibration& calibration,
-                               const std::filesystem::path& folder, const std::string& pattern,
-                               int threads, Progress& progress) {
+UnseenPhotos UnseenOfRig(const calib::Calibration& calibration, const std::filesystem::path& folder,
+                         const std::string& pattern, int threads, Progress& progress) {
   if (pattern != "*") {
     throw UsageError(fmt::format(
         "--pattern {}: is for the photos of one camera; a rig's cameras are told apart by their "
         "folders or names",
         pattern));
   }
-  calib::UnseenViews unseen;
   RigPhotos photos = ReadRigPhotos(folder, calibration.board, {}, threads, progress);
   std::vector<size_t> index(photos.cameras.size());
   for (size_t c = 0; c < photos.cameras.size(); ++c) {
@@ -61,31 +61,53 @@ calib::UnseenViews UnseenOfRig(const calib::Calibration& calibration,
     index[c] = static_cast<size_t>(found - calibration.cameras.begin());
     RequireSize(*found, photos.cameras[c].width_px, photos.cameras[c].height_px, folder);
   }
+  UnseenPhotos of_rig{{}, std::move(photos.left_out)};
+  calib::UnseenViews& unseen = of_rig.unseen;
   unseen.frames = photos.frames.size();
   unseen.views = std::move(photos.views);
   for (calib::RigView& view : unseen.views) view.camera = index[view.camera];
   std::stable_sort(unseen.views.begin(), unseen.views.end(), [](const auto& a, const auto& b) {
     return std::pair(a.frame, a.camera) < std::pair(b.frame, b.camera);
   });
-  return unseen;
+  return of_rig;
 }
 
-// The same photo, detected again, has the same corners; another one of the same board at the same
-// place differs by its noise.
-void TakeOutSeen(const calib::Calibration& calibration, UnseenPhotos& photos) {
-  std::erase_if(photos.unseen.views, [&](const calib::RigView& view) {
+bool CornersMoved(const calib::Calibration& calibration, const calib::CalibratedView& view) {
+  const auto& delay = calibration.cameras[view.camera].delay;
+  return delay && delay->corners_moved;
+}
+
+// The same photo, detected again, has the same corners, of chessboards perhaps counted from the
+// other end; another one of the same board at the same place differs by its noise. Corners that a
+// free-running camera's delay has moved are no photo's: there names must do.
+bool IsSame(const calib::Calibration& calibration, const calib::BoardView& view,
+            const calib::CalibratedView& kept) {
+  if (CornersMoved(calibration, kept)) return view.name == kept.seen.name;
+  if (calib::MeanDistancePx(view, kept.seen) < kSamePhotoPx) return true;
+  return calibration.board.kind == calib::Board::Kind::kChessboard &&
+         calib::MeanDistancePx(calib::TurnedByHalf(calibration.board, view), kept.seen) <
+             kSamePhotoPx;
+}
+
+std::vector<calib::LeftOut> TakeOutSeen(const calib::Calibration& calibration,
+                                        std::vector<calib::RigView>& views) {
+  std::vector<calib::LeftOut> seen;
+  std::erase_if(views, [&](const calib::RigView& view) {
     const auto same =
         std::find_if(calibration.views.begin(), calibration.views.end(), [&](const auto& kept) {
-          return kept.camera == view.camera &&
-                 calib::MeanDistancePx(view.seen, kept.seen) < kSamePhotoPx;
+          return kept.camera == view.camera && IsSame(calibration, view.seen, kept);
         });
     if (same == calibration.views.end()) return false;
-    photos.left_out.push_back(
+    seen.push_back(
         {view.seen.name,
-         fmt::format("not unseen: its corners are those of {}, which the calibration was made from",
-                     same->seen.name)});
+         CornersMoved(calibration, *same)
+             ? "not unseen: the calibration was made from a photo of this name"
+             : fmt::format(
+                   "not unseen: its corners are those of {}, which the calibration was made from",
+                   same->seen.name)});
     return true;
   });
+  return seen;
 }
 
 }  // namespace
@@ -125,17 +147,17 @@ calib::Calibration ForeignCalibration(const std::filesystem::path& file,
 
 UnseenPhotos ReadUnseen(const calib::Calibration& calibration, const std::filesystem::path& folder,
                         const std::string& pattern, int threads, Progress& progress) {
-  UnseenPhotos photos;
-  photos.unseen = calibration.cameras.size() == 1
-                      ? UnseenOfCamera(calibration, folder, pattern, threads, progress)
-                      : UnseenOfRig(calibration, folder, pattern, threads, progress);
-  TakeOutSeen(calibration, photos);
+  UnseenPhotos photos = calibration.cameras.size() == 1
+                            ? UnseenOfCamera(calibration, folder, pattern, threads, progress)
+                            : UnseenOfRig(calibration, folder, pattern, threads, progress);
+  const std::vector<calib::LeftOut> seen = TakeOutSeen(calibration, photos.unseen.views);
   if (photos.unseen.views.empty()) {
     throw Error(fmt::format(
         "{}: expected photos that the calibration has not seen, found only those that it was made "
         "from, {} first; take others, or leave --images out",
-        folder.string(), photos.left_out.front().name));
+        folder.string(), seen.front().name));
   }
+  photos.left_out.insert(photos.left_out.end(), seen.begin(), seen.end());
   return photos;
 }
 

@@ -20,13 +20,15 @@ calib::Calibration ForeignCalibration(const std::filesystem::path& file, const c
 
 struct UnseenPhotos {
   calib::UnseenViews unseen;
-  std::vector<calib::LeftOut> left_out;  ///< photos that the calibration was made from, by name
+  /// Without a usable board, of another size, repeated, or what the calibration was made from.
+  std::vector<calib::LeftOut> left_out;
 };
 
 /// Looks for the calibration's board in photos that it has not seen: of a single camera the photos
 /// of `folder` whose names match `pattern`, of a rig what ReadRigPhotos finds there (`pattern` must
 /// be "*"). Cameras of a rig are matched by name. A photo whose corners are those of a view that
-/// the calibration keeps is the one that it was made from, and is left out. Throws Error when sizes
+/// the calibration keeps (of one with moved corners: whose name) is the one that it was made from,
+/// and is left out. Throws Error when sizes
 /// differ from the calibration's, a camera is not there or nothing is left.
 UnseenPhotos ReadUnseen(const calib::Calibration& calibration, const std::filesystem::path& folder,
                         const std::string& pattern, int threads, Progress& progress);

@@ -72,6 +72,7 @@ std::string Fingerprint(const PruneSetOptions& options, const DtrSet& set) {
   }
   const prune::PruneOptions& prune = options.prune;
   return Json{{"tool_version", DTR_VERSION},
+              {"measured", "what some view sees"},
               {"set_sha256", Sha256OfFile(options.set / "set.json")},
               {"held_out", held_out},
               {"probes", prune.probes},
@@ -214,8 +215,9 @@ void ExpectGoalsReached(const PruneSetOptions& options, const DtrSet& pruned,
 Json ReportJson(const PruneSetOptions& options, const PruneSetReport& report) {
   Json json = {{"set", options.output.string()}};
   json.update(PrunedJson(options, report));
-  const auto& photo_loss_db = report.pruned.photo_loss_db;
-  json["photo_loss_db"] = photo_loss_db ? Json(*photo_loss_db) : Json(nullptr);
+  const auto told = [](const std::optional<double>& db) { return db ? Json(*db) : Json(nullptr); };
+  json["photo_loss_db"] = told(report.pruned.photo_loss_db);
+  json["photo_frame_loss_db"] = told(report.pruned.photo_frame_loss_db);
   json["bytes_before"] = report.bytes_before;
   json["bytes_after"] = report.bytes_after;
   json["bytes_ratio"] =

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <map>
 
 #include "calib/files/opencv_yaml.h"
 #include "calib/solve/choose_model.h"
@@ -21,10 +20,17 @@ std::vector<calib::BoardView> ViewsOf(const RigPhotos& photos, size_t camera) {
   return views;
 }
 
+struct Inputs {
+  std::vector<calib::RigCameraInput> cameras;
+  std::vector<std::vector<calib::ModelScore>> scores;  // empty where the model was not chosen here
+};
+
 // Each camera with its model: given, named, or chosen by this camera's own held-out views.
-std::vector<calib::RigCameraInput> InputsOf(const calib::Board& board, const RigPhotos& photos,
-                                            const RigCalibrationOptions& options) {
-  std::vector<calib::RigCameraInput> inputs;
+Inputs InputsOf(const calib::Board& board, const RigPhotos& photos,
+                const RigCalibrationOptions& options) {
+  Inputs all;
+  std::vector<calib::RigCameraInput>& inputs = all.cameras;
+  all.scores.resize(photos.cameras.size());
   for (size_t c = 0; c < photos.cameras.size(); ++c) {
     const RigPhotoCamera& camera = photos.cameras[c];
     const auto given = options.given.find(camera.name);
@@ -47,16 +53,54 @@ std::vector<calib::RigCameraInput> InputsOf(const calib::Board& board, const Rig
       choose.threads = options.threads;
       choose.seed = options.seed;
       try {
-        const auto choice = calib::ChooseModel(board, ViewsOf(photos, c), camera.width_px,
-                                               camera.height_px, choose);
+        auto choice = calib::ChooseModel(board, ViewsOf(photos, c), camera.width_px,
+                                         camera.height_px, choose);
         model = choice.scores[choice.chosen].model;
+        all.scores[c] = std::move(choice.scores);
       } catch (const Error& error) {
         throw Error(fmt::format("camera {}: {}", camera.name, error.what()));
       }
     }
     inputs.push_back({camera.name, model, camera.width_px, camera.height_px, {}});
   }
-  return inputs;
+  return all;
+}
+
+// A model that a camera's own views held, and whose distortion turns back when all cameras are
+// solved together, gives way to the best with fewer coefficients; false where there is none.
+bool TakeSimplerModel(size_t camera, Inputs& inputs, RigSummary& summary) {
+  calib::RigCameraInput& input = inputs.cameras[camera];
+  const calib::ModelScore* simpler = nullptr;
+  for (const calib::ModelScore& score : inputs.scores[camera]) {
+    if (!score.refused.empty() || score.coefficients >= calib::FreeParameterCount(input.model)) {
+      continue;
+    }
+    if (simpler == nullptr || score.held_out_rms_px < simpler->held_out_rms_px) simpler = &score;
+  }
+  if (simpler == nullptr) return false;
+  summary.simpler.push_back(
+      fmt::format("{}: {}, for in the rig {} turns back before the corner of the image", input.name,
+                  NameOf(simpler->model), NameOf(input.model)));
+  input.model = simpler->model;
+  return true;
+}
+
+calib::FreeRunning Solve(const calib::Board& board, const RigPhotos& photos, Inputs& inputs,
+                         bool free_running, const calib::RigOptions& options, RigSummary& summary) {
+  while (true) {
+    try {
+      if (free_running) {
+        return calib::SolveFreeRunning(board, inputs.cameras, photos.views, photos.frames.size(),
+                                       options);
+      }
+      calib::FreeRunning solved;
+      solved.solution =
+          calib::SolveRig(board, inputs.cameras, photos.views, photos.frames.size(), options);
+      return solved;
+    } catch (const calib::LensTurnsBack& turned) {
+      if (!TakeSimplerModel(turned.camera(), inputs, summary)) throw;
+    }
+  }
 }
 
 void RequireGiven(const RigPhotos& photos, const RigCalibrationOptions& options) {
@@ -86,14 +130,10 @@ calib::Calibration CalibrateRig(const calib::Board& board, const RigPhotos& phot
   calib::RigOptions rig_options;
   rig_options.solve = options.solve;
   rig_options.free_lenses = !options.fixed_lenses && options.given.empty();
-  const auto inputs = InputsOf(board, photos, options);
-  calib::FreeRunning solved;
-  if (options.free_running) {
-    solved =
-        calib::SolveFreeRunning(board, inputs, photos.views, photos.frames.size(), rig_options);
-  } else {
-    solved.solution =
-        calib::SolveRig(board, inputs, photos.views, photos.frames.size(), rig_options);
+  Inputs inputs = InputsOf(board, photos, options);
+  const calib::FreeRunning solved =
+      Solve(board, photos, inputs, options.free_running, rig_options, *summary);
+  if (!options.free_running) {
     summary->delays = calib::DelaysOf(board, solved.solution);
   }
   const calib::RigSolution& solution = solved.solution;
@@ -139,29 +179,8 @@ calib::Calibration CalibrateRig(const calib::Board& board, const RigPhotos& phot
   return calibration;
 }
 
-namespace {
-
-// COLMAP's models of one focal length, as the ones of two that say the same.
-calib::LensCamera WithTwoFocalLengths(calib::LensCamera camera) {
-  using calib::LensModel;
-  static const std::map<LensModel, LensModel> kWider{
-      {LensModel::kSimplePinhole, LensModel::kPinhole},
-      {LensModel::kSimpleRadial, LensModel::kOpenCv},
-      {LensModel::kRadial, LensModel::kOpenCv},
-      {LensModel::kSimpleRadialFisheye, LensModel::kOpenCvFisheye},
-      {LensModel::kRadialFisheye, LensModel::kOpenCvFisheye}};
-  const auto wider = kWider.find(camera.model);
-  if (wider == kWider.end()) return camera;
-  camera.model = wider->second;
-  camera.params.insert(camera.params.begin(), camera.params.front());
-  camera.params.resize(static_cast<size_t>(calib::ParameterCount(camera.model)), 0);
-  return camera;
-}
-
-}  // namespace
-
 calib::RigCameraInput GivenLens(const calib::LensCamera& given, const std::string& where) {
-  const calib::LensCamera camera = WithTwoFocalLengths(given);
+  const calib::LensCamera camera = calib::WithTwoFocalLengths(given);
   calib::RigCameraInput input;
   for (const calib::BoardModel model : calib::kBoardModels) {
     // The first model, so the one with the fewest coefficients, that says the same.

@@ -4,7 +4,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -21,6 +20,7 @@
 #include "dtr/io/pruned.h"
 #include "dtr/io/run_record.h"
 #include "dtr/io/set_io.h"
+#include "dtr/render/option_arguments.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -193,19 +193,12 @@ void CarryStoredOptions(double scale, DtrSet& set) {
   const std::string text = io::PrunedJson(set);
   if (text.empty()) return;
   Json pruned = Json::parse(text);
-  std::vector<std::string> arguments = io::RenderArguments(set);
-  for (size_t i = 0; i + 1 < arguments.size(); ++i) {
-    if (arguments[i] != "--absolute-delta" && arguments[i] != "--absolute-depth-break") continue;
-    double value = 0;
-    const std::string& number = arguments[i + 1];
-    const auto [end, failure] =
-        std::from_chars(number.data(), number.data() + number.size(), value);
-    if (failure != std::errc() || end != number.data() + number.size()) {
-      throw Error(fmt::format("set.json: pruned.render_arguments: {}: expected a number, found {}",
-                              arguments[i], number));
-    }
-    arguments[i + 1] = fmt::format("{}", scale * value);
+  RenderOptions stored =
+      WithArguments({}, io::RenderArguments(set), "set.json: pruned.render_arguments");
+  for (std::optional<double>* length : {&stored.absolute_delta, &stored.absolute_depth_break}) {
+    if (*length) **length *= scale;
   }
+  const std::vector<std::string> arguments = RenderOptionArguments(stored);
   if (pruned.contains("render_arguments")) pruned["render_arguments"] = arguments;
   io::SetPrunedJson(set, pruned.dump());
 }

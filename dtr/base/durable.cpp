@@ -106,11 +106,16 @@ void RemoveFolder(const fs::path& folder, const std::string& last) {
   fs::remove_all(folder);
 }
 
+bool IsEmptyFolder(const fs::path& folder) {
+  return fs::is_directory(folder) && fs::is_empty(folder);
+}
+
 std::optional<FileLock> FileLock::Try(const fs::path& file) {
   const int fd = open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
   if (fd < 0) Fail(file, "cannot be opened", std::strerror(errno));
   FileLock lock(fd);
   if (flock(fd, LOCK_EX | LOCK_NB) == 0) return lock;
+  if (errno != EWOULDBLOCK) Fail(file, "cannot be locked", std::strerror(errno));
   return std::nullopt;
 }
 

@@ -35,11 +35,14 @@ void RemoveTemporaryFiles(const std::filesystem::path& folder);
 /// there, it says whose it is. Throws std::filesystem::filesystem_error.
 void RemoveFolder(const std::filesystem::path& folder, const std::string& last);
 
+/// True for a folder in which nothing is; false for anything else and for nothing.
+bool IsEmptyFolder(const std::filesystem::path& folder);
+
 /// Held by one process at a time; the system releases it when the process ends, however it ends.
 class FileLock {
  public:
   /// Empty when another process has the lock. Makes the file where there is none; throws Error
-  /// where it cannot be opened.
+  /// where it cannot be opened, or where the file system has no locks.
   static std::optional<FileLock> Try(const std::filesystem::path& file);
   ~FileLock();
   FileLock(FileLock&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}

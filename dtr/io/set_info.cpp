@@ -88,7 +88,7 @@ std::string VerdictLine(const DtrSet& set) {
 
 std::string VerdictWarning(const DtrSet& set) {
   const std::string line = VerdictLine(set);
-  return line.starts_with("FAILED") ? "WARNING: calibration " + line : "";
+  return line.starts_with("FAILED") ? "WARNING: validation " + line : "";
 }
 
 namespace {

@@ -134,18 +134,18 @@ struct SetWriter::State {
 void SetWriter::State::Recover() const {
   RecoverWork();
   if (!fs::exists(aside / kSetFile)) return;
-  if (fs::exists(target)) {
-    fs::remove_all(aside);
-  } else {
+  if (fs::exists(target / kSetFile)) {
+    RemoveFolder(aside, kSetFile);  // what it is known by goes last
+  } else if (!fs::exists(target) || IsEmptyFolder(target)) {
     Rename(aside, target);
-  }
+  }  // what is no set took its place: both stay
 }
 
 // A set that was cut off on its way into place has its checkpoints beside it: they go back to one
 // that is not there yet, and are of no more use to one that is.
 void SetWriter::State::RecoverWork() const {
   const bool ours = fs::exists(done_work / kLockName);
-  if (!ours && !(fs::is_directory(done_work) && fs::is_empty(done_work))) return;
+  if (!ours && !IsEmptyFolder(done_work)) return;
   const std::optional<FileLock> nobody_at_work = Lock(done_work / kLockName);
   if (fs::exists(partial) && !fs::exists(partial / kWork)) {
     Rename(done_work, partial / kWork);
@@ -160,10 +160,14 @@ void SetWriter::State::ExpectReplaceable() const {
     throw UsageError(target.string() + ": expected no such folder yet, found one; " +
                      "choose another name or pass --force to replace it");
   }
-  const bool empty_folder = fs::is_directory(target) && fs::is_empty(target);
-  if (!empty_folder && !fs::is_regular_file(target / kSetFile)) {
+  if (!IsEmptyFolder(target) && !fs::is_regular_file(target / kSetFile)) {
     throw UsageError(target.string() + ": expected a D+TR set to replace, found something else; " +
                      "it is left alone");
+  }
+  // At the end of the work the old set would find no room.
+  if (fs::exists(fs::symlink_status(aside)) && !IsEmptyFolder(aside)) {
+    throw UsageError(aside.string() + ": expected nothing, for " + target.string() +
+                     " to make room for the new set; move it away");
   }
 }
 
@@ -405,7 +409,7 @@ void SetWriter::State::MoveIntoPlace() {
   finished = true;
   try {
     RemoveFolder(done_work, kLockName);
-    if (replace) fs::remove_all(aside);
+    if (replace) RemoveFolder(aside, kSetFile);
   } catch (const fs::filesystem_error& error) {
     throw Error(target.string() + ": finished, but what it no longer needs cannot be deleted: " +
                 error.code().message());

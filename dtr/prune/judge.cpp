@@ -112,16 +112,18 @@ std::vector<Place> NovelPlaces(std::vector<NovelCamera> cameras) {
 
 std::vector<ImageRgb8> Pictures(const DtrSet& set, std::span<const std::string> without,
                                 std::span<const Place> places, const RenderOptions& options,
-                                const eval::RenderFunction& render) {
+                                const eval::RenderFunction& render, std::vector<Mask>* coverage) {
   RenderOptions filled = options;
   filled.fill_holes = true;
+  if (coverage != nullptr) coverage->clear();
   std::vector<ImageRgb8> pictures;
   for (const Place& place : places) {
     std::vector<std::string> excluded(without.begin(), without.end());
     excluded.insert(excluded.end(), place.left_out.begin(), place.left_out.end());
-    pictures.push_back(render(MakeRenderScene(set, excluded), place.novel.camera,
-                              place.novel.cam_from_world, filled)
-                           .image);
+    RenderResult drawn = render(MakeRenderScene(set, excluded), place.novel.camera,
+                                place.novel.cam_from_world, filled);
+    pictures.push_back(std::move(drawn.image));
+    if (coverage != nullptr) coverage->push_back(std::move(drawn.coverage));
   }
   return pictures;
 }
@@ -168,12 +170,12 @@ double StandardError(std::span<const double> values) {
   return std::sqrt(squared / (count - 1) / count);
 }
 
-std::vector<double> LossesDb(std::span<const ImageRgb8> before, std::span<const ImageRgb8> after,
-                             const Errors& where_photos_are) {
+std::vector<double> LossesDb(std::span<const Place> places, std::span<const ImageRgb8> before,
+                             std::span<const ImageRgb8> after, const Errors& where_photos_are) {
   const double share = where_photos_are.NewErrorShare() / where_photos_are.before;
   std::vector<double> losses_db;
-  for (size_t i = 0; i < before.size(); ++i) {
-    const double difference = MeanOf(eval::CompareSquared(before[i], after[i], {}));
+  for (size_t i = 0; i < places.size(); ++i) {
+    const double difference = MeanOf(eval::CompareSquared(before[i], after[i], places[i].mask));
     losses_db.push_back(10 * std::log10(1 + share * difference));
   }
   return losses_db;

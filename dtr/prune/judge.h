@@ -18,7 +18,7 @@ using RendererMaker = std::function<eval::RenderFunction()>;
 struct Place {
   NovelCamera novel;
   ImageRgb8 photo;  ///< of the camera's size; empty: nobody has been there
-  Mask mask;        ///< what of the photo is usable
+  Mask mask;        ///< what counts of pictures from here; empty: all
   /// Ids of the source views whose place it is (one, and its copies); a picture from here goes
   /// without them.
   std::vector<std::string> left_out;
@@ -40,12 +40,13 @@ std::vector<NovelCamera> Windows(std::vector<NovelCamera> cameras, int crop);
 std::vector<Place> NovelPlaces(std::vector<NovelCamera> cameras);
 
 /// Pictures from the places, holes filled, without the source views in `without` and each place's
-/// own.
+/// own; `coverage`, unless null, becomes what of each some view saw.
 std::vector<ImageRgb8> Pictures(const DtrSet& set, std::span<const std::string> without,
                                 std::span<const Place> places, const RenderOptions& options,
-                                const eval::RenderFunction& render);
+                                const eval::RenderFunction& render,
+                                std::vector<Mask>* coverage = nullptr);
 
-/// Mean squared differences of 8-bit values over all usable pixels of all places with photos.
+/// Mean squared differences of 8-bit values over all pixels that count at places with photos.
 struct Errors {
   double before = 0, after = 0;   ///< of pictures against photos
   double change = 0;              ///< of pictures after against those before
@@ -64,8 +65,8 @@ Errors CompareWithPhotos(std::span<const Place> places, std::span<const ImageRgb
 
 /// What a change means from places that have no photo, in dB for each: 10 log10(1 + share D / E), D
 /// the mean squared difference of a picture after and before, E and share from where photos are.
-std::vector<double> LossesDb(std::span<const ImageRgb8> before, std::span<const ImageRgb8> after,
-                             const Errors& where_photos_are);
+std::vector<double> LossesDb(std::span<const Place> places, std::span<const ImageRgb8> before,
+                             std::span<const ImageRgb8> after, const Errors& where_photos_are);
 double MeanOf(std::span<const double> values);  ///< 0 for none
 
 }  // namespace dtr::prune

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dtr/eval/metrics.h"
 #include "dtr/prune/probes.h"
 
 namespace dtr::prune {
@@ -10,6 +11,14 @@ namespace {
 
 // Novel cameras that decide are others than those that check.
 constexpr std::uint64_t kOtherCameras = 0x9e3779b97f4a7c15u;
+
+/// What no view of the whole set sees is guessed before and after, and guesses turn on trifles: it
+/// says nothing of what is lost. From places that see nothing all counts.
+void CountSeen(const Mask& coverage, Place& place) {
+  const Mask seen = eval::Intersect(coverage, place.mask);
+  const auto& pixels = seen.data();
+  if (std::any_of(pixels.begin(), pixels.end(), [](auto p) { return p != 0; })) place.mask = seen;
+}
 
 }  // namespace
 
@@ -91,15 +100,19 @@ void Measurer::Prepare() {
   checking_.places = NovelPlaces(DrawProbes(set_, options_.checks, options_.seed));
   witnesses_.places = WitnessPlaces(set, deciding_.places, options_.checks);
   photos_.places = HeldOutPlaces(set);
+  photos_whole_ = photos_.places;
   for (Looks* looks : {&deciding_, &deciding_novel_, &checking_, &witnesses_, &photos_}) {
-    looks->before = PicturesOf(whole, coded, *looks);
+    std::vector<Mask> coverage;
+    looks->before = PicturesOf(whole, coded, *looks, &coverage);
+    for (size_t i = 0; i < coverage.size(); ++i) CountSeen(coverage[i], looks->places[i]);
   }
 }
 
 std::vector<ImageRgb8> Measurer::PicturesOf(const Setting& setting, const Coded& coded,
-                                            const Looks& looks) {
+                                            const Looks& looks, std::vector<Mask>* coverage) {
   progress_.ThrowIfInterrupted();
-  return Pictures(coded->set, setting.without, looks.places, setting.render, RendererFor(coded));
+  return Pictures(coded->set, setting.without, looks.places, setting.render, RendererFor(coded),
+                  coverage);
 }
 
 /// PSNR loss, and the mean squares before, after and of the change.
@@ -118,7 +131,8 @@ Errors Measurer::AtPhotos(const std::string& what, const Looks& looks, Setting s
 
 std::vector<double> Measurer::NovelLossesDb(const Looks& looks, const Setting& setting,
                                             const Errors& at_photos) {
-  return LossesDb(looks.before, PicturesOf(setting, CodedAs(setting.coding), looks), at_photos);
+  return LossesDb(looks.places, looks.before, PicturesOf(setting, CodedAs(setting.coding), looks),
+                  at_photos);
 }
 
 Measured Measurer::Measure(const Setting& setting) {
@@ -141,16 +155,20 @@ Check Measurer::CheckOf(const Setting& setting) {
     // Held-out photos are looked at and heeded in nothing: the set would be chosen by what it is
     // measured with.
     if (!photos_.places.empty()) {
-      found.push_back(CompareWithPhotos(photos_.places, photos_.before,
-                                        PicturesOf(setting, CodedAs(setting.coding), photos_))
-                          .psnr_loss_db);
+      const auto after = PicturesOf(setting, CodedAs(setting.coding), photos_);
+      for (const auto& places : {photos_.places, photos_whole_}) {
+        found.push_back(CompareWithPhotos(places, photos_.before, after).psnr_loss_db);
+      }
     }
     return found;
   });
   Check check{numbers[0],          numbers[1],
               errors.psnr_loss_db, errors.psnr_loss_error_db,
               std::nullopt,        10 * std::log10(255 * 255 / errors.before)};
-  if (numbers.size() > 2) check.photo_loss_db = numbers[2];
+  if (numbers.size() > 3) {
+    check.photo_loss_db = numbers[2];
+    check.photo_frame_loss_db = numbers[3];
+  }
   return check;
 }
 

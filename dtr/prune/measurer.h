@@ -30,7 +30,7 @@ struct Measured {
 struct Check {
   double probe_loss_db = 0, probe_error_db = 0;  ///< mean over places, and its standard error
   double witness_loss_db = 0, witness_error_db = 0;
-  std::optional<double> photo_loss_db;
+  std::optional<double> photo_loss_db, photo_frame_loss_db;
   double error_db = 0;  ///< PSNR of the witnesses' pictures before
   /// Few places can be lucky: a loss is taken for as large as it may well be elsewhere, two
   /// standard errors above the mean.
@@ -88,7 +88,8 @@ class Measurer {
                                     const Errors& at_photos);
   /// Pictures of the whole set, once they are needed.
   void Prepare();
-  std::vector<ImageRgb8> PicturesOf(const Setting& setting, const Coded& coded, const Looks& looks);
+  std::vector<ImageRgb8> PicturesOf(const Setting& setting, const Coded& coded, const Looks& looks,
+                                    std::vector<Mask>* coverage = nullptr);
 
   const DtrSet& set_;
   const MeasurerOptions options_;
@@ -101,6 +102,7 @@ class Measurer {
   bool prepared_ = false;
   int found_ = 0;
   Looks deciding_, deciding_novel_, checking_, witnesses_, photos_;
+  std::vector<Place> photos_whole_;  ///< the held-out photos with all of their pixels
   Coded current_, trial_, drawn_;
   Coding current_coding_, trial_coding_;
   eval::RenderFunction render_;

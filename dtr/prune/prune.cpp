@@ -261,6 +261,7 @@ class Pruner {
     report_.witness_loss_db = accepted.witness_loss_db;
     report_.witness_error_db = accepted.witness_error_db;
     report_.photo_loss_db = accepted.photo_loss_db;
+    report_.photo_frame_loss_db = accepted.photo_frame_loss_db;
     report_.error_db = accepted.error_db;
     return report_;
   }

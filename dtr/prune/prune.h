@@ -47,8 +47,9 @@ struct PruneReport {
   double checked_probe_loss_db = 0, probe_error_db = 0;
   /// Mean over photos of source views that did not decide (of all, where all decide).
   double witness_loss_db = 0, witness_error_db = 0;
-  /// Mean over held-out photos, which decide nothing; none: there are none.
-  std::optional<double> photo_loss_db;
+  /// Mean over held-out photos, which decide nothing, of what some view sees, and of whole frames;
+  /// none: there are none.
+  std::optional<double> photo_loss_db, photo_frame_loss_db;
   double error_db = 0;  ///< PSNR against photos before, to which a loss is relative
   /// The larger of the two checked losses. With two standard errors it does not exceed max_loss_db.
   double loss_db() const { return std::max(checked_probe_loss_db, witness_loss_db); }

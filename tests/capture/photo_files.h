@@ -1,7 +1,5 @@
 // tests/capture/photo_files.h -- small photo files for tests.
 #pragma once
-#include <gtest/gtest.h>
-
 #include <filesystem>
 #include <string>
 
@@ -9,6 +7,7 @@
 #include "dtr/base/random.h"
 #include "dtr/io/image_io.h"
 #include "dtr/types/grid.h"
+#include "tests/support/message_of.h"
 
 namespace dtr::capture::testing {
 
@@ -49,16 +48,6 @@ inline void AddExifOrientation(const std::filesystem::path& jpeg, int orientatio
   WriteFileAtomically(jpeg, content);
 }
 
-/// The message of the Error that `action` throws; fails the test when it throws none.
-template <typename Exception, typename Action>
-std::string MessageOf(const Action& action) {
-  try {
-    action();
-  } catch (const Exception& e) {
-    return e.what();
-  }
-  ADD_FAILURE() << "no error was thrown";
-  return "";
-}
+using dtr::testing::MessageOf;
 
 }  // namespace dtr::capture::testing

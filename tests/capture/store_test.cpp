@@ -198,6 +198,20 @@ TEST(WriteCapture, AReplacementCutOffHalfWayGivesTheOldCaptureBack) {
   fs::copy(folder / "out", folder / "out.replaced", fs::copy_options::recursive);
   { EXPECT_THROW(CaptureWriter(folder / "out", {}), UsageError); }
   EXPECT_TRUE(fs::exists(folder / "out.replaced/capture.json"));
+  EXPECT_THAT(MessageOf<UsageError>([&] { CaptureWriter(folder / "out", {.replace = true}); }),
+              HasSubstr("out.replaced: expected nothing"));
+  // An empty folder in its place is no capture; the old one comes back. Another one stays, both do.
+  mark("out.replaced");
+  fs::remove_all(folder / "out");
+  fs::create_directories(folder / "out");
+  { EXPECT_THROW(CaptureWriter(folder / "out", {}), UsageError); }
+  EXPECT_EQ(ReadFile(folder / "out/capture.json", kFileLimit), list);
+  mark("out");
+  fs::rename(folder / "out", folder / "out.replaced");
+  fs::create_directories(folder / "out/thesis");
+  { EXPECT_THROW(CaptureWriter(folder / "out", {.replace = true}), UsageError); }
+  EXPECT_TRUE(fs::exists(folder / "out.replaced/capture.json"));
+  EXPECT_TRUE(fs::exists(folder / "out/thesis"));
 }
 
 TEST(ReadCapture, NestingThatWouldFillTheStackIsRefused) {

@@ -78,14 +78,21 @@ TEST_F(DepthSettings, NormalsAreUnitVectorsTurnedToTheCamera) {
   ASSERT_TRUE(file);
   std::vector<float> n(3 * static_cast<size_t>(kCourtyardWidthPx * kCourtyardHeightPx));
   ASSERT_TRUE(file->read_image(0, 0, 0, 3, OIIO::TypeDesc::FLOAT, n.data()));
-  int known = 0;
+  const Json camera = Json::parse(Text(set / "set.json"))["frames"][0]["views"][2]["camera"];
+  const double lens[] = {camera["fx_px"], camera["fy_px"], camera["cx_px"], camera["cy_px"]};
+  int known = 0, turned = 0;
   for (size_t i = 0; i < n.size(); i += 3) {
     const float length = std::hypot(n[i], n[i + 1], n[i + 2]);
     if (length == 0) continue;
     ++known;
     EXPECT_NEAR(length, 1, 1e-5);
+    const auto pixel = static_cast<double>(i / 3);
+    const double x = std::fmod(pixel, kCourtyardWidthPx) + 0.5;
+    const double y = std::floor(pixel / kCourtyardWidthPx) + 0.5;
+    turned += n[i] * (x - lens[2]) / lens[0] + n[i + 1] * (y - lens[3]) / lens[1] + n[i + 2] < 0;
   }
   EXPECT_GT(known, 0.5 * kCourtyardWidthPx * kCourtyardHeightPx);
+  EXPECT_EQ(turned, known);
   ExpectRefused(Dtr({"stereo", Cameras().string(), "-o", (folder_ / "no.dtr").string(), "--engine",
                      "sgbm", "--normals", folder.string()}),
                 kWrongUsage, "--normals: expected --engine patchmatch");

@@ -17,6 +17,7 @@
 #include "dtr/io/depth_io.h"
 #include "dtr/io/set_io.h"
 #include "tests/io/small_set.h"
+#include "tests/support/message_of.h"
 #include "tests/support/test_data.h"
 
 namespace dtr::io {
@@ -25,6 +26,7 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using testing::MessageOf;
 using testing::TemporaryFolder;
 using namespace testing_support;
 
@@ -194,6 +196,21 @@ TEST(SetWriter, AReplacementCutOffHalfWayGivesTheOldSetBack) {
   EXPECT_THROW(SetWriter(folder / "small.dtr", kFingerprint, false), UsageError);
   EXPECT_THAT(VerifySet(folder / "small.dtr"), IsEmpty());
   EXPECT_FALSE(fs::exists(folder / "small.dtr.replaced"));
+  // An empty folder in its place is no set.
+  fs::rename(folder / "small.dtr", folder / "small.dtr.replaced");
+  fs::create_directories(folder / "small.dtr");
+  EXPECT_THROW(SetWriter(folder / "small.dtr", kFingerprint, false), UsageError);
+  EXPECT_THAT(VerifySet(folder / "small.dtr"), IsEmpty());
+}
+
+TEST(SetWriter, WhatLiesWhereTheOldSetMustGoIsRefusedBeforeAnyWork) {
+  const TemporaryFolder folder;
+  WriteSmallSet(folder / "small.dtr");
+  fs::create_directories(folder / "small.dtr.replaced/thesis");
+  EXPECT_THAT(MessageOf<UsageError>([&] { SetWriter(folder / "small.dtr", kFingerprint, true); }),
+              HasSubstr("small.dtr.replaced: expected nothing"));
+  EXPECT_TRUE(fs::exists(folder / "small.dtr.replaced/thesis"));
+  EXPECT_THAT(VerifySet(folder / "small.dtr"), IsEmpty());
 }
 
 TEST(SetWriter, KilledAsTheSetComesIntoPlaceLeavesNoWorkInIt) {

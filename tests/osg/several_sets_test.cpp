@@ -78,6 +78,7 @@ TEST_F(SeveralSets, ASetThatIsGoneTakesItsPartAway) {
   nodes_[1] = nullptr;
   handlers_[1] = new KeyHandler(nodes_[0].get());
   EXPECT_TRUE(Press('r'));
+  EXPECT_EQ(nodes_[0]->getRenderOptions().resolution, 2) << "two handlers of a node act once";
   for (int i = 0; i < 5; ++i) EXPECT_TRUE(Press('n'));
   EXPECT_EQ(Current(0), 0);
 }

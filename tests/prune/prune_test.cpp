@@ -142,8 +142,9 @@ TEST(Errors, TellNewErrorFromOneThatTakesAnothersPlace) {
   EXPECT_EQ(worse.NewErrorShare(), 27.0 / 9);
   // From a place without a photo: a difference of 9, three times that is new error, on top of 9.
   const std::vector<ImageRgb8> a = {before[0], before[0]}, b = {before[0], ImageRgb8(4, 4, 3, 106)};
-  EXPECT_EQ(MeanOf(LossesDb(a, a, worse)), 0);
-  const std::vector<double> losses_db = LossesDb(a, b, worse);
+  const std::vector<Place> novel(2);
+  EXPECT_EQ(MeanOf(LossesDb(novel, a, a, worse)), 0);
+  const std::vector<double> losses_db = LossesDb(novel, a, b, worse);
   EXPECT_NEAR(MeanOf(losses_db), 0.5 * 10 * std::log10(4.0), 1e-12);
   // Two values x and 0 have the standard deviation x / sqrt(2), their mean x / 2.
   EXPECT_NEAR(StandardError(losses_db), 0.5 * 10 * std::log10(4.0), 1e-12);

@@ -15,6 +15,7 @@ struct SeenPlane {
   PlaneMap planes{Grid<float>(kWidth, kHeight), Grid<float>(kWidth, kHeight),
                   Grid<float>(kWidth, kHeight)};
   DepthImage depth{kWidth, kHeight};
+  Grid<float> sigma{kWidth, kHeight, 1, 0.002f};
 
   SeenPlane(const Eigen::Vector3d& n, double unit_z) {
     planes.unit_z = unit_z;
@@ -34,7 +35,7 @@ TEST(Normals, AreThePlanesTurnedToTheCameraInAnyUnit) {
   const Eigen::Vector3d n(0.05, -0.08, 0.25);
   for (const double unit_z : {1.0, 3.5, 1e4}) {
     const SeenPlane seen(n, unit_z);
-    const Grid<float> normals = NormalsOf(seen.planes, seen.depth, kCamera);
+    const Grid<float> normals = NormalsOf(seen.planes, seen.depth, seen.sigma, kCamera);
     for (int y = 0; y < kHeight; ++y) {
       for (int x = 0; x < kWidth; ++x) {
         const Eigen::Vector3d found(normals(x, y, 0), normals(x, y, 1), normals(x, y, 2));
@@ -47,15 +48,15 @@ TEST(Normals, AreThePlanesTurnedToTheCameraInAnyUnit) {
 TEST(Normals, AreLeftOutWhereTheDepthIsNotThePlanes) {
   SeenPlane seen({0, 0, 0.25}, 1);
   seen.depth(3, 4) = 0;
-  seen.depth(5, 6) *= 1.03f;
-  seen.depth(7, 8) *= 1.01f;
-  const Grid<float> normals = NormalsOf(seen.planes, seen.depth, kCamera);
+  seen.depth(5, 6) = 1 / (0.25f + 2.1f * 0.002f);
+  seen.depth(7, 8) = 1 / (0.25f + 1.9f * 0.002f);
+  const Grid<float> normals = NormalsOf(seen.planes, seen.depth, seen.sigma, kCamera);
   EXPECT_EQ(normals(3, 4, 2), 0);
   EXPECT_EQ(normals(5, 6, 2), 0);
   EXPECT_EQ(normals(7, 8, 2), -1);
-  const Grid<float> none = NormalsOf({}, seen.depth, kCamera);
+  const Grid<float> none = NormalsOf({}, seen.depth, seen.sigma, kCamera);
   EXPECT_EQ(none(9, 9, 2), 0);
-  EXPECT_THROW(NormalsOf(seen.planes, DepthImage(kWidth, kHeight - 1), kCamera),
+  EXPECT_THROW(NormalsOf(seen.planes, DepthImage(kWidth, kHeight - 1), seen.sigma, kCamera),
                std::invalid_argument);
 }
 

@@ -327,7 +327,7 @@ TEST_F(ViewerWindow, ASetWhoseCalibrationFailedItsTestsSaysSo) {
   set.verdict_json =
       R"({"passed":false,"tests":[{"name":"held_out_rms_px","passed":false,"value":9,"limit":1}]})";
   io::RewriteMetadata(copy, set);
-  const char* warning = "WARNING: calibration FAILED: held_out_rms_px";
+  const char* warning = "WARNING: validation FAILED: held_out_rms_px";
   {
     const Environment no_display("DISPLAY", "");
     EXPECT_THAT(Dtr({"view", copy.string()}).err, HasSubstr(warning));

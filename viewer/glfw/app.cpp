@@ -245,7 +245,7 @@ class App {
   void ReadNextInstant() {
     PictureOrder next = Order();
     next.instant = (next.instant + 1) % session_->clock().frames();
-    next.hidden.clear();
+    next.hidden = session_->HiddenAt(next.instant);
     session_->maker.ReadAhead(next);
   }
 

@@ -178,6 +178,7 @@ void InspectionOverlay::DrawCameras(const Controller& controller, const Inspecti
   ImDrawList& list = *ImGui::GetBackgroundDrawList();
   const NovelCamera& camera = controller.camera();
   const double length = kFrustumShare * controller.scene_size();
+  thumbnails_shown_ = 0;
   for (const View* view : controller.surroundings().cameras) {
     const Pose world_from_cam = view->cam_from_world.Inverse();
     const auto centre = Project(camera, world_from_cam.translation);
@@ -205,6 +206,7 @@ void InspectionOverlay::DrawCameras(const Controller& controller, const Inspecti
         thumbnail->second->Upload(*small);
       }
     }
+    thumbnails_shown_ += thumbnail != thumbnails_.end();
     if (all && thumbnail != thumbnails_.end()) {
       list.AddImageQuad(IdOf(*thumbnail->second), *corners[0], *corners[1], *corners[2],
                         *corners[3], {0, 0}, {1, 0}, {1, 1}, {0, 1}, IM_COL32(255, 255, 255, 200));

@@ -67,11 +67,12 @@ class InspectionOverlay {
                    PhotoShelf& photos);
   void DrawMarks(const Inspection& inspection, const NovelCamera& camera);
   void DrawMagnifier(const Inspection& inspection, const PictureTexture& picture);
-  int thumbnails() const { return static_cast<int>(thumbnails_.size()); }
+  int thumbnails() const { return thumbnails_shown_; }
   const View* photo_of() const { return photo_of_; }
 
  private:
   std::map<const View*, std::unique_ptr<PictureTexture>> thumbnails_;
+  int thumbnails_shown_ = 0;  ///< of this instant's cameras
   PictureTexture photo_;
   const View* photo_of_ = nullptr;
 };

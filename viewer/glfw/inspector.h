@@ -43,7 +43,10 @@ class Inspector {
   void Draw(const RenderOptions& options);
   /// True while photos are being read that are to be shown.
   bool reading() const { return photos_.reading(); }
-  void TryPhotosAgain() { photos_.ForgetRefusals(); }
+  /// Photos that could not be read, of views that `again` says yes to.
+  void TryPhotosAgain(const std::function<bool(const View&)>& again) {
+    photos_.ForgetRefusals(again);
+  }
   /// The view whose photo is beside the picture; null: none.
   const View* photo() const;
   /// Input cameras that are shown with their photo.

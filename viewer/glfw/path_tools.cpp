@@ -85,7 +85,8 @@ void PathTools::Tend() {
 fs::path PathTools::DropRecording() {
   const fs::path target = recording_->target();
   recording_.reset();
-  std::error_code ignored;
+  std::error_code ignored;  // its name was free when it was chosen; it may be finished by now
+  fs::remove(target, ignored);
   fs::remove(fs::path(target).replace_extension(".json"), ignored);
   return target;
 }

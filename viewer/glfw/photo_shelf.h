@@ -32,8 +32,11 @@ class PhotoShelf {
   const ImageRgb8* Whole(const View& view);
   /// Why a view's photo could not be read; null where it could, or was not tried.
   const std::string* RefusalOf(const View& view) const;
-  /// Views that could not be read are tried again when they are asked for.
-  void ForgetRefusals() { refusals_.clear(); }
+  /// Those of the views that could not be read and that `again` says yes to are tried again when
+  /// they are asked for.
+  void ForgetRefusals(const std::function<bool(const View&)>& again) {
+    std::erase_if(refusals_, [&](const auto& refused) { return again(*refused.first); });
+  }
   /// To be called every frame: takes over what was read and goes on.
   void Tend();
   /// True until all that was asked for is there or refused.

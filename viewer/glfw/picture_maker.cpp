@@ -73,8 +73,10 @@ void PictureMaker::MakeStill(const PictureOrder& order) {
 
 void PictureMaker::ReadAhead(const PictureOrder& order) {
   stream_.ShowFrame(order.instant);
+  stream_.Hide(order.hidden);
   stream_.Prefetch(order.camera.cam_from_world, order.options, PixelsFor(order));
   stream_.ShowFrame(picture_.instant);
+  stream_.Hide(hidden_);
 }
 
 RenderScene PictureMaker::SceneFor(const PictureOrder& order, const PinholeCamera& camera,
@@ -97,7 +99,8 @@ void PictureMaker::Make(const PictureOrder& order, int divisor, ViewStream::Wait
     wait = ViewStream::Wait::kForAll;
   }
   stream_.ShowFrame(order.instant);
-  stream_.Hide(order.hidden);
+  hidden_ = order.hidden;
+  stream_.Hide(hidden_);
   const Pose& pose = order.camera.cam_from_world;
   picture_.camera = {Smaller(order.camera.camera, divisor), pose};
   picture_.scene = SceneFor(order, picture_.camera.camera, wait);

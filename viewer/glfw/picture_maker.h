@@ -100,6 +100,7 @@ class PictureMaker {
   PictureTexture other_;
   std::optional<RenderResult> result_;
   HoleFiller filler_;
+  std::vector<const View*> hidden_;  ///< from the picture
   std::map<const View*, ImageRgb8> thumbnails_;
 };
 

@@ -71,17 +71,20 @@ void Session::ShowInstant(size_t instant) {
 }
 
 void Session::RetryLostViews() {
-  if (!host_.view_stamp || opened_->stream->lost().empty()) return;
-  const size_t tried = opened_->stream->RetryLost([this](const View& view) {
-    const std::string stamp = host_.view_stamp(view);
-    return !stamp.empty() && std::exchange(tried_stamps_[&view], stamp) != stamp;
-  });
-  if (tried == 0) return;
-  schedule.Renew();
-  inspector.TryPhotosAgain();
+  if (!host_.view_stamp) return;
+  const auto changed_since = [this](std::map<const View*, std::string>& tried) {
+    return [this, &tried](const View& view) {
+      const std::string stamp = host_.view_stamp(view);
+      return !stamp.empty() && std::exchange(tried[&view], stamp) != stamp;
+    };
+  };
+  inspector.TryPhotosAgain(changed_since(tried_photos_));
+  if (opened_->stream->lost().empty()) return;
+  if (opened_->stream->RetryLost(changed_since(tried_views_)) > 0) schedule.Renew();
 }
 
 const Grid<float>* Session::SigmaOfView(const View& view) {
+  if (const Grid<float>* known = sigmas_.Known(view)) return known;
   const MadePicture& picture = maker.picture();
   std::set<const View*> in_picture;
   for (const int index : picture.views_used) {
@@ -107,6 +110,15 @@ std::vector<std::string> Session::HiddenNames() const {
   std::vector<std::string> names = hidden_elsewhere_;
   for (const View* view : inspector.inspection().hidden) names.push_back(view->name);
   return names;
+}
+
+std::vector<const View*> Session::HiddenAt(size_t instant) const {
+  const std::vector<std::string> names = HiddenNames();
+  std::vector<const View*> hidden;
+  for (const View& view : opened_->set.frames.at(instant).views) {
+    if (std::find(names.begin(), names.end(), view.name) != names.end()) hidden.push_back(&view);
+  }
+  return hidden;
 }
 
 void Session::Describe(AppState& state) const {

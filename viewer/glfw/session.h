@@ -45,6 +45,8 @@ class Session {
   std::optional<double> DepthAt(const Eigen::Vector2d& pixel);
   /// Also of views that this instant lacks.
   std::vector<std::string> HiddenNames() const;
+  /// The views of that instant that are called so.
+  std::vector<const View*> HiddenAt(size_t instant) const;
   /// Writes down what of the window's state is the set's: camera, picture, inspection, instant.
   void Describe(AppState& state) const;
 
@@ -56,7 +58,7 @@ class Session {
   const std::unique_ptr<OpenedSet> opened_;
   const FrameClock clock_;
   size_t instant_ = 0;
-  std::map<const View*, std::string> tried_stamps_;  ///< of lost views' files
+  std::map<const View*, std::string> tried_views_, tried_photos_;  ///< stamps of lost ones' files
   SigmaShelf sigmas_;
   std::vector<std::string> hidden_elsewhere_;  ///< names that this instant lacks
 

@@ -113,23 +113,33 @@ class KeyHandler::Fellows : public osg::Object {
     std::erase_if(all_, [](const auto& one) { return !one.valid(); });
     if (std::find(all_.begin(), all_.end(), handler) == all_.end()) all_.emplace_back(handler);
   }
-  /// True once: several home positions would be that of the last.
-  bool TakeStart() { return !std::exchange(started_, true); }
+  /// True for the first of those that are there together: several home positions would be that of
+  /// the last.
+  bool TakeStart(KeyHandler* handler) {
+    if (started_by_.valid()) return false;
+    started_by_ = handler;
+    return true;
+  }
 
+  /// One handler of each node: two of one node would undo each other's keys.
   template <typename Do>
-  void ForEach(const Do& what) const {
+  void ForEachNode(const Do& what) const {
+    std::vector<osg::ref_ptr<DepthTR>> met;
     for (const auto& one : all_) {
-      if (osg::ref_ptr<KeyHandler> handler; one.lock(handler)) what(*handler);
+      osg::ref_ptr<KeyHandler> handler;
+      osg::ref_ptr<DepthTR> node;
+      if (!one.lock(handler) || !handler->node_.lock(node)) continue;
+      if (std::find(met.begin(), met.end(), node) != met.end()) continue;
+      met.push_back(node);
+      what(*handler, *node);
     }
   }
 
   /// The handler whose node has the next input view after this step; it is the node's current one.
   KeyHandler* Step(int step) {
     std::vector<KeyHandler*> with_views;
-    ForEach([&](KeyHandler& handler) {
-      osg::ref_ptr<DepthTR> node;
-      if (handler.node_.lock(node) && node->numberOfInputViews() > 0)
-        with_views.push_back(&handler);
+    ForEachNode([&](KeyHandler& handler, DepthTR& node) {
+      if (node.numberOfInputViews() > 0) with_views.push_back(&handler);
     });
     if (with_views.empty()) return nullptr;
     const size_t count = with_views.size();
@@ -149,7 +159,7 @@ class KeyHandler::Fellows : public osg::Object {
  private:
   std::vector<osg::observer_ptr<KeyHandler>> all_;
   size_t at_ = 0;
-  bool started_ = false;
+  osg::observer_ptr<KeyHandler> started_by_;
 };
 
 osg::ref_ptr<KeyHandler::Fellows> KeyHandler::FellowsOf(osgGA::GUIActionAdapter& viewer) {
@@ -194,7 +204,7 @@ bool KeyHandler::handle(const osgGA::GUIEventAdapter& event, osgGA::GUIActionAda
   const osg::ref_ptr<Fellows> fellows = FellowsOf(viewer);
   fellows->Join(this);
   if (type == osgGA::GUIEventAdapter::FRAME) {
-    if (std::exchange(starts_at_input_, false) && fellows->TakeStart()) {
+    if (std::exchange(starts_at_input_, false) && fellows->TakeStart(this)) {
       GoTo(node->nextView(), event, viewer);
     }
     return false;
@@ -209,7 +219,7 @@ bool KeyHandler::handle(const osgGA::GUIEventAdapter& event, osgGA::GUIActionAda
     return true;
   }
   bool handled = false;
-  fellows->ForEach([&](KeyHandler& handler) { handled |= handler.Act(key); });
+  fellows->ForEachNode([&](KeyHandler& handler, DepthTR&) { handled |= handler.Act(key); });
   if (handled) viewer.requestRedraw();
   return handled;
 }

@@ -18,9 +18,10 @@ namespace {
 constexpr double kCellPixels = 2;
 
 // OpenSceneGraph sets the far plane by the bound, and the near plane 1/2000 as far away: a pixel
-// that stereo put a thousand times too far would clip the foreground of everything. What so few
-// pixels say, at so many times the depth of the rest, is left out of the bound.
+// that stereo put a thousand times too far would clip the foreground of everything. Pixels without
+// company at so many times the depth of all but so few are left out of the bound.
 constexpr double kOutlierShare = 0.001, kOutlierFactor = 4;
+constexpr int kCompany = 4;  // of the eight around: a surface, however small
 
 /// Depth beyond which a view's pixels do not count for the bound.
 float FarthestDepth(const dtr::View& view) {
@@ -35,6 +36,16 @@ float FarthestDepth(const dtr::View& view) {
   return static_cast<float>(kOutlierFactor) * depths[static_cast<size_t>(rank)];
 }
 
+bool HasCompany(const dtr::DepthImage& depth, int x, int y, float farthest) {
+  int company = 0;
+  for (int v = std::max(0, y - 1); v <= std::min(depth.height() - 1, y + 1); ++v) {
+    for (int u = std::max(0, x - 1); u <= std::min(depth.width() - 1, x + 1); ++u) {
+      company += (u != x || v != y) && depth(u, v) > farthest;
+    }
+  }
+  return company >= kCompany;
+}
+
 osg::BoundingBox BoundsOf(const dtr::View& view) {
   osg::BoundingBox bounds;
   const float farthest = FarthestDepth(view);
@@ -44,7 +55,8 @@ osg::BoundingBox BoundsOf(const dtr::View& view) {
   for (int y = 0; y < view.depth.height(); ++y) {
     for (int x = 0; x < view.depth.width(); ++x) {
       const float z = view.depth(x, y);
-      if (dtr::DepthImage::IsHole(z) || z > farthest) continue;
+      if (dtr::DepthImage::IsHole(z)) continue;
+      if (z > farthest && !HasCompany(view.depth, x, y, farthest)) continue;
       const Eigen::Vector3d p =
           world_from_cam * (static_cast<double>(z) * camera.RayFromPixel({x + 0.5, y + 0.5}));
       const double reach = cell * z;

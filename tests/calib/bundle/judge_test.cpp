@@ -155,6 +155,19 @@ TEST(Judge, APhotoOfFewSightsLeavesTheHalvesToTheOthers) {
   EXPECT_THAT(test->reason, ::testing::HasSubstr(bundle.images[3].name));
 }
 
+TEST(Judge, APhotoOfFewSightsAmongManyPointsKeepsThemAll) {
+  Bundle bundle = MakeBundle({.images = 6, .points = 9000, .lens = kPinholeLens, .noise_px = 0.3});
+  int seen = 0;
+  std::erase_if(bundle.observations,
+                [&](const BundleObservation& o) { return o.image == 3 && ++seen > 40; });
+  const Judgement judgement = Judge(bundle, {});
+  // Of 4000 points drawn it would have 18 sights: too few for halves, and by chance for anything.
+  EXPECT_THAT(TestOf(judgement, "halves_ratio")->reason,
+              ::testing::Not(::testing::HasSubstr(bundle.images[3].name)));
+  EXPECT_EQ(judgement.cameras.size(), 6u);
+  EXPECT_TRUE(TestOf(judgement, "photos_not_judged")->passed);
+}
+
 TEST(Judge, MoreThanCanBeJudgedAtOnceIsJudgedInParts) {
   const SceneSpec spec{
       .images = 60, .points = 500, .lens = kPinholeLens, .noise_px = 0.3, .most_sights = 8};

@@ -39,6 +39,26 @@ TEST(Refine, FreesThePrincipalPointWhereItIsWrong) {
   EXPECT_NEAR(refined.model.cameras.at(1).params[1], 504, 2);
 }
 
+TEST(Refine, FreesAPrincipalPointThatAllSightsTellAndUnseenPointsDoNot) {
+  // Features are of any sharpness, most good, few bad: what one point says of another is dull.
+  Bundle bundle = MakeBundle(Noisy());
+  Random random(7);
+  for (BundleObservation& o : bundle.observations) {
+    const double noise_px = 2 * std::pow(random.Uniform(0, 1), 4);
+    const double x = random.Normal(), y = random.Normal();
+    o.pixel += noise_px * Eigen::Vector2d(x, y);
+  }
+  SfmModel model = ModelFrom(bundle);
+  model.cameras[1].params[1] += 6;
+  const Refined refined = Refine(model, {});
+  ASSERT_TRUE(refined.changed);
+  EXPECT_EQ(refined.lens, LensFreedom::kAll);
+  EXPECT_NEAR(refined.model.cameras.at(1).params[1], 504, 3);
+  ASSERT_EQ(refined.candidates[2].lens, LensFreedom::kAll);
+  EXPECT_GE(refined.candidates[2].high_px2, 0) << "unseen points would do";
+  EXPECT_GT(refined.candidates[2].principal_point_sigmas, 5);
+}
+
 TEST(Refine, TellsTheCovarianceOfEveryPoseAndLensWhereAsked) {
   SfmModel model = ModelFrom(MakeBundle(Noisy()));
   model.cameras[1].params[1] += 12;
