@@ -409,14 +409,15 @@ class Judging {
     // the limit the whole is within it.
     const double harmless = 2 * limits_.max_uncertainty_px;
     const bool small = p < limits_.min_p && most <= harmless;
-    Add(AtLeast(name, small ? 1 : p, limits_.min_p,
-                fmt::format("two halves, solved apart, differ by {:.3g} px at most, in 95 % of the "
-                            "image by {:.3g} px, predicted sigma {:.3g} px; {}",
-                            shift, most, predicted,
-                            small ? fmt::format("no chance (p = {:.2g}), but less than {} px: the "
-                                                "whole is within its limit",
-                                                p, harmless)
-                                  : std::string("this or more by chance"))));
+    Add(AtLeast(
+        name, small ? 1 : p, limits_.min_p,
+        fmt::format("two halves, solved apart, differ by {:.3g} px at most, in 95 % of the "
+                    "image by {:.3g} px, predicted sigma {:.3g} px; {}",
+                    shift, most, predicted,
+                    small ? fmt::format("no chance (p = {:.2g}), but less than {} px: the "
+                                        "whole is within its limit",
+                                        p, harmless)
+                          : std::string("told is the probability of this or more by chance"))));
   }
 
   void TestPatterns() {

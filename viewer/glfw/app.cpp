@@ -409,7 +409,9 @@ class App {
     const bool any =
         session_->schedule.has_picture() && !session_->maker.picture().views_used.empty();
     figures_.EndFrame(any, whole());
-    if (whole() && host_.state_changed) host_.state_changed(State());
+    // Told once what came of the last input shows: keys pressed at once are then taken again, of
+    // which a dialog that has just closed would keep those that come before ImGui's next frame.
+    if (whole() && settling_ <= 0 && host_.state_changed) host_.state_changed(State());
     if (quit_ || settling_ > 0 || CameraMoves() || !session_->schedule.MadeFor(Order())) return;
     if (!time_.playing()) moving_fps_ = 0;
     // A still picture is due soon, or when its views have been read; a video is nearly there; so
