@@ -12,6 +12,7 @@
 #include "calib/undistort.h"
 #include "capture/ingest.h"
 #include "capture/store.h"
+#include "capture/video/frames.h"
 #include "cli/pipeline/calibrated_photos.h"
 #include "cli/pipeline/depth_engine.h"
 #include "cli/pipeline/depth_stage.h"
@@ -24,6 +25,7 @@
 #include "cli/pipeline/set_page.h"
 #include "cli/pipeline/validate_set.h"
 #include "dtr/base/error.h"
+#include "dtr/base/hash.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/eval/json.h"
 #include "dtr/io/set_io.h"
@@ -73,6 +75,34 @@ Json PhotosJson(const capture::Capture& capture, const std::vector<bool>& with_h
   return photos;
 }
 
+// What a capture holds now, as its list only tells what its photos were made of.
+Json StoredHashes(const capture::Capture& capture) {
+  Json hashes = Json::array();
+  for (const capture::Photo& photo : capture.photos) {
+    hashes.push_back(Sha256OfFile(photo.file));
+    if (!photo.mask_file.empty()) hashes.push_back(Sha256OfFile(photo.mask_file));
+  }
+  return hashes;
+}
+
+// The sizes that photos for SfM have, or frames of the videos will.
+std::vector<std::pair<int, int>> SizesOf(const BuildOptions& options,
+                                         const capture::Capture& photos,
+                                         const std::vector<bool>& held_out) {
+  std::vector<std::pair<int, int>> sizes;
+  for (const std::filesystem::path& file : capture::VideosOf(options.photos)) {
+    capture::VideoReader video(file);
+    if (!video.Next()) continue;
+    const ImageRgb8 picture = video.Picture();
+    sizes.emplace_back(picture.width(), picture.height());
+  }
+  for (size_t i = 0; i < photos.photos.size(); ++i) {
+    if (options.holdout_strict && held_out[i]) continue;
+    sizes.emplace_back(photos.photos[i].width_px, photos.photos[i].height_px);
+  }
+  return sizes;
+}
+
 // What a video is known by before its frames are chosen: equal values give the same frames.
 Json VideoJson(const BuildOptions& options) {
   return {{"sha256", InputHash(options.photos)},
@@ -89,9 +119,12 @@ capture::Capture FramesOf(const BuildOptions& options, const std::filesystem::pa
   if (!std::filesystem::exists(kept / capture::kCaptureFile)) {
     capture::VideoOptions video = options.video;
     video.threads = options.threads;
+    video.memory_gb = options.depth.memory_gb.value_or(kDefaultMemoryGb);
     const capture::Capture frames = Ingest(
         options.photos, video, [&] { return fresh; }, progress);
-    capture::WriteCapture(frames, kept, {.replace = false, .threads = options.threads}, progress);
+    capture::WriteCapture(
+        frames, kept, {.replace = false, .threads = options.threads, .memory_gb = video.memory_gb},
+        progress);
     std::filesystem::remove_all(fresh);
   }
   return capture::ReadCapture(kept);
@@ -269,6 +302,14 @@ calib::ValidationReport Validate(DtrSet& set, const SparseScene& sparse, BuildRe
   return validation;
 }
 
+Json ScreeningJson(const BuildReport& report) {
+  Json json = Json::array();
+  for (const auto& [name, remarks] : report.screening) {
+    json.push_back({{"name", name}, {"remarks", remarks}});
+  }
+  return json;
+}
+
 Json ReportJson(const BuildReport& report, const RunLog& log, const std::filesystem::path& output) {
   Json json;
   json["set"] = output.string();
@@ -284,6 +325,7 @@ Json ReportJson(const BuildReport& report, const RunLog& log, const std::filesys
   for (const auto& [name, reason] : report.skipped) {
     json["skipped"].push_back({{"name", name}, {"reason", reason}});
   }
+  json["screening"] = ScreeningJson(report);
   json["validation_passed"] = report.validated ? Json(report.validation_passed) : Json(nullptr);
   json["stages"] = Json::array();
   for (const io::RunStage& stage : log.stages()) {
@@ -292,6 +334,16 @@ Json ReportJson(const BuildReport& report, const RunLog& log, const std::filesys
   }
   json["peak_memory_mib"] = static_cast<double>(PeakMemoryKib()) / 1024;
   return json;
+}
+
+// One line about what screening found, if it found anything.
+void SayRemarks(const BuildReport& report, size_t photos, Progress& progress) {
+  if (report.screening.empty()) return;
+  const auto& [name, remarks] = report.screening.front();
+  progress.Note(
+      fmt::format("screening: {} of {} photos have a remark and are kept, first {}: {}; "
+                  "dtr capture --drop leaves such photos out",
+                  report.screening.size(), photos, name, remarks.front()));
 }
 
 }  // namespace
@@ -304,6 +356,7 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
   RequireOptions(options);
   std::optional<SetRig> rig;
   if (!options.rig.empty()) rig = ReadSetRig(options.rig);
+  const double memory_gb = options.depth.memory_gb.value_or(kDefaultMemoryGb);
   BuildReport report;
   RunLog log;
 
@@ -320,7 +373,8 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
     TellPhotosTheirLens(*rig, photos);
   };
   if (!from_video) {
-    photos = capture::IngestPhotos(options.photos, {.threads = options.threads}, progress);
+    photos = capture::IngestPhotos(options.photos,
+                                   {.threads = options.threads, .memory_gb = memory_gb}, progress);
     look();
   }
   Json fingerprint = {
@@ -332,6 +386,14 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
       {"poses_sha256", InputHash(options.poses)},
       {"workspace_sha256", InputHash(options.depth.workspace)}};
   if (rig) fingerprint["rig_sha256"] = InputHash(options.rig);
+  if (std::filesystem::exists(options.photos / capture::kCaptureFile)) {
+    fingerprint["stored_sha256"] = StoredHashes(photos);
+  }
+  if (options.poses.empty()) {
+    // The one thing that --memory decides of the result.
+    const auto sizes = SizesOf(options, photos, held_out);
+    if (!sizes.empty()) fingerprint["feature_image_size_px"] = FeatureImageSizePx(sizes, memory_gb);
+  }
   io::SetWriter writer(options.output, fingerprint.dump(), options.force);
   if (!options.force_stage.empty()) ForgetStage(writer.folder(), options.force_stage);
   if (from_video) {
@@ -340,6 +402,11 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
   }
   for (const auto& skipped : photos.skipped)
     report.skipped.emplace_back(skipped.name, skipped.reason);
+  for (const capture::Photo& photo : photos.photos) {
+    if (!photo.screening || photo.screening->remarks.empty()) continue;
+    report.screening.emplace_back(photo.name, photo.screening->remarks);
+  }
+  SayRemarks(report, photos.photos.size(), progress);
   std::vector<bool> is_source = held_out;
   is_source.flip();
 
@@ -351,7 +418,7 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
                        options.holdout_strict,
                        options.threads,
                        options.seed,
-                       options.depth.memory_gb.value_or(kDefaultMemoryGb),
+                       memory_gb,
                        options.refine,
                        {},
                        rig},
@@ -382,7 +449,7 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
   log.Begin("finishing");
   FinishScene(set, SourcePoints(sparse, views), writer, options.threads);
   if (options.depth.depth_error_px) {
-    RecodeDepth(set, *options.depth.depth_error_px, writer, options.threads);
+    RecodeDepth(set, *options.depth.depth_error_px, writer, options.threads, memory_gb);
   }
   WriteMeshes(set, writer, options.threads);
   set.provenance_json = ProvenanceJson(options, OptionsJson(options, spent, max_size_px),
@@ -395,7 +462,9 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
                {options.output.stem().string(), options.depth.engine, validation.tests,
                 report.skipped, report.not_registered.size(), options.threads});
   log.End();
-  io::WriteRunRecord(writer.folder(), log.Record(ResolveThreads(options.threads)));
+  io::RunRecord record = log.Record(ResolveThreads(options.threads));
+  record.extra_json = Json{{"screening", ScreeningJson(report)}}.dump();
+  io::WriteRunRecord(writer.folder(), record);
   writer.Finish(set);
   report.set = std::move(set);
   report.json = ReportJson(report, log, options.output).dump(1);

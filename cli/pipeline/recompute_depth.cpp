@@ -97,7 +97,8 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& progre
   }
   FinishScene(set, {}, writer, options.threads);
   if (options.depth.depth_error_px) {
-    RecodeDepth(set, *options.depth.depth_error_px, writer, options.threads);
+    RecodeDepth(set, *options.depth.depth_error_px, writer, options.threads,
+                options.depth.memory_gb.value_or(kDefaultMemoryGb));
   }
   const DepthCount count = WriteMeshes(set, writer, options.threads);
   writer.WriteSparse(set, sparse);

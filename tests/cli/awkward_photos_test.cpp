@@ -3,6 +3,10 @@
 #include <nlohmann/json.hpp>
 
 #include "calib/colmap/model_io.h"
+#include "datasets/layout.h"
+#include "datasets/make.h"
+#include "datasets/render_truth.h"
+#include "datasets/scene.h"
 #include "dtr/io/set_io.h"
 #include "tests/cli/run_dtr.h"
 #include "tests/cli/small_courtyard.h"
@@ -115,6 +119,109 @@ TEST(AwkwardPhotos, GiveTheSetOfPlainOnes) {
     ExpectSameImage(plain[i], awkward[i], kKinds[i].apart);
     ExpectSameDepth(plain[i], awkward[i]);
   }
+}
+
+// Photos of one scene by a phone, a tablet and an old camera, held as it came.
+struct Shot {
+  const char* name;  ///< in byte order
+  int width_px, height_px;
+  double focal_35mm;
+  int orientation;  ///< EXIF's, of the stored pixels
+  bool grey;
+};
+constexpr Shot kShots[] = {
+    {"a/1.png", 192, 128, 28, 1, false}, {"a/2.tif", 128, 192, 28, 6, false},
+    {"a/3.tif", 192, 128, 28, 3, false}, {"a/4.tif", 128, 192, 28, 8, false},
+    {"a/5.png", 192, 128, 28, 1, true},  {"b/1.tif", 144, 144, 24, 2, false},
+    {"b/2.tif", 144, 144, 24, 4, false}, {"b/3.tif", 120, 180, 35, 5, false},
+    {"b/4.tif", 180, 120, 35, 7, false}, {"c/1.png", 96, 64, 28, 1, false},
+    {"c/2.png", 96, 64, 28, 1, true},    {"c/3.tif", 160, 240, 32, 8, false}};
+
+// The file that a camera held that way writes: turned upright by its tag it is `upright`.
+void WriteHeld(const fs::path& file, const ImageRgb8& upright, int orientation) {
+  const int back = orientation == 6 ? 8 : orientation == 8 ? 6 : orientation;
+  const ImageRgb8 stored = io::ApplyExifOrientation(upright, back);
+  OIIO::ImageSpec spec(stored.width(), stored.height(), 3, OIIO::TypeDesc::UINT8);
+  spec.attribute("Orientation", orientation);
+  WriteForeign<std::uint8_t>(file, spec, {stored.data().begin(), stored.data().end()});
+}
+
+// Of the depth of a view, and of the mean view: found, and of that right within 3 %.
+constexpr double kCompleteEach = 0.3, kRightEach = 0.7;
+constexpr double kCompleteMean = 0.5, kRightMean = 0.85;
+
+// How much of the depth that can be known is found, and how much of what is found is right.
+struct DepthFound {
+  double complete = 0, right = 0;
+};
+DepthFound Judged(const DepthImage& found, const DepthImage& truth) {
+  constexpr double kRight = 0.03;
+  int known = 0, both = 0, right = 0;
+  for (int y = 0; y < truth.height(); ++y) {
+    for (int x = 0; x < truth.width(); ++x) {
+      if (truth(x, y) <= 0) continue;
+      ++known;
+      if (found(x, y) <= 0) continue;
+      ++both;
+      right += std::abs(found(x, y) - truth(x, y)) < kRight * truth(x, y);
+    }
+  }
+  return {static_cast<double>(both) / known, static_cast<double>(right) / std::max(both, 1)};
+}
+
+TEST(AwkwardPhotos, OfEverySizeLensShapeAndOrientationMakeOneSet) {
+  const TemporaryFolder folder;
+  const fs::path photos = folder / "photos";
+  std::vector<CourtyardPhoto> shots;
+  std::vector<std::string> names;
+  const std::vector<Pose> poses = CourtyardArc(std::size(kShots));
+  for (const Shot& shot : kShots) {
+    shots.push_back({shot.name,
+                     datasets::MakeCamera(shot.width_px, shot.height_px, shot.focal_35mm),
+                     poses[shots.size()]});
+    names.emplace_back(shot.name);
+  }
+  RenderCourtyard(folder / "upright", shots);
+  for (const Shot& shot : kShots) {
+    const ImageRgb8 upright = io::ReadImage(folder / "upright" / shot.name);
+    fs::create_directories((photos / shot.name).parent_path());
+    if (shot.grey) {
+      WriteGrey(photos / shot.name, upright);
+    } else if (shot.orientation == 1) {
+      io::WriteImage(photos / shot.name, upright);
+    } else {
+      WriteHeld(photos / shot.name, upright, shot.orientation);
+    }
+  }
+  colmap::WriteModel(folder / "model", CourtyardModel(shots), colmap::Format::kBinary);
+  DtrOk(Build(photos, folder / "model", folder / "set.dtr"));
+  const std::vector<View> views = Views(folder / "set.dtr", names);
+  ASSERT_EQ(views.size(), names.size());
+  const datasets::Scene scene = datasets::MakeScene("courtyard", datasets::DatasetSpec{}.seed);
+  double complete = 0, right = 0;
+  for (size_t i = 0; i < views.size(); ++i) {
+    SCOPED_TRACE(kShots[i].name);
+    EXPECT_EQ(views[i].camera, shots[i].camera);
+    const ImageRgb8 upright = io::ReadImage(folder / "upright" / kShots[i].name);
+    ASSERT_EQ(views[i].image.width(), upright.width());
+    ASSERT_EQ(views[i].image.height(), upright.height());
+    for (int y = 0; y < upright.height(); ++y) {
+      for (int x = 0; x < upright.width(); ++x) {
+        for (int c = 0; c < 3; ++c) {
+          ASSERT_EQ(views[i].image(x, y, c), upright(x, y, kShots[i].grey ? 1 : c))
+              << x << " " << y;
+        }
+      }
+    }
+    const DepthFound found = Judged(
+        views[i].depth, datasets::RenderDepth(scene, shots[i].camera, shots[i].cam_from_scene));
+    EXPECT_GT(found.complete, kCompleteEach);
+    EXPECT_GT(found.right, kRightEach);
+    complete += found.complete / static_cast<double>(views.size());
+    right += found.right / static_cast<double>(views.size());
+  }
+  EXPECT_GT(complete, kCompleteMean);
+  EXPECT_GT(right, kRightMean);
 }
 
 }  // namespace
