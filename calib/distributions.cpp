@@ -93,4 +93,8 @@ double ChiSquaredLimit(double p, double freedom) {
   return 0.5 * (low + high);
 }
 
+double RootOfVariance(double variance) {
+  return std::isnan(variance) ? variance : std::sqrt(std::max(0.0, variance));
+}
+
 }  // namespace dtr::calib

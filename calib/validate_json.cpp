@@ -29,6 +29,10 @@ std::string ToJson(const ValidationReport& report) {
   json["untested"] = report.untested;
   json["kept_apart"] = report.kept_apart;
   if (!report.adjustment_json.empty()) json["adjustment"] = Json::parse(report.adjustment_json);
+  if (!report.cross_depth_json.empty()) {
+    json["cross_depth"] = Json::parse(report.cross_depth_json);
+    for (const char* told_above : {"passed", "tests"}) json["cross_depth"].erase(told_above);
+  }
   // Names come from files: bytes that are no UTF-8 must not make the whole report unreadable.
   return json.dump(2, ' ', false, Json::error_handler_t::replace);
 }

@@ -74,31 +74,54 @@ class Host {
   osgViewer::Viewer viewer_;
 };
 
+/// dtr/gl without a scene graph, as others use it and as the node does.
+struct Alone {
+  static gl::RendererSettings Packed() {
+    gl::RendererSettings settings;
+    settings.packed = true;
+    return settings;
+  }
+  gl::Renderer plain, packed{Packed()};
+};
+
+eval::FrameTime DrawAlone(gl::Renderer& renderer, const RenderScene& scene, const Host& host,
+                          const Pose& cam_from_world, const RenderOptions& options,
+                          int& views_used) {
+  const eval::StopWatch watch;
+  const gl::DrawnPicture picture = renderer.Draw(scene, host.camera(), cam_from_world, options);
+  gl::WaitForGpu();
+  const eval::FrameTime time = watch.Elapsed();
+  views_used = std::max(views_used, static_cast<int>(picture.views_used.size()));
+  return time;
+}
+
 OsgRow MeasureRow(const RenderOptions& options, const std::vector<NovelCamera>& path, Host& host,
-                  osgDTR::DepthTR& node, gl::Renderer& alone) {
+                  osgDTR::DepthTR& node, Alone& alone) {
   node.setDrawPath(osgDTR::DrawPath::kGpu);
   node.setRenderOptions(options);
   OsgRow row;
   row.options = options;
-  eval::FrameTimes on_osg, by_gl;
+  eval::FrameTimes on_osg, by_gl, by_packed_gl;
+  const RenderScene& scene = node.getScene()->scene;
   for (const bool counted : {false, true}) {
     for (const NovelCamera& novel : path) {
       const eval::FrameTime osg_time = host.Draw(novel.cam_from_world);
       host.MakeCurrent();
       gl::WaitForGpu();
-      const eval::StopWatch watch;
-      const gl::DrawnPicture picture =
-          alone.Draw(node.getScene()->scene, host.camera(), novel.cam_from_world, options);
-      gl::WaitForGpu();
-      const eval::FrameTime gl_time = watch.Elapsed();
+      const eval::FrameTime gl_time =
+          DrawAlone(alone.plain, scene, host, novel.cam_from_world, options, row.views_used);
+      const eval::FrameTime packed_time =
+          DrawAlone(alone.packed, scene, host, novel.cam_from_world, options, row.views_used);
       if (!counted) continue;
       on_osg.Add(osg_time);
       by_gl.Add(gl_time);
-      row.views_used = std::max(row.views_used, static_cast<int>(picture.views_used.size()));
+      by_packed_gl.Add(packed_time);
     }
   }
   row.gl = by_gl.Frame();
   row.gl_cpu = by_gl.Cpu();
+  row.gl_packed = by_packed_gl.Frame();
+  row.gl_packed_cpu = by_packed_gl.Cpu();
   row.osg = on_osg.Frame();
   row.osg_cpu = on_osg.Cpu();
   return row;
@@ -117,7 +140,7 @@ OsgRow MeasureReadBack(const OsgRow& like, const std::vector<NovelCamera>& path,
         host.Draw(path[static_cast<size_t>(i) % path.size()].cam_from_world);
     if (i > 0) times.Add(time);
   }
-  row.gl = row.gl_cpu = {};
+  row.gl = row.gl_cpu = row.gl_packed = row.gl_packed_cpu = {};
   row.osg = times.Frame();
   row.osg_cpu = times.Cpu();
   return row;
@@ -138,7 +161,7 @@ OsgBench MeasureOnOsg(DtrSet set, const std::vector<NovelCamera>& path,
   bench.frames = static_cast<int>(path.size());
   bench.drawn_by_processor = !gl::FrameTimer().has_gpu_clock();
   {
-    gl::Renderer alone;
+    Alone alone;
     for (const RenderOptions& options : variants) {
       progress.ThrowIfInterrupted();
       bench.rows.push_back(MeasureRow(options, path, host, *node, alone));
@@ -155,17 +178,18 @@ void SayOsgTable(const OsgBench& bench, const eval::BenchMachine& machine, Conso
   console.Say(fmt::format("{}x{}, medians of {} frames of a fly-through; ratio by {} time",
                           bench.width_px, bench.height_px, bench.frames, machine.clock));
   console.Say("");
-  console.Say(fmt::format("{:<22} {:>3} {:>5} {:>10} {:>9} {:>8} {:>10} {:>9} {:>6}", "Application",
-                          "R", "views", "s a frame", "ms", "CPU ms", "alone ms", "CPU ms",
-                          "ratio"));
+  console.Say(fmt::format("{:<22} {:>3} {:>5} {:>10} {:>9} {:>8} {:>10} {:>9} {:>6} {:>10} {:>6}",
+                          "Application", "R", "views", "s a frame", "ms", "CPU ms", "alone ms",
+                          "CPU ms", "ratio", "packed CPU", "ratio"));
   for (const OsgRow& row : bench.rows) {
     std::string line = fmt::format("{:<22} {:>3} {:>5} {:>10.4f} {:>9.1f} {:>8.1f}",
                                    row.read_back ? "D+TR on OSG, read back" : "D+TR on OSG",
                                    row.options.resolution, row.views_used, row.osg.median_ms / 1000,
                                    row.osg.median_ms, row.osg_cpu.median_ms);
     if (!row.read_back) {
-      line += fmt::format(" {:>10.1f} {:>9.1f} {:>6.3f}", row.gl.median_ms, row.gl_cpu.median_ms,
-                          bench.RatioOsgOverGl(row));
+      line += fmt::format(" {:>10.1f} {:>9.1f} {:>6.3f} {:>10.1f} {:>6.3f}", row.gl.median_ms,
+                          row.gl_cpu.median_ms, bench.RatioOsgOverGl(row),
+                          row.gl_packed_cpu.median_ms, bench.RatioOsgOverPackedGl(row));
     }
     console.Say(line);
   }
@@ -186,11 +210,17 @@ std::string OsgJson(const OsgBench& bench, const eval::BenchMachine& machine) {
               {"cpu_ms", row.osg_cpu.median_ms},
               {"gl_ms", nullptr},
               {"gl_cpu_ms", nullptr},
-              {"ratio_osg_over_gl", nullptr}};
+              {"ratio_osg_over_gl", nullptr},
+              {"gl_packed_ms", nullptr},
+              {"gl_packed_cpu_ms", nullptr},
+              {"ratio_osg_over_packed_gl", nullptr}};
     if (!row.read_back) {
       json["gl_ms"] = row.gl.median_ms;
       json["gl_cpu_ms"] = row.gl_cpu.median_ms;
       json["ratio_osg_over_gl"] = bench.RatioOsgOverGl(row);
+      json["gl_packed_ms"] = row.gl_packed.median_ms;
+      json["gl_packed_cpu_ms"] = row.gl_packed_cpu.median_ms;
+      json["ratio_osg_over_packed_gl"] = bench.RatioOsgOverPackedGl(row);
       largest = std::max(largest, bench.RatioOsgOverGl(row));
     }
     rows.push_back(json);

@@ -2,19 +2,20 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
-#include <cmath>
 #include <map>
 #include <numbers>
+#include <optional>
 #include <string>
-#include <string_view>
 
-#include "dtr/base/error.h"
+#include "dtr/io/pruned.h"
+#include "dtr/render/option_arguments.h"
 #include "dtr/render/option_names.h"
 
 namespace dtr::cli {
 namespace {
+
+constexpr char kStoredArguments[] = "set.json: pruned.render_arguments";
 
 template <typename T, size_t N>
 std::map<std::string, T> ByName(const std::array<T, N>& values) {
@@ -43,99 +44,37 @@ void AddChoice(CLI::App& command, const std::string& flag, T& target,
 
 double RadiansOf(double degrees) { return degrees * std::numbers::pi / 180; }
 
-/// Degrees with as few digits as come back as the same bits.
-std::string DegreesOf(double radians) {
-  constexpr int kMostDigits = 17;
-  const double degrees = radians * 180 / std::numbers::pi;
-  for (int digits = 1; digits <= kMostDigits; ++digits) {
-    const double rounded = std::stod(fmt::format("{:.{}g}", degrees, digits));
-    if (RadiansOf(rounded) == radians) return fmt::format("{}", rounded);
-  }
-  // The way back rounds, too: the neighbours are what is left.
-  const double above = std::nextafter(degrees, HUGE_VAL);
-  return fmt::format("{}", RadiansOf(above) == radians ? above : std::nextafter(degrees, 0));
+/// A threshold in scene units; 0 is none.
+void AddAbsolute(CLI::App& command, const std::string& flag, std::optional<double>& target,
+                 const std::string& description) {
+  command
+      .add_option_function<double>(
+          flag,
+          [&target](double value) { target = value > 0 ? std::optional(value) : std::nullopt; },
+          description)
+      ->check(CLI::NonNegativeNumber)
+      ->type_name("UNITS");
 }
-
-/// Collects "--flag VALUE" of what is not the default.
-class Arguments {
- public:
-  template <typename T>
-  void Add(const char* flag, const T& value, const T& by_default) {
-    if (value != by_default) Append(flag, fmt::format("{}", value));
-  }
-  void Append(const char* flag, std::string value) {
-    arguments_.emplace_back(flag);
-    arguments_.push_back(std::move(value));
-  }
-  void Flag(const char* flag) { arguments_.emplace_back(flag); }
-  std::vector<std::string> Take() { return std::move(arguments_); }
-
- private:
-  std::vector<std::string> arguments_;
-};
 
 }  // namespace
 
-// What RenderOptionArguments writes, and nothing else: a set comes from anywhere, and must not set
-// what files a command writes.
-constexpr std::array<std::string_view, 17> kStored{
-    "--method",         "--primitive",      "--blend",
-    "--views",          "--resolution",     "--point-size",
-    "--exponent",       "--falloff",        "--blend-k",
-    "--max-angle",      "--delta",          "--depth-break",
-    "--mesh-tolerance", "--absolute-delta", "--absolute-depth-break",
-    "--blend-linear",   "--fill-holes"};
-
-std::vector<std::string> RenderOptionArguments(const RenderOptions& options) {
-  const RenderOptions usual;
-  Arguments arguments;
-  // Asking for splats alone would change the method, too.
-  const bool splats = options.primitive == Primitive::kSplat;
-  if (splats || options.method != usual.method)
-    arguments.Append("--method", NameOf(options.method));
-  if (splats) arguments.Append("--primitive", NameOf(options.primitive));
-  if (options.blend != usual.blend) arguments.Append("--blend", NameOf(options.blend));
-  arguments.Add("--views", options.views, usual.views);
-  arguments.Add("--resolution", options.resolution, usual.resolution);
-  arguments.Add("--point-size", options.point_size, usual.point_size);
-  arguments.Add("--exponent", options.exponent, usual.exponent);
-  arguments.Add("--falloff", options.falloff, usual.falloff);
-  arguments.Add("--blend-k", options.blend_k, usual.blend_k);
-  if (options.max_angle_rad != usual.max_angle_rad) {
-    arguments.Append("--max-angle", DegreesOf(options.max_angle_rad));
-  }
-  arguments.Add("--delta", options.delta_px, usual.delta_px);
-  arguments.Add("--depth-break", options.depth_break_px, usual.depth_break_px);
-  arguments.Add("--mesh-tolerance", options.mesh_tolerance_px, usual.mesh_tolerance_px);
-  if (options.absolute_delta) arguments.Add("--absolute-delta", *options.absolute_delta, 0.0);
-  if (options.absolute_depth_break) {
-    arguments.Add("--absolute-depth-break", *options.absolute_depth_break, 0.0);
-  }
-  if (options.blend_in_linear_light) arguments.Flag("--blend-linear");
-  if (options.fill_holes) arguments.Flag("--fill-holes");
-  return arguments.Take();
+void UseStoredArguments(const CLI::App& command, const DtrSet& set, RenderOptions& options) {
+  const auto given = [&](const std::string& flag) {
+    const CLI::Option* option = command.get_option_no_throw(flag);
+    return option != nullptr && option->count() > 0;
+  };
+  const auto blends = [](const std::string& flag) {
+    return flag == "--blend-linear" || flag == "--blend-srgb";
+  };
+  const bool blend_given = given("--blend-linear") || given("--blend-srgb");
+  const auto by_user = [&](const std::string& flag) {
+    return given(flag) || (blends(flag) && blend_given);
+  };
+  options = WithArguments(options, io::RenderArguments(set), kStoredArguments, by_user);
 }
 
-void UseStoredArguments(CLI::App& command, const std::vector<std::string>& arguments) {
-  const auto is_flag = [](const std::string& text) { return text.rfind("--", 0) == 0; };
-  for (size_t i = 0; i < arguments.size(); ++i) {
-    const bool has_value = i + 1 < arguments.size() && !is_flag(arguments[i + 1]);
-    const std::string value = has_value ? arguments[i + 1] : "true";
-    const std::string& name = arguments[i];
-    i += has_value;
-    if (std::find(kStored.begin(), kStored.end(), name) == kStored.end()) {
-      throw Error("set.json: pruned.render_arguments: expected options of rendering, found " +
-                  name);
-    }
-    CLI::Option* option = command.get_option_no_throw(name);
-    if (option == nullptr || option->count() > 0) continue;
-    try {
-      option->add_result(value);
-      option->run_callback();
-    } catch (const CLI::ParseError& error) {
-      throw Error(std::string("set.json: pruned.render_arguments: ") + error.what());
-    }
-  }
+RenderOptions StoredRenderOptions(const DtrSet& set) {
+  return WithArguments({}, io::RenderArguments(set), kStoredArguments);
 }
 
 std::shared_ptr<RenderOptions> AddRenderOptions(CLI::App& command) {
@@ -188,20 +127,15 @@ std::shared_ptr<RenderOptions> AddRenderOptions(CLI::App& command) {
       ->type_name("PX");
   command
       .add_option("--mesh-tolerance", options.mesh_tolerance_px,
-                  "deferred: how far the reduced mesh may lie off the depth, in pixels of "
-                  "disparity [0.5]")
+                  fmt::format("deferred: how far the reduced mesh may lie off the depth, in pixels "
+                              "of disparity [{}]",
+                              RenderOptions{}.mesh_tolerance_px))
       ->check(CLI::NonNegativeNumber)
       ->type_name("PX");
-  command
-      .add_option("--absolute-delta", options.absolute_delta,
-                  "Delta in scene units instead, as in the founding report")
-      ->check(CLI::PositiveNumber)
-      ->type_name("UNITS");
-  command
-      .add_option("--absolute-depth-break", options.absolute_depth_break,
-                  "Depth break in scene units instead, as in the founding report (3.5 there)")
-      ->check(CLI::PositiveNumber)
-      ->type_name("UNITS");
+  AddAbsolute(command, "--absolute-delta", options.absolute_delta,
+              "Delta in scene units instead, as in the founding report [0: not]");
+  AddAbsolute(command, "--absolute-depth-break", options.absolute_depth_break,
+              "Depth break in scene units instead, as in the founding report (3.5 there) [0: not]");
   command.add_flag_callback(
       "--blend-linear", [&options] { options.blend_in_linear_light = true; },
       "Blend linear light instead of sRGB values");

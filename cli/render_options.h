@@ -2,10 +2,9 @@
 #pragma once
 #include <CLI/CLI.hpp>
 #include <memory>
-#include <string>
-#include <vector>
 
 #include "dtr/render/options.h"
+#include "dtr/types/dtr_set.h"
 
 namespace dtr::cli {
 
@@ -13,14 +12,11 @@ namespace dtr::cli {
 /// Angles are given in degrees and arrive in radians.
 std::shared_ptr<RenderOptions> AddRenderOptions(CLI::App& command);
 
-/// The other way round: the arguments that give these options, without those that are the default.
-/// Parsing them gives every option bit by bit (angles: those that come of degrees), but for the
-/// number of threads.
-std::vector<std::string> RenderOptionArguments(const RenderOptions& options);
+/// Gives `options`, the parsed ones of `command`, those that the set was pruned for and its user
+/// did not give: they are the set's defaults. Throws Error for what is no option of rendering.
+void UseStoredArguments(const CLI::App& command, const DtrSet& set, RenderOptions& options);
 
-/// Gives `command`, after parsing, those of the arguments (as RenderOptionArguments makes them) that
-/// its user did not give: what a set was pruned for is its default. Options that the command lacks
-/// are passed over. Throws Error for a value that an option refuses.
-void UseStoredArguments(CLI::App& command, const std::vector<std::string>& arguments);
+/// The set's own defaults: what it was pruned for, else the library's. Throws as above.
+RenderOptions StoredRenderOptions(const DtrSet& set);
 
 }  // namespace dtr::cli

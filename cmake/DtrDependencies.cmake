@@ -12,6 +12,13 @@ find_package(JPEG REQUIRED)
 find_package(nlohmann_json 3.11 REQUIRED)
 find_package(fmt 9 REQUIRED)
 find_package(hwy 1.0 REQUIRED)
+# Vectors whose size is known when the program runs fit no struct and no array; ARM processors that
+# have them have NEON too.
+set(DTR_ARM_HIGHWAY_TARGETS "HWY_DISABLED_TARGETS=(HWY_SVE|HWY_SVE2|HWY_SVE_256|HWY_SVE2_128)")
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(aarch64|arm64)")
+  set_property(TARGET hwy::hwy APPEND PROPERTY
+    INTERFACE_COMPILE_DEFINITIONS "${DTR_ARM_HIGHWAY_TARGETS}")
+endif()
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(ZSTD REQUIRED IMPORTED_TARGET libzstd>=1.4)
 if(DTR_WITH_GL)

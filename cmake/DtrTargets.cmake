@@ -1,5 +1,7 @@
 # dtr_library(NAME SOURCES ... [PUBLIC libs...] [PRIVATE libs...]): one static library per folder.
 # dtr_test(NAME SOURCES ... LIBS ... [LABELS ...] [TIMEOUT s]): one GoogleTest program, discovered by CTest.
+# dtr_one_entry_test(the same): one entry of CTest for all its tests, which share what is slow to start. It fails when
+# one of them does, and is skipped when one of them was and none failed.
 
 function(dtr_compile_options target)
   # Bits must match between machines and thread counts: no contraction into FMA, no fast maths.
@@ -50,4 +52,17 @@ endif()
 ")
     set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES ${file})
   endif()
+endfunction()
+
+function(dtr_one_entry_test name)
+  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;LIBS;LABELS" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE ${ARG_LIBS} dtr_one_entry_main GTest::gtest GTest::gmock)
+  dtr_compile_options(${name})
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 300)
+  endif()
+  add_test(NAME ${name} COMMAND ${name} WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
+  # 77: kSkippedExitCode of tests/support/one_entry_main.h.
+  set_tests_properties(${name} PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT ${ARG_TIMEOUT} SKIP_RETURN_CODE 77)
 endfunction()

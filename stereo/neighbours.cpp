@@ -21,8 +21,9 @@ constexpr size_t kMinShared = 4;
 constexpr double kBestAngleDeg = 7.0;
 constexpr double kSmallAngleWidthDeg = 4.0;
 constexpr double kLargeAngleWidthDeg = 10.0;
-/// Centres seen from the points under a smaller angle than this count as one centre.
-constexpr double kSameCentreAngleDeg = 0.01;
+/// Centres seen from the points under a smaller angle than this count as one centre: half of a
+/// baseline of 1e-4 of the depth, of which the longest lenses still make a pixel of disparity.
+constexpr double kSameCentreAngleDeg = 0.003;
 /// Without any points: rays on this grid, at depths these multiples of the guessed distance.
 constexpr int kRayGrid = 8;
 constexpr double kDepthMultiples[] = {0.6, 1.0, 2.0};
@@ -139,13 +140,25 @@ std::vector<Vector3d> SharedPoints(const SparseScene& scene, const std::vector<i
   return points;
 }
 
+/// (-score, index): sorts best first, then by index.
+using Ranking = std::vector<std::pair<double, int>>;
+
+std::vector<int> Best(Ranking ranking, int count) {
+  std::sort(ranking.begin(), ranking.end());
+  std::vector<int> best;
+  for (const auto& [score, view] : ranking) {
+    if (static_cast<int>(best.size()) >= count) break;
+    best.push_back(view);
+  }
+  return best;
+}
+
 }  // namespace
 
 std::vector<ViewNeighbours> ChooseNeighbours(std::span<const StereoView> views,
                                              const SparseScene& scene,
                                              const NeighbourOptions& options) {
   const std::vector<std::vector<int>> observed = PointsOfViews(scene, views.size());
-  const double min_angle_deg = std::max(options.min_angle_deg, kSameCentreAngleDeg);
   std::vector<ViewNeighbours> result(views.size());
   for (size_t a = 0; a < views.size(); ++a) {
     const bool by_points = observed[a].size() >= kMinObservations;
@@ -153,19 +166,19 @@ std::vector<ViewNeighbours> ChooseNeighbours(std::span<const StereoView> views,
         by_points ? NeighbourEvidence::kSharedPoints : NeighbourEvidence::kGeometry;
     const std::vector<Vector3d> stand_in =
         by_points ? std::vector<Vector3d>{} : StandInPoints(views[a], views, scene);
-    std::vector<std::pair<double, int>> ranked;  // (-score, index): sorts best first, then by index
+    Ranking wide, narrow;
     for (size_t b = 0; b < views.size(); ++b) {
       if (b == a) continue;
       const auto score = ScorePair(
           views[a], views[b], by_points ? SharedPoints(scene, observed[a], observed[b]) : stand_in);
-      if (!score || score->median_angle_deg < min_angle_deg) continue;
-      ranked.emplace_back(-score->score, static_cast<int>(b));
+      if (!score || score->median_angle_deg < kSameCentreAngleDeg) continue;
+      if (score->median_angle_deg >= options.min_angle_deg) {
+        wide.emplace_back(-score->score, static_cast<int>(b));
+      } else {
+        narrow.emplace_back(-score->score * score->median_angle_deg, static_cast<int>(b));
+      }
     }
-    std::sort(ranked.begin(), ranked.end());
-    for (const auto& [score, b] : ranked) {
-      if (static_cast<int>(result[a].views.size()) >= options.count) break;
-      result[a].views.push_back(b);
-    }
+    result[a].views = Best(wide.empty() ? std::move(narrow) : std::move(wide), options.count);
   }
   return result;
 }

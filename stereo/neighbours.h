@@ -9,8 +9,9 @@
 namespace dtr::stereo {
 
 struct NeighbourOptions {
-  int count = 5;               ///< at most so many neighbours per view
-  double min_angle_deg = 1.0;  ///< a pair's median triangulation angle must reach this
+  int count = 5;  ///< at most so many neighbours per view
+  /// Pairs whose median triangulation angle is less serve only views that have no other pair.
+  double min_angle_deg = 1.0;
 };
 
 /// What a choice of neighbours was based on.
@@ -31,6 +32,8 @@ struct ViewNeighbours {
 /// no depth, large ones different pictures) times a weight of the ratio of the image scales.
 /// A view with too few observations is scored with stand-in points instead: the points of the whole
 /// scene inside its frustum, or, without any, a grid of rays at depths guessed from the cameras.
+/// Long lenses and far scenes may have no pair of min_angle_deg at all: their pairs are ranked by
+/// score times angle, for what a pair says about depth grows with its baseline.
 /// Equal scores are ordered by index. Pairs with a (nearly) common centre are never chosen.
 /// Throws std::invalid_argument when the scene names a view or point that does not exist.
 std::vector<ViewNeighbours> ChooseNeighbours(std::span<const StereoView> views,

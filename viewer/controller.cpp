@@ -67,11 +67,12 @@ Surroundings SurroundingsOf(const DtrSet& set, size_t frame) {
   Surroundings surroundings;
   surroundings.bounds = set.bounds;
   surroundings.center = set.scene_center;
-  for (const View& view : set.frames.at(frame).views) {
-    if (view.role == ViewRole::kSource) surroundings.views.push_back(&view);
-  }
-  std::sort(surroundings.views.begin(), surroundings.views.end(),
+  for (const View& view : set.frames.at(frame).views) surroundings.cameras.push_back(&view);
+  std::sort(surroundings.cameras.begin(), surroundings.cameras.end(),
             [](const View* a, const View* b) { return a->id < b->id; });
+  for (const View* view : surroundings.cameras) {
+    if (view->role == ViewRole::kSource) surroundings.views.push_back(view);
+  }
   return surroundings;
 }
 
@@ -86,7 +87,9 @@ Controller::Controller(Surroundings surroundings, int width_px, int height_px, D
   }
   const View& first = *surroundings_.views.front();
   camera_ = {FitLens(first.camera, width_px, height_px), first.cam_from_world};
-  stepped_to_ = 0;
+  const auto& cameras = surroundings_.cameras;
+  stepped_to_ =
+      static_cast<size_t>(std::find(cameras.begin(), cameras.end(), &first) - cameras.begin());
 }
 
 double Controller::scene_size() const { return SizeOf(surroundings_); }
@@ -222,13 +225,13 @@ void Controller::GoTo(const NovelCamera& camera) {
 }
 
 void Controller::GoToView(size_t index) {
-  if (index >= surroundings_.views.size()) return;
+  if (index >= surroundings_.cameras.size()) return;
   stepped_to_ = index;
-  GoTo({surroundings_.views[index]->camera, surroundings_.views[index]->cam_from_world});
+  GoTo({surroundings_.cameras[index]->camera, surroundings_.cameras[index]->cam_from_world});
 }
 
 void Controller::StepViews(int by) {
-  const auto count = static_cast<int>(surroundings_.views.size());
+  const auto count = static_cast<int>(surroundings_.cameras.size());
   if (count == 0) return;
   const bool on_the_way = glide_.has_value() || at_view() == stepped_to_;
   const std::optional<size_t> from = on_the_way ? stepped_to_ : nearest_view();
@@ -246,13 +249,17 @@ void Controller::ShowAll() {
 }
 
 std::optional<size_t> Controller::nearest_view() const {
+  return NearestView(surroundings_.cameras, camera_.cam_from_world, scene_size());
+}
+
+std::optional<size_t> Controller::nearest_source() const {
   return NearestView(surroundings_.views, camera_.cam_from_world, scene_size());
 }
 
 std::optional<size_t> Controller::at_view() const {
   const auto nearest = nearest_view();
   if (!nearest) return std::nullopt;
-  const Pose& view = surroundings_.views[*nearest]->cam_from_world;
+  const Pose& view = surroundings_.cameras[*nearest]->cam_from_world;
   if (!SamePose(view, camera_.cam_from_world, scene_size())) return std::nullopt;
   return nearest;
 }

@@ -14,12 +14,13 @@ namespace dtr::viewer {
 
 /// What the controller knows of the scene. The views must outlive it.
 struct Surroundings {
-  std::vector<const View*>
-      views;  ///< input cameras, in the order in which they are stepped through
+  std::vector<const View*> views;  ///< source views: what pictures are drawn from
+  /// Input cameras, those of held-out photos too, in the order in which they are stepped through.
+  std::vector<const View*> cameras;
   Bounds bounds;
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
 };
-/// Source views of one of the set's frames, in byte order of their ids.
+/// Of one of the set's frames; views and cameras in byte order of their ids.
 Surroundings SurroundingsOf(const DtrSet& set, size_t frame = 0);
 
 /// The camera of a window and how it moves. Left drag: orbit about the point under the cursor.
@@ -30,7 +31,8 @@ class Controller {
   /// Plane z of what the picture shows at a pixel; none where it shows nothing.
   using DepthAt = std::function<std::optional<double>(const Eigen::Vector2d& pixel)>;
 
-  /// Starts at the first input camera, or nowhere in particular without one. Sizes in pixels.
+  /// Starts at the first source view's camera, or nowhere in particular without one. Sizes in
+  /// pixels.
   Controller(Surroundings surroundings, int width_px, int height_px, DepthAt depth_at);
 
   const NovelCamera& camera() const { return camera_; }
@@ -54,16 +56,18 @@ class Controller {
 
   /// All of these glide; a drag or a key stops them where they are.
   void GoTo(const NovelCamera& camera);
-  void GoToView(size_t index);
-  void StepViews(int by);  ///< from the view stepped to last, or the nearest
+  void GoToView(size_t index);  ///< of `cameras`
+  void StepViews(int by);       ///< from the view stepped to last, or the nearest
   void GoToNearestView();
   void ShowAll();
   /// At once, without a glide.
   void JumpTo(const NovelCamera& camera);
 
-  /// Index of the view whose camera this is just now; none between views.
+  /// Index into `cameras` of the one whose place this is just now; none between them.
   std::optional<size_t> at_view() const;
   std::optional<size_t> nearest_view() const;
+  /// Index into `views`: the nearest that pictures are drawn from.
+  std::optional<size_t> nearest_source() const;
   double scene_size() const;
 
  private:

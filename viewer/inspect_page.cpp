@@ -67,12 +67,14 @@ std::optional<double> MedianSigmaPx(const View& view) {
 
 /// The view as the others show it. `loaded` has its photo.
 void RenderWithoutItself(const View& view, const View& loaded, ViewStream& stream,
-                         RenderOptions options, ViewFindings& findings) {
+                         RenderOptions options, const ViewColours& colours,
+                         ViewFindings& findings) {
   const auto [width, height] =
       TargetSize(view.camera.width_px(), view.camera.height_px(), kSmallPx);
   const PinholeCamera small = view.camera.Resized(width, height);
   // Depth no finer than the picture: the page is not to take an hour.
-  options.resolution = std::max(1, view.camera.width_px() / view.depth_scale / width);
+  options.resolution =
+      std::max(options.resolution, view.camera.width_px() / view.depth_scale / width);
   stream.Hide({&view});
   const RenderScene scene =
       stream.SceneFor(view.cam_from_world, options, ViewStream::Wait::kForAll);
@@ -83,7 +85,7 @@ void RenderWithoutItself(const View& view, const View& loaded, ViewStream& strea
   findings.psnr_db = eval::Psnr(result.image, findings.photo, mask);
   findings.coverage = result.coverage_share;
   const NovelCamera camera{small, view.cam_from_world};
-  findings.weights = FalseColour(Shown::kWeights, {result, scene, camera, options},
+  findings.weights = FalseColour(Shown::kWeights, {result, scene, camera, options, colours},
                                  [](const View&) { return nullptr; });
   const cpu::Contributions found =
       cpu::ContributionsTo(result.depth, scene, small, view.cam_from_world, options);
@@ -102,6 +104,7 @@ Findings FindOut(const DtrSet& set, ViewStream& stream, const InspectFacts& fact
   findings.ground = GroundOf(set);
   CoverageFromAbove coverage(findings.ground, kMapCells);
   const std::vector<const View*> views = SurroundingsOf(set).views;
+  const ViewColours colours(set);
   progress.Stage("inspecting", static_cast<int>(views.size()));
   for (const View* view : views) {
     progress.ThrowIfInterrupted();
@@ -121,7 +124,9 @@ Findings FindOut(const DtrSet& set, ViewStream& stream, const InspectFacts& fact
               ? report::Shrink(report::ColorizeSigma(*loaded.inverse_depth_sigma), kSheetCellPx)
               : ImageRgb8());
     }
-    if (views.size() > 1) RenderWithoutItself(*view, loaded, stream, options, found);
+    if (views.size() > 1) {
+      RenderWithoutItself(*view, loaded, stream, options, colours, found);
+    }
     findings.views.push_back(std::move(found));
     progress.Update(static_cast<int>(findings.views.size()));
   }
@@ -172,6 +177,18 @@ void AddMaps(report::HtmlReport& page, const DtrSet& set, const Findings& findin
       findings.coverage);
 }
 
+/// The colour of a view in the pictures of weights.
+report::Picture Swatch(const Rgb& colour, const std::string& name) {
+  constexpr int kSwatchPx = 14;
+  ImageRgb8 square(kSwatchPx, kSwatchPx, 3);
+  for (int y = 0; y < kSwatchPx; ++y) {
+    for (int x = 0; x < kSwatchPx; ++x) {
+      for (int c = 0; c < 3; ++c) square(x, y, c) = colour[static_cast<size_t>(c)];
+    }
+  }
+  return {square, "colour of " + name};
+}
+
 std::string LargestShares(const std::map<std::string, double>& shares) {
   std::vector<std::pair<double, std::string>> sorted;
   for (const auto& [name, share] : shares) sorted.push_back({-share, name});
@@ -184,7 +201,8 @@ std::string LargestShares(const std::map<std::string, double>& shares) {
   return text;
 }
 
-void AddContributions(report::HtmlReport& page, const Findings& findings) {
+void AddContributions(report::HtmlReport& page, const DtrSet& set, const Findings& findings) {
+  const ViewColours colours(set);
   std::map<std::string, double> total;
   std::vector<std::vector<report::Cell>> rows;
   for (const ViewFindings& found : findings.views) {
@@ -194,18 +212,18 @@ void AddContributions(report::HtmlReport& page, const Findings& findings) {
   const auto others = static_cast<double>(std::max<size_t>(2, findings.views.size()) - 1);
   for (const ViewFindings& found : findings.views) {
     rows.push_back({report::Picture{found.weights, "weights of " + found.view->name},
-                    found.view->name, LargestShares(found.shares), Percent(found.coverage),
+                    Swatch(colours.Of(*found.view), found.view->name), found.view->name,
+                    LargestShares(found.shares), Percent(found.coverage),
                     Percent(total[found.view->name] / others)});
   }
   page.Section("Which view contributes where");
   page.Paragraph(
-      "Every view is rendered without its own photo. The picture mixes one colour per other view "
-      "by "
-      "their shares of each pixel; green is what none of them saw. The last column is what the "
-      "view "
+      "Every view is rendered without its own photo. The picture mixes one colour per other view, "
+      "that of the square beside its name, by their shares of each pixel; green is what none of "
+      "them saw. The last column is what the view "
       "itself gives to the pictures of all the others: one near 0 % could be left out.");
-  page.Table({"Shares", "In place of", "Largest shares of the picture", "Seen by the others",
-              "Gives to the others"},
+  page.Table({"Shares", "Its colour", "In place of", "Largest shares of the picture",
+              "Seen by the others", "Gives to the others"},
              rows);
 }
 
@@ -279,7 +297,7 @@ std::string InspectPage(const DtrSet& set, ViewStream& stream, const InspectFact
   AddSheets(page, findings);
   AddMaps(page, set, findings, facts);
   AddWorstViews(page, findings, facts);
-  AddContributions(page, findings);
+  AddContributions(page, set, findings);
   AddCosts(page, facts);
   return page.Finish();
 }

@@ -6,14 +6,26 @@
 
 #include "dtr/cpu/contributions.h"
 #include "dtr/report/false_color.h"
+#include "viewer/controller.h"
 #include "viewer/navigation.h"
 
 namespace dtr::viewer {
 namespace {
 
-using Rgb = std::array<std::uint8_t, 3>;
-
 constexpr Rgb kSeen{230, 230, 230};
+
+Rgb ViewColour(int index) {
+  // Hues a golden angle apart: no two of a handful are alike.
+  constexpr double kGolden = 0.61803398874989485;
+  const double hue = 6 * (index * kGolden - std::floor(index * kGolden));
+  Rgb colour{};
+  for (int c = 0; c < 3; ++c) {
+    const double away = std::abs(std::fmod(hue + 6 - 2 * c, 6) - 3);
+    colour[static_cast<size_t>(c)] =
+        static_cast<std::uint8_t>(std::lround(60 + 180 * std::clamp(away - 1, 0.0, 1.0)));
+  }
+  return colour;
+}
 
 /// `colour_at` gives the colour of pixel index p, which some view saw.
 template <typename ColourAt>
@@ -38,7 +50,7 @@ ImageRgb8 WeightPicture(const Drawn& drawn) {
   return Painted(drawn.result, [&](size_t p) {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     for (size_t i = 0; i < found.views.size(); ++i) {
-      const Rgb colour = ViewColour(found.views[i]);
+      const Rgb colour = drawn.colours.Of(*drawn.scene.views[static_cast<size_t>(found.views[i])]);
       sum += found.shares[i].data()[p] * Eigen::Vector3d(colour[0], colour[1], colour[2]);
     }
     Rgb mixed{};
@@ -116,17 +128,17 @@ const char* LegendOf(Shown shown) {
   return "";
 }
 
-std::array<std::uint8_t, 3> ViewColour(int index) {
-  // Hues a golden angle apart: no two of a handful are alike.
-  constexpr double kGolden = 0.61803398874989485;
-  const double hue = 6 * (index * kGolden - std::floor(index * kGolden));
-  Rgb colour{};
-  for (int c = 0; c < 3; ++c) {
-    const double away = std::abs(std::fmod(hue + 6 - 2 * c, 6) - 3);
-    colour[static_cast<size_t>(c)] =
-        static_cast<std::uint8_t>(std::lround(60 + 180 * std::clamp(away - 1, 0.0, 1.0)));
+ViewColours::ViewColours(const DtrSet& set) {
+  for (size_t frame = 0; frame < set.frames.size(); ++frame) {
+    for (const View* view : SurroundingsOf(set, frame).views) {
+      by_name_.try_emplace(view->name, ViewColour(static_cast<int>(by_name_.size())));
+    }
   }
-  return colour;
+}
+
+Rgb ViewColours::Of(const View& view) const {
+  const auto found = by_name_.find(view.name);
+  return found != by_name_.end() ? found->second : Rgb{};
 }
 
 ImageRgb8 FalseColour(Shown shown, const Drawn& drawn, const SigmaOf& sigma_of) {

@@ -1,11 +1,15 @@
 // viewer/shown.h -- what the pixels of the picture mean.
 #pragma once
 #include <array>
+#include <cstdint>
+#include <map>
+#include <string>
 
 #include "dtr/render/camera_path.h"
 #include "dtr/render/options.h"
 #include "dtr/render/result.h"
 #include "dtr/render/scene.h"
+#include "dtr/types/dtr_set.h"
 #include "viewer/probe.h"
 
 namespace dtr::viewer {
@@ -20,19 +24,32 @@ const char* NameOf(Shown shown);
 /// One line that says how to read it.
 const char* LegendOf(Shown shown);
 
+using Rgb = std::array<std::uint8_t, 3>;
+
+/// The colours by which kWeights and wireframes tell views apart: of one set always the same,
+/// whatever is drawn from. Views of one name at several instants share one. Neighbours differ.
+class ViewColours {
+ public:
+  ViewColours() = default;
+  explicit ViewColours(const DtrSet& set);
+  /// Of a source view of that set; black for others.
+  Rgb Of(const View& view) const;
+
+ private:
+  std::map<std::string, Rgb> by_name_;
+};
+
 /// What was drawn, and of what.
 struct Drawn {
   const RenderResult& result;
   const RenderScene& scene;
   const NovelCamera& camera;
   const RenderOptions& options;
+  const ViewColours& colours;
 };
 
 /// A false-colour picture; unseen pixels have report::kHoleColor. Not for kColour, which is the
 /// picture itself, nor for kWireframe, which keeps meshes (viewer/wireframe.h).
 ImageRgb8 FalseColour(Shown shown, const Drawn& drawn, const SigmaOf& sigma_of);
-
-/// The colour that kWeights gives a view, by its index into the scene's views: neighbours differ.
-std::array<std::uint8_t, 3> ViewColour(int index);
 
 }  // namespace dtr::viewer

@@ -153,7 +153,7 @@ ImageRgb8 Wireframe::Draw(const Drawn& drawn) {
                   }
                 });
     const Pen pen{drawn.result.depth, image, ThresholdsOf(view, drawn.options).delta,
-                  ViewColour(nearest_first[k])};
+                  drawn.colours.Of(view)};
     ParallelFor(0, bands, drawn.options.threads, [&](int band) {
       const Rows rows{band * kRowsTogether, std::min(height, (band + 1) * kRowsTogether)};
       for (const auto& [a, b] : mesh.edges) {

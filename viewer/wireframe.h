@@ -16,7 +16,7 @@ namespace dtr::viewer {
 class Wireframe {
  public:
   /// The picture, darkened, and over it the edges of its views' meshes (SPEC 5.1), each view in its
-  /// ViewColour, the nearest view's on top. An edge is hidden where it lies more than the view's
+  /// colour, the nearest view's on top. An edge is hidden where it lies more than the view's
   /// Delta behind the surface shown, in 1/z. The two passes draw full grids: theirs are reduced
   /// with no tolerance, so that only blocks which are flat to the digit are joined. Splats have no
   /// edges; the mesh of their samples is shown.

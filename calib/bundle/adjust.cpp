@@ -14,6 +14,7 @@
 #include "calib/bundle/lens_params.h"
 #include "calib/bundle/normalised.h"
 #include "calib/bundle/rig_adjust.h"
+#include "calib/bundle/sight_rows.h"
 #include "calib/lens_groups.h"
 #include "calib/solve/board_start.h"
 #include "dtr/base/error.h"
@@ -40,15 +41,6 @@ std::vector<Eigen::Vector2d> ResidualsOf(const Bundle& bundle, const Normalised&
   return residuals;
 }
 
-double SigmaOf(const std::vector<Eigen::Vector2d>& residuals) {
-  std::vector<double> lengths;
-  for (const Eigen::Vector2d& r : residuals) {
-    if (r.allFinite()) lengths.push_back(r.norm());
-  }
-  if (lengths.empty()) Refuse("expected points in front of the cameras that see them, found none");
-  return std::max(RobustSigma(std::move(lengths)), kSmallestSigmaPx);
-}
-
 // Sights nearer than `limit_px` to their predictions.
 std::vector<bool> Within(const std::vector<Eigen::Vector2d>& residuals, double limit_px) {
   std::vector<bool> within;
@@ -56,8 +48,102 @@ std::vector<bool> Within(const std::vector<Eigen::Vector2d>& residuals, double l
   return within;
 }
 
-// `rigs`: of how many rigs the images move; 0: every image for itself.
-void Describe(const std::vector<Eigen::Vector2d>& residuals, size_t rigs, Adjusted& out) {
+// How many of these sights each point has.
+std::vector<int> SightsOfPoints(const Bundle& bundle, const std::vector<bool>& counts) {
+  std::vector<int> sights(bundle.points.size());
+  for (size_t i = 0; i < counts.size(); ++i) {
+    sights[static_cast<size_t>(bundle.observations[i].point)] += counts[i];
+  }
+  return sights;
+}
+
+// What a point that moves to where its `sights` want it leaves of their residuals: of two sights'
+// four coordinates one is left, which both share, so that their lengths follow a normal law of one
+// dimension, and the third smallest of them is smaller still than the share of the squares says.
+double ShareOfLength(int sights) {
+  constexpr double kOfTwo = 0.338;  // 0.4307 / sqrt(2) over 0.9005: lower terciles of the two laws
+  return sights == 2 ? kOfTwo : std::sqrt(1 - 1.5 / sights);
+}
+
+// Standard deviation of a sight's coordinate. Without regard to what points take up, tracks of two
+// would make it far too small; under the robust loss their points would then settle on one of the
+// two sights, and make it smaller still.
+double SigmaOf(const Bundle& bundle, const std::vector<Eigen::Vector2d>& residuals) {
+  const std::vector<int> sights =
+      SightsOfPoints(bundle, Within(residuals, std::numeric_limits<double>::infinity()));
+  std::vector<double> lengths;
+  for (size_t i = 0; i < residuals.size(); ++i) {
+    const int of_point = sights[static_cast<size_t>(bundle.observations[i].point)];
+    if (residuals[i].allFinite() && of_point > 1) {
+      lengths.push_back(residuals[i].norm() / ShareOfLength(of_point));
+    }
+  }
+  if (lengths.empty()) Refuse("expected points in front of the cameras that see them, found none");
+  return std::max(RobustSigma(std::move(lengths)), kSmallestSigmaPx);
+}
+
+// Ways to turn, move and scale everything that sights do not tell, and priors leave open.
+double OpenGauge(const AdjustOptions& options) {
+  const double scale = options.distances.empty() ? 1 : 0;
+  switch (options.positions.size()) {
+    case 0:
+      return 6 + scale;
+    case 1:
+      return 3 + scale;  // turns about the place
+    case 2:
+      return 1;  // a turn about the line between them
+    default:
+      return 0;
+  }
+}
+
+// What the priors miss by, in units of their sigmas, squared; how many numbers they are.
+double PriorSquares(const Bundle& bundle, const AdjustOptions& options, double* numbers) {
+  const auto centre = [&](int image) {
+    return bundle.images[static_cast<size_t>(image)].cam_from_world.TargetOriginInSource();
+  };
+  double squares = 0;
+  for (const PositionPrior& p : options.positions) {
+    squares += (centre(p.image) - p.centre).cwiseQuotient(p.sigma).squaredNorm();
+  }
+  for (const DistancePrior& d : options.distances) {
+    squares += std::pow(((centre(d.image_a) - centre(d.image_b)).norm() - d.distance) / d.sigma, 2);
+  }
+  *numbers = 3 * static_cast<double>(options.positions.size()) +
+             static_cast<double>(options.distances.size());
+  return squares;
+}
+
+// Unknowns of the images that count and their lenses. `rigs`: of how many rigs the images move; 0:
+// every image for itself.
+double CameraUnknowns(const Bundle& bundle, const std::vector<bool>& image_used, size_t rigs,
+                      const AdjustOptions& options) {
+  double images = 0, unknowns = 0;
+  std::vector<bool> lens_used(bundle.lenses.size());
+  for (size_t i = 0; i < image_used.size(); ++i) {
+    if (!image_used[i]) continue;
+    images += 1;
+    lens_used[static_cast<size_t>(bundle.images[i].lens)] = true;
+  }
+  for (size_t i = 0; i < lens_used.size(); ++i) {
+    if (!lens_used[i]) continue;
+    unknowns += static_cast<double>(FreeParams(bundle.lenses[i], options.lens).size());
+  }
+  if (IsPerImage(options.lens)) unknowns += 2 * images;
+  if (options.fix_poses) return unknowns;
+  // A rig's own lengths leave six ways to move the world as a whole.
+  return unknowns +
+         (rigs > 0 ? 6 * static_cast<double>(rigs) - 6 : 6 * images - OpenGauge(options));
+}
+
+// `sigma_px`: what priors were weighted with.
+void Describe(const std::vector<Eigen::Vector2d>& residuals, size_t rigs,
+              const AdjustOptions& options, double sigma_px, Adjusted& out) {
+  // A sight that is alone in seeing its point is met whatever the cameras are.
+  const std::vector<int> sights = SightsOfPoints(out.bundle, out.used);
+  for (size_t i = 0; i < residuals.size(); ++i) {
+    if (sights[static_cast<size_t>(out.bundle.observations[i].point)] < 2) out.used[i] = false;
+  }
   double squared = 0;
   std::vector<bool> image_used(out.bundle.images.size()), point_used(out.bundle.points.size());
   for (size_t i = 0; i < residuals.size(); ++i) {
@@ -69,15 +155,14 @@ void Describe(const std::vector<Eigen::Vector2d>& residuals, size_t rigs, Adjust
     image_used[static_cast<size_t>(o.image)] = point_used[static_cast<size_t>(o.point)] = true;
   }
   out.rms_px = std::sqrt(squared / std::max(1, out.sights));
-  const auto count = [](const std::vector<bool>& v) {
-    return static_cast<double>(std::count(v.begin(), v.end(), true));
-  };
-  // A rig's own lengths leave six ways to move the world as a whole, else there are seven.
-  const double moved = rigs > 0 ? 6 * static_cast<double>(rigs) - 6 : 6 * count(image_used) - 7;
-  const double shifted = IsPerImage(out.lens) ? 2 * count(image_used) : 0;
-  const double unknowns = 3 * count(point_used) + moved + shifted;
-  const double freedom = 2.0 * out.sights - unknowns;
-  out.sigma_px = freedom > 0 ? std::sqrt(squared / freedom) : 0;
+  const auto points = static_cast<double>(std::count(point_used.begin(), point_used.end(), true));
+  double known = 0;
+  squared += sigma_px * sigma_px * PriorSquares(out.bundle, options, &known);
+  const double freedom =
+      2.0 * out.sights + known - 3 * points - CameraUnknowns(out.bundle, image_used, rigs, options);
+  // As many unknowns as numbers: all are explained, and nothing says how well.
+  out.sigma_px =
+      freedom > 0 ? std::sqrt(squared / freedom) : std::numeric_limits<double>::infinity();
 }
 
 void CheckPriors(const Bundle& bundle, const AdjustOptions& options) {
@@ -292,7 +377,7 @@ Adjusted Solve(const Bundle& bundle, const AdjustOptions& options, Normalised& n
   Adjusted out;
   out.lens = options.lens;
   std::vector<Eigen::Vector2d> residuals = ResidualsOf(bundle, n);
-  double sigma = SigmaOf(residuals);
+  double sigma = SigmaOf(bundle, residuals);
   const auto solve = [&](const std::vector<bool>& used, double cauchy_px) {
     const auto summary = Minimise(bundle, options, used, sigma, cauchy_px, n);
     out.iterations += static_cast<int>(summary.iterations.size());
@@ -302,7 +387,7 @@ Adjusted Solve(const Bundle& bundle, const AdjustOptions& options, Normalised& n
   const double none = std::numeric_limits<double>::infinity();
   for (int pass = 0; options.outlier_sigmas > 0 && pass < kMostRobustPasses; ++pass) {
     solve(Within(residuals, none), kCauchySigmas * sigma);
-    const double next = SigmaOf(residuals);
+    const double next = SigmaOf(bundle, residuals);
     const bool settled = std::abs(next - sigma) <= kSameScale * sigma;
     sigma = next;
     if (settled) break;
@@ -313,7 +398,7 @@ Adjusted Solve(const Bundle& bundle, const AdjustOptions& options, Normalised& n
   out.used = Within(residuals, limit());
   for (int pass = 0; pass < kMostOutlierPasses; ++pass) {
     out.converged = solve(out.used, 0);
-    sigma = SigmaOf(residuals);
+    sigma = SigmaOf(bundle, residuals);
     std::vector<bool> used = Within(residuals, limit());
     if (used == out.used) break;
     if (pass + 1 < kMostOutlierPasses) out.used = std::move(used);
@@ -324,7 +409,7 @@ Adjusted Solve(const Bundle& bundle, const AdjustOptions& options, Normalised& n
     MoveToGaugeOf(start, out.bundle);
   }
   n.ToWorld(out.bundle);
-  Describe(residuals, n.rig_motion.size(), out);
+  Describe(residuals, n.rig_motion.size(), options, sigma, out);
   return out;
 }
 

@@ -62,9 +62,11 @@ struct Adjusted {
   LensFreedom lens = LensFreedom::kFixed;
   std::vector<bool> used;  ///< per sight: false for outliers and sights without a pixel
   int sights = 0;          ///< used ones
-  double sigma_px = 0;     ///< standard deviation of a used sight's coordinate, unknowns counted
-  double rms_px = 0;       ///< root mean squared residual length of the used sights
-  int without_pixel = 0;   ///< sights whose point has no pixel: behind the camera
+  /// Standard deviation of a used sight's coordinate, unknowns counted, lenses' and poses' as far
+  /// as they were free; infinite where there are as many unknowns as numbers.
+  double sigma_px = 0;
+  double rms_px = 0;      ///< root mean squared residual length of the used sights
+  int without_pixel = 0;  ///< sights whose point has no pixel: behind the camera
   int iterations = 0;
   bool converged = false;
 };

@@ -6,11 +6,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
-#include <nlohmann/json.hpp>
 
 #include "calib/bundle/lens_params.h"
+#include "calib/bundle/parts.h"
+#include "calib/bundle/picture_shift.h"
 #include "calib/bundle/shutter.h"
+#include "calib/distributions.h"
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/base/random.h"
@@ -21,10 +22,9 @@ namespace {
 constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
 constexpr size_t kFewestPoints = 50;
 constexpr int kFewestSights = 10;        // of an image: its pose has 6 unknowns, these 20 numbers
-constexpr int kFewestSightsOfHalf = 30;  // of an image, of all points: half of them must do
+constexpr int kFewestSightsOfHalf = 30;  // of an image in halves, of all points: half must do
 constexpr double kSquare = 1e-3;         // relative difference of fx and fy
 constexpr double kMostPoints = 4000;
-constexpr int kPointsPerView = 40;  // that its picture's shift is worked out at
 constexpr std::uint64_t kDraw = 0xd4a3, kHalf = 0x4a1f;
 
 // With distortion, zero where it starts: what undistortion left behind becomes a parameter. Pixels
@@ -48,31 +48,6 @@ Bundle WithPoints(const Bundle& bundle, const Keep& keep) {
     return !keep(static_cast<std::uint64_t>(o.point));
   });
   return some;
-}
-
-// Without the images that fewer than kFewestSights sights judge, and without lenses nobody uses.
-Bundle WithoutUnseen(const Bundle& bundle) {
-  std::vector<int> sights(bundle.images.size());
-  for (const BundleObservation& o : bundle.observations) ++sights[static_cast<size_t>(o.image)];
-  Bundle seen;
-  seen.points = bundle.points;
-  std::vector<int> image_at(bundle.images.size(), -1), lens_at(bundle.lenses.size(), -1);
-  for (size_t i = 0; i < bundle.images.size(); ++i) {
-    if (sights[i] < kFewestSights) continue;
-    image_at[i] = static_cast<int>(seen.images.size());
-    seen.images.push_back(bundle.images[i]);
-    int& lens = lens_at[static_cast<size_t>(bundle.images[i].lens)];
-    if (lens < 0) {
-      lens = static_cast<int>(seen.lenses.size());
-      seen.lenses.push_back(bundle.lenses[static_cast<size_t>(bundle.images[i].lens)]);
-    }
-    seen.images.back().lens = lens;
-  }
-  for (BundleObservation o : bundle.observations) {
-    o.image = image_at[static_cast<size_t>(o.image)];
-    if (o.image >= 0) seen.observations.push_back(o);
-  }
-  return seen;
 }
 
 AdjustOptions AllFree() {
@@ -125,76 +100,6 @@ Check AtMost(std::string name, double value, double limit, std::string reason) {
   return {std::move(name), value, limit, value <= limit, std::move(reason)};
 }
 
-// Sights of each image, by index, of points that are places.
-std::vector<std::vector<int>> SightsByImage(const Adjusted& fresh) {
-  std::vector<std::vector<int>> sights(fresh.bundle.images.size());
-  for (size_t i = 0; i < fresh.bundle.observations.size(); ++i) {
-    const BundleObservation& o = fresh.bundle.observations[i];
-    if (fresh.used[i] && fresh.bundle.points[static_cast<size_t>(o.point)][3] > 0) {
-      sights[static_cast<size_t>(o.image)].push_back(static_cast<int>(i));
-    }
-  }
-  return sights;
-}
-
-// An image's points, and the standard deviation (px per axis) of where the two images that share
-// most points with it place them.
-std::vector<PlacedPixel> Placed(const Adjusted& fresh, const BundleCovariance& covariance,
-                                const std::vector<std::vector<int>>& sights,
-                                const std::vector<std::vector<int>>& seen_by, int image) {
-  const auto& own = sights[static_cast<size_t>(image)];
-  std::map<int, int> shared;
-  for (const int i : own) {
-    const auto point = static_cast<size_t>(fresh.bundle.observations[static_cast<size_t>(i)].point);
-    for (const int other : seen_by[point]) shared[other] += other != image;
-  }
-  std::vector<std::pair<int, int>> ranked;  // -shared points, image
-  for (const auto& [other, times] : shared) {
-    if (other != image && times > 0) ranked.emplace_back(-times, other);
-  }
-  if (ranked.size() < 2) return {};
-  std::sort(ranked.begin(), ranked.end());
-  const int a = ranked[0].second, b = ranked[1].second;
-  const auto step = std::max<size_t>(1, own.size() / kPointsPerView);
-  std::vector<PlacedPixel> placed;
-  for (size_t k = 0; k < own.size(); k += step) {
-    const auto& o = fresh.bundle.observations[static_cast<size_t>(own[k])];
-    const Eigen::Vector4d& h = fresh.bundle.points[static_cast<size_t>(o.point)];
-    const Eigen::Matrix2d variance =
-        TransferCovariance(fresh.bundle, covariance, h.head<3>() / h[3], a, b, image);
-    if (!variance.allFinite()) continue;
-    placed.push_back({o.pixel, std::sqrt(std::max(0.0, variance.trace() / 2))});
-  }
-  return placed;
-}
-
-// 95 % of their standard deviations.
-double PictureShift(const std::vector<PlacedPixel>& placed) {
-  if (placed.empty()) return kNothing;
-  std::vector<double> shifts;
-  for (const PlacedPixel& point : placed) shifts.push_back(point.sigma_px);
-  std::sort(shifts.begin(), shifts.end());
-  return shifts[static_cast<size_t>(0.95 * static_cast<double>(shifts.size() - 1))];
-}
-
-void PictureShifts(const Adjusted& fresh, const BundleCovariance& covariance, int threads,
-                   Judgement& judgement) {
-  const auto sights = SightsByImage(fresh);
-  std::vector<std::vector<int>> seen_by(fresh.bundle.points.size());
-  for (size_t i = 0; i < sights.size(); ++i) {
-    for (const int s : sights[i]) {
-      const auto point =
-          static_cast<size_t>(fresh.bundle.observations[static_cast<size_t>(s)].point);
-      seen_by[point].push_back(static_cast<int>(i));
-    }
-  }
-  ParallelFor(0, static_cast<int>(sights.size()), threads, [&](int i) {
-    CameraJudgement& camera = judgement.cameras[static_cast<size_t>(i)];
-    camera.placed = Placed(fresh, covariance, sights, seen_by, i);
-    camera.picture_shift_px = PictureShift(camera.placed);
-  });
-}
-
 void CompareWithStored(const Bundle& stored, const Adjusted& fresh,
                        const BundleCovariance& covariance, Judgement& judgement) {
   const std::vector<double> moved = Moved(fresh, stored);
@@ -210,8 +115,7 @@ void CompareWithStored(const Bundle& stored, const Adjusted& fresh,
         PoseDifference(stored.images[i].cam_from_world, fresh.bundle.images[i].cam_from_world),
         variance);
     const auto largest = [](const Eigen::Matrix3d& m) {
-      return std::sqrt(
-          std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(m).eigenvalues()[2]));
+      return RootOfVariance(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(m).eigenvalues()[2]);
     };
     camera.turn_sigma_rad = largest(variance.topLeftCorner<3, 3>());
     camera.centre_sigma = largest(variance.bottomRightCorner<3, 3>());
@@ -251,29 +155,59 @@ double HalvesRatio(const Adjusted halves[2], const BundleCovariance covariances[
   return std::sqrt(sum / static_cast<double>(images.size()));
 }
 
-int LeastSights(const Bundle& bundle) {
-  std::vector<int> sights(bundle.images.size());
-  for (const BundleObservation& o : bundle.observations) ++sights[static_cast<size_t>(o.image)];
-  return *std::min_element(sights.begin(), sights.end());
+// Two halves of the points of the images that have enough, solved apart; empty where too few have.
+struct Halves {
+  std::vector<Bundle> parts;
+  std::string left_out;  // images that have too few sights for it
+};
+
+Halves HalvesOf(const Bundle& stored) {
+  Halves halves;
+  const Bundle enough = WithoutUnseen(stored, kFewestSightsOfHalf);
+  for (const BundleImage& image : stored.images) {
+    const bool kept =
+        std::any_of(enough.images.begin(), enough.images.end(),
+                    [&](const BundleImage& other) { return other.name == image.name; });
+    if (!kept) halves.left_out += (halves.left_out.empty() ? "" : ", ") + image.name;
+  }
+  if (enough.images.size() < 2) return halves;
+  for (const std::uint64_t half : {0, 1}) {
+    halves.parts.push_back(
+        WithPoints(enough, [&](std::uint64_t p) { return (HashOf(p, kHalf) & 1) == half; }));
+  }
+  return halves;
 }
 
-void AddHalves(const BundleLimits& limits, const Adjusted halves[2], Judgement& judgement) {
-  const BundleCovariance covariances[2] = {CovarianceOf(halves[0], AllFree()),
-                                           CovarianceOf(halves[1], AllFree())};
-  judgement.halves_ratio = covariances[0].determined && covariances[1].determined
-                               ? HalvesRatio(halves, covariances)
-                               : kNothing;
+void AddHalves(const BundleLimits& limits, const Halves& halves, const Adjusted solved[2],
+               Judgement& judgement) {
+  judgement.halves_ratio = kNothing;
+  if (halves.parts.empty()) {
+    judgement.tests.push_back(AtMost(
+        "halves_ratio", kNothing, limits.max_halves_ratio,
+        fmt::format("expected two photos of {} sights or more, whose halves can be solved apart",
+                    kFewestSightsOfHalf)));
+    return;
+  }
+  const BundleCovariance covariances[2] = {CovarianceOf(solved[0], AllFree()),
+                                           CovarianceOf(solved[1], AllFree())};
+  if (covariances[0].determined && covariances[1].determined) {
+    judgement.halves_ratio = HalvesRatio(solved, covariances);
+  }
   Check check =
       AtMost("halves_ratio", judgement.halves_ratio, limits.max_halves_ratio,
              "two halves of the points, solved apart: their poses' difference over the predicted");
   double moved_px = 0;
-  for (const double px : Moved(halves[0], halves[1].bundle)) {
+  for (const double px : Moved(solved[0], solved[1].bundle)) {
     if (px > moved_px) moved_px = px;
   }
   // Exact sights leave rounding, of which no ratio means anything.
   if (moved_px <= NegligiblePx(limits, judgement.sigma_px)) {
     check.passed = true;
     check.reason += fmt::format("; points move by {:.2g} px at most", moved_px);
+  }
+  if (!halves.left_out.empty()) {
+    check.reason += fmt::format("; without photos of fewer than {} sights: {}", kFewestSightsOfHalf,
+                                halves.left_out);
   }
   judgement.tests.push_back(std::move(check));
 }
@@ -374,8 +308,8 @@ void AddShutter(const BundleLimits& limits, const Adjusted& fresh,
                 const BundleCovariance& covariance, Judgement& judgement) {
   const ShutterTest test = TestShutter(fresh, covariance);
   if (!test.not_tested.empty()) {
-    judgement.tests.push_back(
-        AtMost("rolling_shutter_px", 0, limits.max_shutter_px, "not tested: " + test.not_tested));
+    judgement.tests.push_back(AtMost("rolling_shutter_px", kNothing, limits.max_shutter_px,
+                                     "not tested: " + test.not_tested));
     return;
   }
   const bool chance = test.p >= limits.min_p;
@@ -395,36 +329,39 @@ void AddShutter(const BundleLimits& limits, const Adjusted& fresh,
   judgement.tests.push_back(std::move(check));
 }
 
-}  // namespace
-
-double NegligiblePx(const BundleLimits& limits, double sigma_px) {
-  return std::clamp(limits.negligible_sigmas * sigma_px, limits.least_negligible_px,
-                    limits.most_negligible_px);
+// Says, as a test that fails, that images were not judged, and why.
+Judgement NotJudged(Judgement judgement, size_t images, const std::string& why) {
+  judgement.not_judged = why;
+  judgement.tests.push_back(
+      AtMost("photos_not_judged", static_cast<double>(images), 0,
+             "no fresh bundle adjustment says whether they are right: " + why));
+  return judgement;
 }
 
-Judgement Judge(const Bundle& given, const BundleLimits& limits, int threads) {
+Judgement JudgePart(const Bundle& given, const BundleLimits& limits, int threads) {
   Judgement judgement;
-  const double share = kMostPoints / static_cast<double>(given.points.size());
-  const Bundle stored = WithDistortion(WithoutUnseen(WithPoints(given, [&](std::uint64_t p) {
-    return share >= 1 || UniformFromHash(HashOf(p, kDraw)) < share;
-  })));
-  if (given.points.size() < kFewestPoints || stored.images.size() < 2) {
-    judgement.not_judged = fmt::format("expected {} points or more that two views see, found {}",
-                                       kFewestPoints, given.points.size());
-    return judgement;
+  std::vector<bool> seen(given.points.size());
+  for (const BundleObservation& o : given.observations) seen[static_cast<size_t>(o.point)] = true;
+  const auto points = static_cast<size_t>(std::count(seen.begin(), seen.end(), true));
+  const double share = kMostPoints / static_cast<double>(points);
+  const Bundle stored = WithDistortion(WithoutUnseen(
+      WithPoints(
+          given,
+          [&](std::uint64_t p) { return share >= 1 || UniformFromHash(HashOf(p, kDraw)) < share; }),
+      kFewestSights));
+  if (points < kFewestPoints || stored.images.size() < 2) {
+    return NotJudged(judgement, given.images.size(),
+                     fmt::format("expected {} points or more that two views see, found {}",
+                                 kFewestPoints, points));
   }
-  const bool halves = LeastSights(stored) >= kFewestSightsOfHalf;
+  const Halves halves = HalvesOf(stored);
   Adjusted solved[3];  // all points, two halves
   try {
-    ParallelFor(0, halves ? 3 : 1, threads, [&](int i) {
-      const Bundle part = WithPoints(stored, [&](std::uint64_t p) {
-        return i == 0 || (HashOf(p, kHalf) & 1) == static_cast<std::uint64_t>(i - 1);
-      });
-      solved[i] = Adjust(part, AllFree());
+    ParallelFor(0, halves.parts.empty() ? 1 : 3, threads, [&](int i) {
+      solved[i] = Adjust(i == 0 ? stored : halves.parts[static_cast<size_t>(i) - 1], AllFree());
     });
   } catch (const Error& error) {
-    judgement.not_judged = error.what();
-    return judgement;
+    return NotJudged(judgement, stored.images.size(), error.what());
   }
   const Adjusted& fresh = solved[0];
   const BundleCovariance covariance = CovarianceOf(fresh, AllFree());
@@ -434,63 +371,93 @@ Judgement Judge(const Bundle& given, const BundleLimits& limits, int threads) {
   judgement.degeneracies = FindDegeneracies(fresh, covariance, limits.max_focal_share);
   AddDegeneracies(judgement);
   if (!covariance.computed) {
-    judgement.not_judged =
-        fmt::format("more than {} unknowns: too many for their covariance", kMostUnknowns);
-    return judgement;
+    return NotJudged(
+        judgement, stored.images.size(),
+        fmt::format("more than {} unknowns: too many for their covariance", kMostUnknowns));
   }
-  if (!covariance.determined) return judgement;
+  if (!covariance.determined) {
+    return NotJudged(judgement, stored.images.size(),
+                     "the sights do not determine " + covariance.weakest);
+  }
   if (!fresh.converged) {
-    judgement.not_judged =
-        fmt::format("the fresh solve did not settle in {} steps", fresh.iterations);
-    return judgement;
+    return NotJudged(judgement, stored.images.size(),
+                     fmt::format("the fresh solve did not settle in {} steps", fresh.iterations));
   }
   CompareWithStored(stored, fresh, covariance, judgement);
-  PictureShifts(fresh, covariance, threads, judgement);
-  if (halves) AddHalves(limits, solved + 1, judgement);
+  PictureShifts(fresh, covariance, threads, judgement.cameras);
+  AddHalves(limits, halves, solved + 1, judgement);
   WidenByHalves(judgement);
   AddDifferences(limits, judgement);
   AddPicture(limits, judgement);
   AddShutter(limits, fresh, covariance, judgement);
+  judgement.tests.push_back(AtMost("photos_not_judged", 0, 0, "a fresh bundle adjustment has all"));
   return judgement;
 }
 
-std::string ToJson(const Judgement& judgement) {
-  using Json = nlohmann::ordered_json;
-  const auto number = [](double v) { return std::isfinite(v) ? Json(v) : Json(nullptr); };
-  Json json;
-  if (!judgement.not_judged.empty()) json["not_judged"] = judgement.not_judged;
-  json["sights"] = judgement.sights;
-  json["sigma_px"] = number(judgement.sigma_px);
-  json["condition"] = number(judgement.condition);
-  json["halves_ratio"] = number(judgement.halves_ratio);
-  json["lenses"] = Json::array();
-  for (const LensJudgement& lens : judgement.lenses) {
-    Json params = Json::array();
-    for (size_t k = 0; k < lens.names.size(); ++k) {
-      params.push_back({{"name", lens.names[k]},
-                        {"stored", number(lens.stored[k])},
-                        {"fresh", number(lens.fresh[k])},
-                        {"sigma", number(lens.sigma[k])}});
+// The worse of two checks of one name: what failed, and then by how much; what could not be worked
+// out is worse than any number.
+bool IsWorse(const Check& a, const Check& b) {
+  if (a.passed != b.passed) return !a.passed;
+  const auto rank = [](const Check& check) {
+    return std::isnan(check.value) ? std::numeric_limits<double>::infinity() : check.value;
+  };
+  return rank(a) > rank(b);
+}
+
+void JoinTests(const Judgement& part, Judgement& all) {
+  for (const Check& test : part.tests) {
+    const auto same = std::find_if(all.tests.begin(), all.tests.end(),
+                                   [&](const Check& other) { return other.name == test.name; });
+    if (same == all.tests.end()) {
+      all.tests.push_back(test);
+    } else if (test.name == "photos_not_judged") {
+      same->value += test.value;
+      if (!test.passed && same->passed) same->reason = test.reason;
+      same->passed = same->passed && test.passed;
+    } else if (IsWorse(test, *same)) {
+      *same = test;
     }
-    json["lenses"].push_back({{"difference_sigmas", number(lens.sigmas)},
-                              {"moved_px", number(lens.moved_px)},
-                              {"params", params}});
   }
-  json["cameras"] = Json::array();
-  for (const CameraJudgement& camera : judgement.cameras) {
-    json["cameras"].push_back({{"name", camera.name},
-                               {"difference_sigmas", number(camera.sigmas)},
-                               {"moved_px", number(camera.moved_px)},
-                               {"turn_sigma_rad", number(camera.turn_sigma_rad)},
-                               {"centre_sigma", number(camera.centre_sigma)},
-                               {"picture_shift_px", number(camera.picture_shift_px)}});
+}
+
+// One judgement of many: the worst of each test, every camera once.
+void Join(const Judgement& part, Judgement& all) {
+  JoinTests(part, all);
+  for (const CameraJudgement& camera : part.cameras) {
+    const bool known =
+        std::any_of(all.cameras.begin(), all.cameras.end(),
+                    [&](const CameraJudgement& other) { return other.name == camera.name; });
+    if (!known) all.cameras.push_back(camera);
   }
-  json["degeneracies"] = Json::array();
-  for (const Degeneracy& d : judgement.degeneracies) {
-    json["degeneracies"].push_back(
-        {{"name", d.name}, {"detail", d.detail}, {"harmful", d.harmful}});
-  }
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  all.lenses.insert(all.lenses.end(), part.lenses.begin(), part.lenses.end());
+  all.degeneracies.insert(all.degeneracies.end(), part.degeneracies.begin(),
+                          part.degeneracies.end());
+  if (all.not_judged.empty()) all.not_judged = part.not_judged;
+  all.sigma_px = std::max(all.sigma_px, part.sigma_px);
+  all.condition = std::max(all.condition, part.condition);
+  if (!(part.halves_ratio <= all.halves_ratio)) all.halves_ratio = part.halves_ratio;
+  all.sights += part.sights;
+}
+
+}  // namespace
+
+double NegligiblePx(const BundleLimits& limits, double sigma_px) {
+  return std::clamp(limits.negligible_sigmas * sigma_px, limits.least_negligible_px,
+                    limits.most_negligible_px);
+}
+
+Judgement Judge(const Bundle& given, const BundleLimits& limits, int threads) {
+  // With distortion, as it is solved for.
+  const int unknowns = JudgedUnknowns(WithDistortion(given));
+  if (unknowns <= limits.most_unknowns) return JudgePart(given, limits, threads);
+  Judgement all;
+  const Bundle seen = WithoutUnseen(given, kFewestSights);
+  // Half of what one part may have: work grows with the cube.
+  const std::vector<Bundle> parts = PartsOf(seen, limits.most_unknowns / 2);
+  for (const Bundle& part : parts) Join(JudgePart(part, limits, threads), all);
+  all.parts = static_cast<int>(parts.size());
+  if (parts.empty()) return NotJudged(all, given.images.size(), "no photo has points to judge by");
+  return all;
 }
 
 }  // namespace dtr::calib

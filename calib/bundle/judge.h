@@ -26,8 +26,9 @@ struct BundleLimits {
   /// Residuals as of photos whose rows were read while the camera turned: RMS per coordinate that
   /// such turns explain beyond chance.
   double max_shutter_px = 0.1;
-  double min_p = 1e-4;           ///< less likely by chance than this is no chance
-  double max_focal_share = 0.1;  ///< standard deviation of a focal length over itself
+  double min_p = 1e-4;                ///< less likely by chance than this is no chance
+  int most_unknowns = kMostUnknowns;  ///< of a bundle that is judged in one part
+  double max_focal_share = 0.1;       ///< standard deviation of a focal length over itself
 };
 
 /// What of a difference is too little to matter, where a sight's coordinate has `sigma_px`.
@@ -59,7 +60,10 @@ struct LensJudgement {
 };
 
 struct Judgement {
-  std::string not_judged;  ///< why there is no judgement; empty where there is one
+  /// Why (some) images have no judgement; empty where all have one. The test photos_not_judged then
+  /// fails: no evidence is no pass.
+  std::string not_judged;
+  int parts = 1;  ///< that the images were judged in
   std::vector<Check> tests;
   std::vector<CameraJudgement> cameras;
   std::vector<LensJudgement> lenses;
@@ -76,7 +80,9 @@ struct Judgement {
 ///  - the covariance is carried to a third view's pixels (TransferCovariance);
 ///  - degeneracies are looked for by name;
 ///  - residuals are held against a shutter that reads row by row (shutter.h).
-/// At most 4000 points, drawn by their index, take part. Deterministic for any number of threads.
+/// At most 4000 points, drawn by their index, take part. More than some 220 photos (kMostUnknowns
+/// with three turns each) are judged in parts of about 100 that see the same points, each by
+/// itself; of every test the worst part's figure is told. Deterministic for any number of threads.
 /// Throws Error on a broken bundle only.
 Judgement Judge(const Bundle& stored, const BundleLimits& limits, int threads = 0);
 
@@ -86,8 +92,8 @@ std::vector<Degeneracy> FindDegeneracies(const Adjusted& adjusted,
                                          const BundleCovariance& covariance,
                                          double max_focal_share);
 
-/// JSON object: sigma_px, condition, halves_ratio, sights, lenses[], cameras[], degeneracies[],
-/// not_judged.
+/// JSON object: parts, sigma_px, condition, halves_ratio, sights, lenses[], cameras[],
+/// degeneracies[], not_judged.
 std::string ToJson(const Judgement& judgement);
 
 }  // namespace dtr::calib

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "calib/bundle/covariance_json.h"
 #include "calib/bundle/held_out.h"
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
@@ -24,7 +25,8 @@ constexpr std::array kRisingFreedom{LensFreedom::kNoPrincipalPoint, LensFreedom:
                                     LensFreedom::kTangential, LensFreedom::kPrincipalPointPerImage,
                                     LensFreedom::kTangentialPerImage};
 
-constexpr size_t kNoneConverged = ~size_t{0};
+constexpr size_t kNoneConverged = ~size_t{0}, kNoScale = kNoneConverged - 1;
+constexpr double kLeastSigmaPx = 1e-7;  // exact sights differ by rounding, which no loss can weigh
 
 // Whether more freedom than the chosen candidate's is worth it: beyond chance, and for a number
 // that every image has by itself beyond what is too little to matter.
@@ -77,14 +79,16 @@ std::vector<std::vector<double>> TryOnUnseenPoints(const Bundle& bundle,
 }
 
 /// Which lens parameters to free, by points that were not adjusted to; index of the candidate, or
-/// kNoneConverged. A candidate whose solve did not converge is not taken.
+/// kNoneConverged, or kNoScale where nothing says how far sights err. A candidate whose solve did
+/// not converge is not taken.
 size_t Choose(const Bundle& bundle, const SightSplit& split, const RefineOptions& options,
               Refined& refined) {
   auto& candidates = refined.candidates;
   candidates = CandidatesFor(bundle, options.separate_lenses);
   double sigma_px = 0;
   LossesOfUnseenPoints(bundle, split.training, 1, &sigma_px);
-  const double scale_px = kLossSigmas * sigma_px;
+  if (!std::isfinite(sigma_px)) return kNoScale;
+  const double scale_px = kLossSigmas * std::max(sigma_px, kLeastSigmaPx);
   const auto losses = TryOnUnseenPoints(SomePoints(bundle, kMostPoints, options.seed), options,
                                         scale_px, candidates);
   size_t chosen = 0;
@@ -126,6 +130,10 @@ bool Refinable(const SfmModel& model, std::string* reason) {
 void Finish(const SfmModel& model, const RefineOptions& options, Refined& refined) {
   refined.model =
       ModelOf(refined.adjusted.bundle, model, options.separate_lenses, &refined.points_dropped);
+  if (options.covariance) {
+    refined.covariance_json =
+        ToJson(refined.adjusted, CovarianceOf(refined.adjusted, OptionsFor(refined.lens)));
+  }
   refined.adjusted.bundle = {};
   refined.changed = true;
 }
@@ -177,9 +185,10 @@ Refined Refine(const SfmModel& model, const RefineOptions& options) {
     return refined;
   }
   const size_t chosen = Choose(bundle, split, options, refined);
-  if (chosen == kNoneConverged || chosen == 0) {
-    refined.reason =
-        chosen == 0 ? "held-out sights are predicted no better" : "the solve did not converge";
+  if (chosen == kNoneConverged || chosen == kNoScale || chosen == 0) {
+    refined.reason = chosen == 0          ? "held-out sights are predicted no better"
+                     : chosen == kNoScale ? "the sights are no more than the unknowns"
+                                          : "the solve did not converge";
     refined.adjusted = {};
     return refined;
   }
@@ -233,6 +242,9 @@ std::string ToJson(const Refined& refined) {
     json["iterations"] = refined.adjusted.iterations;
     json["converged"] = refined.adjusted.converged;
     json["points_dropped"] = refined.points_dropped;
+  }
+  if (!refined.covariance_json.empty()) {
+    json["covariance"] = nlohmann::ordered_json::parse(refined.covariance_json);
   }
   return json.dump();
 }

@@ -17,6 +17,7 @@ struct RefineOptions {
   /// Lenses that are known, by camera id: they are held, and replace the model's.
   std::optional<std::map<std::uint32_t, LensCamera>> known_lenses;
   bool separate_lenses = false;  ///< every image a lens of its own
+  bool covariance = false;       ///< work out Refined::covariance_json
   int threads = 0;
   std::uint64_t seed = 0;  ///< of the sights that are held out
 };
@@ -41,6 +42,8 @@ struct Refined {
   double given_px = 0, adjusted_px = 0;  ///< root mean of Cauchy's loss over these
   std::optional<LensFreedom> lens;
   Adjusted adjusted;  ///< of the chosen candidate, all sights; bundle emptied
+  /// Of that (covariance_json.h), where it was asked for and the model was changed.
+  std::string covariance_json;
   int points_dropped = 0;
 };
 
@@ -68,7 +71,8 @@ void RequireDetermined(const SfmModel& model, const RefineOptions& options,
                        const std::string& what);
 
 /// JSON object: refined, reason, lens, candidates[].{name,held_out_px,converged}, held_out_sights,
-/// given_px, adjusted_px, sigma_px, rms_px, iterations, points_dropped.
+/// given_px, adjusted_px, sigma_px, rms_px, iterations, points_dropped, covariance (where asked
+/// for).
 std::string ToJson(const Refined& refined);
 
 }  // namespace dtr::calib

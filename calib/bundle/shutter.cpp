@@ -166,8 +166,7 @@ ShutterTest TestShutter(const Adjusted& adjusted, const BundleCovariance& layout
   }
   const double variance = unexplained / below;
   test.p = FisherSurvival(explained / test.freedom / variance, test.freedom, below);
-  test.amplitude_px =
-      std::sqrt(std::max(0.0, explained - test.freedom * variance) / normal.coordinates);
+  test.amplitude_px = RootOfVariance((explained - test.freedom * variance) / normal.coordinates);
   const Eigen::MatrixXd half =
       scale.asDiagonal() * eigen.eigenvectors() * inverse.cwiseSqrt().asDiagonal();
   const Eigen::VectorXd found = -half * (inverse.cwiseSqrt().asDiagonal() * along);

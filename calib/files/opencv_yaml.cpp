@@ -245,6 +245,19 @@ void WriteOpenCvYaml(const std::filesystem::path& file, const LensCamera& camera
 
 void WriteOpenCvStereoYaml(const std::filesystem::path& file, const LensCamera& first,
                            const LensCamera& second, const Pose& second_from_first) {
+  // The file has one size and one kind for both.
+  if (first.width_px != second.width_px || first.height_px != second.height_px) {
+    throw Error(fmt::format(
+        "{}: expected two cameras of one size, as OpenCV's stereo files have it, found {}x{} and "
+        "{}x{}; write one .yml for each",
+        file.string(), first.width_px, first.height_px, second.width_px, second.height_px));
+  }
+  if (IsFisheye(first.model) != IsFisheye(second.model)) {
+    throw Error(fmt::format(
+        "{}: expected two fisheyes or none, as OpenCV's stereo files have it, found {} and {}; "
+        "write one .yml for each",
+        file.string(), NameOf(first.model), NameOf(second.model)));
+  }
   const Eigen::Matrix3d r = second_from_first.rotation.toRotationMatrix();
   const Eigen::Vector3d& t = second_from_first.translation;
   WriteFileAtomically(file, kHead + SizeAndKind(first) + MatricesOf(first, "M1", "D1") +

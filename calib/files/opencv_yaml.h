@@ -21,8 +21,8 @@ LensCamera ReadOpenCvYaml(const std::filesystem::path& file);
 void WriteOpenCvYaml(const std::filesystem::path& file, const LensCamera& camera);
 
 /// Writes two cameras as OpenCV's stereo_calib sample names them: M1, D1, M2, D2, R and T with
-/// p_second = R p_first + T, and image_width, image_height of the first. Atomically; throws as
-/// WriteOpenCvYaml does.
+/// p_second = R p_first + T, and image_width, image_height and fisheye_model of both. Atomically;
+/// throws as WriteOpenCvYaml does, and where sizes differ or one alone is a fisheye.
 void WriteOpenCvStereoYaml(const std::filesystem::path& file, const LensCamera& first,
                            const LensCamera& second, const Pose& second_from_first);
 

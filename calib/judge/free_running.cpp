@@ -9,6 +9,7 @@
 
 #include "calib/judge/patterns.h"
 #include "calib/lens_map.h"
+#include "calib/solve/least_squares.h"
 #include "calib/solve/rig_start.h"
 #include "dtr/base/error.h"
 
@@ -157,22 +158,14 @@ Eigen::MatrixXd DelayColumns(const RigSolution& solution, const Path& path, cons
 // What the residuals of a solution say about delays beyond those that its corners were moved by.
 std::vector<std::optional<CameraDelay>> MoreDelay(const RigSolution& solution, const Path& path,
                                                   const Delays& delays) {
-  // Cameras that nothing is known of are taken out: their columns are zero.
-  Eigen::VectorXd squares = Eigen::VectorXd::Zero(static_cast<long>(delays.size()) - 1);
-  for (const FrameRows& frame : solution.rows) {
-    squares += DelayColumns(solution, path, delays, frame).colwise().squaredNorm();
-  }
-  std::vector<long> told;
-  for (long k = 0; k < squares.size(); ++k) {
-    if (squares[k] > 0) told.push_back(k);
-  }
   const PatternTest test = TestSharedPattern(solution, [&](const FrameRows& frame) {
-    return Eigen::MatrixXd(DelayColumns(solution, path, delays, frame)(Eigen::all, told));
+    return DelayColumns(solution, path, delays, frame);
   });
   std::vector<std::optional<CameraDelay>> more(delays.size());
   more[0] = CameraDelay{};
   for (size_t i = 0; i < test.coefficients.size(); ++i) {
-    more[static_cast<size_t>(told[i]) + 1] = CameraDelay{test.coefficients[i], test.sigmas[i]};
+    if (!std::isfinite(test.coefficients[i])) continue;  // nothing is known of this camera
+    more[i + 1] = CameraDelay{test.coefficients[i], test.sigmas[i]};
   }
   return more;
 }
@@ -293,7 +286,11 @@ void WidenByDelays(const Path& path, const Delays& delays, const std::vector<boo
     by_shared << frame.by_shared, DelayColumns(solution, path, delays, frame)(Eigen::all, free);
     information.AddPose(by_shared, frame.by_motion);
   }
-  if (!information.Invert()) return;  // each is determined, as their sigmas say: only rounding
+  if (!information.Invert()) {
+    Refuse(
+        "the delays cannot be told from the cameras' places and lenses; show the board in more "
+        "frames that follow each other, moving to different sides");
+  }
   const double freedom = solution.freedom - static_cast<double>(count);
   solution.sigma_px *= std::sqrt(solution.freedom / freedom);
   solution.freedom = freedom;
@@ -321,6 +318,7 @@ FreeRunning SolveFreeRunning(const Board& board, std::span<const RigCameraInput>
   std::vector<RigView> moved = views;
   std::vector<double> moments(frames, 0);
   RigOptions solve = options;
+  solve.solve.cover_image = false;  // of what is kept alone
   std::vector<RigCameraInput> inputs(cameras.begin(), cameras.end());
   std::string last;  // delays, and by how much they changed
   for (free.passes = 1; free.passes <= kMostPasses; ++free.passes) {
@@ -368,6 +366,9 @@ FreeRunning SolveFreeRunning(const Board& board, std::span<const RigCameraInput>
       WidenByDelays(path, delays, free.moved, free.solution);
       RestoreOutliers(moved, free.solution);
       free.solution.flipped = std::move(flipped);
+      if (options.solve.cover_image && options.free_lenses) {
+        RequireCoveredImages(free.solution.rig);
+      }
       for (const auto* more : {&decided, &left_out}) {
         free.solution.left_out.insert(free.solution.left_out.end(), more->begin(), more->end());
       }

@@ -82,7 +82,7 @@ class Judging {
     options.loss = unseen_ ? Loss::kRobust : Loss::kQuadratic;
     std::vector<LeftOut> left_out;
     fitted_ = FitFrames(calibration_.board, calibration_.cameras, Tested(), TestedFrames(), options,
-                        left_out);
+                        left_out, &report_.flipped);
     AddResiduals(calibration_.board, fitted_, stored_);
     for (const LeftOut& item : left_out) {
       for (const RigView& view : Tested()) {
@@ -213,66 +213,89 @@ class Judging {
     Add(AtMost("worst_region_ratio", worst > 0 ? worst : kNaN, limits_.max_region_ratio, where));
   }
 
-  void TestStoredAgainstFresh() {
-    const Fresh& fresh = unseen_ ? fresh_ : kept_;
-    const double self = limits_.max_self_difference_sigmas;
-    if (!fresh.solution) {
-      Add(Refused("lens_difference_sigmas", self, fresh.refused));
-      if (calibration_.cameras.size() > 1) {
-        Add(Refused("place_difference_sigmas", self, fresh.refused));
-      }
-      return;
+  // What the stored calibration is held against: a solve of the views that made it, which must be
+  // the same numbers, and one of unseen views, which errs by itself. The worse of both is told.
+  struct Reference {
+    const Fresh& fresh;
+    bool unseen = false;
+    double Limit(double min_p, double self, int count) const {
+      return unseen ? std::sqrt(ChiSquaredLimit(min_p, count)) : self;
     }
-    const RigSolution& solution = *fresh.solution;
+  };
+
+  void TestStoredAgainstFresh() {
+    const double self = limits_.max_self_difference_sigmas;
+    std::vector<Reference> references;
+    if (!calibration_.kept.empty()) references.push_back({kept_, false});
+    if (unseen_) references.push_back({fresh_, true});
+    const bool rig = calibration_.cameras.size() > 1;
+    Check lens{"lens_difference_sigmas", -1, self, true, ""};
+    Check place{"place_difference_sigmas", -1, self, true, ""};
+    Check scale{"rig_scale_sigmas", -1, self, true, ""};
+    for (const Reference& reference : references) {
+      if (reference.fresh.solution) {
+        TestAgainst(reference, lens, place, scale);
+        continue;
+      }
+      lens = Refused("lens_difference_sigmas", self, reference.fresh.refused);
+      place = Refused("place_difference_sigmas", self, reference.fresh.refused);
+      break;
+    }
+    if (calibration_.free_lenses) Add(lens);
+    if (!rig) return;
+    Add(place);
+    if (scale.value >= 0) Add(scale);
+  }
+
+  void TestAgainst(const Reference& reference, Check& lens, Check& place, Check& scale) {
+    const RigSolution& solution = *reference.fresh.solution;
     const Eigen::VectorXd difference =
         Difference(solution.layout, calibration_.cameras, solution.rig.cameras);
     Eigen::MatrixXd covariance = solution.covariance;
     // Unseen views: both calibrations err.
-    if (unseen_ && kept_.solution) covariance += kept_.solution->covariance;
-    const auto limit = [&](int count) {
-      return unseen_ ? std::sqrt(ChiSquaredLimit(limits_.min_p, count)) : self;
-    };
+    if (reference.unseen && kept_.solution) covariance += kept_.solution->covariance;
     const ProjectionSensitivity sensitivity(solution);
-    Check lens{"lens_difference_sigmas", -1, limit(8), true, ""};
-    Check place{"place_difference_sigmas", -1, limit(6), true, ""};
     for (size_t c = 0; c < calibration_.cameras.size(); ++c) {
       JudgedCamera& camera = report_.cameras[c];
       camera.difference = ShiftMap(solution, sensitivity, difference, c,
                                    BoardDistance(calibration_.board, solution.rig, c));
       if (solution.layout.LensAt(c) >= 0) {
-        const int count = FreeParameterCount(calibration_.cameras[c].model);
-        Hold(difference, covariance, solution.layout, solution.layout.LensAt(c), count,
-             limit(count), c, lens);
+        Hold(reference, solution.layout, difference, covariance, solution.layout.LensAt(c),
+             FreeParameterCount(calibration_.cameras[c].model), c, lens);
       }
       if (solution.layout.PlaceAt(c) >= 0) {
-        Hold(difference, covariance, solution.layout, solution.layout.PlaceAt(c), 6, limit(6), c,
+        Hold(reference, solution.layout, difference, covariance, solution.layout.PlaceAt(c), 6, c,
              place);
       }
     }
-    if (solution.layout.free_lenses()) Add(lens);
-    if (calibration_.cameras.size() < 2) return;
-    Add(place);
-    TestScale(solution, covariance, difference);
+    if (calibration_.cameras.size() > 1) {
+      TestScale(reference, solution, covariance, difference, scale);
+    }
+  }
+
+  static const char* NameOfSolve(const Reference& reference) {
+    return reference.unseen ? "the unseen views'" : "fresh";
   }
 
   // Keeps in `check` the part that is farthest beyond its limit.
-  void Hold(const Eigen::VectorXd& difference, const Eigen::MatrixXd& covariance,
-            const RigLayout& layout, int at, int count, double limit, size_t camera, Check& check) {
+  void Hold(const Reference& reference, const RigLayout& layout, const Eigen::VectorXd& difference,
+            const Eigen::MatrixXd& covariance, int at, int count, size_t camera, Check& check) {
     const double distance = Distance(difference, covariance, at, count);
+    const double limit = reference.Limit(limits_.min_p, limits_.max_self_difference_sigmas, count);
     if (check.value >= 0 && !(distance / limit > check.value / check.limit)) return;
     check.value = distance;
     check.limit = limit;
     check.passed = distance <= limit;
-    check.reason =
-        fmt::format("{}: stored less {} solve; {}; up to {:.3g} px in the image",
-                    calibration_.cameras[camera].name, unseen_ ? "the unseen views'" : "fresh",
-                    LargestPart(layout, difference, covariance, at, count),
-                    report_.cameras[camera].difference.Largest());
+    check.reason = fmt::format("{}: stored less {} solve; {}; up to {:.3g} px in the image",
+                               calibration_.cameras[camera].name, NameOfSolve(reference),
+                               LargestPart(layout, difference, covariance, at, count),
+                               report_.cameras[camera].difference.Largest());
   }
 
   // One factor on all shifts: another size of the board.
-  void TestScale(const RigSolution& solution, const Eigen::MatrixXd& covariance,
-                 const Eigen::VectorXd& difference) {
+  void TestScale(const Reference& reference, const RigSolution& solution,
+                 const Eigen::MatrixXd& covariance, const Eigen::VectorXd& difference,
+                 Check& check) {
     Eigen::VectorXd direction = Eigen::VectorXd::Zero(difference.size());
     for (size_t c = 1; c < solution.rig.cameras.size(); ++c) {
       direction.segment<3>(solution.layout.PlaceAt(c) + 3) =
@@ -282,12 +305,15 @@ class Judging {
     if (!(squares > 0)) return;  // cameras in one point: no length to compare
     const double scale = direction.dot(difference) / squares;
     const double sigma = std::sqrt(direction.dot(covariance * direction)) / squares;
-    const double limit =
-        unseen_ ? std::sqrt(ChiSquaredLimit(limits_.min_p, 1)) : limits_.max_self_difference_sigmas;
-    Add(AtMost("rig_scale_sigmas", std::abs(scale) / sigma, limit,
-               fmt::format("stored distances between cameras are {:+.4f} % (+- {:.4f} %) off what "
-                           "squares of {} say",
-                           100 * scale, 100 * sigma, calibration_.board.square)));
+    const double value =
+        sigma > 0 ? std::abs(scale) / sigma : std::numeric_limits<double>::infinity();
+    const double limit = reference.Limit(limits_.min_p, limits_.max_self_difference_sigmas, 1);
+    if (check.value >= 0 && !(value / limit > check.value / check.limit)) return;
+    check = AtMost(
+        "rig_scale_sigmas", value, limit,
+        fmt::format("stored distances between cameras are {:+.4f} % (+- {:.4f} %) off "
+                    "what squares of {} say, by {} solve",
+                    100 * scale, 100 * sigma, calibration_.board.square, NameOfSolve(reference)));
   }
 
   void TestData() {
@@ -330,8 +356,11 @@ class Judging {
   void AddUncertainty(const char* name, double limit, const char* where, const MapOf& map_of) {
     Check check{name, kNaN, limit, false, "no pixel has a ray"};
     for (const JudgedCamera& camera : report_.cameras) {
-      const double value = map_of(camera).Quantile(kMostOfImage);
-      if (!std::isfinite(value) || value <= check.value) continue;
+      // A lens that has no ray for a pixel that it should show does not know where it looks; what
+      // could not be computed is the worst, not the best.
+      double value = map_of(camera).Quantile(kMostOfImage);
+      if (!std::isfinite(value)) value = std::numeric_limits<double>::infinity();
+      if (value <= check.value) continue;
       check.value = value;
       check.reason = fmt::format(
           "{}: standard deviation of a projection at {}, exceeded in 5 % of "
@@ -422,7 +451,12 @@ class Judging {
     const PatternTest late = TestTimeOffset(solution);
     Check check{"time_offset_sigmas", 0, limits_.max_time_offset_sigmas, true,
                 "not determined: the board stands still, or its frames do not follow each other"};
+    std::string untold;
     for (size_t c = 0; c < late.coefficients.size(); ++c) {
+      if (!std::isfinite(late.coefficients[c])) {
+        untold += (untold.empty() ? "" : ", ") + solution.rig.cameras[c + 1].name;
+        continue;
+      }
       const double sigmas = std::abs(late.coefficients[c]) / late.sigmas[c];
       // What corners err by in any case is no fault of the clocks.
       const bool harmless = sigmas > check.limit && late.effects_px[c] <= limits_.max_pattern_px;
@@ -434,10 +468,13 @@ class Judging {
           "by {:.3f} px RMS{}",
           solution.rig.cameras[c + 1].name, std::abs(late.coefficients[c]), late.sigmas[c],
           late.coefficients[c] < 0 ? "earlier" : "later", solution.rig.cameras[0].name,
-          late.effects_px[c],
-          harmless ? ": no chance, but no more than corners err" : "");
+          late.effects_px[c], harmless ? ": no chance, but no more than corners err" : "");
     }
     check.passed = check.value <= check.limit;
+    if (!untold.empty()) {
+      check.reason +=
+          "; not determined for " + untold + ": its views are in no frames that follow each other";
+    }
     Add(std::move(check));
   }
 

@@ -21,7 +21,8 @@ struct JudgeLimits {
   double max_region_ratio = 2.5;    ///< the worst region's RMS over the median region's
   double max_outlier_share = 0.05;  ///< of the corners that the solve has not seen
   /// Stored lens or place against a fresh solve of the corners the file keeps: they must be the
-  /// same numbers, up to rounding and the solver's last step.
+  /// same numbers, up to rounding and the solver's last step. (Against one of unseen views: less
+  /// likely by chance than min_p.)
   double max_self_difference_sigmas = 0.5;
   double max_uncertainty_px = 0.5;  ///< at the boards' distance, in 95 % of the image
   double max_far_uncertainty_px = 1;
@@ -73,6 +74,8 @@ struct JudgedCamera {
 struct JudgeReport {
   std::vector<Check> tests;
   std::vector<JudgedCamera> cameras;
+  /// Chessboards among the tested views that were counted from the other end, and repaired.
+  std::vector<std::string> flipped;
   bool unseen = false;   ///< whether views were given that the calibration had not seen
   double sigma_px = 0;   ///< of the solve of the kept corners
   double condition = 0;  ///< ArrowInformation::condition of it
@@ -86,7 +89,7 @@ JudgeReport Judge(const JudgedCalibration& calibration, const std::optional<Unse
 
 /// JSON object: passed, tests[] as `validate` of sets has them; cameras[] with stored and held_out
 /// residuals, noise_px, regions[9], coverage, uncertainty_px and far_uncertainty_px {largest,
-/// median}, views[]; sigma_px, condition, unseen.
+/// median}, views[]; sigma_px, condition, unseen, flipped[].
 std::string ToJson(const JudgeReport& report);
 
 // Of the views alone (data_tests.cpp), one check each, worst camera named.

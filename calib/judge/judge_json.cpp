@@ -42,6 +42,7 @@ std::string ToJson(const JudgeReport& report) {
     json["cameras"].push_back(std::move(item));
   }
   json["unseen"] = report.unseen;
+  json["flipped"] = report.flipped;
   json["sigma_px"] = NumberOrNull(report.sigma_px);
   json["condition"] = NumberOrNull(report.condition);
   // Names come from files: bytes that are no UTF-8 must not make the whole report unreadable.

@@ -4,6 +4,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "calib/distributions.h"
@@ -46,7 +47,7 @@ PatternTest Judged(double rows, double explained, double left, int freedom, doub
   test.freedom = freedom;
   if (freedom <= 0 || !(below > 0)) return test;
   const double of_noise = freedom * left / below;
-  test.amplitude_px = std::sqrt(std::max(0.0, explained - of_noise) / rows);
+  test.amplitude_px = RootOfVariance((explained - of_noise) / rows);
   test.p = FisherSurvival((explained / freedom) / (left / below), freedom, below);
   return test;
 }
@@ -84,10 +85,20 @@ PatternTest TestSharedPattern(const RigSolution& solution, const PatternColumns&
     Stack(Eliminated(frame.by_motion, rest, &rank), triangle);
   }
   if (count <= 0) return {};
-  Eigen::MatrixXd own = triangle.block(shared, shared, count, count);
+  // What no residual feels is not told, and hides nothing of the others.
+  std::vector<long> felt;
+  for (long i = 0; i < count; ++i) {
+    if (squares[i] > 0) felt.push_back(i);
+  }
+  if (felt.empty()) return {};
+  const auto felt_count = static_cast<long>(felt.size());
+  Eigen::MatrixXd own = triangle.block(shared, shared, count, count)(Eigen::all, felt);
   const Eigen::VectorXd right = triangle.block(shared, shared + count, count, 1);
-  const Eigen::VectorXd lengths =
-      triangle.middleCols(shared, count).colwise().norm().cwiseMax(1e-300).transpose();
+  const Eigen::VectorXd lengths = triangle.middleCols(shared, count)(Eigen::all, felt)
+                                      .colwise()
+                                      .norm()
+                                      .cwiseMax(1e-300)
+                                      .transpose();
   own = own * lengths.cwiseInverse().asDiagonal();
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(own.rows(), own.cols());
   qr.setThreshold(kDependent);
@@ -99,17 +110,21 @@ PatternTest TestSharedPattern(const RigSolution& solution, const PatternColumns&
   const auto freedom = static_cast<int>(qr.rank());
   PatternTest test =
       Judged(2.0 * solution.corners, explained, left, freedom, solution.freedom - freedom);
-  if (qr.rank() == count) {
-    const Eigen::VectorXd c = qr.solve(right).cwiseQuotient(lengths);
-    const Eigen::MatrixXd inverse =
-        (lengths.cwiseInverse().asDiagonal() * (own.transpose() * own).inverse().eval() *
-         lengths.cwiseInverse().asDiagonal());
-    const double variance = left / std::max(1.0, solution.freedom - static_cast<double>(count));
-    for (long i = 0; i < count; ++i) {
-      test.coefficients.push_back(c[i]);
-      test.sigmas.push_back(std::sqrt(variance * inverse(i, i)));
-      test.effects_px.push_back(std::abs(c[i]) * std::sqrt(squares[i] / std::max(1.0, rows[i])));
-    }
+  if (qr.rank() < felt_count) return test;
+  const Eigen::VectorXd c = qr.solve(right).cwiseQuotient(lengths);
+  const Eigen::MatrixXd inverse =
+      (lengths.cwiseInverse().asDiagonal() * (own.transpose() * own).inverse().eval() *
+       lengths.cwiseInverse().asDiagonal());
+  const double variance = left / std::max(1.0, solution.freedom - static_cast<double>(felt_count));
+  const std::vector<double> untold(static_cast<size_t>(count),
+                                   std::numeric_limits<double>::quiet_NaN());
+  test.coefficients = test.sigmas = test.effects_px = untold;
+  for (long i = 0; i < felt_count; ++i) {
+    const long k = felt[static_cast<size_t>(i)];
+    const auto at = static_cast<size_t>(k);
+    test.coefficients[at] = c[i];
+    test.sigmas[at] = std::sqrt(variance * inverse(i, i));
+    test.effects_px[at] = std::abs(c[i]) * std::sqrt(squares[k] / std::max(1.0, rows[k]));
   }
   return test;
 }

@@ -17,7 +17,8 @@ struct PatternTest {
   /// RMS over all coordinates of what the pattern explains, less what it would explain of noise.
   double amplitude_px = 0;
   int freedom = 0;  ///< patterns that are independent of the unknowns and of each other
-  // Per column, of shared patterns alone.
+  // Per column, of shared patterns alone; not a number where no residual feels it, and empty where
+  // columns cannot be told apart.
   std::vector<double> coefficients, sigmas;
   std::vector<double> effects_px;  ///< what the coefficient does to a coordinate it acts on, RMS
 };

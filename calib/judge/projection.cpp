@@ -6,11 +6,16 @@
 #include <cmath>
 #include <limits>
 
+#include "calib/distributions.h"
 #include "calib/lens_map.h"
+#include "calib/models/board_model.h"
 #include "dtr/base/order_statistics.h"
 
 namespace dtr::calib {
 namespace {
+
+// Of what a pixel does not tell: worse than any number.
+constexpr double kNoBound = std::numeric_limits<double>::infinity();
 
 Eigen::Matrix3d CrossMatrix(const Eigen::Vector3d& v) {
   Eigen::Matrix3d m;
@@ -25,11 +30,11 @@ Eigen::Matrix<double, 3, 6> ByFrame(const Eigen::Vector3d& p, double distance) {
   return by_frame;
 }
 
-std::vector<double> Finite(const std::vector<double>& values) {
-  std::vector<double> finite;
-  std::copy_if(values.begin(), values.end(), std::back_inserter(finite),
-               [](double v) { return std::isfinite(v); });
-  return finite;
+template <typename Wanted>
+std::vector<double> Only(const std::vector<double>& values, const Wanted& wanted) {
+  std::vector<double> some;
+  std::copy_if(values.begin(), values.end(), std::back_inserter(some), wanted);
+  return some;
 }
 
 template <typename Value>
@@ -39,10 +44,11 @@ ImageMap Mapped(const RigSolution& solution, const ProjectionSensitivity& sensit
   ImageMap map = EmptyMap(lens);
   for (int row = 0; row < map.rows; ++row) {
     for (int column = 0; column < map.columns; ++column) {
-      const auto by_shared = sensitivity.At(camera, CellCentre(map, lens, column, row), distance);
-      if (by_shared) {
-        map.values[static_cast<size_t>(row * map.columns + column)] = value(*by_shared);
-      }
+      const Eigen::Vector2d pixel = CellCentre(map, lens, column, row);
+      const auto by_shared = sensitivity.At(camera, pixel, distance);
+      if (!by_shared && !IsAskedFor(lens, pixel)) continue;
+      const double v = by_shared ? value(*by_shared) : kNoBound;
+      map.values[static_cast<size_t>(row * map.columns + column)] = std::isnan(v) ? kNoBound : v;
     }
   }
   return map;
@@ -82,15 +88,15 @@ std::optional<Eigen::MatrixXd> ProjectionSensitivity::At(size_t camera,
 }
 
 double ImageMap::Largest() const {
-  const auto finite = Finite(values);
+  const auto finite = Only(values, [](double v) { return std::isfinite(v); });
   return finite.empty() ? std::numeric_limits<double>::quiet_NaN()
                         : *std::max_element(finite.begin(), finite.end());
 }
 
 double ImageMap::Quantile(double share) const {
-  auto finite = Finite(values);
-  if (finite.empty()) return std::numeric_limits<double>::quiet_NaN();
-  return QuantileOf(finite, share);
+  auto some = Only(values, [](double v) { return !std::isnan(v); });
+  if (some.empty()) return std::numeric_limits<double>::quiet_NaN();
+  return QuantileOf(some, share);
 }
 
 Eigen::Vector2d CellCentre(const ImageMap& map, const LensCamera& camera, int column, int row) {
@@ -112,7 +118,7 @@ ImageMap UncertaintyMap(const RigSolution& solution, const ProjectionSensitivity
   return Mapped(solution, sensitivity, camera, distance, [&](const Eigen::MatrixXd& by_shared) {
     const Eigen::Matrix2d variance = by_shared * covariance * by_shared.transpose();
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(variance, Eigen::EigenvaluesOnly);
-    return std::sqrt(std::max(0.0, solver.eigenvalues()[1]));
+    return RootOfVariance(solver.eigenvalues()[1]);
   });
 }
 

@@ -28,14 +28,15 @@ class ProjectionSensitivity {
   Eigen::MatrixXd frame_by_shared_;  // the frame's motion (w, v / distance_), 6 rows
 };
 
-/// Samples of the image: a grid of cell centres, kMapColumns columns; empty values where the lens
-/// has no ray.
+/// Samples of the image: a grid of cell centres, kMapColumns columns. Where the lens has no ray the
+/// value is infinite, or not a number where none is asked for (IsAskedFor, models/board_model.h).
 inline constexpr int kMapColumns = 24;
 struct ImageMap {
   int columns = 0, rows = 0;
-  std::vector<double> values;  ///< row-major, not a number where there is none
-  double Largest() const;      ///< NaN where there is none
+  std::vector<double> values;  ///< row-major
+  double Largest() const;      ///< of the finite ones; NaN where there is none
   double Median() const { return Quantile(0.5); }
+  /// Of all cells that are asked for, infinite ones the largest; NaN where there is none.
   double Quantile(double share) const;
 };
 /// Cell centre in pixels.

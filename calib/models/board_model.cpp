@@ -71,14 +71,34 @@ LensCamera CameraFrom(BoardModel model, int width_px, int height_px,
   return camera;
 }
 
+namespace {
+
+// Of a fisheye: the largest circle around the principal point that stays in the image.
+double CircleRadius(const LensCamera& camera, const Eigen::Vector2d& middle) {
+  return std::min(
+      {middle.x(), camera.width_px - middle.x(), middle.y(), camera.height_px - middle.y()});
+}
+
+Eigen::Vector2d PrincipalPoint(const LensCamera& camera) {
+  const PinholeCamera k = camera.Pinhole();
+  return {k.cx_px(), k.cy_px()};
+}
+
+}  // namespace
+
+bool IsAskedFor(const LensCamera& camera, const Eigen::Vector2d& pixel) {
+  if (camera.model != LensModel::kOpenCvFisheye) return true;
+  const Eigen::Vector2d middle = PrincipalPoint(camera);
+  return (pixel - middle).norm() <= CircleRadius(camera, middle);
+}
+
 bool CoversImage(const LensCamera& camera) {
   const LensMap lens(camera);
   const double w = camera.width_px, h = camera.height_px;
   std::vector<Eigen::Vector2d> places;
   if (camera.model == LensModel::kOpenCvFisheye) {
-    const PinholeCamera k = camera.Pinhole();
-    const Eigen::Vector2d middle(k.cx_px(), k.cy_px());
-    const double radius = std::min({middle.x(), w - middle.x(), middle.y(), h - middle.y()});
+    const Eigen::Vector2d middle = PrincipalPoint(camera);
+    const double radius = CircleRadius(camera, middle);
     for (int i = 0; i < 16; ++i) {
       const double turn = i * std::numbers::pi / 8;
       places.emplace_back(middle + radius * Eigen::Vector2d(std::cos(turn), std::sin(turn)));

@@ -47,5 +47,7 @@ LensCamera CameraFrom(BoardModel model, int width_px, int height_px,
 /// the corners that were observed a polynomial can turn back inside the image, and then some of its
 /// pixels mean nothing.
 bool CoversImage(const LensCamera& camera);
+/// Whether CoversImage asks for this pixel: of a fisheye what lies in that circle, else all.
+bool IsAskedFor(const LensCamera& camera, const Eigen::Vector2d& pixel);
 
 }  // namespace dtr::calib

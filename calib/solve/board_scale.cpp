@@ -11,6 +11,7 @@
 #include <numbers>
 #include <optional>
 
+#include "calib/distributions.h"
 #include "calib/solve/board_solve.h"
 #include "calib/solve/board_start.h"
 #include "calib/solve/least_squares.h"
@@ -321,8 +322,8 @@ void Describe(const Problem& problem, const Matrix7& normal, BoardScale& scale) 
   scale.rms_px = std::sqrt(squares / scale.corners);
   const double sigma_px = std::sqrt(squares / (2.0 * scale.corners - 7));
   const Matrix7 covariance = sigma_px * sigma_px * normal.inverse();
-  scale.relative_sigma = std::max(std::sqrt(std::max(0.0, covariance(0, 0))),
-                                  Jackknife(problem, scale.scene_from_board));
+  scale.relative_sigma =
+      std::max(RootOfVariance(covariance(0, 0)), Jackknife(problem, scale.scene_from_board));
   if (!(scale.relative_sigma <= kMostRelativeSigma)) {
     RefuseScale(fmt::format(
         "expected a scale known to 10 %, found one to {:.0f} %; show the board larger, and from "

@@ -240,10 +240,7 @@ void RefuseUseless(const BoardSolution& solution, bool cover_image) {
                     focal, error));
   }
   if (cover_image && !CoversImage(solution.camera)) {
-    Refuse(
-        fmt::format("the distortion of the model {} turns back before the corner of the image; "
-                    "show the board near the corners, or choose fewer coefficients",
-                    NameOf(solution.model)));
+    Refuse(TurnsBack(solution.model));
   }
 }
 
@@ -291,6 +288,13 @@ State StateFrom(const Board& board, std::span<const BoardView> views, int width_
 }
 
 }  // namespace
+
+std::string TurnsBack(BoardModel model) {
+  return fmt::format(
+      "the distortion of the model {} turns back before the corner of the image; show the board "
+      "near the corners, or choose fewer coefficients",
+      NameOf(model));
+}
 
 bool Holds(std::span<const int> ids, int id) {
   return std::binary_search(ids.begin(), ids.end(), id);

@@ -81,6 +81,9 @@ BoardSolution SolveBoard(const Board& board, std::span<const BoardView> views, i
 std::optional<Pose> SolvePose(const Board& board, const BoardView& view, const LensCamera& camera,
                               std::span<const int> ignored = {});
 
+/// What is said of a lens that CoversImage refuses.
+std::string TurnsBack(BoardModel model);
+
 /// True when `ids`, sorted, holds `id`.
 bool Holds(std::span<const int> ids, int id);
 

@@ -435,14 +435,24 @@ RigSolution SolveRig(const Board& board, std::span<const RigCameraInput> cameras
     SolveQuadratically(board, options, solution.rig);
   }
   Describe(board, solution);
+  if (options.solve.cover_image && options.free_lenses) RequireCoveredImages(solution.rig);
   return solution;
 }
 
+void RequireCoveredImages(const Rig& rig) {
+  for (const RigCamera& camera : rig.cameras) {
+    if (CoversImage(camera.camera)) continue;
+    const std::string who = camera.name.empty() ? "" : fmt::format("camera {}: ", camera.name);
+    Refuse(who + TurnsBack(camera.model));
+  }
+}
+
 Rig FitFrames(const Board& board, std::vector<RigCamera> cameras, std::vector<RigView> views,
-              size_t frames, const SolveOptions& options, std::vector<LeftOut>& left_out) {
+              size_t frames, const SolveOptions& options, std::vector<LeftOut>& left_out,
+              std::vector<std::string>* flipped) {
   Rig rig;
   rig.cameras = std::move(cameras);
-  rig.rig_from_board.resize(frames);
+  std::vector<PosedView> posed;
   for (RigView& view : views) {
     const RigCamera& camera = rig.cameras[view.camera];
     const auto pose = PoseOfBoard(board, view.seen, camera.camera);
@@ -450,9 +460,12 @@ Rig FitFrames(const Board& board, std::vector<RigCamera> cameras, std::vector<Ri
       left_out.push_back({view.seen.name, "no pose of a flat board explains its corners"});
       continue;
     }
-    rig.rig_from_board[view.frame] = camera.cam_from_rig.Inverse() * *pose;
-    rig.views.push_back(std::move(view));
+    posed.push_back({std::move(view), *pose});
   }
+  Counted counted = CountFromOneEnd(board, rig.cameras, std::move(posed), frames);
+  rig.views = std::move(counted.views);
+  rig.rig_from_board = std::move(counted.rig_from_board);
+  if (flipped != nullptr) *flipped = std::move(counted.flipped);
   if (rig.views.empty()) return rig;
   ChooseFramePoses(board, kFitCauchyPx, rig);
   const auto by_frame = ViewsByFrame(rig);

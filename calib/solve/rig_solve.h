@@ -48,16 +48,22 @@ struct RigCameraInput {
 /// of them saw at once (StartRig), then all lenses, places and boards together: Cauchy's loss, then
 /// least squares on the corners within `outlier_sigmas` of their camera's own sigma. Corners that
 /// `views` call outliers are dropped. One camera is a rig, too. Throws Error, naming camera and
-/// reason, where the corners do not determine an unknown. The same inputs give the same bits.
+/// reason, where the corners do not determine an unknown, and as SolveOptions::cover_image says.
+/// The same inputs give the same bits.
 RigSolution SolveRig(const Board& board, std::span<const RigCameraInput> cameras,
                      std::vector<RigView> views, size_t frames, const RigOptions& options = {});
+
+/// Throws Error naming a camera whose distortion turns back inside its image (CoversImage).
+void RequireCoveredImages(const Rig& rig);
 
 /// Lenses and places as they are; of every frame the board's pose alone is fitted: by each view's
 /// own pose, then least squares over all views of the frame. With Loss::kRobust corners beyond
 /// `outlier_sigmas` are left out of the fit and named. Views that no pose explains are returned in
-/// `left_out`.
+/// `left_out`; chessboards that were counted from the other end than their frame's first view are
+/// counted anew and named in `flipped`.
 Rig FitFrames(const Board& board, std::vector<RigCamera> cameras, std::vector<RigView> views,
-              size_t frames, const SolveOptions& options, std::vector<LeftOut>& left_out);
+              size_t frames, const SolveOptions& options, std::vector<LeftOut>& left_out,
+              std::vector<std::string>* flipped = nullptr);
 
 /// Residual lengths per view, px; infinite for corners without a pixel.
 std::vector<std::vector<double>> ResidualLengths(const Board& board, const Rig& rig);

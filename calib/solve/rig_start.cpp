@@ -145,13 +145,9 @@ Pose TurnedByHalf(const Board& board, const Pose& cam_from_board) {
   return cam_from_board * Pose{half, middle - half * middle};
 }
 
-RigStart StartRig(const Board& board, std::vector<RigCamera> cameras, std::vector<PosedView> views,
-                  size_t frames) {
-  std::sort(views.begin(), views.end(), [](const PosedView& a, const PosedView& b) {
-    return std::pair(a.view.frame, a.view.camera) < std::pair(b.view.frame, b.view.camera);
-  });
-  PlaceCameras(board, views, cameras);
-  RigStart start;
+Counted CountFromOneEnd(const Board& board, const std::vector<RigCamera>& cameras,
+                        std::vector<PosedView> views, size_t frames) {
+  Counted counted;
   std::vector<std::optional<Pose>> poses(frames);
   for (PosedView& posed : views) {
     const Pose& cam_from_rig = cameras[posed.view.camera].cam_from_rig;
@@ -161,13 +157,27 @@ RigStart StartRig(const Board& board, std::vector<RigCamera> cameras, std::vecto
     } else if (LeastDisagreement(board, cam_from_rig * *rig_from_board, posed.cam_from_board)
                    .second) {
       posed.view = TurnedByHalf(board, posed.view);
-      start.flipped.push_back(posed.view.seen.name);
+      counted.flipped.push_back(posed.view.seen.name);
     }
-    start.rig.views.push_back(std::move(posed.view));
+    counted.views.push_back(std::move(posed.view));
   }
   // Frames without a view take no part; their pose is never looked at.
-  for (const auto& pose : poses) start.rig.rig_from_board.push_back(pose.value_or(Pose{}));
+  for (const auto& pose : poses) counted.rig_from_board.push_back(pose.value_or(Pose{}));
+  return counted;
+}
+
+RigStart StartRig(const Board& board, std::vector<RigCamera> cameras, std::vector<PosedView> views,
+                  size_t frames) {
+  std::sort(views.begin(), views.end(), [](const PosedView& a, const PosedView& b) {
+    return std::pair(a.view.frame, a.view.camera) < std::pair(b.view.frame, b.view.camera);
+  });
+  PlaceCameras(board, views, cameras);
+  Counted counted = CountFromOneEnd(board, cameras, std::move(views), frames);
+  RigStart start;
+  start.rig.views = std::move(counted.views);
+  start.rig.rig_from_board = std::move(counted.rig_from_board);
   start.rig.cameras = std::move(cameras);
+  start.flipped = std::move(counted.flipped);
   return start;
 }
 

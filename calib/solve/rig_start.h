@@ -24,6 +24,18 @@ Pose TurnedByHalf(const Board& board, const Pose& cam_from_board);
 /// Corners that views call outliers, taken out of them: they were decided on before.
 void DropOutliers(std::vector<RigView>& views);
 
+/// Views that are counted from the same end within a frame, and the poses of the frames' boards.
+struct Counted {
+  std::vector<RigView> views;        ///< flipped ones with their corners counted anew
+  std::vector<Pose> rig_from_board;  ///< by each frame's first view; of frames without one, nothing
+  std::vector<std::string> flipped;  ///< names of views that were counted from the other end
+};
+
+/// Each frame's views, counted from the end that fits the first of them, with the cameras where
+/// they stand.
+Counted CountFromOneEnd(const Board& board, const std::vector<RigCamera>& cameras,
+                        std::vector<PosedView> views, size_t frames);
+
 /// A rig to start Newton from.
 struct RigStart {
   Rig rig;                           ///< flipped views have their corners counted anew

@@ -12,7 +12,6 @@
 #include "cli/pipeline/set_quality.h"
 #include "cli/pipeline/stereo_sweep.h"
 #include "cli/pipeline/storage_sweep.h"
-#include "cli/render_options.h"
 #include "cli/shell_words.h"
 #include "cli/sweep_output.h"
 #include "cli/sweep_store.h"
@@ -22,6 +21,7 @@
 #include "dtr/base/machine.h"
 #include "dtr/eval/render_sweep.h"
 #include "dtr/io/set_io.h"
+#include "dtr/render/option_arguments.h"
 
 namespace dtr::cli {
 namespace {
@@ -193,11 +193,15 @@ eval::SweepSetting SettingOf(const eval::SweepStage& stage, const std::string& t
   return setting;
 }
 
-/// "views=3,resolution=2"
+/// "method=deferred,views=3,...": every axis, so that the command means the same when defaults have
+/// become others.
 std::string PointText(const eval::SweepStage& stage, const eval::SweepSetting& setting) {
-  std::string text = eval::Describe(stage, setting);
-  std::replace(text.begin(), text.end(), ' ', ',');
-  return text;
+  std::vector<std::string> words;
+  for (size_t axis = 0; axis < stage.axes.size(); ++axis) {
+    words.push_back(stage.axes[axis].name + "=" +
+                    stage.axes[axis].values.at(static_cast<size_t>(setting[axis])));
+  }
+  return fmt::format("{}", fmt::join(words, ","));
 }
 
 std::string CommandOf(const SweepRequest& request, const eval::SweepStage& stage,

@@ -13,7 +13,7 @@ namespace {
 
 struct Options {
   std::filesystem::path model, output, lens;
-  bool separate = false;
+  bool separate = false, covariance = false;
 };
 
 int RunRefine(const Options& options, const Context& context) {
@@ -24,6 +24,7 @@ int RunRefine(const Options& options, const Context& context) {
   const calib::SfmModel model = colmap::ReadModel(options.model);
   calib::RefineOptions refine;
   refine.separate_lenses = options.separate;
+  refine.covariance = options.covariance;
   refine.threads = context.common.threads;
   refine.seed = context.common.seed;
   if (!options.lens.empty()) {
@@ -82,6 +83,9 @@ void AddCalibrateRefineCommand(CLI::App& calibrate) {
                AddLensOption(command, options->lens);
                command.add_flag("--separate-lenses", options->separate,
                                 "Every photo a lens of its own, as with a zoom that was moved");
+               command.add_flag("--covariance", options->covariance,
+                                "Add what is uncertain about every pose and lens to --json, where "
+                                "the model is refined");
                return [options](const Context& context) { return RunRefine(*options, context); };
              });
 }

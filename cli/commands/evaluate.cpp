@@ -12,7 +12,6 @@
 #include "dtr/eval/held_out.h"
 #include "dtr/eval/json.h"
 #include "dtr/io/image_io.h"
-#include "dtr/io/pruned.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/instants.h"
 
@@ -147,7 +146,7 @@ void AddEvaluateCommand(CLI::App& app) {
         AddRendererOptions(command, options->renderer);
         options->render = AddRenderOptions(command);
         return [options, &command](const Context& context) {
-          UseStoredArguments(command, io::RenderArguments(io::ReadSet(options->set)));
+          UseStoredArguments(command, io::ReadSet(options->set), *options->render);
           return RunEvaluate(*options, context);
         };
       });

@@ -9,6 +9,7 @@
 #include "cli/command.h"
 #include "cli/output_file.h"
 #include "cli/pipeline/validate_set.h"
+#include "cli/render_options.h"
 #include "cli/set_stream.h"
 #include "dtr/base/files.h"
 #include "dtr/io/run_record.h"
@@ -102,7 +103,7 @@ int RunInspect(const Options& options, const Context& context) {
   io::CollapseDuplicates(set);
   const auto stream = StreamOf(options.set, set, {DescribeRenderScene(set)},
                                {options.memory_gb, threads}, context.console);
-  RenderOptions render;
+  RenderOptions render = StoredRenderOptions(set);
   render.threads = threads;
   WriteFileAtomically(options.output,
                       viewer::InspectPage(set, *stream, facts, render, context.console));

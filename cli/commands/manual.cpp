@@ -1,6 +1,6 @@
 #include "cli/manual.h"
-#include "cli/standard_output.h"
 #include "cli/command.h"
+#include "cli/standard_output.h"
 
 namespace dtr::cli {
 

@@ -7,8 +7,8 @@
 #include "cli/pipeline/prune_set.h"
 #include "cli/render_options.h"
 #include "cli/renderers.h"
-#include "dtr/io/pruned.h"
 #include "dtr/io/set_io.h"
+#include "dtr/render/option_arguments.h"
 
 namespace dtr::cli {
 namespace {
@@ -57,7 +57,9 @@ int RunPrune(Options& options, const Context& context) {
   options.prune.threads = context.common.threads;
   options.prune.prune.seed = context.common.seed;
   options.prune.prune.render = *options.render;
-  options.prune.arguments_of = &RenderOptionArguments;
+  options.prune.arguments_of = [](const RenderOptions& render) {
+    return RenderOptionArguments(render);
+  };
   options.prune.renderer = options.renderer.name;
   options.prune.make_renderer = [&] { return MakeRenderer(options.renderer, context.console); };
   options.prune.make_timed_renderer = [&] {
@@ -124,7 +126,7 @@ void AddPruneCommand(CLI::App& app) {
         AddRendererOptions(command, options->renderer);
         options->render = AddRenderOptions(command);
         return [options, &command](const Context& context) {
-          UseStoredArguments(command, io::RenderArguments(io::ReadSet(options->prune.set)));
+          UseStoredArguments(command, io::ReadSet(options->prune.set), *options->render);
           return RunPrune(*options, context);
         };
       });

@@ -16,7 +16,6 @@
 #include "dtr/base/error.h"
 #include "dtr/io/depth_io.h"
 #include "dtr/io/image_io.h"
-#include "dtr/io/pruned.h"
 #include "dtr/io/set_io.h"
 #include "dtr/io/video.h"
 #include "dtr/render/instants.h"
@@ -225,7 +224,7 @@ void AddRenderCommand(CLI::App& app) {
             ->type_name("FILE");
         options->render = AddRenderOptions(command);
         return [options, &command](const Context& context) {
-          UseStoredArguments(command, io::RenderArguments(io::ReadSet(options->set)));
+          UseStoredArguments(command, io::ReadSet(options->set), *options->render);
           return RunRender(*options, context);
         };
       });

@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -19,8 +20,10 @@ struct Options {
   std::filesystem::path table;
 };
 
-/// Renderers that this program and this machine have; what is missing is told, never passed.
-std::vector<selftest::NamedRenderer> Renderers(bool with_gl, Console& console) {
+/// Renderers that this program and this machine have; what is missing is told, never passed, and
+/// added to `skipped`.
+std::vector<selftest::NamedRenderer> Renderers(bool with_gl, Console& console,
+                                               std::vector<std::string>& skipped) {
   std::vector<selftest::NamedRenderer> renderers;
   for (const std::string& name : RendererNames()) {
     if (name == "gl" && !with_gl) continue;
@@ -32,7 +35,8 @@ std::vector<selftest::NamedRenderer> Renderers(bool with_gl, Console& console) {
     try {
       make();
     } catch (const Error& none) {
-      console.Note(fmt::format("SKIPPED: rendering, {}: {}", name, none.what()));
+      skipped.push_back(fmt::format("SKIPPED: rendering, {}: {}", name, none.what()));
+      console.Note(skipped.back());
       continue;
     }
     renderers.push_back({name, make});
@@ -56,18 +60,24 @@ int RunSelftest(const Options& options, const Context& context) {
   if (!options.table.empty() && !options.stability) {
     throw UsageError("-o: expected --stability with it: the table holds every case");
   }
+  std::vector<std::string> skipped;
   const std::vector<selftest::Row> rows =
-      selftest::RunCases(AllCases(Renderers(options.stability, console)),
+      selftest::RunCases(AllCases(Renderers(options.stability, console, skipped)),
                          {.threads = context.common.threads}, !options.stability, console);
   console.ThrowIfInterrupted();
   for (const selftest::Row& row : rows) {
     for (const std::string& line : selftest::TextLines(row)) console.Say(line);
   }
-  if (!options.table.empty()) WriteFileAtomically(options.table, selftest::ToMarkdown(rows));
+  if (!options.table.empty()) {
+    std::string page = selftest::ToMarkdown(rows);
+    for (const std::string& line : skipped) page += "\n" + line + "\n";
+    WriteFileAtomically(options.table, page);
+  }
   context.EmitJson(selftest::ToJson(rows));
   const auto failed = std::ranges::count_if(rows, [](const auto& row) { return !row.passed(); });
-  console.Say(
-      fmt::format("{} of {} cases hold", static_cast<long>(rows.size()) - failed, rows.size()));
+  console.Say(fmt::format("{} of {} cases hold{}", static_cast<long>(rows.size()) - failed,
+                          rows.size(),
+                          skipped.empty() ? "" : fmt::format("; {}", fmt::join(skipped, "; "))));
   return failed == 0 ? kDone : kFailed;
 }
 

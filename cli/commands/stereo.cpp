@@ -23,6 +23,11 @@ void AddStereoCommand(CLI::App& app) {
         AddDepthOptions(command, {"sgbm", "patchmatch", "colmap"},
                         "Work spent on a depth map; the images keep their size [balanced]",
                         options->depth);
+        command
+            .add_option("--normals", options->normals,
+                        "Also write each source view's surface normals: unit vectors in its "
+                        "camera's frame, 0 where unknown, as DIR/NAME.exr")
+            ->type_name("DIR");
         command.add_flag("--force", options->force, "Replace SET2 when it exists");
         return [options](const Context& context) -> int {
           options->threads = context.common.threads;

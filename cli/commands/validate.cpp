@@ -18,7 +18,8 @@ namespace {
 
 struct Options {
   std::filesystem::path set;
-  calib::ValidateLimits limits;
+  pipeline::SetLimits limits;
+  std::optional<double> max_cross_px;
   ValidateCalibrationOptions calibration;
 };
 
@@ -49,6 +50,8 @@ void SayReport(const calib::ValidationReport& report, Console& console) {
 void RefuseForSets(const ValidateCalibrationOptions& options) {
   for (const auto& [given, name] :
        {std::pair{options.images.has_value(), "--images"},
+        std::pair{options.pattern.has_value(), "--pattern"},
+        std::pair{options.board.has_value(), "--board"},
         std::pair{options.max_uncertainty_px.has_value(), "--max-uncertainty"}}) {
     if (given) throw UsageError(fmt::format("{}: is for calibration files, not for sets", name));
   }
@@ -56,17 +59,23 @@ void RefuseForSets(const ValidateCalibrationOptions& options) {
 
 int RunValidate(Options options, const Context& context) {
   if (std::filesystem::is_regular_file(options.set)) {
+    if (options.max_cross_px) {
+      throw UsageError("--max-cross: is for sets, not for calibration files");
+    }
     options.calibration.file = options.set;
     return RunValidateCalibration(options.calibration, context);
   }
   RefuseForSets(options.calibration);
-  options.limits.max_rms_px = options.calibration.max_rms_px.value_or(options.limits.max_rms_px);
+  double& max_rms_px = options.limits.reprojection.max_rms_px;
+  max_rms_px = options.calibration.max_rms_px.value_or(max_rms_px);
+  options.limits.max_cross_px = options.max_cross_px.value_or(options.limits.max_cross_px);
   const auto& page = options.calibration.report;
   if (page) RequireOutputFile(*page, "--report", {".html"});
   const DtrSet set = io::ReadSet(options.set);
   RequireOneFrame(set);
   const SparseScene sparse = io::LoadSparse(options.set, set);
-  const auto report = pipeline::ValidateSet(set, sparse, options.limits, context.common.threads);
+  const auto report =
+      pipeline::ValidateSet(options.set, set, sparse, options.limits, context.common.threads);
   SayReport(report, context.console);
   if (page) {
     const std::string name = options.set.lexically_normal().filename().string();
@@ -89,14 +98,23 @@ void AddValidateCommand(CLI::App& app) {
         auto options = std::make_shared<Options>();
         command
             .add_option("SET|CALIB", options->set,
-                        "A set, or a .json file of calibrate board or calibrate rig")
+                        "A set, a .json file of calibrate board or calibrate rig, or one camera "
+                        "from elsewhere: a .yml of OpenCV, a cameras.txt of COLMAP")
             ->required();
         ValidateCalibrationOptions& calibration = options->calibration;
         command
             .add_option("--max-rms", calibration.max_rms_px,
                         fmt::format("Limit of the RMS on what the calibration has not seen [{} for "
                                     "sets, {} for calibration files]",
-                                    options->limits.max_rms_px, calib::JudgeLimits{}.max_rms_px))
+                                    options->limits.reprojection.max_rms_px,
+                                    calib::JudgeLimits{}.max_rms_px))
+            ->check(CLI::PositiveNumber)
+            ->type_name("PX");
+        command
+            .add_option("--max-cross", options->max_cross_px,
+                        fmt::format("Limit of the way of depth into a neighbour and back, median "
+                                    "of a set's pixels; the worst view may have twice as much [{}]",
+                                    options->limits.max_cross_px))
             ->check(CLI::PositiveNumber)
             ->type_name("PX");
         command
@@ -104,6 +122,15 @@ void AddValidateCommand(CLI::App& app) {
                         "Photos of the board that the calibration has not seen; without them it is "
                         "judged on those it was made from")
             ->type_name("DIR");
+        command
+            .add_option("--pattern", calibration.pattern,
+                        "Only photos of these names, as 'left*.jpg' [*]")
+            ->type_name("PATTERN");
+        command
+            .add_option("--board", calibration.board,
+                        "The board of the photos, as calibrate board has it; for cameras from "
+                        "elsewhere")
+            ->type_name("BOARD");
         command
             .add_option("--max-uncertainty", calibration.max_uncertainty_px,
                         fmt::format("Limit of the projections' standard deviation at the boards' "

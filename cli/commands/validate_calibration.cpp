@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "calib/boards/board.h"
 #include "cli/output_file.h"
 #include "cli/pipeline/judge_calibration.h"
 #include "dtr/base/error.h"
@@ -30,6 +31,10 @@ void SayReport(const calib::JudgeReport& report, Console& console) {
     console.Say(fmt::format("{} {}: {:.4g} (limit {:.4g}): {}", test.passed ? "passed" : "FAILED",
                             test.name, test.value, test.limit, test.reason));
   }
+  if (!report.flipped.empty()) {
+    console.Say(fmt::format("counted from the other end, and repaired: {}",
+                            fmt::join(report.flipped, ", ")));
+  }
   if (!report.unseen) {
     console.Say(
         "judged on the views that made the calibration; --images DIR with photos of the board "
@@ -39,20 +44,49 @@ void SayReport(const calib::JudgeReport& report, Console& console) {
 
 }  // namespace
 
+namespace {
+
+calib::Calibration Read(const ValidateCalibrationOptions& options) {
+  const std::string file = options.file.string();
+  if (options.pattern && !options.images) {
+    throw UsageError("--pattern: says which photos of --images DIR; expected that, too");
+  }
+  if (options.file.extension() == ".json") {
+    if (options.board) {
+      throw UsageError(
+          fmt::format("--board {}: {} says which board it was made from", *options.board, file));
+    }
+    calib::Calibration calibration = calib::ReadCalibration(options.file);
+    if (calibration.views.empty() && !options.images) {
+      throw UsageError(
+          fmt::format("{}: keeps no observations; give photos of the board by --images", file));
+    }
+    return calibration;
+  }
+  if (!options.images || !options.board) {
+    throw UsageError(fmt::format(
+        "{}: keeps neither board nor observations; expected --board BOARD and --images DIR", file));
+  }
+  return pipeline::ForeignCalibration(options.file, calib::BoardFromText(*options.board));
+}
+
+}  // namespace
+
 int RunValidateCalibration(const ValidateCalibrationOptions& options, const Context& context) {
   if (options.report) RequireOutputFile(*options.report, "--report", {".html"});
-  const calib::Calibration calibration = calib::ReadCalibration(options.file);
-  if (calibration.views.empty() && !options.images) {
-    throw UsageError(fmt::format("{}: keeps no observations; give photos of the board by --images",
-                                 options.file.string()));
-  }
+  const calib::Calibration calibration = Read(options);
   calib::JudgeLimits limits;
   limits.max_rms_px = options.max_rms_px.value_or(limits.max_rms_px);
   limits.max_uncertainty_px = options.max_uncertainty_px.value_or(limits.max_uncertainty_px);
   std::optional<calib::UnseenViews> unseen;
   if (options.images) {
-    unseen =
-        pipeline::ReadUnseen(calibration, *options.images, context.common.threads, context.console);
+    pipeline::UnseenPhotos photos =
+        pipeline::ReadUnseen(calibration, *options.images, options.pattern.value_or("*"),
+                             context.common.threads, context.console);
+    for (const calib::LeftOut& photo : photos.left_out) {
+      context.console.Say(fmt::format("left out: {}: {}", photo.name, photo.reason));
+    }
+    unseen = std::move(photos.unseen);
   }
   const calib::JudgeReport report =
       calib::Judge(pipeline::JudgedFrom(calibration), unseen, limits, context.common.threads);

@@ -2,6 +2,7 @@
 #pragma once
 #include <filesystem>
 #include <optional>
+#include <string>
 
 #include "cli/command.h"
 
@@ -10,6 +11,7 @@ namespace dtr::cli {
 struct ValidateCalibrationOptions {
   std::filesystem::path file;
   std::optional<std::filesystem::path> images, report;
+  std::optional<std::string> pattern, board;  ///< of the photos' names; as calibrate board has it
   std::optional<double> max_rms_px, max_uncertainty_px;
 };
 

@@ -20,9 +20,10 @@
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/base/machine.h"
-#include "dtr/io/pruned.h"
 #include "dtr/io/set_io.h"
+#include "dtr/io/verdict.h"
 #include "dtr/render/instants.h"
+#include "dtr/render/option_arguments.h"
 #include "viewer/glfw/app.h"
 #include "viewer/governor.h"
 
@@ -45,31 +46,45 @@ struct Options {
 };
 
 /// A set that the window shows; the console outlives it.
-std::unique_ptr<viewer::OpenedSet> Open(const Options& options, const Context& context,
-                                        const std::vector<std::string>& excluded) {
+std::unique_ptr<viewer::OpenedSet> Open(const Options& options, const Context& context) {
   auto opened = std::make_unique<viewer::OpenedSet>();
   opened->set = io::ReadSet(options.set);
+  opened->defaults = StoredRenderOptions(opened->set);
   io::CollapseDuplicates(opened->set);
-  opened->stream = StreamOf(options.set, opened->set, DescribeFrames(opened->set, excluded),
+  opened->stream = StreamOf(options.set, opened->set, DescribeFrames(opened->set, {}),
                             {options.memory_gb, context.common.threads}, context.console);
   return opened;
 }
 
-std::string CommandLine(const Options& options, const fs::path& camera_file,
-                        const RenderOptions& render, const std::vector<std::string>& hidden,
-                        std::optional<size_t> instant) {
+/// Beside the camera's file: "FILE.png", "FILE-depth.exr".
+std::string Beside(const fs::path& camera_file, const char* ending) {
+  return (fs::path(camera_file).parent_path() / camera_file.stem()).string() + ending;
+}
+
+/// All of the library's and the set's own defaults is left to `dtr render`, which has them, too.
+std::string CommandLine(const Options& options, const viewer::OpenedSet& opened,
+                        const viewer::ToDraw& wanted) {
+  const fs::path camera_file = fs::absolute(wanted.camera_file);
   std::vector<std::string> words{"dtr",
                                  "render",
                                  fs::absolute(options.set).string(),
                                  "--camera",
-                                 fs::absolute(camera_file).string(),
+                                 camera_file.string(),
                                  "-o",
-                                 fs::absolute(camera_file).replace_extension(".png").string()};
-  if (instant) words.insert(words.end(), {"--frame", std::to_string(*instant)});
-  std::string excluded = options.exclude;
-  for (const std::string& name : hidden) excluded += (excluded.empty() ? "" : ",") + name;
+                                 Beside(camera_file, ".png")};
+  if (wanted.depth) words.insert(words.end(), {"--depth-out", Beside(camera_file, "-depth.exr")});
+  if (wanted.coverage) {
+    words.insert(words.end(), {"--coverage-out", Beside(camera_file, "-coverage.png")});
+  }
+  if (wanted.instant) words.insert(words.end(), {"--frame", std::to_string(*wanted.instant)});
+  std::string excluded;
+  for (const View* view : wanted.hidden) {
+    // A comma would end the name; ids have none.
+    const bool plain = view->name.find(',') == std::string::npos;
+    excluded += (excluded.empty() ? "" : ",") + (plain ? view->name : view->id);
+  }
   if (!excluded.empty()) words.insert(words.end(), {"--exclude", excluded});
-  const auto further = RenderOptionArguments(render);
+  const auto further = RenderOptionArguments(wanted.options, opened.defaults);
   words.insert(words.end(), further.begin(), further.end());
   // Where memory holds fewer views than a picture asks for, it is another picture.
   const Options defaults;
@@ -101,6 +116,9 @@ Json StateJson(const viewer::AppState& state) {
   const Eigen::Vector3d center = state.camera.cam_from_world.TargetOriginInSource();
   return {{"still", state.still},
           {"at_view", state.at_view},
+          {"at_held_out", state.at_held_out},
+          {"photo", state.photo},
+          {"thumbnails", state.thumbnails},
           {"shown", state.shown},
           {"divisor", state.divisor},
           {"width_px", lens.width_px()},
@@ -209,10 +227,9 @@ std::vector<NovelCamera> CamerasOf(const std::vector<NovelFrame>& frames) {
   return cameras;
 }
 
-viewer::Host MakeHost(const Options& options, const Context& context,
-                      const std::vector<std::string>& excluded) {
+viewer::Host MakeHost(const Options& options, const Context& context) {
   viewer::Host host;
-  host.open = [&, excluded] { return Open(options, context, excluded); };
+  host.open = [&] { return Open(options, context); };
   host.stamp = [&] { return FileStamp(options.set / "set.json"); };  // written last
   host.view_stamp = [&](const View& view) { return ViewStampOf(options.set, view); };
   host.read_path = [](const DtrSet& set, const fs::path& file) {
@@ -228,9 +245,15 @@ viewer::Host MakeHost(const Options& options, const Context& context,
     io::LoadPixels(options.set, with_sigma, load);
     return with_sigma.inverse_depth_sigma.value_or(Grid<float>());
   };
-  host.command_line = [&](const fs::path& camera_file, const RenderOptions& render,
-                          const std::vector<std::string>& hidden, std::optional<size_t> instant) {
-    return CommandLine(options, camera_file, render, hidden, instant);
+  host.load_photo = [&](const View& view) {
+    View with_photo = view;
+    io::LoadOptions load;
+    load.depth = false;
+    io::LoadPixels(options.set, with_photo, load);
+    return std::move(with_photo.image);
+  };
+  host.command_line = [&](const viewer::OpenedSet& opened, const viewer::ToDraw& wanted) {
+    return CommandLine(options, opened, wanted);
   };
   host.verdicts = [&] { return Verdicts(options, context); };
   host.say = [&](const std::string& line) { context.console.Note(line); };
@@ -247,8 +270,11 @@ viewer::Host MakeHost(const Options& options, const Context& context,
 
 viewer::AppSettings SettingsOf(const Options& options, const Context& context, const DtrSet& set) {
   viewer::AppSettings settings;
+  settings.hidden = ResolveViewNames(AtFrame(set, options.instant), options.exclude);
   const PinholeCamera size = WithSize({1280, 800, 1, 1, 0, 0}, options.size);
+  settings.warning = io::VerdictWarning(set);
   settings.title = WithoutTrailingSlash(options.set).filename().string() + " - dtr view";
+  if (!settings.warning.empty()) settings.title += " - " + settings.warning;
   settings.width_px = size.width_px();
   settings.height_px = size.height_px();
   settings.render = *options.render;
@@ -299,9 +325,10 @@ int RunView(const Options& options, const Context& context) {
   }
   ReturnFreedMemory();
   const DtrSet set = io::ReadSet(options.set);
-  const auto excluded = ResolveViewNames(AtFrame(set, options.instant), options.exclude);
+  const std::string warning = io::VerdictWarning(set);
+  if (!warning.empty()) context.console.Note(warning);
   const viewer::AppReport report =
-      viewer::RunViewer(SettingsOf(options, context, set), MakeHost(options, context, excluded));
+      viewer::RunViewer(SettingsOf(options, context, set), MakeHost(options, context));
   context.EmitJson(ReportJson(report).dump(1, ' ', false, Json::error_handler_t::replace));
   return kDone;
 }
@@ -369,7 +396,7 @@ void AddViewCommand(CLI::App& app) {
         AddMemoryOption(command, options->memory_gb);
         options->render = AddRenderOptions(command);
         return [options, &command](const Context& context) {
-          UseStoredArguments(command, io::RenderArguments(io::ReadSet(options->set)));
+          UseStoredArguments(command, io::ReadSet(options->set), *options->render);
           return RunView(*options, context);
         };
       });

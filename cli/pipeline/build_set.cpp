@@ -3,13 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <map>
 #include <nlohmann/json.hpp>
-#include <set>
 
-#include "calib/lens_groups.h"
 #include "calib/sparse_from_sfm.h"
-#include "calib/undistort.h"
 #include "capture/ingest.h"
 #include "capture/store.h"
 #include "capture/video/frames.h"
@@ -23,6 +19,7 @@
 #include "cli/pipeline/input_hash.h"
 #include "cli/pipeline/run_log.h"
 #include "cli/pipeline/set_page.h"
+#include "cli/pipeline/undistort_photos.h"
 #include "cli/pipeline/validate_set.h"
 #include "dtr/base/error.h"
 #include "dtr/base/hash.h"
@@ -130,85 +127,6 @@ capture::Capture FramesOf(const BuildOptions& options, const std::filesystem::pa
   return capture::ReadCapture(kept);
 }
 
-// Lenses that a stabiliser moved, with the mean principal point of the photos to render from: those
-// that are held out move nothing.
-std::vector<calib::LensCamera> StabilisedLenses(const capture::Capture& capture,
-                                                const std::vector<bool>& held_out,
-                                                const calib::SfmModel& model) {
-  std::set<std::string> sources;
-  for (size_t i = 0; i < capture.photos.size(); ++i) {
-    if (!held_out[i]) sources.insert(capture.photos[i].name);
-  }
-  std::map<std::uint32_t, calib::LensCamera> used;
-  for (const calib::SfmImage& image : model.images) {
-    if (sources.contains(image.name)) {
-      used.emplace(image.camera_id, model.cameras.at(image.camera_id));
-    }
-  }
-  std::vector<calib::LensCamera> lenses;
-  for (const calib::LensGroup& group : calib::LensGroups(used)) {
-    if (group.cameras.size() > 1) lenses.push_back(group.lens);
-  }
-  return lenses;
-}
-
-// The pinhole camera that photos of a camera are drawn on. Those of one stabilised lens share one,
-// as they are resampled anyway; without distortion pixels stay as they are.
-PinholeCamera CameraToDrawOn(const calib::LensCamera& camera,
-                             const std::vector<calib::LensCamera>& stabilised) {
-  const auto lens = std::find_if(stabilised.begin(), stabilised.end(), [&](const auto& other) {
-    return calib::SameButForPrincipalPoint(other, camera);
-  });
-  return lens == stabilised.end() || camera.IsUndistorted() ? camera.Pinhole() : lens->Pinhole();
-}
-
-// Views of the registered photos, in the photos' order; their pixels, on the set's grid, are
-// written one by one.
-std::vector<View> UndistortPhotos(const capture::Capture& capture,
-                                  const CalibratedPhotos& calibrated,
-                                  const std::vector<bool>& held_out, int max_size_px, int threads,
-                                  io::SetWriter& writer, Progress& progress) {
-  std::map<std::string, const calib::SfmImage*> registered;
-  for (const auto& image : calibrated.model.images) registered[image.name] = &image;
-  const bool undistorted =
-      std::all_of(calibrated.model.cameras.begin(), calibrated.model.cameras.end(),
-                  [](const auto& camera) { return camera.second.IsUndistorted(); });
-  if (undistorted) progress.Note("undistortion left out: no camera has distortion");
-  const auto stabilised = StabilisedLenses(capture, held_out, calibrated.model);
-  progress.Stage(undistorted ? "reading photos" : "undistorting",
-                 static_cast<int>(registered.size()));
-
-  std::vector<View> views;
-  for (size_t i = 0; i < capture.photos.size(); ++i) {
-    const capture::Photo& photo = capture.photos[i];
-    const auto found = registered.find(photo.name);
-    if (found == registered.end()) continue;
-    progress.ThrowIfInterrupted();
-    const calib::LensCamera& lens = calibrated.model.cameras.at(found->second->camera_id);
-    if (lens.width_px != photo.width_px || lens.height_px != photo.height_px) {
-      throw Error(
-          fmt::format("{}: the camera's image is {}x{}, the photo is {}x{}; give cameras for "
-                      "these photos",
-                      photo.name, lens.width_px, lens.height_px, photo.width_px, photo.height_px));
-    }
-    calib::UndistortedPhoto flat =
-        calib::Undistort(capture::ReadPhoto(photo), capture::ReadPhotoMask(photo), lens,
-                         CameraToDrawOn(lens, stabilised), max_size_px, threads);
-    View view;
-    view.id = photo.id;
-    view.name = photo.name;
-    view.role = held_out[i] ? ViewRole::kHeldOut : ViewRole::kSource;
-    view.camera = flat.camera;
-    view.cam_from_world = found->second->cam_from_world;
-    view.image = std::move(flat.image);
-    view.mask = std::move(flat.mask);
-    StoreImage(view, calibrated.unit, writer);
-    views.push_back(std::move(view));
-    progress.Update(static_cast<int>(views.size()));
-  }
-  return views;
-}
-
 SparseScene SparseOf(const CalibratedPhotos& calibrated, const std::vector<View>& views) {
   std::vector<std::string> names;
   std::vector<PinholeCamera> cameras;
@@ -290,9 +208,12 @@ Json ProvenanceJson(const BuildOptions& options, const Json& option_values, cons
 }
 
 // The reprojection tests of every calibrated photo, held-out ones included.
-calib::ValidationReport Validate(DtrSet& set, const SparseScene& sparse, BuildReport& report,
+calib::ValidationReport Validate(const std::filesystem::path& folder, DtrSet& set,
+                                 const SparseScene& sparse, double memory_gb, BuildReport& report,
                                  int threads, Progress& progress) {
-  calib::ValidationReport validation = ValidateSet(set, sparse, {}, threads);
+  SetLimits limits;
+  limits.memory_gb = std::min(limits.memory_gb, memory_gb);
+  calib::ValidationReport validation = ValidateSet(folder, set, sparse, limits, threads);
   report.validated = true;
   report.validation_passed = validation.passed();
   set.verdict_json = eval::VerdictJson(validation.tests);
@@ -389,8 +310,8 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
   if (std::filesystem::exists(options.photos / capture::kCaptureFile)) {
     fingerprint["stored_sha256"] = StoredHashes(photos);
   }
-  if (options.poses.empty()) {
-    // The one thing that --memory decides of the result.
+  if (!std::filesystem::is_directory(options.poses)) {
+    // COLMAP looks for features, of a size that is the one thing --memory decides of the result.
     const auto sizes = SizesOf(options, photos, held_out);
     if (!sizes.empty()) fingerprint["feature_image_size_px"] = FeatureImageSizePx(sizes, memory_gb);
   }
@@ -438,8 +359,8 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
   set.frames.resize(1);
   std::vector<View>& views = set.frames.front().views;
   RequireTwoSources(photos, held_out, calibrated);
-  views =
-      UndistortPhotos(photos, calibrated, held_out, max_size_px, options.threads, writer, progress);
+  views = UndistortPhotos(photos, calibrated, held_out, {max_size_px, options.threads}, writer,
+                          progress);
   const SparseScene sparse = SparseOf(calibrated, views);
 
   log.Begin("depth");
@@ -456,7 +377,7 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
                                        PhotosJson(photos, is_source), calibrated, report)
                             .dump();
   const calib::ValidationReport validation =
-      Validate(set, sparse, report, options.threads, progress);
+      Validate(writer.folder(), set, sparse, memory_gb, report, options.threads, progress);
   writer.WriteSparse(set, sparse);
   WriteSetPage(writer, set,
                {options.output.stem().string(), options.depth.engine, validation.tests,

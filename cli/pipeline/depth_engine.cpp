@@ -13,10 +13,10 @@ namespace {
 namespace fs = std::filesystem;
 
 // Lays out a workspace of the source views and has COLMAP fill it. Images are called as their files
-// in the set.
+// in the set. Its world begins where the set's does: COLMAP computes depth in single precision,
+// which at a national grid's millions of metres would leave steps of half a metre.
 void ComputeWorkspace(const DepthSources& of, const fs::path& workspace, Progress& progress) {
   DtrSet set;
-  set.world_origin = of.world_origin;
   set.frames.resize(1);
   for (const int source : of.sources) {
     const View& view = of.views[static_cast<size_t>(source)];
@@ -45,8 +45,9 @@ std::unique_ptr<stereo::Engine> MakeColmapEngine(const fs::path& given, const De
     names.push_back(given.empty() ? fs::path(view.image_file->path).filename().string()
                                   : view.name);
   }
-  auto engine =
-      std::make_unique<stereo::ColmapEngine>(workspace, names, of.stereo, of.world_origin);
+  const Eigen::Vector3d world_origin =
+      given.empty() ? Eigen::Vector3d::Zero().eval() : Eigen::Vector3d(of.world_origin);
+  auto engine = std::make_unique<stereo::ColmapEngine>(workspace, names, of.stereo, world_origin);
   if (engine->photometric_maps() > 0) {
     progress.Note(fmt::format(
         "colmap: {} of {} depth maps are photometric, not held to each other by COLMAP: their "

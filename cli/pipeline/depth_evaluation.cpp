@@ -107,14 +107,18 @@ eval::DepthScores EvaluateDepth(const DtrSet& set, const fs::path& truth, int th
   for (const Pair& pair : pairs) {
     progress.ThrowIfInterrupted();
     const View& view = *pair.view;
-    if (view.role != ViewRole::kSource || view.depth.empty()) continue;
+    if (view.role != ViewRole::kSource) continue;
+    const PinholeCamera camera = view.DepthCamera();
+    // A view that got no depth at all has missed every true pixel of it.
+    const DepthImage none(camera.width_px(), camera.height_px());
+    const DepthImage& depth = view.depth.empty() ? none : view.depth;
     const ViewTruth found =
         cast && !eval::IsSameGrid(pair.truth->camera, view.camera)
             ? cast->On(view, static_cast<size_t>(pair.truth - list.cameras.data()), threads)
             : StoredTruth(truth, *pair.truth, view);
-    scorer.Add(view.depth, eval::SubsampleTruth(found.depth, view.depth_scale),
+    scorer.Add(depth, eval::SubsampleTruth(found.depth, view.depth_scale),
                eval::SubsampleMask(found.scored, view.depth_scale), scale,
-               view.DepthCamera().fx_px() * view.reference_baseline,
+               camera.fx_px() * view.reference_baseline,
                view.inverse_depth_sigma ? &*view.inverse_depth_sigma : nullptr);
     progress.Update(++done);
   }

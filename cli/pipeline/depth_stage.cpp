@@ -10,7 +10,9 @@
 #include "cli/pipeline/plane_files.h"
 #include "cli/pipeline/time_budget.h"
 #include "dtr/base/error.h"
+#include "dtr/io/depth_io.h"
 #include "stereo/depth_maps.h"
+#include "stereo/normals.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -86,6 +88,17 @@ stereo::StereoPixels ReadPixels(const std::filesystem::path& folder, View view, 
   return {std::move(view.image), std::move(view.mask)};
 }
 
+// Where the normals of a view go.
+std::filesystem::path NormalsFile(const std::filesystem::path& folder, const View& view) {
+  return folder / std::filesystem::path(view.name).replace_extension(".exr");
+}
+
+void WriteNormals(const std::filesystem::path& file, const stereo::PlaneMap& planes,
+                  const DepthImage& depth, const PinholeCamera& camera) {
+  std::filesystem::create_directories(file.parent_path());
+  io::WriteExrOfVectors(file, stereo::NormalsOf(planes, depth, camera));
+}
+
 void WriteDepth(View& view, stereo::DepthEstimate&& estimate, LengthUnit unit,
                 io::SetWriter& writer) {
   view.depth = std::move(estimate.depth);
@@ -142,6 +155,10 @@ stereo::Effort DepthStage(DtrSet& set, const SparseScene& sparse, const DepthCho
                                     ? WithinBudget(sources.stereo, scene, choice, depth_options,
                                                    writer.work_folder() / "effort.json", progress)
                                     : asked;
+  if (!options.normals.empty() && (choice.engine != "patchmatch" || effort.rounds == 0)) {
+    throw UsageError(
+        "--normals: expected --engine patchmatch with one round or more, whose planes they are of");
+  }
   const auto engine = MakeDepthEngine(choice, effort,
                                       {views, sources.indices, sources.stereo, &scene,
                                        set.world_origin, writer.folder(), writer.work_folder()},
@@ -156,9 +173,19 @@ stereo::Effort DepthStage(DtrSet& set, const SparseScene& sparse, const DepthCho
   ComputeWithin(choice.memory_gb, depth_options, progress, [&] {
     stereo::ComputeDepthMaps(
         sources.stereo, scene, *engine, depth_options, progress,
-        [&](int source) { return view_of(source).depth_file.has_value(); },
+        [&](int source) {
+          const View& view = view_of(source);
+          return view.depth_file.has_value() &&
+                 (options.normals.empty() ||
+                  std::filesystem::exists(NormalsFile(options.normals, view)));
+        },
         [&](int source, stereo::DepthEstimate&& estimate, const stereo::DepthRange&) {
-          WriteDepth(view_of(source), std::move(estimate), set.unit, writer);
+          View& view = view_of(source);
+          if (!options.normals.empty()) {
+            WriteNormals(NormalsFile(options.normals, view), *planes.Load(engine->Rounds(), source),
+                         estimate.depth, view.camera);
+          }
+          WriteDepth(view, std::move(estimate), set.unit, writer);
         });
   });
   return effort;

@@ -1,6 +1,7 @@
 // cli/pipeline/depth_stage.h -- depth for the source views of a set, written view by view.
 #pragma once
 #include <cstdint>
+#include <filesystem>
 
 #include "cli/pipeline/depth_settings.h"
 #include "dtr/base/progress.h"
@@ -13,6 +14,9 @@ namespace dtr::pipeline {
 struct DepthStageOptions {
   int threads = 0;
   std::uint64_t seed = 0;
+  /// Where normals of the source views go, NAME.exr as stereo::NormalsOf gives them; empty:
+  /// nowhere.
+  std::filesystem::path normals = {};
 };
 
 /// Writes the pixels of a view, or finds them written by an earlier, interrupted run, and frees

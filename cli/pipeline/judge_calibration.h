@@ -13,11 +13,23 @@ namespace dtr::pipeline {
 /// The calibration with its observations as calib::Judge takes it.
 calib::JudgedCalibration JudgedFrom(const calib::Calibration& calibration);
 
+/// A camera from elsewhere (.yml, .yaml of OpenCV or ROS, cameras.txt of COLMAP with one camera),
+/// to be judged by photos of a board: no observations. Throws Error where the lens is of a model
+/// that boards are not solved with, and as ReadLens (lens_file.h) does.
+calib::Calibration ForeignCalibration(const std::filesystem::path& file, const calib::Board& board);
+
+struct UnseenPhotos {
+  calib::UnseenViews unseen;
+  std::vector<calib::LeftOut> left_out;  ///< photos that the calibration was made from, by name
+};
+
 /// Looks for the calibration's board in photos that it has not seen: of a single camera the photos
-/// of `folder`, of a rig what ReadRigPhotos finds there. Cameras of a rig are matched by name.
-/// Throws Error when sizes differ from the calibration's or a camera is not there.
-calib::UnseenViews ReadUnseen(const calib::Calibration& calibration,
-                              const std::filesystem::path& folder, int threads, Progress& progress);
+/// of `folder` whose names match `pattern`, of a rig what ReadRigPhotos finds there (`pattern` must
+/// be "*"). Cameras of a rig are matched by name. A photo whose corners are those of a view that
+/// the calibration keeps is the one that it was made from, and is left out. Throws Error when sizes
+/// differ from the calibration's, a camera is not there or nothing is left.
+UnseenPhotos ReadUnseen(const calib::Calibration& calibration, const std::filesystem::path& folder,
+                        const std::string& pattern, int threads, Progress& progress);
 
 /// The report as a page: verdict and tests, residual vectors, coverage, maps, worst views. Views
 /// are drawn over their photos where `images` has them.

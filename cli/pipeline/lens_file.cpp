@@ -30,7 +30,7 @@ calib::LensCamera ReadLens(const std::filesystem::path& file) {
     return cameras.begin()->second;
   }
   throw UsageError(
-      fmt::format("--lens {}: expected a .json of `dtr calibrate board`, a .yml of "
+      fmt::format("{}: expected a .json of `dtr calibrate board`, a .yml of "
                   "OpenCV or a cameras.txt of COLMAP",
                   file.string()));
 }

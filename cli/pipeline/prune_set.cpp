@@ -14,6 +14,7 @@
 #include "dtr/io/pruned.h"
 #include "dtr/io/set_io.h"
 #include "dtr/prune/probes.h"
+#include "dtr/render/instants.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -54,10 +55,7 @@ DtrSet LoadForPruning(const PruneSetOptions& options, Progress& progress) {
   load.threads = options.threads;
   load.warn = [&](const std::string& line) { progress.Note(line); };
   DtrSet set = io::LoadSet(options.set, load);
-  if (set.frames.size() != 1) {
-    throw Error(fmt::format("{}: pruning expects a still scene, found {} frames",
-                            options.set.string(), set.frames.size()));
-  }
+  RequireOneFrame(set);
   for (const View& view : set.frames.front().views) {
     if (view.role == ViewRole::kHeldOut || view.depth_file) continue;
     throw Error(fmt::format("{}: view '{}': expected depth, found none; run dtr stereo first",

@@ -1,5 +1,6 @@
 #include "cli/pipeline/recompute_depth.h"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "cli/pipeline/depth_engine.h"
@@ -12,6 +13,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/hash.h"
 #include "dtr/base/parallel_for.h"
+#include "dtr/eval/json.h"
 #include "dtr/io/pruned.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/instants.h"
@@ -88,8 +90,9 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& progre
                                       {"held_out", HeldOutHashes(set)}};
   io::SetWriter writer(report.written, fingerprint.dump(), in_place || options.force);
   CopyImages(options.set, set, options.threads, writer, progress);
-  const stereo::Effort spent = DepthStage(set, sparse, options.depth, effort,
-                                          {options.threads, options.seed}, writer, progress);
+  const stereo::Effort spent =
+      DepthStage(set, sparse, options.depth, effort,
+                 {options.threads, options.seed, options.normals}, writer, progress);
   // What was left out of the former depth says nothing of this.
   if (!io::PrunedJson(set).empty()) {
     progress.Note("the record of what was pruned goes with the depth that was pruned");
@@ -116,7 +119,10 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& progre
   set.provenance_json = provenance.dump();
   report.depth_maps = count.maps;
   report.depth_completeness = count.Completeness();
-  const auto validation = ValidateSet(set, sparse, {}, options.threads);
+  SetLimits limits;
+  limits.memory_gb = std::min(limits.memory_gb, options.depth.memory_gb.value_or(kDefaultMemoryGb));
+  const auto validation = ValidateSet(writer.folder(), set, sparse, limits, options.threads);
+  set.verdict_json = eval::VerdictJson(validation.tests);  // other depth, other verdict
   WriteSetPage(writer, set,
                {report.written.stem().string(),
                 options.depth.engine,

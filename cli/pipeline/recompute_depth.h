@@ -13,6 +13,7 @@ struct RecomputeOptions {
   std::filesystem::path set;
   std::filesystem::path output;  ///< empty: `set` itself is replaced
   DepthChoice depth;
+  std::filesystem::path normals;  ///< folder for normals (DepthStageOptions); empty: none
   bool force = false;
   int threads = 0;
   std::uint64_t seed = 0;

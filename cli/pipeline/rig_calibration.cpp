@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 
 #include "calib/files/opencv_yaml.h"
 #include "calib/solve/choose_model.h"
@@ -138,7 +139,29 @@ calib::Calibration CalibrateRig(const calib::Board& board, const RigPhotos& phot
   return calibration;
 }
 
-calib::RigCameraInput GivenLens(const calib::LensCamera& camera, const std::string& where) {
+namespace {
+
+// COLMAP's models of one focal length, as the ones of two that say the same.
+calib::LensCamera WithTwoFocalLengths(calib::LensCamera camera) {
+  using calib::LensModel;
+  static const std::map<LensModel, LensModel> kWider{
+      {LensModel::kSimplePinhole, LensModel::kPinhole},
+      {LensModel::kSimpleRadial, LensModel::kOpenCv},
+      {LensModel::kRadial, LensModel::kOpenCv},
+      {LensModel::kSimpleRadialFisheye, LensModel::kOpenCvFisheye},
+      {LensModel::kRadialFisheye, LensModel::kOpenCvFisheye}};
+  const auto wider = kWider.find(camera.model);
+  if (wider == kWider.end()) return camera;
+  camera.model = wider->second;
+  camera.params.insert(camera.params.begin(), camera.params.front());
+  camera.params.resize(static_cast<size_t>(calib::ParameterCount(camera.model)), 0);
+  return camera;
+}
+
+}  // namespace
+
+calib::RigCameraInput GivenLens(const calib::LensCamera& given, const std::string& where) {
+  const calib::LensCamera camera = WithTwoFocalLengths(given);
   calib::RigCameraInput input;
   for (const calib::BoardModel model : calib::kBoardModels) {
     // The first model, so the one with the fewest coefficients, that says the same.

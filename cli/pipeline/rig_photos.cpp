@@ -363,8 +363,12 @@ RigPhotos ReadRigPhotos(const fs::path& folder, const calib::Board& board,
   RigPhotos photos;
   for (const std::string& name : layout.cameras) photos.cameras.push_back({name, 0, 0});
   std::map<std::string, size_t> frames;
-  for (size_t i = 0; i < layout.frames.size(); ++i) frames[layout.frames[i]] = i;
-  photos.frames = layout.frames;
+  const std::vector<size_t> times = FrameTimes(layout.frames);
+  photos.frames.resize(times.empty() ? 0 : times.back() + 1);
+  for (size_t i = 0; i < times.size(); ++i) {
+    frames[layout.frames[i]] = times[i];
+    photos.frames[times[i]] = layout.frames[i];
+  }
   for (Shot& shot : layout.shots) {
     if (shot.found.corners.empty()) {
       photos.left_out.push_back({shot.name, shot.found.reason});

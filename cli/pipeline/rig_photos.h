@@ -18,7 +18,7 @@ struct RigPhotoCamera {
 
 struct RigPhotos {
   std::vector<RigPhotoCamera> cameras;  ///< in byte order of names
-  std::vector<std::string> frames;      ///< in order of time
+  std::vector<std::string> frames;      ///< by time (FrameTimes); empty where a number is missing
   std::vector<calib::RigView> views;    ///< rising frame, then camera
   std::vector<calib::LeftOut> left_out;
 };

@@ -318,7 +318,7 @@ ScaleReport ScaleSet(const ScaleOptions& options, Progress& progress) {
       point.p_in_world = found.metric_from_scene * point.p_in_world;
     }
     writer.WriteSparse(set, sparse);
-    checks = ValidateSet(set, sparse, {}, options.threads).tests;
+    checks = ValidateSet(writer.folder(), set, sparse, {}, options.threads).tests;
   }
   Record(found, set, report);
   WriteSetPage(writer, set, {report.written.stem().string(), "", checks, {}, 0, options.threads});

@@ -15,7 +15,8 @@ namespace {
 
 enum Axis : size_t { kDepth, kImage, kSigma, kMesh };
 constexpr const char *kPng = "png", *kJpeg = "jpeg", *kKept = "kept", *kLeftOut = "left-out";
-constexpr double kMillimetreFarthest = 65.535;  // what 16 bits of millimetres hold
+constexpr double kMillimetreFarthest = 65.535;                   // what 16 bits of millimetres hold
+constexpr double kHalfNearest = 0x1p-14, kHalfFarthest = 65504;  // with half's 11 bits
 
 /// The axis' values with the set's own first.
 std::vector<std::string> OwnFirst(const std::string& own, std::vector<std::string> values) {
@@ -30,10 +31,10 @@ std::vector<std::string> OwnFirst(const std::string& own, std::vector<std::strin
 
 struct Stored {
   std::string depth = io::NameOf(DepthCoding::kPng16InverseDepth), image = kPng;
-  bool sigma = false, mesh = false, millimetres = false;
+  bool sigma = false, mesh = false, millimetres = false, half = true;
 };
 
-/// How the first source view lies on disk, and whether all would fit millimetres.
+/// How the first source view lies on disk, and whether all would fit millimetres and half floats.
 Stored HowItLies(const DtrSet& set) {
   Stored stored;
   stored.millimetres = set.unit == LengthUnit::kMetre;
@@ -41,6 +42,7 @@ Stored HowItLies(const DtrSet& set) {
   for (const View& view : set.frames.front().views) {
     if (view.role != ViewRole::kSource || !view.depth_file) continue;
     stored.millimetres = stored.millimetres && view.far_z <= kMillimetreFarthest;
+    stored.half = stored.half && view.near_z >= kHalfNearest && view.far_z <= kHalfFarthest;
     if (!std::exchange(first, false)) continue;
     stored.depth = io::NameOf(view.depth_coding);
     stored.image = view.image_file && view.image_file->path.ends_with(".png") ? kPng : kJpeg;
@@ -68,10 +70,10 @@ StorageSweep::StorageSweep(StorageSweepOptions options, Progress& progress)
     : options_(std::move(options)), progress_(progress) {
   const Stored stored = HowItLies(io::ReadSet(options_.set));
   std::vector<std::string> codings;
-  for (const DepthCoding coding :
-       {DepthCoding::kPng16InverseDepth, DepthCoding::kExrFloat, DepthCoding::kExrHalf}) {
+  for (const DepthCoding coding : {DepthCoding::kPng16InverseDepth, DepthCoding::kExrFloat}) {
     codings.emplace_back(io::NameOf(coding));
   }
+  if (stored.half) codings.emplace_back(io::NameOf(DepthCoding::kExrHalf));
   if (stored.millimetres) codings.emplace_back(io::NameOf(DepthCoding::kPng16Millimetre));
   axes_ = {{"depth", OwnFirst(stored.depth, codings)},
            {"image", OwnFirst(stored.image, {kPng, kJpeg})}};

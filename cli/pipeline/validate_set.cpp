@@ -3,6 +3,9 @@
 #include <algorithm>
 
 #include "cli/pipeline/set_rig.h"
+#include "dtr/eval/cross_depth.h"
+#include "dtr/eval/json.h"
+#include "dtr/io/set_io.h"
 
 namespace dtr::pipeline {
 
@@ -26,6 +29,33 @@ Cameras CamerasOf(const DtrSet& set) {
   return of;
 }
 
+// Appends what depth says, where two views or more have any.
+void AddCrossDepth(const std::filesystem::path& folder, const DtrSet& set, const SetLimits& limits,
+                   int threads, calib::ValidationReport& report) {
+  std::vector<const View*> with_depth;
+  for (const View& view : set.frames.front().views) {
+    if (view.depth_file) with_depth.push_back(&view);
+  }
+  if (with_depth.size() < 2) return;
+  eval::CrossDepthOptions options;
+  options.max_cross_px = limits.max_cross_px;
+  options.max_view_cross_px = 2 * limits.max_cross_px;
+  options.memory_bytes = static_cast<size_t>(limits.memory_gb * 1e9);
+  options.scene_center = set.scene_center;
+  options.threads = threads;
+  const auto cross = eval::CrossDepth(with_depth, options, [&](const View& view) {
+    View loaded = view;
+    loaded.mesh_file.reset();  // renderers' alone
+    io::LoadOptions load;
+    load.images = false;
+    load.threads = 1;  // several views at a time
+    io::LoadPixels(folder, loaded, load);
+    return std::move(loaded.depth);
+  });
+  report.tests.insert(report.tests.end(), cross.tests.begin(), cross.tests.end());
+  report.cross_depth_json = eval::ToJson(cross);
+}
+
 }  // namespace
 
 calib::ValidationReport ReprojectionOfSet(const DtrSet& set, const SparseScene& sparse,
@@ -35,13 +65,14 @@ calib::ValidationReport ReprojectionOfSet(const DtrSet& set, const SparseScene& 
                                      of.held_out);
 }
 
-calib::ValidationReport ValidateSet(const DtrSet& set, const SparseScene& sparse,
-                                    const calib::ValidateLimits& limits, int threads,
-                                    const calib::BundleLimits& judge_limits) {
-  calib::ValidationReport report = ReprojectionOfSet(set, sparse, limits, threads);
+calib::ValidationReport ValidateSet(const std::filesystem::path& folder, const DtrSet& set,
+                                    const SparseScene& sparse, const SetLimits& limits,
+                                    int threads) {
+  calib::ValidationReport report = ReprojectionOfSet(set, sparse, limits.reprojection, threads);
+  AddCrossDepth(folder, set, limits, threads, report);
   const Cameras of = CamerasOf(set);
   const calib::Judgement judgement =
-      calib::Judge(calib::BundleOf(of.cameras, of.poses, of.names, sparse), judge_limits, threads);
+      calib::Judge(calib::BundleOf(of.cameras, of.poses, of.names, sparse), limits.judge, threads);
   report.tests.insert(report.tests.end(), judgement.tests.begin(), judgement.tests.end());
   const auto rig = RigOfSet(set);
   const auto places = rig ? RigPlaces(set, sparse, *rig) : std::nullopt;

@@ -15,8 +15,14 @@ namespace {
 using io::DepthFormat;
 
 constexpr const char* kStage = "Depth coding";
-constexpr DepthCoding kCodings[] = {DepthCoding::kPng16InverseDepth, DepthCoding::kPng16Millimetre,
-                                    DepthCoding::kExrHalf, DepthCoding::kExrFloat};
+/// zstd-inverse as finely as it goes, and as coarsely as pruning makes it.
+constexpr std::pair<DepthCoding, int> kCodings[] = {
+    {DepthCoding::kPng16InverseDepth, InverseDepthCode::kSteps},
+    {DepthCoding::kZstdInverseDepth, InverseDepthCode::kSteps},
+    {DepthCoding::kZstdInverseDepth, 100},
+    {DepthCoding::kPng16Millimetre, InverseDepthCode::kSteps},
+    {DepthCoding::kExrHalf, InverseDepthCode::kSteps},
+    {DepthCoding::kExrFloat, InverseDepthCode::kSteps}};
 
 DepthImage ThroughFile(const DepthImage& depth, const DepthFormat& format, Outcome& outcome) {
   const TemporaryFolder folder;
@@ -39,8 +45,9 @@ DepthImage ThroughFile(const DepthImage& depth, const DepthFormat& format, Outco
 double ErrorOverPromise(float z, float stored, const DepthFormat& format) {
   constexpr double kFloat = 0x1.01p-24;
   double promised = kFloat / stored;  // of 1/z
-  if (format.coding == DepthCoding::kPng16InverseDepth) {
-    promised += 0.5 * (1 + 1e-9) * (1 / format.near_z - 1 / format.far_z) / 65534;
+  if (format.coding == DepthCoding::kPng16InverseDepth ||
+      format.coding == DepthCoding::kZstdInverseDepth) {
+    promised += 0.5 * (1 + 1e-9) * (1 / format.near_z - 1 / format.far_z) / io::StepsOf(format);
   } else if (format.coding == DepthCoding::kPng16Millimetre) {
     promised += 0.0005 * (1 + 1e-6) / (static_cast<double>(z) * stored);
   } else if (format.coding == DepthCoding::kExrHalf) {
@@ -64,8 +71,8 @@ class RoundTrips {
     }
   }
   void ThroughAllCodings(const DepthImage& depth, double near_z, double far_z, Outcome& outcome) {
-    for (const DepthCoding coding : kCodings) {
-      Through(depth, {coding, near_z, far_z, LengthUnit::kMetre}, outcome);
+    for (const auto& [coding, steps] : kCodings) {
+      Through(depth, {coding, near_z, far_z, LengthUnit::kMetre, steps}, outcome);
     }
   }
   void AddTo(Outcome& outcome) const {
@@ -196,10 +203,10 @@ Outcome NoNumbers(const Conditions&) {
         std::pair{std::numeric_limits<float>::infinity(), "infinity"}, std::pair{-1.0f, "-1"}}) {
     DepthImage depth(2, 1);
     depth(0, 0) = bad;
-    for (const DepthCoding coding : kCodings) {
-      ExpectRefusal(outcome, std::string(name) + " as " + io::NameOf(coding), [&] {
-        ThroughFile(depth, {coding, 1, 2, LengthUnit::kMetre}, outcome);
-      });
+    for (const auto& [coding, steps] : kCodings) {
+      const DepthFormat format{coding, 1, 2, LengthUnit::kMetre, steps};
+      ExpectRefusal(outcome, std::string(name) + " as " + io::NameOf(coding),
+                    [&] { ThroughFile(depth, format, outcome); });
     }
   }
   return outcome;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
@@ -35,21 +36,28 @@ std::optional<double> InverseDepthAt(const DepthImage& depth, const Eigen::Vecto
 
 enum class Outcome { kNothing, kOccluded, kContradicted, kCompared };
 
+/// A view's depth map with the camera and the pose that it was made for.
+struct Surface {
+  const DepthImage& depth;
+  const PinholeCamera& grid;
+  const Pose& cam_from_world;
+  int depth_scale;
+};
+
 /// One round trip: the depth pixel (x, y) of `view` through `other`.
-Outcome RoundTrip(const View& view, const PinholeCamera& view_grid, const View& other,
-                  const PinholeCamera& other_grid, const Pose& other_from_view, int x, int y,
-                  double* error_px) {
+Outcome RoundTrip(const Surface& view, const Surface& other, const Pose& other_from_view, int x,
+                  int y, double* error_px) {
   const Eigen::Vector2d start(x + 0.5, y + 0.5);
   const Eigen::Vector3d p_in_view =
-      view_grid.CamFromPixel(start, view.depth(x, y), DepthKind::kPlaneZ);
+      view.grid.CamFromPixel(start, view.depth(x, y), DepthKind::kPlaneZ);
   const Eigen::Vector3d p_in_other = other_from_view * p_in_view;
-  const auto landed = other_grid.PixelFromCam(p_in_other);
+  const auto landed = other.grid.PixelFromCam(p_in_other);
   if (!landed) return Outcome::kNothing;
   const auto inverse = InverseDepthAt(other.depth, *landed);
   if (!inverse) return Outcome::kNothing;
   const Eigen::Vector3d back = other_from_view.Inverse() *
-                               other_grid.CamFromPixel(*landed, 1 / *inverse, DepthKind::kPlaneZ);
-  const auto returned = view_grid.PixelFromCam(back);
+                               other.grid.CamFromPixel(*landed, 1 / *inverse, DepthKind::kPlaneZ);
+  const auto returned = view.grid.PixelFromCam(back);
   // A surface behind this camera cannot be told from one that hides the point: no statement.
   if (!returned) return Outcome::kNothing;
   *error_px = (*returned - start).norm() * view.depth_scale;
@@ -124,57 +132,118 @@ std::vector<Check> MakeTests(const CrossDepthReport& report, const CrossDepthOpt
   return tests;
 }
 
-}  // namespace
-
-CrossDepthReport CrossDepth(std::span<const View* const> all_views,
-                            const CrossDepthOptions& options) {
-  std::vector<const View*> views;
-  for (const View* view : all_views) {
-    if (!view->depth.empty()) views.push_back(view);
+/// The samples of one view, through all its neighbours. `errors`: of what counts.
+CrossDepthOfView ThroughNeighbours(const Surface& view, std::span<const Surface> neighbours,
+                                   int samples, std::vector<float>& errors) {
+  CrossDepthOfView result;
+  const double pixels = static_cast<double>(view.depth.width()) * view.depth.height();
+  const int step =
+      std::max(1, static_cast<int>(std::ceil(std::sqrt(pixels / std::max(1, samples)))));
+  for (const Surface& other : neighbours) {
+    const Pose other_from_view = other.cam_from_world * view.cam_from_world.Inverse();
+    for (int y = step / 2; y < view.depth.height(); y += step) {
+      for (int x = step / 2; x < view.depth.width(); x += step) {
+        if (DepthImage::IsHole(view.depth(x, y))) continue;
+        double error_px = 0;
+        const Outcome outcome = RoundTrip(view, other, other_from_view, x, y, &error_px);
+        if (outcome == Outcome::kNothing) continue;
+        result.occluded += outcome == Outcome::kOccluded;
+        result.contradicted += outcome == Outcome::kContradicted;
+        if (outcome != Outcome::kOccluded) errors.push_back(static_cast<float>(error_px));
+      }
+    }
   }
+  Summarise(errors, &result);
+  return result;
+}
+
+/// Depth maps as far as they are needed: those in memory stay where they are, others are brought.
+class DepthMaps {
+ public:
+  DepthMaps(std::span<const View* const> views, const DepthLoader& load, int threads)
+      : views_(views), load_(load), threads_(threads), own_(views.size()) {
+    for (const View* view : views) grids_.push_back(view->DepthCamera());
+  }
+
+  /// What a map takes in memory; nothing where it is there anyhow.
+  size_t Bytes(size_t i) const {
+    return load_ ? sizeof(float) * static_cast<size_t>(grids_[i].width_px()) *
+                       static_cast<size_t>(grids_[i].height_px())
+                 : 0;
+  }
+
+  /// Brings these, and lets go of all others.
+  void Hold(const std::set<size_t>& needed) {
+    std::vector<size_t> missing;
+    for (size_t i = 0; i < own_.size(); ++i) {
+      if (!needed.contains(i)) {
+        own_[i] = DepthImage();
+      } else if (load_ && own_[i].empty()) {
+        missing.push_back(i);
+      }
+    }
+    ParallelFor(0, static_cast<int>(missing.size()), threads_, [&](int at) {
+      const size_t i = missing[static_cast<size_t>(at)];
+      own_[i] = load_(*views_[i]);
+    });
+    for (const size_t i : needed) RequireSize(i);
+  }
+
+  Surface At(size_t i) const {
+    return {Depth(i), grids_[i], views_[i]->cam_from_world, views_[i]->depth_scale};
+  }
+
+ private:
+  const DepthImage& Depth(size_t i) const { return load_ ? own_[i] : views_[i]->depth; }
+
+  void RequireSize(size_t i) const {
+    const PinholeCamera& grid = grids_[i];
+    if (grid.width_px() == Depth(i).width() && grid.height_px() == Depth(i).height()) return;
+    throw Error(fmt::format("cross check: view {}: expected depth of {}x{}, found {}x{}",
+                            views_[i]->name, grid.width_px(), grid.height_px(), Depth(i).width(),
+                            Depth(i).height()));
+  }
+
+  std::span<const View* const> views_;
+  const DepthLoader& load_;
+  int threads_;
+  std::vector<PinholeCamera> grids_;
+  std::vector<DepthImage> own_;
+};
+
+CrossDepthReport Compare(std::span<const View* const> views, const CrossDepthOptions& options,
+                         const DepthLoader& load) {
   if (views.size() < 2) {
     throw Error(
         fmt::format("cross check: expected at least 2 views with depth, found {}", views.size()));
   }
-  std::vector<PinholeCamera> grids;
-  for (const View* view : views) {
-    grids.push_back(view->DepthCamera());
-    if (grids.back().width_px() != view->depth.width() ||
-        grids.back().height_px() != view->depth.height()) {
-      throw Error(fmt::format("cross check: view {}: expected depth of {}x{}, found {}x{}",
-                              view->name, grids.back().width_px(), grids.back().height_px(),
-                              view->depth.width(), view->depth.height()));
-    }
-  }
-
+  DepthMaps maps(views, load, options.threads);
+  std::vector<std::vector<size_t>> neighbours;
+  for (size_t i = 0; i < views.size(); ++i) neighbours.push_back(Neighbours(views, i, options));
   CrossDepthReport report;
   report.views.resize(views.size());
   std::vector<std::vector<float>> errors(views.size());
-  ParallelFor(0, static_cast<int>(views.size()), options.threads, [&](int item) {
-    const auto i = static_cast<size_t>(item);
-    const View& view = *views[i];
-    CrossDepthOfView& result = report.views[i];
-    result.name = view.name;
-    const double pixels = static_cast<double>(view.depth.width()) * view.depth.height();
-    const int step = std::max(
-        1, static_cast<int>(std::ceil(std::sqrt(pixels / std::max(1, options.samples_per_view)))));
-    for (const size_t n : Neighbours(views, i, options)) {
-      const Pose other_from_view = views[n]->cam_from_world * view.cam_from_world.Inverse();
-      for (int y = step / 2; y < view.depth.height(); y += step) {
-        for (int x = step / 2; x < view.depth.width(); x += step) {
-          if (DepthImage::IsHole(view.depth(x, y))) continue;
-          double error_px = 0;
-          const Outcome outcome =
-              RoundTrip(view, grids[i], *views[n], grids[n], other_from_view, x, y, &error_px);
-          if (outcome == Outcome::kNothing) continue;
-          result.occluded += outcome == Outcome::kOccluded;
-          result.contradicted += outcome == Outcome::kContradicted;
-          if (outcome != Outcome::kOccluded) errors[i].push_back(static_cast<float>(error_px));
-        }
-      }
+  // As many views at a time as fit into memory with their neighbours.
+  for (size_t begin = 0, end = 0; begin < views.size(); begin = end) {
+    std::set<size_t> needed;
+    for (; end < views.size(); ++end) {
+      std::set<size_t> more(neighbours[end].begin(), neighbours[end].end());
+      more.insert(end);
+      more.merge(std::set<size_t>(needed));
+      size_t bytes = 0;
+      for (const size_t i : more) bytes += maps.Bytes(i);
+      if (end > begin && bytes > options.memory_bytes) break;
+      needed = std::move(more);
     }
-    Summarise(errors[i], &result);
-  });
+    maps.Hold(needed);
+    ParallelFor(static_cast<int>(begin), static_cast<int>(end), options.threads, [&](int item) {
+      const auto i = static_cast<size_t>(item);
+      std::vector<Surface> others;
+      for (const size_t n : neighbours[i]) others.push_back(maps.At(n));
+      report.views[i] = ThroughNeighbours(maps.At(i), others, options.samples_per_view, errors[i]);
+      report.views[i].name = views[i]->name;
+    });
+  }
 
   std::vector<float> all;
   for (size_t i = 0; i < views.size(); ++i) {
@@ -186,6 +255,22 @@ CrossDepthReport CrossDepth(std::span<const View* const> all_views,
   Summarise(all, &report.all);
   report.tests = MakeTests(report, options);
   return report;
+}
+
+}  // namespace
+
+CrossDepthReport CrossDepth(std::span<const View* const> all_views,
+                            const CrossDepthOptions& options) {
+  std::vector<const View*> views;
+  for (const View* view : all_views) {
+    if (!view->depth.empty()) views.push_back(view);
+  }
+  return Compare(views, options, {});
+}
+
+CrossDepthReport CrossDepth(std::span<const View* const> views, const CrossDepthOptions& options,
+                            const DepthLoader& load) {
+  return Compare(views, options, load);
 }
 
 }  // namespace dtr::eval

@@ -1,6 +1,8 @@
 // dtr/eval/cross_depth.h -- do the views of a set tell the same story?
 #pragma once
 #include <Eigen/Core>
+#include <cstddef>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -18,6 +20,9 @@ struct CrossDepthOptions {
   int samples_per_view = 50000;    ///< depth pixels on a regular grid; enough for any median
   /// Where angles are measured; without it neighbours are the nearest cameras.
   std::optional<Eigen::Vector3d> scene_center;
+  /// Depth maps that are held at a time where they are brought one by one; a view and its
+  /// neighbours are, whatever they take. The result does not depend on it.
+  size_t memory_bytes = size_t{1} << 30;
   int threads = 0;  ///< 0: all cores; the result does not depend on it
 };
 
@@ -49,5 +54,13 @@ struct CrossDepthReport {
 /// Views without depth are passed over. Throws Error when fewer than 2 have depth.
 CrossDepthReport CrossDepth(std::span<const View* const> views,
                             const CrossDepthOptions& options = {});
+
+/// Depth map of a view whose pixels are not in memory; called from several threads.
+using DepthLoader = std::function<DepthImage(const View&)>;
+
+/// The same of views that all have depth, which `load` brings when it is needed: for sets that are
+/// larger than the memory.
+CrossDepthReport CrossDepth(std::span<const View* const> views, const CrossDepthOptions& options,
+                            const DepthLoader& load);
 
 }  // namespace dtr::eval

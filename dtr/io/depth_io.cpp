@@ -124,6 +124,15 @@ DepthImage ReadBands(const fs::path& file, const DepthFormat& format, int width_
   });
 }
 
+void WriteFloats(const fs::path& file, const Grid<float>& grid,
+                 const std::vector<std::string>& channels, TypeDesc type) {
+  ImageSpec spec(grid.width(), grid.height(), grid.channels(), type);
+  spec.channelnames = channels;
+  spec.attribute("compression", "zip");
+  spec.attribute("DateTime", "");  // else OpenImageIO writes the time of day
+  WriteFileAtomically(file, EncodeImage(".exr", spec, TypeDesc::FLOAT, grid.data().data()));
+}
+
 }  // namespace
 
 Grid<float> ReadFloatGrid(const fs::path& file, std::uint64_t limit_px) {
@@ -142,11 +151,14 @@ void WriteExr(const fs::path& file, const Grid<float>& grid, bool half) {
       }
     }
   }
-  ImageSpec spec(grid.width(), grid.height(), 1, half ? TypeDesc::HALF : TypeDesc::FLOAT);
-  spec.channelnames = {"Y"};
-  spec.attribute("compression", "zip");
-  spec.attribute("DateTime", "");  // else OpenImageIO writes the time of day
-  WriteFileAtomically(file, EncodeImage(".exr", spec, TypeDesc::FLOAT, grid.data().data()));
+  WriteFloats(file, grid, {"Y"}, half ? TypeDesc::HALF : TypeDesc::FLOAT);
+}
+
+void WriteExrOfVectors(const fs::path& file, const Grid<float>& grid) {
+  if (grid.empty() || grid.channels() != 3) {
+    throw Error(file.string() + ": expected three channels of floats to write");
+  }
+  WriteFloats(file, grid, {"X", "Y", "Z"}, TypeDesc::FLOAT);
 }
 
 Grid<std::uint16_t> ReadPng16(const fs::path& file, std::uint64_t limit_px) {

@@ -20,6 +20,9 @@ Grid<float> ReadFloatGrid(const std::filesystem::path& file,
 /// half cannot hold (|v| > 65504) are refused. Throws Error.
 void WriteExr(const std::filesystem::path& file, const Grid<float>& grid, bool half = false);
 
+/// Writes three channels named X, Y, Z, ZIP, float32; deterministic bytes. Throws Error.
+void WriteExrOfVectors(const std::filesystem::path& file, const Grid<float>& grid);
+
 /// 16-bit grey PNG, values as stored. Throws Error when the file is not one channel of 16 bits.
 Grid<std::uint16_t> ReadPng16(const std::filesystem::path& file,
                               std::uint64_t limit_px = kImageLimitPx);

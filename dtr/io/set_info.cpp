@@ -16,6 +16,7 @@
 #include "dtr/io/pruned.h"
 #include "dtr/io/set_io.h"
 #include "dtr/io/set_json.h"
+#include "dtr/io/verdict.h"
 
 namespace dtr::io {
 namespace {
@@ -67,6 +68,8 @@ std::string Megabytes(std::uint64_t bytes) {
   return out.str();
 }
 
+}  // namespace
+
 std::string VerdictLine(const DtrSet& set) {
   const Json verdict = ParseJson(set.verdict_json, "verdict");
   if (verdict.empty()) return "not validated";
@@ -82,6 +85,13 @@ std::string VerdictLine(const DtrSet& set) {
   }
   return "FAILED" + (failed.empty() ? "" : ": " + failed) + "; dtr validate says more";
 }
+
+std::string VerdictWarning(const DtrSet& set) {
+  const std::string line = VerdictLine(set);
+  return line.starts_with("FAILED") ? "WARNING: calibration " + line : "";
+}
+
+namespace {
 
 // The rig that a set was built with, in a line; nothing for others, or where another tool wrote
 // something else in its place.

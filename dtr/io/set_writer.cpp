@@ -181,16 +181,14 @@ void SetWriter::State::OpenPartial(const std::string& fingerprint) {
       fs::exists(partial) && HoldsWork(partial) && !fs::exists(partial / kFingerprint);
   if (!foreign) fs::create_directories(partial / kWork, error);
   if (error) throw Error(partial.string() + ": cannot be made: " + error.message());
-  if (!foreign) {
-    lock = Lock(partial / kLock);
-    RemoveTemporaryFiles(partial);  // of a run that was killed
-  }
+  if (!foreign) lock = Lock(partial / kLock);
   const bool holds_work = HoldsWork(partial);
   if (holds_work &&
       (foreign || ReadFile(partial / kFingerprint, kRecordLimitBytes) != fingerprint)) {
     throw UsageError(partial.string() + ": expected work of the same inputs and options, found " +
                      "others; run that command again to finish it, or delete the folder");
   }
+  RemoveTemporaryFiles(partial);  // of a run that was killed
   resumed = holds_work;
   if (!resumed) WriteFileAtomically(partial / kFingerprint, fingerprint);
 }

@@ -47,13 +47,14 @@ std::string SizeText(const PinholeCamera& camera) {
   return std::to_string(camera.width_px()) + "x" + std::to_string(camera.height_px());
 }
 
-/// Distance to the nearest other camera.
+/// Distance to the nearest other camera that is elsewhere.
 double NearestCamera(std::span<const StereoView> views, size_t index) {
   double nearest = std::numeric_limits<double>::infinity();
   const Eigen::Vector3d centre = views[index].cam_from_world.TargetOriginInSource();
   for (size_t i = 0; i < views.size(); ++i) {
     if (i == index) continue;
-    nearest = std::min(nearest, (views[i].cam_from_world.TargetOriginInSource() - centre).norm());
+    const double distance = (views[i].cam_from_world.TargetOriginInSource() - centre).norm();
+    if (distance > 0) nearest = std::min(nearest, distance);
   }
   return nearest;
 }

@@ -1,6 +1,7 @@
 #include "stereo/patchmatch/guesses.h"
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 
 namespace dtr::stereo::patchmatch {
@@ -12,16 +13,30 @@ using Vector = Eigen::Vector3f;
 /// Closer planes than this, in pixels of disparity, are what the pixel has already.
 constexpr float kSamePx = 0.5f;
 
-/// Pixels that a point at the image's centre moves in a source per unit of inverse depth.
-float PxPerInverseDepth(const Level& level, const Source& s) {
+/// Pixels that the point at `share` of the image's width and height moves in a source per unit of
+/// inverse depth; 0 where the source does not see all of its ray.
+float PxPerInverseDepthAt(const Level& level, const Source& s, const Eigen::Vector2f& share) {
   const Matrix m = Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(s.m);
   const Vector k = Eigen::Map<const Vector>(s.k);
-  const Vector centre(0.5f * static_cast<float>(level.reference.width),
-                      0.5f * static_cast<float>(level.reference.height), 1.0f);
-  const auto seen_at = [&](float w) -> Eigen::Vector2f {
-    return (m * centre + w * k).hnormalized();
-  };
-  return (seen_at(level.w_max) - seen_at(level.w_min)).norm() / (level.w_max - level.w_min);
+  const Vector pixel(share.x() * static_cast<float>(level.reference.width),
+                     share.y() * static_cast<float>(level.reference.height), 1.0f);
+  const Vector near = m * pixel + level.w_max * k, far = m * pixel + level.w_min * k;
+  if (!(near.z() > 0) || !(far.z() > 0)) return 0;
+  return (near.hnormalized() - far.hnormalized()).norm() / (level.w_max - level.w_min);
+}
+
+/// Of the image's centre; where that is near the epipole (forward motion) or behind the source,
+/// the largest of the corners, which see what the centre cannot.
+float PxPerInverseDepth(const Level& level, const Source& s) {
+  constexpr float kNearEpipole = 0.25f;  // of what the corners move
+  const float centre = PxPerInverseDepthAt(level, s, {0.5f, 0.5f});
+  float corners = 0;
+  for (const float x : {0.0f, 1.0f}) {
+    for (const float y : {0.0f, 1.0f}) {
+      corners = std::max(corners, PxPerInverseDepthAt(level, s, {x, y}));
+    }
+  }
+  return centre > kNearEpipole * corners ? centre : corners;
 }
 
 void Put(State::Guess* guess, int x, int y, float w, const Vector& plane) {
@@ -41,7 +56,9 @@ void GuessFromSurfaces(const Level& level, State* state) {
     if (s.surface == nullptr) continue;
     const Matrix m = Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(s.back_m);
     const Vector k = Eigen::Map<const Vector>(s.back_k);
-    const float same = kSamePx / PxPerInverseDepth(level, s);
+    const float px_per_inverse_depth = PxPerInverseDepth(level, s);
+    if (!(px_per_inverse_depth > 0)) continue;  // it says nothing of depth here
+    const float same = kSamePx / px_per_inverse_depth;
     const PlaneMap& map = *s.surface;
     for (int v = 0; v < map.inverse_depth.height(); ++v) {
       for (int u = 0; u < map.inverse_depth.width(); ++u) {

@@ -122,6 +122,7 @@ void PrepareGroup(const Level& level, int x, int y, Group* g) {
 
 /// The window's position in a source and its change per pixel of the reference.
 struct Warp {
+  HWY_INLINE Warp() {}  // an implicit one would not be of this instruction set (GCC, NEON)
   VF u, v, ux, uy, vx, vy;
   hn::Mask<DF> fits;
 };

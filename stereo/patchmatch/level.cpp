@@ -56,12 +56,16 @@ Eigen::Vector3d GapBetween(const StereoView& view, const StereoView& other, doub
 
 /// False for pictures of so few colours that every texture is made of them: line art, thresholded
 /// scans. There a window's weights by colour would leave one colour of it, and no texture.
-bool ColoursTellSurfacesApart(const ImageRgb8& image) {
+/// What a mask hides has no say.
+bool ColoursTellSurfacesApart(const StereoView& view) {
   constexpr size_t kFewColours = 4;
+  const ImageRgb8& image = *view.image;
+  const bool masked = view.mask != nullptr && !view.mask->empty();
   std::array<std::array<std::uint8_t, 3>, kFewColours> seen{};
   size_t count = 0;
   for (int y = 0; y < image.height(); ++y) {
     for (int x = 0; x < image.width(); ++x) {
+      if (masked && (*view.mask)(x, y) == 0) continue;
       const std::array<std::uint8_t, 3> colour{image(x, y, 0), image(x, y, 1), image(x, y, 2)};
       const auto end = seen.begin() + static_cast<std::ptrdiff_t>(count);
       if (std::find(seen.begin(), end, colour) != end) continue;
@@ -130,7 +134,7 @@ Level MakeLevel(const StereoView& view, const Picture& reference,
     std::copy_n(reference.grey.row(y), r.width, r.grey.at(0, y));
     for (int x = 0; x < r.width; ++x) *r.usable.at(x, y) = reference.usable(x, y) != 0 ? 1 : 0;
   }
-  r.rgb = ColoursTellSurfacesApart(*view.image) ? ColourOf(view, r.width, r.height, 1 << index)
+  r.rgb = ColoursTellSurfacesApart(view) ? ColourOf(view, r.width, r.height, 1 << index)
                                                 : Bordered<std::int32_t>(r.width, r.height, 0);
   const Eigen::Matrix3d reference_inverse = MatrixOf(reference.camera).inverse();
   // Texture index coordinates: pixel centre i + 0.5 lies at i + kTextureBorder.

@@ -33,7 +33,7 @@ constexpr double kSmallestDisparityPx = 0.5;
 /// a view; two guesses, and a grid they are made from; its picture with all halvings; planes to
 /// hand out; a depth map with what judging it takes; a neighbour's textures with all halvings.
 constexpr double kReferenceBytes = 12, kStateBytes = 16, kWeightBytes = 4, kGuessBytes = 28,
-                 kPictureBytes = 7, kPlaneBytes = 12, kVerdictBytes = 46, kSourceBytes = 7;
+                 kPictureBytes = 7, kPlaneBytes = 12, kVerdictBytes = 54, kSourceBytes = 7;
 constexpr double kSmallThingsBytes = 1 << 18;
 
 void CheckRequest(std::span<const StereoView> views, int reference, std::span<const int> neighbours,

@@ -29,6 +29,10 @@ constexpr Limits kAfterRounds{1.0f, 4.0f, 0};
 constexpr float kLeastTexture = 3.0f;
 /// Largest cost where the texture is weak: that of noise, which is 1, and its scatter.
 constexpr float kWeakCost = 1.1f, kLeastWeakCost = 1e-6f;
+/// Depths less sure than this, pixels of disparity, are held to the planes around them.
+constexpr float kVaguePx = 0.5f;
+/// The planes around a pixel are asked so often: what they have filled is around the next ones.
+constexpr int kPriorPasses = 2;
 /// The planes around a pixel may cost so much more than its own, chosen as the cheapest.
 constexpr float kPriorCost = 0.1f;
 /// One row of so many is asked whether its pixels are ambiguous: what repeats covers more.
@@ -61,8 +65,7 @@ float SigmaWithDoubt(const Verdict& v) {
 }
 
 /// What the pictures say of a pixel and what the planes around it do, as independent measurements.
-void Combine(float prior, Verdict* v) {
-  const float prior_sigma = kPriorSigmaPx / v->px;
+void Combine(float prior, float prior_sigma, Verdict* v) {
   const float seen = v->sigma > 0 ? 1 / (v->sigma * v->sigma) : 0;
   const float expected = 1 / (prior_sigma * prior_sigma);
   v->w = (seen * v->w + expected * prior) / (seen + expected);
@@ -101,54 +104,105 @@ bool HasSurfaces(const Level& level) {
                      [](const Source& s) { return s.surface != nullptr; });
 }
 
+/// The verdicts on all pixels of a view, as they come about.
+class Trust {
+ public:
+  Trust(const Level& level, const StereoView& view, const DepthRange& range, int threads,
+        State* state)
+      : level_(level),
+        view_(view),
+        near_z_(range.near_z),
+        threads_(threads),
+        state_(state),
+        result_{DepthImage(width(), height()), Grid<float>(width(), height())} {}
+
+  /// By what the pictures say of each pixel alone, and of whole areas.
+  void BelieveWhatIsSeen() {
+    const Limits limits = HasSurfaces(level_) ? kAfterRounds : kAfterSearch;
+    Grid<std::uint8_t> consistent(width(), height());
+    ParallelFor(0, height(), threads_, [&](int y) {
+      std::vector<Verdict> row(static_cast<size_t>(width()));
+      JudgeRow(level_, *state_, y, nullptr, row.data());
+      for (int x = 0; x < width(); ++x) {
+        const Verdict& v = row[static_cast<size_t>(x)];
+        if (view_.mask != nullptr && !view_.mask->empty() && (*view_.mask)(x, y) == 0) continue;
+        px_per_w_(x, y) = v.px;
+        if (v.cost <= kWeakCost) cost_(x, y) = std::max(v.cost, kLeastWeakCost);
+        consistent(x, y) = static_cast<std::uint8_t>(v.consistent);
+        const bool weak = !(v.texture >= kLeastTexture) || !(v.sigma * v.px <= limits.sigma_px);
+        if (weak || !(v.cost <= limits.cost) || v.agreeing < limits.agreeing) continue;
+        if (v.sigma > 0) Keep(x, y, v);
+      }
+    });
+    RemoveSpeckles(
+        {px_per_w_, consistent, static_cast<float>(near_z_), level_.w_max - level_.w_min},
+        &result_);
+    RemoveAmbiguous(level_, *state_, threads_, &result_);
+  }
+
+  /// Gives a depth to what has none, and a better one to what is vague, where the planes around
+  /// lead to one that the pictures do not speak against.
+  void AskThePlanesAround() {
+    ParallelFor(0, height(), threads_, [&](int y) {
+      for (int x = 0; x < width(); ++x) {
+        if (DepthImage::IsHole(result_.depth(x, y))) {
+          believed_(x, y) = 0;
+        } else if (!(sigma_px_(x, y) > kVaguePx)) {
+          cost_(x, y) = 0;
+        }
+      }
+    });
+    const Prior prior =
+        PlanarPrior(cost_, {believed_, sigma_px_, px_per_w_}, level_.reference, threads_, state_);
+    ParallelFor(0, height(), threads_, [&](int y) {
+      std::vector<Verdict> row(static_cast<size_t>(width()));
+      JudgeRow(level_, *state_, y, prior.w.row(y), row.data());
+      for (int x = 0; x < width(); ++x) {
+        Verdict& v = row[static_cast<size_t>(x)];
+        if (prior.w(x, y) == 0 || !(v.cost <= cost_(x, y) + kPriorCost)) continue;
+        Combine(prior.w(x, y), prior.sigma(x, y), &v);
+        Keep(x, y, v);
+      }
+    });
+  }
+
+  DepthEstimate TakeResult() { return std::move(result_); }
+
+ private:
+  int width() const { return level_.reference.width; }
+  int height() const { return level_.reference.height; }
+
+  void Keep(int x, int y, const Verdict& v) {
+    // What lies beyond the range by no more than it may be wrong lies at its end.
+    const float slack = kRangeSigmas * v.sigma;
+    if (!(v.w >= level_.w_min - slack) || !(v.w <= level_.w_max + slack)) return;
+    believed_(x, y) = std::clamp(v.w, level_.w_min, level_.w_max);
+    sigma_px_(x, y) = v.sigma * v.px;
+    result_.depth(x, y) = static_cast<float>(near_z_ / static_cast<double>(believed_(x, y)));
+    result_.inverse_depth_sigma(x, y) =
+        static_cast<float>(static_cast<double>(SigmaWithDoubt(v)) / near_z_);
+  }
+
+  const Level& level_;
+  const StereoView& view_;
+  const double near_z_;
+  const int threads_;
+  State* const state_;
+  DepthEstimate result_;
+  Grid<float> px_per_w_{width(), height()};
+  Grid<float> believed_{width(), height()};  ///< inverse depth; 0: none
+  Grid<float> sigma_px_{width(), height()};  ///< of it, without doubt
+  Grid<float> cost_{width(), height()};      ///< of the pixel's plane; 0: the prior is not asked
+};
+
 }  // namespace
 
 DepthEstimate TrustedDepth(const Level& level, const StereoView& view, const DepthRange& range,
                            int threads, State* state) {
-  const int w = level.reference.width, h = level.reference.height;
-  DepthEstimate result{DepthImage(w, h), Grid<float>(w, h)};
-  Grid<float> px_per_w(w, h);
-  Grid<std::uint8_t> consistent(w, h);
-  Grid<float> weak_cost(w, h);  // 0: reliable, or nothing
-  const Limits limits = HasSurfaces(level) ? kAfterRounds : kAfterSearch;
-  const auto keep = [&](int x, int y, const Verdict& v) {
-    // What lies beyond the range by no more than it may be wrong lies at its end.
-    const float slack = kRangeSigmas * v.sigma;
-    if (!(v.w >= level.w_min - slack) || !(v.w <= level.w_max + slack)) return;
-    const float inside = std::clamp(v.w, level.w_min, level.w_max);
-    result.depth(x, y) = static_cast<float>(range.near_z / static_cast<double>(inside));
-    result.inverse_depth_sigma(x, y) =
-        static_cast<float>(static_cast<double>(SigmaWithDoubt(v)) / range.near_z);
-    consistent(x, y) = static_cast<std::uint8_t>(v.consistent);
-  };
-  ParallelFor(0, h, threads, [&](int y) {
-    std::vector<Verdict> row(static_cast<size_t>(w));
-    JudgeRow(level, *state, y, nullptr, row.data());
-    for (int x = 0; x < w; ++x) {
-      const Verdict& v = row[static_cast<size_t>(x)];
-      if (view.mask != nullptr && !view.mask->empty() && (*view.mask)(x, y) == 0) continue;
-      px_per_w(x, y) = v.px;
-      const bool weak = !(v.texture >= kLeastTexture) || !(v.sigma * v.px <= limits.sigma_px);
-      if (weak && v.cost <= kWeakCost) weak_cost(x, y) = std::max(v.cost, kLeastWeakCost);
-      if (weak || !(v.cost <= limits.cost) || v.agreeing < limits.agreeing) continue;
-      if (v.sigma > 0) keep(x, y, v);
-    }
-  });
-  RemoveSpeckles(
-      {px_per_w, consistent, static_cast<float>(range.near_z), level.w_max - level.w_min}, &result);
-  const Grid<float> prior = PlanarPrior(weak_cost, result.depth, px_per_w, threads, state);
-  ParallelFor(0, h, threads, [&](int y) {
-    std::vector<Verdict> row(static_cast<size_t>(w));
-    JudgeRow(level, *state, y, prior.row(y), row.data());
-    for (int x = 0; x < w; ++x) {
-      Verdict& v = row[static_cast<size_t>(x)];
-      if (prior(x, y) == 0 || !(v.cost <= weak_cost(x, y) + kPriorCost)) continue;
-      Combine(prior(x, y), &v);
-      keep(x, y, v);
-    }
-  });
-  RemoveAmbiguous(level, *state, threads, &result);
-  return result;
+  Trust trust(level, view, range, threads, state);
+  trust.BelieveWhatIsSeen();
+  for (int pass = 0; pass < kPriorPasses; ++pass) trust.AskThePlanesAround();
+  return trust.TakeResult();
 }
 
 }  // namespace dtr::stereo::patchmatch

@@ -1,8 +1,8 @@
-// bundle_report MODEL [--truth DIR] [--known-lens]: what bundle adjustment makes of a COLMAP model,
-// beside the model as it is. DIR holds NAME.camera files (Strecha et al. 2008) of images twice as
-// large per axis. Errors after the best similarity between the camera centres: mean angle of the
-// rotations (also by the turn that suits them best), mean distance of the centres as a share of the
-// median neighbour baseline.
+// bundle_report MODEL [--truth CAMERAS_JSON] [--known-lens] [--beside NAME=MODEL]...: what bundle
+// adjustment makes of a COLMAP model, beside the model as it is and others. Errors after the best
+// similarity between the camera centres: mean angle of the rotations (also by the turn that suits
+// them best), mean distance of the centres as a share of the median neighbour baseline. The truth
+// is of the same photos, by their names.
 #include <time.h>
 
 #include <Eigen/LU>
@@ -10,14 +10,15 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstring>
-#include <fstream>
 #include <iostream>
 #include <map>
+#include <optional>
 
 #include "calib/bundle/refine.h"
 #include "calib/colmap/model_io.h"
 #include "calib/similarity.h"
 #include "dtr/base/error.h"
+#include "dtr/io/formats/cameras_json.h"
 
 namespace {
 
@@ -32,28 +33,19 @@ double CpuSeconds() {
 }
 
 struct Truth {
-  LensCamera lens;
+  std::optional<LensCamera> lens;  // that all photos share
   std::map<std::string, Pose> cam_from_world;
 };
 
-Truth ReadTruth(const fs::path& folder) {
+Truth ReadTruth(const fs::path& file) {
   Truth truth;
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    std::ifstream file(entry.path());
-    double v[26];
-    for (double& x : v) file >> x;
-    if (!file) throw Error(entry.path().string() + ": expected 26 numbers");
-    Eigen::Matrix3d world_from_cam;
-    for (int i = 0; i < 9; ++i) world_from_cam(i / 3, i % 3) = v[12 + i];
-    Pose pose;
-    pose.rotation = Eigen::Quaterniond(Eigen::Matrix3d(world_from_cam.transpose())).normalized();
-    pose.translation = -(pose.rotation * Eigen::Vector3d(v[21], v[22], v[23]));
-    truth.cam_from_world[entry.path().stem().string()] = pose;
-    // Half the size per axis; the truth's origin is the outer corner of the first pixel.
+  for (const io::NamedCamera& named : io::ReadCamerasJson(file).cameras) {
+    const PinholeCamera& c = named.camera;
+    truth.cam_from_world[named.name] = named.cam_from_world;
     truth.lens = {LensModel::kPinhole,
-                  static_cast<int>(v[24]) / 2,
-                  static_cast<int>(v[25]) / 2,
-                  {v[0] / 2, v[4] / 2, v[2] / 2, v[5] / 2}};
+                  c.width_px(),
+                  c.height_px(),
+                  {c.fx_px(), c.fy_px(), c.cx_px(), c.cy_px()}};
   }
   return truth;
 }
@@ -101,7 +93,7 @@ void PrintErrors(const SfmModel& model, const Truth& truth) {
         (poses[i].rotation * ours_from_theirs).angularDistance(true_poses[i].rotation) * 180 / M_PI;
   }
   const auto count = static_cast<double>(ours.size());
-  std::printf(" | %.4f | %.4f | %.3f", turn / count, own_turn / count,
+  std::printf(" | %zu | %.4f | %.4f | %.3f", ours.size(), turn / count, own_turn / count,
               100 * shift / count / baseline);
 }
 
@@ -111,29 +103,37 @@ void PrintLens(const SfmModel& model) {
 }
 
 int Run(int argc, char** argv) {
-  fs::path truth_folder;
+  fs::path truth_file;
   bool known = false;
+  std::vector<std::pair<std::string, fs::path>> beside;
   for (int i = 2; i < argc; ++i) {
-    if (std::strcmp(argv[i], "--truth") == 0 && i + 1 < argc) truth_folder = argv[++i];
+    if (std::strcmp(argv[i], "--truth") == 0 && i + 1 < argc) truth_file = argv[++i];
     if (std::strcmp(argv[i], "--known-lens") == 0) known = true;
+    if (std::strcmp(argv[i], "--beside") == 0 && i + 1 < argc) {
+      const std::string given = argv[++i];
+      const size_t equals = given.find('=');
+      if (equals == std::string::npos) throw Error("--beside: expected NAME=MODEL");
+      beside.emplace_back(given.substr(0, equals), given.substr(equals + 1));
+    }
   }
   const SfmModel model = colmap::ReadModel(argv[1]);
-  const Truth truth = truth_folder.empty() ? Truth{} : ReadTruth(truth_folder);
+  const Truth truth = truth_file.empty() ? Truth{} : ReadTruth(truth_file);
   const auto row = [&](const char* name, const SfmModel& m, double cpu_s) {
     std::printf("| %s | %.2f", name, cpu_s);
-    if (!truth_folder.empty()) PrintErrors(m, truth);
+    if (!truth_file.empty()) PrintErrors(m, truth);
     PrintLens(m);
     std::printf(" |\n");
   };
   std::printf("| cameras | CPU s%s | lens |\n",
-              truth_folder.empty() ? ""
-                                   : " | mean rotation error, deg | by the best turn, deg | mean "
-                                     "position error, % of baseline");
+              truth_file.empty() ? ""
+                                 : " | photos | mean rotation error, deg | by the best turn, deg | "
+                                   "mean position error, % of baseline");
+  std::printf("|---|---|%s---|\n", truth_file.empty() ? "" : "---|---|---|---|");
   row("COLMAP", model, 0);
+  for (const auto& [name, folder] : beside) row(name.c_str(), colmap::ReadModel(folder), 0);
   double start = CpuSeconds();
   const Refined refined = Refine(model, {});
   row("refined", refined.model, CpuSeconds() - start);
-  std::printf("%s\n", ToJson(refined).c_str());
   for (const LensFreedom lens : {LensFreedom::kNoPrincipalPoint, LensFreedom::kAll}) {
     AdjustOptions options;
     options.lens = lens;
@@ -142,15 +142,16 @@ int Run(int argc, char** argv) {
     int dropped = 0;
     row(NameOf(lens), ModelOf(a.bundle, model, false, &dropped), CpuSeconds() - start);
   }
-  if (known) {
+  if (known && truth.lens) {
     RefineOptions options;
     options.known_lenses.emplace();
-    for (const auto& [id, camera] : model.cameras) options.known_lenses->emplace(id, truth.lens);
+    for (const auto& [id, camera] : model.cameras) options.known_lenses->emplace(id, *truth.lens);
     start = CpuSeconds();
     const Refined with = Refine(model, options);
     row("known lens", with.model, CpuSeconds() - start);
-    std::printf("%s\n", ToJson(with).c_str());
+    std::printf("\nknown lens: %s\n", ToJson(with).c_str());
   }
+  std::printf("\nrefined: %s\n", ToJson(refined).c_str());
   return 0;
 }
 

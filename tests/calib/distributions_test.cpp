@@ -39,5 +39,11 @@ TEST(Distributions, TheLimitIsTheInverse) {
   }
 }
 
+TEST(Distributions, AVarianceThatIsNoNumberHasNoRootOfZero) {
+  EXPECT_EQ(RootOfVariance(4), 2);
+  EXPECT_EQ(RootOfVariance(-1e-20), 0);
+  EXPECT_TRUE(std::isnan(RootOfVariance(std::numeric_limits<double>::quiet_NaN())));
+}
+
 }  // namespace
 }  // namespace dtr::calib

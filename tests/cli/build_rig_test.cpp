@@ -7,13 +7,12 @@
 #include <nlohmann/json.hpp>
 
 #include "calib/colmap/model_io.h"
-#include "calib/files/calibration.h"
 #include "dtr/base/random.h"
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
 #include "tests/calib/colmap/fake_colmap.h"
+#include "tests/cli/courtyard_rig.h"
 #include "tests/cli/run_dtr.h"
-#include "tests/cli/small_courtyard.h"
 
 namespace dtr::testing {
 namespace {
@@ -28,50 +27,9 @@ constexpr double kNoisePx = 0.2;  // of the features
 constexpr std::uint32_t kLeftId = 7, kRightId = 3;  // of the cameras in COLMAP's database
 
 const PinholeCamera kLeft(192, 128, 150, 150, 96, 64), kRight(192, 128, 154, 154, 94, 66);
+const CourtyardRig kRig{kLeft, kRight};
 
-// The right camera stands half a metre to the right and looks a little inwards.
-Pose RightFromLeft() {
-  Pose pose;
-  pose.rotation =
-      Eigen::Quaterniond(Eigen::AngleAxisd(-0.06, Eigen::Vector3d(0.1, 1, 0).normalized()));
-  pose.translation = pose.rotation * Eigen::Vector3d(-0.5, 0.02, 0.01);
-  return pose;
-}
-
-std::vector<CourtyardPhoto> RigPhotos() {
-  std::vector<CourtyardPhoto> photos;
-  const std::vector<Pose> places = CourtyardArc(kInstants);
-  for (const bool right : {false, true}) {
-    for (int i = 0; i < kInstants; ++i) {
-      const Pose& left = places[static_cast<size_t>(i)];
-      photos.push_back({fmt::format("{}/{:04}.png", right ? "right" : "left", i),
-                        right ? kRight : kLeft, right ? RightFromLeft() * left : left});
-    }
-  }
-  return photos;
-}
-
-calib::Calibration RigCalibration(const Pose& right_from_left) {
-  calib::Calibration rig;
-  rig.board = calib::BoardFromText("chessboard:9x6:25mm");
-  for (const bool right : {false, true}) {
-    const PinholeCamera& c = right ? kRight : kLeft;
-    calib::CalibratedCamera camera;
-    camera.name = right ? "right" : "left";
-    camera.camera = {calib::LensModel::kPinhole,
-                     c.width_px(),
-                     c.height_px(),
-                     {c.fx_px(), c.fy_px(), c.cx_px(), c.cy_px()}};
-    camera.covariance = 0.01 * Eigen::MatrixXd::Identity(4, 4);
-    camera.rms_px = camera.sigma_px = 0.1;
-    if (right) {
-      camera.cam_from_rig = right_from_left;
-      camera.place_covariance = 1e-8 * Eigen::MatrixXd::Identity(6, 6);
-    }
-    rig.cameras.push_back(std::move(camera));
-  }
-  return rig;
-}
+std::vector<CourtyardPhoto> RigPhotos() { return PhotosOf(kRig, kInstants); }
 
 class BuildRig : public ::testing::Test {
  protected:
@@ -81,7 +39,7 @@ class BuildRig : public ::testing::Test {
   }
   std::string In(const std::string& name) const { return (folder_ / name).string(); }
   void WriteRig(const std::string& name, const Pose& right_from_left) const {
-    calib::WriteCalibration(folder_ / name, RigCalibration(right_from_left));
+    calib::WriteCalibration(folder_ / name, CalibrationOf(kRig, right_from_left));
   }
   // What the mapper leaves of these photos: the truth but for noise, numbered in the order of
   // names.
@@ -229,7 +187,7 @@ TEST_F(BuildRig, PhotosThatAreNotTheRigsAreRefusedBeforeAnyWork) {
                 "--rig: places what SfM finds; expected no --poses beside it");
   ExpectRefused(Build({"--rig", In("rig.json"), "--no-refine"}), kWrongUsage,
                 "--rig: is bundle adjustment; expected no --no-refine beside it");
-  calib::Calibration alone = RigCalibration({});
+  calib::Calibration alone = CalibrationOf(kRig);
   alone.cameras.pop_back();
   calib::WriteCalibration(folder_ / "alone.json", alone);
   ExpectRefused(Build({"--rig", In("alone.json")}), kFailed,

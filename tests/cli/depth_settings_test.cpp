@@ -1,8 +1,10 @@
 // Presets, what overrides them, what of it a set remembers; depth that COLMAP makes.
+#include <OpenImageIO/imageio.h>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "dtr/base/files.h"
@@ -66,6 +68,28 @@ class DepthSettings : public ::testing::Test {
   TemporaryFolder folder_;
 };
 TemporaryFolder* DepthSettings::shared_ = nullptr;
+
+TEST_F(DepthSettings, NormalsAreUnitVectorsTurnedToTheCamera) {
+  const fs::path folder = folder_ / "normals";
+  const fs::path set = Stereo("normals", {"--preset", "fast", "--normals", folder.string()});
+  EXPECT_EQ(Text(set / "set.json"), Text(Fast() / "set.json")) << "the set is the same";
+  EXPECT_EQ(FilesIn(folder), 4);
+  const auto file = OIIO::ImageInput::open((folder / "0002.exr").string());
+  ASSERT_TRUE(file);
+  std::vector<float> n(3 * static_cast<size_t>(kCourtyardWidthPx * kCourtyardHeightPx));
+  ASSERT_TRUE(file->read_image(0, 0, 0, 3, OIIO::TypeDesc::FLOAT, n.data()));
+  int known = 0;
+  for (size_t i = 0; i < n.size(); i += 3) {
+    const float length = std::hypot(n[i], n[i + 1], n[i + 2]);
+    if (length == 0) continue;
+    ++known;
+    EXPECT_NEAR(length, 1, 1e-5);
+  }
+  EXPECT_GT(known, 0.5 * kCourtyardWidthPx * kCourtyardHeightPx);
+  ExpectRefused(Dtr({"stereo", Cameras().string(), "-o", (folder_ / "no.dtr").string(), "--engine",
+                     "sgbm", "--normals", folder.string()}),
+                kWrongUsage, "--normals: expected --engine patchmatch");
+}
 
 TEST_F(DepthSettings, AnImportedSetThatKnowsNoneGetsThem) {
   const fs::path courtyard = *shared_ / "courtyard", set = folder_ / "imported.dtr";

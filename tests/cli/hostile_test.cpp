@@ -75,8 +75,9 @@ TEST_F(Hostile, NamesInASetNeverLeadOutOfTheFolderOfAnExport) {
 TEST_F(Hostile, AResultThatCannotBeToldIsAFailure) {
   if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full";
   const std::string set = Good().string();
-  for (const std::string& words : {"info " + set + " --json -", "info " + set,
-                                   "validate " + set + " --json -", std::string("completion")}) {
+  for (const std::string& words :
+       {"info " + set + " --json -", "info " + set, std::string("dataset list --json -"),
+        std::string("completion"), std::string("--version"), std::string("build --help")}) {
     ExpectRefused(DtrInto(words, "/dev/full", In("err")), kFailed,
                   "standard output: cannot be written: No space left on device");
     const Ran fits = DtrInto(words, In("out"), In("err"));
@@ -86,9 +87,10 @@ TEST_F(Hostile, AResultThatCannotBeToldIsAFailure) {
 }
 
 TEST_F(Hostile, ArgumentsThatJsonCannotHoldAreRefusedBeforeAnyWork) {
-  const std::string name = In("caf\xe9");
-  ExpectRefused(Dtr({"build", (*shared_ / "courtyard/images").string(), "-o", name}), kWrongUsage,
-                "expected UTF-8, found");
+  const std::string name = In("caf\xe9\n.dtr");
+  const Ran ran = Dtr({"build", (*shared_ / "courtyard/images").string(), "-o", name});
+  ExpectRefused(ran, kWrongUsage, "expected UTF-8, found");
+  EXPECT_THAT(ran.err, HasSubstr("caf??.dtr'; rename"));  // on one line
   EXPECT_EQ(FilesIn(folder_.path()), 0);
 }
 
@@ -120,15 +122,34 @@ TEST_F(Hostile, APhotoEditedInACaptureIsAnotherInput) {
 
 TEST_F(Hostile, MemoryThatChangesTheFeaturesIsAnotherInput) {
   fs::create_directories(folder_ / "photos");
-  for (const char* name : {"photos/a.jpg", "photos/b.jpg"}) {
+  for (const char* name : {"photos/0000.jpg", "photos/0001.jpg"}) {
     io::WriteImage(folder_ / name, ImageRgb8(2400, 1800, 3, 90));
   }
+  // Known poses need features too, for the points.
+  std::string cameras = Text(*shared_ / "courtyard/cameras.json");
+  for (const auto& [small, large] : {std::pair("\"width\": 192", "\"width\": 2400"),
+                                     std::pair("\"height\": 128", "\"height\": 1800")}) {
+    ASSERT_NE(cameras.find(small), std::string::npos);
+    for (size_t at; (at = cameras.find(small)) != std::string::npos;) {
+      cameras.replace(at, std::string(small).size(), large);
+    }
+  }
+  WriteFileAtomically(folder_ / "cameras.json", cameras);
   colmap::testing::FakeColmap colmap;
   colmap.Fail("feature_extractor", "exit 3");
   const std::string others = "expected work of the same inputs and options, found others";
-  EXPECT_EQ(BeginBuild(In("photos"), {"--memory", "4"}).code, kFailed);
-  EXPECT_EQ(BeginBuild(In("photos"), {"--memory", "3.9"}).err.find(others), std::string::npos);
-  ExpectRefused(BeginBuild(In("photos"), {"--memory", "0.5"}), kWrongUsage, others);
+  for (const std::vector<std::string>& poses :
+       {std::vector<std::string>{}, {"--poses", In("cameras.json")}}) {
+    const auto begin = [&](const std::string& memory_gb) {
+      std::vector<std::string> further = poses;
+      further.insert(further.end(), {"--memory", memory_gb});
+      return BeginBuild(In("photos"), further);
+    };
+    EXPECT_EQ(begin("4").code, kFailed);
+    EXPECT_EQ(begin("3.9").err.find(others), std::string::npos);
+    ExpectRefused(begin("0.5"), kWrongUsage, others);
+    fs::remove_all(folder_ / "set.dtr.partial");
+  }
 }
 
 TEST_F(Hostile, WhatScreeningSeesIsSaid) {

@@ -119,6 +119,8 @@ TEST_F(MovingSet, WhatKnowsStillScenesAloneSaysSo) {
            {"validate", Set()},
            {"stereo", Set()},
            {"inspect", Set(), "-o", At("page.html")},
+           {"prune", Set(), "-o", At("small.dtr"), "--renderer", "cpu"},
+           {"advise", Set()},
            {"bench", Set(), "--renderer", "cpu"}}) {
     SCOPED_TRACE(command.front());
     ExpectRefused(Dtr(command), 2, words);

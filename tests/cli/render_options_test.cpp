@@ -2,12 +2,15 @@
 
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "cli/shell_words.h"
 #include "dtr/base/error.h"
 #include "dtr/base/process.h"
 #include "dtr/base/random.h"
+#include "dtr/io/pruned.h"
+#include "dtr/render/option_arguments.h"
 #include "dtr/render/option_names.h"
 
 namespace dtr::cli {
@@ -61,7 +64,48 @@ TEST(RenderOptionArguments, GiveTheSameOptionsBitByBit) {
     const RenderOptions options = RandomOptions(random);
     const auto arguments = RenderOptionArguments(options);
     EXPECT_EQ(Parsed(arguments), options) << ShellLine(arguments);
+    EXPECT_EQ(WithArguments({}, arguments, "here"), options) << ShellLine(arguments);
   }
+}
+
+DtrSet PrunedFor(const std::vector<std::string>& arguments) {
+  DtrSet set;
+  io::SetPrunedJson(set, nlohmann::json{{"render_arguments", arguments}}.dump());
+  return set;
+}
+
+TEST(RenderOptionArguments, TurnOffWhatASetStores) {
+  Random random(13);
+  for (int draw = 0; draw < 500; ++draw) {
+    const RenderOptions stored = RandomOptions(random), wanted = RandomOptions(random);
+    const DtrSet set = PrunedFor(RenderOptionArguments(stored));
+    EXPECT_EQ(StoredRenderOptions(set), stored);
+    const auto arguments = RenderOptionArguments(wanted, stored);
+    CLI::App app;
+    const auto options = AddRenderOptions(app);
+    app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
+    UseStoredArguments(app, set, *options);
+    EXPECT_EQ(*options, wanted) << ShellLine(RenderOptionArguments(stored)) << " + "
+                                << ShellLine(arguments);
+    EXPECT_TRUE(RenderOptionArguments(stored, stored).empty());
+  }
+}
+
+TEST(WithArguments, SaysWhichValueHasNoMeaning) {
+  const auto said = [](const std::vector<std::string>& arguments) {
+    try {
+      WithArguments({}, arguments, "here");
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string("nothing");
+  };
+  EXPECT_EQ(said({"--views", "many"}), "here: --views: expected a number, found many");
+  EXPECT_EQ(said({"--views", "1000000"}), "here: --views: expected 1 to 1024, found 1000000");
+  EXPECT_EQ(said({"--method", "best"}), "here: --method: expected deferred|two-pass, found best");
+  EXPECT_EQ(said({"--fill-holes=maybe"}),
+            "here: --fill-holes: expected no value, true or false, found maybe");
+  EXPECT_EQ(said({"--delta", "-1"}), "here: --delta: expected 0 or more, found -1.000000");
 }
 
 TEST(UseStoredArguments, TakesOptionsOfRenderingAndNothingElse) {
@@ -73,9 +117,10 @@ TEST(UseStoredArguments, TakesOptionsOfRenderingAndNothingElse) {
     bool force = false;
     app.add_option("--json", json);
     app.add_flag("--force", force);
-    (void)AddRenderOptions(app);
+    const auto options = AddRenderOptions(app);
     app.parse(std::vector<std::string>{});
-    EXPECT_THROW(UseStoredArguments(app, hostile), Error) << ShellLine(hostile);
+    EXPECT_THROW(UseStoredArguments(app, PrunedFor(hostile), *options), Error)
+        << ShellLine(hostile);
     EXPECT_EQ(json, "");
     EXPECT_FALSE(force);
   }
@@ -86,7 +131,7 @@ TEST(UseStoredArguments, TakesOptionsOfRenderingAndNothingElse) {
     CLI::App app;
     const auto options = AddRenderOptions(app);
     app.parse(std::vector<std::string>{"7", "--views"});  // CLI11's order
-    UseStoredArguments(app, RenderOptionArguments(stored));
+    UseStoredArguments(app, PrunedFor(RenderOptionArguments(stored)), *options);
     RenderOptions expected = stored;
     expected.views = 7;
     EXPECT_EQ(*options, expected);

@@ -57,6 +57,38 @@ TEST_F(ValidateReport, ThePageShowsTestsViewsMapsAndTheWorstPhotos) {
   EXPECT_EQ(page, Text(folder_ / "again.html"));
 }
 
+TEST_F(ValidateReport, DepthIsHeldAgainstTheNeighboursDepthAndItsLimitIsAnOption) {
+  DtrOk({"stereo", In("set.dtr"), "--engine", "sgbm", "-o", In("deep.dtr")});
+  const auto cross = [&](const nlohmann::json& tests) {
+    std::map<std::string, nlohmann::json> found;
+    for (const auto& test : tests) {
+      const std::string name = test["name"];
+      if (name.find("cross_depth_px") != std::string::npos) found[name] = test;
+    }
+    return found;
+  };
+  const auto json = nlohmann::json::parse(Dtr({"validate", In("deep.dtr"), "--json", "-"}).out);
+  const auto tests = cross(json["tests"]);
+  ASSERT_EQ(tests.size(), 2u);
+  EXPECT_EQ(tests.at("cross_depth_px")["passed"], true);
+  EXPECT_EQ(tests.at("cross_depth_px")["limit"], 1);
+  EXPECT_EQ(tests.at("worst_view_cross_depth_px")["limit"], 2);
+  EXPECT_GT(tests.at("cross_depth_px")["value"], 0);
+  EXPECT_EQ(json["cross_depth"]["views"].size(), 7u);
+  // The set's verdict is of this depth.
+  const auto info = nlohmann::json::parse(DtrOk({"info", In("deep.dtr"), "--json", "-"}).out);
+  EXPECT_EQ(cross(info["verdict"]["tests"]).at("cross_depth_px")["value"],
+            tests.at("cross_depth_px")["value"]);
+  const Ran strict = Dtr({"validate", In("deep.dtr"), "--max-cross", "1e-9", "--json", "-"});
+  EXPECT_EQ(strict.code, kFailed);
+  EXPECT_EQ(cross(nlohmann::json::parse(strict.out)["tests"]).at("cross_depth_px")["passed"],
+            false);
+  // Without depth there is nothing to say.
+  EXPECT_TRUE(
+      cross(nlohmann::json::parse(Dtr({"validate", In("set.dtr"), "--json", "-"}).out)["tests"])
+          .empty());
+}
+
 TEST_F(ValidateReport, APageThatCannotBeWrittenIsRefusedBeforeAnyWork) {
   ExpectRefused(Dtr({"validate", In("set.dtr"), "--report", In("page.txt")}), kWrongUsage,
                 "expected a name ending in .html, found '.txt'");

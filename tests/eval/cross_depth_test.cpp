@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
+
 #include "dtr/base/error.h"
 #include "tests/eval/plane_views.h"
 
@@ -10,7 +12,8 @@ namespace {
 
 using testing::PlaneView;
 
-// Depth is float32: 6e-8 relative of a disparity of 90 px * 1 / 10, times the way back; 1.3e-6 seen.
+// Depth is float32: 6e-8 relative of a disparity of 90 px * 1 / 10, times the way back; 1.3e-6
+// seen.
 constexpr double kExactPx = 1e-5;
 
 std::vector<const View*> Pointers(const std::vector<View>& views) {
@@ -71,6 +74,34 @@ TEST(CrossDepth, HolesAndNoOverlapAreNoEvidence) {
   EXPECT_THROW(CrossDepth(Pointers(views)), Error);
   views[1].depth = DepthImage(79, 60);
   EXPECT_THROW(CrossDepth(Pointers(views)), Error);
+}
+
+TEST(CrossDepth, MapsThatAreBroughtAsMemoryAllowsGiveTheSameFigures) {
+  std::vector<View> views;
+  for (int i = 0; i < 12; ++i) views.push_back(PlaneView(0.5 * i, 0.01 * i, true));
+  CrossDepthOptions options;
+  const CrossDepthReport all = CrossDepth(Pointers(views), options);
+  std::vector<View> bare = views;
+  for (View& view : bare) view.depth = DepthImage();
+  std::atomic<int> brought = 0;
+  const DepthLoader load = [&](const View& view) {
+    ++brought;
+    for (const View& full : views) {
+      if (full.name == view.name) return full.depth;
+    }
+    return DepthImage();
+  };
+  options.memory_bytes = 6 * 80 * 60 * sizeof(float);
+  const CrossDepthReport few = CrossDepth(Pointers(bare), options, load);
+  EXPECT_GE(brought, 12);
+  EXPECT_EQ(few.all.median_px, all.all.median_px);
+  EXPECT_EQ(few.all.compared, all.all.compared);
+  EXPECT_EQ(few.views[7].p95_px, all.views[7].p95_px);
+  // All at once: every map once.
+  brought = 0;
+  options.memory_bytes = size_t{1} << 30;
+  EXPECT_EQ(CrossDepth(Pointers(bare), options, load).all.p95_px, all.all.p95_px);
+  EXPECT_EQ(brought, 12);
 }
 
 TEST(CrossDepth, SameFiguresForAnyNumberOfThreads) {

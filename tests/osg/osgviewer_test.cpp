@@ -8,16 +8,21 @@
 #include <osg/ShapeDrawable>
 #include <osgDB/WriteFile>
 
+#include <nlohmann/json.hpp>
 #include <thread>
 
+#include "dtr/base/files.h"
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
 #include "tests/osg/osg_testing.h"
+#include "tests/support/environment.h"
 #include "tests/support/test_data.h"
 #include "tests/support/x_screen.h"
 
 namespace dtr::testing {
 namespace {
+
+namespace fs = std::filesystem;
 
 constexpr int kWidth = 480, kHeight = 320;
 
@@ -70,14 +75,15 @@ void Keep(const std::string& name, const ImageRgb8& image) {
 }
 
 /// What osgviewer should show from an input camera: its own lens, that camera's place.
-RenderResult FromInputCamera(const DtrSet& set, const View& view) {
+RenderResult FromInputCamera(const DtrSet& set, const View& view,
+                             const RenderOptions& options = {}) {
   const gl::EglContext context;
   gl::Renderer renderer;
   // OpenSceneGraph's DisplaySettings: a screen 0.26 m high seen from 0.5 m.
   const double focal = kHeight * 0.5 / 0.26;
   return renderer.Render(MakeRenderScene(set),
                          {kWidth, kHeight, focal, focal, 0.5 * kWidth, 0.5 * kHeight},
-                         view.cam_from_world, {});
+                         view.cam_from_world, options);
 }
 
 double ShareOfEqual(const ImageRgb8& shown, const RenderResult& expected) {
@@ -145,6 +151,24 @@ TEST_F(OsgViewerTest, ShowsASetWhoseNameEndsWithASlash) {
   EXPECT_TRUE(WaitFor(program, [&](const ImageRgb8& image) {
     return ShareOfEqual(image, first) > kEqualShare;
   })) << ShareOfEqual(ReadScreen(kWidth, kHeight), first);
+}
+
+TEST_F(OsgViewerTest, FindsASetOnItsPathAndDrawsItAsItWasPrunedFor) {
+  const fs::path file = folder_ / "scene.dtr/set.json";
+  nlohmann::json json = nlohmann::json::parse(ReadFile(file, 1 << 20));
+  json["pruned"]["render_arguments"] = {"--method", "two-pass", "--resolution", "12"};
+  WriteFileAtomically(file, json.dump());
+  RenderOptions pruned;
+  pruned.method = RenderMethod::kTwoPass;
+  pruned.resolution = 12;
+  const View& view = set_.frames[0].views[0];
+  const RenderResult coarse = FromInputCamera(set_, view, pruned);
+  ASSERT_LT(ShareOfEqual(FromInputCamera(set_, view).image, coarse), 0.9);
+  const Environment path("OSG_FILE_PATH", folder_.path().string());
+  const OsgViewerProgram program({"scene.dtr"});
+  EXPECT_TRUE(WaitFor(program, [&](const ImageRgb8& image) {
+    return ShareOfEqual(image, coarse) > kEqualShare;
+  })) << ShareOfEqual(ReadScreen(kWidth, kHeight), coarse);
 }
 
 TEST_F(OsgViewerTest, ShowsASetAndAModel) {

@@ -5,6 +5,7 @@
 #include <osg/LOD>
 #include <osg/MatrixTransform>
 #include <osg/PositionAttitudeTransform>
+#include <osg/Program>
 #include <osg/ShapeDrawable>
 #include <osg/Switch>
 #include <osg/Texture2D>
@@ -143,6 +144,37 @@ TEST_F(SceneGraphTest, NearAndFarPlanesFromItsBoundCutNothingOff) {
   EXPECT_EQ(Drawn(viewer.Draw()), whole);
 }
 
+// OpenSceneGraph puts the near plane 1/2000 as far away as the far plane.
+TEST_F(SceneGraphTest, OneDepthThatIsFarTooLargeClipsNoForeground) {
+  const Shot novel = Ahead();
+  const auto shown = [&](bool spoiled) {
+    DtrSet set = SquareBeforePlane();
+    if (spoiled) set.frames[0].views[0].depth(3, 3) = 1e5F;
+    osg::ref_ptr<DepthTR> node = new DepthTR;
+    node->setScene(std::move(set));
+    osg::ref_ptr<osg::Group> both = new osg::Group;
+    both->addChild(node);
+    both->addChild(RedBox({0, 0, 3}, {0.2, 0.2, 0.2}));
+    OffscreenViewer viewer(both.get(), novel.camera, novel.cam_from_world);
+    viewer.viewer.getCamera()->setComputeNearFarMode(
+        osg::CullSettings::COMPUTE_NEAR_FAR_USING_BOUNDING_VOLUMES);
+    return viewer.Draw();
+  };
+  const auto red = [](const Shown& picture) {
+    int count = 0;
+    for (int y = 0; y < picture.image.height(); ++y) {
+      for (int x = 0; x < picture.image.width(); ++x) count += IsRed(picture.image, x, y);
+    }
+    return count;
+  };
+  const Shown good = shown(false), spoiled = shown(true);
+  ASSERT_GT(red(good), 100);
+  EXPECT_EQ(red(spoiled), red(good));
+  constexpr int kOfThePixel =
+      40;  // and of the triangles around it, in all views that see the place
+  EXPECT_NEAR(Drawn(spoiled), Drawn(good), kOfThePixel);
+}
+
 /// A lit, textured, half transparent ball and a plain one, as models are.
 osg::ref_ptr<osg::Node> Models(int count = 2) {
   osg::ref_ptr<osg::Geode> geode = new osg::Geode;
@@ -164,11 +196,97 @@ osg::ref_ptr<osg::Node> Models(int count = 2) {
   return geode;
 }
 
+/// A square as programs of today draw it: vertex buffers, an attribute of its own, shaders with a
+/// uniform and a texture in another unit than the first.
+osg::ref_ptr<osg::Node> ShaderModel() {
+  osg::ref_ptr<osg::Geometry> square = new osg::Geometry;
+  square->setUseDisplayList(false);
+  square->setUseVertexBufferObjects(true);
+  osg::ref_ptr<osg::Vec3Array> corners = new osg::Vec3Array;
+  osg::ref_ptr<osg::Vec2Array> places = new osg::Vec2Array;
+  for (const float y : {-0.9F, -0.3F}) {
+    for (const float x : {-0.5F, 0.5F}) {
+      corners->push_back({x, y, 2.8F});
+      places->push_back({x + 0.5F, (y + 0.9F) / 0.6F});
+    }
+  }
+  constexpr unsigned kAttribute = 6, kUnit = 3;
+  square->setVertexArray(corners);
+  square->setVertexAttribArray(kAttribute, places, osg::Array::BIND_PER_VERTEX);
+  square->addPrimitiveSet(new osg::DrawArrays(GL_TRIANGLE_STRIP, 0, 4));
+  osg::ref_ptr<osg::Image> image = new osg::Image;
+  image->allocateImage(4, 4, 1, GL_RGB, GL_UNSIGNED_BYTE);
+  for (unsigned i = 0; i < 3 * 16; ++i) image->data()[i] = static_cast<unsigned char>(i * 53);
+  osg::ref_ptr<osg::Texture2D> texture = new osg::Texture2D(image);
+  texture->setFilter(osg::Texture::MIN_FILTER, osg::Texture::NEAREST);
+  texture->setFilter(osg::Texture::MAG_FILTER, osg::Texture::NEAREST);
+  osg::ref_ptr<osg::Program> program = new osg::Program;
+  program->addShader(new osg::Shader(osg::Shader::VERTEX,
+                                     "#version 120\nattribute vec2 place; varying vec2 at;\n"
+                                     "void main() { at = place; gl_Position = ftransform(); }\n"));
+  program->addShader(new osg::Shader(
+      osg::Shader::FRAGMENT,
+      "#version 120\nuniform sampler2D picture; uniform vec3 tint; varying vec2 at;\n"
+      "void main() { gl_FragColor = vec4(tint * texture2D(picture, at).rgb, 1.0); }\n"));
+  program->addBindAttribLocation("place", kAttribute);
+  osg::StateSet* const state = square->getOrCreateStateSet();
+  state->setAttributeAndModes(program);
+  state->setTextureAttributeAndModes(kUnit, texture);
+  state->addUniform(new osg::Uniform("picture", static_cast<int>(kUnit)));
+  state->addUniform(new osg::Uniform("tint", osg::Vec3(1.0F, 0.7F, 0.4F)));
+  osg::ref_ptr<osg::Geode> geode = new osg::Geode;
+  geode->addDrawable(square);
+  return geode;
+}
+
+/// Every way through a frame.
+std::vector<osg::ref_ptr<DepthTR>> NodesOfAllPaths() {
+  std::vector<osg::ref_ptr<DepthTR>> nodes;
+  for (int i = 0; i < 5; ++i) nodes.push_back(SquareNode());
+  nodes[1]->setMode(osgDTR::TRIANGULATION);
+  nodes[2]->setMode(osgDTR::SPLATTING);
+  RenderOptions filled;
+  filled.fill_holes = true;
+  nodes[3]->setRenderOptions(filled);
+  nodes[4]->setDrawPath(osgDTR::DrawPath::kReadBack);
+  return nodes;
+}
+
+TEST_F(SceneGraphTest, AShaderModelDrawnAfterItIsUnchangedWhateverItsPath) {
+  const Shot novel = Ahead();
+  const auto draw = [&](const std::vector<osg::ref_ptr<osg::Node>>& nodes) {
+    osg::ref_ptr<osg::Group> all = new osg::Group;
+    for (const auto& node : nodes) all->addChild(node);
+    OffscreenViewer viewer(all.get(), novel.camera, novel.cam_from_world);
+    return viewer.Draw(3);
+  };
+  const auto model = [] {
+    const osg::ref_ptr<osg::Node> shaders = ShaderModel();
+    shaders->getOrCreateStateSet()->setRenderBinDetails(2, "RenderBin");  // after the scene
+    return shaders;
+  };
+  const Shown without = draw({model()});
+  ASSERT_GT(Drawn(without), 500);
+  int path = 0;
+  for (const osg::ref_ptr<DepthTR>& node : NodesOfAllPaths()) {
+    SCOPED_TRACE(path++);
+    const Shown shown = draw({node, model()});
+    EXPECT_GT(Drawn(shown), Drawn(without) + 1000);
+    int differing = 0;
+    for (int y = 0; y < shown.image.height(); ++y) {
+      for (int x = 0; x < shown.image.width(); ++x) {
+        if (!(without.depth(x, y) < 1)) continue;
+        differing += PixelDifference(shown.image, without.image, x, y) > 0 ||
+                     shown.depth(x, y) != without.depth(x, y);
+      }
+    }
+    EXPECT_EQ(differing, 0);
+  }
+}
+
 TEST_F(SceneGraphTest, ModelsDrawnAfterItAreUnchanged) {
-  for (const auto path : {osgDTR::DrawPath::kGpu, osgDTR::DrawPath::kReadBack}) {
+  for (const osg::ref_ptr<DepthTR>& node : NodesOfAllPaths()) {
     osg::ref_ptr<osg::Group> with = new osg::Group;
-    const osg::ref_ptr<DepthTR> node = SquareNode();
-    node->setDrawPath(path);
     with->addChild(node);
     with->addChild(Models());
     const osg::ref_ptr<osg::Node> models = Models();

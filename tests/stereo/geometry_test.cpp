@@ -79,6 +79,14 @@ TEST(ChooseNeighbours, NeverTakesAViewFromTheSamePlace) {
             (std::vector<int>{2}));
 }
 
+TEST(ChooseNeighbours, TakesNarrowPairsOnlyWhereThereAreNoOthers) {
+  // A long lens: baselines are 1e-4 of the distance and less, the longest says most.
+  const auto narrow = Arc({0, 0.004, 0.0057});
+  EXPECT_EQ(ChooseNeighbours(narrow, Ball(narrow, 50), {})[0].views, (std::vector<int>{2, 1}));
+  const auto mixed = Arc({0, 0.05, 7});
+  EXPECT_EQ(ChooseNeighbours(mixed, Ball(mixed, 50), {})[0].views, (std::vector<int>{2}));
+}
+
 TEST(ChooseNeighbours, SaysWhenItGuessesFromTheCamerasAlone) {
   const auto views = Arc({0, 90, 7, 14, 180});
   const auto chosen = ChooseNeighbours(views, {}, {.count = 2});

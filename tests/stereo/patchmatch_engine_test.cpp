@@ -301,30 +301,54 @@ TEST(PatchMatchEngine, WithoutABaselineThereIsNoDepth) {
   EXPECT_THROW(EstimateFirst(ViewsOf(shots)), NoUsablePair);
 }
 
-TEST(PatchMatchEngine, MaskedPixelsAreHolesAndTheirContentHasNoInfluence) {
-  auto shots = Shots(Slanted(), {Facing({0, 0, 0}), Facing({kBaseline, 0, 0})});
-  std::vector<Mask> masks(2, Mask(kWidth, kHeight, 1, 255));
-  for (int y = 40; y < 70; ++y) {
-    for (int x = 60; x < 90; ++x) masks[0](x, y) = masks[1](x - 12, y) = 0;
+/// Two photos, the same place of the scene masked in both.
+struct MaskedPair {
+  std::vector<testing::Shot> shots =
+      Shots(Slanted(), {Facing({0, 0, 0}), Facing({kBaseline, 0, 0})});
+  std::vector<Mask> masks{2, Mask(kWidth, kHeight, 1, 255)};
+
+  MaskedPair() {
+    Visit([this](int x, int y) { masks[0](x, y) = masks[1](x - 12, y) = 0; });
   }
-  const auto estimate = [&] {
-    auto views = ViewsOf(shots);
-    for (size_t i = 0; i < 2; ++i) views[i].mask = &masks[i];
-    return EstimateFirst(views);
-  };
-  const DepthEstimate before = estimate();
-  for (int y = 40; y < 70; ++y) {
-    for (int x = 60; x < 90; ++x) {
-      EXPECT_TRUE(DepthImage::IsHole(before.depth(x, y)));
+  template <typename PerPixel>
+  static void Visit(PerPixel per_pixel) {
+    for (int y = 40; y < 70; ++y) {
+      for (int x = 60; x < 90; ++x) per_pixel(x, y);
+    }
+  }
+  void PaintUnderTheMasks() {
+    Visit([this](int x, int y) {
       for (int c = 0; c < 3; ++c) {
         shots[0].image(x, y, c) = static_cast<std::uint8_t>(HashOf(x, y));
         shots[1].image(x - 12, y, c) = static_cast<std::uint8_t>(HashOf(y, x));
       }
-    }
+    });
   }
-  const DepthEstimate after = estimate();
+  DepthEstimate Estimate() const {
+    auto views = ViewsOf(shots);
+    for (size_t i = 0; i < 2; ++i) views[i].mask = &masks[i];
+    return EstimateFirst(views);
+  }
+};
+
+TEST(PatchMatchEngine, MaskedPixelsAreHolesAndTheirContentHasNoInfluence) {
+  MaskedPair pair;
+  const DepthEstimate before = pair.Estimate();
+  MaskedPair::Visit([&](int x, int y) { EXPECT_TRUE(DepthImage::IsHole(before.depth(x, y))); });
+  pair.PaintUnderTheMasks();
+  const DepthEstimate after = pair.Estimate();
   EXPECT_EQ(before.depth, after.depth);
-  EXPECT_LT(Judge(after, shots[0].truth).bad_share, 0.02);
+  EXPECT_LT(Judge(after, pair.shots[0].truth).bad_share, 0.02);
+}
+
+TEST(PatchMatchEngine, ColoursUnderAMaskDoNotTurnLineArtIntoAPhoto) {
+  MaskedPair pair;
+  for (testing::Shot& shot : pair.shots) {
+    for (std::uint8_t& level : shot.image.data()) level = level > 128 ? 255 : 0;
+  }
+  const DepthEstimate before = pair.Estimate();
+  pair.PaintUnderTheMasks();
+  EXPECT_EQ(before.depth, pair.Estimate().depth);
 }
 
 TEST(PatchMatchEngine, ATexturelessWallIsHoles) {

@@ -1,6 +1,6 @@
 // The PatchMatch engine where geometry or pictures are at their limits; those that concern users
 // are cases of `dtr selftest` (cli/selftest/stereo_cases.cpp). Bounds come from
-// what the pictures can tell (extremes_rig.h) and from geometry.
+// what the pictures can tell (datasets/exact/stereo_score.h) and from geometry.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -48,19 +48,20 @@ class ControllerTest : public ::testing::Test {
 TEST_F(ControllerTest, BeginsAtTheFirstInputCameraAndStepsThroughThemInOrder) {
   Controller controller = Make();
   EXPECT_EQ(controller.surroundings().views.size(), 4u);  // not the held-out one
+  EXPECT_EQ(controller.surroundings().cameras.size(), 5u);
   std::string visited;
   for (int i = 0; i < 5; ++i) {
     ASSERT_TRUE(controller.at_view());
-    visited += controller.surroundings().views[*controller.at_view()]->id;
+    visited += controller.surroundings().cameras[*controller.at_view()]->id;
     controller.StepViews(1);
     EXPECT_TRUE(controller.moving());
     Wait(controller, 1);
     EXPECT_FALSE(controller.moving());
   }
-  EXPECT_EQ(visited, "abcda");
+  EXPECT_EQ(visited, "abcd`") << "from the first source view, by the held-out one, and round";
   controller.StepViews(-2);
   Wait(controller, 1);
-  EXPECT_EQ(controller.at_view(), 3u);
+  EXPECT_EQ(controller.at_view(), 4u);
   // Steps asked for while on the way add up.
   controller.StepViews(1);
   controller.Advance(0.05);
@@ -68,6 +69,17 @@ TEST_F(ControllerTest, BeginsAtTheFirstInputCameraAndStepsThroughThemInOrder) {
   Wait(controller, 1);
   EXPECT_EQ(controller.at_view(), 1u);
   EXPECT_EQ(controller.camera().camera, FitLens(set_.frames[0].views[0].camera, 640, 400));
+}
+
+TEST_F(ControllerTest, AHeldOutCameraIsReachedButNotTakenForASourceView) {
+  Controller controller = Make();
+  controller.StepViews(-1);
+  Wait(controller, 1);
+  ASSERT_EQ(controller.at_view(), 0u);
+  EXPECT_EQ(controller.surroundings().cameras[0]->role, ViewRole::kHeldOut);
+  EXPECT_EQ(controller.nearest_view(), 0u);
+  ASSERT_TRUE(controller.nearest_source());
+  EXPECT_EQ(controller.surroundings().views[*controller.nearest_source()]->id, "a");
 }
 
 TEST_F(ControllerTest, AfterADragStepsGoOnFromTheNearestView) {

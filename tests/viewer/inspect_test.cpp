@@ -28,6 +28,46 @@ TEST_F(Inspect, WritesOnePageThatNeedsNothingElseTheSameEveryTime) {
   EXPECT_EQ(Text(In("two.html")), page);
 }
 
+TEST_F(Inspect, AViewWhosePhotoIsAnothersComesFirstAmongTheWorst) {
+  std::filesystem::copy(Set(), In("s.dtr"), std::filesystem::copy_options::recursive);
+  nlohmann::json json = nlohmann::json::parse(Text(In("s.dtr/set.json")));
+  std::vector<nlohmann::json*> sources;
+  for (auto& view : json["frames"][0]["views"]) {
+    if (view["role"] == "source") sources.push_back(&view);
+  }
+  ASSERT_GE(sources.size(), 4u);
+  const std::string spoiled = (*sources[2])["name"];
+  const auto first_of_the_worst = [&] {
+    DtrOk({"inspect", In("s.dtr"), "-o", In("page.html")});
+    std::string page = Text(In("page.html"));
+    page = page.substr(page.find("Worst views"));
+    std::string first;
+    size_t least = std::string::npos;
+    for (const auto* view : sources) {
+      const std::string name = (*view)["name"];
+      if (const size_t at = page.find(name); at < least) {
+        least = at;
+        first = name;
+      }
+    }
+    return first;
+  };
+  EXPECT_NE(first_of_the_worst(), spoiled) << "choose another view for this test";
+  (*sources[2])["image"] = (*sources.back())["image"];
+  WriteFileAtomically(In("s.dtr/set.json"), json.dump());
+  EXPECT_EQ(first_of_the_worst(), spoiled);
+}
+
+TEST_F(Inspect, DrawsByTheSetsOwnOptions) {
+  std::filesystem::copy(Set(), In("s.dtr"), std::filesystem::copy_options::recursive);
+  DtrOk({"inspect", In("s.dtr"), "-o", In("usual.html")});
+  nlohmann::json json = nlohmann::json::parse(Text(In("s.dtr/set.json")));
+  json["pruned"]["render_arguments"] = {"--views", "1"};
+  WriteFileAtomically(In("s.dtr/set.json"), json.dump());
+  DtrOk({"inspect", In("s.dtr"), "-o", In("pruned.html")});
+  EXPECT_NE(Text(In("usual.html")), Text(In("pruned.html")));
+}
+
 TEST_F(Inspect, SaysWhatStagesCost) {
   std::filesystem::copy(Set(), In("s.dtr"), std::filesystem::copy_options::recursive);
   std::filesystem::create_directories(In("s.dtr/report"));

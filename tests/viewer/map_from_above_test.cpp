@@ -42,6 +42,46 @@ TEST(GroundOf, LooksDownWithWhatTheCamerasSeeAtTheTop) {
   }
 }
 
+/// Cameras that look straight along z from a grid across it, every other row turned half round.
+DtrSet FlightOver(double spacing, double height) {
+  DtrSet set;
+  set.frames.resize(1);
+  set.scene_center = {0, 0, height};
+  set.bounds = {{-5, -4, height - 1}, {5, 4, height + 1}};
+  for (int row = 0; row < 4; ++row) {
+    for (int column = 0; column < 5; ++column) {
+      View view;
+      view.id = std::to_string(10 * row + column);
+      view.camera = {60, 40, 50, 50, 30, 20};
+      const Eigen::Vector3d center(spacing * (column - 2), spacing * (row - 1.5), 0.1 * (row % 2));
+      const double turn = row % 2 == 0 ? 0 : 3.141592653589793;
+      view.cam_from_world.rotation =
+          Eigen::Quaterniond(Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitZ()));
+      view.cam_from_world.translation = -(view.cam_from_world.rotation * center);
+      set.frames[0].views.push_back(view);
+    }
+  }
+  return set;
+}
+
+TEST(GroundOf, PicturesFromTheAirAreMappedOntoThePlaneThatTheyWereTakenIn) {
+  const Ground ground = GroundOf(FlightOver(5, 10));
+  EXPECT_LT((ground.Place({1, 2, -7}) - ground.Place({1, 2, 30})).norm(), 0.5);
+  EXPECT_NEAR((ground.Place({3, 0, 10}) - ground.Place({0, 4, 10})).norm(), 5, 0.01);
+  EXPECT_LT(ground.Place({0, -1, 10}).y(), ground.Place({0, 1, 10}).y()) << "the first photo's top";
+}
+
+TEST(GroundOf, ARigBeforeAWallIsNoFlight) {
+  DtrSet set = FlightOver(0.5, 10);
+  for (View& view : set.frames[0].views) {  // all upright
+    const Eigen::Vector3d center = view.CenterInWorld();
+    view.cam_from_world = {Eigen::Quaterniond::Identity(), -center};
+  }
+  const Ground ground = GroundOf(set);
+  EXPECT_NEAR((ground.Place({1, -7, 3}) - ground.Place({1, 9, 3})).norm(), 0, 1e-9);
+  EXPECT_LT(ground.Place({0, 0, 10}).y(), ground.Place({0, 0, 0}).y());
+}
+
 TEST(CoverageFromAbove, CountsViewsWhereTheWallStandsAndNowhereElse) {
   const DtrSet set = BeforeAWall();
   const Ground ground = GroundOf(set);

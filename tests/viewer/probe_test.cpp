@@ -131,25 +131,40 @@ TEST(CovarianceOf, IsSigmaAlongTheRayAndPixelsAcross) {
   EXPECT_LT((covariance - Eigen::Matrix3d(expected.asDiagonal())).norm(), 1e-12);
 }
 
+TEST_F(ProbeTest, AViewKeepsItsColourWhateverElseIsLeftOut) {
+  const ViewColours colours(set_);
+  const View& last = set_.frames[0].views[2];
+  RenderScene alone = scene_;
+  alone.views = {&last};  // the first of this scene, the third of the set
+  const RenderResult result = cpu::Render(alone, novel_.camera, novel_.cam_from_world, options_);
+  const ImageRgb8 picture =
+      FalseColour(Shown::kWeights, {result, alone, novel_, options_, colours}, SigmaOfView);
+  const Rgb colour = colours.Of(last);
+  EXPECT_NE(colour, colours.Of(set_.frames[0].views[0]));
+  ASSERT_NE(result.coverage(48, 36), 0);
+  for (int c = 0; c < 3; ++c) EXPECT_EQ(picture(48, 36, c), colour[static_cast<size_t>(c)]);
+}
+
 TEST_F(ProbeTest, FalseColoursTellSeenFromUnseen) {
   View& view = set_.frames[0].views[0];
   view.depth = DepthImage(96, 72);
   const RenderResult result = cpu::Render(scene_, novel_.camera, novel_.cam_from_world, options_);
-  const Drawn drawn{result, scene_, novel_, options_};
+  const ViewColours colours(set_);
+  const Drawn drawn{result, scene_, novel_, options_, colours};
   for (const Shown shown : kAllShown) {
     if (shown == Shown::kColour || shown == Shown::kWireframe) continue;
     const ImageRgb8 picture = FalseColour(shown, drawn, SigmaOfView);
     ASSERT_EQ(picture.width(), 96);
-    std::set<std::array<std::uint8_t, 3>> colours;
+    std::set<std::array<std::uint8_t, 3>> found;
     for (int y = 0; y < 72; ++y) {
       for (int x = 0; x < 96; ++x) {
-        colours.insert({picture(x, y, 0), picture(x, y, 1), picture(x, y, 2)});
+        found.insert({picture(x, y, 0), picture(x, y, 1), picture(x, y, 2)});
       }
     }
-    EXPECT_FALSE(colours.empty()) << NameOf(shown);
+    EXPECT_FALSE(found.empty()) << NameOf(shown);
     if (shown == Shown::kWeights) {
       // The view without depth gives nothing.
-      EXPECT_GT(colours.size(), 1u);
+      EXPECT_GT(found.size(), 1u);
     }
   }
 }

@@ -23,11 +23,14 @@ class ViewerProgram {
  public:
   using Json = nlohmann::json;
 
+  /// What it tells goes into `folder`; what it saves, too, or into `output`.
   ViewerProgram(const std::string& set, const std::filesystem::path& folder,
-                const std::vector<std::string>& further = {})
+                const std::vector<std::string>& further = {},
+                const std::filesystem::path& output = {})
       : state_file_(folder / "state.json") {
+    const std::string saves_into = (output.empty() ? folder : output).string();
     std::vector<std::string> args{
-        DTR_PROGRAM, "view", set, "-o", folder.string(), "--state-file", state_file_.string()};
+        DTR_PROGRAM, "view", set, "-o", saves_into, "--state-file", state_file_.string()};
     args.insert(args.end(), further.begin(), further.end());
     child_ = fork();
     if (child_ == 0) {

@@ -1,40 +1,16 @@
 // `dtr view` in a real window: keys, drags and the wheel by xdotool.
 #include "dtr/base/files.h"
 #include "dtr/io/image_io.h"
+#include "dtr/io/set_io.h"
 #include "tests/support/environment.h"
-#include "tests/support/small_courtyard_set.h"
-#include "tests/support/virtual_display.h"
-#include "tests/viewer/viewer_program.h"
+#include "tests/viewer/viewer_window.h"
 
 namespace dtr::testing {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::json;
+using Json = ViewerWindow::Json;
 using ::testing::HasSubstr;
-
-class ViewerWindow : public SmallCourtyardSet {
- protected:
-  void NeedDisplay() {
-    if (!display_.up()) GTEST_SKIP() << "no display: Xvfb is missing or did not come up";
-    if (FindProgram("xdotool").empty()) GTEST_SKIP() << "xdotool is missing";
-  }
-  static double Moved(const Json& a, const Json& b) {
-    double sum = 0;
-    for (size_t i = 0; i < 3; ++i) {
-      const double d =
-          a["center_in_world"][i].get<double>() - b["center_in_world"][i].get<double>();
-      sum += d * d;
-    }
-    return std::sqrt(sum);
-  }
-  static std::function<bool(const Json&)> MovedFrom(const Json& before) {
-    return [before](const Json& now) { return Moved(before, now) > 1e-3; };
-  }
-  static bool Anything(const Json&) { return true; }
-
-  VirtualDisplay display_;
-};
 
 TEST_F(ViewerWindow, KeysDragsAndTheWheelMoveTheCamera) {
   NeedDisplay();
@@ -272,7 +248,7 @@ TEST_F(ViewerWindow, PixelsGoOnceTheyAreSampledAndComeBackForWhoLooksAtThem) {
   const auto [decoded, held] = bytes({});
   EXPECT_GT(decoded, 0u);
   EXPECT_EQ(held, 0u) << "the display's OpenGL draws on the processor";
-  EXPECT_EQ(bytes({"--photo"}), std::pair(decoded, decoded));
+  EXPECT_EQ(bytes({"--photo"}), std::pair(decoded, size_t{0})) << "the photo is read by itself";
   EXPECT_EQ(bytes({"--fill-holes"}), std::pair(decoded, decoded));
 
   ViewerProgram viewer(Set(), folder_.path(), {"--size", "320x240", "--no-panel"});
@@ -342,6 +318,26 @@ TEST_F(ViewerWindow, AFlightIsTimedAndItsEndIsSaved) {
   EXPECT_GT(json["first_whole_picture_ms"], json["first_picture_ms"]) << "at the flight's end";
   EXPECT_TRUE(json["last"]["still"].get<bool>());
   EXPECT_EQ(io::ReadImage(In("end.png")).height(), 240);
+}
+
+TEST_F(ViewerWindow, ASetWhoseCalibrationFailedItsTestsSaysSo) {
+  const fs::path copy = folder_ / "failed.dtr";
+  fs::copy(Set(), copy, fs::copy_options::recursive);
+  DtrSet set = io::ReadSet(copy);
+  set.verdict_json =
+      R"({"passed":false,"tests":[{"name":"held_out_rms_px","passed":false,"value":9,"limit":1}]})";
+  io::RewriteMetadata(copy, set);
+  const char* warning = "WARNING: calibration FAILED: held_out_rms_px";
+  {
+    const Environment no_display("DISPLAY", "");
+    EXPECT_THAT(Dtr({"view", copy.string()}).err, HasSubstr(warning));
+    EXPECT_THAT(Dtr({"view", Set()}).err, ::testing::Not(HasSubstr("WARNING: calibration")));
+  }
+  NeedDisplay();
+  if (IsSkipped()) return;
+  const Json json = Json::parse(
+      DtrOk({"view", copy.string(), "--size", "320x240", "--frames", "3", "--json", "-"}).out);
+  EXPECT_THAT(json["last"]["message"], HasSubstr(warning));
 }
 
 TEST_F(ViewerWindow, WhatCannotWorkIsSaidInOneLine) {

@@ -25,6 +25,7 @@ class WireframeTest : public ::testing::Test {
       set_.frames[0].views.back().reference_baseline = 1;
     }
     set_.scene_center = {0, 0, 10};
+    colours_ = ViewColours(set_);
     scene_ = MakeRenderScene(set_);
     const View& first = set_.frames[0].views[0];
     novel_ = {first.camera, first.cam_from_world};
@@ -34,21 +35,23 @@ class WireframeTest : public ::testing::Test {
     return cpu::Render(scene_, novel_.camera, novel_.cam_from_world, options_);
   }
   ImageRgb8 Drawn(const RenderResult& result) {
-    return wireframe_.Draw({result, scene_, novel_, options_});
+    return wireframe_.Draw({result, scene_, novel_, options_, colours_});
   }
-  static bool Has(const ImageRgb8& image, int x, int y, int view) {
+  bool Has(const ImageRgb8& image, int x, int y, int view) const {
+    const Rgb colour = colours_.Of(set_.frames[0].views[static_cast<size_t>(view)]);
     for (int c = 0; c < 3; ++c) {
-      if (image(x, y, c) != ViewColour(view)[static_cast<size_t>(c)]) return false;
+      if (image(x, y, c) != colour[static_cast<size_t>(c)]) return false;
     }
     return true;
   }
-  static int InColumn(const ImageRgb8& image, int x, int view) {
+  int InColumn(const ImageRgb8& image, int x, int view) const {
     int count = 0;
     for (int y = 0; y < image.height(); ++y) count += Has(image, x, y, view);
     return count;
   }
 
   DtrSet set_;
+  ViewColours colours_;
   RenderScene scene_;
   NovelCamera novel_;
   RenderOptions options_;
@@ -85,7 +88,7 @@ TEST_F(WireframeTest, HasTheSameBytesForAnyNumberOfThreadsAndWhenMeshesAreKept) 
   const ImageRgb8 one = Drawn(result);
   EXPECT_EQ(Drawn(result).data(), one.data());
   options_.threads = 3;
-  EXPECT_EQ(Wireframe().Draw({result, scene_, novel_, options_}).data(), one.data());
+  EXPECT_EQ(Wireframe().Draw({result, scene_, novel_, options_, colours_}).data(), one.data());
 }
 
 TEST_F(WireframeTest, ShowsFullGridsForTheTwoPasses) {

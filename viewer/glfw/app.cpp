@@ -20,6 +20,7 @@
 #include "viewer/glfw/path_tools.h"
 #include "viewer/glfw/run_figures.h"
 #include "viewer/glfw/session.h"
+#include "viewer/glfw/trouble.h"
 #include "viewer/glfw/user_interface.h"
 #include "viewer/time_player.h"
 
@@ -52,6 +53,7 @@ class App {
     if (settings.start) controller().JumpTo(*settings.start);
     session_->ShowInstant(settings.instant);
     if (settings.play_time) PlayOrStop();
+    if (!settings.warning.empty()) message_ = settings.warning;
   }
 
   AppReport Run() {
@@ -112,8 +114,8 @@ class App {
       session_ = std::move(next);
       ++reloads_;
       Tell("the set on the disk changed and was read anew");
-    } catch (const Error& error) {
-      Tell(std::string(error.what()) + " (the window goes on with what it has read)");
+    } catch (const std::exception& error) {
+      Tell(Said(error) + " (the window goes on with what it has read)");
     }
     settling_ = kSettlingFrames;
   }
@@ -189,7 +191,7 @@ class App {
         return;
       }
       case Action::kHideView:
-        if (const auto nearest = controller().nearest_view()) {
+        if (const auto nearest = controller().nearest_source()) {
           inspection.Toggle(*controller().surroundings().views[*nearest]);
         }
         return;
@@ -267,10 +269,12 @@ class App {
 
   PictureSchedule::Pace Pace() const {
     if (paths_.Wanted()) return PictureSchedule::Pace::kWhole;
-    return CameraMoves() || time_.playing() ? PictureSchedule::Pace::kMoving
-                                            : PictureSchedule::Pace::kResting;
+    // A hand that holds still in the middle of a drag will go on.
+    const bool moves = CameraMoves() || session_->controller.dragging() || time_.playing();
+    return moves ? PictureSchedule::Pace::kMoving : PictureSchedule::Pace::kResting;
   }
 
+  /// By itself: there is another picture with the next frame.
   bool CameraMoves() const {
     return playing() || paths_.Wanted() || paths_.flight().flying() ||
            session_->controller.moving();
@@ -313,8 +317,10 @@ class App {
       PanelModel model{picture,
                        controller(),
                        options_,
+                       session_->opened().defaults,
                        shown_,
                        session_->inspector.inspection(),
+                       session_->maker.colours(),
                        paths_.flight(),
                        {static_cast<int>(session_->clock().frames()), static_cast<int>(instant),
                         session_->clock().StartOf(instant), time_.playing()},
@@ -357,27 +363,32 @@ class App {
       if (last_frame && !settings_.screenshot.empty()) {
         SaveWindowAs(settings_.screenshot, window_.handle());
       }
-    } catch (const Error& error) {
-      Tell(error.what());
+    } catch (const std::exception& error) {
+      Tell(Said(error));
       if (last_frame) throw;  // a script asked for it
     }
   }
 
   void CopyCommand() {
-    const auto file = keeper_.SaveCamera(Order().camera, session_->opened().set);
-    const bool moving = session_->clock().frames() > 1;
-    const std::string command =
-        host_.command_line(file, options_, session_->HiddenNames(),
-                           moving ? std::optional(session_->instant()) : std::nullopt);
+    const Inspection& inspection = session_->inspector.inspection();
+    const PictureOrder order = Order();
+    ToDraw wanted{keeper_.SaveCamera(order.camera, session_->opened().set),
+                  order.options,
+                  order.hidden,
+                  {},
+                  shown_ == Shown::kDepth,
+                  shown_ == Shown::kCoverage};
+    if (session_->clock().frames() > 1) wanted.instant = session_->instant();
+    const std::string command = host_.command_line(session_->opened(), wanted);
     glfwSetClipboardString(window_.handle(), command.c_str());
-    Tell(command);
+    Tell(command + WhatACommandLeavesOut(shown_, inspection.compared));
   }
 
   /// Throws Error where the last frame's picture could not be made: nobody is there to see why.
   bool ReachedFrames() const {
     const bool last = LastFrame();
     if (last && session_->schedule.refusal()) throw Error(*session_->schedule.refusal());
-    return last && whole() && settling_ <= 0;
+    return last && whole() && settling_ <= 0 && !session_->inspector.reading();
   }
 
   /// As many frames as were asked for are drawn; a whole picture may still be to come.
@@ -403,7 +414,8 @@ class App {
     if (!time_.playing()) moving_fps_ = 0;
     // A still picture is due soon, or when its views have been read; a video is nearly there; so
     // is the next instant.
-    const bool due = session_->schedule.Due() || paths_.recording() || time_.playing();
+    const bool due = session_->schedule.Due() || paths_.recording() || time_.playing() ||
+                     session_->inspector.reading();
     glfwWaitEventsTimeout(due ? kReadingSeconds : kIdleSeconds);
   }
 
@@ -416,8 +428,12 @@ class App {
     state.still = whole();
     state.camera = controller.camera();
     if (const auto at = controller.at_view()) {
-      state.at_view = controller.surroundings().views[*at]->name;
+      const View& view = *controller.surroundings().cameras[*at];
+      state.at_view = view.name;
+      state.at_held_out = view.role == ViewRole::kHeldOut;
     }
+    if (const View* photo = session_->inspector.photo()) state.photo = photo->name;
+    state.thumbnails = session_->inspector.thumbnails();
     state.shown = NameOf(shown_);
     state.divisor = picture.divisor;
     for (const int index : picture.views_used) {

@@ -19,11 +19,13 @@ namespace dtr::viewer {
 /// the set.
 struct OpenedSet {
   DtrSet set;
+  RenderOptions defaults;  ///< what `dtr render` takes where nothing is said: the set's own
   std::unique_ptr<ViewStream> stream;
 };
 
 struct AppSettings {
   std::string title;
+  std::string warning;  ///< the first message in the window; empty: none
   int width_px = 1280, height_px = 800;
   RenderOptions render;
   size_t gpu_bytes = size_t{4} << 30;
@@ -31,6 +33,7 @@ struct AppSettings {
   std::filesystem::path output = ".";                 ///< folder for what the user saves
   std::string output_stem = "view";                   ///< first part of those files' names
   bool panel = true, cameras = false, photo = false;  ///< shown from the start; photo: compared
+  std::vector<std::string> hidden;  ///< names of views that are left out from the start
   /// Cameras to fly along at once, one a frame, as while moving; empty: none.
   std::vector<NovelCamera> play;
   int laps = 1;                      ///< so many times
@@ -61,9 +64,12 @@ struct AppState {
   int frames = 0;      ///< drawn so far
   bool still = false;  ///< the picture is whole, in full resolution and of all its views
   NovelCamera camera;
-  std::string at_view;  ///< name of the input camera it is at; empty: none
-  std::string shown;    ///< what the pixels mean: "colour", "depth", ...
-  int divisor = 1;      ///< of the picture's sides
+  std::string at_view;       ///< name of the input camera it is at; empty: none
+  bool at_held_out = false;  ///< that camera's photo is held out
+  std::string photo;         ///< name of the view whose photo is beside the picture; empty: none
+  int thumbnails = 0;        ///< input cameras that are shown with their photo
+  std::string shown;         ///< what the pixels mean: "colour", "depth", ...
+  int divisor = 1;           ///< of the picture's sides
   std::vector<std::string> views_used;
   double coverage = 0;   ///< share of pixels that some view saw; of still pictures
   double fly_speed = 0;  ///< scene units per second
@@ -84,6 +90,16 @@ struct AppState {
   RenderOptions render;
 };
 
+/// What a command line is to draw.
+struct ToDraw {
+  std::filesystem::path camera_file;  ///< cameras.json of one camera
+  RenderOptions options;
+  std::vector<const View*> hidden;  ///< views not to draw from
+  std::optional<size_t> instant;    ///< of a moving set: its frame
+  /// Beside the colours: the depth, what was seen.
+  bool depth = false, coverage = false;
+};
+
 /// What the viewer leaves to the program around it.
 struct Host {
   /// Reads the set anew; throws dtr::Error where it cannot.
@@ -95,11 +111,11 @@ struct Host {
   std::function<std::vector<NovelCamera>(const DtrSet&, const std::filesystem::path&)> read_path;
   /// Sigmas of a view's inverse depth from the disk; empty where it has none.
   std::function<Grid<float>(const View&)> load_sigma;
-  /// The command that draws the picture of the one camera in a file (cameras.json) without some
-  /// views, by name; of a moving set one of its frames.
-  std::function<std::string(const std::filesystem::path& camera_file, const RenderOptions&,
-                            const std::vector<std::string>& hidden, std::optional<size_t> instant)>
-      command_line;
+  /// The photo of a view, source or held out. Called on a thread of its own; throws where it
+  /// cannot.
+  std::function<ImageRgb8(const View&)> load_photo;
+  /// The command that draws a picture.
+  std::function<std::string(const OpenedSet&, const ToDraw&)> command_line;
   /// Differs whenever other files of a view lie on the disk; empty while one is missing. Cheap.
   /// Null: views that could not be read are never tried again.
   std::function<std::string(const View&)> view_stamp;

@@ -14,6 +14,7 @@ namespace {
 constexpr ImU32 kGround = IM_COL32(28, 30, 33, 255), kLine = IM_COL32(255, 255, 255, 220);
 constexpr ImU32 kGood = IM_COL32(90, 220, 120, 255), kBad = IM_COL32(255, 80, 70, 255);
 constexpr ImU32 kUntested = IM_COL32(120, 170, 255, 255), kOff = IM_COL32(130, 130, 130, 255);
+constexpr ImU32 kHeldOut = IM_COL32(255, 150, 240, 255);
 constexpr ImU32 kMark = IM_COL32(255, 225, 60, 255);
 constexpr double kFrustumShare = 0.06;  // of the scene's size: length of a drawn camera
 constexpr int kMagnifiedPx = 25, kMagnification = 8;
@@ -74,6 +75,20 @@ const char* NameOf(Compared compared) {
   return "";
 }
 
+std::string WhatACommandLeavesOut(Shown shown, Compared compared) {
+  std::string line;
+  if (shown == Shown::kDepth || shown == Shown::kCoverage) {
+    line = fmt::format("\n(colours, and beside them the {}; its false colours are the window's: P)",
+                       NameOf(shown));
+  } else if (shown != Shown::kColour) {
+    line = fmt::format("\n(colours: {} is the window's own, P saves it)", NameOf(shown));
+  }
+  if (compared != Compared::kNothing) {
+    line += fmt::format("\n(what lies left of the border: the {} is not in it)", NameOf(compared));
+  }
+  return line;
+}
+
 std::optional<RenderOptions> OptionsOf(Compared compared, const RenderOptions& options) {
   RenderOptions other = options;
   if (compared == Compared::kOtherMethod) {
@@ -127,16 +142,24 @@ void InspectionOverlay::DrawCompared(const Inspection& inspection, const Picture
 }
 
 void InspectionOverlay::DrawPhoto(const Inspection& inspection, const View& view,
-                                  const NovelCamera& camera) {
+                                  const NovelCamera& camera, PhotoShelf& photos) {
   ImDrawList& list = *ImGui::GetBackgroundDrawList();
   CoverRight(list, inspection.border);
-  if (photo_of_ != &view && !view.image.empty()) {
-    photo_.Upload(view.image);
-    photo_of_ = &view;
+  std::string label = view.name + (view.role == ViewRole::kHeldOut ? " (held out)" : "");
+  if (photo_of_ != &view) {
+    const ImageRgb8* photo = view.image.empty() ? photos.Whole(view) : &view.image;
+    if (photo != nullptr) {
+      photo_.Upload(*photo);
+      photo_of_ = &view;
+    } else if (const std::string* refusal = photos.RefusalOf(view)) {
+      label += ": photo not read: " + *refusal;
+    } else {
+      label += ": photo is being read";
+    }
   }
+  const ImVec2 display = ImGui::GetIO().DisplaySize;
   if (photo_of_ == &view) {
     const PinholeCamera &to = camera.camera, &from = view.camera;
-    const ImVec2 display = ImGui::GetIO().DisplaySize;
     const auto place = [&](double u, double v) {
       const double x = to.cx_px() + (u - from.cx_px()) * to.fx_px() / from.fx_px();
       const double y = to.cy_px() + (v - from.cy_px()) * to.fy_px() / from.fy_px();
@@ -146,15 +169,16 @@ void InspectionOverlay::DrawPhoto(const Inspection& inspection, const View& view
     list.AddImage(IdOf(photo_), place(0, 0), place(from.width_px(), from.height_px()));
   }
   EndRight(list, inspection.border);
+  Label(list, {inspection.border * display.x + 10, 8}, kLine, label);
 }
 
 void InspectionOverlay::DrawCameras(const Controller& controller, const Inspection& inspection,
                                     const std::map<std::string, ViewVerdict>& verdicts,
-                                    PictureMaker& maker) {
+                                    PictureMaker& maker, PhotoShelf& photos) {
   ImDrawList& list = *ImGui::GetBackgroundDrawList();
   const NovelCamera& camera = controller.camera();
   const double length = kFrustumShare * controller.scene_size();
-  for (const View* view : controller.surroundings().views) {
+  for (const View* view : controller.surroundings().cameras) {
     const Pose world_from_cam = view->cam_from_world.Inverse();
     const auto centre = Project(camera, world_from_cam.translation);
     const double w = view->camera.width_px(), h = view->camera.height_px();
@@ -165,19 +189,25 @@ void InspectionOverlay::DrawCameras(const Controller& controller, const Inspecti
           Project(camera, world_from_cam * (length * view->camera.RayFromPixel(pixels[i])));
     }
     const auto verdict = verdicts.find(view->name);
-    const ImU32 colour = inspection.IsHidden(*view)  ? kOff
-                         : verdict == verdicts.end() ? kUntested
-                         : verdict->second.good      ? kGood
-                                                     : kBad;
+    const bool held_out = view->role == ViewRole::kHeldOut;
+    const ImU32 colour = held_out                     ? kHeldOut
+                         : inspection.IsHidden(*view) ? kOff
+                         : verdict == verdicts.end()  ? kUntested
+                         : verdict->second.good       ? kGood
+                                                      : kBad;
     const bool all = std::all_of(corners.begin(), corners.end(), [](const auto& c) { return c; });
-    auto& thumbnail = thumbnails_[view];
-    if (const ImageRgb8* small = thumbnail ? nullptr : maker.ThumbnailOf(*view)) {
-      thumbnail = std::make_unique<PictureTexture>();
-      thumbnail->Upload(*small);
+    auto thumbnail = thumbnails_.find(view);
+    if (thumbnail == thumbnails_.end()) {
+      const ImageRgb8* small = maker.ThumbnailOf(*view);
+      if (small == nullptr) small = photos.Small(*view);
+      if (small != nullptr) {
+        thumbnail = thumbnails_.emplace(view, std::make_unique<PictureTexture>()).first;
+        thumbnail->second->Upload(*small);
+      }
     }
-    if (all && thumbnail) {
-      list.AddImageQuad(IdOf(*thumbnail), *corners[0], *corners[1], *corners[2], *corners[3],
-                        {0, 0}, {1, 0}, {1, 1}, {0, 1}, IM_COL32(255, 255, 255, 200));
+    if (all && thumbnail != thumbnails_.end()) {
+      list.AddImageQuad(IdOf(*thumbnail->second), *corners[0], *corners[1], *corners[2],
+                        *corners[3], {0, 0}, {1, 0}, {1, 1}, {0, 1}, IM_COL32(255, 255, 255, 200));
     }
     for (size_t i = 0; i < 4; ++i) {
       if (centre && corners[i]) list.AddLine(*centre, *corners[i], colour, 1.5F);
@@ -186,6 +216,7 @@ void InspectionOverlay::DrawCameras(const Controller& controller, const Inspecti
     }
     if (corners[3]) {
       std::string label = view->name;
+      if (held_out) label += " (held out)";
       if (verdict != verdicts.end()) label += " " + verdict->second.text;
       list.AddText(*corners[3], colour, label.c_str());
     }

@@ -10,8 +10,10 @@
 
 #include "viewer/controller.h"
 #include "viewer/glfw/app.h"
+#include "viewer/glfw/photo_shelf.h"
 #include "viewer/glfw/picture_maker.h"
 #include "viewer/probe.h"
+#include "viewer/shown.h"
 
 namespace dtr::viewer {
 
@@ -21,6 +23,9 @@ enum class Compared { kNothing, kPhoto, kOtherMethod, kOtherPrimitive };
 inline constexpr std::array kAllCompared{Compared::kNothing, Compared::kPhoto,
                                          Compared::kOtherMethod, Compared::kOtherPrimitive};
 const char* NameOf(Compared compared);
+/// A line for the end of a command that draws the picture in the window: `dtr render` knows
+/// colours, depth and coverage. Empty where it draws all of it.
+std::string WhatACommandLeavesOut(Shown shown, Compared compared);
 /// The options of the other picture; none where it is no rendering.
 std::optional<RenderOptions> OptionsOf(Compared compared, const RenderOptions& options);
 
@@ -34,8 +39,10 @@ struct Inspection {
   std::optional<Probe> under_cursor;  ///< of the last cursor at rest
   std::string unit;                   ///< of lengths: "m" or "units"
 
-  /// True while the views' own pixels are looked at.
-  bool LooksAtPixels() const { return magnifier || compared != Compared::kNothing; }
+  /// True while the pixels of the picture's views are looked at; photos are read by themselves.
+  bool LooksAtPixels() const {
+    return magnifier || (compared != Compared::kNothing && compared != Compared::kPhoto);
+  }
   bool IsHidden(const View& view) const;
   void Toggle(const View& view);
   /// Adds a mark; a third begins anew.
@@ -44,18 +51,24 @@ struct Inspection {
   std::string DistanceText() const;
 };
 
-/// Draws it with ImGui. Thumbnails are there of the views that were drawn from.
+/// Draws it with ImGui.
 class InspectionOverlay {
  public:
   /// The other picture, right of the border, and what each side is drawn by.
   void DrawCompared(const Inspection& inspection, const PictureTexture& other,
                     const RenderOptions& left, const RenderOptions& right);
-  /// The photo of `view` where it would lie if this were its camera.
-  void DrawPhoto(const Inspection& inspection, const View& view, const NovelCamera& camera);
+  /// The photo of `view` where it would lie if this were its camera; as long as there is none,
+  /// why.
+  void DrawPhoto(const Inspection& inspection, const View& view, const NovelCamera& camera,
+                 PhotoShelf& photos);
+  /// With small photos of the input cameras, those of held-out photos in a colour of their own.
   void DrawCameras(const Controller& controller, const Inspection& inspection,
-                   const std::map<std::string, ViewVerdict>& verdicts, PictureMaker& maker);
+                   const std::map<std::string, ViewVerdict>& verdicts, PictureMaker& maker,
+                   PhotoShelf& photos);
   void DrawMarks(const Inspection& inspection, const NovelCamera& camera);
   void DrawMagnifier(const Inspection& inspection, const PictureTexture& picture);
+  int thumbnails() const { return static_cast<int>(thumbnails_.size()); }
+  const View* photo_of() const { return photo_of_; }
 
  private:
   std::map<const View*, std::unique_ptr<PictureTexture>> thumbnails_;

@@ -5,7 +5,7 @@
 #include <exception>
 #include <utility>
 
-#include "dtr/base/error.h"
+#include "viewer/glfw/trouble.h"
 
 namespace dtr::viewer {
 
@@ -38,10 +38,10 @@ void Inspector::Look(bool whole, const RenderOptions& options, const Eigen::Vect
     for (const Eigen::Vector2d& pixel : std::exchange(to_mark_, {})) {
       if (const auto probe = ProbeAt(pixel)) inspection_.Mark(*probe);
     }
-  } catch (const Error& error) {
+  } catch (const std::exception& error) {
     inspection_.compared = Compared::kNothing;
     inspection_.magnifier = false;  // would fail again with every frame
-    from_.tell(error.what());
+    from_.tell(Said(error));
   }
 }
 
@@ -66,7 +66,7 @@ void Inspector::AskForVerdicts() {
     try {
       verdicts_ = verdicts_coming_.get();
     } catch (const std::exception& error) {
-      from_.tell(error.what());
+      from_.tell(Said(error));
     }
   }
 }
@@ -75,15 +75,25 @@ void Inspector::Draw(const RenderOptions& options) {
   AskForVerdicts();
   const Controller& controller = from_.controller;
   const auto nearest = controller.nearest_view();
+  photos_.Tend();
   if (inspection_.compared == Compared::kPhoto && nearest) {
-    overlay_.DrawPhoto(inspection_, *controller.surroundings().views[*nearest],
-                       controller.camera());
+    overlay_.DrawPhoto(inspection_, *controller.surroundings().cameras[*nearest],
+                       controller.camera(), photos_);
   } else if (other_made_ && inspection_.compared != Compared::kNothing) {
     overlay_.DrawCompared(inspection_, from_.maker.other(), options, *other_made_);
   }
-  if (inspection_.cameras) overlay_.DrawCameras(controller, inspection_, verdicts_, from_.maker);
+  if (inspection_.cameras) {
+    overlay_.DrawCameras(controller, inspection_, verdicts_, from_.maker, photos_);
+  }
   overlay_.DrawMarks(inspection_, controller.camera());
   if (inspection_.magnifier) overlay_.DrawMagnifier(inspection_, from_.maker.picture().texture);
+}
+
+const View* Inspector::photo() const {
+  if (inspection_.compared != Compared::kPhoto) return nullptr;
+  const auto nearest = from_.controller.nearest_view();
+  const View* view = nearest ? from_.controller.surroundings().cameras[*nearest] : nullptr;
+  return view == overlay_.photo_of() ? view : nullptr;
 }
 
 }  // namespace dtr::viewer

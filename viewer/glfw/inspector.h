@@ -26,9 +26,11 @@ class Inspector {
     const Controller& controller;
     SigmaOf sigma_of;
     std::function<Verdicts()> verdicts;  ///< may be null; called on a thread of its own
+    std::function<ImageRgb8(const View&)> load_photo;  ///< as Host::load_photo
     std::function<void(const std::string&)> tell;
   };
-  explicit Inspector(Sources sources) : from_(std::move(sources)) {}
+  explicit Inspector(Sources sources)
+      : from_(std::move(sources)), photos_(from_.load_photo, kThumbnailPx) {}
 
   Inspection& inspection() { return inspection_; }
   const Inspection& inspection() const { return inspection_; }
@@ -39,6 +41,13 @@ class Inspector {
   void Look(bool whole, const RenderOptions& options, const Eigen::Vector2d& cursor_px);
   /// Draws it with ImGui.
   void Draw(const RenderOptions& options);
+  /// True while photos are being read that are to be shown.
+  bool reading() const { return photos_.reading(); }
+  void TryPhotosAgain() { photos_.ForgetRefusals(); }
+  /// The view whose photo is beside the picture; null: none.
+  const View* photo() const;
+  /// Input cameras that are shown with their photo.
+  int thumbnails() const { return inspection_.cameras ? overlay_.thumbnails() : 0; }
 
  private:
   std::optional<Probe> ProbeAt(const Eigen::Vector2d& pixel);
@@ -47,6 +56,7 @@ class Inspector {
   const Sources from_;
   Inspection inspection_;
   InspectionOverlay overlay_;
+  PhotoShelf photos_;
   int picture_ = -1;                         ///< number of the picture that what follows is of
   std::optional<RenderOptions> other_made_;  ///< options of the other picture beside it
   std::optional<Eigen::Vector2d> probed_;    ///< where the cursor rested

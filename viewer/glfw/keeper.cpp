@@ -38,11 +38,14 @@ void WriteCameras(const fs::path& file, const std::vector<NovelCamera>& cameras,
 
 }  // namespace
 
-fs::path Keeper::Free(const std::string& kind, const std::string& extension) const {
+fs::path Keeper::Free(const std::string& kind, const std::vector<std::string>& extensions) const {
   constexpr int kMostFiles = 100000;
   for (int number = 1; number < kMostFiles; ++number) {
-    fs::path file = folder_ / fmt::format("{}-{}-{:03}{}", stem_, kind, number, extension);
-    if (!fs::exists(file)) return file;
+    const std::string stem = fmt::format("{}-{}-{:03}", stem_, kind, number);
+    const bool taken = std::any_of(
+        extensions.begin(), extensions.end(),
+        [&](const std::string& extension) { return fs::exists(folder_ / (stem + extension)); });
+    if (!taken) return folder_ / (stem + extensions.front());
   }
   throw Error(folder_.string() + ": expected a free name for " + stem_ + "-" + kind +
               ", found all taken; give another folder");
@@ -50,7 +53,7 @@ fs::path Keeper::Free(const std::string& kind, const std::string& extension) con
 
 fs::path Keeper::SavePicture(PictureMaker& maker) const {
   const MadePicture& picture = maker.picture();
-  const fs::path file = Free("picture", ".png");
+  const fs::path file = Free("picture", {".png"});
   if (picture.shown != Shown::kColour || picture.options.fill_holes) {
     io::WriteImage(file, maker.Image());
   } else {
@@ -60,25 +63,25 @@ fs::path Keeper::SavePicture(PictureMaker& maker) const {
 }
 
 fs::path Keeper::SaveWindow(GLFWwindow* window) const {
-  const fs::path file = Free("window", ".png");
+  const fs::path file = Free("window", {".png"});
   SaveWindowAs(file, window);
   return file;
 }
 
 fs::path Keeper::SaveCamera(const NovelCamera& camera, const DtrSet& set) const {
-  const fs::path file = Free("camera", ".json");
+  const fs::path file = Free("camera", {".json"});
   WriteCameras(file, {camera}, set);
   return file;
 }
 
 fs::path Keeper::SavePath(const std::vector<NovelCamera>& path, const DtrSet& set) {
-  if (path_file_.empty()) path_file_ = Free("path", ".json");
+  if (path_file_.empty()) path_file_ = Free("path", {".json"});
   WriteCameras(path_file_, path, set);
   return path_file_;
 }
 
 fs::path Keeper::NameVideo(const std::vector<NovelCamera>& frames, const DtrSet& set) const {
-  const fs::path video = Free("video", ".mp4");
+  const fs::path video = Free("video", {".mp4", ".json"});
   WriteCameras(fs::path(video).replace_extension(".json"), frames, set);
   return video;
 }

@@ -33,7 +33,9 @@ class Keeper {
   std::filesystem::path NameVideo(const std::vector<NovelCamera>& frames, const DtrSet& set) const;
 
  private:
-  std::filesystem::path Free(const std::string& kind, const std::string& extension) const;
+  /// A name that no file has with any of these extensions; with the first.
+  std::filesystem::path Free(const std::string& kind,
+                             const std::vector<std::string>& extensions) const;
 
   std::filesystem::path folder_;
   std::string stem_;

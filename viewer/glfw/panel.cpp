@@ -28,7 +28,7 @@ void WrappedNames(std::string line, const std::vector<std::string>& names) {
   ImGui::TextWrapped("%s", line.c_str());
 }
 
-void RenderControls(Widgets& widgets, RenderOptions& options) {
+void RenderControls(Widgets& widgets, RenderOptions& options, const RenderOptions& defaults) {
   widgets.Choice("method", options.method, kRenderMethods);
   const Primitive before = options.primitive;
   widgets.Choice("primitive", options.primitive, kPrimitives);
@@ -57,7 +57,7 @@ void RenderControls(Widgets& widgets, RenderOptions& options) {
   widgets.Check("fill holes (when still)", options.fill_holes);
   if (widgets.Button("defaults")) {
     const int threads = options.threads;
-    options = {};
+    options = defaults;
     options.threads = threads;
   }
 }
@@ -87,12 +87,12 @@ void Figures(const PanelModel& model) {
 
 void WhereControls(Widgets& widgets, PanelModel& model) {
   Controller& controller = model.controller;
-  const auto& views = controller.surroundings().views;
+  const auto& cameras = controller.surroundings().cameras;
   const auto at = controller.at_view(), nearest = controller.nearest_view();
-  if (at) {
-    Text("at " + views[*at]->name);
-  } else if (nearest) {
-    Text("nearest: " + views[*nearest]->name);
+  if (const auto which = at ? at : nearest) {
+    const View& view = *cameras[*which];
+    Text((at ? "at " : "nearest: ") + view.name +
+         (view.role == ViewRole::kHeldOut ? " (held out)" : ""));
   }
   if (widgets.Arrow("previous", ImGuiDir_Left)) model.pressed.push_back(Action::kPreviousView);
   ImGui::SameLine();
@@ -119,6 +119,14 @@ void InspectControls(Widgets& widgets, PanelModel& model) {
   Text(distance.empty() ? "M marks points to measure between" : "distance " + distance);
   if (!widgets.Tree("views to draw from")) return;
   for (const View* view : model.controller.surroundings().views) {
+    // The view's colour among weights and wireframes.
+    const Rgb colour = model.colours.Of(*view);
+    const float side = ImGui::GetFrameHeight();
+    ImGui::ColorButton(("##colour of " + view->name).c_str(),
+                       ImVec4(colour[0] / 255.0F, colour[1] / 255.0F, colour[2] / 255.0F, 1),
+                       ImGuiColorEditFlags_NoTooltip | ImGuiColorEditFlags_NoDragDrop,
+                       {0.6F * side, side});
+    ImGui::SameLine();
     bool on = !inspection.IsHidden(*view);
     const bool was_on = on;
     widgets.Check(("view " + view->name).c_str(), view->name.c_str(), on);
@@ -184,7 +192,9 @@ void DrawPanel(UserInterface& interface, PanelModel& model) {
     if (widgets.Header("Inspect")) InspectControls(widgets, model);
     if (widgets.Header("Where")) WhereControls(widgets, model);
     if (model.time.instants > 1 && widgets.Header("Time")) TimeControls(widgets, model);
-    if (widgets.Header("Render options")) RenderControls(widgets, model.options);
+    if (widgets.Header("Render options")) {
+      RenderControls(widgets, model.options, model.defaults);
+    }
     if (widgets.Header("Path")) PathControls(widgets, model);
     if (widgets.Header("Keep")) KeepControls(widgets, model);
     ImGui::PopItemWidth();

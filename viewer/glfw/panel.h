@@ -24,8 +24,10 @@ struct PanelModel {
   const MadePicture& picture;
   Controller& controller;
   RenderOptions& options;
+  const RenderOptions& defaults;  ///< the set's own
   Shown& shown;
   Inspection& inspection;
+  const ViewColours& colours;
   Flight& flight;
   TimeModel time;
   std::string recording;  ///< how far a video is; empty: none

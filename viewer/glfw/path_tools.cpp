@@ -4,22 +4,27 @@
 #include <imgui.h>
 
 #include <algorithm>
+#include <exception>
 #include <system_error>
 #include <utility>
 
-#include "dtr/base/error.h"
 #include "dtr/render/instants.h"
+#include "viewer/glfw/trouble.h"
 
 namespace dtr::viewer {
 
 namespace fs = std::filesystem;
 
+PathTools::~PathTools() {
+  if (recording_) DropRecording();
+}
+
 void PathTools::AddKey(const NovelCamera& camera, const DtrSet& set) {
   try {
     flight_.AddKey(camera);
     tell_("added to " + keeper_.SavePath(flight_.keys(), set).string());
-  } catch (const Error& error) {
-    tell_(error.what());
+  } catch (const std::exception& error) {
+    tell_(Said(error));
   }
 }
 
@@ -28,8 +33,8 @@ void PathTools::Load(const fs::path& file, const DtrSet& set) {
     flight_.Replace(host_.read_path(set, file));
     keeper_.BeginNewPath();
     tell_(fmt::format("{}: {} cameras", file.string(), flight_.keys().size()));
-  } catch (const Error& error) {
-    tell_(error.what());
+  } catch (const std::exception& error) {
+    tell_(Said(error));
   }
 }
 
@@ -43,8 +48,8 @@ void PathTools::StartOrStopRecording(const PinholeCamera& like, const DtrSet& se
     const fs::path video = keeper_.NameVideo(frames, set);
     flight_.Stop();
     recording_ = std::make_unique<Recording>(video, std::move(frames));
-  } catch (const Error& error) {
-    tell_(error.what());
+  } catch (const std::exception& error) {
+    tell_(Said(error));
   }
 }
 
@@ -61,8 +66,8 @@ size_t PathTools::WantedFrame(size_t frames) const {
 void PathTools::Filmed(const ImageRgb8& picture) {
   try {
     recording_->Add(picture);
-  } catch (const Error& error) {
-    Abort(error.what());
+  } catch (const std::exception& error) {
+    Abort(Said(error));
   }
 }
 
@@ -72,16 +77,21 @@ void PathTools::Tend() {
     if (!recording_->Done()) return;
     tell_(fmt::format("saved {} ({} frames)", recording_->target().string(), recording_->frames()));
     recording_.reset();
-  } catch (const Error& error) {
-    Abort(error.what());
+  } catch (const std::exception& error) {
+    Abort(Said(error));
   }
 }
 
-void PathTools::Abort(const std::string& why) {
+fs::path PathTools::DropRecording() {
   const fs::path target = recording_->target();
   recording_.reset();
   std::error_code ignored;
   fs::remove(fs::path(target).replace_extension(".json"), ignored);
+  return target;
+}
+
+void PathTools::Abort(const std::string& why) {
+  const fs::path target = DropRecording();
   tell_(target.string() + ": not recorded: " + why);
 }
 

@@ -20,6 +20,11 @@ class PathTools {
   PathTools(const Host& host, Keeper& keeper, std::function<void(const std::string&)> tell)
       : host_(host), keeper_(keeper), tell_(std::move(tell)) {}
 
+  /// Leaves nothing behind of a recording that is not finished.
+  ~PathTools();
+  PathTools(const PathTools&) = delete;
+  PathTools& operator=(const PathTools&) = delete;
+
   Flight& flight() { return flight_; }
   const Flight& flight() const { return flight_; }
 
@@ -42,6 +47,8 @@ class PathTools {
   void Abort(const std::string& why);
 
  private:
+  std::filesystem::path DropRecording();
+
   const Host& host_;
   Keeper& keeper_;
   const std::function<void(const std::string&)> tell_;

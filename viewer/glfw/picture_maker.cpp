@@ -26,8 +26,6 @@ class Laps {
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
-constexpr int kThumbnailPx = 128;
-
 /// Filling, false colours and those who inspect read the views' own pixels.
 ViewStream::Pixels PixelsFor(const PictureOrder& order) {
   const bool needed = order.inspected || order.options.fill_holes || order.shown != Shown::kColour;
@@ -41,11 +39,15 @@ PinholeCamera Smaller(const PinholeCamera& camera, int divisor) {
 
 }  // namespace
 
-PictureMaker::PictureMaker(ViewStream& stream, gl::RendererSettings settings, SigmaOf sigma_of)
-    : stream_(stream), renderer_(std::move(settings)), sigma_of_(std::move(sigma_of)) {}
+PictureMaker::PictureMaker(ViewStream& stream, ViewColours colours, gl::RendererSettings settings,
+                           SigmaOf sigma_of)
+    : stream_(stream),
+      colours_(std::move(colours)),
+      renderer_(std::move(settings)),
+      sigma_of_(std::move(sigma_of)) {}
 
 ImageRgb8 PictureMaker::InFalseColour() {
-  const Drawn drawn{Result(), picture_.scene, picture_.camera, picture_.options};
+  const Drawn drawn{Result(), picture_.scene, picture_.camera, picture_.options, colours_};
   if (picture_.shown == Shown::kWireframe) return wireframe_.Draw(drawn);
   return FalseColour(picture_.shown, drawn, sigma_of_);
 }

@@ -15,6 +15,8 @@
 
 namespace dtr::viewer {
 
+inline constexpr int kThumbnailPx = 128;  ///< long side
+
 /// What is asked for.
 struct PictureOrder {
   NovelCamera camera;
@@ -52,7 +54,10 @@ struct MadePicture {
 class PictureMaker {
  public:
   /// The stream must outlive it.
-  PictureMaker(ViewStream& stream, gl::RendererSettings settings, SigmaOf sigma_of);
+  PictureMaker(ViewStream& stream, ViewColours colours, gl::RendererSettings settings,
+               SigmaOf sigma_of);
+
+  const ViewColours& colours() const { return colours_; }
 
   /// Quickly: each side divided by `divisor`, of the views that are in memory, not filled.
   void MakeMoving(const PictureOrder& order, int divisor);
@@ -87,6 +92,7 @@ class PictureMaker {
   void Show(const PictureOrder& order, const gl::DrawnPicture& drawn, bool still);
 
   ViewStream& stream_;
+  const ViewColours colours_;
   gl::Renderer renderer_;
   const SigmaOf sigma_of_;
   Wireframe wireframe_;

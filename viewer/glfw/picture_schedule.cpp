@@ -1,8 +1,9 @@
 #include "viewer/glfw/picture_schedule.h"
 
+#include <exception>
 #include <utility>
 
-#include "dtr/base/error.h"
+#include "viewer/glfw/trouble.h"
 
 namespace dtr::viewer {
 namespace {
@@ -62,9 +63,10 @@ void PictureSchedule::MakeNow(const PictureOrder& order, bool small) {
     }
     has_picture_ = true;
     told_.clear();
-  } catch (const Error& error) {
-    if (!small) refusal_ = error.what();
-    if (std::exchange(told_, error.what()) != error.what()) tell_(error.what());
+  } catch (const std::exception& error) {
+    const std::string said = Said(error);
+    if (!small) refusal_ = said;
+    if (std::exchange(told_, said) != said) tell_(said);
   }
 }
 

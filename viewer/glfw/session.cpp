@@ -23,14 +23,17 @@ Session::Session(const AppSettings& settings, const Host& host, const Tell& tell
     : host_(host),
       opened_(host.open()),
       clock_(opened_->set),
-      maker(*opened_->stream, MakerSettings(settings, tell),
+      sigmas_(host.load_sigma),
+      maker(*opened_->stream, ViewColours(opened_->set), MakerSettings(settings, tell),
             [this](const View& view) { return SigmaOfView(view); }),
       schedule(maker, settings.largest_divisor, tell),
       controller(SurroundingsOf(opened_->set), width_px, height_px,
                  [this](const Eigen::Vector2d& pixel) { return DepthAt(pixel); }),
       inspector({maker, schedule, controller,
-                 [this](const View& view) { return SigmaOfView(view); }, host.verdicts, tell}) {
+                 [this](const View& view) { return SigmaOfView(view); }, host.verdicts,
+                 host.load_photo, tell}) {
   inspector.inspection().unit = opened_->set.unit == LengthUnit::kMetre ? "m" : "units";
+  Hide(settings.hidden);
 }
 
 Eigen::Vector3d Session::ContinueFrom(const Session& before) {
@@ -44,15 +47,18 @@ Eigen::Vector3d Session::ContinueFrom(const Session& before) {
   mine.magnifier = theirs.magnifier;
   mine.compared = theirs.compared;
   mine.border = theirs.border;
+  mine.hidden.clear();
   Hide(before.HiddenNames());
   ShowInstant(std::min(before.instant(), clock_.frames() - 1));
   return shift;
 }
 
 void Session::Hide(const std::vector<std::string>& names) {
+  hidden_elsewhere_ = names;
   for (const View* view : controller.surroundings().views) {
     if (std::find(names.begin(), names.end(), view->name) == names.end()) continue;
     inspector.inspection().Toggle(*view);
+    std::erase(hidden_elsewhere_, view->name);
   }
 }
 
@@ -70,13 +76,18 @@ void Session::RetryLostViews() {
     const std::string stamp = host_.view_stamp(view);
     return !stamp.empty() && std::exchange(tried_stamps_[&view], stamp) != stamp;
   });
-  if (tried > 0) schedule.Renew();
+  if (tried == 0) return;
+  schedule.Renew();
+  inspector.TryPhotosAgain();
 }
 
 const Grid<float>* Session::SigmaOfView(const View& view) {
-  const auto known = sigmas_.find(&view);
-  if (known != sigmas_.end()) return &known->second;
-  return &(sigmas_[&view] = host_.load_sigma(view));
+  const MadePicture& picture = maker.picture();
+  std::set<const View*> in_picture;
+  for (const int index : picture.views_used) {
+    in_picture.insert(picture.scene.views[static_cast<size_t>(index)]);
+  }
+  return sigmas_.Of(view, in_picture);
 }
 
 std::optional<double> Session::DepthAt(const Eigen::Vector2d& pixel) {
@@ -93,7 +104,7 @@ std::optional<double> Session::DepthAt(const Eigen::Vector2d& pixel) {
 }
 
 std::vector<std::string> Session::HiddenNames() const {
-  std::vector<std::string> names;
+  std::vector<std::string> names = hidden_elsewhere_;
   for (const View* view : inspector.inspection().hidden) names.push_back(view->name);
   return names;
 }

@@ -12,6 +12,7 @@
 #include "viewer/glfw/inspector.h"
 #include "viewer/glfw/picture_maker.h"
 #include "viewer/glfw/picture_schedule.h"
+#include "viewer/sigma_shelf.h"
 
 namespace dtr::viewer {
 
@@ -42,11 +43,11 @@ class Session {
   void RetryLostViews();
   /// What the shown picture shows there, as plane z of the present camera.
   std::optional<double> DepthAt(const Eigen::Vector2d& pixel);
+  /// Also of views that this instant lacks.
   std::vector<std::string> HiddenNames() const;
 
  private:
   void Hide(const std::vector<std::string>& names);
-  /// Read when first asked for and kept.
   const Grid<float>* SigmaOfView(const View& view);
 
   const Host& host_;
@@ -54,7 +55,8 @@ class Session {
   const FrameClock clock_;
   size_t instant_ = 0;
   std::map<const View*, std::string> tried_stamps_;  ///< of lost views' files
-  std::map<const View*, Grid<float>> sigmas_;
+  SigmaShelf sigmas_;
+  std::vector<std::string> hidden_elsewhere_;  ///< names that this instant lacks
 
  public:
   PictureMaker maker;

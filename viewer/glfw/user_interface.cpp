@@ -49,9 +49,10 @@ struct UserInterface::Callbacks {
     if (const auto fly = FlyKeyOf(key); fly && !(pressed && (typing || mods != 0))) {
       self.inputs_.emplace_back(FlyEvent{*fly, pressed});
     }
-    if (!pressed || typing) return;
-    if (const auto bound = ActionOf(key, mods))
-      self.inputs_.emplace_back(ActionInput{*bound, self.cursor_px_});
+    const auto bound = pressed ? ActionOf(key, mods) : std::nullopt;
+    // A field that is typed into takes all but quitting.
+    if (!bound || (typing && bound != Action::kQuit)) return;
+    self.inputs_.emplace_back(ActionInput{*bound, self.cursor_px_});
   }
 
   static void Character(GLFWwindow* window, unsigned code) {

@@ -74,6 +74,11 @@ std::shared_ptr<const LoadedScene> DepthTR::getScene() const {
   return drawable_->state_->Get().Scene();
 }
 
+dtr::RenderOptions DepthTR::getDefaultRenderOptions() const {
+  const auto set = drawable_->state_->Get().set;
+  return set ? set->defaults : dtr::RenderOptions();
+}
+
 void DepthTR::ShowInstant(size_t instant) {
   drawable_->state_->Set([&](DrawSettings& settings) { settings.instant = instant; });
   input_views_.clear();

@@ -30,7 +30,8 @@ enum class DrawPath {
 /// When holes are filled, where the options say that they are.
 enum class FillTime {
   kAlways,     ///< every new picture, also while the camera moves
-  kWhenStill,  ///< once nothing has changed for a moment, as in `dtr view`: moving pictures stay fast
+  kWhenStill,  ///< once nothing has changed for a moment, as in `dtr view`: moving pictures stay
+               ///< fast
 };
 
 /// A scene of depth images that is drawn for the camera that looks at it. A leaf of the scene graph
@@ -54,6 +55,8 @@ class DepthTR : public osg::Geode {
       void load(const std::string& set_folder);
   /// A set in memory, whose source views have image and depth.
   void setScene(dtr::DtrSet set);
+  /// What the set was pruned for, else the library's options; loading does not set them.
+  dtr::RenderOptions getDefaultRenderOptions() const;
   bool isLoaded() const { return getScene() != nullptr; }
   /// The instant that is shown; null without a set.
   std::shared_ptr<const LoadedScene> getScene() const;
@@ -92,6 +95,8 @@ class DepthTR : public osg::Geode {
   osg::Matrixd getInputViewMatrix(int vn) const;
   /// The next input camera in the order of the views, round and round: the report's NextView().
   int nextView(int step = 1);
+  /// The one that nextView went to last; -1 before.
+  int currentView() const { return current_view_; }
 
   // The report's operations: by the reference renderer (dtr/cpu); no graphics context is needed.
 

@@ -1,11 +1,14 @@
 #include "viewer/osg/key_handler.h"
 
 #include <osg/Notify>
+#include <osg/UserDataContainer>
 #include <osgGA/CameraManipulator>
 #include <osgViewer/View>
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+#include <vector>
 
 namespace osgDTR {
 namespace {
@@ -99,6 +102,68 @@ bool HandleTime(int key, DepthTR& node) {
 
 }  // namespace
 
+/// The handlers of one window, in the order in which they met it.
+class KeyHandler::Fellows : public osg::Object {
+ public:
+  Fellows() = default;
+  Fellows(const Fellows& other, const osg::CopyOp& copyop) : osg::Object(other, copyop) {}
+  META_Object(osgDTR, Fellows)
+
+      void Join(KeyHandler* handler) {
+    std::erase_if(all_, [](const auto& one) { return !one.valid(); });
+    if (std::find(all_.begin(), all_.end(), handler) == all_.end()) all_.emplace_back(handler);
+  }
+  /// True once: several home positions would be that of the last.
+  bool TakeStart() { return !std::exchange(started_, true); }
+
+  template <typename Do>
+  void ForEach(const Do& what) const {
+    for (const auto& one : all_) {
+      if (osg::ref_ptr<KeyHandler> handler; one.lock(handler)) what(*handler);
+    }
+  }
+
+  /// The handler whose node has the next input view after this step; it is the node's current one.
+  KeyHandler* Step(int step) {
+    std::vector<KeyHandler*> with_views;
+    ForEach([&](KeyHandler& handler) {
+      osg::ref_ptr<DepthTR> node;
+      if (handler.node_.lock(node) && node->numberOfInputViews() > 0)
+        with_views.push_back(&handler);
+    });
+    if (with_views.empty()) return nullptr;
+    const size_t count = with_views.size();
+    if (at_ >= count) at_ = 0;
+    const osg::ref_ptr<DepthTR> node = with_views[at_]->node_.get();
+    const int before = node->currentView(), now = node->nextView(step);
+    const bool round = before >= 0 && (step > 0 ? now <= before : now >= before);
+    if (!round || count == 1) return with_views[at_];
+    node->nextView(-step);  // stays at its end
+    at_ = (at_ + (step > 0 ? 1 : count - 1)) % count;
+    const osg::ref_ptr<DepthTR> other = with_views[at_]->node_.get();
+    const int end = step > 0 ? 0 : other->numberOfInputViews() - 1;
+    other->nextView(end - other->currentView());
+    return with_views[at_];
+  }
+
+ private:
+  std::vector<osg::observer_ptr<KeyHandler>> all_;
+  size_t at_ = 0;
+  bool started_ = false;
+};
+
+osg::ref_ptr<KeyHandler::Fellows> KeyHandler::FellowsOf(osgGA::GUIActionAdapter& viewer) {
+  osg::View* const view = viewer.asView();
+  if (view == nullptr) return new Fellows;  // alone
+  osg::UserDataContainer& data = *view->getOrCreateUserDataContainer();
+  for (unsigned i = 0; i < data.getNumUserObjects(); ++i) {
+    if (auto* const known = dynamic_cast<Fellows*>(data.getUserObject(i))) return known;
+  }
+  osg::ref_ptr<Fellows> fellows = new Fellows;
+  data.addUserObject(fellows);
+  return fellows;
+}
+
 KeyHandler::KeyHandler(DepthTR* node, bool starts_at_input)
     : node_(node), starts_at_input_(starts_at_input) {}
 
@@ -123,18 +188,37 @@ void KeyHandler::GoTo(int vn, const osgGA::GUIEventAdapter& event,
 bool KeyHandler::handle(const osgGA::GUIEventAdapter& event, osgGA::GUIActionAdapter& viewer) {
   osg::ref_ptr<DepthTR> node;
   if (!node_.lock(node) || !node->isLoaded()) return false;
-  if (event.getEventType() == osgGA::GUIEventAdapter::FRAME && starts_at_input_) {
-    starts_at_input_ = false;
-    GoTo(node->nextView(), event, viewer);
+  const auto type = event.getEventType();
+  if (type != osgGA::GUIEventAdapter::FRAME && type != osgGA::GUIEventAdapter::KEYDOWN)
+    return false;
+  const osg::ref_ptr<Fellows> fellows = FellowsOf(viewer);
+  fellows->Join(this);
+  if (type == osgGA::GUIEventAdapter::FRAME) {
+    if (std::exchange(starts_at_input_, false) && fellows->TakeStart()) {
+      GoTo(node->nextView(), event, viewer);
+    }
     return false;
   }
-  if (event.getEventType() != osgGA::GUIEventAdapter::KEYDOWN || event.getHandled()) return false;
+  if (event.getHandled()) return false;
+  const int key = event.getKey();
+  if (key == 'n' || key == 'N') {
+    KeyHandler* const goes = fellows->Step(key == 'n' ? 1 : -1);
+    if (goes == nullptr) return false;
+    const osg::ref_ptr<DepthTR> its_node = goes->node_.get();
+    goes->GoTo(its_node->currentView(), event, viewer);
+    return true;
+  }
+  bool handled = false;
+  fellows->ForEach([&](KeyHandler& handler) { handled |= handler.Act(key); });
+  if (handled) viewer.requestRedraw();
+  return handled;
+}
+
+bool KeyHandler::Act(int key) {
+  osg::ref_ptr<DepthTR> node;
+  if (!node_.lock(node) || !node->isLoaded()) return false;
   RenderOptions options = node->getRenderOptions();
-  switch (event.getKey()) {
-    case 'n':
-    case 'N':
-      GoTo(node->nextView(event.getKey() == 'n' ? 1 : -1), event, viewer);
-      return true;
+  switch (key) {
     case 'v':
       OSG_NOTICE << "D+TR blend weight: " << Next(options.blend) << std::endl;
       break;
@@ -147,7 +231,7 @@ bool KeyHandler::handle(const osgGA::GUIEventAdapter& event, osgGA::GUIActionAda
       break;
     case '[':
     case ']':
-      options.views = std::clamp(options.views + (event.getKey() == ']' ? 1 : -1), 1,
+      options.views = std::clamp(options.views + (key == ']' ? 1 : -1), 1,
                                  std::max(1, node->numberOfInputViews()));
       OSG_NOTICE << "D+TR views: " << options.views << std::endl;
       break;
@@ -158,16 +242,12 @@ bool KeyHandler::handle(const osgGA::GUIEventAdapter& event, osgGA::GUIActionAda
       const bool gpu = node->getDrawPath() == DrawPath::kReadBack;
       node->setDrawPath(gpu ? DrawPath::kGpu : DrawPath::kReadBack);
       OSG_NOTICE << "D+TR path: " << (gpu ? "GPU" : "read back, two passes") << std::endl;
-      viewer.requestRedraw();
       return true;
     }
     default:
-      if (!HandleTime(event.getKey(), *node)) return false;
-      viewer.requestRedraw();
-      return true;
+      return HandleTime(key, *node);
   }
   node->setRenderOptions(options);
-  viewer.requestRedraw();
   return true;
 }
 

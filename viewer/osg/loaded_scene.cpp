@@ -7,7 +7,9 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
+#include "dtr/io/pruned.h"
 #include "dtr/io/set_io.h"
+#include "dtr/render/option_arguments.h"
 
 namespace osgDTR {
 namespace {
@@ -15,15 +17,34 @@ namespace {
 // Cells of samples reach half a sample beyond their centres (SPEC 2.6): room for R up to 4.
 constexpr double kCellPixels = 2;
 
+// OpenSceneGraph sets the far plane by the bound, and the near plane 1/2000 as far away: a pixel
+// that stereo put a thousand times too far would clip the foreground of everything. What so few
+// pixels say, at so many times the depth of the rest, is left out of the bound.
+constexpr double kOutlierShare = 0.001, kOutlierFactor = 4;
+
+/// Depth beyond which a view's pixels do not count for the bound.
+float FarthestDepth(const dtr::View& view) {
+  std::vector<float> depths;
+  for (const float z : view.depth.grid().data()) {
+    if (!dtr::DepthImage::IsHole(z)) depths.push_back(z);
+  }
+  if (depths.empty()) return 0;
+  const auto rank =
+      static_cast<std::ptrdiff_t>((1 - kOutlierShare) * static_cast<double>(depths.size() - 1));
+  std::nth_element(depths.begin(), depths.begin() + rank, depths.end());
+  return static_cast<float>(kOutlierFactor) * depths[static_cast<size_t>(rank)];
+}
+
 osg::BoundingBox BoundsOf(const dtr::View& view) {
   osg::BoundingBox bounds;
+  const float farthest = FarthestDepth(view);
   const dtr::PinholeCamera camera = view.DepthCamera();
   const dtr::Pose world_from_cam = view.cam_from_world.Inverse();
   const double cell = kCellPixels / std::min(camera.fx_px(), camera.fy_px());
   for (int y = 0; y < view.depth.height(); ++y) {
     for (int x = 0; x < view.depth.width(); ++x) {
       const float z = view.depth(x, y);
-      if (dtr::DepthImage::IsHole(z)) continue;
+      if (dtr::DepthImage::IsHole(z) || z > farthest) continue;
       const Eigen::Vector3d p =
           world_from_cam * (static_cast<double>(z) * camera.RayFromPixel({x + 0.5, y + 0.5}));
       const double reach = cell * z;
@@ -53,6 +74,8 @@ std::shared_ptr<const LoadedSet> MakeSet(dtr::DtrSet set) {
     bounds[k] = BoundsOf(*views[k]);
   });
   for (const osg::BoundingBox& one : bounds) loaded->bounds.expandBy(one);
+  loaded->defaults = dtr::WithArguments({}, dtr::io::RenderArguments(loaded->instants.front().set),
+                                        "set.json: pruned.render_arguments");
   return loaded;
 }
 

@@ -8,6 +8,7 @@
 
 #include "dtr/render/fill_holes.h"
 #include "dtr/render/instants.h"
+#include "dtr/render/options.h"
 #include "dtr/render/scene.h"
 #include "dtr/types/dtr_set.h"
 
@@ -23,7 +24,9 @@ struct LoadedScene {
 struct LoadedSet {
   std::vector<LoadedScene> instants;  ///< one of a still scene
   dtr::FrameClock clock;              ///< of the instants
-  /// Of all that can be drawn at any instant; DtrSet::bounds leaves out the outermost 1 %.
+  dtr::RenderOptions defaults;        ///< what the set was pruned for, else the library's
+  /// Of what can be drawn at any instant, but for single pixels that lie far beyond all others of
+  /// their views; DtrSet::bounds leaves out the outermost 1 %.
   osg::BoundingBox bounds;
   mutable dtr::HoleFiller hole_filler;  ///< keeps what it makes of the photos, for all who draw
 };

@@ -1,5 +1,6 @@
 // osgdb_dtr: `osgviewer scene.dtr`, osgDB::readNodeFile("scene.dtr").
 #include <osgDB/FileNameUtils>
+#include <osgDB/FileUtils>
 #include <osgDB/ReaderWriter>
 #include <osgDB/Registry>
 
@@ -55,8 +56,9 @@ bool OnOrOff(const std::string& name, const std::string& value) {
 }
 
 /// Words without a meaning here belong to other plugins: OpenSceneGraph hands all of them to all.
-PluginOptions Parse(const osgDB::Options* given) {
+PluginOptions Parse(const osgDB::Options* given, const dtr::RenderOptions& defaults) {
   PluginOptions options;
+  options.render = defaults;
   std::istringstream words(given == nullptr ? "" : given->getOptionString());
   for (std::string word; words >> word;) {
     const size_t equals = word.find('=');
@@ -99,6 +101,11 @@ PluginOptions Parse(const osgDB::Options* given) {
   return options;
 }
 
+std::string WithoutSlash(std::string name) {
+  while (name.size() > 1 && name.back() == '/') name.pop_back();
+  return name;
+}
+
 /// The folder of the set that `file` names: itself, or that of its set.json. Empty: no set.
 std::filesystem::path SetFolder(const std::string& file) {
   namespace fs = std::filesystem;
@@ -139,7 +146,10 @@ class ReaderWriterDTR : public osgDB::ReaderWriter {
   }
 
   ReadResult readNode(const std::string& file, const osgDB::Options* options) const override {
-    const std::filesystem::path folder = SetFolder(file);
+    std::filesystem::path folder = SetFolder(file);
+    // Relative names are looked for where OpenSceneGraph looks: OSG_FILE_PATH, the options' paths,
+    // and for a set that another file names, beside that file.
+    if (folder.empty()) folder = SetFolder(osgDB::findDataFile(WithoutSlash(file), options));
     if (folder.empty()) {
       // Others may know this extension: only what is called a set must be one.
       const bool called_set = osgDB::getLowerCaseFileExtension(file) == "dtr";
@@ -147,12 +157,13 @@ class ReaderWriterDTR : public osgDB::ReaderWriter {
       return ReadResult("osgdb_dtr: " + file + ": expected a D+TR set's folder, found none");
     }
     try {
-      const PluginOptions parsed = Parse(options);
+      (void)Parse(options, {});  // words without meaning, before anything is read
       osg::ref_ptr<DepthTR> node = new DepthTR;
+      node->load(folder.string());
+      const PluginOptions parsed = Parse(options, node->getDefaultRenderOptions());
       node->setRenderOptions(parsed.render);
       node->setDrawPath(parsed.path);
       node->setFillTime(parsed.fill_time);
-      node->load(folder.string());
       node->setInstant(parsed.instant);
       node->setPlaying(parsed.play);
       node->setName(folder.filename().string());

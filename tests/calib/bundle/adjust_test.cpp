@@ -151,6 +151,46 @@ TEST(Adjust, SigmaIsTheNoiseThatWasAdded) {
   EXPECT_NEAR(out.sigma_px, 0.4, 0.4 * 0.02);  // 6000 sights and more: 1 % is one sigma
 }
 
+// The mean over many draws, whatever is free: every unknown is counted once.
+TEST(Adjust, SigmaCountsTheUnknownsThatAreFree) {
+  constexpr int kDraws = 60;
+  constexpr double kNoise = 0.2;
+  AdjustOptions poses_known, free = With(LensFreedom::kAll), placed = With(LensFreedom::kFixed);
+  poses_known.lens = LensFreedom::kFixed;
+  poses_known.fix_poses = true;
+  for (AdjustOptions* options : {&poses_known, &free, &placed}) options->outlier_sigmas = 0;
+  double sums[3] = {};
+  for (std::uint64_t seed = 1; seed <= kDraws; ++seed) {
+    const Bundle bundle = MakeBundle({.images = 6, .points = 20, .noise_px = kNoise, .seed = seed});
+    AdjustOptions known = placed;
+    Random random(seed);
+    for (int i = 0; i < 6; ++i) {
+      const Eigen::Vector3d centre =
+          bundle.images[static_cast<size_t>(i)].cam_from_world.TargetOriginInSource();
+      const double x = random.Normal(), y = random.Normal();
+      constexpr double kKnown = 1e-4;  // nearer than the sights say: it counts
+      known.positions.push_back({i, centre + kKnown * Eigen::Vector3d(x, y, random.Normal()),
+                                 Eigen::Vector3d::Constant(kKnown)});
+    }
+    int k = 0;
+    for (const AdjustOptions* options : {&poses_known, &free, &known}) {
+      sums[k++] += Adjust(bundle, *options).sigma_px / (kDraws * kNoise);
+    }
+  }
+  // 60 draws of some 150 numbers: the mean is known to 0.8 %, and a lens is 5 of them.
+  constexpr double kMean = 0.02;
+  EXPECT_NEAR(sums[0], 1, kMean);
+  EXPECT_NEAR(sums[1], 1, kMean);
+  EXPECT_NEAR(sums[2], 1, kMean);
+}
+
+TEST(Adjust, AsManyUnknownsAsNumbersSayNothingOfSigma) {
+  const Bundle bundle = MakeBundle({.images = 2, .points = 4, .noise_px = 0.1});
+  AdjustOptions options = With(LensFreedom::kFixed);
+  options.outlier_sigmas = 0;
+  EXPECT_EQ(Adjust(bundle, options).sigma_px, std::numeric_limits<double>::infinity());
+}
+
 TEST(Adjust, WorldOffsetChangesNothing) {
   const Bundle at_home = MakeBundle({.noise_px = 0.3});
   Similarity far_away;

@@ -124,10 +124,61 @@ TEST(Judge, TheSameForAnyNumberOfThreads) {
   EXPECT_EQ(ToJson(Judge(bundle, {}, 1)), ToJson(Judge(bundle, {}, 4)));
 }
 
-TEST(Judge, TooFewPointsAreNotJudged) {
+const Check* TestOf(const Judgement& judgement, const std::string& name) {
+  for (const Check& test : judgement.tests) {
+    if (test.name == name) return &test;
+  }
+  return nullptr;
+}
+
+TEST(Judge, TooFewPointsFailAndSayWhy) {
   const Judgement judgement = Judge(MakeBundle({.points = 20, .lens = kPinholeLens}), {});
-  EXPECT_TRUE(judgement.tests.empty());
   EXPECT_THAT(judgement.not_judged, ::testing::HasSubstr("expected 50 points"));
+  const Check* test = TestOf(judgement, "photos_not_judged");
+  ASSERT_NE(test, nullptr);
+  EXPECT_FALSE(test->passed);
+  EXPECT_EQ(test->value, 8);
+  EXPECT_THAT(test->reason, ::testing::HasSubstr("expected 50 points"));
+  EXPECT_TRUE(TestOf(Judge(Honest(6), {}), "photos_not_judged")->passed);
+}
+
+TEST(Judge, APhotoOfFewSightsLeavesTheHalvesToTheOthers) {
+  Bundle bundle = Honest(8);
+  int seen = 0;
+  std::erase_if(bundle.observations,
+                [&](const BundleObservation& o) { return o.image == 3 && ++seen > 20; });
+  const Judgement judgement = Judge(bundle, {});
+  const Check* test = TestOf(judgement, "halves_ratio");
+  ASSERT_NE(test, nullptr);
+  EXPECT_TRUE(test->passed) << test->reason;
+  EXPECT_GT(test->value, 0.3);
+  EXPECT_THAT(test->reason, ::testing::HasSubstr(bundle.images[3].name));
+}
+
+TEST(Judge, MoreThanCanBeJudgedAtOnceIsJudgedInParts) {
+  const SceneSpec spec{
+      .images = 60, .points = 500, .lens = kPinholeLens, .noise_px = 0.3, .most_sights = 8};
+  const Bundle honest = Adjust(MakeBundle(spec), AllFree()).bundle;
+  BundleLimits limits;
+  limits.most_unknowns = 500;
+  const Judgement judgement = Judge(honest, limits);
+  EXPECT_GT(judgement.parts, 2);
+  EXPECT_EQ(judgement.cameras.size(), 60u);
+  for (const Check& test : judgement.tests) {
+    EXPECT_TRUE(test.passed) << test.name << " " << test.value << ": " << test.reason;
+  }
+  ASSERT_NE(TestOf(judgement, "rolling_shutter_px"), nullptr);
+  // What is wrong in one part is wrong, and named.
+  for (const size_t image : {size_t{2}, size_t{57}}) {
+    Bundle spoiled = honest;
+    Pose& pose = spoiled.images[image].cam_from_world;
+    pose.rotation = Eigen::AngleAxisd(0.01, Eigen::Vector3d::UnitY()) * pose.rotation;
+    const Judgement bad = Judge(spoiled, limits);
+    const Check* test = TestOf(bad, "camera_difference_sigmas");
+    ASSERT_NE(test, nullptr);
+    EXPECT_FALSE(test->passed);
+    EXPECT_THAT(test->reason, ::testing::HasSubstr(spoiled.images[image].name));
+  }
 }
 
 }  // namespace

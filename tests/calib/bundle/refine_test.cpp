@@ -3,7 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <nlohmann/json.hpp>
 
+#include "calib/bundle/covariance.h"
+#include "calib/bundle/held_out.h"
 #include "calib/lens_groups.h"
 #include "dtr/base/error.h"
 #include "tests/calib/bundle/synthetic_bundle.h"
@@ -12,28 +15,8 @@ namespace dtr::calib {
 namespace {
 
 using testing::MakeBundle;
+using testing::ModelFrom;
 using testing::SceneSpec;
-
-// The model of a bundle, as COLMAP would hand it over.
-SfmModel ModelFrom(const Bundle& bundle) {
-  SfmModel model;
-  model.cameras[1] = bundle.lenses[0];
-  for (size_t i = 0; i < bundle.images.size(); ++i) {
-    model.images.push_back({static_cast<std::uint32_t>(i + 1),
-                            bundle.images[i].name,
-                            1,
-                            bundle.images[i].cam_from_world,
-                            {}});
-  }
-  for (size_t p = 0; p < bundle.points.size(); ++p) {
-    model.points[bundle.point_ids[p]].p_in_world = bundle.points[p].head<3>();
-  }
-  for (const BundleObservation& o : bundle.observations) {
-    model.images[static_cast<size_t>(o.image)].features.push_back(
-        {o.pixel, bundle.point_ids[static_cast<size_t>(o.point)]});
-  }
-  return model;
-}
 
 // What a stabiliser of up to 10 px does to the sights of image i.
 Eigen::Vector2d ShiftOf(int image) {
@@ -54,6 +37,29 @@ TEST(Refine, FreesThePrincipalPointWhereItIsWrong) {
   ASSERT_TRUE(refined.changed);
   EXPECT_EQ(refined.lens, LensFreedom::kAll);
   EXPECT_NEAR(refined.model.cameras.at(1).params[1], 504, 2);
+}
+
+TEST(Refine, TellsTheCovarianceOfEveryPoseAndLensWhereAsked) {
+  SfmModel model = ModelFrom(MakeBundle(Noisy()));
+  model.cameras[1].params[1] += 12;
+  EXPECT_TRUE(Refine(model, {}).covariance_json.empty());
+  RefineOptions options;
+  options.covariance = true;
+  const auto json = nlohmann::json::parse(ToJson(Refine(model, options)))["covariance"];
+  const AdjustOptions free = OptionsFor(LensFreedom::kAll);
+  const BundleCovariance expected = CovarianceOf(Adjust(BundleOf(model), free), free);
+  EXPECT_EQ(json["determined"], true);
+  EXPECT_EQ(json["gauge_freedom"], 7);
+  ASSERT_EQ(json["cameras"].size(), 8u);
+  EXPECT_EQ(json["cameras"][3]["name"], model.images[3].name);
+  for (long i = 0; i < 6; ++i) {
+    for (long k = 0; k < 6; ++k) {
+      EXPECT_EQ(json["cameras"][3]["matrix"][i][k], expected.OfImage(3)(i, k));
+    }
+  }
+  const auto& lens = json["lenses"][0];
+  EXPECT_EQ(lens["names"], (std::vector<std::string>{"f_px", "cx_px", "cy_px", "k1", "k2"}));
+  EXPECT_EQ(lens["matrix"][1][2], expected.matrix(1, 2));
 }
 
 TEST(Refine, LeavesThePrincipalPointWhereTheDataDoNotAskForIt) {

@@ -183,6 +183,68 @@ TEST(OpenCvYaml, OpenCvReadsItAndProjectsToTheSamePixels) {
   }
 }
 
+TEST(OpenCvYaml, AStereoFileProjectsToTheSamePixelsInBothCameras) {
+  const dtr::testing::TemporaryFolder folder;
+  const std::string file = (folder / "rig.yml").string();
+  Pose second_from_first;
+  second_from_first.rotation = Eigen::AngleAxisd(0.1, Eigen::Vector3d(0.2, 1, -0.3).normalized());
+  second_from_first.translation = {-0.2, 0.01, 0.03};
+  for (const BoardModel model : kBoardModels) {
+    const LensCamera first = TypicalCamera(model);
+    LensCamera second = first;
+    second.params[0] *= 1.1;
+    WriteOpenCvStereoYaml(file, first, second, second_from_first);
+    cv::FileStorage storage(file, cv::FileStorage::READ);
+    cv::Mat k[2], d[2], r, t, turn;
+    storage["M1"] >> k[0];
+    storage["D1"] >> d[0];
+    storage["M2"] >> k[1];
+    storage["D2"] >> d[1];
+    storage["R"] >> r;
+    storage["T"] >> t;
+    ASSERT_EQ(static_cast<int>(storage["image_width"]), 640);
+    ASSERT_EQ(static_cast<int>(storage["image_height"]), 480);
+    const bool fisheye = model == BoardModel::kFisheye;
+    ASSERT_EQ(static_cast<int>(storage["fisheye_model"]), fisheye ? 1 : 0);
+    cv::Rodrigues(r, turn);
+    const auto points = Points();
+    for (int c = 0; c < 2; ++c) {
+      const cv::Mat none = cv::Mat::zeros(3, 1, CV_64F);
+      const cv::Mat &rotation = c == 0 ? none : turn, &shift = c == 0 ? none : t;
+      std::vector<cv::Point2d> pixels;
+      if (fisheye) {
+        cv::fisheye::projectPoints(points, pixels, rotation, shift, k[c], d[c]);
+      } else {
+        cv::projectPoints(points, rotation, shift, k[c], d[c], pixels);
+      }
+      for (size_t i = 0; i < points.size(); ++i) {
+        const Eigen::Vector3d p(points[i].x, points[i].y, points[i].z);
+        const auto ours =
+            c == 0 ? first.PixelFromCam(p) : second.PixelFromCam(second_from_first * p);
+        ASSERT_TRUE(ours);
+        EXPECT_NEAR(pixels[i].x + 0.5, ours->x(), kSamePixelPx) << NameOf(model) << c;
+        EXPECT_NEAR(pixels[i].y + 0.5, ours->y(), kSamePixelPx) << NameOf(model) << c;
+      }
+    }
+  }
+}
+
+TEST(OpenCvYaml, AStereoFileOfTwoSizesOrKindsIsRefused) {
+  const dtr::testing::TemporaryFolder folder;
+  const LensCamera pinhole = TypicalCamera(BoardModel::kBrown4);
+  LensCamera larger = pinhole;
+  larger.width_px = 1280;
+  const auto refused = [&](const LensCamera& second, const char* words) {
+    EXPECT_THAT([&] { WriteOpenCvStereoYaml(folder / "rig.yml", pinhole, second, {}); },
+                ::testing::ThrowsMessage<Error>(::testing::HasSubstr(words)));
+    EXPECT_FALSE(std::filesystem::exists(folder / "rig.yml"));
+  };
+  refused(larger,
+          "expected two cameras of one size, as OpenCV's stereo files have it, found "
+          "640x480 and 1280x480");
+  refused(TypicalCamera(BoardModel::kFisheye), "expected two fisheyes or none");
+}
+
 TEST(OpenCvYaml, WhatOpenCvWritesIsReadToTheSamePixels) {
   const dtr::testing::TemporaryFolder folder;
   const std::string file = (folder / "camera.yml").string();

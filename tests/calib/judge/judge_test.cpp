@@ -67,6 +67,42 @@ TEST(Judge, UnseenViewsTellOfAWrongLens) {
   EXPECT_THAT(TestOf(bad, "lens_difference_sigmas").reason, HasSubstr("f"));
 }
 
+// What is stored must be what the kept views say, whatever unseen ones allow.
+TEST(Judge, UnseenViewsDoNotExcuseWhatTheKeptOnesContradict) {
+  const Scene scene = OneCamera(24, 9);
+  const RigSolution solution = SolveScene(scene, kCornerNoisePx, 1);
+  const auto exact = ExactViews(scene.cameras[0].camera, 24, 77);
+  UnseenViews unseen;
+  for (const BoardView& view : Noisy(exact.views, kCornerNoisePx, 2)) {
+    unseen.views.push_back({0, unseen.frames++, view, {}});
+  }
+  JudgedCalibration calibration = CalibrationOf(solution);
+  // Two standard deviations: no more than two solves differ by.
+  const double sigma = std::sqrt(solution.covariance(0, 0));
+  calibration.cameras[0].camera.params[0] += 2 * sigma;
+  const JudgeReport report = Judge(calibration, unseen, {});
+  const Check& lens = TestOf(report, "lens_difference_sigmas");
+  EXPECT_FALSE(lens.passed) << lens.reason;
+  EXPECT_EQ(lens.limit, JudgeLimits{}.max_self_difference_sigmas);
+  EXPECT_THAT(lens.reason, HasSubstr("fresh solve"));
+}
+
+TEST(Judge, PixelsWithoutARayAreNotForgotten) {
+  RigSolution solution = SolveScene(OneCamera(24, 10), kCornerNoisePx, 1);
+  solution.rig.cameras[0].camera = CameraFrom(
+      BoardModel::kBrown4, 640, 480, std::vector<double>{530, 532, 322, 236, -0.5, 0, 0, 0});
+  solution.rig.cameras[0].model = BoardModel::kBrown4;
+  solution.layout = RigLayout(solution.rig.cameras, true);
+  const Eigen::MatrixXd nothing =
+      Eigen::MatrixXd::Zero(solution.layout.size(), solution.layout.size());
+  solution.rows = RowsOf(kBoard, solution.rig, solution.layout);
+  const ProjectionSensitivity sensitivity(solution);
+  const ImageMap map = UncertaintyMap(solution, sensitivity, nothing, 0, 2);
+  EXPECT_TRUE(std::isinf(map.Quantile(0.95)));
+  EXPECT_EQ(map.Largest(), 0);  // of what has a ray
+  EXPECT_EQ(map.Quantile(0.1), 0);
+}
+
 TEST(Judge, PredictedProjectionUncertaintyIsTheSpreadOfManySolves) {
   const Scene scene = OneCamera(12, 4);
   const RigSolution one = SolveScene(scene, kCornerNoisePx, 1);

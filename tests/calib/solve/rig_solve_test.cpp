@@ -73,6 +73,44 @@ TEST(RigSolve, BoardsCountedFromTheOtherEndAreFoundAndRepaired) {
   EXPECT_LT(Difference(right.layout, right.rig.cameras, repaired.rig.cameras).norm(), 1e-4);
 }
 
+TEST(RigSolve, FittedFramesAreCountedFromOneEndToo) {
+  const auto cameras = RowOfCameras(2, 0.1);
+  const Rig truth = ExactRig(cameras, 15, 3, false, 2);
+  auto views = NoisyViews(truth, kNoisePx, 5);
+  std::vector<std::string> expected;
+  for (RigView& view : views) {
+    if (view.camera == 1 && view.frame % 3 == 1) {
+      view.seen = TurnedByHalf(kBoard, view.seen);
+      expected.push_back(view.seen.name);
+    }
+  }
+  std::vector<LeftOut> left_out;
+  std::vector<std::string> flipped;
+  const Rig fitted = FitFrames(kBoard, cameras, views, 15, {}, left_out, &flipped);
+  EXPECT_THAT(flipped, ::testing::UnorderedElementsAreArray(expected));
+  double worst = 0;
+  for (const auto& lengths : ResidualLengths(kBoard, fitted)) {
+    for (const double length : lengths) worst = std::max(worst, length);
+  }
+  EXPECT_LT(worst, 6 * kNoisePx);  // of normal errors; a board from the other end misses by 100 px
+}
+
+TEST(RigSolve, ALensThatTurnsBackInsideTheImageIsRefusedByCamera) {
+  auto cameras = RowOfCameras(2, 0.1);
+  // Its image ends 288 px from the middle, where the corner is 400 px away.
+  cameras[1].camera = CameraFrom(BoardModel::kBrown4, 640, 480,
+                                 std::vector<double>{530, 532, 322, 236, -0.5, 0, 0, 0});
+  const Rig truth = ExactRig(cameras, 15, 3, false, 2);
+  auto inputs = InputsOf(cameras);
+  for (size_t c = 0; c < 2; ++c) inputs[c].given = cameras[c].camera;
+  RigOptions options;
+  EXPECT_THAT([&] { SolveRig(kBoard, inputs, NoisyViews(truth, kNoisePx, 5), 15, options); },
+              ::testing::ThrowsMessage<Error>(::testing::HasSubstr(
+                  "camera cam1: the distortion of the model brown4 turns back")));
+  options.solve.cover_image = false;
+  EXPECT_NO_THROW(SolveRig(kBoard, inputs, NoisyViews(truth, kNoisePx, 5), 15, options));
+}
+
 TEST(RigSolve, TwoCamerasInOnePointAreARig) {
   auto cameras = RowOfCameras(2, 0.0);
   cameras[1].cam_from_rig = {};
@@ -108,6 +146,29 @@ TEST(RigSolve, TheUnitOfTheBoardScalesTheRigAndNothingElse) {
     EXPECT_NEAR(other.rms_px, solution.rms_px, 1e-9);
     EXPECT_NEAR(other.rig.cameras[1].cam_from_rig.translation.x() / scale,
                 solution.rig.cameras[1].cam_from_rig.translation.x(), 1e-8);
+  }
+}
+
+// Of one camera and of two: whatever focal length a solve is told to begin with.
+TEST(RigSolve, AStartThirtyPercentOffEndsAtTheSameMinimum) {
+  for (const int count : {1, 2}) {
+    const auto cameras = RowOfCameras(count, 0.1);
+    const auto views = NoisyViews(ExactRig(cameras, 15, 3), kNoisePx, 8);
+    const auto best = SolveRig(kBoard, InputsOf(cameras), views, 15);
+    for (const double factor : {0.7, 1.3}) {
+      auto inputs = InputsOf(cameras);
+      for (size_t c = 0; c < inputs.size(); ++c) {
+        inputs[c].given = cameras[c].camera;
+        for (const size_t k : {0, 1}) inputs[c].given->params[k] *= factor;
+      }
+      const auto solution = SolveRig(kBoard, inputs, views, 15);
+      EXPECT_EQ(solution.outliers, best.outliers);
+      EXPECT_NEAR(solution.rms_px, best.rms_px, 1e-9);
+      // Far below what the noise leaves open: the same minimum. And that one is the truth's.
+      const auto moved = Difference(best.layout, best.rig.cameras, solution.rig.cameras);
+      EXPECT_LT(moved.dot(best.covariance.inverse() * moved), 1e-6);
+      EXPECT_LT(NormalisedError(solution, cameras), 2.5);
+    }
   }
 }
 

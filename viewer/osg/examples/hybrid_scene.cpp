@@ -1,9 +1,11 @@
 // A hybrid scene: the founding report's road, truck and boxes (its section 3.1.1, figures 14 to 19)
 // in a courtyard of depth images. `osgdtr_hybrid SET.dtr` opens a window; with a second argument it
-// writes one picture instead and ends. docs/OSG.md says how the set is made.
+// writes one picture instead and ends, or the models alone where that ends in .osgt: then
+// `osgviewer SET.dtr FILE.osgt` shows the same. docs/OSG.md says how the set is made.
 #include <osg/Geode>
 #include <osg/PositionAttitudeTransform>
 #include <osg/ShapeDrawable>
+#include <osgDB/FileNameUtils>
 #include <osgDB/WriteFile>
 #include <osgViewer/Viewer>
 
@@ -64,13 +66,12 @@ osg::ref_ptr<osg::Geode> Box() {
 }
 
 /// Figure 16: the truck under a translation with a box on it, the same box once more on the ground.
-osg::ref_ptr<osg::Group> HybridScene(osgDTR::DepthTR* courtyard) {
+osg::ref_ptr<osg::Group> Models() {
   const osg::ref_ptr<osg::Geode> truck = Truck(), box = Box();
   osg::ref_ptr<osg::Group> loaded_truck = new osg::Group;
   loaded_truck->addChild(truck);
   loaded_truck->addChild(Placed(box, {-0.45, 0, 0.44}, 0.2));
   osg::ref_ptr<osg::Group> scene = new osg::Group;
-  scene->addChild(courtyard);
   // Behind the fountain, which hides part of it; the box stands before the wall.
   scene->addChild(Placed(loaded_truck, {-0.4, 4.75, 0}, 0.15));
   scene->addChild(Placed(box, {1.5, 1.5, 0}, 0.6));
@@ -104,13 +105,22 @@ void WritePicture(osgViewer::Viewer& viewer, const std::string& file) {
 
 int main(int argc, char** argv) try {
   if (argc < 2 || argc > 3) {
-    std::fprintf(stderr, "usage: osgdtr_hybrid SET.dtr [PICTURE.jpg]\n");
+    std::fprintf(stderr, "usage: osgdtr_hybrid SET.dtr [PICTURE.jpg|MODELS.osgt]\n");
     return 2;
   }
   const osg::ref_ptr<osgDTR::DepthTR> courtyard = new osgDTR::DepthTR;
   courtyard->load(argv[1]);
   osgViewer::Viewer viewer;
-  viewer.setSceneData(HybridScene(courtyard.get()));
+  const osg::ref_ptr<osg::Group> models = Models();
+  if (argc == 3 && osgDB::getLowerCaseFileExtension(argv[2]) == "osgt") {
+    if (osgDB::writeNodeFile(*models, argv[2])) return 0;
+    throw std::runtime_error(std::string(argv[2]) +
+                             ": expected a file that can be written, found none");
+  }
+  const osg::ref_ptr<osg::Group> scene = new osg::Group;
+  scene->addChild(courtyard);
+  scene->addChild(models);
+  viewer.setSceneData(scene);
   viewer.getCamera()->setClearColor({0.55F, 0.68F, 0.82F, 1});
   // In the eye's coordinates: from the upper left, as the courtyard's sun.
   viewer.getLight()->setPosition({-0.4F, 0.6F, 0.7F, 0});

@@ -1,0 +1,15 @@
+// dtr/io/verdict.h -- what a set's verdict says, in a line.
+#pragma once
+#include <string>
+
+#include "dtr/types/dtr_set.h"
+
+namespace dtr::io {
+
+/// "passed", "not validated", or "FAILED: TEST, ...; dtr validate says more".
+std::string VerdictLine(const DtrSet& set);
+
+/// A line to be shown wherever a set whose calibration failed its tests is used; empty for others.
+std::string VerdictWarning(const DtrSet& set);
+
+}  // namespace dtr::io

@@ -1,0 +1,6 @@
+// Not a test: what one_entry_main_test runs.
+#include <gtest/gtest.h>
+
+TEST(Program, Passes) {}
+TEST(Program, Skips) { GTEST_SKIP() << "as told"; }
+TEST(Program, Fails) { FAIL() << "as told"; }
