@@ -124,9 +124,10 @@ UndistortedPhoto UndistortFullSize(const ImageRgb8& photo, const Mask& usable,
   return out;
 }
 
-void Shrink(UndistortedPhoto& photo, int width, int height) {
+void Shrink(UndistortedPhoto& photo, const PinholeCamera& camera) {
+  const int width = camera.width_px(), height = camera.height_px();
   photo.image = AreaAverage(photo.image, width, height);
-  photo.camera = photo.camera.Resized(width, height);
+  photo.camera = camera;
   if (photo.mask.empty()) return;
   photo.mask = ShrinkMask(photo.mask, width, height);
   for (int y = 0; y < height; ++y) {
@@ -167,9 +168,15 @@ UndistortedPhoto Undistort(const ImageRgb8& photo, const Mask& usable, const Len
   UndistortedPhoto out = lens.IsUndistorted() && onto == lens.Pinhole()
                              ? AsItIs(photo, usable, lens)
                              : UndistortFullSize(photo, usable, lens, onto, threads);
-  const auto [width, height] = TargetSize(photo.width(), photo.height(), max_size_px);
-  if (width != photo.width() || height != photo.height()) Shrink(out, width, height);
+  const PinholeCamera shrunk = ShrunkCamera(onto, max_size_px);
+  if (!(shrunk == onto)) Shrink(out, shrunk);
   return out;
+}
+
+PinholeCamera ShrunkCamera(const PinholeCamera& onto, int max_size_px) {
+  const auto [width, height] = TargetSize(onto.width_px(), onto.height_px(), max_size_px);
+  const bool same = width == onto.width_px() && height == onto.height_px();
+  return same ? onto : onto.Resized(width, height);
 }
 
 std::optional<Eigen::Vector2d> UndistortedPixel(const LensMap& lens,

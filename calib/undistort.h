@@ -40,6 +40,9 @@ UndistortedPhoto Undistort(const ImageRgb8& photo, const Mask& usable, const Len
 UndistortedPhoto Undistort(const ImageRgb8& photo, const Mask& usable, const LensCamera& lens,
                            const PinholeCamera& onto, int max_size_px, int threads);
 
+/// The camera that Undistort gives a photo drawn as `onto` would have taken it, without a photo.
+PinholeCamera ShrunkCamera(const PinholeCamera& onto, int max_size_px);
+
 /// Where a pixel of the photo lies on the undistorted (and possibly shrunk) grid; may be off the
 /// image. Empty where the lens has no ray or the ray does not point forward.
 std::optional<Eigen::Vector2d> UndistortedPixel(const LensMap& lens,

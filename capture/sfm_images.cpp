@@ -7,6 +7,7 @@
 #include <system_error>
 #include <utility>
 
+#include "dtr/base/durable.h"
 #include "dtr/base/error.h"
 #include "dtr/base/memory_budget.h"
 #include "dtr/base/parallel_for.h"
@@ -34,9 +35,7 @@ void LinkOrCopy(const fs::path& from, const fs::path& to) {
   std::error_code error;
   fs::create_hard_link(fs::canonical(from, error), to, error);
   if (!error) return;
-  error.clear();
-  fs::copy_file(from, to, error);  // another disk, or one without links
-  Require(error, to);
+  CopyFileAtomically(from, to);  // another disk, one without links, or a photo of somebody else
 }
 
 void Rewrite(const Photo& photo, const io::ImageHeader& header, std::pair<int, int> size,

@@ -1,11 +1,9 @@
 #include "cli/command.h"
 
-#include <fmt/format.h>
-
-#include <cstdio>
 #include <filesystem>
 
 #include "cli/output_file.h"
+#include "cli/standard_output.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 
@@ -14,8 +12,7 @@ namespace dtr::cli {
 void Context::EmitJson(const std::string& json_text) const {
   if (common.json_target.empty()) return;
   if (common.json_target == "-") {
-    fmt::print("{}\n", json_text);
-    std::fflush(stdout);
+    WriteOut(json_text + "\n");
   } else {
     WriteFileAtomically(common.json_target, json_text + "\n");
   }

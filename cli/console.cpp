@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "cli/standard_output.h"
 #include "dtr/base/machine.h"
 
 namespace dtr::cli {
@@ -81,8 +82,11 @@ void Console::Note(const std::string& line) {
 void Console::Say(const std::string& line) {
   const std::lock_guard lock(mutex_);
   ClearBar();
-  fmt::print(json_on_stdout_ ? stderr : stdout, "{}\n", line);
-  std::fflush(stdout);
+  if (json_on_stdout_) {
+    fmt::print(stderr, "{}\n", line);
+  } else {
+    WriteOut(line + "\n");
+  }
 }
 
 bool Console::StopRequested() const { return g_interrupted != 0; }

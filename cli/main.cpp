@@ -6,9 +6,13 @@
 
 #include <exception>
 #include <filesystem>
+#include <sstream>
+#include <string>
 
 #include "cli/command.h"
+#include "cli/standard_output.h"
 #include "dtr/base/error.h"
+#include "dtr/io/formats/utf8.h"
 
 namespace {
 
@@ -37,6 +41,15 @@ int Run(int argc, char** argv) {
   dtr::cli::AddDatasetCommand(app);
   dtr::cli::AddSelftestCommand(app);
   dtr::cli::AddManualCommands(app, DTR_VERSION);
+  // They come back in JSON and in the record of the run, which hold nothing else.
+  for (int i = 1; i < argc; ++i) {
+    if (dtr::io::IsUtf8(argv[i])) continue;
+    std::string shown = argv[i];
+    for (char& c : shown) c = c >= ' ' && c <= '~' ? c : '?';  // one line, for any terminal
+    fmt::print(stderr, "dtr: argument {}: expected UTF-8, found '{}'; rename the file or folder\n",
+               i, shown);
+    return dtr::cli::kWrongUsage;
+  }
   // CLI11 would say that a command is missing, not that this one does not exist.
   const auto is_called = [&](const CLI::App* command) { return command->get_name() == argv[1]; };
   if (argc > 1 && argv[1][0] != '-' && app.get_subcommands(is_called).empty()) {
@@ -49,7 +62,10 @@ int Run(int argc, char** argv) {
   } catch (const CLI::RuntimeError& ended) {
     return ended.get_exit_code();
   } catch (const CLI::Success& help_or_version) {
-    return app.exit(help_or_version);
+    std::ostringstream text;
+    const int code = app.exit(help_or_version, text, text);
+    dtr::cli::WriteOut(text.str());
+    return code;
   } catch (const CLI::ParseError& error) {
     fmt::print(stderr, "dtr: {}; see dtr --help\n", error.what());
     return dtr::cli::kWrongUsage;

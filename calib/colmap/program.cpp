@@ -45,15 +45,19 @@ class CauseFinder {
     const size_t first = line.find_first_not_of(" \t=-*");
     if (first == std::string::npos) return;
     last_ = line.substr(first, kLongestCause);
+    if (unwritten_.empty() && last_.starts_with("SQLite error")) unwritten_ = last_;
     if (error_.empty() && LooksLikeAnError(line)) error_ = last_;
   }
+  /// What the database did not take, or nothing. COLMAP 3.8 says so, goes on and ends with 0.
+  const std::string& Unwritten() const { return unwritten_; }
   std::string Cause() const {
+    if (!unwritten_.empty()) return unwritten_;
     if (!error_.empty()) return error_;
     return last_.empty() ? "it said nothing" : "last line: " + last_;
   }
 
  private:
-  std::string error_, last_;
+  std::string error_, last_, unwritten_;
 };
 
 std::string HowItEnded(const ProcessResult& result) {
@@ -144,10 +148,11 @@ void RunColmap(const std::vector<std::string>& argv, StepRecord& record,
   record.cpu_s = result.cpu_s;
   record.max_rss_kib = result.max_rss_kib;
   progress.ThrowIfInterrupted();
-  if (!result.Ok()) {
-    throw Error(fmt::format("colmap {} ({}): {}: {}; see {}", argv.at(1), record.name,
-                            HowItEnded(result), cause.Cause(), record.log_file.string()));
-  }
+  if (result.Ok() && cause.Unwritten().empty()) return;
+  const std::string ended =
+      result.Ok() ? "expected all of its results in its database" : HowItEnded(result);
+  throw Error(fmt::format("colmap {} ({}): {}: {}; see {}", argv.at(1), record.name, ended,
+                          cause.Cause(), record.log_file.string()));
 }
 
 }  // namespace dtr::colmap

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "calib/colmap/matching.h"
+#include "dtr/base/durable.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 
@@ -44,14 +45,9 @@ calib::LensModel LensModelOf(const SfmOptions& options) {
 
 void CopyDatabase(const fs::path& from, const fs::path& to) {
   RemoveDatabase(to);
-  std::error_code failure;
   for (const char* part : {"", "-wal"}) {
     if (*part != '\0' && !fs::exists(from.string() + part)) continue;
-    fs::copy_file(from.string() + part, to.string() + part, failure);
-    if (failure) {
-      throw Error(fmt::format("{}: cannot be copied to {}: {}", from.string() + part,
-                              to.string() + part, failure.message()));
-    }
+    CopyFileAtomically(from.string() + part, to.string() + part);
   }
 }
 

@@ -75,6 +75,19 @@ void Link(const fs::path& target, const fs::path& link) {
   }
 }
 
+// COLMAP writes on without a word when the disk is full: what is then missing or cut short looks
+// like another fault. Throws Error when there is no room for as much as a large photo's features.
+void ThrowFullDisk(const fs::path& folder, const std::string& consequence) {
+  constexpr std::uintmax_t kLeastBytes = std::uintmax_t{1} << 20;
+  std::error_code unknown;
+  const fs::space_info space = fs::space(folder, unknown);
+  const bool said = consequence.find("disk is full") != std::string::npos;
+  if (!said && (unknown || space.available >= kLeastBytes)) return;
+  throw Error(fmt::format(
+      "{}: No space left on device; make room, the same command continues; what came of it: {}",
+      folder.string(), consequence));
+}
+
 const char* NameOf(Matching matching) {
   switch (matching) {
     case Matching::kAuto:
@@ -184,7 +197,14 @@ void Workspace::Step(const std::string& name, const std::string& inputs,
   RemoveAll(stamp);
   step_ = name;
   const auto first = static_cast<std::ptrdiff_t>(records_.size());
-  body();
+  try {
+    body();
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const Error& error) {
+    ThrowFullDisk(folder_, error.what());
+    throw;
+  }
   SyncTree(folder_);  // the stamp vouches for what COLMAP wrote, which syncs nothing
   json runs = json::array();
   for (auto it = records_.begin() + first; it != records_.end(); ++it) runs.push_back(ToJson(*it));

@@ -29,7 +29,9 @@ int RunCalibratePhotos(const Options& options, const Context& context) {
     throw UsageError(fmt::format("{}: holds a model already; remove it or choose another folder",
                                  options.output.string()));
   }
-  const auto photos = capture::IngestPhotos(options.photos, {}, context.console);
+  const auto photos = capture::IngestPhotos(
+      options.photos, {.threads = context.common.threads, .memory_gb = options.memory_gb},
+      context.console);
   capture::RequireEnoughPhotos(photos, options.photos);
   pipeline::CalibrateOptions calibrate;
   calibrate.threads = context.common.threads;

@@ -1,15 +1,14 @@
-#include <fmt/format.h>
-
-#include "cli/command.h"
 #include "cli/manual.h"
+#include "cli/command.h"
+#include "cli/standard_output.h"
 
 namespace dtr::cli {
 
 void AddManualCommands(CLI::App& app, const std::string& version) {
   app.add_subcommand("manual", "Print the man page: dtr manual | man -l -")
-      ->callback([&app, version] { fmt::print("{}", ManualPage(app, version)); });
+      ->callback([&app, version] { WriteOut(ManualPage(app, version)); });
   app.add_subcommand("completion", "Print a completion script for bash: source <(dtr completion)")
-      ->callback([&app] { fmt::print("{}", BashCompletion(app)); });
+      ->callback([&app] { WriteOut(BashCompletion(app)); });
 }
 
 }  // namespace dtr::cli

@@ -3,15 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <map>
 #include <nlohmann/json.hpp>
-#include <set>
 
-#include "calib/lens_groups.h"
 #include "calib/sparse_from_sfm.h"
-#include "calib/undistort.h"
 #include "capture/ingest.h"
 #include "capture/store.h"
+#include "capture/video/frames.h"
 #include "cli/pipeline/calibrated_photos.h"
 #include "cli/pipeline/depth_engine.h"
 #include "cli/pipeline/depth_stage.h"
@@ -22,8 +19,10 @@
 #include "cli/pipeline/input_hash.h"
 #include "cli/pipeline/run_log.h"
 #include "cli/pipeline/set_page.h"
+#include "cli/pipeline/undistort_photos.h"
 #include "cli/pipeline/validate_set.h"
 #include "dtr/base/error.h"
+#include "dtr/base/hash.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/eval/json.h"
 #include "dtr/io/set_io.h"
@@ -74,6 +73,34 @@ Json PhotosJson(const capture::Capture& capture, const std::vector<bool>& with_h
   return photos;
 }
 
+// What a capture holds now, as its list only tells what its photos were made of.
+Json StoredHashes(const capture::Capture& capture) {
+  Json hashes = Json::array();
+  for (const capture::Photo& photo : capture.photos) {
+    hashes.push_back(Sha256OfFile(photo.file));
+    if (!photo.mask_file.empty()) hashes.push_back(Sha256OfFile(photo.mask_file));
+  }
+  return hashes;
+}
+
+// The sizes that photos for SfM have, or frames of the videos will.
+std::vector<std::pair<int, int>> SizesOf(const BuildOptions& options,
+                                         const capture::Capture& photos,
+                                         const std::vector<bool>& held_out) {
+  std::vector<std::pair<int, int>> sizes;
+  for (const std::filesystem::path& file : capture::VideosOf(options.photos)) {
+    capture::VideoReader video(file);
+    if (!video.Next()) continue;
+    const ImageRgb8 picture = video.Picture();
+    sizes.emplace_back(picture.width(), picture.height());
+  }
+  for (size_t i = 0; i < photos.photos.size(); ++i) {
+    if (options.holdout_strict && held_out[i]) continue;
+    sizes.emplace_back(photos.photos[i].width_px, photos.photos[i].height_px);
+  }
+  return sizes;
+}
+
 // What a video is known by before its frames are chosen: equal values give the same frames.
 Json VideoJson(const BuildOptions& options) {
   return {{"sha256", InputHash(options.photos)},
@@ -90,91 +117,15 @@ capture::Capture FramesOf(const BuildOptions& options, const std::filesystem::pa
   if (!std::filesystem::exists(kept / capture::kCaptureFile)) {
     capture::VideoOptions video = options.video;
     video.threads = options.threads;
+    video.memory_gb = options.depth.memory_gb.value_or(kDefaultMemoryGb);
     const capture::Capture frames = Ingest(
         options.photos, video, [&] { return fresh; }, progress);
-    capture::WriteCapture(frames, kept, {.replace = false, .threads = options.threads}, progress);
+    capture::WriteCapture(
+        frames, kept, {.replace = false, .threads = options.threads, .memory_gb = video.memory_gb},
+        progress);
     std::filesystem::remove_all(fresh);
   }
   return capture::ReadCapture(kept);
-}
-
-// Lenses that a stabiliser moved, with the mean principal point of the photos to render from: those
-// that are held out move nothing.
-std::vector<calib::LensCamera> StabilisedLenses(const capture::Capture& capture,
-                                                const std::vector<bool>& held_out,
-                                                const calib::SfmModel& model) {
-  std::set<std::string> sources;
-  for (size_t i = 0; i < capture.photos.size(); ++i) {
-    if (!held_out[i]) sources.insert(capture.photos[i].name);
-  }
-  std::map<std::uint32_t, calib::LensCamera> used;
-  for (const calib::SfmImage& image : model.images) {
-    if (sources.contains(image.name)) {
-      used.emplace(image.camera_id, model.cameras.at(image.camera_id));
-    }
-  }
-  std::vector<calib::LensCamera> lenses;
-  for (const calib::LensGroup& group : calib::LensGroups(used)) {
-    if (group.cameras.size() > 1) lenses.push_back(group.lens);
-  }
-  return lenses;
-}
-
-// The pinhole camera that photos of a camera are drawn on. Those of one stabilised lens share one,
-// as they are resampled anyway; without distortion pixels stay as they are.
-PinholeCamera CameraToDrawOn(const calib::LensCamera& camera,
-                             const std::vector<calib::LensCamera>& stabilised) {
-  const auto lens = std::find_if(stabilised.begin(), stabilised.end(), [&](const auto& other) {
-    return calib::SameButForPrincipalPoint(other, camera);
-  });
-  return lens == stabilised.end() || camera.IsUndistorted() ? camera.Pinhole() : lens->Pinhole();
-}
-
-// Views of the registered photos, in the photos' order; their pixels, on the set's grid, are
-// written one by one.
-std::vector<View> UndistortPhotos(const capture::Capture& capture,
-                                  const CalibratedPhotos& calibrated,
-                                  const std::vector<bool>& held_out, int max_size_px, int threads,
-                                  io::SetWriter& writer, Progress& progress) {
-  std::map<std::string, const calib::SfmImage*> registered;
-  for (const auto& image : calibrated.model.images) registered[image.name] = &image;
-  const bool undistorted =
-      std::all_of(calibrated.model.cameras.begin(), calibrated.model.cameras.end(),
-                  [](const auto& camera) { return camera.second.IsUndistorted(); });
-  if (undistorted) progress.Note("undistortion left out: no camera has distortion");
-  const auto stabilised = StabilisedLenses(capture, held_out, calibrated.model);
-  progress.Stage(undistorted ? "reading photos" : "undistorting",
-                 static_cast<int>(registered.size()));
-
-  std::vector<View> views;
-  for (size_t i = 0; i < capture.photos.size(); ++i) {
-    const capture::Photo& photo = capture.photos[i];
-    const auto found = registered.find(photo.name);
-    if (found == registered.end()) continue;
-    progress.ThrowIfInterrupted();
-    const calib::LensCamera& lens = calibrated.model.cameras.at(found->second->camera_id);
-    if (lens.width_px != photo.width_px || lens.height_px != photo.height_px) {
-      throw Error(
-          fmt::format("{}: the camera's image is {}x{}, the photo is {}x{}; give cameras for "
-                      "these photos",
-                      photo.name, lens.width_px, lens.height_px, photo.width_px, photo.height_px));
-    }
-    calib::UndistortedPhoto flat =
-        calib::Undistort(capture::ReadPhoto(photo), capture::ReadPhotoMask(photo), lens,
-                         CameraToDrawOn(lens, stabilised), max_size_px, threads);
-    View view;
-    view.id = photo.id;
-    view.name = photo.name;
-    view.role = held_out[i] ? ViewRole::kHeldOut : ViewRole::kSource;
-    view.camera = flat.camera;
-    view.cam_from_world = found->second->cam_from_world;
-    view.image = std::move(flat.image);
-    view.mask = std::move(flat.mask);
-    StoreImage(view, calibrated.unit, writer);
-    views.push_back(std::move(view));
-    progress.Update(static_cast<int>(views.size()));
-  }
-  return views;
 }
 
 SparseScene SparseOf(const CalibratedPhotos& calibrated, const std::vector<View>& views) {
@@ -259,9 +210,11 @@ Json ProvenanceJson(const BuildOptions& options, const Json& option_values, cons
 
 // The reprojection tests of every calibrated photo, held-out ones included.
 calib::ValidationReport Validate(const std::filesystem::path& folder, DtrSet& set,
-                                 const SparseScene& sparse, BuildReport& report, int threads,
-                                 Progress& progress) {
-  calib::ValidationReport validation = ValidateSet(folder, set, sparse, {}, threads);
+                                 const SparseScene& sparse, double memory_gb, BuildReport& report,
+                                 int threads, Progress& progress) {
+  SetLimits limits;
+  limits.memory_gb = std::min(limits.memory_gb, memory_gb);
+  calib::ValidationReport validation = ValidateSet(folder, set, sparse, limits, threads);
   report.validated = true;
   report.validation_passed = validation.passed();
   set.verdict_json = eval::VerdictJson(validation.tests);
@@ -269,6 +222,14 @@ calib::ValidationReport Validate(const std::filesystem::path& folder, DtrSet& se
     progress.Note(io::VerdictWarning(set));
   }
   return validation;
+}
+
+Json ScreeningJson(const BuildReport& report) {
+  Json json = Json::array();
+  for (const auto& [name, remarks] : report.screening) {
+    json.push_back({{"name", name}, {"remarks", remarks}});
+  }
+  return json;
 }
 
 Json ReportJson(const BuildReport& report, const RunLog& log, const std::filesystem::path& output) {
@@ -286,6 +247,7 @@ Json ReportJson(const BuildReport& report, const RunLog& log, const std::filesys
   for (const auto& [name, reason] : report.skipped) {
     json["skipped"].push_back({{"name", name}, {"reason", reason}});
   }
+  json["screening"] = ScreeningJson(report);
   json["validation_passed"] = report.validated ? Json(report.validation_passed) : Json(nullptr);
   json["stages"] = Json::array();
   for (const io::RunStage& stage : log.stages()) {
@@ -294,6 +256,16 @@ Json ReportJson(const BuildReport& report, const RunLog& log, const std::filesys
   }
   json["peak_memory_mib"] = static_cast<double>(PeakMemoryKib()) / 1024;
   return json;
+}
+
+// One line about what screening found, if it found anything.
+void SayRemarks(const BuildReport& report, size_t photos, Progress& progress) {
+  if (report.screening.empty()) return;
+  const auto& [name, remarks] = report.screening.front();
+  progress.Note(
+      fmt::format("screening: {} of {} photos have a remark and are kept, first {}: {}; "
+                  "dtr capture --drop leaves such photos out",
+                  report.screening.size(), photos, name, remarks.front()));
 }
 
 }  // namespace
@@ -306,6 +278,7 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
   RequireOptions(options);
   std::optional<SetRig> rig;
   if (!options.rig.empty()) rig = ReadSetRig(options.rig);
+  const double memory_gb = options.depth.memory_gb.value_or(kDefaultMemoryGb);
   BuildReport report;
   RunLog log;
 
@@ -322,7 +295,8 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
     TellPhotosTheirLens(*rig, photos);
   };
   if (!from_video) {
-    photos = capture::IngestPhotos(options.photos, {.threads = options.threads}, progress);
+    photos = capture::IngestPhotos(options.photos,
+                                   {.threads = options.threads, .memory_gb = memory_gb}, progress);
     look();
   }
   Json fingerprint = {
@@ -334,6 +308,14 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
       {"poses_sha256", InputHash(options.poses)},
       {"workspace_sha256", InputHash(options.depth.workspace)}};
   if (rig) fingerprint["rig_sha256"] = InputHash(options.rig);
+  if (std::filesystem::exists(options.photos / capture::kCaptureFile)) {
+    fingerprint["stored_sha256"] = StoredHashes(photos);
+  }
+  if (!std::filesystem::is_directory(options.poses)) {
+    // COLMAP looks for features, of a size that is the one thing --memory decides of the result.
+    const auto sizes = SizesOf(options, photos, held_out);
+    if (!sizes.empty()) fingerprint["feature_image_size_px"] = FeatureImageSizePx(sizes, memory_gb);
+  }
   io::SetWriter writer(options.output, fingerprint.dump(), options.force);
   if (!options.force_stage.empty()) ForgetStage(writer.folder(), options.force_stage);
   if (from_video) {
@@ -342,6 +324,11 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
   }
   for (const auto& skipped : photos.skipped)
     report.skipped.emplace_back(skipped.name, skipped.reason);
+  for (const capture::Photo& photo : photos.photos) {
+    if (!photo.screening || photo.screening->remarks.empty()) continue;
+    report.screening.emplace_back(photo.name, photo.screening->remarks);
+  }
+  SayRemarks(report, photos.photos.size(), progress);
   std::vector<bool> is_source = held_out;
   is_source.flip();
 
@@ -353,7 +340,7 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
                        options.holdout_strict,
                        options.threads,
                        options.seed,
-                       options.depth.memory_gb.value_or(kDefaultMemoryGb),
+                       memory_gb,
                        options.refine,
                        {},
                        rig},
@@ -373,8 +360,8 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
   set.frames.resize(1);
   std::vector<View>& views = set.frames.front().views;
   RequireTwoSources(photos, held_out, calibrated);
-  views =
-      UndistortPhotos(photos, calibrated, held_out, max_size_px, options.threads, writer, progress);
+  views = UndistortPhotos(photos, calibrated, held_out, {max_size_px, options.threads}, writer,
+                          progress);
   const SparseScene sparse = SparseOf(calibrated, views);
 
   log.Begin("depth");
@@ -384,20 +371,22 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
   log.Begin("finishing");
   FinishScene(set, SourcePoints(sparse, views), writer, options.threads);
   if (options.depth.depth_error_px) {
-    RecodeDepth(set, *options.depth.depth_error_px, writer, options.threads);
+    RecodeDepth(set, *options.depth.depth_error_px, writer, options.threads, memory_gb);
   }
   WriteMeshes(set, writer, options.threads);
   set.provenance_json = ProvenanceJson(options, OptionsJson(options, spent, max_size_px),
                                        PhotosJson(photos, is_source), calibrated, report)
                             .dump();
   const calib::ValidationReport validation =
-      Validate(writer.folder(), set, sparse, report, options.threads, progress);
+      Validate(writer.folder(), set, sparse, memory_gb, report, options.threads, progress);
   writer.WriteSparse(set, sparse);
   WriteSetPage(writer, set,
                {options.output.stem().string(), options.depth.engine, validation.tests,
                 report.skipped, report.not_registered.size(), options.threads});
   log.End();
-  io::WriteRunRecord(writer.folder(), log.Record(ResolveThreads(options.threads)));
+  io::RunRecord record = log.Record(ResolveThreads(options.threads));
+  record.extra_json = Json{{"screening", ScreeningJson(report)}}.dump();
+  io::WriteRunRecord(writer.folder(), record);
   writer.Finish(set);
   report.set = std::move(set);
   report.json = ReportJson(report, log, options.output).dump(1);

@@ -36,6 +36,8 @@ struct BuildReport {
   std::vector<std::string> not_registered;                   ///< photos that found no camera
   std::vector<std::string> held_out_not_registered;          ///< of them, those that were held out
   std::vector<std::pair<std::string, std::string>> skipped;  ///< file, reason
+  /// Photos that screening has something to say about, with what it is; they are used all the same.
+  std::vector<std::pair<std::string, std::vector<std::string>>> screening;
   bool validated = false, validation_passed = false;
   std::string json;  ///< for --json
 };

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "calib/bundle/refine.h"
+#include "calib/colmap/features.h"
 #include "calib/colmap/program.h"
 #include "calib/colmap/sfm.h"
 #include "capture/sfm_images.h"
@@ -66,7 +67,8 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
   const capture::Capture photos = Subset(capture, in_sfm);
   const std::vector<colmap::SfmImageInput> inputs = SfmInputs(photos, workspace / "photos");
   const colmap::SfmOptions sfm_options = SfmOptionsFor(options);
-  capture::PrepareSfmImages(photos, workspace / "photos", 0, options.threads);
+  capture::PrepareSfmImages(photos, workspace / "photos", 0, options.threads, options.memory_gb,
+                            progress);
   colmap::SfmResult sfm =
       colmap::RunSfm(workspace / "photos", inputs, workspace / "sfm", sfm_options, progress);
 
@@ -107,6 +109,15 @@ colmap::SfmOptions SfmOptionsFor(const CalibrateOptions& options) {
   sfm.seed = options.seed;
   sfm.memory_gb = options.memory_gb;
   return sfm;
+}
+
+int FeatureImageSizePx(const std::vector<std::pair<int, int>>& sizes_px, double memory_gb) {
+  std::vector<colmap::SfmImageInput> images;
+  for (const auto& [width_px, height_px] : sizes_px) {
+    images.push_back({"", width_px, height_px, {}, "", {}});
+  }
+  return colmap::PlanExtraction(images, 1, memory_gb, colmap::SfmOptions().max_image_size_px)
+      .max_image_size_px;
 }
 
 void RequireCalibration(const fs::path& poses) {

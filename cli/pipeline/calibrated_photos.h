@@ -43,6 +43,11 @@ struct CalibratedPhotos {
 /// ways run COLMAP.)
 void RequireCalibration(const std::filesystem::path& poses);
 
+/// The long side to which SfM shrinks photos of these sizes (width and height, px), so that looking
+/// for features in them fits into `memory_gb`: it decides the result, so it belongs to the inputs
+/// of a run that may go on later. Throws UsageError where no size fits.
+int FeatureImageSizePx(const std::vector<std::pair<int, int>>& sizes_px, double memory_gb);
+
 /// Calibrates the photos. `workspace` keeps checkpoints: the same input and options continue there,
 /// and a finished calibration is read back instead of computed again.
 CalibratedPhotos CalibratePhotos(const capture::Capture& capture, const CalibrateOptions& options,

@@ -5,12 +5,16 @@
 #include <cmath>
 #include <functional>
 #include <optional>
+#include <span>
+#include <string>
+#include <vector>
 
 #include "cli/pipeline/depth_engine.h"
 #include "cli/pipeline/plane_files.h"
 #include "cli/pipeline/time_budget.h"
 #include "dtr/base/durable.h"
 #include "dtr/base/error.h"
+#include "dtr/base/hash.h"
 #include "dtr/io/depth_io.h"
 #include "stereo/depth_maps.h"
 #include "stereo/normals.h"
@@ -87,6 +91,30 @@ stereo::StereoPixels ReadPixels(const std::filesystem::path& folder, View view, 
   load.threads = threads;
   io::LoadPixels(folder, view, load);
   return {std::move(view.image), std::move(view.mask)};
+}
+
+// Of all that planes are computed from beside the settings, which the set's fingerprint holds. A
+// calibration may come out otherwise when it has to be done again (COLMAP was updated, a checkpoint
+// damaged): planes of the old one would fit in size and be wrong.
+std::string HashOf(std::span<const stereo::StereoView> views, const SparseScene& scene) {
+  std::vector<double> values;
+  for (const stereo::StereoView& view : views) {
+    const PinholeCamera& camera = view.camera;
+    const Eigen::Vector4d turn = view.cam_from_world.rotation.coeffs();
+    const Eigen::Vector3d shift = view.cam_from_world.translation;
+    values.insert(values.end(),
+                  {static_cast<double>(camera.width_px()), static_cast<double>(camera.height_px()),
+                   camera.fx_px(), camera.fy_px(), camera.cx_px(), camera.cy_px()});
+    values.insert(values.end(), turn.data(), turn.data() + turn.size());
+    values.insert(values.end(), shift.data(), shift.data() + shift.size());
+  }
+  for (const SparsePoint& point : scene.points) {
+    values.insert(values.end(), point.p_in_world.data(), point.p_in_world.data() + 3);
+  }
+  for (const SparseObservation& seen : scene.observations) {
+    values.insert(values.end(), {static_cast<double>(seen.view), static_cast<double>(seen.point)});
+  }
+  return Sha256(std::as_bytes(std::span(values)));
 }
 
 // Normals beside the checkpoints of this very run until all are there: what lies in the user's
@@ -182,7 +210,7 @@ stereo::Effort DepthStage(DtrSet& set, const SparseScene& sparse, const DepthCho
   depth_options.neighbours.count = engine->Neighbours();
   // The other half holds photos, and maps that wait for their neighbours to be done.
   depth_options.engine.memory_gb = choice.memory_gb.value_or(kDefaultMemoryGb) / 2;
-  PlaneFiles planes(writer.work_folder() / "planes");
+  PlaneFiles planes(writer.work_folder() / "planes", HashOf(sources.stereo, scene));
   EstimateFiles estimates(writer.work_folder() / "estimates");
   const NormalFiles normals(writer.work_folder(), options.normals);
   depth_options.planes = &planes;

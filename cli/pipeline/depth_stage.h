@@ -14,8 +14,8 @@ namespace dtr::pipeline {
 struct DepthStageOptions {
   int threads = 0;
   std::uint64_t seed = 0;
-  /// Where normals of the source views go, named as the depth maps,
-  /// .exr, as stereo::NormalsOf gives them; empty: nowhere.
+  /// Where normals of the source views go, named as the depth maps, .exr, as stereo::NormalsOf
+  /// gives them; empty: nowhere.
   std::filesystem::path normals = {};
 };
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "dtr/base/error.h"
+#include "dtr/base/memory_budget.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/io/depth_io.h"
 #include "dtr/render/adaptive_mesh.h"
@@ -42,11 +43,14 @@ void FinishScene(DtrSet& set, std::span<const SparsePoint> points, const io::Set
                  has_depth || points.empty() ? samples.Extent() : SceneExtentFromPoints(points));
 }
 
-void RecodeDepth(DtrSet& set, double error_px, io::SetWriter& writer, int threads) {
+void RecodeDepth(DtrSet& set, double error_px, io::SetWriter& writer, int threads,
+                 double memory_gb) {
+  MemoryBudget memory(memory_gb);
   std::vector<View>& views = set.frames.front().views;
   ParallelFor(0, static_cast<int>(views.size()), threads, [&](int i) {
     View& view = views[static_cast<size_t>(i)];
     if (!HasDepth(view)) return;
+    const auto share = memory.TakeForPhoto(view.camera.width_px(), view.camera.height_px());
     View loaded = Loaded(view, writer, false, 1);
     if (!io::TrySetDepthError(loaded, error_px * ThresholdsOf(loaded, {}).pixel)) {
       throw Error(fmt::format(

@@ -15,8 +15,10 @@ void FinishScene(DtrSet& set, std::span<const SparsePoint> points, const io::Set
 
 /// Stores the depth of every source view anew as zstd-inverse, with 1/z off by at most `error_px`
 /// pixels of disparity from what the stereo engine gave. After FinishScene: pixels of disparity
-/// need the baselines. Throws Error where 16 bits cannot keep the bound.
-void RecodeDepth(DtrSet& set, double error_px, io::SetWriter& writer, int threads);
+/// need the baselines. Maps in memory at a time take at most `memory_gb` (1e9 bytes). Throws Error
+/// where 16 bits cannot keep the bound.
+void RecodeDepth(DtrSet& set, double error_px, io::SetWriter& writer, int threads,
+                 double memory_gb);
 
 /// How much of the source views has a depth.
 struct DepthCount {

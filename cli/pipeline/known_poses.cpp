@@ -111,7 +111,8 @@ CalibratedPhotos FromCameraList(const capture::Capture& capture, const Calibrate
   RequireSharedNames(sources.size(), options.poses,
                      list.cameras.empty() ? "" : list.cameras.front().name, capture);
 
-  capture::PrepareSfmImages(source_photos, workspace / "photos", 0, options.threads);
+  capture::PrepareSfmImages(source_photos, workspace / "photos", 0, options.threads,
+                            options.memory_gb, progress);
   CalibratedPhotos calibrated;
   calibrated.engine = options.poses.filename().string();
   calibrated.unit = list.unit;
@@ -132,7 +133,8 @@ void RegisterHeldOutPhotos(const capture::Capture& held_out,
                            const fs::path& workspace, const colmap::SfmOptions& options,
                            calib::SfmModel& model, Progress& progress) {
   if (held_out.photos.empty()) return;
-  capture::PrepareSfmImages(held_out, workspace / "photos", 0, options.threads);
+  capture::PrepareSfmImages(held_out, workspace / "photos", 0, options.threads, options.memory_gb,
+                            progress);
   const colmap::HeldOutResult placed = colmap::RegisterHeldOut(
       workspace / "photos", SfmInputs(held_out, workspace / "photos"), model, sources,
       workspace / "sfm", workspace / "held_out", options, progress);

@@ -6,6 +6,7 @@
 
 #include "cli/pipeline/grid_files.h"
 #include "dtr/base/error.h"
+#include "dtr/base/files.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -31,9 +32,24 @@ void Remove(const fs::path& file) {
   if (error) throw Error(file.string() + ": cannot be removed: " + error.message());
 }
 
+// False too for a file that was damaged: that costs time, never the job.
+bool Reads(const fs::path& file, const std::string& text) {
+  try {
+    return ReadFile(file, text.size()) == text;
+  } catch (const Error&) {
+    return false;
+  }
+}
+
 }  // namespace
 
-PlaneFiles::PlaneFiles(const fs::path& folder) : folder_(folder) { MakeFolder(folder); }
+PlaneFiles::PlaneFiles(const fs::path& folder, const std::string& made_from) : folder_(folder) {
+  const fs::path origin = folder / "made_from";
+  if (Exists(origin) && Reads(origin, made_from)) return;
+  Remove(folder);
+  MakeFolder(folder);
+  WriteFileAtomically(origin, made_from);
+}
 
 fs::path PlaneFiles::File(int round, int view) const {
   return folder_ / fmt::format("round{}_view{}.planes", round, view);

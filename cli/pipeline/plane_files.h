@@ -1,6 +1,7 @@
 // cli/pipeline/plane_files.h -- what a run keeps between its steps, as files.
 #pragma once
 #include <filesystem>
+#include <string>
 
 #include "stereo/plane_map.h"
 #include "stereo/view_paging.h"
@@ -13,8 +14,9 @@ namespace dtr::pipeline {
 /// a file not removed.
 class PlaneFiles final : public stereo::PlaneMapStore {
  public:
-  /// Creates the folder.
-  explicit PlaneFiles(const std::filesystem::path& folder);
+  /// Creates the folder. `made_from`: one line that says what the planes are computed from; planes
+  /// of anything else are removed.
+  PlaneFiles(const std::filesystem::path& folder, const std::string& made_from);
   bool Has(int round, int view) const override;
   std::shared_ptr<const stereo::PlaneMap> Load(int round, int view) override;
   void Save(int round, int view, stereo::PlaneMap&& map) override;

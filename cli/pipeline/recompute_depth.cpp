@@ -1,5 +1,6 @@
 #include "cli/pipeline/recompute_depth.h"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "cli/pipeline/depth_engine.h"
@@ -99,7 +100,8 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& progre
   }
   FinishScene(set, {}, writer, options.threads);
   if (options.depth.depth_error_px) {
-    RecodeDepth(set, *options.depth.depth_error_px, writer, options.threads);
+    RecodeDepth(set, *options.depth.depth_error_px, writer, options.threads,
+                options.depth.memory_gb.value_or(kDefaultMemoryGb));
   }
   const DepthCount count = WriteMeshes(set, writer, options.threads);
   writer.WriteSparse(set, sparse);
@@ -117,7 +119,9 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& progre
   set.provenance_json = provenance.dump();
   report.depth_maps = count.maps;
   report.depth_completeness = count.Completeness();
-  const auto validation = ValidateSet(writer.folder(), set, sparse, {}, options.threads);
+  SetLimits limits;
+  limits.memory_gb = std::min(limits.memory_gb, options.depth.memory_gb.value_or(kDefaultMemoryGb));
+  const auto validation = ValidateSet(writer.folder(), set, sparse, limits, options.threads);
   set.verdict_json = eval::VerdictJson(validation.tests);  // other depth, other verdict
   WriteSetPage(writer, set,
                {report.written.stem().string(),

@@ -30,7 +30,7 @@ Cameras CamerasOf(const DtrSet& set) {
 }
 
 // Appends what depth says, where two views or more have any.
-void AddCrossDepth(const std::filesystem::path& folder, const DtrSet& set, double max_cross_px,
+void AddCrossDepth(const std::filesystem::path& folder, const DtrSet& set, const SetLimits& limits,
                    int threads, calib::ValidationReport& report) {
   std::vector<const View*> with_depth;
   for (const View& view : set.frames.front().views) {
@@ -38,8 +38,9 @@ void AddCrossDepth(const std::filesystem::path& folder, const DtrSet& set, doubl
   }
   if (with_depth.size() < 2) return;
   eval::CrossDepthOptions options;
-  options.max_cross_px = max_cross_px;
-  options.max_view_cross_px = 2 * max_cross_px;
+  options.max_cross_px = limits.max_cross_px;
+  options.max_view_cross_px = 2 * limits.max_cross_px;
+  options.memory_bytes = static_cast<size_t>(limits.memory_gb * 1e9);
   options.scene_center = set.scene_center;
   options.threads = threads;
   const auto cross = eval::CrossDepth(with_depth, options, [&](const View& view) {
@@ -68,7 +69,7 @@ calib::ValidationReport ValidateSet(const std::filesystem::path& folder, const D
                                     const SparseScene& sparse, const SetLimits& limits,
                                     int threads) {
   calib::ValidationReport report = ReprojectionOfSet(set, sparse, limits.reprojection, threads);
-  AddCrossDepth(folder, set, limits.max_cross_px, threads, report);
+  AddCrossDepth(folder, set, limits, threads, report);
   const Cameras of = CamerasOf(set);
   const calib::Judgement judgement =
       calib::Judge(calib::BundleOf(of.cameras, of.poses, of.names, sparse), limits.judge, threads);

@@ -21,12 +21,14 @@ struct SetLimits {
   /// Depth of one view through its neighbours and back, median of all pixels (eval/cross_depth.h).
   /// The worst view may have twice as much: fewer pixels, seen from farther aside.
   double max_cross_px = 1;
+  double memory_gb = 1;  ///< 1e9 bytes: of depth maps held for that at a time
 };
 
 /// The same, and then the set is judged by a fresh bundle adjustment (calib/bundle/judge.h), whose
 /// tests and figures join the report: some seconds. A set that was built with a rig must still
 /// stand as that does (RigPlaces, set_rig.h). Where views have depth, it is carried into the
-/// neighbours and back; their maps are read from `folder`, at most 1 GiB of them at a time.
+/// neighbours and back; their maps are read from `folder`, as many at a time as memory_gb holds
+/// (one with its neighbours where it holds less).
 calib::ValidationReport ValidateSet(const std::filesystem::path& folder, const DtrSet& set,
                                     const SparseScene& sparse, const SetLimits& limits,
                                     int threads);

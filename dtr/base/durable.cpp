@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -26,6 +27,45 @@ int Sync(const fs::path& path, int flags) {
 
 [[noreturn]] void Fail(const fs::path& file, const std::string& what, const std::string& why) {
   throw Error(file.string() + ": " + what + ": " + why);
+}
+
+class OpenFile {
+ public:
+  OpenFile(const fs::path& file, int flags, mode_t mode = 0)
+      : fd_(open(file.c_str(), flags | O_CLOEXEC, mode)) {
+    if (fd_ < 0) throw std::system_error(errno, std::generic_category());
+  }
+  ~OpenFile() { close(fd_); }
+  OpenFile(const OpenFile&) = delete;
+  OpenFile& operator=(const OpenFile&) = delete;
+  int fd() const { return fd_; }
+
+ private:
+  int fd_;
+};
+
+// What a system call returned, unless that was a failure.
+ssize_t Done(ssize_t result) {
+  if (result < 0) throw std::system_error(errno, std::generic_category());
+  return result;
+}
+
+// std::filesystem::copy_file calls a full disk an input/output error.
+void CopyContent(const fs::path& from, const fs::path& to) {
+  const OpenFile in(from, O_RDONLY);
+  struct stat about;
+  Done(fstat(in.fd(), &about));
+  const OpenFile out(to, O_WRONLY | O_CREAT | O_EXCL, S_IRUSR | S_IWUSR);
+  std::vector<char> buffer(size_t{1} << 18);
+  while (const auto size = static_cast<size_t>(Done(read(in.fd(), buffer.data(), buffer.size())))) {
+    for (size_t written = 0; written < size;) {
+      written +=
+          static_cast<size_t>(Done(write(out.fd(), buffer.data() + written, size - written)));
+    }
+  }
+  constexpr mode_t kPermissions = 0777;
+  Done(fchmod(out.fd(), (about.st_mode & kPermissions) | S_IWUSR));
+  Done(fsync(out.fd()));
 }
 
 }  // namespace
@@ -64,10 +104,11 @@ void CopyFileAtomically(const fs::path& from, const fs::path& to) {
   try {
     std::error_code error;
     fs::remove(temporary, error);  // of an earlier process of our number, perhaps to be read only
-    fs::copy_file(from, temporary, error);
-    if (!error) fs::permissions(temporary, fs::perms::owner_write, fs::perm_options::add, error);
-    if (error) Fail(to, "cannot be copied from " + from.string(), error.message());
-    SyncFile(temporary);
+    try {
+      CopyContent(from, temporary);
+    } catch (const std::system_error& failure) {
+      Fail(to, "cannot be copied from " + from.string(), failure.code().message());
+    }
     Rename(temporary, to);
   } catch (...) {
     std::error_code ignored;

@@ -14,6 +14,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr char kMadeFrom[] = "cameras";
+
 stereo::PlaneMap Planes() {
   stereo::PlaneMap map{Grid<float>(3, 2, 1, 0.5f), Grid<float>(3, 2, 1, -1e-3f), Grid<float>(3, 2),
                        2.5};
@@ -30,9 +32,9 @@ class PlaneFilesTest : public ::testing::Test {
 };
 
 TEST_F(PlaneFilesTest, GivesBackWhatWasSavedAlsoToALaterRun) {
-  PlaneFiles(folder_).Save(1, 4, Planes());
-  PlaneFiles(folder_).Save(1, 5, {});
-  PlaneFiles later(folder_);
+  PlaneFiles(folder_, kMadeFrom).Save(1, 4, Planes());
+  PlaneFiles(folder_, kMadeFrom).Save(1, 5, {});
+  PlaneFiles later(folder_, kMadeFrom);
   EXPECT_TRUE(later.Has(1, 4));
   EXPECT_FALSE(later.Has(0, 4));
   EXPECT_EQ(*later.Load(1, 4), Planes());
@@ -43,8 +45,21 @@ TEST_F(PlaneFilesTest, GivesBackWhatWasSavedAlsoToALaterRun) {
   EXPECT_TRUE(later.Has(2, 4));
 }
 
+TEST_F(PlaneFilesTest, ThoseOfAnotherCalibrationAreNotTaken) {
+  PlaneFiles(folder_, kMadeFrom).Save(1, 4, Planes());
+  EXPECT_FALSE(PlaneFiles(folder_, "others").Has(1, 4));
+  EXPECT_FALSE(PlaneFiles(folder_, kMadeFrom).Has(1, 4));  // they are gone
+  PlaneFiles(folder_, kMadeFrom).Save(1, 4, Planes());
+  EXPECT_TRUE(PlaneFiles(folder_, kMadeFrom).Has(1, 4));
+  WriteFileAtomically(folder_ / "made_from", "cameras, and more");
+  EXPECT_FALSE(PlaneFiles(folder_, kMadeFrom).Has(1, 4));
+  PlaneFiles(folder_, kMadeFrom).Save(1, 4, Planes());
+  fs::remove(folder_ / "made_from");  // of an older version
+  EXPECT_FALSE(PlaneFiles(folder_, kMadeFrom).Has(1, 4));
+}
+
 TEST_F(PlaneFilesTest, RefusesEveryTruncatedOrDamagedFile) {
-  PlaneFiles files(folder_);
+  PlaneFiles files(folder_, kMadeFrom);
   files.Save(0, 0, Planes());
   const fs::path file = folder_ / "round0_view0.planes";
   const std::string whole = ReadFile(file, 1000);
@@ -67,7 +82,7 @@ TEST_F(PlaneFilesTest, RefusesEveryTruncatedOrDamagedFile) {
 }
 
 TEST_F(PlaneFilesTest, AFolderThatIsGoneIsOneLine) {
-  PlaneFiles files(folder_);
+  PlaneFiles files(folder_, kMadeFrom);
   files.Save(0, 0, Planes());
   fs::remove_all(folder_);
   WriteFileAtomically(folder_, "a file");  // what lies below can neither be looked for nor listed

@@ -12,6 +12,8 @@
 #include "dtr/base/random.h"
 #include "dtr/io/set_io.h"
 #include "tests/cli/arc_photos.h"
+#include "tests/cli/nobody.h"
+#include "tests/cli/resuming.h"
 #include "tests/cli/run_dtr.h"
 #include "tests/support/test_data.h"
 
@@ -59,14 +61,21 @@ void ExpectSameCameras(const Points& expected, const Points& found) {
   }
 }
 
-TEST(ResumingSfm, KilledBeforeItsCheckpointTheSameSceneComesOut) {
-  if (FindProgram("colmap").empty()) GTEST_SKIP() << "SKIPPED: colmap is absent";
-  const TemporaryFolder folder;
-  MakeArcPhotos(folder / "arc");
-  const fs::path photos = folder / "arc/images";
+class ResumingSfm : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (FindProgram("colmap").empty()) GTEST_SKIP() << "SKIPPED: colmap is absent";
+    MakeArcPhotos(folder_ / "arc");
+  }
+  fs::path Photos() const { return folder_ / "arc/images"; }
+  TemporaryFolder folder_;
+};
+
+TEST_F(ResumingSfm, KilledBeforeItsCheckpointTheSameSceneComesOut) {
+  const fs::path photos = Photos();
   const auto start = Clock::now();
   std::optional<Clock::time_point> calibrated_at;
-  const fs::path undisturbed = folder / "undisturbed.dtr";
+  const fs::path undisturbed = folder_ / "undisturbed.dtr";
   const Ran whole =
       Dtr(Build(photos, undisturbed),
           {SIGKILL, [&] {
@@ -82,7 +91,7 @@ TEST(ResumingSfm, KilledBeforeItsCheckpointTheSameSceneComesOut) {
 
   Random random(7);
   for (int killed = 0; killed < kKills;) {
-    const fs::path set = folder / ("killed" + std::to_string(killed) + ".dtr");
+    const fs::path set = folder_ / ("killed" + std::to_string(killed) + ".dtr");
     const auto moment = random.Uniform(0, 1) * (*calibrated_at - start);
     const auto begun = Clock::now();
     const Ran cut =
@@ -98,6 +107,56 @@ TEST(ResumingSfm, KilledBeforeItsCheckpointTheSameSceneComesOut) {
     fs::remove_all(set);
     fs::remove_all(set.string() + ".partial");
   }
+}
+
+// Room in KiB that ends, of COLMAP's 9 photos of 480x320: before and among the photos, in the
+// features, in their copy for matching, in the matches, with a little and with all of the rest.
+constexpr long kRooms[] = {64, 500, 2400, 5600, 6400, 9000, 64000};
+
+// COLMAP 3.8 goes on and ends with 0 when its database is full: what it then lacks must be missed.
+TEST_F(ResumingSfm, AFullDiskIsSaidAndTheSameCommandContinuesWithRoom) {
+  const fs::path undisturbed = folder_ / "undisturbed.dtr";
+  DtrOk(Build(Photos(), undisturbed));
+  const SmallDisk disk(folder_ / "disk");
+  if (!disk.mounted()) GTEST_SKIP() << "SKIPPED: no file system can be mounted here";
+  const fs::path set = folder_ / "disk/set.dtr";
+  const fs::path features = set.string() + ".partial/work/calibration/sfm/features.done.json";
+  std::optional<fs::file_time_type> features_at;
+  int stops = 0;
+  for (const long kib : kRooms) {
+    disk.Grow(kib);
+    const Ran ran = Dtr(Build(Photos(), set));
+    if (ran.code == 0) break;
+    ++stops;
+    ExpectRefused(ran, kFailed, "No space left on device");
+    EXPECT_FALSE(fs::exists(set)) << kib;
+    if (!fs::exists(features)) continue;
+    if (!features_at) features_at = fs::last_write_time(features);
+    EXPECT_EQ(fs::last_write_time(features), *features_at) << "found again with " << kib << " KiB";
+  }
+  EXPECT_GE(stops, 4);
+  EXPECT_TRUE(features_at) << "no stop after the features";
+  ASSERT_TRUE(fs::exists(set));
+  EXPECT_FALSE(fs::exists(set.string() + ".partial"));
+  ExpectSameCameras(Centres(undisturbed), Centres(set));
+}
+
+// Neither can be linked to: COLMAP gets copies.
+TEST_F(ResumingSfm, PhotosOfSomebodyElseThatMayOnlyBeReadAreRegistered) {
+  const auto before = Contents(Photos());
+  for (const auto& entry : fs::directory_iterator(Photos())) {
+    fs::permissions(entry.path(), fs::perms(0444));
+  }
+  fs::permissions(Photos(), fs::perms(0555));
+  fs::permissions(folder_.path(), fs::perms(0555));
+  AsNobody::MakeFolder(folder_ / "mine");
+  {
+    const AsNobody nobody;
+    DTR_REQUIRE_NOBODY(nobody);
+    DtrOk(Build(Photos(), folder_ / "mine/set.dtr"));
+  }
+  EXPECT_EQ(Centres(folder_ / "mine/set.dtr").size(), size_t{kArcPhotos});
+  EXPECT_EQ(Contents(Photos()), before);
 }
 
 }  // namespace

@@ -1,6 +1,11 @@
 // Photos and masks. Decoders are others' (OpenImageIO and below it libjpeg, libpng, libtiff,
 // OpenEXR): what is tried is that our reader holds them to a size, and that damage ends in an
 // Error.
+#include <OpenImageIO/imageio.h>
+
+#include <utility>
+
+#include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/io/depth_io.h"
 #include "dtr/io/image_io.h"
@@ -63,7 +68,28 @@ Reader OpenExr(const fs::path& folder) {
   return ReaderOf(file, {ReadFile(file, kSeedLimitBytes)});
 }
 
-constexpr ReaderKind kReaders[] = {{"jpeg", OpenJpeg}, {"png", OpenPng}, {"exr", OpenExr}};
+// 8 and 16 bits, packed and not.
+Reader OpenTiff(const fs::path& folder) {
+  const fs::path file = folder / "photo.tif";
+  const ImageRgb8 image = SomeImage();
+  std::vector<std::string> seeds;
+  for (const auto& [type, packing] :
+       {std::pair(OIIO::TypeDesc::UINT8, "none"), std::pair(OIIO::TypeDesc::UINT16, "lzw"),
+        std::pair(OIIO::TypeDesc::UINT8, "zip")}) {
+    OIIO::ImageSpec spec(image.width(), image.height(), 3, type);
+    spec.attribute("compression", packing);
+    const auto out = OIIO::ImageOutput::create(file.string());
+    if (!out || !out->open(file.string(), spec) ||
+        !out->write_image(OIIO::TypeDesc::UINT8, image.data().data()) || !out->close()) {
+      throw Error(file.string() + ": cannot be written: " + OIIO::geterror());
+    }
+    seeds.push_back(ReadFile(file, kSeedLimitBytes));
+  }
+  return ReaderOf(file, std::move(seeds));
+}
+
+constexpr ReaderKind kReaders[] = {
+    {"jpeg", OpenJpeg}, {"png", OpenPng}, {"exr", OpenExr}, {"tiff", OpenTiff}};
 
 }  // namespace
 

@@ -34,6 +34,13 @@ Reader OpenSet(const fs::path& folder) {
           kImageBufferBytes};
 }
 
+// Hashes and sizes of held-out files, which set.json does not tell.
+Reader OpenHeldOutFiles(const fs::path& folder) {
+  const fs::path set = folder / "scene.dtr", file = set / "held_out/files.json";
+  small::WriteSmallSet(set);
+  return {file, {ReadFile(file, kSeedLimitBytes)}, [set] { io::ReadSet(set); }};
+}
+
 // A map with holes, a step and a slope.
 DepthImage SomeDepth() {
   DepthImage depth(kWidth, kHeight);
@@ -53,7 +60,7 @@ Reader OpenDepth(const fs::path& folder, DepthCoding coding) {
   return {file,
           {ReadFile(file, kSeedLimitBytes)},
           [=] { io::ReadDepth(file, format, kWidth, kHeight); },
-          kImageBufferBytes};
+          coding == DepthCoding::kZstdInverseDepth ? 0 : kImageBufferBytes};
 }
 
 template <DepthCoding coding>
@@ -125,6 +132,8 @@ constexpr ReaderKind kReaders[] = {
     {"depth-millimetre", OpenDepthOf<DepthCoding::kPng16Millimetre>},
     {"depth-float", OpenDepthOf<DepthCoding::kExrFloat>},
     {"depth-half", OpenDepthOf<DepthCoding::kExrHalf>},
+    {"depth-zstd", OpenDepthOf<DepthCoding::kZstdInverseDepth>},
+    {"held-out-files", OpenHeldOutFiles},
     {"sigma", OpenSigma},
     {"sparse", OpenSparse},
     {"mesh", OpenMesh},

@@ -176,6 +176,25 @@ TEST_F(RunSfmWithFake, FailureNamesStepCauseAndLog) {
               HasSubstr("\"exit_code\": 1"));
 }
 
+// COLMAP 3.8 ends with 0 then, and what its database holds is not all there is.
+TEST_F(RunSfmWithFake, ADatabaseThatTookNotEverythingIsAFailure) {
+  const std::string full = "SQLite error [database.cc, line 989]: database or disk is full";
+  fake_.Fail("exhaustive_matcher", "echo '" + full + "'; echo 'Elapsed time: 1'; exit 0");
+  EXPECT_THAT(MessageOfRun(), AllOf(HasSubstr("sfm: No space left on device; make room"),
+                                    HasSubstr("expected all of its results in its database"),
+                                    HasSubstr(full), Not(HasSubstr("\n"))));
+  fake_.Succeed("exhaustive_matcher");
+  fake_.ForgetCalls();
+  EXPECT_EQ(Run().model.images.size(), 3u);
+  ASSERT_EQ(fake_.Calls().size(), 2u);  // the features are kept
+  EXPECT_THAT(fake_.Calls()[0], HasSubstr("exhaustive_matcher"));
+  const std::string locked = "SQLite error [database.cc, line 989]: disk I/O error";
+  fake_.Fail("mapper", "echo '" + locked + "'; exit 0");
+  fs::remove(workspace_ / "sfm" / "mapping.done.json");
+  EXPECT_THAT(MessageOfRun(),
+              AllOf(HasSubstr(locked), Not(HasSubstr("No space left")), HasSubstr(".log")));
+}
+
 TEST_F(RunSfmWithFake, KilledProgramPointsAtMemory) {
   fake_.Fail("mapper", "kill -9 $$");
   EXPECT_THAT(MessageOfRun(), AllOf(HasSubstr("mapper"), HasSubstr("memory ran out")));
