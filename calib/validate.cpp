@@ -164,11 +164,6 @@ int Worst(const std::vector<CameraValidation>& cameras, int min_count, const Val
   return worst;
 }
 
-Check AtMost(std::string name, double value, double limit, std::string reason) {
-  const bool passed = value <= limit;  // false for NaN: nothing measured is not a pass
-  return {std::move(name), value, limit, passed, std::move(reason)};
-}
-
 /// The worst camera's RMS in units of the typical one's: finds a single bad camera among good ones
 /// long before it reaches an absolute limit.
 Check OutOfLine(const ValidationReport& report, int worst, const ValidateLimits& limits) {
@@ -177,8 +172,8 @@ Check OutOfLine(const ValidationReport& report, int worst, const ValidateLimits&
     if (camera.held_out.count >= limits.min_observations) rms.push_back(camera.held_out.rms_px);
   }
   if (rms.empty()) {
-    return AtMost("worst_camera_ratio", std::numeric_limits<double>::quiet_NaN(),
-                  limits.max_camera_ratio, "no camera has enough observations to test");
+    return NotTested("worst_camera_ratio", limits.max_camera_ratio,
+                     "no camera has enough observations to test");
   }
   const double typical = UpperMedian(rms);
   const CameraValidation& camera = report.cameras[static_cast<size_t>(worst)];
@@ -223,8 +218,8 @@ void AddTests(const ValidateLimits& limits, ValidationReport* report) {
                           [](const CameraValidation& c) { return c.held_out.rms_px; });
   tests.push_back(
       worst < 0
-          ? AtMost("worst_camera_rms_px", kNothing, limits.max_camera_rms_px,
-                   "no camera has enough observations to test")
+          ? NotTested("worst_camera_rms_px", limits.max_camera_rms_px,
+                      "no camera has enough observations to test")
           : AtMost("worst_camera_rms_px",
                    report->cameras[static_cast<size_t>(worst)].held_out.rms_px,
                    limits.max_camera_rms_px,

@@ -92,8 +92,9 @@ std::vector<DepthRange> Widened(const Collection& c, int most, Progress& progres
                      &small[v].pixels.mask});
   }
   for (size_t v = 0; v < views.size(); ++v) {
-    const std::vector<int>& neighbours = c.neighbours[v].views;
+    std::span<const int> neighbours = c.neighbours[v].views;
     if (neighbours.empty()) continue;
+    neighbours = neighbours.first(std::min<size_t>(neighbours.size(), kLookNeighbours));
     try {
       for (int step = 0; step < most; ++step) {
         progress.ThrowIfInterrupted();

@@ -17,8 +17,9 @@ struct SmallView {
 /// Long side at most `max_size_px`. The view has its pixels.
 SmallView Shrink(const StereoView& view, int max_size_px);
 
-/// Long side of the copies that Widened looks at.
+/// Long side of the copies that Widened looks at, and how many neighbours a look asks at most.
 int LookSide(const PinholeCamera& camera);
+constexpr int kLookNeighbours = 4;
 
 /// Share of the depths kept that lie at an end of their range.
 struct EndShares {

@@ -96,10 +96,6 @@ std::vector<double> Moved(const Adjusted& solved, const Bundle& other_cameras) {
   return squared;
 }
 
-Check AtMost(std::string name, double value, double limit, std::string reason) {
-  return {std::move(name), value, limit, value <= limit, std::move(reason)};
-}
-
 void CompareWithStored(const Bundle& stored, const Adjusted& fresh,
                        const BundleCovariance& covariance, Judgement& judgement) {
   const std::vector<double> moved = Moved(fresh, stored);

@@ -9,6 +9,7 @@
 
 #include "calib/distributions.h"
 #include "calib/judge/fresh_solve.h"
+#include "calib/judge/pattern_checks.h"
 #include "calib/judge/residuals.h"
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
@@ -20,18 +21,6 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr int kFewestInRegion = 20;  // corners; below, a region's RMS is a guess
 constexpr double kMostOfImage = 0.95;
 constexpr double kFar = 1000;  // times the boards' distance: as good as at infinity
-
-Check Refused(const char* name, double limit, const std::string& why) {
-  return {name, kNaN, limit, false, why};
-}
-
-Check AtMost(const char* name, double value, double limit, std::string reason) {
-  return {name, value, limit, value <= limit, std::move(reason)};
-}
-
-Check AtLeast(const char* name, double value, double limit, std::string reason) {
-  return {name, value, limit, value >= limit, std::move(reason)};
-}
 
 // All that is tested, step by step.
 class Judging {
@@ -162,8 +151,8 @@ class Judging {
         unseen_ ? OrderOfFrames(fitted_.views).size() : OrderOfFrames(calibration_.kept).size();
     if (judged.corners == 0 || !refused.empty()) {
       const std::string why = refused.empty() ? "no view could be predicted" : refused;
-      Add(Refused(rms_name, limits_.max_rms_px, why));
-      Add(Refused(ratio_name, limits_.max_rms_ratio, why));
+      Add(NotTested(rms_name, limits_.max_rms_px, why));
+      Add(NotTested(ratio_name, limits_.max_rms_ratio, why));
     } else {
       std::string noise;
       for (const JudgedCamera& camera : report_.cameras) {
@@ -237,8 +226,8 @@ class Judging {
         TestAgainst(reference, lens, place, scale);
         continue;
       }
-      lens = Refused("lens_difference_sigmas", self, reference.fresh.refused);
-      place = Refused("place_difference_sigmas", self, reference.fresh.refused);
+      lens = NotTested("lens_difference_sigmas", self, reference.fresh.refused);
+      place = NotTested("place_difference_sigmas", self, reference.fresh.refused);
       break;
     }
     if (calibration_.free_lenses) Add(lens);
@@ -332,8 +321,9 @@ class Judging {
 
   void TestUncertainty() {
     if (!Base().solution) {
-      Add(Refused("projection_uncertainty_px", limits_.max_uncertainty_px, Base().refused));
-      Add(Refused("far_projection_uncertainty_px", limits_.max_far_uncertainty_px, Base().refused));
+      Add(NotTested("projection_uncertainty_px", limits_.max_uncertainty_px, Base().refused));
+      Add(NotTested("far_projection_uncertainty_px", limits_.max_far_uncertainty_px,
+                    Base().refused));
       return;
     }
     const RigSolution& solution = *Base().solution;
@@ -385,7 +375,7 @@ class Judging {
     });
     for (const Fresh& half : halves) {
       if (half.solution) continue;
-      Add(Refused(name, limits_.min_p, "half of the views: " + half.refused));
+      Add(NotTested(name, limits_.min_p, "half of the views: " + half.refused));
       return;
     }
     const RigSolution &a = *halves[0].solution, &b = *halves[1].solution;
@@ -410,72 +400,19 @@ class Judging {
     // the limit the whole is within it.
     const double harmless = 2 * limits_.max_uncertainty_px;
     const bool small = p < limits_.min_p && most <= harmless;
-    Add(AtLeast(name, small ? 1 : p, limits_.min_p,
-                fmt::format("two halves, solved apart, differ by {:.3g} px at most, in 95 % of the "
-                            "image by {:.3g} px, predicted sigma {:.3g} px; {}",
-                            shift, most, predicted,
-                            small ? fmt::format("no chance (p = {:.2g}), but less than {} px: the "
-                                                "whole is within its limit",
-                                                p, harmless)
-                                  : std::string("this or more by chance"))));
+    Add(AtLeast(
+        name, small ? 1 : p, limits_.min_p,
+        fmt::format("two halves, solved apart, differ by {:.3g} px at most, in 95 % of the "
+                    "image by {:.3g} px, predicted sigma {:.3g} px; {}",
+                    shift, most, predicted,
+                    small ? fmt::format("no chance (p = {:.2g}), but less than {} px: the "
+                                        "whole is within its limit",
+                                        p, harmless)
+                          : std::string("told is the probability of this or more by chance"))));
   }
 
   void TestPatterns() {
-    const double limit = limits_.max_pattern_px;
-    if (!Base().solution) {
-      Add(Refused("regional_pattern_px", limit, Base().refused));
-      return;
-    }
-    const RigSolution& solution = *Base().solution;
-    const auto add = [&](const char* name, const PatternTest& test, const std::string& what) {
-      const bool chance = test.p >= limits_.min_p;
-      Add(AtMost(name, chance ? 0 : test.amplitude_px, limit,
-                 fmt::format("{}: {:.4f} px RMS per coordinate; p = {:.2g}{}", what,
-                             test.amplitude_px, test.p, chance ? ", what noise does" : "")));
-    };
-    add("radial_pattern_px", TestRadial(solution),
-        "residuals along the radius that the lens model cannot follow");
-    add("regional_pattern_px", TestRegional(solution),
-        "mean residuals of image regions that the lens model cannot follow");
-    add("board_shape_px", TestBoardShape(calibration_.board, solution),
-        "residuals as of a board that is bent");
-    add("rolling_shutter_px", TestRollingShutter(calibration_.board, solution),
-        "residuals as of boards that move while the rows are read");
-    if (solution.rig.cameras.size() < 2) return;
-    TestDelays(solution);
-    add("unsteady_clocks_px", TestUnsteadyClocks(solution),
-        "residuals as of pictures that are not taken at one rate");
-  }
-
-  void TestDelays(const RigSolution& solution) {
-    const PatternTest late = TestTimeOffset(solution);
-    Check check{"time_offset_sigmas", 0, limits_.max_time_offset_sigmas, true,
-                "not determined: the board stands still, or its frames do not follow each other"};
-    std::string untold;
-    for (size_t c = 0; c < late.coefficients.size(); ++c) {
-      if (!std::isfinite(late.coefficients[c])) {
-        untold += (untold.empty() ? "" : ", ") + solution.rig.cameras[c + 1].name;
-        continue;
-      }
-      const double sigmas = std::abs(late.coefficients[c]) / late.sigmas[c];
-      // What corners err by in any case is no fault of the clocks.
-      const bool harmless = sigmas > check.limit && late.effects_px[c] <= limits_.max_pattern_px;
-      const double counted = harmless ? 0 : sigmas;
-      if (counted < check.value) continue;
-      check.value = counted;
-      check.reason = fmt::format(
-          "{}: its images are {:.4f} +- {:.4f} frames {} than {}'s, which moves a coordinate "
-          "by {:.3f} px RMS{}",
-          solution.rig.cameras[c + 1].name, std::abs(late.coefficients[c]), late.sigmas[c],
-          late.coefficients[c] < 0 ? "earlier" : "later", solution.rig.cameras[0].name,
-          late.effects_px[c], harmless ? ": no chance, but no more than corners err" : "");
-    }
-    check.passed = check.value <= check.limit;
-    if (!untold.empty()) {
-      check.reason +=
-          "; not determined for " + untold + ": its views are in no frames that follow each other";
-    }
-    Add(std::move(check));
+    for (Check& check : PatternChecks(calibration_.board, Base(), limits_)) Add(std::move(check));
   }
 
   const JudgedCalibration& calibration_;

@@ -133,7 +133,8 @@ double PredictSeconds(const ProbedCosts& costs, const stereo::Effort& effort,
     const double side = std::max(view.camera.width_px(), view.camera.height_px());
     const double shrink = stereo::LookSide(view.camera) / side;
     seconds += PixelsOf(view.camera) * shrink * shrink * costs.search_s *
-               std::max(searched, asked) * VisitsPerPixel(effort.iterations, 1);
+               std::min<double>(stereo::kLookNeighbours, std::max(searched, asked)) *
+               VisitsPerPixel(effort.iterations, 1);
     seconds += PixelsOf(view.camera) * (costs.search_s * searched * visits +
                                         (costs.round_s * effort.rounds + costs.verdict_s) * asked);
   }

@@ -1,7 +1,9 @@
 // dtr/types/check.h -- one thing that was tested, and how it went.
 #pragma once
 #include <algorithm>
+#include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace dtr {
@@ -14,6 +16,22 @@ struct Check {
   bool passed = false;
   std::string reason;  ///< one line: what the figure says, or why the check failed
 };
+
+/// Passes up to the limit, and never for NaN: nothing measured is not a pass.
+inline Check AtMost(std::string name, double value, double limit, std::string reason) {
+  return {std::move(name), value, limit, value <= limit, std::move(reason)};
+}
+
+/// Passes from the limit on, and never for NaN.
+inline Check AtLeast(std::string name, double value, double limit, std::string reason) {
+  return {std::move(name), value, limit, value >= limit, std::move(reason)};
+}
+
+/// What could not be measured does not pass; `reason` says why.
+inline Check NotTested(std::string name, double limit, std::string reason) {
+  return {std::move(name), std::numeric_limits<double>::quiet_NaN(), limit, false,
+          std::move(reason)};
+}
 
 /// True when there is at least one check and all hold: no evidence is not a pass.
 inline bool AllPassed(const std::vector<Check>& checks) {

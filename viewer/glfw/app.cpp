@@ -409,7 +409,9 @@ class App {
     const bool any =
         session_->schedule.has_picture() && !session_->maker.picture().views_used.empty();
     figures_.EndFrame(any, whole());
-    if (whole() && host_.state_changed) host_.state_changed(State());
+    // Told once what came of the last input shows: keys pressed at once are then taken again, of
+    // which a dialog that has just closed would keep those that come before ImGui's next frame.
+    if (whole() && settling_ <= 0 && host_.state_changed) host_.state_changed(State());
     if (quit_ || settling_ > 0 || CameraMoves() || !session_->schedule.MadeFor(Order())) return;
     if (!time_.playing()) moving_fps_ = 0;
     // A still picture is due soon, or when its views have been read; a video is nearly there; so
@@ -421,46 +423,18 @@ class App {
 
   AppState State() const {
     AppState state;
-    const MadePicture& picture = session_->maker.picture();
-    const Controller& controller = session_->controller;
-    const Inspection& inspection = session_->inspector.inspection();
+    session_->Describe(state);
     state.frames = figures_.frames();
     state.still = whole();
-    state.camera = controller.camera();
-    if (const auto at = controller.at_view()) {
-      const View& view = *controller.surroundings().cameras[*at];
-      state.at_view = view.name;
-      state.at_held_out = view.role == ViewRole::kHeldOut;
-    }
-    if (const View* photo = session_->inspector.photo()) state.photo = photo->name;
-    state.thumbnails = session_->inspector.thumbnails();
     state.shown = NameOf(shown_);
-    state.divisor = picture.divisor;
-    for (const int index : picture.views_used) {
-      state.views_used.push_back(picture.scene.views[static_cast<size_t>(index)]->name);
-    }
-    state.coverage = picture.coverage;
-    state.fly_speed = controller.fly_speed();
     state.help = help_;
     state.panel = panel_;
-    state.cameras = inspection.cameras;
-    state.magnifier = inspection.magnifier;
-    state.compared = NameOf(inspection.compared);
-    state.hidden = session_->HiddenNames();
-    state.distance = inspection.DistanceText();
-    if (inspection.magnifier && inspection.under_cursor) {
-      for (const ProbeView& view : inspection.under_cursor->views) {
-        state.under_cursor.push_back(view.name);
-      }
-    }
     state.path_keys = static_cast<int>(paths_.flight().keys().size());
     state.frames_per_key = paths_.flight().frames_per_key;
     state.recording = paths_.recording();
     state.asks_for_path = path_dialog_.open();
     state.reloads = reloads_;
     state.controls = controls_;
-    state.instant = session_->instant();
-    state.instants = session_->clock().frames();
     state.playing_time = time_.playing();
     state.message = message_;
     state.render = options_;

@@ -123,7 +123,8 @@ struct Host {
   std::function<std::map<std::string, ViewVerdict>()> verdicts;
   /// A line for whoever started the program.
   std::function<void(const std::string&)> say;
-  /// Told whenever the window has a whole picture; null: nobody asks.
+  /// Told whenever the window has a whole picture and shows what the last input did; null: nobody
+  /// asks.
   std::function<void(const AppState&)> state_changed;
 };
 

@@ -109,4 +109,36 @@ std::vector<std::string> Session::HiddenNames() const {
   return names;
 }
 
+void Session::Describe(AppState& state) const {
+  state.camera = controller.camera();
+  if (const auto at = controller.at_view()) {
+    const View& view = *controller.surroundings().cameras[*at];
+    state.at_view = view.name;
+    state.at_held_out = view.role == ViewRole::kHeldOut;
+  }
+  state.fly_speed = controller.fly_speed();
+  state.instant = instant_;
+  state.instants = clock_.frames();
+
+  const MadePicture& picture = maker.picture();
+  state.divisor = picture.divisor;
+  for (const int index : picture.views_used) {
+    state.views_used.push_back(picture.scene.views[static_cast<size_t>(index)]->name);
+  }
+  state.coverage = picture.coverage;
+
+  const Inspection& inspection = inspector.inspection();
+  if (const View* photo = inspector.photo()) state.photo = photo->name;
+  state.thumbnails = inspector.thumbnails();
+  state.cameras = inspection.cameras;
+  state.magnifier = inspection.magnifier;
+  state.compared = NameOf(inspection.compared);
+  state.hidden = HiddenNames();
+  state.distance = inspection.DistanceText();
+  if (!inspection.magnifier || !inspection.under_cursor) return;
+  for (const ProbeView& view : inspection.under_cursor->views) {
+    state.under_cursor.push_back(view.name);
+  }
+}
+
 }  // namespace dtr::viewer

@@ -45,6 +45,8 @@ class Session {
   std::optional<double> DepthAt(const Eigen::Vector2d& pixel);
   /// Also of views that this instant lacks.
   std::vector<std::string> HiddenNames() const;
+  /// Writes down what of the window's state is the set's: camera, picture, inspection, instant.
+  void Describe(AppState& state) const;
 
  private:
   void Hide(const std::vector<std::string>& names);
