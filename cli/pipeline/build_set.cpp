@@ -10,6 +10,7 @@
 #include "calib/lens_groups.h"
 #include "calib/sparse_from_sfm.h"
 #include "calib/undistort.h"
+#include "capture/duplicates.h"
 #include "capture/ingest.h"
 #include "capture/store.h"
 #include "cli/pipeline/calibrated_photos.h"
@@ -20,6 +21,7 @@
 #include "cli/pipeline/holdout.h"
 #include "cli/pipeline/ingest.h"
 #include "cli/pipeline/input_hash.h"
+#include "cli/pipeline/kept_notes.h"
 #include "cli/pipeline/run_log.h"
 #include "cli/pipeline/set_page.h"
 #include "cli/pipeline/validate_set.h"
@@ -47,6 +49,7 @@ Json OptionsJson(const BuildOptions& options, const stereo::Effort& effort, int 
   json["holdout_strict"] = options.holdout_strict;
   json["poses"] = options.poses.filename().string();
   json["refine"] = options.refine;
+  if (options.keep_duplicates) json["keep_duplicates"] = true;
   if (!options.rig.empty()) json["rig"] = options.rig.filename().string();
   json["seed"] = options.seed;
   if (options.depth.depth_error_px) json["depth_error_px"] = *options.depth.depth_error_px;
@@ -220,6 +223,18 @@ void RequireOptions(const BuildOptions& options) {
   }
 }
 
+// Photos that are there twice add nothing, and would show what is held out. Given places say that
+// they are photos of their own; those of a rig belong to its instants.
+void LeaveOutSamePictures(const BuildOptions& options, capture::Capture& photos,
+                          Progress& progress) {
+  if (options.keep_duplicates || !options.poses.empty() || !options.rig.empty()) return;
+  const auto left_out = capture::DropSamePictures(
+      photos, [&](const std::string& name) { return IsNamed(options.holdout, name); });
+  for (const auto& [name, same_as] : left_out) {
+    progress.Note(name + " left out: it has the same pixels as " + same_as);
+  }
+}
+
 void RequireTwoSources(const capture::Capture& capture, const std::vector<bool>& held_out,
                        const CalibratedPhotos& calibrated) {
   int sources = 0;
@@ -297,7 +312,7 @@ Json ReportJson(const BuildReport& report, const RunLog& log, const std::filesys
 
 }  // namespace
 
-BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
+BuildReport BuildSet(const BuildOptions& options, Progress& listener) {
   const int max_size_px = options.max_size_px >= 0 ? options.max_size_px
                                                    : PresetCalled(options.depth.preset).max_size_px;
   const stereo::Effort effort = EffortOf(options.depth);
@@ -307,6 +322,7 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
   if (!options.rig.empty()) rig = ReadSetRig(options.rig);
   BuildReport report;
   RunLog log;
+  KeptNotes progress(listener);
 
   RequireCalibration(options.poses);
   log.Begin("capture");
@@ -314,6 +330,7 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
   capture::Capture photos;
   std::vector<bool> held_out;
   const auto look = [&] {
+    LeaveOutSamePictures(options, photos, progress);
     capture::RequireEnoughPhotos(photos, options.photos);
     held_out = ChooseHeldOut(options.holdout, NamesOf(photos));
     if (!rig) return;
@@ -396,7 +413,8 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
                {options.output.stem().string(), options.depth.engine, validation.tests,
                 report.skipped, report.not_registered.size(), options.threads});
   log.End();
-  io::WriteRunRecord(writer.folder(), log.Record(ResolveThreads(options.threads)));
+  io::WriteRunRecord(writer.folder(),
+                     log.Record(ResolveThreads(options.threads), progress.lines()));
   writer.Finish(set);
   report.set = std::move(set);
   report.json = ReportJson(report, log, options.output).dump(1);

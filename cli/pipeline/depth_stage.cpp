@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "cli/pipeline/depth_engine.h"
+#include "cli/pipeline/depth_precision.h"
 #include "cli/pipeline/plane_files.h"
 #include "cli/pipeline/time_budget.h"
 #include "dtr/base/error.h"
@@ -103,6 +104,7 @@ void WriteDepth(View& view, stereo::DepthEstimate&& estimate, LengthUnit unit,
                 io::SetWriter& writer) {
   view.depth = std::move(estimate.depth);
   view.inverse_depth_sigma = std::move(estimate.inverse_depth_sigma);
+  ChooseDepthCoding(view);
   writer.WriteView(view, unit);
   view.depth = {};
   view.inverse_depth_sigma.reset();
@@ -188,6 +190,7 @@ stereo::Effort DepthStage(DtrSet& set, const SparseScene& sparse, const DepthCho
           WriteDepth(view, std::move(estimate), set.unit, writer);
         });
   });
+  if (const std::string codings = SayDepthCodings(views); !codings.empty()) progress.Note(codings);
   return effort;
 }
 
