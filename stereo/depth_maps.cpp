@@ -6,6 +6,7 @@
 #include <string>
 
 #include "dtr/base/parallel_for.h"
+#include "stereo/left_out.h"
 #include "stereo/rounds.h"
 #include "stereo/widen.h"
 
@@ -42,6 +43,7 @@ class Run {
     const std::vector<int> needed = Needed(wanted);
     CheckMemory(needed);
     // All of them: rounds also match what is not needed itself, and must do so alike every time.
+    if (!needed.empty()) TellStrangers();
     if (!needed.empty()) ranges_ = Widened(Together(), options_.widenings, progress_);
     if (engine_.Rounds() > 0) RunRounds(Together(), needed, planes_, progress_);
     progress_.Stage("depth", static_cast<int>(needed.size()));
@@ -49,6 +51,7 @@ class Run {
     const int threads = ResolveThreads(options_.engine.threads);
     const int side_by_side =
         Alone() ? 1 : std::max(1, threads / std::max(1, options_.neighbours.count));
+    const int without_planes_before = WithoutPlanes();
     size_t done = 0, next_wanted = 0;
     while (done < needed.size()) {
       progress_.ThrowIfInterrupted();
@@ -62,6 +65,10 @@ class Run {
       }
       progress_.Update(static_cast<int>(done));
     }
+    if (const int without = WithoutPlanes() - without_planes_before; without > 0) {
+      progress_.Note("planes on weak texture left out in " + std::to_string(without) + " of " +
+                     std::to_string(needed.size()) + " views: their texture suffices");
+    }
   }
 
  private:
@@ -72,6 +79,21 @@ class Run {
   bool Filters() const { return options_.consistency.min_agreeing > 0; }
   const std::vector<int>& NeighboursOf(int view) const {
     return neighbours_[static_cast<size_t>(view)].views;
+  }
+
+  int WithoutPlanes() const {
+    const auto* counts = dynamic_cast<const CountsLeftOut*>(&engine_);
+    return counts != nullptr ? counts->without_planes() : 0;
+  }
+
+  void TellStrangers() {
+    size_t strangers = 0;
+    for (const ViewNeighbours& view : neighbours_) strangers += static_cast<size_t>(view.strangers);
+    if (strangers == 0) return;
+    progress_.Note(std::to_string(strangers) + " of " +
+                   std::to_string(views_.size() * (views_.size() - 1)) +
+                   " pairs of view and neighbour left out: they have no more than 3 points in "
+                   "common");
   }
 
   void CheckMemory(const std::vector<int>& needed) const {

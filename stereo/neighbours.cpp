@@ -171,6 +171,7 @@ std::vector<ViewNeighbours> ChooseNeighbours(std::span<const StereoView> views,
       if (b == a) continue;
       const auto score = ScorePair(
           views[a], views[b], by_points ? SharedPoints(scene, observed[a], observed[b]) : stand_in);
+      result[a].strangers += !score;
       if (!score || score->median_angle_deg < kSameCentreAngleDeg) continue;
       if (score->median_angle_deg >= options.min_angle_deg) {
         wide.emplace_back(-score->score, static_cast<int>(b));

@@ -24,6 +24,7 @@ enum class NeighbourEvidence {
 struct ViewNeighbours {
   std::vector<int> views;  ///< indices of other views, best first; may be empty
   NeighbourEvidence evidence = NeighbourEvidence::kSharedPoints;
+  int strangers = 0;  ///< other views left out because they share fewer than 4 points
 };
 
 /// Chooses the neighbours of every view.

@@ -7,6 +7,7 @@
 #include "calib/colmap/database.h"
 #include "calib/colmap/model_io.h"
 #include "calib/colmap/sfm_steps.h"
+#include "calib/colmap/view_pyramids.h"
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
 
@@ -183,7 +184,9 @@ SfmResult TriangulateWithPoses(const fs::path& images_dir, std::span<const Posed
   Workspace workspace(workspace_folder, images_dir, InputsOf(known.images), "",
                       ResolveThreads(options.threads), progress);
   SfmResult result;
-  FeaturesAndMatches(workspace, known.groups, options, result.report);
+  const ImagePairs pairs = PairsThatMayOverlap(known.images);
+  FeaturesAndMatches(workspace, known.groups, options, result.report,
+                     pairs.empty() ? std::nullopt : std::optional(pairs));
   workspace.Step("triangulation", TextOf(known) + fmt::format("seed {}", options.seed),
                  [&] { Triangulate(workspace, known, options); });
   result.model = ReadModel(workspace.folder() / "model");

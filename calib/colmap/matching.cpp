@@ -38,6 +38,31 @@ void RunMatcher(Workspace& workspace, const Arguments& arguments) {
   });
 }
 
+// The pairs to name to COLMAP; empty where it takes all that its matcher finds by itself.
+std::optional<ImagePairs> PairsToMatch(Workspace& workspace, Matching matching,
+                                       const std::optional<ImagePairs>& allowed) {
+  const size_t count = workspace.images().size(), all = count * (count - 1) / 2;
+  if (allowed && allowed->size() < all) {
+    workspace.progress().Note(fmt::format(
+        "{} of {} pairs of photos left out of matching: their cameras cannot see the same thing",
+        all - allowed->size(), all));
+  }
+  if (matching == Matching::kExhaustive && allowed && allowed->size() < all) return allowed;
+  if (matching != Matching::kPreselected) return {};
+  std::vector<std::filesystem::path> files;
+  for (size_t i = 0; i < count; ++i) files.push_back(workspace.FileOf(i));
+  ImagePairs pairs = PreselectPairs(files, workspace.threads(), workspace.progress());
+  if (allowed) {
+    std::erase_if(pairs, [&](const auto& pair) {
+      return !std::binary_search(allowed->begin(), allowed->end(), pair);
+    });
+  }
+  workspace.progress().Note(
+      fmt::format("{} of {} pairs of photos left out of matching: other photos resemble them more",
+                  std::min(all, allowed ? allowed->size() : all) - pairs.size(), all));
+  return pairs;
+}
+
 }  // namespace
 
 Matching ResolveMatching(Matching matching, size_t images) {
@@ -77,16 +102,12 @@ void MatchPairs(Workspace& workspace, const std::filesystem::path& database,
 }
 
 void MatchPhotos(Workspace& workspace, const std::filesystem::path& database, Matching matching,
-                 int threads, std::uint64_t seed) {
-  const size_t count = workspace.images().size();
-  if (matching == Matching::kPreselected) {
-    std::vector<std::filesystem::path> files;
-    for (size_t i = 0; i < count; ++i) files.push_back(workspace.FileOf(i));
-    std::vector<std::pair<std::string, std::string>> pairs;
-    for (const auto& [a, b] : PreselectPairs(files, workspace.threads(), workspace.progress())) {
-      pairs.emplace_back(workspace.AliasOf(a), workspace.AliasOf(b));
-    }
-    MatchPairs(workspace, database, pairs, threads, seed);
+                 int threads, std::uint64_t seed, const std::optional<ImagePairs>& allowed) {
+  if (const auto pairs = PairsToMatch(workspace, matching, allowed)) {
+    std::vector<std::pair<std::string, std::string>> names;
+    for (const auto& [a, b] : *pairs)
+      names.emplace_back(workspace.AliasOf(a), workspace.AliasOf(b));
+    MatchPairs(workspace, database, names, threads, seed);
     return;
   }
   const bool sequential = matching == Matching::kSequential;

@@ -1,5 +1,6 @@
 // calib/colmap/matching.h -- which photos are matched with which, and the matching.
 #pragma once
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -10,9 +11,13 @@ namespace dtr::colmap {
 /// kAuto resolved for a number of photos; other values unchanged.
 Matching ResolveMatching(Matching matching, size_t images);
 
-/// Matches the photos of `database`; an interrupted call may be repeated on the same database.
+/// Numbers of two photos, a < b; sorted.
+using ImagePairs = std::vector<std::pair<size_t, size_t>>;
+
+/// Matches the photos of `database`; an interrupted call may be repeated on the same database. Of
+/// the pairs that `matching` names only those of `allowed`, where it is given.
 void MatchPhotos(Workspace& workspace, const std::filesystem::path& database, Matching matching,
-                 int threads, std::uint64_t seed);
+                 int threads, std::uint64_t seed, const std::optional<ImagePairs>& allowed = {});
 
 /// Matches listed pairs of photos, given by their names in the database.
 void MatchPairs(Workspace& workspace, const std::filesystem::path& database,

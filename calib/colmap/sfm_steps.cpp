@@ -52,7 +52,8 @@ void CopyDatabase(const fs::path& from, const fs::path& to) {
 }
 
 void FeaturesAndMatches(Workspace& workspace, const std::vector<CameraGroup>& groups,
-                        const SfmOptions& options, SfmReport& report) {
+                        const SfmOptions& options, SfmReport& report,
+                        const std::optional<ImagePairs>& allowed) {
   const ExtractionPlan plan = PlanExtraction(workspace.images(), workspace.threads(),
                                              options.memory_gb, options.max_image_size_px);
   report.extraction_threads = plan.threads;
@@ -64,8 +65,10 @@ void FeaturesAndMatches(Workspace& workspace, const std::vector<CameraGroup>& gr
     RemoveDatabase(features);  // COLMAP would take over what an interrupted run left
     ExtractFeatures(workspace, features, groups, plan, options.seed);
   });
-  const auto text =
-      fmt::format("matching {} seed {}", static_cast<int>(report.matching), options.seed);
+  auto text = fmt::format("matching {} seed {}", static_cast<int>(report.matching), options.seed);
+  if (allowed) {
+    for (const auto& [a, b] : *allowed) text += fmt::format(" {}-{}", a, b);
+  }
   workspace.Step("matches", text, [&] {
     // Matching may take hours: an interrupted run of the same inputs goes on with its pairs.
     const fs::path begun = workspace.folder() / "matches.begun";
@@ -77,7 +80,7 @@ void FeaturesAndMatches(Workspace& workspace, const std::vector<CameraGroup>& gr
       WriteFileAtomically(begun, workspace.fingerprint());
     }
     MatchPhotos(workspace, workspace.database(), report.matching,
-                MatchingThreads(workspace.threads(), options.memory_gb), options.seed);
+                MatchingThreads(workspace.threads(), options.memory_gb), options.seed, allowed);
   });
 }
 

@@ -1,10 +1,12 @@
 // calib/colmap/sfm_steps.h -- the steps that structure from motion and triangulation share.
 #pragma once
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "calib/colmap/features.h"
+#include "calib/colmap/matching.h"
 #include "calib/colmap/workspace.h"
 
 namespace dtr::colmap {
@@ -13,8 +15,11 @@ namespace dtr::colmap {
 calib::LensModel LensModelOf(const SfmOptions& options);
 
 /// Steps "features" and "matches": fills workspace.database(). What was planned goes to `report`.
+/// Of the pairs that options.matching names only those of `allowed` (a < b, sorted; numbers of
+/// images()) are matched, where it is given.
 void FeaturesAndMatches(Workspace& workspace, const std::vector<CameraGroup>& groups,
-                        const SfmOptions& options, SfmReport& report);
+                        const SfmOptions& options, SfmReport& report,
+                        const std::optional<ImagePairs>& allowed = {});
 
 /// Fills in what every report has: runs, version, who did not register, the error; writes it.
 void CompleteReport(const Workspace& workspace, const calib::SfmModel& model, SfmReport& report);

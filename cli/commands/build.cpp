@@ -72,6 +72,9 @@ void AddBuildCommand(CLI::App& app) {
             ->type_name("RIG.json");
         command.add_flag("!--no-refine", options->refine,
                          "Take COLMAP's cameras as they are, without bundle adjustment");
+        command.add_flag("--keep-duplicates", options->keep_duplicates,
+                         "Keep photos whose pixels are another's, too (with --poses and --rig they "
+                         "always are)");
         command.add_flag("--force", options->force, "Replace a set that exists");
         command
             .add_option("--force-stage", options->force_stage,

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "calib/sparse_from_sfm.h"
+#include "capture/duplicates.h"
 #include "capture/ingest.h"
 #include "capture/store.h"
 #include "capture/video/frames.h"
@@ -17,6 +18,7 @@
 #include "cli/pipeline/holdout.h"
 #include "cli/pipeline/ingest.h"
 #include "cli/pipeline/input_hash.h"
+#include "cli/pipeline/kept_notes.h"
 #include "cli/pipeline/run_log.h"
 #include "cli/pipeline/set_page.h"
 #include "cli/pipeline/undistort_photos.h"
@@ -47,6 +49,7 @@ Json OptionsJson(const BuildOptions& options, const stereo::Effort& effort, int 
   json["holdout_strict"] = options.holdout_strict;
   json["poses"] = options.poses.filename().string();
   json["refine"] = options.refine;
+  if (options.keep_duplicates) json["keep_duplicates"] = true;
   if (!options.rig.empty()) json["rig"] = options.rig.filename().string();
   json["seed"] = options.seed;
   if (options.depth.depth_error_px) json["depth_error_px"] = *options.depth.depth_error_px;
@@ -172,6 +175,18 @@ void RequireOptions(const BuildOptions& options) {
   }
 }
 
+// Photos that are there twice add nothing, and would show what is held out. Given places say that
+// they are photos of their own; those of a rig belong to its instants.
+void LeaveOutSamePictures(const BuildOptions& options, capture::Capture& photos,
+                          Progress& progress) {
+  if (options.keep_duplicates || !options.poses.empty() || !options.rig.empty()) return;
+  const auto left_out = capture::DropSamePictures(
+      photos, [&](const std::string& name) { return IsNamed(options.holdout, name); });
+  for (const auto& [name, same_as] : left_out) {
+    progress.Note(name + " left out: it has the same pixels as " + same_as);
+  }
+}
+
 void RequireTwoSources(const capture::Capture& capture, const std::vector<bool>& held_out,
                        const CalibratedPhotos& calibrated) {
   int sources = 0;
@@ -270,7 +285,7 @@ void SayRemarks(const BuildReport& report, size_t photos, Progress& progress) {
 
 }  // namespace
 
-BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
+BuildReport BuildSet(const BuildOptions& options, Progress& listener) {
   const int max_size_px = options.max_size_px >= 0 ? options.max_size_px
                                                    : PresetCalled(options.depth.preset).max_size_px;
   const stereo::Effort effort = EffortOf(options.depth);
@@ -281,6 +296,7 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
   const double memory_gb = options.depth.memory_gb.value_or(kDefaultMemoryGb);
   BuildReport report;
   RunLog log;
+  KeptNotes progress(listener);
 
   RequireCalibration(options.poses);
   log.Begin("capture");
@@ -288,6 +304,7 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
   capture::Capture photos;
   std::vector<bool> held_out;
   const auto look = [&] {
+    LeaveOutSamePictures(options, photos, progress);
     capture::RequireEnoughPhotos(photos, options.photos);
     held_out = ChooseHeldOut(options.holdout, NamesOf(photos));
     if (!rig) return;
@@ -384,7 +401,7 @@ BuildReport BuildSet(const BuildOptions& options, Progress& progress) {
                {options.output.stem().string(), options.depth.engine, validation.tests,
                 report.skipped, report.not_registered.size(), options.threads});
   log.End();
-  io::RunRecord record = log.Record(ResolveThreads(options.threads));
+  io::RunRecord record = log.Record(ResolveThreads(options.threads), progress.lines());
   record.extra_json = Json{{"screening", ScreeningJson(report)}}.dump();
   io::WriteRunRecord(writer.folder(), record);
   writer.Finish(set);

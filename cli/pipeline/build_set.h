@@ -22,8 +22,9 @@ struct BuildOptions {
   DepthChoice depth;
   int max_size_px = -1;  ///< long side; 0 = full size, -1 = what the preset says
   std::filesystem::path poses;
-  bool refine = true;         ///< bundle adjustment after SfM, where it pays
-  std::filesystem::path rig;  ///< calibration of the rig that took all photos; empty: none
+  bool keep_duplicates = false;  ///< photos with the same pixels as another one
+  bool refine = true;            ///< bundle adjustment after SfM, where it pays
+  std::filesystem::path rig;     ///< calibration of the rig that took all photos; empty: none
   bool force = false;
   std::string force_stage;  ///< of an interrupted run: done again with all after it; "": none
   int threads = 0;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "cli/pipeline/depth_engine.h"
+#include "cli/pipeline/depth_precision.h"
 #include "cli/pipeline/plane_files.h"
 #include "cli/pipeline/time_budget.h"
 #include "dtr/base/durable.h"
@@ -147,6 +148,7 @@ void WriteDepth(View& view, stereo::DepthEstimate&& estimate, LengthUnit unit,
                 io::SetWriter& writer) {
   view.depth = std::move(estimate.depth);
   view.inverse_depth_sigma = std::move(estimate.inverse_depth_sigma);
+  ChooseDepthCoding(view);
   writer.WriteView(view, unit);
   view.depth = {};
   view.inverse_depth_sigma.reset();
@@ -231,6 +233,7 @@ stereo::Effort DepthStage(DtrSet& set, const SparseScene& sparse, const DepthCho
         });
   });
   for (const int index : sources.indices) normals.Deliver(views[static_cast<size_t>(index)]);
+  if (const std::string codings = SayDepthCodings(views); !codings.empty()) progress.Note(codings);
   return effort;
 }
 

@@ -29,13 +29,17 @@ std::string Stem(const std::string& name) {
   return dot == std::string::npos || dot == 0 ? name : name.substr(0, dot);
 }
 
+bool Names(const std::string& wanted, const std::string& name) {
+  return name == wanted || Stem(name) == wanted;
+}
+
 void MarkNamed(const std::string& spec, std::span<const std::string> names,
                std::vector<bool>& held_out) {
   std::istringstream list(spec);
   for (std::string wanted; std::getline(list, wanted, ',');) {
     bool found = false;
     for (size_t i = 0; i < names.size(); ++i) {
-      if (names[i] != wanted && Stem(names[i]) != wanted) continue;
+      if (!Names(wanted, names[i])) continue;
       held_out[i] = found = true;
     }
     if (!found) {
@@ -46,6 +50,14 @@ void MarkNamed(const std::string& spec, std::span<const std::string> names,
 }
 
 }  // namespace
+
+bool IsNamed(const std::string& spec, const std::string& name) {
+  std::istringstream list(spec);
+  for (std::string wanted; std::getline(list, wanted, ',');) {
+    if (Names(wanted, name)) return true;
+  }
+  return false;
+}
 
 std::vector<bool> ChooseHeldOut(const std::string& spec, std::span<const std::string> names) {
   std::vector<bool> held_out(names.size(), false);

@@ -12,4 +12,7 @@ namespace dtr::pipeline {
 /// Throws UsageError for a malformed spec, a name that is not there, or fewer than two photos left.
 std::vector<bool> ChooseHeldOut(const std::string& spec, std::span<const std::string> names);
 
+/// Whether `spec` holds out the photo called `name` by its name.
+bool IsNamed(const std::string& spec, const std::string& name);
+
 }  // namespace dtr::pipeline

@@ -7,6 +7,7 @@
 #include "cli/pipeline/depth_stage.h"
 #include "cli/pipeline/finishing.h"
 #include "cli/pipeline/input_hash.h"
+#include "cli/pipeline/kept_notes.h"
 #include "cli/pipeline/run_log.h"
 #include "cli/pipeline/set_page.h"
 #include "cli/pipeline/validate_set.h"
@@ -69,11 +70,12 @@ void CopyImages(const std::filesystem::path& from, DtrSet& set, int threads, io:
 
 }  // namespace
 
-RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& progress) {
+RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& listener) {
   const stereo::Effort effort = EffortOf(options.depth);
   RequireEngine(options.depth);
   const bool in_place = options.output.empty();
   RunLog log;
+  KeptNotes progress(listener);
   log.Begin("depth");
   RecomputeReport report;
   report.written = in_place ? options.set : options.output;
@@ -131,7 +133,8 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& progre
                 0,
                 options.threads});
   log.End();
-  io::WriteRunRecord(writer.folder(), log.Record(ResolveThreads(options.threads)));
+  io::WriteRunRecord(writer.folder(),
+                     log.Record(ResolveThreads(options.threads), progress.lines()));
   writer.Finish(set);
   return report;
 }

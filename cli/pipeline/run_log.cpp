@@ -3,6 +3,7 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <utility>
 
 namespace dtr::pipeline {
 namespace {
@@ -48,10 +49,11 @@ void RunLog::End() {
   running_ = false;
 }
 
-io::RunRecord RunLog::Record(int threads) const {
+io::RunRecord RunLog::Record(int threads, std::vector<std::string> lines) const {
   io::RunRecord record;
   record.stages = stages_;
   record.threads = threads;
+  record.log = std::move(lines);
   return record;
 }
 

@@ -16,8 +16,8 @@ class RunLog {
   /// Ends the running stage.
   void End();
   const std::vector<io::RunStage>& stages() const { return stages_; }
-  /// The record of the run, to be written by io::WriteRunRecord.
-  io::RunRecord Record(int threads) const;
+  /// The record of the run, with these lines, to be written by io::WriteRunRecord.
+  io::RunRecord Record(int threads, std::vector<std::string> lines = {}) const;
 
  private:
   std::vector<io::RunStage> stages_;

@@ -180,6 +180,15 @@ struct Problem {
   Level finest;
 };
 
+DepthEstimate Judged(const Problem& problem, int threads, State* state,
+                     std::atomic<int>* without_planes) {
+  bool planes_left_out = false;
+  DepthEstimate estimate =
+      TrustedDepth(problem.finest, *problem.view, problem.range, threads, state, &planes_left_out);
+  *without_planes += planes_left_out ? 1 : 0;
+  return estimate;
+}
+
 }  // namespace
 
 int PatchMatchEngine::Rounds() const { return effort_.rounds; }
@@ -215,7 +224,7 @@ DepthEstimate PatchMatchEngine::Estimate(std::span<const StereoView> views, int 
                                          const EngineOptions& options) const {
   Problem problem(views, reference, neighbours, range, {}, Neighbours(), options);
   State state = problem.Search(effort_.iterations, options);
-  return TrustedDepth(problem.finest, *problem.view, range, options.threads, &state);
+  return Judged(problem, options.threads, &state, &without_planes_);
 }
 
 PlaneMap PatchMatchEngine::Match(std::span<const StereoView> views, int reference,
@@ -247,7 +256,7 @@ DepthEstimate PatchMatchEngine::Judge(std::span<const StereoView> views, int ref
                                       const EngineOptions& options) const {
   Problem problem(views, reference, neighbours, range, maps, effort_.round_neighbours, options);
   State state = problem.Resume(*maps[static_cast<size_t>(reference)], options);
-  return TrustedDepth(problem.finest, *problem.view, range, options.threads, &state);
+  return Judged(problem, options.threads, &state, &without_planes_);
 }
 
 }  // namespace dtr::stereo

@@ -1,6 +1,9 @@
 // stereo/patchmatch/patchmatch_engine.h -- slanted planes in several views (PatchMatch).
 #pragma once
+#include <atomic>
+
 #include "stereo/engine.h"
+#include "stereo/left_out.h"
 
 namespace dtr::stereo {
 
@@ -14,7 +17,7 @@ namespace dtr::stereo {
 /// Effort::neighbours, the rounds the first Effort::round_neighbours, Estimate, which is the search
 /// alone, the more of both. Memory (WorkBytes) does not depend on the number of threads: at full
 /// size 113 bytes per pixel of the reference and 7 per pixel of each neighbour.
-class PatchMatchEngine final : public Engine {
+class PatchMatchEngine final : public Engine, public CountsLeftOut {
  public:
   explicit PatchMatchEngine(const Effort& effort = {}) : effort_(effort) {}
   std::string name() const override { return "patchmatch"; }
@@ -34,9 +37,11 @@ class PatchMatchEngine final : public Engine {
                       std::span<const int> neighbours, const DepthRange& range,
                       std::span<const PlaneMap* const> maps,
                       const EngineOptions& options) const override;
+  int without_planes() const override { return without_planes_; }
 
  private:
   Effort effort_;
+  mutable std::atomic<int> without_planes_{0};  // a count of calls, of no influence on any
 };
 
 }  // namespace dtr::stereo

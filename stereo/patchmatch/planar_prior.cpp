@@ -126,9 +126,18 @@ Prior PlanarPrior(const Grid<float>& wanted, const PriorSupport& support, const 
                   int threads, State* state) {
   const int width = wanted.width(), height = wanted.height();
   Prior prior{Grid<float>(width, height), Grid<float>(width, height)};
+  const auto is_open = [&](int x, int y) { return wanted(x, y) != 0 && prior.w(x, y) == 0; };
+  const auto any_open = [&](int begin, int end) {
+    for (int y = begin; y < end; ++y) {
+      for (int x = 0; x < width; ++x) {
+        if (is_open(x, y)) return true;
+      }
+    }
+    return false;
+  };
   const auto fit_row = [&](const Band& sums, int radius, int y) {
     for (int x = 0; x < width; ++x) {
-      if (wanted(x, y) == 0 || prior.w(x, y) != 0) continue;
+      if (!is_open(x, y)) continue;
       const double px = support.px_per_w(x, y);
       const auto plane = FitAround(sums.At(x), x, y, radius, *picture.grey.at(x, y), px);
       if (!plane) continue;
@@ -144,6 +153,7 @@ Prior PlanarPrior(const Grid<float>& wanted, const PriorSupport& support, const 
   ParallelFor(0, (height + kBandRows - 1) / kBandRows, threads, [&](int band) {
     const int begin = band * kBandRows, end = std::min(height, begin + kBandRows);
     for (const int radius : kRadii) {
+      if (!any_open(begin, end)) break;  // sums that nobody asks for
       Band sums(support, picture, radius);
       for (int y = begin; y < end; ++y) {
         sums.MoveTo(y, y == begin);

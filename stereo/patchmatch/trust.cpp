@@ -1,6 +1,7 @@
 #include "stereo/patchmatch/trust.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <vector>
 
@@ -33,6 +34,9 @@ constexpr float kWeakCost = 1.1f, kLeastWeakCost = 1e-6f;
 constexpr float kVaguePx = 0.5f;
 /// The planes around a pixel are asked so often: what they have filled is around the next ones.
 constexpr int kPriorPasses = 2;
+/// Where no larger share of the pixels than this is without a sure depth, planes are not fitted:
+/// more than this they could not add.
+constexpr double kFewDoubtful = 0.002;
 /// The planes around a pixel may cost so much more than its own, chosen as the cheapest.
 constexpr float kPriorCost = 0.1f;
 /// One row of so many is asked whether its pixels are ambiguous: what repeats covers more.
@@ -141,17 +145,24 @@ class Trust {
   }
 
   /// Gives a depth to what has none, and a better one to what is vague, where the planes around
-  /// lead to one that the pictures do not speak against.
-  void AskThePlanesAround() {
+  /// lead to one that the pictures do not speak against. False, and nothing is done, where that
+  /// could be of use to hardly a pixel.
+  bool AskThePlanesAround() {
+    std::atomic<std::int64_t> doubtful{0};
     ParallelFor(0, height(), threads_, [&](int y) {
+      std::int64_t in_row = 0;
       for (int x = 0; x < width(); ++x) {
         if (DepthImage::IsHole(result_.depth(x, y))) {
           believed_(x, y) = 0;
         } else if (!(sigma_px_(x, y) > kVaguePx)) {
           cost_(x, y) = 0;
         }
+        in_row += cost_(x, y) != 0;
       }
+      doubtful += in_row;
     });
+    const double pixels = static_cast<double>(width()) * height();
+    if (static_cast<double>(doubtful) <= kFewDoubtful * pixels) return false;
     const Prior prior =
         PlanarPrior(cost_, {believed_, sigma_px_, px_per_w_}, level_.reference, threads_, state_);
     ParallelFor(0, height(), threads_, [&](int y) {
@@ -164,6 +175,7 @@ class Trust {
         Keep(x, y, v);
       }
     });
+    return true;
   }
 
   DepthEstimate TakeResult() { return std::move(result_); }
@@ -198,10 +210,12 @@ class Trust {
 }  // namespace
 
 DepthEstimate TrustedDepth(const Level& level, const StereoView& view, const DepthRange& range,
-                           int threads, State* state) {
+                           int threads, State* state, bool* planes_left_out) {
   Trust trust(level, view, range, threads, state);
   trust.BelieveWhatIsSeen();
-  for (int pass = 0; pass < kPriorPasses; ++pass) trust.AskThePlanesAround();
+  int passes = 0;
+  while (passes < kPriorPasses && trust.AskThePlanesAround()) ++passes;
+  *planes_left_out = passes == 0;
   return trust.TakeResult();
 }
 

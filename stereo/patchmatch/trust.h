@@ -9,8 +9,9 @@ namespace dtr::stereo::patchmatch {
 /// agree, the minimum is flat, the mask forbids, a small patch of surface stands alone, or a
 /// texture repeats. Where texture is weak or the minimum flat, reliable planes all around give a
 /// prior (PlanarPrior) that the pixel's own plane is combined with, or that stands in its place in
-/// `state` if the photos say no more against it.
+/// `state` if the photos say no more against it. `planes_left_out`: hardly a pixel asks for that,
+/// and no planes were fitted.
 DepthEstimate TrustedDepth(const Level& level, const StereoView& view, const DepthRange& range,
-                           int threads, State* state);
+                           int threads, State* state, bool* planes_left_out);
 
 }  // namespace dtr::stereo::patchmatch

@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "capture/duplicates.h"
 #include "capture/screening.h"
 #include "capture/sfm_images.h"
 #include "capture/store.h"
@@ -269,6 +270,47 @@ TEST(JudgePhotos, ShotsOfOnePictureAreDuplicatesAndASmallStepIsNone) {
   EXPECT_THAT(capture.photos[1].screening->remarks[0], HasSubstr("same picture as a.png"));
   EXPECT_EQ(capture.photos[2].screening->duplicate_of, "");
   EXPECT_EQ(capture.photos[3].screening->duplicate_of, "c.png");
+}
+
+TEST(DropSamePictures, TakesOutWhatHasTheSamePixelsAndKeepsWhatResembles) {
+  const TemporaryFolder folder;
+  const auto none = [](const std::string&) { return false; };
+  io::WriteImage(folder / "a.png", Blobs(0, 3, 1));
+  io::WriteImage(folder / "b.jpg", Blobs(0, 3, 2));  // another shot from the same tripod
+  fs::copy_file(folder / "b.jpg", folder / "c.jpg");
+  AddExifOrientation(folder / "c.jpg", 1);            // the pixels of b in another file
+  io::WriteImage(folder / "d.png", Blobs(20, 3, 3));  // from elsewhere
+  fs::copy_file(folder / "a.png", folder / "e.png");
+  Capture capture = Ingest(folder.path());
+  ASSERT_EQ(capture.photos.size(), 5u);
+  const auto left_out = DropSamePictures(capture, none);
+  EXPECT_THAT(NamesOf(capture), ElementsAre("a.png", "b.jpg", "d.png"));
+  ASSERT_EQ(left_out.size(), 2u);
+  EXPECT_EQ(left_out[0].name + " " + left_out[0].same_as, "c.jpg b.jpg");
+  EXPECT_EQ(left_out[1].name + " " + left_out[1].same_as, "e.png a.png");
+  ASSERT_EQ(capture.skipped.size(), 2u);
+  EXPECT_EQ(capture.skipped[1].name, "e.png");
+  EXPECT_THAT(capture.skipped[1].reason, HasSubstr("same pixels as a.png"));
+  EXPECT_THAT(DropSamePictures(capture, none), IsEmpty());
+}
+
+TEST(DropSamePictures, MasksAndPreferenceHaveASay) {
+  const TemporaryFolder folder;
+  for (const char* name : {"a.png", "b.png", "c.png"}) {
+    io::WriteImage(folder / name, Blobs(0, 3, 1));
+  }
+  ImageRgb8 left_half(400, 300, 3);
+  for (int y = 0; y < 300; ++y) {
+    for (int x = 0; x < 600; ++x) left_half.row(y)[x] = 255;
+  }
+  io::WriteImage(folder / "a_mask.png", left_half);
+  Capture capture = Ingest(folder.path());
+  ASSERT_EQ(capture.photos.size(), 3u);
+  // a shows less than b and c do; c is asked for.
+  const auto left_out = DropSamePictures(capture, [](const auto& name) { return name == "c.png"; });
+  EXPECT_THAT(NamesOf(capture), ElementsAre("a.png", "c.png"));
+  ASSERT_EQ(left_out.size(), 1u);
+  EXPECT_EQ(left_out[0].name + " " + left_out[0].same_as, "b.png c.png");
 }
 
 TEST(DropFaulty, TakesOutWhatIsAskedForAndListsIt) {

@@ -128,6 +128,25 @@ Results Compute(const Row& row, const Engine& engine, const DepthMapsOptions& op
   return results;
 }
 
+TEST(ComputeDepthMaps, PairsWithoutCommonPointsAreLeftOutAndCounted) {
+  WallEngine engine;
+  Recorder all_share;
+  Compute(Cameras(4), engine, Options(2, 1), all_share);
+  EXPECT_TRUE(all_share.notes.empty());
+  // The last of four sees points of its own alone, and would have no neighbour: it is told apart.
+  Row row = Cameras(4);
+  std::erase_if(row.scene.observations, [](const SparseObservation& seen) {
+    return (seen.view == 3) != (seen.point >= 40);
+  });
+  Recorder some_do_not;
+  Compute(row, engine, Options(2, 1), some_do_not);
+  ASSERT_EQ(some_do_not.notes.size(), 2u);
+  EXPECT_EQ(some_do_not.notes[0],
+            "6 of 12 pairs of view and neighbour left out: they have no more than 3 points in "
+            "common");
+  EXPECT_EQ(some_do_not.notes[1], "view 3: no neighbours, no depth");
+}
+
 TEST(ComputeDepthMaps, HandsOutEveryViewOnceInOrderWithWrongPixelsRemoved) {
   WallEngine engine;
   Recorder progress;

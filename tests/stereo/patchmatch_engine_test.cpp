@@ -362,6 +362,25 @@ TEST(PatchMatchEngine, ATexturelessWallIsHoles) {
   EXPECT_LT(Judge(EstimateFirst(ViewsOf(shots)), shots[0].truth).kept, 0.01);
 }
 
+TEST(PatchMatchEngine, PlanesAreFittedToWeakTextureAndLeftOutWhereItSuffices) {
+  auto shots =
+      Shots(Slanted(), {Facing({0, 0, 0}), Facing({kBaseline, 0, 0}), Facing({-kBaseline, 0, 0}),
+                        Facing({0, kBaseline, 0}), Facing({0, -kBaseline, 0})});
+  const PatchMatchEngine engine;
+  const auto without_planes = [&] {
+    const int before = engine.without_planes();
+    engine.Estimate(ViewsOf(shots), 0, std::vector{1, 2, 3, 4}, kRange, {.threads = 2});
+    return engine.without_planes() - before;
+  };
+  EXPECT_EQ(without_planes(), 1);
+  // A patch of wall of one colour, as wide as the windows: from here on it is a thousandth of the
+  // picture and more that planes may help.
+  for (Shot& shot : shots) {
+    for (int y = 50; y < 70; ++y) std::fill_n(shot.image.row(y) + 3 * 70, 3 * 20, std::uint8_t{90});
+  }
+  EXPECT_EQ(without_planes(), 0);
+}
+
 TEST(PatchMatchEngine, ExposureDoesNotMatter) {
   auto shots = Shots(Slanted(), {Facing({0, 0, 0}), Facing({kBaseline, 0, 0})});
   for (auto& value : shots[1].image.data()) {

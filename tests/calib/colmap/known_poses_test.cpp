@@ -4,13 +4,17 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <cmath>
+#include <numbers>
 
 #include "calib/colmap/export.h"
 #include "calib/colmap/held_out.h"
 #include "calib/colmap/model_io.h"
+#include "calib/colmap/view_pyramids.h"
 #include "calib/colmap/workspace.h"
 #include "dtr/base/error.h"
 #include "dtr/base/hash.h"
+#include "dtr/base/random.h"
 #include "tests/calib/colmap/fake_colmap.h"
 #include "tests/calib/colmap/model_test_support.h"
 
@@ -95,6 +99,105 @@ TEST_F(KnownPosesWithFake, MovedPoseIsAnError) {
 TEST_F(KnownPosesWithFake, OnePhotoIsAUsageError) {
   posed_.resize(1);
   EXPECT_THROW(Run(), UsageError);
+}
+
+class Notes final : public Progress {
+ public:
+  void Stage(const std::string&, int) override {}
+  void Update(int) override {}
+  void Note(const std::string& line) override { lines.push_back(line); }
+  std::vector<std::string> lines;
+};
+
+TEST_F(KnownPosesWithFake, PairsThatCannotOverlapAreNotMatchedAndSaidOnce) {
+  // b.jpg turns its back on the others, from behind them.
+  posed_[1].cam_from_world = {Eigen::Quaterniond(0, 0, 1, 0), {0, 0, -9}};
+  Notes notes;
+  TriangulateWithPoses(photos_.path(), posed_, workspace_ / "posed", {}, notes);
+  EXPECT_THAT(notes.lines, ElementsAre("2 of 3 pairs of photos left out of matching: their cameras "
+                                       "cannot see the same thing"));
+  std::string matching;
+  for (const std::string& call : fake_.Calls()) {
+    EXPECT_THAT(call, Not(HasSubstr("exhaustive_matcher")));
+    if (call.starts_with("matches_importer")) matching = call;
+  }
+  const std::string flag = "--match_list_path ";
+  const size_t at = matching.find(flag);
+  ASSERT_NE(at, std::string::npos);
+  const std::string file = matching.substr(at + flag.size());
+  EXPECT_EQ(ReadFile(file.substr(0, file.find(' ')), 1000), "000000.jpg 000002.jpg\n");
+}
+
+TEST_F(KnownPosesWithFake, PairsThatMayOverlapAreAllMatched) {
+  Notes notes;
+  TriangulateWithPoses(photos_.path(), posed_, workspace_ / "posed", {}, notes);
+  EXPECT_THAT(notes.lines, SizeIs(0));
+  EXPECT_THAT(fake_.Calls()[2], HasSubstr("exhaustive_matcher"));
+}
+
+PosedImage At(const Eigen::Vector3d& centre, double yaw_deg, const PinholeCamera& camera) {
+  PosedImage image;
+  image.camera = FromPinhole(camera);
+  image.cam_from_world.rotation =
+      Eigen::AngleAxisd(yaw_deg * std::numbers::pi / 180, Eigen::Vector3d::UnitY());
+  image.cam_from_world.translation = -(image.cam_from_world.rotation * centre);
+  return image;
+}
+
+TEST(CannotOverlap, HandWorkedCases) {
+  // 90 degrees wide; 95.5 with the margin.
+  const PinholeCamera camera(200, 200, 100, 100, 100, 100);
+  const PosedImage ahead = At({0, 0, 0}, 0, camera);
+  EXPECT_FALSE(CannotOverlap(ahead, ahead));
+  EXPECT_FALSE(CannotOverlap(ahead, At({1, 0, 0}, 0, camera)));    // side by side: far away
+  EXPECT_FALSE(CannotOverlap(ahead, At({0, 0, 5}, 180, camera)));  // face to face
+  EXPECT_TRUE(CannotOverlap(ahead, At({0, 0, -5}, 180, camera)));  // back to back
+  EXPECT_FALSE(CannotOverlap(ahead, At({0, 0, 0}, 94, camera)));   // poses are never exact
+  EXPECT_TRUE(CannotOverlap(ahead, At({0, 0, 0}, 97, camera)));
+  // Two that look across each other see the same, two that look away from each other do not.
+  const bool left_first = CannotOverlap(At({-1, 0, 0}, 60, camera), At({1, 0, 0}, -60, camera));
+  const bool right_first = CannotOverlap(At({1, 0, 0}, 60, camera), At({-1, 0, 0}, -60, camera));
+  EXPECT_NE(left_first, right_first);
+  PosedImage lens = At({0, 0, -5}, 180, camera);
+  lens.camera = {calib::LensModel::kSimpleRadial, 200, 200, {100, 100, 100, 0.1}};
+  EXPECT_FALSE(CannotOverlap(ahead, lens));
+}
+
+TEST(CannotOverlap, NoPointIsInBothViewsOfAPairLeftOutAndSomeIsInMostOthers) {
+  Random random(5);
+  const PinholeCamera camera(300, 200, 250, 250, 150, 100);
+  const auto random_image = [&] {
+    PosedImage image;
+    image.camera = FromPinhole(camera);
+    image.cam_from_world.rotation =
+        Eigen::Quaterniond(random.Normal(), random.Normal(), random.Normal(), random.Normal())
+            .normalized();
+    image.cam_from_world.translation = {random.Normal(), random.Normal(), random.Normal()};
+    return image;
+  };
+  constexpr int kPairs = 300, kPoints = 3000;
+  int left_out = 0, kept = 0, kept_with_points = 0;
+  for (int pair = 0; pair < kPairs; ++pair) {
+    const PosedImage a = random_image(), b = random_image();
+    int shared = 0;
+    for (int i = 0; i < kPoints; ++i) {
+      const Eigen::Vector2d pixel(random.Uniform(0, 300), random.Uniform(0, 200));
+      const Eigen::Vector3d p =
+          a.cam_from_world.Inverse() *
+          camera.CamFromPixel(pixel, std::exp(random.Uniform(-4, 7)), DepthKind::kPlaneZ);
+      const auto in_b = camera.PixelFromCam(b.cam_from_world * p);
+      shared += in_b && camera.Contains(*in_b);
+    }
+    if (CannotOverlap(a, b)) {
+      ++left_out;
+      EXPECT_EQ(shared, 0) << pair;
+    } else {
+      ++kept;
+      kept_with_points += shared > 0;
+    }
+  }
+  EXPECT_GT(left_out, kPairs / 4);
+  EXPECT_GT(kept_with_points, kept * 7 / 10);  // the others overlap in the margin or a narrow wedge
 }
 
 // A frozen model of two photos, and held-out ones to be placed in it.
