@@ -60,8 +60,8 @@ struct LensJudgement {
 };
 
 struct Judgement {
-  /// Why (some) images of 10 sights or more have no judgement; empty where all have one. The test photos_not_judged then
-  /// fails: no evidence is no pass.
+  /// Why (some) images of 10 sights or more have no judgement; empty where all have one. The test
+  /// photos_not_judged then fails: no evidence is no pass.
   std::string not_judged;
   int parts = 1;  ///< that the images were judged in
   std::vector<Check> tests;
@@ -80,10 +80,10 @@ struct Judgement {
 ///  - the covariance is carried to a third view's pixels (TransferCovariance);
 ///  - degeneracies are looked for by name;
 ///  - residuals are held against a shutter that reads row by row (shutter.h).
-/// Some 4000 points, drawn by their index, take part, and all of photos that would be left few. More than some 220 photos (kMostUnknowns
-/// with three turns each) are judged in parts of about 100 that see the same points, each by
-/// itself; of every test the worst part's figure is told. Deterministic for any number of threads.
-/// Throws Error on a broken bundle only.
+/// Some 4000 points, drawn by their index, take part, and all of photos that would be left few.
+/// More than some 220 photos (kMostUnknowns with three turns each) are judged in parts of about 100
+/// that see the same points, each by itself; of every test the worst part's figure is told.
+/// Deterministic for any number of threads. Throws Error on a broken bundle only.
 Judgement Judge(const Bundle& stored, const BundleLimits& limits, int threads = 0);
 
 /// Degeneracies of a solution (degeneracy.cpp says how each is recognised). `covariance` may be one

@@ -31,7 +31,7 @@ struct RigSummary {
   double rms_px = 0, sigma_px = 0;
   std::vector<std::string> flipped;
   std::vector<std::string> simpler;  ///< cameras that got a simpler model, and why, a line each
-  int passes = 1;  ///< solves, of free-running cameras
+  int passes = 1;                    ///< solves, of free-running cameras
   /// Of cameras that were taken to be synchronised: what speaks against it (calib/judge).
   std::vector<std::optional<calib::CameraDelay>> delays;
   calib::PatternTest unsteady;  ///< pictures that keep no common rate (calib/judge)

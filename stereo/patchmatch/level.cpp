@@ -135,7 +135,7 @@ Level MakeLevel(const StereoView& view, const Picture& reference,
     for (int x = 0; x < r.width; ++x) *r.usable.at(x, y) = reference.usable(x, y) != 0 ? 1 : 0;
   }
   r.rgb = ColoursTellSurfacesApart(view) ? ColourOf(view, r.width, r.height, 1 << index)
-                                                : Bordered<std::int32_t>(r.width, r.height, 0);
+                                         : Bordered<std::int32_t>(r.width, r.height, 0);
   const Eigen::Matrix3d reference_inverse = MatrixOf(reference.camera).inverse();
   // Texture index coordinates: pixel centre i + 0.5 lies at i + kTextureBorder.
   Eigen::Matrix3d shift = Eigen::Matrix3d::Identity();

@@ -43,8 +43,13 @@ class LeftOut : public ::testing::Test {
 
   // What the mapper leaves of the courtyard's photos: the truth, in the order of names. `further`
   // photos find no place.
-  void LeaveModel(colmap::testing::FakeColmap& colmap, int further = 0) const {
+  void LeaveModel(colmap::testing::FakeColmap& colmap, int further = 0, double k1 = 0) const {
     calib::SfmModel model = colmap::ReadModel(folder_ / "courtyard/sparse");
+    for (auto& [id, camera] : model.cameras) {
+      const PinholeCamera c = camera.Pinhole();
+      camera.model = calib::LensModel::kSimpleRadial;
+      camera.params = {c.fx_px(), c.cx_px(), c.cy_px(), k1};
+    }
     std::vector<std::string> aliases;
     for (calib::SfmImage& image : model.images) {
       image.name = aliases.emplace_back(fmt::format("{:06}.jpg", aliases.size()));
@@ -64,10 +69,11 @@ TEST_F(LeftOut, SfmAndUndistortionWhereCamerasAreGivenAndStraight) {
   EXPECT_THAT(Log(), Contains("undistortion left out: no camera has distortion"));
 }
 
-TEST_F(LeftOut, NotSfmWhereNoCamerasAreGiven) {
+TEST_F(LeftOut, NeitherWhereNoCamerasAreGivenAndTheLensDistorts) {
   colmap::testing::FakeColmap colmap;
-  LeaveModel(colmap);
-  Build({"--engine", "none"});
+  LeaveModel(colmap, 0, -0.01);
+  Build({"--engine", "none", "--no-refine"});
+  EXPECT_THAT(Log(), Not(Contains(HasSubstr("undistortion left out"))));
   EXPECT_THAT(Log(), Not(Contains(HasSubstr("structure from motion left out"))));
   EXPECT_THAT(colmap.Calls(), Contains(HasSubstr("mapper")));
 }

@@ -75,8 +75,8 @@ Reader OpenCapture(const fs::path& folder) {
     photo.date_time = "2026:01:02 03:04:05";
     photo.gps = io::GpsPosition{47.5, 8.5, 400.0};
     photo.source_sha256 = std::string(64, 'a');
-    photo.screening = capture::Screening{
-        0.5, 0.1, 0.2, "", {capture::Fault::kBlurred}, {"may be blurred"}, {}};
+    photo.screening =
+        capture::Screening{0.5, 0.1, 0.2, "", {capture::Fault::kBlurred}, {"may be blurred"}, {}};
     photo.video_frame = capture::VideoFrame{"walk.mp4", 7, 0.28};
     photo.mask_file = std::string("masks/") + id + ".png";
     photo.mask_sha256 = std::string(64, 'b');

@@ -4,11 +4,11 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "datasets/exact/stereo_scene.h"
 #include "stereo/depth_range.h"
 #include "stereo/neighbours.h"
 #include "stereo/sgbm/planes.h"
 #include "stereo/sgbm/rectify.h"
-#include "datasets/exact/stereo_scene.h"
 
 namespace dtr::stereo {
 namespace {
