@@ -122,8 +122,8 @@ TEST_F(Hostile, APhotoEditedInACaptureIsAnotherInput) {
 
 TEST_F(Hostile, MemoryThatChangesTheFeaturesIsAnotherInput) {
   fs::create_directories(folder_ / "photos");
-  for (const char* name : {"photos/0000.jpg", "photos/0001.jpg"}) {
-    io::WriteImage(folder_ / name, ImageRgb8(2400, 1800, 3, 90));
+  for (const auto& [name, grey] : {std::pair("photos/0000.jpg", 90), {"photos/0001.jpg", 120}}) {
+    io::WriteImage(folder_ / name, ImageRgb8(2400, 1800, 3, static_cast<std::uint8_t>(grey)));
   }
   // Known poses need features too, for the points.
   std::string cameras = Text(*shared_ / "courtyard/cameras.json");
