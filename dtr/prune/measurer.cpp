@@ -162,9 +162,12 @@ Check Measurer::CheckOf(const Setting& setting) {
     }
     return found;
   });
-  Check check{numbers[0],          numbers[1],
-              errors.psnr_loss_db, errors.psnr_loss_error_db,
-              std::nullopt,        10 * std::log10(255 * 255 / errors.before)};
+  Check check;
+  check.probe_loss_db = numbers[0];
+  check.probe_error_db = numbers[1];
+  check.witness_loss_db = errors.psnr_loss_db;
+  check.witness_error_db = errors.psnr_loss_error_db;
+  check.error_db = 10 * std::log10(255 * 255 / errors.before);
   if (numbers.size() > 3) {
     check.photo_loss_db = numbers[2];
     check.photo_frame_loss_db = numbers[3];

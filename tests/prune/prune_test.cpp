@@ -175,6 +175,9 @@ TEST(Prune, KeepsItsPromiseAndSavesMoreWhereMoreIsAllowed) {
     const PruneReport report = PruneWith(set, SmallOptions(allowed_db));
     EXPECT_LE(report.loss_db(), allowed_db);
     EXPECT_FALSE(report.photo_loss_db);
+    EXPECT_FALSE(report.photo_frame_loss_db);
+    EXPECT_GT(report.error_db, 10) << "PSNR before";
+    EXPECT_LT(report.error_db, 60);
     double share = 1;
     for (const Removal& removal : report.removed) share *= 1 - removal.bytes_share;
     double frames = 1;
@@ -218,6 +221,8 @@ TEST(Prune, HeldOutPhotosAreToldOfAndDecideNothing) {
   for (auto& value : photo.image.data()) value = static_cast<std::uint8_t>(255 - value);
   const PruneReport other = PruneWith(set, SmallOptions(2));
   EXPECT_NE(*report.photo_loss_db, *other.photo_loss_db);
+  ASSERT_TRUE(report.photo_frame_loss_db);
+  EXPECT_LT(std::abs(*report.photo_frame_loss_db), 5);
   EXPECT_EQ(report.loss_db(), other.loss_db());
   EXPECT_EQ(report.setting.without, other.setting.without);
   EXPECT_EQ(report.setting.coding, other.setting.coding);
