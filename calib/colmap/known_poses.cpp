@@ -184,6 +184,7 @@ SfmResult TriangulateWithPoses(const fs::path& images_dir, std::span<const Posed
   Workspace workspace(workspace_folder, images_dir, InputsOf(known.images), "",
                       ResolveThreads(options.threads), progress);
   SfmResult result;
+  // Where no pair could overlap the cameras are doubtful: the photos themselves are asked then.
   const ImagePairs pairs = PairsThatMayOverlap(known.images);
   FeaturesAndMatches(workspace, known.groups, options, result.report,
                      pairs.empty() ? std::nullopt : std::optional(pairs));

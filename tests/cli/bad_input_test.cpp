@@ -7,6 +7,7 @@
 #include "dtr/base/files.h"
 #include "dtr/io/image_io.h"
 #include "tests/calib/colmap/fake_colmap.h"
+#include "tests/cli/courtyard_and_set.h"
 #include "tests/cli/run_dtr.h"
 #include "tests/cli/small_courtyard.h"
 #include "tests/support/environment.h"
@@ -20,18 +21,8 @@ using Json = nlohmann::json;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-class BadInput : public ::testing::Test {
+class BadInput : public CourtyardAndSet {
  protected:
-  static void SetUpTestSuite() {
-    shared_ = new TemporaryFolder;
-    MakeSmallCourtyard(*shared_ / "courtyard");
-    ImportSmallCourtyard(*shared_ / "courtyard", *shared_ / "good.dtr");
-  }
-  static void TearDownTestSuite() { delete shared_; }
-  static std::string Shared(const std::string& name) { return (*shared_ / name).string(); }
-  static std::string Photos() { return Shared("courtyard/images"); }
-  std::string In(const std::string& name) const { return (folder_ / name).string(); }
-
   // `dtr build` into set.dtr with these arguments after the photos.
   Ran Build(const std::string& photos, std::vector<std::string> further = {}) {
     further.insert(further.begin(), {"build", photos, "-o", In("set.dtr")});
@@ -60,10 +51,7 @@ class BadInput : public ::testing::Test {
     further.insert(further.begin(), {"render", Shared("good.dtr"), "--renderer", "cpu"});
     return Dtr(further);
   }
-  static TemporaryFolder* shared_;
-  TemporaryFolder folder_;
 };
-TemporaryFolder* BadInput::shared_ = nullptr;
 
 TEST_F(BadInput, FoldersWithoutEnoughPhotos) {
   fs::create_directories(folder_ / "photos");

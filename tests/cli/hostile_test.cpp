@@ -6,6 +6,7 @@
 #include "dtr/base/files.h"
 #include "dtr/io/image_io.h"
 #include "tests/calib/colmap/fake_colmap.h"
+#include "tests/cli/courtyard_and_set.h"
 #include "tests/cli/run_dtr.h"
 #include "tests/cli/small_courtyard.h"
 #include "tests/support/test_data.h"
@@ -27,26 +28,16 @@ Ran DtrInto(const std::string& words, const fs::path& out, const fs::path& err) 
   return ran;
 }
 
-class Hostile : public ::testing::Test {
+class Hostile : public CourtyardAndSet {
  protected:
-  static void SetUpTestSuite() {
-    shared_ = new TemporaryFolder;
-    MakeSmallCourtyard(*shared_ / "courtyard");
-    ImportSmallCourtyard(*shared_ / "courtyard", *shared_ / "good.dtr");
-  }
-  static void TearDownTestSuite() { delete shared_; }
   static fs::path Good() { return *shared_ / "good.dtr"; }
-  std::string In(const std::string& name) const { return (folder_ / name).string(); }
 
   // A build that gets as far as COLMAP, which fails: what it began stays for the next run.
   Ran BeginBuild(const std::string& photos, std::vector<std::string> further = {}) {
     further.insert(further.begin(), {"build", photos, "-o", In("set.dtr"), "--engine", "none"});
     return Dtr(further);
   }
-  static TemporaryFolder* shared_;
-  TemporaryFolder folder_;
 };
-TemporaryFolder* Hostile::shared_ = nullptr;
 
 TEST_F(Hostile, NamesInASetNeverLeadOutOfTheFolderOfAnExport) {
   const std::string text = Text(Good() / "set.json");
@@ -88,14 +79,14 @@ TEST_F(Hostile, AResultThatCannotBeToldIsAFailure) {
 
 TEST_F(Hostile, ArgumentsThatJsonCannotHoldAreRefusedBeforeAnyWork) {
   const std::string name = In("caf\xe9\n.dtr");
-  const Ran ran = Dtr({"build", (*shared_ / "courtyard/images").string(), "-o", name});
+  const Ran ran = Dtr({"build", Photos(), "-o", name});
   ExpectRefused(ran, kWrongUsage, "expected UTF-8, found");
   EXPECT_THAT(ran.err, HasSubstr("caf??.dtr'; rename"));  // on one line
   EXPECT_EQ(FilesIn(folder_.path()), 0);
 }
 
 TEST_F(Hostile, AnInterruptedBuildIsNotTakenForACapture) {
-  const std::string photos = (*shared_ / "courtyard/images").string();
+  const std::string photos = Photos();
   {
     colmap::testing::FakeColmap colmap;
     colmap.Fail("feature_extractor", "exit 3");
@@ -110,7 +101,7 @@ TEST_F(Hostile, AnInterruptedBuildIsNotTakenForACapture) {
 
 TEST_F(Hostile, APhotoEditedInACaptureIsAnotherInput) {
   const std::string capture = In("capture");
-  DtrOk({"capture", (*shared_ / "courtyard/images").string(), "-o", capture});
+  DtrOk({"capture", Photos(), "-o", capture});
   colmap::testing::FakeColmap colmap;
   colmap.Fail("feature_extractor", "exit 3");
   const std::string others = "expected work of the same inputs and options, found others";

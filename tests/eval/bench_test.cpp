@@ -12,6 +12,7 @@
 #include "dtr/eval/growth.h"
 #include "dtr/render/valid_views.h"
 #include "tests/eval/clockwork.h"
+#include "tests/support/noted_lines.h"
 
 namespace dtr::eval {
 namespace {
@@ -112,14 +113,6 @@ TEST(MeasureReportTable, EndsARowBlockWhenMoreViewsAreNotValid) {
   EXPECT_EQ(report.rows.back().views_used, 4);
 }
 
-class Listener final : public Progress {
- public:
-  void Stage(const std::string&, int) override {}
-  void Update(int) override {}
-  void Note(const std::string& line) override { notes.push_back(line); }
-  std::vector<std::string> notes;
-};
-
 TEST(MeasureReportTable, SaysWhyThereAreNoMoreRows) {
   BenchOptions options;
   options.repeats = 1;
@@ -127,7 +120,7 @@ TEST(MeasureReportTable, SaysWhyThereAreNoMoreRows) {
   options.resolutions = {2};
   const BenchMachine machine{"cpu", 2, "clockwork", "0.1.0", "wall"};
   for (const bool memory : {true, false}) {
-    Listener listener;
+    dtr::testing::NotedLines listener;
     Clockwork clockwork(false);
     if (memory) clockwork.room_for_views = 4;
     const BenchReport report =
@@ -137,17 +130,17 @@ TEST(MeasureReportTable, SaysWhyThereAreNoMoreRows) {
     EXPECT_EQ(report.ends[0].views_used, 4);
     EXPECT_EQ(report.ends[0].views_asked, 5);
     EXPECT_EQ(report.ends[0].for_memory, memory);
-    ASSERT_THAT(listener.notes, ::testing::SizeIs(1));
-    EXPECT_THAT(listener.notes[0],
+    ASSERT_THAT(listener.lines, ::testing::SizeIs(1));
+    EXPECT_THAT(listener.lines[0],
                 ::testing::HasSubstr(memory ? "memory holds only 4 of them; give --gpu-memory"
                                             : "only 4 are valid here"));
     const auto json = nlohmann::json::parse(ToJson("report", report, machine));
     EXPECT_EQ(json["ends"][0]["reason"], memory ? "memory" : "valid views");
   }
-  Listener listener;
+  dtr::testing::NotedLines listener;
   Clockwork clockwork(false);
   EXPECT_TRUE(MeasureReportTable(Planes(9, true), options, clockwork, listener).ends.empty());
-  EXPECT_TRUE(listener.notes.empty());
+  EXPECT_TRUE(listener.lines.empty());
 }
 
 TEST(MeasureWeightTable, HasARowForEveryNumberOfViewsWeightAndMethod) {
@@ -233,7 +226,7 @@ TEST(MeasureGrowth, ThePerPixelRuleDrawsNoCopiesWithoutPixels) {
   DtrSet set = Planes(6, false);
   set.scene_center = {1, 0, -10};  // behind every camera
   const View& first = set.frames[0].views[0];
-  Listener listener;
+  dtr::testing::NotedLines listener;
   Selector selector;
   const auto series =
       MeasureGrowth(set, {first.camera, first.cam_from_world}, {{}, 1}, selector, listener);
@@ -244,8 +237,8 @@ TEST(MeasureGrowth, ThePerPixelRuleDrawsNoCopiesWithoutPixels) {
     EXPECT_EQ(selected.size(), static_cast<size_t>(views));
     for (const std::string& id : selected) EXPECT_EQ(id.substr(0, 1), "v");
   }
-  ASSERT_THAT(listener.notes, ::testing::SizeIs(1));
-  EXPECT_THAT(listener.notes[0], ::testing::HasSubstr("per-pixel rule"));
+  ASSERT_THAT(listener.lines, ::testing::SizeIs(1));
+  EXPECT_THAT(listener.lines[0], ::testing::HasSubstr("per-pixel rule"));
 }
 
 TEST(BenchJson, NamesAreTheInterface) {

@@ -4,8 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "stereo/depth_maps.h"
 #include "datasets/exact/stereo_quality.h"
+#include "stereo/depth_maps.h"
+#include "tests/support/noted_lines.h"
 
 namespace dtr::stereo::testing {
 namespace {
@@ -15,14 +16,6 @@ using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
 const PinholeCamera kCamera(320, 240, 300, 300, 160, 120);
-
-class Notes final : public Progress {
- public:
-  void Stage(const std::string&, int) override {}
-  void Update(int) override {}
-  void Note(const std::string& line) override { lines.push_back(line); }
-  std::vector<std::string> lines;
-};
 
 /// Three views of a slanted plane that lies between the depths 2.5 and 8.1.
 class WidenedRanges : public ::testing::Test {
@@ -60,7 +53,7 @@ class WidenedRanges : public ::testing::Test {
   std::vector<Shot> shots_;
   std::vector<StereoView> views_;
   std::vector<ViewNeighbours> neighbours_;
-  Notes notes_;
+  dtr::testing::NotedLines notes_;
 };
 
 TEST_F(WidenedRanges, AnEndThatDepthsPileUpAtMovesOutUntilTheyDoNot) {

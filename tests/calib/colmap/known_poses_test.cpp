@@ -17,6 +17,7 @@
 #include "dtr/base/random.h"
 #include "tests/calib/colmap/fake_colmap.h"
 #include "tests/calib/colmap/model_test_support.h"
+#include "tests/support/noted_lines.h"
 
 namespace dtr::colmap {
 namespace {
@@ -101,18 +102,10 @@ TEST_F(KnownPosesWithFake, OnePhotoIsAUsageError) {
   EXPECT_THROW(Run(), UsageError);
 }
 
-class Notes final : public Progress {
- public:
-  void Stage(const std::string&, int) override {}
-  void Update(int) override {}
-  void Note(const std::string& line) override { lines.push_back(line); }
-  std::vector<std::string> lines;
-};
-
 TEST_F(KnownPosesWithFake, PairsThatCannotOverlapAreNotMatchedAndSaidOnce) {
   // b.jpg turns its back on the others, from behind them.
   posed_[1].cam_from_world = {Eigen::Quaterniond(0, 0, 1, 0), {0, 0, -9}};
-  Notes notes;
+  dtr::testing::NotedLines notes;
   TriangulateWithPoses(photos_.path(), posed_, workspace_ / "posed", {}, notes);
   EXPECT_THAT(notes.lines, ElementsAre("2 of 3 pairs of photos left out of matching: their cameras "
                                        "cannot see the same thing"));
@@ -129,7 +122,7 @@ TEST_F(KnownPosesWithFake, PairsThatCannotOverlapAreNotMatchedAndSaidOnce) {
 }
 
 TEST_F(KnownPosesWithFake, PairsThatMayOverlapAreAllMatched) {
-  Notes notes;
+  dtr::testing::NotedLines notes;
   TriangulateWithPoses(photos_.path(), posed_, workspace_ / "posed", {}, notes);
   EXPECT_THAT(notes.lines, SizeIs(0));
   EXPECT_THAT(fake_.Calls()[2], HasSubstr("exhaustive_matcher"));
