@@ -72,7 +72,7 @@ std::string Fingerprint(const PruneSetOptions& options, const DtrSet& set) {
   }
   const prune::PruneOptions& prune = options.prune;
   return Json{{"tool_version", DTR_VERSION},
-              {"measured", "what some view sees"},
+              {"measured", "what some view sees; what is removed counts whole"},
               {"set_sha256", Sha256OfFile(options.set / "set.json")},
               {"held_out", held_out},
               {"probes", prune.probes},

@@ -9,12 +9,22 @@
 #include "dtr/eval/timed_renderer.h"
 #include "dtr/io/depth_io.h"
 #include "dtr/io/set_io.h"
+#include "dtr/render/scene.h"
 
 namespace dtr::pipeline {
 namespace {
 
 enum Axis : size_t { kDepth, kImage, kSigma, kMesh };
 constexpr const char *kPng = "png", *kJpeg = "jpeg", *kKept = "kept", *kLeftOut = "left-out";
+/// Our bands (FORMAT 4.1) within a bound in pixels of disparity.
+constexpr struct {
+  const char* name;
+  double error_px;
+} kBands[] = {{"zstd-0.125px", 0.125}, {"zstd-0.25px", 0.25}, {"zstd-0.5px", 0.5}, {"zstd-1px", 1}};
+constexpr struct {
+  const char* name;
+  int quality;
+} kJpegs[] = {{"jpeg-95", 95}, {"jpeg-85", 85}, {"jpeg-70", 70}};
 constexpr double kMillimetreFarthest = 65.535;                   // what 16 bits of millimetres hold
 constexpr double kHalfNearest = 0x1p-14, kHalfFarthest = 65504;  // with half's 11 bits
 
@@ -52,6 +62,34 @@ Stored HowItLies(const DtrSet& set) {
   return stored;
 }
 
+/// The depth of a view with its pixels in memory, in the coding of that name.
+void RecodeDepth(View& view, const std::string& coding, LengthUnit unit, io::SetWriter& writer) {
+  const auto* band = std::find_if(std::begin(kBands), std::end(kBands),
+                                  [&](const auto& entry) { return coding == entry.name; });
+  if (band != std::end(kBands)) {
+    // As in `dtr prune`, a view of too wide a range for that bound keeps its coding.
+    (void)io::TrySetDepthError(view, band->error_px * ThresholdsOf(view, {}).pixel);
+  } else {
+    view.depth_coding = io::DepthCodingFromName(coding);
+    io::ClampToRange(view);
+  }
+  view.depth_file.reset();
+  writer.RecodeDepth(view, unit);
+}
+
+/// The image of a view with its pixels in memory, in the coding of that name.
+void RecodeImage(View& view, const std::string& coding, LengthUnit unit, io::SetWriter& writer) {
+  for (const auto& jpeg : kJpegs) {
+    if (coding == jpeg.name) return writer.WriteJpeg(view, jpeg.quality);
+  }
+  View pixels = view;
+  pixels.mask = {};
+  pixels.depth = {};
+  pixels.inverse_depth_sigma.reset();
+  writer.WriteView(pixels, unit);
+  view.image_file = pixels.image_file;
+}
+
 std::uint64_t BytesOf(const DtrSet& set) {
   std::uint64_t bytes = 0;
   for (const View& view : set.frames.front().views) {
@@ -75,8 +113,10 @@ StorageSweep::StorageSweep(StorageSweepOptions options, Progress& progress)
   }
   if (stored.half) codings.emplace_back(io::NameOf(DepthCoding::kExrHalf));
   if (stored.millimetres) codings.emplace_back(io::NameOf(DepthCoding::kPng16Millimetre));
-  axes_ = {{"depth", OwnFirst(stored.depth, codings)},
-           {"image", OwnFirst(stored.image, {kPng, kJpeg})}};
+  for (const auto& band : kBands) codings.emplace_back(band.name);
+  std::vector<std::string> images{kPng};
+  for (const auto& jpeg : kJpegs) images.emplace_back(jpeg.name);
+  axes_ = {{"depth", OwnFirst(stored.depth, codings)}, {"image", OwnFirst(stored.image, images)}};
   // What the set has not, it cannot keep.
   axes_.push_back({"sigma", {stored.sigma ? kKept : kLeftOut}});
   if (stored.sigma) axes_.back().values.emplace_back(kLeftOut);
@@ -84,39 +124,50 @@ StorageSweep::StorageSweep(StorageSweepOptions options, Progress& progress)
   if (stored.mesh) axes_.back().values.emplace_back(kLeftOut);
 }
 
-eval::SweepMeasurement StorageSweep::Measure(const eval::SweepSetting& setting) const {
+void StorageSweep::Write(View& view, const eval::SweepSetting& setting, LengthUnit unit,
+                         io::SetWriter& writer) const {
   const auto value = [&](Axis axis) {
     return axes_[axis].values.at(static_cast<size_t>(setting.at(axis)));
   };
+  // The first value of depth and image is how the set lies: those files stay as they are.
+  const bool source = view.role == ViewRole::kSource;
+  const bool same_depth = setting.at(kDepth) == 0 || !source;
+  const bool same_image = setting.at(kImage) == 0 || !source;
+  if (!same_depth || !same_image) {
+    io::LoadOptions load;
+    load.sigma = false;
+    load.threads = options_.threads;
+    io::LoadPixels(options_.set, view, load);
+  }
+  if (value(kSigma) != kKept) view.sigma_file.reset();
+  view.mesh_file.reset();
+  View copied = view;
+  if (!same_depth) copied.depth_file.reset();
+  // Masks are stored the same way beside any image.
+  if (!same_image) copied.image_file.reset();
+  writer.CopyFiles(options_.set, copied);
+  if (!same_depth) RecodeDepth(view, value(kDepth), unit, writer);
+  if (!same_image) RecodeImage(view, value(kImage), unit, writer);
+  view.image = {};
+  view.mask = {};
+  view.depth = {};
+}
+
+eval::SweepMeasurement StorageSweep::Measure(const eval::SweepSetting& setting) const {
   const TemporaryFolder scratch{ScratchFolder(options_.work)};
   const TemporaryFolder made{scratch.folder / "storage.dtr"};
   // Nothing is resumed: the folder is this run's own.
   std::filesystem::remove_all(made.folder.string() + ".partial");
   DtrSet set = io::ReadSet(options_.set);
   {
-    io::SetWriter writer(made.folder, R"({"sweep":"storage"})", true,
-                         value(kImage) == kPng ? io::ImageCoding::kPng : io::ImageCoding::kJpeg);
-    io::LoadOptions load;
-    load.sigma = value(kSigma) == kKept;
-    load.threads = options_.threads;
+    io::SetWriter writer(made.folder, R"({"sweep":"storage"})", true);
     for (View& view : set.frames.front().views) {
       progress_.ThrowIfInterrupted();
-      io::LoadPixels(options_.set, view, load);
-      view.depth_file.reset();
-      view.sigma_file.reset();
-      view.mesh_file.reset();
-      if (view.role == ViewRole::kSource) {
-        view.depth_coding = io::DepthCodingFromName(value(kDepth));
-        io::ClampToRange(view);
-      }
-      writer.WriteView(view, set.unit);
-      view.image = {};
-      view.mask = {};
-      view.depth = {};
-      view.inverse_depth_sigma.reset();
-      view.mesh.reset();
+      Write(view, setting, set.unit, writer);
     }
-    if (value(kMesh) == kKept) WriteMeshes(set, writer, options_.threads);
+    if (axes_[kMesh].values.at(static_cast<size_t>(setting.at(kMesh))) == kKept) {
+      WriteMeshes(set, writer, options_.threads);
+    }
     // The calibration's points are no part of what is rendered from.
     set.sparse_file.reset();
     writer.Finish(set);

@@ -8,6 +8,7 @@
 #include "dtr/base/progress.h"
 #include "dtr/eval/held_out.h"
 #include "dtr/eval/sweep.h"
+#include "dtr/io/set_io.h"
 
 namespace dtr::pipeline {
 
@@ -30,6 +31,9 @@ class StorageSweep {
   eval::SweepStage Stage() const;  ///< its functions borrow this object
 
  private:
+  /// Stores a view of the set in memory; its pixels are gone afterwards.
+  void Write(View& view, const eval::SweepSetting& setting, LengthUnit unit,
+             io::SetWriter& writer) const;
   eval::SweepMeasurement Measure(const eval::SweepSetting& setting) const;
 
   StorageSweepOptions options_;

@@ -170,13 +170,22 @@ double StandardError(std::span<const double> values) {
   return std::sqrt(squared / (count - 1) / count);
 }
 
-std::vector<double> LossesDb(std::span<const Place> places, std::span<const ImageRgb8> before,
-                             std::span<const ImageRgb8> after, const Errors& where_photos_are) {
-  const double share = where_photos_are.NewErrorShare() / where_photos_are.before;
-  std::vector<double> losses_db;
+std::vector<double> Changes(std::span<const Place> places, std::span<const ImageRgb8> before,
+                            std::span<const ImageRgb8> after) {
+  std::vector<double> changes;
   for (size_t i = 0; i < places.size(); ++i) {
-    const double difference = MeanOf(eval::CompareSquared(before[i], after[i], places[i].mask));
-    losses_db.push_back(10 * std::log10(1 + share * difference));
+    changes.push_back(MeanOf(eval::CompareSquared(before[i], after[i], places[i].mask)));
+  }
+  return changes;
+}
+
+std::vector<double> LossesDb(std::span<const double> recoded, std::span<const double> removed,
+                             const Errors& where_photos_are) {
+  const double share = where_photos_are.NewErrorShare();
+  std::vector<double> losses_db;
+  for (size_t i = 0; i < recoded.size(); ++i) {
+    const double added = share * recoded[i] + removed[i];
+    losses_db.push_back(10 * std::log10(1 + added / where_photos_are.before));
   }
   return losses_db;
 }

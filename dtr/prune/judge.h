@@ -54,19 +54,25 @@ struct Errors {
   double psnr_loss_error_db = 0;  ///< of that mean: StandardError
   /// Of a change of a picture's pixels, the part that is new error: (after - before) / change. 1
   /// where it is independent of what was wrong already, 0 where it puts one error in the place of
-  /// another. At least kLeastShare: what is unseen from here may show elsewhere.
+  /// another. At least kLeastShare: some of what is wrong here already is right elsewhere.
   double NewErrorShare() const;
 };
-inline constexpr double kLeastShare = 1;
+inline constexpr double kLeastShare = 0.25;
 /// Of the mean of `values`, by their spread; 0 for fewer than two.
 double StandardError(std::span<const double> values);
 Errors CompareWithPhotos(std::span<const Place> places, std::span<const ImageRgb8> before,
                          std::span<const ImageRgb8> after);
 
-/// What a change means from places that have no photo, in dB for each: 10 log10(1 + share D / E), D
-/// the mean squared difference of a picture after and before, E and share from where photos are.
-std::vector<double> LossesDb(std::span<const Place> places, std::span<const ImageRgb8> before,
-                             std::span<const ImageRgb8> after, const Errors& where_photos_are);
+/// For each place the mean squared difference, of what counts there, of pictures after and before.
+std::vector<double> Changes(std::span<const Place> places, std::span<const ImageRgb8> before,
+                            std::span<const ImageRgb8> after);
+
+/// What changes mean from places that have no photo, in dB for each: 10 log10(1 + (share C + R) /
+/// E). C (`recoded`): by how views are stored and drawn; E and share of the same from where photos
+/// are. R (`removed`): by what is there no more. It counts whole: photos of views that are left out
+/// in turn tell little of it, since there the view that shows a thing best is gone anyway.
+std::vector<double> LossesDb(std::span<const double> recoded, std::span<const double> removed,
+                             const Errors& where_photos_are);
 double MeanOf(std::span<const double> values);  ///< 0 for none
 
 }  // namespace dtr::prune

@@ -11,6 +11,8 @@ namespace {
 
 // Novel cameras that decide are others than those that check.
 constexpr std::uint64_t kOtherCameras = 0x9e3779b97f4a7c15u;
+// Of the setting as it is, and of the one that is tried.
+constexpr size_t kKeptPictures = 2;
 
 /// What no view of the whole set sees is guessed before and after, and guesses turn on trifles: it
 /// says nothing of what is lost. From places that see nothing all counts.
@@ -129,17 +131,33 @@ Errors Measurer::AtPhotos(const std::string& what, const Looks& looks, Setting s
   return {numbers[0], numbers[1], numbers[2], numbers[3], numbers[4]};
 }
 
-std::vector<double> Measurer::NovelLossesDb(const Looks& looks, const Setting& setting,
-                                            const Errors& at_photos) {
-  return LossesDb(looks.places, looks.before, PicturesOf(setting, CodedAs(setting.coding), looks),
-                  at_photos);
+const std::vector<ImageRgb8>& Measurer::KeptPictures(Looks& looks, const Setting& kept) {
+  const std::string key = KeyOf(kept);
+  const auto known = std::find_if(looks.kept.begin(), looks.kept.end(),
+                                  [&](const auto& entry) { return entry.first == key; });
+  if (known != looks.kept.end()) return known->second;
+  if (looks.kept.size() == kKeptPictures) looks.kept.pop_front();
+  looks.kept.emplace_back(key, PicturesOf(kept, CodedAs(kept.coding), looks));
+  return looks.kept.back().second;
+}
+
+std::vector<double> Measurer::NovelLossesDb(Looks& looks, const Setting& setting,
+                                            const Errors& with_all_at_photos) {
+  const Setting kept = WithNothingRemoved(setting);
+  const std::vector<ImageRgb8>& recoded = KeptPictures(looks, kept);
+  std::vector<double> removed(looks.places.size(), 0.0);
+  if (KeyOf(kept) != KeyOf(setting)) {
+    removed = Changes(looks.places, recoded, PicturesOf(setting, CodedAs(setting.coding), looks));
+  }
+  return LossesDb(Changes(looks.places, looks.before, recoded), removed, with_all_at_photos);
 }
 
 Measured Measurer::Measure(const Setting& setting) {
   const Errors errors = AtPhotos("photos", deciding_, setting);
   const auto numbers = Numbers("loss " + KeyOf(setting), [&] {
     Prepare();
-    const double novel_loss_db = MeanOf(NovelLossesDb(deciding_novel_, setting, errors));
+    const Errors with_all = AtPhotos("photos", deciding_, WithNothingRemoved(setting));
+    const double novel_loss_db = MeanOf(NovelLossesDb(deciding_novel_, setting, with_all));
     return std::vector<double>{std::max(errors.psnr_loss_db, novel_loss_db),
                                BytesOf(setting, *CodedAs(setting.coding))};
   });
@@ -150,7 +168,8 @@ Check Measurer::CheckOf(const Setting& setting) {
   const Errors errors = AtPhotos("witnesses", witnesses_, setting);
   const auto numbers = Numbers("check " + KeyOf(setting), [&] {
     Prepare();
-    const auto losses_db = NovelLossesDb(checking_, setting, errors);
+    const Errors with_all = AtPhotos("witnesses", witnesses_, WithNothingRemoved(setting));
+    const auto losses_db = NovelLossesDb(checking_, setting, with_all);
     std::vector<double> found = {MeanOf(losses_db), StandardError(losses_db)};
     // Held-out photos are looked at and heeded in nothing: the set would be chosen by what it is
     // measured with.

@@ -1,9 +1,11 @@
 // dtr/prune/measurer.h -- what settings lose and take, by drawing them.
 #pragma once
+#include <deque>
 #include <functional>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "dtr/base/progress.h"
@@ -76,6 +78,8 @@ class Measurer {
   struct Looks {
     std::vector<Place> places;
     std::vector<ImageRgb8> before;
+    /// By KeyOf, with nothing removed: of the last settings.
+    std::deque<std::pair<std::string, std::vector<ImageRgb8>>> kept;
   };
   /// From the journal, else by `measure`.
   std::vector<double> Numbers(const std::string& name,
@@ -84,8 +88,10 @@ class Measurer {
   Coded CodedAs(const Coding& coding);
   double BytesOf(const Setting& setting, const CodedSet& coded) const;
   Errors AtPhotos(const std::string& what, const Looks& looks, Setting setting);
-  std::vector<double> NovelLossesDb(const Looks& looks, const Setting& setting,
-                                    const Errors& at_photos);
+  /// `with_all_at_photos`: of the setting with nothing removed.
+  std::vector<double> NovelLossesDb(Looks& looks, const Setting& setting,
+                                    const Errors& with_all_at_photos);
+  const std::vector<ImageRgb8>& KeptPictures(Looks& looks, const Setting& kept);
   /// Pictures of the whole set, once they are needed.
   void Prepare();
   std::vector<ImageRgb8> PicturesOf(const Setting& setting, const Coded& coded, const Looks& looks,

@@ -27,6 +27,12 @@ const TileRule& RuleOf(double level) { return kTileRules[static_cast<size_t>(lev
 
 }  // namespace
 
+Setting WithNothingRemoved(Setting setting) {
+  setting.without.clear();
+  setting.coding.tiles.clear();
+  return setting;
+}
+
 const char* NameOf(Kind kind) {
   switch (kind) {
     case Kind::kView:
@@ -63,7 +69,7 @@ std::vector<double> LevelsOf(Kind kind) {
     case Kind::kResolution:
       return {2, 4};
     case Kind::kImages:
-      return {95, 90, 85, 80, 70, 60, 45};
+      return {98, 95, 90, 85, 80, 70, 60, 45};
     case Kind::kDepth:
       return {0.125, 0.25, 0.5, 1};
     case Kind::kSize:

@@ -18,6 +18,9 @@ struct Setting {
   RenderOptions render;
 };
 
+/// Stored and drawn the same, with all views and tiles.
+Setting WithNothingRemoved(Setting setting);
+
 enum class Kind { kView, kTiles, kViewsUsed, kResolution, kImages, kDepth, kSize, kMesh };
 inline constexpr std::array kLevelled = {Kind::kTiles,  Kind::kViewsUsed, Kind::kResolution,
                                          Kind::kImages, Kind::kDepth,     Kind::kSize,

@@ -171,6 +171,31 @@ TEST_F(BenchSweep, StorageByBytes) {
   }
 }
 
+TEST_F(BenchSweep, StorageAsTheSetLiesAndInFewerBytes) {
+  const auto measured = [&](const std::string& point) {
+    return Json::parse(DtrOk({"bench", Shared("true.dtr"), "--stage", "storage", "--renderer",
+                              "cpu", "--point", point, "--json", "-"})
+                           .out)["stages"][0]["points"][0];
+  };
+  const Json own = measured("default"), bands = measured("depth=zstd-0.125px"),
+             coarse = measured("depth=zstd-1px"), jpeg = measured("image=jpeg-95"),
+             worse = measured("image=jpeg-70");
+  std::uintmax_t bytes = 0;
+  for (const char* folder : {"images", "depth", "sigma", "masks", "mesh"}) {
+    if (!fs::exists(fs::path(Shared("true.dtr")) / folder)) continue;
+    for (const auto& entry : fs::directory_iterator(fs::path(Shared("true.dtr")) / folder)) {
+      bytes += entry.file_size();
+    }
+  }
+  EXPECT_EQ(own["cost"], static_cast<double>(bytes));
+  EXPECT_LT(bands["cost"], own["cost"]);
+  EXPECT_LT(coarse["cost"], bands["cost"]);
+  EXPECT_LT(jpeg["cost"], own["cost"]);
+  EXPECT_LT(worse["cost"], jpeg["cost"]);
+  EXPECT_NEAR(bands["error"], own["error"], 0.05 * own["error"].get<double>());
+  EXPECT_NE(jpeg["error"], own["error"]);
+}
+
 TEST_F(BenchSweep, WhatCannotBeMeasuredIsRefused) {
   const auto bench = [](std::vector<std::string> words) {
     words.insert(words.begin(), {"bench", Shared("true.dtr"), "--renderer", "cpu"});

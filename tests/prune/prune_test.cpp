@@ -129,7 +129,7 @@ TEST(Errors, TellNewErrorFromOneThatTakesAnothersPlace) {
   // The photo is 100; before, pictures are 103 everywhere.
   const std::vector<Place> places = {{{}, ImageRgb8(4, 4, 3, 100), {}, {}}};
   const std::vector<ImageRgb8> before = {ImageRgb8(4, 4, 3, 103)};
-  // 97 is as wrong as 103, so nothing is lost however far the two are apart.
+  // 97 is just as wrong as 103, so nothing is lost however far the two are apart.
   const Errors swapped = CompareWithPhotos(places, before, std::vector{ImageRgb8(4, 4, 3, 97)});
   EXPECT_EQ(swapped.before, 9);
   EXPECT_EQ(swapped.after, 9);
@@ -143,12 +143,17 @@ TEST(Errors, TellNewErrorFromOneThatTakesAnothersPlace) {
   // From a place without a photo: a difference of 9, three times that is new error, on top of 9.
   const std::vector<ImageRgb8> a = {before[0], before[0]}, b = {before[0], ImageRgb8(4, 4, 3, 106)};
   const std::vector<Place> novel(2);
-  EXPECT_EQ(MeanOf(LossesDb(novel, a, a, worse)), 0);
-  const std::vector<double> losses_db = LossesDb(novel, a, b, worse);
+  const std::vector<double> none = {0, 0};
+  EXPECT_EQ(MeanOf(LossesDb(Changes(novel, a, a), none, worse)), 0);
+  const std::vector<double> losses_db = LossesDb(Changes(novel, a, b), none, worse);
   EXPECT_NEAR(MeanOf(losses_db), 0.5 * 10 * std::log10(4.0), 1e-12);
   // Two values x and 0 have the standard deviation x / sqrt(2), their mean x / 2.
   EXPECT_NEAR(StandardError(losses_db), 0.5 * 10 * std::log10(4.0), 1e-12);
   EXPECT_EQ(StandardError(std::span(losses_db).first(1)), 0);
+  // What is there no more counts whole, whatever photos say: 27 on top of 9, once.
+  const std::vector<double> gone = LossesDb(none, std::vector<double>{27, 0}, worse);
+  EXPECT_NEAR(gone[0], 10 * std::log10(4.0), 1e-12);
+  EXPECT_EQ(gone[1], 0);
   const Check lucky{0.05, 0.06, 0.01, 0.02, std::nullopt, 30};
   EXPECT_FALSE(lucky.Holds(0.1));
   EXPECT_FALSE(lucky.Holds(0.16));
