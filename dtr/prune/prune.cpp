@@ -15,6 +15,8 @@ namespace {
 // the budget mostly holds at once.
 constexpr double kDecidingShare = 0.85;
 constexpr int kMostTriedAgain = 24;  // decisions after one that was at fault
+// What was taken back leaves room for others: so often decisions are made and checked anew.
+constexpr int kMostPasses = 4;
 // Differences of a loss below this are chance; without a floor, what costs nothing would divide by
 // 0.
 constexpr double kSmallestLossDb = 1e-3;
@@ -62,9 +64,17 @@ class Pruner {
 
   PruneReport Run() {
     Begin();
-    while (!IsEnough() && DecideOne()) {
+    for (int pass = 0; pass < kMostPasses; ++pass) {
+      const size_t verified = pass == 0 ? 0 : report_.removed.size();
+      if (pass > 0) FindCandidates();
+      while (!IsEnough() && DecideOne()) {
+      }
+      if (pass > 0 && report_.removed.size() == verified) break;
+      if (!CheckFrom(verified)) break;
     }
-    return Checked();
+    for (const Removal& removal : report_.removed) report_.decided_loss_db += removal.loss_db;
+    report_.setting = history_.back();
+    return report_;
   }
 
  private:
@@ -76,20 +86,33 @@ class Pruner {
     measurer_.Accept(setting);
     history_.push_back(setting);
     LeaveOutSigma();
+    FindCandidates();
+    if (measurer_.found() > 1) {
+      progress_.Note("going on from " + std::to_string(measurer_.found()) +
+                     " measurements of a run that was interrupted");
+    }
+  }
+
+  /// All next steps from here, measured.
+  void FindCandidates() {
+    candidates_.clear();
     for (const Kind kind : kLevelled) AddNext(kind, 0);
     for (const View& view : set_.frames.front().views) {
-      if (view.role != ViewRole::kSource) continue;
-      candidates_.push_back({{Kind::kView, view.id, 0}, {}, {}, -1, 0});
+      const Move move{Kind::kView, view.id, 0};
+      const auto& gone = history_.back().without;
+      const bool there = std::find(gone.begin(), gone.end(), view.id) == gone.end();
+      if (view.role != ViewRole::kSource || !there || IsAtFault(move)) continue;
+      candidates_.push_back({move, {}, {}, -1, 0});
     }
     progress_.Stage("measuring what could be left out", static_cast<int>(candidates_.size()));
     for (size_t i = 0; i < candidates_.size(); ++i) {
       Measure(candidates_[i]);
       progress_.Update(static_cast<int>(i) + 1);
     }
-    if (measurer_.found() > 1) {
-      progress_.Note("going on from " + std::to_string(measurer_.found()) +
-                     " measurements of a run that was interrupted");
-    }
+  }
+
+  bool IsAtFault(const Move& move) const {
+    return std::find(at_fault_.begin(), at_fault_.end(), move) != at_fault_.end();
   }
 
   /// No renderer looks at standard deviations: nothing to measure.
@@ -147,6 +170,10 @@ class Pruner {
       const Move move{kind, "", levels[i]};
       if (kind == Kind::kSize && !CanShrink(set_, static_cast<int>(levels[i]))) continue;
       if (!mover_.After(history_.back(), move)) continue;
+      if (IsAtFault(move)) {
+        if (MaySkipLevels(kind)) continue;
+        break;  // dearer ones even more so
+      }
       candidates_.push_back({move, {}, {}, -1, 0});
       some = true;
       if (!MaySkipLevels(kind)) break;
@@ -199,6 +226,7 @@ class Pruner {
                                1 - after.bytes / now_.bytes, 1 - after.frame / now_.frame});
     measurer_.Accept(candidate.after);
     history_.push_back(candidate.after);
+    moves_.push_back(candidate.move);
     now_ = after;
     ++round_;
     std::ostringstream line;
@@ -221,49 +249,63 @@ class Pruner {
     return check;
   }
 
-  /// The longest run of decisions that the check bears out, by halving: losses grow with decisions.
-  /// The decision after it is at fault; of those that came later each is tried again without it.
-  PruneReport Checked() {
+  /// Keeps the longest run of decisions that the check bears out, by halving: losses grow with
+  /// decisions. The first `verified` hold. The decision after that run is at fault; of those that
+  /// came later each is tried again without it. True when some were taken back.
+  bool CheckFrom(size_t verified) {
     progress_.Stage("checking from other places", 0);
-    size_t holds = 0, fails = history_.size();
-    Check accepted = CheckAloud(history_.front(), "the whole set");
+    size_t holds = verified, fails = history_.size();
+    if (verified == 0) Accept(CheckAloud(history_.front(), "the whole set"));
     for (size_t next = history_.size() - 1; holds < next; next = (holds + fails) / 2) {
       const Check check = CheckAloud(history_[next], std::to_string(next) + " decisions");
       if (check.Holds(options_.max_loss_db)) {
         holds = next;
-        accepted = check;
+        Accept(check);
       } else {
         fails = next;
       }
     }
-    Setting setting = history_[holds];
-    const std::vector<Removal> decisions = std::move(report_.removed);
-    report_.removed.assign(decisions.begin(),
-                           decisions.begin() + static_cast<std::ptrdiff_t>(holds));
+    return TakeBackFrom(holds);
+  }
+
+  bool TakeBackFrom(size_t holds) {
+    const std::vector<Setting> history = history_;
+    const std::vector<Removal> decisions = report_.removed;
+    const std::vector<Move> moves = moves_;
+    history_.resize(holds + 1);
+    report_.removed.resize(holds);
+    moves_.resize(holds);
     int tries = 0;
     for (size_t n = holds; n < decisions.size(); ++n) {
-      const Setting candidate = Redone(setting, history_[n], history_[n + 1]);
+      const Setting candidate = Redone(history_.back(), history[n], history[n + 1]);
       const bool tried = n > holds && tries < kMostTriedAgain;
       const Check check = tried ? CheckAloud(candidate, "again " + decisions[n].what) : Check{};
       tries += tried;
       if (tried && check.Holds(options_.max_loss_db)) {
-        setting = candidate;
-        accepted = check;
+        Accept(check);
+        history_.push_back(candidate);
         report_.removed.push_back(decisions[n]);
+        moves_.push_back(moves[n]);
       } else {
         report_.put_back.push_back(decisions[n]);
+        at_fault_.push_back(moves[n]);
       }
     }
-    report_.setting = setting;
-    for (const Removal& removal : report_.removed) report_.decided_loss_db += removal.loss_db;
-    report_.checked_probe_loss_db = accepted.probe_loss_db;
-    report_.probe_error_db = accepted.probe_error_db;
-    report_.witness_loss_db = accepted.witness_loss_db;
-    report_.witness_error_db = accepted.witness_error_db;
-    report_.photo_loss_db = accepted.photo_loss_db;
-    report_.photo_frame_loss_db = accepted.photo_frame_loss_db;
-    report_.error_db = accepted.error_db;
-    return report_;
+    if (holds == decisions.size()) return false;
+    measurer_.Accept(history_.back());
+    now_ = measurer_.Measure(history_.back());
+    ++round_;
+    return true;
+  }
+
+  void Accept(const Check& check) {
+    report_.checked_probe_loss_db = check.probe_loss_db;
+    report_.probe_error_db = check.probe_error_db;
+    report_.witness_loss_db = check.witness_loss_db;
+    report_.witness_error_db = check.witness_error_db;
+    report_.photo_loss_db = check.photo_loss_db;
+    report_.photo_frame_loss_db = check.photo_frame_loss_db;
+    report_.error_db = check.error_db;
   }
 
   const DtrSet& set_;
@@ -275,6 +317,8 @@ class Pruner {
 
   std::vector<Candidate> candidates_;
   std::vector<Setting> history_;  ///< [n]: after n decisions
+  std::vector<Move> moves_;       ///< [n]: what decision n did
+  std::vector<Move> at_fault_;    ///< taken back by a check
   Measured before_, now_;
   int round_ = 0;
   PruneReport report_;

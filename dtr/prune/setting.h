@@ -36,6 +36,7 @@ struct Move {
   Kind kind = Kind::kView;
   std::string view;  ///< its id
   double level = 0;
+  bool operator==(const Move&) const = default;
 };
 
 /// Takes steps on one set.

@@ -158,6 +158,9 @@ TEST(Errors, TellNewErrorFromOneThatTakesAnothersPlace) {
   EXPECT_FALSE(lucky.Holds(0.1));
   EXPECT_FALSE(lucky.Holds(0.16));
   EXPECT_TRUE(lucky.Holds(0.18));
+  const Check scattered{0.01, 0.01, 0.05, 0.06, std::nullopt, std::nullopt, 30};
+  EXPECT_FALSE(scattered.Holds(0.1));
+  EXPECT_TRUE(scattered.Holds(0.12));
 }
 
 TEST(Prune, AllowedNoLossLeavesOutOnlyWhatNobodySees) {
