@@ -13,6 +13,7 @@
 // clang-format off: after highway.h
 #include <hwy/contrib/math/math-inl.h>
 
+#include "stereo/patchmatch/kernel_sample-inl.h"
 #include "stereo/patchmatch/kernel_ncc-inl.h"
 #include "stereo/patchmatch/kernel_verdict-inl.h"
 // clang-format on

@@ -10,11 +10,6 @@
 HWY_BEFORE_NAMESPACE();
 namespace dtr::stereo::patchmatch::HWY_NAMESPACE {
 
-namespace hn = hwy::HWY_NAMESPACE;
-using DF = hn::ScalableTag<float>;
-using DI = hn::ScalableTag<std::int32_t>;
-using VF = hn::Vec<DF>;
-using VI = hn::Vec<DI>;
 constexpr size_t kLanes = hn::MaxLanes(DF());
 static_assert(2 * kLanes <= kBorder, "a group's pixels must not leave the border");
 
@@ -187,28 +182,22 @@ VF ScoreWindow(const Group& g, const Source& s, Warp p) {
   p.uy = hn::IfThenElseZero(p.fits, p.uy);
   p.vx = hn::IfThenElseZero(p.fits, p.vx);
   p.vy = hn::IfThenElseZero(p.fits, p.vy);
-  const auto* quads = reinterpret_cast<const std::int32_t*>(s.texture->quads.data());
-  const VI stride = hn::Set(di, s.texture->stride), byte = hn::Set(di, 255);
+  const VI column = hn::ConvertTo(di, p.u), row = hn::ConvertTo(di, p.v);  // positive: truncation
+  const Sampler texture(reinterpret_cast<const std::int32_t*>(s.texture->quads.data()),
+                        hn::Add(hn::Mul(row, hn::Set(di, s.texture->stride)), column),
+                        s.texture->stride);
   const VF reach = hn::Set(d, static_cast<float>(kRadius));
   const VF skip = hn::Set(d, static_cast<float>(kTapStep));
-  VF row_u = hn::NegMulAdd(reach, hn::Add(p.ux, p.uy), p.u);
-  VF row_v = hn::NegMulAdd(reach, hn::Add(p.vx, p.vy), p.v);
-  const VF du = hn::Mul(skip, p.ux), dv = hn::Mul(skip, p.vx);
-  const VF down_u = hn::Mul(skip, p.uy), down_v = hn::Mul(skip, p.vy);
+  VI row_u =
+      Fixed(hn::NegMulAdd(reach, hn::Add(p.ux, p.uy), hn::Sub(p.u, hn::ConvertTo(d, column))));
+  VI row_v = Fixed(hn::NegMulAdd(reach, hn::Add(p.vx, p.vy), hn::Sub(p.v, hn::ConvertTo(d, row))));
+  const VI du = Fixed(hn::Mul(skip, p.ux)), dv = Fixed(hn::Mul(skip, p.vx));
+  const VI down_u = Fixed(hn::Mul(skip, p.uy)), down_v = Fixed(hn::Mul(skip, p.vy));
   VF mean = hn::Zero(d), squares = hn::Zero(d), product = hn::Zero(d);
   for (int j = 0; j < kTapsPerSide; ++j) {
-    VF u = row_u, v = row_v;
+    VI u = row_u, v = row_v;
     for (int i = 0; i < kTapsPerSide; ++i) {
-      const VI iu = hn::ConvertTo(di, u), iv = hn::ConvertTo(di, v);  // positive: truncation
-      const VF fu = hn::Sub(u, hn::ConvertTo(d, iu)), fv = hn::Sub(v, hn::ConvertTo(d, iv));
-      const VI quad = hn::GatherIndex(di, quads, hn::Add(hn::Mul(iv, stride), iu));
-      const VF p00 = hn::ConvertTo(d, hn::And(quad, byte));
-      const VF p10 = hn::ConvertTo(d, hn::And(hn::ShiftRight<8>(quad), byte));
-      const VF p01 = hn::ConvertTo(d, hn::And(hn::ShiftRight<16>(quad), byte));
-      const VF p11 = hn::ConvertTo(d, hn::And(hn::ShiftRight<24>(quad), byte));
-      const VF top = hn::MulAdd(fu, hn::Sub(p10, p00), p00);
-      const VF bottom = hn::MulAdd(fu, hn::Sub(p11, p01), p01);
-      const VF value = hn::MulAdd(fv, hn::Sub(bottom, top), top);
+      const VF value = hn::ConvertTo(d, texture.At(u, v));
       const VF part = hn::Mul(hn::Load(d, g.weight[kTapsPerSide * j + i]), value);
       mean = hn::Add(mean, part);
       squares = hn::MulAdd(part, value, squares);
@@ -219,6 +208,10 @@ VF ScoreWindow(const Group& g, const Source& s, Warp p) {
     row_u = hn::Add(row_u, down_u);
     row_v = hn::Add(row_v, down_v);
   }
+  const VF grey = hn::Set(d, kGreyPerSample);
+  mean = hn::Mul(mean, grey);
+  squares = hn::Mul(hn::Mul(squares, grey), grey);
+  product = hn::Mul(product, grey);
   const VF noise = hn::Set(d, kNoiseVariance);
   const VF variance = hn::Max(hn::Zero(d), hn::NegMulAdd(mean, mean, squares));
   const VF scale =
