@@ -13,7 +13,6 @@
 // clang-format off: after highway.h
 #include <hwy/contrib/math/math-inl.h>
 
-#include "stereo/patchmatch/kernel_sample-inl.h"
 #include "stereo/patchmatch/kernel_ncc-inl.h"
 #include "stereo/patchmatch/kernel_verdict-inl.h"
 // clang-format on
@@ -129,49 +128,87 @@ void CollectCandidates(const State& state, const Group& g, int far_regions, Cand
   }
 }
 
-/// Joint view selection of ACMH without its sampling: a view in which several candidates match well
-/// and few match badly sees the pixel. Its weight is its score times what the neighbours think.
-void ChooseViews(const Level& level, const Sweep& sweep, const State& state, const Group& g,
-                 const Candidates& c, Best* best) {
+/// What the neighbours think of a view: their mean weight, in units of an equal share, up to 1.
+HWY_INLINE VF PriorOf(const State& state, const Group& g, size_t view) {
   const DF d;
-  const int views = static_cast<int>(level.sources.size());
+  const BorderedGrid& w = state.weight[view];
+  const VF sum = hn::Add(hn::Add(LoadColour(w, g.x, g.y - 1), LoadColour(w, g.x, g.y + 1)),
+                         hn::Add(LoadColour(w, g.x - 1, g.y), LoadColour(w, g.x + 1, g.y)));
+  const float equal = 0.25f * static_cast<float>(state.weight.size());
+  return hn::Min(hn::Set(d, 1.0f), hn::Mul(sum, hn::Set(d, equal)));
+}
+
+/// Costs of all candidates in a view, and how well it sees the pixel: a view in which several
+/// candidates match well and few match badly does (ACMH's joint view selection without its
+/// sampling). From 0 to 1.
+VF CompareInView(const Level& level, const Sweep& sweep, const Group& g, size_t view,
+                 Candidates* c) {
+  const DF d;
+  const VF w_min = hn::Set(d, level.w_min), w_max = hn::Set(d, level.w_max);
   const float age = static_cast<float>(sweep.iteration);
   const float tau = 0.8f * std::exp(-age * age / 90.0f);
   const VF good_below = hn::Set(d, tau), bad_above = hn::Set(d, 1.2f);
   const VF one = hn::Set(d, 1.0f), zero = hn::Zero(d);
-  VF sum = zero, largest = zero;
-  for (int v = 0; v < views; ++v) {
-    VF good = zero, bad = zero, score = zero;
-    for (int n = 0; n < c.count; ++n) {
-      const VF cost = hn::Load(d, c.cost[n][v]);
-      const auto is_good = hn::Lt(cost, good_below);
-      good = hn::Add(good, hn::IfThenElseZero(is_good, one));
-      bad = hn::Add(bad, hn::IfThenElseZero(hn::Gt(cost, bad_above), one));
-      const VF e = hn::Exp(d, hn::Mul(hn::Mul(cost, cost), hn::Set(d, -1.0f / 0.18f)));
-      score = hn::Add(score, hn::IfThenElseZero(is_good, e));
-    }
-    const auto sees =
-        hn::And(hn::Gt(good, hn::Set(d, kGoodPlanes)), hn::Lt(bad, hn::Set(d, kBadPlanes)));
-    score = hn::IfThenElse(sees, hn::Div(score, hn::Max(good, one)),
-                           hn::Set(d, std::exp(-tau * tau / 0.32f)));
-    VF prior = zero;
-    const BorderedGrid& w = state.weight[static_cast<size_t>(v)];
-    prior = hn::Add(LoadColour(w, g.x, g.y - 1), LoadColour(w, g.x, g.y + 1));
-    prior = hn::Add(prior, hn::Add(LoadColour(w, g.x - 1, g.y), LoadColour(w, g.x + 1, g.y)));
-    // The mean weight, in units of an equal share, up to 1.
-    prior = hn::Min(one, hn::Mul(prior, hn::Set(d, 0.25f * static_cast<float>(views))));
-    score = hn::Mul(score, hn::MulAdd(prior, hn::Set(d, 0.8f), hn::Set(d, 0.1f)));
-    hn::Store(score, d, best->weight[v]);
-    largest = hn::Max(largest, score);
+  VF good = zero, bad = zero, score = zero;
+  for (int n = 0; n < c->count; ++n) {
+    const VF w = hn::Load(d, c->w[n]);
+    const auto outside = hn::Or(hn::Lt(w, w_min), hn::Gt(w, w_max));
+    VF cost =
+        CostInView(g, level.sources[view], view, w, hn::Load(d, c->a[n]), hn::Load(d, c->b[n]));
+    cost = hn::IfThenElse(outside, hn::Set(d, kWorstCost), cost);
+    cost = hn::IfThenElse(hn::Eq(w, w), cost, hn::Set(d, kNothing));
+    hn::Store(cost, d, c->cost[n][view]);
+    const auto is_good = hn::Lt(cost, good_below);
+    good = hn::Add(good, hn::IfThenElseZero(is_good, one));
+    bad = hn::Add(bad, hn::IfThenElseZero(hn::Gt(cost, bad_above), one));
+    const VF e = hn::Exp(d, hn::Mul(hn::Mul(cost, cost), hn::Set(d, -1.0f / 0.18f)));
+    score = hn::Add(score, hn::IfThenElseZero(is_good, e));
   }
-  const VF least = hn::Mul(largest, hn::Set(d, kLeastWeight));
-  for (int v = 0; v < views; ++v) {
+  const auto sees =
+      hn::And(hn::Gt(good, hn::Set(d, kGoodPlanes)), hn::Lt(bad, hn::Set(d, kBadPlanes)));
+  return hn::IfThenElse(sees, hn::Div(score, hn::Max(good, one)),
+                        hn::Set(d, std::exp(-tau * tau / 0.32f)));
+}
+
+/// Weights of the views: how well they see the pixel times what the neighbours think. Views the
+/// neighbours think most of come first; what these leave no say, however well it may see, is not
+/// looked at.
+void ChooseViews(const Level& level, const Sweep& sweep, const State& state, const Group& g,
+                 Candidates* c, Best* best) {
+  const DF d;
+  const size_t views = level.sources.size();
+  HWY_ALIGN float most[kMaxViews][kLanes];
+  float thought[kMaxViews];
+  size_t order[kMaxViews];
+  for (size_t v = 0; v < views; ++v) {
+    const VF largest = hn::MulAdd(PriorOf(state, g, v), hn::Set(d, 0.8f), hn::Set(d, 0.1f));
+    hn::Store(largest, d, most[v]);
+    thought[v] = hn::GetLane(hn::SumOfLanes(d, largest));
+    size_t i = v;
+    for (; i > 0 && thought[order[i - 1]] < thought[v]; --i) order[i] = order[i - 1];
+    order[i] = v;
+  }
+  const VF share = hn::Set(d, kLeastWeight);
+  VF largest = hn::Zero(d);
+  for (size_t i = 0; i < views; ++i) {
+    const size_t v = order[i];
+    const VF bound = hn::Load(d, most[v]);
+    VF weight = hn::Zero(d);
+    if (!hn::AllTrue(d, hn::Lt(bound, hn::Mul(largest, share)))) {
+      weight = hn::Mul(CompareInView(level, sweep, g, v, c), bound);
+    }
+    largest = hn::Max(largest, weight);
+    hn::Store(weight, d, best->weight[v]);
+  }
+  const VF least = hn::Mul(largest, share);
+  VF sum = hn::Zero(d);
+  for (size_t v = 0; v < views; ++v) {
     VF weight = hn::Load(d, best->weight[v]);
     weight = hn::IfThenZeroElse(hn::Lt(weight, least), weight);
     hn::Store(weight, d, best->weight[v]);
     sum = hn::Add(sum, weight);
   }
-  for (int v = 0; v < views; ++v) {
+  for (size_t v = 0; v < views; ++v) {
     hn::Store(hn::Div(hn::Load(d, best->weight[v]), sum), d, best->weight[v]);
   }
 }
@@ -202,26 +239,20 @@ void TryPlane(const Level& level, const Group& g, VF w, VF a, VF b, Best* best) 
   hn::Store(hn::IfThenElse(less, b, hn::Load(d, best->b)), d, best->b);
 }
 
-/// Costs of all candidates in all views, new view weights, then the cheapest candidate.
+/// New view weights, then the cheapest candidate.
 void ChooseJointly(const Level& level, const Sweep& sweep, const State& state, const Group& g,
                    Candidates* c, Best* best) {
   const DF d;
-  const VF w_min = hn::Set(d, level.w_min), w_max = hn::Set(d, level.w_max);
-  for (int n = 0; n < c->count; ++n) {
-    const VF w = hn::Load(d, c->w[n]), a = hn::Load(d, c->a[n]), b = hn::Load(d, c->b[n]);
-    const auto outside = hn::Or(hn::Lt(w, w_min), hn::Gt(w, w_max));
-    const auto there = hn::Eq(w, w);
-    for (size_t v = 0; v < level.sources.size(); ++v) {
-      VF cost = CostInView(g, level.sources[v], v, w, a, b);
-      cost = hn::IfThenElse(outside, hn::Set(d, kWorstCost), cost);
-      hn::Store(hn::IfThenElse(there, cost, hn::Set(d, kNothing)), d, c->cost[n][v]);
-    }
+  ChooseViews(level, sweep, state, g, c, best);
+  bool counts[kMaxViews];
+  for (size_t v = 0; v < level.sources.size(); ++v) {
+    counts[v] = !hn::AllFalse(d, hn::Gt(hn::Load(d, best->weight[v]), hn::Zero(d)));
   }
-  ChooseViews(level, sweep, state, g, *c, best);
   hn::Store(hn::Set(d, std::numeric_limits<float>::infinity()), d, best->cost);
   for (int n = 0; n < c->count; ++n) {
     VF total = hn::Zero(d);
     for (size_t v = 0; v < level.sources.size(); ++v) {
+      if (!counts[v]) continue;
       total = hn::MulAdd(hn::Load(d, best->weight[v]), hn::Load(d, c->cost[n][v]), total);
     }
     const VF old = hn::Load(d, best->cost);

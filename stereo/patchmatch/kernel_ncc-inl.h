@@ -7,6 +7,8 @@
 #define DTR_STEREO_PATCHMATCH_KERNEL_NCC_INL_H_
 #endif
 
+#include "stereo/patchmatch/kernel_sample-inl.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace dtr::stereo::patchmatch::HWY_NAMESPACE {
 
