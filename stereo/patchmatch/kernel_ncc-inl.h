@@ -66,11 +66,26 @@ HWY_INLINE VI ColourDifference(VI a, VI b) {
   return hn::Max(r, hn::Max(g, blue));
 }
 
-/// Weights and values of the windows, and the pixels' rays in the sources.
-void PrepareGroup(const Level& level, int x, int y, Group* g) {
+/// Sets the group's place and its pixels' rays in the sources.
+void PlaceGroup(const Level& level, int x, int y, Group* g) {
   const DF d;
   g->x = x;
   g->y = y;
+  const VF px = hn::Add(hn::Set(d, static_cast<float>(x) + 0.5f), hn::ConvertTo(d, EverySecond()));
+  const VF py = hn::Set(d, static_cast<float>(y) + 0.5f);
+  for (size_t v = 0; v < level.sources.size(); ++v) {
+    const float* m = level.sources[v].m;
+    for (int i = 0; i < 3; ++i) {
+      const VF rest = hn::MulAdd(hn::Set(d, m[3 * i + 1]), py, hn::Set(d, m[3 * i + 2]));
+      hn::Store(hn::MulAdd(hn::Set(d, m[3 * i]), px, rest), d, g->ray[v][i]);
+    }
+  }
+}
+
+/// The same, and weights and values of the windows.
+void PrepareGroup(const Level& level, int x, int y, Group* g) {
+  const DF d;
+  PlaceGroup(level, x, y, g);
   const VI lanes = EverySecond();
   const VI centre = hn::GatherIndex(DI(), level.reference.rgb.at(x, y), lanes);
   VF sum = hn::Zero(d), mean = hn::Zero(d), squares = hn::Zero(d);
@@ -106,15 +121,6 @@ void PrepareGroup(const Level& level, int x, int y, Group* g) {
   }
   hn::Store(squares, d, g->variance);
   hn::Store(hn::Div(inner, inner_sum), d, g->texture);
-  const VF px = hn::Add(hn::Set(d, static_cast<float>(x) + 0.5f), hn::ConvertTo(d, lanes));
-  const VF py = hn::Set(d, static_cast<float>(y) + 0.5f);
-  for (size_t v = 0; v < level.sources.size(); ++v) {
-    const float* m = level.sources[v].m;
-    for (int i = 0; i < 3; ++i) {
-      const VF rest = hn::MulAdd(hn::Set(d, m[3 * i + 1]), py, hn::Set(d, m[3 * i + 2]));
-      hn::Store(hn::MulAdd(hn::Set(d, m[3 * i]), px, rest), d, g->ray[v][i]);
-    }
-  }
 }
 
 /// The window's position in a source and its change per pixel of the reference.
