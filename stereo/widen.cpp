@@ -91,6 +91,8 @@ std::vector<DepthRange> Widened(const Collection& c, int most, Progress& progres
     views.push_back({small[v].camera, c.views[v].cam_from_world, &small[v].pixels.image,
                      &small[v].pixels.mask});
   }
+  EngineOptions options = c.options;
+  options.look = true;
   for (size_t v = 0; v < views.size(); ++v) {
     std::span<const int> neighbours = c.neighbours[v].views;
     if (neighbours.empty()) continue;
@@ -99,7 +101,7 @@ std::vector<DepthRange> Widened(const Collection& c, int most, Progress& progres
       for (int step = 0; step < most; ++step) {
         progress.ThrowIfInterrupted();
         const DepthEstimate look =
-            c.engine->Estimate(views, static_cast<int>(v), neighbours, ranges[v], c.options);
+            c.engine->Estimate(views, static_cast<int>(v), neighbours, ranges[v], options);
         if (!Widen(SharesAtEnds(look.depth, ranges[v]), &ranges[v])) break;
       }
     } catch (const NoUsablePair&) {

@@ -56,6 +56,7 @@ void GuessFromSurfaces(const Level& level, State* state) {
     if (s.surface == nullptr) continue;
     const Matrix m = Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(s.back_m);
     const Vector k = Eigen::Map<const Vector>(s.back_k);
+    const Matrix inverse_transposed = m.inverse().transpose();
     const float px_per_inverse_depth = PxPerInverseDepth(level, s);
     if (!(px_per_inverse_depth > 0)) continue;  // it says nothing of depth here
     const float same = kSamePx / px_per_inverse_depth;
@@ -74,11 +75,12 @@ void GuessFromSurfaces(const Level& level, State* state) {
           continue;
         }
         const int x = static_cast<int>(px), y = static_cast<int>(py);
-        // In the source 1/z = n . (u, v, 1), so H = m + k n^T and here 1/z = H^-T n . (x, y, 1).
+        // In the source 1/z = n . (u, v, 1), so H = m + k n^T and here 1/z = H^-T n . (x, y, 1);
+        // H^-T n = m^-T n / (1 + k . m^-T n) (Sherman and Morrison, 1950).
         Vector n(s.surface_scale * map.slope_x(u, v), s.surface_scale * map.slope_y(u, v), 0);
         n.z() = w - n.dot(at);
-        const Matrix h = m + k * n.transpose();
-        const Vector plane = h.inverse().transpose() * n;
+        const Vector q = inverse_transposed * n;
+        const Vector plane = q / (1 + k.dot(q));
         const float here =
             plane.dot(Vector(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f, 1.0f));
         if (!(here >= level.w_min) || !(here <= level.w_max)) continue;

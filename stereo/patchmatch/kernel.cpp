@@ -24,7 +24,9 @@ namespace dtr::stereo::patchmatch::HWY_NAMESPACE {
 constexpr int kPlanes = 11;
 /// A view sees a pixel when more than this many candidates match well in it and fewer than that
 /// badly. ACMH's 2 and 3 take the sight from all views next to silhouettes and behind thin things.
-constexpr float kGoodPlanes = 1.0f, kBadPlanes = 7.0f;
+constexpr float kSurelyAbove = 1.0001f;
+constexpr float kGoodPlanes = 1.0f;
+constexpr float kBadPlanes = 7.0f;
 constexpr int kNearSamples = 7, kFarSamples = 11;
 /// What a first guess costs more when one view alone speaks for it. By the mean of two a surface
 /// that a single neighbour sees is never found, and no later step looks for it: fountain's far
@@ -52,6 +54,8 @@ struct Best {
   HWY_ALIGN float b[kLanes];
   HWY_ALIGN float cost[kLanes];
   HWY_ALIGN float weight[kMaxViews][kLanes];
+  int used = 0;            ///< views with a say at any of the pixels
+  size_t view[kMaxViews];  ///< which, that with most say first
 };
 
 /// Stores lanes whose pixel lies in the image.
@@ -128,67 +132,122 @@ void CollectCandidates(const State& state, const Group& g, int far_regions, Cand
   }
 }
 
-/// Joint view selection of ACMH without its sampling: a view in which several candidates match well
-/// and few match badly sees the pixel. Its weight is its score times what the neighbours think.
-void ChooseViews(const Level& level, const Sweep& sweep, const State& state, const Group& g,
-                 const Candidates& c, Best* best) {
+/// What the neighbours think of a view: their mean weight, in units of an equal share, up to 1.
+HWY_INLINE VF PriorOf(const State& state, const Group& g, size_t view) {
   const DF d;
-  const int views = static_cast<int>(level.sources.size());
+  const BorderedGrid& w = state.weight[view];
+  const VF sum = hn::Add(hn::Add(LoadColour(w, g.x, g.y - 1), LoadColour(w, g.x, g.y + 1)),
+                         hn::Add(LoadColour(w, g.x - 1, g.y), LoadColour(w, g.x + 1, g.y)));
+  const float equal = 0.25f * static_cast<float>(state.weight.size());
+  return hn::Min(hn::Set(d, 1.0f), hn::Mul(sum, hn::Set(d, equal)));
+}
+
+/// Costs of all candidates in a view, and how well it sees the pixel: a view in which several
+/// candidates match well and few match badly does (ACMH's joint view selection without its
+/// sampling). From 0 to 1.
+VF CompareInView(const Level& level, const Sweep& sweep, const Group& g, size_t view,
+                 Candidates* c) {
+  const DF d;
+  const VF w_min = hn::Set(d, level.w_min), w_max = hn::Set(d, level.w_max);
   const float age = static_cast<float>(sweep.iteration);
   const float tau = 0.8f * std::exp(-age * age / 90.0f);
   const VF good_below = hn::Set(d, tau), bad_above = hn::Set(d, 1.2f);
   const VF one = hn::Set(d, 1.0f), zero = hn::Zero(d);
-  VF sum = zero, largest = zero;
-  for (int v = 0; v < views; ++v) {
-    VF good = zero, bad = zero, score = zero;
-    for (int n = 0; n < c.count; ++n) {
-      const VF cost = hn::Load(d, c.cost[n][v]);
-      const auto is_good = hn::Lt(cost, good_below);
-      good = hn::Add(good, hn::IfThenElseZero(is_good, one));
-      bad = hn::Add(bad, hn::IfThenElseZero(hn::Gt(cost, bad_above), one));
-      const VF e = hn::Exp(d, hn::Mul(hn::Mul(cost, cost), hn::Set(d, -1.0f / 0.18f)));
-      score = hn::Add(score, hn::IfThenElseZero(is_good, e));
-    }
-    const auto sees =
-        hn::And(hn::Gt(good, hn::Set(d, kGoodPlanes)), hn::Lt(bad, hn::Set(d, kBadPlanes)));
-    score = hn::IfThenElse(sees, hn::Div(score, hn::Max(good, one)),
-                           hn::Set(d, std::exp(-tau * tau / 0.32f)));
-    VF prior = zero;
-    const BorderedGrid& w = state.weight[static_cast<size_t>(v)];
-    prior = hn::Add(LoadColour(w, g.x, g.y - 1), LoadColour(w, g.x, g.y + 1));
-    prior = hn::Add(prior, hn::Add(LoadColour(w, g.x - 1, g.y), LoadColour(w, g.x + 1, g.y)));
-    // The mean weight, in units of an equal share, up to 1.
-    prior = hn::Min(one, hn::Mul(prior, hn::Set(d, 0.25f * static_cast<float>(views))));
-    score = hn::Mul(score, hn::MulAdd(prior, hn::Set(d, 0.8f), hn::Set(d, 0.1f)));
-    hn::Store(score, d, best->weight[v]);
-    largest = hn::Max(largest, score);
+  VF good = zero, bad = zero, score = zero;
+  for (int n = 0; n < c->count; ++n) {
+    const VF w = hn::Load(d, c->w[n]);
+    const auto outside = hn::Or(hn::Lt(w, w_min), hn::Gt(w, w_max));
+    VF cost =
+        CostInView(g, level.sources[view], view, w, hn::Load(d, c->a[n]), hn::Load(d, c->b[n]));
+    cost = hn::IfThenElse(outside, hn::Set(d, kWorstCost), cost);
+    cost = hn::IfThenElse(hn::Eq(w, w), cost, hn::Set(d, kNothing));
+    hn::Store(cost, d, c->cost[n][view]);
+    const auto is_good = hn::Lt(cost, good_below);
+    good = hn::Add(good, hn::IfThenElseZero(is_good, one));
+    bad = hn::Add(bad, hn::IfThenElseZero(hn::Gt(cost, bad_above), one));
+    const VF e = hn::Exp(d, hn::Mul(hn::Mul(cost, cost), hn::Set(d, -1.0f / 0.18f)));
+    score = hn::Add(score, hn::IfThenElseZero(is_good, e));
   }
-  const VF least = hn::Mul(largest, hn::Set(d, kLeastWeight));
-  for (int v = 0; v < views; ++v) {
+  const auto sees =
+      hn::And(hn::Gt(good, hn::Set(d, kGoodPlanes)), hn::Lt(bad, hn::Set(d, kBadPlanes)));
+  return hn::IfThenElse(sees, hn::Div(score, hn::Max(good, one)),
+                        hn::Set(d, std::exp(-tau * tau / 0.32f)));
+}
+
+/// Weights of the views: how well they see the pixel times what the neighbours think. Views the
+/// neighbours think most of come first; what these leave no say, however well it may see, is not
+/// looked at.
+void ChooseViews(const Level& level, const Sweep& sweep, const State& state, const Group& g,
+                 Candidates* c, Best* best) {
+  const DF d;
+  const size_t views = level.sources.size();
+  HWY_ALIGN float most[kMaxViews][kLanes];
+  float thought[kMaxViews];
+  size_t order[kMaxViews];
+  for (size_t v = 0; v < views; ++v) {
+    const VF largest = hn::MulAdd(PriorOf(state, g, v), hn::Set(d, 0.8f), hn::Set(d, 0.1f));
+    hn::Store(largest, d, most[v]);
+    thought[v] = hn::GetLane(hn::SumOfLanes(d, largest));
+    size_t i = v;
+    for (; i > 0 && thought[order[i - 1]] < thought[v]; --i) order[i] = order[i - 1];
+    order[i] = v;
+  }
+  const VF share = hn::Set(d, kLeastWeight);
+  VF largest = hn::Zero(d);
+  for (size_t i = 0; i < views; ++i) {
+    const size_t v = order[i];
+    const VF bound = hn::Load(d, most[v]);
+    VF weight = hn::Zero(d);
+    if (!hn::AllTrue(d, hn::Lt(bound, hn::Mul(largest, share)))) {
+      weight = hn::Mul(CompareInView(level, sweep, g, v, c), bound);
+    }
+    largest = hn::Max(largest, weight);
+    hn::Store(weight, d, best->weight[v]);
+  }
+  const VF least = hn::Mul(largest, share);
+  VF sum = hn::Zero(d);
+  for (size_t v = 0; v < views; ++v) {
     VF weight = hn::Load(d, best->weight[v]);
     weight = hn::IfThenZeroElse(hn::Lt(weight, least), weight);
     hn::Store(weight, d, best->weight[v]);
     sum = hn::Add(sum, weight);
   }
-  for (int v = 0; v < views; ++v) {
-    hn::Store(hn::Div(hn::Load(d, best->weight[v]), sum), d, best->weight[v]);
+  best->used = 0;
+  for (size_t v = 0; v < views; ++v) {
+    const VF weight = hn::Div(hn::Load(d, best->weight[v]), sum);
+    hn::Store(weight, d, best->weight[v]);
+    thought[v] = hn::GetLane(hn::SumOfLanes(d, weight));
+    if (!(thought[v] > 0)) continue;
+    int i = best->used++;
+    for (; i > 0 && thought[best->view[i - 1]] < thought[v]; --i) {
+      best->view[i] = best->view[i - 1];
+    }
+    best->view[i] = v;
   }
 }
 
-/// Weighted mean cost of a plane; stops where no lane can get below `limit`.
+/// Weighted mean cost of a plane; where no lane can get below `limit`, it may be any cost above.
+/// The views with most say come first, but the mean is summed up in one order for all groups.
 VF TotalCost(const Level& level, const Group& g, const Best& best, VF w, VF a, VF b, VF limit) {
   const DF d;
-  VF total = hn::Zero(d);
-  for (size_t v = 0; v < level.sources.size(); ++v) {
-    const VF weight = hn::Load(d, best.weight[v]);
-    if (hn::AllTrue(d, hn::Eq(weight, hn::Zero(d)))) continue;
-    total = hn::MulAdd(weight, CostInView(g, level.sources[v], v, w, a, b), total);
-    if (hn::AllTrue(d, hn::Ge(total, limit))) break;
+  HWY_ALIGN float part[kMaxViews][kLanes];
+  for (size_t v = 0; v < level.sources.size(); ++v) hn::Store(hn::Zero(d), d, part[v]);
+  const VF enough = hn::Mul(limit, hn::Set(d, kSurelyAbove));
+  VF so_far = hn::Zero(d);
+  for (int i = 0; i < best.used; ++i) {
+    const size_t v = best.view[i];
+    const VF cost = CostInView(g, level.sources[v], v, w, a, b);
+    const VF weighted = hn::Mul(hn::Load(d, best.weight[v]), cost);
+    hn::Store(weighted, d, part[v]);
+    so_far = hn::Add(so_far, weighted);
+    if (hn::AllTrue(d, hn::Ge(so_far, enough))) return so_far;
   }
+  VF total = hn::Zero(d);
+  for (size_t v = 0; v < level.sources.size(); ++v) total = hn::Add(total, hn::Load(d, part[v]));
   return total;
 }
 
-/// Takes a plane where it lies in the range and costs less.
+/// Takes a plane, put into the range, where it costs less.
 void TryPlane(const Level& level, const Group& g, VF w, VF a, VF b, Best* best) {
   const DF d;
   w = hn::Min(hn::Max(w, hn::Set(d, level.w_min)), hn::Set(d, level.w_max));
@@ -201,27 +260,18 @@ void TryPlane(const Level& level, const Group& g, VF w, VF a, VF b, Best* best) 
   hn::Store(hn::IfThenElse(less, b, hn::Load(d, best->b)), d, best->b);
 }
 
-/// Costs of all candidates in all views, new view weights, then the cheapest candidate.
+/// New view weights, then the cheapest candidate.
 void ChooseJointly(const Level& level, const Sweep& sweep, const State& state, const Group& g,
                    Candidates* c, Best* best) {
   const DF d;
-  const VF w_min = hn::Set(d, level.w_min), w_max = hn::Set(d, level.w_max);
-  for (int n = 0; n < c->count; ++n) {
-    const VF w = hn::Load(d, c->w[n]), a = hn::Load(d, c->a[n]), b = hn::Load(d, c->b[n]);
-    const auto outside = hn::Or(hn::Lt(w, w_min), hn::Gt(w, w_max));
-    const auto there = hn::Eq(w, w);
-    for (size_t v = 0; v < level.sources.size(); ++v) {
-      VF cost = CostInView(g, level.sources[v], v, w, a, b);
-      cost = hn::IfThenElse(outside, hn::Set(d, kWorstCost), cost);
-      hn::Store(hn::IfThenElse(there, cost, hn::Set(d, kNothing)), d, c->cost[n][v]);
-    }
-  }
-  ChooseViews(level, sweep, state, g, *c, best);
+  ChooseViews(level, sweep, state, g, c, best);
   hn::Store(hn::Set(d, std::numeric_limits<float>::infinity()), d, best->cost);
   for (int n = 0; n < c->count; ++n) {
     VF total = hn::Zero(d);
     for (size_t v = 0; v < level.sources.size(); ++v) {
-      total = hn::MulAdd(hn::Load(d, best->weight[v]), hn::Load(d, c->cost[n][v]), total);
+      const VF weight = hn::Load(d, best->weight[v]);
+      const VF part = hn::Mul(weight, hn::Load(d, c->cost[n][v]));
+      total = hn::Add(total, hn::IfThenZeroElse(hn::Eq(weight, hn::Zero(d)), part));
     }
     const VF old = hn::Load(d, best->cost);
     const auto less = hn::Lt(total, old);
@@ -262,7 +312,7 @@ void Refine(const Level& level, const Sweep& sweep, const State& state, const Gr
   HWY_ALIGN float r[3][kLanes];
   Draw(level, g, sweep.round, 0, r);
   const VF w0 = hn::Load(d, best->w), a0 = hn::Load(d, best->a), b0 = hn::Load(d, best->b);
-  TryPlane(level, g, hn::MulAdd(step, hn::Load(d, r[0]), w0), a0, b0, best);
+  if (sweep.move) TryPlane(level, g, hn::MulAdd(step, hn::Load(d, r[0]), w0), a0, b0, best);
   const VF w1 = hn::Load(d, best->w), a1 = hn::Load(d, best->a), b1 = hn::Load(d, best->b);
   TryPlane(level, g, w1, hn::MulAdd(slope, hn::Load(d, r[1]), a1),
            hn::MulAdd(slope, hn::Load(d, r[2]), b1), best);
@@ -302,6 +352,39 @@ std::int64_t SweepRowImpl(const Level& level, const Sweep& sweep, int y, State* 
   return g.samples;
 }
 
+void ExpectRowImpl(const Level& level, int y, State* state) {
+  const DF d;
+  const int width = level.reference.width;
+  const size_t views = level.sources.size();
+  const VF zero = hn::Zero(d), one = hn::Set(d, 1.0f);
+  HWY_ALIGN float trusted[kMaxViews][kLanes];
+  Group g;
+  for (int start = 0; start < 2; ++start) {
+    for (int x = start; x < width; x += 2 * static_cast<int>(kLanes)) {
+      PlaceGroup(level, x, y, &g);
+      const VF w = LoadColour(state->w, x, y);
+      const VF a = LoadColour(state->a, x, y), b = LoadColour(state->b, x, y);
+      VF sum = zero;
+      for (size_t v = 0; v < views; ++v) {
+        const Source& s = level.sources[v];
+        VF trust = one;
+        if (s.surface != nullptr) {
+          const VF off_px = RoundTripPx(g, s, LocateAllowed(g, s, v, w, a, b));
+          trust = hn::IfThenElseZero(hn::Lt(off_px, hn::Set(d, kLargestRoundTripPx)), one);
+        }
+        hn::Store(trust, d, trusted[v]);
+        sum = hn::Add(sum, trust);
+      }
+      const auto any = hn::Gt(sum, zero);
+      const VF equal = hn::Set(d, 1.0f / static_cast<float>(views));
+      for (size_t v = 0; v < views; ++v) {
+        const VF share = hn::Div(hn::Load(d, trusted[v]), hn::Max(sum, one));
+        StoreColour(hn::IfThenElse(any, share, equal), x, y, width, &state->weight[v]);
+      }
+    }
+  }
+}
+
 std::int64_t SearchRowImpl(const Level& level, int samples, int y, State* state) {
   const DF d;
   const int width = level.reference.width;
@@ -312,40 +395,38 @@ std::int64_t SearchRowImpl(const Level& level, int samples, int y, State* state)
   HWY_ALIGN float equal[kMaxViews][kLanes];
   for (auto& lanes : equal) hn::Store(hn::Set(d, 1.0f / static_cast<float>(views)), d, lanes);
   Group g;
-  for (int start = 0; start < 2; ++start) {
-    for (int x = start; x < width; x += 2 * static_cast<int>(kLanes)) {
-      PrepareGroup(level, x, y, &g);
-      VF best = infinity, best_w = hn::Set(d, level.w_min);
-      VF best_a = hn::Zero(d), best_b = hn::Zero(d);
-      for (int n = 0; n < samples; ++n) {
-        Draw(level, g, n, 15, r);
-        const float cell = (level.w_max - level.w_min) / static_cast<float>(samples);
-        const float centre = level.w_min + cell * (static_cast<float>(n) + 0.5f);
-        const VF w = hn::MulAdd(hn::Load(d, r[0]), hn::Set(d, 0.5f * cell), hn::Set(d, centre));
-        const VF px = DisparityPerInverseDepth(g, level, w, equal);
-        const VF tilt = hn::Div(hn::Set(d, n % 2 == 0 ? 0.0f : 1.0f), px);
-        const VF a = hn::Mul(tilt, hn::Load(d, r[1])), b = hn::Mul(tilt, hn::Load(d, r[2]));
-        VF first = hn::Set(d, kWorstCost), second = first;
-        for (size_t v = 0; v < views; ++v) {
-          const VF cost = ScoreView(g, level.sources[v], v, w, a, b);
-          second = hn::Min(second, hn::Max(first, cost));
-          first = hn::Min(first, cost);
-        }
-        const VF mean = views == 1 ? first : hn::Mul(half, hn::Add(first, second));
-        const VF cost = hn::Min(mean, hn::Add(first, hn::Set(d, kLoneView)));
-        const auto less = hn::Lt(cost, best);
-        best = hn::IfThenElse(less, cost, best);
-        best_w = hn::IfThenElse(less, w, best_w);
-        best_a = hn::IfThenElse(less, a, best_a);
-        best_b = hn::IfThenElse(less, b, best_b);
-      }
-      StoreColour(best_w, x, y, width, &state->w);
-      StoreColour(best_a, x, y, width, &state->a);
-      StoreColour(best_b, x, y, width, &state->b);
-      StoreColour(best, x, y, width, &state->cost);
+  for (int x = (y + kGuessedColour) % 2; x < width; x += 2 * static_cast<int>(kLanes)) {
+    PrepareGroup(level, x, y, &g);
+    VF best = infinity, best_w = hn::Set(d, level.w_min);
+    VF best_a = hn::Zero(d), best_b = hn::Zero(d);
+    for (int n = 0; n < samples; ++n) {
+      Draw(level, g, n, 15, r);
+      const float cell = (level.w_max - level.w_min) / static_cast<float>(samples);
+      const float centre = level.w_min + cell * (static_cast<float>(n) + 0.5f);
+      const VF w = hn::MulAdd(hn::Load(d, r[0]), hn::Set(d, 0.5f * cell), hn::Set(d, centre));
+      const VF px = DisparityPerInverseDepth(g, level, w, equal);
+      const VF tilt = hn::Div(hn::Set(d, n % 2 == 0 ? 0.0f : 1.0f), px);
+      const VF a = hn::Mul(tilt, hn::Load(d, r[1])), b = hn::Mul(tilt, hn::Load(d, r[2]));
+      VF first = hn::Set(d, kWorstCost), second = first;
       for (size_t v = 0; v < views; ++v) {
-        StoreColour(hn::Load(d, equal[v]), x, y, width, &state->weight[v]);
+        const VF cost = ScoreView(g, level.sources[v], v, w, a, b);
+        second = hn::Min(second, hn::Max(first, cost));
+        first = hn::Min(first, cost);
       }
+      const VF mean = views == 1 ? first : hn::Mul(half, hn::Add(first, second));
+      const VF cost = hn::Min(mean, hn::Add(first, hn::Set(d, kLoneView)));
+      const auto less = hn::Lt(cost, best);
+      best = hn::IfThenElse(less, cost, best);
+      best_w = hn::IfThenElse(less, w, best_w);
+      best_a = hn::IfThenElse(less, a, best_a);
+      best_b = hn::IfThenElse(less, b, best_b);
+    }
+    StoreColour(best_w, x, y, width, &state->w);
+    StoreColour(best_a, x, y, width, &state->a);
+    StoreColour(best_b, x, y, width, &state->b);
+    StoreColour(best, x, y, width, &state->cost);
+    for (size_t v = 0; v < views; ++v) {
+      StoreColour(hn::Load(d, equal[v]), x, y, width, &state->weight[v]);
     }
   }
   return g.samples;
@@ -362,6 +443,7 @@ namespace dtr::stereo::patchmatch {
 HWY_EXPORT(SearchRowImpl);
 HWY_EXPORT(SweepRowImpl);
 HWY_EXPORT(ScoreRowImpl);
+HWY_EXPORT(ExpectRowImpl);
 HWY_EXPORT(JudgeRowImpl);
 HWY_EXPORT(AmbiguousRowImpl);
 HWY_EXPORT(TargetName);
@@ -371,6 +453,9 @@ std::int64_t SearchRow(const Level& level, int samples, int y, State* state) {
 }
 std::int64_t SweepRow(const Level& level, const Sweep& sweep, int y, State* state) {
   return HWY_DYNAMIC_DISPATCH(SweepRowImpl)(level, sweep, y, state);
+}
+void ExpectRow(const Level& level, int y, State* state) {
+  HWY_DYNAMIC_DISPATCH(ExpectRowImpl)(level, y, state);
 }
 std::int64_t ScoreRow(const Level& level, const State& state, int y, std::span<const float> steps,
                       float* costs) {

@@ -100,6 +100,7 @@ struct Sweep {
   int round = 0;        ///< names the random numbers
   int iteration = 0;    ///< of this level; the test for good views gets stricter
   int far_regions = 4;  ///< strips of far pixels whose best plane is tried, 0 or 4
+  bool move = true;     ///< try the best plane up to step_px nearer or farther
   bool jump = true;     ///< try a random inverse depth from the whole range
   float step_px = 4;    ///< largest random change, pixels of disparity at the window's centre
 };
@@ -115,16 +116,24 @@ struct Verdict {
   int consistent = 0;  ///< views whose own planes lead back to the pixel (after rounds)
 };
 
-/// First guess: tries `samples` inverse depths spread over the range, half of them with a random
-/// slant, and keeps the one with the least mean cost in the two best views, or in the best alone
-/// with a surcharge. Returns the number of samples that were compared, as SweepRow does: a
-/// benchmark divides it by the time.
+/// Colour of the checkerboard whose pixels get a first guess. Sweeps begin with the other.
+constexpr int kGuessedColour = 1;
+
+/// First guess for every second pixel: tries `samples` inverse depths spread over the range, half
+/// of them with a random slant, and keeps the one with the least mean cost in the two best views,
+/// or in the best alone with a surcharge. Returns the number of samples that were compared, as
+/// SweepRow does: a benchmark divides it by the time.
 std::int64_t SearchRow(const Level& level, int samples, int y, State* state);
 
 /// Works out the cost and the view weights of the plane each pixel of one colour has, its
 /// neighbours' and some new ones (Galliani et al., ICCV 2015; Xu and Tao, CVPR 2019) and keeps the
 /// best. Reads only pixels of the other colour, so rows may run in any order.
 std::int64_t SweepRow(const Level& level, const Sweep& sweep, int y, State* state);
+
+/// View weights to begin a round with: equal shares of the views whose own planes lead back to
+/// within 3 pixels of the pixel, of all where none does. The others can hardly get a say, and
+/// SweepRow need not look at most of them.
+void ExpectRow(const Level& level, int y, State* state);
 
 /// Finds the minimum of the cost to a fraction of a pixel and judges it. `out` has a row's length,
 /// as has `wanted`: pixels where that is 0 may be left out. Null: all are wanted.

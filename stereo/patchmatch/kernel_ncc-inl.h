@@ -7,14 +7,11 @@
 #define DTR_STEREO_PATCHMATCH_KERNEL_NCC_INL_H_
 #endif
 
+#include "stereo/patchmatch/kernel_sample-inl.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace dtr::stereo::patchmatch::HWY_NAMESPACE {
 
-namespace hn = hwy::HWY_NAMESPACE;
-using DF = hn::ScalableTag<float>;
-using DI = hn::ScalableTag<std::int32_t>;
-using VF = hn::Vec<DF>;
-using VI = hn::Vec<DI>;
 constexpr size_t kLanes = hn::MaxLanes(DF());
 static_assert(2 * kLanes <= kBorder, "a group's pixels must not leave the border");
 
@@ -69,11 +66,26 @@ HWY_INLINE VI ColourDifference(VI a, VI b) {
   return hn::Max(r, hn::Max(g, blue));
 }
 
-/// Weights and values of the windows, and the pixels' rays in the sources.
-void PrepareGroup(const Level& level, int x, int y, Group* g) {
+/// Sets the group's place and its pixels' rays in the sources.
+void PlaceGroup(const Level& level, int x, int y, Group* g) {
   const DF d;
   g->x = x;
   g->y = y;
+  const VF px = hn::Add(hn::Set(d, static_cast<float>(x) + 0.5f), hn::ConvertTo(d, EverySecond()));
+  const VF py = hn::Set(d, static_cast<float>(y) + 0.5f);
+  for (size_t v = 0; v < level.sources.size(); ++v) {
+    const float* m = level.sources[v].m;
+    for (int i = 0; i < 3; ++i) {
+      const VF rest = hn::MulAdd(hn::Set(d, m[3 * i + 1]), py, hn::Set(d, m[3 * i + 2]));
+      hn::Store(hn::MulAdd(hn::Set(d, m[3 * i]), px, rest), d, g->ray[v][i]);
+    }
+  }
+}
+
+/// The same, and weights and values of the windows.
+void PrepareGroup(const Level& level, int x, int y, Group* g) {
+  const DF d;
+  PlaceGroup(level, x, y, g);
   const VI lanes = EverySecond();
   const VI centre = hn::GatherIndex(DI(), level.reference.rgb.at(x, y), lanes);
   VF sum = hn::Zero(d), mean = hn::Zero(d), squares = hn::Zero(d);
@@ -109,15 +121,6 @@ void PrepareGroup(const Level& level, int x, int y, Group* g) {
   }
   hn::Store(squares, d, g->variance);
   hn::Store(hn::Div(inner, inner_sum), d, g->texture);
-  const VF px = hn::Add(hn::Set(d, static_cast<float>(x) + 0.5f), hn::ConvertTo(d, lanes));
-  const VF py = hn::Set(d, static_cast<float>(y) + 0.5f);
-  for (size_t v = 0; v < level.sources.size(); ++v) {
-    const float* m = level.sources[v].m;
-    for (int i = 0; i < 3; ++i) {
-      const VF rest = hn::MulAdd(hn::Set(d, m[3 * i + 1]), py, hn::Set(d, m[3 * i + 2]));
-      hn::Store(hn::MulAdd(hn::Set(d, m[3 * i]), px, rest), d, g->ray[v][i]);
-    }
-  }
 }
 
 /// The window's position in a source and its change per pixel of the reference.
@@ -187,28 +190,22 @@ VF ScoreWindow(const Group& g, const Source& s, Warp p) {
   p.uy = hn::IfThenElseZero(p.fits, p.uy);
   p.vx = hn::IfThenElseZero(p.fits, p.vx);
   p.vy = hn::IfThenElseZero(p.fits, p.vy);
-  const auto* quads = reinterpret_cast<const std::int32_t*>(s.texture->quads.data());
-  const VI stride = hn::Set(di, s.texture->stride), byte = hn::Set(di, 255);
+  const VI column = hn::ConvertTo(di, p.u), row = hn::ConvertTo(di, p.v);  // positive: truncation
+  const Sampler texture(reinterpret_cast<const std::int32_t*>(s.texture->quads.data()),
+                        hn::Add(hn::Mul(row, hn::Set(di, s.texture->stride)), column),
+                        s.texture->stride);
   const VF reach = hn::Set(d, static_cast<float>(kRadius));
   const VF skip = hn::Set(d, static_cast<float>(kTapStep));
-  VF row_u = hn::NegMulAdd(reach, hn::Add(p.ux, p.uy), p.u);
-  VF row_v = hn::NegMulAdd(reach, hn::Add(p.vx, p.vy), p.v);
-  const VF du = hn::Mul(skip, p.ux), dv = hn::Mul(skip, p.vx);
-  const VF down_u = hn::Mul(skip, p.uy), down_v = hn::Mul(skip, p.vy);
+  VI row_u =
+      Fixed(hn::NegMulAdd(reach, hn::Add(p.ux, p.uy), hn::Sub(p.u, hn::ConvertTo(d, column))));
+  VI row_v = Fixed(hn::NegMulAdd(reach, hn::Add(p.vx, p.vy), hn::Sub(p.v, hn::ConvertTo(d, row))));
+  const VI du = Fixed(hn::Mul(skip, p.ux)), dv = Fixed(hn::Mul(skip, p.vx));
+  const VI down_u = Fixed(hn::Mul(skip, p.uy)), down_v = Fixed(hn::Mul(skip, p.vy));
   VF mean = hn::Zero(d), squares = hn::Zero(d), product = hn::Zero(d);
   for (int j = 0; j < kTapsPerSide; ++j) {
-    VF u = row_u, v = row_v;
+    VI u = row_u, v = row_v;
     for (int i = 0; i < kTapsPerSide; ++i) {
-      const VI iu = hn::ConvertTo(di, u), iv = hn::ConvertTo(di, v);  // positive: truncation
-      const VF fu = hn::Sub(u, hn::ConvertTo(d, iu)), fv = hn::Sub(v, hn::ConvertTo(d, iv));
-      const VI quad = hn::GatherIndex(di, quads, hn::Add(hn::Mul(iv, stride), iu));
-      const VF p00 = hn::ConvertTo(d, hn::And(quad, byte));
-      const VF p10 = hn::ConvertTo(d, hn::And(hn::ShiftRight<8>(quad), byte));
-      const VF p01 = hn::ConvertTo(d, hn::And(hn::ShiftRight<16>(quad), byte));
-      const VF p11 = hn::ConvertTo(d, hn::And(hn::ShiftRight<24>(quad), byte));
-      const VF top = hn::MulAdd(fu, hn::Sub(p10, p00), p00);
-      const VF bottom = hn::MulAdd(fu, hn::Sub(p11, p01), p01);
-      const VF value = hn::MulAdd(fv, hn::Sub(bottom, top), top);
+      const VF value = hn::ConvertTo(d, texture.At(u, v));
       const VF part = hn::Mul(hn::Load(d, g.weight[kTapsPerSide * j + i]), value);
       mean = hn::Add(mean, part);
       squares = hn::MulAdd(part, value, squares);
@@ -219,6 +216,10 @@ VF ScoreWindow(const Group& g, const Source& s, Warp p) {
     row_u = hn::Add(row_u, down_u);
     row_v = hn::Add(row_v, down_v);
   }
+  const VF grey = hn::Set(d, kGreyPerSample);
+  mean = hn::Mul(mean, grey);
+  squares = hn::Mul(hn::Mul(squares, grey), grey);
+  product = hn::Mul(product, grey);
   const VF noise = hn::Set(d, kNoiseVariance);
   const VF variance = hn::Max(hn::Zero(d), hn::NegMulAdd(mean, mean, squares));
   const VF scale =

@@ -7,6 +7,8 @@
 #define DTR_STEREO_PATCHMATCH_KERNEL_VERDICT_INL_H_
 #endif
 
+#include "stereo/patchmatch/kernel_ncc-inl.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace dtr::stereo::patchmatch::HWY_NAMESPACE {
 
@@ -38,16 +40,26 @@ HWY_INLINE VF Vertex(VF before, VF here, VF after, VF* curvature) {
   return hn::Min(hn::Max(at, hn::Set(d, -1.0f)), hn::Set(d, 1.0f));
 }
 
+/// What each view says of the pixels' own planes, after rounds.
+struct Said {
+  HWY_ALIGN float cost[kMaxViews][kLanes];    ///< photometric
+  HWY_ALIGN float off_px[kMaxViews][kLanes];  ///< RoundTripPx
+};
+
 /// Shares of the views in a verdict. After rounds, a view counts by how well it agrees, in looks
 /// and in place; before, by what the sweeps found.
 void WeighViews(const Level& level, const State& state, const Group& g, VF w, VF a, VF b,
-                float (*weights)[kLanes]) {
+                float (*weights)[kLanes], Said* said) {
   const DF d;
   VF largest = hn::Zero(d), sum = hn::Zero(d);
   for (size_t v = 0; v < level.sources.size(); ++v) {
     VF weight = LoadColour(state.weight[v], g.x, g.y);
-    if (level.sources[v].surface != nullptr) {
-      const VF cost = CostInView(g, level.sources[v], v, w, a, b);
+    if (const Source& s = level.sources[v]; s.surface != nullptr) {
+      const Warp p = LocateAllowed(g, s, v, w, a, b);
+      const VF photometric = ScoreWindow(g, s, p), off_px = RoundTripPx(g, s, p);
+      hn::Store(photometric, d, said->cost[v]);
+      hn::Store(off_px, d, said->off_px[v]);
+      const VF cost = hn::MulAdd(hn::Set(d, kCostPerRoundTripPx), off_px, photometric);
       weight = hn::Exp(d, hn::Mul(hn::Mul(cost, cost), hn::Set(d, -1.0f / 0.18f)));
     }
     largest = hn::Max(largest, weight);
@@ -172,12 +184,13 @@ void AmbiguousRowImpl(const Level& level, const State& state, int y, std::uint8_
   const int width = level.reference.width;
   HWY_ALIGN float weights[kMaxViews][kLanes];
   HWY_ALIGN float odds[kLanes];
+  Said said;
   Group g;
   for (int x = 0; x < width; x += 2 * static_cast<int>(kLanes)) {
     PrepareGroup(level, x, y, &g);
     const VF w = LoadColour(state.w, x, y);
     const VF a = LoadColour(state.a, x, y), b = LoadColour(state.b, x, y);
-    WeighViews(level, state, g, w, a, b, weights);
+    WeighViews(level, state, g, w, a, b, weights, &said);
     const VF px = DisparityPerInverseDepth(g, level, w, weights);
     const VF own = MeanScore(level, g, weights, w, a, b);
     hn::Store(RivalsOdds(level, g, weights, w, a, b, px, own), d, odds);
@@ -193,7 +206,8 @@ void JudgeGroup(const Level& level, const State& state, const Group& g, Verdict*
   HWY_ALIGN float weights[kMaxViews][kLanes];
   const VF w = LoadColour(state.w, g.x, g.y), a = LoadColour(state.a, g.x, g.y);
   const VF b = LoadColour(state.b, g.x, g.y);
-  WeighViews(level, state, g, w, a, b, weights);
+  Said said;
+  WeighViews(level, state, g, w, a, b, weights, &said);
   const VF px = DisparityPerInverseDepth(g, level, w, weights);
   const VF step = hn::Div(hn::Set(d, kJudgeStepPx), px);
   VF before = zero, here = zero, after = zero, agreeing = zero, consistent = zero;
@@ -203,15 +217,15 @@ void JudgeGroup(const Level& level, const State& state, const Group& g, Verdict*
     const Source& s = level.sources[v];
     const VF weight = hn::Load(d, weights[v]);
     if (s.surface != nullptr) {
-      const VF off_px = RoundTripPx(g, s, LocateAllowed(g, s, v, w, a, b));
-      const auto is_near = hn::Lt(off_px, hn::Set(d, kConsistentPx));
+      const auto is_near = hn::Lt(hn::Load(d, said.off_px[v]), hn::Set(d, kConsistentPx));
       consistent = hn::Add(consistent, hn::IfThenElseZero(is_near, one));
     }
     hn::Store(zero, d, vertex[v]);
     hn::Store(zero, d, certainty[v]);
     const auto counts = hn::Gt(weight, zero);
     if (hn::AllFalse(d, counts)) continue;
-    const VF c0 = ScoreView(g, s, v, hn::Sub(w, step), a, b), c1 = ScoreView(g, s, v, w, a, b);
+    const VF c0 = ScoreView(g, s, v, hn::Sub(w, step), a, b);
+    const VF c1 = s.surface != nullptr ? hn::Load(d, said.cost[v]) : ScoreView(g, s, v, w, a, b);
     const VF c2 = ScoreView(g, s, v, hn::Add(w, step), a, b);
     before = hn::MulAdd(weight, c0, before);
     here = hn::MulAdd(weight, c1, here);

@@ -23,6 +23,8 @@ constexpr double kLeastSamples = 48, kMostSamples = 128;
 /// Visits per pixel on the coarsest level more than on those between, and on the finest fewer.
 constexpr int kMoreIterations = 2;
 constexpr float kFirstStepPx = 4.0f, kFinestStepPx = 1.0f;
+/// In the place of Effort::iterations where the result is only looked at.
+constexpr int kLookIterations = 1;
 /// Visits per pixel in each round of geometric consistency.
 constexpr int kRefineIterations = 1;
 constexpr int kFirstRoundNumber = 1000;  // names random numbers apart from the search's
@@ -223,7 +225,7 @@ DepthEstimate PatchMatchEngine::Estimate(std::span<const StereoView> views, int 
                                          std::span<const int> neighbours, const DepthRange& range,
                                          const EngineOptions& options) const {
   Problem problem(views, reference, neighbours, range, {}, Neighbours(), options);
-  State state = problem.Search(effort_.iterations, options);
+  State state = problem.Search(options.look ? kLookIterations : effort_.iterations, options);
   return Judged(problem, options.threads, &state, &without_planes_);
 }
 
@@ -241,8 +243,10 @@ PlaneMap PatchMatchEngine::Refine(std::span<const StereoView> views, int referen
   Problem problem(views, reference, neighbours, range, maps, effort_.round_neighbours, options);
   State state = problem.Resume(*maps[static_cast<size_t>(reference)], options);
   GuessFromSurfaces(problem.finest, &state);
+  ParallelFor(0, problem.finest.reference.height, options.threads,
+              [&](int y) { ExpectRow(problem.finest, y, &state); });
   Sweep sweep;
-  sweep.jump = false;
+  sweep.move = sweep.jump = false;
   sweep.far_regions = 0;  // far planes have come as near as they could
   int number = kFirstRoundNumber * round;
   RunSweeps(problem.finest, sweep, kRefineIterations, kFinestStepPx, options.threads, &number,
