@@ -13,8 +13,7 @@
 namespace dtr::calib {
 namespace {
 
-constexpr double kMostRelativeSigma = 0.1;  // above, a scale says little more than an order of size
-constexpr double kMostDisagreement = 5;     // sigmas
+constexpr double kMostDisagreement = 5;  // sigmas
 constexpr int kMostPasses = 20;
 
 double RelativeSigma(const MeasuredDistance& d) {

@@ -19,6 +19,9 @@ struct MeasuredDistance {
   double sigma_m = 0;  ///< >= 0; 0: not stated, a thousandth of the length is assumed
 };
 
+/// A scale that is known worse says little more than an order of size.
+inline constexpr double kMostRelativeSigma = 0.1;
+
 /// A length without a stated error is taken to be measured to a thousandth, as with a tape.
 inline constexpr double kUnstatedRelativeSigma = 1e-3;
 

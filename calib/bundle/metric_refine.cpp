@@ -280,6 +280,13 @@ void Complete(const KnownMetres& known, const SfmModel& adjusted, MetricStart& s
     weights += std::pow(scale.relative_sigma, -2);
   }
   report.relative_sigma = 1 / std::sqrt(weights);
+  if (!(report.relative_sigma <= kMostRelativeSigma)) {
+    throw Error(fmt::format(
+        "bundle adjustment: expected places or distances that tell the scale to {:.0f} %, found "
+        "ones that tell it to {:.0f} %: they err too much for cameras that stand so near to each "
+        "other",
+        100 * kMostRelativeSigma, 100 * report.relative_sigma));
+  }
 }
 
 }  // namespace

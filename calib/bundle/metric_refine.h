@@ -65,8 +65,9 @@ MetricStart StartInMetres(const SfmModel& model, const KnownMetres& known,
                           const RefineOptions& options);
 
 /// Refines it (Refine): the model in metres, `start.report` completed. Throws Error, naming it,
-/// where a distance is missed by more than 5 of its standard deviations, and where the model cannot
-/// be refined: nothing would hold then.
+/// where a distance is missed by more than 5 of its standard deviations, where the scale comes out
+/// uncertain by more than kMostRelativeSigma, and where the model cannot be refined: nothing would
+/// hold then.
 Refined RefineInMetres(const KnownMetres& known, MetricStart& start);
 
 }  // namespace dtr::calib

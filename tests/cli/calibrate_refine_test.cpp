@@ -1,16 +1,14 @@
 // `dtr calibrate refine` as its users meet it: models that cannot be refined, refused by name; GPS
 // and distances that are held.
-#include <OpenImageIO/imageio.h>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <map>
 #include <nlohmann/json.hpp>
-#include <numbers>
 
 #include "calib/colmap/model_io.h"
 #include "tests/calib/bundle/synthetic_bundle.h"
+#include "tests/cli/gps_photo.h"
 #include "tests/cli/run_dtr.h"
 #include "tests/support/test_data.h"
 
@@ -49,34 +47,6 @@ using Json = nlohmann::json;
 using ::testing::HasSubstr;
 
 constexpr double kUnit = 2.5;  // metres that a unit of the model is
-
-// A photo taken `at` metres east, north and up of 55.7 N, 13.2 E, 37 m; on this scale, and to a
-// hundredth of a millimetre, the Earth is flat there.
-void WritePhotoAt(const std::filesystem::path& file, const Eigen::Vector3d& at,
-                  std::optional<double> error_m = {}) {
-  constexpr double kDegree = std::numbers::pi / 180;
-  constexpr double kMeridianM = 6379144, kParallelM = 6392761;  // radii of WGS 84, plus 37 m
-  // EXIF is written from float: whole degrees and minutes leave the seconds their digits.
-  const auto parts = [](double degrees, double minutes, double seconds) {
-    return std::array{static_cast<float>(degrees), static_cast<float>(minutes),
-                      static_cast<float>(seconds)};
-  };
-  const auto latitude = parts(55, 42, 3600 * at.y() / kMeridianM / kDegree);
-  const auto longitude =
-      parts(13, 12, 3600 * at.x() / (kParallelM * std::cos(55.7 * kDegree)) / kDegree);
-  const OIIO::TypeDesc three(OIIO::TypeDesc::FLOAT, 3);
-  OIIO::ImageSpec spec(2, 2, 3, OIIO::TypeDesc::UINT8);
-  spec.attribute("GPS:LatitudeRef", "N");
-  spec.attribute("GPS:Latitude", three, latitude.data());
-  spec.attribute("GPS:LongitudeRef", "E");
-  spec.attribute("GPS:Longitude", three, longitude.data());
-  spec.attribute("GPS:Altitude", static_cast<float>(37 + at.z()));
-  if (error_m) spec.attribute("GPS:HPositioningError", static_cast<float>(*error_m));
-  const auto out = OIIO::ImageOutput::create(file.string());
-  ASSERT_TRUE(out && out->open(file.string(), spec));
-  const std::vector<std::uint8_t> pixels(12);
-  ASSERT_TRUE(out->write_image(OIIO::TypeDesc::UINT8, pixels.data()) && out->close());
-}
 
 // Eight photos around a box, their model in another world, their places in photos/.
 class RefineToPlaces : public ::testing::Test {
@@ -150,20 +120,25 @@ TEST_F(RefineToPlaces, APlaceThatIsWrongIsNamedAndOthersMayBeMissing) {
 
 TEST_F(RefineToPlaces, WhatExifOrTheUserSaysOfTheErrorIsTaken) {
   for (size_t i = 0; i < centres_.size(); ++i) {
-    WritePhotoAt(folder_ / fmt::format("photos/image{}.jpg", 100 + i), centres_[i], 0.5);
+    WritePhotoAt(folder_ / fmt::format("photos/image{}.jpg", 100 + i), centres_[i], 1.5);
   }
-  Ran ran = Refine({"--gps", In("photos"), "--json", "-"});
+  // Such places do not tell the scale of so small a scene; a distance beside them does.
+  const std::string distance = fmt::format("image100,image107={:.9g}m", Metres(0, 7));
+  Ran ran = Refine({"--gps", In("photos"), "--distance", distance, "--json", "-"});
   ASSERT_EQ(ran.code, 0) << ran.err;
   Json scale = Json::parse(ran.out)["scale"];
+  EXPECT_EQ(scale["method"], "gps and distance");
   EXPECT_TRUE(scale["found_sigma_flat_m"].is_null()) << "EXIF says it";
   EXPECT_GT(scale["found_sigma_up_m"], 0) << "EXIF does not";
-  const double stated = scale["relative_sigma"];
+  EXPECT_NEAR(scale["relative_sigma"], 1e-3, 1e-4);
   std::filesystem::remove_all(folder_ / "out");
-  ran = Refine({"--gps", In("photos"), "--gps-sigma", "5,10", "--json", "-"});
+  ran = Refine({"--gps", In("photos"), "--gps-sigma", "0.1,0.2", "--json", "-"});
   ASSERT_EQ(ran.code, 0) << ran.err;
   scale = Json::parse(ran.out)["scale"];
+  EXPECT_TRUE(scale["found_sigma_flat_m"].is_null());
   EXPECT_TRUE(scale["found_sigma_up_m"].is_null());
-  EXPECT_GT(scale["relative_sigma"], 10 * stated);
+  // Of 0.14 m per coordinate over eight cameras some 3 m from their middle.
+  EXPECT_NEAR(scale["relative_sigma"], 0.02, 0.007);
 }
 
 TEST_F(RefineToPlaces, ADistanceSetsTheUnit) {
@@ -190,6 +165,9 @@ TEST_F(RefineToPlaces, WhatCannotBeHeldIsRefused) {
   ExpectRefused(distance("image100,image101"), kWrongUsage, "found no '='");
   ExpectRefused(Refine({"--gps", In("photos"), "--gps-sigma", "0"}), kWrongUsage,
                 "--gps-sigma 0: expected metres above 0, as 3 or 3,6 (on the map, in height)");
+  ExpectRefused(Refine({"--gps", In("photos"), "--gps-sigma", "5"}), kFailed,
+                "expected places or distances that tell the scale to 10 %, found ones that tell "
+                "it to ");
   ExpectRefused(Refine({"--gps-sigma", "3"}), kWrongUsage, "--gps-sigma requires --gps");
   std::filesystem::create_directories(folder_ / "empty");
   ExpectRefused(Refine({"--gps", In("empty")}), kFailed,
