@@ -13,16 +13,8 @@
 namespace dtr::calib {
 namespace {
 
-constexpr double kMostRelativeSigma = 0.1;  // above, a scale says little more than an order of size
-constexpr double kMostDisagreement = 5;     // sigmas
-constexpr double kOutlierSigmas = 4;
-constexpr size_t kFewestPositions = 4;
+constexpr double kMostDisagreement = 5;  // sigmas
 constexpr int kMostPasses = 20;
-// A length without a stated error is taken to be measured to a thousandth, as with a tape.
-constexpr double kUnstatedRelativeSigma = 1e-3;
-
-// The median length of a 3D vector of independent normal coordinates is 1.538 sigma.
-constexpr double kMedianLength = 1.538;
 
 double RelativeSigma(const MeasuredDistance& d) {
   const Eigen::Vector3d way = d.b - d.a;
@@ -39,7 +31,8 @@ Eigen::Vector3d MeanOf(std::span<const Eigen::Vector3d> points) {
   return mean;
 }
 
-// How well the similarity is known where each coordinate errs by `sigma_m`.
+}  // namespace
+
 void FillUncertainty(std::span<const Eigen::Vector3d> centres, double sigma_m,
                      PositionScale& scale) {
   const Eigen::Vector3d mean = MeanOf(centres);
@@ -54,8 +47,6 @@ void FillUncertainty(std::span<const Eigen::Vector3d> centres, double sigma_m,
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(about_axes, Eigen::EigenvaluesOnly);
   scale.turn_sigma_rad = sigma_m / std::sqrt(std::max(eigen.eigenvalues()[0], 0.0));
 }
-
-}  // namespace
 
 DistanceScale ScaleFromDistances(std::span<const MeasuredDistance> distances) {
   if (distances.empty()) throw Error("scale: expected a measured distance, found none");
@@ -157,7 +148,7 @@ PositionScale ScaleFromPositions(std::span<const Eigen::Vector3d> centres,
     }
     std::vector<double> sorted = lengths;
     // A millionth of the extent: exact positions leave rounding alone.
-    const double limit = kOutlierSigmas * UpperMedian(sorted) / kMedianLength +
+    const double limit = kPositionOutlierSigmas * UpperMedian(sorted) / kMedianLength +
                          1e-6 * (positions_m[0] - MeanOf(positions_m)).norm();
     std::vector<bool> next;
     for (const double length : lengths) next.push_back(length <= limit);

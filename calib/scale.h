@@ -19,6 +19,12 @@ struct MeasuredDistance {
   double sigma_m = 0;  ///< >= 0; 0: not stated, a thousandth of the length is assumed
 };
 
+/// A scale that is known worse says little more than an order of size.
+inline constexpr double kMostRelativeSigma = 0.1;
+
+/// A length without a stated error is taken to be measured to a thousandth, as with a tape.
+inline constexpr double kUnstatedRelativeSigma = 1e-3;
+
 struct DistanceScale {
   double metres_per_unit = 1;
   double relative_sigma = 0;   ///< standard deviation of metres_per_unit over itself
@@ -37,6 +43,11 @@ Eigen::Vector3d EarthFromGeodetic(double latitude_deg, double longitude_deg, dou
 /// EarthFromGeodetic(place)).
 Eigen::Matrix3d EnuFromEarth(double latitude_deg, double longitude_deg);
 
+inline constexpr size_t kFewestPositions = 4;
+inline constexpr double kPositionOutlierSigmas = 4;
+/// The median length of a 3D vector of independent normal coordinates, in their sigmas.
+inline constexpr double kMedianLength = 1.538;
+
 struct PositionScale {
   Similarity metric_from_scene;
   double relative_sigma = 0;     ///< of its scale
@@ -45,11 +56,17 @@ struct PositionScale {
   std::vector<size_t> left_out;  ///< positions that do not agree with the others
 };
 
+/// Fills in how well such a similarity is known where each coordinate of a position errs by
+/// `sigma_m`; `centres` as metric_from_scene takes them.
+void FillUncertainty(std::span<const Eigen::Vector3d> centres, double sigma_m,
+                     PositionScale& scale);
+
 /// The similarity that carries camera centres to the places where they are said to have been.
-/// Positions more than 4 robust standard deviations off are left out. Errors are taken as
-/// independent; those of one receiver go together over minutes, and then the truth is less certain.
-/// Throws Error with fewer than 4 positions, where fewer than half agree, where the centres lie in
-/// one point or on a line to rounding, and where the scale would be uncertain by more than 10 %.
+/// Positions more than kPositionOutlierSigmas robust standard deviations off are left out. Errors
+/// are taken as independent; those of one receiver go together over minutes, and then the truth is
+/// less certain. Throws Error with fewer than 4 positions, where fewer than half agree, where the
+/// centres lie in one point or on a line to rounding, and where the scale would be uncertain by
+/// more than 10 %.
 PositionScale ScaleFromPositions(std::span<const Eigen::Vector3d> centres,
                                  std::span<const Eigen::Vector3d> positions_m);
 

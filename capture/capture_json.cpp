@@ -94,6 +94,7 @@ Json ToJson(const Screening& screening) {
 Json ToJson(const io::GpsPosition& gps) {
   Json json{{"latitude_deg", gps.latitude_deg}, {"longitude_deg", gps.longitude_deg}};
   json["altitude_m"] = gps.altitude_m ? Json(*gps.altitude_m) : Json();
+  if (gps.horizontal_error_m) json["horizontal_error_m"] = *gps.horizontal_error_m;
   return json;
 }
 
@@ -151,6 +152,9 @@ io::GpsPosition GpsFrom(const Node& node) {
   gps.longitude_deg = node["longitude_deg"].Number(-180, 180);
   const Node altitude = node["altitude_m"];
   if (!altitude.IsNull()) gps.altitude_m = altitude.Number(-kHuge, kHuge);
+  if (const auto error = node.Optional("horizontal_error_m")) {
+    gps.horizontal_error_m = error->Number(0, kHuge);
+  }
   return gps;
 }
 

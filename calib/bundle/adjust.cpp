@@ -356,6 +356,17 @@ bool MayGetTangential(const LensCamera& lens) {
   return lens.model == LensModel::kSimpleRadial || lens.model == LensModel::kRadial;
 }
 
+bool Contradicts(const Adjusted& held, const Adjusted& free) {
+  constexpr double kMostSigmaGrowth = 1.5;
+  constexpr double kLeastSights = 0.9;
+  // Errors of a sight's own size are no contradiction, however exact the photos are.
+  constexpr double kHarmlessSigmaPx = 0.5;
+  // Where all was needed for the unknowns nothing is known of the noise, and none is supposed.
+  const double noise = std::isfinite(free.sigma_px) ? free.sigma_px : 0;
+  const double most = std::max(kMostSigmaGrowth * noise, kHarmlessSigmaPx);
+  return !(held.sigma_px <= most) || held.sights < kLeastSights * free.sights;
+}
+
 std::vector<Eigen::Vector2d> Residuals(const Bundle& bundle) {
   return ResidualsOf(bundle, Normalised::Around(bundle));
 }
@@ -401,9 +412,8 @@ Adjusted Solve(const Bundle& bundle, const AdjustOptions& options, Normalised& n
     if (pass + 1 < kMostOutlierPasses) out.used = std::move(used);
   }
   out.bundle = n.LocalAt(bundle);
-  if (options.positions.empty() && options.distances.empty() && !options.fix_poses &&
-      n.members.empty()) {
-    MoveToGaugeOf(start, out.bundle);
+  if (options.positions.empty() && !options.fix_poses && n.members.empty()) {
+    MoveToGaugeOf(start, out.bundle, !options.distances.empty());
   }
   n.ToWorld(out.bundle);
   Describe(residuals, n.rig_motion.size(), options, sigma, out);

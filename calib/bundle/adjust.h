@@ -77,12 +77,17 @@ struct Adjusted {
 /// Inside, the world is centred and scaled, and points are directions with inverse distances
 /// (sight_cost.h). The gauge is that of the start: without priors, the result is turned, scaled and
 /// moved as a whole to be as near to the start's cameras as can be (gauge.h); no camera is singled
-/// out. With priors on positions, these decide.
+/// out. With priors on positions, these decide; with distances alone, these decide the scale.
 ///
 /// One thread, sums in one order: the same bits every time. Throws Error as CheckBundle does, on
 /// priors that cannot be meant, and when no sight has a pixel or the solver finds no finite
 /// solution. What the sights cannot decide is told by Judge (judge.h), not here.
 Adjusted Adjust(const Bundle& bundle, const AdjustOptions& options);
+
+/// Whether `held`, which held more than `free` did, contradicts the sights: what is left of them is
+/// half as large again (and more than half a pixel), or a tenth of them agrees no longer. What
+/// disagrees with a camera is left out, and shows as that.
+bool Contradicts(const Adjusted& held, const Adjusted& free);
 
 /// Residuals predicted - observed in px, NaN where the point has no pixel; the bundle's order.
 std::vector<Eigen::Vector2d> Residuals(const Bundle& bundle);

@@ -67,7 +67,7 @@ Eigen::MatrixXd GaugeDirections(const std::vector<PoseFrame>& poses,
   return thin.leftCols(qr.rank());
 }
 
-void MoveToGaugeOf(const Bundle& start, Bundle& now) {
+void MoveToGaugeOf(const Bundle& start, Bundle& now, bool keep_scale) {
   for (int step = 0; step < kMostSteps; ++step) {
     std::vector<PoseFrame> poses;
     for (const BundleImage& image : now.images) {
@@ -75,8 +75,10 @@ void MoveToGaugeOf(const Bundle& start, Bundle& now) {
                        image.cam_from_world.TargetOriginInSource()});
     }
     // The columns at `now`: moving it by -g brings it nearer.
+    Eigen::MatrixXd columns = GaugeColumns(poses);
+    if (keep_scale) columns.col(6).setZero();
     const Eigen::VectorXd g =
-        GaugeColumns(poses).completeOrthogonalDecomposition().solve(Displacements(start, now));
+        columns.completeOrthogonalDecomposition().solve(Displacements(start, now));
     if (!g.allFinite()) return;
     Similarity back;
     const Eigen::Vector3d turn = -g.segment<3>(3);

@@ -21,7 +21,8 @@ Eigen::MatrixXd GaugeDirections(const std::vector<PoseFrame>& poses,
 /// Moves `now` as a whole so that its cameras are as near as can be to those of `start`: least
 /// squares over turns (radians) and centres together (units of the bundle). At the minimum the
 /// difference is orthogonal to every GaugeColumn: these are the inner constraints of a free network
-/// (Triggs et al. 2000, sec. 9.4), to which the free network's covariance belongs.
-void MoveToGaugeOf(const Bundle& start, Bundle& now);
+/// (Triggs et al. 2000, sec. 9.4), to which the free network's covariance belongs. `keep_scale`:
+/// lengths are known, and only shifts and turns are left to choose.
+void MoveToGaugeOf(const Bundle& start, Bundle& now, bool keep_scale = false);
 
 }  // namespace dtr::calib

@@ -32,10 +32,23 @@ constexpr double kLeastSigmaPx = 1e-7;  // exact sights differ by rounding, whic
 
 constexpr double kSurelySigmas = 5;  // errors of real sights go together: predicted ones are small
 
+bool HasPriors(const RefineOptions& options) {
+  return !options.positions.empty() || !options.distances.empty();
+}
+
+/// Options of a solve that frees `lens` (none: points alone move) and holds what is known.
+AdjustOptions SolveOptions(const RefineOptions& options, const std::optional<LensFreedom>& lens) {
+  AdjustOptions adjust = OptionsFor(lens);
+  if (adjust.fix_poses) return adjust;
+  adjust.positions = options.positions;
+  adjust.distances = options.distances;
+  return adjust;
+}
+
 /// Standard deviations (Mahalanobis length, the largest of all lenses) that a solve of these points
 /// puts a principal point away from where it was given; 0 where it does not tell.
-double PrincipalPointSigmas(const Bundle& bundle) {
-  const AdjustOptions options = OptionsFor(LensFreedom::kAll);
+double PrincipalPointSigmas(const Bundle& bundle, const RefineOptions& refine) {
+  const AdjustOptions options = SolveOptions(refine, LensFreedom::kAll);
   const Adjusted free = Adjust(bundle, options);
   const BundleCovariance covariance = CovarianceOf(free, options);
   if (!free.converged || !covariance.computed || !covariance.determined) return 0;
@@ -89,7 +102,8 @@ std::vector<std::vector<double>> TryOnUnseenPoints(const Bundle& bundle,
   ParallelFor(0, static_cast<int>(parts.size()), options.threads, [&](int i) {
     const auto at = static_cast<size_t>(i);
     const PointFold& fold = folds[at % folds.size()];
-    const Adjusted trained = Adjust(fold.training, OptionsFor(candidates[at / folds.size()].lens));
+    const Adjusted trained =
+        Adjust(fold.training, SolveOptions(options, candidates[at / folds.size()].lens));
     converged[at] = trained.converged;
     parts[at] = LossesOfUnseenPoints(trained.bundle, fold.asked, scale_px);
   });
@@ -129,20 +143,21 @@ size_t Choose(const Bundle& bundle, const SightSplit& split, const RefineOptions
     if (!better && candidate.lens == LensFreedom::kAll && !(candidate.low_px2 > 0)) {
       // A principal point off its place is nearly a turn of all cameras, which unseen points hardly
       // tell; what all sights together say of it is known by its covariance.
-      candidate.principal_point_sigmas = PrincipalPointSigmas(some);
+      candidate.principal_point_sigmas = PrincipalPointSigmas(some, options);
       better = candidate.principal_point_sigmas > kSurelySigmas;
     }
     if (candidate.converged && better) chosen = i;
   }
   if (!candidates[0].converged || chosen == 0) return kNoneConverged;
   // Now like with like: adjusted to all sights, as the given model was.
-  refined.adjusted = Adjust(bundle, OptionsFor(candidates[chosen].lens));
+  refined.adjusted = Adjust(bundle, SolveOptions(options, candidates[chosen].lens));
   const auto given = LossesOfHeldOutSights(bundle, split, scale_px);
   const auto adjusted = LossesOfHeldOutSights(refined.adjusted.bundle, split, scale_px);
   refined.given_px = std::sqrt(Mean(given));
   refined.adjusted_px = std::sqrt(Mean(adjusted));
   refined.held_out_sights = static_cast<int>(split.held_out.size());
   if (!refined.adjusted.converged) return kNoneConverged;
+  if (HasPriors(options)) return chosen;
   // Beyond chance: a model that saw fewer sights, or none, need not be wrong for it.
   return BootstrapOfDifference(adjusted, given, options.seed).second < 0 ? chosen : 0;
 }
@@ -164,12 +179,14 @@ void Finish(const SfmModel& model, const RefineOptions& options, Refined& refine
   refined.model =
       ModelOf(refined.adjusted.bundle, model, options.separate_lenses, &refined.points_dropped);
   if (options.covariance) {
-    refined.covariance_json =
-        ToJson(refined.adjusted, CovarianceOf(refined.adjusted, OptionsFor(refined.lens)));
+    refined.covariance_json = ToJson(
+        refined.adjusted, CovarianceOf(refined.adjusted, SolveOptions(options, refined.lens)));
   }
   refined.adjusted.bundle = {};
   refined.changed = true;
 }
+
+}  // namespace
 
 SfmModel WithLenses(SfmModel model, const std::map<std::uint32_t, LensCamera>& lenses) {
   for (auto& [id, camera] : model.cameras) {
@@ -189,15 +206,13 @@ SfmModel WithLenses(SfmModel model, const std::map<std::uint32_t, LensCamera>& l
   return model;
 }
 
-}  // namespace
-
 Refined Refine(const SfmModel& model, const RefineOptions& options) {
   Refined refined;
   refined.model = model;
   if (options.known_lenses) {
     const SfmModel known = WithLenses(model, *options.known_lenses);
     refined.lens = LensFreedom::kFixed;
-    refined.adjusted = Adjust(BundleOf(known), OptionsFor(refined.lens));
+    refined.adjusted = Adjust(BundleOf(known), SolveOptions(options, refined.lens));
     if (!refined.adjusted.converged) {
       throw Error(fmt::format(
           "bundle adjustment: expected to converge with the lens that was given, found none of it "
@@ -236,8 +251,8 @@ std::vector<Degeneracy> DegeneraciesOf(const SfmModel& model, const RefineOption
   }
   const Bundle bundle =
       SomePoints(BundleOf(model, options.separate_lenses), kMostPoints, options.seed);
-  const AdjustOptions adjust =
-      OptionsFor(options.known_lenses ? LensFreedom::kFixed : LensFreedom::kNoPrincipalPoint);
+  const AdjustOptions adjust = SolveOptions(
+      options, options.known_lenses ? LensFreedom::kFixed : LensFreedom::kNoPrincipalPoint);
   const Adjusted adjusted = Adjust(bundle, adjust);
   return FindDegeneracies(adjusted, CovarianceOf(adjusted, adjust), BundleLimits{}.max_focal_share);
 }

@@ -18,6 +18,10 @@ struct RefineOptions {
   std::optional<std::map<std::uint32_t, LensCamera>> known_lenses;
   bool separate_lenses = false;  ///< every image a lens of its own
   bool covariance = false;       ///< work out Refined::covariance_json
+  /// What is known beside the sights, in the model's world and unit; `image` is an index into
+  /// SfmModel::images. Held by every solve, those of the candidates, too.
+  std::vector<PositionPrior> positions;
+  std::vector<DistancePrior> distances;
   int threads = 0;
   std::uint64_t seed = 0;  ///< of the sights that are held out
 };
@@ -58,13 +62,16 @@ struct Refined {
 /// structure from motion was; the result is taken only if its cameras predict one sight of each
 /// point from the others better than the cameras as given, beyond the bootstrap interval.
 ///
-/// With known lenses, poses and points are adjusted to them without being asked whether it pays.
+/// With known lenses, poses and points are adjusted to them without being asked whether it pays;
+/// with known positions or distances, the lenses' freedom is chosen as above, and the result taken
+/// whether or not it predicts the sights better: what is known is to hold.
 /// Deterministic for any number of threads. What cannot be refined (a lens model FOV, too few
 /// points) comes back unchanged, with the reason; errors of broken models are thrown.
 Refined Refine(const SfmModel& model, const RefineOptions& options);
 
 /// In what ways the views of a model do not suffice (judge.h), its poses, points and lenses free as
-/// Refine leaves them. At most 4000 points take part. A model with a FOV lens has none to tell of.
+/// Refine leaves them, what is known beside the sights held. At most 4000 points take part. A model
+/// with a FOV lens has none to tell of.
 std::vector<Degeneracy> DegeneraciesOf(const SfmModel& model, const RefineOptions& options);
 
 /// Throws Error naming the degeneracy where one leaves poses, points or focal lengths undetermined.
@@ -72,6 +79,10 @@ std::vector<Degeneracy> DegeneraciesOf(const SfmModel& model, const RefineOption
 /// their cameras; `dtr validate` tells of them.)
 void RequireDetermined(const SfmModel& model, const RefineOptions& options,
                        const std::string& what);
+
+/// The model with these lenses, by camera id. Throws Error where one is missing, or is of images of
+/// another size.
+SfmModel WithLenses(SfmModel model, const std::map<std::uint32_t, LensCamera>& lenses);
 
 /// JSON object: refined, reason, lens, candidates[].{name,held_out_px,converged}, held_out_sights,
 /// given_px, adjusted_px, sigma_px, rms_px, iterations, points_dropped, covariance (where asked

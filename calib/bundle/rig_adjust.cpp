@@ -13,11 +13,6 @@ namespace dtr::calib {
 namespace {
 
 constexpr double kMostScaleSpread = 0.2;
-constexpr double kMostSigmaGrowth = 1.5;
-// A camera that has moved shows as outliers, not as residuals: what disagrees is left out.
-constexpr double kLeastSights = 0.9;
-// Errors of a sight's own size are no contradiction, however exact the photos are.
-constexpr double kHarmlessSigmaPx = 0.5;
 
 [[noreturn]] void Refuse(const std::string& what) { throw Error("rig: " + what); }
 
@@ -153,11 +148,7 @@ RigRefined RefineRig(const SfmModel& model, const KnownRig& rig,
   }
   refined.adjusted = AdjustRig(bundle, frames.images, rig_from_world, options);
   RequireConverged(refined.adjusted, "with the rig's places");
-  // Where all was needed for the unknowns nothing is known of the noise, and none is supposed.
-  const double noise = std::isfinite(free.sigma_px) ? free.sigma_px : 0;
-  const double most = std::max(kMostSigmaGrowth * noise, kHarmlessSigmaPx);
-  const bool enough = refined.adjusted.sights >= kLeastSights * free.sights;
-  if (!(refined.adjusted.sigma_px <= most) || !enough) {
+  if (Contradicts(refined.adjusted, free)) {
     Refuse(fmt::format(
         "expected photos of this rig, found residuals of {:.2f} px per coordinate and {} "
         "observations that agree with its places held, {:.2f} px and {} without; was a camera "

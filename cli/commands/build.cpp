@@ -4,6 +4,7 @@
 
 #include "cli/command.h"
 #include "cli/depth_options.h"
+#include "cli/metre_options.h"
 #include "cli/pipeline/build_set.h"
 #include "cli/pipeline/force_stage.h"
 #include "cli/video_options.h"
@@ -72,6 +73,8 @@ void AddBuildCommand(CLI::App& app) {
             ->type_name("RIG.json");
         command.add_flag("!--no-refine", options->refine,
                          "Take COLMAP's cameras as they are, without bundle adjustment");
+        auto words = std::make_shared<MetreWords>();
+        AddMetreOptions(command, *AddGpsFlag(command, options->metres.gps), *words);
         command.add_flag("--keep-duplicates", options->keep_duplicates,
                          "Keep photos whose pixels are another's, too (with --poses and --rig they "
                          "always are)");
@@ -81,7 +84,8 @@ void AddBuildCommand(CLI::App& app) {
                         "Of an interrupted build: do this stage and all after it again")
             ->check(CLI::IsMember(pipeline::StagesKept()))
             ->type_name("NAME");
-        return [options](const Context& context) -> int {
+        return [options, words](const Context& context) -> int {
+          options->metres = MetreOptionsFrom(options->metres.gps, *words);
           options->threads = context.common.threads;
           options->seed = context.common.seed;
           const auto report = pipeline::BuildSet(*options, context.console);

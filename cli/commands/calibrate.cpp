@@ -8,6 +8,7 @@
 #include "capture/ingest.h"
 #include "cli/command.h"
 #include "cli/commands/calibrate_scale.h"
+#include "cli/metre_options.h"
 #include "cli/pipeline/calibrated_photos.h"
 #include "cli/pipeline/lens_file.h"
 #include "dtr/base/error.h"
@@ -20,11 +21,13 @@ namespace fs = std::filesystem;
 struct Options {
   fs::path photos, output;
   double memory_gb = 4;
-  bool refine = true;
+  bool refine = true, gps = false;
   fs::path lens;
+  MetreWords metres;
 };
 
 int RunCalibratePhotos(const Options& options, const Context& context) {
+  const pipeline::MetreOptions metres = MetreOptionsFrom(options.gps, options.metres);
   if (fs::exists(options.output / "cameras.bin")) {
     throw UsageError(fmt::format("{}: holds a model already; remove it or choose another folder",
                                  options.output.string()));
@@ -33,7 +36,9 @@ int RunCalibratePhotos(const Options& options, const Context& context) {
       options.photos, {.threads = context.common.threads, .memory_gb = options.memory_gb},
       context.console);
   capture::RequireEnoughPhotos(photos, options.photos);
+  pipeline::RequireMetres(metres, photos, options.photos.string());
   pipeline::CalibrateOptions calibrate;
+  calibrate.metres = metres;
   calibrate.threads = context.common.threads;
   calibrate.seed = context.common.seed;
   calibrate.memory_gb = options.memory_gb;
@@ -45,6 +50,8 @@ int RunCalibratePhotos(const Options& options, const Context& context) {
   calib::RefineOptions judged;
   judged.seed = context.common.seed;
   if (calibrate.lens) judged.known_lenses.emplace();
+  judged.positions = calibrated.positions;
+  judged.distances = calibrated.distances;
   calib::RequireDetermined(calibrated.model, judged, options.photos.string());
   colmap::WriteModel(options.output, calibrated.model, colmap::Format::kBinary);
 
@@ -56,6 +63,7 @@ int RunCalibratePhotos(const Options& options, const Context& context) {
   }
   auto json = nlohmann::ordered_json::parse(calibrated.report_json);
   json["engine"] = calibrated.engine;
+  json["unit"] = NameOf(calibrated.unit);
   json["registered"] = calibrated.model.images.size();
   json["not_registered"] = calibrated.not_registered;
   context.EmitJson(json.dump(1));
@@ -88,6 +96,8 @@ void AddCalibrateCommand(CLI::App& app) {
                                     "Take COLMAP's cameras as they are, without bundle adjustment");
                // A lens that is given replaces COLMAP's: poses and points must follow it.
                AddLensOption(command, options->lens)->excludes(no_refine);
+               CLI::Option* gps = AddGpsFlag(command, options->gps)->excludes(no_refine);
+               AddMetreOptions(command, *gps, options->metres)->excludes(no_refine);
                return [options](const Context& context) {
                  return RunCalibratePhotos(*options, context);
                };

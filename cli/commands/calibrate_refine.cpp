@@ -5,6 +5,8 @@
 #include "calib/bundle/refine.h"
 #include "calib/colmap/model_io.h"
 #include "cli/command.h"
+#include "cli/metre_options.h"
+#include "cli/pipeline/known_metres.h"
 #include "cli/pipeline/lens_file.h"
 #include "dtr/base/error.h"
 
@@ -12,15 +14,56 @@ namespace dtr::cli {
 namespace {
 
 struct Options {
-  std::filesystem::path model, output, lens;
+  std::filesystem::path model, output, lens, gps;
   bool separate = false, covariance = false;
+  MetreWords metres;
 };
+
+void SayRefined(const calib::Refined& refined, Console& console) {
+  for (const auto& candidate : refined.candidates) {
+    console.Say(
+        fmt::format("{:<26} unseen points: {:.4f} px", candidate.name, candidate.held_out_px));
+  }
+  if (refined.held_out_sights > 0) {
+    console.Say(fmt::format("{} held-out sights: as given {:.4f} px, adjusted {:.4f} px",
+                            refined.held_out_sights, refined.given_px, refined.adjusted_px));
+  }
+  if (!refined.changed) {
+    console.Say("left as given: " + refined.reason);
+  } else {
+    console.Say(
+        fmt::format("refined, lenses {}: RMS {:.4f} px, sigma {:.4f} px per "
+                    "coordinate, {} points dropped",
+                    NameOf(*refined.lens), refined.adjusted.rms_px, refined.adjusted.sigma_px,
+                    refined.points_dropped));
+  }
+}
+
+std::vector<std::string> PhotosOf(const calib::SfmModel& model) {
+  std::vector<std::string> names;
+  for (const calib::SfmImage& image : model.images) names.push_back(image.name);
+  return names;
+}
+
+pipeline::RefinedInMetres RefineInMetres(const Options& options,
+                                         const pipeline::MetreOptions& metres,
+                                         const calib::SfmModel& model,
+                                         const calib::RefineOptions& refine) {
+  pipeline::RequireCameras(metres, PhotosOf(model), "the model");
+  pipeline::PhotoPlaces places;
+  if (metres.gps) {
+    places = pipeline::ReadPhotoPlaces(options.gps, PhotosOf(model));
+    pipeline::RequirePlaces(places, options.gps.string(), "the model");
+  }
+  return pipeline::RefineInMetres(model, metres, places, refine, options.model.string());
+}
 
 int RunRefine(const Options& options, const Context& context) {
   if (std::filesystem::exists(options.output / "cameras.bin")) {
     throw UsageError(fmt::format("{}: holds a model already; remove it or choose another folder",
                                  options.output.string()));
   }
+  const pipeline::MetreOptions metres = MetreOptionsFrom(!options.gps.empty(), options.metres);
   const calib::SfmModel model = colmap::ReadModel(options.model);
   calib::RefineOptions refine;
   refine.separate_lenses = options.separate;
@@ -32,26 +75,17 @@ int RunRefine(const Options& options, const Context& context) {
     refine.known_lenses.emplace();
     for (const auto& [id, camera] : model.cameras) refine.known_lenses->emplace(id, lens);
   }
+  if (metres.any()) {
+    const pipeline::RefinedInMetres in_metres = RefineInMetres(options, metres, model, refine);
+    SayRefined(in_metres.refined, context.console);
+    for (const std::string& line : in_metres.lines) context.console.Say(line);
+    colmap::WriteModel(options.output, in_metres.refined.model, colmap::Format::kBinary);
+    context.EmitJson(in_metres.json);
+    return kDone;
+  }
   calib::RequireDetermined(model, refine, options.model.string());
   const calib::Refined refined = calib::Refine(model, refine);
-  for (const auto& candidate : refined.candidates) {
-    context.console.Say(
-        fmt::format("{:<26} unseen points: {:.4f} px", candidate.name, candidate.held_out_px));
-  }
-  if (refined.held_out_sights > 0) {
-    context.console.Say(fmt::format("{} held-out sights: as given {:.4f} px, adjusted {:.4f} px",
-                                    refined.held_out_sights, refined.given_px,
-                                    refined.adjusted_px));
-  }
-  if (!refined.changed) {
-    context.console.Say("left as given: " + refined.reason);
-  } else {
-    context.console.Say(
-        fmt::format("refined, lenses {}: RMS {:.4f} px, sigma {:.4f} px per "
-                    "coordinate, {} points dropped",
-                    NameOf(*refined.lens), refined.adjusted.rms_px, refined.adjusted.sigma_px,
-                    refined.points_dropped));
-  }
+  SayRefined(refined, context.console);
   colmap::WriteModel(options.output, refined.model, colmap::Format::kBinary);
   context.EmitJson(calib::ToJson(refined));
   return kDone;
@@ -81,6 +115,15 @@ void AddCalibrateRefineCommand(CLI::App& calibrate) {
                    ->required()
                    ->type_name("DIR");
                AddLensOption(command, options->lens);
+               CLI::Option* gps =
+                   command
+                       .add_option("--gps", options->gps,
+                                   "Folder of the model's photos, whose EXIF says where they were "
+                                   "taken: these places are held, and the model gets metres east, "
+                                   "north and up")
+                       ->check(CLI::ExistingDirectory)
+                       ->type_name("PHOTOS");
+               AddMetreOptions(command, *gps, options->metres);
                command.add_flag("--separate-lenses", options->separate,
                                 "Every photo a lens of its own, as with a zoom that was moved");
                command.add_flag("--covariance", options->covariance,

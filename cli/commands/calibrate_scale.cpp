@@ -1,11 +1,9 @@
 #include <fmt/format.h>
 
-#include <charconv>
-#include <cmath>
 #include <filesystem>
 
-#include "calib/boards/length.h"
 #include "cli/commands/calibrate_scale.h"
+#include "cli/metre_options.h"
 #include "cli/pipeline/scale_set.h"
 #include "cli/view_names.h"
 #include "dtr/base/error.h"
@@ -21,72 +19,9 @@ struct Options {
   std::string board;
 };
 
-[[noreturn]] void Refuse(const std::string& text, const std::string& what) {
-  throw UsageError(fmt::format(
-      "--distance {}: {}; expected A,B=LENGTH, as 0001:640:410,0001:902.5:398=2.5m: A and B each "
-      "VIEW:X:Y, VIEW:X:Y+VIEW2:X:Y or VIEW (the camera itself), LENGTH in mm, cm or m",
-      text, what));
-}
-
-std::vector<std::string> Split(const std::string& text, char at) {
-  std::vector<std::string> parts{""};
-  for (const char c : text) {
-    if (c == at) {
-      parts.emplace_back();
-    } else {
-      parts.back().push_back(c);
-    }
-  }
-  return parts;
-}
-
-std::optional<double> NumberFrom(const std::string& word) {
-  double value = 0;
-  const auto [end, failure] = std::from_chars(word.data(), word.data() + word.size(), value);
-  if (failure != std::errc() || end != word.data() + word.size() || !std::isfinite(value))
-    return {};
-  return value;
-}
-
-pipeline::ScalePoint PointFrom(const DtrSet& set, const std::string& text,
-                               const std::string& whole) {
-  pipeline::ScalePoint point{text, {}};
-  for (const std::string& part : Split(text, '+')) {
-    const auto words = Split(part, ':');
-    if (words.front().empty()) Refuse(whole, "a view without a name");
-    pipeline::ScaleClick click{FindView(set, words.front()).id, {}};
-    if (words.size() == 3) {
-      const auto x = NumberFrom(words[1]), y = NumberFrom(words[2]);
-      if (!x || !y) Refuse(whole, fmt::format("no pixel is '{}:{}'", words[1], words[2]));
-      click.pixel = Eigen::Vector2d(*x, *y);
-    } else if (words.size() != 1) {
-      Refuse(whole, fmt::format("no point is '{}'", part));
-    }
-    point.clicks.push_back(std::move(click));
-  }
-  return point;
-}
-
-double MetresFrom(const std::string& word, const std::string& whole) {
-  const auto length = calib::LengthFrom(word);
-  if (!length || !length->has_unit) Refuse(whole, fmt::format("no length is '{}'", word));
-  return length->value;
-}
-
-pipeline::ScaleDistance DistanceFrom(const DtrSet& set, const std::string& text) {
-  const size_t equals = text.rfind('=');
-  if (equals == std::string::npos) Refuse(text, "found no '='");
-  const auto points = Split(text.substr(0, equals), ',');
-  if (points.size() != 2) Refuse(text, fmt::format("found {} points", points.size()));
-  pipeline::ScaleDistance distance;
-  distance.text = text;
-  distance.a = PointFrom(set, points[0], text);
-  distance.b = PointFrom(set, points[1], text);
-  const std::string length = text.substr(equals + 1);
-  const size_t spread = length.find("+-");
-  distance.length_m = MetresFrom(length.substr(0, spread), text);
-  if (spread != std::string::npos) distance.sigma_m = MetresFrom(length.substr(spread + 2), text);
-  return distance;
+// The views of the set that somebody named.
+void NameViews(const DtrSet& set, pipeline::ScalePoint& point) {
+  for (pipeline::ScaleClick& click : point.clicks) click.view_id = FindView(set, click.view_id).id;
 }
 
 calib::Board MetricBoard(const std::string& text) {
@@ -109,7 +44,10 @@ int RunScale(Options options, const Context& context) {
   const DtrSet set = io::ReadSet(options.scale.set);
   RequireOneFrame(set);
   for (const std::string& text : options.distances) {
-    options.scale.distances.push_back(DistanceFrom(set, text));
+    pipeline::ScaleDistance distance = DistanceFrom(text);
+    NameViews(set, distance.a);
+    NameViews(set, distance.b);
+    options.scale.distances.push_back(std::move(distance));
   }
   options.scale.threads = context.common.threads;
   const auto report = pipeline::ScaleSet(options.scale, context.console);

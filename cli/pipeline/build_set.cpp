@@ -51,6 +51,7 @@ Json OptionsJson(const BuildOptions& options, const stereo::Effort& effort, int 
   json["refine"] = options.refine;
   if (options.keep_duplicates) json["keep_duplicates"] = true;
   if (!options.rig.empty()) json["rig"] = options.rig.filename().string();
+  if (options.metres.any()) json["metres"] = Json::parse(ToJson(options.metres));
   json["seed"] = options.seed;
   if (options.depth.depth_error_px) json["depth_error_px"] = *options.depth.depth_error_px;
   return json;
@@ -155,6 +156,11 @@ void RequireOptions(const BuildOptions& options) {
         "--holdout-strict: keeps the photos of --holdout out of SfM; it needs --holdout and "
         "no --poses");
   }
+  if (options.metres.any() && (!options.poses.empty() || !options.rig.empty() || !options.refine)) {
+    throw UsageError(
+        "--gps, --distance: are held by the bundle adjustment of what SfM finds; expected no "
+        "--poses, --rig or --no-refine beside them (dtr calibrate scale takes any finished set)");
+  }
   if (options.rig.empty()) return;
   if (!options.poses.empty()) {
     throw UsageError("--rig: places what SfM finds; expected no --poses beside it");
@@ -211,6 +217,9 @@ Json ProvenanceJson(const BuildOptions& options, const Json& option_values, cons
   provenance["tool_version"] = DTR_VERSION;
   provenance["calibration"] = Json::parse(calibrated.report_json);
   provenance["calibration"]["engine"] = calibrated.engine;
+  if (!calibrated.scale_json.empty()) {
+    provenance["scale"] = Json::array({Json::parse(calibrated.scale_json)});
+  }
   provenance["depth_engine"] = options.depth.engine;
   provenance["options"] = option_values;
   provenance["photos"] = photos;
@@ -307,6 +316,7 @@ BuildReport BuildSet(const BuildOptions& options, Progress& listener) {
     LeaveOutSamePictures(options, photos, progress);
     capture::RequireEnoughPhotos(photos, options.photos);
     held_out = ChooseHeldOut(options.holdout, NamesOf(photos));
+    RequireMetres(options.metres, photos, options.photos.string());
     if (!rig) return;
     (void)PhotosOfRig(*rig, photos);  // refused here, before any work
     TellPhotosTheirLens(*rig, photos);
@@ -360,7 +370,8 @@ BuildReport BuildSet(const BuildOptions& options, Progress& listener) {
                        memory_gb,
                        options.refine,
                        {},
-                       rig},
+                       rig,
+                       options.metres},
                       writer.work_folder() / "calibration", progress);
   report.not_registered = calibrated.not_registered;
   for (size_t i = 0; i < held_out.size(); ++i) {

@@ -41,9 +41,32 @@ Json SfmJson(const colmap::SfmReport& report, const calib::SfmModel& model) {
   return json;
 }
 
+std::vector<std::string> NamesOf(const calib::SfmModel& model) {
+  std::vector<std::string> names;
+  for (const calib::SfmImage& image : model.images) names.push_back(image.name);
+  return names;
+}
+
+// The same, in metres.
+void RefineInMetres(const capture::Capture& capture, const CalibrateOptions& options,
+                    const calib::RefineOptions& refine, CalibratedPhotos& calibrated,
+                    Json& report) {
+  const PhotoPlaces places = PhotoPlacesOf(capture, NamesOf(calibrated.model));
+  if (options.metres.gps) RequirePlaces(places, "--gps", "those with a camera");
+  RefinedInMetres refined = RefineInMetres(calibrated.model, options.metres, places, refine);
+  report["bundle_adjustment"] = Json::parse(refined.json);
+  calibrated.model = std::move(refined.refined.model);
+  calibrated.unit = LengthUnit::kMetre;
+  calibrated.scale_json = std::move(refined.scale_json);
+  calibrated.scale_lines = std::move(refined.lines);
+  calibrated.positions = std::move(refined.start.options.positions);
+  calibrated.distances = std::move(refined.start.options.distances);
+}
+
 // Bundle adjustment of the frozen model, where it pays; deterministic.
-void RefineModel(const CalibrateOptions& options, calib::SfmModel& model, Json& report,
-                 Progress& progress) {
+void RefineModel(const capture::Capture& capture, const CalibrateOptions& options,
+                 CalibratedPhotos& calibrated, Json& report, Progress& progress) {
+  calib::SfmModel& model = calibrated.model;
   progress.Stage("bundle adjustment", 0);
   calib::RefineOptions refine;
   refine.threads = options.threads;
@@ -51,6 +74,11 @@ void RefineModel(const CalibrateOptions& options, calib::SfmModel& model, Json& 
   if (options.lens) {
     refine.known_lenses.emplace();
     for (const auto& [id, camera] : model.cameras) refine.known_lenses->emplace(id, *options.lens);
+  }
+  if (options.metres.any()) {
+    RefineInMetres(capture, options, refine, calibrated, report);
+    for (const std::string& line : calibrated.scale_lines) progress.Note(line);
+    return;
   }
   calib::Refined refined = calib::Refine(model, refine);
   report["bundle_adjustment"] = Json::parse(calib::ToJson(refined));
@@ -81,7 +109,7 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
     report["rig"] = Json::parse(PlaceByRig(*options.rig, capture, calibrated.model));
     calibrated.unit = options.rig->unit;
   } else if (options.refine || options.lens) {
-    RefineModel(options, calibrated.model, report, progress);
+    RefineModel(capture, options, calibrated, report, progress);
   }
   calibrated.report_json = report.dump();
   if (options.strict) {

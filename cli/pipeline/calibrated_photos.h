@@ -8,6 +8,7 @@
 
 #include "calib/sfm_model.h"
 #include "capture/capture.h"
+#include "cli/pipeline/known_metres.h"
 #include "cli/pipeline/set_rig.h"
 #include "dtr/base/progress.h"
 #include "dtr/types/dtr_set.h"
@@ -26,6 +27,7 @@ struct CalibrateOptions {
   bool refine = true;  ///< bundle adjustment after SfM, where held-out sights say that it pays
   std::optional<calib::LensCamera> lens;  ///< of all photos, known: SfM's own is replaced by it
   std::optional<SetRig> rig;              ///< took all photos: its lenses, places and scale hold
+  MetreOptions metres;  ///< places and distances to hold while SfM's model is refined
 };
 
 /// Calibrated photos, frozen: everything later depends on this model alone.
@@ -36,6 +38,11 @@ struct CalibratedPhotos {
   std::vector<std::string> not_registered;  ///< photos without a camera
   std::string engine;                       ///< "colmap 3.8", "cameras.json", ...
   std::string report_json;                  ///< details for the provenance; no times, no paths
+  std::string scale_json;  ///< entry of the provenance's `scale`; empty: lengths are SfM's
+  std::vector<std::string> scale_lines;  ///< the same for people
+  /// Held by the refinement; `image` is an index into the model it refined.
+  std::vector<calib::PositionPrior> positions;
+  std::vector<calib::DistancePrior> distances;
 };
 
 /// Refuses before any work what cannot work: UsageError for `poses` that do not exist, Error when

@@ -12,7 +12,7 @@ namespace dtr::pipeline {
 
 /// A pixel of a view of the first frame; without a pixel, the view's camera centre is meant.
 struct ScaleClick {
-  std::string view_id;
+  std::string view_id;                   ///< of a set; elsewhere a photo's name as somebody gave it
   std::optional<Eigen::Vector2d> pixel;  ///< origin at the outer corner of the top-left pixel
 };
 
@@ -21,6 +21,14 @@ struct ScaleClick {
 struct ScalePoint {
   std::string text;  ///< as it was given, for errors
   std::vector<ScaleClick> clicks;
+};
+
+/// `--distance A,B=LENGTH`.
+struct ScaleDistance {
+  std::string text;  ///< as it was given, for errors
+  ScalePoint a, b;
+  double length_m = 0;
+  double sigma_m = 0;  ///< 0: not stated
 };
 
 /// Where it is in the set's stored world, and how uncertain: scene units squared.

@@ -5,11 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "calib/scale.h"
 #include "cli/pipeline/finishing.h"
+#include "cli/pipeline/photo_places.h"
 #include "cli/pipeline/run_log.h"
 #include "cli/pipeline/scale_board.h"
 #include "cli/pipeline/set_page.h"
@@ -64,53 +66,20 @@ Found FromDistances(const ScaleOptions& options, const DtrSet& set) {
   return found;
 }
 
-struct Located {
-  std::vector<std::string> names;
-  std::vector<Eigen::Vector3d> centres, positions_m;
-  io::GpsPosition origin;
-};
-
-// Cameras whose photo says where it was taken: metres east, north and up of the first of them.
-Located Locate(const fs::path& photos, const DtrSet& set, Found& found) {
-  Located located;
-  std::vector<io::GpsPosition> places;
-  for (const View& view : set.frames.front().views) {
-    const fs::path photo = photos / view.name;
-    if (!fs::is_regular_file(photo)) {
-      found.lines.push_back("not in the folder: " + view.name);
-      continue;
-    }
-    const auto gps = io::ReadImageHeader(photo).gps;
-    if (!gps || !gps->altitude_m) {
-      found.lines.push_back((gps ? "without altitude: " : "without GPS: ") + view.name);
-      continue;
-    }
-    located.names.push_back(view.name);
-    located.centres.push_back(view.CenterInWorld());
-    places.push_back(*gps);
-  }
-  if (places.size() < 4) {
-    throw Error(fmt::format(
-        "{}: expected at least 4 photos of the set with latitude, longitude and altitude, found {}",
-        photos.string(), places.size()));
-  }
-  const auto earth = [](const io::GpsPosition& p) {
-    return calib::EarthFromGeodetic(p.latitude_deg, p.longitude_deg, *p.altitude_m);
-  };
-  located.origin = places.front();
-  const Eigen::Matrix3d axes =
-      calib::EnuFromEarth(located.origin.latitude_deg, located.origin.longitude_deg);
-  for (const io::GpsPosition& place : places) {
-    located.positions_m.push_back(axes * (earth(place) - earth(located.origin)));
-  }
-  return located;
-}
-
 Found FromGps(const ScaleOptions& options, const DtrSet& set) {
   Found found;
-  const Located located = Locate(options.gps, set, found);
-  const calib::PositionScale scale =
-      calib::ScaleFromPositions(located.centres, located.positions_m);
+  std::map<std::string, Eigen::Vector3d> centre_of;
+  std::vector<std::string> names;
+  for (const View& view : set.frames.front().views) {
+    names.push_back(view.name);
+    centre_of[view.name] = view.CenterInWorld();
+  }
+  const PhotoPlaces located = ReadPhotoPlaces(options.gps, names);
+  RequirePlaces(located, options.gps.string(), "the set");
+  found.lines = located.without_place;
+  std::vector<Eigen::Vector3d> centres;
+  for (const std::string& name : located.names) centres.push_back(centre_of.at(name));
+  const calib::PositionScale scale = calib::ScaleFromPositions(centres, located.EastNorthUp());
   found.relative_sigma = scale.relative_sigma;
   found.keeps_axes = !(scale.turn_sigma_rad <= kMostTurnSigma);
   found.metric_from_scene = scale.metric_from_scene;
@@ -128,9 +97,7 @@ Found FromGps(const ScaleOptions& options, const DtrSet& set) {
   found.json["turn_sigma_deg"] = turn_deg;
   found.json["axes"] = found.keeps_axes ? "as before" : "east, north, up";
   if (!found.keeps_axes) {
-    found.json["origin"] = {{"latitude_deg", located.origin.latitude_deg},
-                            {"longitude_deg", located.origin.longitude_deg},
-                            {"altitude_m", *located.origin.altitude_m}};
+    found.json["origin"] = Json::parse(located.OriginJson());
   }
   found.lines.push_back(fmt::format("{} positions, {:.2f} m RMS; turn known to {:.2g} degrees",
                                     located.names.size() - left_out.size(), scale.rms_m, turn_deg));

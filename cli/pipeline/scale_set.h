@@ -11,13 +11,6 @@
 
 namespace dtr::pipeline {
 
-/// `--distance A,B=LENGTH`.
-struct ScaleDistance {
-  std::string text;
-  ScalePoint a, b;
-  double length_m = 0, sigma_m = 0;
-};
-
 struct ScaleOptions {
   std::filesystem::path set;
   std::filesystem::path output;  ///< empty: `set` itself is replaced, whole or not at all

@@ -45,12 +45,13 @@ std::optional<GpsPosition> GpsOf(const ImageSpec& spec) {
   const auto latitude = GpsAngle(spec, "GPS:Latitude", "GPS:LatitudeRef", 'S');
   const auto longitude = GpsAngle(spec, "GPS:Longitude", "GPS:LongitudeRef", 'W');
   if (!latitude || !longitude || std::abs(*latitude) > 90) return std::nullopt;
-  GpsPosition gps{*latitude, *longitude, std::nullopt};
+  GpsPosition gps{*latitude, *longitude, std::nullopt, std::nullopt};
   if (spec.find_attribute("GPS:Altitude") != nullptr) {
     const double altitude_m = spec.get_float_attribute("GPS:Altitude", NAN);
     const bool below = spec.get_int_attribute("GPS:AltitudeRef", 0) == 1;
     if (std::isfinite(altitude_m)) gps.altitude_m = below ? -altitude_m : altitude_m;
   }
+  gps.horizontal_error_m = PositiveNumber(spec, "GPS:HPositioningError");
   return gps;
 }
 

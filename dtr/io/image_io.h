@@ -14,6 +14,8 @@ struct GpsPosition {
   double latitude_deg = 0;           ///< north positive
   double longitude_deg = 0;          ///< east positive
   std::optional<double> altitude_m;  ///< above sea level
+  /// How far off the place may be on the map (EXIF GPSHPositioningError), where the file says it.
+  std::optional<double> horizontal_error_m = std::nullopt;
 };
 
 /// What a file says about its image, before any pixel is read.

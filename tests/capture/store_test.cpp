@@ -52,6 +52,12 @@ void ExpectSameFacts(const Capture& a, const Capture& b) {
     EXPECT_EQ(x.focal_source, y.focal_source);
     EXPECT_EQ(x.camera_group, y.camera_group);
     EXPECT_EQ(x.source_sha256, y.source_sha256);
+    ASSERT_EQ(x.gps.has_value(), y.gps.has_value());
+    if (x.gps) {
+      EXPECT_EQ(x.gps->latitude_deg, y.gps->latitude_deg);
+      EXPECT_EQ(x.gps->altitude_m, y.gps->altitude_m);
+      EXPECT_EQ(x.gps->horizontal_error_m, y.gps->horizontal_error_m);
+    }
     EXPECT_EQ(x.screening->sharpness, y.screening->sharpness);
     EXPECT_EQ(x.screening->remarks, y.screening->remarks);
   }
@@ -63,7 +69,9 @@ void ExpectSameFacts(const Capture& a, const Capture& b) {
 TEST(WriteCapture, ComesBackWithTheSameFactsAndPixels) {
   const TemporaryFolder folder;
   FillWithPhotos(folder / "photos");
-  const Capture capture = Ingest(folder / "photos");
+  Capture capture = Ingest(folder / "photos");
+  capture.photos[0].gps = io::GpsPosition{55.7, -13.2, 37.5, 4.5};
+  capture.photos[1].gps = io::GpsPosition{-5.7, 13.2, std::nullopt, std::nullopt};
   WriteCapture(capture, folder / "out/", 2);
   const Capture back = ReadCapture(folder / "out");
   ExpectSameFacts(capture, back);

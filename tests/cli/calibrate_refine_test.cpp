@@ -1,8 +1,14 @@
-// `dtr calibrate refine` on models that cannot be refined: the reason by name and exit code 1.
+// `dtr calibrate refine` as its users meet it: models that cannot be refined, refused by name; GPS
+// and distances that are held.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "calib/colmap/model_io.h"
 #include "tests/calib/bundle/synthetic_bundle.h"
+#include "tests/cli/gps_photo.h"
 #include "tests/cli/run_dtr.h"
 #include "tests/support/test_data.h"
 
@@ -35,6 +41,149 @@ TEST(CalibrateRefine, DegenerateModelsAreRefusedByName) {
     return Eigen::Vector3d(x, 0, random.Uniform(-1.5, 1.5));
   };
   ExpectRefused(refine("wall", spec), kFailed, ": planar_scene: the points lie in a plane");
+}
+
+using Json = nlohmann::json;
+using ::testing::HasSubstr;
+
+constexpr double kUnit = 2.5;  // metres that a unit of the model is
+
+// Eight photos around a box, their model in another world, their places in photos/.
+class RefineToPlaces : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    calib::Bundle bundle = bundle::MakeBundle({.points = 400, .noise_px = 0.3});
+    Random random(5);
+    std::filesystem::create_directories(folder_ / "photos");
+    for (calib::BundleImage& image : bundle.images) {
+      image.name += ".jpg";
+      // North and east of the origin: no seconds below zero.
+      centres_.push_back(image.cam_from_world.TargetOriginInSource() + Eigen::Vector3d(20, 30, 0));
+      const double x = random.Normal(), y = random.Normal();
+      WritePhotoAt(folder_ / "photos" / image.name,
+                   centres_.back() + 0.02 * Eigen::Vector3d(x, y, random.Normal()));
+    }
+    const calib::Similarity world{
+        1 / kUnit, Eigen::Quaterniond(0.8, 0.2, -0.4, 0.4).normalized(), {5, -7, 90}};
+    const calib::Bundle moved = bundle::Moved(bundle, world);
+    colmap::WriteModel(In("model"), ModelFrom(moved), colmap::Format::kBinary);
+  }
+  std::string In(const std::string& name) const { return (folder_ / name).string(); }
+  Ran Refine(std::vector<std::string> further) const {
+    further.insert(further.begin(), {"calibrate", "refine", In("model"), "-o", In("out")});
+    return Dtr(further);
+  }
+  double Metres(size_t a, size_t b) const { return (centres_[a] - centres_[b]).norm(); }
+  // Between cameras of what was written.
+  double Found(size_t a, size_t b) const {
+    const auto images = colmap::ReadModel(In("out")).images;
+    return (images[a].cam_from_world.TargetOriginInSource() -
+            images[b].cam_from_world.TargetOriginInSource())
+        .norm();
+  }
+  TemporaryFolder folder_;
+  std::vector<Eigen::Vector3d> centres_;  // true ones, metres
+};
+
+TEST_F(RefineToPlaces, GpsGivesMetresEastNorthAndUp) {
+  const Ran ran = Refine({"--gps", In("photos"), "--covariance", "--json", "-"});
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  const Json json = Json::parse(ran.out);
+  EXPECT_EQ(json["unit"], "metre");
+  const Json& scale = json["scale"];
+  EXPECT_EQ(scale["method"], "gps");
+  EXPECT_EQ(scale["photos"], 8);
+  EXPECT_TRUE(scale["left_out"].empty());
+  EXPECT_NEAR(scale["metres_per_unit"], kUnit, 0.02 * kUnit);
+  EXPECT_LT(scale["rms_m"], 0.06);
+  EXPECT_NEAR(scale["origin"]["altitude_m"], 38, 0.2);
+  EXPECT_EQ(json["covariance"]["gauge_freedom"], 0);
+  const auto images = colmap::ReadModel(In("out")).images;
+  for (size_t i = 0; i < images.size(); ++i) {
+    const Eigen::Vector3d way = images[i].cam_from_world.TargetOriginInSource() -
+                                images[0].cam_from_world.TargetOriginInSource();
+    EXPECT_LT((way - (centres_[i] - centres_[0])).norm(), 0.15) << i;
+  }
+}
+
+TEST_F(RefineToPlaces, APlaceThatIsWrongIsNamedAndOthersMayBeMissing) {
+  const std::string wrong = "image104.jpg";
+  WritePhotoAt(folder_ / "photos" / wrong, centres_[4] + Eigen::Vector3d(25, 0, 0));
+  std::filesystem::remove(folder_ / "photos/image106.jpg");
+  const Ran ran = Refine({"--gps", In("photos")});
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("do not agree, left out: " + wrong));
+  EXPECT_THAT(ran.out, HasSubstr("not in the folder: image106.jpg"));
+  EXPECT_NEAR(Found(0, 7), Metres(0, 7), 0.1);
+  EXPECT_NEAR(Found(3, 4), Metres(3, 4), 0.1);
+}
+
+TEST_F(RefineToPlaces, WhatExifOrTheUserSaysOfTheErrorIsTaken) {
+  for (size_t i = 0; i < centres_.size(); ++i) {
+    WritePhotoAt(folder_ / fmt::format("photos/image{}.jpg", 100 + i), centres_[i], 1.5);
+  }
+  // Such places do not tell the scale of so small a scene; a distance beside them does.
+  const std::string distance = fmt::format("image100,image107={:.9g}m", Metres(0, 7));
+  Ran ran = Refine({"--gps", In("photos"), "--distance", distance, "--json", "-"});
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  Json scale = Json::parse(ran.out)["scale"];
+  EXPECT_EQ(scale["method"], "gps and distance");
+  EXPECT_TRUE(scale["found_sigma_flat_m"].is_null()) << "EXIF says it";
+  EXPECT_GT(scale["found_sigma_up_m"], 0) << "EXIF does not";
+  EXPECT_NEAR(scale["relative_sigma"], 1e-3, 1e-4);
+  std::filesystem::remove_all(folder_ / "out");
+  ran = Refine({"--gps", In("photos"), "--gps-sigma", "0.1,0.2", "--json", "-"});
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  scale = Json::parse(ran.out)["scale"];
+  EXPECT_TRUE(scale["found_sigma_flat_m"].is_null());
+  EXPECT_TRUE(scale["found_sigma_up_m"].is_null());
+  // Of 0.14 m per coordinate over eight cameras some 3 m from their middle.
+  EXPECT_NEAR(scale["relative_sigma"], 0.02, 0.007);
+}
+
+TEST_F(RefineToPlaces, ADistanceSetsTheUnit) {
+  const Ran ran = Refine({"--distance", fmt::format("image100,image107.jpg={:.9g}m", Metres(0, 7)),
+                          "--covariance", "--json", "-"});
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  const Json json = Json::parse(ran.out);
+  EXPECT_EQ(json["unit"], "metre");
+  EXPECT_EQ(json["scale"]["method"], "distance");
+  EXPECT_NEAR(json["scale"]["metres_per_unit"], kUnit, 1e-2 * kUnit);
+  EXPECT_NEAR(json["scale"]["distances"][0]["found_m"], Metres(0, 7), 1e-3 * Metres(0, 7));
+  EXPECT_EQ(json["covariance"]["gauge_freedom"], 6);
+  EXPECT_NEAR(Found(0, 7), Metres(0, 7), 1e-3 * Metres(0, 7));
+  EXPECT_NEAR(Found(2, 5), Metres(2, 5), 0.01 * Metres(2, 5));
+}
+
+TEST_F(RefineToPlaces, WhatCannotBeHeldIsRefused) {
+  const auto distance = [&](const std::string& text) { return Refine({"--distance", text}); };
+  ExpectRefused(distance("image100:1:2,image101=5m"), kWrongUsage,
+                "expected two photos, as left01,right01=12cm, found 'image100:1:2'");
+  ExpectRefused(distance("nobody,image101=5m"), kWrongUsage, "no photo is named 'nobody'");
+  ExpectRefused(distance("image100,image100=5m"), kWrongUsage,
+                "expected two photos, found 'image100' twice");
+  ExpectRefused(distance("image100,image101"), kWrongUsage, "found no '='");
+  ExpectRefused(Refine({"--gps", In("photos"), "--gps-sigma", "0"}), kWrongUsage,
+                "--gps-sigma 0: expected metres above 0, as 3 or 3,6 (on the map, in height)");
+  ExpectRefused(Refine({"--gps", In("photos"), "--gps-sigma", "5"}), kFailed,
+                "expected places or distances that tell the scale to 10 %, found ones that tell "
+                "it to ");
+  ExpectRefused(Refine({"--gps-sigma", "3"}), kWrongUsage, "--gps-sigma requires --gps");
+  std::filesystem::create_directories(folder_ / "empty");
+  ExpectRefused(Refine({"--gps", In("empty")}), kFailed,
+                "expected at least 4 photos of the model with latitude, longitude and altitude, "
+                "found 0");
+  ExpectRefused(Refine({"--gps", In("photos"), "--distance", "image100,image107=1m"}), kFailed,
+                "expected a distance that agrees with the photos' GPS, found ");
+  ExpectRefused(
+      Refine({"--distance", "image100,image107=8m", "--distance", "image101,image106=9m"}), kFailed,
+      "expected distances that agree, found ");
+  // Too little for a model that is bent, too much for these photos.
+  const std::string one = fmt::format("image100,image107={:.9g}m", Metres(0, 7));
+  const std::string other = fmt::format("image101,image106={:.9g}m", 1.05 * Metres(1, 6));
+  ExpectRefused(Refine({"--distance", one, "--distance", other}), kFailed,
+                "expected a distance that the photos agree with, found ");
+  EXPECT_EQ(FilesIn(folder_ / "out"), 0);
 }
 
 }  // namespace

@@ -318,12 +318,14 @@ TEST(ReadImageHeader, ReadsTheGpsPositionSouthAndWestNegative) {
   spec.attribute("GPS:LongitudeRef", "W");
   spec.attribute("GPS:Longitude", TypeDesc(TypeDesc::FLOAT, 3), longitude);
   spec.attribute("GPS:Altitude", 512.5f);
+  spec.attribute("GPS:HPositioningError", 4.5f);
   WriteForeign<std::uint8_t>(folder / "gps.jpg", spec, std::vector<std::uint8_t>(12));
   const auto gps = ReadImageHeader(folder / "gps.jpg").gps;
   ASSERT_TRUE(gps);
   EXPECT_NEAR(gps->latitude_deg, -33.51, 1e-6);
   EXPECT_NEAR(gps->longitude_deg, -70.25, 1e-6);
   EXPECT_NEAR(gps->altitude_m.value_or(0), 512.5, 1e-3);
+  EXPECT_NEAR(gps->horizontal_error_m.value_or(0), 4.5, 1e-3);
 }
 
 TEST(ReadMask, HalfScaleAndMoreIsUsable) {

@@ -1,0 +1,323 @@
+#include "calib/bundle/metric_refine.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "calib/bundle/covariance.h"
+#include "calib/bundle/held_out.h"
+#include "calib/scale.h"
+#include "dtr/base/error.h"
+#include "dtr/base/order_statistics.h"
+
+namespace dtr::calib {
+namespace {
+
+constexpr int kMostPoints = 4000;  // that decide which places agree
+constexpr int kMostPasses = 10;
+constexpr double kSettled = 0.05;      // relative change of a standard deviation
+constexpr double kLeastSigmaM = 1e-3;  // nobody knows a place on Earth better
+constexpr double kMostOff = 5;         // standard deviations of a distance
+// What a model may be longer at one end than at the other before anything is adjusted.
+constexpr double kScaleDrift = 0.02;
+
+Eigen::Vector3d CentreOf(const SfmModel& model, int image) {
+  return model.images[static_cast<size_t>(image)].cam_from_world.TargetOriginInSource();
+}
+
+double DistanceOf(const SfmModel& model, const KnownDistance& d) {
+  return (CentreOf(model, d.image_a) - CentreOf(model, d.image_b)).norm();
+}
+
+double SigmaOf(const KnownDistance& d) {
+  return d.sigma_m > 0 ? d.sigma_m : kUnstatedRelativeSigma * d.length_m;
+}
+
+// Root sum of squared distances from the mean.
+double SpreadOf(const std::vector<Eigen::Vector3d>& points) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& p : points) mean += p / static_cast<double>(points.size());
+  double squares = 0;
+  for (const Eigen::Vector3d& p : points) squares += (p - mean).squaredNorm();
+  return std::sqrt(squares);
+}
+
+SfmModel Moved(SfmModel model, const Similarity& b_from_a) {
+  for (SfmImage& image : model.images) {
+    image.cam_from_world = b_from_a.CamFromB(image.cam_from_world);
+  }
+  for (auto& [id, point] : model.points) point.p_in_world = b_from_a * point.p_in_world;
+  return model;
+}
+
+// Centres of the cameras whose place is known, and these places: where `used` says so.
+struct Pairs {
+  std::vector<Eigen::Vector3d> centres, positions_m;
+};
+
+Pairs PairsOf(const SfmModel& model, const KnownMetres& known, const std::vector<bool>& used) {
+  Pairs pairs;
+  for (size_t i = 0; i < used.size(); ++i) {
+    if (!used[i]) continue;
+    pairs.centres.push_back(CentreOf(model, known.places[i].image));
+    pairs.positions_m.push_back(known.places[i].position_m);
+  }
+  return pairs;
+}
+
+// Which places agree, and how far those err that do not say so.
+struct Held {
+  std::vector<bool> used;
+  double sigma_flat_m = kLeastSigmaM, sigma_up_m = kLeastSigmaM;
+
+  Eigen::Vector3d SigmaOf(const KnownPlace& place) const {
+    const double flat = place.sigma_flat_m > 0 ? place.sigma_flat_m : sigma_flat_m;
+    return {flat, flat, place.sigma_up_m > 0 ? place.sigma_up_m : sigma_up_m};
+  }
+};
+
+std::vector<PositionPrior> PositionsOf(const KnownMetres& known, const Held& held) {
+  std::vector<PositionPrior> positions;
+  for (size_t i = 0; i < known.places.size(); ++i) {
+    const KnownPlace& place = known.places[i];
+    if (held.used[i]) positions.push_back({place.image, place.position_m, held.SigmaOf(place)});
+  }
+  return positions;
+}
+
+void RequireEnough(const Held& held) {
+  const auto agree = static_cast<size_t>(std::count(held.used.begin(), held.used.end(), true));
+  if (agree >= kFewestPositions && 2 * agree >= held.used.size()) return;
+  throw Error(
+      fmt::format("GPS: expected positions that agree with the cameras, found that {} of {} do",
+                  agree, held.used.size()));
+}
+
+// What a position leaves of its error as its camera follows it, per place and axis: 1 where sights
+// decide, 0 where nothing else does (Helmert's redundancy numbers). Where the covariance is too
+// large to be worked out, the seven numbers of a similarity alone are counted, and errors come out
+// too small by what the model bends.
+std::vector<Eigen::Vector3d> Redundancies(const KnownMetres& known, const Held& held,
+                                          const BundleCovariance* covariance) {
+  const auto agree = static_cast<double>(std::count(held.used.begin(), held.used.end(), true));
+  std::vector<Eigen::Vector3d> shares(known.places.size(),
+                                      Eigen::Vector3d::Constant(1 - 7 / (3 * agree)));
+  if (covariance == nullptr || !covariance->computed || !covariance->determined) return shares;
+  for (size_t i = 0; i < shares.size(); ++i) {
+    const Eigen::Vector3d variance =
+        covariance->OfImage(known.places[i].image).diagonal().tail<3>();
+    const Eigen::Vector3d sigma = held.SigmaOf(known.places[i]);
+    shares[i] = (1 - (variance.array() / sigma.array().square())).cwiseMax(0);
+  }
+  return shares;
+}
+
+// By what the cameras, as they are now, miss their places.
+Held Judged(const KnownMetres& known, const std::vector<Eigen::Vector3d>& misses, Held held,
+            const BundleCovariance* covariance) {
+  const std::vector<Eigen::Vector3d> shares = Redundancies(known, held, covariance);
+  double flat = 0, up = 0, flat_count = 0, up_count = 0;
+  for (size_t i = 0; i < misses.size(); ++i) {
+    if (!held.used[i]) continue;
+    if (!(known.places[i].sigma_flat_m > 0)) {
+      flat += misses[i].head<2>().squaredNorm();
+      flat_count += shares[i].head<2>().sum();
+    }
+    if (!(known.places[i].sigma_up_m > 0)) {
+      up += misses[i].z() * misses[i].z();
+      up_count += shares[i].z();
+    }
+  }
+  if (flat_count > 0) held.sigma_flat_m = std::max(kLeastSigmaM, std::sqrt(flat / flat_count));
+  if (up_count > 0) held.sigma_up_m = std::max(kLeastSigmaM, std::sqrt(up / up_count));
+  std::vector<double> lengths;
+  for (size_t i = 0; i < misses.size(); ++i) {
+    lengths.push_back(misses[i].cwiseQuotient(held.SigmaOf(known.places[i])).norm());
+  }
+  std::vector<double> sorted = lengths;
+  const double limit = kPositionOutlierSigmas * std::max(1.0, UpperMedian(sorted) / kMedianLength);
+  for (size_t i = 0; i < lengths.size(); ++i) held.used[i] = lengths[i] <= limit;
+  return held;
+}
+
+bool IsSettled(const Held& before, const Held& now) {
+  const auto same = [](double a, double b) { return std::abs(std::log(b / a)) <= kSettled; };
+  return before.used == now.used && same(before.sigma_flat_m, now.sigma_flat_m) &&
+         same(before.sigma_up_m, now.sigma_up_m);
+}
+
+std::vector<Eigen::Vector3d> Misses(const KnownMetres& known, const Bundle& bundle) {
+  std::vector<Eigen::Vector3d> misses;
+  for (const KnownPlace& place : known.places) {
+    const Pose& pose = bundle.images[static_cast<size_t>(place.image)].cam_from_world;
+    misses.push_back(pose.TargetOriginInSource() - place.position_m);
+  }
+  return misses;
+}
+
+// The similarity into metres, and the places that agree with it.
+Similarity FromPlaces(const SfmModel& model, const KnownMetres& known, Held& held) {
+  const Pairs pairs = PairsOf(model, known, std::vector<bool>(known.places.size(), true));
+  const PositionScale scale = ScaleFromPositions(pairs.centres, pairs.positions_m);
+  held.used.assign(known.places.size(), true);
+  for (const size_t i : scale.left_out) held.used[i] = false;
+  for (const KnownDistance& d : known.distances) {
+    const double by_gps = scale.metric_from_scene.scale * DistanceOf(model, d);
+    const double sigma = std::hypot(scale.relative_sigma, SigmaOf(d) / d.length_m, kScaleDrift);
+    const double off = std::abs(std::log(d.length_m / by_gps)) / sigma;
+    if (off <= kMostOff) continue;
+    throw Error(fmt::format(
+        "{}: expected a distance that agrees with the photos' GPS, found {:.4g} m between these "
+        "cameras by GPS, {:.1f} standard deviations off; is it the right pair?",
+        d.name, by_gps, off));
+  }
+  return scale.metric_from_scene;
+}
+
+Similarity FromDistances(const SfmModel& model, const KnownMetres& known) {
+  std::vector<MeasuredDistance> measured;
+  for (const KnownDistance& d : known.distances) {
+    // Each end errs by the drift: distances in two places of a model may differ by as much.
+    const double drift = kScaleDrift * DistanceOf(model, d) / std::sqrt(2);
+    const Eigen::Matrix3d covariance = drift * drift * Eigen::Matrix3d::Identity();
+    measured.push_back({d.name, CentreOf(model, d.image_a), CentreOf(model, d.image_b), covariance,
+                        covariance, d.length_m, SigmaOf(d)});
+  }
+  Similarity metric_from_model;
+  metric_from_model.scale = ScaleFromDistances(measured).metres_per_unit;
+  return metric_from_model;
+}
+
+void RequireNoContradiction(const Adjusted& held, const Adjusted& free) {
+  if (!Contradicts(held, free)) return;
+  throw Error(fmt::format(
+      "bundle adjustment: expected photos that agree with the places and distances given, found "
+      "residuals of {:.2f} px per coordinate and {} observations that agree with these held, "
+      "{:.2f} px and {} without; are their standard deviations too small, or is a distance of "
+      "another pair?",
+      held.sigma_px, held.sights, free.sigma_px, free.sights));
+}
+
+// Adjusts some points until the places settle, and holds what comes out against the photos.
+void SettlePlaces(const KnownMetres& known, MetricStart& start, Held held) {
+  const RefineOptions& options = start.options;
+  // Of the lenses as they are known: what decides about places is to see what the result will.
+  const SfmModel model =
+      options.known_lenses ? WithLenses(start.model, *options.known_lenses) : start.model;
+  const Bundle some =
+      SomePoints(BundleOf(model, options.separate_lenses), kMostPoints, options.seed);
+  AdjustOptions adjust =
+      OptionsFor(options.known_lenses ? LensFreedom::kFixed : LensFreedom::kNoPrincipalPoint);
+  const Adjusted free = Adjust(some, adjust);
+  adjust.distances = options.distances;
+  Bundle bundle = some;
+  const bool placed = !known.places.empty();
+  if (placed) held = Judged(known, Misses(known, bundle), held, nullptr);
+  for (int pass = 0; pass < kMostPasses; ++pass) {
+    if (placed) RequireEnough(held);
+    adjust.positions = PositionsOf(known, held);
+    const Adjusted adjusted = Adjust(bundle, adjust);
+    bundle = adjusted.bundle;
+    Held next = held;
+    if (placed) {
+      const BundleCovariance covariance = CovarianceOf(adjusted, adjust);
+      next = Judged(known, Misses(known, bundle), held, &covariance);
+    }
+    if (IsSettled(held, next) || pass + 1 == kMostPasses) {
+      RequireNoContradiction(adjusted, free);
+      break;
+    }
+    held = next;
+  }
+  start.options.positions = PositionsOf(known, held);
+  for (size_t i = 0; i < known.places.size(); ++i) {
+    const KnownPlace& place = known.places[i];
+    if (!held.used[i]) start.report.left_out.push_back(place.image);
+    if (!(place.sigma_flat_m > 0)) start.report.sigma_flat_m = held.sigma_flat_m;
+    if (!(place.sigma_up_m > 0)) start.report.sigma_up_m = held.sigma_up_m;
+  }
+}
+
+// What is told of the result.
+void Complete(const KnownMetres& known, const SfmModel& adjusted, MetricStart& start) {
+  MetricReport& report = start.report;
+  std::vector<Eigen::Vector3d> before, after;
+  for (size_t i = 0; i < adjusted.images.size(); ++i) {
+    before.push_back(CentreOf(start.model, static_cast<int>(i)));
+    after.push_back(CentreOf(adjusted, static_cast<int>(i)));
+  }
+  report.metres_per_unit *= SpreadOf(after) / SpreadOf(before);
+  double weights = 0;  // of the scale, squared inverse standard deviations
+  for (const KnownDistance& d : known.distances) {
+    weights += std::pow(d.length_m / SigmaOf(d), 2);
+    report.found_m.push_back(DistanceOf(adjusted, d));
+    const double off = (report.found_m.back() - d.length_m) / SigmaOf(d);
+    report.sigmas_off.push_back(std::abs(off));
+    if (report.sigmas_off.back() <= kMostOff) continue;
+    throw Error(
+        fmt::format("{}: expected a distance that the photos agree with, found {:.5g} m after "
+                    "adjustment, {:.1f} "
+                    "standard deviations off; is it the right pair?",
+                    d.name, report.found_m.back(), report.sigmas_off.back()));
+  }
+  if (!known.places.empty()) {
+    std::vector<bool> used(known.places.size());
+    double squares = 0;
+    for (size_t i = 0; i < used.size(); ++i) {
+      const auto& out = report.left_out;
+      used[i] = std::find(out.begin(), out.end(), known.places[i].image) == out.end();
+    }
+    for (const PositionPrior& p : start.options.positions) squares += p.sigma.squaredNorm();
+    const Pairs given = PairsOf(start.model, known, used), found = PairsOf(adjusted, known, used);
+    const auto count = static_cast<double>(found.centres.size());
+    report.given_rms_m = AlignmentRms(AlignPoints(given.centres, given.positions_m), given.centres,
+                                      given.positions_m);
+    report.rms_m = AlignmentRms({}, found.centres, found.positions_m);
+    PositionScale scale;
+    FillUncertainty(found.centres, std::sqrt(squares / (3 * count)), scale);
+    report.turn_sigma_rad = scale.turn_sigma_rad;
+    weights += std::pow(scale.relative_sigma, -2);
+  }
+  report.relative_sigma = 1 / std::sqrt(weights);
+  if (!(report.relative_sigma <= kMostRelativeSigma)) {
+    throw Error(fmt::format(
+        "bundle adjustment: expected places or distances that tell the scale to {:.0f} %, found "
+        "ones that tell it to {:.0f} %: they err too much for cameras that stand so near to each "
+        "other",
+        100 * kMostRelativeSigma, 100 * report.relative_sigma));
+  }
+}
+
+}  // namespace
+
+MetricStart StartInMetres(const SfmModel& model, const KnownMetres& known,
+                          const RefineOptions& options) {
+  MetricStart start;
+  start.options = options;
+  Held held;
+  const Similarity metric_from_model =
+      known.places.empty() ? FromDistances(model, known) : FromPlaces(model, known, held);
+  start.model = Moved(model, metric_from_model);
+  start.report.metres_per_unit = metric_from_model.scale;
+  for (const KnownDistance& d : known.distances) {
+    start.options.distances.push_back({d.image_a, d.image_b, d.length_m, SigmaOf(d)});
+    start.report.given_m.push_back(DistanceOf(start.model, d));
+  }
+  SettlePlaces(known, start, held);
+  return start;
+}
+
+Refined RefineInMetres(const KnownMetres& known, MetricStart& start) {
+  Refined refined = Refine(start.model, start.options);
+  if (!refined.changed) {
+    throw Error(
+        fmt::format("bundle adjustment: expected a model that places and distances can be "
+                    "held for, found none: {}; dtr calibrate scale carries a set as a whole",
+                    refined.reason));
+  }
+  Complete(known, refined.model, start);
+  return refined;
+}
+
+}  // namespace dtr::calib

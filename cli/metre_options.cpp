@@ -1,0 +1,121 @@
+#include "cli/metre_options.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <cmath>
+
+#include "calib/boards/length.h"
+#include "dtr/base/error.h"
+
+namespace dtr::cli {
+namespace {
+
+[[noreturn]] void Refuse(const std::string& text, const std::string& what) {
+  throw UsageError(fmt::format(
+      "--distance {}: {}; expected A,B=LENGTH, as 0001:640:410,0001:902.5:398=2.5m: A and B each "
+      "VIEW:X:Y, VIEW:X:Y+VIEW2:X:Y or VIEW (the camera itself), LENGTH in mm, cm or m",
+      text, what));
+}
+
+std::vector<std::string> Split(const std::string& text, char at) {
+  std::vector<std::string> parts{""};
+  for (const char c : text) {
+    if (c == at) {
+      parts.emplace_back();
+    } else {
+      parts.back().push_back(c);
+    }
+  }
+  return parts;
+}
+
+std::optional<double> NumberFrom(const std::string& word) {
+  double value = 0;
+  const auto [end, failure] = std::from_chars(word.data(), word.data() + word.size(), value);
+  if (failure != std::errc() || end != word.data() + word.size() || !std::isfinite(value))
+    return {};
+  return value;
+}
+
+pipeline::ScalePoint PointFrom(const std::string& text, const std::string& whole) {
+  pipeline::ScalePoint point{text, {}};
+  for (const std::string& part : Split(text, '+')) {
+    const auto words = Split(part, ':');
+    if (words.front().empty()) Refuse(whole, "a view without a name");
+    pipeline::ScaleClick click{words.front(), {}};
+    if (words.size() == 3) {
+      const auto x = NumberFrom(words[1]), y = NumberFrom(words[2]);
+      if (!x || !y) Refuse(whole, fmt::format("no pixel is '{}:{}'", words[1], words[2]));
+      click.pixel = Eigen::Vector2d(*x, *y);
+    } else if (words.size() != 1) {
+      Refuse(whole, fmt::format("no point is '{}'", part));
+    }
+    point.clicks.push_back(std::move(click));
+  }
+  return point;
+}
+
+double MetresFrom(const std::string& word, const std::string& whole) {
+  const auto length = calib::LengthFrom(word);
+  if (!length || !length->has_unit) Refuse(whole, fmt::format("no length is '{}'", word));
+  return length->value;
+}
+
+pipeline::GpsSigma GpsSigmaFrom(const std::string& text) {
+  const auto words = Split(text, ',');
+  const auto flat = NumberFrom(words.front()), up = NumberFrom(words.back());
+  if (words.size() > 2 || !flat || !up || !(*flat > 0) || !(*up > 0)) {
+    throw UsageError(fmt::format(
+        "--gps-sigma {}: expected metres above 0, as 3 or 3,6 (on the map, in height)", text));
+  }
+  return {*flat, *up};
+}
+
+}  // namespace
+
+pipeline::ScaleDistance DistanceFrom(const std::string& text) {
+  const size_t equals = text.rfind('=');
+  if (equals == std::string::npos) Refuse(text, "found no '='");
+  const auto points = Split(text.substr(0, equals), ',');
+  if (points.size() != 2) Refuse(text, fmt::format("found {} points", points.size()));
+  pipeline::ScaleDistance distance;
+  distance.text = text;
+  distance.a = PointFrom(points[0], text);
+  distance.b = PointFrom(points[1], text);
+  const std::string length = text.substr(equals + 1);
+  const size_t spread = length.find("+-");
+  distance.length_m = MetresFrom(length.substr(0, spread), text);
+  if (spread != std::string::npos) distance.sigma_m = MetresFrom(length.substr(spread + 2), text);
+  return distance;
+}
+
+CLI::Option* AddGpsFlag(CLI::App& command, bool& gps) {
+  return command.add_flag("--gps", gps,
+                          "Hold the places that the photos' EXIF says they were taken at: cameras "
+                          "in metres east, north and up");
+}
+
+CLI::Option* AddMetreOptions(CLI::App& command, CLI::Option& gps, MetreWords& words) {
+  command
+      .add_option("--gps-sigma", words.gps_sigma,
+                  "Standard deviation of these places per axis, on the map and in height, in place "
+                  "of what EXIF says or the places themselves show")
+      ->needs(&gps)
+      ->type_name("M[,V]");
+  return command
+      .add_option("--distance", words.distances,
+                  "A measured distance between the cameras of two photos, to be held; LENGTH as "
+                  "2.5m, or 2.5m+-5mm with its standard deviation; may be given more than once")
+      ->type_name("A,B=LENGTH");
+}
+
+pipeline::MetreOptions MetreOptionsFrom(bool gps, const MetreWords& words) {
+  pipeline::MetreOptions options;
+  options.gps = gps;
+  if (!words.gps_sigma.empty()) options.gps_sigma = GpsSigmaFrom(words.gps_sigma);
+  for (const std::string& text : words.distances) options.distances.push_back(DistanceFrom(text));
+  return options;
+}
+
+}  // namespace dtr::cli

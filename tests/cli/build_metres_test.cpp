@@ -1,0 +1,136 @@
+// `dtr build` and `dtr calibrate photos` with --gps and --distance. COLMAP is a stand-in that
+// leaves the true model in another unit, with noise.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "calib/colmap/model_io.h"
+#include "dtr/base/random.h"
+#include "dtr/io/image_io.h"
+#include "dtr/io/set_io.h"
+#include "tests/calib/colmap/fake_colmap.h"
+#include "tests/cli/gps_photo.h"
+#include "tests/cli/run_dtr.h"
+#include "tests/cli/small_courtyard.h"
+
+namespace dtr::testing {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+using ::testing::HasSubstr;
+
+constexpr double kUnit = 0.31;     // scene units, which are metres, per unit of the model
+constexpr double kNoisePx = 0.2;   // of the features
+constexpr double kPlacesM = 0.02;  // standard deviation of the places
+constexpr int kPhotos = 7;
+
+class BuildInMetres : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const PinholeCamera camera(192, 128, 150, 150, 96, 64);
+    for (const Pose& pose : CourtyardArc(kPhotos)) {
+      photos_.push_back({fmt::format("{:04}.jpg", photos_.size()), camera, pose});
+    }
+    RenderCourtyard(folder_ / "plain", photos_);
+    fs::create_directories(folder_ / "photos");
+    Random random(9);
+    for (const CourtyardPhoto& photo : photos_) {
+      const double x = random.Normal(), y = random.Normal();
+      WritePhotoAt(folder_ / "photos" / photo.name,
+                   photo.cam_from_scene.TargetOriginInSource() + Eigen::Vector3d(25, 25, 0) +
+                       kPlacesM * Eigen::Vector3d(x, y, random.Normal()),
+                   {}, io::ReadImage(folder_ / "plain" / photo.name));
+    }
+    LeaveModel();
+  }
+  std::string In(const std::string& name) const { return (folder_ / name).string(); }
+  void LeaveModel() {
+    calib::SfmModel model = CourtyardModel(photos_, 1 / kUnit);
+    Random random(3);
+    std::vector<std::string> aliases;
+    for (calib::SfmImage& image : model.images) {
+      aliases.push_back(fmt::format("{:06}.jpg", aliases.size()));
+      image.name = aliases.back();
+      for (auto& feature : image.features) {
+        const double x = random.Normal();
+        feature.pixel += kNoisePx * Eigen::Vector2d(x, random.Normal());
+      }
+    }
+    colmap::WriteModel(colmap_ / "model.0", model, colmap::Format::kBinary);
+    colmap_.LeaveDatabase(aliases);
+  }
+  double Metres(size_t a, size_t b) const {
+    return (photos_[a].cam_from_scene.TargetOriginInSource() -
+            photos_[b].cam_from_scene.TargetOriginInSource())
+        .norm();
+  }
+  Ran Build(std::vector<std::string> further) const {
+    further.insert(further.begin(),
+                   {"build", In("photos"), "-o", In("set.dtr"), "--engine", "none"});
+    return Dtr(further);
+  }
+  colmap::testing::FakeColmap colmap_;
+  TemporaryFolder folder_;
+  std::vector<CourtyardPhoto> photos_;
+};
+
+TEST_F(BuildInMetres, GpsOfThePhotosGivesASetInMetres) {
+  const Ran ran = Build({"--gps"});
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  const DtrSet set = io::ReadSet(folder_ / "set.dtr");
+  EXPECT_EQ(set.unit, LengthUnit::kMetre);
+  const auto& views = set.frames.front().views;
+  ASSERT_EQ(views.size(), photos_.size());
+  for (size_t i = 1; i < views.size(); ++i) {
+    // East, north and up are the scene's axes: each coordinate is the truth's.
+    const Eigen::Vector3d way = views[i].CenterInWorld() - views[0].CenterInWorld();
+    const Eigen::Vector3d truth = photos_[i].cam_from_scene.TargetOriginInSource() -
+                                  photos_[0].cam_from_scene.TargetOriginInSource();
+    EXPECT_LT((way - truth).norm(), 5 * kPlacesM) << i;
+  }
+  const Json provenance = Json::parse(set.provenance_json);
+  const Json& scale = provenance["scale"][0];
+  EXPECT_EQ(scale["method"], "gps");
+  EXPECT_EQ(scale["photos"], kPhotos);
+  EXPECT_NEAR(scale["metres_per_unit"], kUnit, 0.02 * kUnit);
+  EXPECT_EQ(provenance["options"]["metres"]["gps"], true);
+  EXPECT_EQ(provenance["calibration"]["bundle_adjustment"]["unit"], "metre");
+}
+
+TEST_F(BuildInMetres, ADistanceBetweenCamerasIsHeldByCalibratePhotos) {
+  const std::string distance = fmt::format("0000,0006.jpg={:.9g}m+-1mm", Metres(0, 6));
+  const Ran ran = Dtr({"calibrate", "photos", In("photos"), "-o", In("model"), "--distance",
+                       distance, "--json", "-"});
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  const Json json = Json::parse(ran.out);
+  EXPECT_EQ(json["unit"], "metre");
+  EXPECT_EQ(json["bundle_adjustment"]["scale"]["distances"][0]["text"], distance);
+  const auto images = colmap::ReadModel(In("model")).images;
+  const auto apart = [&](size_t a, size_t b) {
+    return (images[a].cam_from_world.TargetOriginInSource() -
+            images[b].cam_from_world.TargetOriginInSource())
+        .norm();
+  };
+  EXPECT_NEAR(apart(0, 6), Metres(0, 6), 0.005);
+  EXPECT_NEAR(apart(2, 4), Metres(2, 4), 0.01 * Metres(2, 4));
+}
+
+TEST_F(BuildInMetres, WhatCannotBeHeldIsRefusedBeforeAnyWork) {
+  ExpectRefused(Build({"--gps", "--no-refine"}), kWrongUsage,
+                "--gps, --distance: are held by the bundle adjustment of what SfM finds; expected "
+                "no --poses, --rig or --no-refine beside them");
+  ExpectRefused(Build({"--distance", "0000,nobody=1m"}), kWrongUsage,
+                "--distance 0000,nobody=1m: no photo is named 'nobody'");
+  for (const CourtyardPhoto& photo : photos_) fs::remove(folder_ / "photos" / photo.name);
+  fs::copy(folder_ / "plain", folder_ / "photos", fs::copy_options::recursive);
+  ExpectRefused(Build({"--gps"}), kFailed,
+                "expected at least 4 photos of the folder with latitude, longitude and altitude, "
+                "found 0");
+  EXPECT_FALSE(fs::exists(folder_ / "set.dtr"));
+  EXPECT_FALSE(fs::exists(folder_ / "set.dtr.partial"));
+}
+
+}  // namespace
+}  // namespace dtr::testing
