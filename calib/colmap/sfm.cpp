@@ -38,9 +38,19 @@ int RegisteredImages(const std::string& line) {
       workspace.images().size(), workspace.Report().steps.back().log_file.string()));
 }
 
-// Runs the mapper. COLMAP ends with an error when the photos do not connect: that is a finding
-// about the photos, told as such.
-void Map(Workspace& workspace, const fs::path& models, std::uint64_t seed) {
+// COLMAP starts from two photos that see the scene from 16 degrees apart, or 4 where it finds none,
+// and not along the line of sight. A walk straight ahead through a street has no such pair. Its
+// points are seen under small angles throughout, so they are kept under smaller ones, too.
+void LookStraightAhead(Arguments& arguments) {
+  arguments.Add({"Mapper.init_max_forward_motion"}, "1")
+      .Add({"Mapper.init_min_tri_angle"}, "2")
+      .Add({"Mapper.filter_min_tri_angle"}, "0.5")
+      .Add({"Mapper.abs_pose_min_num_inliers"}, "15");
+}
+
+// Runs the mapper; false where it found no two photos to start from, which COLMAP takes for an
+// error: it is a finding about the photos.
+bool Map(Workspace& workspace, const fs::path& models, std::uint64_t seed, bool straight_ahead) {
   Arguments arguments(workspace.program(), "mapper");
   arguments.AddIfKnown({"random_seed", "default_random_seed"}, fmt::format("{}", seed))
       .AddIfKnown({"Mapper.random_seed"}, fmt::format("{}", seed))
@@ -48,6 +58,7 @@ void Map(Workspace& workspace, const fs::path& models, std::uint64_t seed) {
       .Add({"image_path"}, workspace.images_folder().string())
       .Add({"output_path"}, models.string())
       .Add({"Mapper.num_threads"}, std::to_string(workspace.threads()));
+  if (straight_ahead) LookStraightAhead(arguments);
   workspace.progress().Stage("mapping", static_cast<int>(workspace.images().size()));
   int most = 0;
   bool no_pair = false;
@@ -62,9 +73,10 @@ void Map(Workspace& workspace, const fs::path& models, std::uint64_t seed) {
   } catch (const Interrupted&) {
     throw;
   } catch (const Error&) {
-    if (no_pair) ThrowNoModel(workspace);
+    if (no_pair) return false;
     throw;
   }
+  return true;
 }
 
 // The folders "0", "1", ... in which the mapper leaves its models, as models; largest first (by
@@ -86,8 +98,19 @@ void MappingStep(Workspace& workspace, const SfmOptions& options) {
   RemoveAll(models);
   RemoveAll(workspace.folder() / "model");
   MakeFolder(models);
-  Map(workspace, models, options.seed);
-  const auto made = ModelsIn(workspace, models);
+  const auto map = [&](bool straight_ahead) {
+    return Map(workspace, models, options.seed, straight_ahead) ? ModelsIn(workspace, models)
+                                                                : std::vector<calib::SfmModel>();
+  };
+  auto made = map(false);
+  if (made.empty()) {
+    workspace.progress().Note(
+        "no two photos see the scene from places far enough beside each other: starting from two "
+        "in line with what they see");
+    RemoveAll(models);
+    MakeFolder(models);
+    made = map(true);
+  }
   if (made.empty()) ThrowNoModel(workspace);
   std::string sizes;
   for (const auto& model : made) sizes += fmt::format("{}\n", model.images.size());

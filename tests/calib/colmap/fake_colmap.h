@@ -79,7 +79,9 @@ class FakeColmap {
         "--ExhaustiveMatching.block_size\n--SequentialMatching.overlap\n"
         "--SequentialMatching.quadratic_overlap\n--Mapper.num_threads\n"
         "--Mapper.ba_refine_focal_length\n--Mapper.ba_refine_principal_point\n"
-        "--Mapper.ba_refine_extra_params\n--Mapper.tri_ignore_two_view_tracks\n";
+        "--Mapper.ba_refine_extra_params\n--Mapper.tri_ignore_two_view_tracks\n"
+        "--Mapper.init_max_forward_motion\n--Mapper.init_min_tri_angle\n"
+        "--Mapper.filter_min_tri_angle\n--Mapper.abs_pose_min_num_inliers\n";
     options += "--workspace_path\n--PatchMatchStereo.geom_consistency\n";
     options += new_names ? "--default_random_seed\n" : "--random_seed\n";
     for (const char* name : {".use_gpu", ".num_threads", ".max_image_size"}) {

@@ -217,6 +217,18 @@ TEST_F(RunSfmWithFake, PhotosWithNothingInCommonAreToldAsSuch) {
   EXPECT_THAT(MessageOfRun(), HasSubstr("too little in common"));
 }
 
+TEST_F(RunSfmWithFake, AWalkStraightAheadStartsFromPhotosInLineWithWhatTheySee) {
+  fake_.Fail("mapper",
+             "if ! grep -q 'init_max_forward_motion 1' \"$here/calls\"; then "
+             "echo '=> No good initial image pair found.'; "
+             "echo 'ERROR: failed to create sparse model'; exit 1; fi");
+  const SfmResult result = Run();
+  EXPECT_EQ(result.model.images.size(), 3u);
+  ASSERT_EQ(result.report.steps.size(), 4u);
+  EXPECT_THAT(result.report.steps[2].argv, Not(Contains("--Mapper.init_max_forward_motion")));
+  EXPECT_THAT(result.report.steps[3].argv, Contains("--Mapper.init_max_forward_motion"));
+}
+
 TEST_F(RunSfmWithFake, GarbageModelIsRefused) {
   WriteFileAtomically(fake_ / "model.0" / "images.bin", "garbage");
   EXPECT_THAT(MessageOfRun(), HasSubstr("images.bin"));
