@@ -119,8 +119,12 @@ LensCamera WrongLens(LensCamera lens) {
 
 // For docs/CALIBRATION.md.
 void Tell(const char* what, const SfmModel& model, const Held& held, const Bundle& truth) {
-  std::printf("%s: cameras off the truth, RMS: %.3f m as a whole, %.3f m with places held\n", what,
-              BentM(model, truth), OffM(held.refined.model, truth));
+  std::printf(
+      "%s: cameras off the truth, RMS: %.3f m as a whole, %.3f m refined and as a whole, %.3f m "
+      "with "
+      "places held\n",
+      what, BentM(model, truth), BentM(Refine(model, {}).model, truth),
+      OffM(held.refined.model, truth));
 }
 
 TEST(RefineInMetres, GpsStraightensAWalkThatALensHasBent) {
