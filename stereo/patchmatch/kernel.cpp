@@ -24,14 +24,15 @@ namespace dtr::stereo::patchmatch::HWY_NAMESPACE {
 constexpr int kPlanes = 11;
 /// A view sees a pixel when more than this many candidates match well in it and fewer than that
 /// badly. ACMH's 2 and 3 take the sight from all views next to silhouettes and behind thin things.
-constexpr float kSurelyAbove = 1.0001f;
-constexpr float kGoodPlanes = 1.0f;
-constexpr float kBadPlanes = 7.0f;
+constexpr float kGoodPlanes = 1.0f, kBadPlanes = 7.0f;
 constexpr int kNearSamples = 7, kFarSamples = 11;
 /// What a first guess costs more when one view alone speaks for it. By the mean of two a surface
 /// that a single neighbour sees is never found, and no later step looks for it: fountain's far
 /// facade, 27.3 dB held out instead of 28.0. Without any surcharge chance decides more often.
 constexpr float kLoneView = 0.1f;
+
+/// A sum so far above a limit is above it in whatever order it is summed up.
+constexpr float kSurelyAbove = 1.0001f;
 
 /// Inverse depth and cost of a candidate that a lane does not have, for its neighbours have one:
 /// comparisons with it are false, so it is no good plane, no bad one and never the cheapest, and
@@ -217,7 +218,7 @@ void ChooseViews(const Level& level, const Sweep& sweep, const State& state, con
     const VF weight = hn::Div(hn::Load(d, best->weight[v]), sum);
     hn::Store(weight, d, best->weight[v]);
     thought[v] = hn::GetLane(hn::SumOfLanes(d, weight));
-    if (!(thought[v] > 0)) continue;
+    if (hn::AllTrue(d, hn::Eq(weight, hn::Zero(d)))) continue;
     int i = best->used++;
     for (; i > 0 && thought[best->view[i - 1]] < thought[v]; --i) {
       best->view[i] = best->view[i - 1];

@@ -25,6 +25,8 @@ constexpr int kTaps = kTapsPerSide * kTapsPerSide;
 constexpr int kBorder = 56;
 /// Border around source textures; a window that reaches beyond it is not compared.
 constexpr int kTextureBorder = 16;
+/// Rows of a texture are told apart by a signed 16-bit number of its places.
+constexpr int kWidestTexture = 32767 - 2 * kTextureBorder;
 /// Worst cost (NCC = -1); also of a window that does not fit into a view.
 constexpr float kWorstCost = 2.0f;
 

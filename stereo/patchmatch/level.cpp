@@ -109,6 +109,11 @@ std::vector<Picture> Pyramid(Picture full, int levels) {
 }
 
 SourcePyramid MakeSource(const StereoView& view, int levels) {
+  if (view.camera.width_px() > kWidestTexture) {
+    throw Error("patchmatch: expected photos at most " + std::to_string(kWidestTexture) +
+                " pixels wide, found " + std::to_string(view.camera.width_px()) +
+                "; shrink them (--max-size)");
+  }
   SourcePyramid source;
   source.view = &view;
   for (const Picture& picture : Pyramid(MakePicture(view), levels)) {

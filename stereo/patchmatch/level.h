@@ -20,6 +20,7 @@ struct SourcePyramid {
 /// The picture and its halvings, `levels` in all. Requires sizes of at least 2^(levels - 1).
 std::vector<Picture> Pyramid(Picture full, int levels);
 
+/// Throws Error for photos wider than kWidestTexture.
 SourcePyramid MakeSource(const StereoView& view, int levels);
 
 /// Sets up matching `reference` (a level's picture of `view`) with the sources' pictures at
