@@ -42,10 +42,10 @@ int RegisteredImages(const std::string& line) {
 // and not along the line of sight. A walk straight ahead through a street has no such pair. Its
 // points are seen under small angles throughout, so they are kept under smaller ones, too.
 void LookStraightAhead(Arguments& arguments) {
-  arguments.Add({"Mapper.init_max_forward_motion"}, "1")
-      .Add({"Mapper.init_min_tri_angle"}, "2")
-      .Add({"Mapper.filter_min_tri_angle"}, "0.5")
-      .Add({"Mapper.abs_pose_min_num_inliers"}, "15");
+  arguments.AddIfKnown({"Mapper.init_max_forward_motion"}, "1")
+      .AddIfKnown({"Mapper.init_min_tri_angle"}, "2")
+      .AddIfKnown({"Mapper.filter_min_tri_angle"}, "0.5")
+      .AddIfKnown({"Mapper.abs_pose_min_num_inliers"}, "15");
 }
 
 // Runs the mapper; false where it found no two photos to start from, which COLMAP takes for an
@@ -105,8 +105,8 @@ void MappingStep(Workspace& workspace, const SfmOptions& options) {
   auto made = map(false);
   if (made.empty()) {
     workspace.progress().Note(
-        "no two photos see the scene from places far enough beside each other: starting from two "
-        "in line with what they see");
+        "COLMAP found no two photos to start from; trying two that may lie in line with what they "
+        "see");
     RemoveAll(models);
     MakeFolder(models);
     made = map(true);

@@ -140,7 +140,8 @@ void StorageSweep::Write(View& view, const eval::SweepSetting& setting, LengthUn
     io::LoadPixels(options_.set, view, load);
   }
   if (value(kSigma) != kKept) view.sigma_file.reset();
-  view.mesh_file.reset();
+  // Meshes are of the depth as it is stored.
+  if (!same_depth || value(kMesh) != kKept) view.mesh_file.reset();
   View copied = view;
   if (!same_depth) copied.depth_file.reset();
   // Masks are stored the same way beside any image.
@@ -165,7 +166,8 @@ eval::SweepMeasurement StorageSweep::Measure(const eval::SweepSetting& setting) 
       progress_.ThrowIfInterrupted();
       Write(view, setting, set.unit, writer);
     }
-    if (axes_[kMesh].values.at(static_cast<size_t>(setting.at(kMesh))) == kKept) {
+    const bool meshes = axes_[kMesh].values.at(static_cast<size_t>(setting.at(kMesh))) == kKept;
+    if (meshes && setting.at(kDepth) != 0) {
       WriteMeshes(set, writer, options_.threads);
     }
     // The calibration's points are no part of what is rendered from.

@@ -72,7 +72,7 @@ class Pruner {
       if (pass > 0 && report_.removed.size() == verified) break;
       if (!CheckFrom(verified)) break;
     }
-    for (const Removal& removal : report_.removed) report_.decided_loss_db += removal.loss_db;
+    report_.decided_loss_db = now_.loss_db;
     report_.setting = history_.back();
     return report_;
   }
@@ -288,7 +288,8 @@ class Pruner {
         moves_.push_back(moves[n]);
       } else {
         report_.put_back.push_back(decisions[n]);
-        at_fault_.push_back(moves[n]);
+        // What was not looked at again may be decided again.
+        if (tried || n == holds) at_fault_.push_back(moves[n]);
       }
     }
     if (holds == decisions.size()) return false;

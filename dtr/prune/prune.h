@@ -51,7 +51,8 @@ struct PruneReport {
   /// none: there are none.
   std::optional<double> photo_loss_db, photo_frame_loss_db;
   double error_db = 0;  ///< PSNR against photos before, to which a loss is relative
-  /// The larger of the two checked losses. With two standard errors it does not exceed max_loss_db.
+  /// The larger of the two checked losses, neither of which exceeds max_loss_db: with twice its
+  /// standard error the first, with once its own the second.
   double loss_db() const { return std::max(checked_probe_loss_db, witness_loss_db); }
 };
 
@@ -61,7 +62,8 @@ struct PruneReport {
 /// larger loss of two: at source views left out in turn, and between input cameras. `set`: loaded
 /// with images and depth, and held-out photos where it has some: they only judge. The outcome is
 /// then looked at anew, at full size, from other cameras and against the photos, and the last
-/// decisions are taken back until the loss holds. Depends on the set, the options and the renderer
+/// decisions are taken back until the loss holds; then it goes on without these, a few times.
+/// Depends on the set, the options and the renderer
 /// alone, not on threads or times, nor on how often it was interrupted.
 PruneReport Prune(const DtrSet& set, const PruneOptions& options, const CodeFunction& code,
                   const RendererMaker& make_renderer, Progress& progress);

@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
+#include <sstream>
 
 #include "datasets/exact/analytic_scene.h"
 #include "dtr/base/error.h"
@@ -311,6 +313,57 @@ TEST(Prune, EveryCauseOfLossIsLogged) {
       code, make, mover, notes, progress);
   EXPECT_NEAR(measurer.Measure(setting).loss_db, sum_db, 1e-9);
   EXPECT_NEAR(report.decided_loss_db, sum_db, 1e-12);
+}
+
+/// As if from elsewhere any JPEG lost 100 dB; all else is measured.
+class JpegFailsTheCheck : public Notes {
+ public:
+  using Notes::Notes;
+  std::optional<std::vector<double>> Find(const std::string& name) const override {
+    // "check IDS QUALITY ..." (KeyOf)
+    std::istringstream words(name.starts_with("check ") ? name.substr(name.find(' ', 6)) : "0");
+    int quality = 0;
+    words >> quality;
+    return quality > 0 ? std::optional(std::vector<double>{100, 0}) : Notes::Find(name);
+  }
+};
+
+class CountsMeasuring : public Progress {
+ public:
+  void Update(int) override {}
+  void Note(const std::string&) override {}
+  void Stage(const std::string& name, int) override { passes += name.starts_with("measuring"); }
+  int passes = 0;
+};
+
+TEST(Prune, WhatACheckTakesBackStaysOutAndLeavesRoomForOthers) {
+  const DtrSet set = Row(6);
+  PruneOptions options = SmallOptions(8);
+  JpegFailsTheCheck journal(100000);
+  options.journal = &journal;
+  FakeStore store(set);
+  CountsMeasuring progress;
+  const CodeFunction code = std::ref(store);
+  const RendererMaker make = [] { return &cpu::Render; };
+  const PruneReport report = Prune(set, options, code, make, progress);
+  EXPECT_GE(progress.passes, 2);
+  EXPECT_EQ(report.setting.coding.jpeg_quality, 0);
+  ASSERT_FALSE(report.put_back.empty());
+  std::set<std::string> once;
+  for (const Removal& removal : report.put_back) {
+    EXPECT_TRUE(once.insert(removal.kind + removal.what).second)
+        << removal.what << " was decided again after a check took it back";
+  }
+  EXPECT_TRUE(once.contains("imagesJPEG quality 98"));
+  ASSERT_FALSE(report.removed.empty());
+  for (const Removal& removal : report.removed) EXPECT_NE(removal.kind, "images");
+  // What is said to have been decided is what the result loses, not what was taken back.
+  Mover mover(set, 1);
+  Measurer measurer(
+      set, {options.probes, options.checks, options.probe_crop, options.seed, 0, options.render},
+      code, make, mover, journal, progress);
+  EXPECT_DOUBLE_EQ(report.decided_loss_db, measurer.Measure(report.setting).loss_db);
+  EXPECT_LE(report.loss_db(), options.max_loss_db);
 }
 
 TEST(Prune, GoesOnFromWhatAnInterruptedRunMeasured) {
