@@ -1,6 +1,7 @@
 // Rendering where scales, cameras or surfaces are at their limits, both methods, by any renderer.
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <numbers>
 
 #include "cli/selftest/cases.h"
@@ -45,6 +46,11 @@ class Drawing {
   RenderResult Draw(const DtrSet& set, const Shot& novel, const RenderOptions& options) {
     return Draw(MakeRenderScene(set), novel, options);
   }
+  /// Renderers know views by their addresses: one that died could be taken for the next set's.
+  RenderResult Draw(DtrSet&& set, const Shot& novel, const RenderOptions& options) {
+    kept_.push_back(std::move(set));
+    return Draw(kept_.back(), novel, options);
+  }
   Outcome Finish(Outcome outcome) const {
     outcome.not_finite += not_finite_;
     outcome.Add(Exactly("pixels whose depth, coverage and colour contradict each other",
@@ -54,6 +60,7 @@ class Drawing {
   }
 
  private:
+  std::deque<DtrSet> kept_;
   RenderFunction render_;
   int threads_;
   long long contradictions_ = 0, not_finite_ = 0;
