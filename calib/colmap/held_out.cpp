@@ -60,9 +60,17 @@ std::optional<std::uint32_t> SharedCamera(const Frozen& frozen, const SfmImageIn
   return std::nullopt;
 }
 
-// The frozen model under the names its database knows.
-void WriteAliased(const fs::path& folder, const Frozen& frozen) {
+// The frozen model under the names its database knows. COLMAP puts the database's parameters, from
+// before refinement and perhaps of another lens model (it crashes then), in the place of a camera
+// that no registered image has: where `camera_id` is such a one, an image of the copy takes it.
+// Registration looks at points, not at other images' cameras.
+void WriteAliased(const fs::path& folder, const Frozen& frozen,
+                  std::optional<std::uint32_t> camera_id) {
   calib::SfmModel model = frozen.model;
+  const bool unused =
+      camera_id && std::none_of(model.images.begin(), model.images.end(),
+                                [&](const auto& image) { return image.camera_id == *camera_id; });
+  if (unused) model.images.front().camera_id = *camera_id;
   for (calib::SfmImage& image : model.images) {
     const auto source = std::lower_bound(
         frozen.sources.begin(), frozen.sources.end(), image.name,
@@ -86,12 +94,13 @@ void MatchWithSources(Workspace& workspace, const Frozen& frozen, const SfmOptio
   MatchPairs(workspace, workspace.database(), pairs, 1, options.seed);
 }
 
-void Register(Workspace& workspace, const Frozen& frozen, const SfmOptions& options) {
+void Register(Workspace& workspace, const Frozen& frozen, const SfmOptions& options,
+              std::optional<std::uint32_t> camera_id) {
   const fs::path input = workspace.folder() / "source", output = workspace.folder() / "registered";
   RemoveAll(input);
   RemoveAll(output);
   MakeFolder(output);
-  WriteAliased(input, frozen);
+  WriteAliased(input, frozen, camera_id);
   Arguments arguments(workspace.program(), "image_registrator");
   arguments.AddIfKnown({"random_seed", "default_random_seed"}, fmt::format("{}", options.seed))
       .AddIfKnown({"Mapper.random_seed"}, fmt::format("{}", options.seed))
@@ -145,7 +154,7 @@ Placed Place(const fs::path& images_dir, const SfmImageInput& photo, const Froze
     CopyDatabase(frozen.database, workspace.database());
     ExtractFeatures(workspace, workspace.database(), groups, plan, options.seed);
     MatchWithSources(workspace, frozen, options);
-    Register(workspace, frozen, options);
+    Register(workspace, frozen, options, groups.front().camera_id);
     for (const char* part : {"", "-wal", "-shm"}) RemoveAll(workspace.database().string() + part);
   });
   Placed placed;
