@@ -2,6 +2,7 @@
 // Earth.
 #pragma once
 #include <Eigen/Core>
+#include <numbers>
 #include <span>
 #include <string>
 #include <vector>
@@ -47,6 +48,9 @@ inline constexpr size_t kFewestPositions = 4;
 inline constexpr double kPositionOutlierSigmas = 4;
 /// The median length of a 3D vector of independent normal coordinates, in their sigmas.
 inline constexpr double kMedianLength = 1.538;
+
+/// Where the turn of a similarity is known worse, which axis is up is not known either.
+inline constexpr double kMostTurnSigmaRad = 5 * std::numbers::pi / 180;
 
 struct PositionScale {
   Similarity metric_from_scene;

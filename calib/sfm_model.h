@@ -1,6 +1,7 @@
 // calib/sfm_model.h -- a structure-from-motion model as values.
 #pragma once
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <map>
@@ -41,5 +42,18 @@ struct SfmModel {
   std::vector<SfmImage> images;
   std::map<std::uint64_t, SfmPoint> points;
 };
+
+/// Of the model's images, in their order.
+inline std::vector<std::string> ImageNames(const SfmModel& model) {
+  std::vector<std::string> names;
+  for (const SfmImage& image : model.images) names.push_back(image.name);
+  return names;
+}
+
+/// True where an image has this camera.
+inline bool HasImages(const SfmModel& model, std::uint32_t camera_id) {
+  return std::any_of(model.images.begin(), model.images.end(),
+                     [&](const SfmImage& image) { return image.camera_id == camera_id; });
+}
 
 }  // namespace dtr::calib

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <sstream>
 
 #include "dtr/base/error.h"
@@ -13,9 +12,7 @@ namespace dtr::cli {
 const View& FindView(const DtrSet& set, const std::string& name) {
   const std::vector<View>& views = set.frames.front().views;
   const auto is_called = [&name](const View& view) {
-    const std::filesystem::path photo(view.name);
-    return view.name == name || view.id == name ||
-           (photo.parent_path() / photo.stem()).string() == name;
+    return view.id == name || IsCalled(view.name, name);
   };
   const auto found = std::find_if(views.begin(), views.end(), is_called);
   if (found != views.end()) return *found;

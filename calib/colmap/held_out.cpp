@@ -36,9 +36,7 @@ struct Frozen {
 std::uint32_t LensOf(const calib::SfmModel& model, std::uint32_t camera_id) {
   const calib::LensCamera& camera = model.cameras.at(camera_id);
   for (const auto& [id, other] : model.cameras) {
-    const bool used = std::any_of(model.images.begin(), model.images.end(),
-                                  [key = id](const auto& image) { return image.camera_id == key; });
-    if (!used && calib::SameButForPrincipalPoint(camera, other)) return id;
+    if (!HasImages(model, id) && calib::SameButForPrincipalPoint(camera, other)) return id;
   }
   return camera_id;
 }
@@ -67,10 +65,7 @@ std::optional<std::uint32_t> SharedCamera(const Frozen& frozen, const SfmImageIn
 void WriteAliased(const fs::path& folder, const Frozen& frozen,
                   std::optional<std::uint32_t> camera_id) {
   calib::SfmModel model = frozen.model;
-  const bool unused =
-      camera_id && std::none_of(model.images.begin(), model.images.end(),
-                                [&](const auto& image) { return image.camera_id == *camera_id; });
-  if (unused) model.images.front().camera_id = *camera_id;
+  if (camera_id && !HasImages(model, *camera_id)) model.images.front().camera_id = *camera_id;
   for (calib::SfmImage& image : model.images) {
     const auto source = std::lower_bound(
         frozen.sources.begin(), frozen.sources.end(), image.name,

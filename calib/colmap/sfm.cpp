@@ -41,7 +41,7 @@ int RegisteredImages(const std::string& line) {
 // COLMAP starts from two photos that see the scene from 16 degrees apart, or 4 where it finds none,
 // and not along the line of sight. A walk straight ahead through a street has no such pair. Its
 // points are seen under small angles throughout, so they are kept under smaller ones, too.
-void LookStraightAhead(Arguments& arguments) {
+void AllowForwardMotion(Arguments& arguments) {
   arguments.AddIfKnown({"Mapper.init_max_forward_motion"}, "1")
       .AddIfKnown({"Mapper.init_min_tri_angle"}, "2")
       .AddIfKnown({"Mapper.filter_min_tri_angle"}, "0.5")
@@ -50,7 +50,7 @@ void LookStraightAhead(Arguments& arguments) {
 
 // Runs the mapper; false where it found no two photos to start from, which COLMAP takes for an
 // error: it is a finding about the photos.
-bool Map(Workspace& workspace, const fs::path& models, std::uint64_t seed, bool straight_ahead) {
+bool Map(Workspace& workspace, const fs::path& models, std::uint64_t seed, bool forward_motion) {
   Arguments arguments(workspace.program(), "mapper");
   arguments.AddIfKnown({"random_seed", "default_random_seed"}, fmt::format("{}", seed))
       .AddIfKnown({"Mapper.random_seed"}, fmt::format("{}", seed))
@@ -58,7 +58,7 @@ bool Map(Workspace& workspace, const fs::path& models, std::uint64_t seed, bool 
       .Add({"image_path"}, workspace.images_folder().string())
       .Add({"output_path"}, models.string())
       .Add({"Mapper.num_threads"}, std::to_string(workspace.threads()));
-  if (straight_ahead) LookStraightAhead(arguments);
+  if (forward_motion) AllowForwardMotion(arguments);
   workspace.progress().Stage("mapping", static_cast<int>(workspace.images().size()));
   int most = 0;
   bool no_pair = false;
@@ -98,8 +98,8 @@ void MappingStep(Workspace& workspace, const SfmOptions& options) {
   RemoveAll(models);
   RemoveAll(workspace.folder() / "model");
   MakeFolder(models);
-  const auto map = [&](bool straight_ahead) {
-    return Map(workspace, models, options.seed, straight_ahead) ? ModelsIn(workspace, models)
+  const auto map = [&](bool forward_motion) {
+    return Map(workspace, models, options.seed, forward_motion) ? ModelsIn(workspace, models)
                                                                 : std::vector<calib::SfmModel>();
   };
   auto made = map(false);

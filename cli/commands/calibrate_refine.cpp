@@ -39,20 +39,14 @@ void SayRefined(const calib::Refined& refined, Console& console) {
   }
 }
 
-std::vector<std::string> PhotosOf(const calib::SfmModel& model) {
-  std::vector<std::string> names;
-  for (const calib::SfmImage& image : model.images) names.push_back(image.name);
-  return names;
-}
-
-pipeline::RefinedInMetres RefineInMetres(const Options& options,
-                                         const pipeline::MetreOptions& metres,
-                                         const calib::SfmModel& model,
-                                         const calib::RefineOptions& refine) {
-  pipeline::RequireCameras(metres, PhotosOf(model), "the model");
+pipeline::RefinedInMetres HoldMetres(const Options& options, const pipeline::MetreOptions& metres,
+                                     const calib::SfmModel& model,
+                                     const calib::RefineOptions& refine) {
+  const std::vector<std::string> names = calib::ImageNames(model);
+  pipeline::RequireCameras(metres, names, "the model");
   pipeline::PhotoPlaces places;
   if (metres.gps) {
-    places = pipeline::ReadPhotoPlaces(options.gps, PhotosOf(model));
+    places = pipeline::ReadPhotoPlaces(options.gps, names);
     pipeline::RequirePlaces(places, options.gps.string(), "the model");
   }
   return pipeline::RefineInMetres(model, metres, places, refine, options.model.string());
@@ -76,7 +70,7 @@ int RunRefine(const Options& options, const Context& context) {
     for (const auto& [id, camera] : model.cameras) refine.known_lenses->emplace(id, lens);
   }
   if (metres.any()) {
-    const pipeline::RefinedInMetres in_metres = RefineInMetres(options, metres, model, refine);
+    const pipeline::RefinedInMetres in_metres = HoldMetres(options, metres, model, refine);
     SayRefined(in_metres.refined, context.console);
     for (const std::string& line : in_metres.lines) context.console.Say(line);
     colmap::WriteModel(options.output, in_metres.refined.model, colmap::Format::kBinary);

@@ -41,26 +41,20 @@ Json SfmJson(const colmap::SfmReport& report, const calib::SfmModel& model) {
   return json;
 }
 
-std::vector<std::string> NamesOf(const calib::SfmModel& model) {
-  std::vector<std::string> names;
-  for (const calib::SfmImage& image : model.images) names.push_back(image.name);
-  return names;
-}
-
-// The same, in metres.
-void RefineInMetres(const capture::Capture& capture, const CalibrateOptions& options,
-                    const calib::RefineOptions& refine, CalibratedPhotos& calibrated,
-                    Json& report) {
-  const PhotoPlaces places = PhotoPlacesOf(capture, NamesOf(calibrated.model));
+// Bundle adjustment that holds what is known in metres.
+void HoldMetres(const capture::Capture& capture, const CalibrateOptions& options,
+                const calib::RefineOptions& refine, CalibratedPhotos& calibrated, Json& report,
+                Progress& progress) {
+  const PhotoPlaces places = PhotoPlacesOf(capture, calib::ImageNames(calibrated.model));
   if (options.metres.gps) RequirePlaces(places, "--gps", "those with a camera");
   RefinedInMetres refined = RefineInMetres(calibrated.model, options.metres, places, refine);
   report["bundle_adjustment"] = Json::parse(refined.json);
   calibrated.model = std::move(refined.refined.model);
   calibrated.unit = LengthUnit::kMetre;
   calibrated.scale_json = std::move(refined.scale_json);
-  calibrated.scale_lines = std::move(refined.lines);
   calibrated.positions = std::move(refined.start.options.positions);
   calibrated.distances = std::move(refined.start.options.distances);
+  for (const std::string& line : refined.lines) progress.Note(line);
 }
 
 // Bundle adjustment of the frozen model, where it pays; deterministic.
@@ -76,9 +70,7 @@ void RefineModel(const capture::Capture& capture, const CalibrateOptions& option
     for (const auto& [id, camera] : model.cameras) refine.known_lenses->emplace(id, *options.lens);
   }
   if (options.metres.any()) {
-    RefineInMetres(capture, options, refine, calibrated, report);
-    for (const std::string& line : calibrated.scale_lines) progress.Note(line);
-    return;
+    return HoldMetres(capture, options, refine, calibrated, report, progress);
   }
   calib::Refined refined = calib::Refine(model, refine);
   report["bundle_adjustment"] = Json::parse(calib::ToJson(refined));

@@ -39,7 +39,6 @@ struct CalibratedPhotos {
   std::string engine;                       ///< "colmap 3.8", "cameras.json", ...
   std::string report_json;                  ///< details for the provenance; no times, no paths
   std::string scale_json;  ///< entry of the provenance's `scale`; empty: lengths are SfM's
-  std::vector<std::string> scale_lines;  ///< the same for people
   /// Held by the refinement; `image` is an index into the model it refined.
   std::vector<calib::PositionPrior> positions;
   std::vector<calib::DistancePrior> distances;

@@ -8,7 +8,9 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "calib/scale.h"
 #include "dtr/base/error.h"
+#include "dtr/types/view.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -16,22 +18,13 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr double kDegree = std::numbers::pi / 180;
-constexpr double kMostTurnSigma = 5 * kDegree;
 
-// The photo that somebody called `word`: by its name, with or without the extension.
+// The photo that somebody called `word`.
 std::optional<size_t> FindPhoto(const std::vector<std::string>& names, const std::string& word) {
-  const auto found = std::find_if(names.begin(), names.end(), [&](const std::string& name) {
-    const std::filesystem::path photo(name);
-    return name == word || (photo.parent_path() / photo.stem()).string() == word;
-  });
+  const auto found = std::find_if(names.begin(), names.end(),
+                                  [&](const std::string& name) { return IsCalled(name, word); });
   if (found == names.end()) return std::nullopt;
   return static_cast<size_t>(found - names.begin());
-}
-
-std::vector<std::string> NamesOf(const calib::SfmModel& model) {
-  std::vector<std::string> names;
-  for (const calib::SfmImage& image : model.images) names.push_back(image.name);
-  return names;
 }
 
 calib::KnownMetres KnownOf(const calib::SfmModel& model, const MetreOptions& options,
@@ -51,7 +44,7 @@ calib::KnownMetres KnownOf(const calib::SfmModel& model, const MetreOptions& opt
     }
     known.places.push_back(place);
   }
-  const std::vector<std::string> names = NamesOf(model);
+  const std::vector<std::string> names = calib::ImageNames(model);
   for (const ScaleDistance& d : options.distances) {
     calib::KnownDistance distance{"--distance " + d.text, 0, 0, d.length_m, d.sigma_m};
     for (const auto& [point, image] :
@@ -100,7 +93,7 @@ void TellOfPlaces(const calib::SfmModel& model, const PhotoPlaces& places,
     out.lines.push_back(fmt::format("do not agree, left out: {}", fmt::join(left_out, ", ")));
   }
   out.lines.push_back("axes: x east, y north, z up, from the first photo's place");
-  if (!(report.turn_sigma_rad <= kMostTurnSigma)) {
+  if (!(report.turn_sigma_rad <= calib::kMostTurnSigmaRad)) {
     out.lines.push_back(
         fmt::format("the cameras stand nearly on a line: the turn about it, and "
                     "with it what is up, is known to {:.0f} degrees only",

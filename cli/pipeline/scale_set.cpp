@@ -30,8 +30,6 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-constexpr double kMostTurnSigma = 5 * std::numbers::pi / 180;
-
 // The way into metres, and what is told of it.
 struct Found {
   calib::Similarity metric_from_scene;
@@ -81,7 +79,7 @@ Found FromGps(const ScaleOptions& options, const DtrSet& set) {
   for (const std::string& name : located.names) centres.push_back(centre_of.at(name));
   const calib::PositionScale scale = calib::ScaleFromPositions(centres, located.EastNorthUp());
   found.relative_sigma = scale.relative_sigma;
-  found.keeps_axes = !(scale.turn_sigma_rad <= kMostTurnSigma);
+  found.keeps_axes = !(scale.turn_sigma_rad <= calib::kMostTurnSigmaRad);
   found.metric_from_scene = scale.metric_from_scene;
   if (found.keeps_axes) {
     found.metric_from_scene = {};

@@ -124,11 +124,12 @@ StorageSweep::StorageSweep(StorageSweepOptions options, Progress& progress)
   if (stored.mesh) axes_.back().values.emplace_back(kLeftOut);
 }
 
+const std::string& StorageSweep::Value(const eval::SweepSetting& setting, size_t axis) const {
+  return axes_[axis].values.at(static_cast<size_t>(setting.at(axis)));
+}
+
 void StorageSweep::Write(View& view, const eval::SweepSetting& setting, LengthUnit unit,
                          io::SetWriter& writer) const {
-  const auto value = [&](Axis axis) {
-    return axes_[axis].values.at(static_cast<size_t>(setting.at(axis)));
-  };
   // The first value of depth and image is how the set lies: those files stay as they are.
   const bool source = view.role == ViewRole::kSource;
   const bool same_depth = setting.at(kDepth) == 0 || !source;
@@ -139,16 +140,16 @@ void StorageSweep::Write(View& view, const eval::SweepSetting& setting, LengthUn
     load.threads = options_.threads;
     io::LoadPixels(options_.set, view, load);
   }
-  if (value(kSigma) != kKept) view.sigma_file.reset();
+  if (Value(setting, kSigma) != kKept) view.sigma_file.reset();
   // Meshes are of the depth as it is stored.
-  if (!same_depth || value(kMesh) != kKept) view.mesh_file.reset();
+  if (!same_depth || Value(setting, kMesh) != kKept) view.mesh_file.reset();
   View copied = view;
   if (!same_depth) copied.depth_file.reset();
   // Masks are stored the same way beside any image.
   if (!same_image) copied.image_file.reset();
   writer.CopyFiles(options_.set, copied);
-  if (!same_depth) RecodeDepth(view, value(kDepth), unit, writer);
-  if (!same_image) RecodeImage(view, value(kImage), unit, writer);
+  if (!same_depth) RecodeDepth(view, Value(setting, kDepth), unit, writer);
+  if (!same_image) RecodeImage(view, Value(setting, kImage), unit, writer);
   view.image = {};
   view.mask = {};
   view.depth = {};
@@ -166,8 +167,7 @@ eval::SweepMeasurement StorageSweep::Measure(const eval::SweepSetting& setting) 
       progress_.ThrowIfInterrupted();
       Write(view, setting, set.unit, writer);
     }
-    const bool meshes = axes_[kMesh].values.at(static_cast<size_t>(setting.at(kMesh))) == kKept;
-    if (meshes && setting.at(kDepth) != 0) {
+    if (Value(setting, kMesh) == kKept && setting.at(kDepth) != 0) {
       WriteMeshes(set, writer, options_.threads);
     }
     // The calibration's points are no part of what is rendered from.

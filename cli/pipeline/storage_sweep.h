@@ -3,6 +3,7 @@
 #pragma once
 #include <filesystem>
 #include <functional>
+#include <string>
 #include <vector>
 
 #include "dtr/base/progress.h"
@@ -31,6 +32,7 @@ class StorageSweep {
   eval::SweepStage Stage() const;  ///< its functions borrow this object
 
  private:
+  const std::string& Value(const eval::SweepSetting& setting, size_t axis) const;
   /// Stores a view of the set in memory; its pixels are gone afterwards.
   void Write(View& view, const eval::SweepSetting& setting, LengthUnit unit,
              io::SetWriter& writer) const;

@@ -63,8 +63,8 @@ struct PruneReport {
 /// with images and depth, and held-out photos where it has some: they only judge. The outcome is
 /// then looked at anew, at full size, from other cameras and against the photos, and the last
 /// decisions are taken back until the loss holds; then it goes on without these, a few times.
-/// Depends on the set, the options and the renderer
-/// alone, not on threads or times, nor on how often it was interrupted.
+/// Depends on the set, the options and the renderer alone, not on threads or times, nor on how
+/// often it was interrupted.
 PruneReport Prune(const DtrSet& set, const PruneOptions& options, const CodeFunction& code,
                   const RendererMaker& make_renderer, Progress& progress);
 

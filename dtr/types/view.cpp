@@ -1,5 +1,6 @@
 #include "dtr/types/view.h"
 
+#include <filesystem>
 #include <stdexcept>
 
 namespace dtr {
@@ -13,6 +14,11 @@ PinholeCamera View::DepthCamera() const {
     throw std::invalid_argument("View::DepthCamera: the depth scale must divide the image's size");
   }
   return camera.Resized(camera.width_px() / depth_scale, camera.height_px() / depth_scale);
+}
+
+bool IsCalled(const std::string& name, const std::string& word) {
+  const std::filesystem::path photo(name);
+  return name == word || (photo.parent_path() / photo.stem()).string() == word;
 }
 
 }  // namespace dtr

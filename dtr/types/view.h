@@ -67,4 +67,7 @@ struct View {
   Eigen::Vector3d CenterInWorld() const { return cam_from_world.TargetOriginInSource(); }
 };
 
+/// True where somebody means the photo `name` by `word`: with its extension or without.
+bool IsCalled(const std::string& name, const std::string& word);
+
 }  // namespace dtr

@@ -5,7 +5,10 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <string>
 #include <utility>
+
+#include "dtr/base/error.h"
 
 namespace dtr::stereo::patchmatch {
 namespace {

@@ -2,6 +2,7 @@
 // model that was carried to the other places as a whole, and by one that was adjusted to them. The
 // places of photos i, i + FOLDS, ... are left out by turns (3 folds). The places' own errors are in
 // every figure.
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
