@@ -78,11 +78,17 @@ void SayDepth(const eval::DepthScores& depth, Console& console) {
       percent(depth.outlier_share)));
   console.Say(fmt::format(
       "depth edges: displaced by {} px, grown by {} px, {} found; errors within 1, 2, 3 sigma: {}, "
-      "{}, {}; sparsification {} times the oracle's",
+      "{}, {}; sparsification {} times the oracle's ({} if errors were normal)",
       Figure(depth.edges.displacement_px, "{:.2f}"), Figure(depth.edges.fattening_px, "{:.2f}"),
       percent(depth.edges.found_share), percent(depth.sigma.share_within_1_sigma),
       percent(depth.sigma.share_within_2_sigma), percent(depth.sigma.share_within_3_sigma),
-      Figure(depth.sigma.sparsification_ratio, "{:.2f}")));
+      Figure(depth.sigma.sparsification_ratio, "{:.2f}"),
+      Figure(depth.sigma.sparsification_ratio_if_normal, "{:.2f}")));
+  const std::vector<double>& outliers = depth.sigma.outlier_share_by_tenth;
+  if (outliers.empty()) return;
+  // Half, and nine tenths.
+  console.Say(fmt::format("outliers among the most certain half: {}, nine tenths: {}",
+                          percent(outliers.at(4)), percent(outliers.at(8))));
 }
 
 int RunEvaluate(const Options& options, const Context& context) {

@@ -81,7 +81,10 @@ void DepthScorer::Add(const DepthImage& estimate, const DepthImage& truth, const
         within_1px_ += px <= 1;
         within_2px_ += px <= 2;
         const float sigma = inverse_depth_sigma != nullptr ? (*inverse_depth_sigma)(x, y) : 0.0f;
-        if (sigma > 0) sigma_.Add(px, px_per_inverse_depth * static_cast<double>(sigma));
+        if (sigma > 0) {
+          sigma_.Add(px, px_per_inverse_depth * static_cast<double>(sigma),
+                     relative_errors_.back() > kOutlier);
+        }
       }
     }
   }

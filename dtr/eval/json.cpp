@@ -41,6 +41,8 @@ Json Value(const DepthScores& s) {
           {"share_within_2_sigma", Number(s.sigma.share_within_2_sigma)},
           {"share_within_3_sigma", Number(s.sigma.share_within_3_sigma)},
           {"sparsification_ratio", Number(s.sigma.sparsification_ratio)},
+          {"sparsification_ratio_if_normal", Number(s.sigma.sparsification_ratio_if_normal)},
+          {"outlier_share_by_tenth", s.sigma.outlier_share_by_tenth},
           {"truth_pixels", s.truth_pixels},
           {"kept_pixels", s.kept_pixels}};
 }

@@ -23,7 +23,7 @@ std::string ToJson(const EvaluationReport& report,
 ///  median_relative_error,outlier_share,outlier_share_5pct,depth_completeness,
 ///  share_estimated_without_truth,edge_displacement_px,edge_fattening_px,edges_found_share,
 ///  share_within_1_sigma,share_within_2_sigma,share_within_3_sigma,sparsification_ratio,
-///  truth_pixels,kept_pixels}.
+///  sparsification_ratio_if_normal,outlier_share_by_tenth:[...],truth_pixels,kept_pixels}.
 std::string ToJson(const DepthScores& scores);
 
 /// {passed,tests:[{name,value,limit,passed,reason}],views:[{name,compared,occluded,contradicted,

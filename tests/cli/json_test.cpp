@@ -64,7 +64,8 @@ TEST(JsonInterface, NamesAreThoseOfTheDesign) {
   EXPECT_EQ(evaluate["views"].at(0)["name"], "0000.jpg");
   ExpectNames(evaluate["depth"], {"share_within_1pct", "share_within_2pct", "median_relative_error",
                                   "outlier_share", "depth_completeness", "edge_displacement_px",
-                                  "share_within_1_sigma", "sparsification_ratio"});
+                                  "share_within_1_sigma", "sparsification_ratio",
+                                  "sparsification_ratio_if_normal", "outlier_share_by_tenth"});
 
   const Json render = OnStdout(
       {"render", set, "--renderer", "cpu", "--like", "0000", "-o", (folder / "view.png").string()});
