@@ -43,6 +43,7 @@ struct Group {
   HWY_ALIGN float weighted[kTaps][kLanes];  ///< weight * (grey - mean)
   HWY_ALIGN float variance[kLanes];
   HWY_ALIGN float texture[kLanes];  ///< variance of the pixels like the centre, grey levels squared
+  HWY_ALIGN float squared_weights[kLanes];    ///< their sum: one over the samples that count
   HWY_ALIGN float ray[kMaxViews][3][kLanes];  ///< m (x, y, 1) per source
   /// Samples of windows that fitted, kTaps each, since the group was made: what benchmarks count.
   mutable std::int64_t samples = 0;
@@ -89,7 +90,7 @@ void PrepareGroup(const Level& level, int x, int y, Group* g) {
   const VI lanes = EverySecond();
   const VI centre = hn::GatherIndex(DI(), level.reference.rgb.at(x, y), lanes);
   VF sum = hn::Zero(d), mean = hn::Zero(d), squares = hn::Zero(d);
-  VF inner = hn::Zero(d), inner_sum = hn::Set(d, 1e-6f);
+  VF inner = hn::Zero(d), squared_weights = hn::Set(d, 1e-6f);
   int t = 0;
   for (int dy = -kRadius; dy <= kRadius; dy += kTapStep) {
     for (int dx = -kRadius; dx <= kRadius; dx += kTapStep, ++t) {
@@ -115,12 +116,13 @@ void PrepareGroup(const Level& level, int x, int y, Group* g) {
     const VF weighted = hn::Mul(weight, grey);
     squares = hn::MulAdd(weighted, grey, squares);
     inner = hn::MulAdd(weighted, weighted, inner);
-    inner_sum = hn::MulAdd(weight, weight, inner_sum);
+    squared_weights = hn::MulAdd(weight, weight, squared_weights);
     hn::Store(weight, d, g->weight[t]);
     hn::Store(weighted, d, g->weighted[t]);
   }
   hn::Store(squares, d, g->variance);
-  hn::Store(hn::Div(inner, inner_sum), d, g->texture);
+  hn::Store(squared_weights, d, g->squared_weights);
+  hn::Store(hn::Div(inner, squared_weights), d, g->texture);
 }
 
 /// The window's position in a source and its change per pixel of the reference.

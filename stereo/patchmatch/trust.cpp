@@ -24,14 +24,14 @@ constexpr Limits kAfterSearch{0.8f, 1.0f, 1};
 /// Rounds have settled the planes by what all views know: looks may differ more. On plaza, share of
 /// all true pixels within 1 % and outliers after all checks: 79.8 % and 1.1 % with the limits
 /// above, 84.2 % and 2.8 % with these.
-constexpr Limits kAfterRounds{1.0f, 4.0f, 0};
+constexpr Limits kAfterRounds{1.0f, 5.0f, 0};
 /// Least variance of the pixels that look like the centre (grey levels squared). A window of sky at
 /// a roof has the roof's texture, and would get its depth.
 constexpr float kLeastTexture = 3.0f;
 /// Largest cost where the texture is weak: that of noise, which is 1, and its scatter.
 constexpr float kWeakCost = 1.1f, kLeastWeakCost = 1e-6f;
 /// Depths less sure than this, pixels of disparity, are held to the planes around them.
-constexpr float kVaguePx = 0.5f;
+constexpr float kVaguePx = 0.6f;
 /// The planes around a pixel are asked so often: what they have filled is around the next ones.
 constexpr int kPriorPasses = 2;
 /// Where no larger share of the pixels than this is without a sure depth, planes are not fitted:
@@ -53,7 +53,7 @@ constexpr float kOddsOfWrong = -2.7f, kOddsPerCost = 3.6f, kOddsPerView = -0.44f
 constexpr float kOddsPerLogSigma = 0.44f, kLeastSigmaPx = 0.02f;
 /// What a wrong depth adds to sigma, pixels of disparity. Wrong depths are wrong by tens of pixels;
 /// as much as that would make the right ones that look like them, which are more, too modest.
-constexpr float kWrongByPx = 5.0f;
+constexpr float kWrongByPx = 3.0f;
 
 /// How likely the depth is wrong, from 0 to 1.
 float ProbabilityOfWrong(const Verdict& v) {

@@ -7,6 +7,8 @@
 #include <optional>
 
 #include "datasets/exact/stereo_quality.h"
+#include "dtr/base/random.h"
+#include "dtr/eval/sigma_scores.h"
 #include "tests/support/instruction_sets.h"
 
 namespace dtr::stereo {
@@ -249,6 +251,50 @@ TEST(PatchMatchEngine, SigmaDescribesTheError) {
   }
   EXPECT_GT(within, 0.5 * all);  // 68 % for a perfect model
   EXPECT_LT(within, 0.95 * all);
+}
+
+eval::SigmaScores ScoreSigmas(const DepthEstimate& estimate, const DepthImage& truth) {
+  eval::SigmaScorer scorer;
+  for (int y = 0; y < truth.height(); ++y) {
+    for (int x = 0; x < truth.width(); ++x) {
+      const float z = estimate.depth(x, y);
+      if (DepthImage::IsHole(z)) continue;
+      scorer.Add(std::abs(1 / z - 1 / truth(x, y)), estimate.inverse_depth_sigma(x, y), false);
+    }
+  }
+  return scorer.Scores();
+}
+
+// One neighbour or four on all sides, whose errors by the reference's noise cancel: that makes a
+// depth 2.5 times as exact, and must not make sigma more or less honest.
+TEST(PatchMatchEngine, SigmaIsAsHonestWhateverTheNumberOfViews) {
+  const std::vector<Pose> poses = {Facing({0, 0, 0}), Facing({kBaseline, 0, 0}),
+                                   Facing({0, kBaseline, 0}), Facing({-kBaseline, 0, 0}),
+                                   Facing({0, -kBaseline, 0})};
+  for (const double noise_levels : {2.0, 6.0}) {
+    std::vector<Shot> shots = Shots(Slanted(), poses);
+    Random random(1);
+    for (Shot& shot : shots) {
+      for (std::uint8_t& value : shot.image.data()) {
+        const double noisy = std::round(value + noise_levels * random.Normal());
+        value = static_cast<std::uint8_t>(std::clamp(noisy, 0.0, 255.0));
+      }
+    }
+    std::vector<double> within;
+    for (const int count : {2, 3, 5}) {
+      std::vector<StereoView> views = ViewsOf(shots);
+      views.erase(views.begin() + count, views.end());
+      const eval::SigmaScores scores = ScoreSigmas(EstimateFirst(views), shots[0].truth);
+      within.push_back(*scores.share_within_1_sigma);
+      EXPECT_GT(*scores.share_within_2_sigma, 0.9) << count << " views, noise " << noise_levels;
+    }
+    // 68 % for a perfect model. Textures as clear as these keep what doubt adds to sigma above the
+    // error where there is little noise.
+    const auto [least, most] = std::minmax_element(within.begin(), within.end());
+    EXPECT_GT(*least, 0.6) << "noise " << noise_levels;
+    EXPECT_LT(*most, 0.92) << "noise " << noise_levels;
+    EXPECT_LT(*most - *least, 0.1) << "noise " << noise_levels;
+  }
 }
 
 TEST(PatchMatchEngine, WhatOneViewAloneHoldsIsDoubted) {
