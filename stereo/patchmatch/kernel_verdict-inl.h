@@ -16,7 +16,7 @@ namespace dtr::stereo::patchmatch::HWY_NAMESPACE {
 /// seem: but bilinear samples have 0.44 of the noise of pixels in the mean, which the minimum feels
 /// whole, as slopes are smoother than noise; and windows give most weight to pixels whose noise is
 /// like the centre's (1.1 times the variance at a noise of 2 levels, 1.7 at 6).
-constexpr float kNoisePerCost = 2.0f;
+constexpr float kNoisePerCost = 1.7f;
 /// Steps of the judging parabola and the cost of a view that sees the same surface.
 constexpr float kJudgeStepPx = 0.5f;
 constexpr float kAgreeingCost = 0.4f;

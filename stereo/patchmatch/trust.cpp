@@ -53,7 +53,7 @@ constexpr float kOddsOfWrong = -2.7f, kOddsPerCost = 3.6f, kOddsPerView = -0.44f
 constexpr float kOddsPerLogSigma = 0.44f, kLeastSigmaPx = 0.02f;
 /// What a wrong depth adds to sigma, pixels of disparity. Wrong depths are wrong by tens of pixels;
 /// as much as that would make the right ones that look like them, which are more, too modest.
-constexpr float kWrongByPx = 3.0f;
+constexpr float kWrongByPx = 2.5f;
 
 /// How likely the depth is wrong, from 0 to 1.
 float ProbabilityOfWrong(const Verdict& v) {
