@@ -6,6 +6,7 @@
 
 #include "dtr/base/order_statistics.h"
 #include "dtr/render/geometry.h"
+#include "viewer/world_up.h"
 
 namespace dtr::viewer {
 namespace {
@@ -67,6 +68,7 @@ Surroundings SurroundingsOf(const DtrSet& set, size_t frame) {
   Surroundings surroundings;
   surroundings.bounds = set.bounds;
   surroundings.center = set.scene_center;
+  surroundings.up = WorldUp(set, frame);
   for (const View& view : set.frames.at(frame).views) surroundings.cameras.push_back(&view);
   std::sort(surroundings.cameras.begin(), surroundings.cameras.end(),
             [](const View* a, const View* b) { return a->id < b->id; });
@@ -79,7 +81,7 @@ Surroundings SurroundingsOf(const DtrSet& set, size_t frame) {
 Controller::Controller(Surroundings surroundings, int width_px, int height_px, DepthAt depth_at)
     : surroundings_(std::move(surroundings)),
       depth_at_(std::move(depth_at)),
-      up_(WorldUp(PosesOf(surroundings_.views))),
+      up_(surroundings_.up),
       fly_speed_(kSceneSizesPerSecond * SizeOf(surroundings_)) {
   if (surroundings_.views.empty()) {
     camera_ = {FitLens({3, 2, 3, 3, 1.5, 1}, width_px, height_px), {}};

@@ -19,6 +19,7 @@ struct Surroundings {
   std::vector<const View*> cameras;
   Bounds bounds;
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
+  Eigen::Vector3d up = -Eigen::Vector3d::UnitY();  ///< WorldUp
 };
 /// Of one of the set's frames; views and cameras in byte order of their ids.
 Surroundings SurroundingsOf(const DtrSet& set, size_t frame = 0);
@@ -41,7 +42,8 @@ class Controller {
   void set_fly_speed(double units_per_s);
   Eigen::Vector3d up() const { return up_; }
   const Surroundings& surroundings() const { return surroundings_; }
-  /// Another instant of the same scene: the camera stays where it is and goes on as it went.
+  /// Another instant of the same scene: the camera stays where it is and goes on as it went, and up
+  /// stays up.
   void SetSurroundings(Surroundings surroundings) { surroundings_ = std::move(surroundings); }
 
   void Handle(const InputEvent& event);

@@ -2,16 +2,15 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <optional>
 
 #include "dtr/report/encode.h"
 #include "dtr/report/false_color.h"
 #include "viewer/controller.h"
 #include "viewer/navigation.h"
+#include "viewer/world_up.h"
 
 namespace dtr::viewer {
 namespace {
@@ -21,37 +20,8 @@ constexpr int kMapWidthPx = 760, kMostMapHeightPx = 1200;
 constexpr double kWedgeShare = 0.05;  // of the map's width: length of a camera
 constexpr int kSamplesAcross = 480;   // of a depth map
 
-/// Down, where cameras look straight at the plane that they stand in: pictures from the air. Their
-/// own up is then a direction of the compass, or none. None for other sets.
-std::optional<Eigen::Vector3d> DownOfPicturesFromAbove(const Surroundings& around,
-                                                       const Eigen::Vector3d& forward_sum) {
-  // Off the plane in shares of its shorter axis, and that in shares of its longer one.
-  constexpr double kMostOffPlane = 0.2, kLeastAcross = 0.15;
-  // A rig before a wall stands in a plane, too, but sees more than where it stands.
-  constexpr double kLeastSpreadOverDistance = 0.4;
-  const double kMostTilt = std::cos(35 * std::numbers::pi / 180);
-  const auto count = static_cast<double>(around.views.size());
-  if (count < 4) return std::nullopt;
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  for (const View* view : around.views) middle += view->CenterInWorld() / count;
-  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
-  for (const View* view : around.views) {
-    const Eigen::Vector3d off = view->CenterInWorld() - middle;
-    spread += off * off.transpose() / count;
-  }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(spread);  // ascending
-  const Eigen::Vector3d size = axes.eigenvalues().cwiseMax(0).cwiseSqrt();
-  if (!(size[0] <= kMostOffPlane * size[1]) || !(size[1] >= kLeastAcross * size[2])) {
-    return std::nullopt;
-  }
-  const Eigen::Vector3d normal = axes.eigenvectors().col(0);
-  const double along = normal.dot(forward_sum) / count;
-  const double distance = std::abs(normal.dot(around.center - middle));
-  if (std::abs(along) < kMostTilt || size[2] < kLeastSpreadOverDistance * distance) {
-    return std::nullopt;
-  }
-  return along > 0 ? normal : Eigen::Vector3d(-normal);
-}
+/// Cameras that look down less steeply than this show what is ahead of them at the top.
+const double kFromAbove = std::cos(35 * std::numbers::pi / 180);
 
 double Longer(const Ground& ground) { return (ground.max - ground.min).maxCoeff(); }
 
@@ -68,9 +38,9 @@ Ground GroundOf(const DtrSet& set) {
   Ground ground;
   // Seen from above, looking down: LookAlong puts what the cameras look at at the top; of pictures
   // from the air what is at the top of most of them.
-  const auto down = DownOfPicturesFromAbove(around, forward);
-  const Pose from_above = down ? LookAlong(set.scene_center, *down, WorldUp(poses))
-                               : LookAlong(set.scene_center, -WorldUp(poses), forward);
+  const bool from_the_air = forward.normalized().dot(-around.up) >= kFromAbove;
+  const Pose from_above =
+      LookAlong(set.scene_center, -around.up, from_the_air ? UpInImages(poses) : forward);
   ground.right = from_above.rotation.conjugate() * Eigen::Vector3d::UnitX();
   ground.down = from_above.rotation.conjugate() * Eigen::Vector3d::UnitY();
   ground.min = ground.max = ground.Place(set.scene_center);

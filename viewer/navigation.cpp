@@ -13,29 +13,13 @@ namespace {
 // Shorter sums of unit vectors have no direction worth the name.
 constexpr double kNoCommonDirection = 0.2;
 
-Eigen::Vector3d Axis(const Pose& cam_from_world, const Eigen::Vector3d& axis_in_cam) {
-  return cam_from_world.rotation.conjugate() * axis_in_cam;
-}
-
 Pose FromCenter(const Eigen::Quaterniond& cam_from_world, const Eigen::Vector3d& center) {
   return {cam_from_world, -(cam_from_world * center)};
 }
 
-/// Mean direction of an axis of the cameras, or the first one's; unit length.
-Eigen::Vector3d CommonAxis(std::span<const Pose> cams_from_world,
-                           const Eigen::Vector3d& axis_in_cam) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const Pose& cam_from_world : cams_from_world) sum += Axis(cam_from_world, axis_in_cam);
-  if (cams_from_world.empty()) return axis_in_cam;
-  if (sum.norm() < kNoCommonDirection * static_cast<double>(cams_from_world.size())) {
-    return Axis(cams_from_world.front(), axis_in_cam);
-  }
-  return sum.normalized();
-}
-
 /// The pitch that leaves the axis kPoleRad away from the poles.
 double AllowedPitch(const Pose& cam_from_world, const Eigen::Vector3d& up, double pitch_rad) {
-  const double now = AngleBetween(Axis(cam_from_world, Eigen::Vector3d::UnitZ()), up);
+  const double now = AngleBetween(AxisInWorld(cam_from_world, Eigen::Vector3d::UnitZ()), up);
   // Turning about the camera's x by +a moves the axis (z) away from y, which is down: upwards.
   const double low = std::min(now, kPoleRad), high = std::max(now, std::numbers::pi - kPoleRad);
   return now - std::clamp(now - pitch_rad, low, high);
@@ -56,8 +40,20 @@ PinholeCamera FitLens(const PinholeCamera& camera, int width_px, int height_px) 
           0.5 * height_px + down * scale};
 }
 
-Eigen::Vector3d WorldUp(std::span<const Pose> cams_from_world) {
-  return CommonAxis(cams_from_world, -Eigen::Vector3d::UnitY());
+Eigen::Vector3d AxisInWorld(const Pose& cam_from_world, const Eigen::Vector3d& axis_in_cam) {
+  return cam_from_world.rotation.conjugate() * axis_in_cam;
+}
+
+Eigen::Vector3d CommonAxis(std::span<const Pose> cams_from_world,
+                           const Eigen::Vector3d& axis_in_cam) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const Pose& cam_from_world : cams_from_world)
+    sum += AxisInWorld(cam_from_world, axis_in_cam);
+  if (cams_from_world.empty()) return axis_in_cam;
+  if (sum.norm() < kNoCommonDirection * static_cast<double>(cams_from_world.size())) {
+    return AxisInWorld(cams_from_world.front(), axis_in_cam);
+  }
+  return sum.normalized();
 }
 
 Eigen::Vector3d WorldPoint(const NovelCamera& from, const Eigen::Vector2d& pixel, double depth_z) {
@@ -69,7 +65,7 @@ Pose Orbit(const Pose& cam_from_world, const Eigen::Vector3d& pivot, const Eigen
            double yaw_rad, double pitch_rad) {
   const double pitch = AllowedPitch(cam_from_world, up, pitch_rad);
   const Eigen::AngleAxisd about_up(yaw_rad, up);
-  const Eigen::AngleAxisd about_right(pitch, Axis(cam_from_world, Eigen::Vector3d::UnitX()));
+  const Eigen::AngleAxisd about_right(pitch, AxisInWorld(cam_from_world, Eigen::Vector3d::UnitX()));
   const Eigen::Quaterniond turn = Eigen::Quaterniond(about_up) * Eigen::Quaterniond(about_right);
   const Eigen::Vector3d center = pivot + turn * (cam_from_world.TargetOriginInSource() - pivot);
   return FromCenter((cam_from_world.rotation * turn.conjugate()).normalized(), center);
@@ -116,14 +112,14 @@ NovelCamera Between(const NovelCamera& from, const NovelCamera& to, double share
 std::optional<size_t> NearestView(std::span<const View* const> views, const Pose& cam_from_world,
                                   double scene_size) {
   const Eigen::Vector3d center = cam_from_world.TargetOriginInSource();
-  const Eigen::Vector3d axis = Axis(cam_from_world, Eigen::Vector3d::UnitZ());
+  const Eigen::Vector3d axis = AxisInWorld(cam_from_world, Eigen::Vector3d::UnitZ());
   std::optional<size_t> nearest;
   double least = std::numeric_limits<double>::infinity();
   for (size_t i = 0; i < views.size(); ++i) {
     const Pose& view = views[i]->cam_from_world;
     const double distance = (view.TargetOriginInSource() - center).norm();
     const double apart = distance / (scene_size > 0 ? scene_size : 1) +
-                         AngleBetween(Axis(view, Eigen::Vector3d::UnitZ()), axis);
+                         AngleBetween(AxisInWorld(view, Eigen::Vector3d::UnitZ()), axis);
     if (apart < least) {
       least = apart;
       nearest = i;
@@ -150,8 +146,10 @@ Pose ViewAll(const Bounds& bounds, std::span<const Pose> cams_from_world, const 
       bounds.empty() ? Eigen::Vector3d::Zero() : Eigen::Vector3d(0.5 * (bounds.min + bounds.max));
   const Eigen::Vector3d half =
       bounds.empty() ? Eigen::Vector3d::Ones() : Eigen::Vector3d(0.5 * (bounds.max - bounds.min));
-  const Pose at_middle =
-      LookAlong(middle, CommonAxis(cams_from_world, Eigen::Vector3d::UnitZ()), up);
+  const Eigen::Vector3d forward = CommonAxis(cams_from_world, Eigen::Vector3d::UnitZ());
+  const bool steep = forward.cross(up).norm() < std::sin(kPoleRad);
+  const Pose at_middle = LookAlong(
+      middle, forward, steep ? CommonAxis(cams_from_world, -Eigen::Vector3d::UnitY()) : up);
   // How far back each corner asks the camera to go, on each side of the picture.
   double back = 0;
   for (int corner = 0; corner < 8; ++corner) {

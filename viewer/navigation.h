@@ -14,9 +14,13 @@ namespace dtr::viewer {
 /// factor for both axes and its principal point keeps its place relative to the middle.
 PinholeCamera FitLens(const PinholeCamera& camera, int width_px, int height_px);
 
-/// Which way is up in the world: the mean of what is up in the views' images, unit length. Views
-/// without a common up (looking at the ground from all sides) give the first view's.
-Eigen::Vector3d WorldUp(std::span<const Pose> cams_from_world);
+/// A direction of the camera's in the world.
+Eigen::Vector3d AxisInWorld(const Pose& cam_from_world, const Eigen::Vector3d& axis_in_cam);
+
+/// Mean direction of an axis of the cameras in the world, unit length; of cameras without a common
+/// one (looking from all sides) the first one's. No camera: the axis itself.
+Eigen::Vector3d CommonAxis(std::span<const Pose> cams_from_world,
+                           const Eigen::Vector3d& axis_in_cam);
 
 /// The world point a pixel shows. `depth_z` > 0, scene units.
 Eigen::Vector3d WorldPoint(const NovelCamera& from, const Eigen::Vector2d& pixel, double depth_z);
@@ -57,7 +61,8 @@ std::optional<size_t> NearestView(std::span<const View* const> views, const Pose
 
 /// A pose from which all of `bounds` is inside the picture of `lens`. It looks at the middle along
 /// the mean axis of the cameras, level with `up`; where the cameras look in all directions along
-/// the first one's.
+/// the first one's. Where that is straight up or down, the top of the picture is that of most of
+/// theirs.
 Pose ViewAll(const Bounds& bounds, std::span<const Pose> cams_from_world, const Eigen::Vector3d& up,
              const PinholeCamera& lens);
 
