@@ -76,12 +76,12 @@ class Host {
 
 /// dtr/gl without a scene graph, as others use it and as the node does.
 struct Alone {
-  static gl::RendererSettings Packed() {
+  static gl::RendererSettings InMemory() {
     gl::RendererSettings settings;
-    settings.packed = true;
+    settings.in_memory = true;
     return settings;
   }
-  gl::Renderer plain, packed{Packed()};
+  gl::Renderer plain, in_memory{InMemory()};
 };
 
 eval::FrameTime DrawAlone(gl::Renderer& renderer, const RenderScene& scene, const Host& host,
@@ -101,7 +101,7 @@ OsgRow MeasureRow(const RenderOptions& options, const std::vector<NovelCamera>& 
   node.setRenderOptions(options);
   OsgRow row;
   row.options = options;
-  eval::FrameTimes on_osg, by_gl, by_packed_gl;
+  eval::FrameTimes on_osg, by_gl, in_memory;
   const RenderScene& scene = node.getScene()->scene;
   for (const bool counted : {false, true}) {
     for (const NovelCamera& novel : path) {
@@ -110,18 +110,18 @@ OsgRow MeasureRow(const RenderOptions& options, const std::vector<NovelCamera>& 
       gl::WaitForGpu();
       const eval::FrameTime gl_time =
           DrawAlone(alone.plain, scene, host, novel.cam_from_world, options, row.views_used);
-      const eval::FrameTime packed_time =
-          DrawAlone(alone.packed, scene, host, novel.cam_from_world, options, row.views_used);
+      const eval::FrameTime in_memory_time =
+          DrawAlone(alone.in_memory, scene, host, novel.cam_from_world, options, row.views_used);
       if (!counted) continue;
       on_osg.Add(osg_time);
       by_gl.Add(gl_time);
-      by_packed_gl.Add(packed_time);
+      in_memory.Add(in_memory_time);
     }
   }
   row.gl = by_gl.Frame();
   row.gl_cpu = by_gl.Cpu();
-  row.gl_packed = by_packed_gl.Frame();
-  row.gl_packed_cpu = by_packed_gl.Cpu();
+  row.gl_in_memory = in_memory.Frame();
+  row.gl_in_memory_cpu = in_memory.Cpu();
   row.osg = on_osg.Frame();
   row.osg_cpu = on_osg.Cpu();
   return row;
@@ -140,7 +140,7 @@ OsgRow MeasureReadBack(const OsgRow& like, const std::vector<NovelCamera>& path,
         host.Draw(path[static_cast<size_t>(i) % path.size()].cam_from_world);
     if (i > 0) times.Add(time);
   }
-  row.gl = row.gl_cpu = row.gl_packed = row.gl_packed_cpu = {};
+  row.gl = row.gl_cpu = row.gl_in_memory = row.gl_in_memory_cpu = {};
   row.osg = times.Frame();
   row.osg_cpu = times.Cpu();
   return row;
@@ -180,7 +180,7 @@ void SayOsgTable(const OsgBench& bench, const eval::BenchMachine& machine, Conso
   console.Say("");
   console.Say(fmt::format("{:<22} {:>3} {:>5} {:>10} {:>9} {:>8} {:>10} {:>9} {:>6} {:>10} {:>6}",
                           "Application", "R", "views", "s a frame", "ms", "CPU ms", "alone ms",
-                          "CPU ms", "ratio", "packed CPU", "ratio"));
+                          "CPU ms", "ratio", "in memory", "ratio"));
   for (const OsgRow& row : bench.rows) {
     std::string line = fmt::format("{:<22} {:>3} {:>5} {:>10.4f} {:>9.1f} {:>8.1f}",
                                    row.read_back ? "D+TR on OSG, read back" : "D+TR on OSG",
@@ -189,7 +189,7 @@ void SayOsgTable(const OsgBench& bench, const eval::BenchMachine& machine, Conso
     if (!row.read_back) {
       line += fmt::format(" {:>10.1f} {:>9.1f} {:>6.3f} {:>10.1f} {:>6.3f}", row.gl.median_ms,
                           row.gl_cpu.median_ms, bench.RatioOsgOverGl(row),
-                          row.gl_packed_cpu.median_ms, bench.RatioOsgOverPackedGl(row));
+                          row.gl_in_memory_cpu.median_ms, bench.RatioOsgOverGlInMemory(row));
     }
     console.Say(line);
   }
@@ -211,16 +211,16 @@ std::string OsgJson(const OsgBench& bench, const eval::BenchMachine& machine) {
               {"gl_ms", nullptr},
               {"gl_cpu_ms", nullptr},
               {"ratio_osg_over_gl", nullptr},
-              {"gl_packed_ms", nullptr},
-              {"gl_packed_cpu_ms", nullptr},
-              {"ratio_osg_over_packed_gl", nullptr}};
+              {"gl_in_memory_ms", nullptr},
+              {"gl_in_memory_cpu_ms", nullptr},
+              {"ratio_osg_over_gl_in_memory", nullptr}};
     if (!row.read_back) {
       json["gl_ms"] = row.gl.median_ms;
       json["gl_cpu_ms"] = row.gl_cpu.median_ms;
       json["ratio_osg_over_gl"] = bench.RatioOsgOverGl(row);
-      json["gl_packed_ms"] = row.gl_packed.median_ms;
-      json["gl_packed_cpu_ms"] = row.gl_packed_cpu.median_ms;
-      json["ratio_osg_over_packed_gl"] = bench.RatioOsgOverPackedGl(row);
+      json["gl_in_memory_ms"] = row.gl_in_memory.median_ms;
+      json["gl_in_memory_cpu_ms"] = row.gl_in_memory_cpu.median_ms;
+      json["ratio_osg_over_gl_in_memory"] = bench.RatioOsgOverGlInMemory(row);
       largest = std::max(largest, bench.RatioOsgOverGl(row));
     }
     rows.push_back(json);

@@ -2,17 +2,16 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "dtr/gl/drawing.h"
 #include "dtr/gl/driver.h"
 #include "dtr/gl/program.h"
+#include "dtr/gl/window_depth.h"
 
 namespace dtr::gl {
 namespace {
-
-/// Alpha of what was filled, not seen; composite.frag knows it as neither 0 nor 1.
-constexpr std::uint8_t kGuessedAlpha = 128;
 
 /// What compositing changes, put back at the end of the scope. StateGuard would not do: it takes
 /// away what shall hold for the picture (depth test, blending, masks).
@@ -36,7 +35,8 @@ class CompositeGuard {
     }
     for (size_t i = 0; i < units_.size(); ++i) {
       glActiveTexture(GL_TEXTURE0 + static_cast<GLenum>(i));
-      glGetIntegerv(GL_TEXTURE_BINDING_2D_ARRAY, &units_[i].texture);
+      glGetIntegerv(GL_TEXTURE_BINDING_2D_ARRAY, &units_[i].texture_array);
+      glGetIntegerv(GL_TEXTURE_BINDING_2D, &units_[i].texture);
       glGetIntegerv(GL_SAMPLER_BINDING, &units_[i].sampler);
       glBindSampler(static_cast<GLuint>(i), 0);
     }
@@ -44,7 +44,8 @@ class CompositeGuard {
   ~CompositeGuard() {
     for (size_t i = 0; i < units_.size(); ++i) {
       glActiveTexture(GL_TEXTURE0 + static_cast<GLenum>(i));
-      glBindTexture(GL_TEXTURE_2D_ARRAY, static_cast<GLuint>(units_[i].texture));
+      glBindTexture(GL_TEXTURE_2D_ARRAY, static_cast<GLuint>(units_[i].texture_array));
+      glBindTexture(GL_TEXTURE_2D, static_cast<GLuint>(units_[i].texture));
       glBindSampler(static_cast<GLuint>(i), static_cast<GLuint>(units_[i].sampler));
     }
     glActiveTexture(static_cast<GLenum>(active_unit_));
@@ -58,7 +59,7 @@ class CompositeGuard {
 
  private:
   struct Unit {
-    GLint texture = 0, sampler = 0;
+    GLint texture_array = 0, texture = 0, sampler = 0;
   };
   void TurnOff(GLenum name) {
     if (glIsEnabled(name) == GL_FALSE) return;
@@ -72,31 +73,22 @@ class CompositeGuard {
   std::array<Unit, 2> units_;
 };
 
-/// Device z of the near plane, and window z per device z.
-std::array<double, 2> DeviceDepthRange() {
-  GLint mode = GL_NEGATIVE_ONE_TO_ONE;
-  if (HasClipControl()) glGetIntegerv(GL_CLIP_DEPTH_MODE, &mode);
-  if (mode == GL_ZERO_TO_ONE) return {0, 1};
-  return {-1, 0.5};
-}
-
 bool TopRowFirst() {
   GLint origin = GL_LOWER_LEFT;
   if (HasClipControl()) glGetIntegerv(GL_CLIP_ORIGIN, &origin);
   return origin == GL_UPPER_LEFT;
 }
 
-/// Per axis the factor (x, y) and what is added (z, w); row 0 of the picture is its top row.
-Eigen::Vector4d TexelFromPixel(const DrawnPicture& picture, const Viewport& viewport) {
-  const double x = static_cast<double>(picture.width_px) / viewport.width;
-  const double y = static_cast<double>(picture.height_px) / viewport.height;
+/// Per axis the factor (x, y) and what is added (z, w); 0 is the picture's top row.
+Eigen::Vector4d PictureFromPixel(const Viewport& viewport) {
+  const double x = 1.0 / viewport.width, y = 1.0 / viewport.height;
   if (TopRowFirst()) return {x, y, -x * viewport.x, -y * viewport.y};
   return {x, -y, -x * viewport.x, y * (viewport.y + viewport.height)};
 }
 
-void Bind(GLenum unit, GLuint texture) {
+void Bind(GLenum unit, GLenum target, GLuint texture) {
   glActiveTexture(GL_TEXTURE0 + unit);
-  glBindTexture(GL_TEXTURE_2D_ARRAY, texture);
+  glBindTexture(target, texture);
 }
 
 }  // namespace
@@ -107,6 +99,20 @@ Viewport CurrentViewport() {
   return {box[0], box[1], box[2], box[3]};
 }
 
+WindowDepthMapping CurrentMapping(const DepthProjection& projection) {
+  WindowDepthMapping mapping;
+  mapping.at_infinity = static_cast<float>(projection.at_infinity);
+  mapping.per_inverse_depth = static_cast<float>(projection.per_inverse_depth);
+  GLint mode = GL_NEGATIVE_ONE_TO_ONE;
+  if (HasClipControl()) glGetIntegerv(GL_CLIP_DEPTH_MODE, &mode);
+  if (mode == GL_ZERO_TO_ONE) mapping.least = 0, mapping.scale = 1;
+  GLfloat range[2] = {};
+  glGetFloatv(GL_DEPTH_RANGE, range);
+  mapping.near = range[0], mapping.difference = range[1] - range[0];
+  mapping.clamps = glIsEnabled(GL_DEPTH_CLAMP) == GL_TRUE;
+  return mapping;
+}
+
 class Compositor::Implementation {
  public:
   explicit Implementation(std::string shader_folder)
@@ -114,53 +120,90 @@ class Compositor::Implementation {
 
   void Composite(const DrawnPicture& picture, const DepthProjection& projection) {
     const Viewport viewport = CurrentViewport();
-    const auto [least, scale] = DeviceDepthRange();
+    const WindowDepthMapping mapping = CurrentMapping(projection);
+    const bool in_memory = picture.rgba != nullptr;
     const CompositeGuard guard;
-    const bool packed = picture.texels != 0;
+    if (in_memory) Bring(picture, mapping);
     const Uniforms set(programs_.Get(
         {{GL_VERTEX_SHADER, "full_screen.vert"}, {GL_FRAGMENT_SHADER, "composite.frag"}},
-        {packed ? "PACKED 1" : "PACKED 0"}));
-    set.Set(packed ? "texels" : "image", 0);
+        {in_memory ? "MAPPED 1" : "MAPPED 0"}));
+    set.Set("image", 0);
     set.Set("depth", 1);
-    set.Set("texel_from_pixel", TexelFromPixel(picture, viewport));
-    set.Set("mapping",
-            Eigen::Vector4d(projection.at_infinity, projection.per_inverse_depth, least, scale));
-    set.Set("clamps", glIsEnabled(GL_DEPTH_CLAMP) == GL_TRUE ? 1 : 0);
-    Bind(0, packed ? picture.texels : picture.image);
-    Bind(1, picture.depth);
+    set.Set("picture_from_pixel", PictureFromPixel(viewport));
+    set.Set("mapping", Eigen::Vector4d(mapping.at_infinity, mapping.per_inverse_depth,
+                                       mapping.least, mapping.scale));
+    set.Set("clamps", mapping.clamps ? 1 : 0);
+    const GLenum target = in_memory ? GL_TEXTURE_2D : GL_TEXTURE_2D_ARRAY;
+    Bind(0, target, in_memory ? image_.name() : picture.image);
+    Bind(1, target, in_memory ? depth_.name() : picture.depth);
     glBindVertexArray(empty_array_.name());
     glDrawArrays(GL_TRIANGLES, 0, 3);
   }
 
   /// Where `depth` has one and no view saw the pixel it is a guess.
-  DrawnPicture Upload(const RenderResult& result, const Grid<float>& depth) {
-    const StateGuard guard;
-    const int width = result.image.width(), height = result.image.height();
-    std::vector<std::uint8_t> rgba(4 * result.coverage.data().size());
-    for (size_t p = 0; p < result.coverage.data().size(); ++p) {
-      for (size_t c = 0; c < 3; ++c) rgba[4 * p + c] = result.image.data()[3 * p + c];
-      const bool guessed = result.coverage.data()[p] == 0 && depth.data()[p] > 0;
-      rgba[4 * p + 3] = guessed ? kGuessedAlpha : result.coverage.data()[p];
+  DrawnPicture Take(const RenderResult& result, const Grid<float>& depth) {
+    const size_t pixels = result.coverage.data().size();
+    taken_rgba_.resize(pixels);
+    taken_guessed_.resize(pixels);
+    for (size_t p = 0; p < pixels; ++p) {
+      const std::uint8_t* rgb = &result.image.data()[3 * p];
+      taken_rgba_[p] = rgb[0] | rgb[1] << 8 | rgb[2] << 16 | 0xff000000u;
+      taken_guessed_[p] = result.coverage.data()[p] == 0;
     }
-    if (width != width_ || height != height_) {
-      image_ = MakeTarget(GL_TEXTURE_2D_ARRAY, GL_RGBA8, width, height, 1);
-      depth_ = MakeTarget(GL_TEXTURE_2D_ARRAY, GL_R32F, width, height, 1);
-      width_ = width, height_ = height;
-    }
-    Bind(0, image_.name());
-    glTexSubImage3D(GL_TEXTURE_2D_ARRAY, 0, 0, 0, 0, width, height, 1, GL_RGBA, GL_UNSIGNED_BYTE,
-                    rgba.data());
-    Bind(0, depth_.name());
-    glTexSubImage3D(GL_TEXTURE_2D_ARRAY, 0, 0, 0, 0, width, height, 1, GL_RED, GL_FLOAT,
-                    depth.data().data());
-    return {image_.name(), depth_.name(), 0, 0, width, height, result.views_used, false};
+    taken_depth_ = depth.data();
+    DrawnPicture picture;
+    picture.width_px = result.image.width(), picture.height_px = result.image.height();
+    picture.views_used = result.views_used;
+    picture.rgba = taken_rgba_.data(), picture.depth_z = taken_depth_.data();
+    picture.number = taken_number_ = NextPictureNumber();
+    return picture;
   }
 
  private:
+  /// A picture in memory to the GPU, its depth as the host's buffer has it: a software rasteriser
+  /// takes several times as long for that sum as the processor's vector instructions, and longer
+  /// for texels of an array than of a plain texture. Within a CompositeGuard.
+  void Bring(const DrawnPicture& picture, const WindowDepthMapping& mapping) {
+    const bool known = picture.number == brought_number_;
+    if (known && mapping == brought_mapping_) return;
+    const StateGuard guard;
+    const int width = picture.width_px, height = picture.height_px;
+    if (width != width_ || height != height_) {
+      width_ = height_ = 0;
+      image_ = MakeTarget(GL_TEXTURE_2D, GL_RGBA8, width, height, 1);
+      depth_ = MakeTarget(GL_TEXTURE_2D, GL_R32F, width, height, 1);
+      width_ = width, height_ = height;  // now they hold
+    }
+    const auto send = [&](const Texture& texture, GLenum format, GLenum type, const void* data) {
+      Bind(0, GL_TEXTURE_2D, texture.name());
+      glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, width, height, format, type, data);
+    };
+    const size_t pixels = static_cast<size_t>(width) * static_cast<size_t>(height);
+    if (!known) send(image_, GL_RGBA, GL_UNSIGNED_BYTE, picture.rgba);
+    if (picture.window_z != nullptr && picture.mapping == mapping) {
+      send(depth_, GL_RED, GL_FLOAT, picture.window_z);
+    } else {
+      window_z_.resize(pixels);
+      const bool has_guesses = picture.number == taken_number_;
+      MapToWindow(mapping, {picture.depth_z, pixels},
+                  has_guesses ? std::span<const std::uint8_t>(taken_guessed_)
+                              : std::span<const std::uint8_t>(),
+                  window_z_);
+      send(depth_, GL_RED, GL_FLOAT, window_z_.data());
+    }
+    brought_number_ = picture.number, brought_mapping_ = mapping;
+  }
+
   ProgramCache programs_;
   VertexArray empty_array_;
-  Texture image_, depth_;
+  std::vector<std::uint32_t> taken_rgba_;
+  std::vector<std::uint8_t> taken_guessed_;
+  std::vector<float> taken_depth_, window_z_;
+  std::uint64_t taken_number_ = 0;
+  Texture image_, depth_;  ///< of what was brought last
   int width_ = 0, height_ = 0;
+  std::uint64_t brought_number_ = 0;
+  WindowDepthMapping brought_mapping_;
 };
 
 Compositor::Compositor(std::string shader_folder)
@@ -171,12 +214,12 @@ void Compositor::Composite(const DrawnPicture& picture, const DepthProjection& p
   implementation_->Composite(picture, projection);
 }
 
-DrawnPicture Compositor::Upload(const RenderResult& result) {
-  return implementation_->Upload(result, result.depth.grid());
+DrawnPicture Compositor::Take(const RenderResult& result) {
+  return implementation_->Take(result, result.depth.grid());
 }
 
-DrawnPicture Compositor::UploadFilled(const RenderResult& result, const Grid<float>& depth) {
-  return implementation_->Upload(result, depth);
+DrawnPicture Compositor::TakeFilled(const RenderResult& result, const Grid<float>& depth) {
+  return implementation_->Take(result, depth);
 }
 
 }  // namespace dtr::gl

@@ -23,6 +23,10 @@ struct DepthProjection {
   double at_infinity = 1, per_inverse_depth = 0;
 };
 
+/// How the current context's state (glDepthRange, glClipControl, GL_DEPTH_CLAMP) and a host's
+/// projection map depth: for Renderer::Draw, just before the picture is composited.
+WindowDepthMapping CurrentMapping(const DepthProjection& projection);
+
 /// Draws pictures into the framebuffer that the current context draws to, pixel for pixel over its
 /// viewport, with depth: the host's depth test, its mask, blending, scissor, stencil and colour
 /// mask hold for them as for anything else. Pixels of which the picture has nothing are left as
@@ -37,15 +41,15 @@ class Compositor {
 
   /// `picture` fills the viewport, whatever its size (nearest pixels). It is cut at the host's near
   /// and far planes as other surfaces are. Colours are written as they are: sRGB values, also where
-  /// GL_FRAMEBUFFER_SRGB is on.
+  /// GL_FRAMEBUFFER_SRGB is on. One that is composited again is not brought to the GPU again.
   void Composite(const DrawnPicture& picture, const DepthProjection& projection);
 
-  /// A picture from memory, holding until the next upload.
-  DrawnPicture Upload(const RenderResult& result);
+  /// A picture from memory, holding until the next one is taken.
+  DrawnPicture Take(const RenderResult& result);
   /// The same of a picture whose holes were filled; `depth` is what HoleFiller::Fill gave. What is
   /// guessed is never cut: beyond the host's near or far plane it lies just within it, for a host
   /// sets these by what was seen, and skies have no end.
-  DrawnPicture UploadFilled(const RenderResult& result, const Grid<float>& depth);
+  DrawnPicture TakeFilled(const RenderResult& result, const Grid<float>& depth);
 
  private:
   class Implementation;

@@ -2,6 +2,8 @@
 // this.
 #pragma once
 #include <Eigen/Core>
+#include <atomic>
+#include <cstdint>
 #include <string>
 
 #include "dtr/base/error.h"
@@ -41,6 +43,12 @@ class Uniforms {
 
 inline Eigen::Vector4d Intrinsics(const PinholeCamera& camera) {
   return {camera.fx_px(), camera.fy_px(), camera.cx_px(), camera.cy_px()};
+}
+
+/// DrawnPicture::number of the next one.
+inline std::uint64_t NextPictureNumber() {
+  static std::atomic<std::uint64_t> last = 0;  // contexts draw in threads of their own
+  return ++last;
 }
 
 /// A texture to draw into, of one band's size.

@@ -1,7 +1,6 @@
 #include "dtr/gl/processor_resolve.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <numbers>
 
@@ -95,7 +94,8 @@ bool ProcessorResolver::Draws(const Frame& frame) {
 }
 
 void ProcessorResolver::Draw(const Frame& frame, const Band& band, const SampledViews& sampled,
-                             const std::vector<float>& surface) {
+                             const std::vector<float>& surface,
+                             const std::optional<WindowDepthMapping>& mapping) {
   std::vector<PixelView> views;
   for (size_t i = 0; i < frame.views.size(); ++i) {
     const View& view = *frame.views[i];
@@ -109,6 +109,7 @@ void ProcessorResolver::Draw(const Frame& frame, const Band& band, const Sampled
   image_.resize(pixels);
   depth_.resize(pixels);
   marks_.resize(pixels);
+  if (mapping) window_.resize(pixels);
   const BlendParameters blend = BlendParametersOf(frame.options, frame.novel.fx_px());
   const PinholeCamera& novel = frame.novel;
   // A thread's rows lie together: they read the same pixels of the views.
@@ -125,6 +126,11 @@ void ProcessorResolver::Draw(const Frame& frame, const Band& band, const Sampled
            static_cast<float>(blend.max_angle_rad), blend.blend_k, &surface[first], &image_[first],
            &depth_[first], &marks_[first]},
           views);
+    }
+    if (mapping) {
+      const size_t from = static_cast<size_t>(piece * kRowsTogether) * width;
+      const size_t count = static_cast<size_t>(end) * width - from;
+      MapToWindow(*mapping, {&depth_[from], count}, {}, {&window_[from], count});
     }
   });
 }
@@ -143,22 +149,6 @@ void ProcessorResolver::Upload(const Targets& targets) const {
   copy(targets.image, GL_RGBA, GL_UNSIGNED_BYTE, image_.data());
   copy(targets.depth, GL_RED, GL_FLOAT, depth_.data());
   copy(targets.marks, GL_RGBA_INTEGER, GL_UNSIGNED_BYTE, marks_.data());
-}
-
-GLuint ProcessorResolver::UploadPacked() {
-  texels_.resize(2 * depth_.size());
-  for (size_t p = 0; p < depth_.size(); ++p) {
-    texels_[2 * p] = std::bit_cast<std::uint32_t>(depth_[p]);
-    texels_[2 * p + 1] = image_[p];
-  }
-  if (width_px_ != packed_width_px_ || band_.count != packed_rows_) {
-    packed_ = MakeTarget(GL_TEXTURE_2D_ARRAY, GL_RG32UI, width_px_, band_.count, 1);
-    packed_width_px_ = width_px_, packed_rows_ = band_.count;
-  }
-  glBindTexture(GL_TEXTURE_2D_ARRAY, packed_.name());
-  glTexSubImage3D(GL_TEXTURE_2D_ARRAY, 0, 0, 0, 0, width_px_, band_.count, 1, GL_RG_INTEGER,
-                  GL_UNSIGNED_INT, texels_.data());
-  return packed_.name();
 }
 
 }  // namespace dtr::gl

@@ -118,7 +118,8 @@ class Renderer::Implementation {
   }
 
   DrawnPicture Draw(const RenderScene& scene, const PinholeCamera& novel,
-                    const Pose& novel_from_world, const RenderOptions& options) {
+                    const Pose& novel_from_world, const RenderOptions& options,
+                    const std::optional<WindowDepthMapping>& mapping) {
     CheckRenderOptions(options);
     CheckNovelCamera(novel, novel_from_world);
     CheckPictureSize(novel);
@@ -127,7 +128,7 @@ class Renderer::Implementation {
         MakeFrame(scene, novel, novel_from_world, options, selection, !coarse_by_shaders_);
     RequirePixels(frame);
     const bool held = Holds(frame);
-    DrawnPicture drawn = DrawWhole(std::move(frame), selection);
+    DrawnPicture drawn = DrawWhole(std::move(frame), selection, mapping);
     drawn.views_held = held;
     drawn_ = std::move(drawn);
     return *drawn_;
@@ -225,7 +226,8 @@ class Renderer::Implementation {
   }
 
   /// The whole picture at once.
-  DrawnPicture DrawWhole(Frame frame, const ViewSelection& selection) {
+  DrawnPicture DrawWhole(Frame frame, const ViewSelection& selection,
+                         const std::optional<WindowDepthMapping>& mapping) {
     drawn_.reset();
     ForgetErrors();
     const StateGuard guard;
@@ -235,9 +237,12 @@ class Renderer::Implementation {
     if (!frame.views.empty()) drawn.views_used = Prepare(frame, selection);
     CheckStorage(frame);
     drawn_in_memory_ = frame.on_processor && !frame.views.empty();
-    if (drawn_in_memory_ && settings_.packed) {
-      DrawBand(frame, {0, drawn.height_px});
-      drawn.texels = processor_resolver_.UploadPacked();
+    drawn.number = NextPictureNumber();
+    if (drawn_in_memory_ && settings_.in_memory) {
+      DrawBand(frame, {0, drawn.height_px}, mapping);
+      drawn.rgba = processor_resolver_.rgba();
+      drawn.depth_z = processor_resolver_.depth_z();
+      if (mapping) drawn.window_z = processor_resolver_.window_z(), drawn.mapping = *mapping;
     } else {
       FitTargets(frame, drawn.height_px);
       DrawIntoTargets(frame);
@@ -265,7 +270,8 @@ class Renderer::Implementation {
     }
   }
 
-  void DrawBand(const Frame& frame, const Band& band) {
+  void DrawBand(const Frame& frame, const Band& band,
+                const std::optional<WindowDepthMapping>& mapping = std::nullopt) {
     if (frame.deferred()) {
       coarse_depth_.Draw(frame, band, views_.meshes(), programs_, targets_);
     } else {
@@ -273,7 +279,7 @@ class Renderer::Implementation {
                      HasClipControl() && !settings_.only_opengl_43);
     }
     if (frame.on_processor) {
-      processor_resolver_.Draw(frame, band, views_.sampled(), coarse_depth_.nearest());
+      processor_resolver_.Draw(frame, band, views_.sampled(), coarse_depth_.nearest(), mapping);
     } else {
       resolver_.Draw(frame, band, views_.store(), programs_, targets_, coarse_depth_.buffer());
     }
@@ -344,8 +350,9 @@ RenderResult Renderer::Render(const RenderScene& scene, const PinholeCamera& nov
 }
 
 DrawnPicture Renderer::Draw(const RenderScene& scene, const PinholeCamera& novel,
-                            const Pose& novel_from_world, const RenderOptions& options) {
-  return implementation_->Draw(scene, novel, novel_from_world, options);
+                            const Pose& novel_from_world, const RenderOptions& options,
+                            const std::optional<WindowDepthMapping>& mapping) {
+  return implementation_->Draw(scene, novel, novel_from_world, options, mapping);
 }
 
 bool Renderer::CanDraw(const RenderScene& scene, const PinholeCamera& novel,

@@ -34,9 +34,9 @@ class ContextRenderer {
   /// Puts a picture of what is said into the framebuffer. It is made anew only when one of these
   /// differs from the frame before: a viewer draws a still scene again and again. A window may show
   /// a node several times in a frame: the n-th of a frame goes with the n-th of the frame before.
-  /// `draw` is given the compositor to upload to and whether the picture is to be whole: with
-  /// `may_wait` not before nothing has differed for a while. `frame`: OpenSceneGraph's number of
-  /// it; empty: a frame of its own.
+  /// `draw` is given the compositor that takes pictures from memory and whether the picture is to
+  /// be whole: with `may_wait` not before nothing has differed for a while. `frame`:
+  /// OpenSceneGraph's number of it; empty: a frame of its own.
   template <typename Draw>
   void Show(std::optional<unsigned> frame, std::shared_ptr<const LoadedSet> set,
             unsigned settings_version, const NovelCamera& novel, bool may_wait, const Draw& draw) {

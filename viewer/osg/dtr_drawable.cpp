@@ -17,7 +17,9 @@ MadePicture DrawPicture(dtr::gl::Renderer& renderer, dtr::gl::Compositor& compos
   const dtr::RenderOptions& options = settings.options;
   const bool on_gpu = settings.path == DrawPath::kGpu;
   if (on_gpu && !fill) {
-    return {renderer.Draw(scene, novel.camera, novel.cam_from_local, options), true};
+    return {renderer.Draw(scene, novel.camera, novel.cam_from_local, options,
+                          dtr::gl::CurrentMapping(novel.projection)),
+            true};
   }
   dtr::RenderResult result;
   if (on_gpu) {
@@ -26,10 +28,10 @@ MadePicture DrawPicture(dtr::gl::Renderer& renderer, dtr::gl::Compositor& compos
   } else {
     result = RenderByReadBack(renderer, scene, novel.camera, novel.cam_from_local, options);
   }
-  if (!fill) return {compositor.Upload(result), false};
+  if (!fill) return {compositor.Take(result), false};
   const dtr::Grid<float> depth =
       settings.set->hole_filler.Fill(scene, novel.camera, novel.cam_from_local, options, result);
-  return {compositor.UploadFilled(result, depth), false};
+  return {compositor.TakeFilled(result, depth), false};
 }
 
 }  // namespace
