@@ -59,6 +59,33 @@ std::string Described(const RenderOptions& options) {
 
 void Text(const std::string& line) { ImGui::TextUnformatted(line.c_str()); }
 
+/// What is written beside a camera.
+struct CameraName {
+  double distance;  ///< from where one looks
+  ImVec2 at;
+  ImU32 colour;
+  std::string text;
+};
+
+/// The nearest cameras' names, and of the others those that would not lie on one of them: many in
+/// one place would not be legible, any of them.
+void WriteNames(ImDrawList& list, std::vector<CameraName> names) {
+  std::stable_sort(names.begin(), names.end(), [](const CameraName& a, const CameraName& b) {
+    return a.distance < b.distance;
+  });
+  std::vector<ImVec4> taken;  // left, top, right, bottom
+  for (const CameraName& name : names) {
+    const ImVec2 size = ImGui::CalcTextSize(name.text.c_str());
+    const ImVec4 box(name.at.x, name.at.y, name.at.x + size.x, name.at.y + size.y);
+    const bool free = std::none_of(taken.begin(), taken.end(), [&](const ImVec4& other) {
+      return box.x < other.z && other.x < box.z && box.y < other.w && other.y < box.w;
+    });
+    if (!free) continue;
+    taken.push_back(box);
+    list.AddText(name.at, name.colour, name.text.c_str());
+  }
+}
+
 }  // namespace
 
 const char* NameOf(Compared compared) {
@@ -179,6 +206,7 @@ void InspectionOverlay::DrawCameras(const Controller& controller, const Inspecti
   const NovelCamera& camera = controller.camera();
   const double length = kFrustumShare * controller.scene_size();
   thumbnails_shown_ = 0;
+  std::vector<CameraName> names;
   for (const View* view : controller.surroundings().cameras) {
     const Pose world_from_cam = view->cam_from_world.Inverse();
     const auto centre = Project(camera, world_from_cam.translation);
@@ -220,9 +248,11 @@ void InspectionOverlay::DrawCameras(const Controller& controller, const Inspecti
       std::string label = view->name;
       if (held_out) label += " (held out)";
       if (verdict != verdicts.end()) label += " " + verdict->second.text;
-      list.AddText(*corners[3], colour, label.c_str());
+      names.push_back({(camera.cam_from_world * view->CenterInWorld()).norm(), *corners[3], colour,
+                       std::move(label)});
     }
   }
+  WriteNames(list, std::move(names));
 }
 
 void InspectionOverlay::DrawMarks(const Inspection& inspection, const NovelCamera& camera) {
