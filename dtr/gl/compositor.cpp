@@ -169,7 +169,7 @@ class Compositor::Implementation {
     const StateGuard guard;
     const int width = picture.width_px, height = picture.height_px;
     if (width != width_ || height != height_) {
-      width_ = height_ = 0;
+      width_ = height_ = 0, brought_number_ = 0;
       image_ = MakeTarget(GL_TEXTURE_2D, GL_RGBA8, width, height, 1);
       depth_ = MakeTarget(GL_TEXTURE_2D, GL_R32F, width, height, 1);
       width_ = width, height_ = height;  // now they hold
