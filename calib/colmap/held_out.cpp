@@ -28,7 +28,8 @@ struct Frozen {
   std::vector<std::string> aliases;    // of `sources`, in their database
   std::vector<fs::path> files;         // of `sources`
   fs::path database;
-  std::string fingerprint;  // of the model
+  std::string fingerprint;      // of the model
+  bool forward_motion = false;  // its mapper needed AllowForwardMotion
 };
 
 // The camera of an image, or, where a stabiliser made one lens a camera for every image, the lens
@@ -103,6 +104,7 @@ void Register(Workspace& workspace, const Frozen& frozen, const SfmOptions& opti
       .Add({"input_path"}, input.string())
       .Add({"output_path"}, output.string())
       .Add({"Mapper.num_threads"}, "1");
+  if (frozen.forward_motion) AllowForwardMotion(arguments);
   workspace.Run(arguments, nullptr);
   RemoveAll(input);  // a copy of the frozen model per photo would fill the disk
 }
@@ -143,8 +145,9 @@ Placed Place(const fs::path& images_dir, const SfmImageInput& photo, const Froze
   const ExtractionPlan plan =
       PlanExtraction(workspace.images(), 1, options.memory_gb, options.max_image_size_px);
   const auto inputs =
-      fmt::format("model {} size {} seed {} {} [{}]", frozen.fingerprint, plan.max_image_size_px,
-                  options.seed, options.lens_model, ParamsText(groups.front().params));
+      fmt::format("model {} size {} seed {} {} [{}]{}", frozen.fingerprint, plan.max_image_size_px,
+                  options.seed, options.lens_model, ParamsText(groups.front().params),
+                  frozen.forward_motion ? " forward" : "");
   workspace.Step("registration", inputs, [&] {
     CopyDatabase(frozen.database, workspace.database());
     ExtractFeatures(workspace, workspace.database(), groups, plan, options.seed);
@@ -184,6 +187,7 @@ Frozen FrozenFrom(const calib::SfmModel& model, std::span<const SfmImageInput> s
                   const fs::path& images_dir, const fs::path& source_workspace,
                   const fs::path& workspace) {
   Frozen frozen{model, {sources.begin(), sources.end()}, {}, {}, {}, {}};
+  frozen.forward_motion = fs::exists(source_workspace / kForwardMotionNote);
   std::sort(frozen.sources.begin(), frozen.sources.end(),
             [](const auto& a, const auto& b) { return a.name < b.name; });
   for (size_t i = 0; i < frozen.sources.size(); ++i) {

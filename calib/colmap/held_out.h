@@ -23,7 +23,8 @@ struct HeldOutResult {
 /// Registers each photo of `held_out` in the frozen `source_model`, which RunSfm made of `sources`
 /// in `source_workspace`. A photo whose camera group and size a registered source has takes that
 /// source's frozen intrinsics, of a stabilised lens those that its photos have in common; another
-/// gets its focal length estimated with its pose.
+/// gets its focal length estimated with its pose. Where the mapper needed other thresholds for
+/// photos straight ahead of each other, registration has them, too.
 ///
 /// Each photo is matched with source photos alone, in a database of its own, by programs of its
 /// own: neither the model nor the pose of another held-out photo can depend on it. Poses are frozen

@@ -38,16 +38,6 @@ int RegisteredImages(const std::string& line) {
       workspace.images().size(), workspace.Report().steps.back().log_file.string()));
 }
 
-// COLMAP starts from two photos that see the scene from 16 degrees apart, or 4 where it finds none,
-// and not along the line of sight. A walk straight ahead through a street has no such pair. Its
-// points are seen under small angles throughout, so they are kept under smaller ones, too.
-void AllowForwardMotion(Arguments& arguments) {
-  arguments.AddIfKnown({"Mapper.init_max_forward_motion"}, "1")
-      .AddIfKnown({"Mapper.init_min_tri_angle"}, "2")
-      .AddIfKnown({"Mapper.filter_min_tri_angle"}, "0.5")
-      .AddIfKnown({"Mapper.abs_pose_min_num_inliers"}, "15");
-}
-
 // Runs the mapper; false where it found no two photos to start from, which COLMAP takes for an
 // error: it is a finding about the photos.
 bool Map(Workspace& workspace, const fs::path& models, std::uint64_t seed, bool forward_motion) {
@@ -97,6 +87,7 @@ void MappingStep(Workspace& workspace, const SfmOptions& options) {
   const fs::path models = workspace.folder() / "models";
   RemoveAll(models);
   RemoveAll(workspace.folder() / "model");
+  RemoveAll(workspace.folder() / kForwardMotionNote);
   MakeFolder(models);
   const auto map = [&](bool forward_motion) {
     return Map(workspace, models, options.seed, forward_motion) ? ModelsIn(workspace, models)
@@ -110,6 +101,7 @@ void MappingStep(Workspace& workspace, const SfmOptions& options) {
     RemoveAll(models);
     MakeFolder(models);
     made = map(true);
+    WriteFileAtomically(workspace.folder() / kForwardMotionNote, "");
   }
   if (made.empty()) ThrowNoModel(workspace);
   std::string sizes;

@@ -84,6 +84,13 @@ void FeaturesAndMatches(Workspace& workspace, const std::vector<CameraGroup>& gr
   });
 }
 
+void AllowForwardMotion(Arguments& arguments) {
+  arguments.AddIfKnown({"Mapper.init_max_forward_motion"}, "1")
+      .AddIfKnown({"Mapper.init_min_tri_angle"}, "2")
+      .AddIfKnown({"Mapper.filter_min_tri_angle"}, "0.5")
+      .AddIfKnown({"Mapper.abs_pose_min_num_inliers"}, "15");
+}
+
 void CompleteReport(const Workspace& workspace, const calib::SfmModel& model, SfmReport& report) {
   const SfmReport runs = workspace.Report();
   report.version = runs.version;

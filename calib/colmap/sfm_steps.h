@@ -24,6 +24,16 @@ void FeaturesAndMatches(Workspace& workspace, const std::vector<CameraGroup>& gr
 /// Fills in what every report has: runs, version, who did not register, the error; writes it.
 void CompleteReport(const Workspace& workspace, const calib::SfmModel& model, SfmReport& report);
 
+/// COLMAP starts from two photos that see the scene from 16 degrees apart, or 4 where it finds
+/// none, and not along the line of sight. A walk straight ahead through a street has no such pair.
+/// Its points are seen under small angles throughout, so they are kept under smaller ones, too, and
+/// fewer of them must agree with a pose. Adds, of what says so, the options that the command has.
+void AllowForwardMotion(Arguments& arguments);
+
+/// File in the workspace of a model that RunSfm needed them for: what is registered in it needs
+/// them, too.
+inline constexpr char kForwardMotionNote[] = "forward_motion";
+
 /// Copies a database that no program has open. Throws Error when it cannot.
 void CopyDatabase(const std::filesystem::path& from, const std::filesystem::path& to);
 

@@ -261,6 +261,41 @@ TEST_F(HeldOutWithFake, PlacedPhotosCarryTheFrozenCameraAndPointIds) {
   EXPECT_EQ(result.report.steps.size(), 6u);
 }
 
+// A stabilised lens: a camera for every photo, and the lens they have in common, which is none's.
+// COLMAP takes a camera that no image of the model has from its database, from before refinement,
+// and crashes where the lens model is another one by now.
+TEST_F(HeldOutWithFake, TheLensThatPhotosHaveInCommonIsOneOfAnImageOfTheModelThatColmapReads) {
+  calib::LensCamera lens{
+      calib::LensModel::kOpenCv, 640, 480, {512, 513, 320, 240, 0.1, 0.2, 3e-3, 4e-3}};
+  model_.cameras[4] = lens;
+  for (const std::uint32_t i : {0, 1}) {
+    lens.params[2] = 318 + 5.0 * i;
+    model_.cameras[7 + i] = lens;
+    model_.images[i].camera_id = 7 + i;
+  }
+  fake_.LeaveDatabase({"held_000000.jpg"});
+  LeaveRegistered(true);
+  fake_.Fail("image_registrator", "cp -r \"$input\" \"$here/seen\"");
+  held_out_.resize(1);
+  const HeldOutResult result = Run();
+  const calib::SfmModel seen = ReadModel(fake_ / "seen");
+  ASSERT_EQ(seen.images.size(), 2u);
+  EXPECT_TRUE(HasImages(seen, 4)) << "COLMAP would take it from its database";
+  for (const auto& [id, camera] : model_.cameras) {
+    EXPECT_EQ(seen.cameras.at(id).params, camera.params) << id;
+  }
+  for (size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(seen.images[i].name, Workspace::AliasFor("", i, model_.images[i].name));
+    EXPECT_EQ(seen.images[i].cam_from_world.translation,
+              model_.images[i].cam_from_world.translation);
+    EXPECT_EQ(seen.images[i].features.at(0).point_id, 9u);
+  }
+  EXPECT_THAT(fake_.Calls().front(), HasSubstr("--ImageReader.existing_camera_id 4"));
+  ASSERT_EQ(result.images.size(), 1u);
+  EXPECT_EQ(result.images[0].camera_id, 4u);
+  EXPECT_EQ(result.cameras.at(4).params, model_.cameras.at(4).params);
+}
+
 TEST_F(HeldOutWithFake, EachPhotoIsMatchedWithSourcesAlone) {
   fake_.LeaveDatabase({"held_000000.jpg"});
   LeaveRegistered(true);

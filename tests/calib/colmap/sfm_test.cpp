@@ -7,6 +7,7 @@
 #include <mutex>
 
 #include "calib/colmap/features.h"
+#include "calib/colmap/held_out.h"
 #include "calib/colmap/matching.h"
 #include "calib/colmap/model_io.h"
 #include "calib/colmap/workspace.h"
@@ -227,6 +228,35 @@ TEST_F(RunSfmWithFake, AWalkStraightAheadStartsFromPhotosInLineWithWhatTheySee) 
   ASSERT_EQ(result.report.steps.size(), 4u);
   EXPECT_THAT(result.report.steps[2].argv, Not(Contains("--Mapper.init_max_forward_motion")));
   EXPECT_THAT(result.report.steps[3].argv, Contains("--Mapper.init_max_forward_motion"));
+}
+
+// Its points are seen under as small angles, and by as few others, as those that made the model.
+TEST_F(RunSfmWithFake, HeldOutPhotosOfSuchAWalkAreRegisteredByTheThresholdsThatMadeItsModel) {
+  const std::string walk =
+      "if ! grep -q 'init_max_forward_motion 1' \"$here/calls\"; then "
+      "echo '=> No good initial image pair found.'; exit 1; fi";
+  WriteFileAtomically(photos_ / "e.jpg", "photo e.jpg");
+  const std::vector<SfmImageInput> held{{"e.jpg", 640, 480, 500.0, "camera one"}};
+  std::vector<std::string> aliases = Aliases();
+  aliases.push_back("held_000000.jpg");
+  fake_.LeaveDatabase(aliases);
+  const auto registered = [&](const std::string& folder) {
+    const SfmResult result = Run();
+    RegisterHeldOut(photos_.path(), held, result.model, images_, workspace_ / "sfm",
+                    workspace_ / folder, options_, listener_);
+    const std::string call = fake_.Calls().back();
+    EXPECT_THAT(call, HasSubstr("image_registrator"));
+    return call;
+  };
+  const std::string fewer = "--Mapper.abs_pose_min_num_inliers 15";
+  EXPECT_THAT(registered("held"), Not(HasSubstr(fewer)));
+  fake_.Fail("mapper", walk);
+  options_.seed = 1;  // another model: the walk's
+  EXPECT_THAT(registered("held"), HasSubstr(fewer));
+  EXPECT_THAT(registered("again"), HasSubstr(fewer)) << "of a model that was read back";
+  fake_.Succeed("mapper");
+  options_.seed = 2;
+  EXPECT_THAT(registered("held"), Not(HasSubstr(fewer))) << "in the workspace of another model";
 }
 
 TEST_F(RunSfmWithFake, GarbageModelIsRefused) {
