@@ -119,16 +119,24 @@ Eigen::Matrix3d EnuFromEarth(double latitude_deg, double longitude_deg) {
   return axes;
 }
 
-PositionScale ScaleFromPositions(std::span<const Eigen::Vector3d> centres,
-                                 std::span<const Eigen::Vector3d> positions_m) {
+double SigmaOfRadius(double radius_m) {
+  constexpr double kShare = 0.68;  // of the errors, that Android's documentation says lie within
+  return radius_m / std::sqrt(-2 * std::log(1 - kShare));
+}
+
+PositionScale AlignToPositions(std::span<const Eigen::Vector3d> centres,
+                               std::span<const Eigen::Vector3d> positions_m,
+                               std::optional<double> known_scale) {
   if (centres.size() != positions_m.size() || centres.size() < kFewestPositions) {
     throw Error(fmt::format("scale: expected at least {} positions, found {}", kFewestPositions,
                             std::min(centres.size(), positions_m.size())));
   }
   PositionScale scale;
-  std::vector<bool> used(centres.size(), true);
+  std::vector<bool> used, next(centres.size(), true);
   std::vector<Eigen::Vector3d> a, b;
-  for (int pass = 0; pass < kMostPasses; ++pass) {
+  scale.settled = false;
+  for (int pass = 0; !scale.settled && pass < kMostPasses; ++pass) {
+    used = next;
     a.clear();
     b.clear();
     for (size_t i = 0; i < centres.size(); ++i) {
@@ -141,7 +149,8 @@ PositionScale ScaleFromPositions(std::span<const Eigen::Vector3d> centres,
           "scale: expected positions that agree with the cameras, found that {} of {} do", a.size(),
           centres.size()));
     }
-    scale.metric_from_scene = AlignPoints(a, b);
+    scale.metric_from_scene =
+        known_scale ? AlignPointsAtScale(a, b, *known_scale) : AlignPoints(a, b);
     std::vector<double> lengths;
     for (size_t i = 0; i < centres.size(); ++i) {
       lengths.push_back((scale.metric_from_scene * centres[i] - positions_m[i]).norm());
@@ -150,24 +159,30 @@ PositionScale ScaleFromPositions(std::span<const Eigen::Vector3d> centres,
     // A millionth of the extent: exact positions leave rounding alone.
     const double limit = kPositionOutlierSigmas * UpperMedian(sorted) / kMedianLength +
                          1e-6 * (positions_m[0] - MeanOf(positions_m)).norm();
-    std::vector<bool> next;
-    for (const double length : lengths) next.push_back(length <= limit);
-    if (next == used) break;
-    used = std::move(next);
+    for (size_t i = 0; i < lengths.size(); ++i) next[i] = lengths[i] <= limit;
+    scale.settled = next == used;
   }
   for (size_t i = 0; i < centres.size(); ++i) {
     if (!used[i]) scale.left_out.push_back(i);
   }
   scale.rms_m = AlignmentRms(scale.metric_from_scene, a, b);
-  const double freedom = 3.0 * static_cast<double>(a.size()) - 7;
+  const double freedom = 3.0 * static_cast<double>(a.size()) - (known_scale ? 6 : 7);
   FillUncertainty(a, scale.rms_m * std::sqrt(static_cast<double>(a.size()) / freedom), scale);
-  if (!(scale.relative_sigma <= kMostRelativeSigma)) {
-    throw Error(
-        fmt::format("scale: expected a scale known to 10 %, found one to {:.0f} %: positions that "
-                    "err by {:.2g} "
-                    "m RMS, of cameras that stand too near to each other for that",
-                    100 * scale.relative_sigma, scale.rms_m));
-  }
+  return scale;
+}
+
+void RequireKnownScale(const PositionScale& scale) {
+  if (scale.relative_sigma <= kMostRelativeSigma) return;
+  throw Error(fmt::format(
+      "scale: expected a scale known to 10 %, found one to {:.0f} %: positions that err by {:.2g} "
+      "m RMS, of cameras that stand too near to each other for that; measure a --distance",
+      100 * scale.relative_sigma, scale.rms_m));
+}
+
+PositionScale ScaleFromPositions(std::span<const Eigen::Vector3d> centres,
+                                 std::span<const Eigen::Vector3d> positions_m) {
+  const PositionScale scale = AlignToPositions(centres, positions_m);
+  RequireKnownScale(scale);
   return scale;
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <numbers>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -46,6 +47,11 @@ Eigen::Matrix3d EnuFromEarth(double latitude_deg, double longitude_deg);
 
 inline constexpr size_t kFewestPositions = 4;
 inline constexpr double kPositionOutlierSigmas = 4;
+/// Standard deviation per axis of a place on the map whose error is said as a radius, as EXIF's
+/// GPSHPositioningError is: 68 % of the errors are taken to lie within, and to be normal and equal
+/// along both axes (docs/CALIBRATION.md says why).
+double SigmaOfRadius(double radius_m);
+
 /// The median length of a 3D vector of independent normal coordinates, in their sigmas.
 inline constexpr double kMedianLength = 1.538;
 
@@ -58,6 +64,7 @@ struct PositionScale {
   double turn_sigma_rad = 0;     ///< of its rotation, about the axis known worst
   double rms_m = 0;              ///< distances of the positions that were used
   std::vector<size_t> left_out;  ///< positions that do not agree with the others
+  bool settled = true;  ///< false: of which positions agree, the last pass had it otherwise
 };
 
 /// Fills in how well such a similarity is known where each coordinate of a position errs by
@@ -65,12 +72,20 @@ struct PositionScale {
 void FillUncertainty(std::span<const Eigen::Vector3d> centres, double sigma_m,
                      PositionScale& scale);
 
-/// The similarity that carries camera centres to the places where they are said to have been.
-/// Positions more than kPositionOutlierSigmas robust standard deviations off are left out. Errors
-/// are taken as independent; those of one receiver go together over minutes, and then the truth is
-/// less certain. Throws Error with fewer than 4 positions, where fewer than half agree, where the
-/// centres lie in one point or on a line to rounding, and where the scale would be uncertain by
-/// more than 10 %.
+/// The similarity that carries camera centres to the places where they are said to have been, with
+/// `known_scale` (metres per unit) where that is given. Positions more than kPositionOutlierSigmas
+/// robust standard deviations off are left out. Errors are taken as independent; those of one
+/// receiver go together over minutes, and then the truth is less certain. Throws Error with fewer
+/// than 4 positions, where fewer than half agree, and where the centres lie in one point or on a
+/// line to rounding. `relative_sigma` is what the positions alone tell of the scale.
+PositionScale AlignToPositions(std::span<const Eigen::Vector3d> centres,
+                               std::span<const Eigen::Vector3d> positions_m,
+                               std::optional<double> known_scale = {});
+
+/// Throws Error where such a scale would be uncertain by more than kMostRelativeSigma.
+void RequireKnownScale(const PositionScale& scale);
+
+/// AlignToPositions, the scale unknown, and RequireKnownScale.
 PositionScale ScaleFromPositions(std::span<const Eigen::Vector3d> centres,
                                  std::span<const Eigen::Vector3d> positions_m);
 

@@ -1,5 +1,6 @@
 #include "calib/similarity.h"
 
+#include <Eigen/QR>
 #include <Eigen/SVD>
 #include <cassert>
 #include <cmath>
@@ -24,6 +25,12 @@ Points Stack(std::span<const Eigen::Vector3d> points, const char* which) {
                 which + " set");
   }
   return stacked;
+}
+
+Eigen::Vector3d MeanOf(std::span<const Eigen::Vector3d> points) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& p : points) mean += p / static_cast<double>(points.size());
+  return mean;
 }
 
 void RefuseLines(const Points& centred, const char* which) {
@@ -77,6 +84,59 @@ Similarity AlignPoints(std::span<const Eigen::Vector3d> points_in_a,
   }
   b_from_a.translation = mean_b - b_from_a.scale * (b_from_a.rotation * mean_a);
   return b_from_a;
+}
+
+Similarity AlignPointsAtScale(std::span<const Eigen::Vector3d> points_in_a,
+                              std::span<const Eigen::Vector3d> points_in_b, double b_per_a) {
+  assert(b_per_a > 0);
+  // The best turn is the same for every scale; the shift carries mean to mean.
+  Similarity b_from_a = AlignPoints(points_in_a, points_in_b);
+  const Eigen::Vector3d mean_a = MeanOf(points_in_a);
+  const Eigen::Vector3d mean_b = b_from_a * mean_a;
+  b_from_a.scale = b_per_a;
+  b_from_a.translation = mean_b - b_per_a * (b_from_a.rotation * mean_a);
+  return b_from_a;
+}
+
+Similarity TurnAndShift(std::span<const Eigen::Vector3d> points_in_a,
+                        std::span<const Eigen::Vector3d> points_in_b,
+                        std::span<const Eigen::Vector3d> sigmas) {
+  constexpr int kMostSteps = 20;
+  const Eigen::Vector3d middle = MeanOf(points_in_a);
+  const auto rows = 3 * static_cast<Eigen::Index>(points_in_a.size());
+  const auto misses_of = [&](const Similarity& b_from_a) {
+    Eigen::VectorXd misses(rows);
+    for (size_t i = 0; i < points_in_a.size(); ++i) {
+      misses.segment<3>(3 * static_cast<Eigen::Index>(i)) =
+          (b_from_a * points_in_a[i] - points_in_b[i]).cwiseQuotient(sigmas[i]);
+    }
+    return misses;
+  };
+  Similarity best;
+  Eigen::VectorXd misses = misses_of(best);
+  for (int step = 0; step < kMostSteps; ++step) {
+    Eigen::MatrixXd columns(rows, 6);
+    for (size_t i = 0; i < points_in_a.size(); ++i) {
+      const Eigen::Vector3d arm = best.rotation * (points_in_a[i] - middle);
+      const Eigen::Vector3d weight = sigmas[i].cwiseInverse();
+      auto block = columns.middleRows<3>(3 * static_cast<Eigen::Index>(i));
+      block.leftCols<3>() = weight.asDiagonal();
+      for (int k = 0; k < 3; ++k) {
+        block.col(3 + k) = weight.cwiseProduct(Eigen::Vector3d::Unit(k).cross(arm));
+      }
+    }
+    const Eigen::VectorXd g = columns.completeOrthogonalDecomposition().solve(-misses);
+    const Eigen::Vector3d turn = g.tail<3>();
+    Similarity next;
+    if (turn.norm() > 0) next.rotation = Eigen::AngleAxisd(turn.norm(), turn.normalized());
+    next.rotation = (next.rotation * best.rotation).normalized();
+    next.translation = best * middle + g.head<3>() - next.rotation * middle;
+    const Eigen::VectorXd left = misses_of(next);
+    if (!(left.squaredNorm() < misses.squaredNorm())) break;
+    best = next;
+    misses = left;
+  }
+  return best;
 }
 
 double AlignmentRms(const Similarity& b_from_a, std::span<const Eigen::Vector3d> points_in_a,

@@ -32,6 +32,17 @@ struct Similarity {
 Similarity AlignPoints(std::span<const Eigen::Vector3d> points_in_a,
                        std::span<const Eigen::Vector3d> points_in_b);
 
+/// The same where the scale is known (> 0): only turn and shift are looked for.
+Similarity AlignPointsAtScale(std::span<const Eigen::Vector3d> points_in_a,
+                              std::span<const Eigen::Vector3d> points_in_b, double b_per_a);
+
+/// The turn and shift near none at all (scale 1) with the smallest sum of squared differences
+/// b_from_a * a_i - b_i, each coordinate in units of sigmas_i > 0; nothing where none is nearer.
+/// Requires equal numbers, and that the two sets are nearly there.
+Similarity TurnAndShift(std::span<const Eigen::Vector3d> points_in_a,
+                        std::span<const Eigen::Vector3d> points_in_b,
+                        std::span<const Eigen::Vector3d> sigmas);
+
 /// Root mean square of the distances |b_from_a * a_i - b_i|, in units of b. Requires equal numbers.
 double AlignmentRms(const Similarity& b_from_a, std::span<const Eigen::Vector3d> points_in_a,
                     std::span<const Eigen::Vector3d> points_in_b);

@@ -96,13 +96,14 @@ void RequireEnough(const Held& held) {
 
 // What a position leaves of its error as its camera follows it, per place and axis: 1 where sights
 // decide, 0 where nothing else does (Helmert's redundancy numbers). Where the covariance is too
-// large to be worked out, the seven numbers of a similarity alone are counted, and errors come out
-// too small by what the model bends.
+// large to be worked out, the numbers of a similarity alone are counted (seven, six where distances
+// hold the scale), and errors come out too small by what the model bends.
 std::vector<Eigen::Vector3d> Redundancies(const KnownMetres& known, const Held& held,
                                           const BundleCovariance* covariance) {
   const auto agree = static_cast<double>(std::count(held.used.begin(), held.used.end(), true));
+  const double absorbed = known.distances.empty() ? 7 : 6;
   std::vector<Eigen::Vector3d> shares(known.places.size(),
-                                      Eigen::Vector3d::Constant(1 - 7 / (3 * agree)));
+                                      Eigen::Vector3d::Constant(1 - absorbed / (3 * agree)));
   if (covariance == nullptr || !covariance->computed || !covariance->determined) return shares;
   for (size_t i = 0; i < shares.size(); ++i) {
     const Eigen::Vector3d variance =
@@ -147,32 +148,14 @@ bool IsSettled(const Held& before, const Held& now) {
          same(before.sigma_up_m, now.sigma_up_m);
 }
 
-std::vector<Eigen::Vector3d> Misses(const KnownMetres& known, const Bundle& bundle) {
+template <typename Model>
+std::vector<Eigen::Vector3d> Misses(const KnownMetres& known, const Model& model) {
   std::vector<Eigen::Vector3d> misses;
   for (const KnownPlace& place : known.places) {
-    const Pose& pose = bundle.images[static_cast<size_t>(place.image)].cam_from_world;
+    const Pose& pose = model.images[static_cast<size_t>(place.image)].cam_from_world;
     misses.push_back(pose.TargetOriginInSource() - place.position_m);
   }
   return misses;
-}
-
-// The similarity into metres, and the places that agree with it.
-Similarity FromPlaces(const SfmModel& model, const KnownMetres& known, Held& held) {
-  const Pairs pairs = PairsOf(model, known, std::vector<bool>(known.places.size(), true));
-  const PositionScale scale = ScaleFromPositions(pairs.centres, pairs.positions_m);
-  held.used.assign(known.places.size(), true);
-  for (const size_t i : scale.left_out) held.used[i] = false;
-  for (const KnownDistance& d : known.distances) {
-    const double by_gps = scale.metric_from_scene.scale * DistanceOf(model, d);
-    const double sigma = std::hypot(scale.relative_sigma, SigmaOf(d) / d.length_m, kScaleDrift);
-    const double off = std::abs(std::log(d.length_m / by_gps)) / sigma;
-    if (off <= kMostOff) continue;
-    throw Error(fmt::format(
-        "{}: expected a distance that agrees with the photos' GPS, found {:.4g} m between these "
-        "cameras by GPS, {:.1f} standard deviations off; is it the right pair?",
-        d.name, by_gps, off));
-  }
-  return scale.metric_from_scene;
 }
 
 Similarity FromDistances(const SfmModel& model, const KnownMetres& known) {
@@ -187,6 +170,69 @@ Similarity FromDistances(const SfmModel& model, const KnownMetres& known) {
   Similarity metric_from_model;
   metric_from_model.scale = ScaleFromDistances(measured).metres_per_unit;
   return metric_from_model;
+}
+
+// Each distance against what the places make of it.
+void RequireAgreement(const SfmModel& model, const KnownMetres& known,
+                      const PositionScale& places) {
+  for (const KnownDistance& d : known.distances) {
+    const double by_gps = places.metric_from_scene.scale * DistanceOf(model, d);
+    // Not of its logarithm: of places that err by more than the cameras stand apart the scale is a
+    // number of which nothing but its error is known.
+    const double sigma =
+        std::hypot(by_gps * places.relative_sigma, SigmaOf(d), by_gps * kScaleDrift);
+    const double off = std::abs(d.length_m - by_gps) / sigma;
+    if (off <= kMostOff) continue;
+    throw Error(fmt::format(
+        "{}: expected a distance that agrees with the photos' GPS, found {:.4g} m between these "
+        "cameras by GPS, {:.1f} standard deviations off; is it the right pair?",
+        d.name, by_gps, off));
+  }
+}
+
+// How far places err per coordinate: as they say, where they do, else as `found` says; never less.
+double ErrorOf(const KnownMetres& known, double found) {
+  double squares = 0;
+  for (const KnownPlace& place : known.places) {
+    squares += 2 * std::pow(std::max(found, place.sigma_flat_m), 2) +
+               std::pow(std::max(found, place.sigma_up_m), 2);
+  }
+  return std::sqrt(squares / (3 * static_cast<double>(known.places.size())));
+}
+
+// The way into metres, and the places that agree with it.
+Similarity FromPlaces(const SfmModel& model, const KnownMetres& known, Held& held,
+                      MetricReport& report) {
+  const Pairs pairs = PairsOf(model, known, std::vector<bool>(known.places.size(), true));
+  PositionScale placed = AlignToPositions(pairs.centres, pairs.positions_m);
+  if (known.distances.empty()) RequireKnownScale(placed);
+  FillUncertainty(pairs.centres, ErrorOf(known, placed.rms_m / std::sqrt(3)), placed);
+  RequireAgreement(model, known, placed);
+  report.places_tell_scale = known.distances.empty() || placed.relative_sigma <= kMostRelativeSigma;
+  if (!report.places_tell_scale) {
+    placed = AlignToPositions(pairs.centres, pairs.positions_m, FromDistances(model, known).scale);
+  }
+  held.used.assign(known.places.size(), true);
+  for (const size_t i : placed.left_out) held.used[i] = false;
+  return placed.metric_from_scene;
+}
+
+// Turns and shifts the model to places that tell no more: held, they would bend nothing that photos
+// tell, and a solve finds a turn that is worth no more than theirs in very many steps.
+Held TurnToPlaces(const KnownMetres& known, Held held, MetricStart& start) {
+  for (int pass = 0; pass < kMostPasses; ++pass) {
+    const Held next = Judged(known, Misses(known, start.model), held, nullptr);
+    RequireEnough(next);
+    start.report.passes = pass + 1;
+    start.report.settled = pass > 0 && IsSettled(held, next);
+    if (start.report.settled) break;
+    held = next;
+    const Pairs pairs = PairsOf(start.model, known, held.used);
+    std::vector<Eigen::Vector3d> sigmas;
+    for (const PositionPrior& p : PositionsOf(known, held)) sigmas.push_back(p.sigma);
+    start.model = Moved(start.model, TurnAndShift(pairs.centres, pairs.positions_m, sigmas));
+  }
+  return held;
 }
 
 void RequireNoContradiction(const Adjusted& held, const Adjusted& free) {
@@ -212,7 +258,7 @@ void SettlePlaces(const KnownMetres& known, MetricStart& start, Held held) {
   const Adjusted free = Adjust(some, adjust);
   adjust.distances = options.distances;
   Bundle bundle = some;
-  const bool placed = !known.places.empty();
+  const bool placed = !known.places.empty() && start.report.places_tell_scale;
   if (placed) held = Judged(known, Misses(known, bundle), held, nullptr);
   for (int pass = 0; pass < kMostPasses; ++pass) {
     if (placed) RequireEnough(held);
@@ -224,13 +270,19 @@ void SettlePlaces(const KnownMetres& known, MetricStart& start, Held held) {
       const BundleCovariance covariance = CovarianceOf(adjusted, adjust);
       next = Judged(known, Misses(known, bundle), held, &covariance);
     }
-    if (IsSettled(held, next) || pass + 1 == kMostPasses) {
+    const bool settled = IsSettled(held, next);
+    if (placed) {
+      start.report.passes = pass + 1;
+      start.report.settled = settled;
+    }
+    if (settled || pass + 1 == kMostPasses) {
       RequireNoContradiction(adjusted, free);
       break;
     }
     held = next;
   }
-  start.options.positions = PositionsOf(known, held);
+  start.places = PositionsOf(known, held);
+  if (placed) start.options.positions = start.places;
   for (size_t i = 0; i < known.places.size(); ++i) {
     const KnownPlace& place = known.places[i];
     if (!held.used[i]) start.report.left_out.push_back(place.image);
@@ -268,16 +320,19 @@ void Complete(const KnownMetres& known, const SfmModel& adjusted, MetricStart& s
       const auto& out = report.left_out;
       used[i] = std::find(out.begin(), out.end(), known.places[i].image) == out.end();
     }
-    for (const PositionPrior& p : start.options.positions) squares += p.sigma.squaredNorm();
+    for (const PositionPrior& p : start.places) squares += p.sigma.squaredNorm();
     const Pairs given = PairsOf(start.model, known, used), found = PairsOf(adjusted, known, used);
     const auto count = static_cast<double>(found.centres.size());
-    report.given_rms_m = AlignmentRms(AlignPoints(given.centres, given.positions_m), given.centres,
-                                      given.positions_m);
+    const Similarity as_a_whole = report.places_tell_scale
+                                      ? AlignPoints(given.centres, given.positions_m)
+                                      : AlignPointsAtScale(given.centres, given.positions_m, 1);
+    report.given_rms_m = AlignmentRms(as_a_whole, given.centres, given.positions_m);
     report.rms_m = AlignmentRms({}, found.centres, found.positions_m);
     PositionScale scale;
     FillUncertainty(found.centres, std::sqrt(squares / (3 * count)), scale);
     report.turn_sigma_rad = scale.turn_sigma_rad;
-    weights += std::pow(scale.relative_sigma, -2);
+    report.places_relative_sigma = scale.relative_sigma;
+    if (report.places_tell_scale) weights += std::pow(scale.relative_sigma, -2);
   }
   report.relative_sigma = 1 / std::sqrt(weights);
   if (!(report.relative_sigma <= kMostRelativeSigma)) {
@@ -296,14 +351,16 @@ MetricStart StartInMetres(const SfmModel& model, const KnownMetres& known,
   MetricStart start;
   start.options = options;
   Held held;
-  const Similarity metric_from_model =
-      known.places.empty() ? FromDistances(model, known) : FromPlaces(model, known, held);
+  const Similarity metric_from_model = known.places.empty()
+                                           ? FromDistances(model, known)
+                                           : FromPlaces(model, known, held, start.report);
   start.model = Moved(model, metric_from_model);
   start.report.metres_per_unit = metric_from_model.scale;
   for (const KnownDistance& d : known.distances) {
     start.options.distances.push_back({d.image_a, d.image_b, d.length_m, SigmaOf(d)});
     start.report.given_m.push_back(DistanceOf(start.model, d));
   }
+  if (!start.report.places_tell_scale) held = TurnToPlaces(known, held, start);
   SettlePlaces(known, start, held);
   return start;
 }

@@ -38,6 +38,13 @@ struct MetricReport {
   /// Root mean square distances of the places that agree: of the model carried there as a whole,
   /// and as it was adjusted.
   double given_rms_m = 0, rms_m = 0;
+  /// False where the places err too much for the scale, and distances alone give it: then they turn
+  /// and shift the whole, and hold nothing.
+  bool places_tell_scale = true;
+  double places_relative_sigma = 0;  ///< of the scale, as the places alone say it
+  /// Whether which places agree, and how far they err, stayed as it was in the last of the passes.
+  bool settled = true;
+  int passes = 0;
   double sigma_flat_m = 0, sigma_up_m = 0;  ///< of places that state none; 0: all do
   double turn_sigma_rad = 0;                ///< of the whole, about the axis known worst
   /// Per distance: between the cameras of the model carried there as a whole, of the adjusted one,
@@ -49,17 +56,22 @@ struct MetricReport {
 struct MetricStart {
   SfmModel model;         ///< carried there as a whole
   RefineOptions options;  ///< with positions and distances
-  MetricReport report;    ///< what is known of the start
+  std::vector<PositionPrior>
+      places;           ///< that agree; options.positions unless they do not tell scale
+  MetricReport report;  ///< what is known of the start
 };
 
-/// Carries `model` into metres: by the similarity to the places (x east, y north, z up), or, where
-/// only distances are known, by their mean scale, its axes kept. Then some 4000 points are
+/// Carries `model` into metres: by the similarity to the places (x east, y north, z up); where they
+/// do not tell the scale to kMostRelativeSigma and distances do, by the mean scale of these, turned
+/// and shifted to the places as a whole; where only distances are known, by that scale, its axes
+/// kept. Places that tell the scale are held: some 4000 points are
 /// adjusted, the places held (lenses without the principal point, or as known), again and again
 /// until it is settled which of them agree (to kPositionOutlierSigmas robust standard deviations)
 /// and how far they err where they do not say so. A model that is bent does not fit its places as a
 /// whole: those at its ends would be left out, and its bend be taken for their error.
 ///
-/// Throws Error where ScaleFromPositions does, where a distance contradicts the places by more than
+/// Throws Error where AlignToPositions does, where places without distances do not tell the scale
+/// (RequireKnownScale), where a distance contradicts the places by more than
 /// a bent model can, and where the photos contradict what is known (Contradicts, adjust.h).
 MetricStart StartInMetres(const SfmModel& model, const KnownMetres& known,
                           const RefineOptions& options);

@@ -91,6 +91,7 @@ Found FromGps(const ScaleOptions& options, const DtrSet& set) {
   found.json["method"] = "gps";
   found.json["photos"] = located.names.size();
   found.json["left_out"] = left_out;
+  found.json["settled"] = scale.settled;
   found.json["rms_m"] = scale.rms_m;
   found.json["turn_sigma_deg"] = turn_deg;
   found.json["axes"] = found.keeps_axes ? "as before" : "east, north, up";
@@ -101,6 +102,10 @@ Found FromGps(const ScaleOptions& options, const DtrSet& set) {
                                     located.names.size() - left_out.size(), scale.rms_m, turn_deg));
   if (!left_out.empty()) {
     found.lines.push_back(fmt::format("do not agree, left out: {}", fmt::join(left_out, ", ")));
+  }
+  if (!scale.settled) {
+    found.lines.push_back(
+        "which positions agree did not settle: with another pass others would be left out");
   }
   found.lines.push_back(found.keeps_axes
                             ? "the cameras stand nearly on a line, and the turn about it is not "

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "dtr/base/error.h"
@@ -144,6 +145,72 @@ TEST(ScaleFromPositions, PositionsThatAreFarOffAreLeftOut) {
   const PositionScale scale = ScaleFromPositions(walk.centres, walk.positions);
   EXPECT_EQ(scale.left_out, (std::vector<size_t>{4, 17}));
   EXPECT_NEAR(scale.metric_from_scene.scale, 3, 5 * 3 * scale.relative_sigma);
+}
+
+TEST(AlignToPositions, VaguePositionsTurnAndShiftWhereTheScaleIsKnown) {
+  constexpr int kSolves = 300;
+  constexpr double kVagueM = 14;  // of a walk of 44 m
+  double squares = 0;
+  for (std::uint64_t k = 0; k < kSolves; ++k) {
+    const Walk exact = MakeWalk(0, k), vague = MakeWalk(kVagueM, k);
+    EXPECT_THROW(ScaleFromPositions(vague.centres, vague.positions), Error) << k;
+    const PositionScale scale = AlignToPositions(vague.centres, vague.positions, 3.0);
+    EXPECT_EQ(scale.metric_from_scene.scale, 3);
+    // The middle is the mean of 30 places, wherever the turn is.
+    Eigen::Vector3d shift = Eigen::Vector3d::Zero();
+    for (size_t i = 0; i < exact.centres.size(); ++i) {
+      shift += (scale.metric_from_scene * exact.centres[i] - exact.positions[i]) / 30;
+    }
+    squares += shift.squaredNorm() / (3 * kVagueM * kVagueM / 30);
+    EXPECT_TRUE(scale.settled);
+  }
+  EXPECT_NEAR(squares / kSolves, 1, 0.15);  // 3 sigmas of the mean of 900 squares, halved freedom
+}
+
+// Which positions agree is decided by a fit to those that did: that may go round for ever.
+TEST(AlignToPositions, PositionsThatTakeTurnsToAgreeAreTold) {
+  Random random(1548);  // one of some 60 000 such draws of heavy tails
+  std::vector<Eigen::Vector3d> centres, positions;
+  for (int i = 0; i < 8; ++i) {
+    centres.push_back(Draw(random));
+    const Eigen::Vector3d error = 0.03 * Draw(random);
+    positions.push_back(centres.back() + error / std::abs(random.Normal()));
+  }
+  const PositionScale scale = AlignToPositions(centres, positions);
+  EXPECT_FALSE(scale.settled);
+  // What is told is told of one fit all the same: the last.
+  std::vector<Eigen::Vector3d> a, b;
+  for (size_t i = 0; i < centres.size(); ++i) {
+    const auto& out = scale.left_out;
+    if (std::find(out.begin(), out.end(), i) != out.end()) continue;
+    a.push_back(centres[i]);
+    b.push_back(positions[i]);
+  }
+  EXPECT_EQ(scale.rms_m, AlignmentRms(AlignPoints(a, b), a, b));
+}
+
+TEST(AlignToPositions, PositionsOfWhichTooFewAgreeAreRefused) {
+  // A triangle, and its middle, which the three hold where it is.
+  const std::vector<Eigen::Vector3d> centres = {{2, 0, 0}, {-1, 1.7, 0}, {-1, -1.7, 0}, {0, 0, 0}};
+  std::vector<Eigen::Vector3d> positions = centres;
+  positions[3].z() = 0.5;
+  try {
+    (void)AlignToPositions(centres, positions);
+    FAIL() << "nothing was refused";
+  } catch (const Error& error) {
+    EXPECT_STREQ(error.what(),
+                 "scale: expected positions that agree with the cameras, found that 3 of 4 do");
+  }
+}
+
+TEST(SigmaOfRadius, TwoThirdsOfTheErrorsLieWithinTheRadius) {
+  Random random(5);
+  constexpr int kDraws = 20000;
+  constexpr double kRadiusM = 4.5;
+  const double sigma = SigmaOfRadius(kRadiusM);
+  int within = 0;
+  for (int i = 0; i < kDraws; ++i) within += (sigma * Draw(random)).head<2>().norm() <= kRadiusM;
+  EXPECT_NEAR(within, 0.68 * kDraws, 3 * std::sqrt(0.68 * 0.32 * kDraws));
 }
 
 TEST(ScaleFromPositions, WhatSaysNothingIsRefused) {

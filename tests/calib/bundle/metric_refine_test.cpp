@@ -16,31 +16,24 @@ namespace {
 
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using testing::kChain;
 using testing::MakeBundle;
 using testing::ModelFrom;
 using testing::SceneSpec;
+using testing::Walk;
 
-constexpr int kChain = 40;
 constexpr double kUnit = 2.5;  // metres that a unit of the models is
-
-// A walk along a wall of 40 m, which every photo shows a part of: points are seen by four photos in
-// a row, and what errs in one step is carried through all others.
-SceneSpec Walk(double noise_px = 1) {
-  SceneSpec spec{.images = kChain, .points = 900, .noise_px = noise_px, .most_sights = 4};
-  spec.pose = [](int i, int) {
-    const Eigen::Vector3d centre(i, 0.6 * std::sin(0.7 * i), 1.5 + 0.3 * std::cos(0.5 * i));
-    return testing::LookAt(centre, centre + Eigen::Vector3d(0.3 * std::sin(1.1 * i), 10, 0));
-  };
-  spec.point = [](Random& random) {
-    const double x = random.Uniform(-4, kChain + 3), y = random.Uniform(5, 12);
-    return Eigen::Vector3d(x, y, random.Uniform(-2, 5));
-  };
-  return spec;
-}
 
 Eigen::Vector3d Draw(Random& random) {
   const double x = random.Normal(), y = random.Normal();
   return {x, y, random.Normal()};
+}
+
+// In another world, of another unit.
+SfmModel Moved(const Bundle& bundle) {
+  const Similarity world{
+      1 / kUnit, Eigen::Quaterniond(0.8, 0.2, -0.4, 0.4).normalized(), {5, -7, 90}};
+  return ModelFrom(testing::Moved(bundle, world));
 }
 
 // What structure from motion makes of it: adjusted to the sights alone, in another world.
@@ -49,9 +42,7 @@ SfmModel Found(const Bundle& truth, const LensCamera& lens) {
   start.lenses[0] = lens;
   AdjustOptions options;
   options.lens = LensFreedom::kFixed;
-  const Similarity world{
-      1 / kUnit, Eigen::Quaterniond(0.8, 0.2, -0.4, 0.4).normalized(), {5, -7, 90}};
-  return ModelFrom(testing::Moved(Adjust(start, options).bundle, world));
+  return Moved(Adjust(start, options).bundle);
 }
 
 std::vector<Eigen::Vector3d> CentresOf(const SfmModel& model) {
@@ -87,6 +78,15 @@ Held Hold(const SfmModel& model, const KnownMetres& known, const RefineOptions& 
   held.start = StartInMetres(model, known, options);
   held.refined = RefineInMetres(known, held.start);
   return held;
+}
+
+void ExpectRefusal(const SfmModel& model, const KnownMetres& known, const std::string& words) {
+  try {
+    Hold(model, known);
+    FAIL() << "nothing was refused: " << words;
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr(words));
+  }
 }
 
 // Root mean square distance of the cameras from the truth, as they are and carried there as a
@@ -219,6 +219,43 @@ TEST(RefineInMetres, DistancesSetTheUnitAndStretchWhatHasShrunk) {
   EXPECT_LT(after, 0.6 * before) << "between the ends of what was measured, too";
 }
 
+// Places that do not tell the scale are what they are beside a distance that does: they turn and
+// shift the whole as far as they can, and bend nothing.
+TEST(RefineInMetres, VaguePlacesTurnAndShiftWhatADistanceScales) {
+  constexpr double kPlacesM = 1.5;
+  const Bundle truth = MakeBundle({.points = 400, .noise_px = 0.3});
+  const SfmModel model = Moved(truth);
+  const auto centres = CentresOf(truth);
+  const double length_m = (centres[0] - centres[7]).norm();
+  double turns = 0;
+  int kept = 0;
+  constexpr int kDraws = 6;
+  for (std::uint64_t seed = 1; seed <= kDraws; ++seed) {
+    KnownMetres known = Places(truth, kPlacesM, seed);
+    ExpectRefusal(model, known, "scale: expected a scale known to 10 %, found one to ");
+    known.distances = {{"--distance A,B", 0, 7, length_m, 0.001}};
+    const Held held = Hold(model, known);
+    const MetricReport& report = held.start.report;
+    EXPECT_FALSE(report.places_tell_scale);
+    EXPECT_GT(report.places_relative_sigma, 0.1);
+    EXPECT_NEAR(report.relative_sigma, 0.001 / length_m, 1e-4);
+    EXPECT_TRUE(held.start.options.positions.empty()) << "they hold nothing";
+    EXPECT_NEAR(held.start.places[0].sigma.x() / kPlacesM, 1, 0.7) << "of 24 numbers";
+    EXPECT_LT(BentM(held.refined.model, truth), 0.01);
+    const Similarity off = AlignPoints(CentresOf(held.refined.model), centres);
+    EXPECT_NEAR(off.scale, 1, 0.005);
+    const double turn_rad = Eigen::AngleAxisd(off.rotation).angle();
+    turns += std::pow(turn_rad / report.turn_sigma_rad, 2) / kDraws;
+    kept += static_cast<int>(held.start.places.size());
+    known.distances[0].length_m = 10 * length_m;
+    ExpectRefusal(model, known, "expected a distance that agrees with the photos' GPS, found ");
+  }
+  // Three axes, of which the one known worst is predicted.
+  EXPECT_GT(turns, 0.5);
+  EXPECT_LT(turns, 3);
+  EXPECT_GE(kept, 7 * kDraws);
+}
+
 TEST(RefineInMetres, TheGaugeIsThatOfThePlaces) {
   const Bundle truth = MakeBundle({.points = 400, .noise_px = 0.3});
   RefineOptions options;
@@ -238,15 +275,6 @@ TEST(RefineInMetres, TheSameForAnyNumberOfThreads) {
   const Held four = Hold(ModelFrom(truth), Places(truth, 0.05), options);
   EXPECT_EQ(ToJson(one.refined), ToJson(four.refined));
   EXPECT_EQ(CentresOf(one.refined.model), CentresOf(four.refined.model));
-}
-
-void ExpectRefusal(const SfmModel& model, const KnownMetres& known, const std::string& words) {
-  try {
-    Hold(model, known);
-    FAIL() << "nothing was refused: " << words;
-  } catch (const Error& error) {
-    EXPECT_THAT(error.what(), HasSubstr(words));
-  }
 }
 
 TEST(RefineInMetres, WhatContradictsIsRefused) {

@@ -1,5 +1,7 @@
 // tests/calib/bundle/synthetic_bundle.h -- the bundles whose truth is known, by the tests' names.
 #pragma once
+#include <cmath>
+
 #include "calib/sfm_model.h"
 #include "datasets/exact/bundle.h"
 
@@ -25,6 +27,23 @@ inline calib::SfmModel ModelFrom(const calib::Bundle& bundle) {
         {o.pixel, bundle.point_ids[static_cast<size_t>(o.point)]});
   }
   return model;
+}
+
+inline constexpr int kChain = 40;
+
+/// A walk along a wall of 40 m, which every photo shows a part of: points are seen by four photos
+/// in a row, and what errs in one step is carried through all others.
+inline SceneSpec Walk(double noise_px = 1) {
+  SceneSpec spec{.images = kChain, .points = 900, .noise_px = noise_px, .most_sights = 4};
+  spec.pose = [](int i, int) {
+    const Eigen::Vector3d centre(i, 0.6 * std::sin(0.7 * i), 1.5 + 0.3 * std::cos(0.5 * i));
+    return LookAt(centre, centre + Eigen::Vector3d(0.3 * std::sin(1.1 * i), 10, 0));
+  };
+  spec.point = [](dtr::Random& random) {
+    const double x = random.Uniform(-4, kChain + 3), y = random.Uniform(5, 12);
+    return Eigen::Vector3d(x, y, random.Uniform(-2, 5));
+  };
+  return spec;
 }
 
 }  // namespace dtr::testing
