@@ -11,11 +11,21 @@
 namespace dtr::cli {
 namespace {
 
-[[noreturn]] void Refuse(const std::string& text, const std::string& what) {
-  throw UsageError(fmt::format(
-      "--distance {}: {}; expected A,B=LENGTH, as 0001:640:410,0001:902.5:398=2.5m: A and B each "
-      "VIEW:X:Y, VIEW:X:Y+VIEW2:X:Y or VIEW (the camera itself), LENGTH in mm, cm or m",
-      text, what));
+// A word of --distance, and what its ends may be.
+struct Typed {
+  const std::string& text;
+  DistanceEnds ends;
+};
+
+[[noreturn]] void Refuse(const Typed& typed, const std::string& what) {
+  const char* form =
+      typed.ends == DistanceEnds::kCameras
+          ? "left01,right01=12cm: A and B each a photo, whose camera is meant"
+          : "0001:640:410,0001:902.5:398=2.5m: A and B each VIEW:X:Y, VIEW:X:Y+VIEW2:X:Y or VIEW "
+            "(the camera itself)";
+  throw UsageError(
+      fmt::format("--distance {}: {}; expected A,B=LENGTH, as {}, LENGTH in mm, cm or m",
+                  typed.text, what, form));
 }
 
 std::vector<std::string> Split(const std::string& text, char at) {
@@ -38,8 +48,13 @@ std::optional<double> NumberFrom(const std::string& word) {
   return value;
 }
 
-pipeline::ScalePoint PointFrom(const std::string& text, const std::string& whole) {
+pipeline::ScalePoint PointFrom(const std::string& text, const Typed& whole) {
   pipeline::ScalePoint point{text, {}};
+  if (whole.ends == DistanceEnds::kCameras) {
+    if (text.empty()) Refuse(whole, "a photo without a name");
+    point.clicks.push_back({text, {}});  // with all its signs: photos may have them in their names
+    return point;
+  }
   for (const std::string& part : Split(text, '+')) {
     const auto words = Split(part, ':');
     if (words.front().empty()) Refuse(whole, "a view without a name");
@@ -56,7 +71,7 @@ pipeline::ScalePoint PointFrom(const std::string& text, const std::string& whole
   return point;
 }
 
-double MetresFrom(const std::string& word, const std::string& whole) {
+double MetresFrom(const std::string& word, const Typed& whole) {
   const auto length = calib::LengthFrom(word);
   if (!length || !length->has_unit) Refuse(whole, fmt::format("no length is '{}'", word));
   return length->value;
@@ -74,19 +89,20 @@ pipeline::GpsSigma GpsSigmaFrom(const std::string& text) {
 
 }  // namespace
 
-pipeline::ScaleDistance DistanceFrom(const std::string& text) {
+pipeline::ScaleDistance DistanceFrom(const std::string& text, DistanceEnds ends) {
+  const Typed typed{text, ends};
   const size_t equals = text.rfind('=');
-  if (equals == std::string::npos) Refuse(text, "found no '='");
+  if (equals == std::string::npos) Refuse(typed, "found no '='");
   const auto points = Split(text.substr(0, equals), ',');
-  if (points.size() != 2) Refuse(text, fmt::format("found {} points", points.size()));
+  if (points.size() != 2) Refuse(typed, fmt::format("found {} ends", points.size()));
   pipeline::ScaleDistance distance;
   distance.text = text;
-  distance.a = PointFrom(points[0], text);
-  distance.b = PointFrom(points[1], text);
+  distance.a = PointFrom(points[0], typed);
+  distance.b = PointFrom(points[1], typed);
   const std::string length = text.substr(equals + 1);
   const size_t spread = length.find("+-");
-  distance.length_m = MetresFrom(length.substr(0, spread), text);
-  if (spread != std::string::npos) distance.sigma_m = MetresFrom(length.substr(spread + 2), text);
+  distance.length_m = MetresFrom(length.substr(0, spread), typed);
+  if (spread != std::string::npos) distance.sigma_m = MetresFrom(length.substr(spread + 2), typed);
   return distance;
 }
 
@@ -98,9 +114,10 @@ CLI::Option* AddGpsFlag(CLI::App& command, bool& gps) {
 
 CLI::Option* AddMetreOptions(CLI::App& command, CLI::Option& gps, MetreWords& words) {
   command
-      .add_option("--gps-sigma", words.gps_sigma,
-                  "Standard deviation of these places per axis, on the map and in height, in place "
-                  "of what EXIF says or the places themselves show")
+      .add_option_function<std::string>(
+          "--gps-sigma", [&words](const std::string& word) { words.gps_sigma = word; },
+          "Standard deviation of these places per axis, on the map and in height, in place of what "
+          "EXIF says or the places themselves show")
       ->needs(&gps)
       ->type_name("M[,V]");
   return command
@@ -113,8 +130,10 @@ CLI::Option* AddMetreOptions(CLI::App& command, CLI::Option& gps, MetreWords& wo
 pipeline::MetreOptions MetreOptionsFrom(bool gps, const MetreWords& words) {
   pipeline::MetreOptions options;
   options.gps = gps;
-  if (!words.gps_sigma.empty()) options.gps_sigma = GpsSigmaFrom(words.gps_sigma);
-  for (const std::string& text : words.distances) options.distances.push_back(DistanceFrom(text));
+  if (words.gps_sigma) options.gps_sigma = GpsSigmaFrom(*words.gps_sigma);
+  for (const std::string& text : words.distances) {
+    options.distances.push_back(DistanceFrom(text, DistanceEnds::kCameras));
+  }
   return options;
 }
 

@@ -1,6 +1,7 @@
 // cli/metre_options.h -- --distance, --gps and --gps-sigma of the commands that take them.
 #pragma once
 #include <CLI/CLI.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,11 +13,18 @@ namespace dtr::cli {
 /// `--distance` between the cameras of two photos, `--gps-sigma`, as they were typed.
 struct MetreWords {
   std::vector<std::string> distances;
-  std::string gps_sigma;
+  std::optional<std::string> gps_sigma;
 };
 
-/// What `--distance A,B=LENGTH` says; views are called as they were typed. Throws UsageError.
-pipeline::ScaleDistance DistanceFrom(const std::string& text);
+/// What a distance may be measured between.
+enum class DistanceEnds {
+  kPoints,   ///< pixels of a set's views, or cameras: as `dtr calibrate scale` takes them
+  kCameras,  ///< photos: as a refinement takes them
+};
+
+/// What `--distance A,B=LENGTH` says; views are called as they were typed. Throws UsageError, which
+/// shows the form that is possible here.
+pipeline::ScaleDistance DistanceFrom(const std::string& text, DistanceEnds ends);
 
 /// Adds the flag --gps of commands that take in photos themselves.
 CLI::Option* AddGpsFlag(CLI::App& command, bool& gps);

@@ -6,15 +6,22 @@
 #include <sstream>
 
 #include "dtr/base/error.h"
+#include "dtr/types/photo_names.h"
 
 namespace dtr::cli {
 
 const View& FindView(const DtrSet& set, const std::string& name) {
   const std::vector<View>& views = set.frames.front().views;
-  const auto is_called = [&name](const View& view) {
-    return view.id == name || IsCalled(view.name, name);
-  };
-  const auto found = std::find_if(views.begin(), views.end(), is_called);
+  std::vector<std::string> names;
+  for (const View& view : views) names.push_back(view.name);
+  const std::vector<size_t> called = PhotosCalled(names, name);
+  if (called.size() > 1) {
+    throw UsageError(fmt::format("'{}' may be {} or {}; name the photo with its extension", name,
+                                 names[called[0]], names[called[1]]));
+  }
+  if (!called.empty()) return views[called.front()];
+  const auto found =
+      std::find_if(views.begin(), views.end(), [&](const View& view) { return view.id == name; });
   if (found != views.end()) return *found;
   constexpr size_t kExamples = 3;
   std::string examples;

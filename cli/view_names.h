@@ -8,7 +8,8 @@
 namespace dtr::cli {
 
 /// The view of the first frame called `name`: its photo's name, with or without the extension, or
-/// its id. Throws UsageError naming a few that exist when there is none.
+/// its id where no photo is called so. Throws UsageError naming a few that exist when there is
+/// none, and naming two where nothing but an extension tells photos apart.
 const View& FindView(const DtrSet& set, const std::string& name);
 
 /// The names of the views that a comma-separated list means, each by FindView. Empty list: none.

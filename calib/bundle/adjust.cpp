@@ -380,6 +380,12 @@ Bundle WithTangential(Bundle bundle) {
   return bundle;
 }
 
+int Differences(const std::vector<bool>& a, const std::vector<bool>& b) {
+  int count = 0;
+  for (size_t i = 0; i < a.size(); ++i) count += a[i] != b[i];
+  return count;
+}
+
 Adjusted Solve(const Bundle& bundle, const AdjustOptions& options, Normalised& n) {
   const Bundle start = n.LocalAt(bundle);
   Adjusted out;
@@ -408,7 +414,8 @@ Adjusted Solve(const Bundle& bundle, const AdjustOptions& options, Normalised& n
     out.converged = solve(out.used, 0);
     sigma = SigmaOf(bundle, residuals);
     std::vector<bool> used = Within(residuals, limit());
-    if (used == out.used) break;
+    out.unsettled = Differences(used, out.used);
+    if (out.unsettled == 0) break;
     if (pass + 1 < kMostOutlierPasses) out.used = std::move(used);
   }
   out.bundle = n.LocalAt(bundle);

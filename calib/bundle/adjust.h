@@ -69,6 +69,9 @@ struct Adjusted {
   int without_pixel = 0;  ///< sights whose point has no pixel: behind the camera
   int iterations = 0;
   bool converged = false;
+  /// Sights whose part in the solve would change once more: which are outliers was decided anew
+  /// after each of four solves, and had not settled with the last. 0: it had.
+  int unsettled = 0;
 };
 
 /// Minimises the sum over sights of |predicted - observed|^2, starting at `bundle`: under Cauchy's

@@ -175,6 +175,10 @@ bool Refinable(const SfmModel& model, std::string* reason) {
   return true;
 }
 
+void AskDetermined(const SfmModel& model, const RefineOptions& options) {
+  if (!options.determined.empty()) RequireDetermined(model, options, options.determined);
+}
+
 void Finish(const SfmModel& model, const RefineOptions& options, Refined& refined) {
   refined.model =
       ModelOf(refined.adjusted.bundle, model, options.separate_lenses, &refined.points_dropped);
@@ -211,6 +215,7 @@ Refined Refine(const SfmModel& model, const RefineOptions& options) {
   refined.model = model;
   if (options.known_lenses) {
     const SfmModel known = WithLenses(model, *options.known_lenses);
+    AskDetermined(known, options);
     refined.lens = LensFreedom::kFixed;
     refined.adjusted = Adjust(BundleOf(known), SolveOptions(options, refined.lens));
     if (!refined.adjusted.converged) {
@@ -222,6 +227,7 @@ Refined Refine(const SfmModel& model, const RefineOptions& options) {
     Finish(known, options, refined);
     return refined;
   }
+  AskDetermined(model, options);
   if (!Refinable(model, &refined.reason)) return refined;
   const Bundle bundle = BundleOf(model, options.separate_lenses);
   const SightSplit split = SplitSights(SomePoints(bundle, kMostPoints, options.seed), options.seed);
@@ -268,6 +274,14 @@ void RequireDetermined(const SfmModel& model, const RefineOptions& options,
   }
 }
 
+std::string RemarkOn(const Refined& refined) {
+  if (!refined.changed || refined.adjusted.unsettled == 0) return "";
+  return fmt::format(
+      "bundle adjustment: which observations are outliers did not settle: {} of {} would change "
+      "with another solve",
+      refined.adjusted.unsettled, refined.adjusted.used.size());
+}
+
 std::string ToJson(const Refined& refined) {
   nlohmann::ordered_json json;
   json["refined"] = refined.changed;
@@ -290,6 +304,7 @@ std::string ToJson(const Refined& refined) {
     json["rms_px"] = refined.adjusted.rms_px;
     json["iterations"] = refined.adjusted.iterations;
     json["converged"] = refined.adjusted.converged;
+    json["unsettled_sights"] = refined.adjusted.unsettled;
     json["points_dropped"] = refined.points_dropped;
   }
   if (!refined.covariance_json.empty()) {

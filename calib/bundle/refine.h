@@ -22,6 +22,9 @@ struct RefineOptions {
   /// SfmModel::images. Held by every solve, those of the candidates, too.
   std::vector<PositionPrior> positions;
   std::vector<DistancePrior> distances;
+  /// The name of the model, or of its photos, where it must determine its cameras:
+  /// RequireDetermined is asked before anything is adjusted. Empty: nobody asks.
+  std::string determined;
   int threads = 0;
   std::uint64_t seed = 0;  ///< of the sights that are held out
 };
@@ -66,7 +69,8 @@ struct Refined {
 /// with known positions or distances, the lenses' freedom is chosen as above, and the result taken
 /// whether or not it predicts the sights better: what is known is to hold.
 /// Deterministic for any number of threads. What cannot be refined (a lens model FOV, too few
-/// points) comes back unchanged, with the reason; errors of broken models are thrown.
+/// points) comes back unchanged, with the reason; errors of broken models are thrown, and
+/// those of RequireDetermined where options.determined asks for it.
 Refined Refine(const SfmModel& model, const RefineOptions& options);
 
 /// In what ways the views of a model do not suffice (judge.h), its poses, points and lenses free as
@@ -84,9 +88,13 @@ void RequireDetermined(const SfmModel& model, const RefineOptions& options,
 /// another size.
 SfmModel WithLenses(SfmModel model, const std::map<std::uint32_t, LensCamera>& lenses);
 
+/// What is to be said of a result that is no error: that which sights count had not settled. Empty:
+/// nothing.
+std::string RemarkOn(const Refined& refined);
+
 /// JSON object: refined, reason, lens, candidates[].{name,held_out_px,converged}, held_out_sights,
-/// given_px, adjusted_px, sigma_px, rms_px, iterations, points_dropped, covariance (where asked
-/// for).
+/// given_px, adjusted_px, sigma_px, rms_px, iterations, converged, unsettled_sights,
+/// points_dropped, covariance (where asked for).
 std::string ToJson(const Refined& refined);
 
 }  // namespace dtr::calib

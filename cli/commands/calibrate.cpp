@@ -3,7 +3,6 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "calib/bundle/refine.h"
 #include "calib/colmap/model_io.h"
 #include "capture/ingest.h"
 #include "cli/command.h"
@@ -43,16 +42,11 @@ int RunCalibratePhotos(const Options& options, const Context& context) {
   calibrate.seed = context.common.seed;
   calibrate.memory_gb = options.memory_gb;
   calibrate.refine = options.refine;
+  calibrate.determined = options.photos.string();
   if (!options.lens.empty()) calibrate.lens = pipeline::ReadLens(options.lens);
   // The workspace stays: it holds COLMAP's arguments, logs and database, and lets a run continue.
   const auto calibrated =
       pipeline::CalibratePhotos(photos, calibrate, options.output / "workspace", context.console);
-  calib::RefineOptions judged;
-  judged.seed = context.common.seed;
-  if (calibrate.lens) judged.known_lenses.emplace();
-  judged.positions = calibrated.positions;
-  judged.distances = calibrated.distances;
-  calib::RequireDetermined(calibrated.model, judged, options.photos.string());
   colmap::WriteModel(options.output, calibrated.model, colmap::Format::kBinary);
 
   context.console.Say(fmt::format("{}: {} of {} photos have a camera; {} points",

@@ -37,6 +37,7 @@ void SayRefined(const calib::Refined& refined, Console& console) {
                     NameOf(*refined.lens), refined.adjusted.rms_px, refined.adjusted.sigma_px,
                     refined.points_dropped));
   }
+  if (const std::string remark = calib::RemarkOn(refined); !remark.empty()) console.Say(remark);
 }
 
 pipeline::RefinedInMetres HoldMetres(const Options& options, const pipeline::MetreOptions& metres,
@@ -49,7 +50,7 @@ pipeline::RefinedInMetres HoldMetres(const Options& options, const pipeline::Met
     places = pipeline::ReadPhotoPlaces(options.gps, names);
     pipeline::RequirePlaces(places, options.gps.string(), "the model");
   }
-  return pipeline::RefineInMetres(model, metres, places, refine, options.model.string());
+  return pipeline::RefineInMetres(model, metres, places, refine);
 }
 
 int RunRefine(const Options& options, const Context& context) {
@@ -62,6 +63,7 @@ int RunRefine(const Options& options, const Context& context) {
   calib::RefineOptions refine;
   refine.separate_lenses = options.separate;
   refine.covariance = options.covariance;
+  refine.determined = options.model.string();
   refine.threads = context.common.threads;
   refine.seed = context.common.seed;
   if (!options.lens.empty()) {
@@ -77,7 +79,6 @@ int RunRefine(const Options& options, const Context& context) {
     context.EmitJson(in_metres.json);
     return kDone;
   }
-  calib::RequireDetermined(model, refine, options.model.string());
   const calib::Refined refined = calib::Refine(model, refine);
   SayRefined(refined, context.console);
   colmap::WriteModel(options.output, refined.model, colmap::Format::kBinary);

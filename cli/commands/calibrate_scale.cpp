@@ -44,7 +44,7 @@ int RunScale(Options options, const Context& context) {
   const DtrSet set = io::ReadSet(options.scale.set);
   RequireOneFrame(set);
   for (const std::string& text : options.distances) {
-    pipeline::ScaleDistance distance = DistanceFrom(text);
+    pipeline::ScaleDistance distance = DistanceFrom(text, DistanceEnds::kPoints);
     NameViews(set, distance.a);
     NameViews(set, distance.b);
     options.scale.distances.push_back(std::move(distance));

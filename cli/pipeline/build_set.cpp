@@ -316,7 +316,8 @@ BuildReport BuildSet(const BuildOptions& options, Progress& listener) {
     LeaveOutSamePictures(options, photos, progress);
     capture::RequireEnoughPhotos(photos, options.photos);
     held_out = ChooseHeldOut(options.holdout, NamesOf(photos));
-    RequireMetres(options.metres, photos, options.photos.string());
+    RequireMetres(options.metres, photos, options.photos.string(),
+                  options.holdout_strict ? held_out : std::vector<bool>());
     if (!rig) return;
     (void)PhotosOfRig(*rig, photos);  // refused here, before any work
     TellPhotosTheirLens(*rig, photos);

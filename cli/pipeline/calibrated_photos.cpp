@@ -41,6 +41,10 @@ Json SfmJson(const colmap::SfmReport& report, const calib::SfmModel& model) {
   return json;
 }
 
+void NoteRemark(const calib::Refined& refined, Progress& progress) {
+  if (const std::string remark = calib::RemarkOn(refined); !remark.empty()) progress.Note(remark);
+}
+
 // Bundle adjustment that holds what is known in metres.
 void HoldMetres(const capture::Capture& capture, const CalibrateOptions& options,
                 const calib::RefineOptions& refine, CalibratedPhotos& calibrated, Json& report,
@@ -52,9 +56,16 @@ void HoldMetres(const capture::Capture& capture, const CalibrateOptions& options
   calibrated.model = std::move(refined.refined.model);
   calibrated.unit = LengthUnit::kMetre;
   calibrated.scale_json = std::move(refined.scale_json);
-  calibrated.positions = std::move(refined.start.options.positions);
-  calibrated.distances = std::move(refined.start.options.distances);
+  NoteRemark(refined.refined, progress);
   for (const std::string& line : refined.lines) progress.Note(line);
+}
+
+calib::RefineOptions RefineOptionsFor(const CalibrateOptions& options) {
+  calib::RefineOptions refine;
+  refine.determined = options.determined;
+  refine.threads = options.threads;
+  refine.seed = options.seed;
+  return refine;
 }
 
 // Bundle adjustment of the frozen model, where it pays; deterministic.
@@ -62,9 +73,7 @@ void RefineModel(const capture::Capture& capture, const CalibrateOptions& option
                  CalibratedPhotos& calibrated, Json& report, Progress& progress) {
   calib::SfmModel& model = calibrated.model;
   progress.Stage("bundle adjustment", 0);
-  calib::RefineOptions refine;
-  refine.threads = options.threads;
-  refine.seed = options.seed;
+  calib::RefineOptions refine = RefineOptionsFor(options);
   if (options.lens) {
     refine.known_lenses.emplace();
     for (const auto& [id, camera] : model.cameras) refine.known_lenses->emplace(id, *options.lens);
@@ -75,6 +84,7 @@ void RefineModel(const capture::Capture& capture, const CalibrateOptions& option
   calib::Refined refined = calib::Refine(model, refine);
   report["bundle_adjustment"] = Json::parse(calib::ToJson(refined));
   if (!refined.changed) progress.Note("bundle adjustment left out: " + refined.reason);
+  NoteRemark(refined, progress);
   model = std::move(refined.model);
 }
 
@@ -102,6 +112,8 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
     calibrated.unit = options.rig->unit;
   } else if (options.refine || options.lens) {
     RefineModel(capture, options, calibrated, report, progress);
+  } else if (!options.determined.empty()) {
+    calib::RequireDetermined(calibrated.model, RefineOptionsFor(options), options.determined);
   }
   calibrated.report_json = report.dump();
   if (options.strict) {

@@ -28,6 +28,9 @@ struct CalibrateOptions {
   std::optional<calib::LensCamera> lens;  ///< of all photos, known: SfM's own is replaced by it
   std::optional<SetRig> rig;              ///< took all photos: its lenses, places and scale hold
   MetreOptions metres;  ///< places and distances to hold while SfM's model is refined
+  /// The name of the photos where SfM's model must determine its cameras, else Error before it is
+  /// refined; empty: nobody asks.
+  std::string determined = {};
 };
 
 /// Calibrated photos, frozen: everything later depends on this model alone.
@@ -39,9 +42,6 @@ struct CalibratedPhotos {
   std::string engine;                       ///< "colmap 3.8", "cameras.json", ...
   std::string report_json;                  ///< details for the provenance; no times, no paths
   std::string scale_json;  ///< entry of the provenance's `scale`; empty: lengths are SfM's
-  /// Held by the refinement; `image` is an index into the model it refined.
-  std::vector<calib::PositionPrior> positions;
-  std::vector<calib::DistancePrior> distances;
 };
 
 /// Refuses before any work what cannot work: UsageError for `poses` that do not exist, Error when

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "dtr/base/error.h"
+#include "dtr/types/view.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -24,22 +25,13 @@ int ParseEvery(const std::string& spec) {
   return n;
 }
 
-std::string Stem(const std::string& name) {
-  const size_t dot = name.rfind('.');
-  return dot == std::string::npos || dot == 0 ? name : name.substr(0, dot);
-}
-
-bool Names(const std::string& wanted, const std::string& name) {
-  return name == wanted || Stem(name) == wanted;
-}
-
 void MarkNamed(const std::string& spec, std::span<const std::string> names,
                std::vector<bool>& held_out) {
   std::istringstream list(spec);
   for (std::string wanted; std::getline(list, wanted, ',');) {
     bool found = false;
     for (size_t i = 0; i < names.size(); ++i) {
-      if (!Names(wanted, names[i])) continue;
+      if (!IsCalled(names[i], wanted)) continue;
       held_out[i] = found = true;
     }
     if (!found) {
@@ -54,7 +46,7 @@ void MarkNamed(const std::string& spec, std::span<const std::string> names,
 bool IsNamed(const std::string& spec, const std::string& name) {
   std::istringstream list(spec);
   for (std::string wanted; std::getline(list, wanted, ',');) {
-    if (Names(wanted, name)) return true;
+    if (IsCalled(name, wanted)) return true;
   }
   return false;
 }

@@ -10,7 +10,7 @@
 
 #include "calib/scale.h"
 #include "dtr/base/error.h"
-#include "dtr/types/view.h"
+#include "dtr/types/photo_names.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -19,12 +19,15 @@ using Json = nlohmann::ordered_json;
 
 constexpr double kDegree = std::numbers::pi / 180;
 
-// The photo that somebody called `word`.
-std::optional<size_t> FindPhoto(const std::vector<std::string>& names, const std::string& word) {
-  const auto found = std::find_if(names.begin(), names.end(),
-                                  [&](const std::string& name) { return IsCalled(name, word); });
-  if (found == names.end()) return std::nullopt;
-  return static_cast<size_t>(found - names.begin());
+// The photo that an end of the distance is called by.
+std::optional<size_t> FindPhoto(const std::vector<std::string>& names,
+                                const ScaleDistance& distance, const ScalePoint& end) {
+  const std::vector<size_t> called = PhotosCalled(names, end.text);
+  if (called.empty()) return std::nullopt;
+  if (called.size() == 1) return called.front();
+  throw UsageError(
+      fmt::format("--distance {}: '{}' may be {} or {}; name the photo with its extension",
+                  distance.text, end.text, names[called[0]], names[called[1]]));
 }
 
 calib::KnownMetres KnownOf(const calib::SfmModel& model, const MetreOptions& options,
@@ -37,7 +40,9 @@ calib::KnownMetres KnownOf(const calib::SfmModel& model, const MetreOptions& opt
   const std::vector<Eigen::Vector3d> positions_m = places.EastNorthUp();
   for (size_t i = 0; options.gps && i < places.names.size(); ++i) {
     calib::KnownPlace place{image_of.at(places.names[i]), positions_m[i], 0, 0};
-    place.sigma_flat_m = places.places[i].horizontal_error_m.value_or(0);
+    if (const auto& radius_m = places.places[i].horizontal_error_m) {
+      place.sigma_flat_m = calib::SigmaOfRadius(*radius_m);
+    }
     if (options.gps_sigma) {
       place.sigma_flat_m = options.gps_sigma->flat_m;
       place.sigma_up_m = options.gps_sigma->up_m;
@@ -49,7 +54,7 @@ calib::KnownMetres KnownOf(const calib::SfmModel& model, const MetreOptions& opt
     calib::KnownDistance distance{"--distance " + d.text, 0, 0, d.length_m, d.sigma_m};
     for (const auto& [point, image] :
          {std::pair(&d.a, &distance.image_a), std::pair(&d.b, &distance.image_b)}) {
-      const auto found = FindPhoto(names, point->text);
+      const auto found = FindPhoto(names, d, *point);
       if (!found) {
         throw Error(fmt::format("{}: expected two photos that have a camera, found none of {}",
                                 distance.name, point->text));
@@ -59,6 +64,22 @@ calib::KnownMetres KnownOf(const calib::SfmModel& model, const MetreOptions& opt
     known.distances.push_back(distance);
   }
   return known;
+}
+
+// Which way is up is known worse than kMostTurnSigmaRad.
+std::string TurnLine(const calib::MetricReport& report) {
+  constexpr double kNoTurnSigmaRad = 1;  // beyond, an error of a turn is no small number any more
+  const std::string known =
+      report.turn_sigma_rad < kNoTurnSigmaRad
+          ? fmt::format("is known to {:.0f} degrees only", report.turn_sigma_rad / kDegree)
+          : "is not known";
+  // No axis is known better than the scale: the arms about it are no longer.
+  if (report.places_relative_sigma > calib::kMostTurnSigmaRad) {
+    return "the places err too much for cameras that stand so near to each other: the turn, and "
+           "with it what is north and up, " +
+           known;
+  }
+  return "the cameras stand nearly on a line: the turn about it, and with it what is up, " + known;
 }
 
 void TellOfPlaces(const calib::SfmModel& model, const PhotoPlaces& places,
@@ -74,6 +95,10 @@ void TellOfPlaces(const calib::SfmModel& model, const PhotoPlaces& places,
   scale["rms_m"] = report.rms_m;
   scale["found_sigma_flat_m"] = report.sigma_flat_m > 0 ? Json(report.sigma_flat_m) : Json();
   scale["found_sigma_up_m"] = report.sigma_up_m > 0 ? Json(report.sigma_up_m) : Json();
+  scale["places_tell_scale"] = report.places_tell_scale;
+  scale["places_relative_sigma"] = report.places_relative_sigma;
+  scale["passes"] = report.passes;
+  scale["settled"] = report.settled;
   scale["turn_sigma_deg"] = turn_deg;
   scale["axes"] = "east, north, up";
   scale["origin"] = Json::parse(places.OriginJson());
@@ -92,12 +117,21 @@ void TellOfPlaces(const calib::SfmModel& model, const PhotoPlaces& places,
   if (!left_out.empty()) {
     out.lines.push_back(fmt::format("do not agree, left out: {}", fmt::join(left_out, ", ")));
   }
+  if (!report.settled) {
+    out.lines.push_back(
+        fmt::format("which places agree, and how far they err, did not settle in {} passes; give "
+                    "--gps-sigma where you know it",
+                    report.passes));
+  }
+  if (!report.places_tell_scale) {
+    out.lines.push_back(fmt::format(
+        "the places alone tell the scale to {:.0f} % only: it is that of the distances, "
+        "and they turn and shift the whole",
+        100 * report.places_relative_sigma));
+  }
   out.lines.push_back("axes: x east, y north, z up, from the first photo's place");
   if (!(report.turn_sigma_rad <= calib::kMostTurnSigmaRad)) {
-    out.lines.push_back(
-        fmt::format("the cameras stand nearly on a line: the turn about it, and "
-                    "with it what is up, is known to {:.0f} degrees only",
-                    turn_deg));
+    out.lines.push_back(TurnLine(report));
   }
 }
 
@@ -124,18 +158,18 @@ void RequireCameras(const MetreOptions& options, const std::vector<std::string>&
                     const std::string& whose) {
   for (const ScaleDistance& d : options.distances) {
     for (const ScalePoint* point : {&d.a, &d.b}) {
-      if (point->clicks.size() != 1 || point->clicks.front().pixel) {
+      if (FindPhoto(names, d, *point)) continue;
+      if (point->text.find_first_of(":+") != std::string::npos) {
         throw UsageError(fmt::format(
             "--distance {}: expected two photos, as left01,right01=12cm, found '{}'; points of "
             "pictures are for dtr calibrate scale, of a finished set",
             d.text, point->text));
       }
-      if (FindPhoto(names, point->text)) continue;
       throw UsageError(fmt::format("--distance {}: no photo is named '{}'; {} has {} ... ({})",
                                    d.text, point->text, whose, names.empty() ? "" : names.front(),
                                    names.size()));
     }
-    if (FindPhoto(names, d.a.text) == FindPhoto(names, d.b.text)) {
+    if (FindPhoto(names, d, d.a) == FindPhoto(names, d, d.b)) {
       throw UsageError(
           fmt::format("--distance {}: expected two photos, found '{}' twice", d.text, d.a.text));
     }
@@ -143,11 +177,26 @@ void RequireCameras(const MetreOptions& options, const std::vector<std::string>&
 }
 
 void RequireMetres(const MetreOptions& options, const capture::Capture& photos,
-                   const std::string& where) {
-  std::vector<std::string> names;
-  for (const capture::Photo& photo : photos.photos) names.push_back(photo.name);
+                   const std::string& where, const std::vector<bool>& held_back) {
+  std::vector<std::string> names, adjusted;
+  for (const capture::Photo& photo : photos.photos) {
+    if (held_back.empty() || !held_back[names.size()]) adjusted.push_back(photo.name);
+    names.push_back(photo.name);
+  }
   RequireCameras(options, names, where);
-  if (options.gps) RequirePlaces(PhotoPlacesOf(photos, names), where, "the folder");
+  for (const ScaleDistance& d : options.distances) {
+    for (const ScalePoint* end : {&d.a, &d.b}) {
+      const std::string& name = names[*FindPhoto(names, d, *end)];
+      if (std::find(adjusted.begin(), adjusted.end(), name) != adjusted.end()) continue;
+      throw UsageError(fmt::format(
+          "--distance {}: expected photos that take part in bundle adjustment, found {}, which "
+          "--holdout-strict keeps out of it; name others, or leave out --holdout-strict",
+          d.text, name));
+    }
+  }
+  if (!options.gps) return;
+  RequirePlaces(PhotoPlacesOf(photos, adjusted), where,
+                adjusted.size() == names.size() ? "the folder" : "those not held out strictly");
 }
 
 std::string ToJson(const MetreOptions& options) {
@@ -162,14 +211,10 @@ std::string ToJson(const MetreOptions& options) {
 }
 
 RefinedInMetres RefineInMetres(const calib::SfmModel& model, const MetreOptions& options,
-                               const PhotoPlaces& places, const calib::RefineOptions& refine,
-                               const std::string& determined) {
+                               const PhotoPlaces& places, const calib::RefineOptions& refine) {
   const calib::KnownMetres known = KnownOf(model, options, places);
   RefinedInMetres out;
   out.start = calib::StartInMetres(model, known, refine);
-  if (!determined.empty()) {
-    calib::RequireDetermined(out.start.model, out.start.options, determined);
-  }
   out.refined = calib::RefineInMetres(known, out.start);
   const calib::MetricReport& report = out.start.report;
   Json scale = {{"metres_per_unit", report.metres_per_unit},

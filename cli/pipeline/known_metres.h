@@ -33,24 +33,25 @@ struct RefinedInMetres {
   std::string scale_json;          ///< as `dtr calibrate scale` keeps it in a set's provenance
 };
 
-/// Throws UsageError where a distance is not between two of these photos, by names: pixels of
-/// pictures are for `dtr calibrate scale`, of a finished set. `whose`: "the model".
+/// Throws UsageError where a distance is not between two of these photos, by names, or an extension
+/// is needed to tell photos apart: pixels of pictures are for `dtr calibrate scale`, of a finished
+/// set. `whose`: "the model".
 void RequireCameras(const MetreOptions& options, const std::vector<std::string>& names,
                     const std::string& whose);
 
-/// Refuses before any work what cannot be had of these photos: RequireCameras, and with --gps too
-/// few that say where they were taken. `where`: their folder.
+/// Refuses before any work what cannot be had of these photos: RequireCameras, a distance to a
+/// photo with `held_back[i]` (empty: none), which will be no part of the model, and with --gps too
+/// few of the others that say where they were taken. `where`: their folder.
 void RequireMetres(const MetreOptions& options, const capture::Capture& photos,
-                   const std::string& where);
+                   const std::string& where, const std::vector<bool>& held_back = {});
 
 /// JSON object: what can change a result.
 std::string ToJson(const MetreOptions& options);
 
 /// Refines `model` as StartInMetres and RefineInMetres do. `places` may be empty where
 /// options.gps is not set. Throws Error as they do, and where a distance names a photo without a
-/// camera; `determined`, where given, names the model for RequireDetermined, which is asked before.
+/// camera.
 RefinedInMetres RefineInMetres(const calib::SfmModel& model, const MetreOptions& options,
-                               const PhotoPlaces& places, const calib::RefineOptions& refine,
-                               const std::string& determined = "");
+                               const PhotoPlaces& places, const calib::RefineOptions& refine);
 
 }  // namespace dtr::pipeline

@@ -126,12 +126,41 @@ TEST_F(BuildInMetres, ADistanceBetweenCamerasIsHeldByCalibratePhotos) {
   EXPECT_NEAR(apart(2, 4), Metres(2, 4), 0.01 * Metres(2, 4));
 }
 
+// Photos that structure from motion finds no camera for hold nothing.
+TEST_F(BuildInMetres, TooFewCamerasForWhatIsKnownAreRefused) {
+  calib::SfmModel model = colmap::ReadModel(colmap_ / "model.0");
+  model.images.resize(3);
+  std::erase_if(model.points, [&](const auto& item) {
+    return std::none_of(model.images.begin(), model.images.end(), [&](const auto& image) {
+      return std::any_of(image.features.begin(), image.features.end(),
+                         [&](const auto& feature) { return feature.point_id == item.first; });
+    });
+  });
+  fs::remove_all(colmap_ / "model.0");
+  colmap::WriteModel(colmap_ / "model.0", model, colmap::Format::kBinary);
+  ExpectRefused(Build({"--gps"}), kFailed,
+                "--gps: expected at least 4 photos of those with a camera with latitude, longitude "
+                "and altitude, found 3");
+  fs::remove_all(folder_ / "set.dtr.partial");
+  ExpectRefused(Build({"--distance", "0000,0006=1m"}), kFailed,
+                "--distance 0000,0006=1m: expected two photos that have a camera, found none of "
+                "0006");
+}
+
 TEST_F(BuildInMetres, WhatCannotBeHeldIsRefusedBeforeAnyWork) {
   ExpectRefused(Build({"--gps", "--no-refine"}), kWrongUsage,
                 "--gps, --distance: are held by the bundle adjustment of what SfM finds; expected "
                 "no --poses, --rig or --no-refine beside them");
   ExpectRefused(Build({"--distance", "0000,nobody=1m"}), kWrongUsage,
                 "--distance 0000,nobody=1m: no photo is named 'nobody'");
+  ExpectRefused(
+      Build({"--distance", "0000,0006=1m", "--holdout", "every:3", "--holdout-strict"}),
+      kWrongUsage,
+      "--distance 0000,0006=1m: expected photos that take part in bundle adjustment, found "
+      "0000.jpg, which --holdout-strict keeps out of it");
+  ExpectRefused(Build({"--gps", "--holdout", "0000,0001,0002,0003", "--holdout-strict"}), kFailed,
+                "expected at least 4 photos of those not held out strictly with latitude, "
+                "longitude and altitude, found 3");
   for (const CourtyardPhoto& photo : photos_) fs::remove(folder_ / "photos" / photo.name);
   fs::copy(folder_ / "plain", folder_ / "photos", fs::copy_options::recursive);
   ExpectRefused(Build({"--gps"}), kFailed,

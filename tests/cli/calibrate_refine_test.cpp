@@ -5,8 +5,10 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <numbers>
 
 #include "calib/colmap/model_io.h"
+#include "cli/pipeline/known_metres.h"
 #include "tests/calib/bundle/synthetic_bundle.h"
 #include "tests/cli/gps_photo.h"
 #include "tests/cli/run_dtr.h"
@@ -45,6 +47,35 @@ TEST(CalibrateRefine, DegenerateModelsAreRefusedByName) {
 
 using Json = nlohmann::json;
 using ::testing::HasSubstr;
+
+// Errors of heavy tails: many observations lie at the limit of what is an outlier.
+TEST(CalibrateRefine, OutliersThatDoNotSettleAreTold) {
+  const TemporaryFolder folder;
+  calib::Bundle bundle = bundle::MakeBundle({.images = 8, .points = 600, .lens = kLens});
+  Random random(7);
+  for (calib::BundleObservation& sight : bundle.observations) {
+    const double x = random.Normal(), y = random.Normal();
+    sight.pixel += 0.3 * Eigen::Vector2d(x, y) / std::abs(random.Normal());
+  }
+  const calib::SfmModel model = ModelFrom(bundle);
+  colmap::WriteModel(folder / "model", model, colmap::Format::kBinary);
+  // With a distance the result is taken whether or not it is better.
+  const double length_m = (model.images[0].cam_from_world.TargetOriginInSource() -
+                           model.images[7].cam_from_world.TargetOriginInSource())
+                              .norm();
+  const Ran ran =
+      Dtr({"calibrate", "refine", (folder / "model").string(), "-o", (folder / "out").string(),
+           "--distance", fmt::format("image100,image107={}m+-5cm", length_m), "--json",
+           (folder / "told.json").string()});
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  const Json json = Json::parse(Text(folder / "told.json"));
+  ASSERT_EQ(json["refined"], true) << json;
+  ASSERT_GT(json["unsettled_sights"], 0) << "settled: the test tells nothing";
+  EXPECT_THAT(ran.out, HasSubstr(fmt::format(
+                           "which observations are outliers did not settle: {} of "
+                           "{} would change with another solve",
+                           json["unsettled_sights"].get<int>(), bundle.observations.size())));
+}
 
 constexpr double kUnit = 2.5;  // metres that a unit of the model is
 
@@ -155,10 +186,99 @@ TEST_F(RefineToPlaces, ADistanceSetsTheUnit) {
   EXPECT_NEAR(Found(2, 5), Metres(2, 5), 0.01 * Metres(2, 5));
 }
 
+// Places that err by more than tells the scale: a distance does, and they turn and shift the whole.
+TEST_F(RefineToPlaces, VaguePlacesAreHeldBesideADistanceAndNotWithoutOne) {
+  Random random(11);
+  for (size_t i = 0; i < centres_.size(); ++i) {
+    const double x = random.Normal(), y = random.Normal();
+    WritePhotoAt(folder_ / fmt::format("photos/image{}.jpg", 100 + i),
+                 centres_[i] + 1.5 * Eigen::Vector3d(x, y, random.Normal()));
+  }
+  ExpectRefused(Refine({"--gps", In("photos")}), kFailed,
+                "scale: expected a scale known to 10 %, found one to ");
+  const Ran ran =
+      Refine({"--gps", In("photos"), "--distance",
+              fmt::format("image100,image107={:.9g}m", Metres(0, 7)), "--json", In("told.json")});
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("it is that of the distances"));
+  EXPECT_THAT(ran.out, HasSubstr("the places err too much for cameras that stand so near to each "
+                                 "other: the turn, and with it what is north and up, is known to"));
+  const Json scale = Json::parse(Text(In("told.json")))["scale"];
+  EXPECT_EQ(scale["places_tell_scale"], false);
+  EXPECT_GT(scale["places_relative_sigma"], 0.1);
+  EXPECT_NEAR(scale["relative_sigma"], 1e-3, 1e-4);
+  EXPECT_NEAR(Found(2, 5), Metres(2, 5), 0.01 * Metres(2, 5));
+  // The axes are those of the Earth as far as such places tell them.
+  const auto images = colmap::ReadModel(In("out")).images;
+  const double turn_rad = scale["turn_sigma_deg"].get<double>() * std::numbers::pi / 180;
+  for (size_t i = 1; i < images.size(); ++i) {
+    const Eigen::Vector3d way = images[i].cam_from_world.TargetOriginInSource() -
+                                images[0].cam_from_world.TargetOriginInSource();
+    EXPECT_LT((way - (centres_[i] - centres_[0])).norm(), 3 * turn_rad * way.norm()) << i;
+  }
+}
+
+TEST_F(RefineToPlaces, PlacesThatTellNothingAreRefused) {
+  for (size_t i = 5; i < centres_.size(); ++i) {
+    std::filesystem::remove(folder_ / fmt::format("photos/image{}.jpg", 100 + i));
+  }
+  // Two that claim to err by millimetres, and err by decimetres.
+  for (size_t i = 0; i < 5; ++i) {
+    const Eigen::Vector3d off = i < 3 ? Eigen::Vector3d(0, 0, 0) : Eigen::Vector3d(0.2, 0.2, 0);
+    WritePhotoAt(folder_ / fmt::format("photos/image{}.jpg", 100 + i), centres_[i] + off,
+                 i < 3 ? 0.3 : 0.003);
+  }
+  ExpectRefused(Refine({"--gps", In("photos")}), kFailed,
+                "GPS: expected positions that agree with the cameras, found that 3 of 5 do");
+  for (size_t i = 0; i < 5; ++i) {
+    WritePhotoAt(folder_ / fmt::format("photos/image{}.jpg", 100 + i), {20, 30, 0});
+  }
+  ExpectRefused(Refine({"--gps", In("photos")}), kFailed,
+                "alignment: expected points that are not on one line, found the second set in one "
+                "point; the turn about it is unknown: use more points");
+}
+
+// EXIF says a radius, of which 68 % is taken to lie within.
+TEST_F(RefineToPlaces, TheErrorThatExifSaysIsARadius) {
+  for (size_t i = 0; i < centres_.size(); ++i) {
+    WritePhotoAt(folder_ / fmt::format("photos/image{}.jpg", 100 + i), centres_[i], 0.3);
+  }
+  const calib::SfmModel model = colmap::ReadModel(In("model"));
+  pipeline::MetreOptions options;
+  options.gps = true;
+  const auto refined = pipeline::RefineInMetres(
+      model, options, pipeline::ReadPhotoPlaces(folder_ / "photos", calib::ImageNames(model)), {});
+  ASSERT_EQ(refined.start.options.positions.size(), centres_.size());
+  for (const calib::PositionPrior& p : refined.start.options.positions) {
+    EXPECT_NEAR(p.sigma.x(), 0.3 / 1.50959, 1e-4);
+    EXPECT_EQ(p.sigma.y(), p.sigma.x());
+  }
+}
+
+TEST_F(RefineToPlaces, AWordThatTwoPhotosMayBeMeantByIsRefused) {
+  calib::SfmModel model = colmap::ReadModel(In("model"));
+  model.images[5].name = "image104.png";
+  std::filesystem::remove_all(In("model"));
+  colmap::WriteModel(In("model"), model, colmap::Format::kBinary);
+  ExpectRefused(Refine({"--distance", "image100,image104=5m"}), kWrongUsage,
+                "--distance image100,image104=5m: 'image104' may be image104.jpg or image104.png; "
+                "name the photo with its extension");
+  const auto distance = fmt::format("image100,image104.png={:.9g}m", Metres(0, 5));
+  const Ran ran = Refine({"--distance", distance});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+}
+
 TEST_F(RefineToPlaces, WhatCannotBeHeldIsRefused) {
   const auto distance = [&](const std::string& text) { return Refine({"--distance", text}); };
   ExpectRefused(distance("image100:1:2,image101=5m"), kWrongUsage,
                 "expected two photos, as left01,right01=12cm, found 'image100:1:2'");
+  ExpectRefused(distance("image100:x:2,image101=5m"), kWrongUsage,
+                "expected two photos, as left01,right01=12cm, found 'image100:x:2'");
+  ExpectRefused(distance("image100,image101=5"), kWrongUsage,
+                "no length is '5'; expected A,B=LENGTH, as left01,right01=12cm: A and B each a "
+                "photo, whose camera is meant, LENGTH in mm, cm or m");
+  ExpectRefused(Refine({"--gps", In("photos"), "--gps-sigma", ""}), kWrongUsage,
+                "--gps-sigma : expected metres above 0, as 3 or 3,6 (on the map, in height)");
   ExpectRefused(distance("nobody,image101=5m"), kWrongUsage, "no photo is named 'nobody'");
   ExpectRefused(distance("image100,image100=5m"), kWrongUsage,
                 "expected two photos, found 'image100' twice");

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "dtr/base/files.h"
 #include "dtr/io/set_io.h"
 #include "tests/cli/run_dtr.h"
 #include "tests/cli/small_courtyard.h"
@@ -120,6 +121,17 @@ TEST_F(CalibrateScale, InPlaceTheSetIsReplaced) {
       {"--distance", fmt::format("{},{}={:.17g}m", views[0].id, views[5].id, Metres(set, 0, 5))});
   ASSERT_EQ(ran.code, 0) << ran.err;
   ExpectScaled(folder_ / "old.dtr", folder_ / "small.dtr", kUnit);
+}
+
+TEST_F(CalibrateScale, AViewThatOnlyItsExtensionTellsIsNamedInFull) {
+  Json set = Json::parse(Text(folder_ / "small.dtr/set.json"));
+  Json& views = set["frames"][0]["views"];
+  views[1]["name"] = "a/IMG.jpg";
+  views[2]["name"] = "a/IMG.png";
+  WriteFileAtomically(folder_ / "small.dtr/set.json", set.dump());
+  ExpectRefused(Scale({"--distance", "a/IMG,0005=5m"}), kWrongUsage,
+                "'a/IMG' may be a/IMG.jpg or a/IMG.png; name the photo with its extension");
+  EXPECT_EQ(Scale({"--distance", "a/IMG.png,0005=5m"}).code, 0);
 }
 
 TEST_F(CalibrateScale, WhatSaysNothingIsRefused) {
