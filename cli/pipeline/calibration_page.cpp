@@ -63,9 +63,10 @@ void AddWorstViews(report::HtmlReport& page, const calib::LensCamera& lens,
         behind.clear();  // drawn without its photo
       }
     }
-    page.Svg(fmt::format("{}: RMS {:.3f} px, worst {:.3f} px, {} corners, {} outliers; residuals "
+    page.Svg(fmt::format("{}: RMS {:.3f} px, worst {:.3f} px, {} corners, {} outlier{}; residuals "
                          "{:.0f} times as long",
-                         view.name, view.rms_px, view.worst_px, view.corners, view.outliers, gain),
+                         view.name, view.rms_px, view.worst_px, view.corners, view.outliers,
+                         view.outliers == 1 ? "" : "s", gain),
              ImagePlot(size, behind + Arrows(size, view.arrows, gain)));
   }
 }

@@ -28,12 +28,13 @@ class Shade {
     by_logarithm_ = least_ > 0 && largest_ > kWideSpan * least_;
   }
   double least() const { return least_; }
+  /// What is drawn darkest, with all that is less.
+  double darkest() const { return by_logarithm_ ? std::max(least_, largest_ / kWidestSpan) : 0; }
   double largest() const { return largest_; }
   bool by_logarithm() const { return by_logarithm_; }
   double Of(double value) const {
     if (by_logarithm_) {
-      const double darkest = std::max(least_, largest_ / kWidestSpan);
-      return std::max(0.0, std::log(value / darkest) / std::log(largest_ / darkest));
+      return std::max(0.0, std::log(value / darkest()) / std::log(largest_ / darkest()));
     }
     return largest_ > 0 ? value / largest_ : 0;
   }
@@ -107,8 +108,14 @@ void AddMap(report::HtmlReport& page, const std::string& what, const std::string
           column * w, row * h, w + 0.5, h + 0.5, color[0], color[1], color[2]);
     }
   }
-  page.Svg(fmt::format("{}: {:.3g}{} (dark) to {:.3g}{} (bright){}, median {:.3g}{}{}", what,
-                       shade.least(), unit, shade.largest(), unit,
+  const std::string least =
+      shade.darkest() == shade.least()
+          ? ""
+          : fmt::format("{}; the least is {:.3g}{}",
+                        shade.darkest() > shade.least() ? " with all below" : "", shade.least(),
+                        unit);
+  page.Svg(fmt::format("{}: {:.3g}{} (dark{}) to {:.3g}{} (bright){}, median {:.3g}{}{}", what,
+                       shade.darkest(), unit, least, shade.largest(), unit,
                        shade.by_logarithm() ? ", by the logarithm" : "", map.Median(), unit,
                        blank ? "; blank: unknown" : ""),
            ImagePlot(size, body));

@@ -3,6 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "cli/pipeline/residual_plots.h"
 #include "tests/cli/run_dtr.h"
 #include "tests/cli/small_courtyard.h"
 #include "tests/support/test_data.h"
@@ -92,6 +93,21 @@ TEST_F(ValidateReport, DepthIsHeldAgainstTheNeighboursDepthAndItsLimitIsAnOption
 TEST_F(ValidateReport, APageThatCannotBeWrittenIsRefusedBeforeAnyWork) {
   ExpectRefused(Dtr({"validate", In("set.dtr"), "--report", In("page.txt")}), kWrongUsage,
                 "expected a name ending in .html, found '.txt'");
+}
+
+// What is darkest is told, and what is the least where that is another.
+TEST(AddMap, TheCaptionSaysWhatTheColoursMean) {
+  const auto caption = [](const std::vector<double>& values) {
+    report::HtmlReport page("map");
+    pipeline::AddMap(page, "Error", " px", {640, 480},
+                     {static_cast<int>(values.size()), 1, values});
+    return page.Finish();
+  };
+  EXPECT_THAT(caption({2, 3, 4}),
+              HasSubstr("Error: 0 px (dark; the least is 2 px) to 4 px (bright),"));
+  EXPECT_THAT(caption({2, 30, 60}), HasSubstr("Error: 2 px (dark) to 60 px (bright), by the"));
+  EXPECT_THAT(caption({0.01, 30, 600}),
+              HasSubstr("Error: 0.6 px (dark with all below; the least is 0.01 px) to 600 px"));
 }
 
 }  // namespace
