@@ -10,6 +10,7 @@
 #include "dtr/base/random.h"
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
+#include "tests/calib/bundle/synthetic_bundle.h"
 #include "tests/calib/colmap/fake_colmap.h"
 #include "tests/cli/gps_photo.h"
 #include "tests/cli/run_dtr.h"
@@ -22,6 +23,7 @@ namespace fs = std::filesystem;
 using Json = nlohmann::json;
 using ::testing::HasSubstr;
 using ::testing::IsSupersetOf;
+using ::testing::Not;
 
 constexpr double kUnit = 0.31;     // scene units, which are metres, per unit of the model
 constexpr double kNoisePx = 0.2;   // of the features
@@ -145,6 +147,40 @@ TEST_F(BuildInMetres, TooFewCamerasForWhatIsKnownAreRefused) {
   ExpectRefused(Build({"--distance", "0000,0006=1m"}), kFailed,
                 "--distance 0000,0006=1m: expected two photos that have a camera, found none of "
                 "0006");
+}
+
+// A wall faced squarely by a lens that nobody knows: with places or without, `calibrate photos`
+// asks as `calibrate refine` does, before anything is refined.
+TEST_F(BuildInMetres, PhotosThatDoNotDetermineTheirCamerasAreRefusedBeforeTheyAreRefined) {
+  const calib::LensCamera lens{calib::LensModel::kPinhole, 192, 128, {150, 150, 96, 64}};
+  bundle::SceneSpec spec{.images = kPhotos, .points = 400, .lens = lens, .noise_px = 0.1};
+  spec.pose = [](int i, int) {
+    const Eigen::Vector3d centre(0.5 * (i % 3) - 0.5, -6, 0.5 * (i / 3));
+    return bundle::LookAt(centre, centre + Eigen::Vector3d::UnitY());
+  };
+  spec.point = [](Random& random) {
+    const double x = random.Uniform(-2, 2);
+    return Eigen::Vector3d(x, 0, random.Uniform(-1.5, 1.5));
+  };
+  calib::SfmModel model = ModelFrom(bundle::MakeBundle(spec));
+  for (size_t i = 0; i < model.images.size(); ++i) {
+    const std::string name = fmt::format("{:04}.jpg", i);
+    WritePhotoAt(folder_ / "photos" / name,
+                 model.images[i].cam_from_world.TargetOriginInSource() + Eigen::Vector3d(25, 25, 0),
+                 {}, io::ReadImage(folder_ / "plain" / name));
+    model.images[i].name = fmt::format("{:06}.jpg", i);
+  }
+  fs::remove_all(colmap_ / "model.0");
+  colmap::WriteModel(colmap_ / "model.0", model, colmap::Format::kBinary);
+  for (const std::vector<std::string>& how :
+       {std::vector<std::string>{}, {"--gps"}, {"--no-refine"}}) {
+    std::vector<std::string> words{"calibrate", "photos", In("photos"), "-o", In("model")};
+    words.insert(words.end(), how.begin(), how.end());
+    const Ran ran = Dtr(words);
+    ExpectRefused(ran, kFailed, "planar_scene: the points lie in a plane");
+    EXPECT_THAT(ran.err, Not(HasSubstr("positions:"))) << "refined already";
+    EXPECT_FALSE(fs::exists(folder_ / "model/cameras.bin"));
+  }
 }
 
 TEST_F(BuildInMetres, WhatCannotBeHeldIsRefusedBeforeAnyWork) {
