@@ -14,8 +14,7 @@
 namespace dtr::calib {
 namespace {
 
-constexpr int kMostPoints = 4000;  // that decide which places agree
-constexpr int kMostPasses = 10;
+constexpr int kMostPoints = 4000;      // that decide which places agree
 constexpr double kSettled = 0.05;      // relative change of a standard deviation
 constexpr double kLeastSigmaM = 1e-3;  // nobody knows a place on Earth better
 constexpr double kMostOff = 5;         // standard deviations of a distance
@@ -220,7 +219,7 @@ Similarity FromPlaces(const SfmModel& model, const KnownMetres& known, Held& hel
 // Turns and shifts the model to places that tell no more: held, they would bend nothing that photos
 // tell, and a solve finds a turn that is worth no more than theirs in very many steps.
 Held TurnToPlaces(const KnownMetres& known, Held held, MetricStart& start) {
-  for (int pass = 0; pass < kMostPasses; ++pass) {
+  for (int pass = 0; pass < known.most_passes; ++pass) {
     const Held next = Judged(known, Misses(known, start.model), held, nullptr);
     RequireEnough(next);
     start.report.passes = pass + 1;
@@ -260,7 +259,7 @@ void SettlePlaces(const KnownMetres& known, MetricStart& start, Held held) {
   Bundle bundle = some;
   const bool placed = !known.places.empty() && start.report.places_tell_scale;
   if (placed) held = Judged(known, Misses(known, bundle), held, nullptr);
-  for (int pass = 0; pass < kMostPasses; ++pass) {
+  for (int pass = 0; pass < known.most_passes; ++pass) {
     if (placed) RequireEnough(held);
     adjust.positions = PositionsOf(known, held);
     const Adjusted adjusted = Adjust(bundle, adjust);
@@ -275,7 +274,7 @@ void SettlePlaces(const KnownMetres& known, MetricStart& start, Held held) {
       start.report.passes = pass + 1;
       start.report.settled = settled;
     }
-    if (settled || pass + 1 == kMostPasses) {
+    if (settled || pass + 1 == known.most_passes) {
       RequireNoContradiction(adjusted, free);
       break;
     }

@@ -28,6 +28,8 @@ struct KnownDistance {
 struct KnownMetres {
   std::vector<KnownPlace> places;
   std::vector<KnownDistance> distances;
+  /// Rounds after which it is given up that places settle (MetricReport::settled).
+  int most_passes = 10;
 };
 
 /// What holding it did.

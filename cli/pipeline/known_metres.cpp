@@ -33,6 +33,7 @@ std::optional<size_t> FindPhoto(const std::vector<std::string>& names,
 calib::KnownMetres KnownOf(const calib::SfmModel& model, const MetreOptions& options,
                            const PhotoPlaces& places) {
   calib::KnownMetres known;
+  known.most_passes = options.most_passes;
   std::map<std::string, int> image_of;
   for (const calib::SfmImage& image : model.images) {
     image_of.emplace(image.name, static_cast<int>(image_of.size()));

@@ -20,6 +20,7 @@ struct MetreOptions {
   bool gps = false;
   std::optional<GpsSigma> gps_sigma;
   std::vector<ScaleDistance> distances;  ///< between cameras, called as their photos are
+  int most_passes = calib::KnownMetres().most_passes;
 
   bool any() const { return gps || !distances.empty(); }
 };

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -253,6 +254,28 @@ TEST_F(RefineToPlaces, TheErrorThatExifSaysIsARadius) {
     EXPECT_NEAR(p.sigma.x(), 0.3 / 1.50959, 1e-4);
     EXPECT_EQ(p.sigma.y(), p.sigma.x());
   }
+}
+
+TEST_F(RefineToPlaces, PlacesThatDoNotSettleAreTold) {
+  pipeline::MetreOptions options;
+  options.gps = true;
+  const calib::SfmModel model = colmap::ReadModel(In("model"));
+  const auto places = pipeline::ReadPhotoPlaces(folder_ / "photos", calib::ImageNames(model));
+  const auto told = [&](int most_passes) {
+    options.most_passes = most_passes;
+    const auto refined = pipeline::RefineInMetres(model, options, places, {});
+    const Json scale = Json::parse(refined.scale_json);
+    EXPECT_LE(scale["passes"], most_passes);
+    const std::string line = fmt::format(
+        "which places agree, and how far they err, did not settle in {} passes; give --gps-sigma "
+        "where you know it",
+        most_passes);
+    const auto& lines = refined.lines;
+    EXPECT_EQ(std::find(lines.begin(), lines.end(), line) != lines.end(), !scale["settled"]);
+    return scale["settled"].get<bool>();
+  };
+  EXPECT_TRUE(told(10));
+  EXPECT_FALSE(told(1)) << "settled at once: the test tells nothing";
 }
 
 TEST_F(RefineToPlaces, AWordThatTwoPhotosMayBeMeantByIsRefused) {
