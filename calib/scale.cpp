@@ -167,7 +167,8 @@ PositionScale AlignToPositions(std::span<const Eigen::Vector3d> centres,
   }
   scale.rms_m = AlignmentRms(scale.metric_from_scene, a, b);
   const double freedom = 3.0 * static_cast<double>(a.size()) - (known_scale ? 6 : 7);
-  FillUncertainty(a, scale.rms_m * std::sqrt(static_cast<double>(a.size()) / freedom), scale);
+  scale.sigma_m = scale.rms_m * std::sqrt(static_cast<double>(a.size()) / freedom);
+  FillUncertainty(a, scale.sigma_m, scale);
   return scale;
 }
 

@@ -63,6 +63,7 @@ struct PositionScale {
   double relative_sigma = 0;     ///< of its scale
   double turn_sigma_rad = 0;     ///< of its rotation, about the axis known worst
   double rms_m = 0;              ///< distances of the positions that were used
+  double sigma_m = 0;            ///< of a coordinate of theirs, what the fit takes up counted
   std::vector<size_t> left_out;  ///< positions that do not agree with the others
   bool settled = true;  ///< false: of which positions agree, the last pass had it otherwise
 };

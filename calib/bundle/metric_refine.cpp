@@ -205,7 +205,9 @@ Similarity FromPlaces(const SfmModel& model, const KnownMetres& known, Held& hel
   const Pairs pairs = PairsOf(model, known, std::vector<bool>(known.places.size(), true));
   PositionScale placed = AlignToPositions(pairs.centres, pairs.positions_m);
   if (known.distances.empty()) RequireKnownScale(placed);
-  FillUncertainty(pairs.centres, ErrorOf(known, placed.rms_m / std::sqrt(3)), placed);
+  std::vector<bool> agree(known.places.size(), true);
+  for (const size_t i : placed.left_out) agree[i] = false;
+  FillUncertainty(PairsOf(model, known, agree).centres, ErrorOf(known, placed.sigma_m), placed);
   RequireAgreement(model, known, placed);
   report.places_tell_scale = known.distances.empty() || placed.relative_sigma <= kMostRelativeSigma;
   if (!report.places_tell_scale) {

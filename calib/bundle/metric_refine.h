@@ -58,8 +58,8 @@ struct MetricReport {
 struct MetricStart {
   SfmModel model;         ///< carried there as a whole
   RefineOptions options;  ///< with positions and distances
-  std::vector<PositionPrior>
-      places;           ///< that agree; options.positions unless they do not tell scale
+  /// The places that agree: options.positions, too, unless they do not tell the scale.
+  std::vector<PositionPrior> places;
   MetricReport report;  ///< what is known of the start
 };
 

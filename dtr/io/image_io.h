@@ -14,7 +14,7 @@ struct GpsPosition {
   double latitude_deg = 0;           ///< north positive
   double longitude_deg = 0;          ///< east positive
   std::optional<double> altitude_m;  ///< above sea level
-  /// How far off the place may be on the map (EXIF GPSHPositioningError), where the file says it.
+  /// Radius that the place is known to on the map (EXIF GPSHPositioningError), where it is said.
   std::optional<double> horizontal_error_m = std::nullopt;
 };
 

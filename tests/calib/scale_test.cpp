@@ -173,8 +173,8 @@ TEST(AlignToPositions, PositionsThatTakeTurnsToAgreeAreTold) {
   std::vector<Eigen::Vector3d> centres, positions;
   for (int i = 0; i < 8; ++i) {
     centres.push_back(Draw(random));
-    const Eigen::Vector3d error = 0.03 * Draw(random);
-    positions.push_back(centres.back() + error / std::abs(random.Normal()));
+    const double tail = std::abs(random.Normal());
+    positions.push_back(centres.back() + 0.03 * Draw(random) / tail);
   }
   const PositionScale scale = AlignToPositions(centres, positions);
   EXPECT_FALSE(scale.settled);

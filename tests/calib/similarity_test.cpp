@@ -30,6 +30,31 @@ Points Mapped(const Similarity& b_from_a, const Points& points) {
   return mapped;
 }
 
+TEST(TurnAndShift, FindsARigidMotionAndWeighsEachCoordinate) {
+  const Similarity truth{1, Eigen::Quaterniond(0.98, 0.1, -0.15, 0.05).normalized(), {0.3, -2, 5}};
+  std::vector<Eigen::Vector3d> a = {{1, 2, 3}, {-2, 0, 1}, {0, 4, -1}, {3, -1, 2}, {-1, -3, 0}}, b;
+  for (const Eigen::Vector3d& p : a) b.push_back(truth * p);
+  std::vector<Eigen::Vector3d> sigmas(a.size(), {1, 2, 3});
+  b[1].y() += 50;
+  sigmas[1].y() = 1e9;  // nobody knows it
+  const Similarity found = TurnAndShift(a, b, sigmas);
+  constexpr double kExact = 1e-6;  // what 50 / 1e9 of a coordinate that is all but ignored leaves
+  EXPECT_LT(found.rotation.angularDistance(truth.rotation), kExact);
+  EXPECT_LT((found.translation - truth.translation).norm(), 10 * kExact);
+  EXPECT_EQ(found.scale, 1);
+}
+
+TEST(AlignPointsAtScale, TurnsAndShiftsAndKeepsTheScale) {
+  const Similarity truth{2, Eigen::Quaterniond(0.5, -0.5, 0.5, 0.5), {1, 2, 3}};
+  std::vector<Eigen::Vector3d> a = {{1, 2, 3}, {-2, 0, 1}, {0, 4, -1}, {3, -1, 2}}, b;
+  for (const Eigen::Vector3d& p : a) b.push_back(truth * p);
+  const Similarity found = AlignPointsAtScale(a, b, 3);
+  EXPECT_EQ(found.scale, 3);
+  EXPECT_LT(found.rotation.angularDistance(truth.rotation), 1e-9);
+  const Eigen::Vector3d middle(0.5, 1.25, 1.25);
+  EXPECT_LT((found * middle - truth * middle).norm(), 1e-9);
+}
+
 TEST(Similarity, HandWorkedPointAndInverse) {
   const Similarity b_from_a{
       2,
