@@ -15,6 +15,7 @@ namespace {
 
 constexpr double kMostDisagreement = 5;  // sigmas
 constexpr int kMostPasses = 20;
+constexpr double kNothing = 1e-12;  // share of what is known best: rounding
 
 double RelativeSigma(const MeasuredDistance& d) {
   const Eigen::Vector3d way = d.b - d.a;
@@ -31,21 +32,47 @@ Eigen::Vector3d MeanOf(std::span<const Eigen::Vector3d> points) {
   return mean;
 }
 
+double RmsFromMean(std::span<const Eigen::Vector3d> points) {
+  const Eigen::Vector3d mean = MeanOf(points);
+  double squares = 0;
+  for (const Eigen::Vector3d& p : points) squares += (p - mean).squaredNorm();
+  return std::sqrt(squares / static_cast<double>(points.size()));
+}
+
 }  // namespace
 
-void FillUncertainty(std::span<const Eigen::Vector3d> centres, double sigma_m,
-                     PositionScale& scale) {
+void FillUncertainty(std::span<const Eigen::Vector3d> centres,
+                     std::span<const Eigen::Vector3d> sigmas_m, PositionScale& scale) {
   const Eigen::Vector3d mean = MeanOf(centres);
-  double squares = 0;
-  Eigen::Matrix3d about_axes = Eigen::Matrix3d::Zero();
-  for (const Eigen::Vector3d& centre : centres) {
-    const Eigen::Vector3d arm = scale.metric_from_scene.scale * (centre - mean);
-    squares += arm.squaredNorm();
-    about_axes += arm.squaredNorm() * Eigen::Matrix3d::Identity() - arm * arm.transpose();
+  // Of a shift, a turn and the scale's logarithm.
+  Eigen::Matrix<double, 7, 7> information = Eigen::Matrix<double, 7, 7>::Zero();
+  for (size_t i = 0; i < centres.size(); ++i) {
+    const Eigen::Vector3d arm = scale.metric_from_scene.scale * (centres[i] - mean);
+    Eigen::Matrix<double, 3, 7> moved;
+    moved.leftCols<3>().setIdentity();
+    moved.middleCols<3>(3) << 0, arm.z(), -arm.y(), -arm.z(), 0, arm.x(), arm.y(), -arm.x(), 0;
+    moved.col(6) = arm;
+    const Eigen::Vector3d weights = sigmas_m[i].array().square().inverse();
+    information += moved.transpose() * weights.asDiagonal() * moved;
   }
-  scale.relative_sigma = sigma_m / std::sqrt(squares);
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(about_axes, Eigen::EigenvaluesOnly);
-  scale.turn_sigma_rad = sigma_m / std::sqrt(std::max(eigen.eigenvalues()[0], 0.0));
+  // What the shift takes up, then what the turn does: it may be unknown, which leaves the scale.
+  const Eigen::Matrix4d rest =
+      information.bottomRightCorner<4, 4>() -
+      information.bottomLeftCorner<4, 3>() *
+          information.topLeftCorner<3, 3>().ldlt().solve(information.topRightCorner<3, 4>());
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> turn(rest.topLeftCorner<3, 3>());
+  double known_scale = rest(3, 3);
+  for (int k = 0; k < 3; ++k) {
+    const double known = turn.eigenvalues()[k];
+    if (!(known > kNothing * turn.eigenvalues()[2])) continue;
+    known_scale -= std::pow(turn.eigenvectors().col(k).dot(rest.topRightCorner<3, 1>()), 2) / known;
+  }
+  scale.relative_sigma = 1 / std::sqrt(std::max(known_scale, 0.0));
+  // The turn where the scale is adjusted, too.
+  const Eigen::Vector3d both = rest.topRightCorner<3, 1>();
+  const Eigen::Matrix3d alone = rest.topLeftCorner<3, 3>() - both * both.transpose() / rest(3, 3);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> worst(alone, Eigen::EigenvaluesOnly);
+  scale.turn_sigma_rad = 1 / std::sqrt(std::max(worst.eigenvalues()[0], 0.0));
 }
 
 DistanceScale ScaleFromDistances(std::span<const MeasuredDistance> distances) {
@@ -156,9 +183,10 @@ PositionScale AlignToPositions(std::span<const Eigen::Vector3d> centres,
       lengths.push_back((scale.metric_from_scene * centres[i] - positions_m[i]).norm());
     }
     std::vector<double> sorted = lengths;
-    // A millionth of the extent: exact positions leave rounding alone.
+    // A millionth of the extent: exact positions leave rounding alone. Of the cameras' extent, for
+    // one place may lie on another continent.
     const double limit = kPositionOutlierSigmas * UpperMedian(sorted) / kMedianLength +
-                         1e-6 * (positions_m[0] - MeanOf(positions_m)).norm();
+                         1e-6 * scale.metric_from_scene.scale * RmsFromMean(a);
     for (size_t i = 0; i < lengths.size(); ++i) next[i] = lengths[i] <= limit;
     scale.settled = next == used;
   }
@@ -168,7 +196,11 @@ PositionScale AlignToPositions(std::span<const Eigen::Vector3d> centres,
   scale.rms_m = AlignmentRms(scale.metric_from_scene, a, b);
   const double freedom = 3.0 * static_cast<double>(a.size()) - (known_scale ? 6 : 7);
   scale.sigma_m = scale.rms_m * std::sqrt(static_cast<double>(a.size()) / freedom);
-  FillUncertainty(a, scale.sigma_m, scale);
+  // Positions that are met exactly are known to rounding.
+  const double sigma_m =
+      std::max(scale.sigma_m, kNothing * scale.metric_from_scene.scale * RmsFromMean(a));
+  const std::vector<Eigen::Vector3d> sigmas(a.size(), Eigen::Vector3d::Constant(sigma_m));
+  FillUncertainty(a, sigmas, scale);
   return scale;
 }
 

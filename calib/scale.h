@@ -68,10 +68,11 @@ struct PositionScale {
   bool settled = true;  ///< false: of which positions agree, the last pass had it otherwise
 };
 
-/// Fills in how well such a similarity is known where each coordinate of a position errs by
-/// `sigma_m`; `centres` as metric_from_scene takes them.
-void FillUncertainty(std::span<const Eigen::Vector3d> centres, double sigma_m,
-                     PositionScale& scale);
+/// Fills in how well such a similarity is known where the coordinates of position i err
+/// independently by `sigmas_m[i]`, metres > 0; `centres` as metric_from_scene takes them. By least
+/// squares: a vague place takes nothing from what exact ones tell. Infinite where nothing is told.
+void FillUncertainty(std::span<const Eigen::Vector3d> centres,
+                     std::span<const Eigen::Vector3d> sigmas_m, PositionScale& scale);
 
 /// The similarity that carries camera centres to the places where they are said to have been, with
 /// `known_scale` (metres per unit) where that is given. Positions more than kPositionOutlierSigmas

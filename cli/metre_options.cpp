@@ -109,7 +109,8 @@ pipeline::ScaleDistance DistanceFrom(const std::string& text, DistanceEnds ends)
 CLI::Option* AddGpsFlag(CLI::App& command, bool& gps) {
   return command.add_flag("--gps", gps,
                           "Hold the places that the photos' EXIF says they were taken at: cameras "
-                          "in metres east, north and up");
+                          "in metres east, north and up; places that do not tell the scale only "
+                          "turn and shift what --distance scales");
 }
 
 CLI::Option* AddMetreOptions(CLI::App& command, CLI::Option& gps, MetreWords& words) {
@@ -121,9 +122,10 @@ CLI::Option* AddMetreOptions(CLI::App& command, CLI::Option& gps, MetreWords& wo
       ->needs(&gps)
       ->type_name("M[,V]");
   return command
-      .add_option("--distance", words.distances,
-                  "A measured distance between the cameras of two photos, to be held; LENGTH as "
-                  "2.5m, or 2.5m+-5mm with its standard deviation; may be given more than once")
+      .add_option(
+          "--distance", words.distances,
+          "A measured distance between the cameras of photos A and B, to be held; LENGTH as "
+          "2.5m, or 2.5m+-5mm with its standard deviation; may be given more than once")
       ->type_name("A,B=LENGTH");
 }
 

@@ -189,14 +189,23 @@ void RequireAgreement(const SfmModel& model, const KnownMetres& known,
   }
 }
 
-// How far places err per coordinate: as they say, where they do, else as `found` says; never less.
-double ErrorOf(const KnownMetres& known, double found) {
-  double squares = 0;
-  for (const KnownPlace& place : known.places) {
-    squares += 2 * std::pow(std::max(found, place.sigma_flat_m), 2) +
-               std::pow(std::max(found, place.sigma_up_m), 2);
+// Heights by satellite err by more than places on the map. Where they do not say how far, no less
+// is believed of them, however well a few of them agree.
+Eigen::Vector3d Believed(const KnownPlace& place, Eigen::Vector3d sigma) {
+  if (!(place.sigma_up_m > 0)) sigma.z() = std::max(sigma.z(), sigma.x());
+  return sigma;
+}
+
+// How far the places that agree err: as they say, where they do, else as `found` says; never less.
+std::vector<Eigen::Vector3d> ErrorsOf(const KnownMetres& known, const std::vector<bool>& agree,
+                                      double found) {
+  std::vector<Eigen::Vector3d> sigmas;
+  for (size_t i = 0; i < agree.size(); ++i) {
+    const double flat = std::max({found, known.places[i].sigma_flat_m, kLeastSigmaM});
+    const double up = std::max({found, known.places[i].sigma_up_m, kLeastSigmaM});
+    if (agree[i]) sigmas.push_back(Believed(known.places[i], {flat, flat, up}));
   }
-  return std::sqrt(squares / (3 * static_cast<double>(known.places.size())));
+  return sigmas;
 }
 
 // The way into metres, and the places that agree with it.
@@ -207,7 +216,8 @@ Similarity FromPlaces(const SfmModel& model, const KnownMetres& known, Held& hel
   if (known.distances.empty()) RequireKnownScale(placed);
   std::vector<bool> agree(known.places.size(), true);
   for (const size_t i : placed.left_out) agree[i] = false;
-  FillUncertainty(PairsOf(model, known, agree).centres, ErrorOf(known, placed.sigma_m), placed);
+  FillUncertainty(PairsOf(model, known, agree).centres, ErrorsOf(known, agree, placed.sigma_m),
+                  placed);
   RequireAgreement(model, known, placed);
   report.places_tell_scale = known.distances.empty() || placed.relative_sigma <= kMostRelativeSigma;
   if (!report.places_tell_scale) {
@@ -263,7 +273,7 @@ void SettlePlaces(const KnownMetres& known, MetricStart& start, Held held) {
   if (placed) held = Judged(known, Misses(known, bundle), held, nullptr);
   for (int pass = 0; pass < known.most_passes; ++pass) {
     if (placed) RequireEnough(held);
-    adjust.positions = PositionsOf(known, held);
+    if (placed) adjust.positions = PositionsOf(known, held);
     const Adjusted adjusted = Adjust(bundle, adjust);
     bundle = adjusted.bundle;
     Held next = held;
@@ -292,6 +302,45 @@ void SettlePlaces(const KnownMetres& known, MetricStart& start, Held held) {
   }
 }
 
+// By how much places err more than they say, all in all; at least 1. `misses` of a model that has
+// taken up the numbers of a similarity at least.
+double Understated(const std::vector<Eigen::Vector3d>& misses,
+                   const std::vector<Eigen::Vector3d>& sigmas) {
+  double squares = 0;
+  for (size_t i = 0; i < misses.size(); ++i) {
+    squares += misses[i].cwiseQuotient(sigmas[i]).squaredNorm();
+  }
+  return std::max(1.0, std::sqrt(squares / (3.0 * static_cast<double>(misses.size()) - 7)));
+}
+
+// What is told of the places.
+void CompletePlaces(const KnownMetres& known, const SfmModel& adjusted, MetricStart& start) {
+  MetricReport& report = start.report;
+  std::vector<bool> used(known.places.size());
+  for (size_t i = 0; i < used.size(); ++i) {
+    const auto& out = report.left_out;
+    used[i] = std::find(out.begin(), out.end(), known.places[i].image) == out.end();
+  }
+  const Pairs given = PairsOf(start.model, known, used), found = PairsOf(adjusted, known, used);
+  const Similarity as_a_whole = report.places_tell_scale
+                                    ? AlignPoints(given.centres, given.positions_m)
+                                    : AlignPointsAtScale(given.centres, given.positions_m, 1);
+  report.given_rms_m = AlignmentRms(as_a_whole, given.centres, given.positions_m);
+  report.rms_m = AlignmentRms({}, found.centres, found.positions_m);
+  std::vector<Eigen::Vector3d> misses, sigmas;
+  for (size_t i = 0, k = 0; i < used.size(); ++i) {
+    if (!used[i]) continue;
+    misses.push_back(found.centres[k] - found.positions_m[k]);
+    sigmas.push_back(Believed(known.places[i], start.places[k++].sigma));
+  }
+  const double factor = Understated(misses, sigmas);
+  for (Eigen::Vector3d& sigma : sigmas) sigma *= factor;
+  PositionScale scale;
+  FillUncertainty(found.centres, sigmas, scale);
+  report.turn_sigma_rad = scale.turn_sigma_rad;
+  report.places_relative_sigma = scale.relative_sigma;
+}
+
 // What is told of the result.
 void Complete(const KnownMetres& known, const SfmModel& adjusted, MetricStart& start) {
   MetricReport& report = start.report;
@@ -314,26 +363,9 @@ void Complete(const KnownMetres& known, const SfmModel& adjusted, MetricStart& s
                     "standard deviations off; is it the right pair?",
                     d.name, report.found_m.back(), report.sigmas_off.back()));
   }
-  if (!known.places.empty()) {
-    std::vector<bool> used(known.places.size());
-    double squares = 0;
-    for (size_t i = 0; i < used.size(); ++i) {
-      const auto& out = report.left_out;
-      used[i] = std::find(out.begin(), out.end(), known.places[i].image) == out.end();
-    }
-    for (const PositionPrior& p : start.places) squares += p.sigma.squaredNorm();
-    const Pairs given = PairsOf(start.model, known, used), found = PairsOf(adjusted, known, used);
-    const auto count = static_cast<double>(found.centres.size());
-    const Similarity as_a_whole = report.places_tell_scale
-                                      ? AlignPoints(given.centres, given.positions_m)
-                                      : AlignPointsAtScale(given.centres, given.positions_m, 1);
-    report.given_rms_m = AlignmentRms(as_a_whole, given.centres, given.positions_m);
-    report.rms_m = AlignmentRms({}, found.centres, found.positions_m);
-    PositionScale scale;
-    FillUncertainty(found.centres, std::sqrt(squares / (3 * count)), scale);
-    report.turn_sigma_rad = scale.turn_sigma_rad;
-    report.places_relative_sigma = scale.relative_sigma;
-    if (report.places_tell_scale) weights += std::pow(scale.relative_sigma, -2);
+  if (!known.places.empty()) CompletePlaces(known, adjusted, start);
+  if (!known.places.empty() && report.places_tell_scale) {
+    weights += std::pow(report.places_relative_sigma, -2);
   }
   report.relative_sigma = 1 / std::sqrt(weights);
   if (!(report.relative_sigma <= kMostRelativeSigma)) {

@@ -23,7 +23,7 @@ struct RefineOptions {
   std::vector<PositionPrior> positions;
   std::vector<DistancePrior> distances;
   /// The name of the model, or of its photos, where it must determine its cameras:
-  /// RequireDetermined is asked before anything is adjusted. Empty: nobody asks.
+  /// Refine asks RequireDetermined before it adjusts anything. Empty: nobody asks.
   std::string determined;
   int threads = 0;
   std::uint64_t seed = 0;  ///< of the sights that are held out

@@ -130,7 +130,7 @@ void TellOfPlaces(const calib::SfmModel& model, const PhotoPlaces& places,
         "and they turn and shift the whole",
         100 * report.places_relative_sigma));
   }
-  out.lines.push_back("axes: x east, y north, z up, from the first photo's place");
+  out.lines.push_back(places.AxesLine());
   if (!(report.turn_sigma_rad <= calib::kMostTurnSigmaRad)) {
     out.lines.push_back(TurnLine(report));
   }

@@ -16,9 +16,13 @@ struct PhotoPlaces {
   std::vector<io::GpsPosition> places;     ///< of these; each has an altitude
   std::vector<std::string> without_place;  ///< lines that name the others, with what is missing
 
-  /// Metres east, north and up of the first place.
+  /// Index of the first place that lies where most do; there must be one.
+  size_t Origin() const;
+  /// Metres east, north and up of that place.
   std::vector<Eigen::Vector3d> EastNorthUp() const;
-  /// That place, as sets keep it: latitude_deg, longitude_deg, altitude_m.
+  /// What the axes are, for people.
+  std::string AxesLine() const;
+  /// The origin, as sets keep it: latitude_deg, longitude_deg, altitude_m.
   std::string OriginJson() const;
 };
 

@@ -110,7 +110,7 @@ Found FromGps(const ScaleOptions& options, const DtrSet& set) {
   found.lines.push_back(found.keeps_axes
                             ? "the cameras stand nearly on a line, and the turn about it is not "
                               "known: axes are left as they were"
-                            : "axes: x east, y north, z up, from the first photo's place");
+                            : located.AxesLine());
   return found;
 }
 

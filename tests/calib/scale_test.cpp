@@ -147,6 +147,29 @@ TEST(ScaleFromPositions, PositionsThatAreFarOffAreLeftOut) {
   EXPECT_NEAR(scale.metric_from_scene.scale, 3, 5 * 3 * scale.relative_sigma);
 }
 
+TEST(FillUncertainty, EachPositionCountsByItsOwnError) {
+  Walk walk = MakeWalk(0, 1);
+  std::vector<Eigen::Vector3d> sigmas(30, Eigen::Vector3d(3, 3, 6));
+  const auto known = [&] {
+    PositionScale scale;
+    scale.metric_from_scene.scale = 3;
+    FillUncertainty(walk.centres, sigmas, scale);
+    return scale;
+  };
+  const PositionScale alike = known();
+  walk.centres.emplace_back(7, 0, 0);
+  sigmas.emplace_back(1e4, 1e4, 1e4);
+  EXPECT_NEAR(known().relative_sigma / alike.relative_sigma, 1, 1e-3);
+  EXPECT_NEAR(known().turn_sigma_rad / alike.turn_sigma_rad, 1, 1e-3);
+  sigmas.back() = {0.01, 0.01, 0.01};
+  EXPECT_LT(known().relative_sigma, alike.relative_sigma);
+  // On a line along x the turn about it is not known, the scale is: sigma over the spread.
+  walk.centres = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}};
+  sigmas.assign(4, {3, 300, 300});
+  EXPECT_GT(known().turn_sigma_rad, 1e3);
+  EXPECT_NEAR(known().relative_sigma, 3 / (3 * std::sqrt(5.0)), 1e-9);
+}
+
 TEST(AlignToPositions, VaguePositionsTurnAndShiftWhereTheScaleIsKnown) {
   constexpr int kSolves = 300;
   constexpr double kVagueM = 14;  // of a walk of 44 m

@@ -138,6 +138,23 @@ TEST_F(RefineToPlaces, GpsGivesMetresEastNorthAndUp) {
   }
 }
 
+// As where a photo without a fix says latitude 0: east, north and up there are not those of the
+// scene.
+TEST_F(RefineToPlaces, AxesAreOfAPlaceThatLiesWhereMostDo) {
+  WritePhotoAt(folder_ / "photos/image100.jpg", {0, 600e3, 0});
+  const Ran ran = Refine({"--gps", In("photos"), "--json", "-"});
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  const Json scale = Json::parse(ran.out)["scale"];
+  EXPECT_EQ(scale["left_out"], Json::array({"image100.jpg"}));
+  EXPECT_NEAR(scale["origin"]["latitude_deg"], 55.7, 1e-3);
+  const auto images = colmap::ReadModel(In("out")).images;
+  for (size_t i = 2; i < images.size(); ++i) {
+    const Eigen::Vector3d way = images[i].cam_from_world.TargetOriginInSource() -
+                                images[1].cam_from_world.TargetOriginInSource();
+    EXPECT_LT((way - (centres_[i] - centres_[1])).norm(), 0.15) << i;
+  }
+}
+
 TEST_F(RefineToPlaces, APlaceThatIsWrongIsNamedAndOthersMayBeMissing) {
   const std::string wrong = "image104.jpg";
   WritePhotoAt(folder_ / "photos" / wrong, centres_[4] + Eigen::Vector3d(25, 0, 0));
@@ -163,6 +180,15 @@ TEST_F(RefineToPlaces, WhatExifOrTheUserSaysOfTheErrorIsTaken) {
   EXPECT_TRUE(scale["found_sigma_flat_m"].is_null()) << "EXIF says it";
   EXPECT_GT(scale["found_sigma_up_m"], 0) << "EXIF does not";
   EXPECT_NEAR(scale["relative_sigma"], 1e-3, 1e-4);
+  EXPECT_EQ(scale["places_tell_scale"], false);
+  std::filesystem::remove_all(folder_ / "out");
+  for (size_t i = 1; i < centres_.size(); ++i) {
+    WritePhotoAt(folder_ / fmt::format("photos/image{}.jpg", 100 + i), centres_[i], 0.2);
+  }
+  ran = Refine({"--gps", In("photos"), "--json", "-"});
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  scale = Json::parse(ran.out)["scale"];
+  EXPECT_NEAR(scale["relative_sigma"], 0.02, 0.01) << "a vague place takes nothing from the others";
   std::filesystem::remove_all(folder_ / "out");
   ran = Refine({"--gps", In("photos"), "--gps-sigma", "0.1,0.2", "--json", "-"});
   ASSERT_EQ(ran.code, 0) << ran.err;
@@ -188,7 +214,7 @@ TEST_F(RefineToPlaces, ADistanceSetsTheUnit) {
 }
 
 // Places that err by more than tells the scale: a distance does, and they turn and shift the whole.
-TEST_F(RefineToPlaces, VaguePlacesAreHeldBesideADistanceAndNotWithoutOne) {
+TEST_F(RefineToPlaces, VaguePlacesTurnWhatADistanceScalesAndAreRefusedWithoutOne) {
   Random random(11);
   for (size_t i = 0; i < centres_.size(); ++i) {
     const double x = random.Normal(), y = random.Normal();
