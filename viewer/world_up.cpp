@@ -23,6 +23,8 @@ constexpr double kWeightOfPrior = 0.01;
 // Least absolute deviations by reweighted squares: sines below this count alike.
 constexpr double kLeastSine = 0.02;
 constexpr int kReweightings = 20;
+// Cosine to the vertical: 75 degrees and more from it, it tells no side.
+constexpr double kTellsSide = 0.26;
 
 Eigen::Vector3d Sum(std::span<const Pose> cams_from_world, const Eigen::Vector3d& axis_in_cam) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -36,10 +38,12 @@ struct StandingPlane {
   double spread = 0;  ///< standard deviation along its longer axis
 };
 
-/// None where they stand on a line, or off any plane.
-std::optional<StandingPlane> PlaneOf(std::span<const Pose> cams_from_world) {
-  // Off the plane in shares of its shorter axis, and that in shares of its longer one.
-  constexpr double kMostOffPlane = 0.2, kLeastAcross = 0.15;
+/// None where they stand in one point, on a line, or off any plane.
+std::optional<StandingPlane> PlaneOf(std::span<const Pose> cams_from_world,
+                                     const Eigen::Vector3d& scene_center) {
+  // Off the plane in shares of its shorter axis, that in shares of its longer one, and this in
+  // shares of the way to the scene.
+  constexpr double kMostOffPlane = 0.2, kLeastAcross = 0.15, kLeastSpread = 1e-3;
   const auto count = static_cast<double>(cams_from_world.size());
   if (count < 4) return std::nullopt;
   StandingPlane plane;
@@ -57,6 +61,7 @@ std::optional<StandingPlane> PlaneOf(std::span<const Pose> cams_from_world) {
   }
   plane.normal = axes.eigenvectors().col(0);
   plane.spread = size[2];
+  if (!(plane.spread > kLeastSpread * (scene_center - plane.middle).norm())) return std::nullopt;
   return plane;
 }
 
@@ -81,7 +86,7 @@ Eigen::Vector3d PriorUp(std::span<const Pose> cams_from_world,
   const auto count = static_cast<double>(cams_from_world.size());
   const Eigen::Vector3d up = Sum(cams_from_world, -Eigen::Vector3d::UnitY()) / count;
   const Eigen::Vector3d forward = Sum(cams_from_world, Eigen::Vector3d::UnitZ()) / count;
-  if (const auto plane = PlaneOf(cams_from_world)) {
+  if (const auto plane = PlaneOf(cams_from_world, scene_center)) {
     const auto along = [&](const Eigen::Vector3d& direction) -> Eigen::Vector3d {
       return plane->normal.dot(direction) >= 0 ? plane->normal : Eigen::Vector3d(-plane->normal);
     };
@@ -133,7 +138,12 @@ Eigen::Vector3d UpOfCameras(std::span<const Pose> cams_from_world,
     roll = up.dot(squares * up);
   }
   if (!(roll <= kMostRoll)) return prior;
-  return up.dot(prior) < 0 ? Eigen::Vector3d(-up) : up;
+  // Pictures from the air on one line: what their images call up is a direction of the compass and
+  // does not tell the side. That is then where they do not look.
+  const Eigen::Vector3d side = std::abs(up.dot(prior)) >= kTellsSide
+                                   ? prior
+                                   : -Sum(cams_from_world, Eigen::Vector3d::UnitZ());
+  return up.dot(side) < 0 ? Eigen::Vector3d(-up) : up;
 }
 
 Eigen::Vector3d WorldUp(const DtrSet& set, size_t frame) {

@@ -7,6 +7,7 @@
 
 #include "dtr/gl/drawing.h"
 #include "dtr/gl/driver.h"
+#include "dtr/gl/objects.h"
 #include "dtr/gl/program.h"
 #include "dtr/gl/window_depth.h"
 
@@ -164,12 +165,16 @@ class Compositor::Implementation {
   /// takes several times as long for that sum as the processor's vector instructions, and longer
   /// for texels of an array than of a plain texture. Within a CompositeGuard.
   void Bring(const DrawnPicture& picture, const WindowDepthMapping& mapping) {
-    const bool known = picture.number == brought_number_;
+    const bool known = picture.number != 0 && picture.number == brought_number_;
     if (known && mapping == brought_mapping_) return;
+    brought_number_ = 0;  // until all of it is there
     const StateGuard guard;
     const int width = picture.width_px, height = picture.height_px;
     if (width != width_ || height != height_) {
-      width_ = height_ = 0, brought_number_ = 0;
+      width_ = height_ = 0;
+      // Unit 0 is put back by the CompositeGuard; a host's errors are not to be taken for ours.
+      glActiveTexture(GL_TEXTURE0);
+      ForgetErrors();
       image_ = MakeTarget(GL_TEXTURE_2D, GL_RGBA8, width, height, 1);
       depth_ = MakeTarget(GL_TEXTURE_2D, GL_R32F, width, height, 1);
       width_ = width, height_ = height;  // now they hold

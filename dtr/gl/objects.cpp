@@ -76,6 +76,11 @@ void ThrowOnError(const std::string& what) {
               "); use --renderer cpu, or a smaller --gpu-memory or --size, or fewer --views");
 }
 
+void ForgetErrors() {
+  while (glGetError() != GL_NO_ERROR) {
+  }
+}
+
 StateGuard::IndexedBuffer StateGuard::IndexedBuffer::Of(GLenum target, GLuint index) {
   const bool uniform = target == GL_UNIFORM_BUFFER;
   IndexedBuffer bound;

@@ -63,8 +63,10 @@ using Program = Owned<ProgramKind>;
 using Shader = Owned<ShaderKind>;
 
 /// Throws dtr::Error naming `what` and the error, when GL has recorded one (out of memory above
-/// all). Errors from before the last call count too, so callers clear them first.
+/// all). Errors from before the last call count too, so callers ForgetErrors first.
 void ThrowOnError(const std::string& what);
+/// Clears what GL has recorded: the errors of whoever drew before are not ours.
+void ForgetErrors();
 
 /// Puts the context's state, as far as this library changes it, back at the end of the scope.
 class StateGuard {

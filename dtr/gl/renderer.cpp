@@ -285,12 +285,6 @@ class Renderer::Implementation {
     }
   }
 
-  /// The caller's own errors are not ours.
-  static void ForgetErrors() {
-    while (glGetError() != GL_NO_ERROR) {
-    }
-  }
-
   static int LayersOf(const Frame& frame) {
     return frame.deferred() ? 1 : std::max(1, static_cast<int>(frame.views.size()));
   }

@@ -251,8 +251,9 @@ VF SpreadOf(const Witnesses& views, VF at) {
 
 /// Variance of the common minimum by the photos' noise, squared steps. Weighted least squares: a
 /// cost c is half the mean of squared differences of normalised patches, so the minimum of one
-/// view's has a variance of 2 c sum(weight^2) / c''. Half of it is noise of the view's own, half of
-/// the reference, which all views share: their minima add up as vectors.
+/// view's has a variance of 2 c sum(weight^2) / c'', times kNoisePerCost. Half of it is noise of
+/// the view's own, half of the reference, which all views share: their minima add up as vectors.
+/// For c stands the common cost of all views that count: that of one view is mostly chance.
 VF VarianceByNoise(const Group& g, VF cost, VF curvature, const Witnesses& views) {
   const DF d;
   const VF zero = hn::Zero(d), least = hn::Set(d, 1e-9f);

@@ -276,8 +276,14 @@ TEST_F(CompositorTest, LeavesTheHostsStateAsItWas) {
   Compositor compositor;
   Host host;
   const DrawnPicture drawn = Draw(renderer);
-  const Texture array = Texture::Make(), plain = Texture::Make();
+  const Texture array = Texture::Make(), plain = Texture::Make(), other = Texture::Make();
+  // Textures are made as the first picture comes; unit 15 is where the renderer makes its own.
+  constexpr GLenum kUnits[] = {GL_TEXTURE0, GL_TEXTURE15};
   host.With(States().front(), [&] {
+    for (const GLenum unit : kUnits) {
+      glActiveTexture(unit);
+      glBindTexture(GL_TEXTURE_2D, other.name());
+    }
     glActiveTexture(GL_TEXTURE1);
     glBindTexture(GL_TEXTURE_2D_ARRAY, array.name());
     glBindTexture(GL_TEXTURE_2D, plain.name());
@@ -292,6 +298,12 @@ TEST_F(CompositorTest, LeavesTheHostsStateAsItWas) {
     EXPECT_EQ(value(GL_ACTIVE_TEXTURE), GL_TEXTURE1);
     EXPECT_EQ(value(GL_TEXTURE_BINDING_2D_ARRAY), static_cast<GLint>(array.name()));
     EXPECT_EQ(value(GL_TEXTURE_BINDING_2D), static_cast<GLint>(plain.name()));
+    for (const GLenum unit : kUnits) {
+      glActiveTexture(unit);
+      EXPECT_EQ(value(GL_TEXTURE_BINDING_2D), static_cast<GLint>(other.name())) << unit;
+      glBindTexture(GL_TEXTURE_2D, 0);
+    }
+    glActiveTexture(GL_TEXTURE1);
     EXPECT_EQ(value(GL_UNPACK_ROW_LENGTH), 17);
     EXPECT_EQ(value(GL_DEPTH_WRITEMASK), GL_FALSE);
     EXPECT_EQ(value(GL_CURRENT_PROGRAM), 0);

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <vector>
@@ -124,6 +125,27 @@ TEST(UpOfCameras, OfPicturesStraightFromAboveIsNotTheCompass) {
   for (int i = 0; i < 8; ++i)
     there_and_back.push_back(CameraAt(Place(0, 5 * i, 30), 180 * (i % 2), 90));
   EXPECT_LT(OffDeg(there_and_back), 0.01) << "one line, no plane";
+}
+
+// Their mean image-up is a direction of the compass, and the x axes alone do not tell the side.
+TEST(UpOfCameras, OfPicturesFromAboveOnOneLineIsNeverDown) {
+  std::vector<Pose> poses;
+  for (int i = 0; i < 8; ++i)
+    poses.push_back(CameraAt(Place(0, 5 * i, 30), i % 2 == 0 ? 0 : 90, 90));
+  EXPECT_LT(OffDeg(poses), 0.01);
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    EXPECT_LT(OffDeg(Shaken(poses, 3, seed)), 10) << seed;
+  }
+  std::reverse(poses.begin(), poses.end());
+  EXPECT_LT(OffDeg(poses), 0.01);
+}
+
+TEST(UpOfCameras, OfPhotosFromOnePlaceIsWhatIsUpInThem) {
+  std::vector<Pose> poses;
+  for (const double down : {-30.0, -10.0, 0.0, 10.0, 30.0}) {
+    poses.push_back(CameraAt(Place(0, -8, 0), 0, down));
+  }
+  EXPECT_LT(OffDeg(poses), 1);
 }
 
 TEST(UpOfCameras, OfAGimbalTilted45DegreesIsUp) {
