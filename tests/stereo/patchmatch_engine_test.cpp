@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "datasets/exact/stereo_quality.h"
+#include "dtr/base/order_statistics.h"
 #include "dtr/base/random.h"
 #include "dtr/eval/sigma_scores.h"
 #include "tests/support/instruction_sets.h"
@@ -265,36 +266,65 @@ eval::SigmaScores ScoreSigmas(const DepthEstimate& estimate, const DepthImage& t
   return scorer.Scores();
 }
 
-// One neighbour or four on all sides, whose errors by the reference's noise cancel: that makes a
-// depth 2.5 times as exact, and must not make sigma more or less honest.
-TEST(PatchMatchEngine, SigmaIsAsHonestWhateverTheNumberOfViews) {
+std::vector<Shot> NoisyShots(const std::vector<Pose>& poses, double noise_levels) {
+  std::vector<Shot> shots = Shots(Slanted(), poses);
+  Random random(1);
+  for (Shot& shot : shots) {
+    for (std::uint8_t& value : shot.image.data()) {
+      const double noisy = std::round(value + noise_levels * random.Normal());
+      value = static_cast<std::uint8_t>(std::clamp(noisy, 0.0, 255.0));
+    }
+  }
+  return shots;
+}
+
+TEST(PatchMatchEngine, SigmaIsHonestWhateverTheNumberOfViews) {
   const std::vector<Pose> poses = {Facing({0, 0, 0}), Facing({kBaseline, 0, 0}),
                                    Facing({0, kBaseline, 0}), Facing({-kBaseline, 0, 0}),
                                    Facing({0, -kBaseline, 0})};
   for (const double noise_levels : {2.0, 6.0}) {
-    std::vector<Shot> shots = Shots(Slanted(), poses);
-    Random random(1);
-    for (Shot& shot : shots) {
-      for (std::uint8_t& value : shot.image.data()) {
-        const double noisy = std::round(value + noise_levels * random.Normal());
-        value = static_cast<std::uint8_t>(std::clamp(noisy, 0.0, 255.0));
-      }
-    }
-    std::vector<double> within;
+    const std::vector<Shot> shots = NoisyShots(poses, noise_levels);
     for (const int count : {2, 3, 5}) {
       std::vector<StereoView> views = ViewsOf(shots);
       views.erase(views.begin() + count, views.end());
       const eval::SigmaScores scores = ScoreSigmas(EstimateFirst(views), shots[0].truth);
-      within.push_back(*scores.share_within_1_sigma);
+      // 68 % for a perfect model. Textures as clear as these keep what doubt adds to sigma above
+      // the error where there is little noise.
+      EXPECT_GT(*scores.share_within_1_sigma, 0.6) << count << " views, noise " << noise_levels;
+      EXPECT_LT(*scores.share_within_1_sigma, 0.92) << count << " views, noise " << noise_levels;
       EXPECT_GT(*scores.share_within_2_sigma, 0.9) << count << " views, noise " << noise_levels;
     }
-    // 68 % for a perfect model. Textures as clear as these keep what doubt adds to sigma above the
-    // error where there is little noise.
-    const auto [least, most] = std::minmax_element(within.begin(), within.end());
-    EXPECT_GT(*least, 0.6) << "noise " << noise_levels;
-    EXPECT_LT(*most, 0.92) << "noise " << noise_levels;
-    EXPECT_LT(*most - *least, 0.1) << "noise " << noise_levels;
   }
+}
+
+// Noise of the reference pulls views from opposite sides to opposite depths and views from one side
+// to one: by least squares the sigmas of one neighbour, two from one side and two from opposite
+// sides are as sqrt 2, sqrt 1.5 and sqrt 0.5, and so are the errors.
+TEST(PatchMatchEngine, SigmaKnowsThatOppositeBaselinesCancelTheNoiseOfTheReference) {
+  const auto medians = [](const std::vector<Pose>& poses) {
+    const std::vector<Shot> shots = NoisyShots(poses, 6);
+    const DepthEstimate estimate = EstimateFirst(ViewsOf(shots));
+    std::vector<double> errors, sigmas;
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < kWidth; ++x) {
+        const float z = estimate.depth(x, y);
+        if (DepthImage::IsHole(z)) continue;
+        errors.push_back(std::abs(1 / z - 1 / shots[0].truth(x, y)));
+        sigmas.push_back(estimate.inverse_depth_sigma(x, y));
+      }
+    }
+    return std::pair(UpperMedian(errors), UpperMedian(sigmas));
+  };
+  const Pose here = Facing({0, 0, 0}), right = Facing({kBaseline, 0, 0});
+  const auto [one_error, one] = medians({here, right});
+  const auto [same_error, same] = medians({here, right, Facing({kBaseline, 0.02, 0})});
+  const auto [opposite_error, opposite] = medians({here, right, Facing({-kBaseline, 0, 0})});
+  EXPECT_NEAR(same_error / one_error, std::sqrt(1.5 / 2), 0.12);
+  EXPECT_NEAR(opposite_error / one_error, std::sqrt(0.5 / 2), 0.12);
+  // The spread of the views' own minima and doubt keep sigma from falling as far.
+  EXPECT_NEAR(same / one, same_error / one_error, 0.12);
+  EXPECT_NEAR(opposite / one, opposite_error / one_error, 0.12);
+  EXPECT_LT(opposite, 0.85 * same) << "with one number of views the two would be alike";
 }
 
 TEST(PatchMatchEngine, WhatOneViewAloneHoldsIsDoubted) {
