@@ -167,6 +167,13 @@ Apart ApartFrom(const Shown& shown, const RenderResult& picture, const Grid<floa
   return apart;
 }
 
+RendererSettings DrawnByTheProcessor(bool in_memory) {
+  RendererSettings settings;
+  settings.in_memory = in_memory;
+  settings.coarse_drawer = CoarseDrawer::kProcessor;
+  return settings;
+}
+
 class CompositorTest : public testing::GlTest {
  protected:
   /// The damaged scene: holes, masks, a step.
@@ -185,10 +192,7 @@ class CompositorTest : public testing::GlTest {
 TEST_F(CompositorTest, ATextureAndAPictureInMemoryAreShownWhereTheyAreInFront) {
   const RenderResult picture = Render();
   for (const bool in_memory : {false, true}) {
-    RendererSettings settings;
-    settings.in_memory = in_memory;
-    settings.coarse_drawer = CoarseDrawer::kProcessor;
-    Renderer renderer(settings);
+    Renderer renderer(DrawnByTheProcessor(in_memory));
     Compositor compositor;
     Host host;
     const DrawnPicture drawn = Draw(renderer);
@@ -206,10 +210,7 @@ TEST_F(CompositorTest, ATextureAndAPictureInMemoryAreShownWhereTheyAreInFront) {
 
 TEST_F(CompositorTest, DepthThatIsMappedAsItIsDrawnIsTheSame) {
   const RenderResult picture = Render();
-  RendererSettings settings;
-  settings.in_memory = true;
-  settings.coarse_drawer = CoarseDrawer::kProcessor;
-  Renderer renderer(settings);
+  Renderer renderer(DrawnByTheProcessor(true));
   Compositor compositor;
   Host host;
   for (const HostState& state : States()) {
@@ -232,10 +233,7 @@ TEST_F(CompositorTest, DepthThatIsMappedAsItIsDrawnIsTheSame) {
 }
 
 TEST_F(CompositorTest, TheNextPictureTakesThePlaceOfTheLast) {
-  RendererSettings settings;
-  settings.in_memory = true;
-  settings.coarse_drawer = CoarseDrawer::kProcessor;
-  Renderer renderer(settings);
+  Renderer renderer(DrawnByTheProcessor(true));
   Compositor compositor;
   Host host;
   const HostState plain = States().front();
@@ -269,10 +267,7 @@ TEST_F(CompositorTest, WhatIsGuessedIsNeverCutOff) {
 }
 
 TEST_F(CompositorTest, LeavesTheHostsStateAsItWas) {
-  RendererSettings settings;
-  settings.in_memory = true;
-  settings.coarse_drawer = CoarseDrawer::kProcessor;
-  Renderer renderer(settings);
+  Renderer renderer(DrawnByTheProcessor(true));
   Compositor compositor;
   Host host;
   const DrawnPicture drawn = Draw(renderer);

@@ -254,15 +254,27 @@ TEST(PatchMatchEngine, SigmaDescribesTheError) {
   EXPECT_LT(within, 0.95 * all);
 }
 
-eval::SigmaScores ScoreSigmas(const DepthEstimate& estimate, const DepthImage& truth) {
-  eval::SigmaScorer scorer;
+/// Of the pixels with a depth: how far 1/z is off, and what is said of it.
+struct Errors {
+  std::vector<double> errors, sigmas;
+};
+
+Errors ErrorsOf(const DepthEstimate& estimate, const DepthImage& truth) {
+  Errors of;
   for (int y = 0; y < truth.height(); ++y) {
     for (int x = 0; x < truth.width(); ++x) {
       const float z = estimate.depth(x, y);
       if (DepthImage::IsHole(z)) continue;
-      scorer.Add(std::abs(1 / z - 1 / truth(x, y)), estimate.inverse_depth_sigma(x, y), false);
+      of.errors.push_back(std::abs(1 / z - 1 / truth(x, y)));
+      of.sigmas.push_back(estimate.inverse_depth_sigma(x, y));
     }
   }
+  return of;
+}
+
+eval::SigmaScores ScoreSigmas(const Errors& of) {
+  eval::SigmaScorer scorer;
+  for (size_t i = 0; i < of.errors.size(); ++i) scorer.Add(of.errors[i], of.sigmas[i], false);
   return scorer.Scores();
 }
 
@@ -287,7 +299,7 @@ TEST(PatchMatchEngine, SigmaIsHonestWhateverTheNumberOfViews) {
     for (const int count : {2, 3, 5}) {
       std::vector<StereoView> views = ViewsOf(shots);
       views.erase(views.begin() + count, views.end());
-      const eval::SigmaScores scores = ScoreSigmas(EstimateFirst(views), shots[0].truth);
+      const eval::SigmaScores scores = ScoreSigmas(ErrorsOf(EstimateFirst(views), shots[0].truth));
       // 68 % for a perfect model. Textures as clear as these keep what doubt adds to sigma above
       // the error where there is little noise.
       EXPECT_GT(*scores.share_within_1_sigma, 0.6) << count << " views, noise " << noise_levels;
@@ -303,17 +315,8 @@ TEST(PatchMatchEngine, SigmaIsHonestWhateverTheNumberOfViews) {
 TEST(PatchMatchEngine, SigmaKnowsThatOppositeBaselinesCancelTheNoiseOfTheReference) {
   const auto medians = [](const std::vector<Pose>& poses) {
     const std::vector<Shot> shots = NoisyShots(poses, 6);
-    const DepthEstimate estimate = EstimateFirst(ViewsOf(shots));
-    std::vector<double> errors, sigmas;
-    for (int y = 0; y < kHeight; ++y) {
-      for (int x = 0; x < kWidth; ++x) {
-        const float z = estimate.depth(x, y);
-        if (DepthImage::IsHole(z)) continue;
-        errors.push_back(std::abs(1 / z - 1 / shots[0].truth(x, y)));
-        sigmas.push_back(estimate.inverse_depth_sigma(x, y));
-      }
-    }
-    return std::pair(UpperMedian(errors), UpperMedian(sigmas));
+    Errors of = ErrorsOf(EstimateFirst(ViewsOf(shots)), shots[0].truth);
+    return std::pair(UpperMedian(of.errors), UpperMedian(of.sigmas));
   };
   const Pose here = Facing({0, 0, 0}), right = Facing({kBaseline, 0, 0});
   const auto [one_error, one] = medians({here, right});
