@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "dtr/report/encode.h"
 #include "dtr/report/false_color.h"
@@ -19,9 +18,6 @@ constexpr double kMarginShare = 0.05;  // of the longer side
 constexpr int kMapWidthPx = 760, kMostMapHeightPx = 1200;
 constexpr double kWedgeShare = 0.05;  // of the map's width: length of a camera
 constexpr int kSamplesAcross = 480;   // of a depth map
-
-/// Cameras that look down less steeply than this show what is ahead of them at the top.
-const double kFromAbove = std::cos(35 * std::numbers::pi / 180);
 
 double Longer(const Ground& ground) { return (ground.max - ground.min).maxCoeff(); }
 
@@ -38,7 +34,7 @@ Ground GroundOf(const DtrSet& set) {
   Ground ground;
   // Seen from above, looking down: LookAlong puts what the cameras look at at the top; of pictures
   // from the air what is at the top of most of them.
-  const bool from_the_air = forward.normalized().dot(-around.up) >= kFromAbove;
+  const bool from_the_air = forward.normalized().dot(-around.up) >= kFromTheAir;
   const Pose from_above =
       LookAlong(set.scene_center, -around.up, from_the_air ? UpInImages(poses) : forward);
   ground.right = from_above.rotation.conjugate() * Eigen::Vector3d::UnitX();

@@ -70,9 +70,8 @@ std::optional<StandingPlane> PlaneOf(std::span<const Pose> cams_from_world,
 bool LookAtTheirPlane(const StandingPlane& plane, const Eigen::Vector3d& mean_forward,
                       const Eigen::Vector3d& scene_center) {
   constexpr double kLeastSpreadOverDistance = 0.4;
-  const double most_tilt = std::cos(35 * kDegree);
   const double distance = std::abs(plane.normal.dot(scene_center - plane.middle));
-  return std::abs(plane.normal.dot(mean_forward)) >= most_tilt &&
+  return std::abs(plane.normal.dot(mean_forward)) >= kFromTheAir &&
          plane.spread >= kLeastSpreadOverDistance * distance;
 }
 

@@ -8,6 +8,10 @@
 
 namespace dtr::viewer {
 
+/// Cosine to straight down, 35 degrees: cameras that look down more steeply take pictures from the
+/// air, others what lies ahead of them.
+inline constexpr double kFromTheAir = 0.8191520442889918;
+
 /// Up, unit length, world frame. Where GPS gave the set axes east, north and up it is z. Else it is
 /// estimated from the source cameras of a frame (UpOfCameras); the views' order does not matter
 /// but where only one of them can tell.
@@ -32,7 +36,7 @@ Eigen::Vector3d UpOfCameras(std::span<const Pose> cams_from_world,
                             const Eigen::Vector3d& scene_center);
 
 /// What is up in most of the images (unit length, world frame), whatever is up in the world: where
-/// cameras look down the top of their pictures. Without a common one it is the first one's.
+/// cameras look down it is the top of their pictures. Without a common one it is the first one's.
 Eigen::Vector3d UpInImages(std::span<const Pose> cams_from_world);
 
 }  // namespace dtr::viewer
