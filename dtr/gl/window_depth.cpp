@@ -16,22 +16,22 @@ namespace hn = hwy::HWY_NAMESPACE;
 using DF = hn::ScalableTag<float>;
 using VF = hn::Vec<DF>;
 
-// A depth buffer of 24 bits: the last step before the far plane. What is cleared to that plane must
-// not hide a guess.
-constexpr float kBeforeFar = 0.9999999f;
+// More than one step of a depth buffer of 24 bits. What is cleared to the far plane, which a
+// reversed projection has at 0, must not hide a guess.
+constexpr float kLastStep = 1.2e-7f;
 
-/// `farthest`: of what is seen 1; below that for guesses, which are never clipped.
-HWY_INLINE VF Mapped(const WindowDepthMapping& m, VF z, VF farthest) {
+/// `inset`: how far from window z 0 and 1 a depth must lie; of what is seen 0, above that for
+/// guesses, which are never clipped.
+HWY_INLINE VF Mapped(const WindowDepthMapping& m, VF z, VF inset) {
   const DF d;
-  const VF one = hn::Set(d, 1.0f), least = hn::Set(d, m.least);
+  const VF zero = hn::Zero(d), one = hn::Set(d, 1.0f), least = hn::Set(d, m.least);
   const VF device = hn::Add(hn::Set(d, m.at_infinity), hn::Div(hn::Set(d, m.per_inverse_depth), z));
   const VF inside = hn::Min(hn::Max(device, least), one);
-  const VF share = hn::Min(hn::Mul(hn::Sub(inside, least), hn::Set(d, m.scale)), farthest);
+  const VF linear = hn::Mul(hn::Sub(inside, least), hn::Set(d, m.scale));
+  const VF share = hn::Min(hn::Max(linear, inset), hn::Sub(one, inset));
   const VF window = hn::MulAdd(share, hn::Set(d, m.difference), hn::Set(d, m.near));
-  auto drawn = hn::Gt(z, hn::Zero(d));
-  if (!m.clamps) {
-    drawn = hn::And(drawn, hn::Or(hn::Eq(inside, device), hn::Lt(farthest, one)));
-  }
+  auto drawn = hn::Gt(z, zero);
+  if (!m.clamps) drawn = hn::And(drawn, hn::Or(hn::Eq(inside, device), hn::Gt(inset, zero)));
   return hn::IfThenElse(drawn, window, hn::Set(d, kNoWindowDepth));
 }
 
@@ -41,18 +41,17 @@ void MapToWindowImpl(const WindowDepthMapping& mapping, const float* depth_z,
   const size_t lanes = hn::Lanes(d);
   for (size_t p = 0; p < count; p += lanes) {
     const size_t some = std::min(lanes, count - p);
-    HWY_ALIGN float z[hn::MaxLanes(d)] = {}, farthest[hn::MaxLanes(d)];
-    VF most = hn::Set(d, 1.0f);
+    HWY_ALIGN float z[hn::MaxLanes(d)] = {}, insets[hn::MaxLanes(d)] = {};
+    VF inset = hn::Zero(d);
     if (guessed != nullptr) {
-      std::fill_n(farthest, lanes, 1.0f);
-      for (size_t i = 0; i < some; ++i) farthest[i] = guessed[p + i] != 0 ? kBeforeFar : 1.0f;
-      most = hn::Load(d, farthest);
+      for (size_t i = 0; i < some; ++i) insets[i] = guessed[p + i] != 0 ? kLastStep : 0.0f;
+      inset = hn::Load(d, insets);
     }
     if (some == lanes) {
-      hn::StoreU(Mapped(mapping, hn::LoadU(d, depth_z + p), most), d, window_z + p);
+      hn::StoreU(Mapped(mapping, hn::LoadU(d, depth_z + p), inset), d, window_z + p);
     } else {
       std::copy_n(depth_z + p, some, z);
-      hn::Store(Mapped(mapping, hn::Load(d, z), most), d, z);
+      hn::Store(Mapped(mapping, hn::Load(d, z), inset), d, z);
       std::copy_n(z, some, window_z + p);
     }
   }

@@ -50,22 +50,47 @@ TEST(MapToWindow, IsTheProjectionForEveryCountOnEveryInstructionSet) {
   });
 }
 
+// Half a step of a buffer of 24 bits is where rounding to the next one begins.
+constexpr float kHalfStep = 0.5f / ((1 << 24) - 1), kOneStep = 4 * kHalfStep;
+
 TEST(MapToWindow, GuessesLieBeforeWhatIsClearedToTheFarPlane) {
   const std::vector<float> z = {1e-3f, 1, 99, 1e9f, kInfinity, 0, 1e-40f};
   testing::WithEachInstructionSet([&](std::int64_t) {
     std::vector<float> found(z.size());
     MapToWindow(Usual(), z, std::vector<std::uint8_t>(z.size(), 1), found);
-    EXPECT_EQ(found[0], 0) << "before the near plane";
+    EXPECT_NEAR(found[0], 0, kOneStep) << "before the near plane";
     for (const size_t far : {size_t{3}, size_t{4}}) {
-      EXPECT_LT(found[far], 1);
+      EXPECT_LT(found[far], 1 - kHalfStep);
       EXPECT_GT(found[far], found[2]);
     }
     EXPECT_EQ(found[5], kNoWindowDepth) << "a hole stays one";
-    EXPECT_EQ(found[6], 0) << "denormal, but a depth";
+    EXPECT_NEAR(found[6], 0, kOneStep) << "denormal, but a depth";
     std::vector<float> not_guessed(z.size());
     MapToWindow(Usual(), z, std::vector<std::uint8_t>(z.size(), 0), not_guessed);
     EXPECT_EQ(not_guessed[3], kNoWindowDepth) << "what is seen is cut off";
   });
+}
+
+// Window z 1 is the near plane, 0 lies at infinity or at a far plane; the buffer is cleared to 0
+// and what is greater is drawn.
+TEST(MapToWindow, GuessesBeyondAReversedProjectionAreNotHiddenByWhatIsCleared) {
+  WindowDepthMapping to_infinity, to_far;
+  to_infinity.least = to_far.least = 0, to_infinity.scale = to_far.scale = 1;
+  to_infinity.at_infinity = 0, to_infinity.per_inverse_depth = static_cast<float>(kNear);
+  to_far.at_infinity = static_cast<float>(-kNear / (kFar - kNear));
+  to_far.per_inverse_depth = static_cast<float>(kNear * kFar / (kFar - kNear));
+  const std::vector<float> z = {1e-3f, 1, 99, 1e12f, kInfinity};
+  for (const WindowDepthMapping& mapping : {to_infinity, to_far}) {
+    testing::WithEachInstructionSet([&](std::int64_t) {
+      std::vector<float> found(z.size());
+      MapToWindow(mapping, z, std::vector<std::uint8_t>(z.size(), 1), found);
+      EXPECT_NEAR(found[0], 1, kOneStep);
+      for (const size_t far : {size_t{3}, size_t{4}}) {
+        EXPECT_GT(found[far], kHalfStep);
+        EXPECT_LT(found[far], found[2]);
+      }
+    });
+  }
 }
 
 TEST(MapToWindow, TheHostsDepthRangeAndClampingHold) {
