@@ -6,7 +6,6 @@
 
 #include "dtr/base/order_statistics.h"
 #include "dtr/render/geometry.h"
-#include "viewer/world_up.h"
 
 namespace dtr::viewer {
 namespace {
@@ -45,17 +44,6 @@ std::vector<Pose> PosesOf(const std::vector<const View*>& views) {
   return poses;
 }
 
-/// How far the cameras stand from the middle of the scene; bounds can reach to the horizon.
-double SizeOf(const Surroundings& surroundings) {
-  std::vector<double> distances;
-  for (const View* view : surroundings.views) {
-    distances.push_back((view->CenterInWorld() - surroundings.center).norm());
-  }
-  if (distances.empty()) return 1;
-  const auto middle = UpperMedian(distances);
-  return middle > 0 && std::isfinite(middle) ? middle : 1;
-}
-
 bool SamePose(const Pose& a, const Pose& b, double scene_size) {
   return (a.TargetOriginInSource() - b.TargetOriginInSource()).norm() <=
              kSameCenterShare * scene_size &&
@@ -68,7 +56,6 @@ Surroundings SurroundingsOf(const DtrSet& set, size_t frame) {
   Surroundings surroundings;
   surroundings.bounds = set.bounds;
   surroundings.center = set.scene_center;
-  surroundings.up = WorldUp(set, frame);
   for (const View& view : set.frames.at(frame).views) surroundings.cameras.push_back(&view);
   std::sort(surroundings.cameras.begin(), surroundings.cameras.end(),
             [](const View* a, const View* b) { return a->id < b->id; });
@@ -78,11 +65,31 @@ Surroundings SurroundingsOf(const DtrSet& set, size_t frame) {
   return surroundings;
 }
 
-Controller::Controller(Surroundings surroundings, int width_px, int height_px, DepthAt depth_at)
+double SceneSize(const Surroundings& surroundings) {
+  std::vector<double> distances;
+  for (const View* view : surroundings.views) {
+    distances.push_back((view->CenterInWorld() - surroundings.center).norm());
+  }
+  if (distances.empty()) return 1;
+  const auto middle = UpperMedian(distances);
+  return middle > 0 && std::isfinite(middle) ? middle : 1;
+}
+
+Bounds Foreground(const Surroundings& surroundings) {
+  const Bounds& bounds = surroundings.bounds;
+  const Eigen::Vector3d reach =
+      Eigen::Vector3d::Constant(kMostSceneSizes * SceneSize(surroundings));
+  const Bounds foreground{bounds.min.cwiseMax(surroundings.center - reach),
+                          bounds.max.cwiseMin(surroundings.center + reach)};
+  return bounds.empty() || foreground.empty() ? bounds : foreground;
+}
+
+Controller::Controller(Surroundings surroundings, const Eigen::Vector3d& up, int width_px,
+                       int height_px, DepthAt depth_at)
     : surroundings_(std::move(surroundings)),
       depth_at_(std::move(depth_at)),
-      up_(surroundings_.up),
-      fly_speed_(kSceneSizesPerSecond * SizeOf(surroundings_)) {
+      up_(up),
+      fly_speed_(kSceneSizesPerSecond * SceneSize(surroundings_)) {
   if (surroundings_.views.empty()) {
     camera_ = {FitLens({3, 2, 3, 3, 1.5, 1}, width_px, height_px), {}};
     return;
@@ -93,8 +100,6 @@ Controller::Controller(Surroundings surroundings, int width_px, int height_px, D
   stepped_to_ =
       static_cast<size_t>(std::find(cameras.begin(), cameras.end(), &first) - cameras.begin());
 }
-
-double Controller::scene_size() const { return SizeOf(surroundings_); }
 
 void Controller::set_fly_speed(double units_per_s) {
   const double size = scene_size();
@@ -251,7 +256,7 @@ void Controller::GoToNearestView() {
 
 void Controller::ShowAll() {
   GoTo({camera_.camera,
-        ViewAll(surroundings_.bounds, PosesOf(surroundings_.views), up_, camera_.camera)});
+        ViewAll(Foreground(surroundings_), PosesOf(surroundings_.views), up_, camera_.camera)});
 }
 
 std::optional<size_t> Controller::nearest_view() const {

@@ -19,10 +19,18 @@ struct Surroundings {
   std::vector<const View*> cameras;
   Bounds bounds;
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
-  Eigen::Vector3d up = -Eigen::Vector3d::UnitY();  ///< WorldUp
 };
 /// Of one of the set's frames; views and cameras in byte order of their ids.
 Surroundings SurroundingsOf(const DtrSet& set, size_t frame = 0);
+
+/// How far the cameras stand from the middle of the scene (median, scene units; 1 where that tells
+/// nothing): bounds can reach to the horizon.
+double SceneSize(const Surroundings& surroundings);
+
+/// What to look at: the bounds without what lies further from the middle than kMostSceneSizes
+/// times the scene's size along an axis, as sky and horizon do; all of them where nothing is left.
+Bounds Foreground(const Surroundings& surroundings);
+inline constexpr double kMostSceneSizes = 4;
 
 /// The camera of a window and how it moves. Left drag: orbit about the point under the cursor.
 /// Right drag: look around. Middle drag: pan. Wheel: towards the point under the cursor; while
@@ -32,9 +40,10 @@ class Controller {
   /// Plane z of what the picture shows at a pixel; none where it shows nothing.
   using DepthAt = std::function<std::optional<double>(const Eigen::Vector2d& pixel)>;
 
-  /// Starts at the first source view's camera, or nowhere in particular without one. Sizes in
-  /// pixels.
-  Controller(Surroundings surroundings, int width_px, int height_px, DepthAt depth_at);
+  /// Starts at the first source view's camera, or nowhere in particular without one. `up`: WorldUp,
+  /// unit length. Sizes in pixels.
+  Controller(Surroundings surroundings, const Eigen::Vector3d& up, int width_px, int height_px,
+             DepthAt depth_at);
 
   const NovelCamera& camera() const { return camera_; }
   /// Scene units per second.
@@ -61,7 +70,7 @@ class Controller {
   void GoToView(size_t index);  ///< of `cameras`
   void StepViews(int by);       ///< from the view stepped to last, or the nearest
   void GoToNearestView();
-  void ShowAll();
+  void ShowAll();  ///< the foreground
   /// At once, without a glide.
   void JumpTo(const NovelCamera& camera);
 
@@ -70,7 +79,7 @@ class Controller {
   std::optional<size_t> nearest_view() const;
   /// Index into `views`: the nearest that pictures are drawn from.
   std::optional<size_t> nearest_source() const;
-  double scene_size() const;
+  double scene_size() const { return SceneSize(surroundings_); }
 
  private:
   struct Drag {

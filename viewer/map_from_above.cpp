@@ -32,11 +32,12 @@ Ground GroundOf(const DtrSet& set) {
     forward += view->cam_from_world.rotation.conjugate() * Eigen::Vector3d::UnitZ();
   }
   Ground ground;
+  const Eigen::Vector3d up = WorldUp(set);
   // Seen from above, looking down: LookAlong puts what the cameras look at at the top; of pictures
   // from the air what is at the top of most of them.
-  const bool from_the_air = forward.normalized().dot(-around.up) >= kFromTheAir;
+  const bool from_the_air = forward.normalized().dot(-up) >= kFromTheAir;
   const Pose from_above =
-      LookAlong(set.scene_center, -around.up, from_the_air ? UpInImages(poses) : forward);
+      LookAlong(set.scene_center, -up, from_the_air ? UpInImages(poses) : forward);
   ground.right = from_above.rotation.conjugate() * Eigen::Vector3d::UnitX();
   ground.down = from_above.rotation.conjugate() * Eigen::Vector3d::UnitY();
   ground.min = ground.max = ground.Place(set.scene_center);

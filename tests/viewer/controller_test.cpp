@@ -32,7 +32,7 @@ DtrSet FourCameras() {
 class ControllerTest : public ::testing::Test {
  protected:
   Controller Make() {
-    return {SurroundingsOf(set_), kWidthPx, kHeightPx,
+    return {SurroundingsOf(set_), kUp, kWidthPx, kHeightPx,
             [this](const Eigen::Vector2d&) { return depth_; }};
   }
   static void Wait(Controller& controller, double seconds) {
@@ -234,6 +234,33 @@ TEST_F(ControllerTest, AnyInputLeavesAFinitePose) {
     ASSERT_TRUE(pose.translation.allFinite()) << i;
     ASSERT_NEAR(pose.rotation.norm(), 1, 1e-6) << i;
   }
+}
+
+// The cameras stand 10 from the middle, as the sky does not.
+TEST_F(ControllerTest, AllThatIsShownLeavesOutTheSky) {
+  const auto back = [&] {
+    Controller controller = Make();
+    controller.ShowAll();
+    Wait(controller, 1);
+    return Center(controller).norm();
+  };
+  const double scene_alone = back();
+  set_.bounds = {{-20, -4, -4}, {30, 4, 4}};
+  const double wide = back();
+  EXPECT_GT(wide, 2 * scene_alone) << "what is as far as a few times the cameras is shown";
+  set_.bounds = {{-4, -5000, -4}, {4, 4, 20000}};
+  const double sky = back();
+  EXPECT_LT(sky, 20 * 10) << "what is at the horizon is not";
+  EXPECT_GT(sky, scene_alone);
+}
+
+TEST(Foreground, IsAllOfItWhereNothingWouldBeLeft) {
+  DtrSet set = FourCameras();
+  set.bounds = {{900, 900, 900}, {901, 901, 901}};
+  EXPECT_EQ(Foreground(SurroundingsOf(set)).min, set.bounds.min);
+  EXPECT_EQ(Foreground(SurroundingsOf(set)).max, set.bounds.max);
+  set.bounds = {};
+  EXPECT_TRUE(Foreground(SurroundingsOf(set)).empty());
 }
 
 }  // namespace

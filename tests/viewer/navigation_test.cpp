@@ -146,6 +146,16 @@ TEST(ViewAll, HasEveryCornerInThePictureAndNoneToSpare) {
   }
 }
 
+// Pictures from the air: up cannot be up in them; north, which is at the top of most, can.
+TEST(ViewAll, LookingStraightDownHasTheTopOfMostPicturesAtItsTop) {
+  const Eigen::Vector3d up = Eigen::Vector3d::UnitZ(), north = Eigen::Vector3d::UnitY();
+  const std::vector<Pose> cameras = {LookAlong({0, 0, 9}, {0, 0.02, -1}, north),
+                                     LookAlong({3, 1, 9}, {0, -0.02, -1}, north)};
+  const Pose pose = ViewAll({{-4, -4, 0}, {4, 4, 1}}, cameras, up, kLens);
+  EXPECT_LT((AxisInWorld(pose, -Eigen::Vector3d::UnitY()) - north).norm(), 0.03);
+  EXPECT_LT((AxisInWorld(pose, Eigen::Vector3d::UnitZ()) + up).norm(), 0.03);
+}
+
 TEST(NearestView, WeighsPlaceAndDirection) {
   View here, beside, turned;
   here.cam_from_world = LookAlong({0, 0, 0}, {0, 0, 1}, kUp);

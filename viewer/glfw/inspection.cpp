@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "dtr/render/option_names.h"
+#include "viewer/labels.h"
 
 namespace dtr::viewer {
 namespace {
@@ -59,32 +60,45 @@ std::string Described(const RenderOptions& options) {
 
 void Text(const std::string& line) { ImGui::TextUnformatted(line.c_str()); }
 
-/// What is written beside a camera.
+/// A camera as it is drawn; none of a point behind the one who looks.
+struct Frustum {
+  std::optional<ImVec2> centre;
+  std::array<std::optional<ImVec2>, 4> corners;  ///< of the picture: from the top left, clockwise
+};
+
+Frustum FrustumOf(const View& view, const NovelCamera& seen_from, double length) {
+  const Pose world_from_cam = view.cam_from_world.Inverse();
+  const double w = view.camera.width_px(), h = view.camera.height_px();
+  const Eigen::Vector2d pixels[4] = {{0, 0}, {w, 0}, {w, h}, {0, h}};
+  Frustum frustum{Project(seen_from, world_from_cam.translation), {}};
+  for (size_t i = 0; i < 4; ++i) {
+    frustum.corners[i] =
+        Project(seen_from, world_from_cam * (length * view.camera.RayFromPixel(pixels[i])));
+  }
+  return frustum;
+}
+
+/// `photo` may be null.
+void DrawFrustum(ImDrawList& list, const Frustum& frustum, ImU32 colour,
+                 const PictureTexture* photo) {
+  const auto& corners = frustum.corners;
+  const bool all = std::all_of(corners.begin(), corners.end(), [](const auto& c) { return c; });
+  if (all && photo != nullptr) {
+    list.AddImageQuad(IdOf(*photo), *corners[0], *corners[1], *corners[2], *corners[3], {0, 0},
+                      {1, 0}, {1, 1}, {0, 1}, IM_COL32(255, 255, 255, 200));
+  }
+  for (size_t i = 0; i < 4; ++i) {
+    if (frustum.centre && corners[i]) list.AddLine(*frustum.centre, *corners[i], colour, 1.5F);
+    const auto& next = corners[(i + 1) % 4];
+    if (corners[i] && next) list.AddLine(*corners[i], *next, colour, 1.5F);
+  }
+}
+
+/// What is written beside a camera, and in which colour.
 struct CameraName {
-  double distance;  ///< from where one looks
-  ImVec2 at;
   ImU32 colour;
   std::string text;
 };
-
-/// The nearest cameras' names, and of the others those that would not lie on one of them: many in
-/// one place would not be legible, any of them.
-void WriteNames(ImDrawList& list, std::vector<CameraName> names) {
-  std::stable_sort(names.begin(), names.end(), [](const CameraName& a, const CameraName& b) {
-    return a.distance < b.distance;
-  });
-  std::vector<ImVec4> taken;  // left, top, right, bottom
-  for (const CameraName& name : names) {
-    const ImVec2 size = ImGui::CalcTextSize(name.text.c_str());
-    const ImVec4 box(name.at.x, name.at.y, name.at.x + size.x, name.at.y + size.y);
-    const bool free = std::none_of(taken.begin(), taken.end(), [&](const ImVec4& other) {
-      return box.x < other.z && other.x < box.z && box.y < other.w && other.y < box.w;
-    });
-    if (!free) continue;
-    taken.push_back(box);
-    list.AddText(name.at, name.colour, name.text.c_str());
-  }
-}
 
 }  // namespace
 
@@ -199,6 +213,19 @@ void InspectionOverlay::DrawPhoto(const Inspection& inspection, const View& view
   Label(list, {inspection.border * display.x + 10, 8}, kLine, label);
 }
 
+const PictureTexture* InspectionOverlay::Thumbnail(const View& view, PictureMaker& maker,
+                                                   PhotoShelf& photos) {
+  auto thumbnail = thumbnails_.find(&view);
+  if (thumbnail == thumbnails_.end()) {
+    const ImageRgb8* small = maker.ThumbnailOf(view);
+    if (small == nullptr) small = photos.Small(view);
+    if (small == nullptr) return nullptr;
+    thumbnail = thumbnails_.emplace(&view, std::make_unique<PictureTexture>()).first;
+    thumbnail->second->Upload(*small);
+  }
+  return thumbnail->second.get();
+}
+
 void InspectionOverlay::DrawCameras(const Controller& controller, const Inspection& inspection,
                                     const std::map<std::string, ViewVerdict>& verdicts,
                                     PictureMaker& maker, PhotoShelf& photos) {
@@ -207,16 +234,8 @@ void InspectionOverlay::DrawCameras(const Controller& controller, const Inspecti
   const double length = kFrustumShare * controller.scene_size();
   thumbnails_shown_ = 0;
   std::vector<CameraName> names;
+  std::vector<PlacedName> places;
   for (const View* view : controller.surroundings().cameras) {
-    const Pose world_from_cam = view->cam_from_world.Inverse();
-    const auto centre = Project(camera, world_from_cam.translation);
-    const double w = view->camera.width_px(), h = view->camera.height_px();
-    std::array<std::optional<ImVec2>, 4> corners;
-    const Eigen::Vector2d pixels[4] = {{0, 0}, {w, 0}, {w, h}, {0, h}};
-    for (size_t i = 0; i < 4; ++i) {
-      corners[i] =
-          Project(camera, world_from_cam * (length * view->camera.RayFromPixel(pixels[i])));
-    }
     const auto verdict = verdicts.find(view->name);
     const bool held_out = view->role == ViewRole::kHeldOut;
     const ImU32 colour = held_out                     ? kHeldOut
@@ -224,35 +243,23 @@ void InspectionOverlay::DrawCameras(const Controller& controller, const Inspecti
                          : verdict == verdicts.end()  ? kUntested
                          : verdict->second.good       ? kGood
                                                       : kBad;
-    const bool all = std::all_of(corners.begin(), corners.end(), [](const auto& c) { return c; });
-    auto thumbnail = thumbnails_.find(view);
-    if (thumbnail == thumbnails_.end()) {
-      const ImageRgb8* small = maker.ThumbnailOf(*view);
-      if (small == nullptr) small = photos.Small(*view);
-      if (small != nullptr) {
-        thumbnail = thumbnails_.emplace(view, std::make_unique<PictureTexture>()).first;
-        thumbnail->second->Upload(*small);
-      }
-    }
-    thumbnails_shown_ += thumbnail != thumbnails_.end();
-    if (all && thumbnail != thumbnails_.end()) {
-      list.AddImageQuad(IdOf(*thumbnail->second), *corners[0], *corners[1], *corners[2],
-                        *corners[3], {0, 0}, {1, 0}, {1, 1}, {0, 1}, IM_COL32(255, 255, 255, 200));
-    }
-    for (size_t i = 0; i < 4; ++i) {
-      if (centre && corners[i]) list.AddLine(*centre, *corners[i], colour, 1.5F);
-      const auto& next = corners[(i + 1) % 4];
-      if (corners[i] && next) list.AddLine(*corners[i], *next, colour, 1.5F);
-    }
-    if (corners[3]) {
-      std::string label = view->name;
-      if (held_out) label += " (held out)";
-      if (verdict != verdicts.end()) label += " " + verdict->second.text;
-      names.push_back({(camera.cam_from_world * view->CenterInWorld()).norm(), *corners[3], colour,
-                       std::move(label)});
-    }
+    const PictureTexture* photo = Thumbnail(*view, maker, photos);
+    thumbnails_shown_ += photo != nullptr;
+    const Frustum frustum = FrustumOf(*view, camera, length);
+    DrawFrustum(list, frustum, colour, photo);
+    const auto& at = frustum.corners[3];
+    if (!at) continue;
+    names.push_back({colour, view->name + (held_out ? " (held out)" : "") +
+                                 (verdict == verdicts.end() ? "" : " " + verdict->second.text)});
+    const ImVec2 size = ImGui::CalcTextSize(names.back().text.c_str());
+    places.push_back(
+        {(camera.cam_from_world * view->CenterInWorld()).norm(),
+         {Eigen::Vector2d(at->x, at->y), Eigen::Vector2d(at->x + size.x, at->y + size.y)}});
   }
-  WriteNames(list, std::move(names));
+  for (const size_t i : LegibleNames(places)) {
+    const Eigen::Vector2f at = places[i].box.min().cast<float>();
+    list.AddText({at.x(), at.y()}, names[i].colour, names[i].text.c_str());
+  }
 }
 
 void InspectionOverlay::DrawMarks(const Inspection& inspection, const NovelCamera& camera) {

@@ -71,6 +71,9 @@ class InspectionOverlay {
   const View* photo_of() const { return photo_of_; }
 
  private:
+  /// Null as long as there is no small photo of it.
+  const PictureTexture* Thumbnail(const View& view, PictureMaker& maker, PhotoShelf& photos);
+
   std::map<const View*, std::unique_ptr<PictureTexture>> thumbnails_;
   int thumbnails_shown_ = 0;  ///< of this instant's cameras
   PictureTexture photo_;

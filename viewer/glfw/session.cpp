@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "viewer/navigation.h"
+#include "viewer/world_up.h"
 
 namespace dtr::viewer {
 namespace {
@@ -27,7 +28,7 @@ Session::Session(const AppSettings& settings, const Host& host, const Tell& tell
       maker(*opened_->stream, ViewColours(opened_->set), MakerSettings(settings, tell),
             [this](const View& view) { return SigmaOfView(view); }),
       schedule(maker, settings.largest_divisor, tell),
-      controller(SurroundingsOf(opened_->set), width_px, height_px,
+      controller(SurroundingsOf(opened_->set), WorldUp(opened_->set), width_px, height_px,
                  [this](const Eigen::Vector2d& pixel) { return DepthAt(pixel); }),
       inspector({maker, schedule, controller,
                  [this](const View& view) { return SigmaOfView(view); }, host.verdicts,
