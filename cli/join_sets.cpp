@@ -38,6 +38,20 @@ nlohmann::json FingerprintOf(const std::vector<fs::path>& sets, const JoinOption
   return json;
 }
 
+/// How lengths and axes were found: kept where all sets say the same, with one world.
+nlohmann::json ProvenanceOf(const std::vector<DtrSet>& stills, const nlohmann::json& fingerprint) {
+  nlohmann::json provenance{{"joined", fingerprint}};
+  std::optional<nlohmann::json> scale;
+  for (const DtrSet& still : stills) {
+    const nlohmann::json own = nlohmann::json::parse(still.provenance_json, nullptr, false);
+    if (!own.is_object() || !own.contains("scale")) return provenance;
+    if (scale && *scale != own["scale"]) return provenance;
+    scale = own["scale"];
+  }
+  if (scale) provenance["scale"] = *scale;
+  return provenance;
+}
+
 /// The set in the world of the first one: its poses act on p - `origin`, box and centre are there.
 void MoveTo(const Eigen::Vector3d& origin, DtrSet& set) {
   const Eigen::Vector3d shift = origin - set.world_origin;
@@ -97,7 +111,7 @@ void JoinSets(const std::vector<fs::path>& sets, const fs::path& target, const J
   DtrSet moving;
   moving.unit = stills.front().unit;
   moving.world_origin = stills.front().world_origin;
-  moving.provenance_json = nlohmann::json{{"joined", fingerprint}}.dump();
+  moving.provenance_json = ProvenanceOf(stills, fingerprint).dump();
   progress.Stage("joining frames", static_cast<int>(sets.size()));
   for (size_t i = 0; i < sets.size(); ++i) {
     DtrSet& still = stills[i];

@@ -9,8 +9,8 @@
 
 #include "calib/bundle/lens_params.h"
 #include "calib/bundle/parts.h"
+#include "calib/bundle/pattern_checks.h"
 #include "calib/bundle/picture_shift.h"
-#include "calib/bundle/shutter.h"
 #include "calib/distributions.h"
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
@@ -300,31 +300,6 @@ void AddPicture(const BundleLimits& limits, Judgement& judgement) {
           : "no view's points are placed by two others"));
 }
 
-void AddShutter(const BundleLimits& limits, const Adjusted& fresh,
-                const BundleCovariance& covariance, Judgement& judgement) {
-  const ShutterTest test = TestShutter(fresh, covariance);
-  if (!test.not_tested.empty()) {
-    judgement.tests.push_back(AtMost("rolling_shutter_px", kNothing, limits.max_shutter_px,
-                                     "not tested: " + test.not_tested));
-    return;
-  }
-  const bool chance = test.p >= limits.min_p;
-  Check check = AtMost(
-      "rolling_shutter_px", chance ? 0 : test.amplitude_px, limits.max_shutter_px,
-      fmt::format("residuals as of cameras that turn while the rows are read: {:.3f} px RMS per "
-                  "coordinate; p = {:.2g}{}",
-                  test.amplitude_px, test.p, chance ? ", what noise does" : ""));
-  if (!check.passed) {
-    const auto surest = static_cast<size_t>(
-        std::max_element(test.sigmas.begin(), test.sigmas.end()) - test.sigmas.begin());
-    check.reason += fmt::format(
-        "; the surest is {}, by {:.3g} degrees from its first row to its "
-        "last",
-        fresh.bundle.images[surest].name, test.turns_rad[surest] * 180 / EIGEN_PI);
-  }
-  judgement.tests.push_back(std::move(check));
-}
-
 Judgement NotJudged(Judgement judgement, const std::string& why) {
   judgement.not_judged = why;
   return judgement;
@@ -416,7 +391,9 @@ Judgement JudgePart(const Bundle& given, const BundleLimits& limits, int threads
   WidenByHalves(judgement);
   AddDifferences(limits, judgement);
   AddPicture(limits, judgement);
-  AddShutter(limits, fresh, covariance, judgement);
+  for (Check& check : PatternChecks(fresh, covariance, limits)) {
+    judgement.tests.push_back(std::move(check));
+  }
   return judgement;
 }
 

@@ -26,6 +26,9 @@ struct BundleLimits {
   /// Residuals as of photos whose rows were read while the camera turned: RMS per coordinate that
   /// such turns explain beyond chance.
   double max_shutter_px = 0.1;
+  /// Residuals that a lens model cannot follow, along the radius or by regions: RMS per coordinate
+  /// that is beyond chance. Features err by themselves where a scene's texture does.
+  double max_lens_pattern_px = 0.1;
   double min_p = 1e-4;                ///< less likely by chance than this is no chance
   int most_unknowns = kMostUnknowns;  ///< of a bundle that is judged in one part
   double max_focal_share = 0.1;       ///< standard deviation of a focal length over itself
@@ -79,7 +82,9 @@ struct Judgement {
 ///    by more than predicted, all uncertainties are widened by that factor;
 ///  - the covariance is carried to a third view's pixels (TransferCovariance);
 ///  - degeneracies are looked for by name;
-///  - residuals are held against a shutter that reads row by row (shutter.h).
+///  - residuals are held against patterns of the lens (lens_patterns.h) and a shutter that reads
+///  row
+///    by row (shutter.h).
 /// Some 4000 points, drawn by their index, take part, and all of photos that would be left few.
 /// More than some 220 photos (kMostUnknowns with three turns each) are judged in parts of about 100
 /// that see the same points, each by itself; of every test the worst part's figure is told.

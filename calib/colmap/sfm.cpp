@@ -140,6 +140,7 @@ SfmResult RunSfm(const fs::path& images_dir, std::span<const SfmImageInput> imag
                  [&] { MappingStep(workspace, options); });
   result.model = ReadModel(workspace.folder() / "model");
   result.report.images_per_model = ModelSizes(workspace);
+  result.report.forward_motion = fs::exists(workspace.folder() / kForwardMotionNote);
   CompleteReport(workspace, result.model, result.report);
   return result;
 }

@@ -64,6 +64,7 @@ struct SfmReport {
   int max_image_size_px = 0;
   std::vector<std::string> not_registered;  ///< names without a pose, sorted
   std::vector<int> images_per_model;        ///< models COLMAP made, largest first; [0] was taken
+  bool forward_motion = false;              ///< mapped with the thresholds of a walk straight ahead
   double mean_reprojection_error_px = 0;    ///< over all observations, recomputed
 };
 

@@ -26,12 +26,15 @@ constexpr double kFar = 1000;  // times the boards' distance: as good as at infi
 class Judging {
  public:
   Judging(const JudgedCalibration& calibration, const std::optional<UnseenViews>& unseen,
-          const JudgeLimits& limits, int threads)
+          const JudgeLimits& limits, int threads, std::span<const double> distances)
       : calibration_(calibration), unseen_(unseen), limits_(limits), threads_(threads) {
     report_.unseen = unseen.has_value();
     for (const RigCamera& camera : calibration.cameras) {
       report_.cameras.push_back({});
       report_.cameras.back().name = camera.name;
+      for (const double distance : distances) {
+        report_.cameras.back().uncertainty_at.push_back({distance, {}});
+      }
     }
   }
 
@@ -337,11 +340,14 @@ class Judging {
     const ProjectionSensitivity sensitivity(solution);
     ParallelFor(0, static_cast<int>(report_.cameras.size()), threads_, [&](int c) {
       const auto at = static_cast<size_t>(c);
+      const auto map_at = [&](double distance) {
+        return UncertaintyMap(solution, sensitivity, solution.covariance, at, distance);
+      };
+      JudgedCamera& camera = report_.cameras[at];
       const double distance = BoardDistance(calibration_.board, solution.rig, at);
-      report_.cameras[at].near_uncertainty =
-          UncertaintyMap(solution, sensitivity, solution.covariance, at, distance);
-      report_.cameras[at].far_uncertainty =
-          UncertaintyMap(solution, sensitivity, solution.covariance, at, kFar * distance);
+      camera.near_uncertainty = map_at(distance);
+      camera.far_uncertainty = map_at(kFar * distance);
+      for (UncertaintyAt& chosen : camera.uncertainty_at) chosen.map = map_at(chosen.distance);
     });
     AddUncertainty("projection_uncertainty_px", limits_.max_uncertainty_px, "the boards' distance",
                    [](const JudgedCamera& c) -> const ImageMap& { return c.near_uncertainty; });
@@ -437,7 +443,7 @@ class Judging {
 }  // namespace
 
 JudgeReport Judge(const JudgedCalibration& calibration, const std::optional<UnseenViews>& unseen,
-                  const JudgeLimits& limits, int threads) {
+                  const JudgeLimits& limits, int threads, std::span<const double> distances) {
   const auto& views = unseen ? unseen->views : calibration.kept;
   for (size_t c = 0; c < calibration.cameras.size(); ++c) {
     if (std::none_of(views.begin(), views.end(), [&](const auto& v) { return v.camera == c; })) {
@@ -446,7 +452,7 @@ JudgeReport Judge(const JudgedCalibration& calibration, const std::optional<Unse
                               unseen ? "among the images" : "in the file; give --images"));
     }
   }
-  return Judging(calibration, unseen, limits, threads).Run();
+  return Judging(calibration, unseen, limits, threads, distances).Run();
 }
 
 }  // namespace dtr::calib

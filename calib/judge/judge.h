@@ -58,6 +58,12 @@ struct JudgedView {
   std::vector<ResidualArrow> arrows;
 };
 
+/// How uncertain projections are at a distance from the camera.
+struct UncertaintyAt {
+  double distance = 0;  ///< board units
+  ImageMap map;         ///< px; empty where no solve was possible
+};
+
 struct JudgedCamera {
   std::string name;
   ResidualStats stored;    ///< stored lens and place, boards alone refitted (kept or unseen views)
@@ -67,6 +73,7 @@ struct JudgedCamera {
   double distance = 0;                         ///< of the boards
   ImageMap near_uncertainty, far_uncertainty;  ///< px; empty where no solve was possible
   ImageMap difference;                         ///< px, stored against fresh
+  std::vector<UncertaintyAt> uncertainty_at;   ///< at the distances that were asked for
   double coverage = 0;
   std::vector<JudgedView> views;  ///< worst first
 };
@@ -83,13 +90,16 @@ struct JudgeReport {
 };
 
 /// Everything docs/VALIDATION.md lists, in its order. A test that cannot be made fails and says
-/// why; a degeneracy is named. Requires kept or unseen views of every camera; throws Error without.
+/// why; a degeneracy is named. `distances` (board units, > 0): where else uncertainty is told,
+/// which breaks no test. Requires kept or unseen views of every camera; throws Error without.
 JudgeReport Judge(const JudgedCalibration& calibration, const std::optional<UnseenViews>& unseen,
-                  const JudgeLimits& limits, int threads = 0);
+                  const JudgeLimits& limits, int threads = 0,
+                  std::span<const double> distances = {});
 
 /// JSON object: passed, tests[] as `validate` of sets has them; cameras[] with stored and held_out
-/// residuals, noise_px, regions[9], coverage, uncertainty_px and far_uncertainty_px {largest,
-/// median}, views[]; sigma_px, condition, unseen, flipped[].
+/// residuals, noise_px, regions[9], coverage, uncertainty_px and far_uncertainty_px {largest, p95,
+/// median}, uncertainty_at[] (the same with distance), views[]; sigma_px, condition, unseen,
+/// flipped[].
 std::string ToJson(const JudgeReport& report);
 
 // Of the views alone (data_tests.cpp), one check each, worst camera named.

@@ -9,7 +9,9 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 Json ToJsonValue(const ImageMap& map) {
-  return {{"largest", NumberOrNull(map.Largest())}, {"median", NumberOrNull(map.Median())}};
+  return {{"largest", NumberOrNull(map.Largest())},
+          {"p95", NumberOrNull(map.Quantile(0.95))},
+          {"median", NumberOrNull(map.Median())}};
 }
 
 }  // namespace
@@ -29,6 +31,11 @@ std::string ToJson(const JudgeReport& report) {
               {"uncertainty_px", ToJsonValue(camera.near_uncertainty)},
               {"far_uncertainty_px", ToJsonValue(camera.far_uncertainty)},
               {"difference_px", ToJsonValue(camera.difference)}};
+    item["uncertainty_at"] = Json::array();
+    for (const UncertaintyAt& at : camera.uncertainty_at) {
+      item["uncertainty_at"].push_back({{"distance", at.distance}});
+      item["uncertainty_at"].back().update(ToJsonValue(at.map));
+    }
     item["regions"] = Json::array();
     for (const auto& region : camera.regions) item["regions"].push_back(ToJsonValue(region));
     item["views"] = Json::array();

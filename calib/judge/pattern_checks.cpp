@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "calib/judge/patterns.h"
+#include "calib/residual_patterns.h"
 
 namespace dtr::calib {
 namespace {
@@ -49,11 +50,7 @@ std::vector<Check> PatternChecks(const Board& board, const Fresh& fresh,
   const RigSolution& solution = *fresh.solution;
   std::vector<Check> checks;
   const auto add = [&](const char* name, const PatternTest& test, const std::string& what) {
-    const bool chance = test.p >= limits.min_p;
-    checks.push_back(
-        AtMost(name, chance ? 0 : test.amplitude_px, limit,
-               fmt::format("{}: {:.4f} px RMS per coordinate; p = {:.2g}{}", what,
-                           test.amplitude_px, test.p, chance ? ", what noise does" : "")));
+    checks.push_back(PatternCheck(name, what, test.p, test.amplitude_px, limits.min_p, limit));
   };
   add("radial_pattern_px", TestRadial(solution),
       "residuals along the radius that the lens model cannot follow");

@@ -8,12 +8,11 @@
 #include <numbers>
 
 #include "calib/distributions.h"
-#include "calib/validate.h"
+#include "calib/residual_patterns.h"
 
 namespace dtr::calib {
 namespace {
 
-constexpr int kRings = 6, kRegions = 4;
 // Every corner that may lie elsewhere is three unknowns, and work grows with their cube.
 constexpr int kMostCornersOfShutter = 150;
 constexpr double kDependent = 1e-7;  // of columns of length 1: what is left of one that others span
@@ -253,14 +252,10 @@ PatternTest TestRadial(const RigSolution& solution) {
       const Eigen::Vector2d way = from_middle(frame, i);
       const double radius = way.norm();
       if (!(radius > 0)) continue;
-      // Hat functions centred on the outer edges of the rings: none at the middle, where there is
-      // no direction.
-      const double place = kRings * radius / reach[camera];
-      for (int ring = 0; ring < kRings; ++ring) {
-        const double weight = 1 - std::abs(place - (ring + 1));
-        if (weight <= 0) continue;
-        columns.block<2, 1>(2 * static_cast<long>(i), static_cast<long>(camera) * kRings + ring) =
-            weight * way / radius;
+      const auto weights = RingWeights(radius / reach[camera]);
+      for (size_t ring = 0; ring < kRings; ++ring) {
+        columns.block<2, 1>(2 * static_cast<long>(i), static_cast<long>(camera * kRings + ring)) =
+            weights[ring] * way / radius;
       }
     }
     return columns;
@@ -268,17 +263,16 @@ PatternTest TestRadial(const RigSolution& solution) {
 }
 
 PatternTest TestRegional(const RigSolution& solution) {
-  const long per_camera = 2 * kRegions * kRegions;
+  const long per_camera = 2L * kPatternRegions * kPatternRegions;
   const long count = static_cast<long>(solution.rig.cameras.size()) * per_camera;
   return TestSharedPattern(solution, [&](const FrameRows& frame) {
     Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(frame.residuals.size(), count);
     for (size_t i = 0; i < frame.origins.size(); ++i) {
       const size_t camera = CameraOf(solution, frame, i);
       const LensCamera& lens = solution.rig.cameras[camera].camera;
-      const Eigen::Vector2d pixel = PixelOf(solution, frame, i);
-      const int row = CellOf(pixel.y(), lens.height_px, kRegions);
-      const int column = CellOf(pixel.x(), lens.width_px, kRegions);
-      const long at = static_cast<long>(camera) * per_camera + 2 * (row * kRegions + column);
+      const int region =
+          PatternRegionOf(PixelOf(solution, frame, i), lens.width_px, lens.height_px);
+      const long at = static_cast<long>(camera) * per_camera + 2 * region;
       columns(2 * static_cast<long>(i), at) = 1;
       columns(2 * static_cast<long>(i) + 1, at + 1) = 1;
     }

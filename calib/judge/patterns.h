@@ -32,7 +32,7 @@ PatternTest TestFramePattern(std::span<const FrameRows> rows, const PatternColum
                              const PatternColumns& nuisance = {});
 
 /// Residuals along the radius from the principal point, as a function of the radius: hat functions
-/// on 6 rings per camera. A lens model that cannot follow the lens.
+/// on 6 rings per camera (residual_patterns.h). A lens model that cannot follow the lens.
 PatternTest TestRadial(const RigSolution& solution);
 /// A mean residual vector in each of 4 x 4 regions of the image, per camera.
 PatternTest TestRegional(const RigSolution& solution);

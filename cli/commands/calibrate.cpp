@@ -31,19 +31,20 @@ int RunCalibratePhotos(const Options& options, const Context& context) {
     throw UsageError(fmt::format("{}: holds a model already; remove it or choose another folder",
                                  options.output.string()));
   }
+  pipeline::CalibrateOptions calibrate;
+  // Before any photo is read: a wrong file must not cost their time.
+  if (!options.lens.empty()) calibrate.lens = pipeline::ReadLens(options.lens);
   const auto photos = capture::IngestPhotos(
       options.photos, {.threads = context.common.threads, .memory_gb = options.memory_gb},
       context.console);
   capture::RequireEnoughPhotos(photos, options.photos);
   pipeline::RequireMetres(metres, photos, options.photos.string());
-  pipeline::CalibrateOptions calibrate;
   calibrate.metres = metres;
   calibrate.threads = context.common.threads;
   calibrate.seed = context.common.seed;
   calibrate.memory_gb = options.memory_gb;
   calibrate.refine = options.refine;
   calibrate.determined = options.photos.string();
-  if (!options.lens.empty()) calibrate.lens = pipeline::ReadLens(options.lens);
   // The workspace stays: it holds COLMAP's arguments, logs and database, and lets a run continue.
   const auto calibrated =
       pipeline::CalibratePhotos(photos, calibrate, options.output / "workspace", context.console);

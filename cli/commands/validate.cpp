@@ -52,7 +52,8 @@ void RefuseForSets(const ValidateCalibrationOptions& options) {
        {std::pair{options.images.has_value(), "--images"},
         std::pair{options.pattern.has_value(), "--pattern"},
         std::pair{options.board.has_value(), "--board"},
-        std::pair{options.max_uncertainty_px.has_value(), "--max-uncertainty"}}) {
+        std::pair{options.max_uncertainty_px.has_value(), "--max-uncertainty"},
+        std::pair{!options.at.empty(), "--at"}}) {
     if (given) throw UsageError(fmt::format("{}: is for calibration files, not for sets", name));
   }
 }
@@ -138,6 +139,13 @@ void AddValidateCommand(CLI::App& app) {
                                     calib::JudgeLimits{}.max_uncertainty_px))
             ->check(CLI::PositiveNumber)
             ->type_name("PX");
+        command
+            .add_option("--at", calibration.at,
+                        "Of a calibration file: also tell the projections' standard deviation at "
+                        "these distances from the camera, as 2m or 60cm, or in the unit of the "
+                        "board's squares")
+            ->delimiter(',')
+            ->type_name("D,...");
         command
             .add_option("--report", calibration.report,
                         "The report as a page: residuals, coverage, uncertainty, worst views")

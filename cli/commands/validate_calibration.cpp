@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "calib/boards/board.h"
+#include "calib/boards/length.h"
 #include "cli/output_file.h"
 #include "cli/pipeline/judge_calibration.h"
 #include "dtr/base/error.h"
@@ -44,9 +45,35 @@ void SayReport(const calib::JudgeReport& report, Console& console) {
   }
 }
 
-}  // namespace
+void SayUncertainty(const calib::JudgeReport& report, bool metric, Console& console) {
+  for (const calib::JudgedCamera& camera : report.cameras) {
+    for (const calib::UncertaintyAt& at : camera.uncertainty_at) {
+      console.Say(fmt::format(
+          "{} at {:g}{}: standard deviation of a projection {:.3g} px or less in 95 % of the "
+          "image, median {:.3g} px",
+          camera.name, at.distance, metric ? " m" : " (the squares' unit)", at.map.Quantile(0.95),
+          at.map.Median()));
+    }
+  }
+}
 
-namespace {
+// In the unit of the board's squares.
+std::vector<double> DistancesOf(const std::vector<std::string>& words, const calib::Board& board) {
+  std::vector<double> distances;
+  for (const std::string& word : words) {
+    const auto length = calib::LengthFrom(word);
+    if (!length) {
+      throw UsageError(
+          fmt::format("--at: expected distances above 0, as 2m or 60cm, found '{}'", word));
+    }
+    if (length->has_unit && !board.metric) {
+      throw UsageError(fmt::format(
+          "--at {}: the board's squares have no unit; expected distances in the same one", word));
+    }
+    distances.push_back(length->value);
+  }
+  return distances;
+}
 
 calib::Calibration Read(const ValidateCalibrationOptions& options) {
   const std::string file = options.file.string();
@@ -80,6 +107,7 @@ int RunValidateCalibration(const ValidateCalibrationOptions& options, const Cont
   calib::JudgeLimits limits;
   limits.max_rms_px = options.max_rms_px.value_or(limits.max_rms_px);
   limits.max_uncertainty_px = options.max_uncertainty_px.value_or(limits.max_uncertainty_px);
+  const std::vector<double> distances = DistancesOf(options.at, calibration.board);
   std::optional<calib::UnseenViews> unseen;
   auto skipped = nlohmann::ordered_json::array();
   if (options.images) {
@@ -92,9 +120,10 @@ int RunValidateCalibration(const ValidateCalibrationOptions& options, const Cont
     }
     unseen = std::move(photos.unseen);
   }
-  const calib::JudgeReport report =
-      calib::Judge(pipeline::JudgedFrom(calibration), unseen, limits, context.common.threads);
+  const calib::JudgeReport report = calib::Judge(pipeline::JudgedFrom(calibration), unseen, limits,
+                                                 context.common.threads, distances);
   SayReport(report, context.console);
+  SayUncertainty(report, calibration.board.metric, context.console);
   if (options.report) {
     WriteFileAtomically(*options.report,
                         pipeline::CalibrationPage(calibration, report,

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "cli/command.h"
 
@@ -13,6 +14,7 @@ struct ValidateCalibrationOptions {
   std::optional<std::filesystem::path> images, report;
   std::optional<std::string> pattern, board;  ///< of the photos' names; as calibrate board has it
   std::optional<double> max_rms_px, max_uncertainty_px;
+  std::vector<std::string> at;  ///< distances at which uncertainty is told, as people write lengths
 };
 
 /// Judges, prints one line per test, writes the page where asked for; kFailed when a test breaks.

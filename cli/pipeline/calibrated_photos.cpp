@@ -34,6 +34,7 @@ Json SfmJson(const colmap::SfmReport& report, const calib::SfmModel& model) {
   Json json;
   json["mean_reprojection_error_px"] = report.mean_reprojection_error_px;
   json["images_per_model"] = report.images_per_model;
+  if (report.forward_motion) json["forward_motion"] = true;
   json["feature_image_size_px"] = report.max_image_size_px;
   json["points"] = model.points.size();
   json["lens_model"] =

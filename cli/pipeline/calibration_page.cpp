@@ -99,6 +99,12 @@ std::string CalibrationPage(const calib::Calibration& calibration, const calib::
     AddRegionTable(page, camera.regions, "corners");
     AddMap(page, "Standard deviation of a projection at the boards' distance", " px", size,
            camera.near_uncertainty);
+    for (const calib::UncertaintyAt& at : camera.uncertainty_at) {
+      AddMap(page,
+             fmt::format("The same at {:g}{}", at.distance,
+                         calibration.board.metric ? " m" : " of the squares' unit"),
+             " px", size, at.map);
+    }
     AddMap(page, "The same at infinity", " px", size, camera.far_uncertainty);
     AddDifference(page, size, camera.difference);
     page.Paragraph("The worst views:");

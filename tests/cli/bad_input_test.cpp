@@ -64,6 +64,19 @@ TEST_F(BadInput, FoldersWithoutEnoughPhotos) {
   ExpectNothingBuilt();
 }
 
+TEST_F(BadInput, ALensFileIsReadBeforeAnyPhoto) {
+  // The folder has no photo: reading it first would say that.
+  fs::create_directories(folder_ / "photos");
+  const auto calibrate = [&](const std::string& lens) {
+    return Dtr({"calibrate", "photos", In("photos"), "-o", In("calibration"), "--lens", In(lens)});
+  };
+  WriteFileAtomically(In("lens.json"), "{}");
+  ExpectRefused(calibrate("lens.json"), kFailed, "lens.json");
+  WriteFileAtomically(In("lens.xml"), "");
+  ExpectRefused(calibrate("lens.xml"), kWrongUsage, "expected a .json of `dtr calibrate board`");
+  EXPECT_FALSE(fs::exists(In("calibration")));
+}
+
 TEST_F(BadInput, ATextFileAmongThePhotosIsSkippedAndNamed) {
   fs::copy(Photos(), In("photos"));
   WriteFileAtomically(In("photos/notes.jpg"), "Sunny day, 14 photos.\n");

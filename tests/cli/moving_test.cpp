@@ -5,6 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "dtr/base/files.h"
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/instants.h"
@@ -135,6 +136,31 @@ TEST_F(MovingSet, WhatKnowsStillScenesAloneSaysSo) {
                 "expected a set of one frame, found 2");
   ExpectRefused(Dtr({"dataset", "make", "plane", "-o", At("p"), "--time", "1"}), 2,
                 "where nothing moves");
+}
+
+// What up is, and whose metres, are told by the scale's provenance.
+TEST_F(MovingSet, HowLengthsWereFoundIsKeptWhereAllInstantsSayTheSame) {
+  const auto joined_scale = [&](const std::vector<Json>& scales) {
+    std::vector<std::string> join = {"join"};
+    for (size_t i = 0; i < scales.size(); ++i) {
+      const std::string copy = In("copy" + std::to_string(i) + ".dtr");
+      fs::remove_all(copy);
+      fs::copy(At("t0.dtr"), copy, fs::copy_options::recursive);
+      Json set = Json::parse(Text(copy + "/set.json"));
+      if (!scales[i].is_null()) set["provenance"]["scale"] = scales[i];
+      WriteFileAtomically(copy + "/set.json", set.dump());
+      join.push_back(copy);
+    }
+    join.insert(join.end(), {"-o", In("joined.dtr"), "--fps", "2", "--force"});
+    DtrOk(join);
+    return Json::parse(io::ReadSet(In("joined.dtr")).provenance_json).value("scale", Json());
+  };
+  const Json gps = {{{"method", "gps"}, {"axes", "east, north, up"}}};
+  const Json board = {{{"method", "board"}}};
+  EXPECT_EQ(joined_scale({gps, gps}), gps);
+  EXPECT_EQ(joined_scale({gps, board}), Json());
+  EXPECT_EQ(joined_scale({gps, Json()}), Json());
+  EXPECT_EQ(joined_scale({Json(), gps}), Json());
 }
 
 TEST(FrameOfPicture, GivesEveryFrameItsShare) {

@@ -76,6 +76,26 @@ TEST_F(ValidateCalibration, ACameraFromElsewhereIsJudgedByPhotosOfABoard) {
   EXPECT_NEAR(rms_px["left.yml"], rms_px["left.txt"], 1e-6);  // half a pixel would be 0.7 px
 }
 
+// What errs in one direction grows with 1/distance up close and stays what it is far away.
+TEST_F(ValidateCalibration, UncertaintyIsToldAtChosenDistances) {
+  DTR_REQUIRE_DATA(Photos());
+  Calibrate();
+  const Ran ran = Validate("left.json", {"--at", "15,200,20000", "--json", "-"});
+  ASSERT_TRUE(ran.code == 0 || ran.code == kFailed) << ran.err;
+  EXPECT_THAT(ran.err, HasSubstr("at 200 (the squares' unit): standard deviation of a projection"));
+  const Json camera = Json::parse(ran.out)["cameras"][0];
+  ASSERT_EQ(camera["uncertainty_at"].size(), 3u);
+  EXPECT_EQ(camera["uncertainty_at"][0]["distance"], 15.0);
+  const auto p95 = [&](size_t i) { return camera["uncertainty_at"][i]["p95"].get<double>(); };
+  EXPECT_GT(p95(0), 0);
+  EXPECT_GT(p95(1), p95(0)) << "the boards stood some 15 away";
+  EXPECT_NEAR(p95(2), camera["far_uncertainty_px"]["p95"].get<double>(), 0.02 * p95(2));
+  ExpectRefused(Validate("left.json", {"--at", "2m"}), kWrongUsage,
+                "--at 2m: the board's squares have no unit");
+  ExpectRefused(Validate("left.json", {"--at", "0"}), kWrongUsage,
+                "--at: expected distances above 0, as 2m or 60cm, found '0'");
+}
+
 TEST_F(ValidateCalibration, OptionsThatDoNotBelongTogetherAreRefused) {
   DTR_REQUIRE_DATA(Photos());
   Calibrate();

@@ -1,5 +1,7 @@
 #include "dtr/io/formats/transforms_json.h"
 
+#include <fmt/format.h>
+
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -71,7 +73,12 @@ double FocalFromAngle(const FrameFields& fields, const char* key, int side_px) {
     throw Error(fields.where() + "." + key + ": expected an angle below pi, found " +
                 std::to_string(angle_rad));
   }
-  return side_px / 2.0 / std::tan(angle_rad / 2);
+  const double focal_px = side_px / 2.0 / std::tan(angle_rad / 2);
+  if (std::isfinite(focal_px)) return focal_px;
+  throw Error(
+      fmt::format("{}.{}: expected an angle of view in radians, found {:g}, which no focal "
+                  "length has",
+                  fields.where(), key, angle_rad));
 }
 
 PinholeCamera CameraFrom(const FrameFields& fields, const SizedImage& image) {

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "calib/bundle/shutter.h"
 #include "tests/calib/bundle/sabotage.h"
 
 namespace dtr::calib {
@@ -40,51 +39,6 @@ TEST(Judge, HalvesDifferAsPredicted) {
   const Judgement judgement = Judge(Honest(77, 800), {});
   EXPECT_GT(judgement.halves_ratio, 0.5);
   EXPECT_LT(judgement.halves_ratio, 1.7);  // 7 cameras share lens and points: few independent ones
-}
-
-ShutterTest ShutterOf(const Bundle& seen) {
-  const Adjusted adjusted = Adjust(seen, AllFree());
-  return TestShutter(adjusted, CovarianceOf(adjusted, AllFree()));
-}
-
-TEST(Shutter, OfNoiseEveryShareOfTheTestsIsAsRareAsItsP) {
-  constexpr int kDraws = 40;
-  int below_half = 0, below_a_tenth = 0;
-  for (int k = 0; k < kDraws; ++k) {
-    const ShutterTest test = ShutterOf(MakeBundle({.images = 6,
-                                                   .points = 150,
-                                                   .lens = kPinholeLens,
-                                                   .noise_px = 0.3,
-                                                   .seed = 900 + static_cast<std::uint64_t>(k)}));
-    ASSERT_EQ(test.freedom, 18);
-    below_half += test.p < 0.5;
-    below_a_tenth += test.p < 0.1;
-  }
-  // Binomial: 20 +- 3.2 and 4 +- 1.9; 3.5 sigmas.
-  EXPECT_NEAR(below_half, 20, 11);
-  EXPECT_LE(below_a_tenth, 10);
-}
-
-TEST(Shutter, TurnsAreFoundAndMeasured) {
-  Bundle seen =
-      MakeBundle({.images = 7, .points = 400, .lens = kPinholeLens, .noise_px = 0.1, .seed = 3});
-  // The third camera alone turns, by half a degree from its first row to its last.
-  const Eigen::Vector3d turn(0.003, -0.008, 0.002);
-  for (BundleObservation& o : seen.observations) {
-    if (o.image != 2) continue;
-    const Eigen::Vector3d p =
-        seen.images[2].cam_from_world * seen.points[static_cast<size_t>(o.point)].hnormalized();
-    const Eigen::Vector3d w = (o.pixel.y() / kPinholeLens.height_px - 0.5) * turn;
-    o.pixel += *kPinholeLens.PixelFromCam(Eigen::AngleAxisd(w.norm(), w.normalized()) * p) -
-               *kPinholeLens.PixelFromCam(p);
-  }
-  AdjustOptions all = AllFree();
-  all.outlier_sigmas = 0;
-  const Adjusted adjusted = Adjust(seen, all);
-  const ShutterTest test = TestShutter(adjusted, CovarianceOf(adjusted, all));
-  EXPECT_LT(test.p, 1e-12);
-  EXPECT_EQ(std::max_element(test.sigmas.begin(), test.sigmas.end()) - test.sigmas.begin(), 2);
-  EXPECT_NEAR(test.turns_rad[2], turn.norm(), 0.1 * turn.norm());
 }
 
 TEST(Judge, PureRotationIsNamed) {

@@ -20,14 +20,19 @@ inline AdjustOptions AllFree() {
   return options;
 }
 
-// A set as `dtr build` leaves it: adjusted to its own noisy sights.
+// A set as `dtr build` leaves it: adjusted to its own noisy sights. What is seen fills the images:
+// where nothing is seen, no fault of the lens shows.
 inline Bundle Honest(std::uint64_t seed, int points = 300) {
-  const Bundle seen = MakeBundle(
-      {.images = 7, .points = points, .lens = kPinholeLens, .noise_px = 0.3, .seed = seed});
-  return Adjust(seen, AllFree()).bundle;
+  SceneSpec spec{
+      .images = 7, .points = points, .lens = kPinholeLens, .noise_px = 0.3, .seed = seed};
+  spec.point = [](Random& random) {
+    const double x = random.Uniform(-2.2, 2.2), y = random.Uniform(-2, 2);
+    return Eigen::Vector3d(x, y, random.Uniform(-2, 2));
+  };
+  return Adjust(MakeBundle(spec), AllFree()).bundle;
 }
 
-inline constexpr int kSabotages = 8;
+inline constexpr int kSabotages = 9;
 
 // How many standard deviations a stored calibration is off, as the honest one's covariance has it.
 struct Sabotaged {
@@ -58,6 +63,18 @@ inline void ReadRowByRow(double largest_turn_rad, Random& random, Bundle& bundle
     const auto still = lens.PixelFromCam(p);
     const auto turned = lens.PixelFromCam(Eigen::AngleAxisd(turn.norm(), turn.normalized()) * p);
     if (still && turned) o.pixel += *turned - *still;
+  }
+}
+
+// The sights as a lens draws them that waves, by this much, twice across its image, as a
+// bent pane before it does: slower waves are what distortion follows.
+inline void Ripple(double height_px, Bundle& bundle) {
+  for (BundleObservation& o : bundle.observations) {
+    const BundleImage& image = bundle.images[static_cast<size_t>(o.image)];
+    const LensCamera& lens = bundle.lenses[static_cast<size_t>(image.lens)];
+    const double x = 4 * EIGEN_PI * o.pixel.x() / lens.width_px;
+    const double y = 4 * EIGEN_PI * o.pixel.y() / lens.height_px;
+    o.pixel += height_px * Eigen::Vector2d(std::sin(y), std::sin(x));
   }
 }
 
@@ -136,6 +153,12 @@ inline Sabotaged Sabotage(const Bundle& honest, int kind, Random& random) {
       ReadRowByRow(random.Uniform(0.002, 0.01), random, s.bundle);
       s.test = "rolling_shutter_px";
       s.word = "rows are read";
+      break;
+    case 7:  // a lens that no model follows
+      s.sigmas = 1e3;
+      Ripple(random.Uniform(0.5, 2), s.bundle);
+      s.test = "regional_pattern_px";
+      s.word = "image regions";
       break;
     default: {  // pixels as another lens would have undistorted them
       s.sigmas = 1e3;

@@ -276,6 +276,34 @@ TEST(Stiff, CentresOnALineAreNamedAndGiveTheTruth) {
                  "collinear_centres");
 }
 
+// Photos 0 and 1 are of one place and direction: the same camera, with noise of its own.
+SceneSpec WithTheSameCameraTwice() {
+  SceneSpec spec{.points = 400, .lens = kPinholeLens};
+  spec.pose = [](int i, int n) { return testing::ArcPose(std::max(i, 1), n); };
+  return spec;
+}
+
+TEST(Stiff, TwoIdenticalCamerasAmongOthersGiveTheTruth) {
+  const auto [truth, seen] = TrueAndSeen(WithTheSameCameraTwice());
+  const Held held = ExpectTheTruth(truth, Perturbed(seen, 0.01), LensFreedom::kAll);
+  EXPECT_TRUE(FindDegeneracies(held.out, held.covariance, BundleLimits{}.max_focal_share).empty())
+      << "two photos from one place are no copies of each other";
+}
+
+TEST(Stiff, TheSamePhotoTwiceAmongOthersIsNamed) {
+  Bundle bundle = MakeBundle(WithTheSameCameraTwice());  // no noise: the same sights
+  bundle.images[0].name = "first.jpg", bundle.images[1].name = "again.jpg";
+  const Judgement judgement = ExpectNamed(bundle, {"duplicate_images"});
+  EXPECT_EQ(Find(judgement.degeneracies, "duplicate_images")->detail, "first.jpg = again.jpg");
+}
+
+// Nothing but one place: no point has a distance.
+TEST(Stiff, TwoIdenticalCamerasAloneAreNamed) {
+  SceneSpec spec{.images = 2, .points = 400, .lens = kPinholeLens, .noise_px = kNoisePx};
+  spec.pose = [](int, int) { return testing::ArcPose(3, 8); };
+  ExpectNamed(MakeBundle(spec), {"pure_rotation"});
+}
+
 // A point by two known cameras: its errors along and across the rays are those of its covariance.
 TEST(Stiff, APointThatTwoRaysATenthOfADegreeApartPlaceErrsAsPredicted) {
   const PinholeCamera camera = kPinholeLens.Pinhole();

@@ -228,6 +228,8 @@ TEST_F(RunSfmWithFake, AWalkStraightAheadStartsFromPhotosInLineWithWhatTheySee) 
   ASSERT_EQ(result.report.steps.size(), 4u);
   EXPECT_THAT(result.report.steps[2].argv, Not(Contains("--Mapper.init_max_forward_motion")));
   EXPECT_THAT(result.report.steps[3].argv, Contains("--Mapper.init_max_forward_motion"));
+  EXPECT_TRUE(result.report.forward_motion);
+  EXPECT_TRUE(Run().report.forward_motion) << "of a run that goes on from it, too";
 }
 
 // Its points are seen under as small angles, and by as few others, as those that made the model.

@@ -225,6 +225,18 @@ TEST(TransformsJson, AnAngleAloneGivesTheFocalLength) {
   EXPECT_EQ(camera.cy_px(), 7.5);
 }
 
+TEST(TransformsJson, AFocalLengthBeyondAllNumbersIsRefused) {
+  const auto with = [](const std::string& fields) {
+    return ErrorOf([&] {
+      Transforms(TransformsWith(R"("w": 40, "h": 30, "fl_x": 50, "fl_y": 51, "cx": 21, "cy": 14)",
+                                fields));
+    });
+  };
+  EXPECT_THAT(with(R"("camera_angle_x": 1e-320)"), HasSubstr("expected an angle of view"));
+  EXPECT_THAT(with(R"("w": 4, "h": 3, "fl_x": 1e308)"), HasSubstr("finite at"));
+  EXPECT_THAT(with(R"("w": 400, "h": 300, "fl_x": 5e-324)"), HasSubstr("above 0 at"));
+}
+
 TEST(TransformsJson, WhatWouldBeReadWronglyIsRefused) {
   const auto with = [](const std::string& from, const std::string& to) {
     return ErrorOf([&] { Transforms(TransformsWith(from, to)); });
