@@ -5,6 +5,8 @@
 
 #include "calib/bundle/covariance.h"
 #include "calib/bundle/judge.h"
+#include "calib/bundle/lens_patterns.h"
+#include "calib/bundle/shutter.h"
 #include "tests/calib/bundle/synthetic_bundle.h"
 #include "tests/calib/sabotage_tally.h"
 
@@ -78,15 +80,31 @@ inline void Ripple(double height_px, Bundle& bundle) {
   }
 }
 
+// A pattern's strength: what is left of it in exact sights, over its limit; 5 where it reaches
+// that. Poses, lens and points follow the rest of it.
+template <typename Spoil, typename Test>
+double SigmasOfPattern(const Bundle& honest, const Spoil& spoil, const Test& test,
+                       double limit_px) {
+  Bundle exact = honest;
+  const auto pixels = Projections(honest);
+  for (size_t i = 0; i < pixels.size(); ++i) exact.observations[i].pixel = pixels[i];
+  spoil(exact);
+  const Adjusted adjusted = Adjust(exact, AllFree());
+  return 5 * test(adjusted, CovarianceOf(adjusted, AllFree())).fit.amplitude_px / limit_px;
+}
+
 inline Sabotaged Sabotage(const Bundle& honest, int kind, Random& random) {
   Sabotaged s{honest, 0, "", ""};
-  const Adjusted adjusted = Adjust(honest, AllFree());
-  const BundleCovariance covariance = CovarianceOf(adjusted, AllFree());
+  // With distortion, as whoever judges undistorted views has to allow for.
+  Bundle distorted = honest;
+  distorted.lenses[0].model = LensModel::kOpenCv;
+  distorted.lenses[0].params.resize(8, 0);
+  const BundleCovariance covariance = CovarianceOf(Adjust(distorted, AllFree()), AllFree());
   const double wanted = random.Uniform(8, 40);
   const int image = random.Index(static_cast<int>(honest.images.size()));
   Pose& pose = s.bundle.images[static_cast<size_t>(image)].cam_from_world;
   std::vector<double>& params = s.bundle.lenses[0].params;
-  const Eigen::MatrixXd of_lens = covariance.OfLens(honest, 0);
+  const Eigen::MatrixXd of_lens = covariance.OfLens(distorted, 0);
   const Eigen::MatrixXd of_image = covariance.OfImage(image);
   switch (kind) {
     case 0:  // focal lengths
@@ -148,18 +166,28 @@ inline Sabotaged Sabotage(const Bundle& honest, int kind, Random& random) {
       s.test = "degeneracies";
       s.word = "duplicate_images";
       break;
-    case 6:  // rows are read one after the other by a camera that turns
-      s.sigmas = 1e3;
-      ReadRowByRow(random.Uniform(0.002, 0.01), random, s.bundle);
+    case 6: {  // rows are read one after the other by a camera that turns
+      const double largest_turn_rad = random.Uniform(0.002, 0.01);
+      const auto spoil = [&, drawn = random](Bundle& bundle) {
+        Random turns = drawn;  // the same in both bundles
+        ReadRowByRow(largest_turn_rad, turns, bundle);
+      };
+      s.sigmas = SigmasOfPattern(honest, spoil, TestShutter, BundleLimits{}.max_shutter_px);
+      spoil(s.bundle);
       s.test = "rolling_shutter_px";
       s.word = "rows are read";
       break;
-    case 7:  // a lens that no model follows
-      s.sigmas = 1e3;
-      Ripple(random.Uniform(0.5, 2), s.bundle);
+    }
+    case 7: {  // a lens that no model follows
+      const double height_px = random.Uniform(0.5, 2);
+      const auto spoil = [&](Bundle& bundle) { Ripple(height_px, bundle); };
+      s.sigmas =
+          SigmasOfPattern(honest, spoil, TestRegionalPattern, BundleLimits{}.max_lens_pattern_px);
+      spoil(s.bundle);
       s.test = "regional_pattern_px";
       s.word = "image regions";
       break;
+    }
     default: {  // pixels as another lens would have undistorted them
       s.sigmas = 1e3;
       for (BundleObservation& o : s.bundle.observations) {
@@ -196,11 +224,12 @@ inline Tally SabotageAll(int count, std::uint64_t seed) {
     }
     double moved = 0;
     for (const auto& camera : judged.cameras) moved = std::max(moved, camera.moved_px);
-    const bool invisible = moved <= NegligiblePx({}, judged.sigma_px);
+    const bool invisible = bad.sigmas < 5 || moved <= NegligiblePx({}, judged.sigma_px);
     (invisible ? tally.not_detectable : tally.missed) += 1;
     std::cout << (invisible ? "not detectable: " : "missed: ") << "kind " << k % kSabotages << ", "
-              << bad.sigmas << " sigmas, points move by " << moved << " px; "
-              << BrokenTests(judged.tests) << "\n";
+              << bad.sigmas << " sigmas, points move by " << moved << " px, halves differ by "
+              << judged.halves_ratio << " of what was predicted; " << BrokenTests(judged.tests)
+              << "\n";
   }
   return tally;
 }
