@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "calib/bundle/lens_params.h"
+#include "calib/bundle/moved.h"
 #include "calib/bundle/parts.h"
 #include "calib/bundle/pattern_checks.h"
 #include "calib/bundle/picture_shift.h"
@@ -75,33 +76,12 @@ Eigen::VectorXd ParamDifference(const LensCamera& from, const LensCamera& to) {
          Eigen::Map<const Eigen::VectorXd>(from.params.data(), n);
 }
 
-// RMS over the fresh points that an image's used sights show of how far another camera draws them;
-// per image. Points that outliers made say nothing of cameras.
-std::vector<double> Moved(const Adjusted& solved, const Bundle& other_cameras) {
-  const Bundle& fresh = solved.bundle;
-  Bundle other = fresh;
-  other.lenses = other_cameras.lenses;
-  other.images = other_cameras.images;
-  const auto a = Residuals(fresh), b = Residuals(other);
-  std::vector<double> squared(fresh.images.size()), count(fresh.images.size());
-  for (size_t i = 0; i < a.size(); ++i) {
-    if (!solved.used[i] || !a[i].allFinite() || !b[i].allFinite()) continue;
-    const auto image = static_cast<size_t>(fresh.observations[i].image);
-    squared[image] += (a[i] - b[i]).squaredNorm();
-    count[image] += 1;
-  }
-  for (size_t i = 0; i < squared.size(); ++i) {
-    squared[i] = count[i] > 0 ? std::sqrt(squared[i] / count[i]) : kNothing;
-  }
-  return squared;
-}
-
 void CompareWithStored(const Bundle& stored, const Adjusted& fresh,
                        const BundleCovariance& covariance, Judgement& judgement) {
-  const std::vector<double> moved = Moved(fresh, stored);
+  const std::vector<double> moved = MovedPxInNearestWorld(fresh, stored);
   Bundle only_lenses = fresh.bundle;
   only_lenses.lenses = stored.lenses;
-  const std::vector<double> moved_by_lens = Moved(fresh, only_lenses);
+  const std::vector<double> moved_by_lens = MovedPx(fresh, only_lenses);
   for (size_t i = 0; i < stored.images.size(); ++i) {
     CameraJudgement camera;
     camera.name = stored.images[i].name;
@@ -193,7 +173,7 @@ void AddHalves(const BundleLimits& limits, const Halves& halves, const Adjusted 
       AtMost("halves_ratio", judgement.halves_ratio, limits.max_halves_ratio,
              "two halves of the points, solved apart: their poses' difference over the predicted");
   double moved_px = 0;
-  for (const double px : Moved(solved[0], solved[1].bundle)) {
+  for (const double px : MovedPxInNearestWorld(solved[0], solved[1].bundle)) {
     if (px > moved_px) moved_px = px;
   }
   // Exact sights leave rounding, of which no ratio means anything.

@@ -48,7 +48,8 @@ struct Degeneracy {
 struct CameraJudgement {
   std::string name;
   double sigmas = 0;                ///< stored pose against the fresh one
-  double moved_px = 0;              ///< RMS over its sights, stored camera against fresh one
+  double moved_px = 0;              ///< RMS over its sights, stored camera against fresh one, in
+                                    ///< the world that is nearest to most (moved.h)
   double turn_sigma_rad = 0;        ///< largest axis of the turn's uncertainty
   double centre_sigma = 0;          ///< of the centre's, world units, in the free network's gauge
   double picture_shift_px = 0;      ///< 95 %; NaN where no two neighbours place its points

@@ -1,9 +1,12 @@
 // tests/calib/bundle/sabotage.h -- photo sets spoiled by seed, and whether that is found.
 #pragma once
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <iostream>
 
 #include "calib/bundle/covariance.h"
+#include "calib/bundle/gauge.h"
 #include "calib/bundle/judge.h"
 #include "calib/bundle/lens_patterns.h"
 #include "calib/bundle/shutter.h"
@@ -80,6 +83,24 @@ inline void Ripple(double height_px, Bundle& bundle) {
   }
 }
 
+// How far the worst camera is off: one that stands elsewhere moves all in the gauge that is nearest
+// to what is stored, and itself the less.
+inline double SigmasOfPose(const Bundle& honest, const Bundle& stored,
+                           const BundleCovariance& covariance) {
+  Bundle fresh = honest;
+  MoveToGaugeOf(stored, fresh);
+  double most = 0;
+  for (size_t i = 0; i < honest.images.size(); ++i) {
+    const Pose &from = stored.images[i].cam_from_world, &to = fresh.images[i].cam_from_world;
+    const Eigen::AngleAxisd turn((to.rotation * from.rotation.conjugate()).normalized());
+    Eigen::Matrix<double, 6, 1> d;
+    d << turn.angle() * turn.axis(), to.TargetOriginInSource() - from.TargetOriginInSource();
+    const Eigen::MatrixXd variance = covariance.OfImage(static_cast<int>(i));
+    most = std::max(most, std::sqrt(d.dot(variance.ldlt().solve(d))));
+  }
+  return most;
+}
+
 // A pattern's strength: what is left of it in exact sights, over its limit; 5 where it reaches
 // that. Poses, lens and points follow the rest of it.
 template <typename Spoil, typename Test>
@@ -124,8 +145,8 @@ inline Sabotaged Sabotage(const Bundle& honest, int kind, Random& random) {
       const Eigen::Vector3d d = Direction(random);
       const Eigen::Matrix3d m = of_image.bottomRightCorner<3, 3>();
       const double length = wanted / std::sqrt(d.dot(m.inverse() * d));
-      s.sigmas = wanted;
       pose.translation -= pose.rotation * (length * d);
+      s.sigmas = SigmasOfPose(honest, s.bundle, covariance);
       s.test = "camera_difference_sigmas";
       s.word = honest.images[static_cast<size_t>(image)].name;
       break;
@@ -134,10 +155,10 @@ inline Sabotaged Sabotage(const Bundle& honest, int kind, Random& random) {
       const Eigen::Vector3d d = Direction(random);
       const Eigen::Matrix3d m = of_image.topLeftCorner<3, 3>();
       const double angle = wanted / std::sqrt(d.dot(m.inverse() * d));
-      s.sigmas = wanted;
       const Eigen::Vector3d centre = pose.TargetOriginInSource();
       pose.rotation = (Eigen::AngleAxisd(angle, d) * pose.rotation).normalized();
       pose.translation = -(pose.rotation * centre);
+      s.sigmas = SigmasOfPose(honest, s.bundle, covariance);
       s.test = "camera_difference_sigmas";
       s.word = honest.images[static_cast<size_t>(image)].name;
       break;
