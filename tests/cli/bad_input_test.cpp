@@ -71,7 +71,7 @@ TEST_F(BadInput, ALensFileIsReadBeforeAnyPhoto) {
     return Dtr({"calibrate", "photos", In("photos"), "-o", In("calibration"), "--lens", In(lens)});
   };
   WriteFileAtomically(In("lens.json"), "{}");
-  ExpectRefused(calibrate("lens.json"), kFailed, "lens.json");
+  ExpectRefused(calibrate("lens.json"), kFailed, "format: expected a string, found nothing");
   WriteFileAtomically(In("lens.xml"), "");
   ExpectRefused(calibrate("lens.xml"), kWrongUsage, "expected a .json of `dtr calibrate board`");
   EXPECT_FALSE(fs::exists(In("calibration")));
