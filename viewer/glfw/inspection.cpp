@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "dtr/render/option_names.h"
-#include "viewer/labels.h"
+#include "viewer/overlay.h"
 
 namespace dtr::viewer {
 namespace {
@@ -78,12 +78,21 @@ Frustum FrustumOf(const View& view, const NovelCamera& seen_from, double length)
   return frustum;
 }
 
+bool HidesLittle(const std::array<std::optional<ImVec2>, 4>& corners) {
+  std::array<Eigen::Vector2d, 4> places;
+  for (size_t i = 0; i < 4; ++i) {
+    if (!corners[i]) return false;
+    places[i] = {corners[i]->x, corners[i]->y};
+  }
+  const ImVec2 display = ImGui::GetIO().DisplaySize;
+  return MayBeLaidOver(places, {display.x, display.y});
+}
+
 /// `photo` may be null.
 void DrawFrustum(ImDrawList& list, const Frustum& frustum, ImU32 colour,
                  const PictureTexture* photo) {
   const auto& corners = frustum.corners;
-  const bool all = std::all_of(corners.begin(), corners.end(), [](const auto& c) { return c; });
-  if (all && photo != nullptr) {
+  if (photo != nullptr && HidesLittle(corners)) {
     list.AddImageQuad(IdOf(*photo), *corners[0], *corners[1], *corners[2], *corners[3], {0, 0},
                       {1, 0}, {1, 1}, {0, 1}, IM_COL32(255, 255, 255, 200));
   }

@@ -1,9 +1,15 @@
-#include "viewer/labels.h"
+#include "viewer/overlay.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 namespace dtr::viewer {
+namespace {
+
+constexpr double kMostOfDisplay = 0.25;
+
+}  // namespace
 
 std::vector<size_t> LegibleNames(std::span<const PlacedName> names) {
   std::vector<size_t> order(names.size());
@@ -21,6 +27,16 @@ std::vector<size_t> LegibleNames(std::span<const PlacedName> names) {
     if (free) legible.push_back(name);
   }
   return legible;
+}
+
+bool MayBeLaidOver(const std::array<Eigen::Vector2d, 4>& corners,
+                   const Eigen::Vector2d& display_px) {
+  double twice_area = 0;  // shoelace formula
+  for (size_t i = 0; i < 4; ++i) {
+    const Eigen::Vector2d &a = corners[i], &b = corners[(i + 1) % 4];
+    twice_area += a.x() * b.y() - b.x() * a.y();
+  }
+  return std::abs(twice_area) <= 2 * kMostOfDisplay * display_px.prod();
 }
 
 }  // namespace dtr::viewer

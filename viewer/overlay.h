@@ -1,6 +1,7 @@
-// viewer/labels.h -- which names are written over a picture.
+// viewer/overlay.h -- what may lie over a picture: names that can be read, photos that hide little.
 #pragma once
 #include <Eigen/Geometry>
+#include <array>
 #include <span>
 #include <vector>
 
@@ -16,5 +17,11 @@ struct PlacedName {
 /// nearest first: many in one place would not be legible, any of them. Of equally near ones the
 /// first comes first; boxes that only touch do not lie on each other.
 std::vector<size_t> LegibleNames(std::span<const PlacedName> names);
+
+/// Whether a photo may be laid between these corners (in order, display pixels): it covers a
+/// quarter of the display at most. That of the camera one stands at would hide what is drawn from
+/// it.
+bool MayBeLaidOver(const std::array<Eigen::Vector2d, 4>& corners,
+                   const Eigen::Vector2d& display_px);
 
 }  // namespace dtr::viewer

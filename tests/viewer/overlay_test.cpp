@@ -1,6 +1,9 @@
-#include "viewer/labels.h"
+#include "viewer/overlay.h"
 
 #include <gtest/gtest.h>
+
+#include <cmath>
+#include <utility>
 
 namespace dtr::viewer {
 namespace {
@@ -26,6 +29,23 @@ TEST(LegibleNames, BoxesThatTouchAreBothLegibleAndOfEquallyNearOnesTheFirstIsWri
   const std::vector<PlacedName> same = {At(1, 0, 0), At(1, 0, 0)};
   EXPECT_EQ(LegibleNames(same), (std::vector<size_t>{0}));
   EXPECT_TRUE(LegibleNames({}).empty());
+}
+
+TEST(MayBeLaidOver, NotWhereMostOfThePictureWouldBeHidden) {
+  const Eigen::Vector2d display(1280, 800);
+  const auto centred = [&](double share) {
+    const Eigen::Vector2d half = 0.5 * std::sqrt(share) * display, middle = 0.5 * display;
+    return std::array<Eigen::Vector2d, 4>{
+        middle - half, middle + Eigen::Vector2d(half.x(), -half.y()), middle + half,
+        middle + Eigen::Vector2d(-half.x(), half.y())};
+  };
+  EXPECT_TRUE(MayBeLaidOver(centred(0.02), display));
+  EXPECT_TRUE(MayBeLaidOver(centred(0.24), display));
+  EXPECT_FALSE(MayBeLaidOver(centred(0.26), display));
+  EXPECT_FALSE(MayBeLaidOver(centred(1), display)) << "the camera one stands at";
+  auto seen_from_behind = centred(1);
+  std::swap(seen_from_behind[1], seen_from_behind[3]);
+  EXPECT_FALSE(MayBeLaidOver(seen_from_behind, display));
 }
 
 }  // namespace
