@@ -90,20 +90,23 @@ TEST_F(ResumingSfm, KilledBeforeItsCheckpointTheSameSceneComesOut) {
   ASSERT_EQ(expected.size(), size_t{kArcPhotos});
 
   Random random(7);
+  Clock::duration until_checkpoint = *calibrated_at - start;
   for (int killed = 0; killed < kKills;) {
     const fs::path set = folder_ / ("killed" + std::to_string(killed) + ".dtr");
-    const auto moment = random.Uniform(0, 1) * (*calibrated_at - start);
+    const auto moment = random.Uniform(0, 1) * until_checkpoint;
     const auto begun = Clock::now();
     const Ran cut =
         Dtr(Build(photos, set), {SIGKILL, [&] { return Clock::now() - begun >= moment; }});
-    ASSERT_EQ(cut.signal, SIGKILL) << cut.err;
-    // The moment was past the checkpoint of a faster run: that is resume_full_test's matter.
-    if (FilesIn(set.string() + ".partial/images") == 0) {
+    if (cut.signal != SIGKILL) {
+      // A machine with less to do than at the start: the whole run was over before the moment.
+      ASSERT_EQ(cut.code, 0) << cut.err;
+      until_checkpoint = until_checkpoint * 2 / 3;
+    } else if (FilesIn(set.string() + ".partial/images") == 0) {
       DtrOk(Build(photos, set));
       EXPECT_FALSE(fs::exists(set.string() + ".partial"));
       ExpectSameCameras(expected, Centres(set));
       ++killed;
-    }
+    }  // else past the checkpoint of a faster run: that is resume_full_test's matter
     fs::remove_all(set);
     fs::remove_all(set.string() + ".partial");
   }
