@@ -32,15 +32,20 @@ void Add(long bytes) {
 }  // namespace dtr::fuzz
 
 #ifdef DTR_SANITIZED
-// A sanitizer has an allocator of its own and tells of every call.
-#include <sanitizer/allocator_interface.h>
+// A sanitizer has an allocator of its own and tells of every call. GCC has these functions, too,
+// but not the header, sanitizer/allocator_interface.h, that declares them.
+extern "C" {
+int __sanitizer_install_malloc_and_free_hooks(void (*on_malloc)(const volatile void*, size_t),
+                                              void (*on_free)(const volatile void*));
+size_t __sanitizer_get_allocated_size(const volatile void* block);
+}
 namespace dtr::fuzz {
 namespace {
 [[maybe_unused]] const int hooked = __sanitizer_install_malloc_and_free_hooks(
     [](const volatile void*, size_t bytes) { Add(static_cast<long>(bytes)); },
     [](const volatile void* block) {
       if (block == nullptr) return;
-      Add(-static_cast<long>(__sanitizer_get_allocated_size(const_cast<const void*>(block))));
+      Add(-static_cast<long>(__sanitizer_get_allocated_size(block)));
     });
 }  // namespace
 }  // namespace dtr::fuzz
