@@ -15,9 +15,10 @@ namespace {
 namespace fs = std::filesystem;
 constexpr std::uint32_t kMagic = 20000630, kMultiPart = 0x1000;
 constexpr size_t kLongestName = 255;  // OpenEXR's "long names"
-// A chunk of up to this size needs no proof; of a larger one each byte of the file stands for at
-// most as many as deflate packs into one (zlib's manual).
-constexpr std::uint64_t kAlwaysPlausibleBytes = 16 << 20, kMostPacking = 1032;
+// A chunk of up to this size needs no proof (some twenty times as much is allocated to read it); of
+// a larger one each byte of the file stands for at most as many as deflate packs into one (zlib's
+// manual).
+constexpr std::uint64_t kAlwaysPlausibleBytes = 2 << 20, kMostPacking = 1032;
 constexpr std::uint64_t kOffsetBytes = 8;  // of a chunk, in the table after the headers
 
 struct Reader {
@@ -32,7 +33,8 @@ struct Reader {
 struct Part {
   std::int64_t width = 1, height = 1;
   std::int64_t tile_width = 0, tile_height = 0;  // 0: scan lines
-  std::int64_t lines = 1;                        // of a chunk of scan lines
+  std::int64_t lines = 16;                       // of a chunk of scan lines: ZIP's, as OpenEXR
+                                                 // takes a header that names no compression
   std::uint64_t bytes_per_px = 0;
 };
 

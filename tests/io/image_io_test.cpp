@@ -171,9 +171,15 @@ TEST(ReadImage, AnExrOfMoreOrLargerChunksThanItsFileHoldsIsRefused) {
     std::memcpy(bad.data() + window_at + 12, &bottom, 4);
     return bad;
   };
+  const auto without_compression = [](std::string bytes) {
+    bytes[bytes.find("compression")] = 'C';  // an attribute that nobody knows
+    return bytes;
+  };
   const std::vector<std::pair<std::string, const char*>> cases{
       {with_window(3, 2000000000), "a table of chunks that fits"},
       {with_window(2000000000, 3), "chunks that can be packed"},
+      {with_window(100000, 3), "chunks that can be packed"},  // 6.4 MB, for which 130 are allocated
+      {without_compression(with_window(100000, 3)), "in chunks of 16 lines"},  // OpenEXR's default
       {with_window(-7, 3), "at least one pixel"},
       {with_window(3, -1), "at least one pixel"}};
   for (const auto& [bad, complaint] : cases) {
