@@ -59,7 +59,8 @@ Similarity AlignPoints(std::span<const Eigen::Vector3d> points_in_a,
                        std::span<const Eigen::Vector3d> points_in_b) {
   if (points_in_a.size() != points_in_b.size() || points_in_a.size() < 3) {
     throw Error("alignment: expected two sets of at least 3 points each, found " +
-                std::to_string(points_in_a.size()) + " and " + std::to_string(points_in_b.size()));
+                std::to_string(points_in_a.size()) + " and " + std::to_string(points_in_b.size()) +
+                "; give more of them");
   }
   Points a = Stack(points_in_a, "first"), b = Stack(points_in_b, "second");
   // Differences to the mean first: coordinates may be map coordinates of 1e7.

@@ -101,9 +101,10 @@ void JoinSets(const std::vector<fs::path>& sets, const fs::path& target, const J
   for (const fs::path& folder : sets) {
     stills.push_back(ReadStill(folder));
     if (stills.back().unit != stills.front().unit) {
-      throw Error(fmt::format("{}: unit: expected {} as in {}, found {}", folder.string(),
-                              NameOf(stills.front().unit), sets.front().string(),
-                              NameOf(stills.back().unit)));
+      throw Error(fmt::format(
+          "{}: unit: expected {} as in {}, found {}; dtr calibrate scale brings a set into metres",
+          folder.string(), NameOf(stills.front().unit), sets.front().string(),
+          NameOf(stills.back().unit)));
     }
   }
   const nlohmann::json fingerprint = FingerprintOf(sets, options);

@@ -96,13 +96,19 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "dtr: {}\n", error.what());
     return dtr::cli::kFailed;
   } catch (const std::filesystem::filesystem_error& error) {
-    fmt::print(stderr, "dtr: {}: {}\n", error.path1().string(), error.code().message());
+    fmt::print(stderr,
+               "dtr: {}: expected a place that can be used, found: {}; mend it or choose another\n",
+               error.path1().string(), error.code().message());
     return dtr::cli::kFailed;
   } catch (const std::bad_alloc&) {
-    fmt::print(stderr, "dtr: out of memory; lower --max-size or --memory\n");
+    fmt::print(stderr,
+               "dtr: memory: expected enough for this job, found too little; close other programs, "
+               "or lower --max-size, --size or --memory\n");
     return dtr::cli::kFailed;
   } catch (const std::exception& error) {
-    fmt::print(stderr, "dtr: unexpected: {}\n", error.what());
+    fmt::print(stderr,
+               "dtr: expected no fault of its own, found: {}; report this line and the command\n",
+               error.what());
     return dtr::cli::kFailed;
   }
 }

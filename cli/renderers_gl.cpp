@@ -26,7 +26,9 @@ class DriverObjections {
   void Throw() const {}
 #else
   void Throw() const {
-    if (output_.errors() > 0) throw Error("OpenGL: the driver reports an error, see above");
+    if (output_.errors() > 0) {
+      throw Error("OpenGL: the driver reports an error, see above; use --renderer cpu");
+    }
   }
 
  private:

@@ -133,7 +133,8 @@ void CheckPhotoOptions(const PinholeCamera& camera, const PhotoOptions& options)
   }
   const RadialLens& lens = options.lens;
   if (!std::isfinite(lens.k1) || !std::isfinite(lens.k2)) {
-    throw UsageError("lens distortion: expected finite k1, k2");
+    throw UsageError("lens distortion: expected finite k1, k2, found " + std::to_string(lens.k1) +
+                     ", " + std::to_string(lens.k2));
   }
   const double limit = MonotoneRadius(lens);
   if (std::isinf(limit)) return;

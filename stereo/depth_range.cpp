@@ -34,9 +34,11 @@ std::vector<DepthRange> DepthRangesFromPoints(std::span<const StereoView> views,
       inverse_depths = InverseDepths(views[v], scene, PointsInFrustum(views[v], scene));
     }
     if (inverse_depths.size() < needed) {
-      throw Error("view " + std::to_string(v) + ": depth range unknown, expected at least " +
-                  std::to_string(needed) + " sparse points in sight, found " +
-                  std::to_string(inverse_depths.size()) + "; give the near and far depth");
+      const std::string who = v < options.names.size() ? options.names[v] : std::to_string(v);
+      throw Error("view " + who + ": expected at least " + std::to_string(needed) +
+                  " sparse points in its sight, which tell how deep it looks, found " +
+                  std::to_string(inverse_depths.size()) +
+                  "; take more photos of what it shows, or leave it out");
     }
     const double cut = options.percentile / 100.0;
     ranges.push_back({.near_z = 1.0 / (Quantile(inverse_depths, 1.0 - cut) * options.near_margin),

@@ -1,6 +1,7 @@
 // stereo/depth_range.h -- the depths worth searching, from the sparse points.
 #pragma once
 #include <span>
+#include <string>
 #include <vector>
 
 #include "dtr/types/sparse_scene.h"
@@ -9,10 +10,11 @@
 namespace dtr::stereo {
 
 struct DepthRangeOptions {
-  double percentile = 1.0;   ///< per cent of the inverse depths cut off at either end
-  double near_margin = 1.3;  ///< the near end comes closer by this factor
-  double far_margin = 1.5;   ///< the far end moves away by this factor
-  int min_points = 12;       ///< fewer points than this say nothing about a view's range
+  double percentile = 1.0;              ///< per cent of the inverse depths cut off at either end
+  double near_margin = 1.3;             ///< the near end comes closer by this factor
+  double far_margin = 1.5;              ///< the far end moves away by this factor
+  int min_points = 12;                  ///< fewer points than this say nothing about a view's range
+  std::vector<std::string> names = {};  ///< of the views, for errors; else they are numbered
 };
 
 /// Range of every view: percentiles of the inverse depths of the points it observes, widened.

@@ -92,10 +92,11 @@ ExtractionPlan PlanExtraction(const std::vector<SfmImageInput>& images, int thre
   };
   while (side_px > kSmallestSidePx && peak(side_px, 1) > limit_mib) --side_px;
   if (peak(side_px, 1) > limit_mib) {
-    throw UsageError(
-        fmt::format("memory limit: expected at least {:.1f} GiB for features of photos "
-                    "of this size, found {:.1f}; raise the limit",
-                    peak(side_px, 1) / kFill / 1024, memory_gb));
+    constexpr double kShown = 100;  // of a gigabyte, rounded up: what is asked for must do
+    throw UsageError(fmt::format(
+        "--memory {:g}: expected at least {:.2f} (GB) for features of photos of this size; give as "
+        "much, or smaller photos",
+        memory_gb, std::ceil(kShown * peak(side_px, 1) / kFill / 1024) / kShown));
   }
   plan.max_image_size_px = static_cast<int>(side_px);
   plan.threads = std::clamp(threads, 1, static_cast<int>(images.size()));

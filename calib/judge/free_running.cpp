@@ -344,7 +344,7 @@ FreeRunning SolveFreeRunning(const Board& board, std::span<const RigCameraInput>
       if (!(std::abs(delay.frames) <= kMostDelay)) {
         throw Error(fmt::format(
             "camera {}: expected pictures within {} frames of camera {}'s, found {:+.1f}; its "
-            "frames are paired with others than their own",
+            "frames are paired with others than their own: cut the videos to one start",
             cameras[c].name, kMostDelay, cameras[0].name, delay.frames));
       }
       const bool is_free =

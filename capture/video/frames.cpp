@@ -74,7 +74,8 @@ bool VideoReader::Next() {
 ImageRgb8 VideoReader::Picture() const {
   const cv::Mat& frame = decoder_->frame;
   if (frame.empty() || frame.type() != CV_8UC3) {
-    throw Error(fmt::format("{}: frame {}: expected 8-bit colours", file_.string(), number_));
+    throw Error(fmt::format("{}: frame {}: expected 8-bit colours, found others; convert the video",
+                            file_.string(), number_));
   }
   return FromBgr(frame);
 }
@@ -97,7 +98,7 @@ void ForEachFrame(const std::filesystem::path& file,
     if (!take(video.number(), video.Picture())) return;
   }
   if (video.number() < 0) {
-    throw Error(fmt::format("{}: expected frames, found none", file.string()));
+    throw Error(fmt::format("{}: expected frames, found none; is the video whole?", file.string()));
   }
 }
 

@@ -112,7 +112,8 @@ Choice ChooseFrames(const Videos& files, const VideoOptions& options, Progress& 
   }
   progress.Update(choice.seen);
   if (choice.seen == 0) {
-    throw Error(fmt::format("{}: expected frames, found none", files.front().string()));
+    throw Error(fmt::format("{}: expected frames, found none; is the video whole?",
+                            files.front().string()));
   }
   if (options.every == 0) choice.frames = chooser.Finish();
   if (choice.frames.empty()) {

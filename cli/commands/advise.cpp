@@ -44,8 +44,9 @@ std::vector<advise::CoarseView> CoarseViewsOf(const fs::path& folder, const DtrS
     progress.Update(++done);
   }
   if (coarse.size() < 2) {
-    throw Error(fmt::format("{}: expected at least 2 source views with depth, found {}",
-                            folder.string(), coarse.size()));
+    throw Error(fmt::format(
+        "{}: expected at least 2 source views with depth, found {}; run dtr stereo first",
+        folder.string(), coarse.size()));
   }
   return coarse;
 }

@@ -28,8 +28,9 @@ struct Options {
 int RunCalibratePhotos(const Options& options, const Context& context) {
   const pipeline::MetreOptions metres = MetreOptionsFrom(options.gps, options.metres);
   if (fs::exists(options.output / "cameras.bin")) {
-    throw UsageError(fmt::format("{}: holds a model already; remove it or choose another folder",
-                                 options.output.string()));
+    throw UsageError(
+        fmt::format("{}: expected no model yet, found one; remove it or choose another folder",
+                    options.output.string()));
   }
   pipeline::CalibrateOptions calibrate;
   // Before any photo is read: a wrong file must not cost their time.

@@ -55,8 +55,9 @@ pipeline::RefinedInMetres HoldMetres(const Options& options, const pipeline::Met
 
 int RunRefine(const Options& options, const Context& context) {
   if (std::filesystem::exists(options.output / "cameras.bin")) {
-    throw UsageError(fmt::format("{}: holds a model already; remove it or choose another folder",
-                                 options.output.string()));
+    throw UsageError(
+        fmt::format("{}: expected no model yet, found one; remove it or choose another folder",
+                    options.output.string()));
   }
   const pipeline::MetreOptions metres = MetreOptionsFrom(!options.gps.empty(), options.metres);
   const calib::SfmModel model = colmap::ReadModel(options.model);

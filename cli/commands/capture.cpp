@@ -100,8 +100,10 @@ int Run(const Options& options, const Context& context) {
       context.console);
   capture::DropFaulty(ingested, drop);
   if (ingested.photos.empty()) {
-    throw Error(fmt::format("{}: expected photos without the faults of --drop, found none",
-                            options.source.string()));
+    throw Error(fmt::format(
+        "{}: expected photos without the faults of --drop, found none; leave out --drop "
+        "to see what each is",
+        options.source.string()));
   }
   const auto look = pipeline::LookAt(ingested, "Photos of " + options.source.filename().string(),
                                      context.common.threads, store.memory_gb, context.console);

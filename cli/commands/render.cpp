@@ -84,7 +84,7 @@ void RequireOutputs(const Options& options, bool several) {
                                  options.output.string()));
   }
   if (several && (!options.depth_out.empty() || !options.coverage_out.empty())) {
-    throw UsageError("--depth-out and --coverage-out go with a single camera");
+    throw UsageError("--depth-out, --coverage-out: expected one camera with them, found several");
   }
   if (!options.depth_out.empty()) RequireOutputFile(options.depth_out, "--depth-out", {".exr"});
   if (!options.coverage_out.empty()) {

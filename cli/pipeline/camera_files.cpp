@@ -67,7 +67,9 @@ std::string FormatOf(const fs::path& file) {
   if (file.filename().string().starts_with("transforms")) return "nerf";
   if (file.extension() == ".json") return "cameras-json";
   throw UsageError(
-      fmt::format("{}: cannot tell the format of this camera file; give --format", file.string()));
+      fmt::format("{}: expected the folder of a COLMAP model, a cameras.json, a transforms.json or "
+                  "a poses_bounds.npy, found another name; give --format",
+                  file.string()));
 }
 
 }  // namespace

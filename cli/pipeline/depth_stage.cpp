@@ -192,6 +192,9 @@ stereo::Effort DepthStage(DtrSet& set, const SparseScene& sparse, const DepthCho
 
   stereo::DepthMapsOptions depth_options;
   depth_options.widenings = kWidenings;
+  for (const int index : sources.indices) {
+    depth_options.range.names.push_back(views[static_cast<size_t>(index)].name);
+  }
   depth_options.engine.threads = options.threads;
   depth_options.engine.seed = options.seed;
   depth_options.load_pixels = [&](int source) {

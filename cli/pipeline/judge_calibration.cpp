@@ -54,9 +54,10 @@ UnseenPhotos UnseenOfRig(const calib::Calibration& calibration, const std::files
         std::find_if(calibration.cameras.begin(), calibration.cameras.end(),
                      [&](const auto& camera) { return camera.name == photos.cameras[c].name; });
     if (found == calibration.cameras.end()) {
-      throw Error(fmt::format("{}: camera {}: not in the calibration, whose first camera is {}",
-                              folder.string(), photos.cameras[c].name,
-                              calibration.cameras[0].name));
+      throw Error(fmt::format(
+          "{}: camera {}: expected a camera of the calibration, found none of this name; its first "
+          "is {}",
+          folder.string(), photos.cameras[c].name, calibration.cameras[0].name));
     }
     index[c] = static_cast<size_t>(found - calibration.cameras.begin());
     RequireSize(*found, photos.cameras[c].width_px, photos.cameras[c].height_px, folder);

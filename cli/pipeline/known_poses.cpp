@@ -37,9 +37,8 @@ void RequireSharedNames(size_t found, const fs::path& poses, const std::string& 
                         const capture::Capture& capture) {
   if (found >= 2) return;
   throw Error(
-      fmt::format("{}: expected cameras for at least 2 of the photos by name, found {}; the file's "
-                  "first is '{}', "
-                  "the first photo is '{}'",
+      fmt::format("{}: expected cameras for at least 2 of the photos by name, found {}; its first "
+                  "is '{}', the first photo is '{}': name the photos as it does, or give theirs",
                   poses.string(), found, first_of_file, capture.photos.front().name));
 }
 
@@ -65,13 +64,13 @@ CalibratedPhotos FromColmapModel(const capture::Capture& capture, const fs::path
   calibrated.engine = "COLMAP model";
   calibrated.unit = LengthUnit::kUnknown;
   calibrated.model = colmap::ReadModel(poses);
+  const std::string first =
+      calibrated.model.images.empty() ? "" : calibrated.model.images.front().name;
   std::erase_if(calibrated.model.images, [&](const calib::SfmImage& image) {
     return std::none_of(capture.photos.begin(), capture.photos.end(),
                         [&](const capture::Photo& photo) { return photo.name == image.name; });
   });
-  RequireSharedNames(calibrated.model.images.size(), poses,
-                     calibrated.model.images.empty() ? "" : calibrated.model.images.front().name,
-                     capture);
+  RequireSharedNames(calibrated.model.images.size(), poses, first, capture);
   calibrated.world_origin = RecentreModel(calibrated.model);
   return calibrated;
 }

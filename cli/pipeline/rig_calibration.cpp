@@ -37,9 +37,10 @@ Inputs InputsOf(const calib::Board& board, const RigPhotos& photos,
     if (given != options.given.end()) {
       const calib::LensCamera& lens = given->second.given.value();
       if (lens.width_px != camera.width_px || lens.height_px != camera.height_px) {
-        throw Error(fmt::format("--camera {}: expected a lens of {} x {} px, found {} x {}",
-                                camera.name, camera.width_px, camera.height_px, lens.width_px,
-                                lens.height_px));
+        throw Error(fmt::format(
+            "--camera {}: expected a lens of {} x {} px as its photos are, found {} x {}; give the "
+            "lens of this camera",
+            camera.name, camera.width_px, camera.height_px, lens.width_px, lens.height_px));
       }
       inputs.push_back({camera.name, given->second.model, camera.width_px, camera.height_px, lens});
       continue;
@@ -202,8 +203,9 @@ void WriteRigFile(const std::filesystem::path& file, const calib::Calibration& c
     return;
   }
   if (calibration.cameras.size() != 2) {
-    throw Error(fmt::format("{}: OpenCV's stereo file has 2 cameras, found {}; write a .json",
-                            file.string(), calibration.cameras.size()));
+    throw Error(fmt::format(
+        "{}: expected 2 cameras, as OpenCV's stereo files have, found {}; write a .json",
+        file.string(), calibration.cameras.size()));
   }
   calib::WriteOpenCvStereoYaml(file, calibration.cameras[0].camera, calibration.cameras[1].camera,
                                calibration.cameras[1].cam_from_rig);

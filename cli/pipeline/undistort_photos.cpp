@@ -51,8 +51,8 @@ PinholeCamera CameraToDrawOn(const calib::LensCamera& camera,
 void RequireSize(const capture::Photo& photo, const calib::LensCamera& lens) {
   if (lens.width_px == photo.width_px && lens.height_px == photo.height_px) return;
   throw Error(
-      fmt::format("{}: the camera's image is {}x{}, the photo is {}x{}; give cameras for "
-                  "these photos",
+      fmt::format("{}: expected a photo of {}x{} pixels as its camera has, found {}x{}; give "
+                  "cameras for these photos",
                   photo.name, lens.width_px, lens.height_px, photo.width_px, photo.height_px));
 }
 

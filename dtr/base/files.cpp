@@ -27,8 +27,12 @@ std::string ReadFile(const fs::path& file, std::uintmax_t limit_bytes) {
   }
   std::string content(size, '\0');
   in.seekg(0);
+  errno = 0;
   if (!in.read(content.data(), static_cast<std::streamsize>(size))) {
-    throw Error(file.string() + ": cannot be read to its end");
+    throw Error(file.string() + ": expected " + std::to_string(size) + " bytes, found " +
+                std::to_string(in.gcount()) + " that can be read" +
+                (errno != 0 ? std::string(": ") + std::strerror(errno) : "") +
+                "; read it again once nothing writes it, or copy it anew");
   }
   return content;
 }

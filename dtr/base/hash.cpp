@@ -3,6 +3,8 @@
 #include <openssl/evp.h>
 
 #include <array>
+#include <cerrno>
+#include <cstring>
 #include <fstream>
 #include <memory>
 #include <vector>
@@ -47,13 +49,13 @@ std::string Sha256(std::span<const std::byte> data) {
 
 std::string Sha256OfFile(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
-  if (!in) throw Error(file.string() + ": cannot be opened for reading");
+  if (!in) throw Error(file.string() + ": cannot be read: " + std::strerror(errno));
   Sha256Stream stream;
   std::vector<char> buffer(1 << 16);
   while (in.read(buffer.data(), static_cast<std::streamsize>(buffer.size())) || in.gcount() > 0) {
     stream.Add(buffer.data(), static_cast<size_t>(in.gcount()));
   }
-  if (in.bad()) throw Error(file.string() + ": cannot be read to its end");
+  if (in.bad()) throw Error(file.string() + ": cannot be read: " + std::strerror(errno));
   return stream.Hex();
 }
 

@@ -168,7 +168,8 @@ DtrSet LoadSet(const fs::path& set_folder, const LoadOptions& options) {
 SparseScene LoadSparse(const fs::path& set_folder, const DtrSet& set) {
   if (!set.sparse_file) {
     throw Error((set_folder / kSetFile).string() +
-                ": sparse: expected the points behind the calibration, found nothing");
+                ": sparse: expected the points behind the calibration, found nothing; build the "
+                "set from its photos with dtr build");
   }
   const fs::path file = set_folder / set.sparse_file->path;
   SparseScene scene = ReadSparse(file);

@@ -179,7 +179,8 @@ std::optional<FileLock> SetWriter::State::Lock(const fs::path& file) const {
 void SetWriter::State::OpenPartial(const std::string& fingerprint) {
   std::error_code error;
   if (fs::exists(partial) && !fs::is_directory(partial)) {
-    throw UsageError(partial.string() + ": expected a folder or nothing, found a file");
+    throw UsageError(partial.string() +
+                     ": expected a folder or nothing, found a file; move it away");
   }
   const bool foreign =
       fs::exists(partial) && HoldsWork(partial) && !fs::exists(partial / kFingerprint);

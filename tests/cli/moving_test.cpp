@@ -132,6 +132,8 @@ TEST_F(MovingSet, WhatKnowsStillScenesAloneSaysSo) {
   ExpectRefused(Dtr({"render", Set(), "--renderer", "cpu", "--fly-through", "4", "--play", "-o",
                      At("none.mp4")}),
                 2, "--play: expected --like or --camera with it");
+  ExpectRefused(Dtr({"export", Set(), "-o", At("colmap")}), 1,
+                "export to COLMAP: expected a set with one frame, found 2");
   ExpectRefused(Dtr({"join", Set(), Set(), "-o", At("again.dtr")}), 2,
                 "expected a set of one frame, found 2");
   ExpectRefused(Dtr({"dataset", "make", "plane", "-o", At("p"), "--time", "1"}), 2,

@@ -1,10 +1,12 @@
 // Neighbours, depth ranges, rectification: what is decided before any pixel is compared.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <stdexcept>
 
 #include "datasets/exact/stereo_scene.h"
+#include "dtr/base/error.h"
 #include "stereo/depth_range.h"
 #include "stereo/neighbours.h"
 #include "stereo/sgbm/planes.h"
@@ -16,6 +18,8 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 using testing::Facing;
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
 
 const PinholeCamera kCamera(320, 240, 300, 300, 160, 120);
 
@@ -128,7 +132,17 @@ TEST(DepthRanges, OfAViewWithoutObservationsComeFromAllPointsInSight) {
   const auto after = DepthRangesFromPoints(views, scene, {});
   EXPECT_EQ(before[1].near_z, after[1].near_z);
   EXPECT_EQ(before[1].far_z, after[1].far_z);
-  EXPECT_THROW(DepthRangesFromPoints(views, {}, {}), Error);
+}
+
+TEST(DepthRanges, AViewThatSeesTooFewPointsIsNamed) {
+  const auto views = Arc({0, 7});
+  EXPECT_THAT(
+      [&] {
+        DepthRangesFromPoints(views, {}, {.names = {"a.jpg", "b.jpg"}});
+      },
+      ThrowsMessage<Error>(
+          HasSubstr("view a.jpg: expected at least 12 sparse points in its sight, which "
+                    "tell how deep it looks, found 0; take more photos of what it shows")));
 }
 
 TEST(RectifyPair, PutsPointsOnOneRowWithTheDisparityOfTheirDepth) {

@@ -143,7 +143,9 @@ void PictureMaker::BringPixels() {
   const RenderScene scene =
       stream_.SceneFor(picture_.camera.cam_from_world, picture_.options, ViewStream::Wait::kForAll);
   if (scene.views != picture_.scene.views) {
-    throw Error("a view of the picture cannot be read any more");
+    throw Error(
+        "picture: expected its views to be there still, found one that cannot be read any "
+        "more; is the set's disk there?");
   }
 }
 

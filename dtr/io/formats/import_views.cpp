@@ -78,8 +78,8 @@ DepthImage ReadCameraDepth(const NamedCamera& named, const ImportOptions& option
   const fs::path file = DepthFileOf(named, options);
   if (!options.depth_unit && HoldsWholeNumbers(file)) {
     throw UsageError(file.string() +
-                     ": 16-bit PNG holds whole numbers; state their unit (--depth-unit, 0.001 for "
-                     "millimetres in a set in metres)");
+                     ": expected --depth-unit for a PNG, which holds whole numbers, found none; "
+                     "give it, as 0.001 for millimetres in a set in metres");
   }
   const PinholeCamera& camera = named.camera;
   const DepthKind kind = options.depth_kind.value_or(named.depth_kind);
@@ -293,7 +293,10 @@ void ImportSet(const CameraList& list, const ImportOptions& options, const fs::p
         "nobody knows where the scene is");
   }
   if (!force && fs::exists(target)) {  // before any file is hashed
-    throw UsageError(target.string() + ": exists; choose another name or give --force");
+    throw UsageError(
+        target.string() +
+        ": expected no such folder yet, found one; choose another name or pass --force "
+        "to replace it");
   }
   const nlohmann::json inputs = Inputs(list, options, progress);
   const std::string fingerprint = Fingerprint(inputs, list, options, points);

@@ -386,7 +386,8 @@ TEST(PlanExtraction, FillsTheMemoryAndNeverMore) {
   for (const double memory_gb : {0.5, 1.0, 2.0, 4.0, 8.0}) {
     EXPECT_LE(plan(8, memory_gb, 0).expected_peak_gib, kFill * memory_gb);
   }
-  EXPECT_THROW(plan(1, 0.1, 0), UsageError);
+  EXPECT_THAT([&] { plan(1, 0.1, 0); },
+              ::testing::ThrowsMessage<UsageError>(HasSubstr("--memory 0.1: expected at least ")));
 }
 
 }  // namespace

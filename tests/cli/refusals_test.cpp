@@ -1,0 +1,497 @@
+// Requests that need no set-up of their own to be refused: each in one line that docs/ERRORS.md
+// lists, with the right exit code.
+#include <sys/wait.h>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+
+#include "dtr/base/files.h"
+#include "dtr/io/image_io.h"
+#include "tests/cli/courtyard_and_set.h"
+#include "tests/cli/run_dtr.h"
+#include "tests/support/environment.h"
+#include "tests/support/test_data.h"
+
+namespace dtr::testing {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+struct Refusal {
+  int code;
+  std::string words;  // of the line, and of the page
+  std::vector<std::string> args;
+};
+
+void ExpectAllRefused(const std::vector<Refusal>& refusals) {
+  for (const Refusal& refusal : refusals) {
+    SCOPED_TRACE(fmt::format("dtr {}", fmt::join(refusal.args, " ")));
+    ExpectRefused(Dtr(refusal.args), refusal.code, refusal.words);
+  }
+}
+
+class Refusals : public CourtyardAndSet {
+ protected:
+  static void SetUpTestSuite() {
+    CourtyardAndSet::SetUpTestSuite();
+    // A set of one view, in another unit than the good one.
+    Json cameras = Cameras();
+    cameras["unit"] = "arbitrary";
+    cameras["views"].erase(cameras["views"].begin() + 1, cameras["views"].end());
+    WriteFileAtomically(Shared("one.json"), cameras.dump());
+    DtrOk({"import", "--cameras", Shared("one.json"), "--images", Photos(), "--depth",
+           Shared("courtyard/depth"), "-o", Shared("one.dtr")});
+  }
+  static Json Cameras() { return Json::parse(Text(Shared("courtyard/cameras.json"))); }
+
+  std::string Write(const std::string& name, const std::string& text) const {
+    fs::create_directories((folder_ / name).parent_path());
+    WriteFileAtomically(folder_ / name, text);
+    return In(name);
+  }
+  // A folder of this name with nothing in it.
+  std::string Folder(const std::string& name) const {
+    fs::create_directories(folder_ / name);
+    return In(name);
+  }
+  // A COLMAP model of two photos, of one camera that `camera` describes.
+  std::string Model(const std::string& name, const std::string& camera, const std::string& first,
+                    const std::string& second) const {
+    Write(name + "/cameras.txt", "1 " + camera + "\n");
+    Write(name + "/images.txt",
+          fmt::format("1 1 0 0 0 0 0 0 1 {}\n\n2 1 0 0 0 1 0 0 1 {}\n\n", first, second));
+    Write(name + "/points3D.txt", "");
+    return In(name);
+  }
+  // What the shell makes of these words.
+  Ran Shell(const std::string& words) const {
+    const int status = std::system(fmt::format("({}) 2> {}", words, In("err")).c_str());
+    Ran ran;
+    ran.code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    ran.err = Text(In("err"));
+    return ran;
+  }
+  // A program of this name, the only one on the PATH that In("bin") is.
+  void Program(const std::string& name, const std::string& shell_lines) const {
+    Write("bin/" + name, "#!/bin/sh\n" + shell_lines + "\n");
+    fs::permissions(In("bin/" + name), fs::perms::owner_all);
+  }
+};
+
+TEST_F(Refusals, WhatCannotBeImported) {
+  const auto import = [&](const std::string& cameras, std::vector<std::string> further) {
+    further.insert(further.begin(), {"import", "--cameras", cameras, "-o", In("set.dtr")});
+    return further;
+  };
+  const std::string good = Shared("courtyard/cameras.json"), depth = Shared("courtyard/depth");
+  const std::string sparse = Shared("courtyard/sparse");
+  Json wide = Cameras(), numbers = Cameras();
+  wide["views"][0]["width"] = 96;
+  Write("wide.json", wide.dump());
+  numbers["views"][0]["depth"] = "0000.png";
+  Write("numbers.json", numbers.dump());
+  const std::string pngs = Folder("pngs"), empty = Folder("empty");
+  fs::copy(depth, pngs, fs::copy_options::recursive);
+  io::WriteImage(In("pngs/0000.png"), ImageRgb8(4, 4, 3));
+  const std::string lens = Model("lens", "SIMPLE_RADIAL 192 128 150 96 64 0.1", "a.jpg", "b.jpg");
+  ExpectAllRefused({
+      {kWrongUsage, "import: expected depth maps (--depth) or a model with points, found neither",
+       import(good, {"--images", Photos()})},
+      {kWrongUsage, ": no such file or folder", import(In("cameras.json"), {"--images", Photos()})},
+      {kWrongUsage, "a transforms.json or a poses_bounds.npy, found another name; give --format",
+       import(Write("cameras.xml", ""), {"--images", Photos()})},
+      {kWrongUsage, ": no such folder",
+       import(good, {"--images", Photos(), "--masks", In("masks")})},
+      {kWrongUsage, "--holdout: no photo is named 'nobody'",
+       import(good, {"--images", Photos(), "--holdout", "nobody"})},
+      {kFailed, "0000.jpg: cannot be read: No such file or directory",
+       import(good, {"--images", empty, "--depth", depth})},
+      {kFailed, "expected one depth map (.exr, .pfm, .png, .tif) named like the photo 0000.jpg",
+       import(sparse, {"--images", Photos(), "--depth", empty})},
+      {kFailed,
+       "pixels as the camera says, found 192x128; give the images the cameras were made for",
+       import(In("wide.json"), {"--images", Photos(), "--depth", depth})},
+      {kWrongUsage, "expected --depth-unit for a PNG, which holds whole numbers, found none",
+       import(In("numbers.json"), {"--images", Photos(), "--depth", pngs})},
+      {kFailed, "camera of 'a.jpg': expected no distortion, found SIMPLE_RADIAL",
+       import(lens, {"--images", Photos()})},
+      {kWrongUsage,
+       "expected no such folder yet, found one; choose another name or pass --force",
+       {"import", "--cameras", good, "--images", Photos(), "--depth", depth, "-o", empty}},
+  });
+  EXPECT_FALSE(fs::exists(In("set.dtr")));
+  EXPECT_FALSE(fs::exists(In("set.dtr.partial")));
+}
+
+TEST_F(Refusals, CamerasOfOtherProgramsThatAreNone) {
+  const auto import = [&](const std::string& cameras) {
+    return std::vector<std::string>{"import", "--cameras", cameras,      "--images",
+                                    Photos(), "-o",        In("set.dtr")};
+  };
+  Json twice = Cameras(), skewed = Cameras();
+  twice["views"][1]["name"] = "0000.jpg";
+  skewed["views"][0]["cam_from_world"][0][0] = 5;
+  const std::string frame = R"("file_path": "0000.jpg", "transform_matrix": )"
+                            "[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]";
+  ExpectAllRefused({
+      {kFailed, "views: expected a list of at least one camera, found another",
+       import(Write("none.json", R"({"views": []})"))},
+      {kFailed, "views[1].name: expected unique names, found \"0000.jpg\" twice",
+       import(Write("twice.json", twice.dump()))},
+      {kFailed, "expected a rotation matrix (R^T R = I to",
+       import(Write("skewed.json", skewed.dump()))},
+      {kFailed, "frames: expected a list of at least one camera, found another",
+       import(Write("transforms.json", R"({"frames": []})"))},
+      {kFailed, "camera_model: expected PINHOLE, SIMPLE_PINHOLE or OPENCV with zero coefficients",
+       import(Write(
+           "transforms_fisheye.json",
+           R"({"camera_model": "OPENCV_FISHEYE", "fl_x": 150, "frames": [{)" + frame + "}]}"))},
+      {kFailed, "expected fl_x or camera_angle_x, found neither",
+       import(Write("transforms_focal.json", R"({"frames": [{)" + frame + "}]}"))},
+      {kFailed, "expected a .npy file (it begins with \\x93NUMPY), found another",
+       import(Write("poses_bounds.npy", "0 1 2"))},
+  });
+}
+
+TEST_F(Refusals, WhatIsNoDataSet) {
+  const std::string taken = Folder("taken"), file = Write("file", "");
+  const auto make = [&](const std::string& scene, std::vector<std::string> further) {
+    further.insert(further.begin(), {"dataset", "make", scene, "-o", In("made")});
+    return further;
+  };
+  ExpectAllRefused({
+      {kWrongUsage, "scene: expected courtyard, plane, stairs, sphere or room, found 'park'",
+       make("park", {})},
+      {kWrongUsage, "for scene 'plane', found 'circle'", make("plane", {"--layout", "circle"})},
+      {kWrongUsage, "views: expected 2 to", make("plane", {"--views", "1"})},
+      {kWrongUsage, "fold the image over before its corners; take smaller ones",
+       make("plane", {"--k1", "-5"})},
+      {kWrongUsage, "lens distortion: expected finite k1, k2", make("plane", {"--k1", "nan"})},
+      {kWrongUsage,
+       "expected a folder that does not exist yet; remove it or choose another name",
+       {"dataset", "make", "plane", "-o", taken}},
+      {kFailed,
+       "expected a folder that can be made, found: Not a directory",
+       {"dataset", "make", "plane", "-o", file + "/made"}},
+      {kWrongUsage,
+       "is not downloaded but made; use `dtr dataset make plane`",
+       {"dataset", "get", "plane", "--folder", taken}},
+      {kWrongUsage,
+       "data set: expected a public set's name, found 'nobody'",
+       {"dataset", "get", "nobody", "--folder", taken}},
+      {kFailed,
+       "expected a folder with the set llff_fern, found none; it comes from",
+       {"dataset", "get", "llff_fern", "--folder", In("absent")}},
+      {kWrongUsage, "KIND: magic not in", {"dataset", "convert", "magic", taken, "-o", In("made")}},
+      {kWrongUsage,
+       "exists; choose another folder or remove it",
+       {"dataset", "convert", "fountain", taken, "-o", taken}},
+      {kFailed,
+       "expected the folder of the set, found none",
+       {"dataset", "convert", "fountain", In("absent"), "-o", In("made")}},
+      {kFailed,
+       "found none; give the folder that holds the set's SOURCE.md",
+       {"dataset", "convert", "fountain", taken, "-o", In("made")}},
+  });
+  EXPECT_FALSE(fs::exists(In("made")));
+}
+
+TEST_F(Refusals, ASetOfOneViewServesNothingThatComparesViews) {
+  const std::string one = Shared("one.dtr");
+  ExpectAllRefused({
+      {kWrongUsage,
+       "evaluate: expected a held-out view in the set, found none; build it with",
+       {"evaluate", one, "--renderer", "cpu"}},
+      {kWrongUsage,
+       "--leave-one-out: expected at least 2 source views in the set, found 1",
+       {"evaluate", one, "--renderer", "cpu", "--leave-one-out"}},
+      {kWrongUsage,
+       "bench: expected a held-out view, or two source views to leave one out of, found 1",
+       {"bench", one, "--renderer", "cpu", "--table", "report"}},
+      {kFailed,
+       "expected at least 2 source views with depth, found 1; run dtr stereo first",
+       {"advise", one, "-o", In("advice.html")}},
+      {kFailed,
+       "pruning: expected at least 2 source views to look between, found 1",
+       {"prune", one, "--renderer", "cpu", "-o", In("pruned.dtr")}},
+      {kWrongUsage,
+       "join: expected two sets or more, one for each instant",
+       {"join", one, "-o", In("moving.dtr")}},
+      {kFailed,
+       ": unit: expected metre as in",
+       {"join", Shared("good.dtr"), one, "-o", In("moving.dtr")}},
+  });
+  EXPECT_FALSE(fs::exists(In("moving.dtr")));
+}
+
+TEST_F(Refusals, TruthThatIsNotTheSets) {
+  Json others = Cameras(), longer = Cameras(), few = Cameras();
+  for (size_t i = 0; i < others["views"].size(); ++i) {
+    others["views"][i]["name"] = fmt::format("other{}.jpg", i);
+    longer["views"][i]["fx"] = 2 * longer["views"][i]["fx"].get<double>();
+  }
+  few["views"].erase(few["views"].begin() + 2, few["views"].end());
+  few["views"][0]["cam_from_world"][0][3] = 9;
+  Write("few/cameras.json", few.dump());
+  Write("others/cameras.json", others.dump());
+  Write("longer/cameras.json", longer.dump());
+  fs::copy(Shared("courtyard/depth"), In("longer/depth"));
+  const auto evaluate = [&](const std::string& truth) {
+    return std::vector<std::string>{"evaluate", Shared("good.dtr"), "--renderer",
+                                    "cpu",      "--depth",          In(truth)};
+  };
+  ExpectAllRefused({
+      {kFailed, "expected true cameras of the set's views by name, found none of 7",
+       evaluate("others")},
+      {kFailed, "cast the truth again on the set's cameras", evaluate("longer")},
+      {kFailed, "alignment: expected two sets of at least 3 points each, found 2 and 2",
+       evaluate("few")},
+      {kFailed, ": cannot be read: No such file or directory", evaluate("absent")},
+  });
+}
+
+TEST_F(Refusals, ASetWithoutPointsServesNothingThatNeedsThem) {
+  const std::string set = Shared("good.dtr");
+  ExpectAllRefused({
+      {kFailed,
+       "sparse: expected the points behind the calibration, found nothing; build the set",
+       {"validate", set}},
+      {kFailed,
+       "expected sparse points to find depth ranges from, found none; build the set",
+       {"stereo", set, "-o", In("other.dtr")}},
+      {kWrongUsage,
+       "--images: is for calibration files, not for sets",
+       {"validate", set, "--images", Photos()}},
+  });
+}
+
+TEST_F(Refusals, PicturesOfNoSizeOrOfSeveralCameras) {
+  const auto render = [&](std::vector<std::string> further) {
+    further.insert(further.begin(), {"render", Shared("good.dtr"), "--renderer", "cpu"});
+    return further;
+  };
+  Json huge = Cameras();
+  huge["views"].erase(huge["views"].begin() + 1, huge["views"].end());
+  huge["views"][0]["width"] = huge["views"][0]["height"] = 20000;
+  const std::string picture = In("view.png"), folder = Folder("folder.png");
+  ExpectAllRefused({
+      {kWrongUsage, "--size 10: expected WxH, such as 1280x720",
+       render({"--like", "0001", "-o", picture, "--size", "10"})},
+      {kWrongUsage, "expected WxH in pixels, each 0 to 16384, found '99999'",
+       render({"--like", "0001", "-o", picture, "--size", "99999x10"})},
+      {kWrongUsage, "picture: expected at most 2^28 pixels, found 20000x20000",
+       render({"--camera", Write("huge.json", huge.dump()), "-o", picture})},
+      {kWrongUsage, "expected one camera, found 7; give --path for several",
+       render({"--camera", Shared("courtyard/cameras.json"), "-o", picture})},
+      {kWrongUsage, "--depth-out, --coverage-out: expected one camera with them, found several",
+       render({"--fly-through", "3", "-o", In("frames"), "--depth-out", In("d.exr")})},
+      {kWrongUsage, ": expected a file name, found a folder",
+       render({"--like", "0001", "-o", folder})},
+      {kWrongUsage,
+       ": expected a file name, found a folder",
+       {"info", Shared("good.dtr"), "--json", folder}},
+  });
+  EXPECT_FALSE(fs::exists(picture));
+  EXPECT_FALSE(fs::exists(In("frames")));
+}
+
+TEST_F(Refusals, VideosWithoutFfmpegOrWithOneThatFails) {
+  const Environment path("PATH", In("bin"));
+  const std::vector<std::string> fly = {
+      "render", Shared("good.dtr"), "--renderer", "cpu", "--fly-through",
+      "2",      "--size",           "24x16",      "-o",  In("path.mp4")};
+  ExpectRefused(Dtr(fly), kFailed,
+                "program ffmpeg not found on the PATH; install it or write images to a folder");
+  Program("ffmpeg", "echo no such encoder; exit 3");
+  ExpectRefused(Dtr(fly), kFailed, "ffmpeg failed with exit code 3: no such encoder");
+  const fs::directory_iterator left(folder_.path());
+  EXPECT_EQ(std::distance(begin(left), end(left)), 1) << "more than bin/ is left";
+}
+
+TEST_F(Refusals, CalibrationsOfTakenFoldersAndOfOtherLenses) {
+  const std::string taken = Folder("taken");
+  Write("taken/cameras.bin", "");
+  Write("two/cameras.txt", "1 PINHOLE 192 128 150 150 96 64\n2 PINHOLE 192 128 150 150 96 64\n");
+  ExpectAllRefused({
+      {kWrongUsage,
+       "expected no model yet, found one; remove it or choose another folder",
+       {"calibrate", "photos", Photos(), "-o", taken}},
+      {kWrongUsage,
+       "expected no model yet, found one; remove it or choose another folder",
+       {"calibrate", "refine", Shared("courtyard/sparse"), "-o", taken}},
+      {kFailed,
+       "expected one camera, found 2; give a file with the camera that took the photos",
+       {"calibrate", "photos", Photos(), "-o", In("new"), "--lens", In("two/cameras.txt")}},
+      {kWrongUsage,
+       "expected a pixel of every view joined with +, found none of 0002",
+       {"calibrate", "scale", Shared("good.dtr"), "-o", In("metres.dtr"), "--distance",
+        "0001:5:5+0002,0003=5m"}},
+      {kFailed,
+       "click the same point in views from different places",
+       {"calibrate", "scale", Shared("good.dtr"), "-o", In("metres.dtr"), "--distance",
+        "0001:5:64+0005:187:64,0003=5m"}},
+  });
+}
+
+TEST_F(Refusals, BoardsAndRigsThatCannotBe) {
+  const auto board = [&](const std::string& words) {
+    return std::vector<std::string>{"calibrate",  "board",   Photos(), "-o",
+                                    In("c.json"), "--board", words};
+  };
+  const auto rig = [&](const std::string& folder, std::vector<std::string> further = {}) {
+    further.insert(further.begin(), {"calibrate", "rig", folder, "-o", In("rig.json"), "--board",
+                                     "chessboard:9x6:25mm"});
+    return further;
+  };
+  const std::string names = Folder("names"), table = Folder("table"), number = Folder("number");
+  for (const std::string& folder : {names, table, number}) {
+    WriteFileAtomically(folder + "/left.avi", "x");
+    WriteFileAtomically(folder + "/right.avi", "x");
+  }
+  Write("table/timestamps.csv", "time,camera\n1,2\n");
+  Write("names/timestamps.csv", "sync_index,cam_id,frame_index\n0,0,0\n");
+  Write("number/timestamps.csv", "sync_index,cam_id,frame_index\n0,first,0\n");
+  ExpectAllRefused({
+      {kWrongUsage, "inner corners per side, found 2 x 9", board("chessboard:2x9:25mm")},
+      {kWrongUsage, "no length in '-1'; expected chessboard:WxH:SQUARE",
+       board("chessboard:9x6:-1")},
+      {kWrongUsage, "expected markers smaller than their squares, found a share of 1.2",
+       board("charuco:9x6:25mm:30mm")},
+      {kWrongUsage, "expected a dictionary of OpenCV, as DICT_4X4_50, found 'DICT_9'",
+       board("charuco:9x6:25mm:10mm:DICT_9")},
+      {kWrongUsage, "--camera left: expected NAME=FILE", rig(names, {"--camera", "left"})},
+      {kFailed, "timestamps.csv: expected a column sync_index, found none", rig(table)},
+      {kFailed, "timestamps.csv: line 2: cam_id: expected a whole number", rig(number)},
+      {kFailed, "expected a number at the end of the name, the cam_id of timestamps.csv",
+       rig(names)},
+  });
+  EXPECT_FALSE(fs::exists(In("rig.json")));
+}
+
+TEST_F(Refusals, PosesThatAreNotOfThesePhotos) {
+  int sets = 0;  // what one begins is not in the way of the next
+  const auto build = [&](std::vector<std::string> further) {
+    further.insert(further.begin(), {"build", Photos(), "-o", In(fmt::format("{}.dtr", sets++))});
+    return further;
+  };
+  const std::string pinhole = "PINHOLE 100 100 150 150 50 50";
+  ExpectAllRefused({
+      {kWrongUsage, "--holdout-strict: keeps the photos of --holdout out of SfM; it needs",
+       build({"--holdout-strict"})},
+      {kWrongUsage, "expected the folder of a COLMAP model, a cameras.json or a poses_bounds.npy",
+       build({"--poses", Write("poses.txt", "")})},
+      {kFailed,
+       "expected cameras for at least 2 of the photos by name, found 0; its first is 'a.jpg'",
+       build({"--poses", Model("names", pinhole, "a.jpg", "b.jpg")})},
+      {kFailed, "calibration: expected at least 2 photos to build from, found 1 with a camera",
+       build({"--holdout", "0000", "--poses",
+              Model("two", "PINHOLE 192 128 150 150 96 64", "0000.jpg", "0001.jpg")})},
+      {kFailed, "view 0000.jpg: expected at least 12 sparse points in its sight",
+       build({"--poses", In("two")})},
+      {kFailed, "expected a photo of 100x100 pixels as its camera has, found 192x128",
+       build({"--poses", Model("sizes", pinhole, "0000.jpg", "0001.jpg")})},
+  });
+  for (int i = 0; i < sets; ++i) EXPECT_FALSE(fs::exists(In(fmt::format("{}.dtr", i))));
+  Write("set.dtr.partial", "mine");
+  ExpectRefused(
+      Dtr({"build", Photos(), "-o", In("set.dtr"), "--poses", Shared("courtyard/sparse")}),
+      kWrongUsage, "expected a folder or nothing, found a file; move it away");
+  EXPECT_EQ(Text(In("set.dtr.partial")), "mine");
+}
+
+TEST_F(Refusals, AProgramCalledColmapThatIsNotIt) {
+  const Environment path("PATH", In("bin"));
+  const auto build = [&] { return Dtr({"build", Photos(), "-o", In("set.dtr")}); };
+  Program("colmap", "exit 3");
+  ExpectRefused(build(), kFailed, "'colmap help' failed (exit code 3); reinstall COLMAP");
+  Program("colmap", "echo Hello");
+  ExpectRefused(build(), kFailed,
+                "expected a program that calls itself COLMAP, found one that does not");
+  Program("colmap", "echo COLMAP 9.9");
+  ExpectRefused(build(), kFailed, "without it; install another version (3.8 is the one this was");
+  ExpectRefused(Dtr({"build", Photos(), "-o", In("other.dtr"), "--memory", "0.001"}), kWrongUsage,
+                "--memory 0.001: expected at least");
+  EXPECT_FALSE(fs::exists(In("set.dtr")));
+  EXPECT_FALSE(fs::exists(In("other.dtr")));
+}
+
+TEST_F(Refusals, DepthThatCannotBeHad) {
+  const std::string set = In("set.dtr");
+  DtrOk({"build", Photos(), "-o", set, "--poses", Shared("courtyard/sparse"), "--engine", "none",
+         "--max-size", "96"});
+  Model("lens/sparse", "SIMPLE_RADIAL 96 64 75 48 32 0.1", "0000.jpg", "0001.jpg");
+  Model("other/sparse", "PINHOLE 96 64 75 75 48 32", "a.jpg", "b.jpg");
+  ExpectAllRefused({
+      {kFailed,
+       "camera 1: expected an undistorted camera, found SIMPLE_RADIAL",
+       {"stereo", set, "-o", In("a.dtr"), "--engine", "colmap", "--workspace", In("lens")}},
+      {kFailed,
+       "expected an image of this name, found none; make the workspace from this set",
+       {"stereo", set, "-o", In("b.dtr"), "--engine", "colmap", "--workspace", In("other")}},
+      {kFailed,
+       "expected a bound that 16 bits can keep over its depths of",
+       {"stereo", set, "-o", In("c.dtr"), "--engine", "sgbm", "--depth-error", "1e-6"}},
+  });
+  for (const char* name : {"a.dtr", "b.dtr", "c.dtr"}) EXPECT_FALSE(fs::exists(In(name)));
+}
+
+TEST_F(Refusals, PhotosThatAreAllDropped) {
+  Folder("dark");
+  for (const char* name : {"dark/a.png", "dark/b.png"}) {
+    io::WriteImage(In(name), ImageRgb8(64, 48, 3));
+  }
+  ExpectRefused(Dtr({"capture", In("dark"), "-o", In("capture"), "--drop", "underexposed"}),
+                kFailed,
+                "expected photos without the faults of --drop, found none; leave out --drop");
+  EXPECT_FALSE(fs::exists(In("capture")));
+}
+
+TEST_F(Refusals, FilesAndFoldersOfAnotherKind) {
+  const std::string file = Write("file", "");
+  ExpectAllRefused({
+      {kFailed,
+       "cannot be read: Is a directory",
+       {"render", Shared("good.dtr"), "--renderer", "cpu", "--camera", Folder("folder"), "-o",
+        In("view.png")}},
+      {kFailed,
+       "expected a place that can be used, found: Not a directory; mend it or choose another",
+       {"evaluate", Shared("good.dtr"), "--renderer", "cpu", "--pictures", file + "/pictures"}},
+  });
+}
+
+TEST_F(Refusals, AFileThatEndsBeforeItsSize) {
+  // The kernel says 4096 bytes of it, and gives some dozens.
+  const fs::path shorter = "/sys/kernel/mm/transparent_hugepage/enabled";
+  if (!fs::exists(shorter)) GTEST_SKIP() << "no " << shorter;
+  ExpectRefused(Dtr({"render", Shared("good.dtr"), "--renderer", "cpu", "--camera",
+                     shorter.string(), "-o", In("view.png")}),
+                kFailed, "that can be read; read it again once nothing writes it, or copy it anew");
+}
+
+TEST_F(Refusals, AFolderForTemporaryFilesThatTakesNone) {
+  ExpectRefused(Shell(fmt::format("TMPDIR=/proc exec {} bench {} --renderer cpu --stage render "
+                                  "--point default",
+                                  DTR_PROGRAM, Shared("good.dtr"))),
+                kFailed, "cannot be made; set TMPDIR to a folder that can be written");
+}
+
+TEST_F(Refusals, TooLittleMemoryIsSaidInOneLine) {
+#ifdef __SANITIZE_ADDRESS__
+  GTEST_SKIP() << "the sanitizer takes addresses without end";
+#endif
+  // Room to start in, and less than the picture: 16384 x 16384 pixels.
+  const Ran ran = Shell(
+      fmt::format("ulimit -v 1500000; exec {} render {} --renderer cpu --threads 1 --like 0001 "
+                  "--size 16384x16384 -o {}",
+                  DTR_PROGRAM, Shared("good.dtr"), In("view.png")));
+  ExpectRefused(ran, kFailed, "memory: expected enough for this job, found too little");
+  EXPECT_FALSE(fs::exists(In("view.png")));
+}
+
+}  // namespace
+}  // namespace dtr::testing
