@@ -7,6 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
+#include "dtr/base/files.h"
+
 namespace dtr::cli {
 namespace {
 
@@ -87,42 +89,39 @@ std::string Figure(const std::optional<double>& value) {
   return value ? fmt::format("{:.2f}", *value) : "-";
 }
 
-void SayStage(const SweptStage& swept, Console& console) {
-  console.Say(fmt::format("\n{}: {} against {}; {}", swept.stage.name, swept.stage.error_name,
-                          swept.stage.cost_name, swept.conditions));
+void SayStage(const StageFacts& stage, Console& console) {
+  console.Say(fmt::format("\n{}: {} against {}; {}", stage.name, stage.error_name, stage.cost_name,
+                          stage.conditions));
   console.Say(
       fmt::format("   {:>12} {:>24} {:>10} {:>7}  setting", "cost", "range", "error", "dB"));
-  std::vector<size_t> order(swept.points.size());
+  std::vector<size_t> order(stage.points.size());
   std::iota(order.begin(), order.end(), size_t{0});
-  std::sort(order.begin(), order.end(), [&](size_t a, size_t b) {
-    return swept.points[a].measured.cost < swept.points[b].measured.cost;
-  });
+  std::ranges::stable_sort(order, {}, [&](size_t i) { return stage.points[i].cost; });
   for (const size_t i : order) {
-    const eval::SweepPoint& point = swept.points[i];
-    const eval::CostRange range = eval::RangeOf(point, swept.points);
+    const PointFacts& point = stage.points[i];
     console.Say(fmt::format("{} {} {:>11.5g} {:>11.5g} -{:>11.5g} {:>10.4g} {:>7}  {}",
-                            OnFront(swept, i) ? '*' : ' ', swept.knee == i ? 'k' : ' ',
-                            point.measured.cost, range.least, range.most, point.measured.error,
-                            Figure(point.measured.psnr_db), NameOf(swept, i)));
+                            point.on_front ? '*' : ' ', stage.knee == i ? 'k' : ' ', point.cost,
+                            point.cost_least, point.cost_most, point.error, Figure(point.psnr_db),
+                            point.setting));
   }
   console.Say("*: on the Pareto front; k: its knee");
-  if (swept.usual) console.Say(DefaultSentence(swept));
-  if (swept.cheapest) {
-    console.Say(fmt::format("the cheapest within {:g} dB of the best: {}\n  {}", swept.max_loss_db,
-                            NameOf(swept, *swept.cheapest), swept.commands[*swept.cheapest]));
+  if (stage.usual) console.Say(DefaultSentence(stage));
+  if (stage.cheapest) {
+    const PointFacts& cheapest = stage.points[*stage.cheapest];
+    console.Say(fmt::format("the cheapest within {:g} dB of the best: {}\n  {}", stage.max_loss_db,
+                            cheapest.setting, cheapest.command));
   }
-  if (swept.budget) {
-    console.Say(swept.within_budget
-                    ? fmt::format("the best within {:g}: {}\n  {}", *swept.budget,
-                                  NameOf(swept, *swept.within_budget),
-                                  swept.commands[*swept.within_budget])
-                    : fmt::format("nothing measured is within {:g}", *swept.budget));
+  if (stage.budget && stage.within_budget) {
+    const PointFacts& best = stage.points[*stage.within_budget];
+    console.Say(
+        fmt::format("the best within {:g}: {}\n  {}", *stage.budget, best.setting, best.command));
+  } else if (stage.budget) {
+    console.Say(fmt::format("nothing measured is within {:g}", *stage.budget));
   }
-  if (const Json machine = MachineJson(swept); !machine.is_null()) {
+  if (stage.machine) {
     console.Say(fmt::format(
         "the machine: a fixed piece of work took {:.3g} to {:.3g} ms between points, median {:.3g}",
-        machine["least"].get<double>(), machine["most"].get<double>(),
-        machine["median"].get<double>()));
+        stage.machine->least_ms, stage.machine->most_ms, stage.machine->median_ms));
   }
 }
 
@@ -146,26 +145,15 @@ void SweptStage::Judge() {
   usual = eval::JudgeDefault(points, front);
 }
 
-std::string DefaultSentence(const SweptStage& swept) {
-  if (!swept.usual) return "the default was not measured";
-  if (swept.usual->on_front) return "the default is on the Pareto front";
-  const eval::SweepMeasurement& usual = swept.points[swept.usual->at].measured;
-  const eval::SweepMeasurement& better = swept.points[*swept.usual->beaten_by].measured;
-  std::string gain;
-  if (usual.psnr_db && better.psnr_db) {
-    gain = fmt::format(", {:+.3f} dB", *better.psnr_db - *usual.psnr_db);
-  } else {
-    gain = fmt::format(", {:.2f} of its error", better.error / usual.error);
-  }
-  return fmt::format("the default is not on the Pareto front: {} takes {:.2f} of its cost{}{}",
-                     NameOf(swept, *swept.usual->beaten_by), better.cost / usual.cost, gain,
-                     swept.usual->within_spread ? " (the ranges of the two costs overlap)" : "");
+void SaySweep(const SweepFacts& facts, Console& console) {
+  console.Say(fmt::format("{}; {}, {} cores; dtr {}", facts.machine.renderer, facts.machine.cpu,
+                          facts.machine.cores, facts.machine.version));
+  for (const StageFacts& stage : facts.stages) SayStage(stage, console);
 }
 
-void SaySweep(const SweepRun& run, Console& console) {
-  console.Say(fmt::format("{}; {}, {} cores; dtr {}", run.machine.renderer, run.machine.cpu,
-                          run.machine.cores, run.machine.version));
-  for (const SweptStage& swept : run.stages) SayStage(swept, console);
+std::filesystem::path SweepFolderOf(const std::filesystem::path& set) {
+  const std::filesystem::path folder = WithoutTrailingSlash(set);
+  return folder.parent_path() / (folder.stem().string() + "-bench");
 }
 
 std::string SweepJson(const SweepRun& run) {

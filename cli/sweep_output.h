@@ -1,13 +1,16 @@
 // cli/sweep_output.h -- what a sweep found: table, JSON, CSV, page.
 #pragma once
+#include <filesystem>
 #include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "cli/console.h"
+#include "cli/sweep_facts.h"
 #include "dtr/eval/bench_json.h"
 #include "dtr/eval/sweep.h"
+#include "dtr/report/html.h"
 
 namespace dtr::cli {
 
@@ -35,10 +38,7 @@ struct SweepRun {
   std::vector<SweptStage> stages;
 };
 
-/// One line: is the default on the front, and if not what beats it?
-std::string DefaultSentence(const SweptStage& swept);
-
-void SaySweep(const SweepRun& run, Console& console);
+void SaySweep(const SweepFacts& facts, Console& console);
 /// {set, machine:{cpu,cores,renderer,version,clock}, stages:[{stage,cost,error,conditions,
 ///  points:[{setting,options:{AXIS:VALUE},command,cost,cost_least,cost_most,error,psnr_db,
 ///  machine_ms,on_front,figures:{...}}], front:[index], knee, max_loss_db, cheapest_within_loss,
@@ -49,9 +49,15 @@ std::string SweepJson(const SweepRun& run);
 /// command.
 std::string SweepCsv(const SweepRun& run);
 /// An offline page: a plot of each stage, error over cost on logarithmic axes, and its table.
-std::string SweepPage(const SweepRun& run);
+std::string SweepPage(const SweepFacts& facts);
+/// The same sections on another page, after what measured them.
+void AddSweep(report::HtmlReport& page, const SweepFacts& facts);
 /// The plots of a run as SVG, by name: one per stage, and `build` where depth was swept on a set
 /// that records what its calibration took: the error over the time of a whole build.
-std::map<std::string, std::string> SweepPlots(const SweepRun& run);
+std::map<std::string, std::string> SweepPlots(const SweepFacts& facts);
+
+/// Where `dtr bench` writes if not told, and its file with the sweep: NAME-bench beside the set.
+std::filesystem::path SweepFolderOf(const std::filesystem::path& set);
+inline constexpr char kSweepFile[] = "bench.json";
 
 }  // namespace dtr::cli

@@ -299,6 +299,7 @@ std::string InspectPage(const DtrSet& set, ViewStream& stream, const InspectFact
   AddWorstViews(page, findings, facts);
   AddContributions(page, set, findings);
   AddCosts(page, facts);
+  if (facts.add_further) facts.add_further(page);
   return page.Finish();
 }
 

@@ -8,6 +8,7 @@
 #include "dtr/base/progress.h"
 #include "dtr/render/options.h"
 #include "dtr/render/view_stream.h"
+#include "dtr/report/html.h"
 #include "dtr/types/check.h"
 #include "dtr/types/dtr_set.h"
 
@@ -26,6 +27,8 @@ struct InspectFacts {
   std::map<std::string, double> error_px;  ///< held-out reprojection RMS by view name
   double error_limit_px = 0;               ///< above it a view is bad
   std::vector<StageCost> stages;
+  std::function<void(report::HtmlReport&)>
+      add_further;  ///< sections of its own, last; may be empty
   /// A view with its image, depth and sigma.
   std::function<View(const View&)> load;
 };

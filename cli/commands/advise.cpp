@@ -1,12 +1,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "cli/command.h"
 #include "cli/output_file.h"
+#include "cli/pipeline/coverage_advice.h"
 #include "dtr/advise/advise.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
@@ -24,32 +24,6 @@ struct Options {
   fs::path set, output;
   advise::AdviseOptions advise;
 };
-
-// The source views, coarse; pixels of one view at a time.
-std::vector<advise::CoarseView> CoarseViewsOf(const fs::path& folder, const DtrSet& set,
-                                              int threads, Progress& progress) {
-  const auto& views = set.frames.front().views;
-  progress.Stage("reading depth", static_cast<int>(views.size()));
-  std::vector<advise::CoarseView> coarse;
-  int done = 0;
-  for (const View& view : views) {
-    progress.ThrowIfInterrupted();
-    if (view.role == ViewRole::kSource && view.depth_file) {
-      View loaded = view;
-      io::LoadOptions load;
-      load.threads = threads;
-      io::LoadPixels(folder, loaded, load);
-      coarse.push_back(advise::MakeCoarse(loaded, advise::kCoarseSidePx));
-    }
-    progress.Update(++done);
-  }
-  if (coarse.size() < 2) {
-    throw Error(fmt::format(
-        "{}: expected at least 2 source views with depth, found {}; run dtr stereo first",
-        folder.string(), coarse.size()));
-  }
-  return coarse;
-}
 
 Json PlaceJson(const advise::Place& place, const DtrSet& set) {
   const Eigen::Vector3d center = place.cam_from_world.TargetOriginInSource() + set.world_origin;
@@ -113,7 +87,14 @@ int Run(Options options, const Context& context) {
   DtrSet set = io::ReadSet(options.set);
   RequireOneFrame(set);
   io::CollapseDuplicates(set);
-  const auto views = CoarseViewsOf(options.set, set, context.common.threads, context.console);
+  const auto views =
+      pipeline::CoarseViewsOf(options.set, set, context.common.threads, context.console);
+  if (views.size() < 2) {
+    throw Error(
+        fmt::format("{}: expected at least 2 source views with depth, found {}; run dtr stereo "
+                    "first",
+                    options.set.string(), views.size()));
+  }
   const advise::Advice advice = advise::Advise(views, options.advise, context.console);
   Say(advice, context.console);
   if (!options.output.empty()) {

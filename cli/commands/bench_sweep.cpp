@@ -267,12 +267,6 @@ void Check(const SweepRequest& request) {
   }
 }
 
-fs::path OutputFolder(const SweepRequest& request) {
-  if (!request.output.empty()) return request.output;
-  const fs::path set = WithoutTrailingSlash(request.set);
-  return set.parent_path() / (set.stem().string() + "-bench");
-}
-
 fs::path ScratchFolder() {
   std::string name = (fs::temp_directory_path() / "dtr-bench-XXXXXX").string();
   if (mkdtemp(name.data()) == nullptr) {
@@ -348,7 +342,9 @@ int RunSweep(const SweepRequest& request, const Context& context) {
   run.set = request.set.string();
   run.machine = MachineOf(*renderer);
   const bool one_point = !request.point.empty();
-  const fs::path output = one_point ? ScratchFolder() : OutputFolder(request);
+  const fs::path output = one_point                ? ScratchFolder()
+                          : request.output.empty() ? SweepFolderOf(request.set)
+                                                   : request.output;
   fs::create_directories(output);
   // A single point leaves nothing behind.
   std::optional<pipeline::TemporaryFolder> scratch;
@@ -360,17 +356,19 @@ int RunSweep(const SweepRequest& request, const Context& context) {
     run.stages.push_back(
         SweepOne(*measurable, request, context, run.machine, file ? &*file : nullptr));
   }
+  const std::string json = SweepJson(run);
+  const SweepFacts facts = ReadSweep(json, kSweepFile);
   if (!one_point) {
-    WriteFileAtomically(output / "bench.json", SweepJson(run) + "\n");
+    WriteFileAtomically(output / kSweepFile, json + "\n");
     WriteFileAtomically(output / "bench.csv", SweepCsv(run));
-    WriteFileAtomically(output / "bench.html", SweepPage(run));
-    for (const auto& [name, svg] : SweepPlots(run)) {
+    WriteFileAtomically(output / "bench.html", SweepPage(facts));
+    for (const auto& [name, svg] : SweepPlots(facts)) {
       WriteFileAtomically(output / (name + ".svg"), svg);
     }
   }
-  SaySweep(run, context.console);
+  SaySweep(facts, context.console);
   if (!one_point) context.console.Say("written: " + (output / "bench.html").string());
-  context.EmitJson(SweepJson(run));
+  context.EmitJson(json);
   return kDone;
 }
 

@@ -30,6 +30,10 @@ void SayResult(const pipeline::BuildOptions& options, const pipeline::BuildRepor
                     ? "  calibration: reprojection tests passed"
                     : "  calibration: REPROJECTION TESTS FAILED; dtr validate says which");
   }
+  for (const std::string& line : report.coverage) console.Say("  " + line);
+  if (!report.coverage.empty()) {
+    console.Say(fmt::format("  dtr advise {} says where", options.output.string()));
+  }
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 
 #include "cli/command.h"
@@ -11,6 +12,8 @@
 #include "cli/pipeline/validate_set.h"
 #include "cli/render_options.h"
 #include "cli/set_stream.h"
+#include "cli/sweep_output.h"
+#include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/io/run_record.h"
 #include "dtr/io/set_io.h"
@@ -24,7 +27,7 @@ namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
 struct Options {
-  fs::path set, output;
+  fs::path set, output, bench;
   double memory_gb = 4;
 };
 
@@ -68,6 +71,19 @@ std::vector<viewer::StageCost> StagesOf(const fs::path& set) {
   return stages;
 }
 
+/// What `dtr bench` found, from where it was told to be, or from where it is written by default.
+std::optional<SweepFacts> BenchOf(const Options& options) {
+  constexpr std::uintmax_t kFileLimitBytes = 64 << 20;
+  const bool told = !options.bench.empty();
+  const fs::path file = (told ? options.bench : SweepFolderOf(options.set)) / kSweepFile;
+  if (!told && !fs::exists(file)) return std::nullopt;
+  if (!fs::exists(file)) {
+    throw Error("--bench " + options.bench.string() + ": expected " + kSweepFile +
+                " of dtr bench in it, found none");
+  }
+  return ReadSweep(ReadFile(file, kFileLimitBytes), file.string());
+}
+
 viewer::InspectFacts FactsOf(const Options& options, const DtrSet& set, int threads) {
   viewer::InspectFacts facts;
   facts.name = WithoutTrailingSlash(options.set).filename().string();
@@ -99,7 +115,15 @@ int RunInspect(const Options& options, const Context& context) {
   const int threads = context.common.threads;
   DtrSet set = io::ReadSet(options.set);
   RequireOneFrame(set);
-  const viewer::InspectFacts facts = FactsOf(options, set, threads);
+  const std::optional<SweepFacts> bench = BenchOf(options);
+  viewer::InspectFacts facts = FactsOf(options, set, threads);
+  if (bench) {
+    facts.add_further = [&bench](report::HtmlReport& page) {
+      page.Section("What settings cost and are worth");
+      page.Paragraph("Measured by dtr bench, of " + bench->set + ".");
+      AddSweep(page, *bench);
+    };
+  }
   io::CollapseDuplicates(set);
   const auto stream = StreamOf(options.set, set, {DescribeRenderScene(set)},
                                {options.memory_gb, threads}, context.console);
@@ -121,6 +145,11 @@ void AddInspectCommand(CLI::App& app) {
         auto options = std::make_shared<Options>();
         command.add_option("SET", options->set, "The set")->required();
         command.add_option("-o,--output", options->output, "The page, an .html file")->required();
+        command
+            .add_option("--bench", options->bench,
+                        "Folder that dtr bench wrote; its plots and findings go on the page "
+                        "[NAME-bench beside the set, where it is]")
+            ->type_name("DIR");
         AddMemoryOption(command, options->memory_gb);
         return [options](const Context& context) { return RunInspect(*options, context); };
       });

@@ -1,9 +1,5 @@
-#include <fmt/format.h>
-#include <fmt/ranges.h>
-
 #include <algorithm>
 #include <filesystem>
-#include <iterator>
 
 #include "cli/command.h"
 #include "cli/output_file.h"
@@ -20,38 +16,28 @@ struct Options {
   std::filesystem::path table;
 };
 
-/// Renderers that this program and this machine have; what is missing is told, never passed, and
-/// added to `skipped`.
-std::vector<selftest::NamedRenderer> Renderers(bool with_gl, Console& console,
-                                               std::vector<std::string>& skipped) {
+/// Both renderers; one that this program or this machine lacks with the reason.
+std::vector<selftest::NamedRenderer> Renderers(Console& console) {
   std::vector<selftest::NamedRenderer> renderers;
-  for (const std::string& name : RendererNames()) {
-    if (name == "gl" && !with_gl) continue;
+  const std::vector<std::string> known = RendererNames();
+  for (const std::string name : {"gl", "cpu"}) {
     const auto make = [name, &console] {
       RendererChoice choice;
       choice.name = name;
       return MakeRenderer(choice, console);
     };
+    renderers.push_back({name, make});
+    if (std::ranges::find(known, name) == known.end()) {
+      renderers.back().missing = "this program was built without OpenGL";
+      continue;
+    }
     try {
       make();
     } catch (const Error& none) {
-      skipped.push_back(fmt::format("SKIPPED: rendering, {}: {}", name, none.what()));
-      console.Note(skipped.back());
-      continue;
+      renderers.back().missing = none.what();
     }
-    renderers.push_back({name, make});
   }
   return renderers;
-}
-
-std::vector<selftest::Case> AllCases(const std::vector<selftest::NamedRenderer>& renderers) {
-  std::vector<selftest::Case> all;
-  for (std::vector<selftest::Case>& stage :
-       std::vector{selftest::BundleCases(), selftest::StereoCases(), selftest::DepthCodingCases(),
-                   selftest::BlendingCases(), selftest::RenderingCases(renderers)}) {
-    std::ranges::move(stage, std::back_inserter(all));
-  }
-  return all;
 }
 
 int RunSelftest(const Options& options, const Context& context) {
@@ -60,25 +46,23 @@ int RunSelftest(const Options& options, const Context& context) {
   if (!options.table.empty() && !options.stability) {
     throw UsageError("-o: expected --stability with it: the table holds every case");
   }
-  std::vector<std::string> skipped;
   const std::vector<selftest::Row> rows =
-      selftest::RunCases(AllCases(Renderers(options.stability, console, skipped)),
+      selftest::RunCases(selftest::AllCases(Renderers(console)),
                          {.threads = context.common.threads}, !options.stability, console);
   console.ThrowIfInterrupted();
   for (const selftest::Row& row : rows) {
     for (const std::string& line : selftest::TextLines(row)) console.Say(line);
   }
+  const std::string summary = selftest::Summary(rows);
+  const bool skipped =
+      std::ranges::any_of(rows, [](const auto& row) { return !row.skipped.empty(); });
   if (!options.table.empty()) {
-    std::string page = selftest::ToMarkdown(rows);
-    for (const std::string& line : skipped) page += "\n" + line + "\n";
-    WriteFileAtomically(options.table, page);
+    WriteFileAtomically(options.table, selftest::ToMarkdown(rows));
+    if (skipped) console.Note(options.table.string() + ": not the whole table: " + summary);
   }
   context.EmitJson(selftest::ToJson(rows));
-  const auto failed = std::ranges::count_if(rows, [](const auto& row) { return !row.passed(); });
-  console.Say(fmt::format("{} of {} cases hold{}", static_cast<long>(rows.size()) - failed,
-                          rows.size(),
-                          skipped.empty() ? "" : fmt::format("; {}", fmt::join(skipped, "; "))));
-  return failed == 0 ? kDone : kFailed;
+  console.Say(summary);
+  return std::ranges::any_of(rows, &selftest::Row::failed) ? kFailed : kDone;
 }
 
 }  // namespace
@@ -91,7 +75,7 @@ void AddSelftestCommand(CLI::App& app) {
       "dtr selftest --stability -o STABILITY.md", [](CLI::App& command) -> Action {
         auto options = std::make_shared<Options>();
         command.add_flag("--stability", options->stability,
-                         "Every case, with every renderer (a minute); else the quick ones");
+                         "Every case (a minute); else the quick ones");
         command.add_option("-o", options->table, "The table as a page, too")->type_name("FILE.md");
         return [options](const Context& context) { return RunSelftest(*options, context); };
       });

@@ -11,6 +11,7 @@
 #include "capture/store.h"
 #include "capture/video/frames.h"
 #include "cli/pipeline/calibrated_photos.h"
+#include "cli/pipeline/coverage_advice.h"
 #include "cli/pipeline/depth_engine.h"
 #include "cli/pipeline/depth_stage.h"
 #include "cli/pipeline/finishing.h"
@@ -248,6 +249,18 @@ calib::ValidationReport Validate(const std::filesystem::path& folder, DtrSet& se
   return validation;
 }
 
+// Where the capture is thin, from the depth that was found. Kept out of set.json: it says nothing
+// that `dtr advise` would not find in the set.
+void AdviseOn(const std::filesystem::path& folder, DtrSet set, BuildReport& report, int threads,
+              Progress& progress) {
+  io::CollapseDuplicates(set);
+  const auto views = CoarseViewsOf(folder, set, threads, progress);
+  if (views.size() < 2) return;
+  advise::AdviseOptions options;
+  options.threads = threads;
+  report.coverage = AdviceLines(advise::Advise(views, options, progress));
+}
+
 Json ScreeningJson(const BuildReport& report) {
   Json json = Json::array();
   for (const auto& [name, remarks] : report.screening) {
@@ -272,6 +285,7 @@ Json ReportJson(const BuildReport& report, const RunLog& log, const std::filesys
     json["skipped"].push_back({{"name", name}, {"reason", reason}});
   }
   json["screening"] = ScreeningJson(report);
+  json["coverage"] = report.coverage;
   json["validation_passed"] = report.validated ? Json(report.validation_passed) : Json(nullptr);
   json["stages"] = Json::array();
   for (const io::RunStage& stage : log.stages()) {
@@ -412,8 +426,11 @@ BuildReport BuildSet(const BuildOptions& options, Progress& listener) {
   WriteSetPage(writer, set,
                {options.output.stem().string(), options.depth.engine, validation.tests,
                 report.skipped, report.not_registered.size(), options.threads});
+  AdviseOn(writer.folder(), set, report, options.threads, progress);
   log.End();
-  io::RunRecord record = log.Record(ResolveThreads(options.threads), progress.lines());
+  std::vector<std::string> lines = progress.lines();
+  lines.insert(lines.end(), report.coverage.begin(), report.coverage.end());
+  io::RunRecord record = log.Record(ResolveThreads(options.threads), std::move(lines));
   record.extra_json = Json{{"screening", ScreeningJson(report)}}.dump();
   io::WriteRunRecord(writer.folder(), record);
   writer.Finish(set);

@@ -42,7 +42,8 @@ struct BuildReport {
   /// Photos that screening has something to say about, with what it is; they are used all the same.
   std::vector<std::pair<std::string, std::vector<std::string>>> screening;
   bool validated = false, validation_passed = false;
-  std::string json;  ///< for --json
+  std::vector<std::string> coverage;  ///< what the capture lacks, in words; empty without depth
+  std::string json;                   ///< for --json
 };
 
 /// Builds a set. Continues an interrupted run of the same input and options; throws UsageError when

@@ -64,6 +64,7 @@ using RenderFunction =
 struct NamedRenderer {
   std::string name;  ///< "cpu" or "gl"
   std::function<RenderFunction()> make;
+  std::string missing = {};  ///< why this program or machine has none; its cases are skipped
 };
 
 /// What the cases run with.
@@ -76,6 +77,7 @@ struct Case {
   std::string stage, name;
   bool quick = false;  ///< part of the short form
   std::function<Outcome(const Conditions&)> run;
+  std::string skipped = {};  ///< why it cannot be run here; empty: it can
 };
 
 std::vector<Case> BundleCases();
@@ -84,5 +86,7 @@ std::vector<Case> DepthCodingCases();
 std::vector<Case> BlendingCases();
 /// Every case once for each renderer.
 std::vector<Case> RenderingCases(std::span<const NamedRenderer> renderers);
+/// All of these, in the order of the table.
+std::vector<Case> AllCases(std::span<const NamedRenderer> renderers);
 
 }  // namespace dtr::selftest

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "dtr/base/error.h"
@@ -52,6 +53,10 @@ std::string Cell(std::string text) {
 
 void AddRow(const Row& row, std::string& text) {
   std::string name = Cell(row.name);
+  if (!row.skipped.empty()) {
+    text += fmt::format("| {} | not run here: {} | | | SKIPPED | |\n", name, Cell(row.skipped));
+    return;
+  }
   for (const Measure& m : row.outcome.measures) {
     text += fmt::format("| {} | {} | {} | {} | {} | {} |\n", name, Cell(m.what), Number(m.value),
                         BoundOf(m), Verdict(Holds(m)), Cell(m.reason));
@@ -70,7 +75,8 @@ constexpr const char* kIntroduction =
     "Written by `dtr selftest --stability -o docs/STABILITY.md`; do not edit. A case holds when\n"
     "every value holds its bound and no number that was put out is NaN or infinite. The command\n"
     "exits with 1 where a case fails. `dtr selftest` runs the short form (cases marked *), which\n"
-    "`./check` runs too. No value depends on the number of threads.\n";
+    "`./check` runs too. No value depends on the number of threads. Cases that a program or a\n"
+    "machine without OpenGL cannot run are listed as SKIPPED.\n";
 
 }  // namespace
 
@@ -92,7 +98,7 @@ void ExpectRefusal(Outcome& outcome, const std::string& what, const std::functio
 }
 
 bool Row::passed() const {
-  return OtherFaults(*this).empty() && !outcome.measures.empty() &&
+  return skipped.empty() && OtherFaults(*this).empty() && !outcome.measures.empty() &&
          std::ranges::all_of(outcome.measures, Holds);
 }
 
@@ -106,9 +112,9 @@ std::vector<Row> RunCases(const std::vector<Case>& cases, const Conditions& cond
   std::vector<Row> rows;
   for (const Case* each : chosen) {
     if (progress.StopRequested()) break;
-    Row row{each->stage, each->name, each->quick, {}, {}};
+    Row row{each->stage, each->name, each->quick, {}, {}, each->skipped};
     try {
-      row.outcome = each->run(conditions);
+      if (row.skipped.empty()) row.outcome = each->run(conditions);
     } catch (const std::exception& error) {  // a case that ends the program judges no other case
       row.error = error.what();
     }
@@ -118,10 +124,36 @@ std::vector<Row> RunCases(const std::vector<Case>& cases, const Conditions& cond
   return rows;
 }
 
-bool AllPassed(const std::vector<Row>& rows) { return std::ranges::all_of(rows, &Row::passed); }
+std::vector<Case> AllCases(std::span<const NamedRenderer> renderers) {
+  std::vector<Case> all;
+  for (std::vector<Case>& stage : std::vector{BundleCases(), StereoCases(), DepthCodingCases(),
+                                              BlendingCases(), RenderingCases(renderers)}) {
+    std::ranges::move(stage, std::back_inserter(all));
+  }
+  return all;
+}
+
+std::string Summary(const std::vector<Row>& rows) {
+  std::string text =
+      fmt::format("{} of {} cases hold", std::ranges::count_if(rows, &Row::passed), rows.size());
+  std::vector<std::pair<std::string, int>> skipped;  // by what is missing, in the table's order
+  for (const Row& row : rows) {
+    if (row.skipped.empty()) continue;
+    const std::string why = row.stage + ": " + row.skipped;
+    if (skipped.empty() || skipped.back().first != why) skipped.emplace_back(why, 0);
+    ++skipped.back().second;
+  }
+  for (const auto& [why, count] : skipped) {
+    text += fmt::format("; {} SKIPPED: {}", count, why);
+  }
+  return text;
+}
 
 std::vector<std::string> TextLines(const Row& row) {
   std::vector<std::string> lines;
+  if (!row.skipped.empty()) {
+    return {fmt::format("SKIPPED {}: {}: {}", row.stage, row.name, row.skipped)};
+  }
   for (const Measure& m : row.outcome.measures) {
     lines.push_back(fmt::format("{:<5} {}: {}: {}: {} ({})", Verdict(Holds(m)), row.stage, row.name,
                                 m.what, Number(m.value), BoundOf(m)));
@@ -134,15 +166,16 @@ std::vector<std::string> TextLines(const Row& row) {
 }
 
 std::string ToJson(const std::vector<Row>& rows) {
-  Json root = {{"passed", AllPassed(rows)}, {"rows", Json::array()}};
+  Json root = {{"passed", std::ranges::none_of(rows, &Row::failed)}, {"rows", Json::array()}};
   for (const Row& row : rows) {
     Json json = {{"stage", row.stage},
                  {"case", row.name},
                  {"quick", row.quick},
-                 {"passed", row.passed()},
+                 {"passed", row.skipped.empty() ? Json(row.passed()) : Json(nullptr)},
                  {"not_finite", row.outcome.not_finite},
                  {"refusal", row.outcome.refusal},
                  {"error", row.error},
+                 {"skipped", row.skipped},
                  {"measures", Json::array()}};
     for (const Measure& m : row.outcome.measures) json["measures"].push_back(ToJson(m));
     root["rows"].push_back(std::move(json));
@@ -151,9 +184,8 @@ std::string ToJson(const std::vector<Row>& rows) {
 }
 
 std::string ToMarkdown(const std::vector<Row>& rows) {
-  const auto held = std::ranges::count_if(rows, &Row::passed);
   std::string text = kIntroduction;
-  text += fmt::format("\n{} of {} cases hold.\n", held, rows.size());
+  text += "\n" + Summary(rows) + ".\n";
   std::string stage;
   for (const Row& row : rows) {
     if (row.stage != stage) {

@@ -8,15 +8,17 @@
 
 namespace dtr::selftest {
 
-/// A case that was run.
+/// A case that was run, or why it was not.
 struct Row {
   std::string stage, name;
   bool quick = false;
   Outcome outcome;
-  std::string error;  ///< what the case threw, which fails it; empty where it came to its end
+  std::string error;    ///< what the case threw, which fails it; empty where it came to its end
+  std::string skipped;  ///< why it could not be run here: neither passed nor failed
 
-  /// Every measure holds, everything was finite, nothing was thrown.
+  /// It was run, every measure holds, everything was finite, nothing was thrown.
   bool passed() const;
+  bool failed() const { return skipped.empty() && !passed(); }
 };
 
 /// Runs the cases one after the other, only the quick ones if `quick_only`. Ends early, with the
@@ -24,16 +26,19 @@ struct Row {
 std::vector<Row> RunCases(const std::vector<Case>& cases, const Conditions& conditions,
                           bool quick_only, Progress& progress);
 
-bool AllPassed(const std::vector<Row>& rows);
+/// "58 of 68 cases hold", and how many failed or were skipped, with the reasons.
+std::string Summary(const std::vector<Row>& rows);
 
 /// One line a measure, for a terminal: stage, case, what, value, bound, verdict.
 std::vector<std::string> TextLines(const Row& row);
 
-/// JSON object: passed, rows[].{stage,case,quick,passed,not_finite,refusal,error,
-/// measures[].{what,value,relation,bound,passed,reason}}. Values that are no numbers are null.
+/// JSON object: passed (nothing failed), rows[].{stage,case,quick,passed,not_finite,refusal,error,
+/// skipped,measures[].{what,value,relation,bound,passed,reason}}. Values that are no numbers are
+/// null, and so is `passed` of a row that was skipped.
 std::string ToJson(const std::vector<Row>& rows);
 
-/// The table as docs/STABILITY.md holds it; the same bytes for the same rows.
+/// The table as docs/STABILITY.md holds it; the same bytes for the same rows. What was skipped
+/// stands in it by name.
 std::string ToMarkdown(const std::vector<Row>& rows);
 
 }  // namespace dtr::selftest

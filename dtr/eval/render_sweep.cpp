@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "dtr/base/error.h"
 #include "dtr/render/option_names.h"
@@ -11,8 +12,20 @@
 namespace dtr::eval {
 namespace {
 
-// Order of the axes.
-enum Axis : size_t { kMethod, kViews, kResolution, kBlend, kTolerance, kDelta, kPointSize };
+// Order of the axes; those of a weight come after it (SweepStage::applies).
+enum Axis : size_t {
+  kMethod,
+  kViews,
+  kResolution,
+  kBlend,
+  kTolerance,
+  kDelta,
+  kPointSize,
+  kExponent,
+  kFalloff,
+  kBlendK,
+  kMaxAngle
+};
 constexpr const char* kSplats = "splat";  // two-pass with the other primitive
 
 std::string MethodName(const RenderOptions& options) {
@@ -35,6 +48,10 @@ std::vector<std::string> BlendValues(BlendWeight usual) {
   std::vector<std::string> names;
   for (const BlendWeight blend : kBlendWeights) names.emplace_back(NameOf(blend));
   return Values(std::string(NameOf(usual)), names);
+}
+
+std::string DegreesName(double radians) {
+  return fmt::format("{:.6g}", radians * 180 / std::numbers::pi);
 }
 
 /// Values given are tried as they are; ours begin with the option's.
@@ -70,7 +87,12 @@ RenderSweep::RenderSweep(const DtrSet& set, const RenderSweepOptions& options,
       {"blend", BlendValues(usual.blend)},
       {"mesh-tolerance", Values(usual.mesh_tolerance_px, std::vector{0.25, 0.5, 1.0, 2.0})},
       {"delta", Values(usual.delta_px, std::vector{0.5, 1.0, 2.0})},
-      {"point-size", Values(usual.point_size, std::vector{0.75, 1.0, 1.5})}};
+      {"point-size", Values(usual.point_size, std::vector{0.75, 1.0, 1.5})},
+      {"exponent", Values(usual.exponent, std::vector{2.0, 8.0, 32.0})},
+      {"falloff", Values(usual.falloff, std::vector{2.0, 8.0, 32.0})},
+      {"blend-k", Values(usual.blend_k, std::vector{1, 2, 4})},
+      {"max-angle",
+       Values(DegreesName(usual.max_angle_rad), std::vector<std::string>{"30", "60", "90"})}};
 }
 
 bool RenderSweep::Applies(const SweepSetting& setting, size_t axis) const {
@@ -85,7 +107,14 @@ bool RenderSweep::Applies(const SweepSetting& setting, size_t axis) const {
       return two_pass && !options.absolute_delta;
     case kPointSize:
       return two_pass && options.primitive == Primitive::kSplat;
-    default:
+    case kExponent:
+      return options.views > 1 && options.blend == BlendWeight::kCosine;
+    case kFalloff:
+      return options.views > 1 && options.blend == BlendWeight::kExponential;
+    case kBlendK:
+      return options.views > 1 && (options.blend == BlendWeight::kInverseAngle ||
+                                   options.blend == BlendWeight::kKNearest);
+    default:  // max-angle among them: it says which views are valid, under every weight
       return true;
   }
 }
@@ -107,6 +136,12 @@ RenderOptions RenderSweep::OptionsOf(const SweepSetting& setting) const {
   options.mesh_tolerance_px = std::stod(value(kTolerance));
   options.delta_px = std::stod(value(kDelta));
   options.point_size = std::stod(value(kPointSize));
+  options.exponent = std::stod(value(kExponent));
+  options.falloff = std::stod(value(kFalloff));
+  options.blend_k = std::stoi(value(kBlendK));
+  if (setting.at(kMaxAngle) != 0) {  // the default's degrees need not come back as the same bits
+    options.max_angle_rad = std::stod(value(kMaxAngle)) * std::numbers::pi / 180;
+  }
   options.fill_holes = false;  // filling is timed apart
   return options;
 }

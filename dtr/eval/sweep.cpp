@@ -28,12 +28,16 @@ SweepSetting With(SweepSetting setting, size_t axis, int value) {
   return setting;
 }
 
-/// The value of axis 0 on which another axis is tried alone.
-std::optional<int> BaseOf(const SweepStage& stage, size_t axis) {
-  SweepSetting setting(stage.axes.size(), 0);
-  for (int value = 0; value < static_cast<int>(stage.axes[0].values.size()); ++value) {
-    setting[0] = value;
-    if (stage.applies(setting, axis)) return value;
+/// The setting on which an axis is tried alone: one value that is not the default, at most.
+std::optional<SweepSetting> BaseOf(const SweepStage& stage, size_t axis) {
+  const SweepSetting usual(stage.axes.size(), 0);
+  for (size_t other = 0; other < axis; ++other) {
+    for (int value = 0; value < static_cast<int>(stage.axes[other].values.size()); ++value) {
+      const SweepSetting setting = With(usual, other, value);
+      if ((other == 0 || stage.applies(usual, other)) && stage.applies(setting, axis)) {
+        return setting;
+      }
+    }
   }
   return std::nullopt;
 }
@@ -41,8 +45,9 @@ std::optional<int> BaseOf(const SweepStage& stage, size_t axis) {
 /// What each value did when it was alone.
 class Effects {
  public:
-  Effects(const SweepStage& stage, std::span<const SweepPoint> points) : stage_(stage) {
+  Effects(const SweepStage& stage, std::span<const SweepPoint> points) {
     for (const SweepPoint& point : points) measured_[point.setting] = LogOf(point.measured);
+    for (size_t axis = 0; axis < stage.axes.size(); ++axis) bases_.push_back(BaseOf(stage, axis));
   }
 
   /// Empty where something it needs was not measured.
@@ -66,36 +71,32 @@ class Effects {
 
  private:
   std::optional<LogPoint> Alone(size_t axis, int value) const {
-    const std::optional<int> base_value = BaseOf(stage_, axis);
-    if (!base_value) return std::nullopt;
-    const SweepSetting base = With(SweepSetting(stage_.axes.size(), 0), 0, *base_value);
-    const auto without = measured_.find(base), with = measured_.find(With(base, axis, value));
+    const std::optional<SweepSetting>& base = bases_[axis];
+    if (!base) return std::nullopt;
+    const auto without = measured_.find(*base), with = measured_.find(With(*base, axis, value));
     if (without == measured_.end() || with == measured_.end()) return std::nullopt;
     return LogPoint{with->second.cost - without->second.cost,
                     with->second.error - without->second.error};
   }
 
-  const SweepStage& stage_;
+  std::vector<std::optional<SweepSetting>> bases_;  ///< by axis
   std::map<SweepSetting, LogPoint> measured_;
 };
 
-/// Calls `visit` with every setting of the full product that means something throughout.
+/// Calls `visit` with every setting of the full product that means something throughout, `setting`
+/// being fixed before `axis`: axes that mean nothing there are passed over, so that a choice with
+/// many options of its own does not multiply the work for all others.
 template <typename Visit>
-void ForEachSetting(const SweepStage& stage, const Visit& visit) {
-  SweepSetting setting(stage.axes.size(), 0);
-  for (;;) {
-    bool meaningful = true;
-    for (size_t axis = 1; axis < setting.size() && meaningful; ++axis) {
-      meaningful = setting[axis] == 0 || stage.applies(setting, axis);
-    }
-    if (meaningful) visit(setting);
-    size_t axis = 0;
-    while (axis < setting.size() &&
-           ++setting[axis] == static_cast<int>(stage.axes[axis].values.size())) {
-      setting[axis++] = 0;
-    }
-    if (axis == setting.size()) return;
+void ForEachSetting(const SweepStage& stage, SweepSetting& setting, size_t axis,
+                    const Visit& visit) {
+  if (axis == setting.size()) return visit(setting);
+  const bool means_something = axis == 0 || stage.applies(setting, axis);
+  const int values = means_something ? static_cast<int>(stage.axes[axis].values.size()) : 1;
+  for (int value = 0; value < values; ++value) {
+    setting[axis] = value;
+    ForEachSetting(stage, setting, axis + 1, visit);
   }
+  setting[axis] = 0;
 }
 
 /// How far `point` lies beyond `front`: the share of the extents by which every point of the front
@@ -120,10 +121,10 @@ std::vector<SweepSetting> OneAtATime(const SweepStage& stage) {
     settings.push_back(With(usual, 0, static_cast<int>(value)));
   }
   for (size_t axis = 1; axis < stage.axes.size(); ++axis) {
-    const std::optional<int> base = BaseOf(stage, axis);
+    const std::optional<SweepSetting> base = BaseOf(stage, axis);
     if (!base) continue;
     for (size_t value = 1; value < stage.axes[axis].values.size(); ++value) {
-      settings.push_back(With(With(usual, 0, *base), axis, static_cast<int>(value)));
+      settings.push_back(With(*base, axis, static_cast<int>(value)));
     }
   }
   return settings;
@@ -144,7 +145,8 @@ std::vector<SweepSetting> Promising(const SweepStage& stage, std::span<const Swe
     LogPoint predicted;
   };
   std::vector<Candidate> candidates;
-  ForEachSetting(stage, [&](const SweepSetting& setting) {
+  SweepSetting start(stage.axes.size(), 0);
+  ForEachSetting(stage, start, 0, [&](const SweepSetting& setting) {
     if (effects.Measured(setting)) return;
     const std::optional<LogPoint> predicted = effects.Predict(setting);
     if (predicted && GainOver(front, extent, *predicted) > kLeastPromise) {

@@ -43,7 +43,8 @@ struct SweepStage {
   bool cost_is_time = true;  ///< else it is the same on every machine, every time
   /// The first axis is what decides which others mean something: the method, the engine.
   std::vector<SweepAxis> axes;
-  /// Whether another value of this axis could change anything under the setting.
+  /// Whether another value of this axis could change anything under the setting, as the axes before
+  /// it say.
   std::function<bool(const SweepSetting&, size_t axis)> applies;
   std::function<SweepMeasurement(const SweepSetting&)> measure;
 };
@@ -87,7 +88,8 @@ std::optional<DefaultVerdict> JudgeDefault(std::span<const SweepPoint> points,
                                            std::span<const size_t> front);
 
 /// The default, every value of axis 0 alone, and every other value of every other axis, alone, on
-/// the first value of axis 0 under which it means something.
+/// the first value of axis 0 under which it means something; where there is none, on the first value
+/// of another axis (the exponent on the weight that has one).
 std::vector<SweepSetting> OneAtATime(const SweepStage& stage);
 
 /// Up to `count` settings not measured yet that could move the front, the most promising first.

@@ -27,6 +27,37 @@ std::string TextAt(const Json& object, const char* key) {
   return found != object.end() && found->is_string() ? found->get<std::string>() : "?";
 }
 
+/// The steps of a list, a line each; of another tool: no reason to refuse the set.
+void DescribeSteps(const Json& pruned, const char* list, const char* before,
+                   std::ostringstream& out) {
+  const auto found = pruned.find(list);
+  if (found == pruned.end() || !found->is_array()) return;
+  for (const Json& step : *found) {
+    if (!step.is_object()) continue;
+    out << "  " << before << TextAt(step, "kind") << ": " << TextAt(step, "what");
+    if (const auto loss = NumberAt(step, "loss_db")) out << ", " << *loss << " dB";
+    if (const auto bytes = NumberAt(step, "bytes_share")) {
+      out << ", " << 100 * *bytes << " % of the bytes";
+    }
+    if (const auto frame = NumberAt(step, "frame_share"); frame && *frame > 0) {
+      out << ", " << 100 * *frame << " % of a frame's work";
+    }
+    out << "\n";
+  }
+}
+
+/// KIND_loss_db with KIND_error_db, its standard error.
+void DescribeLoss(const Json& pruned, const std::string& kind, const char* words,
+                  std::ostringstream& out) {
+  const auto loss_db = NumberAt(pruned, (kind + "_loss_db").c_str());
+  if (!loss_db) return;
+  out << words << ": " << *loss_db;
+  if (const auto error_db = NumberAt(pruned, (kind + "_error_db").c_str())) {
+    out << " +- " << *error_db;
+  }
+  out << " dB\n";
+}
+
 }  // namespace
 
 std::string PrunedJson(const DtrSet& set) {
@@ -76,20 +107,10 @@ std::string DescribePruned(const DtrSet& set) {
   out << "left out by dtr prune";
   if (loss_db && most_db) out << ", " << *loss_db << " dB lost of " << *most_db << " allowed";
   out << ":\n";
-  const auto removed = pruned.find("removed");
-  const bool listed = removed != pruned.end() && removed->is_array();
-  for (const Json& removal : listed ? *removed : Json::array()) {
-    if (!removal.is_object()) continue;  // of another tool: no reason to refuse the set
-    out << "  " << TextAt(removal, "kind") << ": " << TextAt(removal, "what");
-    if (const auto loss = NumberAt(removal, "loss_db")) out << ", " << *loss << " dB";
-    if (const auto bytes = NumberAt(removal, "bytes_share")) {
-      out << ", " << 100 * *bytes << " % of the bytes";
-    }
-    if (const auto frame = NumberAt(removal, "frame_share"); frame && *frame > 0) {
-      out << ", " << 100 * *frame << " % of a frame's work";
-    }
-    out << "\n";
-  }
+  DescribeSteps(pruned, "removed", "", out);
+  DescribeSteps(pruned, "put_back", "taken back: ", out);
+  DescribeLoss(pruned, "probe", "lost between input cameras", out);
+  DescribeLoss(pruned, "witness", "lost at photos that did not decide", out);
   std::string arguments;
   for (const std::string& argument : RenderArguments(set)) arguments += " " + argument;
   out << "drawn by default with:" << (arguments.empty() ? " the usual options" : arguments) << "\n";

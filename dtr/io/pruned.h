@@ -17,7 +17,8 @@ void SetPrunedJson(DtrSet& set, const std::string& json);
 /// its defaults. Empty where there are none; throws Error where they are no list of strings.
 std::vector<std::string> RenderArguments(const DtrSet& set);
 
-/// For people: what was left out and why, a line each; "" for a set that nothing was left out of.
+/// For people: what was left out and why and what was taken back, a line each, and the losses that
+/// were checked; "" for a set that nothing was left out of.
 std::string DescribePruned(const DtrSet& set);
 
 }  // namespace dtr::io

@@ -3,10 +3,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstdlib>
+#include <iterator>
+
 #include "capture/ingest.h"
 #include "dtr/base/error.h"
 #include "dtr/types/area_average.h"
 #include "tests/capture/photo_files.h"
+#include "tests/support/photo_kinds.h"
 #include "tests/support/test_data.h"
 
 namespace dtr::capture {
@@ -73,6 +78,43 @@ TEST(PrepareSfmImages, OtherFormatsBecomePngUnderTheirOwnNames) {
   int files = 0;
   for ([[maybe_unused]] const auto& entry : fs::directory_iterator(folder / "sfm")) ++files;
   EXPECT_EQ(files, 1);
+}
+
+/// A photo as other programs write it, and what COLMAP is given for it.
+struct Foreign {
+  const char* name;
+  void (*write)(const fs::path&, const ImageRgb8&);
+  const char* format;  ///< of what SfM reads
+  int apart;           ///< levels of 255 that JPEG may cost, on blocks
+};
+
+TEST(PrepareSfmImages, WhatColmapDoesNotReadIsEightBitColourOfTheSameLook) {
+  const Foreign kinds[] = {{"inks.jpg", dtr::testing::WriteCmyk, "jpeg", 6},
+                           {"deep.png", dtr::testing::WriteSixteenBits, "png", 0},
+                           {"deep.tif", dtr::testing::WriteSixteenBits, "png", 0},
+                           {"linear.exr", dtr::testing::WriteLinear, "png", 0},
+                           {"veiled.png", dtr::testing::WriteAlpha, "png", 0}};
+  const TemporaryFolder folder;
+  fs::create_directories(folder / "photos");
+  const ImageRgb8 truth = BlockPhoto(48, 32, 5);
+  for (const Foreign& kind : kinds) kind.write(folder / "photos" / kind.name, truth);
+  const Capture capture = Ingest(folder / "photos");
+  ASSERT_EQ(capture.photos.size(), std::size(kinds));
+  PrepareSfmImages(capture, folder / "sfm", 0, 2);
+  for (const Foreign& kind : kinds) {
+    const fs::path file = folder / "sfm" / kind.name;
+    const io::ImageHeader header = io::ReadImageHeader(file);
+    EXPECT_EQ(header.format, kind.format) << kind.name;
+    EXPECT_EQ(header.channels, 3) << kind.name;
+    EXPECT_EQ(header.bits, 8) << kind.name;
+    const ImageRgb8 found = io::ReadImage(file);
+    ASSERT_EQ(found.data().size(), truth.data().size()) << kind.name;
+    int apart = 0;
+    for (size_t i = 0; i < truth.data().size(); ++i) {
+      apart = std::max(apart, std::abs(found.data()[i] - truth.data()[i]));
+    }
+    EXPECT_LE(apart, kind.apart) << kind.name;
+  }
 }
 
 TEST(PrepareSfmImages, ASecondRunNeverWritesIntoTheOriginals) {

@@ -203,7 +203,8 @@ TEST_F(BenchSweep, WhatCannotBeMeasuredIsRefused) {
   };
   ExpectRefused(bench({"--point", "color=red"}), kWrongUsage,
                 "--point: expected default or NAME=VALUE,... with names of "
-                "{method,views,resolution,blend,mesh-tolerance,delta,point-size}, found "
+                "{method,views,resolution,blend,mesh-tolerance,delta,point-size,exponent,falloff,"
+                "blend-k,max-angle}, found "
                 "'color=red'");
   ExpectRefused(bench({"--point", "resolution=9"}), kWrongUsage,
                 "--point: expected a value of {1,2,4} for resolution, found 'resolution=9'");

@@ -1,21 +1,45 @@
-// The whole stability table: it holds, and knows nothing of the number of threads.
+// The whole stability table: it holds, knows nothing of the number of threads, and is the one in
+// docs/STABILITY.md.
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
 
+#include "dtr/base/temporary_folder.h"
+#include "tests/cli/quick_stability.h"
 #include "tests/cli/run_dtr.h"
+#include "tests/support/environment.h"
 
 namespace dtr::testing {
 namespace {
 
 TEST(StabilityTable, HoldsWithTheSameBytesForOneThreadAndTwo) {
-  const Ran one = Dtr({"selftest", "--stability", "--threads", "1", "--json", "-"});
+  const TemporaryFolder folder;
+  const std::string page = folder / "page.md";
+  const Ran one = Dtr({"selftest", "--stability", "--threads", "1", "--json", "-", "-o", page});
   EXPECT_EQ(one.code, 0) << one.err;
+  bool skipped = false;
   for (const nlohmann::json& row : nlohmann::json::parse(one.out)["rows"]) {
-    EXPECT_TRUE(row["passed"]) << row.dump(1);
+    skipped = skipped || row["skipped"] != "";
+    if (row["skipped"] == "") EXPECT_TRUE(row["passed"]) << row.dump(1);
   }
+  std::ifstream written(page);
+  if (!skipped) EXPECT_EQ(selftest::LinesWithoutValues(written), selftest::DocumentedLines());
   const Ran two = Dtr({"selftest", "--stability", "--threads", "2", "--json", "-"});
   EXPECT_EQ(one.out, two.out);
+}
+
+TEST(StabilityTable, WithoutOpenGlItsCasesAreNamedAsSkipped) {
+  const Environment no_driver("__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent");
+  const Ran ran = Dtr({"selftest", "--json", "-"});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  int skipped = 0;
+  for (const nlohmann::json& row : nlohmann::json::parse(ran.out)["rows"]) {
+    if (row["stage"] != "Rendering, gl") continue;
+    EXPECT_TRUE(row["passed"].is_null());
+    EXPECT_NE(row["skipped"], "");
+    ++skipped;
+  }
+  EXPECT_EQ(skipped, 11);  // the short form's
 }
 
 TEST(StabilityTable, APageNeedsTheWholeTable) {

@@ -3,7 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <map>
+#include <numbers>
 #include <set>
 
 #include "dtr/base/error.h"
@@ -126,6 +129,41 @@ TEST(OneAtATime, TriesConditionalChoicesWhereTheyMeanSomething) {
                   SweepSetting{0, 2, 0, 0}, SweepSetting{0, 0, 1, 0}, SweepSetting{1, 0, 0, 1}));
 }
 
+/// Error and cost of a stage whose second choice has an option of its own: the power of "sharp".
+SweepStage Nested() {
+  SweepStage stage;
+  stage.name = "nested";
+  stage.axes = {{"method", {"one", "other"}}, {"weight", {"soft", "sharp"}}, {"power", {"8", "9"}}};
+  stage.applies = [](const SweepSetting& setting, size_t axis) {
+    return axis != 2 || setting[1] == 1;
+  };
+  stage.measure = [](const SweepSetting& setting) {
+    const double cost = setting[0] == 1 ? 1 : 10;
+    const double error =
+        (setting[0] == 1 ? 3 : 1) * (setting[1] == 1 ? 0.5 : 1) * (setting[2] == 1 ? 0.5 : 1);
+    return SweepMeasurement{cost, cost, cost, error, std::nullopt, 0, {}};
+  };
+  return stage;
+}
+
+TEST(OneAtATime, TriesTheOptionsOfAChoiceOnThatChoice) {
+  EXPECT_THAT(OneAtATime(Nested()), ElementsAre(SweepSetting{0, 0, 0}, SweepSetting{1, 0, 0},
+                                                SweepSetting{0, 1, 0}, SweepSetting{0, 1, 1}));
+}
+
+TEST(Sweep, CombinesTheOptionsOfAChoiceWithTheOtherAxes) {
+  SilentProgress progress;
+  Memory memory;
+  std::set<SweepSetting> measured;
+  for (const SweepPoint& point : Sweep(Nested(), 100, memory, progress)) {
+    measured.insert(point.setting);
+  }
+  // Cheapest, and best there: what the power did beside the other method is foreseen.
+  EXPECT_THAT(measured, Contains(SweepSetting{1, 1, 1}));
+  EXPECT_THAT(measured, Not(Contains(SweepSetting{0, 0, 1})));  // a power of nothing
+  EXPECT_THAT(measured, Not(Contains(SweepSetting{1, 0, 1})));
+}
+
 TEST(Sweep, FindsTheFrontOfTheFullProductWithoutMeasuringIt) {
   SilentProgress progress;
   Memory memory;
@@ -222,6 +260,53 @@ TEST(RenderSweep, TriesWhatTheSetHasAndMeasuresCostAndError) {
   EXPECT_FALSE(stage.applies(setting, 4));  // mesh tolerance is of the other method
   clockwork.room_for_views = 1;
   EXPECT_THROW(stage.measure(setting), Error);
+}
+
+TEST(RenderSweep, OptionsOfAWeightAreTriedUnderThatWeightAlone) {
+  SilentProgress progress;
+  testing::Clockwork clockwork(false);
+  const DtrSet set = testing::Planes(5, true);
+  RenderSweepOptions options;
+  options.bench.render.max_angle_rad = 1;  // whose degrees do not come back as the same bits
+  const RenderSweep sweep(set, options, clockwork, progress);
+  const SweepStage stage = sweep.Stage();
+  const auto axis_of = [&](const std::string& name) {
+    return static_cast<size_t>(std::ranges::find(stage.axes, name, &SweepAxis::name) -
+                               stage.axes.begin());
+  };
+  const size_t blend = axis_of("blend");
+  const std::map<std::string, std::vector<std::string>> weights_of = {
+      {"exponent", {"cosine"}},
+      {"falloff", {"exponential"}},
+      {"blend-k", {"inverse-angle", "k-nearest"}},
+      {"max-angle", stage.axes[blend].values}};
+  for (const auto& [name, weights] : weights_of) {
+    ASSERT_LT(axis_of(name), stage.axes.size()) << name;
+    for (size_t value = 0; value < stage.axes[blend].values.size(); ++value) {
+      SweepSetting setting(stage.axes.size(), 0);
+      setting[blend] = static_cast<int>(value);
+      const bool expected = std::ranges::count(weights, stage.axes[blend].values[value]) > 0;
+      EXPECT_EQ(stage.applies(setting, axis_of(name)), expected)
+          << name << " under " << stage.axes[blend].values[value];
+    }
+  }
+  SweepSetting setting(stage.axes.size(), 0);
+  EXPECT_EQ(sweep.OptionsOf(setting), options.bench.render);
+  setting[axis_of("exponent")] = setting[axis_of("falloff")] = 1;
+  setting[axis_of("blend-k")] = setting[axis_of("max-angle")] = 1;
+  const RenderOptions others = sweep.OptionsOf(setting);
+  EXPECT_EQ(others.exponent, 2);
+  EXPECT_EQ(others.falloff, 2);
+  EXPECT_EQ(others.blend_k, 1);
+  EXPECT_DOUBLE_EQ(others.max_angle_rad, std::numbers::pi / 6);
+  // Every one of them is measured alone.
+  for (const auto& [name, weights] : weights_of) {
+    const auto settings = OneAtATime(stage);
+    EXPECT_EQ(std::ranges::count_if(
+                  settings, [&](const SweepSetting& one) { return one[axis_of(name)] != 0; }),
+              std::ssize(stage.axes[axis_of(name)].values) - 1)
+        << name;
+  }
 }
 
 }  // namespace
