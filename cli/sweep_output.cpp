@@ -100,10 +100,12 @@ void SayStage(const SweptStage& swept, Console& console) {
   for (const size_t i : order) {
     const eval::SweepPoint& point = swept.points[i];
     const eval::CostRange range = eval::RangeOf(point, swept.points);
-    console.Say(fmt::format("{} {} {:>11.5g} {:>11.5g} -{:>11.5g} {:>10.4g} {:>7}  {}",
+    const std::string lost = WithoutCamera(point);
+    console.Say(fmt::format("{} {} {:>11.5g} {:>11.5g} -{:>11.5g} {:>10.4g} {:>7}  {}{}",
                             OnFront(swept, i) ? '*' : ' ', swept.knee == i ? 'k' : ' ',
                             point.measured.cost, range.least, range.most, point.measured.error,
-                            Figure(point.measured.psnr_db), NameOf(swept, i)));
+                            Figure(point.measured.psnr_db), NameOf(swept, i),
+                            lost.empty() ? "" : " (" + lost + ")"));
   }
   console.Say("*: on the Pareto front; k: its knee");
   if (swept.usual) console.Say(DefaultSentence(swept));
@@ -144,6 +146,12 @@ void SweptStage::Judge() {
   within_budget.reset();
   if (budget) within_budget = eval::BestWithin(points, *budget);
   usual = eval::JudgeDefault(points, front);
+}
+
+std::string WithoutCamera(const eval::SweepPoint& point) {
+  const auto count = point.measured.figures.find("not_registered");
+  if (count == point.measured.figures.end() || count->second == 0) return "";
+  return fmt::format("{:g} photo{} without a camera", count->second, count->second == 1 ? "" : "s");
 }
 
 std::string DefaultSentence(const SweptStage& swept) {

@@ -35,6 +35,9 @@ struct SweepRun {
   std::vector<SweptStage> stages;
 };
 
+/// "2 photos without a camera" of a calibration that has such; empty otherwise.
+std::string WithoutCamera(const eval::SweepPoint& point);
+
 /// One line: is the default on the front, and if not what beats it?
 std::string DefaultSentence(const SweptStage& swept);
 

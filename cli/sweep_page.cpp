@@ -96,10 +96,12 @@ void AddTable(report::HtmlReport& page, const SweptStage& swept) {
   for (const size_t i : order) {
     const eval::SweepPoint& point = swept.points[i];
     const bool front = std::find(swept.front.begin(), swept.front.end(), i) != swept.front.end();
+    const std::string marks = MarksOf(swept, i), lost = WithoutCamera(point);
     rows.push_back({eval::Describe(swept.stage, point.setting), CostText(swept, point),
                     fmt::format("{:.4g}", point.measured.error),
                     point.measured.psnr_db ? fmt::format("{:.2f}", *point.measured.psnr_db) : "-",
-                    std::string(front ? "yes" : ""), MarksOf(swept, i), swept.commands[i]});
+                    std::string(front ? "yes" : ""),
+                    marks + (marks.empty() || lost.empty() ? "" : ", ") + lost, swept.commands[i]});
   }
   page.Table(header, rows);
 }
