@@ -43,6 +43,7 @@ PointFacts PointOf(const JsonObject& json) {
   point.psnr_db = NumberAt(json, "psnr_db");
   point.on_front = TruthAt(json, "on_front");
   point.build_cpu_s = NumberAt(json.Object("figures"), "build_cpu_s");
+  point.not_registered = NumberAt(json.Object("figures"), "not_registered").value_or(0);
   const JsonObject options = json.Object("options");
   const io::Json& values = json.Value("options");
   if (values.empty()) json.Fail("options", "the value of every axis");
@@ -122,6 +123,12 @@ SweepFacts ReadSweep(const std::string& json, const std::string& file) {
     facts.stages.push_back(StageOf(top.Item("stages", i)));
   }
   return facts;
+}
+
+std::string WithoutCamera(const PointFacts& point) {
+  if (point.not_registered == 0) return "";
+  return fmt::format("{:g} photo{} without a camera", point.not_registered,
+                     point.not_registered == 1 ? "" : "s");
 }
 
 std::string DefaultSentence(const StageFacts& stage) {

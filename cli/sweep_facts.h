@@ -19,6 +19,7 @@ struct PointFacts {
   std::optional<double> psnr_db;
   bool on_front = false;
   std::optional<double> build_cpu_s;  ///< of the whole build, where the set records it
+  double not_registered = 0;          ///< photos that the calibration found no camera for
 };
 
 struct StageFacts {
@@ -41,6 +42,9 @@ struct SweepFacts {
 /// `json`: what SweepJson gives. Throws Error, which begins with `file` and names the field, where
 /// it is something else.
 SweepFacts ReadSweep(const std::string& json, const std::string& file);
+
+/// "2 photos without a camera" of a calibration that has such; empty otherwise.
+std::string WithoutCamera(const PointFacts& point);
 
 /// One line: is the default on the front, and if not what beats it?
 std::string DefaultSentence(const StageFacts& stage);

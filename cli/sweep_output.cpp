@@ -99,10 +99,11 @@ void SayStage(const StageFacts& stage, Console& console) {
   std::ranges::stable_sort(order, {}, [&](size_t i) { return stage.points[i].cost; });
   for (const size_t i : order) {
     const PointFacts& point = stage.points[i];
-    console.Say(fmt::format("{} {} {:>11.5g} {:>11.5g} -{:>11.5g} {:>10.4g} {:>7}  {}",
+    const std::string lost = WithoutCamera(point);
+    console.Say(fmt::format("{} {} {:>11.5g} {:>11.5g} -{:>11.5g} {:>10.4g} {:>7}  {}{}",
                             point.on_front ? '*' : ' ', stage.knee == i ? 'k' : ' ', point.cost,
                             point.cost_least, point.cost_most, point.error, Figure(point.psnr_db),
-                            point.setting));
+                            point.setting, lost.empty() ? "" : " (" + lost + ")"));
   }
   console.Say("*: on the Pareto front; k: its knee");
   if (stage.usual) console.Say(DefaultSentence(stage));

@@ -87,9 +87,11 @@ void AddTable(report::HtmlReport& page, const StageFacts& stage) {
   std::ranges::stable_sort(order, {}, [&](size_t i) { return stage.points[i].cost; });
   for (const size_t i : order) {
     const PointFacts& point = stage.points[i];
+    const std::string marks = MarksOf(stage, i), lost = WithoutCamera(point);
     rows.push_back({point.setting, CostText(point), fmt::format("{:.4g}", point.error),
                     point.psnr_db ? fmt::format("{:.2f}", *point.psnr_db) : "-",
-                    std::string(point.on_front ? "yes" : ""), MarksOf(stage, i), point.command});
+                    std::string(point.on_front ? "yes" : ""),
+                    marks + (marks.empty() || lost.empty() ? "" : ", ") + lost, point.command});
   }
   page.Table(header, rows);
 }

@@ -16,12 +16,6 @@ std::uint64_t IdOf(const Bundle& bundle, const BundleObservation& o) {
   return bundle.point_ids[static_cast<size_t>(o.point)];
 }
 
-double Loss(const Eigen::Vector2d& residual, double scale_px) {
-  const double c2 = scale_px * scale_px;
-  const double squared = residual.allFinite() ? residual.squaredNorm() : 1e4 * c2;
-  return c2 * std::log1p(squared / c2);
-}
-
 /// `asked` with these cameras, its points where they explain them best.
 Adjusted Placed(const Bundle& cameras, const Bundle& asked) {
   Bundle placed = asked;
@@ -70,7 +64,7 @@ std::vector<double> LossesOfUnseenPoints(const Bundle& cameras, const Bundle& as
   for (size_t begin = 0, end = 0; begin < all.size(); begin = end) {
     double sum = 0;
     for (end = begin; end < all.size() && all[end].point == all[begin].point; ++end) {
-      sum += Loss(residuals[end], scale_px);
+      sum += CauchyLoss(residuals[end], scale_px);
     }
     if (end - begin >= kMinTrack) losses.push_back(sum / static_cast<double>(end - begin));
   }
@@ -101,9 +95,15 @@ std::vector<double> LossesOfHeldOutSights(const Bundle& cameras, const SightSpli
   asked.observations = split.held_out;
   std::vector<double> losses;
   for (const Eigen::Vector2d& residual : Residuals(asked)) {
-    losses.push_back(Loss(residual, scale_px));
+    losses.push_back(CauchyLoss(residual, scale_px));
   }
   return losses;
+}
+
+double CauchyLoss(const Eigen::Vector2d& residual_px, double scale_px) {
+  const double c2 = scale_px * scale_px;
+  const double squared = residual_px.allFinite() ? residual_px.squaredNorm() : 1e4 * c2;
+  return c2 * std::log1p(squared / c2);
 }
 
 double Mean(const std::vector<double>& values) {

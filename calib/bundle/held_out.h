@@ -45,6 +45,9 @@ SightSplit SplitSights(const Bundle& bundle, std::uint64_t seed);
 std::vector<double> LossesOfHeldOutSights(const Bundle& cameras, const SightSplit& split,
                                           double scale_px);
 
+/// Cauchy's loss (px^2) of a residual; of one that is not finite as if 100 scales long.
+double CauchyLoss(const Eigen::Vector2d& residual_px, double scale_px);
+
 double Mean(const std::vector<double>& values);
 
 /// 95 % percentile interval of mean(a - b), items drawn with replacement.

@@ -154,6 +154,9 @@ void ExtractFeatures(Workspace& workspace, const std::filesystem::path& database
              std::to_string(std::min<size_t>(static_cast<size_t>(plan.threads), names.size())))
         .Add({"SiftExtraction.max_image_size", "FeatureExtraction.max_image_size"},
              std::to_string(plan.max_image_size_px));
+    if (plan.max_features > 0) {
+      arguments.Add({"SiftExtraction.max_num_features"}, std::to_string(plan.max_features));
+    }
     const bool masked = std::any_of(group.images.begin(), group.images.end(), [&](size_t i) {
       return !workspace.images()[i].mask_file.empty();
     });

@@ -15,6 +15,7 @@ struct ExtractionPlan {
   int threads = 1;
   int max_image_size_px = 0;  ///< long side; larger photos are scaled down for features only
   double expected_peak_gib = 0;
+  int max_features = 0;  ///< per photo; 0: COLMAP's own limit
 };
 
 /// Model of COLMAP's CPU extraction (VLFeat SIFT from octave -1, that is, on the doubled image):

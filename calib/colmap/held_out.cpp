@@ -142,8 +142,9 @@ Placed Place(const fs::path& images_dir, const SfmImageInput& photo, const Froze
   Workspace workspace(folder, images_dir, std::span(&photo, 1), kAliasPrefix, 1, progress);
   auto groups = GroupCameras(workspace.images(), LensModelOf(options), true);
   groups.front().camera_id = SharedCamera(frozen, photo, options.share_intrinsics_within_group);
-  const ExtractionPlan plan =
+  ExtractionPlan plan =
       PlanExtraction(workspace.images(), 1, options.memory_gb, options.max_image_size_px);
+  plan.max_features = options.max_features;  // as the sources', which `frozen` vouches for
   const auto inputs =
       fmt::format("model {} size {} seed {} {} [{}]{}", frozen.fingerprint, plan.max_image_size_px,
                   options.seed, options.lens_model, ParamsText(groups.front().params),

@@ -20,6 +20,7 @@ constexpr std::uintmax_t kLargestNote = 1 << 12;
 std::string TextOf(const std::vector<CameraGroup>& groups, const ExtractionPlan& plan,
                    std::uint64_t seed) {
   std::string text = fmt::format("size {} seed {}", plan.max_image_size_px, seed);
+  if (plan.max_features > 0) text += fmt::format(" most {}", plan.max_features);
   for (const CameraGroup& group : groups) {
     text += fmt::format("\n{} [{}] of {}", calib::NameOf(group.model), ParamsText(group.params),
                         fmt::join(group.images, ","));
@@ -54,8 +55,9 @@ void CopyDatabase(const fs::path& from, const fs::path& to) {
 void FeaturesAndMatches(Workspace& workspace, const std::vector<CameraGroup>& groups,
                         const SfmOptions& options, SfmReport& report,
                         const std::optional<ImagePairs>& allowed) {
-  const ExtractionPlan plan = PlanExtraction(workspace.images(), workspace.threads(),
-                                             options.memory_gb, options.max_image_size_px);
+  ExtractionPlan plan = PlanExtraction(workspace.images(), workspace.threads(), options.memory_gb,
+                                       options.max_image_size_px);
+  plan.max_features = options.max_features;
   report.extraction_threads = plan.threads;
   report.max_image_size_px = plan.max_image_size_px;
   report.matching = ResolveMatching(options.matching, workspace.images().size());

@@ -88,6 +88,8 @@ void ThrowFullDisk(const fs::path& folder, const std::string& consequence) {
       folder.string(), consequence));
 }
 
+}  // namespace
+
 const char* NameOf(Matching matching) {
   switch (matching) {
     case Matching::kAuto:
@@ -101,8 +103,6 @@ const char* NameOf(Matching matching) {
   }
   return "";
 }
-
-}  // namespace
 
 void RemoveAll(const fs::path& path) {
   std::error_code failure;

@@ -8,6 +8,7 @@
 #include <sstream>
 #include <thread>
 
+#include "cli/pipeline/calibration_sweep.h"
 #include "cli/pipeline/input_hash.h"
 #include "cli/pipeline/set_quality.h"
 #include "cli/pipeline/stereo_sweep.h"
@@ -37,6 +38,8 @@ class Measurable {
   virtual std::string Conditions() const = 0;
   /// Arguments that, with --point, measure under the same conditions.
   virtual std::vector<std::string> Arguments() const = 0;
+  /// What decides a measurement beside set, arguments and axes.
+  virtual std::string Inputs() const { return {}; }
 };
 
 std::vector<std::string> RendererArguments(const SweepRequest& request) {
@@ -100,6 +103,38 @@ class RenderStage final : public Measurable {
   const eval::RenderSweep sweep_;
 };
 
+fs::path OutputFolder(const SweepRequest& request) {
+  if (!request.output.empty()) return request.output;
+  const fs::path set = WithoutTrailingSlash(request.set);
+  return set.parent_path() / (set.stem().string() + "-bench");
+}
+
+class CalibrationStage final : public Measurable {
+ public:
+  CalibrationStage(const SweepRequest& request, const Context& context, const fs::path& work)
+      : request_(request),
+        sweep_({request.set, request.photos, work / "calibrations", request.feature_sizes_px,
+                context.common.threads, context.common.seed},
+               context.console) {}
+  eval::SweepStage Stage() const override { return sweep_.Stage(); }
+  std::string Conditions() const override { return sweep_.Conditions(); }
+  std::string Inputs() const override { return sweep_.Identity(); }
+  std::vector<std::string> Arguments() const override {
+    std::vector<std::string> arguments = RendererArguments(request_);
+    arguments.insert(arguments.end(), {"--photos", request_.photos.string()});
+    AppendList("--feature-size", request_.feature_sizes_px, arguments);
+    // There COLMAP's results lie, which it would not find again.
+    if (request_.point.empty() || !request_.output.empty()) {
+      arguments.insert(arguments.end(), {"-o", OutputFolder(request_).string()});
+    }
+    return arguments;
+  }
+
+ private:
+  const SweepRequest& request_;
+  const pipeline::CalibrationSweep sweep_;
+};
+
 /// The two stages that write sets: Options and Sweep are those of either.
 template <typename Sweep>
 class SetStage final : public Measurable {
@@ -130,6 +165,11 @@ std::unique_ptr<Measurable> MakeStage(const std::string& name, const SweepReques
                                       const Context& context, const fs::path& work,
                                       eval::TimedRenderer& renderer) {
   if (name == "render") return std::make_unique<RenderStage>(request, context, renderer);
+  if (name == "calibration") {
+    // A single point leaves something behind only where it is told to.
+    return std::make_unique<CalibrationStage>(request, context,
+                                              request.output.empty() ? work : request.output);
+  }
   const auto make_renderer = [&request, &context] {
     return MakeRenderer(request.renderer, context.console);
   };
@@ -145,7 +185,7 @@ std::unique_ptr<Measurable> MakeStage(const std::string& name, const SweepReques
 }
 
 /// What decides a measurement, but for the setting: of two equal ones one is enough.
-std::string ContextOf(const SweepRequest& request, const eval::SweepStage& stage,
+std::string ContextOf(const SweepRequest& request, const Measurable& measurable,
                       const std::vector<std::string>& arguments, const Context& context,
                       const eval::BenchMachine& machine) {
   std::string text = Sha256OfFile(request.set / "set.json") + "\n" + machine.version + "\n" +
@@ -157,7 +197,8 @@ std::string ContextOf(const SweepRequest& request, const eval::SweepStage& stage
     if (view.role == ViewRole::kHeldOut && view.image_file) text += "\n" + view.image_file->sha256;
   }
   if (!request.truth.empty()) text += "\n" + pipeline::InputHash(request.truth);
-  for (const eval::SweepAxis& axis : stage.axes) {
+  if (const std::string inputs = measurable.Inputs(); !inputs.empty()) text += "\n" + inputs;
+  for (const eval::SweepAxis& axis : measurable.Stage().axes) {
     text += "\n" + axis.name + "=" + axis.values.front();
   }
   return Sha256(std::as_bytes(std::span(text)));
@@ -235,7 +276,7 @@ SweptStage SweepOne(const Measurable& measurable, const SweepRequest& request,
     swept.points = {eval::MeasurePoint(swept.stage, SettingOf(swept.stage, request.point))};
   } else {
     const auto store =
-        file->Of(swept.stage, ContextOf(request, swept.stage, arguments, context, machine));
+        file->Of(swept.stage, ContextOf(request, measurable, arguments, context, machine));
     swept.points = eval::Sweep(swept.stage, request.most_points, *store, context.console);
   }
   for (const eval::SweepPoint& point : swept.points) {
@@ -262,6 +303,13 @@ void Check(const SweepRequest& request) {
   if ((!request.truth.empty() || !request.max_sizes_px.empty()) && !has("stereo")) {
     throw UsageError("--truth, --max-size: expected --stage stereo with them");
   }
+  if ((!request.photos.empty() || !request.feature_sizes_px.empty()) && !has("calibration")) {
+    throw UsageError("--photos, --feature-size: expected --stage calibration with them");
+  }
+  if (has("calibration") && request.photos.empty()) {
+    throw UsageError(
+        "--stage calibration: expected --photos with it, the folder that the set was built from");
+  }
   if (!fs::exists(request.set)) {
     throw Error(request.set.string() + ": expected the folder of a D+TR set, found nothing");
   }
@@ -284,13 +332,14 @@ eval::BenchMachine MachineOf(const eval::TimedRenderer& renderer) {
 
 void AddSweepOptions(CLI::App& command, CLI::Option* table, SweepRequest& request) {
   command
-      .add_option("--stage", request.stages,
-                  "Stages to sweep: render; stereo: depth by engine, preset and image size; "
-                  "storage: codings and planes [render]")
+      .add_option(
+          "--stage", request.stages,
+          "Stages to sweep: render; stereo: depth by engine, preset and image size; "
+          "storage: codings and planes; calibration: what SfM is told, of --photos [render]")
       ->delimiter(',')
-      ->check(CLI::IsMember({"render", "stereo", "storage"}))
+      ->check(CLI::IsMember({"render", "stereo", "storage", "calibration"}))
       ->excludes(table)
-      ->type_name("render|stereo|storage,...");
+      ->type_name("render|stereo|storage|calibration,...");
   command
       .add_option("--point", request.point,
                   "Measure this one setting, default or NAME=VALUE,..., instead of a sweep")
@@ -325,6 +374,20 @@ void AddSweepOptions(CLI::App& command, CLI::Option* table, SweepRequest& reques
                   "[as they are, seven tenths, half]")
       ->delimiter(',')
       ->check(CLI::Range(0, 1000000))
+      ->excludes(table)
+      ->type_name("PX,...");
+  command
+      .add_option("--photos", request.photos,
+                  "calibration: folder of the photos the set was built from")
+      ->check(CLI::ExistingDirectory)
+      ->excludes(table)
+      ->type_name("DIR");
+  command
+      .add_option("--feature-size", request.feature_sizes_px,
+                  "calibration: long sides for features to try, the first the default; 0: what "
+                  "memory allows [that, seven tenths, half]")
+      ->delimiter(',')
+      ->check(CLI::Range(0, 65536))
       ->excludes(table)
       ->type_name("PX,...");
   command

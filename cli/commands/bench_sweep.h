@@ -18,6 +18,8 @@ struct SweepRequest {
   std::filesystem::path output;  ///< folder; empty: NAME-bench beside the set
   std::filesystem::path truth;
   std::vector<int> max_sizes_px;
+  std::filesystem::path photos;  ///< to calibrate anew
+  std::vector<int> feature_sizes_px;
   int most_points = 60;
   double max_loss_db = 0.1;
   std::optional<double> budget_ms;

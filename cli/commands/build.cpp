@@ -7,6 +7,7 @@
 #include "cli/metre_options.h"
 #include "cli/pipeline/build_set.h"
 #include "cli/pipeline/force_stage.h"
+#include "cli/sfm_options.h"
 #include "cli/video_options.h"
 
 namespace dtr::cli {
@@ -77,6 +78,7 @@ void AddBuildCommand(CLI::App& app) {
             ->type_name("RIG.json");
         command.add_flag("!--no-refine", options->refine,
                          "Take COLMAP's cameras as they are, without bundle adjustment");
+        AddSfmOptions(command, options->sfm);
         auto words = std::make_shared<MetreWords>();
         AddMetreOptions(command, *AddGpsFlag(command, options->metres.gps), *words);
         command.add_flag("--keep-duplicates", options->keep_duplicates,

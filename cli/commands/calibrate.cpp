@@ -10,6 +10,7 @@
 #include "cli/metre_options.h"
 #include "cli/pipeline/calibrated_photos.h"
 #include "cli/pipeline/lens_file.h"
+#include "cli/sfm_options.h"
 #include "dtr/base/error.h"
 
 namespace dtr::cli {
@@ -20,6 +21,7 @@ namespace fs = std::filesystem;
 struct Options {
   fs::path photos, output;
   double memory_gb = 4;
+  pipeline::SfmChoice sfm;
   bool refine = true, gps = false;
   fs::path lens;
   MetreWords metres;
@@ -44,6 +46,7 @@ int RunCalibratePhotos(const Options& options, const Context& context) {
   calibrate.threads = context.common.threads;
   calibrate.seed = context.common.seed;
   calibrate.memory_gb = options.memory_gb;
+  calibrate.sfm = options.sfm;
   calibrate.refine = options.refine;
   calibrate.determined = options.photos.string();
   // The workspace stays: it holds COLMAP's arguments, logs and database, and lets a run continue.
@@ -90,6 +93,7 @@ void AddCalibrateCommand(CLI::App& app) {
                CLI::Option* no_refine =
                    command.add_flag("!--no-refine", options->refine,
                                     "Take COLMAP's cameras as they are, without bundle adjustment");
+               AddSfmOptions(command, options->sfm);
                // A lens that is given replaces COLMAP's: poses and points must follow it.
                AddLensOption(command, options->lens)->excludes(no_refine);
                CLI::Option* gps = AddGpsFlag(command, options->gps)->excludes(no_refine);

@@ -53,6 +53,7 @@ Json OptionsJson(const BuildOptions& options, const stereo::Effort& effort, int 
   if (options.keep_duplicates) json["keep_duplicates"] = true;
   if (!options.rig.empty()) json["rig"] = options.rig.filename().string();
   if (options.metres.any()) json["metres"] = Json::parse(ToJson(options.metres));
+  if (options.sfm != SfmChoice()) json["sfm"] = Json::parse(ToJson(options.sfm));
   json["seed"] = options.seed;
   if (options.depth.depth_error_px) json["depth_error_px"] = *options.depth.depth_error_px;
   return json;
@@ -356,7 +357,10 @@ BuildReport BuildSet(const BuildOptions& options, Progress& listener) {
   if (!std::filesystem::is_directory(options.poses)) {
     // COLMAP looks for features, of a size that is the one thing --memory decides of the result.
     const auto sizes = SizesOf(options, photos, held_out);
-    if (!sizes.empty()) fingerprint["feature_image_size_px"] = FeatureImageSizePx(sizes, memory_gb);
+    if (!sizes.empty()) {
+      fingerprint["feature_image_size_px"] =
+          FeatureImageSizePx(sizes, memory_gb, options.sfm.feature_size_px);
+    }
   }
   io::SetWriter writer(options.output, fingerprint.dump(), options.force);
   if (!options.force_stage.empty()) ForgetStage(writer.folder(), options.force_stage);
@@ -386,7 +390,9 @@ BuildReport BuildSet(const BuildOptions& options, Progress& listener) {
                        options.refine,
                        {},
                        rig,
-                       options.metres},
+                       options.metres,
+                       {},
+                       options.sfm},
                       writer.work_folder() / "calibration", progress);
   report.not_registered = calibrated.not_registered;
   for (size_t i = 0; i < held_out.size(); ++i) {

@@ -8,6 +8,7 @@
 #include "capture/video/ingest_video.h"
 #include "cli/pipeline/depth_settings.h"
 #include "cli/pipeline/known_metres.h"
+#include "cli/pipeline/sfm_choice.h"
 #include "dtr/base/progress.h"
 #include "dtr/types/dtr_set.h"
 
@@ -26,6 +27,7 @@ struct BuildOptions {
   bool keep_duplicates = false;  ///< photos with the same pixels as another one
   bool refine = true;            ///< bundle adjustment after SfM, where it pays
   std::filesystem::path rig;     ///< calibration of the rig that took all photos; empty: none
+  SfmChoice sfm;                 ///< how cameras are looked for
   MetreOptions metres;           ///< places and distances that the refinement holds
   bool force = false;
   std::string force_stage;  ///< of an interrupted run: done again with all after it; "": none

@@ -105,6 +105,7 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
 
   CalibratedPhotos calibrated;
   calibrated.engine = sfm.report.version;
+  for (const colmap::StepRecord& step : sfm.report.steps) calibrated.engine_cpu_s += step.cpu_s;
   Json report = SfmJson(sfm.report, sfm.model);
   calibrated.model = std::move(sfm.model);
   if (options.rig) {
@@ -141,16 +142,20 @@ colmap::SfmOptions SfmOptionsFor(const CalibrateOptions& options) {
   sfm.threads = options.threads;
   sfm.seed = options.seed;
   sfm.memory_gb = options.memory_gb;
+  sfm.max_image_size_px = options.sfm.feature_size_px;
+  sfm.max_features = options.sfm.features < colmap::kMostFeatures ? options.sfm.features : 0;
+  sfm.matching = options.sfm.matching;
+  sfm.lens_model = options.sfm.lens_model;
   return sfm;
 }
 
-int FeatureImageSizePx(const std::vector<std::pair<int, int>>& sizes_px, double memory_gb) {
+int FeatureImageSizePx(const std::vector<std::pair<int, int>>& sizes_px, double memory_gb,
+                       int asked_px) {
   std::vector<colmap::SfmImageInput> images;
   for (const auto& [width_px, height_px] : sizes_px) {
     images.push_back({"", width_px, height_px, {}, "", {}});
   }
-  return colmap::PlanExtraction(images, 1, memory_gb, colmap::SfmOptions().max_image_size_px)
-      .max_image_size_px;
+  return colmap::PlanExtraction(images, 1, memory_gb, asked_px).max_image_size_px;
 }
 
 void RequireCalibration(const fs::path& poses) {

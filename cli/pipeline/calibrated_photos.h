@@ -10,6 +10,7 @@
 #include "capture/capture.h"
 #include "cli/pipeline/known_metres.h"
 #include "cli/pipeline/set_rig.h"
+#include "cli/pipeline/sfm_choice.h"
 #include "dtr/base/progress.h"
 #include "dtr/types/dtr_set.h"
 
@@ -31,6 +32,7 @@ struct CalibrateOptions {
   /// The name of the photos where SfM's model must determine its cameras, else Error before it is
   /// refined; empty: nobody asks.
   std::string determined = {};
+  SfmChoice sfm = {};
 };
 
 /// Calibrated photos, frozen: everything later depends on this model alone.
@@ -41,6 +43,8 @@ struct CalibratedPhotos {
   std::vector<std::string> not_registered;  ///< photos without a camera
   std::string engine;                       ///< "colmap 3.8", "cameras.json", ...
   std::string report_json;                  ///< details for the provenance; no times, no paths
+  /// Processor seconds of COLMAP's runs, those of an earlier call that this one went on from, too.
+  double engine_cpu_s = 0;
   std::string scale_json;  ///< entry of the provenance's `scale`; empty: lengths are SfM's
 };
 
@@ -50,9 +54,11 @@ struct CalibratedPhotos {
 void RequireCalibration(const std::filesystem::path& poses);
 
 /// The long side to which SfM shrinks photos of these sizes (width and height, px), so that looking
-/// for features in them fits into `memory_gb`: it decides the result, so it belongs to the inputs
-/// of a run that may go on later. Throws UsageError where no size fits.
-int FeatureImageSizePx(const std::vector<std::pair<int, int>>& sizes_px, double memory_gb);
+/// for features in them fits into `memory_gb` (`asked_px` at most; 0: nothing is asked): it decides
+/// the result, so it belongs to the inputs of a run that may go on later. Throws UsageError where
+/// no size fits.
+int FeatureImageSizePx(const std::vector<std::pair<int, int>>& sizes_px, double memory_gb,
+                       int asked_px = 0);
 
 /// Calibrates the photos. `workspace` keeps checkpoints: the same input and options continue there,
 /// and a finished calibration is read back instead of computed again.

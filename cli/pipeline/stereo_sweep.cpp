@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "cli/pipeline/depth_evaluation.h"
 #include "cli/pipeline/depth_stage.h"
 #include "cli/pipeline/recompute_depth.h"
 #include "cli/pipeline/set_quality.h"
+#include "cli/pipeline/sweep_axes.h"
 #include "dtr/base/error.h"
 #include "dtr/base/machine.h"
 #include "dtr/io/run_record.h"
@@ -21,19 +21,6 @@ namespace {
 enum Axis : size_t { kEngine, kPreset, kMaxSize };
 constexpr double kMillisecondsPerSecond = 1000;
 
-/// Stages of what is measured would hide the sweep's own; notes are worth reading.
-class NotesOnly final : public Progress {
- public:
-  explicit NotesOnly(Progress& progress) : progress_(progress) {}
-  void Stage(const std::string&, int) override {}
-  void Update(int) override {}
-  void Note(const std::string& line) override { progress_.Note(line); }
-  bool StopRequested() const override { return progress_.StopRequested(); }
-
- private:
-  Progress& progress_;
-};
-
 int LongSide(const std::filesystem::path& folder) {
   int longest = 0;
   for (const View& view : io::ReadSet(folder).frames.front().views) {
@@ -44,17 +31,6 @@ int LongSide(const std::filesystem::path& folder) {
     throw UsageError(folder.string() + ": expected source views to find depth for, found none");
   }
   return longest;
-}
-
-std::vector<std::string> SizeValues(const std::vector<int>& given, int own) {
-  constexpr double kLess = 0.7, kHalf = 0.5;
-  const auto share = [&](double factor) { return static_cast<int>(std::lround(factor * own)); };
-  std::vector<std::string> values;
-  for (const int size : given.empty() ? std::vector{own, share(kLess), share(kHalf)} : given) {
-    const std::string name = std::to_string(size == 0 ? own : std::min(size, own));
-    if (std::find(values.begin(), values.end(), name) == values.end()) values.push_back(name);
-  }
-  return values;
 }
 
 /// Empty where the set's record knows of no calibration: a build without it is no whole build.

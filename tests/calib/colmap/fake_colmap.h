@@ -75,6 +75,7 @@ class FakeColmap {
     std::string options =
         "--database_path\n--image_path\n--image_list_path\n--match_list_path\n--match_type\n"
         "--input_path\n--output_path\n--ImageReader.camera_model\n--ImageReader.single_camera\n"
+        "--SiftExtraction.max_num_features\n"
         "--ImageReader.camera_params\n--ImageReader.existing_camera_id\n--ImageReader.mask_path\n"
         "--ExhaustiveMatching.block_size\n--SequentialMatching.overlap\n"
         "--SequentialMatching.quadratic_overlap\n--Mapper.num_threads\n"

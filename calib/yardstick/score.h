@@ -1,0 +1,28 @@
+// calib/yardstick/score.h -- how well cameras predict sights that they were not adjusted to.
+#pragma once
+#include <span>
+#include <string>
+#include <vector>
+
+#include "calib/sfm_model.h"
+#include "calib/yardstick/tracks.h"
+
+namespace dtr::calib {
+
+struct YardstickScore {
+  /// Root mean of Cauchy's loss (bundle/held_out.h) over all sights. One that is not predicted
+  /// counts as if it were missed by 100 scales: so whoever has fewer cameras has no smaller error.
+  double error_px = 0;
+  double median_px = 0;  ///< residual length of the sights that are predicted; 0 without any
+  int sights = 0;        ///< of the yardstick: the same for all cameras
+  int predicted = 0;     ///< of them
+};
+
+/// Holds out every sight of every track in turn: the point is placed by the cameras of its other
+/// sights (Triangulate, two of them at least) and the residual is taken in the photo, lens
+/// included. Sights of photos without a camera in the model are not predicted, and help to place
+/// nothing. `photos` are the names that tracks count by. The same result for any number of threads.
+YardstickScore ScoreCameras(const SfmModel& model, std::span<const std::string> photos,
+                            std::span<const Track> tracks, double loss_scale_px, int threads);
+
+}  // namespace dtr::calib

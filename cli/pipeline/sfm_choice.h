@@ -1,0 +1,23 @@
+// cli/pipeline/sfm_choice.h -- what may be chosen of structure from motion.
+#pragma once
+#include <string>
+
+#include "calib/colmap/sfm.h"
+
+namespace dtr::pipeline {
+
+/// How COLMAP goes about it. Each choice decides the result; docs/accuracy/SPEED.md has what they
+/// cost and what they are worth.
+struct SfmChoice {
+  int feature_size_px = 0;  ///< long side of the photos for features; 0: from the memory
+  int features = colmap::kMostFeatures;  ///< most per photo
+  colmap::Matching matching = colmap::Matching::kAuto;
+  std::string lens_model = colmap::SfmOptions().lens_model;
+
+  bool operator==(const SfmChoice&) const = default;
+};
+
+/// JSON object: feature_size_px, features, matching, lens_model.
+std::string ToJson(const SfmChoice& choice);
+
+}  // namespace dtr::pipeline

@@ -1,0 +1,43 @@
+#include "cli/sfm_options.h"
+
+#include <map>
+#include <string>
+
+namespace dtr::cli {
+namespace {
+
+constexpr int kFewestFeatures = 128, kSmallestPx = 64;  // with less no photos come together
+
+}  // namespace
+
+void AddSfmOptions(CLI::App& command, pipeline::SfmChoice& choice) {
+  command
+      .add_option("--feature-size", choice.feature_size_px,
+                  "Long side of the photos when SfM looks for features [2400, or what --memory "
+                  "allows]")
+      ->check(CLI::Range(kSmallestPx, 65536))
+      ->type_name("PX");
+  command.add_option("--features", choice.features, "Most features of a photo [8192]")
+      ->check(CLI::Range(kFewestFeatures, colmap::kMostFeatures))
+      ->type_name("N");
+  std::map<std::string, colmap::Matching> names;
+  for (const auto matching : {colmap::Matching::kAuto, colmap::Matching::kExhaustive,
+                              colmap::Matching::kPreselected, colmap::Matching::kSequential}) {
+    names[colmap::NameOf(matching)] = matching;
+  }
+  command
+      .add_option_function<std::string>(
+          "--matching",
+          [&choice, names](const std::string& name) { choice.matching = names.at(name); },
+          "Photos matched with each other: all, those that resemble each other, or neighbours by "
+          "name [auto: all up to 60 photos, then preselected]")
+      ->check(CLI::IsMember({"auto", "exhaustive", "preselected", "sequential"}))
+      ->type_name("auto|exhaustive|preselected|sequential");
+  command
+      .add_option("--lens-model", choice.lens_model,
+                  "Distortion that SfM starts with, by COLMAP's names [RADIAL]")
+      ->check(CLI::IsMember({"SIMPLE_RADIAL", "RADIAL", "OPENCV"}))
+      ->type_name("SIMPLE_RADIAL|RADIAL|OPENCV");
+}
+
+}  // namespace dtr::cli

@@ -1,0 +1,246 @@
+// `dtr bench --stage calibration`: photos calibrated anew. A fake COLMAP leaves cameras whose
+// errors are known, so that it is known, too, which of them must be told to be better.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "calib/colmap/model_io.h"
+#include "dtr/io/image_io.h"
+#include "tests/calib/colmap/fake_colmap.h"
+#include "tests/cli/run_dtr.h"
+#include "tests/cli/small_courtyard.h"
+#include "tests/support/test_data.h"
+
+namespace dtr::testing {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using Json = nlohmann::json;
+
+constexpr int kPhotos = 6;
+const PinholeCamera kCamera(480, 320, 400, 400, 240, 160);
+
+class BenchCalibration : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    shared_ = new TemporaryFolder;
+    truth_ = new calib::SfmModel;
+    std::vector<CourtyardPhoto> photos;
+    for (const Pose& pose : CourtyardArc(kPhotos)) {
+      photos.push_back({fmt::format("{:04}.jpg", photos.size()), kCamera, pose});
+    }
+    RenderCourtyard(*shared_ / "photos", photos);
+    *truth_ = CourtyardModel(photos);
+    for (auto& [id, camera] : truth_->cameras) {
+      camera.model = calib::LensModel::kRadial;
+      camera.params = {400, 240, 160, 0, 0};
+    }
+    colmap::testing::FakeColmap colmap;
+    Leave(colmap, *truth_);
+    DtrOk({"build", (*shared_ / "photos").string(), "-o", (*shared_ / "set.dtr").string(),
+           "--engine", "none"});
+  }
+  static void TearDownTestSuite() {
+    delete shared_;
+    delete truth_;
+  }
+
+  /// What the mapper is to leave, under the names that photos have for COLMAP.
+  static void Leave(colmap::testing::FakeColmap& colmap, calib::SfmModel model) {
+    std::vector<std::string> aliases;
+    for (int i = 0; i < kPhotos; ++i) aliases.push_back(fmt::format("{:06}.jpg", i));
+    for (calib::SfmImage& image : model.images) image.name = "00" + image.name;
+    fs::remove_all(colmap / "model.0");
+    colmap::WriteModel(colmap / "model.0", model, colmap::Format::kBinary);
+    colmap.LeaveDatabase(aliases);
+  }
+  /// The truth with a focal length that is wrong by this share, the sights as they are.
+  static calib::SfmModel WithFocal(double share) {
+    calib::SfmModel model = *truth_;
+    for (auto& [id, camera] : model.cameras) camera.params[0] *= 1 + share;
+    return model;
+  }
+
+  static std::vector<std::string> Words(std::vector<std::string> further) {
+    further.insert(further.begin(),
+                   {"bench", (*shared_ / "set.dtr").string(), "--renderer", "cpu", "--stage",
+                    "calibration", "--photos", (*shared_ / "photos").string()});
+    return further;
+  }
+  static Json Point(const std::string& setting, std::vector<std::string> further = {}) {
+    further.insert(further.end(), {"--point", setting, "--json", "-"});
+    return Json::parse(DtrOk(Words(further)).out)["stages"][0]["points"][0];
+  }
+
+  static TemporaryFolder* shared_;
+  static calib::SfmModel* truth_;
+  TemporaryFolder folder_;
+};
+TemporaryFolder* BenchCalibration::shared_ = nullptr;
+calib::SfmModel* BenchCalibration::truth_ = nullptr;
+
+TEST_F(BenchCalibration, WorseCamerasHaveALargerErrorAndRefinementMendsThem) {
+  colmap::testing::FakeColmap colmap;
+  Leave(colmap, *truth_);
+  const Json truth = Point("refine=no");
+  EXPECT_GT(truth["cost"], 0);
+  EXPECT_EQ(truth["figures"]["not_registered"], 0);
+  EXPECT_EQ(truth["figures"]["yardstick_predicted"], truth["figures"]["yardstick_sights"]);
+  EXPECT_GT(truth["figures"]["yardstick_sights"], 400);
+  EXPECT_LT(truth["figures"]["median_px"], 0.5);
+  double last = truth["error"];
+  for (const double share : {0.03, 0.06}) {
+    Leave(colmap, WithFocal(share));
+    const double error = Point("refine=no")["error"];
+    EXPECT_GT(error, 1.1 * last) << share;
+    last = error;
+  }
+  // Exact sights say what the focal length is: adjusted, the cameras are the true ones again.
+  EXPECT_NEAR(Point("refine=yes")["error"], truth["error"], 0.02 * truth["error"].get<double>());
+}
+
+TEST_F(BenchCalibration, FewerCamerasAreNoAdvantage) {
+  colmap::testing::FakeColmap colmap;
+  Leave(colmap, WithFocal(0.03));
+  const Json all = Point("refine=no");
+  // The true cameras, but for one photo that finds no place.
+  calib::SfmModel fewer = *truth_;
+  for (const calib::SfmFeature& feature : fewer.images.back().features) {
+    fewer.points.erase(feature.point_id);
+  }
+  fewer.images.pop_back();
+  for (calib::SfmImage& image : fewer.images) {
+    std::erase_if(image.features, [&](const calib::SfmFeature& feature) {
+      return !fewer.points.contains(feature.point_id);
+    });
+  }
+  Leave(colmap, fewer);
+  const Json point = Point("refine=no");
+  EXPECT_EQ(point["figures"]["not_registered"], 1);
+  EXPECT_EQ(point["figures"]["yardstick_sights"], all["figures"]["yardstick_sights"]);
+  EXPECT_LT(point["figures"]["yardstick_predicted"], point["figures"]["yardstick_sights"]);
+  EXPECT_GT(point["error"], 2 * all["error"].get<double>());
+}
+
+TEST_F(BenchCalibration, ColmapIsToldWhatTheSettingSays) {
+  colmap::testing::FakeColmap colmap;
+  Leave(colmap, *truth_);
+  Point("default");
+  for (const std::string& call : colmap.Calls()) {
+    EXPECT_THAT(call, Not(HasSubstr("max_num_features"))) << "COLMAP's own is the default";
+  }
+  EXPECT_THAT(colmap.Calls(), Contains(HasSubstr("exhaustive_matcher")));
+  EXPECT_THAT(colmap.Calls(), Contains(HasSubstr("--SiftExtraction.max_image_size 480 ")));
+  EXPECT_THAT(colmap.Calls(), Contains(HasSubstr("--ImageReader.camera_model RADIAL ")));
+  colmap.ForgetCalls();
+  Point("feature-size=240,features=2048,matching=sequential,lens-model=OPENCV");
+  EXPECT_THAT(colmap.Calls(), Contains(HasSubstr("--SiftExtraction.max_image_size 240")));
+  EXPECT_THAT(colmap.Calls(), Contains(HasSubstr("--SiftExtraction.max_num_features 2048")));
+  EXPECT_THAT(colmap.Calls(), Contains(HasSubstr("--ImageReader.camera_model OPENCV ")));
+  EXPECT_THAT(colmap.Calls(), Contains(HasSubstr("sequential_matcher")));
+  EXPECT_THAT(colmap.Calls(), Not(Contains(HasSubstr("exhaustive_matcher"))));
+  // The same of a user's own calibration.
+  colmap.ForgetCalls();
+  DtrOk({"calibrate", "photos", (*shared_ / "photos").string(), "-o", (folder_ / "model").string(),
+         "--feature-size", "240", "--features", "2048", "--matching", "sequential", "--lens-model",
+         "OPENCV"});
+  EXPECT_THAT(colmap.Calls(), Contains(HasSubstr("--SiftExtraction.max_image_size 240")));
+  EXPECT_THAT(colmap.Calls(), Contains(HasSubstr("--SiftExtraction.max_num_features 2048")));
+  EXPECT_THAT(colmap.Calls(), Contains(HasSubstr("--ImageReader.camera_model OPENCV ")));
+  EXPECT_THAT(colmap.Calls(), Contains(HasSubstr("sequential_matcher")));
+}
+
+TEST_F(BenchCalibration, ABuildKnowsHowItsCamerasWereLookedFor) {
+  colmap::testing::FakeColmap colmap;
+  Leave(colmap, *truth_);
+  const auto build = [&](const std::string& features) {
+    DtrOk({"build", (*shared_ / "photos").string(), "-o", (folder_ / "set.dtr").string(),
+           "--engine", "none", "--force", "--features", features});
+    return Json::parse(Text(folder_ / "set.dtr/set.json"))["provenance"]["options"];
+  };
+  EXPECT_EQ(build("2048")["sfm"]["features"], 2048);
+  EXPECT_FALSE(build("8192").contains("sfm")) << "the default changes no byte of a set";
+}
+
+TEST_F(BenchCalibration, CommandsBringTheErrorBackFromWhatColmapLeft) {
+  colmap::testing::FakeColmap colmap;
+  Leave(colmap, *truth_);
+  const std::string out = (folder_ / "out").string();
+  DtrOk(Words({"-o", out, "--max-points", "3", "--feature-size", "480,240"}));
+  const Json stage = Json::parse(Text(folder_ / "out/bench.json"))["stages"][0];
+  EXPECT_EQ(stage["stage"], "calibration");
+  ASSERT_EQ(stage["points"].size(), 3u);
+  EXPECT_THAT(Text(folder_ / "out/bench.html"), HasSubstr("held-out reprojection"));
+  EXPECT_TRUE(fs::exists(folder_ / "out/calibration.svg"));
+  // COLMAP would find others now: what it found then counts, and is not run again.
+  Leave(colmap, WithFocal(0.06));
+  colmap.ForgetCalls();
+  for (const Json& point : stage["points"]) {
+    std::istringstream command(point["command"].get<std::string>());
+    std::vector<std::string> words{std::istream_iterator<std::string>(command), {}};
+    words.erase(words.begin());
+    words.insert(words.end(), {"--json", "-"});
+    const Json again = Json::parse(DtrOk(words).out)["stages"][0]["points"][0];
+    EXPECT_EQ(again["error"], point["error"]) << point["command"];
+    EXPECT_EQ(again["command"], point["command"]);
+  }
+  EXPECT_THAT(colmap.Calls(), ::testing::IsEmpty());
+  // The sweep itself goes on; a point that is told no folder is calibrated from scratch.
+  DtrOk(Words({"-o", out, "--max-points", "3", "--feature-size", "480,240"}));
+  EXPECT_THAT(colmap.Calls(), ::testing::IsEmpty());
+  EXPECT_EQ(Json::parse(Text(folder_ / "out/bench.json"))["stages"][0], stage);
+  Point("default");
+  EXPECT_THAT(colmap.Calls(), Contains(HasSubstr("mapper")));
+}
+
+TEST_F(BenchCalibration, OtherPhotosAreMeasuredAnew) {
+  colmap::testing::FakeColmap colmap;
+  Leave(colmap, *truth_);
+  fs::copy(*shared_ / "photos", folder_ / "photos", fs::copy_options::recursive);
+  std::vector<std::string> words = Words({"-o", (folder_ / "out").string(), "--max-points", "1"});
+  *std::find(words.begin(), words.end(), (*shared_ / "photos").string()) =
+      (folder_ / "photos").string();
+  DtrOk(words);
+  ChangePhoto(folder_ / "photos/0003.jpg");
+  DtrOk(words);
+  EXPECT_EQ(Json::parse(Text(folder_ / "out/work.json"))["measurements"].size(), 2u);
+}
+
+TEST_F(BenchCalibration, WhatCannotBeMeasuredIsRefused) {
+  colmap::testing::FakeColmap colmap;
+  const std::string set = (*shared_ / "set.dtr").string(), photos = (*shared_ / "photos").string();
+  const auto bench = [&](std::vector<std::string> words) {
+    words.insert(words.begin(), {"bench", set, "--renderer", "cpu"});
+    return Dtr(words);
+  };
+  ExpectRefused(bench({"--photos", photos}), kWrongUsage,
+                "--photos, --feature-size: expected --stage calibration with them");
+  ExpectRefused(bench({"--stage", "stereo", "--feature-size", "200"}), kWrongUsage,
+                "--photos, --feature-size: expected --stage calibration with them");
+  ExpectRefused(
+      bench({"--stage", "calibration"}), kWrongUsage,
+      "--stage calibration: expected --photos with it, the folder that the set was built from");
+  ExpectRefused(Dtr(Words({"--point", "refine=perhaps"})), kWrongUsage,
+                "--point: expected a value of {yes,no} for refine, found 'refine=perhaps'");
+  // Photos that are not the set's, and such as nothing can be judged by.
+  fs::create_directories(folder_ / "grey");
+  for (int i = 0; i < kPhotos; ++i) {
+    const ImageRgb8 grey(480, 320, 3, static_cast<std::uint8_t>(60 + 20 * i));
+    io::WriteImage(folder_ / "grey" / fmt::format("{:04}.jpg", i), grey);
+  }
+  ExpectRefused(bench({"--stage", "calibration", "--photos", (folder_ / "grey").string()}), kFailed,
+                "expected 100 points that 4 or more photos show, to judge cameras by, found 0; "
+                "take photos that overlap more");
+  fs::rename(folder_ / "grey/0005.jpg", folder_ / "grey/other.jpg");
+  ExpectRefused(bench({"--stage", "calibration", "--photos", (folder_ / "grey").string()}), kFailed,
+                "was built from, found none called 0005.jpg");
+}
+
+}  // namespace
+}  // namespace dtr::testing
