@@ -21,8 +21,8 @@ TEST(BenchCalibrationByColmap, SmallerFeaturesCostLessAndErrMore) {
   const TemporaryFolder folder;
   MakeArcPhotos(folder / "made");
   const std::string set = (folder / "set.dtr").string(), photos = (folder / "made/images").string();
-  DtrOk({"import", "--cameras", (folder / "made/cameras.json").string(), "--images", photos, "-o",
-         set});
+  DtrOk({"import", "--cameras", (folder / "made/cameras.json").string(), "--images", photos,
+         "--depth", (folder / "made/depth").string(), "-o", set});
   const auto point = [&](const std::string& setting) {
     const Json json = Json::parse(
         DtrOk({"bench", set, "--renderer", "cpu", "--stage", "calibration", "--photos", photos,
