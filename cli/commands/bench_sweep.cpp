@@ -4,12 +4,10 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <sstream>
 #include <thread>
 
 #include "cli/pipeline/input_hash.h"
-#include "cli/pipeline/set_quality.h"
 #include "cli/pipeline/stereo_sweep.h"
 #include "cli/pipeline/storage_sweep.h"
 #include "cli/shell_words.h"
@@ -19,6 +17,7 @@
 #include "dtr/base/files.h"
 #include "dtr/base/hash.h"
 #include "dtr/base/machine.h"
+#include "dtr/base/temporary_folder.h"
 #include "dtr/eval/render_sweep.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/option_arguments.h"
@@ -273,14 +272,6 @@ fs::path OutputFolder(const SweepRequest& request) {
   return set.parent_path() / (set.stem().string() + "-bench");
 }
 
-fs::path ScratchFolder() {
-  std::string name = (fs::temp_directory_path() / "dtr-bench-XXXXXX").string();
-  if (mkdtemp(name.data()) == nullptr) {
-    throw Error(name + ": cannot be made; set TMPDIR to a folder that can be written");
-  }
-  return name;
-}
-
 }  // namespace
 
 eval::BenchMachine MachineOf(const eval::TimedRenderer& renderer) {
@@ -348,11 +339,10 @@ int RunSweep(const SweepRequest& request, const Context& context) {
   run.set = request.set.string();
   run.machine = MachineOf(*renderer);
   const bool one_point = !request.point.empty();
-  const fs::path output = one_point ? ScratchFolder() : OutputFolder(request);
+  std::optional<TemporaryFolder> scratch;  // a single point leaves nothing behind
+  if (one_point) scratch.emplace();
+  const fs::path output = one_point ? scratch->path() : OutputFolder(request);
   fs::create_directories(output);
-  // A single point leaves nothing behind.
-  std::optional<pipeline::TemporaryFolder> scratch;
-  if (one_point) scratch.emplace(output);
   std::optional<SweepFile> file;
   if (!one_point) file.emplace(output / "work.json");
   for (const std::string& name : request.stages) {
