@@ -1,7 +1,5 @@
 #include "capture/sfm_images.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <atomic>
 #include <system_error>
@@ -49,11 +47,7 @@ void Rewrite(const Photo& photo, const io::ImageHeader& header, std::pair<int, i
                           {header.focal_mm, header.focal_35mm, header.make, header.model});
     return;
   }
-  const fs::path png = to.string() + ".tmp" + std::to_string(getpid()) + ".png";
-  io::WriteImage(png, image);
-  std::error_code error;
-  fs::rename(png, to, error);
-  Require(error, to);
+  io::WritePng(to, image);
 }
 
 void MakeFolderOf(const fs::path& file) {

@@ -14,6 +14,7 @@
 #include "dtr/base/files.h"
 #include "dtr/base/memory_budget.h"
 #include "dtr/base/parallel_for.h"
+#include "dtr/base/work_folder.h"
 
 namespace dtr::capture {
 namespace fs = std::filesystem;
@@ -38,14 +39,7 @@ void RefuseOccupied(const fs::path& folder, bool replace) {
                    "; choose another name" + (replace ? "" : " or give --force"));
 }
 
-// The lock of a capture in the making, also its mark: a folder without it is not ours to delete.
-constexpr char kLock[] = "capture.lock";
-
-std::optional<FileLock> LockIn(const fs::path& folder) {
-  auto lock = FileLock::Try(folder / kLock);
-  if (lock) return lock;
-  throw UsageError(folder.string() + ": another process is writing this capture; wait for it");
-}
+constexpr char kKind[] = "capture";
 
 // The file system's own errors, as ours: they name the file already.
 void AsError(const std::function<void()>& function) {
@@ -82,81 +76,59 @@ Photo StorePhoto(const Photo& photo, const fs::path& folder) {
 struct CaptureWriter::State {
   fs::path folder, partial, aside;
   StoreOptions options;
-  std::optional<FileLock> lock;
-  bool finished = false;
+  std::optional<WorkFolder> work;
 
   void Recover() const;
   void RefuseForeign() const;
-  void Open();
   void MoveIntoPlace();
 };
 
 // A capture that was cut off on its way into place: the old one goes back, or what is left over of
 // both goes.
 void CaptureWriter::State::Recover() const {
-  if (fs::exists(aside / kLock)) {
-    const auto nobody_at_work = LockIn(aside);
+  const std::string mark = WorkFolder::MarkOf(kKind);
+  if (fs::exists(aside / mark)) {
+    const FileLock nobody_at_work = WorkFolder::Lock(aside, kKind);
     if (fs::exists(folder / kCaptureFile)) {
-      RemoveFolder(aside, kLock);
+      RemoveFolder(aside, mark);
     } else if (!fs::exists(folder) || IsEmptyFolder(folder)) {
       Rename(aside, folder);
     }  // what is no capture took its place: both stay
   }
-  if (!fs::exists(folder / kLock) || !fs::exists(folder / kCaptureFile)) return;
-  const auto nobody_at_work = LockIn(folder);
-  fs::remove(folder / kLock);
+  if (!fs::exists(folder / mark) || !fs::exists(folder / kCaptureFile)) return;
+  const FileLock nobody_at_work = WorkFolder::Lock(folder, kKind);
+  fs::remove(folder / mark);
 }
 
 // Before any work: at its end the old capture would find no room.
 void CaptureWriter::State::RefuseForeign() const {
-  for (const fs::path& path : {partial, aside}) {
-    if (path == aside && !options.replace) continue;
-    if (!fs::exists(fs::symlink_status(path)) || IsEmptyFolder(path)) continue;
-    if (path == partial && fs::is_regular_file(path / kLock)) continue;
-    throw UsageError(path.string() + ": expected nothing or an unfinished capture, found " +
-                     "something else; move it away");
-  }
-}
-
-// An empty folder for the work. One that a stopped run left is ours to clear; any other is not.
-void CaptureWriter::State::Open() {
-  if (lock) return;
-  RefuseForeign();
-  std::error_code error;
-  fs::create_directories(partial, error);
-  Require(error, partial);
-  lock = LockIn(partial);
-  std::vector<fs::path> stale;
-  for (const auto& entry : fs::directory_iterator(partial)) {
-    if (entry.path().filename() != kLock) stale.push_back(entry.path());
-  }
-  for (const fs::path& path : stale) fs::remove_all(path);
+  WorkFolder::RefuseForeign(partial, kKind);
+  if (options.replace) WorkFolder::RefuseForeign(aside, kKind);
 }
 
 // What was there goes only once the new capture is there.
 void CaptureWriter::State::MoveIntoPlace() {
   SyncTree(partial);
+  const std::string mark = WorkFolder::MarkOf(kKind);
   const bool replaces = fs::exists(folder) && !fs::is_empty(folder);
-  std::optional<FileLock> mark;
-  if (replaces) mark = LockIn(folder);  // by it Recover() knows the old capture again
+  std::optional<FileLock> old;
+  if (replaces) old = WorkFolder::Lock(folder, kKind);  // Recover() knows it by its mark
   try {
     if (replaces) Rename(folder, aside);
-    Rename(partial, folder);
+    work->MoveTo(folder);
   } catch (const Error&) {
     if (replaces && !fs::exists(folder)) Rename(aside, folder);
-    if (replaces) fs::remove(folder / kLock);
+    if (replaces) fs::remove(folder / mark);
     throw;
   }
-  finished = true;
-  SyncFolder(folder.parent_path().empty() ? "." : folder.parent_path());
-  if (replaces) RemoveFolder(aside, kLock);
-  fs::remove(folder / kLock);
+  if (replaces) RemoveFolder(aside, mark);
+  work->Unmark();
 }
 
 CaptureWriter::CaptureWriter(const fs::path& folder, const StoreOptions& options)
     : state_(std::make_unique<State>()) {
   state_->folder = WithoutTrailingSlash(folder);
-  state_->partial = state_->folder.string() + ".partial";
+  state_->partial = WorkFolder::Of(state_->folder);
   state_->aside = state_->folder.string() + ".replaced";
   state_->options = options;
   AsError([&] {
@@ -166,17 +138,10 @@ CaptureWriter::CaptureWriter(const fs::path& folder, const StoreOptions& options
   RefuseOccupied(state_->folder, options.replace);
 }
 
-CaptureWriter::~CaptureWriter() {
-  if (!state_->lock || state_->finished) return;
-  try {
-    RemoveFolder(state_->partial, kLock);
-  } catch (const fs::filesystem_error&) {
-    // The next run clears it away.
-  }
-}
+CaptureWriter::~CaptureWriter() = default;
 
 fs::path CaptureWriter::Open() {
-  AsError([&] { state_->Open(); });
+  if (!state_->work) state_->work.emplace(state_->partial, kKind);
   return state_->partial;
 }
 

@@ -28,9 +28,20 @@ std::string Duration(double seconds) {
   return fmt::format("{:.0f} min {:02.0f} s", std::floor(seconds / 60), std::fmod(seconds, 60));
 }
 
-// Of this process so far; COLMAP's are not in it.
+double SecondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+// So far; COLMAP's as soon as it has ended.
 std::string PeakMemory() {
-  return fmt::format("at most {:.0f} MiB", static_cast<double>(PeakMemoryBytes()) / (1 << 20));
+  return fmt::format("at most {:.0f} MiB",
+                     static_cast<double>(PeakMemoryBytesWithPrograms()) / (1 << 20));
+}
+
+// ", 12 s left": by what the share that is done took; nothing before and after that.
+std::string TimeLeft(double spent_s, double share) {
+  if (share <= 0 || share >= 1) return "";
+  return ", " + Duration(spent_s * (1 - share) / share) + " left";
 }
 
 }  // namespace
@@ -69,7 +80,8 @@ void Console::Update(int done) {
     DrawBar();
   } else if (total_ > 0 && 10 * done / total_ > told_tenths_) {
     told_tenths_ = 10 * done / total_;
-    fmt::print(stderr, "   {} {}/{}\n", stage_, done, total_);
+    fmt::print(stderr, "   {} {}/{}{}\n", stage_, done, total_,
+               TimeLeft(SecondsSince(stage_start_), static_cast<double>(done) / total_));
   }
 }
 
@@ -93,26 +105,25 @@ bool Console::StopRequested() const { return g_interrupted != 0; }
 
 void Console::FinishStage() {
   if (stage_.empty()) return;
-  const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - stage_start_;
+  const double spent_s = SecondsSince(stage_start_);
   if (terminal_) {
     ClearBar();
-    fmt::print(stderr, "   {} ({}, {})\n", stage_, Duration(spent.count()), PeakMemory());
-  } else if (spent.count() >= kWorthTellingS) {
-    fmt::print(stderr, "   {}: {}, {}\n", stage_, Duration(spent.count()), PeakMemory());
+    fmt::print(stderr, "   {} ({}, {})\n", stage_, Duration(spent_s), PeakMemory());
+  } else if (spent_s >= kWorthTellingS) {
+    fmt::print(stderr, "   {}: {}, {}\n", stage_, Duration(spent_s), PeakMemory());
   }
 }
 
 void Console::DrawBar() {
   if (stage_.empty()) return;
   constexpr int kBarWidth = 24;
-  const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - stage_start_;
-  std::string tail = Duration(spent.count());
+  const double spent_s = SecondsSince(stage_start_);
+  std::string tail = Duration(spent_s);
   int filled = 0;
   if (total_ > 0) {
     const double share = std::clamp(static_cast<double>(done_) / total_, 0.0, 1.0);
     filled = static_cast<int>(kBarWidth * share);
-    tail = fmt::format("{:3.0f} %", 100 * share);
-    if (done_ > 0) tail += ", " + Duration(spent.count() * (1 - share) / share) + " left";
+    tail = fmt::format("{:3.0f} %", 100 * share) + TimeLeft(spent_s, share);
   }
   tail += ", " + PeakMemory();
   fmt::print(stderr, "\r\033[K   [{}{}] {} {}", std::string(static_cast<size_t>(filled), '='),

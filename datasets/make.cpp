@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <cstdio>
-#include <system_error>
 #include <utility>
 
 #include "datasets/layout.h"
@@ -11,6 +10,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/base/random.h"
+#include "dtr/base/work_folder.h"
 #include "dtr/io/depth_io.h"
 #include "dtr/io/formats/cameras_json.h"
 #include "dtr/io/image_io.h"
@@ -57,15 +57,6 @@ std::string NumberName(int i) {
   char name[32];
   std::snprintf(name, sizeof name, "%04d", i);
   return name;
-}
-
-void CreateFolder(const fs::path& folder) {
-  std::error_code failed;
-  fs::create_directories(folder, failed);
-  if (failed) {
-    throw Error(folder.string() +
-                ": expected a folder that can be made, found: " + failed.message());
-  }
 }
 
 std::string SourceText(const DatasetSpec& spec) {
@@ -151,10 +142,9 @@ void MakeDataset(const DatasetSpec& given, const fs::path& given_folder, int thr
   probe.lens = {spec.k1, spec.k2};
   CheckPhotoOptions(MakeCamera(spec.width_px, spec.height_px, spec.focal_35mm), probe);
 
-  const fs::path partial = out_folder.string() + ".partial";
-  std::error_code failed;
-  fs::remove_all(partial, failed);
-  for (const char* part : {"images", "depth", "masks"}) CreateFolder(partial / part);
+  WorkFolder work(WorkFolder::Of(out_folder), "dataset");
+  const fs::path& partial = work.path();
+  for (const char* part : {"images", "depth", "masks"}) fs::create_directory(partial / part);
 
   progress.Stage("rendering photos and truth", spec.views);
   io::CameraList list;
@@ -174,11 +164,7 @@ void MakeDataset(const DatasetSpec& given, const fs::path& given_folder, int thr
   io::WriteCamerasJson(partial / "cameras.json", list);
   WriteFileAtomically(partial / "dataset.json", FormatSpecJson(spec));
   WriteFileAtomically(partial / "SOURCE.md", SourceText(spec));
-  fs::rename(partial, out_folder, failed);
-  if (failed) {
-    throw Error(out_folder.string() + ": expected that " + partial.string() +
-                " can be renamed to it, found: " + failed.message());
-  }
+  work.Become(out_folder);
 }
 
 }  // namespace dtr::datasets

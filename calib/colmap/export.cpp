@@ -30,14 +30,20 @@ std::uint32_t CameraIdOf(calib::SfmModel& model, std::vector<PinholeCamera>& kno
 
 void AddObservation(const View& view, const SparsePoint& point, const Eigen::Vector2d& pixel,
                     PointSums& sums) {
-  if (!view.image.empty() && view.camera.Contains(pixel)) {
-    const int x = static_cast<int>(pixel.x()), y = static_cast<int>(pixel.y());
-    for (int c = 0; c < 3; ++c) sums.rgb[c] += view.image(x, y, c);
-    ++sums.coloured;
-  }
   if (const auto seen = view.camera.PixelFromCam(view.cam_from_world * point.p_in_world)) {
     sums.error_px += (*seen - pixel).norm();
     ++sums.measured;
+  }
+}
+
+void AddColours(const View& view, const ImageRgb8& image,
+                const std::vector<const SparseObservation*>& seen, std::vector<PointSums>& sums) {
+  for (const SparseObservation* one : seen) {
+    if (!view.camera.Contains(one->pixel)) continue;
+    const int x = static_cast<int>(one->pixel.x()), y = static_cast<int>(one->pixel.y());
+    PointSums& sum = sums[static_cast<size_t>(one->point)];
+    for (int c = 0; c < 3; ++c) sum.rgb[c] += image(x, y, c);
+    ++sum.coloured;
   }
 }
 
@@ -62,7 +68,8 @@ calib::LensCamera FromPinhole(const PinholeCamera& camera) {
           {camera.fx_px(), camera.fy_px(), camera.cx_px(), camera.cy_px()}};
 }
 
-calib::SfmModel ModelFromViews(const DtrSet& set, const SparseScene& scene) {
+calib::SfmModel ModelFromViews(const DtrSet& set, const SparseScene& scene,
+                               const std::function<ImageRgb8(const View&)>& image_of) {
   if (set.frames.size() != 1) {
     throw Error("export to COLMAP: expected a set with one frame, found " +
                 std::to_string(set.frames.size()) + "; a COLMAP model shows one instant");
@@ -86,6 +93,7 @@ calib::SfmModel ModelFromViews(const DtrSet& set, const SparseScene& scene) {
     image.cam_from_world.translation -= view.cam_from_world.rotation * set.world_origin;
   }
   std::vector<PointSums> sums(scene.points.size());
+  std::vector<std::vector<const SparseObservation*>> seen_by(views.size());
   for (const SparseObservation& seen : scene.observations) {
     if (seen.view < 0 || static_cast<size_t>(seen.view) >= views.size() || seen.point < 0 ||
         static_cast<size_t>(seen.point) >= scene.points.size()) {
@@ -94,6 +102,10 @@ calib::SfmModel ModelFromViews(const DtrSet& set, const SparseScene& scene) {
     const auto view = static_cast<size_t>(seen.view), point = static_cast<size_t>(seen.point);
     model.images[view].features.push_back({seen.pixel, point + 1});
     AddObservation(views[view], scene.points[point], seen.pixel, sums[point]);
+    seen_by[view].push_back(&seen);
+  }
+  for (size_t i = 0; image_of && i < views.size(); ++i) {
+    AddColours(views[i], image_of(views[i]), seen_by[i], sums);
   }
   for (size_t i = 0; i < scene.points.size(); ++i) {
     model.points[i + 1] = PointFrom(scene.points[i], sums[i], set.world_origin);

@@ -4,13 +4,11 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <sstream>
 #include <thread>
 
 #include "cli/pipeline/calibration_sweep.h"
 #include "cli/pipeline/input_hash.h"
-#include "cli/pipeline/set_quality.h"
 #include "cli/pipeline/stereo_sweep.h"
 #include "cli/pipeline/storage_sweep.h"
 #include "cli/shell_words.h"
@@ -20,6 +18,7 @@
 #include "dtr/base/files.h"
 #include "dtr/base/hash.h"
 #include "dtr/base/machine.h"
+#include "dtr/base/temporary_folder.h"
 #include "dtr/eval/render_sweep.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/option_arguments.h"
@@ -104,9 +103,7 @@ class RenderStage final : public Measurable {
 };
 
 fs::path OutputFolder(const SweepRequest& request) {
-  if (!request.output.empty()) return request.output;
-  const fs::path set = WithoutTrailingSlash(request.set);
-  return set.parent_path() / (set.stem().string() + "-bench");
+  return request.output.empty() ? SweepFolderOf(request.set) : request.output;
 }
 
 class CalibrationStage final : public Measurable {
@@ -315,14 +312,6 @@ void Check(const SweepRequest& request) {
   }
 }
 
-fs::path ScratchFolder() {
-  std::string name = (fs::temp_directory_path() / "dtr-bench-XXXXXX").string();
-  if (mkdtemp(name.data()) == nullptr) {
-    throw Error(name + ": cannot be made; set TMPDIR to a folder that can be written");
-  }
-  return name;
-}
-
 }  // namespace
 
 eval::BenchMachine MachineOf(const eval::TimedRenderer& renderer) {
@@ -405,13 +394,10 @@ int RunSweep(const SweepRequest& request, const Context& context) {
   run.set = request.set.string();
   run.machine = MachineOf(*renderer);
   const bool one_point = !request.point.empty();
-  const fs::path output = one_point                ? ScratchFolder()
-                          : request.output.empty() ? SweepFolderOf(request.set)
-                                                   : request.output;
+  std::optional<TemporaryFolder> scratch;  // a single point leaves nothing behind
+  if (one_point) scratch.emplace();
+  const fs::path output = one_point ? scratch->path() : OutputFolder(request);
   fs::create_directories(output);
-  // A single point leaves nothing behind.
-  std::optional<pipeline::TemporaryFolder> scratch;
-  if (one_point) scratch.emplace(output);
   std::optional<SweepFile> file;
   if (!one_point) file.emplace(output / "work.json");
   for (const std::string& name : request.stages) {

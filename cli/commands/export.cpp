@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <filesystem>
 #include <map>
@@ -8,8 +7,10 @@
 #include "calib/colmap/model_io.h"
 #include "cli/command.h"
 #include "cli/output_file.h"
+#include "dtr/base/durable.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
+#include "dtr/base/work_folder.h"
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
 
@@ -40,8 +41,17 @@ void ExportImages(const fs::path& folder, const DtrSet& set, const fs::path& tar
   for (const View& view : set.frames.front().views) {
     const fs::path file = target / view.name;
     fs::create_directories(file.parent_path());
-    fs::copy_file(folder / view.image_file->path, file, fs::copy_options::overwrite_existing);
+    CopyFileAtomically(folder / view.image_file->path, file);
   }
+}
+
+// A view's image, for the colours of its points: one at a time is in memory.
+ImageRgb8 ImageOf(const fs::path& folder, View view, int threads) {
+  io::LoadOptions load;
+  load.depth = false;
+  load.threads = threads;
+  io::LoadPixels(folder, view, load);
+  return std::move(view.image);
 }
 
 int RunExport(Options options, const Context& context) {
@@ -52,26 +62,16 @@ int RunExport(Options options, const Context& context) {
   }
   RequireFolderOf(options.output, "-o");
   DtrSet set = io::ReadSet(options.set);
-  io::LoadOptions load;
-  load.depth = false;
-  load.threads = context.common.threads;
-  for (View& view : set.frames.front().views) io::LoadPixels(options.set, view, load);
-  NameByStoredFormat(set.frames.front().views);
+  WorkFolder work(WorkFolder::Of(options.output), "export");
   const SparseScene sparse = set.sparse_file ? io::LoadSparse(options.set, set) : SparseScene{};
-  const calib::SfmModel model = colmap::ModelFromViews(set, sparse);
-
-  // A name no other program uses: NAME.partial may be somebody's interrupted work.
-  const fs::path partial = fmt::format("{}.export{}", options.output.string(), getpid());
-  try {
-    ExportImages(options.set, set, partial / "images");
-    colmap::WriteModel(partial / "sparse", model,
-                       options.text ? colmap::Format::kText : colmap::Format::kBinary);
-    fs::rename(partial, options.output);
-  } catch (...) {
-    std::error_code ignored;
-    fs::remove_all(partial, ignored);
-    throw;
-  }
+  NameByStoredFormat(set.frames.front().views);
+  const calib::SfmModel model = colmap::ModelFromViews(set, sparse, [&](const View& view) {
+    return ImageOf(options.set, view, context.common.threads);
+  });
+  ExportImages(options.set, set, work.path() / "images");
+  colmap::WriteModel(work.path() / "sparse", model,
+                     options.text ? colmap::Format::kText : colmap::Format::kBinary);
+  work.Become(options.output);
   context.console.Say(fmt::format("{}: {} images, {} points", options.output.string(),
                                   model.images.size(), model.points.size()));
   context.EmitJson(

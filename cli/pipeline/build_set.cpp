@@ -26,6 +26,7 @@
 #include "cli/pipeline/validate_set.h"
 #include "dtr/base/error.h"
 #include "dtr/base/hash.h"
+#include "dtr/base/machine.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/eval/json.h"
 #include "dtr/io/set_io.h"
@@ -293,7 +294,7 @@ Json ReportJson(const BuildReport& report, const RunLog& log, const std::filesys
     json["stages"].push_back(
         {{"name", stage.name}, {"wall_s", stage.wall_s}, {"cpu_s", stage.cpu_s}});
   }
-  json["peak_memory_mib"] = static_cast<double>(PeakMemoryKib()) / 1024;
+  json["peak_memory_mib"] = static_cast<double>(PeakMemoryBytesWithPrograms()) / (1 << 20);
   return json;
 }
 

@@ -4,6 +4,7 @@
 
 #include "calib/colmap/dense.h"
 #include "calib/colmap/export.h"
+#include "dtr/base/durable.h"
 #include "dtr/base/error.h"
 #include "stereo/colmap/colmap_engine.h"
 
@@ -22,8 +23,7 @@ void ComputeWorkspace(const DepthSources& of, const fs::path& workspace, Progres
     const View& view = of.views[static_cast<size_t>(source)];
     const fs::path file = fs::path(view.image_file->path).filename();
     fs::create_directories(workspace / "images");
-    fs::copy_file(of.set_folder / view.image_file->path, workspace / "images" / file,
-                  fs::copy_options::overwrite_existing);
+    CopyFileAtomically(of.set_folder / view.image_file->path, workspace / "images" / file);
     View bare;
     bare.id = view.id;
     bare.name = file.string();

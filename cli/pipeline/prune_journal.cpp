@@ -1,7 +1,9 @@
 #include "cli/pipeline/prune_journal.h"
 
+#include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "dtr/base/durable.h"
 #include "dtr/base/error.h"
 
 namespace dtr::pipeline {
@@ -25,8 +27,7 @@ PruneJournal::PruneJournal(const std::filesystem::path& file) : file_(file) {
     in.close();
     std::filesystem::resize_file(file, whole);
   }
-  out_.open(file, std::ios::app);
-  if (!out_) throw Error(file.string() + ": cannot write");
+  AppendDurably(file, "");  // what cannot be written is said before any work
 }
 
 std::optional<std::vector<double>> PruneJournal::Find(const std::string& name) const {
@@ -36,8 +37,7 @@ std::optional<std::vector<double>> PruneJournal::Find(const std::string& name) c
 
 void PruneJournal::Add(const std::string& name, const std::vector<double>& numbers) {
   known_[name] = numbers;
-  out_ << Json{{"name", name}, {"numbers", numbers}}.dump() << std::endl;
-  if (!out_) throw Error(file_.string() + ": cannot write");
+  AppendDurably(file_, Json{{"name", name}, {"numbers", numbers}}.dump() + "\n");
 }
 
 }  // namespace dtr::pipeline

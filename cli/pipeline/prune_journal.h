@@ -1,7 +1,6 @@
 // cli/pipeline/prune_journal.h -- what `dtr prune` measured, kept in the working folder.
 #pragma once
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <string>
 #include <vector>
@@ -10,8 +9,8 @@
 
 namespace dtr::pipeline {
 
-/// A line of JSON for each measurement: {"name": ..., "numbers": [...]}, appended as it is made. A
-/// last line without its end, of a run that was killed, is passed over.
+/// A line of JSON for each measurement: {"name": ..., "numbers": [...]}, appended as it is made and
+/// on the disk from then on. A last line without its end, of a run that was killed, is passed over.
 class PruneJournal : public prune::Journal {
  public:
   /// Reads what is there. Throws Error where the file cannot be written or is none of ours.
@@ -23,7 +22,6 @@ class PruneJournal : public prune::Journal {
  private:
   std::filesystem::path file_;
   std::map<std::string, std::vector<double>> known_;
-  std::ofstream out_;
 };
 
 }  // namespace dtr::pipeline

@@ -2,8 +2,9 @@
 
 #include <sys/resource.h>
 
-#include <algorithm>
 #include <utility>
+
+#include "dtr/base/machine.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -22,16 +23,6 @@ double CpuSeconds() {
 
 }  // namespace
 
-long PeakMemoryKib() {
-  long peak_kib = 0;
-  for (const int who : {RUSAGE_SELF, RUSAGE_CHILDREN}) {
-    rusage usage{};
-    getrusage(who, &usage);
-    peak_kib = std::max(peak_kib, usage.ru_maxrss);
-  }
-  return peak_kib;
-}
-
 void RunLog::Begin(const std::string& name) {
   End();
   stages_.push_back({name, 0, 0, 0});
@@ -45,7 +36,7 @@ void RunLog::End() {
   const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - start_;
   stages_.back().wall_s = wall.count();
   stages_.back().cpu_s = CpuSeconds() - cpu_start_s_;
-  stages_.back().peak_rss_kib = PeakMemoryKib();
+  stages_.back().peak_rss_kib = static_cast<long>(PeakMemoryBytesWithPrograms() >> 10);
   running_ = false;
 }
 

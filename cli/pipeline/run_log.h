@@ -26,7 +26,4 @@ class RunLog {
   std::chrono::steady_clock::time_point start_;
 };
 
-/// Peak resident memory so far, of this process or of any program it ran.
-long PeakMemoryKib();
-
 }  // namespace dtr::pipeline

@@ -192,12 +192,6 @@ void Carry(const Found& found, DtrSet& set) {
   }
 }
 
-void CopyFile(const fs::path& from, const fs::path& to, const std::optional<StoredFile>& file) {
-  if (!file) return;
-  fs::create_directories((to / file->path).parent_path());
-  fs::copy_file(from / file->path, to / file->path, fs::copy_options::overwrite_existing);
-}
-
 // Depth and sigma of the old view, times the scale, written for the new one. Float rounding must
 // not carry a depth past the ends of its range, which are rounded apart from it.
 void CarryDepth(const fs::path& from, View old_view, double scale, View& view, LengthUnit unit,
@@ -231,8 +225,9 @@ void WriteViews(const ScaleOptions& options, const DtrSet& old_set, double scale
     for (size_t i = 0; i < views.size(); ++i) {
       progress.ThrowIfInterrupted();
       const View& old_view = old_set.frames[f].views[i];
-      CopyFile(options.set, writer.folder(), old_view.image_file);
-      CopyFile(options.set, writer.folder(), old_view.mask_file);
+      View unchanged = old_view;
+      unchanged.depth_file = unchanged.sigma_file = unchanged.mesh_file = std::nullopt;
+      writer.CopyFiles(options.set, unchanged);
       if (old_view.depth_file) CarryDepth(options.set, old_view, scale, views[i], set.unit, writer);
       progress.Update(static_cast<int>(i) + 1);
     }

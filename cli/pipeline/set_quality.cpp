@@ -1,11 +1,6 @@
 #include "cli/pipeline/set_quality.h"
 
-#include <fmt/format.h>
-#include <stdlib.h>
-
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 
 #include "dtr/base/error.h"
 #include "dtr/eval/render_sweep.h"
@@ -13,20 +8,17 @@
 
 namespace dtr::pipeline {
 
-TemporaryFolder::~TemporaryFolder() {
-  std::error_code ignored;  // what is left in the way is replaced by the next run
-  std::filesystem::remove_all(folder, ignored);
+namespace {
+
+const std::filesystem::path& Made(const std::filesystem::path& folder) {
+  std::filesystem::create_directories(folder);
+  return folder;
 }
 
-std::filesystem::path ScratchFolder(const std::filesystem::path& folder) {
-  std::filesystem::create_directories(folder);
-  std::string name = (folder / ".measured-XXXXXX").string();
-  if (mkdtemp(name.data()) == nullptr) {
-    throw Error(fmt::format("{}: a folder to work in cannot be made there: {}", folder.string(),
-                            std::strerror(errno)));
-  }
-  return name;
-}
+}  // namespace
+
+ScratchFolder::ScratchFolder(const std::filesystem::path& folder)
+    : TemporaryFolder(Made(folder), ".measured-") {}
 
 DtrSet LoadToJudge(const std::filesystem::path& folder, bool sigma, int threads,
                    Progress& progress) {

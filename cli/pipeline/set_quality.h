@@ -3,23 +3,18 @@
 #include <filesystem>
 
 #include "dtr/base/progress.h"
+#include "dtr/base/temporary_folder.h"
 #include "dtr/eval/held_out.h"
 #include "dtr/eval/sweep.h"
 
 namespace dtr::pipeline {
 
-/// Removes a folder when it goes.
-struct TemporaryFolder {
-  explicit TemporaryFolder(std::filesystem::path path) : folder(std::move(path)) {}
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  ~TemporaryFolder();
-  std::filesystem::path folder;
-};
-
 /// A new folder below `folder` (made when absent) for sets that are measured and removed again:
 /// whatever else lies there, sets of people included, is left alone. Throws Error.
-std::filesystem::path ScratchFolder(const std::filesystem::path& folder);
+class ScratchFolder : public TemporaryFolder {
+ public:
+  explicit ScratchFolder(const std::filesystem::path& folder);
+};
 
 /// A set with its images, depth and held-out photos.
 DtrSet LoadToJudge(const std::filesystem::path& folder, bool sigma, int threads,

@@ -118,15 +118,13 @@ eval::SweepMeasurement StereoSweep::Measure(const eval::SweepSetting& setting) c
     return axes_[axis].values.at(static_cast<size_t>(setting.at(axis)));
   };
   NotesOnly notes(progress_);
-  const TemporaryFolder scratch{ScratchFolder(options_.work)};
-  const TemporaryFolder resized{scratch.folder / "resized.dtr"},
-      made{scratch.folder / "stereo.dtr"};
-  WriteResized(options_.set, resized.folder, std::stoi(value(kMaxSize)), options_.threads, notes);
-  std::filesystem::remove_all(made.folder.string() + ".partial");
+  const ScratchFolder scratch(options_.work);
+  const std::filesystem::path resized = scratch / "resized.dtr", made = scratch / "stereo.dtr";
+  WriteResized(options_.set, resized, std::stoi(value(kMaxSize)), options_.threads, notes);
 
   RecomputeOptions recompute;
-  recompute.set = resized.folder;
-  recompute.output = made.folder;
+  recompute.set = resized;
+  recompute.output = made;
   recompute.depth.engine = value(kEngine);
   recompute.depth.preset = value(kPreset);
   recompute.force = true;
@@ -140,7 +138,7 @@ eval::SweepMeasurement StereoSweep::Measure(const eval::SweepSetting& setting) c
   if (other_stages_s_) measured.figures["build_cpu_s"] = *other_stages_s_ + measured.cost;
   measured.figures["share_with_depth"] = report.depth_completeness;
 
-  const DtrSet set = LoadToJudge(made.folder, !options_.truth.empty(), options_.threads, notes);
+  const DtrSet set = LoadToJudge(made, !options_.truth.empty(), options_.threads, notes);
   JudgePictures(set, options_.render, options_.make_renderer(), measured);
   if (!options_.truth.empty()) {
     measured.error =

@@ -156,13 +156,11 @@ void StorageSweep::Write(View& view, const eval::SweepSetting& setting, LengthUn
 }
 
 eval::SweepMeasurement StorageSweep::Measure(const eval::SweepSetting& setting) const {
-  const TemporaryFolder scratch{ScratchFolder(options_.work)};
-  const TemporaryFolder made{scratch.folder / "storage.dtr"};
-  // Nothing is resumed: the folder is this run's own.
-  std::filesystem::remove_all(made.folder.string() + ".partial");
+  const ScratchFolder scratch(options_.work);
+  const std::filesystem::path made = scratch / "storage.dtr";
   DtrSet set = io::ReadSet(options_.set);
   {
-    io::SetWriter writer(made.folder, R"({"sweep":"storage"})", true);
+    io::SetWriter writer(made, R"({"sweep":"storage"})", true);
     for (View& view : set.frames.front().views) {
       progress_.ThrowIfInterrupted();
       Write(view, setting, set.unit, writer);
@@ -182,7 +180,7 @@ eval::SweepMeasurement StorageSweep::Measure(const eval::SweepSetting& setting) 
   DtrSet loaded;
   for (int i = 0; i < kLoads; ++i) {
     const double start_ms = ProcessCpuMilliseconds();
-    loaded = LoadToJudge(made.folder, false, options_.threads, progress_);
+    loaded = LoadToJudge(made, false, options_.threads, progress_);
     load_ms.push_back(ProcessCpuMilliseconds() - start_ms);
   }
   measured.figures["load_cpu_ms"] = eval::TimesOf(load_ms).median_ms;

@@ -4,8 +4,10 @@
 #include <array>
 
 #include "datasets/convert/converters.h"
+#include "dtr/base/durable.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
+#include "dtr/base/work_folder.h"
 #include "dtr/io/depth_io.h"
 #include "dtr/io/image_io.h"
 
@@ -30,23 +32,6 @@ constexpr std::array kKinds = {
     Kind{"plaza", ConvertPlaza},
 };
 
-/// Removes the folder unless told to keep it.
-class Scaffold {
- public:
-  explicit Scaffold(fs::path folder) : folder_(std::move(folder)) { fs::remove_all(folder_); }
-  ~Scaffold() {
-    std::error_code ignored;
-    fs::remove_all(folder_, ignored);  // nothing there after Become
-  }
-  Scaffold(const Scaffold&) = delete;
-  Scaffold& operator=(const Scaffold&) = delete;
-  const fs::path& folder() const { return folder_; }
-  void Become(const fs::path& target) { fs::rename(folder_, target); }
-
- private:
-  fs::path folder_;
-};
-
 std::string StemOf(const std::string& name) { return fs::path(name).stem().string(); }
 
 }  // namespace
@@ -60,11 +45,7 @@ fs::path ConvertedFolder::ImageFile(const std::string& name) const {
 }
 
 void ConvertedFolder::CopyImage(const fs::path& from, const std::string& name) const {
-  std::error_code error;
-  fs::copy_file(from, ImageFile(name), error);
-  if (error) throw Error(from.string() + ": cannot be copied: " + error.message());
-  // A copy of a read-only file must not stand in the way of its removal or replacement.
-  fs::permissions(ImageFile(name), fs::perms::owner_write, fs::perm_options::add, error);
+  CopyFileAtomically(from, ImageFile(name));
 }
 
 std::string ConvertedFolder::WriteDepth(const std::string& name, const DepthImage& depth_z) const {
@@ -122,10 +103,10 @@ void ConvertDataset(const std::string& kind, const fs::path& source, const fs::p
   if (!fs::is_directory(source)) {
     throw Error(source.string() + ": expected the folder of the set, found none");
   }
-  Scaffold scaffold(out.string() + ".partial");
-  const io::CameraList list = found->convert(source, ConvertedFolder(scaffold.folder()));
-  io::WriteCamerasJson(scaffold.folder() / "cameras.json", list);
-  scaffold.Become(out);
+  WorkFolder work(WorkFolder::Of(out), "dataset");
+  const io::CameraList list = found->convert(source, ConvertedFolder(work.path()));
+  io::WriteCamerasJson(work.path() / "cameras.json", list);
+  work.Become(out);
 }
 
 }  // namespace dtr::datasets

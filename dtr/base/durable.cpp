@@ -1,16 +1,16 @@
 #include "dtr/base/durable.h"
 
-#include <fcntl.h>
 #include <sys/file.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
 #include <system_error>
+#include <tuple>
 #include <vector>
 
 #include "dtr/base/error.h"
+#include "dtr/base/open_file.h"
 
 namespace dtr {
 namespace fs = std::filesystem;
@@ -29,27 +29,6 @@ int Sync(const fs::path& path, int flags) {
   throw Error(file.string() + ": " + what + ": " + why);
 }
 
-class OpenFile {
- public:
-  OpenFile(const fs::path& file, int flags, mode_t mode = 0)
-      : fd_(open(file.c_str(), flags | O_CLOEXEC, mode)) {
-    if (fd_ < 0) throw std::system_error(errno, std::generic_category());
-  }
-  ~OpenFile() { close(fd_); }
-  OpenFile(const OpenFile&) = delete;
-  OpenFile& operator=(const OpenFile&) = delete;
-  int fd() const { return fd_; }
-
- private:
-  int fd_;
-};
-
-// What a system call returned, unless that was a failure.
-ssize_t Done(ssize_t result) {
-  if (result < 0) throw std::system_error(errno, std::generic_category());
-  return result;
-}
-
 // std::filesystem::copy_file calls a full disk an input/output error.
 void CopyContent(const fs::path& from, const fs::path& to) {
   const OpenFile in(from, O_RDONLY);
@@ -58,10 +37,7 @@ void CopyContent(const fs::path& from, const fs::path& to) {
   const OpenFile out(to, O_WRONLY | O_CREAT | O_EXCL, S_IRUSR | S_IWUSR);
   std::vector<char> buffer(size_t{1} << 18);
   while (const auto size = static_cast<size_t>(Done(read(in.fd(), buffer.data(), buffer.size())))) {
-    for (size_t written = 0; written < size;) {
-      written +=
-          static_cast<size_t>(Done(write(out.fd(), buffer.data() + written, size - written)));
-    }
+    WriteAll(out, {buffer.data(), size});
   }
   constexpr mode_t kPermissions = 0777;
   Done(fchmod(out.fd(), (about.st_mode & kPermissions) | S_IWUSR));
@@ -114,6 +90,22 @@ void CopyFileAtomically(const fs::path& from, const fs::path& to) {
     std::error_code ignored;
     fs::remove(temporary, ignored);
     throw;
+  }
+}
+
+void AppendDurably(const fs::path& file, std::string_view record) {
+  try {
+    const OpenFile out(file, O_WRONLY | O_CREAT | O_APPEND, 0644);
+    const off_t before = Done(lseek(out.fd(), 0, SEEK_END));
+    try {
+      WriteAll(out, record);
+      Done(fsync(out.fd()));
+    } catch (const std::system_error&) {
+      std::ignore = ftruncate(out.fd(), before);  // what comes next must not follow half a record
+      throw;
+    }
+  } catch (const std::system_error& failure) {
+    Fail(file, "cannot be written", failure.code().message());
   }
 }
 

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 
 namespace dtr {
@@ -24,6 +25,11 @@ void Rename(const std::filesystem::path& from, const std::filesystem::path& to);
 /// the original cannot. As WriteFileAtomically, `to` has the old content or all of the new one,
 /// which is on the disk; a file that may only be read is replaced too. Throws Error.
 void CopyFileAtomically(const std::filesystem::path& from, const std::filesystem::path& to);
+
+/// Adds `record` at the end of `file`, which is made where there is none. It is on the disk when
+/// this returns; where it cannot be, the file is as it was. Throws Error. A process that is killed
+/// may leave a part of the record: its reader must know a whole one.
+void AppendDurably(const std::filesystem::path& file, std::string_view record);
 
 /// True for what WriteFileAtomically and CopyFileAtomically leave when they are killed:
 /// NAME.tmp and a number.

@@ -1,13 +1,11 @@
 #include "dtr/base/files.h"
 
-#include <fcntl.h>
-#include <unistd.h>
-
-#include <cerrno>
-#include <cstring>
+#include <cstdio>
 #include <fstream>
+#include <tuple>
 
 #include "dtr/base/error.h"
+#include "dtr/base/open_file.h"
 
 namespace dtr {
 namespace fs = std::filesystem;
@@ -41,30 +39,18 @@ fs::path WithoutTrailingSlash(const fs::path& path) {
   return path.has_filename() || !path.has_relative_path() ? path : path.parent_path();
 }
 
-namespace {
-
-// Writes and syncs; returns errno of the first failure, or 0.
-int WriteAll(int fd, std::string_view content) {
-  while (!content.empty()) {
-    const ssize_t written = write(fd, content.data(), content.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) return errno;
-    content.remove_prefix(static_cast<size_t>(written));
-  }
-  return fsync(fd) == 0 ? 0 : errno;
-}
-
-}  // namespace
-
 void WriteFileAtomically(const fs::path& file, std::string_view content) {
   const fs::path temporary = file.string() + ".tmp" + std::to_string(getpid());
-  const int fd = open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-  int failure = fd < 0 ? errno : WriteAll(fd, content);
-  if (fd >= 0 && close(fd) != 0 && failure == 0) failure = errno;
-  if (failure == 0 && rename(temporary.c_str(), file.c_str()) != 0) failure = errno;
-  if (failure != 0) {
+  try {
+    {
+      const OpenFile out(temporary, O_WRONLY | O_CREAT | O_TRUNC, 0644);
+      WriteAll(out, content);
+      Done(fsync(out.fd()));
+    }
+    Done(rename(temporary.c_str(), file.c_str()));
+  } catch (const std::system_error& failure) {
     unlink(temporary.c_str());
-    throw Error(file.string() + ": cannot be written: " + std::strerror(failure));
+    throw Error(file.string() + ": cannot be written: " + failure.code().message());
   }
 }
 

@@ -4,6 +4,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <fstream>
 
 namespace dtr {
@@ -25,10 +26,20 @@ double ProcessCpuMilliseconds() {
   return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
 }
 
-size_t PeakMemoryBytes() {
+namespace {
+
+size_t PeakMemoryBytesOf(int who) {
   rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
+  getrusage(who, &usage);
   return static_cast<size_t>(usage.ru_maxrss) << 10;
+}
+
+}  // namespace
+
+size_t PeakMemoryBytes() { return PeakMemoryBytesOf(RUSAGE_SELF); }
+
+size_t PeakMemoryBytesWithPrograms() {
+  return std::max(PeakMemoryBytes(), PeakMemoryBytesOf(RUSAGE_CHILDREN));
 }
 
 size_t MemoryBytes() {

@@ -14,7 +14,9 @@ double ProcessCpuMilliseconds();
 
 /// The most physical memory this process had so far.
 size_t PeakMemoryBytes();
-/// What it has just now; 0 where the system does not say.
+/// The same of this process or of any program that it ran to its end, whichever had most.
+size_t PeakMemoryBytesWithPrograms();
+/// What this process has just now; 0 where the system does not say.
 size_t MemoryBytes();
 
 }  // namespace dtr

@@ -1,31 +1,24 @@
 // dtr/base/temporary_folder.h -- a folder for as long as a scope lasts.
 #pragma once
-#include <cerrno>
-#include <cstdlib>
-#include <cstring>
 #include <filesystem>
+#include <memory>
 #include <string>
-
-#include "dtr/base/error.h"
 
 namespace dtr {
 
-/// A fresh folder, removed with everything in it at the end of the scope. Throws Error where none
-/// can be made.
+class OpenFile;
+
+/// A fresh folder, removed with everything in it at the end of the scope. One that outlived its
+/// process, which was killed, is removed by the next that is made beside it: the system ends the
+/// lock on it with its owner, however that ends. Where folders cannot be locked it stays.
 class TemporaryFolder {
  public:
-  TemporaryFolder() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "dtr_XXXXXX").string();
-    if (mkdtemp(pattern.data()) == nullptr) {
-      throw Error(pattern +
-                  ": expected to create a temporary folder, found: " + std::strerror(errno));
-    }
-    path_ = pattern;
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
+  /// Where the system keeps what is temporary.
+  TemporaryFolder() : TemporaryFolder(std::filesystem::temp_directory_path(), "dtr-tmp-") {}
+  /// Below `parent`, which must be there; `prefix` is the beginning of its name, and nothing but
+  /// such folders may be called so. Throws Error where none can be made.
+  TemporaryFolder(const std::filesystem::path& parent, const std::string& prefix);
+  ~TemporaryFolder();
   TemporaryFolder(const TemporaryFolder&) = delete;
   TemporaryFolder& operator=(const TemporaryFolder&) = delete;
   const std::filesystem::path& path() const { return path_; }
@@ -33,6 +26,7 @@ class TemporaryFolder {
 
  private:
   std::filesystem::path path_;
+  std::unique_ptr<OpenFile> lock_;
 };
 
 }  // namespace dtr

@@ -125,6 +125,10 @@ void ExpectRgb(const fs::path& file, const ImageRgb8& image) {
   }
 }
 
+ImageSpec Rgb8Spec(const ImageRgb8& image) {
+  return {image.width(), image.height(), 3, TypeDesc::UINT8};
+}
+
 std::string EncodeJpeg(const ImageRgb8& image, int quality, ImageSpec spec) {
   spec.attribute("CompressionQuality", std::clamp(quality, 1, 100));
   spec.attribute("jpeg:subsampling", "4:4:4");
@@ -178,15 +182,20 @@ Mask ReadMask(const fs::path& file, std::uint64_t limit_px) {
 void WriteImage(const fs::path& file, const ImageRgb8& image, int jpeg_quality) {
   ExpectRgb(file, image);
   const std::string extension = LowerExtension(file);
-  const ImageSpec spec(image.width(), image.height(), 3, TypeDesc::UINT8);
   if (extension == ".png") {
-    WriteFileAtomically(file, EncodeImage(".png", spec, TypeDesc::UINT8, image.data().data()));
+    WritePng(file, image);
   } else if (extension == ".jpg" || extension == ".jpeg") {
-    WriteFileAtomically(file, EncodeJpeg(image, jpeg_quality, spec));
+    WriteFileAtomically(file, EncodeJpeg(image, jpeg_quality, Rgb8Spec(image)));
   } else {
     throw UsageError(file.string() + ": expected a name ending in .png or .jpg, found '" +
                      extension + "'");
   }
+}
+
+void WritePng(const fs::path& file, const ImageRgb8& image) {
+  ExpectRgb(file, image);
+  WriteFileAtomically(file,
+                      EncodeImage(".png", Rgb8Spec(image), TypeDesc::UINT8, image.data().data()));
 }
 
 void WriteImageWithAlpha(const fs::path& file, const ImageRgb8& image, const Mask& alpha) {
@@ -219,7 +228,7 @@ void WriteMask(const fs::path& file, const Mask& mask) {
 void WriteJpegWithExif(const fs::path& file, const ImageRgb8& image, int quality,
                        const ExifFocal& exif) {
   ExpectRgb(file, image);
-  ImageSpec spec(image.width(), image.height(), 3, TypeDesc::UINT8);
+  ImageSpec spec = Rgb8Spec(image);
   if (!exif.make.empty()) spec.attribute("Make", exif.make);
   if (!exif.model.empty()) spec.attribute("Model", exif.model);
   if (exif.focal_mm) spec.attribute("Exif:FocalLength", static_cast<float>(*exif.focal_mm));

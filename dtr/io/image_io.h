@@ -68,6 +68,9 @@ inline constexpr int kDefaultJpegQuality = 95;
 void WriteImage(const std::filesystem::path& file, const ImageRgb8& image,
                 int jpeg_quality = kDefaultJpegQuality);
 
+/// The same as PNG, whatever the file is called.
+void WritePng(const std::filesystem::path& file, const ImageRgb8& image);
+
 /// Writes a PNG with an alpha channel (not multiplied in). `alpha` must have the image's size.
 void WriteImageWithAlpha(const std::filesystem::path& file, const ImageRgb8& image,
                          const Mask& alpha);

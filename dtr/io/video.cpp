@@ -1,8 +1,8 @@
 #include "dtr/io/video.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
+#include "dtr/base/durable.h"
 #include "dtr/base/error.h"
 #include "dtr/base/process.h"
 #include "dtr/io/image_io.h"
@@ -12,27 +12,22 @@ namespace fs = std::filesystem;
 
 VideoWriter::VideoWriter(fs::path target, int frames_per_second)
     : target_(std::move(target)),
-      frames_(target_.string() + fmt::format(".frames{}", getpid())),
+      frames_(WorkFolder::Of(target_), "video"),
       frames_per_second_(frames_per_second) {
   if (FindProgram("ffmpeg").empty()) {
     throw Error(target_.string() +
                 ": program ffmpeg not found on the PATH; install it or write images to a folder");
   }
-  fs::create_directory(frames_);
-}
-
-VideoWriter::~VideoWriter() {
-  std::error_code ignored;
-  fs::remove_all(frames_, ignored);
 }
 
 void VideoWriter::Add(const ImageRgb8& frame) {
-  WriteImage(frames_ / fmt::format("{:06}.png", count_++), frame);
+  WriteImage(frames_.path() / fmt::format("{:06}.png", count_++), frame);
 }
 
 void VideoWriter::Finish(const Progress& progress) {
-  const fs::path encoded = frames_ / "video.mp4";
-  const fs::path log = frames_ / "ffmpeg.log";
+  const fs::path& frames = frames_.path();
+  const fs::path encoded = frames / "video.mp4";
+  const fs::path log = frames / "ffmpeg.log";
   ProcessOptions options;
   options.log_file = log;
   std::string last_line;
@@ -41,7 +36,7 @@ void VideoWriter::Finish(const Progress& progress) {
   // yuv420p, which every player knows, needs even sizes: an odd frame gains one row or column.
   const auto result = RunProcess(
       {"ffmpeg", "-y", "-loglevel", "error", "-framerate", std::to_string(frames_per_second_), "-i",
-       (frames_ / "%06d.png").string(), "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-c:v", "libx264",
+       (frames / "%06d.png").string(), "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-c:v", "libx264",
        "-crf", "18", "-pix_fmt", "yuv420p", "-movflags", "+faststart", encoded.string()},
       options);
   progress.ThrowIfInterrupted();
@@ -49,7 +44,8 @@ void VideoWriter::Finish(const Progress& progress) {
     throw Error(fmt::format("{}: ffmpeg failed with exit code {}: {}", target_.string(),
                             result.exit_code, last_line));
   }
-  fs::rename(encoded, target_);
+  SyncFile(encoded);
+  Rename(encoded, target_);
 }
 
 }  // namespace dtr::io

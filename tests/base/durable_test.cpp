@@ -1,17 +1,22 @@
 #include "dtr/base/durable.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <fstream>
 
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
+#include "tests/support/message_of.h"
+#include "tests/support/small_disk.h"
 #include "tests/support/test_data.h"
 
 namespace dtr {
 namespace {
 
 namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+using testing::MessageOf;
 using testing::TemporaryFolder;
 
 TEST(TemporaryFiles, AreThoseWithANumberBehindTheirEnding) {
@@ -50,6 +55,32 @@ TEST(CopyFileAtomically, ReplacesAndLeavesNothingWhereItCannot) {
   fs::create_directories(folder / "full/of");
   EXPECT_THROW(CopyFileAtomically(folder / "from", folder / "full"), Error);
   EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 3);
+}
+
+TEST(AppendDurably, AddsAllOfARecordOrNothing) {
+  const TemporaryFolder folder;
+  const testing::SmallDisk disk(folder / "disk");
+  if (!disk.mounted()) GTEST_SKIP() << "SKIPPED: no file system can be mounted here";
+  const fs::path file = folder / "disk/journal";
+  AppendDurably(file, "one\n");
+  AppendDurably(file, "");
+  const std::string large(size_t{1} << 20, 'x');
+  EXPECT_THAT(MessageOf<Error>([&] { AppendDurably(file, large); }),
+              HasSubstr("journal: cannot be written: No space left on device"));
+  AppendDurably(file, "two\n");
+  EXPECT_EQ(ReadFile(file, 100), "one\ntwo\n");
+  EXPECT_THROW(AppendDurably(folder / "disk", "x"), Error);
+}
+
+TEST(CopyFileAtomically, SaysThatADiskIsFull) {
+  const TemporaryFolder folder;
+  const testing::SmallDisk disk(folder / "disk");
+  if (!disk.mounted()) GTEST_SKIP() << "SKIPPED: no file system can be mounted here";
+  WriteFileAtomically(folder / "large", std::string(size_t{1} << 20, 'x'));
+  EXPECT_THAT(MessageOf<Error>([&] { CopyFileAtomically(folder / "large", folder / "disk/copy"); }),
+              ::testing::AllOf(HasSubstr("disk/copy: cannot be copied from "),
+                               ::testing::EndsWith(": No space left on device")));
+  EXPECT_TRUE(IsEmptyFolder(folder / "disk"));
 }
 
 TEST(FileLock, IsHeldOnceAndReleased) {

@@ -109,7 +109,8 @@ TEST(ModelFromViews, AddsTheWorldOriginAndSurvivesTheFiles) {
   SparseScene scene;
   scene.points = {{{0.25, 0.5, 5}}, {{0, 0, 4}}};
   scene.observations = {{0, 0, {34.5, 29}}, {1, 0, {36.5, 29}}};
-  const SfmModel model = colmap::ModelFromViews(set, scene);
+  const SfmModel model =
+      colmap::ModelFromViews(set, scene, [](const View& view) { return view.image; });
   ASSERT_EQ(model.images.size(), 2u);
   EXPECT_EQ(model.images[0].name, "a.jpg");
   EXPECT_EQ(model.cameras.size(), 1u);
@@ -117,6 +118,7 @@ TEST(ModelFromViews, AddsTheWorldOriginAndSurvivesTheFiles) {
   const SfmPoint& point = model.points.at(1);
   EXPECT_EQ(point.p_in_world, Eigen::Vector3d(5e5 + 0.25, 4.5e6 + 0.5, 105));
   EXPECT_EQ(point.rgb[0], 125);
+  EXPECT_EQ(colmap::ModelFromViews(set, scene).points.at(1).rgb[0], 0);
   EXPECT_NEAR(point.error_px, 0.5, kExactPx);  // 0 in b.jpg, 1 px in a.jpg
   // kilometres from the origin, rounding in double is 1e-9 of a unit: far below a pixel
   const auto p_in_cam = model.images[0].cam_from_world * point.p_in_world;
