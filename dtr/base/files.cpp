@@ -1,6 +1,8 @@
 #include "dtr/base/files.h"
 
+#include <cerrno>
 #include <cstdio>
+#include <cstring>
 #include <fstream>
 #include <tuple>
 
