@@ -53,10 +53,8 @@ class BuildInMetres : public ::testing::Test {
   void LeaveModel() {
     calib::SfmModel model = CourtyardModel(photos_, 1 / kUnit);
     Random random(3);
-    std::vector<std::string> aliases;
+    const std::vector<std::string> aliases = NumberImages(model);
     for (calib::SfmImage& image : model.images) {
-      aliases.push_back(fmt::format("{:06}.jpg", aliases.size()));
-      image.name = aliases.back();
       for (auto& feature : image.features) {
         const double x = random.Normal();
         feature.pixel += kNoisePx * Eigen::Vector2d(x, random.Normal());

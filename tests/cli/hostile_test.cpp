@@ -85,6 +85,7 @@ TEST_F(Hostile, ArgumentsThatJsonCannotHoldAreRefusedBeforeAnyWork) {
   EXPECT_EQ(FilesIn(folder_.path()), 0);
 }
 
+// What other commands make under the name that a build was to have is not written over its work.
 TEST_F(Hostile, AnInterruptedBuildIsNotTakenForACapture) {
   const std::string photos = Photos();
   {
@@ -94,9 +95,19 @@ TEST_F(Hostile, AnInterruptedBuildIsNotTakenForACapture) {
   }
   const auto before = Contents(folder_ / "set.dtr.partial");
   ASSERT_FALSE(before.empty());
-  ExpectRefused(Dtr({"capture", photos, "-o", In("set.dtr")}), kWrongUsage,
-                "expected nothing or an unfinished capture, found something else; move it away");
-  EXPECT_EQ(Contents(folder_ / "set.dtr.partial"), before);
+  const std::pair<std::string, std::vector<std::string>> others[] = {
+      {"capture", {"capture", photos}},
+      {"dataset", {"dataset", "make", "plane"}},
+      {"dataset", {"dataset", "convert", "fern", photos}},
+      {"export", {"export", Good().string()}}};
+  for (auto [kind, words] : others) {
+    words.insert(words.end(), {"-o", In("set.dtr")});
+    ExpectRefused(
+        Dtr(words), kWrongUsage,
+        "expected nothing or an unfinished " + kind + ", found something else; move it away");
+    EXPECT_EQ(Contents(folder_ / "set.dtr.partial"), before) << kind;
+    EXPECT_FALSE(fs::exists(folder_ / "set.dtr")) << kind;
+  }
 }
 
 TEST_F(Hostile, APhotoEditedInACaptureIsAnotherInput) {

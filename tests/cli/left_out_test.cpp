@@ -50,10 +50,7 @@ class LeftOut : public ::testing::Test {
       camera.model = calib::LensModel::kSimpleRadial;
       camera.params = {c.fx_px(), c.cx_px(), c.cy_px(), k1};
     }
-    std::vector<std::string> aliases;
-    for (calib::SfmImage& image : model.images) {
-      image.name = aliases.emplace_back(fmt::format("{:06}.jpg", aliases.size()));
-    }
+    std::vector<std::string> aliases = NumberImages(model);
     colmap::WriteModel(colmap / "model.0", model, colmap::Format::kBinary);
     for (int i = 0; i < further; ++i) {
       aliases.push_back(fmt::format("{:06}.jpg", aliases.size()));

@@ -129,6 +129,14 @@ void MakeSmallCourtyard(const fs::path& folder, double scale, const Eigen::Vecto
                      colmap::Format::kBinary);
 }
 
+std::vector<std::string> NumberImages(calib::SfmModel& model) {
+  std::vector<std::string> names;
+  for (calib::SfmImage& image : model.images) {
+    image.name = names.emplace_back(fmt::format("{:06}.jpg", names.size()));
+  }
+  return names;
+}
+
 void ChangePhoto(const fs::path& photo) {
   ImageRgb8 image = io::ReadImage(photo);
   for (auto& value : image.data()) value = static_cast<std::uint8_t>(255 - value);

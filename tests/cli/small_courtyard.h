@@ -39,6 +39,9 @@ void RenderCourtyard(const std::filesystem::path& folder,
 calib::SfmModel CourtyardModel(const std::vector<CourtyardPhoto>& photos, double scale = 1,
                                const Eigen::Vector3d& offset = Eigen::Vector3d::Zero());
 
+/// Names a model's images 000000.jpg, 000001.jpg, ..., as COLMAP gets them, and returns the names.
+std::vector<std::string> NumberImages(calib::SfmModel& model);
+
 /// Replaces a photo by another picture of the same size.
 void ChangePhoto(const std::filesystem::path& photo);
 

@@ -1,0 +1,108 @@
+// Commands whose work is not continued: killed, the same command leaves nothing but its result.
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <cstdlib>
+
+#include "dtr/base/process.h"
+#include "tests/cli/courtyard_and_set.h"
+
+namespace dtr::testing {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+class LeftOver : public CourtyardAndSet {
+ protected:
+  static std::vector<std::string> NamesIn(const fs::path& folder) {
+    std::vector<std::string> names;
+    for (const auto& entry : fs::directory_iterator(folder)) {
+      names.push_back(entry.path().filename().string());
+    }
+    return names;
+  }
+  // Kills runs until one was hit after `begun`: a fast one may be over before that is seen.
+  void Kill(const std::vector<std::string>& words, const std::function<bool()>& begun) {
+    constexpr int kMostTries = 50;
+    for (int i = 0; i < kMostTries; ++i) {
+      const Ran ran = Dtr(words, {SIGKILL, begun});
+      if (ran.signal == SIGKILL) return;
+      ASSERT_EQ(ran.code, 0) << ran.err;
+      for (const auto& entry : fs::directory_iterator(work_)) fs::remove_all(entry.path());
+    }
+    FAIL() << "never killed at work";
+  }
+  void SetUp() override { fs::create_directories(work_); }
+  std::string Work(const std::string& name) const { return (work_ / name).string(); }
+
+  const fs::path work_ = folder_ / "work";
+};
+
+TEST_F(LeftOver, AVideosFrames) {
+  if (FindProgram("ffmpeg").empty()) GTEST_SKIP() << "SKIPPED: ffmpeg is absent";
+  const std::vector<std::string> render{"render", Shared("good.dtr"), "--fly-through",
+                                        "24",     "--renderer",       "cpu",
+                                        "-o",     Work("path.mp4")};
+  const fs::path frames = Work("path.mp4.partial");
+  // While pictures are drawn, and while they are encoded.
+  Kill(render, [&] { return FilesIn(frames) >= 4; });
+  EXPECT_GE(FilesIn(frames), 4);
+  Kill(render, [&] { return fs::exists(frames / "video.mp4"); });
+  EXPECT_THAT(NamesIn(work_), ElementsAre("path.mp4.partial"));
+  DtrOk(render);
+  EXPECT_THAT(NamesIn(work_), ElementsAre("path.mp4"));
+}
+
+TEST_F(LeftOver, AnExportHalfWritten) {
+  const std::vector<std::string> exporting{"export", Shared("good.dtr"), "-o", Work("out")};
+  Kill(exporting, [&] { return FilesIn(Work("out.partial/images")) >= 1; });
+  EXPECT_THAT(NamesIn(work_), ElementsAre("out.partial"));
+  DtrOk(exporting);
+  EXPECT_THAT(NamesIn(work_), ElementsAre("out"));
+  EXPECT_EQ(FilesIn(work_ / "out"), 0);  // folders alone: no mark
+}
+
+TEST_F(LeftOver, ADatasetHalfMade) {
+  const std::vector<std::string> making{"dataset", "make",    "courtyard", "--views",
+                                        "4",       "--width", "96",        "--height",
+                                        "64",      "-o",      Work("out")};
+  Kill(making, [&] { return FilesIn(Work("out.partial/images")) >= 2; });
+  DtrOk(making);
+  EXPECT_THAT(NamesIn(work_), ElementsAre("out"));
+  EXPECT_FALSE(fs::exists(work_ / "out/dataset.lock"));
+}
+
+bool HoldsASet(const fs::path& folder) {
+  std::error_code gone;
+  fs::recursive_directory_iterator entries(folder, gone);
+  for (; !gone && entries != fs::recursive_directory_iterator(); entries.increment(gone)) {
+    if (entries->path().filename() == "storage.dtr.partial") return true;
+  }
+  return false;
+}
+
+// One setting is measured where the system keeps what is temporary, a sweep beside its results.
+TEST_F(LeftOver, SetsThatABenchMeasured) {
+  setenv("TMPDIR", work_.c_str(), 1);
+  const std::vector<std::string> point{"bench",   Shared("good.dtr"), "--stage",    "storage",
+                                       "--point", "default",          "--renderer", "cpu"};
+  Kill(point, [&] { return HoldsASet(work_); });
+  EXPECT_EQ(NamesIn(work_).size(), 1u);
+  DtrOk(point);
+  EXPECT_THAT(NamesIn(work_), IsEmpty());
+  unsetenv("TMPDIR");
+
+  std::vector<std::string> sweep = point;
+  sweep.erase(sweep.begin() + 4, sweep.begin() + 6);
+  sweep.insert(sweep.end(), {"--max-points", "1", "-o", Work("out")});
+  Kill(sweep, [&] { return HoldsASet(work_ / "out"); });
+  DtrOk(sweep);
+  for (const std::string& name : NamesIn(work_ / "out")) {
+    EXPECT_NE(name.front(), '.') << name << " was left";
+  }
+}
+
+}  // namespace
+}  // namespace dtr::testing
