@@ -75,7 +75,8 @@ TemporaryFolder::TemporaryFolder(const fs::path& parent, const std::string& pref
     } while (!lock_ || Lock(*lock_) == Locked::kBySomebody || !IsStillThere(*lock_, name));
   } catch (const std::system_error& failure) {
     throw Error(name +
-                ": expected to create a temporary folder, found: " + failure.code().message());
+                ": expected to create a temporary folder, found: " + failure.code().message() +
+                "; choose another place, or set TMPDIR to a folder that can be written");
   }
   path_ = name;
 }

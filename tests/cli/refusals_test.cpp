@@ -176,7 +176,7 @@ TEST_F(Refusals, WhatIsNoDataSet) {
        "expected a folder that does not exist yet; remove it or choose another name",
        {"dataset", "make", "plane", "-o", taken}},
       {kFailed,
-       "expected a folder that can be made, found: Not a directory",
+       "cannot be written: Not a directory",
        {"dataset", "make", "plane", "-o", file + "/made"}},
       {kWrongUsage,
        "is not downloaded but made; use `dtr dataset make plane`",
@@ -477,7 +477,7 @@ TEST_F(Refusals, AFolderForTemporaryFilesThatTakesNone) {
   ExpectRefused(Shell(fmt::format("TMPDIR=/proc exec {} bench {} --renderer cpu --stage render "
                                   "--point default",
                                   DTR_PROGRAM, Shared("good.dtr"))),
-                kFailed, "cannot be made; set TMPDIR to a folder that can be written");
+                kFailed, "choose another place, or set TMPDIR to a folder that can be written");
 }
 
 TEST_F(Refusals, TooLittleMemoryIsSaidInOneLine) {

@@ -130,6 +130,19 @@ TEST(IngestVideos, SaysWhatIsNoVideoAndWhatHasNothingToSee) {
       HasSubstr("--motion"));
 }
 
+TEST(IngestVideos, FramesWithoutTextureAreRefused) {
+  const TemporaryFolder folder;
+  const fs::path file = folder / "fog.avi";
+  {
+    cv::VideoWriter video(file.string(), cv::CAP_OPENCV_MJPEG,
+                          cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 25, cv::Size(64, 48));
+    for (int i = 0; i < 5; ++i) video.write(cv::Mat(48, 64, CV_8UC3, cv::Scalar::all(128)));
+  }
+  EXPECT_THAT(MessageOf<Error>([&] { Ingest({file}, {}, folder / "frames"); }),
+              HasSubstr("fog.avi: expected frames with texture, found none among 5; give --every"));
+  EXPECT_EQ(Ingest({file}, {.every = 2}, folder / "every").photos.size(), 3u);
+}
+
 TEST(IngestVideos, AVideoCutShortIsTakenAsFarAsItGoesAndListed) {
   const TemporaryFolder folder;
   WriteVideo(folder / "walk.avi", Places(40, 4));
