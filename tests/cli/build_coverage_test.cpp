@@ -26,8 +26,11 @@ class BuildCoverage : public ::testing::Test {
 };
 
 TEST_F(BuildCoverage, IsWhatAdviseFindsAndTheSameForAnyNumberOfThreads) {
-  const std::vector<std::string> quick{"--rounds",     "0", "--iterations", "1",
-                                       "--neighbours", "2", "--threads"};
+  // Three photos in the middle of the arc are held out: there the capture has a gap.
+  const std::vector<std::string> quick{
+      "--rounds",     "0", "--iterations", "1",
+      "--neighbours", "2", "--holdout",    "0002.jpg,0003.jpg,0004.jpg",
+      "--threads"};
   const auto with_threads = [&](const std::string& threads) {
     std::vector<std::string> words = quick;
     words.push_back(threads);
@@ -47,7 +50,7 @@ TEST_F(BuildCoverage, IsWhatAdviseFindsAndTheSameForAnyNumberOfThreads) {
   const Json advice = Json::parse(DtrOk({"advise", In("one.dtr"), "--json", "-"}).out);
   int poor = 0;
   for (const Json& place : advice["places"]) poor += place["poor"].get<bool>();
-  EXPECT_GT(poor, 0) << "an arc of seven cameras shows nothing beyond its ends";
+  EXPECT_GT(poor, 0) << "nothing would be tested";
   EXPECT_THAT(lines[0], HasSubstr("coverage: " + std::to_string(poor) + " of " +
                                   std::to_string(advice["places"].size()) + " places"));
   ASSERT_FALSE(advice["add"].empty());
