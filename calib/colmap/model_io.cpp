@@ -5,10 +5,13 @@
 #include <algorithm>
 #include <iterator>
 #include <map>
+#include <utility>
 
 #include "calib/colmap/raw_model.h"
+#include "dtr/base/durable.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
+#include "dtr/base/work_folder.h"
 
 namespace dtr::colmap {
 namespace fs = std::filesystem;
@@ -79,6 +82,21 @@ void Put(std::string& out, T value) {
   out.append(reinterpret_cast<const char*>(&value), sizeof value);
 }
 
+// A full disk is met before any file bears its name. The cameras come last: where they are, a model
+// is, also after a kill.
+void WriteFiles(const fs::path& folder, const std::string& extension, const std::string& cameras,
+                const std::string& images, const std::string& points) {
+  const WorkFolder work(folder / "model.partial", "model");
+  const std::pair<std::string, const std::string*> files[] = {
+      {"images", &images}, {"points3D", &points}, {"cameras", &cameras}};
+  for (const auto& [stem, content] : files) {
+    WriteFileAtomically(work.path() / (stem + extension), *content);
+  }
+  for (const auto& [stem, content] : files) {
+    Rename(work.path() / (stem + extension), folder / (stem + extension));
+  }
+}
+
 void WriteBinary(const fs::path& folder, const calib::SfmModel& model) {
   std::string cameras, images, points;
   Put<std::uint64_t>(cameras, model.cameras.size());
@@ -117,9 +135,7 @@ void WriteBinary(const fs::path& folder, const calib::SfmModel& model) {
       Put<std::uint32_t>(points, element.feature);
     }
   }
-  WriteFileAtomically(folder / "cameras.bin", cameras);
-  WriteFileAtomically(folder / "images.bin", images);
-  WriteFileAtomically(folder / "points3D.bin", points);
+  WriteFiles(folder, ".bin", cameras, images, points);
 }
 
 // fmt's "{}" of a double is the shortest text that reads back to the same bits.
@@ -179,9 +195,7 @@ void WriteText(const fs::path& folder, const calib::SfmModel& model) {
     }
     points.push_back('\n');
   }
-  WriteFileAtomically(folder / "cameras.txt", CamerasText(model.cameras));
-  WriteFileAtomically(folder / "images.txt", images);
-  WriteFileAtomically(folder / "points3D.txt", points);
+  WriteFiles(folder, ".txt", CamerasText(model.cameras), images, points);
 }
 
 bool HasFiles(const fs::path& folder, const char* extension) {
