@@ -74,11 +74,13 @@ YardstickScore ScoreCameras(const SfmModel& model, std::span<const std::string> 
     residuals[t] = ResidualsOf(tracks[t], cameras);
   });
   YardstickScore score;
+  const double missed_px = kMissedScales * loss_scale_px;
   std::vector<double> losses, lengths;
   for (const auto& of_track : residuals) {
     for (const Eigen::Vector2d& residual : of_track) {
-      losses.push_back(CauchyLoss(residual, loss_scale_px));
-      if (residual.allFinite()) lengths.push_back(residual.norm());
+      const bool predicted = residual.allFinite();
+      losses.push_back(predicted ? CauchyLoss(residual, loss_scale_px) : missed_px * missed_px);
+      if (predicted) lengths.push_back(residual.norm());
     }
   }
   score.sights = static_cast<int>(losses.size());

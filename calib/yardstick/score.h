@@ -9,9 +9,12 @@
 
 namespace dtr::calib {
 
+/// What a sight that is not predicted counts as: a squared error of so many scales, which the loss
+/// gives to no residual below e^50 scales. A camera fewer is thus no advantage.
+inline constexpr double kMissedScales = 10;
+
 struct YardstickScore {
-  /// Root mean of Cauchy's loss (bundle/held_out.h) over all sights. One that is not predicted
-  /// counts as if it were missed by 100 scales: so whoever has fewer cameras has no smaller error.
+  /// Root mean over all sights of Cauchy's loss (bundle/held_out.h), or of what is missed.
   double error_px = 0;
   double median_px = 0;  ///< residual length of the sights that are predicted; 0 without any
   int sights = 0;        ///< of the yardstick: the same for all cameras

@@ -27,9 +27,9 @@ namespace fs = std::filesystem;
 enum Axis : size_t { kFeatureSize, kFeatures, kMatching, kLensModel, kRefine };
 constexpr const char *kYes = "yes", *kNo = "no";
 constexpr double kMillisecondsPerSecond = 1000;
-// Scale of the loss over the photos' long side: 2 px of 1000. A good calibration of a good lens
-// misses corners by half of that, and what is farther off by many is wrong sights, not cameras.
-constexpr double kLossShare = 0.002;
+// Scale of the loss over the photos' long side: half a pixel of 1000, about what sights err by, so
+// that wrong ones, which err the same by any cameras, do not hide what the cameras do.
+constexpr double kLossShare = 0.0005;
 constexpr double kExact = 1e-9;  // px; what stands for 0 on a logarithmic axis
 
 /// As `dtr build` takes them.
