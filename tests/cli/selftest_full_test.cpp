@@ -20,10 +20,14 @@ TEST(StabilityTable, HoldsWithTheSameBytesForOneThreadAndTwo) {
   bool skipped = false;
   for (const nlohmann::json& row : nlohmann::json::parse(one.out)["rows"]) {
     skipped = skipped || row["skipped"] != "";
-    if (row["skipped"] == "") EXPECT_TRUE(row["passed"]) << row.dump(1);
+    if (row["skipped"] == "") {
+      EXPECT_TRUE(row["passed"]) << row.dump(1);
+    }
   }
   std::ifstream written(page);
-  if (!skipped) EXPECT_EQ(selftest::LinesWithoutValues(written), selftest::DocumentedLines());
+  if (!skipped) {
+    EXPECT_EQ(selftest::LinesWithoutValues(written), selftest::DocumentedLines());
+  }
   const Ran two = Dtr({"selftest", "--stability", "--threads", "2", "--json", "-"});
   EXPECT_EQ(one.out, two.out);
 }
