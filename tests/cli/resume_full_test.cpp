@@ -1,9 +1,13 @@
-// The long forms of resume_test.
-#include "tests/cli/resuming.h"
+// The long forms of resume_test and resume_video_test.
+#include "tests/cli/resuming_video.h"
 
 namespace dtr::testing {
 namespace {
 
+using ::testing::AnyOf;
+using ::testing::Contains;
+using ::testing::IsSubsetOf;
+using ::testing::Key;
 using ResumingLong = FullDisk;
 
 // Twenty moments, each in a run of its own.
@@ -13,8 +17,29 @@ TEST_F(ResumingLong, TwentyRandomKills) {
   }
 }
 
-// So little at a time that every stage is stopped in the middle.
-TEST_F(ResumingLong, FullDiskAtEveryStage) { GrowUntilFinished(24, 10); }
+// So little at a time that every stage is stopped in the middle. Depth maps take the place of what
+// the rounds before them needed: there the disk is filled on the way.
+TEST_F(ResumingLong, FullDiskAtEveryStage) {
+  GrowUntilFinished(24, 10);
+  FillAt("depth");
+  for (const char* stage : {"reading photos", "matching", "consistency round 1", "depth"}) {
+    EXPECT_THAT(stopped_in_, Contains(Key(stage)));
+  }
+  EXPECT_THAT(stopped_in_["reading photos"], Contains("images"));
+  EXPECT_THAT(stopped_in_["matching"], Contains("work"));
+  EXPECT_THAT(stopped_in_["consistency round 1"], Contains("work"));
+  EXPECT_THAT(stopped_in_["depth"], Contains(AnyOf("depth", "sigma")));
+  EXPECT_THAT((std::set<std::string>{"report", "sparse.bin"}), IsSubsetOf(stopped_in_["depth"]));
+}
+
+// The same from the video on. Its set is larger, and every run refines: longer steps.
+TEST_F(VideoBySfm, FullDiskAtEveryStage) {
+  GrowUntilFinished(96, 8);
+  for (const char* stage : {"writing frames", "writing photos", "mapping", "undistorting",
+                            "matching", "consistency round 1", "depth"}) {
+    EXPECT_THAT(stopped_in_, Contains(Key(stage)));
+  }
+}
 
 }  // namespace
 }  // namespace dtr::testing

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <sched.h>
 #include <sys/mount.h>
+#include <sys/statvfs.h>
 
 #include <filesystem>
 #include <string>
@@ -27,6 +28,18 @@ class SmallDisk {
   void Grow(long kib) const {
     const std::string size = "size=" + std::to_string(kib) + "k";
     ASSERT_EQ(mount("tmpfs", folder_.c_str(), "tmpfs", MS_REMOUNT, size.c_str()), 0);
+  }
+
+  /// Leaves less than a page or two, whatever is written meanwhile.
+  void Fill() const {
+    for (int tries = 0; tries < 100; ++tries) {
+      struct statvfs about;
+      ASSERT_EQ(statvfs(folder_.c_str(), &about), 0);
+      const auto used = (about.f_blocks - about.f_bfree) * about.f_frsize;
+      const std::string size = "size=" + std::to_string(used + about.f_frsize);
+      if (mount("tmpfs", folder_.c_str(), "tmpfs", MS_REMOUNT, size.c_str()) == 0) return;
+    }
+    FAIL() << "the disk cannot be filled";
   }
 
  private:

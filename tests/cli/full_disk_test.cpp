@@ -1,0 +1,191 @@
+// A full disk under every command that writes, besides `dtr build` (resume_test): one line says so,
+// what was there stays, and with room the same command makes what it would have made at once.
+#include <gtest/gtest.h>
+#include <sys/statvfs.h>
+
+#include <algorithm>
+#include <sstream>
+
+#include "calib/colmap/model_io.h"
+#include "tests/calib/colmap/fake_colmap.h"
+#include "tests/cli/run_dtr.h"
+#include "tests/cli/small_courtyard.h"
+#include "tests/support/small_disk.h"
+#include "tests/support/test_data.h"
+
+namespace dtr::testing {
+namespace {
+
+namespace fs = std::filesystem;
+
+// A command in a folder of its own.
+struct Command {
+  std::string name;
+  std::string words;  // IN/ is that folder, OF/ that of what is given
+  // A set that lies in the folder already and is replaced.
+  std::string replaces = {};
+  // Bytes that hold times or paths, or are COLMAP's own, differ from run to run.
+  bool repeats = true;
+  // How often too little room must have been met: 1 for a single small file.
+  int least_stops = 2;
+  // Where whole files may appear one by one before all are there.
+  std::string one_by_one = {};
+
+  friend void PrintTo(const Command& command, std::ostream* out) { *out << command.words; }
+};
+
+const Command kCommands[] = {
+    {.name = "capture", .words = "capture OF/courtyard/images -o IN/capture"},
+    {.name = "import",
+     .words = "import --cameras OF/courtyard/cameras.json --images OF/courtyard/images --depth "
+              "OF/courtyard/depth -o IN/set.dtr"},
+    {.name = "join", .words = "join OF/good.dtr OF/good.dtr -o IN/moving.dtr"},
+    {.name = "stereo",
+     .words = "stereo IN/set.dtr --neighbours 2 --round-neighbours 2 --iterations 1 --rounds 1",
+     .replaces = "cameras.dtr"},
+    {.name = "scale",
+     .words = "calibrate scale IN/set.dtr --distance 0000,0006=2m",
+     .replaces = "cameras.dtr"},
+    {.name = "scale_with_depth",
+     .words = "calibrate scale IN/set.dtr --distance 0001,0006=2m",
+     .replaces = "good.dtr"},
+    {.name = "refine", .words = "calibrate refine OF/courtyard/sparse -o IN/refined"},
+    {.name = "calibrate_photos",
+     .words = "calibrate photos OF/courtyard/images -o IN/model",
+     .repeats = false,
+     .one_by_one = "model/"},
+    {.name = "prune",
+     .words =
+         "prune OF/good.dtr -o IN/small.dtr --max-loss-db 1 --probes 2 --checks 2 --renderer cpu",
+     .repeats = false},
+    {.name = "render",
+     .words = "render OF/good.dtr --fly-through 3 -o IN/path --renderer cpu",
+     .one_by_one = "path/"},
+    {.name = "render_video",
+     .words = "render OF/good.dtr --fly-through 3 -o IN/path.mp4 --renderer cpu"},
+    {.name = "export", .words = "export OF/cameras.dtr -o IN/colmap"},
+    {.name = "bench",
+     .words = "bench OF/good.dtr --stage storage --max-points 1 -o IN/bench --renderer cpu",
+     .repeats = false,
+     .one_by_one = "bench/"},
+    {.name = "dataset",
+     .words = "dataset make courtyard --views 3 --width 96 --height 64 -o IN/made"},
+    {.name = "inspect", .words = "inspect OF/good.dtr -o IN/report.html", .least_stops = 1},
+    {.name = "advise", .words = "advise OF/good.dtr -o IN/advice.html", .least_stops = 1},
+    {.name = "json",
+     .words = "info OF/good.dtr --json IN/info.json",
+     .repeats = false,
+     .least_stops = 1},
+};
+
+class FullDiskOf : public ::testing::TestWithParam<Command> {
+ protected:
+  static void SetUpTestSuite() {
+    shared_ = new TemporaryFolder;
+    MakeSmallCourtyard(*shared_ / "courtyard");
+    ImportSmallCourtyard(*shared_ / "courtyard", *shared_ / "good.dtr");
+    DtrOk({"build", Of() + "courtyard/images", "-o", Of() + "cameras.dtr", "--poses",
+           Of() + "courtyard/sparse", "--engine", "none"});
+  }
+  static void TearDownTestSuite() { delete shared_; }
+  static std::string Of() { return shared_->path().string() + "/"; }
+
+  void SetUp() override {
+    calib::SfmModel model = colmap::ReadModel(Of() + "courtyard/sparse");
+    colmap_.LeaveDatabase(NumberImages(model));
+    colmap::WriteModel(colmap_ / "model.0", model, colmap::Format::kBinary);
+  }
+  std::vector<std::string> In(const fs::path& folder) const {
+    std::vector<std::string> words;
+    std::istringstream stream(GetParam().words + " --threads 1");
+    for (std::string word; stream >> word;) {
+      if (word.starts_with("IN/")) word = (folder / word.substr(3)).string();
+      if (word.starts_with("OF/")) word = Of() + word.substr(3);
+      words.push_back(word);
+    }
+    return words;
+  }
+  void Prepare(const fs::path& folder) const {
+    fs::create_directories(folder);
+    const std::string& set = GetParam().replaces;
+    if (!set.empty()) fs::copy(Of() + set, folder / "set.dtr", fs::copy_options::recursive);
+  }
+  // What lies in a folder; a set's record of times is left out.
+  static std::map<std::string, std::string> All(const fs::path& folder) {
+    std::map<std::string, std::string> all = Contents(folder);
+    std::erase_if(all, [](const auto& item) { return item.first.ends_with("/report/run.json"); });
+    return all;
+  }
+  // Of it what bears its own name: work in progress is left out.
+  static std::map<std::string, std::string> Whole(const fs::path& folder) {
+    std::map<std::string, std::string> whole = All(folder);
+    std::erase_if(
+        whole, [](const auto& item) { return item.first.find(".partial/") != std::string::npos; });
+    return whole;
+  }
+  // What was there is as it was; what is new is allowed to be, and whole.
+  static void ExpectNothingLostOrHalf(const std::map<std::string, std::string>& before,
+                                      const std::map<std::string, std::string>& expected,
+                                      const std::map<std::string, std::string>& now) {
+    for (const std::string& name : DifferingFiles(before, now)) {
+      const std::string& place = GetParam().one_by_one;
+      const bool allowed = !place.empty() && name.starts_with(place);
+      EXPECT_TRUE(allowed) << name;
+      if (!allowed || !GetParam().repeats) continue;
+      const auto whole = expected.find(name), found = now.find(name);
+      EXPECT_TRUE(whole != expected.end() && found != now.end() && *whole == *found) << name;
+    }
+  }
+
+  static inline TemporaryFolder* shared_ = nullptr;
+  colmap::testing::FakeColmap colmap_;
+  TemporaryFolder folder_;
+};
+
+long UsedKib(const fs::path& disk) {
+  struct statvfs about;
+  EXPECT_EQ(statvfs(disk.c_str(), &about), 0);
+  return static_cast<long>((about.f_blocks - about.f_bfree) * about.f_frsize / 1024);
+}
+
+// Room in KiB beside what lies there from the start; a disk of none would be one without a limit.
+constexpr long kRooms[] = {4, 16, 40, 100, 200, 400, 800, 1600, 64000};
+
+TEST_P(FullDiskOf, IsSaidInOneLineLosesNothingAndRoomMakesItWhole) {
+  const fs::path plain = folder_ / "plain", full = folder_ / "disk";
+  const SmallDisk disk(full);
+  if (!disk.mounted()) GTEST_SKIP() << "SKIPPED: no file system can be mounted here";
+  disk.Grow(kRooms[std::size(kRooms) - 1]);
+  Prepare(plain);
+  Prepare(full);
+  DtrOk(In(plain));
+  const auto expected = All(plain);
+  const auto before = Whole(full);
+  const long used_kib = UsedKib(full);
+  int stops = 0;
+  for (const long room_kib : kRooms) {
+    disk.Grow(std::max(used_kib + room_kib, UsedKib(full)));
+    const Ran ran = Dtr(In(full));
+    if (ran.code == 0) break;
+    ++stops;
+    ExpectRefused(ran, kFailed, "No space left on device");
+    ExpectNothingLostOrHalf(before, expected, Whole(full));
+  }
+  EXPECT_GE(stops, GetParam().least_stops);
+  const auto found = All(full);
+  if (GetParam().repeats) {
+    EXPECT_THAT(DifferingFiles(expected, found), ::testing::IsEmpty());
+  }
+  const auto names = [](const auto& contents) {
+    std::vector<std::string> list;
+    for (const auto& [name, content] : contents) list.push_back(name);
+    return list;
+  };
+  EXPECT_EQ(names(found), names(expected));
+}
+
+INSTANTIATE_TEST_SUITE_P(, FullDiskOf, ::testing::ValuesIn(kCommands),
+                         [](const auto& tested) { return tested.param.name; });
+
+}  // namespace
+}  // namespace dtr::testing
