@@ -18,7 +18,8 @@ TEST(StabilityTable, HoldsWithTheSameBytesForOneThreadAndTwo) {
   const Ran one = Dtr({"selftest", "--stability", "--threads", "1", "--json", "-", "-o", page});
   EXPECT_EQ(one.code, 0) << one.err;
   bool skipped = false;
-  for (const nlohmann::json& row : nlohmann::json::parse(one.out)["rows"]) {
+  const nlohmann::json table = nlohmann::json::parse(one.out);
+  for (const nlohmann::json& row : table["rows"]) {
     skipped = skipped || row["skipped"] != "";
     if (row["skipped"] == "") {
       EXPECT_TRUE(row["passed"]) << row.dump(1);
@@ -37,7 +38,8 @@ TEST(StabilityTable, WithoutOpenGlItsCasesAreNamedAsSkipped) {
   const Ran ran = Dtr({"selftest", "--json", "-"});
   EXPECT_EQ(ran.code, 0) << ran.err;
   int skipped = 0;
-  for (const nlohmann::json& row : nlohmann::json::parse(ran.out)["rows"]) {
+  const nlohmann::json table = nlohmann::json::parse(ran.out);
+  for (const nlohmann::json& row : table["rows"]) {
     if (row["stage"] != "Rendering, gl") continue;
     EXPECT_TRUE(row["passed"].is_null());
     EXPECT_NE(row["skipped"], "");
