@@ -1,5 +1,7 @@
 #include "cli/pipeline/prune_journal.h"
 
+#include <fmt/format.h>
+
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -30,9 +32,15 @@ PruneJournal::PruneJournal(const std::filesystem::path& file) : file_(file) {
   AppendDurably(file, "");  // what cannot be written is said before any work
 }
 
-std::optional<std::vector<double>> PruneJournal::Find(const std::string& name) const {
+std::optional<std::vector<double>> PruneJournal::Find(const std::string& name, size_t least) const {
   const auto found = known_.find(name);
-  return found == known_.end() ? std::nullopt : std::optional(found->second);
+  if (found == known_.end()) return std::nullopt;
+  if (found->second.size() < least) {
+    throw Error(
+        fmt::format("{}: {}: expected {} numbers, found {}; delete the folder to start over",
+                    file_.string(), name, least, found->second.size()));
+  }
+  return found->second;
 }
 
 void PruneJournal::Add(const std::string& name, const std::vector<double>& numbers) {

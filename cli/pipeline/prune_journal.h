@@ -16,7 +16,7 @@ class PruneJournal : public prune::Journal {
   /// Reads what is there. Throws Error where the file cannot be written or is none of ours.
   explicit PruneJournal(const std::filesystem::path& file);
 
-  std::optional<std::vector<double>> Find(const std::string& name) const override;
+  std::optional<std::vector<double>> Find(const std::string& name, size_t least) const override;
   void Add(const std::string& name, const std::vector<double>& numbers) override;
 
  private:

@@ -179,7 +179,7 @@ eval::Times FrameOf(const DtrSet& set, const std::vector<NovelCamera>& cameras,
 eval::Times FrameBefore(const PruneSetOptions& options, const DtrSet& set,
                         const std::vector<NovelCamera>& cameras, PruneJournal& journal) {
   const std::string name = "frame before";
-  auto times = journal.Find(name);
+  auto times = journal.Find(name, 2);
   if (!times) {
     RenderOptions render = options.prune.render;
     render.threads = options.threads;

@@ -4,18 +4,16 @@
 
 #include <algorithm>
 #include <atomic>
-#include <charconv>
 #include <functional>
 #include <map>
 #include <optional>
-#include <sstream>
 
 #include "calib/boards/repeats.h"
 #include "capture/ingest.h"
 #include "capture/video/frames.h"
 #include "cli/pipeline/rig_names.h"
+#include "cli/pipeline/rig_timestamps.h"
 #include "dtr/base/error.h"
-#include "dtr/base/files.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/io/image_io.h"
 
@@ -24,7 +22,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uintmax_t kLargestTableBytes = 64u << 20;
 constexpr size_t kFramesAtOnce = 16;  // of a video, in memory
 
 // One photo, or one frame of a video, and what was found in it.
@@ -121,54 +118,10 @@ Layout FromNames(const std::vector<fs::path>& photos) {
   return layout;
 }
 
-std::optional<int> IntFrom(const std::string& word) {
-  int value = 0;
-  const auto [end, failure] = std::from_chars(word.data(), word.data() + word.size(), value);
-  if (failure != std::errc() || end != word.data() + word.size() || value < 0) return {};
-  return value;
-}
-
-// Which frame of which camera belongs to which instant.
-using Instants = std::map<std::pair<int, int>, int>;  // (cam_id, frame_index) -> sync_index
-
-Instants ReadTimestamps(const fs::path& file) {
-  std::istringstream lines(ReadFile(file, kLargestTableBytes));
-  Instants instants;
-  std::string line;
-  std::map<std::string, size_t> columns;
-  for (int number = 1; std::getline(lines, line); ++number) {
-    if (!line.empty() && line.back() == '\r') line.pop_back();
-    if (line.empty()) continue;
-    std::vector<std::string> words;
-    std::istringstream parts(line);
-    for (std::string word; std::getline(parts, word, ',');) words.push_back(word);
-    if (columns.empty()) {
-      for (size_t i = 0; i < words.size(); ++i) columns[words[i]] = i;
-      for (const char* name : {"sync_index", "cam_id", "frame_index"}) {
-        if (!columns.contains(name)) {
-          throw Error(fmt::format("{}: expected a column {}, found none", file.string(), name));
-        }
-      }
-      continue;
-    }
-    const auto value = [&](const char* name) {
-      const size_t at = columns[name];
-      const auto number_found = at < words.size() ? IntFrom(words[at]) : std::nullopt;
-      if (!number_found) {
-        throw Error(
-            fmt::format("{}: line {}: {}: expected a whole number", file.string(), number, name));
-      }
-      return *number_found;
-    };
-    instants[{value("cam_id"), value("frame_index")}] = value("sync_index");
-  }
-  return instants;
-}
-
 // Of one camera: which frame of its video belongs to which instant. A table that has as many rows
 // as the video has frames is a table of them in order, though it may count them from another start:
 // recorders number from when a camera began.
-std::map<int, int> InstantsOf(const Instants& instants, int camera, int frames) {
+std::map<int, int> InstantsOf(const RigInstants& instants, int camera, int frames) {
   std::map<int, int> own;
   for (const auto& [key, instant] : instants) {
     if (key.first == camera) own.emplace(key.second, instant);
@@ -183,12 +136,12 @@ std::map<int, int> InstantsOf(const Instants& instants, int camera, int frames) 
 
 Layout FromVideos(const fs::path& folder, const std::vector<fs::path>& videos) {
   Layout layout;
-  Instants instants;
+  RigInstants instants;
   const bool timed = fs::exists(folder / "timestamps.csv");
-  if (timed) instants = ReadTimestamps(folder / "timestamps.csv");
+  if (timed) instants = ReadRigTimestamps(folder / "timestamps.csv");
   for (const fs::path& video : videos) {
     const std::string name = video.stem().string();
-    const auto id = IntFrom(DigitsAtEnd(name));
+    const auto id = WholeNumber(DigitsAtEnd(name));
     if (timed && !id) {
       throw Error(
           fmt::format("{}: expected a number at the end of the name, the cam_id of "

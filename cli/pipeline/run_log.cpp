@@ -5,6 +5,8 @@
 #include <utility>
 
 #include "dtr/base/machine.h"
+#include "dtr/base/process.h"
+#include "dtr/io/formats/utf8.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -19,6 +21,18 @@ double CpuSeconds() {
     }
   }
   return seconds;
+}
+
+// As JSON can hold it: names of files may be any bytes.
+std::vector<std::string> CommandLineInUtf8() {
+  std::vector<std::string> words = CommandLine();
+  for (std::string& word : words) {
+    if (io::IsUtf8(word)) continue;
+    for (char& c : word) {
+      if (static_cast<unsigned char>(c) >= 0x80) c = '?';
+    }
+  }
+  return words;
 }
 
 }  // namespace
@@ -42,6 +56,7 @@ void RunLog::End() {
 
 io::RunRecord RunLog::Record(int threads, std::vector<std::string> lines) const {
   io::RunRecord record;
+  record.command = CommandLineInUtf8();
   record.stages = stages_;
   record.threads = threads;
   record.log = std::move(lines);

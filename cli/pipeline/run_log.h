@@ -16,7 +16,8 @@ class RunLog {
   /// Ends the running stage.
   void End();
   const std::vector<io::RunStage>& stages() const { return stages_; }
-  /// The record of the run, with these lines, to be written by io::WriteRunRecord.
+  /// The record of the run (its command line is this program's), with these lines, to be written
+  /// by io::WriteRunRecord.
   io::RunRecord Record(int threads, std::vector<std::string> lines = {}) const;
 
  private:

@@ -16,6 +16,12 @@ double NumberOr0(const Json& object, const char* name) {
   return found != object.end() && found->is_number() ? found->get<double>() : 0;
 }
 
+// A number that no machine can hold is none.
+long KibOr0(const Json& object, const char* name) {
+  const double kib = NumberOr0(object, name);
+  return kib >= 0 && kib <= 1e15 ? static_cast<long>(kib) : 0;
+}
+
 }  // namespace
 
 std::vector<RunStage> ReadRunStages(const std::filesystem::path& set_folder) {
@@ -34,7 +40,7 @@ std::vector<RunStage> ReadRunStages(const std::filesystem::path& set_folder) {
     const auto name = stage.find("name");
     stages.push_back({name != stage.end() && name->is_string() ? name->get<std::string>() : "",
                       NumberOr0(stage, "wall_s"), NumberOr0(stage, "cpu_s"),
-                      static_cast<long>(NumberOr0(stage, "peak_rss_kib"))});
+                      KibOr0(stage, "peak_rss_kib")});
   }
   return stages;
 }

@@ -24,10 +24,10 @@ void CountSeen(const Mask& coverage, Place& place) {
 
 }  // namespace
 
-std::vector<double> Measurer::Numbers(const std::string& name,
+std::vector<double> Measurer::Numbers(const std::string& name, size_t least,
                                       const std::function<std::vector<double>()>& measure) {
   progress_.ThrowIfInterrupted();
-  if (auto found = journal_.Find(name)) {
+  if (auto found = journal_.Find(name, least)) {
     found_ += !prepared_;
     return *found;
   }
@@ -82,7 +82,7 @@ double Measurer::BytesOf(const Setting& setting, const CodedSet& coded) const {
 }
 
 double Measurer::BytesOf(const Setting& setting) {
-  return Numbers("bytes " + KeyOf(setting), [&] {
+  return Numbers("bytes " + KeyOf(setting), 1, [&] {
     return std::vector<double>{BytesOf(setting, *CodedAs(setting.coding))};
   })[0];
 }
@@ -121,7 +121,7 @@ std::vector<ImageRgb8> Measurer::PicturesOf(const Setting& setting, const Coded&
 Errors Measurer::AtPhotos(const std::string& what, const Looks& looks, Setting setting) {
   // Tiles lean on the very views that are left out here; from between the cameras they are judged.
   setting.coding.tiles.clear();
-  const auto numbers = Numbers(what + " " + KeyOf(setting), [&] {
+  const auto numbers = Numbers(what + " " + KeyOf(setting), 5, [&] {
     Prepare();
     const Errors errors = CompareWithPhotos(looks.places, looks.before,
                                             PicturesOf(setting, CodedAs(setting.coding), looks));
@@ -154,7 +154,7 @@ std::vector<double> Measurer::NovelLossesDb(Looks& looks, const Setting& setting
 
 Measured Measurer::Measure(const Setting& setting) {
   const Errors errors = AtPhotos("photos", deciding_, setting);
-  const auto numbers = Numbers("loss " + KeyOf(setting), [&] {
+  const auto numbers = Numbers("loss " + KeyOf(setting), 2, [&] {
     Prepare();
     const Errors with_all = AtPhotos("photos", deciding_, WithNothingRemoved(setting));
     const double novel_loss_db = MeanOf(NovelLossesDb(deciding_novel_, setting, with_all));
@@ -166,7 +166,7 @@ Measured Measurer::Measure(const Setting& setting) {
 
 Check Measurer::CheckOf(const Setting& setting) {
   const Errors errors = AtPhotos("witnesses", witnesses_, setting);
-  const auto numbers = Numbers("check " + KeyOf(setting), [&] {
+  const auto numbers = Numbers("check " + KeyOf(setting), 2, [&] {
     Prepare();
     const Errors with_all = AtPhotos("witnesses", witnesses_, WithNothingRemoved(setting));
     const auto losses_db = NovelLossesDb(checking_, setting, with_all);

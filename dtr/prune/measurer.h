@@ -18,7 +18,8 @@ namespace dtr::prune {
 class Journal {
  public:
   virtual ~Journal() = default;
-  virtual std::optional<std::vector<double>> Find(const std::string& name) const = 0;
+  /// At least `least` numbers, or none. Throws Error where fewer were kept: another program's.
+  virtual std::optional<std::vector<double>> Find(const std::string& name, size_t least) const = 0;
   virtual void Add(const std::string& name, const std::vector<double>& numbers) = 0;
 };
 
@@ -83,8 +84,8 @@ class Measurer {
     /// By KeyOf, with nothing removed: of the last settings.
     std::deque<std::pair<std::string, std::vector<ImageRgb8>>> kept;
   };
-  /// From the journal, else by `measure`.
-  std::vector<double> Numbers(const std::string& name,
+  /// From the journal, else by `measure`; `least`: how many it gives at least.
+  std::vector<double> Numbers(const std::string& name, size_t least,
                               const std::function<std::vector<double>()>& measure);
   const eval::RenderFunction& RendererFor(const Coded& coded);
   Coded CodedAs(const Coding& coding);

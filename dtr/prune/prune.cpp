@@ -36,7 +36,7 @@ struct Candidate {
 /// What was measured once is not measured again.
 class OwnJournal : public Journal {
  public:
-  std::optional<std::vector<double>> Find(const std::string& name) const override {
+  std::optional<std::vector<double>> Find(const std::string& name, size_t) const override {
     const auto found = known_.find(name);
     return found == known_.end() ? std::nullopt : std::optional(found->second);
   }

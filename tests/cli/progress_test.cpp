@@ -39,6 +39,12 @@ TEST_F(ProgressTold, TheMemoryOfColmapIsCounted) {
   EXPECT_GE(std::stod(told[1]), kLeastMib);
   const auto record = nlohmann::json::parse(Text(In("set.dtr") + "/report/run.json"));
   EXPECT_GE(record["stages"].back()["peak_rss_kib"], kLeastMib * 1024);
+  const std::vector<std::string> arguments = {"build",       Photos(),   "-o",
+                                              In("set.dtr"), "--engine", "none"};
+  std::vector<std::string> recorded = record["command"];
+  ASSERT_FALSE(recorded.empty());
+  recorded.erase(recorded.begin());  // the program
+  EXPECT_EQ(recorded, arguments);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "tests/cli/run_dtr.h"
 #include "tests/cli/small_courtyard.h"
@@ -135,8 +136,20 @@ TEST_F(Pruning, RefusesMeasurementsThatAreNone) {
   const fs::path journal = folder_ / "cut.dtr.partial/work/measured.jsonl";
   (void)Dtr(arguments, {SIGINT, [&] { return fs::exists(journal) && fs::file_size(journal) > 0; }});
   ASSERT_TRUE(fs::exists(journal));
+  const std::string kept = Text(journal);
   std::ofstream(journal, std::ios::app) << "no measurement\n";
   ExpectRefused(Dtr(arguments), 1, "expected measurements of dtr prune, found");
+
+  // The names are right, the numbers are gone.
+  std::string emptied;
+  std::istringstream lines(kept);
+  for (std::string line; std::getline(lines, line);) {
+    Json entry = Json::parse(line);
+    entry["numbers"] = Json::array();
+    emptied += entry.dump() + "\n";
+  }
+  std::ofstream(journal) << emptied;
+  ExpectRefused(Dtr(arguments), 1, "numbers, found 0; delete the folder to start over");
 }
 
 TEST_F(Pruning, RefusesASetWithoutDepth) {

@@ -348,12 +348,14 @@ TEST_F(Refusals, BoardsAndRigsThatCannotBe) {
                                      "chessboard:9x6:25mm"});
     return further;
   };
-  const std::string names = Folder("names"), table = Folder("table"), number = Folder("number");
-  for (const std::string& folder : {names, table, number}) {
+  const std::string names = Folder("names"), table = Folder("table"), number = Folder("number"),
+                    empty = Folder("empty");
+  for (const std::string& folder : {names, table, number, empty}) {
     WriteFileAtomically(folder + "/left.avi", "x");
     WriteFileAtomically(folder + "/right.avi", "x");
   }
   Write("table/timestamps.csv", "time,camera\n1,2\n");
+  Write("empty/timestamps.csv", "");
   Write("names/timestamps.csv", "sync_index,cam_id,frame_index\n0,0,0\n");
   Write("number/timestamps.csv", "sync_index,cam_id,frame_index\n0,first,0\n");
   ExpectAllRefused({
@@ -366,6 +368,7 @@ TEST_F(Refusals, BoardsAndRigsThatCannotBe) {
        board("charuco:9x6:25mm:10mm:DICT_9")},
       {kWrongUsage, "--camera left: expected NAME=FILE", rig(names, {"--camera", "left"})},
       {kFailed, "timestamps.csv: expected a column sync_index, found none", rig(table)},
+      {kFailed, "timestamps.csv: expected a column sync_index, found none", rig(empty)},
       {kFailed, "timestamps.csv: line 2: cam_id: expected a whole number", rig(number)},
       {kFailed, "expected a number at the end of the name, the cam_id of timestamps.csv",
        rig(names)},

@@ -29,6 +29,7 @@ std::span<const ReaderKind> SetReaders();     ///< sets, their depth, meshes and
 std::span<const ReaderKind> CameraReaders();  ///< lists of cameras and float maps of other programs
 std::span<const ReaderKind> ColmapReaders();  ///< COLMAP's models, depth maps and database
 std::span<const ReaderKind> CalibReaders();   ///< calibrations, captures, working files
+std::span<const ReaderKind> WorkReaders();    ///< what a run leaves for the next one
 std::span<const ReaderKind> ImageReaders();   ///< photos and masks, as far as they are ours
 std::vector<ReaderKind> AllReaders();
 

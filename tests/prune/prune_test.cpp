@@ -256,7 +256,7 @@ TEST(Prune, DecidesTheSameForAnyNumberOfThreads) {
 class Notes : public Journal {
  public:
   explicit Notes(int left) : left_(left) {}
-  std::optional<std::vector<double>> Find(const std::string& name) const override {
+  std::optional<std::vector<double>> Find(const std::string& name, size_t) const override {
     const auto found = numbers.find(name);
     return found == numbers.end() ? std::nullopt : std::optional(found->second);
   }
@@ -319,12 +319,12 @@ TEST(Prune, EveryCauseOfLossIsLogged) {
 class JpegFailsTheCheck : public Notes {
  public:
   using Notes::Notes;
-  std::optional<std::vector<double>> Find(const std::string& name) const override {
+  std::optional<std::vector<double>> Find(const std::string& name, size_t least) const override {
     // "check IDS QUALITY ..." (KeyOf)
     std::istringstream words(name.starts_with("check ") ? name.substr(name.find(' ', 6)) : "0");
     int quality = 0;
     words >> quality;
-    return quality > 0 ? std::optional(std::vector<double>{100, 0}) : Notes::Find(name);
+    return quality > 0 ? std::optional(std::vector<double>{100, 0}) : Notes::Find(name, least);
   }
 };
 

@@ -1,0 +1,79 @@
+// What a run leaves for the next one, and for reports. Ours, but on disks that others write to.
+#include "cli/pipeline/prune_journal.h"
+#include "cli/pipeline/rig_timestamps.h"
+#include "cli/sweep_store.h"
+#include "dtr/base/error.h"
+#include "dtr/base/files.h"
+#include "dtr/io/run_record.h"
+#include "dtr/io/set_io.h"
+#include "tests/fuzz/readers.h"
+
+namespace dtr::fuzz {
+namespace {
+
+namespace fs = std::filesystem;
+constexpr std::uintmax_t kSeedLimitBytes = 1 << 20;
+
+Reader OpenRunRecord(const fs::path& folder) {
+  const fs::path file = folder / "report" / "run.json";
+  fs::create_directories(file.parent_path());
+  return {file,
+          {R"({"stages": [{"name": "depth", "wall_s": 2.5, "cpu_s": 4.75, "peak_rss_kib": 90000},
+                          {"name": "report"}, 7], "host": {"cores": 2}})"},
+          [=] { io::ReadRunStages(folder); }};
+}
+
+Reader OpenPruneJournal(const fs::path& folder) {
+  const fs::path file = folder / "measured.jsonl";
+  pipeline::PruneJournal journal(file);
+  journal.Add("frame before", {4.25, 0.5});
+  journal.Add("bytes 1 0 1", {1e6});
+  return {file, {ReadFile(file, kSeedLimitBytes)}, [=] {
+            const pipeline::PruneJournal read(file);
+            // A last line without an end is passed over: files of nothing else would crowd out the
+            // rest.
+            const bool frame = read.Find("frame before", 2).has_value();
+            const bool bytes = read.Find("bytes 1 0 1", 1).has_value();
+            if (!frame && !bytes) throw Error("nothing to go on from");
+          }};
+}
+
+Reader OpenSweep(const fs::path& folder) {
+  const fs::path file = folder / "work.json";
+  const eval::SweepStage stage;
+  eval::SweepMeasurement measured;
+  measured.cost = 3;
+  measured.cost_least = 2;
+  measured.cost_most = 4;
+  measured.error = 0.25;
+  measured.psnr_db = 30;
+  measured.figures["views"] = 7;
+  cli::SweepFile sweep(file);
+  sweep.Of(stage, "conditions")->Keep({}, measured);
+  return {file, {ReadFile(file, kSeedLimitBytes)}, [=] {
+            // What was taken can be kept beside something new.
+            cli::SweepFile read(file);
+            read.Of(stage, "others")->Keep({}, measured);
+          }};
+}
+
+Reader OpenTimestamps(const fs::path& folder) {
+  const fs::path file = folder / "timestamps.csv";
+  return {file,
+          {"sync_index,cam_id,frame_index\n0,0,0\n0,1,2\n1,0,1\n1,1,3\n",
+           "frame_index,cam_id,seconds,sync_index\r\n12,0,0.25,0\r\n13,0,0.5,1\r\n"},
+          [=] { pipeline::ReadRigTimestamps(file); }};
+}
+
+constexpr ReaderKind kReaders[] = {
+    {"run-record", OpenRunRecord},
+    {"prune-journal", OpenPruneJournal},
+    {"sweep", OpenSweep},
+    {"rig-timestamps", OpenTimestamps},
+};
+
+}  // namespace
+
+std::span<const ReaderKind> WorkReaders() { return kReaders; }
+
+}  // namespace dtr::fuzz
