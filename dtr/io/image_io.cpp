@@ -135,6 +135,10 @@ std::string EncodeJpeg(const ImageRgb8& image, int quality, ImageSpec spec) {
   return EncodeImage(".jpg", spec, TypeDesc::UINT8, image.data().data());
 }
 
+bool IsCmyk(const ImageSpec& spec) {
+  return spec.get_string_attribute("jpeg:ColorSpace") == "CMYK";
+}
+
 }  // namespace
 
 ImageHeader ReadImageHeader(const fs::path& file) {
@@ -143,7 +147,8 @@ ImageHeader ReadImageHeader(const fs::path& file) {
   ImageHeader header;
   header.width_px = spec.width;
   header.height_px = spec.height;
-  header.channels = spec.nchannels;
+  // OpenImageIO tells the channels that it will convert a CMYK JPEG to, not those of the file.
+  header.channels = IsCmyk(spec) ? 4 : spec.nchannels;
   header.bits =
       spec.get_int_attribute("oiio:BitsPerSample", static_cast<int>(spec.format.size() * 8));
   header.is_float = IsFloat(spec.format);
@@ -162,9 +167,8 @@ ImageHeader ReadImageHeader(const fs::path& file) {
 
 ImageRgb8 ReadImage(const fs::path& file, const ImageReadOptions& options) {
   const auto in = OpenImage(file, options.limit_px);
-  const bool cmyk = in->spec().get_string_attribute("jpeg:ColorSpace") == "CMYK";
   std::optional<Grid<std::uint8_t>> plain;
-  if (cmyk) plain = ReadPlainCmykJpeg(file);
+  if (IsCmyk(in->spec())) plain = ReadPlainCmykJpeg(file);
   Grid<std::uint8_t> pixels = plain ? std::move(*plain) : ReadColours(*in, file);
   if (pixels.channels() == 1) pixels = RgbFromGrey(pixels);
   if (!options.apply_exif_orientation) return pixels;
