@@ -54,14 +54,19 @@ std::vector<SmallFeatures> FeaturesOfFiles(std::span<const std::filesystem::path
   return features;
 }
 
-// The indices of the largest scores, ties to the lower index; zero scores never.
-std::vector<size_t> TopIndices(const std::vector<int>& scores) {
+// The indices of scores above 0, the largest first, ties to the lower index.
+std::vector<size_t> ByScore(const std::vector<int>& scores) {
   std::vector<size_t> order(scores.size());
   std::iota(order.begin(), order.end(), size_t{0});
   std::stable_sort(order.begin(), order.end(),
                    [&](size_t a, size_t b) { return scores[a] > scores[b]; });
-  order.resize(std::min<size_t>(order.size(), kNeighbours));
   std::erase_if(order, [&](size_t i) { return scores[i] <= 0; });
+  return order;
+}
+
+// The first of an order, by index.
+std::vector<size_t> First(std::vector<size_t> order, size_t count) {
+  order.resize(std::min(order.size(), count));
   std::sort(order.begin(), order.end());
   return order;
 }
@@ -109,6 +114,25 @@ int Resemblance(const SmallFeatures& a, const SmallFeatures& b) {
   return shared;
 }
 
+std::vector<size_t> Partners(const std::vector<int>& scores) {
+  std::vector<size_t> order = ByScore(scores);
+  const auto sure = static_cast<size_t>(
+      std::count_if(order.begin(), order.end(), [&](size_t i) { return scores[i] >= kSure; }));
+  if (sure > kNeighbours) {
+    // The ranks grow by one factor from the last of the nearest to the last sure one, by 1 at
+    // least.
+    constexpr int kFar = kNeighbours - kNearest;
+    const double factor = std::pow(static_cast<double>(sure) / kNearest, 1.0 / kFar);
+    size_t last = kNearest - 1;
+    for (int k = 1; k <= kFar; ++k) {
+      const auto rank = static_cast<size_t>(std::lround(kNearest * std::pow(factor, k))) - 1;
+      last = std::clamp(rank, last + 1, sure - 1 - static_cast<size_t>(kFar - k));
+      order[static_cast<size_t>(kNearest + k - 1)] = order[last];
+    }
+  }
+  return First(std::move(order), kNeighbours);
+}
+
 std::vector<std::pair<size_t, size_t>> PreselectPairs(std::span<const std::filesystem::path> files,
                                                       int threads, Progress& progress) {
   const auto features = FeaturesOfFiles(files, threads, &progress);
@@ -128,7 +152,7 @@ std::vector<std::pair<size_t, size_t>> PreselectPairs(std::span<const std::files
   std::set<std::pair<size_t, size_t>> pairs;
   for (size_t a = 0; a < count; ++a) {
     if (a + 1 < count) pairs.emplace(a, a + 1);
-    for (const size_t b : TopIndices(scores[a])) pairs.emplace(std::min(a, b), std::max(a, b));
+    for (const size_t b : Partners(scores[a])) pairs.emplace(std::min(a, b), std::max(a, b));
   }
   return {pairs.begin(), pairs.end()};
 }
@@ -139,7 +163,7 @@ std::vector<size_t> MostResembling(const std::filesystem::path& photo,
   const auto features = FeaturesOfFiles(files, threads, nullptr);
   std::vector<int> scores;
   for (const SmallFeatures& other : features) scores.push_back(Resemblance(own, other));
-  return TopIndices(scores);
+  return First(ByScore(scores), kNeighbours);
 }
 
 }  // namespace dtr::colmap

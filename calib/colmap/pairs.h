@@ -28,8 +28,18 @@ SmallFeatures SmallFeaturesOf(const ImageRgb8& image);
 /// share. Symmetric.
 int Resemblance(const SmallFeatures& a, const SmallFeatures& b);
 
-/// Pairs (a < b, sorted) worth matching in full: every photo with its kNeighbours most resembling
-/// ones and with the next in order, so that a chain through poor photos is not cut.
+/// Of those a photo resembles surely (kSure shared features or more) the kNearest most resembling
+/// are kept, and the rest of the kNeighbours from among all others, spread geometrically by rank:
+/// in a dense capture the most resembling alone are all next to each other, and baselines as short
+/// as that give no pair to start a model from and let it drift.
+inline constexpr int kNearest = 12, kSure = 20;
+
+/// Indices (sorted) of at most kNeighbours photos to match with, by how much each is resembled;
+/// scores of 0 never. Ties go to the lower index.
+std::vector<size_t> Partners(const std::vector<int>& scores);
+
+/// Pairs (a < b, sorted) worth matching in full: every photo with its Partners and with the next in
+/// order, so that a chain through poor photos is not cut.
 /// Deterministic for any number of threads. Throws Error when a photo cannot be read.
 std::vector<std::pair<size_t, size_t>> PreselectPairs(std::span<const std::filesystem::path> files,
                                                       int threads, Progress& progress);

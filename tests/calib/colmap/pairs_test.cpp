@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <numeric>
 
 #include "calib/colmap/matching.h"
 #include "dtr/base/error.h"
@@ -60,6 +61,29 @@ TEST(PreselectPairs, KeepsTheChainAndIsTheSameForAnyNumberOfThreads) {
   EXPECT_FALSE(has(2, 4));  // which has no other partners
   WriteFileAtomically(folder / "blank.png", "no image");
   EXPECT_THROW(PreselectPairs(files, 2, silent), Error);
+}
+
+TEST(Partners, AreTheMostResemblingWhereFewAre) {
+  std::vector<int> scores(40, 0);
+  for (size_t i = 0; i < 30; ++i) scores[i] = i < 20 ? 30 : 10;  // 20 surely, 10 perhaps
+  std::vector<size_t> expected(kNeighbours);
+  std::iota(expected.begin(), expected.end(), size_t{0});
+  EXPECT_EQ(Partners(scores), expected);
+  scores.assign(40, 0);
+  scores[7] = 1;
+  EXPECT_EQ(Partners(scores), std::vector<size_t>{7});
+}
+
+TEST(Partners, OfADenseCaptureReachAsFarAsResemblanceDoes) {
+  for (const size_t sure : {21, 25, 60, 250}) {
+    std::vector<int> scores(300, 1);
+    for (size_t i = 0; i < sure; ++i) scores[i] = static_cast<int>(1000 - i);
+    const auto partners = Partners(scores);
+    ASSERT_EQ(partners.size(), static_cast<size_t>(kNeighbours));
+    for (size_t i = 0; i < kNearest; ++i) EXPECT_EQ(partners[i], i);
+    for (size_t i = kNearest; i < partners.size(); ++i) EXPECT_GT(partners[i], partners[i - 1]);
+    EXPECT_EQ(partners.back(), sure - 1);
+  }
 }
 
 TEST(ResolveMatching, PreselectsBeyondTheExhaustiveLimit) {
