@@ -58,9 +58,11 @@ void AddBuildCommand(CLI::App& app) {
             ->type_name("every:N|NAME,...");
         command.add_flag("--holdout-strict", options->holdout_strict,
                          "Keep them out of SfM too and register them afterwards");
-        AddDepthOptions(command, {"sgbm", "patchmatch", "colmap", "none"},
-                        "Long side 800, 1024 or full size, and work spent on depth [balanced]",
-                        options->depth);
+        AddDepthOptions(
+            command, {"sgbm", "patchmatch", "colmap", "none"},
+            "Long side 800, 1024 or full size, and work spent on depth and, with fast, on "
+            "cameras (--features 4096) [balanced]",
+            options->depth);
         command
             .add_option("--max-size", options->max_size_px,
                         "Long side of the set's images; 0 = full size; overrides the preset")
@@ -90,7 +92,11 @@ void AddBuildCommand(CLI::App& app) {
                         "Of an interrupted build: do this stage and all after it again")
             ->check(CLI::IsMember(pipeline::StagesKept()))
             ->type_name("NAME");
-        return [options, words](const Context& context) -> int {
+        const CLI::Option* const features = command.get_option("--features");
+        return [options, words, features](const Context& context) -> int {
+          if (features->empty() && options->poses.empty()) {
+            options->sfm.features = pipeline::PresetCalled(options->depth.preset).features;
+          }
           options->metres = MetreOptionsFrom(options->metres.gps, *words);
           options->threads = context.common.threads;
           options->seed = context.common.seed;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "calib/colmap/sfm.h"
 #include "dtr/base/error.h"
 
 namespace dtr::pipeline {
@@ -12,16 +13,20 @@ namespace {
 
 // The rounds cost less than the search and ask more views: what few far views see, they settle.
 // On plaza, share of all true pixels within 1 % before any check, with 5 and with 8 views in the
-// rounds: 86.6 % and 88.0 %.
+// rounds: 86.6 % and 88.0 %. Half of the features cost a quarter of the time of matching, which is
+// what a large collection waits for; docs/accuracy/SPEED.md has what they cost in error.
 constexpr Preset kPresets[] = {
     {.name = "fast",
      .max_size_px = 800,
+     .features = 4096,
      .effort = {.neighbours = 4, .round_neighbours = 6, .iterations = 2, .rounds = 1}},
     {.name = "balanced",
      .max_size_px = 1024,
+     .features = colmap::kMostFeatures,
      .effort = {.neighbours = 5, .round_neighbours = 8, .iterations = 3, .rounds = 2}},
     {.name = "best",
      .max_size_px = 0,
+     .features = colmap::kMostFeatures,
      .effort = {.neighbours = 8, .round_neighbours = 8, .iterations = 5, .rounds = 3}},
 };
 

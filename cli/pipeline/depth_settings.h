@@ -14,6 +14,7 @@ namespace dtr::pipeline {
 struct Preset {
   const char* name;
   int max_size_px;  ///< long side of the images of a set that is built; 0: full size
+  int features;     ///< most of a photo whose camera structure from motion looks for
   stereo::Effort effort;
 };
 

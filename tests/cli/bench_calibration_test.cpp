@@ -171,13 +171,18 @@ TEST_F(BenchCalibration, ColmapIsToldWhatTheSettingSays) {
 TEST_F(BenchCalibration, ABuildKnowsHowItsCamerasWereLookedFor) {
   colmap::testing::FakeColmap colmap;
   Leave(colmap, *truth_);
-  const auto build = [&](const std::string& features) {
-    DtrOk({"build", (*shared_ / "photos").string(), "-o", (folder_ / "set.dtr").string(),
-           "--engine", "none", "--force", "--features", features});
+  const auto build = [&](std::vector<std::string> further) {
+    further.insert(further.begin(),
+                   {"build", (*shared_ / "photos").string(), "-o", (folder_ / "set.dtr").string(),
+                    "--engine", "none", "--force"});
+    DtrOk(further);
     return Json::parse(Text(folder_ / "set.dtr/set.json"))["provenance"]["options"];
   };
-  EXPECT_EQ(build("2048")["sfm"]["features"], 2048);
-  EXPECT_FALSE(build("8192").contains("sfm")) << "the default changes no byte of a set";
+  EXPECT_EQ(build({"--features", "2048"})["sfm"]["features"], 2048);
+  EXPECT_FALSE(build({"--features", "8192"}).contains("sfm"))
+      << "the default changes no byte of a set";
+  EXPECT_EQ(build({"--preset", "fast"})["sfm"]["features"], 4096);
+  EXPECT_FALSE(build({"--preset", "fast", "--features", "8192"}).contains("sfm"));
 }
 
 TEST_F(BenchCalibration, CommandsBringTheErrorBackFromWhatColmapLeft) {
