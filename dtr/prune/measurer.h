@@ -1,5 +1,6 @@
 // dtr/prune/measurer.h -- what settings lose and take, by drawing them.
 #pragma once
+#include <algorithm>
 #include <deque>
 #include <functional>
 #include <memory>
@@ -39,9 +40,11 @@ struct Check {
   /// standard errors above the mean from between the cameras, as many as one likes; one above it
   /// where photos are: these are few, differ more from each other than what is lost, and two would
   /// refuse steps that photos gain by.
-  bool Holds(double most_db) const {
-    return probe_loss_db + 2 * probe_error_db <= most_db &&
-           witness_loss_db + witness_error_db <= most_db;
+  bool Holds(double most_db) const { return RoomDb(most_db) >= 0; }
+  /// What may be lost on top before it holds no longer.
+  double RoomDb(double most_db) const {
+    return most_db -
+           std::max(probe_loss_db + 2 * probe_error_db, witness_loss_db + witness_error_db);
   }
 };
 

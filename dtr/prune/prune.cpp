@@ -15,7 +15,8 @@ namespace {
 // the budget mostly holds at once.
 constexpr double kDecidingShare = 0.85;
 constexpr int kMostTriedAgain = 24;  // decisions after one that was at fault
-// What was taken back leaves room for others: so often decisions are made and checked anew.
+// What was taken back, and what a check finds cheaper than the places that decide, leaves room for
+// others: so often decisions are made and checked anew.
 constexpr int kMostPasses = 4;
 // Differences of a loss below this are chance; without a floor, what costs nothing would divide by
 // 0.
@@ -66,11 +67,16 @@ class Pruner {
     Begin();
     for (int pass = 0; pass < kMostPasses; ++pass) {
       const size_t verified = pass == 0 ? 0 : report_.removed.size();
-      if (pass > 0) FindCandidates();
+      if (pass > 0) {
+        // The check sees other places than those that decide, and may leave more room than these.
+        limit_db_ = std::max(limit_db_, now_.loss_db + kDecidingShare * room_db_);
+        FindCandidates();
+      }
       while (!IsEnough() && DecideOne()) {
       }
       if (pass > 0 && report_.removed.size() == verified) break;
-      if (!CheckFrom(verified)) break;
+      const bool taken_back = CheckFrom(verified);
+      if (!taken_back && room_db_ <= (1 - kDecidingShare) * options_.max_loss_db) break;
     }
     report_.decided_loss_db = now_.loss_db;
     report_.setting = history_.back();
@@ -211,7 +217,7 @@ class Pruner {
         if (std::isfinite(candidate.measured.loss_db)) MeasureNext(candidate.move);
         continue;
       }
-      if (candidate.measured.loss_db > kDecidingShare * options_.max_loss_db) continue;
+      if (candidate.measured.loss_db > limit_db_) continue;
       Take(candidate, NameOf(candidate.move.kind),
            mover_.WordsFor(candidate.move, candidate.after));
       MeasureNext(candidate.move);
@@ -220,10 +226,15 @@ class Pruner {
     return false;
   }
 
+  static Removal Removed(const std::string& kind, const std::string& what, const Measured& before,
+                         const Measured& after) {
+    return {kind, what, after.loss_db - before.loss_db, 1 - after.bytes / before.bytes,
+            1 - after.frame / before.frame};
+  }
+
   void Take(const Candidate& candidate, const std::string& kind, const std::string& what) {
     const Measured& after = candidate.measured;
-    report_.removed.push_back({kind, what, after.loss_db - now_.loss_db,
-                               1 - after.bytes / now_.bytes, 1 - after.frame / now_.frame});
+    report_.removed.push_back(Removed(kind, what, now_, after));
     measurer_.Accept(candidate.after);
     history_.push_back(candidate.after);
     moves_.push_back(candidate.move);
@@ -293,13 +304,26 @@ class Pruner {
       }
     }
     if (holds == decisions.size()) return false;
+    LogAgainFrom(holds);
     measurer_.Accept(history_.back());
     now_ = measurer_.Measure(history_.back());
     ++round_;
     return true;
   }
 
+  /// What each decision from `first` on costs on top of those that are left before it.
+  void LogAgainFrom(size_t first) {
+    Measured before = first == 0 ? before_ : measurer_.Measure(history_[first]);
+    for (size_t n = first; n < report_.removed.size(); ++n) {
+      const Measured after = measurer_.Measure(history_[n + 1]);
+      Removal& removal = report_.removed[n];
+      removal = Removed(removal.kind, removal.what, before, after);
+      before = after;
+    }
+  }
+
   void Accept(const Check& check) {
+    room_db_ = check.RoomDb(options_.max_loss_db);
     report_.checked_probe_loss_db = check.probe_loss_db;
     report_.probe_error_db = check.probe_error_db;
     report_.witness_loss_db = check.witness_loss_db;
@@ -322,6 +346,8 @@ class Pruner {
   std::vector<Move> at_fault_;    ///< taken back by a check
   Measured before_, now_;
   int round_ = 0;
+  double limit_db_ = kDecidingShare * options_.max_loss_db;  ///< on the places that decide
+  double room_db_ = 0;                                       ///< left by the last check that held
   PruneReport report_;
 };
 

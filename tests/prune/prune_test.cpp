@@ -363,6 +363,9 @@ TEST(Prune, WhatACheckTakesBackStaysOutAndLeavesRoomForOthers) {
       set, {options.probes, options.checks, options.probe_crop, options.seed, 0, options.render},
       code, make, mover, journal, progress);
   EXPECT_DOUBLE_EQ(report.decided_loss_db, measurer.Measure(report.setting).loss_db);
+  double sum_db = 0;
+  for (const Removal& removal : report.removed) sum_db += removal.loss_db;
+  EXPECT_NEAR(report.decided_loss_db, sum_db, 1e-9);
   EXPECT_LE(report.loss_db(), options.max_loss_db);
 }
 
