@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "calib/judge/patterns.h"
+#include "dtr/base/error.h"
 #include "tests/calib/judge/late_views.h"
 
 namespace dtr::calib {
@@ -52,8 +53,12 @@ TEST(FreeRunningFull, DelaysAreFoundWithinTheirSigmasAndTheRigWithThem) {
 TEST(FreeRunningFull, SolvedAsIfSynchronisedTheRigIsFarOff) {
   const auto cameras = RowOfCameras(3, 0.05);
   const auto views = LateViews(cameras, kDelays, 20);
-  const auto as_if = SolveRig(kBoard, InputsOf(cameras), views, kFrames);
-  EXPECT_GT(as_if.rms_px, 5 * kNoisePx);
+  // Lenses bend to make up for the delays: so far that one is refused, or not enough.
+  try {
+    EXPECT_GT(SolveRig(kBoard, InputsOf(cameras), views, kFrames).rms_px, 5 * kNoisePx);
+  } catch (const Error& refusal) {
+    EXPECT_THAT(refusal.what(), ::testing::HasSubstr("turns back before the corner"));
+  }
   const FreeRunning free = SolveFreeRunning(kBoard, InputsOf(cameras), views, kFrames);
   // What validate makes of the corners that are kept: nothing of the delays is left in them.
   const PatternTest left = TestTimeOffset(free.solution);
