@@ -5,7 +5,6 @@
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/io/run_record.h"
-#include "dtr/io/set_io.h"
 #include "tests/fuzz/readers.h"
 
 namespace dtr::fuzz {
