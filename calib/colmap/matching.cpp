@@ -57,9 +57,12 @@ std::optional<ImagePairs> PairsToMatch(Workspace& workspace, Matching matching,
       return !std::binary_search(allowed->begin(), allowed->end(), pair);
     });
   }
-  workspace.progress().Note(
-      fmt::format("{} of {} pairs of photos left out of matching: other photos resemble them more",
-                  std::min(all, allowed ? allowed->size() : all) - pairs.size(), all));
+  const size_t left_out = std::min(all, allowed ? allowed->size() : all) - pairs.size();
+  if (left_out > 0) {
+    workspace.progress().Note(fmt::format(
+        "{} of {} pairs of photos left out of matching: other photos resemble them more", left_out,
+        all));
+  }
   return pairs;
 }
 

@@ -75,6 +75,16 @@ TEST_F(LeftOut, NeitherWhereNoCamerasAreGivenAndTheLensDistorts) {
   EXPECT_THAT(colmap.Calls(), Contains(HasSubstr("mapper")));
 }
 
+TEST_F(LeftOut, BundleAdjustmentWhereUnseenSightsArePredictedNoBetter) {
+  colmap::testing::FakeColmap colmap;
+  LeaveModel(colmap);
+  Build({"--engine", "none"});
+  EXPECT_THAT(Log(), Contains(HasSubstr("bundle adjustment left out: ")));
+  LeaveModel(colmap, 0, -0.01);  // not the lens that these points were seen through
+  Build({"--engine", "none"});
+  EXPECT_THAT(Log(), Not(Contains(HasSubstr("bundle adjustment left out"))));
+}
+
 TEST_F(LeftOut, APhotoThatIsThereTwice) {
   fs::copy_file(Photos() / "0003.jpg", Photos() / "0003_again.jpg");
   {

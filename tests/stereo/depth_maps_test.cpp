@@ -2,10 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 
 #include "datasets/exact/stereo_scene.h"
+#include "stereo/left_out.h"
 
 namespace dtr::stereo {
 namespace {
@@ -17,7 +19,7 @@ const PinholeCamera kCamera(64, 48, 50, 50, 32, 24);
 constexpr float kWallZ = 4;
 
 /// Gives every view a wall at z = 4 with a wrong pixel at (view + 5, 10).
-class WallEngine final : public Engine {
+class WallEngine : public Engine {
  public:
   std::string name() const override { return "wall"; }
   DepthEstimate Estimate(std::span<const StereoView>, int reference, std::span<const int>,
@@ -31,6 +33,12 @@ class WallEngine final : public Engine {
   }
   mutable std::atomic<int> calls{0};
   int refuse = -1;
+};
+
+/// Does so without planes for the first two views it is given.
+class CountingEngine final : public WallEngine, public CountsLeftOut {
+ public:
+  int without_planes() const override { return std::min(2, calls.load()); }
 };
 
 /// A plane's inverse depth is 1/4 + 0.001 view at first; a round adds a tenth of what the view and
@@ -145,6 +153,19 @@ TEST(ComputeDepthMaps, PairsWithoutCommonPointsAreLeftOutAndCounted) {
             "6 of 12 pairs of view and neighbour left out: they have no more than 3 points in "
             "common");
   EXPECT_EQ(some_do_not.notes[1], "view 3: no neighbours, no depth");
+}
+
+TEST(ComputeDepthMaps, ViewsWhoseTextureSufficesAreCounted) {
+  const CountingEngine engine;
+  Recorder progress;
+  Compute(Cameras(4), engine, Options(2, 1), progress);
+  ASSERT_EQ(progress.notes.size(), 1u);
+  EXPECT_EQ(progress.notes[0],
+            "planes on weak texture left out in 2 of 4 views: their texture suffices");
+  // Only what this call left out is told.
+  Recorder again;
+  Compute(Cameras(4), engine, Options(2, 1), again);
+  EXPECT_TRUE(again.notes.empty());
 }
 
 TEST(ComputeDepthMaps, HandsOutEveryViewOnceInOrderWithWrongPixelsRemoved) {

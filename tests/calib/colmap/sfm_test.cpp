@@ -1,5 +1,6 @@
 #include "calib/colmap/sfm.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -12,6 +13,7 @@
 #include "calib/colmap/model_io.h"
 #include "calib/colmap/workspace.h"
 #include "dtr/base/error.h"
+#include "dtr/io/image_io.h"
 #include "tests/calib/colmap/fake_colmap.h"
 #include "tests/calib/colmap/model_test_support.h"
 
@@ -35,10 +37,10 @@ class Listener final : public Progress {
     if (name == stop_at) stop = true;
   }
   void Update(int done) override { updates.push_back(done); }
-  void Note(const std::string&) override {}
+  void Note(const std::string& line) override { notes.push_back(line); }
   bool StopRequested() const override { return stop; }
 
-  std::vector<std::string> stages;
+  std::vector<std::string> stages, notes;
   std::vector<int> updates;
   std::string stop_at;
   std::atomic<bool> stop = false;
@@ -320,6 +322,23 @@ TEST_F(RunSfmWithFake, SequentialMatchingIsForVideo) {
   options_.matching = Matching::kSequential;
   Run();
   EXPECT_THAT(fake_.Calls()[1], HasSubstr("sequential_matcher"));
+}
+
+TEST_F(RunSfmWithFake, PairsThatResembleEachOtherLessAreLeftOutAndCounted) {
+  options_.matching = Matching::kPreselected;
+  const fs::path plaza = "datasets/plaza/images";
+  for (size_t i = 0; i < sorted_.size(); ++i) {
+    io::WriteImage(photos_ / sorted_[i], io::ReadImage(plaza / fmt::format("000{}.jpg", i)));
+  }
+  Run();
+  EXPECT_THAT(listener_.notes, ElementsAre());  // all four show the same: nothing is left out
+  // Grey photos resemble none: each is matched with the next alone.
+  for (size_t i = 1; i < sorted_.size(); ++i) {
+    io::WriteImage(photos_ / sorted_[i], ImageRgb8(64, 48, 3, std::uint8_t{128}));
+  }
+  Run();
+  EXPECT_THAT(listener_.notes, ElementsAre("3 of 6 pairs of photos left out of matching: other "
+                                           "photos resemble them more"));
 }
 
 TEST_F(RunSfmWithFake, RequestsThatCannotBeMeantAreUsageErrors) {
