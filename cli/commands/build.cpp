@@ -92,11 +92,7 @@ void AddBuildCommand(CLI::App& app) {
                         "Of an interrupted build: do this stage and all after it again")
             ->check(CLI::IsMember(pipeline::StagesKept()))
             ->type_name("NAME");
-        const CLI::Option* const features = command.get_option("--features");
-        return [options, words, features](const Context& context) -> int {
-          if (features->empty() && options->poses.empty()) {
-            options->sfm.features = pipeline::PresetCalled(options->depth.preset).features;
-          }
+        return [options, words](const Context& context) -> int {
           options->metres = MetreOptionsFrom(options->metres.gps, *words);
           options->threads = context.common.threads;
           options->seed = context.common.seed;

@@ -43,10 +43,10 @@ std::vector<std::string> NamesOf(const capture::Capture& capture) {
   return names;
 }
 
-Json OptionsJson(const BuildOptions& options, const stereo::Effort& effort, int max_size_px) {
+Json OptionsJson(const BuildOptions& options, const stereo::Effort& effort) {
   // Everything that can change a byte of the set, and nothing else: threads and memory do not.
   Json json = SettingsJson(options.depth.engine, effort);
-  json["max_size_px"] = max_size_px;
+  json["max_size_px"] = options.max_size_px;
   json["holdout"] = options.holdout;
   json["holdout_strict"] = options.holdout_strict;
   json["poses"] = options.poses.filename().string();
@@ -54,7 +54,9 @@ Json OptionsJson(const BuildOptions& options, const stereo::Effort& effort, int 
   if (options.keep_duplicates) json["keep_duplicates"] = true;
   if (!options.rig.empty()) json["rig"] = options.rig.filename().string();
   if (options.metres.any()) json["metres"] = Json::parse(ToJson(options.metres));
-  if (options.sfm != SfmChoice()) json["sfm"] = Json::parse(ToJson(options.sfm));
+  SfmChoice plain;
+  plain.features = colmap::kMostFeatures;
+  if (options.sfm != plain) json["sfm"] = Json::parse(ToJson(options.sfm));
   json["seed"] = options.seed;
   if (options.depth.depth_error_px) json["depth_error_px"] = *options.depth.depth_error_px;
   return json;
@@ -150,6 +152,16 @@ std::vector<SparsePoint> SourcePoints(const SparseScene& sparse, const std::vect
   std::vector<bool> is_source;
   for (const View& view : views) is_source.push_back(view.role == ViewRole::kSource);
   return RestrictToViews(sparse, is_source).points;
+}
+
+// With what the preset says in the place of what was not asked for.
+BuildOptions ByPreset(BuildOptions options) {
+  const Preset& preset = PresetCalled(options.depth.preset);
+  if (options.max_size_px < 0) options.max_size_px = preset.max_size_px;
+  if (options.sfm.features == 0) {
+    options.sfm.features = options.poses.empty() ? preset.features : colmap::kMostFeatures;
+  }
+  return options;
 }
 
 // What the options ask for that cannot be had together.
@@ -310,9 +322,8 @@ void SayRemarks(const BuildReport& report, size_t photos, Progress& progress) {
 
 }  // namespace
 
-BuildReport BuildSet(const BuildOptions& options, Progress& listener) {
-  const int max_size_px = options.max_size_px >= 0 ? options.max_size_px
-                                                   : PresetCalled(options.depth.preset).max_size_px;
+BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
+  const BuildOptions options = ByPreset(asked);
   const stereo::Effort effort = EffortOf(options.depth);
   RequireEngine(options.depth);
   RequireOptions(options);
@@ -345,7 +356,7 @@ BuildReport BuildSet(const BuildOptions& options, Progress& listener) {
   }
   Json fingerprint = {
       {"tool_version", DTR_VERSION},
-      {"options", OptionsJson(options, effort, max_size_px)},
+      {"options", OptionsJson(options, effort)},
       {"time_budget_s", options.depth.time_budget_s.value_or(0)},
       {"photos", from_video ? VideoJson(options)
                             : PhotosJson(photos, std::vector<bool>(held_out.size(), true))},
@@ -410,8 +421,8 @@ BuildReport BuildSet(const BuildOptions& options, Progress& listener) {
   set.frames.resize(1);
   std::vector<View>& views = set.frames.front().views;
   RequireTwoSources(photos, held_out, calibrated);
-  views = UndistortPhotos(photos, calibrated, held_out, {max_size_px, options.threads}, writer,
-                          progress);
+  views = UndistortPhotos(photos, calibrated, held_out, {options.max_size_px, options.threads},
+                          writer, progress);
   const SparseScene sparse = SparseOf(calibrated, views);
 
   log.Begin("depth");
@@ -424,7 +435,7 @@ BuildReport BuildSet(const BuildOptions& options, Progress& listener) {
     RecodeDepth(set, *options.depth.depth_error_px, writer, options.threads, memory_gb);
   }
   WriteMeshes(set, writer, options.threads);
-  set.provenance_json = ProvenanceJson(options, OptionsJson(options, spent, max_size_px),
+  set.provenance_json = ProvenanceJson(options, OptionsJson(options, spent),
                                        PhotosJson(photos, is_source), calibrated, report)
                             .dump();
   const calib::ValidationReport validation =
