@@ -123,8 +123,8 @@ void SayWeightTable(const eval::BenchReport& report, const eval::BenchMachine& m
   };
   for (size_t i = 0; i + 1 < report.rows.size(); i += 2) {
     const eval::BenchRow &two_pass = report.rows[i], &deferred = report.rows[i + 1];
-    console.Say(fmt::format("{:>5} {:<13}  {}  {}", two_pass.views_used,
-                            NameOf(two_pass.blend), figures(two_pass), figures(deferred)));
+    console.Say(fmt::format("{:>5} {:<13}  {}  {}", two_pass.views_used, NameOf(two_pass.blend),
+                            figures(two_pass), figures(deferred)));
   }
   console.Say("");
   console.Say(

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <map>
 #include <string>
+#include <vector>
 
 namespace dtr::colmap {
 
@@ -17,5 +18,20 @@ struct DatabaseIds {
 /// and its older versions refuse a model with other numbers.
 /// Throws Error when the file is no COLMAP database.
 std::map<std::string, DatabaseIds> ReadDatabaseIds(const std::filesystem::path& database);
+
+/// Features that two images have in common: matches that agree with one geometry of the pair.
+struct DatabasePair {
+  std::uint32_t image_ids[2];
+  std::int64_t common;
+};
+
+/// What a database says of images by their ids.
+struct DatabaseMatches {
+  std::map<std::uint32_t, std::int64_t> features;  ///< number found in each image
+  std::vector<DatabasePair> pairs;                 ///< that have anything in common
+};
+
+/// Throws Error when the file is no COLMAP database.
+DatabaseMatches ReadDatabaseMatches(const std::filesystem::path& database);
 
 }  // namespace dtr::colmap

@@ -7,6 +7,7 @@
 
 #include "calib/colmap/model_io.h"
 #include "calib/colmap/sfm_steps.h"
+#include "calib/colmap/without_camera.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/base/parallel_for.h"
@@ -142,6 +143,9 @@ SfmResult RunSfm(const fs::path& images_dir, std::span<const SfmImageInput> imag
   result.report.images_per_model = ModelSizes(workspace);
   result.report.forward_motion = fs::exists(workspace.folder() / kForwardMotionNote);
   CompleteReport(workspace, result.model, result.report);
+  result.report.why_not_registered =
+      WhyWithoutCamera(workspace, result.model,
+                       result.report.forward_motion ? kFewestInliersForward : kFewestInliers);
   return result;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -69,10 +70,11 @@ struct SfmReport {
   Matching matching = Matching::kAuto;  ///< the one used
   int extraction_threads = 0;           ///< features.h: bounded by the memory
   int max_image_size_px = 0;
-  std::vector<std::string> not_registered;  ///< names without a pose, sorted
-  std::vector<int> images_per_model;        ///< models COLMAP made, largest first; [0] was taken
-  bool forward_motion = false;              ///< mapped with the thresholds of a walk straight ahead
-  double mean_reprojection_error_px = 0;    ///< over all observations, recomputed
+  std::vector<std::string> not_registered;                ///< names without a pose, sorted
+  std::map<std::string, std::string> why_not_registered;  ///< a clause for each, by name; RunSfm
+  std::vector<int> images_per_model;      ///< models COLMAP made, largest first; [0] was taken
+  bool forward_motion = false;            ///< mapped with the thresholds of a walk straight ahead
+  double mean_reprojection_error_px = 0;  ///< over all observations, recomputed
 };
 
 struct SfmResult {

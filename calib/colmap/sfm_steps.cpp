@@ -90,7 +90,7 @@ void AllowForwardMotion(Arguments& arguments) {
   arguments.AddIfKnown({"Mapper.init_max_forward_motion"}, "1")
       .AddIfKnown({"Mapper.init_min_tri_angle"}, "2")
       .AddIfKnown({"Mapper.filter_min_tri_angle"}, "0.5")
-      .AddIfKnown({"Mapper.abs_pose_min_num_inliers"}, "15");
+      .AddIfKnown({"Mapper.abs_pose_min_num_inliers"}, std::to_string(kFewestInliersForward));
 }
 
 void CompleteReport(const Workspace& workspace, const calib::SfmModel& model, SfmReport& report) {

@@ -5,6 +5,7 @@
 #include "cli/command.h"
 #include "cli/depth_options.h"
 #include "cli/metre_options.h"
+#include "cli/not_registered.h"
 #include "cli/pipeline/build_set.h"
 #include "cli/pipeline/force_stage.h"
 #include "cli/sfm_options.h"
@@ -20,9 +21,7 @@ void SayResult(const pipeline::BuildOptions& options, const pipeline::BuildRepor
       views.begin(), views.end(), [](const View& view) { return view.role == ViewRole::kHeldOut; });
   console.Say(fmt::format("{}: {} views to render from, {} held out", options.output.string(),
                           static_cast<long>(views.size()) - held_out, held_out));
-  for (const std::string& name : report.not_registered) {
-    console.Say(fmt::format("  not registered: {}", name));
-  }
+  SayNotRegistered(report.not_registered, report.why_not_registered, console);
   for (const auto& [name, reason] : report.skipped) {
     console.Say(fmt::format("  skipped: {}: {}", name, reason));
   }

@@ -8,6 +8,7 @@
 #include "cli/command.h"
 #include "cli/commands/calibrate_scale.h"
 #include "cli/metre_options.h"
+#include "cli/not_registered.h"
 #include "cli/pipeline/calibrated_photos.h"
 #include "cli/pipeline/lens_file.h"
 #include "cli/sfm_options.h"
@@ -57,14 +58,13 @@ int RunCalibratePhotos(const Options& options, const Context& context) {
   context.console.Say(fmt::format("{}: {} of {} photos have a camera; {} points",
                                   options.output.string(), calibrated.model.images.size(),
                                   photos.photos.size(), calibrated.model.points.size()));
-  for (const std::string& name : calibrated.not_registered) {
-    context.console.Say("  not registered: " + name);
-  }
+  SayNotRegistered(calibrated.not_registered, calibrated.why_not_registered, context.console);
   auto json = nlohmann::ordered_json::parse(calibrated.report_json);
   json["engine"] = calibrated.engine;
   json["unit"] = NameOf(calibrated.unit);
   json["registered"] = calibrated.model.images.size();
   json["not_registered"] = calibrated.not_registered;
+  json["why_not_registered"] = calibrated.why_not_registered;
   context.EmitJson(json.dump(1));
   return kDone;
 }

@@ -294,6 +294,7 @@ Json ReportJson(const BuildReport& report, const RunLog& log, const std::filesys
                              {"height_px", view.camera.height_px()}});
   }
   json["not_registered"] = report.not_registered;
+  json["why_not_registered"] = report.why_not_registered;
   json["skipped"] = Json::array();
   for (const auto& [name, reason] : report.skipped) {
     json["skipped"].push_back({{"name", name}, {"reason", reason}});
@@ -407,6 +408,7 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
                        options.sfm},
                       writer.work_folder() / "calibration", progress);
   report.not_registered = calibrated.not_registered;
+  report.why_not_registered = calibrated.why_not_registered;
   for (size_t i = 0; i < held_out.size(); ++i) {
     const auto& lost = report.not_registered;
     if (held_out[i] && std::find(lost.begin(), lost.end(), photos.photos[i].name) != lost.end()) {

@@ -2,6 +2,7 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -39,6 +40,7 @@ struct BuildOptions {
 struct BuildReport {
   DtrSet set;                                                ///< without pixels
   std::vector<std::string> not_registered;                   ///< photos that found no camera
+  std::map<std::string, std::string> why_not_registered;     ///< by name, where that is known
   std::vector<std::string> held_out_not_registered;          ///< of them, those that were held out
   std::vector<std::pair<std::string, std::string>> skipped;  ///< file, reason
   /// Photos that screening has something to say about, with what it is; they are used all the same.

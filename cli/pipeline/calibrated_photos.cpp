@@ -105,6 +105,7 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
 
   CalibratedPhotos calibrated;
   calibrated.engine = sfm.report.version;
+  calibrated.why_not_registered = sfm.report.why_not_registered;
   for (const colmap::StepRecord& step : sfm.report.steps) calibrated.engine_cpu_s += step.cpu_s;
   Json report = SfmJson(sfm.report, sfm.model);
   calibrated.model = std::move(sfm.model);

@@ -2,6 +2,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -41,8 +42,10 @@ struct CalibratedPhotos {
   LengthUnit unit = LengthUnit::kArbitrary;
   Eigen::Vector3d world_origin = Eigen::Vector3d::Zero();
   std::vector<std::string> not_registered;  ///< photos without a camera
-  std::string engine;                       ///< "colmap 3.8", "cameras.json", ...
-  std::string report_json;                  ///< details for the provenance; no times, no paths
+  /// By name, a clause that says why one has none, where that is known.
+  std::map<std::string, std::string> why_not_registered;
+  std::string engine;       ///< "colmap 3.8", "cameras.json", ...
+  std::string report_json;  ///< details for the provenance; no times, no paths
   /// Processor seconds of COLMAP's runs, those of an earlier call that this one went on from, too.
   double engine_cpu_s = 0;
   std::string scale_json;  ///< entry of the provenance's `scale`; empty: lengths are SfM's

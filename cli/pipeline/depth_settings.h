@@ -18,7 +18,8 @@ struct Preset {
   stereo::Effort effort;
 };
 
-/// The table of presets, cheapest first. `dtr bench --stage stereo` measures what each costs and gives.
+/// The table of presets, cheapest first. `dtr bench --stage stereo` measures what each costs and
+/// gives.
 std::span<const Preset> Presets();
 /// Throws UsageError for unknown names.
 const Preset& PresetCalled(const std::string& name);
@@ -35,7 +36,7 @@ struct DepthChoice {
   std::optional<double> memory_gb;      ///< 1e9 bytes; absent: kDefaultMemoryGb, or what is needed
   /// Pixels of disparity that storing may move a depth; absent: png16-inverse, practically exact.
   std::optional<double> depth_error_px;
-  std::filesystem::path workspace;      ///< for engine "colmap"; empty: the program fills one
+  std::filesystem::path workspace;  ///< for engine "colmap"; empty: the program fills one
 };
 
 /// An effort with what the choice gives explicitly in its place.

@@ -36,8 +36,8 @@ TEST(JsonInterface, NamesAreThoseOfTheDesign) {
   const Json build =
       OnStdout({"build", (folder / "c/images").string(), "-o", set, "--poses",
                 (folder / "c/sparse").string(), "--holdout", "every:4", "--max-size", "96"});
-  ExpectNames(build, {"set", "views", "not_registered", "skipped", "validation_passed", "stages",
-                      "peak_memory_mib"});
+  ExpectNames(build, {"set", "views", "not_registered", "why_not_registered", "skipped",
+                      "validation_passed", "stages", "peak_memory_mib"});
   ExpectNames(build["views"].at(0), {"name", "role", "width_px", "height_px"});
   ExpectNames(build["stages"].at(0), {"name", "wall_s", "cpu_s"});
 
@@ -62,10 +62,10 @@ TEST(JsonInterface, NamesAreThoseOfTheDesign) {
     ExpectNames(scores, {"psnr_db", "psnr_covered_db", "ssim", "coverage"});
   }
   EXPECT_EQ(evaluate["views"].at(0)["name"], "0000.jpg");
-  ExpectNames(evaluate["depth"], {"share_within_1pct", "share_within_2pct", "median_relative_error",
-                                  "outlier_share", "depth_completeness", "edge_displacement_px",
-                                  "share_within_1_sigma", "sparsification_ratio",
-                                  "sparsification_ratio_if_normal", "outlier_share_by_tenth"});
+  ExpectNames(evaluate["depth"],
+              {"share_within_1pct", "share_within_2pct", "median_relative_error", "outlier_share",
+               "depth_completeness", "edge_displacement_px", "share_within_1_sigma",
+               "sparsification_ratio", "sparsification_ratio_if_normal", "outlier_share_by_tenth"});
 
   const Json render = OnStdout(
       {"render", set, "--renderer", "cpu", "--like", "0000", "-o", (folder / "view.png").string()});

@@ -39,14 +39,30 @@ class FakeColmap {
   void Fail(const std::string& command, const std::string& shell_lines) {
     WriteFileAtomically(folder_ / ("fail." + command), shell_lines + "\n");
   }
-  /// The database that the extractor leaves: these images, of the cameras named (else of one).
-  void LeaveDatabase(const std::vector<std::string>& names, const std::vector<int>& cameras = {}) {
+  /// Features that two images of a database have in common, a < b by their numbers from 0.
+  struct Common {
+    size_t a, b;
+    int features;
+  };
+  /// The database that the extractor leaves: these images, of the cameras named (else of one), with
+  /// 100 features each, and of pairs what they have in common.
+  void LeaveDatabase(const std::vector<std::string>& names, const std::vector<int>& cameras = {},
+                     const std::vector<Common>& pairs = {}) {
     std::filesystem::remove(folder_ / "database");
     sqlite3* database = nullptr;
-    std::string sql = "CREATE TABLE images (image_id INTEGER, name TEXT, camera_id INTEGER);";
+    std::string sql =
+        "CREATE TABLE images (image_id INTEGER, name TEXT, camera_id INTEGER);"
+        "CREATE TABLE keypoints (image_id INTEGER, rows INTEGER);"
+        "CREATE TABLE two_view_geometries (pair_id INTEGER, rows INTEGER);";
     for (size_t i = 0; i < names.size(); ++i) {
       sql += "INSERT INTO images VALUES (" + std::to_string(i + 1) + ", '" + names[i] + "', " +
              std::to_string(cameras.empty() ? 1 : cameras.at(i)) + ");";
+      sql += "INSERT INTO keypoints VALUES (" + std::to_string(i + 1) + ", 100);";
+    }
+    for (const Common& pair : pairs) {
+      sql += "INSERT INTO two_view_geometries VALUES (" +
+             std::to_string(2147483647 * (pair.a + 1) + pair.b + 1) + ", " +
+             std::to_string(pair.features) + ");";
     }
     const bool made = sqlite3_open((folder_ / "database").c_str(), &database) == SQLITE_OK &&
                       sqlite3_exec(database, sql.c_str(), nullptr, nullptr, nullptr) == SQLITE_OK;

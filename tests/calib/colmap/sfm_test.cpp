@@ -26,6 +26,7 @@ using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
+using ::testing::Pair;
 
 constexpr std::uintmax_t kFileLimit = 1 << 20;
 
@@ -120,6 +121,30 @@ TEST_F(RunSfmWithFake, TakesTheLargestModelAndNamesWhoIsMissing) {
   EXPECT_EQ(result.report.version, "COLMAP 3.8 (a fake one)");
   EXPECT_THAT(listener_.stages, ElementsAre("features/4", "matching/100", "mapping/4"));
   EXPECT_THAT(listener_.updates, ElementsAre(1, 2, 3, 4, 50, 100, 2, 3));
+}
+
+TEST_F(RunSfmWithFake, SaysWhatPhotosWithoutACameraHaveInCommonWithOthers) {
+  LeaveModel(1, 2);  // d.png and "Über uns/b photo.JPG" find no camera
+  const auto why = [&](const std::vector<testing::FakeColmap::Common>& pairs) {
+    std::filesystem::remove_all(workspace_ / "sfm");
+    fake_.LeaveDatabase(Aliases(), {}, pairs);
+    return Run().report.why_not_registered;
+  };
+  EXPECT_THAT(why({{0, 1, 90}, {0, 2, 12}, {1, 2, 12}, {2, 3, 40}}),
+              ElementsAre(Pair("d.png",
+                               "12 of its 100 features in common with a b.jpg, with no "
+                               "photo more; a place takes 30"),
+                          Pair("Über uns/b photo.JPG",
+                               "in common with d.png alone, which has no camera either (40 "
+                               "features)")));
+  EXPECT_THAT(
+      why({{0, 2, 5}, {1, 2, 60}}),
+      ElementsAre(Pair("d.png",
+                       "60 of its 100 features in common with c.jpg, with no photo "
+                       "more; they agree on no place"),
+                  Pair("Über uns/b photo.JPG", "100 features, none of them in another photo")));
+  LeaveModel(1, 4);
+  EXPECT_THAT(why({}), ElementsAre());
 }
 
 TEST_F(RunSfmWithFake, KeepsArgumentsLogAndExitCode) {
