@@ -143,9 +143,13 @@ SfmResult RunSfm(const fs::path& images_dir, std::span<const SfmImageInput> imag
   result.report.images_per_model = ModelSizes(workspace);
   result.report.forward_motion = fs::exists(workspace.folder() / kForwardMotionNote);
   CompleteReport(workspace, result.model, result.report);
-  result.report.why_not_registered =
-      WhyWithoutCamera(workspace, result.model,
-                       result.report.forward_motion ? kFewestInliersForward : kFewestInliers);
+  try {
+    result.report.why_not_registered =
+        WhyWithoutCamera(workspace, result.model,
+                         result.report.forward_motion ? kFewestInliersForward : kFewestInliers);
+  } catch (const Error& error) {  // the model is whole: a diagnosis is not worth its loss
+    progress.Note(fmt::format("why photos have no camera is not known: {}", error.what()));
+  }
   return result;
 }
 

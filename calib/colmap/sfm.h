@@ -71,7 +71,7 @@ struct SfmReport {
   int extraction_threads = 0;           ///< features.h: bounded by the memory
   int max_image_size_px = 0;
   std::vector<std::string> not_registered;                ///< names without a pose, sorted
-  std::map<std::string, std::string> why_not_registered;  ///< a clause for each, by name; RunSfm
+  std::map<std::string, std::string> why_not_registered;  ///< a clause each, by name, from RunSfm
   std::vector<int> images_per_model;      ///< models COLMAP made, largest first; [0] was taken
   bool forward_motion = false;            ///< mapped with the thresholds of a walk straight ahead
   double mean_reprojection_error_px = 0;  ///< over all observations, recomputed

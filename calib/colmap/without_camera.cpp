@@ -10,39 +10,47 @@
 namespace dtr::colmap {
 namespace {
 
-/// The photo that has most in common with another one.
-struct Partner {
-  std::int64_t common = 0;
+/// COLMAP forgets pairs that have fewer features in common (TwoViewGeometry.min_num_inliers).
+constexpr int kFewestOfAPair = 15;
+
+/// Of some photos the one that another photo has most in common with.
+struct Partners {
+  int count = 0;
+  std::int64_t most = 0;
   std::string name;
 
-  void Consider(std::int64_t other_common, const std::string& other_name) {
+  void Add(std::int64_t common, const std::string& other) {
+    ++count;
     // Ties go to the first name: pairs come in no order of ours.
-    if (other_common > common || (other_common == common && other_name < name)) {
-      common = other_common;
-      name = other_name;
+    if (common > most || (common == most && other < name)) {
+      most = common;
+      name = other;
     }
   }
 };
 
-struct Partners {
-  Partner registered, other;
+struct InCommon {
+  Partners with_camera, without;
 };
 
-std::string Reason(std::int64_t features, const Partners& partners, int fewest_common) {
-  const auto& [registered, other] = partners;
+std::string Reason(std::int64_t features, const InCommon& common, int fewest_common) {
+  const auto& [with_camera, without] = common;
   if (features == 0) return "nothing in it to recognise";
-  if (registered.common == 0 && other.common == 0) {
-    return fmt::format("{} features, none of them in another photo", features);
+  if (with_camera.count == 0 && without.count == 0) {
+    return fmt::format("{} features, fewer than {} of them in any other photo", features,
+                       kFewestOfAPair);
   }
-  if (registered.common == 0) {
-    return fmt::format("in common with {} alone, which has no camera either ({} features)",
-                       other.name, other.common);
+  if (with_camera.count == 0) {
+    return fmt::format(
+        "in common with {} alone that {} no camera either, most with {} ({} features)",
+        without.count == 1 ? "a photo" : fmt::format("{} photos", without.count),
+        without.count == 1 ? "has" : "have", without.name, without.most);
   }
   return fmt::format("{} of its {} features in common with {}, with no photo more; {}",
-                     registered.common, features, registered.name,
-                     registered.common < fewest_common
-                         ? fmt::format("a place takes {}", fewest_common)
-                         : "they agree on no place");
+                     with_camera.most, features, with_camera.name,
+                     with_camera.most < fewest_common
+                         ? fmt::format("COLMAP places a photo by {} that agree", fewest_common)
+                         : "COLMAP found no place that they agree on with those of other photos");
 }
 
 }  // namespace
@@ -61,22 +69,22 @@ std::map<std::string, std::string> WhyWithoutCamera(const Workspace& workspace,
     const auto found = ids.find(workspace.AliasOf(i));
     if (found != ids.end()) names[found->second.image_id] = workspace.images()[i].name;
   }
-  std::map<std::string, Partners> partners;
+  std::map<std::string, InCommon> in_common;
   for (const DatabasePair& pair : matches.pairs) {
     for (const int side : {0, 1}) {
       const auto mine = names.find(pair.image_ids[side]);
       const auto theirs = names.find(pair.image_ids[1 - side]);
       if (mine == names.end() || theirs == names.end()) continue;
-      Partners& known = partners[mine->second];
-      (registered.contains(theirs->second) ? known.registered : known.other)
-          .Consider(pair.common, theirs->second);
+      InCommon& known = in_common[mine->second];
+      (registered.contains(theirs->second) ? known.with_camera : known.without)
+          .Add(pair.common, theirs->second);
     }
   }
   for (const auto& [id, name] : names) {
     if (registered.contains(name)) continue;
     const auto features = matches.features.find(id);
     reasons[name] = Reason(features == matches.features.end() ? 0 : features->second,
-                           partners[name], fewest_common);
+                           in_common[name], fewest_common);
   }
   return reasons;
 }

@@ -101,7 +101,7 @@ class RunSfmWithFake : public ::testing::Test {
     return "(no error)";
   }
 
-  const std::vector<std::string> sorted_ = {"a b.jpg", "c.jpg", "d.png", "Über uns/b photo.JPG"};
+  std::vector<std::string> sorted_ = {"a b.jpg", "c.jpg", "d.png", "Über uns/b photo.JPG"};
   const dtr::testing::TemporaryFolder photos_, workspace_;
   testing::FakeColmap fake_;
   std::vector<SfmImageInput> images_;
@@ -130,21 +130,38 @@ TEST_F(RunSfmWithFake, SaysWhatPhotosWithoutACameraHaveInCommonWithOthers) {
     fake_.LeaveDatabase(Aliases(), {}, pairs);
     return Run().report.why_not_registered;
   };
-  EXPECT_THAT(why({{0, 1, 90}, {0, 2, 12}, {1, 2, 12}, {2, 3, 40}}),
+  EXPECT_THAT(why({{0, 1, 90}, {0, 2, 20}, {1, 2, 20}, {2, 3, 40}}),
               ElementsAre(Pair("d.png",
-                               "12 of its 100 features in common with a b.jpg, with no "
-                               "photo more; a place takes 30"),
+                               "20 of its 100 features in common with a b.jpg, with no "
+                               "photo more; COLMAP places a photo by 30 that agree"),
                           Pair("Über uns/b photo.JPG",
-                               "in common with d.png alone, which has no camera either (40 "
-                               "features)")));
-  EXPECT_THAT(
-      why({{0, 2, 5}, {1, 2, 60}}),
-      ElementsAre(Pair("d.png",
-                       "60 of its 100 features in common with c.jpg, with no photo "
-                       "more; they agree on no place"),
-                  Pair("Über uns/b photo.JPG", "100 features, none of them in another photo")));
-  LeaveModel(1, 4);
+                               "in common with a photo alone that has no camera either, most with "
+                               "d.png (40 features)")));
+  EXPECT_THAT(why({{0, 2, 15}, {1, 2, 60}}),
+              ElementsAre(Pair("d.png",
+                               "60 of its 100 features in common with c.jpg, with no photo "
+                               "more; COLMAP found no place that they agree on with those "
+                               "of other photos"),
+                          Pair("Über uns/b photo.JPG",
+                               "100 features, fewer than 15 of them in any other photo")));
+  // Three photos that know each other alone.
+  images_.push_back({"e.jpg", 640, 480, 500.0, "camera one"});
+  WriteFileAtomically(photos_ / "e.jpg", "photo e");
+  sorted_.insert(sorted_.begin() + 3, "e.jpg");
+  EXPECT_THAT(why({{2, 3, 50}, {2, 4, 60}, {3, 4, 70}})["e.jpg"],
+              "in common with 2 photos alone that have no camera either, most with Über uns/b "
+              "photo.JPG (70 features)");
+  LeaveModel(1, 5);
   EXPECT_THAT(why({}), ElementsAre());
+}
+
+TEST_F(RunSfmWithFake, AModelIsNotLostWithTheDatabaseThatSaysWhyPhotosAreNotInIt) {
+  Run();
+  std::filesystem::remove(workspace_ / "sfm" / "database.db");
+  const SfmResult again = Run();
+  EXPECT_EQ(again.model.images.size(), 3u);
+  EXPECT_THAT(again.report.why_not_registered, ElementsAre());
+  EXPECT_THAT(listener_.notes, Contains(HasSubstr("why photos have no camera is not known: ")));
 }
 
 TEST_F(RunSfmWithFake, KeepsArgumentsLogAndExitCode) {
