@@ -15,6 +15,7 @@
 #include "dtr/base/hash.h"
 #include "dtr/base/memory_budget.h"
 #include "dtr/base/parallel_for.h"
+#include "dtr/base/work_folder.h"
 #include "dtr/io/formats/utf8.h"
 
 namespace dtr::capture {
@@ -62,6 +63,9 @@ std::string WhyNotSearched(const fs::path& folder) {
     return "is a D+TR set, not photos";
   }
   if (fs::exists(folder / kCaptureFile, ignored)) return "is a capture of its own";
+  if (fs::exists(folder / WorkFolder::MarkOf(kCalibrationKind), ignored)) {
+    return "is the workspace of a calibration";
+  }
   return "";
 }
 
@@ -242,6 +246,11 @@ Capture IngestPhotos(const fs::path& folder, const IngestOptions& options, Progr
                      (fs::exists(folder, error) ? "something else" : "nothing"));
   }
   if (fs::exists(folder / kCaptureFile, error)) return ReadCapture(folder);
+  if (fs::exists(folder / "set.json", error)) {
+    throw UsageError(folder.string() +
+                     ": expected a folder of photos, found a D+TR set; give the photos it was made "
+                     "of");
+  }
   Listing listing;
   ListFolder(folder, "", options.recurse, listing);
   std::sort(listing.names.begin(), listing.names.end());

@@ -10,6 +10,9 @@ namespace dtr::capture {
 
 /// Name of the file that makes a folder a capture.
 inline constexpr char kCaptureFile[] = "capture.json";
+/// What is made in the workspace of `dtr calibrate photos` (WorkFolder's KIND): it holds pictures
+/// that are no photos.
+inline constexpr char kCalibrationKind[] = "calibration";
 /// What `dtr capture` adds for people: all photos on one, and a page about them.
 inline constexpr char kContactSheetFile[] = "contact_sheet.jpg";
 inline constexpr char kPageFile[] = "index.html";

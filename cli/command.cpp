@@ -1,5 +1,7 @@
 #include "cli/command.h"
 
+#include <cmath>
+#include <cstdlib>
 #include <filesystem>
 
 #include "cli/output_file.h"
@@ -8,6 +10,43 @@
 #include "dtr/base/files.h"
 
 namespace dtr::cli {
+namespace {
+
+// NaN passes every comparison by which CLI11 holds numbers to a range.
+void RefuseWhatIsNoNumber(CLI::App& command) {
+  const auto finite = [](const std::string& text) -> std::string {
+    char* end = nullptr;
+    const double value = std::strtod(text.c_str(), &end);
+    const bool whole = !text.empty() && *end == '\0';
+    return whole && std::isfinite(value) ? "" : "expected a finite number, found " + text;
+  };
+  for (CLI::Option* option : command.get_options()) {
+    const std::string type = option->get_type_name();
+    if (type.find("POSITIVE") != std::string::npos ||
+        type.find("NONNEGATIVE") != std::string::npos || type.find(" in [") != std::string::npos) {
+      option->transform(CLI::Validator(finite, ""));  // before the range, which would print it
+    }
+  }
+}
+
+void RefuseOutputs(const CLI::App& command, const std::string& json_target) {
+  if (!json_target.empty() && json_target != "-") {
+    RequireFolderOf(json_target, "--json");
+    if (std::filesystem::is_directory(json_target)) {
+      throw UsageError("--json " + json_target + ": expected a file name, found a folder");
+    }
+  }
+  const CLI::Option* output = command.get_option_no_throw("--output");
+  if (output == nullptr || output->empty()) return;
+  const std::string& target = output->results().back();
+  if (target.empty()) throw UsageError("--output: expected a name, found an empty one");
+  if (!json_target.empty() && json_target != "-" &&
+      std::filesystem::weakly_canonical(json_target) == std::filesystem::weakly_canonical(target)) {
+    throw UsageError("--json " + json_target + ": expected another file than --output, found it");
+  }
+}
+
+}  // namespace
 
 void Context::EmitJson(const std::string& json_text) const {
   if (common.json_target.empty()) return;
@@ -33,14 +72,9 @@ void AddCommand(CLI::App& app, const std::string& name, const std::string& descr
   command->add_option("--seed", common->seed, "Seed of everything random")->type_name("N");
   const Action action = prepare(*command);
   // The exit code leaves through CLI::RuntimeError, CLI11's way of ending with a code of one's own.
-  command->callback([common, action] {
-    if (!common->json_target.empty() && common->json_target != "-") {
-      RequireFolderOf(common->json_target, "--json");
-      if (std::filesystem::is_directory(common->json_target)) {
-        throw UsageError("--json " + common->json_target +
-                         ": expected a file name, found a folder");
-      }
-    }
+  RefuseWhatIsNoNumber(*command);
+  command->callback([command, common, action] {
+    RefuseOutputs(*command, common->json_target);
     Console console(common->json_target == "-");
     const int code = action(Context{*common, console});
     if (code != kDone) throw CLI::RuntimeError(code);

@@ -4,6 +4,7 @@
 #include <malloc.h>
 #endif
 
+#include <algorithm>
 #include <exception>
 #include <filesystem>
 #include <sstream>
@@ -43,11 +44,15 @@ int Run(int argc, char** argv) {
   dtr::cli::AddManualCommands(app, DTR_VERSION);
   // They come back in JSON and in the record of the run, which hold nothing else.
   for (int i = 1; i < argc; ++i) {
-    if (dtr::io::IsUtf8(argv[i])) continue;
     std::string shown = argv[i];
-    for (char& c : shown) c = c >= ' ' && c <= '~' ? c : '?';  // one line, for any terminal
-    fmt::print(stderr, "dtr: argument {}: expected UTF-8, found '{}'; rename the file or folder\n",
-               i, shown);
+    // Messages are one line each.
+    const bool control = std::any_of(shown.begin(), shown.end(), [](char c) {
+      return static_cast<unsigned char>(c) < ' ' || c == '\x7f';
+    });
+    if (dtr::io::IsUtf8(argv[i]) && !control) continue;
+    for (char& c : shown) c = c >= ' ' && c <= '~' ? c : '?';  // for any terminal
+    fmt::print(stderr, "dtr: argument {}: expected {}, found '{}'; rename the file or folder\n", i,
+               control ? "no control characters" : "UTF-8", shown);
     return dtr::cli::kWrongUsage;
   }
   // CLI11 would say that a command is missing, not that this one does not exist.

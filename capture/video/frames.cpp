@@ -7,9 +7,11 @@
 #include <cctype>
 #include <cmath>
 #include <cstdlib>
+#include <fstream>
 #include <mutex>
 #include <opencv2/core.hpp>
 #include <opencv2/videoio.hpp>
+#include <string_view>
 
 #include "dtr/base/error.h"
 
@@ -36,6 +38,28 @@ void QuietFfmpeg() {
   std::call_once(once, [] { setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0); });
 }
 
+// FFmpeg would follow a playlist to files and hosts that it names, whatever the file is called:
+// only what begins as one of these is given to it.
+bool BeginsAsVideo(const std::filesystem::path& file) {
+  std::array<char, 12> bytes{};
+  std::ifstream(file, std::ios::binary).read(bytes.data(), bytes.size());
+  const std::string_view begin(bytes.data(), bytes.size());
+  static constexpr std::array<std::string_view, 9> kBoxes{
+      // of MP4 and QuickTime
+      "ftyp", "moov", "mdat", "free", "skip", "wide", "pnot", "styp", "uuid"};
+  static constexpr std::array<std::string_view, 6> kStarts{"\x1a\x45\xdf\xa3",
+                                                           "FLV",
+                                                           "OggS",
+                                                           "\x30\x26\xb2\x75",
+                                                           "G@",  // Matroska, ..., ASF, MPEG-TS
+                                                           std::string_view("\0\0\1\xba", 4)};
+  if (begin.starts_with("RIFF") && begin.substr(8) == "AVI ") return true;
+  return std::any_of(kBoxes.begin(), kBoxes.end(),
+                     [&](std::string_view box) { return begin.substr(4, 4) == box; }) ||
+         std::any_of(kStarts.begin(), kStarts.end(),
+                     [&](std::string_view start) { return begin.starts_with(start); });
+}
+
 }  // namespace
 
 struct VideoReader::Decoder {
@@ -54,11 +78,20 @@ bool IsVideoExtension(const std::string& extension) {
 VideoReader::VideoReader(const std::filesystem::path& file)
     : file_(file), decoder_(std::make_unique<Decoder>()) {
   QuietFfmpeg();
-  decoder_->video.open(file.string(), cv::CAP_FFMPEG);
+  if (!std::filesystem::exists(file)) {
+    throw Error(fmt::format("{}: expected a video, found no such file", file.string()));
+  }
+  if (!BeginsAsVideo(file)) {
+    throw Error(
+        fmt::format("{}: expected a video, found something else by its first bytes; "
+                    "playlists are not followed, give the video itself",
+                    file.string()));
+  }
+  // What stands before a colon at the beginning would be a protocol.
+  decoder_->video.open(std::filesystem::absolute(file).string(), cv::CAP_FFMPEG);
   if (!decoder_->video.isOpened()) {
-    throw Error(fmt::format(
-        "{}: expected a video, found {}", file.string(),
-        std::filesystem::exists(file) ? "something FFmpeg does not read" : "no such file"));
+    throw Error(
+        fmt::format("{}: expected a video, found something FFmpeg does not read", file.string()));
   }
 }
 

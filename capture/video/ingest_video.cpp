@@ -167,13 +167,16 @@ void ListLosses(const Videos& files, int seen, std::vector<Skipped>& skipped) {
   }
 }
 
-// Where a video's frames go: nowhere special where it is alone.
+// Where a video's frames go: nowhere special where it is alone; by the name without its extension
+// where no other folder could be called so, and photos are looked for in folders of such a name.
 fs::path FolderFor(const fs::path& video, const Videos& videos) {
   if (videos.size() == 1) return {};
-  const auto called = std::count_if(videos.begin(), videos.end(), [&](const fs::path& other) {
-    return other.stem() == video.stem();
+  const fs::path stem = video.stem();
+  const bool taken = std::any_of(videos.begin(), videos.end(), [&](const fs::path& other) {
+    return other != video && (other.stem() == stem || other.filename() == stem);
   });
-  return called == 1 ? video.stem() : video.filename();
+  return taken || stem.extension() == ".dtr" || stem.extension() == ".partial" ? video.filename()
+                                                                               : stem;
 }
 
 void RequireOptions(const VideoOptions& options) {

@@ -5,6 +5,7 @@
 
 #include "calib/colmap/model_io.h"
 #include "capture/ingest.h"
+#include "capture/store.h"
 #include "cli/command.h"
 #include "cli/commands/calibrate_scale.h"
 #include "cli/metre_options.h"
@@ -13,6 +14,7 @@
 #include "cli/pipeline/lens_file.h"
 #include "cli/sfm_options.h"
 #include "dtr/base/error.h"
+#include "dtr/base/work_folder.h"
 
 namespace dtr::cli {
 namespace {
@@ -51,8 +53,10 @@ int RunCalibratePhotos(const Options& options, const Context& context) {
   calibrate.refine = options.refine;
   calibrate.determined = options.photos.string();
   // The workspace stays: it holds COLMAP's arguments, logs and database, and lets a run continue.
-  const auto calibrated =
-      pipeline::CalibratePhotos(photos, calibrate, options.output / "workspace", context.console);
+  const fs::path workspace = options.output / "workspace";
+  fs::create_directories(workspace);
+  const FileLock lock = WorkFolder::Lock(workspace, capture::kCalibrationKind);
+  const auto calibrated = pipeline::CalibratePhotos(photos, calibrate, workspace, context.console);
   colmap::WriteModel(options.output, calibrated.model, colmap::Format::kBinary);
 
   context.console.Say(fmt::format("{}: {} of {} photos have a camera; {} points",

@@ -26,26 +26,27 @@ void VideoWriter::Add(const ImageRgb8& frame) {
 
 void VideoWriter::Finish(const Progress& progress) {
   const fs::path& frames = frames_.path();
-  const fs::path encoded = frames / "video.mp4";
-  const fs::path log = frames / "ffmpeg.log";
+  // ffmpeg takes "%" and ":" in a path for words of its own: it sees names of ours alone.
+  const char* encoded = "video.mp4";
   ProcessOptions options;
-  options.log_file = log;
+  options.log_file = frames / "ffmpeg.log";
+  options.working_directory = frames;
   std::string last_line;
   options.on_line = [&last_line](const std::string& line) { last_line = line; };
   options.should_stop = [&progress] { return progress.StopRequested(); };
   // yuv420p, which every player knows, needs even sizes: an odd frame gains one row or column.
   const auto result = RunProcess(
       {"ffmpeg", "-y", "-loglevel", "error", "-framerate", std::to_string(frames_per_second_), "-i",
-       (frames / "%06d.png").string(), "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-c:v", "libx264",
-       "-crf", "18", "-pix_fmt", "yuv420p", "-movflags", "+faststart", encoded.string()},
+       "%06d.png", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-c:v", "libx264", "-crf", "18",
+       "-pix_fmt", "yuv420p", "-movflags", "+faststart", encoded},
       options);
   progress.ThrowIfInterrupted();
   if (!result.Ok()) {
     throw Error(fmt::format("{}: ffmpeg failed with exit code {}: {}", target_.string(),
                             result.exit_code, last_line));
   }
-  SyncFile(encoded);
-  Rename(encoded, target_);
+  SyncFile(frames / encoded);
+  Rename(frames / encoded, target_);
 }
 
 }  // namespace dtr::io

@@ -81,6 +81,10 @@ TEST(IngestPhotos, NamesWhatItSkipsAndWhy) {
   WriteFileAtomically(folder / "b\xff.png", "name is no UTF-8");
   fs::create_directories(folder / "is_a_folder.jpg");
   fs::create_directory_symlink(folder.path(), folder / "loop");
+  // Of a calibration whose output lies among its photos.
+  fs::create_directories(folder / "out/workspace/photos");
+  WriteFileAtomically(folder / "out/workspace/calibration.lock", "");
+  io::WriteImage(folder / "out/workspace/photos/good.jpg", NoisePhoto(64, 48, 1));
   const Capture capture = Ingest(folder.path());
   EXPECT_THAT(NamesOf(capture), ElementsAre("good.jpg"));
   std::vector<std::string> names;
@@ -90,7 +94,8 @@ TEST(IngestPhotos, NamesWhatItSkipsAndWhy) {
     EXPECT_THAT(skipped.reason, ::testing::Not(HasSubstr("\n")));
     EXPECT_THAT(skipped.reason, ::testing::Not(HasSubstr(folder.path().string())));
   }
-  EXPECT_THAT(names, ElementsAre("b?.png", "cut.jpg", "empty.png", "loop", "text.jpg"));
+  EXPECT_THAT(names,
+              ElementsAre("b?.png", "cut.jpg", "empty.png", "loop", "out/workspace", "text.jpg"));
 }
 
 TEST(IngestPhotos, FoldersWithoutPhotosAreCleanErrors) {

@@ -150,6 +150,8 @@ TEST_F(Pruning, RefusesMeasurementsThatAreNone) {
   }
   std::ofstream(journal) << emptied;
   ExpectRefused(Dtr(arguments), 1, "numbers, found 0; delete the folder to start over");
+  fs::resize_file(journal, (256u << 20) + 1);
+  ExpectRefused(Dtr(arguments), 1, "256 MiB of measurements, found");
 }
 
 TEST_F(Pruning, RefusesASetWithoutDepth) {

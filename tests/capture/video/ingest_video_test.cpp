@@ -107,6 +107,20 @@ TEST(IngestVideos, VideosOfOneNameDoNotMix) {
       ElementsAre("walk.avi/frame_000000.jpg", "walk.mkv/frame_000000.jpg"));
 }
 
+TEST(IngestVideos, NamesThatMeetEachOtherOrAreNoFoldersOfPhotosKeepTheirExtension) {
+  const TemporaryFolder folder;
+  WriteVideo(folder / "w.avi", Places(3, 4));
+  std::vector<fs::path> videos;
+  for (const char* name : {"a.dtr.avi", "b.partial.avi", "c.avi", "w.avi", "w.avi.mkv", "w.mkv"}) {
+    if (name != std::string("w.avi")) fs::copy_file(folder / "w.avi", folder / name);
+    videos.push_back(folder / name);
+  }
+  EXPECT_THAT(NamesOf(Ingest(videos, {.every = 3}, folder / "frames")),
+              ElementsAre("a.dtr.avi/frame_000000.jpg", "b.partial.avi/frame_000000.jpg",
+                          "c/frame_000000.jpg", "w.avi.mkv/frame_000000.jpg",
+                          "w.avi/frame_000000.jpg", "w.mkv/frame_000000.jpg"));
+}
+
 TEST(IngestVideos, RefusesVideosOfDifferentRatesAsOneRig) {
   const TemporaryFolder folder;
   WriteVideo(folder / "left.avi", Places(5, 4), 25);
@@ -122,7 +136,19 @@ TEST(IngestVideos, SaysWhatIsNoVideoAndWhatHasNothingToSee) {
   const TemporaryFolder folder;
   WriteFileAtomically(folder / "text.mp4", "I am no video");
   EXPECT_THAT(MessageOf<Error>([&] { Ingest({folder / "text.mp4"}, {}, folder / "a"); }),
-              HasSubstr("text.mp4: expected a video"));
+              HasSubstr("text.mp4: expected a video, found something else by its first bytes"));
+  // A playlist would have FFmpeg read whatever it names.
+  WriteVideo(folder / "walk.avi", Places(3, 4));
+  WriteFileAtomically(folder / "list.mp4",
+                      "#EXTM3U\n#EXTINF:1,\n" + (folder / "walk.avi").string() + "\n");
+  EXPECT_THAT(MessageOf<Error>([&] { Ingest({folder / "list.mp4"}, {}, folder / "d"); }),
+              HasSubstr("playlists are not followed, give the video itself"));
+  // What stands before a colon is no protocol.
+  const fs::path here = fs::current_path();
+  fs::current_path(folder.path());
+  fs::rename("walk.avi", "file:walk.avi");
+  EXPECT_EQ(Ingest({"file:walk.avi"}, {.every = 3}, folder / "e").photos.size(), 1u);
+  fs::current_path(here);
   EXPECT_THAT(MessageOf<Error>([&] { Ingest({folder / "none.mp4"}, {}, folder / "b"); }),
               HasSubstr("no such file"));
   EXPECT_THAT(

@@ -1,0 +1,67 @@
+// Words of the command line that can be meant by nobody, whatever the command.
+#include <gtest/gtest.h>
+
+#include "capture/store.h"
+#include "dtr/base/process.h"
+#include "dtr/base/work_folder.h"
+#include "tests/cli/courtyard_and_set.h"
+#include "tests/cli/run_dtr.h"
+
+namespace dtr::testing {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Arguments : public CourtyardAndSet {};
+
+TEST_F(Arguments, NumbersThatAreNone) {
+  const std::string words = ": expected a finite number, found ";
+  for (const char* word : {"nan", "-nan", "inf", "1e999", "4GB"}) {
+    SCOPED_TRACE(word);
+    const Ran ran = Dtr({"capture", Photos(), "-o", In("capture"), "--memory", word});
+    ExpectRefused(ran, kWrongUsage, words);
+    EXPECT_NE(ran.err.find("--memory" + words + word), std::string::npos) << ran.err;
+  }
+  ExpectRefused(Dtr({"advise", Shared("good.dtr"), "--max-gap", "nan"}), kWrongUsage, words);
+  ExpectRefused(Dtr({"bench", Shared("good.dtr"), "--views", "2,nan"}), kWrongUsage, words);
+  EXPECT_FALSE(fs::exists(In("capture")));
+}
+
+TEST_F(Arguments, OutputsWithoutANameOrWithTheNameOfAnother) {
+  ExpectRefused(Dtr({"capture", Photos(), "-o", ""}), kWrongUsage,
+                "--output: expected a name, found an empty one");
+  ExpectRefused(Dtr({"render", Shared("good.dtr"), "--renderer", "cpu", "--like", "0001", "-o",
+                     In("view.png"), "--json", In("./view.png")}),
+                kWrongUsage, ": expected another file than --output, found it");
+  EXPECT_FALSE(fs::exists(In("view.png")));
+}
+
+TEST_F(Arguments, WordsOfSeveralLines) {
+  ExpectRefused(Dtr({"info", In("a\nb.dtr")}), kWrongUsage,
+                "expected no control characters, found '");
+}
+
+TEST_F(Arguments, AVideoMayHaveAnyName) {
+  if (FindProgram("ffmpeg").empty()) GTEST_SKIP() << "there is no ffmpeg on the PATH";
+  for (const char* name : {"100%.mp4", "a%d.mp4", "a:b.mp4", "-x.mp4"}) {
+    SCOPED_TRACE(name);
+    DtrOk({"render", Shared("good.dtr"), "--renderer", "cpu", "--fly-through", "2", "--size",
+           "24x16", "-o", In(name)});
+    EXPECT_GT(fs::file_size(In(name)), 0u);
+  }
+}
+
+TEST_F(Arguments, TwoCalibrationsInOneFolder) {
+  fs::create_directories(In("model/workspace"));
+  const FileLock lock = WorkFolder::Lock(In("model/workspace"), capture::kCalibrationKind);
+  ExpectRefused(Dtr({"calibrate", "photos", Photos(), "-o", In("model")}), kWrongUsage,
+                "workspace: another process is writing this calibration; wait for it");
+}
+
+TEST_F(Arguments, ASetInThePlaceOfPhotos) {
+  ExpectRefused(Dtr({"build", Shared("good.dtr"), "-o", In("set.dtr")}), kWrongUsage,
+                "expected a folder of photos, found a D+TR set; give the photos it was made of");
+}
+
+}  // namespace
+}  // namespace dtr::testing
