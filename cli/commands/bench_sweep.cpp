@@ -190,7 +190,8 @@ std::string ContextOf(const SweepRequest& request, const Measurable& measurable,
                      std::to_string(context.common.threads) + " " +
                      std::to_string(context.common.seed) + "\n" + ShellLine(arguments);
   // Photos to measure with, and truth: set.json knows neither.
-  for (const View& view : io::ReadSet(request.set).frames.front().views) {
+  const DtrSet set = io::ReadSet(request.set);
+  for (const View& view : set.frames.front().views) {
     if (view.role == ViewRole::kHeldOut && view.image_file) text += "\n" + view.image_file->sha256;
   }
   if (!request.truth.empty()) text += "\n" + pipeline::InputHash(request.truth);

@@ -43,7 +43,8 @@ capture::Capture PhotosOf(const CalibrationSweepOptions& options, Progress& prog
 
 void RequirePhotosOfTheSet(const CalibrationSweepOptions& options,
                            const std::vector<std::string>& names) {
-  for (const View& view : io::ReadSet(options.set).frames.front().views) {
+  const DtrSet set = io::ReadSet(options.set);
+  for (const View& view : set.frames.front().views) {
     if (std::any_of(names.begin(), names.end(), [&](const std::string& name) {
           return IsCalled(name, view.name) || IsCalled(view.name, name);
         })) {

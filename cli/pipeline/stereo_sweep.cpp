@@ -23,7 +23,8 @@ constexpr double kMillisecondsPerSecond = 1000;
 
 int LongSide(const std::filesystem::path& folder) {
   int longest = 0;
-  for (const View& view : io::ReadSet(folder).frames.front().views) {
+  const DtrSet set = io::ReadSet(folder);
+  for (const View& view : set.frames.front().views) {
     if (view.role != ViewRole::kSource) continue;
     longest = std::max({longest, view.camera.width_px(), view.camera.height_px()});
   }

@@ -117,7 +117,8 @@ TEST_F(LeftOut, FloatsWhere16BitsHold) {
   Build(WithPoses({"--rounds", "0", "--iterations", "1", "--neighbours", "2"}));
   EXPECT_THAT(Log(), Contains("depth in floats left out: 16 bits hold what is known in all 7 "
                               "views"));
-  for (const View& view : io::ReadSet(Set()).frames.front().views) {
+  const DtrSet set = io::ReadSet(Set());
+  for (const View& view : set.frames.front().views) {
     EXPECT_EQ(view.depth_coding, DepthCoding::kPng16InverseDepth);
   }
 }
