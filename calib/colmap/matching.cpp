@@ -39,7 +39,7 @@ void RunMatcher(Workspace& workspace, const Arguments& arguments) {
 }
 
 // The pairs to name to COLMAP; empty where it takes all that its matcher finds by itself.
-std::optional<ImagePairs> PairsToMatch(Workspace& workspace, Matching matching,
+std::optional<ImagePairs> PairsToMatch(Workspace& workspace, Matching matching, double memory_gb,
                                        const std::optional<ImagePairs>& allowed) {
   const size_t count = workspace.images().size(), all = count * (count - 1) / 2;
   if (allowed && allowed->size() < all) {
@@ -51,7 +51,7 @@ std::optional<ImagePairs> PairsToMatch(Workspace& workspace, Matching matching,
   if (matching != Matching::kPreselected) return {};
   std::vector<std::filesystem::path> files;
   for (size_t i = 0; i < count; ++i) files.push_back(workspace.FileOf(i));
-  ImagePairs pairs = PreselectPairs(files, workspace.threads(), workspace.progress());
+  ImagePairs pairs = PreselectPairs(files, workspace.threads(), memory_gb, workspace.progress());
   if (allowed) {
     std::erase_if(pairs, [&](const auto& pair) {
       return !std::binary_search(allowed->begin(), allowed->end(), pair);
@@ -105,8 +105,9 @@ void MatchPairs(Workspace& workspace, const std::filesystem::path& database,
 }
 
 void MatchPhotos(Workspace& workspace, const std::filesystem::path& database, Matching matching,
-                 int threads, std::uint64_t seed, const std::optional<ImagePairs>& allowed) {
-  if (const auto pairs = PairsToMatch(workspace, matching, allowed)) {
+                 double memory_gb, std::uint64_t seed, const std::optional<ImagePairs>& allowed) {
+  const int threads = MatchingThreads(workspace.threads(), memory_gb);
+  if (const auto pairs = PairsToMatch(workspace, matching, memory_gb, allowed)) {
     std::vector<std::pair<std::string, std::string>> names;
     for (const auto& [a, b] : *pairs)
       names.emplace_back(workspace.AliasOf(a), workspace.AliasOf(b));

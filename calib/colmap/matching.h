@@ -15,9 +15,11 @@ Matching ResolveMatching(Matching matching, size_t images);
 using ImagePairs = std::vector<std::pair<size_t, size_t>>;
 
 /// Matches the photos of `database`; an interrupted call may be repeated on the same database. Of
-/// the pairs that `matching` names only those of `allowed`, where it is given.
+/// the pairs that `matching` names only those of `allowed`, where it is given. Threads, and photos
+/// held at a time, are bounded by `memory_gb` (1e9 bytes).
 void MatchPhotos(Workspace& workspace, const std::filesystem::path& database, Matching matching,
-                 int threads, std::uint64_t seed, const std::optional<ImagePairs>& allowed = {});
+                 double memory_gb, std::uint64_t seed,
+                 const std::optional<ImagePairs>& allowed = {});
 
 /// Matches listed pairs of photos, given by their names in the database.
 void MatchPairs(Workspace& workspace, const std::filesystem::path& database,

@@ -9,6 +9,7 @@
 #include <opencv2/imgproc.hpp>
 #include <set>
 
+#include "dtr/base/memory_budget.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/io/image_io.h"
 
@@ -41,13 +42,16 @@ Best BestOfRow(const Eigen::RowVectorXf& dots) {
 }
 
 std::vector<SmallFeatures> FeaturesOfFiles(std::span<const std::filesystem::path> files,
-                                           int threads, Progress* progress) {
+                                           int threads, double memory_gb, Progress* progress) {
   std::vector<SmallFeatures> features(files.size());
+  MemoryBudget memory(memory_gb);
   if (progress != nullptr) progress->Stage("small images", static_cast<int>(files.size()));
   std::atomic<int> done = 0;
   ParallelFor(0, static_cast<int>(files.size()), threads, [&](int i) {
     if (progress != nullptr) progress->ThrowIfInterrupted();
     const auto index = static_cast<size_t>(i);
+    const io::ImageHeader header = io::ReadImageHeader(files[index]);
+    const auto share = memory.TakeForPhoto(header.width_px, header.height_px);
     features[index] = SmallFeaturesOf(io::ReadImage(files[index]));
     if (progress != nullptr) progress->Update(++done);
   });
@@ -134,8 +138,9 @@ std::vector<size_t> Partners(const std::vector<int>& scores) {
 }
 
 std::vector<std::pair<size_t, size_t>> PreselectPairs(std::span<const std::filesystem::path> files,
-                                                      int threads, Progress& progress) {
-  const auto features = FeaturesOfFiles(files, threads, &progress);
+                                                      int threads, double memory_gb,
+                                                      Progress& progress) {
+  const auto features = FeaturesOfFiles(files, threads, memory_gb, &progress);
   const size_t count = files.size();
   std::vector<std::vector<int>> scores(count, std::vector<int>(count, 0));
   progress.Stage("comparing small images", static_cast<int>(count));
@@ -160,7 +165,7 @@ std::vector<std::pair<size_t, size_t>> PreselectPairs(std::span<const std::files
 std::vector<size_t> MostResembling(const std::filesystem::path& photo,
                                    std::span<const std::filesystem::path> files, int threads) {
   const SmallFeatures own = SmallFeaturesOf(io::ReadImage(photo));
-  const auto features = FeaturesOfFiles(files, threads, nullptr);
+  const auto features = FeaturesOfFiles(files, threads, 0, nullptr);
   std::vector<int> scores;
   for (const SmallFeatures& other : features) scores.push_back(Resemblance(own, other));
   return First(ByScore(scores), kNeighbours);

@@ -81,8 +81,8 @@ void FeaturesAndMatches(Workspace& workspace, const std::vector<CameraGroup>& gr
       CopyDatabase(features, workspace.database());
       WriteFileAtomically(begun, workspace.fingerprint());
     }
-    MatchPhotos(workspace, workspace.database(), report.matching,
-                MatchingThreads(workspace.threads(), options.memory_gb), options.seed, allowed);
+    MatchPhotos(workspace, workspace.database(), report.matching, options.memory_gb, options.seed,
+                allowed);
   });
 }
 

@@ -50,8 +50,9 @@ TEST(PreselectPairs, KeepsTheChainAndIsTheSameForAnyNumberOfThreads) {
   files.insert(files.begin() + 2, folder / "blank.png");
   io::WriteImage(files[2], ImageRgb8(100, 50, 3, std::uint8_t{128}));
   SilentProgress silent;
-  const auto pairs = PreselectPairs(files, 1, silent);
-  EXPECT_EQ(pairs, PreselectPairs(files, 2, silent));
+  const auto pairs = PreselectPairs(files, 1, 0, silent);
+  EXPECT_EQ(pairs, PreselectPairs(files, 2, 0, silent));
+  EXPECT_EQ(pairs, PreselectPairs(files, 2, 1e-3, silent));  // one photo at a time
   EXPECT_TRUE(std::is_sorted(pairs.begin(), pairs.end()));
   const auto has = [&](size_t a, size_t b) {
     return std::find(pairs.begin(), pairs.end(), std::pair(a, b)) != pairs.end();
@@ -60,7 +61,7 @@ TEST(PreselectPairs, KeepsTheChainAndIsTheSameForAnyNumberOfThreads) {
   EXPECT_TRUE(has(1, 3));   // neighbours across the blank one
   EXPECT_FALSE(has(2, 4));  // which has no other partners
   WriteFileAtomically(folder / "blank.png", "no image");
-  EXPECT_THROW(PreselectPairs(files, 2, silent), Error);
+  EXPECT_THROW(PreselectPairs(files, 2, 0, silent), Error);
 }
 
 TEST(Partners, AreTheMostResemblingWhereFewAre) {
