@@ -49,10 +49,11 @@ int Run(int argc, char** argv) {
     const bool control = std::any_of(shown.begin(), shown.end(), [](char c) {
       return static_cast<unsigned char>(c) < ' ' || c == '\x7f';
     });
-    if (dtr::io::IsUtf8(argv[i]) && !control) continue;
+    const bool utf8 = dtr::io::IsUtf8(argv[i]);
+    if (utf8 && !control) continue;
     for (char& c : shown) c = c >= ' ' && c <= '~' ? c : '?';  // for any terminal
     fmt::print(stderr, "dtr: argument {}: expected {}, found '{}'; rename the file or folder\n", i,
-               control ? "no control characters" : "UTF-8", shown);
+               utf8 ? "no control characters" : "UTF-8", shown);
     return dtr::cli::kWrongUsage;
   }
   // CLI11 would say that a command is missing, not that this one does not exist.
