@@ -71,8 +71,8 @@ void AddCommand(CLI::App& app, const std::string& name, const std::string& descr
       ->type_name("N");
   command->add_option("--seed", common->seed, "Seed of everything random")->type_name("N");
   const Action action = prepare(*command);
-  // The exit code leaves through CLI::RuntimeError, CLI11's way of ending with a code of one's own.
   RefuseWhatIsNoNumber(*command);
+  // The exit code leaves through CLI::RuntimeError, CLI11's way of ending with a code of one's own.
   command->callback([command, common, action] {
     RefuseOutputs(*command, common->json_target);
     Console console(common->json_target == "-");
