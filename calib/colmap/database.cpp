@@ -5,6 +5,8 @@
 #include <limits>
 #include <memory>
 
+#include "calib/colmap/workspace.h"
+#include "dtr/base/durable.h"
 #include "dtr/base/error.h"
 
 namespace dtr::colmap {
@@ -55,6 +57,19 @@ class Database {
   std::unique_ptr<sqlite3, decltype(&sqlite3_close)> handle_{nullptr, &sqlite3_close};
 };
 
+// Whoever closes a database last takes its log into it, and COLMAP does; where it did not, this
+// does: one file alone can be moved at once.
+void FoldLogIn(const std::filesystem::path& database) {
+  if (!std::filesystem::exists(database.string() + "-wal")) return;
+  sqlite3* opened = nullptr;
+  int failure = sqlite3_open_v2(database.c_str(), &opened, SQLITE_OPEN_READWRITE, nullptr);
+  const std::unique_ptr<sqlite3, decltype(&sqlite3_close)> closing(opened, &sqlite3_close);
+  if (failure == SQLITE_OK) {
+    failure = sqlite3_exec(opened, "PRAGMA wal_checkpoint(TRUNCATE)", nullptr, nullptr, nullptr);
+  }
+  if (failure != SQLITE_OK) Refuse(database, sqlite3_errstr(failure));
+}
+
 }  // namespace
 
 std::map<std::string, DatabaseIds> ReadDatabaseIds(const std::filesystem::path& database) {
@@ -82,6 +97,25 @@ DatabaseMatches ReadDatabaseMatches(const std::filesystem::path& database) {
                                sqlite3_column_int64(row, 1)});
       });
   return found;
+}
+
+void RemoveDatabase(const std::filesystem::path& database) {
+  for (const char* part : {"", "-wal", "-shm", "-journal"}) RemoveAll(database.string() + part);
+}
+
+void CopyDatabase(const std::filesystem::path& from, const std::filesystem::path& to) {
+  RemoveDatabase(to);
+  for (const char* part : {"", "-wal"}) {
+    if (*part != '\0' && !std::filesystem::exists(from.string() + part)) continue;
+    CopyFileAtomically(from.string() + part, to.string() + part);
+  }
+}
+
+void MoveDatabase(const std::filesystem::path& from, const std::filesystem::path& to) {
+  FoldLogIn(from);
+  SyncFile(from);
+  Rename(from, to);
+  SyncFolder(to.parent_path());
 }
 
 }  // namespace dtr::colmap

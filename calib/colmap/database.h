@@ -1,4 +1,4 @@
-// calib/colmap/database.h -- the little we read from COLMAP's SQLite database.
+// calib/colmap/database.h -- COLMAP's SQLite database: the little we read from it, and its files.
 #pragma once
 #include <cstdint>
 #include <filesystem>
@@ -33,5 +33,14 @@ struct DatabaseMatches {
 
 /// Throws Error when the file is no COLMAP database.
 DatabaseMatches ReadDatabaseMatches(const std::filesystem::path& database);
+
+/// Of a database that no program has open: removes it with the files that SQLite keeps beside it.
+/// Throws Error when it cannot, as do the next two.
+void RemoveDatabase(const std::filesystem::path& database);
+/// `to` is replaced.
+void CopyDatabase(const std::filesystem::path& from, const std::filesystem::path& to);
+/// The same, and `from` is gone; what is under the name `to` is on the disk and whole at any
+/// moment.
+void MoveDatabase(const std::filesystem::path& from, const std::filesystem::path& to);
 
 }  // namespace dtr::colmap

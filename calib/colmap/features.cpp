@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <map>
 #include <tuple>
 
 #include "calib/colmap/database.h"
 #include "dtr/base/error.h"
+#include "dtr/base/files.h"
 #include "dtr/base/order_statistics.h"
 
 namespace dtr::colmap {
@@ -67,15 +69,103 @@ std::vector<double> FirstGuess(calib::LensModel model, const SfmImageInput& imag
 }
 
 // COLMAP skips what it cannot read and ends with 0.
-void ExpectAllInDatabase(const Workspace& workspace, const std::filesystem::path& database) {
+void ExpectAllInDatabase(const Workspace& workspace, const std::filesystem::path& database,
+                         const std::vector<ExtractionRun>& batch) {
   const auto ids = ReadDatabaseIds(database);
-  for (size_t i = 0; i < workspace.images().size(); ++i) {
-    if (ids.contains(workspace.AliasOf(i))) continue;
-    throw Error(
-        fmt::format("{}: expected a photo that colmap feature_extractor can read, found that "
-                    "it left the file out; convert it to JPEG or PNG",
-                    workspace.images()[i].name));
+  for (const ExtractionRun& run : batch) {
+    for (const size_t i : run.images) {
+      if (ids.contains(workspace.AliasOf(i))) continue;
+      throw Error(
+          fmt::format("{}: expected a photo that colmap feature_extractor can read, found that "
+                      "it left the file out; convert it to JPEG or PNG",
+                      workspace.images()[i].name));
+    }
   }
+}
+
+// The camera of the database that the photos of a run are of, where it holds it already.
+std::optional<std::uint32_t> CameraOf(const Workspace& workspace,
+                                      const std::filesystem::path& database,
+                                      const CameraGroup& group, const ExtractionRun& run) {
+  const size_t first = group.images.front();
+  if (group.camera_id || run.images.front() == first) return group.camera_id;
+  return ReadDatabaseIds(database).at(workspace.AliasOf(first)).camera_id;
+}
+
+Arguments ExtractorArguments(Workspace& workspace, const std::filesystem::path& database,
+                             const CameraGroup& group, const ExtractionRun& run,
+                             const ExtractionPlan& plan, std::uint64_t seed) {
+  std::vector<std::string> names;
+  for (const size_t i : run.images) names.push_back(workspace.AliasOf(i));
+  const auto list =
+      workspace.WriteList(fmt::format("camera_{:04}_{:06}.txt", run.group, run.images[0]), names);
+  Arguments arguments(workspace.program(), "feature_extractor");
+  arguments.AddIfKnown({"random_seed", "default_random_seed"}, fmt::format("{}", seed))
+      .Add({"database_path"}, database.string())
+      .Add({"image_path"}, workspace.images_folder().string())
+      .Add({"image_list_path"}, list.string())
+      .Add({"ImageReader.camera_model"}, calib::NameOf(group.model))
+      .Add({"SiftExtraction.use_gpu", "FeatureExtraction.use_gpu"}, "0")
+      .Add({"SiftExtraction.num_threads", "FeatureExtraction.num_threads"},
+           std::to_string(std::min<size_t>(static_cast<size_t>(plan.threads), names.size())))
+      .Add({"SiftExtraction.max_image_size", "FeatureExtraction.max_image_size"},
+           std::to_string(plan.max_image_size_px));
+  if (plan.max_features > 0) {
+    arguments.Add({"SiftExtraction.max_num_features"}, std::to_string(plan.max_features));
+  }
+  const bool masked = std::any_of(run.images.begin(), run.images.end(), [&](size_t i) {
+    return !workspace.images()[i].mask_file.empty();
+  });
+  if (masked) arguments.Add({"ImageReader.mask_path"}, workspace.masks_folder().string());
+  if (const auto camera_id = CameraOf(workspace, database, group, run)) {
+    arguments.Add({"ImageReader.existing_camera_id"}, std::to_string(*camera_id));
+    return arguments;
+  }
+  arguments.Add({"ImageReader.single_camera"}, "1");
+  if (!group.params.empty()) {
+    arguments.Add({"ImageReader.camera_params"}, ParamsText(group.params));
+  }
+  return arguments;
+}
+
+size_t PhotosIn(const std::vector<ExtractionRun>& batch) {
+  size_t count = 0;
+  for (const ExtractionRun& run : batch) count += run.images.size();
+  return count;
+}
+
+// `before`: photos whose features the database holds already.
+void ExtractBatch(Workspace& workspace, const std::filesystem::path& database,
+                  const std::vector<CameraGroup>& groups, const std::vector<ExtractionRun>& batch,
+                  const ExtractionPlan& plan, std::uint64_t seed, size_t before) {
+  int done = static_cast<int>(before);
+  for (const ExtractionRun& run : batch) {
+    workspace.Run(ExtractorArguments(workspace, database, groups[run.group], run, plan, seed),
+                  [&](const std::string& line) {
+                    if (line.find("Processed file [") != std::string::npos) {
+                      workspace.progress().Update(++done);
+                    }
+                  });
+  }
+  ExpectAllInDatabase(workspace, database, batch);
+}
+
+// "FINGERPRINT BATCHES" in a file beside the database: how many batches the database holds, of the
+// inputs that the fingerprint is of.
+std::filesystem::path BegunNote(const std::filesystem::path& database) {
+  return database.string() + ".begun";
+}
+
+size_t BatchesDone(const Workspace& workspace, const std::filesystem::path& database) {
+  constexpr std::uintmax_t kLargestNote = 1 << 12;
+  if (!std::filesystem::exists(BegunNote(database)) || !std::filesystem::exists(database)) return 0;
+  const std::string note = ReadFile(BegunNote(database), kLargestNote);
+  size_t count = 0;
+  const bool same = note.starts_with(workspace.fingerprint() + " ");
+  if (!same || std::sscanf(note.c_str() + workspace.fingerprint().size(), "%zu", &count) != 1) {
+    return 0;
+  }
+  return count;
 }
 
 }  // namespace
@@ -133,47 +223,59 @@ std::string ParamsText(const std::vector<double>& params) {
   return fmt::format("{}", fmt::join(params, ","));
 }
 
+std::vector<std::vector<ExtractionRun>> InBatches(const std::vector<CameraGroup>& groups) {
+  std::vector<std::vector<ExtractionRun>> batches;
+  size_t before = 0, in_batch = 0, limit = 0;
+  for (size_t g = 0; g < groups.size(); ++g) {
+    for (const size_t i : groups[g].images) {
+      if (in_batch == limit) {
+        before += in_batch;
+        in_batch = 0;
+        limit = std::max(kPhotosPerBatch, before / 4);
+        batches.emplace_back();
+      }
+      auto& batch = batches.back();
+      if (batch.empty() || batch.back().group != g) batch.push_back({g, {}});
+      batch.back().images.push_back(i);
+      ++in_batch;
+    }
+  }
+  return batches;
+}
+
 void ExtractFeatures(Workspace& workspace, const std::filesystem::path& database,
                      const std::vector<CameraGroup>& groups, const ExtractionPlan& plan,
                      std::uint64_t seed) {
   workspace.progress().Stage("features", static_cast<int>(workspace.images().size()));
-  int done = 0;
-  for (size_t g = 0; g < groups.size(); ++g) {
-    const CameraGroup& group = groups[g];
-    std::vector<std::string> names;
-    for (const size_t i : group.images) names.push_back(workspace.AliasOf(i));
-    const auto list = workspace.WriteList(fmt::format("camera_{:04}.txt", g), names);
-    Arguments arguments(workspace.program(), "feature_extractor");
-    arguments.AddIfKnown({"random_seed", "default_random_seed"}, fmt::format("{}", seed))
-        .Add({"database_path"}, database.string())
-        .Add({"image_path"}, workspace.images_folder().string())
-        .Add({"image_list_path"}, list.string())
-        .Add({"ImageReader.camera_model"}, calib::NameOf(group.model))
-        .Add({"SiftExtraction.use_gpu", "FeatureExtraction.use_gpu"}, "0")
-        .Add({"SiftExtraction.num_threads", "FeatureExtraction.num_threads"},
-             std::to_string(std::min<size_t>(static_cast<size_t>(plan.threads), names.size())))
-        .Add({"SiftExtraction.max_image_size", "FeatureExtraction.max_image_size"},
-             std::to_string(plan.max_image_size_px));
-    if (plan.max_features > 0) {
-      arguments.Add({"SiftExtraction.max_num_features"}, std::to_string(plan.max_features));
-    }
-    const bool masked = std::any_of(group.images.begin(), group.images.end(), [&](size_t i) {
-      return !workspace.images()[i].mask_file.empty();
-    });
-    if (masked) arguments.Add({"ImageReader.mask_path"}, workspace.masks_folder().string());
-    if (group.camera_id) {
-      arguments.Add({"ImageReader.existing_camera_id"}, std::to_string(*group.camera_id));
-    } else {
-      arguments.Add({"ImageReader.single_camera"}, "1");
-      if (!group.params.empty()) {
-        arguments.Add({"ImageReader.camera_params"}, ParamsText(group.params));
-      }
-    }
-    workspace.Run(arguments, [&](const std::string& line) {
-      if (line.find("Processed file [") != std::string::npos) workspace.progress().Update(++done);
-    });
+  size_t before = 0;
+  for (const auto& batch : InBatches(groups)) {
+    ExtractBatch(workspace, database, groups, batch, plan, seed, before);
+    before += PhotosIn(batch);
   }
-  ExpectAllInDatabase(workspace, database);
+}
+
+void ExtractFeaturesResumably(Workspace& workspace, const std::filesystem::path& database,
+                              const std::vector<CameraGroup>& groups, const ExtractionPlan& plan,
+                              std::uint64_t seed) {
+  const std::filesystem::path working = database.string() + ".working";
+  const size_t kept = BatchesDone(workspace, database);
+  if (kept == 0) RemoveDatabase(database);  // COLMAP would take over what it holds
+  workspace.progress().Stage("features", static_cast<int>(workspace.images().size()));
+  size_t before = 0, done = 0;
+  for (const auto& batch : InBatches(groups)) {
+    const size_t after = before + PhotosIn(batch);
+    if (done++ < kept) {
+      workspace.progress().Update(static_cast<int>(after));
+    } else {
+      // COLMAP writes photo by photo, and cameras before their photos: what it leaves when it is
+      // stopped is thrown away, and only whole batches go on.
+      before == 0 ? RemoveDatabase(working) : CopyDatabase(database, working);
+      ExtractBatch(workspace, working, groups, batch, plan, seed, before);
+      MoveDatabase(working, database);
+      WriteFileAtomically(BegunNote(database), fmt::format("{} {}", workspace.fingerprint(), done));
+    }
+    before = after;
+  }
 }
 
 }  // namespace dtr::colmap

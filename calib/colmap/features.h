@@ -55,10 +55,30 @@ std::vector<CameraGroup> GroupCameras(const std::vector<SfmImageInput>& images,
 /// COLMAP's text of camera parameters: exact decimals separated by commas.
 std::string ParamsText(const std::vector<double>& params);
 
-/// One extractor run per group into `database`. Throws as Workspace::Run, and Error when a photo
-/// could not be read by COLMAP.
+/// What one run of the extractor is given: photos of one group.
+struct ExtractionRun {
+  size_t group = 0;
+  std::vector<size_t> images;  ///< indices into Workspace::images()
+};
+
+/// Photos after which features are safe from an interruption: a minute or two of work.
+inline constexpr size_t kPhotosPerBatch = 48;
+
+/// All photos of the groups, in their order, in batches of kPhotosPerBatch or a quarter of those
+/// before, whichever is more: what is copied to keep them is then a few times the whole at most.
+std::vector<std::vector<ExtractionRun>> InBatches(const std::vector<CameraGroup>& groups);
+
+/// Extracts into `database`, one extractor run per group or part of one; parts of a group share the
+/// camera that its first made. Throws as Workspace::Run, and Error when a photo could not be read
+/// by COLMAP.
 void ExtractFeatures(Workspace& workspace, const std::filesystem::path& database,
                      const std::vector<CameraGroup>& groups, const ExtractionPlan& plan,
                      std::uint64_t seed);
+
+/// The same, batch by batch: after each, `database` holds it whole, and an interrupted extraction
+/// of a workspace with the same fingerprint goes on after the last of them.
+void ExtractFeaturesResumably(Workspace& workspace, const std::filesystem::path& database,
+                              const std::vector<CameraGroup>& groups, const ExtractionPlan& plan,
+                              std::uint64_t seed);
 
 }  // namespace dtr::colmap

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <optional>
 
+#include "calib/colmap/database.h"
 #include "calib/colmap/matching.h"
 #include "calib/colmap/model_io.h"
 #include "calib/colmap/pairs.h"
@@ -154,7 +155,7 @@ Placed Place(const fs::path& images_dir, const SfmImageInput& photo, const Froze
     ExtractFeatures(workspace, workspace.database(), groups, plan, options.seed);
     MatchWithSources(workspace, frozen, options);
     Register(workspace, frozen, options, groups.front().camera_id);
-    for (const char* part : {"", "-wal", "-shm"}) RemoveAll(workspace.database().string() + part);
+    RemoveDatabase(workspace.database());
   });
   Placed placed;
   placed.runs = workspace.Report().steps;

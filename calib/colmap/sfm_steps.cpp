@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <set>
 
+#include "calib/colmap/database.h"
 #include "calib/colmap/matching.h"
-#include "dtr/base/durable.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 
@@ -29,10 +29,6 @@ std::string TextOf(const std::vector<CameraGroup>& groups, const ExtractionPlan&
   return text;
 }
 
-void RemoveDatabase(const fs::path& database) {
-  for (const char* part : {"", "-wal", "-shm", "-journal"}) RemoveAll(database.string() + part);
-}
-
 }  // namespace
 
 calib::LensModel LensModelOf(const SfmOptions& options) {
@@ -42,14 +38,6 @@ calib::LensModel LensModelOf(const SfmOptions& options) {
                      options.lens_model + "'");
   }
   return *model;
-}
-
-void CopyDatabase(const fs::path& from, const fs::path& to) {
-  RemoveDatabase(to);
-  for (const char* part : {"", "-wal"}) {
-    if (*part != '\0' && !fs::exists(from.string() + part)) continue;
-    CopyFileAtomically(from.string() + part, to.string() + part);
-  }
 }
 
 void FeaturesAndMatches(Workspace& workspace, const std::vector<CameraGroup>& groups,
@@ -64,8 +52,7 @@ void FeaturesAndMatches(Workspace& workspace, const std::vector<CameraGroup>& gr
 
   const fs::path features = workspace.folder() / "features.db";
   workspace.Step("features", TextOf(groups, plan, options.seed), [&] {
-    RemoveDatabase(features);  // COLMAP would take over what an interrupted run left
-    ExtractFeatures(workspace, features, groups, plan, options.seed);
+    ExtractFeaturesResumably(workspace, features, groups, plan, options.seed);
   });
   auto text = fmt::format("matching {} seed {}", static_cast<int>(report.matching), options.seed);
   if (allowed) {

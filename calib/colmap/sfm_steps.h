@@ -37,7 +37,4 @@ inline constexpr char kForwardMotionNote[] = "forward_motion";
 /// Points that must agree with the place of a photo: COLMAP's own limit, and that of such a walk.
 inline constexpr int kFewestInliers = 30, kFewestInliersForward = 15;
 
-/// Copies a database that no program has open. Throws Error when it cannot.
-void CopyDatabase(const std::filesystem::path& from, const std::filesystem::path& to);
-
 }  // namespace dtr::colmap

@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 // A command in a folder of its own.
 struct Command {
   std::string name;
-  std::string words;  // IN/ is that folder, OF/ that of what is given
+  std::string words;  // IN/ is that folder, OF/ that of what is given, DATA/ DTR_DATA
   // A set that lies in the folder already and is replaced.
   std::string replaces = {};
   // Bytes that hold times or paths, or are COLMAP's own, differ from run to run.
@@ -72,6 +72,21 @@ const Command kCommands[] = {
      .words = "dataset make courtyard --views 3 --width 96 --height 64 -o IN/made"},
     {.name = "inspect", .words = "inspect OF/good.dtr -o IN/report.html", .least_stops = 1},
     {.name = "advise", .words = "advise OF/good.dtr -o IN/advice.html", .least_stops = 1},
+    {.name = "evaluate",
+     .words = "evaluate OF/good.dtr --leave-one-out --pictures IN/compare --renderer cpu",
+     .one_by_one = "compare/"},
+    {.name = "validate",
+     .words = "validate OF/cameras.dtr --report IN/report.html",
+     .least_stops = 1},
+    {.name = "board",
+     .words = "calibrate board DATA/chessboard_stereo_640x480 --images left0*.jpg --board "
+              "chessboard:9x6:1 --model brown4 -o IN/left.json",
+     .least_stops = 1},
+    {.name = "rig",
+     .words =
+         "calibrate rig DATA/chessboard_stereo_640x480 --board chessboard:9x6:1 --model brown4 "
+         "-o IN/rig.json -o IN/rig.yml",
+     .least_stops = 1},
     {.name = "json",
      .words = "info OF/good.dtr --json IN/info.json",
      .repeats = false,
@@ -101,6 +116,7 @@ class FullDiskOf : public ::testing::TestWithParam<Command> {
     for (std::string word; stream >> word;) {
       if (word.starts_with("IN/")) word = (folder / word.substr(3)).string();
       if (word.starts_with("OF/")) word = Of() + word.substr(3);
+      if (word.starts_with("DATA/")) word = (DataFolder() / word.substr(5)).string();
       words.push_back(word);
     }
     return words;
@@ -152,6 +168,9 @@ long UsedKib(const fs::path& disk) {
 constexpr long kRooms[] = {4, 16, 40, 100, 200, 400, 800, 1600, 64000};
 
 TEST_P(FullDiskOf, IsSaidInOneLineLosesNothingAndRoomMakesItWhole) {
+  if (GetParam().words.find("DATA/") != std::string::npos) {
+    DTR_REQUIRE_DATA(DataFolder() / "chessboard_stereo_640x480");
+  }
   const fs::path plain = folder_ / "plain", full = folder_ / "disk";
   const SmallDisk disk(full);
   if (!disk.mounted()) GTEST_SKIP() << "SKIPPED: no file system can be mounted here";

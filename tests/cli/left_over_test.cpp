@@ -1,10 +1,13 @@
 // Commands whose work is not continued: killed, the same command leaves nothing but its result.
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <unistd.h>
 
 #include <cstdlib>
 
+#include "calib/colmap/model_io.h"
 #include "dtr/base/process.h"
+#include "tests/calib/colmap/fake_colmap.h"
 #include "tests/cli/courtyard_and_set.h"
 
 namespace dtr::testing {
@@ -72,6 +75,50 @@ TEST_F(LeftOver, ADatasetHalfMade) {
   DtrOk(making);
   EXPECT_THAT(NamesIn(work_), ElementsAre("out"));
   EXPECT_FALSE(fs::exists(work_ / "out/dataset.lock"));
+}
+
+TEST_F(LeftOver, AnImportHalfWritten) {
+  std::vector<std::string> importing{
+      "import",       "--cameras", Shared("courtyard/cameras.json"), "--images",
+      Photos(),       "--depth",   Shared("courtyard/depth"),        "-o",
+      Work("set.dtr")};
+  Kill(importing, [&] { return FilesIn(Work("set.dtr.partial/images")) >= 1; });
+  EXPECT_THAT(NamesIn(work_), ElementsAre("set.dtr.partial"));
+  DtrOk(importing);
+  EXPECT_THAT(NamesIn(work_), ElementsAre("set.dtr"));
+  importing.back() = In("undisturbed.dtr");
+  DtrOk(importing);
+  EXPECT_THAT(DifferingFiles(Contents(In("undisturbed.dtr")), Contents(Work("set.dtr"))),
+              IsEmpty());
+}
+
+TEST_F(LeftOver, AMovingSetHalfJoined) {
+  const std::vector<std::string> joining{"join", Shared("good.dtr"), Shared("good.dtr"), "-o",
+                                         Work("moving.dtr")};
+  Kill(joining, [&] { return fs::exists(Work("moving.dtr.partial")); });
+  DtrOk(joining);
+  EXPECT_THAT(NamesIn(work_), ElementsAre("moving.dtr"));
+  DtrOk({"info", Work("moving.dtr"), "--verify"});
+}
+
+// COLMAP ends with the command that started it, and what is finished is not done again.
+TEST_F(LeftOver, ACalibrationThatWasKilledWhileColmapWorked) {
+  colmap::testing::FakeColmap colmap;
+  calib::SfmModel model = colmap::ReadModel(Shared("courtyard/sparse"));
+  colmap.LeaveDatabase(NumberImages(model));
+  colmap::WriteModel(colmap / "model.0", model, colmap::Format::kBinary);
+  colmap.Fail("mapper", "echo $$ > \"$FAKE_COLMAP/mapping\"; exec sleep 600");
+  const std::vector<std::string> calibrating{"calibrate", "photos", Photos(), "-o", Work("model")};
+  Kill(calibrating, [&] { return fs::exists(colmap / "mapping"); });
+  const int sleeper = std::stoi(ReadFile(colmap / "mapping", 64));
+  for (int i = 0; i < 100 && kill(sleeper, 0) == 0; ++i) usleep(100'000);
+  EXPECT_NE(kill(sleeper, 0), 0);
+  colmap.Succeed("mapper");
+  colmap.ForgetCalls();
+  DtrOk(calibrating);
+  ASSERT_EQ(colmap.Calls().size(), 1u);
+  EXPECT_THAT(colmap.Calls()[0], ::testing::HasSubstr("mapper"));
+  EXPECT_THAT(NamesIn(work_), ElementsAre("model"));
 }
 
 bool HoldsASet(const fs::path& folder) {

@@ -117,6 +117,9 @@ class OsgViewerTest : public OsgTest {
     OsgTest::SetUp();
     if (IsSkipped()) return;
     if (!HasOsgViewer()) GTEST_SKIP() << "osgviewer is missing (package openscenegraph)";
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+    GTEST_SKIP() << "SKIPPED: osgviewer has no sanitizer and cannot load a plugin that has";
+#endif
     NamedScene named = ExactScene("courtyard", 5, 240, 160);
     io::SetWriter writer(folder_ / "scene.dtr", "{}", false);
     for (View& view : named.set.frames[0].views) writer.WriteView(view, named.set.unit);

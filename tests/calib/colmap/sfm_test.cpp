@@ -80,6 +80,16 @@ class RunSfmWithFake : public ::testing::Test {
     WriteModel(folder, model, Format::kBinary);
   }
 
+  // Photos after those that every test has, by name too.
+  void LeaveMorePhotos(int count) {
+    for (int i = 0; i < count; ++i) {
+      const std::string name = fmt::format("Über uns/c {:03}.jpg", i);
+      WriteFileAtomically(photos_ / name, "photo " + name);
+      images_.push_back({name, 640, 480, 500.0, "camera one"});
+      sorted_.push_back(name);
+    }
+  }
+
   std::vector<std::string> Aliases() const {
     std::vector<std::string> aliases;
     for (size_t i = 0; i < sorted_.size(); ++i) {
@@ -210,6 +220,63 @@ TEST_F(RunSfmWithFake, InterruptEndsTheProgramAndTheNextRunGoesOn) {
   EXPECT_EQ(Run().model.images.size(), 3u);
   ASSERT_EQ(fake_.Calls().size(), 2u);
   EXPECT_THAT(fake_.Calls()[0], HasSubstr("exhaustive_matcher"));
+}
+
+// 48 photos are a batch: what an interruption finds done of a later one is thrown away, what it
+// finds of those before is kept, and later photos of a camera are of that which the first made.
+TEST_F(RunSfmWithFake, FeaturesGoOnAfterTheLastWholeBatch) {
+  LeaveMorePhotos(50);
+  std::vector<int> cameras(Aliases().size(), 7);
+  fake_.LeaveDatabase(Aliases(), cameras);
+  fake_.Fail("feature_extractor", "test ! -e \"$database\" || { rm \"$database\"; exit 3; }");
+  EXPECT_THAT(MessageOfRun(), HasSubstr("found 3"));
+  ASSERT_EQ(fake_.Calls().size(), 2u);
+  EXPECT_THAT(fake_.Calls()[0], AllOf(HasSubstr("single_camera 1"), Not(HasSubstr("existing"))));
+  EXPECT_THAT(fake_.Calls()[1],
+              AllOf(HasSubstr("existing_camera_id 7"), Not(HasSubstr("single_camera"))));
+
+  fake_.Succeed("feature_extractor");
+  fake_.ForgetCalls();
+  listener_.updates.clear();
+  Run();
+  ASSERT_EQ(fake_.Calls().size(), 3u);  // the second batch, matching, mapping
+  EXPECT_THAT(fake_.Calls()[0], HasSubstr("existing_camera_id 7"));
+  EXPECT_EQ(listener_.updates.front(), 48);
+  EXPECT_FALSE(fs::exists(workspace_ / "sfm" / "features.db.working"));
+}
+
+TEST_F(RunSfmWithFake, FeaturesOfOtherPhotosDoNotGoOn) {
+  LeaveMorePhotos(50);
+  fake_.LeaveDatabase(Aliases());
+  fake_.Fail("feature_extractor", "test ! -e \"$database\" || exit 3");
+  EXPECT_THAT(MessageOfRun(), HasSubstr("found 3"));
+  fake_.Succeed("feature_extractor");
+  fake_.ForgetCalls();
+  WriteFileAtomically(photos_ / "c.jpg", "another photo");
+  Run();
+  EXPECT_EQ(fake_.Calls().size(), 4u);
+}
+
+TEST(InBatches, AreOfWholePhotosInOrderAndGrowWithWhatIsBehindThem) {
+  std::vector<CameraGroup> groups(3);
+  for (size_t i = 0; i < 400; ++i) groups[i < 300 ? 0 : i < 399 ? 1 : 2].images.push_back(i);
+  const auto batches = InBatches(groups);
+  size_t next = 0;
+  for (const auto& batch : batches) {
+    size_t photos = 0;
+    const size_t before = next;
+    for (const ExtractionRun& run : batch) {
+      photos += run.images.size();
+      for (const size_t i : run.images) {
+        EXPECT_EQ(i, next++);
+        EXPECT_EQ(run.group, i < 300 ? 0u : i < 399 ? 1u : 2u);
+      }
+    }
+    EXPECT_EQ(photos, std::min(400 - before, std::max(kPhotosPerBatch, before / 4)));
+  }
+  EXPECT_EQ(next, 400u);
+  EXPECT_EQ(batches.size(), 8u);
+  EXPECT_TRUE(InBatches({}).empty());
 }
 
 TEST_F(RunSfmWithFake, FailureNamesStepCauseAndLog) {
