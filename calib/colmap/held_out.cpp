@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <mutex>
 #include <optional>
 
 #include "calib/colmap/database.h"
@@ -15,6 +16,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/hash.h"
 #include "dtr/base/parallel_for.h"
+#include "dtr/io/image_io.h"
 
 namespace dtr::colmap {
 namespace fs = std::filesystem;
@@ -31,6 +33,22 @@ struct Frozen {
   fs::path database;
   std::string fingerprint;      // of the model
   bool forward_motion = false;  // its mapper needed AllowForwardMotion
+};
+
+// The sources on small images, looked at once, by the first photo that needs them; one photo's
+// pixels at a time, in the place of the features that this photo has by then.
+class SmallSources {
+ public:
+  explicit SmallSources(const Frozen& frozen) : files_(frozen.files) {}
+  std::span<const SmallFeatures> Features() {
+    std::call_once(once_, [&] { features_ = SmallFeaturesOfFiles(files_, 1, 0, nullptr); });
+    return features_;
+  }
+
+ private:
+  std::span<const fs::path> files_;
+  std::once_flag once_;
+  std::vector<SmallFeatures> features_;
 };
 
 // The camera of an image, or, where a stabiliser made one lens a camera for every image, the lens
@@ -80,11 +98,13 @@ void WriteAliased(const fs::path& folder, const Frozen& frozen,
   WriteModel(folder, model, Format::kBinary);
 }
 
-void MatchWithSources(Workspace& workspace, const Frozen& frozen, const SfmOptions& options) {
+void MatchWithSources(Workspace& workspace, const Frozen& frozen, SmallSources& small,
+                      const SfmOptions& options) {
   std::vector<size_t> partners(frozen.sources.size());
   for (size_t i = 0; i < partners.size(); ++i) partners[i] = i;
   if (partners.size() > kExhaustiveLimit) {
-    partners = MostResembling(workspace.FileOf(0), frozen.files, 1);
+    partners =
+        MostResembling(SmallFeaturesOf(io::ReadImage(workspace.FileOf(0))), small.Features());
   }
   std::vector<std::pair<std::string, std::string>> pairs;
   for (const size_t i : partners) pairs.emplace_back(workspace.AliasOf(0), frozen.aliases[i]);
@@ -139,7 +159,8 @@ void KeepFrozenPoints(const calib::SfmModel& model, calib::SfmImage& image) {
 }
 
 Placed Place(const fs::path& images_dir, const SfmImageInput& photo, const Frozen& frozen,
-             const fs::path& folder, const SfmOptions& options, Progress& progress) {
+             SmallSources& small, const fs::path& folder, const SfmOptions& options,
+             Progress& progress) {
   Workspace workspace(folder, images_dir, std::span(&photo, 1), kAliasPrefix, 1, progress);
   auto groups = GroupCameras(workspace.images(), LensModelOf(options), true);
   groups.front().camera_id = SharedCamera(frozen, photo, options.share_intrinsics_within_group);
@@ -153,7 +174,7 @@ Placed Place(const fs::path& images_dir, const SfmImageInput& photo, const Froze
   workspace.Step("registration", inputs, [&] {
     CopyDatabase(frozen.database, workspace.database());
     ExtractFeatures(workspace, workspace.database(), groups, plan, options.seed);
-    MatchWithSources(workspace, frozen, options);
+    MatchWithSources(workspace, frozen, small, options);
     Register(workspace, frozen, options, groups.front().camera_id);
     RemoveDatabase(workspace.database());
   });
@@ -247,6 +268,7 @@ HeldOutResult RegisterHeldOut(const fs::path& images_dir, std::span<const SfmIma
                                      : PlanExtraction(photos, ResolveThreads(options.threads),
                                                       options.memory_gb, options.max_image_size_px)
                                            .threads;
+  SmallSources small(frozen);
   std::vector<Placed> placed(photos.size());
   progress.Stage("registering held-out photos", static_cast<int>(photos.size()));
   std::atomic<int> done = 0;
@@ -256,7 +278,7 @@ HeldOutResult RegisterHeldOut(const fs::path& images_dir, std::span<const SfmIma
     QuietProgress quiet(progress);
     // A name is no folder name in general; its hash is, and does not depend on the other photos.
     const auto folder = workspace / Sha256(std::as_bytes(std::span(photos[index].name)));
-    placed[index] = Place(images_dir, photos[index], frozen, folder, options, quiet);
+    placed[index] = Place(images_dir, photos[index], frozen, small, folder, options, quiet);
     progress.Update(++done);
   });
 

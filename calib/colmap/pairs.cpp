@@ -41,23 +41,6 @@ Best BestOfRow(const Eigen::RowVectorXf& dots) {
   return best;
 }
 
-std::vector<SmallFeatures> FeaturesOfFiles(std::span<const std::filesystem::path> files,
-                                           int threads, double memory_gb, Progress* progress) {
-  std::vector<SmallFeatures> features(files.size());
-  MemoryBudget memory(memory_gb);
-  if (progress != nullptr) progress->Stage("small images", static_cast<int>(files.size()));
-  std::atomic<int> done = 0;
-  ParallelFor(0, static_cast<int>(files.size()), threads, [&](int i) {
-    if (progress != nullptr) progress->ThrowIfInterrupted();
-    const auto index = static_cast<size_t>(i);
-    const io::ImageHeader header = io::ReadImageHeader(files[index]);
-    const auto share = memory.TakeForPhoto(header.width_px, header.height_px);
-    features[index] = SmallFeaturesOf(io::ReadImage(files[index]));
-    if (progress != nullptr) progress->Update(++done);
-  });
-  return features;
-}
-
 // The indices of scores above 0, the largest first, ties to the lower index.
 std::vector<size_t> ByScore(const std::vector<int>& scores) {
   std::vector<size_t> order(scores.size());
@@ -140,7 +123,7 @@ std::vector<size_t> Partners(const std::vector<int>& scores) {
 std::vector<std::pair<size_t, size_t>> PreselectPairs(std::span<const std::filesystem::path> files,
                                                       int threads, double memory_gb,
                                                       Progress& progress) {
-  const auto features = FeaturesOfFiles(files, threads, memory_gb, &progress);
+  const auto features = SmallFeaturesOfFiles(files, threads, memory_gb, &progress);
   const size_t count = files.size();
   std::vector<std::vector<int>> scores(count, std::vector<int>(count, 0));
   progress.Stage("comparing small images", static_cast<int>(count));
@@ -162,12 +145,27 @@ std::vector<std::pair<size_t, size_t>> PreselectPairs(std::span<const std::files
   return {pairs.begin(), pairs.end()};
 }
 
-std::vector<size_t> MostResembling(const std::filesystem::path& photo,
-                                   std::span<const std::filesystem::path> files, int threads) {
-  const SmallFeatures own = SmallFeaturesOf(io::ReadImage(photo));
-  const auto features = FeaturesOfFiles(files, threads, 0, nullptr);
+std::vector<SmallFeatures> SmallFeaturesOfFiles(std::span<const std::filesystem::path> files,
+                                                int threads, double memory_gb, Progress* progress) {
+  std::vector<SmallFeatures> features(files.size());
+  MemoryBudget memory(memory_gb);
+  if (progress != nullptr) progress->Stage("small images", static_cast<int>(files.size()));
+  std::atomic<int> done = 0;
+  ParallelFor(0, static_cast<int>(files.size()), threads, [&](int i) {
+    if (progress != nullptr) progress->ThrowIfInterrupted();
+    const auto index = static_cast<size_t>(i);
+    const io::ImageHeader header = io::ReadImageHeader(files[index]);
+    const auto share = memory.TakeForPhoto(header.width_px, header.height_px);
+    features[index] = SmallFeaturesOf(io::ReadImage(files[index]));
+    if (progress != nullptr) progress->Update(++done);
+  });
+  return features;
+}
+
+std::vector<size_t> MostResembling(const SmallFeatures& photo,
+                                   std::span<const SmallFeatures> others) {
   std::vector<int> scores;
-  for (const SmallFeatures& other : features) scores.push_back(Resemblance(own, other));
+  for (const SmallFeatures& other : others) scores.push_back(Resemblance(photo, other));
   return First(ByScore(scores), kNeighbours);
 }
 

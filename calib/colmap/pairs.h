@@ -47,8 +47,13 @@ std::vector<std::pair<size_t, size_t>> PreselectPairs(std::span<const std::files
                                                       int threads, double memory_gb,
                                                       Progress& progress);
 
-/// Indices (sorted) of the at most kNeighbours `files` most resembling `photo`.
-std::vector<size_t> MostResembling(const std::filesystem::path& photo,
-                                   std::span<const std::filesystem::path> files, int threads);
+/// SmallFeaturesOf each of the photos, under the bound of PreselectPairs. `progress` may be null.
+/// Throws Error when a photo cannot be read.
+std::vector<SmallFeatures> SmallFeaturesOfFiles(std::span<const std::filesystem::path> files,
+                                                int threads, double memory_gb, Progress* progress);
+
+/// Indices (sorted) of the at most kNeighbours of `others` that resemble a photo most.
+std::vector<size_t> MostResembling(const SmallFeatures& photo,
+                                   std::span<const SmallFeatures> others);
 
 }  // namespace dtr::colmap

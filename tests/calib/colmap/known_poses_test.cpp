@@ -1,8 +1,10 @@
 #include "calib/colmap/known_poses.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <numbers>
@@ -15,6 +17,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/hash.h"
 #include "dtr/base/random.h"
+#include "dtr/io/image_io.h"
 #include "tests/calib/colmap/fake_colmap.h"
 #include "tests/calib/colmap/model_test_support.h"
 #include "tests/support/noted_lines.h"
@@ -239,8 +242,8 @@ class HeldOutWithFake : public ::testing::Test {
 
   const dtr::testing::TemporaryFolder photos_, workspace_;
   testing::FakeColmap fake_;
-  const std::vector<SfmImageInput> sources_ = {{"a.jpg", 640, 480, {}, "one"},
-                                               {"b.jpg", 640, 480, {}, "one"}};
+  std::vector<SfmImageInput> sources_ = {{"a.jpg", 640, 480, {}, "one"},
+                                         {"b.jpg", 640, 480, {}, "one"}};
   std::vector<SfmImageInput> held_out_ = {{"y.jpg", 640, 480, {}, "one"},
                                           {"x.jpg", 640, 480, {}, "one"}};
   calib::SfmModel model_;
@@ -307,6 +310,35 @@ TEST_F(HeldOutWithFake, EachPhotoIsMatchedWithSourcesAlone) {
     EXPECT_EQ(fs::read_symlink(folder / "images" / "held_000000.jpg").filename(), name);
   }
   EXPECT_THAT(fake_.Calls(), Each(Not(HasSubstr("mapper"))));
+}
+
+// Of more sources than all can be matched with, those that the photo resembles.
+TEST_F(HeldOutWithFake, OfManySourcesThePhotoIsMatchedWithThoseItResembles) {
+  const fs::path plaza = "datasets/plaza/images";
+  std::vector<fs::path> pictures(fs::directory_iterator(plaza), fs::directory_iterator{});
+  std::sort(pictures.begin(), pictures.end());
+  sources_.clear();
+  for (size_t i = 0; i < kExhaustiveLimit + 1; ++i) {
+    const std::string name = fmt::format("s{:03}.png", i);
+    io::WriteImage(photos_ / name, ImageRgb8(64, 48, 3, std::uint8_t{128}));
+    sources_.push_back({name, 640, 480, {}, "one"});
+  }
+  const auto becomes = [&](const std::string& name, const fs::path& picture) {
+    fs::copy_file(picture, photos_ / name, fs::copy_options::overwrite_existing);
+  };
+  becomes("s007.png", pictures[1]);
+  becomes("s040.png", pictures[2]);
+  becomes("x.jpg", pictures[0]);
+  model_.images.resize(1);
+  model_.images[0].name = sources_[0].name;
+  held_out_ = {{"x.jpg", 640, 480, {}, "one"}};
+  fake_.LeaveDatabase({"held_000000.jpg"});
+  LeaveRegistered(true);
+  Run();
+  const auto folder =
+      workspace_ / "held" / Sha256(std::as_bytes(std::span(std::string_view("x.jpg"))));
+  EXPECT_EQ(ReadFile(folder / "lists" / "pairs.txt", 1 << 20),
+            "held_000000.jpg 000007.png\nheld_000000.jpg 000040.png\n");
 }
 
 TEST_F(HeldOutWithFake, ChangedPhotoIsPlacedAgainAndNoOther) {
