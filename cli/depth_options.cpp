@@ -46,11 +46,14 @@ void AddDepthOptions(CLI::App& command, const std::vector<std::string>& engines,
           "[as good as exact]")
       ->check(CLI::Range(1e-6, 100.0))
       ->type_name("PX");
-  overriding("--neighbours", choice.neighbours, "Views that the search asks", 1, 8);
-  overriding("--round-neighbours", choice.round_neighbours, "Views that the rounds ask", 1, 8);
-  overriding("--iterations", choice.iterations, "Visits per pixel and level of the search", 1, 20);
+  overriding("--neighbours", choice.neighbours, "Views that the search asks", 1,
+             pipeline::kMostNeighbours);
+  overriding("--round-neighbours", choice.round_neighbours, "Views that the rounds ask", 1,
+             pipeline::kMostNeighbours);
+  overriding("--iterations", choice.iterations, "Visits per pixel and level of the search", 1,
+             pipeline::kMostIterations);
   overriding("--rounds", choice.rounds, "Rounds in which views are held to each other's planes", 0,
-             8);
+             pipeline::kMostRounds);
 }
 
 }  // namespace dtr::cli

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <nlohmann/json.hpp>
 
 #include "calib/colmap/sfm.h"
@@ -55,17 +56,21 @@ stereo::Effort EffortOf(const DepthChoice& choice) {
 }
 
 stereo::Effort EffortFromJson(const std::string& text, const std::string& where) {
-  try {
-    const auto json = nlohmann::json::parse(text);
-    return {.neighbours = json.at("neighbours"),
-            .round_neighbours = json.at("round_neighbours"),
-            .iterations = json.at("iterations"),
-            .rounds = json.at("rounds")};
-  } catch (const nlohmann::json::exception&) {
-    throw Error(where +
-                ": expected the settings that a time budget picked, found something else; delete "
-                "the partial set and build again");
-  }
+  const nlohmann::json json = nlohmann::json::parse(text, nullptr, false);
+  const auto number = [&](const char* name, int least, int most) {
+    const bool given = json.is_object() && json.contains(name) && json[name].is_number_integer();
+    const auto value = given ? json[name].get<std::int64_t>() : least - 1;
+    if (value < least || value > most) {
+      throw Error(where +
+                  ": expected the settings that a time budget picked, found something else; delete "
+                  "the partial set and build again");
+    }
+    return static_cast<int>(value);
+  };
+  return {.neighbours = number("neighbours", 1, kMostNeighbours),
+          .round_neighbours = number("round_neighbours", 1, kMostNeighbours),
+          .iterations = number("iterations", 1, kMostIterations),
+          .rounds = number("rounds", 0, kMostRounds)};
 }
 
 nlohmann::ordered_json SettingsJson(const std::string& engine, const stereo::Effort& effort) {

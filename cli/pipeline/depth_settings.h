@@ -27,6 +27,9 @@ const Preset& PresetCalled(const std::string& name);
 /// Memory to stay within unless told otherwise.
 inline constexpr double kDefaultMemoryGb = 4;
 
+/// The most that an effort may have of each; rounds may be none, the others are 1 at least.
+inline constexpr int kMostNeighbours = 8, kMostIterations = 20, kMostRounds = 8;
+
 /// What was asked for: a preset, and what overrides it.
 struct DepthChoice {
   std::string engine = "patchmatch";  ///< "none": no depth
@@ -48,7 +51,8 @@ stereo::Effort EffortOf(const DepthChoice& choice);
 /// What of the engine and its effort decides the bytes of a depth map, by the names of the options:
 /// given explicitly, they make the same maps whatever preset they came from.
 nlohmann::ordered_json SettingsJson(const std::string& engine, const stereo::Effort& effort);
-/// The effort in what SettingsJson gave for `patchmatch`. Throws Error naming `where`.
+/// The effort in what SettingsJson gave for `patchmatch`. Throws Error naming `where`, also where
+/// it has more than the most.
 stereo::Effort EffortFromJson(const std::string& text, const std::string& where);
 
 }  // namespace dtr::pipeline

@@ -1,6 +1,10 @@
 // What a run leaves for the next one, and for reports. Ours, but on disks that others write to.
+#include <nlohmann/json.hpp>
+
+#include "cli/pipeline/depth_settings.h"
 #include "cli/pipeline/prune_journal.h"
 #include "cli/pipeline/rig_timestamps.h"
+#include "cli/sweep_facts.h"
 #include "cli/sweep_store.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
@@ -64,11 +68,40 @@ Reader OpenTimestamps(const fs::path& folder) {
           [=] { pipeline::ReadRigTimestamps(file); }};
 }
 
+// What `dtr bench` wrote, read back by `dtr inspect`.
+Reader OpenBench(const fs::path& folder) {
+  const fs::path file = folder / "bench.json";
+  return {
+      file,
+      {R"({"set": "a.dtr", "machine": {"cpu": "c", "cores": 2, "renderer": "r", "version": "1", "clock": "wall"},
+ "stages": [{"stage": "stereo", "cost": "CPU s", "error": "RMS", "conditions": "one run", "points": [
+  {"setting": "default", "options": {"engine": "sgbm"}, "command": "dtr bench", "cost": 9, "cost_least": 8,
+   "cost_most": 10.5, "error": 2, "psnr_db": 20.5, "machine_ms": 2.5, "on_front": false, "figures": {"build_cpu_s": 34}},
+  {"setting": "other", "options": {"engine": "none"}, "command": "dtr bench", "cost": 7, "cost_least": 6,
+   "cost_most": 8, "error": 1, "psnr_db": null, "machine_ms": 2.5, "on_front": true, "figures": {"not_registered": 1}}],
+  "front": [1], "knee": 1, "max_loss_db": 0.1, "cheapest_within_loss": 1, "budget": null, "best_within_budget": null,
+  "default": {"at": 0, "on_front": false, "beaten_by": 1, "within_spread": true},
+  "machine_ms": {"least": 2, "median": 2.5, "most": 3}}]})"},
+      [=] {
+        const auto facts = cli::ReadSweep(ReadFile(file, kSeedLimitBytes), file.string());
+        for (const cli::StageFacts& stage : facts.stages) {
+          cli::DefaultSentence(stage);
+          for (const cli::PointFacts& point : stage.points) cli::WithoutCamera(point);
+        }
+      }};
+}
+
+Reader OpenEffort(const fs::path& folder) {
+  const fs::path file = folder / "effort.json";
+  return {file, {pipeline::SettingsJson("patchmatch", {}).dump()}, [=] {
+            pipeline::EffortFromJson(ReadFile(file, kSeedLimitBytes), file.string());
+          }};
+}
+
 constexpr ReaderKind kReaders[] = {
-    {"run-record", OpenRunRecord},
-    {"prune-journal", OpenPruneJournal},
-    {"sweep", OpenSweep},
-    {"rig-timestamps", OpenTimestamps},
+    {"bench", OpenBench},          {"effort", OpenEffort},
+    {"run-record", OpenRunRecord}, {"prune-journal", OpenPruneJournal},
+    {"sweep", OpenSweep},          {"rig-timestamps", OpenTimestamps},
 };
 
 }  // namespace
