@@ -4,6 +4,7 @@
 #include <sstream>
 
 #include "dtr/base/files.h"
+#include "dtr/io/depth_io.h"
 #include "tests/cli/run_dtr.h"
 #include "tests/cli/small_courtyard.h"
 #include "tests/support/test_data.h"
@@ -146,6 +147,18 @@ TEST_F(BenchSweep, DepthByEngineAndSize) {
   const Json smaller = Json::parse(DtrOk(words).out)["stages"][0]["points"][0];
   EXPECT_LT(smaller["cost"], point["cost"]);
   EXPECT_NE(smaller["error"], point["error"]);
+}
+
+TEST_F(BenchSweep, TruthThatShowsNothingIsTold) {
+  const fs::path truth = folder_ / "truth";
+  fs::copy(Shared("courtyard"), truth, fs::copy_options::recursive);
+  fs::remove(truth / "dataset.json");  // from which truth is cast anew
+  for (const auto& entry : fs::directory_iterator(truth / "depth")) {
+    io::WriteExr(entry.path(), Grid<float>(kCourtyardWidthPx, kCourtyardHeightPx));
+  }
+  ExpectRefused(Dtr({"bench", Shared("cameras.dtr"), "--stage", "stereo", "--max-size", "192",
+                     "--truth", truth.string(), "--point", "engine=sgbm", "--renderer", "cpu"}),
+                kFailed, "bench stereo: expected true pixels to score, found none");
 }
 
 TEST_F(BenchSweep, StorageByBytes) {
