@@ -67,7 +67,9 @@ void FoldLogIn(const std::filesystem::path& database) {
   if (failure == SQLITE_OK) {
     failure = sqlite3_exec(opened, "PRAGMA wal_checkpoint(TRUNCATE)", nullptr, nullptr, nullptr);
   }
-  if (failure != SQLITE_OK) Refuse(database, sqlite3_errstr(failure));
+  if (failure == SQLITE_OK) return;
+  throw Error(database.string() + ": its log cannot be taken into it: " + sqlite3_errstr(failure) +
+              "; the same command goes on with the photos before");
 }
 
 }  // namespace
@@ -107,7 +109,9 @@ void CopyDatabase(const std::filesystem::path& from, const std::filesystem::path
   RemoveDatabase(to);
   for (const char* part : {"", "-wal"}) {
     if (*part != '\0' && !std::filesystem::exists(from.string() + part)) continue;
-    CopyFileAtomically(from.string() + part, to.string() + part);
+    std::error_code failure;
+    std::filesystem::copy_file(from.string() + part, to.string() + part, failure);
+    if (failure) throw Error(to.string() + part + ": cannot be written: " + failure.message());
   }
 }
 

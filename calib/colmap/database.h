@@ -37,7 +37,7 @@ DatabaseMatches ReadDatabaseMatches(const std::filesystem::path& database);
 /// Of a database that no program has open: removes it with the files that SQLite keeps beside it.
 /// Throws Error when it cannot, as do the next two.
 void RemoveDatabase(const std::filesystem::path& database);
-/// `to` is replaced.
+/// `to` is replaced, and whole only when this returns: something else must vouch for it.
 void CopyDatabase(const std::filesystem::path& from, const std::filesystem::path& to);
 /// The same, and `from` is gone; what is under the name `to` is on the disk and whole at any
 /// moment.

@@ -4,13 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <map>
 #include <tuple>
 
 #include "calib/colmap/database.h"
+#include "dtr/base/durable.h"
 #include "dtr/base/error.h"
-#include "dtr/base/files.h"
 #include "dtr/base/order_statistics.h"
 
 namespace dtr::colmap {
@@ -69,32 +68,32 @@ std::vector<double> FirstGuess(calib::LensModel model, const SfmImageInput& imag
 }
 
 // COLMAP skips what it cannot read and ends with 0.
-void ExpectAllInDatabase(const Workspace& workspace, const std::filesystem::path& database,
-                         const std::vector<ExtractionRun>& batch) {
+void ExpectInDatabase(const Workspace& workspace, const std::filesystem::path& database,
+                      const std::vector<size_t>& images) {
   const auto ids = ReadDatabaseIds(database);
-  for (const ExtractionRun& run : batch) {
-    for (const size_t i : run.images) {
-      if (ids.contains(workspace.AliasOf(i))) continue;
-      throw Error(
-          fmt::format("{}: expected a photo that colmap feature_extractor can read, found that "
-                      "it left the file out; convert it to JPEG or PNG",
-                      workspace.images()[i].name));
-    }
+  for (const size_t i : images) {
+    if (ids.contains(workspace.AliasOf(i))) continue;
+    throw Error(
+        fmt::format("{}: expected a photo that colmap feature_extractor can read, found that "
+                    "it left the file out; convert it to JPEG or PNG",
+                    workspace.images()[i].name));
   }
 }
 
-// The camera of the database that the photos of a run are of, where it holds it already.
+// The camera that the database has of photos of a group already.
 std::optional<std::uint32_t> CameraOf(const Workspace& workspace,
                                       const std::filesystem::path& database,
-                                      const CameraGroup& group, const ExtractionRun& run) {
-  const size_t first = group.images.front();
-  if (group.camera_id || run.images.front() == first) return group.camera_id;
-  return ReadDatabaseIds(database).at(workspace.AliasOf(first)).camera_id;
+                                      const CameraGroup& group) {
+  const auto ids = ReadDatabaseIds(database);
+  const auto known = ids.find(workspace.AliasOf(group.images.front()));
+  return known == ids.end() ? std::nullopt : std::optional(known->second.camera_id);
 }
 
+// `camera_id`: the group's in the database, where it has one.
 Arguments ExtractorArguments(Workspace& workspace, const std::filesystem::path& database,
                              const CameraGroup& group, const ExtractionRun& run,
-                             const ExtractionPlan& plan, std::uint64_t seed) {
+                             std::optional<std::uint32_t> camera_id, const ExtractionPlan& plan,
+                             std::uint64_t seed) {
   std::vector<std::string> names;
   for (const size_t i : run.images) names.push_back(workspace.AliasOf(i));
   const auto list =
@@ -117,7 +116,7 @@ Arguments ExtractorArguments(Workspace& workspace, const std::filesystem::path& 
     return !workspace.images()[i].mask_file.empty();
   });
   if (masked) arguments.Add({"ImageReader.mask_path"}, workspace.masks_folder().string());
-  if (const auto camera_id = CameraOf(workspace, database, group, run)) {
+  if (camera_id) {
     arguments.Add({"ImageReader.existing_camera_id"}, std::to_string(*camera_id));
     return arguments;
   }
@@ -134,38 +133,23 @@ size_t PhotosIn(const std::vector<ExtractionRun>& batch) {
   return count;
 }
 
-// `before`: photos whose features the database holds already.
+// `before`: photos of the groups whose features the database holds already.
 void ExtractBatch(Workspace& workspace, const std::filesystem::path& database,
                   const std::vector<CameraGroup>& groups, const std::vector<ExtractionRun>& batch,
                   const ExtractionPlan& plan, std::uint64_t seed, size_t before) {
   int done = static_cast<int>(before);
   for (const ExtractionRun& run : batch) {
-    workspace.Run(ExtractorArguments(workspace, database, groups[run.group], run, plan, seed),
+    const CameraGroup& group = groups[run.group];
+    auto camera_id = group.camera_id;
+    if (!camera_id && before > 0) camera_id = CameraOf(workspace, database, group);
+    workspace.Run(ExtractorArguments(workspace, database, group, run, camera_id, plan, seed),
                   [&](const std::string& line) {
                     if (line.find("Processed file [") != std::string::npos) {
                       workspace.progress().Update(++done);
                     }
                   });
+    ExpectInDatabase(workspace, database, run.images);
   }
-  ExpectAllInDatabase(workspace, database, batch);
-}
-
-// "FINGERPRINT BATCHES" in a file beside the database: how many batches the database holds, of the
-// inputs that the fingerprint is of.
-std::filesystem::path BegunNote(const std::filesystem::path& database) {
-  return database.string() + ".begun";
-}
-
-size_t BatchesDone(const Workspace& workspace, const std::filesystem::path& database) {
-  constexpr std::uintmax_t kLargestNote = 1 << 12;
-  if (!std::filesystem::exists(BegunNote(database)) || !std::filesystem::exists(database)) return 0;
-  const std::string note = ReadFile(BegunNote(database), kLargestNote);
-  size_t count = 0;
-  const bool same = note.starts_with(workspace.fingerprint() + " ");
-  if (!same || std::sscanf(note.c_str() + workspace.fingerprint().size(), "%zu", &count) != 1) {
-    return 0;
-  }
-  return count;
 }
 
 }  // namespace
@@ -257,14 +241,20 @@ void ExtractFeatures(Workspace& workspace, const std::filesystem::path& database
 void ExtractFeaturesResumably(Workspace& workspace, const std::filesystem::path& database,
                               const std::vector<CameraGroup>& groups, const ExtractionPlan& plan,
                               std::uint64_t seed) {
-  const std::filesystem::path working = database.string() + ".working";
-  const size_t kept = BatchesDone(workspace, database);
-  if (kept == 0) RemoveDatabase(database);  // COLMAP would take over what it holds
+  const std::filesystem::path working = database.string() + ".working",
+                              note = database.string() + ".begun";
+  size_t kept = std::filesystem::exists(database) ? workspace.Kept(note).value_or(0) : 0;
+  if (kept == 0) {
+    // A note must never meet features of other photos: it goes before a new database comes.
+    RemoveAll(note);
+    SyncFolder(note.parent_path());
+    RemoveDatabase(database);  // COLMAP would take over what it holds
+  }
   workspace.progress().Stage("features", static_cast<int>(workspace.images().size()));
-  size_t before = 0, done = 0;
+  size_t before = 0;
   for (const auto& batch : InBatches(groups)) {
     const size_t after = before + PhotosIn(batch);
-    if (done++ < kept) {
+    if (after <= kept) {
       workspace.progress().Update(static_cast<int>(after));
     } else {
       // COLMAP writes photo by photo, and cameras before their photos: what it leaves when it is
@@ -272,10 +262,11 @@ void ExtractFeaturesResumably(Workspace& workspace, const std::filesystem::path&
       before == 0 ? RemoveDatabase(working) : CopyDatabase(database, working);
       ExtractBatch(workspace, working, groups, batch, plan, seed, before);
       MoveDatabase(working, database);
-      WriteFileAtomically(BegunNote(database), fmt::format("{} {}", workspace.fingerprint(), done));
+      workspace.Keep(note, after);
     }
     before = after;
   }
+  for (const CameraGroup& group : groups) ExpectInDatabase(workspace, database, group.images);
 }
 
 }  // namespace dtr::colmap

@@ -61,7 +61,7 @@ struct ExtractionRun {
   std::vector<size_t> images;  ///< indices into Workspace::images()
 };
 
-/// Photos after which features are safe from an interruption: a minute or two of work.
+/// Photos after which features are safe from an interruption, at first: a minute or two of work.
 inline constexpr size_t kPhotosPerBatch = 48;
 
 /// All photos of the groups, in their order, in batches of kPhotosPerBatch or a quarter of those

@@ -40,8 +40,8 @@ struct Frozen {
 class SmallSources {
  public:
   explicit SmallSources(const Frozen& frozen) : files_(frozen.files) {}
-  std::span<const SmallFeatures> Features() {
-    std::call_once(once_, [&] { features_ = SmallFeaturesOfFiles(files_, 1, 0, nullptr); });
+  std::span<const SmallFeatures> Features(Progress& progress) {
+    std::call_once(once_, [&] { features_ = SmallFeaturesOfFiles(files_, 1, 0, progress); });
     return features_;
   }
 
@@ -103,8 +103,8 @@ void MatchWithSources(Workspace& workspace, const Frozen& frozen, SmallSources& 
   std::vector<size_t> partners(frozen.sources.size());
   for (size_t i = 0; i < partners.size(); ++i) partners[i] = i;
   if (partners.size() > kExhaustiveLimit) {
-    partners =
-        MostResembling(SmallFeaturesOf(io::ReadImage(workspace.FileOf(0))), small.Features());
+    const SmallFeatures own = SmallFeaturesOf(io::ReadImage(workspace.FileOf(0)));
+    partners = MostResembling(own, small.Features(workspace.progress()));
   }
   std::vector<std::pair<std::string, std::string>> pairs;
   for (const size_t i : partners) pairs.emplace_back(workspace.AliasOf(0), frozen.aliases[i]);

@@ -123,7 +123,7 @@ std::vector<size_t> Partners(const std::vector<int>& scores) {
 std::vector<std::pair<size_t, size_t>> PreselectPairs(std::span<const std::filesystem::path> files,
                                                       int threads, double memory_gb,
                                                       Progress& progress) {
-  const auto features = SmallFeaturesOfFiles(files, threads, memory_gb, &progress);
+  const auto features = SmallFeaturesOfFiles(files, threads, memory_gb, progress);
   const size_t count = files.size();
   std::vector<std::vector<int>> scores(count, std::vector<int>(count, 0));
   progress.Stage("comparing small images", static_cast<int>(count));
@@ -146,18 +146,18 @@ std::vector<std::pair<size_t, size_t>> PreselectPairs(std::span<const std::files
 }
 
 std::vector<SmallFeatures> SmallFeaturesOfFiles(std::span<const std::filesystem::path> files,
-                                                int threads, double memory_gb, Progress* progress) {
+                                                int threads, double memory_gb, Progress& progress) {
   std::vector<SmallFeatures> features(files.size());
   MemoryBudget memory(memory_gb);
-  if (progress != nullptr) progress->Stage("small images", static_cast<int>(files.size()));
+  progress.Stage("small images", static_cast<int>(files.size()));
   std::atomic<int> done = 0;
   ParallelFor(0, static_cast<int>(files.size()), threads, [&](int i) {
-    if (progress != nullptr) progress->ThrowIfInterrupted();
+    progress.ThrowIfInterrupted();
     const auto index = static_cast<size_t>(i);
     const io::ImageHeader header = io::ReadImageHeader(files[index]);
     const auto share = memory.TakeForPhoto(header.width_px, header.height_px);
     features[index] = SmallFeaturesOf(io::ReadImage(files[index]));
-    if (progress != nullptr) progress->Update(++done);
+    progress.Update(++done);
   });
   return features;
 }

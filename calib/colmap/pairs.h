@@ -47,10 +47,10 @@ std::vector<std::pair<size_t, size_t>> PreselectPairs(std::span<const std::files
                                                       int threads, double memory_gb,
                                                       Progress& progress);
 
-/// SmallFeaturesOf each of the photos, under the bound of PreselectPairs. `progress` may be null.
+/// SmallFeaturesOf each of the photos, under the bound of PreselectPairs.
 /// Throws Error when a photo cannot be read.
 std::vector<SmallFeatures> SmallFeaturesOfFiles(std::span<const std::filesystem::path> files,
-                                                int threads, double memory_gb, Progress* progress);
+                                                int threads, double memory_gb, Progress& progress);
 
 /// Indices (sorted) of the at most kNeighbours of `others` that resemble a photo most.
 std::vector<size_t> MostResembling(const SmallFeatures& photo,

@@ -47,20 +47,33 @@ StepRecord FromJson(const json& j) {
   return record;
 }
 
-// The records of a finished step, or nothing when its stamp is absent, damaged or of other inputs:
-// then the step simply runs again.
-std::optional<std::vector<StepRecord>> ReadStamp(const fs::path& stamp,
-                                                 const std::string& fingerprint) {
-  if (!fs::exists(stamp)) return std::nullopt;
-  const json j = json::parse(ReadFile(stamp, kLargestStamp), nullptr, false);
+// What vouches for work of a step: its fingerprint, the runs that it took, and how much is done.
+struct Stamp {
+  std::vector<StepRecord> records;
+  size_t done = 0;
+};
+
+// Nothing when it is absent, damaged or of other inputs: then the work is simply done again.
+std::optional<Stamp> ReadStamp(const fs::path& file, const std::string& fingerprint) {
+  if (!fs::exists(file)) return std::nullopt;
+  const json j = json::parse(ReadFile(file, kLargestStamp), nullptr, false);
   try {
     if (j.is_discarded() || j.at("fingerprint") != fingerprint) return std::nullopt;
-    std::vector<StepRecord> records;
-    for (const json& record : j.at("runs")) records.push_back(FromJson(record));
-    return records;
+    Stamp stamp;
+    for (const json& record : j.at("runs")) stamp.records.push_back(FromJson(record));
+    stamp.done = j.value("done", size_t{0});
+    return stamp;
   } catch (const json::exception&) {
     return std::nullopt;
   }
+}
+
+void WriteStamp(const fs::path& file, const std::string& fingerprint,
+                std::span<const StepRecord> records, std::optional<size_t> done) {
+  json j = {{"fingerprint", fingerprint}, {"runs", json::array()}};
+  for (const StepRecord& record : records) j["runs"].push_back(ToJson(record));
+  if (done) j["done"] = *done;
+  WriteFileAtomically(file, j.dump(1, ' ', false, json::error_handler_t::replace) + "\n");
 }
 
 void Link(const fs::path& target, const fs::path& link) {
@@ -134,6 +147,7 @@ Workspace::Workspace(const fs::path& folder, const fs::path& images_dir,
   RemoveAll(images_folder());
   RemoveAll(masks_folder());
   for (const char* part : {"images", "logs", "lists"}) MakeFolder(folder_ / part);
+  RemoveTemporaryFiles(folder_);
   json names = json::object(), identity = json::array();
   for (size_t i = 0; i < images_.size(); ++i) {
     const SfmImageInput& image = images_[i];
@@ -190,13 +204,13 @@ void Workspace::Step(const std::string& name, const std::string& inputs,
                      const std::function<void()>& body) {
   fingerprint_ = HashOfText(fingerprint_ + "\n" + name + "\n" + inputs);
   const fs::path stamp = folder_ / (name + ".done.json");
-  if (const auto records = ReadStamp(stamp, fingerprint_)) {
-    records_.insert(records_.end(), records->begin(), records->end());
+  if (const auto finished = ReadStamp(stamp, fingerprint_)) {
+    records_.insert(records_.end(), finished->records.begin(), finished->records.end());
     return;
   }
   RemoveAll(stamp);
   step_ = name;
-  const auto first = static_cast<std::ptrdiff_t>(records_.size());
+  first_of_step_ = records_.size();
   try {
     body();
   } catch (const Interrupted&) {
@@ -206,11 +220,19 @@ void Workspace::Step(const std::string& name, const std::string& inputs,
     throw;
   }
   SyncTree(folder_);  // the stamp vouches for what COLMAP wrote, which syncs nothing
-  json runs = json::array();
-  for (auto it = records_.begin() + first; it != records_.end(); ++it) runs.push_back(ToJson(*it));
-  WriteFileAtomically(stamp, json{{"fingerprint", fingerprint_}, {"runs", runs}}.dump(
-                                 1, ' ', false, json::error_handler_t::replace) +
-                                 "\n");
+  WriteStamp(stamp, fingerprint_, std::span(records_).subspan(first_of_step_), {});
+}
+
+void Workspace::Keep(const fs::path& note, size_t done) const {
+  WriteStamp(note, fingerprint_, std::span(records_).subspan(first_of_step_), done);
+  SyncFolder(note.parent_path());
+}
+
+std::optional<size_t> Workspace::Kept(const fs::path& note) {
+  const auto kept = ReadStamp(note, fingerprint_);
+  if (!kept) return std::nullopt;
+  records_.insert(records_.end(), kept->records.begin(), kept->records.end());
+  return kept->done;
 }
 
 void Workspace::Run(const Arguments& arguments,

@@ -3,6 +3,7 @@
 #pragma once
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -52,6 +53,12 @@ class Workspace {
   /// Identity of the step running now (or last begun): hash of everything it depends on.
   const std::string& fingerprint() const { return fingerprint_; }
 
+  /// Inside a step: writes a note, on the disk when this returns, that `done` of its work is, with
+  /// the runs it took. Kept() takes them over and gives `done` back where a step of the same
+  /// fingerprint is begun again; nothing for a note that is absent, damaged or of other inputs.
+  void Keep(const std::filesystem::path& note, size_t done) const;
+  std::optional<size_t> Kept(const std::filesystem::path& note);
+
   /// Runs COLMAP once inside a step; see RunColmap.
   void Run(const Arguments& arguments, const std::function<void(const std::string&)>& on_line);
 
@@ -70,6 +77,7 @@ class Workspace {
   Program program_;
   std::string fingerprint_;
   std::string step_;
+  size_t first_of_step_ = 0;  // among records_
   std::vector<StepRecord> records_;
 };
 

@@ -329,16 +329,17 @@ TEST_F(HeldOutWithFake, OfManySourcesThePhotoIsMatchedWithThoseItResembles) {
   becomes("s007.png", pictures[1]);
   becomes("s040.png", pictures[2]);
   becomes("x.jpg", pictures[0]);
+  becomes("y.jpg", pictures[0]);
   model_.images.resize(1);
   model_.images[0].name = sources_[0].name;
-  held_out_ = {{"x.jpg", 640, 480, {}, "one"}};
   fake_.LeaveDatabase({"held_000000.jpg"});
   LeaveRegistered(true);
   Run();
-  const auto folder =
-      workspace_ / "held" / Sha256(std::as_bytes(std::span(std::string_view("x.jpg"))));
-  EXPECT_EQ(ReadFile(folder / "lists" / "pairs.txt", 1 << 20),
-            "held_000000.jpg 000007.png\nheld_000000.jpg 000040.png\n");
+  for (const std::string name : {"x.jpg", "y.jpg"}) {
+    const auto folder = workspace_ / "held" / Sha256(std::as_bytes(std::span(name)));
+    EXPECT_EQ(ReadFile(folder / "lists" / "pairs.txt", 1 << 20),
+              "held_000000.jpg 000007.png\nheld_000000.jpg 000040.png\n");
+  }
 }
 
 TEST_F(HeldOutWithFake, ChangedPhotoIsPlacedAgainAndNoOther) {
@@ -361,7 +362,14 @@ TEST_F(HeldOutWithFake, PhotoThatDoesNotRegisterIsListed) {
 
 TEST_F(HeldOutWithFake, AbsentSourceDatabaseIsNamed) {
   fs::remove(workspace_ / "sfm" / "database.db");
-  EXPECT_THROW(Run(), Error);
+  std::string message;
+  try {
+    Run();
+  } catch (const Error& error) {
+    message = error.what();
+  }
+  EXPECT_THAT(message, HasSubstr("database.db: expected the database that made the source model, "
+                                 "found none; run structure from motion on the sources again"));
 }
 
 }  // namespace

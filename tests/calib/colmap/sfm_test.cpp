@@ -226,35 +226,74 @@ TEST_F(RunSfmWithFake, InterruptEndsTheProgramAndTheNextRunGoesOn) {
 // finds of those before is kept, and later photos of a camera are of that which the first made.
 TEST_F(RunSfmWithFake, FeaturesGoOnAfterTheLastWholeBatch) {
   LeaveMorePhotos(50);
-  std::vector<int> cameras(Aliases().size(), 7);
-  fake_.LeaveDatabase(Aliases(), cameras);
-  fake_.Fail("feature_extractor", "test ! -e \"$database\" || { rm \"$database\"; exit 3; }");
+  fake_.LeaveDatabase(Aliases(), std::vector<int>(Aliases().size(), 7));
+  fake_.Fail("feature_extractor", "test ! -e \"$database\" || { echo x > \"$database\"; exit 3; }");
   EXPECT_THAT(MessageOfRun(), HasSubstr("found 3"));
   ASSERT_EQ(fake_.Calls().size(), 2u);
   EXPECT_THAT(fake_.Calls()[0], AllOf(HasSubstr("single_camera 1"), Not(HasSubstr("existing"))));
   EXPECT_THAT(fake_.Calls()[1],
               AllOf(HasSubstr("existing_camera_id 7"), Not(HasSubstr("single_camera"))));
 
-  fake_.Succeed("feature_extractor");
+  fake_.Fail("feature_extractor", "cmp \"$database\" \"$here/database\" || exit 4");
   fake_.ForgetCalls();
   listener_.updates.clear();
-  Run();
+  const SfmResult result = Run();
   ASSERT_EQ(fake_.Calls().size(), 3u);  // the second batch, matching, mapping
   EXPECT_THAT(fake_.Calls()[0], HasSubstr("existing_camera_id 7"));
   EXPECT_EQ(listener_.updates.front(), 48);
   EXPECT_FALSE(fs::exists(workspace_ / "sfm" / "features.db.working"));
+  // What the first batch took is not forgotten, and neither is its log.
+  ASSERT_EQ(result.report.steps.size(), 4u);
+  EXPECT_TRUE(result.report.steps[0].from_checkpoint);
+  EXPECT_NE(result.report.steps[0].log_file, result.report.steps[1].log_file);
+  EXPECT_TRUE(fs::exists(result.report.steps[0].log_file));
 }
 
+// Names are the same to COLMAP whatever the photos: what was found of others must never pass for
+// theirs, not even when one comes back to them.
 TEST_F(RunSfmWithFake, FeaturesOfOtherPhotosDoNotGoOn) {
   LeaveMorePhotos(50);
   fake_.LeaveDatabase(Aliases());
-  fake_.Fail("feature_extractor", "test ! -e \"$database\" || exit 3");
+  const std::string second_fails = "test ! -e \"$database\" || exit 3";
+  fake_.Fail("feature_extractor", second_fails);
   EXPECT_THAT(MessageOfRun(), HasSubstr("found 3"));
+  const fs::path note = workspace_ / "sfm" / "features.db.begun";
+  EXPECT_TRUE(fs::exists(note));
+  WriteFileAtomically(photos_ / "c.jpg", "another photo");
+  fake_.Fail("feature_extractor", "exit 5");
+  EXPECT_THAT(MessageOfRun(), HasSubstr("found 5"));
+  EXPECT_FALSE(fs::exists(note)) << "it is of the photos before";
+  fake_.Fail("feature_extractor", second_fails);
+  EXPECT_THAT(MessageOfRun(), HasSubstr("found 3"));
+  WriteFileAtomically(photos_ / "c.jpg", "photo c.jpg");
   fake_.Succeed("feature_extractor");
   fake_.ForgetCalls();
-  WriteFileAtomically(photos_ / "c.jpg", "another photo");
   Run();
-  EXPECT_EQ(fake_.Calls().size(), 4u);
+  EXPECT_EQ(fake_.Calls().size(), 4u);  // both batches
+}
+
+// Killed between the two: a batch more is there than the note says.
+TEST_F(RunSfmWithFake, ABatchThatTheNoteDoesNotKnowIsAskedForAgain) {
+  LeaveMorePhotos(50);
+  fake_.LeaveDatabase(Aliases(), std::vector<int>(Aliases().size(), 7));
+  fake_.Fail("feature_extractor", "test ! -e \"$database\" || exit 3");
+  EXPECT_THAT(MessageOfRun(), HasSubstr("found 3"));
+  const fs::path note = workspace_ / "sfm" / "features.db.begun";
+  const std::string first = ReadFile(note, kFileLimit);
+  fake_.Succeed("feature_extractor");
+  Run();
+  fs::remove(workspace_ / "sfm" / "features.done.json");
+  WriteFileAtomically(note, first);
+  fake_.ForgetCalls();
+  Run();
+  EXPECT_THAT(fake_.Calls().front(), HasSubstr("existing_camera_id 7"));
+  for (size_t length = 0; length < first.size(); length += 7) {
+    fs::remove(workspace_ / "sfm" / "features.done.json");
+    WriteFileAtomically(note, first.substr(0, length));
+    fake_.ForgetCalls();
+    Run();
+    ASSERT_THAT(fake_.Calls().front(), HasSubstr("single_camera 1")) << length;
+  }
 }
 
 TEST(InBatches, AreOfWholePhotosInOrderAndGrowWithWhatIsBehindThem) {
