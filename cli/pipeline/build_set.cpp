@@ -407,6 +407,7 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
                        {},
                        options.sfm},
                       writer.work_folder() / "calibration", progress);
+  log.AddEarlier(calibrated.earlier_wall_s, calibrated.earlier_cpu_s);
   report.not_registered = calibrated.not_registered;
   report.why_not_registered = calibrated.why_not_registered;
   for (size_t i = 0; i < held_out.size(); ++i) {

@@ -106,7 +106,12 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
   CalibratedPhotos calibrated;
   calibrated.engine = sfm.report.version;
   calibrated.why_not_registered = sfm.report.why_not_registered;
-  for (const colmap::StepRecord& step : sfm.report.steps) calibrated.engine_cpu_s += step.cpu_s;
+  for (const colmap::StepRecord& step : sfm.report.steps) {
+    calibrated.engine_cpu_s += step.cpu_s;
+    if (!step.from_checkpoint) continue;
+    calibrated.earlier_cpu_s += step.cpu_s;
+    calibrated.earlier_wall_s += step.wall_s;
+  }
   Json report = SfmJson(sfm.report, sfm.model);
   calibrated.model = std::move(sfm.model);
   if (options.rig) {

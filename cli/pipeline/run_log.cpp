@@ -41,6 +41,7 @@ void RunLog::Begin(const std::string& name) {
   End();
   stages_.push_back({name, 0, 0, 0});
   running_ = true;
+  earlier_wall_s_ = earlier_cpu_s_ = 0;
   cpu_start_s_ = CpuSeconds();
   start_ = std::chrono::steady_clock::now();
 }
@@ -48,10 +49,15 @@ void RunLog::Begin(const std::string& name) {
 void RunLog::End() {
   if (!running_) return;
   const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - start_;
-  stages_.back().wall_s = wall.count();
-  stages_.back().cpu_s = CpuSeconds() - cpu_start_s_;
+  stages_.back().wall_s = earlier_wall_s_ + wall.count();
+  stages_.back().cpu_s = earlier_cpu_s_ + CpuSeconds() - cpu_start_s_;
   stages_.back().peak_rss_kib = static_cast<long>(PeakMemoryBytesWithPrograms() >> 10);
   running_ = false;
+}
+
+void RunLog::AddEarlier(double wall_s, double cpu_s) {
+  earlier_wall_s_ += wall_s;
+  earlier_cpu_s_ += cpu_s;
 }
 
 io::RunRecord RunLog::Record(int threads, std::vector<std::string> lines) const {

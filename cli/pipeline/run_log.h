@@ -15,6 +15,8 @@ class RunLog {
   void Begin(const std::string& name);
   /// Ends the running stage.
   void End();
+  /// Adds to the running stage what an interrupted run before spent on it.
+  void AddEarlier(double wall_s, double cpu_s);
   const std::vector<io::RunStage>& stages() const { return stages_; }
   /// The record of the run (its command line is this program's), with these lines, to be written
   /// by io::WriteRunRecord.
@@ -23,7 +25,7 @@ class RunLog {
  private:
   std::vector<io::RunStage> stages_;
   bool running_ = false;
-  double cpu_start_s_ = 0;
+  double cpu_start_s_ = 0, earlier_wall_s_ = 0, earlier_cpu_s_ = 0;
   std::chrono::steady_clock::time_point start_;
 };
 

@@ -9,6 +9,7 @@
 
 #include "calib/colmap/model_io.h"
 #include "dtr/base/process.h"
+#include "dtr/io/run_record.h"
 #include "tests/calib/colmap/fake_colmap.h"
 #include "tests/cli/courtyard_and_set.h"
 
@@ -129,6 +130,25 @@ TEST_F(LeftOver, ACalibrationThatWasKilledWhileColmapWorked) {
   ASSERT_EQ(colmap.Calls().size(), 1u);
   EXPECT_THAT(colmap.Calls()[0], ::testing::HasSubstr("mapper"));
   EXPECT_THAT(NamesIn(work_), ElementsAre("model"));
+}
+
+// A build that goes on tells what its calibration took, not what was left of it.
+TEST_F(LeftOver, ABuildThatGoesOnCountsWhatColmapTookBefore) {
+  colmap::testing::FakeColmap colmap;
+  calib::SfmModel model = colmap::ReadModel(Shared("courtyard/sparse"));
+  colmap.LeaveDatabase(NumberImages(model));
+  colmap::WriteModel(colmap / "model.0", model, colmap::Format::kBinary);
+  colmap.Fail("feature_extractor", "sleep 3");
+  colmap.Fail("mapper", "exit 3");
+  const std::vector<std::string> building{"build", Photos(), "--engine",
+                                          "none",  "-o",     Work("set.dtr")};
+  ExpectRefused(Dtr(building), 1, "expected exit code 0, found 3");
+  colmap.Succeed("mapper");
+  DtrOk(building);
+  const auto stages = io::ReadRunStages(Work("set.dtr"));
+  ASSERT_GE(stages.size(), 2u);
+  ASSERT_EQ(stages[1].name, "calibration");
+  EXPECT_GE(stages[1].wall_s, 3);
 }
 
 bool HoldsASet(const fs::path& folder) {
