@@ -68,7 +68,7 @@ class Expression {
   size_t at_;
 };
 
-// The longest run without a {placeholder}, less the punctuation around it.
+// The longest run without a {field} of fmt, less the punctuation around it.
 std::string LongestPiece(const std::vector<std::string>& literals) {
   std::string longest;
   const auto take = [&longest](std::string_view piece) {

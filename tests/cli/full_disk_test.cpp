@@ -7,7 +7,7 @@
 #include <sstream>
 
 #include "calib/colmap/model_io.h"
-#include "tests/calib/colmap/fake_colmap.h"
+#include "tests/cli/fake_sfm.h"
 #include "tests/cli/run_dtr.h"
 #include "tests/cli/small_courtyard.h"
 #include "tests/support/small_disk.h"
@@ -105,11 +105,7 @@ class FullDiskOf : public ::testing::TestWithParam<Command> {
   static void TearDownTestSuite() { delete shared_; }
   static std::string Of() { return shared_->path().string() + "/"; }
 
-  void SetUp() override {
-    calib::SfmModel model = colmap::ReadModel(Of() + "courtyard/sparse");
-    colmap_.LeaveDatabase(NumberImages(model));
-    colmap::WriteModel(colmap_ / "model.0", model, colmap::Format::kBinary);
-  }
+  void SetUp() override { LeaveModel(colmap_, colmap::ReadModel(Of() + "courtyard/sparse")); }
   std::vector<std::string> In(const fs::path& folder) const {
     std::vector<std::string> words;
     std::istringstream stream(GetParam().words + " --threads 1");

@@ -10,8 +10,8 @@
 #include "calib/colmap/model_io.h"
 #include "dtr/base/process.h"
 #include "dtr/io/run_record.h"
-#include "tests/calib/colmap/fake_colmap.h"
 #include "tests/cli/courtyard_and_set.h"
+#include "tests/cli/fake_sfm.h"
 
 namespace dtr::testing {
 namespace {
@@ -114,9 +114,7 @@ bool IsAtWork(int process) {
 // COLMAP ends with the command that started it, and what is finished is not done again.
 TEST_F(LeftOver, ACalibrationThatWasKilledWhileColmapWorked) {
   colmap::testing::FakeColmap colmap;
-  calib::SfmModel model = colmap::ReadModel(Shared("courtyard/sparse"));
-  colmap.LeaveDatabase(NumberImages(model));
-  colmap::WriteModel(colmap / "model.0", model, colmap::Format::kBinary);
+  LeaveModel(colmap, colmap::ReadModel(Shared("courtyard/sparse")));
   colmap.Fail("mapper",
               "echo $$ > \"$here/pid\"; mv \"$here/pid\" \"$here/mapping\"; exec sleep 600");
   const std::vector<std::string> calibrating{"calibrate", "photos", Photos(), "-o", Work("model")};
@@ -135,9 +133,7 @@ TEST_F(LeftOver, ACalibrationThatWasKilledWhileColmapWorked) {
 // A build that goes on tells what its calibration took, not what was left of it.
 TEST_F(LeftOver, ABuildThatGoesOnCountsWhatColmapTookBefore) {
   colmap::testing::FakeColmap colmap;
-  calib::SfmModel model = colmap::ReadModel(Shared("courtyard/sparse"));
-  colmap.LeaveDatabase(NumberImages(model));
-  colmap::WriteModel(colmap / "model.0", model, colmap::Format::kBinary);
+  LeaveModel(colmap, colmap::ReadModel(Shared("courtyard/sparse")));
   colmap.Fail("feature_extractor", "sleep 3");
   colmap.Fail("mapper", "exit 3");
   const std::vector<std::string> building{"build", Photos(), "--engine",

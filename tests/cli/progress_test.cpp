@@ -5,8 +5,8 @@
 #include <regex>
 
 #include "calib/colmap/model_io.h"
-#include "tests/calib/colmap/fake_colmap.h"
 #include "tests/cli/courtyard_and_set.h"
+#include "tests/cli/fake_sfm.h"
 
 namespace dtr::testing {
 namespace {
@@ -26,9 +26,7 @@ TEST_F(ProgressTold, TheShareAndTheTimeLeft) {
 // COLMAP takes 300 MB and a second, more than everything else together.
 TEST_F(ProgressTold, TheMemoryOfColmapIsCounted) {
   colmap::testing::FakeColmap colmap;
-  calib::SfmModel model = colmap::ReadModel(Shared("courtyard/sparse"));
-  colmap.LeaveDatabase(NumberImages(model));
-  colmap::WriteModel(colmap / "model.0", model, colmap::Format::kBinary);
+  LeaveModel(colmap, colmap::ReadModel(Shared("courtyard/sparse")));
   colmap.Fail("feature_extractor",
               "head -c 300000000 /dev/zero | tail -c 300000000 > /dev/null; sleep 1");
   const Ran ran = DtrOk({"build", Photos(), "-o", In("set.dtr"), "--engine", "none"});

@@ -4,7 +4,7 @@
 #pragma once
 #include "calib/colmap/model_io.h"
 #include "dtr/base/process.h"
-#include "tests/calib/colmap/fake_colmap.h"
+#include "tests/cli/fake_sfm.h"
 #include "tests/cli/resuming.h"
 
 namespace dtr::testing {
@@ -35,8 +35,7 @@ class VideoBySfm : public FullDisk {
         feature.pixel += kSfmNoisePx * Eigen::Vector2d(x, random.Normal());
       }
     }
-    colmap_.LeaveDatabase(NumberImages(model));
-    colmap::WriteModel(colmap_ / "model.0", model, colmap::Format::kBinary);
+    LeaveModel(colmap_, model);
   }
   std::vector<std::string> Inputs() const override { return {Video(), "--every", "1"}; }
   std::string Video() const { return (folder_ / "walk.avi").string(); }

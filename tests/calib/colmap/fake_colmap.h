@@ -47,7 +47,7 @@ class FakeColmap {
   /// The database that the extractor leaves: these images, of the cameras named (else of one), with
   /// 100 features each, and of pairs what they have in common.
   void LeaveDatabase(const std::vector<std::string>& names, const std::vector<int>& cameras = {},
-                     const std::vector<Common>& pairs = {}) {
+                     const std::vector<Common>& pairs = {}) const {
     std::filesystem::remove(folder_ / "database");
     sqlite3* database = nullptr;
     std::string sql =

@@ -235,6 +235,14 @@ class HeldOutWithFake : public ::testing::Test {
     WriteModel(fake_ / "output", model, Format::kBinary);
   }
 
+  // Where a held-out photo is placed, and the pairs that are matched for it there.
+  fs::path FolderOf(const std::string& name) const {
+    return workspace_ / "held" / Sha256(std::as_bytes(std::span(name)));
+  }
+  std::string PairsOf(const std::string& name) const {
+    return ReadFile(FolderOf(name) / "lists" / "pairs.txt", 1 << 20);
+  }
+
   HeldOutResult Run() {
     return RegisterHeldOut(photos_.path(), held_out_, model_, sources_, workspace_ / "sfm",
                            workspace_ / "held", {}, silent_);
@@ -304,10 +312,8 @@ TEST_F(HeldOutWithFake, EachPhotoIsMatchedWithSourcesAlone) {
   LeaveRegistered(true);
   Run();
   for (const std::string name : {"x.jpg", "y.jpg"}) {
-    const auto folder = workspace_ / "held" / Sha256(std::as_bytes(std::span(name)));
-    EXPECT_EQ(ReadFile(folder / "lists" / "pairs.txt", 1 << 20),
-              "held_000000.jpg 000000.jpg\nheld_000000.jpg 000001.jpg\n");
-    EXPECT_EQ(fs::read_symlink(folder / "images" / "held_000000.jpg").filename(), name);
+    EXPECT_EQ(PairsOf(name), "held_000000.jpg 000000.jpg\nheld_000000.jpg 000001.jpg\n");
+    EXPECT_EQ(fs::read_symlink(FolderOf(name) / "images" / "held_000000.jpg").filename(), name);
   }
   EXPECT_THAT(fake_.Calls(), Each(Not(HasSubstr("mapper"))));
 }
@@ -336,9 +342,7 @@ TEST_F(HeldOutWithFake, OfManySourcesThePhotoIsMatchedWithThoseItResembles) {
   LeaveRegistered(true);
   Run();
   for (const std::string name : {"x.jpg", "y.jpg"}) {
-    const auto folder = workspace_ / "held" / Sha256(std::as_bytes(std::span(name)));
-    EXPECT_EQ(ReadFile(folder / "lists" / "pairs.txt", 1 << 20),
-              "held_000000.jpg 000007.png\nheld_000000.jpg 000040.png\n");
+    EXPECT_EQ(PairsOf(name), "held_000000.jpg 000007.png\nheld_000000.jpg 000040.png\n");
   }
 }
 
