@@ -243,7 +243,7 @@ void ExtractFeaturesResumably(Workspace& workspace, const std::filesystem::path&
                               std::uint64_t seed) {
   const std::filesystem::path working = database.string() + ".working",
                               note = database.string() + ".begun";
-  size_t kept = std::filesystem::exists(database) ? workspace.Kept(note).value_or(0) : 0;
+  const size_t kept = std::filesystem::exists(database) ? workspace.Kept(note).value_or(0) : 0;
   if (kept == 0) {
     // A note must never meet features of other photos: it goes before a new database comes.
     RemoveAll(note);
