@@ -16,6 +16,7 @@
 #include "dtr/base/memory_budget.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/base/work_folder.h"
+#include "dtr/io/formats/file_names.h"
 #include "dtr/io/formats/utf8.h"
 
 namespace dtr::capture {
@@ -53,22 +54,6 @@ bool EndsWith(const std::string& text, const std::string& end) {
   return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
 }
 
-// Why a folder is not searched for photos: it would give pictures that we made ourselves.
-std::string WhyNotSearched(const fs::path& folder) {
-  std::error_code ignored;
-  if (fs::is_symlink(folder, ignored)) return "links to a folder; links are not followed";
-  const std::string name = folder.filename().string();
-  if (EndsWith(name, ".dtr") || EndsWith(name, ".partial") ||
-      fs::exists(folder / "set.json", ignored)) {
-    return "is a D+TR set, not photos";
-  }
-  if (fs::exists(folder / kCaptureFile, ignored)) return "is a capture of its own";
-  if (fs::exists(folder / WorkFolder::MarkOf(kCalibrationKind), ignored)) {
-    return "is the workspace of a calibration";
-  }
-  return "";
-}
-
 void ListFolder(const fs::path& top, const std::string& below, bool recurse, Listing& listing) {
   std::error_code error;
   fs::directory_iterator entries(below.empty() ? top : top / below, error);
@@ -89,6 +74,12 @@ void ListFolder(const fs::path& top, const std::string& below, bool recurse, Lis
       ++listing.ignored;
     } else if (!io::IsUtf8(name) || std::any_of(name.begin(), name.end(), IsControl)) {
       listing.skipped.push_back({PrintableName(name), "its name is no printable UTF-8; rename it"});
+    } else if (!io::WhyUnsafeName(name).empty()) {
+      listing.skipped.push_back(
+          {PrintableName(name), "its name " + io::WhyUnsafeName(name) + "; rename it"});
+    } else if (name.front() == ' ') {
+      listing.skipped.push_back(
+          {name, "its name begins with a blank, which COLMAP's files cannot hold; rename it"});
     } else {
       listing.names.push_back(name);
     }
@@ -221,6 +212,21 @@ void AssignIds(std::vector<Photo>& photos) {
 }
 
 }  // namespace
+
+std::string WhyNotSearched(const fs::path& folder) {
+  std::error_code ignored;
+  if (fs::is_symlink(folder, ignored)) return "links to a folder; links are not followed";
+  const std::string name = folder.filename().string();
+  if (EndsWith(name, ".dtr") || EndsWith(name, ".partial") ||
+      fs::exists(folder / "set.json", ignored)) {
+    return "is a D+TR set, not photos";
+  }
+  if (fs::exists(folder / kCaptureFile, ignored)) return "is a capture of its own";
+  if (fs::exists(folder / WorkFolder::MarkOf(kCalibrationKind), ignored)) {
+    return "is the workspace of a calibration";
+  }
+  return "";
+}
 
 FocalPrior FocalFromExif(const io::ImageHeader& header) {
   const double longest = std::max(header.width_px, header.height_px);

@@ -31,6 +31,10 @@ struct IngestOptions {
 Capture IngestPhotos(const std::filesystem::path& folder, const IngestOptions& options,
                      Progress& progress);
 
+/// Why a folder below one of photos is not looked into: it is a link, or holds pictures that we
+/// made ourselves (a set, a capture, a workspace, unfinished work). Empty: it is.
+std::string WhyNotSearched(const std::filesystem::path& folder);
+
 /// A focal length in pixels and where it comes from.
 struct FocalPrior {
   std::optional<double> focal_px;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <set>
 #include <utility>
 
 #include "dtr/base/error.h"
@@ -34,16 +35,21 @@ std::optional<Fault> FaultCalled(const std::string& name) {
 
 void DropFaulty(Capture& capture, const std::vector<Fault>& faults) {
   std::vector<Photo> kept;
+  std::set<std::string> dropped;
   for (Photo& photo : capture.photos) {
     std::string reason;
     for (size_t i = 0; photo.screening && i < photo.screening->faults.size(); ++i) {
       const Fault fault = photo.screening->faults[i];
       if (std::find(faults.begin(), faults.end(), fault) == faults.end()) continue;
+      // The sharp retake of a blurred photo: once that has gone nothing else shows the picture, and
+      // the first retake that stays stands for it.
+      if (fault == Fault::kDuplicate && dropped.erase(photo.screening->duplicate_of) > 0) continue;
       reason += (reason.empty() ? "dropped: " : "; ") + photo.screening->remarks[i];
     }
     if (reason.empty()) {
       kept.push_back(std::move(photo));
     } else {
+      dropped.insert(photo.name);
       capture.skipped.push_back({photo.name, reason});
     }
   }

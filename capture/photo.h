@@ -82,7 +82,8 @@ struct Capture {
   std::vector<Skipped> skipped;
 };
 
-/// Takes out the photos that have one of these faults and lists them under `skipped`.
+/// Takes out the photos that have one of these faults and lists them under `skipped`. A duplicate
+/// of a photo that goes stays: it is the only one left of its picture.
 void DropFaulty(Capture& capture, const std::vector<Fault>& faults);
 
 /// A scene needs two photos. Throws Error naming `where`, the number found and what was skipped.

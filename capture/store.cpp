@@ -4,6 +4,7 @@
 #include <atomic>
 #include <functional>
 #include <optional>
+#include <set>
 #include <string>
 #include <system_error>
 #include <vector>
@@ -20,6 +21,7 @@ namespace dtr::capture {
 namespace fs = std::filesystem;
 namespace {
 
+constexpr char kKind[] = "capture";
 constexpr std::uintmax_t kLargestListBytes = 256u << 20;  // a thousand bytes a photo
 
 void Require(const std::error_code& error, const fs::path& file) {
@@ -31,15 +33,19 @@ void RefuseOccupied(const fs::path& folder, bool replace) {
   if (!fs::exists(fs::symlink_status(folder, error))) return;
   const bool is_folder = fs::is_directory(folder, error);
   if (is_folder && fs::is_empty(folder, error) && !error) return;
-  if (is_folder && replace && fs::exists(folder / kCaptureFile, error)) return;
+  if (is_folder && replace && fs::exists(folder / kCaptureFile, error)) {
+    return RefuseForeign(folder, [](const std::string& name) {
+      static const std::set<std::string> kOurs{
+          "images", "masks", kCaptureFile, kContactSheetFile, kPageFile, WorkFolder::MarkOf(kKind)};
+      return kOurs.contains(name);
+    });
+  }
   throw UsageError(folder.string() + ": expected a new folder, found " +
                    (!is_folder ? "a file"
                     : replace  ? "a folder that is no capture"
                                : "something in it already") +
                    "; choose another name" + (replace ? "" : " or give --force"));
 }
-
-constexpr char kKind[] = "capture";
 
 // The file system's own errors, as ours: they name the file already.
 void AsError(const std::function<void()>& function) {

@@ -20,8 +20,18 @@ void RefuseWhatIsNoNumber(CLI::App& command) {
     const bool whole = !text.empty() && *end == '\0';
     return whole && std::isfinite(value) ? "" : "expected a finite number, found " + text;
   };
+  const auto whole = [finite](const std::string& text) -> std::string {
+    if (std::string why = finite(text); !why.empty()) return why;
+    char* end = nullptr;
+    (void)std::strtoll(text.c_str(), &end, 10);
+    return *end == '\0' ? "" : "expected a whole number, found " + text;
+  };
   for (CLI::Option* option : command.get_options()) {
     const std::string type = option->get_type_name();
+    if (type.find(":INT in [") != std::string::npos) {
+      option->transform(CLI::Validator(whole, ""));
+      continue;
+    }
     if (type.find("POSITIVE") != std::string::npos ||
         type.find("NONNEGATIVE") != std::string::npos || type.find(" in [") != std::string::npos) {
       option->transform(CLI::Validator(finite, ""));  // before the range, which would print it

@@ -103,6 +103,11 @@ void Console::Say(const std::string& line) {
 
 bool Console::StopRequested() const { return g_interrupted != 0; }
 
+std::string Console::InterruptedLine() const {
+  return keeps_work_ ? "interrupted; what was finished is kept, the same command continues"
+                     : "interrupted; the same command begins anew";
+}
+
 void Console::FinishStage() {
   if (stage_.empty()) return;
   const double spent_s = SecondsSince(stage_start_);

@@ -19,6 +19,10 @@ class Console final : public Progress {
   void Update(int done) override;
   void Note(const std::string& line) override;
   bool StopRequested() const override;  ///< after Ctrl-C or SIGTERM
+  std::string InterruptedLine() const override;
+
+  /// Said by commands that go on where an interrupted run of theirs ended.
+  void KeepsWork() { keeps_work_ = true; }
 
   /// A result for people.
   void Say(const std::string& line);
@@ -31,6 +35,7 @@ class Console final : public Progress {
   std::mutex mutex_;
   bool json_on_stdout_;
   bool terminal_;
+  bool keeps_work_ = false;
   std::string stage_;
   int total_ = 0, done_ = 0, told_tenths_ = 0;
   std::chrono::steady_clock::time_point stage_start_;

@@ -82,13 +82,26 @@ void WriteViews(const fs::path& folder, size_t index, Frame& frame, LengthUnit u
   load.warn = [&](const std::string& line) { progress.Note(line); };
   for (View& view : frame.views) {
     progress.ThrowIfInterrupted();
-    io::LoadPixels(folder, view, load);
-    view.id = fmt::format("t{:04}_{}", index, view.id);
-    view.image_file = view.depth_file = view.sigma_file = view.mask_file = view.mesh_file = {};
+    View joined = view;
+    joined.id = fmt::format("t{:04}_{}", index, view.id);
+    for (auto* file : {&joined.image_file, &joined.mask_file, &joined.depth_file,
+                       &joined.sigma_file, &joined.mesh_file}) {
+      file->reset();
+    }
+    const bool written = writer.RestoreView(joined);  // by a run that was interrupted
+    load.images = load.sigma = !written;
+    if (!written || view.mesh_file) io::LoadPixels(folder, view, load);
     const std::optional<StoredMesh> mesh = std::exchange(view.mesh, {});
-    writer.WriteView(view, unit);
-    if (mesh) writer.WriteMesh(view, *mesh);
-    DropPixels(view);
+    if (!written) {
+      joined.image = std::move(view.image);
+      joined.mask = std::move(view.mask);
+      joined.depth = std::move(view.depth);
+      joined.inverse_depth_sigma = std::move(view.inverse_depth_sigma);
+      writer.WriteView(joined, unit);
+    }
+    if (mesh) writer.WriteMesh(joined, *mesh);
+    DropPixels(joined);
+    view = std::move(joined);
   }
 }
 

@@ -9,7 +9,14 @@ namespace {
 
 // Visible sub-commands in the order they were added.
 std::vector<const CLI::App*> Commands(const CLI::App& app) {
-  return app.get_subcommands([](const CLI::App* command) { return !command->get_group().empty(); });
+  return app.get_subcommands([](const CLI::App* command) {
+    return !command->get_group().empty() && !command->get_name().empty();
+  });
+}
+
+// CLI11 keeps a group of options of which one must be given as a command without a name.
+std::vector<const CLI::App*> Groups(const CLI::App& app) {
+  return app.get_subcommands([](const CLI::App* command) { return command->get_name().empty(); });
 }
 
 // Visible options in the order they were added; positionals apart from those with a dash.
@@ -17,6 +24,13 @@ std::vector<const CLI::Option*> Options(const CLI::App& app, bool positional) {
   return app.get_options([positional](const CLI::Option* option) {
     return !option->get_group().empty() && option->get_positional() == positional;
   });
+}
+
+// Of such a group, but for the help that CLI11 gives it, too.
+std::vector<const CLI::Option*> OptionsOfGroup(const CLI::App& group) {
+  std::vector<const CLI::Option*> options = Options(group, false);
+  std::erase(options, group.get_help_ptr());
+  return options;
 }
 
 // "-o,--output" as CLI11 joins the names of an option.
@@ -58,14 +72,24 @@ std::string Roff(const std::string& text) {
   return out;
 }
 
+// The type as it was declared: CLI11 puts behind it what a value is checked for ("N:INT in [0 -
+// 9]"), and ours may have a colon of their own ("every:N|NAME,...").
+std::string TypeOf(const CLI::Option& option) {
+  std::string type = option.get_type_name();
+  for (const char* check : {":INT", ":UINT", ":FLOAT", ":POSITIVE", ":NONNEGATIVE", ":NUMBER", ":{",
+                            ":DIR", ":FILE", ":PATH", ":TEXT"}) {
+    type = type.substr(0, type.find(check));
+  }
+  return type;
+}
+
 std::string OptionEntry(const CLI::Option& option) {
   std::string names = option.get_positional() ? option.get_name(true)
                                               : fmt::format("{}", fmt::join(Names(option), ", "));
   std::string entry = ".TP\n.B " + Roff(names);
   // A flag takes no value; its type says nothing.
   if (!option.get_positional() && option.get_items_expected_max() > 0) {
-    const std::string type = option.get_type_name();  // "NAME" or "NAME:what it is checked for"
-    entry += " " + Roff(type.substr(0, type.find(':')));
+    entry += " " + Roff(TypeOf(option));
   }
   if (option.get_required()) entry += " (required)";
   entry += "\n" + Roff(option.get_description()) + "\n";
@@ -76,6 +100,9 @@ void AppendCommand(const CLI::App& command, const std::string& called, std::stri
   page += fmt::format(".SS \"{}\"\n{}\n", Roff(called), Roff(command.get_description()));
   for (const bool positional : {true, false}) {
     for (const CLI::Option* option : Options(command, positional)) page += OptionEntry(*option);
+  }
+  for (const CLI::App* group : Groups(command)) {
+    for (const CLI::Option* option : OptionsOfGroup(*group)) page += OptionEntry(*option);
   }
   if (!command.get_footer().empty()) {
     page += ".PP\n.nf\n" + Roff(command.get_footer()) + "\n.fi\n";
@@ -90,7 +117,12 @@ void AppendWords(const CLI::App& app, const std::string& called, std::string& wo
                  std::string& choices) {
   std::vector<std::string> list;
   for (const CLI::App* command : Commands(app)) list.push_back(command->get_name());
-  for (const CLI::Option* option : Options(app, false)) {
+  std::vector<const CLI::Option*> options = Options(app, false);
+  for (const CLI::App* group : Groups(app)) {
+    const auto more = OptionsOfGroup(*group);
+    options.insert(options.end(), more.begin(), more.end());
+  }
+  for (const CLI::Option* option : options) {
     for (const std::string& name : Names(*option)) {
       list.push_back(name);
       const std::string values = Choices(*option);
@@ -146,7 +178,7 @@ _dtr() {{
   local values=${{choices["$called ${{COMP_WORDS[COMP_CWORD-1]}}"]-}}
   if [[ -n $values ]]; then
     COMPREPLY=($(compgen -W "$values" -- "$current"))
-  elif [[ $current == -* || $called == dtr || $called == "dtr calibrate" ]]; then
+  elif [[ $current == -* || ${{words[$called]}} != -* ]]; then
     COMPREPLY=($(compgen -W "${{words[$called]}}" -- "$current"))
   fi
   # No word fits: bash offers file names.

@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
 
 #include "dtr/base/error.h"
 
@@ -13,7 +16,12 @@ namespace fs = std::filesystem;
 void RequireFolderOf(const fs::path& file, const std::string& option) {
   const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
   std::error_code ignored;
-  if (fs::is_directory(folder, ignored)) return;
+  if (fs::is_directory(folder, ignored)) {
+    if (access(folder.c_str(), W_OK) == 0) return;
+    throw Error(
+        fmt::format("{} {}: expected a folder that can be written to, found {}, which cannot: {}",
+                    option, file.string(), folder.string(), std::strerror(errno)));
+  }
   throw UsageError(fmt::format(
       "{} {}: expected an existing folder to write into, found {} at {}", option, file.string(),
       fs::exists(folder, ignored) ? "a file" : "nothing", folder.string()));

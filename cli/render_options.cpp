@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 
+#include "cli/number_checks.h"
 #include "dtr/io/pruned.h"
 #include "dtr/render/option_arguments.h"
 #include "dtr/render/option_names.h"
@@ -52,7 +53,7 @@ void AddAbsolute(CLI::App& command, const std::string& flag, std::optional<doubl
           flag,
           [&target](double value) { target = value > 0 ? std::optional(value) : std::nullopt; },
           description)
-      ->check(CLI::NonNegativeNumber)
+      ->check(kNonNegative)
       ->type_name("UNITS");
 }
 
@@ -98,7 +99,7 @@ std::shared_ptr<RenderOptions> AddRenderOptions(CLI::App& command) {
       ->check(CLI::Range(1, 64))
       ->type_name("R");
   command.add_option("--point-size", options.point_size, "Splats: factor on the footprint [1]")
-      ->check(CLI::PositiveNumber)
+      ->check(kPositive)
       ->type_name("S");
   command.add_option("--exponent", options.exponent, "cosine: exponent [8]")
       ->check(CLI::Range(0.0, 1000.0))
@@ -118,19 +119,19 @@ std::shared_ptr<RenderOptions> AddRenderOptions(CLI::App& command) {
   command
       .add_option("--delta", options.delta_px,
                   "Delta of the two-pass method, in pixels of disparity")
-      ->check(CLI::PositiveNumber)
+      ->check(kPositive)
       ->type_name("PX");
   command
       .add_option("--depth-break", options.depth_break_px,
                   "Triangles across larger depth steps are dropped, in pixels of disparity")
-      ->check(CLI::PositiveNumber)
+      ->check(kPositive)
       ->type_name("PX");
   command
       .add_option("--mesh-tolerance", options.mesh_tolerance_px,
                   fmt::format("deferred: how far the reduced mesh may lie off the depth, in pixels "
                               "of disparity [{}]",
                               RenderOptions{}.mesh_tolerance_px))
-      ->check(CLI::NonNegativeNumber)
+      ->check(kNonNegative)
       ->type_name("PX");
   AddAbsolute(command, "--absolute-delta", options.absolute_delta,
               "Delta in scene units instead, as in the founding report [0: not]");

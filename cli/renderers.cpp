@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "cli/number_checks.h"
 #include "dtr/base/error.h"
 #include "dtr/cpu/renderer.h"
 
@@ -58,7 +59,7 @@ void AddOpenGlOptions(CLI::App& command, RendererChoice& choice) {
   command
       .add_option("--gpu-memory", choice.gpu_memory_gb,
                   "Memory for the views on the GPU; others are dropped and put there again [4]")
-      ->check(CLI::PositiveNumber)
+      ->check(kPositive)
       ->check(CLI::Range(0.0, kMostGigabytes))
       ->type_name("GB");
 }

@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "cli/number_checks.h"
 #include "cli/renderers.h"
 #include "dtr/io/set_io.h"
 
@@ -30,7 +31,7 @@ void AddMemoryOption(CLI::App& command, double& memory_gb) {
   command
       .add_option("--memory", memory_gb,
                   "Memory for the views' pixels; others are dropped and read again [4]")
-      ->check(CLI::PositiveNumber)
+      ->check(kPositive)
       ->check(CLI::Range(0.0, kMostGigabytes))
       ->type_name("GB");
 }

@@ -1,5 +1,7 @@
 #include "cli/video_options.h"
 
+#include "cli/number_checks.h"
+
 namespace dtr::cli {
 
 void AddVideoOptions(CLI::App& command, capture::VideoOptions& options) {
@@ -7,7 +9,7 @@ void AddVideoOptions(CLI::App& command, capture::VideoOptions& options) {
       command
           .add_option("--every", options.every,
                       "Of a video: every N-th frame, instead of a choice by motion and sharpness")
-          ->check(CLI::PositiveNumber)
+          ->check(kPositive)
           ->type_name("N");
   command
       .add_option("--motion", options.motion,
@@ -17,7 +19,7 @@ void AddVideoOptions(CLI::App& command, capture::VideoOptions& options) {
   command
       .add_option("--max-frames", options.most,
                   "Of a video: at most so many frames, the sharpest of equal parts")
-      ->check(CLI::PositiveNumber)
+      ->check(kPositive)
       ->type_name("N");
   command.add_flag("--synchronised", options.synchronised,
                    "The videos are a rig's, begun at one moment: the same frames of each");

@@ -277,6 +277,17 @@ ceres::Solver::Options SolverOptions(size_t images, bool robust) {
   return options;
 }
 
+class StopsWhenAsked final : public ceres::IterationCallback {
+ public:
+  explicit StopsWhenAsked(const Progress& progress) : progress_(progress) {}
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary&) override {
+    return progress_.StopRequested() ? ceres::SOLVER_ABORT : ceres::SOLVER_CONTINUE;
+  }
+
+ private:
+  const Progress& progress_;
+};
+
 // One solve over the sights with used[i]; Cauchy's loss where a scale is given.
 ceres::Solver::Summary Minimise(const Bundle& bundle, const AdjustOptions& options,
                                 const std::vector<bool>& used, double sigma_px, double cauchy_px,
@@ -316,8 +327,13 @@ ceres::Solver::Summary Minimise(const Bundle& bundle, const AdjustOptions& optio
     FixLens(n.lenses[i], options.lens, n.theta[i].data(), problem);
   }
   for (auto& shift : n.shift) add(shift.data(), 3);
+  const SilentProgress nobody;
+  const Progress& progress = options.progress != nullptr ? *options.progress : nobody;
+  StopsWhenAsked stops(progress);
+  solver.callbacks.push_back(&stops);
   ceres::Solver::Summary summary;
   ceres::Solve(solver, &problem, &summary);
+  progress.ThrowIfInterrupted();
   if (!summary.IsSolutionUsable()) Refuse("the sights have no least-squares solution");
   n.FollowRig();
   return summary;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "calib/bundle/bundle.h"
+#include "dtr/base/progress.h"
 
 namespace dtr::calib {
 
@@ -48,6 +49,8 @@ struct AdjustOptions {
   bool fix_poses = false;  ///< only points (and lenses, as `lens` says) move
   std::vector<PositionPrior> positions;
   std::vector<DistancePrior> distances;
+  /// Asked after every iteration whether to stop: Interrupted is thrown then. Null: nobody asks.
+  const Progress* progress = nullptr;
 };
 
 /// Whether every image has a principal point of its own.

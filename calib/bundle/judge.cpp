@@ -321,7 +321,8 @@ void AddNotJudged(const Bundle& given, Judgement& all) {
                     : "no fresh bundle adjustment says whether they are right: " + all.not_judged});
 }
 
-Judgement JudgePart(const Bundle& given, const BundleLimits& limits, int threads) {
+Judgement JudgePart(const Bundle& given, const BundleLimits& limits, int threads,
+                    const Progress* progress) {
   Judgement judgement;
   std::vector<bool> seen(given.points.size());
   for (const BundleObservation& o : given.observations) seen[static_cast<size_t>(o.point)] = true;
@@ -339,16 +340,20 @@ Judgement JudgePart(const Bundle& given, const BundleLimits& limits, int threads
                                  kFewestSights, stored.images.size()));
   }
   const Halves halves = HalvesOf(stored);
+  AdjustOptions options = AllFree();
+  options.progress = progress;
   Adjusted solved[3];  // all points, two halves
   try {
     ParallelFor(0, halves.parts.empty() ? 1 : 3, threads, [&](int i) {
-      solved[i] = Adjust(i == 0 ? stored : halves.parts[static_cast<size_t>(i) - 1], AllFree());
+      solved[i] = Adjust(i == 0 ? stored : halves.parts[static_cast<size_t>(i) - 1], options);
     });
+  } catch (const Interrupted&) {
+    throw;
   } catch (const Error& error) {
     return NotJudged(judgement, error.what());
   }
   const Adjusted& fresh = solved[0];
-  const BundleCovariance covariance = CovarianceOf(fresh, AllFree());
+  const BundleCovariance covariance = CovarianceOf(fresh, options);
   judgement.sights = fresh.sights;
   judgement.sigma_px = fresh.sigma_px;
   judgement.condition = covariance.condition;
@@ -427,7 +432,8 @@ double NegligiblePx(const BundleLimits& limits, double sigma_px) {
                     limits.most_negligible_px);
 }
 
-Judgement Judge(const Bundle& given, const BundleLimits& limits, int threads) {
+Judgement Judge(const Bundle& given, const BundleLimits& limits, int threads,
+                const Progress* progress) {
   // With distortion, as it is solved for.
   // Photos of fewer sights are those of the test cameras_untested.
   const Bundle seen = WithoutUnseen(given, kFewestSights);
@@ -438,11 +444,11 @@ Judgement Judge(const Bundle& given, const BundleLimits& limits, int threads) {
   }
   Judgement all;
   if (JudgedUnknowns(WithDistortion(seen)) <= limits.most_unknowns) {
-    all = JudgePart(seen, limits, threads);
+    all = JudgePart(seen, limits, threads, progress);
   } else {
     // Half of what one part may have: work grows with the cube.
     const std::vector<Bundle> parts = PartsOf(seen, limits.most_unknowns / 2);
-    for (const Bundle& part : parts) Join(JudgePart(part, limits, threads), all);
+    for (const Bundle& part : parts) Join(JudgePart(part, limits, threads, progress), all);
     all.parts = static_cast<int>(parts.size());
   }
   AddNotJudged(seen, all);

@@ -89,8 +89,10 @@ struct Judgement {
 /// Some 4000 points, drawn by their index, take part, and all of photos that would be left few.
 /// More than some 220 photos (kMostUnknowns with three turns each) are judged in parts of about 100
 /// that see the same points, each by itself; of every test the worst part's figure is told.
-/// Deterministic for any number of threads. Throws Error on a broken bundle only.
-Judgement Judge(const Bundle& stored, const BundleLimits& limits, int threads = 0);
+/// Deterministic for any number of threads. Throws Error on a broken bundle only, and Interrupted
+/// where `progress` asks for it.
+Judgement Judge(const Bundle& stored, const BundleLimits& limits, int threads = 0,
+                const Progress* progress = nullptr);
 
 /// Degeneracies of a solution (degeneracy.cpp says how each is recognised). `covariance` may be one
 /// that is not determined.

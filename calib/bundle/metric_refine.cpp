@@ -266,6 +266,7 @@ void SettlePlaces(const KnownMetres& known, MetricStart& start, Held held) {
       SomePoints(BundleOf(model, options.separate_lenses), kMostPoints, options.seed);
   AdjustOptions adjust =
       OptionsFor(options.known_lenses ? LensFreedom::kFixed : LensFreedom::kNoPrincipalPoint);
+  adjust.progress = options.progress;
   const Adjusted free = Adjust(some, adjust);
   adjust.distances = options.distances;
   Bundle bundle = some;

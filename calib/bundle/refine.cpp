@@ -39,6 +39,7 @@ bool HasPriors(const RefineOptions& options) {
 /// Options of a solve that frees `lens` (none: points alone move) and holds what is known.
 AdjustOptions SolveOptions(const RefineOptions& options, const std::optional<LensFreedom>& lens) {
   AdjustOptions adjust = OptionsFor(lens);
+  adjust.progress = options.progress;
   if (adjust.fix_poses) return adjust;
   adjust.positions = options.positions;
   adjust.distances = options.distances;

@@ -26,7 +26,8 @@ struct RefineOptions {
   /// Refine asks RequireDetermined before it adjusts anything. Empty: nobody asks.
   std::string determined;
   int threads = 0;
-  std::uint64_t seed = 0;  ///< of the sights that are held out
+  std::uint64_t seed = 0;              ///< of the sights that are held out
+  const Progress* progress = nullptr;  ///< AdjustOptions::progress of every solve
 };
 
 /// A way to refine, and what it does to sights it has not seen.

@@ -129,11 +129,12 @@ void RequireConverged(const Adjusted& adjusted, const char* what) {
 }  // namespace
 
 RigRefined RefineRig(const SfmModel& model, const KnownRig& rig,
-                     const std::map<std::string, RigPhoto>& photo_of) {
+                     const std::map<std::string, RigPhoto>& photo_of, const Progress* progress) {
   const SfmModel known = WithLenses(model, rig, photo_of);
   RigRefined refined;
   AdjustOptions options;
   options.lens = LensFreedom::kFixed;
+  options.progress = progress;
   const Adjusted free = Adjust(BundleOf(known), options);
   RequireConverged(free, "with the rig's lenses");
   refined.free_sigma_px = free.sigma_px;

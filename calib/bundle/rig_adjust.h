@@ -52,9 +52,10 @@ struct RigRefined {
 /// Throws Error where an image has another size than its camera, where no frame has two cameras
 /// that stand apart, where the photos contradict the rig (single scales scatter by more than a
 /// fifth, or the residuals grow by half or a tenth of the sights is lost for the rig), and where a
-/// solve does not converge.
+/// solve does not converge. `progress`: AdjustOptions::progress.
 RigRefined RefineRig(const SfmModel& model, const KnownRig& rig,
-                     const std::map<std::string, RigPhoto>& photo_of);
+                     const std::map<std::string, RigPhoto>& photo_of,
+                     const Progress* progress = nullptr);
 
 /// JSON object: scale, scale_spread, frames, pairs, free_sigma_px, sigma_px, rms_px,
 /// points_dropped.

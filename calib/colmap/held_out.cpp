@@ -138,6 +138,7 @@ class QuietProgress final : public Progress {
   void Update(int) override {}
   void Note(const std::string&) override {}
   bool StopRequested() const override { return outer_.StopRequested(); }
+  std::string InterruptedLine() const override { return outer_.InterruptedLine(); }
 
  private:
   const Progress& outer_;

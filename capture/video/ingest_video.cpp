@@ -163,7 +163,7 @@ void ListLosses(const Videos& files, int seen, std::vector<Skipped>& skipped) {
         {file.filename().string(),
          fmt::format("frames from {} on: the file says it has {}; {}", seen, promised,
                      files.size() > 1 ? "it or another of the synchronised videos ends there"
-                                      : "it is cut short or damaged there")});
+                                      : "it is trimmed, cut short or damaged")});
   }
 }
 
@@ -201,7 +201,10 @@ Videos VideosOf(const fs::path& source) {
     const fs::path& path = entries->path();
     if (path.filename().string().front() == '.') continue;
     std::error_code ignored;
-    if (entries->is_directory(ignored)) return {};  // photos may lie below
+    if (entries->is_directory(ignored)) {
+      if (WhyNotSearched(path).empty()) return {};  // photos may lie below
+      continue;
+    }
     if (IsImageExtension(path.extension().string())) return {};
     if (IsVideoExtension(path.extension().string())) videos.push_back(path);
   }

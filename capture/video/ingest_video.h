@@ -22,8 +22,9 @@ struct VideoOptions {
   double memory_gb = 0;  ///< as IngestOptions::memory_gb, of the frames that were taken
 };
 
-/// `source` itself where it is a video; the videos of a folder that has no photos beside them, in
-/// byte order of their names; else nothing.
+/// `source` itself where it is a video; the videos of a folder that has neither photos nor folders
+/// beside them in which photos are looked for (WhyNotSearched), in byte order of their names; else
+/// nothing.
 std::vector<std::filesystem::path> VideosOf(const std::filesystem::path& source);
 
 /// Decodes the videos twice, once to choose and once to write the chosen frames into `folder`

@@ -7,6 +7,7 @@
 #include <sstream>
 #include <thread>
 
+#include "cli/number_checks.h"
 #include "cli/pipeline/calibration_sweep.h"
 #include "cli/pipeline/input_hash.h"
 #include "cli/pipeline/stereo_sweep.h"
@@ -295,6 +296,11 @@ void Check(const SweepRequest& request) {
   if (!request.point.empty() && request.stages.size() != 1) {
     throw UsageError("--point: expected one --stage with it, found several");
   }
+  if (!request.point.empty() && !request.output.empty() && !has("calibration")) {
+    throw UsageError(
+        "--point: expected no --output beside it, for one setting writes no folder; give --json "
+        "FILE");
+  }
   if (request.budget_ms && !has("render")) {
     throw UsageError("--budget-ms: expected --stage render with it, whose frames it is about");
   }
@@ -349,13 +355,13 @@ void AddSweepOptions(CLI::App& command, CLI::Option* table, SweepRequest& reques
   command
       .add_option("--max-loss-db", request.max_loss_db,
                   "Name the cheapest setting that loses no more against the best [0.1]")
-      ->check(CLI::NonNegativeNumber)
+      ->check(kNonNegative)
       ->excludes(table)
       ->type_name("DB");
   command
       .add_option("--budget-ms", request.budget_ms,
                   "Name the best setting whose frames take no longer")
-      ->check(CLI::PositiveNumber)
+      ->check(kPositive)
       ->excludes(table)
       ->type_name("MS");
   command
@@ -389,6 +395,7 @@ void AddSweepOptions(CLI::App& command, CLI::Option* table, SweepRequest& reques
 }
 
 int RunSweep(const SweepRequest& request, const Context& context) {
+  context.console.KeepsWork();
   Check(request);
   const auto renderer = MakeTimedRenderer(request.renderer, context.console);
   SweepRun run;

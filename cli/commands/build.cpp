@@ -92,6 +92,7 @@ void AddBuildCommand(CLI::App& app) {
             ->check(CLI::IsMember(pipeline::StagesKept()))
             ->type_name("NAME");
         return [options, words](const Context& context) -> int {
+          context.console.KeepsWork();
           options->metres = MetreOptionsFrom(options->metres.gps, *words);
           options->threads = context.common.threads;
           options->seed = context.common.seed;

@@ -31,6 +31,7 @@ struct Options {
 };
 
 int RunCalibratePhotos(const Options& options, const Context& context) {
+  context.console.KeepsWork();
   const pipeline::MetreOptions metres = MetreOptionsFrom(options.gps, options.metres);
   if (fs::exists(options.output / "cameras.bin")) {
     throw UsageError(
@@ -38,8 +39,9 @@ int RunCalibratePhotos(const Options& options, const Context& context) {
                     options.output.string()));
   }
   pipeline::CalibrateOptions calibrate;
-  // Before any photo is read: a wrong file must not cost their time.
+  // Before any photo is read: what is missing or wrong must not cost their time.
   if (!options.lens.empty()) calibrate.lens = pipeline::ReadLens(options.lens);
+  pipeline::RequireCalibration({});
   const auto photos = capture::IngestPhotos(
       options.photos, {.threads = context.common.threads, .memory_gb = options.memory_gb},
       context.console);

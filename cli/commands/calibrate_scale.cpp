@@ -32,6 +32,7 @@ calib::Board MetricBoard(const std::string& text) {
 }
 
 int RunScale(Options options, const Context& context) {
+  context.console.KeepsWork();
   const int ways = (options.distances.empty() ? 0 : 1) + (options.scale.gps.empty() ? 0 : 1) +
                    (options.board.empty() ? 0 : 1);
   if (ways != 1) {

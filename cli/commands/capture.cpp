@@ -5,6 +5,7 @@
 
 #include "capture/capture.h"
 #include "cli/command.h"
+#include "cli/number_checks.h"
 #include "cli/pipeline/capture_page.h"
 #include "cli/pipeline/depth_settings.h"
 #include "cli/pipeline/ingest.h"
@@ -139,7 +140,7 @@ void AddCaptureCommand(CLI::App& app) {
                command
                    .add_option("--memory", options->video.memory_gb,
                                "Memory for photos that are looked at at a time [4]")
-                   ->check(CLI::PositiveNumber)
+                   ->check(kPositive)
                    ->type_name("GB");
                command.add_flag("--force", options->force, "Replace a capture that exists");
                return [options](const Context& context) { return Run(*options, context); };

@@ -92,6 +92,10 @@ void SayDepth(const eval::DepthScores& depth, Console& console) {
 }
 
 int RunEvaluate(const Options& options, const Context& context) {
+  if (fs::exists(options.pictures) && !fs::is_directory(options.pictures)) {
+    throw UsageError(
+        fmt::format("--pictures {}: expected a folder, found a file", options.pictures.string()));
+  }
   io::LoadOptions load;
   load.held_out = true;
   load.sigma = !options.truth.empty();

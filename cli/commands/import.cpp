@@ -4,7 +4,9 @@
 #include <map>
 
 #include "cli/command.h"
+#include "cli/number_checks.h"
 #include "cli/pipeline/camera_files.h"
+#include "cli/pipeline/depth_settings.h"
 #include "dtr/base/error.h"
 #include "dtr/io/formats/import_views.h"
 
@@ -20,11 +22,12 @@ struct Options {
 };
 
 int RunImport(Options options, const Context& context) {
-  const auto cameras =
+  auto cameras =
       pipeline::ReadCameraFile(options.cameras, options.format, options.import.images_dir);
-  if (!options.import.mask_dir.empty() && !std::filesystem::is_directory(options.import.mask_dir)) {
-    throw UsageError(fmt::format("--masks {}: no such folder", options.import.mask_dir.string()));
-  }
+  if (options.import.mask_dir.empty())
+    options.import.mask_dir = cameras.mask_dir;
+  else
+    pipeline::NameMasks(options.import.mask_dir, cameras.list);
   if (options.depth_kind == "z") options.import.depth_kind = DepthKind::kPlaneZ;
   if (options.depth_kind == "ray") options.import.depth_kind = DepthKind::kRayDistance;
   options.import.held_out = pipeline::NamesHeldOut(options.held_out, cameras.list);
@@ -53,21 +56,32 @@ void AddImportCommand(CLI::App& app) {
         command.add_option("--images", options->import.images_dir, "Folder of undistorted images")
             ->required()
             ->type_name("DIR");
-        command
-            .add_option("--depth", options->import.depth_dir,
-                        "Folder of depth maps NAME.exr, .pfm, .png or .tif")
-            ->type_name("DIR");
+        CLI::Option* depth = command
+                                 .add_option("--depth", options->import.depth_dir,
+                                             "Folder of depth maps NAME.exr, .pfm, .png or .tif")
+                                 ->type_name("DIR");
         command
             .add_option("--depth-kind", options->depth_kind,
                         "z: along the optical axis; ray: distance from the camera")
-            ->check(CLI::IsMember({"z", "ray"}));
+            ->check(CLI::IsMember({"z", "ray"}))
+            ->needs(depth);
         command
             .add_option("--depth-unit", options->import.depth_unit,
                         "Scene units per number of a depth file (0.001: millimetres)")
-            ->check(CLI::PositiveNumber)
+            ->check(kPositive)
+            ->needs(depth)
             ->type_name("U");
-        command.add_option("--masks", options->import.mask_dir, "Folder of masks")
+        command
+            .add_option("--masks", options->import.mask_dir,
+                        "Folder of masks, dark where a photo is not to be used: as --cameras names "
+                        "them, else NAME.png, NAME.EXT.png or NAME_mask.png")
             ->type_name("DIR");
+        options->import.memory_gb = pipeline::kDefaultMemoryGb;
+        command
+            .add_option("--memory", options->import.memory_gb,
+                        "Memory for views that are read at a time [4]")
+            ->check(kPositive)
+            ->type_name("GB");
         command
             .add_option("--holdout", options->held_out, "Views kept without depth, to measure with")
             ->type_name("every:N|NAME,...");

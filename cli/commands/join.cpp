@@ -5,6 +5,7 @@
 
 #include "cli/command.h"
 #include "cli/join_sets.h"
+#include "cli/number_checks.h"
 
 namespace dtr::cli {
 
@@ -25,10 +26,11 @@ void AddJoinCommand(CLI::App& app) {
             ->type_name("SET.dtr");
         command
             .add_option("--fps", options->join.frames_per_second, "Frames per second of time [24]")
-            ->check(CLI::PositiveNumber)
+            ->check(kPositive)
             ->type_name("F");
         command.add_flag("--force", options->join.force, "Replace a set that exists");
         return [options](const Context& context) -> int {
+          context.console.KeepsWork();
           JoinOptions join = options->join;
           join.threads = context.common.threads;
           JoinSets(options->sets, options->output, join, context.console);

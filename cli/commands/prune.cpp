@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "cli/command.h"
+#include "cli/number_checks.h"
 #include "cli/pipeline/prune_set.h"
 #include "cli/render_options.h"
 #include "cli/renderers.h"
@@ -55,6 +56,7 @@ void SayResult(const Options& options, const pipeline::PruneSetReport& report, C
 }
 
 int RunPrune(Options& options, const Context& context) {
+  context.console.KeepsWork();
   options.prune.threads = context.common.threads;
   options.prune.prune.seed = context.common.seed;
   options.prune.prune.render = *options.render;
@@ -98,13 +100,13 @@ void AddPruneCommand(CLI::App& app) {
                 "--max-bytes", options->prune.max_bytes,
                 "Enough is left out when the set takes no more than N bytes; exit 1 where the "
                 "loss does not allow that")
-            ->check(CLI::PositiveNumber)
+            ->check(kPositive)
             ->type_name("N");
         command
             .add_option("--frame-ms", options->prune.frame_ms,
                         "Enough is left out when frames take no more than T ms (with --max-bytes: "
                         "when both hold); exit 1 where the loss does not allow that")
-            ->check(CLI::PositiveNumber)
+            ->check(kPositive)
             ->type_name("T");
         command
             .add_option("--probes", prune.probes,

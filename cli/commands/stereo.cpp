@@ -30,6 +30,7 @@ void AddStereoCommand(CLI::App& app) {
             ->type_name("DIR");
         command.add_flag("--force", options->force, "Replace SET2 when it exists");
         return [options](const Context& context) -> int {
+          context.console.KeepsWork();
           options->threads = context.common.threads;
           options->seed = context.common.seed;
           const auto report = pipeline::RecomputeDepth(*options, context.console);

@@ -5,6 +5,7 @@
 #include "calib/judge/judge.h"
 #include "cli/command.h"
 #include "cli/commands/validate_calibration.h"
+#include "cli/number_checks.h"
 #include "cli/output_file.h"
 #include "cli/pipeline/validate_set.h"
 #include "cli/pipeline/validation_page.h"
@@ -75,8 +76,8 @@ int RunValidate(Options options, const Context& context) {
   const DtrSet set = io::ReadSet(options.set);
   RequireOneFrame(set);
   const SparseScene sparse = io::LoadSparse(options.set, set);
-  const auto report =
-      pipeline::ValidateSet(options.set, set, sparse, options.limits, context.common.threads);
+  const auto report = pipeline::ValidateSet(options.set, set, sparse, options.limits,
+                                            context.common.threads, context.console);
   SayReport(report, context.console);
   if (page) {
     const std::string name = options.set.lexically_normal().filename().string();
@@ -109,14 +110,14 @@ void AddValidateCommand(CLI::App& app) {
                                     "sets, {} for calibration files]",
                                     options->limits.reprojection.max_rms_px,
                                     calib::JudgeLimits{}.max_rms_px))
-            ->check(CLI::PositiveNumber)
+            ->check(kPositive)
             ->type_name("PX");
         command
             .add_option("--max-cross", options->max_cross_px,
                         fmt::format("Limit of the way of depth into a neighbour and back, median "
                                     "of a set's pixels; the worst view may have twice as much [{}]",
                                     options->limits.max_cross_px))
-            ->check(CLI::PositiveNumber)
+            ->check(kPositive)
             ->type_name("PX");
         command
             .add_option("--images", calibration.images,
@@ -137,7 +138,7 @@ void AddValidateCommand(CLI::App& app) {
                         fmt::format("Limit of the projections' standard deviation at the boards' "
                                     "distance [{}]",
                                     calib::JudgeLimits{}.max_uncertainty_px))
-            ->check(CLI::PositiveNumber)
+            ->check(kPositive)
             ->type_name("PX");
         command
             .add_option("--at", calibration.at,

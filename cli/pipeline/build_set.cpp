@@ -112,7 +112,7 @@ std::vector<std::pair<int, int>> SizesOf(const BuildOptions& options,
 
 // What a video is known by before its frames are chosen: equal values give the same frames.
 Json VideoJson(const BuildOptions& options) {
-  return {{"sha256", InputHash(options.photos)},
+  return {{"sha256", InputHash(capture::VideosOf(options.photos))},
           {"every", options.video.every},
           {"motion", options.video.motion},
           {"max_frames", options.video.most},
@@ -176,6 +176,12 @@ void RequireOptions(const BuildOptions& options) {
         "--gps, --distance: are held by the bundle adjustment of what SfM finds; expected no "
         "--poses, --rig or --no-refine beside them (dtr calibrate scale takes any finished set)");
   }
+  const bool from_video = !VideosFor(options.photos, options.video).empty();
+  if (from_video && options.metres.gps) {
+    throw UsageError(
+        "--gps: expected photos, which say where they were taken, found a video; give --distance "
+        "or use dtr calibrate scale");
+  }
   if (options.rig.empty()) return;
   if (!options.poses.empty()) {
     throw UsageError("--rig: places what SfM finds; expected no --poses beside it");
@@ -183,7 +189,7 @@ void RequireOptions(const BuildOptions& options) {
   if (!options.refine) {
     throw UsageError("--rig: is bundle adjustment; expected no --no-refine beside it");
   }
-  if (capture::VideosOf(options.photos).empty()) return;
+  if (!from_video) return;
   if (!options.video.synchronised) {
     throw UsageError(
         "--rig: needs frames of the same instants; expected --synchronised for videos");
@@ -253,7 +259,7 @@ calib::ValidationReport Validate(const std::filesystem::path& folder, DtrSet& se
                                  int threads, Progress& progress) {
   SetLimits limits;
   limits.memory_gb = std::min(limits.memory_gb, memory_gb);
-  calib::ValidationReport validation = ValidateSet(folder, set, sparse, limits, threads);
+  calib::ValidationReport validation = ValidateSet(folder, set, sparse, limits, threads, progress);
   report.validated = true;
   report.validation_passed = validation.passed();
   set.verdict_json = eval::VerdictJson(validation.tests);
@@ -336,6 +342,7 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
   KeptNotes progress(listener);
 
   RequireCalibration(options.poses);
+  io::SetWriter::RequireTarget(options.output, options.force);
   log.Begin("capture");
   const bool from_video = !capture::VideosOf(options.photos).empty();
   capture::Capture photos;
@@ -379,7 +386,14 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
   if (!options.force_stage.empty()) ForgetStage(writer.folder(), options.force_stage);
   if (from_video) {
     photos = FramesOf(options, writer.work_folder(), progress);
-    look();
+    try {
+      look();
+    } catch (const Error&) {
+      // What was asked for cannot be had of these frames: nothing goes on from here, and the
+      // command that is mended must not find this one's work in its way.
+      writer.Discard();
+      throw;
+    }
   }
   for (const auto& skipped : photos.skipped)
     report.skipped.emplace_back(skipped.name, skipped.reason);
@@ -433,11 +447,11 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
                                           {options.threads, options.seed}, writer, progress);
 
   log.Begin("finishing");
-  FinishScene(set, SourcePoints(sparse, views), writer, options.threads);
+  FinishScene(set, SourcePoints(sparse, views), writer, options.threads, progress);
   if (options.depth.depth_error_px) {
-    RecodeDepth(set, *options.depth.depth_error_px, writer, options.threads, memory_gb);
+    RecodeDepth(set, *options.depth.depth_error_px, writer, options.threads, memory_gb, progress);
   }
-  WriteMeshes(set, writer, options.threads);
+  WriteMeshes(set, writer, options.threads, progress);
   set.provenance_json = ProvenanceJson(options, OptionsJson(options, spent),
                                        PhotosJson(photos, is_source), calibrated, report)
                             .dump();
@@ -446,7 +460,8 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
   writer.WriteSparse(set, sparse);
   WriteSetPage(writer, set,
                {options.output.stem().string(), options.depth.engine, validation.tests,
-                report.skipped, report.not_registered.size(), options.threads});
+                report.skipped, report.not_registered.size(), options.threads},
+               progress);
   AdviseOn(writer.folder(), set, report, options.threads, progress);
   log.End();
   std::vector<std::string> lines = progress.lines();

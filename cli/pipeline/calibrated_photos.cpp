@@ -6,12 +6,12 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "calib/bundle/refine.h"
 #include "calib/colmap/features.h"
 #include "calib/colmap/program.h"
 #include "calib/colmap/sfm.h"
 #include "capture/sfm_images.h"
 #include "cli/pipeline/known_poses.h"
+#include "cli/pipeline/photo_refinement.h"
 #include "dtr/base/error.h"
 
 namespace dtr::pipeline {
@@ -42,53 +42,6 @@ Json SfmJson(const colmap::SfmReport& report, const calib::SfmModel& model) {
   return json;
 }
 
-void NoteRemark(const calib::Refined& refined, Progress& progress) {
-  if (const std::string remark = calib::RemarkOn(refined); !remark.empty()) progress.Note(remark);
-}
-
-// Bundle adjustment that holds what is known in metres.
-void HoldMetres(const capture::Capture& capture, const CalibrateOptions& options,
-                const calib::RefineOptions& refine, CalibratedPhotos& calibrated, Json& report,
-                Progress& progress) {
-  const PhotoPlaces places = PhotoPlacesOf(capture, calib::ImageNames(calibrated.model));
-  if (options.metres.gps) RequirePlaces(places, "--gps", "those with a camera");
-  RefinedInMetres refined = RefineInMetres(calibrated.model, options.metres, places, refine);
-  report["bundle_adjustment"] = Json::parse(refined.json);
-  calibrated.model = std::move(refined.refined.model);
-  calibrated.unit = LengthUnit::kMetre;
-  calibrated.scale_json = std::move(refined.scale_json);
-  NoteRemark(refined.refined, progress);
-  for (const std::string& line : refined.lines) progress.Note(line);
-}
-
-calib::RefineOptions RefineOptionsFor(const CalibrateOptions& options) {
-  calib::RefineOptions refine;
-  refine.determined = options.determined;
-  refine.threads = options.threads;
-  refine.seed = options.seed;
-  return refine;
-}
-
-// Bundle adjustment of the frozen model, where it pays; deterministic.
-void RefineModel(const capture::Capture& capture, const CalibrateOptions& options,
-                 CalibratedPhotos& calibrated, Json& report, Progress& progress) {
-  calib::SfmModel& model = calibrated.model;
-  progress.Stage("bundle adjustment", 0);
-  calib::RefineOptions refine = RefineOptionsFor(options);
-  if (options.lens) {
-    refine.known_lenses.emplace();
-    for (const auto& [id, camera] : model.cameras) refine.known_lenses->emplace(id, *options.lens);
-  }
-  if (options.metres.any()) {
-    return HoldMetres(capture, options, refine, calibrated, report, progress);
-  }
-  calib::Refined refined = calib::Refine(model, refine);
-  report["bundle_adjustment"] = Json::parse(calib::ToJson(refined));
-  if (!refined.changed) progress.Note("bundle adjustment left out: " + refined.reason);
-  NoteRemark(refined, progress);
-  model = std::move(refined.model);
-}
-
 CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions& options,
                          const fs::path& workspace, Progress& progress) {
   std::vector<bool> in_sfm(capture.photos.size(), true);
@@ -113,22 +66,32 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
     calibrated.earlier_wall_s += step.wall_s;
   }
   Json report = SfmJson(sfm.report, sfm.model);
-  calibrated.model = std::move(sfm.model);
-  if (options.rig) {
-    progress.Stage("bundle adjustment of the rig", 0);
-    report["rig"] = Json::parse(PlaceByRig(*options.rig, capture, calibrated.model));
-    calibrated.unit = options.rig->unit;
-  } else if (options.refine || options.lens) {
-    RefineModel(capture, options, calibrated, report, progress);
-  } else if (!options.determined.empty()) {
-    calib::RequireDetermined(calibrated.model, RefineOptionsFor(options), options.determined);
-  }
+  PhotoRefinement refined = RefinePhotos(capture, options, sfm.model, workspace / "sfm" / "model",
+                                         workspace / "refined", progress);
+  report.update(Json::parse(refined.report_json));
+  calibrated.earlier_cpu_s += refined.earlier_cpu_s;
+  calibrated.earlier_wall_s += refined.earlier_wall_s;
+  calibrated.model = std::move(refined.model);
+  calibrated.unit = refined.unit;
+  calibrated.scale_json = std::move(refined.scale_json);
   calibrated.report_json = report.dump();
   if (options.strict) {
     RegisterHeldOutPhotos(Subset(capture, options.held_out), inputs, workspace, sfm_options,
                           calibrated.model, progress);
   }
   return calibrated;
+}
+
+// Boards are looked at as their photos are stored (board_photos.h); turned upright a photo has its
+// principal point elsewhere.
+void RefuseTurned(const capture::Capture& capture, const char* known) {
+  for (const capture::Photo& photo : capture.photos) {
+    if (photo.exif_orientation == 1) continue;
+    throw Error(fmt::format(
+        "{}: expected a photo as it is stored, for {} is known of such, found EXIF orientation {}; "
+        "take the tag out of it (exiftool -Orientation= FILE)",
+        photo.name, known, photo.exif_orientation));
+  }
 }
 
 }  // namespace
@@ -176,6 +139,8 @@ CalibratedPhotos CalibratePhotos(const capture::Capture& capture, const Calibrat
   CalibrateOptions checked = options;
   checked.held_out.resize(capture.photos.size(), false);
   RequireCalibration(checked.poses);
+  if (checked.rig) RefuseTurned(capture, "the rig");
+  if (checked.lens) RefuseTurned(capture, "the lens");
   fs::create_directories(workspace);
   CalibratedPhotos calibrated = checked.poses.empty()
                                     ? FromSfm(capture, checked, workspace, progress)

@@ -48,7 +48,8 @@ struct CalibratedPhotos {
   std::string report_json;  ///< details for the provenance; no times, no paths
   /// Processor seconds of COLMAP's runs, those of an earlier call that this one went on from, too.
   double engine_cpu_s = 0;
-  /// Of those runs, what the earlier call's took: processor and wall-clock seconds.
+  /// Of those runs and of bundle adjustment, what the earlier call's took: processor and wall-clock
+  /// seconds.
   double earlier_cpu_s = 0, earlier_wall_s = 0;
   std::string scale_json;  ///< entry of the provenance's `scale`; empty: lengths are SfM's
 };

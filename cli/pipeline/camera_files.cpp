@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
+#include <set>
 
 #include "calib/colmap/model_io.h"
 #include "calib/sparse_from_sfm.h"
@@ -18,7 +20,25 @@ namespace {
 
 namespace fs = std::filesystem;
 
-io::SizedImage SizeOf(const fs::path& images_dir, const std::string& name) {
+// A name without an extension, as in NeRF's own files, is that of the one image called so.
+std::string WithExtension(const fs::path& images_dir, const std::string& name) {
+  std::error_code ignored;
+  if (fs::is_regular_file(images_dir / name, ignored)) return name;
+  std::set<std::string> found;
+  const fs::path folder = (images_dir / name).parent_path();
+  fs::directory_iterator entries(folder, ignored);
+  for (; !ignored && entries != fs::directory_iterator(); entries.increment(ignored)) {
+    const fs::path& file = entries->path();
+    if (file.stem() == fs::path(name).filename() &&
+        capture::IsImageExtension(file.extension().string())) {
+      found.insert(file.extension().string());
+    }
+  }
+  return found.size() == 1 ? name + *found.begin() : name;
+}
+
+io::SizedImage SizeOf(const fs::path& images_dir, const std::string& given) {
+  const std::string name = WithExtension(images_dir, given);
   const io::ImageHeader header = io::ReadImageHeader(images_dir / name);
   return {name, header.width_px, header.height_px};
 }
@@ -34,6 +54,22 @@ std::vector<io::SizedImage> SizedImages(const fs::path& images_dir) {
   }
   if (error) throw UsageError(images_dir.string() + ": cannot be listed: " + error.message());
   return images;
+}
+
+// Images below a folder, by their names without the extension; of several the first by name.
+std::map<std::string, std::string> ImagesByStem(const fs::path& folder) {
+  std::set<std::string> names;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    if (!entry.is_regular_file() || !capture::IsImageExtension(entry.path().extension().string())) {
+      continue;
+    }
+    names.insert(entry.path().lexically_relative(folder).generic_string());
+  }
+  std::map<std::string, std::string> by_stem;
+  for (const std::string& name : names) {
+    by_stem.emplace(fs::path(name).replace_extension().generic_string(), name);
+  }
+  return by_stem;
 }
 
 CamerasFromFile FromColmap(const fs::path& folder) {
@@ -87,9 +123,36 @@ CamerasFromFile ReadCameraFile(const fs::path& file, const std::string& format,
   if (kind == "nerf") {
     return {io::ReadTransformsJson(
                 file, [&](const std::string& name) { return SizeOf(images_dir, name); }),
-            {}};
+            {},
+            images_dir};
   }
   return {io::ReadCamerasJson(file), {}};
+}
+
+void NameMasks(const fs::path& mask_dir, io::CameraList& list) {
+  if (!fs::is_directory(mask_dir)) {
+    throw UsageError(fmt::format("--masks {}: no such folder", mask_dir.string()));
+  }
+  const auto is_named = [](const io::NamedCamera& camera) { return !camera.mask_file.empty(); };
+  if (std::any_of(list.cameras.begin(), list.cameras.end(), is_named)) return;
+  const std::map<std::string, std::string> masks = ImagesByStem(mask_dir);
+  for (io::NamedCamera& camera : list.cameras) {
+    const std::string stem = fs::path(camera.name).replace_extension().generic_string();
+    for (const std::string& name : {stem, camera.name, stem + "_mask"}) {
+      const auto mask = masks.find(name);
+      if (mask == masks.end()) continue;
+      camera.mask_file = mask->second;
+      break;
+    }
+  }
+  if (list.cameras.empty() || std::any_of(list.cameras.begin(), list.cameras.end(), is_named)) {
+    return;
+  }
+  const std::string& first = list.cameras.front().name;
+  throw UsageError(fmt::format(
+      "--masks {}: expected a mask of {} or of another photo, called {}.png or "
+      "{}.png, found none",
+      mask_dir.string(), first, fs::path(first).replace_extension().generic_string(), first));
 }
 
 std::set<std::string> NamesHeldOut(const std::string& spec, const io::CameraList& list) {

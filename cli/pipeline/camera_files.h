@@ -15,6 +15,8 @@ namespace dtr::pipeline {
 struct CamerasFromFile {
   io::CameraList list;
   std::optional<SparseScene> points;  ///< views are indices into `list`
+  /// Where masks that the file names lie; empty: `masks` beside the images.
+  std::filesystem::path mask_dir = {};
 };
 
 /// Names that ReadCameraFile takes as `format`.
@@ -27,6 +29,12 @@ std::vector<std::string> CameraFormats();
 /// camera has distortion.
 CamerasFromFile ReadCameraFile(const std::filesystem::path& file, const std::string& format,
                                const std::filesystem::path& images_dir);
+
+/// Finds masks for the cameras of a file that names none (COLMAP's, LLFF's): for a photo
+/// left/a.jpg the first of left/a.png, left/a.jpg.png (COLMAP's name) and left/a_mask.png, with any
+/// extension of an image, that lies in `mask_dir`; photos without one stay without. Throws
+/// UsageError where the folder is none or holds no mask of any of them.
+void NameMasks(const std::filesystem::path& mask_dir, io::CameraList& list);
 
 /// Names of `list` that a --holdout text means (cli/pipeline/holdout.h), over its cameras in byte
 /// order of their names.

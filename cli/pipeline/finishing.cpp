@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <atomic>
+#include <string>
 #include <vector>
 
 #include "dtr/base/error.h"
@@ -28,24 +31,44 @@ View Loaded(const View& view, const io::SetWriter& writer, bool images, int thre
 
 bool HasDepth(const View& view) { return view.role == ViewRole::kSource && view.depth_file; }
 
+// A stage over the views that have depth.
+class ViewsDone {
+ public:
+  ViewsDone(const DtrSet& set, const std::string& stage, Progress& progress) : progress_(progress) {
+    const auto& views = set.frames.front().views;
+    progress.Stage(stage, static_cast<int>(std::count_if(views.begin(), views.end(), HasDepth)));
+  }
+  void OneMore() {
+    progress_.Update(++done_);
+    progress_.ThrowIfInterrupted();
+  }
+
+ private:
+  Progress& progress_;
+  std::atomic<int> done_ = 0;
+};
+
 }  // namespace
 
 void FinishScene(DtrSet& set, std::span<const SparsePoint> points, const io::SetWriter& writer,
-                 int threads) {
+                 int threads, Progress& progress) {
   DepthSamples samples;
+  ViewsDone done(set, "extent of the scene", progress);
   bool has_depth = false;
   for (const View& view : set.frames.front().views) {
     if (!HasDepth(view)) continue;
     has_depth = true;
     samples.Add(Loaded(view, writer, false, threads));
+    done.OneMore();
   }
   FinishGeometry(set,
                  has_depth || points.empty() ? samples.Extent() : SceneExtentFromPoints(points));
 }
 
-void RecodeDepth(DtrSet& set, double error_px, io::SetWriter& writer, int threads,
-                 double memory_gb) {
+void RecodeDepth(DtrSet& set, double error_px, io::SetWriter& writer, int threads, double memory_gb,
+                 Progress& progress) {
   MemoryBudget memory(memory_gb);
+  ViewsDone done(set, "coding depth", progress);
   std::vector<View>& views = set.frames.front().views;
   ParallelFor(0, static_cast<int>(views.size()), threads, [&](int i) {
     View& view = views[static_cast<size_t>(i)];
@@ -63,11 +86,13 @@ void RecodeDepth(DtrSet& set, double error_px, io::SetWriter& writer, int thread
     view.depth_steps = loaded.depth_steps;
     view.depth_file = loaded.depth_file;
     view.mesh_file.reset();
+    done.OneMore();
   });
 }
 
-DepthCount WriteMeshes(DtrSet& set, io::SetWriter& writer, int threads) {
+DepthCount WriteMeshes(DtrSet& set, io::SetWriter& writer, int threads, Progress& progress) {
   DepthCount count;
+  ViewsDone done(set, "meshes", progress);
   for (View& view : set.frames.front().views) {
     if (!HasDepth(view)) continue;
     const View loaded = Loaded(view, writer, true, threads);
@@ -75,6 +100,7 @@ DepthCount WriteMeshes(DtrSet& set, io::SetWriter& writer, int threads) {
     ++count.maps;
     for (const float z : loaded.depth.grid().data()) count.with_depth += !DepthImage::IsHole(z);
     count.pixels += static_cast<long>(loaded.depth.grid().data().size());
+    done.OneMore();
   }
   return count;
 }

@@ -1,8 +1,9 @@
 // cli/pipeline/finishing.h -- what is worked out once all depth maps lie in the set's folder, one
-// view in memory at a time.
+// view in memory at a time. All of it tells of its views and can be stopped between them.
 #pragma once
 #include <span>
 
+#include "dtr/base/progress.h"
 #include "dtr/io/set_io.h"
 #include "dtr/types/dtr_set.h"
 #include "dtr/types/sparse_scene.h"
@@ -11,14 +12,14 @@ namespace dtr::pipeline {
 
 /// Scene centre, bounds and baselines: from the stored depth maps or, without any, from `points`.
 void FinishScene(DtrSet& set, std::span<const SparsePoint> points, const io::SetWriter& writer,
-                 int threads);
+                 int threads, Progress& progress);
 
 /// Stores the depth of every source view anew as zstd-inverse, with 1/z off by at most `error_px`
 /// pixels of disparity from what the stereo engine gave. After FinishScene: pixels of disparity
 /// need the baselines. Maps in memory at a time take at most `memory_gb` (1e9 bytes). Throws Error
 /// where 16 bits cannot keep the bound.
-void RecodeDepth(DtrSet& set, double error_px, io::SetWriter& writer, int threads,
-                 double memory_gb);
+void RecodeDepth(DtrSet& set, double error_px, io::SetWriter& writer, int threads, double memory_gb,
+                 Progress& progress);
 
 /// How much of the source views has a depth.
 struct DepthCount {
@@ -31,6 +32,6 @@ struct DepthCount {
 
 /// Writes the reduced mesh (SPEC 5.1) of every source view that has depth, as renderers make it
 /// with their default options. After FinishScene: thresholds need the baselines.
-DepthCount WriteMeshes(DtrSet& set, io::SetWriter& writer, int threads);
+DepthCount WriteMeshes(DtrSet& set, io::SetWriter& writer, int threads, Progress& progress);
 
 }  // namespace dtr::pipeline

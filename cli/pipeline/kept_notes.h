@@ -16,6 +16,7 @@ class KeptNotes final : public Progress {
   void Update(int done) override { listener_.Update(done); }
   void Note(const std::string& line) override;
   bool StopRequested() const override { return listener_.StopRequested(); }
+  std::string InterruptedLine() const override { return listener_.InterruptedLine(); }
 
   /// The notes so far, in their order.
   std::vector<std::string> lines() const;

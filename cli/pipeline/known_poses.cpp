@@ -144,9 +144,25 @@ void RegisterHeldOutPhotos(const capture::Capture& held_out,
   }
 }
 
+// COLMAP takes photos as they are stored, whatever their EXIF data say; we turn them upright, and
+// our own models are of upright ones. Where the size tells nothing the user must know.
+void TellOfTurned(const capture::Capture& capture, Progress& progress) {
+  std::vector<std::string> turned;
+  for (const capture::Photo& photo : capture.photos) {
+    if (photo.exif_orientation != 1) turned.push_back(photo.name);
+  }
+  if (turned.empty()) return;
+  progress.Note(fmt::format(
+      "{} photos are turned upright by their EXIF data, first {}: their cameras must be of the "
+      "upright pictures; COLMAP does not turn photos, so for its own models take the tag out of "
+      "them first (exiftool -Orientation= FILE)",
+      turned.size(), turned.front()));
+}
+
 CalibratedPhotos FromKnownPoses(const capture::Capture& capture, const CalibrateOptions& options,
                                 const fs::path& workspace, Progress& progress) {
   progress.Note("structure from motion left out: cameras are given");
+  TellOfTurned(capture, progress);
   CalibratedPhotos calibrated = fs::is_directory(options.poses)
                                     ? FromColmapModel(capture, options.poses)
                                     : FromCameraList(capture, options, workspace, progress);

@@ -100,12 +100,12 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& listen
     progress.Note("the record of what was pruned goes with the depth that was pruned");
     io::SetPrunedJson(set, "");
   }
-  FinishScene(set, {}, writer, options.threads);
+  FinishScene(set, {}, writer, options.threads, progress);
   if (options.depth.depth_error_px) {
     RecodeDepth(set, *options.depth.depth_error_px, writer, options.threads,
-                options.depth.memory_gb.value_or(kDefaultMemoryGb));
+                options.depth.memory_gb.value_or(kDefaultMemoryGb), progress);
   }
-  const DepthCount count = WriteMeshes(set, writer, options.threads);
+  const DepthCount count = WriteMeshes(set, writer, options.threads, progress);
   writer.WriteSparse(set, sparse);
   nlohmann::ordered_json provenance = nlohmann::ordered_json::parse(set.provenance_json);
   provenance["depth_engine"] = options.depth.engine;
@@ -123,7 +123,8 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& listen
   report.depth_completeness = count.Completeness();
   SetLimits limits;
   limits.memory_gb = std::min(limits.memory_gb, options.depth.memory_gb.value_or(kDefaultMemoryGb));
-  const auto validation = ValidateSet(writer.folder(), set, sparse, limits, options.threads);
+  const auto validation =
+      ValidateSet(writer.folder(), set, sparse, limits, options.threads, progress);
   set.verdict_json = eval::VerdictJson(validation.tests);  // other depth, other verdict
   WriteSetPage(writer, set,
                {report.written.stem().string(),
@@ -131,7 +132,8 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& listen
                 validation.tests,
                 {},
                 0,
-                options.threads});
+                options.threads},
+               progress);
   log.End();
   io::WriteRunRecord(writer.folder(),
                      log.Record(ResolveThreads(options.threads), progress.lines()));

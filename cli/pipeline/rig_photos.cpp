@@ -134,7 +134,20 @@ std::map<int, int> InstantsOf(const RigInstants& instants, int camera, int frame
   return in_order;
 }
 
-Layout FromVideos(const fs::path& folder, const std::vector<fs::path>& videos) {
+// Headers count a few frames that are not there.
+int FramesIn(const fs::path& video, Progress& progress) {
+  capture::VideoReader reader(video);
+  progress.Stage("counting frames of " + video.filename().string(), reader.frames_promised());
+  int frames = 0;
+  while (reader.Next()) {
+    progress.Update(++frames);
+    if (progress.StopRequested()) throw Interrupted("interrupted; nothing was written");
+  }
+  if (frames > 0) return frames;
+  throw Error(video.string() + ": expected frames, found none; is the video whole?");
+}
+
+Layout FromVideos(const fs::path& folder, const std::vector<fs::path>& videos, Progress& progress) {
   Layout layout;
   RigInstants instants;
   const bool timed = fs::exists(folder / "timestamps.csv");
@@ -148,11 +161,7 @@ Layout FromVideos(const fs::path& folder, const std::vector<fs::path>& videos) {
                       "timestamps.csv",
                       video.string()));
     }
-    int frames = 0;
-    capture::ForEachFrame(video, [&](int number, const ImageRgb8&) {
-      frames = number + 1;
-      return true;
-    });
+    const int frames = FramesIn(video, progress);
     const std::map<int, int> own = timed ? InstantsOf(instants, *id, frames) : std::map<int, int>{};
     for (int number = 0; number < frames; ++number) {
       Shot shot;
@@ -187,7 +196,7 @@ void RequireOneShotPerFrame(const Layout& layout) {
   }
 }
 
-Layout LayoutOf(const fs::path& folder) {
+Layout LayoutOf(const fs::path& folder, Progress& progress) {
   if (!fs::is_directory(folder)) {
     throw UsageError(fmt::format("{}: expected a folder of what the cameras of a rig saw, found {}",
                                  folder.string(),
@@ -205,7 +214,7 @@ Layout LayoutOf(const fs::path& folder) {
                                                  capture::IsVideoExtension(p.extension().string());
                                         });
              videos.size() >= 2) {
-    layout = FromVideos(folder, videos);
+    layout = FromVideos(folder, videos, progress);
   } else {
     layout = FromNames(Sorted(folder, IsPhoto));
   }
@@ -311,7 +320,7 @@ void TakeOutRepeatedFrames(RigPhotos& photos) {
 
 RigPhotos ReadRigPhotos(const fs::path& folder, const calib::Board& board,
                         const calib::DetectOptions& options, int threads, Progress& progress) {
-  Layout layout = LayoutOf(folder);
+  Layout layout = LayoutOf(folder, progress);
   LookAtAll(board, options, threads, progress, layout);
   RigPhotos photos;
   for (const std::string& name : layout.cameras) photos.cameras.push_back({name, 0, 0});

@@ -225,6 +225,10 @@ void WriteViews(const ScaleOptions& options, const DtrSet& old_set, double scale
     for (size_t i = 0; i < views.size(); ++i) {
       progress.ThrowIfInterrupted();
       const View& old_view = old_set.frames[f].views[i];
+      if (writer.RestoreView(views[i])) {
+        progress.Update(static_cast<int>(i) + 1);
+        continue;
+      }
       View unchanged = old_view;
       unchanged.depth_file = unchanged.sigma_file = unchanged.mesh_file = std::nullopt;
       writer.CopyFiles(options.set, unchanged);
@@ -268,7 +272,7 @@ ScaleReport ScaleSet(const ScaleOptions& options, Progress& progress) {
                             {"set_sha256", Sha256OfFile(options.set / "set.json")}};
   io::SetWriter writer(report.written, fingerprint.dump(), in_place || options.force);
   WriteViews(options, old_set, found.metric_from_scene.scale, set, writer, progress);
-  WriteMeshes(set, writer, options.threads);
+  WriteMeshes(set, writer, options.threads, progress);
   std::vector<Check> checks;
   if (set.sparse_file) {
     SparseScene sparse = io::LoadSparse(options.set, old_set);
@@ -276,10 +280,11 @@ ScaleReport ScaleSet(const ScaleOptions& options, Progress& progress) {
       point.p_in_world = found.metric_from_scene * point.p_in_world;
     }
     writer.WriteSparse(set, sparse);
-    checks = ValidateSet(writer.folder(), set, sparse, {}, options.threads).tests;
+    checks = ValidateSet(writer.folder(), set, sparse, {}, options.threads, progress).tests;
   }
   Record(found, set, report);
-  WriteSetPage(writer, set, {report.written.stem().string(), "", checks, {}, 0, options.threads});
+  WriteSetPage(writer, set, {report.written.stem().string(), "", checks, {}, 0, options.threads},
+               progress);
   log.End();
   // What the stages before cost is still what this set cost.
   io::RunRecord record = log.Record(ResolveThreads(options.threads));

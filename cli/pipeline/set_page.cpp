@@ -5,7 +5,8 @@
 
 namespace dtr::pipeline {
 
-void WriteSetPage(const io::SetWriter& writer, const DtrSet& set, const SetPageFacts& facts) {
+void WriteSetPage(const io::SetWriter& writer, const DtrSet& set, const SetPageFacts& facts,
+                  Progress& progress) {
   DtrSet sources = set;
   std::vector<View>& views = sources.frames.front().views;
   const size_t all = views.size();
@@ -17,7 +18,11 @@ void WriteSetPage(const io::SetWriter& writer, const DtrSet& set, const SetPageF
                 {"depth engine", facts.engine},
                 {"not registered", std::to_string(facts.not_registered)}};
   info.checks = facts.checks;
+  progress.Stage("page", static_cast<int>(views.size()));
+  int done = 0;
   info.load = [&](const View& view) {
+    progress.ThrowIfInterrupted();
+    progress.Update(++done);
     View loaded = view;
     io::LoadOptions load;
     load.sigma = true;

@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "dtr/base/progress.h"
 #include "dtr/io/set_io.h"
 #include "dtr/types/check.h"
 #include "dtr/types/dtr_set.h"
@@ -23,6 +24,7 @@ struct SetPageFacts {
 /// Writes report/index.html into the writer's folder: source views only, as pixels of held-out
 /// photos stay in held_out/, and without times, so that equal builds stay equal. Pixels are read
 /// from there, one view at a time.
-void WriteSetPage(const io::SetWriter& writer, const DtrSet& set, const SetPageFacts& facts);
+void WriteSetPage(const io::SetWriter& writer, const DtrSet& set, const SetPageFacts& facts,
+                  Progress& progress);
 
 }  // namespace dtr::pipeline

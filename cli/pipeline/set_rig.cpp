@@ -169,8 +169,10 @@ void TellPhotosTheirLens(const SetRig& rig, capture::Capture& capture) {
   }
 }
 
-std::string PlaceByRig(const SetRig& rig, const capture::Capture& capture, calib::SfmModel& model) {
-  calib::RigRefined refined = calib::RefineRig(model, rig.known, PhotosOfRig(rig, capture));
+std::string PlaceByRig(const SetRig& rig, const capture::Capture& capture, calib::SfmModel& model,
+                       const Progress& progress) {
+  calib::RigRefined refined =
+      calib::RefineRig(model, rig.known, PhotosOfRig(rig, capture), &progress);
   KeepIds(model, refined.model);
   Json json = io::ParseJson(calib::ToJson(refined), "rig");
   json["file"] = rig.file;

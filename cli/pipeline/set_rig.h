@@ -39,8 +39,10 @@ void TellPhotosTheirLens(const SetRig& rig, capture::Capture& capture);
 
 /// Bundle adjustment of `model` by calib::RefineRig. Cameras keep the ids that structure from
 /// motion gave them. Returns what the set's provenance keeps under `calibration.rig`, as JSON: what
-/// RefineRig reports, `file`, `unit`, `cameras[]` (`name`, `cam_from_rig` as 3 rows of 4).
-std::string PlaceByRig(const SetRig& rig, const capture::Capture& capture, calib::SfmModel& model);
+/// RefineRig reports, `file`, `unit`, `cameras[]` (`name`, `cam_from_rig` as 3 rows of 4). Throws
+/// Interrupted where `progress` asks for it.
+std::string PlaceByRig(const SetRig& rig, const capture::Capture& capture, calib::SfmModel& model,
+                       const Progress& progress);
 
 /// What that left in a set's provenance; empty for sets that were built without a rig. Throws Error
 /// where it is broken.

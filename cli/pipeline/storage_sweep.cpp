@@ -5,6 +5,7 @@
 
 #include "cli/pipeline/finishing.h"
 #include "cli/pipeline/set_quality.h"
+#include "cli/pipeline/sweep_axes.h"
 #include "dtr/base/machine.h"
 #include "dtr/eval/timed_renderer.h"
 #include "dtr/io/depth_io.h"
@@ -166,7 +167,8 @@ eval::SweepMeasurement StorageSweep::Measure(const eval::SweepSetting& setting) 
       Write(view, setting, set.unit, writer);
     }
     if (Value(setting, kMesh) == kKept && setting.at(kDepth) != 0) {
-      WriteMeshes(set, writer, options_.threads);
+      NotesOnly notes(progress_);
+      WriteMeshes(set, writer, options_.threads, notes);
     }
     // The calibration's points are no part of what is rendered from.
     set.sparse_file.reset();

@@ -15,6 +15,7 @@ class NotesOnly final : public Progress {
   void Update(int) override {}
   void Note(const std::string& line) override { progress_.Note(line); }
   bool StopRequested() const override { return progress_.StopRequested(); }
+  std::string InterruptedLine() const override { return progress_.InterruptedLine(); }
 
  private:
   Progress& progress_;

@@ -1,6 +1,7 @@
 #include "cli/pipeline/validate_set.h"
 
 #include <algorithm>
+#include <atomic>
 
 #include "cli/pipeline/set_rig.h"
 #include "dtr/eval/cross_depth.h"
@@ -31,7 +32,7 @@ Cameras CamerasOf(const DtrSet& set) {
 
 // Appends what depth says, where two views or more have any.
 void AddCrossDepth(const std::filesystem::path& folder, const DtrSet& set, const SetLimits& limits,
-                   int threads, calib::ValidationReport& report) {
+                   int threads, calib::ValidationReport& report, Progress& progress) {
   std::vector<const View*> with_depth;
   for (const View& view : set.frames.front().views) {
     if (view.depth_file) with_depth.push_back(&view);
@@ -43,13 +44,17 @@ void AddCrossDepth(const std::filesystem::path& folder, const DtrSet& set, const
   options.memory_bytes = static_cast<size_t>(limits.memory_gb * 1e9);
   options.scene_center = set.scene_center;
   options.threads = threads;
+  progress.Stage("depth across views", static_cast<int>(with_depth.size()));
+  std::atomic<int> brought = 0;  // some more than once, where memory is short
   const auto cross = eval::CrossDepth(with_depth, options, [&](const View& view) {
+    progress.ThrowIfInterrupted();
     View loaded = view;
     loaded.mesh_file.reset();  // renderers' alone
     io::LoadOptions load;
     load.images = false;
     load.threads = 1;  // several views at a time
     io::LoadPixels(folder, loaded, load);
+    progress.Update(std::min(++brought, static_cast<int>(with_depth.size())));
     return std::move(loaded.depth);
   });
   report.tests.insert(report.tests.end(), cross.tests.begin(), cross.tests.end());
@@ -66,13 +71,16 @@ calib::ValidationReport ReprojectionOfSet(const DtrSet& set, const SparseScene& 
 }
 
 calib::ValidationReport ValidateSet(const std::filesystem::path& folder, const DtrSet& set,
-                                    const SparseScene& sparse, const SetLimits& limits,
-                                    int threads) {
+                                    const SparseScene& sparse, const SetLimits& limits, int threads,
+                                    Progress& progress) {
+  progress.Stage("reprojection tests", 0);
   calib::ValidationReport report = ReprojectionOfSet(set, sparse, limits.reprojection, threads);
-  AddCrossDepth(folder, set, limits, threads, report);
+  progress.ThrowIfInterrupted();
+  AddCrossDepth(folder, set, limits, threads, report, progress);
+  progress.Stage("cameras against their sights", 0);
   const Cameras of = CamerasOf(set);
-  const calib::Judgement judgement =
-      calib::Judge(calib::BundleOf(of.cameras, of.poses, of.names, sparse), limits.judge, threads);
+  const calib::Judgement judgement = calib::Judge(
+      calib::BundleOf(of.cameras, of.poses, of.names, sparse), limits.judge, threads, &progress);
   report.tests.insert(report.tests.end(), judgement.tests.begin(), judgement.tests.end());
   const auto rig = RigOfSet(set);
   const auto places = rig ? RigPlaces(set, sparse, *rig) : std::nullopt;

@@ -4,6 +4,7 @@
 
 #include "calib/bundle/judge.h"
 #include "calib/validate.h"
+#include "dtr/base/progress.h"
 #include "dtr/types/dtr_set.h"
 #include "dtr/types/sparse_scene.h"
 
@@ -30,7 +31,7 @@ struct SetLimits {
 /// neighbours and back; their maps are read from `folder`, as many at a time as memory_gb holds
 /// (one with its neighbours where it holds less).
 calib::ValidationReport ValidateSet(const std::filesystem::path& folder, const DtrSet& set,
-                                    const SparseScene& sparse, const SetLimits& limits,
-                                    int threads);
+                                    const SparseScene& sparse, const SetLimits& limits, int threads,
+                                    Progress& progress);
 
 }  // namespace dtr::pipeline

@@ -5,6 +5,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <set>
 #include <system_error>
 #include <tuple>
 #include <vector>
@@ -141,6 +142,19 @@ void RemoveFolder(const fs::path& folder, const std::string& last) {
 
 bool IsEmptyFolder(const fs::path& folder) {
   return fs::is_directory(folder) && fs::is_empty(folder);
+}
+
+void RefuseForeign(const fs::path& folder, const std::function<bool(const std::string&)>& ours) {
+  std::set<std::string> foreign;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    const std::string name = entry.path().filename().string();
+    if (!ours(name) && !IsTemporaryFile(entry.path())) foreign.insert(name);
+  }
+  if (foreign.empty()) return;
+  throw UsageError(
+      folder.string() +
+      ": expected nothing in the folder to be replaced but what was made there, found " +
+      *foreign.begin() + "; move it away");
 }
 
 std::optional<FileLock> FileLock::Try(const fs::path& file) {

@@ -3,6 +3,7 @@
 // with their process.
 #pragma once
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -43,6 +44,11 @@ void RemoveFolder(const std::filesystem::path& folder, const std::string& last);
 
 /// True for a folder in which nothing is; false for anything else and for nothing.
 bool IsEmptyFolder(const std::filesystem::path& folder);
+
+/// Before a folder is replaced: throws UsageError naming the first entry (by name) that is not
+/// `ours`, as somebody's notes would go with the folder. What IsTemporaryFile knows is nobody's.
+void RefuseForeign(const std::filesystem::path& folder,
+                   const std::function<bool(const std::string& name)>& ours);
 
 /// Held by one process at a time; the system releases it when the process ends, however it ends.
 class FileLock {

@@ -18,11 +18,11 @@ class Progress {
   virtual void Note(const std::string& line) = 0;
   /// True once the user asked to stop (Ctrl-C).
   virtual bool StopRequested() const { return false; }
+  /// The one line that then ends the work: what becomes of what was done.
+  virtual std::string InterruptedLine() const { return "interrupted"; }
   /// Throws Interrupted when the user asked to stop; long loops call it between items.
   void ThrowIfInterrupted() const {
-    if (StopRequested()) {
-      throw Interrupted("interrupted; what was finished is kept, the same command continues");
-    }
+    if (StopRequested()) throw Interrupted(InterruptedLine());
   }
 };
 

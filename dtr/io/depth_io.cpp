@@ -1,7 +1,10 @@
 #include "dtr/io/depth_io.h"
 
 #include <bit>
+#include <cctype>
 #include <cmath>
+#include <string>
+#include <vector>
 
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
@@ -17,12 +20,62 @@ using OIIO::TypeDesc;
 
 constexpr float kHalfMax = 65504;
 
-int DepthChannel(const ImageSpec& spec) {
+// "ViewLayer.Depth.Z" -> {"viewlayer", "depth", "z"}.
+std::vector<std::string> PartsOf(const std::string& channel) {
+  std::vector<std::string> parts(1);
+  for (const char c : channel) {
+    if (c == '.') {
+      parts.emplace_back();
+    } else {
+      parts.back() += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    }
+  }
+  return parts;
+}
+
+bool IsDepthOfALayer(const std::string& channel) {
+  const std::vector<std::string> parts = PartsOf(channel);
+  const bool of_depth = parts.size() > 1 && parts[parts.size() - 2] == "depth";
+  return parts.back() == "depth" ||
+         (of_depth && (parts.back() == "z" || parts.back() == "y" || parts.back() == "v" ||
+                       parts.back() == "r")) ||
+         (parts.size() == 1 && parts.back() == "z");
+}
+
+// The channel Z or Y, else the one that a layer calls its depth (Blender: ViewLayer.Depth.Z), else
+// the first of a picture that holds nothing else.
+int DepthChannel(const ImageSpec& spec, const fs::path& file) {
   for (const char* name : {"Z", "Y"}) {
     const int channel = spec.channelindex(name);
     if (channel >= 0) return channel;
   }
-  return 0;
+  std::vector<int> found;
+  std::string names;
+  bool plain = true;
+  for (int i = 0; i < spec.nchannels; ++i) {
+    const std::string name = spec.channel_name(i);
+    if (IsDepthOfALayer(name)) found.push_back(i);
+    names += (i > 0 ? ", " : "") + name;
+    plain = plain && (name == "R" || name == "G" || name == "B" || name == "A");
+  }
+  if (found.size() == 1) return found.front();
+  if (found.empty() && (plain || spec.nchannels == 1)) return 0;
+  throw Error(file.string() +
+              ": expected one channel of depth, called Z, Y, depth or LAYER.Depth.Z, found " +
+              names.substr(0, 200) + "; write the depth into a file of its own");
+}
+
+// Programs that render a part of a picture write that part alone.
+void ExpectWholePicture(const ImageSpec& spec, const fs::path& file) {
+  if (spec.x == spec.full_x && spec.y == spec.full_y && spec.width == spec.full_width &&
+      spec.height == spec.full_height) {
+    return;
+  }
+  throw Error(file.string() + ": expected pixels for the whole picture of " +
+              std::to_string(spec.full_width) + "x" + std::to_string(spec.full_height) +
+              ", found " + std::to_string(spec.width) + "x" + std::to_string(spec.height) +
+              " of them from (" + std::to_string(spec.x - spec.full_x) + ", " +
+              std::to_string(spec.y - spec.full_y) + ") on; write it without a border");
 }
 
 // Errors of the pure coding functions name a pixel; this puts the file in front.
@@ -41,8 +94,9 @@ Grid<float> ReadFloatsOf(OIIO::ImageInput& in, const fs::path& file) {
     throw Error(file.string() + ": expected float samples, found " +
                 std::string(spec.format.c_str()) + "; say how its numbers are coded");
   }
+  ExpectWholePicture(spec, file);
   Grid<float> grid(spec.width, spec.height);
-  const int channel = DepthChannel(spec);
+  const int channel = DepthChannel(spec, file);
   ReadPixels(in, file, channel, channel + 1, TypeDesc::FLOAT, grid.data().data());
   return grid;
 }

@@ -82,6 +82,9 @@ class SetWriter {
   /// writes it now.
   SetWriter(const std::filesystem::path& target, const std::string& fingerprint_json, bool force,
             ImageCoding image_coding = ImageCoding::kPng);
+  /// What the constructor says of a target that cannot be written, before any work and without
+  /// touching anything. Throws UsageError.
+  static void RequireTarget(const std::filesystem::path& target, bool force);
   /// Without Finish, the partial folder stays for the next run.
   ~SetWriter();
   SetWriter(const SetWriter&) = delete;
@@ -89,6 +92,8 @@ class SetWriter {
 
   /// name.dtr.partial: where everything lies until Finish.
   const std::filesystem::path& folder() const;
+  /// Takes the partial folder away: for work that no later command could go on with.
+  void Discard() noexcept;
   /// folder()/work: for checkpoints of other stages; removed by Finish.
   std::filesystem::path work_folder() const;
   /// True when an earlier run with this fingerprint left work behind.

@@ -24,6 +24,7 @@ constexpr char kFingerprint[] = "work/fingerprint.json";
 constexpr char kLockName[] = "lock";
 constexpr char kLock[] = "work/lock";
 constexpr char kSparseFile[] = "sparse.bin";
+constexpr char kReportFolder[] = "report";
 constexpr std::uintmax_t kRecordLimitBytes = 1 << 24;
 constexpr const char* kPixelFolders[] = {"images", "mask", "depth", "sigma", "mesh", "held_out"};
 
@@ -156,6 +157,10 @@ void SetWriter::State::RecoverWork() const {
 
 void SetWriter::State::ExpectReplaceable() const {
   if (!fs::exists(fs::symlink_status(target))) return;
+  if (!fs::is_directory(target)) {
+    throw UsageError(target.string() + ": expected no such folder yet, found a file; " +
+                     "choose another name");
+  }
   if (!force) {
     throw UsageError(target.string() + ": expected no such folder yet, found one; " +
                      "choose another name or pass --force to replace it");
@@ -164,6 +169,11 @@ void SetWriter::State::ExpectReplaceable() const {
     throw UsageError(target.string() + ": expected a D+TR set to replace, found something else; " +
                      "it is left alone");
   }
+  RefuseForeign(target, [](const std::string& name) {
+    return name == kSetFile || name == kSparseFile || name == kReportFolder ||
+           std::find(std::begin(kPixelFolders), std::end(kPixelFolders), name) !=
+               std::end(kPixelFolders);
+  });
   // At the end of the work the old set would find no room.
   if (fs::exists(fs::symlink_status(aside)) && !IsEmptyFolder(aside)) {
     throw UsageError(aside.string() + ": expected nothing, for " + target.string() +
@@ -231,6 +241,15 @@ SetWriter::SetWriter(const fs::path& target, const std::string& fingerprint_json
   });
 }
 
+void SetWriter::RequireTarget(const fs::path& target, bool force) {
+  State state;
+  state.target = WithoutSlash(target);
+  state.aside = Beside(state.target, ".replaced");
+  state.force = force;
+  // An old set that was cut off half-way there is the constructor's to put back.
+  if (!fs::exists(state.aside / kSetFile)) AsError([&] { state.ExpectReplaceable(); });
+}
+
 SetWriter::~SetWriter() {
   std::error_code ignored;
   try {
@@ -239,6 +258,13 @@ SetWriter::~SetWriter() {
   } catch (const fs::filesystem_error&) {
     // The folder was taken away while we worked; there is nothing left to tidy.
   }
+}
+
+void SetWriter::Discard() noexcept {
+  std::error_code ignored;
+  fs::remove_all(state_->partial, ignored);
+  state_->lock.reset();
+  state_->finished = true;
 }
 
 const fs::path& SetWriter::folder() const { return state_->partial; }

@@ -43,6 +43,7 @@ SampleGrid MakeSampleGrid(const View& view, int resolution) {
   const int columns = count(view.depth.width()), rows = count(view.depth.height());
   if (columns == 0 || rows == 0) return samples;
   samples.inverse_depth = Grid<double>(columns, rows);
+  bool any = false;
   for (int j = 0; j < rows; ++j) {
     const int y = samples.offset + j * resolution;
     for (int i = 0; i < columns; ++i) {
@@ -55,7 +56,12 @@ SampleGrid MakeSampleGrid(const View& view, int resolution) {
       const float depth = view.depth(x, y);
       if (DepthImage::IsHole(depth)) continue;
       samples.inverse_depth(i, j) = 1.0 / static_cast<double>(depth);
+      any = true;
     }
+  }
+  if (!any) {
+    samples.inverse_depth = {};
+    samples.masked = {};
   }
   return samples;
 }

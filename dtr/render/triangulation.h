@@ -23,7 +23,7 @@ struct SampleGrid {
 };
 
 /// SPEC 2.1. Holes and samples whose image pixels are all masked give 0. Empty grid when R leaves
-/// no sample.
+/// no sample, or none of them has a depth.
 SampleGrid MakeSampleGrid(const View& view, int resolution);
 
 /// SPEC 2.3: when two neighbouring samples do not belong to one surface.

@@ -333,6 +333,40 @@ TEST(DropFaulty, TakesOutWhatIsAskedForAndListsIt) {
   EXPECT_THAT(capture.skipped[1].reason, HasSubstr("dropped: 100 % of it is overexposed"));
 }
 
+TEST(DropFaulty, TheSharpRetakeOfABlurredPhotoStays) {
+  Capture capture;
+  capture.photos.resize(3);
+  const std::vector<std::string> names{"blurred.jpg", "retake.jpg", "third.jpg"};
+  for (size_t i = 0; i < names.size(); ++i) {
+    capture.photos[i].name = names[i];
+    capture.photos[i].screening.emplace();
+  }
+  capture.photos[0].screening->faults = {Fault::kBlurred};
+  capture.photos[0].screening->remarks = {"is blurred"};
+  for (size_t i : {1, 2}) {
+    capture.photos[i].screening->duplicate_of = "blurred.jpg";
+    capture.photos[i].screening->faults = {Fault::kDuplicate};
+    capture.photos[i].screening->remarks = {"shows the same picture as blurred.jpg"};
+  }
+  Capture duplicates_alone = capture;
+  DropFaulty(capture, {Fault::kBlurred, Fault::kDuplicate});
+  EXPECT_THAT(NamesOf(capture), ElementsAre("retake.jpg"));
+  DropFaulty(duplicates_alone, {Fault::kDuplicate});
+  EXPECT_THAT(NamesOf(duplicates_alone), ElementsAre("blurred.jpg"));
+}
+
+TEST(IngestPhotos, NamesThatNoModelCanHoldAreSkippedBeforeAnyWork) {
+  const TemporaryFolder folder;
+  io::WriteImage(folder / " a.png", Blobs(0, 3, 1));
+  io::WriteImage(folder / "b.png", Blobs(0, 3, 2));
+  fs::create_directory(folder / "sub");
+  io::WriteImage(folder / "sub/ c.png", Blobs(0, 3, 3));
+  const Capture capture = Ingest(folder.path());
+  EXPECT_THAT(NamesOf(capture), ElementsAre("b.png", "sub/ c.png"));
+  ASSERT_EQ(capture.skipped.size(), 1u);
+  EXPECT_THAT(capture.skipped[0].reason, HasSubstr("its name begins with a blank"));
+}
+
 TEST(IngestPhotos, AMaskBesideAPhotoIsItsMaskAndNoPhoto) {
   const TemporaryFolder folder;
   fs::create_directories(folder / "left");

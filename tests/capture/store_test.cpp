@@ -120,6 +120,11 @@ TEST(WriteCapture, LeavesWhatIsThereUnlessToldToReplaceACapture) {
   EXPECT_THROW(WriteCapture(capture, folder / "empty", 1), UsageError);
   EXPECT_NO_THROW(WriteCapture(capture, folder / "empty", {.replace = true}, progress));
   EXPECT_FALSE(fs::exists(folder / "empty.replaced"));
+  WriteFileAtomically(folder / "empty/notes.txt", "mine");
+  EXPECT_THAT(MessageOf<UsageError>(
+                  [&] { WriteCapture(capture, folder / "empty", {.replace = true}, progress); }),
+              HasSubstr("found notes.txt; move it away"));
+  EXPECT_TRUE(fs::exists(folder / "empty/notes.txt"));
   WriteFileAtomically(folder / "file", "");
   EXPECT_THROW(WriteCapture(capture, folder / "file", 1), UsageError);
 }

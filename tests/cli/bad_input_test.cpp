@@ -20,6 +20,7 @@ namespace fs = std::filesystem;
 using Json = nlohmann::json;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 
 class BadInput : public CourtyardAndSet {
  protected:
@@ -124,6 +125,11 @@ TEST_F(BadInput, OutputsThatExistOrCannotBeMade) {
   ExpectRefused(Build(Photos(), {"--force", "--poses", Shared("courtyard/sparse")}), kWrongUsage,
                 "expected a D+TR set to replace, found something else");
   EXPECT_EQ(Text(In("set.dtr/mine")), "precious");
+  const Ran onto_file = Dtr({"build", Photos(), "-o", In("set.dtr/mine"), "--force"});
+  ExpectRefused(onto_file, kWrongUsage, "expected no such folder yet, found a file");
+  EXPECT_THAT(onto_file.err, Not(HasSubstr("== photos")));  // said before any is read
+  ExpectRefused(Dtr({"evaluate", Shared("good.dtr"), "--pictures", In("set.dtr/mine")}),
+                kWrongUsage, ": expected a folder, found a file");
   const auto build_into = [&](const std::string& set) {
     return Dtr({"build", Photos(), "-o", set, "--poses", Shared("courtyard/sparse")});
   };
@@ -164,6 +170,10 @@ TEST_F(BadInput, WordsThatMeanNothing) {
   ExpectRefused(Build(Photos(), {"--engine", "magic"}), kWrongUsage, "--engine: magic not in");
   ExpectRefused(Build(Photos(), {"--threads", "-1"}), kWrongUsage,
                 "--threads: Value -1 not in range");
+  ExpectRefused(Dtr({"info", Shared("good.dtr"), "--threads", "1.5"}), kWrongUsage,
+                "--threads: expected a whole number, found 1.5");
+  ExpectRefused(Dtr({"join", Shared("good.dtr"), Shared("good.dtr"), "-o", In("j"), "--fps", "0"}),
+                kWrongUsage, "--fps: expected a number above 0, found 0");
 }
 
 TEST_F(BadInput, SetsCutShort) {

@@ -221,6 +221,8 @@ TEST_F(BenchSweep, WhatCannotBeMeasuredIsRefused) {
                 "'color=red'");
   ExpectRefused(bench({"--point", "resolution=9"}), kWrongUsage,
                 "--point: expected a value of {1,2,4} for resolution, found 'resolution=9'");
+  ExpectRefused(bench({"--point", "views=4", "-o", (folder_ / "x").string()}), kWrongUsage,
+                "--point: expected no --output beside it, for one setting writes no folder");
   ExpectRefused(bench({"--point", "default", "--stage", "render,storage"}), kWrongUsage,
                 "--point: expected one --stage with it, found several");
   ExpectRefused(bench({"--budget-ms", "5", "--stage", "storage"}), kWrongUsage,

@@ -122,5 +122,25 @@ TEST(BuildCommand, TakesAVideoForPhotos) {
   ExpectRefused(Dtr(other), 2, "expected no such folder yet");
 }
 
+// The natural call in a folder of videos, and options that are known to fail once frames are there.
+TEST(BuildCommand, AFolderOfVideosMayHoldTheSet) {
+  const TemporaryFolder folder;
+  MakeSmallCourtyard(folder / "c");
+  fs::create_directory(folder / "videos");
+  MakeVideo(folder / "c", folder / "videos/walk.avi", folder / "model");
+  const fs::path set = folder / "videos/set.dtr";
+  std::vector<std::string> command{"build",     (folder / "videos").string(),
+                                   "-o",        set.string(),
+                                   "--poses",   (folder / "model").string(),
+                                   "--engine",  "none",
+                                   "--every",   "1",
+                                   "--holdout", "nobody"};
+  ExpectRefused(Dtr(command), 2, "--holdout: no photo is named 'nobody'");
+  EXPECT_FALSE(fs::exists(set.string() + ".partial"));  // it would stand in the next one's way
+  command.back() = "frame_000002.jpg";
+  DtrOk(command);
+  EXPECT_EQ(io::ReadSet(set).frames.front().views.size(), static_cast<size_t>(kCourtyardViews));
+}
+
 }  // namespace
 }  // namespace dtr::testing

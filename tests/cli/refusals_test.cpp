@@ -11,6 +11,7 @@
 
 #include "dtr/base/files.h"
 #include "dtr/io/image_io.h"
+#include "tests/capture/photo_files.h"
 #include "tests/cli/courtyard_and_set.h"
 #include "tests/cli/run_dtr.h"
 #include "tests/support/environment.h"
@@ -107,6 +108,10 @@ TEST_F(Refusals, WhatCannotBeImported) {
        import(Write("cameras.xml", ""), {"--images", Photos()})},
       {kWrongUsage, ": no such folder",
        import(good, {"--images", Photos(), "--masks", In("masks")})},
+      {kWrongUsage, "expected a mask of 0000.jpg or of another photo, called 0000.png",
+       import(sparse, {"--images", Photos(), "--masks", empty})},
+      {kWrongUsage, "--depth-unit requires --depth",
+       import(sparse, {"--images", Photos(), "--depth-unit", "0.001"})},
       {kWrongUsage, "--holdout: no photo is named 'nobody'",
        import(good, {"--images", Photos(), "--holdout", "nobody"})},
       {kFailed, "0000.jpg: cannot be read: No such file or directory",
@@ -313,6 +318,25 @@ TEST_F(Refusals, VideosWithoutFfmpegOrWithOneThatFails) {
   EXPECT_EQ(std::distance(begin(left), end(left)), 1) << "more than bin/ is left";
 }
 
+// A lens is calibrated on photos as they are stored; of an upright one it would be a mirrored one.
+TEST_F(Refusals, APhotoThatIsTurnedIsNotOfAKnownLens) {
+  const std::string photos = Folder("turned");
+  fs::copy(Photos(), photos, fs::copy_options::recursive | fs::copy_options::overwrite_existing);
+  capture::testing::AddExifOrientation(In("turned/0001.jpg"), 3);
+  Write("one/cameras.txt", "1 PINHOLE 192 128 150 150 96 64\n");
+  ExpectAllRefused(
+      {{kFailed,
+        "0001.jpg: expected a photo as it is stored, for the lens is known of such, found EXIF "
+        "orientation 3",
+        {"calibrate", "photos", photos, "-o", In("new"), "--lens", In("one/cameras.txt")}}});
+  // Of given cameras nobody knows: it is told.
+  const Ran built = DtrOk({"build", photos, "-o", In("set.dtr"), "--poses",
+                           Shared("courtyard/sparse"), "--engine", "none"});
+  EXPECT_THAT(built.err,
+              ::testing::HasSubstr("1 photos are turned upright by their EXIF data, first "
+                                   "0001.jpg"));
+}
+
 TEST_F(Refusals, CalibrationsOfTakenFoldersAndOfOtherLenses) {
   const std::string taken = Folder("taken");
   Write("taken/cameras.bin", "");
@@ -441,6 +465,19 @@ TEST_F(Refusals, DepthThatCannotBeHad) {
        {"stereo", set, "-o", In("c.dtr"), "--engine", "sgbm", "--depth-error", "1e-6"}},
   });
   for (const char* name : {"a.dtr", "b.dtr", "c.dtr"}) EXPECT_FALSE(fs::exists(In(name)));
+}
+
+TEST_F(Refusals, OptionsOfVideosForPhotosAndOfPhotosForVideos) {
+  const std::string video = Write("walk.mp4", "");
+  const std::string found = "for --every, --motion, --max-frames and --synchronised, found neither";
+  ExpectAllRefused({
+      {kWrongUsage, found, {"capture", Photos(), "-o", In("c"), "--every", "2"}},
+      {kWrongUsage, found, {"build", Photos(), "-o", In("s.dtr"), "--max-frames", "5"}},
+      {kWrongUsage, found, {"build", Photos(), "-o", In("s.dtr"), "--synchronised"}},
+      {kWrongUsage,
+       "--gps: expected photos, which say where they were taken, found a video",
+       {"build", video, "-o", In("s.dtr"), "--gps"}},
+  });
 }
 
 TEST_F(Refusals, PhotosThatAreAllDropped) {

@@ -10,14 +10,22 @@ TEST_F(VideoBySfm, KilledAnywhereItIsFinishedToTheSameBytes) { KillAndFinish("ki
 
 // The model that structure from motion left is frozen: what comes after it is killed, for certain.
 TEST_F(VideoBySfm, KilledAfterItsModelWasFrozenItIsFinishedWithoutColmap) {
-  const fs::path set = Set("frozen");
-  const fs::path partial = set.string() + ".partial";
-  const Ran cut = Dtr(Arguments(set), {SIGKILL, [&] { return FilesIn(partial / "images") >= 1; }});
-  ASSERT_EQ(cut.signal, SIGKILL) << cut.err;
-  colmap_.ForgetCalls();
-  DtrOk(Arguments(set));
-  ExpectFinished(set);
-  EXPECT_THAT(colmap_.Calls(), ::testing::IsEmpty());
+  // Bundle adjustment is kept, too; a record of it that is damaged costs time alone.
+  for (const bool damaged : {false, true}) {
+    const fs::path set = Set(damaged ? "damaged" : "frozen");
+    const fs::path partial = set.string() + ".partial";
+    const Ran cut =
+        Dtr(Arguments(set), {SIGKILL, [&] { return FilesIn(partial / "images") >= 1; }});
+    ASSERT_EQ(cut.signal, SIGKILL) << cut.err;
+    const fs::path record = partial / "work/calibration/refined/refined.json";
+    ASSERT_TRUE(fs::exists(record));
+    if (damaged) fs::resize_file(record, fs::file_size(record) / 2);
+    colmap_.ForgetCalls();
+    const Ran again = DtrOk(Arguments(set));
+    EXPECT_EQ(again.err.find("bundle adjustment") != std::string::npos, damaged) << again.err;
+    ExpectFinished(set);
+    EXPECT_THAT(colmap_.Calls(), ::testing::IsEmpty());
+  }
 }
 
 TEST_F(VideoBySfm, AForcedCaptureChoosesTheFramesAgainToTheSameBytes) {

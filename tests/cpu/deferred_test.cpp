@@ -213,7 +213,7 @@ TEST(HeldSurfaces, TheNearestViewIsBelievedAgainstAFarOne) {
 }
 
 TEST(HeldSurfaces, AHoleSaysAQuarterOfADepth) {
-  // A view 0.5 to one side, and others at the same angle that have no depth at all: each of their
+  // A view 0.5 to one side, and others at the same angle that have no depth there: each of their
   // says is a quarter of its say.
   for (const int holes : {3, 5}) {
     std::vector<View> views = {
@@ -229,7 +229,7 @@ TEST(HeldSurfaces, AHoleSaysAQuarterOfADepth) {
     for (View& view : set.frames[0].views) {
       if (view.id == "a") continue;
       for (int y = 0; y < 72; ++y) {
-        for (int x = 0; x < 96; ++x) view.depth(x, y) = 0;
+        for (int x = y == 0 ? 1 : 0; x < 96; ++x) view.depth(x, y) = 0;  // it looked: one is left
       }
     }
     const Shot novel = ShotFrom("n", {0, 0, 0}, {0, 0, 10});
@@ -249,7 +249,11 @@ TEST(HeldSurfaces, WhatIsMaskedSaysNothing) {
                   OptionsOf(RenderMethod::kDeferred));
   };
   View& nearest = set.frames[0].views[0];
+  const float corner = nearest.depth(0, 0);
   for (float& z : nearest.depth.grid().data()) z = 0;
+  // A view that stereo found nothing of, or never looked at, has no say.
+  EXPECT_NEAR(picture().depth(48, 36), 10, 1e-4);
+  nearest.depth(0, 0) = corner;
   EXPECT_EQ(picture().coverage(48, 36), 0);
   nearest.mask = Mask(nearest.camera.width_px(), nearest.camera.height_px());
   const RenderResult masked = picture();
@@ -259,7 +263,7 @@ TEST(HeldSurfaces, WhatIsMaskedSaysNothing) {
   ExpectSameBytes(masked, Render(MakeRenderScene(set, without), novel.camera, novel.cam_from_world,
                                  OptionsOf(RenderMethod::kDeferred)));
   // Masked samples beside others: these still say what they say.
-  nearest.mask(48, 36) = 255;
+  nearest.mask(48, 36) = nearest.mask(0, 0) = 255;
   EXPECT_EQ(picture().coverage(48, 36), 0);
 }
 

@@ -2,6 +2,7 @@
 // that is damaged as real captures are, and on simple shapes with masks, gains and few samples.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdio>
 
 #include "dtr/cpu/renderer.h"
@@ -98,6 +99,26 @@ TEST_F(Parity, HoldsWhereViewsAreMaskedInLargePieces) {
     EXPECT_TRUE(ExpectParity(by_processor, scene, options).Holds()) << resolution;
     EXPECT_TRUE(ExpectParity(by_shaders, scene, options).Holds()) << resolution;
   }
+}
+
+// A map without one sample was never looked at (SPEC 2.1): from its own place others are seen.
+TEST_F(Parity, HoldsWhereAViewHasNoDepthAtAll) {
+  NamedScene scene = ExactOrDamagedScene("courtyard", 5, 192, 128);
+  View& empty = scene.set.frames[0].views[2];
+  for (float& z : empty.depth.grid().data()) z = 0;
+  scene.novel.camera = empty.camera;
+  scene.novel.cam_from_world = empty.cam_from_world;
+  RendererSettings shaders;
+  shaders.coarse_drawer = CoarseDrawer::kShaders;
+  Renderer by_processor, by_shaders(shaders);
+  const RenderOptions options = OptionsOf(RenderMethod::kDeferred);
+  EXPECT_TRUE(ExpectParity(by_processor, scene, options).Holds());
+  EXPECT_TRUE(ExpectParity(by_shaders, scene, options).Holds());
+  const RenderResult picture = cpu::Render(MakeRenderScene(scene.set), scene.novel.camera,
+                                           scene.novel.cam_from_world, options);
+  const auto& coverage = picture.coverage.data();
+  EXPECT_GT(std::count_if(coverage.begin(), coverage.end(), [](auto c) { return c != 0; }),
+            static_cast<std::ptrdiff_t>(coverage.size() / 2));
 }
 
 TEST_F(Parity, WouldSeeHalfAPixel) {

@@ -1,6 +1,7 @@
 #include "dtr/io/depth_io.h"
 
-#include <gtest/gtest.h>
+#include <OpenImageIO/imageio.h>
+#include <gmock/gmock.h>
 
 #include <cmath>
 #include <limits>
@@ -8,6 +9,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/base/random.h"
+#include "tests/support/message_of.h"
 #include "tests/support/test_data.h"
 #include "tests/support/truncation.h"
 
@@ -102,6 +104,56 @@ TEST(Png16Millimetre, RoundsToAMillimetreAndRefusesWhatDoesNotFit) {
   EXPECT_THROW(EncodePng16Millimetre(depth), Error);
   depth(2, 0) = 0.0004f;  // would turn into a hole
   EXPECT_THROW(EncodePng16Millimetre(depth), Error);
+}
+
+// An EXR with these channels, channel k 10 + k throughout; `x` columns of the picture before it.
+void WriteLayers(const std::filesystem::path& file, const std::vector<std::string>& channels,
+                 int x = 0) {
+  OIIO::ImageSpec spec(4, 3, static_cast<int>(channels.size()), OIIO::TypeDesc::FLOAT);
+  spec.channelnames = channels;
+  spec.x = x;
+  spec.full_width = 4 + x;
+  std::vector<float> pixels;
+  for (int i = 0; i < 12; ++i) {
+    for (size_t k = 0; k < channels.size(); ++k) pixels.push_back(10 + static_cast<float>(k));
+  }
+  const auto out = OIIO::ImageOutput::create(file.string());
+  ASSERT_TRUE(out && out->open(file.string(), spec));
+  ASSERT_TRUE(out->write_image(OIIO::TypeDesc::FLOAT, pixels.data()));
+  ASSERT_TRUE(out->close());
+}
+
+TEST(ReadFloatGrid, DepthOfALayerIsFoundByItsName) {
+  const TemporaryFolder folder;
+  const auto value = [&](const std::vector<std::string>& channels) {
+    WriteLayers(folder / "layers.exr", channels);
+    return ReadFloatGrid(folder / "layers.exr")(0, 0);
+  };
+  EXPECT_EQ(value({"R", "G", "B", "Z"}), 13);
+  EXPECT_EQ(value({"R", "G", "B", "A"}), 10);
+  // As Blender writes them; a normal has a Z of its own.
+  EXPECT_EQ(value({"View.Combined.R", "View.Combined.G", "View.Combined.B", "View.Depth.Z",
+                   "View.Normal.X", "View.Normal.Y", "View.Normal.Z"}),
+            13);
+  EXPECT_EQ(value({"a.R", "depth.V"}), 11);
+  EXPECT_EQ(value({"a.R", "b.depth"}), 11);
+  for (const std::vector<std::string>& channels :
+       {std::vector<std::string>{"a.Depth.Z", "b.Depth.Z"}, {"View.R", "View.G", "View.B"}}) {
+    WriteLayers(folder / "other.exr", channels);
+    EXPECT_THAT(testing::MessageOf<Error>([&] { ReadFloatGrid(folder / "other.exr"); }),
+                ::testing::HasSubstr("expected one channel of depth, called Z, Y, depth or "
+                                     "LAYER.Depth.Z, found " +
+                                     channels.front()));
+  }
+}
+
+TEST(ReadFloatGrid, APartOfAPictureIsRefused) {
+  const TemporaryFolder folder;
+  WriteLayers(folder / "part.exr", {"Z"}, 4);
+  EXPECT_THAT(
+      testing::MessageOf<Error>([&] { ReadFloatGrid(folder / "part.exr"); }),
+      ::testing::HasSubstr("expected pixels for the whole picture of 8x3, found 4x3 of them from "
+                           "(4, 0) on"));
 }
 
 TEST(ExrHalf, RoundsLikeOpenExrAndRefusesWhatDoesNotFit) {

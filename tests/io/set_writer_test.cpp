@@ -167,14 +167,15 @@ TEST(SetWriter, AFinishedSetIsReplacedOnlyByForce) {
   const TemporaryFolder folder;
   const fs::path target = folder / "small.dtr";
   WriteSmallSet(target);
-  WriteFileAtomically(target / "old", "of the old set");
+  fs::create_directories(target / "report");
+  WriteFileAtomically(target / "report/old", "of the old set");
   EXPECT_THROW(SetWriter(target, kFingerprint, false), UsageError);
   {
     SetWriter writer(target, kFingerprint, true);
-    EXPECT_TRUE(fs::exists(target / "old"));  // until the new one is whole
+    EXPECT_TRUE(fs::exists(target / "report/old"));  // until the new one is whole
     WriteSmallSet(writer);
   }
-  EXPECT_FALSE(fs::exists(target / "old"));
+  EXPECT_FALSE(fs::exists(target / "report/old"));
   EXPECT_FALSE(fs::exists(folder / "small.dtr.replaced"));
   EXPECT_THAT(VerifySet(target), IsEmpty());
 }
@@ -187,6 +188,30 @@ TEST(SetWriter, ForceReplacesNothingThatIsNoSet) {
   EXPECT_TRUE(fs::exists(folder / "photos/a.jpg"));
   fs::create_directories(folder / "empty.dtr");
   EXPECT_NO_THROW(WriteSmallSet(folder / "empty.dtr", true));
+}
+
+TEST(SetWriter, WhatSomebodyKeepsInASetIsNotReplacedWithIt) {
+  const TemporaryFolder folder;
+  const fs::path target = folder / "small.dtr";
+  WriteSmallSet(target);
+  WriteFileAtomically(target / "notes.txt", "mine");
+  EXPECT_THAT(MessageOf<UsageError>([&] { SetWriter(target, kFingerprint, true); }),
+              HasSubstr("found notes.txt; move it away"));
+  EXPECT_TRUE(fs::exists(target / "notes.txt"));
+  EXPECT_FALSE(fs::exists(folder / "small.dtr.partial"));
+  fs::remove(target / "notes.txt");
+  EXPECT_NO_THROW(WriteSmallSet(target, true));
+}
+
+TEST(SetWriter, WorkThatIsDiscardedStandsInNobodysWay) {
+  const TemporaryFolder folder;
+  {
+    SetWriter writer(folder / "small.dtr", kFingerprint, false);
+    WriteFileAtomically(writer.work_folder() / "frames", "chosen");
+    writer.Discard();
+  }
+  EXPECT_FALSE(fs::exists(folder / "small.dtr.partial"));
+  EXPECT_NO_THROW(SetWriter(folder / "small.dtr", R"({"other": 1})", false));
 }
 
 TEST(SetWriter, AReplacementCutOffHalfWayGivesTheOldSetBack) {

@@ -1,13 +1,14 @@
 #include "dtr/io/formats/import_views.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cctype>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <span>
 
 #include "dtr/base/error.h"
 #include "dtr/base/hash.h"
+#include "dtr/base/memory_budget.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/io/depth_io.h"
 #include "dtr/io/formats/foreign_depth.h"
@@ -36,9 +37,15 @@ fs::path MaskFolder(const ImportOptions& options) {
 fs::path DepthFileOf(const NamedCamera& named, const ImportOptions& options) {
   if (!named.depth_file.empty()) return options.depth_dir / named.depth_file;
   std::vector<fs::path> found;
-  for (const char* extension : {".exr", ".pfm", ".png", ".tif", ".tiff"}) {
+  for (const char* extension :
+       {".exr", ".pfm", ".png", ".tif", ".tiff", ".EXR", ".PFM", ".PNG", ".TIF", ".TIFF"}) {
     const fs::path file = options.depth_dir / fs::path(named.name).replace_extension(extension);
-    if (fs::exists(file)) found.push_back(file);
+    // Where the disk does not tell a from A, both are one file.
+    const bool known = std::any_of(found.begin(), found.end(), [&](const fs::path& other) {
+      std::error_code ignored;
+      return fs::equivalent(other, file, ignored);
+    });
+    if (fs::exists(file) && !known) found.push_back(file);
   }
   if (found.size() != 1) {
     throw Error(options.depth_dir.string() + ": expected one depth map (.exr, .pfm, .png, .tif) " +
@@ -96,6 +103,12 @@ Mask ReadCameraMask(const NamedCamera& named, const ImportOptions& options) {
                 SizeText(named.camera.width_px(), named.camera.height_px()) + " pixels, found " +
                 SizeText(mask.width(), mask.height()));
   }
+  if (std::none_of(mask.data().begin(), mask.data().end(), [](auto value) { return value != 0; })) {
+    throw Error(
+        file.string() +
+        ": expected a mask that leaves something of its photo, found it dark throughout; what "
+        "is to be used is 255, not 1");
+  }
   return mask;
 }
 
@@ -147,6 +160,7 @@ nlohmann::json Inputs(const CameraList& list, const ImportOptions& options, Prog
   const int count = static_cast<int>(list.cameras.size());
   std::vector<nlohmann::json> photos(list.cameras.size());
   progress.Stage("hash", count);
+  std::atomic<int> done{0};
   ParallelFor(0, count, options.threads, [&](int i) {
     progress.ThrowIfInterrupted();
     const NamedCamera& named = list.cameras[static_cast<size_t>(i)];
@@ -163,7 +177,7 @@ nlohmann::json Inputs(const CameraList& list, const ImportOptions& options, Prog
       const DepthKind kind = options.depth_kind.value_or(named.depth_kind);
       photo["depth_kind"] = kind == DepthKind::kPlaneZ ? "z" : "ray";
     }
-    progress.Update(i + 1);
+    progress.Update(++done);
   });
   nlohmann::json inputs;
   inputs["made_by"] = "import";
@@ -216,9 +230,13 @@ void WriteViews(const CameraList& list, const ImportOptions& options, SetWriter&
   set.frames[0].views.resize(list.cameras.size());
   coarse.frames = set.frames;
   progress.Stage("import", count);
+  MemoryBudget memory(options.memory_gb);
+  std::atomic<int> done{0};
   ParallelFor(0, count, options.threads, [&](int i) {
     progress.ThrowIfInterrupted();
     const auto at = static_cast<size_t>(i);
+    const PinholeCamera& camera = list.cameras[at].camera;
+    const auto share = memory.TakeForPhoto(camera.width_px(), camera.height_px());
     View view = ImportView(list.cameras[at], ids[at], options);
     writer.WriteView(view, list.unit);
     coarse.frames[0].views[at] = CoarseCopy(view);
@@ -226,7 +244,7 @@ void WriteViews(const CameraList& list, const ImportOptions& options, SetWriter&
     view.mask = {};
     view.depth = {};
     set.frames[0].views[at] = std::move(view);
-    progress.Update(i + 1);
+    progress.Update(++done);
   });
 }
 
@@ -292,23 +310,15 @@ void ImportSet(const CameraList& list, const ImportOptions& options, const fs::p
         "import: expected depth maps (--depth) or a model with points, found neither; without them "
         "nobody knows where the scene is");
   }
-  if (!force && fs::exists(target)) {  // before any file is hashed
-    throw UsageError(
-        target.string() +
-        ": expected no such folder yet, found one; choose another name or pass --force "
-        "to replace it");
-  }
+  SetWriter::RequireTarget(target, force);  // before any file is hashed
   const nlohmann::json inputs = Inputs(list, options, progress);
   const std::string fingerprint = Fingerprint(inputs, list, options, points);
-  auto writer = std::make_unique<SetWriter>(target, fingerprint, force);
+  SetWriter writer(target, fingerprint, force);
   try {
-    WriteSet(list, options, inputs.dump(), points, *writer, progress);
+    WriteSet(list, options, inputs.dump(), points, writer, progress);
   } catch (const Error&) {
     // An import starts anew anyway, and what it left would stand in the way of mended inputs.
-    const fs::path unfinished = writer->folder();
-    writer.reset();
-    std::error_code ignored;
-    fs::remove_all(unfinished, ignored);
+    writer.Discard();
     throw;
   }
 }

@@ -232,6 +232,14 @@ TEST(VideosOf, AreAVideoOrAFolderOfNothingElse) {
   EXPECT_THAT(VideosOf(folder.path()), ElementsAre(folder / "a.mov", folder / "b.MP4"));
   EXPECT_THAT(VideosOf(folder / "a.mov"), ElementsAre(folder / "a.mov"));
   EXPECT_THAT(VideosOf(folder / "notes.txt"), IsEmpty());
+  for (const char* ours : {"set.dtr", "set.dtr.partial", "cut.partial", "capture"}) {
+    fs::create_directory(folder / ours);
+  }
+  WriteFileAtomically(folder / "capture/capture.json", "{}");
+  EXPECT_EQ(VideosOf(folder.path()).size(), 2u);
+  fs::create_directory(folder / "sub");
+  EXPECT_THAT(VideosOf(folder.path()), IsEmpty());
+  fs::remove(folder / "sub");
   WriteFileAtomically(folder / "photo.jpg", "x");
   EXPECT_THAT(VideosOf(folder.path()), IsEmpty());
 }

@@ -235,6 +235,22 @@ TEST_F(ImportTest, WhatIsMissingOrDoesNotFitIsNamed) {
   EXPECT_THAT(ErrorOfImport(), HasSubstr("named like the photo photo 2.png, found 0"));
 }
 
+TEST_F(ImportTest, AMaskThatLeavesNothingIsRefused) {
+  options_.mask_dir = folder_ / "masks";
+  fs::create_directory(options_.mask_dir);
+  list_.cameras[0].mask_file = "ones.png";
+  WriteImage(options_.mask_dir / "ones.png", ImageRgb8(kWidth, kHeight, 3, 1));
+  EXPECT_THAT(ErrorOfImport(), HasSubstr("found it dark throughout; what is to be used is 255"));
+}
+
+TEST_F(ImportTest, ExtensionsOfDepthMayBeOfCapitals) {
+  Import("small.dtr");
+  fs::rename(folder_ / "depth/photo 0.exr", folder_ / "depth/photo 0.EXR");
+  Import("capital.dtr");
+  EXPECT_EQ(Sha256OfFile(folder_ / "small.dtr/set.json"),
+            Sha256OfFile(folder_ / "capital.dtr/set.json"));
+}
+
 TEST_F(ImportTest, WholeNumbersNeedAStatedUnit) {
   for (const NamedCamera& named : list_.cameras) {
     const fs::path file = folder_ / "depth" / named.name;
