@@ -374,7 +374,7 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
   if (std::filesystem::exists(options.photos / capture::kCaptureFile)) {
     fingerprint["stored_sha256"] = StoredHashes(photos);
   }
-  if (!std::filesystem::is_directory(options.poses)) {
+  if (NeedsFeatures(options.poses)) {
     // COLMAP looks for features, of a size that is the one thing --memory decides of the result.
     const auto sizes = SizesOf(options, photos, held_out);
     if (!sizes.empty()) {

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "calib/colmap/features.h"
+#include "calib/colmap/model_io.h"
 #include "calib/colmap/program.h"
 #include "calib/colmap/sfm.h"
 #include "capture/sfm_images.h"
@@ -127,11 +128,15 @@ int FeatureImageSizePx(const std::vector<std::pair<int, int>>& sizes_px, double 
   return colmap::PlanExtraction(images, 1, memory_gb, asked_px).max_image_size_px;
 }
 
+bool NeedsFeatures(const fs::path& poses) {
+  return !fs::is_directory(poses) || colmap::ReadModel(poses).points.empty();
+}
+
 void RequireCalibration(const fs::path& poses) {
   if (!poses.empty() && !fs::exists(poses)) {
     throw UsageError(fmt::format("--poses {}: no such file or folder", poses.string()));
   }
-  if (!fs::is_directory(poses)) (void)colmap::Program();
+  if (NeedsFeatures(poses)) (void)colmap::Program();
 }
 
 CalibratedPhotos CalibratePhotos(const capture::Capture& capture, const CalibrateOptions& options,

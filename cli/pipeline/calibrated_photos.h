@@ -54,9 +54,12 @@ struct CalibratedPhotos {
   std::string scale_json;  ///< entry of the provenance's `scale`; empty: lengths are SfM's
 };
 
+/// Whether COLMAP must look for features: not where `poses` is a model that brings its points.
+/// Throws Error where that is broken.
+bool NeedsFeatures(const std::filesystem::path& poses);
+
 /// Refuses before any work what cannot work: UsageError for `poses` that do not exist, Error when
-/// COLMAP is needed and not installed. (The model of a folder of poses brings its points; all other
-/// ways run COLMAP.)
+/// COLMAP is needed (NeedsFeatures) and not installed.
 void RequireCalibration(const std::filesystem::path& poses);
 
 /// The long side to which SfM shrinks photos of these sizes (width and height, px), so that looking

@@ -59,19 +59,69 @@ Eigen::Vector3d RecentreModel(calib::SfmModel& model) {
   return list.world_origin;
 }
 
-CalibratedPhotos FromColmapModel(const capture::Capture& capture, const fs::path& poses) {
+// Cameras as they were given; poses act on p_world - the recentred origin.
+struct Given {
+  std::map<std::string, colmap::PosedImage> by_name;
+  std::string first;  // of the file
+  LengthUnit unit = LengthUnit::kUnknown;
+  Eigen::Vector3d world_origin = Eigen::Vector3d::Zero();
+};
+
+// Points for cameras that came without any: COLMAP finds them with everything else held.
+CalibratedPhotos Triangulated(const Given& given, const capture::Capture& capture,
+                              const CalibrateOptions& options, const fs::path& workspace,
+                              Progress& progress) {
+  std::vector<colmap::PosedImage> sources, held_out;
+  capture::Capture source_photos;
+  for (size_t i = 0; i < capture.photos.size(); ++i) {
+    const capture::Photo& photo = capture.photos[i];
+    const auto found = given.by_name.find(photo.name);
+    if (found == given.by_name.end()) continue;
+    colmap::PosedImage posed = found->second;
+    posed.mask_file = capture::SfmMaskFile(workspace / "photos", photo);
+    (options.held_out[i] ? held_out : sources).push_back(std::move(posed));
+    if (!options.held_out[i]) source_photos.photos.push_back(photo);
+  }
+  RequireSharedNames(sources.size(), options.poses, given.first, capture);
+  capture::PrepareSfmImages(source_photos, workspace / "photos", 0, options.threads,
+                            options.memory_gb, progress);
   CalibratedPhotos calibrated;
-  calibrated.engine = "COLMAP model";
-  calibrated.unit = LengthUnit::kUnknown;
-  calibrated.model = colmap::ReadModel(poses);
-  const std::string first =
-      calibrated.model.images.empty() ? "" : calibrated.model.images.front().name;
-  std::erase_if(calibrated.model.images, [&](const calib::SfmImage& image) {
+  calibrated.unit = given.unit;
+  calibrated.world_origin = given.world_origin;
+  calibrated.model = colmap::TriangulateWithPoses(workspace / "photos", sources, workspace / "sfm",
+                                                  SfmOptionsFor(options), progress)
+                         .model;
+  for (const colmap::PosedImage& posed : held_out) {
+    AddImage({0, posed.name, 0, posed.cam_from_world, {}}, posed.camera, calibrated.model);
+  }
+  return calibrated;
+}
+
+CalibratedPhotos FromColmapModel(const capture::Capture& capture, const CalibrateOptions& options,
+                                 const fs::path& workspace, Progress& progress) {
+  calib::SfmModel model = colmap::ReadModel(options.poses);
+  Given given;
+  given.first = model.images.empty() ? "" : model.images.front().name;
+  std::erase_if(model.images, [&](const calib::SfmImage& image) {
     return std::none_of(capture.photos.begin(), capture.photos.end(),
                         [&](const capture::Photo& photo) { return photo.name == image.name; });
   });
-  RequireSharedNames(calibrated.model.images.size(), poses, first, capture);
-  calibrated.world_origin = RecentreModel(calibrated.model);
+  RequireSharedNames(model.images.size(), options.poses, given.first, capture);
+  given.world_origin = RecentreModel(model);
+  CalibratedPhotos calibrated;
+  if (model.points.empty()) {
+    for (const calib::SfmImage& image : model.images) {
+      given.by_name.emplace(
+          image.name,
+          colmap::PosedImage{image.name, model.cameras.at(image.camera_id), image.cam_from_world});
+    }
+    calibrated = Triangulated(given, capture, options, workspace, progress);
+  } else {
+    calibrated.model = std::move(model);
+    calibrated.unit = given.unit;
+    calibrated.world_origin = given.world_origin;
+  }
+  calibrated.engine = "COLMAP model";
   return calibrated;
 }
 
@@ -92,37 +142,32 @@ io::CameraList ReadCameraList(const capture::Capture& capture, const fs::path& p
 CalibratedPhotos FromCameraList(const capture::Capture& capture, const CalibrateOptions& options,
                                 const fs::path& workspace, Progress& progress) {
   const io::CameraList list = io::RecentreWorld(ReadCameraList(capture, options.poses));
-  std::map<std::string, const io::NamedCamera*> by_name;
-  for (const io::NamedCamera& named : list.cameras) by_name[named.name] = &named;
-
-  std::vector<colmap::PosedImage> sources, held_out;
-  capture::Capture source_photos;
-  for (size_t i = 0; i < capture.photos.size(); ++i) {
-    const auto found = by_name.find(capture.photos[i].name);
-    if (found == by_name.end()) continue;
-    const io::NamedCamera& named = *found->second;
-    const capture::Photo& photo = capture.photos[i];
-    (options.held_out[i] ? held_out : sources)
-        .push_back({named.name, colmap::FromPinhole(named.camera), named.cam_from_world,
-                    capture::SfmMaskFile(workspace / "photos", photo)});
-    if (!options.held_out[i]) source_photos.photos.push_back(capture.photos[i]);
+  Given given;
+  given.first = list.cameras.empty() ? "" : list.cameras.front().name;
+  given.unit = list.unit;
+  given.world_origin = list.world_origin;
+  for (const io::NamedCamera& named : list.cameras) {
+    given.by_name[named.name] = {named.name, colmap::FromPinhole(named.camera),
+                                 named.cam_from_world};
   }
-  RequireSharedNames(sources.size(), options.poses,
-                     list.cameras.empty() ? "" : list.cameras.front().name, capture);
-
-  capture::PrepareSfmImages(source_photos, workspace / "photos", 0, options.threads,
-                            options.memory_gb, progress);
-  CalibratedPhotos calibrated;
+  CalibratedPhotos calibrated = Triangulated(given, capture, options, workspace, progress);
   calibrated.engine = options.poses.filename().string();
-  calibrated.unit = list.unit;
-  calibrated.world_origin = list.world_origin;
-  calibrated.model = colmap::TriangulateWithPoses(workspace / "photos", sources, workspace / "sfm",
-                                                  SfmOptionsFor(options), progress)
-                         .model;
-  for (const colmap::PosedImage& posed : held_out) {
-    AddImage({0, posed.name, 0, posed.cam_from_world, {}}, posed.camera, calibrated.model);
-  }
   return calibrated;
+}
+
+// COLMAP takes photos as they are stored, whatever their EXIF data say; we turn them upright, and
+// our own models are of upright ones. Where the size tells nothing the user must know.
+void TellOfTurned(const capture::Capture& capture, Progress& progress) {
+  std::vector<std::string> turned;
+  for (const capture::Photo& photo : capture.photos) {
+    if (photo.exif_orientation != 1) turned.push_back(photo.name);
+  }
+  if (turned.empty()) return;
+  progress.Note(fmt::format(
+      "{} photos are turned upright by their EXIF data, first {}: their cameras must be of the "
+      "upright pictures; COLMAP does not turn photos, so for its own models take the tag out of "
+      "them first (exiftool -Orientation= FILE)",
+      turned.size(), turned.front()));
 }
 
 }  // namespace
@@ -144,27 +189,12 @@ void RegisterHeldOutPhotos(const capture::Capture& held_out,
   }
 }
 
-// COLMAP takes photos as they are stored, whatever their EXIF data say; we turn them upright, and
-// our own models are of upright ones. Where the size tells nothing the user must know.
-void TellOfTurned(const capture::Capture& capture, Progress& progress) {
-  std::vector<std::string> turned;
-  for (const capture::Photo& photo : capture.photos) {
-    if (photo.exif_orientation != 1) turned.push_back(photo.name);
-  }
-  if (turned.empty()) return;
-  progress.Note(fmt::format(
-      "{} photos are turned upright by their EXIF data, first {}: their cameras must be of the "
-      "upright pictures; COLMAP does not turn photos, so for its own models take the tag out of "
-      "them first (exiftool -Orientation= FILE)",
-      turned.size(), turned.front()));
-}
-
 CalibratedPhotos FromKnownPoses(const capture::Capture& capture, const CalibrateOptions& options,
                                 const fs::path& workspace, Progress& progress) {
   progress.Note("structure from motion left out: cameras are given");
   TellOfTurned(capture, progress);
   CalibratedPhotos calibrated = fs::is_directory(options.poses)
-                                    ? FromColmapModel(capture, options.poses)
+                                    ? FromColmapModel(capture, options, workspace, progress)
                                     : FromCameraList(capture, options, workspace, progress);
   calibrated.report_json =
       nlohmann::ordered_json{{"points", calibrated.model.points.size()}}.dump();

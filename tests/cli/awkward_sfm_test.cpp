@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "calib/colmap/export.h"
+#include "calib/colmap/model_io.h"
 #include "calib/similarity.h"
 #include "dtr/base/process.h"
 #include "dtr/io/formats/cameras_json.h"
@@ -86,6 +88,33 @@ TEST(AwkwardPhotosThroughColmap, AllHaveTheirCameras) {
   for (size_t i = 0; i < found.size(); ++i) {
     EXPECT_LT((aligned * found[i] - expected[i]).norm(), kMostOff * steps[steps.size() / 2])
         << kKinds[i].name;
+  }
+}
+
+// A model of known poses, as COLMAP's users make one by hand: images and points are empty.
+TEST(PosesThroughColmap, OfAModelWithoutPointsArePointsTriangulated) {
+  if (FindProgram("colmap").empty()) GTEST_SKIP() << "SKIPPED: colmap is absent";
+  const TemporaryFolder folder;
+  MakeArcPhotos(folder / "arc");
+  const io::CameraList truth = io::ReadCamerasJson(folder / "arc/cameras.json");
+  calib::SfmModel model;
+  for (const io::NamedCamera& named : truth.cameras) {
+    const auto id = static_cast<std::uint32_t>(model.images.size()) + 1;
+    model.cameras[id] = colmap::FromPinhole(named.camera);
+    model.images.push_back({id, named.name, id, named.cam_from_world, {}});
+  }
+  colmap::WriteModel(folder / "poses", model, colmap::Format::kText);
+  const fs::path set = folder / "set.dtr";
+  DtrOk({"build", (folder / "arc/images").string(), "-o", set.string(), "--poses",
+         (folder / "poses").string(), "--engine", "none"});
+  const DtrSet read = io::ReadSet(set);
+  const auto& views = read.frames.front().views;
+  ASSERT_EQ(views.size(), truth.cameras.size());
+  EXPECT_GT(io::LoadSparse(set, read).points.size(), 100u);
+  for (size_t i = 0; i < views.size(); ++i) {
+    const Eigen::Vector3d centre =
+        views[i].cam_from_world.TargetOriginInSource() + read.world_origin;
+    EXPECT_LT((centre - truth.cameras[i].cam_from_world.TargetOriginInSource()).norm(), 1e-9);
   }
 }
 
