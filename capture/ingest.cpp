@@ -130,7 +130,7 @@ std::string CameraGroup(const Photo& photo, const io::ImageHeader& header) {
                       std::to_string(photo.width_px) + "x" + std::to_string(photo.height_px) + "|" +
                       focal;
   // A turned camera has its principal point elsewhere on the upright picture.
-  if (photo.exif_orientation != 1) group += "|turned" + std::to_string(photo.exif_orientation);
+  if (photo.exif_orientation != 1) group += kTurnedGroup + std::to_string(photo.exif_orientation);
   return group;
 }
 
@@ -217,7 +217,7 @@ std::string WhyNotSearched(const fs::path& folder) {
   std::error_code ignored;
   if (fs::is_symlink(folder, ignored)) return "links to a folder; links are not followed";
   const std::string name = folder.filename().string();
-  if (EndsWith(name, ".dtr") || EndsWith(name, ".partial") ||
+  if (EndsWith(name, ".dtr") || EndsWith(name, ".partial") || EndsWith(name, ".partial.work") ||
       fs::exists(folder / "set.json", ignored)) {
     return "is a D+TR set, not photos";
   }

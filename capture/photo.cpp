@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
 #include <set>
 #include <utility>
 
@@ -34,28 +35,43 @@ std::optional<Fault> FaultCalled(const std::string& name) {
 }
 
 void DropFaulty(Capture& capture, const std::vector<Fault>& faults) {
+  std::map<std::string, std::string> duplicate_of;
+  const auto original = [&](std::string name) {
+    for (auto at = duplicate_of.find(name); at != duplicate_of.end();
+         at = duplicate_of.find(name)) {
+      name = at->second;
+    }
+    return name;
+  };
+  std::set<std::string> shown;  // originals whose picture a photo that is kept shows
   std::vector<Photo> kept;
-  std::set<std::string> dropped;
   for (Photo& photo : capture.photos) {
+    if (photo.screening && !photo.screening->duplicate_of.empty()) {
+      duplicate_of.emplace(photo.name, photo.screening->duplicate_of);
+    }
+    const std::string picture = original(photo.name);
     std::string reason;
     for (size_t i = 0; photo.screening && i < photo.screening->faults.size(); ++i) {
       const Fault fault = photo.screening->faults[i];
       if (std::find(faults.begin(), faults.end(), fault) == faults.end()) continue;
-      // The sharp retake of a blurred photo: once that has gone nothing else shows the picture, and
-      // the first retake that stays stands for it.
-      if (fault == Fault::kDuplicate && dropped.erase(photo.screening->duplicate_of) > 0) continue;
+      // The sharp retake of blurred photos that go: nothing else shows the picture.
+      if (fault == Fault::kDuplicate && !shown.contains(picture)) continue;
       reason += (reason.empty() ? "dropped: " : "; ") + photo.screening->remarks[i];
     }
     if (reason.empty()) {
+      shown.insert(picture);
       kept.push_back(std::move(photo));
     } else {
-      dropped.insert(photo.name);
       capture.skipped.push_back({photo.name, reason});
     }
   }
   capture.photos = std::move(kept);
   std::sort(capture.skipped.begin(), capture.skipped.end(),
             [](const Skipped& a, const Skipped& b) { return a.name < b.name; });
+}
+
+bool IsTurned(const Photo& photo) {
+  return photo.exif_orientation != 1 || photo.camera_group.find(kTurnedGroup) != std::string::npos;
 }
 
 void RequireEnoughPhotos(const Capture& capture, const std::filesystem::path& where) {

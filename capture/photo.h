@@ -86,6 +86,11 @@ struct Capture {
 /// of a photo that goes stays: it is the only one left of its picture.
 void DropFaulty(Capture& capture, const std::vector<Fault>& faults);
 
+/// What a camera group says of turned photos, with the orientation behind it.
+inline constexpr char kTurnedGroup[] = "|turned";
+/// Whether EXIF data turned the photo upright, or a capture that it comes from did.
+bool IsTurned(const Photo& photo);
+
 /// A scene needs two photos. Throws Error naming `where`, the number found and what was skipped.
 void RequireEnoughPhotos(const Capture& capture, const std::filesystem::path& where);
 

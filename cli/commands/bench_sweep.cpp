@@ -395,7 +395,7 @@ void AddSweepOptions(CLI::App& command, CLI::Option* table, SweepRequest& reques
 }
 
 int RunSweep(const SweepRequest& request, const Context& context) {
-  context.console.KeepsWork();
+  if (request.point.empty()) context.console.KeepsWork();
   Check(request);
   const auto renderer = MakeTimedRenderer(request.renderer, context.console);
   SweepRun run;

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <map>
 
@@ -24,10 +25,17 @@ struct Options {
 int RunImport(Options options, const Context& context) {
   auto cameras =
       pipeline::ReadCameraFile(options.cameras, options.format, options.import.images_dir);
-  if (options.import.mask_dir.empty())
+  if (options.import.mask_dir.empty()) {
     options.import.mask_dir = cameras.mask_dir;
-  else
-    pipeline::NameMasks(options.import.mask_dir, cameras.list);
+  } else {
+    pipeline::NameMasks(options.import.mask_dir, options.import.images_dir, cameras.list);
+    const auto bare = std::count_if(cameras.list.cameras.begin(), cameras.list.cameras.end(),
+                                    [](const auto& camera) { return camera.mask_file.empty(); });
+    if (bare > 0) {
+      context.console.Note(fmt::format("{} of {} photos have no mask: all of them is used", bare,
+                                       cameras.list.cameras.size()));
+    }
+  }
   if (options.depth_kind == "z") options.import.depth_kind = DepthKind::kPlaneZ;
   if (options.depth_kind == "ray") options.import.depth_kind = DepthKind::kRayDistance;
   options.import.held_out = pipeline::NamesHeldOut(options.held_out, cameras.list);

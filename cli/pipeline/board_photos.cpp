@@ -87,7 +87,7 @@ BoardPhotos ReadBoardPhotos(const fs::path& folder, const std::string& pattern,
   progress.Stage("looking for the board", static_cast<int>(names.size()));
   std::atomic<int> done = 0;
   ParallelFor(0, static_cast<int>(names.size()), threads, [&](int i) {
-    if (progress.StopRequested()) throw Interrupted("interrupted; nothing was written");
+    progress.ThrowIfInterrupted();
     const auto at = static_cast<size_t>(i);
     all[at] = LookAt(folder / names[at], board, options);
     progress.Update(++done);

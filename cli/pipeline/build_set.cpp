@@ -391,7 +391,7 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
     } catch (const Error&) {
       // What was asked for cannot be had of these frames: nothing goes on from here, and the
       // command that is mended must not find this one's work in its way.
-      writer.Discard();
+      if (!std::filesystem::exists(writer.work_folder() / "calibration")) writer.Discard();
       throw;
     }
   }

@@ -70,6 +70,7 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
   PhotoRefinement refined = RefinePhotos(capture, options, sfm.model, workspace / "sfm" / "model",
                                          workspace / "refined", progress);
   report.update(Json::parse(refined.report_json));
+  calibrated.kept_refinement_cpu_s = refined.earlier_cpu_s;
   calibrated.earlier_cpu_s += refined.earlier_cpu_s;
   calibrated.earlier_wall_s += refined.earlier_wall_s;
   calibrated.model = std::move(refined.model);
@@ -87,11 +88,11 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
 // principal point elsewhere.
 void RefuseTurned(const capture::Capture& capture, const char* known) {
   for (const capture::Photo& photo : capture.photos) {
-    if (photo.exif_orientation == 1) continue;
+    if (!capture::IsTurned(photo)) continue;
     throw Error(fmt::format(
-        "{}: expected a photo as it is stored, for {} is known of such, found EXIF orientation {}; "
-        "take the tag out of it (exiftool -Orientation= FILE)",
-        photo.name, known, photo.exif_orientation));
+        "{}: expected a photo as it is stored, for {} is known of such, found one that its EXIF "
+        "orientation turned; take the tag out of it (exiftool -Orientation= FILE)",
+        photo.name, known));
   }
 }
 

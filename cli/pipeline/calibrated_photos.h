@@ -51,6 +51,7 @@ struct CalibratedPhotos {
   /// Of those runs and of bundle adjustment, what the earlier call's took: processor and wall-clock
   /// seconds.
   double earlier_cpu_s = 0, earlier_wall_s = 0;
+  double kept_refinement_cpu_s = 0;  ///< of bundle adjustment that an earlier call did
   std::string scale_json;  ///< entry of the provenance's `scale`; empty: lengths are SfM's
 };
 

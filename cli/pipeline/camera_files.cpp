@@ -129,7 +129,7 @@ CamerasFromFile ReadCameraFile(const fs::path& file, const std::string& format,
   return {io::ReadCamerasJson(file), {}};
 }
 
-void NameMasks(const fs::path& mask_dir, io::CameraList& list) {
+void NameMasks(const fs::path& mask_dir, const fs::path& images_dir, io::CameraList& list) {
   if (!fs::is_directory(mask_dir)) {
     throw UsageError(fmt::format("--masks {}: no such folder", mask_dir.string()));
   }
@@ -138,9 +138,13 @@ void NameMasks(const fs::path& mask_dir, io::CameraList& list) {
   const std::map<std::string, std::string> masks = ImagesByStem(mask_dir);
   for (io::NamedCamera& camera : list.cameras) {
     const std::string stem = fs::path(camera.name).replace_extension().generic_string();
-    for (const std::string& name : {stem, camera.name, stem + "_mask"}) {
+    for (const std::string& name : {stem + "_mask", camera.name, stem}) {
       const auto mask = masks.find(name);
-      if (mask == masks.end()) continue;
+      std::error_code ignored;  // masks may lie beside the photos, which are none
+      if (mask == masks.end() ||
+          fs::equivalent(mask_dir / mask->second, images_dir / camera.name, ignored)) {
+        continue;
+      }
       camera.mask_file = mask->second;
       break;
     }

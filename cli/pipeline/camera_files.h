@@ -31,10 +31,12 @@ CamerasFromFile ReadCameraFile(const std::filesystem::path& file, const std::str
                                const std::filesystem::path& images_dir);
 
 /// Finds masks for the cameras of a file that names none (COLMAP's, LLFF's): for a photo
-/// left/a.jpg the first of left/a.png, left/a.jpg.png (COLMAP's name) and left/a_mask.png, with any
-/// extension of an image, that lies in `mask_dir`; photos without one stay without. Throws
-/// UsageError where the folder is none or holds no mask of any of them.
-void NameMasks(const std::filesystem::path& mask_dir, io::CameraList& list);
+/// left/a.jpg the first of left/a_mask.png, left/a.jpg.png (COLMAP's name) and left/a.png, with any
+/// extension of an image, that lies in `mask_dir` and is not the photo itself, in `images_dir`;
+/// photos without one stay without. Throws UsageError where the folder is none or holds no mask of
+/// any of them.
+void NameMasks(const std::filesystem::path& mask_dir, const std::filesystem::path& images_dir,
+               io::CameraList& list);
 
 /// Names of `list` that a --holdout text means (cli/pipeline/holdout.h), over its cameras in byte
 /// order of their names.

@@ -10,8 +10,10 @@ namespace fs = std::filesystem;
 std::vector<fs::path> VideosFor(const fs::path& source, const capture::VideoOptions& video) {
   std::vector<fs::path> videos = capture::VideosOf(source);
   const capture::VideoOptions plain;
-  if (videos.empty() && (video.every != plain.every || video.motion != plain.motion ||
-                         video.most != plain.most || video.synchronised)) {
+  // What is not there is told by who reads it.
+  if (videos.empty() && fs::exists(source) &&
+      (video.every != plain.every || video.motion != plain.motion || video.most != plain.most ||
+       video.synchronised)) {
     throw UsageError(source.string() +
                      ": expected a video or a folder of nothing but videos for --every, --motion, "
                      "--max-frames and --synchronised, found neither; leave them out");

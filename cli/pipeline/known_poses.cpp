@@ -59,6 +59,13 @@ Eigen::Vector3d RecentreModel(calib::SfmModel& model) {
   return list.world_origin;
 }
 
+bool IsHeldOut(const std::string& name, const capture::Capture& capture,
+               const CalibrateOptions& options) {
+  const auto photo = std::find_if(capture.photos.begin(), capture.photos.end(),
+                                  [&](const auto& p) { return p.name == name; });
+  return options.held_out[static_cast<size_t>(photo - capture.photos.begin())];
+}
+
 // Cameras as they were given; poses act on p_world - the recentred origin.
 struct Given {
   std::map<std::string, colmap::PosedImage> by_name;
@@ -109,7 +116,11 @@ CalibratedPhotos FromColmapModel(const capture::Capture& capture, const Calibrat
   RequireSharedNames(model.images.size(), options.poses, given.first, capture);
   given.world_origin = RecentreModel(model);
   CalibratedPhotos calibrated;
-  if (model.points.empty()) {
+  // With one photo to build from there is nothing to triangulate, which is told later.
+  const auto sources = std::count_if(model.images.begin(), model.images.end(), [&](const auto& i) {
+    return !IsHeldOut(i.name, capture, options);
+  });
+  if (model.points.empty() && sources >= 2) {
     for (const calib::SfmImage& image : model.images) {
       given.by_name.emplace(
           image.name,
@@ -160,7 +171,7 @@ CalibratedPhotos FromCameraList(const capture::Capture& capture, const Calibrate
 void TellOfTurned(const capture::Capture& capture, Progress& progress) {
   std::vector<std::string> turned;
   for (const capture::Photo& photo : capture.photos) {
-    if (photo.exif_orientation != 1) turned.push_back(photo.name);
+    if (capture::IsTurned(photo)) turned.push_back(photo.name);
   }
   if (turned.empty()) return;
   progress.Note(fmt::format(

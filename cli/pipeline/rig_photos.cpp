@@ -141,7 +141,7 @@ int FramesIn(const fs::path& video, Progress& progress) {
   int frames = 0;
   while (reader.Next()) {
     progress.Update(++frames);
-    if (progress.StopRequested()) throw Interrupted("interrupted; nothing was written");
+    progress.ThrowIfInterrupted();
   }
   if (frames > 0) return frames;
   throw Error(video.string() + ": expected frames, found none; is the video whole?");
@@ -241,7 +241,7 @@ void LookAtAll(const calib::Board& board, const calib::DetectOptions& options, i
   progress.Stage("looking for the board", static_cast<int>(layout.shots.size()));
   std::atomic<int> done = 0;
   const auto step = [&] {
-    if (progress.StopRequested()) throw Interrupted("interrupted; nothing was written");
+    progress.ThrowIfInterrupted();
     progress.Update(++done);
   };
   std::vector<size_t> photos;

@@ -27,7 +27,7 @@ BoardInSet FindBoard(const std::filesystem::path& folder, const DtrSet& set,
   std::vector<calib::Detection> found(views.size());
   std::atomic<int> done = 0;
   ParallelFor(0, static_cast<int>(views.size()), threads, [&](int i) {
-    if (progress.StopRequested()) throw Interrupted("interrupted; nothing was written");
+    progress.ThrowIfInterrupted();
     View view = *views[static_cast<size_t>(i)];
     io::LoadOptions load;
     load.depth = false;

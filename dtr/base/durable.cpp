@@ -144,11 +144,23 @@ bool IsEmptyFolder(const fs::path& folder) {
   return fs::is_directory(folder) && fs::is_empty(folder);
 }
 
+namespace {
+
+// What desktops and network disks leave in every folder: nobody's work.
+bool IsLitter(const std::string& name) {
+  for (const char* litter : {".DS_Store", ".directory", "Thumbs.db", "desktop.ini"}) {
+    if (name == litter) return true;
+  }
+  return name.starts_with("._") || name.starts_with(".nfs");
+}
+
+}  // namespace
+
 void RefuseForeign(const fs::path& folder, const std::function<bool(const std::string&)>& ours) {
   std::set<std::string> foreign;
   for (const auto& entry : fs::directory_iterator(folder)) {
     const std::string name = entry.path().filename().string();
-    if (!ours(name) && !IsTemporaryFile(entry.path())) foreign.insert(name);
+    if (!ours(name) && !IsLitter(name) && !IsTemporaryFile(entry.path())) foreign.insert(name);
   }
   if (foreign.empty()) return;
   throw UsageError(

@@ -46,7 +46,8 @@ void RemoveFolder(const std::filesystem::path& folder, const std::string& last);
 bool IsEmptyFolder(const std::filesystem::path& folder);
 
 /// Before a folder is replaced: throws UsageError naming the first entry (by name) that is not
-/// `ours`, as somebody's notes would go with the folder. What IsTemporaryFile knows is nobody's.
+/// `ours`, as somebody's notes would go with the folder. What IsTemporaryFile knows, and what
+/// desktops leave everywhere (.DS_Store, Thumbs.db), is nobody's.
 void RefuseForeign(const std::filesystem::path& folder,
                    const std::function<bool(const std::string& name)>& ours);
 

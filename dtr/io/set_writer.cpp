@@ -174,6 +174,11 @@ void SetWriter::State::ExpectReplaceable() const {
            std::find(std::begin(kPixelFolders), std::end(kPixelFolders), name) !=
                std::end(kPixelFolders);
   });
+  if (fs::is_directory(target / kReportFolder)) {
+    RefuseForeign(target / kReportFolder, [](const std::string& name) {
+      return name == "index.html" || name == "run.json";
+    });
+  }
   // At the end of the work the old set would find no room.
   if (fs::exists(fs::symlink_status(aside)) && !IsEmptyFolder(aside)) {
     throw UsageError(aside.string() + ": expected nothing, for " + target.string() +
@@ -246,8 +251,10 @@ void SetWriter::RequireTarget(const fs::path& target, bool force) {
   state.target = WithoutSlash(target);
   state.aside = Beside(state.target, ".replaced");
   state.force = force;
-  // An old set that was cut off half-way there is the constructor's to put back.
-  if (!fs::exists(state.aside / kSetFile)) AsError([&] { state.ExpectReplaceable(); });
+  // What a run that was cut off half-way left beside it is the constructor's to put right.
+  const bool cut_off =
+      fs::exists(state.aside / kSetFile) || fs::exists(Beside(state.target, ".partial.work"));
+  if (!cut_off) AsError([&] { state.ExpectReplaceable(); });
 }
 
 SetWriter::~SetWriter() {

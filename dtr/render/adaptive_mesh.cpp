@@ -301,7 +301,8 @@ AdaptiveMesh MakeAdaptiveMesh(const View& view, const RenderOptions& options, in
   unfit.clear();
   const SampleGrid samples = MakeSampleGrid(view, options.resolution);
   const MeshRule rule = MeshRuleOf(view, options);
-  if (view.mesh && view.mesh->resolution == options.resolution &&
+  // Without a sample there is nothing that a stored mesh could fit.
+  if (view.mesh && !samples.inverse_depth.empty() && view.mesh->resolution == options.resolution &&
       MeshRule{{view.mesh->depth_break, view.mesh->absolute_depth_break}, view.mesh->tolerance} ==
           rule) {
     try {

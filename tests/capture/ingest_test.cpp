@@ -351,8 +351,18 @@ TEST(DropFaulty, TheSharpRetakeOfABlurredPhotoStays) {
   Capture duplicates_alone = capture;
   DropFaulty(capture, {Fault::kBlurred, Fault::kDuplicate});
   EXPECT_THAT(NamesOf(capture), ElementsAre("retake.jpg"));
+  Capture both_blurred = duplicates_alone;
   DropFaulty(duplicates_alone, {Fault::kDuplicate});
   EXPECT_THAT(NamesOf(duplicates_alone), ElementsAre("blurred.jpg"));
+  // A retake that is blurred, too, stands for nothing; a copy of a copy is one of what stays.
+  both_blurred.photos[1].screening->faults.push_back(Fault::kBlurred);
+  both_blurred.photos[1].screening->remarks.push_back("is blurred");
+  Capture chain = both_blurred;
+  DropFaulty(both_blurred, {Fault::kBlurred, Fault::kDuplicate});
+  EXPECT_THAT(NamesOf(both_blurred), ElementsAre("third.jpg"));
+  chain.photos[2].screening->duplicate_of = "retake.jpg";
+  DropFaulty(chain, {Fault::kDuplicate});
+  EXPECT_THAT(NamesOf(chain), ElementsAre("blurred.jpg"));
 }
 
 TEST(IngestPhotos, NamesThatNoModelCanHoldAreSkippedBeforeAnyWork) {

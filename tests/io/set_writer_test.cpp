@@ -167,15 +167,15 @@ TEST(SetWriter, AFinishedSetIsReplacedOnlyByForce) {
   const TemporaryFolder folder;
   const fs::path target = folder / "small.dtr";
   WriteSmallSet(target);
-  fs::create_directories(target / "report");
-  WriteFileAtomically(target / "report/old", "of the old set");
+  fs::create_directories(target / "mesh");
+  WriteFileAtomically(target / "mesh/old", "of the old set");
   EXPECT_THROW(SetWriter(target, kFingerprint, false), UsageError);
   {
     SetWriter writer(target, kFingerprint, true);
-    EXPECT_TRUE(fs::exists(target / "report/old"));  // until the new one is whole
+    EXPECT_TRUE(fs::exists(target / "mesh/old"));  // until the new one is whole
     WriteSmallSet(writer);
   }
-  EXPECT_FALSE(fs::exists(target / "report/old"));
+  EXPECT_FALSE(fs::exists(target / "mesh/old"));
   EXPECT_FALSE(fs::exists(folder / "small.dtr.replaced"));
   EXPECT_THAT(VerifySet(target), IsEmpty());
 }
@@ -199,7 +199,11 @@ TEST(SetWriter, WhatSomebodyKeepsInASetIsNotReplacedWithIt) {
               HasSubstr("found notes.txt; move it away"));
   EXPECT_TRUE(fs::exists(target / "notes.txt"));
   EXPECT_FALSE(fs::exists(folder / "small.dtr.partial"));
-  fs::remove(target / "notes.txt");
+  fs::create_directories(target / "report");
+  fs::rename(target / "notes.txt", target / "report/notes.txt");
+  EXPECT_THROW(SetWriter(target, kFingerprint, true), UsageError);
+  fs::remove(target / "report/notes.txt");
+  WriteFileAtomically(target / ".DS_Store", "nobody's");
   EXPECT_NO_THROW(WriteSmallSet(target, true));
 }
 

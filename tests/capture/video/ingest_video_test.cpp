@@ -232,7 +232,8 @@ TEST(VideosOf, AreAVideoOrAFolderOfNothingElse) {
   EXPECT_THAT(VideosOf(folder.path()), ElementsAre(folder / "a.mov", folder / "b.MP4"));
   EXPECT_THAT(VideosOf(folder / "a.mov"), ElementsAre(folder / "a.mov"));
   EXPECT_THAT(VideosOf(folder / "notes.txt"), IsEmpty());
-  for (const char* ours : {"set.dtr", "set.dtr.partial", "cut.partial", "capture"}) {
+  for (const char* ours :
+       {"set.dtr", "set.dtr.partial", "set.dtr.partial.work", "cut.partial", "capture"}) {
     fs::create_directory(folder / ours);
   }
   WriteFileAtomically(folder / "capture/capture.json", "{}");
