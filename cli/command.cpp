@@ -4,7 +4,9 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "cli/number_checks.h"
 #include "cli/output_file.h"
+#include "cli/pipeline/depth_settings.h"
 #include "cli/standard_output.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
@@ -65,6 +67,11 @@ void Context::EmitJson(const std::string& json_text) const {
   } else {
     WriteFileAtomically(common.json_target, json_text + "\n");
   }
+}
+
+void AddMemoryOption(CLI::App& command, double& memory_gb, const std::string& description) {
+  memory_gb = pipeline::kDefaultMemoryGb;
+  command.add_option("--memory", memory_gb, description)->check(kPositive)->type_name("GB");
 }
 
 void AddCommand(CLI::App& app, const std::string& name, const std::string& description,

@@ -5,9 +5,7 @@
 
 #include "capture/capture.h"
 #include "cli/command.h"
-#include "cli/number_checks.h"
 #include "cli/pipeline/capture_page.h"
-#include "cli/pipeline/depth_settings.h"
 #include "cli/pipeline/ingest.h"
 #include "cli/video_options.h"
 #include "dtr/base/error.h"
@@ -136,12 +134,8 @@ void AddCaptureCommand(CLI::App& app) {
                    ->delimiter(',')
                    ->type_name("FAULT,...");
                AddVideoOptions(command, options->video);
-               options->video.memory_gb = pipeline::kDefaultMemoryGb;
-               command
-                   .add_option("--memory", options->video.memory_gb,
-                               "Memory for photos that are looked at at a time [4]")
-                   ->check(kPositive)
-                   ->type_name("GB");
+               AddMemoryOption(command, options->video.memory_gb,
+                               "Memory for photos that are looked at at a time [4]");
                command.add_flag("--force", options->force, "Replace a capture that exists");
                return [options](const Context& context) { return Run(*options, context); };
              });

@@ -7,7 +7,6 @@
 #include "cli/command.h"
 #include "cli/number_checks.h"
 #include "cli/pipeline/camera_files.h"
-#include "cli/pipeline/depth_settings.h"
 #include "dtr/base/error.h"
 #include "dtr/io/formats/import_views.h"
 
@@ -84,12 +83,8 @@ void AddImportCommand(CLI::App& app) {
                         "Folder of masks, dark where a photo is not to be used: as --cameras names "
                         "them, else NAME.png, NAME.EXT.png or NAME_mask.png")
             ->type_name("DIR");
-        options->import.memory_gb = pipeline::kDefaultMemoryGb;
-        command
-            .add_option("--memory", options->import.memory_gb,
-                        "Memory for views that are read at a time [4]")
-            ->check(kPositive)
-            ->type_name("GB");
+        AddMemoryOption(command, options->import.memory_gb,
+                        "Memory for views that are read at a time [4]");
         command
             .add_option("--holdout", options->held_out, "Views kept without depth, to measure with")
             ->type_name("every:N|NAME,...");

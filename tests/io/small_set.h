@@ -1,8 +1,10 @@
 // tests/io/small_set.h -- a set of three tiny views for the tests of dtr/io.
 #pragma once
 #include <filesystem>
+#include <map>
 #include <string>
 
+#include "dtr/base/files.h"
 #include "dtr/base/random.h"
 #include "dtr/io/set_io.h"
 
@@ -67,6 +69,16 @@ inline DtrSet WriteSmallSet(SetWriter& writer) {
 inline DtrSet WriteSmallSet(const std::filesystem::path& target, bool force = false) {
   SetWriter writer(target, kFingerprint, force);
   return WriteSmallSet(writer);
+}
+
+/// Every file below a folder with its content.
+inline std::map<std::string, std::string> Contents(const std::filesystem::path& folder) {
+  std::map<std::string, std::string> contents;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+    if (entry.is_directory()) continue;
+    contents[entry.path().lexically_relative(folder)] = ReadFile(entry.path(), 1 << 24);
+  }
+  return contents;
 }
 
 }  // namespace dtr::io::testing_support

@@ -1,0 +1,116 @@
+// What `dtr import` takes and refuses: cameras, depth and masks of other programs.
+#include "dtr/io/image_io.h"
+#include "dtr/io/set_io.h"
+#include "tests/cli/refusals.h"
+
+namespace dtr::testing {
+namespace {
+
+TEST_F(Refusals, WhatCannotBeImported) {
+  const auto import = [&](const std::string& cameras, std::vector<std::string> further) {
+    further.insert(further.begin(), {"import", "--cameras", cameras, "-o", In("set.dtr")});
+    return further;
+  };
+  const std::string good = Shared("courtyard/cameras.json"), depth = Shared("courtyard/depth");
+  const std::string sparse = Shared("courtyard/sparse");
+  Json wide = Cameras(), numbers = Cameras();
+  wide["views"][0]["width"] = 96;
+  Write("wide.json", wide.dump());
+  numbers["views"][0]["depth"] = "0000.png";
+  Write("numbers.json", numbers.dump());
+  const std::string pngs = Folder("pngs"), empty = Folder("empty");
+  fs::copy(depth, pngs, fs::copy_options::recursive);
+  io::WriteImage(In("pngs/0000.png"), ImageRgb8(4, 4, 3));
+  const std::string lens = Model("lens", "SIMPLE_RADIAL 192 128 150 96 64 0.1", "a.jpg", "b.jpg");
+  ExpectAllRefused({
+      {kWrongUsage, "import: expected depth maps (--depth) or a model with points, found neither",
+       import(good, {"--images", Photos()})},
+      {kWrongUsage, ": no such file or folder", import(In("cameras.json"), {"--images", Photos()})},
+      {kWrongUsage, "a transforms.json or a poses_bounds.npy, found another name; give --format",
+       import(Write("cameras.xml", ""), {"--images", Photos()})},
+      {kWrongUsage, ": no such folder",
+       import(good, {"--images", Photos(), "--masks", In("masks")})},
+      {kWrongUsage, "expected a mask of 0000.jpg or of another photo, called 0000.png",
+       import(sparse, {"--images", Photos(), "--masks", empty})},
+      {kWrongUsage, "--depth-unit requires --depth",
+       import(sparse, {"--images", Photos(), "--depth-unit", "0.001"})},
+      {kWrongUsage, "--holdout: no photo is named 'nobody'",
+       import(good, {"--images", Photos(), "--holdout", "nobody"})},
+      {kFailed, "0000.jpg: cannot be read: No such file or directory",
+       import(good, {"--images", empty, "--depth", depth})},
+      {kFailed, "expected one depth map (.exr, .pfm, .png, .tif) named like the photo 0000.jpg",
+       import(sparse, {"--images", Photos(), "--depth", empty})},
+      {kFailed,
+       "pixels as the camera says, found 192x128; give the images the cameras were made for",
+       import(In("wide.json"), {"--images", Photos(), "--depth", depth})},
+      {kWrongUsage, "expected --depth-unit for a PNG, which holds whole numbers, found none",
+       import(In("numbers.json"), {"--images", Photos(), "--depth", pngs})},
+      {kFailed, "camera of 'a.jpg': expected no distortion, found SIMPLE_RADIAL",
+       import(lens, {"--images", Photos()})},
+      {kWrongUsage,
+       "expected no such folder yet, found one; choose another name or pass --force",
+       {"import", "--cameras", good, "--images", Photos(), "--depth", depth, "-o", empty}},
+  });
+  EXPECT_FALSE(fs::exists(In("set.dtr")));
+  EXPECT_FALSE(fs::exists(In("set.dtr.partial")));
+}
+
+// Of cameras whose file names no masks they are found by the photos' names, beside the photos, too.
+TEST_F(Refusals, MasksThatNoFileNamesAreFound) {
+  Mask mask(kCourtyardWidthPx, kCourtyardHeightPx, 1, 255);
+  mask(3, 4) = 0;
+  const std::string masks = Folder("masks");
+  io::WriteMask(In("masks/0002.png"), mask);
+  io::WriteMask(In("masks/0003.jpg.png"), mask);
+  io::WriteMask(In("masks/0004_mask.png"), mask);
+  const std::string photos = Folder("both");
+  fs::copy(Photos(), photos, fs::copy_options::recursive | fs::copy_options::overwrite_existing);
+  io::WriteMask(In("both/0001_mask.png"), mask);
+  const auto masked = [&](const std::string& images, const std::string& from,
+                          const std::string& name) {
+    const std::string set = In(name);
+    DtrOk({"import", "--cameras", Shared("courtyard/sparse"), "--images", images, "--masks", from,
+           "-o", set});
+    std::string found;
+    const DtrSet read = io::ReadSet(set);
+    for (const View& view : read.frames.front().views) {
+      if (view.mask_file) found += view.name + " ";
+    }
+    return found;
+  };
+  EXPECT_EQ(masked(Photos(), masks, "a.dtr"), "0002.jpg 0003.jpg 0004.jpg ");
+  EXPECT_EQ(masked(photos, photos, "b.dtr"), "0001.jpg ");
+}
+
+TEST_F(Refusals, CamerasOfOtherProgramsThatAreNone) {
+  const auto import = [&](const std::string& cameras) {
+    return std::vector<std::string>{"import", "--cameras", cameras,      "--images",
+                                    Photos(), "-o",        In("set.dtr")};
+  };
+  Json twice = Cameras(), skewed = Cameras();
+  twice["views"][1]["name"] = "0000.jpg";
+  skewed["views"][0]["cam_from_world"][0][0] = 5;
+  const std::string frame = R"("file_path": "0000.jpg", "transform_matrix": )"
+                            "[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]";
+  ExpectAllRefused({
+      {kFailed, "views: expected a list of at least one camera, found another",
+       import(Write("none.json", R"({"views": []})"))},
+      {kFailed, "views[1].name: expected unique names, found \"0000.jpg\" twice",
+       import(Write("twice.json", twice.dump()))},
+      {kFailed, "expected a rotation matrix (R^T R = I to",
+       import(Write("skewed.json", skewed.dump()))},
+      {kFailed, "frames: expected a list of at least one camera, found another",
+       import(Write("transforms.json", R"({"frames": []})"))},
+      {kFailed, "camera_model: expected PINHOLE, SIMPLE_PINHOLE or OPENCV with zero coefficients",
+       import(Write(
+           "transforms_fisheye.json",
+           R"({"camera_model": "OPENCV_FISHEYE", "fl_x": 150, "frames": [{)" + frame + "}]}"))},
+      {kFailed, "expected fl_x or camera_angle_x, found neither",
+       import(Write("transforms_focal.json", R"({"frames": [{)" + frame + "}]}"))},
+      {kFailed, "expected a .npy file (it begins with \\x93NUMPY), found another",
+       import(Write("poses_bounds.npy", "0 1 2"))},
+  });
+}
+
+}  // namespace
+}  // namespace dtr::testing
