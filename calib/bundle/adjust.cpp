@@ -2,7 +2,6 @@
 
 #include <ceres/ceres.h>
 #include <fmt/format.h>
-#include <glog/logging.h>
 
 #include <algorithm>
 #include <cmath>
@@ -15,6 +14,7 @@
 #include "calib/bundle/normalised.h"
 #include "calib/bundle/rig_adjust.h"
 #include "calib/bundle/sight_rows.h"
+#include "calib/bundle/solver_ends.h"
 #include "calib/lens_groups.h"
 #include "calib/solve/board_start.h"
 #include "dtr/base/error.h"
@@ -22,11 +22,12 @@
 namespace dtr::calib {
 namespace {
 
-constexpr double kSmallestSigmaPx = 1e-7;  // exact sights are no reason to call rounding outliers
-constexpr double kSameScale = 0.05;        // relative change at which the robust loss is settled
-constexpr double kCauchySigmas = 2;        // scale of the robust loss
+// Observations that miss by less than this are no outliers, however exact the others are: some
+// photos of a model may be exact and others rounded, and what fits to 0.1 px misleads nobody.
+constexpr double kLeastOutlierSigmaPx = 0.02;  // times the five of AdjustOptions
+constexpr double kSameScale = 0.05;  // relative change at which the robust loss is settled
+constexpr double kCauchySigmas = 2;  // scale of the robust loss
 constexpr int kMostRobustPasses = 5, kMostOutlierPasses = 4;
-constexpr int kDenseImages = 100;  // up to here the cameras' system is solved as a dense one
 
 [[noreturn]] void Refuse(const std::string& what) { throw Error("bundle adjustment: " + what); }
 
@@ -79,7 +80,7 @@ double SigmaOf(const Bundle& bundle, const std::vector<Eigen::Vector2d>& residua
     }
   }
   if (lengths.empty()) Refuse("expected points in front of the cameras that see them, found none");
-  return std::max(RobustSigma(std::move(lengths)), kSmallestSigmaPx);
+  return std::max(RobustSigma(std::move(lengths)), kPrecisionPx);
 }
 
 // Ways to turn, move and scale everything that sights do not tell, and priors leave open.
@@ -98,7 +99,8 @@ double OpenGauge(const AdjustOptions& options) {
 }
 
 // What the priors miss by, in units of their sigmas, squared; how many numbers they are.
-double PriorSquares(const Bundle& bundle, const AdjustOptions& options, double* numbers) {
+double PriorSquares(const Bundle& start, const Bundle& bundle, const AdjustOptions& options,
+                    double* numbers) {
   const auto centre = [&](int image) {
     return bundle.images[static_cast<size_t>(image)].cam_from_world.TargetOriginInSource();
   };
@@ -111,6 +113,15 @@ double PriorSquares(const Bundle& bundle, const AdjustOptions& options, double* 
   }
   *numbers = 3 * static_cast<double>(options.positions.size()) +
              static_cast<double>(options.distances.size());
+  for (size_t i = 0; i < bundle.lenses.size(); ++i) {
+    const double known_px = PrincipalPointSigmaPx(bundle.lenses[i], options);
+    if (!std::isfinite(known_px)) continue;
+    const auto at = static_cast<size_t>(FocalCount(bundle.lenses[i].model));
+    for (size_t k = at; k < at + 2; ++k) {
+      squares += std::pow((bundle.lenses[i].params[k] - start.lenses[i].params[k]) / known_px, 2);
+    }
+    *numbers += 2;
+  }
   return squares;
 }
 
@@ -137,7 +148,7 @@ double CameraUnknowns(const Bundle& bundle, const std::vector<bool>& image_used,
 }
 
 // `sigma_px`: what priors were weighted with.
-void Describe(const std::vector<Eigen::Vector2d>& residuals, size_t rigs,
+void Describe(const Bundle& start, const std::vector<Eigen::Vector2d>& residuals, size_t rigs,
               const AdjustOptions& options, double sigma_px, Adjusted& out) {
   // A sight that is alone in seeing its point is met whatever the cameras are.
   const std::vector<int> sights = SightsOfPoints(out.bundle, out.used);
@@ -157,7 +168,7 @@ void Describe(const std::vector<Eigen::Vector2d>& residuals, size_t rigs,
   out.rms_px = std::sqrt(squared / std::max(1, out.sights));
   const auto points = static_cast<double>(std::count(point_used.begin(), point_used.end(), true));
   double known = 0;
-  squared += sigma_px * sigma_px * PriorSquares(out.bundle, options, &known);
+  squared += sigma_px * sigma_px * PriorSquares(start, out.bundle, options, &known);
   const double freedom =
       2.0 * out.sights + known - 3 * points - CameraUnknowns(out.bundle, image_used, rigs, options);
   // As many unknowns as numbers: all are explained, and nothing says how well.
@@ -217,6 +228,32 @@ struct ShiftCost {
   }
 };
 
+// A lens's principal point, likewise, where its unknowns are theta.
+struct PrincipalPointCost {
+  int first;
+  double weight;  // of one unit of the unknowns
+  template <typename T>
+  bool operator()(T const* const* theta, T* residual) const {
+    for (int i = 0; i < 2; ++i) residual[i] = weight * theta[0][first + i];
+    return true;
+  }
+};
+
+void AddPrincipalPointPriors(const Bundle& bundle, const AdjustOptions& options, double sigma_px,
+                             Normalised& n, ceres::Problem& problem) {
+  for (size_t i = 0; i < n.theta.size(); ++i) {
+    const double known_px = PrincipalPointSigmaPx(bundle.lenses[i], options);
+    if (!std::isfinite(known_px) || !problem.HasParameterBlock(n.theta[i].data())) continue;
+    const int first = FocalCount(n.lenses[i].model);
+    const double weight = sigma_px / known_px * n.lenses[i].scale[static_cast<size_t>(first)];
+    auto* cost = new ceres::DynamicAutoDiffCostFunction<PrincipalPointCost>(
+        new PrincipalPointCost{first, weight});
+    cost->AddParameterBlock(static_cast<int>(n.lenses[i].centre.size()));
+    cost->SetNumResiduals(2);
+    problem.AddResidualBlock(cost, nullptr, n.theta[i].data());
+  }
+}
+
 void AddShiftPriors(const Bundle& bundle, double sigma_px, Normalised& n, ceres::Problem& problem) {
   for (size_t i = 0; i < n.shift.size(); ++i) {
     if (!problem.HasParameterBlock(n.shift[i].data())) continue;
@@ -256,38 +293,6 @@ void FixLens(const LensFrame& lens, LensFreedom freedom, double* theta, ceres::P
       theta, new ceres::SubsetManifold(static_cast<int>(lens.centre.size()), {centre, centre + 1}));
 }
 
-ceres::Solver::Options SolverOptions(size_t images, bool robust) {
-  // Ceres tells stderr of every step that fails; the next one is shorter, and the end is judged
-  // here. The level belongs to the process: it is set once, before any thread of ours reads it.
-  [[maybe_unused]] static const bool quiet = [] {
-    FLAGS_minloglevel = google::GLOG_ERROR;
-    return true;
-  }();
-  ceres::Solver::Options options;
-  options.linear_solver_type = images <= kDenseImages ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
-  options.num_threads = 1;  // sums in one order: the same bits every time
-  // Under the robust loss Ceres converges by a constant factor a step: it is left when the cameras
-  // have settled, and least squares, which converges quadratically, does the rest.
-  options.max_num_iterations = robust ? 8 : 100;
-  options.function_tolerance = robust ? 1e-3 : 1e-11;
-  options.parameter_tolerance = 1e-12;
-  options.gradient_tolerance = 1e-12;
-  options.logging_type = ceres::SILENT;
-  options.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
-  return options;
-}
-
-class StopsWhenAsked final : public ceres::IterationCallback {
- public:
-  explicit StopsWhenAsked(const Progress& progress) : progress_(progress) {}
-  ceres::CallbackReturnType operator()(const ceres::IterationSummary&) override {
-    return progress_.StopRequested() ? ceres::SOLVER_ABORT : ceres::SOLVER_CONTINUE;
-  }
-
- private:
-  const Progress& progress_;
-};
-
 // One solve over the sights with used[i]; Cauchy's loss where a scale is given.
 ceres::Solver::Summary Minimise(const Bundle& bundle, const AdjustOptions& options,
                                 const std::vector<bool>& used, double sigma_px, double cauchy_px,
@@ -307,6 +312,7 @@ ceres::Solver::Summary Minimise(const Bundle& bundle, const AdjustOptions& optio
   }
   AddPriors(options, sigma_px, n, problem);
   AddShiftPriors(bundle, sigma_px, n, problem);
+  AddPrincipalPointPriors(bundle, options, sigma_px, n, problem);
   const auto add = [&](double* block, int group) {
     if (problem.HasParameterBlock(block)) {
       solver.linear_solver_ordering->AddElementToGroup(block, group);
@@ -329,8 +335,12 @@ ceres::Solver::Summary Minimise(const Bundle& bundle, const AdjustOptions& optio
   for (auto& shift : n.shift) add(shift.data(), 3);
   const SilentProgress nobody;
   const Progress& progress = options.progress != nullptr ? *options.progress : nobody;
-  StopsWhenAsked stops(progress);
-  solver.callbacks.push_back(&stops);
+  double largest_px = 0;
+  for (const LensCamera& lens : bundle.lenses) {
+    largest_px = std::max<double>(largest_px, std::max(lens.width_px, lens.height_px));
+  }
+  SolverEnds ends(progress, static_cast<size_t>(problem.NumResiduals()), largest_px);
+  solver.callbacks.push_back(&ends);
   ceres::Solver::Summary summary;
   ceres::Solve(solver, &problem, &summary);
   progress.ThrowIfInterrupted();
@@ -340,6 +350,14 @@ ceres::Solver::Summary Minimise(const Bundle& bundle, const AdjustOptions& optio
 }
 
 }  // namespace
+
+double PrincipalPointSigmaPx(const LensCamera& lens, const AdjustOptions& options) {
+  if (!(options.principal_point_share > 0) || options.lens == LensFreedom::kFixed ||
+      options.lens == LensFreedom::kNoPrincipalPoint) {
+    return std::numeric_limits<double>::infinity();
+  }
+  return options.principal_point_share * std::max(lens.width_px, lens.height_px);
+}
 
 const char* NameOf(LensFreedom freedom) {
   switch (freedom) {
@@ -412,18 +430,22 @@ Adjusted Solve(const Bundle& bundle, const AdjustOptions& options, Normalised& n
     const auto summary = Minimise(bundle, options, used, sigma, cauchy_px, n);
     out.iterations += static_cast<int>(summary.iterations.size());
     residuals = ResidualsOf(bundle, n);
-    return summary.termination_type == ceres::CONVERGENCE;
+    return summary.termination_type == ceres::CONVERGENCE ||
+           summary.termination_type == ceres::USER_SUCCESS;
   };
   const double none = std::numeric_limits<double>::infinity();
   for (int pass = 0; options.outlier_sigmas > 0 && pass < kMostRobustPasses; ++pass) {
-    solve(Within(residuals, none), kCauchySigmas * sigma);
+    solve(Within(residuals, none), kCauchySigmas * std::max(sigma, kLeastOutlierSigmaPx));
     const double next = SigmaOf(bundle, residuals);
-    const bool settled = std::abs(next - sigma) <= kSameScale * sigma;
+    const bool settled = std::abs(next - sigma) <= kSameScale * sigma ||
+                         std::max(next, sigma) <= kLeastOutlierSigmaPx;  // the same loss again
     sigma = next;
     if (settled) break;
   }
   const auto limit = [&] {
-    return options.outlier_sigmas > 0 ? options.outlier_sigmas * sigma : none;
+    return options.outlier_sigmas > 0
+               ? options.outlier_sigmas * std::max(sigma, kLeastOutlierSigmaPx)
+               : none;
   };
   out.used = Within(residuals, limit());
   for (int pass = 0; pass < kMostOutlierPasses; ++pass) {
@@ -439,7 +461,7 @@ Adjusted Solve(const Bundle& bundle, const AdjustOptions& options, Normalised& n
     MoveToGaugeOf(start, out.bundle, !options.distances.empty());
   }
   n.ToWorld(out.bundle);
-  Describe(residuals, n.rig_motion.size(), options, sigma, out);
+  Describe(start, residuals, n.rig_motion.size(), options, sigma, out);
   return out;
 }
 

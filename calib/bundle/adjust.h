@@ -41,6 +41,12 @@ struct DistancePrior {
   double distance = 0, sigma = 1;  ///< both > 0
 };
 
+/// No pixel's coordinate is taken as better known than this, standard deviation: float holds those
+/// of 4096 px and more to 5e-4 px, and text files often have three decimals. Whatever is measured
+/// in units of noise uses at least this, as noise below it is rounding, of which no ratio means
+/// anything.
+inline constexpr double kPrecisionPx = 1e-3;
+
 struct AdjustOptions {
   LensFreedom lens = LensFreedom::kNoPrincipalPoint;
   /// Sights farther from their predictions than this many standard deviations (robust: of the
@@ -49,10 +55,17 @@ struct AdjustOptions {
   bool fix_poses = false;  ///< only points (and lenses, as `lens` says) move
   std::vector<PositionPrior> positions;
   std::vector<DistancePrior> distances;
+  /// Above 0: free principal points are known to be where they start, to a standard deviation of
+  /// this share of the image's long side. Where the observations do not determine them, as on a
+  /// turntable or any orbit at one height, they stay there.
+  double principal_point_share = 0;
   /// Asked after every iteration whether to stop: Interrupted is thrown then. Null: nobody asks.
   const Progress* progress = nullptr;
 };
 
+/// Standard deviation of what is known of a lens's principal point; infinite where nothing is or it
+/// may not move.
+double PrincipalPointSigmaPx(const LensCamera& lens, const AdjustOptions& options);
 /// Whether every image has a principal point of its own.
 bool IsPerImage(LensFreedom freedom);
 /// Whether radial lenses get tangential distortion, and whether this is one.

@@ -76,8 +76,9 @@ void AddPoint(const Normalised& n, const Bundle& bundle, const BundleCovariance&
   }
 }
 
-Eigen::MatrixXd PriorInformation(const Normalised& n, const BundleCovariance& layout,
-                                 const AdjustOptions& options, long unknowns) {
+Eigen::MatrixXd PriorInformation(const Normalised& n, const Bundle& bundle,
+                                 const BundleCovariance& layout, const AdjustOptions& options,
+                                 long unknowns) {
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(unknowns, unknowns);
   const double unit_px = layout.sigma_px * n.unit;  // sights' units: everything is scaled by sigma
   for (const PositionPrior& p : options.positions) {
@@ -93,6 +94,17 @@ Eigen::MatrixXd PriorInformation(const Normalised& n, const BundleCovariance& la
     row.segment<3>(layout.image_at[a] + 3) = unit_px / d.sigma * along;
     row.segment<3>(layout.image_at[b] + 3) = -unit_px / d.sigma * along;
     information += row * row.transpose();
+  }
+  for (size_t i = 0; i < bundle.lenses.size(); ++i) {
+    const int centre = FocalCount(bundle.lenses[i].model);
+    const double known_px = PrincipalPointSigmaPx(bundle.lenses[i], options);
+    for (size_t k = 0; k < layout.free_params[i].size(); ++k) {
+      const int param = layout.free_params[i][k];
+      if (param != centre && param != centre + 1) continue;
+      const long at = layout.lens_at[i] + static_cast<long>(k);
+      const double unit = n.lenses[i].scale[static_cast<size_t>(param)];
+      information(at, at) += std::pow(layout.sigma_px * unit / known_px, 2);
+    }
   }
   return information;
 }
@@ -190,7 +202,7 @@ Eigen::MatrixXd BundleCovariance::OfLens(const Bundle& bundle, int lens) const {
 BundleCovariance CovarianceOf(const Adjusted& adjusted, const AdjustOptions& options) {
   const Bundle& bundle = adjusted.bundle;
   BundleCovariance out;
-  out.sigma_px = adjusted.sigma_px;
+  out.sigma_px = std::max(adjusted.sigma_px, kPrecisionPx);
   int unknowns = 0;
   for (const LensCamera& lens : bundle.lenses) {
     out.free_params.push_back(FreeParams(lens, options.lens));
@@ -211,7 +223,7 @@ BundleCovariance CovarianceOf(const Adjusted& adjusted, const AdjustOptions& opt
     tracks[static_cast<size_t>(bundle.observations[i].point)].push_back(&bundle.observations[i]);
   }
   for (const auto& sights : tracks) AddPoint(n, bundle, out, sights, information);
-  const Eigen::MatrixXd priors = PriorInformation(n, out, options, unknowns);
+  const Eigen::MatrixXd priors = PriorInformation(n, bundle, out, options, unknowns);
   const Eigen::MatrixXd open = OpenDirections(GaugeDirections(n.poses, out.image_at, unknowns),
                                               priors, information.trace() / unknowns);
   out.gauge_freedom = static_cast<int>(open.cols());

@@ -81,7 +81,8 @@ Parallax ParallaxOf(const Adjusted& adjusted, const Geometry& g) {
     }
     const auto lens =
         static_cast<size_t>(bundle.images[static_cast<size_t>(track.front()->image)].lens);
-    const double ray_sigma = adjusted.sigma_px / bundle.lenses[lens].params[0];
+    const double ray_sigma =
+        std::max(adjusted.sigma_px, kPrecisionPx) / bundle.lenses[lens].params[0];
     angles.push_back(widest * 180 / std::numbers::pi);
     significances.push_back(widest / (std::numbers::sqrt2 * ray_sigma));
   }

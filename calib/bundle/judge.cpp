@@ -26,6 +26,10 @@ constexpr int kFewestSights = 10;        // of an image: its pose has 6 unknowns
 constexpr int kFewestSightsOfHalf = 30;  // of an image in halves, of all points: half must do
 constexpr double kSquare = 1e-3;         // relative difference of fx and fy
 constexpr double kMostPoints = 4000;
+// What a principal point is known to beforehand, of the image's long side. Real ones lie within
+// some 2 % of the middle; here it is the stored one that is held, loosely: an orbit at one height
+// leaves it open, though its pictures are right.
+constexpr double kPrincipalPointShare = 0.02;
 constexpr std::uint64_t kDraw = 0xd4a3, kHalf = 0x4a1f;
 
 // With distortion, zero where it starts: what undistortion left behind becomes a parameter. Pixels
@@ -54,6 +58,7 @@ Bundle WithPoints(const Bundle& bundle, const Keep& keep) {
 AdjustOptions AllFree() {
   AdjustOptions options;
   options.lens = LensFreedom::kAll;
+  options.principal_point_share = kPrincipalPointShare;
   return options;
 }
 
@@ -251,6 +256,27 @@ void AddDifferences(const BundleLimits& limits, Judgement& judgement) {
                   camera->name, camera->moved_px)));
 }
 
+// Principal points that the observations determine little better than they were known before.
+void AddOpenPrincipalPoints(const Adjusted& fresh, const BundleCovariance& covariance,
+                            const AdjustOptions& options, Judgement& judgement) {
+  if (!covariance.computed || !covariance.determined) return;
+  for (size_t i = 0; i < fresh.bundle.lenses.size(); ++i) {
+    const LensCamera& lens = fresh.bundle.lenses[i];
+    const double known_px = PrincipalPointSigmaPx(lens, options);
+    const Eigen::MatrixXd variance = covariance.OfLens(fresh.bundle, static_cast<int>(i));
+    const long at = FocalCount(lens.model);
+    const double sigma_px = RootOfVariance(std::max(variance(at, at), variance(at + 1, at + 1)));
+    if (!(sigma_px > 0.5 * known_px)) continue;
+    judgement.degeneracies.push_back(
+        {"open_principal_point",
+         fmt::format("the observations determine the principal point of lens {} to {:.2g} px only, "
+                     "as on an orbit at one height: it was fitted with the stored one as known to "
+                     "{:.2g} px",
+                     i + 1, sigma_px, known_px),
+         false});
+  }
+}
+
 void AddDegeneracies(Judgement& judgement) {
   std::string reason;
   int harmful = 0;
@@ -358,6 +384,7 @@ Judgement JudgePart(const Bundle& given, const BundleLimits& limits, int threads
   judgement.sigma_px = fresh.sigma_px;
   judgement.condition = covariance.condition;
   judgement.degeneracies = FindDegeneracies(fresh, covariance, limits.max_focal_share);
+  AddOpenPrincipalPoints(fresh, covariance, options, judgement);
   AddDegeneracies(judgement);
   if (!covariance.computed) {
     return NotJudged(judgement, fmt::format("more than {} unknowns: too many for their covariance",

@@ -151,12 +151,13 @@ WiderFit Judged(const Eigen::MatrixXd& left, const Eigen::VectorXd& units, doubl
     ++fit.freedom;
   }
   const double below = free - fit.freedom;
-  const double unexplained = left(extra, extra) - explained;
-  if (fit.freedom == 0 || !(below > 0) || !(unexplained > 0)) {
+  if (fit.freedom == 0 || !(below > 0)) {
     fit.not_tested = "the sights do not tell it from the other unknowns";
     return fit;
   }
-  const double variance = unexplained / below;
+  // Of exact observations rounding is left, which may as well come out below zero.
+  const double unexplained = std::max(0.0, left(extra, extra) - explained);
+  const double variance = std::max(unexplained / below, kPrecisionPx * kPrecisionPx);
   fit.p = FisherSurvival(explained / fit.freedom / variance, fit.freedom, below);
   fit.amplitude_px = RootOfVariance((explained - fit.freedom * variance) / coordinates);
   const Eigen::VectorXd roots = inverse.cwiseSqrt();
