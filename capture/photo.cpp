@@ -13,6 +13,18 @@
 namespace dtr::capture {
 namespace {
 
+// A mask turned as the photo's pixels are: upright masks fit upright photos.
+Mask OnGridOf(const Photo& photo, Mask mask) {
+  if (photo.exif_orientation == 1) return mask;
+  const StoredSize stored = StoredSizeOf(photo);
+  const auto given = GridOfSize(mask.width(), mask.height(), stored, PhotoGrid::kUpright);
+  const PhotoGrid wanted = photo.as_stored ? PhotoGrid::kStored : PhotoGrid::kUpright;
+  if (!given || *given == wanted) return mask;
+  return io::ApplyExifOrientation(mask, wanted == PhotoGrid::kUpright
+                                            ? photo.exif_orientation
+                                            : io::InverseExifOrientation(photo.exif_orientation));
+}
+
 constexpr std::array<std::pair<Fault, const char*>, 4> kFaults{
     {{Fault::kBlurred, "blurred"},
      {Fault::kOverexposed, "overexposed"},
@@ -70,7 +82,21 @@ void DropFaulty(Capture& capture, const std::vector<Fault>& faults) {
             [](const Skipped& a, const Skipped& b) { return a.name < b.name; });
 }
 
+StoredSize StoredSizeOf(const Photo& photo) {
+  const bool swapped = !photo.as_stored && photo.exif_orientation >= 5;
+  return {swapped ? photo.height_px : photo.width_px, swapped ? photo.width_px : photo.height_px,
+          photo.exif_orientation};
+}
+
+void TakeAsStored(Photo& photo) {
+  const StoredSize stored = StoredSizeOf(photo);
+  photo.width_px = stored.width_px;
+  photo.height_px = stored.height_px;
+  photo.as_stored = true;
+}
+
 bool IsTurned(const Photo& photo) {
+  if (photo.as_stored) return false;
   return photo.exif_orientation != 1 || photo.camera_group.find(kTurnedGroup) != std::string::npos;
 }
 
@@ -86,7 +112,7 @@ void RequireEnoughPhotos(const Capture& capture, const std::filesystem::path& wh
 }
 
 ImageRgb8 ReadPhoto(const Photo& photo) {
-  ImageRgb8 image = io::ReadImage(photo.file, {.apply_exif_orientation = true});
+  ImageRgb8 image = io::ReadImage(photo.file, {.apply_exif_orientation = !photo.as_stored});
   if (image.width() != photo.width_px || image.height() != photo.height_px) {
     throw Error(photo.file.string() + ": expected a photo of " + std::to_string(photo.width_px) +
                 "x" + std::to_string(photo.height_px) + " pixels as when it was ingested, found " +
@@ -98,7 +124,7 @@ ImageRgb8 ReadPhoto(const Photo& photo) {
 
 Mask ReadPhotoMask(const Photo& photo) {
   if (photo.mask_file.empty()) return {};
-  Mask mask = io::ReadMask(photo.mask_file);
+  Mask mask = OnGridOf(photo, io::ReadMask(photo.mask_file));
   if (mask.width() != photo.width_px || mask.height() != photo.height_px) {
     throw Error(
         fmt::format("{}: expected a mask of {}x{} pixels as its photo {} upright, found {}x{}",

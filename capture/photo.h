@@ -7,6 +7,7 @@
 
 #include "dtr/io/image_io.h"
 #include "dtr/types/grid.h"
+#include "dtr/types/photo_grid.h"
 
 namespace dtr::capture {
 
@@ -41,13 +42,15 @@ struct VideoFrame {
   double time_s = 0;  ///< when the video shows it
 };
 
-/// One photo. Sizes and pixels are meant upright, after the EXIF orientation.
+/// One photo. Sizes and pixels are meant upright, after the EXIF orientation, unless `as_stored`.
 struct Photo {
   std::string id;    ///< unique, also where case is ignored; letters, digits, '_' and '-' only
   std::string name;  ///< original path below the photo folder, '/' between parts; kept for ever
   std::filesystem::path file;
   int width_px = 0, height_px = 0;
   int exif_orientation = 1;  ///< of `file`, 1..8
+  /// Size and pixels are those of the file, its EXIF orientation not applied (TakeAsStored).
+  bool as_stored = false;
 
   std::optional<double> focal_prior_px;  ///< a first guess for the calibration
   std::string focal_source = "none";     ///< "exif-35mm", "exif-focal-plane" or "none"
@@ -91,15 +94,23 @@ inline constexpr char kTurnedGroup[] = "|turned";
 /// Whether EXIF data turned the photo upright, or a capture that it comes from did.
 bool IsTurned(const Photo& photo);
 
+/// Size of the file's pixels, before the EXIF orientation.
+StoredSize StoredSizeOf(const Photo& photo);
+
+/// The photo as its file stores it, for cameras that were found in such pixels. Nothing changes
+/// where it has no EXIF orientation.
+void TakeAsStored(Photo& photo);
+
 /// A scene needs two photos. Throws Error naming `where`, the number found and what was skipped.
 void RequireEnoughPhotos(const Capture& capture, const std::filesystem::path& where);
 
-/// The photo upright, 8-bit sRGB. Throws Error when the file is unreadable or has no longer the
-/// size it had when it was ingested.
+/// The photo upright (or as stored, where the photo says so), 8-bit sRGB. Throws Error when the
+/// file is unreadable or has no longer the size it had when it was ingested.
 ImageRgb8 ReadPhoto(const Photo& photo);
 
-/// What of the photo may be used; empty where it has no mask. Throws Error when the mask is
-/// unreadable, is not of the photo's size or leaves nothing.
+/// What of the photo may be used, on the photo's grid; empty where it has no mask. A mask is an
+/// upright image, but one that fits only the photo as it is stored is taken as that. Throws Error
+/// when the mask is unreadable, is not of the photo's size or leaves nothing.
 Mask ReadPhotoMask(const Photo& photo);
 
 }  // namespace dtr::capture

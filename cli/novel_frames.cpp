@@ -6,9 +6,11 @@
 #include <cmath>
 #include <set>
 
+#include "cli/pipeline/named_files.h"
 #include "cli/view_names.h"
 #include "dtr/base/error.h"
 #include "dtr/io/formats/cameras_json.h"
+#include "dtr/io/formats/transforms_json.h"
 #include "dtr/render/camera_path.h"
 
 namespace dtr::cli {
@@ -27,9 +29,29 @@ int ParseSide(const std::string& size, const std::string& digits) {
   return side;
 }
 
+// Cameras of a transforms.json without their images, where it says their size.
+io::CameraList FromTransforms(const std::filesystem::path& file) {
+  const std::filesystem::path folder = file.parent_path();
+  io::TransformsPaths paths;
+  paths.image_of = [&](const std::string& path) {
+    const auto image = pipeline::FindImage(folder, path);
+    return image ? *image : io::SizedImage{path};
+  };
+  io::CameraList list = io::ReadTransformsJson(file, paths).list;
+  for (const io::NamedCamera& named : list.cameras) {
+    if (!named.distortion) continue;
+    throw Error(
+        fmt::format("{}: camera of {} has distortion, and views are rendered without; take "
+                    "its k1 and the like out of the file for a view as if undistorted",
+                    file.string(), named.name));
+  }
+  return list;
+}
+
 // A file's poses act on p_world - its origin, the set's on p_world - the set's.
 std::vector<NovelFrame> FromFile(const DtrSet& set, const std::filesystem::path& file) {
-  const io::CameraList list = io::ReadCamerasJson(file);
+  const io::CameraList list =
+      io::IsTransformsJson(file) ? FromTransforms(file) : io::ReadCamerasJson(file);
   const Eigen::Vector3d shift = set.world_origin - list.world_origin;
   std::vector<NovelFrame> cameras;
   for (const io::NamedCamera& named : list.cameras) {

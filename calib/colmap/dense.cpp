@@ -64,11 +64,11 @@ PinholeCamera CameraOf(const fs::path& folder, const calib::SfmModel& model,
 }  // namespace
 
 std::vector<DenseImage> ReadDenseWorkspace(const fs::path& workspace) {
-  const calib::SfmModel model = ReadModel(workspace / "sparse");
+  const fs::path sparse = ModelFolderIn(workspace / "sparse");
+  const calib::SfmModel model = ReadModel(sparse);
   std::vector<DenseImage> images;
   for (const calib::SfmImage& image : model.images) {
-    DenseImage dense{
-        image.name, CameraOf(workspace / "sparse", model, image), image.cam_from_world, {}, true};
+    DenseImage dense{image.name, CameraOf(sparse, model, image), image.cam_from_world, {}, true};
     const fs::path stem = workspace / "stereo" / "depth_maps" / image.name;
     for (const bool geometric : {true, false}) {
       const fs::path file = stem.string() + (geometric ? ".geometric.bin" : ".photometric.bin");

@@ -233,6 +233,22 @@ calib::SfmModel ReadModel(const fs::path& folder) {
               "found none; name the folder that holds these files");
 }
 
+fs::path ModelFolderIn(const fs::path& folder) {
+  const auto is_model = [](const fs::path& at) {
+    std::error_code ignored;
+    return fs::is_regular_file(at / "cameras.bin", ignored) ||
+           fs::is_regular_file(at / "cameras.txt", ignored);
+  };
+  std::error_code ignored;
+  const bool several =
+      fs::exists(folder / "sparse" / "1", ignored) || fs::exists(folder / "1", ignored);
+  if (is_model(folder) || several) return folder;
+  for (const fs::path& below : {fs::path("sparse") / "0", fs::path("sparse"), fs::path("0")}) {
+    if (is_model(folder / below)) return folder / below;
+  }
+  return folder;
+}
+
 void WriteModel(const fs::path& folder, const calib::SfmModel& model, Format format) {
   CheckModel(folder, model);
   std::error_code failure;

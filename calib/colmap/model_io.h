@@ -21,6 +21,11 @@ enum class Format { kBinary, kText };
 /// track that disagrees with the features.
 calib::SfmModel ReadModel(const std::filesystem::path& folder);
 
+/// The folder itself where it holds a model; else the one below it that COLMAP, its dense
+/// workspaces and Gaussian splatting programs use: sparse/0, sparse or 0. Where there is none, or
+/// sparse holds several models, the folder itself, for ReadModel to say what is wrong.
+std::filesystem::path ModelFolderIn(const std::filesystem::path& folder);
+
 /// Writes the three files of a model into `folder` (made when absent), the cameras last; where one
 /// cannot be written none appears, and an earlier model stays as it is. Doubles
 /// survive both formats bit for bit; reading the result gives the model back.

@@ -5,11 +5,12 @@
 
 #include <charconv>
 #include <cmath>
-#include <map>
 #include <optional>
 #include <string_view>
+#include <tuple>
 
 #include "calib/boards/opencv_pixels.h"
+#include "calib/files/camera_fields.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 
@@ -18,52 +19,6 @@ namespace {
 
 constexpr std::uintmax_t kLargestFileBytes = 16u << 20;  // OpenCV's samples write the points too
 constexpr int kLongestSidePx = 1'000'000;
-
-// What stands behind a key at the margin: the rest of its line and the indented lines below.
-using Fields = std::map<std::string, std::string>;
-
-std::string_view Trimmed(std::string_view text) {
-  const auto first = text.find_first_not_of(" \t\r");
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
-}
-
-// The beginning of what was found, fit for a message of one line.
-std::string Shown(std::string_view text) {
-  constexpr size_t kLongest = 40;
-  std::string shown(Trimmed(text.substr(0, kLongest)));
-  for (char& c : shown) c = static_cast<unsigned char>(c) < ' ' ? ' ' : c;
-  return shown;
-}
-
-// Top-level keys of a YAML file in the block style that FileStorage and ROS write.
-Fields FieldsOf(const std::string& text, const std::string& where) {
-  Fields fields;
-  std::string* open = nullptr;
-  for (size_t at = 0; at < text.size();) {
-    const size_t end = std::min(text.find('\n', at), text.size());
-    const std::string_view line(text.data() + at, end - at);
-    at = end + 1;
-    const std::string_view words = Trimmed(line);
-    if (words.empty() || words[0] == '#' || words[0] == '%' || words == "---" || words == "...") {
-      continue;
-    }
-    const bool at_margin = line[0] != ' ' && line[0] != '\t' && line[0] != '-';
-    const size_t colon = line.find(':');
-    if (at_margin && colon != std::string_view::npos) {
-      const std::string key(Trimmed(line.substr(0, colon)));
-      const auto [place, is_new] = fields.emplace(key, Trimmed(line.substr(colon + 1)));
-      if (!is_new) throw Error(where + ": the key '" + Shown(key) + "' stands twice");
-      open = &place->second;
-    } else if (open != nullptr) {
-      *open += '\n';
-      *open += words;
-    } else {
-      throw Error(where + ": expected YAML with keys at the margin, found '" + Shown(words) + "'");
-    }
-  }
-  return fields;
-}
 
 std::optional<double> NumberFrom(std::string_view word) {
   word = Trimmed(word);
@@ -76,59 +31,67 @@ std::optional<double> NumberFrom(std::string_view word) {
   return value;
 }
 
-const std::string& Field(const Fields& fields, const char* key, const std::string& where) {
-  const auto found = fields.find(key);
-  if (found == fields.end())
-    throw Error(fmt::format("{}: {}: expected it, found nothing", where, key));
-  return found->second;
-}
-
-// The numbers of a matrix's "data: [ ... ]".
-std::vector<double> MatrixData(const Fields& fields, const char* key, const std::string& where) {
-  const std::string& text = Field(fields, key, where);
+// The numbers of a matrix's "data: [ ... ]", or of a list.
+std::vector<double> MatrixData(const Field& field, const std::string& where) {
+  const std::string& text = field.text;
   const size_t data = text.find("data:");
-  const size_t open = data == std::string::npos ? data : text.find('[', data);
-  const size_t close = open == std::string::npos ? open : text.find(']', open);
-  if (close == std::string::npos) {
-    throw Error(fmt::format("{}: {}: expected a matrix with data: [ ... ], found '{}'", where, key,
-                            Shown(text)));
+  const size_t open = text.find('[', data == std::string::npos ? 0 : data);
+  const size_t close = text.rfind(']');
+  if (open == std::string::npos || close == std::string::npos || close < open) {
+    throw Error(fmt::format("{}: {}: expected a matrix with data: [ ... ], found '{}'", where,
+                            field.name, Shown(text)));
   }
+  std::string list = text.substr(open + 1, close - open - 1);
+  for (char& c : list) c = c == '\n' || c == '[' || c == ']' ? ' ' : c;  // rows may have their own
   std::vector<double> values;
-  const std::string_view list(text.data() + open + 1, close - open - 1);
   for (size_t at = 0; at <= list.size();) {
     const size_t end = std::min(list.find(',', at), list.size());
-    std::string word(list.substr(at, end - at));
-    for (char& c : word) c = c == '\n' ? ' ' : c;
+    const std::string word = list.substr(at, end - at);
     at = end + 1;
-    if (Trimmed(word).empty() && list.find_first_not_of(" \n\t\r") == std::string_view::npos) break;
+    if (Trimmed(word).empty() && Trimmed(list).empty()) break;
     const auto value = NumberFrom(word);
     if (!value) {
-      throw Error(fmt::format("{}: {}: expected a finite number, found '{}'", where, key,
-                              Shown(Trimmed(word))));
+      throw Error(fmt::format("{}: {}: expected a finite number, found '{}'", where, field.name,
+                              Shown(word)));
     }
     values.push_back(*value);
   }
   return values;
 }
 
-int SideFrom(const Fields& fields, const char* key, const std::string& where) {
-  const auto value = NumberFrom(Field(fields, key, where));
+int SideFrom(std::optional<double> value, const Field& field, const std::string& where) {
   if (!value || *value != std::floor(*value) || *value < 1 || *value > kLongestSidePx) {
-    throw Error(fmt::format("{}: {}: expected a whole number of 1 to {}, found '{}'", where, key,
-                            kLongestSidePx, Shown(fields.at(key))));
+    throw Error(fmt::format("{}: {}: expected a whole number of 1 to {}, found '{}'", where,
+                            field.name, kLongestSidePx, Shown(field.text)));
   }
   return static_cast<int>(*value);
 }
 
-bool IsFisheye(const Fields& fields) {
-  const auto flag = fields.find("fisheye_model");
-  const auto model = fields.find("distortion_model");
+// Width and height, of their own or as one pair.
+std::pair<int, int> SizeFrom(const CameraFields& fields, const std::string& where) {
+  const Field* pair = fields.Find(FieldRole::kSize);
+  if (pair == nullptr) {
+    const Field& width = fields.Get(FieldRole::kWidth);
+    const Field& height = fields.Get(FieldRole::kHeight);
+    return {SideFrom(NumberFrom(width.text), width, where),
+            SideFrom(NumberFrom(height.text), height, where)};
+  }
+  const std::vector<double> sides = MatrixData(*pair, where);
+  if (sides.size() != 2) {
+    throw Error(fmt::format("{}: {}: expected [ width, height ], found {} numbers", where,
+                            pair->name, sides.size()));
+  }
+  return {SideFrom(sides[0], *pair, where), SideFrom(sides[1], *pair, where)};
+}
+
+bool IsFisheye(const CameraFields& fields) {
+  const Field* flag = fields.Named("fisheye_model");
+  const Field* model = fields.Named("distortion_model");
   const auto says = [](const std::string& text, const char* word) {
     return text.find(word) != std::string::npos;
   };
-  return (flag != fields.end() && NumberFrom(flag->second).value_or(0) != 0) ||
-         (model != fields.end() &&
-          (says(model->second, "equidistant") || says(model->second, "fisheye")));
+  return (flag != nullptr && NumberFrom(flag->text).value_or(0) != 0) ||
+         (model != nullptr && (says(model->text, "equidistant") || says(model->text, "fisheye")));
 }
 
 // Coefficients in OpenCV's order, which is that of FULL_OPENCV: k1 k2 p1 p2 k3 k4 k5 k6.
@@ -217,23 +180,23 @@ std::string MatricesOf(const LensCamera& camera, const char* k_name, const char*
 
 LensCamera ReadOpenCvYaml(const std::filesystem::path& file) {
   const std::string where = file.string();
-  const Fields fields = FieldsOf(ReadFile(file, kLargestFileBytes), where);
+  const CameraFields fields(ReadFile(file, kLargestFileBytes), where);
   LensCamera camera;
-  camera.width_px = SideFrom(fields, "image_width", where);
-  camera.height_px = SideFrom(fields, "image_height", where);
-  const std::vector<double> k = MatrixData(fields, "camera_matrix", where);
+  // The matrices first: what has none is another program's file, and its name is worth more.
+  const Field& matrix = fields.Get(FieldRole::kMatrix);
+  const Field& coefficients = fields.Get(FieldRole::kDistortion);
+  std::tie(camera.width_px, camera.height_px) = SizeFrom(fields, where);
+  const std::vector<double> k = MatrixData(matrix, where);
   if (k.size() != 9 || k[1] != 0 || k[3] != 0 || k[6] != 0 || k[7] != 0 || k[8] != 1) {
-    throw Error(where +
-                ": camera_matrix: expected [fx, 0, cx, 0, fy, cy, 0, 0, 1]; skew is not "
-                "supported");
+    throw Error(where + ": " + matrix.name +
+                ": expected [fx, 0, cx, 0, fy, cy, 0, 0, 1]; skew is not supported");
   }
   camera.params = {k[0], k[4], k[2] + kOpenCvOffsetPx, k[5] + kOpenCvOffsetPx};
-  AddCoefficients(MatrixData(fields, "distortion_coefficients", where), IsFisheye(fields), where,
-                  camera);
+  AddCoefficients(MatrixData(coefficients, where), IsFisheye(fields), where, camera);
   try {
     camera.Check();
   } catch (const std::invalid_argument& error) {
-    throw Error(where + ": camera_matrix: " + error.what());
+    throw Error(where + ": " + matrix.name + ": " + error.what());
   }
   return camera;
 }

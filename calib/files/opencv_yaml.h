@@ -7,13 +7,13 @@
 
 namespace dtr::calib {
 
-/// Reads a camera from a YAML file of OpenCV's FileStorage (image_width, image_height,
-/// camera_matrix, distortion_coefficients; fisheye_model: 1 for fisheyes), or of ROS (the same
-/// names, distortion_model plumb_bob, rational_polynomial or equidistant). OpenCV has the centre of
-/// the first pixel at (0, 0), we at (0.5, 0.5): cx and cy gain half a pixel. 0, 4, 5 or 8
-/// coefficients are taken, and up to 14 when those of thin prisms and tilted sensors are zero.
-/// Throws Error naming file and field: absent fields, skew, other sizes, numbers that are not
-/// finite.
+/// Reads a camera from a YAML or XML file of OpenCV's FileStorage (image_width, image_height,
+/// camera_matrix, distortion_coefficients, or other common names of these, where one field alone
+/// has such a name; fisheye_model: 1 for fisheyes), or of ROS (the same names, distortion_model
+/// plumb_bob, rational_polynomial or equidistant). OpenCV has the centre of the first pixel at (0,
+/// 0), we at (0.5, 0.5): cx and cy gain half a pixel. 0, 4, 5 or 8 coefficients are taken, and up
+/// to 14 when those of thin prisms and tilted sensors are zero. Throws Error naming file and field:
+/// absent fields, skew, other sizes, numbers that are not finite.
 LensCamera ReadOpenCvYaml(const std::filesystem::path& file);
 
 /// Writes such a file, atomically; doubles read back exactly, but for the half pixel.

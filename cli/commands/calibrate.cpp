@@ -12,6 +12,7 @@
 #include "cli/not_registered.h"
 #include "cli/pipeline/calibrated_photos.h"
 #include "cli/pipeline/lens_file.h"
+#include "cli/pipeline/model_grid.h"
 #include "cli/sfm_options.h"
 #include "dtr/base/error.h"
 #include "dtr/base/work_folder.h"
@@ -60,6 +61,7 @@ int RunCalibratePhotos(const Options& options, const Context& context) {
   const FileLock lock = WorkFolder::Lock(workspace, capture::kCalibrationKind);
   const auto calibrated = pipeline::CalibratePhotos(photos, calibrate, workspace, context.console);
   colmap::WriteModel(options.output, calibrated.model, colmap::Format::kBinary);
+  pipeline::MarkUpright(options.output);
 
   context.console.Say(fmt::format("{}: {} of {} photos have a camera; {} points",
                                   options.output.string(), calibrated.model.images.size(),

@@ -8,6 +8,7 @@
 #include "cli/metre_options.h"
 #include "cli/pipeline/known_metres.h"
 #include "cli/pipeline/lens_file.h"
+#include "cli/pipeline/model_grid.h"
 #include "dtr/base/error.h"
 
 namespace dtr::cli {
@@ -53,6 +54,13 @@ pipeline::RefinedInMetres HoldMetres(const Options& options, const pipeline::Met
   return pipeline::RefineInMetres(model, metres, places, refine);
 }
 
+// The refined model is of the same pixels as the given one.
+void WriteRefined(const Options& options, const std::filesystem::path& from,
+                  const calib::SfmModel& model) {
+  colmap::WriteModel(options.output, model, colmap::Format::kBinary);
+  if (pipeline::GridOfModel(from) == PhotoGrid::kUpright) pipeline::MarkUpright(options.output);
+}
+
 int RunRefine(const Options& options, const Context& context) {
   if (std::filesystem::exists(options.output / "cameras.bin")) {
     throw UsageError(
@@ -60,7 +68,8 @@ int RunRefine(const Options& options, const Context& context) {
                     options.output.string()));
   }
   const pipeline::MetreOptions metres = MetreOptionsFrom(!options.gps.empty(), options.metres);
-  const calib::SfmModel model = colmap::ReadModel(options.model);
+  const std::filesystem::path model_folder = colmap::ModelFolderIn(options.model);
+  const calib::SfmModel model = colmap::ReadModel(model_folder);
   calib::RefineOptions refine;
   refine.separate_lenses = options.separate;
   refine.covariance = options.covariance;
@@ -76,13 +85,13 @@ int RunRefine(const Options& options, const Context& context) {
     const pipeline::RefinedInMetres in_metres = HoldMetres(options, metres, model, refine);
     SayRefined(in_metres.refined, context.console);
     for (const std::string& line : in_metres.lines) context.console.Say(line);
-    colmap::WriteModel(options.output, in_metres.refined.model, colmap::Format::kBinary);
+    WriteRefined(options, model_folder, in_metres.refined.model);
     context.EmitJson(in_metres.json);
     return kDone;
   }
   const calib::Refined refined = calib::Refine(model, refine);
   SayRefined(refined, context.console);
-  colmap::WriteModel(options.output, refined.model, colmap::Format::kBinary);
+  WriteRefined(options, model_folder, refined.model);
   context.EmitJson(calib::ToJson(refined));
   return kDone;
 }
@@ -92,8 +101,8 @@ int RunRefine(const Options& options, const Context& context) {
 CLI::Option* AddLensOption(CLI::App& command, std::filesystem::path& lens) {
   return command
       .add_option("--lens", lens,
-                  "The lens of all photos, known: a .json of `dtr calibrate board`, a .yml of "
-                  "OpenCV or a cameras.txt; it is not changed")
+                  "The lens of all photos, known: a .json of `dtr calibrate board`, a .yml or "
+                  ".xml of OpenCV or a cameras.txt; it is not changed")
       ->check(CLI::ExistingFile)
       ->type_name("FILE");
 }

@@ -2,48 +2,143 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <map>
+#include <nlohmann/json.hpp>
 
 #include "cli/command.h"
 #include "cli/number_checks.h"
+#include "cli/pipeline/camera_distortion.h"
 #include "cli/pipeline/camera_files.h"
+#include "cli/pipeline/import_photos.h"
+#include "cli/pipeline/kept_notes.h"
+#include "cli/pipeline/known_poses.h"
 #include "dtr/base/error.h"
+#include "dtr/base/temporary_folder.h"
 #include "dtr/io/formats/import_views.h"
+#include "dtr/io/set_io.h"
 
 namespace dtr::cli {
 namespace {
 
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
 struct Options {
-  std::filesystem::path cameras, output;
+  fs::path cameras, output;
   std::string format, depth_kind;
   io::ImportOptions import;
   std::string held_out;
-  bool force = false;
+  bool allow_missing = false, force = false;
 };
 
-int RunImport(Options options, const Context& context) {
-  auto cameras =
-      pipeline::ReadCameraFile(options.cameras, options.format, options.import.images_dir);
+void FindMasks(Options& options, pipeline::CamerasFromFile& cameras, Progress& progress) {
   if (options.import.mask_dir.empty()) {
     options.import.mask_dir = cameras.mask_dir;
-  } else {
-    pipeline::NameMasks(options.import.mask_dir, options.import.images_dir, cameras.list);
-    const auto bare = std::count_if(cameras.list.cameras.begin(), cameras.list.cameras.end(),
-                                    [](const auto& camera) { return camera.mask_file.empty(); });
-    if (bare > 0) {
-      context.console.Note(fmt::format("{} of {} photos have no mask: all of them is used", bare,
-                                       cameras.list.cameras.size()));
-    }
+    return;
   }
+  pipeline::NameMasks(options.import.mask_dir, options.import.images_dir, cameras.list);
+  const auto bare = std::count_if(cameras.list.cameras.begin(), cameras.list.cameras.end(),
+                                  [](const auto& camera) { return camera.mask_file.empty(); });
+  if (bare > 0) {
+    progress.Note(fmt::format("{} of {} photos have no mask: all of them is used", bare,
+                              cameras.list.cameras.size()));
+  }
+}
+
+// --holdout, else what the file says.
+std::set<std::string> HeldOut(const Options& options, const pipeline::CamerasFromFile& cameras,
+                              Progress& progress) {
+  if (!cameras.held_out) return pipeline::NamesHeldOut(options.held_out, cameras.list);
+  if (!options.held_out.empty()) {
+    progress.Note("--holdout replaces train_filenames, test_filenames and val_filenames of " +
+                  options.cameras.string());
+    return pipeline::NamesHeldOut(options.held_out, cameras.list);
+  }
+  progress.Note(fmt::format("{}: {} views held out, as its test_filenames and val_filenames say",
+                            options.cameras.string(), cameras.held_out->size()));
+  return *cameras.held_out;
+}
+
+// The unit that the file gives, where the command gives none; depth maps that nothing reads.
+void SettleDepth(Options& options, const pipeline::CamerasFromFile& cameras, Progress& progress) {
+  const auto& list = cameras.list.cameras;
+  const auto maps = std::count_if(list.begin(), list.end(),
+                                  [](const auto& named) { return !named.depth_file.empty(); });
+  if (options.import.depth_dir.empty()) {
+    if (maps > 0) {
+      progress.Note(
+          fmt::format("{}: {} depth maps that it names are not used; --depth DIR takes "
+                      "them",
+                      options.cameras.string(), maps));
+    }
+    return;
+  }
+  if (!cameras.depth_unit) return;
+  if (options.import.depth_unit && *options.import.depth_unit != *cameras.depth_unit) {
+    progress.Note(fmt::format("--depth-unit {} replaces the {} of {}", *options.import.depth_unit,
+                              *cameras.depth_unit, options.cameras.string()));
+  }
+  if (!options.import.depth_unit) options.import.depth_unit = cameras.depth_unit;
+}
+
+// Points of a set without depth, where the cameras come without: COLMAP finds them.
+void FindPoints(const Options& options, const Context& context, pipeline::CamerasFromFile& cameras,
+                Progress& progress) {
+  if (!options.import.depth_dir.empty() || (cameras.points && !cameras.points->points.empty())) {
+    return;
+  }
+  if (!cameras.points_file.empty()) {
+    progress.Note(
+        fmt::format("{}: points of {} are not used, they do not say which photo sees them",
+                    options.cameras.string(), cameras.points_file));
+  }
+  cameras.list = io::RecentreWorld(std::move(cameras.list));
+  const capture::Capture photos = pipeline::PhotosOf(cameras.list, options.import);
+  pipeline::CalibrateOptions calibrate;
+  for (const capture::Photo& photo : photos.photos) {
+    calibrate.held_out.push_back(options.import.held_out.contains(photo.name));
+  }
+  calibrate.threads = context.common.threads;
+  calibrate.seed = context.common.seed;
+  calibrate.memory_gb = options.import.memory_gb;
+  calibrate.poses = options.cameras;
+  const TemporaryFolder workspace;
+  cameras.points =
+      pipeline::TriangulatedPoints(cameras.list, photos, calibrate, workspace.path(), progress);
+}
+
+Json ResultJson(const Options& options, const pipeline::CamerasFromFile& cameras,
+                const std::vector<std::string>& notes) {
+  Json json = {{"views", cameras.list.cameras.size()},
+               {"held_out", options.import.held_out.size()},
+               {"skipped", Json::array()},
+               {"notes", notes}};
+  for (const auto& [name, reason] : cameras.skipped) {
+    json["skipped"].push_back({{"name", name}, {"reason", reason}});
+  }
+  return json;
+}
+
+int RunImport(Options options, const Context& context) {
+  pipeline::KeptNotes progress(context.console);
+  auto cameras = pipeline::ReadCameraFile(
+      options.cameras, options.format,
+      {options.import.images_dir, options.import.depth_dir, options.allow_missing});
+  for (const std::string& note : cameras.notes) progress.Note(note);
+  FindMasks(options, cameras, progress);
   if (options.depth_kind == "z") options.import.depth_kind = DepthKind::kPlaneZ;
   if (options.depth_kind == "ray") options.import.depth_kind = DepthKind::kRayDistance;
-  options.import.held_out = pipeline::NamesHeldOut(options.held_out, cameras.list);
+  SettleDepth(options, cameras, progress);
+  options.import.held_out = HeldOut(options, cameras, progress);
+  options.import.photo_grid = cameras.list.photo_grid;
+  options.import.distortion_of = pipeline::DistortionOf;
   options.import.threads = context.common.threads;
+  io::SetWriter::RequireTarget(options.output, options.force);
+  FindPoints(options, context, cameras, progress);
   io::ImportSet(cameras.list, options.import, options.output, options.force,
-                cameras.points ? &*cameras.points : nullptr, context.console);
+                cameras.points ? &*cameras.points : nullptr, progress);
   context.console.Say(fmt::format("{}: {} views, {} held out", options.output.string(),
                                   cameras.list.cameras.size(), options.import.held_out.size()));
-  context.EmitJson(fmt::format("{{\"views\": {}}}", cameras.list.cameras.size()));
+  context.EmitJson(ResultJson(options, cameras, progress.lines()).dump(1));
   return kDone;
 }
 
@@ -60,13 +155,14 @@ void AddImportCommand(CLI::App& app) {
             ->type_name("FILE");
         command.add_option("--format", options->format, "Format of --cameras [by its name]")
             ->check(CLI::IsMember(pipeline::CameraFormats()));
-        command.add_option("--images", options->import.images_dir, "Folder of undistorted images")
+        command.add_option("--images", options->import.images_dir, "Folder of the images")
             ->required()
             ->type_name("DIR");
-        CLI::Option* depth = command
-                                 .add_option("--depth", options->import.depth_dir,
-                                             "Folder of depth maps NAME.exr, .pfm, .png or .tif")
-                                 ->type_name("DIR");
+        CLI::Option* depth =
+            command
+                .add_option("--depth", options->import.depth_dir,
+                            "Folder of depth maps NAME.exr, .pfm, .png, .tif or .npy")
+                ->type_name("DIR");
         command
             .add_option("--depth-kind", options->depth_kind,
                         "z: along the optical axis; ray: distance from the camera")
@@ -85,6 +181,8 @@ void AddImportCommand(CLI::App& app) {
             ->type_name("DIR");
         AddMemoryOption(command, options->import.memory_gb,
                         "Memory for views that are read at a time [4]");
+        command.add_flag("--allow-missing", options->allow_missing,
+                         "Leave out cameras whose photo is not there, instead of failing");
         command
             .add_option("--holdout", options->held_out, "Views kept without depth, to measure with")
             ->type_name("every:N|NAME,...");

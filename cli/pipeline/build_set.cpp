@@ -20,6 +20,7 @@
 #include "cli/pipeline/ingest.h"
 #include "cli/pipeline/input_hash.h"
 #include "cli/pipeline/kept_notes.h"
+#include "cli/pipeline/model_grid.h"
 #include "cli/pipeline/run_log.h"
 #include "cli/pipeline/set_page.h"
 #include "cli/pipeline/undistort_photos.h"
@@ -350,6 +351,7 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
   const auto look = [&] {
     LeaveOutSamePictures(options, photos, progress);
     capture::RequireEnoughPhotos(photos, options.photos);
+    if (!options.poses.empty()) TakePhotosAsCamerasDo(options.poses, photos, progress);
     held_out = ChooseHeldOut(options.holdout, NamesOf(photos));
     RequireMetres(options.metres, photos, options.photos.string(),
                   options.holdout_strict ? held_out : std::vector<bool>());

@@ -130,7 +130,7 @@ int FeatureImageSizePx(const std::vector<std::pair<int, int>>& sizes_px, double 
 }
 
 bool NeedsFeatures(const fs::path& poses) {
-  return !fs::is_directory(poses) || colmap::ReadModel(poses).points.empty();
+  return !fs::is_directory(poses) || colmap::ReadModel(colmap::ModelFolderIn(poses)).points.empty();
 }
 
 void RequireCalibration(const fs::path& poses) {

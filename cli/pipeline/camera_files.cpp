@@ -10,7 +10,10 @@
 #include "calib/sparse_from_sfm.h"
 #include "capture/ingest.h"
 #include "cli/pipeline/holdout.h"
+#include "cli/pipeline/model_grid.h"
+#include "cli/pipeline/named_files.h"
 #include "dtr/base/error.h"
+#include "dtr/io/formats/file_names.h"
 #include "dtr/io/formats/llff.h"
 #include "dtr/io/formats/transforms_json.h"
 #include "dtr/io/image_io.h"
@@ -20,29 +23,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A name without an extension, as in NeRF's own files, is that of the one image called so.
-std::string WithExtension(const fs::path& images_dir, const std::string& name) {
-  std::error_code ignored;
-  if (fs::is_regular_file(images_dir / name, ignored)) return name;
-  std::set<std::string> found;
-  const fs::path folder = (images_dir / name).parent_path();
-  fs::directory_iterator entries(folder, ignored);
-  for (; !ignored && entries != fs::directory_iterator(); entries.increment(ignored)) {
-    const fs::path& file = entries->path();
-    if (file.stem() == fs::path(name).filename() &&
-        capture::IsImageExtension(file.extension().string())) {
-      found.insert(file.extension().string());
-    }
-  }
-  return found.size() == 1 ? name + *found.begin() : name;
-}
-
-io::SizedImage SizeOf(const fs::path& images_dir, const std::string& given) {
-  const std::string name = WithExtension(images_dir, given);
-  const io::ImageHeader header = io::ReadImageHeader(images_dir / name);
-  return {name, header.width_px, header.height_px};
-}
-
 std::vector<io::SizedImage> SizedImages(const fs::path& images_dir) {
   std::error_code error;
   std::vector<io::SizedImage> images;
@@ -50,7 +30,7 @@ std::vector<io::SizedImage> SizedImages(const fs::path& images_dir) {
     if (!entry.is_regular_file() || !capture::IsImageExtension(entry.path().extension().string())) {
       continue;
     }
-    images.push_back(SizeOf(images_dir, entry.path().filename().string()));
+    images.push_back(SizedImageAt(images_dir, entry.path().filename().string()));
   }
   if (error) throw UsageError(images_dir.string() + ": cannot be listed: " + error.message());
   return images;
@@ -72,36 +52,105 @@ std::map<std::string, std::string> ImagesByStem(const fs::path& folder) {
   return by_stem;
 }
 
-CamerasFromFile FromColmap(const fs::path& folder) {
-  const calib::SfmModel model = colmap::ReadModel(folder);
+bool IsFile(const fs::path& file) {
+  std::error_code ignored;
+  return fs::is_regular_file(file, ignored);
+}
+
+// Leaves out what has no photo, or says so: `name` may leave its folder, which readers refuse.
+bool HasPhoto(const std::string& name, const CameraFileFolders& folders) {
+  return !io::WhyUnsafeName(name).empty() || IsFile(folders.images / name);
+}
+
+// One line about what is missing; without allow_missing the end.
+void TellMissing(const fs::path& file, const CameraFileFolders& folders, size_t cameras,
+                 CamerasFromFile& out) {
+  if (out.skipped.empty()) return;
+  const auto& [name, reason] = out.skipped.front();
+  const std::string what = fmt::format("{}: {} of its {} cameras have no photo, first {} ({})",
+                                       file.string(), out.skipped.size(), cameras, name, reason);
+  if (out.skipped.size() == cameras) throw Error(what + "; give the folder of its photos");
+  if (!folders.allow_missing) {
+    throw Error(what +
+                "; copy the photos there, or give --allow-missing to leave such cameras out");
+  }
+  out.notes.push_back(what + ": left out");
+}
+
+CamerasFromFile FromColmap(const fs::path& folder, const CameraFileFolders& folders) {
+  const fs::path model_folder = colmap::ModelFolderIn(folder);
+  calib::SfmModel model = colmap::ReadModel(model_folder);
   CamerasFromFile cameras;
+  const size_t all = model.images.size();
+  std::erase_if(model.images, [&](const calib::SfmImage& image) {
+    if (HasPhoto(image.name, folders)) return false;
+    cameras.skipped.emplace_back(image.name,
+                                 "not there: " + (folders.images / image.name).string());
+    return true;
+  });
+  TellMissing(model_folder, folders, all, cameras);
   std::vector<std::string> names;
   std::vector<PinholeCamera> pinholes;
   for (const calib::SfmImage& image : model.images) {
     const calib::LensCamera& lens = model.cameras.at(image.camera_id);
-    if (!lens.IsUndistorted()) {
-      throw Error(
-          fmt::format("{}: camera of '{}': expected no distortion, found {}; undistort the "
-                      "images first, or use dtr build --poses",
-                      folder.string(), image.name, calib::NameOf(lens.model)));
-    }
     io::NamedCamera named;
     named.name = image.name;
     named.camera = lens.Pinhole();
+    if (!lens.IsUndistorted()) named.distortion = {calib::NameOf(lens.model), lens.params};
     named.cam_from_world = image.cam_from_world;
     names.push_back(image.name);
     pinholes.push_back(named.camera);
     cameras.list.cameras.push_back(named);
   }
-  cameras.points = calib::ToSparseScene(model, names, pinholes);
+  cameras.list.photo_grid = GridOfModel(model_folder);
+  if (!model.points.empty()) cameras.points = calib::ToSparseScene(model, names, pinholes);
+  return cameras;
+}
+
+CamerasFromFile FromTransforms(const fs::path& file, const CameraFileFolders& folders) {
+  io::TransformsPaths paths;
+  paths.image_of = [&](const std::string& path) { return FindImage(folders.images, path); };
+  const fs::path depth_dir = folders.depth.empty() ? folders.images : folders.depth;
+  paths.depth_of = [&](const std::string& path) { return NameBelow(depth_dir, path); };
+  paths.mask_of = [&](const std::string& path) { return NameBelow(folders.images, path); };
+  io::TransformsFile read = io::ReadTransformsJson(file, paths);
+  CamerasFromFile cameras;
+  cameras.list = std::move(read.list);
+  cameras.mask_dir = folders.images;
+  cameras.held_out = std::move(read.held_out);
+  cameras.depth_unit = read.depth_unit;
+  cameras.points_file = read.points_file;
+  cameras.notes = std::move(read.notes);
+  for (const io::FrameWithoutPhoto& frame : read.missing) {
+    cameras.skipped.emplace_back(io::Printable(frame.path),
+                                 fmt::format("frame {}: not there: {}", frame.frame,
+                                             (folders.images / frame.path).string()));
+  }
+  TellMissing(file, folders, cameras.list.cameras.size() + read.missing.size(), cameras);
+  return cameras;
+}
+
+CamerasFromFile FromCamerasJson(const fs::path& file, const CameraFileFolders& folders) {
+  CamerasFromFile cameras;
+  cameras.list = io::ReadCamerasJson(file);
+  const size_t all = cameras.list.cameras.size();
+  std::erase_if(cameras.list.cameras, [&](const io::NamedCamera& named) {
+    if (HasPhoto(named.name, folders)) return false;
+    cameras.skipped.emplace_back(named.name,
+                                 "not there: " + (folders.images / named.name).string());
+    return true;
+  });
+  TellMissing(file, folders, all, cameras);
   return cameras;
 }
 
 std::string FormatOf(const fs::path& file) {
   if (fs::is_directory(file)) return "colmap";
   if (file.extension() == ".npy") return "llff";
-  if (file.filename().string().starts_with("transforms")) return "nerf";
-  if (file.extension() == ".json") return "cameras-json";
+  if (file.extension() == ".json") {
+    const bool called_so = file.filename().string().starts_with("transforms");
+    return called_so || io::IsTransformsJson(file) ? "nerf" : "cameras-json";
+  }
   throw UsageError(
       fmt::format("{}: expected the folder of a COLMAP model, a cameras.json, a transforms.json or "
                   "a poses_bounds.npy, found another name; give --format",
@@ -113,20 +162,19 @@ std::string FormatOf(const fs::path& file) {
 std::vector<std::string> CameraFormats() { return {"cameras-json", "colmap", "llff", "nerf"}; }
 
 CamerasFromFile ReadCameraFile(const fs::path& file, const std::string& format,
-                               const fs::path& images_dir) {
+                               const CameraFileFolders& folders) {
   if (!fs::exists(file)) {
     throw UsageError(fmt::format("--cameras {}: no such file or folder", file.string()));
   }
   const std::string kind = format.empty() ? FormatOf(file) : format;
-  if (kind == "colmap") return FromColmap(file);
-  if (kind == "llff") return {io::ReadLlff(file, SizedImages(images_dir)).list, {}};
-  if (kind == "nerf") {
-    return {io::ReadTransformsJson(
-                file, [&](const std::string& name) { return SizeOf(images_dir, name); }),
-            {},
-            images_dir};
+  if (kind == "colmap") return FromColmap(file, folders);
+  if (kind == "nerf") return FromTransforms(file, folders);
+  if (kind == "llff") {
+    CamerasFromFile cameras;
+    cameras.list = io::ReadLlff(file, SizedImages(folders.images)).list;
+    return cameras;
   }
-  return {io::ReadCamerasJson(file), {}};
+  return FromCamerasJson(file, folders);
 }
 
 void NameMasks(const fs::path& mask_dir, const fs::path& images_dir, io::CameraList& list) {

@@ -13,22 +13,35 @@ namespace dtr::pipeline {
 
 /// Cameras with what else their file brings.
 struct CamerasFromFile {
-  io::CameraList list;
-  std::optional<SparseScene> points;  ///< views are indices into `list`
+  io::CameraList list = {};
+  std::optional<SparseScene> points = {};  ///< views are indices into `list`
   /// Where masks that the file names lie; empty: `masks` beside the images.
   std::filesystem::path mask_dir = {};
+  /// Photos that the file says are for measuring; empty: it says nothing of that.
+  std::optional<std::set<std::string>> held_out = {};
+  std::optional<double> depth_unit = {};  ///< of depth maps that the file names
+  std::string points_file = {};           ///< points of which no photo is known to see which
+  /// Cameras without a photo, and why they are left out.
+  std::vector<std::pair<std::string, std::string>> skipped = {};
+  std::vector<std::string> notes = {};  ///< one line each
+};
+
+/// Where files that a camera file names lie.
+struct CameraFileFolders {
+  std::filesystem::path images, depth;
+  bool allow_missing = false;  ///< cameras without a photo are left out
 };
 
 /// Names that ReadCameraFile takes as `format`.
 std::vector<std::string> CameraFormats();
 
-/// Reads cameras of undistorted images. `format` "": a folder is a COLMAP model, poses_bounds.npy
-/// LLFF's, transforms.json NeRF's, any other .json a cameras.json. `images_dir` gives the images'
-/// names and sizes to the formats that do not store them.
-/// Throws UsageError when the format cannot be told, Error when the file is broken or a COLMAP
-/// camera has distortion.
+/// Reads cameras of images, which may have distortion. `format` "": a folder is a COLMAP model,
+/// poses_bounds.npy LLFF's, a .json with `frames` NeRF's, any other .json a cameras.json.
+/// `folders.images` gives the images' names and sizes to the formats that do not store them.
+/// Throws UsageError when the format cannot be told, Error when the file is broken or, without
+/// `allow_missing`, a photo is not there.
 CamerasFromFile ReadCameraFile(const std::filesystem::path& file, const std::string& format,
-                               const std::filesystem::path& images_dir);
+                               const CameraFileFolders& folders);
 
 /// Finds masks for the cameras of a file that names none (COLMAP's, LLFF's): for a photo
 /// left/a.jpg the first of left/a_mask.png, left/a.jpg.png (COLMAP's name) and left/a.png, with any

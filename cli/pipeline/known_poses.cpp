@@ -6,14 +6,18 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "calib/colmap/export.h"
 #include "calib/colmap/held_out.h"
 #include "calib/colmap/known_poses.h"
 #include "calib/colmap/model_io.h"
+#include "calib/sparse_from_sfm.h"
 #include "capture/sfm_images.h"
+#include "cli/pipeline/camera_distortion.h"
+#include "cli/pipeline/named_files.h"
 #include "dtr/base/error.h"
 #include "dtr/io/formats/cameras_json.h"
+#include "dtr/io/formats/file_names.h"
 #include "dtr/io/formats/llff.h"
+#include "dtr/io/formats/transforms_json.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -74,6 +78,17 @@ struct Given {
   Eigen::Vector3d world_origin = Eigen::Vector3d::Zero();
 };
 
+Given GivenIn(const io::CameraList& list) {
+  Given given;
+  given.first = list.cameras.empty() ? "" : list.cameras.front().name;
+  given.unit = list.unit;
+  given.world_origin = list.world_origin;
+  for (const io::NamedCamera& named : list.cameras) {
+    given.by_name[named.name] = {named.name, CameraModelOf(named), named.cam_from_world};
+  }
+  return given;
+}
+
 // Points for cameras that came without any: COLMAP finds them with everything else held.
 CalibratedPhotos Triangulated(const Given& given, const capture::Capture& capture,
                               const CalibrateOptions& options, const fs::path& workspace,
@@ -106,7 +121,7 @@ CalibratedPhotos Triangulated(const Given& given, const capture::Capture& captur
 
 CalibratedPhotos FromColmapModel(const capture::Capture& capture, const CalibrateOptions& options,
                                  const fs::path& workspace, Progress& progress) {
-  calib::SfmModel model = colmap::ReadModel(options.poses);
+  calib::SfmModel model = colmap::ReadModel(colmap::ModelFolderIn(options.poses));
   Given given;
   given.first = model.images.empty() ? "" : model.images.front().name;
   std::erase_if(model.images, [&](const calib::SfmImage& image) {
@@ -136,52 +151,102 @@ CalibratedPhotos FromColmapModel(const capture::Capture& capture, const Calibrat
   return calibrated;
 }
 
-io::CameraList ReadCameraList(const capture::Capture& capture, const fs::path& poses) {
-  if (poses.extension() == ".json") return io::ReadCamerasJson(poses);
-  if (poses.extension() == ".npy") {
-    std::vector<io::SizedImage> images;
-    for (const capture::Photo& photo : capture.photos) {
-      images.push_back({photo.name, photo.width_px, photo.height_px});
-    }
-    return io::ReadLlff(poses, std::move(images)).list;
-  }
-  throw UsageError(fmt::format(
-      "--poses {}: expected the folder of a COLMAP model, a cameras.json or a poses_bounds.npy",
-      poses.string()));
-}
-
 CalibratedPhotos FromCameraList(const capture::Capture& capture, const CalibrateOptions& options,
                                 const fs::path& workspace, Progress& progress) {
-  const io::CameraList list = io::RecentreWorld(ReadCameraList(capture, options.poses));
-  Given given;
-  given.first = list.cameras.empty() ? "" : list.cameras.front().name;
-  given.unit = list.unit;
-  given.world_origin = list.world_origin;
-  for (const io::NamedCamera& named : list.cameras) {
-    given.by_name[named.name] = {named.name, colmap::FromPinhole(named.camera),
-                                 named.cam_from_world};
-  }
-  CalibratedPhotos calibrated = Triangulated(given, capture, options, workspace, progress);
+  PosesFile file = ReadPoses(capture, options.poses);
+  for (const std::string& note : file.notes) progress.Note(note);
+  const io::CameraList list = io::RecentreWorld(std::move(file.list));
+  CalibratedPhotos calibrated = Triangulated(GivenIn(list), capture, options, workspace, progress);
   calibrated.engine = options.poses.filename().string();
   return calibrated;
 }
 
-// COLMAP takes photos as they are stored, whatever their EXIF data say; we turn them upright, and
-// our own models are of upright ones. Where the size tells nothing the user must know.
-void TellOfTurned(const capture::Capture& capture, Progress& progress) {
-  std::vector<std::string> turned;
-  for (const capture::Photo& photo : capture.photos) {
-    if (capture::IsTurned(photo)) turned.push_back(photo.name);
+// The photo that a path of a transforms.json means; its folders are those of the photos.
+const io::SizedImage* PhotoMeant(const std::vector<io::SizedImage>& images, const fs::path& folder,
+                                 const std::string& path) {
+  const std::vector<std::string> names = NamesMeant(folder, path);
+  for (const bool with_extension : {true, false}) {
+    for (const std::string& name : names) {
+      const auto found = std::find_if(images.begin(), images.end(), [&](const auto& image) {
+        return with_extension ? image.name == name
+                              : fs::path(image.name).replace_extension() == fs::path(name);
+      });
+      if (found != images.end()) return &*found;
+    }
   }
-  if (turned.empty()) return;
-  progress.Note(fmt::format(
-      "{} photos are turned upright by their EXIF data, first {}: their cameras must be of the "
-      "upright pictures; COLMAP does not turn photos, so for its own models take the tag out of "
-      "them first (exiftool -Orientation= FILE)",
-      turned.size(), turned.front()));
+  return nullptr;
+}
+
+PosesFile FromTransforms(const std::vector<io::SizedImage>& images, const capture::Capture& capture,
+                         const fs::path& poses) {
+  // Below the folder of photos: their names are what is left of their files' paths.
+  fs::path folder = capture.photos.empty() ? fs::path() : capture.photos.front().file.parent_path();
+  for (const char c : capture.photos.empty() ? std::string() : capture.photos.front().name) {
+    if (c == '/') folder = folder.parent_path();
+  }
+  io::TransformsPaths paths;
+  paths.image_of = [&](const std::string& path) -> std::optional<io::SizedImage> {
+    const io::SizedImage* photo = PhotoMeant(images, folder, path);
+    return photo == nullptr ? std::nullopt : std::optional(*photo);
+  };
+  io::TransformsFile read = io::ReadTransformsJson(poses, paths);
+  PosesFile file{std::move(read.list), std::move(read.notes)};
+  if (!read.missing.empty()) {
+    file.notes.push_back(fmt::format(
+        "{}: {} of its {} frames have no photo here, first {}", poses.string(), read.missing.size(),
+        file.list.cameras.size() + read.missing.size(), io::Printable(read.missing.front().path)));
+  }
+  if (file.list.cameras.empty()) {
+    throw Error(
+        fmt::format("{}: none of its frames is one of the photos; its first is '{}', the "
+                    "first photo is '{}': name the photos as it does, or give theirs",
+                    poses.string(), io::Printable(read.missing.front().path),
+                    capture.photos.empty() ? "" : capture.photos.front().name));
+  }
+  if (read.held_out && !read.held_out->empty()) {
+    file.notes.push_back(
+        fmt::format("{}: {} frames are for testing by its lists, which --holdout "
+                    "decides here",
+                    poses.string(), read.held_out->size()));
+  }
+  return file;
 }
 
 }  // namespace
+
+PosesFile ReadPoses(const capture::Capture& capture, const fs::path& poses) {
+  std::vector<io::SizedImage> images;
+  for (const capture::Photo& photo : capture.photos) {
+    // Photos whose pixels are settled are as they are; of others their cameras' size will say.
+    const StoredSize stored = capture::StoredSizeOf(photo);
+    images.push_back({photo.name, stored.width_px, stored.height_px,
+                      photo.as_stored ? 1 : photo.exif_orientation});
+  }
+  if (poses.extension() == ".json") {
+    if (io::IsTransformsJson(poses)) return FromTransforms(images, capture, poses);
+    return {io::ReadCamerasJson(poses), {}};
+  }
+  if (poses.extension() == ".npy") return {io::ReadLlff(poses, std::move(images)).list, {}};
+  throw UsageError(
+      fmt::format("--poses {}: expected the folder of a COLMAP model, a cameras.json, a "
+                  "transforms.json or a poses_bounds.npy",
+                  poses.string()));
+}
+
+SparseScene TriangulatedPoints(const io::CameraList& list, const capture::Capture& photos,
+                               const CalibrateOptions& options, const fs::path& workspace,
+                               Progress& progress) {
+  progress.Note("points are triangulated from the photos, with their cameras fixed");
+  const CalibratedPhotos calibrated =
+      Triangulated(GivenIn(list), photos, options, workspace, progress);
+  std::vector<std::string> names;
+  std::vector<PinholeCamera> pinholes;
+  for (const io::NamedCamera& named : list.cameras) {
+    names.push_back(named.name);
+    pinholes.push_back(named.camera);
+  }
+  return calib::ToSparseScene(calibrated.model, names, pinholes);
+}
 
 void RegisterHeldOutPhotos(const capture::Capture& held_out,
                            const std::vector<colmap::SfmImageInput>& sources,
@@ -203,7 +268,6 @@ void RegisterHeldOutPhotos(const capture::Capture& held_out,
 CalibratedPhotos FromKnownPoses(const capture::Capture& capture, const CalibrateOptions& options,
                                 const fs::path& workspace, Progress& progress) {
   progress.Note("structure from motion left out: cameras are given");
-  TellOfTurned(capture, progress);
   CalibratedPhotos calibrated = fs::is_directory(options.poses)
                                     ? FromColmapModel(capture, options, workspace, progress)
                                     : FromCameraList(capture, options, workspace, progress);

@@ -5,6 +5,8 @@
 
 #include "calib/colmap/sfm.h"
 #include "cli/pipeline/calibrated_photos.h"
+#include "dtr/io/formats/cameras_json.h"
+#include "dtr/types/sparse_scene.h"
 
 namespace dtr::pipeline {
 
@@ -13,8 +15,25 @@ std::vector<colmap::SfmImageInput> SfmInputs(const capture::Capture& capture,
                                              const std::filesystem::path& folder);
 colmap::SfmOptions SfmOptionsFor(const CalibrateOptions& options);
 
-/// Cameras from options.poses: the folder of a COLMAP model, a cameras.json or a poses_bounds.npy.
-/// A COLMAP model brings its points; for the other two, points are triangulated with the cameras
+/// Cameras of a file, with lines about it that are worth telling.
+struct PosesFile {
+  io::CameraList list;
+  std::vector<std::string> notes;
+};
+
+/// Reads a cameras.json, a transforms.json or a poses_bounds.npy for photos. Throws UsageError for
+/// another name, Error for a broken file or one of other photos.
+PosesFile ReadPoses(const capture::Capture& capture, const std::filesystem::path& poses);
+
+/// Points that photos show, triangulated with the cameras of `list` held fixed; views are indices
+/// into it. Of `options` threads, seed, memory and held_out (for each photo) are used; photos that
+/// are held out give no points.
+SparseScene TriangulatedPoints(const io::CameraList& list, const capture::Capture& photos,
+                               const CalibrateOptions& options,
+                               const std::filesystem::path& workspace, Progress& progress);
+
+/// Cameras from options.poses: the folder of a COLMAP model, or a file as of ReadPoses.
+/// A COLMAP model brings its points; for the others, points are triangulated with the cameras
 /// held fixed, from photos that are not held out. Cameras far from the origin get a world origin
 /// near them (io::RecentreWorld). Photos that the file does not name stay without a camera. Throws
 /// Error when the file is broken or names too few of the photos.

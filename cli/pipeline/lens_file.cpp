@@ -23,15 +23,17 @@ calib::LensCamera ReadLens(const std::filesystem::path& file) {
     only_one(calibration.cameras.size());
     return calibration.cameras.front().camera;
   }
-  if (extension == ".yml" || extension == ".yaml") return calib::ReadOpenCvYaml(file);
+  if (extension == ".yml" || extension == ".yaml" || extension == ".xml") {
+    return calib::ReadOpenCvYaml(file);
+  }
   if (extension == ".txt") {
     const auto cameras = colmap::ReadCamerasText(file);
     only_one(cameras.size());
     return cameras.begin()->second;
   }
   throw UsageError(
-      fmt::format("{}: expected a .json of `dtr calibrate board`, a .yml of "
-                  "OpenCV or a cameras.txt of COLMAP",
+      fmt::format("{}: expected a .json of `dtr calibrate board`, a .yml or "
+                  ".xml of OpenCV or a cameras.txt of COLMAP",
                   file.string()));
 }
 

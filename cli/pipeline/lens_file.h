@@ -6,9 +6,9 @@
 
 namespace dtr::pipeline {
 
-/// The one camera of a file: .json as `dtr calibrate board` writes it, .yml or .yaml of OpenCV,
-/// .txt of COLMAP (cameras.txt). Throws UsageError on another extension, Error on a broken file or
-/// one with several cameras.
+/// The one camera of a file: .json as `dtr calibrate board` writes it, .yml, .yaml or .xml of
+/// OpenCV, .txt of COLMAP (cameras.txt). Throws UsageError on another extension, Error on a broken
+/// file or one with several cameras.
 calib::LensCamera ReadLens(const std::filesystem::path& file);
 
 }  // namespace dtr::pipeline

@@ -52,12 +52,8 @@ void RequireSize(const capture::Photo& photo, const calib::LensCamera& lens) {
   if (lens.width_px == photo.width_px && lens.height_px == photo.height_px) return;
   throw Error(
       fmt::format("{}: expected a photo of {}x{} pixels as its camera has, found {}x{}; give "
-                  "cameras for these photos{}",
-                  photo.name, lens.width_px, lens.height_px, photo.width_px, photo.height_px,
-                  photo.exif_orientation >= 5
-                      ? ", or take out the EXIF orientation that turns it (exiftool -Orientation= "
-                        "FILE) where COLMAP, which does not turn photos, found them"
-                      : ""));
+                  "cameras for these photos",
+                  photo.name, lens.width_px, lens.height_px, photo.width_px, photo.height_px));
 }
 
 }  // namespace

@@ -89,9 +89,9 @@ std::string FiveDigits(int number) {
 }  // namespace
 
 io::CameraList ConvertLego(const fs::path& source, const ConvertedFolder& out) {
-  io::CameraList list = io::ReadTransformsJson(
-      source / "transforms_test_subset.json",
-      [&](const std::string& path) { return ImageAt(source, path + ".png"); });
+  io::TransformsPaths paths;
+  paths.image_of = [&](const std::string& path) { return ImageAt(source, path + ".png"); };
+  io::CameraList list = io::ReadTransformsJson(source / "transforms_test_subset.json", paths).list;
   for (io::NamedCamera& named : list.cameras) {
     const fs::path image = source / named.name;
     const fs::path depth = image.parent_path() / (image.stem().string() + "_depth_0001.png");

@@ -242,11 +242,15 @@ void WriteJpegWithExif(const fs::path& file, const ImageRgb8& image, int quality
   WriteFileAtomically(file, EncodeJpeg(image, quality, spec));
 }
 
-ImageRgb8 ApplyExifOrientation(const ImageRgb8& image, int exif_orientation) {
+int InverseExifOrientation(int exif_orientation) {
+  return exif_orientation == 6 ? 8 : exif_orientation == 8 ? 6 : exif_orientation;
+}
+
+Grid<std::uint8_t> ApplyExifOrientation(const Grid<std::uint8_t>& image, int exif_orientation) {
   if (exif_orientation < 2 || exif_orientation > 8) return image;
   const int w = image.width(), h = image.height();
   const bool transposed = exif_orientation >= 5;
-  ImageRgb8 upright(transposed ? h : w, transposed ? w : h, 3);
+  Grid<std::uint8_t> upright(transposed ? h : w, transposed ? w : h, image.channels());
   // Where pixel (x, y) of the upright image lies in the stored one; EXIF 2.3, tag 0x0112.
   const auto stored = [&](int x, int y) -> std::array<int, 2> {
     switch (exif_orientation) {
@@ -269,7 +273,7 @@ ImageRgb8 ApplyExifOrientation(const ImageRgb8& image, int exif_orientation) {
   for (int y = 0; y < upright.height(); ++y) {
     for (int x = 0; x < upright.width(); ++x) {
       const auto [sx, sy] = stored(x, y);
-      for (int c = 0; c < 3; ++c) upright(x, y, c) = image(sx, sy, c);
+      for (int c = 0; c < image.channels(); ++c) upright(x, y, c) = image(sx, sy, c);
     }
   }
   return upright;

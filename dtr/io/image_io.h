@@ -89,7 +89,11 @@ struct ExifFocal {
 void WriteJpegWithExif(const std::filesystem::path& file, const ImageRgb8& image, int quality,
                        const ExifFocal& exif);
 
-/// The image as it must be turned for EXIF orientation 1..8 (others: unchanged).
-ImageRgb8 ApplyExifOrientation(const ImageRgb8& image, int exif_orientation);
+/// The image as it must be turned for EXIF orientation 1..8 (others: unchanged), of any number of
+/// channels.
+Grid<std::uint8_t> ApplyExifOrientation(const Grid<std::uint8_t>& image, int exif_orientation);
+
+/// The orientation that undoes another: 6 and 8 undo each other, all others themselves.
+int InverseExifOrientation(int exif_orientation);
 
 }  // namespace dtr::io

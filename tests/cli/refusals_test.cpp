@@ -174,12 +174,12 @@ TEST_F(Refusals, APhotoThatIsTurnedIsNotOfAKnownLens) {
         "0001.jpg: expected a photo as it is stored, for the lens is known of such, found one that "
         "its EXIF orientation turned",
         {"calibrate", "photos", photos, "-o", In("new"), "--lens", In("one/cameras.txt")}}});
-  // Of given cameras nobody knows: it is told.
+  // Cameras of a model that says nothing else are of the pixels as stored.
   const Ran built = DtrOk({"build", photos, "-o", In("set.dtr"), "--poses",
                            Shared("courtyard/sparse"), "--engine", "none"});
   EXPECT_THAT(built.err,
-              ::testing::HasSubstr("1 photos are turned upright by their EXIF data, first "
-                                   "0001.jpg"));
+              ::testing::HasSubstr("1 photos with an EXIF orientation, first 0001.jpg: taken as "
+                                   "they are stored"));
 }
 
 TEST_F(Refusals, CalibrationsOfTakenFoldersAndOfOtherLenses) {
@@ -255,7 +255,7 @@ TEST_F(Refusals, PosesThatAreNotOfThesePhotos) {
   ExpectAllRefused({
       {kWrongUsage, "--holdout-strict: keeps the photos of --holdout out of SfM; it needs",
        build({"--holdout-strict"})},
-      {kWrongUsage, "expected the folder of a COLMAP model, a cameras.json or a poses_bounds.npy",
+      {kWrongUsage, "a cameras.json, a transforms.json or a poses_bounds.npy",
        build({"--poses", Write("poses.txt", "")})},
       {kFailed,
        "expected cameras for at least 2 of the photos by name, found 0; its first is 'a.jpg'",

@@ -39,7 +39,10 @@ Reader OpenNpy(const fs::path& folder) {
   return {file,
           {Npy<double>("(2, 3)", {1, 2, 3, 4, 5, 6}), Npy<float>("(4,)", {1, 2, 3, 4}),
            Npy<double>("()", {7})},
-          [=] { io::ReadNpy(file); }};
+          [=] {
+            io::ReadNpy(file, {.half = true, .integers = true, .any_value = true});
+            io::ReadNpy(file);
+          }};
 }
 
 Reader OpenLlff(const fs::path& folder) {
@@ -83,9 +86,11 @@ Reader OpenTransforms(const fs::path& folder) {
           {R"({"w": 40, "h": 30, "fl_x": 50, "fl_y": 51, "cx": 21, "cy": 14, "k1": 0, )" + frames,
            R"({"camera_angle_x": 0.9, "aabb_scale": 4, )" + frames},
           [=] {
-            io::ReadTransformsJson(file, [](const std::string& path) {
+            io::TransformsPaths paths;
+            paths.image_of = [](const std::string& path) {
               return io::SizedImage{path + ".png", 20, 15};
-            });
+            };
+            io::ReadTransformsJson(file, paths);
           }};
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <stdexcept>
 
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
@@ -116,6 +117,9 @@ std::string FormatCamerasJson(const CameraList& list) {
   root["matrix_order"] = "4x4 row-major";
   root["views"] = Json::array();
   for (const NamedCamera& named : list.cameras) {
+    if (named.distortion) {
+      throw std::invalid_argument("FormatCamerasJson: a cameras.json holds no distortion");
+    }
     Json view;
     view["name"] = named.name;
     if (!named.depth_file.empty()) {

@@ -11,15 +11,25 @@
 #pragma once
 #include <Eigen/Core>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "dtr/types/camera.h"
 #include "dtr/types/dtr_set.h"
+#include "dtr/types/photo_grid.h"
 #include "dtr/types/pose.h"
 
 namespace dtr::io {
+
+/// A camera model with distortion, in COLMAP's words: the name ("OPENCV") and the parameters in
+/// its order, focal lengths and principal point first. What it means is for calib to say.
+struct Distortion {
+  std::string model;
+  std::vector<double> params;
+  bool operator==(const Distortion&) const = default;
+};
 
 /// A camera of a list with the names of the files that belong to it.
 struct NamedCamera {
@@ -27,7 +37,8 @@ struct NamedCamera {
   std::string depth_file;  ///< relative to the folder of depth maps; empty: none
   std::string mask_file;   ///< relative to the folder of masks; empty: none
   DepthKind depth_kind = DepthKind::kPlaneZ;  ///< what the numbers of `depth_file` measure
-  PinholeCamera camera{1, 1, 1, 1, 0, 0};     ///< of the image, undistorted
+  PinholeCamera camera{1, 1, 1, 1, 0, 0};     ///< of the image, once it is undistorted
+  std::optional<Distortion> distortion;       ///< of the image as it is; empty: none
   Pose cam_from_world;                        ///< world: relative to CameraList::world_origin
 };
 
@@ -36,6 +47,9 @@ struct CameraList {
   LengthUnit unit = LengthUnit::kUnknown;
   Eigen::Vector3d world_origin = Eigen::Vector3d::Zero();  ///< poses act on p_world - world_origin
   std::vector<NamedCamera> cameras;
+  /// The pixels that cameras describe of photos with an EXIF orientation, where both ways have the
+  /// camera's size: cameras.json is of upright photos.
+  PhotoGrid photo_grid = PhotoGrid::kUpright;
 };
 
 /// Longest image side any reader of camera lists accepts; keeps a hostile size from becoming an
@@ -55,7 +69,8 @@ CameraList ParseCamerasJson(std::string_view text, const std::string& source);
 /// Error when the file cannot be written or the list would not be read back.
 void WriteCamerasJson(const std::filesystem::path& file, const CameraList& list);
 
-/// The text WriteCamerasJson writes; the same list gives the same bytes.
+/// The text WriteCamerasJson writes; the same list gives the same bytes. Throws
+/// std::invalid_argument for cameras with distortion, which the file cannot hold.
 std::string FormatCamerasJson(const CameraList& list);
 
 /// Keeps stored poses small. When the camera centres lie farther from 0 than 100 times their

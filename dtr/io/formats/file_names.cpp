@@ -26,11 +26,16 @@ std::string WhyUnsafeName(const std::string& name) {
 void RequireSafeName(const std::string& name, const std::string& where) {
   const std::string why = WhyUnsafeName(name);
   if (why.empty()) return;
-  const auto is_control = [](char c) { return static_cast<unsigned char>(c) < 32 || c == 127; };
-  std::string shown = name.substr(0, 80);
-  std::replace_if(shown.begin(), shown.end(), is_control, '?');
-  throw Error(where + ": expected a relative path inside its folder, found \"" + shown +
+  throw Error(where + ": expected a relative path inside its folder, found \"" + Printable(name) +
               "\", which " + why);
+}
+
+std::string Printable(const std::string& text) {
+  constexpr size_t kLongest = 80;
+  const auto is_control = [](char c) { return static_cast<unsigned char>(c) < 32 || c == 127; };
+  std::string shown = text.substr(0, kLongest);
+  std::replace_if(shown.begin(), shown.end(), is_control, '?');
+  return shown;
 }
 
 }  // namespace dtr::io

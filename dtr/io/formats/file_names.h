@@ -11,4 +11,7 @@ std::string WhyUnsafeName(const std::string& name);
 /// Throws Error "where: ..." unless WhyUnsafeName(name) is empty.
 void RequireSafeName(const std::string& name, const std::string& where);
 
+/// The beginning of a text out of a file, fit for a message of one line.
+std::string Printable(const std::string& text);
+
 }  // namespace dtr::io

@@ -4,10 +4,14 @@
 #include <cctype>
 #include <cmath>
 #include <string>
+#include <vector>
 
 #include "dtr/base/error.h"
 #include "dtr/io/depth_io.h"
+#include "dtr/io/formats/cameras_json.h"
+#include "dtr/io/formats/npy.h"
 #include "dtr/io/formats/pfm.h"
+#include "dtr/io/image_io.h"
 
 namespace dtr::io {
 namespace {
@@ -19,16 +23,44 @@ Grid<float> FloatsFromPng16(const std::filesystem::path& file, std::uint64_t lim
   return numbers;
 }
 
-Grid<float> ReadNumbers(const std::filesystem::path& file, std::uint64_t limit_px) {
+std::string LowerExtension(const std::filesystem::path& file) {
   std::string extension = file.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  if (extension == ".exr" || extension == ".tif" || extension == ".tiff") {
-    return ReadFloatGrid(file, limit_px);
+  return extension;
+}
+
+// numpy's arrays of one image: rows and columns, with or without an axis of length 1.
+Grid<float> FloatsFromNpy(const std::filesystem::path& file, std::uint64_t limit_px) {
+  const NpyArray array =
+      ReadNpy(file, {.half = true, .integers = true, .any_value = true, .most_values = limit_px});
+  std::vector<size_t> shape = array.shape;
+  if (shape.size() == 3 && shape.back() == 1) shape.pop_back();
+  if (shape.size() == 3 && shape.front() == 1) shape.erase(shape.begin());
+  const auto is_side = [](size_t extent) { return extent >= 1 && extent <= kMaxImageSidePx; };
+  if (shape.size() != 2 || !is_side(shape[0]) || !is_side(shape[1])) {
+    throw Error(file.string() +
+                ": expected an array of rows and columns (HxW, 1xHxW or HxWx1) for a depth map, "
+                "found another shape");
   }
+  Grid<float> numbers(static_cast<int>(shape[1]), static_cast<int>(shape[0]));
+  std::transform(array.values.begin(), array.values.end(), numbers.data().begin(),
+                 [](double value) { return static_cast<float>(value); });
+  return numbers;
+}
+
+Grid<float> ReadNumbers(const std::filesystem::path& file, std::uint64_t limit_px) {
+  const std::string extension = LowerExtension(file);
+  if (extension == ".npy") return FloatsFromNpy(file, limit_px);
   if (extension == ".pfm") return ReadPfm(file);
   if (extension == ".png") return FloatsFromPng16(file, limit_px);
-  throw UsageError(file.string() + ": expected a depth map as .exr, .pfm, .png or .tif, found \"" +
+  if (extension == ".tif" || extension == ".tiff") {
+    return HoldsWholeNumbers(file) ? FloatsFromPng16(file, limit_px)
+                                   : ReadFloatGrid(file, limit_px);
+  }
+  if (extension == ".exr") return ReadFloatGrid(file, limit_px);
+  throw UsageError(file.string() +
+                   ": expected a depth map as .exr, .pfm, .png, .tif or .npy, found \"" +
                    extension + "\"");
 }
 
@@ -37,33 +69,59 @@ bool IsWholePart(int width, int height, int width_px, int height_px) {
          width_px / width == height_px / height;
 }
 
-}  // namespace
-
-DepthImage ReadForeignDepth(const std::filesystem::path& file, DepthKind kind, double unit_scale,
-                            int width_px, int height_px) {
-  if (!(unit_scale > 0) || !std::isfinite(unit_scale)) {
-    throw UsageError(file.string() + ": expected a positive depth unit, found " +
-                     std::to_string(unit_scale));
-  }
-  const auto limit_px =
-      static_cast<std::uint64_t>(width_px) * static_cast<std::uint64_t>(height_px);
-  const Grid<float> numbers = ReadNumbers(file, limit_px);
+DepthImage Scaled(const std::filesystem::path& file, const Grid<float>& numbers, DepthKind kind,
+                  double unit_scale) {
+  DepthImage depth(numbers.width(), numbers.height(), kind);
   if (numbers.channels() != 1) {
     throw Error(file.string() + ": expected a depth map of one channel, found " +
                 std::to_string(numbers.channels()));
   }
+  for (size_t i = 0; i < numbers.data().size(); ++i) {
+    const auto scaled = static_cast<float>(numbers.data()[i] * unit_scale);
+    depth.grid().data()[i] = DepthImage::IsHole(scaled) ? 0.0f : scaled;
+  }
+  return depth;
+}
+
+void RequireUnit(const std::filesystem::path& file, double unit_scale) {
+  if (unit_scale > 0 && std::isfinite(unit_scale)) return;
+  throw UsageError(file.string() + ": expected a positive depth unit, found " +
+                   std::to_string(unit_scale));
+}
+
+std::uint64_t PixelsOf(int width_px, int height_px) {
+  return static_cast<std::uint64_t>(width_px) * static_cast<std::uint64_t>(height_px);
+}
+
+}  // namespace
+
+bool HoldsWholeNumbers(const std::filesystem::path& depth_file) {
+  const std::string extension = LowerExtension(depth_file);
+  if (extension == ".npy") return NpyHoldsWholeNumbers(depth_file);
+  if (extension == ".tif" || extension == ".tiff") return !ReadImageHeader(depth_file).is_float;
+  return extension == ".png";
+}
+
+DepthImage ReadForeignDepth(const std::filesystem::path& file, DepthKind kind, double unit_scale,
+                            int width_px, int height_px) {
+  RequireUnit(file, unit_scale);
+  const Grid<float> numbers = ReadNumbers(file, PixelsOf(width_px, height_px));
   if (!IsWholePart(numbers.width(), numbers.height(), width_px, height_px)) {
     throw Error(file.string() + ": expected a depth map of " + std::to_string(width_px) + "x" +
                 std::to_string(height_px) + " pixels or a whole part of it, found " +
                 std::to_string(numbers.width()) + "x" + std::to_string(numbers.height()) +
                 "; give the map of this image");
   }
-  DepthImage depth(numbers.width(), numbers.height(), kind);
-  for (size_t i = 0; i < numbers.data().size(); ++i) {
-    const auto scaled = static_cast<float>(numbers.data()[i] * unit_scale);
-    depth.grid().data()[i] = DepthImage::IsHole(scaled) ? 0.0f : scaled;
-  }
-  return depth;
+  return Scaled(file, numbers, kind, unit_scale);
+}
+
+DepthImage ReadDepthOfAnySize(const std::filesystem::path& file, DepthKind kind, double unit_scale,
+                              int width_px, int height_px) {
+  constexpr std::uint64_t kMostPerPixel = 16;  // four times finer than the photo per axis
+  RequireUnit(file, unit_scale);
+  const Grid<float> numbers =
+      ReadNumbers(file, std::min(kImageLimitPx, kMostPerPixel * PixelsOf(width_px, height_px)));
+  return Scaled(file, numbers, kind, unit_scale);
 }
 
 }  // namespace dtr::io

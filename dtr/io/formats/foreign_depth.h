@@ -7,7 +7,8 @@
 namespace dtr::io {
 
 /// Reads a depth map, by the file's extension: .exr, .tif, .tiff (float or half: the channel Z,
-/// else Y, else the first), .pfm (one channel) or .png (one channel of 16 bits).
+/// else Y, else the first; a TIFF also of one channel of 16 bits), .pfm (one channel), .png (one
+/// channel of 16 bits) or .npy (one image of floats or integers: HxW, 1xHxW or HxWx1).
 /// Each number is multiplied by `unit_scale` to give scene units (0.001 for millimetres in a set in
 /// metres) and measures what `kind` says; nothing guesses either. Numbers that are zero, negative,
 /// NaN or infinite, before or after scaling, are holes (programs write 0, -1, NaN or infinity).
@@ -17,5 +18,13 @@ namespace dtr::io {
 /// coding; UsageError for another extension or a unit_scale that is not positive and finite.
 DepthImage ReadForeignDepth(const std::filesystem::path& file, DepthKind kind, double unit_scale,
                             int width_px, int height_px);
+
+/// The same for a map of any size up to 16 times the photo's pixels.
+DepthImage ReadDepthOfAnySize(const std::filesystem::path& file, DepthKind kind, double unit_scale,
+                              int width_px, int height_px);
+
+/// Whether a depth map holds integers, whose unit is never a scene unit by itself: a PNG, or a TIFF
+/// or .npy of such a type. Throws Error where that must be read from the file and cannot.
+bool HoldsWholeNumbers(const std::filesystem::path& depth_file);
 
 }  // namespace dtr::io

@@ -2,16 +2,17 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cctype>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <span>
+#include <stdexcept>
 
 #include "dtr/base/error.h"
 #include "dtr/base/hash.h"
 #include "dtr/base/memory_budget.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/io/depth_io.h"
-#include "dtr/io/formats/foreign_depth.h"
+#include "dtr/io/formats/import_depth.h"
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/geometry.h"
@@ -25,74 +26,31 @@ std::string SizeText(int width_px, int height_px) {
   return std::to_string(width_px) + "x" + std::to_string(height_px);
 }
 
-fs::path MaskFolder(const ImportOptions& options) {
-  if (!options.mask_dir.empty()) return options.mask_dir;
-  const fs::path images = fs::absolute(options.images_dir).lexically_normal();
-  // "photos/" has an empty file name; its parent is "photos".
-  return (images.has_filename() ? images.parent_path() : images.parent_path().parent_path()) /
-         "masks";
-}
-
-// The depth map of a camera: the one its list names, else the only one with the photo's name.
-fs::path DepthFileOf(const NamedCamera& named, const ImportOptions& options) {
-  if (!named.depth_file.empty()) return options.depth_dir / named.depth_file;
-  std::vector<fs::path> found;
-  for (const char* extension :
-       {".exr", ".pfm", ".png", ".tif", ".tiff", ".EXR", ".PFM", ".PNG", ".TIF", ".TIFF"}) {
-    const fs::path file = options.depth_dir / fs::path(named.name).replace_extension(extension);
-    // Where the disk does not tell a from A, both are one file.
-    const bool known = std::any_of(found.begin(), found.end(), [&](const fs::path& other) {
-      std::error_code ignored;
-      return fs::equivalent(other, file, ignored);
-    });
-    if (fs::exists(file) && !known) found.push_back(file);
-  }
-  if (found.size() != 1) {
-    throw Error(options.depth_dir.string() + ": expected one depth map (.exr, .pfm, .png, .tif) " +
-                "named like the photo " + named.name + ", found " + std::to_string(found.size()) +
-                "; name it in cameras.json");
-  }
-  return found.front();
-}
-
 bool HasDepth(const NamedCamera& named, const ImportOptions& options) {
   return !options.depth_dir.empty() && !options.held_out.contains(named.name);
 }
 
-ImageRgb8 ReadCameraImage(const NamedCamera& named, const fs::path& file) {
+// What is worth a line about one view.
+struct ViewNote {
+  bool as_stored = false, turned = false;  // of photos with an EXIF orientation
+  std::string resampled;                   // what was done to its depth map
+};
+
+ImageRgb8 ReadCameraImage(const NamedCamera& named, const fs::path& file,
+                          const ImportOptions& options, ViewNote& note) {
   const ImageHeader header = ReadImageHeader(file);
   const PinholeCamera& camera = named.camera;
-  if (header.exif_orientation != 1) {
-    throw Error(file.string() + ": expected an upright image, found EXIF orientation " +
-                std::to_string(header.exif_orientation) +
-                "; turn the pixels upright and remove the tag, so that the camera is certain");
-  }
-  if (header.width_px != camera.width_px() || header.height_px != camera.height_px()) {
+  const StoredSize stored{header.width_px, header.height_px, header.exif_orientation};
+  const auto grid = GridOfSize(camera.width_px(), camera.height_px(), stored, options.photo_grid);
+  if (!grid) {
     throw Error(file.string() + ": expected " + SizeText(camera.width_px(), camera.height_px()) +
                 " pixels as the camera says, found " + SizeText(header.width_px, header.height_px) +
                 "; give the images the cameras were made for");
   }
-  return ReadImage(file);
-}
-
-bool HoldsWholeNumbers(const fs::path& depth_file) {
-  std::string extension = depth_file.extension().string();
-  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return extension == ".png";
-}
-
-DepthImage ReadCameraDepth(const NamedCamera& named, const ImportOptions& options) {
-  const fs::path file = DepthFileOf(named, options);
-  if (!options.depth_unit && HoldsWholeNumbers(file)) {
-    throw UsageError(file.string() +
-                     ": expected --depth-unit for a PNG, which holds whole numbers, found none; "
-                     "give it, as 0.001 for millimetres in a set in metres");
-  }
-  const PinholeCamera& camera = named.camera;
-  const DepthKind kind = options.depth_kind.value_or(named.depth_kind);
-  const DepthImage depth = ReadForeignDepth(file, kind, options.depth_unit.value_or(1.0),
-                                            camera.width_px(), camera.height_px());
-  return ToPlaneZ(depth, camera.Resized(depth.width(), depth.height()));
+  const bool upright = *grid == PhotoGrid::kUpright;
+  note.as_stored = header.exif_orientation != 1 && !upright;
+  note.turned = header.exif_orientation != 1 && upright;
+  return ReadImage(file, {.apply_exif_orientation = upright});
 }
 
 Mask ReadCameraMask(const NamedCamera& named, const ImportOptions& options) {
@@ -173,7 +131,7 @@ nlohmann::json Inputs(const CameraList& list, const ImportOptions& options, Prog
       photo["mask_sha256"] = Sha256OfFile(MaskFolder(options) / named.mask_file);
     }
     if (HasDepth(named, options)) {
-      photo["depth_sha256"] = Sha256OfFile(DepthFileOf(named, options));
+      photo["depth_sha256"] = Sha256OfFile(internal::DepthFileOf(named, options));
       const DepthKind kind = options.depth_kind.value_or(named.depth_kind);
       photo["depth_kind"] = kind == DepthKind::kPlaneZ ? "z" : "ray";
     }
@@ -214,11 +172,72 @@ std::vector<SparsePoint> PointsOfSources(const SparseScene& scene, const std::ve
 std::string Fingerprint(const nlohmann::json& inputs, const CameraList& list,
                         const ImportOptions& options, const SparseScene* points) {
   nlohmann::json fingerprint = inputs;
-  fingerprint["cameras"] = nlohmann::json::parse(FormatCamerasJson(list));
+  CameraList pinholes = list;
+  for (NamedCamera& named : pinholes.cameras) {
+    if (named.distortion) {
+      fingerprint["distortion"][named.name] = {named.distortion->model, named.distortion->params};
+    }
+    named.distortion.reset();
+  }
+  fingerprint["cameras"] = nlohmann::json::parse(FormatCamerasJson(pinholes));
   fingerprint["depth_coding"] = NameOf(options.depth_coding);
   fingerprint["held_out"] = options.held_out;
   if (points != nullptr) fingerprint["points_sha256"] = HashOf(*points);
   return fingerprint.dump();
+}
+
+View ViewOf(const NamedCamera& named, const std::string& id, const ImportOptions& options,
+            ViewNote& note) {
+  View view;
+  view.id = id;
+  view.name = named.name;
+  view.role = options.held_out.contains(named.name) ? ViewRole::kHeldOut : ViewRole::kSource;
+  view.camera = named.camera;
+  view.cam_from_world = named.cam_from_world;
+  view.depth_coding = options.depth_coding;
+  view.image = ReadCameraImage(named, options.images_dir / named.name, options, note);
+  if (!named.mask_file.empty()) view.mask = ReadCameraMask(named, options);
+  std::unique_ptr<CameraDistortion> distortion;
+  if (named.distortion) {
+    if (!options.distortion_of) {
+      throw std::invalid_argument("import: a camera with distortion, and nothing that knows it");
+    }
+    distortion = options.distortion_of(named);
+    distortion->Undistort(view.image, view.mask);
+  }
+  if (HasDepth(named, options)) {
+    view.depth = internal::ReadCameraDepth(named, options, distortion.get(), note.resampled);
+    view.depth_scale = view.camera.width_px() / view.depth.width();
+  }
+  return view;
+}
+
+// One line for each thing that was done to some of the views.
+void TellOf(const CameraList& list, const std::vector<ViewNote>& notes, Progress& progress) {
+  std::set<std::string> resampled;
+  size_t as_stored = 0, turned = 0, distorted = 0;
+  std::string first;
+  for (size_t i = 0; i < notes.size(); ++i) {
+    if (!notes[i].resampled.empty()) resampled.insert(notes[i].resampled);
+    as_stored += notes[i].as_stored;
+    turned += notes[i].turned;
+    distorted += list.cameras[i].distortion.has_value();
+    if (first.empty() && (notes[i].as_stored || notes[i].turned)) first = list.cameras[i].name;
+  }
+  if (as_stored > 0) {
+    progress.Note(std::to_string(as_stored) + " photos with an EXIF orientation, first " + first +
+                  ": taken as they are stored, as their cameras describe them");
+  }
+  if (turned > 0) {
+    progress.Note(std::to_string(turned) + " photos, first " + first +
+                  ": turned by their EXIF orientation, as their cameras describe them");
+  }
+  if (distorted > 0) {
+    progress.Note(std::to_string(distorted) +
+                  " photos undistorted; depth maps that come with them are taken to have the "
+                  "photo's distortion");
+  }
+  for (const std::string& line : resampled) progress.Note(line);
 }
 
 // Writes all views, each in turn without its pixels into `set` and coarsely into `coarse`.
@@ -232,12 +251,13 @@ void WriteViews(const CameraList& list, const ImportOptions& options, SetWriter&
   progress.Stage("import", count);
   MemoryBudget memory(options.memory_gb);
   std::atomic<int> done{0};
+  std::vector<ViewNote> notes(list.cameras.size());
   ParallelFor(0, count, options.threads, [&](int i) {
     progress.ThrowIfInterrupted();
     const auto at = static_cast<size_t>(i);
     const PinholeCamera& camera = list.cameras[at].camera;
     const auto share = memory.TakeForPhoto(camera.width_px(), camera.height_px());
-    View view = ImportView(list.cameras[at], ids[at], options);
+    View view = ViewOf(list.cameras[at], ids[at], options, notes[at]);
     writer.WriteView(view, list.unit);
     coarse.frames[0].views[at] = CoarseCopy(view);
     view.image = {};
@@ -246,6 +266,7 @@ void WriteViews(const CameraList& list, const ImportOptions& options, SetWriter&
     set.frames[0].views[at] = std::move(view);
     progress.Update(++done);
   });
+  TellOf(list, notes, progress);
 }
 
 void WriteSet(const CameraList& list, const ImportOptions& options, const std::string& provenance,
@@ -274,21 +295,17 @@ void WriteSet(const CameraList& list, const ImportOptions& options, const std::s
 
 }  // namespace
 
+fs::path MaskFolder(const ImportOptions& options) {
+  if (!options.mask_dir.empty()) return options.mask_dir;
+  const fs::path images = fs::absolute(options.images_dir).lexically_normal();
+  // "photos/" has an empty file name; its parent is "photos".
+  return (images.has_filename() ? images.parent_path() : images.parent_path().parent_path()) /
+         "masks";
+}
+
 View ImportView(const NamedCamera& named, const std::string& id, const ImportOptions& options) {
-  View view;
-  view.id = id;
-  view.name = named.name;
-  view.role = options.held_out.contains(named.name) ? ViewRole::kHeldOut : ViewRole::kSource;
-  view.camera = named.camera;
-  view.cam_from_world = named.cam_from_world;
-  view.depth_coding = options.depth_coding;
-  view.image = ReadCameraImage(named, options.images_dir / named.name);
-  if (!named.mask_file.empty()) view.mask = ReadCameraMask(named, options);
-  if (HasDepth(named, options)) {
-    view.depth = ReadCameraDepth(named, options);
-    view.depth_scale = view.camera.width_px() / view.depth.width();
-  }
-  return view;
+  ViewNote note;
+  return ViewOf(named, id, options, note);
 }
 
 std::vector<View> ImportViews(const CameraList& list, const ImportOptions& options) {

@@ -1,6 +1,8 @@
 // dtr/io/formats/import_views.h -- D+TR sets out of others' cameras, images and depth maps.
 #pragma once
 #include <filesystem>
+#include <functional>
+#include <memory>
 #include <optional>
 #include <set>
 #include <string>
@@ -13,6 +15,19 @@
 
 namespace dtr::io {
 
+/// The distortion of one camera's photos; dtr/io itself knows no camera models.
+class CameraDistortion {
+ public:
+  virtual ~CameraDistortion() = default;
+  /// Undistorts an image onto the grid of NamedCamera::camera, of the same size; `mask` (may be
+  /// empty: all is usable) becomes 0 where the image has no source.
+  virtual void Undistort(ImageRgb8& image, Mask& mask) const = 0;
+  /// Where a pixel of the undistorted image lies in the photo; empty: nowhere.
+  virtual std::optional<Eigen::Vector2d> DistortedPixel(const Eigen::Vector2d& pixel) const = 0;
+  /// Direction of a pixel of the photo, in the camera's frame; empty: it has none.
+  virtual std::optional<Eigen::Vector3d> RayFromDistorted(const Eigen::Vector2d& pixel) const = 0;
+};
+
 /// Where the files of a CameraList lie and what their numbers mean.
 struct ImportOptions {
   std::filesystem::path images_dir;
@@ -20,9 +35,13 @@ struct ImportOptions {
   std::filesystem::path mask_dir;   ///< empty: a folder `masks` beside images_dir
   /// What the depth numbers measure; empty: what the list says for each camera.
   std::optional<DepthKind> depth_kind;
-  /// Scene units per number in a depth file. Empty: 1 for float files; 16-bit PNG is refused, as
-  /// its numbers are never scene units by themselves.
+  /// Scene units per number in a depth file. Empty: 1 for float files; whole numbers are
+  /// refused, as they are never scene units by themselves.
   std::optional<double> depth_unit;
+  /// CameraList::photo_grid of the list.
+  PhotoGrid photo_grid = PhotoGrid::kUpright;
+  /// Knows the models of cameras with distortion; needed where the list has such.
+  std::function<std::unique_ptr<CameraDistortion>(const NamedCamera&)> distortion_of;
   std::set<std::string> held_out;  ///< names of the list: camera and image are kept, depth is not
   DepthCoding depth_coding = DepthCoding::kPng16InverseDepth;
   int threads = 0;  ///< 0: all cores; the set does not depend on it
@@ -31,11 +50,16 @@ struct ImportOptions {
   double memory_gb = 0;
 };
 
+/// Where the masks of an import lie.
+std::filesystem::path MaskFolder(const ImportOptions& options);
+
 /// One view with its pixels. The depth file is the list's, else the only file of depth_dir with the
-/// photo's name and the extension .exr, .pfm, .png or .tif; ray distances become plane z. Pixels
-/// without depth are holes, never guessed. near_z and far_z are left to the writer.
+/// photo's name and the extension .exr, .pfm, .png, .tif or .npy; ray distances become plane z, and
+/// a map of a size that no set can hold is resampled (depth_grid.h). Pixels without depth are
+/// holes, never guessed. near_z and far_z are left to the writer. Of an image with an EXIF
+/// orientation the camera's size says which pixels are meant, those stored or those turned upright.
 /// Throws Error, naming the file, when an image, depth map or mask is absent, damaged or of another
-/// size than its camera, or when the image has an EXIF orientation (its camera is then ambiguous).
+/// size (a depth map: shape) than its camera.
 View ImportView(const NamedCamera& named, const std::string& id, const ImportOptions& options);
 
 /// All views of a list, in its order, ready for SetWriter::WriteView: everything in memory at once.

@@ -47,6 +47,7 @@ LlffCameras ReadLlff(const std::filesystem::path& poses_bounds, std::vector<Size
             [](const SizedImage& a, const SizedImage& b) { return a.name < b.name; });
   LlffCameras cameras;
   cameras.list.unit = LengthUnit::kArbitrary;
+  cameras.list.photo_grid = PhotoGrid::kStored;  // COLMAP's, from which LLFF makes the file
   for (size_t i = 0; i < images.size(); ++i) {
     const double* row = array.values.data() + i * kRowNumbers;
     const std::string where = source + ": row " + std::to_string(i) + " (" + images[i].name + ")";

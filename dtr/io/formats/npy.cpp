@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <optional>
 
 #include "dtr/base/error.h"
@@ -18,6 +19,7 @@ constexpr size_t kMaxDimensions = 8;
 
 struct Header {
   size_t item_bytes = 0;
+  char kind = 'f';  // f, i or u, as numpy calls them
   bool big_endian = false;
   bool fortran_order = false;
   std::vector<size_t> shape;
@@ -26,7 +28,8 @@ struct Header {
 /// The header is a Python dictionary literal of three known keys; this reads just that.
 class HeaderParser {
  public:
-  HeaderParser(std::string_view text, const std::string& source) : text_(text), source_(source) {}
+  HeaderParser(std::string_view text, const std::string& source, const NpyOptions& options)
+      : text_(text), source_(source), options_(options) {}
 
   Header Parse() {
     Header header;
@@ -105,10 +108,21 @@ class HeaderParser {
       Fail("descr: expected '<f4' or '<f8', found a structure");
     }
     const std::string descr = String();
-    if (descr.size() != 3 || (descr[0] != '<' && descr[0] != '>') || descr[1] != 'f' ||
-        (descr[2] != '4' && descr[2] != '8')) {
-      Fail("descr: expected float32 or float64 ('<f4', '<f8', '>f4', '>f8'), found another type");
+    const bool three =
+        descr.size() == 3 && std::string_view("<>|=").find(descr[0]) != std::string_view::npos;
+    const auto is = [&](char kind, std::string_view sizes) {
+      return three && descr[1] == kind && sizes.find(descr[2]) != std::string_view::npos;
+    };
+    // "|" and "=": of one byte, or of the machine that wrote it, which the file does not name.
+    const bool ordered = three && (descr[2] == '1' || descr[0] == '<' || descr[0] == '>');
+    if (!ordered || !(is('f', options_.half ? "248" : "48") ||
+                      (options_.integers && (is('i', "124") || is('u', "124"))))) {
+      Fail(options_.integers
+               ? "descr: expected floats or integers of up to 32 bits, found another type"
+               : "descr: expected float32 or float64 ('<f4', '<f8', '>f4', '>f8'), found "
+                 "another type");
     }
+    header.kind = descr[1];
     header.big_endian = descr[0] == '>';
     header.item_bytes = static_cast<size_t>(descr[2] - '0');
   }
@@ -134,6 +148,7 @@ class HeaderParser {
 
   std::string_view text_;
   const std::string& source_;
+  const NpyOptions& options_;
   size_t position_ = 0;
 };
 
@@ -147,12 +162,31 @@ std::optional<size_t> CountOf(const std::vector<size_t>& shape, size_t limit) {
   return count;
 }
 
+// IEEE 754 binary16: sign, 5 bits of exponent, 10 of fraction.
+double FromHalf(std::uint64_t bits) {
+  const double sign = (bits & 0x8000) != 0 ? -1 : 1;
+  const int exponent = static_cast<int>(bits >> 10 & 31);
+  const double fraction = static_cast<double>(bits & 1023) / 1024;
+  if (exponent == 31) {
+    return fraction == 0 ? sign * std::numeric_limits<double>::infinity()
+                         : std::numeric_limits<double>::quiet_NaN();
+  }
+  return sign *
+         (exponent == 0 ? std::ldexp(fraction, -14) : std::ldexp(1 + fraction, exponent - 15));
+}
+
 double ValueAt(const char* bytes, const Header& header) {
   std::uint64_t bits = 0;
   for (size_t i = 0; i < header.item_bytes; ++i) {
     const size_t at = header.big_endian ? i : header.item_bytes - 1 - i;
     bits = bits << 8 | static_cast<unsigned char>(bytes[at]);
   }
+  if (header.kind == 'u') return static_cast<double>(bits);
+  if (header.kind == 'i') {
+    const auto unused_bits = static_cast<int>(64 - 8 * header.item_bytes);
+    return static_cast<double>(static_cast<std::int64_t>(bits << unused_bits) >> unused_bits);
+  }
+  if (header.item_bytes == 2) return FromHalf(bits);
   if (header.item_bytes == 8) return std::bit_cast<double>(bits);
   return static_cast<double>(std::bit_cast<float>(static_cast<std::uint32_t>(bits)));
 }
@@ -169,9 +203,9 @@ size_t FortranIndex(size_t c_index, const std::vector<size_t>& shape) {
   return index;
 }
 
-}  // namespace
-
-NpyArray ParseNpy(std::string_view bytes, const std::string& source) {
+// The header, and where the data begin.
+std::pair<Header, size_t> HeaderOf(std::string_view bytes, const std::string& source,
+                                   const NpyOptions& options) {
   constexpr std::string_view kMagic("\x93NUMPY", 6);
   if (bytes.size() < 10 || bytes.substr(0, 6) != kMagic) {
     throw Error(source + ": expected a .npy file (it begins with \\x93NUMPY), found another");
@@ -191,20 +225,32 @@ NpyArray ParseNpy(std::string_view bytes, const std::string& source) {
     throw Error(source + ": expected a header of " + std::to_string(header_bytes) +
                 " bytes, found the end of the file");
   }
-  const Header header = HeaderParser(bytes.substr(header_begin, header_bytes), source).Parse();
-  const std::string_view data = bytes.substr(header_begin + header_bytes);
+  return {HeaderParser(bytes.substr(header_begin, header_bytes), source, options).Parse(),
+          header_begin + header_bytes};
+}
+
+}  // namespace
+
+NpyArray ParseNpy(std::string_view bytes, const std::string& source, const NpyOptions& options) {
+  const auto [header, begin] = HeaderOf(bytes, source, options);
+  const std::string_view data = bytes.substr(begin);
   const auto count = CountOf(header.shape, data.size() / header.item_bytes);
   if (!count || *count * header.item_bytes != data.size()) {
     throw Error(source + ": expected as many bytes as the shape tells, found " +
                 std::to_string(data.size()) + "; the file is damaged");
   }
+  if (*count > options.most_values) {
+    throw Error(source + ": expected at most " + std::to_string(options.most_values) +
+                " numbers, found " + std::to_string(*count));
+  }
   NpyArray array;
   array.shape = header.shape;
+  array.whole_numbers = header.kind != 'f';
   array.values.resize(*count);
   for (size_t i = 0; i < *count; ++i) {
     const size_t at = header.fortran_order ? FortranIndex(i, header.shape) : i;
     array.values[i] = ValueAt(data.data() + at * header.item_bytes, header);
-    if (!std::isfinite(array.values[i])) {
+    if (!options.any_value && !std::isfinite(array.values[i])) {
       throw Error(source + ": expected finite numbers, found NaN or infinity at element " +
                   std::to_string(i));
     }
@@ -212,8 +258,13 @@ NpyArray ParseNpy(std::string_view bytes, const std::string& source) {
   return array;
 }
 
-NpyArray ReadNpy(const std::filesystem::path& file) {
-  return ParseNpy(ReadFile(file, kMaxFileBytes), file.string());
+NpyArray ReadNpy(const std::filesystem::path& file, const NpyOptions& options) {
+  return ParseNpy(ReadFile(file, kMaxFileBytes), file.string(), options);
+}
+
+bool NpyHoldsWholeNumbers(const std::filesystem::path& file) {
+  const std::string bytes = ReadFile(file, kMaxFileBytes);
+  return HeaderOf(bytes, file.string(), {.half = true, .integers = true}).first.kind != 'f';
 }
 
 }  // namespace dtr::io

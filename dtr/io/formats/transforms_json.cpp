@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <array>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <set>
@@ -12,6 +12,7 @@
 #include "dtr/io/formats/file_names.h"
 #include "dtr/io/formats/json_fields.h"
 #include "dtr/io/formats/pose_from_matrix.h"
+#include "dtr/io/formats/transforms_lens.h"
 
 namespace dtr::io {
 namespace {
@@ -20,52 +21,7 @@ using internal::Json;
 
 constexpr std::uintmax_t kMaxFileBytes = 256u << 20;
 
-/// A field of the frame, else of the whole file.
-class FrameFields {
- public:
-  FrameFields(const Json& root, const Json& frame, std::string where)
-      : root_(root), frame_(frame), where_(std::move(where)) {}
-  bool Has(const char* key) const { return frame_.contains(key) || root_.contains(key); }
-  const Json& Holder(const char* key) const { return frame_.contains(key) ? frame_ : root_; }
-  double Number(const char* key) const { return internal::NumberField(Holder(key), key, where_); }
-  double Positive(const char* key) const {
-    const double number = Number(key);
-    if (number > 0) return number;
-    throw Error(where_ + "." + key + ": expected a positive number, found " +
-                std::to_string(number));
-  }
-  const std::string& where() const { return where_; }
-
- private:
-  const Json& root_;
-  const Json& frame_;
-  std::string where_;
-};
-
-void RefuseLens(const FrameFields& fields) {
-  constexpr std::array kCoefficients = {"k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"};
-  const std::string advice = "; undistort the images first";
-  for (const char* key : kCoefficients) {
-    if (fields.Has(key) && fields.Number(key) != 0) {
-      throw Error(fields.where() + "." + key + ": expected images without distortion, found " +
-                  std::to_string(fields.Number(key)) + advice);
-    }
-  }
-  if (fields.Has("is_fisheye") && fields.Holder("is_fisheye")["is_fisheye"] != false) {
-    throw Error(fields.where() + ".is_fisheye: expected a pinhole camera, found a fisheye" +
-                advice);
-  }
-  if (fields.Has("camera_model")) {
-    const std::string model =
-        internal::StringField(fields.Holder("camera_model"), "camera_model", fields.where());
-    if (model != "PINHOLE" && model != "SIMPLE_PINHOLE" && model != "OPENCV") {
-      throw Error(fields.where() +
-                  ".camera_model: expected PINHOLE, SIMPLE_PINHOLE or OPENCV with "
-                  "zero coefficients, found another" +
-                  advice);
-    }
-  }
-}
+using internal::FrameFields;
 
 double FocalFromAngle(const FrameFields& fields, const char* key, int side_px) {
   const double angle_rad = fields.Positive(key);
@@ -85,6 +41,10 @@ PinholeCamera CameraFrom(const FrameFields& fields, const SizedImage& image) {
   int width_px = image.width_px, height_px = image.height_px;
   if (fields.Has("w") != fields.Has("h")) {
     throw Error(fields.where() + ": expected w and h together, found one of them");
+  }
+  const bool without_image = width_px == 0 && height_px == 0;
+  if (without_image && !fields.Has("w")) {
+    throw Error(fields.where() + ": says no size (w and h) and its image is not there");
   }
   if (fields.Has("w")) {
     width_px = internal::IntField(fields.Holder("w"), "w", 1, kMaxImageSidePx, fields.where());
@@ -106,57 +66,202 @@ PinholeCamera CameraFrom(const FrameFields& fields, const SizedImage& image) {
   }
   const double cx_px = fields.Has("cx") ? fields.Number("cx") : width_px / 2.0;
   const double cy_px = fields.Has("cy") ? fields.Number("cy") : height_px / 2.0;
-  return ScaledToImage(PinholeCamera(width_px, height_px, fx_px, fy_px, cx_px, cy_px), image,
-                       fields.where());
+  const PinholeCamera camera(width_px, height_px, fx_px, fy_px, cx_px, cy_px);
+  return without_image ? camera : ScaledToImage(camera, image, fields.where());
 }
 
-std::string RelativePath(const Json& frame, const char* key, const std::string& where) {
-  std::string path = internal::StringField(frame, key, where);
+std::string RelativePath(const Json& object, const char* key, const std::string& where) {
+  std::string path = internal::StringField(object, key, where);
   while (path.starts_with("./")) path.erase(0, 2);
   RequireSafeName(path, where + "." + key);
   return path;
 }
 
+// A depth map or mask that a frame names, as it is called below its folder; empty: none.
+std::string OtherFile(const Json& frame, const char* key, const std::string& where,
+                      const std::function<std::string(const std::string&)>& name_of) {
+  if (!frame.contains(key) || frame[key].is_null()) return "";
+  const std::string path = RelativePath(frame, key, where);
+  if (!name_of) return path;
+  const std::string name = name_of(path);
+  RequireSafeName(name, where + "." + key);
+  return name;
+}
+
+NamedCamera CameraOf(const Json& root, const Json& frame, const SizedImage& image,
+                     const std::string& where, const std::string& path,
+                     const TransformsPaths& paths) {
+  const FrameFields fields(root, frame, where + " (" + path + ")");
+  NamedCamera named;
+  named.name = image.name;
+  RequireSafeName(named.name, fields.where());
+  named.camera = CameraFrom(fields, image);
+  named.distortion = internal::DistortionFrom(fields, named.camera);
+  named.depth_file = OtherFile(frame, "depth_file_path", where, paths.depth_of);
+  named.mask_file = OtherFile(frame, "mask_path", where, paths.mask_of);
+  const Eigen::DiagonalMatrix<double, 4> gl_from_cam(1, -1, -1, 1);
+  const Eigen::Matrix4d world_from_gl =
+      internal::MatrixField(frame, "transform_matrix", true, fields.where());
+  named.cam_from_world =
+      PoseFromWorldFromCam(world_from_gl * gl_from_cam, kPrintedRotationTolerance, fields.where());
+  return named;
+}
+
+// A path as lists of a file may write it in another way than its frames: one separator, no "./".
+std::string Plain(std::string path) {
+  std::replace(path.begin(), path.end(), '\\', '/');
+  while (path.starts_with("./")) path.erase(0, 2);
+  return path;
+}
+
+std::set<std::string> NamesIn(const Json& root, const char* key, const std::string& source) {
+  std::set<std::string> names;
+  if (!root.contains(key) || root[key].is_null()) return names;
+  const Json& list = root[key];
+  if (!list.is_array()) throw Error(source + ": " + key + ": expected a list of names");
+  for (const Json& name : list) {
+    if (!name.is_string()) throw Error(source + ": " + key + ": expected names, found another");
+    names.insert(Plain(name.get<std::string>()));
+  }
+  return names;
+}
+
+// The roles that the file's lists give its frames. `paths_of`: of each camera, as the file has it.
+void ReadSplit(const Json& root, const std::string& source,
+               const std::vector<std::string>& paths_of, TransformsFile& out) {
+  const std::set<std::string> train = NamesIn(root, "train_filenames", source);
+  std::set<std::string> held_out = NamesIn(root, "test_filenames", source);
+  held_out.merge(NamesIn(root, "val_filenames", source));
+  if (train.empty() && held_out.empty()) return;
+  std::set<std::string> unknown = held_out;
+  unknown.insert(train.begin(), train.end());
+  for (const FrameWithoutPhoto& frame : out.missing) unknown.erase(Plain(frame.path));
+  out.held_out.emplace();
+  size_t in_no_list = 0;
+  for (size_t i = 0; i < paths_of.size(); ++i) {
+    const std::string path = Plain(paths_of[i]);
+    unknown.erase(path);
+    const bool trained = train.contains(path), tested = held_out.contains(path);
+    if (tested && !trained) out.held_out->insert(out.list.cameras[i].name);
+    in_no_list += !trained && !tested && !train.empty();
+  }
+  if (in_no_list > 0) {
+    out.notes.push_back(fmt::format(
+        "{}: {} frames are in none of train_filenames, test_filenames and val_filenames: they are "
+        "used as source views",
+        source, in_no_list));
+  }
+  if (!unknown.empty()) {
+    out.notes.push_back(
+        fmt::format("{}: {} names of train_filenames, test_filenames or val_filenames are those of "
+                    "no frame, first {}",
+                    source, unknown.size(), Printable(*unknown.begin())));
+  }
+}
+
+std::optional<double> DepthUnit(const Json& root, const std::string& source) {
+  std::optional<double> unit;
+  for (const char* key : {"depth_unit_scale_factor", "integer_depth_scale"}) {
+    if (!root.contains(key) || root[key].is_null()) continue;
+    const double given = internal::NumberField(root, key, source);
+    if (!(given > 0) || (unit && *unit != given)) {
+      throw Error(source + ": " + key + ": expected one positive depth unit, found another");
+    }
+    unit = given;
+  }
+  return unit;
+}
+
+// Everything that nothing above reads, by name.
+void NoteUnused(const Json& root, const Json& frames, const std::string& source,
+                TransformsFile& out) {
+  std::set<std::string> used = {"frames",
+                                "file_path",
+                                "transform_matrix",
+                                "depth_file_path",
+                                "mask_path",
+                                "fl_x",
+                                "fl_y",
+                                "cx",
+                                "cy",
+                                "w",
+                                "h",
+                                "camera_angle_x",
+                                "camera_angle_y",
+                                "train_filenames",
+                                "test_filenames",
+                                "val_filenames",
+                                "depth_unit_scale_factor",
+                                "integer_depth_scale",
+                                "ply_file_path"};
+  used.insert(internal::DistortionFields().begin(), internal::DistortionFields().end());
+  std::set<std::string> unused;
+  const auto look = [&](const Json& object) {
+    for (const auto& [key, value] : object.items()) {
+      if (!used.contains(key)) unused.insert(Printable(key));
+    }
+  };
+  look(root);
+  for (const Json& frame : frames) look(frame);
+  const bool moved = unused.contains("applied_transform") || unused.contains("applied_scale");
+  constexpr size_t kMostNamed = 12;
+  std::string names;
+  size_t named = 0;
+  for (const std::string& name : unused) {
+    if (named++ == kMostNamed) break;
+    names += (names.empty() ? "" : ", ") + name;
+  }
+  if (unused.size() > kMostNamed) names += fmt::format(" and {} more", unused.size() - kMostNamed);
+  if (!unused.empty()) {
+    out.notes.push_back(fmt::format(
+        "{}: fields that are not used: {}{}", source, names,
+        moved ? "; cameras and depth stay in the world of this file, not of what it was made from"
+              : ""));
+  }
+}
+
 }  // namespace
 
-CameraList ReadTransformsJson(const std::filesystem::path& file,
-                              const std::function<SizedImage(const std::string&)>& image_of) {
+TransformsFile ReadTransformsJson(const std::filesystem::path& file, const TransformsPaths& paths) {
   const std::string source = file.string();
   const Json root = internal::ParseJson(ReadFile(file, kMaxFileBytes), source);
   const Json& frames = internal::Field(root, "frames", source);
   if (!frames.is_array() || frames.empty()) {
     throw Error(source + ": frames: expected a list of at least one camera, found another");
   }
-  CameraList list;
-  list.unit = LengthUnit::kArbitrary;
+  TransformsFile out;
+  out.list.unit = LengthUnit::kArbitrary;
+  out.list.photo_grid = PhotoGrid::kStored;  // these programs do not turn photos
   std::set<std::string> names;
-  const Eigen::DiagonalMatrix<double, 4> gl_from_cam(1, -1, -1, 1);
+  std::vector<std::string> paths_of;
   for (size_t i = 0; i < frames.size(); ++i) {
     const std::string where = source + ": frames[" + std::to_string(i) + "]";
     const std::string path = RelativePath(frames[i], "file_path", where);
-    const SizedImage image = image_of(path);
-    const FrameFields fields(root, frames[i], where + " (" + path + ")");
-    RefuseLens(fields);
-    NamedCamera named;
-    named.name = image.name;
-    RequireSafeName(named.name, fields.where());
-    named.camera = CameraFrom(fields, image);
-    if (frames[i].contains("depth_file_path")) {
-      named.depth_file = RelativePath(frames[i], "depth_file_path", where);
+    const std::optional<SizedImage> image = paths.image_of(path);
+    if (!image) {
+      out.missing.push_back({i, path});
+      continue;
     }
-    if (frames[i].contains("mask_path")) {
-      named.mask_file = RelativePath(frames[i], "mask_path", where);
+    out.list.cameras.push_back(CameraOf(root, frames[i], *image, where, path, paths));
+    paths_of.push_back(path);
+    const std::string& name = out.list.cameras.back().name;
+    if (!names.insert(name).second) {
+      throw Error(where + " (" + path + "): expected unique images, found \"" + name + "\" twice");
     }
-    const Eigen::Matrix4d world_from_gl =
-        internal::MatrixField(frames[i], "transform_matrix", true, fields.where());
-    named.cam_from_world = PoseFromWorldFromCam(world_from_gl * gl_from_cam,
-                                                kPrintedRotationTolerance, fields.where());
-    if (!names.insert(named.name).second) {
-      throw Error(fields.where() + ": expected unique images, found \"" + named.name + "\" twice");
-    }
-    list.cameras.push_back(named);
   }
-  return list;
+  ReadSplit(root, source, paths_of, out);
+  out.depth_unit = DepthUnit(root, source);
+  if (root.contains("ply_file_path") && root["ply_file_path"].is_string()) {
+    out.points_file = Printable(root["ply_file_path"].get<std::string>());
+  }
+  NoteUnused(root, frames, source, out);
+  return out;
+}
+
+bool IsTransformsJson(const std::filesystem::path& file) {
+  if (file.extension() != ".json" || !std::filesystem::is_regular_file(file)) return false;
+  const Json root = internal::ParseJson(ReadFile(file, kMaxFileBytes), file.string());
+  return root.is_object() && root.contains("frames") && !root.contains("views");
 }
 
 }  // namespace dtr::io

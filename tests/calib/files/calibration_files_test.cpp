@@ -313,10 +313,88 @@ TEST(OpenCvYaml, WhatIsNoCameraIsAnError) {
   }
 }
 
+// A camera as FileStorage writes it, with other names of its fields.
+void WriteStorage(const std::string& file, const char* k_name, const char* d_name) {
+  cv::FileStorage storage(file, cv::FileStorage::WRITE);
+  storage << "image_width" << 640 << "image_height" << 480 << k_name
+          << cv::Mat(cv::Matx33d(530, 0, 321.5, 0, 532, 235.5, 0, 0, 1)) << d_name
+          << cv::Mat(cv::Matx14d(-0.28, 0.08, 1e-3, -5e-4));
+}
+
+TEST(OpenCvYaml, OtherNamesOfTheMatricesAndXmlGiveTheSameCamera) {
+  const dtr::testing::TemporaryFolder folder;
+  const std::vector<double> params = {530, 532, 322, 236, -0.28, 0.08, 1e-3, -5e-4};
+  for (const auto& [k, d] : {std::pair("camera_matrix", "distortion_coefficients"),
+                             std::pair("cameraMatrix", "distCoeffs"),
+                             std::pair("Camera_Matrix", "Distortion_Coefficients"),
+                             std::pair("K", "D"), std::pair("mtx", "dist")}) {
+    for (const char* name : {"a.yml", "a.xml"}) {
+      WriteStorage((folder / name).string(), k, d);
+      const LensCamera camera = ReadOpenCvYaml(folder / name);
+      EXPECT_EQ(camera.model, LensModel::kOpenCv) << k << name;
+      EXPECT_EQ(camera.params, params) << k << name;
+      EXPECT_EQ(camera.width_px, 640);
+      EXPECT_EQ(camera.height_px, 480);
+    }
+  }
+}
+
+TEST(OpenCvYaml, TheSizeMayBeOnePairAndMatricesLists) {
+  const dtr::testing::TemporaryFolder folder;
+  WriteFileAtomically(folder / "a.yml",
+                      "image_size: [640, 480]\nK: [[530.0, 0, 321.5], [0, 532, 235.5], [0, 0, 1]]\n"
+                      "dist: [[-0.28, 0.08, 0.001, -0.0005]]\n");
+  EXPECT_EQ(ReadOpenCvYaml(folder / "a.yml").params,
+            (std::vector<double>{530, 532, 322, 236, -0.28, 0.08, 1e-3, -5e-4}));
+}
+
+TEST(OpenCvYaml, WhatMayBeMeantTwiceOrNotAtAllIsSaidWithTheNames) {
+  const dtr::testing::TemporaryFolder folder;
+  const auto error = [&](const std::string& text, const char* name = "a.yml") -> std::string {
+    WriteFileAtomically(folder / name, text);
+    try {
+      ReadOpenCvYaml(folder / name);
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return "no error";
+  };
+  const auto has = [](const char* words) { return ::testing::HasSubstr(words); };
+  EXPECT_THAT(error("K: [1]\nmtx: [1]\n"), has("K and mtx may both be the camera matrix"));
+  EXPECT_THAT(error("a: 1\nb: 2\n"), has("looked for camera_matrix, K, mtx"));
+  EXPECT_THAT(error("a: 1\nb: 2\n"), has("the file has a, b; write image_width"));
+  EXPECT_THAT(error("cam0:\n  intrinsics: [1, 2, 3, 4]\n"), has("camera chain of Kalibr"));
+  EXPECT_THAT(error("Camera1.fx: 420\n"), has("settings of ORB-SLAM"));
+  EXPECT_THAT(error("M1: [1]\nM2: [1]\n"), has("two cameras of a stereo pair"));
+  EXPECT_THAT(error("<?xml version=\"1.0\"?>\n<html></html>"), has("found other XML"));
+  EXPECT_THAT(error("<opencv_storage><K>1</K><K>2</K></opencv_storage>"), has("'K' stands twice"));
+  WriteStorage((folder / "a.xml").string(), "K", "D");
+  const std::string good = ReadFile(folder / "a.xml", 1 << 16);
+  WriteFileAtomically(folder / "b.xml", good.substr(0, good.rfind('>') + 1));
+  dtr::testing::ExpectEveryPrefixIsAnError(folder / "b.xml", 1,
+                                           [&] { ReadOpenCvYaml(folder / "b.xml"); });
+}
+
+TEST(OpenCvYaml, FilesOfOtherProgramsAreReadOrNamed) {
+  const auto folder = dtr::testing::DataFolder() / "field/lens_files";
+  DTR_REQUIRE_DATA(folder);
+  for (const char* name : {"K_D.yml", "cameraMatrix.yml", "Camera_Matrix.yml", "mtx.xml"}) {
+    const LensCamera camera = ReadOpenCvYaml(folder / name);
+    EXPECT_EQ(camera.params,
+              (std::vector<double>{420, 420, 240, 180, 0.0015, 0.0004, -3e-5, 0.0004, 0, 0, 0, 0}))
+        << name;
+  }
+  for (const auto& [name, words] :
+       {std::pair("kalibr-camchain.yaml", "Kalibr"), std::pair("orbslam.yaml", "ORB-SLAM")}) {
+    EXPECT_THAT([&] { ReadOpenCvYaml(folder / name); },
+                ::testing::ThrowsMessage<Error>(::testing::HasSubstr(words)));
+  }
+}
+
 TEST(OpenCvYaml, WhatIsFoundIsSaidInOneLine) {
   const dtr::testing::TemporaryFolder folder;
   const auto file = folder / "camera.yml";
-  WriteFileAtomically(file, "image_width: 640\n  and more\n");
+  WriteFileAtomically(file, "image_width: 640\n  and more\nK: [1]\nD: [1]\n");
   try {
     ReadOpenCvYaml(file);
     ADD_FAILURE() << "read";

@@ -192,9 +192,9 @@ const std::string kTransforms = R"({"w": 40, "h": 30, "fl_x": 50, "fl_y": 51, "c
 CameraList Transforms(const std::string& text) {
   testing::TemporaryFolder folder;
   Write(folder / "transforms.json", text);
-  return ReadTransformsJson(folder / "transforms.json", [](const std::string& path) {
-    return SizedImage{path + ".png", 20, 15};
-  });
+  TransformsPaths paths;
+  paths.image_of = [](const std::string& path) { return SizedImage{path + ".png", 20, 15}; };
+  return ReadTransformsJson(folder / "transforms.json", paths).list;
 }
 
 std::string TransformsWith(const std::string& from, const std::string& to) {
@@ -241,9 +241,14 @@ TEST(TransformsJson, WhatWouldBeReadWronglyIsRefused) {
   const auto with = [](const std::string& from, const std::string& to) {
     return ErrorOf([&] { Transforms(TransformsWith(from, to)); });
   };
-  EXPECT_THAT(with("\"w\"", "\"k1\": 0.1, \"w\""), HasSubstr("undistort"));
-  EXPECT_THAT(with("\"w\"", "\"camera_model\": \"OPENCV_FISHEYE\", \"w\""), HasSubstr("undistort"));
-  EXPECT_THAT(with("\"w\"", "\"is_fisheye\": true, \"w\""), HasSubstr("undistort"));
+  EXPECT_THAT(with("\"w\"", "\"camera_model\": \"EQUIRECTANGULAR\", \"w\""),
+              HasSubstr("camera_model: cannot be used"));
+  EXPECT_THAT(with("\"w\"", "\"camera_model\": \"OPENCV\", \"is_fisheye\": true, \"w\""),
+              HasSubstr("is_fisheye conflicts with camera_model OPENCV"));
+  EXPECT_THAT(with("\"w\"", "\"k4\": 0.1, \"w\""), HasSubstr("FULL_OPENCV"));
+  EXPECT_THAT(with("\"w\"", "\"s1\": 0.1, \"w\""), HasSubstr("prism"));
+  EXPECT_THAT(with("\"w\"", "\"is_fisheye\": true, \"p1\": 0.1, \"w\""),
+              HasSubstr("has k1 to k4 only"));
   EXPECT_THAT(with("\"w\": 40,", ""), HasSubstr("w and h together"));
   EXPECT_THAT(with("\"fl_x\": 50,", ""), HasSubstr("camera_angle_x"));
   EXPECT_THAT(with("./images", "../images"), HasSubstr("leaves its folder"));
@@ -251,6 +256,101 @@ TEST(TransformsJson, WhatWouldBeReadWronglyIsRefused) {
   EXPECT_THAT(with("[0,1,0,9]", "[0,2,0,9]"), HasSubstr("rotation matrix"));
   EXPECT_THAT(with("\"h\": 30", "\"h\": 60"), HasSubstr("neither turned nor cropped"));
   EXPECT_THAT(ErrorOf([&] { Transforms("{\"frames\": [3]}"); }), HasSubstr("expected an object"));
+}
+
+std::optional<Distortion> DistortionWith(const std::string& fields) {
+  return Transforms(TransformsWith("\"w\"", fields + ", \"w\"")).cameras.at(0).distortion;
+}
+
+TEST(TransformsJson, DistortionComesWithItsModel) {
+  const std::vector<double> pinhole = {25, 25.5, 10.5, 7};  // at the image's size
+  const auto with = [&](std::vector<double> more) {
+    more.insert(more.begin(), pinhole.begin(), pinhole.end());
+    return more;
+  };
+  EXPECT_EQ(DistortionWith(R"("k1": 0, "k2": 0.0, "p1": 0)"), std::nullopt);
+  EXPECT_EQ(DistortionWith(R"("k1": 0.05)"), (Distortion{"OPENCV", with({0.05, 0, 0, 0})}));
+  EXPECT_EQ(DistortionWith(R"("k1": 0.05, "p2": 0.01, "k3": 0.2)"),
+            (Distortion{"FULL_OPENCV", with({0.05, 0, 0, 0.01, 0.2, 0, 0, 0})}));
+  EXPECT_EQ(DistortionWith(R"("camera_model": "FULL_OPENCV", "k4": 0.3)"),
+            (Distortion{"FULL_OPENCV", with({0, 0, 0, 0, 0, 0.3, 0, 0})}));
+  const Distortion fisheye{"OPENCV_FISHEYE", with({0.1, 0, 0, 0.4})};
+  EXPECT_EQ(DistortionWith(R"("camera_model": "OPENCV_FISHEYE", "k1": 0.1, "k4": 0.4)"), fisheye);
+  EXPECT_EQ(DistortionWith(R"("is_fisheye": 1, "k1": 0.1, "k4": 0.4)"), fisheye);
+}
+
+TEST(TransformsJson, AFlagThatIsFalseIsNoFisheye) {
+  for (const char* flag : {"0", "0.0", "false", "null"}) {
+    EXPECT_EQ(DistortionWith(std::string(R"("is_fisheye": )") + flag), std::nullopt) << flag;
+  }
+}
+
+TransformsFile FileOf(const std::string& text, const std::vector<std::string>& photos) {
+  testing::TemporaryFolder folder;
+  Write(folder / "transforms.json", text);
+  TransformsPaths paths;
+  paths.image_of = [&](const std::string& path) -> std::optional<SizedImage> {
+    for (const std::string& photo : photos) {
+      if (photo == path) return SizedImage{path, 20, 15};
+    }
+    return std::nullopt;
+  };
+  return ReadTransformsJson(folder / "transforms.json", paths);
+}
+
+const std::string kThree =
+    R"({"fl_x": 50, "w": 20, "h": 15, "aabb_scale": 16, "applied_transform": [], "frames": [
+  {"file_path": "./a.jpg", "transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,0]]},
+  {"file_path": "b.jpg", "transform_matrix": [[1,0,0,1],[0,1,0,0],[0,0,1,0]], "sharpness": 3},
+  {"file_path": "c.jpg", "transform_matrix": [[1,0,0,2],[0,1,0,0],[0,0,1,0]]}])";
+
+TEST(TransformsJson, FramesWithoutAPhotoAreListed) {
+  const TransformsFile file = FileOf(kThree + "}", {"a.jpg", "c.jpg"});
+  EXPECT_EQ(file.list.cameras.size(), 2u);
+  ASSERT_EQ(file.missing.size(), 1u);
+  EXPECT_EQ(file.missing[0].frame, 1u);
+  EXPECT_EQ(file.missing[0].path, "b.jpg");
+  EXPECT_EQ(file.held_out, std::nullopt);
+}
+
+TEST(TransformsJson, WhatIsNotUsedIsNamed) {
+  const TransformsFile file = FileOf(kThree + "}", {"a.jpg", "b.jpg", "c.jpg"});
+  ASSERT_EQ(file.notes.size(), 1u);
+  EXPECT_THAT(file.notes[0],
+              HasSubstr("fields that are not used: aabb_scale, applied_transform, sharpness"));
+}
+
+TEST(TransformsJson, ListsOfNamesSayWhatIsHeldOut) {
+  const TransformsFile file = FileOf(
+      kThree + R"(, "train_filenames": ["a.jpg", "./gone.jpg"], "test_filenames": ["./b.jpg"],
+                          "val_filenames": ["a.jpg"]})",
+      {"a.jpg", "b.jpg", "c.jpg"});
+  EXPECT_EQ(file.held_out, (std::set<std::string>{"b.jpg"}));
+  ASSERT_EQ(file.notes.size(), 3u);
+  EXPECT_THAT(file.notes[0], HasSubstr("1 frames are in none"));
+  EXPECT_THAT(file.notes[1], HasSubstr("those of no frame, first gone.jpg"));
+}
+
+TEST(TransformsJson, DepthUnitsOfTheFileAreRead) {
+  EXPECT_EQ(FileOf(kThree + R"(, "depth_unit_scale_factor": 0.001})", {"a.jpg"}).depth_unit, 0.001);
+  EXPECT_EQ(FileOf(kThree + R"(, "integer_depth_scale": 0.01})", {"a.jpg"}).depth_unit, 0.01);
+  EXPECT_THAT(ErrorOf([&] { FileOf(kThree + R"(, "integer_depth_scale": 0})", {"a.jpg"}); }),
+              HasSubstr("positive depth unit"));
+}
+
+TEST(TransformsJson, OfATurnedPhotoTheShapeSaysWhichPixelsAreMeant) {
+  testing::TemporaryFolder folder;
+  const auto camera = [&](int width, int height) {
+    Write(folder / "transforms.json",
+          TransformsWith("\"w\": 40, \"h\": 30",
+                         "\"w\": " + std::to_string(width) + ", \"h\": " + std::to_string(height)));
+    TransformsPaths paths;
+    paths.image_of = [](const std::string& path) { return SizedImage{path, 20, 15, 6}; };
+    return ReadTransformsJson(folder / "transforms.json", paths).list.cameras.at(0).camera;
+  };
+  EXPECT_EQ(camera(40, 30).width_px(), 20);
+  EXPECT_EQ(camera(30, 40).width_px(), 15);
+  EXPECT_EQ(camera(30, 40).height_px(), 20);
 }
 
 TEST(TransformsJson, EveryTruncatedPrefixIsRefused) {

@@ -82,10 +82,82 @@ TEST(ForeignDepth, WhatIsNoDepthMapIsRefused) {
   EXPECT_THAT(ErrorOf(folder / "a.exr", 0), HasSubstr("positive depth unit"));
   EXPECT_THAT(ErrorOf(folder / "a.exr", kNan), HasSubstr("positive depth unit"));
   std::ofstream(folder / "a.txt") << "1 2 3";
-  EXPECT_THAT(ErrorOf(folder / "a.txt"), HasSubstr(".exr, .pfm, .png or .tif"));
+  EXPECT_THAT(ErrorOf(folder / "a.txt"), HasSubstr(".exr, .pfm, .png, .tif or .npy"));
   std::ofstream(folder / "text.exr") << "1 2 3";
   EXPECT_THAT(ErrorOf(folder / "text.exr"), HasSubstr("text.exr"));
   EXPECT_THAT(ErrorOf(folder / "absent.exr"), HasSubstr("absent.exr"));
+}
+
+// A .npy file of format 1 with these bytes as its data.
+std::string Npy(const std::string& descr, const std::string& shape, const std::string& data) {
+  const std::string header =
+      "{'descr': '" + descr + "', 'fortran_order': False, 'shape': " + shape + ", }\n";
+  std::string bytes("\x93NUMPY\x01\0", 8);
+  bytes += static_cast<char>(header.size() & 0xff);
+  bytes += static_cast<char>(header.size() >> 8);
+  return bytes + header + data;
+}
+
+TEST(ForeignDepth, NumpyArraysOfOneImageAreRead) {
+  testing::TemporaryFolder folder;
+  const auto file = folder / "a.npy";
+  const auto depths = [&](const std::string& bytes) {
+    std::ofstream(file, std::ios::binary) << bytes;
+    return ReadForeignDepth(file, DepthKind::kPlaneZ, 0.5, 2, 1).grid().data();
+  };
+  const auto text = [](std::initializer_list<int> codes) {
+    std::string bytes;
+    for (const int code : codes) bytes += static_cast<char>(code);
+    return bytes;
+  };
+  using ::testing::ElementsAre;
+  const std::string u16 = text({2, 0, 255, 255});
+  for (const char* shape : {"(1, 2)", "(1, 1, 2)", "(1, 2, 1)"}) {
+    EXPECT_THAT(depths(Npy("<u2", shape, u16)), ElementsAre(1, 32767.5f)) << shape;
+  }
+  EXPECT_TRUE(HoldsWholeNumbers(file));
+  EXPECT_THAT(depths(Npy(">u2", "(1, 2)", u16)), ElementsAre(256, 32767.5f));
+  EXPECT_THAT(depths(Npy("<i2", "(1, 2)", u16)), ElementsAre(1, 0)) << "-1 is a hole";
+  // float16: 1.5 is 0x3e00, infinity 0x7c00.
+  EXPECT_THAT(depths(Npy("<f2", "(1, 2)", text({0, 0x3e, 0, 0x7c}))), ElementsAre(0.75f, 0));
+  // float32: 2 is 0x40000000, NaN 0x7fc00000.
+  EXPECT_THAT(depths(Npy("<f4", "(1, 2)", text({0, 0, 0, 0x40, 0, 0, 0xc0, 0x7f}))),
+              ElementsAre(1, 0));
+  EXPECT_FALSE(HoldsWholeNumbers(file));
+  for (const char* shape : {"(2,)", "(1, 2, 1, 1)", "(0, 2)", "(2, 1, 1, 1)"}) {
+    EXPECT_THROW(depths(Npy("<u2", shape, u16)), Error) << shape;
+  }
+  EXPECT_THROW(depths(Npy("|O", "(1, 2)", u16)), Error);
+  EXPECT_THROW(depths(Npy("<f8", "(100000, 100000)", u16)), Error);
+  const std::string good = Npy("<u2", "(1, 2)", u16);
+  for (size_t length = 0; length < good.size(); ++length) {
+    EXPECT_THROW(depths(good.substr(0, length)), Error) << length;
+  }
+}
+
+TEST(ForeignDepth, ATiffOf16BitsIsOfWholeNumbers) {
+  testing::TemporaryFolder folder;
+  // Little endian, one strip behind the header; the smallest directory that says so.
+  const auto entry = [](int tag, int type, int value) {
+    std::string bytes;
+    for (const int part : {tag, type, 1, 0, value, 0}) {
+      bytes += static_cast<char>(part & 0xff);
+      bytes += static_cast<char>(part >> 8);
+    }
+    return bytes;
+  };
+  constexpr int kShort = 3, kLong = 4;
+  std::string tiff("II*\0\x0c\0\0\0", 8);
+  tiff += std::string("\xe8\x03\xd0\x07", 4);  // 1000, 2000
+  tiff += std::string("\x09\0", 2);
+  tiff += entry(256, kShort, 2) + entry(257, kShort, 1) + entry(258, kShort, 16) +
+          entry(259, kShort, 1) + entry(262, kShort, 1) + entry(273, kLong, 8) +
+          entry(277, kShort, 1) + entry(278, kShort, 1) + entry(279, kLong, 4);
+  tiff += std::string(4, '\0');
+  std::ofstream(folder / "a.tif", std::ios::binary) << tiff;
+  EXPECT_TRUE(HoldsWholeNumbers(folder / "a.tif"));
+  EXPECT_THAT(ReadForeignDepth(folder / "a.tif", DepthKind::kPlaneZ, 0.001, 2, 1).grid().data(),
+              ::testing::ElementsAre(1, 2));
 }
 
 TEST(ForeignDepth, EveryTruncatedPrefixIsRefused) {

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <fstream>
 
@@ -230,7 +231,8 @@ TEST_F(ImportTest, WhatIsMissingOrDoesNotFitIsNamed) {
   EXPECT_THAT(ErrorOfImport(), HasSubstr("nobody.png"));
   options_.held_out = {};
   WriteExr(folder_ / "depth/photo 2.exr", Grid<float>(kWidth, kHeight - 1, 1, 2.0f));
-  EXPECT_THAT(ErrorOfImport(), HasSubstr("photo 2.exr: expected a depth map of 96x70"));
+  EXPECT_THAT(ErrorOfImport(),
+              HasSubstr("photo 2.exr: a depth map of 96x69 pixels has another shape"));
   fs::remove(folder_ / "depth/photo 2.exr");
   EXPECT_THAT(ErrorOfImport(), HasSubstr("named like the photo photo 2.png, found 0"));
 }
@@ -262,13 +264,12 @@ TEST_F(ImportTest, WholeNumbersNeedAStatedUnit) {
   EXPECT_EQ(ImportViews(list_, options_).at(0).depth(4, 4), 2.5f);
 }
 
-TEST_F(ImportTest, TurnedPhotosAreRefused) {
-  // A JPEG with EXIF orientation 6 in its smallest form: the tag is put before the image data.
-  const std::string name = "photo 0.jpg";
-  WriteImage(folder_ / "images" / name, ImageRgb8(kWidth, kHeight, 3, 90));
-  std::ifstream in(folder_ / "images" / name, std::ios::binary);
+// A JPEG with an EXIF orientation in its smallest form: the tag is put before the image data.
+void WriteTurned(const fs::path& file, const ImageRgb8& image, char orientation) {
+  WriteImage(file, image);
+  std::ifstream in(file, std::ios::binary);
   std::string jpeg((std::istreambuf_iterator<char>(in)), {});
-  const std::string exif(
+  std::string exif(
       "\xff\xe1\x00\x22"
       "Exif\0\0"
       "II*\0\x08\0\0\0"
@@ -276,10 +277,83 @@ TEST_F(ImportTest, TurnedPhotosAreRefused) {
       "\x12\x01\x03\0\x01\0\0\0\x06\0\0\0"
       "\0\0\0\0",
       36);
+  exif[28] = orientation;
   jpeg.insert(2, exif);
-  std::ofstream(folder_ / "images" / name, std::ios::binary) << jpeg;
-  list_.cameras[0].name = name;
-  EXPECT_THAT(ErrorOfImport(), HasSubstr("EXIF orientation 6"));
+  std::ofstream(file, std::ios::binary) << jpeg;
+}
+
+// An image whose left half is bright and right half dark.
+ImageRgb8 BrightLeft(int width, int height) {
+  ImageRgb8 image(width, height, 3, 20);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width / 2; ++x) {
+      for (int c = 0; c < 3; ++c) image(x, y, c) = 230;
+    }
+  }
+  return image;
+}
+
+TEST_F(ImportTest, TheCamerasSizeSaysWhichPixelsOfATurnedPhotoAreMeant) {
+  // Orientation 6: the stored left side is the upright top.
+  const std::string name = "photo 0.jpg";
+  WriteTurned(folder_ / "images" / name, BrightLeft(kWidth, kHeight), 6);
+  options_.depth_dir.clear();
+  NamedCamera camera = list_.cameras[0];
+  camera.name = name;
+  const auto corners = [&] {
+    const ImageRgb8 image = ImportView(camera, "a", options_).image;
+    const int right = image.width() - 3, bottom = image.height() - 3;
+    return std::array{image(2, 2) > 128, image(right, 2) > 128, image(2, bottom) > 128};
+  };
+  for (const PhotoGrid convention : {PhotoGrid::kStored, PhotoGrid::kUpright}) {
+    options_.photo_grid = convention;
+    camera.camera = PinholeCamera(kWidth, kHeight, 80, 81, 48, 34);
+    EXPECT_EQ(corners(), (std::array{true, false, true})) << "stored";
+    camera.camera = PinholeCamera(kHeight, kWidth, 80, 81, 34, 48);
+    EXPECT_EQ(corners(), (std::array{true, true, false})) << "upright";
+  }
+}
+
+TEST_F(ImportTest, WhereBothGridsFitTheFilesConventionDecides) {
+  struct Case {
+    int width, height;
+    char orientation;
+  };
+  for (const Case& one : {Case{64, 64, 6}, Case{64, 64, 8}, Case{kWidth, kHeight, 3}}) {
+    const std::string name = "photo 0.jpg";
+    WriteTurned(folder_ / "images" / name, BrightLeft(one.width, one.height), one.orientation);
+    options_.depth_dir.clear();
+    NamedCamera camera = list_.cameras[0];
+    camera.name = name;
+    camera.camera = PinholeCamera(one.width, one.height, 80, 81, 32, 32);
+    options_.photo_grid = PhotoGrid::kStored;
+    const ImageRgb8 stored = ImportView(camera, "a", options_).image;
+    options_.photo_grid = PhotoGrid::kUpright;
+    const ImageRgb8 upright = ImportView(camera, "a", options_).image;
+    EXPECT_GT(stored(2, 30), 128);
+    EXPECT_EQ(upright, ApplyExifOrientation(stored, one.orientation)) << int(one.orientation);
+    EXPECT_NE(upright, stored);
+  }
+}
+
+TEST_F(ImportTest, MapsOfAnyRatioAreResampledToAGridThatASetHolds) {
+  // 96x70 and a map of 32x23, a third but for rounding; the plane's depth grows to the right.
+  Grid<float> map(32, 23);
+  for (int y = 0; y < map.height(); ++y) {
+    for (int x = 0; x < map.width(); ++x) {
+      map(x, y) = static_cast<float>(1 / (0.2 + 0.001 * (3 * (x + 0.5))));
+    }
+  }
+  WriteExr(folder_ / "depth/photo 0.exr", map);
+  const View view = ImportView(list_.cameras[0], "a", options_);
+  EXPECT_EQ(view.depth_scale, 2);
+  ASSERT_EQ(view.depth.width(), 48);
+  ASSERT_EQ(view.depth.height(), 35);
+  constexpr double kInterpolated = 1e-5;  // float32, through 1/z and back
+  for (int x = 0; x < 48; ++x) {
+    const double z = 1 / (0.2 + 0.001 * 2 * (x + 0.5));
+    EXPECT_NEAR(view.depth(x, 17) / z, 1, kInterpolated) << x;
+  }
 }
 
 TEST_F(ImportTest, ATargetThatExistsIsKept) {

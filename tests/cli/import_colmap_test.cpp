@@ -1,0 +1,41 @@
+// `dtr import` and `dtr build --poses` where points must be triangulated, which COLMAP does.
+#include "dtr/io/set_io.h"
+#include "tests/cli/field_scene.h"
+
+namespace dtr::testing {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+TEST_F(FieldScene, DepthMapsThatNobodyAskedForAreNamed) {
+  DtrOk({"import", "--cameras", Field("_scene/transforms_dfull.json").string(), "--images",
+         Field("_scene").string(), "-o", Set(), "--json", (folder_ / "result.json").string()});
+  EXPECT_THAT(Notes(),
+              HasSubstr("6 depth maps that it names are not used; --depth DIR takes them"));
+}
+
+TEST_F(FieldScene, PosesWithoutPointsGetThemTriangulated) {
+  DtrOk({"import", "--cameras", Field("_scene/transforms_ply.json").string(), "--images",
+         Field("_scene").string(), "-o", Set(), "--json", (folder_ / "result.json").string()});
+  EXPECT_THAT(Notes(), AllOf(HasSubstr("points of sparse_pc.ply are not used"),
+                             HasSubstr("fields that are not used: applied_transform"),
+                             HasSubstr("triangulated")));
+  const DtrSet set = io::ReadSet(Set());
+  EXPECT_EQ(set.frames[0].views.size(), 6u);
+  EXPECT_GT(io::LoadSparse(Set(), set).points.size(), 50u);
+}
+
+TEST_F(FieldScene, BuildAndRenderReadATransformsJson) {
+  const std::string file = Field("_scene/transforms_dfull.json").string();
+  DtrOk(
+      {"build", Field("_scene/images").string(), "--poses", file, "--engine", "none", "-o", Set()});
+  EXPECT_EQ(io::ReadSet(Set()).frames[0].views.size(), 6u);
+  DtrOk(Import(file));
+  DtrOk({"render", Set(), "--path", file, "--renderer", "cpu", "--size", "120x90", "-o",
+         (folder_ / "frames").string()});
+  EXPECT_EQ(FilesIn(folder_ / "frames"), 6);
+}
+
+}  // namespace
+}  // namespace dtr::testing

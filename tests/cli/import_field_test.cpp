@@ -1,0 +1,184 @@
+// `dtr import` on files as other programs write them: the cases of shared/data/field.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "dtr/io/depth_io.h"
+#include "dtr/io/image_io.h"
+#include "dtr/io/set_io.h"
+#include "tests/cli/field_scene.h"
+
+namespace dtr::testing {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+TEST_F(FieldScene, PhotosThatColmapDidNotTurnAreTakenAsStored) {
+  const fs::path folder = Field("exif_turned_import");
+  DtrOk({"import", "--cameras", (folder / "model").string(), "--images",
+         (folder / "images").string(), "-o", Set(), "--json", (folder_ / "result.json").string()});
+  EXPECT_THAT(Notes(), HasSubstr("6 photos with an EXIF orientation, first frame_00000.jpg: taken "
+                                 "as they are stored"));
+  const DtrSet set = io::LoadSet(Set());
+  ASSERT_EQ(set.frames[0].views.size(), 6u);
+  for (const View& view : set.frames[0].views) {
+    EXPECT_EQ(view.image, io::ReadImage(folder / "images" / view.name)) << view.name;
+  }
+}
+
+TEST_F(FieldScene, BuildTakesThemSoToo) {
+  const fs::path folder = Field("exif_turned_import");
+  const Ran ran = DtrOk({"build", (folder / "images").string(), "--poses",
+                         (folder / "model").string(), "--engine", "none", "-o", Set()});
+  EXPECT_THAT(ran.err + ran.out, HasSubstr("taken as they are stored"));
+  const DtrSet set = io::LoadSet(Set());
+  ASSERT_EQ(set.frames[0].views.size(), 6u);
+  for (const View& view : set.frames[0].views) {
+    EXPECT_EQ(view.image, io::ReadImage(folder / "images" / view.name)) << view.name;
+  }
+}
+
+TEST_F(FieldScene, BackslashesInPathsAreSeparators) {
+  DtrOk(Import(Field("_scene") / "transforms_backslash.json"));
+  EXPECT_EQ(Result()["views"], 6);
+  // Depth maps, too.
+  Json file = Json::parse(Text(Field("_scene") / "transforms_backslash.json"));
+  for (Json& frame : file["frames"]) {
+    std::string path = frame["depth_file_path"];
+    std::replace(path.begin(), path.end(), '/', '\\');
+    frame["depth_file_path"] = ".\\" + path;
+  }
+  DtrOk(Import(Changed("transforms_backslash.json", file)));
+}
+
+TEST_F(FieldScene, AFrameWithoutItsPhotoIsNamedAndLeftOutWhereAllowed) {
+  const fs::path file = Field("_scene") / "transforms_missing.json";
+  const Ran refused = Dtr(Import(file));
+  ExpectRefused(refused, kFailed, "have no photo, first");
+  EXPECT_THAT(refused.err, AllOf(HasSubstr("1 of its 7 cameras"), HasSubstr("frame 6"),
+                                 HasSubstr("frame_00099.jpg"), HasSubstr("--allow-missing")));
+  EXPECT_FALSE(fs::exists(Set()));
+  DtrOk(Import(file, {"--allow-missing"}));
+  EXPECT_EQ(Result()["views"], 6);
+  ASSERT_EQ(Result()["skipped"].size(), 1u);
+  EXPECT_EQ(Result()["skipped"][0]["name"], "images/frame_00099.jpg");
+}
+
+TEST_F(FieldScene, AFlagThatSaysNoFisheyeIsNone) {
+  for (const Json& flag : {Json(0), Json(false)}) {
+    DtrOk(Import(Changed("transforms_dfull.json", {{"is_fisheye", flag}})));
+    EXPECT_THAT(Notes(), ::testing::Not(HasSubstr("undistorted")));
+  }
+}
+
+TEST_F(FieldScene, TheFilesListsSayWhatIsHeldOut) {
+  const fs::path file = Field("_scene") / "transforms_split.json";
+  DtrOk(Import(file));
+  int held_out = 0;
+  const DtrSet set = io::ReadSet(Set());
+  for (const View& view : set.frames[0].views) {
+    const bool is_held_out = view.role == ViewRole::kHeldOut;
+    EXPECT_EQ(is_held_out, view.name == "images/frame_00003.jpg") << view.name;
+    held_out += is_held_out;
+  }
+  EXPECT_EQ(held_out, 1);
+  DtrOk(Import(file, {"--holdout", "every:3"}));
+  EXPECT_EQ(Result()["held_out"], 2);
+  EXPECT_THAT(Notes(), HasSubstr("--holdout replaces train_filenames"));
+}
+
+// Depth of a set against the exact maps, by what is a hole in neither: the median relative error.
+double MedianError(const DtrSet& set) {
+  std::vector<double> errors;
+  for (const View& view : set.frames[0].views) {
+    const std::string stem = fs::path(view.name).stem().string();
+    const Grid<std::uint16_t> truth =
+        io::ReadPng16(DataFolder() / "field/_scene/depth_full_mm" / (stem + ".png"));
+    for (int y = 0; y < view.depth.height(); ++y) {
+      for (int x = 0; x < view.depth.width(); ++x) {
+        const double s = view.depth_scale;
+        const auto code = truth(static_cast<int>(s * (x + 0.5)), static_cast<int>(s * (y + 0.5)));
+        if (code == 0 || DepthImage::IsHole(view.depth(x, y))) continue;
+        errors.push_back(std::abs(view.depth(x, y) / (0.001 * code) - 1));
+      }
+    }
+  }
+  if (errors.empty()) return 1;
+  std::nth_element(errors.begin(), errors.begin() + static_cast<long>(errors.size() / 2),
+                   errors.end());
+  return errors[errors.size() / 2];
+}
+
+TEST_F(FieldScene, DepthMapsOfAnOddRatioAreResampled) {
+  DtrOk(Import(Field("_scene") / "transforms_d75.json"));
+  EXPECT_THAT(Notes(), HasSubstr("depth maps of 64x48 for photos of 480x360: resampled to 80x60"));
+  const DtrSet set = io::LoadSet(Set());
+  EXPECT_EQ(set.frames[0].views[0].depth_scale, 6);
+  constexpr double kMostError = 0.001;  // the exact map's pixels are 1 mm; the issue asks for 1 %
+  EXPECT_LT(MedianError(set), kMostError);
+}
+
+TEST_F(FieldScene, PhotosWithDistortionAreUndistortedAndTheirDepthMapsToo) {
+  DtrOk(Import(Field("_scene") / "transforms_dist.json"));
+  EXPECT_THAT(Notes(), HasSubstr("6 photos undistorted"));
+  const DtrSet set = io::LoadSet(Set());
+  // k1 = 0.05 with f = 420: what lies at (60, 60) from the centre was at 60 (1 + 0.05 r^2).
+  const View& view = set.frames[0].views[0];
+  const Grid<std::uint16_t> stored =
+      io::ReadPng16(Field("_scene") / "depth_full_mm/frame_00000.png");
+  const auto distorted = [](double x, double y) {
+    const double u = (x - 240) / 420, v = (y - 180) / 420, scale = 1 + 0.05 * (u * u + v * v);
+    return std::pair(420 * u * scale + 240, 420 * v * scale + 180);
+  };
+  int near = 0, all = 0;
+  for (int y = 5; y < 355; y += 10) {
+    for (int x = 5; x < 475; x += 10) {
+      const auto [u, v] = distorted(x + 0.5, y + 0.5);
+      if (u < 0 || v < 0 || u >= 480 || v >= 360) continue;
+      const auto code = stored(static_cast<int>(u), static_cast<int>(v));
+      if (code == 0) continue;
+      ++all;
+      near += std::abs(view.depth(x, y) / (0.001 * code) - 1) < 0.005;
+    }
+  }
+  EXPECT_GT(all, 1000);
+  EXPECT_GT(near, 0.99 * all) << "the rest lies at depth edges, where nearest pixels may differ";
+  EXPECT_FALSE(view.mask.empty()) << "corners without a source";
+}
+
+TEST_F(FieldScene, AFisheyeIsUndistortedToo) {
+  DtrOk(Import(Changed("transforms_dfull.json", {{"camera_model", "OPENCV_FISHEYE"}})));
+  EXPECT_THAT(Notes(), HasSubstr("6 photos undistorted"));
+}
+
+TEST_F(FieldScene, FoldersAndPathsMayBothNameTheSubfolder) {
+  const std::string scene = Field("_scene").string();
+  DtrOk({"import", "--cameras", scene + "/transforms_dfull.json", "--images", scene + "/images",
+         "--depth", scene + "/depth_full_mm", "--depth-unit", "0.001", "-o", Set()});
+  EXPECT_EQ(io::ReadSet(Set()).frames[0].views.size(), 6u);
+}
+
+TEST_F(FieldScene, ATransformsJsonWithDistortionIsNoViewToRender) {
+  DtrOk(Import(Field("_scene") / "transforms_dfull.json"));
+  const fs::path dist = Field("_scene") / "transforms_dist.json";
+  const std::string frames = (folder_ / "frames").string();
+  ExpectRefused(Dtr({"render", Set(), "--path", dist.string(), "-o", frames}), kFailed,
+                "has distortion, and views are rendered without");
+  DtrOk({"render", Set(), "--path", Changed("transforms_dist.json", {{"k1", 0}}).string(),
+         "--renderer", "cpu", "--size", "60x45", "-o", frames});
+}
+
+TEST_F(FieldScene, AUnitThatTheFileStatesIsUsed) {
+  const std::string scene = Field("_scene").string();
+  const fs::path file = Changed("transforms_dfull.json", {{"depth_unit_scale_factor", 0.001}});
+  DtrOk({"import", "--cameras", file.string(), "--images", scene, "--depth", scene, "-o", Set()});
+  constexpr double kExact = 1e-4;  // inverse depth in 16 bits
+  EXPECT_LT(MedianError(io::LoadSet(Set())), kExact);
+}
+
+}  // namespace
+}  // namespace dtr::testing
