@@ -10,7 +10,7 @@ constexpr int kFewestFeatures = 128, kSmallestPx = 64;  // with less no photos c
 
 }  // namespace
 
-void AddSfmOptions(CLI::App& command, pipeline::SfmChoice& choice) {
+CLI::Option* AddSfmOptions(CLI::App& command, pipeline::SfmChoice& choice) {
   command
       .add_option("--feature-size", choice.feature_size_px,
                   "Long side of the photos when SfM looks for features [2400, or what --memory "
@@ -38,6 +38,20 @@ void AddSfmOptions(CLI::App& command, pipeline::SfmChoice& choice) {
                   "Distortion that SfM starts with, by COLMAP's names [RADIAL]")
       ->check(CLI::IsMember({"SIMPLE_RADIAL", "RADIAL", "OPENCV"}))
       ->type_name("SIMPLE_RADIAL|RADIAL|OPENCV");
+  std::map<std::string, pipeline::CameraPer> sharing;
+  for (const auto per : {pipeline::CameraPer::kAuto, pipeline::CameraPer::kFolder,
+                         pipeline::CameraPer::kPhoto, pipeline::CameraPer::kSet}) {
+    sharing[pipeline::NameOf(per)] = per;
+  }
+  return command
+      .add_option_function<std::string>(
+          "--camera-per",
+          [&choice, sharing](const std::string& name) { choice.camera_per = sharing.at(name); },
+          "Photos that share intrinsics: those of a folder, none, or all of equal size and "
+          "orientation [auto: equal EXIF data and size; over several folders where held-out "
+          "observations do not ask for intrinsics per folder]")
+      ->check(CLI::IsMember({"auto", "folder", "photo", "set"}))
+      ->type_name("auto|folder|photo|set");
 }
 
 }  // namespace dtr::cli

@@ -1,5 +1,5 @@
-// cli/sfm_options.h -- --feature-size, --features, --matching and --lens-model of the commands that
-// calibrate photos.
+// cli/sfm_options.h -- --feature-size, --features, --matching, --lens-model and
+// --camera-per of the commands that calibrate photos.
 #pragma once
 #include <CLI/CLI.hpp>
 
@@ -7,6 +7,7 @@
 
 namespace dtr::cli {
 
-void AddSfmOptions(CLI::App& command, pipeline::SfmChoice& choice);
+/// Returns --camera-per: a camera that is known excludes it.
+CLI::Option* AddSfmOptions(CLI::App& command, pipeline::SfmChoice& choice);
 
 }  // namespace dtr::cli

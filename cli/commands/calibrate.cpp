@@ -101,9 +101,9 @@ void AddCalibrateCommand(CLI::App& app) {
                CLI::Option* no_refine =
                    command.add_flag("!--no-refine", options->refine,
                                     "Take COLMAP's cameras as they are, without bundle adjustment");
-               AddSfmOptions(command, options->sfm);
+               CLI::Option* camera_per = AddSfmOptions(command, options->sfm);
                // A lens that is given replaces COLMAP's: poses and points must follow it.
-               AddLensOption(command, options->lens)->excludes(no_refine);
+               AddLensOption(command, options->lens)->excludes(no_refine)->excludes(camera_per);
                CLI::Option* gps = AddGpsFlag(command, options->gps)->excludes(no_refine);
                AddMetreOptions(command, *gps, options->metres)->excludes(no_refine);
                return [options](const Context& context) {

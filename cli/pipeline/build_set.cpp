@@ -177,6 +177,12 @@ void RequireOptions(const BuildOptions& options) {
         "--gps, --distance: are held by the bundle adjustment of what SfM finds; expected no "
         "--poses, --rig or --no-refine beside them (dtr calibrate scale takes any finished set)");
   }
+  if (options.sfm.camera_per != CameraPer::kAuto &&
+      (!options.poses.empty() || !options.rig.empty())) {
+    throw UsageError(
+        "--camera-per: says which photos share intrinsics that SfM finds; those of --poses and "
+        "--rig are known; leave out one of them");
+  }
   const bool from_video = !VideosFor(options.photos, options.video).empty();
   if (from_video && options.metres.gps) {
     throw UsageError(
@@ -290,7 +296,8 @@ Json ScreeningJson(const BuildReport& report) {
   return json;
 }
 
-Json ReportJson(const BuildReport& report, const RunLog& log, const std::filesystem::path& output) {
+Json ReportJson(const BuildReport& report, const CalibratedPhotos& calibrated, const RunLog& log,
+                const std::filesystem::path& output) {
   Json json;
   json["set"] = output.string();
   json["views"] = Json::array();
@@ -307,6 +314,10 @@ Json ReportJson(const BuildReport& report, const RunLog& log, const std::filesys
     json["skipped"].push_back({{"name", name}, {"reason", reason}});
   }
   json["screening"] = ScreeningJson(report);
+  const Json calibration = Json::parse(calibrated.report_json);
+  if (calibration.contains("camera_sharing")) {
+    json["camera_sharing"] = calibration["camera_sharing"];
+  }
   json["coverage"] = report.coverage;
   json["validation_passed"] = report.validated ? Json(report.validation_passed) : Json(nullptr);
   json["stages"] = Json::array();
@@ -473,7 +484,7 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
   io::WriteRunRecord(writer.folder(), record);
   writer.Finish(set);
   report.set = std::move(set);
-  report.json = ReportJson(report, log, options.output).dump(1);
+  report.json = ReportJson(report, calibrated, log, options.output).dump(1);
   return report;
 }
 

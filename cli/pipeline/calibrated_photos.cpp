@@ -50,7 +50,8 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
     for (size_t i = 0; i < in_sfm.size(); ++i) in_sfm[i] = !options.held_out[i];
   }
   const capture::Capture photos = Subset(capture, in_sfm);
-  const std::vector<colmap::SfmImageInput> inputs = SfmInputs(photos, workspace / "photos");
+  const CameraGroups groups(photos.photos, options.sfm.camera_per, options.rig || options.lens);
+  const std::vector<colmap::SfmImageInput> inputs = SfmInputs(photos, groups, workspace / "photos");
   const colmap::SfmOptions sfm_options = SfmOptionsFor(options);
   capture::PrepareSfmImages(photos, workspace / "photos", 0, options.threads, options.memory_gb,
                             progress);
@@ -67,8 +68,9 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
     calibrated.earlier_wall_s += step.wall_s;
   }
   Json report = SfmJson(sfm.report, sfm.model);
-  PhotoRefinement refined = RefinePhotos(capture, options, sfm.model, workspace / "sfm" / "model",
-                                         workspace / "refined", progress);
+  PhotoRefinement refined =
+      RefinePhotos(capture, options, groups, sfm.model, workspace / "sfm" / "model",
+                   workspace / "refined", progress);
   report.update(Json::parse(refined.report_json));
   calibrated.kept_refinement_cpu_s = refined.earlier_cpu_s;
   calibrated.earlier_cpu_s += refined.earlier_cpu_s;
@@ -78,7 +80,7 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
   calibrated.scale_json = std::move(refined.scale_json);
   calibrated.report_json = report.dump();
   if (options.strict) {
-    RegisterHeldOutPhotos(Subset(capture, options.held_out), inputs, workspace, sfm_options,
+    RegisterHeldOutPhotos(Subset(capture, options.held_out), inputs, groups, workspace, sfm_options,
                           calibrated.model, progress);
   }
   return calibrated;
@@ -99,11 +101,11 @@ void RefuseTurned(const capture::Capture& capture, const char* known) {
 }  // namespace
 
 std::vector<colmap::SfmImageInput> SfmInputs(const capture::Capture& capture,
-                                             const fs::path& folder) {
+                                             const CameraGroups& groups, const fs::path& folder) {
   std::vector<colmap::SfmImageInput> inputs;
   for (const capture::Photo& photo : capture.photos) {
     inputs.push_back({photo.name, photo.width_px, photo.height_px, photo.focal_prior_px,
-                      photo.camera_group, capture::SfmMaskFile(folder, photo)});
+                      groups.GroupOf(photo), capture::SfmMaskFile(folder, photo)});
   }
   return inputs;
 }

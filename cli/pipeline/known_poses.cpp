@@ -250,13 +250,14 @@ SparseScene TriangulatedPoints(const io::CameraList& list, const capture::Captur
 
 void RegisterHeldOutPhotos(const capture::Capture& held_out,
                            const std::vector<colmap::SfmImageInput>& sources,
-                           const fs::path& workspace, const colmap::SfmOptions& options,
-                           calib::SfmModel& model, Progress& progress) {
+                           const CameraGroups& groups, const fs::path& workspace,
+                           const colmap::SfmOptions& options, calib::SfmModel& model,
+                           Progress& progress) {
   if (held_out.photos.empty()) return;
   capture::PrepareSfmImages(held_out, workspace / "photos", 0, options.threads, options.memory_gb,
                             progress);
   const colmap::HeldOutResult placed = colmap::RegisterHeldOut(
-      workspace / "photos", SfmInputs(held_out, workspace / "photos"), model, sources,
+      workspace / "photos", SfmInputs(held_out, groups, workspace / "photos"), model, sources,
       workspace / "sfm", workspace / "held_out", options, progress);
   for (const calib::SfmImage& image : placed.images) {
     // The pose alone: what the photo shows of the points would enter the set outside held_out/.

@@ -5,13 +5,16 @@
 
 #include "calib/colmap/sfm.h"
 #include "cli/pipeline/calibrated_photos.h"
+#include "cli/pipeline/camera_groups.h"
 #include "dtr/io/formats/cameras_json.h"
 #include "dtr/types/sparse_scene.h"
 
 namespace dtr::pipeline {
 
-/// Photos as COLMAP is told about them; `folder` is what capture::PrepareSfmImages fills.
+/// Photos as COLMAP gets them, with the groups that share intrinsics; `folder` is what
+/// capture::PrepareSfmImages fills.
 std::vector<colmap::SfmImageInput> SfmInputs(const capture::Capture& capture,
+                                             const CameraGroups& groups,
                                              const std::filesystem::path& folder);
 colmap::SfmOptions SfmOptionsFor(const CalibrateOptions& options);
 
@@ -44,7 +47,7 @@ CalibratedPhotos FromKnownPoses(const capture::Capture& capture, const Calibrate
 /// model changes; photos that cannot be registered are left out.
 void RegisterHeldOutPhotos(const capture::Capture& held_out,
                            const std::vector<colmap::SfmImageInput>& sources,
-                           const std::filesystem::path& workspace,
+                           const CameraGroups& groups, const std::filesystem::path& workspace,
                            const colmap::SfmOptions& options, calib::SfmModel& model,
                            Progress& progress);
 

@@ -6,6 +6,7 @@
 
 #include "calib/bundle/refine.h"
 #include "calib/colmap/model_io.h"
+#include "cli/pipeline/folder_cameras.h"
 #include "cli/pipeline/input_hash.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
@@ -24,6 +25,7 @@ constexpr std::uintmax_t kLargestRecordBytes = 16u << 20;
 calib::RefineOptions RefineOptionsFor(const CalibrateOptions& options, const Progress& progress) {
   calib::RefineOptions refine;
   refine.determined = options.determined;
+  refine.separate_lenses = options.sfm.camera_per == CameraPer::kPhoto;
   refine.threads = options.threads;
   refine.seed = options.seed;
   refine.progress = &progress;
@@ -71,8 +73,25 @@ LengthUnit UnitFor(const CalibrateOptions& options) {
   return options.metres.any() ? LengthUnit::kMetre : LengthUnit::kArbitrary;
 }
 
+// Which folders share intrinsics.
+void ShareFolders(const capture::Capture& capture, const CalibrateOptions& options,
+                  const CameraGroups& groups, bool test, Json& report, PhotoRefinement& out,
+                  const Progress& progress) {
+  if (options.sfm.camera_per != CameraPer::kAuto) {
+    report["camera_sharing"] = {{"camera_per", NameOf(options.sfm.camera_per)}};
+  }
+  if (groups.pools().empty()) return;
+  FolderCameras chosen = ChooseFolderCameras(groups, capture, out.model, test,
+                                             {options.threads, options.seed, &progress});
+  report["camera_sharing"] = {{"camera_per", NameOf(options.sfm.camera_per)},
+                              {"tests", Json::parse(chosen.json)}};
+  out.model = std::move(chosen.model);
+  out.notes.insert(out.notes.end(), chosen.notes.begin(), chosen.notes.end());
+}
+
 PhotoRefinement WorkOut(const capture::Capture& capture, const CalibrateOptions& options,
-                        const calib::SfmModel& model, Progress& progress) {
+                        const CameraGroups& groups, const calib::SfmModel& model,
+                        Progress& progress) {
   PhotoRefinement out;
   out.model = model;
   Json report = Json::object();
@@ -80,6 +99,8 @@ PhotoRefinement WorkOut(const capture::Capture& capture, const CalibrateOptions&
     progress.Stage("bundle adjustment of the rig", 0);
     report["rig"] = Json::parse(PlaceByRig(*options.rig, capture, out.model, progress));
   } else {
+    if (!groups.pools().empty()) progress.Stage("cameras of folders", 0);
+    ShareFolders(capture, options, groups, true, report, out, progress);
     progress.Stage("bundle adjustment", 0);
     RefineLenses(capture, options, RefineOptionsFor(options, progress), report, out);
   }
@@ -90,7 +111,7 @@ PhotoRefinement WorkOut(const capture::Capture& capture, const CalibrateOptions&
 // Everything that decides the result. A rig is not looked into: builds alone have one, and what
 // they keep is of one rig.
 Json StampOf(const capture::Capture& capture, const CalibrateOptions& options,
-             const fs::path& sfm_folder) {
+             const CameraGroups& groups, const fs::path& sfm_folder) {
   Json stamp = {{"tool_version", DTR_VERSION},
                 {"model_sha256", InputHash(sfm_folder)},
                 {"seed", options.seed},
@@ -101,6 +122,12 @@ Json StampOf(const capture::Capture& capture, const CalibrateOptions& options,
     stamp["lens"] = {{"model", calib::NameOf(options.lens->model)},
                      {"size_px", {options.lens->width_px, options.lens->height_px}},
                      {"params", options.lens->params}};
+  }
+  if (options.sfm.camera_per != CameraPer::kAuto) {
+    stamp["camera_per"] = NameOf(options.sfm.camera_per);
+  }
+  for (const FolderPool& pool : groups.pools()) {
+    stamp["folders"].push_back({{"group", pool.group}, {"photos", pool.photos_of}});
   }
   for (const capture::Photo& photo : capture.photos) {
     if (!options.metres.gps || !photo.gps) continue;
@@ -154,23 +181,28 @@ void Keep(const PhotoRefinement& refined, const Json& stamp, double wall_s, doub
 }  // namespace
 
 PhotoRefinement RefinePhotos(const capture::Capture& capture, const CalibrateOptions& options,
-                             const calib::SfmModel& model, const fs::path& sfm_folder,
-                             const fs::path& folder, Progress& progress) {
+                             const CameraGroups& groups, const calib::SfmModel& model,
+                             const fs::path& sfm_folder, const fs::path& folder,
+                             Progress& progress) {
   PhotoRefinement refined;
   if (!options.rig && !options.refine && !options.lens) {
     if (!options.determined.empty()) {
       calib::RequireDetermined(model, RefineOptionsFor(options, progress), options.determined);
     }
     refined.model = model;
+    Json report = Json::object();
+    ShareFolders(capture, options, groups, false, report, refined, progress);
+    refined.report_json = report.dump();
+    for (const std::string& line : refined.notes) progress.Note(line);
     return refined;
   }
-  const Json stamp = StampOf(capture, options, sfm_folder);
+  const Json stamp = StampOf(capture, options, groups, sfm_folder);
   if (auto kept = Kept(folder, stamp)) {
     refined = std::move(*kept);
   } else {
     const double cpu_start_ms = ProcessCpuMilliseconds();
     const auto start = std::chrono::steady_clock::now();
-    refined = WorkOut(capture, options, model, progress);
+    refined = WorkOut(capture, options, groups, model, progress);
     const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - start;
     Keep(refined, stamp, wall.count(), (ProcessCpuMilliseconds() - cpu_start_ms) / 1e3, folder);
   }

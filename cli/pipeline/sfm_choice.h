@@ -6,6 +6,11 @@
 
 namespace dtr::pipeline {
 
+/// Which photos share intrinsics (camera_groups.h).
+enum class CameraPer { kAuto, kFolder, kPhoto, kSet };
+/// "auto", "folder", "photo", "set".
+const char* NameOf(CameraPer per);
+
 /// How COLMAP goes about it. Each choice decides the result; docs/accuracy/SPEED.md has what they
 /// cost and what they are worth.
 struct SfmChoice {
@@ -13,11 +18,13 @@ struct SfmChoice {
   int features = 0;         ///< most per photo; 0: colmap::kMostFeatures, or what a preset says
   colmap::Matching matching = colmap::Matching::kAuto;
   std::string lens_model = colmap::SfmOptions().lens_model;
+  CameraPer camera_per = CameraPer::kAuto;
 
   bool operator==(const SfmChoice&) const = default;
 };
 
-/// JSON object: feature_size_px, features, matching, lens_model.
+/// JSON object: feature_size_px, features, matching, lens_model, and camera_per where it is not
+/// auto.
 std::string ToJson(const SfmChoice& choice);
 
 }  // namespace dtr::pipeline
