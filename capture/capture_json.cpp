@@ -231,6 +231,10 @@ std::string CaptureToJson(const Capture& capture) {
   for (const Skipped& skipped : capture.skipped) {
     json["skipped"].push_back({{"name", skipped.name}, {"reason", skipped.reason}});
   }
+  json["remarks"] = Json::array();
+  for (const Remark& remark : capture.remarks) {
+    json["remarks"].push_back({{"name", remark.name}, {"text", remark.text}});
+  }
   return json.dump(1) + "\n";
 }
 
@@ -245,6 +249,11 @@ Capture CaptureFromJson(std::string_view text, const std::string& source) {
   for (const Node& photo : root["photos"].Items()) capture.photos.push_back(PhotoFrom(photo));
   for (const Node& skipped : root["skipped"].Items()) {
     capture.skipped.push_back({skipped["name"].Text(), skipped["reason"].Text()});
+  }
+  if (json.contains("remarks")) {  // since 2026-11-25
+    for (const Node& remark : root["remarks"].Items()) {
+      capture.remarks.push_back({remark["name"].Text(), remark["text"].Text()});
+    }
   }
   CheckKeys(capture, source);
   return capture;

@@ -79,10 +79,17 @@ struct Skipped {
   std::string reason;
 };
 
+/// What of a file was converted on the way, or is not used: one line each. The rest of it is used.
+struct Remark {
+  std::string name;
+  std::string text;
+};
+
 /// Photos in byte order of their names.
 struct Capture {
   std::vector<Photo> photos;
   std::vector<Skipped> skipped;
+  std::vector<Remark> remarks;
 };
 
 /// Takes out the photos that have one of these faults and lists them under `skipped`. A duplicate

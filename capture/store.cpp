@@ -165,6 +165,7 @@ void CaptureWriter::Write(const Capture& capture, Progress& progress) {
   progress.Stage("writing photos", count);
   Capture stored;
   stored.skipped = capture.skipped;
+  stored.remarks = capture.remarks;
   stored.photos.resize(capture.photos.size());
   std::atomic<int> done{0};
   MemoryBudget memory(state_->options.memory_gb);

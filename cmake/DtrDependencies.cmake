@@ -21,6 +21,9 @@ if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(aarch64|arm64)")
 endif()
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(ZSTD REQUIRED IMPORTED_TARGET libzstd>=1.4)
+pkg_check_modules(FFMPEG REQUIRED IMPORTED_TARGET libavformat>=59 libavcodec>=59 libavfilter>=8
+  libswscale>=6 libavutil>=57)  # FFmpeg 5.1
+pkg_check_modules(LCMS2 REQUIRED IMPORTED_TARGET lcms2>=2.12)
 if(DTR_WITH_GL)
   pkg_check_modules(EPOXY REQUIRED IMPORTED_TARGET epoxy>=1.5)
   pkg_check_modules(EGL REQUIRED egl)  # epoxy's EGL header includes EGL's own

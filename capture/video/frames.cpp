@@ -6,65 +6,39 @@
 #include <array>
 #include <cctype>
 #include <cmath>
-#include <cstdlib>
-#include <fstream>
-#include <mutex>
-#include <opencv2/core.hpp>
-#include <opencv2/videoio.hpp>
-#include <string_view>
+#include <optional>
+#include <stdexcept>
 
+#include "capture/video/frame_colours.h"
+#include "capture/video/video_decoder.h"
 #include "dtr/base/error.h"
+#include "dtr/io/image_io.h"
 
 namespace dtr::capture {
 namespace {
 
-ImageRgb8 FromBgr(const cv::Mat& frame) {
-  ImageRgb8 image(frame.cols, frame.rows, 3);
-  for (int y = 0; y < frame.rows; ++y) {
-    const auto* from = frame.ptr<std::uint8_t>(y);
-    std::uint8_t* to = image.row(y);
-    for (int x = 0; x < 3 * frame.cols; x += 3) {
-      to[x] = from[x + 2];
-      to[x + 1] = from[x + 1];
-      to[x + 2] = from[x];
-    }
-  }
-  return image;
-}
+constexpr double kCutShort = 0.98;  // of what is promised; headers count a few frames too many
+constexpr double kSomeFrames = 2;   // that a duration counts more than are shown
 
-// FFmpeg writes about damaged frames on standard error as it goes; we say once what is missing.
-void QuietFfmpeg() {
-  static std::once_flag once;
-  std::call_once(once, [] { setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0); });
-}
-
-// FFmpeg would follow a playlist to files and hosts that it names, whatever the file is called:
-// only what begins as one of these is given to it.
-bool BeginsAsVideo(const std::filesystem::path& file) {
-  std::array<char, 12> bytes{};
-  std::ifstream(file, std::ios::binary).read(bytes.data(), bytes.size());
-  const std::string_view begin(bytes.data(), bytes.size());
-  static constexpr std::array<std::string_view, 9> kBoxes{
-      // of MP4 and QuickTime
-      "ftyp", "moov", "mdat", "free", "skip", "wide", "pnot", "styp", "uuid"};
-  static constexpr std::array<std::string_view, 6> kStarts{"\x1a\x45\xdf\xa3",
-                                                           "FLV",
-                                                           "OggS",
-                                                           "\x30\x26\xb2\x75",
-                                                           "G@",  // Matroska, ..., ASF, MPEG-TS
-                                                           std::string_view("\0\0\1\xba", 4)};
-  if (begin.starts_with("RIFF") && begin.substr(8) == "AVI ") return true;
-  return std::any_of(kBoxes.begin(), kBoxes.end(),
-                     [&](std::string_view box) { return begin.substr(4, 4) == box; }) ||
-         std::any_of(kStarts.begin(), kStarts.end(),
-                     [&](std::string_view start) { return begin.starts_with(start); });
+// Orientation 5 and above exchange width and height.
+bool SameSize(const FrameKind& a, int orientation_a, const FrameKind& b, int orientation_b) {
+  const bool exchanged = (orientation_a >= 5) != (orientation_b >= 5);
+  return b.out_width == (exchanged ? a.out_height : a.out_width) &&
+         b.out_height == (exchanged ? a.out_width : a.out_height);
 }
 
 }  // namespace
 
-struct VideoReader::Decoder {
-  cv::VideoCapture video;
-  cv::Mat frame;
+struct VideoReader::Parts {
+  explicit Parts(const std::filesystem::path& file) : decoder(file) {}
+
+  VideoDecoder decoder;
+  const AVFrame* frame = nullptr;
+  int orientation = 1;
+  std::optional<FrameKind> first;
+  int first_orientation = 1;
+  FrameKind kind;
+  std::optional<FrameConverter> converter;  // made for the first frame whose pixels are wanted
 };
 
 bool IsVideoExtension(const std::string& extension) {
@@ -76,52 +50,106 @@ bool IsVideoExtension(const std::string& extension) {
 }
 
 VideoReader::VideoReader(const std::filesystem::path& file)
-    : file_(file), decoder_(std::make_unique<Decoder>()) {
-  QuietFfmpeg();
-  if (!std::filesystem::exists(file)) {
-    throw Error(fmt::format("{}: expected a video, found no such file", file.string()));
+    : file_(file), parts_(std::make_unique<Parts>(file)) {
+  const VideoDecoder& decoder = parts_->decoder;
+  if (decoder.NeedsDolbyVision()) {
+    throw Error(fmt::format(
+        "{}: Dolby Vision profile 5: its colours cannot be read without Dolby's metadata; export "
+        "the video as HDR10, HLG or SDR",
+        file.string()));
   }
-  if (!BeginsAsVideo(file)) {
-    throw Error(
-        fmt::format("{}: expected a video, found something else by its first bytes; "
-                    "playlists are not followed, give the video itself",
-                    file.string()));
-  }
-  // What stands before a colon at the beginning would be a protocol.
-  decoder_->video.open(std::filesystem::absolute(file).string(), cv::CAP_FFMPEG);
-  if (!decoder_->video.isOpened()) {
-    throw Error(
-        fmt::format("{}: expected a video, found something FFmpeg does not read", file.string()));
+  if (decoder.video_tracks() > 1) {
+    Remark(fmt::format("it holds {} video tracks; one of them is used", decoder.video_tracks()));
   }
 }
 
 VideoReader::~VideoReader() = default;
 
+void VideoReader::Remark(const std::string& line) {
+  if (std::find(remarks_.begin(), remarks_.end(), line) == remarks_.end()) remarks_.push_back(line);
+}
+
 bool VideoReader::Next() {
-  if (!decoder_->video.read(decoder_->frame)) return false;
+  Parts& parts = *parts_;
+  if (!why_ended_.empty()) return false;
+  try {
+    parts.frame = parts.decoder.Next();
+  } catch (const std::runtime_error& error) {
+    throw Error(fmt::format("{}: frame {}: cannot be deinterlaced: {}", file_.string(), number_ + 1,
+                            error.what()));
+  }
+  if (parts.frame == nullptr) return false;
+  parts.kind = KindOf(*parts.frame, parts.decoder.SampleAspect(*parts.frame));
+  const std::string why_not = WhyNotConverted(parts.kind);
+  if (!why_not.empty()) {
+    throw Error(fmt::format("{}: frame {}: {} is not supported; convert the video", file_.string(),
+                            number_ + 1, why_not));
+  }
+  const auto matrix = parts.decoder.MatrixOf(*parts.frame);
+  const auto orientation = matrix ? ExifOrientationOf(*matrix) : 1;
+  if (!orientation) {
+    Remark("its display matrix rotates by no multiple of 90 degrees: frames are taken as stored");
+  }
+  parts.orientation = orientation.value_or(1);
+  if (!parts.first) {
+    parts.first = parts.kind;
+    parts.first_orientation = parts.orientation;
+  } else if (!SameSize(*parts.first, parts.first_orientation, parts.kind, parts.orientation)) {
+    why_ended_ = fmt::format(
+        "frames from {} on: they are {}x{} as stored, those before {}x{}; cut the video there and "
+        "give the rest as another one",
+        number_ + 1, parts.kind.width, parts.kind.height, parts.first->width, parts.first->height);
+    parts.frame = nullptr;
+    return false;
+  }
+  for (const std::string& remark : RemarksOn(*parts.frame, parts.kind)) Remark(remark);
+  if (parts.decoder.deinterlaced() > 0) Remark("interlaced frames are deinterlaced");
   ++number_;
-  time_s_ = decoder_->video.get(cv::CAP_PROP_POS_MSEC) / 1000;
+  time_s_ = parts.decoder.TimeOf(*parts.frame);
   return true;
 }
 
 ImageRgb8 VideoReader::Picture() const {
-  const cv::Mat& frame = decoder_->frame;
-  if (frame.empty() || frame.type() != CV_8UC3) {
-    throw Error(fmt::format("{}: frame {}: expected 8-bit colours, found others; convert the video",
-                            file_.string(), number_));
+  Parts& parts = *parts_;
+  if (parts.frame == nullptr) throw std::logic_error("VideoReader::Picture: no frame");
+  try {
+    if (!parts.converter || parts.converter->kind() != parts.kind) {
+      parts.converter.emplace(parts.kind);
+    }
+  } catch (const std::runtime_error& error) {
+    throw Error(fmt::format("{}: frame {}: {}", file_.string(), number_, error.what()));
   }
-  return FromBgr(frame);
+  return io::ApplyExifOrientation(parts.converter->Convert(*parts.frame), parts.orientation);
 }
 
 int VideoReader::frames_promised() const {
-  constexpr double kMost = 1e9;  // broken headers promise anything
-  const double count = decoder_->video.get(cv::CAP_PROP_FRAME_COUNT);
+  constexpr double kMost = 1e9;
+  const VideoDecoder& decoder = parts_->decoder;
+  if (decoder.frames_counted() > 0) return decoder.frames_counted();
+  const double count = std::round(decoder.duration_s() * decoder.frames_per_second());
   return count > 0 && count < kMost ? static_cast<int>(count) : 0;
 }
 
-double VideoReader::frames_per_second() const {
-  const double rate = decoder_->video.get(cv::CAP_PROP_FPS);
-  return std::isfinite(rate) && rate > 0 ? rate : 0;
+double VideoReader::frames_per_second() const { return parts_->decoder.frames_per_second(); }
+
+std::string VideoReader::WhyIncomplete() const {
+  if (!why_ended_.empty()) return why_ended_;
+  const VideoDecoder& decoder = parts_->decoder;
+  const int seen = number_ + 1;
+  const std::string damaged =
+      decoder.damaged() == 0 ? ""
+                             : fmt::format("{} damaged frames are left out", decoder.damaged());
+  const int counted = decoder.frames_counted();
+  const auto promised_s = decoder.duration_s();
+  bool cut = counted > 0 && seen < kCutShort * counted;
+  if (counted == 0 && promised_s > 0 && decoder.frames_per_second() > 0) {
+    // Frames need not come at one rate: what was shown is measured by its time.
+    cut = time_s_ + kSomeFrames / decoder.frames_per_second() < kCutShort * promised_s;
+  }
+  if (!cut) return damaged;
+  return fmt::format(
+      "frames from {} on: the file says it has {}; it is trimmed, cut short or damaged{}", seen,
+      frames_promised(), damaged.empty() ? "" : "; " + damaged);
 }
 
 void ForEachFrame(const std::filesystem::path& file,

@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "dtr/types/grid.h"
 
@@ -12,18 +13,20 @@ namespace dtr::capture {
 /// True for the extensions of videos that are read, any case, with the dot.
 bool IsVideoExtension(const std::string& extension);
 
-/// Decodes a video from its first frame on (OpenCV's videoio, so FFmpeg), upright where the file
-/// says how it was held.
+/// Decodes a video from its first frame on with FFmpeg's libraries. What the file says about its
+/// frames is applied here: rotation and mirroring (the display matrix), pixels that are not square,
+/// colour matrix and range, HDR and wide gamut (io::SrgbConverter), interlacing (bwdif).
 class VideoReader {
  public:
   /// Throws Error where the file is no video.
   explicit VideoReader(const std::filesystem::path& file);
   ~VideoReader();
 
-  /// Goes to the next frame; false after the last one, and where the rest cannot be decoded.
+  /// Goes to the next frame; false after the last one, where the rest cannot be decoded, and where
+  /// frames change their size. Throws Error where frames cannot be converted.
   bool Next();
-  /// The frame that Next() went to: its number from 0, when it is shown, and its pixels. Throws
-  /// Error where it is not of 8-bit colours.
+  /// The frame that Next() went to: its number from 0, when it is shown (from the first frame's
+  /// time on), and its pixels: upright, 8-bit sRGB.
   int number() const { return number_; }
   double time_s() const { return time_s_; }
   ImageRgb8 Picture() const;
@@ -33,10 +36,20 @@ class VideoReader {
   int frames_promised() const;
   double frames_per_second() const;
 
+  /// Of the frames so far: one line for each thing that was converted, or that is not used.
+  const std::vector<std::string>& remarks() const { return remarks_; }
+  /// Why frames up to this one are less than the file holds or promises: cut short, damaged frames
+  /// left out, another size. Empty where nothing is missing. Meant for the end.
+  std::string WhyIncomplete() const;
+
  private:
-  struct Decoder;
+  struct Parts;
+  void Remark(const std::string& line);
+
   std::filesystem::path file_;
-  std::unique_ptr<Decoder> decoder_;
+  std::unique_ptr<Parts> parts_;
+  std::vector<std::string> remarks_;
+  std::string why_ended_;
   int number_ = -1;
   double time_s_ = 0;
 };

@@ -21,11 +21,12 @@ namespace dtr::capture {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr int kSmallSidePx = 320;   // motion is looked at in such pictures
-constexpr int kJpegQuality = 98;    // the video lost more before
-constexpr double kSameRate = 1e-3;  // relative
-constexpr double kCutShort = 0.98;  // of the promised frames; headers count a few too many
-constexpr int kSaidEvery = 10;      // frames between two words of progress
+constexpr int kSmallSidePx = 320;      // motion is looked at in such pictures
+constexpr int kJpegQuality = 98;       // the video lost more before
+constexpr double kSameRate = 1e-3;     // relative
+constexpr double kCutShort = 0.98;     // of the promised frames; headers count a few too many
+constexpr double kSameInstant = 0.75;  // of the time between two frames
+constexpr int kSaidEvery = 10;         // frames between two words of progress
 
 using Videos = std::vector<fs::path>;
 
@@ -40,11 +41,15 @@ class Together {
   bool Next() {
     bool all = true;
     for (const auto& reader : readers_) all = reader->Next() && all;
+    if (all) CompareTimes();
     return all;
   }
   int number() const { return readers_.front()->number(); }
   double time_s() const { return readers_.front()->time_s(); }
   const std::vector<std::unique_ptr<VideoReader>>& readers() const { return readers_; }
+
+  /// One line where frames of one number are not shown at one time; else empty.
+  const std::string& drift() const { return drift_; }
 
   void RequireOneRate() const {
     const double first = readers_.front()->frames_per_second();
@@ -59,8 +64,24 @@ class Together {
   }
 
  private:
+  // A camera that drops frames, or one of variable rate, shows another moment from there on.
+  void CompareTimes() {
+    const double rate = readers_.front()->frames_per_second();
+    if (!drift_.empty() || rate <= 0) return;
+    for (size_t i = 1; i < readers_.size(); ++i) {
+      const double apart_s = readers_[i]->time_s() - readers_.front()->time_s();
+      if (std::abs(apart_s) * rate < kSameInstant) continue;
+      drift_ = fmt::format(
+          "frame {} is shown at {:.3f} s, that of {} at {:.3f} s: from there on the same number is "
+          "another moment; are frames missing in one of them?",
+          number(), time_s(), files_[i].filename().string(), readers_[i]->time_s());
+      return;
+    }
+  }
+
   const Videos& files_;
   std::vector<std::unique_ptr<VideoReader>> readers_;
+  std::string drift_;
 };
 
 Grid<std::uint8_t> SmallGrey(const ImageRgb8& picture) {
@@ -83,12 +104,34 @@ std::vector<ImageRgb8> PicturesOf(const Together& videos) {
   return pictures;
 }
 
+// Videos that hold less than they promise, or more than is taken of them; and what was remarked.
+void ListLosses(const Videos& files, const Together& videos, int seen, Capture& capture) {
+  for (size_t i = 0; i < files.size(); ++i) {
+    const VideoReader& reader = *videos.readers()[i];
+    const std::string name = files[i].filename().string();
+    for (const std::string& remark : reader.remarks()) capture.remarks.push_back({name, remark});
+    std::string why = reader.WhyIncomplete();
+    const int promised = reader.frames_promised();
+    if (files.size() > 1 && seen < kCutShort * promised) {
+      why = fmt::format(
+          "frames from {} on: the file says it has {}; it or another of the synchronised videos "
+          "ends there",
+          seen, promised);
+    }
+    if (!why.empty()) capture.skipped.push_back({name, why});
+  }
+  if (!videos.drift().empty()) {
+    capture.remarks.push_back({files.front().filename().string(), videos.drift()});
+  }
+}
+
 struct Choice {
   std::vector<ChosenFrame> frames;
   int seen = 0;  // frames that could be decoded of all videos
 };
 
-Choice ChooseFrames(const Videos& files, const VideoOptions& options, Progress& progress) {
+Choice ChooseFrames(const Videos& files, const VideoOptions& options, Capture& reported,
+                    Progress& progress) {
   Together videos(files);
   videos.RequireOneRate();
   progress.Stage("choosing frames", videos.readers().front()->frames_promised());
@@ -121,6 +164,7 @@ Choice ChooseFrames(const Videos& files, const VideoOptions& options, Progress& 
                             files.front().string(), choice.seen));
   }
   choice.frames = Thinned(choice.frames, options.most);
+  ListLosses(files, videos, choice.seen, reported);
   return choice;
 }
 
@@ -151,19 +195,6 @@ void WriteFrames(const Videos& files, const std::vector<fs::path>& folders,
                                         frames[next].time_s};
     }
     progress.Update(static_cast<int>(++next));
-  }
-}
-
-// Videos that hold less than they promise, or more than is taken of them.
-void ListLosses(const Videos& files, int seen, std::vector<Skipped>& skipped) {
-  for (const fs::path& file : files) {
-    const int promised = VideoReader(file).frames_promised();
-    if (seen >= kCutShort * promised) continue;
-    skipped.push_back(
-        {file.filename().string(),
-         fmt::format("frames from {} on: the file says it has {}; {}", seen, promised,
-                     files.size() > 1 ? "it or another of the synchronised videos ends there"
-                                      : "it is trimmed, cut short or damaged")});
   }
 }
 
@@ -227,12 +258,11 @@ Capture IngestVideos(const Videos& videos, const VideoOptions& options, const fs
     for (const fs::path& video : videos) groups.push_back({video});
   }
   std::map<std::string, VideoFrame> origins;
-  std::vector<Skipped> losses;
+  Capture reported;  // of the files: what is missing, what was remarked
   for (const Videos& group : groups) {
     std::vector<fs::path> folders;
     for (const fs::path& video : group) folders.push_back(FolderFor(video, videos));
-    const Choice choice = ChooseFrames(group, options, progress);
-    ListLosses(group, choice.seen, losses);
+    const Choice choice = ChooseFrames(group, options, reported, progress);
     WriteFrames(group, folders, choice.frames, folder, options.threads, origins, progress);
   }
   Capture capture =
@@ -242,7 +272,8 @@ Capture IngestVideos(const Videos& videos, const VideoOptions& options, const fs
     photo.camera_group =
         fmt::format("video {}|{}x{}", photo.video_frame->video, photo.width_px, photo.height_px);
   }
-  capture.skipped.insert(capture.skipped.end(), losses.begin(), losses.end());
+  capture.skipped.insert(capture.skipped.end(), reported.skipped.begin(), reported.skipped.end());
+  capture.remarks.insert(capture.remarks.end(), reported.remarks.begin(), reported.remarks.end());
   JudgePhotos(capture.photos);
   return capture;
 }

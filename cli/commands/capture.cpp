@@ -57,6 +57,10 @@ std::string ToJson(const capture::Capture& capture) {
   for (const auto& skipped : capture.skipped) {
     json["skipped"].push_back({{"name", skipped.name}, {"reason", skipped.reason}});
   }
+  json["remarks"] = Json::array();
+  for (const auto& remark : capture.remarks) {
+    json["remarks"].push_back({{"name", remark.name}, {"text", remark.text}});
+  }
   return json.dump(1);
 }
 
@@ -80,6 +84,9 @@ void Say(const capture::Capture& capture, const fs::path& output, Console& conso
     for (const auto& remark : photo.screening->remarks) {
       console.Say(fmt::format("  {}: {}", photo.name, remark));
     }
+  }
+  for (const auto& remark : capture.remarks) {
+    console.Say(fmt::format("  {}: {}", remark.name, remark.text));
   }
   for (const auto& skipped : capture.skipped) {
     console.Say(fmt::format("  skipped: {}: {}", skipped.name, skipped.reason));

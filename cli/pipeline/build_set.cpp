@@ -313,6 +313,10 @@ Json ReportJson(const BuildReport& report, const CalibratedPhotos& calibrated, c
   for (const auto& [name, reason] : report.skipped) {
     json["skipped"].push_back({{"name", name}, {"reason", reason}});
   }
+  json["remarks"] = Json::array();
+  for (const auto& [name, text] : report.remarks) {
+    json["remarks"].push_back({{"name", name}, {"text", text}});
+  }
   json["screening"] = ScreeningJson(report);
   const Json calibration = Json::parse(calibrated.report_json);
   if (calibration.contains("camera_sharing")) {
@@ -410,6 +414,10 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
   }
   for (const auto& skipped : photos.skipped)
     report.skipped.emplace_back(skipped.name, skipped.reason);
+  for (const auto& remark : photos.remarks) {
+    report.remarks.emplace_back(remark.name, remark.text);
+    progress.Note(fmt::format("{}: {}", remark.name, remark.text));
+  }
   for (const capture::Photo& photo : photos.photos) {
     if (!photo.screening || photo.screening->remarks.empty()) continue;
     report.screening.emplace_back(photo.name, photo.screening->remarks);

@@ -43,6 +43,8 @@ struct BuildReport {
   std::map<std::string, std::string> why_not_registered;     ///< by name, where that is known
   std::vector<std::string> held_out_not_registered;          ///< of them, those that were held out
   std::vector<std::pair<std::string, std::string>> skipped;  ///< file, reason
+  /// File, what of it was converted or is not used.
+  std::vector<std::pair<std::string, std::string>> remarks;
   /// Photos that screening has something to say about, with what it is; they are used all the same.
   std::vector<std::pair<std::string, std::vector<std::string>>> screening;
   bool validated = false, validation_passed = false;

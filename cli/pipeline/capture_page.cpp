@@ -88,6 +88,12 @@ CaptureLook LookAt(const capture::Capture& capture, const std::string& title, in
     for (const auto& skipped : capture.skipped) rows.push_back({skipped.name, skipped.reason});
     page.Table({"name", "reason"}, rows);
   }
+  if (!capture.remarks.empty()) {
+    page.Section("Remarks on files");
+    Rows rows;
+    for (const auto& remark : capture.remarks) rows.push_back({remark.name, remark.text});
+    page.Table({"name", "remark"}, rows);
+  }
   if (!good.empty()) {
     page.Section("Nothing wrong seen");
     page.Table(header, good);

@@ -143,6 +143,11 @@ int FramesIn(const fs::path& video, Progress& progress) {
     progress.Update(++frames);
     progress.ThrowIfInterrupted();
   }
+  const auto note = [&](const std::string& line) {
+    progress.Note(fmt::format("{}: {}", video.filename().string(), line));
+  };
+  for (const std::string& remark : reader.remarks()) note(remark);
+  if (const std::string why = reader.WhyIncomplete(); frames > 0 && !why.empty()) note(why);
   if (frames > 0) return frames;
   throw Error(video.string() + ": expected frames, found none; is the video whole?");
 }

@@ -35,10 +35,35 @@ void VideoWriter::Finish(const Progress& progress) {
   options.on_line = [&last_line](const std::string& line) { last_line = line; };
   options.should_stop = [&progress] { return progress.StopRequested(); };
   // yuv420p, which every player knows, needs even sizes: an odd frame gains one row or column.
+  // FFmpeg would code with BT.601's matrix and not say so, and players take BT.709's for HD.
   const auto result = RunProcess(
-      {"ffmpeg", "-y", "-loglevel", "error", "-framerate", std::to_string(frames_per_second_), "-i",
-       "%06d.png", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-c:v", "libx264", "-crf", "18",
-       "-pix_fmt", "yuv420p", "-movflags", "+faststart", encoded},
+      {"ffmpeg",
+       "-y",
+       "-loglevel",
+       "error",
+       "-framerate",
+       std::to_string(frames_per_second_),
+       "-i",
+       "%06d.png",
+       "-vf",
+       "pad=ceil(iw/2)*2:ceil(ih/2)*2,scale=out_color_matrix=bt709:out_range=tv:flags=accurate_rnd",
+       "-colorspace",
+       "bt709",
+       "-color_primaries",
+       "bt709",
+       "-color_trc",
+       "iec61966-2-1",
+       "-color_range",
+       "tv",
+       "-c:v",
+       "libx264",
+       "-crf",
+       "18",
+       "-pix_fmt",
+       "yuv420p",
+       "-movflags",
+       "+faststart",
+       encoded},
       options);
   progress.ThrowIfInterrupted();
   if (!result.Ok()) {

@@ -1,0 +1,250 @@
+#include "capture/video/video_decoder.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <mutex>
+#include <string_view>
+
+#include "dtr/base/error.h"
+#include "dtr/io/image_io.h"
+
+extern "C" {
+#include <libavutil/dovi_meta.h>
+}
+
+namespace dtr::capture {
+namespace fs = std::filesystem;
+namespace {
+
+// FFmpeg writes about damaged frames on standard error as it goes; we report once what is missing.
+void QuietFfmpeg() {
+  static std::once_flag once;
+  std::call_once(once, [] { av_log_set_level(AV_LOG_QUIET); });
+}
+
+// FFmpeg would follow a playlist to files and hosts that it names, whatever the file is called:
+// only what begins as one of these is given to it.
+bool BeginsAsVideo(const fs::path& file) {
+  std::array<char, 12> bytes{};
+  std::ifstream(file, std::ios::binary).read(bytes.data(), bytes.size());
+  const std::string_view begin(bytes.data(), bytes.size());
+  static constexpr std::array<std::string_view, 9> kBoxes{
+      // of MP4 and QuickTime
+      "ftyp", "moov", "mdat", "free", "skip", "wide", "pnot", "styp", "uuid"};
+  static constexpr std::array<std::string_view, 6> kStarts{"\x1a\x45\xdf\xa3",
+                                                           "FLV",
+                                                           "OggS",
+                                                           "\x30\x26\xb2\x75",
+                                                           "G@",  // Matroska, ..., ASF, MPEG-TS
+                                                           std::string_view("\0\0\1\xba", 4)};
+  if (begin.starts_with("RIFF") && begin.substr(8) == "AVI ") return true;
+  return std::any_of(kBoxes.begin(), kBoxes.end(),
+                     [&](std::string_view box) { return begin.substr(4, 4) == box; }) ||
+         std::any_of(kStarts.begin(), kStarts.end(),
+                     [&](std::string_view start) { return begin.starts_with(start); });
+}
+
+[[noreturn]] void ThrowUnreadable(const fs::path& file, int code) {
+  throw Error(
+      fmt::format("{}: FFmpeg cannot read it as a video: {}", file.string(), FfmpegError(code)));
+}
+
+Ffmpeg<AVFormatContext> OpenFormat(const fs::path& file) {
+  AVDictionary* options = nullptr;
+  av_dict_set(&options, "protocol_whitelist", "file", 0);
+  av_dict_set(&options, "format_whitelist", "mov,matroska,avi,flv,ogg,asf,mpegts,mpeg", 0);
+  AVFormatContext* context = nullptr;
+  // What stands before a colon at the beginning would be a protocol.
+  const std::string url = "file:" + fs::absolute(file).string();
+  int code = avformat_open_input(&context, url.c_str(), nullptr, &options);
+  av_dict_free(&options);
+  if (code < 0) ThrowUnreadable(file, code);
+  Ffmpeg<AVFormatContext> format(context);
+  code = avformat_find_stream_info(context, nullptr);
+  if (code < 0) ThrowUnreadable(file, code);
+  return format;
+}
+
+Ffmpeg<AVCodecContext> OpenCodec(const fs::path& file, const AVStream& stream,
+                                 const AVCodec* decoder) {
+  Ffmpeg<AVCodecContext> codec(avcodec_alloc_context3(decoder));
+  int code = avcodec_parameters_to_context(codec.get(), stream.codecpar);
+  if (code >= 0) {
+    codec->pkt_timebase = stream.time_base;
+    codec->thread_count = 0;  // all cores: the frames do not depend on it
+    codec->max_pixels = static_cast<std::int64_t>(io::kImageLimitPx);
+    code = avcodec_open2(codec.get(), decoder, nullptr);
+  }
+  if (code < 0) ThrowUnreadable(file, code);
+  return codec;
+}
+
+std::optional<DisplayMatrix> MatrixIn(const void* data, size_t bytes) {
+  DisplayMatrix matrix{};
+  if (data == nullptr || bytes < sizeof matrix) return {};
+  const auto* from = static_cast<const std::uint8_t*>(data);
+  std::copy_n(from, sizeof matrix, reinterpret_cast<std::uint8_t*>(matrix.data()));
+  return matrix;
+}
+
+bool IsDamaged(const AVFrame& frame) {
+  return (frame.flags & AV_FRAME_FLAG_CORRUPT) != 0 || frame.decode_error_flags != 0;
+}
+
+}  // namespace
+
+VideoDecoder::VideoDecoder(const fs::path& file)
+    : packet_(av_packet_alloc()), frame_(av_frame_alloc()), held_(av_frame_alloc()) {
+  QuietFfmpeg();
+  if (!fs::exists(file)) {
+    throw Error(fmt::format("{}: expected a video, found no such file", file.string()));
+  }
+  if (!BeginsAsVideo(file)) {
+    throw Error(
+        fmt::format("{}: expected a video, found something else by its first bytes; "
+                    "playlists are not followed, give the video itself",
+                    file.string()));
+  }
+  format_ = OpenFormat(file);
+  const AVCodec* decoder = nullptr;
+  stream_index_ = av_find_best_stream(format_.get(), AVMEDIA_TYPE_VIDEO, -1, -1, &decoder, 0);
+  if (stream_index_ < 0 || decoder == nullptr) {
+    throw Error(fmt::format("{}: holds no video track that FFmpeg decodes", file.string()));
+  }
+  for (unsigned i = 0; i < format_->nb_streams; ++i) {
+    if (static_cast<int>(i) != stream_index_) format_->streams[i]->discard = AVDISCARD_ALL;
+  }
+  codec_ = OpenCodec(file, stream(), decoder);
+}
+
+bool VideoDecoder::SendPacket() {
+  if (all_sent_) return false;
+  int code = 0;
+  do {
+    av_packet_unref(packet_.get());
+    code = av_read_frame(format_.get(), packet_.get());
+  } while (code == AVERROR(EAGAIN) || (code >= 0 && packet_->stream_index != stream_index_));
+  all_sent_ = code < 0;
+  code = avcodec_send_packet(codec_.get(), all_sent_ ? nullptr : packet_.get());
+  if (code < 0 && !all_sent_) ++damaged_;
+  return true;
+}
+
+bool VideoDecoder::Decode() {
+  while (true) {
+    const int code = avcodec_receive_frame(codec_.get(), frame_.get());
+    if (code == AVERROR_EOF) return false;
+    if (code == AVERROR(EAGAIN)) {
+      if (!SendPacket()) return false;
+    } else if (code < 0 || IsDamaged(*frame_)) {
+      ++damaged_;
+      if (code < 0 && !SendPacket()) return false;
+    } else {
+      return true;
+    }
+  }
+}
+
+const AVFrame* VideoDecoder::Next() {
+  while (true) {
+    if (deinterlacer_ && deinterlacer_->Get(frame_.get())) return frame_.get();
+    if (draining_) {
+      draining_ = false;
+      deinterlacer_.reset();
+      if (held_->width == 0) return nullptr;
+      av_frame_move_ref(frame_.get(), held_.get());
+    } else if (!Decode()) {
+      if (!deinterlacer_) return nullptr;
+      draining_ = deinterlacer_->Add(nullptr);
+      continue;
+    }
+    if (frame_->interlaced_frame != 0) {
+      ++deinterlaced_;
+      if (!deinterlacer_) deinterlacer_.emplace(*frame_, stream().time_base);
+    }
+    if (!deinterlacer_) return frame_.get();
+    if (deinterlacer_->Add(frame_.get())) continue;
+    av_frame_move_ref(held_.get(), frame_.get());  // of another size
+    --deinterlaced_;
+    draining_ = deinterlacer_->Add(nullptr);
+  }
+}
+
+double VideoDecoder::TimeOf(const AVFrame& frame) const {
+  std::int64_t timestamp = frame.best_effort_timestamp;
+  if (timestamp == AV_NOPTS_VALUE) timestamp = frame.pts;
+  if (timestamp == AV_NOPTS_VALUE) return 0;
+  const std::int64_t start = stream().start_time;
+  if (start != AV_NOPTS_VALUE) timestamp -= start;
+  return static_cast<double>(timestamp) * av_q2d(stream().time_base);
+}
+
+AVRational VideoDecoder::SampleAspect(const AVFrame& frame) const {
+  return av_guess_sample_aspect_ratio(format_.get(), &stream(), const_cast<AVFrame*>(&frame));
+}
+
+std::optional<DisplayMatrix> VideoDecoder::MatrixOf(const AVFrame& frame) const {
+  if (const AVFrameSideData* own = av_frame_get_side_data(&frame, AV_FRAME_DATA_DISPLAYMATRIX)) {
+    return MatrixIn(own->data, own->size);
+  }
+  size_t bytes = 0;
+  const void* data = av_stream_get_side_data(&stream(), AV_PKT_DATA_DISPLAYMATRIX, &bytes);
+  return MatrixIn(data, bytes);
+}
+
+bool VideoDecoder::NeedsDolbyVision() const {
+  constexpr int kProfileWithoutBase = 5;
+  size_t bytes = 0;
+  const auto* data = av_stream_get_side_data(&stream(), AV_PKT_DATA_DOVI_CONF, &bytes);
+  if (data == nullptr || bytes < sizeof(AVDOVIDecoderConfigurationRecord)) return false;
+  return reinterpret_cast<const AVDOVIDecoderConfigurationRecord*>(data)->dv_profile ==
+         kProfileWithoutBase;
+}
+
+int VideoDecoder::frames_counted() const {
+  constexpr std::int64_t kMost = 1'000'000'000;  // broken headers promise anything
+  if (stream().nb_frames <= 0 || stream().nb_frames > kMost) return 0;
+  // An edit list has frames decoded, for others to refer to, that are not shown.
+  int hidden = 0;
+  const int entries = avformat_index_get_entries_count(&stream());
+  for (int i = 0; i < entries; ++i) {
+    const AVIndexEntry* entry = avformat_index_get_entry(&stream(), i);
+    if (entry != nullptr && (entry->flags & AVINDEX_DISCARD_FRAME) != 0) ++hidden;
+  }
+  const auto counted = static_cast<int>(stream().nb_frames);
+  const bool whole_index = std::string_view(format_->iformat->name).starts_with("mov") &&
+                           entries > 0 && entries < counted;
+  return (whole_index ? entries : counted) - hidden;
+}
+
+double VideoDecoder::duration_s() const {
+  if (stream().duration != AV_NOPTS_VALUE && stream().duration > 0) {
+    return static_cast<double>(stream().duration) * av_q2d(stream().time_base);
+  }
+  if (format_->duration == AV_NOPTS_VALUE || format_->duration <= 0) return 0;
+  return static_cast<double>(format_->duration) / AV_TIME_BASE;
+}
+
+double VideoDecoder::frames_per_second() const {
+  const AVRational rate = av_guess_frame_rate(format_.get(), &stream(), nullptr);
+  return rate.num > 0 && rate.den > 0 ? av_q2d(rate) : 0;
+}
+
+int VideoDecoder::video_tracks() const {
+  int count = 0;
+  for (unsigned i = 0; i < format_->nb_streams; ++i) {
+    const AVStream& track = *format_->streams[i];
+    if (track.codecpar->codec_type == AVMEDIA_TYPE_VIDEO &&
+        (track.disposition & (AV_DISPOSITION_ATTACHED_PIC | AV_DISPOSITION_TIMED_THUMBNAILS)) ==
+            0) {
+      ++count;
+    }
+  }
+  return count;
+}
+
+}  // namespace dtr::capture

@@ -1,0 +1,56 @@
+// capture/video/video_decoder.h -- internal: coded frames of a file, in the order they are shown.
+#pragma once
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "capture/video/deinterlacer.h"
+#include "capture/video/display_matrix.h"
+#include "capture/video/ffmpeg_handles.h"
+
+namespace dtr::capture {
+
+/// Opens and decodes one video track with FFmpeg's libraries. Nothing is converted here, except
+/// that interlaced frames are deinterlaced.
+class VideoDecoder {
+ public:
+  /// Throws Error where FFmpeg does not read the file.
+  explicit VideoDecoder(const std::filesystem::path& file);
+
+  /// The next frame that could be decoded; nullptr after the last one. Valid until the next call.
+  const AVFrame* Next();
+
+  double TimeOf(const AVFrame& frame) const;  ///< seconds from the first frame's time on
+  /// Of the pixels of this frame: width over height.
+  AVRational SampleAspect(const AVFrame& frame) const;
+  /// The matrix of this frame (H.264 and HEVC can hold one), else of the track; nothing where
+  /// neither has one.
+  std::optional<DisplayMatrix> MatrixOf(const AVFrame& frame) const;
+  /// Dolby Vision without a base layer that others can show.
+  bool NeedsDolbyVision() const;
+
+  int frames_counted() const;               ///< by the file's own index; 0 where it has none
+  double duration_s() const;                ///< 0 where the file does not say
+  double frames_per_second() const;         ///< 0 where the file does not say
+  int video_tracks() const;                 ///< in the file; the one FFmpeg ranks first is read
+  int damaged() const { return damaged_; }  ///< frames left out so far
+  int deinterlaced() const { return deinterlaced_; }
+
+ private:
+  AVStream& stream() const { return *format_->streams[stream_index_]; }
+  bool Decode();      // into frame_; false at the end
+  bool SendPacket();  // to the decoder; false once all were sent
+
+  Ffmpeg<AVFormatContext> format_;
+  Ffmpeg<AVCodecContext> codec_;
+  Ffmpeg<AVPacket> packet_;
+  Ffmpeg<AVFrame> frame_;
+  Ffmpeg<AVFrame> held_;  // the first of another size, while the deinterlacer gives what it has
+  std::optional<Deinterlacer> deinterlacer_;
+  int stream_index_ = -1;
+  bool all_sent_ = false, draining_ = false;
+  int damaged_ = 0, deinterlaced_ = 0;
+};
+
+}  // namespace dtr::capture
