@@ -7,6 +7,7 @@
 #include "calib/colmap/model_io.h"
 #include "cli/command.h"
 #include "cli/output_file.h"
+#include "cli/pipeline/points_from_depth.h"
 #include "dtr/base/durable.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
@@ -63,26 +64,34 @@ int RunExport(Options options, const Context& context) {
   RequireFolderOf(options.output, "-o");
   DtrSet set = io::ReadSet(options.set);
   WorkFolder work(WorkFolder::Of(options.output), "export");
-  const SparseScene sparse = set.sparse_file ? io::LoadSparse(options.set, set) : SparseScene{};
+  SparseScene sparse = set.sparse_file ? io::LoadSparse(options.set, set) : SparseScene{};
+  const bool from_depth = sparse.points.empty() && set.frames.size() == 1;
+  if (from_depth) {
+    sparse =
+        pipeline::PointsFromDepth(options.set, set, {}, context.common.threads, context.console);
+  }
   NameByStoredFormat(set.frames.front().views);
   const calib::SfmModel model = colmap::ModelFromViews(set, sparse, [&](const View& view) {
     return ImageOf(options.set, view, context.common.threads);
   });
   ExportImages(options.set, set, work.path() / "images");
-  colmap::WriteModel(work.path() / "sparse", model,
+  colmap::WriteModel(work.path() / "sparse" / "0", model,
                      options.text ? colmap::Format::kText : colmap::Format::kBinary);
   work.Become(options.output);
-  context.console.Say(fmt::format("{}: {} images, {} points", options.output.string(),
-                                  model.images.size(), model.points.size()));
-  context.EmitJson(
-      fmt::format("{{\"images\": {}, \"points\": {}}}", model.images.size(), model.points.size()));
+  context.console.Say(fmt::format("{}: {} images, {} points{}", options.output.string(),
+                                  model.images.size(), model.points.size(),
+                                  from_depth ? " from depth, as the set has no sparse ones" : ""));
+  context.EmitJson(fmt::format("{{\"images\": {}, \"points\": {}, \"points_from\": \"{}\"}}",
+                               model.images.size(), model.points.size(),
+                               from_depth ? "depth" : "sparse"));
   return kDone;
 }
 
 }  // namespace
 
 void AddExportCommand(CLI::App& app) {
-  AddCommand(app, "export", "Write a set's cameras, points and images for another program",
+  AddCommand(app, "export",
+             "Write a set's cameras, points and images for another program: sparse/0 and images",
              "dtr export scene.dtr --format colmap -o colmap/", [](CLI::App& command) -> Action {
                auto options = std::make_shared<Options>();
                command.add_option("SET", options->set, "The set")->required();

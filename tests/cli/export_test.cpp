@@ -1,9 +1,13 @@
 // `dtr export` takes the colours of points from one image after another.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
 
 #include "calib/colmap/model_io.h"
 #include "dtr/base/process.h"
 #include "dtr/io/image_io.h"
+#include "dtr/io/set_io.h"
 #include "tests/cli/run_dtr.h"
 #include "tests/cli/small_courtyard.h"
 #include "tests/support/test_data.h"
@@ -32,7 +36,7 @@ long ExportKib(const fs::path& folder, int photos) {
       {DTR_PROGRAM, "export", set, "-o", (folder / "out").string(), "--threads", "1"}, {});
   EXPECT_TRUE(ran.Ok());
   EXPECT_EQ(FilesIn(folder / "out/images"), photos);
-  const auto points = colmap::ReadModel(folder / "out/sparse").points;
+  const auto points = colmap::ReadModel(folder / "out/sparse/0").points;
   EXPECT_FALSE(points.empty());
   for (const auto& [id, point] : points) EXPECT_EQ(point.rgb[1], 100) << id;
   return ran.max_rss_kib;
@@ -46,6 +50,50 @@ TEST(ExportCommand, HoldsOneImageAtATime) {
   const long few = ExportKib(folder / "few", 2), many = ExportKib(folder / "many", 14);
   constexpr long kImageKib = 9 * 1024;
   EXPECT_LT(many - few, 3 * kImageKib);  // 12 more would be 12 of them
+}
+
+// A set with true depth and no sparse points, as `dtr import` makes it of an RGB-D collection.
+class ExportOfDepth : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    MakeSmallCourtyard(folder_ / "courtyard");
+    ImportSmallCourtyard(folder_ / "courtyard", folder_ / "set.dtr");
+  }
+  fs::path Export(const std::string& name, const std::string& threads) {
+    DtrOk({"export", (folder_ / "set.dtr").string(), "-o", (folder_ / name).string(), "--threads",
+           threads, "--json", (folder_ / "result.json").string()});
+    return folder_ / name;
+  }
+  TemporaryFolder folder_;
+};
+
+TEST_F(ExportOfDepth, HasPointsOfItsSurfacesForGaussianSplatting) {
+  const fs::path out = Export("out", "2");
+  EXPECT_TRUE(fs::exists(out / "sparse/0/points3D.bin"));
+  const calib::SfmModel model = colmap::ReadModel(out / "sparse/0");
+  for (const auto& image : model.images) EXPECT_TRUE(fs::exists(out / "images" / image.name));
+  const auto json = nlohmann::json::parse(Text(folder_ / "result.json"));
+  EXPECT_EQ(json["points_from"], "depth");
+  EXPECT_EQ(json["points"], model.points.size());
+  EXPECT_GT(model.points.size(), 1000u);
+  EXPECT_LE(model.points.size(), 100'000u);
+  // The courtyard is no black place.
+  size_t coloured = 0;
+  for (const auto& [id, point] : model.points) coloured += point.rgb[0] + point.rgb[1] > 0;
+  EXPECT_GT(coloured, model.points.size() * 9 / 10);
+}
+
+TEST_F(ExportOfDepth, IsTheSameForAnyNumberOfThreadsAndIsImportedAgain) {
+  const fs::path a = Export("a", "1"), b = Export("b", "3");
+  EXPECT_THAT(DifferingFiles(Contents(a), Contents(b)), ::testing::IsEmpty());
+  // The folder as a whole, its sparse/ and sparse/0 are the same model.
+  int number = 0;
+  for (const fs::path& cameras : {a, a / "sparse", a / "sparse/0"}) {
+    const std::string set = (folder_ / (std::to_string(number++) + ".dtr")).string();
+    DtrOk(
+        {"import", "--cameras", cameras.string(), "--images", (a / "images").string(), "-o", set});
+    EXPECT_EQ(io::ReadSet(set).frames[0].views.size(), static_cast<size_t>(kCourtyardViews));
+  }
 }
 
 }  // namespace

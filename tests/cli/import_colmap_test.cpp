@@ -1,10 +1,12 @@
 // `dtr import` and `dtr build --poses` where points must be triangulated, which COLMAP does.
+#include "dtr/base/process.h"
 #include "dtr/io/set_io.h"
 #include "tests/cli/field_scene.h"
 
 namespace dtr::testing {
 namespace {
 
+namespace fs = std::filesystem;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
@@ -35,6 +37,27 @@ TEST_F(FieldScene, BuildAndRenderReadATransformsJson) {
   DtrOk({"render", Set(), "--path", file, "--renderer", "cpu", "--size", "120x90", "-o",
          (folder_ / "frames").string()});
   EXPECT_EQ(FilesIn(folder_ / "frames"), 6);
+}
+
+TEST_F(FieldScene, ColmapReadsWhatIsExported) {
+  DtrOk(Import(Field("_scene/transforms_dfull.json")));
+  DtrOk({"export", Set(), "-o", (folder_ / "out").string()});
+  const fs::path log = folder_ / "analyzer.log";
+  ASSERT_TRUE(
+      RunProcess({"colmap", "model_analyzer", "--path", (folder_ / "out/sparse/0").string()},
+                 {.log_file = log})
+          .Ok());
+  EXPECT_THAT(Text(log), HasSubstr("Registered images: 6"));
+  fs::create_directory(folder_ / "text");
+  ASSERT_TRUE(
+      RunProcess({"colmap", "model_converter", "--input_path", (folder_ / "out/sparse/0").string(),
+                  "--output_path", (folder_ / "text").string(), "--output_type", "TXT"},
+                 {})
+          .Ok());
+  const std::string again = (folder_ / "again.dtr").string();
+  DtrOk({"import", "--cameras", (folder_ / "text").string(), "--images",
+         (folder_ / "out/images").string(), "-o", again});
+  EXPECT_EQ(io::ReadSet(again).frames[0].views.size(), 6u);
 }
 
 }  // namespace

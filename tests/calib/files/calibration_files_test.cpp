@@ -394,7 +394,7 @@ TEST(OpenCvYaml, FilesOfOtherProgramsAreReadOrNamed) {
 TEST(OpenCvYaml, WhatIsFoundIsSaidInOneLine) {
   const dtr::testing::TemporaryFolder folder;
   const auto file = folder / "camera.yml";
-  WriteFileAtomically(file, "image_width: 640\n  and more\nK: [1]\nD: [1]\n");
+  WriteFileAtomically(file, "image_width: 640\n  and more\nimage_height: 480\nK: [1]\nD: [1]\n");
   try {
     ReadOpenCvYaml(file);
     ADD_FAILURE() << "read";
