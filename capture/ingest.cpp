@@ -135,10 +135,11 @@ std::string CameraGroup(const Photo& photo, const io::ImageHeader& header) {
 }
 
 Photo InspectPhoto(const fs::path& file, const std::string& name, const fs::path& mask, bool screen,
-                   MemoryBudget& memory) {
+                   MemoryBudget& memory, std::vector<std::string>& remarks) {
   std::error_code error;
   if (!fs::is_regular_file(file, error)) throw Error("is no regular file");
   const io::ImageHeader header = io::ReadImageHeader(file);
+  remarks = header.remarks;
   Photo photo;
   photo.name = name;
   photo.file = file;
@@ -266,6 +267,7 @@ Capture IngestPhotos(const fs::path& folder, const IngestOptions& options, Progr
   progress.Stage("photos", count);
   std::vector<std::optional<Photo>> photos(listing.names.size());
   std::vector<std::string> reasons(listing.names.size());
+  std::vector<std::vector<std::string>> remarks(listing.names.size());
   std::atomic<int> done{0};
   MemoryBudget memory(options.memory_gb);
   ParallelFor(0, count, options.threads, [&](int i) {
@@ -276,7 +278,7 @@ Capture IngestPhotos(const fs::path& folder, const IngestOptions& options, Progr
       const auto mask = listing.masks.find(name);
       photos[index] = InspectPhoto(folder / name, name,
                                    mask == listing.masks.end() ? fs::path() : folder / mask->second,
-                                   options.screen, memory);
+                                   options.screen, memory, remarks[index]);
     } catch (const Error& e) {
       reasons[index] = ReasonFrom(e.what(), folder / name, name);
     }
@@ -287,6 +289,7 @@ Capture IngestPhotos(const fs::path& folder, const IngestOptions& options, Progr
   capture.skipped = std::move(listing.skipped);
   for (size_t i = 0; i < photos.size(); ++i) {
     if (photos[i]) {
+      for (const std::string& text : remarks[i]) capture.remarks.push_back({photos[i]->name, text});
       capture.photos.push_back(std::move(*photos[i]));
     } else {
       capture.skipped.push_back({listing.names[i], reasons[i]});

@@ -68,7 +68,7 @@ void PreparePhoto(const Photo& photo, const fs::path& to, int max_size_px) {
   const io::ImageHeader header = io::ReadImageHeader(photo.file);
   const auto size = TargetSize(photo.width_px, photo.height_px, max_size_px);
   const bool readable_by_colmap = (header.format == "jpeg" || header.format == "png") &&
-                                  header.bits == 8 &&
+                                  header.bits == 8 && !header.converted &&
                                   (header.channels == 1 || header.channels == 3);
   const bool unchanged = readable_by_colmap && photo.exif_orientation == 1 &&
                          size == std::pair(photo.width_px, photo.height_px);

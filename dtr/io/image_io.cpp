@@ -1,5 +1,7 @@
 #include "dtr/io/image_io.h"
 
+#include <OpenImageIO/tiffutils.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,8 +10,11 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
+#include "dtr/io/colour_coding.h"
+#include "dtr/io/file_colours.h"
 #include "dtr/io/jpeg_cmyk.h"
 #include "dtr/io/oiio_files.h"
+#include "dtr/io/photo_colours.h"
 
 namespace dtr::io {
 namespace {
@@ -70,13 +75,6 @@ int ExifOrientationOf(const ImageSpec& spec) {
   return orientation >= 1 && orientation <= 8 ? orientation : 1;
 }
 
-// The usual transfer function of IEC 61966-2-1, rounded to 8 bits.
-std::uint8_t Srgb8FromLinear(float linear) {
-  const double v = std::clamp(static_cast<double>(linear), 0.0, 1.0);
-  const double coded = v <= 0.0031308 ? 12.92 * v : 1.055 * std::pow(v, 1 / 2.4) - 0.055;
-  return static_cast<std::uint8_t>(std::lround(coded * 255));
-}
-
 // Channels to read: RGB of colour images, the one channel of grey ones; alpha and more are left.
 int ColourChannels(const ImageSpec& spec) { return spec.nchannels >= 3 ? 3 : 1; }
 
@@ -84,18 +82,24 @@ int ColourChannels(const ImageSpec& spec) { return spec.nchannels >= 3 ? 3 : 1; 
 Grid<std::uint8_t> ReadColours(OIIO::ImageInput& in, const fs::path& file) {
   const ImageSpec& spec = in.spec();
   const int channels = ColourChannels(spec);
+  const PhotoColours colours(spec, file);
   Grid<std::uint8_t> pixels(spec.width, spec.height, channels);
-  if (spec.format.basetype == TypeDesc::UINT8) {
+  if (spec.format.basetype == TypeDesc::UINT8 && !colours.converts()) {
     ReadPixels(in, file, 0, channels, TypeDesc::UINT8, pixels.data().data());
     return pixels;
   }
   const bool linear = IsFloat(spec.format);
   std::vector<float> values(pixels.data().size());
   ReadPixels(in, file, 0, channels, TypeDesc::FLOAT, values.data());
+  if (!std::all_of(values.begin(), values.end(),
+                   [](float value) { return std::isfinite(value); })) {
+    throw Error(file.string() + ": expected finite colours, found NaN or infinity");
+  }
+  if (colours.converts()) {
+    colours.Convert(values, channels, pixels.data());
+    return pixels;
+  }
   for (size_t i = 0; i < values.size(); ++i) {
-    if (!std::isfinite(values[i])) {
-      throw Error(file.string() + ": expected finite colours, found NaN or infinity");
-    }
     pixels.data()[i] =
         linear ? Srgb8FromLinear(values[i])
                : static_cast<std::uint8_t>(std::lround(std::clamp(values[i], 0.0f, 1.0f) * 255.0f));
@@ -139,11 +143,34 @@ bool IsCmyk(const ImageSpec& spec) {
   return spec.get_string_attribute("jpeg:ColorSpace") == "CMYK";
 }
 
+// The opened image's spec, with EXIF that OpenImageIO left in the file.
+ImageSpec SpecOf(const OIIO::ImageInput& in, const fs::path& file) {
+  ImageSpec spec = in.spec();
+  const std::string exif = ReadWebpExif(file);
+  if (!exif.empty()) OIIO::decode_exif(OIIO::string_view(exif), spec);
+  return spec;
+}
+
+// What a file holds beside the image that is read.
+void AddRemarks(OIIO::ImageInput& in, ImageHeader& header) {
+  const ImageSpec& spec = in.spec();
+  const int used = ColourChannels(spec) + (spec.alpha_channel >= 0 ? 1 : 0);
+  if (spec.nchannels > used && !IsCmyk(spec)) {
+    header.remarks.push_back("of its " + std::to_string(spec.nchannels) +
+                             " channels only the colours are used");
+  }
+  // The layers of a PSD are in its first image.
+  if (header.format != "psd" && in.seek_subimage(1, 0)) {
+    header.remarks.push_back("holds more than one image; the first is used");
+  }
+  (void)in.geterror();
+}
+
 }  // namespace
 
 ImageHeader ReadImageHeader(const fs::path& file) {
   const auto in = OpenImage(file, UINT64_MAX);
-  const ImageSpec& spec = in->spec();
+  const ImageSpec spec = SpecOf(*in, file);
   ImageHeader header;
   header.width_px = spec.width;
   header.height_px = spec.height;
@@ -162,6 +189,10 @@ ImageHeader ReadImageHeader(const fs::path& file) {
   header.lens_model = spec.get_string_attribute("Exif:LensModel");
   header.date_time = spec.get_string_attribute("Exif:DateTimeOriginal");
   header.gps = GpsOf(spec);
+  const PhotoColours colours(spec, file);
+  header.converted = colours.converts();
+  header.remarks = colours.remarks();
+  AddRemarks(*in, header);
   return header;
 }
 
@@ -172,7 +203,7 @@ ImageRgb8 ReadImage(const fs::path& file, const ImageReadOptions& options) {
   Grid<std::uint8_t> pixels = plain ? std::move(*plain) : ReadColours(*in, file);
   if (pixels.channels() == 1) pixels = RgbFromGrey(pixels);
   if (!options.apply_exif_orientation) return pixels;
-  return ApplyExifOrientation(pixels, ExifOrientationOf(in->spec()));
+  return ApplyExifOrientation(pixels, ExifOrientationOf(SpecOf(*in, file)));
 }
 
 Mask ReadMask(const fs::path& file, std::uint64_t limit_px) {

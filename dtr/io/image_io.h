@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "dtr/types/grid.h"
 
@@ -33,9 +34,13 @@ struct ImageHeader {
   std::string make, model, lens_model;
   std::string date_time;  ///< "YYYY:MM:DD HH:MM:SS" of the exposure, or empty
   std::optional<GpsPosition> gps;
+  bool converted = false;  ///< integer samples that are not sRGB's: ReadImage converts them
+  /// One line for each thing that the file holds or states and that ReadImage does not use.
+  std::vector<std::string> remarks;
 };
 
-/// Reads a file's header. Throws Error when the file is no image OpenImageIO knows.
+/// Reads a file's header. Throws Error when the file is no image OpenImageIO knows, and where
+/// ReadImage could not convert its colours.
 /// EXIF values that make no sense (zero, negative, NaN) are left out, as cameras write zeros there.
 ImageHeader ReadImageHeader(const std::filesystem::path& file);
 
@@ -50,8 +55,11 @@ struct ImageReadOptions {
 /// Reads an image as 8-bit sRGB of 3 channels.
 /// Grey becomes RGB; alpha is dropped (not multiplied in); CMYK JPEG is converted without a colour
 /// profile, taken to be inverted where it bears Adobe's marker, as Adobe's programs write it.
-/// Integer samples are taken as sRGB-coded and rounded to 8 bits. Float and half samples (EXR, HDR,
-/// float TIFF) are taken as linear light in the sRGB primaries, clipped to [0, 1] and sRGB-coded;
+/// Integer samples are converted by the file's ICC profile (lcms2, relative colorimetric), by the
+/// numbers of cICP or nclx (HDR: see SrgbConverter), by PNG's gAMA and cHRM or by EXIF's Adobe RGB;
+/// those of other files are taken as sRGB-coded. Float and half samples (EXR, HDR, float TIFF) are
+/// taken as linear light in the primaries of the file, else sRGB's. All are clipped to [0, 1] and
+/// rounded to 8 bits.
 /// NaN and infinity among them are refused. Only the first image of a file is read.
 /// Throws Error when the file is no image, is damaged or cut short, or is larger than the limit.
 ImageRgb8 ReadImage(const std::filesystem::path& file, const ImageReadOptions& options = {});

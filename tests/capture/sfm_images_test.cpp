@@ -11,6 +11,7 @@
 #include "dtr/base/error.h"
 #include "dtr/types/area_average.h"
 #include "tests/capture/photo_files.h"
+#include "tests/support/colour_files.h"
 #include "tests/support/photo_kinds.h"
 #include "tests/support/test_data.h"
 
@@ -40,6 +41,17 @@ TEST(PrepareSfmImages, UprightPhotosKeepNamesAndBytes) {
     EXPECT_EQ(ReadFile(folder / "sfm" / name, kFileLimit),
               ReadFile(folder / "photos" / name, kFileLimit));
   }
+}
+
+TEST(PrepareSfmImages, PhotosThatAreNotSrgbAreWrittenAsSrgb) {
+  const TemporaryFolder folder;
+  fs::create_directories(folder / "photos");
+  io::WriteImage(folder / "photos/1.png", BlockPhoto(48, 32, 1));
+  io::WriteImage(folder / "photos/2.png", BlockPhoto(48, 32, 2));
+  dtr::testing::InsertPngChunk(folder / "photos/1.png", "gAMA", dtr::testing::BigEndian(100000));
+  PrepareSfmImages(Ingest(folder / "photos"), folder / "sfm", 48, 2);
+  EXPECT_NE(io::ReadImage(folder / "photos/1.png"), BlockPhoto(48, 32, 1));
+  EXPECT_EQ(io::ReadImage(folder / "sfm/1.png"), io::ReadImage(folder / "photos/1.png"));
 }
 
 TEST(PrepareSfmImages, TurnedAndLargePhotosAreWrittenUprightAndSmall) {

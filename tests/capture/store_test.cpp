@@ -9,6 +9,7 @@
 #include "capture/ingest.h"
 #include "dtr/base/error.h"
 #include "tests/capture/photo_files.h"
+#include "tests/support/photo_kinds.h"
 #include "tests/support/test_data.h"
 
 namespace dtr::capture {
@@ -64,6 +65,23 @@ void ExpectSameFacts(const Capture& a, const Capture& b) {
   ASSERT_EQ(a.skipped.size(), b.skipped.size());
   EXPECT_EQ(a.skipped[0].name, b.skipped[0].name);
   EXPECT_EQ(a.skipped[0].reason, b.skipped[0].reason);
+}
+
+TEST(Capture, RemarksOnFilesAreStored) {
+  const TemporaryFolder folder;
+  fs::create_directories(folder / "photos");
+  io::WriteImage(folder / "photos/1.png", testing::BlockPhoto(48, 32, 1));
+  std::vector<float> values(5 * 48 * 32, 0.5F);
+  OIIO::ImageSpec spec(48, 32, 5, OIIO::TypeDesc::HALF);
+  spec.channelnames = {"R", "G", "B", "Z", "id"};
+  dtr::testing::WriteForeign(folder / "photos/2.exr", spec, values);
+  SilentProgress progress;
+  const Capture capture = IngestPhotos(folder / "photos", {.threads = 1}, progress);
+  WriteCapture(capture, folder / "capture", 1);
+  const Capture read = ReadCapture(folder / "capture");
+  ASSERT_EQ(read.remarks.size(), 1u);
+  EXPECT_EQ(read.remarks[0].name, "2.exr");
+  EXPECT_EQ(read.remarks[0].text, "of its 5 channels only the colours are used");
 }
 
 TEST(WriteCapture, ComesBackWithTheSameFactsAndPixels) {

@@ -221,6 +221,13 @@ TEST(VideoTruth, VideosOfColoursThatAreNotConvertedAreAnError) {
               HasSubstr("flat.mp4: frame 0: the colour matrix ictcp is not supported"));
 }
 
+TEST(VideoTruth, AFileOfSoundAloneIsNoVideo) {
+  const TemporaryFolder folder;
+  RunFfmpeg(folder.path(), {"-f", "lavfi", "-i", "sine=duration=0.2", "sound.mp4"});
+  EXPECT_THAT(MessageOf<Error>([&] { FramesOf(folder / "sound.mp4"); }),
+              HasSubstr("sound.mp4: holds no video track that FFmpeg decodes"));
+}
+
 TEST(VideoTruth, WhatWeWriteIsStatedAndReadBack) {
   const TemporaryFolder folder;
   ImageRgb8 image(1280, 720, 3);
