@@ -38,7 +38,8 @@ struct Shot {
 struct Layout {
   std::vector<std::string> cameras;
   std::vector<Shot> shots;
-  std::vector<std::string> frames;  // in order of time
+  std::vector<std::string> frames;       // in order of time
+  std::vector<calib::LeftOut> left_out;  // what the folder holds and nothing is made of
 };
 
 std::vector<fs::path> Sorted(const fs::path& folder,
@@ -121,9 +122,9 @@ Layout FromNames(const std::vector<fs::path>& photos) {
 // Of one camera: which frame of its video belongs to which instant. A table that has as many rows
 // as the video has frames is a table of them in order, though it may count them from another start:
 // recorders number from when a camera began.
-std::map<int, int> InstantsOf(const RigInstants& instants, int camera, int frames) {
+std::map<int, int> InstantsOf(const RigTimestamps& timestamps, int camera, int frames) {
   std::map<int, int> own;
-  for (const auto& [key, instant] : instants) {
+  for (const auto& [key, instant] : timestamps.instants) {
     if (key.first == camera) own.emplace(key.second, instant);
   }
   if (static_cast<int>(own.size()) != frames) return own;
@@ -152,11 +153,28 @@ int FramesIn(const fs::path& video, Progress& progress) {
   throw Error(video.string() + ": expected frames, found none; is the video whole?");
 }
 
+// Where table and video differ in length, what has no partner is listed.
+void ListUnpaired(const RigTimestamps& timestamps, const std::map<int, int>& own, int frames,
+                  const std::string& name, Layout& layout) {
+  const int paired = static_cast<int>(
+      std::count_if(own.begin(), own.end(), [&](const auto& row) { return row.first < frames; }));
+  const int rows = static_cast<int>(own.size());
+  if (paired == frames && rows == paired) return;
+  layout.left_out.push_back(
+      {name, fmt::format("{} of {} frames have no row in timestamps.csv and {} of its {} rows have "
+                         "no frame in the video{}",
+                         frames - paired, frames, rows - paired, rows,
+                         timestamps.counted ? "; it has no column frame_index, so row k, in order "
+                                              "of time, is taken as frame k: if frames are missing "
+                                              "before the end, add that column"
+                                            : "")});
+}
+
 Layout FromVideos(const fs::path& folder, const std::vector<fs::path>& videos, Progress& progress) {
   Layout layout;
-  RigInstants instants;
+  RigTimestamps timestamps;
   const bool timed = fs::exists(folder / "timestamps.csv");
-  if (timed) instants = ReadRigTimestamps(folder / "timestamps.csv");
+  if (timed) timestamps = ReadRigTimestamps(folder / "timestamps.csv");
   for (const fs::path& video : videos) {
     const std::string name = video.stem().string();
     const auto id = WholeNumber(DigitsAtEnd(name));
@@ -167,7 +185,18 @@ Layout FromVideos(const fs::path& folder, const std::vector<fs::path>& videos, P
                       video.string()));
     }
     const int frames = FramesIn(video, progress);
-    const std::map<int, int> own = timed ? InstantsOf(instants, *id, frames) : std::map<int, int>{};
+    std::map<int, int> own;
+    if (timed) {
+      own = InstantsOf(timestamps, *id, frames);
+      if (own.empty()) {
+        throw Error(
+            fmt::format("{}: timestamps.csv has no row of cam_id {}, the number at the end of the "
+                        "video's name; "
+                        "rename the video after its camera, or move it out of the folder",
+                        video.string(), *id));
+      }
+      ListUnpaired(timestamps, own, frames, name, layout);
+    }
     for (int number = 0; number < frames; ++number) {
       Shot shot;
       shot.file = video;
@@ -328,6 +357,7 @@ RigPhotos ReadRigPhotos(const fs::path& folder, const calib::Board& board,
   Layout layout = LayoutOf(folder, progress);
   LookAtAll(board, options, threads, progress, layout);
   RigPhotos photos;
+  photos.left_out = layout.left_out;
   for (const std::string& name : layout.cameras) photos.cameras.push_back({name, 0, 0});
   std::map<std::string, size_t> frames;
   const std::vector<size_t> times = FrameTimes(layout.frames);

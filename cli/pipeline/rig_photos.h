@@ -29,7 +29,7 @@ struct RigPhotos {
 ///  - photos named CAMERA and a number, as left01.jpg and right01.jpg; same number, same instant;
 ///  - videos, one per camera; frames of the same number are of one instant, or as timestamps.csv
 ///    beside them says (columns sync_index, cam_id, frame_index; cam_id is the number at the end of
-///    the video's name).
+///    the video's name; without frame_index a camera's rows in order are its frames).
 /// Photos without the board are listed in left_out; frames in which no camera sees it are dropped
 /// from the views, but keep their place in time. The result is the same for any number of threads.
 /// Throws UsageError when the folder holds none of these, Error when no photo shows the board or a

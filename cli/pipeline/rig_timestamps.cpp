@@ -1,9 +1,11 @@
 #include "cli/pipeline/rig_timestamps.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <charconv>
 #include <sstream>
 #include <vector>
@@ -15,27 +17,118 @@ namespace dtr::pipeline {
 namespace {
 
 constexpr std::uintmax_t kLargestTableBytes = 64u << 20;
-constexpr std::array<const char*, 3> kColumns = {"sync_index", "cam_id", "frame_index"};
+constexpr const char* kByteOrderMark = "\xEF\xBB\xBF";
 
-std::vector<std::string> WordsOf(const std::string& line) {
-  std::vector<std::string> words;
-  std::istringstream parts(line);
-  for (std::string word; std::getline(parts, word, ',');) words.push_back(word);
-  return words;
+std::string Trimmed(const std::string& word) {
+  constexpr const char* kSpace = " \t\r";
+  const size_t first = word.find_first_not_of(kSpace);
+  if (first == std::string::npos) return "";
+  return word.substr(first, word.find_last_not_of(kSpace) - first + 1);
 }
 
-// Where each of kColumns stands in a line.
-std::array<size_t, 3> PlacesOf(const std::string& heading, const std::string& file) {
-  const std::vector<std::string> words = WordsOf(heading);
-  std::array<size_t, 3> places{};
-  for (size_t i = 0; i < kColumns.size(); ++i) {
-    const auto found = std::find(words.begin(), words.end(), kColumns[i]);
-    if (found == words.end()) {
-      throw Error(fmt::format("{}: expected a column {}, found none", file, kColumns[i]));
+// Cells of a line; within quotes a separator is text, and two quotes are one.
+std::vector<std::string> CellsOf(const std::string& line, char separator) {
+  std::vector<std::string> cells{""};
+  bool quoted = false;
+  for (size_t i = 0; i < line.size(); ++i) {
+    const char c = line[i];
+    if (c == '"' && quoted && i + 1 < line.size() && line[i + 1] == '"') {
+      cells.back().push_back(line[++i]);
+    } else if (c == '"') {
+      quoted = !quoted;
+    } else if (c == separator && !quoted) {
+      cells.emplace_back();
+    } else {
+      cells.back().push_back(c);
     }
-    places[i] = static_cast<size_t>(found - words.begin());
   }
-  return places;
+  std::transform(cells.begin(), cells.end(), cells.begin(), Trimmed);
+  return cells;
+}
+
+char SeparatorOf(const std::string& heading) {
+  for (const char c : {',', ';', '\t'}) {
+    if (heading.find(c) != std::string::npos) return c;
+  }
+  return ',';
+}
+
+// A whole number, or one as data frames write it where a column has gaps: 26.0.
+std::optional<int> NumberOf(const std::string& cell) {
+  const size_t point = cell.find('.');
+  if (point == std::string::npos) return WholeNumber(cell);
+  if (cell.find_first_not_of('0', point + 1) != std::string::npos) return {};
+  return WholeNumber(cell.substr(0, point));
+}
+
+bool IsMissing(std::string cell) {
+  for (char& c : cell) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return cell.empty() || cell == "nan";
+}
+
+struct Row {
+  int instant = 0, camera = 0;
+  std::optional<int> frame;  // empty where the table has no such column
+};
+
+class Table {
+ public:
+  Table(std::string file, const std::string& heading)
+      : file_(std::move(file)), separator_(SeparatorOf(heading)) {
+    names_ = CellsOf(heading, separator_);
+    instant_ = Require("sync_index");
+    camera_ = Require("cam_id");
+    frame_ = Find("frame_index");
+    time_ = Find("frame_time");
+  }
+
+  bool counts_frames() const { return frame_.has_value(); }
+
+  // Empty where the line says that the camera has no frame.
+  std::optional<Row> RowOf(const std::string& line, int number) const {
+    const std::vector<std::string> cells = CellsOf(line, separator_);
+    const auto cell = [&](size_t at) { return at < cells.size() ? cells[at] : std::string(); };
+    Row row{
+        Number(cell(instant_), number, "sync_index"), Number(cell(camera_), number, "cam_id"), {}};
+    const auto& presence = frame_ ? frame_ : time_;
+    if (presence && IsMissing(cell(*presence))) return std::nullopt;
+    if (frame_) row.frame = Number(cell(*frame_), number, "frame_index");
+    return row;
+  }
+
+ private:
+  std::optional<size_t> Find(const std::string& name) const {
+    const auto found = std::find(names_.begin(), names_.end(), name);
+    if (found == names_.end()) return std::nullopt;
+    return static_cast<size_t>(found - names_.begin());
+  }
+
+  size_t Require(const std::string& name) const {
+    if (const auto at = Find(name)) return *at;
+    throw Error(fmt::format("{}: expected a column {}, found {}", file_, name,
+                            names_ == std::vector<std::string>{""}
+                                ? std::string("none")
+                                : fmt::format("{}", fmt::join(names_, ", "))));
+  }
+
+  int Number(const std::string& cell, int line, const char* column) const {
+    if (const auto value = NumberOf(cell)) return *value;
+    throw Error(fmt::format("{}: line {}: {}: expected a whole number", file_, line, column));
+  }
+
+  std::string file_;
+  char separator_;
+  std::vector<std::string> names_;
+  size_t instant_ = 0, camera_ = 0;
+  std::optional<size_t> frame_, time_;
+};
+
+// A table without frame numbers: a camera's rows, in order of time, are its frames.
+void CountFrames(std::vector<Row>& rows) {
+  std::stable_sort(rows.begin(), rows.end(),
+                   [](const Row& a, const Row& b) { return a.instant < b.instant; });
+  std::map<int, int> next;
+  for (Row& row : rows) row.frame = next[row.camera]++;
 }
 
 }  // namespace
@@ -47,33 +140,35 @@ std::optional<int> WholeNumber(const std::string& word) {
   return value;
 }
 
-RigInstants ReadRigTimestamps(const std::filesystem::path& file) {
-  std::istringstream lines(ReadFile(file, kLargestTableBytes));
-  RigInstants instants;
-  std::optional<std::array<size_t, 3>> places;
+RigTimestamps ReadRigTimestamps(const std::filesystem::path& file) {
+  std::string text = ReadFile(file, kLargestTableBytes);
+  if (text.starts_with(kByteOrderMark)) text.erase(0, 3);
+  std::istringstream lines(text);
+  std::optional<Table> table;
+  std::vector<Row> rows;
   std::string line;
   for (int number = 1; std::getline(lines, line); ++number) {
-    if (!line.empty() && line.back() == '\r') line.pop_back();
-    if (line.empty()) continue;
-    if (!places) {
-      places = PlacesOf(line, file.string());
-      continue;
+    if (Trimmed(line).empty()) continue;
+    if (!table) {
+      table.emplace(file.string(), Trimmed(line));
+    } else if (const auto row = table->RowOf(line, number)) {
+      rows.push_back(*row);
     }
-    const std::vector<std::string> words = WordsOf(line);
-    std::array<int, 3> values{};
-    for (size_t i = 0; i < kColumns.size(); ++i) {
-      const size_t at = (*places)[i];
-      const auto value = at < words.size() ? WholeNumber(words[at]) : std::nullopt;
-      if (!value) {
-        throw Error(fmt::format("{}: line {}: {}: expected a whole number", file.string(), number,
-                                kColumns[i]));
-      }
-      values[i] = *value;
-    }
-    instants[{values[1], values[2]}] = values[0];
   }
-  if (!places) PlacesOf("", file.string());  // an empty file has no columns
-  return instants;
+  if (!table) table.emplace(file.string(), "");  // an empty file has no columns
+  RigTimestamps timestamps;
+  timestamps.counted = !table->counts_frames();
+  if (timestamps.counted) CountFrames(rows);
+  for (const Row& row : rows) {
+    const auto [at, fresh] =
+        timestamps.instants.emplace(std::pair(row.camera, *row.frame), row.instant);
+    if (fresh || at->second == row.instant) continue;
+    throw Error(fmt::format(
+        "{}: cam_id {}: frame_index {} stands at sync_index {} and at {}; a frame is of one time "
+        "step",
+        file.string(), row.camera, *row.frame, at->second, row.instant));
+  }
+  return timestamps;
 }
 
 }  // namespace dtr::pipeline

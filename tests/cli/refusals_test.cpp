@@ -236,7 +236,7 @@ TEST_F(Refusals, BoardsAndRigsThatCannotBe) {
       {kWrongUsage, "expected a dictionary of OpenCV, as DICT_4X4_50, found 'DICT_9'",
        board("charuco:9x6:25mm:10mm:DICT_9")},
       {kWrongUsage, "--camera left: expected NAME=FILE", rig(names, {"--camera", "left"})},
-      {kFailed, "timestamps.csv: expected a column sync_index, found none", rig(table)},
+      {kFailed, "timestamps.csv: expected a column sync_index, found time, camera", rig(table)},
       {kFailed, "timestamps.csv: expected a column sync_index, found none", rig(empty)},
       {kFailed, "timestamps.csv: line 2: cam_id: expected a whole number", rig(number)},
       {kFailed, "expected a number at the end of the name, the cam_id of timestamps.csv",

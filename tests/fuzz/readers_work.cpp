@@ -64,7 +64,8 @@ Reader OpenTimestamps(const fs::path& folder) {
   const fs::path file = folder / "timestamps.csv";
   return {file,
           {"sync_index,cam_id,frame_index\n0,0,0\n0,1,2\n1,0,1\n1,1,3\n",
-           "frame_index,cam_id,seconds,sync_index\r\n12,0,0.25,0\r\n13,0,0.5,1\r\n"},
+           "frame_index,cam_id,seconds,sync_index\r\n12,0,0.25,0\r\n13,0,0.5,1\r\n",
+           "\xEF\xBB\xBF\"sync_index\";\"cam_id\";\"frame_time\"\n0;0;1.5\n0;1;\n1;1.0;2.5\n"},
           [=] { pipeline::ReadRigTimestamps(file); }};
 }
 
