@@ -43,10 +43,10 @@ TEST_F(FieldScene, ColmapReadsWhatIsExported) {
   DtrOk(Import(Field("_scene/transforms_dfull.json")));
   DtrOk({"export", Set(), "-o", (folder_ / "out").string()});
   const fs::path log = folder_ / "analyzer.log";
-  ASSERT_TRUE(
-      RunProcess({"colmap", "model_analyzer", "--path", (folder_ / "out/sparse/0").string()},
-                 {.log_file = log})
-          .Ok());
+  ProcessOptions logged;
+  logged.log_file = log;
+  const std::string model = (folder_ / "out/sparse/0").string();
+  ASSERT_TRUE(RunProcess({"colmap", "model_analyzer", "--path", model}, logged).Ok());
   EXPECT_THAT(Text(log), HasSubstr("Registered images: 6"));
   fs::create_directory(folder_ / "text");
   ASSERT_TRUE(
