@@ -39,11 +39,15 @@ int RunImport(Options options, const Context& context) {
   if (options.depth_kind == "ray") options.import.depth_kind = DepthKind::kRayDistance;
   options.import.held_out = pipeline::NamesHeldOut(options.held_out, cameras.list);
   options.import.threads = context.common.threads;
-  io::ImportSet(cameras.list, options.import, options.output, options.force,
-                cameras.points ? &*cameras.points : nullptr, context.console);
+  const io::AlphaTotals alpha =
+      io::ImportSet(cameras.list, options.import, options.output, options.force,
+                    cameras.points ? &*cameras.points : nullptr, context.console);
   context.console.Say(fmt::format("{}: {} views, {} held out", options.output.string(),
                                   cameras.list.cameras.size(), options.import.held_out.size()));
-  context.EmitJson(fmt::format("{{\"views\": {}}}", cameras.list.cameras.size()));
+  context.EmitJson(fmt::format(
+      "{{\"views\": {}, \"alpha\": {{\"masked_photos\": {}, \"partial_photos\": {}, "
+      "\"partial_px\": {}}}}}",
+      cameras.list.cameras.size(), alpha.masked_photos, alpha.partial_photos, alpha.partial_px));
   return kDone;
 }
 

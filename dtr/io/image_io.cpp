@@ -8,6 +8,7 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
+#include "dtr/io/alpha.h"
 #include "dtr/io/jpeg_cmyk.h"
 #include "dtr/io/oiio_files.h"
 
@@ -80,18 +81,20 @@ std::uint8_t Srgb8FromLinear(float linear) {
 // Channels to read: RGB of colour images, the one channel of grey ones; alpha and more are left.
 int ColourChannels(const ImageSpec& spec) { return spec.nchannels >= 3 ? 3 : 1; }
 
-// Pixels as 8-bit sRGB with the file's number of colour channels.
-Grid<std::uint8_t> ReadColours(OIIO::ImageInput& in, const fs::path& file) {
+// Pixels as 8-bit sRGB with the file's number of colour channels, without what alpha hides.
+Grid<std::uint8_t> ReadColours(OIIO::ImageInput& in, const fs::path& file, const Alpha& alpha) {
   const ImageSpec& spec = in.spec();
   const int channels = ColourChannels(spec);
   Grid<std::uint8_t> pixels(spec.width, spec.height, channels);
   if (spec.format.basetype == TypeDesc::UINT8) {
     ReadPixels(in, file, 0, channels, TypeDesc::UINT8, pixels.data().data());
+    alpha.Straighten(pixels.data(), channels);
     return pixels;
   }
   const bool linear = IsFloat(spec.format);
   std::vector<float> values(pixels.data().size());
   ReadPixels(in, file, 0, channels, TypeDesc::FLOAT, values.data());
+  alpha.Straighten(values, channels);
   for (size_t i = 0; i < values.size(); ++i) {
     if (!std::isfinite(values[i])) {
       throw Error(file.string() + ": expected finite colours, found NaN or infinity");
@@ -149,6 +152,7 @@ ImageHeader ReadImageHeader(const fs::path& file) {
   header.height_px = spec.height;
   // OpenImageIO tells the channels that it will convert a CMYK JPEG to, not those of the file.
   header.channels = IsCmyk(spec) ? 4 : spec.nchannels;
+  header.has_alpha = AlphaChannelOf(spec) >= 0;
   header.bits =
       spec.get_int_attribute("oiio:BitsPerSample", static_cast<int>(spec.format.size() * 8));
   header.is_float = IsFloat(spec.format);
@@ -166,13 +170,24 @@ ImageHeader ReadImageHeader(const fs::path& file) {
 }
 
 ImageRgb8 ReadImage(const fs::path& file, const ImageReadOptions& options) {
+  return ReadImageAndMask(file, options).image;
+}
+
+ImageAndMask ReadImageAndMask(const fs::path& file, const ImageReadOptions& options) {
   const auto in = OpenImage(file, options.limit_px);
   std::optional<Grid<std::uint8_t>> plain;
   if (IsCmyk(in->spec())) plain = ReadPlainCmykJpeg(file);
-  Grid<std::uint8_t> pixels = plain ? std::move(*plain) : ReadColours(*in, file);
+  const Alpha alpha(*in, file);
+  Grid<std::uint8_t> pixels = plain ? std::move(*plain) : ReadColours(*in, file, alpha);
   if (pixels.channels() == 1) pixels = RgbFromGrey(pixels);
-  if (!options.apply_exif_orientation) return pixels;
-  return ApplyExifOrientation(pixels, ExifOrientationOf(in->spec()));
+  Mask mask = alpha.Usable();
+  FillUnusable(pixels, mask);
+  if (options.apply_exif_orientation) {
+    const int orientation = ExifOrientationOf(in->spec());
+    pixels = ApplyExifOrientation(pixels, orientation);
+    mask = ApplyExifOrientation(mask, orientation);
+  }
+  return {std::move(pixels), std::move(mask), alpha.counts()};
 }
 
 Mask ReadMask(const fs::path& file, std::uint64_t limit_px) {
@@ -180,6 +195,10 @@ Mask ReadMask(const fs::path& file, std::uint64_t limit_px) {
   Mask mask(in->spec().width, in->spec().height);
   ReadPixels(*in, file, 0, 1, TypeDesc::UINT8, mask.data().data());
   for (std::uint8_t& value : mask.data()) value = value >= 128 ? 255 : 0;
+  if (AlphaChannelOf(in->spec()) > 0) {
+    const Mask opaque = Alpha(*in, file).Usable();
+    for (size_t i = 0; i < opaque.data().size(); ++i) mask.data()[i] &= opaque.data()[i];
+  }
   return mask;
 }
 
@@ -242,11 +261,11 @@ void WriteJpegWithExif(const fs::path& file, const ImageRgb8& image, int quality
   WriteFileAtomically(file, EncodeJpeg(image, quality, spec));
 }
 
-ImageRgb8 ApplyExifOrientation(const ImageRgb8& image, int exif_orientation) {
-  if (exif_orientation < 2 || exif_orientation > 8) return image;
+Grid<std::uint8_t> ApplyExifOrientation(const Grid<std::uint8_t>& image, int exif_orientation) {
+  if (image.empty() || exif_orientation < 2 || exif_orientation > 8) return image;
   const int w = image.width(), h = image.height();
   const bool transposed = exif_orientation >= 5;
-  ImageRgb8 upright(transposed ? h : w, transposed ? w : h, 3);
+  Grid<std::uint8_t> upright(transposed ? h : w, transposed ? w : h, image.channels());
   // Where pixel (x, y) of the upright image lies in the stored one; EXIF 2.3, tag 0x0112.
   const auto stored = [&](int x, int y) -> std::array<int, 2> {
     switch (exif_orientation) {
@@ -269,7 +288,7 @@ ImageRgb8 ApplyExifOrientation(const ImageRgb8& image, int exif_orientation) {
   for (int y = 0; y < upright.height(); ++y) {
     for (int x = 0; x < upright.width(); ++x) {
       const auto [sx, sy] = stored(x, y);
-      for (int c = 0; c < 3; ++c) upright(x, y, c) = image(sx, sy, c);
+      for (int c = 0; c < image.channels(); ++c) upright(x, y, c) = image(sx, sy, c);
     }
   }
   return upright;

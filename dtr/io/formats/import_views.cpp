@@ -12,7 +12,6 @@
 #include "dtr/base/parallel_for.h"
 #include "dtr/io/depth_io.h"
 #include "dtr/io/formats/foreign_depth.h"
-#include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/geometry.h"
 
@@ -59,7 +58,7 @@ bool HasDepth(const NamedCamera& named, const ImportOptions& options) {
   return !options.depth_dir.empty() && !options.held_out.contains(named.name);
 }
 
-ImageRgb8 ReadCameraImage(const NamedCamera& named, const fs::path& file) {
+ImageAndMask ReadCameraImage(const NamedCamera& named, const fs::path& file) {
   const ImageHeader header = ReadImageHeader(file);
   const PinholeCamera& camera = named.camera;
   if (header.exif_orientation != 1) {
@@ -72,7 +71,7 @@ ImageRgb8 ReadCameraImage(const NamedCamera& named, const fs::path& file) {
                 " pixels as the camera says, found " + SizeText(header.width_px, header.height_px) +
                 "; give the images the cameras were made for");
   }
-  return ReadImage(file);
+  return ReadImageAndMask(file);
 }
 
 bool HoldsWholeNumbers(const fs::path& depth_file) {
@@ -110,6 +109,66 @@ Mask ReadCameraMask(const NamedCamera& named, const ImportOptions& options) {
         "is to be used is 255, not 1");
   }
   return mask;
+}
+
+bool LeavesNothing(const Mask& mask) {
+  return std::none_of(mask.data().begin(), mask.data().end(),
+                      [](auto value) { return value != 0; });
+}
+
+// What the alpha of the image (empty: all of it) and the camera's mask file both allow.
+Mask UsablePart(const NamedCamera& named, const ImportOptions& options, Mask alpha) {
+  const std::string file = (options.images_dir / named.name).string();
+  if (!alpha.empty() && LeavesNothing(alpha)) {
+    throw Error(file +
+                ": no pixel has an alpha of at least one half; remove the alpha channel if it "
+                "means nothing");
+  }
+  if (named.mask_file.empty()) return alpha;
+  Mask mask = ReadCameraMask(named, options);
+  for (size_t i = 0; i < alpha.data().size(); ++i) mask.data()[i] &= alpha.data()[i];
+  if (LeavesNothing(mask)) {
+    throw Error(file +
+                ": its alpha channel and its mask have no usable pixel in common; remove one "
+                "of them");
+  }
+  return mask;
+}
+
+// What may not be used has no depth: with alpha the depth there is as arbitrary as the colour.
+void RemoveMaskedDepth(View& view) {
+  if (view.mask.empty()) return;
+  for (int y = 0; y < view.depth.height(); ++y) {
+    for (int x = 0; x < view.depth.width(); ++x) {
+      bool usable = false;
+      for (int j = 0; j < view.depth_scale && !usable; ++j) {
+        const std::uint8_t* row = &view.mask(view.depth_scale * x, view.depth_scale * y + j);
+        usable = std::any_of(row, row + view.depth_scale, [](auto value) { return value != 0; });
+      }
+      if (!usable) view.depth(x, y) = 0;
+    }
+  }
+}
+
+View ImportView(const NamedCamera& named, const std::string& id, const ImportOptions& options,
+                AlphaCounts& alpha) {
+  View view;
+  view.id = id;
+  view.name = named.name;
+  view.role = options.held_out.contains(named.name) ? ViewRole::kHeldOut : ViewRole::kSource;
+  view.camera = named.camera;
+  view.cam_from_world = named.cam_from_world;
+  view.depth_coding = options.depth_coding;
+  ImageAndMask read = ReadCameraImage(named, options.images_dir / named.name);
+  alpha = read.alpha;
+  view.image = std::move(read.image);
+  view.mask = UsablePart(named, options, std::move(read.mask));
+  if (HasDepth(named, options)) {
+    view.depth = ReadCameraDepth(named, options);
+    view.depth_scale = view.camera.width_px() / view.depth.width();
+    RemoveMaskedDepth(view);
+  }
+  return view;
 }
 
 void RequireHeldOutNames(const CameraList& list, const ImportOptions& options) {
@@ -223,7 +282,7 @@ std::string Fingerprint(const nlohmann::json& inputs, const CameraList& list,
 
 // Writes all views, each in turn without its pixels into `set` and coarsely into `coarse`.
 void WriteViews(const CameraList& list, const ImportOptions& options, SetWriter& writer,
-                DtrSet& set, DtrSet& coarse, Progress& progress) {
+                DtrSet& set, DtrSet& coarse, AlphaTotals& alpha, Progress& progress) {
   const std::vector<std::string> ids = IdsOf(list);
   const int count = static_cast<int>(list.cameras.size());
   set.frames.resize(1);
@@ -231,13 +290,15 @@ void WriteViews(const CameraList& list, const ImportOptions& options, SetWriter&
   coarse.frames = set.frames;
   progress.Stage("import", count);
   MemoryBudget memory(options.memory_gb);
+  std::vector<std::pair<AlphaCounts, bool>> alphas(list.cameras.size());
   std::atomic<int> done{0};
   ParallelFor(0, count, options.threads, [&](int i) {
     progress.ThrowIfInterrupted();
     const auto at = static_cast<size_t>(i);
     const PinholeCamera& camera = list.cameras[at].camera;
     const auto share = memory.TakeForPhoto(camera.width_px(), camera.height_px());
-    View view = ImportView(list.cameras[at], ids[at], options);
+    View view = ImportView(list.cameras[at], ids[at], options, alphas[at].first);
+    alphas[at].second = alphas[at].first.any() && !view.mask.empty();
     writer.WriteView(view, list.unit);
     coarse.frames[0].views[at] = CoarseCopy(view);
     view.image = {};
@@ -246,16 +307,20 @@ void WriteViews(const CameraList& list, const ImportOptions& options, SetWriter&
     set.frames[0].views[at] = std::move(view);
     progress.Update(++done);
   });
+  for (const auto& [counts, masks] : alphas) alpha.Add(counts, masks);
+  if (!alpha.Line().empty()) progress.Note(alpha.Line());
 }
 
-void WriteSet(const CameraList& list, const ImportOptions& options, const std::string& provenance,
-              const SparseScene* points, SetWriter& writer, Progress& progress) {
+AlphaTotals WriteSet(const CameraList& list, const ImportOptions& options,
+                     const std::string& provenance, const SparseScene* points, SetWriter& writer,
+                     Progress& progress) {
   const CameraList near = RecentreWorld(list);
   DtrSet set, coarse;
   set.unit = near.unit;
   set.world_origin = near.world_origin;
   set.provenance_json = provenance;
-  WriteViews(near, options, writer, set, coarse, progress);
+  AlphaTotals alpha;
+  WriteViews(near, options, writer, set, coarse, alpha, progress);
   std::vector<View>& views = set.frames[0].views;
   std::vector<SparsePoint> source_points;
   if (points != nullptr) {
@@ -270,25 +335,14 @@ void WriteSet(const CameraList& list, const ImportOptions& options, const std::s
     views[i].reference_baseline = coarse.frames[0].views[i].reference_baseline;
   }
   writer.Finish(set);
+  return alpha;
 }
 
 }  // namespace
 
 View ImportView(const NamedCamera& named, const std::string& id, const ImportOptions& options) {
-  View view;
-  view.id = id;
-  view.name = named.name;
-  view.role = options.held_out.contains(named.name) ? ViewRole::kHeldOut : ViewRole::kSource;
-  view.camera = named.camera;
-  view.cam_from_world = named.cam_from_world;
-  view.depth_coding = options.depth_coding;
-  view.image = ReadCameraImage(named, options.images_dir / named.name);
-  if (!named.mask_file.empty()) view.mask = ReadCameraMask(named, options);
-  if (HasDepth(named, options)) {
-    view.depth = ReadCameraDepth(named, options);
-    view.depth_scale = view.camera.width_px() / view.depth.width();
-  }
-  return view;
+  AlphaCounts ignored;
+  return ImportView(named, id, options, ignored);
 }
 
 std::vector<View> ImportViews(const CameraList& list, const ImportOptions& options) {
@@ -302,8 +356,8 @@ std::vector<View> ImportViews(const CameraList& list, const ImportOptions& optio
   return views;
 }
 
-void ImportSet(const CameraList& list, const ImportOptions& options, const fs::path& target,
-               bool force, const SparseScene* points, Progress& progress) {
+AlphaTotals ImportSet(const CameraList& list, const ImportOptions& options, const fs::path& target,
+                      bool force, const SparseScene* points, Progress& progress) {
   RequireHeldOutNames(list, options);
   if (options.depth_dir.empty() && (points == nullptr || points->points.empty())) {
     throw UsageError(
@@ -315,7 +369,7 @@ void ImportSet(const CameraList& list, const ImportOptions& options, const fs::p
   const std::string fingerprint = Fingerprint(inputs, list, options, points);
   SetWriter writer(target, fingerprint, force);
   try {
-    WriteSet(list, options, inputs.dump(), points, writer, progress);
+    return WriteSet(list, options, inputs.dump(), points, writer, progress);
   } catch (const Error&) {
     // An import starts anew anyway, and what it left would stand in the way of mended inputs.
     writer.Discard();

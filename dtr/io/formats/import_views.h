@@ -8,6 +8,7 @@
 
 #include "dtr/base/progress.h"
 #include "dtr/io/formats/cameras_json.h"
+#include "dtr/io/image_io.h"
 #include "dtr/types/sparse_scene.h"
 #include "dtr/types/view.h"
 
@@ -34,8 +35,10 @@ struct ImportOptions {
 /// One view with its pixels. The depth file is the list's, else the only file of depth_dir with the
 /// photo's name and the extension .exr, .pfm, .png or .tif; ray distances become plane z. Pixels
 /// without depth are holes, never guessed. near_z and far_z are left to the writer.
-/// Throws Error, naming the file, when an image, depth map or mask is absent, damaged or of another
-/// size than its camera, or when the image has an EXIF orientation (its camera is then ambiguous).
+/// Transparent pixels are masked (ReadImageAndMask), and a mask file must allow a pixel as well.
+/// What is masked has no depth. Throws Error, naming the file, when an image, depth map or mask is
+/// absent, damaged or of another size than its camera, or when the image has an EXIF orientation
+/// (its camera is then ambiguous).
 View ImportView(const NamedCamera& named, const std::string& id, const ImportOptions& options);
 
 /// All views of a list, in its order, ready for SetWriter::WriteView: everything in memory at once.
@@ -47,9 +50,10 @@ std::vector<View> ImportViews(const CameraList& list, const ImportOptions& optio
 /// depth, or from `points` where there is none. `points` (world of the list, views = indices into
 /// it) become the set's sparse scene; null: none. Views go through memory a few at a time.
 /// Throws UsageError when `target` exists without `force` or neither depth nor points are given;
-/// Error like ImportView. A failure or interruption leaves nothing behind.
-void ImportSet(const CameraList& list, const ImportOptions& options,
-               const std::filesystem::path& target, bool force, const SparseScene* points,
-               Progress& progress);
+/// Error like ImportView. Returns what the alpha of the images said. A failure or interruption
+/// leaves nothing behind.
+AlphaTotals ImportSet(const CameraList& list, const ImportOptions& options,
+                      const std::filesystem::path& target, bool force, const SparseScene* points,
+                      Progress& progress);
 
 }  // namespace dtr::io
