@@ -17,6 +17,7 @@ using Json = nlohmann::ordered_json;
 constexpr char kFormat[] = "dtr-capture";
 constexpr int kVersion = 1;
 constexpr int kLargestSidePx = 1'000'000;
+constexpr std::uint64_t kLargestCount = 1'000'000'000'000;  // both sides at their largest
 
 // A JSON value that knows where it stands, for errors that name the field.
 class Node {
@@ -59,6 +60,16 @@ class Node {
       Fail("a number from " + std::to_string(low) + " to " + std::to_string(high));
     }
     return static_cast<int>(number);
+  }
+  std::int64_t Count() const {
+    if (!value_.is_number_unsigned() || value_.get<std::uint64_t>() > kLargestCount) {
+      Fail("a number of pixels");
+    }
+    return value_.get<std::int64_t>();
+  }
+  bool Bool() const {
+    if (!value_.is_boolean()) Fail("true or false");
+    return value_.get<bool>();
   }
   double Number(double low, double high) const {
     if (!value_.is_number()) Fail("a number");
@@ -120,6 +131,11 @@ Json ToJson(const Photo& photo) {
   }
   if (!photo.mask_file.empty()) {
     json["mask"] = {{"file", photo.mask_file.generic_string()}, {"sha256", photo.mask_sha256}};
+  }
+  if (photo.alpha) {
+    json["alpha"] = {{"transparent_px", photo.alpha->transparent_px},
+                     {"partial_px", photo.alpha->partial_px},
+                     {"masks", photo.alpha->masks}};
   }
   json["source_sha256"] = photo.source_sha256;
   json["screening"] = photo.screening ? ToJson(*photo.screening) : Json();
@@ -197,6 +213,10 @@ Photo PhotoFrom(const Node& node) {
     io::RequireSafeName(mask_file, (*mask)["file"].where());
     photo.mask_file = mask_file;
     photo.mask_sha256 = (*mask)["sha256"].Text();
+  }
+  if (const auto alpha = node.Optional("alpha")) {
+    photo.alpha = PhotoAlpha{(*alpha)["transparent_px"].Count(), (*alpha)["partial_px"].Count(),
+                             (*alpha)["masks"].Bool()};
   }
   photo.source_sha256 = node["source_sha256"].Text();
   if (!node["screening"].IsNull()) photo.screening = ScreeningFrom(node["screening"]);

@@ -21,9 +21,11 @@ std::set<std::string> Suspects(const Capture& capture) {
 
 // Equal for photos that give equal views wherever they stand.
 std::string PictureHash(const Photo& photo) {
-  const ImageRgb8 pixels = ReadPhoto(photo);
+  const PhotoPixels read = ReadPhotoAndMask(photo);
+  const ImageRgb8& pixels = read.image;
   return std::to_string(pixels.width()) + "x" + std::to_string(pixels.height()) + " " +
-         Sha256(std::as_bytes(std::span(pixels.data()))) + " " + photo.mask_sha256;
+         Sha256(std::as_bytes(std::span(pixels.data()))) + " " +
+         Sha256(std::as_bytes(std::span(read.mask.data())));
 }
 
 }  // namespace

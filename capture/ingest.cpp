@@ -157,14 +157,15 @@ Photo InspectPhoto(const fs::path& file, const std::string& name, const fs::path
   photo.gps = header.gps;
   photo.camera_group = CameraGroup(photo, header);
   photo.source_sha256 = Sha256OfFile(file);
-  if (mask.empty() && !screen) return photo;
+  if (mask.empty() && !screen && !header.has_alpha) return photo;
   const auto share = memory.TakeForPhoto(photo.width_px, photo.height_px);
   if (!mask.empty()) {
     photo.mask_file = mask;
     photo.mask_sha256 = Sha256OfFile(mask);
-    (void)ReadPhotoMask(photo);  // one that cannot be used is known now
   }
-  if (screen) photo.screening = MeasurePhoto(ReadPhoto(photo));
+  const PhotoPixels pixels = ReadPhotoAndMask(photo);  // what cannot be used is known now
+  photo.alpha = pixels.alpha;
+  if (screen) photo.screening = MeasurePhoto(pixels.image, pixels.mask);
   return photo;
 }
 
@@ -300,6 +301,8 @@ Capture IngestPhotos(const fs::path& folder, const IngestOptions& options, Progr
   if (capture.photos.empty()) ThrowNoPhotos(folder, capture, listing.ignored);
   AssignIds(capture.photos);
   JudgePhotos(capture.photos);
+  const std::string alpha = AlphaLine(capture.photos);
+  if (!alpha.empty()) progress.Note(alpha);
   return capture;
 }
 

@@ -111,19 +111,27 @@ void RequireEnoughPhotos(const Capture& capture, const std::filesystem::path& wh
   throw Error(message + "; a scene needs several views");
 }
 
-ImageRgb8 ReadPhoto(const Photo& photo) {
-  ImageRgb8 image = io::ReadImage(photo.file, {.apply_exif_orientation = !photo.as_stored});
+namespace {
+
+io::ImageAndMask ReadOnGrid(const Photo& photo) {
+  io::ImageAndMask read =
+      io::ReadImageAndMask(photo.file, {.apply_exif_orientation = !photo.as_stored});
+  const ImageRgb8& image = read.image;
   if (image.width() != photo.width_px || image.height() != photo.height_px) {
     throw Error(photo.file.string() + ": expected a photo of " + std::to_string(photo.width_px) +
                 "x" + std::to_string(photo.height_px) + " pixels as when it was ingested, found " +
                 std::to_string(image.width()) + "x" + std::to_string(image.height()) +
                 "; ingest the photos again");
   }
-  return image;
+  return read;
 }
 
-Mask ReadPhotoMask(const Photo& photo) {
-  if (photo.mask_file.empty()) return {};
+bool LeavesNothing(const Mask& mask) {
+  return !mask.empty() &&
+         std::all_of(mask.data().begin(), mask.data().end(), [](auto value) { return value == 0; });
+}
+
+Mask ReadMaskFile(const Photo& photo) {
   Mask mask = OnGridOf(photo, io::ReadMask(photo.mask_file));
   if (mask.width() != photo.width_px || mask.height() != photo.height_px) {
     throw Error(
@@ -131,13 +139,62 @@ Mask ReadPhotoMask(const Photo& photo) {
                     photo.mask_file.string(), photo.width_px, photo.height_px, photo.name,
                     mask.width(), mask.height()));
   }
-  if (std::none_of(mask.data().begin(), mask.data().end(), [](auto value) { return value != 0; })) {
+  if (LeavesNothing(mask)) {
     throw Error(
         fmt::format("{}: expected a mask that leaves something of its photo {}, found it "
                     "dark throughout; dark is not used",
                     photo.mask_file.string(), photo.name));
   }
   return mask;
+}
+
+// What the mask file and the alpha both allow.
+Mask WithMaskFile(const Photo& photo, Mask alpha) {
+  if (LeavesNothing(alpha)) {
+    throw Error(
+        fmt::format("{}: no pixel of {} has an alpha of at least one half; remove the "
+                    "alpha channel if it means nothing",
+                    photo.file.string(), photo.name));
+  }
+  if (photo.mask_file.empty()) return alpha;
+  Mask mask = ReadMaskFile(photo);
+  for (size_t i = 0; i < alpha.data().size(); ++i) mask.data()[i] &= alpha.data()[i];
+  if (LeavesNothing(mask)) {
+    throw Error(
+        fmt::format("{}: the mask and the alpha channel of {} have no usable pixel in "
+                    "common; remove one of them",
+                    photo.mask_file.string(), photo.name));
+  }
+  return mask;
+}
+
+}  // namespace
+
+ImageRgb8 ReadPhoto(const Photo& photo) { return ReadOnGrid(photo).image; }
+
+Mask ReadPhotoMask(const Photo& photo) {
+  if (!photo.HasMask()) return {};
+  return WithMaskFile(photo, photo.alpha && photo.alpha->masks ? ReadOnGrid(photo).mask : Mask());
+}
+
+PhotoPixels ReadPhotoAndMask(const Photo& photo) {
+  io::ImageAndMask read = ReadOnGrid(photo);
+  PhotoPixels pixels;
+  if (read.alpha.any()) {
+    pixels.alpha = {read.alpha.transparent_px, read.alpha.partial_px, !read.mask.empty()};
+  }
+  pixels.image = std::move(read.image);
+  pixels.mask = WithMaskFile(photo, std::move(read.mask));
+  return pixels;
+}
+
+std::string AlphaLine(const std::vector<Photo>& photos) {
+  io::AlphaTotals totals;
+  for (const Photo& photo : photos) {
+    if (photo.alpha)
+      totals.Add({photo.alpha->transparent_px, photo.alpha->partial_px}, photo.alpha->masks);
+  }
+  return totals.Line();
 }
 
 }  // namespace dtr::capture

@@ -1,5 +1,6 @@
 // capture/photo.h -- what was photographed: photos and what is known of them before calibration.
 #pragma once
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -24,7 +25,7 @@ struct Screening {
   /// Variance of the 4-neighbour Laplacian over the variance of the brightness itself: falls with
   /// blur, does not change with contrast. 0 for a photo of one colour.
   double sharpness = 0;
-  double overexposed_share = 0;   ///< pixels with a channel at 254 or 255
+  double overexposed_share = 0;   ///< of the usable pixels: those with a channel at 254 or 255
   double underexposed_share = 0;  ///< pixels with all channels at 0 or 1
   /// Name of the first photo with the same bytes, else of an earlier one that shows the same
   /// picture; empty where there is none.
@@ -40,6 +41,13 @@ struct VideoFrame {
   std::string video;  ///< file name
   int number = 0;     ///< from 0
   double time_s = 0;  ///< when the video shows it
+};
+
+/// What the alpha channel of a photo's file says, where it is not opaque throughout.
+struct PhotoAlpha {
+  std::int64_t transparent_px = 0;
+  std::int64_t partial_px = 0;  ///< neither transparent nor opaque: usable from one half up
+  bool masks = false;           ///< some pixels are not usable
 };
 
 /// One photo. Sizes and pixels are meant upright, after the EXIF orientation, unless `as_stored`.
@@ -68,6 +76,9 @@ struct Photo {
   /// Empty: all of it.
   std::filesystem::path mask_file;
   std::string mask_sha256;  ///< of that file, or empty
+  std::optional<PhotoAlpha> alpha;
+  /// Whether part of the photo is not to be used, by its mask file or its alpha.
+  bool HasMask() const { return !mask_file.empty() || (alpha && alpha->masks); }
 
   std::string source_sha256;  ///< of the original file
   std::optional<Screening> screening;
@@ -111,13 +122,26 @@ void TakeAsStored(Photo& photo);
 /// A scene needs two photos. Throws Error naming `where`, the number found and what was skipped.
 void RequireEnoughPhotos(const Capture& capture, const std::filesystem::path& where);
 
-/// The photo upright (or as stored, where the photo says so), 8-bit sRGB. Throws Error when the
-/// file is unreadable or has no longer the size it had when it was ingested.
+/// The photo upright (or as stored, where the photo says so), 8-bit sRGB, without colours that its
+/// alpha hides (io::ReadImageAndMask). Throws Error when the file is unreadable or has no longer the
+/// size it had when it was ingested.
 ImageRgb8 ReadPhoto(const Photo& photo);
 
-/// What of the photo may be used, on the photo's grid; empty where it has no mask. A mask is an
-/// upright image, but one that fits only the photo as it is stored is taken as that. Throws Error
-/// when the mask is unreadable, is not of the photo's size or leaves nothing.
+/// What of the photo may be used, on the photo's grid, by its mask file and by its alpha, which must
+/// both allow it; empty where it has neither. A mask is an upright image, but one that fits only the
+/// photo as it is stored is taken as that. Throws Error when the mask is unreadable, is not of the
+/// photo's size, or nothing is left.
 Mask ReadPhotoMask(const Photo& photo);
+
+/// Both at once, with what the alpha says whatever `photo` tells of it.
+struct PhotoPixels {
+  ImageRgb8 image;
+  Mask mask;
+  std::optional<PhotoAlpha> alpha;
+};
+PhotoPixels ReadPhotoAndMask(const Photo& photo);
+
+/// One line about the alpha of the photos; empty where none has any.
+std::string AlphaLine(const std::vector<Photo>& photos);
 
 }  // namespace dtr::capture

@@ -62,6 +62,12 @@ double DifferenceOf(const Grid<std::uint16_t>& a, const Grid<std::uint16_t>& b) 
   return std::sqrt(static_cast<double>(squares) / static_cast<double>(a.data().size()));
 }
 
+// Whether a pixel and its 4 neighbours are usable.
+bool CrossIsUsable(const Mask& mask, int x, int y) {
+  return mask(x, y) != 0 && mask(x - 1, y) != 0 && mask(x + 1, y) != 0 && mask(x, y - 1) != 0 &&
+         mask(x, y + 1) != 0;
+}
+
 void Add(Screening& screening, Fault fault, std::string remark) {
   screening.faults.push_back(fault);
   screening.remarks.push_back(std::move(remark));
@@ -99,7 +105,7 @@ std::map<std::string, double> MedianSharpnessByCamera(const std::vector<Photo>& 
 
 }  // namespace
 
-double Sharpness(const ImageRgb8& photo) {
+double Sharpness(const ImageRgb8& photo, const Mask& mask) {
   const int width = photo.width(), height = photo.height();
   if (width < 3 || height < 3) return 0;
   std::array<std::vector<int>, 3> rows;  // above, this, below
@@ -113,7 +119,10 @@ double Sharpness(const ImageRgb8& photo) {
   for (int y = 1; y + 1 < height; ++y) {
     load(rows[2], y + 1);
     std::int64_t sum = 0, squares = 0, lap_sum = 0, lap_squares = 0;
+    std::int64_t counted = 0;
     for (size_t x = 1; x + 1 < static_cast<size_t>(width); ++x) {
+      if (!mask.empty() && !CrossIsUsable(mask, static_cast<int>(x), y)) continue;
+      ++counted;
       const std::int64_t value = rows[1][x];
       const std::int64_t lap =
           rows[0][x] + rows[2][x] + rows[1][x - 1] + rows[1][x + 1] - 4 * value;
@@ -122,8 +131,8 @@ double Sharpness(const ImageRgb8& photo) {
       lap_sum += lap;
       lap_squares += lap * lap;
     }
-    brightness.AddRow(sum, squares, width - 2);
-    laplacian.AddRow(lap_sum, lap_squares, width - 2);
+    brightness.AddRow(sum, squares, counted);
+    laplacian.AddRow(lap_sum, lap_squares, counted);
     std::rotate(rows.begin(), rows.begin() + 1, rows.end());
   }
   // Below a hundredth of a level there is nothing but the rounding of the means.
@@ -141,19 +150,22 @@ Grid<std::uint16_t> SmallLuma(const ImageRgb8& photo, int side_px) {
   return luma;
 }
 
-Screening MeasurePhoto(const ImageRgb8& photo) {
+Screening MeasurePhoto(const ImageRgb8& photo, const Mask& mask) {
   Screening screening;
-  screening.sharpness = Sharpness(photo);
-  std::int64_t over = 0, under = 0;
+  screening.sharpness = Sharpness(photo, mask);
+  std::int64_t over = 0, under = 0, usable = 0;
   const std::uint8_t* rgb = photo.data().data();
   const std::int64_t pixels = static_cast<std::int64_t>(photo.width()) * photo.height();
   for (std::int64_t i = 0; i < pixels; ++i, rgb += 3) {
+    if (!mask.empty() && mask.data()[static_cast<size_t>(i)] == 0) continue;
+    ++usable;
     const int most = std::max({rgb[0], rgb[1], rgb[2]});
     over += most >= kBright;
     under += most <= kDark;
   }
-  screening.overexposed_share = static_cast<double>(over) / static_cast<double>(pixels);
-  screening.underexposed_share = static_cast<double>(under) / static_cast<double>(pixels);
+  const double all = std::max(1.0, static_cast<double>(usable));
+  screening.overexposed_share = static_cast<double>(over) / all;
+  screening.underexposed_share = static_cast<double>(under) / all;
   screening.thumbnail = SmallLuma(photo, kThumbnailSidePx);
   return screening;
 }

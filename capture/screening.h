@@ -6,14 +6,15 @@
 
 namespace dtr::capture {
 
-/// Screening::sharpness.
-double Sharpness(const ImageRgb8& photo);
+/// Screening::sharpness, of the usable pixels whose neighbours are usable too (`mask` empty: all).
+double Sharpness(const ImageRgb8& photo, const Mask& mask = {});
 
 /// Luma of the whole photo in 1/256 levels, on a grid of at most `side_px` along its long side.
 Grid<std::uint16_t> SmallLuma(const ImageRgb8& photo, int side_px);
 
-/// Sharpness, clipping and thumbnail of a photo (its pixels only: no duplicates, no remarks).
-Screening MeasurePhoto(const ImageRgb8& photo);
+/// Sharpness, clipping and thumbnail of a photo (its pixels only: no duplicates, no remarks). What
+/// the mask leaves out counts in no share and no sharpness; empty: all of the photo is usable.
+Screening MeasurePhoto(const ImageRgb8& photo, const Mask& mask = {});
 
 /// Compares the photos with each other: names duplicates, faults and remarks, in place of those
 /// that were there. A photo is a duplicate of an earlier one that has the same bytes, or of one

@@ -96,13 +96,13 @@ void PrepareSfmImages(const Capture& capture, const fs::path& folder, int max_si
     const Photo& photo = capture.photos[static_cast<size_t>(i)];
     const auto share = memory.TakeForPhoto(photo.width_px, photo.height_px);
     PreparePhoto(photo, folder / photo.name, max_size_px);
-    if (!photo.mask_file.empty()) PrepareMask(photo, SfmMaskFile(folder, photo), max_size_px);
+    if (photo.HasMask()) PrepareMask(photo, SfmMaskFile(folder, photo), max_size_px);
     progress.Update(++done);
   });
 }
 
 fs::path SfmMaskFile(const fs::path& folder, const Photo& photo) {
-  if (photo.mask_file.empty()) return {};
+  if (!photo.HasMask()) return {};
   return fs::path(folder.string() + ".masks") / (photo.name + ".png");
 }
 

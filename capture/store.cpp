@@ -70,7 +70,7 @@ Photo StorePhoto(const Photo& photo, const fs::path& folder) {
     stored.exif_orientation = 1;
     io::WriteImage(folder / stored.file, ReadPhoto(photo));
   }
-  if (!photo.mask_file.empty()) {
+  if (photo.HasMask()) {
     stored.mask_file = fs::path("masks") / (photo.id + ".png");
     io::WriteMask(folder / stored.mask_file, ReadPhotoMask(photo));
   }
@@ -155,7 +155,7 @@ void CaptureWriter::Write(const Capture& capture, Progress& progress) {
   const fs::path partial = Open();
   RefuseOccupied(state_->folder, state_->options.replace);
   const bool masked = std::any_of(capture.photos.begin(), capture.photos.end(),
-                                  [](const Photo& photo) { return !photo.mask_file.empty(); });
+                                  [](const Photo& photo) { return photo.HasMask(); });
   std::error_code error;
   fs::create_directory(partial / "images", error);
   if (!error && masked) fs::create_directory(partial / "masks", error);

@@ -107,9 +107,13 @@ void FindPoints(const Options& options, const Context& context, pipeline::Camera
 }
 
 Json ResultJson(const Options& options, const pipeline::CamerasFromFile& cameras,
-                const std::vector<std::string>& notes) {
+                const io::AlphaTotals& alpha, const std::vector<std::string>& notes) {
   Json json = {{"views", cameras.list.cameras.size()},
                {"held_out", options.import.held_out.size()},
+               {"alpha",
+                {{"masked_photos", alpha.masked_photos},
+                 {"partial_photos", alpha.partial_photos},
+                 {"partial_px", alpha.partial_px}}},
                {"skipped", Json::array()},
                {"notes", notes}};
   for (const auto& [name, reason] : cameras.skipped) {
@@ -134,11 +138,12 @@ int RunImport(Options options, const Context& context) {
   options.import.threads = context.common.threads;
   io::SetWriter::RequireTarget(options.output, options.force);
   FindPoints(options, context, cameras, progress);
-  io::ImportSet(cameras.list, options.import, options.output, options.force,
-                cameras.points ? &*cameras.points : nullptr, progress);
+  const io::AlphaTotals alpha =
+      io::ImportSet(cameras.list, options.import, options.output, options.force,
+                    cameras.points ? &*cameras.points : nullptr, progress);
   context.console.Say(fmt::format("{}: {} views, {} held out", options.output.string(),
                                   cameras.list.cameras.size(), options.import.held_out.size()));
-  context.EmitJson(ResultJson(options, cameras, progress.lines()).dump(1));
+  context.EmitJson(ResultJson(options, cameras, alpha, progress.lines()).dump(1));
   return kDone;
 }
 

@@ -60,9 +60,8 @@ std::vector<calib::Track> YardstickOf(const capture::Capture& photos, const fs::
                                       int threads, Progress& progress) {
   const auto read = [&](int i) {
     const capture::Photo& photo = photos.photos[static_cast<size_t>(i)];
-    calib::YardstickPhoto asked{io::ReadImage(photo.file, {.apply_exif_orientation = true}), {}};
-    if (!photo.mask_file.empty()) asked.mask = io::ReadMask(photo.mask_file);
-    return asked;
+    capture::PhotoPixels pixels = capture::ReadPhotoAndMask(photo);
+    return calib::YardstickPhoto{std::move(pixels.image), std::move(pixels.mask)};
   };
   auto tracks = calib::FindTracks(static_cast<int>(photos.photos.size()), read, threads, progress);
   if (tracks.size() < calib::kFewestHeldOut) {

@@ -38,6 +38,16 @@ std::vector<report::Cell> RowOf(const capture::Photo& photo, const ImageRgb8& th
   return row;
 }
 
+// The photo, grey where it is masked.
+ImageRgb8 WithMaskShown(const capture::Photo& photo) {
+  constexpr std::uint8_t kMasked = 128;
+  capture::PhotoPixels pixels = ReadPhotoAndMask(photo);
+  for (size_t i = 0; i < pixels.mask.data().size(); ++i) {
+    if (pixels.mask.data()[i] == 0) std::fill_n(&pixels.image.data()[3 * i], 3, kMasked);
+  }
+  return std::move(pixels.image);
+}
+
 bool IsFaulty(const capture::Photo& photo) {
   return photo.screening && !photo.screening->remarks.empty();
 }
@@ -56,7 +66,7 @@ CaptureLook LookAt(const capture::Capture& capture, const std::string& title, in
     const auto index = static_cast<size_t>(i);
     const auto share =
         memory.TakeForPhoto(capture.photos[index].width_px, capture.photos[index].height_px);
-    thumbnails[index] = report::Shrink(ReadPhoto(capture.photos[index]), kThumbnailPx);
+    thumbnails[index] = report::Shrink(WithMaskShown(capture.photos[index]), kThumbnailPx);
     progress.Update(++done);
   });
 

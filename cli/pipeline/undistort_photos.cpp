@@ -90,9 +90,9 @@ std::vector<View> UndistortPhotos(const capture::Capture& capture,
     view.camera = calib::ShrunkCamera(onto, options.max_size_px);
     view.cam_from_world = found->second->cam_from_world;
     if (!writer.RestoreView(view)) {
-      calib::UndistortedPhoto flat =
-          calib::Undistort(capture::ReadPhoto(photo), capture::ReadPhotoMask(photo), lens, onto,
-                           options.max_size_px, options.threads);
+      const capture::PhotoPixels pixels = capture::ReadPhotoAndMask(photo);
+      calib::UndistortedPhoto flat = calib::Undistort(pixels.image, pixels.mask, lens, onto,
+                                                      options.max_size_px, options.threads);
       view.image = std::move(flat.image);
       view.mask = std::move(flat.mask);
       writer.WriteView(view, calibrated.unit);

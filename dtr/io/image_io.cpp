@@ -10,6 +10,7 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
+#include "dtr/io/alpha.h"
 #include "dtr/io/colour_coding.h"
 #include "dtr/io/file_colours.h"
 #include "dtr/io/jpeg_cmyk.h"
@@ -78,14 +79,15 @@ int ExifOrientationOf(const ImageSpec& spec) {
 // Channels to read: RGB of colour images, the one channel of grey ones; alpha and more are left.
 int ColourChannels(const ImageSpec& spec) { return spec.nchannels >= 3 ? 3 : 1; }
 
-// Pixels as 8-bit sRGB with the file's number of colour channels.
-Grid<std::uint8_t> ReadColours(OIIO::ImageInput& in, const fs::path& file) {
+// Pixels as 8-bit sRGB with the file's number of colour channels, without what alpha hides.
+Grid<std::uint8_t> ReadColours(OIIO::ImageInput& in, const fs::path& file, const Alpha& alpha) {
   const ImageSpec& spec = in.spec();
   const int channels = ColourChannels(spec);
   const PhotoColours colours(spec, file);
   Grid<std::uint8_t> pixels(spec.width, spec.height, channels);
   if (spec.format.basetype == TypeDesc::UINT8 && !colours.converts()) {
     ReadPixels(in, file, 0, channels, TypeDesc::UINT8, pixels.data().data());
+    alpha.Straighten(pixels.data(), channels);
     return pixels;
   }
   const bool linear = IsFloat(spec.format);
@@ -95,6 +97,7 @@ Grid<std::uint8_t> ReadColours(OIIO::ImageInput& in, const fs::path& file) {
                    [](float value) { return std::isfinite(value); })) {
     throw Error(file.string() + ": expected finite colours, found NaN or infinity");
   }
+  alpha.Straighten(values, channels);
   if (colours.converts()) {
     colours.Convert(values, channels, pixels.data());
     return pixels;
@@ -176,6 +179,7 @@ ImageHeader ReadImageHeader(const fs::path& file) {
   header.height_px = spec.height;
   // OpenImageIO tells the channels that it will convert a CMYK JPEG to, not those of the file.
   header.channels = IsCmyk(spec) ? 4 : spec.nchannels;
+  header.has_alpha = AlphaChannelOf(spec) >= 0;
   header.bits =
       spec.get_int_attribute("oiio:BitsPerSample", static_cast<int>(spec.format.size() * 8));
   header.is_float = IsFloat(spec.format);
@@ -197,13 +201,24 @@ ImageHeader ReadImageHeader(const fs::path& file) {
 }
 
 ImageRgb8 ReadImage(const fs::path& file, const ImageReadOptions& options) {
+  return ReadImageAndMask(file, options).image;
+}
+
+ImageAndMask ReadImageAndMask(const fs::path& file, const ImageReadOptions& options) {
   const auto in = OpenImage(file, options.limit_px);
   std::optional<Grid<std::uint8_t>> plain;
   if (IsCmyk(in->spec())) plain = ReadPlainCmykJpeg(file);
-  Grid<std::uint8_t> pixels = plain ? std::move(*plain) : ReadColours(*in, file);
+  const Alpha alpha(*in, file);
+  Grid<std::uint8_t> pixels = plain ? std::move(*plain) : ReadColours(*in, file, alpha);
   if (pixels.channels() == 1) pixels = RgbFromGrey(pixels);
-  if (!options.apply_exif_orientation) return pixels;
-  return ApplyExifOrientation(pixels, ExifOrientationOf(SpecOf(*in, file)));
+  Mask mask = alpha.Usable();
+  FillUnusable(pixels, mask);
+  if (options.apply_exif_orientation) {
+    const int orientation = ExifOrientationOf(SpecOf(*in, file));
+    pixels = ApplyExifOrientation(pixels, orientation);
+    mask = ApplyExifOrientation(mask, orientation);
+  }
+  return {std::move(pixels), std::move(mask), alpha.counts()};
 }
 
 Mask ReadMask(const fs::path& file, std::uint64_t limit_px) {
@@ -211,6 +226,10 @@ Mask ReadMask(const fs::path& file, std::uint64_t limit_px) {
   Mask mask(in->spec().width, in->spec().height);
   ReadPixels(*in, file, 0, 1, TypeDesc::UINT8, mask.data().data());
   for (std::uint8_t& value : mask.data()) value = value >= 128 ? 255 : 0;
+  if (AlphaChannelOf(in->spec()) > 0) {
+    const Mask opaque = Alpha(*in, file).Usable();
+    for (size_t i = 0; i < opaque.data().size(); ++i) mask.data()[i] &= opaque.data()[i];
+  }
   return mask;
 }
 
@@ -278,7 +297,7 @@ int InverseExifOrientation(int exif_orientation) {
 }
 
 Grid<std::uint8_t> ApplyExifOrientation(const Grid<std::uint8_t>& image, int exif_orientation) {
-  if (exif_orientation < 2 || exif_orientation > 8) return image;
+  if (image.empty() || exif_orientation < 2 || exif_orientation > 8) return image;
   const int w = image.width(), h = image.height();
   const bool transposed = exif_orientation >= 5;
   Grid<std::uint8_t> upright(transposed ? h : w, transposed ? w : h, image.channels());

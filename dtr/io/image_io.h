@@ -23,6 +23,7 @@ struct GpsPosition {
 struct ImageHeader {
   int width_px = 0, height_px = 0;  ///< as stored, before the EXIF orientation
   int channels = 0;
+  bool has_alpha = false;    ///< one of the channels is alpha, which may be opaque throughout
   int bits = 0;              ///< per channel
   bool is_float = false;     ///< float samples: linear light by convention
   std::string format;        ///< OpenImageIO's name of the format: "jpeg", "png", ...
@@ -53,7 +54,8 @@ struct ImageReadOptions {
 };
 
 /// Reads an image as 8-bit sRGB of 3 channels.
-/// Grey becomes RGB; alpha is dropped (not multiplied in); CMYK JPEG is converted without a colour
+/// Grey becomes RGB. Alpha is no part of the result, and neither are colours hidden by it: see
+/// ReadImageAndMask, which gives the mask too. CMYK JPEG is converted without a colour
 /// profile, taken to be inverted where it bears Adobe's marker, as Adobe's programs write it.
 /// Integer samples are converted by the file's ICC profile (lcms2, relative colorimetric), by the
 /// numbers of cICP or nclx (HDR: see SrgbConverter), by PNG's gAMA and cHRM or by EXIF's Adobe RGB;
@@ -64,8 +66,41 @@ struct ImageReadOptions {
 /// Throws Error when the file is no image, is damaged or cut short, or is larger than the limit.
 ImageRgb8 ReadImage(const std::filesystem::path& file, const ImageReadOptions& options = {});
 
+/// How many pixels of an image its alpha does not leave opaque.
+struct AlphaCounts {
+  std::int64_t transparent_px = 0;
+  std::int64_t partial_px = 0;  ///< neither transparent nor opaque
+  bool any() const { return transparent_px > 0 || partial_px > 0; }
+};
+
+/// An image with what its alpha channel says of it.
+struct ImageAndMask {
+  ImageRgb8 image;
+  Mask mask;  ///< empty: all of the image is usable
+  AlphaCounts alpha;
+};
+
+/// ReadImage with the alpha channel as a mask: pixels are usable from an alpha of one half up,
+/// where most of the light is the object's. Premultiplied colours are divided by alpha. What is not
+/// usable has colours that continue the usable ones smoothly, never those that the file hides
+/// there: no filter, feature or JPEG can bring them back. An image that is transparent throughout
+/// has a mask of zeros. Throws like ReadImage.
+ImageAndMask ReadImageAndMask(const std::filesystem::path& file,
+                              const ImageReadOptions& options = {});
+
+/// The alpha of several photos.
+struct AlphaTotals {
+  std::int64_t masked_photos = 0;   ///< of which alpha leaves some pixels out
+  std::int64_t partial_photos = 0;  ///< with pixels that are partly transparent
+  std::int64_t partial_px = 0;
+  void Add(const AlphaCounts& photo, bool masks);
+  /// One line for people; empty where there is nothing to say.
+  std::string Line() const;
+};
+
 /// Reads a mask: the first channel, usable (255) from half of full scale up, else 0. A mask that
-/// went through JPEG thus keeps its shape. Throws like ReadImage.
+/// went through JPEG thus keeps its shape. Where the mask itself has alpha, that must be at least
+/// one half too. Throws like ReadImage.
 Mask ReadMask(const std::filesystem::path& file, std::uint64_t limit_px = kImageLimitPx);
 
 inline constexpr int kDefaultJpegQuality = 95;
@@ -97,7 +132,7 @@ struct ExifFocal {
 void WriteJpegWithExif(const std::filesystem::path& file, const ImageRgb8& image, int quality,
                        const ExifFocal& exif);
 
-/// The image as it must be turned for EXIF orientation 1..8 (others: unchanged), of any number of
+/// The image or mask as it must be turned for EXIF orientation 1..8 (others: unchanged), of any number of
 /// channels.
 Grid<std::uint8_t> ApplyExifOrientation(const Grid<std::uint8_t>& image, int exif_orientation);
 

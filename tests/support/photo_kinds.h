@@ -46,7 +46,7 @@ inline void WriteSixteenBits(const std::filesystem::path& file, const ImageRgb8&
 
 /// Alpha that would change every colour if it were multiplied in.
 inline void WriteAlpha(const std::filesystem::path& file, const ImageRgb8& image) {
-  io::WriteImageWithAlpha(file, image, Mask(image.width(), image.height(), 1, 100));
+  io::WriteImageWithAlpha(file, image, Mask(image.width(), image.height(), 1, 200));
 }
 
 /// Linear light in floats, as renderers and cameras' raw converters give.

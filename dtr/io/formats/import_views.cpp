@@ -34,10 +34,12 @@ bool HasDepth(const NamedCamera& named, const ImportOptions& options) {
 struct ViewNote {
   bool as_stored = false, turned = false;  // of photos with an EXIF orientation
   std::string resampled;                   // what was done to its depth map
+  AlphaCounts alpha;
+  bool alpha_masks = false;
 };
 
-ImageRgb8 ReadCameraImage(const NamedCamera& named, const fs::path& file,
-                          const ImportOptions& options, ViewNote& note) {
+ImageAndMask ReadCameraImage(const NamedCamera& named, const fs::path& file,
+                             const ImportOptions& options, ViewNote& note) {
   const ImageHeader header = ReadImageHeader(file);
   const PinholeCamera& camera = named.camera;
   const StoredSize stored{header.width_px, header.height_px, header.exif_orientation};
@@ -50,7 +52,7 @@ ImageRgb8 ReadCameraImage(const NamedCamera& named, const fs::path& file,
   const bool upright = *grid == PhotoGrid::kUpright;
   note.as_stored = header.exif_orientation != 1 && !upright;
   note.turned = header.exif_orientation != 1 && upright;
-  return ReadImage(file, {.apply_exif_orientation = upright});
+  return ReadImageAndMask(file, {.apply_exif_orientation = upright});
 }
 
 Mask ReadCameraMask(const NamedCamera& named, const ImportOptions& options) {
@@ -68,6 +70,45 @@ Mask ReadCameraMask(const NamedCamera& named, const ImportOptions& options) {
         "is to be used is 255, not 1");
   }
   return mask;
+}
+
+bool LeavesNothing(const Mask& mask) {
+  return std::none_of(mask.data().begin(), mask.data().end(),
+                      [](auto value) { return value != 0; });
+}
+
+// What the alpha of the image (empty: all of it) and the camera's mask file both allow.
+Mask UsablePart(const NamedCamera& named, const ImportOptions& options, Mask alpha) {
+  const std::string file = (options.images_dir / named.name).string();
+  if (!alpha.empty() && LeavesNothing(alpha)) {
+    throw Error(file +
+                ": no pixel has an alpha of at least one half; remove the alpha channel if it "
+                "means nothing");
+  }
+  if (named.mask_file.empty()) return alpha;
+  Mask mask = ReadCameraMask(named, options);
+  for (size_t i = 0; i < alpha.data().size(); ++i) mask.data()[i] &= alpha.data()[i];
+  if (LeavesNothing(mask)) {
+    throw Error(file +
+                ": its alpha channel and its mask have no usable pixel in common; remove one "
+                "of them");
+  }
+  return mask;
+}
+
+// What may not be used has no depth: with alpha the depth there is as arbitrary as the colour.
+void RemoveMaskedDepth(View& view) {
+  if (view.mask.empty()) return;
+  for (int y = 0; y < view.depth.height(); ++y) {
+    for (int x = 0; x < view.depth.width(); ++x) {
+      bool usable = false;
+      for (int j = 0; j < view.depth_scale && !usable; ++j) {
+        const std::uint8_t* row = &view.mask(view.depth_scale * x, view.depth_scale * y + j);
+        usable = std::any_of(row, row + view.depth_scale, [](auto value) { return value != 0; });
+      }
+      if (!usable) view.depth(x, y) = 0;
+    }
+  }
 }
 
 void RequireHeldOutNames(const CameraList& list, const ImportOptions& options) {
@@ -195,8 +236,11 @@ View ViewOf(const NamedCamera& named, const std::string& id, const ImportOptions
   view.camera = named.camera;
   view.cam_from_world = named.cam_from_world;
   view.depth_coding = options.depth_coding;
-  view.image = ReadCameraImage(named, options.images_dir / named.name, options, note);
-  if (!named.mask_file.empty()) view.mask = ReadCameraMask(named, options);
+  ImageAndMask read = ReadCameraImage(named, options.images_dir / named.name, options, note);
+  view.image = std::move(read.image);
+  view.mask = UsablePart(named, options, std::move(read.mask));
+  note.alpha = read.alpha;
+  note.alpha_masks = read.alpha.any() && !view.mask.empty();
   std::unique_ptr<CameraDistortion> distortion;
   if (named.distortion) {
     if (!options.distortion_of) {
@@ -208,6 +252,7 @@ View ViewOf(const NamedCamera& named, const std::string& id, const ImportOptions
   if (HasDepth(named, options)) {
     view.depth = internal::ReadCameraDepth(named, options, distortion.get(), note.resampled);
     view.depth_scale = view.camera.width_px() / view.depth.width();
+    RemoveMaskedDepth(view);
   }
   return view;
 }
@@ -242,7 +287,7 @@ void TellOf(const CameraList& list, const std::vector<ViewNote>& notes, Progress
 
 // Writes all views, each in turn without its pixels into `set` and coarsely into `coarse`.
 void WriteViews(const CameraList& list, const ImportOptions& options, SetWriter& writer,
-                DtrSet& set, DtrSet& coarse, Progress& progress) {
+                DtrSet& set, DtrSet& coarse, AlphaTotals& alpha, Progress& progress) {
   const std::vector<std::string> ids = IdsOf(list);
   const int count = static_cast<int>(list.cameras.size());
   set.frames.resize(1);
@@ -267,16 +312,20 @@ void WriteViews(const CameraList& list, const ImportOptions& options, SetWriter&
     progress.Update(++done);
   });
   TellOf(list, notes, progress);
+  for (const ViewNote& note : notes) alpha.Add(note.alpha, note.alpha_masks);
+  if (!alpha.Line().empty()) progress.Note(alpha.Line());
 }
 
-void WriteSet(const CameraList& list, const ImportOptions& options, const std::string& provenance,
-              const SparseScene* points, SetWriter& writer, Progress& progress) {
+AlphaTotals WriteSet(const CameraList& list, const ImportOptions& options,
+                     const std::string& provenance, const SparseScene* points, SetWriter& writer,
+                     Progress& progress) {
   const CameraList near = RecentreWorld(list);
   DtrSet set, coarse;
   set.unit = near.unit;
   set.world_origin = near.world_origin;
   set.provenance_json = provenance;
-  WriteViews(near, options, writer, set, coarse, progress);
+  AlphaTotals alpha;
+  WriteViews(near, options, writer, set, coarse, alpha, progress);
   std::vector<View>& views = set.frames[0].views;
   std::vector<SparsePoint> source_points;
   if (points != nullptr) {
@@ -291,6 +340,7 @@ void WriteSet(const CameraList& list, const ImportOptions& options, const std::s
     views[i].reference_baseline = coarse.frames[0].views[i].reference_baseline;
   }
   writer.Finish(set);
+  return alpha;
 }
 
 }  // namespace
@@ -319,8 +369,8 @@ std::vector<View> ImportViews(const CameraList& list, const ImportOptions& optio
   return views;
 }
 
-void ImportSet(const CameraList& list, const ImportOptions& options, const fs::path& target,
-               bool force, const SparseScene* points, Progress& progress) {
+AlphaTotals ImportSet(const CameraList& list, const ImportOptions& options, const fs::path& target,
+                      bool force, const SparseScene* points, Progress& progress) {
   RequireHeldOutNames(list, options);
   if (options.depth_dir.empty() && (points == nullptr || points->points.empty())) {
     throw UsageError(
@@ -332,7 +382,7 @@ void ImportSet(const CameraList& list, const ImportOptions& options, const fs::p
   const std::string fingerprint = Fingerprint(inputs, list, options, points);
   SetWriter writer(target, fingerprint, force);
   try {
-    WriteSet(list, options, inputs.dump(), points, writer, progress);
+    return WriteSet(list, options, inputs.dump(), points, writer, progress);
   } catch (const Error&) {
     // An import starts anew anyway, and what it left would stand in the way of mended inputs.
     writer.Discard();

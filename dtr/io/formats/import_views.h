@@ -10,6 +10,7 @@
 
 #include "dtr/base/progress.h"
 #include "dtr/io/formats/cameras_json.h"
+#include "dtr/io/image_io.h"
 #include "dtr/types/sparse_scene.h"
 #include "dtr/types/view.h"
 
@@ -58,8 +59,9 @@ std::filesystem::path MaskFolder(const ImportOptions& options);
 /// a map of a size that no set can hold is resampled (depth_grid.h). Pixels without depth are
 /// holes, never guessed. near_z and far_z are left to the writer. Of an image with an EXIF
 /// orientation the camera's size says which pixels are meant, those stored or those turned upright.
-/// Throws Error, naming the file, when an image, depth map or mask is absent, damaged or of another
-/// size (a depth map: shape) than its camera.
+/// Transparent pixels are masked (ReadImageAndMask), and a mask file must allow a pixel as well.
+/// What is masked has no depth. Throws Error, naming the file, when an image, depth map or mask is
+/// absent, damaged or of another size (a depth map: shape) than its camera.
 View ImportView(const NamedCamera& named, const std::string& id, const ImportOptions& options);
 
 /// All views of a list, in its order, ready for SetWriter::WriteView: everything in memory at once.
@@ -71,9 +73,10 @@ std::vector<View> ImportViews(const CameraList& list, const ImportOptions& optio
 /// depth, or from `points` where there is none. `points` (world of the list, views = indices into
 /// it) become the set's sparse scene; null: none. Views go through memory a few at a time.
 /// Throws UsageError when `target` exists without `force` or neither depth nor points are given;
-/// Error like ImportView. A failure or interruption leaves nothing behind.
-void ImportSet(const CameraList& list, const ImportOptions& options,
-               const std::filesystem::path& target, bool force, const SparseScene* points,
-               Progress& progress);
+/// Error like ImportView. Returns what the alpha of the images said. A failure or interruption
+/// leaves nothing behind.
+AlphaTotals ImportSet(const CameraList& list, const ImportOptions& options,
+                      const std::filesystem::path& target, bool force, const SparseScene* points,
+                      Progress& progress);
 
 }  // namespace dtr::io

@@ -86,6 +86,21 @@ SparseScene Points(const Eigen::Vector3d& where) {
   return scene;
 }
 
+TEST_F(ImportTest, TransparentPixelsAreMaskedAndHaveNoDepth) {
+  Mask alpha(kWidth, kHeight, 1, 255);
+  alpha(95, 3) = 0;
+  const std::string name = list_.cameras[1].name;
+  const ImageRgb8 image = ReadImage(folder_ / "images" / name);
+  list_.cameras[1].name = "alpha.png";
+  fs::rename(folder_ / "depth/photo 1.exr", folder_ / "depth/alpha.exr");
+  WriteImageWithAlpha(folder_ / "images/alpha.png", image, alpha);
+  Import("a.dtr");
+  const View view = LoadSet(folder_ / "a.dtr").frames[0].views[1];
+  EXPECT_EQ(view.mask, alpha);
+  EXPECT_EQ(view.depth(95, 3), 0);
+  EXPECT_GT(view.depth(94, 3), 0);
+}
+
 TEST_F(ImportTest, TheSetHoldsWhatTheFilesHold) {
   Mask mask(kWidth, kHeight, 1, 255);
   mask(7, 8) = 0;
