@@ -8,6 +8,8 @@
 #include "dtr/io/depth_io.h"
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
+#include "dtr/types/area_average.h"
+#include "tests/capture/photo_files.h"
 #include "tests/cli/field_scene.h"
 
 namespace dtr::testing {
@@ -178,6 +180,133 @@ TEST_F(FieldScene, AUnitThatTheFileStatesIsUsed) {
   DtrOk({"import", "--cameras", file.string(), "--images", scene, "--depth", scene, "-o", Set()});
   constexpr double kExact = 1e-4;  // inverse depth in 16 bits
   EXPECT_LT(MedianError(io::LoadSet(Set())), kExact);
+}
+
+// Below: siblings of the cases, from public reports.
+
+// Cameras of different sizes with intrinsics of their own, and '\' in every path (nerfstudio
+// #2386).
+TEST_F(FieldScene, FramesMayHaveCamerasOfTheirOwn) {
+  Json file = Json::parse(Text(Field("_scene") / "transforms_dfull.json"));
+  for (const char* key : {"fl_x", "fl_y", "cx", "cy", "w", "h", "k1", "k2", "p1", "p2"}) {
+    file.erase(key);
+  }
+  const fs::path made = folder_ / "made";
+  for (const char* sub : {"rgb", "depth"}) fs::create_directories(made / "sensor0" / sub);
+  for (size_t i = 0; i < 6; ++i) {
+    Json& frame = file["frames"][i];
+    const int shrink = i % 2 == 0 ? 2 : 1;
+    const std::string name = std::to_string(i) + ".png";
+    const std::string stem = "frame_0000" + std::to_string(i);
+    const ImageRgb8 photo = io::ReadImage(Field("_scene/images") / (stem + ".jpg"));
+    io::WriteImage(made / "sensor0/rgb" / name, AreaAverage(photo, 480 / shrink, 360 / shrink));
+    const auto map = io::ReadPng16(Field("_scene/depth_full_mm") / (stem + ".png"));
+    Grid<std::uint16_t> small(480 / shrink, 360 / shrink);
+    for (int y = 0; y < small.height(); ++y) {
+      for (int x = 0; x < small.width(); ++x) small(x, y) = map(shrink * x, shrink * y);
+    }
+    io::WritePng16(made / "sensor0/depth" / name, small);
+    frame.update({{"fl_x", 420.0 / shrink},
+                  {"fl_y", 420.0 / shrink},
+                  {"cx", 240 / shrink},
+                  {"cy", 180 / shrink},
+                  {"w", 480 / shrink},
+                  {"h", 360 / shrink},
+                  {"k1", 0},
+                  {"k4", 0},
+                  {"file_path", "sensor0\\rgb\\" + name},
+                  {"depth_file_path", "sensor0\\depth\\" + name}});
+  }
+  std::ofstream(made / "transforms.json") << file.dump();
+  DtrOk({"import", "--cameras", (made / "transforms.json").string(), "--images", made.string(),
+         "--depth", made.string(), "--depth-unit", "0.001", "-o", Set()});
+  const DtrSet set = io::ReadSet(Set());
+  ASSERT_EQ(set.frames[0].views.size(), 6u);
+  EXPECT_EQ(set.frames[0].views[0].camera.width_px(), 240);
+  EXPECT_EQ(set.frames[0].views[1].camera.width_px(), 480);
+}
+
+// One camera held four ways: COLMAP has one size for all of them (colmap #1520, #1456).
+TEST_F(FieldScene, PhotosOfOneCameraInEveryOrientationAreTakenAsStored) {
+  const fs::path photos = folder_ / "photos";
+  fs::create_directories(photos);
+  const int orientations[] = {1, 6, 8, 3, 1, 6};
+  for (size_t i = 0; i < 6; ++i) {
+    const std::string name = "frame_0000" + std::to_string(i) + ".jpg";
+    fs::copy(Field("_scene/images") / name, photos / name);
+    if (orientations[i] != 1) capture::testing::AddExifOrientation(photos / name, orientations[i]);
+  }
+  const fs::path model = Field("exif_turned_import/model");
+  DtrOk({"import", "--cameras", model.string(), "--images", photos.string(), "-o", Set(), "--json",
+         (folder_ / "result.json").string()});
+  EXPECT_THAT(Notes(), HasSubstr("4 photos with an EXIF orientation, first frame_00001.jpg"));
+  const std::string built = (folder_ / "built.dtr").string();
+  DtrOk({"build", photos.string(), "--poses", model.string(), "--engine", "none", "-o", built});
+  for (const std::string& set : {Set(), built}) {
+    const DtrSet read = io::LoadSet(set);
+    ASSERT_EQ(read.frames[0].views.size(), 6u);
+    for (const View& view : read.frames[0].views) {
+      EXPECT_EQ(view.image, io::ReadImage(Field("_scene/images") / view.name)) << view.name;
+    }
+  }
+}
+
+// Paths without an extension (text2room #7), and with blanks and letters of other languages
+// (instant-ngp #1096).
+TEST_F(FieldScene, PathsMayLackTheExtensionAndHoldAnyLetter) {
+  Json file = Json::parse(Text(Field("_scene") / "transforms_dfull.json"));
+  const fs::path made = folder_ / "made";
+  fs::create_directories(made / "my images");
+  for (size_t i = 0; i < 6; ++i) {
+    const std::string stem = "my images/photo \xc3\xa9 " + std::to_string(i);
+    fs::copy(Field("_scene/images") / ("frame_0000" + std::to_string(i) + ".jpg"),
+             made / (stem + ".jpg"));
+    file["frames"][i]["file_path"] = "./" + stem;
+  }
+  std::ofstream(made / "transforms.json") << file.dump();
+  DtrOk({"import", "--cameras", (made / "transforms.json").string(), "--images", made.string(),
+         "--depth", Field("_scene").string(), "--depth-unit", "0.001", "-o", Set()});
+  EXPECT_EQ(io::ReadSet(Set()).frames[0].views.size(), 6u);
+}
+
+// Upright photos of a phone with LiDAR: 3x4, a ratio of 7.5 (record3d #30, nerfstudio #1253).
+TEST_F(FieldScene, DepthMapsOfPortraitPhotosAreResampledToo) {
+  const fs::path made = folder_ / "made";
+  fs::create_directories(made);
+  Json file = Json::parse(Text(Field("_scene") / "transforms_d75.json"));
+  file.update({{"w", 360}, {"h", 480}, {"cx", 180}, {"cy", 240}});
+  for (size_t i = 0; i < 6; ++i) {
+    const std::string name = std::to_string(i), stem = "frame_0000" + name;
+    const ImageRgb8 photo = io::ReadImage(Field("_scene/images") / (stem + ".jpg"));
+    io::WriteImage(made / (name + ".png"), io::ApplyExifOrientation(photo, 6));
+    const auto map = io::ReadPng16(Field("_scene/depth_75_mm") / (stem + ".png"));
+    Grid<std::uint16_t> upright(48, 64);
+    for (int y = 0; y < 64; ++y) {
+      for (int x = 0; x < 48; ++x) upright(x, y) = map(y, 47 - x);
+    }
+    io::WritePng16(made / ("d" + name + ".png"), upright);
+    file["frames"][i]["file_path"] = name + ".png";
+    file["frames"][i]["depth_file_path"] = "d" + name + ".png";
+  }
+  std::ofstream(made / "transforms.json") << file.dump();
+  DtrOk({"import", "--cameras", (made / "transforms.json").string(), "--images", made.string(),
+         "--depth", made.string(), "--depth-unit", "0.001", "-o", Set()});
+  const DtrSet set = io::LoadSet(Set());
+  const View& view = set.frames[0].views[0];
+  EXPECT_EQ(view.depth_scale, 6);
+  EXPECT_EQ(view.depth.width(), 60);
+  const auto truth = io::ReadPng16(Field("_scene/depth_full_mm/frame_00000.png"));
+  std::vector<double> errors;
+  for (int y = 0; y < 80; ++y) {
+    for (int x = 0; x < 60; ++x) {
+      const auto code = truth(6 * y + 3, 359 - (6 * x + 3));
+      if (code == 0 || DepthImage::IsHole(view.depth(x, y))) continue;
+      errors.push_back(std::abs(view.depth(x, y) / (0.001 * code) - 1));
+    }
+  }
+  std::nth_element(errors.begin(), errors.begin() + static_cast<long>(errors.size() / 2),
+                   errors.end());
+  EXPECT_LT(errors.at(errors.size() / 2), 0.01);
 }
 
 }  // namespace
