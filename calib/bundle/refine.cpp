@@ -269,9 +269,11 @@ void RequireDetermined(const SfmModel& model, const RefineOptions& options,
   for (const Degeneracy& d : DegeneraciesOf(model, options)) {
     if (!d.harmful || d.name == "duplicate_images" || d.name == "too_few_views") continue;
     throw Error(
-        fmt::format("{}: {}: {}; expected views that determine the cameras; "
-                    "docs/VALIDATION.md says what to do",
-                    what, d.name, d.detail));
+        fmt::format("{}: {}: {}; {}", what, d.name, d.detail,
+                    !options.advice.empty()
+                        ? options.advice
+                        : "take photos from more positions, around what they show, or give the "
+                          "camera (--lens); docs/VALIDATION.md names what each degeneracy lacks"));
   }
 }
 

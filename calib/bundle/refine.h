@@ -25,6 +25,8 @@ struct RefineOptions {
   /// The name of the model, or of its photos, where it must determine its cameras:
   /// Refine asks RequireDetermined before it adjusts anything. Empty: nobody asks.
   std::string determined;
+  /// What helps where it does not; empty: more views, or a camera that is known.
+  std::string advice = {};
   int threads = 0;
   std::uint64_t seed = 0;              ///< of the sights that are held out
   const Progress* progress = nullptr;  ///< AdjustOptions::progress of every solve

@@ -2,6 +2,9 @@
 
 #include <sqlite3.h>
 
+#include <array>
+#include <cmath>
+#include <cstring>
 #include <limits>
 #include <memory>
 
@@ -43,6 +46,35 @@ class Database {
     int step = SQLITE_ROW;
     while ((step = sqlite3_step(prepared)) == SQLITE_ROW) on_row(prepared);
     if (step != SQLITE_DONE) Refuse(file_, sqlite3_errmsg(handle_.get()));
+  }
+
+  /// A matrix as COLMAP stores it, row by row; valid until the next row is read.
+  template <typename Number>
+  struct View {
+    const unsigned char* data = nullptr;
+    size_t rows = 0, cols = 0;
+    Number At(size_t row, size_t col) const {
+      Number number;
+      std::memcpy(&number, data + (row * cols + col) * sizeof(Number), sizeof(Number));
+      return number;
+    }
+  };
+
+  /// Of the columns `first` (number of rows), `first` + 1 (of columns) and `first` + 2 (numbers).
+  template <typename Number>
+  View<Number> Matrix(sqlite3_stmt* row, int first, sqlite3_int64 min_cols) const {
+    constexpr sqlite3_int64 kMaxCols = 1024;
+    const sqlite3_int64 rows = sqlite3_column_int64(row, first);
+    const sqlite3_int64 cols = sqlite3_column_int64(row, first + 1);
+    const auto* data = static_cast<const unsigned char*>(sqlite3_column_blob(row, first + 2));
+    const sqlite3_int64 bytes = sqlite3_column_bytes(row, first + 2);
+    constexpr auto kSize = static_cast<sqlite3_int64>(sizeof(Number));
+    if (rows < 0 || (rows > 0 && (cols < min_cols || cols > kMaxCols ||
+                                  bytes % (kSize * cols) != 0 || bytes / (kSize * cols) != rows))) {
+      Refuse(file_, "a matrix of " + std::to_string(rows) + " x " + std::to_string(cols) + " in " +
+                        std::to_string(bytes) + " bytes");
+    }
+    return {data, static_cast<size_t>(rows), static_cast<size_t>(cols)};
   }
 
   std::uint32_t Id(sqlite3_int64 id) const {
@@ -99,6 +131,36 @@ DatabaseMatches ReadDatabaseMatches(const std::filesystem::path& database) {
                                sqlite3_column_int64(row, 1)});
       });
   return found;
+}
+
+void ForEachMatchedPair(const std::filesystem::path& database,
+                        const std::function<void(const MatchedPair&)>& use) {
+  const Database opened(database);
+  std::map<std::uint32_t, std::vector<std::array<float, 2>>> features;
+  opened.ForEachRow("SELECT image_id, rows, cols, data FROM keypoints", [&](sqlite3_stmt* row) {
+    const auto values = opened.Matrix<float>(row, 1, 2);
+    auto& of_image = features[opened.Id(sqlite3_column_int64(row, 0))];
+    for (size_t i = 0; i < values.rows; ++i) {
+      of_image.push_back({values.At(i, 0), values.At(i, 1)});
+    }
+  });
+  opened.ForEachRow(
+      "SELECT pair_id, rows, cols, data, config FROM two_view_geometries WHERE rows > 0",
+      [&](sqlite3_stmt* row) {
+        const sqlite3_int64 id = sqlite3_column_int64(row, 0);
+        MatchedPair pair{
+            {opened.Id(id / kPairBase), opened.Id(id % kPairBase)}, sqlite3_column_int(row, 4), {}};
+        const auto matches = opened.Matrix<std::uint32_t>(row, 1, 2);
+        const auto &a = features[pair.image_ids[0]], &b = features[pair.image_ids[1]];
+        for (size_t i = 0; i < matches.rows; ++i) {
+          const std::uint32_t in_a = matches.At(i, 0), in_b = matches.At(i, 1);
+          if (in_a >= a.size() || in_b >= b.size()) {
+            Refuse(database, "a match of a feature that its image lacks");
+          }
+          pair.moved_px.push_back(std::hypot(a[in_a][0] - b[in_b][0], a[in_a][1] - b[in_b][1]));
+        }
+        use(pair);
+      });
 }
 
 void RemoveDatabase(const std::filesystem::path& database) {

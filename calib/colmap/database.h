@@ -2,6 +2,7 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -33,6 +34,18 @@ struct DatabaseMatches {
 
 /// Throws Error when the file is no COLMAP database.
 DatabaseMatches ReadDatabaseMatches(const std::filesystem::path& database);
+
+/// A pair of images that COLMAP verified.
+struct MatchedPair {
+  std::uint32_t image_ids[2];
+  int config = 0;                ///< TwoViewGeometry::ConfigurationType
+  std::vector<double> moved_px;  ///< per common feature: from its pixel in one image to the other's
+};
+/// Calls `use` with each pair that has features in common. One pair is in memory at a time, with
+/// the positions of all features. Throws Error when the file is no COLMAP database, or a record of
+/// it does not fit the others.
+void ForEachMatchedPair(const std::filesystem::path& database,
+                        const std::function<void(const MatchedPair&)>& use);
 
 /// Of a database that no program has open: removes it with the files that SQLite keeps beside it.
 /// Throws Error when it cannot, as do the next two.

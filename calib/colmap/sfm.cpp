@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "calib/colmap/model_io.h"
+#include "calib/colmap/parallax.h"
 #include "calib/colmap/sfm_steps.h"
 #include "calib/colmap/without_camera.h"
 #include "dtr/base/error.h"
@@ -33,10 +34,15 @@ int RegisteredImages(const std::string& line) {
 }
 
 [[noreturn]] void ThrowNoModel(const Workspace& workspace) {
+  const std::string log = workspace.Report().steps.back().log_file.string();
+  if (const std::string why = WhyNoModel(CountPairs(workspace)); !why.empty()) {
+    throw Error(fmt::format("colmap mapper: no model of {} photos: {}; see {}",
+                            workspace.images().size(), why, log));
+  }
   throw Error(fmt::format(
       "colmap mapper: expected a model of {} photos, found that they have too little in common to "
       "make one; photos must overlap by half and show texture; see {}",
-      workspace.images().size(), workspace.Report().steps.back().log_file.string()));
+      workspace.images().size(), log));
 }
 
 // Runs the mapper; false where it found no two photos to start from, which COLMAP takes for an
@@ -144,11 +150,15 @@ SfmResult RunSfm(const fs::path& images_dir, std::span<const SfmImageInput> imag
   result.report.forward_motion = fs::exists(workspace.folder() / kForwardMotionNote);
   CompleteReport(workspace, result.model, result.report);
   try {
+    result.report.lack_of_parallax = LackOfParallax(CountPairs(workspace));
+    if (!result.report.lack_of_parallax.empty()) progress.Note(result.report.lack_of_parallax);
     result.report.why_not_registered =
         WhyWithoutCamera(workspace, result.model,
                          result.report.forward_motion ? kFewestInliersForward : kFewestInliers);
   } catch (const Error& error) {  // the model is whole: a diagnosis is not worth its loss
-    progress.Note(fmt::format("why photos have no camera is not known: {}", error.what()));
+    progress.Note(fmt::format(
+        "what the matches say of parallax and of photos without a camera is not known: {}",
+        error.what()));
   }
   return result;
 }

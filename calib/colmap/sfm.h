@@ -73,6 +73,8 @@ struct SfmReport {
   std::vector<std::string> not_registered;                ///< names without a pose, sorted
   std::map<std::string, std::string> why_not_registered;  ///< a clause each, by name, from RunSfm
   std::vector<int> images_per_model;      ///< models COLMAP made, largest first; [0] was taken
+  /// Half of the matched pairs or more show no parallax: a sentence with counts and what helps.
+  std::string lack_of_parallax;
   bool forward_motion = false;            ///< mapped with the thresholds of a walk straight ahead
   double mean_reprojection_error_px = 0;  ///< over all observations, recomputed
 };

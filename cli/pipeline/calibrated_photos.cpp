@@ -35,6 +35,7 @@ Json SfmJson(const colmap::SfmReport& report, const calib::SfmModel& model) {
   Json json;
   json["mean_reprojection_error_px"] = report.mean_reprojection_error_px;
   json["images_per_model"] = report.images_per_model;
+  if (!report.lack_of_parallax.empty()) json["lack_of_parallax"] = report.lack_of_parallax;
   if (report.forward_motion) json["forward_motion"] = true;
   json["feature_image_size_px"] = report.max_image_size_px;
   json["points"] = model.points.size();
@@ -68,8 +69,10 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
     calibrated.earlier_wall_s += step.wall_s;
   }
   Json report = SfmJson(sfm.report, sfm.model);
+  CalibrateOptions advised = options;
+  advised.advice = sfm.report.lack_of_parallax;
   PhotoRefinement refined =
-      RefinePhotos(capture, options, groups, sfm.model, workspace / "sfm" / "model",
+      RefinePhotos(capture, advised, groups, sfm.model, workspace / "sfm" / "model",
                    workspace / "refined", progress);
   report.update(Json::parse(refined.report_json));
   calibrated.kept_refinement_cpu_s = refined.earlier_cpu_s;

@@ -34,6 +34,8 @@ struct CalibrateOptions {
   /// refined; empty: nobody asks.
   std::string determined = {};
   SfmChoice sfm = {};
+  std::string advice =
+      {};  ///< what helps where cameras are not determined; CalibratePhotos sets it
 };
 
 /// Calibrated photos, frozen: everything later depends on this model alone.

@@ -25,6 +25,7 @@ constexpr std::uintmax_t kLargestRecordBytes = 16u << 20;
 calib::RefineOptions RefineOptionsFor(const CalibrateOptions& options, const Progress& progress) {
   calib::RefineOptions refine;
   refine.determined = options.determined;
+  refine.advice = options.advice;
   refine.separate_lenses = options.sfm.camera_per == CameraPer::kPhoto;
   refine.threads = options.threads;
   refine.seed = options.seed;

@@ -59,16 +59,19 @@ Reader OpenDatabase(const fs::path& folder) {
   sqlite3_open(file.c_str(), &database);
   sqlite3_exec(database,
                "CREATE TABLE images (image_id INTEGER PRIMARY KEY, name TEXT, camera_id INTEGER);"
-               "CREATE TABLE keypoints (image_id INTEGER PRIMARY KEY, rows INTEGER);"
-               "CREATE TABLE two_view_geometries (pair_id INTEGER PRIMARY KEY, rows INTEGER);"
-               "INSERT INTO keypoints VALUES (1, 100), (2, 200);"
-               "INSERT INTO two_view_geometries VALUES (2147483649, 40);"
+               "CREATE TABLE keypoints (image_id INTEGER PRIMARY KEY, rows INTEGER, cols INTEGER, "
+               "data BLOB);"
+               "CREATE TABLE two_view_geometries (pair_id INTEGER PRIMARY KEY, rows INTEGER, "
+               "cols INTEGER, data BLOB, config INTEGER);"
+               "INSERT INTO keypoints VALUES (1, 2, 2, zeroblob(16)), (2, 3, 4, zeroblob(48));"
+               "INSERT INTO two_view_geometries VALUES (2147483649, 2, 2, zeroblob(16), 2);"
                "INSERT INTO images VALUES (1, 'a.jpg', 1), (2, 'b.jpg', 1);",
                nullptr, nullptr, nullptr);
   sqlite3_close(database);
   return {file, {ReadFile(file, kSeedLimitBytes)}, [=] {
             colmap::ReadDatabaseIds(file);
             colmap::ReadDatabaseMatches(file);
+            colmap::ForEachMatchedPair(file, [](const auto&) {});
           }};
 }
 

@@ -2,7 +2,9 @@
 #pragma once
 #include <sqlite3.h>
 
+#include <cstdint>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -43,6 +45,8 @@ class FakeColmap {
   struct Common {
     size_t a, b;
     int features;
+    int config = 2;      ///< COLMAP's TwoViewGeometry::ConfigurationType; 2: calibrated
+    bool still = false;  ///< at the same pixels in both
   };
   /// The database that the extractor leaves: these images, of the cameras named (else of one), with
   /// 100 features each, and of pairs what they have in common.
@@ -52,17 +56,20 @@ class FakeColmap {
     sqlite3* database = nullptr;
     std::string sql =
         "CREATE TABLE images (image_id INTEGER, name TEXT, camera_id INTEGER);"
-        "CREATE TABLE keypoints (image_id INTEGER, rows INTEGER);"
-        "CREATE TABLE two_view_geometries (pair_id INTEGER, rows INTEGER);";
+        "CREATE TABLE keypoints (image_id INTEGER, rows INTEGER, cols INTEGER, data BLOB);"
+        "CREATE TABLE two_view_geometries (pair_id INTEGER, rows INTEGER, cols INTEGER, data BLOB, "
+        "config INTEGER);";
     for (size_t i = 0; i < names.size(); ++i) {
       sql += "INSERT INTO images VALUES (" + std::to_string(i + 1) + ", '" + names[i] + "', " +
              std::to_string(cameras.empty() ? 1 : cameras.at(i)) + ");";
-      sql += "INSERT INTO keypoints VALUES (" + std::to_string(i + 1) + ", 100);";
+      sql += "INSERT INTO keypoints VALUES (" + std::to_string(i + 1) + ", 100, 2, x'" +
+             Keypoints(i) + "');";
     }
     for (const Common& pair : pairs) {
       sql += "INSERT INTO two_view_geometries VALUES (" +
              std::to_string(2147483647 * (pair.a + 1) + pair.b + 1) + ", " +
-             std::to_string(pair.features) + ");";
+             std::to_string(pair.features) + ", 2, x'" + Matches(pair) + "', " +
+             std::to_string(pair.config) + ");";
     }
     const bool made = sqlite3_open((folder_ / "database").c_str(), &database) == SQLITE_OK &&
                       sqlite3_exec(database, sql.c_str(), nullptr, nullptr, nullptr) == SQLITE_OK;
@@ -87,6 +94,36 @@ class FakeColmap {
   void ForgetCalls() { std::filesystem::remove(folder_ / "calls"); }
 
  private:
+  template <typename Number>
+  static void AddHex(Number number, std::string& hex) {
+    unsigned char bytes[sizeof(Number)];
+    std::memcpy(bytes, &number, sizeof(Number));
+    for (const unsigned char byte : bytes) {
+      hex += "0123456789abcdef"[byte >> 4];
+      hex += "0123456789abcdef"[byte & 15];
+    }
+  }
+  // Features 0 to 49 lie at the same pixels in all images, the others move from image to image.
+  static std::string Keypoints(size_t image) {
+    std::string hex;
+    for (int k = 0; k < 100; ++k) {
+      AddHex(5.0f * static_cast<float>(k) + (k < 50 ? 0.0f : 20.0f * static_cast<float>(image)),
+             hex);
+      AddHex(2.0f * static_cast<float>(k), hex);
+    }
+    return hex;
+  }
+  // Feature k of both images; those that move, unless they are to stand still.
+  static std::string Matches(const Common& pair) {
+    std::string hex;
+    for (int k = 0; k < pair.features; ++k) {
+      const auto feature = static_cast<std::uint32_t>(pair.still ? k % 50 : 50 + k % 50);
+      AddHex(feature, hex);
+      AddHex(feature, hex);
+    }
+    return hex;
+  }
+
   static std::string Options(bool new_names) {
     std::string options =
         "--database_path\n--image_path\n--image_list_path\n--match_list_path\n--match_type\n"

@@ -84,7 +84,7 @@ TEST_F(RunSfmWithFake, AModelIsNotLostWithTheDatabaseThatSaysWhyPhotosAreNotInIt
   const SfmResult again = Run();
   EXPECT_EQ(again.model.images.size(), 3u);
   EXPECT_THAT(again.report.why_not_registered, ElementsAre());
-  EXPECT_THAT(listener_.notes, Contains(HasSubstr("why photos have no camera is not known: ")));
+  EXPECT_THAT(listener_.notes, Contains(HasSubstr("of photos without a camera is not known: ")));
 }
 
 TEST_F(RunSfmWithFake, KeepsArgumentsLogAndExitCode) {
@@ -183,6 +183,38 @@ TEST_F(RunSfmWithFake, PhotosWithNothingInCommonAreToldAsSuch) {
              "echo '=> No good initial image pair found.'; "
              "echo 'ERROR: failed to create sparse model'; exit 1");
   EXPECT_THAT(MessageOfRun(), HasSubstr("too little in common"));
+}
+
+TEST_F(RunSfmWithFake, PhotosThatMatchWithoutParallaxAreReportedAsSuch) {
+  fs::remove_all(fake_ / "model.0");
+  fs::remove_all(fake_ / "model.1");
+  // A turntable: COLMAP calls some pairs calibrated, others planar or panoramic, or a watermark.
+  fake_.LeaveDatabase(Aliases(), {},
+                      {{0, 1, 40, 2, true}, {0, 2, 40, 6, true}, {1, 2, 40, 7, true}, {2, 3, 40}});
+  EXPECT_THAT(MessageOfRun(), AllOf(HasSubstr("3 of 4 matched pairs"),
+                                    HasSubstr("at the same position"), HasSubstr("NAME_mask.png")));
+  // A camera that only rotated.
+  fs::remove_all(workspace_ / "sfm");
+  fake_.LeaveDatabase(Aliases(), {}, {{0, 1, 40, 6}, {0, 2, 40, 5}, {1, 2, 40}});
+  EXPECT_THAT(MessageOfRun(), AllOf(HasSubstr("2 of 3 matched pairs"), HasSubstr("no parallax"),
+                                    HasSubstr("different positions")));
+}
+
+TEST_F(RunSfmWithFake, PhotosThatMatchButFitNoCameraAreNotCalledWithoutOverlap) {
+  fs::remove_all(fake_ / "model.0");
+  fs::remove_all(fake_ / "model.1");
+  fake_.LeaveDatabase(Aliases(), {}, {{0, 1, 40}, {0, 2, 40}, {1, 2, 40}, {2, 3, 40}});
+  EXPECT_THAT(MessageOfRun(), AllOf(HasSubstr("4 pairs of photos match"),
+                                    HasSubstr("--camera-per folder or photo")));
+}
+
+TEST_F(RunSfmWithFake, AModelOfPhotosMostlyWithoutParallaxIsRemarkedOn) {
+  fake_.LeaveDatabase(Aliases(), {}, {{0, 1, 40, 2, true}, {0, 2, 40, 6, true}, {1, 2, 40}});
+  EXPECT_THAT(Run().report.lack_of_parallax, HasSubstr("2 of 3 matched pairs"));
+  EXPECT_THAT(listener_.notes, Contains(HasSubstr("2 of 3 matched pairs")));
+  fs::remove_all(workspace_ / "sfm");
+  fake_.LeaveDatabase(Aliases(), {}, {{0, 1, 40}, {0, 2, 40, 6}, {1, 2, 40}});
+  EXPECT_EQ(Run().report.lack_of_parallax, "");
 }
 
 TEST_F(RunSfmWithFake, AWalkStraightAheadStartsFromPhotosInLineWithWhatTheySee) {

@@ -1,0 +1,81 @@
+#include "calib/colmap/parallax.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+
+#include "calib/colmap/database.h"
+
+namespace dtr::colmap {
+namespace {
+
+// A feature that moved by less than this share of the photo's long side lies at the same position:
+// 1.2 px of 400, 12 px of 4000. Features are found to about a pixel of the photo they are found in,
+// whose long side is 640 to 2400 px.
+constexpr double kStillShare = 0.003;
+
+// COLMAP's TwoViewGeometry::ConfigurationType.
+constexpr int kPlanar = 4, kWatermark = 7;
+
+bool HalfOrMore(int part, int whole) { return whole > 0 && 2 * part >= whole; }
+
+}  // namespace
+
+PairCounts CountPairs(const Workspace& workspace) {
+  const auto ids = ReadDatabaseIds(workspace.database());
+  std::map<std::uint32_t, double> long_side_px;
+  for (size_t i = 0; i < workspace.images().size(); ++i) {
+    const SfmImageInput& image = workspace.images()[i];
+    const auto found = ids.find(workspace.AliasOf(i));
+    if (found == ids.end()) continue;
+    long_side_px[found->second.image_id] = std::max(image.width_px, image.height_px);
+  }
+  PairCounts counts;
+  counts.photos = static_cast<int>(workspace.images().size());
+  ForEachMatchedPair(workspace.database(), [&](const MatchedPair& pair) {
+    const auto side = long_side_px.find(pair.image_ids[0]);
+    if (side == long_side_px.end()) return;
+    const double limit_px = kStillShare * side->second;
+    const auto still = std::count_if(pair.moved_px.begin(), pair.moved_px.end(),
+                                     [&](double px) { return px < limit_px; });
+    ++counts.matched;
+    counts.still += HalfOrMore(static_cast<int>(still), static_cast<int>(pair.moved_px.size()));
+    counts.without_parallax += pair.config >= kPlanar && pair.config <= kWatermark;
+  });
+  return counts;
+}
+
+std::string LackOfParallax(const PairCounts& counts) {
+  if (HalfOrMore(counts.still, counts.matched)) {
+    return fmt::format(
+        "{} of {} matched pairs of photos show most of their common features at the same position "
+        "in both: the camera did not move against what stands still (a turntable, or a thing held "
+        "into the picture); mask what stands still, by NAME_mask.png beside each NAME.jpg, black "
+        "where the photo is not to be used; where nothing turned, move the camera between photos",
+        counts.still, counts.matched);
+  }
+  if (HalfOrMore(counts.without_parallax, counts.matched)) {
+    return fmt::format(
+        "{} of {} matched pairs of photos show no parallax: the camera only rotated, or all that "
+        "they show lies in one plane or far away; take photos from different positions, each step "
+        "about a tenth of the distance to the scene",
+        counts.without_parallax, counts.matched);
+  }
+  return "";
+}
+
+std::string WhyNoModel(const PairCounts& counts) {
+  if (std::string lack = LackOfParallax(counts); !lack.empty()) return lack;
+  // A chain of photos has one pair less than photos: with fewer, they fall into parts.
+  if (counts.matched >= counts.photos) {
+    return fmt::format(
+        "{} pairs of photos match, but no cameras agree with them; photos of several cameras or "
+        "zoom settings need intrinsics of their own (--camera-per folder or photo), and what moved "
+        "between the photos a mask",
+        counts.matched);
+  }
+  return "";
+}
+
+}  // namespace dtr::colmap

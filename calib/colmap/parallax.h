@@ -1,0 +1,32 @@
+// calib/colmap/parallax.h -- did the camera move against what the photos show? From their matches.
+#pragma once
+#include <optional>
+#include <string>
+
+#include "calib/colmap/workspace.h"
+
+namespace dtr::colmap {
+
+/// What the pairs of the workspace's database show.
+struct PairCounts {
+  int photos = 0;
+  int matched = 0;  ///< pairs with features in common that agree with one geometry
+  /// Of those, pairs that COLMAP calls planar, panoramic or a watermark: one homography explains
+  /// them, so they hold no parallax (unless everything lies in one plane).
+  int without_parallax = 0;
+  /// Of the matched pairs, those in which half of the common features or more lie at the same
+  /// position in both photos: the camera did not move against what these photos show most of.
+  int still = 0;
+};
+
+/// Throws Error where the database is none, or a record of it cannot be.
+PairCounts CountPairs(const Workspace& workspace);
+
+/// A sentence for counts in which half of the matched pairs or more are `still` or
+/// `without_parallax`, with what helps; empty for others.
+std::string LackOfParallax(const PairCounts& counts);
+
+/// Why the mapper made no model of these photos, and what helps.
+std::string WhyNoModel(const PairCounts& counts);
+
+}  // namespace dtr::colmap
