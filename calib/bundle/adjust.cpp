@@ -12,10 +12,10 @@
 #include "calib/bundle/gauge.h"
 #include "calib/bundle/lens_params.h"
 #include "calib/bundle/normalised.h"
+#include "calib/bundle/priors.h"
 #include "calib/bundle/rig_adjust.h"
 #include "calib/bundle/sight_rows.h"
 #include "calib/bundle/solver_ends.h"
-#include "calib/lens_groups.h"
 #include "calib/solve/board_start.h"
 #include "dtr/base/error.h"
 
@@ -98,33 +98,6 @@ double OpenGauge(const AdjustOptions& options) {
   }
 }
 
-// What the priors miss by, in units of their sigmas, squared; how many numbers they are.
-double PriorSquares(const Bundle& start, const Bundle& bundle, const AdjustOptions& options,
-                    double* numbers) {
-  const auto centre = [&](int image) {
-    return bundle.images[static_cast<size_t>(image)].cam_from_world.TargetOriginInSource();
-  };
-  double squares = 0;
-  for (const PositionPrior& p : options.positions) {
-    squares += (centre(p.image) - p.centre).cwiseQuotient(p.sigma).squaredNorm();
-  }
-  for (const DistancePrior& d : options.distances) {
-    squares += std::pow(((centre(d.image_a) - centre(d.image_b)).norm() - d.distance) / d.sigma, 2);
-  }
-  *numbers = 3 * static_cast<double>(options.positions.size()) +
-             static_cast<double>(options.distances.size());
-  for (size_t i = 0; i < bundle.lenses.size(); ++i) {
-    const double known_px = PrincipalPointSigmaPx(bundle.lenses[i], options);
-    if (!std::isfinite(known_px)) continue;
-    const auto at = static_cast<size_t>(FocalCount(bundle.lenses[i].model));
-    for (size_t k = at; k < at + 2; ++k) {
-      squares += std::pow((bundle.lenses[i].params[k] - start.lenses[i].params[k]) / known_px, 2);
-    }
-    *numbers += 2;
-  }
-  return squares;
-}
-
 // Unknowns of the images that count and their lenses. `rigs`: of how many rigs the images move; 0:
 // every image for itself.
 double CameraUnknowns(const Bundle& bundle, const std::vector<bool>& image_used, size_t rigs,
@@ -176,115 +149,6 @@ void Describe(const Bundle& start, const std::vector<Eigen::Vector2d>& residuals
       freedom > 0 ? std::sqrt(squared / freedom) : std::numeric_limits<double>::infinity();
 }
 
-void CheckPriors(const Bundle& bundle, const AdjustOptions& options) {
-  const auto images = static_cast<int>(bundle.images.size());
-  const auto known = [images](int i) { return i >= 0 && i < images; };
-  for (const PositionPrior& p : options.positions) {
-    if (!known(p.image) || !p.centre.allFinite() || !(p.sigma.array() > 0).all() ||
-        !p.sigma.allFinite()) {
-      Refuse("expected known positions of its images, finite and with sigmas above 0");
-    }
-  }
-  for (const DistancePrior& d : options.distances) {
-    if (!known(d.image_a) || !known(d.image_b) || d.image_a == d.image_b || !(d.distance > 0) ||
-        !(d.sigma > 0) || !std::isfinite(d.distance + d.sigma)) {
-      Refuse("expected known distances between two of its images, above 0 and with sigmas above 0");
-    }
-  }
-}
-
-// (centre - known) / sigma, in units of a sight's sigma so that both sums can be added.
-struct PositionCost {
-  Eigen::Vector3d offset, weight;  // of the normalised centre
-  template <typename T>
-  bool operator()(const T* motion, T* residual) const {
-    for (int i = 0; i < 3; ++i) residual[i] = weight[i] * (motion[3 + i] + offset[i]);
-    return true;
-  }
-};
-
-struct DistanceCost {
-  Eigen::Vector3d a, b;
-  double distance, weight;
-  template <typename T>
-  bool operator()(const T* motion_a, const T* motion_b, T* residual) const {
-    T d[3];
-    for (int i = 0; i < 3; ++i) d[i] = a[i] + motion_a[3 + i] - b[i] - motion_b[3 + i];
-    const T squared = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-    if (!(squared > T(0))) return false;
-    residual[0] = weight * (sqrt(squared) - distance);
-    return true;
-  }
-};
-
-// An image's shift, in units of its standard deviation and of a sight's.
-struct ShiftCost {
-  Eigen::Vector2d start_px;
-  double scale_px, weight;
-  template <typename T>
-  bool operator()(const T* shift, T* residual) const {
-    for (int i = 0; i < 2; ++i) residual[i] = weight * (start_px[i] + scale_px * shift[i]);
-    return true;
-  }
-};
-
-// A lens's principal point, likewise, where its unknowns are theta.
-struct PrincipalPointCost {
-  int first;
-  double weight;  // of one unit of the unknowns
-  template <typename T>
-  bool operator()(T const* const* theta, T* residual) const {
-    for (int i = 0; i < 2; ++i) residual[i] = weight * theta[0][first + i];
-    return true;
-  }
-};
-
-void AddPrincipalPointPriors(const Bundle& bundle, const AdjustOptions& options, double sigma_px,
-                             Normalised& n, ceres::Problem& problem) {
-  for (size_t i = 0; i < n.theta.size(); ++i) {
-    const double known_px = PrincipalPointSigmaPx(bundle.lenses[i], options);
-    if (!std::isfinite(known_px) || !problem.HasParameterBlock(n.theta[i].data())) continue;
-    const int first = FocalCount(n.lenses[i].model);
-    const double weight = sigma_px / known_px * n.lenses[i].scale[static_cast<size_t>(first)];
-    auto* cost = new ceres::DynamicAutoDiffCostFunction<PrincipalPointCost>(
-        new PrincipalPointCost{first, weight});
-    cost->AddParameterBlock(static_cast<int>(n.lenses[i].centre.size()));
-    cost->SetNumResiduals(2);
-    problem.AddResidualBlock(cost, nullptr, n.theta[i].data());
-  }
-}
-
-void AddShiftPriors(const Bundle& bundle, double sigma_px, Normalised& n, ceres::Problem& problem) {
-  for (size_t i = 0; i < n.shift.size(); ++i) {
-    if (!problem.HasParameterBlock(n.shift[i].data())) continue;
-    const BundleImage& image = bundle.images[i];
-    const LensCamera& lens = bundle.lenses[static_cast<size_t>(image.lens)];
-    const double known_px = kStabiliserShare * std::max(lens.width_px, lens.height_px);
-    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<ShiftCost, 2, 2>(new ShiftCost{
-                                 image.shift_px, n.ShiftScalePx(bundle, i), sigma_px / known_px}),
-                             nullptr, n.shift[i].data());
-  }
-}
-
-void AddPriors(const AdjustOptions& options, double sigma_px, Normalised& n,
-               ceres::Problem& problem) {
-  for (const PositionPrior& p : options.positions) {
-    const auto i = static_cast<size_t>(p.image);
-    const Eigen::Vector3d weight = sigma_px * n.unit * p.sigma.cwiseInverse();
-    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<PositionCost, 3, 6>(new PositionCost{
-                                 n.poses[i].centre - (p.centre - n.origin) / n.unit, weight}),
-                             nullptr, n.motion[i].data());
-  }
-  for (const DistancePrior& d : options.distances) {
-    const auto a = static_cast<size_t>(d.image_a), b = static_cast<size_t>(d.image_b);
-    problem.AddResidualBlock(
-        new ceres::AutoDiffCostFunction<DistanceCost, 1, 6, 6>(
-            new DistanceCost{n.poses[a].centre, n.poses[b].centre, d.distance / n.unit,
-                             sigma_px * n.unit / d.sigma}),
-        nullptr, n.motion[a].data(), n.motion[b].data());
-  }
-}
-
 void FixLens(const LensFrame& lens, LensFreedom freedom, double* theta, ceres::Problem& problem) {
   if (freedom == LensFreedom::kFixed) problem.SetParameterBlockConstant(theta);
   if (freedom != LensFreedom::kNoPrincipalPoint) return;
@@ -310,9 +174,7 @@ ceres::Solver::Summary Minimise(const Bundle& bundle, const AdjustOptions& optio
     problem.AddResidualBlock(n.Cost(bundle, sight).release(),
                              cauchy_px > 0 ? new ceres::CauchyLoss(cauchy_px) : nullptr, blocks);
   }
-  AddPriors(options, sigma_px, n, problem);
-  AddShiftPriors(bundle, sigma_px, n, problem);
-  AddPrincipalPointPriors(bundle, options, sigma_px, n, problem);
+  AddPriors(bundle, options, sigma_px, n, problem);
   const auto add = [&](double* block, int group) {
     if (problem.HasParameterBlock(block)) {
       solver.linear_solver_ordering->AddElementToGroup(block, group);
@@ -350,14 +212,6 @@ ceres::Solver::Summary Minimise(const Bundle& bundle, const AdjustOptions& optio
 }
 
 }  // namespace
-
-double PrincipalPointSigmaPx(const LensCamera& lens, const AdjustOptions& options) {
-  if (!(options.principal_point_share > 0) || options.lens == LensFreedom::kFixed ||
-      options.lens == LensFreedom::kNoPrincipalPoint) {
-    return std::numeric_limits<double>::infinity();
-  }
-  return options.principal_point_share * std::max(lens.width_px, lens.height_px);
-}
 
 const char* NameOf(LensFreedom freedom) {
   switch (freedom) {

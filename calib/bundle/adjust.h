@@ -47,6 +47,11 @@ struct DistancePrior {
 /// anything.
 inline constexpr double kPrecisionPx = 1e-3;
 
+/// What is known of real cameras, for the two options of AdjustOptions: principal points lie within
+/// some 2 % of the image's long side of the middle, pixels are square to better than 1 %. Where
+/// cameras are given, their own values take the place of the middle and of squares.
+inline constexpr double kKnownPrincipalPointShare = 0.02, kKnownAspectSigma = 0.01;
+
 struct AdjustOptions {
   LensFreedom lens = LensFreedom::kNoPrincipalPoint;
   /// Sights farther from their predictions than this many standard deviations (robust: of the
@@ -59,6 +64,10 @@ struct AdjustOptions {
   /// this share of the image's long side. Where the observations do not determine them, as on a
   /// turntable or any orbit at one height, they stay there.
   double principal_point_share = 0;
+  /// Above 0: of lenses with two free focal lengths their ratio is known to be what it is at the
+  /// start, to this standard deviation of its logarithm. An orbit at one height leaves that open,
+  /// too.
+  double aspect_sigma = 0;
   /// Asked after every iteration whether to stop: Interrupted is thrown then. Null: nobody asks.
   const Progress* progress = nullptr;
 };
@@ -66,6 +75,8 @@ struct AdjustOptions {
 /// Standard deviation of what is known of a lens's principal point; infinite where nothing is or it
 /// may not move.
 double PrincipalPointSigmaPx(const LensCamera& lens, const AdjustOptions& options);
+/// Likewise of the logarithm of fy / fx.
+double AspectSigma(const LensCamera& lens, const AdjustOptions& options);
 /// Whether every image has a principal point of its own.
 bool IsPerImage(LensFreedom freedom);
 /// Whether radial lenses get tangential distortion, and whether this is one.

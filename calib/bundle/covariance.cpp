@@ -76,6 +76,30 @@ void AddPoint(const Normalised& n, const Bundle& bundle, const BundleCovariance&
   }
 }
 
+void AddLensInformation(const Normalised& n, const Bundle& bundle, const BundleCovariance& layout,
+                        const AdjustOptions& options, Eigen::MatrixXd& information) {
+  for (size_t i = 0; i < bundle.lenses.size(); ++i) {
+    const LensFrame& lens = n.lenses[i];
+    const auto& free = layout.free_params[i];
+    const auto unknown = [&](int param) {
+      return layout.lens_at[i] + (std::find(free.begin(), free.end(), param) - free.begin());
+    };
+    const double known_px = PrincipalPointSigmaPx(bundle.lenses[i], options);
+    const int centre = FocalCount(lens.model);
+    for (const int param : {centre, centre + 1}) {
+      if (!std::isfinite(known_px)) break;
+      const double unit = lens.scale[static_cast<size_t>(param)];
+      information(unknown(param), unknown(param)) += std::pow(layout.sigma_px * unit / known_px, 2);
+    }
+    const double known = AspectSigma(bundle.lenses[i], options);
+    if (!std::isfinite(known)) continue;
+    Eigen::VectorXd row = Eigen::VectorXd::Zero(information.rows());
+    row[unknown(0)] = -layout.sigma_px / known * lens.scale[0] / lens.centre[0];
+    row[unknown(1)] = layout.sigma_px / known * lens.scale[1] / lens.centre[1];
+    information += row * row.transpose();
+  }
+}
+
 Eigen::MatrixXd PriorInformation(const Normalised& n, const Bundle& bundle,
                                  const BundleCovariance& layout, const AdjustOptions& options,
                                  long unknowns) {
@@ -95,17 +119,7 @@ Eigen::MatrixXd PriorInformation(const Normalised& n, const Bundle& bundle,
     row.segment<3>(layout.image_at[b] + 3) = -unit_px / d.sigma * along;
     information += row * row.transpose();
   }
-  for (size_t i = 0; i < bundle.lenses.size(); ++i) {
-    const int centre = FocalCount(bundle.lenses[i].model);
-    const double known_px = PrincipalPointSigmaPx(bundle.lenses[i], options);
-    for (size_t k = 0; k < layout.free_params[i].size(); ++k) {
-      const int param = layout.free_params[i][k];
-      if (param != centre && param != centre + 1) continue;
-      const long at = layout.lens_at[i] + static_cast<long>(k);
-      const double unit = n.lenses[i].scale[static_cast<size_t>(param)];
-      information(at, at) += std::pow(layout.sigma_px * unit / known_px, 2);
-    }
-  }
+  AddLensInformation(n, bundle, layout, options, information);
   return information;
 }
 

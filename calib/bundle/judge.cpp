@@ -26,10 +26,6 @@ constexpr int kFewestSights = 10;        // of an image: its pose has 6 unknowns
 constexpr int kFewestSightsOfHalf = 30;  // of an image in halves, of all points: half must do
 constexpr double kSquare = 1e-3;         // relative difference of fx and fy
 constexpr double kMostPoints = 4000;
-// What a principal point is known to beforehand, of the image's long side. Real ones lie within
-// some 2 % of the middle; here it is the stored one that is held, loosely: an orbit at one height
-// leaves it open, though its pictures are right.
-constexpr double kPrincipalPointShare = 0.02;
 constexpr std::uint64_t kDraw = 0xd4a3, kHalf = 0x4a1f;
 
 // With distortion, zero where it starts: what undistortion left behind becomes a parameter. Pixels
@@ -58,7 +54,8 @@ Bundle WithPoints(const Bundle& bundle, const Keep& keep) {
 AdjustOptions AllFree() {
   AdjustOptions options;
   options.lens = LensFreedom::kAll;
-  options.principal_point_share = kPrincipalPointShare;
+  options.principal_point_share = kKnownPrincipalPointShare;
+  options.aspect_sigma = kKnownAspectSigma;
   return options;
 }
 
@@ -256,24 +253,33 @@ void AddDifferences(const BundleLimits& limits, Judgement& judgement) {
                   camera->name, camera->moved_px)));
 }
 
-// Principal points that the observations determine little better than they were known before.
-void AddOpenPrincipalPoints(const Adjusted& fresh, const BundleCovariance& covariance,
-                            const AdjustOptions& options, Judgement& judgement) {
+// What of lenses the observations determine little better than it was known before.
+void AddOpenIntrinsics(const Adjusted& fresh, const BundleCovariance& covariance,
+                       const AdjustOptions& options, Judgement& judgement) {
   if (!covariance.computed || !covariance.determined) return;
   for (size_t i = 0; i < fresh.bundle.lenses.size(); ++i) {
     const LensCamera& lens = fresh.bundle.lenses[i];
-    const double known_px = PrincipalPointSigmaPx(lens, options);
     const Eigen::MatrixXd variance = covariance.OfLens(fresh.bundle, static_cast<int>(i));
+    const auto add = [&](const char* name, const std::string& what, double sigma, double known,
+                         const char* unit) {
+      if (!(sigma > 0.5 * known)) return;
+      judgement.degeneracies.push_back(
+          {name,
+           fmt::format("the observations determine {} of lens {} to {:.2g}{} only, as on an orbit "
+                       "at one height; the fresh solve took the stored one as known to {:.2g}{}",
+                       what, i + 1, sigma, unit, known, unit),
+           false});
+    };
     const long at = FocalCount(lens.model);
-    const double sigma_px = RootOfVariance(std::max(variance(at, at), variance(at + 1, at + 1)));
-    if (!(sigma_px > 0.5 * known_px)) continue;
-    judgement.degeneracies.push_back(
-        {"open_principal_point",
-         fmt::format("the observations determine the principal point of lens {} to {:.2g} px only, "
-                     "as on an orbit at one height: it was fitted with the stored one as known to "
-                     "{:.2g} px",
-                     i + 1, sigma_px, known_px),
-         false});
+    add("open_principal_point", "the principal point",
+        RootOfVariance(std::max(variance(at, at), variance(at + 1, at + 1))),
+        PrincipalPointSigmaPx(lens, options), " px");
+    const double known = AspectSigma(lens, options);
+    if (!std::isfinite(known)) continue;
+    const Eigen::Vector2d by(-1 / lens.params[0], 1 / lens.params[1]);
+    const Eigen::Matrix2d of_focals = variance.topLeftCorner<2, 2>();
+    add("open_aspect_ratio", "the ratio of the focal lengths",
+        RootOfVariance(by.dot(of_focals * by)), known, "");
   }
 }
 
@@ -384,7 +390,7 @@ Judgement JudgePart(const Bundle& given, const BundleLimits& limits, int threads
   judgement.sigma_px = fresh.sigma_px;
   judgement.condition = covariance.condition;
   judgement.degeneracies = FindDegeneracies(fresh, covariance, limits.max_focal_share);
-  AddOpenPrincipalPoints(fresh, covariance, options, judgement);
+  AddOpenIntrinsics(fresh, covariance, options, judgement);
   AddDegeneracies(judgement);
   if (!covariance.computed) {
     return NotJudged(judgement, fmt::format("more than {} unknowns: too many for their covariance",

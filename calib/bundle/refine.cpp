@@ -28,8 +28,6 @@ constexpr std::array kRisingFreedom{LensFreedom::kNoPrincipalPoint, LensFreedom:
                                     LensFreedom::kTangentialPerImage};
 
 constexpr size_t kNoneConverged = ~size_t{0}, kNoScale = kNoneConverged - 1;
-constexpr double kLeastSigmaPx = 1e-7;  // exact sights differ by rounding, which no loss can weigh
-
 constexpr double kSurelySigmas = 5;  // errors of real sights go together: predicted ones are small
 
 bool HasPriors(const RefineOptions& options) {
@@ -41,6 +39,7 @@ AdjustOptions SolveOptions(const RefineOptions& options, const std::optional<Len
   AdjustOptions adjust = OptionsFor(lens);
   adjust.progress = options.progress;
   if (adjust.fix_poses) return adjust;
+  adjust.aspect_sigma = kKnownAspectSigma;
   adjust.positions = options.positions;
   adjust.distances = options.distances;
   return adjust;
@@ -130,7 +129,7 @@ size_t Choose(const Bundle& bundle, const SightSplit& split, const RefineOptions
   double sigma_px = 0;
   LossesOfUnseenPoints(bundle, split.training, 1, &sigma_px);
   if (!std::isfinite(sigma_px)) return kNoScale;
-  const double scale_px = kLossSigmas * std::max(sigma_px, kLeastSigmaPx);
+  const double scale_px = kLossSigmas * std::max(sigma_px, kPrecisionPx);
   const Bundle some = SomePoints(bundle, kMostPoints, options.seed);
   const auto losses = TryOnUnseenPoints(some, options, scale_px, candidates);
   size_t chosen = 0;
@@ -159,6 +158,7 @@ size_t Choose(const Bundle& bundle, const SightSplit& split, const RefineOptions
   refined.held_out_sights = static_cast<int>(split.held_out.size());
   if (!refined.adjusted.converged) return kNoneConverged;
   if (HasPriors(options)) return chosen;
+  if (refined.given_px <= kPrecisionPx) return 0;  // exact: what is left is rounding
   // Beyond chance: a model that saw fewer sights, or none, need not be wrong for it.
   return BootstrapOfDifference(adjusted, given, options.seed).second < 0 ? chosen : 0;
 }

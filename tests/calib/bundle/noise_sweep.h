@@ -22,17 +22,19 @@ inline const std::vector<double> kNoisesPx = {
 inline const std::vector<double> kFewNoisesPx = {0, 1e-9, 1e-6, 1e-4, 1e-3, 1e-2, 0.1, 3};
 
 enum class SceneKind {
-  kArc,     ///< eight cameras along an arc
-  kRing,    ///< ten cameras around the scene
-  kThrees,  ///< of an arc, but every point is seen by three cameras only
-  kOrbit,   ///< of an arc at one height, looking at its middle: leaves principal points open
-  kMixed,   ///< by two to all of them, most by two, as in field/validate_exact
+  kArc,        ///< eight cameras along an arc
+  kRing,       ///< ten cameras around the scene
+  kThrees,     ///< of an arc, but every point is seen by three cameras only
+  kOrbit,      ///< of an arc at one height, looking at its middle: leaves principal points open
+  kTurntable,  ///< all the way round at one height, pixels that are not square
+  kMixed,      ///< by two to all of them, most by two, as in field/validate_exact
 };
-inline const std::vector<SceneKind> kSceneKinds = {
-    SceneKind::kArc, SceneKind::kRing, SceneKind::kThrees, SceneKind::kOrbit, SceneKind::kMixed};
+inline const std::vector<SceneKind> kSceneKinds = {SceneKind::kArc,       SceneKind::kRing,
+                                                   SceneKind::kThrees,    SceneKind::kOrbit,
+                                                   SceneKind::kTurntable, SceneKind::kMixed};
 
 inline std::string NameOf(SceneKind kind) {
-  const char* names[] = {"arc", "ring", "threes", "orbit", "mixed"};
+  const char* names[] = {"arc", "ring", "threes", "orbit", "turntable", "mixed"};
   return names[static_cast<int>(kind)];
 }
 
@@ -75,6 +77,14 @@ inline calib::Bundle NoisyScene(SceneKind kind, double noise_px, std::uint64_t s
     spec.pose = [](int i, int n) {
       const double angle = -0.5 + 1.0 * i / (n - 1);
       return LookAt({6 * std::sin(angle), -6 * std::cos(angle), 1.0}, Eigen::Vector3d::Zero());
+    };
+  }
+  if (kind == SceneKind::kTurntable) {
+    spec.images = 10;
+    spec.lens.params[1] *= 1.1;
+    spec.pose = [](int i, int n) {
+      const double angle = 2 * EIGEN_PI * i / n;
+      return LookAt({6 * std::sin(angle), -6 * std::cos(angle), 2.0}, Eigen::Vector3d::Zero());
     };
   }
   if (kind == SceneKind::kThrees) spec.most_sights = 3;

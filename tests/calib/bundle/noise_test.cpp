@@ -3,6 +3,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "calib/bundle/refine.h"
 #include "calib/colmap/model_io.h"
 #include "tests/calib/bundle/noise_sweep.h"
 #include "tests/support/test_data.h"
@@ -76,12 +77,32 @@ TEST(NoiseSweep, SomePhotosMayBeExactAndOthersRounded) {
   }
 }
 
-TEST(NoiseSweep, AnOrbitAtOneHeightLeavesThePrincipalPointOpenAndSaysSo) {
+TEST(NoiseSweep, AnOrbitAtOneHeightLeavesIntrinsicsOpenAndSaysSo) {
+  const auto names = [](SceneKind kind, double noise_px) {
+    std::string found;
+    for (const Degeneracy& d : Judge(NoisyScene(kind, noise_px, 15, 150), {}, 1).degeneracies) {
+      found += d.name + (d.harmful ? " harmful " : " ");
+    }
+    return found;
+  };
   for (const double noise_px : {0.0, 1e-3, 0.1}) {
-    const Judgement judgement = Judge(NoisyScene(SceneKind::kOrbit, noise_px, 15, 150), {}, 1);
-    ASSERT_EQ(judgement.degeneracies.size(), 1u) << noise_px << ToJson(judgement);
-    EXPECT_EQ(judgement.degeneracies[0].name, "open_principal_point");
-    EXPECT_FALSE(judgement.degeneracies[0].harmful);
+    EXPECT_EQ(names(SceneKind::kOrbit, noise_px), "open_principal_point ") << noise_px;
+    EXPECT_EQ(names(SceneKind::kTurntable, noise_px), "open_principal_point open_aspect_ratio ")
+        << noise_px;
+  }
+}
+
+// Nothing is gained on exact observations, and nothing forbids to ask.
+TEST(NoiseSweep, RefineLeavesExactModelsAsTheyAre) {
+  for (const SceneKind kind : {SceneKind::kArc, SceneKind::kTurntable}) {
+    for (const double noise_px : {0.0, 1e-9, 1e-6, 1e-4}) {
+      const SfmModel model = testing::ModelFrom(NoisyScene(kind, noise_px, 16, 150));
+      RefineOptions options;
+      options.determined = "here";
+      const Refined refined = Refine(model, options);
+      EXPECT_FALSE(refined.changed) << NameOf(kind) << ", noise " << noise_px;
+      EXPECT_EQ(refined.reason, "held-out sights are predicted no better");
+    }
   }
 }
 
