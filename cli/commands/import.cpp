@@ -44,6 +44,15 @@ void FindMasks(Options& options, pipeline::CamerasFromFile& cameras, Progress& p
   }
 }
 
+// Photos that no camera of the file is of. Depth maps that are found by name may lie among them.
+void TellUnused(const Options& options, pipeline::CamerasFromFile& cameras, Progress& progress) {
+  if (options.import.depth_dir == options.import.images_dir) return;
+  const auto unused = pipeline::PhotosWithoutCamera(cameras.list, options.import.images_dir);
+  if (unused.empty()) return;
+  progress.Note(fmt::format("{} images of {} have no camera and are not used, first {}",
+                            unused.size(), options.import.images_dir.string(), unused.front()));
+}
+
 // --holdout, else what the file says.
 std::set<std::string> HeldOut(const Options& options, const pipeline::CamerasFromFile& cameras,
                               Progress& progress) {
@@ -129,6 +138,7 @@ int RunImport(Options options, const Context& context) {
       {options.import.images_dir, options.import.depth_dir, options.allow_missing});
   for (const std::string& note : cameras.notes) progress.Note(note);
   FindMasks(options, cameras, progress);
+  TellUnused(options, cameras, progress);
   if (options.depth_kind == "z") options.import.depth_kind = DepthKind::kPlaneZ;
   if (options.depth_kind == "ray") options.import.depth_kind = DepthKind::kRayDistance;
   SettleDepth(options, cameras, progress);

@@ -103,7 +103,14 @@ CamerasFromFile FromColmap(const fs::path& folder, const CameraFileFolders& fold
     cameras.list.cameras.push_back(named);
   }
   cameras.list.photo_grid = GridOfModel(model_folder);
-  if (!model.points.empty()) cameras.points = calib::ToSparseScene(model, names, pinholes);
+  if (model.points.empty()) return cameras;
+  cameras.points = calib::ToSparseScene(model, names, pinholes);
+  const size_t used = cameras.points->points.size();
+  if (used < model.points.size()) {
+    cameras.notes.push_back(
+        fmt::format("{}: {} of its {} points are not used, fewer than two of the photos see them",
+                    model_folder.string(), model.points.size() - used, model.points.size()));
+  }
   return cameras;
 }
 
@@ -172,9 +179,32 @@ CamerasFromFile ReadCameraFile(const fs::path& file, const std::string& format,
   if (kind == "llff") {
     CamerasFromFile cameras;
     cameras.list = io::ReadLlff(file, SizedImages(folders.images)).list;
+    cameras.notes.push_back(file.string() + ": its nearest and farthest depths are not used");
     return cameras;
   }
   return FromCamerasJson(file, folders);
+}
+
+std::vector<std::string> PhotosWithoutCamera(const io::CameraList& list,
+                                             const fs::path& images_dir) {
+  std::set<std::string> used, folders;
+  for (const io::NamedCamera& named : list.cameras) {
+    used.insert({named.name, named.depth_file, named.mask_file});
+    folders.insert(fs::path(named.name).parent_path().generic_string());
+  }
+  std::set<std::string> left;
+  for (const std::string& folder : folders) {
+    std::error_code error;
+    fs::directory_iterator entries(images_dir / folder, error);
+    for (; !error && entries != fs::directory_iterator(); entries.increment(error)) {
+      const fs::path& file = entries->path();
+      const bool is_photo = IsFile(file) && capture::IsImageExtension(file.extension().string()) &&
+                            !file.stem().string().ends_with("_mask");
+      const std::string name = (fs::path(folder) / file.filename()).generic_string();
+      if (is_photo && !used.contains(name)) left.insert(name);
+    }
+  }
+  return {left.begin(), left.end()};
 }
 
 void NameMasks(const fs::path& mask_dir, const fs::path& images_dir, io::CameraList& list) {

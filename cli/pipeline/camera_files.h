@@ -43,6 +43,11 @@ std::vector<std::string> CameraFormats();
 CamerasFromFile ReadCameraFile(const std::filesystem::path& file, const std::string& format,
                                const CameraFileFolders& folders);
 
+/// Images that lie beside the photos of the list and are no file of it: neither photo nor depth map
+/// nor mask. In byte order, relative to `images_dir`.
+std::vector<std::string> PhotosWithoutCamera(const io::CameraList& list,
+                                             const std::filesystem::path& images_dir);
+
 /// Finds masks for the cameras of a file that names none (COLMAP's, LLFF's): for a photo
 /// left/a.jpg the first of left/a_mask.png, left/a.jpg.png (COLMAP's name) and left/a.png, with any
 /// extension of an image, that lies in `mask_dir` and is not the photo itself, in `images_dir`;

@@ -174,6 +174,25 @@ TEST_F(FieldScene, ATransformsJsonWithDistortionIsNoViewToRender) {
          "--renderer", "cpu", "--size", "60x45", "-o", frames});
 }
 
+TEST_F(FieldScene, WhatAModelOrAFolderHoldsAndIsNotUsedIsCounted) {
+  const fs::path photos = folder_ / "photos", model = Field("_scene/c_plain");
+  fs::copy(Field("_scene/images"), photos);
+  const auto notes = [&] {
+    DtrOk({"import", "--cameras", model.string(), "--images", photos.string(), "--allow-missing",
+           "--force", "-o", Set(), "--json", (folder_ / "result.json").string()});
+    return Notes();
+  };
+  EXPECT_EQ(notes(), "[]");
+  fs::copy(photos / "frame_00000.jpg", photos / "more.jpg");
+  EXPECT_THAT(notes(), HasSubstr("1 images of"));
+  EXPECT_THAT(notes(), HasSubstr("have no camera and are not used, first more.jpg"));
+  for (const char* name : {"frame_00001.jpg", "frame_00002.jpg", "frame_00003.jpg"}) {
+    fs::remove(photos / name);
+  }
+  EXPECT_THAT(notes(), AllOf(HasSubstr("points are not used, fewer than two of the photos see"),
+                             HasSubstr("3 of its 6 cameras have no photo")));
+}
+
 TEST_F(FieldScene, AUnitThatTheFileStatesIsUsed) {
   const std::string scene = Field("_scene").string();
   const fs::path file = Changed("transforms_dfull.json", {{"depth_unit_scale_factor", 0.001}});
