@@ -251,6 +251,7 @@ std::string CaptureToJson(const Capture& capture) {
   for (const Skipped& skipped : capture.skipped) {
     json["skipped"].push_back({{"name", skipped.name}, {"reason", skipped.reason}});
   }
+  json["contents"] = Json::parse(JsonOf(capture.contents));  // for people and other programs
   return json.dump(1) + "\n";
 }
 

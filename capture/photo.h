@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "capture/contents.h"
 #include "dtr/io/image_io.h"
 #include "dtr/types/grid.h"
 
@@ -91,6 +92,7 @@ struct Skipped {
 struct Capture {
   std::vector<Photo> photos;
   std::vector<Skipped> skipped;
+  FolderContents contents;  ///< of the folder that the photos come from; counts alone if stored
 };
 
 /// Takes out the photos that have one of these faults and lists them under `skipped`. A duplicate

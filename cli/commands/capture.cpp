@@ -57,6 +57,7 @@ std::string ToJson(const capture::Capture& capture) {
   for (const auto& skipped : capture.skipped) {
     json["skipped"].push_back({{"name", skipped.name}, {"reason", skipped.reason}});
   }
+  json["contents"] = Json::parse(capture::JsonOf(capture.contents));
   return json.dump(1);
 }
 

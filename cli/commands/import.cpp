@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
+#include <nlohmann/json.hpp>
 
+#include "capture/ingest.h"
 #include "cli/command.h"
 #include "cli/number_checks.h"
 #include "cli/pipeline/camera_files.h"
@@ -20,6 +22,35 @@ struct Options {
   std::string held_out;
   bool force = false;
 };
+
+bool LiesIn(const std::filesystem::path& folder, const std::filesystem::path& above) {
+  std::error_code ignored;
+  const auto relative = std::filesystem::relative(folder, above, ignored);
+  return !folder.empty() && !relative.empty() && *relative.begin() != "..";
+}
+
+// What of the folder of images the cameras use.
+capture::FolderContents ContentsFor(const Options& options, const io::CameraList& list) {
+  capture::FolderContents contents;
+  const std::filesystem::path& images = options.import.images_dir;
+  if (std::filesystem::is_directory(images)) contents = capture::ContentsOfFiles(images, true);
+  contents.Use("other_files");  // the cameras and what else belongs to a project
+  const int used = static_cast<int>(list.cameras.size());
+  for (const io::NamedCamera& camera : list.cameras) {
+    contents.masks += !camera.mask_file.empty();
+    contents.depth_maps +=
+        !options.import.depth_dir.empty() && !options.import.held_out.contains(camera.name);
+  }
+  const int others = contents.photos - used -
+                     (LiesIn(options.import.depth_dir, images) ? contents.depth_maps : 0) -
+                     (LiesIn(options.import.mask_dir, images) ? contents.masks : 0);
+  if (others > 0) {
+    contents.Ignore("unused_photos", "other images", "no camera names them as its photo", "",
+                    others);
+  }
+  contents.photos = used;
+  return contents;
+}
 
 int RunImport(Options options, const Context& context) {
   auto cameras =
@@ -39,15 +70,19 @@ int RunImport(Options options, const Context& context) {
   if (options.depth_kind == "ray") options.import.depth_kind = DepthKind::kRayDistance;
   options.import.held_out = pipeline::NamesHeldOut(options.held_out, cameras.list);
   options.import.threads = context.common.threads;
+  const capture::FolderContents contents = ContentsFor(options, cameras.list);
+  context.console.Note(capture::LineOf(contents));
   const io::AlphaTotals alpha =
       io::ImportSet(cameras.list, options.import, options.output, options.force,
                     cameras.points ? &*cameras.points : nullptr, context.console);
   context.console.Say(fmt::format("{}: {} views, {} held out", options.output.string(),
                                   cameras.list.cameras.size(), options.import.held_out.size()));
-  context.EmitJson(fmt::format(
-      "{{\"views\": {}, \"alpha\": {{\"masked_photos\": {}, \"partial_photos\": {}, "
-      "\"partial_px\": {}}}}}",
-      cameras.list.cameras.size(), alpha.masked_photos, alpha.partial_photos, alpha.partial_px));
+  const nlohmann::ordered_json json{{"views", cameras.list.cameras.size()},
+                                    {"alpha",
+                                     {{"masked_photos", alpha.masked_photos},
+                                      {"partial_photos", alpha.partial_photos},
+                                      {"partial_px", alpha.partial_px}}}};
+  context.EmitJson(capture::JsonWith(contents, json.dump()));
   return kDone;
 }
 

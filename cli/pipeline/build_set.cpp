@@ -305,6 +305,7 @@ Json ReportJson(const BuildReport& report, const RunLog& log, const std::filesys
   for (const auto& [name, reason] : report.skipped) {
     json["skipped"].push_back({{"name", name}, {"reason", reason}});
   }
+  json["contents"] = Json::parse(capture::JsonOf(report.contents));
   json["screening"] = ScreeningJson(report);
   json["coverage"] = report.coverage;
   json["validation_passed"] = report.validated ? Json(report.validation_passed) : Json(nullptr);
@@ -395,6 +396,7 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
       throw;
     }
   }
+  report.contents = photos.contents;
   for (const auto& skipped : photos.skipped)
     report.skipped.emplace_back(skipped.name, skipped.reason);
   for (const capture::Photo& photo : photos.photos) {

@@ -43,6 +43,7 @@ struct BuildReport {
   std::map<std::string, std::string> why_not_registered;     ///< by name, where that is known
   std::vector<std::string> held_out_not_registered;          ///< of them, those that were held out
   std::vector<std::pair<std::string, std::string>> skipped;  ///< file, reason
+  capture::FolderContents contents;                          ///< of the folder of photos
   /// Photos that screening has something to say about, with what it is; they are used all the same.
   std::vector<std::pair<std::string, std::vector<std::string>>> screening;
   bool validated = false, validation_passed = false;
