@@ -255,6 +255,7 @@ std::string CaptureToJson(const Capture& capture) {
   for (const Remark& remark : capture.remarks) {
     json["remarks"].push_back({{"name", remark.name}, {"text", remark.text}});
   }
+  json["contents"] = Json::parse(JsonOf(capture.contents));  // for people and other programs
   return json.dump(1) + "\n";
 }
 

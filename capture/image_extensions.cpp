@@ -1,22 +1,29 @@
 #include <OpenImageIO/imageio.h>
 
-#include <algorithm>
+#include <map>
 #include <set>
 #include <sstream>
+#include <string>
+#include <vector>
 
 #include "capture/ingest.h"
+#include "capture/names.h"
 
 namespace dtr::capture {
 namespace {
 
-std::string LowerCase(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
-  return text;
+// Other names of formats that OpenImageIO knows by their content.
+const std::map<std::string, std::vector<std::string>>& Synonyms() {
+  static const std::map<std::string, std::vector<std::string>> kSynonyms{
+      {"heif", {"hif", "heifs", "avifs"}},  // .HIF: Sony and Canon
+      {"jpeg", {"pjpeg", "pjp", "mpo"}},
+      {"jpeg2000", {"jpx", "jpf"}},
+      {"png", {"apng"}}};
+  return kSynonyms;
 }
 
-// OpenImageIO tells "jpeg:jpg,jpe,jpeg;png:png;..."
-std::set<std::string> ReadableExtensions() {
+// OpenImageIO tells "jpeg:jpg,jpe,jpeg;png:png;..."; `format` empty: of all that hold photos.
+std::set<std::string> ReadableExtensions(const std::string& asked) {
   // Formats of films, volumes and terminals.
   static const std::set<std::string> kNoPhotos{"ffmpeg", "field3d", "null", "openvdb",
                                                "ptex",   "term",    "zfile"};
@@ -24,19 +31,32 @@ std::set<std::string> ReadableExtensions() {
   std::set<std::string> extensions;
   for (std::string format; std::getline(formats, format, ';');) {
     const size_t colon = format.find(':');
-    if (colon == std::string::npos || kNoPhotos.count(format.substr(0, colon)) != 0) continue;
+    if (colon == std::string::npos) continue;
+    const std::string name_of_format = format.substr(0, colon);
+    if (asked.empty() ? kNoPhotos.contains(name_of_format) : name_of_format != asked) continue;
+    const auto more = Synonyms().find(name_of_format);
+    if (more != Synonyms().end()) extensions.insert(more->second.begin(), more->second.end());
     std::istringstream names(format.substr(colon + 1));
     for (std::string name; std::getline(names, name, ',');) extensions.insert(LowerCase(name));
   }
   return extensions;
 }
 
+bool Contains(const std::set<std::string>& extensions, const std::string& extension) {
+  const bool dot = !extension.empty() && extension.front() == '.';
+  return extensions.contains(LowerCase(dot ? extension.substr(1) : extension));
+}
+
 }  // namespace
 
 bool IsImageExtension(const std::string& extension) {
-  static const std::set<std::string> kExtensions = ReadableExtensions();
-  const bool dot = !extension.empty() && extension.front() == '.';
-  return kExtensions.count(LowerCase(dot ? extension.substr(1) : extension)) != 0;
+  static const std::set<std::string> kExtensions = ReadableExtensions("");
+  return Contains(kExtensions, extension);
+}
+
+bool IsRawExtension(const std::string& extension) {
+  static const std::set<std::string> kExtensions = ReadableExtensions("raw");
+  return Contains(kExtensions, extension);
 }
 
 }  // namespace dtr::capture

@@ -4,11 +4,12 @@
 #include <atomic>
 #include <cmath>
 #include <cstdio>
-#include <cstring>
-#include <map>
 #include <set>
 #include <system_error>
 
+#include "capture/folder_walk.h"
+#include "capture/layout.h"
+#include "capture/names.h"
 #include "capture/screening.h"
 #include "capture/store.h"
 #include "dtr/base/error.h"
@@ -16,8 +17,6 @@
 #include "dtr/base/memory_budget.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/base/work_folder.h"
-#include "dtr/io/formats/file_names.h"
-#include "dtr/io/formats/utf8.h"
 
 namespace dtr::capture {
 namespace fs = std::filesystem;
@@ -26,96 +25,8 @@ namespace {
 const double kFilmDiagonalMm = std::hypot(36.0, 24.0);
 constexpr double kShortestFocal = 0.1, kLongestFocal = 100;  // of the long side
 
-bool IsControl(char c) { return static_cast<unsigned char>(c) < 32 || c == 127; }
-
-// A text that prints as one line and that JSON can hold: for names of skipped files and EXIF texts.
-std::string Printable(std::string text) {
-  const bool utf8 = io::IsUtf8(text);
-  for (char& c : text) {
-    if (IsControl(c) || (!utf8 && static_cast<unsigned char>(c) >= 0x80)) c = '?';
-  }
-  while (!text.empty() && (text.back() == ' ' || text.back() == '?')) text.pop_back();
-  return text;
-}
-
-std::string PrintableName(const std::string& name) {
-  const std::string text = Printable(name);
-  return text.empty() ? "(unprintable)" : text;
-}
-
-struct Listing {
-  std::vector<std::string> names;            // of photos; relative, '/' between parts
-  std::map<std::string, std::string> masks;  // by the photo's name
-  std::vector<Skipped> skipped;
-  int ignored = 0;  // files without an image extension
-};
-
 bool EndsWith(const std::string& text, const std::string& end) {
   return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
-}
-
-void ListFolder(const fs::path& top, const std::string& below, bool recurse, Listing& listing) {
-  std::error_code error;
-  fs::directory_iterator entries(below.empty() ? top : top / below, error);
-  for (; !error && entries != fs::directory_iterator(); entries.increment(error)) {
-    const std::string part = entries->path().filename().string();
-    if (part.front() == '.') continue;
-    const std::string name = below.empty() ? part : below + "/" + part;
-    std::error_code ignored;
-    if (entries->is_directory(ignored)) {
-      if (!recurse) continue;
-      const std::string why_not = WhyNotSearched(entries->path());
-      if (why_not.empty()) {
-        ListFolder(top, name, recurse, listing);
-      } else {
-        listing.skipped.push_back({PrintableName(name), why_not});
-      }
-    } else if (!IsImageExtension(entries->path().extension().string())) {
-      ++listing.ignored;
-    } else if (!io::IsUtf8(name) || std::any_of(name.begin(), name.end(), IsControl)) {
-      listing.skipped.push_back({PrintableName(name), "its name is no printable UTF-8; rename it"});
-    } else if (!io::WhyUnsafeName(name).empty()) {
-      listing.skipped.push_back(
-          {PrintableName(name), "its name " + io::WhyUnsafeName(name) + "; rename it"});
-    } else if (name.front() == ' ') {
-      listing.skipped.push_back(
-          {name, "its name begins with a blank, which COLMAP's files cannot hold; rename it"});
-    } else {
-      listing.names.push_back(name);
-    }
-  }
-  if (!error) return;
-  const std::string reason = "cannot be listed: " + error.message();
-  if (below.empty()) throw Error(top.string() + ": " + reason);
-  listing.skipped.push_back({PrintableName(below), reason});
-}
-
-std::string WithoutExtension(const std::string& name) {
-  return fs::path(name).replace_extension().generic_string();
-}
-
-// Tells masks from photos: "a_mask.png" is one where there is an "a.jpg".
-void SeparateMasks(Listing& listing) {
-  constexpr char kEnd[] = "_mask";
-  std::multimap<std::string, std::string> by_stem;
-  for (const std::string& name : listing.names) by_stem.emplace(WithoutExtension(name), name);
-  std::vector<std::string> photos;
-  for (const std::string& name : listing.names) {
-    const std::string stem = WithoutExtension(name);
-    const auto [first, last] = EndsWith(stem, kEnd)
-                                   ? by_stem.equal_range(stem.substr(0, stem.size() - strlen(kEnd)))
-                                   : std::pair(by_stem.end(), by_stem.end());
-    bool used = first == last;
-    for (auto photo = first; photo != last; ++photo) {
-      used = listing.masks.emplace(photo->second, name).second || used;
-    }
-    if (!used) {
-      listing.skipped.push_back(
-          {name, "a second mask of " + first->second + "; remove one of them"});
-    }
-    if (first == last) photos.push_back(name);
-  }
-  listing.names = std::move(photos);
 }
 
 std::string CameraGroup(const Photo& photo, const io::ImageHeader& header) {
@@ -203,13 +114,31 @@ void AssignIds(std::vector<Photo>& photos) {
   }
 }
 
-[[noreturn]] void ThrowNoPhotos(const fs::path& folder, const Capture& capture, int ignored) {
+// The first thing that a command says of a folder.
+void Announce(Capture& capture, Progress& progress) {
+  std::set<std::string> groups, masks;
+  for (const Photo& photo : capture.photos) {
+    groups.insert(photo.camera_group);
+    if (!photo.mask_file.empty()) masks.insert(photo.mask_file.string());
+  }
+  capture.contents.photos = static_cast<int>(capture.photos.size());
+  capture.contents.cameras = static_cast<int>(groups.size());
+  capture.contents.masks = static_cast<int>(masks.size());
+  progress.Note(LineOf(capture.contents) +
+                (capture.skipped.empty()
+                     ? ""
+                     : "; skipped: " + std::to_string(capture.skipped.size()) + ", named below"));
+  const std::string alpha = AlphaLine(capture.photos);
+  if (!alpha.empty()) progress.Note(alpha);
+}
+
+[[noreturn]] void ThrowNoPhotos(const fs::path& folder, const Capture& capture) {
   std::string message = folder.string() + ": expected photos, found none";
   if (!capture.skipped.empty()) {
     message += "; " + std::to_string(capture.skipped.size()) + " skipped (" +
                capture.skipped.front().name + ": " + capture.skipped.front().reason + ")";
   }
-  if (ignored > 0) message += "; " + std::to_string(ignored) + " files without an image extension";
+  if (!capture.contents.ignored.empty()) message += "; " + LineOf(capture.contents);
   throw Error(message + "; give the folder that holds the photos");
 }
 
@@ -228,6 +157,17 @@ std::string WhyNotSearched(const fs::path& folder) {
     return "is the workspace of a calibration";
   }
   return "";
+}
+
+FolderContents ContentsOf(const fs::path& folder, bool recurse) {
+  FolderWalk walk = WalkFolder(folder, recurse);
+  return SortImages(folder, walk.images, std::move(walk.contents)).contents;
+}
+
+FolderContents ContentsOfFiles(const fs::path& folder, bool recurse) {
+  FolderWalk walk = WalkFolder(folder, recurse);
+  walk.contents.photos = static_cast<int>(walk.images.size());
+  return walk.contents;
 }
 
 FocalPrior FocalFromExif(const io::ImageHeader& header) {
@@ -253,28 +193,31 @@ Capture IngestPhotos(const fs::path& folder, const IngestOptions& options, Progr
     throw UsageError(folder.string() + ": expected a folder of photos, found " +
                      (fs::exists(folder, error) ? "something else" : "nothing"));
   }
-  if (fs::exists(folder / kCaptureFile, error)) return ReadCapture(folder);
+  if (fs::exists(folder / kCaptureFile, error)) {
+    Capture stored = ReadCapture(folder);
+    Announce(stored, progress);
+    return stored;
+  }
   if (fs::exists(folder / "set.json", error)) {
     throw UsageError(folder.string() +
                      ": expected a folder of photos, found a D+TR set; give the photos it was made "
                      "of");
   }
-  Listing listing;
-  ListFolder(folder, "", options.recurse, listing);
-  std::sort(listing.names.begin(), listing.names.end());
-  SeparateMasks(listing);
+  FolderWalk walk = WalkFolder(folder, options.recurse);
+  Layout listing = SortImages(folder, walk.images, std::move(walk.contents));
+  walk.skipped.insert(walk.skipped.end(), listing.skipped.begin(), listing.skipped.end());
 
-  const int count = static_cast<int>(listing.names.size());
+  const int count = static_cast<int>(listing.photos.size());
   progress.Stage("photos", count);
-  std::vector<std::optional<Photo>> photos(listing.names.size());
-  std::vector<std::string> reasons(listing.names.size());
-  std::vector<std::vector<std::string>> remarks(listing.names.size());
+  std::vector<std::optional<Photo>> photos(listing.photos.size());
+  std::vector<std::string> reasons(listing.photos.size());
+  std::vector<std::vector<std::string>> remarks(listing.photos.size());
   std::atomic<int> done{0};
   MemoryBudget memory(options.memory_gb);
   ParallelFor(0, count, options.threads, [&](int i) {
     progress.ThrowIfInterrupted();
     const auto index = static_cast<size_t>(i);
-    const std::string& name = listing.names[index];
+    const std::string& name = listing.photos[index];
     try {
       const auto mask = listing.masks.find(name);
       photos[index] = InspectPhoto(folder / name, name,
@@ -287,22 +230,22 @@ Capture IngestPhotos(const fs::path& folder, const IngestOptions& options, Progr
   });
 
   Capture capture;
-  capture.skipped = std::move(listing.skipped);
+  capture.skipped = std::move(walk.skipped);
+  capture.contents = std::move(listing.contents);
   for (size_t i = 0; i < photos.size(); ++i) {
     if (photos[i]) {
       for (const std::string& text : remarks[i]) capture.remarks.push_back({photos[i]->name, text});
       capture.photos.push_back(std::move(*photos[i]));
     } else {
-      capture.skipped.push_back({listing.names[i], reasons[i]});
+      capture.skipped.push_back({listing.photos[i], reasons[i]});
     }
   }
   std::sort(capture.skipped.begin(), capture.skipped.end(),
             [](const Skipped& a, const Skipped& b) { return a.name < b.name; });
-  if (capture.photos.empty()) ThrowNoPhotos(folder, capture, listing.ignored);
+  if (capture.photos.empty()) ThrowNoPhotos(folder, capture);
   AssignIds(capture.photos);
   JudgePhotos(capture.photos);
-  const std::string alpha = AlphaLine(capture.photos);
-  if (!alpha.empty()) progress.Note(alpha);
+  Announce(capture, progress);
   return capture;
 }
 

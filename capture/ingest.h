@@ -21,15 +21,22 @@ struct IngestOptions {
 };
 
 /// The photos of a folder in byte order of their names. A photo is a file with the extension of an
-/// image format that OpenImageIO reads (any case). Hidden files and folders and files with other
-/// extensions are ignored. Skipped, with the reason: files with such an extension that hold no
-/// readable image, names that are no UTF-8, links to folders, and sub-folders that are D+TR sets or
-/// captures. NAME_mask.EXT beside a photo NAME.EXT is its mask and no photo; a photo whose mask
-/// cannot be used is skipped. A folder that WriteCapture made is read as that capture, with its
-/// original names. The result is the same for any number of threads. Throws UsageError when the
-/// folder does not exist, Error when it cannot be listed or holds no photo at all.
+/// image format that OpenImageIO reads (any case) which SortImages takes for a photo: copies,
+/// masks, depth maps and other maps of a project's folder are none. What is ignored is counted in
+/// Capture::contents, and one Note of `progress` says all counts. Skipped, with the reason: files
+/// that should be photos but hold no readable image, names that are no UTF-8, links to folders, and
+/// sub-folders that are D+TR sets or captures. A photo whose mask cannot be used is skipped. A
+/// folder that WriteCapture made is read as that capture, with its original names. The result is
+/// the same for any number of threads. Throws UsageError when the folder does not exist, Error when
+/// it cannot be listed or holds no photo at all.
 Capture IngestPhotos(const std::filesystem::path& folder, const IngestOptions& options,
                      Progress& progress);
+
+/// What IngestPhotos would find in a folder, by names and samples alone: for commands that look at
+/// its photos in another way. Counts no cameras. Throws as WalkFolder does.
+FolderContents ContentsOf(const std::filesystem::path& folder, bool recurse);
+/// The same by the kinds of files alone: every image counts as a photo.
+FolderContents ContentsOfFiles(const std::filesystem::path& folder, bool recurse);
 
 /// Why a folder below one of photos is not looked into: it is a link, or holds pictures that we
 /// made ourselves (a set, a capture, a workspace, unfinished work). Empty: it is.
@@ -51,5 +58,7 @@ FocalPrior FocalFromExif(const io::ImageHeader& header);
 /// True for the extension of an image format that OpenImageIO reads, with or without the dot, in
 /// any case. Video and volume formats are no image formats here.
 bool IsImageExtension(const std::string& extension);
+/// The same for raw files of cameras.
+bool IsRawExtension(const std::string& extension);
 
 }  // namespace dtr::capture

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "capture/contents.h"
 #include "dtr/io/image_io.h"
 #include "dtr/types/grid.h"
 #include "dtr/types/photo_grid.h"
@@ -101,6 +102,7 @@ struct Capture {
   std::vector<Photo> photos;
   std::vector<Skipped> skipped;
   std::vector<Remark> remarks;
+  FolderContents contents;  ///< of the folder that the photos come from; counts alone if stored
 };
 
 /// Takes out the photos that have one of these faults and lists them under `skipped`. A duplicate

@@ -73,6 +73,7 @@ int RunCalibratePhotos(const Options& options, const Context& context) {
   json["registered"] = calibrated.model.images.size();
   json["not_registered"] = calibrated.not_registered;
   json["why_not_registered"] = calibrated.why_not_registered;
+  json["contents"] = nlohmann::ordered_json::parse(capture::JsonOf(photos.contents));
   context.EmitJson(json.dump(1));
   return kDone;
 }

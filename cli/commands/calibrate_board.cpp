@@ -108,7 +108,7 @@ int RunCalibrateBoard(const Options& options, const Context& context) {
   for (const fs::path& output : options.outputs) pipeline::WriteCameraFile(output, calibration);
   SayModels(calibration, context.console);
   SayCamera(calibration, context.console);
-  context.EmitJson(calib::SummaryJson(calibration));
+  context.EmitJson(capture::JsonWith(photos.contents, calib::SummaryJson(calibration)));
   return kDone;
 }
 

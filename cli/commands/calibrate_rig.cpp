@@ -132,7 +132,7 @@ int RunCalibrateRig(const Options& options, const Context& context) {
   for (const fs::path& output : options.outputs) pipeline::WriteRigFile(output, calibration);
   SayRig(calibration, summary, context.console);
   SayDelays(calibration, summary, context.console);
-  context.EmitJson(calib::SummaryJson(calibration));
+  context.EmitJson(capture::JsonWith(photos.contents, calib::SummaryJson(calibration)));
   return kDone;
 }
 

@@ -61,6 +61,7 @@ std::string ToJson(const capture::Capture& capture) {
   for (const auto& remark : capture.remarks) {
     json["remarks"].push_back({{"name", remark.name}, {"text", remark.text}});
   }
+  json["contents"] = Json::parse(capture::JsonOf(capture.contents));
   return json.dump(1);
 }
 

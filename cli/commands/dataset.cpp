@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "capture/ingest.h"
 #include "cli/command.h"
 #include "datasets/convert/convert.h"
 #include "datasets/list.h"
@@ -135,11 +136,14 @@ void AddConvert(CLI::App& dataset) {
                    ->required()
                    ->type_name("DIR");
                return [options](const Context& context) -> int {
+                 const auto contents = capture::ContentsOf(options->source, true);
+                 context.console.Note(capture::LineOf(contents));
                  datasets::ConvertDataset(options->kind, options->source, options->output);
                  context.console.Say(fmt::format(
                      "{}: cameras.json and images/ (and depth/, masks/ where the set has them)",
                      options->output.string()));
-                 context.EmitJson(Json{{"folder", options->output.string()}}.dump());
+                 context.EmitJson(capture::JsonWith(
+                     contents, Json{{"folder", options->output.string()}}.dump()));
                  return kDone;
                };
              });

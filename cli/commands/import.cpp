@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "capture/ingest.h"
 #include "cli/command.h"
 #include "cli/number_checks.h"
 #include "cli/pipeline/camera_distortion.h"
@@ -30,6 +31,29 @@ struct Options {
   bool allow_missing = false, force = false;
 };
 
+// What of the folder of images the cameras use.
+capture::FolderContents ContentsFor(const Options& options, const io::CameraList& list) {
+  capture::FolderContents contents;
+  const std::filesystem::path& images = options.import.images_dir;
+  if (std::filesystem::is_directory(images)) contents = capture::ContentsOfFiles(images, true);
+  contents.Use("other_files");  // the cameras and what else belongs to a project
+  contents.photos = static_cast<int>(list.cameras.size());
+  for (const io::NamedCamera& camera : list.cameras) {
+    contents.masks += !camera.mask_file.empty();
+    contents.depth_maps +=
+        !options.import.depth_dir.empty() && !options.import.held_out.contains(camera.name);
+  }
+  // Depth maps that are found by name may lie among the photos.
+  if (options.import.depth_dir == images) return contents;
+  const std::vector<std::string> unused = pipeline::PhotosWithoutCamera(list, images);
+  if (!unused.empty()) {
+    contents.Ignore("unused_photos", "other images",
+                    "no camera is of them, first " + unused.front(), "",
+                    static_cast<int>(unused.size()));
+  }
+  return contents;
+}
+
 void FindMasks(Options& options, pipeline::CamerasFromFile& cameras, Progress& progress) {
   if (options.import.mask_dir.empty()) {
     options.import.mask_dir = cameras.mask_dir;
@@ -42,15 +66,6 @@ void FindMasks(Options& options, pipeline::CamerasFromFile& cameras, Progress& p
     progress.Note(fmt::format("{} of {} photos have no mask: all of them is used", bare,
                               cameras.list.cameras.size()));
   }
-}
-
-// Photos that no camera of the file is of. Depth maps that are found by name may lie among them.
-void TellUnused(const Options& options, pipeline::CamerasFromFile& cameras, Progress& progress) {
-  if (options.import.depth_dir == options.import.images_dir) return;
-  const auto unused = pipeline::PhotosWithoutCamera(cameras.list, options.import.images_dir);
-  if (unused.empty()) return;
-  progress.Note(fmt::format("{} images of {} have no camera and are not used, first {}",
-                            unused.size(), options.import.images_dir.string(), unused.front()));
 }
 
 // --holdout, else what the file says.
@@ -138,7 +153,6 @@ int RunImport(Options options, const Context& context) {
       {options.import.images_dir, options.import.depth_dir, options.allow_missing});
   for (const std::string& note : cameras.notes) progress.Note(note);
   FindMasks(options, cameras, progress);
-  TellUnused(options, cameras, progress);
   if (options.depth_kind == "z") options.import.depth_kind = DepthKind::kPlaneZ;
   if (options.depth_kind == "ray") options.import.depth_kind = DepthKind::kRayDistance;
   SettleDepth(options, cameras, progress);
@@ -147,13 +161,16 @@ int RunImport(Options options, const Context& context) {
   options.import.distortion_of = pipeline::DistortionOf;
   options.import.threads = context.common.threads;
   io::SetWriter::RequireTarget(options.output, options.force);
+  const capture::FolderContents contents = ContentsFor(options, cameras.list);
+  context.console.Note(capture::LineOf(contents));
   FindPoints(options, context, cameras, progress);
   const io::AlphaTotals alpha =
       io::ImportSet(cameras.list, options.import, options.output, options.force,
                     cameras.points ? &*cameras.points : nullptr, progress);
   context.console.Say(fmt::format("{}: {} views, {} held out", options.output.string(),
                                   cameras.list.cameras.size(), options.import.held_out.size()));
-  context.EmitJson(ResultJson(options, cameras, alpha, progress.lines()).dump(1));
+  context.EmitJson(
+      capture::JsonWith(contents, ResultJson(options, cameras, alpha, progress.lines()).dump()));
   return kDone;
 }
 

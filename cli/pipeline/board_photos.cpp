@@ -41,6 +41,16 @@ std::vector<std::string> MatchingNames(const fs::path& folder, const std::string
   return names;
 }
 
+// Every image is looked at for the board, whatever else it may be.
+capture::FolderContents ContentsOfBoardFolder(const fs::path& folder, size_t matching) {
+  capture::FolderContents contents = capture::ContentsOfFiles(folder, false);
+  const int others = contents.photos - static_cast<int>(matching);
+  if (others > 0) contents.Ignore("unmatched_photos", "images", "not of that name", "", others);
+  contents.photos = static_cast<int>(matching);
+  contents.cameras = 1;
+  return contents;
+}
+
 struct Looked {
   int width_px = 0, height_px = 0;  // 0: no image
   calib::Detection found;
@@ -83,6 +93,9 @@ BoardPhotos ReadBoardPhotos(const fs::path& folder, const std::string& pattern,
                             const calib::Board& board, const calib::DetectOptions& options,
                             int threads, Progress& progress) {
   const std::vector<std::string> names = MatchingNames(folder, pattern);
+  BoardPhotos photos;
+  photos.contents = ContentsOfBoardFolder(folder, names.size());
+  progress.Note(capture::LineOf(photos.contents));
   std::vector<Looked> all(names.size());
   progress.Stage("looking for the board", static_cast<int>(names.size()));
   std::atomic<int> done = 0;
@@ -92,7 +105,6 @@ BoardPhotos ReadBoardPhotos(const fs::path& folder, const std::string& pattern,
     all[at] = LookAt(folder / names[at], board, options);
     progress.Update(++done);
   });
-  BoardPhotos photos;
   std::tie(photos.width_px, photos.height_px) = UsualSize(all);
   for (size_t i = 0; i < names.size(); ++i) {
     if (all[i].found.corners.empty()) {

@@ -6,11 +6,13 @@
 
 #include "calib/boards/board.h"
 #include "calib/boards/detect.h"
+#include "capture/contents.h"
 #include "dtr/base/progress.h"
 
 namespace dtr::pipeline {
 
 struct BoardPhotos {
+  capture::FolderContents contents;  ///< of the folder; photos: those that match
   int width_px = 0, height_px = 0;
   std::vector<calib::BoardView> views;   ///< in byte order of names
   std::vector<calib::LeftOut> left_out;  ///< photos without a usable board, of another size, or

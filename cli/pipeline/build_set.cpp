@@ -317,6 +317,7 @@ Json ReportJson(const BuildReport& report, const CalibratedPhotos& calibrated, c
   for (const auto& [name, text] : report.remarks) {
     json["remarks"].push_back({{"name", name}, {"text", text}});
   }
+  json["contents"] = Json::parse(capture::JsonOf(report.contents));
   json["screening"] = ScreeningJson(report);
   const Json calibration = Json::parse(calibrated.report_json);
   if (calibration.contains("camera_sharing")) {
@@ -412,6 +413,7 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
       throw;
     }
   }
+  report.contents = photos.contents;
   for (const auto& skipped : photos.skipped)
     report.skipped.emplace_back(skipped.name, skipped.reason);
   for (const auto& remark : photos.remarks) {

@@ -45,6 +45,7 @@ struct BuildReport {
   std::vector<std::pair<std::string, std::string>> skipped;  ///< file, reason
   /// File, what of it was converted or is not used.
   std::vector<std::pair<std::string, std::string>> remarks;
+  capture::FolderContents contents;                          ///< of the folder of photos
   /// Photos that screening has something to say about, with what it is; they are used all the same.
   std::vector<std::pair<std::string, std::vector<std::string>>> screening;
   bool validated = false, validation_passed = false;

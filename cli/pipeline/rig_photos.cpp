@@ -350,13 +350,32 @@ void TakeOutRepeatedFrames(RigPhotos& photos) {
                 [&](const calib::RigView& view) { return repeats.contains(view.frame); });
 }
 
+// What the folder holds besides the images of the cameras.
+capture::FolderContents ContentsOfRig(const fs::path& folder, const Layout& layout) {
+  capture::FolderContents contents = capture::ContentsOfFiles(folder, true);
+  const bool videos = layout.shots.empty() || layout.shots.front().number >= 0;
+  const int used = videos ? 0 : static_cast<int>(layout.shots.size());
+  if (videos) {
+    for (const char* kind : {"videos", "live_photo_videos", "other_files"}) contents.Use(kind);
+  }
+  if (contents.photos > used) {
+    contents.Ignore("unused_photos", "images", "of no camera of the rig", "",
+                    contents.photos - used);
+  }
+  contents.photos = used;
+  contents.cameras = static_cast<int>(layout.cameras.size());
+  return contents;
+}
+
 }  // namespace
 
 RigPhotos ReadRigPhotos(const fs::path& folder, const calib::Board& board,
                         const calib::DetectOptions& options, int threads, Progress& progress) {
   Layout layout = LayoutOf(folder, progress);
-  LookAtAll(board, options, threads, progress, layout);
   RigPhotos photos;
+  photos.contents = ContentsOfRig(folder, layout);
+  progress.Note(capture::LineOf(photos.contents));
+  LookAtAll(board, options, threads, progress, layout);
   photos.left_out = layout.left_out;
   for (const std::string& name : layout.cameras) photos.cameras.push_back({name, 0, 0});
   std::map<std::string, size_t> frames;

@@ -7,6 +7,7 @@
 #include "calib/boards/board.h"
 #include "calib/boards/detect.h"
 #include "calib/solve/rig.h"
+#include "capture/contents.h"
 #include "dtr/base/progress.h"
 
 namespace dtr::pipeline {
@@ -17,6 +18,7 @@ struct RigPhotoCamera {
 };
 
 struct RigPhotos {
+  capture::FolderContents contents;     ///< of the folder
   std::vector<RigPhotoCamera> cameras;  ///< in byte order of names
   std::vector<std::string> frames;      ///< by time (FrameTimes); empty where a number is missing
   std::vector<calib::RigView> views;    ///< rising frame, then camera

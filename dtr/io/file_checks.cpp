@@ -8,6 +8,7 @@
 
 #include "dtr/base/error.h"
 #include "dtr/io/exr_checks.h"
+#include "dtr/io/image_io.h"
 
 namespace dtr::io {
 namespace {
@@ -92,6 +93,28 @@ void ExpectImageKind(const fs::path& file) {
               ": no readable image: expected a PNG, JPEG, TIFF, OpenEXR or another format of "
               "photos, found a file that begins with \"" +
               Printable(start) + "\"; copy the file again or name an image");
+}
+
+// Only marks of which no other kind of file begins by chance.
+bool HoldsPhoto(const fs::path& file) {
+  std::error_code error;
+  if (!fs::is_regular_file(file, error)) return false;
+  std::ifstream in(file, std::ios::binary);
+  std::array<char, 12> bytes{};
+  in.read(bytes.data(), bytes.size());
+  const std::string start(bytes.data(), static_cast<size_t>(in.gcount()));
+  if (start.size() < bytes.size()) return false;
+  for (const std::string& mark :
+       {std::string("\x89PNG\r\n\x1a\n"), std::string("\xff\xd8\xff"), std::string("II*\0", 4),
+        std::string("MM\0*", 4), std::string("v/1\x01")}) {
+    if (start.compare(0, mark.size(), mark) == 0) return true;
+  }
+  if (StartsWith(start, "RIFF")) return start.compare(8, 4, "WEBP") == 0;
+  if (start.compare(4, 4, "ftyp") != 0) return false;
+  for (const char* brand : {"heic", "heix", "heif", "heim", "heis", "mif1", "msf1", "avif"}) {
+    if (start.compare(8, 4, brand) == 0) return true;
+  }
+  return false;
 }
 
 void ExpectWholeFile(const fs::path& file) {

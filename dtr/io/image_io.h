@@ -45,6 +45,9 @@ struct ImageHeader {
 /// EXIF values that make no sense (zero, negative, NaN) are left out, as cameras write zeros there.
 ImageHeader ReadImageHeader(const std::filesystem::path& file);
 
+/// Whether a file begins as PNG, JPEG, TIFF, OpenEXR, WebP, HEIF or AVIF, whatever it is called.
+bool HoldsPhoto(const std::filesystem::path& file);
+
 /// Default of the reading limits: 400 Mpx hold every camera sold, and 1.2 GB of memory at RGB.
 inline constexpr std::uint64_t kImageLimitPx = 400'000'000;
 

@@ -1,0 +1,116 @@
+#include "capture/layout_looks.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "dtr/base/error.h"
+#include "dtr/io/image_io.h"
+#include "dtr/types/area_average.h"
+#include "dtr/types/luma.h"
+
+namespace dtr::capture {
+namespace {
+
+constexpr int kThumbnailSidePx = 24;
+constexpr size_t kSamples = 100'000;
+constexpr int kNear = 8;  // levels that JPEG moves flat values by
+constexpr size_t kFewColours = 64;
+
+ImageLook LookAtPixels(const ImageRgb8& image) {
+  ImageLook look;
+  look.readable = true;
+  const size_t pixels = image.data().size() / 3;
+  const size_t step = std::max<size_t>(1, pixels / kSamples);
+  size_t samples = 0, grey = 0, extreme = 0, tiny = 0, coloured = 0, unit = 0;
+  std::set<int> colours;
+  for (size_t i = 0; i < pixels; i += step) {
+    const std::uint8_t* rgb = &image.data()[3 * i];
+    const auto [low, high] = std::minmax({rgb[0], rgb[1], rgb[2]});
+    ++samples;
+    grey += high - low <= kNear;
+    extreme += high <= kNear || low >= 255 - kNear;
+    tiny += high <= 1;
+    if (colours.size() <= kFewColours) colours.insert(rgb[0] << 16 | rgb[1] << 8 | rgb[2]);
+    if (high - low <= kNear) continue;
+    ++coloured;
+    double square = 0;
+    for (int c = 0; c < 3; ++c) square += std::pow(2 * rgb[c] / 255.0 - 1, 2);
+    unit += std::abs(std::sqrt(square) - 1) < 0.1;
+  }
+  const auto share = [](size_t part, size_t all) {
+    return all == 0 ? 0 : static_cast<double>(part) / static_cast<double>(all);
+  };
+  look.grey = share(grey, samples) > 0.99;
+  look.binary = look.grey && (share(extreme, samples) > 0.98 || tiny == samples);
+  look.normals = share(coloured, samples) > 0.02 && share(unit, coloured) > 0.8;
+  look.labels = colours.size() <= kFewColours;
+  const int width = std::min(kThumbnailSidePx, image.width());
+  const int height = std::min(kThumbnailSidePx, image.height());
+  const ImageRgb8 small = AreaAverage(image, width, height);
+  look.thumbnail = Grid<std::uint8_t>(width, height);
+  for (size_t i = 0; i < look.thumbnail.data().size(); ++i) {
+    look.thumbnail.data()[i] = static_cast<std::uint8_t>(Luma(&small.data()[3 * i]) / 256);
+  }
+  return look;
+}
+
+}  // namespace
+
+const ImageSize& Looks::SizeOf(const std::string& name) {
+  const auto [entry, is_new] = sizes_.try_emplace(name);
+  if (!is_new) return entry->second;
+  try {
+    const io::ImageHeader header = io::ReadImageHeader(folder_ / name);
+    const bool sideways = header.exif_orientation >= 5;
+    entry->second = {sideways ? header.height_px : header.width_px,
+                     sideways ? header.width_px : header.height_px, header.channels == 1,
+                     header.is_float || header.bits > 8, header.format == "jpeg"};
+  } catch (const Error&) {
+    // Whoever reads it as a photo says why.
+  }
+  return entry->second;
+}
+
+const ImageLook& Looks::LookOf(const std::string& name) {
+  const auto [entry, is_new] = looks_.try_emplace(name);
+  if (!is_new) return entry->second;
+  try {
+    entry->second = LookAtPixels(io::ReadImage(folder_ / name, {.apply_exif_orientation = true}));
+  } catch (const Error&) {
+    // As above.
+  }
+  return entry->second;
+}
+
+bool Looks::IsReducedSize(const std::string& smaller, const std::string& larger) {
+  const ImageSize small = SizeOf(smaller), large = SizeOf(larger);
+  constexpr double kLeastFactor = 1.2, kRoundingPx = 1;
+  if (small.width_px == 0 || large.width_px == 0) return false;
+  const double factor =
+      static_cast<double>(large.width_px + large.height_px) / (small.width_px + small.height_px);
+  return factor >= kLeastFactor &&
+         std::abs(large.width_px / factor - small.width_px) <= kRoundingPx &&
+         std::abs(large.height_px / factor - small.height_px) <= kRoundingPx;
+}
+
+double Looks::Difference(const std::string& a, const std::string& b) {
+  Grid<std::uint8_t> x = LookOf(a).thumbnail, y = LookOf(b).thumbnail;
+  if (x.empty() || y.empty()) return std::numeric_limits<double>::infinity();
+  const int width = std::min(x.width(), y.width()), height = std::min(x.height(), y.height());
+  x = AreaAverage(x, width, height);
+  y = AreaAverage(y, width, height);
+  double sum = 0, squares = 0, apart = 0;
+  for (size_t i = 0; i < x.data().size(); ++i) {
+    sum += x.data()[i];
+    squares += x.data()[i] * x.data()[i];
+    apart += std::pow(x.data()[i] - y.data()[i], 2);
+  }
+  const auto count = static_cast<double>(x.data().size());
+  const double variance = squares / count - std::pow(sum / count, 2);
+  // A level of rounding is no difference in an image of one colour.
+  return std::sqrt(apart / count) / std::sqrt(std::max(variance, 16.0));
+}
+
+}  // namespace dtr::capture
