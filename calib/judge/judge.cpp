@@ -329,6 +329,21 @@ class Judging {
   // What the tests below are made on: the views that made the calibration, where they are kept.
   const Fresh& Base() const { return calibration_.kept.empty() ? fresh_ : kept_; }
 
+  // Of one camera's own views: what the other cameras of a rig add to its lens is little.
+  std::vector<OtherModel> OtherModelsOf(const RigSolution& solution, size_t camera) const {
+    if (!calibration_.free_lenses) return {};
+    const RigCamera& own = solution.rig.cameras[camera];
+    std::vector<BoardView> views;
+    std::vector<std::vector<int>> outliers;
+    for (const RigView& view : solution.rig.views) {
+      if (view.camera != camera) continue;
+      views.push_back(view.seen);
+      outliers.push_back(view.outliers);
+    }
+    return OtherModels(calibration_.board, own.model, own.camera.width_px, own.camera.height_px,
+                       views, outliers, threads_);
+  }
+
   void TestUncertainty() {
     if (!Base().solution) {
       Add(NotTested("projection_uncertainty_px", limits_.max_uncertainty_px, Base().refused));
@@ -340,13 +355,17 @@ class Judging {
     const ProjectionSensitivity sensitivity(solution);
     ParallelFor(0, static_cast<int>(report_.cameras.size()), threads_, [&](int c) {
       const auto at = static_cast<size_t>(c);
-      const auto map_at = [&](double distance) {
-        return UncertaintyMap(solution, sensitivity, solution.covariance, at, distance);
-      };
       JudgedCamera& camera = report_.cameras[at];
+      const std::vector<OtherModel> others = OtherModelsOf(solution, at);
+      const auto map_at = [&](double distance) {
+        return Combined(UncertaintyMap(solution, sensitivity, solution.covariance, at, distance),
+                        SpreadMap(solution.rig.cameras[at].camera, others, distance));
+      };
       const double distance = BoardDistance(calibration_.board, solution.rig, at);
       camera.near_uncertainty = map_at(distance);
       camera.far_uncertainty = map_at(kFar * distance);
+      camera.model_spread =
+          SpreadMap(solution.rig.cameras[at].camera, others, distance, &camera.spread_model);
       for (UncertaintyAt& chosen : camera.uncertainty_at) chosen.map = map_at(chosen.distance);
     });
     AddUncertainty("projection_uncertainty_px", limits_.max_uncertainty_px, "the boards' distance",
@@ -368,9 +387,14 @@ class Judging {
       check.value = value;
       check.reason = fmt::format(
           "{}: standard deviation of a projection at {}, exceeded in 5 % of "
-          "the image; median {:.3g} px, worst {:.3g} px{}",
+          "the image; median {:.3g} px, worst {:.3g} px{}{}",
           camera.name, where, map_of(camera).Median(), map_of(camera).Largest(),
-          has_rays ? "" : " of those that have a ray: more than 5 % have none");
+          has_rays ? "" : " of those that have a ray: more than 5 % have none",
+          camera.spread_model.empty()
+              ? std::string()
+              : fmt::format("; in it the choice of the model: {} fits the corners as well and "
+                            "differs by up to {:.3g} px at the boards' distance",
+                            camera.spread_model, camera.model_spread.Largest()));
     }
     check.passed = check.value <= limit;
     Add(std::move(check));

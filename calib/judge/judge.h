@@ -73,7 +73,12 @@ struct JudgedCamera {
   double distance = 0;                         ///< of the boards
   ImageMap near_uncertainty, far_uncertainty;  ///< px; empty where no solve was possible
   ImageMap difference;                         ///< px, stored against fresh
-  std::vector<UncertaintyAt> uncertainty_at;   ///< at the distances that were asked for
+  /// Part of the uncertainties that the choice of the model is: the largest difference to another
+  /// model that the corners do not tell from this one (solve/model_spread.h), at the boards'
+  /// distance; zero and no name where there is none.
+  ImageMap model_spread;
+  std::string spread_model;                   ///< the one that differs most
+  std::vector<UncertaintyAt> uncertainty_at;  ///< at the distances that were asked for
   double coverage = 0;
   std::vector<JudgedView> views;  ///< worst first
 };

@@ -30,7 +30,9 @@ std::string ToJson(const JudgeReport& report) {
               {"board_distance", NumberOrNull(camera.distance)},
               {"uncertainty_px", ToJsonValue(camera.near_uncertainty)},
               {"far_uncertainty_px", ToJsonValue(camera.far_uncertainty)},
-              {"difference_px", ToJsonValue(camera.difference)}};
+              {"difference_px", ToJsonValue(camera.difference)},
+              {"model_spread_px", ToJsonValue(camera.model_spread)},
+              {"spread_model", camera.spread_model}};
     item["uncertainty_at"] = Json::array();
     for (const UncertaintyAt& at : camera.uncertainty_at) {
       item["uncertainty_at"].push_back({{"distance", at.distance}});

@@ -128,6 +128,35 @@ ImageMap ShiftMap(const RigSolution& solution, const ProjectionSensitivity& sens
                 [&](const Eigen::MatrixXd& by_shared) { return (by_shared * difference).norm(); });
 }
 
+ImageMap SpreadMap(const LensCamera& lens, std::span<const OtherModel> others, double distance,
+                   std::string* largest) {
+  ImageMap map = EmptyMap(lens);
+  double most = -1;
+  for (int row = 0; row < map.rows; ++row) {
+    for (int column = 0; column < map.columns; ++column) {
+      const Eigen::Vector2d pixel = CellCentre(map, lens, column, row);
+      double& value = map.values[static_cast<size_t>(row * map.columns + column)];
+      value = 0;
+      for (const OtherModel& other : others) {
+        const double difference = other.DifferenceAt(pixel, distance).value_or(0);
+        if (std::isinf(difference) && !IsAskedFor(lens, pixel)) continue;
+        value = std::max(value, difference);
+        if (difference <= most) continue;
+        most = difference;
+        if (largest != nullptr) *largest = NameOf(other.model);
+      }
+    }
+  }
+  return map;
+}
+
+ImageMap Combined(ImageMap uncertainty, const ImageMap& spread) {
+  for (size_t i = 0; i < uncertainty.values.size(); ++i) {
+    uncertainty.values[i] = std::hypot(uncertainty.values[i], spread.values[i]);
+  }
+  return uncertainty;
+}
+
 double BoardDistance(const Board& board, const Rig& rig, size_t camera) {
   std::vector<double> distances;
   for (const RigView& view : rig.views) {

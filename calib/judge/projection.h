@@ -2,8 +2,11 @@
 #pragma once
 #include <Eigen/Core>
 #include <optional>
+#include <span>
+#include <string>
 #include <vector>
 
+#include "calib/solve/model_spread.h"
 #include "calib/solve/rig_solve.h"
 
 namespace dtr::calib {
@@ -49,6 +52,13 @@ ImageMap UncertaintyMap(const RigSolution& solution, const ProjectionSensitivity
 /// Length of the shift that a difference of the shared unknowns makes, px, to first order.
 ImageMap ShiftMap(const RigSolution& solution, const ProjectionSensitivity& sensitivity,
                   const Eigen::VectorXd& difference, size_t camera, double distance);
+
+/// Largest difference to the other models, px; 0 where nothing is asked for or there are none.
+/// `largest`, where given, gets the name of the model that differs most.
+ImageMap SpreadMap(const LensCamera& lens, std::span<const OtherModel> others, double distance,
+                   std::string* largest = nullptr);
+/// Root of the sum of squares, cell by cell.
+ImageMap Combined(ImageMap uncertainty, const ImageMap& spread);
 
 /// Median distance of the boards from a camera, board units.
 double BoardDistance(const Board& board, const Rig& rig, size_t camera);

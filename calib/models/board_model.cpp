@@ -16,14 +16,15 @@ struct ModelFacts {
   const char* name;
   LensModel lens;
   int free_parameters;
+  int complexity;
 };
 
 constexpr std::array<ModelFacts, 5> kFacts{{
-    {BoardModel::kPinhole, "pinhole", LensModel::kPinhole, 4},
-    {BoardModel::kBrown4, "brown4", LensModel::kOpenCv, 8},
-    {BoardModel::kBrown5, "brown5", LensModel::kFullOpenCv, 9},
-    {BoardModel::kBrown8, "brown8", LensModel::kFullOpenCv, 12},
-    {BoardModel::kFisheye, "fisheye", LensModel::kOpenCvFisheye, 8},
+    {BoardModel::kPinhole, "pinhole", LensModel::kPinhole, 4, 0},
+    {BoardModel::kBrown4, "brown4", LensModel::kOpenCv, 8, 1},
+    {BoardModel::kBrown5, "brown5", LensModel::kFullOpenCv, 9, 2},
+    {BoardModel::kBrown8, "brown8", LensModel::kFullOpenCv, 12, 4},
+    {BoardModel::kFisheye, "fisheye", LensModel::kOpenCvFisheye, 8, 3},
 }};
 
 const ModelFacts& FactsOf(BoardModel model) {
@@ -47,6 +48,8 @@ std::optional<BoardModel> BoardModelFromName(const std::string& name) {
 LensModel LensModelOf(BoardModel model) { return FactsOf(model).lens; }
 
 int FreeParameterCount(BoardModel model) { return FactsOf(model).free_parameters; }
+
+int ComplexityOf(BoardModel model) { return FactsOf(model).complexity; }
 
 std::vector<std::string> FreeParameterNames(BoardModel model) {
   static constexpr const char* kBrown[] = {"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"};

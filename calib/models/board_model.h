@@ -33,6 +33,10 @@ std::optional<BoardModel> BoardModelFromName(const std::string& name);
 LensModel LensModelOf(BoardModel model);
 /// How many of that LensModel's parameters, the first ones, are estimated. The others are zero.
 int FreeParameterCount(BoardModel model);
+/// Order of simplicity: how far a model can bend where no corner holds it. Perspective models come
+/// first, by their radial terms; a fisheye has four of them; of a quotient the denominator can
+/// vanish.
+int ComplexityOf(BoardModel model);
 /// Names of the estimated parameters: "fx_px", "fy_px", "cx_px", "cy_px", "k1", ...
 std::vector<std::string> FreeParameterNames(BoardModel model);
 

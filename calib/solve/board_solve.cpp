@@ -171,7 +171,7 @@ void SolveRobustly(const Board& board, BoardModel model, double outlier_sigmas, 
   for (int pass = 0; pass < kMostOutlierPasses; ++pass) {
     Minimise(board, model, {}, state);
     const auto lengths = Lengths(board, state);
-    Used used = Within(lengths, outlier_sigmas * SigmaOfUsed(lengths, state.used));
+    Used used = Within(lengths, outlier_sigmas * ScatterOfUsed(lengths, state.used));
     if (used == state.used) break;
     state.used = std::move(used);
     TakeOutDisagreeing(state, left_out);

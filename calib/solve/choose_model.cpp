@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
 #include <map>
 #include <set>
 
+#include "calib/models/radial_bend.h"
 #include "calib/solve/board_start.h"
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
@@ -17,6 +19,10 @@ namespace dtr::calib {
 namespace {
 
 constexpr size_t kFewestViews = 5;  // 4 to solve from, 1 to hold out
+// Held-out photos share the print, the lighting and the corner detector with the others: of their
+// errors, too, more coefficients explain a part. Gains below these are none of the lens for sure.
+constexpr double kLeastGain = 0.1;      // of the held-out RMS
+constexpr double kLeastGainPx = 0.005;  // far below what a corner detector does (0.03 px)
 
 // Sum of squared residual lengths over a view's corners, and their number.
 struct ViewError {
@@ -142,6 +148,47 @@ ErrorsByModel HoldOut(const Board& board, std::span<const BoardView> views,
   return errors;
 }
 
+RadialBend BendOf(const BoardSolution& solution, std::span<const BoardView> views) {
+  double seen_px = 0;
+  for (const SolvedView& solved : solution.views) {
+    const auto view = std::find_if(views.begin(), views.end(),
+                                   [&](const BoardView& v) { return v.name == solved.name; });
+    seen_px = std::max(seen_px, OutermostPx(solution.camera, view->corners, solved.outliers));
+  }
+  return RadialBendOf(solution.camera, seen_px);
+}
+
+std::string TextOf(const RadialBend& bend) {
+  const std::string where = fmt::format(
+      "between the outermost corner seen, {:.0f} px from the "
+      "principal point, and the image's corner at {:.0f} px",
+      bend.seen_px, bend.border_px);
+  if (bend.folds) return "turns back " + where;
+  return fmt::format(
+      "bends {}: its scale changes by a factor of {:.2f} there, by {:.2f} where "
+      "corners were seen",
+      where, std::exp(bend.beyond_change), std::exp(bend.seen_change));
+}
+
+// Models that bend where no corner holds them do not count where another one explains held-out
+// views nearly as well.
+void RefuseBent(std::span<const BoardView> views, std::vector<ModelScore>& scores) {
+  std::vector<RadialBend> bends(scores.size());
+  double least = std::numeric_limits<double>::infinity();
+  for (size_t m = 0; m < scores.size(); ++m) {
+    if (!scores[m].refused.empty()) continue;
+    bends[m] = BendOf(*scores[m].solution, views);
+    if (bends[m].Plausible()) least = std::min(least, scores[m].held_out_rms_px);
+  }
+  for (size_t m = 0; m < scores.size(); ++m) {
+    ModelScore& score = scores[m];
+    if (!score.refused.empty() || bends[m].Plausible()) continue;
+    if (least <= kBendGivesWay * score.held_out_rms_px + kLeastGainPx) {
+      score.refused = TextOf(bends[m]);
+    }
+  }
+}
+
 // Percentile interval of RMS(model) - RMS(best) over resampled views.
 void Bootstrap(const ErrorsByModel& errors, size_t best, const ChoiceOptions& options,
                std::vector<ModelScore>& scores) {
@@ -171,6 +218,10 @@ void Bootstrap(const ErrorsByModel& errors, size_t best, const ChoiceOptions& op
 
 }  // namespace
 
+bool NotSeparated(double rms_px, double least_px) {
+  return rms_px - least_px <= std::max(kLeastGain * least_px, kLeastGainPx);
+}
+
 ModelChoice ChooseModel(const Board& board, std::span<const BoardView> views, int width_px,
                         int height_px, const ChoiceOptions& options) {
   if (views.size() < kFewestViews) {
@@ -184,24 +235,25 @@ ModelChoice ChooseModel(const Board& board, std::span<const BoardView> views, in
   const ErrorsByModel errors = HoldOut(board, views, options, choice.scores);
   std::vector<size_t> all(views.size());
   for (size_t i = 0; i < all.size(); ++i) all[i] = i;
+  for (size_t m = 0; m < choice.scores.size(); ++m) {
+    if (choice.scores[m].refused.empty()) choice.scores[m].held_out_rms_px = Rms(errors[m], all);
+  }
+  RefuseBent(views, choice.scores);
   std::vector<size_t> counting;
   for (size_t m = 0; m < choice.scores.size(); ++m) {
-    if (!choice.scores[m].refused.empty()) continue;
-    choice.scores[m].held_out_rms_px = Rms(errors[m], all);
-    counting.push_back(m);
+    if (choice.scores[m].refused.empty()) counting.push_back(m);
   }
   if (counting.empty()) throw Error(choice.scores.front().refused);
-  const auto by_error = [&](size_t a, size_t b) {
+  choice.best = *std::min_element(counting.begin(), counting.end(), [&](size_t a, size_t b) {
     return choice.scores[a].held_out_rms_px < choice.scores[b].held_out_rms_px;
-  };
-  choice.best = *std::min_element(counting.begin(), counting.end(), by_error);
+  });
   Bootstrap(errors, choice.best, options, choice.scores);
   choice.chosen = choice.best;
+  const double least_px = choice.scores[choice.best].held_out_rms_px;
   for (const size_t m : counting) {
     const ModelScore &score = choice.scores[m], &chosen = choice.scores[choice.chosen];
-    const bool fewer = score.coefficients < chosen.coefficients ||
-                       (score.coefficients == chosen.coefficients && by_error(m, choice.chosen));
-    if (score.low_px <= 0 && fewer) choice.chosen = m;
+    const bool as_good = score.low_px <= 0 || NotSeparated(score.held_out_rms_px, least_px);
+    if (as_good && ComplexityOf(score.model) < ComplexityOf(chosen.model)) choice.chosen = m;
   }
   return choice;
 }

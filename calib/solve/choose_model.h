@@ -36,13 +36,25 @@ struct ModelChoice {
   size_t chosen = 0;
 };
 
+/// A model that bends beyond the corners seen gives way to one that does not, unless that one's RMS
+/// is this many times larger: then the lens is of its kind, and wants photos nearer to the border.
+inline constexpr double kBendGivesWay = 1.5;
+
+/// True where an RMS is larger than the least one by no more than 10 % or 0.005 px. Photos share
+/// the print, the lighting and the corner detector: of such errors, held out or not, more
+/// coefficients explain a part, so a gain as small as this is not certain to be one of the lens.
+bool NotSeparated(double rms_px, double least_px);
+
 /// Held-out error: the views are dealt to `folds` groups in turn; each group is predicted by a
 /// camera solved from all the others, its poses alone fitted (SolvePose). Corners that no model's
 /// solution of all views uses are left out for every model. The best model is the one with the
-/// least held-out RMS. A model with fewer coefficients is as good when the bootstrap interval of
-/// the difference of their RMS (views drawn with replacement, the same for both; Efron & Tibshirani
-/// 1993) reaches zero. Chosen is, of those, the one with the fewest coefficients, and of equal ones
-/// that with the smaller error. Throws Error when there are fewer than 5 views, or no model holds.
+/// least held-out RMS; a simpler one (ComplexityOf) is as good when the bootstrap interval of the
+/// difference of their RMS (views drawn with replacement, the same for both; Efron & Tibshirani
+/// 1993) reaches zero, or when the difference is below 10 % or 0.005 px: errors that all photos of
+/// a board share favour coefficients in held-out photos too. Chosen is the simplest of those. A
+/// model that bends or turns back between the outermost corner seen and the border of the image
+/// (radial_bend.h) does not count, unless all others err more (kBendGivesWay). Throws Error when
+/// there are fewer than 5 views, or no model holds.
 ModelChoice ChooseModel(const Board& board, std::span<const BoardView> views, int width_px,
                         int height_px, const ChoiceOptions& options = {});
 

@@ -3,6 +3,7 @@
 #include <glog/logging.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "calib/solve/board_start.h"
@@ -49,6 +50,18 @@ double SigmaOfUsed(const std::vector<std::vector<double>>& lengths_px, const Use
   }
   if (all.empty()) Refuse("expected corners that a camera explains, found none");
   return std::max(RobustSigma(std::move(all)), kSmallestSigmaPx);
+}
+
+double ScatterOfUsed(const std::vector<std::vector<double>>& lengths_px, const Used& used) {
+  double squares = 0, count = 0;
+  for (size_t i = 0; i < lengths_px.size(); ++i) {
+    for (size_t j = 0; j < lengths_px[i].size(); ++j) {
+      if (!used[i][j]) continue;
+      squares += lengths_px[i][j] * lengths_px[i][j];
+      count += 2;  // coordinates
+    }
+  }
+  return std::max(SigmaOfUsed(lengths_px, used), std::sqrt(squares / std::max(1.0, count)));
 }
 
 }  // namespace dtr::calib

@@ -29,4 +29,10 @@ Used Within(const std::vector<std::vector<double>>& lengths_px, double limit_px)
 /// none.
 double SigmaOfUsed(const std::vector<std::vector<double>>& lengths_px, const Used& used);
 
+/// Standard deviation per coordinate of the lengths that are used, tails and all: at least
+/// SigmaOfUsed. Photos differ in sharpness and boards are bent; where the smaller residuals alone
+/// are the measure, the larger ones of every photo become outliers, and with them what the image's
+/// border says of the lens. Requires gross outliers to be taken out before.
+double ScatterOfUsed(const std::vector<std::vector<double>>& lengths_px, const Used& used);
+
 }  // namespace dtr::calib

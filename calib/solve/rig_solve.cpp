@@ -220,9 +220,12 @@ void TakeOutDisagreeing(Rig& rig, std::vector<LeftOut>& left_out) {
   });
 }
 
-// Robust sigma per camera; that of all where a camera has no view.
-std::vector<double> CameraSigmas(const Rig& rig, const Lengths& lengths, const Used& used) {
-  std::vector<double> sigmas(rig.cameras.size(), SigmaOfUsed(lengths, used));
+using SigmaOf = double (*)(const Lengths&, const Used&);  // SigmaOfUsed or ScatterOfUsed
+
+// Sigma per camera; that of all where a camera has no view.
+std::vector<double> CameraSigmas(const Rig& rig, const Lengths& lengths, const Used& used,
+                                 SigmaOf sigma_of) {
+  std::vector<double> sigmas(rig.cameras.size(), sigma_of(lengths, used));
   for (size_t c = 0; c < rig.cameras.size(); ++c) {
     Lengths own;
     Used own_used;
@@ -231,7 +234,7 @@ std::vector<double> CameraSigmas(const Rig& rig, const Lengths& lengths, const U
       own.push_back(lengths[v]);
       own_used.push_back(used[v]);
     }
-    if (!own.empty()) sigmas[c] = SigmaOfUsed(own, own_used);
+    if (!own.empty()) sigmas[c] = sigma_of(own, own_used);
   }
   return sigmas;
 }
@@ -241,10 +244,10 @@ Used Drawable(const Lengths& lengths) {
 }
 
 // Names as outliers what is farther off than its camera's sigmas allow. False when nothing changed.
-bool NameOutliers(const Board& board, double outlier_sigmas, Rig& rig) {
+bool NameOutliers(const Board& board, double outlier_sigmas, SigmaOf sigma_of, Rig& rig) {
   const Lengths lengths = ResidualLengths(board, rig);
   const Used before = UsedOf(rig);
-  const auto sigmas = CameraSigmas(rig, lengths, before);
+  const auto sigmas = CameraSigmas(rig, lengths, before, sigma_of);
   Used used = before;
   for (size_t v = 0; v < lengths.size(); ++v) {
     for (size_t j = 0; j < lengths[v].size(); ++j) {
@@ -267,11 +270,11 @@ void SolveRobustly(const Board& board, const RigOptions& options, Rig& rig,
     scale = next;
     if (settled) break;
   }
-  NameOutliers(board, options.solve.outlier_sigmas, rig);
+  NameOutliers(board, options.solve.outlier_sigmas, SigmaOfUsed, rig);
   TakeOutDisagreeing(rig, left_out);
   for (int pass = 0; pass < kMostOutlierPasses; ++pass) {
     Minimise(board, options.free_lenses, {}, UsedOf(rig), rig);
-    if (!NameOutliers(board, options.solve.outlier_sigmas, rig)) break;
+    if (!NameOutliers(board, options.solve.outlier_sigmas, ScatterOfUsed, rig)) break;
     TakeOutDisagreeing(rig, left_out);
   }
 }
@@ -482,7 +485,7 @@ Rig FitFrames(const Board& board, std::vector<RigCamera> cameras, std::vector<Ri
   };
   if (options.loss == Loss::kRobust) {
     minimise(kCauchySigmas * SigmaOfUsed(ResidualLengths(board, rig), UsedOf(rig)));
-    NameOutliers(board, options.outlier_sigmas, rig);
+    NameOutliers(board, options.outlier_sigmas, SigmaOfUsed, rig);
   }
   minimise({});
   return rig;

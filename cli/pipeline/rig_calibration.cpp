@@ -68,12 +68,13 @@ Inputs InputsOf(const calib::Board& board, const RigPhotos& photos,
 }
 
 // A model that a camera's own views held, and whose distortion turns back when all cameras are
-// solved together, gives way to the best with fewer coefficients; false where there is none.
+// solved together, gives way to the best simpler one; false where there is none.
 bool TakeSimplerModel(size_t camera, Inputs& inputs, RigSummary& summary) {
   calib::RigCameraInput& input = inputs.cameras[camera];
   const calib::ModelScore* simpler = nullptr;
   for (const calib::ModelScore& score : inputs.scores[camera]) {
-    if (!score.refused.empty() || score.coefficients >= calib::FreeParameterCount(input.model)) {
+    if (!score.refused.empty() ||
+        calib::ComplexityOf(score.model) >= calib::ComplexityOf(input.model)) {
       continue;
     }
     if (simpler == nullptr || score.held_out_rms_px < simpler->held_out_rms_px) simpler = &score;
