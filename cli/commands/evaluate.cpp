@@ -117,7 +117,7 @@ int RunEvaluate(const Options& options, const Context& context) {
     fs::create_directories(options.pictures);
     evaluate.on_rendered = [&](const View& view, const RenderResult& filled) {
       io::WriteImage(options.pictures / (view.id + ".png"),
-                     eval::ComparisonImage(filled.image, view.image));
+                     eval::ComparisonImage(filled.image, view.image, view.mask));
     };
   }
   const bool has_held_out =

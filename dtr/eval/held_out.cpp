@@ -124,9 +124,12 @@ EvaluationReport EvaluateHeldOut(const DtrSet& set, const EvaluateOptions& optio
   return report;
 }
 
-ImageRgb8 ComparisonImage(const ImageRgb8& rendered, const ImageRgb8& photo) {
-  if (rendered.empty() || rendered.channels() != 3 || photo.channels() != 3 ||
-      rendered.width() != photo.width() || rendered.height() != photo.height()) {
+ImageRgb8 ComparisonImage(const ImageRgb8& rendered, const ImageRgb8& photo, const Mask& mask) {
+  const auto fits = [&](const Grid<std::uint8_t>& other) {
+    return other.width() == rendered.width() && other.height() == rendered.height();
+  };
+  if (rendered.empty() || rendered.channels() != 3 || photo.channels() != 3 || !fits(photo) ||
+      !(mask.empty() || fits(mask))) {
     throw std::invalid_argument("ComparisonImage: the images must be RGB and of one size");
   }
   const int width = rendered.width(), stride = width + kGapPx;
@@ -136,6 +139,7 @@ ImageRgb8 ComparisonImage(const ImageRgb8& rendered, const ImageRgb8& photo) {
       for (int c = 0; c < 3; ++c) {
         const int a = rendered(x, y, c), b = photo(x, y, c);
         sheet(x, y, c) = rendered(x, y, c);
+        if (!mask.empty() && mask(x, y) == 0) continue;
         sheet(stride + x, y, c) = photo(x, y, c);
         sheet(2 * stride + x, y, c) =
             static_cast<std::uint8_t>(std::min(255, kDifferenceGain * std::abs(a - b)));

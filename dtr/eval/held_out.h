@@ -60,7 +60,8 @@ EvaluationReport EvaluateHeldOut(const DtrSet& set, const EvaluateOptions& optio
                                  const RenderFunction& render, Progress& progress);
 
 /// Rendering | photo | absolute difference times 4, side by side with a grey line between, for
-/// looking at. Throws std::invalid_argument unless both are RGB and of one size.
-ImageRgb8 ComparisonImage(const ImageRgb8& rendered, const ImageRgb8& photo);
+/// looking at. Pixels that the photo's mask excludes (empty: none) are grey in photo and difference,
+/// as they count in no figure. Throws std::invalid_argument unless both are RGB and all of one size.
+ImageRgb8 ComparisonImage(const ImageRgb8& rendered, const ImageRgb8& photo, const Mask& mask = {});
 
 }  // namespace dtr::eval

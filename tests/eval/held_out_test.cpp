@@ -198,5 +198,17 @@ TEST(ComparisonImage, ShowsTheDifferenceFourfold) {
   EXPECT_THROW(ComparisonImage(a, ImageRgb8(2, 2, 3)), std::invalid_argument);
 }
 
+TEST(ComparisonImage, PixelsThatCountInNoFigureAreGrey) {
+  const ImageRgb8 a(3, 2, 3, 100), b(3, 2, 3, 110);
+  Mask mask(3, 2, 1, 255);
+  mask(0, 1) = 0;
+  const ImageRgb8 sheet = ComparisonImage(a, b, mask);
+  EXPECT_EQ(sheet(7, 1, 0), 128);
+  EXPECT_EQ(sheet(14, 1, 0), 128);
+  EXPECT_EQ(sheet(7, 0, 0), 110);
+  EXPECT_EQ(sheet(14, 0, 0), 40);
+  EXPECT_THROW(ComparisonImage(a, b, Mask(2, 2)), std::invalid_argument);
+}
+
 }  // namespace
 }  // namespace dtr::eval
