@@ -56,6 +56,11 @@ Reader OpenYaml(const fs::path& folder) {
       "3\n"
       "  data: [530, 0, 320, 0, 530, 240, 0, 0, 1]\ndistortion_model: plumb_bob\n"
       "distortion_coefficients:\n  rows: 1\n  cols: 5\n  data: [-0.3, 0.1, 0, 0, 0]\n");
+  seeds.push_back(  // FileStorage as XML
+      "<?xml version=\"1.0\"?>\n<opencv_storage>\n<image_size>640 480</image_size>\n"
+      "<K type_id=\"opencv-matrix\"><rows>3</rows><cols>3</cols><dt>d</dt>\n"
+      "<data>530. 0. 320. 0. 530. 240. 0. 0. 1.</data></K>\n"
+      "<D type_id=\"opencv-matrix\"><data>-0.3 0.1 0. 0.</data></D>\n</opencv_storage>\n");
   return {file, seeds, [=] { calib::ReadOpenCvYaml(file); }};
 }
 

@@ -82,16 +82,20 @@ Reader OpenTransforms(const fs::path& folder) {
       R"("frames": [{"file_path": "./images/a", "depth_file_path": "depth/a.png",
   "transform_matrix": [[1,0,0,7],[0,0,-1,8],[0,1,0,9],[0,0,0,1]]}, {"file_path": "./images/b",
   "transform_matrix": [[1,0,0,7.5],[0,0,-1,8],[0,1,0,9],[0,0,0,1]]}]})";
-  return {file,
-          {R"({"w": 40, "h": 30, "fl_x": 50, "fl_y": 51, "cx": 21, "cy": 14, "k1": 0, )" + frames,
-           R"({"camera_angle_x": 0.9, "aabb_scale": 4, )" + frames},
-          [=] {
-            io::TransformsPaths paths;
-            paths.image_of = [](const std::string& path) {
-              return io::SizedImage{path + ".png", 20, 15};
-            };
-            io::ReadTransformsJson(file, paths);
-          }};
+  return {
+      file,
+      {R"({"w": 40, "h": 30, "fl_x": 50, "fl_y": 51, "cx": 21, "cy": 14, "k1": 0, )" + frames,
+       R"({"camera_angle_x": 0.9, "aabb_scale": 4, )" + frames,
+       R"({"w": 40, "h": 30, "fl_x": 50, "is_fisheye": 1, "k1": 0.1, "depth_unit_scale_factor": 0.01,
+  "train_filenames": ["images/a"], "test_filenames": ["images/b"], )" +
+           frames},
+      [=] {
+        io::TransformsPaths paths;
+        paths.image_of = [](const std::string& path) {
+          return io::SizedImage{path + ".png", 20, 15};
+        };
+        io::ReadTransformsJson(file, paths);
+      }};
 }
 
 Reader OpenPar(const fs::path& folder) {

@@ -38,8 +38,9 @@ struct NamedCamera {
   std::string mask_file;   ///< relative to the folder of masks; empty: none
   DepthKind depth_kind = DepthKind::kPlaneZ;  ///< what the numbers of `depth_file` measure
   PinholeCamera camera{1, 1, 1, 1, 0, 0};     ///< of the image, once it is undistorted
-  std::optional<Distortion> distortion;       ///< of the image as it is; empty: none
   Pose cam_from_world;                        ///< world: relative to CameraList::world_origin
+  /// Of the image as it is; empty: none.
+  std::optional<Distortion> distortion = std::nullopt;
 };
 
 /// Cameras of one scene.
