@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "calib/bundle/covariance.h"
@@ -264,17 +265,39 @@ std::vector<Degeneracy> DegeneraciesOf(const SfmModel& model, const RefineOption
   return FindDegeneracies(adjusted, CovarianceOf(adjusted, adjust), BundleLimits{}.max_focal_share);
 }
 
-void RequireDetermined(const SfmModel& model, const RefineOptions& options,
-                       const std::string& what) {
+std::string WhyUndetermined(const SfmModel& model, const RefineOptions& options) {
   for (const Degeneracy& d : DegeneraciesOf(model, options)) {
     if (!d.harmful || d.name == "duplicate_images" || d.name == "too_few_views") continue;
-    throw Error(
-        fmt::format("{}: {}: {}; {}", what, d.name, d.detail,
-                    !options.advice.empty()
-                        ? options.advice
-                        : "take photos from more positions, around what they show, or give the "
-                          "camera (--lens); docs/VALIDATION.md names what each degeneracy lacks"));
+    return fmt::format("{}: {}", d.name, d.detail);
   }
+  return "";
+}
+
+void RequireDetermined(const SfmModel& model, const RefineOptions& options,
+                       const std::string& what) {
+  const std::string why = WhyUndetermined(model, options);
+  if (why.empty()) return;
+  throw Error(
+      fmt::format("{}: {}; {}", what, why,
+                  !options.advice.empty()
+                      ? options.advice
+                      : "take photos from more positions, around what they show, or give the "
+                        "camera (--lens); docs/VALIDATION.md names what each degeneracy lacks"));
+}
+
+double HeldOutErrorPx(const SfmModel& model, std::uint64_t seed, int* count) {
+  const Bundle bundle = BundleOf(model);
+  const SightSplit split = SplitSights(SomePoints(bundle, kMostPoints, seed), seed);
+  // Cauchy's loss is monotone in the length: its inverse gives the lengths back.
+  constexpr double kScalePx = 1;
+  std::vector<double> lengths_px;
+  for (const double loss : LossesOfHeldOutSights(bundle, split, kScalePx)) {
+    lengths_px.push_back(kScalePx * std::sqrt(std::expm1(loss / (kScalePx * kScalePx))));
+  }
+  *count = static_cast<int>(lengths_px.size());
+  if (lengths_px.empty()) return std::numeric_limits<double>::quiet_NaN();
+  std::nth_element(lengths_px.begin(), lengths_px.begin() + *count / 2, lengths_px.end());
+  return lengths_px[static_cast<size_t>(*count / 2)];
 }
 
 std::string RemarkOn(const Refined& refined) {

@@ -87,6 +87,13 @@ std::vector<Degeneracy> DegeneraciesOf(const SfmModel& model, const RefineOption
 void RequireDetermined(const SfmModel& model, const RefineOptions& options,
                        const std::string& what);
 
+/// The same as a clause, "" where the model determines them.
+std::string WhyUndetermined(const SfmModel& model, const RefineOptions& options);
+
+/// Median length (px) of held-out residuals: one observation of each point in 4 images or more, the
+/// point placed by the others. `count`: how many. NaN where there are none.
+double HeldOutErrorPx(const SfmModel& model, std::uint64_t seed, int* count);
+
 /// The model with these lenses, by camera id. Throws Error where one is missing, or is of images of
 /// another size.
 SfmModel WithLenses(SfmModel model, const std::map<std::uint32_t, LensCamera>& lenses);

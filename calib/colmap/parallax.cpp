@@ -46,8 +46,10 @@ PairCounts CountPairs(const Workspace& workspace) {
   return counts;
 }
 
+bool CameraStoodStill(const PairCounts& counts) { return HalfOrMore(counts.still, counts.matched); }
+
 std::string LackOfParallax(const PairCounts& counts) {
-  if (HalfOrMore(counts.still, counts.matched)) {
+  if (CameraStoodStill(counts)) {
     return fmt::format(
         "{} of {} matched pairs of photos show most of their common features at the same position "
         "in both: the camera did not move against what stands still (a turntable, or a thing held "

@@ -22,6 +22,9 @@ struct PairCounts {
 /// Throws Error where the database is none, or a record of it cannot be.
 PairCounts CountPairs(const Workspace& workspace);
 
+/// Half of the matched pairs or more are `still`.
+bool CameraStoodStill(const PairCounts& counts);
+
 /// A sentence for counts in which half of the matched pairs or more are `still` or
 /// `without_parallax`, with what helps; empty for others.
 std::string LackOfParallax(const PairCounts& counts);

@@ -45,9 +45,16 @@ int RegisteredImages(const std::string& line) {
       workspace.images().size(), log));
 }
 
+// How COLMAP maps.
+enum class Mapping {
+  kFree,
+  kFixedIntrinsics,  ///< focal lengths of EXIF, no distortion
+  kForwardMotion,    ///< with the thresholds of a walk straight ahead
+};
+
 // Runs the mapper; false where it found no two photos to start from, which COLMAP takes for an
 // error: it is a finding about the photos.
-bool Map(Workspace& workspace, const fs::path& models, std::uint64_t seed, bool forward_motion) {
+bool Map(Workspace& workspace, const fs::path& models, std::uint64_t seed, Mapping mapping) {
   Arguments arguments(workspace.program(), "mapper");
   arguments.AddIfKnown({"random_seed", "default_random_seed"}, fmt::format("{}", seed))
       .AddIfKnown({"Mapper.random_seed"}, fmt::format("{}", seed))
@@ -55,7 +62,11 @@ bool Map(Workspace& workspace, const fs::path& models, std::uint64_t seed, bool 
       .Add({"image_path"}, workspace.images_folder().string())
       .Add({"output_path"}, models.string())
       .Add({"Mapper.num_threads"}, std::to_string(workspace.threads()));
-  if (forward_motion) AllowForwardMotion(arguments);
+  if (mapping == Mapping::kForwardMotion) AllowForwardMotion(arguments);
+  if (mapping == Mapping::kFixedIntrinsics) {
+    arguments.Add({"Mapper.ba_refine_focal_length"}, "0")
+        .Add({"Mapper.ba_refine_extra_params"}, "0");
+  }
   workspace.progress().Stage("mapping", static_cast<int>(workspace.images().size()));
   int most = 0;
   bool no_pair = false;
@@ -90,31 +101,74 @@ std::vector<calib::SfmModel> ModelsIn(const Workspace& workspace, const fs::path
   return models;
 }
 
-void MappingStep(Workspace& workspace, const SfmOptions& options) {
-  const fs::path models = workspace.folder() / "models";
+std::vector<calib::SfmModel> MadeIn(Workspace& workspace, const fs::path& models,
+                                    const SfmOptions& options, Mapping mapping) {
   RemoveAll(models);
-  RemoveAll(workspace.folder() / "model");
-  RemoveAll(workspace.folder() / kForwardMotionNote);
   MakeFolder(models);
-  const auto map = [&](bool forward_motion) {
-    return Map(workspace, models, options.seed, forward_motion) ? ModelsIn(workspace, models)
-                                                                : std::vector<calib::SfmModel>();
+  return Map(workspace, models, options.seed, mapping) ? ModelsIn(workspace, models)
+                                                       : std::vector<calib::SfmModel>();
+}
+
+// Every camera has a focal length of EXIF to be fixed at.
+bool AllHavePriors(const std::vector<CameraGroup>& groups) {
+  return std::none_of(groups.begin(), groups.end(),
+                      [](const CameraGroup& group) { return group.params.empty(); });
+}
+
+// What the mapper makes of photos of which it made nothing with free intrinsics.
+std::vector<calib::SfmModel> MadeOtherwise(Workspace& workspace, const fs::path& models,
+                                           const std::vector<CameraGroup>& groups,
+                                           const SfmOptions& options) {
+  constexpr double kMostPhotos = 0.75;
+  std::vector<calib::SfmModel> fixed;
+  if (AllHavePriors(groups)) {
+    workspace.progress().Note(
+        "COLMAP made no model with free focal lengths; trying with those of EXIF, fixed");
+    fixed = MadeIn(workspace, models, options, Mapping::kFixedIntrinsics);
+  }
+  const auto photos = [](const std::vector<calib::SfmModel>& made) {
+    return made.empty() ? 0 : made.front().images.size();
   };
-  auto made = map(false);
-  if (made.empty()) {
+  std::vector<calib::SfmModel> forward;
+  if (static_cast<double>(photos(fixed)) <
+      kMostPhotos * static_cast<double>(workspace.images().size())) {
     workspace.progress().Note(
         "COLMAP found no two photos to start from; trying two that may lie in line with what they "
         "see");
-    RemoveAll(models);
-    MakeFolder(models);
-    made = map(true);
-    WriteFileAtomically(workspace.folder() / kForwardMotionNote, "");
+    forward = MadeIn(workspace, models, options, Mapping::kForwardMotion);
   }
+  const bool take_fixed = photos(fixed) > photos(forward);
+  WriteFileAtomically(workspace.folder() / (take_fixed ? kFixedIntrinsicsNote : kForwardMotionNote),
+                      "");
+  return take_fixed ? fixed : forward;
+}
+
+void MappingStep(Workspace& workspace, const std::vector<CameraGroup>& groups,
+                 const SfmOptions& options) {
+  const fs::path models = workspace.folder() / "models";
+  RemoveAll(workspace.folder() / "model");
+  RemoveAll(workspace.folder() / kForwardMotionNote);
+  RemoveAll(workspace.folder() / kFixedIntrinsicsNote);
+  auto made = MadeIn(workspace, models, options, Mapping::kFree);
+  if (made.empty()) made = MadeOtherwise(workspace, models, groups, options);
   if (made.empty()) ThrowNoModel(workspace);
   std::string sizes;
   for (const auto& model : made) sizes += fmt::format("{}\n", model.images.size());
   WriteFileAtomically(workspace.folder() / "models.txt", sizes);
   WriteModel(workspace.folder() / "model", made.front(), Format::kBinary);
+}
+
+// Leaves no model where COLMAP makes none.
+void FixedMappingStep(Workspace& workspace, const SfmOptions& options) {
+  const fs::path models = workspace.folder() / "fixed" / "models",
+                 model = workspace.folder() / kFixedModel;
+  RemoveAll(model);
+  const auto made = MadeIn(workspace, models, options, Mapping::kFixedIntrinsics);
+  if (!made.empty()) WriteModel(model, made.front(), Format::kBinary);
+}
+
+std::string MappingInputs(const SfmOptions& options) {
+  return fmt::format("seed {}", options.seed);
 }
 
 std::vector<int> ModelSizes(const Workspace& workspace) {
@@ -143,15 +197,19 @@ SfmResult RunSfm(const fs::path& images_dir, std::span<const SfmImageInput> imag
   const auto groups = GroupCameras(workspace.images(), lens, options.share_intrinsics_within_group);
   SfmResult result;
   FeaturesAndMatches(workspace, groups, options, result.report);
-  workspace.Step("mapping", fmt::format("seed {}", options.seed),
-                 [&] { MappingStep(workspace, options); });
+  workspace.Step("mapping", MappingInputs(options),
+                 [&] { MappingStep(workspace, groups, options); });
   result.model = ReadModel(workspace.folder() / "model");
   result.report.images_per_model = ModelSizes(workspace);
+  result.report.fixed_intrinsics = fs::exists(workspace.folder() / kFixedIntrinsicsNote);
   result.report.forward_motion = fs::exists(workspace.folder() / kForwardMotionNote);
   CompleteReport(workspace, result.model, result.report);
   try {
-    result.report.lack_of_parallax = LackOfParallax(CountPairs(workspace));
-    if (!result.report.lack_of_parallax.empty()) progress.Note(result.report.lack_of_parallax);
+    const PairCounts pairs = CountPairs(workspace);
+    result.report.lack_of_parallax = LackOfParallax(pairs);
+    // One homography explains most pairs of a wall or a box, too, of which there is a model: that
+    // is worth a line where the model does not determine its cameras, not here.
+    if (CameraStoodStill(pairs)) progress.Note(result.report.lack_of_parallax);
     result.report.why_not_registered =
         WhyWithoutCamera(workspace, result.model,
                          result.report.forward_motion ? kFewestInliersForward : kFewestInliers);
@@ -160,6 +218,29 @@ SfmResult RunSfm(const fs::path& images_dir, std::span<const SfmImageInput> imag
         "what the matches say of parallax and of photos without a camera is not known: {}",
         error.what()));
   }
+  return result;
+}
+
+std::optional<SfmResult> MapWithFixedIntrinsics(const fs::path& images_dir,
+                                                std::span<const SfmImageInput> images,
+                                                const fs::path& workspace_folder,
+                                                const SfmOptions& options, Progress& progress) {
+  Workspace workspace(workspace_folder, images_dir, images, "", ResolveThreads(options.threads),
+                      progress);
+  const auto groups =
+      GroupCameras(workspace.images(), LensModelOf(options), options.share_intrinsics_within_group);
+  if (!AllHavePriors(groups)) return {};
+  SfmResult result;
+  FeaturesAndMatches(workspace, groups, options, result.report);
+  workspace.Step("mapping", MappingInputs(options),
+                 [&] { MappingStep(workspace, groups, options); });
+  workspace.Step("fixed mapping", MappingInputs(options),
+                 [&] { FixedMappingStep(workspace, options); });
+  if (!fs::exists(workspace.folder() / kFixedModel)) return {};
+  result.model = ReadModel(workspace.folder() / kFixedModel);
+  result.report.images_per_model = {static_cast<int>(result.model.images.size())};
+  result.report.fixed_intrinsics = true;
+  CompleteReport(workspace, result.model, result.report);
   return result;
 }
 

@@ -72,9 +72,12 @@ struct SfmReport {
   int max_image_size_px = 0;
   std::vector<std::string> not_registered;                ///< names without a pose, sorted
   std::map<std::string, std::string> why_not_registered;  ///< a clause each, by name, from RunSfm
-  std::vector<int> images_per_model;      ///< models COLMAP made, largest first; [0] was taken
+  std::vector<int> images_per_model;  ///< models COLMAP made, largest first; [0] was taken
   /// Half of the matched pairs or more show no parallax: a sentence with counts and what helps.
   std::string lack_of_parallax;
+  /// Mapped with focal lengths of EXIF and no distortion, fixed: with free ones COLMAP made no
+  /// model.
+  bool fixed_intrinsics = false;
   bool forward_motion = false;            ///< mapped with the thresholds of a walk straight ahead
   double mean_reprojection_error_px = 0;  ///< over all observations, recomputed
 };
@@ -97,6 +100,16 @@ struct SfmResult {
 SfmResult RunSfm(const std::filesystem::path& images_dir, std::span<const SfmImageInput> images,
                  const std::filesystem::path& workspace, const SfmOptions& options,
                  Progress& progress);
+
+/// Where RunSfm of the same arguments has finished, maps its matches again with focal lengths fixed
+/// at the priors and no distortion, in `workspace`/fixed, with checkpoints as RunSfm's. Empty where
+/// COLMAP makes no model so, or a photo has no prior. Throws as RunSfm does.
+std::optional<SfmResult> MapWithFixedIntrinsics(const std::filesystem::path& images_dir,
+                                                std::span<const SfmImageInput> images,
+                                                const std::filesystem::path& workspace,
+                                                const SfmOptions& options, Progress& progress);
+/// The folder of its model in the workspace.
+inline constexpr char kFixedModel[] = "fixed/model";
 
 /// Mean distance (px) between features and their points' projections; 0 without observations.
 double MeanReprojectionErrorPx(const calib::SfmModel& model);

@@ -33,6 +33,8 @@ void AllowForwardMotion(Arguments& arguments);
 /// File in the workspace of a model that RunSfm needed them for: what is registered in it needs
 /// them, too.
 inline constexpr char kForwardMotionNote[] = "forward_motion";
+/// Lies in a workspace whose mapper made a model with the intrinsics fixed at EXIF's alone.
+inline constexpr char kFixedIntrinsicsNote[] = "fixed_intrinsics";
 
 /// Points that must agree with the place of a photo: COLMAP's own limit, and that of such a walk.
 inline constexpr int kFewestInliers = 30, kFewestInliersForward = 15;

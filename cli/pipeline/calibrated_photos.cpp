@@ -11,8 +11,8 @@
 #include "calib/colmap/program.h"
 #include "calib/colmap/sfm.h"
 #include "capture/sfm_images.h"
+#include "cli/pipeline/exif_focal.h"
 #include "cli/pipeline/known_poses.h"
-#include "cli/pipeline/photo_refinement.h"
 #include "dtr/base/error.h"
 
 namespace dtr::pipeline {
@@ -59,6 +59,8 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
   colmap::SfmResult sfm =
       colmap::RunSfm(workspace / "photos", inputs, workspace / "sfm", sfm_options, progress);
 
+  PhotoRefinement refined =
+      RefineSfm({capture, options, groups, inputs, sfm_options, workspace}, sfm, progress);
   CalibratedPhotos calibrated;
   calibrated.engine = sfm.report.version;
   calibrated.why_not_registered = sfm.report.why_not_registered;
@@ -69,11 +71,6 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
     calibrated.earlier_wall_s += step.wall_s;
   }
   Json report = SfmJson(sfm.report, sfm.model);
-  CalibrateOptions advised = options;
-  advised.advice = sfm.report.lack_of_parallax;
-  PhotoRefinement refined =
-      RefinePhotos(capture, advised, groups, sfm.model, workspace / "sfm" / "model",
-                   workspace / "refined", progress);
   report.update(Json::parse(refined.report_json));
   calibrated.kept_refinement_cpu_s = refined.earlier_cpu_s;
   calibrated.earlier_cpu_s += refined.earlier_cpu_s;

@@ -34,6 +34,7 @@ struct CalibrateOptions {
   /// refined; empty: nobody asks.
   std::string determined = {};
   SfmChoice sfm = {};
+  bool fixed_intrinsics = false;  ///< the model's are to be held; CalibratePhotos sets it
   std::string advice =
       {};  ///< what helps where cameras are not determined; CalibratePhotos sets it
 };

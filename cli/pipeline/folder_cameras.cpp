@@ -121,7 +121,7 @@ FolderCameras ChooseFolderCameras(const CameraGroups& groups, const capture::Cap
     const Registered registered = RegisteredOf(pool, groups, capture, out.model);
     if (registered.folder_of.size() < 2) continue;  // one camera: nothing to decide
     calib::SharedCameras result;
-    std::string not_tested = "--no-refine";
+    std::string not_tested = "intrinsics are taken as they are";
     if (test) {
       result = calib::ShareCameras(out.model, registered.Cameras(), options);
       not_tested = result.not_tested;

@@ -61,6 +61,7 @@ void RefineLenses(const capture::Capture& capture, const CalibrateOptions& optio
       refine.known_lenses->emplace(id, *options.lens);
     }
   }
+  if (options.fixed_intrinsics) refine.known_lenses = out.model.cameras;
   if (options.metres.any()) return HoldMetres(capture, options, refine, report, out);
   calib::Refined refined = calib::Refine(out.model, refine);
   report["bundle_adjustment"] = Json::parse(calib::ToJson(refined));
@@ -101,7 +102,7 @@ PhotoRefinement WorkOut(const capture::Capture& capture, const CalibrateOptions&
     report["rig"] = Json::parse(PlaceByRig(*options.rig, capture, out.model, progress));
   } else {
     if (!groups.pools().empty()) progress.Stage("cameras of folders", 0);
-    ShareFolders(capture, options, groups, true, report, out, progress);
+    ShareFolders(capture, options, groups, !options.fixed_intrinsics, report, out, progress);
     progress.Stage("bundle adjustment", 0);
     RefineLenses(capture, options, RefineOptionsFor(options, progress), report, out);
   }
@@ -127,6 +128,7 @@ Json StampOf(const capture::Capture& capture, const CalibrateOptions& options,
   if (options.sfm.camera_per != CameraPer::kAuto) {
     stamp["camera_per"] = NameOf(options.sfm.camera_per);
   }
+  if (options.fixed_intrinsics) stamp["fixed_intrinsics"] = true;
   for (const FolderPool& pool : groups.pools()) {
     stamp["folders"].push_back({{"group", pool.group}, {"photos", pool.photos_of}});
   }
@@ -188,7 +190,9 @@ PhotoRefinement RefinePhotos(const capture::Capture& capture, const CalibrateOpt
   PhotoRefinement refined;
   if (!options.rig && !options.refine && !options.lens) {
     if (!options.determined.empty()) {
-      calib::RequireDetermined(model, RefineOptionsFor(options, progress), options.determined);
+      calib::RefineOptions refine = RefineOptionsFor(options, progress);
+      if (options.fixed_intrinsics) refine.known_lenses = model.cameras;
+      calib::RequireDetermined(model, refine, options.determined);
     }
     refined.model = model;
     Json report = Json::object();

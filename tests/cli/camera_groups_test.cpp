@@ -1,5 +1,7 @@
 #include "cli/pipeline/camera_groups.h"
 
+#include "cli/pipeline/exif_focal.h"
+
 #include <gtest/gtest.h>
 
 #include <set>
@@ -78,6 +80,31 @@ TEST(CameraGroups, OneFolderOrOneCameraPerFolderBySizeIsNoQuestion) {
   auto photos = TwoFolders();
   for (size_t i = 3; i < 6; ++i) photos[i].width_px = 800;
   EXPECT_TRUE(CameraGroups(photos, CameraPer::kAuto, false).pools().empty());
+}
+
+calib::SfmModel ModelWithFocal(double focal_px) {
+  calib::SfmModel model;
+  model.cameras[4] = {calib::LensModel::kSimpleRadial, 800, 600, {focal_px, 400, 300, 0}};
+  for (const char* name : {"a.jpg", "b.jpg", "c.jpg"}) {
+    calib::SfmImage image;
+    image.name = name;
+    image.camera_id = 4;
+    model.images.push_back(image);
+  }
+  return model;
+}
+
+TEST(ExifFocal, OnlyWhatRoundingCannotExplainContradictsIt) {
+  const std::vector<colmap::SfmImageInput> photos{
+      {"a.jpg", 800, 600, 889.0}, {"b.jpg", 800, 600, 889.0}, {"c.jpg", 800, 600, {}}};
+  EXPECT_FALSE(ContradictsExif(ModelWithFocal(900), photos));
+  EXPECT_FALSE(ContradictsExif(ModelWithFocal(1000), photos));
+  EXPECT_FALSE(ContradictsExif(ModelWithFocal(800), photos));
+  ASSERT_TRUE(ContradictsExif(ModelWithFocal(157), photos));
+  EXPECT_EQ(ContradictsExif(ModelWithFocal(157), photos)->exif_px, 889);
+  EXPECT_EQ(ContradictsExif(ModelWithFocal(157), photos)->found_px, 157);
+  EXPECT_TRUE(ContradictsExif(ModelWithFocal(1800), photos));
+  EXPECT_FALSE(ContradictsExif(ModelWithFocal(157), {{"a.jpg", 800, 600, {}}})) << "no EXIF";
 }
 
 }  // namespace

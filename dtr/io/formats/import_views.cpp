@@ -227,6 +227,14 @@ std::string Fingerprint(const nlohmann::json& inputs, const CameraList& list,
   return fingerprint.dump();
 }
 
+// What fills the place of hidden colours was never seen. Not before undistortion, whose filter
+// would draw it over the border.
+void BlackenMasked(View& view) {
+  for (size_t i = 0; i < view.mask.data().size(); ++i) {
+    if (view.mask.data()[i] == 0) std::fill_n(&view.image.data()[3 * i], 3, std::uint8_t{0});
+  }
+}
+
 View ViewOf(const NamedCamera& named, const std::string& id, const ImportOptions& options,
             ViewNote& note) {
   View view;
@@ -249,6 +257,7 @@ View ViewOf(const NamedCamera& named, const std::string& id, const ImportOptions
     distortion = options.distortion_of(named);
     distortion->Undistort(view.image, view.mask);
   }
+  if (note.alpha_masks) BlackenMasked(view);
   if (HasDepth(named, options)) {
     view.depth = internal::ReadCameraDepth(named, options, distortion.get(), note.resampled);
     view.depth_scale = view.camera.width_px() / view.depth.width();

@@ -217,6 +217,48 @@ TEST_F(RunSfmWithFake, AModelOfPhotosMostlyWithoutParallaxIsRemarkedOn) {
   EXPECT_EQ(Run().report.lack_of_parallax, "");
 }
 
+// The mapper makes a model with fixed intrinsics only.
+constexpr char kOnlyFixed[] =
+    "if ! tail -n 1 \"$here/calls\" | grep -q 'ba_refine_focal_length 0.*ba_refine_extra_params "
+    "0'; "
+    "then echo 'ERROR: failed to create sparse model'; exit 1; fi";
+
+TEST_F(RunSfmWithFake, WithoutAModelTheFocalLengthsOfExifAreFixed) {
+  fake_.Fail("mapper", kOnlyFixed);
+  const SfmResult result = Run();
+  EXPECT_EQ(result.model.images.size(), 3u);
+  EXPECT_TRUE(result.report.fixed_intrinsics);
+  EXPECT_FALSE(result.report.forward_motion);
+  EXPECT_TRUE(Run().report.fixed_intrinsics) << "of a run that goes on from it, too";
+  EXPECT_THAT(listener_.notes, Contains(HasSubstr("trying with those of EXIF, fixed")));
+}
+
+TEST_F(RunSfmWithFake, AFocalLengthThatExifDoesNotGiveIsNotFixed) {
+  for (SfmImageInput& image : images_) image.focal_prior_px.reset();
+  fake_.Fail("mapper", kOnlyFixed);
+  fake_.LeaveDatabase(Aliases(), {}, {{0, 1, 40}});
+  EXPECT_THAT(MessageOfRun(), HasSubstr("too little in common"));
+  for (const std::string& call : fake_.Calls()) {
+    EXPECT_THAT(call, Not(HasSubstr("ba_refine_focal_length"))) << call;
+  }
+}
+
+TEST_F(RunSfmWithFake, MatchesAreMappedAgainWithFixedIntrinsics) {
+  Run();
+  fake_.ForgetCalls();
+  const auto again =
+      MapWithFixedIntrinsics(photos_.path(), images_, workspace_ / "sfm", options_, listener_);
+  ASSERT_TRUE(again.has_value());
+  EXPECT_EQ(again->model.images.size(), 3u);
+  ASSERT_EQ(fake_.Calls().size(), 1u) << "features and matches are those of the first run";
+  EXPECT_THAT(fake_.Calls()[0], HasSubstr("--Mapper.ba_refine_focal_length 0"));
+  fake_.ForgetCalls();
+  EXPECT_TRUE(
+      MapWithFixedIntrinsics(photos_.path(), images_, workspace_ / "sfm", options_, listener_));
+  EXPECT_TRUE(fake_.Calls().empty()) << "finished before";
+  EXPECT_FALSE(Run().report.fixed_intrinsics) << "the first model stays";
+}
+
 TEST_F(RunSfmWithFake, AWalkStraightAheadStartsFromPhotosInLineWithWhatTheySee) {
   fake_.Fail("mapper",
              "if ! grep -q 'init_max_forward_motion 1' \"$here/calls\"; then "
@@ -224,9 +266,10 @@ TEST_F(RunSfmWithFake, AWalkStraightAheadStartsFromPhotosInLineWithWhatTheySee) 
              "echo 'ERROR: failed to create sparse model'; exit 1; fi");
   const SfmResult result = Run();
   EXPECT_EQ(result.model.images.size(), 3u);
-  ASSERT_EQ(result.report.steps.size(), 4u);
+  ASSERT_EQ(result.report.steps.size(), 5u);
   EXPECT_THAT(result.report.steps[2].argv, Not(Contains("--Mapper.init_max_forward_motion")));
-  EXPECT_THAT(result.report.steps[3].argv, Contains("--Mapper.init_max_forward_motion"));
+  EXPECT_THAT(result.report.steps[3].argv, Contains("--Mapper.ba_refine_focal_length"));
+  EXPECT_THAT(result.report.steps[4].argv, Contains("--Mapper.init_max_forward_motion"));
   EXPECT_TRUE(result.report.forward_motion);
   EXPECT_TRUE(Run().report.forward_motion) << "of a run that goes on from it, too";
 }

@@ -97,6 +97,7 @@ TEST_F(ImportTest, TransparentPixelsAreMaskedAndHaveNoDepth) {
   Import("a.dtr");
   const View view = LoadSet(folder_ / "a.dtr").frames[0].views[1];
   EXPECT_EQ(view.mask, alpha);
+  EXPECT_EQ(view.image(95, 3, 1), 0);
   EXPECT_EQ(view.depth(95, 3), 0);
   EXPECT_GT(view.depth(94, 3), 0);
 }
