@@ -47,7 +47,7 @@ void SplitRgba(const Grid<std::uint8_t>& rgba, ImageRgb8& on_black, Mask& opaque
 // (SOURCE.md of the set), as the files say nothing.
 DepthImage LegoDepth(const fs::path& file, const PinholeCamera& camera) {
   constexpr double kFarthest = 8.0;
-  const ImageRgb8 codes = io::ReadImage(file);
+  const Grid<std::uint8_t> codes = ReadRgba(file);  // all four channels are the number: no alpha
   if (codes.width() != camera.width_px() || codes.height() != camera.height_px()) {
     throw Error(file.string() + ": expected the size of its photo, found another");
   }
