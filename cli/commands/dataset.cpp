@@ -136,8 +136,11 @@ void AddConvert(CLI::App& dataset) {
                    ->required()
                    ->type_name("DIR");
                return [options](const Context& context) -> int {
-                 const auto contents = capture::ContentsOf(options->source, true);
-                 context.console.Note(capture::LineOf(contents));
+                 capture::FolderContents contents;
+                 if (std::filesystem::is_directory(options->source)) {
+                   contents = capture::ContentsOf(options->source, true);
+                   context.console.Note(capture::LineOf(contents));
+                 }
                  datasets::ConvertDataset(options->kind, options->source, options->output);
                  context.console.Say(fmt::format(
                      "{}: cameras.json and images/ (and depth/, masks/ where the set has them)",

@@ -71,6 +71,16 @@ struct Row {
   std::optional<int> frame;  // empty where the table has no such column
 };
 
+// Names of columns, for a message of one line.
+std::string Listed(const std::vector<std::string>& names) {
+  if (names == std::vector<std::string>{""}) return "none";
+  std::string text = fmt::format("{}", fmt::join(names, ", "));
+  for (char& c : text) {
+    if (static_cast<unsigned char>(c) < 32 || c == 127) c = '?';
+  }
+  return text;
+}
+
 class Table {
  public:
   Table(std::string file, const std::string& heading)
@@ -105,10 +115,7 @@ class Table {
 
   size_t Require(const std::string& name) const {
     if (const auto at = Find(name)) return *at;
-    throw Error(fmt::format("{}: expected a column {}, found {}", file_, name,
-                            names_ == std::vector<std::string>{""}
-                                ? std::string("none")
-                                : fmt::format("{}", fmt::join(names_, ", "))));
+    throw Error(fmt::format("{}: expected a column {}, found {}", file_, name, Listed(names_)));
   }
 
   int Number(const std::string& cell, int line, const char* column) const {

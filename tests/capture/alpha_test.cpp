@@ -60,6 +60,12 @@ TEST(PhotosWithAlpha, MaskFileAndAlphaMustBothAllowAPixel) {
   for (size_t i = 0; i < both.data().size(); ++i) {
     ASSERT_EQ(both.data()[i], alpha.data()[i] & file.data()[i]);
   }
+  for (size_t i = 0; i < file.data().size(); ++i) file.data()[i] = alpha.data()[i] == 0 ? 255 : 0;
+  io::WriteMask(folder / "a_mask.png", file);
+  io::WriteImage(folder / "b.png", BlockPhoto(48, 32, 6));
+  const Capture capture = Ingest(folder.path());
+  ASSERT_EQ(capture.skipped.size(), 1u);
+  EXPECT_THAT(capture.skipped[0].reason, HasSubstr("have no usable pixel in common"));
 }
 
 TEST(PhotosWithAlpha, APhotoThatIsTransparentThroughoutIsSkippedWithTheReason) {

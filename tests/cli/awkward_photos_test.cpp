@@ -7,6 +7,7 @@
 #include "datasets/make.h"
 #include "datasets/render_truth.h"
 #include "datasets/scene.h"
+#include "dtr/base/files.h"
 #include "dtr/io/set_io.h"
 #include "tests/cli/run_dtr.h"
 #include "tests/cli/small_courtyard.h"
@@ -225,6 +226,8 @@ TEST(AwkwardPhotos, OfEverySizeLensShapeAndOrientationMakeOneSet) {
   RenderCourtyard(folder / "upright", Named(shots, ".png"));
   WriteShots(folder.path());
   colmap::WriteModel(folder / "model", CourtyardModel(shots), colmap::Format::kBinary);
+  // Its cameras are those of upright photos; COLMAP's own would be of photos as they are stored.
+  WriteFileAtomically(folder / "model/upright_photos.txt", "");
   colmap::WriteModel(folder / "plain_model", CourtyardModel(Named(shots, ".png")),
                      colmap::Format::kBinary);
   DtrOk(Build(folder / "photos", folder / "model", folder / "set.dtr"));

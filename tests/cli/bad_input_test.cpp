@@ -73,8 +73,8 @@ TEST_F(BadInput, ALensFileIsReadBeforeAnyPhoto) {
   };
   WriteFileAtomically(In("lens.json"), "{}");
   ExpectRefused(calibrate("lens.json"), kFailed, "format: expected a string, found nothing");
-  WriteFileAtomically(In("lens.xml"), "");
-  ExpectRefused(calibrate("lens.xml"), kWrongUsage, "expected a .json of `dtr calibrate board`");
+  WriteFileAtomically(In("lens.ini"), "");
+  ExpectRefused(calibrate("lens.ini"), kWrongUsage, "expected a .json of `dtr calibrate board`");
   EXPECT_FALSE(fs::exists(In("calibration")));
 }
 
