@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "calib/bundle/fresh_solves.h"
 #include "calib/bundle/lens_params.h"
 #include "calib/bundle/moved.h"
 #include "calib/bundle/parts.h"
@@ -14,7 +15,6 @@
 #include "calib/bundle/picture_shift.h"
 #include "calib/distributions.h"
 #include "dtr/base/error.h"
-#include "dtr/base/parallel_for.h"
 #include "dtr/base/random.h"
 
 namespace dtr::calib {
@@ -22,11 +22,10 @@ namespace {
 
 constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
 constexpr size_t kFewestPoints = 50;
-constexpr int kFewestSights = 10;        // of an image: its pose has 6 unknowns, these 20 numbers
-constexpr int kFewestSightsOfHalf = 30;  // of an image in halves, of all points: half must do
-constexpr double kSquare = 1e-3;         // relative difference of fx and fy
+constexpr int kFewestSights = 10;  // of an image: its pose has 6 unknowns, these 20 numbers
+constexpr double kSquare = 1e-3;   // relative difference of fx and fy
 constexpr double kMostPoints = 4000;
-constexpr std::uint64_t kDraw = 0xd4a3, kHalf = 0x4a1f;
+constexpr std::uint64_t kDraw = 0xd4a3;
 
 // With distortion, zero where it starts: what undistortion left behind becomes a parameter. Pixels
 // that the stored lens has as square stay so: sensors' are, and more freedom than a camera has
@@ -40,23 +39,6 @@ Bundle WithDistortion(Bundle bundle) {
     lens.params.resize(static_cast<size_t>(ParameterCount(lens.model)), 0);
   }
   return bundle;
-}
-
-template <typename Keep>
-Bundle WithPoints(const Bundle& bundle, const Keep& keep) {
-  Bundle some = bundle;
-  std::erase_if(some.observations, [&](const BundleObservation& o) {
-    return !keep(static_cast<std::uint64_t>(o.point));
-  });
-  return some;
-}
-
-AdjustOptions AllFree() {
-  AdjustOptions options;
-  options.lens = LensFreedom::kAll;
-  options.principal_point_share = kKnownPrincipalPointShare;
-  options.aspect_sigma = kKnownAspectSigma;
-  return options;
 }
 
 double Length(const Eigen::VectorXd& difference, const Eigen::MatrixXd& covariance) {
@@ -133,63 +115,6 @@ double HalvesRatio(const Adjusted halves[2], const BundleCovariance covariances[
   return std::sqrt(sum / static_cast<double>(images.size()));
 }
 
-// Two halves of the points of the images that have enough, solved apart; empty where too few have.
-struct Halves {
-  std::vector<Bundle> parts;
-  std::string left_out;  // images that have too few sights for it
-};
-
-Halves HalvesOf(const Bundle& stored) {
-  Halves halves;
-  const Bundle enough = WithoutUnseen(stored, kFewestSightsOfHalf);
-  for (const BundleImage& image : stored.images) {
-    const bool kept =
-        std::any_of(enough.images.begin(), enough.images.end(),
-                    [&](const BundleImage& other) { return other.name == image.name; });
-    if (!kept) halves.left_out += (halves.left_out.empty() ? "" : ", ") + image.name;
-  }
-  if (enough.images.size() < 2) return halves;
-  for (const std::uint64_t half : {0, 1}) {
-    halves.parts.push_back(
-        WithPoints(enough, [&](std::uint64_t p) { return (HashOf(p, kHalf) & 1) == half; }));
-  }
-  return halves;
-}
-
-void AddHalves(const BundleLimits& limits, const Halves& halves, const Adjusted solved[2],
-               Judgement& judgement) {
-  judgement.halves_ratio = kNothing;
-  if (halves.parts.empty()) {
-    judgement.tests.push_back(AtMost(
-        "halves_ratio", kNothing, limits.max_halves_ratio,
-        fmt::format("expected two photos of {} sights or more, whose halves can be solved apart",
-                    kFewestSightsOfHalf)));
-    return;
-  }
-  const BundleCovariance covariances[2] = {CovarianceOf(solved[0], AllFree()),
-                                           CovarianceOf(solved[1], AllFree())};
-  if (covariances[0].determined && covariances[1].determined) {
-    judgement.halves_ratio = HalvesRatio(solved, covariances);
-  }
-  Check check =
-      AtMost("halves_ratio", judgement.halves_ratio, limits.max_halves_ratio,
-             "two halves of the points, solved apart: their poses' difference over the predicted");
-  double moved_px = 0;
-  for (const double px : MovedPxInNearestWorld(solved[0], solved[1].bundle)) {
-    if (px > moved_px) moved_px = px;
-  }
-  // Exact sights leave rounding, of which no ratio means anything.
-  if (moved_px <= NegligiblePx(limits, judgement.sigma_px)) {
-    check.passed = true;
-    check.reason += fmt::format("; points move by {:.2g} px at most", moved_px);
-  }
-  if (!halves.left_out.empty()) {
-    check.reason += fmt::format("; without photos of fewer than {} sights: {}", kFewestSightsOfHalf,
-                                halves.left_out);
-  }
-  judgement.tests.push_back(std::move(check));
-}
-
 std::string LensReason(const LensJudgement& lens) {
   size_t worst = 0;
   double most = 0;
@@ -253,34 +178,39 @@ void AddDifferences(const BundleLimits& limits, Judgement& judgement) {
                   camera->name, camera->moved_px)));
 }
 
-// What of lenses the observations determine little better than it was known before.
-void AddOpenIntrinsics(const Adjusted& fresh, const BundleCovariance& covariance,
-                       const AdjustOptions& options, Judgement& judgement) {
-  if (!covariance.computed || !covariance.determined) return;
-  for (size_t i = 0; i < fresh.bundle.lenses.size(); ++i) {
-    const LensCamera& lens = fresh.bundle.lenses[i];
-    const Eigen::MatrixXd variance = covariance.OfLens(fresh.bundle, static_cast<int>(i));
-    const auto add = [&](const char* name, const std::string& what, double sigma, double known,
-                         const char* unit) {
-      if (!(sigma > 0.5 * known)) return;
-      judgement.degeneracies.push_back(
-          {name,
-           fmt::format("the observations determine {} of lens {} to {:.2g}{} only, as on an orbit "
-                       "at one height; the fresh solve took the stored one as known to {:.2g}{}",
-                       what, i + 1, sigma, unit, known, unit),
-           false});
-    };
-    const long at = FocalCount(lens.model);
-    add("open_principal_point", "the principal point",
-        RootOfVariance(std::max(variance(at, at), variance(at + 1, at + 1))),
-        PrincipalPointSigmaPx(lens, options), " px");
-    const double known = AspectSigma(lens, options);
-    if (!std::isfinite(known)) continue;
-    const Eigen::Vector2d by(-1 / lens.params[0], 1 / lens.params[1]);
-    const Eigen::Matrix2d of_focals = variance.topLeftCorner<2, 2>();
-    add("open_aspect_ratio", "the ratio of the focal lengths",
-        RootOfVariance(by.dot(of_focals * by)), known, "");
+void AddHalves(const BundleLimits& limits, const Halves& halves, const FreshSolves& solves,
+               Judgement& judgement) {
+  const Adjusted* solved = solves.solved + 1;
+  judgement.halves_ratio = kNothing;
+  if (halves.parts.empty()) {
+    judgement.tests.push_back(AtMost(
+        "halves_ratio", kNothing, limits.max_halves_ratio,
+        fmt::format("expected two photos of {} sights or more, whose halves can be solved apart",
+                    kFewestSightsOfHalf)));
+    return;
   }
+  const BundleCovariance covariances[2] = {CovarianceOf(solved[0], solves.options),
+                                           CovarianceOf(solved[1], solves.options)};
+  if (covariances[0].determined && covariances[1].determined) {
+    judgement.halves_ratio = HalvesRatio(solved, covariances);
+  }
+  Check check =
+      AtMost("halves_ratio", judgement.halves_ratio, limits.max_halves_ratio,
+             "two halves of the points, solved apart: their poses' difference over the predicted");
+  double moved_px = 0;
+  for (const double px : MovedPxInNearestWorld(solved[0], solved[1].bundle)) {
+    if (px > moved_px) moved_px = px;
+  }
+  // Exact sights leave rounding, of which no ratio means anything.
+  if (moved_px <= NegligiblePx(limits, judgement.sigma_px)) {
+    check.passed = true;
+    check.reason += fmt::format("; points move by {:.2g} px at most", moved_px);
+  }
+  if (!halves.left_out.empty()) {
+    check.reason += fmt::format("; without photos of fewer than {} sights: {}", kFewestSightsOfHalf,
+                                halves.left_out);
+  }
+  judgement.tests.push_back(std::move(check));
 }
 
 void AddDegeneracies(Judgement& judgement) {
@@ -372,25 +302,22 @@ Judgement JudgePart(const Bundle& given, const BundleLimits& limits, int threads
                                  kFewestSights, stored.images.size()));
   }
   const Halves halves = HalvesOf(stored);
-  AdjustOptions options = AllFree();
-  options.progress = progress;
-  Adjusted solved[3];  // all points, two halves
+  FreshSolves solves;
   try {
-    ParallelFor(0, halves.parts.empty() ? 1 : 3, threads, [&](int i) {
-      solved[i] = Adjust(i == 0 ? stored : halves.parts[static_cast<size_t>(i) - 1], options);
-    });
+    solves = SolveAfresh(stored, halves, threads, progress);
   } catch (const Interrupted&) {
     throw;
   } catch (const Error& error) {
     return NotJudged(judgement, error.what());
   }
-  const Adjusted& fresh = solved[0];
-  const BundleCovariance covariance = CovarianceOf(fresh, options);
+  const Adjusted& fresh = solves.solved[0];
+  const BundleCovariance& covariance = solves.covariance;
   judgement.sights = fresh.sights;
   judgement.sigma_px = fresh.sigma_px;
   judgement.condition = covariance.condition;
   judgement.degeneracies = FindDegeneracies(fresh, covariance, limits.max_focal_share);
-  AddOpenIntrinsics(fresh, covariance, options, judgement);
+  judgement.degeneracies.insert(judgement.degeneracies.end(), solves.open.begin(),
+                                solves.open.end());
   AddDegeneracies(judgement);
   if (!covariance.computed) {
     return NotJudged(judgement, fmt::format("more than {} unknowns: too many for their covariance",
@@ -405,7 +332,7 @@ Judgement JudgePart(const Bundle& given, const BundleLimits& limits, int threads
   }
   CompareWithStored(stored, fresh, covariance, judgement);
   PictureShifts(fresh, covariance, threads, judgement.cameras);
-  AddHalves(limits, halves, solved + 1, judgement);
+  AddHalves(limits, halves, solves, judgement);
   WidenByHalves(judgement);
   AddDifferences(limits, judgement);
   AddPicture(limits, judgement);

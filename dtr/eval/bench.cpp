@@ -56,7 +56,11 @@ std::optional<BenchComparison> Compare(const std::vector<BenchRow>& rows, bool g
       return gpu_clock ? row.frame.median_ms : row.cpu.median_ms;
     };
     best->ratio_two_pass_over_deferred = time(two_pass) / time(deferred);
-    if (two_pass.psnr_db && deferred.psnr_db) best->loss_db = *two_pass.psnr_db - *deferred.psnr_db;
+    if (two_pass.psnr_db && deferred.psnr_db) {
+      // Both infinite: both equal the photos.
+      best->loss_db =
+          *two_pass.psnr_db == *deferred.psnr_db ? 0 : *two_pass.psnr_db - *deferred.psnr_db;
+    }
   }
   return best;
 }
