@@ -25,8 +25,7 @@ struct BundleCovariance {
   /// independent of any unit.
   double condition = 0;
   std::string weakest;  ///< the unknown with the largest part in the least determined combination
-  double sigma_px = 0;  ///< of a sight's coordinate, that everything is scaled by: kPrecisionPx at
-                        ///< least
+  double sigma_px = 0;  ///< of an observed coordinate, the scale of all; kPrecisionPx at least
   std::vector<std::vector<int>> free_params;  ///< per lens, indices into its params
   std::vector<int> lens_at, image_at;         ///< first unknown of each lens, image
   Eigen::MatrixXd matrix;

@@ -201,7 +201,7 @@ void AddHalves(const BundleLimits& limits, const Halves& halves, const FreshSolv
   for (const double px : MovedPxInNearestWorld(solved[0], solved[1].bundle)) {
     if (px > moved_px) moved_px = px;
   }
-  // Exact sights leave rounding, of which no ratio means anything.
+  // Exact observations leave rounding, of which no ratio means anything.
   if (moved_px <= NegligiblePx(limits, judgement.sigma_px)) {
     check.passed = true;
     check.reason += fmt::format("; points move by {:.2g} px at most", moved_px);

@@ -12,7 +12,7 @@ namespace {
 
 [[noreturn]] void Refuse(const std::string& what) { throw Error("bundle adjustment: " + what); }
 
-// (centre - known) / sigma, in units of a sight's sigma so that both sums can be added.
+// (centre - known) / sigma, in units of an observation's sigma so that both sums can be added.
 struct PositionCost {
   Eigen::Vector3d offset, weight;  // of the normalised centre
   template <typename T>
@@ -36,7 +36,7 @@ struct DistanceCost {
   }
 };
 
-// An image's shift, in units of its standard deviation and of a sight's.
+// An image's shift, in units of its standard deviation and of an observation's.
 struct ShiftCost {
   Eigen::Vector2d start_px;
   double scale_px, weight;
