@@ -10,6 +10,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "calib/boards/corner_noise.h"
+#include "calib/boards/opencv_images.h"
 #include "calib/boards/opencv_pixels.h"
 
 namespace dtr::calib {
@@ -21,11 +22,6 @@ constexpr size_t kFewestCorners = 4;  // a homography needs as many
 constexpr double kWindowShare = 0.45;
 
 using Found = std::vector<std::pair<int, cv::Point2f>>;  // ids rising, OpenCV's pixels
-
-cv::Mat Borrowed(const Grid<std::uint8_t>& grey) {
-  return cv::Mat(grey.height(), grey.width(), CV_8UC1,
-                 const_cast<std::uint8_t*>(grey.data().data()));  // detectors only read
-}
 
 std::vector<cv::Point2f> ChessboardCorners(const cv::Mat& image, const Board& board,
                                            ChessboardDetector detector) {
@@ -52,8 +48,7 @@ Found FindChessboard(const cv::Mat& image, const Board& board, ChessboardDetecto
 }
 
 Found FindCharuco(const cv::Mat& given, const Board& board) {
-  cv::Mat image = given;
-  if (board.inverted) image = 255 - given;
+  const cv::Mat image = board.inverted ? Inverted(given) : given;
   const auto dictionary = cv::aruco::getPredefinedDictionary(DictionaryNumber(board.dictionary));
   const auto charuco = cv::aruco::CharucoBoard::create(
       board.columns + 1, board.rows + 1, 1.0f, static_cast<float>(board.marker_share), dictionary);

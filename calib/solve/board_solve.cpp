@@ -81,6 +81,10 @@ void Minimise(const Board& board, BoardModel model, std::optional<double> cauchy
     }
   }
   options.linear_solver_ordering->AddElementToGroup(theta.data(), 1);
+  if (auto prior = RadialPrior(lens, BorderRadius(state.camera),
+                               SigmaOfUsed(Lengths(board, state), state.used))) {
+    problem.AddResidualBlock(prior.release(), nullptr, theta.data());
+  }
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem, &summary);
   if (!summary.IsSolutionUsable()) Refuse("the corners have no least-squares solution");
@@ -178,9 +182,21 @@ void SolveRobustly(const Board& board, BoardModel model, double outlier_sigmas, 
   }
 }
 
+// Least squares until the residuals, which say what the prior weighs, do not shrink any more.
+void MinimiseSettled(const Board& board, BoardModel model, State& state) {
+  double sigma = SigmaOfUsed(Lengths(board, state), state.used);
+  for (int pass = 0; pass < kMostRobustPasses; ++pass) {
+    Minimise(board, model, {}, state);
+    const double next = SigmaOfUsed(Lengths(board, state), state.used);
+    const bool settled = std::abs(next - sigma) < kSameScale * sigma;
+    sigma = next;
+    if (settled) break;
+  }
+}
+
 void SolveQuadratically(const Board& board, BoardModel model, State& state) {
   state.used = Within(Lengths(board, state), std::numeric_limits<double>::infinity());
-  Minimise(board, model, {}, state);
+  MinimiseSettled(board, model, state);
   // Corners that the start could not draw count now.
   state.used = Within(Lengths(board, state), std::numeric_limits<double>::infinity());
   for (const auto& used : state.used) {
@@ -191,7 +207,7 @@ void SolveQuadratically(const Board& board, BoardModel model, State& state) {
     }
   }
   RepairPoses(board, state);
-  Minimise(board, model, {}, state);
+  MinimiseSettled(board, model, state);
 }
 
 void RefuseParallelBoards(const State& state) {

@@ -24,6 +24,18 @@ struct LensCoordinates {
 LensCoordinates CoordinatesAround(BoardModel model, const LensCamera& camera,
                                   double largest_radius);
 
+/// What is expected of radial coefficients before any corner is seen: that each displaces the
+/// image's corner, at `border_radius` on the plane of LensFormula, by 0 +- 30 % of its distance.
+/// Weighs as much as one corner of `sigma_px`, so it is felt only where corners say less than that
+/// about a coefficient: polynomials of high degree then stay near those of lower degree in place of
+/// following what is no lens. Parameter block theta. Null for a pinhole, which has no such
+/// coefficients, and for brown8, whose mean something as a quotient only.
+std::unique_ptr<ceres::CostFunction> RadialPrior(const LensCoordinates& lens, double border_radius,
+                                                 double sigma_px);
+
+/// Distance of the image's corners from its middle on the plane of LensFormula, without distortion.
+double BorderRadius(const LensCamera& camera);
+
 /// A board's pose as the solver sees it: six numbers (w, v) that stand for
 ///   p_in_cam = exp(w) R (p_in_board - pivot) + translation + scale * v,
 /// a rotation w about the pivot, in radians and along the camera's axes, and a shift v.

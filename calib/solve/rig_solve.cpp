@@ -115,6 +115,25 @@ void TakeOver(const Board& board, const Unknowns& u, Rig& rig) {
   }
 }
 
+using SigmaOf = double (*)(const Lengths&, const Used&);  // SigmaOfUsed or ScatterOfUsed
+
+// Sigma per camera; that of all where a camera has no view.
+std::vector<double> CameraSigmas(const Rig& rig, const Lengths& lengths, const Used& used,
+                                 SigmaOf sigma_of) {
+  std::vector<double> sigmas(rig.cameras.size(), sigma_of(lengths, used));
+  for (size_t c = 0; c < rig.cameras.size(); ++c) {
+    Lengths own;
+    Used own_used;
+    for (size_t v = 0; v < rig.views.size(); ++v) {
+      if (rig.views[v].camera != c) continue;
+      own.push_back(lengths[v]);
+      own_used.push_back(used[v]);
+    }
+    if (!own.empty()) sigmas[c] = sigma_of(own, own_used);
+  }
+  return sigmas;
+}
+
 // Least squares over the used corners from where the rig is; Cauchy's loss where a scale is given.
 void Minimise(const Board& board, bool free_lenses, std::optional<double> cauchy_px,
               const Used& used, Rig& rig) {
@@ -132,6 +151,13 @@ void Minimise(const Board& board, bool free_lenses, std::optional<double> cauchy
               .release(),
           cauchy_px ? new ceres::CauchyLoss(*cauchy_px) : nullptr, u.thetas[view.camera].data(),
           u.place_motions[view.camera].data(), u.frame_motions[view.frame].data());
+    }
+  }
+  const auto sigmas = CameraSigmas(rig, ResidualLengths(board, rig), used, SigmaOfUsed);
+  for (size_t c = 0; c < rig.cameras.size() && free_lenses; ++c) {
+    if (!problem.HasParameterBlock(u.thetas[c].data())) continue;
+    if (auto prior = RadialPrior(u.lenses[c], BorderRadius(rig.cameras[c].camera), sigmas[c])) {
+      problem.AddResidualBlock(prior.release(), nullptr, u.thetas[c].data());
     }
   }
   ceres::Solver::Options options = SolverOptions();
@@ -220,25 +246,6 @@ void TakeOutDisagreeing(Rig& rig, std::vector<LeftOut>& left_out) {
   });
 }
 
-using SigmaOf = double (*)(const Lengths&, const Used&);  // SigmaOfUsed or ScatterOfUsed
-
-// Sigma per camera; that of all where a camera has no view.
-std::vector<double> CameraSigmas(const Rig& rig, const Lengths& lengths, const Used& used,
-                                 SigmaOf sigma_of) {
-  std::vector<double> sigmas(rig.cameras.size(), sigma_of(lengths, used));
-  for (size_t c = 0; c < rig.cameras.size(); ++c) {
-    Lengths own;
-    Used own_used;
-    for (size_t v = 0; v < rig.views.size(); ++v) {
-      if (rig.views[v].camera != c) continue;
-      own.push_back(lengths[v]);
-      own_used.push_back(used[v]);
-    }
-    if (!own.empty()) sigmas[c] = sigma_of(own, own_used);
-  }
-  return sigmas;
-}
-
 Used Drawable(const Lengths& lengths) {
   return Within(lengths, std::numeric_limits<double>::infinity());
 }
@@ -289,7 +296,15 @@ void SolveQuadratically(const Board& board, const RigOptions& options, Rig& rig)
         "with a quadratic loss every corner counts, and some have no place in the image; leave "
         "the loss robust");
   }
-  Minimise(board, options.free_lenses, {}, UsedOf(rig), rig);
+  // Until the residuals, which say what the prior of the lenses weighs, do not shrink any more.
+  double sigma = SigmaOfUsed(ResidualLengths(board, rig), UsedOf(rig));
+  for (int pass = 0; pass < kMostRobustPasses; ++pass) {
+    Minimise(board, options.free_lenses, {}, UsedOf(rig), rig);
+    const double next = SigmaOfUsed(ResidualLengths(board, rig), UsedOf(rig));
+    const bool settled = std::abs(next - sigma) < kSameScale * sigma;
+    sigma = next;
+    if (settled) break;
+  }
 }
 
 void Describe(const Board& board, RigSolution& solution) {

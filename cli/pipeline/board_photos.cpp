@@ -9,6 +9,7 @@
 
 #include "calib/boards/repeats.h"
 #include "capture/ingest.h"
+#include "cli/pipeline/board_given.h"
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/io/image_io.h"
@@ -96,6 +97,9 @@ BoardPhotos ReadBoardPhotos(const fs::path& folder, const std::string& pattern,
   BoardPhotos photos;
   photos.contents = ContentsOfBoardFolder(folder, names.size());
   progress.Note(capture::LineOf(photos.contents));
+  RequireGivenBoard(
+      folder.string(), board, names.size(),
+      [&](size_t i) { return io::ReadImage(folder / names[i]); }, threads);
   std::vector<Looked> all(names.size());
   progress.Stage("looking for the board", static_cast<int>(names.size()));
   std::atomic<int> done = 0;

@@ -22,8 +22,8 @@ struct BoardPhotos {
 /// Looks for the board in the photos of `folder` whose names match `pattern` (a shell pattern as
 /// left*.jpg). Pixels are taken as stored: EXIF orientation would turn some photos of a camera and
 /// not others. The size is that of the most photos. The result is the same for any number of
-/// threads. Throws UsageError when the folder does not exist or nothing matches, Error when no
-/// photo shows the board.
+/// threads. Throws UsageError when the folder does not exist, nothing matches or the photos
+/// show another board (board_given.h), Error when no photo shows the board.
 BoardPhotos ReadBoardPhotos(const std::filesystem::path& folder, const std::string& pattern,
                             const calib::Board& board, const calib::DetectOptions& options,
                             int threads, Progress& progress);

@@ -11,6 +11,7 @@
 #include "calib/boards/repeats.h"
 #include "capture/ingest.h"
 #include "capture/video/frames.h"
+#include "cli/pipeline/board_given.h"
 #include "cli/pipeline/rig_names.h"
 #include "cli/pipeline/rig_timestamps.h"
 #include "dtr/base/error.h"
@@ -269,6 +270,34 @@ void Look(const ImageRgb8& image, const calib::Board& board, const calib::Detect
   shot.height_px = image.height();
 }
 
+// Frames of one video to look at before all of all cameras: videos are read from the start.
+std::vector<ImageRgb8> SomeFrames(const fs::path& video, size_t shots) {
+  constexpr size_t kFrames = 8;
+  std::vector<ImageRgb8> frames;
+  capture::ForEachFrame(video, [&](int number, const ImageRgb8& image) {
+    const size_t next = frames.size() * shots / kFrames;
+    if (static_cast<size_t>(number) >= next) frames.push_back(image);
+    return frames.size() < kFrames;
+  });
+  return frames;
+}
+
+void RequireGivenBoardIn(const Layout& layout, const std::string& folder, const calib::Board& board,
+                         int threads) {
+  if (layout.shots.empty()) return;
+  const Shot& first = layout.shots.front();
+  if (first.number < 0) {
+    RequireGivenBoard(
+        folder, board, layout.shots.size(),
+        [&](size_t i) { return io::ReadImage(layout.shots[i].file); }, threads);
+    return;
+  }
+  const size_t shots = layout.shots.size() / layout.cameras.size();
+  const auto frames = SomeFrames(first.file, shots);
+  RequireGivenBoard(
+      first.file.string(), board, frames.size(), [&](size_t i) { return frames[i]; }, threads);
+}
+
 // Looks for the board in every shot: photos side by side, videos a few frames at a time.
 void LookAtAll(const calib::Board& board, const calib::DetectOptions& options, int threads,
                Progress& progress, Layout& layout) {
@@ -375,6 +404,7 @@ RigPhotos ReadRigPhotos(const fs::path& folder, const calib::Board& board,
   RigPhotos photos;
   photos.contents = ContentsOfRig(folder, layout);
   progress.Note(capture::LineOf(photos.contents));
+  RequireGivenBoardIn(layout, folder.string(), board, threads);
   LookAtAll(board, options, threads, progress, layout);
   photos.left_out = layout.left_out;
   for (const std::string& name : layout.cameras) photos.cameras.push_back({name, 0, 0});

@@ -4,8 +4,10 @@
 
 #include <atomic>
 #include <utility>
+#include <vector>
 
 #include "calib/boards/detect.h"
+#include "cli/pipeline/board_given.h"
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/io/set_io.h"
@@ -14,6 +16,28 @@ namespace dtr::pipeline {
 namespace {
 
 constexpr size_t kFewestViews = 3;
+
+ImageRgb8 ImageOf(const std::filesystem::path& folder, View view) {
+  io::LoadOptions load;
+  load.depth = false;
+  load.threads = 1;
+  io::LoadPixels(folder, view, load);
+  return std::move(view.image);
+}
+
+// Photos of a scene need not show the board: where some seem to, these alone are asked.
+void RequireGivenBoardIn(const std::filesystem::path& folder, std::vector<const View*> views,
+                         const std::vector<calib::Detection>& found, const calib::Board& board,
+                         int threads) {
+  std::vector<const View*> seeing;
+  for (size_t i = 0; i < views.size(); ++i) {
+    if (!found[i].corners.empty()) seeing.push_back(views[i]);
+  }
+  if (!seeing.empty()) views = std::move(seeing);
+  RequireGivenBoard(
+      folder.string(), board, views.size(), [&](size_t i) { return ImageOf(folder, *views[i]); },
+      threads);
+}
 
 }  // namespace
 
@@ -28,14 +52,11 @@ BoardInSet FindBoard(const std::filesystem::path& folder, const DtrSet& set,
   std::atomic<int> done = 0;
   ParallelFor(0, static_cast<int>(views.size()), threads, [&](int i) {
     progress.ThrowIfInterrupted();
-    View view = *views[static_cast<size_t>(i)];
-    io::LoadOptions load;
-    load.depth = false;
-    load.threads = 1;
-    io::LoadPixels(folder, view, load);
-    found[static_cast<size_t>(i)] = calib::DetectBoard(calib::GreyOf(view.image), board);
+    const auto at = static_cast<size_t>(i);
+    found[at] = calib::DetectBoard(calib::GreyOf(ImageOf(folder, *views[at])), board);
     progress.Update(++done);
   });
+  RequireGivenBoardIn(folder, views, found, board, threads);
   BoardInSet in_set;
   for (size_t i = 0; i < views.size(); ++i) {
     const View& view = *views[i];

@@ -90,6 +90,18 @@ TEST_F(CalibrateBoard, WhatCannotWorkIsSaidInOneLine) {
   EXPECT_FALSE(fs::exists(In("c.json")));
 }
 
+TEST_F(CalibrateBoard, ABoardOfAnotherSizeIsNamedBeforeAnythingIsSolved) {
+  DTR_REQUIRE_DATA(Photos());
+  const auto refused = [&](const std::string& given, const std::string& expected) {
+    ExpectRefused(Board(Photos(), {"--images", "left*.jpg", "--board", given, "-o", In("c.json")}),
+                  kWrongUsage, expected);
+  };
+  // Its corners lie on part of the board that is shown.
+  refused("chessboard:8x6:1", "show a chessboard of 9x6 inner corners, none the given one");
+  refused("chessboard:10x7:1", "give chessboard:9x6:SQUARE (you gave the number of squares)");
+  EXPECT_FALSE(fs::exists(In("c.json")));
+}
+
 TEST_F(CalibrateBoard, TooFewPhotosAreRefused) {
   DTR_REQUIRE_DATA(Photos());
   const std::string two = In("two");

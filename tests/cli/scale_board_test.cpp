@@ -38,8 +38,9 @@ Pose CamFromBoard(const calib::Board& board, int i) {
 
 class ScaleByBoard : public ::testing::Test {
  protected:
-  // A set of these photos; in those of `moved` the board lies 3 to 5 cm aside, each time elsewhere.
-  void MakeSet(const std::string& name, const std::vector<int>& moved = {}) {
+  // A set of these photos, in the first `shown` of which the board is to be seen; in those of
+  // `moved` it lies 3 to 5 cm aside, each time elsewhere.
+  void MakeSet(const std::string& name, const std::vector<int>& moved = {}, int shown = kViews) {
     const calib::Board board = calib::BoardFromText(kBoardText);
     const auto photos = folder_ / (name + "_photos");
     std::filesystem::create_directories(photos);
@@ -54,7 +55,7 @@ class ScaleByBoard : public ::testing::Test {
       ImageRgb8 image(grey.width(), grey.height(), 3);
       for (int y = 0; y < grey.height(); ++y) {
         for (int x = 0; x < grey.width(); ++x) {
-          for (int c = 0; c < 3; ++c) image(x, y, c) = grey(x, y);
+          for (int c = 0; c < 3; ++c) image(x, y, c) = i < shown ? grey(x, y) : 128;
         }
       }
       io::NamedCamera camera;
@@ -118,8 +119,13 @@ TEST_F(ScaleByBoard, BoardsThatTellNothingAreRefused) {
   MakeSet("moving.dtr", {1, 2, 3, 5});
   ExpectRefused(Scale("moving.dtr", kBoardText), kFailed,
                 "scale by a board: expected views that agree where the board lies, found that");
-  ExpectRefused(Scale("moving.dtr", "chessboard:6x8:30mm"), kFailed,
-                "--board chessboard:6x8:0.03m: expected it in 3 views of");
+  ExpectRefused(
+      Scale("moving.dtr", "charuco:5x6:30mm:0.7"), kWrongUsage,
+      "6 of 6 photos looked at show a chessboard of 7x5 inner corners, none the given one; "
+      "give chessboard:7x5:SQUARE");
+  MakeSet("two.dtr", {}, 2);
+  ExpectRefused(Scale("two.dtr", kBoardText), kFailed,
+                "--board chessboard:7x5:0.03m: expected it in 3 views of");
   ExpectRefused(Scale("moving.dtr", "chessboard:7x5:30"), kWrongUsage,
                 "--board chessboard:7x5:30: expected a square in mm, cm or m, found a length "
                 "without a unit");

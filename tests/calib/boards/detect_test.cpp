@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 
 #include "calib/boards/repeats.h"
@@ -104,7 +105,9 @@ TEST(DetectBoard, CharucoCornersAreWhereTheyAreWholePartlyAndInverted) {
       Pose pose = Tilted(kCharuco, 0.4, 0.45);
       pose.translation.x() += aside;
       const auto grey = Photo(board, kCamera, pose, 0, 1);
+      const Grid<std::uint8_t> before = grey;
       const Detection found = DetectBoard(grey, board);
+      EXPECT_TRUE(std::equal(grey.data().begin(), grey.data().end(), before.data().begin()));
       ASSERT_GE(found.corners.size(), 4u) << found.reason;
       EXPECT_EQ(found.corners.size() == 20u, aside == 0);
       EXPECT_LT(ErrorOf(board, pose, found).rms_px, kExactPhotoPx);

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "dtr/base/error.h"
@@ -57,6 +58,31 @@ TEST(ChooseModel, AThirdRadialCoefficientIsTakenWhereTheLensNeedsIt) {
   EXPECT_NE(NameOf(chosen.model), "brown4");
   EXPECT_LT(chosen.held_out_rms_px, ScoreOf(choice, BoardModel::kBrown4).held_out_rms_px);
   EXPECT_LE(chosen.low_px, 0);
+}
+
+// A webcam whose board is held up in the middle: nobody says what the lens does at the border.
+TEST(ChooseModel, WhereCornersSayNothingALensIsNotBent) {
+  const LensCamera camera =
+      CameraFrom(BoardModel::kBrown5, 1280, 720,
+                 std::vector<double>{651, 654, 647, 392, 0.18, -0.256, 0.0032, 0.0022, 0.124});
+  std::vector<BoardView> views;
+  for (const BoardView& view : Noisy(ExactViews(camera, 400, 31).views, 0.15, 32)) {
+    const bool in_the_middle =
+        std::all_of(view.corners.begin(), view.corners.end(), [](const BoardCorner& corner) {
+          return (corner.pixel - Eigen::Vector2d(647, 392)).norm() < 300;
+        });
+    if (in_the_middle && views.size() < 20) views.push_back(view);
+  }
+  ASSERT_EQ(views.size(), 20u);
+  ChoiceOptions options;
+  options.folds = 5;
+  const ModelChoice choice = ChooseModel(kBoard, views, 1280, 720, options);
+  const BoardSolution& chosen = *choice.scores[choice.chosen].solution;
+  EXPECT_NEAR(chosen.camera.params[0], 651, 0.03 * 651);
+  for (const ModelScore& score : choice.scores) {
+    if (!score.refused.empty() || score.model != BoardModel::kFisheye) continue;
+    for (size_t i = 4; i < 8; ++i) EXPECT_LT(std::abs(score.solution->camera.params[i]), 1);
+  }
 }
 
 TEST(ChooseModel, DoesNotDependOnThreads) {

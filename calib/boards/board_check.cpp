@@ -1,0 +1,172 @@
+#include "calib/boards/board_check.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "calib/boards/detect.h"
+#include "calib/boards/shown_board.h"
+
+namespace dtr::calib {
+namespace {
+
+constexpr int kFewestVotes = 2;  // one photo may be of something else
+
+bool SameSides(const GridSize& a, const GridSize& b) {
+  return std::minmax(a.columns, a.rows) == std::minmax(b.columns, b.rows);
+}
+
+bool ReachesBeyond(const GridSize& shown, const GridSize& given) {
+  return std::max(shown.columns, shown.rows) > std::max(given.columns, given.rows) ||
+         std::min(shown.columns, shown.rows) > std::min(given.columns, given.rows);
+}
+
+// In the order of sides that a given chessboard has: photos show either.
+Board ChessboardOf(GridSize size, const Board& given) {
+  const bool upright = given.kind == Board::Kind::kChessboard && given.columns < given.rows;
+  const auto [shorter, longer] = std::minmax(size.columns, size.rows);
+  Board board;
+  board.columns = upright ? shorter : longer;
+  board.rows = upright ? longer : shorter;
+  return board;
+}
+
+Board CharucoOf(const ShownMarkers& shown, bool inverted) {
+  Board board;
+  board.kind = Board::Kind::kCharuco;
+  board.columns = shown.columns - 1;
+  board.rows = shown.rows - 1;
+  board.dictionary = shown.dictionary;
+  board.inverted = inverted;
+  return board;
+}
+
+// A photo may show fewer rows than the board has.
+bool CanBe(const ShownMarkers& shown, bool inverted, const Board& given) {
+  return FamilyOf(shown.dictionary) == FamilyOf(given.dictionary) && inverted == given.inverted &&
+         shown.columns == given.columns + 1 && shown.rows <= given.rows + 1;
+}
+
+BoardVerdict VerdictOfMarkers(const Grid<std::uint8_t>& grey, const Board& given,
+                              const std::string& dictionary, bool inverted) {
+  BoardVerdict verdict;
+  const auto shown = MarkersShown(grey, inverted, dictionary);
+  if (!shown || shown->columns == 0) return verdict;
+  verdict.first_square_white = shown->first_square_white;
+  verdict.shows_given = CanBe(*shown, inverted, given) && !shown->first_square_white;
+  if (verdict.shows_given) return verdict;
+  verdict.other = CharucoOf(*shown, inverted);
+  // Dictionaries of one family begin with the same markers: the given one is not wrong.
+  const bool fits = FamilyOf(shown->dictionary) == FamilyOf(given.dictionary) &&
+                    DictionaryNumber(shown->dictionary) <= DictionaryNumber(given.dictionary);
+  if (fits) verdict.other.dictionary = given.dictionary;
+  return verdict;
+}
+
+bool SaysNothing(const BoardVerdict& verdict) {
+  return !verdict.shows_given && verdict.other.columns == 0;
+}
+
+BoardVerdict VerdictOfAnyMarkers(const Grid<std::uint8_t>& grey, const Board& given) {
+  BoardVerdict verdict = VerdictOfMarkers(grey, given, "", given.inverted);
+  if (SaysNothing(verdict)) verdict = VerdictOfMarkers(grey, given, "", !given.inverted);
+  return verdict;
+}
+
+// Reflections hide lines of squares, so a size within the given one is another board only where
+// that one is not found either. By quads: OpenCV's other detector takes seconds for a size not
+// shown.
+bool IsFound(const Grid<std::uint8_t>& grey, const Board& given) {
+  DetectOptions options;
+  options.detector = ChessboardDetector::kQuads;
+  return !DetectBoard(grey, given, options).corners.empty();
+}
+
+BoardVerdict VerdictOfChessboard(const Grid<std::uint8_t>& grey, const Board& given) {
+  BoardVerdict verdict;
+  const auto shown = ShownChessboard(grey);
+  if (!shown) return verdict;
+  if (given.kind == Board::Kind::kChessboard) {
+    const GridSize size{given.columns, given.rows};
+    verdict.shows_given =
+        SameSides(*shown, size) || (!ReachesBeyond(*shown, size) && IsFound(grey, given));
+  }
+  if (!verdict.shows_given) verdict.other = ChessboardOf(*shown, given);
+  return verdict;
+}
+
+bool Agree(const BoardVerdict& a, const BoardVerdict& b) {
+  if (a.other.kind != b.other.kind || a.other.columns != b.other.columns) return false;
+  if (a.other.kind == Board::Kind::kChessboard) return a.other.rows == b.other.rows;
+  return FamilyOf(a.other.dictionary) == FamilyOf(b.other.dictionary) &&
+         a.other.inverted == b.other.inverted && a.first_square_white == b.first_square_white;
+}
+
+std::string SizeText(const Board& board) {
+  if (board.kind == Board::Kind::kChessboard) {
+    return fmt::format("a chessboard of {}x{} inner corners", board.columns, board.rows);
+  }
+  return fmt::format("a ChArUco board of {}x{} squares, {}{}", board.columns + 1, board.rows + 1,
+                     board.dictionary, board.inverted ? ", inverted" : "");
+}
+
+std::string Advice(const Board& given, const Board& other, bool first_square_white) {
+  if (first_square_white) {
+    return "its first square is white, as OpenCV before 4.6 made boards with an even number of "
+           "rows: "
+           "print the board anew";
+  }
+  if (other.kind == Board::Kind::kCharuco) {
+    return fmt::format("give charuco:{}x{}:SQUARE:MARKER:{}{}{}", other.columns + 1, other.rows + 1,
+                       other.dictionary, other.inverted ? ":inverted" : "",
+                       ", with more rows if no photo shows the whole board");
+  }
+  const bool squares = given.kind == Board::Kind::kChessboard &&
+                       SameSides({other.columns + 1, other.rows + 1}, {given.columns, given.rows});
+  return fmt::format("give chessboard:{}x{}:SQUARE{}", other.columns, other.rows,
+                     squares ? " (you gave the number of squares)" : "");
+}
+
+}  // namespace
+
+BoardVerdict VerdictOf(const Grid<std::uint8_t>& grey, const Board& given) {
+  if (given.kind == Board::Kind::kChessboard) {
+    const BoardVerdict verdict = VerdictOfChessboard(grey, given);
+    return SaysNothing(verdict) ? VerdictOfAnyMarkers(grey, given) : verdict;
+  }
+  BoardVerdict verdict = VerdictOfMarkers(grey, given, given.dictionary, given.inverted);
+  if (SaysNothing(verdict)) verdict = VerdictOfAnyMarkers(grey, given);
+  return SaysNothing(verdict) ? VerdictOfChessboard(grey, given) : verdict;
+}
+
+std::string DescribeOtherBoard(const Board& given, std::span<const BoardVerdict> verdicts) {
+  std::vector<BoardVerdict> others;
+  for (const BoardVerdict& verdict : verdicts) {
+    if (verdict.shows_given) return "";
+    if (verdict.other.columns > 0) others.push_back(verdict);
+  }
+  const auto votes_for = [&](const BoardVerdict& one) {
+    return std::count_if(others.begin(), others.end(),
+                         [&](const BoardVerdict& other) { return Agree(one, other); });
+  };
+  const auto most =
+      std::max_element(others.begin(), others.end(),
+                       [&](const auto& a, const auto& b) { return votes_for(a) < votes_for(b); });
+  if (most == others.end()) return "";
+  const auto votes = static_cast<size_t>(votes_for(*most));
+  if (votes < std::min<size_t>(kFewestVotes, verdicts.size()) || 2 * votes < others.size()) {
+    return "";
+  }
+  Board shown = most->other;
+  for (const BoardVerdict& other : others) {
+    if (Agree(*most, other) && other.other.rows > shown.rows) shown = other.other;
+  }
+  return fmt::format(
+      "expected {}, as given; {} of {} photos looked at show {}, none the given one; {}",
+      SizeText(given), votes, verdicts.size(), SizeText(shown),
+      Advice(given, shown, most->first_square_white));
+}
+
+}  // namespace dtr::calib
