@@ -1,9 +1,11 @@
 #include "calib/solve/rotated_views.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "calib/solve/board_start.h"
 #include "dtr/base/error.h"
@@ -18,6 +20,7 @@ constexpr std::array kRotations{PhotoRotation::kClockwise, PhotoRotation::kCount
 constexpr double kClearRatio = 2;
 constexpr double kClearSigmas = 3;      // of views' differences with random signs: 10 that agree
 constexpr double kExplainedSigmas = 3;  // RMS of a view that is of this camera
+constexpr double kHalfTurnSigmas = 5;   // covariances do not count what is systematic
 constexpr double kNoiseFloorPx = 0.02;  // corners of drawn boards have next to none
 
 // Of one view, per rotation of kRotations: squared residuals, the pose alone fitted; infinite where
@@ -37,6 +40,29 @@ Squares SquaresOf(const Board& board, const BoardView& view, const LensCamera& c
     }
   }
   return squares;
+}
+
+// How far the camera is, in standard deviations, from one that half a turn of the sensor does not
+// change: principal point in the middle, no tangential distortion.
+double HalfTurnSigmas(const BoardSolution& solution) {
+  const LensCamera& camera = solution.camera;
+  const auto names = FreeParameterNames(solution.model);
+  std::vector<int> odd;  // parameters that half a turn mirrors
+  std::vector<double> off;
+  for (size_t i = 0; i < names.size(); ++i) {
+    double middle = 0;
+    if (names[i] == "cx_px")
+      middle = camera.width_px / 2.0;
+    else if (names[i] == "cy_px")
+      middle = camera.height_px / 2.0;
+    else if (names[i] != "p1" && names[i] != "p2")
+      continue;
+    odd.push_back(static_cast<int>(i));
+    off.push_back(camera.params[i] - middle);
+  }
+  const Eigen::MatrixXd covariance = solution.covariance(odd, odd);
+  const Eigen::Map<const Eigen::VectorXd> distance(off.data(), static_cast<long>(off.size()));
+  return std::sqrt(distance.dot(covariance.ldlt().solve(distance)));
 }
 
 size_t BetterOf(const Squares& squares) { return squares[0] <= squares[1] ? 0 : 1; }
@@ -88,18 +114,21 @@ ReferenceCamera ReferenceFrom(const Board& board, std::span<const BoardView> vie
                               int height_px) {
   SolveOptions options;
   options.cover_image = false;
-  std::optional<ReferenceCamera> best;
+  std::optional<BoardSolution> best;
   std::string why;
   for (const BoardModel model : {BoardModel::kBrown4, BoardModel::kFisheye}) {
     try {
-      const BoardSolution solved = SolveBoard(board, views, width_px, height_px, model, options);
-      if (!best || solved.sigma_px < best->sigma_px) best = {solved.camera, solved.sigma_px};
+      BoardSolution solved = SolveBoard(board, views, width_px, height_px, model, options);
+      if (!best || solved.sigma_px < best->sigma_px) best = std::move(solved);
     } catch (const Error& error) {
       if (why.empty()) why = error.what();
     }
   }
   if (!best) throw Error(why);
-  return *best;
+  if (!(HalfTurnSigmas(*best) > kHalfTurnSigmas)) {
+    throw Error("its principal point is in the middle of the image, as far as they show it");
+  }
+  return {best->camera, best->sigma_px};
 }
 
 std::vector<FoundRotation> FindRotations(const Board& board, std::span<const BoardView> rotated,

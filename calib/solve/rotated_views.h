@@ -22,7 +22,8 @@ struct ReferenceCamera {
 };
 
 /// Solved from views that are not rotated, Brown's or the fisheye model, whichever leaves less.
-/// Throws Error where they determine neither.
+/// Throws Error where they determine neither, or half a turn of the sensor would change the camera
+/// by no more than it is uncertain: all rotated views would then agree on the same wrong way.
 ReferenceCamera ReferenceFrom(const Board& board, std::span<const BoardView> views, int width_px,
                               int height_px);
 
