@@ -65,16 +65,26 @@ std::vector<calib::FoundRotation> RotationsOf(const calib::Board& board,
   }
 }
 
-void ReportRotated(const std::string& name, const calib::RotationCounts& counts, const Size& grid,
+std::string RotatedPhotos(size_t count) {
+  return fmt::format("{} photo{} that a program had rotated", count, count == 1 ? "" : "s");
+}
+
+// Also of what cannot be put back: where too few are left to calibrate, no list of them is printed.
+void ReportRotated(const std::string& name, const calib::RotationCounts& counts,
+                   const std::vector<calib::LeftOut>& undecided, const Size& grid,
                    Progress& progress) {
-  const int all = counts.clockwise + counts.counterclockwise;
-  if (all == 0) return;
-  progress.Note(
-      fmt::format("{}: {} photo{} that a program had rotated, {} clockwise and {} "
-                  "counterclockwise: corners put "
-                  "back on the sensor's grid of {} x {} px",
-                  name, all, all == 1 ? "" : "s", counts.clockwise, counts.counterclockwise,
-                  grid.first, grid.second));
+  const int back = counts.clockwise + counts.counterclockwise;
+  if (back > 0) {
+    progress.Note(fmt::format(
+        "{}: {}, {} clockwise and {} counterclockwise: corners put back on the sensor's grid of {} "
+        "x {} px",
+        name, RotatedPhotos(static_cast<size_t>(back)), counts.clockwise, counts.counterclockwise,
+        grid.first, grid.second));
+  }
+  if (!undecided.empty()) {
+    progress.Note(fmt::format("{}: {} left out; {}: {}", name, RotatedPhotos(undecided.size()),
+                              undecided.front().name, undecided.front().reason));
+  }
 }
 
 }  // namespace
@@ -94,6 +104,7 @@ ViewsOnGrid OnOneGrid(const calib::Board& board, std::vector<StoredView> stored,
   const auto rotations = RotationsOf(board, as_grid, rotated, grid, known);
   ViewsOnGrid on_grid{grid.first, grid.second, {}, {}};
   calib::RotationCounts counts;
+  std::vector<calib::LeftOut> undecided;
   size_t next = 0;  // of rotated
   for (StoredView& item : stored) {
     if (SizeOf(item) == grid) {
@@ -108,14 +119,15 @@ ViewsOnGrid OnOneGrid(const calib::Board& board, std::vector<StoredView> stored,
           calib::OnSensorGrid(item.view, found.rotation, grid.first, grid.second));
       counts.Add(found.rotation);
     } else {
-      on_grid.left_out.push_back(
+      undecided.push_back(
           {item.view.name,
            fmt::format("its {} x {} px are rotated against the {} x {} px of the others, and which "
                        "way cannot be found: {}; use the photo as the camera stored it",
                        item.width_px, item.height_px, grid.first, grid.second, found.undecided)});
     }
   }
-  ReportRotated(name, counts, grid, progress);
+  ReportRotated(name, counts, undecided, grid, progress);
+  on_grid.left_out.insert(on_grid.left_out.end(), undecided.begin(), undecided.end());
   return on_grid;
 }
 

@@ -26,9 +26,10 @@ struct ViewsOnGrid {
 /// Brings one camera's views to the grid that most photos have: sizes count together with their
 /// sides swapped, then the more frequent of the two is taken, of equally frequent ones landscape.
 /// Photos with swapped sides are those that a program rotated: which way the residuals say
-/// (calib/solve/rotated_views.h), against a camera solved from the others, and one line of how many
-/// there were starts with `name`. A camera that is `known` gives the grid, if any photo has its
-/// size or that with swapped sides, and is what they are compared with.
+/// (calib/solve/rotated_views.h), against a camera solved from the others. One line, starting with
+/// `name`, reports how many were put back and which way, another how many were not. A camera that
+/// is `known` gives the grid, if any photo has its size or that with swapped sides, and is what
+/// they are compared with.
 ViewsOnGrid OnOneGrid(const calib::Board& board, std::vector<StoredView> stored,
                       const std::string& name, const std::optional<calib::LensCamera>& known,
                       Progress& progress);
