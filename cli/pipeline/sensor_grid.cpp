@@ -121,7 +121,7 @@ ViewsOnGrid OnOneGrid(const calib::Board& board, std::vector<StoredView> stored,
     } else {
       undecided.push_back(
           {item.view.name,
-           fmt::format("its {} x {} px are rotated against the {} x {} px of the others, and which "
+           fmt::format("its {} x {} px are rotated against the {} x {} px of the camera, and which "
                        "way cannot be found: {}; use the photo as the camera stored it",
                        item.width_px, item.height_px, grid.first, grid.second, found.undecided)});
     }
