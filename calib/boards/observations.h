@@ -12,6 +12,29 @@ struct BoardCorner {
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
 };
 
+/// How a program had rotated the pixels of a photo whose corners are given on the sensor's grid.
+enum class PhotoRotation {
+  kNone,
+  kClockwise,         ///< the sensor's left edge is the photo's top
+  kCounterclockwise,  ///< the sensor's right edge is the photo's top
+};
+
+/// Clockwise, 0 where there is none.
+inline int DegreesOf(PhotoRotation rotation) {
+  if (rotation == PhotoRotation::kNone) return 0;
+  return rotation == PhotoRotation::kClockwise ? 90 : 270;
+}
+
+/// Photos by how they were rotated.
+struct RotationCounts {
+  int clockwise = 0, counterclockwise = 0;
+
+  void Add(PhotoRotation rotation) {
+    if (rotation == PhotoRotation::kClockwise) ++clockwise;
+    if (rotation == PhotoRotation::kCounterclockwise) ++counterclockwise;
+  }
+};
+
 /// The board in one image.
 struct BoardView {
   std::string name;                  ///< of the image
@@ -19,6 +42,7 @@ struct BoardView {
   /// Standard deviation of a coordinate of a corner, from the image alone (corner_noise.h); not a
   /// number where it could not be told.
   double noise_px = 0;
+  PhotoRotation rotation = PhotoRotation::kNone;  ///< taken out of the corners already
 };
 
 /// An image that is not used, and why.

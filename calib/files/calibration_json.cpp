@@ -69,18 +69,26 @@ Json CameraJson(const CalibratedCamera& camera) {
   return json;
 }
 
+// Views whose photos nothing rotated look as they always did.
+void AddRotation(const CalibratedView& view, Json& json) {
+  if (view.seen.rotation == PhotoRotation::kNone) return;
+  json["photo_rotation_deg"] = DegreesOf(view.seen.rotation);
+}
+
 Json ViewJson(const CalibratedView& view) {
   Json corners = Json::array();
   for (const BoardCorner& corner : view.seen.corners) {
     corners.push_back({corner.id, corner.pixel.x(), corner.pixel.y()});
   }
-  return {{"name", view.seen.name},
-          {"camera", view.camera},
-          {"frame", view.frame},
-          {"noise_px", Number(view.seen.noise_px)},
-          {"cam_from_board", PoseJson(view.cam_from_board)},
-          {"corners", corners},
-          {"outliers", view.outliers}};
+  Json json{{"name", view.seen.name},
+            {"camera", view.camera},
+            {"frame", view.frame},
+            {"noise_px", Number(view.seen.noise_px)},
+            {"cam_from_board", PoseJson(view.cam_from_board)},
+            {"corners", corners},
+            {"outliers", view.outliers}};
+  AddRotation(view, json);
+  return json;
 }
 
 Json LeftOutJson(const std::vector<LeftOut>& left_out) {
@@ -221,6 +229,15 @@ std::vector<BoardCorner> ReadCorners(const JsonObject& object, const Board& boar
   return corners;
 }
 
+PhotoRotation ReadRotation(const JsonObject& object) {
+  constexpr const char* kKey = "photo_rotation_deg";
+  if (!object.Has(kKey)) return PhotoRotation::kNone;
+  for (const auto rotation : {PhotoRotation::kClockwise, PhotoRotation::kCounterclockwise}) {
+    if (object.Value(kKey) == Json(DegreesOf(rotation))) return rotation;
+  }
+  object.Fail(kKey, "90 or 270");
+}
+
 CalibratedView ReadView(const JsonObject& object, const Calibration& calibration) {
   CalibratedView view;
   view.seen.name = object.String("name");
@@ -235,6 +252,7 @@ CalibratedView ReadView(const JsonObject& object, const Calibration& calibration
   if (view.frame > kLargestFrame) object.Fail("frame", fmt::format("at most {}", kLargestFrame));
   view.cam_from_board = ReadPose(object, "cam_from_board");
   view.seen.corners = ReadCorners(object, calibration.board);
+  view.seen.rotation = ReadRotation(object);
   for (const Json& item : object.Array("outliers")) {
     if (!item.is_number_integer() || (!view.outliers.empty() && item <= view.outliers.back())) {
       object.Fail("outliers", "rising ids", item.dump().substr(0, 60));
@@ -316,6 +334,7 @@ std::string SummaryJson(const Calibration& calibration) {
   json["cameras"] = Json::array();
   for (const auto& camera : calibration.cameras) json["cameras"].push_back(CameraJson(camera));
   json["views"] = Json::array();
+  RotationCounts rotated;
   for (const auto& view : calibration.views) {
     json["views"].push_back({{"name", view.seen.name},
                              {"camera", view.camera},
@@ -324,7 +343,11 @@ std::string SummaryJson(const Calibration& calibration) {
                              {"rms_px", Number(ViewRmsPx(calibration, view))},
                              {"noise_px", Number(view.seen.noise_px)},
                              {"outliers", view.outliers}});
+    AddRotation(view, json["views"].back());
+    rotated.Add(view.seen.rotation);
   }
+  json["rotated_photos"] = {{"clockwise", rotated.clockwise},
+                            {"counterclockwise", rotated.counterclockwise}};
   json["models"] = ModelsJson(calibration.models);
   json["left_out"] = LeftOutJson(calibration.left_out);
   // Names come from files: bytes that are no UTF-8 must not make the whole summary unreadable.

@@ -125,7 +125,8 @@ class Judging {
     JudgedCamera& camera = report_.cameras[c];
     for (const RigView& view : fitted_.views) {
       if (view.camera != c) continue;
-      JudgedView judged{view.seen.name, 0, 0, 0, 0, ArrowsOf(calibration_.board, fitted_, view)};
+      JudgedView judged{view.seen.name,    0, 0, 0, 0, ArrowsOf(calibration_.board, fitted_, view),
+                        view.seen.rotation};
       std::vector<Eigen::Vector2d> residuals;
       for (const ResidualArrow& arrow : judged.arrows) residuals.push_back(arrow.residual_px);
       const ResidualStats stats = Summarise(residuals);

@@ -56,6 +56,7 @@ struct JudgedView {
   double rms_px = 0, worst_px = 0;
   int corners = 0, outliers = 0;
   std::vector<ResidualArrow> arrows;
+  PhotoRotation rotation = PhotoRotation::kNone;  ///< BoardView::rotation
 };
 
 /// How uncertain projections are at a distance from the camera.

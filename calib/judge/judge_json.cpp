@@ -21,6 +21,7 @@ std::string ToJson(const JudgeReport& report) {
   json["passed"] = report.passed();
   json["tests"] = ToJsonValue(report.tests);
   json["cameras"] = Json::array();
+  RotationCounts rotated;
   for (const JudgedCamera& camera : report.cameras) {
     Json item{{"name", camera.name},
               {"stored", ToJsonValue(camera.stored)},
@@ -47,9 +48,14 @@ std::string ToJson(const JudgeReport& report) {
                                {"worst_px", NumberOrNull(view.worst_px)},
                                {"corners", view.corners},
                                {"outliers", view.outliers}});
+      if (view.rotation == PhotoRotation::kNone) continue;
+      item["views"].back()["photo_rotation_deg"] = DegreesOf(view.rotation);
+      rotated.Add(view.rotation);
     }
     json["cameras"].push_back(std::move(item));
   }
+  json["rotated_photos"] = {{"clockwise", rotated.clockwise},
+                            {"counterclockwise", rotated.counterclockwise}};
   json["unseen"] = report.unseen;
   json["flipped"] = report.flipped;
   json["sigma_px"] = NumberOrNull(report.sigma_px);

@@ -117,16 +117,19 @@ int RunCalibrateRig(const Options& options, const Context& context) {
   calibrate.free_running = options.clocks == "free";
   calibrate.threads = context.common.threads;
   calibrate.seed = context.common.seed;
+  std::map<std::string, calib::LensCamera> known;
   for (const std::string& given : options.given) {
     const size_t at = given.find('=');
     if (at == std::string::npos || at == 0) {
       throw UsageError("--camera " + given + ": expected NAME=FILE");
     }
     const std::string file = given.substr(at + 1);
-    calibrate.given[given.substr(0, at)] = pipeline::GivenLens(pipeline::ReadLens(file), file);
+    const std::string name = given.substr(0, at);
+    calibrate.given[name] = pipeline::GivenLens(pipeline::ReadLens(file), file);
+    known.insert_or_assign(name, *calibrate.given[name].given);
   }
-  const auto photos =
-      pipeline::ReadRigPhotos(options.folder, board, {}, context.common.threads, context.console);
+  const auto photos = pipeline::ReadRigPhotos(options.folder, board, {}, context.common.threads,
+                                              context.console, known);
   pipeline::RigSummary summary;
   const auto calibration = pipeline::CalibrateRig(board, photos, calibrate, &summary);
   for (const fs::path& output : options.outputs) pipeline::WriteRigFile(output, calibration);

@@ -5,11 +5,11 @@
 
 #include <algorithm>
 #include <atomic>
-#include <map>
 
 #include "calib/boards/repeats.h"
 #include "capture/ingest.h"
 #include "cli/pipeline/board_given.h"
+#include "cli/pipeline/sensor_grid.h"
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/io/image_io.h"
@@ -71,28 +71,12 @@ Looked LookAt(const fs::path& file, const calib::Board& board,
   return looked;
 }
 
-// The size most photos have; of equally frequent ones the larger.
-std::pair<int, int> UsualSize(const std::vector<Looked>& all) {
-  std::map<std::pair<int, int>, int> counts;
-  for (const Looked& looked : all) {
-    if (!looked.found.corners.empty()) ++counts[{looked.width_px, looked.height_px}];
-  }
-  std::pair<int, int> usual;
-  int most = 0;
-  for (const auto& [size, count] : counts) {
-    if (count >= most) {
-      usual = size;
-      most = count;
-    }
-  }
-  return usual;
-}
-
 }  // namespace
 
 BoardPhotos ReadBoardPhotos(const fs::path& folder, const std::string& pattern,
                             const calib::Board& board, const calib::DetectOptions& options,
-                            int threads, Progress& progress) {
+                            int threads, Progress& progress,
+                            const std::optional<calib::LensCamera>& known) {
   const std::vector<std::string> names = MatchingNames(folder, pattern);
   BoardPhotos photos;
   photos.contents = ContentsOfBoardFolder(folder, names.size());
@@ -109,23 +93,30 @@ BoardPhotos ReadBoardPhotos(const fs::path& folder, const std::string& pattern,
     all[at] = LookAt(folder / names[at], board, options);
     progress.Update(++done);
   });
-  std::tie(photos.width_px, photos.height_px) = UsualSize(all);
+  std::vector<StoredView> stored;
   for (size_t i = 0; i < names.size(); ++i) {
     if (all[i].found.corners.empty()) {
       photos.left_out.push_back({names[i], all[i].found.reason});
-    } else if (all[i].width_px != photos.width_px || all[i].height_px != photos.height_px) {
-      photos.left_out.push_back(
-          {names[i],
-           fmt::format("expected {} x {} px as most photos have, found {} x {}", photos.width_px,
-                       photos.height_px, all[i].width_px, all[i].height_px)});
     } else {
-      photos.views.push_back({names[i], all[i].found.corners, all[i].found.noise_px});
+      stored.push_back({{names[i], all[i].found.corners, all[i].found.noise_px},
+                        all[i].width_px,
+                        all[i].height_px});
     }
   }
-  if (photos.views.empty()) {
+  if (stored.empty()) {
     throw Error(fmt::format(
         "{}: expected photos of a {}, found it in none of {}; the first says: {}", folder.string(),
         calib::TextOf(board), names.size(), photos.left_out.front().reason));
+  }
+  ViewsOnGrid on_grid = OnOneGrid(board, std::move(stored), folder.string(), known, progress);
+  photos.width_px = on_grid.width_px;
+  photos.height_px = on_grid.height_px;
+  photos.views = std::move(on_grid.views);
+  photos.left_out.insert(photos.left_out.end(), on_grid.left_out.begin(), on_grid.left_out.end());
+  if (photos.views.empty()) {
+    throw Error(fmt::format("{}: none of the photos that show the board can be used; {}: {}",
+                            folder.string(), on_grid.left_out.front().name,
+                            on_grid.left_out.front().reason));
   }
   auto repeats =
       calib::TakeOutRepeats(calib::NearestViewsPx(photos.width_px, photos.height_px), photos.views);

@@ -1,11 +1,13 @@
 // cli/pipeline/board_photos.h -- a folder of photos of a board becomes views of it.
 #pragma once
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "calib/boards/board.h"
 #include "calib/boards/detect.h"
+#include "calib/lens_camera.h"
 #include "capture/contents.h"
 #include "dtr/base/progress.h"
 
@@ -21,11 +23,13 @@ struct BoardPhotos {
 
 /// Looks for the board in the photos of `folder` whose names match `pattern` (a shell pattern as
 /// left*.jpg). Pixels are taken as stored: EXIF orientation would turn some photos of a camera and
-/// not others. The size is that of the most photos. The result is the same for any number of
-/// threads. Throws UsageError when the folder does not exist, nothing matches or the photos
-/// show another board (board_given.h), Error when no photo shows the board.
+/// not others. Photos that a program has rotated are put back on the grid of the others
+/// (sensor_grid.h), of which the camera may be known. The result is the same for any number of
+/// threads. Throws UsageError when the folder does not exist, nothing matches or the photos show
+/// another board (board_given.h), Error when no photo shows the board.
 BoardPhotos ReadBoardPhotos(const std::filesystem::path& folder, const std::string& pattern,
                             const calib::Board& board, const calib::DetectOptions& options,
-                            int threads, Progress& progress);
+                            int threads, Progress& progress,
+                            const std::optional<calib::LensCamera>& known = {});
 
 }  // namespace dtr::pipeline

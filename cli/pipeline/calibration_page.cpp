@@ -48,6 +48,12 @@ void AddDifference(report::HtmlReport& page, const PlotSize& size,
   AddMap(page, "Stored less fresh solve", " px", size, difference);
 }
 
+// The EXIF orientation that brings a rotated photo back onto the sensor's grid.
+int PutsBack(calib::PhotoRotation rotation) {
+  if (rotation == calib::PhotoRotation::kNone) return 1;
+  return rotation == calib::PhotoRotation::kClockwise ? 8 : 6;
+}
+
 void AddWorstViews(report::HtmlReport& page, const calib::LensCamera& lens,
                    const calib::JudgedCamera& camera, const std::optional<fs::path>& images) {
   const PlotSize size = SizeOf(lens);
@@ -58,7 +64,7 @@ void AddWorstViews(report::HtmlReport& page, const calib::LensCamera& lens,
     if (images && fs::is_regular_file(*images / view.name)) {
       try {
         const ImageRgb8 photo = io::ReadImage(*images / view.name);
-        behind = PhotoBehind(size, photo);
+        behind = PhotoBehind(size, io::ApplyExifOrientation(photo, PutsBack(view.rotation)));
       } catch (const Error&) {
         behind.clear();  // drawn without its photo
       }

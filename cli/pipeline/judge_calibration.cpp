@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 
 #include "calib/boards/repeats.h"
 #include "calib/solve/rig_start.h"
@@ -30,8 +31,8 @@ void RequireSize(const calib::CalibratedCamera& camera, int width_px, int height
 UnseenPhotos UnseenOfCamera(const calib::Calibration& calibration,
                             const std::filesystem::path& folder, const std::string& pattern,
                             int threads, Progress& progress) {
-  const BoardPhotos photos =
-      ReadBoardPhotos(folder, pattern, calibration.board, {}, threads, progress);
+  const BoardPhotos photos = ReadBoardPhotos(folder, pattern, calibration.board, {}, threads,
+                                             progress, calibration.cameras[0].camera);
   RequireSize(calibration.cameras[0], photos.width_px, photos.height_px, folder);
   UnseenPhotos found{{}, photos.left_out};
   calib::UnseenViews& unseen = found.unseen;
@@ -47,7 +48,9 @@ UnseenPhotos UnseenOfRig(const calib::Calibration& calibration, const std::files
         "folders or names",
         pattern));
   }
-  RigPhotos photos = ReadRigPhotos(folder, calibration.board, {}, threads, progress);
+  std::map<std::string, calib::LensCamera> known;
+  for (const auto& camera : calibration.cameras) known.emplace(camera.name, camera.camera);
+  RigPhotos photos = ReadRigPhotos(folder, calibration.board, {}, threads, progress, known);
   std::vector<size_t> index(photos.cameras.size());
   for (size_t c = 0; c < photos.cameras.size(); ++c) {
     const auto found =

@@ -14,6 +14,7 @@
 #include "cli/pipeline/board_given.h"
 #include "cli/pipeline/rig_names.h"
 #include "cli/pipeline/rig_timestamps.h"
+#include "cli/pipeline/sensor_grid.h"
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/io/image_io.h"
@@ -396,10 +397,43 @@ capture::FolderContents ContentsOfRig(const fs::path& folder, const Layout& layo
   return contents;
 }
 
+// The views of one camera, and what of it is left out.
+void AddViewsOf(size_t camera, const fs::path& folder, const calib::Board& board, Layout& layout,
+                const std::map<std::string, size_t>& frames,
+                const std::optional<calib::LensCamera>& known, Progress& progress,
+                RigPhotos& photos) {
+  std::vector<StoredView> stored;
+  std::map<std::string, size_t> frame_of;  // by name, which is a camera's once
+  for (Shot& shot : layout.shots) {
+    if (shot.camera != camera) continue;
+    if (shot.found.corners.empty()) {
+      photos.left_out.push_back({shot.name, shot.found.reason});
+      continue;
+    }
+    frame_of[shot.name] = frames.at(shot.frame);
+    stored.push_back({{shot.name, std::move(shot.found.corners), shot.found.noise_px},
+                      shot.width_px,
+                      shot.height_px});
+  }
+  if (stored.empty()) {
+    throw Error(fmt::format("{}: camera {}: expected photos of a {}, found it in none",
+                            folder.string(), layout.cameras[camera], calib::TextOf(board)));
+  }
+  ViewsOnGrid on_grid =
+      OnOneGrid(board, std::move(stored), "camera " + layout.cameras[camera], known, progress);
+  photos.cameras.push_back({layout.cameras[camera], on_grid.width_px, on_grid.height_px});
+  for (calib::BoardView& view : on_grid.views) {
+    const size_t frame = frame_of.at(view.name);
+    photos.views.push_back({camera, frame, std::move(view), {}});
+  }
+  photos.left_out.insert(photos.left_out.end(), on_grid.left_out.begin(), on_grid.left_out.end());
+}
+
 }  // namespace
 
 RigPhotos ReadRigPhotos(const fs::path& folder, const calib::Board& board,
-                        const calib::DetectOptions& options, int threads, Progress& progress) {
+                        const calib::DetectOptions& options, int threads, Progress& progress,
+                        const std::map<std::string, calib::LensCamera>& known) {
   Layout layout = LayoutOf(folder, progress);
   RigPhotos photos;
   photos.contents = ContentsOfRig(folder, layout);
@@ -407,7 +441,6 @@ RigPhotos ReadRigPhotos(const fs::path& folder, const calib::Board& board,
   RequireGivenBoardIn(layout, folder.string(), board, threads);
   LookAtAll(board, options, threads, progress, layout);
   photos.left_out = layout.left_out;
-  for (const std::string& name : layout.cameras) photos.cameras.push_back({name, 0, 0});
   std::map<std::string, size_t> frames;
   const std::vector<size_t> times = FrameTimes(layout.frames);
   photos.frames.resize(times.empty() ? 0 : times.back() + 1);
@@ -415,34 +448,10 @@ RigPhotos ReadRigPhotos(const fs::path& folder, const calib::Board& board,
     frames[layout.frames[i]] = times[i];
     photos.frames[times[i]] = layout.frames[i];
   }
-  for (Shot& shot : layout.shots) {
-    if (shot.found.corners.empty()) {
-      photos.left_out.push_back({shot.name, shot.found.reason});
-      continue;
-    }
-    RigPhotoCamera& camera = photos.cameras[shot.camera];
-    if (camera.width_px == 0) {
-      camera.width_px = shot.width_px;
-      camera.height_px = shot.height_px;
-    }
-    if (camera.width_px != shot.width_px || camera.height_px != shot.height_px) {
-      photos.left_out.push_back(
-          {shot.name,
-           fmt::format("expected {} x {} px as the camera's first photo has, found {} "
-                       "x {}",
-                       camera.width_px, camera.height_px, shot.width_px, shot.height_px)});
-      continue;
-    }
-    photos.views.push_back({shot.camera,
-                            frames.at(shot.frame),
-                            {shot.name, std::move(shot.found.corners), shot.found.noise_px},
-                            {}});
-  }
-  for (const RigPhotoCamera& camera : photos.cameras) {
-    if (camera.width_px == 0) {
-      throw Error(fmt::format("{}: camera {}: expected photos of a {}, found it in none",
-                              folder.string(), camera.name, calib::TextOf(board)));
-    }
+  for (size_t c = 0; c < layout.cameras.size(); ++c) {
+    const auto lens = known.find(layout.cameras[c]);
+    AddViewsOf(c, folder, board, layout, frames,
+               lens == known.end() ? std::nullopt : std::optional(lens->second), progress, photos);
   }
   std::stable_sort(photos.views.begin(), photos.views.end(), [](const auto& a, const auto& b) {
     return std::pair(a.frame, a.camera) < std::pair(b.frame, b.camera);

@@ -34,6 +34,7 @@ Calibration Example(BoardModel model) {
     calibration.views.push_back({exact.views[i], 0, 2 * i, exact.cam_from_board[i], {3, 8}});
   }
   calibration.views[0].seen.noise_px = std::nan("");
+  calibration.views[1].seen.rotation = PhotoRotation::kCounterclockwise;
   calibration.left_out.push_back({"blurred.jpg", "expected the whole board"});
   calibration.models.push_back({model, true, 0.2, -0.01, 0.02, ""});
   calibration.models.push_back({BoardModel::kBrown8, false, {}, 0, 0, "turns back"});
@@ -58,6 +59,7 @@ TEST(CalibrationFile, EverythingSurvivesWritingAndReading) {
     for (size_t i = 0; i < read.views.size(); ++i) {
       EXPECT_EQ(read.views[i].outliers, written.views[i].outliers);
       EXPECT_EQ(read.views[i].frame, 2 * i);
+      EXPECT_EQ(read.views[i].seen.rotation, written.views[i].seen.rotation);
       EXPECT_LT(
           (read.views[i].cam_from_board.translation - written.views[i].cam_from_board.translation)
               .norm(),
@@ -130,7 +132,8 @@ TEST(CalibrationFile, WrongFieldsAreNamed) {
       {"[1, ", "[0, ", "corners"},
       {"\"outliers\": [3, 8]", "\"outliers\": [8, 3]", "outliers"},
       {"\"outliers\": [3, 8]", "\"outliers\": [3, 800]", "outliers"},
-      {"\"outliers\": [3, 8]", "\"outliers\": 5", "outliers"}};
+      {"\"outliers\": [3, 8]", "\"outliers\": 5", "outliers"},
+      {"\"photo_rotation_deg\": 270", "\"photo_rotation_deg\": 180", "photo_rotation_deg"}};
   for (const auto& [from, to, named] : spoiled) {
     const size_t at = good.find(from);
     ASSERT_NE(at, std::string::npos) << from;
