@@ -44,8 +44,9 @@ struct VideoReader::Parts {
 bool IsVideoExtension(const std::string& extension) {
   std::string lower = extension;
   for (char& c : lower) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  static constexpr std::array<const char*, 6> kVideos{".mp4", ".mov", ".avi",
-                                                      ".mkv", ".m4v", ".webm"};
+  static constexpr std::array<const char*, 14> kVideos{".mp4",  ".mov", ".avi",  ".mkv", ".m4v",
+                                                       ".webm", ".mts", ".m2ts", ".mpg", ".mpeg",
+                                                       ".3gp",  ".3g2", ".wmv",  ".qt"};
   return std::find(kVideos.begin(), kVideos.end(), lower) != kVideos.end();
 }
 

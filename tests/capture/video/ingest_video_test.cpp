@@ -69,6 +69,20 @@ TEST(IngestVideos, TakesEveryNthFrameAndSaysWhichItIs) {
   EXPECT_EQ(read.photos[1].video_frame->video, "walk.avi");
 }
 
+// Camcorders and older phones; what a file holds says how to decode it, not its name.
+TEST(IngestVideos, OtherNamesOfVideosAreRead) {
+  const TemporaryFolder folder;
+  WriteVideo(folder / "walk.avi", Places(25, 4));
+  for (const char* name : {"a.MTS", "b.m2ts", "c.3gp", "d.mpg", "e.wmv", "f.qt"}) {
+    fs::copy_file(folder / "walk.avi", folder / name);
+    EXPECT_TRUE(IsVideoExtension(fs::path(name).extension().string())) << name;
+    EXPECT_GT(Ingest({folder / name}, {.threads = 2}, folder / (name + std::string("_frames")))
+                  .photos.size(),
+              1u)
+        << name;
+  }
+}
+
 TEST(IngestVideos, ChoosesByMotionTheSameFramesForAnyNumberOfThreads) {
   const TemporaryFolder folder;
   WriteVideo(folder / "walk.avi", Places(40, 4));
