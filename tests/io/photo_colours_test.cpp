@@ -261,6 +261,28 @@ TEST(PhotoColours, PrimariesOfExrAreApplied) {
   ExpectFlat(folder / "plain.exr", {188, 188, 188}, 0);
 }
 
+// The products of what a float can hold with a matrix may be infinite, their differences no number.
+TEST(PhotoColours, TheLargestFloatsAreBrightAndNoCrash) {
+  const TemporaryFolder folder;
+  const std::array<float, 8> aces{0.7347F, 0.2653F, 0.0F,     1.0F,
+                                  0.0001F, -0.077F, 0.32168F, 0.33767F};
+  for (const float value : {3.4e38F, -3.4e38F, 1e-39F}) {
+    ImageSpec spec(kW, kH, 3, TypeDesc::FLOAT);
+    spec.attribute("chromaticities", TypeDesc(TypeDesc::FLOAT, 8), aces.data());
+    WriteForeign(folder / "large.exr", spec, std::vector<float>(3 * kW * kH, value));
+    const int level = value > 1 ? 255 : 0;
+    ExpectFlat(folder / "large.exr", {level, level, level}, 0);
+  }
+  ImageSpec spec(kW, kH, 4, TypeDesc::FLOAT);  // premultiplied: colour / alpha is infinite
+  spec.channelnames = {"R", "G", "B", "A"};
+  spec.alpha_channel = 3;
+  spec.attribute("chromaticities", TypeDesc(TypeDesc::FLOAT, 8), aces.data());
+  std::vector<float> values;
+  for (int i = 0; i < kW * kH; ++i) values.insert(values.end(), {0.5F, 0.5F, 0.5F, 1e-39F});
+  WriteForeign(folder / "thin.exr", spec, values);
+  ExpectFlat(folder / "thin.exr", {255, 255, 255}, 0);
+}
+
 TEST(PhotoColours, WindowsAndChannelsOfExrThatAreNoPhotoAreAnError) {
   const TemporaryFolder folder;
   ImageSpec spec(kW, kH, 3, TypeDesc::HALF);
@@ -272,6 +294,9 @@ TEST(PhotoColours, WindowsAndChannelsOfExrThatAreNoPhotoAreAnError) {
     ImageSpec other(kW, kH, 3, TypeDesc::HALF);
     other.full_width = kW + larger;
     WriteForeign(folder / "window.exr", other, values);
+    fs::copy_file(folder / "window.exr", folder / "capital.EXR",
+                  fs::copy_options::overwrite_existing);
+    EXPECT_THROW(ReadImage(folder / "capital.EXR"), Error);
     for (const auto& read :
          {std::function<void()>([&] { ReadImage(folder / "window.exr"); }),
           std::function<void()>([&] { ReadImageHeader(folder / "window.exr"); })}) {
