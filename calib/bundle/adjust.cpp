@@ -219,7 +219,7 @@ ceres::Solver::Summary Minimise(const Bundle& bundle, const AdjustOptions& optio
   ceres::Solver::Summary summary;
   ceres::Solve(solver, &problem, &summary);
   progress.ThrowIfInterrupted();
-  if (!summary.IsSolutionUsable()) Refuse("the sights have no least-squares solution");
+  if (!summary.IsSolutionUsable()) Refuse("the observations have no least-squares solution");
   n.FollowRig();
   return summary;
 }
