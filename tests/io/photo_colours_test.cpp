@@ -362,55 +362,27 @@ TEST(PhotoColours, LabTiffIsAnError) {
               HasSubstr("lab.tif: a TIFF of Lab colours is not supported"));
 }
 
-// A JPEG of one colour in `space`, coded as `coded`; luma sampled so often as the chroma.
-void WriteJpegAs(const fs::path& file, const std::vector<JSAMPLE>& pixel, J_COLOR_SPACE space,
-                 J_COLOR_SPACE coded, bool adobe, int across, int down) {
-  std::FILE* out = std::fopen(file.c_str(), "wb");
-  ASSERT_NE(out, nullptr);
-  jpeg_compress_struct jpeg{};
-  jpeg_error_mgr errors{};
-  jpeg.err = jpeg_std_error(&errors);
-  jpeg_create_compress(&jpeg);
-  jpeg_stdio_dest(&jpeg, out);
-  jpeg.image_width = kW;
-  jpeg.image_height = kH;
-  jpeg.input_components = static_cast<int>(pixel.size());
-  jpeg.in_color_space = space;
-  jpeg_set_defaults(&jpeg);
-  jpeg_set_colorspace(&jpeg, coded);
-  jpeg_set_quality(&jpeg, 100, TRUE);
-  jpeg.write_Adobe_marker = adobe ? TRUE : FALSE;
-  jpeg.write_JFIF_header = coded == JCS_YCbCr && !adobe ? TRUE : FALSE;
-  for (int i = 0; i < jpeg.num_components; ++i) {
-    const bool luma = i == 0 || i == 3;
-    jpeg.comp_info[i].h_samp_factor = luma ? across : 1;
-    jpeg.comp_info[i].v_samp_factor = luma ? down : 1;
-  }
-  jpeg_start_compress(&jpeg, TRUE);
-  std::vector<JSAMPLE> row;
-  for (int x = 0; x < kW; ++x) row.insert(row.end(), pixel.begin(), pixel.end());
-  for (int y = 0; y < kH; ++y) {
-    JSAMPROW pointer = row.data();
-    jpeg_write_scanlines(&jpeg, &pointer, 1);
-  }
-  jpeg_finish_compress(&jpeg);
-  jpeg_destroy_compress(&jpeg);
-  std::fclose(out);
+// A JPEG of one colour.
+void WriteFlatJpeg(const fs::path& file, const std::vector<JSAMPLE>& pixel,
+                   const testing::JpegKind& kind) {
+  std::vector<JSAMPLE> values;
+  for (int i = 0; i < kW * kH; ++i) values.insert(values.end(), pixel.begin(), pixel.end());
+  testing::WriteJpegAs(file, kW, kH, std::move(values), kind);
 }
 
 TEST(PhotoColours, KindsOfJpegHaveTheirColours) {
   const TemporaryFolder folder;
   const fs::path file = folder / "photo.jpg";
   for (const auto& [across, down] : {std::pair(1, 1), {1, 2}, {2, 1}, {2, 2}, {4, 1}, {4, 2}}) {
-    WriteJpegAs(file, {200, 100, 50}, JCS_RGB, JCS_YCbCr, false, across, down);
+    WriteFlatJpeg(file, {200, 100, 50}, {JCS_RGB, JCS_YCbCr, false, across, down});
     ExpectFlat(file, {200, 100, 50}, 2);
   }
-  WriteJpegAs(file, {200, 100, 50}, JCS_RGB, JCS_RGB, true, 1, 1);  // marker: no transform
+  WriteFlatJpeg(file, {200, 100, 50}, {JCS_RGB, JCS_RGB, true, 1, 1});  // marker: no transform
   ExpectFlat(file, {200, 100, 50}, 1);
   // Adobe's inks are inverted, coded as they are or through YCC.
-  WriteJpegAs(file, {200, 100, 50, 255}, JCS_CMYK, JCS_CMYK, true, 1, 1);
+  WriteFlatJpeg(file, {200, 100, 50, 255}, {JCS_CMYK, JCS_CMYK, true, 1, 1});
   ExpectFlat(file, {200, 100, 50}, 2);
-  WriteJpegAs(file, {200, 100, 50, 255}, JCS_CMYK, JCS_YCCK, true, 2, 2);
+  WriteFlatJpeg(file, {200, 100, 50, 255}, {JCS_CMYK, JCS_YCCK, true, 2, 2});
   ExpectFlat(file, {200, 100, 50}, 2);
 }
 
