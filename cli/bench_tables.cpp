@@ -87,8 +87,7 @@ void SayReportTable(const eval::BenchReport& report, const eval::BenchMachine& m
                           "x CPU", "x ms", "loss", "2006 fps"));
   for (size_t i = 0; i + 1 < report.rows.size(); i += 2) {
     const eval::BenchRow &two_pass = report.rows[i], &deferred = report.rows[i + 1];
-    std::optional<double> loss;
-    if (two_pass.psnr_db && deferred.psnr_db) loss = *two_pass.psnr_db - *deferred.psnr_db;
+    const auto loss = eval::LossDb(two_pass.psnr_db, deferred.psnr_db);
     console.Say(fmt::format("{:>3} {:>5}  {}  {}  {:>6.1f} {:>6.1f} {:>5}  {:>9}",
                             two_pass.resolution, two_pass.views_used, Row(two_pass), Row(deferred),
                             two_pass.cpu.median_ms / deferred.cpu.median_ms,

@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "dtr/base/files.h"
+#include "dtr/eval/metrics.h"
 
 namespace dtr::cli {
 namespace {
@@ -54,6 +55,7 @@ Json PointJson(const SweptStage& swept, size_t i) {
           {"cost_most", range.most},
           {"error", point.measured.error},
           {"psnr_db", OrNull(point.measured.psnr_db)},
+          {"identical", eval::IdenticalFigures({{"psnr_db", point.measured.psnr_db}})},
           {"machine_ms", point.measured.machine_ms},
           {"on_front", OnFront(swept, i)},
           {"figures", point.measured.figures}};

@@ -1,7 +1,11 @@
 #include "cli/sweep_store.h"
 
+#include <cmath>
+#include <limits>
+
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
+#include "dtr/eval/metrics.h"
 #include "dtr/io/json_fields.h"
 
 namespace dtr::cli {
@@ -17,7 +21,9 @@ io::Json Value(const eval::SweepMeasurement& measured) {
                 {"error", measured.error},
                 {"machine_ms", measured.machine_ms},
                 {"figures", measured.figures}};
-  if (measured.psnr_db) json["psnr_db"] = *measured.psnr_db;
+  // JSON has no infinity: what equals the photos is written as such.
+  if (measured.psnr_db && std::isfinite(*measured.psnr_db)) json["psnr_db"] = *measured.psnr_db;
+  json["identical"] = eval::IdenticalFigures({{"psnr_db", measured.psnr_db}});
   return json;
 }
 
@@ -29,6 +35,9 @@ eval::SweepMeasurement MeasurementOf(const io::JsonObject& json) {
   measured.error = json.Positive("error");
   measured.machine_ms = json.Number("machine_ms");
   if (json.Has("psnr_db")) measured.psnr_db = json.Number("psnr_db");
+  if (json.Has("identical") && !json.Value("identical").empty()) {
+    measured.psnr_db = std::numeric_limits<double>::infinity();
+  }
   const io::JsonObject figures = json.Object("figures");
   for (const auto& [name, value] : json.Value("figures").items()) {
     measured.figures[name] = figures.Number(name);

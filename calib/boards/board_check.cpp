@@ -13,6 +13,7 @@ namespace dtr::calib {
 namespace {
 
 constexpr int kFewestVotes = 2;  // one photo may be of something else
+constexpr double kSameCornerPx = 2;
 
 bool SameSides(const GridSize& a, const GridSize& b) {
   return std::minmax(a.columns, a.rows) == std::minmax(b.columns, b.rows);
@@ -75,25 +76,39 @@ BoardVerdict VerdictOfAnyMarkers(const Grid<std::uint8_t>& grey, const Board& gi
   return verdict;
 }
 
-// Reflections hide lines of squares, so a size within the given one is another board only where
-// that one is not found either. By quads: OpenCV's other detector takes seconds for a size not
-// shown.
-bool IsFound(const Grid<std::uint8_t>& grey, const Board& given) {
+// By quads: OpenCV's other detector takes seconds for a size that is not shown.
+std::vector<BoardCorner> CornersOf(const Grid<std::uint8_t>& grey, const Board& given) {
   DetectOptions options;
   options.detector = ChessboardDetector::kQuads;
-  return !DetectBoard(grey, given, options).corners.empty();
+  return DetectBoard(grey, given, options).corners;
 }
 
+// True where the corners are those of the lattice, not of another board in the photo.
+bool LieOn(const std::vector<BoardCorner>& corners, const ShownChessboard& lattice) {
+  const auto on_lattice = std::count_if(corners.begin(), corners.end(), [&](const auto& corner) {
+    return std::any_of(lattice.corners.begin(), lattice.corners.end(), [&](const auto& pixel) {
+      return (pixel - corner.pixel).norm() < kSameCornerPx;
+    });
+  });
+  return 2 * static_cast<size_t>(on_lattice) > corners.size();
+}
+
+// What is seen may be less than the given board, of which reflections hide lines, and the largest
+// board in a photo may be one in the background: the given one is looked for as well.
 BoardVerdict VerdictOfChessboard(const Grid<std::uint8_t>& grey, const Board& given) {
   BoardVerdict verdict;
-  const auto shown = ShownChessboard(grey);
+  const auto shown = FindChessboard(grey);
   if (!shown) return verdict;
   if (given.kind == Board::Kind::kChessboard) {
     const GridSize size{given.columns, given.rows};
-    verdict.shows_given =
-        SameSides(*shown, size) || (!ReachesBeyond(*shown, size) && IsFound(grey, given));
+    verdict.shows_given = SameSides(shown->size, size);
+    if (!verdict.shows_given) {
+      const auto corners = CornersOf(grey, given);
+      verdict.shows_given =
+          !corners.empty() && !(ReachesBeyond(shown->size, size) && LieOn(corners, *shown));
+    }
   }
-  if (!verdict.shows_given) verdict.other = ChessboardOf(*shown, given);
+  if (!verdict.shows_given) verdict.other = ChessboardOf(shown->size, given);
   return verdict;
 }
 
@@ -116,7 +131,7 @@ std::string Advice(const Board& given, const Board& other, bool first_square_whi
   if (first_square_white) {
     return "its first square is white, as OpenCV before 4.6 made boards with an even number of "
            "rows: "
-           "print the board anew";
+           "print the board again";
   }
   if (other.kind == Board::Kind::kCharuco) {
     return fmt::format("give charuco:{}x{}:SQUARE:MARKER:{}{}{}", other.columns + 1, other.rows + 1,

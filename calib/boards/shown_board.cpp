@@ -159,22 +159,23 @@ std::optional<Node> SeedAt(const Grid<std::uint8_t>& grey, const Eigen::Vector2d
   return best;
 }
 
-GridSize Larger(const GridSize& a, const GridSize& b) {
-  return a.columns * a.rows >= b.columns * b.rows ? a : b;
-}
-
 }  // namespace
 
-std::optional<GridSize> ShownChessboard(const Grid<std::uint8_t>& grey) {
-  GridSize size;
+std::optional<ShownChessboard> FindChessboard(const Grid<std::uint8_t>& grey) {
+  ShownChessboard largest;
   const auto candidates = Candidates(grey);
   const size_t step = std::max<size_t>(1, candidates.size() / kSeeds);
   for (size_t i = 0; i < candidates.size(); i += step) {
     const auto seed = SeedAt(grey, Refined(grey, candidates[i], 12), candidates);
-    if (seed) size = Larger(size, SizeOf(Grown(grey, *seed)));
+    if (!seed) continue;
+    const auto nodes = Grown(grey, *seed);
+    const GridSize size = SizeOf(nodes);
+    if (size.columns * size.rows <= largest.size.columns * largest.size.rows) continue;
+    largest = {size, {}};
+    for (const auto& [place, node] : nodes) largest.corners.push_back(node.pixel);
   }
-  if (std::min(size.columns, size.rows) < kSmallestBoard) return std::nullopt;
-  return size;
+  if (std::min(largest.size.columns, largest.size.rows) < kSmallestBoard) return std::nullopt;
+  return largest;
 }
 
 namespace {

@@ -1,8 +1,10 @@
 // calib/boards/shown_board.h -- which board does a photo show, if not the one that was given?
 #pragma once
+#include <Eigen/Core>
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "dtr/types/grid.h"
 
@@ -14,10 +16,15 @@ struct GridSize {
   bool operator==(const GridSize&) const = default;
 };
 
-/// Size of the largest chessboard in a photo, without being told; empty where there is none of at
-/// least 3 x 3 corners. A lattice grows from corner to corner, each of which shows two opposite
+struct ShownChessboard {
+  GridSize size;
+  std::vector<Eigen::Vector2d> corners;  ///< pixels, in no order
+};
+
+/// The largest chessboard in a photo, whatever its size; empty where there is none of at least
+/// 3 x 3 corners. A lattice grows from corner to corner, each of which shows two opposite
 /// quadrants dark and two bright. In either order of sides.
-std::optional<GridSize> ShownChessboard(const Grid<std::uint8_t>& grey);
+std::optional<ShownChessboard> FindChessboard(const Grid<std::uint8_t>& grey);
 
 /// Markers in a photo, and the ChArUco board that they lie on.
 struct ShownMarkers {

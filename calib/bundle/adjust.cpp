@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <numeric>
 #include <optional>
 
@@ -15,19 +16,17 @@
 #include "calib/bundle/priors.h"
 #include "calib/bundle/rig_adjust.h"
 #include "calib/bundle/sight_rows.h"
-#include "calib/bundle/solver_ends.h"
 #include "calib/solve/board_start.h"
+#include "calib/solve/solver_ends.h"
 #include "dtr/base/error.h"
 
 namespace dtr::calib {
 namespace {
 
-// Observations that miss by less than this are no outliers, however exact the others are: some
-// photos of a model may be exact and others rounded, and what fits to 0.1 px misleads nobody.
-constexpr double kLeastOutlierSigmaPx = 0.02;  // times the five of AdjustOptions
 constexpr double kSameScale = 0.05;  // relative change at which the robust loss is settled
 constexpr double kCauchySigmas = 2;  // scale of the robust loss
 constexpr int kMostRobustPasses = 5, kMostOutlierPasses = 4;
+constexpr size_t kDenseImages = 100;  // up to here the cameras' system is solved as a dense one
 
 [[noreturn]] void Refuse(const std::string& what) { throw Error("bundle adjustment: " + what); }
 
@@ -157,6 +156,20 @@ void FixLens(const LensFrame& lens, LensFreedom freedom, double* theta, ceres::P
       theta, new ceres::SubsetManifold(static_cast<int>(lens.centre.size()), {centre, centre + 1}));
 }
 
+// `robust`: a few steps under a robust loss, to be followed by least squares.
+ceres::Solver::Options SolverOptions(size_t images, bool robust) {
+  ceres::Solver::Options options = SilentOptions();
+  options.linear_solver_type = images <= kDenseImages ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
+  // Under the robust loss Ceres converges by a constant factor a step: it is left when the cameras
+  // have settled, and least squares, which converges quadratically, does the rest.
+  options.max_num_iterations = robust ? 8 : 100;
+  options.function_tolerance = robust ? 1e-3 : 1e-11;
+  options.parameter_tolerance = 1e-12;
+  options.gradient_tolerance = 1e-12;
+  options.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+  return options;
+}
+
 // One solve over the sights with used[i]; Cauchy's loss where a scale is given.
 ceres::Solver::Summary Minimise(const Bundle& bundle, const AdjustOptions& options,
                                 const std::vector<bool>& used, double sigma_px, double cauchy_px,
@@ -206,7 +219,7 @@ ceres::Solver::Summary Minimise(const Bundle& bundle, const AdjustOptions& optio
   ceres::Solver::Summary summary;
   ceres::Solve(solver, &problem, &summary);
   progress.ThrowIfInterrupted();
-  if (!summary.IsSolutionUsable()) Refuse("the sights have no least-squares solution");
+  if (!summary.IsSolutionUsable()) Refuse("the observations have no least-squares solution");
   n.FollowRig();
   return summary;
 }

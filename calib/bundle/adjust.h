@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "calib/bundle/bundle.h"
+#include "calib/precision.h"
 #include "dtr/base/progress.h"
 
 namespace dtr::calib {
@@ -40,12 +41,6 @@ struct DistancePrior {
   int image_a = 0, image_b = 0;
   double distance = 0, sigma = 1;  ///< both > 0
 };
-
-/// No pixel's coordinate is taken as better known than this, standard deviation: float holds those
-/// of 4096 px and more to 5e-4 px, and text files often have three decimals. Whatever is measured
-/// in units of noise uses at least this, as noise below it is rounding, of which no ratio means
-/// anything.
-inline constexpr double kPrecisionPx = 1e-3;
 
 /// What is known of real cameras, for the two options of AdjustOptions: principal points lie within
 /// some 2 % of the image's long side of the middle, pixels are square to better than 1 %. Where

@@ -125,9 +125,9 @@ std::string LensReason(const LensJudgement& lens) {
       worst = k;
     }
   }
-  return fmt::format("{}: stored {:.6g}, the sights say {:.6g} +- {:.2g}; points move by {:.3g} px",
-                     lens.names[worst], lens.stored[worst], lens.fresh[worst], lens.sigma[worst],
-                     lens.moved_px);
+  return fmt::format(
+      "{}: stored {:.6g}, the observations say {:.6g} +- {:.2g}; points move by {:.3g} px",
+      lens.names[worst], lens.stored[worst], lens.fresh[worst], lens.sigma[worst], lens.moved_px);
 }
 
 // A difference fails where it is beyond chance and can be seen.
@@ -185,8 +185,9 @@ void AddHalves(const BundleLimits& limits, const Halves& halves, const FreshSolv
   if (halves.parts.empty()) {
     judgement.tests.push_back(AtMost(
         "halves_ratio", kNothing, limits.max_halves_ratio,
-        fmt::format("expected two photos of {} sights or more, whose halves can be solved apart",
-                    kFewestSightsOfHalf)));
+        fmt::format(
+            "expected two photos of {} observations or more, whose halves can be solved apart",
+            kFewestSightsOfHalf)));
     return;
   }
   const BundleCovariance covariances[2] = {CovarianceOf(solved[0], solves.options),
@@ -207,8 +208,8 @@ void AddHalves(const BundleLimits& limits, const Halves& halves, const FreshSolv
     check.reason += fmt::format("; points move by {:.2g} px at most", moved_px);
   }
   if (!halves.left_out.empty()) {
-    check.reason += fmt::format("; without photos of fewer than {} sights: {}", kFewestSightsOfHalf,
-                                halves.left_out);
+    check.reason += fmt::format("; without photos of fewer than {} observations: {}",
+                                kFewestSightsOfHalf, halves.left_out);
   }
   judgement.tests.push_back(std::move(check));
 }
@@ -274,7 +275,7 @@ void AddNotJudged(const Bundle& given, Judgement& all) {
   if (lost.empty()) {
     all.not_judged.clear();  // what one part could not judge another has
   } else if (all.not_judged.empty()) {
-    all.not_judged = fmt::format("fewer than {} sights of what photos beside them see: {}",
+    all.not_judged = fmt::format("fewer than {} observations of what photos beside them see: {}",
                                  kFewestSights, fmt::join(lost, ", "));
   }
   all.tests.push_back(
@@ -298,7 +299,7 @@ Judgement JudgePart(const Bundle& given, const BundleLimits& limits, int threads
   }
   if (stored.images.size() < 2) {
     return NotJudged(judgement,
-                     fmt::format("expected two photos or more of {} sights each, found {}",
+                     fmt::format("expected two photos or more of {} observations each, found {}",
                                  kFewestSights, stored.images.size()));
   }
   const Halves halves = HalvesOf(stored);
@@ -324,7 +325,7 @@ Judgement JudgePart(const Bundle& given, const BundleLimits& limits, int threads
                                             kMostUnknowns));
   }
   if (!covariance.determined) {
-    return NotJudged(judgement, "the sights do not determine " + covariance.weakest);
+    return NotJudged(judgement, "the observations do not determine " + covariance.weakest);
   }
   if (!fresh.converged) {
     return NotJudged(judgement,

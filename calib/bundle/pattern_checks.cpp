@@ -25,7 +25,7 @@ Check LensCheck(const char* name, const std::string& what, const LensPatternTest
                 const BundleLimits& limits) {
   Check check = CheckOf(name, what, test.fit, limits.min_p, limits.max_lens_pattern_px);
   if (test.lenses_left_out > 0) {
-    check.reason += fmt::format("; without {} lenses of fewest sights", test.lenses_left_out);
+    check.reason += fmt::format("; without {} lenses of fewest observations", test.lenses_left_out);
   }
   return check;
 }

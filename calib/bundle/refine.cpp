@@ -242,8 +242,8 @@ Refined Refine(const SfmModel& model, const RefineOptions& options) {
   }
   const size_t chosen = Choose(bundle, split, options, refined);
   if (chosen == kNoneConverged || chosen == kNoScale || chosen == 0) {
-    refined.reason = chosen == 0          ? "held-out sights are predicted no better"
-                     : chosen == kNoScale ? "the sights are no more than the unknowns"
+    refined.reason = chosen == 0          ? "held-out observations are predicted no better"
+                     : chosen == kNoScale ? "the observations are no more than the unknowns"
                                           : "the solve did not converge";
     refined.adjusted = {};
     return refined;

@@ -152,7 +152,7 @@ WiderFit Judged(const Eigen::MatrixXd& left, const Eigen::VectorXd& units, doubl
   }
   const double below = free - fit.freedom;
   if (fit.freedom == 0 || !(below > 0)) {
-    fit.not_tested = "the sights do not tell it from the other unknowns";
+    fit.not_tested = "the observations do not tell it from the other unknowns";
     return fit;
   }
   // Of exact observations rounding is left, which may as well come out below zero.

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "calib/judge/judge.h"
+#include "calib/precision.h"
 
 namespace dtr::calib {
 namespace {
@@ -87,7 +88,7 @@ Check TestTilt(const JudgedCalibration& calibration, const Rig& fitted, double m
 
 Check TestRepeats(const JudgedCalibration& calibration, double sigma_px) {
   Check check{"repeated_views", 0, 0, true, ""};
-  const double nearest = kRepeatSigmas * std::sqrt(2.0) * sigma_px;  // per coordinate
+  const double nearest = kRepeatSigmas * std::sqrt(2.0 * VarianceOf(sigma_px));  // per coordinate
   const auto& views = calibration.kept;
   for (size_t i = 0; i < views.size(); ++i) {
     for (size_t j = 0; j < i; ++j) {

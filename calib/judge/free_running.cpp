@@ -9,6 +9,7 @@
 
 #include "calib/judge/patterns.h"
 #include "calib/lens_map.h"
+#include "calib/precision.h"
 #include "calib/solve/least_squares.h"
 #include "calib/solve/rig_start.h"
 #include "dtr/base/error.h"
@@ -294,8 +295,8 @@ void WidenByDelays(const Path& path, const Delays& delays, const std::vector<boo
   const double freedom = solution.freedom - static_cast<double>(count);
   solution.sigma_px *= std::sqrt(solution.freedom / freedom);
   solution.freedom = freedom;
-  solution.covariance = solution.sigma_px * solution.sigma_px *
-                        information.lens_covariance().topLeftCorner(shared, shared);
+  solution.covariance =
+      VarianceOf(solution.sigma_px) * information.lens_covariance().topLeftCorner(shared, shared);
 }
 
 }  // namespace

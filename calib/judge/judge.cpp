@@ -11,6 +11,7 @@
 #include "calib/judge/fresh_solve.h"
 #include "calib/judge/pattern_checks.h"
 #include "calib/judge/residuals.h"
+#include "calib/precision.h"
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
 
@@ -172,7 +173,8 @@ class Judging {
       const double promised = kept_.solution    ? kept_.solution->sigma_px
                               : fresh_.solution ? fresh_.solution->sigma_px
                                                 : kNaN;
-      Add(AtMost(ratio_name, SigmaOf(judged, frames) / promised, limits_.max_rms_ratio,
+      Add(AtMost(ratio_name, SigmaOf(judged, frames) / std::max(promised, kPrecisionPx),
+                 limits_.max_rms_ratio,
                  fmt::format("scatter per coordinate over the {:.4f} px that the solve promises",
                              promised)));
     }
@@ -183,7 +185,7 @@ class Judging {
   }
 
   void TestRegions() {
-    double worst = 0;
+    double worst = -1;
     std::string where = "no region has enough corners";
     for (const JudgedCamera& camera : report_.cameras) {
       std::vector<double> rms;
@@ -195,15 +197,17 @@ class Judging {
       const double typical = rms[rms.size() / 2];
       for (size_t i = 0; i < camera.regions.size(); ++i) {
         const ResidualStats& region = camera.regions[i];
-        if (region.count < kFewestInRegion || !(region.rms_px / typical > worst)) continue;
-        worst = region.rms_px / typical;
+        // No region is out of line by what misleads nobody.
+        const double ratio = region.rms_px / std::max(typical, kLeastOutlierSigmaPx);
+        if (region.count < kFewestInRegion || !(ratio > worst)) continue;
+        worst = ratio;
         where = fmt::format(
             "{}: row {}, column {} of 3 x 3 has RMS {:.3f} px, the median region "
             "{:.3f} px",
             camera.name, i / kRegionsPerAxis + 1, i % kRegionsPerAxis + 1, region.rms_px, typical);
       }
     }
-    Add(AtMost("worst_region_ratio", worst > 0 ? worst : kNaN, limits_.max_region_ratio, where));
+    Add(AtMost("worst_region_ratio", worst >= 0 ? worst : kNaN, limits_.max_region_ratio, where));
   }
 
   // What the stored calibration is held against: a solve of the views that made it, which must be

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "calib/distributions.h"
+#include "calib/precision.h"
 #include "calib/residual_patterns.h"
 
 namespace dtr::calib {
@@ -114,7 +115,8 @@ PatternTest TestSharedPattern(const RigSolution& solution, const PatternColumns&
   const Eigen::MatrixXd inverse =
       (lengths.cwiseInverse().asDiagonal() * (own.transpose() * own).inverse().eval() *
        lengths.cwiseInverse().asDiagonal());
-  const double variance = left / std::max(1.0, solution.freedom - static_cast<double>(felt_count));
+  const double variance = VarianceOf(
+      RootOfVariance(left / std::max(1.0, solution.freedom - static_cast<double>(felt_count))));
   const std::vector<double> untold(static_cast<size_t>(count),
                                    std::numeric_limits<double>::quiet_NaN());
   test.coefficients = test.sigmas = test.effects_px = untold;

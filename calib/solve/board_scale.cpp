@@ -12,6 +12,7 @@
 #include <optional>
 
 #include "calib/distributions.h"
+#include "calib/precision.h"
 #include "calib/solve/board_solve.h"
 #include "calib/solve/board_start.h"
 #include "calib/solve/least_squares.h"
@@ -251,7 +252,7 @@ double SigmaOf(const Problem& problem, const Similarity& scene_from_board) {
 
 // Drops corners that are off, and views of which most are. False when nothing changed.
 bool DropOutliers(const Similarity& scene_from_board, Problem& problem) {
-  const double limit = kOutlierSigmas * SigmaOf(problem, scene_from_board);
+  const double limit = OutlierLimitPx(kOutlierSigmas, SigmaOf(problem, scene_from_board));
   bool changed = false;
   std::vector<size_t> all(problem.seen.size(), 0), kept(problem.seen.size(), 0);
   for (Corner& corner : problem.corners) {
@@ -321,7 +322,7 @@ void Describe(const Problem& problem, const Matrix7& normal, BoardScale& scale) 
   }
   scale.rms_px = std::sqrt(squares / scale.corners);
   const double sigma_px = std::sqrt(squares / (2.0 * scale.corners - 7));
-  const Matrix7 covariance = sigma_px * sigma_px * normal.inverse();
+  const Matrix7 covariance = VarianceOf(sigma_px) * normal.inverse();
   scale.relative_sigma =
       std::max(RootOfVariance(covariance(0, 0)), Jackknife(problem, scale.scene_from_board));
   if (!(scale.relative_sigma <= kMostRelativeSigma)) {

@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "calib/models/lens_formula.h"
+#include "calib/precision.h"
 #include "calib/solve/board_start.h"
 #include "calib/solve/least_squares.h"
 #include "calib/solve/reprojection.h"
@@ -85,9 +86,7 @@ void Minimise(const Board& board, BoardModel model, std::optional<double> cauchy
                                SigmaOfUsed(Lengths(board, state), state.used))) {
     problem.AddResidualBlock(prior.release(), nullptr, theta.data());
   }
-  ceres::Solver::Summary summary;
-  ceres::Solve(options, &problem, &summary);
-  if (!summary.IsSolutionUsable()) Refuse("the corners have no least-squares solution");
+  if (!Solve(options, state.camera, &problem)) Refuse("the corners have no least-squares solution");
   std::vector<double> params;
   for (int k = 0; k < FreeParameterCount(model); ++k) {
     const auto i = static_cast<size_t>(k);
@@ -170,12 +169,12 @@ void SolveRobustly(const Board& board, BoardModel model, double outlier_sigmas, 
     scale = next;
     if (settled && !repaired) break;
   }
-  state.used = Within(Lengths(board, state), outlier_sigmas * scale / kCauchySigmas);
+  state.used = Within(Lengths(board, state), OutlierLimitPx(outlier_sigmas, scale / kCauchySigmas));
   TakeOutDisagreeing(state, left_out);
   for (int pass = 0; pass < kMostOutlierPasses; ++pass) {
     Minimise(board, model, {}, state);
     const auto lengths = Lengths(board, state);
-    Used used = Within(lengths, outlier_sigmas * ScatterOfUsed(lengths, state.used));
+    Used used = Within(lengths, OutlierLimitPx(outlier_sigmas, ScatterOfUsed(lengths, state.used)));
     if (used == state.used) break;
     state.used = std::move(used);
     TakeOutDisagreeing(state, left_out);
@@ -342,8 +341,7 @@ BoardSolution SolveBoard(const Board& board, std::span<const BoardView> views, i
   solution.camera = state.camera;
   Describe(board, state, solution);
   solution.information = InformationOf(board, model, state);
-  solution.covariance =
-      solution.sigma_px * solution.sigma_px * solution.information.lens_covariance();
+  solution.covariance = VarianceOf(solution.sigma_px) * solution.information.lens_covariance();
   RefuseUseless(solution, options.cover_image);
   return solution;
 }
@@ -370,9 +368,7 @@ std::optional<Pose> SolvePose(const Board& board, const BoardView& view, const L
   if (problem.NumResidualBlocks() < static_cast<int>(kFewestCorners)) return std::nullopt;
   ceres::Solver::Options options = SolverOptions();
   options.linear_solver_type = ceres::DENSE_QR;
-  ceres::Solver::Summary summary;
-  ceres::Solve(options, &problem, &summary);
-  if (!summary.IsSolutionUsable()) return std::nullopt;
+  if (!Solve(options, camera, &problem)) return std::nullopt;
   return PoseAt(pose, motion.data(), pivot);
 }
 

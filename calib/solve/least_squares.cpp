@@ -1,12 +1,12 @@
 #include "calib/solve/least_squares.h"
 
-#include <glog/logging.h>
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
+#include "calib/precision.h"
 #include "calib/solve/board_start.h"
+#include "calib/solve/solver_ends.h"
 #include "dtr/base/error.h"
 
 namespace dtr::calib {
@@ -14,22 +14,27 @@ namespace dtr::calib {
 void Refuse(const std::string& what) { throw Error("calibration: " + what); }
 
 ceres::Solver::Options SolverOptions() {
-  // Ceres tells stderr of every step that fails; the next one is shorter, and the end is judged
-  // by the caller. The level belongs to the process: it is set once, before any thread of ours
-  // reads it.
-  [[maybe_unused]] static const bool quiet = [] {
-    FLAGS_minloglevel = google::GLOG_ERROR;
-    return true;
-  }();
-  ceres::Solver::Options options;
+  ceres::Solver::Options options = SilentOptions();
   options.linear_solver_type = ceres::DENSE_SCHUR;
-  options.num_threads = 1;  // sums in one order: the same bits every time
   options.max_num_iterations = 200;
   options.function_tolerance = 1e-12;
   options.parameter_tolerance = 1e-10;
   options.gradient_tolerance = 1e-12;
-  options.logging_type = ceres::SILENT;
   return options;
+}
+
+bool Solve(ceres::Solver::Options options, const LensCamera& camera, ceres::Problem* problem) {
+  const SilentProgress nobody;
+  const double largest_px = std::max(camera.width_px, camera.height_px);
+  SolverEnds ends(nobody, static_cast<size_t>(problem->NumResiduals()), largest_px);
+  options.callbacks.push_back(&ends);
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, problem, &summary);
+  return summary.IsSolutionUsable();
+}
+
+double OutlierLimitPx(double outlier_sigmas, double sigma_px) {
+  return outlier_sigmas * std::max(sigma_px, kLeastOutlierSigmaPx);
 }
 
 Used Within(const std::vector<std::vector<double>>& lengths_px, double limit_px) {

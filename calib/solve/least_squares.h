@@ -5,22 +5,29 @@
 #include <string>
 #include <vector>
 
-#include "dtr/types/pose.h"
+#include "calib/lens_camera.h"
 
 namespace dtr::calib {
 
 /// Throws Error: "calibration: " and what is missing.
 [[noreturn]] void Refuse(const std::string& what);
 
-/// Levenberg-Marquardt to the last digits, one thread, silent: the same bits every time.
+/// Levenberg-Marquardt to the last digits, silent: the same bits every time.
 ceres::Solver::Options SolverOptions();
+
+/// Solves until nothing is gained, or rounding hides it (SolverEnds); observations are pixels of
+/// images like this camera's. False where there is no usable solution.
+bool Solve(ceres::Solver::Options options, const LensCamera& camera, ceres::Problem* problem);
 
 constexpr double kCauchySigmas = 3;        // scale of the robust loss
 constexpr double kSameScale = 0.05;        // relative change at which the robust loss is settled
-constexpr double kSmallestSigmaPx = 1e-7;  // exact corners are no reason to call rounding outliers
+constexpr double kSmallestSigmaPx = 1e-7;  // that the loss is scaled by, where corners are exact
 constexpr int kMostRobustPasses = 6, kMostOutlierPasses = 10;
 
 using Used = std::vector<std::vector<bool>>;  // per view, per corner
+
+/// Farther from its prediction than this, a corner is an outlier.
+double OutlierLimitPx(double outlier_sigmas, double sigma_px);
 
 /// Corners nearer than `limit_px` to their predictions.
 Used Within(const std::vector<std::vector<double>>& lengths_px, double limit_px);

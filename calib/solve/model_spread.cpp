@@ -66,9 +66,7 @@ std::optional<Pose> OtherFromOwn(const Board& board, std::span<const BoardView> 
   }
   ceres::Solver::Options options = SolverOptions();
   options.linear_solver_type = ceres::DENSE_QR;
-  ceres::Solver::Summary summary;
-  ceres::Solve(options, &problem, &summary);
-  if (!summary.IsSolutionUsable()) return std::nullopt;
+  if (!Solve(options, other, &problem)) return std::nullopt;
   return PoseAt(pose, motion.data(), middle);
 }
 

@@ -1,8 +1,18 @@
 #include "calib/solve/rig.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 
 namespace dtr::calib {
+
+const LensCamera& LargestImage(const Rig& rig) {
+  const auto side = [](const RigCamera& c) {
+    return std::max(c.camera.width_px, c.camera.height_px);
+  };
+  return std::max_element(rig.cameras.begin(), rig.cameras.end(),
+                          [&](const auto& a, const auto& b) { return side(a) < side(b); })
+      ->camera;
+}
 
 RigLayout::RigLayout(const std::vector<RigCamera>& cameras, bool free_lenses)
     : free_lenses_(free_lenses) {

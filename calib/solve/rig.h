@@ -33,6 +33,9 @@ struct Rig {
   std::vector<RigView> views;        ///< rising frame, then camera; each pair once
 };
 
+/// The camera whose images have the longest side.
+const LensCamera& LargestImage(const Rig& rig);
+
 /// Which unknowns all frames share, and where each stands in their vector: per camera the
 /// parameters of the lens (unless they are given), then for every camera but the first its place,
 /// (w, v): cam_from_rig' = (exp(w) R, t + v), w in radians, v in the unit of the board.

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "calib/models/lens_formula.h"
+#include "calib/precision.h"
 #include "calib/solve/board_start.h"
 #include "calib/solve/least_squares.h"
 #include "calib/solve/reprojection.h"
@@ -174,9 +175,9 @@ void Minimise(const Board& board, bool free_lenses, std::optional<double> cauchy
     if (!free_lenses) problem.SetParameterBlockConstant(u.thetas[c].data());
     if (c == 0) problem.SetParameterBlockConstant(u.place_motions[c].data());
   }
-  ceres::Solver::Summary summary;
-  ceres::Solve(options, &problem, &summary);
-  if (!summary.IsSolutionUsable()) Refuse("the corners of the rig have no least-squares solution");
+  if (!Solve(options, LargestImage(rig), &problem)) {
+    Refuse("the corners of the rig have no least-squares solution");
+  }
   TakeOver(board, u, rig);
 }
 
@@ -258,7 +259,7 @@ bool NameOutliers(const Board& board, double outlier_sigmas, SigmaOf sigma_of, R
   Used used = before;
   for (size_t v = 0; v < lengths.size(); ++v) {
     for (size_t j = 0; j < lengths[v].size(); ++j) {
-      used[v][j] = lengths[v][j] < outlier_sigmas * sigmas[rig.views[v].camera];
+      used[v][j] = lengths[v][j] < OutlierLimitPx(outlier_sigmas, sigmas[rig.views[v].camera]);
     }
   }
   SetUsed(used, rig);
@@ -340,8 +341,7 @@ void Describe(const Board& board, RigSolution& solution) {
   }
   solution.rms_px = std::sqrt(sum / solution.corners);
   solution.sigma_px = std::sqrt(sum / solution.freedom);
-  solution.covariance =
-      solution.sigma_px * solution.sigma_px * solution.information.lens_covariance();
+  solution.covariance = VarianceOf(solution.sigma_px) * solution.information.lens_covariance();
 }
 
 std::vector<BoardView> ViewsOf(const std::vector<RigView>& views, size_t camera,
@@ -405,9 +405,7 @@ void MinimiseFrame(const Board& board, const std::vector<size_t>& views, const U
   if (problem.NumResidualBlocks() < static_cast<int>(kFewestCorners)) return;
   ceres::Solver::Options options = SolverOptions();
   options.linear_solver_type = ceres::DENSE_QR;
-  ceres::Solver::Summary summary;
-  ceres::Solve(options, &problem, &summary);
-  if (summary.IsSolutionUsable()) {
+  if (Solve(options, LargestImage(rig), &problem)) {
     rig.rig_from_board[frame] = PoseAt(pose, motion.data(), pivot);
   }
 }

@@ -26,7 +26,7 @@ void SayRefined(const calib::Refined& refined, Console& console) {
         fmt::format("{:<26} unseen points: {:.4f} px", candidate.name, candidate.held_out_px));
   }
   if (refined.held_out_sights > 0) {
-    console.Say(fmt::format("{} held-out sights: as given {:.4f} px, adjusted {:.4f} px",
+    console.Say(fmt::format("{} held-out observations: as given {:.4f} px, adjusted {:.4f} px",
                             refined.held_out_sights, refined.given_px, refined.adjusted_px));
   }
   if (!refined.changed) {

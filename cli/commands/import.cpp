@@ -148,9 +148,9 @@ Json ResultJson(const Options& options, const pipeline::CamerasFromFile& cameras
 
 int RunImport(Options options, const Context& context) {
   pipeline::KeptNotes progress(context.console);
-  auto cameras = pipeline::ReadCameraFile(
-      options.cameras, options.format,
-      {options.import.images_dir, options.import.depth_dir, options.allow_missing});
+  auto cameras = pipeline::ReadCameraFile(options.cameras, options.format,
+                                          {options.import.images_dir, options.import.depth_dir,
+                                           options.import.mask_dir, options.allow_missing});
   for (const std::string& note : cameras.notes) progress.Note(note);
   FindMasks(options, cameras, progress);
   if (options.depth_kind == "z") options.import.depth_kind = DepthKind::kPlaneZ;

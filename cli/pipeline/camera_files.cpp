@@ -82,6 +82,7 @@ CamerasFromFile FromColmap(const fs::path& folder, const CameraFileFolders& fold
   calib::SfmModel model = colmap::ReadModel(model_folder);
   CamerasFromFile cameras;
   const size_t all = model.images.size();
+  for (calib::SfmImage& image : model.images) image.name = NameBelow(folders.images, image.name);
   std::erase_if(model.images, [&](const calib::SfmImage& image) {
     if (HasPhoto(image.name, folders)) return false;
     cameras.skipped.emplace_back(image.name,
@@ -119,11 +120,20 @@ CamerasFromFile FromTransforms(const fs::path& file, const CameraFileFolders& fo
   paths.image_of = [&](const std::string& path) { return FindImage(folders.images, path); };
   const fs::path depth_dir = folders.depth.empty() ? folders.images : folders.depth;
   paths.depth_of = [&](const std::string& path) { return NameBelow(depth_dir, path); };
-  paths.mask_of = [&](const std::string& path) { return NameBelow(folders.images, path); };
+  // Below the photos, or beside them: programs write paths from where the file lies.
+  std::vector<fs::path> mask_dirs = {folders.images, file.parent_path()};
+  if (!folders.masks.empty()) mask_dirs = {folders.masks};
+  paths.mask_of = [&](const std::string& path) {
+    const auto holds = [&](const fs::path& dir) { return IsFile(dir / NameBelow(dir, path)); };
+    const auto found = std::find_if(mask_dirs.begin(), mask_dirs.end(), holds);
+    // All masks of a set lie below one folder: the first one found says which.
+    if (found != mask_dirs.end()) mask_dirs = {fs::path(*found)};
+    return NameBelow(mask_dirs.front(), path);
+  };
   io::TransformsFile read = io::ReadTransformsJson(file, paths);
   CamerasFromFile cameras;
   cameras.list = std::move(read.list);
-  cameras.mask_dir = folders.images;
+  cameras.mask_dir = mask_dirs.front().empty() ? fs::path(".") : mask_dirs.front();
   cameras.held_out = std::move(read.held_out);
   cameras.depth_unit = read.depth_unit;
   cameras.points_file = read.points_file;
@@ -141,6 +151,9 @@ CamerasFromFile FromCamerasJson(const fs::path& file, const CameraFileFolders& f
   CamerasFromFile cameras;
   cameras.list = io::ReadCamerasJson(file);
   const size_t all = cameras.list.cameras.size();
+  for (io::NamedCamera& named : cameras.list.cameras) {
+    named.name = NameBelow(folders.images, named.name);
+  }
   std::erase_if(cameras.list.cameras, [&](const io::NamedCamera& named) {
     if (HasPhoto(named.name, folders)) return false;
     cameras.skipped.emplace_back(named.name,

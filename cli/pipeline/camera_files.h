@@ -29,7 +29,8 @@ struct CamerasFromFile {
 /// Where files that a camera file names lie.
 struct CameraFileFolders {
   std::filesystem::path images, depth;
-  bool allow_missing = false;  ///< cameras without a photo are left out
+  std::filesystem::path masks;  ///< empty: where the file's names of masks lead, of images or file
+  bool allow_missing = false;   ///< cameras without a photo are left out
 };
 
 /// Names that ReadCameraFile takes as `format`.

@@ -13,6 +13,7 @@
 #include "capture/sfm_images.h"
 #include "cli/pipeline/camera_distortion.h"
 #include "cli/pipeline/named_files.h"
+#include "cli/pipeline/names_of_photos.h"
 #include "dtr/base/error.h"
 #include "dtr/io/formats/cameras_json.h"
 #include "dtr/io/formats/file_names.h"
@@ -35,35 +36,6 @@ void AddImage(calib::SfmImage image, const calib::LensCamera& camera, calib::Sfm
       model.images.begin(), model.images.end(), image.name,
       [](const calib::SfmImage& other, const std::string& name) { return other.name < name; });
   model.images.insert(place, std::move(image));
-}
-
-bool EndsWithPath(const std::string& name, const std::string& end) {
-  return name.size() > end.size() && name.ends_with(end) &&
-         name[name.size() - end.size() - 1] == '/';
-}
-
-// Programs name photos below another folder than ours, as COLMAP does below images/ of a project:
-// a name that is no photo's becomes that of the one photo which it ends, or which ends it.
-void NameAsPhotos(const capture::Capture& capture, const std::vector<std::string*>& names) {
-  std::map<std::string, int> claims;  // by photo
-  for (const capture::Photo& photo : capture.photos) claims[photo.name] = 0;
-  std::vector<std::pair<std::string*, std::string>> renamed;
-  for (std::string* name : names) {
-    if (const auto same = claims.find(*name); same != claims.end()) {
-      ++same->second;
-      continue;
-    }
-    std::vector<std::string> meant;
-    for (const auto& [photo, count] : claims) {
-      if (EndsWithPath(photo, *name) || EndsWithPath(*name, photo)) meant.push_back(photo);
-    }
-    if (meant.size() != 1) continue;
-    ++claims[meant.front()];
-    renamed.emplace_back(name, meant.front());
-  }
-  for (const auto& [name, photo] : renamed) {
-    if (claims[photo] == 1) *name = photo;
-  }
 }
 
 void RequireSharedNames(size_t found, const fs::path& poses, const std::string& first_of_file,
@@ -150,14 +122,9 @@ CalibratedPhotos Triangulated(const Given& given, const capture::Capture& captur
 
 CalibratedPhotos FromColmapModel(const capture::Capture& capture, const CalibrateOptions& options,
                                  const fs::path& workspace, Progress& progress) {
-  calib::SfmModel model = colmap::ReadModel(colmap::ModelFolderIn(options.poses));
+  calib::SfmModel model = ReadModelOf(capture, options.poses);
   Given given;
   given.first = model.images.empty() ? "" : model.images.front().name;
-  std::vector<std::string*> names;
-  for (calib::SfmImage& image : model.images) names.push_back(&image.name);
-  NameAsPhotos(capture, names);
-  std::sort(model.images.begin(), model.images.end(),
-            [](const auto& a, const auto& b) { return a.name < b.name; });
   std::erase_if(model.images, [&](const calib::SfmImage& image) {
     return std::none_of(capture.photos.begin(), capture.photos.end(),
                         [&](const capture::Photo& photo) { return photo.name == image.name; });
@@ -201,11 +168,15 @@ const io::SizedImage* PhotoMeant(const std::vector<io::SizedImage>& images, cons
   const std::vector<std::string> names = NamesMeant(folder, path);
   for (const bool with_extension : {true, false}) {
     for (const std::string& name : names) {
-      const auto found = std::find_if(images.begin(), images.end(), [&](const auto& image) {
+      const auto is_meant = [&](const io::SizedImage& image) {
         return with_extension ? image.name == name
                               : fs::path(image.name).replace_extension() == fs::path(name);
-      });
-      if (found != images.end()) return &*found;
+      };
+      const auto found = std::find_if(images.begin(), images.end(), is_meant);
+      if (found == images.end()) continue;
+      // Of several images called so, none is meant (FindImage does the same).
+      if (std::any_of(found + 1, images.end(), is_meant)) return nullptr;
+      return &*found;
     }
   }
   return nullptr;
@@ -259,9 +230,7 @@ PosesFile ReadPoses(const capture::Capture& capture, const fs::path& poses) {
   if (poses.extension() == ".json") {
     if (io::IsTransformsJson(poses)) return FromTransforms(images, capture, poses);
     PosesFile file{io::ReadCamerasJson(poses), {}};
-    std::vector<std::string*> names;
-    for (io::NamedCamera& camera : file.list.cameras) names.push_back(&camera.name);
-    NameAsPhotos(capture, names);
+    NameAsPhotos(capture, file.list);
     return file;
   }
   if (poses.extension() == ".npy") return {io::ReadLlff(poses, std::move(images)).list, {}};

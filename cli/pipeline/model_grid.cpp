@@ -8,6 +8,7 @@
 
 #include "calib/colmap/model_io.h"
 #include "cli/pipeline/known_poses.h"
+#include "cli/pipeline/names_of_photos.h"
 #include "dtr/base/files.h"
 
 namespace dtr::pipeline {
@@ -27,7 +28,7 @@ CameraSizes SizesOf(const fs::path& poses, const capture::Capture& photos) {
   CameraSizes sizes;
   if (fs::is_directory(poses)) {
     const fs::path folder = colmap::ModelFolderIn(poses);
-    const calib::SfmModel model = colmap::ReadModel(folder);
+    const calib::SfmModel model = ReadModelOf(photos, poses);
     for (const calib::SfmImage& image : model.images) {
       const calib::LensCamera& camera = model.cameras.at(image.camera_id);
       sizes.by_name[image.name] = {camera.width_px, camera.height_px};

@@ -56,11 +56,7 @@ std::optional<BenchComparison> Compare(const std::vector<BenchRow>& rows, bool g
       return gpu_clock ? row.frame.median_ms : row.cpu.median_ms;
     };
     best->ratio_two_pass_over_deferred = time(two_pass) / time(deferred);
-    if (two_pass.psnr_db && deferred.psnr_db) {
-      // Both infinite: both equal the photos.
-      best->loss_db =
-          *two_pass.psnr_db == *deferred.psnr_db ? 0 : *two_pass.psnr_db - *deferred.psnr_db;
-    }
+    best->loss_db = LossDb(two_pass.psnr_db, deferred.psnr_db);
   }
   return best;
 }
@@ -95,6 +91,12 @@ void Describe(const std::vector<Place>& places, const BenchOptions& options, Ben
 }
 
 }  // namespace
+
+std::optional<double> LossDb(const std::optional<double>& of_db,
+                             const std::optional<double>& against_db) {
+  if (!of_db || !against_db) return std::nullopt;
+  return *of_db == *against_db ? 0 : *of_db - *against_db;
+}
 
 BenchReport MeasureReportTable(const DtrSet& set, const BenchOptions& options,
                                TimedRenderer& renderer, Progress& progress) {

@@ -42,6 +42,10 @@ struct BenchRow {
   }
 };
 
+/// PSNR of one less that of another, 0 where both are infinite: both equal the photos.
+std::optional<double> LossDb(const std::optional<double>& of_db,
+                             const std::optional<double>& against_db);
+
 /// The two methods under equal conditions: the row pair of the finest resolution with the number of
 /// views nearest to the default.
 struct BenchComparison {

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "dtr/eval/metrics.h"
 #include "dtr/render/option_names.h"
 
 namespace dtr::eval {
@@ -41,6 +42,8 @@ Json Value(const BenchRow& row, int views_in_set) {
           {"whole_cpu_ms", row.whole_cpu_ms()},
           {"psnr_db", Number(row.psnr_db)},
           {"psnr_covered_db", Number(row.psnr_covered_db)},
+          {"identical",
+           IdenticalFigures({{"psnr_db", row.psnr_db}, {"psnr_covered_db", row.psnr_covered_db}})},
           {"coverage", row.coverage}};
 }
 

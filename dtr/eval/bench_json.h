@@ -21,13 +21,13 @@ struct BenchMachine {
 /// {table,views_in_set,width_px,height_px,repeats,left_out,cameras,
 ///  rows:[{method,blend,views_in_set,views_used,resolution,ms,spread_ms,fps,cpu_ms,cpu_spread_ms,
 ///         read_back_ms,read_back_cpu_ms,fill_ms,fill_cpu_ms,whole_ms,whole_cpu_ms,psnr_db,
-///         psnr_covered_db,coverage}],
+///         psnr_covered_db,identical:[...],coverage}],
 ///  ends:[{resolution,views_used,views_asked,reason}] (why there are no more rows: "memory" or
 ///  "valid views"),
 ///  ratio_two_pass_over_deferred,loss_db,compared_at:{views_used,resolution},
 ///  machine:{cpu,cores,renderer,version,clock}}.
 /// Spreads are interquartile ranges. What is not defined (no row pair, no pixel to compare) is
-/// null.
+/// null, and so is an infinite PSNR (all pixels equal), which "identical" names.
 std::string ToJson(const std::string& table, const BenchReport& report,
                    const BenchMachine& machine);
 

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "dtr/eval/metrics.h"
+
 namespace dtr::eval {
 namespace {
 
@@ -17,6 +19,9 @@ Json Value(const ViewScore& score) {
           {"psnr_db", Number(score.psnr_db)},
           {"psnr_covered_db", Number(score.psnr_covered_db)},
           {"psnr_own_depth_db", Number(score.psnr_own_depth_db)},
+          {"identical", IdenticalFigures({{"psnr_db", score.psnr_db},
+                                          {"psnr_covered_db", score.psnr_covered_db},
+                                          {"psnr_own_depth_db", score.psnr_own_depth_db}})},
           {"ssim", Number(score.ssim)},
           {"coverage", Number(score.coverage)},
           {"views_used", score.views_used},

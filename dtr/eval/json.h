@@ -10,12 +10,13 @@
 
 namespace dtr::eval {
 
-/// {"views":[{name,psnr_db,psnr_covered_db,psnr_own_depth_db,ssim,coverage,views_used,render_ms}],
+/// {"views":[{name,psnr_db,psnr_covered_db,psnr_own_depth_db,identical:[...],ssim,coverage,views_used,
+///    render_ms}],
 ///  "mean":{the same},"not_registered":count,"not_registered_names":[...],"leave_one_out":bool,
 ///  "depth":{...}}.
-/// A figure that is not defined (no pixel to compare) or infinite (all pixels equal) is null; a
-/// mean is over the views where the figure is defined, and infinite if one of them is. "depth" only
-/// where given.
+/// A figure that is not defined (no pixel to compare) or infinite (all pixels equal) is null;
+/// "identical" names the infinite ones. A mean is over the views where the figure is defined, and
+/// infinite if one of them is. "depth" only where given.
 std::string ToJson(const EvaluationReport& report,
                    const std::optional<DepthScores>& depth = std::nullopt);
 

@@ -104,6 +104,15 @@ std::optional<double> Psnr(const ImageRgb8& image, const ImageRgb8& reference, c
   return 10 * std::log10(kPeak * kPeak * static_cast<double>(error.samples) / error.sum);
 }
 
+std::vector<std::string> IdenticalFigures(
+    std::initializer_list<std::pair<const char*, std::optional<double>>> psnrs_db) {
+  std::vector<std::string> names;
+  for (const auto& [name, value] : psnrs_db) {
+    if (value && std::isinf(*value)) names.emplace_back(name);
+  }
+  return names;
+}
+
 std::optional<double> Ssim(const ImageRgb8& image, const ImageRgb8& reference, const Mask& mask,
                            int threads) {
   RequireSameSize(image, reference, mask);

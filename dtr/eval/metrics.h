@@ -1,6 +1,10 @@
 // dtr/eval/metrics.h -- how far a rendering is from a photo. DESIGN: "What the numbers mean".
 #pragma once
+#include <initializer_list>
 #include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "dtr/types/grid.h"
 
@@ -20,6 +24,11 @@ SquaredError CompareSquared(const ImageRgb8& image, const ImageRgb8& reference, 
 /// Infinite for identical pixels (JSON shows it as null), empty when `mask`
 /// leaves no pixel. Sizes as for CompareSquared.
 std::optional<double> Psnr(const ImageRgb8& image, const ImageRgb8& reference, const Mask& mask);
+
+/// Names of those that are infinite. Programs that read JSON tell by it "all pixels are equal" from
+/// "no pixel to compare", as both are null there.
+std::vector<std::string> IdenticalFigures(
+    std::initializer_list<std::pair<const char*, std::optional<double>>> psnrs_db);
 
 /// Structural similarity: mean over windows and over the three channels of the SSIM index with an
 /// 11x11 Gaussian window of sigma 1.5, K1 = 0.01, K2 = 0.03, L = 255 (Wang, Bovik, Sheikh,

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <string_view>
 
 #include "dtr/base/error.h"
@@ -129,7 +130,8 @@ void Alpha::StraightenAs(std::vector<T>& values, int channels, float most) const
         values[c] =
             static_cast<T>(std::lround(std::min(most, static_cast<float>(values[c]) / alpha)));
       } else {
-        values[c] /= alpha;
+        constexpr T kMost = std::numeric_limits<T>::max();
+        values[c] = std::clamp(values[c] / alpha, -kMost, kMost);
       }
     }
   }

@@ -10,6 +10,7 @@ namespace {
 
 constexpr double kReferenceWhite = 203;                   // cd/m2, ITU-R BT.2408
 constexpr double kHlgPeak = 1000, kHlgSystemGamma = 1.2;  // ITU-R BT.2100's nominal display
+constexpr float kLargestLight = 1e30F;                    // products with matrices stay finite
 constexpr float kKnee = 0.8F;                             // of reference white
 constexpr size_t kNumbers = 65536;
 
@@ -168,6 +169,8 @@ SrgbConverter::SrgbConverter(const ColourCoding& coding) : coding_(coding), ligh
 
 void SrgbConverter::Finish(Eigen::Vector3f light, std::uint8_t* srgb) const {
   static const Codes kCodes;
+  // Within what the products below can hold: infinity less infinity would be no number.
+  light = light.cwiseMin(kLargestLight).cwiseMax(-kLargestLight);
   light = (srgb_from_coded_ * light).cwiseMax(0);
   if (IsHdr(coding_)) {
     const float largest = light.maxCoeff();

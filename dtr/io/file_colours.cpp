@@ -62,6 +62,7 @@ PngChunks ReadPngChunks(Bytes& file) {
   PngChunks chunks;
   for (std::uint64_t at = 8; at + 12 <= file.size();) {
     const std::string head = file.At(at, 8);
+    if (head.size() < 8) break;
     const std::uint64_t length = Big(head, 0, 4);
     const std::string name = head.substr(4);
     if (name == "IDAT" || name == "IEND") break;
@@ -108,6 +109,7 @@ FileColours PngColours(Bytes& file) {
 std::string WebpChunk(Bytes& file, std::string_view name) {
   for (std::uint64_t at = 12; at + 8 <= file.size();) {
     const std::string head = file.At(at, 8);
+    if (head.size() < 8) break;
     std::uint64_t length = 0;
     for (size_t i = 8; i-- > 4;) length = length << 8 | static_cast<unsigned char>(head[i]);
     if (head.starts_with(name)) return file.At(at + 8, length);

@@ -83,7 +83,7 @@ int ColourChannels(const ImageSpec& spec) { return spec.nchannels >= 3 ? 3 : 1; 
 Grid<std::uint8_t> ReadColours(OIIO::ImageInput& in, const fs::path& file, const Alpha& alpha) {
   const ImageSpec& spec = in.spec();
   const int channels = ColourChannels(spec);
-  const PhotoColours colours(spec, file);
+  const PhotoColours colours(spec, in.format_name(), file);
   Grid<std::uint8_t> pixels(spec.width, spec.height, channels);
   if (spec.format.basetype == TypeDesc::UINT8 && !colours.converts()) {
     ReadPixels(in, file, 0, channels, TypeDesc::UINT8, pixels.data().data());
@@ -193,7 +193,7 @@ ImageHeader ReadImageHeader(const fs::path& file) {
   header.lens_model = spec.get_string_attribute("Exif:LensModel");
   header.date_time = spec.get_string_attribute("Exif:DateTimeOriginal");
   header.gps = GpsOf(spec);
-  const PhotoColours colours(spec, file);
+  const PhotoColours colours(spec, in->format_name(), file);
   header.converted = colours.converts();
   header.remarks = colours.remarks();
   AddRemarks(*in, header);

@@ -223,13 +223,13 @@ void PhotoColours::Conversion::ByNumbers(const float* values, size_t pixels,
   by_numbers->Convert(numbers.data(), pixels, out);
 }
 
-PhotoColours::PhotoColours(const ImageSpec& spec, const fs::path& file) {
+PhotoColours::PhotoColours(const ImageSpec& spec, const std::string& format, const fs::path& file) {
   const FileColours stated = ReadFileColours(file);
   if (!stated.unsupported.empty()) {
     throw Error(fmt::format("{}: {} are not supported; export it as sRGB", file.string(),
                             stated.unsupported));
   }
-  const bool is_exr = !spec.channelnames.empty() && file.extension() == ".exr";
+  const bool is_exr = !spec.channelnames.empty() && format == "openexr";
   if (is_exr) RequireExrOfColours(spec, file);
   RequireTiffOfColours(spec, file);
   std::optional<ColourCoding> coding = stated.coding;

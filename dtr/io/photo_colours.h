@@ -13,8 +13,10 @@ namespace dtr::io {
 /// EXR's chromaticities, EXIF's Adobe RGB. Converts to 8-bit sRGB, in one or three channels.
 class PhotoColours {
  public:
-  /// Throws Error with one line where the file's colours or windows are not supported.
-  PhotoColours(const OIIO::ImageSpec& spec, const std::filesystem::path& file);
+  /// `format` as OpenImageIO names it, whatever the file is called. Throws Error with one line
+  /// where the file's colours or windows are not supported.
+  PhotoColours(const OIIO::ImageSpec& spec, const std::string& format,
+               const std::filesystem::path& file);
   ~PhotoColours();
 
   /// False where numbers are sRGB's already (or linear with sRGB's primaries, if they are floats).

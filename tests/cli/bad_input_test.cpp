@@ -114,9 +114,14 @@ TEST_F(BadInput, PhotosWithNothingInCommon) {
   colmap.LeaveDatabase({"000000.jpg", "000001.jpg", "000002.jpg", "000003.jpg", "000004.jpg",
                         "000005.jpg", "000006.jpg"});
   ExpectRefused(Build(Photos()), kFailed, "found that they have too little in common");
-  ExpectRefused(
-      Build(Photos(), {"--camera-per", "set", "--poses", Shared("courtyard/cameras.json")}),
-      kWrongUsage, "--camera-per: says which photos share intrinsics that SfM finds");
+  EXPECT_FALSE(fs::exists(In("set.dtr")));
+}
+
+TEST_F(BadInput, CameraGroupsOfKnownCameras) {
+  for (const char* known : {"--poses", "--rig"}) {
+    ExpectRefused(Build(Photos(), {"--camera-per", "set", known, Shared("courtyard/cameras.json")}),
+                  kWrongUsage, "--camera-per: says which photos share intrinsics that SfM finds");
+  }
   EXPECT_FALSE(fs::exists(In("set.dtr")));
 }
 

@@ -44,6 +44,54 @@ TEST_F(FieldScene, BuildTakesThemSoToo) {
   }
 }
 
+// A project's photos are images/NAME, those of its model NAME.
+TEST_F(FieldScene, SoDoesAProjectOfThem) {
+  const fs::path folder = Field("exif_turned_import"), project = folder_ / "project";
+  fs::create_directories(project);
+  fs::copy(folder / "images", project / "images");
+  const Ran ran = DtrOk({"build", project.string(), "--poses", (folder / "model").string(),
+                         "--engine", "none", "-o", Set()});
+  EXPECT_THAT(ran.err + ran.out, HasSubstr("taken as they are stored"));
+  const DtrSet set = io::LoadSet(Set());
+  ASSERT_EQ(set.frames[0].views.size(), 6u);
+  for (const View& view : set.frames[0].views) {
+    EXPECT_EQ(view.image, io::ReadImage(project / view.name)) << view.name;
+  }
+}
+
+// nerfstudio's layout: paths are from where the file lies, the photos' folder is given.
+TEST_F(FieldScene, MasksLieBelowThePhotosBesideThemOrWhereTheyAreSaidToLie) {
+  const fs::path project = folder_ / "project";
+  fs::create_directories(project / "masks");
+  fs::copy(Field("_scene") / "images", project / "images");
+  Json file = Json::parse(Text(Field("_scene") / "transforms_dist.json"));
+  for (Json& frame : file["frames"]) {
+    frame.erase("depth_file_path");
+    const std::string name = fs::path(std::string(frame["file_path"])).stem().string() + ".png";
+    frame["mask_path"] = "masks/" + name;
+    const auto photo = io::ReadImage(project / std::string(frame["file_path"]));
+    Grid<std::uint8_t> mask(photo.width(), photo.height(), 1, 255);
+    for (int x = 0; x < mask.width(); ++x) mask(x, 0) = 0;
+    io::WriteImage(project / "masks" / name, mask);
+  }
+  std::ofstream(project / "transforms.json") << file.dump();
+  const auto import = [&](std::vector<std::string> further) {
+    std::vector<std::string> args = {"import", "--cameras", (project / "transforms.json").string(),
+                                     "-o",     Set(),       "--force"};
+    args.insert(args.end(), further.begin(), further.end());
+    DtrOk(args);
+    for (const View& view : io::LoadSet(Set()).frames[0].views) {
+      ASSERT_FALSE(view.mask.empty()) << view.name;
+      EXPECT_EQ(view.mask(5, 0), 0);
+    }
+  };
+  const std::string images = (project / "images").string();
+  import({"--images", images});
+  import({"--images", project.string()});
+  import({"--images", images, "--masks", (project / "masks").string()});
+  import({"--images", images, "--masks", project.string()});
+}
+
 TEST_F(FieldScene, BackslashesInPathsAreSeparators) {
   DtrOk(Import(Field("_scene") / "transforms_backslash.json"));
   EXPECT_EQ(Result()["views"], 6);

@@ -241,6 +241,34 @@ TEST(MeasureGrowth, ThePerPixelRuleDrawsNoCopiesWithoutPixels) {
   EXPECT_THAT(listener.lines[0], ::testing::HasSubstr("per-pixel rule"));
 }
 
+// Photos of one level that the renderer hits have no error, and nothing of it is NaN.
+TEST(BenchJson, ImagesThatEqualThePhotosAreIdenticalAndLoseNothing) {
+  SilentProgress progress;
+  BenchOptions options;
+  options.repeats = 1;
+  options.views = {3};
+  options.resolutions = {1};
+  DtrSet set = Planes(9, true);
+  for (View& view : set.frames[0].views) std::ranges::fill(view.image.data(), std::uint8_t{102});
+  for (const int deferred_level : {102, 110}) {
+    Clockwork clockwork(false);
+    clockwork.deferred_level = static_cast<std::uint8_t>(deferred_level);
+    const BenchReport report = MeasureReportTable(set, options, clockwork, progress);
+    const auto json =
+        nlohmann::json::parse(ToJson("report", report, {"cpu", 2, "clockwork", "0.1.0", "wall"}));
+    EXPECT_TRUE(json["rows"][0]["psnr_db"].is_null());
+    EXPECT_THAT(json["rows"][0]["identical"], ElementsAre("psnr_db", "psnr_covered_db"));
+    if (deferred_level == 102) {
+      EXPECT_EQ(report.comparison->loss_db, 0);
+      EXPECT_EQ(json["loss_db"], 0);
+    } else {
+      EXPECT_TRUE(json["rows"][1]["identical"].empty());
+      EXPECT_TRUE(std::isinf(*report.comparison->loss_db));
+    }
+  }
+  EXPECT_FALSE(LossDb(std::nullopt, 30).has_value());
+}
+
 TEST(BenchJson, NamesAreTheInterface) {
   SilentProgress progress;
   BenchOptions options;

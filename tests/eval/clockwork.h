@@ -51,7 +51,8 @@ class Clockwork final : public TimedRenderer {
     const int used =
         std::min({options.views, static_cast<int>(scene.views.size()), room_for_views});
     drawn_ = RenderResult{};
-    drawn_.image = ImageRgb8(novel.width_px(), novel.height_px(), 3, deferred ? 110 : 102);
+    drawn_.image =
+        ImageRgb8(novel.width_px(), novel.height_px(), 3, deferred ? deferred_level : 102);
     drawn_.coverage = Mask(novel.width_px(), novel.height_px(), 1, 255);
     drawn_.depth = DepthImage(novel.width_px(), novel.height_px());
     for (int i = 0; i < used; ++i) drawn_.views_used.push_back(i);
@@ -65,6 +66,7 @@ class Clockwork final : public TimedRenderer {
   std::vector<RenderMethod> methods;
   std::set<BlendWeight> blends;
   std::vector<int> widths, views_in_scene;
+  std::uint8_t deferred_level = 110;
   int room_for_views = 1000;  ///< more are left out, as memory does
 
  private:

@@ -170,6 +170,8 @@ TEST(EvaluationJson, InfiniteAndUndefinedFiguresAreNull) {
   report.views.resize(1);
   report.views[0].psnr_db = std::numeric_limits<double>::infinity();
   const auto json = nlohmann::json::parse(ToJson(report));
+  EXPECT_EQ(json["views"][0]["identical"], nlohmann::json::array({"psnr_db"}));
+  EXPECT_EQ(json["mean"]["identical"], nlohmann::json::array());
   EXPECT_TRUE(json["views"][0]["psnr_db"].is_null());
   EXPECT_TRUE(json["views"][0]["psnr_covered_db"].is_null());
   EXPECT_TRUE(json["mean"]["ssim"].is_null());

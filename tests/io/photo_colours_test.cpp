@@ -261,6 +261,28 @@ TEST(PhotoColours, PrimariesOfExrAreApplied) {
   ExpectFlat(folder / "plain.exr", {188, 188, 188}, 0);
 }
 
+// The products of what a float can hold with a matrix may be infinite, their differences no number.
+TEST(PhotoColours, TheLargestFloatsAreBrightAndNoCrash) {
+  const TemporaryFolder folder;
+  const std::array<float, 8> aces{0.7347F, 0.2653F, 0.0F,     1.0F,
+                                  0.0001F, -0.077F, 0.32168F, 0.33767F};
+  for (const float value : {3.4e38F, -3.4e38F, 1e-39F}) {
+    ImageSpec spec(kW, kH, 3, TypeDesc::FLOAT);
+    spec.attribute("chromaticities", TypeDesc(TypeDesc::FLOAT, 8), aces.data());
+    WriteForeign(folder / "large.exr", spec, std::vector<float>(3 * kW * kH, value));
+    const int level = value > 1 ? 255 : 0;
+    ExpectFlat(folder / "large.exr", {level, level, level}, 0);
+  }
+  ImageSpec spec(kW, kH, 4, TypeDesc::FLOAT);  // premultiplied: colour / alpha is infinite
+  spec.channelnames = {"R", "G", "B", "A"};
+  spec.alpha_channel = 3;
+  spec.attribute("chromaticities", TypeDesc(TypeDesc::FLOAT, 8), aces.data());
+  std::vector<float> values;
+  for (int i = 0; i < kW * kH; ++i) values.insert(values.end(), {0.5F, 0.5F, 0.5F, 1e-39F});
+  WriteForeign(folder / "thin.exr", spec, values);
+  ExpectFlat(folder / "thin.exr", {255, 255, 255}, 0);
+}
+
 TEST(PhotoColours, WindowsAndChannelsOfExrThatAreNoPhotoAreAnError) {
   const TemporaryFolder folder;
   ImageSpec spec(kW, kH, 3, TypeDesc::HALF);
@@ -272,6 +294,9 @@ TEST(PhotoColours, WindowsAndChannelsOfExrThatAreNoPhotoAreAnError) {
     ImageSpec other(kW, kH, 3, TypeDesc::HALF);
     other.full_width = kW + larger;
     WriteForeign(folder / "window.exr", other, values);
+    fs::copy_file(folder / "window.exr", folder / "capital.EXR",
+                  fs::copy_options::overwrite_existing);
+    EXPECT_THROW(ReadImage(folder / "capital.EXR"), Error);
     for (const auto& read :
          {std::function<void()>([&] { ReadImage(folder / "window.exr"); }),
           std::function<void()>([&] { ReadImageHeader(folder / "window.exr"); })}) {
@@ -337,55 +362,27 @@ TEST(PhotoColours, LabTiffIsAnError) {
               HasSubstr("lab.tif: a TIFF of Lab colours is not supported"));
 }
 
-// A JPEG of one colour in `space`, coded as `coded`; luma sampled so often as the chroma.
-void WriteJpegAs(const fs::path& file, const std::vector<JSAMPLE>& pixel, J_COLOR_SPACE space,
-                 J_COLOR_SPACE coded, bool adobe, int across, int down) {
-  std::FILE* out = std::fopen(file.c_str(), "wb");
-  ASSERT_NE(out, nullptr);
-  jpeg_compress_struct jpeg{};
-  jpeg_error_mgr errors{};
-  jpeg.err = jpeg_std_error(&errors);
-  jpeg_create_compress(&jpeg);
-  jpeg_stdio_dest(&jpeg, out);
-  jpeg.image_width = kW;
-  jpeg.image_height = kH;
-  jpeg.input_components = static_cast<int>(pixel.size());
-  jpeg.in_color_space = space;
-  jpeg_set_defaults(&jpeg);
-  jpeg_set_colorspace(&jpeg, coded);
-  jpeg_set_quality(&jpeg, 100, TRUE);
-  jpeg.write_Adobe_marker = adobe ? TRUE : FALSE;
-  jpeg.write_JFIF_header = coded == JCS_YCbCr && !adobe ? TRUE : FALSE;
-  for (int i = 0; i < jpeg.num_components; ++i) {
-    const bool luma = i == 0 || i == 3;
-    jpeg.comp_info[i].h_samp_factor = luma ? across : 1;
-    jpeg.comp_info[i].v_samp_factor = luma ? down : 1;
-  }
-  jpeg_start_compress(&jpeg, TRUE);
-  std::vector<JSAMPLE> row;
-  for (int x = 0; x < kW; ++x) row.insert(row.end(), pixel.begin(), pixel.end());
-  for (int y = 0; y < kH; ++y) {
-    JSAMPROW pointer = row.data();
-    jpeg_write_scanlines(&jpeg, &pointer, 1);
-  }
-  jpeg_finish_compress(&jpeg);
-  jpeg_destroy_compress(&jpeg);
-  std::fclose(out);
+// A JPEG of one colour.
+void WriteFlatJpeg(const fs::path& file, const std::vector<JSAMPLE>& pixel,
+                   const testing::JpegKind& kind) {
+  std::vector<JSAMPLE> values;
+  for (int i = 0; i < kW * kH; ++i) values.insert(values.end(), pixel.begin(), pixel.end());
+  testing::WriteJpegAs(file, kW, kH, std::move(values), kind);
 }
 
 TEST(PhotoColours, KindsOfJpegHaveTheirColours) {
   const TemporaryFolder folder;
   const fs::path file = folder / "photo.jpg";
   for (const auto& [across, down] : {std::pair(1, 1), {1, 2}, {2, 1}, {2, 2}, {4, 1}, {4, 2}}) {
-    WriteJpegAs(file, {200, 100, 50}, JCS_RGB, JCS_YCbCr, false, across, down);
+    WriteFlatJpeg(file, {200, 100, 50}, {JCS_RGB, JCS_YCbCr, false, across, down});
     ExpectFlat(file, {200, 100, 50}, 2);
   }
-  WriteJpegAs(file, {200, 100, 50}, JCS_RGB, JCS_RGB, true, 1, 1);  // marker: no transform
+  WriteFlatJpeg(file, {200, 100, 50}, {JCS_RGB, JCS_RGB, true, 1, 1});  // marker: no transform
   ExpectFlat(file, {200, 100, 50}, 1);
   // Adobe's inks are inverted, coded as they are or through YCC.
-  WriteJpegAs(file, {200, 100, 50, 255}, JCS_CMYK, JCS_CMYK, true, 1, 1);
+  WriteFlatJpeg(file, {200, 100, 50, 255}, {JCS_CMYK, JCS_CMYK, true, 1, 1});
   ExpectFlat(file, {200, 100, 50}, 2);
-  WriteJpegAs(file, {200, 100, 50, 255}, JCS_CMYK, JCS_YCCK, true, 2, 2);
+  WriteFlatJpeg(file, {200, 100, 50, 255}, {JCS_CMYK, JCS_YCCK, true, 2, 2});
   ExpectFlat(file, {200, 100, 50}, 2);
 }
 

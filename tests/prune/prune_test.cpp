@@ -127,6 +127,23 @@ TEST(DrawProbes, LiesBetweenTwoCamerasAndDoesNotDependOnTheirOrder) {
   EXPECT_THROW(DrawProbes(Row(1), 1, 0), Error);
 }
 
+// Renderings that equal the photo, and photos without a pixel to compare, lose a finite amount.
+TEST(Errors, OfEqualImagesAndOfNoPixelsAreFinite) {
+  const ImageRgb8 photo(4, 4, 3, 100);
+  for (const bool masked : {false, true}) {
+    const std::vector<Place> places = {{{}, photo, masked ? Mask(4, 4) : Mask(), {}}};
+    const Errors same = CompareWithPhotos(places, std::vector{photo}, std::vector{photo});
+    EXPECT_EQ(same.psnr_loss_db, 0);
+    EXPECT_EQ(same.NewErrorShare(), 1);
+    const Errors worse =
+        CompareWithPhotos(places, std::vector{photo}, std::vector{ImageRgb8(4, 4, 3, 101)});
+    EXPECT_TRUE(std::isfinite(worse.psnr_loss_db));
+    EXPECT_EQ(worse.psnr_loss_db > 0, !masked);
+    const std::vector<double> some = {1.0}, none = {0.0};
+    EXPECT_TRUE(std::isfinite(LossesDb(some, none, same)[0]));
+  }
+}
+
 TEST(Errors, TellNewErrorFromOneThatTakesAnothersPlace) {
   // The photo is 100; before, pictures are 103 everywhere.
   const std::vector<Place> places = {{{}, ImageRgb8(4, 4, 3, 100), {}, {}}};

@@ -82,10 +82,17 @@ inline void WriteProgressive(const std::filesystem::path& file, const ImageRgb8&
   WriteForeign<std::uint8_t>(file, spec, {image.data().begin(), image.data().end()});
 }
 
-/// Four values a pixel, as printers mix colours; `marker`: with Adobe's marker, which says that
-/// they are inverted.
-inline void WriteInks(const std::filesystem::path& file, int width_px, int height_px,
-                      const std::vector<JSAMPLE>& inks, bool marker) {
+/// How a JPEG is coded. Adobe's marker says that inks are inverted, and that colours are not
+/// transformed.
+struct JpegKind {
+  J_COLOR_SPACE space, coded;
+  bool adobe = false;
+  int across = 1, down = 1;  ///< luma is sampled so often as the chroma
+};
+
+/// Values of `kind.space`, pixel by pixel.
+inline void WriteJpegAs(const std::filesystem::path& file, int width_px, int height_px,
+                        std::vector<JSAMPLE> values, const JpegKind& kind) {
   std::FILE* out = std::fopen(file.c_str(), "wb");
   ASSERT_NE(out, nullptr);
   jpeg_compress_struct jpeg{};
@@ -95,20 +102,33 @@ inline void WriteInks(const std::filesystem::path& file, int width_px, int heigh
   jpeg_stdio_dest(&jpeg, out);
   jpeg.image_width = static_cast<JDIMENSION>(width_px);
   jpeg.image_height = static_cast<JDIMENSION>(height_px);
-  jpeg.input_components = 4;
-  jpeg.in_color_space = JCS_CMYK;
+  jpeg.input_components = kind.space == JCS_CMYK ? 4 : 3;
+  jpeg.in_color_space = kind.space;
   jpeg_set_defaults(&jpeg);
+  jpeg_set_colorspace(&jpeg, kind.coded);
   jpeg_set_quality(&jpeg, 100, TRUE);
-  jpeg.write_Adobe_marker = marker ? TRUE : FALSE;
+  jpeg.write_Adobe_marker = kind.adobe ? TRUE : FALSE;
+  jpeg.write_JFIF_header = kind.coded == JCS_YCbCr && !kind.adobe ? TRUE : FALSE;
+  for (int i = 0; i < jpeg.num_components; ++i) {
+    const bool luma = i == 0 || i == 3;
+    jpeg.comp_info[i].h_samp_factor = luma ? kind.across : 1;
+    jpeg.comp_info[i].v_samp_factor = luma ? kind.down : 1;
+  }
   jpeg_start_compress(&jpeg, TRUE);
-  std::vector<JSAMPLE> values = inks;
   for (int y = 0; y < height_px; ++y) {
-    JSAMPROW row = values.data() + static_cast<std::ptrdiff_t>(4) * width_px * y;
+    JSAMPROW row =
+        values.data() + static_cast<std::ptrdiff_t>(jpeg.input_components) * width_px * y;
     jpeg_write_scanlines(&jpeg, &row, 1);
   }
   jpeg_finish_compress(&jpeg);
   jpeg_destroy_compress(&jpeg);
   std::fclose(out);
+}
+
+/// Four values a pixel, as printers mix colours; `marker`: with Adobe's marker.
+inline void WriteInks(const std::filesystem::path& file, int width_px, int height_px,
+                      const std::vector<JSAMPLE>& inks, bool marker) {
+  WriteJpegAs(file, width_px, height_px, inks, {JCS_CMYK, JCS_CMYK, marker});
 }
 
 /// The picture in cyan, magenta and yellow, without black.

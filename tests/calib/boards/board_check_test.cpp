@@ -74,6 +74,23 @@ TEST(BoardCheck, TheOtherKindOfBoardIsNamed) {
               HasSubstr("give charuco:5x6:SQUARE:MARKER:DICT_5X5_50"));
 }
 
+// A poster of a board on the wall.
+TEST(BoardCheck, ALargerBoardBehindTheGivenOneIsNotTakenForIt) {
+  const Board given = Chessboard(7, 5), behind = Chessboard(11, 8);
+  const auto photo_of = [](const Board& board, double x, double distance) {
+    Pose pose;
+    const Eigen::Vector3d middle = 0.5 * (board.Corner(0) + board.Corner(board.CornerCount() - 1));
+    pose.translation = Eigen::Vector3d(x, 0, distance) - middle;
+    return Photo(board, kCamera, pose, 2, 1);
+  };
+  auto grey = photo_of(given, -0.18, 0.7);
+  const auto right = photo_of(behind, 0.3, 1.1);
+  for (int y = 0; y < grey.height(); ++y) {
+    for (int x = 320; x < grey.width(); ++x) grey(x, y) = right(x, y);
+  }
+  EXPECT_TRUE(VerdictOf(grey, given).shows_given);
+}
+
 TEST(BoardCheck, PhotosThatDisagreeSayNothing) {
   const Board given = Chessboard(9, 6);
   const auto other = [](int columns, int rows) {

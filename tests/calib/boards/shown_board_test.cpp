@@ -34,16 +34,16 @@ std::pair<int, int> Sides(const GridSize& size) { return std::minmax(size.column
 TEST(ShownBoard, ASizeIsFoundWithoutBeingGiven) {
   for (const auto& [columns, rows] : {std::pair(9, 6), std::pair(8, 5), std::pair(12, 12)}) {
     for (const double tilt : {0.0, 0.4}) {
-      const auto size = ShownChessboard(PhotoOf(Chessboard(columns, rows), tilt, 0.2, 0.8));
-      ASSERT_TRUE(size.has_value());
-      EXPECT_EQ(Sides(*size), Sides({columns, rows}));
+      const auto shown = FindChessboard(PhotoOf(Chessboard(columns, rows), tilt, 0.2, 0.8));
+      ASSERT_TRUE(shown.has_value());
+      EXPECT_EQ(Sides(shown->size), Sides({columns, rows}));
     }
   }
 }
 
 TEST(ShownBoard, APhotoWithoutABoardShowsNone) {
   const Grid<std::uint8_t> grey(320, 240, 1, 128);
-  EXPECT_FALSE(ShownChessboard(grey).has_value());
+  EXPECT_FALSE(FindChessboard(grey).has_value());
   EXPECT_FALSE(MarkersShown(grey, false).has_value());
 }
 

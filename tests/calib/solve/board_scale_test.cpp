@@ -7,6 +7,7 @@
 
 #include "calib/solve/rig_start.h"
 #include "dtr/base/error.h"
+#include "tests/calib/bundle/noise_sweep.h"
 #include "tests/calib/solve/synthetic_views.h"
 
 namespace dtr::calib {
@@ -100,6 +101,36 @@ TEST(BoardScale, CamerasThatErrMakeTheScaleLessCertain) {
   // Every camera looks aside a little: corners of a view err together, which no noise does.
   for (size_t i = 0; i < sights.size(); ++i) MoveBoard(sights[i], i % 2 == 0 ? 0.5 : -0.5);
   EXPECT_GT(ScaleFromBoard(kBoard, sights).relative_sigma, 2 * honest);
+}
+
+// Beyond 1.5 px corners that a set's own gate would not allow are outliers, noise or not.
+TEST(BoardScale, HonestViewsAgreeAndAMovedBoardIsFoundAtEveryNoise) {
+  for (const double noise_px : dtr::testing::kNoisesPx) {
+    auto sights = Sights(8, 9, noise_px);
+    const BoardScale scale = ScaleFromBoard(kBoard, sights);
+    EXPECT_TRUE(scale.left_out.empty()) << noise_px;
+    EXPECT_LE(scale.outliers, noise_px <= 1 ? 0 : 0.1 * scale.corners) << noise_px;
+    EXPECT_GT(scale.relative_sigma, 0) << noise_px;
+    EXPECT_LT(std::abs(std::log(scale.scene_from_board.scale * kUnit)), 4 * scale.relative_sigma)
+        << noise_px;
+    MoveBoard(sights[2], 12 + 5 * noise_px);
+    const BoardScale moved = ScaleFromBoard(kBoard, sights);
+    ASSERT_EQ(moved.left_out.size(), 1u) << noise_px;
+    EXPECT_EQ(moved.left_out[0].name, "view2");
+  }
+}
+
+// A model's file rounds its poses, and corners may be exact all the same: none is an outlier.
+TEST(BoardScale, SomePosesMayBeRounded) {
+  for (const double rounding : {1e-9, 1e-7, 1e-5}) {
+    auto sights = Sights(8, 9, 0);
+    for (size_t i = 0; i < 4; ++i) {
+      sights[i].cam_from_world.translation += rounding * Eigen::Vector3d(1, -1, 1);
+    }
+    const BoardScale scale = ScaleFromBoard(kBoard, sights);
+    EXPECT_TRUE(scale.left_out.empty()) << rounding;
+    EXPECT_EQ(scale.outliers, 0) << rounding;
+  }
 }
 
 TEST(BoardScale, WhatSaysNothingIsRefused) {

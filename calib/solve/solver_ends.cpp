@@ -1,21 +1,19 @@
-#include "calib/bundle/solver_ends.h"
+#include "calib/solve/solver_ends.h"
 
 #include <glog/logging.h>
 
 #include <cmath>
 #include <limits>
-#include <memory>
 
 namespace dtr::calib {
 namespace {
 
-constexpr size_t kDenseImages = 100;  // up to here the cameras' system is solved as a dense one
 // Operations between a point and its pixel that round: rotation, projection, distortion.
 constexpr double kRoundings = 8;
 
 }  // namespace
 
-ceres::Solver::Options SolverOptions(size_t images, bool robust) {
+ceres::Solver::Options SilentOptions() {
   // Ceres logs every step that fails to stderr; the next one is shorter, and the end is checked by
   // the caller. The level belongs to the process: it is set once, before any thread of ours reads
   // it.
@@ -24,16 +22,8 @@ ceres::Solver::Options SolverOptions(size_t images, bool robust) {
     return true;
   }();
   ceres::Solver::Options options;
-  options.linear_solver_type = images <= kDenseImages ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
-  options.num_threads = 1;  // sums in one order: the same bits every time
-  // Under the robust loss Ceres converges by a constant factor a step: it is left when the cameras
-  // have settled, and least squares, which converges quadratically, does the rest.
-  options.max_num_iterations = robust ? 8 : 100;
-  options.function_tolerance = robust ? 1e-3 : 1e-11;
-  options.parameter_tolerance = 1e-12;
-  options.gradient_tolerance = 1e-12;
+  options.num_threads = 1;  // sums in one order
   options.logging_type = ceres::SILENT;
-  options.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
   return options;
 }
 

@@ -1,4 +1,4 @@
-// calib/bundle/solver_ends.h -- internal to calib/bundle: how Ceres is set up, and when it is done.
+// calib/bundle/solver_ends.h -- internal to calib/solve and calib/bundle: when Ceres is done.
 #pragma once
 #include <ceres/ceres.h>
 
@@ -6,9 +6,8 @@
 
 namespace dtr::calib {
 
-/// One thread, and dense or sparse normal equations by the number of images. `robust`: a few steps
-/// under a robust loss, to be followed by least squares.
-ceres::Solver::Options SolverOptions(size_t images, bool robust);
+/// One thread, silent: the same bits every time. Linear solver and tolerances are the caller's.
+ceres::Solver::Options SilentOptions();
 
 /// Stops a solve when `progress` asks for it, and ends it where rounding hides any further gain.
 ///
