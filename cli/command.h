@@ -26,7 +26,7 @@ struct Context {
   void EmitJson(const std::string& json_text) const;
 };
 
-/// Exit codes of the command line (DESIGN section 5).
+/// Exit codes of the command line.
 enum ExitCode { kDone = 0, kFailed = 1, kWrongUsage = 2 };
 
 /// Adds a sub-command. `prepare` declares its options on the CLI::App and returns the action; the

@@ -28,7 +28,7 @@ constexpr double kMaxScale = 1e6;
 constexpr double kMaxOffset = 1e9;
 constexpr double kMaxSeconds = 1;  // then the ball leaves the pictures
 constexpr double kMaxDriftStops = 10;
-constexpr int kMinVisibleOthers = 2;  // DESIGN section 5: "seen in at least 2 other views"
+constexpr int kMinVisibleOthers = 2;  // as docs/ACCURACY.md counts pixels with true depth
 
 void CheckRange(const char* field, double value, double low, double high) {
   if (value >= low && value <= high) return;

@@ -24,8 +24,8 @@ constexpr double kAlmostThere = 1 - 1e-9;
 // Surfaces seen more obliquely than this (cosine) are textured as if seen at it: the footprint of
 // a pixel would grow beyond all bounds.
 constexpr double kMinCosine = 0.05;
-constexpr int kTextureRadius = 4;       // 9x9, DESIGN section 5
-constexpr double kTextureStdDev = 4.0;  // levels, DESIGN section 5
+constexpr int kTextureRadius = 4;       // 9x9 pixels
+constexpr double kTextureStdDev = 4.0;  // levels
 
 /// A camera in the world: rays of z-depth 1.
 class RayCaster {

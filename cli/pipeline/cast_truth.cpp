@@ -8,7 +8,7 @@ namespace {
 
 namespace fs = std::filesystem;
 constexpr std::uintmax_t kSpecLimitBytes = 1 << 20;
-constexpr int kMinVisibleOthers = 2;  // DESIGN section 5: seen in at least 2 other views
+constexpr int kMinVisibleOthers = 2;  // seen in at least 2 other views
 
 // Inverse of datasets::WrittenPose, for poses that act on p_written - origin.
 Pose ScenePose(const Pose& written, const datasets::DatasetSpec& spec,

@@ -14,7 +14,7 @@ namespace dtr::eval {
 namespace {
 
 constexpr float kSmoothRatio = 1.03f;     // neighbouring depths of a larger ratio: other surfaces
-constexpr double kOtherSurfacePx = 3.0;   // DESIGN's stereo keeps depth to well below a pixel
+constexpr double kOtherSurfacePx = 3.0;   // stereo keeps depth to well below a pixel
 constexpr long long kEnoughPixels = 200;  // a median of fewer says little about a view
 
 /// Inverse depth of the view's surface where `pixel` (of the depth grid) lies on one smooth

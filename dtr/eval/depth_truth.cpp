@@ -11,7 +11,7 @@
 namespace dtr::eval {
 namespace {
 
-constexpr double kSameIntrinsicsPx = 1e-6;  // DESIGN: rounding of printed cameras, no more
+constexpr double kSameIntrinsicsPx = 1e-6;  // rounding of printed cameras, no more
 constexpr float kOutlier = 0.02f, kGrossOutlier = 0.05f;
 
 void RequirePositive(double factor, const char* what, bool zero_allowed) {

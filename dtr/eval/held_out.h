@@ -30,7 +30,7 @@ struct EvaluateOptions {
   std::function<void(const View& view, const RenderResult& filled)> on_rendered;
 };
 
-/// Figures of one view; DESIGN "What the numbers mean". Empty: not defined, as no pixel is left to
+/// Figures of one view; docs/ACCURACY.md. Empty: not defined, as no pixel is left to
 /// compare (for SSIM: no window). Infinite PSNR: every pixel is equal.
 struct ViewScore {
   std::string name;
@@ -60,8 +60,9 @@ EvaluationReport EvaluateHeldOut(const DtrSet& set, const EvaluateOptions& optio
                                  const RenderFunction& render, Progress& progress);
 
 /// Rendering | photo | absolute difference times 4, side by side with a grey line between, for
-/// looking at. Pixels that the photo's mask excludes (empty: none) are grey in photo and difference,
-/// as they count in no figure. Throws std::invalid_argument unless both are RGB and all of one size.
+/// looking at. Pixels that the photo's mask excludes (empty: none) are grey in photo and
+/// difference, as they count in no figure. Throws std::invalid_argument unless both are RGB and all
+/// of one size.
 ImageRgb8 ComparisonImage(const ImageRgb8& rendered, const ImageRgb8& photo, const Mask& mask = {});
 
 }  // namespace dtr::eval

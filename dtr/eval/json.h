@@ -1,4 +1,4 @@
-// dtr/eval/json.h -- the reports as JSON text, for programs. Names are an interface (DESIGN 5).
+// dtr/eval/json.h -- the reports as JSON text, for programs. Names are an interface.
 #pragma once
 #include <optional>
 #include <string>

@@ -1,4 +1,4 @@
-// dtr/eval/metrics.h -- how far a rendering is from a photo. DESIGN: "What the numbers mean".
+// dtr/eval/metrics.h -- how far a rendering is from a photo. docs/ACCURACY.md.
 #pragma once
 #include <initializer_list>
 #include <optional>

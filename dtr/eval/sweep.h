@@ -88,8 +88,8 @@ std::optional<DefaultVerdict> JudgeDefault(std::span<const SweepPoint> points,
                                            std::span<const size_t> front);
 
 /// The default, every value of axis 0 alone, and every other value of every other axis, alone, on
-/// the first value of axis 0 under which it means something; where there is none, on the first value
-/// of another axis (the exponent on the weight that has one).
+/// the first value of axis 0 under which it means something; where there is none, on the first
+/// value of another axis (the exponent on the weight that has one).
 std::vector<SweepSetting> OneAtATime(const SweepStage& stage);
 
 /// Up to `count` settings not measured yet that could move the front, the most promising first.
@@ -117,8 +117,8 @@ SweepPoint MeasurePoint(const SweepStage& stage, const SweepSetting& setting);
 std::vector<SweepPoint> Sweep(const SweepStage& stage, int most_points, SweepStore& store,
                               Progress& progress);
 
-/// Processor milliseconds, the median of three, of a fixed piece of work (arithmetic on numbers from
-/// all over a buffer of 8 MiB, one thread): how fast core, caches and memory are just now.
+/// Processor milliseconds, the median of three, of a fixed piece of work (arithmetic on numbers
+/// from all over a buffer of 8 MiB, one thread): how fast core, caches and memory are just now.
 double CalibrationLoop();
 
 /// "--name" values of the setting that are not the default: "views=3 resolution=2"; "default".

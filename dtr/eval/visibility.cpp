@@ -17,7 +17,7 @@ constexpr double kSmoothRatio = 1.03;    // neighbouring depths of a larger rati
 constexpr double kOnSurface = 1e-3;      // relative; float depth and interpolation err by 1e-5
 constexpr double kOnEdgeSurface = 1e-2;  // relative; the nearest centre is up to 0.7 px away
 constexpr int kTextureRadius = 4;        // 9x9
-constexpr double kTextureLevels = 4;     // DESIGN: standard deviation of at least 4 levels
+constexpr double kTextureLevels = 4;     // standard deviation of at least 4 levels
 
 void RequireDepth(const TrueView& view) {
   if (view.depth == nullptr || view.depth->width() != view.camera.width_px() ||

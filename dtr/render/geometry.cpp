@@ -10,7 +10,7 @@
 namespace dtr {
 namespace {
 
-constexpr int kNeighbours = 4;           // DESIGN section 3
+constexpr int kNeighbours = 4;           // docs/FORMAT.md, reference_baseline
 constexpr int kSamplesPerAxis = 64;      // 4096 points a view place a median to a percent or two
 constexpr double kLowPercentile = 0.01;  // beyond lie stray points of stereo and SfM
 constexpr double kHighPercentile = 0.99;

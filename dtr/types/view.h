@@ -20,7 +20,7 @@ enum class ViewRole {
 /// "source" or "held_out".
 const char* NameOf(ViewRole role);
 
-/// How depth lies on disk (DESIGN section 3; docs/FORMAT.md gives the bytes).
+/// How depth lies on disk (docs/FORMAT.md).
 enum class DepthCoding {
   kExrFloat,           ///< "exr-float": float32 EXR
   kExrHalf,            ///< "exr-half": half EXR; refuses depths beyond half's range
@@ -55,7 +55,7 @@ struct View {
   int depth_steps = 0;            ///< of kZstdInverseDepth, 1...65534; 0 with other codings
   int depth_scale = 1;            ///< s: the depth map is 1/s of the image per axis
   double near_z = 0, far_z = 0;   ///< range of the stored depth; 0 for held-out views
-  double reference_baseline = 0;  ///< DESIGN section 3; the baseline of every figure in px
+  double reference_baseline = 0;  ///< docs/FORMAT.md; the baseline of every figure in px
   Eigen::Vector3d gain = Eigen::Vector3d::Ones();  ///< linear RGB factor towards the set's mean
 
   std::optional<StoredFile> image_file, depth_file, sigma_file, mask_file, mesh_file;

@@ -1,4 +1,4 @@
-// S25: the picture changes smoothly as the camera moves, also where the K nearest views change.
+// The rendered image changes smoothly as the camera moves, also where the K nearest views change.
 //
 // The measure: along FlyThrough's path of 100 steps, the change of a frame is the largest change of
 // any pixel (of 255, of three channels) from the frame before; pixels within 2 of a depth break

@@ -37,7 +37,7 @@ TEST(LogWeight, HandWorkedNumbers) {
   EXPECT_EQ(Weight(p, 3), 0);  // not cos^8, which is positive again
   p.blend = BlendWeight::kExponential;
   p.falloff = 2;
-  EXPECT_NEAR(Weight(p, 0.5), 0.36787944117144233, kRound);  // S23: falls, e^-1
+  EXPECT_NEAR(Weight(p, 0.5), 0.36787944117144233, kRound);  // falls, e^-1
   p.blend = BlendWeight::kAngle;
   EXPECT_NEAR(Weight(p, 0.25), 0.75, kRound);
   EXPECT_EQ(Weight(p, 1), 0);
@@ -60,7 +60,7 @@ TEST(NextAngle, IsTheOneAfterTheKthSmallest) {
 }
 
 TEST(BlendShares, EachViewIsWeighedByItsOwnAngle) {
-  // S22: the report prints both weights with the first angle, which would give equal shares.
+  // The report prints both weights with the first angle, which would give equal shares.
   BlendParameters p;
   p.exponent = 2;
   const std::vector<double> shares = Shares(p, {0, std::numbers::pi / 4});

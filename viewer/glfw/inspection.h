@@ -18,7 +18,7 @@
 namespace dtr::viewer {
 
 /// What the right part of the window shows instead. The other primitive: splats beside a mesh, a
-/// mesh beside splats (S65 of the founding report), both by two passes.
+/// mesh beside splats (as the founding report compares them), both by two passes.
 enum class Compared { kNothing, kPhoto, kOtherMethod, kOtherPrimitive };
 inline constexpr std::array kAllCompared{Compared::kNothing, Compared::kPhoto,
                                          Compared::kOtherMethod, Compared::kOtherPrimitive};
