@@ -70,8 +70,10 @@ TEST_F(FieldScene, MasksLieBelowThePhotosBesideThemOrWhereTheyAreSaidToLie) {
     const std::string name = fs::path(std::string(frame["file_path"])).stem().string() + ".png";
     frame["mask_path"] = "masks/" + name;
     const auto photo = io::ReadImage(project / std::string(frame["file_path"]));
-    Grid<std::uint8_t> mask(photo.width(), photo.height(), 1, 255);
-    for (int x = 0; x < mask.width(); ++x) mask(x, 0) = 0;
+    ImageRgb8 mask(photo.width(), photo.height(), 3, 255);
+    for (int x = 0; x < mask.width(); ++x) {
+      for (int c = 0; c < 3; ++c) mask(x, 0, c) = 0;
+    }
     io::WriteImage(project / "masks" / name, mask);
   }
   std::ofstream(project / "transforms.json") << file.dump();
