@@ -26,22 +26,33 @@ void QuietFfmpeg() {
   std::call_once(once, [] { av_log_set_level(AV_LOG_QUIET); });
 }
 
+// Packets begin with 0x47: of 188 bytes, or of 192 where 4 bytes of time stand before each, as
+// camcorders (AVCHD) and Blu-ray discs write them.
+bool BeginsAsTransportStream(std::string_view begin) {
+  const auto packets = [&](size_t first, size_t bytes) {
+    return begin[first] == 'G' && begin[first + bytes] == 'G' && begin[first + 2 * bytes] == 'G';
+  };
+  return packets(0, 188) || packets(4, 192);
+}
+
 // FFmpeg would follow a playlist to files and hosts that it names, whatever the file is called:
 // only what begins as one of these is given to it.
 bool BeginsAsVideo(const fs::path& file) {
-  std::array<char, 12> bytes{};
+  std::array<char, 400> bytes{};  // three packets of a transport stream
   std::ifstream(file, std::ios::binary).read(bytes.data(), bytes.size());
   const std::string_view begin(bytes.data(), bytes.size());
-  static constexpr std::array<std::string_view, 9> kBoxes{
-      // of MP4 and QuickTime
-      "ftyp", "moov", "mdat", "free", "skip", "wide", "pnot", "styp", "uuid"};
-  static constexpr std::array<std::string_view, 6> kStarts{"\x1a\x45\xdf\xa3",
-                                                           "FLV",
-                                                           "OggS",
-                                                           "\x30\x26\xb2\x75",
-                                                           "G@",  // Matroska, ..., ASF, MPEG-TS
-                                                           std::string_view("\0\0\1\xba", 4)};
-  if (begin.starts_with("RIFF") && begin.substr(8) == "AVI ") return true;
+  static constexpr std::array<std::string_view, 10> kBoxes{
+      // of MP4, QuickTime and Motion JPEG 2000
+      "ftyp", "moov", "mdat", "free", "skip", "wide", "pnot", "styp", "uuid", "jP  "};
+  static constexpr std::array<std::string_view, 6> kStarts{
+      "\x1a\x45\xdf\xa3",
+      "FLV",
+      "OggS",
+      "\x30\x26\xb2\x75",                 // Matroska, ..., ASF
+      std::string_view("\0\0\1\xba", 4),  // MPEG: with sound, and the video alone
+      std::string_view("\0\0\1\xb3", 4)};
+  if (begin.starts_with("RIFF") && begin.substr(8, 4) == "AVI ") return true;
+  if (BeginsAsTransportStream(begin)) return true;
   return std::any_of(kBoxes.begin(), kBoxes.end(),
                      [&](std::string_view box) { return begin.substr(4, 4) == box; }) ||
          std::any_of(kStarts.begin(), kStarts.end(),
@@ -56,7 +67,8 @@ bool BeginsAsVideo(const fs::path& file) {
 Ffmpeg<AVFormatContext> OpenFormat(const fs::path& file) {
   AVDictionary* options = nullptr;
   av_dict_set(&options, "protocol_whitelist", "file", 0);
-  av_dict_set(&options, "format_whitelist", "mov,matroska,avi,flv,ogg,asf,mpegts,mpeg", 0);
+  av_dict_set(&options, "format_whitelist", "mov,matroska,avi,flv,ogg,asf,mpegts,mpeg,mpegvideo",
+              0);
   AVFormatContext* context = nullptr;
   // What stands before a colon at the beginning would be a protocol.
   const std::string url = "file:" + fs::absolute(file).string();

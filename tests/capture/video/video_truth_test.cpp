@@ -344,6 +344,53 @@ void WriteCounted(const TemporaryFolder& folder, const std::string& name, int fr
   RunFfmpeg(folder.path(), arguments);
 }
 
+// What a file holds says how to decode it, not its name.
+TEST(VideoTruth, FilesOfCamcordersPhonesAndActionCamerasAreRead) {
+  const TemporaryFolder folder;
+  struct Kind {
+    const char* name;
+    Arguments how;
+  };
+  const Arguments h264{"-c:v", "libx264", "-qp", "0"};
+  const Arguments blocks{"-r", "25", "-b:v", "20M", "-c:v"};
+  const auto with = [](Arguments all, const Arguments& more) {
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+  };
+  const Kind kinds[] = {
+      {"plain.ts", h264},
+      {"00001.MTS", with(h264, {"-f", "mpegts", "-mpegts_m2ts_mode", "1"})},
+      {"00002.m2ts", with(h264, {"-mpegts_m2ts_mode", "1"})},
+      {"program.mpg", with(blocks, {"mpeg2video", "-f", "vob"})},
+      {"video.mpg", with(blocks, {"mpeg2video", "-f", "mpeg2video"})},
+      {"video.mpeg", with(blocks, {"mpeg1video", "-f", "mpeg1video"})},
+      {"phone.3gp", with(h264, {"-f", "3gp"})},
+      {"old.wmv", with(blocks, {"wmv2"})},
+      {"old.qt", with(blocks, {"mjpeg", "-f", "mov"})},
+      {"GL010001.LRV", with(h264, {"-f", "mp4"})},
+      {"VID_1.insv", with(h264, {"-f", "mp4"})},
+      {"frames.mj2",
+       {"-c:v", "jpeg2000", "-f", "mov", "-movflags",
+        "frag_keyframe+empty_moov+default_base_moof"}},
+  };
+  for (const Kind& kind : kinds) {
+    WriteCounted(folder, kind.name, 12, kind.how);
+    if (kind.name == std::string("frames.mj2")) {  // ISO 15444-3: a signature stands first
+      const std::string mov = ReadFile(folder / kind.name, 1 << 24);
+      WriteFileAtomically(folder / kind.name, std::string("\0\0\0\x0cjP  \r\n\x87\n", 12) + mov);
+    }
+    VideoReader video(folder / kind.name);
+    int frames = 0;
+    while (video.Next()) ++frames;
+    EXPECT_GE(frames, 12) << kind.name;
+    EXPECT_EQ(video.WhyIncomplete(), "") << kind.name;
+  }
+  // A transport stream may begin anywhere, with video before its tables.
+  const std::string whole = ReadFile(folder / "plain.ts", 1 << 24);
+  WriteFileAtomically(folder / "later.mts", whole.substr(2 * 188, 188) + whole);
+  EXPECT_EQ(FramesOf(folder / "later.mts").size(), 12u);
+}
+
 TEST(VideoTruth, FramesThatAnEditListHidesAreNeitherShownNorMissed) {
   const TemporaryFolder folder;
   WriteCounted(folder, "whole.mp4", 20, {"-c:v", "libx264", "-qp", "0", "-g", "20", "-bf", "0"});
