@@ -204,7 +204,13 @@ Capture IngestPhotos(const fs::path& folder, const IngestOptions& options, Progr
                      "of");
   }
   FolderWalk walk = WalkFolder(folder, options.recurse);
-  Layout listing = SortImages(folder, walk.images, std::move(walk.contents));
+  Layout listing;
+  if (options.sort) {
+    listing = SortImages(folder, walk.images, std::move(walk.contents));
+  } else {
+    listing.photos = walk.images;
+    listing.contents = std::move(walk.contents);
+  }
   walk.skipped.insert(walk.skipped.end(), listing.skipped.begin(), listing.skipped.end());
 
   const int count = static_cast<int>(listing.photos.size());

@@ -12,6 +12,8 @@ namespace dtr::capture {
 
 struct IngestOptions {
   bool recurse = true;  ///< photos of sub-folders too, as COLMAP takes them
+  /// Tell photos from what belongs to them (SortImages); false: every image is a photo.
+  bool sort = true;
   /// Decode every photo: finds damaged ones now instead of hours later, and measures the rest.
   bool screen = true;
   int threads = 0;  ///< 0: all cores

@@ -265,8 +265,10 @@ Capture IngestVideos(const Videos& videos, const VideoOptions& options, const fs
     const Choice choice = ChooseFrames(group, options, reported, progress);
     WriteFrames(group, folders, choice.frames, folder, options.threads, origins, progress);
   }
-  Capture capture =
-      IngestPhotos(folder, {.threads = options.threads, .memory_gb = options.memory_gb}, progress);
+  // Frames are photos, whatever a video is called: "normal.mp4" is one speed of several.
+  Capture capture = IngestPhotos(
+      folder, {.sort = false, .threads = options.threads, .memory_gb = options.memory_gb},
+      progress);
   for (Photo& photo : capture.photos) {
     photo.video_frame = origins.at(photo.name);
     photo.camera_group =
