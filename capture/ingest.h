@@ -62,5 +62,9 @@ FocalPrior FocalFromExif(const io::ImageHeader& header);
 bool IsImageExtension(const std::string& extension);
 /// The same for raw files of cameras.
 bool IsRawExtension(const std::string& extension);
+/// The same for the videos that are read, with the dot.
+bool IsVideoExtension(const std::string& extension);
+/// The same for those that cameras write beside a video of full resolution.
+bool IsProxyVideoExtension(const std::string& extension);
 
 }  // namespace dtr::capture

@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
-#include <cctype>
 #include <cmath>
 #include <optional>
 #include <stdexcept>
@@ -40,15 +38,6 @@ struct VideoReader::Parts {
   FrameKind kind;
   std::optional<FrameConverter> converter;  // made for the first frame whose pixels are wanted
 };
-
-bool IsVideoExtension(const std::string& extension) {
-  std::string lower = extension;
-  for (char& c : lower) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  static constexpr std::array<const char*, 14> kVideos{".mp4",  ".mov", ".avi",  ".mkv", ".m4v",
-                                                       ".webm", ".mts", ".m2ts", ".mpg", ".mpeg",
-                                                       ".3gp",  ".3g2", ".wmv",  ".qt"};
-  return std::find(kVideos.begin(), kVideos.end(), lower) != kVideos.end();
-}
 
 VideoReader::VideoReader(const std::filesystem::path& file)
     : file_(file), parts_(std::make_unique<Parts>(file)) {

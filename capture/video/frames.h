@@ -10,9 +10,6 @@
 
 namespace dtr::capture {
 
-/// True for the extensions of videos that are read, any case, with the dot.
-bool IsVideoExtension(const std::string& extension);
-
 /// Decodes a video from its first frame on with FFmpeg's libraries. What the file says about its
 /// frames is applied here: rotation and mirroring (the display matrix), pixels that are not square,
 /// colour matrix and range, HDR and wide gamut (io::SrgbConverter), interlacing (bwdif).

@@ -226,7 +226,7 @@ Videos VideosOf(const fs::path& source) {
   if (fs::is_regular_file(source, error)) {
     return IsVideoExtension(source.extension().string()) ? Videos{source} : Videos{};
   }
-  Videos videos;
+  Videos videos, proxies;
   fs::directory_iterator entries(source, error);
   for (; !error && entries != fs::directory_iterator(); entries.increment(error)) {
     const fs::path& path = entries->path();
@@ -237,8 +237,12 @@ Videos VideosOf(const fs::path& source) {
       continue;
     }
     if (IsImageExtension(path.extension().string())) return {};
-    if (IsVideoExtension(path.extension().string())) videos.push_back(path);
+    const std::string extension = path.extension().string();
+    if (IsVideoExtension(extension)) {
+      (IsProxyVideoExtension(extension) ? proxies : videos).push_back(path);
+    }
   }
+  if (videos.empty()) videos = std::move(proxies);
   std::sort(videos.begin(), videos.end());
   return videos;
 }

@@ -219,6 +219,18 @@ Layout FromVideos(const fs::path& folder, const std::vector<fs::path>& videos, P
   return layout;
 }
 
+// Videos of low resolution that cameras write beside them are no cameras of their own.
+std::vector<fs::path> VideosIn(const fs::path& folder) {
+  const auto is_proxy = [](const fs::path& path) {
+    return capture::IsProxyVideoExtension(path.extension().string());
+  };
+  auto videos = Sorted(folder, [](const fs::path& path) {
+    return fs::is_regular_file(path) && capture::IsVideoExtension(path.extension().string());
+  });
+  if (!std::all_of(videos.begin(), videos.end(), is_proxy)) std::erase_if(videos, is_proxy);
+  return videos;
+}
+
 // One camera sees an instant once.
 void RequireOneShotPerFrame(const Layout& layout) {
   std::map<std::pair<size_t, std::string>, const Shot*> seen;
@@ -244,12 +256,7 @@ Layout LayoutOf(const fs::path& folder, Progress& progress) {
   Layout layout;
   if (folders.size() >= 2) {
     layout = FromSubfolders(folders);
-  } else if (const auto videos = Sorted(folder,
-                                        [](const fs::path& p) {
-                                          return fs::is_regular_file(p) &&
-                                                 capture::IsVideoExtension(p.extension().string());
-                                        });
-             videos.size() >= 2) {
+  } else if (const auto videos = VideosIn(folder); videos.size() >= 2) {
     layout = FromVideos(folder, videos, progress);
   } else {
     layout = FromNames(Sorted(folder, IsPhoto));

@@ -330,6 +330,18 @@ TEST_F(ProjectFolder, RawFilesBesidePhotosVideosAndImagesWithoutExtensionAreCoun
   }
 }
 
+TEST_F(ProjectFolder, VideosOfLowResolutionAreNotAdvisedBesideThoseOfFull) {
+  WritePhoto("1.jpg", 1);
+  WriteFileAtomically(folder_ / "GL010001.LRV", "film");
+  EXPECT_EQ(IgnoredOf(Sort(), "videos"), 1);
+  WriteFileAtomically(folder_ / "GX010001.MP4", "film");
+  EXPECT_EQ(IgnoredOf(Sort(), "videos"), 1);
+  EXPECT_EQ(IgnoredOf(Sort(), "proxy_videos"), 1);
+  for (const char* extension : {".MTS", ".m2ts", ".insv", ".LRV", ".mj2"}) {
+    EXPECT_TRUE(IsVideoExtension(extension)) << extension;
+  }
+}
+
 TEST(IngestPhotos, ExtensionsOfHeifAndJpegAreKnownInAnyCase) {
   for (const char* extension :
        {".HIF", ".hif", ".heics", ".AVIF", ".jfif", ".JPE", ".jp2", ".tif"}) {

@@ -250,6 +250,9 @@ TEST(VideosOf, AreAVideoOrAFolderOfNothingElse) {
   }
   WriteFileAtomically(folder / "capture/capture.json", "{}");
   EXPECT_EQ(VideosOf(folder.path()).size(), 2u);
+  WriteFileAtomically(folder / "a.lrv", "x");  // the same at low resolution
+  EXPECT_EQ(VideosOf(folder.path()).size(), 2u);
+  EXPECT_THAT(VideosOf(folder / "a.lrv"), ElementsAre(folder / "a.lrv"));
   fs::create_directory(folder / "sub");
   EXPECT_THAT(VideosOf(folder.path()), IsEmpty());
   fs::remove(folder / "sub");
