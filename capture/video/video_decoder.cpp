@@ -107,6 +107,15 @@ bool IsDamaged(const AVFrame& frame) {
   return (frame.flags & AV_FRAME_FLAG_CORRUPT) != 0 || frame.decode_error_flags != 0;
 }
 
+FrameNumbers::Time TimeIn(std::int64_t timestamp) {
+  return timestamp == AV_NOPTS_VALUE ? FrameNumbers::Time() : timestamp;
+}
+
+FrameNumbers::Time ShownTimeOf(const AVFrame& frame) {
+  const FrameNumbers::Time shown = TimeIn(frame.best_effort_timestamp);
+  return shown ? shown : TimeIn(frame.pts);
+}
+
 }  // namespace
 
 VideoDecoder::VideoDecoder(const fs::path& file)
@@ -133,6 +142,13 @@ VideoDecoder::VideoDecoder(const fs::path& file)
   codec_ = OpenCodec(file, stream(), decoder);
 }
 
+void VideoDecoder::CountDamaged() {
+  ++damaged_;
+  numbers_.Lose();
+}
+
+// An error of sending is one of a frame sent before, also where nothing more is sent: which of the
+// two calls reports it depends on the number of threads.
 bool VideoDecoder::SendPacket() {
   if (all_sent_) return false;
   int code = 0;
@@ -141,27 +157,40 @@ bool VideoDecoder::SendPacket() {
     code = av_read_frame(format_.get(), packet_.get());
   } while (code == AVERROR(EAGAIN) || (code >= 0 && packet_->stream_index != stream_index_));
   all_sent_ = code < 0;
+  if (!all_sent_ && (packet_->flags & AV_PKT_FLAG_DISCARD) == 0) {  // hidden by an edit list
+    const FrameNumbers::Time decoded = TimeIn(packet_->dts);
+    const FrameNumbers::Time shown = TimeIn(packet_->pts);
+    numbers_.Read(shown ? shown : decoded, decoded);
+  }
   code = avcodec_send_packet(codec_.get(), all_sent_ ? nullptr : packet_.get());
-  if (code < 0 && !all_sent_) ++damaged_;
+  if (code < 0 && code != AVERROR_EOF) CountDamaged();
   return true;
 }
 
 bool VideoDecoder::Decode() {
-  while (true) {
+  constexpr int kMaxErrors = 1000;  // without a frame, at the end: FFmpeg itself gives up earlier
+  for (int errors_at_end = 0; errors_at_end < kMaxErrors;) {
     const int code = avcodec_receive_frame(codec_.get(), frame_.get());
     if (code == AVERROR_EOF) return false;
     if (code == AVERROR(EAGAIN)) {
       if (!SendPacket()) return false;
     } else if (code < 0 || IsDamaged(*frame_)) {
-      ++damaged_;
-      if (code < 0 && !SendPacket()) return false;
+      CountDamaged();
+      errors_at_end += all_sent_;
     } else {
       return true;
     }
   }
+  return false;
 }
 
 const AVFrame* VideoDecoder::Next() {
+  const AVFrame* frame = NextUnnumbered();
+  if (frame != nullptr) number_ = numbers_.Next(ShownTimeOf(*frame));
+  return frame;
+}
+
+const AVFrame* VideoDecoder::NextUnnumbered() {
   while (true) {
     if (deinterlacer_ && deinterlacer_->Get(frame_.get())) return frame_.get();
     if (draining_) {
@@ -186,13 +215,11 @@ const AVFrame* VideoDecoder::Next() {
   }
 }
 
-double VideoDecoder::TimeOf(const AVFrame& frame) const {
-  std::int64_t timestamp = frame.best_effort_timestamp;
-  if (timestamp == AV_NOPTS_VALUE) timestamp = frame.pts;
-  if (timestamp == AV_NOPTS_VALUE) return 0;
-  const std::int64_t start = stream().start_time;
-  if (start != AV_NOPTS_VALUE) timestamp -= start;
-  return static_cast<double>(timestamp) * av_q2d(stream().time_base);
+std::optional<double> VideoDecoder::TimeOf(const AVFrame& frame) const {
+  const FrameNumbers::Time shown = ShownTimeOf(frame);
+  if (!shown) return {};
+  const std::int64_t start = TimeIn(stream().start_time).value_or(0);
+  return static_cast<double>(*shown - start) * av_q2d(stream().time_base);
 }
 
 AVRational VideoDecoder::SampleAspect(const AVFrame& frame) const {
@@ -234,10 +261,11 @@ int VideoDecoder::frames_counted() const {
 }
 
 double VideoDecoder::duration_s() const {
-  if (stream().duration != AV_NOPTS_VALUE && stream().duration > 0) {
+  const bool known = format_->duration_estimation_method != AVFMT_DURATION_FROM_BITRATE;
+  if (known && stream().duration != AV_NOPTS_VALUE && stream().duration > 0) {
     return static_cast<double>(stream().duration) * av_q2d(stream().time_base);
   }
-  if (format_->duration == AV_NOPTS_VALUE || format_->duration <= 0) return 0;
+  if (!known || format_->duration == AV_NOPTS_VALUE || format_->duration <= 0) return 0;
   return static_cast<double>(format_->duration) / AV_TIME_BASE;
 }
 

@@ -9,10 +9,10 @@
 #include "capture/video/ingest_video.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
-#include "dtr/base/process.h"
 #include "dtr/io/image_io.h"
 #include "dtr/io/video.h"
 #include "tests/capture/photo_files.h"
+#include "tests/capture/video/ffmpeg_videos.h"
 #include "tests/support/test_data.h"
 
 namespace dtr::capture {
@@ -21,22 +21,15 @@ namespace {
 namespace fs = std::filesystem;
 using dtr::testing::DataFolder;
 using dtr::testing::TemporaryFolder;
+using testing::Arguments;
 using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using testing::MessageOf;
-using Arguments = std::vector<std::string>;
+using testing::RunFfmpeg;
+using testing::WriteCounted;
 
 constexpr int kW = 96, kH = 64;
-
-void RunFfmpeg(const fs::path& folder, const Arguments& arguments) {
-  Arguments command{"ffmpeg", "-y", "-loglevel", "error"};
-  command.insert(command.end(), arguments.begin(), arguments.end());
-  ProcessOptions options;
-  options.working_directory = folder;
-  options.log_file = folder / "ffmpeg.log";
-  ASSERT_TRUE(RunProcess(command, options).Ok()) << ReadFile(folder / "ffmpeg.log", 1 << 20);
-}
 
 // Blocks of different colours, without any symmetry.
 ImageRgb8 Truth() {
@@ -326,22 +319,6 @@ TEST(VideoTruth, InterlacedFramesAreDeinterlaced) {
   EXPECT_LT(combed, kFrames * 8 * kH / 50);  // as stored it is every pixel of 8 columns a frame
   EXPECT_THAT(video.remarks(), Contains("interlaced frames are deinterlaced"));
   EXPECT_EQ(video.WhyIncomplete(), "");
-}
-
-// Frames that differ: number n has the grey value 20 n.
-void WriteCounted(const TemporaryFolder& folder, const std::string& name, int frames,
-                  const Arguments& more) {
-  std::string bytes;
-  for (int i = 0; i < frames; ++i) {
-    bytes += std::string(64 * 48, static_cast<char>(20 + 10 * i));
-    bytes += std::string(64 * 24, static_cast<char>(128));
-  }
-  WriteFileAtomically(folder / "counted.yuv", bytes);
-  Arguments arguments{"-f",    "rawvideo", "-pix_fmt", "yuv420p", "-s",
-                      "64x48", "-r",       "10",       "-i",      "counted.yuv"};
-  arguments.insert(arguments.end(), more.begin(), more.end());
-  arguments.push_back(name);
-  RunFfmpeg(folder.path(), arguments);
 }
 
 // What a file holds says how to decode it, not its name.
