@@ -37,13 +37,6 @@ bool IsSystemFile(const std::string& name) {
   return IsOneOf(LowerCase(name), kNames);
 }
 
-bool IsVideo(const std::string& extension) {
-  static constexpr std::array<std::string_view, 17> kVideos{
-      ".mp4",  ".mov", ".avi", ".mkv", ".m4v", ".webm", ".mts", ".m2ts", ".mpg",
-      ".mpeg", ".3gp", ".3g2", ".wmv", ".mj2", ".insv", ".lrv", ".qt"};
-  return IsOneOf(extension, kVideos);
-}
-
 int FilesBelow(const fs::path& folder) {
   int count = 0;
   std::error_code error;
@@ -113,7 +106,7 @@ class Walker {
     if (part.front() == '.' || IsSystemFile(part)) {
       Ignore("system_files", "system files", "hidden files, thumbnails",
              part.rfind("._", 0) == 0 ? "._*" : PrintableName(part), 1);
-    } else if (IsVideo(extension)) {
+    } else if (IsVideoExtension(extension)) {
       walk_.videos.push_back(name);
     } else if (!IsImageExtension(extension)) {
       AddOther(path, extension);
@@ -150,11 +143,17 @@ class Walker {
   void SortVideos() {
     std::set<std::string> stems;
     for (const std::string& image : walk_.images) stems.insert(StemOf(image));
+    const auto is_proxy = [](const std::string& video) {
+      return IsProxyVideoExtension(fs::path(video).extension().string());
+    };
+    const bool proxies_alone = std::all_of(walk_.videos.begin(), walk_.videos.end(), is_proxy);
     for (const std::string& video : walk_.videos) {
       const std::string shown = PrintableName(LowerCase(fs::path(video).extension().string()));
       if (stems.contains(StemOf(video))) {
         Ignore("live_photo_videos", "videos of live photos", "the photo beside each is used",
                shown);
+      } else if (is_proxy(video) && !proxies_alone) {
+        Ignore("proxy_videos", "videos of low resolution", "use those of full resolution", shown);
       } else {
         Ignore("videos", "videos", "give a video by itself to use its frames", shown);
       }

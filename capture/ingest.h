@@ -12,6 +12,8 @@ namespace dtr::capture {
 
 struct IngestOptions {
   bool recurse = true;  ///< photos of sub-folders too, as COLMAP takes them
+  /// Tell photos from what belongs to them (SortImages); false: every image is a photo.
+  bool sort = true;
   /// Decode every photo: finds damaged ones now instead of hours later, and measures the rest.
   bool screen = true;
   int threads = 0;  ///< 0: all cores
@@ -60,5 +62,9 @@ FocalPrior FocalFromExif(const io::ImageHeader& header);
 bool IsImageExtension(const std::string& extension);
 /// The same for raw files of cameras.
 bool IsRawExtension(const std::string& extension);
+/// The same for the videos that are read, with the dot.
+bool IsVideoExtension(const std::string& extension);
+/// The same for those that cameras write beside a video of full resolution.
+bool IsProxyVideoExtension(const std::string& extension);
 
 }  // namespace dtr::capture

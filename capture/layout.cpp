@@ -23,7 +23,23 @@ struct Folder {
   std::string name;
   std::map<std::string, std::string> images;  // by bare name
   bool copies = false;                        // made by a program from photos elsewhere
+  bool maps = false;                          // by its pixels
 };
+
+// The first, the middle and the last one: a single image may be dark or unreadable.
+std::vector<std::string> SamplesOf(const std::vector<std::string>& names) {
+  std::vector<std::string> samples;
+  for (const size_t i : std::set<size_t>{0, names.size() / 2, names.size() - 1}) {
+    samples.push_back(names[i]);
+  }
+  return samples;
+}
+
+std::vector<std::string> SamplesOf(const Folder& folder, const std::vector<std::string>& common) {
+  std::vector<std::string> names;
+  for (const std::string& bare : SamplesOf(common)) names.push_back(folder.images.at(bare));
+  return names;
+}
 
 class Sorter {
  public:
@@ -52,7 +68,9 @@ class Sorter {
   void TakeRawFiles();
   void TakeProgramOutput();
   void TakeNamedKinds();
-  bool LooksLike(const NamedImage& named, const std::string& sample);
+  bool LooksLike(const NamedImage& named, const std::string& sample, const std::string& photo);
+  bool IsPreview(const std::string& sample, const std::string& photo);
+  bool AreDeep(const std::vector<std::string>& samples);
   void TakeSiblings();
   std::vector<Folder> FoldersOfRest();
   void SortFolder(const Folder& folder, const std::vector<const Folder*>& photos, bool& is_photos);
@@ -67,10 +85,6 @@ class Sorter {
   std::map<std::string, std::vector<std::string>> masks_by_key_;
   Layout layout_;
 };
-
-bool EndsWith(const std::string& text, const std::string& end) {
-  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
-}
 
 void Sorter::Ignore(const std::string& name, const char* kind, const char* what,
                     const char* reason) {
@@ -111,7 +125,7 @@ void Sorter::TakeMaskFiles() {
   for (const std::string& name : rest_) by_stem.emplace(StemOf(name), name);
   for (const std::string& name : std::vector<std::string>(rest_.begin(), rest_.end())) {
     const std::string stem = StemOf(name);
-    if (!EndsWith(stem, kEnd)) continue;
+    if (!stem.ends_with(kEnd)) continue;
     const auto [first, last] = by_stem.equal_range(stem.substr(0, stem.size() - strlen(kEnd)));
     if (first == last) continue;
     bool used = false;
@@ -148,34 +162,64 @@ void Sorter::TakeProgramOutput() {
   }
 }
 
-bool Sorter::LooksLike(const NamedImage& named, const std::string& sample) {
-  if (named.kind == ImageKind::kMask || named.kind == ImageKind::kInverseMask) {
-    return looks_.LookOf(sample).grey;
+// A smaller image, of the same content where it is not cropped.
+bool Sorter::IsPreview(const std::string& sample, const std::string& photo) {
+  if (photo.empty()) return true;
+  if (looks_.Difference(photo, sample) < kSameContent) return true;
+  const ImageSize size = looks_.SizeOf(sample), full = looks_.SizeOf(photo);
+  return size.width_px < full.width_px && size.height_px < full.height_px &&
+         !looks_.IsReducedSize(sample, photo);
+}
+
+// Whether the pixels agree with the word. "normal" and "preview" are also names of cameras, speeds
+// and exposures. `photo`: the one that it may belong to, if any.
+bool Sorter::LooksLike(const NamedImage& named, const std::string& sample,
+                       const std::string& photo) {
+  const ImageSize size = looks_.SizeOf(sample);
+  if (named.kind == ImageKind::kDepth) {
+    return named.by_folder || size.one_channel || looks_.LookOf(sample).grey;
   }
-  if (named.by_folder) return true;
+  const ImageLook& look = looks_.LookOf(sample);
+  if (!look.readable) return named.by_folder;
   switch (named.kind) {
-    case ImageKind::kDepth:
-      return looks_.SizeOf(sample).one_channel || looks_.LookOf(sample).grey;
-    case ImageKind::kNormals:
-      return looks_.LookOf(sample).normals;
+    case ImageKind::kMask:
+    case ImageKind::kInverseMask:
+      return look.grey;
     case ImageKind::kConfidence:
-      return looks_.LookOf(sample).grey;
+      return look.grey || (named.by_folder && size.is_float);
+    case ImageKind::kNormals:  // of floats, whose values are no colours, the folder's word is all
+      return look.normals || (named.by_folder && size.is_float);
     case ImageKind::kLabels:
-      return looks_.LookOf(sample).labels;
+      return look.flat && (named.by_folder || look.few_colours);
+    case ImageKind::kPreview:
+      return IsPreview(sample, photo);
     default:
       return true;
   }
 }
 
+bool Sorter::AreDeep(const std::vector<std::string>& samples) {
+  return std::all_of(samples.begin(), samples.end(), [&](const std::string& sample) {
+    const ImageSize& size = looks_.SizeOf(sample);
+    return size.one_channel && size.deep;
+  });
+}
+
 // What words call something else than a photo, where there is the photo that it belongs to.
 void Sorter::TakeNamedKinds() {
   std::map<std::string, NamedImage> named;
-  std::set<std::string> photo_keys;
+  std::map<std::string, std::string> photo_of;  // by key
   for (const std::string& name : rest_) {
     named[name] = ReadName(name);
-    if (named[name].kind == ImageKind::kPhoto) photo_keys.insert(named[name].key);
+    if (named[name].kind == ImageKind::kPhoto) photo_of.emplace(named[name].key, name);
   }
-  if (photo_keys.empty()) return;
+  if (photo_of.empty()) return;
+  const auto photo = [&](const std::string& name) -> std::string {
+    for (const std::string& key : {named[name].key, named[name].short_key}) {
+      if (const auto found = photo_of.find(key); found != photo_of.end()) return found->second;
+    }
+    return {};
+  };
   struct Group {
     std::vector<std::string> names;
     size_t matched = 0;
@@ -185,15 +229,17 @@ void Sorter::TakeNamedKinds() {
     if (read.kind == ImageKind::kPhoto) continue;
     Group& group = groups[{FolderOf(name), read.kind}];
     group.names.push_back(name);
-    group.matched += photo_keys.contains(read.key) || photo_keys.contains(read.short_key);
+    group.matched += !photo(name).empty();
   }
   for (const auto& [where, group] : groups) {
-    const std::string& sample = group.names.front();
-    const ImageSize& size = looks_.SizeOf(sample);
-    const bool is_depth = where.second == ImageKind::kDepth && size.one_channel && size.deep;
+    const std::vector<std::string> samples = SamplesOf(group.names);
+    const bool is_depth = where.second == ImageKind::kDepth && AreDeep(samples);
     if (2 * group.matched < group.names.size() && !is_depth) continue;
-    if (group.matched == 0 && !named[sample].by_folder) continue;
-    if (!LooksLike(named[sample], sample)) continue;
+    if (group.matched == 0 && !named[samples.front()].by_folder) continue;
+    const bool agree = std::all_of(samples.begin(), samples.end(), [&](const std::string& sample) {
+      return LooksLike(named[sample], sample, photo(sample));
+    });
+    if (!agree) continue;
     for (const std::string& name : group.names) Take(name, where.second);
   }
 }
@@ -242,10 +288,10 @@ std::vector<std::string> CommonNames(const Folder& a, const Folder& b) {
 
 bool Sorter::IsCopy(const Folder& folder, const Folder& of,
                     const std::vector<std::string>& common) {
-  const std::set<size_t> samples{0, common.size() / 2, common.size() - 1};
-  return std::all_of(samples.begin(), samples.end(), [&](size_t i) {
-    const std::string& a = folder.images.at(common[i]);
-    const std::string& b = of.images.at(common[i]);
+  const std::vector<std::string> samples = SamplesOf(common);
+  return std::all_of(samples.begin(), samples.end(), [&](const std::string& bare) {
+    const std::string& a = folder.images.at(bare);
+    const std::string& b = of.images.at(bare);
     if (looks_.IsReducedSize(a, b)) return looks_.Difference(b, a) < kSameContent;
     return folder.copies && !of.copies && looks_.Difference(b, a) < kUndistortedContent;
   });
@@ -257,21 +303,13 @@ void Sorter::SortFolder(const Folder& folder, const std::vector<const Folder*>& 
   for (const Folder* of : photos) {
     const std::vector<std::string> common = CommonNames(folder, *of);
     if (common.empty() || 2 * common.size() < folder.images.size()) continue;
-    const std::string& sample = folder.images.at(common.front());
-    const std::string& photo = of->images.at(common.front());
-    const ImageSize size = looks_.SizeOf(sample), full = looks_.SizeOf(photo);
-    ImageKind kind = ImageKind::kPhoto;
-    if (size.one_channel && size.deep && !full.one_channel) {
-      kind = ImageKind::kDepth;
-    } else if (!size.jpeg) {
-      const ImageLook& look = looks_.LookOf(sample);
-      const ImageLook& photo_look = looks_.LookOf(photo);
-      if (look.binary && !photo_look.binary) {
-        kind = ImageKind::kMask;
-      } else if (look.normals && !photo_look.normals) {
-        kind = ImageKind::kNormals;
-      } else if (look.labels && !photo_look.labels) {
-        kind = ImageKind::kLabels;
+    const std::vector<std::string> samples = SamplesOf(folder, common);
+    const std::vector<std::string> photo_samples = SamplesOf(*of, common);
+    ImageKind kind = ImageKind::kDepth;
+    if (!AreDeep(samples) || looks_.SizeOf(photo_samples.front()).one_channel) {
+      kind = looks_.KindOf(samples, IsCalledMasks(folder.name));
+      if (kind != ImageKind::kPhoto && kind == looks_.KindOf(photo_samples, false)) {
+        kind = ImageKind::kPhoto;
       }
     }
     const bool copy = kind == ImageKind::kPhoto && IsCopy(folder, *of, common);
@@ -308,15 +346,16 @@ void Sorter::TakeSiblings() {
                         [&](const auto& image) { return uses[image.first] > 1; });
   });
   // Photos before what may belong to them, large ones before small ones.
+  for (Folder& folder : folders) {
+    std::vector<std::string> names;
+    for (const auto& [bare, name] : folder.images) names.push_back(name);
+    const std::vector<std::string> samples = SamplesOf(names);
+    folder.maps = looks_.SizeOf(samples.front()).one_channel ||
+                  looks_.KindOf(samples, IsCalledMasks(folder.name)) != ImageKind::kPhoto;
+  }
   const auto rank = [&](const Folder& folder) {
-    const std::string& sample = folder.images.begin()->second;
-    const ImageSize& size = looks_.SizeOf(sample);
-    bool maps = size.one_channel;
-    if (!maps && !size.jpeg) {
-      const ImageLook& look = looks_.LookOf(sample);
-      maps = look.binary || look.normals || look.labels;
-    }
-    return std::tuple(folder.copies, maps,
+    const ImageSize& size = looks_.SizeOf(folder.images.begin()->second);
+    return std::tuple(folder.copies, folder.maps,
                       -static_cast<std::int64_t>(size.width_px) * size.height_px, folder.name);
   };
   std::sort(folders.begin(), folders.end(),

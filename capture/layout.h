@@ -24,15 +24,18 @@ struct Layout {
 /// Images belong together when their names are equal but for words for a kind of image (images,
 /// masks, depth, normals, ...) in the name or in the folders above. Among them are
 /// - masks: NAME_mask.EXT beside NAME.EXT; else grey images called masks, or of two values only
-///   in a folder beside the photos, of the photo's size. They become the masks of their photos;
+///   (0 and 255) in a folder beside the photos, of the photo's size. They become the masks of their
+///   photos;
 /// - depth maps: 16-bit or float images of one channel, or images called depth;
-/// - normal maps, label maps, confidence maps and previews, by their words or their values;
+/// - normal maps and label maps, by their values; confidence maps and previews, by their words
+///   where their values agree, as "normal" and "preview" are names of cameras and exposures too;
 /// - reduced copies: images of a folder that holds names of another one, smaller by one factor in
 ///   both axes, which show the same (in a comparison of thumbnails);
 /// - other copies of the same size: those that show the same, or that lie in what a program is
 ///   known to write (COLMAP's undistorted images, OpenDroneMap's, Meshroom's results);
 /// - raw files beside a developed photo of their name.
-/// Folders of several cameras with equal names show different things, and all stay photos.
+/// Folders of several cameras with equal names show different things, and all stay photos. What a
+/// folder holds is decided by several samples that agree: a camera may begin in the dark.
 Layout SortImages(const std::filesystem::path& folder, const std::vector<std::string>& images,
                   FolderContents contents);
 

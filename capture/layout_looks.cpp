@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <set>
 
@@ -17,6 +18,37 @@ constexpr int kThumbnailSidePx = 24;
 constexpr size_t kSamples = 100'000;
 constexpr int kNear = 8;  // levels that JPEG moves flat values by
 constexpr size_t kFewColours = 64;
+constexpr double kSomePixels = 0.001;  // share; hot pixels and reflections are fewer
+
+// How the sampled pixels compare with those to the right and below.
+struct Neighbours {
+  size_t pairs = 0, equal = 0, single_step = 0;  // of those that are not both 0 or both 255
+
+  void Add(const std::uint8_t* a, const std::uint8_t* b) {
+    int step = 0;
+    bool clipped = true;
+    for (int c = 0; c < 3; ++c) {
+      step = std::max(step, std::abs(a[c] - b[c]));
+      clipped = clipped && a[c] == a[0] && b[c] == a[0] && (a[0] == 0 || a[0] == 255);
+    }
+    if (clipped) return;
+    ++pairs;
+    equal += step == 0;
+    single_step += step == 1;
+  }
+};
+
+Neighbours NeighboursIn(const ImageRgb8& image, size_t step) {
+  Neighbours neighbours;
+  const auto width = static_cast<size_t>(image.width());
+  const size_t pixels = image.data().size() / 3;
+  for (size_t i = 0; i < pixels; i += step) {
+    const std::uint8_t* rgb = &image.data()[3 * i];
+    if ((i + 1) % width != 0) neighbours.Add(rgb, rgb + 3);
+    if (i + width < pixels) neighbours.Add(rgb, rgb + 3 * width);
+  }
+  return neighbours;
+}
 
 ImageLook LookAtPixels(const ImageRgb8& image) {
   ImageLook look;
@@ -24,6 +56,7 @@ ImageLook LookAtPixels(const ImageRgb8& image) {
   const size_t pixels = image.data().size() / 3;
   const size_t step = std::max<size_t>(1, pixels / kSamples);
   size_t samples = 0, grey = 0, extreme = 0, tiny = 0, coloured = 0, unit = 0;
+  size_t black = 0, white = 0;
   std::set<int> colours;
   for (size_t i = 0; i < pixels; i += step) {
     const std::uint8_t* rgb = &image.data()[3 * i];
@@ -32,6 +65,8 @@ ImageLook LookAtPixels(const ImageRgb8& image) {
     grey += high - low <= kNear;
     extreme += high <= kNear || low >= 255 - kNear;
     tiny += high <= 1;
+    black += high == 0;
+    white += low == 255;
     if (colours.size() <= kFewColours) colours.insert(rgb[0] << 16 | rgb[1] << 8 | rgb[2]);
     if (high - low <= kNear) continue;
     ++coloured;
@@ -45,7 +80,14 @@ ImageLook LookAtPixels(const ImageRgb8& image) {
   look.grey = share(grey, samples) > 0.99;
   look.binary = look.grey && (share(extreme, samples) > 0.98 || tiny == samples);
   look.normals = share(coloured, samples) > 0.02 && share(unit, coloured) > 0.8;
-  look.labels = colours.size() <= kFewColours;
+  look.two_ends = share(black, samples) > kSomePixels && share(white, samples) > kSomePixels;
+  // Noise and shading step by one level from pixel to pixel, labels by any number.
+  constexpr double kFlatPhoto = 0.5, kFlatLabels = 0.9;
+  const Neighbours near = NeighboursIn(image, step);
+  look.few_colours = colours.size() <= kFewColours;
+  look.flat = near.pairs == 0 || share(near.equal, near.pairs) > kFlatPhoto;
+  look.labels = look.few_colours && share(near.equal, near.pairs) > kFlatLabels &&
+                2 * near.single_step <= near.pairs - near.equal;
   const int width = std::min(kThumbnailSidePx, image.width());
   const int height = std::min(kThumbnailSidePx, image.height());
   const ImageRgb8 small = AreaAverage(image, width, height);
@@ -65,8 +107,11 @@ const ImageSize& Looks::SizeOf(const std::string& name) {
     const io::ImageHeader header = io::ReadImageHeader(folder_ / name);
     const bool sideways = header.exif_orientation >= 5;
     entry->second = {sideways ? header.height_px : header.width_px,
-                     sideways ? header.width_px : header.height_px, header.channels == 1,
-                     header.is_float || header.bits > 8, header.format == "jpeg"};
+                     sideways ? header.width_px : header.height_px,
+                     header.channels == 1,
+                     header.is_float || header.bits > 8,
+                     header.is_float,
+                     header.format == "jpeg"};
   } catch (const Error&) {
     // Whoever reads it as a photo says why.
   }
@@ -82,6 +127,25 @@ const ImageLook& Looks::LookOf(const std::string& name) {
     // As above.
   }
   return entry->second;
+}
+
+ImageKind Looks::KindOf(const std::vector<std::string>& samples, bool called_masks) {
+  size_t readable = 0, binary = 0, two_ends = 0, normals = 0, labels = 0;
+  for (const std::string& sample : samples) {
+    if (SizeOf(sample).width_px == 0) continue;
+    if (SizeOf(sample).jpeg) return ImageKind::kPhoto;
+    const ImageLook& look = LookOf(sample);
+    if (!look.readable) continue;
+    ++readable;
+    binary += look.binary;
+    two_ends += look.binary && look.two_ends;
+    normals += look.normals;
+    labels += look.labels;
+  }
+  if (readable == 0) return ImageKind::kPhoto;
+  if (binary == readable && (two_ends > 0 || called_masks)) return ImageKind::kMask;
+  if (normals == readable) return ImageKind::kNormals;
+  return labels == readable ? ImageKind::kLabels : ImageKind::kPhoto;
 }
 
 bool Looks::IsReducedSize(const std::string& smaller, const std::string& larger) {

@@ -3,7 +3,9 @@
 #include <filesystem>
 #include <map>
 #include <string>
+#include <vector>
 
+#include "capture/layout_names.h"
 #include "dtr/types/grid.h"
 
 namespace dtr::capture {
@@ -13,16 +15,20 @@ struct ImageSize {
   int width_px = 0, height_px = 0;
   bool one_channel = false;
   bool deep = false;  ///< more than 8 bits or float
+  bool is_float = false;
   bool jpeg = false;
 };
 
 /// What a sample of its pixels says.
 struct ImageLook {
   bool readable = false;
-  bool grey = false;     ///< all channels alike
-  bool binary = false;   ///< grey, and dark or bright but for the seams
-  bool normals = false;  ///< unit vectors as colours
-  bool labels = false;   ///< few colours, no noise
+  bool grey = false;      ///< all channels alike
+  bool binary = false;    ///< grey, and dark or bright but for the seams, or 0 and 1
+  bool two_ends = false;  ///< holds both 0 and 255; an image that is dark all over does not
+  bool normals = false;   ///< unit vectors as colours
+  bool few_colours = false;
+  bool flat = false;    ///< most pixels equal their neighbours, areas of 0 and of 255 left out
+  bool labels = false;  ///< few colours in flat areas: neither noise nor shading
   Grid<std::uint8_t> thumbnail;
 };
 
@@ -32,6 +38,11 @@ class Looks {
   explicit Looks(const std::filesystem::path& folder) : folder_(folder) {}
   const ImageSize& SizeOf(const std::string& name);
   const ImageLook& LookOf(const std::string& name);
+
+  /// What the pixels of these samples of a folder show without any word: masks, normal maps or
+  /// label maps where all readable ones agree; else photos. A JPEG is a photo. `called_masks`: a
+  /// word says so, and images that are dark or bright all over may be masks too.
+  ImageKind KindOf(const std::vector<std::string>& samples, bool called_masks);
 
   /// Whether `smaller` has the size of `larger` divided by one factor, which is above 1.
   bool IsReducedSize(const std::string& smaller, const std::string& larger);

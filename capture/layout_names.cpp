@@ -146,6 +146,12 @@ NamedImage ReadName(const std::string& name) {
   return read;
 }
 
+bool IsCalledMasks(const std::string& folder) {
+  const std::vector<std::string> tokens = Tokens(folder);
+  return std::any_of(tokens.begin(), tokens.end(),
+                     [](const auto& token) { return KindOf(token) == ImageKind::kMask; });
+}
+
 bool IsProgramOutput(const std::string& name) {
   for (const std::string& part : Parts(FolderOf(name))) {
     const std::string lower = LowerCase(part);

@@ -25,6 +25,8 @@ struct NamedImage {
 };
 
 NamedImage ReadName(const std::string& name);
+/// Whether any word of a folder's name, whatever stands beside it, means masks: "sky_masks".
+bool IsCalledMasks(const std::string& folder);
 
 /// The last part of a name without its extension, and without that of the photo in NAME.jpg.png.
 std::string BareName(const std::string& name);

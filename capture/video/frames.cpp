@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
-#include <cctype>
 #include <cmath>
 #include <optional>
 #include <stdexcept>
@@ -41,15 +39,6 @@ struct VideoReader::Parts {
   std::optional<FrameConverter> converter;  // made for the first frame whose pixels are wanted
 };
 
-bool IsVideoExtension(const std::string& extension) {
-  std::string lower = extension;
-  for (char& c : lower) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  static constexpr std::array<const char*, 14> kVideos{".mp4",  ".mov", ".avi",  ".mkv", ".m4v",
-                                                       ".webm", ".mts", ".m2ts", ".mpg", ".mpeg",
-                                                       ".3gp",  ".3g2", ".wmv",  ".qt"};
-  return std::find(kVideos.begin(), kVideos.end(), lower) != kVideos.end();
-}
-
 VideoReader::VideoReader(const std::filesystem::path& file)
     : file_(file), parts_(std::make_unique<Parts>(file)) {
   const VideoDecoder& decoder = parts_->decoder;
@@ -80,11 +69,12 @@ bool VideoReader::Next() {
                             error.what()));
   }
   if (parts.frame == nullptr) return false;
+  const int number = parts.decoder.number();
   parts.kind = KindOf(*parts.frame, parts.decoder.SampleAspect(*parts.frame));
   const std::string why_not = WhyNotConverted(parts.kind);
   if (!why_not.empty()) {
     throw Error(fmt::format("{}: frame {}: {} is not supported; convert the video", file_.string(),
-                            number_ + 1, why_not));
+                            number, why_not));
   }
   const auto matrix = parts.decoder.MatrixOf(*parts.frame);
   const auto orientation = matrix ? ExifOrientationOf(*matrix) : 1;
@@ -99,14 +89,15 @@ bool VideoReader::Next() {
     why_ended_ = fmt::format(
         "frames from {} on: they are {}x{} as stored, those before {}x{}; cut the video there and "
         "give the rest as another one",
-        number_ + 1, parts.kind.width, parts.kind.height, parts.first->width, parts.first->height);
+        number, parts.kind.width, parts.kind.height, parts.first->width, parts.first->height);
     parts.frame = nullptr;
     return false;
   }
   for (const std::string& remark : RemarksOn(*parts.frame, parts.kind)) Remark(remark);
   if (parts.decoder.deinterlaced() > 0) Remark("interlaced frames are deinterlaced");
-  ++number_;
-  time_s_ = parts.decoder.TimeOf(*parts.frame);
+  number_ = number;
+  const double rate = frames_per_second();
+  time_s_ = parts.decoder.TimeOf(*parts.frame).value_or(rate > 0 ? number / rate : 0);
   return true;
 }
 
@@ -131,21 +122,30 @@ int VideoReader::frames_promised() const {
   return count > 0 && count < kMost ? static_cast<int>(count) : 0;
 }
 
+bool VideoReader::PromisesMoreThan(int frames) const {
+  return frames < kCutShort * frames_promised();
+}
+
+int VideoReader::frames_so_far() const { return parts_->decoder.count(); }
+
 double VideoReader::frames_per_second() const { return parts_->decoder.frames_per_second(); }
 
 std::string VideoReader::WhyIncomplete() const {
   if (!why_ended_.empty()) return why_ended_;
   const VideoDecoder& decoder = parts_->decoder;
-  const int seen = number_ + 1;
-  const std::string damaged =
-      decoder.damaged() == 0 ? ""
-                             : fmt::format("{} damaged frames are left out", decoder.damaged());
-  const int counted = decoder.frames_counted();
+  const int seen = frames_so_far();
+  std::string damaged;
+  if (decoder.damaged() == 1) damaged = "1 damaged frame is left out";
+  if (decoder.damaged() > 1) {
+    damaged = fmt::format("{} damaged frames are left out", decoder.damaged());
+  }
+  const bool counted = decoder.frames_counted() > 0;
   const auto promised_s = decoder.duration_s();
-  bool cut = counted > 0 && seen < kCutShort * counted;
-  if (counted == 0 && promised_s > 0 && decoder.frames_per_second() > 0) {
+  bool cut = counted && PromisesMoreThan(seen);
+  if (!counted && promised_s > 0 && decoder.frames_per_second() > 0) {
     // Frames need not come at one rate: what was shown is measured by its time.
-    cut = time_s_ + kSomeFrames / decoder.frames_per_second() < kCutShort * promised_s;
+    const double more = kSomeFrames + decoder.lost_behind();
+    cut = time_s_ + more / decoder.frames_per_second() < kCutShort * promised_s;
   }
   if (!cut) return damaged;
   return fmt::format(

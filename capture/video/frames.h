@@ -10,9 +10,6 @@
 
 namespace dtr::capture {
 
-/// True for the extensions of videos that are read, any case, with the dot.
-bool IsVideoExtension(const std::string& extension);
-
 /// Decodes a video from its first frame on with FFmpeg's libraries. What the file says about its
 /// frames is applied here: rotation and mirroring (the display matrix), pixels that are not square,
 /// colour matrix and range, HDR and wide gamut (io::SrgbConverter), interlacing (bwdif).
@@ -25,8 +22,9 @@ class VideoReader {
   /// Goes to the next frame; false after the last one, where the rest cannot be decoded, and where
   /// frames change their size. Throws Error where frames cannot be converted.
   bool Next();
-  /// The frame that Next() went to: its number from 0, when it is shown (from the first frame's
-  /// time on), and its pixels: upright, 8-bit sRGB.
+  /// The frame that Next() went to: its number in the file from 0 (damaged frames that are left out
+  /// have theirs), when it is shown (from the first frame's time on), and its pixels: upright,
+  /// 8-bit sRGB.
   int number() const { return number_; }
   double time_s() const { return time_s_; }
   ImageRgb8 Picture() const;
@@ -34,6 +32,10 @@ class VideoReader {
   /// What the file says of itself; 0 where it does not tell. A file cut short says more frames than
   /// it holds.
   int frames_promised() const;
+  /// Whether so many frames are fewer than that by more than headers count too many.
+  bool PromisesMoreThan(int frames) const;
+  /// Frames of the file so far, damaged ones included.
+  int frames_so_far() const;
   double frames_per_second() const;
 
   /// Of the frames so far: one line for each thing that was converted, or that is not used.

@@ -24,7 +24,6 @@ namespace {
 constexpr int kSmallSidePx = 320;      // motion is looked at in such pictures
 constexpr int kJpegQuality = 98;       // the video lost more before
 constexpr double kSameRate = 1e-3;     // relative
-constexpr double kCutShort = 0.98;     // of the promised frames; headers count a few too many
 constexpr double kSameInstant = 0.75;  // of the time between two frames
 constexpr int kSaidEvery = 10;         // frames between two words of progress
 
@@ -37,10 +36,11 @@ class Together {
     for (const fs::path& file : files) readers_.push_back(std::make_unique<VideoReader>(file));
   }
 
-  // To the next instant; false once one of the videos has no more.
+  // To the next instant that all have; false once one of the videos has no more.
   bool Next() {
     bool all = true;
     for (const auto& reader : readers_) all = reader->Next() && all;
+    all = all && Align();
     if (all) CompareTimes();
     return all;
   }
@@ -64,6 +64,22 @@ class Together {
   }
 
  private:
+  // A frame that is damaged in one of the videos is left out of all.
+  bool Align() {
+    int latest = 0;
+    for (bool aligned = false; !aligned;) {
+      aligned = true;
+      for (const auto& reader : readers_) latest = std::max(latest, reader->number());
+      for (const auto& reader : readers_) {
+        while (reader->number() < latest) {
+          if (!reader->Next()) return false;
+        }
+        aligned = aligned && reader->number() == latest;
+      }
+    }
+    return true;
+  }
+
   // A camera that drops frames, or one of variable rate, shows another moment from there on.
   void CompareTimes() {
     const double rate = readers_.front()->frames_per_second();
@@ -112,7 +128,7 @@ void ListLosses(const Videos& files, const Together& videos, int seen, Capture& 
     for (const std::string& remark : reader.remarks()) capture.remarks.push_back({name, remark});
     std::string why = reader.WhyIncomplete();
     const int promised = reader.frames_promised();
-    if (files.size() > 1 && seen < kCutShort * promised) {
+    if (files.size() > 1 && reader.PromisesMoreThan(seen)) {
       why = fmt::format(
           "frames from {} on: the file says it has {}; it or another of the synchronised videos "
           "ends there",
@@ -137,13 +153,15 @@ Choice ChooseFrames(const Videos& files, const VideoOptions& options, Capture& r
   progress.Stage("choosing frames", videos.readers().front()->frames_promised());
   Choice choice;
   FrameChooser chooser(options.motion);
+  int due = 0;  // the next one of every so many, or the first one after it that is whole
   while (videos.Next()) {
     progress.ThrowIfInterrupted();
     const int number = videos.number();
     choice.seen = number + 1;
     if (choice.seen % kSaidEvery == 0) progress.Update(choice.seen);
     if (options.every > 0) {
-      if (number % options.every != 0) continue;
+      if (number < due) continue;
+      due = (number / options.every + 1) * options.every;
       const double sharpness = options.most > 0 ? MeanSharpness(PicturesOf(videos)) : 0;
       choice.frames.push_back({number, videos.time_s(), 0, sharpness});
       continue;
@@ -226,7 +244,7 @@ Videos VideosOf(const fs::path& source) {
   if (fs::is_regular_file(source, error)) {
     return IsVideoExtension(source.extension().string()) ? Videos{source} : Videos{};
   }
-  Videos videos;
+  Videos videos, proxies;
   fs::directory_iterator entries(source, error);
   for (; !error && entries != fs::directory_iterator(); entries.increment(error)) {
     const fs::path& path = entries->path();
@@ -237,8 +255,12 @@ Videos VideosOf(const fs::path& source) {
       continue;
     }
     if (IsImageExtension(path.extension().string())) return {};
-    if (IsVideoExtension(path.extension().string())) videos.push_back(path);
+    const std::string extension = path.extension().string();
+    if (IsVideoExtension(extension)) {
+      (IsProxyVideoExtension(extension) ? proxies : videos).push_back(path);
+    }
   }
+  if (videos.empty()) videos = std::move(proxies);
   std::sort(videos.begin(), videos.end());
   return videos;
 }
@@ -265,8 +287,10 @@ Capture IngestVideos(const Videos& videos, const VideoOptions& options, const fs
     const Choice choice = ChooseFrames(group, options, reported, progress);
     WriteFrames(group, folders, choice.frames, folder, options.threads, origins, progress);
   }
-  Capture capture =
-      IngestPhotos(folder, {.threads = options.threads, .memory_gb = options.memory_gb}, progress);
+  // Frames are photos, whatever a video is called: "normal.mp4" is one speed of several.
+  Capture capture = IngestPhotos(
+      folder, {.sort = false, .threads = options.threads, .memory_gb = options.memory_gb},
+      progress);
   for (Photo& photo : capture.photos) {
     photo.video_frame = origins.at(photo.name);
     photo.camera_group =

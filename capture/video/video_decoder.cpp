@@ -26,22 +26,33 @@ void QuietFfmpeg() {
   std::call_once(once, [] { av_log_set_level(AV_LOG_QUIET); });
 }
 
+// Packets begin with 0x47: of 188 bytes, or of 192 where 4 bytes of time stand before each, as
+// camcorders (AVCHD) and Blu-ray discs write them.
+bool BeginsAsTransportStream(std::string_view begin) {
+  const auto packets = [&](size_t first, size_t bytes) {
+    return begin[first] == 'G' && begin[first + bytes] == 'G' && begin[first + 2 * bytes] == 'G';
+  };
+  return packets(0, 188) || packets(4, 192);
+}
+
 // FFmpeg would follow a playlist to files and hosts that it names, whatever the file is called:
 // only what begins as one of these is given to it.
 bool BeginsAsVideo(const fs::path& file) {
-  std::array<char, 12> bytes{};
+  std::array<char, 400> bytes{};  // three packets of a transport stream
   std::ifstream(file, std::ios::binary).read(bytes.data(), bytes.size());
   const std::string_view begin(bytes.data(), bytes.size());
-  static constexpr std::array<std::string_view, 9> kBoxes{
-      // of MP4 and QuickTime
-      "ftyp", "moov", "mdat", "free", "skip", "wide", "pnot", "styp", "uuid"};
-  static constexpr std::array<std::string_view, 6> kStarts{"\x1a\x45\xdf\xa3",
-                                                           "FLV",
-                                                           "OggS",
-                                                           "\x30\x26\xb2\x75",
-                                                           "G@",  // Matroska, ..., ASF, MPEG-TS
-                                                           std::string_view("\0\0\1\xba", 4)};
-  if (begin.starts_with("RIFF") && begin.substr(8) == "AVI ") return true;
+  static constexpr std::array<std::string_view, 10> kBoxes{
+      // of MP4, QuickTime and Motion JPEG 2000
+      "ftyp", "moov", "mdat", "free", "skip", "wide", "pnot", "styp", "uuid", "jP  "};
+  static constexpr std::array<std::string_view, 6> kStarts{
+      "\x1a\x45\xdf\xa3",
+      "FLV",
+      "OggS",
+      "\x30\x26\xb2\x75",                 // Matroska, ..., ASF
+      std::string_view("\0\0\1\xba", 4),  // MPEG: with sound, and the video alone
+      std::string_view("\0\0\1\xb3", 4)};
+  if (begin.starts_with("RIFF") && begin.substr(8, 4) == "AVI ") return true;
+  if (BeginsAsTransportStream(begin)) return true;
   return std::any_of(kBoxes.begin(), kBoxes.end(),
                      [&](std::string_view box) { return begin.substr(4, 4) == box; }) ||
          std::any_of(kStarts.begin(), kStarts.end(),
@@ -56,7 +67,8 @@ bool BeginsAsVideo(const fs::path& file) {
 Ffmpeg<AVFormatContext> OpenFormat(const fs::path& file) {
   AVDictionary* options = nullptr;
   av_dict_set(&options, "protocol_whitelist", "file", 0);
-  av_dict_set(&options, "format_whitelist", "mov,matroska,avi,flv,ogg,asf,mpegts,mpeg", 0);
+  av_dict_set(&options, "format_whitelist", "mov,matroska,avi,flv,ogg,asf,mpegts,mpeg,mpegvideo",
+              0);
   AVFormatContext* context = nullptr;
   // What stands before a colon at the beginning would be a protocol.
   const std::string url = "file:" + fs::absolute(file).string();
@@ -95,6 +107,15 @@ bool IsDamaged(const AVFrame& frame) {
   return (frame.flags & AV_FRAME_FLAG_CORRUPT) != 0 || frame.decode_error_flags != 0;
 }
 
+FrameNumbers::Time TimeIn(std::int64_t timestamp) {
+  return timestamp == AV_NOPTS_VALUE ? FrameNumbers::Time() : timestamp;
+}
+
+FrameNumbers::Time ShownTimeOf(const AVFrame& frame) {
+  const FrameNumbers::Time shown = TimeIn(frame.best_effort_timestamp);
+  return shown ? shown : TimeIn(frame.pts);
+}
+
 }  // namespace
 
 VideoDecoder::VideoDecoder(const fs::path& file)
@@ -121,6 +142,13 @@ VideoDecoder::VideoDecoder(const fs::path& file)
   codec_ = OpenCodec(file, stream(), decoder);
 }
 
+void VideoDecoder::CountDamaged() {
+  ++damaged_;
+  numbers_.Lose();
+}
+
+// An error of sending is one of a frame sent before, also where nothing more is sent: which of the
+// two calls reports it depends on the number of threads.
 bool VideoDecoder::SendPacket() {
   if (all_sent_) return false;
   int code = 0;
@@ -129,27 +157,40 @@ bool VideoDecoder::SendPacket() {
     code = av_read_frame(format_.get(), packet_.get());
   } while (code == AVERROR(EAGAIN) || (code >= 0 && packet_->stream_index != stream_index_));
   all_sent_ = code < 0;
+  if (!all_sent_ && (packet_->flags & AV_PKT_FLAG_DISCARD) == 0) {  // hidden by an edit list
+    const FrameNumbers::Time decoded = TimeIn(packet_->dts);
+    const FrameNumbers::Time shown = TimeIn(packet_->pts);
+    numbers_.Read(shown ? shown : decoded, decoded);
+  }
   code = avcodec_send_packet(codec_.get(), all_sent_ ? nullptr : packet_.get());
-  if (code < 0 && !all_sent_) ++damaged_;
+  if (code < 0 && code != AVERROR_EOF) CountDamaged();
   return true;
 }
 
 bool VideoDecoder::Decode() {
-  while (true) {
+  constexpr int kMaxErrors = 1000;  // without a frame, at the end: FFmpeg itself gives up earlier
+  for (int errors_at_end = 0; errors_at_end < kMaxErrors;) {
     const int code = avcodec_receive_frame(codec_.get(), frame_.get());
     if (code == AVERROR_EOF) return false;
     if (code == AVERROR(EAGAIN)) {
       if (!SendPacket()) return false;
     } else if (code < 0 || IsDamaged(*frame_)) {
-      ++damaged_;
-      if (code < 0 && !SendPacket()) return false;
+      CountDamaged();
+      errors_at_end += all_sent_;
     } else {
       return true;
     }
   }
+  return false;
 }
 
 const AVFrame* VideoDecoder::Next() {
+  const AVFrame* frame = NextUnnumbered();
+  if (frame != nullptr) number_ = numbers_.Next(ShownTimeOf(*frame));
+  return frame;
+}
+
+const AVFrame* VideoDecoder::NextUnnumbered() {
   while (true) {
     if (deinterlacer_ && deinterlacer_->Get(frame_.get())) return frame_.get();
     if (draining_) {
@@ -174,13 +215,11 @@ const AVFrame* VideoDecoder::Next() {
   }
 }
 
-double VideoDecoder::TimeOf(const AVFrame& frame) const {
-  std::int64_t timestamp = frame.best_effort_timestamp;
-  if (timestamp == AV_NOPTS_VALUE) timestamp = frame.pts;
-  if (timestamp == AV_NOPTS_VALUE) return 0;
-  const std::int64_t start = stream().start_time;
-  if (start != AV_NOPTS_VALUE) timestamp -= start;
-  return static_cast<double>(timestamp) * av_q2d(stream().time_base);
+std::optional<double> VideoDecoder::TimeOf(const AVFrame& frame) const {
+  const FrameNumbers::Time shown = ShownTimeOf(frame);
+  if (!shown) return {};
+  const std::int64_t start = TimeIn(stream().start_time).value_or(0);
+  return static_cast<double>(*shown - start) * av_q2d(stream().time_base);
 }
 
 AVRational VideoDecoder::SampleAspect(const AVFrame& frame) const {
@@ -222,10 +261,11 @@ int VideoDecoder::frames_counted() const {
 }
 
 double VideoDecoder::duration_s() const {
-  if (stream().duration != AV_NOPTS_VALUE && stream().duration > 0) {
+  const bool known = format_->duration_estimation_method != AVFMT_DURATION_FROM_BITRATE;
+  if (known && stream().duration != AV_NOPTS_VALUE && stream().duration > 0) {
     return static_cast<double>(stream().duration) * av_q2d(stream().time_base);
   }
-  if (format_->duration == AV_NOPTS_VALUE || format_->duration <= 0) return 0;
+  if (!known || format_->duration == AV_NOPTS_VALUE || format_->duration <= 0) return 0;
   return static_cast<double>(format_->duration) / AV_TIME_BASE;
 }
 

@@ -8,6 +8,7 @@
 #include "capture/video/deinterlacer.h"
 #include "capture/video/display_matrix.h"
 #include "capture/video/ffmpeg_handles.h"
+#include "capture/video/frame_numbers.h"
 
 namespace dtr::capture {
 
@@ -20,8 +21,14 @@ class VideoDecoder {
 
   /// The next frame that could be decoded; nullptr after the last one. Valid until the next call.
   const AVFrame* Next();
+  /// Of that frame: its number in the file, from 0, where damaged frames have theirs.
+  int number() const { return number_; }
+  int count() const { return numbers_.count(); }  ///< frames so far, damaged ones included
+  /// Of them, damaged ones after that frame.
+  int lost_behind() const { return numbers_.lost_behind(); }
 
-  double TimeOf(const AVFrame& frame) const;  ///< seconds from the first frame's time on
+  /// Seconds from the first frame's time on, if the file says it.
+  std::optional<double> TimeOf(const AVFrame& frame) const;
   /// Of the pixels of this frame: width over height.
   AVRational SampleAspect(const AVFrame& frame) const;
   /// The matrix of this frame (H.264 and HEVC can hold one), else of the track; nothing where
@@ -39,6 +46,8 @@ class VideoDecoder {
 
  private:
   AVStream& stream() const { return *format_->streams[stream_index_]; }
+  const AVFrame* NextUnnumbered();
+  void CountDamaged();
   bool Decode();      // into frame_; false at the end
   bool SendPacket();  // to the decoder; false once all were sent
 
@@ -49,8 +58,9 @@ class VideoDecoder {
   Ffmpeg<AVFrame> held_;  // the first of another size, while the deinterlacer gives what it has
   std::optional<Deinterlacer> deinterlacer_;
   int stream_index_ = -1;
+  FrameNumbers numbers_;
   bool all_sent_ = false, draining_ = false;
-  int damaged_ = 0, deinterlaced_ = 0;
+  int number_ = -1, damaged_ = 0, deinterlaced_ = 0;
 };
 
 }  // namespace dtr::capture

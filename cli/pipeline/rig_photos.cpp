@@ -7,6 +7,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <set>
 
 #include "calib/boards/repeats.h"
 #include "capture/ingest.h"
@@ -137,29 +138,39 @@ std::map<int, int> InstantsOf(const RigTimestamps& timestamps, int camera, int f
   return in_order;
 }
 
-// Headers count a few frames that are not there.
-int FramesIn(const fs::path& video, Progress& progress) {
+// Of a video, as headers count a few frames that are not there.
+struct VideoFrames {
+  std::set<int> numbers;  // of those that can be decoded
+  int count = 0;          // damaged ones included
+};
+
+VideoFrames FramesIn(const fs::path& video, Progress& progress) {
   capture::VideoReader reader(video);
   progress.Stage("counting frames of " + video.filename().string(), reader.frames_promised());
-  int frames = 0;
+  VideoFrames frames;
   while (reader.Next()) {
-    progress.Update(++frames);
+    frames.numbers.insert(reader.number());
+    progress.Update(reader.number() + 1);
     progress.ThrowIfInterrupted();
   }
   const auto note = [&](const std::string& line) {
     progress.Note(fmt::format("{}: {}", video.filename().string(), line));
   };
   for (const std::string& remark : reader.remarks()) note(remark);
-  if (const std::string why = reader.WhyIncomplete(); frames > 0 && !why.empty()) note(why);
-  if (frames > 0) return frames;
+  if (const std::string why = reader.WhyIncomplete(); !frames.numbers.empty() && !why.empty()) {
+    note(why);
+  }
+  frames.count = reader.frames_so_far();
+  if (!frames.numbers.empty()) return frames;
   throw Error(video.string() + ": expected frames, found none; is the video whole?");
 }
 
 // Where table and video differ in length, what has no partner is listed.
-void ListUnpaired(const RigTimestamps& timestamps, const std::map<int, int>& own, int frames,
-                  const std::string& name, Layout& layout) {
-  const int paired = static_cast<int>(
-      std::count_if(own.begin(), own.end(), [&](const auto& row) { return row.first < frames; }));
+void ListUnpaired(const RigTimestamps& timestamps, const std::map<int, int>& own,
+                  const std::set<int>& numbers, const std::string& name, Layout& layout) {
+  const int frames = static_cast<int>(numbers.size());
+  const int paired = static_cast<int>(std::count_if(
+      own.begin(), own.end(), [&](const auto& row) { return numbers.contains(row.first); }));
   const int rows = static_cast<int>(own.size());
   if (paired == frames && rows == paired) return;
   layout.left_out.push_back(
@@ -186,10 +197,10 @@ Layout FromVideos(const fs::path& folder, const std::vector<fs::path>& videos, P
                       "timestamps.csv",
                       video.string()));
     }
-    const int frames = FramesIn(video, progress);
+    const VideoFrames frames = FramesIn(video, progress);
     std::map<int, int> own;
     if (timed) {
-      own = InstantsOf(timestamps, *id, frames);
+      own = InstantsOf(timestamps, *id, frames.count);
       if (own.empty()) {
         throw Error(
             fmt::format("{}: timestamps.csv has no row of cam_id {}, the number at the end of the "
@@ -197,9 +208,9 @@ Layout FromVideos(const fs::path& folder, const std::vector<fs::path>& videos, P
                         "rename the video after its camera, or move it out of the folder",
                         video.string(), *id));
       }
-      ListUnpaired(timestamps, own, frames, name, layout);
+      ListUnpaired(timestamps, own, frames.numbers, name, layout);
     }
-    for (int number = 0; number < frames; ++number) {
+    for (const int number : frames.numbers) {
       Shot shot;
       shot.file = video;
       shot.number = number;
@@ -217,6 +228,18 @@ Layout FromVideos(const fs::path& folder, const std::vector<fs::path>& videos, P
   }
   OrderFrames(layout);
   return layout;
+}
+
+// Videos of low resolution that cameras write beside them are no cameras of their own.
+std::vector<fs::path> VideosIn(const fs::path& folder) {
+  const auto is_proxy = [](const fs::path& path) {
+    return capture::IsProxyVideoExtension(path.extension().string());
+  };
+  auto videos = Sorted(folder, [](const fs::path& path) {
+    return fs::is_regular_file(path) && capture::IsVideoExtension(path.extension().string());
+  });
+  if (!std::all_of(videos.begin(), videos.end(), is_proxy)) std::erase_if(videos, is_proxy);
+  return videos;
 }
 
 // One camera sees an instant once.
@@ -244,12 +267,7 @@ Layout LayoutOf(const fs::path& folder, Progress& progress) {
   Layout layout;
   if (folders.size() >= 2) {
     layout = FromSubfolders(folders);
-  } else if (const auto videos = Sorted(folder,
-                                        [](const fs::path& p) {
-                                          return fs::is_regular_file(p) &&
-                                                 capture::IsVideoExtension(p.extension().string());
-                                        });
-             videos.size() >= 2) {
+  } else if (const auto videos = VideosIn(folder); videos.size() >= 2) {
     layout = FromVideos(folder, videos, progress);
   } else {
     layout = FromNames(Sorted(folder, IsPhoto));

@@ -4,6 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "capture/folder_walk.h"
 #include "capture/ingest.h"
 #include "dtr/types/area_average.h"
@@ -121,6 +124,131 @@ TEST_F(ProjectFolder, CamerasWithEqualNamesStayPhotosWhateverTheirSizes) {
   EXPECT_THAT(layout.contents.ignored, IsEmpty());
 }
 
+// Grey as a dim camera gives it: a gradient over few levels, and noise.
+ImageRgb8 DimGrey(int width, int height, std::uint64_t seed, double noise_levels) {
+  Random random(seed);
+  ImageRgb8 image(width, height, 3);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const double level = 4 + 24.0 * (x + y) / (width + height) + noise_levels * random.Normal();
+      for (int c = 0; c < 3; ++c)
+        image(x, y, c) = static_cast<std::uint8_t>(std::clamp(level, 0., 60.));
+    }
+  }
+  return image;
+}
+
+TEST_F(ProjectFolder, DarkPhotosOfACameraAreNoMasksOfAnother) {
+  for (const int dark : {1, 2, 3}) {  // the first ones: a lamp that is still off
+    for (int i = 0; i < 3; ++i) {
+      const std::string name = "/000" + std::to_string(i) + ".png";
+      WritePhoto("left" + name, 10 + i);
+      if (i < dark) {
+        Write("right" + name, ImageRgb8(kWidth, kHeight, 3, static_cast<std::uint8_t>(i)));
+      } else {
+        WritePhoto("right" + name, 20 + i);
+      }
+    }
+    const Layout layout = Sort();
+    EXPECT_EQ(layout.photos.size(), 6u) << dark;
+    EXPECT_THAT(layout.masks, IsEmpty()) << dark;
+  }
+  for (int i = 0; i < 3; ++i) {  // and one that looks into the sun
+    Write("right/000" + std::to_string(i) + ".png", ImageRgb8(kWidth, kHeight, 3, 255));
+  }
+  EXPECT_EQ(Sort().photos.size(), 6u);
+}
+
+TEST_F(ProjectFolder, MasksThatUseNothingOfAPhotoAreMasksAmongOthersOrByTheirName) {
+  for (int i = 0; i < 3; ++i) {
+    const std::string name = "/" + std::to_string(i) + ".png";
+    WritePhoto("shots" + name, i);
+    if (i == 0) {
+      Write("sel" + name, ImageRgb8(kWidth, kHeight, 3));
+    } else {
+      WriteMask("sel" + name);
+    }
+  }
+  EXPECT_EQ(Sort().masks.size(), 3u);
+  fs::remove_all(folder_ / "sel");
+  for (int i = 0; i < 3; ++i) {
+    Write("sky_masks/" + std::to_string(i) + ".png", ImageRgb8(kWidth, kHeight, 3));
+  }
+  EXPECT_EQ(Sort().masks.size(), 3u);
+}
+
+TEST_F(ProjectFolder, DimGreyPhotosAreNoLabelMaps) {
+  for (const double noise : {2.0, 0.05}) {
+    for (int i = 0; i < 3; ++i) {
+      const std::string name = "/" + std::to_string(i) + ".png";
+      WritePhoto("left" + name, i);
+      Write("right" + name, DimGrey(8 * kWidth, 8 * kHeight, i, noise));
+    }
+    EXPECT_EQ(Sort().photos.size(), 6u) << noise;
+  }
+}
+
+TEST_F(ProjectFolder, LabelMapsAreKnownByTheirFlatAreas) {
+  for (int i = 0; i < 3; ++i) {
+    const std::string name = "/" + std::to_string(i) + ".png";
+    WritePhoto("shots" + name, i);
+    ImageRgb8 labels(kWidth, kHeight, 3);
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < kWidth; ++x) {
+        const int label = x < 40 ? 0 : y < 30 ? 7 : x < 70 ? 23 : 11;
+        for (int c = 0; c < 3; ++c) labels(x, y, c) = static_cast<std::uint8_t>(label);
+      }
+    }
+    Write("classes" + name, labels);
+  }
+  EXPECT_EQ(Sort().photos.size(), 3u);
+  EXPECT_EQ(IgnoredOf(Sort(), "label_maps"), 3);
+}
+
+TEST_F(ProjectFolder, AFoldersWordNeedsPixelsThatAgree) {
+  for (int i = 0; i < 3; ++i) {
+    const std::string name = "/" + std::to_string(i) + ".jpg";
+    WritePhoto("images" + name, i);
+    for (const char* camera : {"normal", "labels", "confidence"}) {
+      Random random(i);
+      ImageRgb8 photo = BlockPhoto(kWidth, kHeight, 100 + 10 * i + camera[0]);
+      for (auto& value : photo.data()) value = static_cast<std::uint8_t>(value + random.Index(9));
+      Write(camera + name, photo);
+    }
+    WritePhoto("preview" + name, 100 + 10 * i, 48);
+  }
+  EXPECT_EQ(Sort().photos.size(), 15u);
+  EXPECT_THAT(Sort().contents.ignored, IsEmpty());
+}
+
+TEST_F(ProjectFolder, MapsInFoldersCalledSoAreNoPhotos) {
+  for (int i = 0; i < 3; ++i) {
+    const std::string name = "/" + std::to_string(i) + ".jpg";
+    WritePhoto("images" + name, i);
+    WritePhoto("preview" + name, i, 48);
+    ImageRgb8 normals(kWidth, kHeight, 3), labels(kWidth, kHeight, 3), sure(kWidth, kHeight, 3);
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < kWidth; ++x) {
+        const double angle = 0.01 * (x - 48);  // a cylinder that stands upright
+        const double normal[] = {std::sin(angle), 0, std::cos(angle)};
+        for (int c = 0; c < 3; ++c) {
+          normals(x, y, c) = static_cast<std::uint8_t>(127.5 + 127.5 * normal[c]);
+          labels(x, y, c) = static_cast<std::uint8_t>((x / 32 * 90 + c * 60) % 250);
+          sure(x, y, c) = static_cast<std::uint8_t>(2 * x + y / 4);
+        }
+      }
+    }
+    Write("normals" + name, normals);
+    Write("labels" + name, labels);
+    Write("conf" + name, sure);
+  }
+  const Layout layout = Sort();
+  EXPECT_EQ(layout.photos.size(), 3u);
+  for (const char* kind : {"normal_maps", "label_maps", "confidence_maps", "previews"}) {
+    EXPECT_EQ(IgnoredOf(layout, kind), 3) << kind;
+  }
+}
+
 TEST_F(ProjectFolder, TimeStepsOfAStillSceneStayPhotos) {
   for (const char* step : {"t0", "t1"}) {
     for (int camera = 0; camera < 2; ++camera) {
@@ -199,6 +327,18 @@ TEST_F(ProjectFolder, RawFilesBesidePhotosVideosAndImagesWithoutExtensionAreCoun
   for (const char* kind : {"raw_files", "live_photo_videos", "videos", "other_files",
                            "unread_images", "unnamed_images"}) {
     EXPECT_EQ(IgnoredOf(layout, kind), 1) << kind;
+  }
+}
+
+TEST_F(ProjectFolder, VideosOfLowResolutionAreNotAdvisedBesideThoseOfFull) {
+  WritePhoto("1.jpg", 1);
+  WriteFileAtomically(folder_ / "GL010001.LRV", "film");
+  EXPECT_EQ(IgnoredOf(Sort(), "videos"), 1);
+  WriteFileAtomically(folder_ / "GX010001.MP4", "film");
+  EXPECT_EQ(IgnoredOf(Sort(), "videos"), 1);
+  EXPECT_EQ(IgnoredOf(Sort(), "proxy_videos"), 1);
+  for (const char* extension : {".MTS", ".m2ts", ".insv", ".LRV", ".mj2"}) {
+    EXPECT_TRUE(IsVideoExtension(extension)) << extension;
   }
 }
 

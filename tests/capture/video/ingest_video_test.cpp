@@ -69,18 +69,16 @@ TEST(IngestVideos, TakesEveryNthFrameAndSaysWhichItIs) {
   EXPECT_EQ(read.photos[1].video_frame->video, "walk.avi");
 }
 
-// Camcorders and older phones; what a file holds says how to decode it, not its name.
-TEST(IngestVideos, OtherNamesOfVideosAreRead) {
+TEST(IngestVideos, FramesArePhotosWhateverTheVideosAreCalled) {
   const TemporaryFolder folder;
-  WriteVideo(folder / "walk.avi", Places(25, 4));
-  for (const char* name : {"a.MTS", "b.m2ts", "c.3gp", "d.mpg", "e.wmv", "f.qt"}) {
-    fs::copy_file(folder / "walk.avi", folder / name);
-    EXPECT_TRUE(IsVideoExtension(fs::path(name).extension().string())) << name;
-    EXPECT_GT(Ingest({folder / name}, {.threads = 2}, folder / (name + std::string("_frames")))
-                  .photos.size(),
-              1u)
-        << name;
+  std::vector<fs::path> videos;
+  for (const char* name : {"color.avi", "labels.avi", "normal.avi", "preview.avi"}) {
+    WriteVideo(folder / name, Places(3, 4));
+    videos.push_back(folder / name);
   }
+  EXPECT_THAT(NamesOf(Ingest(videos, {.every = 3}, folder / "frames")),
+              ElementsAre("color/frame_000000.jpg", "labels/frame_000000.jpg",
+                          "normal/frame_000000.jpg", "preview/frame_000000.jpg"));
 }
 
 TEST(IngestVideos, ChoosesByMotionTheSameFramesForAnyNumberOfThreads) {
@@ -252,6 +250,9 @@ TEST(VideosOf, AreAVideoOrAFolderOfNothingElse) {
   }
   WriteFileAtomically(folder / "capture/capture.json", "{}");
   EXPECT_EQ(VideosOf(folder.path()).size(), 2u);
+  WriteFileAtomically(folder / "a.lrv", "x");  // the same at low resolution
+  EXPECT_EQ(VideosOf(folder.path()).size(), 2u);
+  EXPECT_THAT(VideosOf(folder / "a.lrv"), ElementsAre(folder / "a.lrv"));
   fs::create_directory(folder / "sub");
   EXPECT_THAT(VideosOf(folder.path()), IsEmpty());
   fs::remove(folder / "sub");

@@ -9,10 +9,10 @@
 #include "capture/video/ingest_video.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
-#include "dtr/base/process.h"
 #include "dtr/io/image_io.h"
 #include "dtr/io/video.h"
 #include "tests/capture/photo_files.h"
+#include "tests/capture/video/ffmpeg_videos.h"
 #include "tests/support/test_data.h"
 
 namespace dtr::capture {
@@ -21,22 +21,15 @@ namespace {
 namespace fs = std::filesystem;
 using dtr::testing::DataFolder;
 using dtr::testing::TemporaryFolder;
+using testing::Arguments;
 using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using testing::MessageOf;
-using Arguments = std::vector<std::string>;
+using testing::RunFfmpeg;
+using testing::WriteCounted;
 
 constexpr int kW = 96, kH = 64;
-
-void RunFfmpeg(const fs::path& folder, const Arguments& arguments) {
-  Arguments command{"ffmpeg", "-y", "-loglevel", "error"};
-  command.insert(command.end(), arguments.begin(), arguments.end());
-  ProcessOptions options;
-  options.working_directory = folder;
-  options.log_file = folder / "ffmpeg.log";
-  ASSERT_TRUE(RunProcess(command, options).Ok()) << ReadFile(folder / "ffmpeg.log", 1 << 20);
-}
 
 // Blocks of different colours, without any symmetry.
 ImageRgb8 Truth() {
@@ -328,20 +321,51 @@ TEST(VideoTruth, InterlacedFramesAreDeinterlaced) {
   EXPECT_EQ(video.WhyIncomplete(), "");
 }
 
-// Frames that differ: number n has the grey value 20 n.
-void WriteCounted(const TemporaryFolder& folder, const std::string& name, int frames,
-                  const Arguments& more) {
-  std::string bytes;
-  for (int i = 0; i < frames; ++i) {
-    bytes += std::string(64 * 48, static_cast<char>(20 + 10 * i));
-    bytes += std::string(64 * 24, static_cast<char>(128));
+// What a file holds says how to decode it, not its name.
+TEST(VideoTruth, FilesOfCamcordersPhonesAndActionCamerasAreRead) {
+  const TemporaryFolder folder;
+  struct Kind {
+    const char* name;
+    Arguments how;
+  };
+  const Arguments h264{"-c:v", "libx264", "-qp", "0"};
+  const Arguments blocks{"-r", "25", "-b:v", "20M", "-c:v"};
+  const auto with = [](Arguments all, const Arguments& more) {
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+  };
+  const Kind kinds[] = {
+      {"plain.ts", h264},
+      {"00001.MTS", with(h264, {"-f", "mpegts", "-mpegts_m2ts_mode", "1"})},
+      {"00002.m2ts", with(h264, {"-mpegts_m2ts_mode", "1"})},
+      {"program.mpg", with(blocks, {"mpeg2video", "-f", "vob"})},
+      {"video.mpg", with(blocks, {"mpeg2video", "-f", "mpeg2video"})},
+      {"video.mpeg", with(blocks, {"mpeg1video", "-f", "mpeg1video"})},
+      {"phone.3gp", with(h264, {"-f", "3gp"})},
+      {"old.wmv", with(blocks, {"wmv2"})},
+      {"old.qt", with(blocks, {"mjpeg", "-f", "mov"})},
+      {"GL010001.LRV", with(h264, {"-f", "mp4"})},
+      {"VID_1.insv", with(h264, {"-f", "mp4"})},
+      {"frames.mj2",
+       {"-c:v", "jpeg2000", "-f", "mov", "-movflags",
+        "frag_keyframe+empty_moov+default_base_moof"}},
+  };
+  for (const Kind& kind : kinds) {
+    WriteCounted(folder, kind.name, 12, kind.how);
+    if (kind.name == std::string("frames.mj2")) {  // ISO 15444-3: a signature stands first
+      const std::string mov = ReadFile(folder / kind.name, 1 << 24);
+      WriteFileAtomically(folder / kind.name, std::string("\0\0\0\x0cjP  \r\n\x87\n", 12) + mov);
+    }
+    VideoReader video(folder / kind.name);
+    int frames = 0;
+    while (video.Next()) ++frames;
+    EXPECT_GE(frames, 12) << kind.name;
+    EXPECT_EQ(video.WhyIncomplete(), "") << kind.name;
   }
-  WriteFileAtomically(folder / "counted.yuv", bytes);
-  Arguments arguments{"-f",    "rawvideo", "-pix_fmt", "yuv420p", "-s",
-                      "64x48", "-r",       "10",       "-i",      "counted.yuv"};
-  arguments.insert(arguments.end(), more.begin(), more.end());
-  arguments.push_back(name);
-  RunFfmpeg(folder.path(), arguments);
+  // A transport stream may begin anywhere, with video before its tables.
+  const std::string whole = ReadFile(folder / "plain.ts", 1 << 24);
+  WriteFileAtomically(folder / "later.mts", whole.substr(2 * 188, 188) + whole);
+  EXPECT_EQ(FramesOf(folder / "later.mts").size(), 12u);
 }
 
 TEST(VideoTruth, FramesThatAnEditListHidesAreNeitherShownNorMissed) {

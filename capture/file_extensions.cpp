@@ -1,9 +1,12 @@
 #include <OpenImageIO/imageio.h>
 
+#include <algorithm>
+#include <array>
 #include <map>
 #include <set>
 #include <sstream>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "capture/ingest.h"
@@ -58,5 +61,15 @@ bool IsRawExtension(const std::string& extension) {
   static const std::set<std::string> kExtensions = ReadableExtensions("raw");
   return Contains(kExtensions, extension);
 }
+
+bool IsVideoExtension(const std::string& extension) {
+  // .insv and .lrv are MP4 files of action cameras.
+  static constexpr std::array<std::string_view, 17> kVideos{
+      ".mp4",  ".mov", ".avi", ".mkv", ".m4v", ".webm", ".mts", ".m2ts", ".mpg",
+      ".mpeg", ".3gp", ".3g2", ".wmv", ".mj2", ".insv", ".lrv", ".qt"};
+  return std::find(kVideos.begin(), kVideos.end(), LowerCase(extension)) != kVideos.end();
+}
+
+bool IsProxyVideoExtension(const std::string& extension) { return LowerCase(extension) == ".lrv"; }
 
 }  // namespace dtr::capture
