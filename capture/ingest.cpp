@@ -25,10 +25,6 @@ namespace {
 const double kFilmDiagonalMm = std::hypot(36.0, 24.0);
 constexpr double kShortestFocal = 0.1, kLongestFocal = 100;  // of the long side
 
-bool EndsWith(const std::string& text, const std::string& end) {
-  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
-}
-
 std::string CameraGroup(const Photo& photo, const io::ImageHeader& header) {
   const auto known = [](const std::string& text) { return text.empty() ? "unknown" : text; };
   char focal[48] = "unknown";
@@ -148,7 +144,7 @@ std::string WhyNotSearched(const fs::path& folder) {
   std::error_code ignored;
   if (fs::is_symlink(folder, ignored)) return "links to a folder; links are not followed";
   const std::string name = folder.filename().string();
-  if (EndsWith(name, ".dtr") || EndsWith(name, ".partial") || EndsWith(name, ".partial.work") ||
+  if (name.ends_with(".dtr") || name.ends_with(".partial") || name.ends_with(".partial.work") ||
       fs::exists(folder / "set.json", ignored)) {
     return "is a D+TR set, not photos";
   }

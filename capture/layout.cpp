@@ -68,10 +68,6 @@ class Sorter {
   Layout layout_;
 };
 
-bool EndsWith(const std::string& text, const std::string& end) {
-  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
-}
-
 void Sorter::Ignore(const std::string& name, const char* kind, const char* what,
                     const char* reason) {
   rest_.erase(name);
@@ -111,7 +107,7 @@ void Sorter::TakeMaskFiles() {
   for (const std::string& name : rest_) by_stem.emplace(StemOf(name), name);
   for (const std::string& name : std::vector<std::string>(rest_.begin(), rest_.end())) {
     const std::string stem = StemOf(name);
-    if (!EndsWith(stem, kEnd)) continue;
+    if (!stem.ends_with(kEnd)) continue;
     const auto [first, last] = by_stem.equal_range(stem.substr(0, stem.size() - strlen(kEnd)));
     if (first == last) continue;
     bool used = false;

@@ -13,7 +13,7 @@
 namespace dtr::capture {
 namespace {
 
-constexpr int kThumbnailSidePx = 24;
+constexpr int kLookSidePx = 24;
 constexpr size_t kSamples = 100'000;
 constexpr int kNear = 8;  // levels that JPEG moves flat values by
 constexpr size_t kFewColours = 64;
@@ -46,8 +46,8 @@ ImageLook LookAtPixels(const ImageRgb8& image) {
   look.binary = look.grey && (share(extreme, samples) > 0.98 || tiny == samples);
   look.normals = share(coloured, samples) > 0.02 && share(unit, coloured) > 0.8;
   look.labels = colours.size() <= kFewColours;
-  const int width = std::min(kThumbnailSidePx, image.width());
-  const int height = std::min(kThumbnailSidePx, image.height());
+  const int width = std::min(kLookSidePx, image.width());
+  const int height = std::min(kLookSidePx, image.height());
   const ImageRgb8 small = AreaAverage(image, width, height);
   look.thumbnail = Grid<std::uint8_t>(width, height);
   for (size_t i = 0; i < look.thumbnail.data().size(); ++i) {

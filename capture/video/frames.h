@@ -10,6 +10,8 @@
 
 namespace dtr::capture {
 
+constexpr double kCutShort = 0.98;  // of the promised frames; headers count a few too many
+
 /// True for the extensions of videos that are read, any case, with the dot.
 bool IsVideoExtension(const std::string& extension);
 

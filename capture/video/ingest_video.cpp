@@ -24,7 +24,6 @@ namespace {
 constexpr int kSmallSidePx = 320;      // motion is looked at in such pictures
 constexpr int kJpegQuality = 98;       // the video lost more before
 constexpr double kSameRate = 1e-3;     // relative
-constexpr double kCutShort = 0.98;     // of the promised frames; headers count a few too many
 constexpr double kSameInstant = 0.75;  // of the time between two frames
 constexpr int kSaidEvery = 10;         // frames between two words of progress
 
