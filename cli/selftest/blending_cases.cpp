@@ -89,7 +89,7 @@ Outcome Exponentials(const Conditions&) {
   return outcome;
 }
 
-Outcome ManyViews(const Conditions&) {
+Outcome ManyBlendedViews(const Conditions&) {
   Outcome outcome;
   Shares shares;
   Random random(3);
@@ -166,7 +166,7 @@ Outcome ZeroAndStraightBehind(const Conditions&) {
 std::vector<Case> BlendingCases() {
   return {{kBlendingStage, "cos^n, n to 1000", true, CosinePowers},
           {kBlendingStage, "exponential, c to 1e6", true, Exponentials},
-          {kBlendingStage, "256 views", true, ManyViews},
+          {kBlendingStage, "256 views", true, ManyBlendedViews},
           {kBlendingStage, "all weights underflow", true, AllUnderflow},
           {kBlendingStage, "duplicate cameras", true, Duplicates},
           {kBlendingStage, "angles of 0 and 180 degrees", true, ZeroAndStraightBehind}};
