@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "calib/similarity.h"
 #include "dtr/base/error.h"
 #include "dtr/base/order_statistics.h"
 
@@ -15,7 +16,7 @@ namespace {
 
 constexpr double kMostDisagreement = 5;  // sigmas
 constexpr int kMostPasses = 20;
-constexpr double kNothing = 1e-12;  // share of what is known best: rounding
+constexpr double kRoundingShare = 1e-12;  // share of what is known best: rounding
 
 double RelativeSigma(const MeasuredDistance& d) {
   const Eigen::Vector3d way = d.b - d.a;
@@ -24,12 +25,6 @@ double RelativeSigma(const MeasuredDistance& d) {
   const double variance = along.dot((d.covariance_a + d.covariance_b) * along);
   const double measured = d.sigma_m > 0 ? d.sigma_m / d.length_m : kUnstatedRelativeSigma;
   return std::hypot(std::sqrt(variance) / length, measured);
-}
-
-Eigen::Vector3d MeanOf(std::span<const Eigen::Vector3d> points) {
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  for (const Eigen::Vector3d& p : points) mean += p / static_cast<double>(points.size());
-  return mean;
 }
 
 double RmsFromMean(std::span<const Eigen::Vector3d> points) {
@@ -64,7 +59,7 @@ void FillUncertainty(std::span<const Eigen::Vector3d> centres,
   double known_scale = rest(3, 3);
   for (int k = 0; k < 3; ++k) {
     const double known = turn.eigenvalues()[k];
-    if (!(known > kNothing * turn.eigenvalues()[2])) continue;
+    if (!(known > kRoundingShare * turn.eigenvalues()[2])) continue;
     known_scale -= std::pow(turn.eigenvectors().col(k).dot(rest.topRightCorner<3, 1>()), 2) / known;
   }
   scale.relative_sigma = 1 / std::sqrt(std::max(known_scale, 0.0));
@@ -198,7 +193,7 @@ PositionScale AlignToPositions(std::span<const Eigen::Vector3d> centres,
   scale.sigma_m = scale.rms_m * std::sqrt(static_cast<double>(a.size()) / freedom);
   // Positions that are met exactly are known to rounding.
   const double sigma_m =
-      std::max(scale.sigma_m, kNothing * scale.metric_from_scene.scale * RmsFromMean(a));
+      std::max(scale.sigma_m, kRoundingShare * scale.metric_from_scene.scale * RmsFromMean(a));
   const std::vector<Eigen::Vector3d> sigmas(a.size(), Eigen::Vector3d::Constant(sigma_m));
   FillUncertainty(a, sigmas, scale);
   return scale;

@@ -27,12 +27,6 @@ Points Stack(std::span<const Eigen::Vector3d> points, const char* which) {
   return stacked;
 }
 
-Eigen::Vector3d MeanOf(std::span<const Eigen::Vector3d> points) {
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  for (const Eigen::Vector3d& p : points) mean += p / static_cast<double>(points.size());
-  return mean;
-}
-
 void RefuseLines(const Points& centred, const char* which) {
   const Eigen::Vector3d extent = Eigen::JacobiSVD<Points>(centred).singularValues();
   if (!(extent(0) > 0) || !(extent(1) > kThinnest * extent(0))) {
@@ -43,6 +37,12 @@ void RefuseLines(const Points& centred, const char* which) {
 }
 
 }  // namespace
+
+Eigen::Vector3d MeanOf(std::span<const Eigen::Vector3d> points) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& p : points) mean += p / static_cast<double>(points.size());
+  return mean;
+}
 
 Similarity Similarity::Inverse() const {
   const Eigen::Quaterniond a_from_b = rotation.conjugate();

@@ -24,6 +24,9 @@ struct Similarity {
   Pose CamFromB(const Pose& cam_from_a) const;
 };
 
+/// Requires a point.
+Eigen::Vector3d MeanOf(std::span<const Eigen::Vector3d> points);
+
 /// The similarity b_from_a with the smallest sum of squared distances |b_from_a * a_i - b_i|^2
 /// (Umeyama 1991, eq. 40-42). It needs three points that are not on one line; for camera centres
 /// that is a path with a bend. Throws Error when the numbers of points differ, are below three, a

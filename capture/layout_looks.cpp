@@ -14,7 +14,7 @@
 namespace dtr::capture {
 namespace {
 
-constexpr int kThumbnailSidePx = 24;
+constexpr int kLookSidePx = 24;
 constexpr size_t kSamples = 100'000;
 constexpr int kNear = 8;  // levels that JPEG moves flat values by
 constexpr size_t kFewColours = 64;
@@ -88,8 +88,8 @@ ImageLook LookAtPixels(const ImageRgb8& image) {
   look.flat = near.pairs == 0 || share(near.equal, near.pairs) > kFlatPhoto;
   look.labels = look.few_colours && share(near.equal, near.pairs) > kFlatLabels &&
                 2 * near.single_step <= near.pairs - near.equal;
-  const int width = std::min(kThumbnailSidePx, image.width());
-  const int height = std::min(kThumbnailSidePx, image.height());
+  const int width = std::min(kLookSidePx, image.width());
+  const int height = std::min(kLookSidePx, image.height());
   const ImageRgb8 small = AreaAverage(image, width, height);
   look.thumbnail = Grid<std::uint8_t>(width, height);
   for (size_t i = 0; i < look.thumbnail.data().size(); ++i) {

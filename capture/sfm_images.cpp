@@ -25,7 +25,7 @@ bool EndsInJpeg(const std::string& name) {
   return extension == ".jpg" || extension == ".jpeg";
 }
 
-void Require(const std::error_code& error, const fs::path& file) {
+void RequireDone(const std::error_code& error, const fs::path& file) {
   if (error) throw Error(file.string() + ": cannot be written: " + error.message());
 }
 
@@ -53,7 +53,7 @@ void Rewrite(const Photo& photo, const io::ImageHeader& header, std::pair<int, i
 void MakeFolderOf(const fs::path& file) {
   std::error_code error;
   fs::create_directories(file.parent_path(), error);
-  Require(error, file.parent_path());
+  RequireDone(error, file.parent_path());
 }
 
 void PrepareMask(const Photo& photo, const fs::path& to, int max_size_px) {
@@ -75,7 +75,7 @@ void PreparePhoto(const Photo& photo, const fs::path& to, int max_size_px) {
   std::error_code error;
   MakeFolderOf(to);
   fs::remove(to, error);
-  Require(error, to);
+  RequireDone(error, to);
   if (unchanged) {
     LinkOrCopy(photo.file, to);
   } else {

@@ -1,4 +1,5 @@
-# dtr_library(NAME SOURCES ... [PUBLIC libs...] [PRIVATE libs...]): one static library per folder.
+# dtr_library(NAME SOURCES ... [APART ...] [PUBLIC libs...] [PRIVATE libs...]): one static library per folder. With
+# DTR_UNITY its sources are compiled several at a time; those of APART each alone.
 # dtr_test(NAME SOURCES ... LIBS ... [LABELS ...] [TIMEOUT s]): one GoogleTest program, discovered by CTest.
 # dtr_one_entry_test(the same): one entry of CTest for all its tests, which share what is slow to start. It fails when
 # one of them does, and is skipped when one of them was and none failed.
@@ -23,9 +24,19 @@ function(dtr_compile_options target)
   endif()
 endfunction()
 
+# Most of a compile job is headers: Eigen, JSON, Ceres. Names in one batch must differ.
+function(dtr_unity target)
+  set_target_properties(${target} PROPERTIES UNITY_BUILD ${DTR_UNITY} UNITY_BUILD_BATCH_SIZE 8)
+  if(NOT ARGN)
+    return()
+  endif()
+  set_source_files_properties(${ARGN} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+endfunction()
+
 function(dtr_library name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
-  add_library(${name} STATIC ${ARG_SOURCES})
+  cmake_parse_arguments(ARG "" "" "SOURCES;APART;PUBLIC;PRIVATE" ${ARGN})
+  add_library(${name} STATIC ${ARG_SOURCES} ${ARG_APART})
+  dtr_unity(${name} ${ARG_APART})
   add_library(dtr::${name} ALIAS ${name})
   target_include_directories(${name} PUBLIC
     $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:${DTR_INSTALL_HEADERS}>)

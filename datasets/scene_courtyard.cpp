@@ -13,13 +13,13 @@ using Eigen::Vector3d;
 using Pattern = Material::Pattern;
 
 /// The yard's materials, by what they are.
-struct Palette {
+struct CourtyardPalette {
   int paving, brick, plaster, bare, stone, marble, wood, dark_wood, tiles, slate, metal, painting,
       glass, leaves, dark_leaves, clay;
 };
 
-Palette MakePalette(SceneBuilder& b) {
-  Palette p;
+CourtyardPalette MakeCourtyardPalette(SceneBuilder& b) {
+  CourtyardPalette p;
   p.paving = b.Add({.pattern = Pattern::kPaving,
                     .color = {0.46, 0.43, 0.38},
                     .color2 = {0.13, 0.12, 0.09},
@@ -83,7 +83,7 @@ Palette MakePalette(SceneBuilder& b) {
 }
 
 /// Floor, walls, door, windows and posters. The right wall is the one without texture.
-void AddWalls(SceneBuilder& b, const Palette& p) {
+void AddWalls(SceneBuilder& b, const CourtyardPalette& p) {
   b.Rectangle(Vector3d::Zero(), 95 * Vector3d::UnitX(), 95 * Vector3d::UnitY(), p.paving);
   b.Box({0, 9.25, 2.6}, {11.5, 0.25, 2.6}, p.brick);
   b.Box({0, 9.25, 5.3}, {11.7, 0.4, 0.1}, p.stone);
@@ -107,7 +107,7 @@ void AddWalls(SceneBuilder& b, const Palette& p) {
 }
 
 /// A colonnade along the back wall under a lean-to roof of tiles.
-void AddArcade(SceneBuilder& b, const Palette& p) {
+void AddArcade(SceneBuilder& b, const CourtyardPalette& p) {
   for (int i = 0; i < 7; ++i) {
     const double x = -9.0 + 3.0 * i;
     b.Box({x, 6.8, 0.15}, {0.42, 0.42, 0.15}, p.stone, 3.0 * i);
@@ -138,7 +138,7 @@ void AddHouse(SceneBuilder& b, const Vector3d& foot, const Vector3d& half, doubl
 }
 
 /// A fountain, statues, lamp posts, a fence of thin rods, and what stands about in a yard.
-void AddFurnishing(SceneBuilder& b, const Palette& p, Random& random) {
+void AddFurnishing(SceneBuilder& b, const CourtyardPalette& p, Random& random) {
   b.Rod({0.3, 2.4, 0}, {0.3, 2.4, 0.45}, 1.35, p.stone);
   b.Rod({0.3, 2.4, 0.4}, {0.3, 2.4, 0.5}, 1.15, p.glass);
   b.Rod({0.3, 2.4, 0.4}, {0.3, 2.4, 1.5}, 0.16, p.marble);
@@ -181,7 +181,7 @@ void AddFurnishing(SceneBuilder& b, const Palette& p, Random& random) {
 }
 
 /// A trunk under a crown of several balls of leaves, as wide as a ball of `radius`.
-void AddTree(SceneBuilder& b, const Palette& p, const Vector3d& foot, double radius,
+void AddTree(SceneBuilder& b, const CourtyardPalette& p, const Vector3d& foot, double radius,
              Random& random) {
   const Vector3d crown = foot + Vector3d(0, 0, 3.2 + radius);
   b.Rod(foot, crown, 0.25, p.dark_wood);
@@ -194,7 +194,7 @@ void AddTree(SceneBuilder& b, const Palette& p, const Vector3d& foot, double rad
 }
 
 /// Bushes in pots and in the corners; trees and buildings beyond the walls.
-void AddGreenAndBeyond(SceneBuilder& b, const Palette& p, Random& random) {
+void AddGreenAndBeyond(SceneBuilder& b, const CourtyardPalette& p, Random& random) {
   for (const double x : {-10.2, -7.6, -4.6, 4.6, 7.6}) {
     b.Rod({x, 6.1, 0}, {x, 6.1, 0.4}, 0.26, p.clay);
     const double radius = 0.4 + random.Uniform(-0.06, 0.08);
@@ -224,7 +224,7 @@ void AddGreenAndBeyond(SceneBuilder& b, const Palette& p, Random& random) {
 Scene MakeCourtyard(std::uint64_t seed) {
   SceneBuilder b(seed);
   Random random(HashOf(seed, 0xc0u));
-  const Palette p = MakePalette(b);
+  const CourtyardPalette p = MakeCourtyardPalette(b);
   AddWalls(b, p);
   AddArcade(b, p);
   AddHouse(b, {-4.6, 4.3, 0}, {1.2, 1.0, 0.9}, 0.75, 18, p.wood, p.slate);

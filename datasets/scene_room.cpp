@@ -13,13 +13,13 @@ using Pattern = Material::Pattern;
 
 constexpr double kHalfX = 4.0, kHalfY = 3.0, kHeight = 2.9;
 
-struct Palette {
+struct RoomPalette {
   int floor, ceiling, brick, paper, panel, plain, oak, walnut, cloth, rug, painting, leather, leaf,
       clay, metal, marble;
 };
 
-Palette MakePalette(SceneBuilder& b) {
-  Palette p;
+RoomPalette MakeRoomPalette(SceneBuilder& b) {
+  RoomPalette p;
   p.floor = b.Add({.pattern = Pattern::kPlanks,
                    .color = {0.50, 0.32, 0.18},
                    .color2 = {0.06, 0.04, 0.02},
@@ -89,7 +89,7 @@ Palette MakePalette(SceneBuilder& b) {
 }
 
 /// Floor, ceiling with beams, four walls of different stuff, skirting boards, window and door.
-void AddShell(SceneBuilder& b, const Palette& p) {
+void AddShell(SceneBuilder& b, const RoomPalette& p) {
   const Vector3d x = kHalfX * Vector3d::UnitX(), y = kHalfY * Vector3d::UnitY(),
                  z = kHeight / 2 * Vector3d::UnitZ();
   b.Rectangle({0, 0, 0}, x, y, p.floor);
@@ -115,7 +115,7 @@ void AddShell(SceneBuilder& b, const Palette& p) {
 }
 
 /// A bookcase of 5 shelves against the wall y = +3, filled with books of all sizes.
-void AddBookcase(SceneBuilder& b, const Palette& p, double x0, Random& random) {
+void AddBookcase(SceneBuilder& b, const RoomPalette& p, double x0, Random& random) {
   constexpr double kHalfWidth = 0.75, kDepth = 0.16, kTop = 2.05;
   const double y = kHalfY - kDepth;
   b.Box({x0 - kHalfWidth, y, kTop / 2}, {0.025, kDepth, kTop / 2}, p.walnut);
@@ -140,7 +140,7 @@ void AddBookcase(SceneBuilder& b, const Palette& p, double x0, Random& random) {
   }
 }
 
-void AddChair(SceneBuilder& b, const Palette& p, const Vector3d& foot, double turn_deg) {
+void AddChair(SceneBuilder& b, const RoomPalette& p, const Vector3d& foot, double turn_deg) {
   const Eigen::Matrix3d turn =
       Eigen::AngleAxisd(turn_deg * std::numbers::pi / 180, Vector3d::UnitZ()).matrix();
   const auto at = [&](double x, double y, double z) -> Vector3d {
@@ -156,7 +156,7 @@ void AddChair(SceneBuilder& b, const Palette& p, const Vector3d& foot, double tu
 }
 
 /// Table, chairs and rug in the middle; low enough for cameras at eye height to look over.
-void AddMiddle(SceneBuilder& b, const Palette& p, Random& random) {
+void AddMiddle(SceneBuilder& b, const RoomPalette& p, Random& random) {
   b.Box({0, 0, 0.008}, {1.7, 1.25, 0.008}, p.rug, 7);
   b.Rod({0, 0, 0.70}, {0, 0, 0.75}, 0.62, p.oak);
   b.Rod({0, 0, 0}, {0, 0, 0.70}, 0.07, p.walnut);
@@ -172,7 +172,7 @@ void AddMiddle(SceneBuilder& b, const Palette& p, Random& random) {
 }
 
 /// What stands against the walls.
-void AddAlongWalls(SceneBuilder& b, const Palette& p) {
+void AddAlongWalls(SceneBuilder& b, const RoomPalette& p) {
   // Sofa under pictures, left wall.
   b.Box({-3.45, 0.1, 0.22}, {0.42, 1.0, 0.22}, p.cloth);
   b.Box({-3.80, 0.1, 0.62}, {0.12, 1.0, 0.3}, p.cloth);
@@ -217,7 +217,7 @@ void AddAlongWalls(SceneBuilder& b, const Palette& p) {
 Scene MakeRoom(std::uint64_t seed) {
   SceneBuilder b(seed);
   Random random(HashOf(seed, 0x20u));
-  const Palette p = MakePalette(b);
+  const RoomPalette p = MakeRoomPalette(b);
   AddShell(b, p);
   AddBookcase(b, p, -1.9, random);
   AddBookcase(b, p, -0.3, random);

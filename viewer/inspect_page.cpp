@@ -135,7 +135,7 @@ Findings FindOut(const DtrSet& set, ViewStream& stream, const InspectFacts& fact
   return findings;
 }
 
-std::string Percent(double share) { return fmt::format("{:.1f} %", 100 * share); }
+std::string PercentText(double share) { return fmt::format("{:.1f} %", 100 * share); }
 
 void AddVerdict(report::HtmlReport& page, const InspectFacts& facts) {
   page.Section("Can the calibration be trusted?");
@@ -196,7 +196,7 @@ std::string LargestShares(const std::map<std::string, double>& shares) {
   std::string text;
   for (int i = 0; i < std::min<int>(kNamedShares, static_cast<int>(sorted.size())); ++i) {
     const auto& [share, name] = sorted[static_cast<size_t>(i)];
-    text += fmt::format("{}{} {}", i == 0 ? "" : ", ", name, Percent(-share));
+    text += fmt::format("{}{} {}", i == 0 ? "" : ", ", name, PercentText(-share));
   }
   return text;
 }
@@ -213,8 +213,8 @@ void AddContributions(report::HtmlReport& page, const DtrSet& set, const Finding
   for (const ViewFindings& found : findings.views) {
     rows.push_back({report::Picture{found.weights, "weights of " + found.view->name},
                     Swatch(colours.Of(*found.view), found.view->name), found.view->name,
-                    LargestShares(found.shares), Percent(found.coverage),
-                    Percent(total[found.view->name] / others)});
+                    LargestShares(found.shares), PercentText(found.coverage),
+                    PercentText(total[found.view->name] / others)});
   }
   page.Section("Which view contributes where");
   page.Paragraph(
@@ -243,8 +243,8 @@ void AddWorstViews(report::HtmlReport& page, const Findings& findings, const Ins
     return {
         found.view->name,
         Decibels(found.psnr_db),
-        Percent(found.coverage),
-        Percent(found.depth_share),
+        PercentText(found.coverage),
+        PercentText(found.depth_share),
         found.sigma_px ? fmt::format("{:.3f} px", *found.sigma_px) : std::string("-"),
         error != facts.error_px.end() ? fmt::format("{:.2f} px", error->second) : std::string("-")};
   };

@@ -6,14 +6,14 @@
 namespace dtr::viewer {
 namespace {
 
-constexpr double kLongestStepSeconds = 0.1;  // a slow frame must not leave half a second out
+constexpr double kLongestPlayedSeconds = 0.1;  // a slow frame must not leave half a second out
 
 }  // namespace
 
 size_t TimePlayer::Advance(double seconds, const FrameClock& clock, size_t shown) {
   if (!playing_ || clock.FrameAt(at_s_) != shown) at_s_ = clock.StartOf(shown);
   if (!playing_) return shown;
-  at_s_ = std::fmod(at_s_ + std::clamp(seconds, 0.0, kLongestStepSeconds), clock.period_s());
+  at_s_ = std::fmod(at_s_ + std::clamp(seconds, 0.0, kLongestPlayedSeconds), clock.period_s());
   return clock.FrameAt(at_s_);
 }
 

@@ -16,7 +16,7 @@ constexpr double kRoundingLevels = 0.2887;   // of whole grey levels: 1 / sqrt(1
 constexpr double kMedianOfNormal = 0.67449;  // of |x| for a standard normal x
 constexpr double kMaskGain = 6;              // root of the sum of squares of Immerkaer's mask
 constexpr double kLeastConditioned = 1e-3;   // smaller over larger eigenvalue: an edge, no corner
-constexpr size_t kFewestCorners = 4;
+constexpr size_t kFewestNoisyCorners = 4;
 
 Eigen::Vector2d GradientAt(const Grid<std::uint8_t>& grey, int x, int y) {
   return {0.5 * (grey(x + 1, y) - grey(x - 1, y)), 0.5 * (grey(x, y + 1) - grey(x, y - 1))};
@@ -98,7 +98,7 @@ double CornerNoise(const Grid<std::uint8_t>& grey, std::span<const BoardCorner> 
       gains.push_back(std::sqrt(0.5 * *gain));
     }
   }
-  if (gains.size() < kFewestCorners) return std::numeric_limits<double>::quiet_NaN();
+  if (gains.size() < kFewestNoisyCorners) return std::numeric_limits<double>::quiet_NaN();
   return PixelNoise(grey, corners) * UpperMedian(gains);
 }
 

@@ -15,8 +15,8 @@ namespace {
 
 using Groups = std::vector<std::vector<std::uint32_t>>;
 
-constexpr int kMaxPoints = 4000;   // that take part in the comparison
-constexpr double kLossSigmas = 2;  // scale of the loss, as for the choice of free parameters
+constexpr int kMaxPoints = 4000;         // that take part in the comparison
+constexpr double kSharedLossSigmas = 2;  // scale of the loss, as for the choice of free parameters
 // A significant gain that is smaller than this changes no rendered pixel: the simpler model is
 // kept.
 constexpr double kMinGain = 0.01;
@@ -69,7 +69,7 @@ class Comparison {
     const Bundle some = SomePoints(BundleOf(model), kMaxPoints, options.seed);
     double sigma_px = 0;
     points_ = LossesOfUnseenPoints(some, some, 1, &sigma_px).size();
-    scale_px_ = kLossSigmas * std::max(sigma_px, kMinSigmaPx);
+    scale_px_ = kSharedLossSigmas * std::max(sigma_px, kMinSigmaPx);
   }
 
   std::string WhyNot() const {

@@ -15,7 +15,7 @@ namespace dtr::calib {
 namespace {
 
 constexpr double kHeldAspectSigma = 1e-4;  // of the logarithm of fy / fx: as good as fixed
-constexpr std::uint64_t kHalf = 0x4a1f;
+constexpr std::uint64_t kHalfDraw = 0x4a1f;
 
 AdjustOptions AllFree() {
   AdjustOptions options;
@@ -81,7 +81,7 @@ Halves HalvesOf(const Bundle& stored) {
   if (enough.images.size() < 2) return halves;
   for (const std::uint64_t half : {0, 1}) {
     halves.parts.push_back(
-        WithPoints(enough, [&](std::uint64_t p) { return (HashOf(p, kHalf) & 1) == half; }));
+        WithPoints(enough, [&](std::uint64_t p) { return (HashOf(p, kHalfDraw) & 1) == half; }));
   }
   return halves;
 }

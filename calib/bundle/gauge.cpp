@@ -11,7 +11,7 @@ namespace dtr::calib {
 namespace {
 
 constexpr int kMostSteps = 20;
-constexpr double kSettled = 1e-15;  // of shift, turn and growth, in normalised units
+constexpr double kSettledGauge = 1e-15;  // of shift, turn and growth, in normalised units
 
 void Move(const Similarity& b_from_a, Bundle& bundle) {
   for (BundleImage& image : bundle.images) {
@@ -87,7 +87,7 @@ void MoveToGaugeOf(const Bundle& start, Bundle& now, bool keep_scale) {
     back.scale = std::exp(-g[6]);
     back.translation = -g.head<3>();
     Move(back, now);
-    if (g.norm() < kSettled) break;
+    if (g.norm() < kSettledGauge) break;
   }
 }
 

@@ -24,7 +24,7 @@ constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
 constexpr size_t kFewestPoints = 50;
 constexpr int kFewestSights = 10;  // of an image: its pose has 6 unknowns, these 20 numbers
 constexpr double kSquare = 1e-3;   // relative difference of fx and fy
-constexpr double kMostPoints = 4000;
+constexpr double kMostJudgedPoints = 4000;
 constexpr std::uint64_t kDraw = 0xd4a3;
 
 // With distortion, zero where it starts: what undistortion left behind becomes a parameter. Pixels
@@ -291,7 +291,7 @@ Judgement JudgePart(const Bundle& given, const BundleLimits& limits, int threads
   for (const BundleObservation& o : given.observations) seen[static_cast<size_t>(o.point)] = true;
   const auto points = static_cast<size_t>(std::count(seen.begin(), seen.end(), true));
   const Bundle stored = WithDistortion(
-      WithoutUnseen(Drawn(given, kMostPoints / static_cast<double>(points)), kFewestSights));
+      WithoutUnseen(Drawn(given, kMostJudgedPoints / static_cast<double>(points)), kFewestSights));
   if (points < kFewestPoints) {
     return NotJudged(judgement,
                      fmt::format("expected {} points or more that two views see, found {}",

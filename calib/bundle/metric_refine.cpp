@@ -14,10 +14,10 @@
 namespace dtr::calib {
 namespace {
 
-constexpr int kMostPoints = 4000;      // that decide which places agree
-constexpr double kSettled = 0.05;      // relative change of a standard deviation
-constexpr double kLeastSigmaM = 1e-3;  // nobody knows a place on Earth better
-constexpr double kMostOff = 5;         // standard deviations of a distance
+constexpr int kMostTriedPoints = 4000;   // that decide which places agree
+constexpr double kSettledSpread = 0.05;  // relative change of a standard deviation
+constexpr double kLeastSigmaM = 1e-3;    // nobody knows a place on Earth better
+constexpr double kMostOff = 5;           // standard deviations of a distance
 // What a model may be longer at one end than at the other before anything is adjusted.
 constexpr double kScaleDrift = 0.02;
 
@@ -142,7 +142,7 @@ Held Judged(const KnownMetres& known, const std::vector<Eigen::Vector3d>& misses
 }
 
 bool IsSettled(const Held& before, const Held& now) {
-  const auto same = [](double a, double b) { return std::abs(std::log(b / a)) <= kSettled; };
+  const auto same = [](double a, double b) { return std::abs(std::log(b / a)) <= kSettledSpread; };
   return before.used == now.used && same(before.sigma_flat_m, now.sigma_flat_m) &&
          same(before.sigma_up_m, now.sigma_up_m);
 }
@@ -263,7 +263,7 @@ void SettlePlaces(const KnownMetres& known, MetricStart& start, Held held) {
   const SfmModel model =
       options.known_lenses ? WithLenses(start.model, *options.known_lenses) : start.model;
   const Bundle some =
-      SomePoints(BundleOf(model, options.separate_lenses), kMostPoints, options.seed);
+      SomePoints(BundleOf(model, options.separate_lenses), kMostTriedPoints, options.seed);
   AdjustOptions adjust =
       OptionsFor(options.known_lenses ? LensFreedom::kFixed : LensFreedom::kNoPrincipalPoint);
   adjust.progress = options.progress;

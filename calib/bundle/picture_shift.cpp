@@ -11,7 +11,7 @@
 namespace dtr::calib {
 namespace {
 
-constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
+constexpr double kNoShift = std::numeric_limits<double>::quiet_NaN();
 constexpr int kPointsPerView = 40;  // that its picture's shift is worked out at
 
 // Sights of each image, by index, of points that are places.
@@ -59,7 +59,7 @@ std::vector<PlacedPixel> Placed(const Adjusted& fresh, const BundleCovariance& c
 
 // 95 % of their standard deviations.
 double PictureShift(const std::vector<PlacedPixel>& placed) {
-  if (placed.empty()) return kNothing;
+  if (placed.empty()) return kNoShift;
   std::vector<double> shifts;
   for (const PlacedPixel& point : placed) shifts.push_back(point.sigma_px);
   std::sort(shifts.begin(), shifts.end());

@@ -10,7 +10,9 @@
 namespace dtr::calib {
 namespace {
 
-[[noreturn]] void Refuse(const std::string& what) { throw Error("bundle adjustment: " + what); }
+[[noreturn]] void RefusePrior(const std::string& what) {
+  throw Error("bundle adjustment: " + what);
+}
 
 // (centre - known) / sigma, in units of an observation's sigma so that both sums can be added.
 struct PositionCost {
@@ -137,13 +139,14 @@ void CheckPriors(const Bundle& bundle, const AdjustOptions& options) {
   for (const PositionPrior& p : options.positions) {
     if (!known(p.image) || !p.centre.allFinite() || !(p.sigma.array() > 0).all() ||
         !p.sigma.allFinite()) {
-      Refuse("expected known positions of its images, finite and with sigmas above 0");
+      RefusePrior("expected known positions of its images, finite and with sigmas above 0");
     }
   }
   for (const DistancePrior& d : options.distances) {
     if (!known(d.image_a) || !known(d.image_b) || d.image_a == d.image_b || !(d.distance > 0) ||
         !(d.sigma > 0) || !std::isfinite(d.distance + d.sigma)) {
-      Refuse("expected known distances between two of its images, above 0 and with sigmas above 0");
+      RefusePrior(
+          "expected known distances between two of its images, above 0 and with sigmas above 0");
     }
   }
 }

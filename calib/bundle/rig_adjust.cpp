@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kMostScaleSpread = 0.2;
 
-[[noreturn]] void Refuse(const std::string& what) { throw Error("rig: " + what); }
+[[noreturn]] void RefuseRig(const std::string& what) { throw Error("rig: " + what); }
 
 SfmModel WithLenses(SfmModel model, const KnownRig& rig,
                     const std::map<std::string, RigPhoto>& photo_of) {
@@ -25,12 +25,13 @@ SfmModel WithLenses(SfmModel model, const KnownRig& rig,
   }
   for (SfmImage& image : model.images) {
     const auto photo = photo_of.find(image.name);
-    if (photo == photo_of.end()) Refuse(image.name + ": expected a photo of the rig");
+    if (photo == photo_of.end()) RefuseRig(image.name + ": expected a photo of the rig");
     const LensCamera& lens = rig.lenses[photo->second.camera];
     const LensCamera& was = old.at(image.camera_id);
     if (lens.width_px != was.width_px || lens.height_px != was.height_px) {
-      Refuse(fmt::format("{}: expected {} x {} px as the calibration has, found {} x {}",
-                         image.name, lens.width_px, lens.height_px, was.width_px, was.height_px));
+      RefuseRig(fmt::format("{}: expected {} x {} px as the calibration has, found {} x {}",
+                            image.name, lens.width_px, lens.height_px, was.width_px,
+                            was.height_px));
     }
     image.camera_id = static_cast<std::uint32_t>(photo->second.camera + 1);
   }
@@ -74,14 +75,14 @@ void FindScale(const Bundle& bundle, const Frames& frames, RigRefined& refined) 
     }
   }
   if (scales.empty()) {
-    Refuse("expected an instant that two cameras saw from different places, found none");
+    RefuseRig("expected an instant that two cameras saw from different places, found none");
   }
   refined.pairs = static_cast<int>(scales.size());
   refined.scale = UpperMedian(scales);
   for (double& s : scales) s = std::abs(s - refined.scale);
   refined.scale_spread = 1.4826 * UpperMedian(scales) / refined.scale;
   if (refined.scale_spread > kMostScaleSpread) {
-    Refuse(
+    RefuseRig(
         fmt::format("expected photos of this rig, found distances between its cameras that "
                     "scatter by {:.0f} %",
                     100 * refined.scale_spread));
@@ -121,8 +122,8 @@ void Scale(double scale, Bundle& bundle) {
 
 void RequireConverged(const Adjusted& adjusted, const char* what) {
   if (!adjusted.converged) {
-    Refuse(fmt::format("expected the solve {} to converge, found none of it after {} iterations",
-                       what, adjusted.iterations));
+    RefuseRig(fmt::format("expected the solve {} to converge, found none of it after {} iterations",
+                          what, adjusted.iterations));
   }
 }
 
@@ -150,7 +151,7 @@ RigRefined RefineRig(const SfmModel& model, const KnownRig& rig,
   refined.adjusted = AdjustRig(bundle, frames.images, rig_from_world, options);
   RequireConverged(refined.adjusted, "with the rig's places");
   if (Contradicts(refined.adjusted, free)) {
-    Refuse(fmt::format(
+    RefuseRig(fmt::format(
         "expected photos of this rig, found residuals of {:.2f} px per coordinate and {} "
         "observations that agree with its places held, {:.2f} px and {} without; was a camera "
         "moved since?",

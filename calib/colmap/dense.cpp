@@ -49,8 +49,8 @@ Header ParseHeader(const fs::path& file, std::string_view content) {
   return header;
 }
 
-PinholeCamera CameraOf(const fs::path& folder, const calib::SfmModel& model,
-                       const calib::SfmImage& image) {
+PinholeCamera DenseCameraOf(const fs::path& folder, const calib::SfmModel& model,
+                            const calib::SfmImage& image) {
   const calib::LensCamera& lens = model.cameras.at(image.camera_id);
   if (!lens.IsUndistorted()) {
     throw Error(fmt::format(
@@ -68,7 +68,8 @@ std::vector<DenseImage> ReadDenseWorkspace(const fs::path& workspace) {
   const calib::SfmModel model = ReadModel(sparse);
   std::vector<DenseImage> images;
   for (const calib::SfmImage& image : model.images) {
-    DenseImage dense{image.name, CameraOf(sparse, model, image), image.cam_from_world, {}, true};
+    DenseImage dense{
+        image.name, DenseCameraOf(sparse, model, image), image.cam_from_world, {}, true};
     const fs::path stem = workspace / "stereo" / "depth_maps" / image.name;
     for (const bool geometric : {true, false}) {
       const fs::path file = stem.string() + (geometric ? ".geometric.bin" : ".photometric.bin");

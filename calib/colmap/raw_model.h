@@ -1,5 +1,6 @@
 // calib/colmap/raw_model.h -- what the readers of both formats hand to the common checks.
 #pragma once
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -7,6 +8,8 @@
 #include "calib/sfm_model.h"
 
 namespace dtr::colmap {
+
+constexpr std::uintmax_t kLargestFile = std::uintmax_t{64} << 30;
 
 /// A track element as stored: feature `feature` of image `image_id`.
 struct RawTrackElement {

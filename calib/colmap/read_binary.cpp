@@ -16,8 +16,6 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "the files are little endian");
 
-constexpr std::uintmax_t kLargestFile = std::uintmax_t{64} << 30;
-
 // A cursor over a file's content that never reads past its end.
 class BinaryReader {
  public:

@@ -12,7 +12,6 @@
 namespace dtr::colmap {
 namespace {
 
-constexpr std::uintmax_t kLargestFile = std::uintmax_t{64} << 30;
 constexpr std::string_view kBlanks = " \t\r\v\f";
 
 std::string_view Trimmed(std::string_view text) {
@@ -154,7 +153,7 @@ std::uint64_t TakePointId(Fields& line) {
   return id;
 }
 
-void ReadImages(RawModel& raw) {
+void ReadImagesText(RawModel& raw) {
   TextReader in(raw.images_file);
   while (auto line = in.NextRecord()) {
     calib::SfmImage image;
@@ -178,7 +177,7 @@ void ReadImages(RawModel& raw) {
   in.ExpectAnnouncedCount();
 }
 
-void ReadPoints(RawModel& raw) {
+void ReadPointsText(RawModel& raw) {
   TextReader in(raw.points_file);
   while (auto line = in.NextRecord()) {
     RawModel::Point point;
@@ -235,8 +234,8 @@ RawModel ReadTextModel(const std::filesystem::path& folder) {
   raw.images_file = folder / "images.txt";
   raw.points_file = folder / "points3D.txt";
   raw.cameras = ReadTextCameras(raw.cameras_file);
-  ReadImages(raw);
-  ReadPoints(raw);
+  ReadImagesText(raw);
+  ReadPointsText(raw);
   return raw;
 }
 

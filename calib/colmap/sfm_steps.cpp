@@ -14,7 +14,7 @@ namespace dtr::colmap {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr std::uintmax_t kLargestNote = 1 << 12;
+constexpr std::uintmax_t kLargestStepNote = 1 << 12;
 
 // What the features depend on beside the photos.
 std::string TextOf(const std::vector<CameraGroup>& groups, const ExtractionPlan& plan,
@@ -62,7 +62,7 @@ void FeaturesAndMatches(Workspace& workspace, const std::vector<CameraGroup>& gr
     // Matching may take hours: an interrupted run of the same inputs goes on with its pairs.
     const fs::path begun = workspace.folder() / "matches.begun";
     const bool go_on = fs::exists(begun) && fs::exists(workspace.database()) &&
-                       ReadFile(begun, kLargestNote) == workspace.fingerprint();
+                       ReadFile(begun, kLargestStepNote) == workspace.fingerprint();
     if (!go_on) {
       RemoveAll(begun);
       CopyDatabase(features, workspace.database());

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "calib/files/calibration.h"
+#include "calib/files/camera_fields.h"
 #include "calib/lens_map.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
@@ -19,7 +20,6 @@ using io::JsonObject;
 
 constexpr const char* kFormat = "dtr-calibration";
 constexpr int kVersion = 1;
-constexpr int kLongestSidePx = 1'000'000;
 constexpr double kSymmetric = 1e-9;  // relative; written exactly, so rounding alone
 constexpr double kRotation = 1e-6;   // R^T R = I, as for every pose file (CONVENTIONS.md)
 

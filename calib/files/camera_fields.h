@@ -1,4 +1,5 @@
-// calib/files/camera_fields.h -- the fields of a camera in OpenCV's YAML and XML. Internal.
+// calib/files/camera_fields.h -- the fields of a camera in OpenCV's YAML and XML, and what holds
+// for all files of cameras. Internal.
 #pragma once
 #include <optional>
 #include <string>
@@ -6,6 +7,8 @@
 #include <vector>
 
 namespace dtr::calib {
+
+constexpr int kLongestSidePx = 1'000'000;  // of a camera in any file
 
 /// A key at the margin of a file, and what stands behind it: the rest of its line and the indented
 /// lines below. A matrix of an XML file reads "data: [ a, b, ... ]", as it does in YAML.

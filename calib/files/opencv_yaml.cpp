@@ -18,7 +18,6 @@ namespace dtr::calib {
 namespace {
 
 constexpr std::uintmax_t kLargestFileBytes = 16u << 20;  // OpenCV's samples write the points too
-constexpr int kLongestSidePx = 1'000'000;
 
 std::optional<double> NumberFrom(std::string_view word) {
   word = Trimmed(word);

@@ -11,7 +11,7 @@
 namespace dtr::calib {
 namespace {
 
-struct ModelFacts {
+struct BoardModelFacts {
   BoardModel model;
   const char* name;
   LensModel lens;
@@ -19,7 +19,7 @@ struct ModelFacts {
   int complexity;
 };
 
-constexpr std::array<ModelFacts, 5> kFacts{{
+constexpr std::array<BoardModelFacts, 5> kFacts{{
     {BoardModel::kPinhole, "pinhole", LensModel::kPinhole, 4, 0},
     {BoardModel::kBrown4, "brown4", LensModel::kOpenCv, 8, 1},
     {BoardModel::kBrown5, "brown5", LensModel::kFullOpenCv, 9, 2},
@@ -27,8 +27,8 @@ constexpr std::array<ModelFacts, 5> kFacts{{
     {BoardModel::kFisheye, "fisheye", LensModel::kOpenCvFisheye, 8, 3},
 }};
 
-const ModelFacts& FactsOf(BoardModel model) {
-  for (const ModelFacts& facts : kFacts) {
+const BoardModelFacts& FactsOf(BoardModel model) {
+  for (const BoardModelFacts& facts : kFacts) {
     if (facts.model == model) return facts;
   }
   throw std::invalid_argument("BoardModel: unknown value");
@@ -39,7 +39,7 @@ const ModelFacts& FactsOf(BoardModel model) {
 std::string NameOf(BoardModel model) { return FactsOf(model).name; }
 
 std::optional<BoardModel> BoardModelFromName(const std::string& name) {
-  for (const ModelFacts& facts : kFacts) {
+  for (const BoardModelFacts& facts : kFacts) {
     if (name == facts.name) return facts.model;
   }
   return std::nullopt;

@@ -16,6 +16,7 @@
 #include "calib/solve/board_solve.h"
 #include "calib/solve/board_start.h"
 #include "calib/solve/least_squares.h"
+#include "calib/solve/limits.h"
 #include "calib/solve/rig_start.h"
 #include "calib/triangulate.h"
 #include "dtr/base/error.h"
@@ -23,9 +24,6 @@
 namespace dtr::calib {
 namespace {
 
-constexpr size_t kFewestViews = 3;  // two agree about anything
-constexpr size_t kFewestCorners = 4;
-constexpr double kLeastAgreeing = 1.0 / 3;  // of a view's corners
 constexpr double kOutlierSigmas = 5;
 constexpr double kMostRelativeSigma = 0.1;  // as with distances (calib/scale.cpp)
 constexpr double kLeastAngle = 1 * std::numbers::pi / 180;

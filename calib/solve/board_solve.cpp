@@ -12,6 +12,7 @@
 #include "calib/precision.h"
 #include "calib/solve/board_start.h"
 #include "calib/solve/least_squares.h"
+#include "calib/solve/limits.h"
 #include "calib/solve/reprojection.h"
 #include "calib/solve/rig_system.h"
 #include "dtr/base/error.h"
@@ -19,9 +20,6 @@
 namespace dtr::calib {
 namespace {
 
-constexpr size_t kFewestViews = 3;
-constexpr size_t kFewestCorners = 4;        // of a view: a pose has 6 unknowns, these 8 numbers
-constexpr double kLeastAgreeing = 1.0 / 3;  // of a view's corners; else its pose is a guess
 constexpr double kLeastTiltDeg = 3;         // between two boards: below, they count as parallel
 constexpr double kLargestFocalError = 0.1;  // relative; above, the solution is of no use
 

@@ -10,13 +10,12 @@
 
 #include "calib/boards/opencv_pixels.h"
 #include "calib/lens_map.h"
+#include "calib/solve/limits.h"
 #include "dtr/base/error.h"
 
 namespace dtr::calib {
 namespace {
 
-constexpr size_t kFewestCorners = 4;
-constexpr size_t kFewestViews = 3;
 // Of the image's long side; 0.15 is a 190-degree fisheye on the short side of 4:3, 29 a 2-degree
 // tele lens.
 constexpr double kShortestFocal = 0.15, kLongestFocal = 30, kFocalStep = 1.3;

@@ -18,7 +18,7 @@
 namespace dtr::calib {
 namespace {
 
-constexpr size_t kFewestViews = 5;  // 4 to solve from, 1 to hold out
+constexpr size_t kFewestViewsToChoose = 5;  // 4 to solve from, 1 to hold out
 // Held-out photos share the print, the lighting and the corner detector with the others: of their
 // errors, too, more coefficients explain a part. Gains below these are none of the lens for sure.
 constexpr double kLeastGain = 0.1;      // of the held-out RMS
@@ -224,11 +224,11 @@ bool NotSeparated(double rms_px, double least_px) {
 
 ModelChoice ChooseModel(const Board& board, std::span<const BoardView> views, int width_px,
                         int height_px, const ChoiceOptions& options) {
-  if (views.size() < kFewestViews) {
+  if (views.size() < kFewestViewsToChoose) {
     throw Error(
         fmt::format("--model auto: expected at least {} images with the board to hold some "
                     "out, found {}; take more, or name a model",
-                    kFewestViews, views.size()));
+                    kFewestViewsToChoose, views.size()));
   }
   ModelChoice choice;
   choice.scores = SolveAll(board, views, width_px, height_px, options);

@@ -10,14 +10,13 @@
 #include "calib/models/radial_bend.h"
 #include "calib/solve/choose_model.h"
 #include "calib/solve/least_squares.h"
+#include "calib/solve/limits.h"
 #include "calib/solve/reprojection.h"
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
 
 namespace dtr::calib {
 namespace {
-
-constexpr size_t kFewestCorners = 4;  // of a view: a pose has 6 unknowns, these 8 numbers
 
 std::vector<BoardView> WithoutOutliers(std::span<const BoardView> views,
                                        std::span<const std::vector<int>> outliers) {

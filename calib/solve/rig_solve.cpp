@@ -11,6 +11,7 @@
 #include "calib/precision.h"
 #include "calib/solve/board_start.h"
 #include "calib/solve/least_squares.h"
+#include "calib/solve/limits.h"
 #include "calib/solve/reprojection.h"
 #include "calib/solve/rig_start.h"
 #include "dtr/base/error.h"
@@ -18,12 +19,10 @@
 namespace dtr::calib {
 namespace {
 
-constexpr size_t kFewestCorners = 4;        // of a view that counts
-constexpr double kLeastAgreeing = 1.0 / 3;  // of a view's corners
-constexpr double kFitCauchyPx = 1;          // scale for frames alone, before a sigma is known
+constexpr double kFitCauchyPx = 1;  // scale for frames alone, before a sigma is known
 const Eigen::Vector3d kRigOrigin = Eigen::Vector3d::Zero();
 
-using Lengths = std::vector<std::vector<double>>;
+using ViewLengths = std::vector<std::vector<double>>;
 
 // What counts, as the solver takes it: per view, per corner.
 Used UsedOf(const Rig& rig) {
@@ -116,14 +115,14 @@ void TakeOver(const Board& board, const Unknowns& u, Rig& rig) {
   }
 }
 
-using SigmaOf = double (*)(const Lengths&, const Used&);  // SigmaOfUsed or ScatterOfUsed
+using SigmaRule = double (*)(const ViewLengths&, const Used&);  // SigmaOfUsed or ScatterOfUsed
 
 // Sigma per camera; that of all where a camera has no view.
-std::vector<double> CameraSigmas(const Rig& rig, const Lengths& lengths, const Used& used,
-                                 SigmaOf sigma_of) {
+std::vector<double> CameraSigmas(const Rig& rig, const ViewLengths& lengths, const Used& used,
+                                 SigmaRule sigma_of) {
   std::vector<double> sigmas(rig.cameras.size(), sigma_of(lengths, used));
   for (size_t c = 0; c < rig.cameras.size(); ++c) {
-    Lengths own;
+    ViewLengths own;
     Used own_used;
     for (size_t v = 0; v < rig.views.size(); ++v) {
       if (rig.views[v].camera != c) continue;
@@ -247,13 +246,13 @@ void TakeOutDisagreeing(Rig& rig, std::vector<LeftOut>& left_out) {
   });
 }
 
-Used Drawable(const Lengths& lengths) {
+Used Drawable(const ViewLengths& lengths) {
   return Within(lengths, std::numeric_limits<double>::infinity());
 }
 
 // Names as outliers what is farther off than its camera's sigmas allow. False when nothing changed.
-bool NameOutliers(const Board& board, double outlier_sigmas, SigmaOf sigma_of, Rig& rig) {
-  const Lengths lengths = ResidualLengths(board, rig);
+bool NameOutliers(const Board& board, double outlier_sigmas, SigmaRule sigma_of, Rig& rig) {
+  const ViewLengths lengths = ResidualLengths(board, rig);
   const Used before = UsedOf(rig);
   const auto sigmas = CameraSigmas(rig, lengths, before, sigma_of);
   Used used = before;
@@ -413,7 +412,7 @@ void MinimiseFrame(const Board& board, const std::vector<size_t>& views, const U
 }  // namespace
 
 std::vector<std::vector<double>> ResidualLengths(const Board& board, const Rig& rig) {
-  Lengths lengths;
+  ViewLengths lengths;
   for (const RigView& view : rig.views) lengths.push_back(LengthsOf(board, rig, view));
   return lengths;
 }

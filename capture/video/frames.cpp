@@ -1,4 +1,5 @@
-#include "capture/video/frames.h"
+
+constexpr double kCutShort = 0.98;  // of what is promised; headers count a few frames too many#include "capture/video/frames.h"
 
 #include <fmt/format.h>
 
@@ -15,8 +16,7 @@
 namespace dtr::capture {
 namespace {
 
-constexpr double kCutShort = 0.98;  // of what is promised; headers count a few frames too many
-constexpr double kSomeFrames = 2;   // that a duration counts more than are shown
+constexpr double kSomeFrames = 2;  // that a duration counts more than are shown
 
 // Orientation 5 and above exchange width and height.
 bool SameSize(const FrameKind& a, int orientation_a, const FrameKind& b, int orientation_b) {

@@ -20,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-struct Options {
+struct AdviseArguments {
   fs::path set, output;
   advise::AdviseOptions advise;
 };
@@ -81,7 +81,7 @@ void Say(const advise::Advice& advice, Console& console) {
   if (advice.redundant.empty()) console.Say("  every camera shows something of its own");
 }
 
-int Run(Options options, const Context& context) {
+int Run(AdviseArguments options, const Context& context) {
   if (!options.output.empty()) RequireOutputFile(options.output, "-o", {".html", ".htm"});
   options.advise.threads = context.common.threads;
   DtrSet set = io::ReadSet(options.set);
@@ -111,7 +111,7 @@ int Run(Options options, const Context& context) {
 void AddAdviseCommand(CLI::App& app) {
   AddCommand(app, "advise", "Where a set lacks a camera, and which of its cameras add nothing",
              "dtr advise scene.dtr -o advice.html", [](CLI::App& command) -> Action {
-               auto options = std::make_shared<Options>();
+               auto options = std::make_shared<AdviseArguments>();
                command.add_option("SET", options->set, "The set")->required();
                command.add_option("-o,--output", options->output, "A page about it, an .html file");
                command

@@ -22,7 +22,7 @@
 namespace dtr::cli {
 namespace {
 
-struct Options {
+struct BenchArguments {
   std::filesystem::path set;
   std::string table, size, like;  // table empty: a sweep
   std::vector<int> views, resolutions;
@@ -33,11 +33,11 @@ struct Options {
 };
 
 /// Of the rows of tables.
-std::vector<int> ResolutionsOf(const Options& options) {
+std::vector<int> ResolutionsOf(const BenchArguments& options) {
   return options.resolutions.empty() ? std::vector{1, 2} : options.resolutions;
 }
 
-eval::BenchOptions BenchOptionsOf(const Options& options, const RenderOptions& render) {
+eval::BenchOptions BenchOptionsOf(const BenchArguments& options, const RenderOptions& render) {
   eval::BenchOptions bench;
   bench.render = render;
   bench.views = options.views;
@@ -50,7 +50,7 @@ eval::BenchOptions BenchOptionsOf(const Options& options, const RenderOptions& r
   return bench;
 }
 
-int RunPhotoTable(const Options& options, const RenderOptions& render, const DtrSet& set,
+int RunPhotoTable(const BenchArguments& options, const RenderOptions& render, const DtrSet& set,
                   eval::TimedRenderer& renderer, const Context& context) {
   eval::BenchOptions bench = BenchOptionsOf(options, render);
   std::sort(bench.views.begin(), bench.views.end());
@@ -64,7 +64,7 @@ int RunPhotoTable(const Options& options, const RenderOptions& render, const Dtr
   return kDone;
 }
 
-int RunGrowthTable(const Options& options, RenderOptions render, const DtrSet& set,
+int RunGrowthTable(const BenchArguments& options, RenderOptions render, const DtrSet& set,
                    eval::TimedRenderer& renderer, const Context& context) {
   if (!options.views.empty()) render.views = options.views.front();
   render.resolution = ResolutionsOf(options).front();
@@ -86,7 +86,7 @@ int RunGrowthTable(const Options& options, RenderOptions render, const DtrSet& s
   return kDone;
 }
 
-DtrSet LoadWhole(const Options& options, const Context& context) {
+DtrSet LoadWhole(const BenchArguments& options, const Context& context) {
   io::LoadOptions load;
   load.held_out = true;
   load.threads = context.common.threads;
@@ -95,7 +95,8 @@ DtrSet LoadWhole(const Options& options, const Context& context) {
 }
 
 #ifdef DTR_HAS_OSG
-int RunOsgTable(const Options& options, const RenderOptions& render, const Context& context) {
+int RunOsgTable(const BenchArguments& options, const RenderOptions& render,
+                const Context& context) {
   std::vector<RenderOptions> variants;
   const std::vector<int> views = options.views.empty() ? std::vector{3, 5, 8} : options.views;
   for (const int resolution : ResolutionsOf(options)) {
@@ -117,14 +118,14 @@ int RunOsgTable(const Options& options, const RenderOptions& render, const Conte
   return kDone;
 }
 #else
-int RunOsgTable(const Options&, const RenderOptions&, const Context&) {
+int RunOsgTable(const BenchArguments&, const RenderOptions&, const Context&) {
   throw Error(
       "bench --table osg: expected a program built with OpenSceneGraph, found one without; install "
       "libopenscenegraph-dev and build again");
 }
 #endif
 
-int RunBench(const Options& options, const Context& context) {
+int RunBench(const BenchArguments& options, const Context& context) {
   RenderOptions render = *options.render;
   render.threads = context.common.threads;
   if (options.table.empty()) {
@@ -144,7 +145,7 @@ int RunBench(const Options& options, const Context& context) {
                                    : RunPhotoTable(options, render, set, *renderer, context);
 }
 
-void DeclareOptions(CLI::App& command, Options& options) {
+void DeclareOptions(CLI::App& command, BenchArguments& options) {
   command.add_option("SET", options.set, "The set")->required();
   CLI::Option* table =
       command
@@ -201,7 +202,7 @@ void DeclareOptions(CLI::App& command, Options& options) {
 void AddBenchCommand(CLI::App& app) {
   AddCommand(app, "bench", "Measure what settings cost and what they are worth",
              "dtr bench scene.dtr --stage render,storage", [](CLI::App& command) -> Action {
-               auto options = std::make_shared<Options>();
+               auto options = std::make_shared<BenchArguments>();
                DeclareOptions(command, *options);
                return [options](const Context& context) { return RunBench(*options, context); };
              });

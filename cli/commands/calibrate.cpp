@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct CalibrateArguments {
   fs::path photos, output;
   double memory_gb = 4;
   pipeline::SfmChoice sfm;
@@ -31,7 +31,7 @@ struct Options {
   MetreWords metres;
 };
 
-int RunCalibratePhotos(const Options& options, const Context& context) {
+int RunCalibratePhotos(const CalibrateArguments& options, const Context& context) {
   context.console.KeepsWork();
   const pipeline::MetreOptions metres = MetreOptionsFrom(options.gps, options.metres);
   if (fs::exists(options.output / "cameras.bin")) {
@@ -89,7 +89,7 @@ void AddCalibrateCommand(CLI::App& app) {
   AddCalibrateScaleCommand(*calibrate);
   AddCommand(*calibrate, "photos", "Calibrate a folder of photos by structure from motion",
              "dtr calibrate photos photos/ -o calibration/", [](CLI::App& command) -> Action {
-               auto options = std::make_shared<Options>();
+               auto options = std::make_shared<CalibrateArguments>();
                command.add_option("PHOTOS", options->photos, "Folder of photos")->required();
                command
                    .add_option("-o,--output", options->output,

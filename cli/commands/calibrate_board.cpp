@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct CalibrateBoardArguments {
   fs::path photos;
   std::vector<fs::path> outputs;
   std::string board, model = "auto", images = "*", detector = "auto", loss = "robust";
@@ -88,7 +88,7 @@ void SayCamera(const calib::Calibration& calibration, Console& console) {
                   middle));
 }
 
-int RunCalibrateBoard(const Options& options, const Context& context) {
+int RunCalibrateBoard(const CalibrateBoardArguments& options, const Context& context) {
   const calib::Board board = calib::BoardFromText(options.board);
   for (const fs::path& output : options.outputs) {
     RequireOutputFile(output, "-o", {".json", ".yml", ".yaml", ".txt"});
@@ -119,7 +119,7 @@ void AddCalibrateBoardCommand(CLI::App& calibrate) {
       calibrate, "board", "Calibrate one camera from photos of a board",
       "dtr calibrate board photos/ --board chessboard:9x6:25mm -o left.json -o left.yml",
       [](CLI::App& command) -> Action {
-        auto options = std::make_shared<Options>();
+        auto options = std::make_shared<CalibrateBoardArguments>();
         command
             .add_option("PHOTOS", options->photos, "Folder of photos of the board, one camera's")
             ->required();

@@ -14,7 +14,7 @@
 namespace dtr::cli {
 namespace {
 
-struct Options {
+struct CalibrateRefineArguments {
   std::filesystem::path model, output, lens, gps;
   bool separate = false, covariance = false;
   MetreWords metres;
@@ -41,7 +41,8 @@ void SayRefined(const calib::Refined& refined, Console& console) {
   if (const std::string remark = calib::RemarkOn(refined); !remark.empty()) console.Say(remark);
 }
 
-pipeline::RefinedInMetres HoldMetres(const Options& options, const pipeline::MetreOptions& metres,
+pipeline::RefinedInMetres HoldMetres(const CalibrateRefineArguments& options,
+                                     const pipeline::MetreOptions& metres,
                                      const calib::SfmModel& model,
                                      const calib::RefineOptions& refine) {
   const std::vector<std::string> names = calib::ImageNames(model);
@@ -55,13 +56,13 @@ pipeline::RefinedInMetres HoldMetres(const Options& options, const pipeline::Met
 }
 
 // The refined model is of the same pixels as the given one.
-void WriteRefined(const Options& options, const std::filesystem::path& from,
+void WriteRefined(const CalibrateRefineArguments& options, const std::filesystem::path& from,
                   const calib::SfmModel& model) {
   colmap::WriteModel(options.output, model, colmap::Format::kBinary);
   if (pipeline::GridOfModel(from) == PhotoGrid::kUpright) pipeline::MarkUpright(options.output);
 }
 
-int RunRefine(const Options& options, const Context& context) {
+int RunRefine(const CalibrateRefineArguments& options, const Context& context) {
   if (std::filesystem::exists(options.output / "cameras.bin")) {
     throw UsageError(
         fmt::format("{}: expected no model yet, found one; remove it or choose another folder",
@@ -112,7 +113,7 @@ void AddCalibrateRefineCommand(CLI::App& calibrate) {
              "Bundle adjustment of a COLMAP model, where held-out observations say that it pays",
              "dtr calibrate refine sparse/0 -o refined/ --lens camera.json",
              [](CLI::App& command) -> Action {
-               auto options = std::make_shared<Options>();
+               auto options = std::make_shared<CalibrateRefineArguments>();
                command.add_option("MODEL", options->model, "Folder of the COLMAP model")
                    ->required()
                    ->check(CLI::ExistingDirectory);

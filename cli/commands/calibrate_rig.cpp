@@ -16,14 +16,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct CalibrateRigArguments {
   fs::path folder;
   std::vector<fs::path> outputs;
   std::string board, model = "auto", loss = "robust", lenses = "free", clocks = "synchronised";
   std::vector<std::string> given;
 };
 
-std::optional<calib::BoardModel> ModelFrom(const std::string& name) {
+std::optional<calib::BoardModel> RigModelFrom(const std::string& name) {
   if (name == "auto") return std::nullopt;
   const auto model = calib::BoardModelFromName(name);
   if (!model) throw UsageError("--model " + name + ": expected auto or the name of a model");
@@ -104,13 +104,13 @@ void SayRig(const calib::Calibration& calibration, const pipeline::RigSummary& s
                   summary.rms_px, summary.sigma_px));
 }
 
-int RunCalibrateRig(const Options& options, const Context& context) {
+int RunCalibrateRig(const CalibrateRigArguments& options, const Context& context) {
   const calib::Board board = calib::BoardFromText(options.board);
   for (const fs::path& output : options.outputs) {
     RequireOutputFile(output, "-o", {".json", ".yml", ".yaml", ".txt"});
   }
   pipeline::RigCalibrationOptions calibrate;
-  calibrate.model = ModelFrom(options.model);
+  calibrate.model = RigModelFrom(options.model);
   calibrate.solve.loss =
       options.loss == "quadratic" ? calib::Loss::kQuadratic : calib::Loss::kRobust;
   calibrate.fixed_lenses = options.lenses == "fixed";
@@ -146,7 +146,7 @@ void AddCalibrateRigCommand(CLI::App& calibrate) {
       calibrate, "rig", "Calibrate cameras that are fixed to each other from a board that they see",
       "dtr calibrate rig pairs/ --board chessboard:9x6:25mm -o rig.json -o rig.yml",
       [](CLI::App& command) -> Action {
-        auto options = std::make_shared<Options>();
+        auto options = std::make_shared<CalibrateRigArguments>();
         command
             .add_option("DIR", options->folder,
                         "Sub-folders, one per camera, with photos of equal names; or photos named "

@@ -13,7 +13,7 @@
 namespace dtr::cli {
 namespace {
 
-struct Options {
+struct CalibrateScaleArguments {
   pipeline::ScaleOptions scale;
   std::vector<std::string> distances;
   std::string board;
@@ -31,7 +31,7 @@ calib::Board MetricBoard(const std::string& text) {
       "--board {}: expected a square in mm, cm or m, found a length without a unit", text));
 }
 
-int RunScale(Options options, const Context& context) {
+int RunScale(CalibrateScaleArguments options, const Context& context) {
   context.console.KeepsWork();
   const int ways = (options.distances.empty() ? 0 : 1) + (options.scale.gps.empty() ? 0 : 1) +
                    (options.board.empty() ? 0 : 1);
@@ -66,7 +66,7 @@ void AddCalibrateScaleCommand(CLI::App& calibrate) {
   AddCommand(calibrate, "scale", "Give a set its size in metres",
              "dtr calibrate scale scene.dtr --distance 0001:640:410,0001:902:398=2.5m",
              [](CLI::App& command) -> Action {
-               auto options = std::make_shared<Options>();
+               auto options = std::make_shared<CalibrateScaleArguments>();
                pipeline::ScaleOptions& scale = options->scale;
                command.add_option("SET", scale.set, "The set")->required();
                command

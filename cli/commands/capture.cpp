@@ -18,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-struct Options {
+struct CaptureArguments {
   fs::path source, output;
   capture::VideoOptions video;
   std::vector<std::string> drop;
@@ -95,7 +95,7 @@ void Say(const capture::Capture& capture, const fs::path& output, Console& conso
   console.Say(fmt::format("  to look at: {}", (output / capture::kPageFile).string()));
 }
 
-int Run(const Options& options, const Context& context) {
+int Run(const CaptureArguments& options, const Context& context) {
   const std::vector<capture::Fault> drop = FaultsIn(options.drop);
   const capture::StoreOptions store{options.force, context.common.threads, options.video.memory_gb};
   const fs::path output = WithoutTrailingSlash(options.output);
@@ -128,7 +128,7 @@ int Run(const Options& options, const Context& context) {
 void AddCaptureCommand(CLI::App& app) {
   AddCommand(app, "capture", "Ingest photos or videos: frames, orientation, EXIF priors, screening",
              "dtr capture walk.mp4 -o capture/ --max-frames 100", [](CLI::App& command) -> Action {
-               auto options = std::make_shared<Options>();
+               auto options = std::make_shared<CaptureArguments>();
                command
                    .add_option("SRC", options->source,
                                "Folder of photos, a video, or a folder of nothing but videos")

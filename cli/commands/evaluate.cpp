@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct EvaluateArguments {
   fs::path set, pictures, truth;
   bool leave_one_out = false;
   RendererChoice renderer;
@@ -91,7 +91,7 @@ void SayDepth(const eval::DepthScores& depth, Console& console) {
                           percent(outliers.at(4)), percent(outliers.at(8))));
 }
 
-int RunEvaluate(const Options& options, const Context& context) {
+int RunEvaluate(const EvaluateArguments& options, const Context& context) {
   if (fs::exists(options.pictures) && !fs::is_directory(options.pictures)) {
     throw UsageError(
         fmt::format("--pictures {}: expected a folder, found a file", options.pictures.string()));
@@ -143,7 +143,7 @@ void AddEvaluateCommand(CLI::App& app) {
   AddCommand(
       app, "evaluate", "Measure a set by photos it was not made from, or against true depth",
       "dtr evaluate scene.dtr --json -", [](CLI::App& command) -> Action {
-        auto options = std::make_shared<Options>();
+        auto options = std::make_shared<EvaluateArguments>();
         command.add_option("SET", options->set, "The set")->required();
         command.add_flag("--leave-one-out", options->leave_one_out,
                          "Leave every source view out of rendering in turn, instead");

@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct ExportArguments {
   fs::path set, output;
   std::string format = "colmap";
   bool text = false;
@@ -55,7 +55,7 @@ ImageRgb8 ImageOf(const fs::path& folder, View view, int threads) {
   return std::move(view.image);
 }
 
-int RunExport(Options options, const Context& context) {
+int RunExport(ExportArguments options, const Context& context) {
   options.output = WithoutTrailingSlash(options.output);
   if (fs::exists(options.output)) {
     throw UsageError(
@@ -93,7 +93,7 @@ void AddExportCommand(CLI::App& app) {
   AddCommand(app, "export",
              "Write a set's cameras, points and images for another program: sparse/0 and images",
              "dtr export scene.dtr --format colmap -o colmap/", [](CLI::App& command) -> Action {
-               auto options = std::make_shared<Options>();
+               auto options = std::make_shared<ExportArguments>();
                command.add_option("SET", options->set, "The set")->required();
                command.add_option("--format", options->format, "Format [colmap]")
                    ->check(CLI::IsMember({"colmap"}))

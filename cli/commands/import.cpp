@@ -23,7 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-struct Options {
+struct ImportArguments {
   fs::path cameras, output;
   std::string format, depth_kind;
   io::ImportOptions import;
@@ -32,7 +32,7 @@ struct Options {
 };
 
 // What of the folder of images the cameras use.
-capture::FolderContents ContentsFor(const Options& options, const io::CameraList& list) {
+capture::FolderContents ContentsFor(const ImportArguments& options, const io::CameraList& list) {
   capture::FolderContents contents;
   const std::filesystem::path& images = options.import.images_dir;
   if (std::filesystem::is_directory(images)) contents = capture::ContentsOfFiles(images, true);
@@ -54,7 +54,7 @@ capture::FolderContents ContentsFor(const Options& options, const io::CameraList
   return contents;
 }
 
-void FindMasks(Options& options, pipeline::CamerasFromFile& cameras, Progress& progress) {
+void FindMasks(ImportArguments& options, pipeline::CamerasFromFile& cameras, Progress& progress) {
   if (options.import.mask_dir.empty()) {
     options.import.mask_dir = cameras.mask_dir;
     return;
@@ -69,8 +69,8 @@ void FindMasks(Options& options, pipeline::CamerasFromFile& cameras, Progress& p
 }
 
 // --holdout, else what the file says.
-std::set<std::string> HeldOut(const Options& options, const pipeline::CamerasFromFile& cameras,
-                              Progress& progress) {
+std::set<std::string> HeldOut(const ImportArguments& options,
+                              const pipeline::CamerasFromFile& cameras, Progress& progress) {
   if (!cameras.held_out) return pipeline::NamesHeldOut(options.held_out, cameras.list);
   if (!options.held_out.empty()) {
     progress.Note("--holdout replaces train_filenames, test_filenames and val_filenames of " +
@@ -83,7 +83,8 @@ std::set<std::string> HeldOut(const Options& options, const pipeline::CamerasFro
 }
 
 // The unit that the file gives, where the command gives none; depth maps that nothing reads.
-void SettleDepth(Options& options, const pipeline::CamerasFromFile& cameras, Progress& progress) {
+void SettleDepth(ImportArguments& options, const pipeline::CamerasFromFile& cameras,
+                 Progress& progress) {
   const auto& list = cameras.list.cameras;
   const auto maps = std::count_if(list.begin(), list.end(),
                                   [](const auto& named) { return !named.depth_file.empty(); });
@@ -105,8 +106,8 @@ void SettleDepth(Options& options, const pipeline::CamerasFromFile& cameras, Pro
 }
 
 // Points of a set without depth, where the cameras come without: COLMAP finds them.
-void FindPoints(const Options& options, const Context& context, pipeline::CamerasFromFile& cameras,
-                Progress& progress) {
+void FindPoints(const ImportArguments& options, const Context& context,
+                pipeline::CamerasFromFile& cameras, Progress& progress) {
   if (!options.import.depth_dir.empty() || (cameras.points && !cameras.points->points.empty())) {
     return;
   }
@@ -130,7 +131,7 @@ void FindPoints(const Options& options, const Context& context, pipeline::Camera
       pipeline::TriangulatedPoints(cameras.list, photos, calibrate, workspace.path(), progress);
 }
 
-Json ResultJson(const Options& options, const pipeline::CamerasFromFile& cameras,
+Json ResultJson(const ImportArguments& options, const pipeline::CamerasFromFile& cameras,
                 const io::AlphaTotals& alpha, const std::vector<std::string>& notes) {
   Json json = {{"views", cameras.list.cameras.size()},
                {"held_out", options.import.held_out.size()},
@@ -146,7 +147,7 @@ Json ResultJson(const Options& options, const pipeline::CamerasFromFile& cameras
   return json;
 }
 
-int RunImport(Options options, const Context& context) {
+int RunImport(ImportArguments options, const Context& context) {
   pipeline::KeptNotes progress(context.console);
   auto cameras = pipeline::ReadCameraFile(options.cameras, options.format,
                                           {options.import.images_dir, options.import.depth_dir,
@@ -181,7 +182,7 @@ void AddImportCommand(CLI::App& app) {
       app, "import", "Make a set from others' cameras, images and depth maps",
       "dtr import --cameras sparse/ --format colmap --images images/ --depth depth/ -o scene.dtr",
       [](CLI::App& command) -> Action {
-        auto options = std::make_shared<Options>();
+        auto options = std::make_shared<ImportArguments>();
         command.add_option("--cameras", options->cameras, "cameras.json, or what --format says")
             ->required()
             ->type_name("FILE");

@@ -24,9 +24,9 @@ namespace dtr::cli {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::json;
+using Json = nlohmann::ordered_json;
 
-struct Options {
+struct InspectArguments {
   fs::path set, output, bench;
   double memory_gb = 4;
 };
@@ -72,7 +72,7 @@ std::vector<viewer::StageCost> StagesOf(const fs::path& set) {
 }
 
 /// What `dtr bench` found, from where it was told to be, or from where it is written by default.
-std::optional<SweepFacts> BenchOf(const Options& options) {
+std::optional<SweepFacts> BenchOf(const InspectArguments& options) {
   constexpr std::uintmax_t kFileLimitBytes = 64 << 20;
   const bool told = !options.bench.empty();
   const fs::path file = (told ? options.bench : SweepFolderOf(options.set)) / kSweepFile;
@@ -84,7 +84,7 @@ std::optional<SweepFacts> BenchOf(const Options& options) {
   return ReadSweep(ReadFile(file, kFileLimitBytes), file.string());
 }
 
-viewer::InspectFacts FactsOf(const Options& options, const DtrSet& set, int threads) {
+viewer::InspectFacts FactsOf(const InspectArguments& options, const DtrSet& set, int threads) {
   viewer::InspectFacts facts;
   facts.name = WithoutTrailingSlash(options.set).filename().string();
   facts.checks = ChecksOf(set);
@@ -110,7 +110,7 @@ viewer::InspectFacts FactsOf(const Options& options, const DtrSet& set, int thre
   return facts;
 }
 
-int RunInspect(const Options& options, const Context& context) {
+int RunInspect(const InspectArguments& options, const Context& context) {
   RequireOutputFile(options.output, "-o", {".html", ".htm"});
   const int threads = context.common.threads;
   DtrSet set = io::ReadSet(options.set);
@@ -142,7 +142,7 @@ void AddInspectCommand(CLI::App& app) {
   AddCommand(
       app, "inspect", "One offline page of what is good and bad in a set",
       "dtr inspect scene.dtr -o report.html", [](CLI::App& command) -> Action {
-        auto options = std::make_shared<Options>();
+        auto options = std::make_shared<InspectArguments>();
         command.add_option("SET", options->set, "The set")->required();
         command.add_option("-o,--output", options->output, "The page, an .html file")->required();
         command

@@ -14,13 +14,14 @@
 namespace dtr::cli {
 namespace {
 
-struct Options {
+struct PruneArguments {
   pipeline::PruneSetOptions prune;
   RendererChoice renderer;
   std::shared_ptr<RenderOptions> render;
 };
 
-void SayResult(const Options& options, const pipeline::PruneSetReport& report, Console& console) {
+void SayResult(const PruneArguments& options, const pipeline::PruneSetReport& report,
+               Console& console) {
   const prune::PruneReport& pruned = report.pruned;
   const auto megabytes = [](std::uint64_t bytes) { return static_cast<double>(bytes) / 1e6; };
   console.Say(fmt::format(
@@ -55,7 +56,7 @@ void SayResult(const Options& options, const pipeline::PruneSetReport& report, C
                               : fmt::format("{}", fmt::join(report.render_arguments, " "))));
 }
 
-int RunPrune(Options& options, const Context& context) {
+int RunPrune(PruneArguments& options, const Context& context) {
   context.console.KeepsWork();
   options.prune.threads = context.common.threads;
   options.prune.prune.seed = context.common.seed;
@@ -82,7 +83,7 @@ void AddPruneCommand(CLI::App& app) {
   AddCommand(
       app, "prune", "Leave out what a set's pictures do not need",
       "dtr prune scene.dtr -o small.dtr --max-loss-db 0.1", [](CLI::App& command) -> Action {
-        auto options = std::make_shared<Options>();
+        auto options = std::make_shared<PruneArguments>();
         prune::PruneOptions& prune = options->prune.prune;
         command.add_option("SET", options->prune.set, "The set; it is only read")->required();
         command.add_option("-o,--output", options->prune.output, "The set to write")

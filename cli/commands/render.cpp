@@ -27,7 +27,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct RenderCommandArguments {
   fs::path set, output, depth_out, coverage_out;
   NovelCameraRequest request;
   std::string exclude;
@@ -73,7 +73,7 @@ class FrameSink {
 };
 
 // Everything about the outputs that can be known before the work.
-void RequireOutputs(const Options& options, bool several) {
+void RequireOutputs(const RenderCommandArguments& options, bool several) {
   if (options.output.extension() == ".mp4") {
     RequireFolderOf(options.output, "-o");
   } else if (!several) {
@@ -92,7 +92,7 @@ void RequireOutputs(const Options& options, bool several) {
   }
 }
 
-void WritePlanes(const Options& options, const RenderResult& result) {
+void WritePlanes(const RenderCommandArguments& options, const RenderResult& result) {
   if (!options.depth_out.empty()) io::WriteExr(options.depth_out, result.depth.grid(), false);
   if (!options.coverage_out.empty()) io::WriteMask(options.coverage_out, result.coverage);
 }
@@ -111,7 +111,7 @@ nlohmann::ordered_json FrameJson(const std::string& file, double ms, size_t show
 }
 
 // With --play, one camera sees every frame of the set.
-std::vector<NovelFrame> CamerasOf(const Options& options, const DtrSet& set) {
+std::vector<NovelFrame> CamerasOf(const RenderCommandArguments& options, const DtrSet& set) {
   std::vector<NovelFrame> cameras =
       NovelFrames(AtFrame(set, options.frame.value_or(0)), options.request);
   if (!options.play) return cameras;
@@ -124,11 +124,12 @@ std::vector<NovelFrame> CamerasOf(const Options& options, const DtrSet& set) {
 }
 
 // The frame of the set that picture `i` shows; paths run through time.
-size_t FrameShown(const Options& options, const DtrSet& set, size_t i, size_t pictures) {
+size_t FrameShown(const RenderCommandArguments& options, const DtrSet& set, size_t i,
+                  size_t pictures) {
   return options.frame ? *options.frame : FrameOfPicture(i, pictures, set.frames.size());
 }
 
-int RunRender(const Options& options, const Context& context) {
+int RunRender(const RenderCommandArguments& options, const Context& context) {
   const DtrSet described = io::ReadSet(options.set);
   const auto cameras = CamerasOf(options, described);
   const bool several =
@@ -186,7 +187,7 @@ void AddRenderCommand(CLI::App& app) {
   AddCommand(
       app, "render", "Render new views of a set",
       "dtr render scene.dtr --like IMG_4026 -o view.png", [](CLI::App& command) -> Action {
-        auto options = std::make_shared<Options>();
+        auto options = std::make_shared<RenderCommandArguments>();
         command.add_option("SET", options->set, "The set")->required();
         command
             .add_option("-o,--output", options->output,

@@ -11,7 +11,7 @@
 namespace dtr::cli {
 namespace {
 
-struct Options {
+struct SelftestArguments {
   bool stability = false;
   std::filesystem::path table;
 };
@@ -40,7 +40,7 @@ std::vector<selftest::NamedRenderer> Renderers(Console& console) {
   return renderers;
 }
 
-int RunSelftest(const Options& options, const Context& context) {
+int RunSelftest(const SelftestArguments& options, const Context& context) {
   Console& console = context.console;
   if (!options.table.empty()) RequireOutputFile(options.table, "-o", {".md"});
   if (!options.table.empty() && !options.stability) {
@@ -73,7 +73,7 @@ void AddSelftestCommand(CLI::App& app) {
       "Stiff and extreme cases of every stage, each held against its bound; exit 1 when one "
       "fails",
       "dtr selftest --stability -o STABILITY.md", [](CLI::App& command) -> Action {
-        auto options = std::make_shared<Options>();
+        auto options = std::make_shared<SelftestArguments>();
         command.add_flag("--stability", options->stability,
                          "Every case (a minute); else the quick ones");
         command.add_option("-o", options->table, "The table as a page, too")->type_name("FILE.md");

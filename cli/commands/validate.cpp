@@ -17,7 +17,7 @@
 namespace dtr::cli {
 namespace {
 
-struct Options {
+struct ValidateArguments {
   std::filesystem::path set;
   pipeline::SetLimits limits;
   std::optional<double> max_cross_px;
@@ -59,7 +59,7 @@ void RefuseForSets(const ValidateCalibrationOptions& options) {
   }
 }
 
-int RunValidate(Options options, const Context& context) {
+int RunValidate(ValidateArguments options, const Context& context) {
   if (std::filesystem::is_regular_file(options.set)) {
     if (options.max_cross_px) {
       throw UsageError("--max-cross: is for sets, not for calibration files");
@@ -97,7 +97,7 @@ void AddValidateCommand(CLI::App& app) {
       "Reprojection tests of a set's or a board's calibration; exit 1 when one fails",
       "dtr validate left.json --images unseen/ --report left.html",
       [](CLI::App& command) -> Action {
-        auto options = std::make_shared<Options>();
+        auto options = std::make_shared<ValidateArguments>();
         command
             .add_option("SET|CALIB", options->set,
                         "A set, a .json file of calibrate board or calibrate rig, or one camera "

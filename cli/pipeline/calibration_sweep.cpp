@@ -24,9 +24,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-enum Axis : size_t { kFeatureSize, kFeatures, kMatching, kLensModel, kRefine };
+enum CalibrationAxis : size_t { kFeatureSize, kFeatures, kMatching, kLensModel, kRefine };
 constexpr const char *kYes = "yes", *kNo = "no";
-constexpr double kMillisecondsPerSecond = 1000;
 // Scale of the loss over the photos' long side: half a pixel of 1000, about what sights err by, so
 // that wrong ones, which err the same by any cameras, do not hide what the cameras do.
 constexpr double kLossShare = 0.0005;
@@ -142,7 +141,7 @@ eval::SweepMeasurement CalibrationSweep::Measure(const eval::SweepSetting& setti
   calibrate.sfm = ChoiceOf(setting);
   // Refinement begins where COLMAP ends: with and without it there is one workspace.
   std::string folder;
-  for (const Axis axis : {kFeatureSize, kFeatures, kMatching, kLensModel}) {
+  for (const CalibrationAxis axis : {kFeatureSize, kFeatures, kMatching, kLensModel}) {
     folder += (folder.empty() ? "" : "-") + Value(setting, axis);
   }
   const double start_ms = ProcessCpuMilliseconds();

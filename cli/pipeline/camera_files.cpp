@@ -52,11 +52,6 @@ std::map<std::string, std::string> ImagesByStem(const fs::path& folder) {
   return by_stem;
 }
 
-bool IsFile(const fs::path& file) {
-  std::error_code ignored;
-  return fs::is_regular_file(file, ignored);
-}
-
 // Leaves out what has no photo, or says so: `name` may leave its folder, which readers refuse.
 bool HasPhoto(const std::string& name, const CameraFileFolders& folders) {
   return !io::WhyUnsafeName(name).empty() || IsFile(folders.images / name);

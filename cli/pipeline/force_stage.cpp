@@ -13,13 +13,13 @@ namespace {
 namespace fs = std::filesystem;
 
 // What each stage leaves, below the partial set; the order is the stages'.
-struct Kept {
+struct KeptStage {
   const char* stage;
   std::vector<std::string> paths;
 };
 
-const std::vector<Kept>& AllKept() {
-  static const std::vector<Kept> kAll{
+const std::vector<KeptStage>& AllKept() {
+  static const std::vector<KeptStage> kAll{
       {"capture", {"work/capture", "work/frames"}},
       {"calibration", {"work/calibration"}},
       {"undistortion", {"images", "mask", "held_out", "work/views"}},
@@ -33,14 +33,14 @@ const std::vector<Kept>& AllKept() {
 
 std::vector<std::string> StagesKept() {
   std::vector<std::string> names;
-  for (const Kept& kept : AllKept()) names.emplace_back(kept.stage);
+  for (const KeptStage& kept : AllKept()) names.emplace_back(kept.stage);
   return names;
 }
 
 void ForgetStage(const fs::path& folder, const std::string& name) {
   const auto& all = AllKept();
-  const auto from =
-      std::find_if(all.begin(), all.end(), [&](const Kept& kept) { return kept.stage == name; });
+  const auto from = std::find_if(all.begin(), all.end(),
+                                 [&](const KeptStage& kept) { return kept.stage == name; });
   if (from == all.end()) {
     throw UsageError(
         fmt::format("--force-stage {}: expected one of {}", name, fmt::join(StagesKept(), ", ")));

@@ -12,11 +12,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool IsFile(const fs::path& file) {
-  std::error_code ignored;
-  return fs::is_regular_file(file, ignored);
-}
-
 // The folders of a path from the last one up.
 std::vector<std::string> PartsFromTheEnd(const fs::path& folder) {
   std::vector<std::string> parts;
@@ -56,6 +51,11 @@ std::string WithExtension(const fs::path& folder, const std::string& name) {
 }
 
 }  // namespace
+
+bool IsFile(const fs::path& file) {
+  std::error_code ignored;
+  return fs::is_regular_file(file, ignored);
+}
 
 std::vector<std::string> NamesMeant(const fs::path& folder, const std::string& path) {
   std::vector<std::string> names = {path};

@@ -9,6 +9,9 @@
 
 namespace dtr::pipeline {
 
+/// False too where nobody may look.
+bool IsFile(const std::filesystem::path& file);
+
 /// The names that a path of another program may have below `folder`, likeliest first: as it is,
 /// with
 /// '/' for '\', and without leading folders that `folder` itself ends with (images/a.jpg in

@@ -143,7 +143,7 @@ Json StampOf(const capture::Capture& capture, const CalibrateOptions& options,
 }
 
 // A damaged checkpoint costs time, never the job.
-std::optional<PhotoRefinement> Kept(const fs::path& folder, const Json& stamp) {
+std::optional<PhotoRefinement> KeptRefinement(const fs::path& folder, const Json& stamp) {
   if (!fs::exists(folder / kRecord)) return {};
   try {
     const Json record = Json::parse(ReadFile(folder / kRecord, kLargestRecordBytes));
@@ -202,7 +202,7 @@ PhotoRefinement RefinePhotos(const capture::Capture& capture, const CalibrateOpt
     return refined;
   }
   const Json stamp = StampOf(capture, options, groups, sfm_folder);
-  if (auto kept = Kept(folder, stamp)) {
+  if (auto kept = KeptRefinement(folder, stamp)) {
     refined = std::move(*kept);
   } else {
     const double cpu_start_ms = ProcessCpuMilliseconds();

@@ -10,7 +10,7 @@
 
 namespace dtr::pipeline {
 
-using Json = nlohmann::json;
+using Json = nlohmann::ordered_json;
 
 PruneJournal::PruneJournal(const std::filesystem::path& file) : file_(file) {
   std::uintmax_t whole = 0;

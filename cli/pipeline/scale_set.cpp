@@ -230,7 +230,9 @@ void WriteViews(const ScaleOptions& options, const DtrSet& old_set, double scale
         continue;
       }
       View unchanged = old_view;
-      unchanged.depth_file = unchanged.sigma_file = unchanged.mesh_file = std::nullopt;
+      unchanged.depth_file.reset();
+      unchanged.sigma_file.reset();
+      unchanged.mesh_file.reset();
       writer.CopyFiles(options.set, unchanged);
       if (old_view.depth_file) CarryDepth(options.set, old_view, scale, views[i], set.unit, writer);
       progress.Update(static_cast<int>(i) + 1);

@@ -21,7 +21,7 @@ using io::Json;
 constexpr double kMostPlacesPx = 0.1;
 constexpr char kProvenance[] = "provenance";
 
-std::string Listed(const std::vector<std::string>& names) {
+std::string ListedPhotos(const std::vector<std::string>& names) {
   std::string list;
   for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
   return list;
@@ -144,7 +144,7 @@ std::map<std::string, calib::RigPhoto> PhotosOfRig(const SetRig& rig,
       throw Error(fmt::format(
           "--rig {}: photo {}: expected one of the cameras {}: CAMERA/NAME or CAMERA and a "
           "number; take it out or name it by its camera",
-          rig.file, photo.name, Listed(rig.names)));
+          rig.file, photo.name, ListedPhotos(rig.names)));
     }
     const calib::LensCamera& lens = rig.known.lenses[found->camera];
     if (lens.width_px != photo.width_px || lens.height_px != photo.height_px) {

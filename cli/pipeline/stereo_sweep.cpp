@@ -18,8 +18,7 @@
 namespace dtr::pipeline {
 namespace {
 
-enum Axis : size_t { kEngine, kPreset, kMaxSize };
-constexpr double kMillisecondsPerSecond = 1000;
+enum StereoAxis : size_t { kEngine, kPreset, kMaxSize };
 
 int LongSide(const std::filesystem::path& folder) {
   int longest = 0;
@@ -115,7 +114,7 @@ StereoSweep::StereoSweep(StereoSweepOptions options, Progress& progress)
 }
 
 eval::SweepMeasurement StereoSweep::Measure(const eval::SweepSetting& setting) const {
-  const auto value = [&](Axis axis) {
+  const auto value = [&](StereoAxis axis) {
     return axes_[axis].values.at(static_cast<size_t>(setting.at(axis)));
   };
   NotesOnly notes(progress_);

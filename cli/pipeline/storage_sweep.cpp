@@ -15,7 +15,7 @@
 namespace dtr::pipeline {
 namespace {
 
-enum Axis : size_t { kDepth, kImage, kSigma, kMesh };
+enum StorageAxis : size_t { kDepth, kImage, kSigma, kMesh };
 constexpr const char *kPng = "png", *kJpeg = "jpeg", *kKept = "kept", *kLeftOut = "left-out";
 /// Our bands (FORMAT 4.1) within a bound in pixels of disparity.
 constexpr struct {

@@ -7,6 +7,8 @@
 
 namespace dtr::pipeline {
 
+constexpr double kMillisecondsPerSecond = 1000;
+
 /// Stages of what is measured would hide the sweep's own; notes are worth reading.
 class NotesOnly final : public Progress {
  public:

@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr size_t kWorstViews = 4;
+constexpr size_t kWorstShownViews = 4;
 constexpr size_t kMostDrawn = 1500, kMostOfView = 500;  // arrows of a plot; more is a blot
 constexpr int kCoverageColumns = 24;                    // of a map that counts
 constexpr int kPlacedColumns = 12;                      // of a map with some 40 points per view
@@ -166,7 +166,7 @@ void AddWorstViews(report::HtmlReport& page, const fs::path& folder, const std::
   std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {
     return report.cameras[a].held_out.rms_px > report.cameras[b].held_out.rms_px;
   });
-  order.resize(std::min(order.size(), kWorstViews));
+  order.resize(std::min(order.size(), kWorstShownViews));
   if (order.empty()) return;
   page.Section("The worst views");
   for (const size_t i : order) {

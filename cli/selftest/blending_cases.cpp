@@ -9,7 +9,7 @@
 namespace dtr::selftest {
 namespace {
 
-constexpr const char* kStage = "Blending";
+constexpr const char* kBlendingStage = "Blending";
 constexpr BlendWeight kWeights[] = {BlendWeight::kCosine, BlendWeight::kExponential,
                                     BlendWeight::kAngle, BlendWeight::kInverseAngle,
                                     BlendWeight::kKNearest};
@@ -89,7 +89,7 @@ Outcome Exponentials(const Conditions&) {
   return outcome;
 }
 
-Outcome ManyViews(const Conditions&) {
+Outcome ManyBlendedViews(const Conditions&) {
   Outcome outcome;
   Shares shares;
   Random random(3);
@@ -164,12 +164,12 @@ Outcome ZeroAndStraightBehind(const Conditions&) {
 }  // namespace
 
 std::vector<Case> BlendingCases() {
-  return {{kStage, "cos^n, n to 1000", true, CosinePowers},
-          {kStage, "exponential, c to 1e6", true, Exponentials},
-          {kStage, "256 views", true, ManyViews},
-          {kStage, "all weights underflow", true, AllUnderflow},
-          {kStage, "duplicate cameras", true, Duplicates},
-          {kStage, "angles of 0 and 180 degrees", true, ZeroAndStraightBehind}};
+  return {{kBlendingStage, "cos^n, n to 1000", true, CosinePowers},
+          {kBlendingStage, "exponential, c to 1e6", true, Exponentials},
+          {kBlendingStage, "256 views", true, ManyBlendedViews},
+          {kBlendingStage, "all weights underflow", true, AllUnderflow},
+          {kBlendingStage, "duplicate cameras", true, Duplicates},
+          {kBlendingStage, "angles of 0 and 180 degrees", true, ZeroAndStraightBehind}};
 }
 
 }  // namespace dtr::selftest

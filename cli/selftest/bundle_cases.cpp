@@ -26,7 +26,7 @@ using testing::bundle::Perturbed;
 using testing::bundle::Projections;
 using testing::bundle::SceneSpec;
 
-constexpr const char* kStage = "Bundle adjustment";
+constexpr const char* kBundleStage = "Bundle adjustment";
 
 Adjusted Solve(const Bundle& start, LensFreedom lens, Outcome& outcome) {
   AdjustOptions options;
@@ -320,22 +320,23 @@ std::vector<Case> BundleCases() {
   const auto scaled = [](double scale) {
     return [scale](const Conditions&) { return Scaled(scale); };
   };
-  return {{kStage, "world in a unit of 1e-6", true, scaled(1e-6)},
-          {kStage, "world in a unit of 1e6", true, scaled(1e6)},
-          {kStage, "world 1e7 units from its origin", true, FarFromTheOrigin},
-          {kStage, "mixed magnitudes: f 9000 px, depths 1 : 10 000", true, MixedMagnitudes},
-          {kStage, "nearly planar: a slab 4 x 3 x 0.002", true, NearlyFlat},
-          {kStage, "a plane faced squarely, lens unknown", true, FlatFacedSquarely},
-          {kStage, "camera centres on a line", true, CentresOnALine},
-          {kStage, "points on a line", false, PointsOnALine},
-          {kStage, "a lens of 1 degree, known", true, NarrowLens},
-          {kStage, "rays 0.1 degrees apart, lens unknown", true, NarrowLensFree},
-          {kStage, "a fisheye lens of 190 degrees", true, FisheyeOf190Degrees},
-          {kStage, "half of the sights are outliers, 2 % off at the start", true, HalfAreOutliers},
-          {kStage, "one sight a million pixels off", true, AMillionPixelsOff},
-          {kStage, "focal length 30 % off at the start", true, FocalThirtyPercentOff},
-          {kStage, "everything 30 % off at the start", true, AllThirtyPercentOff},
-          {kStage, "a sight that is no number", true, BrokenNumbers}};
+  return {{kBundleStage, "world in a unit of 1e-6", true, scaled(1e-6)},
+          {kBundleStage, "world in a unit of 1e6", true, scaled(1e6)},
+          {kBundleStage, "world 1e7 units from its origin", true, FarFromTheOrigin},
+          {kBundleStage, "mixed magnitudes: f 9000 px, depths 1 : 10 000", true, MixedMagnitudes},
+          {kBundleStage, "nearly planar: a slab 4 x 3 x 0.002", true, NearlyFlat},
+          {kBundleStage, "a plane faced squarely, lens unknown", true, FlatFacedSquarely},
+          {kBundleStage, "camera centres on a line", true, CentresOnALine},
+          {kBundleStage, "points on a line", false, PointsOnALine},
+          {kBundleStage, "a lens of 1 degree, known", true, NarrowLens},
+          {kBundleStage, "rays 0.1 degrees apart, lens unknown", true, NarrowLensFree},
+          {kBundleStage, "a fisheye lens of 190 degrees", true, FisheyeOf190Degrees},
+          {kBundleStage, "half of the sights are outliers, 2 % off at the start", true,
+           HalfAreOutliers},
+          {kBundleStage, "one sight a million pixels off", true, AMillionPixelsOff},
+          {kBundleStage, "focal length 30 % off at the start", true, FocalThirtyPercentOff},
+          {kBundleStage, "everything 30 % off at the start", true, AllThirtyPercentOff},
+          {kBundleStage, "a sight that is no number", true, BrokenNumbers}};
 }
 
 }  // namespace dtr::selftest

@@ -14,7 +14,7 @@ namespace {
 
 using io::DepthFormat;
 
-constexpr const char* kStage = "Depth coding";
+constexpr const char* kDepthCodingStage = "Depth coding";
 /// Steps of 1/z between the ends of the range; zstd-inverse as finely as it goes, and as coarsely
 /// as pruning makes it.
 constexpr std::pair<DepthCoding, int> kInverseCodings[] = {
@@ -227,15 +227,15 @@ Outcome NoNumbers(const Conditions&) {
 }  // namespace
 
 std::vector<Case> DepthCodingCases() {
-  return {{kStage, "all holes", true, AllHoles},
-          {kStage, "a single pixel: alone, and among holes", true, SinglePixel},
-          {kStage, "checkerboard of near and far, 1 : 600", true, Checkerboard},
-          {kStage, "the end of the range, 65.535 m", true, EndOfMillimetres},
-          {kStage, "the end of half floats, 65 504", true, EndOfHalf},
-          {kStage, "the ends of random ranges", true, RangeEnds},
-          {kStage, "denormals", true, Denormals},
-          {kStage, "a range that begins at a denormal", true, RangeFromADenormal},
-          {kStage, "NaN, infinity, negative depth", true, NoNumbers}};
+  return {{kDepthCodingStage, "all holes", true, AllHoles},
+          {kDepthCodingStage, "a single pixel: alone, and among holes", true, SinglePixel},
+          {kDepthCodingStage, "checkerboard of near and far, 1 : 600", true, Checkerboard},
+          {kDepthCodingStage, "the end of the range, 65.535 m", true, EndOfMillimetres},
+          {kDepthCodingStage, "the end of half floats, 65 504", true, EndOfHalf},
+          {kDepthCodingStage, "the ends of random ranges", true, RangeEnds},
+          {kDepthCodingStage, "denormals", true, Denormals},
+          {kDepthCodingStage, "a range that begins at a denormal", true, RangeFromADenormal},
+          {kDepthCodingStage, "NaN, infinity, negative depth", true, NoNumbers}};
 }
 
 }  // namespace dtr::selftest

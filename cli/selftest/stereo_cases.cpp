@@ -28,7 +28,7 @@ using stereo::testing::Surface;
 using stereo::testing::Texture;
 using stereo::testing::ViewsOf;
 
-constexpr const char* kStage = "Stereo";
+constexpr const char* kStereoStage = "Stereo";
 constexpr int kWidth = 96, kHeight = 72;
 constexpr double kFocal = 84;
 const PinholeCamera kCamera(kWidth, kHeight, kFocal, kFocal, 0.5 * kWidth, 0.5 * kHeight);
@@ -315,19 +315,19 @@ std::vector<Case> StereoCases() {
   const auto baseline = [](double share) {
     return [share](const Conditions& conditions) { return SmallBaseline(share, conditions); };
   };
-  return {{kStage, "baseline / depth 1e-4, a long lens", true, baseline(1e-4)},
-          {kStage, "baseline / depth 1e-3, a long lens", false, baseline(1e-3)},
-          {kStage, "baseline / depth 1e-2, a long lens", false, baseline(1e-2)},
-          {kStage, "baseline / depth 1e-4, a short lens", true, LessThanNoise},
-          {kStage, "baseline / depth 0.1, two views", true, BaselineOfATenth},
-          {kStage, "baseline / depth 1", true, BaselineAsLongAsTheDepth},
-          {kStage, "depths 1 : 1000 in one picture", true, DepthsOneToAThousand},
-          {kStage, "no texture", true, WithoutTexture},
-          {kStage, "a pattern that repeats 3 times within the range", true, Repetition},
-          {kStage, "exposure +-1 EV between neighbours", true, Exposure},
-          {kStage, "1-bit images", true, OneBit},
-          {kStage, "copies of one photo", true, CopiesOfOnePhoto},
-          {kStage, "worlds in other units, 1e7 from the origin", true, UnitAndOrigin}};
+  return {{kStereoStage, "baseline / depth 1e-4, a long lens", true, baseline(1e-4)},
+          {kStereoStage, "baseline / depth 1e-3, a long lens", false, baseline(1e-3)},
+          {kStereoStage, "baseline / depth 1e-2, a long lens", false, baseline(1e-2)},
+          {kStereoStage, "baseline / depth 1e-4, a short lens", true, LessThanNoise},
+          {kStereoStage, "baseline / depth 0.1, two views", true, BaselineOfATenth},
+          {kStereoStage, "baseline / depth 1", true, BaselineAsLongAsTheDepth},
+          {kStereoStage, "depths 1 : 1000 in one picture", true, DepthsOneToAThousand},
+          {kStereoStage, "no texture", true, WithoutTexture},
+          {kStereoStage, "a pattern that repeats 3 times within the range", true, Repetition},
+          {kStereoStage, "exposure +-1 EV between neighbours", true, Exposure},
+          {kStereoStage, "1-bit images", true, OneBit},
+          {kStereoStage, "copies of one photo", true, CopiesOfOnePhoto},
+          {kStereoStage, "worlds in other units, 1e7 from the origin", true, UnitAndOrigin}};
 }
 
 }  // namespace dtr::selftest

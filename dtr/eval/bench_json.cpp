@@ -11,7 +11,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json Number(const std::optional<double>& value) {
+Json NumberOrNull(const std::optional<double>& value) {
   return value && std::isfinite(*value) ? Json(*value) : Json(nullptr);
 }
 
@@ -40,8 +40,8 @@ Json Value(const BenchRow& row, int views_in_set) {
           {"fill_cpu_ms", row.fill_cpu.median_ms},
           {"whole_ms", row.whole_ms()},
           {"whole_cpu_ms", row.whole_cpu_ms()},
-          {"psnr_db", Number(row.psnr_db)},
-          {"psnr_covered_db", Number(row.psnr_covered_db)},
+          {"psnr_db", NumberOrNull(row.psnr_db)},
+          {"psnr_covered_db", NumberOrNull(row.psnr_covered_db)},
           {"identical",
            IdenticalFigures({{"psnr_db", row.psnr_db}, {"psnr_covered_db", row.psnr_covered_db}})},
           {"coverage", row.coverage}};
@@ -74,7 +74,7 @@ std::string ToJson(const std::string& table, const BenchReport& report,
   if (report.comparison) {
     const BenchComparison& at = *report.comparison;
     json["ratio_two_pass_over_deferred"] = at.ratio_two_pass_over_deferred;
-    json["loss_db"] = Number(at.loss_db);
+    json["loss_db"] = NumberOrNull(at.loss_db);
     json["compared_at"] = {{"views_used", at.views_used}, {"resolution", at.resolution}};
   }
   json["machine"] = Value(machine);

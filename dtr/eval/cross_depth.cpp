@@ -13,9 +13,9 @@
 namespace dtr::eval {
 namespace {
 
-constexpr float kSmoothRatio = 1.03f;     // neighbouring depths of a larger ratio: other surfaces
-constexpr double kOtherSurfacePx = 3.0;   // stereo keeps depth to well below a pixel
-constexpr long long kEnoughPixels = 200;  // a median of fewer says little about a view
+constexpr float kSmoothDepthRatio = 1.03f;  // neighbouring depths of a larger ratio: other surfaces
+constexpr double kOtherSurfacePx = 3.0;     // stereo keeps depth to well below a pixel
+constexpr long long kEnoughPixels = 200;    // a median of fewer says little about a view
 
 /// Inverse depth of the view's surface where `pixel` (of the depth grid) lies on one smooth
 /// surface, exact on planes; empty at edges, holes and off the map.
@@ -28,7 +28,7 @@ std::optional<double> InverseDepthAt(const DepthImage& depth, const Eigen::Vecto
     if (DepthImage::IsHole(z)) return std::nullopt;
   }
   const auto [low, high] = std::minmax_element(corner, corner + 4);
-  if (*high >= kSmoothRatio * *low) return std::nullopt;
+  if (*high >= kSmoothDepthRatio * *low) return std::nullopt;
   const double a = u - x, b = v - y;
   return (1 - b) * ((1 - a) / corner[0] + a / corner[1]) +
          b * ((1 - a) / corner[2] + a / corner[3]);

@@ -23,13 +23,13 @@ struct Line {
   }
 };
 
-struct Place {
+struct EdgePlace {
   bool found = false;
   double offset = 0;  ///< of the estimated edge from the true one, towards the second pixel
 };
 
 /// `middle`: true depth between the two surfaces. Pixels on either side of it are near or far.
-Place FindEdge(const Line& line, double middle, double set_units_per_truth_unit) {
+EdgePlace FindEdge(const Line& line, double middle, double set_units_per_truth_unit) {
   const bool first_is_near = line.At(*line.truth, 0) < middle;
   const auto goes_on = [&](int step) {
     const float z = line.At(*line.truth, step);
@@ -79,7 +79,7 @@ void EdgeScorer::Add(const DepthImage& estimate, const DepthImage& truth, const 
         if (jump_px < kJumpPx || std::max(a, b) < kJumpRatio * std::min(a, b)) continue;
         ++edges_;
         const double middle = 2 / (1 / a + 1 / b);
-        const Place place =
+        const EdgePlace place =
             FindEdge({&estimate, &truth, x, y, dx, dy}, middle, set_units_per_truth_unit);
         if (!place.found) continue;
         ++found_;

@@ -17,7 +17,7 @@ static_assert(sizeof(ViewBlock) == 10 * 16, "std430: ten vec4");
 constexpr int kMaxImageArrays = StateGuard::kTextureUnits - 1;
 // Variants of the resolving shader hold so many views, doubled until all fit.
 constexpr int kFewestViews = 8;
-constexpr GLuint kViewsBinding = 0, kCoarseDepthBinding = 2;  // as in resolve.frag
+constexpr GLuint kViewsBinding = 0, kResolveDepthBinding = 2;  // as in resolve.frag
 
 std::array<float, 4> Row(const Eigen::Vector3d& row, double last) {
   return {static_cast<float>(row.x()), static_cast<float>(row.y()), static_cast<float>(row.z()),
@@ -169,7 +169,7 @@ void Resolver::Draw(const Frame& frame, const Band& band, const ViewStore& store
   glBindBufferBase(BlocksFitUniforms(views) ? GL_UNIFORM_BUFFER : GL_SHADER_STORAGE_BUFFER,
                    kViewsBinding, view_buffer_.name());
   if (frame.deferred()) {
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, kCoarseDepthBinding, coarse_depth);
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, kResolveDepthBinding, coarse_depth);
   }
   glBindFramebuffer(GL_FRAMEBUFFER, targets.result_framebuffer.name());
   glViewport(0, 0, frame.novel.width_px(), band.count);

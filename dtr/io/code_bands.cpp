@@ -11,16 +11,15 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
+#include "dtr/io/plain_bytes.h"
 
 namespace dtr::io {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "bytes are copied as they lie in memory");
+using BandBytes = std::vector<std::uint8_t>;
 
-using Bytes = std::vector<std::uint8_t>;
-
-constexpr char kMagic[9] = "DTRBAND1";
-constexpr size_t kHeaderBytes = 8 + 3 * 4;
+constexpr char kBandMagic[9] = "DTRBAND1";
+constexpr size_t kBandHeaderBytes = 8 + 3 * 4;
 // Enough pixels for the entropy coder's tables to pay, few enough that photos have several bands.
 constexpr int kRowsPerBand = 128;
 constexpr int kMostRowsPerBand = 1 << 16;
@@ -29,9 +28,9 @@ constexpr std::uint8_t kWide = 255;  // the residual's 16 bits stand among the w
 
 /// What a band is stored as, each a zstd frame with checksum, or nothing where empty.
 struct Parts {
-  Bytes validity;   ///< a bit a pixel, rows padded to bytes, each row XOR the one above
-  Bytes residuals;  ///< a byte for each pixel that is no hole
-  Bytes wide;       ///< u16 for each residual kWide
+  BandBytes validity;   ///< a bit a pixel, rows padded to bytes, each row XOR the one above
+  BandBytes residuals;  ///< a byte for each pixel that is no hole
+  BandBytes wide;       ///< u16 for each residual kWide
 };
 constexpr size_t kParts = 3;
 using PartSizes = std::array<std::uint32_t, kParts>;
@@ -120,7 +119,7 @@ Parts Split(const Grid<std::uint16_t>& codes, const BandRange& band) {
   return parts;
 }
 
-std::string Compressed(const Bytes& part) {
+std::string Compressed(const BandBytes& part) {
   if (part.empty()) return "";
   const std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)> context(ZSTD_createCCtx(),
                                                                      &ZSTD_freeCCtx);
@@ -176,7 +175,7 @@ void ExpectPlausible(const std::array<std::string_view, kParts>& frames, int wid
 }
 
 /// Exactly `size` bytes out of exactly the bytes given.
-Bytes Decompressed(std::string_view frame, size_t size) {
+BandBytes Decompressed(std::string_view frame, size_t size) {
   if (size == 0) {
     if (!frame.empty()) Fail("no bytes for an empty part", std::to_string(frame.size()));
     return {};
@@ -186,14 +185,14 @@ Bytes Decompressed(std::string_view frame, size_t size) {
   if (ZSTD_findFrameCompressedSize(frame.data(), frame.size()) != frame.size()) {
     Fail("one zstd frame", "part of one, or more");
   }
-  Bytes bytes(size);
+  BandBytes bytes(size);
   const size_t got = ZSTD_decompress(bytes.data(), size, frame.data(), frame.size());
   if (ZSTD_isError(got)) Fail("a zstd frame", ZSTD_getErrorName(got));
   if (got != size) Fail(std::to_string(size) + " bytes", std::to_string(got));
   return bytes;
 }
 
-size_t CountValid(Bytes& validity, int width_px) {
+size_t CountValid(BandBytes& validity, int width_px) {
   const size_t row_bytes = RowBytes(width_px);
   for (size_t i = row_bytes; i < validity.size(); ++i) {
     validity[i] = static_cast<std::uint8_t>(validity[i] ^ validity[i - row_bytes]);
@@ -250,11 +249,6 @@ void Join(const Parts& parts, const BandRange& band, Grid<std::uint16_t>& codes)
   if (zero) Fail("codes of at least 1 where there is depth", "0");
 }
 
-template <typename T>
-void Append(std::string& out, T value) {
-  out.append(reinterpret_cast<const char*>(&value), sizeof(T));
-}
-
 std::uint32_t U32At(std::string_view bytes, size_t at) {
   std::uint32_t value;
   std::memcpy(&value, bytes.data() + at, sizeof value);
@@ -283,7 +277,7 @@ std::string EncodeBands(const Grid<std::uint16_t>& codes, int threads) {
     frames[static_cast<size_t>(band)] = {Compressed(parts.validity), Compressed(parts.residuals),
                                          Compressed(parts.wide)};
   });
-  std::string out(kMagic, 8);
+  std::string out(kBandMagic, 8);
   for (const int number : {codes.width(), codes.height(), kRowsPerBand}) {
     Append(out, static_cast<std::uint32_t>(number));
   }
@@ -297,7 +291,7 @@ std::string EncodeBands(const Grid<std::uint16_t>& codes, int threads) {
 }
 
 Grid<std::uint16_t> DecodeBands(std::string_view bytes, int width_px, int height_px, int threads) {
-  if (bytes.size() < kHeaderBytes || bytes.substr(0, 8) != std::string_view(kMagic, 8)) {
+  if (bytes.size() < kBandHeaderBytes || bytes.substr(0, 8) != std::string_view(kBandMagic, 8)) {
     Fail("the magic DTRBAND1 and a header", "another beginning");
   }
   const std::uint32_t width = U32At(bytes, 8), height = U32At(bytes, 12), rows = U32At(bytes, 16);
@@ -312,13 +306,13 @@ Grid<std::uint16_t> DecodeBands(std::string_view bytes, int width_px, int height
   const int rows_per_band = static_cast<int>(rows);
   const int bands = BandsOf(height_px, rows_per_band);
   const size_t table_bytes = static_cast<size_t>(bands) * sizeof(PartSizes);
-  if (bytes.size() - kHeaderBytes < table_bytes) {
+  if (bytes.size() - kBandHeaderBytes < table_bytes) {
     Fail("the sizes of " + std::to_string(bands) + " bands", "the end");
   }
   std::vector<PartSizes> sizes(static_cast<size_t>(bands));
-  std::memcpy(sizes.data(), bytes.data() + kHeaderBytes, table_bytes);
+  std::memcpy(sizes.data(), bytes.data() + kBandHeaderBytes, table_bytes);
   std::vector<size_t> begins;
-  size_t end = kHeaderBytes + table_bytes;
+  size_t end = kBandHeaderBytes + table_bytes;
   for (const PartSizes& band : sizes) {
     begins.push_back(end);
     for (const std::uint32_t size : band) end += size;
@@ -352,7 +346,7 @@ std::uint64_t MostBandBytes(int width_px, int height_px) {
   // Bands of one row at worst; 64 bytes are more than zstd adds to what does not compress at all.
   constexpr std::uint64_t kFrameBytes = 64;
   const auto pixels = static_cast<std::uint64_t>(width_px) * static_cast<std::uint64_t>(height_px);
-  return kHeaderBytes + 4 * pixels + pixels / 64 +
+  return kBandHeaderBytes + 4 * pixels + pixels / 64 +
          static_cast<std::uint64_t>(height_px) * (sizeof(PartSizes) + kParts * kFrameBytes);
 }
 

@@ -58,7 +58,7 @@ double LightOfHlg(double number) {  // ITU-R BT.2100, table 5: of the scene, 0..
 }
 
 // What is brighter than the knee approaches 1.
-float Compressed(float light) {
+float CompressedLight(float light) {
   if (light <= kKnee) return light;
   return kKnee + (1 - kKnee) * (1 - std::exp((kKnee - light) / (1 - kKnee)));
 }
@@ -174,7 +174,7 @@ void SrgbConverter::Finish(Eigen::Vector3f light, std::uint8_t* srgb) const {
   light = (srgb_from_coded_ * light).cwiseMax(0);
   if (IsHdr(coding_)) {
     const float largest = light.maxCoeff();
-    if (largest > kKnee) light *= Compressed(largest) / largest;
+    if (largest > kKnee) light *= CompressedLight(largest) / largest;
   }
   for (int c = 0; c < 3; ++c) {
     const float clipped = std::min(light[c], 1.0F);

@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 using OIIO::ImageSpec;
 using OIIO::TypeDesc;
 
-constexpr float kHalfMax = 65504;
+constexpr float kLargestHalf = 65504;
 
 // "ViewLayer.Depth.Z" -> {"viewlayer", "depth", "z"}.
 std::vector<std::string> PartsOf(const std::string& channel) {
@@ -199,7 +199,7 @@ void WriteExr(const fs::path& file, const Grid<float>& grid, bool half) {
   }
   if (half) {
     for (const float value : grid.data()) {
-      if (std::abs(value) > kHalfMax) {
+      if (std::abs(value) > kLargestHalf) {
         throw Error(file.string() + ": expected values within half's range, 65504, found " +
                     std::to_string(value));
       }

@@ -13,7 +13,7 @@ namespace dtr::io {
 namespace {
 
 namespace fs = std::filesystem;
-constexpr std::uint32_t kMagic = 20000630, kMultiPart = 0x1000;
+constexpr std::uint32_t kExrMagic = 20000630, kMultiPart = 0x1000;
 constexpr size_t kLongestName = 255;  // OpenEXR's "long names"
 // A chunk of up to this size needs no proof (some twenty times as much is allocated to read it); of
 // a larger one each byte of the file stands for at most as many as deflate packs into one (zlib's
@@ -188,7 +188,8 @@ void ExpectPlausibleHeaders(Reader& exr) {
 void ExpectPlausibleExr(const fs::path& file) {
   Reader exr{file, std::ifstream(file, std::ios::binary), fs::file_size(file)};
   constexpr std::uintmax_t kMagicAndVersion = 8;
-  if (exr.size >= kMagicAndVersion && ReadLittle32(exr.in) == kMagic) ExpectPlausibleHeaders(exr);
+  if (exr.size >= kMagicAndVersion && ReadLittle32(exr.in) == kExrMagic)
+    ExpectPlausibleHeaders(exr);
 }
 
 }  // namespace dtr::io

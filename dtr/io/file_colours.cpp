@@ -13,10 +13,10 @@ namespace {
 namespace fs = std::filesystem;
 constexpr std::uint64_t kLargestBox = 64 << 20;  // of what is read into memory
 
-// Bytes of a file; what lies beyond its end is empty.
-class Bytes {
+// FileBytes of a file; what lies beyond its end is empty.
+class FileBytes {
  public:
-  explicit Bytes(const fs::path& file) : in_(file, std::ios::binary) {
+  explicit FileBytes(const fs::path& file) : in_(file, std::ios::binary) {
     std::error_code error;
     size_ = fs::file_size(file, error);
     if (error) size_ = 0;
@@ -58,7 +58,7 @@ struct PngChunks {
   bool iccp = false, srgb = false;
 };
 
-PngChunks ReadPngChunks(Bytes& file) {
+PngChunks ReadPngChunks(FileBytes& file) {
   PngChunks chunks;
   for (std::uint64_t at = 8; at + 12 <= file.size();) {
     const std::string head = file.At(at, 8);
@@ -76,7 +76,7 @@ PngChunks ReadPngChunks(Bytes& file) {
   return chunks;
 }
 
-FileColours PngColours(Bytes& file) {
+FileColours PngColours(FileBytes& file) {
   constexpr double kUnit = 1e5;
   constexpr double kUsualGamma = 0.45455, kNear = 0.01;  // old programs write this of sRGB
   FileColours colours;
@@ -106,7 +106,7 @@ FileColours PngColours(Bytes& file) {
 }
 
 // RFC 9649; empty where there is none.
-std::string WebpChunk(Bytes& file, std::string_view name) {
+std::string WebpChunk(FileBytes& file, std::string_view name) {
   for (std::uint64_t at = 12; at + 8 <= file.size();) {
     const std::string head = file.At(at, 8);
     if (head.size() < 8) break;
@@ -122,7 +122,7 @@ bool IsWebp(const std::string& start) {
   return start.starts_with("RIFF") && start.substr(8) == "WEBP";
 }
 
-FileColours WebpColours(Bytes& file) {
+FileColours WebpColours(FileBytes& file) {
   FileColours colours;
   const std::string icc = WebpChunk(file, "ICCP");
   colours.icc.assign(icc.begin(), icc.end());
@@ -135,7 +135,7 @@ struct Box {
   std::uint64_t begin = 0, end = 0;
 };
 
-std::vector<Box> BoxesIn(Bytes& file, std::uint64_t begin, std::uint64_t end) {
+std::vector<Box> BoxesIn(FileBytes& file, std::uint64_t begin, std::uint64_t end) {
   constexpr size_t kMostBoxes = 10'000;
   std::vector<Box> boxes;
   for (std::uint64_t at = begin; at + 8 <= end && boxes.size() < kMostBoxes;) {
@@ -160,7 +160,7 @@ const Box* Find(const std::vector<Box>& boxes, std::string_view type) {
   return found == boxes.end() ? nullptr : &*found;
 }
 
-std::string ContentOf(Bytes& file, const Box* box) {
+std::string ContentOf(FileBytes& file, const Box* box) {
   return box == nullptr ? std::string() : file.At(box->begin, box->end - box->begin);
 }
 
@@ -187,7 +187,7 @@ std::vector<size_t> PropertiesOf(const std::string& ipma, std::uint64_t item) {
   return {};
 }
 
-FileColours HeifColours(Bytes& file) {
+FileColours HeifColours(FileBytes& file) {
   constexpr std::uint64_t kFullBox = 4;  // version and flags
   FileColours colours;
   const auto top = BoxesIn(file, 0, file.size());
@@ -220,7 +220,7 @@ FileColours HeifColours(Bytes& file) {
 }  // namespace
 
 FileColours ReadFileColours(const fs::path& path) {
-  Bytes file(path);
+  FileBytes file(path);
   const std::string start = file.At(0, 12);
   if (start.starts_with("\x89PNG")) return PngColours(file);
   if (IsWebp(start)) return WebpColours(file);
@@ -230,7 +230,7 @@ FileColours ReadFileColours(const fs::path& path) {
 
 std::string ReadWebpExif(const fs::path& path) {
   constexpr std::string_view kJpegsStart("Exif\0\0", 6);  // some programs put it before
-  Bytes file(path);
+  FileBytes file(path);
   if (!IsWebp(file.At(0, 12))) return {};
   std::string exif = WebpChunk(file, "EXIF");
   if (exif.starts_with(kJpegsStart)) exif.erase(0, kJpegsStart.size());

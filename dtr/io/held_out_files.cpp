@@ -10,7 +10,7 @@
 namespace dtr::io {
 namespace {
 
-constexpr char kFormatName[] = "dtr-held-out";
+constexpr char kHeldOutFormat[] = "dtr-held-out";
 
 template <typename Set>
 auto HeldOutFilesOf(Set& set) {
@@ -39,7 +39,7 @@ std::string HeldOutFilesJson(const DtrSet& set, const std::string& file) {
   const std::vector<const StoredFile*> stored = HeldOutFilesOf(set);
   if (stored.empty()) return "";
   Json root = {
-      {"format", kFormatName}, {"format_version", kFormatVersion}, {"files", Json::array()}};
+      {"format", kHeldOutFormat}, {"format_version", kFormatVersion}, {"files", Json::array()}};
   for (const StoredFile* entry : stored) root["files"].push_back(JsonFromStoredFile(*entry));
   return PrettyJson(root, file);
 }
@@ -47,7 +47,7 @@ std::string HeldOutFilesJson(const DtrSet& set, const std::string& file) {
 void MergeHeldOutFiles(const std::string& text, const std::string& file, DtrSet& set) {
   const Json parsed = ParseJson(text, file);
   const JsonObject root(parsed, file, "");
-  if (root.String("format") != kFormatName) root.Fail("format", "\"dtr-held-out\"");
+  if (root.String("format") != kHeldOutFormat) root.Fail("format", "\"dtr-held-out\"");
   if (root.PositiveInt("format_version") != kFormatVersion) {
     root.Fail("format_version", std::to_string(kFormatVersion));
   }

@@ -10,25 +10,20 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
+#include "dtr/io/plain_bytes.h"
 
 namespace dtr::io {
 namespace {
 
 namespace fs = std::filesystem;
-static_assert(std::endian::native == std::endian::little, "bytes are copied as they lie in memory");
 
-constexpr char kMagic[9] = "DTRMESH1";
+constexpr char kMeshMagic[9] = "DTRMESH1";
 constexpr size_t kHashBytes = 32;
-constexpr std::uintmax_t kLimitBytes = std::uintmax_t{512} << 20;
+constexpr std::uintmax_t kLargestMeshBytes = std::uintmax_t{512} << 20;
 constexpr int kMostSamples = 1 << 20;  // a side: an image has at most 400 Mpx
 constexpr double kNoAbsoluteBreak = -1;
 constexpr int kRootSide = BlockCover::kRootSide;
 static_assert(kRootSide == 16, "a rectangle is four numbers of 4 bits");
-
-template <typename T>
-void Append(std::string& out, T value) {
-  out.append(reinterpret_cast<const char*>(&value), sizeof(T));
-}
 
 std::string BytesOfHex(const std::string& hex) {
   std::string bytes(kHashBytes, '\0');
@@ -54,9 +49,9 @@ std::string HexOfBytes(std::string_view bytes) {
 int RootsAlong(int samples) { return (samples + kRootSide - 1) / kRootSide; }
 
 /// Takes plain values one after the other; throws where they end.
-class Bytes {
+class MeshBytes {
  public:
-  Bytes(std::string_view content, const fs::path& file) : rest_(content), file_(file) {}
+  MeshBytes(std::string_view content, const fs::path& file) : rest_(content), file_(file) {}
   std::string_view Take(size_t count) {
     if (rest_.size() < count) Fail("more bytes", "the end");
     const std::string_view taken = rest_.substr(0, count);
@@ -80,7 +75,7 @@ class Bytes {
   const fs::path& file_;
 };
 
-double TakeThreshold(Bytes& bytes, double smallest) {
+double TakeThreshold(MeshBytes& bytes, double smallest) {
   const auto value = bytes.Take<double>();
   if (!std::isfinite(value) || (value < 0 && value != smallest)) {
     bytes.Fail("a threshold of at least 0", std::to_string(value));
@@ -89,8 +84,8 @@ double TakeThreshold(Bytes& bytes, double smallest) {
 }
 
 StoredMesh FromText(const std::string& content, const fs::path& file) {
-  Bytes bytes(content, file);
-  if (bytes.Take(8) != std::string_view(kMagic, 8)) bytes.Fail("the magic DTRMESH1", "another");
+  MeshBytes bytes(content, file);
+  if (bytes.Take(8) != std::string_view(kMeshMagic, 8)) bytes.Fail("the magic DTRMESH1", "another");
   StoredMesh mesh;
   BlockCover& cover = mesh.cover;
   const auto take_count = [&](const char* what, std::uint32_t least, std::uint32_t most) {
@@ -152,7 +147,7 @@ StoredMesh FromText(const std::string& content, const fs::path& file) {
 
 void WriteMesh(const fs::path& file, const StoredMesh& mesh) {
   const BlockCover& cover = mesh.cover;
-  std::string out(kMagic, 8);
+  std::string out(kMeshMagic, 8);
   for (const int number : {mesh.resolution, cover.columns, cover.rows, 0}) {
     Append(out, static_cast<std::uint32_t>(number));
   }
@@ -180,6 +175,8 @@ void WriteMesh(const fs::path& file, const StoredMesh& mesh) {
   WriteFileAtomically(file, out);
 }
 
-StoredMesh ReadMesh(const fs::path& file) { return FromText(ReadFile(file, kLimitBytes), file); }
+StoredMesh ReadMesh(const fs::path& file) {
+  return FromText(ReadFile(file, kLargestMeshBytes), file);
+}
 
 }  // namespace dtr::io

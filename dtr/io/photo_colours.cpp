@@ -34,7 +34,7 @@ struct TransformDeleter {
 using Profile = std::unique_ptr<void, ProfileCloser>;
 using Transform = std::unique_ptr<void, TransformDeleter>;
 
-bool IsFloat(const ImageSpec& spec) { return spec.format.is_floating_point(); }
+bool IsFloatSpec(const ImageSpec& spec) { return spec.format.is_floating_point(); }
 
 std::vector<std::uint8_t> IccOf(const ImageSpec& spec) {
   const OIIO::ParamValue* icc = spec.find_attribute("ICCProfile");
@@ -233,16 +233,16 @@ PhotoColours::PhotoColours(const ImageSpec& spec, const std::string& format, con
   if (is_exr) RequireExrOfColours(spec, file);
   RequireTiffOfColours(spec, file);
   std::optional<ColourCoding> coding = stated.coding;
-  if (!coding && IsFloat(spec)) coding = CodingOfChromaticities(spec);
+  if (!coding && IsFloatSpec(spec)) coding = CodingOfChromaticities(spec);
   const std::vector<std::uint8_t> icc = stated.icc.empty() ? IccOf(spec) : stated.icc;
   if (!coding && icc.empty() && IsAdobeRgbByExif(spec)) coding = AdobeRgb();
 
   auto conversion = std::make_unique<Conversion>();
-  conversion->linear_floats = IsFloat(spec);
+  conversion->linear_floats = IsFloatSpec(spec);
   conversion->eight_bits = spec.format.basetype == TypeDesc::UINT8;
   if (coding) {
     const bool same_transfer =
-        coding->transfer == (IsFloat(spec) ? Transfer::kLinear : Transfer::kSrgb);
+        coding->transfer == (IsFloatSpec(spec) ? Transfer::kLinear : Transfer::kSrgb);
     if (AreSrgbs(coding->primaries)) coding->primaries = {};
     if (same_transfer && AreSrgbs(coding->primaries)) return;
     try {

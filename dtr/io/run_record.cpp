@@ -1,14 +1,12 @@
 #include "dtr/io/run_record.h"
 
-#include <nlohmann/json.hpp>
-
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
+#include "dtr/io/json_fields.h"
 
 namespace dtr::io {
 namespace {
 
-using Json = nlohmann::json;
 constexpr std::uintmax_t kMostRecordBytes = 64 << 20;
 
 double NumberOr0(const Json& object, const char* name) {

@@ -9,29 +9,24 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
+#include "dtr/io/plain_bytes.h"
 
 namespace dtr::io {
 namespace {
 
 namespace fs = std::filesystem;
-static_assert(std::endian::native == std::endian::little, "bytes are copied as they lie in memory");
 
-constexpr char kMagic[9] = "DTRSPARS";
+constexpr char kSparseMagic[9] = "DTRSPARS";
 constexpr std::uint32_t kVersion = 1;
-constexpr std::uint64_t kHeaderBytes = 8 + 4 + 4 + 8 + 8;
+constexpr std::uint64_t kSparseHeaderBytes = 8 + 4 + 4 + 8 + 8;
 constexpr std::uint64_t kPointBytes = 3 * 8;
 constexpr std::uint64_t kObservationBytes = 4 + 4 + 2 * 8;
-constexpr std::uint64_t kLimitBytes = std::uint64_t{8} << 30;  // 300 million observations
-
-template <typename T>
-void Append(std::string& out, T value) {
-  out.append(reinterpret_cast<const char*>(&value), sizeof(T));
-}
+constexpr std::uint64_t kLargestSparseBytes = std::uint64_t{8} << 30;  // 300 million observations
 
 // Reads plain values one after the other; the caller has checked that they are there.
-class Bytes {
+class SparseBytes {
  public:
-  explicit Bytes(const std::string& content) : at_(content.data()) {}
+  explicit SparseBytes(const std::string& content) : at_(content.data()) {}
   template <typename T>
   T Take() {
     T value;
@@ -72,8 +67,8 @@ void ExpectGood(const fs::path& file, const SparseScene& scene) {
 
 void WriteSparse(const fs::path& file, const SparseScene& scene) {
   ExpectGood(file, scene);
-  std::string out(kMagic, 8);
-  out.reserve(kHeaderBytes + scene.points.size() * kPointBytes +
+  std::string out(kSparseMagic, 8);
+  out.reserve(kSparseHeaderBytes + scene.points.size() * kPointBytes +
               scene.observations.size() * kObservationBytes);
   Append(out, kVersion);
   Append(out, std::uint32_t{0});
@@ -92,12 +87,12 @@ void WriteSparse(const fs::path& file, const SparseScene& scene) {
 }
 
 SparseScene ReadSparse(const fs::path& file) {
-  const std::string content = ReadFile(file, kLimitBytes);
-  if (content.size() < kHeaderBytes || content.compare(0, 8, kMagic, 8) != 0) {
+  const std::string content = ReadFile(file, kLargestSparseBytes);
+  if (content.size() < kSparseHeaderBytes || content.compare(0, 8, kSparseMagic, 8) != 0) {
     throw Error(file.string() + ": expected a sparse scene (magic DTRSPARS), found " +
                 std::to_string(content.size()) + " bytes of something else");
   }
-  Bytes bytes(content);
+  SparseBytes bytes(content);
   bytes.Take<std::uint64_t>();  // the magic
   const auto version = bytes.Take<std::uint32_t>();
   if (version != kVersion || bytes.Take<std::uint32_t>() != 0) {
@@ -107,7 +102,7 @@ SparseScene ReadSparse(const fs::path& file) {
   const auto points = bytes.Take<std::uint64_t>();
   const auto observations = bytes.Take<std::uint64_t>();
   // Dividing keeps hostile counts from overflowing the product.
-  const std::uint64_t body = content.size() - kHeaderBytes;
+  const std::uint64_t body = content.size() - kSparseHeaderBytes;
   if (points > INT_MAX || points > body / kPointBytes ||
       observations != (body - points * kPointBytes) / kObservationBytes ||
       (body - points * kPointBytes) % kObservationBytes != 0) {

@@ -36,7 +36,7 @@ double MedianDepth(const View& view) {
 }
 
 /// The views nearest by angle at what the view looks at; ties to the smaller index.
-std::vector<int> NeighboursOf(int index, const std::vector<const View*>& views) {
+std::vector<int> CoverNeighboursOf(int index, const std::vector<const View*>& views) {
   const View& view = *views[static_cast<size_t>(index)];
   const double depth = MedianDepth(view);
   const Eigen::Vector3d centre = view.CenterInWorld();
@@ -64,7 +64,7 @@ class PlaceFinder {
         view_(*views[static_cast<size_t>(index)]),
         camera_(view_.DepthCamera()),
         depth_break_(ThresholdsOf(view_, {}).depth_break),
-        neighbours_(NeighboursOf(index, views)) {
+        neighbours_(CoverNeighboursOf(index, views)) {
     for (const int n : neighbours_) {
       const View& other = *views[static_cast<size_t>(n)];
       other_from_view_.push_back(other.cam_from_world * view_.cam_from_world.Inverse());

@@ -6,7 +6,7 @@
 namespace dtr {
 namespace {
 
-double ValueAt(const Grid<double>& grid, int x, int y) {
+double InverseDepthAt(const Grid<double>& grid, int x, int y) {
   return grid.Contains(x, y) ? grid(x, y) : 0;
 }
 
@@ -29,8 +29,8 @@ std::uint8_t ApexOf(std::uint8_t corners) {
 double LocalSlope(const Grid<double>& inverse_depth, int x, int y, int dx, int dy,
                   const BreakRule& rule) {
   const double here = inverse_depth(x, y);
-  const double after = ValueAt(inverse_depth, x + dx, y + dy);
-  const double before = ValueAt(inverse_depth, x - dx, y - dy);
+  const double after = InverseDepthAt(inverse_depth, x + dx, y + dy);
+  const double before = InverseDepthAt(inverse_depth, x - dx, y - dy);
   double slope = 0;
   bool found = false;
   if (after > 0 && !EdgeBreaks(inverse_depth, x, y, dx, dy, rule)) {

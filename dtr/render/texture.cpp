@@ -45,12 +45,12 @@ Rgb MeanOfNeighbours(const View& view, int x, int y) {
 }
 
 // SPEC 4.8: the rim's width is this share of the image's longer side, in whole pixels, at least:
-constexpr double kRimShare = 1.0 / 48;
+constexpr double kTextureRimShare = 1.0 / 48;
 constexpr int kLeastRimPx = 8;
 
 int RimWidth(const View& view) {
   const int side = std::max(view.image.width(), view.image.height());
-  return std::max(kLeastRimPx, static_cast<int>(kRimShare * side));
+  return std::max(kLeastRimPx, static_cast<int>(kTextureRimShare * side));
 }
 
 /// Chessboard distance to the nearest pixel that is masked or off the image, at most `most`.

@@ -56,7 +56,7 @@ std::string Shape(size_t group, double x, double y, double size) {
   }
 }
 
-void Check(const Plot& plot) {
+void RequireDrawable(const Plot& plot) {
   const auto positive = [](double value) { return value > 0 && std::isfinite(value); };
   if (plot.points.empty() || plot.groups.size() > kColors.size()) {
     throw std::invalid_argument("ScatterSvg: expected points, in at most eight groups");
@@ -234,7 +234,7 @@ std::vector<double> LogTicks(double low, double high) {
 }
 
 std::string ScatterSvg(const Plot& plot) {
-  Check(plot);
+  RequireDrawable(plot);
   double x_low = HUGE_VAL, x_high = 0, y_low = HUGE_VAL, y_high = 0;
   for (const PlotPoint& point : plot.points) {
     x_low = std::min(x_low, point.x);

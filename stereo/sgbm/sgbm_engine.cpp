@@ -14,7 +14,7 @@ namespace {
 
 /// Connected areas smaller than this share of the image are taken for chance matches: about 60
 /// pixels at 960x640. Pixels connect across at most this many pixels of disparity.
-constexpr double kSpeckleShare = 1e-4;
+constexpr double kSgbmSpeckleShare = 1e-4;
 constexpr double kSpeckleSteps = 2.0;
 
 /// The coarse pass that looks for large planes: long side of the image, pairs used, slopes tried
@@ -53,8 +53,8 @@ int PairsAtOnce(const std::vector<Pair>& pairs, const EngineOptions& options) {
   return static_cast<int>(std::clamp(options.memory_gb * 1e9 / largest, 1.0, 1e6));
 }
 
-void CheckRequest(std::span<const StereoView> views, int reference, std::span<const int> neighbours,
-                  const DepthRange& range) {
+void CheckSgbmRequest(std::span<const StereoView> views, int reference,
+                      std::span<const int> neighbours, const DepthRange& range) {
   const auto exists = [&](int i) { return i >= 0 && static_cast<size_t>(i) < views.size(); };
   for (const int n : neighbours) {
     if (!exists(n) || n == reference) throw std::invalid_argument("Estimate: no such neighbour");
@@ -133,7 +133,7 @@ std::vector<Task> TasksOf(const std::vector<Pair>& pairs,
 DepthEstimate SgbmEngine::Estimate(std::span<const StereoView> views, int reference,
                                    std::span<const int> neighbours, const DepthRange& range,
                                    const EngineOptions& options) const {
-  CheckRequest(views, reference, neighbours, range);
+  CheckSgbmRequest(views, reference, neighbours, range);
   const StereoView& view = views[static_cast<size_t>(reference)];
   std::vector<Pair> pairs;
   std::string reasons;
@@ -169,7 +169,7 @@ DepthEstimate SgbmEngine::Estimate(std::span<const StereoView> views, int refere
   });
   DepthEstimate estimate = FusePairs(view.camera, view.mask, sweeps, static_cast<int>(pairs.size()),
                                      range, options.threads);
-  const int min_pixels = static_cast<int>(kSpeckleShare * view.camera.width_px() *
+  const int min_pixels = static_cast<int>(kSgbmSpeckleShare * view.camera.width_px() *
                                           static_cast<double>(view.camera.height_px()));
   RemoveSpeckles(view.camera, sweeps, min_pixels, kSpeckleSteps, &estimate);
   return estimate;

@@ -10,7 +10,7 @@ namespace {
 
 constexpr float kPanelWidth = 330, kMargin = 8, kItemWidth = 150;
 
-void Text(const std::string& line) { ImGui::TextUnformatted(line.c_str()); }
+void PanelText(const std::string& line) { ImGui::TextUnformatted(line.c_str()); }
 
 /// As many names on a line as fit: ImGui's own wrapping would break them at their dots. A name
 /// wider than the panel is wrapped all the same.
@@ -65,18 +65,20 @@ void RenderControls(Widgets& widgets, RenderOptions& options, const RenderOption
 void Figures(const PanelModel& model) {
   const MadePicture& picture = model.picture;
   const PinholeCamera& lens = picture.camera.camera;
-  Text(fmt::format("{} x {} px{}", lens.width_px(), lens.height_px(),
-                   picture.divisor > 1 ? fmt::format(" (1/{} while moving)", picture.divisor)
-                   : picture.whole     ? ""
-                                       : " (views are being read)"));
-  Text(fmt::format("views {:.1f} ms   draw {:.1f} ms", picture.ms.views, picture.ms.draw));
-  Text(fmt::format("inspect {:.1f} ms   window {:.1f} ms", picture.ms.inspect, model.window_ms));
-  Text(model.frames_per_second > 0
-           ? fmt::format("{:.1f} frames per second while moving", model.frames_per_second)
-           : std::string("still"));
+  PanelText(fmt::format("{} x {} px{}", lens.width_px(), lens.height_px(),
+                        picture.divisor > 1 ? fmt::format(" (1/{} while moving)", picture.divisor)
+                        : picture.whole     ? ""
+                                            : " (views are being read)"));
+  PanelText(fmt::format("views {:.1f} ms   draw {:.1f} ms", picture.ms.views, picture.ms.draw));
+  PanelText(
+      fmt::format("inspect {:.1f} ms   window {:.1f} ms", picture.ms.inspect, model.window_ms));
+  PanelText(model.frames_per_second > 0
+                ? fmt::format("{:.1f} frames per second while moving", model.frames_per_second)
+                : std::string("still"));
   // One line always, so that what stands below keeps its place while one clicks.
-  Text(picture.divisor == 1 ? fmt::format("seen by some view: {:.1f} %", 100 * picture.coverage)
-                            : std::string("seen by some view: told when still"));
+  PanelText(picture.divisor == 1
+                ? fmt::format("seen by some view: {:.1f} %", 100 * picture.coverage)
+                : std::string("seen by some view: told when still"));
   std::vector<std::string> names;
   for (const int index : picture.views_used) {
     names.push_back(picture.scene.views[static_cast<size_t>(index)]->name);
@@ -91,8 +93,8 @@ void WhereControls(Widgets& widgets, PanelModel& model) {
   const auto at = controller.at_view(), nearest = controller.nearest_view();
   if (const auto which = at ? at : nearest) {
     const View& view = *cameras[*which];
-    Text((at ? "at " : "nearest: ") + view.name +
-         (view.role == ViewRole::kHeldOut ? " (held out)" : ""));
+    PanelText((at ? "at " : "nearest: ") + view.name +
+              (view.role == ViewRole::kHeldOut ? " (held out)" : ""));
   }
   if (widgets.Arrow("previous", ImGuiDir_Left)) model.pressed.push_back(Action::kPreviousView);
   ImGui::SameLine();
@@ -116,7 +118,7 @@ void InspectControls(Widgets& widgets, PanelModel& model) {
     widgets.Share("border", inspection.border);
   }
   const std::string distance = inspection.DistanceText();
-  Text(distance.empty() ? "M marks points to measure between" : "distance " + distance);
+  PanelText(distance.empty() ? "M marks points to measure between" : "distance " + distance);
   if (!widgets.Tree("views to draw from")) return;
   for (const View* view : model.controller.surroundings().views) {
     // The view's colour among weights and wireframes.
@@ -138,7 +140,8 @@ void InspectControls(Widgets& widgets, PanelModel& model) {
 
 void TimeControls(Widgets& widgets, PanelModel& model) {
   TimeModel& time = model.time;
-  Text(fmt::format("{:.3f} s, instant {} of {}", time.seconds, time.instant + 1, time.instants));
+  PanelText(
+      fmt::format("{:.3f} s, instant {} of {}", time.seconds, time.instant + 1, time.instants));
   widgets.Whole("instant", time.instant, 0, time.instants - 1, false);
   if (widgets.Arrow("earlier", ImGuiDir_Left)) model.pressed.push_back(Action::kPreviousInstant);
   ImGui::SameLine();
@@ -154,7 +157,7 @@ void PathControls(Widgets& widgets, PanelModel& model) {
   const int frames = flight.keys().empty()
                          ? 0
                          : static_cast<int>(flight.keys().size() - 1) * flight.frames_per_key + 1;
-  Text(fmt::format("{} cameras, {} frames", flight.keys().size(), frames));
+  PanelText(fmt::format("{} cameras, {} frames", flight.keys().size(), frames));
   widgets.Whole("frames per camera", flight.frames_per_key, 1, Flight::kMostFramesPerKey);
   if (widgets.Button("add camera")) model.pressed.push_back(Action::kAddKey);
   ImGui::SameLine();
@@ -165,7 +168,7 @@ void PathControls(Widgets& widgets, PanelModel& model) {
   if (widgets.Button("record", model.recording.empty() ? "record MP4" : "stop recording")) {
     model.pressed.push_back(Action::kRecord);
   }
-  if (!model.recording.empty()) Text(model.recording);
+  if (!model.recording.empty()) PanelText(model.recording);
 }
 
 void KeepControls(Widgets& widgets, PanelModel& model) {

@@ -16,7 +16,7 @@ namespace {
 
 using internal::Json;
 
-constexpr std::uintmax_t kMaxFileBytes = 256u << 20;  // 1 KB a camera: a quarter of a million
+constexpr std::uintmax_t kMaxListBytes = 256u << 20;  // 1 KB a camera: a quarter of a million
 
 LengthUnit UnitFrom(const Json& root, const std::string& source) {
   if (!root.contains("unit")) return LengthUnit::kUnknown;
@@ -105,7 +105,7 @@ CameraList ParseCamerasJson(std::string_view text, const std::string& source) {
 }
 
 CameraList ReadCamerasJson(const std::filesystem::path& file) {
-  return ParseCamerasJson(ReadFile(file, kMaxFileBytes), file.string());
+  return ParseCamerasJson(ReadFile(file, kMaxListBytes), file.string());
 }
 
 std::string FormatCamerasJson(const CameraList& list) {

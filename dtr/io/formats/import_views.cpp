@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string SizeText(int width_px, int height_px) {
+std::string PixelsText(int width_px, int height_px) {
   return std::to_string(width_px) + "x" + std::to_string(height_px);
 }
 
@@ -45,8 +45,9 @@ ImageAndMask ReadCameraImage(const NamedCamera& named, const fs::path& file,
   const StoredSize stored{header.width_px, header.height_px, header.exif_orientation};
   const auto grid = GridOfSize(camera.width_px(), camera.height_px(), stored, options.photo_grid);
   if (!grid) {
-    throw Error(file.string() + ": expected " + SizeText(camera.width_px(), camera.height_px()) +
-                " pixels as the camera says, found " + SizeText(header.width_px, header.height_px) +
+    throw Error(file.string() + ": expected " + PixelsText(camera.width_px(), camera.height_px()) +
+                " pixels as the camera says, found " +
+                PixelsText(header.width_px, header.height_px) +
                 "; give the images the cameras were made for");
   }
   const bool upright = *grid == PhotoGrid::kUpright;
@@ -60,8 +61,8 @@ Mask ReadCameraMask(const NamedCamera& named, const ImportOptions& options) {
   const Mask mask = ReadMask(file);
   if (mask.width() != named.camera.width_px() || mask.height() != named.camera.height_px()) {
     throw Error(file.string() + ": expected a mask of " +
-                SizeText(named.camera.width_px(), named.camera.height_px()) + " pixels, found " +
-                SizeText(mask.width(), mask.height()));
+                PixelsText(named.camera.width_px(), named.camera.height_px()) + " pixels, found " +
+                PixelsText(mask.width(), mask.height()));
   }
   if (std::none_of(mask.data().begin(), mask.data().end(), [](auto value) { return value != 0; })) {
     throw Error(

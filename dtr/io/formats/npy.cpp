@@ -14,7 +14,7 @@
 namespace dtr::io {
 namespace {
 
-constexpr std::uintmax_t kMaxFileBytes = 256u << 20;  // a million LLFF poses
+constexpr std::uintmax_t kMaxNpyBytes = 256u << 20;  // a million LLFF poses
 constexpr size_t kMaxDimensions = 8;
 
 struct Header {
@@ -259,11 +259,11 @@ NpyArray ParseNpy(std::string_view bytes, const std::string& source, const NpyOp
 }
 
 NpyArray ReadNpy(const std::filesystem::path& file, const NpyOptions& options) {
-  return ParseNpy(ReadFile(file, kMaxFileBytes), file.string(), options);
+  return ParseNpy(ReadFile(file, kMaxNpyBytes), file.string(), options);
 }
 
 bool NpyHoldsWholeNumbers(const std::filesystem::path& file) {
-  const std::string bytes = ReadFile(file, kMaxFileBytes);
+  const std::string bytes = ReadFile(file, kMaxNpyBytes);
   return HeaderOf(bytes, file.string(), {.half = true, .integers = true}).first.kind != 'f';
 }
 

@@ -8,24 +8,23 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
+#include "dtr/io/formats/text_numbers.h"
 
 namespace dtr::io {
 namespace {
 
-constexpr std::uintmax_t kMaxFileBytes = std::uintmax_t{4} << 30;  // 1 Gpx of one channel
+constexpr std::uintmax_t kMaxPfmBytes = std::uintmax_t{4} << 30;  // 1 Gpx of one channel
 constexpr int kMaxSidePx = 1 << 16;
-
-bool IsBlank(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
 
 // The next word of the header; `position` ends behind the one blank that follows the word.
 std::string_view HeaderWord(std::string_view bytes, size_t& position, const std::string& source) {
   constexpr size_t kMaxWord = 64;
-  while (position < bytes.size() && IsBlank(bytes[position])) ++position;
+  while (position < bytes.size() && internal::IsBlank(bytes[position])) ++position;
   const size_t begin = position;
-  while (position < bytes.size() && !IsBlank(bytes[position])) {
+  while (position < bytes.size() && !internal::IsBlank(bytes[position])) {
     if (++position - begin > kMaxWord) break;
   }
-  if (position >= bytes.size() || !IsBlank(bytes[position])) {
+  if (position >= bytes.size() || !internal::IsBlank(bytes[position])) {
     throw Error(source + ": expected a PFM header (type, width, height, scale), found other bytes");
   }
   return bytes.substr(begin, position++ - begin);
@@ -83,7 +82,7 @@ Grid<float> ParsePfm(std::string_view bytes, const std::string& source) {
 }
 
 Grid<float> ReadPfm(const std::filesystem::path& file) {
-  return ParsePfm(ReadFile(file, kMaxFileBytes), file.string());
+  return ParsePfm(ReadFile(file, kMaxPfmBytes), file.string());
 }
 
 void WritePfm(const std::filesystem::path& file, const Grid<float>& grid, bool little_endian) {

@@ -9,9 +9,7 @@
 namespace dtr::io::internal {
 namespace {
 
-constexpr std::uintmax_t kMaxFileBytes = 64u << 20;
-
-bool IsBlank(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
+constexpr std::uintmax_t kMaxTextBytes = 64u << 20;
 
 std::string Shown(std::string_view word) {
   constexpr size_t kMaxShown = 40;
@@ -25,7 +23,7 @@ std::string Shown(std::string_view word) {
 }  // namespace
 
 TextNumbers::TextNumbers(const std::filesystem::path& file)
-    : text_(ReadFile(file, kMaxFileBytes)), source_(file.string()) {}
+    : text_(ReadFile(file, kMaxTextBytes)), source_(file.string()) {}
 
 TextNumbers::TextNumbers(std::string text, std::string source)
     : text_(std::move(text)), source_(std::move(source)) {}

@@ -8,6 +8,8 @@
 
 namespace dtr::io::internal {
 
+inline bool IsBlank(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
+
 /// Reads blank-separated words of a text. Every error is an Error "source:line: what, ...".
 class TextNumbers {
  public:

@@ -19,7 +19,7 @@ namespace {
 
 using internal::Json;
 
-constexpr std::uintmax_t kMaxFileBytes = 256u << 20;
+constexpr std::uintmax_t kMaxTransformsBytes = 256u << 20;
 
 using internal::FrameFields;
 
@@ -224,7 +224,7 @@ void NoteUnused(const Json& root, const Json& frames, const std::string& source,
 
 TransformsFile ReadTransformsJson(const std::filesystem::path& file, const TransformsPaths& paths) {
   const std::string source = file.string();
-  const Json root = internal::ParseJson(ReadFile(file, kMaxFileBytes), source);
+  const Json root = internal::ParseJson(ReadFile(file, kMaxTransformsBytes), source);
   const Json& frames = internal::Field(root, "frames", source);
   if (!frames.is_array() || frames.empty()) {
     throw Error(source + ": frames: expected a list of at least one camera, found another");
@@ -260,7 +260,7 @@ TransformsFile ReadTransformsJson(const std::filesystem::path& file, const Trans
 
 bool IsTransformsJson(const std::filesystem::path& file) {
   if (file.extension() != ".json" || !std::filesystem::is_regular_file(file)) return false;
-  const Json root = internal::ParseJson(ReadFile(file, kMaxFileBytes), file.string());
+  const Json root = internal::ParseJson(ReadFile(file, kMaxTransformsBytes), file.string());
   return root.is_object() && root.contains("frames") && !root.contains("views");
 }
 
