@@ -1,5 +1,4 @@
-
-constexpr double kCutShort = 0.98;  // of what is promised; headers count a few frames too many#include "capture/video/frames.h"
+#include "capture/video/frames.h"
 
 #include <fmt/format.h>
 
@@ -16,6 +15,7 @@ constexpr double kCutShort = 0.98;  // of what is promised; headers count a few 
 namespace dtr::capture {
 namespace {
 
+constexpr double kCutShort = 0.98;  // of what is promised; headers count a few frames too many
 constexpr double kSomeFrames = 2;  // that a duration counts more than are shown
 
 // Orientation 5 and above exchange width and height.
