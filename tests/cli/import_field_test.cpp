@@ -82,7 +82,8 @@ TEST_F(FieldScene, MasksLieBelowThePhotosBesideThemOrWhereTheyAreSaidToLie) {
                                      "-o",     Set(),       "--force"};
     args.insert(args.end(), further.begin(), further.end());
     DtrOk(args);
-    for (const View& view : io::LoadSet(Set()).frames[0].views) {
+    const DtrSet set = io::LoadSet(Set());
+    for (const View& view : set.frames[0].views) {
       ASSERT_FALSE(view.mask.empty()) << view.name;
       EXPECT_EQ(view.mask(5, 0), 0);
     }
