@@ -75,16 +75,18 @@ double SquaresOf(const SolvedView& view, std::span<const BoardView> views) {
   return view.rms_px * view.rms_px * static_cast<double>(seen->corners.size());
 }
 
-// One-standard-error rule with views as the unit: the mean of what the other model's squared
-// residuals exceed the own ones by, view by view, is no more than its standard error.
-bool FitsAsWell(const BoardSolution& other, const BoardSolution& own,
+constexpr double kClearlyBetter = -3;  // standard errors
+
+// What the other model's squared residuals exceed the own ones by, the mean of all views in units
+// of its standard error; infinite where it cannot explain a view.
+double ExcessOf(const BoardSolution& other, const BoardSolution& own,
                 std::span<const BoardView> views) {
   double sum = 0, squares = 0;
   size_t count = 0;
   for (const SolvedView& view : own.views) {
     const auto same = std::find_if(other.views.begin(), other.views.end(),
                                    [&](const SolvedView& v) { return v.name == view.name; });
-    if (same == other.views.end()) return false;  // a view that the other model cannot explain
+    if (same == other.views.end()) return std::numeric_limits<double>::infinity();
     const double excess = SquaresOf(*same, views) - SquaresOf(view, views);
     sum += excess;
     squares += excess * excess;
@@ -92,7 +94,16 @@ bool FitsAsWell(const BoardSolution& other, const BoardSolution& own,
   }
   const auto n = static_cast<double>(count);
   const double mean = sum / n, variance = std::max(0.0, squares / n - mean * mean);
-  return mean <= std::sqrt(variance / std::max(1.0, n - 1));
+  const double error = std::sqrt(variance / std::max(1.0, n - 1));
+  return mean / std::max(error, std::numeric_limits<double>::min());
+}
+
+// One-standard-error rule with views as the unit. Nothing bounds a quotient of polynomials between
+// the outermost corner and the border, where others have a prior: it counts where it fits better.
+bool FitsAsWell(const BoardSolution& other, const BoardSolution& own,
+                std::span<const BoardView> views) {
+  const double most = other.model == BoardModel::kBrown8 ? kClearlyBetter : 1;
+  return ExcessOf(other, own, views) <= most;
 }
 
 bool BendsPlausibly(const LensCamera& camera, std::span<const BoardView> views) {
