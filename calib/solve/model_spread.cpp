@@ -98,12 +98,20 @@ double ExcessOf(const BoardSolution& other, const BoardSolution& own,
   return mean / std::max(error, std::numeric_limits<double>::min());
 }
 
-// One-standard-error rule with views as the unit. Nothing bounds a quotient of polynomials between
-// the outermost corner and the border, where others have a prior: it counts where it fits better.
+// Polynomials with further coefficients fit as well whatever these are, which the covariance of one
+// without them cannot count; where they fit no better there is nothing to count.
+bool Contains(BoardModel other, BoardModel own) {
+  return other != BoardModel::kFisheye && own != BoardModel::kFisheye &&
+         FreeParameterCount(other) > FreeParameterCount(own);
+}
+
+// One-standard-error rule with views as the unit. Nothing bounds a quotient of polynomials (brown8)
+// between the outermost corner and the border, where others have a prior.
 bool FitsAsWell(const BoardSolution& other, const BoardSolution& own,
                 std::span<const BoardView> views) {
-  const double most = other.model == BoardModel::kBrown8 ? kClearlyBetter : 1;
-  return ExcessOf(other, own, views) <= most;
+  const bool must_be_better =
+      other.model == BoardModel::kBrown8 || Contains(other.model, own.model);
+  return ExcessOf(other, own, views) <= (must_be_better ? kClearlyBetter : 1);
 }
 
 bool BendsPlausibly(const LensCamera& camera, std::span<const BoardView> views) {

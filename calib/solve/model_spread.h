@@ -22,14 +22,14 @@ struct OtherModel {
 };
 
 /// All models that fit these views as well as the chosen one (the mean excess of a view's squared
-/// residuals is within its standard error) and do not bend beyond the corners seen (radial_bend.h);
-/// brown8, which no prior bounds beyond them, only where it fits clearly better (3 standard
-/// errors). Where the chosen one itself bends there, also those that fit nearly as well
-/// (kBendGivesWay). Corners in `outliers` (sorted ids, by view) are not used. As another model puts
-/// all boards into another frame, that motion is fitted to all corners and taken out, as
-/// ProjectionSensitivity does to first order (calib/judge/projection.h; D. Kogan, mrcal,
-/// "cross-reprojection"). Empty where the chosen model itself cannot be solved from these views
-/// alone. The same for any number of threads.
+/// residuals is within its standard error) and do not bend beyond the corners seen (radial_bend.h).
+/// Models that contain the chosen one, and brown8, which no prior bounds beyond the corners, count
+/// only where they fit clearly better (3 standard errors). Where the chosen one itself bends there,
+/// also those that fit nearly as well (kBendGivesWay). Corners in `outliers` (sorted ids, by view)
+/// are not used. As another model puts all boards into another frame, that motion is fitted to all
+/// corners and taken out, as ProjectionSensitivity does to first order (calib/judge/projection.h;
+/// D. Kogan, mrcal, "cross-reprojection"). Empty where the chosen model itself cannot be solved
+/// from these views alone. The same for any number of threads.
 std::vector<OtherModel> OtherModels(const Board& board, BoardModel chosen, int width_px,
                                     int height_px, std::span<const BoardView> views,
                                     std::span<const std::vector<int>> outliers, int threads = 0);
