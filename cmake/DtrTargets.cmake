@@ -1,6 +1,6 @@
 # dtr_library(NAME SOURCES ... [APART ...] [PUBLIC libs...] [PRIVATE libs...]): one static library per folder. With
 # DTR_UNITY its sources are compiled several at a time; those of APART each alone.
-# dtr_test(NAME SOURCES ... LIBS ... [LABELS ...] [TIMEOUT s]): one GoogleTest program, discovered by CTest.
+# dtr_test(NAME SOURCES ... [APART ...] LIBS ... [LABELS ...] [TIMEOUT s]): one GoogleTest program, discovered by CTest.
 # dtr_one_entry_test(the same): one entry of CTest for all its tests, which share what is slow to start. It fails when
 # one of them does, and is skipped when one of them was and none failed.
 
@@ -11,7 +11,14 @@ function(dtr_compile_options target)
     # GCC 12 sees overlapping copies in std::string's operator+ where there are none (GCC bug 105651).
     target_compile_options(${target} PRIVATE -Wno-restrict)
   endif()
-  if(DTR_WARNINGS_AS_ERRORS)
+  set(strict ${DTR_WARNINGS_AS_ERRORS})
+  if(strict STREQUAL AUTO)
+    set(strict OFF)  # sanitized code makes GCC warn of what is not there
+    if(NOT DTR_SANITIZE AND CMAKE_CXX_COMPILER_ID STREQUAL GNU AND CMAKE_CXX_COMPILER_VERSION MATCHES "^12\\.")
+      set(strict ON)
+    endif()
+  endif()
+  if(strict)
     target_compile_options(${target} PRIVATE -Werror)
   endif()
   if(DTR_SANITIZE)
@@ -33,6 +40,14 @@ function(dtr_unity target)
   set_source_files_properties(${ARGN} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 endfunction()
 
+# The product's options; optimised less where the product is: tests are compiled more often than they run.
+function(dtr_test_options target)
+  dtr_compile_options(${target})
+  if(CMAKE_BUILD_TYPE STREQUAL Release)
+    target_compile_options(${target} PRIVATE -O1)
+  endif()
+endfunction()
+
 function(dtr_library name)
   cmake_parse_arguments(ARG "" "" "SOURCES;APART;PUBLIC;PRIVATE" ${ARGN})
   add_library(${name} STATIC ${ARG_SOURCES} ${ARG_APART})
@@ -47,10 +62,11 @@ function(dtr_library name)
 endfunction()
 
 function(dtr_test name)
-  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;LIBS;LABELS" ${ARGN})
-  add_executable(${name} ${ARG_SOURCES})
+  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;APART;LIBS;LABELS" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES} ${ARG_APART})
+  dtr_unity(${name} ${ARG_APART})
   target_link_libraries(${name} PRIVATE ${ARG_LIBS} GTest::gtest GTest::gmock GTest::gtest_main)
-  dtr_compile_options(${name})
+  dtr_test_options(${name})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
   endif()
@@ -70,10 +86,11 @@ endif()
 endfunction()
 
 function(dtr_one_entry_test name)
-  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;LIBS;LABELS" ${ARGN})
-  add_executable(${name} ${ARG_SOURCES})
+  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;APART;LIBS;LABELS" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES} ${ARG_APART})
+  dtr_unity(${name} ${ARG_APART})
   target_link_libraries(${name} PRIVATE ${ARG_LIBS} dtr_one_entry_main GTest::gtest GTest::gmock)
-  dtr_compile_options(${name})
+  dtr_test_options(${name})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
   endif()

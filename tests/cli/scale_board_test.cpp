@@ -49,7 +49,7 @@ class ScaleByBoard : public ::testing::Test {
       const Pose pose = CamFromBoard(board, i);
       Pose seen = pose;
       const bool elsewhere = std::find(moved.begin(), moved.end(), i) != moved.end();
-      if (elsewhere) seen = pose * Pose{{}, Eigen::Vector3d(0.03, 0.02 * (i - 3), 0)};
+      if (elsewhere) seen = pose * Pose{Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.03, 0.02 * (i - 3), 0)};
       const auto grey =
           calib::testing::Photo(board, kCamera, seen, 1, static_cast<std::uint64_t>(i));
       ImageRgb8 image(grey.width(), grey.height(), 3);
