@@ -60,7 +60,7 @@ void AddOpenGlOptions(CLI::App& command, RendererChoice& choice) {
       .add_option("--gpu-memory", choice.gpu_memory_gb,
                   "Memory for the views on the GPU; others are dropped and put there again [4]")
       ->check(kPositive)
-      ->check(CLI::Range(0.0, kMostGigabytes))
+      ->check(CLI::Range(0.0, kMaxGigabytes))
       ->type_name("GB");
 }
 

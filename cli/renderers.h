@@ -12,10 +12,6 @@
 
 namespace dtr::cli {
 
-/// Memory on the command line: its unit, and a bound that no machine reaches and no size overflows
-/// at.
-inline constexpr double kBytesPerGigabyte = 1 << 30, kMostGigabytes = 1e6;
-
 /// What --renderer, --shader-dir and --gpu-memory say.
 struct RendererChoice {
   std::string name;                     ///< "gl" or "cpu"
