@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "calib/validate.h"
+#include "calib/residuals.h"
 
 namespace dtr::calib {
 

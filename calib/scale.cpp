@@ -203,7 +203,7 @@ void RequireKnownScale(const PositionScale& scale) {
   if (scale.relative_sigma <= kMostRelativeSigma) return;
   throw Error(fmt::format(
       "scale: expected a scale known to 10 %, found one to {:.0f} %: positions that err by {:.2g} "
-      "m RMS, of cameras that stand too near to each other for that; measure a --distance",
+      "m RMS, of cameras that stand too near to each other for that; measure a `distance`",
       100 * scale.relative_sigma, scale.rms_m));
 }
 

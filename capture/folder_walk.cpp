@@ -11,6 +11,7 @@
 #include "capture/names.h"
 #include "dtr/base/error.h"
 #include "dtr/base/file_names.h"
+#include "dtr/base/lower_case.h"
 #include "dtr/base/utf8.h"
 #include "dtr/io/image_io.h"
 

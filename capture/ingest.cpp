@@ -14,6 +14,7 @@
 #include "capture/store.h"
 #include "dtr/base/error.h"
 #include "dtr/base/hash.h"
+#include "dtr/base/lower_case.h"
 #include "dtr/base/memory_budget.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/base/work_folder.h"
@@ -90,12 +91,7 @@ std::string ReasonFrom(std::string message, const fs::path& file, const std::str
 void AssignIds(std::vector<Photo>& photos) {
   constexpr size_t kLongestId = 100;
   std::set<std::string> taken;  // in lower case
-  const auto take = [&](std::string id) {
-    for (char& c : id) {
-      if (c >= 'A' && c <= 'Z') c = static_cast<char>(c + 32);
-    }
-    return taken.insert(id).second;
-  };
+  const auto take = [&](const std::string& id) { return taken.insert(LowerCase(id)).second; };
   for (Photo& photo : photos) {
     std::string stem = fs::path(photo.name).replace_extension().string();
     for (char& c : stem) {

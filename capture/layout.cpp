@@ -8,6 +8,7 @@
 #include "capture/layout_looks.h"
 #include "capture/layout_names.h"
 #include "capture/names.h"
+#include "dtr/base/lower_case.h"
 
 namespace dtr::capture {
 namespace fs = std::filesystem;

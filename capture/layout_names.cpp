@@ -9,6 +9,7 @@
 
 #include "capture/ingest.h"
 #include "capture/names.h"
+#include "dtr/base/lower_case.h"
 
 namespace dtr::capture {
 namespace {

@@ -23,12 +23,6 @@ std::string PrintableName(const std::string& name) {
   return text.empty() ? "(unprintable)" : text;
 }
 
-std::string LowerCase(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
-  return text;
-}
-
 std::string StemOf(const std::string& name) {
   return std::filesystem::path(name).replace_extension().generic_string();
 }

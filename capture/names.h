@@ -9,8 +9,6 @@ bool IsControl(char c);
 std::string Printable(std::string text);
 /// The same for a name, which is never empty.
 std::string PrintableName(const std::string& name);
-/// ASCII letters in lower case.
-std::string LowerCase(std::string text);
 /// "a/b.jpg" -> "a/b"
 std::string StemOf(const std::string& name);
 

@@ -7,6 +7,7 @@
 
 #include "dtr/base/durable.h"
 #include "dtr/base/error.h"
+#include "dtr/base/lower_case.h"
 #include "dtr/base/memory_budget.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/io/image_io.h"
@@ -19,9 +20,7 @@ namespace {
 constexpr int kJpegQuality = 98;  // features move by less than their own noise
 
 bool EndsInJpeg(const std::string& name) {
-  std::string extension = fs::path(name).extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
+  const std::string extension = LowerExtension(name);
   return extension == ".jpg" || extension == ".jpeg";
 }
 

@@ -13,6 +13,7 @@
 #include "dtr/base/durable.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
+#include "dtr/base/lower_case.h"
 #include "dtr/base/memory_budget.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/base/work_folder.h"
@@ -44,7 +45,7 @@ void RefuseOccupied(const fs::path& folder, bool replace) {
                    (!is_folder ? "a file"
                     : replace  ? "a folder that is no capture"
                                : "something in it already") +
-                   "; choose another name" + (replace ? "" : " or give --force"));
+                   "; choose another name" + (replace ? "" : " or give `force`"));
 }
 
 // The file system's own errors, as ours: they name the file already.
@@ -60,10 +61,7 @@ void AsError(const std::function<void()>& function) {
 Photo StorePhoto(const Photo& photo, const fs::path& folder) {
   Photo stored = photo;
   if (photo.exif_orientation == 1) {
-    std::string extension = photo.file.extension().string();
-    std::transform(extension.begin(), extension.end(), extension.begin(),
-                   [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
-    stored.file = fs::path("images") / (photo.id + extension);
+    stored.file = fs::path("images") / (photo.id + LowerExtension(photo.file));
     CopyFileAtomically(photo.file, folder / stored.file);
   } else {
     stored.file = fs::path("images") / (photo.id + ".png");

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "cli/option_names.h"
 #include "cli/standard_output.h"
 #include "dtr/base/machine.h"
 
@@ -88,16 +89,17 @@ void Console::Update(int done) {
 void Console::Note(const std::string& line) {
   const std::lock_guard lock(mutex_);
   ClearBar();
-  fmt::print(stderr, "   {}\n", line);
+  fmt::print(stderr, "   {}\n", WithOptionNames(line));
 }
 
 void Console::Say(const std::string& line) {
   const std::lock_guard lock(mutex_);
   ClearBar();
+  const std::string text = WithOptionNames(line);
   if (json_on_stdout_) {
-    fmt::print(stderr, "{}\n", line);
+    fmt::print(stderr, "{}\n", text);
   } else {
-    WriteOut(line + "\n");
+    WriteOut(text + "\n");
   }
 }
 

@@ -11,6 +11,7 @@
 #include <string>
 
 #include "cli/command.h"
+#include "cli/option_names.h"
 #include "cli/standard_output.h"
 #include "dtr/base/error.h"
 #include "dtr/base/utf8.h"
@@ -42,6 +43,7 @@ int Run(int argc, char** argv) {
   dtr::cli::AddDatasetCommand(app);
   dtr::cli::AddSelftestCommand(app);
   dtr::cli::AddManualCommands(app, DTR_VERSION);
+  dtr::cli::LearnOptionNames(app);
   // They come back in JSON and in the record of the run, which hold nothing else.
   for (int i = 1; i < argc; ++i) {
     std::string shown = argv[i];
@@ -96,10 +98,10 @@ int main(int argc, char** argv) {
   try {
     return Run(argc, argv);
   } catch (const dtr::UsageError& error) {
-    fmt::print(stderr, "dtr: {}\n", error.what());
+    fmt::print(stderr, "dtr: {}\n", dtr::cli::WithOptionNames(error.what()));
     return dtr::cli::kWrongUsage;
   } catch (const dtr::Error& error) {
-    fmt::print(stderr, "dtr: {}\n", error.what());
+    fmt::print(stderr, "dtr: {}\n", dtr::cli::WithOptionNames(error.what()));
     return dtr::cli::kFailed;
   } catch (const std::filesystem::filesystem_error& error) {
     fmt::print(stderr,

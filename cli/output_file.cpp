@@ -9,6 +9,7 @@
 #include <cstring>
 
 #include "dtr/base/error.h"
+#include "dtr/base/lower_case.h"
 
 namespace dtr::cli {
 namespace fs = std::filesystem;
@@ -25,13 +26,6 @@ void RequireFolderOf(const fs::path& file, const std::string& option) {
   throw UsageError(fmt::format(
       "{} {}: expected an existing folder to write into, found {} at {}", option, file.string(),
       fs::exists(folder, ignored) ? "a file" : "nothing", folder.string()));
-}
-
-std::string LowerExtension(const fs::path& file) {
-  std::string extension = file.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
-  return extension;
 }
 
 void RequireOutputFile(const fs::path& file, const std::string& option,

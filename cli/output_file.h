@@ -9,9 +9,6 @@ namespace dtr::cli {
 /// Throws UsageError unless the folder that `file` would lie in exists. `option` is named.
 void RequireFolderOf(const std::filesystem::path& file, const std::string& option);
 
-/// Extension of a file name in lower case, with the dot: ".png" of "VIEW.PNG".
-std::string LowerExtension(const std::filesystem::path& file);
-
 /// RequireFolderOf, and the name must end in one of `extensions` (with the dot, lower case; any
 /// case passes).
 void RequireOutputFile(const std::filesystem::path& file, const std::string& option,

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <map>
 #include <numbers>
@@ -10,13 +11,12 @@
 
 #include "cli/number_checks.h"
 #include "dtr/io/pruned.h"
-#include "dtr/render/option_arguments.h"
+#include "dtr/render/degrees.h"
 #include "dtr/render/option_names.h"
+#include "dtr/render/stored_options.h"
 
 namespace dtr::cli {
 namespace {
-
-constexpr char kStoredArguments[] = "set.json: pruned.render_arguments";
 
 template <typename T, size_t N>
 std::map<std::string, T> ByName(const std::array<T, N>& values) {
@@ -43,8 +43,6 @@ void AddChoice(CLI::App& command, const std::string& flag, T& target,
       ->type_name(names);
 }
 
-double RadiansOf(double degrees) { return degrees * std::numbers::pi / 180; }
-
 /// A threshold in scene units; 0 is none.
 void AddAbsolute(CLI::App& command, const std::string& flag, std::optional<double>& target,
                  const std::string& description) {
@@ -57,25 +55,33 @@ void AddAbsolute(CLI::App& command, const std::string& flag, std::optional<doubl
       ->type_name("UNITS");
 }
 
+// The flag that sets a field: --max-angle for max_angle_deg.
+std::string FlagOf(std::string field) {
+  for (const std::string unit : {"_deg", "_px"}) {
+    if (field.ends_with(unit)) field.resize(field.size() - unit.size());
+  }
+  std::replace(field.begin(), field.end(), '_', '-');
+  return "--" + field;
+}
+
 }  // namespace
 
-void UseStoredArguments(const CLI::App& command, const DtrSet& set, RenderOptions& options) {
+void UseStoredOptions(const CLI::App& command, const DtrSet& set, RenderOptions& options) {
   const auto given = [&](const std::string& flag) {
     const CLI::Option* option = command.get_option_no_throw(flag);
     return option != nullptr && option->count() > 0;
   };
-  const auto blends = [](const std::string& flag) {
-    return flag == "--blend-linear" || flag == "--blend-srgb";
+  const auto by_user = [&](const std::string& field) {
+    if (field == "blend_in_linear_light") return given("--blend-linear") || given("--blend-srgb");
+    return given(FlagOf(field));
   };
-  const bool blend_given = given("--blend-linear") || given("--blend-srgb");
-  const auto by_user = [&](const std::string& flag) {
-    return given(flag) || (blends(flag) && blend_given);
-  };
-  options = WithArguments(options, io::RenderArguments(set), kStoredArguments, by_user);
+  const auto [json, where] = io::RenderOptionsOf(set);
+  options = WithStoredOptions(options, json, where, by_user);
 }
 
 RenderOptions StoredRenderOptions(const DtrSet& set) {
-  return WithArguments({}, io::RenderArguments(set), kStoredArguments);
+  const auto [json, where] = io::RenderOptionsOf(set);
+  return WithStoredOptions({}, json, where);
 }
 
 std::shared_ptr<RenderOptions> AddRenderOptions(CLI::App& command) {

@@ -14,7 +14,7 @@ std::shared_ptr<RenderOptions> AddRenderOptions(CLI::App& command);
 
 /// Gives `options`, the parsed ones of `command`, those that the set was pruned for and its user
 /// did not give: they are the set's defaults. Throws Error for what is no option of rendering.
-void UseStoredArguments(const CLI::App& command, const DtrSet& set, RenderOptions& options);
+void UseStoredOptions(const CLI::App& command, const DtrSet& set, RenderOptions& options);
 
 /// The set's own defaults: what it was pruned for, else the library's. Throws as above.
 RenderOptions StoredRenderOptions(const DtrSet& set);

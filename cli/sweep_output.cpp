@@ -138,7 +138,7 @@ std::string CsvField(const std::string& text) {
 
 }  // namespace
 
-void SweptStage::Judge() {
+void SweptStage::ValidateBoards() {
   front = eval::ParetoFront(points);
   knee.reset();
   if (const auto at = eval::KneeOf(points, front)) knee = front[*at];

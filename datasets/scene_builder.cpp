@@ -131,7 +131,7 @@ std::vector<std::string> SceneNames() { return {"courtyard", "plane", "stairs", 
 Scene MakeScene(const std::string& name, std::uint64_t seed, double time_s) {
   if (name == "sphere") return MakeSphere(seed, time_s);
   if (time_s != 0) {
-    throw UsageError("--time: expected 0 for " + name + ", where nothing moves; sphere moves");
+    throw UsageError("`time`: expected 0 for " + name + ", where nothing moves; sphere moves");
   }
   if (name == "courtyard") return MakeCourtyard(seed);
   if (name == "plane") return MakePlane(seed);

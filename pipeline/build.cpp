@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "pipeline/detail/depth/effort_json.h"
 #include "calib/sparse_from_sfm.h"
 #include "capture/duplicates.h"
 #include "capture/ingest.h"
@@ -181,7 +182,7 @@ void RequireTwoSources(const capture::Capture& capture, const std::vector<bool>&
   throw Error(
       fmt::format("calibration: expected at least 2 photos to build from, found {} with a camera "
                   "({} photos have "
-                  "none); take more overlapping photos or give --poses",
+                  "none); take more overlapping photos or give `poses`",
                   sources, calibrated.not_registered.size()));
 }
 
@@ -287,7 +288,7 @@ void SayRemarks(const BuildReport& report, size_t photos, Progress& progress) {
   const auto& [name, remarks] = report.screening.front();
   progress.Note(
       fmt::format("screening: {} of {} photos have a remark and are kept, first {}: {}; "
-                  "dtr capture --drop leaves such photos out",
+                  "dtr capture `drop` leaves such photos out",
                   report.screening.size(), photos, name, remarks.front()));
 }
 

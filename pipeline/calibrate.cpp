@@ -137,7 +137,7 @@ bool NeedsFeatures(const fs::path& poses) {
 
 void RequireCalibration(const fs::path& poses) {
   if (!poses.empty() && !fs::exists(poses)) {
-    throw UsageError(fmt::format("--poses {}: no such file or folder", poses.string()));
+    throw UsageError(fmt::format("`poses` {}: no such file or folder", poses.string()));
   }
   if (NeedsFeatures(poses)) (void)colmap::Program();
 }

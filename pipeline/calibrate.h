@@ -11,7 +11,7 @@
 #include "capture/capture.h"
 #include "dtr/base/progress.h"
 #include "dtr/types/dtr_set.h"
-#include "pipeline/detail/cameras/set_rig.h"
+#include "pipeline/set_rig.h"
 #include "pipeline/metres.h"
 #include "pipeline/sfm_settings.h"
 

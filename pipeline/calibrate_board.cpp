@@ -7,6 +7,7 @@
 #include "calib/colmap/model_io.h"
 #include "calib/files/opencv_yaml.h"
 #include "calib/solve/choose_model.h"
+#include "dtr/base/lower_case.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -63,8 +64,7 @@ calib::Calibration CalibrateBoard(const calib::Board& board, const BoardPhotos& 
 }
 
 void WriteCameraFile(const std::filesystem::path& file, const calib::Calibration& calibration) {
-  std::string extension = file.extension().string();
-  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  const std::string extension = LowerExtension(file);
   if (extension == ".json") {
     calib::WriteCalibration(file, calibration);
   } else if (extension == ".txt") {

@@ -7,7 +7,7 @@
 
 #include "calib/files/calibration.h"
 #include "calib/solve/board_solve.h"
-#include "pipeline/detail/boards/board_photos.h"
+#include "pipeline/board_photos.h"
 
 namespace dtr::pipeline {
 

@@ -38,7 +38,7 @@ Inputs InputsOf(const calib::Board& board, const RigPhotos& photos,
       const calib::LensCamera& lens = given->second.given.value();
       if (lens.width_px != camera.width_px || lens.height_px != camera.height_px) {
         throw Error(fmt::format(
-            "--camera {}: expected a lens of {} x {} px as its photos are, found {} x {}; give the "
+            "`camera` {}: expected a lens of {} x {} px as its photos are, found {} x {}; give the "
             "lens of this camera",
             camera.name, camera.width_px, camera.height_px, lens.width_px, lens.height_px));
       }
@@ -110,7 +110,7 @@ void RequireGiven(const RigPhotos& photos, const RigCalibrationOptions& options)
   for (const RigPhotoCamera& camera : photos.cameras) {
     if (!options.given.contains(camera.name)) {
       throw UsageError(
-          fmt::format("--camera: expected a lens for every camera or for none, found "
+          fmt::format("`camera`: expected a lens for every camera or for none, found "
                       "none for {}",
                       camera.name));
     }
@@ -118,7 +118,7 @@ void RequireGiven(const RigPhotos& photos, const RigCalibrationOptions& options)
   for (const auto& [name, lens] : options.given) {
     if (std::none_of(photos.cameras.begin(), photos.cameras.end(),
                      [&](const auto& camera) { return camera.name == name; })) {
-      throw UsageError(fmt::format("--camera {}: no such camera; the first one is {}", name,
+      throw UsageError(fmt::format("`camera` {}: no such camera; the first one is {}", name,
                                    photos.cameras.front().name));
     }
   }

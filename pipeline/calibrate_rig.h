@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "calib/files/calibration.h"
-#include "calib/judge/free_running.h"
-#include "calib/judge/patterns.h"
+#include "calib/validation/free_running.h"
+#include "calib/validation/patterns.h"
 #include "calib/solve/rig_solve.h"
-#include "pipeline/detail/boards/rig_photos.h"
+#include "pipeline/rig_photos.h"
 
 namespace dtr::pipeline {
 

@@ -15,8 +15,8 @@ std::vector<fs::path> VideosFor(const fs::path& source, const capture::VideoOpti
       (video.every != plain.every || video.motion != plain.motion || video.most != plain.most ||
        video.synchronised)) {
     throw UsageError(source.string() +
-                     ": expected a video or a folder of nothing but videos for --every, --motion, "
-                     "--max-frames and --synchronised, found neither; leave them out");
+                     ": expected a video or a folder of nothing but videos for `every`, `motion`, "
+                     "`max_frames` and `synchronised`, found neither; leave them out");
   }
   return videos;
 }

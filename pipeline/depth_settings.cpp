@@ -40,7 +40,7 @@ const Preset& PresetCalled(const std::string& name) {
   const auto found = std::find_if(std::begin(kPresets), std::end(kPresets),
                                   [&](const Preset& preset) { return name == preset.name; });
   if (found != std::end(kPresets)) return *found;
-  throw UsageError(fmt::format("--preset: expected fast, balanced or best, found '{}'", name));
+  throw UsageError(fmt::format("`preset`: expected fast, balanced or best, found '{}'", name));
 }
 
 stereo::Effort Overridden(stereo::Effort effort, const DepthChoice& choice) {
@@ -53,35 +53,6 @@ stereo::Effort Overridden(stereo::Effort effort, const DepthChoice& choice) {
 
 stereo::Effort EffortOf(const DepthChoice& choice) {
   return Overridden(PresetCalled(choice.preset).effort, choice);
-}
-
-stereo::Effort EffortFromJson(const std::string& text, const std::string& where) {
-  const nlohmann::json json = nlohmann::json::parse(text, nullptr, false);
-  const auto number = [&](const char* name, int least, int most) {
-    const bool given = json.is_object() && json.contains(name) && json[name].is_number_integer();
-    const auto value = given ? json[name].get<std::int64_t>() : least - 1;
-    if (value < least || value > most) {
-      throw Error(where +
-                  ": expected the settings that a time budget picked, found something else; delete "
-                  "the partial set and build again");
-    }
-    return static_cast<int>(value);
-  };
-  return {.neighbours = number("neighbours", 1, kMostNeighbours),
-          .round_neighbours = number("round_neighbours", 1, kMostNeighbours),
-          .iterations = number("iterations", 1, kMostIterations),
-          .rounds = number("rounds", 0, kMostRounds)};
-}
-
-nlohmann::ordered_json SettingsJson(const std::string& engine, const stereo::Effort& effort) {
-  nlohmann::ordered_json settings = {{"engine", engine}};
-  if (engine == "sgbm" || engine == "patchmatch") settings["neighbours"] = effort.neighbours;
-  if (engine == "patchmatch") {
-    settings["round_neighbours"] = effort.round_neighbours;
-    settings["iterations"] = effort.iterations;
-    settings["rounds"] = effort.rounds;
-  }
-  return settings;
 }
 
 }  // namespace dtr::pipeline

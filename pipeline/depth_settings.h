@@ -1,7 +1,6 @@
 // pipeline/depth_settings.h -- presets, and what of them the command line overrides.
 #pragma once
 #include <filesystem>
-#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <span>
 #include <string>
@@ -47,12 +46,5 @@ stereo::Effort Overridden(stereo::Effort effort, const DepthChoice& choice);
 
 /// The effort that a choice comes to, but for a time budget.
 stereo::Effort EffortOf(const DepthChoice& choice);
-
-/// What of the engine and its effort decides the bytes of a depth map, by the names of the options:
-/// given explicitly, they make the same maps whatever preset they came from.
-nlohmann::ordered_json SettingsJson(const std::string& engine, const stereo::Effort& effort);
-/// The effort in what SettingsJson gave for `patchmatch`. Throws Error naming `where`, also where
-/// it has more than the most.
-stereo::Effort EffortFromJson(const std::string& text, const std::string& where);
 
 }  // namespace dtr::pipeline

@@ -26,7 +26,7 @@ std::optional<size_t> FindPhoto(const std::vector<std::string>& names,
   if (called.empty()) return std::nullopt;
   if (called.size() == 1) return called.front();
   throw UsageError(
-      fmt::format("--distance {}: '{}' may be {} or {}; name the photo with its extension",
+      fmt::format("`distance` {}: '{}' may be {} or {}; name the photo with its extension",
                   distance.text, end.text, names[called[0]], names[called[1]]));
 }
 
@@ -52,7 +52,7 @@ calib::KnownMetres KnownOf(const calib::SfmModel& model, const MetreOptions& opt
   }
   const std::vector<std::string> names = calib::ImageNames(model);
   for (const ScaleDistance& d : options.distances) {
-    calib::KnownDistance distance{"--distance " + d.text, 0, 0, d.length_m, d.sigma_m};
+    calib::KnownDistance distance{"`distance` " + d.text, 0, 0, d.length_m, d.sigma_m};
     for (const auto& [point, image] :
          {std::pair(&d.a, &distance.image_a), std::pair(&d.b, &distance.image_b)}) {
       const auto found = FindPhoto(names, d, *point);
@@ -121,7 +121,7 @@ void TellOfPlaces(const calib::SfmModel& model, const PhotoPlaces& places,
   if (!report.settled) {
     out.lines.push_back(
         fmt::format("which places agree, and how far they err, did not settle in {} passes; give "
-                    "--gps-sigma where you know it",
+                    "`gps_sigma` where you know it",
                     report.passes));
   }
   if (!report.places_tell_scale) {
@@ -162,17 +162,17 @@ void RequireCameras(const MetreOptions& options, const std::vector<std::string>&
       if (FindPhoto(names, d, *point)) continue;
       if (point->text.find_first_of(":+") != std::string::npos) {
         throw UsageError(fmt::format(
-            "--distance {}: expected two photos, as left01,right01=12cm, found '{}'; points of "
+            "`distance` {}: expected two photos, as left01,right01=12cm, found '{}'; points of "
             "pictures are for dtr calibrate scale, of a finished set",
             d.text, point->text));
       }
-      throw UsageError(fmt::format("--distance {}: no photo is named '{}'; {} has {} ... ({})",
+      throw UsageError(fmt::format("`distance` {}: no photo is named '{}'; {} has {} ... ({})",
                                    d.text, point->text, whose, names.empty() ? "" : names.front(),
                                    names.size()));
     }
     if (FindPhoto(names, d, d.a) == FindPhoto(names, d, d.b)) {
       throw UsageError(
-          fmt::format("--distance {}: expected two photos, found '{}' twice", d.text, d.a.text));
+          fmt::format("`distance` {}: expected two photos, found '{}' twice", d.text, d.a.text));
     }
   }
 }
@@ -190,8 +190,8 @@ void RequireMetres(const MetreOptions& options, const capture::Capture& photos,
       const std::string& name = names[*FindPhoto(names, d, *end)];
       if (std::find(adjusted.begin(), adjusted.end(), name) != adjusted.end()) continue;
       throw UsageError(fmt::format(
-          "--distance {}: expected photos that take part in bundle adjustment, found {}, which "
-          "--holdout-strict keeps out of it; name others, or leave out --holdout-strict",
+          "`distance` {}: expected photos that take part in bundle adjustment, found {}, which "
+          "`holdout_strict` keeps out of it; name others, or leave out `holdout_strict`",
           d.text, name));
     }
   }

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "calib/bundle/metric_refine.h"
-#include "pipeline/detail/photos/photo_places.h"
+#include "pipeline/photo_places.h"
 #include "pipeline/scale_points.h"
 
 namespace dtr::pipeline {

@@ -12,6 +12,7 @@
 #include "dtr/io/set_io.h"
 #include "dtr/prune/probes.h"
 #include "dtr/render/instants.h"
+#include "dtr/render/stored_options.h"
 #include "pipeline/detail/depth/view_coder.h"
 #include "pipeline/detail/run/prune_journal.h"
 #include "pipeline/detail/run/run_log.h"
@@ -79,7 +80,7 @@ std::string Fingerprint(const PruneSetOptions& options, const DtrSet& set) {
               {"checks", prune.checks},
               {"probe_crop", prune.probe_crop},
               {"renderer", options.renderer},
-              {"render", options.arguments_of(prune.render)},
+              {"render", Json::parse(dtr::ToJson(prune.render))},
               {"seed", prune.seed}}
       .dump();
 }
@@ -110,7 +111,7 @@ Json PrunedJson(const PruneSetOptions& options, const PruneSetReport& report) {
           {"probes", options.prune.probes},
           {"checks", options.prune.checks},
           {"seed", options.prune.seed},
-          {"render_arguments", report.render_arguments},
+          {"render", Json::parse(dtr::ToJson(pruned.setting.render))},
           {"removed", ToJson(pruned.removed)},
           {"put_back", ToJson(pruned.put_back)}};
 }
@@ -198,7 +199,7 @@ void ExpectGoalsReached(const PruneSetOptions& options, const DtrSet& pruned,
   const auto refuse = [&](const std::string& expected, const std::string& found) {
     throw Error(
         fmt::format("{}: expected {} within a loss of {:g} dB, found {}; allow more by "
-                    "--max-loss-db",
+                    "`max_loss_db`",
                     options.output.string(), expected, options.prune.max_loss_db, found));
   };
   const std::uint64_t bytes =
@@ -252,7 +253,6 @@ PruneSetReport PruneSet(const PruneSetOptions& options, Progress& progress) {
       set, prune, [&](const prune::Coding& coding) { return coder.Try(coding); },
       options.make_renderer, progress);
   const prune::Setting& setting = report.pruned.setting;
-  report.render_arguments = options.arguments_of(setting.render);
 
   log.Begin("writing");
   DtrSet pruned = WritePruned(options, set, coder, setting, writer, progress);

@@ -22,8 +22,6 @@ struct PruneSetOptions {
   std::optional<double> frame_ms;  ///< as frame_after is measured
   bool force = false;
   int threads = 0;
-  /// Command-line arguments that give these options: what the pruned set keeps as its defaults.
-  std::function<std::vector<std::string>(const RenderOptions&)> arguments_of;
   prune::RendererMaker make_renderer;
   std::string renderer;  ///< its name
   std::function<std::unique_ptr<eval::TimedRenderer>()> make_timed_renderer;
@@ -31,7 +29,6 @@ struct PruneSetOptions {
 
 struct PruneSetReport {
   prune::PruneReport pruned;
-  std::vector<std::string> render_arguments;
   std::uint64_t bytes_before = 0, bytes_after = 0;  ///< of all files but held_out/ and report/
   eval::Times frame_before, frame_after;  ///< CPU time without a GPU's clock, else its own
   std::string json;                       ///< what --json gives

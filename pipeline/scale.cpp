@@ -16,10 +16,10 @@
 #include "dtr/io/pruned.h"
 #include "dtr/io/run_record.h"
 #include "dtr/io/set_io.h"
-#include "dtr/render/option_arguments.h"
+#include "dtr/render/stored_options.h"
 #include "pipeline/detail/boards/scale_board.h"
 #include "pipeline/detail/pages/set_page.h"
-#include "pipeline/detail/photos/photo_places.h"
+#include "pipeline/photo_places.h"
 #include "pipeline/detail/run/finishing.h"
 #include "pipeline/detail/run/run_log.h"
 #include "pipeline/validate.h"
@@ -43,7 +43,7 @@ Found FromDistances(const ScaleOptions& options, const DtrSet& set) {
   std::vector<calib::MeasuredDistance> distances;
   for (const ScaleDistance& d : options.distances) {
     const PlacedPoint a = Place(options.set, set, d.a), b = Place(options.set, set, d.b);
-    distances.push_back({"--distance " + d.text, a.p_in_world, b.p_in_world, a.covariance,
+    distances.push_back({"`distance` " + d.text, a.p_in_world, b.p_in_world, a.covariance,
                          b.covariance, d.length_m, d.sigma_m});
   }
   const calib::DistanceScale scale = calib::ScaleFromDistances(distances);
@@ -163,13 +163,13 @@ void CarryStoredOptions(double scale, DtrSet& set) {
   const std::string text = io::PrunedJson(set);
   if (text.empty()) return;
   Json pruned = Json::parse(text);
-  RenderOptions stored =
-      WithArguments({}, io::RenderArguments(set), "set.json: pruned.render_arguments");
+  const auto [json, where] = io::RenderOptionsOf(set);
+  RenderOptions stored = WithStoredOptions({}, json, where);
   for (std::optional<double>* length : {&stored.absolute_delta, &stored.absolute_depth_break}) {
     if (*length) **length *= scale;
   }
-  const std::vector<std::string> arguments = RenderOptionArguments(stored);
-  if (pruned.contains("render_arguments")) pruned["render_arguments"] = arguments;
+  pruned.erase("render_arguments");
+  pruned["render"] = Json::parse(ToJson(stored));
   io::SetPrunedJson(set, pruned.dump());
 }
 

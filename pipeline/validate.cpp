@@ -7,7 +7,7 @@
 #include "dtr/eval/cross_depth.h"
 #include "dtr/eval/json.h"
 #include "dtr/io/set_io.h"
-#include "pipeline/detail/cameras/set_rig.h"
+#include "pipeline/set_rig.h"
 
 namespace dtr::pipeline {
 
@@ -80,20 +80,20 @@ calib::ValidationReport ValidateSet(const std::filesystem::path& folder, const D
   AddCrossDepth(folder, set, limits, threads, report, progress);
   progress.Stage("cameras against their sights", 0);
   const Cameras of = CamerasOf(set);
-  const calib::Judgement judgement = calib::Judge(
-      calib::BundleOf(of.cameras, of.poses, of.names, sparse), limits.judge, threads, &progress);
+  const calib::PhotosValidation judgement = calib::ValidatePhotos(
+      calib::BundleOf(of.cameras, of.poses, of.names, sparse), limits.photos, threads, &progress);
   report.tests.insert(report.tests.end(), judgement.tests.begin(), judgement.tests.end());
   const auto rig = RigOfSet(set);
   const auto places = rig ? RigPlaces(set, sparse, *rig) : std::nullopt;
   if (places) report.tests.push_back(*places);
-  for (const calib::CameraJudgement& judged : judgement.cameras) {
+  for (const calib::PhotoValidation& judged : judgement.cameras) {
     const auto camera =
         std::find_if(report.cameras.begin(), report.cameras.end(),
                      [&](const auto& validated) { return validated.name == judged.name; });
     if (camera != report.cameras.end()) camera->placed = judged.placed;
   }
   report.adjustment_json = calib::ToJson(judgement);
-  report.not_judged = judgement.not_judged;
+  report.not_validated = judgement.not_validated;
   return report;
 }
 

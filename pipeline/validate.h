@@ -2,8 +2,8 @@
 #pragma once
 #include <filesystem>
 
-#include "calib/bundle/judge.h"
-#include "calib/validate.h"
+#include "calib/validation/photos.h"
+#include "calib/validation/reprojection.h"
 #include "dtr/base/progress.h"
 #include "dtr/types/dtr_set.h"
 #include "dtr/types/sparse_scene.h"
@@ -18,14 +18,14 @@ calib::ValidationReport ReprojectionOfSet(const DtrSet& set, const SparseScene& 
 
 struct SetLimits {
   calib::ValidateLimits reprojection;
-  calib::BundleLimits judge;
+  calib::BundleLimits photos;
   /// Depth of one view through its neighbours and back, median of all pixels (eval/cross_depth.h).
   /// The worst view may have twice as much: fewer pixels, seen from farther aside.
   double max_cross_px = 1;
   double memory_gb = 1;  ///< 1e9 bytes: of depth maps held for that at a time
 };
 
-/// The same, and then the set is judged by a fresh bundle adjustment (calib/bundle/judge.h), whose
+/// The same, and then the set is judged by a fresh bundle adjustment (calib/validation/photos.h), whose
 /// tests and figures join the report: some seconds. A set that was built with a rig must still
 /// stand as that does (RigPlaces, set_rig.h). Where views have depth, it is carried into the
 /// neighbours and back; their maps are read from `folder`, as many at a time as memory_gb holds

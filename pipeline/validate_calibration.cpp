@@ -10,8 +10,8 @@
 #include "dtr/base/error.h"
 #include "pipeline/calibrate_rig.h"
 #include "pipeline/camera_file.h"
-#include "pipeline/detail/boards/board_photos.h"
-#include "pipeline/detail/boards/rig_photos.h"
+#include "pipeline/board_photos.h"
+#include "pipeline/rig_photos.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -44,7 +44,7 @@ UnseenPhotos UnseenOfRig(const calib::Calibration& calibration, const std::files
                          const std::string& pattern, int threads, Progress& progress) {
   if (pattern != "*") {
     throw UsageError(fmt::format(
-        "--pattern {}: is for the photos of one camera; a rig's cameras are told apart by their "
+        "`pattern` {}: is for the photos of one camera; a rig's cameras are told apart by their "
         "folders or names",
         pattern));
   }
@@ -116,8 +116,8 @@ std::vector<calib::LeftOut> TakeOutSeen(const calib::Calibration& calibration,
 
 }  // namespace
 
-calib::JudgedCalibration JudgedFrom(const calib::Calibration& calibration) {
-  calib::JudgedCalibration judged;
+calib::ValidatedCalibration ToValidate(const calib::Calibration& calibration) {
+  calib::ValidatedCalibration judged;
   judged.board = calibration.board;
   judged.free_lenses = !calibration.lenses_given;
   for (const calib::CalibratedCamera& camera : calibration.cameras) {
@@ -158,7 +158,7 @@ UnseenPhotos ReadUnseen(const calib::Calibration& calibration, const std::filesy
   if (photos.unseen.views.empty()) {
     throw Error(fmt::format(
         "{}: expected photos that the calibration has not seen, found only those that it was made "
-        "from, {} first; take others, or leave --images out",
+        "from, {} first; take others, or leave `images` out",
         folder.string(), seen.front().name));
   }
   photos.left_out.insert(photos.left_out.end(), seen.begin(), seen.end());

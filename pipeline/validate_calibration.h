@@ -5,13 +5,13 @@
 #include <string>
 
 #include "calib/files/calibration.h"
-#include "calib/judge/judge.h"
+#include "calib/validation/boards.h"
 #include "dtr/base/progress.h"
 
 namespace dtr::pipeline {
 
 /// The calibration with its observations as calib::Judge takes it.
-calib::JudgedCalibration JudgedFrom(const calib::Calibration& calibration);
+calib::ValidatedCalibration ToValidate(const calib::Calibration& calibration);
 
 /// A camera from elsewhere (.yml, .yaml of OpenCV or ROS, cameras.txt of COLMAP with one camera),
 /// to be judged by photos of a board: no observations. Throws Error where the lens is of a model
@@ -35,7 +35,7 @@ UnseenPhotos ReadUnseen(const calib::Calibration& calibration, const std::filesy
 
 /// The report as a page: verdict and tests, residual vectors, coverage, maps, worst views. Views
 /// are drawn over their photos where `images` has them.
-std::string CalibrationPage(const calib::Calibration& calibration, const calib::JudgeReport& report,
+std::string CalibrationPage(const calib::Calibration& calibration, const calib::BoardValidation& report,
                             const std::string& title,
                             const std::optional<std::filesystem::path>& images);
 

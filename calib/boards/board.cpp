@@ -26,7 +26,7 @@ constexpr const char* kDictionaries[] = {
 
 [[noreturn]] void RefuseText(const std::string& text, const std::string& what) {
   throw UsageError(
-      fmt::format("--board {}: {}; expected chessboard:WxH:SQUARE (W x H inner corners) or "
+      fmt::format("`board` {}: {}; expected chessboard:WxH:SQUARE (W x H inner corners) or "
                   "charuco:WxH:SQUARE:MARKER[:DICTIONARY][:inverted] (W x H squares)",
                   text, what));
 }
@@ -138,7 +138,7 @@ Board BoardFromText(const std::string& text) {
   }
   if (next != parts.size()) RefuseText(text, "unexpected '" + parts[next] + "'");
   try {
-    CheckBoard(board, "--board " + text);
+    CheckBoard(board, "`board` " + text);
   } catch (const Error& error) {
     throw UsageError(error.what());
   }

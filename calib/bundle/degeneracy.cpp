@@ -1,3 +1,5 @@
+#include "calib/bundle/degeneracy.h"
+
 #include <fmt/format.h>
 
 #include <Eigen/Dense>
@@ -6,7 +8,6 @@
 #include <map>
 #include <numbers>
 
-#include "calib/bundle/judge.h"
 #include "calib/bundle/lens_params.h"
 #include "dtr/base/order_statistics.h"
 

@@ -117,7 +117,7 @@ Bundle WithoutUnseen(const Bundle& bundle, int fewest) {
   return OnlyImages(bundle, wanted);
 }
 
-int JudgedUnknowns(const Bundle& bundle) {
+int ValidationUnknowns(const Bundle& bundle) {
   int unknowns = kUnknownsOfImage * static_cast<int>(bundle.images.size());
   for (const LensCamera& lens : bundle.lenses) unknowns += static_cast<int>(lens.params.size());
   return unknowns;

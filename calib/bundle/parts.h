@@ -15,7 +15,7 @@ Bundle WithoutUnseen(const Bundle& bundle, int fewest);
 
 /// Unknowns of a bundle that is judged: its lenses' parameters, and per image a pose and the three
 /// turns of a rolling shutter.
-int JudgedUnknowns(const Bundle& bundle);
+int ValidationUnknowns(const Bundle& bundle);
 
 /// Every image of a bundle in one part of `most_unknowns` at most, images that see the same points
 /// together: parts grow by the image that shares most points with what they hold. What is left over

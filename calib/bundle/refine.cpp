@@ -262,7 +262,7 @@ std::vector<Degeneracy> DegeneraciesOf(const SfmModel& model, const RefineOption
   const AdjustOptions adjust = SolveOptions(
       options, options.known_lenses ? LensFreedom::kFixed : LensFreedom::kNoPrincipalPoint);
   const Adjusted adjusted = Adjust(bundle, adjust);
-  return FindDegeneracies(adjusted, CovarianceOf(adjusted, adjust), BundleLimits{}.max_focal_share);
+  return FindDegeneracies(adjusted, CovarianceOf(adjusted, adjust), kMaxFocalShare);
 }
 
 std::string WhyUndetermined(const SfmModel& model, const RefineOptions& options) {
@@ -282,7 +282,7 @@ void RequireDetermined(const SfmModel& model, const RefineOptions& options,
                   !options.advice.empty()
                       ? options.advice
                       : "take photos from more positions, around what they show, or give the "
-                        "camera (--lens); docs/VALIDATION.md names what each degeneracy lacks"));
+                        "camera (`lens`); docs/VALIDATION.md names what each degeneracy lacks"));
 }
 
 double HeldOutErrorPx(const SfmModel& model, std::uint64_t seed, int* count) {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "calib/bundle/adjust.h"
-#include "calib/bundle/judge.h"
+#include "calib/bundle/degeneracy.h"
 #include "calib/sfm_model.h"
 
 namespace dtr::calib {

@@ -119,7 +119,7 @@ void RequireCuda() {
   if (program.has_cuda()) return;
   throw Error(fmt::format(
       "colmap patch_match_stereo: expected a COLMAP with CUDA, found {} without; let a machine "
-      "with CUDA fill a dense workspace and give it with --workspace, or use --engine patchmatch",
+      "with CUDA fill a dense workspace and give it with `workspace`, or use `engine` patchmatch",
       program.version()));
 }
 

@@ -169,7 +169,7 @@ ExtractionPlan PlanExtraction(const std::vector<SfmImageInput>& images, int thre
   if (peak(side_px, 1) > limit_mib) {
     constexpr double kShown = 100;  // of a gigabyte, rounded up: what is asked for must do
     throw UsageError(fmt::format(
-        "--memory {:g}: expected at least {:.2f} (GB) for features of photos of this size; give as "
+        "`memory` {:g}: expected at least {:.2f} (GB) for features of photos of this size; give as "
         "much, or smaller photos",
         memory_gb,
         std::ceil(kShown * peak(side_px, 1) * kMib / kFill / kBytesPerGigabyte) / kShown));

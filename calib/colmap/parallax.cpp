@@ -73,7 +73,7 @@ std::string WhyNoModel(const PairCounts& counts) {
   if (counts.matched >= counts.photos) {
     return fmt::format(
         "{} pairs of photos match, but no cameras agree with them; photos of several cameras or "
-        "zoom settings need intrinsics of their own (--camera-per folder or photo), and what moved "
+        "zoom settings need intrinsics of their own (`camera_per` folder or photo), and what moved "
         "between the photos a mask",
         counts.matched);
   }

@@ -286,7 +286,8 @@ Board ReadBoard(const JsonObject& object) {
   try {
     return BoardFromText(object.String("board"));
   } catch (const UsageError& error) {
-    object.Fail("board", "a board as --board takes it");
+    object.Fail("board",
+                "a board as chessboard:WxH:SQUARE or charuco:WxH:SQUARE:MARKER:DICTIONARY");
   }
 }
 

@@ -226,7 +226,7 @@ ModelChoice ChooseModel(const Board& board, std::span<const BoardView> views, in
                         int height_px, const ChoiceOptions& options) {
   if (views.size() < kFewestViewsToChoose) {
     throw Error(
-        fmt::format("--model auto: expected at least {} images with the board to hold some "
+        fmt::format("`model` auto: expected at least {} images with the board to hold some "
                     "out, found {}; take more, or name a model",
                     kFewestViewsToChoose, views.size()));
   }

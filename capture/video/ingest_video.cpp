@@ -178,7 +178,7 @@ Choice ChooseFrames(const Videos& files, const VideoOptions& options, Capture& r
   }
   if (options.every == 0) choice.frames = chooser.Finish();
   if (choice.frames.empty()) {
-    throw Error(fmt::format("{}: expected frames with texture, found none among {}; give --every",
+    throw Error(fmt::format("{}: expected frames with texture, found none among {}; give `every`",
                             files.front().string(), choice.seen));
   }
   choice.frames = Thinned(choice.frames, options.most);
@@ -229,11 +229,11 @@ fs::path FolderFor(const fs::path& video, const Videos& videos) {
 }
 
 void RequireOptions(const VideoOptions& options) {
-  if (options.every < 0) throw UsageError("--every: expected a number of frames above 0");
-  if (options.most < 0) throw UsageError("--max-frames: expected a number of frames above 0");
+  if (options.every < 0) throw UsageError("`every`: expected a number of frames above 0");
+  if (options.most < 0) throw UsageError("`max_frames`: expected a number of frames above 0");
   if (!(options.motion > 0 && options.motion <= 1)) {
     throw UsageError(fmt::format(
-        "--motion: expected a share of the picture above 0 and up to 1, found {}", options.motion));
+        "`motion`: expected a share of the picture above 0 and up to 1, found {}", options.motion));
   }
 }
 

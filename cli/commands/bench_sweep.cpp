@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "cli/number_checks.h"
+#include "cli/render_arguments.h"
 #include "cli/shell_words.h"
 #include "cli/sweep_output.h"
 #include "cli/sweep_store.h"
@@ -18,7 +19,6 @@
 #include "dtr/base/temporary_folder.h"
 #include "dtr/eval/render_sweep.h"
 #include "dtr/io/set_io.h"
-#include "dtr/render/option_arguments.h"
 #include "pipeline/detail/photos/input_hash.h"
 #include "pipeline/detail/sweeps/calibration_sweep.h"
 #include "pipeline/detail/sweeps/stereo_sweep.h"
@@ -285,7 +285,7 @@ SweptStage SweepOne(const Measurable& measurable, const SweepRequest& request,
   swept.conditions = measurable.Conditions();
   swept.max_loss_db = request.max_loss_db;
   if (swept.stage.name == "render") swept.budget = request.budget_ms;
-  swept.Judge();
+  swept.ValidateBoards();
   return swept;
 }
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <filesystem>
 
-#include "calib/judge/judge.h"
+#include "calib/validation/boards.h"
 #include "cli/command.h"
 #include "cli/output_file.h"
 #include "dtr/base/error.h"
@@ -56,7 +56,7 @@ void SayDelays(const calib::Calibration& calibration, const pipeline::RigSummary
   if (summary.passes > 1) {
     console.Say(fmt::format("delays settled after {} solves", summary.passes));
   }
-  const calib::JudgeLimits limits;
+  const calib::BoardLimits limits;
   if (summary.unsteady.p < limits.min_p && summary.unsteady.amplitude_px > limits.max_pattern_px) {
     console.Say(fmt::format(
         "the cameras keep no common rate: a delay of each picture's own, beyond one per camera, "

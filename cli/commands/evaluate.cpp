@@ -1,44 +1,23 @@
+#include "pipeline/evaluate.h"
+
 #include <fmt/format.h>
 
 #include <cmath>
-#include <filesystem>
-#include <nlohmann/json.hpp>
-#include <optional>
 
 #include "cli/command.h"
 #include "cli/render_options.h"
 #include "cli/renderers.h"
-#include "dtr/eval/held_out.h"
 #include "dtr/eval/json.h"
-#include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
-#include "dtr/render/instants.h"
-#include "pipeline/evaluate_depth.h"
 
 namespace dtr::cli {
 namespace {
 
-namespace fs = std::filesystem;
-
 struct EvaluateArguments {
-  fs::path set, pictures, truth;
-  bool leave_one_out = false;
+  pipeline::EvaluateRequest request;
   RendererChoice renderer;
   std::shared_ptr<RenderOptions> render;
 };
-
-// Held-out photos that found no camera when the set was built.
-std::vector<std::string> NotRegistered(const DtrSet& set) {
-  const auto provenance = nlohmann::json::parse(set.provenance_json);
-  std::vector<std::string> names;
-  // Provenance is free text to a reader of sets: what has another form tells nothing here.
-  const auto listed = provenance.find("held_out_not_registered");
-  if (listed == provenance.end() || !listed->is_array()) return names;
-  for (const auto& name : *listed) {
-    if (name.is_string()) names.push_back(name.get<std::string>());
-  }
-  return names;
-}
 
 std::string Figure(const std::optional<double>& value, const char* format) {
   if (!value) return "-";
@@ -92,74 +71,41 @@ void SayDepth(const eval::DepthScores& depth, Console& console) {
 }
 
 int RunEvaluate(const EvaluateArguments& options, const Context& context) {
-  if (fs::exists(options.pictures) && !fs::is_directory(options.pictures)) {
-    throw UsageError(
-        fmt::format("--pictures {}: expected a folder, found a file", options.pictures.string()));
-  }
-  io::LoadOptions load;
-  load.held_out = true;
-  load.sigma = !options.truth.empty();
-  load.threads = context.common.threads;
-  load.warn = [&context](const std::string& line) { context.console.Note(line); };
-  const DtrSet set = io::LoadSet(options.set, load);
-  RequireOneFrame(set);
-
-  std::optional<eval::DepthScores> depth;
-  if (!options.truth.empty()) {
-    depth = pipeline::EvaluateDepth(set, options.truth, context.common.threads, context.console);
-  }
-  eval::EvaluateOptions evaluate;
-  evaluate.leave_one_out = options.leave_one_out;
-  evaluate.render = *options.render;
-  evaluate.render.threads = context.common.threads;
-  evaluate.not_registered = NotRegistered(set);
-  if (!options.pictures.empty()) {
-    fs::create_directories(options.pictures);
-    evaluate.on_rendered = [&](const View& view, const RenderResult& filled) {
-      io::WriteImage(options.pictures / (view.id + ".png"),
-                     eval::ComparisonImage(filled.image, view.image, view.mask));
-    };
-  }
-  const bool has_held_out =
-      std::any_of(set.frames.front().views.begin(), set.frames.front().views.end(),
-                  [](const View& view) { return view.role == ViewRole::kHeldOut; });
-  eval::EvaluationReport report;
-  // With truth alone there is still something to measure.
-  if (!options.leave_one_out && !has_held_out && !evaluate.not_registered.empty()) {
-    report.not_registered = evaluate.not_registered;  // every held-out photo is lost: counted
-  } else if (options.leave_one_out || has_held_out || !depth) {
-    report = eval::EvaluateHeldOut(set, evaluate, MakeRenderer(options.renderer, context.console),
-                                   context.console);
-  }
-  SayReport(report, context.console);
-  if (depth) SayDepth(*depth, context.console);
-  context.EmitJson(eval::ToJson(report, depth));
+  pipeline::EvaluateRequest request = options.request;
+  request.render = *options.render;
+  request.threads = context.common.threads;
+  const auto result = pipeline::Evaluate(
+      request, [&] { return MakeRenderer(options.renderer, context.console); }, context.console);
+  SayReport(result.views, context.console);
+  if (result.depth) SayDepth(*result.depth, context.console);
+  context.EmitJson(eval::ToJson(result.views, result.depth));
   return kDone;
 }
 
 }  // namespace
 
 void AddEvaluateCommand(CLI::App& app) {
-  AddCommand(
-      app, "evaluate", "Measure a set by photos it was not made from, or against true depth",
-      "dtr evaluate scene.dtr --json -", [](CLI::App& command) -> Action {
-        auto options = std::make_shared<EvaluateArguments>();
-        command.add_option("SET", options->set, "The set")->required();
-        command.add_flag("--leave-one-out", options->leave_one_out,
-                         "Leave every source view out of rendering in turn, instead");
-        command.add_option("--depth", options->truth, "Folder with cameras.json and true depth/")
-            ->type_name("TRUTH");
-        command
-            .add_option("--pictures", options->pictures,
-                        "Write rendering | photo | difference for every view")
-            ->type_name("DIR");
-        AddRendererOptions(command, options->renderer);
-        options->render = AddRenderOptions(command);
-        return [options, &command](const Context& context) {
-          UseStoredArguments(command, io::ReadSet(options->set), *options->render);
-          return RunEvaluate(*options, context);
-        };
-      });
+  AddCommand(app, "evaluate", "Measure a set by photos it was not made from, or against true depth",
+             "dtr evaluate scene.dtr --json -", [](CLI::App& command) -> Action {
+               auto options = std::make_shared<EvaluateArguments>();
+               command.add_option("SET", options->request.set, "The set")->required();
+               command.add_flag("--leave-one-out", options->request.leave_one_out,
+                                "Leave every source view out of rendering in turn, instead");
+               command
+                   .add_option("--depth", options->request.truth,
+                               "Folder with cameras.json and true depth/")
+                   ->type_name("TRUTH");
+               command
+                   .add_option("--pictures", options->request.pictures,
+                               "Write rendering | photo | difference for every view")
+                   ->type_name("DIR");
+               AddRendererOptions(command, options->renderer);
+               options->render = AddRenderOptions(command);
+               return [options, &command](const Context& context) {
+                 UseStoredOptions(command, io::ReadSet(options->request.set), *options->render);
+                 return RunEvaluate(*options, context);
+               };
+             });
 }
 
 }  // namespace dtr::cli

@@ -5,10 +5,10 @@
 
 #include "cli/command.h"
 #include "cli/number_checks.h"
+#include "cli/render_arguments.h"
 #include "cli/render_options.h"
 #include "cli/renderers.h"
 #include "dtr/io/set_io.h"
-#include "dtr/render/option_arguments.h"
 #include "pipeline/prune.h"
 
 namespace dtr::cli {
@@ -49,11 +49,11 @@ void SayResult(const PruneArguments& options, const pipeline::PruneSetReport& re
     console.Say(fmt::format("  {} decisions taken back, as other places showed more loss",
                             pruned.put_back.size()));
   }
+  const auto render = RenderOptionArguments(pruned.setting.render);
   console.Say(fmt::format("  dtr info {} says what was left out; drawn with: {}",
                           options.prune.output.string(),
-                          report.render_arguments.empty()
-                              ? std::string("the usual options")
-                              : fmt::format("{}", fmt::join(report.render_arguments, " "))));
+                          render.empty() ? std::string("the usual options")
+                                         : fmt::format("{}", fmt::join(render, " "))));
 }
 
 int RunPrune(PruneArguments& options, const Context& context) {
@@ -61,9 +61,6 @@ int RunPrune(PruneArguments& options, const Context& context) {
   options.prune.threads = context.common.threads;
   options.prune.prune.seed = context.common.seed;
   options.prune.prune.render = *options.render;
-  options.prune.arguments_of = [](const RenderOptions& render) {
-    return RenderOptionArguments(render);
-  };
   options.prune.renderer = options.renderer.name;
   options.prune.make_renderer = [&] { return MakeRenderer(options.renderer, context.console); };
   options.prune.make_timed_renderer = [&] {
@@ -130,7 +127,7 @@ void AddPruneCommand(CLI::App& app) {
         AddRendererOptions(command, options->renderer);
         options->render = AddRenderOptions(command);
         return [options, &command](const Context& context) {
-          UseStoredArguments(command, io::ReadSet(options->prune.set), *options->render);
+          UseStoredOptions(command, io::ReadSet(options->prune.set), *options->render);
           return RunPrune(*options, context);
         };
       });

@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "calib/judge/judge.h"
+#include "calib/validation/boards.h"
 #include "cli/command.h"
 #include "cli/commands/validate_calibration.h"
 #include "cli/number_checks.h"
@@ -37,8 +37,8 @@ void SayReport(const calib::ValidationReport& report, Console& console) {
     console.Say(fmt::format("{} {}: {:.4g} (limit {:.4g}): {}", test.passed ? "passed" : "FAILED",
                             test.name, test.value, test.limit, test.reason));
   }
-  if (!report.not_judged.empty()) {
-    console.Say("not judged by a fresh bundle adjustment: " + report.not_judged);
+  if (!report.not_validated.empty()) {
+    console.Say("not judged by a fresh bundle adjustment: " + report.not_validated);
   }
   for (const std::string& name : report.untested) {
     console.Say("not tested, too few observations: " + name);
@@ -109,7 +109,7 @@ void AddValidateCommand(CLI::App& app) {
                         fmt::format("Limit of the RMS on what the calibration has not seen [{} for "
                                     "sets, {} for calibration files]",
                                     options->limits.reprojection.max_rms_px,
-                                    calib::JudgeLimits{}.max_rms_px))
+                                    calib::BoardLimits{}.max_rms_px))
             ->check(kPositive)
             ->type_name("PX");
         command
@@ -137,7 +137,7 @@ void AddValidateCommand(CLI::App& app) {
             .add_option("--max-uncertainty", calibration.max_uncertainty_px,
                         fmt::format("Limit of the projections' standard deviation at the boards' "
                                     "distance [{}]",
-                                    calib::JudgeLimits{}.max_uncertainty_px))
+                                    calib::BoardLimits{}.max_uncertainty_px))
             ->check(kPositive)
             ->type_name("PX");
         command

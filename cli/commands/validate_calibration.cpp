@@ -22,10 +22,10 @@ void SayStats(const std::string& camera, const char* what, const calib::Residual
                           stats.worst_px, noise_px));
 }
 
-void SayReport(const calib::JudgeReport& report, Console& console) {
+void SayReport(const calib::BoardValidation& report, Console& console) {
   console.Say(fmt::format("{:<16} {:<10} {:>7} {:>8} {:>8} {:>8} {:>8} {:>8}", "camera, px",
                           "corners", "count", "RMS", "median", "95 %", "worst", "noise"));
-  for (const calib::JudgedCamera& camera : report.cameras) {
+  for (const calib::ValidatedCamera& camera : report.cameras) {
     SayStats(camera.name, report.unseen ? "unseen" : "kept", camera.stored, camera.noise_px,
              console);
     SayStats(camera.name, "held out", camera.held_out, camera.noise_px, console);
@@ -45,8 +45,8 @@ void SayReport(const calib::JudgeReport& report, Console& console) {
   }
 }
 
-void SayUncertainty(const calib::JudgeReport& report, bool metric, Console& console) {
-  for (const calib::JudgedCamera& camera : report.cameras) {
+void SayUncertainty(const calib::BoardValidation& report, bool metric, Console& console) {
+  for (const calib::ValidatedCamera& camera : report.cameras) {
     for (const calib::UncertaintyAt& at : camera.uncertainty_at) {
       console.Say(fmt::format(
           "{} at {:g}{}: standard deviation of a projection {:.3g} px or less in 95 % of the "
@@ -104,7 +104,7 @@ calib::Calibration Read(const ValidateCalibrationOptions& options) {
 int RunValidateCalibration(const ValidateCalibrationOptions& options, const Context& context) {
   if (options.report) RequireOutputFile(*options.report, "--report", {".html"});
   const calib::Calibration calibration = Read(options);
-  calib::JudgeLimits limits;
+  calib::BoardLimits limits;
   limits.max_rms_px = options.max_rms_px.value_or(limits.max_rms_px);
   limits.max_uncertainty_px = options.max_uncertainty_px.value_or(limits.max_uncertainty_px);
   const std::vector<double> distances = DistancesOf(options.at, calibration.board);
@@ -120,7 +120,7 @@ int RunValidateCalibration(const ValidateCalibrationOptions& options, const Cont
     }
     unseen = std::move(photos.unseen);
   }
-  const calib::JudgeReport report = calib::Judge(pipeline::JudgedFrom(calibration), unseen, limits,
+  const calib::BoardValidation report = calib::ValidateBoards(pipeline::ToValidate(calibration), unseen, limits,
                                                  context.common.threads, distances);
   SayReport(report, context.console);
   SayUncertainty(report, calibration.board.metric, context.console);

@@ -10,6 +10,7 @@
 
 #include "cli/command.h"
 #include "cli/output_file.h"
+#include "cli/render_arguments.h"
 #include "cli/render_options.h"
 #include "cli/renderers.h"
 #include "cli/shell_words.h"
@@ -20,7 +21,6 @@
 #include "dtr/io/set_io.h"
 #include "dtr/io/verdict.h"
 #include "dtr/render/instants.h"
-#include "dtr/render/option_arguments.h"
 #include "pipeline/detail/render/novel_frames.h"
 #include "pipeline/detail/render/set_stream.h"
 #include "pipeline/validate.h"
@@ -53,7 +53,7 @@ std::unique_ptr<viewer::OpenedSet> Open(const Options& options, const Context& c
   opened->defaults = StoredRenderOptions(opened->set);
   io::CollapseDuplicates(opened->set);
   opened->stream = pipeline::StreamOf(options.set, opened->set, DescribeFrames(opened->set, {}),
-                            {options.memory_gb, context.common.threads}, context.console);
+                                      {options.memory_gb, context.common.threads}, context.console);
   return opened;
 }
 
@@ -224,7 +224,8 @@ std::string ViewStampOf(const fs::path& set, const View& view) {
 
 std::vector<NovelCamera> CamerasOf(const std::vector<pipeline::NovelFrame>& frames) {
   std::vector<NovelCamera> cameras;
-  for (const pipeline::NovelFrame& frame : frames) cameras.push_back({frame.camera, frame.cam_from_world});
+  for (const pipeline::NovelFrame& frame : frames)
+    cameras.push_back({frame.camera, frame.cam_from_world});
   return cameras;
 }
 
@@ -298,7 +299,8 @@ viewer::AppSettings SettingsOf(const Options& options, const Context& context, c
       request.fly_through_frames == 0) {
     return settings;
   }
-  const std::vector<pipeline::NovelFrame> frames = pipeline::NovelFrames(AtFrame(set, options.instant), request);
+  const std::vector<pipeline::NovelFrame> frames =
+      pipeline::NovelFrames(AtFrame(set, options.instant), request);
   settings.start = NovelCamera{frames.front().camera, frames.front().cam_from_world};
   if (frames.size() > 1) settings.play = CamerasOf(frames);
   return settings;
@@ -398,7 +400,7 @@ void AddViewCommand(CLI::App& app) {
                         "Memory for the views' pixels; others are dropped and read again [4]");
         options->render = AddRenderOptions(command);
         return [options, &command](const Context& context) {
-          UseStoredArguments(command, io::ReadSet(options->set), *options->render);
+          UseStoredOptions(command, io::ReadSet(options->set), *options->render);
           return RunView(*options, context);
         };
       });

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <numbers>
 
-#include "calib/bundle/judge.h"
+#include "calib/validation/photos.h"
 #include "cli/selftest/cases.h"
 #include "datasets/exact/bundle.h"
 #include "dtr/base/error.h"
@@ -129,7 +129,7 @@ Outcome NearlyFlat(const Conditions&) {
   return outcome;
 }
 
-bool Names(const calib::Judgement& judgement, std::initializer_list<const char*> names) {
+bool Names(const calib::PhotosValidation& judgement, std::initializer_list<const char*> names) {
   return std::ranges::any_of(judgement.degeneracies, [&](const calib::Degeneracy& d) {
     return std::ranges::any_of(names, [&](const char* name) { return d.name == name; });
   });
@@ -143,7 +143,7 @@ Outcome Undecided(const SceneSpec& spec, std::initializer_list<const char*> name
   Outcome outcome;
   const Bundle bundle = MakeBundle(spec);
   Solve(bundle, LensFreedom::kNoPrincipalPoint, outcome);
-  const calib::Judgement judgement = calib::Judge(bundle, {}, conditions.threads);
+  const calib::PhotosValidation judgement = calib::ValidatePhotos(bundle, {}, conditions.threads);
   for (const Check& test : judgement.tests) outcome.not_finite += std::isnan(test.value);
   outcome.Add(Exactly("the judge names the degeneracy", Names(judgement, names), 1,
                       "what the views cannot decide is told, not guessed"));

@@ -78,7 +78,7 @@ std::string NoteOf(const BenchEnd& end) {
   const std::string where = "resolution " + std::to_string(end.resolution) + ": no rows beyond " +
                             std::to_string(end.views_asked) + " views: ";
   return end.for_memory ? "WARNING: " + where + "memory holds only " +
-                              std::to_string(end.views_used) + " of them; give --gpu-memory"
+                              std::to_string(end.views_used) + " of them; give `gpu_memory`"
                         : where + "only " + std::to_string(end.views_used) + " are valid here";
 }
 

@@ -1,5 +1,5 @@
 // dtr/eval/bench_rows.h -- what rows of all tables have in common: where they look from, and how a
-// row is measured. Internal to dtr/eval.
+// row is measured.
 #pragma once
 #include <optional>
 #include <vector>

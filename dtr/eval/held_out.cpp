@@ -30,13 +30,13 @@ std::vector<const View*> ViewsToCompare(const DtrSet& set, bool leave_one_out) {
     views.push_back(&view);
   }
   if (leave_one_out && sources < 2) {
-    throw UsageError("--leave-one-out: expected at least 2 source views in the set, found " +
+    throw UsageError("`leave_one_out`: expected at least 2 source views in the set, found " +
                      std::to_string(sources));
   }
   if (views.empty()) {
     throw UsageError(
-        "evaluate: expected a held-out view in the set, found none; build it with --holdout "
-        "every:8, or use --leave-one-out");
+        "evaluate: expected a held-out view in the set, found none; build it with `holdout` "
+        "every:8, or use `leave_one_out`");
   }
   return views;
 }

@@ -160,7 +160,7 @@ SweepMeasurement RenderSweep::Measure(const SweepSetting& setting) const {
   if (!row.psnr_db) throw Error("bench: no photo has a pixel to compare with");
   if (sums.cut()) {
     throw Error(fmt::format(
-        "bench: {} views: memory holds fewer of them; give --gpu-memory, or fewer --views",
+        "bench: {} views: memory holds fewer of them; give `gpu_memory`, or fewer `views`",
         options.views));
   }
   const Times& cost = renderer_.HasGpuClock() ? row.frame : row.cpu;

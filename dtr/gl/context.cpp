@@ -26,7 +26,7 @@ constexpr EGLint kContextFlags = EGL_CONTEXT_OPENGL_DEBUG_BIT_KHR;
 
 [[noreturn]] void Refuse(const std::string& found) {
   throw Error("OpenGL: expected a context of version 4.3 or newer through EGL, found " + found +
-              "; use --renderer cpu");
+              "; use `renderer` cpu");
 }
 
 /// epoxy ends the program when a library is absent, so this asks first.

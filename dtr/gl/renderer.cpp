@@ -30,7 +30,7 @@ void CheckContext() {
   if (version < kOldestVersion || !epoxy_is_desktop_gl()) {
     throw Error("OpenGL: expected a current context of version 4.3 or newer, found " +
                 std::to_string(version / 10) + "." + std::to_string(version % 10) +
-                "; use --renderer cpu");
+                "; use `renderer` cpu");
   }
 }
 
@@ -44,7 +44,7 @@ void CheckPictureSize(const PinholeCamera& novel) {
   if (novel.width_px() > max_px || novel.height_px() > max_px) {
     throw Error("OpenGL: expected a picture of at most " + std::to_string(max_px) +
                 " pixels a side on this driver, found " + std::to_string(novel.width_px()) + "x" +
-                std::to_string(novel.height_px()) + "; use --renderer cpu");
+                std::to_string(novel.height_px()) + "; use `renderer` cpu");
   }
 }
 
@@ -54,7 +54,7 @@ void CheckViewCount(size_t views) {
   if (views > static_cast<size_t>(max_layers)) {
     throw Error("OpenGL: expected at most " + std::to_string(max_layers) +
                 " candidate views on this driver, found " + std::to_string(views) +
-                "; use --renderer cpu or --exclude");
+                "; use `renderer` cpu or `exclude`");
   }
 }
 
@@ -203,7 +203,7 @@ class Renderer::Implementation {
     settings_.warn("WARNING: drawn from the nearest " + std::to_string(fitting) + " of " +
                    std::to_string(wanted) + " views: more do not fit into " +
                    std::to_string(settings_.gpu_bytes >> 20) +
-                   " MiB of GPU memory; give --gpu-memory");
+                   " MiB of GPU memory; give `gpu_memory`");
   }
 
   /// Band by band, so that the views' fragments stay within the memory for them.
@@ -310,7 +310,7 @@ class Renderer::Implementation {
                 std::to_string(most_storage_bytes_) + " bytes, found " +
                 std::to_string(frame.novel.width_px()) + "x" +
                 std::to_string(frame.novel.height_px()) +
-                " pixels of 4 bytes; use --renderer cpu, --method two-pass or a smaller --size");
+                " pixels of 4 bytes; use `renderer` cpu, `method` two-pass or a smaller `size`");
   }
 
   void FitTargets(const Frame& frame, int rows) {

@@ -100,8 +100,8 @@ int Resolver::SlotOf(std::vector<int>& bound, int array) const {
     throw Error(
         "OpenGL: expected the images and depth maps of one picture in at most " +
         std::to_string(kMaxImageArrays) +
-        " texture arrays of up to 1 GiB, found more; use --renderer cpu, fewer --views or a "
-        "smaller --gpu-memory");
+        " texture arrays of up to 1 GiB, found more; use `renderer` cpu, fewer `views` or a "
+        "smaller `gpu_memory`");
   }
   bound.push_back(array);
   return static_cast<int>(bound.size()) - 1;

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "dtr/base/error.h"
+#include "dtr/base/lower_case.h"
 #include "dtr/io/exr_checks.h"
 #include "dtr/io/image_io.h"
 
@@ -80,10 +81,7 @@ std::string Printable(std::string text) {
 }  // namespace
 
 void ExpectImageKind(const fs::path& file) {
-  std::string extension = file.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return std::tolower(c); });
-  if (extension == ".tga") return;  // the one format that begins with no mark
+  if (LowerExtension(file) == ".tga") return;  // the one format that begins with no mark
   std::ifstream in(file, std::ios::binary);
   std::array<char, 12> bytes{};
   in.read(bytes.data(), bytes.size());

@@ -10,6 +10,7 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
+#include "dtr/base/lower_case.h"
 #include "dtr/io/alpha.h"
 #include "dtr/io/colour_coding.h"
 #include "dtr/io/file_colours.h"
@@ -116,13 +117,6 @@ ImageRgb8 RgbFromGrey(const Grid<std::uint8_t>& grey) {
     std::fill_n(rgb.data().begin() + static_cast<std::ptrdiff_t>(3 * i), 3, grey.data()[i]);
   }
   return rgb;
-}
-
-std::string LowerExtension(const fs::path& file) {
-  std::string extension = file.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension;
 }
 
 void ExpectRgb(const fs::path& file, const ImageRgb8& image) {

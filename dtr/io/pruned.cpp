@@ -10,6 +10,8 @@ namespace {
 
 constexpr char kPruned[] = "pruned";
 constexpr char kWhere[] = "set.json: pruned";
+constexpr char kRender[] = "render";
+constexpr char kRenderWords[] = "render_arguments";  // of version 0.1: a list of words
 
 Json ExtraOf(const DtrSet& set) {
   return set.extra_json.empty() ? Json::object() : ParseJson(set.extra_json, kWhere);
@@ -58,6 +60,21 @@ void DescribeLoss(const Json& pruned, const std::string& kind, const char* words
   out << " dB\n";
 }
 
+/// {"views": 4, "method": "two-pass"} as: views 4, method two-pass.
+std::string InWords(const std::string& options_json) {
+  const Json options = Json::parse(options_json);
+  std::string words;
+  for (const auto& [name, value] : options.items()) {
+    const std::string text = value.is_string() ? value.get<std::string>() : value.dump();
+    if (options.is_array()) {
+      words += (words.empty() ? "" : " ") + text;
+    } else {
+      words += (words.empty() ? "" : ", ") + name + " " + text;
+    }
+  }
+  return words.empty() ? "the usual options" : words;
+}
+
 }  // namespace
 
 std::string PrunedJson(const DtrSet& set) {
@@ -80,21 +97,15 @@ void SetPrunedJson(DtrSet& set, const std::string& json) {
   set.extra_json = extra.dump();
 }
 
-std::vector<std::string> RenderArguments(const DtrSet& set) {
+StoredRenderOptions RenderOptionsOf(const DtrSet& set) {
   const std::string text = PrunedJson(set);
   if (text.empty()) return {};
   const Json pruned = ParseJson(text, kWhere);
-  const auto found = pruned.find("render_arguments");
-  if (found == pruned.end()) return {};
-  std::vector<std::string> arguments;
-  for (const Json& argument : found->is_array() ? *found : Json::array({nullptr})) {
-    if (!argument.is_string()) {
-      throw Error(std::string(kWhere) + ".render_arguments: expected a list of strings, found " +
-                  found->dump());
-    }
-    arguments.push_back(argument.get<std::string>());
+  for (const char* field : {kRender, kRenderWords}) {
+    const auto found = pruned.find(field);
+    if (found != pruned.end()) return {found->dump(), std::string(kWhere) + "." + field};
   }
-  return arguments;
+  return {};
 }
 
 std::string DescribePruned(const DtrSet& set) {
@@ -111,9 +122,7 @@ std::string DescribePruned(const DtrSet& set) {
   DescribeSteps(pruned, "put_back", "taken back: ", out);
   DescribeLoss(pruned, "probe", "lost between input cameras", out);
   DescribeLoss(pruned, "witness", "lost at photos that did not decide", out);
-  std::string arguments;
-  for (const std::string& argument : RenderArguments(set)) arguments += " " + argument;
-  out << "drawn by default with:" << (arguments.empty() ? " the usual options" : arguments) << "\n";
+  out << "rendered by default with: " << InWords(RenderOptionsOf(set).json) << "\n";
   return out.str();
 }
 

@@ -1,7 +1,6 @@
 // dtr/io/pruned.h -- what set.json says about what was left out of a set (docs/FORMAT.md, 2.1).
 #pragma once
 #include <string>
-#include <vector>
 
 #include "dtr/types/dtr_set.h"
 
@@ -13,9 +12,14 @@ std::string PrunedJson(const DtrSet& set);
 /// Puts it there, in the place of one before; "" takes that out.
 void SetPrunedJson(DtrSet& set, const std::string& json);
 
-/// `pruned.render_arguments`: the options of `dtr render` that the set was pruned for, which are
-/// its defaults. Empty where there are none; throws Error where they are no list of strings.
-std::vector<std::string> RenderArguments(const DtrSet& set);
+/// The rendering options that the set was pruned for, which are its defaults.
+struct StoredRenderOptions {
+  std::string json = "{}";  ///< as WithStoredOptions (dtr/render/stored_options.h) takes them
+  std::string where;        ///< the field of set.json, for messages
+};
+
+/// `pruned.render`; `pruned.render_arguments` of sets of version 0.1; "{}" where there is neither.
+StoredRenderOptions RenderOptionsOf(const DtrSet& set);
 
 /// For people: what was left out and why and what was taken back, a line each, and the losses that
 /// were checked; "" for a set that nothing was left out of.

@@ -5,6 +5,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/base/hash.h"
+#include "dtr/base/lower_case.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/io/depth_io.h"
 #include "dtr/io/held_out_files.h"
@@ -102,13 +103,6 @@ std::string IdFromName(const std::string& name) {
   }
   if (id.size() > kLongestStem) id = id.substr(id.size() - kLongestStem);  // the end differs most
   return id.empty() ? "view" : id;
-}
-
-std::string LowerCase(std::string text) {
-  for (char& c : text) {
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  }
-  return text;
 }
 
 }  // namespace

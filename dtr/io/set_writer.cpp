@@ -163,7 +163,7 @@ void SetWriter::State::ExpectReplaceable() const {
   }
   if (!force) {
     throw UsageError(target.string() + ": expected no such folder yet, found one; " +
-                     "choose another name or pass --force to replace it");
+                     "choose another name or pass `force` to replace it");
   }
   if (!IsEmptyFolder(target) && !fs::is_regular_file(target / kSetFile)) {
     throw UsageError(target.string() + ": expected a D+TR set to replace, found something else; " +
@@ -350,8 +350,8 @@ void SetWriter::CopyFiles(const fs::path& set_folder, const View& view) {
     });
     if (copied == **file) continue;
     throw Error((set_folder / (*file)->path).string() +
-                ": expected the content that the set records, found another; `dtr info --verify` "
-                "names every such file");
+                ": expected the content that the set records, found another; dtr info with "
+                "`verify` names every such file");
   }
 }
 

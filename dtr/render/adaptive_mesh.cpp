@@ -291,7 +291,7 @@ AdaptiveMesh MakeAdaptiveMesh(const SampleGrid& samples, const BreakRule& rule,
   if (w.width() > kMostSideSamples || w.height() > kMostSideSamples) {
     throw Error("reduced mesh: expected at most " + std::to_string(kMostSideSamples) +
                 " depth samples a side, found " + std::to_string(w.width()) + "x" +
-                std::to_string(w.height()) + "; use a larger --resolution");
+                std::to_string(w.height()) + "; use a larger `resolution`");
   }
   return MeshMaker(samples, rule, cover).Make();
 }

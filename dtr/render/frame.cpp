@@ -20,7 +20,7 @@ void CheckNovelCamera(const PinholeCamera& novel, const Pose& novel_from_world) 
   if (static_cast<long long>(novel.width_px()) * novel.height_px() > kMaxNovelPixels) {
     throw UsageError("picture: expected at most 2^28 pixels, found " +
                      std::to_string(novel.width_px()) + "x" + std::to_string(novel.height_px()) +
-                     "; give a smaller --size");
+                     "; give a smaller `size`");
   }
   if (!novel_from_world.translation.allFinite() ||
       !novel_from_world.rotation.coeffs().allFinite() || !(novel_from_world.rotation.norm() > 0)) {

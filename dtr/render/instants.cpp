@@ -11,7 +11,7 @@ namespace dtr {
 
 DtrSet AtFrame(const DtrSet& set, size_t index) {
   if (index >= set.frames.size()) {
-    throw UsageError("--frame " + std::to_string(index) + ": expected 0 to " +
+    throw UsageError("`frame` " + std::to_string(index) + ": expected 0 to " +
                      std::to_string(set.frames.size() - 1) + ", the set has " +
                      std::to_string(set.frames.size()) +
                      (set.frames.size() == 1 ? " frame" : " frames"));
@@ -37,7 +37,7 @@ void RequireOneFrame(const DtrSet& set) {
   if (set.frames.empty()) throw Error("set: expected at least one frame, found none");
   if (set.frames.size() == 1) return;
   throw UsageError("set: expected one frame, found " + std::to_string(set.frames.size()) +
-                   "; moving sets are for `dtr render`, `dtr view` (--frame) and `dtr info`");
+                   "; moving sets are for dtr render, dtr view (`frame`) and dtr info");
 }
 
 std::vector<RenderScene> DescribeFrames(const DtrSet& set,

@@ -55,7 +55,7 @@ RenderScene DescribeRenderScene(const DtrSet& set, std::span<const std::string> 
   for (const std::string& name : excluded_names) {
     if (std::none_of(views.begin(), views.end(),
                      [&](const View& v) { return v.id == name || v.name == name; })) {
-      throw UsageError("--exclude: expected the name of a view, found '" + name +
+      throw UsageError("`exclude`: expected the name of a view, found '" + name +
                        "'; `dtr info` lists the names");
     }
   }

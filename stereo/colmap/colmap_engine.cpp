@@ -112,7 +112,7 @@ ColmapEngine::ColmapEngine(const fs::path& workspace, std::span<const std::strin
                          : Difference(views[i], *image, world_origin, NearestCamera(views, i));
     if (!difference.empty()) {
       throw Error(workspace.string() + ": view " + names[i] + ": expected " + difference +
-                  "; make the workspace from this set (dtr export --format colmap)");
+                  "; make the workspace from this set (dtr export `format` colmap)");
     }
     maps_.push_back(image->depth_map);
     if (!image->depth_map.empty() && !image->geometric) ++photometric_maps_;

@@ -115,7 +115,7 @@ SourcePyramid MakeSource(const StereoView& view, int levels) {
   if (view.camera.width_px() > kWidestTexture) {
     throw Error("patchmatch: expected photos at most " + std::to_string(kWidestTexture) +
                 " pixels wide, found " + std::to_string(view.camera.width_px()) +
-                "; shrink them (--max-size)");
+                "; shrink them (`max_size`)");
   }
   SourcePyramid source;
   source.view = &view;

@@ -1,4 +1,4 @@
-// tests/calib/sabotage_tally.h -- what came of spoiled calibrations and of honest ones.
+// tests/calib/fault_tally.h -- what came of spoiled calibrations and of honest ones.
 #pragma once
 #include <algorithm>
 #include <cstdint>
@@ -14,12 +14,12 @@ struct Tally {
   int caught = 0, missed = 0;  ///< of those that can be detected
   int not_detectable = 0;
   int honest = 0, honest_passed = 0;
-  int sabotages() const { return caught + missed; }
+  int faults() const { return caught + missed; }
 };
 
-/// What sabotages are drawn by: DTR_SABOTAGE_SEED, or 1.
-inline std::uint64_t SabotageSeed() {
-  const char* given = std::getenv("DTR_SABOTAGE_SEED");
+/// What faults are drawn by: DTR_FAULT_SEED, or 1.
+inline std::uint64_t FaultInjectionSeed() {
+  const char* given = std::getenv("DTR_FAULT_SEED");
   return given ? std::strtoull(given, nullptr, 10) : 1;
 }
 

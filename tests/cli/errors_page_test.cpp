@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
+#include <regex>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -68,6 +69,20 @@ class Expression {
   size_t at_;
 };
 
+// What dtr prints: `max_size` of a library as --max-size (cli/option_names.h).
+std::string AsShown(const std::string& literal) {
+  static const std::regex field("`([a-z][a-z0-9_]*)`");
+  std::string text;
+  auto from = literal.begin();
+  for (std::sregex_iterator at(literal.begin(), literal.end(), field), end; at != end; ++at) {
+    std::string name = (*at)[1].str();
+    std::replace(name.begin(), name.end(), '_', '-');
+    text.append(from, (*at)[0].first).append("--" + name);
+    from = (*at)[0].second;
+  }
+  return text.append(from, literal.end());
+}
+
 // The longest run without a {field} of fmt, less the punctuation around it.
 std::string LongestPiece(const std::vector<std::string>& literals) {
   std::string longest;
@@ -78,7 +93,8 @@ std::string LongestPiece(const std::vector<std::string>& literals) {
     piece = piece.substr(first, piece.find_last_not_of(kAround) - first + 1);
     if (piece.size() > longest.size()) longest = piece;
   };
-  for (const std::string& literal : literals) {
+  for (const std::string& source : literals) {
+    const std::string literal = AsShown(source);
     size_t from = 0;
     for (size_t open = literal.find('{'); open != std::string::npos;
          open = literal.find('{', from)) {
@@ -108,7 +124,8 @@ std::vector<Thrown> ThrownBy(const fs::path& file) {
 
 std::vector<Thrown> EverythingThrown() {
   std::vector<Thrown> all;
-  for (const char* folder : {"calib", "capture", "cli", "datasets", "dtr", "pipeline", "stereo", "viewer"}) {
+  for (const char* folder :
+       {"calib", "capture", "cli", "datasets", "dtr", "pipeline", "stereo", "viewer"}) {
     for (const auto& entry : fs::recursive_directory_iterator(folder)) {
       const std::string extension = entry.path().extension().string();
       if (extension != ".cpp" && extension != ".h") continue;

@@ -1,6 +1,8 @@
 // `dtr prune` in its shortest form: one goal that few steps reach. prune_test.cpp has the rest.
 #include <nlohmann/json.hpp>
 
+#include "cli/render_arguments.h"
+#include "dtr/render/stored_options.h"
 #include "tests/support/small_courtyard_set.h"
 
 namespace dtr::testing {
@@ -55,8 +57,8 @@ TEST_F(QuickPruning, ASmallerSetIsDescribedVerifiedAndDrawnAsItWasPrunedFor) {
     return Text(In(name));
   };
   const std::string drawn = picture("default.png", {});
-  EXPECT_EQ(drawn,
-            picture("explicit.png", report["render_arguments"].get<std::vector<std::string>>()));
+  EXPECT_EQ(drawn, picture("explicit.png", cli::RenderOptionArguments(WithStoredOptions(
+                                               {}, report["render"].dump(), "report"))));
   EXPECT_NE(drawn, picture("other.png", {"--views", "1", "--resolution", "4"}));
 }
 

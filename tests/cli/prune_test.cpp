@@ -6,6 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "cli/render_arguments.h"
+#include "dtr/render/stored_options.h"
 #include "tests/cli/run_dtr.h"
 #include "tests/cli/small_courtyard.h"
 #include "tests/support/test_data.h"
@@ -69,7 +71,7 @@ TEST_F(Pruning, KeepsItsPromiseSaysWhatItDidAndIsAnOrdinarySet) {
   EXPECT_THAT(info.out, HasSubstr(report["removed"][0]["what"].get<std::string>()));
   const Json described = Json::parse(Text(folder_ / "info.json"));
   EXPECT_EQ(described["pruned"]["removed"], report["removed"]);
-  EXPECT_EQ(described["pruned"]["render_arguments"], report["render_arguments"]);
+  EXPECT_EQ(described["pruned"]["render"], report["render"]);
 
   // What the set was pruned for is the default, and can be overridden.
   const auto picture = [&](const std::string& name, std::vector<std::string> more) {
@@ -79,7 +81,8 @@ TEST_F(Pruning, KeepsItsPromiseSaysWhatItDidAndIsAnOrdinarySet) {
     DtrOk(render);
     return Text(folder_ / name);
   };
-  const auto stored = report["render_arguments"].get<std::vector<std::string>>();
+  const auto stored =
+      cli::RenderOptionArguments(WithStoredOptions({}, report["render"].dump(), "report"));
   ASSERT_FALSE(stored.empty()) << "a loss of 1 dB allows fewer views a pixel";
   EXPECT_EQ(picture("default.png", {}), picture("explicit.png", stored));
   EXPECT_NE(picture("default.png", {}),

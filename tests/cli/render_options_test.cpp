@@ -5,13 +5,14 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "cli/render_arguments.h"
 #include "cli/shell_words.h"
 #include "dtr/base/error.h"
 #include "dtr/base/process.h"
 #include "dtr/base/random.h"
 #include "dtr/io/pruned.h"
-#include "dtr/render/option_arguments.h"
 #include "dtr/render/option_names.h"
+#include "dtr/render/stored_options.h"
 
 namespace dtr::cli {
 namespace {
@@ -64,13 +65,18 @@ TEST(RenderOptionArguments, GiveTheSameOptionsBitByBit) {
     const RenderOptions options = RandomOptions(random);
     const auto arguments = RenderOptionArguments(options);
     EXPECT_EQ(Parsed(arguments), options) << ShellLine(arguments);
-    EXPECT_EQ(WithArguments({}, arguments, "here"), options) << ShellLine(arguments);
+    EXPECT_EQ(WithStoredOptions({}, ToJson(options), "here"), options) << ToJson(options);
+    const RenderOptions other = RandomOptions(random);
+    EXPECT_EQ(WithStoredOptions(other, ToJson(options, other), "here"), options);
+    // Sets of version 0.1 hold such words.
+    EXPECT_EQ(WithStoredOptions({}, nlohmann::json(arguments).dump(), "here"), options)
+        << ShellLine(arguments);
   }
 }
 
-DtrSet PrunedFor(const std::vector<std::string>& arguments) {
+DtrSet PrunedFor(const std::string& options_json) {
   DtrSet set;
-  io::SetPrunedJson(set, nlohmann::json{{"render_arguments", arguments}}.dump());
+  io::SetPrunedJson(set, R"({"render": )" + options_json + "}");
   return set;
 }
 
@@ -78,40 +84,57 @@ TEST(RenderOptionArguments, TurnOffWhatASetStores) {
   Random random(13);
   for (int draw = 0; draw < 500; ++draw) {
     const RenderOptions stored = RandomOptions(random), wanted = RandomOptions(random);
-    const DtrSet set = PrunedFor(RenderOptionArguments(stored));
+    const DtrSet set = PrunedFor(ToJson(stored));
     EXPECT_EQ(StoredRenderOptions(set), stored);
     const auto arguments = RenderOptionArguments(wanted, stored);
     CLI::App app;
     const auto options = AddRenderOptions(app);
     app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
-    UseStoredArguments(app, set, *options);
+    UseStoredOptions(app, set, *options);
     EXPECT_EQ(*options, wanted) << ShellLine(RenderOptionArguments(stored)) << " + "
                                 << ShellLine(arguments);
     EXPECT_TRUE(RenderOptionArguments(stored, stored).empty());
   }
 }
 
-TEST(WithArguments, SaysWhichValueHasNoMeaning) {
-  const auto said = [](const std::vector<std::string>& arguments) {
-    try {
-      WithArguments({}, arguments, "here");
-    } catch (const Error& error) {
-      return std::string(error.what());
-    }
-    return std::string("nothing");
-  };
-  EXPECT_EQ(said({"--views", "many"}), "here: --views: expected a number, found many");
-  EXPECT_EQ(said({"--views", "1000000"}), "here: --views: expected 1 to 1024, found 1000000");
-  EXPECT_EQ(said({"--method", "best"}), "here: --method: expected deferred|two-pass, found best");
-  EXPECT_EQ(said({"--fill-holes=maybe"}),
-            "here: --fill-holes: expected no value, true or false, found maybe");
-  EXPECT_EQ(said({"--delta", "-1"}), "here: --delta: expected 0 or more, found -1.000000");
+std::string ErrorOf(const std::string& json) {
+  try {
+    WithStoredOptions({}, json, "here");
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "nothing";
 }
 
-TEST(UseStoredArguments, TakesOptionsOfRenderingAndNothingElse) {
-  for (const std::vector<std::string>& hostile : {std::vector<std::string>{"--json", "/tmp/x"},
-                                                  {"--views", "3", "--force"},
-                                                  {"views", "3"}}) {
+TEST(WithStoredOptions, SaysWhichValueHasNoMeaning) {
+  EXPECT_EQ(ErrorOf(R"({"views": "many"})"), "here: views: expected a number, found \"many\"");
+  EXPECT_EQ(ErrorOf(R"({"views": 1000000})"), "here: views: expected 1 to 1024, found 1000000");
+  EXPECT_EQ(ErrorOf(R"({"views": 2.5})"), "here: views: expected 1 to 1024, found 2.5");
+  EXPECT_EQ(ErrorOf(R"({"method": "best"})"),
+            "here: method: expected deferred|two-pass, found \"best\"");
+  EXPECT_EQ(ErrorOf(R"({"fill_holes": 1})"), "here: fill_holes: expected true or false, found 1");
+  EXPECT_EQ(ErrorOf(R"({"delta_px": -1})"), "here: `delta`: expected 0 or more, found -1.000000");
+  EXPECT_EQ(ErrorOf("7"), "here: expected an object, found 7");
+  EXPECT_EQ(ErrorOf(R"(["--views", "many"])"), "here: views: expected a number, found \"many\"");
+  EXPECT_EQ(ErrorOf(R"(["--views", 4])"),
+            "here: expected a list of strings, found [\"--views\",4]");
+}
+
+TEST(StoredRenderOptions, ReadsSetsOfVersion01) {
+  DtrSet set;
+  io::SetPrunedJson(set, R"({"render_arguments": ["--views", "4", "--blend-linear",
+                                                  "--fill-holes=false", "--max-angle", "50"]})");
+  RenderOptions expected;
+  expected.views = 4;
+  expected.blend_in_linear_light = true;
+  expected.max_angle_rad = 50 * std::numbers::pi / 180;
+  EXPECT_EQ(StoredRenderOptions(set), expected);
+}
+
+TEST(UseStoredOptions, TakesOptionsOfRenderingAndNothingElse) {
+  for (const std::string hostile :
+       {R"({"json": "/tmp/x"})", R"({"views": 3, "force": true})", R"(["--json", "/tmp/x"])",
+        R"(["--views", "3", "--force"])", R"(["views", "3"])"}) {
     CLI::App app;
     std::string json;
     bool force = false;
@@ -119,8 +142,7 @@ TEST(UseStoredArguments, TakesOptionsOfRenderingAndNothingElse) {
     app.add_flag("--force", force);
     const auto options = AddRenderOptions(app);
     app.parse(std::vector<std::string>{});
-    EXPECT_THROW(UseStoredArguments(app, PrunedFor(hostile), *options), Error)
-        << ShellLine(hostile);
+    EXPECT_THROW(UseStoredOptions(app, PrunedFor(hostile), *options), Error) << hostile;
     EXPECT_EQ(json, "");
     EXPECT_FALSE(force);
   }
@@ -131,7 +153,7 @@ TEST(UseStoredArguments, TakesOptionsOfRenderingAndNothingElse) {
     CLI::App app;
     const auto options = AddRenderOptions(app);
     app.parse(std::vector<std::string>{"7", "--views"});  // CLI11's order
-    UseStoredArguments(app, PrunedFor(RenderOptionArguments(stored)), *options);
+    UseStoredOptions(app, PrunedFor(ToJson(stored)), *options);
     RenderOptions expected = stored;
     expected.views = 7;
     EXPECT_EQ(*options, expected);

@@ -2,6 +2,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/sweep_facts.h"
+#include "pipeline/detail/depth/effort_json.h"
 #include "cli/sweep_store.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"

@@ -159,7 +159,7 @@ TEST_F(OsgViewerTest, ShowsASetWhoseNameEndsWithASlash) {
 TEST_F(OsgViewerTest, FindsASetOnItsPathAndDrawsItAsItWasPrunedFor) {
   const fs::path file = folder_ / "scene.dtr/set.json";
   nlohmann::json json = nlohmann::json::parse(ReadFile(file, 1 << 20));
-  json["pruned"]["render_arguments"] = {"--method", "two-pass", "--resolution", "12"};
+  json["pruned"]["render"] = {{"method", "two-pass"}, {"resolution", 12}};
   WriteFileAtomically(file, json.dump());
   RenderOptions pruned;
   pruned.method = RenderMethod::kTwoPass;

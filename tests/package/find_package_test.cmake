@@ -1,6 +1,6 @@
 # cmake -D BUILD=... -D SOURCE=... -D WORK=... -D DTR=... -P find_package_test.cmake
-# Installs the build into an empty prefix and makes a program of five lines against nothing but that prefix;
-# it lists the views of a set that the installed `dtr` wrote. The man page and the completion are there too.
+# Installs the build into an empty prefix and builds examples/ against nothing but that prefix;
+# they use a set that the installed `dtr` wrote. The man page and the completion are there too.
 function(run)
   execute_process(COMMAND ${ARGN} RESULT_VARIABLE code OUTPUT_VARIABLE output ERROR_VARIABLE output)
   if(NOT code EQUAL 0)
@@ -18,15 +18,31 @@ foreach(file bin/dtr share/man/man1/dtr.1.gz share/bash-completion/completions/d
   endif()
 endforeach()
 
-run(${CMAKE_COMMAND} -S ${SOURCE}/user -B ${WORK}/user -G Ninja -D CMAKE_PREFIX_PATH=${prefix}
+# Headers that call themselves internal stay at home, and no public one includes such a header.
+file(GLOB_RECURSE internal ${prefix}/include/*/pipeline/detail/*)
+if(internal)
+  message(FATAL_ERROR "expected no internal header to be installed, found ${internal}")
+endif()
+
+run(${CMAKE_COMMAND} -S ${EXAMPLES} -B ${WORK}/examples -G Ninja -D CMAKE_PREFIX_PATH=${prefix}
   -D CMAKE_FIND_USE_PACKAGE_REGISTRY=OFF)
-run(${CMAKE_COMMAND} --build ${WORK}/user)
+run(${CMAKE_COMMAND} --build ${WORK}/examples)
 
 run(${prefix}/bin/dtr dataset make plane -o ${WORK}/plane --views 3 --width 64 --height 48)
 run(${prefix}/bin/dtr import --cameras ${WORK}/plane/cameras.json --images ${WORK}/plane/images
   --depth ${WORK}/plane/depth -o ${WORK}/plane.dtr)
-run(${WORK}/user/views ${WORK}/plane.dtr)
-if(NOT output STREQUAL "0000.jpg\n0001.jpg\n0002.jpg\n")
-  message(FATAL_ERROR "views: expected three photos, found\n${output}")
+run(${WORK}/examples/render_path ${WORK}/plane.dtr ${WORK}/path)
+if(NOT EXISTS ${WORK}/path/000011.png OR NOT output MATCHES "000011.png: [0-9.]+ % seen")
+  message(FATAL_ERROR "render_path: expected 12 images, found\n${output}")
+endif()
+run(${WORK}/examples/point_cloud ${WORK}/plane.dtr 0001 ${WORK}/cloud.ply)
+if(NOT output MATCHES "cloud.ply: 3[0-9][0-9][0-9] points")
+  message(FATAL_ERROR "point_cloud: expected a point for every pixel of 64 x 48, found\n${output}")
+endif()
+# Photos to set needs COLMAP and minutes; here it must link, and say what it wants.
+execute_process(COMMAND ${WORK}/examples/photos_to_set ${WORK}/nothing ${WORK}/x.dtr
+  RESULT_VARIABLE code ERROR_VARIABLE output)
+if(NOT code EQUAL 1 OR NOT output MATCHES "nothing: expected")
+  message(FATAL_ERROR "photos_to_set: expected an error about its folder, found ${code}: ${output}")
 endif()
 file(REMOVE_RECURSE ${WORK})

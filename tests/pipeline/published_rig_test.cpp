@@ -8,10 +8,10 @@
 #include <cstdio>
 #include <sstream>
 
-#include "calib/judge/free_running.h"
-#include "calib/judge/judge.h"
+#include "calib/validation/free_running.h"
+#include "calib/validation/boards.h"
 #include "dtr/base/files.h"
-#include "pipeline/detail/boards/rig_photos.h"
+#include "pipeline/rig_photos.h"
 #include "tests/support/test_data.h"
 
 namespace dtr::calib {
@@ -63,14 +63,14 @@ std::vector<RigCamera> Published(const std::vector<pipeline::RigPhotoCamera>& ca
   return published;
 }
 
-double ValueOf(const JudgeReport& report, const std::string& name) {
+double ValueOf(const BoardValidation& report, const std::string& name) {
   const auto found = std::find_if(report.tests.begin(), report.tests.end(),
                                   [&](const Check& test) { return test.name == name; });
   EXPECT_NE(found, report.tests.end()) << name;
   return found == report.tests.end() ? std::nan("") : found->value;
 }
 
-double RmsOf(const JudgeReport& report) { return ValueOf(report, "unseen_rms_px"); }
+double RmsOf(const BoardValidation& report) { return ValueOf(report, "unseen_rms_px"); }
 
 class PublishedRig : public ::testing::Test {
  protected:
@@ -96,7 +96,7 @@ TEST_F(PublishedRig, ItsLensesExplainOurCornersAsWellAsOurOwn) {
     }
     RigCamera alone = published_[c];
     alone.cam_from_rig = {};
-    const JudgeReport report = Judge({board_, {alone}, {}, 0, true}, own, {});
+    const BoardValidation report = ValidateBoards({board_, {alone}, {}, 0, true}, own, {});
     const double ratio = ValueOf(report, "unseen_rms_ratio");
     std::printf(
         "%s: RMS %.3f px, %.2f of our own sigma, lenses differ by %.1f sigmas, ours is "
@@ -106,7 +106,7 @@ TEST_F(PublishedRig, ItsLensesExplainOurCornersAsWellAsOurOwn) {
     EXPECT_LT(RmsOf(report), 0.2);
     EXPECT_LT(ratio, 1.25);  // 1.20 was seen; another lens leaves several times as much
     // Boards in the middle alone leave the rest of the lens open, and that is said.
-    EXPECT_GT(ValueOf(report, "projection_uncertainty_px"), JudgeLimits{}.max_uncertainty_px);
+    EXPECT_GT(ValueOf(report, "projection_uncertainty_px"), BoardLimits{}.max_uncertainty_px);
   }
 }
 
@@ -120,8 +120,8 @@ TEST_F(PublishedRig, ItsPlacesAreOursToAHundredthAndTheClocksAreWhatIsWrong) {
   options.free_lenses = false;
   const size_t frames = photos_.frames.size();
   const RigSolution ours = SolveRig(board_, inputs, photos_.views, frames, options);
-  const JudgeReport theirs =
-      Judge({board_, published_, {}, 0, false}, UnseenViews{photos_.views, frames}, {});
+  const BoardValidation theirs =
+      ValidateBoards({board_, published_, {}, 0, false}, UnseenViews{photos_.views, frames}, {});
   std::printf("RMS with the published places %.3f px, with ours %.3f px\n", RmsOf(theirs),
               ours.rms_px);
   EXPECT_LT(RmsOf(theirs), 1.05 * ours.rms_px);
@@ -143,7 +143,7 @@ TEST_F(PublishedRig, ItsPlacesAreOursToAHundredthAndTheClocksAreWhatIsWrong) {
       free.solution.rms_px, free.passes, unsteady.amplitude_px, unsteady.p);
   EXPECT_LT(free.solution.rms_px, 0.7 * ours.rms_px);
   EXPECT_LT(unsteady.p, 1e-12);
-  EXPECT_GT(unsteady.amplitude_px, JudgeLimits{}.max_pattern_px);
+  EXPECT_GT(unsteady.amplitude_px, BoardLimits{}.max_pattern_px);
 }
 
 }  // namespace

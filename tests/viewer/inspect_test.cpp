@@ -62,7 +62,7 @@ TEST_F(Inspect, DrawsByTheSetsOwnOptions) {
   std::filesystem::copy(Set(), In("s.dtr"), std::filesystem::copy_options::recursive);
   DtrOk({"inspect", In("s.dtr"), "-o", In("usual.html")});
   nlohmann::json json = nlohmann::json::parse(Text(In("s.dtr/set.json")));
-  json["pruned"]["render_arguments"] = {"--views", "1"};
+  json["pruned"]["render"] = {{"views", 1}};
   WriteFileAtomically(In("s.dtr/set.json"), json.dump());
   DtrOk({"inspect", In("s.dtr"), "-o", In("pruned.html")});
   EXPECT_NE(Text(In("usual.html")), Text(In("pruned.html")));

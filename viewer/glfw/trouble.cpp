@@ -8,7 +8,7 @@ namespace dtr::viewer {
 std::string Said(const std::exception& error) {
   if (dynamic_cast<const std::bad_alloc*>(&error) != nullptr) {
     return "memory: expected enough for this, found too little; close other programs, or begin "
-           "with a smaller --memory or --size";
+           "with less memory for the views or a smaller window";
   }
   if (const auto* of_files = dynamic_cast<const std::filesystem::filesystem_error*>(&error)) {
     return of_files->path1().string() +

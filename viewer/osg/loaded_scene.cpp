@@ -9,7 +9,7 @@
 #include "dtr/base/parallel_for.h"
 #include "dtr/io/pruned.h"
 #include "dtr/io/set_io.h"
-#include "dtr/render/option_arguments.h"
+#include "dtr/render/stored_options.h"
 
 namespace osgDTR {
 namespace {
@@ -86,8 +86,8 @@ std::shared_ptr<const LoadedSet> MakeSet(dtr::DtrSet set) {
     bounds[k] = BoundsOf(*views[k]);
   });
   for (const osg::BoundingBox& one : bounds) loaded->bounds.expandBy(one);
-  loaded->defaults = dtr::WithArguments({}, dtr::io::RenderArguments(loaded->instants.front().set),
-                                        "set.json: pruned.render_arguments");
+  const auto stored = dtr::io::RenderOptionsOf(loaded->instants.front().set);
+  loaded->defaults = dtr::WithStoredOptions({}, stored.json, stored.where);
   return loaded;
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dtr/base/error.h"
+#include "dtr/base/lower_case.h"
 #include "dtr/io/depth_io.h"
 #include "dtr/io/formats/cameras_json.h"
 #include "dtr/io/formats/npy.h"
@@ -21,13 +22,6 @@ Grid<float> FloatsFromPng16(const std::filesystem::path& file, std::uint64_t lim
   Grid<float> numbers(codes.width(), codes.height());
   std::copy(codes.data().begin(), codes.data().end(), numbers.data().begin());
   return numbers;
-}
-
-std::string LowerExtension(const std::filesystem::path& file) {
-  std::string extension = file.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension;
 }
 
 // numpy's arrays of one image: rows and columns, with or without an axis of length 1.

@@ -70,7 +70,7 @@ BoardInSet FindBoard(const std::filesystem::path& folder, const DtrSet& set,
   }
   if (in_set.sights.size() >= kFewestViews) return in_set;
   throw Error(fmt::format(
-      "--board {}: expected it in {} views of {} or more, found it in {} of {}{}",
+      "`board` {}: expected it in {} views of {} or more, found it in {} of {}{}",
       calib::TextOf(board), kFewestViews, folder.string(), in_set.sights.size(), views.size(),
       in_set.without.empty() ? ""
                              : fmt::format("; {} says: {}", in_set.without.front().name,

@@ -16,7 +16,7 @@
 #include "dtr/io/formats/cameras_json.h"
 #include "dtr/io/formats/llff.h"
 #include "dtr/io/formats/transforms_json.h"
-#include "pipeline/detail/cameras/camera_distortion.h"
+#include "pipeline/detail/import/camera_distortion.h"
 #include "pipeline/detail/photos/named_files.h"
 #include "pipeline/detail/photos/names_of_photos.h"
 
@@ -210,7 +210,7 @@ PosesFile FromTransforms(const std::vector<io::SizedImage>& images, const captur
   }
   if (read.held_out && !read.held_out->empty()) {
     file.notes.push_back(
-        fmt::format("{}: {} frames are for testing by its lists, which --holdout "
+        fmt::format("{}: {} frames are for testing by its lists, which `holdout` "
                     "decides here",
                     poses.string(), read.held_out->size()));
   }
@@ -235,7 +235,7 @@ PosesFile ReadPoses(const capture::Capture& capture, const fs::path& poses) {
   }
   if (poses.extension() == ".npy") return {io::ReadLlff(poses, std::move(images)).list, {}};
   throw UsageError(
-      fmt::format("--poses {}: expected the folder of a COLMAP model, a cameras.json, a "
+      fmt::format("`poses` {}: expected the folder of a COLMAP model, a cameras.json, a "
                   "transforms.json or a poses_bounds.npy",
                   poses.string()));
 }

@@ -43,7 +43,7 @@ void Remark(const calib::Refined& refined, PhotoRefinement& out) {
 void HoldMetres(const capture::Capture& capture, const CalibrateOptions& options,
                 const calib::RefineOptions& refine, Json& report, PhotoRefinement& out) {
   const PhotoPlaces places = PhotoPlacesOf(capture, calib::ImageNames(out.model));
-  if (options.metres.gps) RequirePlaces(places, "--gps", "those with a camera");
+  if (options.metres.gps) RequirePlaces(places, "`gps`", "those with a camera");
   RefinedInMetres refined = RefineInMetres(out.model, options.metres, places, refine);
   report["bundle_adjustment"] = Json::parse(refined.json);
   out.model = std::move(refined.refined.model);

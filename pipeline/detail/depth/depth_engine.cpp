@@ -62,10 +62,10 @@ std::unique_ptr<stereo::Engine> MakeColmapEngine(const fs::path& given, const De
 void RequireEngine(const DepthChoice& choice) {
   if (!choice.workspace.empty() && choice.engine != "colmap") {
     throw UsageError(
-        fmt::format("--workspace: is read by --engine colmap, found --engine {}", choice.engine));
+        fmt::format("`workspace`: is read by `engine` colmap, found `engine` {}", choice.engine));
   }
   if (choice.time_budget_s && choice.engine != "patchmatch") {
-    throw UsageError(fmt::format("--time-budget: picks settings of --engine patchmatch, found {}",
+    throw UsageError(fmt::format("`time_budget`: picks settings of `engine` patchmatch, found {}",
                                  choice.engine));
   }
   if (choice.engine == "colmap" && choice.workspace.empty()) colmap::RequireCuda();

@@ -60,8 +60,8 @@ void ComputeWithin(const std::optional<double>& memory_gb, stereo::DepthMapsOpti
         1e3;
     if (memory_gb) {
       throw UsageError(fmt::format(
-          "--memory {}: expected at least {:.3f} (GB) for a view with its neighbours; give as "
-          "much, fewer --neighbours or smaller images",
+          "`memory` {}: expected at least {:.3f} (GB) for a view with its neighbours; give as "
+          "much, fewer `neighbours` or smaller images",
           *memory_gb, least_gb));
     }
     progress.Note(
@@ -181,7 +181,7 @@ stereo::Effort DepthStage(DtrSet& set, const SparseScene& sparse, const DepthCho
                           const stereo::Effort& asked, const DepthStageOptions& options,
                           io::SetWriter& writer, Progress& progress) {
   if (choice.engine == "none") {
-    progress.Note("depth left out: --engine none");
+    progress.Note("depth left out: `engine` none");
     return asked;
   }
   std::vector<View>& views = set.frames.front().views;
@@ -207,7 +207,7 @@ stereo::Effort DepthStage(DtrSet& set, const SparseScene& sparse, const DepthCho
                                     : asked;
   if (!options.normals.empty() && (choice.engine != "patchmatch" || effort.rounds == 0)) {
     throw UsageError(
-        "--normals: expected --engine patchmatch with one round or more, whose planes they are of");
+        "`normals`: expected `engine` patchmatch with one round or more, whose planes they are of");
   }
   const auto engine = MakeDepthEngine(choice, effort,
                                       {views, sources.indices, sources.stereo, &scene,

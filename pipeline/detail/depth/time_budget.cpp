@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "pipeline/detail/depth/effort_json.h"
 #include "dtr/base/files.h"
 #include "stereo/widen.h"
 
@@ -108,7 +109,7 @@ ProbedCosts ProbeCosts(const stereo::Collection& c, int view) {
   }
   costs.round_s =
       SecondsOf([&] { engine->Refine(views, 0, others, range, pointers, 1, c.options); });
-  costs.verdict_s = SecondsOf([&] { engine->Judge(views, 0, others, range, pointers, c.options); });
+  costs.verdict_s = SecondsOf([&] { engine->ValidateBoards(views, 0, others, range, pointers, c.options); });
   const double pixels = PixelsOf(small[0].camera);
   const double available = static_cast<double>(others.size());
   const double searched = std::min<double>(kProbeEffort.neighbours, available);

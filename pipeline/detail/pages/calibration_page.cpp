@@ -19,9 +19,9 @@ constexpr double kSamePx = 1e-3;  // a map of less than that shows rounding
 
 PlotSize SizeOf(const calib::LensCamera& lens) { return {lens.width_px, lens.height_px}; }
 
-void AddCameraTable(report::HtmlReport& page, const calib::JudgeReport& judged) {
+void AddCameraTable(report::HtmlReport& page, const calib::BoardValidation& judged) {
   std::vector<std::vector<report::Cell>> rows;
-  for (const calib::JudgedCamera& camera : judged.cameras) {
+  for (const calib::ValidatedCamera& camera : judged.cameras) {
     for (const auto& [what, stats] :
          {std::pair{judged.unseen ? "unseen, boards refitted" : "kept, boards refitted",
                     &camera.stored},
@@ -55,11 +55,11 @@ int PutsBack(calib::PhotoRotation rotation) {
 }
 
 void AddWorstViews(report::HtmlReport& page, const calib::LensCamera& lens,
-                   const calib::JudgedCamera& camera, const std::optional<fs::path>& images) {
+                   const calib::ValidatedCamera& camera, const std::optional<fs::path>& images) {
   const PlotSize size = SizeOf(lens);
   const double gain = ArrowGain(size, camera.stored);
   for (size_t i = 0; i < std::min(kWorstViews, camera.views.size()); ++i) {
-    const calib::JudgedView& view = camera.views[i];
+    const calib::ValidatedView& view = camera.views[i];
     std::string behind;
     if (images && fs::is_regular_file(*images / view.name)) {
       try {
@@ -79,7 +79,7 @@ void AddWorstViews(report::HtmlReport& page, const calib::LensCamera& lens,
 
 }  // namespace
 
-std::string CalibrationPage(const calib::Calibration& calibration, const calib::JudgeReport& judged,
+std::string CalibrationPage(const calib::Calibration& calibration, const calib::BoardValidation& judged,
                             const std::string& title, const std::optional<fs::path>& images) {
   report::HtmlReport page(title);
   page.Verdict(judged.passed(), judged.passed() ? "The calibration passed its tests"
@@ -88,11 +88,11 @@ std::string CalibrationPage(const calib::Calibration& calibration, const calib::
   report::AddChecks(page, judged.tests);
   AddCameraTable(page, judged);
   for (size_t c = 0; c < judged.cameras.size(); ++c) {
-    const calib::JudgedCamera& camera = judged.cameras[c];
+    const calib::ValidatedCamera& camera = judged.cameras[c];
     const calib::LensCamera& lens = calibration.cameras[c].camera;
     page.Section("Camera " + camera.name);
     std::vector<calib::ResidualArrow> all;
-    for (const calib::JudgedView& view : camera.views) {
+    for (const calib::ValidatedView& view : camera.views) {
       all.insert(all.end(), view.arrows.begin(), view.arrows.end());
     }
     const PlotSize size = SizeOf(lens);

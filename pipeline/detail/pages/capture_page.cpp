@@ -87,7 +87,8 @@ CaptureLook LookAt(const capture::Capture& capture, const std::string& title, in
   page.Paragraph(
       "Sharpness is the variance of the 4-neighbour Laplacian over the variance of the brightness: "
       "compare it between photos of one camera. Overexposed: a channel at 254 or 255; "
-      "underexposed: all at 0 or 1. Photos with remarks are kept unless --drop says otherwise.");
+      "underexposed: all at 0 or 1. Photos with remarks are used unless the capture was made "
+      "without them.");
   if (!faulty.empty()) {
     page.Section("Worth a look");
     page.Table(header, faulty);

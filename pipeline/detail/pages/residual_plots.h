@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "calib/judge/projection.h"
-#include "calib/validate.h"
+#include "calib/validation/projection.h"
+#include "calib/validation/reprojection.h"
 #include "dtr/report/html.h"
 #include "dtr/types/grid.h"
 

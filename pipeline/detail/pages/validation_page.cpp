@@ -197,8 +197,8 @@ std::string ValidationPage(const fs::path& folder, const DtrSet& set,
                                                 : "The calibration broke at least one test");
   page.Section("Can the calibration be trusted?");
   report::AddChecks(page, report.tests);
-  if (!report.not_judged.empty()) {
-    page.Paragraph("Not judged by a fresh bundle adjustment: " + report.not_judged);
+  if (!report.not_validated.empty()) {
+    page.Paragraph("Not judged by a fresh bundle adjustment: " + report.not_validated);
   }
   AddViewTable(page, views, report);
   page.Section("Residuals by region of the image, all views");

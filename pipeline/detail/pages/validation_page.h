@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <string>
 
-#include "calib/validate.h"
+#include "calib/validation/reprojection.h"
 #include "dtr/types/dtr_set.h"
 
 namespace dtr::pipeline {

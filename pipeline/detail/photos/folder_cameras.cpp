@@ -64,7 +64,7 @@ std::string LineFor(const calib::SharedCameras& result, const Registered& regist
   const std::string focal = FocalLengths(result.model, registered, result.groups);
   if (!not_tested.empty()) {
     return line + fmt::format(
-                      "separate intrinsics per folder, not tested: {} ({}); --camera-per set "
+                      "separate intrinsics per folder, not tested: {} ({}); `camera_per` set "
                       "has them share",
                       not_tested, focal);
   }

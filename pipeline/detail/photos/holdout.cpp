@@ -20,7 +20,7 @@ int ParseEvery(const std::string& spec) {
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), n);
   if (error != std::errc() || end != digits.data() + digits.size() || n < 2) {
     throw UsageError(fmt::format(
-        "--holdout {}: expected every:N with a whole number N >= 2, found '{}'", spec, digits));
+        "`holdout` {}: expected every:N with a whole number N >= 2, found '{}'", spec, digits));
   }
   return n;
 }
@@ -35,7 +35,7 @@ void MarkNamed(const std::string& spec, std::span<const std::string> names,
       held_out[i] = found = true;
     }
     if (!found) {
-      throw UsageError(fmt::format("--holdout: no photo is named '{}'; the first is '{}'", wanted,
+      throw UsageError(fmt::format("`holdout`: no photo is named '{}'; the first is '{}'", wanted,
                                    names.empty() ? "" : names.front()));
     }
   }
@@ -63,7 +63,7 @@ std::vector<bool> ChooseHeldOut(const std::string& spec, std::span<const std::st
   const auto left = std::count(held_out.begin(), held_out.end(), false);
   if (left < 2) {
     throw UsageError(
-        fmt::format("--holdout {}: expected at least 2 photos to build from, found {} of {}", spec,
+        fmt::format("`holdout` {}: expected at least 2 photos to build from, found {} of {}", spec,
                     left, names.size()));
   }
   return held_out;

@@ -23,7 +23,7 @@ int ParseSide(const std::string& size, const std::string& digits) {
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), side);
   if (error != std::errc() || end != digits.data() + digits.size() || side < 0 ||
       side > kLargestSidePx) {
-    throw UsageError(fmt::format("--size {}: expected WxH in pixels, each 0 to {}, found '{}'",
+    throw UsageError(fmt::format("`size` {}: expected WxH in pixels, each 0 to {}, found '{}'",
                                  size, kLargestSidePx, digits));
   }
   return side;
@@ -78,12 +78,12 @@ PinholeCamera WithSize(const PinholeCamera& camera, const std::string& size) {
   if (size.empty()) return camera;
   const size_t x = size.find('x');
   if (x == std::string::npos) {
-    throw UsageError(fmt::format("--size {}: expected WxH, such as 1280x720", size));
+    throw UsageError(fmt::format("`size` {}: expected WxH, such as 1280x720", size));
   }
   int width = ParseSide(size, size.substr(0, x));
   int height = ParseSide(size, size.substr(x + 1));
   if (width == 0 && height == 0) {
-    throw UsageError(fmt::format("--size {}: expected at least one side above 0", size));
+    throw UsageError(fmt::format("`size` {}: expected at least one side above 0", size));
   }
   const double aspect = static_cast<double>(camera.width_px()) / camera.height_px();
   if (width == 0) width = std::max(1, static_cast<int>(std::lround(height * aspect)));
@@ -100,7 +100,7 @@ std::vector<NovelFrame> NovelFrames(const DtrSet& set, const NovelCameraRequest&
     cameras = FromFile(set, request.camera_file);
     if (cameras.size() > 1) {
       throw UsageError(
-          fmt::format("--camera {}: expected one camera, found {}; give --path for several",
+          fmt::format("`camera` {}: expected one camera, found {}; give `path` for several",
                       request.camera_file.string(), cameras.size()));
     }
   } else if (!request.path_file.empty()) {
@@ -111,7 +111,7 @@ std::vector<NovelFrame> NovelFrames(const DtrSet& set, const NovelCameraRequest&
       cameras.push_back({fmt::format("{:06}", index++), step.camera, step.cam_from_world});
     }
   } else {
-    throw UsageError("expected one of --like, --camera, --path and --fly-through");
+    throw UsageError("expected one of `like`, `camera`, `path` and `fly_through`");
   }
   for (NovelFrame& camera : cameras) camera.camera = WithSize(camera.camera, request.size);
   return cameras;

@@ -77,7 +77,7 @@ void RecodeDepth(DtrSet& set, double error_px, io::SetWriter& writer, int thread
     View loaded = Loaded(view, writer, false, 1);
     if (!io::TrySetDepthError(loaded, error_px * ThresholdsOf(loaded, {}).pixel)) {
       throw Error(fmt::format(
-          "--depth-error {}: {}: expected a bound that 16 bits can keep over its depths of {:.4g} "
+          "`depth_error` {}: {}: expected a bound that 16 bits can keep over its depths of {:.4g} "
           "to {:.4g}; allow a larger one",
           error_px, view.name, view.near_z, view.far_z));
     }

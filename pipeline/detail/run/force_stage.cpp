@@ -43,7 +43,7 @@ void ForgetStage(const fs::path& folder, const std::string& name) {
                                  [&](const KeptStage& kept) { return kept.stage == name; });
   if (from == all.end()) {
     throw UsageError(
-        fmt::format("--force-stage {}: expected one of {}", name, fmt::join(StagesKept(), ", ")));
+        fmt::format("`force_stage` {}: expected one of {}", name, fmt::join(StagesKept(), ", ")));
   }
   // Later stages first: should this be cut off, what is left is the work of an earlier moment.
   for (auto kept = all.end(); kept-- != from;) {

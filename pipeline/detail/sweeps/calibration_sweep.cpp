@@ -8,7 +8,7 @@
 #include "calib/colmap/matching.h"
 #include "calib/colmap/pairs.h"
 #include "calib/colmap/program.h"
-#include "calib/yardstick/score.h"
+#include "calib/reference_tracks/score.h"
 #include "capture/duplicates.h"
 #include "capture/ingest.h"
 #include "dtr/base/error.h"
@@ -50,7 +50,7 @@ void RequirePhotosOfTheSet(const CalibrationSweepOptions& options,
       continue;
     }
     throw Error(
-        fmt::format("--photos {}: expected the photos that {} was built from, found none called {}",
+        fmt::format("`photos` {}: expected the photos that {} was built from, found none called {}",
                     options.photos.string(), options.set.string(), view.name));
   }
 }
@@ -65,7 +65,7 @@ std::vector<calib::Track> YardstickOf(const capture::Capture& photos, const fs::
   auto tracks = calib::FindTracks(static_cast<int>(photos.photos.size()), read, threads, progress);
   if (tracks.size() < calib::kFewestHeldOut) {
     throw Error(fmt::format(
-        "--photos {}: expected {} points that {} or more photos show, to judge cameras by, found "
+        "`photos` {}: expected {} points that {} or more photos show, to judge cameras by, found "
         "{}; take photos that overlap more",
         folder.string(), calib::kFewestHeldOut, calib::kFewestSights, tracks.size()));
   }

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "calib/yardstick/tracks.h"
+#include "calib/reference_tracks/tracks.h"
 #include "capture/photo.h"
 #include "dtr/base/progress.h"
 #include "dtr/eval/sweep.h"

@@ -6,10 +6,10 @@
 #include <utility>
 #include <vector>
 
-#include "calib/bundle/judge.h"
-#include "calib/validate.h"
+#include "calib/validation/photos.h"
+#include "calib/validation/reprojection.h"
 #include "tests/calib/bundle/synthetic_bundle.h"
-#include "tests/calib/sabotage_tally.h"
+#include "tests/calib/fault_tally.h"
 
 namespace dtr::testing {
 
@@ -172,7 +172,7 @@ inline std::vector<Check> ValidationOf(const calib::Bundle& bundle, double noise
       calib::ValidateReprojection(cameras, poses, scene, limits, names, 1).tests;
   calib::BundleLimits judge;
   judge.max_picture_shift_px *= scale;
-  const calib::Judgement judgement = calib::Judge(bundle, judge, 1);
+  const calib::PhotosValidation judgement = calib::ValidatePhotos(bundle, judge, 1);
   tests.insert(tests.end(), judgement.tests.begin(), judgement.tests.end());
   return tests;
 }

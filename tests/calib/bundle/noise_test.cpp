@@ -38,7 +38,7 @@ TEST(NoiseSweep, FaultsFailAtEveryNoise) {
       EXPECT_FALSE(AllPassed(tests)) << NameOf(fault) << ", noise " << noise_px << " px";
       // For the right reason: what was found, not that nothing could be.
       for (const Check& test : tests) {
-        if (test.name == "photos_not_judged") {
+        if (test.name == "photos_not_validated") {
           EXPECT_TRUE(test.passed)
               << NameOf(fault) << ", noise " << noise_px << ": " << test.reason;
         }
@@ -81,7 +81,7 @@ TEST(NoiseSweep, SomePhotosMayBeExactAndOthersRounded) {
 TEST(NoiseSweep, AnOrbitAtOneHeightLeavesIntrinsicsOpenAndSaysSo) {
   const auto names = [](SceneKind kind, double noise_px) {
     std::string found;
-    for (const Degeneracy& d : Judge(NoisyScene(kind, noise_px, 15, 150), {}, 1).degeneracies) {
+    for (const Degeneracy& d : ValidatePhotos(NoisyScene(kind, noise_px, 15, 150), {}, 1).degeneracies) {
       found += d.name + (d.harmful ? " harmful " : " ");
     }
     return found;

@@ -7,7 +7,7 @@
 #include "calib/bundle/lens_patterns.h"
 #include "calib/bundle/shutter.h"
 #include "calib/residual_patterns.h"
-#include "tests/calib/bundle/sabotage.h"
+#include "tests/calib/bundle/injected_faults.h"
 
 namespace dtr::calib {
 namespace {
@@ -117,7 +117,7 @@ TEST(Patterns, AWavyLensIsSeenByRegions) {
   const Patterns patterns = PatternsOf(bundle);
   EXPECT_LT(patterns.regional.fit.p, 1e-10);
   EXPECT_GT(patterns.regional.fit.amplitude_px, 0.3);
-  const Judgement judgement = Judge(bundle, {});
+  const PhotosValidation judgement = ValidatePhotos(bundle, {});
   const auto test = std::find_if(judgement.tests.begin(), judgement.tests.end(),
                                  [](const Check& c) { return c.name == "regional_pattern_px"; });
   ASSERT_NE(test, judgement.tests.end());

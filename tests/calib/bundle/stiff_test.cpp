@@ -10,7 +10,7 @@
 #include <numbers>
 
 #include "calib/bundle/gauge.h"
-#include "calib/bundle/judge.h"
+#include "calib/validation/photos.h"
 #include "calib/triangulate.h"
 #include "tests/calib/bundle/synthetic_bundle.h"
 
@@ -120,8 +120,8 @@ void ExpectHarmless(const Held& held, const char* name) {
   EXPECT_FALSE(found->harmful) << found->detail;
 }
 
-Judgement ExpectNamed(const Bundle& bundle, std::initializer_list<const char*> names) {
-  const Judgement judgement = Judge(bundle, {});
+PhotosValidation ExpectNamed(const Bundle& bundle, std::initializer_list<const char*> names) {
+  const PhotosValidation judgement = ValidatePhotos(bundle, {});
   EXPECT_FALSE(AllPassed(judgement.tests));
   for (const Check& test : judgement.tests) EXPECT_FALSE(std::isnan(test.value)) << test.name;
   EXPECT_TRUE(std::ranges::any_of(names, [&](const char* name) {
@@ -293,7 +293,7 @@ TEST(Stiff, TwoIdenticalCamerasAmongOthersGiveTheTruth) {
 TEST(Stiff, TheSamePhotoTwiceAmongOthersIsNamed) {
   Bundle bundle = MakeBundle(WithTheSameCameraTwice());  // no noise: the same sights
   bundle.images[0].name = "first.jpg", bundle.images[1].name = "again.jpg";
-  const Judgement judgement = ExpectNamed(bundle, {"duplicate_images"});
+  const PhotosValidation judgement = ExpectNamed(bundle, {"duplicate_images"});
   EXPECT_EQ(Find(judgement.degeneracies, "duplicate_images")->detail, "first.jpg = again.jpg");
 }
 

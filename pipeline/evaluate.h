@@ -1,0 +1,35 @@
+// pipeline/evaluate.h -- how good a set is: by photos it was not made from, and against true depth.
+#pragma once
+#include <filesystem>
+#include <functional>
+#include <optional>
+
+#include "dtr/base/progress.h"
+#include "dtr/eval/depth_truth.h"
+#include "dtr/eval/held_out.h"
+#include "dtr/render/options.h"
+
+namespace dtr::pipeline {
+
+struct EvaluateRequest {
+  std::filesystem::path set;
+  bool leave_one_out = false;      ///< every source view in turn, instead of the held-out ones
+  std::filesystem::path truth;     ///< folder with cameras.json and depth/; empty: no depth scores
+  std::filesystem::path pictures;  ///< folder for rendering | photo | difference; empty: none
+  RenderOptions render;
+  int threads = 0;
+};
+
+struct EvaluateResult {
+  eval::EvaluationReport views;
+  std::optional<eval::DepthScores> depth;  ///< where there is truth
+};
+
+/// Renders every held-out view and compares it with its photo. `make_renderer` is called once, if
+/// there is anything to render. Throws UsageError where there is nothing to measure, Error for a
+/// broken set or truth.
+EvaluateResult Evaluate(const EvaluateRequest& request,
+                        const std::function<eval::RenderFunction()>& make_renderer,
+                        Progress& progress);
+
+}  // namespace dtr::pipeline

@@ -1,0 +1,149 @@
+#include "pipeline/render.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+
+#include "dtr/base/error.h"
+#include "dtr/base/files.h"
+#include "dtr/base/lower_case.h"
+#include "dtr/io/depth_io.h"
+#include "dtr/io/image_io.h"
+#include "dtr/io/set_io.h"
+#include "dtr/io/video.h"
+#include "dtr/render/instants.h"
+#include "dtr/render/scene.h"
+#include "dtr/render/view_stream.h"
+#include "pipeline/detail/render/dynamic_scene.h"
+#include "pipeline/detail/render/novel_frames.h"
+
+namespace dtr::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Writes frames where the output says: one image, a folder of images, or a video.
+class FrameSink {
+ public:
+  FrameSink(const fs::path& output, bool several) : output_(output), several_(several) {
+    if (output.extension() == ".mp4") {
+      video_.emplace(output, io::kVideoFramesPerSecond);
+    } else if (several) {
+      fs::create_directories(output);
+    }
+  }
+  std::string Add(const NovelFrame& camera, const RenderResult& result, bool filled) {
+    if (video_) {
+      video_->Add(result.image);
+      return output_.string();
+    }
+    const fs::path file = several_ ? output_ / (camera.name + ".png") : output_;
+    // What no view saw is black with alpha 0, unless it was filled.
+    if (filled || LowerExtension(file) != ".png") {
+      io::WriteImage(file, result.image);
+    } else {
+      io::WriteImageWithAlpha(file, result.image, result.coverage);
+    }
+    return file.string();
+  }
+  void Finish(const Progress& progress) {
+    if (video_) video_->Finish(progress);
+  }
+
+ private:
+  fs::path output_;
+  bool several_;
+  std::optional<io::VideoWriter> video_;
+};
+
+void RequireOneOutput(const RenderRequest& request) {
+  if (!request.several()) return;
+  if (!request.depth_out.empty() || !request.coverage_out.empty()) {
+    throw UsageError("`depth_out`, `coverage_out`: expected one camera with them, found several");
+  }
+  const fs::path& output = request.output;
+  if (output.extension() != ".mp4" && !fs::is_directory(output) &&
+      (!output.extension().empty() || fs::exists(output))) {
+    throw UsageError(
+        fmt::format("`output` {}: several frames need a folder or an .mp4 file", output.string()));
+  }
+}
+
+void WritePlanes(const RenderRequest& request, const RenderResult& result) {
+  if (!request.depth_out.empty()) io::WriteExr(request.depth_out, result.depth.grid(), false);
+  if (!request.coverage_out.empty()) io::WriteMask(request.coverage_out, result.coverage);
+}
+
+// When playing, one camera sees every frame of the set.
+std::vector<NovelFrame> CamerasOf(const RenderRequest& request, const DtrSet& set) {
+  std::vector<NovelFrame> cameras =
+      NovelFrames(AtFrame(set, request.frame.value_or(0)), request.cameras);
+  if (!request.play) return cameras;
+  if (cameras.size() != 1 || request.frame) {
+    throw UsageError("`play`: expected `like` or `camera` with it, and no `frame`");
+  }
+  std::vector<NovelFrame> all(set.frames.size(), cameras.front());
+  for (size_t i = 0; i < all.size(); ++i) all[i].name = fmt::format("{:06}", i);
+  return all;
+}
+
+// The frame of the set that rendered frame `i` shows; paths run through time.
+size_t FrameShown(const RenderRequest& request, const DtrSet& set, size_t i, size_t count) {
+  return request.frame ? *request.frame : FrameOfPicture(i, count, set.frames.size());
+}
+
+RenderedFile Facts(const std::string& file, double ms, size_t frame, const RenderScene& scene,
+                   const RenderResult& result) {
+  RenderedFile facts{file, ms, frame, {}, result.coverage_share};
+  for (const int index : result.views_used) {
+    facts.views_used.push_back(scene.views[static_cast<size_t>(index)]->name);
+  }
+  return facts;
+}
+
+}  // namespace
+
+RenderReport Render(const RenderRequest& request, const eval::RenderFunction& draw,
+                    Progress& progress) {
+  const DtrSet described = io::ReadSet(request.set);
+  const auto cameras = CamerasOf(request, described);
+  RequireOneOutput(request);
+  RenderOptions render = request.render;
+  render.threads = request.threads;
+  DynamicScene moving(request.set, described, request.exclude, {request.memory_gb, render.threads},
+                      progress);
+  const auto shown = [&](size_t i) { return FrameShown(request, described, i, cameras.size()); };
+  moving.At(shown(0));  // names are checked here
+
+  RenderReport report;
+  FrameSink sink(request.output, request.several());
+  progress.Stage("rendering", static_cast<int>(cameras.size()));
+  for (size_t i = 0; i < cameras.size(); ++i) {
+    progress.ThrowIfInterrupted();
+    const NovelFrame& novel = cameras[i];
+    ViewStream& stream = moving.At(shown(i));
+    const RenderScene scene =
+        stream.SceneFor(novel.cam_from_world, render, ViewStream::Wait::kForAll);
+    if (i + 1 < cameras.size() && shown(i + 1) == shown(i)) {
+      stream.Prefetch(cameras[i + 1].cam_from_world, render);
+    }
+    const auto start = std::chrono::steady_clock::now();
+    const RenderResult result = draw(scene, novel.camera, novel.cam_from_world, render);
+    const std::chrono::duration<double, std::milli> ms = std::chrono::steady_clock::now() - start;
+    if (result.views_used.empty()) {
+      progress.Note(fmt::format("WARNING: {}: no view is valid for this camera: the image is empty",
+                                novel.name));
+    }
+    const std::string file = sink.Add(novel, result, render.fill_holes);
+    WritePlanes(request, result);
+    report.frames.push_back(Facts(file, ms.count(), shown(i), scene, result));
+    progress.Update(static_cast<int>(i) + 1);
+  }
+  sink.Finish(progress);
+  for (const ViewStream::Lost& lost : moving.lost()) {
+    report.skipped.emplace_back(lost.name, lost.reason);
+  }
+  return report;
+}
+
+}  // namespace dtr::pipeline
