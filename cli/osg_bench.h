@@ -20,7 +20,7 @@ struct OsgRow {
   RenderOptions options;
   int views_used = 0;  ///< most of any frame
   eval::Times gl, gl_cpu, osg, osg_cpu;
-  /// By a renderer that gives its pictures as the node's does: RendererSettings::in_memory.
+  /// By a renderer that gives its images as the node's does: RendererSettings::in_memory.
   eval::Times gl_in_memory, gl_in_memory_cpu;
 };
 
@@ -40,7 +40,7 @@ struct OsgBench {
 };
 
 /// Draws the cameras of `path` one after the other, every frame once by a viewer with the set as
-/// its scene and once each by a gl::Renderer of its own that leaves its pictures in memory and one
+/// its scene and once each by a gl::Renderer of its own that leaves its images in memory and one
 /// that does not, in the same graphics context, in turns, after one lap that is not counted. A
 /// frame is finished when its pixels are. `variants` give a row each; the first also one by the
 /// read-back path, of a few frames. The window is one in memory. Throws Error, one line, where no

@@ -35,7 +35,7 @@ std::string DefaultRenderer();
 /// that must draw with it too. Throws dtr::Error, one line that names --renderer cpu, where the
 /// machine has no OpenGL 4.3: nothing falls back silently. Throws UsageError for a shader folder
 /// that is not there or goes with another renderer. `console` must outlive the renderer: it is told
-/// when memory holds fewer views than a picture asks for.
+/// when memory holds fewer views than an image asks for.
 eval::RenderFunction MakeRenderer(const RendererChoice& choice, Progress& console);
 /// The same, for its frames to be timed.
 std::unique_ptr<eval::TimedRenderer> MakeTimedRenderer(const RendererChoice& choice,

@@ -28,7 +28,7 @@ struct SweptStage {
   std::optional<size_t> cheapest, within_budget;
   std::optional<eval::DefaultVerdict> usual;
   /// Fills in the last five from the points.
-  void ValidateBoards();
+  void FindDefaults();
 };
 
 /// All of a run of `dtr bench`.

@@ -8,7 +8,7 @@
 #include "dtr/base/error.h"
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
-#include "dtr/render/instants.h"
+#include "dtr/render/time_steps.h"
 #include "pipeline/evaluate_depth.h"
 
 namespace dtr::pipeline {
@@ -47,7 +47,7 @@ EvaluateResult Evaluate(const EvaluateRequest& request,
                         Progress& progress) {
   if (fs::exists(request.pictures) && !fs::is_directory(request.pictures)) {
     throw UsageError(
-        fmt::format("`pictures` {}: expected a folder, found a file", request.pictures.string()));
+        fmt::format("`images` {}: expected a folder, found a file", request.pictures.string()));
   }
   const DtrSet set = Load(request, progress);
   EvaluateResult result;

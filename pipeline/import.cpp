@@ -13,7 +13,7 @@
 #include "pipeline/detail/import/camera_files.h"
 #include "pipeline/detail/import/import_photos.h"
 #include "pipeline/detail/import/import_views.h"
-#include "pipeline/detail/run/kept_notes.h"
+#include "pipeline/detail/run/recorded_notes.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -135,7 +135,7 @@ ImportOptions OptionsFor(const ImportRequest& request, CamerasFromFile& cameras,
 }  // namespace
 
 ImportReport Import(ImportRequest request, Progress& listener) {
-  KeptNotes progress(listener);
+  RecordedNotes progress(listener);
   CamerasFromFile cameras =
       ReadCameraFile(request.cameras, request.format,
                      {request.images, request.depth, request.masks, request.allow_missing});

@@ -10,7 +10,7 @@
 
 namespace dtr::pipeline {
 
-/// The calibration with its observations as calib::Judge takes it.
+/// The calibration with its observations as calib::ValidateBoards takes it.
 calib::ValidatedCalibration ToValidate(const calib::Calibration& calibration);
 
 /// A camera from elsewhere (.yml, .yaml of OpenCV or ROS, cameras.txt of COLMAP with one camera),
@@ -33,10 +33,10 @@ struct UnseenPhotos {
 UnseenPhotos ReadUnseen(const calib::Calibration& calibration, const std::filesystem::path& folder,
                         const std::string& pattern, int threads, Progress& progress);
 
-/// The report as a page: verdict and tests, residual vectors, coverage, maps, worst views. Views
-/// are drawn over their photos where `images` has them.
-std::string CalibrationPage(const calib::Calibration& calibration, const calib::BoardValidation& report,
-                            const std::string& title,
+/// The report as a page: validation result and tests, residual vectors, coverage, maps, worst
+/// views. Views are drawn over their photos where `images` has them.
+std::string CalibrationPage(const calib::Calibration& calibration,
+                            const calib::BoardValidation& report, const std::string& title,
                             const std::optional<std::filesystem::path>& images);
 
 }  // namespace dtr::pipeline

@@ -20,7 +20,7 @@ std::vector<ResidualArrow> ArrowsOf(const Board& board, const Rig& rig, const Ri
   return arrows;
 }
 
-void AddResiduals(const Board& board, const Rig& rig, Residuals& out) {
+void AddResiduals(const Board& board, const Rig& rig, BoardResiduals& out) {
   out.by_camera.resize(rig.cameras.size());
   out.arrows.resize(rig.cameras.size());
   for (const RigView& view : rig.views) {
@@ -35,7 +35,7 @@ void AddResiduals(const Board& board, const Rig& rig, Residuals& out) {
   }
 }
 
-double SigmaOf(const Residuals& residuals, size_t frames) {
+double SigmaOf(const BoardResiduals& residuals, size_t frames) {
   const double freedom = 2.0 * residuals.corners - 6.0 * static_cast<double>(frames);
   return freedom > 0 ? std::sqrt(residuals.squares / freedom)
                      : std::numeric_limits<double>::quiet_NaN();

@@ -8,7 +8,7 @@
 namespace dtr::calib {
 
 /// Residuals of a rig whose frames were fitted, by camera; outliers apart.
-struct Residuals {
+struct BoardResiduals {
   std::vector<std::vector<Eigen::Vector2d>> by_camera;
   std::vector<std::vector<ResidualArrow>> arrows;
   double squares = 0;  ///< px^2
@@ -18,8 +18,8 @@ struct Residuals {
 /// Of the corners of one view, predicted less observed, without outliers and what has no pixel.
 std::vector<ResidualArrow> ArrowsOf(const Board& board, const Rig& rig, const RigView& view);
 /// Adds the residuals of all views of `rig`.
-void AddResiduals(const Board& board, const Rig& rig, Residuals& out);
+void AddResiduals(const Board& board, const Rig& rig, BoardResiduals& out);
 /// px per coordinate, with the poses' 6 unknowns per frame taken off; NaN when nothing is left.
-double SigmaOf(const Residuals& residuals, size_t frames);
+double SigmaOf(const BoardResiduals& residuals, size_t frames);
 
 }  // namespace dtr::calib

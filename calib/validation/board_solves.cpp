@@ -58,10 +58,10 @@ std::map<size_t, size_t> OrderOfFrames(const std::vector<RigView>& views) {
   return order;
 }
 
-Residuals HeldOut(const ValidatedCalibration& calibration, int threads, std::string* refused) {
+BoardResiduals HeldOut(const ValidatedCalibration& calibration, int threads, std::string* refused) {
   const auto order = OrderOfFrames(calibration.kept);
   const size_t folds = std::min(kFolds, order.size());
-  std::vector<Residuals> by_fold(folds);
+  std::vector<BoardResiduals> by_fold(folds);
   std::vector<std::string> why(folds);
   ParallelFor(0, static_cast<int>(folds), threads, [&](int k) {
     const auto fold = static_cast<size_t>(k);
@@ -82,7 +82,7 @@ Residuals HeldOut(const ValidatedCalibration& calibration, int threads, std::str
                            left_out),
                  by_fold[fold]);
   });
-  Residuals all;
+  BoardResiduals all;
   all.by_camera.resize(calibration.cameras.size());
   for (size_t fold = 0; fold < folds; ++fold) {
     if (!why[fold].empty()) {

@@ -1,5 +1,5 @@
-// calib/validation/board_solves.h -- internal to calib/judge: solves made to judge a calibration by, and
-// how far two solves differ.
+// calib/validation/board_solves.h -- internal to calib/judge: solves made to judge a calibration
+// by, and how far two solves differ.
 #pragma once
 #include <Eigen/Core>
 #include <functional>
@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "calib/validation/boards.h"
 #include "calib/validation/board_residuals.h"
+#include "calib/validation/boards.h"
 
 namespace dtr::calib {
 
@@ -31,9 +31,9 @@ std::vector<RigView> FramesWhere(const std::vector<RigView>& views,
 /// Frames are dealt in turn; those without a view do not take part.
 std::map<size_t, size_t> OrderOfFrames(const std::vector<RigView>& views);
 
-/// Kept views in five folds, each predicted by a solve of the others; `refused` tells of a fold
+/// Kept views in five folds, each predicted by a solve of the others; `rejected` tells of a fold
 /// whose others could not be solved.
-Residuals HeldOut(const ValidatedCalibration& calibration, int threads, std::string* refused);
+BoardResiduals HeldOut(const ValidatedCalibration& calibration, int threads, std::string* refused);
 
 /// Mahalanobis distance of `count` unknowns from `at` on; infinite beyond what a covariance says.
 double Distance(const Eigen::VectorXd& difference, const Eigen::MatrixXd& covariance, int at,

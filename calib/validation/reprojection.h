@@ -1,5 +1,5 @@
-// calib/validation/reprojection.h -- can a calibration be trusted? Residuals on observations it is not judged
-// with.
+// calib/validation/reprojection.h -- can a calibration be trusted? Residuals on observations it is
+// not judged with.
 #pragma once
 #include <Eigen/Core>
 #include <array>
@@ -29,7 +29,7 @@ struct ValidateLimits {
 };
 
 /// Arrows that a camera keeps at most: enough to see a pattern by, few enough to draw.
-inline constexpr size_t kMostArrows = 1500;
+inline constexpr size_t kMaxArrows = 1500;
 
 /// What became of one camera's observations.
 struct CameraValidation {

@@ -76,7 +76,7 @@ void AddRenderCommand(CLI::App& app) {
                         "One frame: an image; several: a folder or an .mp4 file")
             ->required();
         auto* where = command.add_option_group("where", "Where to look from (exactly one)");
-        where->add_option("--like", options->request.cameras.like, "From a view's place")
+        where->add_option("--like", options->request.cameras.like, "From a view's position")
             ->type_name("VIEW");
         where->add_option("--camera", options->request.cameras.camera_file, "From a cameras.json")
             ->type_name("FILE");
@@ -93,11 +93,11 @@ void AddRenderCommand(CLI::App& app) {
             ->type_name("WxH");
         command
             .add_option("--frame", options->request.frame,
-                        "Of a moving set: the frame to show, from 0 [a path runs through all]")
+                        "Of a dynamic set: the frame to show, from 0 [a path runs through all]")
             ->check(CLI::Range(0, 1 << 30))
             ->type_name("N");
         command.add_flag("--play", options->request.play,
-                         "Of a moving set: every frame in turn, from one place");
+                         "Of a dynamic set: every frame in turn, from one position");
         command.add_option("--exclude", options->request.exclude, "Views not to render from")
             ->type_name("NAME,...");
         AddRendererOptions(command, options->renderer);

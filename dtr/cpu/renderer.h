@@ -12,16 +12,16 @@ namespace dtr::cpu {
 /// in double precision, by the two-pass method of Verlani et al. 2006 or by the deferred one, as
 /// RENDER_SPEC states them.
 /// The result does not depend on the order of the views or on the number of threads. Where no view
-/// is valid the picture is empty: black, no depth, no coverage.
-/// With options.fill_holes, FillHolesFromViews is applied to the finished picture.
-/// Throws dtr::UsageError for options without a meaning and for pictures beyond 2^28 pixels, and
+/// is valid the image is empty: black, no depth, no coverage.
+/// With options.fill_holes, FillHolesFromViews is applied to the finished image.
+/// Throws dtr::UsageError for options without a meaning and for images beyond 2^28 pixels, and
 /// dtr::Error for a pose that is not finite.
 RenderResult Render(const RenderScene& scene, const PinholeCamera& novel,
                     const Pose& novel_from_world, const RenderOptions& options);
 
 /// The same by the deferred method with the start of SPEC 5.1 moved nearer by so many pixels of
 /// disparity (of the view whose pixel is smallest). Other renderers may start that far off: where
-/// this changes the picture two of them may rightly differ, and comparisons judge apart.
+/// this changes the image two of them may rightly differ, and comparisons judge apart.
 RenderResult RenderFromMovedStart(const RenderScene& scene, const PinholeCamera& novel,
                                   const Pose& novel_from_world, const RenderOptions& options,
                                   double start_shift_px);

@@ -24,7 +24,7 @@ constexpr EGLint kContextFlags = 0;
 constexpr EGLint kContextFlags = EGL_CONTEXT_OPENGL_DEBUG_BIT_KHR;
 #endif
 
-[[noreturn]] void Refuse(const std::string& found) {
+[[noreturn]] void Reject(const std::string& found) {
   throw Error("OpenGL: expected a context of version 4.3 or newer through EGL, found " + found +
               "; use `renderer` cpu");
 }
@@ -33,7 +33,7 @@ constexpr EGLint kContextFlags = EGL_CONTEXT_OPENGL_DEBUG_BIT_KHR;
 void RequireLibrary(const char* name, const char* alternative) {
   if (dlopen(name, RTLD_LAZY | RTLD_GLOBAL) != nullptr) return;
   if (alternative != nullptr && dlopen(alternative, RTLD_LAZY | RTLD_GLOBAL) != nullptr) return;
-  Refuse(std::string("no ") + name);
+  Reject(std::string("no ") + name);
 }
 
 bool HasWord(const char* list, std::string_view word) {
@@ -139,7 +139,7 @@ EglContext::EglContext() : state_(std::make_unique<State>()) {
     }
     eglDestroyContext(display, context);
   }
-  Refuse(any_display ? "only older ones" : "no display that EGL can open");
+  Reject(any_display ? "only older ones" : "no display that EGL can open");
 }
 
 EglContext::~EglContext() {

@@ -1,4 +1,4 @@
-// dtr/gl/frame.h -- what one picture is made of, as every pass sees it. Only dtr/gl's own files
+// dtr/gl/frame.h -- what one image is made of, as every pass sees it. Only dtr/gl's own files
 // include this.
 #pragma once
 #include <vector>
@@ -10,7 +10,7 @@
 
 namespace dtr::gl {
 
-/// One picture: the views that take part, in canonical order.
+/// One image: the views that take part, in canonical order.
 struct Frame {
   const RenderScene& scene;
   const PinholeCamera& novel;
@@ -30,7 +30,7 @@ struct Frame {
   bool deferred() const { return options.method == RenderMethod::kDeferred; }
 };
 
-/// Rows [first, first + count) of the picture.
+/// Rows [first, first + count) of the image.
 struct Band {
   int first = 0, count = 0;
 };

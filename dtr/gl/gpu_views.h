@@ -13,7 +13,7 @@
 
 namespace dtr::gl {
 
-/// Puts on the GPU what pictures are drawn from; the views used longest ago make room. What counts
+/// Puts on the GPU what images are drawn from; the views used longest ago make room. What counts
 /// is what views use: geometry, meshes, and their layers of texture arrays. The arrays are as long
 /// as views of one size fit, so their empty layers are room for the next views.
 class GpuViews {

@@ -69,7 +69,7 @@ void MeshStore::Prepare(const std::vector<const View*>& views, const RenderOptio
   for (size_t k = 0; k < missing.size(); ++k) {
     if (unfit[k].empty()) continue;
     warn_("WARNING: " + missing[k]->name +
-          ": its stored mesh does not fit its depth map and was made anew: " + unfit[k]);
+          ": its stored mesh does not fit its depth map and was made again: " + unfit[k]);
   }
   for (size_t k = 0; k < missing.size(); ++k) {
     Stored stored{KeyOf(*missing[k], options), {}};

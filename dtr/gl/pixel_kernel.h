@@ -52,7 +52,7 @@ struct PixelView {
   float image_per_sample[2], image_offset[2];
 };
 
-/// A row of the picture.
+/// A row of the image.
 struct PixelRow {
   int width_px;
   float inverse_fx, inverse_fy, cx, cy;  ///< of the novel camera, pixels
@@ -68,8 +68,8 @@ struct PixelRow {
   std::uint32_t* marks;  ///< views blended; from bit 8 on 255 at the Delta border
 };
 
-/// Most views of a picture.
-inline constexpr int kMostPixelViews = 64;
+/// Most views of an image.
+inline constexpr int kMaxPixelViews = 64;
 
 /// SPEC 5.2, 5.3 and 4.2 to 4.8; views in canonical order. Weights `inverse-angle` must fit
 /// float32.

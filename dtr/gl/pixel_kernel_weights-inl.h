@@ -10,18 +10,18 @@
 HWY_BEFORE_NAMESPACE();
 namespace dtr::gl::HWY_NAMESPACE {
 
-constexpr float kLeastOthers = 1e-6f;
+constexpr float kMinOthers = 1e-6f;
 constexpr float kHalfPi = 1.57079632679f;
 // As weights.glsl: stands for the logarithm of 0. Beyond any angle: stands for a hidden fragment's.
 constexpr float kNoWeight = -1e38f, kHidden = 10;
 
 /// The pixels of a group and what the views say of them.
 struct Group {
-  HWY_ALIGN float inverse_depth[kMostPixelViews][kLanes];  ///< fragments; 0: none
-  HWY_ALIGN float image_x[kMostPixelViews][kLanes];        ///< on the view's image
-  HWY_ALIGN float image_y[kMostPixelViews][kLanes];
-  HWY_ALIGN float angle[kMostPixelViews][kLanes];   ///< of SPEC 4.5; not with `inverse-angle`
-  HWY_ALIGN float weight[kMostPixelViews][kLanes];  ///< up to a common factor
+  HWY_ALIGN float inverse_depth[kMaxPixelViews][kLanes];  ///< fragments; 0: none
+  HWY_ALIGN float image_x[kMaxPixelViews][kLanes];        ///< on the view's image
+  HWY_ALIGN float image_y[kMaxPixelViews][kLanes];
+  HWY_ALIGN float angle[kMaxPixelViews][kLanes];   ///< of SPEC 4.5; not with `inverse-angle`
+  HWY_ALIGN float weight[kMaxPixelViews][kLanes];  ///< up to a common factor
 };
 
 /// The angle t of SPEC 4.5 at the point at inverse depth w: its sine squared and its cosine, both
@@ -202,7 +202,7 @@ HWY_INLINE Weighed WeighFragments(const PixelRow& row, std::span<const PixelView
 /// weights need not fit float32.
 HWY_INLINE VF FadedShare(VF share, VF factor) {
   const VF others =
-      hn::Add(Constant(kLeastOthers), hn::Max(hn::Sub(Constant(1), share), hn::Zero(DF())));
+      hn::Add(Constant(kMinOthers), hn::Max(hn::Sub(Constant(1), share), hn::Zero(DF())));
   const VF rest = hn::MulAdd(hn::Sub(Constant(1), factor), share, others);
   return hn::Div(hn::Mul(hn::Mul(share, factor), others), rest);
 }

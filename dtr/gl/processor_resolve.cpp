@@ -89,7 +89,7 @@ PixelView PlaceView(const View& view, const ViewPlacement& placed, double cut_fa
 bool ProcessorResolver::Draws(const Frame& frame) {
   const RenderOptions& options = frame.options;
   return frame.deferred() && !frame.per_pixel && !options.blend_in_linear_light &&
-         !options.absolute_delta && frame.views.size() <= static_cast<size_t>(kMostPixelViews) &&
+         !options.absolute_delta && frame.views.size() <= static_cast<size_t>(kMaxPixelViews) &&
          WeightsFitFloat(BlendParametersOf(options, frame.novel.fx_px()));
 }
 

@@ -19,7 +19,7 @@ namespace dtr::gl {
 class ProcessorResolver {
  public:
   /// False for frames that it does not draw: two passes, the per-pixel rule, linear light, the
-  /// report's absolute Delta, weights out of float32's reach, more views than kMostPixelViews.
+  /// report's absolute Delta, weights out of float32's reach, more views than kMaxPixelViews.
   static bool Draws(const Frame& frame);
 
   /// As Resolver::Draw, but into memory of its own, which holds the band until the next call;
@@ -28,7 +28,7 @@ class ProcessorResolver {
   void Draw(const Frame& frame, const Band& band, const SampledViews& sampled,
             const std::vector<float>& surface, const std::optional<WindowDepthMapping>& mapping);
 
-  /// SPEC 6: the band into its rows of `result`, which has the picture's size.
+  /// SPEC 6: the band into its rows of `result`, which has the image's size.
   void CopyTo(RenderResult& result) const;
   /// The band into the textures of `targets`, which fit it.
   void Upload(const Targets& targets) const;

@@ -25,29 +25,29 @@ enum class CoarseDrawer {
   kProcessor,  ///< our own code, on the CPU
 };
 
-/// What does not change the picture, beyond the last digits.
+/// What does not change the image, beyond the last digits.
 struct RendererSettings {
   /// Where shaders come from, for development; empty: from the program itself.
   std::string shader_folder;
-  /// Memory for the views' fragments; a picture that needs more is drawn in bands of rows.
+  /// Memory for the views' fragments; an image that needs more is drawn in bands of rows.
   size_t layer_bytes = size_t{256} << 20;
   /// Memory for the views themselves. Those drawn longest ago make room for others; where one
-  /// picture's do not fit, it is drawn from the nearest that do, and `warn` is told so once.
+  /// image's do not fit, it is drawn from the nearest that do, and `warn` is told so once.
   size_t gpu_bytes = size_t{4} << 30;
-  /// Told of what the picture goes without, a line each, on the thread that draws.
+  /// Told of what the image goes without, a line each, on the thread that draws.
   std::function<void(const std::string&)> warn = [](const std::string&) {};
   CoarseDrawer coarse_drawer = CoarseDrawer::kFitting;
   /// Leave unused what the driver has beyond OpenGL 4.3, as on one that has no more.
   bool only_opengl_43 = false;
   /// Take its storage blocks for no larger than this, as on one that has smaller ones.
-  size_t most_storage_bytes = SIZE_MAX;
-  /// Draw() leaves pictures that the processor drew where they are (DrawnPicture::rgba, depth_z),
+  size_t max_storage_bytes = SIZE_MAX;
+  /// Draw() leaves images that the processor drew where they are (DrawnPicture::rgba, depth_z),
   /// for gl::Compositor.
   bool in_memory = false;
 };
 
-/// A picture that was drawn and lies on the GPU: names of GL_TEXTURE_2D_ARRAY textures of one layer
-/// that belong to the renderer and hold the picture until its next call. Row 0 is the top row.
+/// An image that was drawn and lies on the GPU: names of GL_TEXTURE_2D_ARRAY textures of one layer
+/// that belong to the renderer and hold the image until its next call. Row 0 is the top row.
 /// Where RendererSettings::in_memory asks for it and the processor drew, there are no textures (0):
 /// it then lies in the renderer's memory, as long.
 struct DrawnPicture {
@@ -59,11 +59,11 @@ struct DrawnPicture {
   /// In memory: what MapToWindow makes of depth_z by `mapping`, where Draw was told one; else null.
   const float* window_z = nullptr;
   WindowDepthMapping mapping;
-  /// No two pictures of a process have the same, whoever drew them.
+  /// No two images of a process have the same, whoever drew them.
   std::uint64_t number = 0;
   int width_px = 0, height_px = 0;
   std::vector<int> views_used;  ///< as RenderResult::views_used
-  /// The renderer holds all that pictures by these options need of these views: their pixels may go
+  /// The renderer holds all that images by these options need of these views: their pixels may go
   /// and need not come back for them (CanDraw). So where it draws on the processor; it then has
   /// what it made of them in memory.
   bool views_held = false;
@@ -86,7 +86,7 @@ class Renderer {
   /// RendererSettings::gpu_bytes: they must not change or die as long as this renderer draws them
   /// (Forget() ends that); their pixels may go and be read again in between, as ViewStream does.
   /// The result does not depend on the order of the views; equal calls give
-  /// equal bytes. Throws dtr::UsageError for options without a meaning and for pictures beyond 2^28
+  /// equal bytes. Throws dtr::UsageError for options without a meaning and for images beyond 2^28
   /// pixels, and dtr::Error for a pose that is not finite, for what the driver cannot hold (naming
   /// its limit) and for a shader that does not compile (file and line).
   RenderResult Render(const RenderScene& scene, const PinholeCamera& novel,
@@ -96,17 +96,17 @@ class Renderer {
   /// filled (options.fill_holes is not looked at). Drawn at once, whatever layer_bytes says. May
   /// return before the GPU has finished. Throws as Render; also dtr::Error where the deferred
   /// method's depth (4 bytes a pixel) is more than one storage block of this driver.
-  /// `mapping`: pictures left in memory get window_z, too, while their depth is in the cache.
+  /// `mapping`: images left in memory get window_z, too, while their depth is in the cache.
   DrawnPicture Draw(const RenderScene& scene, const PinholeCamera& novel,
                     const Pose& novel_from_world, const RenderOptions& options,
                     const std::optional<WindowDepthMapping>& mapping = std::nullopt);
 
-  /// True when this picture can be drawn though the pixels of some of its views went: the renderer
+  /// True when this image can be drawn though the pixels of some of its views went: the renderer
   /// holds what it would make of them. (Of others it has what it needs: the pixels.)
   bool CanDraw(const RenderScene& scene, const PinholeCamera& novel, const Pose& novel_from_world,
                const RenderOptions& options) const;
 
-  /// The picture of the last Draw, which must be the last call that drew (std::logic_error): what
+  /// The image of the last Draw, which must be the last call that drew (std::logic_error): what
   /// Render gives without filling.
   RenderResult ReadBack();
 

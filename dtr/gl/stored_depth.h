@@ -21,7 +21,7 @@ struct StoredDepth {
 /// that was loaded; not one that was computed and never rounded). `samples`: of this view.
 StoredDepth StoreDepth(const View& view, const SampleGrid& samples);
 
-/// The picture of a grid of samples that own_depth.glsl reads: `values` with the last row and
+/// The image of a grid of samples that own_depth.glsl reads: `values` with the last row and
 /// column once more, and below them whether a block is whole or masked (its values are 0 then,
 /// which whole ones' never are): of block (x, y) bit (y + 1) % kBlocksPerTexel of the texel (x + 1,
 /// rows + 1 + (y + 1) / kBlocksPerTexel), as a number.

@@ -1,4 +1,4 @@
-// What the picture must not depend on, both methods.
+// What the image must not depend on, both methods.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -58,7 +58,7 @@ TEST_P(Invariance, ThreadsAndRepeatedRuns) {
     const RenderResult expected = Draw(scene.set, scene.novel, 1);
     ExpectSameBytes(expected, Draw(scene.set, scene.novel, 3));
     ExpectSameBytes(expected, Draw(scene.set, scene.novel, 1));
-    // Within one renderer, after another picture.
+    // Within one renderer, after another image.
     Renderer renderer(settings_);
     const RenderScene views = MakeRenderScene(scene.set);
     const View& input = *views.views.front();

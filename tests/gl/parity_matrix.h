@@ -15,7 +15,7 @@ namespace dtr::testing {
 /// Less than SPEC 5.1's tolerance of the reduced mesh (0.7).
 inline constexpr double kStartShiftPx = 0.1;
 
-/// The reference against dtr/gl. Deferred: pixels at which the reference's own picture hangs on
+/// The reference against dtr/gl. Deferred: pixels at which the reference's own image hangs on
 /// where the steps of SPEC 5.3 begin are undecided.
 inline Comparison ExpectParity(gl::Renderer& renderer, const NamedScene& scene,
                                const RenderOptions& options) {
@@ -62,7 +62,7 @@ inline void ExpectParityOf(gl::Renderer& renderer, const NamedScene& scene, Rend
   EXPECT_GT(all.compared, all.total / 4) << scene.name << " " << what;
 }
 
-/// Both methods x both primitives. The deferred method knows no primitive (SPEC 5.1): its picture
+/// Both methods x both primitives. The deferred method knows no primitive (SPEC 5.1): its image
 /// must be the same, to the bit, for the other one.
 inline void ExpectParityOfAll(const NamedScene& scene, int views) {
   gl::Renderer renderer;

@@ -37,7 +37,7 @@ MadePicture DrawPicture(dtr::gl::Renderer& renderer, dtr::gl::Compositor& compos
 }  // namespace
 
 DepthTR::dtrDrawable::dtrDrawable() : state_(std::make_unique<State>()) {
-  setSupportsDisplayList(false);  // every camera sees another picture
+  setSupportsDisplayList(false);  // every camera sees another image
   setUseDisplayList(false);
 }
 

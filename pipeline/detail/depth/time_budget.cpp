@@ -9,8 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "pipeline/detail/depth/effort_json.h"
 #include "dtr/base/files.h"
+#include "pipeline/detail/depth/effort_json.h"
 #include "stereo/widen.h"
 
 namespace dtr::pipeline {
@@ -109,7 +109,7 @@ ProbedCosts ProbeCosts(const stereo::Collection& c, int view) {
   }
   costs.round_s =
       SecondsOf([&] { engine->Refine(views, 0, others, range, pointers, 1, c.options); });
-  costs.verdict_s = SecondsOf([&] { engine->ValidateBoards(views, 0, others, range, pointers, c.options); });
+  costs.verdict_s = SecondsOf([&] { engine->Judge(views, 0, others, range, pointers, c.options); });
   const double pixels = PixelsOf(small[0].camera);
   const double available = static_cast<double>(others.size());
   const double searched = std::min<double>(kProbeEffort.neighbours, available);
@@ -164,13 +164,13 @@ stereo::Effort EffortWithinBudget(const stereo::Collection& c, const DepthChoice
     effort = PickEffort(*costs, choice, c.views);
     const double expected_s = PredictSeconds(*costs, effort, c.views);
     progress.Note(fmt::format(
-        "time budget {} s: {} neighbours, {} in {} rounds, {} iterations; expected {:.1f} s{}",
+        "time budget {} s: {} neighbours, {} in {} passes, {} iterations; expected {:.1f} s{}",
         *choice.time_budget_s, effort.neighbours, effort.round_neighbours, effort.rounds,
         effort.iterations, expected_s,
         expected_s > *choice.time_budget_s ? ", MORE than the budget: nothing cheaper is left"
                                            : ""));
   } else {
-    progress.Note("time budget: no view has a usable pair to try; the least effort is taken");
+    progress.Note("time budget: no view has a usable pair to try; the lowest settings are used");
   }
   WriteFileAtomically(record, SettingsJson("patchmatch", effort).dump());
   return effort;

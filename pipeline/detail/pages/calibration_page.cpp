@@ -23,9 +23,9 @@ void AddCameraTable(report::HtmlReport& page, const calib::BoardValidation& judg
   std::vector<std::vector<report::Cell>> rows;
   for (const calib::ValidatedCamera& camera : judged.cameras) {
     for (const auto& [what, stats] :
-         {std::pair{judged.unseen ? "unseen, boards refitted" : "kept, boards refitted",
+         {std::pair{judged.unseen ? "held out, boards refitted" : "stored, boards refitted",
                     &camera.stored},
-          std::pair{"kept, held out", &camera.held_out}}) {
+          std::pair{"stored, held out", &camera.held_out}}) {
       if (stats->count == 0) continue;
       rows.push_back({camera.name, std::string(what), std::to_string(stats->count),
                       FixedPx(stats->rms_px), FixedPx(stats->median_px), FixedPx(stats->p95_px),
@@ -79,8 +79,9 @@ void AddWorstViews(report::HtmlReport& page, const calib::LensCamera& lens,
 
 }  // namespace
 
-std::string CalibrationPage(const calib::Calibration& calibration, const calib::BoardValidation& judged,
-                            const std::string& title, const std::optional<fs::path>& images) {
+std::string CalibrationPage(const calib::Calibration& calibration,
+                            const calib::BoardValidation& judged, const std::string& title,
+                            const std::optional<fs::path>& images) {
   report::HtmlReport page(title);
   page.Verdict(judged.passed(), judged.passed() ? "The calibration passed its tests"
                                                 : "The calibration broke at least one test");

@@ -1,4 +1,5 @@
-// tests/calib/validation/late_views.h -- views of a board in the hand by cameras without a common clock.
+// tests/calib/validation/late_views.h -- views of a board in the hand by cameras without a common
+// clock.
 #pragma once
 #include <Eigen/Geometry>
 #include <cmath>
@@ -31,7 +32,7 @@ inline Pose BoardAt(double time) {
 }
 
 /// What cameras see that are late by `delays`: whole boards, with noise. `jitter`: standard
-/// deviation of every picture's own moment, in frames.
+/// deviation of every image's own moment, in frames.
 inline std::vector<RigView> LateViews(const std::vector<RigCamera>& cameras,
                                       const std::vector<double>& delays, std::uint64_t seed,
                                       double jitter = 0) {

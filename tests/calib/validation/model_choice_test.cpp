@@ -7,11 +7,11 @@
 #include <filesystem>
 
 #include "calib/boards/detect.h"
-#include "calib/validation/boards.h"
-#include "calib/validation/projection.h"
 #include "calib/lens_map.h"
 #include "calib/solve/choose_model.h"
 #include "calib/solve/model_spread.h"
+#include "calib/validation/boards.h"
+#include "calib/validation/projection.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/io/image_io.h"
 #include "tests/support/test_data.h"
@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const Board kBoard{Board::Kind::kChessboard, 9, 6, 1, 0, "", false};
+const Board kPhotoBoard{Board::Kind::kChessboard, 9, 6, 1, 0, "", false};
 constexpr int kWidth = 1280, kHeight = 720;
 
 const std::vector<BoardView>& Views(const fs::path& folder) {
@@ -36,7 +36,7 @@ const std::vector<BoardView>& Views(const fs::path& folder) {
       if (image.width() != kWidth || image.height() != kHeight) return;  // two are a pixel larger
       DetectOptions quads;
       quads.detector = ChessboardDetector::kQuads;
-      found[at] = DetectBoard(GreyOf(image), kBoard, quads);
+      found[at] = DetectBoard(GreyOf(image), kPhotoBoard, quads);
     });
     std::vector<BoardView> views;
     for (size_t i = 0; i < files.size(); ++i) {
@@ -55,7 +55,7 @@ BoardSolution Solved(const std::vector<BoardView>& views, BoardModel model) {
   SolveOptions options;
   options.loss = Loss::kQuadratic;
   options.cover_image = false;
-  return SolveBoard(kBoard, views, kWidth, kHeight, model, options);
+  return SolveBoard(kPhotoBoard, views, kWidth, kHeight, model, options);
 }
 
 // Distance over the whole image after the best rotation about the camera's centre.
@@ -93,7 +93,7 @@ TEST(ModelChoiceOfPhotos, AnOrdinaryLensIsWithinAPixelOfOpenCvsOverTheWholeImage
   ASSERT_GE(views.size(), 15u);
   ChoiceOptions options;
   options.folds = 5;
-  const ModelChoice choice = ChooseModel(kBoard, views, kWidth, kHeight, options);
+  const ModelChoice choice = ChooseModel(kPhotoBoard, views, kWidth, kHeight, options);
   const ModelScore& chosen = choice.scores[choice.chosen];
   ASSERT_EQ(NameOf(chosen.model), "brown4");
   for (const ModelScore& score : choice.scores) {
@@ -108,7 +108,7 @@ TEST(ModelChoiceOfPhotos, AModelThatBendsBeyondTheCornersSeenStatesHowFarOthersA
   DTR_REQUIRE_DATA(Photos());
   const auto& views = Views(Photos());
   const std::vector<std::vector<int>> none(views.size());
-  const auto others = OtherModels(kBoard, BoardModel::kFisheye, kWidth, kHeight, views, none);
+  const auto others = OtherModels(kPhotoBoard, BoardModel::kFisheye, kWidth, kHeight, views, none);
   const auto brown4 = std::find_if(others.begin(), others.end(), [](const OtherModel& other) {
     return other.model == BoardModel::kBrown4;
   });
