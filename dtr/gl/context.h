@@ -14,6 +14,8 @@ class EglContext {
   /// OpenGL, or none of version 4.3.
   EglContext();
   ~EglContext();
+  /// One whose driver draws with a GPU, else null and in `why` the reason, half a line.
+  static std::unique_ptr<EglContext> OnGpu(std::string& why);
   EglContext(const EglContext&) = delete;
   EglContext& operator=(const EglContext&) = delete;
 

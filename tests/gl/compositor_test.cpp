@@ -167,20 +167,13 @@ Apart ApartFrom(const Shown& shown, const RenderResult& picture, const Grid<floa
   return apart;
 }
 
-RendererSettings DrawnByTheProcessor(bool in_memory) {
-  RendererSettings settings;
-  settings.in_memory = in_memory;
-  settings.coarse_drawer = CoarseDrawer::kProcessor;
-  return settings;
-}
-
 class CompositorTest : public testing::GlTest {
  protected:
   /// The damaged scene: holes, masks, a step.
   const NamedScene scene_ = ParityScenes()[3];
   const RenderScene views_ = MakeRenderScene(scene_.set);
 
-  DrawnPicture Draw(Renderer& renderer) const {
+  DrawnPicture Draw(FittingRenderer& renderer) const {
     return renderer.Draw(views_, scene_.novel.camera, scene_.novel.cam_from_world, {});
   }
   RenderResult Render() const {
@@ -192,7 +185,7 @@ class CompositorTest : public testing::GlTest {
 TEST_F(CompositorTest, ATextureAndAPictureInMemoryAreShownWhereTheyAreInFront) {
   const RenderResult picture = Render();
   for (const bool in_memory : {false, true}) {
-    Renderer renderer(DrawnByTheProcessor(in_memory));
+    FittingRenderer renderer({}, in_memory ? Drawer::kSimd : Drawer::kOpenGl);
     Compositor compositor;
     Host host;
     const DrawnPicture drawn = Draw(renderer);
@@ -210,7 +203,7 @@ TEST_F(CompositorTest, ATextureAndAPictureInMemoryAreShownWhereTheyAreInFront) {
 
 TEST_F(CompositorTest, DepthThatIsMappedAsItIsDrawnIsTheSame) {
   const RenderResult picture = Render();
-  Renderer renderer(DrawnByTheProcessor(true));
+  FittingRenderer renderer({}, Drawer::kSimd);
   Compositor compositor;
   Host host;
   for (const HostState& state : States()) {
@@ -218,7 +211,7 @@ TEST_F(CompositorTest, DepthThatIsMappedAsItIsDrawnIsTheSame) {
       const Shown shown = host.With(state, [&] {
         DepthProjection projection = ProjectionOf(state);
         if (!as_said) projection.at_infinity *= 1.01;
-        const WindowDepthMapping mapping = CurrentMapping(projection);
+        const simd::WindowDepthMapping mapping = CurrentMapping(projection);
         const DrawnPicture drawn =
             renderer.Draw(views_, scene_.novel.camera, scene_.novel.cam_from_world, {}, mapping);
         EXPECT_NE(drawn.window_z, nullptr);
@@ -233,7 +226,7 @@ TEST_F(CompositorTest, DepthThatIsMappedAsItIsDrawnIsTheSame) {
 }
 
 TEST_F(CompositorTest, TheNextPictureTakesThePlaceOfTheLast) {
-  Renderer renderer(DrawnByTheProcessor(true));
+  FittingRenderer renderer({}, Drawer::kSimd);
   Compositor compositor;
   Host host;
   const HostState plain = States().front();
@@ -267,7 +260,7 @@ TEST_F(CompositorTest, WhatIsGuessedIsNeverCutOff) {
 }
 
 TEST_F(CompositorTest, LeavesTheHostsStateAsItWas) {
-  Renderer renderer(DrawnByTheProcessor(true));
+  FittingRenderer renderer({}, Drawer::kSimd);
   Compositor compositor;
   Host host;
   const DrawnPicture drawn = Draw(renderer);
