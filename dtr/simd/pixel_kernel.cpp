@@ -354,7 +354,7 @@ const char* NameImpl() { return hwy::TargetName(HWY_TARGET); }
 
 void ResolveRowImpl(const PixelRow& row, std::span<const PixelView> views) {
   const DF d;
-  Group group(views.size());
+  Group group(std::max<size_t>(1, views.size()));
   for (int x = 0; x < row.width_px; x += static_cast<int>(kLanes)) {
     const auto count = std::min(kLanes, static_cast<size_t>(row.width_px - x));
     HWY_ALIGN float surfaces[kLanes] = {};

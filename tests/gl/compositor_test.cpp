@@ -176,16 +176,17 @@ class CompositorTest : public testing::GlTest {
   DrawnPicture Draw(FittingRenderer& renderer) const {
     return renderer.Draw(views_, scene_.novel.camera, scene_.novel.cam_from_world, {});
   }
-  RenderResult Render() const {
-    Renderer renderer;
+  RenderResult Render(Drawer drawer = Drawer::kOpenGl) const {
+    FittingRenderer renderer({}, drawer);
     return renderer.Render(views_, scene_.novel.camera, scene_.novel.cam_from_world, {});
   }
 };
 
 TEST_F(CompositorTest, ATextureAndAPictureInMemoryAreShownWhereTheyAreInFront) {
-  const RenderResult picture = Render();
   for (const bool in_memory : {false, true}) {
-    FittingRenderer renderer({}, in_memory ? Drawer::kSimd : Drawer::kOpenGl);
+    const Drawer drawer = in_memory ? Drawer::kSimd : Drawer::kOpenGl;
+    const RenderResult picture = Render(drawer);
+    FittingRenderer renderer({}, drawer);
     Compositor compositor;
     Host host;
     const DrawnPicture drawn = Draw(renderer);
@@ -202,7 +203,7 @@ TEST_F(CompositorTest, ATextureAndAPictureInMemoryAreShownWhereTheyAreInFront) {
 }
 
 TEST_F(CompositorTest, DepthThatIsMappedAsItIsDrawnIsTheSame) {
-  const RenderResult picture = Render();
+  const RenderResult picture = Render(Drawer::kSimd);
   FittingRenderer renderer({}, Drawer::kSimd);
   Compositor compositor;
   Host host;

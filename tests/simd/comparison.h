@@ -12,7 +12,7 @@ namespace dtr::testing {
 
 /// What two renderers may differ by: 2 of 255 levels (rounding to 8 bits twice, single precision)
 /// on all but a share of the pixels, those where rounding turns a decision. Those at the Delta
-/// border are not judged, and must be few; so must those at which the reference itself wavers.
+/// border are not judged, and must be few.
 inline constexpr int kLevels = 2;
 inline constexpr double kApartShare = 0.002, kCoverageShare = 0.002, kBorderShare = 0.01;
 
@@ -20,29 +20,27 @@ struct Comparison {
   long long compared = 0, apart = 0;         ///< seen by both and judged; more than kLevels apart
   long long judged = 0, coverage_apart = 0;  ///< neither at a break nor at the Delta border
   long long border = 0, total = 0;           ///< flagged by the reference: at the Delta border
-  long long undecided = 0;                   ///< of the judged: the reference wavers itself
   int largest = 0;
 
   double border_share() const { return Share(border, total); }
-  double undecided_share() const { return Share(undecided, judged); }
   double apart_share() const { return Share(apart, compared); }
   double coverage_share() const { return Share(coverage_apart, judged); }
   bool Holds() const {
     return apart_share() <= kApartShare && coverage_share() <= kCoverageShare &&
-           border_share() <= kBorderShare && undecided_share() <= kBorderShare;
+           border_share() <= kBorderShare;
   }
   void Add(const Comparison& o) {
     compared += o.compared, apart += o.apart, judged += o.judged;
     coverage_apart += o.coverage_apart, border += o.border, total += o.total;
-    undecided += o.undecided, largest = std::max(largest, o.largest);
+    largest = std::max(largest, o.largest);
   }
   std::string Text() const {
     char text[200];
     std::snprintf(text, sizeof(text),
                   "%9lld px compared (%.0f %%), %.4f %% apart (largest %d), coverage %.4f %%, at "
-                  "the border %.3f %%, undecided %.3f %%",
+                  "the border %.3f %%",
                   compared, 100 * Share(compared, total), 100 * apart_share(), largest,
-                  100 * coverage_share(), 100 * border_share(), 100 * undecided_share());
+                  100 * coverage_share(), 100 * border_share());
     return text;
   }
 
@@ -95,22 +93,9 @@ inline Mask NearBreaks(const RenderResult& reference, const BreakRule& rule) {
   return near;
 }
 
-/// 255 where the reference draws something else than in `reference`, when it may: undecided.
-inline void MarkApart(const RenderResult& reference, const RenderResult& otherwise,
-                      Mask& undecided) {
-  for (int y = 0; y < undecided.height(); ++y) {
-    for (int x = 0; x < undecided.width(); ++x) {
-      if (reference.coverage(x, y) != otherwise.coverage(x, y) ||
-          PixelDifference(reference.image, otherwise.image, x, y) > kLevels) {
-        undecided(x, y) = 255;
-      }
-    }
-  }
-}
-
-/// The measure: pixels near breaks and at the Delta border are left out, undecided ones counted.
+/// The measure: pixels near breaks and at the Delta border are left out.
 inline Comparison Compare(const RenderResult& reference, const RenderResult& other,
-                          const BreakRule& rule, const Mask& undecided = {}) {
+                          const BreakRule& rule) {
   Comparison c;
   const Mask breaks = NearBreaks(reference, rule);
   for (int y = 0; y < breaks.height(); ++y) {
@@ -119,7 +104,6 @@ inline Comparison Compare(const RenderResult& reference, const RenderResult& oth
       const bool border = reference.delta_border(x, y) != 0;
       c.border += border;
       if (border || breaks(x, y) != 0) continue;
-      c.undecided += !undecided.empty() && undecided(x, y) != 0;
       ++c.judged;
       const bool seen = reference.coverage(x, y) != 0;
       if (seen != (other.coverage(x, y) != 0)) ++c.coverage_apart;

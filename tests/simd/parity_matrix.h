@@ -9,14 +9,11 @@
 #include "dtr/cpu/renderer.h"
 #include "tests/simd/comparison.h"
 #include "tests/simd/exact_scenes.h"
+#include "tests/simd/whole_comparison.h"
 
 namespace dtr::testing {
 
-/// Less than SPEC 5.1's tolerance of the reduced mesh (0.7).
-inline constexpr double kStartShiftPx = 0.1;
-
-/// The reference against another renderer (gl::Renderer, simd::Renderer). Deferred: pixels at which the reference's own picture hangs on
-/// where the steps of SPEC 5.3 begin are undecided.
+/// The reference against another renderer (gl::Renderer, simd::Renderer).
 template <typename Renderer>
 Comparison ExpectParity(Renderer& renderer, const NamedScene& scene,
                                const RenderOptions& options) {
@@ -25,16 +22,11 @@ Comparison ExpectParity(Renderer& renderer, const NamedScene& scene,
   const RenderResult expected = cpu::Render(views, novel.camera, novel.cam_from_world, options);
   const RenderResult found = renderer.Render(views, novel.camera, novel.cam_from_world, options);
   EXPECT_EQ(found.views_used, expected.views_used);
-  Mask undecided(novel.camera.width_px(), novel.camera.height_px());
   if (options.method == RenderMethod::kDeferred) {
-    for (const double shift_px : {-kStartShiftPx, kStartShiftPx}) {
-      MarkApart(
-          expected,
-          cpu::RenderFromMovedStart(views, novel.camera, novel.cam_from_world, options, shift_px),
-          undecided);
-    }
+    const WholeComparison whole = CompareWhole(expected, found);
+    EXPECT_TRUE(whole.Holds()) << scene.name << ": " << whole.Text();
   }
-  return Compare(expected, found, StrictestBreaks(views, options), undecided);
+  return Compare(expected, found, StrictestBreaks(views, options));
 }
 
 /// Resolutions 1, 2, 4 x all weights of one method and primitive, `views` blended; every one must
