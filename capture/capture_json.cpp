@@ -6,7 +6,7 @@
 #include <set>
 
 #include "dtr/base/error.h"
-#include "dtr/io/formats/file_names.h"
+#include "dtr/base/file_names.h"
 #include "dtr/io/json_fields.h"
 
 namespace dtr::capture {
@@ -185,9 +185,9 @@ Photo PhotoFrom(const Node& node) {
   photo.id = node["id"].Text();
   if (!IsSafeId(photo.id)) node["id"].Fail("letters, digits, '_' and '-'");
   photo.name = node["name"].Text();
-  io::RequireSafeName(photo.name, node["name"].where());
+  RequireSafeName(photo.name, node["name"].where());
   const std::string file = node["file"].Text();
-  io::RequireSafeName(file, node["file"].where());
+  RequireSafeName(file, node["file"].where());
   photo.file = file;
   photo.width_px = node["width_px"].Int(1, kLargestSidePx);
   photo.height_px = node["height_px"].Int(1, kLargestSidePx);
@@ -210,7 +210,7 @@ Photo PhotoFrom(const Node& node) {
   }
   if (const auto mask = node.Optional("mask")) {
     const std::string mask_file = (*mask)["file"].Text();
-    io::RequireSafeName(mask_file, (*mask)["file"].where());
+    RequireSafeName(mask_file, (*mask)["file"].where());
     photo.mask_file = mask_file;
     photo.mask_sha256 = (*mask)["sha256"].Text();
   }

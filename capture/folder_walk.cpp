@@ -10,8 +10,8 @@
 #include "capture/ingest.h"
 #include "capture/names.h"
 #include "dtr/base/error.h"
-#include "dtr/io/formats/file_names.h"
-#include "dtr/io/formats/utf8.h"
+#include "dtr/base/file_names.h"
+#include "dtr/base/utf8.h"
 #include "dtr/io/image_io.h"
 
 namespace dtr::capture {
@@ -110,11 +110,11 @@ class Walker {
       walk_.videos.push_back(name);
     } else if (!IsImageExtension(extension)) {
       AddOther(path, extension);
-    } else if (!io::IsUtf8(name) || std::any_of(name.begin(), name.end(), IsControl)) {
+    } else if (!IsUtf8(name) || std::any_of(name.begin(), name.end(), IsControl)) {
       walk_.skipped.push_back({PrintableName(name), "its name is no printable UTF-8; rename it"});
-    } else if (!io::WhyUnsafeName(name).empty()) {
+    } else if (!WhyUnsafeName(name).empty()) {
       walk_.skipped.push_back(
-          {PrintableName(name), "its name " + io::WhyUnsafeName(name) + "; rename it"});
+          {PrintableName(name), "its name " + WhyUnsafeName(name) + "; rename it"});
     } else if (name.front() == ' ') {
       walk_.skipped.push_back(
           {name, "its name begins with a blank, which COLMAP's files cannot hold; rename it"});

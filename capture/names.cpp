@@ -3,14 +3,14 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "dtr/io/formats/utf8.h"
+#include "dtr/base/utf8.h"
 
 namespace dtr::capture {
 
 bool IsControl(char c) { return static_cast<unsigned char>(c) < 32 || c == 127; }
 
 std::string Printable(std::string text) {
-  const bool utf8 = io::IsUtf8(text);
+  const bool utf8 = IsUtf8(text);
   for (char& c : text) {
     if (IsControl(c) || (!utf8 && static_cast<unsigned char>(c) >= 0x80)) c = '?';
   }

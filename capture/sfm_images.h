@@ -16,8 +16,8 @@ namespace dtr::capture {
 /// axis by the ratios of the sizes, TargetSize(width_px, height_px, max_size_px) over the photo's.
 /// A photo's mask is written to SfmMaskFile, of the size that the photo has there.
 /// What is there already is replaced, never written into: it may be a link to an original.
-/// Photos in memory at a time take at most `memory_gb` (1e9 bytes; 0: no bound; one may be larger).
-/// Throws Error when a photo cannot be read or a file cannot be written.
+/// Photos in memory at a time take at most `memory_gb` (GB of 1e9 bytes; 0: no bound; one may be
+/// larger). Throws Error when a photo cannot be read or a file cannot be written.
 void PrepareSfmImages(const Capture& capture, const std::filesystem::path& folder, int max_size_px,
                       int threads, double memory_gb, Progress& progress);
 /// The same without progress and bound.

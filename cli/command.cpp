@@ -6,10 +6,10 @@
 
 #include "cli/number_checks.h"
 #include "cli/output_file.h"
-#include "cli/pipeline/depth_settings.h"
 #include "cli/standard_output.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
+#include "pipeline/depth_settings.h"
 
 namespace dtr::cli {
 namespace {
@@ -71,7 +71,10 @@ void Context::EmitJson(const std::string& json_text) const {
 
 void AddMemoryOption(CLI::App& command, double& memory_gb, const std::string& description) {
   memory_gb = pipeline::kDefaultMemoryGb;
-  command.add_option("--memory", memory_gb, description)->check(kPositive)->type_name("GB");
+  command.add_option("--memory", memory_gb, description)
+      ->check(kPositive)
+      ->check(CLI::Range(0.0, kMaxGigabytes))
+      ->type_name("GB");
 }
 
 void AddCommand(CLI::App& app, const std::string& name, const std::string& description,

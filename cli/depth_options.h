@@ -3,7 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <vector>
 
-#include "cli/pipeline/depth_settings.h"
+#include "pipeline/depth_settings.h"
 
 namespace dtr::cli {
 

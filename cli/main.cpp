@@ -13,7 +13,7 @@
 #include "cli/command.h"
 #include "cli/standard_output.h"
 #include "dtr/base/error.h"
-#include "dtr/io/formats/utf8.h"
+#include "dtr/base/utf8.h"
 
 namespace {
 
@@ -49,7 +49,7 @@ int Run(int argc, char** argv) {
     const bool control = std::any_of(shown.begin(), shown.end(), [](char c) {
       return static_cast<unsigned char>(c) < ' ' || c == '\x7f';
     });
-    const bool utf8 = dtr::io::IsUtf8(argv[i]);
+    const bool utf8 = dtr::IsUtf8(argv[i]);
     if (utf8 && !control) continue;
     for (char& c : shown) c = c >= ' ' && c <= '~' ? c : '?';  // for any terminal
     fmt::print(stderr, "dtr: argument {}: expected {}, found '{}'; rename the file or folder\n", i,

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "cli/pipeline/known_metres.h"
-#include "cli/pipeline/scale_points.h"
+#include "pipeline/metres.h"
+#include "pipeline/scale_points.h"
 
 namespace dtr::cli {
 

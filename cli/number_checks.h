@@ -9,4 +9,7 @@ namespace dtr::cli {
 /// AddCommand knows options that take numbers.
 extern const CLI::Validator kPositive, kNonNegative;
 
+/// A bound on memory that no machine reaches and no size overflows at.
+inline constexpr double kMaxGigabytes = 1e6;
+
 }  // namespace dtr::cli

@@ -5,6 +5,7 @@
 #include "cli/number_checks.h"
 #include "cli/render_engine.h"
 #include "dtr/base/error.h"
+#include "dtr/base/memory_budget.h"
 #include "dtr/cpu/renderer.h"
 #include "dtr/simd/renderer.h"
 
@@ -50,7 +51,7 @@ void AddOptions(CLI::App& command, const std::vector<std::string>& names, Render
                   "Memory for views that are ready to be drawn, on the GPU or, by simd, in main "
                   "memory; others are dropped and prepared again [4]")
       ->check(kPositive)
-      ->check(CLI::Range(0.0, kMostGigabytes))
+      ->check(CLI::Range(0.0, kMaxGigabytes))
       ->type_name("GB");
 }
 

@@ -14,10 +14,6 @@
 
 namespace dtr::cli {
 
-/// Memory on the command line: its unit, and a bound that no machine reaches and no size overflows
-/// at.
-inline constexpr double kBytesPerGigabyte = 1 << 30, kMostGigabytes = 1e6;
-
 /// Lines that a command prints once, however many renderers it makes. Any thread.
 class OnceNotes {
  public:

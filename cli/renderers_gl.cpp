@@ -5,6 +5,7 @@
 
 #include "cli/render_engine.h"
 #include "dtr/base/error.h"
+#include "dtr/base/memory_budget.h"
 #include "dtr/gl/context.h"
 #include "dtr/gl/frame_timer.h"
 #include "dtr/gl/renderer.h"

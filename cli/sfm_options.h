@@ -3,7 +3,7 @@
 #pragma once
 #include <CLI/CLI.hpp>
 
-#include "cli/pipeline/sfm_choice.h"
+#include "pipeline/sfm_settings.h"
 
 namespace dtr::cli {
 

@@ -23,9 +23,8 @@ add_custom_command(OUTPUT ${PROJECT_BINARY_DIR}/dtr.1.gz
   DEPENDS ${PROJECT_BINARY_DIR}/dtr.manual VERBATIM)
 install(FILES ${PROJECT_BINARY_DIR}/dtr.1.gz DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT runtime)
 
-install(DIRECTORY dtr capture calib stereo datasets viewer DESTINATION ${DTR_INSTALL_HEADERS} COMPONENT dev
-  FILES_MATCHING PATTERN "*.h" PATTERN shaders EXCLUDE PATTERN examples EXCLUDE PATTERN plaza EXCLUDE)
-install(DIRECTORY cli/pipeline DESTINATION ${DTR_INSTALL_HEADERS}/cli COMPONENT dev FILES_MATCHING PATTERN "*.h")
+install(DIRECTORY dtr capture calib stereo datasets viewer pipeline DESTINATION ${DTR_INSTALL_HEADERS} COMPONENT dev
+  FILES_MATCHING PATTERN "*.h" PATTERN shaders EXCLUDE PATTERN detail EXCLUDE PATTERN examples EXCLUDE PATTERN plaza EXCLUDE)
 set(config ${CMAKE_INSTALL_LIBDIR}/cmake/dtr)
 configure_package_config_file(cmake/dtrConfig.cmake.in ${PROJECT_BINARY_DIR}/dtrConfig.cmake
   INSTALL_DESTINATION ${config})

@@ -10,6 +10,7 @@
 #include "calib/colmap/database.h"
 #include "dtr/base/durable.h"
 #include "dtr/base/error.h"
+#include "dtr/base/memory_budget.h"
 #include "dtr/base/order_statistics.h"
 
 namespace dtr::colmap {
@@ -156,7 +157,7 @@ void ExtractBatch(Workspace& workspace, const std::filesystem::path& database,
 
 ExtractionPlan PlanExtraction(const std::vector<SfmImageInput>& images, int threads,
                               double memory_gb, int requested_side_px) {
-  const double limit_mib = kFill * memory_gb * 1024;
+  const double limit_mib = kFill * memory_gb * kBytesPerGigabyte / kMib;
   const LargestImage largest = LargestOf(images);
   ExtractionPlan plan;
   double side_px = requested_side_px > 0 ? requested_side_px : kPreferredSidePx;
@@ -170,7 +171,8 @@ ExtractionPlan PlanExtraction(const std::vector<SfmImageInput>& images, int thre
     throw UsageError(fmt::format(
         "--memory {:g}: expected at least {:.2f} (GB) for features of photos of this size; give as "
         "much, or smaller photos",
-        memory_gb, std::ceil(kShown * peak(side_px, 1) / kFill / 1024) / kShown));
+        memory_gb,
+        std::ceil(kShown * peak(side_px, 1) * kMib / kFill / kBytesPerGigabyte) / kShown));
   }
   plan.max_image_size_px = static_cast<int>(side_px);
   plan.threads = std::clamp(threads, 1, static_cast<int>(images.size()));

@@ -16,7 +16,7 @@ using ImagePairs = std::vector<std::pair<size_t, size_t>>;
 
 /// Matches the photos of `database`; an interrupted call may be repeated on the same database. Of
 /// the pairs that `matching` names only those of `allowed`, where it is given. Threads, and photos
-/// held at a time, are bounded by `memory_gb` (1e9 bytes).
+/// held at a time, are bounded by `memory_gb` (GB of 1e9 bytes).
 void MatchPhotos(Workspace& workspace, const std::filesystem::path& database, Matching matching,
                  double memory_gb, std::uint64_t seed,
                  const std::optional<ImagePairs>& allowed = {});

@@ -41,7 +41,7 @@ std::vector<size_t> Partners(const std::vector<int>& scores);
 
 /// Pairs (a < b, sorted) worth matching in full: every photo with its Partners and with the next in
 /// order, so that a chain through poor photos is not cut.
-/// As many photos at a time are held as fit into `memory_gb` (1e9 bytes), one at least; 0: no
+/// As many photos at a time are held as fit into `memory_gb` (GB of 1e9 bytes), one at least; 0: no
 /// bound. Deterministic for any number of threads. Throws Error when a photo cannot be read.
 std::vector<std::pair<size_t, size_t>> PreselectPairs(std::span<const std::filesystem::path> files,
                                                       int threads, double memory_gb,

@@ -8,7 +8,7 @@
 #include <unordered_map>
 
 #include "dtr/base/error.h"
-#include "dtr/io/formats/file_names.h"
+#include "dtr/base/file_names.h"
 
 namespace dtr::colmap {
 namespace {
@@ -49,7 +49,7 @@ void CheckImages(const RawModel& raw, const calib::SfmModel& model) {
   for (const calib::SfmImage& image : raw.images) {
     const auto where = fmt::format("{}: image {}", raw.images_file.string(), image.id);
     if (!ids.insert(image.id).second) Refuse(where, "expected a unique id, found it twice");
-    io::RequireSafeName(image.name, where + ": its name");  // it is put behind folders of photos
+    RequireSafeName(image.name, where + ": its name");  // it is put behind folders of photos
     if (!names.insert(image.name).second) {
       Refuse(where, fmt::format("expected a unique name, found '{}' twice", image.name));
     }

@@ -12,9 +12,9 @@
 #include "capture/video/frame_chooser.h"
 #include "capture/video/frames.h"
 #include "dtr/base/error.h"
+#include "dtr/base/file_names.h"
 #include "dtr/base/parallel_for.h"
-#include "dtr/io/formats/file_names.h"
-#include "dtr/io/formats/utf8.h"
+#include "dtr/base/utf8.h"
 #include "dtr/io/image_io.h"
 
 namespace dtr::capture {
@@ -270,7 +270,7 @@ Capture IngestVideos(const Videos& videos, const VideoOptions& options, const fs
   RequireOptions(options);
   for (const fs::path& video : videos) {
     const std::string name = video.filename().string();
-    if (io::IsUtf8(name) && io::WhyUnsafeName(name).empty()) continue;
+    if (IsUtf8(name) && WhyUnsafeName(name).empty()) continue;
     throw Error(video.string() + ": expected a video whose name is printable UTF-8; rename it");
   }
   std::vector<Videos> groups;

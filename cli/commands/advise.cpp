@@ -6,12 +6,12 @@
 
 #include "cli/command.h"
 #include "cli/output_file.h"
-#include "cli/pipeline/coverage_advice.h"
 #include "dtr/advise/advise.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/instants.h"
+#include "pipeline/advise.h"
 #include "viewer/advice_page.h"
 
 namespace dtr::cli {

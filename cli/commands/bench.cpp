@@ -7,14 +7,14 @@
 #include "cli/bench_tables.h"
 #include "cli/command.h"
 #include "cli/commands/bench_sweep.h"
-#include "cli/novel_frames.h"
 #include "cli/render_options.h"
 #include "cli/renderers.h"
-#include "cli/view_names.h"
 #include "dtr/base/machine.h"
 #include "dtr/eval/bench_json.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/instants.h"
+#include "pipeline/detail/render/novel_frames.h"
+#include "pipeline/view_names.h"
 #ifdef DTR_HAS_OSG
 #include "cli/osg_bench.h"
 #endif
@@ -45,7 +45,7 @@ eval::BenchOptions BenchOptionsOf(const BenchArguments& options, const RenderOpt
   bench.repeats = options.repeats;
   bench.cameras = options.cameras;
   bench.timed_camera = [size = options.size](const PinholeCamera& camera) {
-    return WithSize(camera, size);
+    return pipeline::WithSize(camera, size);
   };
   return bench;
 }
@@ -74,10 +74,10 @@ int RunGrowthTable(const BenchArguments& options, RenderOptions render, const Dt
     constexpr int kStepsOfPath = 9;
     novel = FlyThrough(set, kStepsOfPath)[kStepsOfPath / 2];
   } else {
-    const View& view = FindView(set, options.like);
+    const View& view = pipeline::FindView(set, options.like);
     novel = {view.camera, view.cam_from_world};
   }
-  novel.camera = WithSize(novel.camera, options.size);
+  novel.camera = pipeline::WithSize(novel.camera, options.size);
   const auto series =
       eval::MeasureGrowth(set, novel, {render, options.repeats}, renderer, context.console);
   const eval::BenchMachine machine = MachineOf(renderer);
@@ -108,7 +108,7 @@ int RunOsgTable(const BenchArguments& options, const RenderOptions& render,
   }
   DtrSet set = LoadWhole(options, context);
   std::vector<NovelCamera> path = FlyThrough(set, options.repeats);
-  for (NovelCamera& novel : path) novel.camera = WithSize(novel.camera, options.size);
+  for (NovelCamera& novel : path) novel.camera = pipeline::WithSize(novel.camera, options.size);
   const OsgBench bench = MeasureOnOsg(std::move(set), path, variants, context.console);
   const eval::BenchMachine machine{
       CpuModel(), static_cast<int>(std::thread::hardware_concurrency()), bench.renderer,

@@ -8,10 +8,6 @@
 #include <thread>
 
 #include "cli/number_checks.h"
-#include "cli/pipeline/calibration_sweep.h"
-#include "cli/pipeline/input_hash.h"
-#include "cli/pipeline/stereo_sweep.h"
-#include "cli/pipeline/storage_sweep.h"
 #include "cli/shell_words.h"
 #include "cli/sweep_output.h"
 #include "cli/sweep_store.h"
@@ -23,6 +19,10 @@
 #include "dtr/eval/render_sweep.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/option_arguments.h"
+#include "pipeline/detail/photos/input_hash.h"
+#include "pipeline/detail/sweeps/calibration_sweep.h"
+#include "pipeline/detail/sweeps/stereo_sweep.h"
+#include "pipeline/detail/sweeps/storage_sweep.h"
 
 namespace dtr::cli {
 namespace {

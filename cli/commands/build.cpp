@@ -6,10 +6,10 @@
 #include "cli/depth_options.h"
 #include "cli/metre_options.h"
 #include "cli/not_registered.h"
-#include "cli/pipeline/build_set.h"
-#include "cli/pipeline/force_stage.h"
 #include "cli/sfm_options.h"
 #include "cli/video_options.h"
+#include "pipeline/build.h"
+#include "pipeline/detail/run/force_stage.h"
 
 namespace dtr::cli {
 namespace {

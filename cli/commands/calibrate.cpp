@@ -10,12 +10,12 @@
 #include "cli/commands/calibrate_scale.h"
 #include "cli/metre_options.h"
 #include "cli/not_registered.h"
-#include "cli/pipeline/calibrated_photos.h"
-#include "cli/pipeline/lens_file.h"
-#include "cli/pipeline/model_grid.h"
 #include "cli/sfm_options.h"
 #include "dtr/base/error.h"
 #include "dtr/base/work_folder.h"
+#include "pipeline/calibrate.h"
+#include "pipeline/camera_file.h"
+#include "pipeline/detail/photos/model_grid.h"
 
 namespace dtr::cli {
 namespace {

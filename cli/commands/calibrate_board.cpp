@@ -7,9 +7,9 @@
 #include "calib/models/board_model.h"
 #include "cli/command.h"
 #include "cli/output_file.h"
-#include "cli/pipeline/board_calibration.h"
 #include "dtr/base/error.h"
 #include "dtr/base/order_statistics.h"
+#include "pipeline/calibrate_board.h"
 
 namespace dtr::cli {
 namespace {

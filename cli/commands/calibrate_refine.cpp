@@ -6,10 +6,10 @@
 #include "calib/colmap/model_io.h"
 #include "cli/command.h"
 #include "cli/metre_options.h"
-#include "cli/pipeline/known_metres.h"
-#include "cli/pipeline/lens_file.h"
-#include "cli/pipeline/model_grid.h"
 #include "dtr/base/error.h"
+#include "pipeline/camera_file.h"
+#include "pipeline/detail/photos/model_grid.h"
+#include "pipeline/metres.h"
 
 namespace dtr::cli {
 namespace {

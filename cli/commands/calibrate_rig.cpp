@@ -7,9 +7,9 @@
 #include "calib/judge/judge.h"
 #include "cli/command.h"
 #include "cli/output_file.h"
-#include "cli/pipeline/lens_file.h"
-#include "cli/pipeline/rig_calibration.h"
 #include "dtr/base/error.h"
+#include "pipeline/calibrate_rig.h"
+#include "pipeline/camera_file.h"
 
 namespace dtr::cli {
 namespace {

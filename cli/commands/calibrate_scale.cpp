@@ -4,11 +4,11 @@
 
 #include "cli/commands/calibrate_scale.h"
 #include "cli/metre_options.h"
-#include "cli/pipeline/scale_set.h"
-#include "cli/view_names.h"
 #include "dtr/base/error.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/instants.h"
+#include "pipeline/scale.h"
+#include "pipeline/view_names.h"
 
 namespace dtr::cli {
 namespace {
@@ -21,7 +21,7 @@ struct CalibrateScaleArguments {
 
 // The views of the set that somebody named.
 void NameViews(const DtrSet& set, pipeline::ScalePoint& point) {
-  for (pipeline::ScaleClick& click : point.clicks) click.view_id = FindView(set, click.view_id).id;
+  for (pipeline::ScaleClick& click : point.clicks) click.view_id = pipeline::FindView(set, click.view_id).id;
 }
 
 calib::Board MetricBoard(const std::string& text) {

@@ -5,12 +5,12 @@
 
 #include "capture/capture.h"
 #include "cli/command.h"
-#include "cli/pipeline/capture_page.h"
-#include "cli/pipeline/ingest.h"
 #include "cli/video_options.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/io/image_io.h"
+#include "pipeline/capture.h"
+#include "pipeline/detail/pages/capture_page.h"
 
 namespace dtr::cli {
 namespace {

@@ -6,7 +6,6 @@
 #include <optional>
 
 #include "cli/command.h"
-#include "cli/pipeline/depth_evaluation.h"
 #include "cli/render_options.h"
 #include "cli/renderers.h"
 #include "dtr/eval/held_out.h"
@@ -14,6 +13,7 @@
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/instants.h"
+#include "pipeline/evaluate_depth.h"
 
 namespace dtr::cli {
 namespace {

@@ -7,13 +7,13 @@
 #include "calib/colmap/model_io.h"
 #include "cli/command.h"
 #include "cli/output_file.h"
-#include "cli/pipeline/points_from_depth.h"
 #include "dtr/base/durable.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/base/work_folder.h"
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
+#include "pipeline/detail/depth/points_from_depth.h"
 
 namespace dtr::cli {
 namespace {

@@ -7,15 +7,15 @@
 #include "capture/ingest.h"
 #include "cli/command.h"
 #include "cli/number_checks.h"
-#include "cli/pipeline/camera_distortion.h"
-#include "cli/pipeline/camera_files.h"
-#include "cli/pipeline/import_photos.h"
-#include "cli/pipeline/kept_notes.h"
-#include "cli/pipeline/known_poses.h"
 #include "dtr/base/error.h"
 #include "dtr/base/temporary_folder.h"
-#include "dtr/io/formats/import_views.h"
 #include "dtr/io/set_io.h"
+#include "pipeline/detail/cameras/camera_distortion.h"
+#include "pipeline/detail/cameras/camera_files.h"
+#include "pipeline/detail/cameras/known_poses.h"
+#include "pipeline/detail/photos/import_photos.h"
+#include "pipeline/detail/run/kept_notes.h"
+#include "pipeline/import.h"
 
 namespace dtr::cli {
 namespace {
@@ -26,7 +26,7 @@ using Json = nlohmann::ordered_json;
 struct ImportArguments {
   fs::path cameras, output;
   std::string format, depth_kind;
-  io::ImportOptions import;
+  pipeline::ImportOptions import;
   std::string held_out;
   bool allow_missing = false, force = false;
 };
@@ -166,8 +166,8 @@ int RunImport(ImportArguments options, const Context& context) {
   context.console.Note(capture::LineOf(contents));
   FindPoints(options, context, cameras, progress);
   const io::AlphaTotals alpha =
-      io::ImportSet(cameras.list, options.import, options.output, options.force,
-                    cameras.points ? &*cameras.points : nullptr, progress);
+      pipeline::ImportSet(cameras.list, options.import, options.output, options.force,
+                          cameras.points ? &*cameras.points : nullptr, progress);
   context.console.Say(fmt::format("{}: {} views, {} held out", options.output.string(),
                                   cameras.list.cameras.size(), options.import.held_out.size()));
   context.EmitJson(

@@ -9,15 +9,15 @@
 
 #include "cli/command.h"
 #include "cli/output_file.h"
-#include "cli/pipeline/validate_set.h"
 #include "cli/render_options.h"
-#include "cli/set_stream.h"
 #include "cli/sweep_output.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/io/run_record.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/instants.h"
+#include "pipeline/detail/render/set_stream.h"
+#include "pipeline/validate.h"
 #include "viewer/inspect_page.h"
 
 namespace dtr::cli {
@@ -125,7 +125,7 @@ int RunInspect(const InspectArguments& options, const Context& context) {
     };
   }
   io::CollapseDuplicates(set);
-  const auto stream = StreamOf(options.set, set, {DescribeRenderScene(set)},
+  const auto stream = pipeline::StreamOf(options.set, set, {DescribeRenderScene(set)},
                                {options.memory_gb, threads}, context.console);
   RenderOptions render = StoredRenderOptions(set);
   render.threads = threads;
@@ -150,7 +150,8 @@ void AddInspectCommand(CLI::App& app) {
                         "Folder that dtr bench wrote; its plots and findings go on the page "
                         "[NAME-bench beside the set, where it is]")
             ->type_name("DIR");
-        AddMemoryOption(command, options->memory_gb);
+        AddMemoryOption(command, options->memory_gb,
+                        "Memory for the views' pixels; others are dropped and read again [4]");
         return [options](const Context& context) { return RunInspect(*options, context); };
       });
 }

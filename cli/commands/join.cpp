@@ -4,8 +4,8 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/command.h"
-#include "cli/join_sets.h"
 #include "cli/number_checks.h"
+#include "pipeline/join.h"
 
 namespace dtr::cli {
 
@@ -13,7 +13,7 @@ void AddJoinCommand(CLI::App& app) {
   struct Options {
     std::vector<std::filesystem::path> sets;
     std::filesystem::path output;
-    JoinOptions join;
+    pipeline::JoinOptions join;
   };
   AddCommand(
       app, "join", "Make a moving set of sets of single instants, in their order",
@@ -31,9 +31,9 @@ void AddJoinCommand(CLI::App& app) {
         command.add_flag("--force", options->join.force, "Replace a set that exists");
         return [options](const Context& context) -> int {
           context.console.KeepsWork();
-          JoinOptions join = options->join;
+          pipeline::JoinOptions join = options->join;
           join.threads = context.common.threads;
-          JoinSets(options->sets, options->output, join, context.console);
+          pipeline::JoinSets(options->sets, options->output, join, context.console);
           context.console.Say(
               fmt::format("{}: {} frames", options->output.string(), options->sets.size()));
           context.EmitJson(

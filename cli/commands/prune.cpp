@@ -5,11 +5,11 @@
 
 #include "cli/command.h"
 #include "cli/number_checks.h"
-#include "cli/pipeline/prune_set.h"
 #include "cli/render_options.h"
 #include "cli/renderers.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/option_arguments.h"
+#include "pipeline/prune.h"
 
 namespace dtr::cli {
 namespace {

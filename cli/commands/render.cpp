@@ -8,8 +8,6 @@
 #include <string>
 
 #include "cli/command.h"
-#include "cli/moving_scene.h"
-#include "cli/novel_frames.h"
 #include "cli/output_file.h"
 #include "cli/render_options.h"
 #include "cli/renderers.h"
@@ -21,6 +19,8 @@
 #include "dtr/render/instants.h"
 #include "dtr/render/scene.h"
 #include "dtr/render/view_stream.h"
+#include "pipeline/detail/render/dynamic_scene.h"
+#include "pipeline/detail/render/novel_frames.h"
 
 namespace dtr::cli {
 namespace {
@@ -29,7 +29,7 @@ namespace fs = std::filesystem;
 
 struct RenderCommandArguments {
   fs::path set, output, depth_out, coverage_out;
-  NovelCameraRequest request;
+  pipeline::NovelCameraRequest request;
   std::string exclude;
   std::optional<size_t> frame;  ///< of a moving set
   bool play = false;
@@ -48,7 +48,7 @@ class FrameSink {
       fs::create_directories(output);
     }
   }
-  std::string Add(const NovelFrame& camera, const RenderResult& result, bool filled) {
+  std::string Add(const pipeline::NovelFrame& camera, const RenderResult& result, bool filled) {
     if (video_) {
       video_->Add(result.image);
       return output_.string();
@@ -111,14 +111,14 @@ nlohmann::ordered_json FrameJson(const std::string& file, double ms, size_t show
 }
 
 // With --play, one camera sees every frame of the set.
-std::vector<NovelFrame> CamerasOf(const RenderCommandArguments& options, const DtrSet& set) {
-  std::vector<NovelFrame> cameras =
-      NovelFrames(AtFrame(set, options.frame.value_or(0)), options.request);
+std::vector<pipeline::NovelFrame> CamerasOf(const RenderCommandArguments& options, const DtrSet& set) {
+  std::vector<pipeline::NovelFrame> cameras =
+      pipeline::NovelFrames(AtFrame(set, options.frame.value_or(0)), options.request);
   if (!options.play) return cameras;
   if (cameras.size() != 1 || options.frame) {
     throw UsageError("--play: expected --like or --camera with it, and no --frame");
   }
-  std::vector<NovelFrame> all(set.frames.size(), cameras.front());
+  std::vector<pipeline::NovelFrame> all(set.frames.size(), cameras.front());
   for (size_t i = 0; i < all.size(); ++i) all[i].name = fmt::format("{:06}", i);
   return all;
 }
@@ -139,8 +139,8 @@ int RunRender(const RenderCommandArguments& options, const Context& context) {
   render.threads = context.common.threads;
   // Before anything is loaded: a machine without OpenGL should say so at once.
   const eval::RenderFunction render_view = MakeRenderer(options.renderer, context.console);
-  MovingScene moving(options.set, described, options.exclude, {options.memory_gb, render.threads},
-                     context.console);
+  pipeline::DynamicScene moving(options.set, described, options.exclude, {options.memory_gb, render.threads},
+                      context.console);
   moving.At(FrameShown(options, described, 0, cameras.size()));  // names are checked here
 
   FrameSink sink(options.output, several);
@@ -218,7 +218,8 @@ void AddRenderCommand(CLI::App& app) {
         command.add_option("--exclude", options->exclude, "Views not to render from")
             ->type_name("NAME,...");
         AddRendererOptions(command, options->renderer);
-        AddMemoryOption(command, options->memory_gb);
+        AddMemoryOption(command, options->memory_gb,
+                        "Memory for the views' pixels; others are dropped and read again [4]");
         command.add_option("--depth-out", options->depth_out, "Write the depth as float EXR")
             ->type_name("FILE");
         command.add_option("--coverage-out", options->coverage_out, "Write what was seen as PNG")

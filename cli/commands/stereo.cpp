@@ -5,7 +5,7 @@
 
 #include "cli/command.h"
 #include "cli/depth_options.h"
-#include "cli/pipeline/recompute_depth.h"
+#include "pipeline/stereo.h"
 
 namespace dtr::cli {
 

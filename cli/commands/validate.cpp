@@ -7,12 +7,12 @@
 #include "cli/commands/validate_calibration.h"
 #include "cli/number_checks.h"
 #include "cli/output_file.h"
-#include "cli/pipeline/validate_set.h"
-#include "cli/pipeline/validation_page.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/instants.h"
+#include "pipeline/detail/pages/validation_page.h"
+#include "pipeline/validate.h"
 
 namespace dtr::cli {
 namespace {

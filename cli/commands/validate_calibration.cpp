@@ -7,9 +7,9 @@
 #include "calib/boards/board.h"
 #include "calib/boards/length.h"
 #include "cli/output_file.h"
-#include "cli/pipeline/judge_calibration.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
+#include "pipeline/validate_calibration.h"
 
 namespace dtr::cli {
 namespace {

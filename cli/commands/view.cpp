@@ -9,21 +9,22 @@
 #include <string>
 
 #include "cli/command.h"
-#include "cli/novel_frames.h"
 #include "cli/output_file.h"
-#include "cli/pipeline/validate_set.h"
 #include "cli/render_options.h"
 #include "cli/renderers.h"
-#include "cli/set_stream.h"
 #include "cli/shell_words.h"
-#include "cli/view_names.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/base/machine.h"
+#include "dtr/base/memory_budget.h"
 #include "dtr/io/set_io.h"
 #include "dtr/io/verdict.h"
 #include "dtr/render/instants.h"
 #include "dtr/render/option_arguments.h"
+#include "pipeline/detail/render/novel_frames.h"
+#include "pipeline/detail/render/set_stream.h"
+#include "pipeline/validate.h"
+#include "pipeline/view_names.h"
 #include "viewer/glfw/app.h"
 #include "viewer/governor.h"
 
@@ -35,7 +36,7 @@ using Json = nlohmann::ordered_json;
 
 struct Options {
   fs::path set, output = ".", screenshot, state_file;
-  NovelCameraRequest request;
+  pipeline::NovelCameraRequest request;
   std::string size = "1280x800", exclude;
   RendererChoice renderer;
   double memory_gb = 4;
@@ -51,7 +52,7 @@ std::unique_ptr<viewer::OpenedSet> Open(const Options& options, const Context& c
   opened->set = io::ReadSet(options.set);
   opened->defaults = StoredRenderOptions(opened->set);
   io::CollapseDuplicates(opened->set);
-  opened->stream = StreamOf(options.set, opened->set, DescribeFrames(opened->set, {}),
+  opened->stream = pipeline::StreamOf(options.set, opened->set, DescribeFrames(opened->set, {}),
                             {options.memory_gb, context.common.threads}, context.console);
   return opened;
 }
@@ -221,9 +222,9 @@ std::string ViewStampOf(const fs::path& set, const View& view) {
   return stamp;
 }
 
-std::vector<NovelCamera> CamerasOf(const std::vector<NovelFrame>& frames) {
+std::vector<NovelCamera> CamerasOf(const std::vector<pipeline::NovelFrame>& frames) {
   std::vector<NovelCamera> cameras;
-  for (const NovelFrame& frame : frames) cameras.push_back({frame.camera, frame.cam_from_world});
+  for (const pipeline::NovelFrame& frame : frames) cameras.push_back({frame.camera, frame.cam_from_world});
   return cameras;
 }
 
@@ -233,9 +234,9 @@ viewer::Host MakeHost(const Options& options, const Context& context) {
   host.stamp = [&] { return FileStamp(options.set / "set.json"); };  // written last
   host.view_stamp = [&](const View& view) { return ViewStampOf(options.set, view); };
   host.read_path = [](const DtrSet& set, const fs::path& file) {
-    NovelCameraRequest request;
+    pipeline::NovelCameraRequest request;
     request.path_file = file;
-    return CamerasOf(NovelFrames(AtFrame(set, 0), request));
+    return CamerasOf(pipeline::NovelFrames(AtFrame(set, 0), request));
   };
   host.load_sigma = [&](const View& view) {
     View with_sigma = view;
@@ -275,8 +276,8 @@ gl::Drawer DrawerOf(const std::string& renderer) {
 
 viewer::AppSettings SettingsOf(const Options& options, const Context& context, const DtrSet& set) {
   viewer::AppSettings settings;
-  settings.hidden = ResolveViewNames(AtFrame(set, options.instant), options.exclude);
-  const PinholeCamera size = WithSize({1280, 800, 1, 1, 0, 0}, options.size);
+  settings.hidden = pipeline::ResolveViewNames(AtFrame(set, options.instant), options.exclude);
+  const PinholeCamera size = pipeline::WithSize({1280, 800, 1, 1, 0, 0}, options.size);
   settings.warning = io::VerdictWarning(set);
   settings.title = WithoutTrailingSlash(options.set).filename().string() + " - dtr view";
   if (!settings.warning.empty()) settings.title += " - " + settings.warning;
@@ -298,12 +299,12 @@ viewer::AppSettings SettingsOf(const Options& options, const Context& context, c
   settings.laps = options.laps;
   settings.largest_divisor = options.largest_divisor;
   settings.screenshot = options.screenshot;
-  const NovelCameraRequest& request = options.request;
+  const pipeline::NovelCameraRequest& request = options.request;
   if (request.like.empty() && request.camera_file.empty() && request.path_file.empty() &&
       request.fly_through_frames == 0) {
     return settings;
   }
-  const std::vector<NovelFrame> frames = NovelFrames(AtFrame(set, options.instant), request);
+  const std::vector<pipeline::NovelFrame> frames = pipeline::NovelFrames(AtFrame(set, options.instant), request);
   settings.start = NovelCamera{frames.front().camera, frames.front().cam_from_world};
   if (frames.size() > 1) settings.play = CamerasOf(frames);
   return settings;
@@ -399,7 +400,8 @@ void AddViewCommand(CLI::App& app) {
                         "Keep FILE telling, as JSON, what the window shows; for scripts")
             ->type_name("FILE");
         AddWindowRendererOptions(command, options->renderer);
-        AddMemoryOption(command, options->memory_gb);
+        AddMemoryOption(command, options->memory_gb,
+                        "Memory for the views' pixels; others are dropped and read again [4]");
         options->render = AddRenderOptions(command);
         return [options, &command](const Context& context) {
           UseStoredArguments(command, io::ReadSet(options->set), *options->render);

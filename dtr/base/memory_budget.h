@@ -5,6 +5,9 @@
 
 namespace dtr {
 
+/// The unit of every limit on memory, on the command line too.
+inline constexpr double kBytesPerGigabyte = 1e9;
+
 /// What a decoded photo takes at most while it is looked at, turned or written: its pixels as they
 /// come, as 8 bits, and once more as what they become.
 inline constexpr double kBytesPerPhotoPixel = 16;
@@ -13,8 +16,8 @@ inline constexpr double kBytesPerPhotoPixel = 16;
 /// that is larger than all of the room is let through alone: it is work that must be done.
 class MemoryBudget {
  public:
-  /// In 1e9 bytes; 0: no bound.
-  explicit MemoryBudget(double gb) : room_bytes_(gb * 1e9) {}
+  /// In gigabytes; 0: no bound.
+  explicit MemoryBudget(double gb) : room_bytes_(gb * kBytesPerGigabyte) {}
 
   /// Given back at the end of its scope.
   class Share {

@@ -5,8 +5,8 @@
 #include <set>
 
 #include "dtr/base/error.h"
+#include "dtr/base/file_names.h"
 #include "dtr/io/depth_io.h"
-#include "dtr/io/formats/file_names.h"
 #include "dtr/io/held_out_files.h"
 #include "dtr/io/json_fields.h"
 

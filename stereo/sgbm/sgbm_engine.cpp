@@ -5,6 +5,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "dtr/base/memory_budget.h"
 #include "dtr/base/parallel_for.h"
 #include "stereo/sgbm/fuse.h"
 #include "stereo/sgbm/planes.h"
@@ -50,7 +51,7 @@ int PairsAtOnce(const std::vector<Pair>& pairs, const EngineOptions& options) {
     largest = std::max(
         largest, kBytesPerCell * p.camera.width_px() * p.camera.height_px() * p.FullSweep(0).steps);
   }
-  return static_cast<int>(std::clamp(options.memory_gb * 1e9 / largest, 1.0, 1e6));
+  return static_cast<int>(std::clamp(options.memory_gb * kBytesPerGigabyte / largest, 1.0, 1e6));
 }
 
 void CheckSgbmRequest(std::span<const StereoView> views, int reference,

@@ -11,7 +11,7 @@
 #include "calib/bundle/metric_refine.h"
 #include "calib/colmap/model_io.h"
 #include "calib/similarity.h"
-#include "cli/pipeline/photo_places.h"
+#include "pipeline/detail/photos/photo_places.h"
 
 namespace {
 

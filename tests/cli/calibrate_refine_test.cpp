@@ -9,7 +9,7 @@
 #include <numbers>
 
 #include "calib/colmap/model_io.h"
-#include "cli/pipeline/known_metres.h"
+#include "pipeline/metres.h"
 #include "tests/calib/bundle/synthetic_bundle.h"
 #include "tests/cli/gps_photo.h"
 #include "tests/cli/run_dtr.h"

@@ -108,7 +108,7 @@ std::vector<Thrown> ThrownBy(const fs::path& file) {
 
 std::vector<Thrown> EverythingThrown() {
   std::vector<Thrown> all;
-  for (const char* folder : {"calib", "capture", "cli", "datasets", "dtr", "stereo", "viewer"}) {
+  for (const char* folder : {"calib", "capture", "cli", "datasets", "dtr", "pipeline", "stereo", "viewer"}) {
     for (const auto& entry : fs::recursive_directory_iterator(folder)) {
       const std::string extension = entry.path().extension().string();
       if (extension != ".cpp" && extension != ".h") continue;

@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 
 #include "calib/colmap/model_io.h"
-#include "cli/pipeline/depth_precision.h"
 #include "dtr/io/set_io.h"
+#include "pipeline/detail/depth/depth_precision.h"
 #include "tests/calib/colmap/fake_colmap.h"
 #include "tests/cli/run_dtr.h"
 #include "tests/cli/small_courtyard.h"

@@ -4,7 +4,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "cli/pipeline/rig_names.h"
+#include "pipeline/detail/boards/rig_names.h"
 #include "tests/cli/chessboard_set.h"
 
 namespace dtr::testing {

@@ -4,9 +4,9 @@
 #include "calib/models/board_model.h"
 #include "capture/capture_json.h"
 #include "capture/photo.h"
-#include "cli/pipeline/grid_files.h"
 #include "datasets/make.h"
 #include "dtr/base/files.h"
+#include "pipeline/detail/depth/grid_files.h"
 #include "tests/calib/solve/synthetic_views.h"
 #include "tests/fuzz/readers.h"
 

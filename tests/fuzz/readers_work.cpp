@@ -1,14 +1,14 @@
 // What a run leaves for the next one, and for reports. Ours, but on disks that others write to.
 #include <nlohmann/json.hpp>
 
-#include "cli/pipeline/depth_settings.h"
-#include "cli/pipeline/prune_journal.h"
-#include "cli/pipeline/rig_timestamps.h"
 #include "cli/sweep_facts.h"
 #include "cli/sweep_store.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/io/run_record.h"
+#include "pipeline/depth_settings.h"
+#include "pipeline/detail/boards/rig_timestamps.h"
+#include "pipeline/detail/run/prune_journal.h"
 #include "tests/fuzz/readers.h"
 
 namespace dtr::fuzz {

@@ -6,8 +6,8 @@
 #include <stdexcept>
 
 #include "dtr/base/error.h"
+#include "dtr/base/file_names.h"
 #include "dtr/base/files.h"
-#include "dtr/io/formats/file_names.h"
 #include "dtr/io/formats/json_fields.h"
 #include "dtr/io/formats/pose_from_matrix.h"
 

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "dtr/base/error.h"
-#include "dtr/io/formats/file_names.h"
+#include "dtr/base/file_names.h"
 #include "dtr/io/formats/npy.h"
 #include "dtr/io/formats/pose_from_matrix.h"
 

@@ -4,8 +4,8 @@
 #include <set>
 
 #include "dtr/base/error.h"
+#include "dtr/base/file_names.h"
 #include "dtr/io/formats/cameras_json.h"
-#include "dtr/io/formats/file_names.h"
 #include "dtr/io/formats/pose_from_matrix.h"
 #include "dtr/io/formats/text_numbers.h"
 

@@ -8,8 +8,8 @@
 #include <set>
 
 #include "dtr/base/error.h"
+#include "dtr/base/file_names.h"
 #include "dtr/base/files.h"
-#include "dtr/io/formats/file_names.h"
 #include "dtr/io/formats/json_fields.h"
 #include "dtr/io/formats/pose_from_matrix.h"
 #include "dtr/io/formats/transforms_lens.h"

@@ -10,9 +10,9 @@
 #include "dtr/base/files.h"
 #include "dtr/io/depth_io.h"
 #include "dtr/io/formats/foreign_depth.h"
-#include "dtr/io/formats/import_views.h"
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
+#include "pipeline/import.h"
 #include "tests/io/formats/residuals.h"
 #include "tests/support/test_data.h"
 
@@ -237,11 +237,11 @@ TEST(ConvertLego, TheResultImportsAsASet) {
   DTR_REQUIRE_DATA(source);
   Converted set("lego", source);
   set.list.cameras.erase(set.list.cameras.begin() + 3, set.list.cameras.end());
-  io::ImportOptions options;
+  pipeline::ImportOptions options;
   options.images_dir = set.out / "images";
   options.depth_dir = set.out / "depth";
   SilentProgress progress;
-  io::ImportSet(set.list, options, set.folder / "lego.dtr", false, nullptr, progress);
+  pipeline::ImportSet(set.list, options, set.folder / "lego.dtr", false, nullptr, progress);
   const DtrSet loaded = io::LoadSet(set.folder / "lego.dtr");
   ASSERT_EQ(loaded.frames.at(0).views.size(), 3u);
   EXPECT_LT(loaded.scene_center.norm(), 1.0);  // the model stands on the origin, cameras at 4

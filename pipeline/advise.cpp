@@ -1,0 +1,52 @@
+#include "pipeline/advise.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "dtr/io/set_io.h"
+
+namespace dtr::pipeline {
+
+std::vector<advise::CoarseView> CoarseViewsOf(const std::filesystem::path& folder,
+                                              const DtrSet& set, int threads, Progress& progress) {
+  const auto& views = set.frames.front().views;
+  progress.Stage("reading depth", static_cast<int>(views.size()));
+  std::vector<advise::CoarseView> coarse;
+  int done = 0;
+  for (const View& view : views) {
+    progress.ThrowIfInterrupted();
+    if (view.role == ViewRole::kSource && view.depth_file) {
+      View loaded = view;
+      io::LoadOptions load;
+      load.images = false;
+      load.threads = threads;
+      io::LoadPixels(folder, loaded, load);
+      coarse.push_back(advise::MakeCoarse(loaded, advise::kCoarseSidePx));
+    }
+    progress.Update(++done);
+  }
+  return coarse;
+}
+
+std::vector<std::string> AdviceLines(const advise::Advice& advice) {
+  const auto poor = std::ranges::count_if(advice.places, &advise::Place::poor);
+  std::string missing =
+      fmt::format("coverage: {} of {} places between and beyond the cameras are poor", poor,
+                  advice.places.size());
+  if (!advice.add.empty()) {
+    const advise::Place& place = advice.places[advice.add.front().place];
+    missing += fmt::format(
+        "; most is gained by a camera {}, where {:.0f} % of what it sees is in no photo and the "
+        "nearest photo within {:.0f} degrees",
+        place.where, 100 * place.unseen_share, place.gap_deg);
+  }
+  std::string redundant = "coverage: every camera shows something of its own";
+  if (!advice.redundant.empty()) {
+    redundant = fmt::format("coverage: {} of the cameras add nothing, first {}",
+                            advice.redundant.size(), advice.redundant.front().name);
+  }
+  return {missing, redundant};
+}
+
+}  // namespace dtr::pipeline

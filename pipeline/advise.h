@@ -1,0 +1,21 @@
+// pipeline/advise.h -- what dtr/advise says of a set on disk.
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "dtr/advise/advise.h"
+#include "dtr/types/dtr_set.h"
+
+namespace dtr::pipeline {
+
+/// The source views of a set that have depth, coarse; pixels of one view in memory at a time. `set`
+/// is of `folder`, without copies of views.
+std::vector<advise::CoarseView> CoarseViewsOf(const std::filesystem::path& folder,
+                                              const DtrSet& set, int threads, Progress& progress);
+
+/// "3 of 40 places ... are poor", and what is to be done about it: two lines for who reads on in
+/// `dtr advise`. The same for any number of threads.
+std::vector<std::string> AdviceLines(const advise::Advice& advice);
+
+}  // namespace dtr::pipeline

@@ -1,0 +1,448 @@
+#include "pipeline/build.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "calib/sparse_from_sfm.h"
+#include "capture/duplicates.h"
+#include "capture/ingest.h"
+#include "capture/store.h"
+#include "capture/video/frames.h"
+#include "dtr/base/error.h"
+#include "dtr/base/hash.h"
+#include "dtr/base/machine.h"
+#include "dtr/base/parallel_for.h"
+#include "dtr/eval/json.h"
+#include "dtr/io/set_io.h"
+#include "dtr/io/verdict.h"
+#include "pipeline/advise.h"
+#include "pipeline/calibrate.h"
+#include "pipeline/capture.h"
+#include "pipeline/detail/depth/depth_engine.h"
+#include "pipeline/detail/depth/depth_stage.h"
+#include "pipeline/detail/pages/set_page.h"
+#include "pipeline/detail/photos/holdout.h"
+#include "pipeline/detail/photos/input_hash.h"
+#include "pipeline/detail/photos/model_grid.h"
+#include "pipeline/detail/photos/undistort_photos.h"
+#include "pipeline/detail/run/build_options.h"
+#include "pipeline/detail/run/finishing.h"
+#include "pipeline/detail/run/force_stage.h"
+#include "pipeline/detail/run/kept_notes.h"
+#include "pipeline/detail/run/run_log.h"
+#include "pipeline/validate.h"
+
+namespace dtr::pipeline {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::vector<std::string> NamesOf(const capture::Capture& capture) {
+  std::vector<std::string> names;
+  for (const capture::Photo& photo : capture.photos) names.push_back(photo.name);
+  return names;
+}
+
+Json OptionsJson(const BuildOptions& options, const stereo::Effort& effort) {
+  // Everything that can change a byte of the set, and nothing else: threads and memory do not.
+  Json json = SettingsJson(options.depth.engine, effort);
+  json["max_size_px"] = options.max_size_px;
+  json["holdout"] = options.holdout;
+  json["holdout_strict"] = options.holdout_strict;
+  json["poses"] = options.poses.filename().string();
+  json["refine"] = options.refine;
+  if (options.keep_duplicates) json["keep_duplicates"] = true;
+  if (!options.rig.empty()) json["rig"] = options.rig.filename().string();
+  if (options.metres.any()) json["metres"] = Json::parse(ToJson(options.metres));
+  SfmChoice plain;
+  plain.features = colmap::kMostFeatures;
+  if (options.sfm != plain) json["sfm"] = Json::parse(ToJson(options.sfm));
+  json["seed"] = options.seed;
+  if (options.depth.depth_error_px) json["depth_error_px"] = *options.depth.depth_error_px;
+  return json;
+}
+
+// Photos by name, size and content: equal values mean the same input. Hashes of held-out photos are
+// for the fingerprint alone: nothing of their pixels may enter the set outside held_out/.
+Json PhotosJson(const capture::Capture& capture, const std::vector<bool>& with_hash) {
+  Json photos = Json::array();
+  for (size_t i = 0; i < capture.photos.size(); ++i) {
+    const capture::Photo& photo = capture.photos[i];
+    photos.push_back(
+        {{"name", photo.name}, {"width_px", photo.width_px}, {"height_px", photo.height_px}});
+    if (with_hash[i]) photos.back()["sha256"] = photo.source_sha256;
+    if (with_hash[i] && !photo.mask_sha256.empty()) {
+      photos.back()["mask_sha256"] = photo.mask_sha256;
+    }
+    if (const auto& frame = photo.video_frame) {
+      photos.back()["video"] = frame->video;
+      photos.back()["frame"] = frame->number;
+    }
+  }
+  return photos;
+}
+
+// What a capture holds now, as its list only tells what its photos were made of.
+Json StoredHashes(const capture::Capture& capture) {
+  Json hashes = Json::array();
+  for (const capture::Photo& photo : capture.photos) {
+    hashes.push_back(Sha256OfFile(photo.file));
+    if (!photo.mask_file.empty()) hashes.push_back(Sha256OfFile(photo.mask_file));
+  }
+  return hashes;
+}
+
+// The sizes that photos for SfM have, or frames of the videos will.
+std::vector<std::pair<int, int>> SizesOf(const BuildOptions& options,
+                                         const capture::Capture& photos,
+                                         const std::vector<bool>& held_out) {
+  std::vector<std::pair<int, int>> sizes;
+  for (const std::filesystem::path& file : capture::VideosOf(options.photos)) {
+    capture::VideoReader video(file);
+    if (!video.Next()) continue;
+    const ImageRgb8 picture = video.Picture();
+    sizes.emplace_back(picture.width(), picture.height());
+  }
+  for (size_t i = 0; i < photos.photos.size(); ++i) {
+    if (options.holdout_strict && held_out[i]) continue;
+    sizes.emplace_back(photos.photos[i].width_px, photos.photos[i].height_px);
+  }
+  return sizes;
+}
+
+// What a video is known by before its frames are chosen: equal values give the same frames.
+Json VideoJson(const BuildOptions& options) {
+  return {{"sha256", InputHash(capture::VideosOf(options.photos))},
+          {"every", options.video.every},
+          {"motion", options.video.motion},
+          {"max_frames", options.video.most},
+          {"synchronised", options.video.synchronised}};
+}
+
+// The frames of a video, chosen once: a later run of the same build finds them in `folder`.
+capture::Capture FramesOf(const BuildOptions& options, const std::filesystem::path& folder,
+                          Progress& progress) {
+  const std::filesystem::path kept = folder / "capture", fresh = folder / "frames";
+  if (!std::filesystem::exists(kept / capture::kCaptureFile)) {
+    capture::VideoOptions video = options.video;
+    video.threads = options.threads;
+    video.memory_gb = options.depth.memory_gb.value_or(kDefaultMemoryGb);
+    const capture::Capture frames = Ingest(
+        options.photos, video, [&] { return fresh; }, progress);
+    capture::WriteCapture(
+        frames, kept, {.replace = false, .threads = options.threads, .memory_gb = video.memory_gb},
+        progress);
+    std::filesystem::remove_all(fresh);
+  }
+  return capture::ReadCapture(kept);
+}
+
+SparseScene SparseOf(const CalibratedPhotos& calibrated, const std::vector<View>& views) {
+  std::vector<std::string> names;
+  std::vector<PinholeCamera> cameras;
+  for (const View& view : views) {
+    names.push_back(view.name);
+    cameras.push_back(view.camera);
+  }
+  return calib::ToSparseScene(calibrated.model, names, cameras);
+}
+
+// The points that the source views alone would know: held-out photos move nothing.
+std::vector<SparsePoint> SourcePoints(const SparseScene& sparse, const std::vector<View>& views) {
+  std::vector<bool> is_source;
+  for (const View& view : views) is_source.push_back(view.role == ViewRole::kSource);
+  return RestrictToViews(sparse, is_source).points;
+}
+
+// Photos that are there twice add nothing, and would show what is held out. Given places say that
+// they are photos of their own; those of a rig belong to its instants.
+void LeaveOutSamePictures(const BuildOptions& options, capture::Capture& photos,
+                          Progress& progress) {
+  if (options.keep_duplicates || !options.poses.empty() || !options.rig.empty()) return;
+  const auto left_out = capture::DropSamePictures(
+      photos, [&](const std::string& name) { return IsNamed(options.holdout, name); });
+  for (const auto& [name, same_as] : left_out) {
+    progress.Note(name + " left out: it has the same pixels as " + same_as);
+  }
+}
+
+void RequireTwoSources(const capture::Capture& capture, const std::vector<bool>& held_out,
+                       const CalibratedPhotos& calibrated) {
+  int sources = 0;
+  for (size_t i = 0; i < capture.photos.size(); ++i) {
+    const auto& images = calibrated.model.images;
+    sources += !held_out[i] && std::any_of(images.begin(), images.end(), [&](const auto& image) {
+      return image.name == capture.photos[i].name;
+    });
+  }
+  if (sources >= 2) return;
+  throw Error(
+      fmt::format("calibration: expected at least 2 photos to build from, found {} with a camera "
+                  "({} photos have "
+                  "none); take more overlapping photos or give --poses",
+                  sources, calibrated.not_registered.size()));
+}
+
+Json ProvenanceJson(const BuildOptions& options, const Json& option_values, const Json& photos,
+                    const CalibratedPhotos& calibrated, const BuildReport& report) {
+  Json provenance;
+  provenance["tool"] = "dtr";
+  provenance["tool_version"] = DTR_VERSION;
+  provenance["calibration"] = Json::parse(calibrated.report_json);
+  provenance["calibration"]["engine"] = calibrated.engine;
+  if (!calibrated.scale_json.empty()) {
+    provenance["scale"] = Json::array({Json::parse(calibrated.scale_json)});
+  }
+  provenance["depth_engine"] = options.depth.engine;
+  provenance["options"] = option_values;
+  provenance["photos"] = photos;
+  provenance["not_registered"] = report.not_registered;
+  provenance["held_out_not_registered"] = report.held_out_not_registered;
+  provenance["skipped"] = Json::array();
+  for (const auto& [name, reason] : report.skipped) {
+    provenance["skipped"].push_back({{"name", name}, {"reason", reason}});
+  }
+  return provenance;
+}
+
+// The reprojection tests of every calibrated photo, held-out ones included.
+calib::ValidationReport Validate(const std::filesystem::path& folder, DtrSet& set,
+                                 const SparseScene& sparse, double memory_gb, BuildReport& report,
+                                 int threads, Progress& progress) {
+  SetLimits limits;
+  limits.memory_gb = std::min(limits.memory_gb, memory_gb);
+  calib::ValidationReport validation = ValidateSet(folder, set, sparse, limits, threads, progress);
+  report.validated = true;
+  report.validation_passed = validation.passed();
+  set.verdict_json = eval::VerdictJson(validation.tests);
+  if (!report.validation_passed) {
+    progress.Note(io::VerdictWarning(set));
+  }
+  return validation;
+}
+
+// Where the capture is thin, from the depth that was found. Kept out of set.json: it says nothing
+// that `dtr advise` would not find in the set.
+void AdviseOn(const std::filesystem::path& folder, DtrSet set, BuildReport& report, int threads,
+              Progress& progress) {
+  io::CollapseDuplicates(set);
+  const auto views = CoarseViewsOf(folder, set, threads, progress);
+  if (views.size() < 2) return;
+  advise::AdviseOptions options;
+  options.threads = threads;
+  report.coverage = AdviceLines(advise::Advise(views, options, progress));
+}
+
+Json ScreeningJson(const BuildReport& report) {
+  Json json = Json::array();
+  for (const auto& [name, remarks] : report.screening) {
+    json.push_back({{"name", name}, {"remarks", remarks}});
+  }
+  return json;
+}
+
+Json ReportJson(const BuildReport& report, const CalibratedPhotos& calibrated, const RunLog& log,
+                const std::filesystem::path& output) {
+  Json json;
+  json["set"] = output.string();
+  json["views"] = Json::array();
+  for (const View& view : report.set.frames.front().views) {
+    json["views"].push_back({{"name", view.name},
+                             {"role", NameOf(view.role)},
+                             {"width_px", view.camera.width_px()},
+                             {"height_px", view.camera.height_px()}});
+  }
+  json["not_registered"] = report.not_registered;
+  json["why_not_registered"] = report.why_not_registered;
+  json["skipped"] = Json::array();
+  for (const auto& [name, reason] : report.skipped) {
+    json["skipped"].push_back({{"name", name}, {"reason", reason}});
+  }
+  json["remarks"] = Json::array();
+  for (const auto& [name, text] : report.remarks) {
+    json["remarks"].push_back({{"name", name}, {"text", text}});
+  }
+  json["contents"] = Json::parse(capture::JsonOf(report.contents));
+  json["screening"] = ScreeningJson(report);
+  const Json calibration = Json::parse(calibrated.report_json);
+  if (calibration.contains("camera_sharing")) {
+    json["camera_sharing"] = calibration["camera_sharing"];
+  }
+  json["coverage"] = report.coverage;
+  json["validation_passed"] = report.validated ? Json(report.validation_passed) : Json(nullptr);
+  json["stages"] = Json::array();
+  for (const io::RunStage& stage : log.stages()) {
+    json["stages"].push_back(
+        {{"name", stage.name}, {"wall_s", stage.wall_s}, {"cpu_s", stage.cpu_s}});
+  }
+  json["peak_memory_mib"] = static_cast<double>(PeakMemoryBytesWithPrograms()) / (1 << 20);
+  return json;
+}
+
+// One line about what screening found, if it found anything.
+void SayRemarks(const BuildReport& report, size_t photos, Progress& progress) {
+  if (report.screening.empty()) return;
+  const auto& [name, remarks] = report.screening.front();
+  progress.Note(
+      fmt::format("screening: {} of {} photos have a remark and are kept, first {}: {}; "
+                  "dtr capture --drop leaves such photos out",
+                  report.screening.size(), photos, name, remarks.front()));
+}
+
+}  // namespace
+
+BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
+  const BuildOptions options = ByPreset(asked);
+  const stereo::Effort effort = EffortOf(options.depth);
+  RequireEngine(options.depth);
+  RequireOptions(options);
+  std::optional<SetRig> rig;
+  if (!options.rig.empty()) rig = ReadSetRig(options.rig);
+  const double memory_gb = options.depth.memory_gb.value_or(kDefaultMemoryGb);
+  BuildReport report;
+  RunLog log;
+  KeptNotes progress(listener);
+
+  RequireCalibration(options.poses);
+  io::SetWriter::RequireTarget(options.output, options.force);
+  log.Begin("capture");
+  const bool from_video = !capture::VideosOf(options.photos).empty();
+  capture::Capture photos;
+  std::vector<bool> held_out;
+  const auto look = [&] {
+    LeaveOutSamePictures(options, photos, progress);
+    capture::RequireEnoughPhotos(photos, options.photos);
+    if (!options.poses.empty()) TakePhotosAsCamerasDo(options.poses, photos, progress);
+    held_out = ChooseHeldOut(options.holdout, NamesOf(photos));
+    RequireMetres(options.metres, photos, options.photos.string(),
+                  options.holdout_strict ? held_out : std::vector<bool>());
+    if (!rig) return;
+    (void)PhotosOfRig(*rig, photos);  // refused here, before any work
+    TellPhotosTheirLens(*rig, photos);
+  };
+  if (!from_video) {
+    photos = capture::IngestPhotos(options.photos,
+                                   {.threads = options.threads, .memory_gb = memory_gb}, progress);
+    look();
+  }
+  Json fingerprint = {
+      {"tool_version", DTR_VERSION},
+      {"options", OptionsJson(options, effort)},
+      {"time_budget_s", options.depth.time_budget_s.value_or(0)},
+      {"photos", from_video ? VideoJson(options)
+                            : PhotosJson(photos, std::vector<bool>(held_out.size(), true))},
+      {"poses_sha256", InputHash(options.poses)},
+      {"workspace_sha256", InputHash(options.depth.workspace)}};
+  if (rig) fingerprint["rig_sha256"] = InputHash(options.rig);
+  if (std::filesystem::exists(options.photos / capture::kCaptureFile)) {
+    fingerprint["stored_sha256"] = StoredHashes(photos);
+  }
+  if (NeedsFeatures(options.poses)) {
+    // COLMAP looks for features, of a size that is the one thing --memory decides of the result.
+    const auto sizes = SizesOf(options, photos, held_out);
+    if (!sizes.empty()) {
+      fingerprint["feature_image_size_px"] =
+          FeatureImageSizePx(sizes, memory_gb, options.sfm.feature_size_px);
+    }
+  }
+  io::SetWriter writer(options.output, fingerprint.dump(), options.force);
+  if (!options.force_stage.empty()) ForgetStage(writer.folder(), options.force_stage);
+  if (from_video) {
+    photos = FramesOf(options, writer.work_folder(), progress);
+    try {
+      look();
+    } catch (const Error&) {
+      // What was asked for cannot be had of these frames: nothing goes on from here, and the
+      // command that is mended must not find this one's work in its way.
+      if (!std::filesystem::exists(writer.work_folder() / "calibration")) writer.Discard();
+      throw;
+    }
+  }
+  report.contents = photos.contents;
+  for (const auto& skipped : photos.skipped)
+    report.skipped.emplace_back(skipped.name, skipped.reason);
+  for (const auto& remark : photos.remarks) {
+    report.remarks.emplace_back(remark.name, remark.text);
+    progress.Note(fmt::format("{}: {}", remark.name, remark.text));
+  }
+  for (const capture::Photo& photo : photos.photos) {
+    if (!photo.screening || photo.screening->remarks.empty()) continue;
+    report.screening.emplace_back(photo.name, photo.screening->remarks);
+  }
+  SayRemarks(report, photos.photos.size(), progress);
+  std::vector<bool> is_source = held_out;
+  is_source.flip();
+
+  log.Begin("calibration");
+  const CalibratedPhotos calibrated =
+      CalibratePhotos(photos,
+                      {options.poses,
+                       held_out,
+                       options.holdout_strict,
+                       options.threads,
+                       options.seed,
+                       memory_gb,
+                       options.refine,
+                       {},
+                       rig,
+                       options.metres,
+                       {},
+                       options.sfm},
+                      writer.work_folder() / "calibration", progress);
+  log.AddEarlier(calibrated.earlier_wall_s, calibrated.earlier_cpu_s);
+  report.not_registered = calibrated.not_registered;
+  report.why_not_registered = calibrated.why_not_registered;
+  for (size_t i = 0; i < held_out.size(); ++i) {
+    const auto& lost = report.not_registered;
+    if (held_out[i] && std::find(lost.begin(), lost.end(), photos.photos[i].name) != lost.end()) {
+      report.held_out_not_registered.push_back(photos.photos[i].name);
+    }
+  }
+
+  log.Begin("undistortion");
+  DtrSet set;
+  set.unit = calibrated.unit;
+  set.world_origin = calibrated.world_origin;
+  set.frames.resize(1);
+  std::vector<View>& views = set.frames.front().views;
+  RequireTwoSources(photos, held_out, calibrated);
+  views = UndistortPhotos(photos, calibrated, held_out, {options.max_size_px, options.threads},
+                          writer, progress);
+  const SparseScene sparse = SparseOf(calibrated, views);
+
+  log.Begin("depth");
+  const stereo::Effort spent = DepthStage(set, sparse, options.depth, effort,
+                                          {options.threads, options.seed}, writer, progress);
+
+  log.Begin("finishing");
+  FinishScene(set, SourcePoints(sparse, views), writer, options.threads, progress);
+  if (options.depth.depth_error_px) {
+    RecodeDepth(set, *options.depth.depth_error_px, writer, options.threads, memory_gb, progress);
+  }
+  WriteMeshes(set, writer, options.threads, progress);
+  set.provenance_json = ProvenanceJson(options, OptionsJson(options, spent),
+                                       PhotosJson(photos, is_source), calibrated, report)
+                            .dump();
+  const calib::ValidationReport validation =
+      Validate(writer.folder(), set, sparse, memory_gb, report, options.threads, progress);
+  writer.WriteSparse(set, sparse);
+  WriteSetPage(writer, set,
+               {options.output.stem().string(), options.depth.engine, validation.tests,
+                report.skipped, report.not_registered.size(), options.threads},
+               progress);
+  AdviseOn(writer.folder(), set, report, options.threads, progress);
+  log.End();
+  std::vector<std::string> lines = progress.lines();
+  lines.insert(lines.end(), report.coverage.begin(), report.coverage.end());
+  io::RunRecord record = log.Record(ResolveThreads(options.threads), std::move(lines));
+  record.extra_json = Json{{"screening", ScreeningJson(report)}}.dump();
+  io::WriteRunRecord(writer.folder(), record);
+  writer.Finish(set);
+  report.set = std::move(set);
+  report.json = ReportJson(report, calibrated, log, options.output).dump(1);
+  return report;
+}
+
+}  // namespace dtr::pipeline

@@ -1,0 +1,164 @@
+#include "pipeline/calibrate.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "calib/colmap/features.h"
+#include "calib/colmap/model_io.h"
+#include "calib/colmap/program.h"
+#include "calib/colmap/sfm.h"
+#include "capture/sfm_images.h"
+#include "dtr/base/error.h"
+#include "pipeline/detail/cameras/known_poses.h"
+#include "pipeline/detail/photos/exif_focal.h"
+
+namespace dtr::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+// The photos with `wanted[i]`, in their order.
+capture::Capture Subset(const capture::Capture& capture, const std::vector<bool>& wanted) {
+  capture::Capture subset;
+  for (size_t i = 0; i < capture.photos.size(); ++i) {
+    if (wanted[i]) subset.photos.push_back(capture.photos[i]);
+  }
+  return subset;
+}
+
+// What can be told about an SfM run without times and paths, so that equal runs stay equal.
+Json SfmJson(const colmap::SfmReport& report, const calib::SfmModel& model) {
+  Json json;
+  json["mean_reprojection_error_px"] = report.mean_reprojection_error_px;
+  json["images_per_model"] = report.images_per_model;
+  if (!report.lack_of_parallax.empty()) json["lack_of_parallax"] = report.lack_of_parallax;
+  if (report.forward_motion) json["forward_motion"] = true;
+  json["feature_image_size_px"] = report.max_image_size_px;
+  json["points"] = model.points.size();
+  json["lens_model"] =
+      model.cameras.empty() ? "" : calib::NameOf(model.cameras.begin()->second.model);
+  return json;
+}
+
+CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions& options,
+                         const fs::path& workspace, Progress& progress) {
+  std::vector<bool> in_sfm(capture.photos.size(), true);
+  if (options.strict) {
+    for (size_t i = 0; i < in_sfm.size(); ++i) in_sfm[i] = !options.held_out[i];
+  }
+  const capture::Capture photos = Subset(capture, in_sfm);
+  const CameraGroups groups(photos.photos, options.sfm.camera_per, options.rig || options.lens);
+  const std::vector<colmap::SfmImageInput> inputs = SfmInputs(photos, groups, workspace / "photos");
+  const colmap::SfmOptions sfm_options = SfmOptionsFor(options);
+  capture::PrepareSfmImages(photos, workspace / "photos", 0, options.threads, options.memory_gb,
+                            progress);
+  colmap::SfmResult sfm =
+      colmap::RunSfm(workspace / "photos", inputs, workspace / "sfm", sfm_options, progress);
+
+  PhotoRefinement refined =
+      RefineSfm({capture, options, groups, inputs, sfm_options, workspace}, sfm, progress);
+  CalibratedPhotos calibrated;
+  calibrated.engine = sfm.report.version;
+  calibrated.why_not_registered = sfm.report.why_not_registered;
+  for (const colmap::StepRecord& step : sfm.report.steps) {
+    calibrated.engine_cpu_s += step.cpu_s;
+    if (!step.from_checkpoint) continue;
+    calibrated.earlier_cpu_s += step.cpu_s;
+    calibrated.earlier_wall_s += step.wall_s;
+  }
+  Json report = SfmJson(sfm.report, sfm.model);
+  report.update(Json::parse(refined.report_json));
+  calibrated.kept_refinement_cpu_s = refined.earlier_cpu_s;
+  calibrated.earlier_cpu_s += refined.earlier_cpu_s;
+  calibrated.earlier_wall_s += refined.earlier_wall_s;
+  calibrated.model = std::move(refined.model);
+  calibrated.unit = refined.unit;
+  calibrated.scale_json = std::move(refined.scale_json);
+  calibrated.report_json = report.dump();
+  if (options.strict) {
+    RegisterHeldOutPhotos(Subset(capture, options.held_out), inputs, groups, workspace, sfm_options,
+                          calibrated.model, progress);
+  }
+  return calibrated;
+}
+
+// Boards are looked at as their photos are stored (board_photos.h); turned upright a photo has its
+// principal point elsewhere.
+void RefuseTurned(const capture::Capture& capture, const char* known) {
+  for (const capture::Photo& photo : capture.photos) {
+    if (!capture::IsTurned(photo)) continue;
+    throw Error(fmt::format(
+        "{}: expected a photo as it is stored, for {} is known of such, found one that its EXIF "
+        "orientation turned; take the tag out of it (exiftool -Orientation= FILE)",
+        photo.name, known));
+  }
+}
+
+}  // namespace
+
+std::vector<colmap::SfmImageInput> SfmInputs(const capture::Capture& capture,
+                                             const CameraGroups& groups, const fs::path& folder) {
+  std::vector<colmap::SfmImageInput> inputs;
+  for (const capture::Photo& photo : capture.photos) {
+    inputs.push_back({photo.name, photo.width_px, photo.height_px, photo.focal_prior_px,
+                      groups.GroupOf(photo), capture::SfmMaskFile(folder, photo)});
+  }
+  return inputs;
+}
+
+colmap::SfmOptions SfmOptionsFor(const CalibrateOptions& options) {
+  colmap::SfmOptions sfm;
+  sfm.threads = options.threads;
+  sfm.seed = options.seed;
+  sfm.memory_gb = options.memory_gb;
+  sfm.max_image_size_px = options.sfm.feature_size_px;
+  sfm.max_features = options.sfm.features < colmap::kMostFeatures ? options.sfm.features : 0;
+  sfm.matching = options.sfm.matching;
+  sfm.lens_model = options.sfm.lens_model;
+  return sfm;
+}
+
+int FeatureImageSizePx(const std::vector<std::pair<int, int>>& sizes_px, double memory_gb,
+                       int asked_px) {
+  std::vector<colmap::SfmImageInput> images;
+  for (const auto& [width_px, height_px] : sizes_px) {
+    images.push_back({"", width_px, height_px, {}, "", {}});
+  }
+  return colmap::PlanExtraction(images, 1, memory_gb, asked_px).max_image_size_px;
+}
+
+bool NeedsFeatures(const fs::path& poses) {
+  return !fs::is_directory(poses) || colmap::ReadModel(colmap::ModelFolderIn(poses)).points.empty();
+}
+
+void RequireCalibration(const fs::path& poses) {
+  if (!poses.empty() && !fs::exists(poses)) {
+    throw UsageError(fmt::format("--poses {}: no such file or folder", poses.string()));
+  }
+  if (NeedsFeatures(poses)) (void)colmap::Program();
+}
+
+CalibratedPhotos CalibratePhotos(const capture::Capture& capture, const CalibrateOptions& options,
+                                 const fs::path& workspace, Progress& progress) {
+  CalibrateOptions checked = options;
+  checked.held_out.resize(capture.photos.size(), false);
+  RequireCalibration(checked.poses);
+  if (checked.rig) RefuseTurned(capture, "the rig");
+  if (checked.lens) RefuseTurned(capture, "the lens");
+  fs::create_directories(workspace);
+  CalibratedPhotos calibrated = checked.poses.empty()
+                                    ? FromSfm(capture, checked, workspace, progress)
+                                    : FromKnownPoses(capture, checked, workspace, progress);
+  std::set<std::string> registered;
+  for (const calib::SfmImage& image : calibrated.model.images) registered.insert(image.name);
+  for (const capture::Photo& photo : capture.photos) {
+    if (!registered.contains(photo.name)) calibrated.not_registered.push_back(photo.name);
+  }
+  return calibrated;
+}
+
+}  // namespace dtr::pipeline

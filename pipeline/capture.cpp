@@ -1,0 +1,37 @@
+#include "pipeline/capture.h"
+
+#include "capture/ingest.h"
+#include "dtr/base/error.h"
+
+namespace dtr::pipeline {
+
+namespace fs = std::filesystem;
+
+std::vector<fs::path> VideosFor(const fs::path& source, const capture::VideoOptions& video) {
+  std::vector<fs::path> videos = capture::VideosOf(source);
+  const capture::VideoOptions plain;
+  // What is not there is told by who reads it.
+  if (videos.empty() && fs::exists(source) &&
+      (video.every != plain.every || video.motion != plain.motion || video.most != plain.most ||
+       video.synchronised)) {
+    throw UsageError(source.string() +
+                     ": expected a video or a folder of nothing but videos for --every, --motion, "
+                     "--max-frames and --synchronised, found neither; leave them out");
+  }
+  return videos;
+}
+
+capture::Capture Ingest(const fs::path& source, const capture::VideoOptions& video,
+                        const std::function<fs::path()>& frames_folder, Progress& progress) {
+  const std::vector<fs::path> videos = VideosFor(source, video);
+  if (videos.empty()) {
+    return capture::IngestPhotos(source, {.threads = video.threads, .memory_gb = video.memory_gb},
+                                 progress);
+  }
+  const fs::path frames = frames_folder();
+  fs::remove_all(frames);
+  fs::create_directories(frames);
+  return capture::IngestVideos(videos, video, frames, progress);
+}
+
+}  // namespace dtr::pipeline

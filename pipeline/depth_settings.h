@@ -1,0 +1,58 @@
+// pipeline/depth_settings.h -- presets, and what of them the command line overrides.
+#pragma once
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "stereo/engine.h"
+
+namespace dtr::pipeline {
+
+/// Settings that belong together, by name.
+struct Preset {
+  const char* name;
+  int max_size_px;  ///< long side of the images of a set that is built; 0: full size
+  int features;     ///< most of a photo whose camera structure from motion looks for
+  stereo::Effort effort;
+};
+
+/// The table of presets, cheapest first. `dtr bench --stage stereo` measures what each costs and
+/// gives.
+std::span<const Preset> Presets();
+/// Throws UsageError for unknown names.
+const Preset& PresetCalled(const std::string& name);
+
+/// Memory to stay within unless told otherwise.
+inline constexpr double kDefaultMemoryGb = 4;
+
+/// The most that an effort may have of each; rounds may be none, the others are 1 at least.
+inline constexpr int kMostNeighbours = 8, kMostIterations = 20, kMostRounds = 8;
+
+/// What was asked for: a preset, and what overrides it.
+struct DepthChoice {
+  std::string engine = "patchmatch";  ///< "none": no depth
+  std::string preset = "balanced";
+  std::optional<int> neighbours, round_neighbours, iterations, rounds;
+  std::optional<double> time_budget_s;  ///< picks what is not given explicitly
+  std::optional<double> memory_gb;      ///< gigabytes; absent: kDefaultMemoryGb, or what is needed
+  /// Pixels of disparity that storing may move a depth; absent: png16-inverse, practically exact.
+  std::optional<double> depth_error_px;
+  std::filesystem::path workspace;  ///< for engine "colmap"; empty: the program fills one
+};
+
+/// An effort with what the choice gives explicitly in its place.
+stereo::Effort Overridden(stereo::Effort effort, const DepthChoice& choice);
+
+/// The effort that a choice comes to, but for a time budget.
+stereo::Effort EffortOf(const DepthChoice& choice);
+
+/// What of the engine and its effort decides the bytes of a depth map, by the names of the options:
+/// given explicitly, they make the same maps whatever preset they came from.
+nlohmann::ordered_json SettingsJson(const std::string& engine, const stereo::Effort& effort);
+/// The effort in what SettingsJson gave for `patchmatch`. Throws Error naming `where`, also where
+/// it has more than the most.
+stereo::Effort EffortFromJson(const std::string& text, const std::string& where);
+
+}  // namespace dtr::pipeline

@@ -1,0 +1,260 @@
+#include "pipeline/detail/cameras/camera_files.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <set>
+
+#include "calib/colmap/model_io.h"
+#include "calib/sparse_from_sfm.h"
+#include "capture/ingest.h"
+#include "dtr/base/error.h"
+#include "dtr/base/file_names.h"
+#include "dtr/io/formats/llff.h"
+#include "dtr/io/formats/transforms_json.h"
+#include "dtr/io/image_io.h"
+#include "pipeline/detail/photos/holdout.h"
+#include "pipeline/detail/photos/model_grid.h"
+#include "pipeline/detail/photos/named_files.h"
+
+namespace dtr::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<io::SizedImage> SizedImages(const fs::path& images_dir) {
+  std::error_code error;
+  std::vector<io::SizedImage> images;
+  for (const auto& entry : fs::directory_iterator(images_dir, error)) {
+    if (!entry.is_regular_file() || !capture::IsImageExtension(entry.path().extension().string())) {
+      continue;
+    }
+    images.push_back(SizedImageAt(images_dir, entry.path().filename().string()));
+  }
+  if (error) throw UsageError(images_dir.string() + ": cannot be listed: " + error.message());
+  return images;
+}
+
+// Images below a folder, by their names without the extension; of several the first by name.
+std::map<std::string, std::string> ImagesByStem(const fs::path& folder) {
+  std::set<std::string> names;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    if (!entry.is_regular_file() || !capture::IsImageExtension(entry.path().extension().string())) {
+      continue;
+    }
+    names.insert(entry.path().lexically_relative(folder).generic_string());
+  }
+  std::map<std::string, std::string> by_stem;
+  for (const std::string& name : names) {
+    by_stem.emplace(fs::path(name).replace_extension().generic_string(), name);
+  }
+  return by_stem;
+}
+
+// Leaves out what has no photo, or says so: `name` may leave its folder, which readers refuse.
+bool HasPhoto(const std::string& name, const CameraFileFolders& folders) {
+  return !WhyUnsafeName(name).empty() || IsFile(folders.images / name);
+}
+
+// One line about what is missing; without allow_missing the end.
+void TellMissing(const fs::path& file, const CameraFileFolders& folders, size_t cameras,
+                 CamerasFromFile& out) {
+  if (out.skipped.empty()) return;
+  const auto& [name, reason] = out.skipped.front();
+  const std::string what = fmt::format("{}: {} of its {} cameras have no photo, first {} ({})",
+                                       file.string(), out.skipped.size(), cameras, name, reason);
+  if (out.skipped.size() == cameras) throw Error(what + "; give the folder of its photos");
+  if (!folders.allow_missing) {
+    throw Error(what +
+                "; copy the photos there, or give --allow-missing to leave such cameras out");
+  }
+  out.notes.push_back(what + ": left out");
+}
+
+CamerasFromFile FromColmap(const fs::path& folder, const CameraFileFolders& folders) {
+  const fs::path model_folder = colmap::ModelFolderIn(folder);
+  calib::SfmModel model = colmap::ReadModel(model_folder);
+  CamerasFromFile cameras;
+  const size_t all = model.images.size();
+  for (calib::SfmImage& image : model.images) image.name = NameBelow(folders.images, image.name);
+  std::erase_if(model.images, [&](const calib::SfmImage& image) {
+    if (HasPhoto(image.name, folders)) return false;
+    cameras.skipped.emplace_back(image.name,
+                                 "not there: " + (folders.images / image.name).string());
+    return true;
+  });
+  TellMissing(model_folder, folders, all, cameras);
+  std::vector<std::string> names;
+  std::vector<PinholeCamera> pinholes;
+  for (const calib::SfmImage& image : model.images) {
+    const calib::LensCamera& lens = model.cameras.at(image.camera_id);
+    io::NamedCamera named;
+    named.name = image.name;
+    named.camera = lens.Pinhole();
+    if (!lens.IsUndistorted()) named.distortion = {calib::NameOf(lens.model), lens.params};
+    named.cam_from_world = image.cam_from_world;
+    names.push_back(image.name);
+    pinholes.push_back(named.camera);
+    cameras.list.cameras.push_back(named);
+  }
+  cameras.list.photo_grid = GridOfModel(model_folder);
+  if (model.points.empty()) return cameras;
+  cameras.points = calib::ToSparseScene(model, names, pinholes);
+  const size_t used = cameras.points->points.size();
+  if (used < model.points.size()) {
+    cameras.notes.push_back(
+        fmt::format("{}: {} of its {} points are not used, fewer than two of the photos see them",
+                    model_folder.string(), model.points.size() - used, model.points.size()));
+  }
+  return cameras;
+}
+
+CamerasFromFile FromTransforms(const fs::path& file, const CameraFileFolders& folders) {
+  io::TransformsPaths paths;
+  paths.image_of = [&](const std::string& path) { return FindImage(folders.images, path); };
+  const fs::path depth_dir = folders.depth.empty() ? folders.images : folders.depth;
+  paths.depth_of = [&](const std::string& path) { return NameBelow(depth_dir, path); };
+  // Below the photos, or beside them: programs write paths from where the file lies.
+  std::vector<fs::path> mask_dirs = {folders.images, file.parent_path()};
+  if (!folders.masks.empty()) mask_dirs = {folders.masks};
+  paths.mask_of = [&](const std::string& path) {
+    const auto holds = [&](const fs::path& dir) { return IsFile(dir / NameBelow(dir, path)); };
+    const auto found = std::find_if(mask_dirs.begin(), mask_dirs.end(), holds);
+    // All masks of a set lie below one folder: the first one found says which.
+    if (found != mask_dirs.end()) mask_dirs = {fs::path(*found)};
+    return NameBelow(mask_dirs.front(), path);
+  };
+  io::TransformsFile read = io::ReadTransformsJson(file, paths);
+  CamerasFromFile cameras;
+  cameras.list = std::move(read.list);
+  cameras.mask_dir = mask_dirs.front().empty() ? fs::path(".") : mask_dirs.front();
+  cameras.held_out = std::move(read.held_out);
+  cameras.depth_unit = read.depth_unit;
+  cameras.points_file = read.points_file;
+  cameras.notes = std::move(read.notes);
+  for (const io::FrameWithoutPhoto& frame : read.missing) {
+    cameras.skipped.emplace_back(Printable(frame.path),
+                                 fmt::format("frame {}: not there: {}", frame.frame,
+                                             (folders.images / frame.path).string()));
+  }
+  TellMissing(file, folders, cameras.list.cameras.size() + read.missing.size(), cameras);
+  return cameras;
+}
+
+CamerasFromFile FromCamerasJson(const fs::path& file, const CameraFileFolders& folders) {
+  CamerasFromFile cameras;
+  cameras.list = io::ReadCamerasJson(file);
+  const size_t all = cameras.list.cameras.size();
+  for (io::NamedCamera& named : cameras.list.cameras) {
+    named.name = NameBelow(folders.images, named.name);
+  }
+  std::erase_if(cameras.list.cameras, [&](const io::NamedCamera& named) {
+    if (HasPhoto(named.name, folders)) return false;
+    cameras.skipped.emplace_back(named.name,
+                                 "not there: " + (folders.images / named.name).string());
+    return true;
+  });
+  TellMissing(file, folders, all, cameras);
+  return cameras;
+}
+
+std::string FormatOf(const fs::path& file) {
+  if (fs::is_directory(file)) return "colmap";
+  if (file.extension() == ".npy") return "llff";
+  if (file.extension() == ".json") {
+    const bool called_so = file.filename().string().starts_with("transforms");
+    return called_so || io::IsTransformsJson(file) ? "nerf" : "cameras-json";
+  }
+  throw UsageError(
+      fmt::format("{}: expected the folder of a COLMAP model, a cameras.json, a transforms.json or "
+                  "a poses_bounds.npy, found another name; give --format",
+                  file.string()));
+}
+
+}  // namespace
+
+std::vector<std::string> CameraFormats() { return {"cameras-json", "colmap", "llff", "nerf"}; }
+
+CamerasFromFile ReadCameraFile(const fs::path& file, const std::string& format,
+                               const CameraFileFolders& folders) {
+  if (!fs::exists(file)) {
+    throw UsageError(fmt::format("--cameras {}: no such file or folder", file.string()));
+  }
+  const std::string kind = format.empty() ? FormatOf(file) : format;
+  if (kind == "colmap") return FromColmap(file, folders);
+  if (kind == "nerf") return FromTransforms(file, folders);
+  if (kind == "llff") {
+    CamerasFromFile cameras;
+    cameras.list = io::ReadLlff(file, SizedImages(folders.images)).list;
+    cameras.notes.push_back(file.string() + ": its nearest and farthest depths are not used");
+    return cameras;
+  }
+  return FromCamerasJson(file, folders);
+}
+
+std::vector<std::string> PhotosWithoutCamera(const io::CameraList& list,
+                                             const fs::path& images_dir) {
+  std::set<std::string> used, folders;
+  for (const io::NamedCamera& named : list.cameras) {
+    used.insert({named.name, named.depth_file, named.mask_file});
+    folders.insert(fs::path(named.name).parent_path().generic_string());
+  }
+  std::set<std::string> left;
+  for (const std::string& folder : folders) {
+    std::error_code error;
+    fs::directory_iterator entries(images_dir / folder, error);
+    for (; !error && entries != fs::directory_iterator(); entries.increment(error)) {
+      const fs::path& file = entries->path();
+      const bool is_photo = IsFile(file) && capture::IsImageExtension(file.extension().string()) &&
+                            !file.stem().string().ends_with("_mask");
+      const std::string name = (fs::path(folder) / file.filename()).generic_string();
+      if (is_photo && !used.contains(name)) left.insert(name);
+    }
+  }
+  return {left.begin(), left.end()};
+}
+
+void NameMasks(const fs::path& mask_dir, const fs::path& images_dir, io::CameraList& list) {
+  if (!fs::is_directory(mask_dir)) {
+    throw UsageError(fmt::format("--masks {}: no such folder", mask_dir.string()));
+  }
+  const auto is_named = [](const io::NamedCamera& camera) { return !camera.mask_file.empty(); };
+  if (std::any_of(list.cameras.begin(), list.cameras.end(), is_named)) return;
+  const std::map<std::string, std::string> masks = ImagesByStem(mask_dir);
+  for (io::NamedCamera& camera : list.cameras) {
+    const std::string stem = fs::path(camera.name).replace_extension().generic_string();
+    for (const std::string& name : {stem + "_mask", camera.name, stem}) {
+      const auto mask = masks.find(name);
+      std::error_code ignored;  // masks may lie beside the photos, which are none
+      if (mask == masks.end() ||
+          fs::equivalent(mask_dir / mask->second, images_dir / camera.name, ignored)) {
+        continue;
+      }
+      camera.mask_file = mask->second;
+      break;
+    }
+  }
+  if (list.cameras.empty() || std::any_of(list.cameras.begin(), list.cameras.end(), is_named)) {
+    return;
+  }
+  const std::string& first = list.cameras.front().name;
+  throw UsageError(fmt::format(
+      "--masks {}: expected a mask of {} or of another photo, called {}.png or "
+      "{}.png, found none",
+      mask_dir.string(), first, fs::path(first).replace_extension().generic_string(), first));
+}
+
+std::set<std::string> NamesHeldOut(const std::string& spec, const io::CameraList& list) {
+  std::vector<std::string> names;
+  for (const io::NamedCamera& camera : list.cameras) names.push_back(camera.name);
+  std::sort(names.begin(), names.end());
+  const std::vector<bool> held_out = ChooseHeldOut(spec, names);
+  std::set<std::string> chosen;
+  for (size_t i = 0; i < names.size(); ++i) {
+    if (held_out[i]) chosen.insert(names[i]);
+  }
+  return chosen;
+}
+
+}  // namespace dtr::pipeline

@@ -1,0 +1,287 @@
+#include "pipeline/detail/cameras/known_poses.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "calib/colmap/held_out.h"
+#include "calib/colmap/known_poses.h"
+#include "calib/colmap/model_io.h"
+#include "calib/sparse_from_sfm.h"
+#include "capture/sfm_images.h"
+#include "dtr/base/error.h"
+#include "dtr/base/file_names.h"
+#include "dtr/io/formats/cameras_json.h"
+#include "dtr/io/formats/llff.h"
+#include "dtr/io/formats/transforms_json.h"
+#include "pipeline/detail/cameras/camera_distortion.h"
+#include "pipeline/detail/photos/named_files.h"
+#include "pipeline/detail/photos/names_of_photos.h"
+
+namespace dtr::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Adds a photo under ids of its own, keeping the order of names. Cameras are not shared: the
+// model's own stay what they were.
+void AddImage(calib::SfmImage image, const calib::LensCamera& camera, calib::SfmModel& model) {
+  image.camera_id = model.cameras.empty() ? 1 : model.cameras.rbegin()->first + 1;
+  image.id = 1;
+  for (const calib::SfmImage& other : model.images) image.id = std::max(image.id, other.id + 1);
+  model.cameras[image.camera_id] = camera;
+  const auto place = std::lower_bound(
+      model.images.begin(), model.images.end(), image.name,
+      [](const calib::SfmImage& other, const std::string& name) { return other.name < name; });
+  model.images.insert(place, std::move(image));
+}
+
+void RequireSharedNames(size_t found, const fs::path& poses, const std::string& first_of_file,
+                        const capture::Capture& capture) {
+  if (found >= 2) return;
+  throw Error(
+      fmt::format("{}: expected cameras for at least 2 of the photos by name, found {}; its first "
+                  "is '{}', the first photo is '{}': name the photos as it does, or give theirs",
+                  poses.string(), found, first_of_file, capture.photos.front().name));
+}
+
+// Poses act on p_world - origin afterwards; returns that origin.
+Eigen::Vector3d RecentreModel(calib::SfmModel& model) {
+  io::CameraList list;
+  for (const calib::SfmImage& image : model.images) {
+    io::NamedCamera named;
+    named.name = image.name;
+    named.cam_from_world = image.cam_from_world;
+    list.cameras.push_back(named);
+  }
+  list = io::RecentreWorld(std::move(list));
+  for (size_t i = 0; i < model.images.size(); ++i) {
+    model.images[i].cam_from_world = list.cameras[i].cam_from_world;
+  }
+  for (auto& [id, point] : model.points) point.p_in_world -= list.world_origin;
+  return list.world_origin;
+}
+
+bool IsHeldOut(const std::string& name, const capture::Capture& capture,
+               const CalibrateOptions& options) {
+  const auto photo = std::find_if(capture.photos.begin(), capture.photos.end(),
+                                  [&](const auto& p) { return p.name == name; });
+  return options.held_out[static_cast<size_t>(photo - capture.photos.begin())];
+}
+
+// Cameras as they were given; poses act on p_world - the recentred origin.
+struct Given {
+  std::map<std::string, colmap::PosedImage> by_name;
+  std::string first;  // of the file
+  LengthUnit unit = LengthUnit::kUnknown;
+  Eigen::Vector3d world_origin = Eigen::Vector3d::Zero();
+};
+
+Given GivenIn(const io::CameraList& list) {
+  Given given;
+  given.first = list.cameras.empty() ? "" : list.cameras.front().name;
+  given.unit = list.unit;
+  given.world_origin = list.world_origin;
+  for (const io::NamedCamera& named : list.cameras) {
+    given.by_name[named.name] = {named.name, CameraModelOf(named), named.cam_from_world};
+  }
+  return given;
+}
+
+// Points for cameras that came without any: COLMAP finds them with everything else held.
+CalibratedPhotos Triangulated(const Given& given, const capture::Capture& capture,
+                              const CalibrateOptions& options, const fs::path& workspace,
+                              Progress& progress) {
+  std::vector<colmap::PosedImage> sources, held_out;
+  capture::Capture source_photos;
+  for (size_t i = 0; i < capture.photos.size(); ++i) {
+    const capture::Photo& photo = capture.photos[i];
+    const auto found = given.by_name.find(photo.name);
+    if (found == given.by_name.end()) continue;
+    colmap::PosedImage posed = found->second;
+    posed.mask_file = capture::SfmMaskFile(workspace / "photos", photo);
+    (options.held_out[i] ? held_out : sources).push_back(std::move(posed));
+    if (!options.held_out[i]) source_photos.photos.push_back(photo);
+  }
+  RequireSharedNames(sources.size(), options.poses, given.first, capture);
+  capture::PrepareSfmImages(source_photos, workspace / "photos", 0, options.threads,
+                            options.memory_gb, progress);
+  CalibratedPhotos calibrated;
+  calibrated.unit = given.unit;
+  calibrated.world_origin = given.world_origin;
+  calibrated.model = colmap::TriangulateWithPoses(workspace / "photos", sources, workspace / "sfm",
+                                                  SfmOptionsFor(options), progress)
+                         .model;
+  for (const colmap::PosedImage& posed : held_out) {
+    AddImage({0, posed.name, 0, posed.cam_from_world, {}}, posed.camera, calibrated.model);
+  }
+  return calibrated;
+}
+
+CalibratedPhotos FromColmapModel(const capture::Capture& capture, const CalibrateOptions& options,
+                                 const fs::path& workspace, Progress& progress) {
+  calib::SfmModel model = ReadModelOf(capture, options.poses);
+  Given given;
+  given.first = model.images.empty() ? "" : model.images.front().name;
+  std::erase_if(model.images, [&](const calib::SfmImage& image) {
+    return std::none_of(capture.photos.begin(), capture.photos.end(),
+                        [&](const capture::Photo& photo) { return photo.name == image.name; });
+  });
+  RequireSharedNames(model.images.size(), options.poses, given.first, capture);
+  given.world_origin = RecentreModel(model);
+  CalibratedPhotos calibrated;
+  // With one photo to build from there is nothing to triangulate, which is told later.
+  const auto sources = std::count_if(model.images.begin(), model.images.end(), [&](const auto& i) {
+    return !IsHeldOut(i.name, capture, options);
+  });
+  if (model.points.empty() && sources >= 2) {
+    for (const calib::SfmImage& image : model.images) {
+      given.by_name.emplace(
+          image.name,
+          colmap::PosedImage{image.name, model.cameras.at(image.camera_id), image.cam_from_world});
+    }
+    calibrated = Triangulated(given, capture, options, workspace, progress);
+  } else {
+    calibrated.model = std::move(model);
+    calibrated.unit = given.unit;
+    calibrated.world_origin = given.world_origin;
+  }
+  calibrated.engine = "COLMAP model";
+  return calibrated;
+}
+
+CalibratedPhotos FromCameraList(const capture::Capture& capture, const CalibrateOptions& options,
+                                const fs::path& workspace, Progress& progress) {
+  PosesFile file = ReadPoses(capture, options.poses);
+  for (const std::string& note : file.notes) progress.Note(note);
+  const io::CameraList list = io::RecentreWorld(std::move(file.list));
+  CalibratedPhotos calibrated = Triangulated(GivenIn(list), capture, options, workspace, progress);
+  calibrated.engine = options.poses.filename().string();
+  return calibrated;
+}
+
+// The photo that a path of a transforms.json means; its folders are those of the photos.
+const io::SizedImage* PhotoMeant(const std::vector<io::SizedImage>& images, const fs::path& folder,
+                                 const std::string& path) {
+  const std::vector<std::string> names = NamesMeant(folder, path);
+  for (const bool with_extension : {true, false}) {
+    for (const std::string& name : names) {
+      const auto is_meant = [&](const io::SizedImage& image) {
+        return with_extension ? image.name == name
+                              : fs::path(image.name).replace_extension() == fs::path(name);
+      };
+      const auto found = std::find_if(images.begin(), images.end(), is_meant);
+      if (found == images.end()) continue;
+      // Of several images called so, none is meant (FindImage does the same).
+      if (std::any_of(found + 1, images.end(), is_meant)) return nullptr;
+      return &*found;
+    }
+  }
+  return nullptr;
+}
+
+PosesFile FromTransforms(const std::vector<io::SizedImage>& images, const capture::Capture& capture,
+                         const fs::path& poses) {
+  // Below the folder of photos: their names are what is left of their files' paths.
+  fs::path folder = capture.photos.empty() ? fs::path() : capture.photos.front().file.parent_path();
+  for (const char c : capture.photos.empty() ? std::string() : capture.photos.front().name) {
+    if (c == '/') folder = folder.parent_path();
+  }
+  io::TransformsPaths paths;
+  paths.image_of = [&](const std::string& path) -> std::optional<io::SizedImage> {
+    const io::SizedImage* photo = PhotoMeant(images, folder, path);
+    return photo == nullptr ? std::nullopt : std::optional(*photo);
+  };
+  io::TransformsFile read = io::ReadTransformsJson(poses, paths);
+  PosesFile file{std::move(read.list), std::move(read.notes)};
+  if (!read.missing.empty()) {
+    file.notes.push_back(fmt::format(
+        "{}: {} of its {} frames have no photo here, first {}", poses.string(), read.missing.size(),
+        file.list.cameras.size() + read.missing.size(), Printable(read.missing.front().path)));
+  }
+  if (file.list.cameras.empty()) {
+    throw Error(
+        fmt::format("{}: none of its frames is one of the photos; its first is '{}', the "
+                    "first photo is '{}': name the photos as it does, or give theirs",
+                    poses.string(), Printable(read.missing.front().path),
+                    capture.photos.empty() ? "" : capture.photos.front().name));
+  }
+  if (read.held_out && !read.held_out->empty()) {
+    file.notes.push_back(
+        fmt::format("{}: {} frames are for testing by its lists, which --holdout "
+                    "decides here",
+                    poses.string(), read.held_out->size()));
+  }
+  return file;
+}
+
+}  // namespace
+
+PosesFile ReadPoses(const capture::Capture& capture, const fs::path& poses) {
+  std::vector<io::SizedImage> images;
+  for (const capture::Photo& photo : capture.photos) {
+    // Photos whose pixels are settled are as they are; of others their cameras' size will say.
+    const StoredSize stored = capture::StoredSizeOf(photo);
+    images.push_back({photo.name, stored.width_px, stored.height_px,
+                      photo.as_stored ? 1 : photo.exif_orientation});
+  }
+  if (poses.extension() == ".json") {
+    if (io::IsTransformsJson(poses)) return FromTransforms(images, capture, poses);
+    PosesFile file{io::ReadCamerasJson(poses), {}};
+    NameAsPhotos(capture, file.list);
+    return file;
+  }
+  if (poses.extension() == ".npy") return {io::ReadLlff(poses, std::move(images)).list, {}};
+  throw UsageError(
+      fmt::format("--poses {}: expected the folder of a COLMAP model, a cameras.json, a "
+                  "transforms.json or a poses_bounds.npy",
+                  poses.string()));
+}
+
+SparseScene TriangulatedPoints(const io::CameraList& list, const capture::Capture& photos,
+                               const CalibrateOptions& options, const fs::path& workspace,
+                               Progress& progress) {
+  progress.Note("points are triangulated from the photos, with their cameras fixed");
+  const CalibratedPhotos calibrated =
+      Triangulated(GivenIn(list), photos, options, workspace, progress);
+  std::vector<std::string> names;
+  std::vector<PinholeCamera> pinholes;
+  for (const io::NamedCamera& named : list.cameras) {
+    names.push_back(named.name);
+    pinholes.push_back(named.camera);
+  }
+  return calib::ToSparseScene(calibrated.model, names, pinholes);
+}
+
+void RegisterHeldOutPhotos(const capture::Capture& held_out,
+                           const std::vector<colmap::SfmImageInput>& sources,
+                           const CameraGroups& groups, const fs::path& workspace,
+                           const colmap::SfmOptions& options, calib::SfmModel& model,
+                           Progress& progress) {
+  if (held_out.photos.empty()) return;
+  capture::PrepareSfmImages(held_out, workspace / "photos", 0, options.threads, options.memory_gb,
+                            progress);
+  const colmap::HeldOutResult placed = colmap::RegisterHeldOut(
+      workspace / "photos", SfmInputs(held_out, groups, workspace / "photos"), model, sources,
+      workspace / "sfm", workspace / "held_out", options, progress);
+  for (const calib::SfmImage& image : placed.images) {
+    // The pose alone: what the photo shows of the points would enter the set outside held_out/.
+    AddImage({0, image.name, 0, image.cam_from_world, {}}, placed.cameras.at(image.camera_id),
+             model);
+  }
+}
+
+CalibratedPhotos FromKnownPoses(const capture::Capture& capture, const CalibrateOptions& options,
+                                const fs::path& workspace, Progress& progress) {
+  progress.Note("structure from motion left out: cameras are given");
+  CalibratedPhotos calibrated = fs::is_directory(options.poses)
+                                    ? FromColmapModel(capture, options, workspace, progress)
+                                    : FromCameraList(capture, options, workspace, progress);
+  calibrated.report_json =
+      nlohmann::ordered_json{{"points", calibrated.model.points.size()}}.dump();
+  return calibrated;
+}
+
+}  // namespace dtr::pipeline

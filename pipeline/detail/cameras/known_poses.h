@@ -1,0 +1,54 @@
+// pipeline/detail/cameras/known_poses.h -- cameras from a file instead of from SfM.
+#pragma once
+#include <filesystem>
+#include <vector>
+
+#include "calib/colmap/sfm.h"
+#include "dtr/io/formats/cameras_json.h"
+#include "dtr/types/sparse_scene.h"
+#include "pipeline/calibrate.h"
+#include "pipeline/detail/photos/camera_groups.h"
+
+namespace dtr::pipeline {
+
+/// Photos as COLMAP gets them, with the groups that share intrinsics; `folder` is what
+/// capture::PrepareSfmImages fills.
+std::vector<colmap::SfmImageInput> SfmInputs(const capture::Capture& capture,
+                                             const CameraGroups& groups,
+                                             const std::filesystem::path& folder);
+colmap::SfmOptions SfmOptionsFor(const CalibrateOptions& options);
+
+/// Cameras of a file, with lines about it that are worth telling.
+struct PosesFile {
+  io::CameraList list;
+  std::vector<std::string> notes;
+};
+
+/// Reads a cameras.json, a transforms.json or a poses_bounds.npy for photos. Throws UsageError for
+/// another name, Error for a broken file or one of other photos.
+PosesFile ReadPoses(const capture::Capture& capture, const std::filesystem::path& poses);
+
+/// Points that photos show, triangulated with the cameras of `list` held fixed; views are indices
+/// into it. Of `options` threads, seed, memory and held_out (for each photo) are used; photos that
+/// are held out give no points.
+SparseScene TriangulatedPoints(const io::CameraList& list, const capture::Capture& photos,
+                               const CalibrateOptions& options,
+                               const std::filesystem::path& workspace, Progress& progress);
+
+/// Cameras from options.poses: the folder of a COLMAP model, or a file as of ReadPoses.
+/// A COLMAP model brings its points; for the others, points are triangulated with the cameras
+/// held fixed, from photos that are not held out. Cameras far from the origin get a world origin
+/// near them (io::RecentreWorld). Photos that the file does not name stay without a camera. Throws
+/// Error when the file is broken or names too few of the photos.
+CalibratedPhotos FromKnownPoses(const capture::Capture& capture, const CalibrateOptions& options,
+                                const std::filesystem::path& workspace, Progress& progress);
+
+/// Adds the poses of held-out photos to a model that was made without them. Nothing else of the
+/// model changes; photos that cannot be registered are left out.
+void RegisterHeldOutPhotos(const capture::Capture& held_out,
+                           const std::vector<colmap::SfmImageInput>& sources,
+                           const CameraGroups& groups, const std::filesystem::path& workspace,
+                           const colmap::SfmOptions& options, calib::SfmModel& model,
+                           Progress& progress);
+
+}  // namespace dtr::pipeline

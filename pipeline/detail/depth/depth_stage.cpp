@@ -1,0 +1,244 @@
+#include "pipeline/detail/depth/depth_stage.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "dtr/base/durable.h"
+#include "dtr/base/error.h"
+#include "dtr/base/hash.h"
+#include "dtr/base/memory_budget.h"
+#include "dtr/io/depth_io.h"
+#include "pipeline/detail/depth/depth_engine.h"
+#include "pipeline/detail/depth/depth_precision.h"
+#include "pipeline/detail/depth/plane_files.h"
+#include "pipeline/detail/depth/time_budget.h"
+#include "stereo/depth_maps.h"
+#include "stereo/normals.h"
+
+namespace dtr::pipeline {
+namespace {
+
+// The scene as the source views alone know it, with views renumbered to their order among sources.
+SparseScene SourceScene(const SparseScene& sparse, const std::vector<View>& views,
+                        const std::vector<int>& sources) {
+  std::vector<bool> is_source(views.size(), false);
+  std::vector<int> source_index(views.size(), -1);
+  for (size_t s = 0; s < sources.size(); ++s) {
+    is_source[static_cast<size_t>(sources[s])] = true;
+    source_index[static_cast<size_t>(sources[s])] = static_cast<int>(s);
+  }
+  SparseScene scene = RestrictToViews(sparse, is_source);
+  for (SparseObservation& seen : scene.observations) {
+    seen.view = source_index[static_cast<size_t>(seen.view)];
+  }
+  return scene;
+}
+
+// What the program itself takes: code, libraries, points and whatever is not counted one by one.
+constexpr std::uint64_t kProgramBytes = std::uint64_t{256} << 20;
+constexpr int kWidenings = 3;
+
+// Runs `compute` within the memory chosen.
+void ComputeWithin(const std::optional<double>& memory_gb, stereo::DepthMapsOptions& options,
+                   Progress& progress, const std::function<void()>& compute) {
+  const auto allowed =
+      static_cast<std::uint64_t>(memory_gb.value_or(kDefaultMemoryGb) * kBytesPerGigabyte);
+  options.memory_bytes = allowed > kProgramBytes ? allowed - kProgramBytes : 1;
+  try {
+    compute();
+  } catch (const stereo::NotEnoughMemory& error) {
+    // Rounded up, so that the number printed works when it is given.
+    const double least_gb =
+        std::ceil(1e3 * static_cast<double>(error.least_bytes() + kProgramBytes) /
+                  kBytesPerGigabyte) /
+        1e3;
+    if (memory_gb) {
+      throw UsageError(fmt::format(
+          "--memory {}: expected at least {:.3f} (GB) for a view with its neighbours; give as "
+          "much, fewer --neighbours or smaller images",
+          *memory_gb, least_gb));
+    }
+    progress.Note(
+        fmt::format("depth takes {:.3f} GB of memory: what a view with its neighbours "
+                    "needs",
+                    least_gb));
+    options.memory_bytes = error.least_bytes();
+    compute();
+  }
+}
+
+// The source views of a set, in its order.
+struct Sources {
+  explicit Sources(const std::vector<View>& views) {
+    for (size_t i = 0; i < views.size(); ++i) {
+      if (views[i].role != ViewRole::kSource) continue;
+      indices.push_back(static_cast<int>(i));
+      stereo.push_back({views[i].camera, views[i].cam_from_world, nullptr, nullptr});
+    }
+  }
+  std::vector<int> indices;
+  std::vector<stereo::StereoView> stereo;
+};
+
+// The image and mask of a view as its set stores them.
+stereo::StereoPixels ReadPixels(const std::filesystem::path& folder, View view, int threads) {
+  io::LoadOptions load;
+  load.depth = false;
+  load.threads = threads;
+  io::LoadPixels(folder, view, load);
+  return {std::move(view.image), std::move(view.mask)};
+}
+
+// Of all that planes are computed from beside the settings, which the set's fingerprint holds. A
+// calibration may come out otherwise when it has to be done again (COLMAP was updated, a checkpoint
+// damaged): planes of the old one would fit in size and be wrong.
+std::string HashOf(std::span<const stereo::StereoView> views, const SparseScene& scene) {
+  std::vector<double> values;
+  for (const stereo::StereoView& view : views) {
+    const PinholeCamera& camera = view.camera;
+    const Eigen::Vector4d turn = view.cam_from_world.rotation.coeffs();
+    const Eigen::Vector3d shift = view.cam_from_world.translation;
+    values.insert(values.end(),
+                  {static_cast<double>(camera.width_px()), static_cast<double>(camera.height_px()),
+                   camera.fx_px(), camera.fy_px(), camera.cx_px(), camera.cy_px()});
+    values.insert(values.end(), turn.data(), turn.data() + turn.size());
+    values.insert(values.end(), shift.data(), shift.data() + shift.size());
+  }
+  for (const SparsePoint& point : scene.points) {
+    values.insert(values.end(), point.p_in_world.data(), point.p_in_world.data() + 3);
+  }
+  for (const SparseObservation& seen : scene.observations) {
+    values.insert(values.end(), {static_cast<double>(seen.view), static_cast<double>(seen.point)});
+  }
+  return Sha256(std::as_bytes(std::span(values)));
+}
+
+// Normals beside the checkpoints of this very run until all are there: what lies in the user's
+// folder may be of another.
+class NormalFiles {
+ public:
+  NormalFiles(const std::filesystem::path& work, const std::filesystem::path& folder)
+      : work_(work / "normals"), folder_(folder) {}
+
+  bool Has(const View& view) const { return folder_.empty() || exists(work_ / Name(view)); }
+  void Write(const View& view, const stereo::PlaneMap& planes,
+             const stereo::DepthEstimate& estimate) const {
+    std::filesystem::create_directories(work_);
+    io::WriteExrOfVectors(
+        work_ / Name(view),
+        stereo::NormalsOf(planes, estimate.depth, estimate.inverse_depth_sigma, view.camera));
+  }
+  void Deliver(const View& view) const {
+    if (folder_.empty() || !exists(work_ / Name(view))) return;
+    std::filesystem::create_directories(folder_);
+    CopyFileAtomically(work_ / Name(view), folder_ / Name(view));
+  }
+
+ private:
+  static std::string Name(const View& view) { return view.id + ".exr"; }
+  std::filesystem::path work_, folder_;
+};
+
+void WriteDepth(View& view, stereo::DepthEstimate&& estimate, LengthUnit unit,
+                io::SetWriter& writer) {
+  view.depth = std::move(estimate.depth);
+  view.inverse_depth_sigma = std::move(estimate.inverse_depth_sigma);
+  ChooseDepthCoding(view);
+  writer.WriteView(view, unit);
+  view.depth = {};
+  view.inverse_depth_sigma.reset();
+}
+
+// The effort that fits into the time budget, by a probe with as many neighbours as any effort asks.
+stereo::Effort WithinBudget(std::span<const stereo::StereoView> views, const SparseScene& scene,
+                            const DepthChoice& choice, const stereo::DepthMapsOptions& options,
+                            const std::filesystem::path& record, Progress& progress) {
+  stereo::NeighbourOptions most;
+  most.count = stereo::MakeEngine("patchmatch")->Neighbours();
+  const auto neighbours = stereo::ChooseNeighbours(views, scene, most);
+  const auto ranges = stereo::DepthRangesFromPoints(views, scene, options.range);
+  stereo::Pages pages;
+  return EffortWithinBudget(
+      {views, neighbours, ranges, nullptr, options.engine, options.load_pixels, &pages}, choice,
+      record, progress);
+}
+
+}  // namespace
+
+void StoreImage(View& view, LengthUnit unit, io::SetWriter& writer) {
+  if (!writer.RestoreView(view)) writer.WriteView(view, unit);
+  view.image = {};
+  view.mask = {};
+}
+
+stereo::Effort DepthStage(DtrSet& set, const SparseScene& sparse, const DepthChoice& choice,
+                          const stereo::Effort& asked, const DepthStageOptions& options,
+                          io::SetWriter& writer, Progress& progress) {
+  if (choice.engine == "none") {
+    progress.Note("depth left out: --engine none");
+    return asked;
+  }
+  std::vector<View>& views = set.frames.front().views;
+  const Sources sources(views);
+  const SparseScene scene = SourceScene(sparse, views, sources.indices);
+  const auto view_of = [&](int source) -> View& {
+    return views[static_cast<size_t>(sources.indices[static_cast<size_t>(source)])];
+  };
+
+  stereo::DepthMapsOptions depth_options;
+  depth_options.widenings = kWidenings;
+  for (const int index : sources.indices) {
+    depth_options.range.names.push_back(views[static_cast<size_t>(index)].name);
+  }
+  depth_options.engine.threads = options.threads;
+  depth_options.engine.seed = options.seed;
+  depth_options.load_pixels = [&](int source) {
+    return ReadPixels(writer.folder(), view_of(source), options.threads);
+  };
+  const stereo::Effort effort = choice.time_budget_s
+                                    ? WithinBudget(sources.stereo, scene, choice, depth_options,
+                                                   writer.work_folder() / "effort.json", progress)
+                                    : asked;
+  if (!options.normals.empty() && (choice.engine != "patchmatch" || effort.rounds == 0)) {
+    throw UsageError(
+        "--normals: expected --engine patchmatch with one round or more, whose planes they are of");
+  }
+  const auto engine = MakeDepthEngine(choice, effort,
+                                      {views, sources.indices, sources.stereo, &scene,
+                                       set.world_origin, writer.folder(), writer.work_folder()},
+                                      progress);
+  depth_options.neighbours.count = engine->Neighbours();
+  // The other half holds photos, and maps that wait for their neighbours to be done.
+  depth_options.engine.memory_gb = choice.memory_gb.value_or(kDefaultMemoryGb) / 2;
+  PlaneFiles planes(writer.work_folder() / "planes", HashOf(sources.stereo, scene));
+  EstimateFiles estimates(writer.work_folder() / "estimates");
+  const NormalFiles normals(writer.work_folder(), options.normals);
+  depth_options.planes = &planes;
+  depth_options.estimates = &estimates;
+  ComputeWithin(choice.memory_gb, depth_options, progress, [&] {
+    stereo::ComputeDepthMaps(
+        sources.stereo, scene, *engine, depth_options, progress,
+        [&](int source) {
+          const View& view = view_of(source);
+          return view.depth_file.has_value() && normals.Has(view);
+        },
+        [&](int source, stereo::DepthEstimate&& estimate, const stereo::DepthRange&) {
+          View& view = view_of(source);
+          if (!options.normals.empty()) {
+            normals.Write(view, *planes.Load(engine->Rounds(), source), estimate);
+          }
+          WriteDepth(view, std::move(estimate), set.unit, writer);
+        });
+  });
+  for (const int index : sources.indices) normals.Deliver(views[static_cast<size_t>(index)]);
+  if (const std::string codings = SayDepthCodings(views); !codings.empty()) progress.Note(codings);
+  return effort;
+}
+
+}  // namespace dtr::pipeline

@@ -1,0 +1,105 @@
+#include "pipeline/detail/depth/plane_files.h"
+
+#include <fmt/format.h>
+
+#include <array>
+
+#include "dtr/base/error.h"
+#include "dtr/base/files.h"
+#include "pipeline/detail/depth/grid_files.h"
+
+namespace dtr::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+void MakeFolder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw Error(folder.string() + ": cannot be created: " + error.message());
+}
+
+bool Exists(const fs::path& file) {
+  std::error_code error;
+  const bool found = fs::exists(file, error);
+  if (error) throw Error(file.string() + ": cannot be looked for: " + error.message());
+  return found;
+}
+
+void Remove(const fs::path& file) {
+  std::error_code error;
+  fs::remove_all(file, error);
+  if (error) throw Error(file.string() + ": cannot be removed: " + error.message());
+}
+
+// False too for a file that was damaged: that costs time, never the job.
+bool Reads(const fs::path& file, const std::string& text) {
+  try {
+    return ReadFile(file, text.size()) == text;
+  } catch (const Error&) {
+    return false;
+  }
+}
+
+}  // namespace
+
+PlaneFiles::PlaneFiles(const fs::path& folder, const std::string& made_from) : folder_(folder) {
+  const fs::path origin = folder / "made_from";
+  if (Exists(origin) && Reads(origin, made_from)) return;
+  Remove(folder);
+  MakeFolder(folder);
+  WriteFileAtomically(origin, made_from);
+}
+
+fs::path PlaneFiles::File(int round, int view) const {
+  return folder_ / fmt::format("round{}_view{}.planes", round, view);
+}
+
+bool PlaneFiles::Has(int round, int view) const { return Exists(File(round, view)); }
+
+std::shared_ptr<const stereo::PlaneMap> PlaneFiles::Load(int round, int view) {
+  auto map = std::make_shared<stereo::PlaneMap>();
+  map->unit_z = ReadGridFile(File(round, view),
+                             std::array{&map->inverse_depth, &map->slope_x, &map->slope_y});
+  return map;
+}
+
+void PlaneFiles::Save(int round, int view, stereo::PlaneMap&& map) {
+  const std::array<const Grid<float>*, 3> grids{&map.inverse_depth, &map.slope_x, &map.slope_y};
+  WriteGridFile(File(round, view), grids, map.unit_z);
+}
+
+void PlaneFiles::Drop(int round) {
+  const std::string prefix = fmt::format("round{}_view", round);
+  std::error_code error;
+  fs::directory_iterator entry(folder_, error);
+  for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
+    if (entry->path().filename().string().starts_with(prefix)) Remove(entry->path());
+  }
+  if (error) throw Error(folder_.string() + ": cannot be listed: " + error.message());
+}
+
+EstimateFiles::EstimateFiles(const fs::path& folder) : folder_(folder) {
+  Remove(folder);
+  MakeFolder(folder);
+}
+
+fs::path EstimateFiles::File(int view) const { return folder_ / fmt::format("view{}.depth", view); }
+
+bool EstimateFiles::Has(int view) const { return Exists(File(view)); }
+
+std::shared_ptr<const stereo::DepthEstimate> EstimateFiles::Load(int view) {
+  auto estimate = std::make_shared<stereo::DepthEstimate>();
+  ReadGridFile(File(view), std::array{&estimate->depth.grid(), &estimate->inverse_depth_sigma});
+  return estimate;
+}
+
+void EstimateFiles::Save(int view, stereo::DepthEstimate&& estimate) {
+  const std::array<const Grid<float>*, 2> grids{&estimate.depth.grid(),
+                                                &estimate.inverse_depth_sigma};
+  WriteGridFile(File(view), grids);
+}
+
+void EstimateFiles::Drop(int view) { Remove(File(view)); }
+
+}  // namespace dtr::pipeline

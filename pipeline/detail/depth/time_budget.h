@@ -1,0 +1,47 @@
+// pipeline/detail/depth/time_budget.h -- settings that fit into so many seconds, picked before the
+// stage.
+#pragma once
+#include <filesystem>
+#include <span>
+
+#include "dtr/base/progress.h"
+#include "pipeline/depth_settings.h"
+#include "stereo/engine.h"
+#include "stereo/rounds.h"
+
+namespace dtr::pipeline {
+
+/// What work costs here and now, wall-clock seconds per pixel of a view. Measured at full effort of
+/// one kind, from which other efforts follow: the search costs in proportion to its neighbours and
+/// its visits per pixel, a round and the verdict in proportion to theirs.
+struct ProbedCosts {
+  double search_s = 0;   ///< per pixel, neighbour and visit
+  double round_s = 0;    ///< per pixel and neighbour
+  double verdict_s = 0;  ///< per pixel and neighbour
+};
+
+/// Visits per pixel of full size that a search makes on all its levels; `levels` >= 1.
+double VisitsPerPixel(int iterations, int levels);
+
+/// Runs engine `patchmatch` on one view of the collection and its neighbours, shrunk to 384 px.
+/// `view` must have neighbours. Throws as the engine does.
+ProbedCosts ProbeCosts(const stereo::Collection& collection, int view);
+
+/// Seconds that all of the views should take.
+double PredictSeconds(const ProbedCosts& costs, const stereo::Effort& effort,
+                      std::span<const stereo::StereoView> views);
+
+/// The efforts a budget chooses among, cheapest first; presets are among them.
+std::span<const stereo::Effort> EffortLadder();
+
+/// The dearest effort of the ladder that should fit into the budget, else the cheapest; what the
+/// choice gives explicitly stays.
+stereo::Effort PickEffort(const ProbedCosts& costs, const DepthChoice& choice,
+                          std::span<const stereo::StereoView> views);
+
+/// Probes the first view that has neighbours, picks for choice.time_budget_s and says so in one
+/// line. What was picked is kept in `record`, so that an interrupted run goes on with the same.
+stereo::Effort EffortWithinBudget(const stereo::Collection& collection, const DepthChoice& choice,
+                                  const std::filesystem::path& record, Progress& progress);
+
+}  // namespace dtr::pipeline

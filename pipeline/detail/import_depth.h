@@ -1,0 +1,20 @@
+// pipeline/detail/import_depth.h -- the depth map of one camera of an import. Internal.
+#pragma once
+#include <filesystem>
+#include <string>
+
+#include "pipeline/import.h"
+
+namespace dtr::pipeline {
+
+/// The depth map of a camera: the one its list names, else the only one with the photo's name.
+/// Throws Error where there is none, or several.
+std::filesystem::path DepthFileOf(const io::NamedCamera& named, const ImportOptions& options);
+
+/// Plane z of that file on a grid that a set can hold, of the undistorted photo. `distortion` is
+/// null where the camera has none. `resampled` gets a clause that says what was done where the map
+/// had another grid.
+DepthImage ReadCameraDepth(const io::NamedCamera& named, const ImportOptions& options,
+                           const CameraDistortion* distortion, std::string& resampled);
+
+}  // namespace dtr::pipeline

@@ -1,0 +1,38 @@
+#include "pipeline/detail/pages/set_page.h"
+
+#include "dtr/base/files.h"
+#include "dtr/report/set_report.h"
+
+namespace dtr::pipeline {
+
+void WriteSetPage(const io::SetWriter& writer, const DtrSet& set, const SetPageFacts& facts,
+                  Progress& progress) {
+  DtrSet sources = set;
+  std::vector<View>& views = sources.frames.front().views;
+  const size_t all = views.size();
+  std::erase_if(views, [](const View& view) { return view.role == ViewRole::kHeldOut; });
+  report::SetReportInfo info;
+  info.title = "D+TR set " + facts.name;
+  info.facts = {{"views", std::to_string(views.size())},
+                {"held out", std::to_string(all - views.size())},
+                {"depth engine", facts.engine},
+                {"not registered", std::to_string(facts.not_registered)}};
+  info.checks = facts.checks;
+  progress.Stage("page", static_cast<int>(views.size()));
+  int done = 0;
+  info.load = [&](const View& view) {
+    progress.ThrowIfInterrupted();
+    progress.Update(++done);
+    View loaded = view;
+    io::LoadOptions load;
+    load.sigma = true;
+    load.threads = facts.threads;
+    io::LoadPixels(writer.folder(), loaded, load);
+    return loaded;
+  };
+  for (const auto& [name, reason] : facts.skipped) info.skipped.push_back({name, reason});
+  std::filesystem::create_directories(writer.folder() / "report");
+  WriteFileAtomically(writer.folder() / "report" / "index.html", report::SetReport(sources, info));
+}
+
+}  // namespace dtr::pipeline

@@ -1,0 +1,18 @@
+// pipeline/detail/photos/holdout.h -- which photos are kept back to measure with.
+#pragma once
+#include <span>
+#include <string>
+#include <vector>
+
+namespace dtr::pipeline {
+
+/// For each of `names` (accepted photos in byte order) whether `spec` holds it out.
+/// "": none. "every:N": index i with i % N == 0, N >= 2. Otherwise names separated by commas, each
+/// with or without its extension.
+/// Throws UsageError for a malformed spec, a name that is not there, or fewer than two photos left.
+std::vector<bool> ChooseHeldOut(const std::string& spec, std::span<const std::string> names);
+
+/// Whether `spec` holds out the photo called `name` by its name.
+bool IsNamed(const std::string& spec, const std::string& name);
+
+}  // namespace dtr::pipeline

@@ -1,0 +1,20 @@
+// pipeline/detail/photos/names_of_photos.h -- cameras of another program by the names that our
+// photos have.
+#pragma once
+#include <filesystem>
+
+#include "calib/sfm_model.h"
+#include "capture/capture.h"
+#include "dtr/io/formats/cameras_json.h"
+
+namespace dtr::pipeline {
+
+/// Programs name photos below another folder than ours, as COLMAP does below images/ of a project:
+/// names that end as those of photos do become these where that is one to one. Others stay.
+void NameAsPhotos(const capture::Capture& capture, io::CameraList& list);
+
+/// The COLMAP model in `folder` (ModelFolderIn), its images in byte order of such names. Throws
+/// Error as colmap::ReadModel does.
+calib::SfmModel ReadModelOf(const capture::Capture& capture, const std::filesystem::path& folder);
+
+}  // namespace dtr::pipeline

@@ -1,0 +1,63 @@
+#include "pipeline/detail/run/build_options.h"
+
+#include <fmt/format.h>
+
+#include "capture/video/frames.h"
+#include "dtr/base/error.h"
+#include "pipeline/capture.h"
+
+namespace dtr::pipeline {
+
+BuildOptions ByPreset(BuildOptions options) {
+  const Preset& preset = PresetCalled(options.depth.preset);
+  if (options.max_size_px < 0) options.max_size_px = preset.max_size_px;
+  if (options.sfm.features == 0) {
+    options.sfm.features = options.poses.empty() ? preset.features : colmap::kMostFeatures;
+  }
+  return options;
+}
+
+void RequireOptions(const BuildOptions& options) {
+  if (options.holdout_strict && (options.holdout.empty() || !options.poses.empty())) {
+    throw UsageError(
+        "--holdout-strict: keeps the photos of --holdout out of SfM; it needs --holdout and "
+        "no --poses");
+  }
+  if (options.metres.any() && (!options.poses.empty() || !options.rig.empty() || !options.refine)) {
+    throw UsageError(
+        "--gps, --distance: are held by the bundle adjustment of what SfM finds; expected no "
+        "--poses, --rig or --no-refine beside them (dtr calibrate scale takes any finished set)");
+  }
+  if (options.sfm.camera_per != CameraPer::kAuto &&
+      (!options.poses.empty() || !options.rig.empty())) {
+    throw UsageError(
+        "--camera-per: says which photos share intrinsics that SfM finds; those of --poses and "
+        "--rig are known; leave out one of them");
+  }
+  const bool from_video = !VideosFor(options.photos, options.video).empty();
+  if (from_video && options.metres.gps) {
+    throw UsageError(
+        "--gps: expected photos, which say where they were taken, found a video; give --distance "
+        "or use dtr calibrate scale");
+  }
+  if (options.rig.empty()) return;
+  if (!options.poses.empty()) {
+    throw UsageError("--rig: places what SfM finds; expected no --poses beside it");
+  }
+  if (!options.refine) {
+    throw UsageError("--rig: is bundle adjustment; expected no --no-refine beside it");
+  }
+  if (!from_video) return;
+  if (!options.video.synchronised) {
+    throw UsageError(
+        "--rig: needs frames of the same instants; expected --synchronised for videos");
+  }
+  if (std::filesystem::exists(options.photos / "timestamps.csv")) {
+    throw UsageError(fmt::format(
+        "--rig {}: expected videos whose frames of equal number are of one instant, found {}, "
+        "which says which are; give photos, one folder per camera, of equal names",
+        options.rig.string(), (options.photos / "timestamps.csv").string()));
+  }
+}
+
+}  // namespace dtr::pipeline

@@ -1,0 +1,13 @@
+// pipeline/detail/run/build_options.h -- options of `dtr build` before any work.
+#pragma once
+#include "pipeline/build.h"
+
+namespace dtr::pipeline {
+
+/// With what the preset says in the place of what was not asked for.
+BuildOptions ByPreset(BuildOptions options);
+
+/// Throws UsageError where options ask for what cannot be had together.
+void RequireOptions(const BuildOptions& options);
+
+}  // namespace dtr::pipeline

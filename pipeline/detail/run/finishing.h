@@ -1,0 +1,38 @@
+// pipeline/detail/run/finishing.h -- what is worked out once all depth maps lie in the set's
+// folder, one view in memory at a time. All of it tells of its views and can be stopped between
+// them.
+#pragma once
+#include <span>
+
+#include "dtr/base/progress.h"
+#include "dtr/io/set_io.h"
+#include "dtr/types/dtr_set.h"
+#include "dtr/types/sparse_scene.h"
+
+namespace dtr::pipeline {
+
+/// Scene centre, bounds and baselines: from the stored depth maps or, without any, from `points`.
+void FinishScene(DtrSet& set, std::span<const SparsePoint> points, const io::SetWriter& writer,
+                 int threads, Progress& progress);
+
+/// Stores the depth of every source view anew as zstd-inverse, with 1/z off by at most `error_px`
+/// pixels of disparity from what the stereo engine gave. After FinishScene: pixels of disparity
+/// need the baselines. Maps in memory at a time take at most `memory_gb` (GB of 1e9 bytes). Throws
+/// Error where 16 bits cannot keep the bound.
+void RecodeDepth(DtrSet& set, double error_px, io::SetWriter& writer, int threads, double memory_gb,
+                 Progress& progress);
+
+/// How much of the source views has a depth.
+struct DepthCount {
+  int maps = 0;
+  long with_depth = 0, pixels = 0;
+  double Completeness() const {
+    return pixels > 0 ? static_cast<double>(with_depth) / static_cast<double>(pixels) : 0;
+  }
+};
+
+/// Writes the reduced mesh (SPEC 5.1) of every source view that has depth, as renderers make it
+/// with their default options. After FinishScene: thresholds need the baselines.
+DepthCount WriteMeshes(DtrSet& set, io::SetWriter& writer, int threads, Progress& progress);
+
+}  // namespace dtr::pipeline

@@ -1,0 +1,17 @@
+// pipeline/detail/run/force_stage.h -- stages of an interrupted build that are to be done again.
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace dtr::pipeline {
+
+/// The stages of which a build keeps something between runs, in their order.
+std::vector<std::string> StagesKept();
+
+/// Removes what the stage `name` and all after it left in the partial set `folder` (io::SetWriter),
+/// so that the run does them anew. Throws UsageError for a name not in StagesKept, Error when a
+/// file cannot be removed.
+void ForgetStage(const std::filesystem::path& folder, const std::string& name);
+
+}  // namespace dtr::pipeline

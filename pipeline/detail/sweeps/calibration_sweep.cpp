@@ -1,0 +1,188 @@
+#include "pipeline/detail/sweeps/calibration_sweep.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "calib/bundle/held_out.h"
+#include "calib/colmap/matching.h"
+#include "calib/colmap/pairs.h"
+#include "calib/colmap/program.h"
+#include "calib/yardstick/score.h"
+#include "capture/duplicates.h"
+#include "capture/ingest.h"
+#include "dtr/base/error.h"
+#include "dtr/base/machine.h"
+#include "dtr/io/set_io.h"
+#include "pipeline/calibrate.h"
+#include "pipeline/depth_settings.h"
+#include "pipeline/detail/photos/input_hash.h"
+#include "pipeline/detail/sweeps/sweep_axes.h"
+
+namespace dtr::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+enum CalibrationAxis : size_t { kFeatureSize, kFeatures, kMatching, kLensModel, kRefine };
+constexpr const char *kYes = "yes", *kNo = "no";
+// Scale of the loss over the photos' long side: half a pixel of 1000, about what sights err by, so
+// that wrong ones, which err the same by any cameras, do not hide what the cameras do.
+constexpr double kLossShare = 0.0005;
+constexpr double kExact = 1e-9;  // px; what stands for 0 on a logarithmic axis
+
+/// As `dtr build` takes them.
+capture::Capture PhotosOf(const CalibrationSweepOptions& options, Progress& progress) {
+  capture::Capture photos = capture::IngestPhotos(
+      options.photos, {.threads = options.threads, .memory_gb = kDefaultMemoryGb}, progress);
+  (void)capture::DropSamePictures(photos, [](const std::string&) { return false; });
+  capture::RequireEnoughPhotos(photos, options.photos);
+  return photos;
+}
+
+void RequirePhotosOfTheSet(const CalibrationSweepOptions& options,
+                           const std::vector<std::string>& names) {
+  const DtrSet set = io::ReadSet(options.set);
+  for (const View& view : set.frames.front().views) {
+    if (std::any_of(names.begin(), names.end(), [&](const std::string& name) {
+          return IsCalled(name, view.name) || IsCalled(view.name, name);
+        })) {
+      continue;
+    }
+    throw Error(
+        fmt::format("--photos {}: expected the photos that {} was built from, found none called {}",
+                    options.photos.string(), options.set.string(), view.name));
+  }
+}
+
+std::vector<calib::Track> YardstickOf(const capture::Capture& photos, const fs::path& folder,
+                                      int threads, Progress& progress) {
+  const auto read = [&](int i) {
+    const capture::Photo& photo = photos.photos[static_cast<size_t>(i)];
+    capture::PhotoPixels pixels = capture::ReadPhotoAndMask(photo);
+    return calib::YardstickPhoto{std::move(pixels.image), std::move(pixels.mask)};
+  };
+  auto tracks = calib::FindTracks(static_cast<int>(photos.photos.size()), read, threads, progress);
+  if (tracks.size() < calib::kFewestHeldOut) {
+    throw Error(fmt::format(
+        "--photos {}: expected {} points that {} or more photos show, to judge cameras by, found "
+        "{}; take photos that overlap more",
+        folder.string(), calib::kFewestHeldOut, calib::kFewestSights, tracks.size()));
+  }
+  return tracks;
+}
+
+/// Where a preselection keeps every pair there is nothing to choose.
+std::vector<std::string> MatchingValues(size_t photos) {
+  const colmap::Matching own = colmap::ResolveMatching(colmap::Matching::kAuto, photos);
+  std::vector<std::string> values{colmap::NameOf(own)};
+  for (const auto matching : {colmap::Matching::kExhaustive, colmap::Matching::kPreselected}) {
+    if (matching != own && photos > colmap::kNeighbours + 1) {
+      values.emplace_back(colmap::NameOf(matching));
+    }
+  }
+  values.emplace_back(colmap::NameOf(colmap::Matching::kSequential));
+  return values;
+}
+
+std::vector<std::string> FeatureValues() {
+  std::vector<std::string> values;
+  for (const int part : {1, 2, 4}) values.push_back(std::to_string(colmap::kMostFeatures / part));
+  return values;
+}
+
+}  // namespace
+
+CalibrationSweep::CalibrationSweep(CalibrationSweepOptions options, Progress& progress)
+    : options_(std::move(options)), progress_(progress) {
+  RequireCalibration({});
+  photos_ = PhotosOf(options_, progress_);
+  std::vector<std::pair<int, int>> sizes_px;
+  int longest = 0;
+  for (const capture::Photo& photo : photos_.photos) {
+    names_.push_back(photo.name);
+    sizes_px.emplace_back(photo.width_px, photo.height_px);
+    longest = std::max({longest, photo.width_px, photo.height_px});
+  }
+  RequirePhotosOfTheSet(options_, names_);
+  tracks_ = YardstickOf(photos_, options_.photos, options_.threads, progress_);
+  loss_scale_px_ = kLossShare * longest;
+  axes_ = {{"feature-size",
+            SizeValues(options_.feature_sizes_px, FeatureImageSizePx(sizes_px, kDefaultMemoryGb))},
+           {"features", FeatureValues()},
+           {"matching", MatchingValues(names_.size())},
+           {"lens-model", {SfmChoice{}.lens_model, "SIMPLE_RADIAL", "OPENCV"}},
+           {"refine", {kYes, kNo}}};
+}
+
+const std::string& CalibrationSweep::Value(const eval::SweepSetting& setting, size_t axis) const {
+  return axes_[axis].values.at(static_cast<size_t>(setting.at(axis)));
+}
+
+SfmChoice CalibrationSweep::ChoiceOf(const eval::SweepSetting& setting) const {
+  SfmChoice choice;
+  choice.feature_size_px = std::stoi(Value(setting, kFeatureSize));
+  choice.features = std::stoi(Value(setting, kFeatures));
+  for (const auto matching : {colmap::Matching::kExhaustive, colmap::Matching::kPreselected,
+                              colmap::Matching::kSequential}) {
+    if (Value(setting, kMatching) == colmap::NameOf(matching)) choice.matching = matching;
+  }
+  choice.lens_model = Value(setting, kLensModel);
+  return choice;
+}
+
+eval::SweepMeasurement CalibrationSweep::Measure(const eval::SweepSetting& setting) const {
+  NotesOnly notes(progress_);
+  CalibrateOptions calibrate;
+  calibrate.threads = options_.threads;
+  calibrate.seed = options_.seed;
+  calibrate.memory_gb = kDefaultMemoryGb;
+  calibrate.refine = Value(setting, kRefine) == kYes;
+  calibrate.sfm = ChoiceOf(setting);
+  // Refinement begins where COLMAP ends: with and without it there is one workspace.
+  std::string folder;
+  for (const CalibrationAxis axis : {kFeatureSize, kFeatures, kMatching, kLensModel}) {
+    folder += (folder.empty() ? "" : "-") + Value(setting, axis);
+  }
+  const double start_ms = ProcessCpuMilliseconds();
+  const CalibratedPhotos calibrated =
+      CalibratePhotos(photos_, calibrate, options_.work / folder, notes);
+  eval::SweepMeasurement measured;
+  measured.cost = (ProcessCpuMilliseconds() - start_ms) / kMillisecondsPerSecond +
+                  calibrated.engine_cpu_s + calibrated.kept_refinement_cpu_s;
+  measured.cost_least = measured.cost_most = measured.cost;
+
+  const calib::YardstickScore score =
+      calib::ScoreCameras(calibrated.model, names_, tracks_, loss_scale_px_, options_.threads);
+  measured.error = std::max(score.error_px, kExact);
+  measured.figures = {{"not_registered", static_cast<double>(calibrated.not_registered.size())},
+                      {"points", static_cast<double>(calibrated.model.points.size())},
+                      {"yardstick_sights", score.sights},
+                      {"yardstick_predicted", score.predicted},
+                      {"median_px", score.median_px}};
+  return measured;
+}
+
+std::string CalibrationSweep::Identity() const {
+  return InputHash(options_.photos) + " " + colmap::Program().version();
+}
+
+std::string CalibrationSweep::Conditions() const {
+  return fmt::format(
+      "{} photos, one calibration of each setting; judged by {} points that structure from motion "
+      "knows nothing of, every sight of them held out in turn",
+      names_.size(), tracks_.size());
+}
+
+eval::SweepStage CalibrationSweep::Stage() const {
+  eval::SweepStage stage;
+  stage.name = "calibration";
+  stage.cost_name = "CPU s of the calibration, COLMAP's included";
+  stage.error_name = "held-out reprojection, px of the photo";
+  stage.axes = axes_;
+  stage.applies = [](const eval::SweepSetting&, size_t) { return true; };
+  stage.measure = [this](const eval::SweepSetting& setting) { return Measure(setting); };
+  return stage;
+}
+
+}  // namespace dtr::pipeline

@@ -1,0 +1,300 @@
+#include "pipeline/scale.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "calib/scale.h"
+#include "dtr/base/error.h"
+#include "dtr/base/hash.h"
+#include "dtr/base/parallel_for.h"
+#include "dtr/io/pruned.h"
+#include "dtr/io/run_record.h"
+#include "dtr/io/set_io.h"
+#include "dtr/render/option_arguments.h"
+#include "pipeline/detail/boards/scale_board.h"
+#include "pipeline/detail/pages/set_page.h"
+#include "pipeline/detail/photos/photo_places.h"
+#include "pipeline/detail/run/finishing.h"
+#include "pipeline/detail/run/run_log.h"
+#include "pipeline/validate.h"
+
+namespace dtr::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+// The way into metres, and what is told of it.
+struct Found {
+  calib::Similarity metric_from_scene;
+  bool keeps_axes = true;
+  double relative_sigma = 0;
+  Json json;
+  std::vector<std::string> lines;
+};
+
+Found FromDistances(const ScaleOptions& options, const DtrSet& set) {
+  std::vector<calib::MeasuredDistance> distances;
+  for (const ScaleDistance& d : options.distances) {
+    const PlacedPoint a = Place(options.set, set, d.a), b = Place(options.set, set, d.b);
+    distances.push_back({"--distance " + d.text, a.p_in_world, b.p_in_world, a.covariance,
+                         b.covariance, d.length_m, d.sigma_m});
+  }
+  const calib::DistanceScale scale = calib::ScaleFromDistances(distances);
+  Found found;
+  found.metric_from_scene.scale = scale.metres_per_unit;
+  found.relative_sigma = scale.relative_sigma;
+  found.json["method"] = "distance";
+  found.json["distances"] = Json::array();
+  for (size_t i = 0; i < distances.size(); ++i) {
+    const double units = (distances[i].b - distances[i].a).norm();
+    found.json["distances"].push_back({{"text", options.distances[i].text},
+                                       {"units", units},
+                                       {"length_m", distances[i].length_m},
+                                       {"sigmas_off", scale.sigmas[i]}});
+    found.lines.push_back(fmt::format("{}: {:.6g} units, {:.2f} standard deviations off",
+                                      options.distances[i].text, units, scale.sigmas[i]));
+  }
+  return found;
+}
+
+Found FromGps(const ScaleOptions& options, const DtrSet& set) {
+  Found found;
+  std::map<std::string, Eigen::Vector3d> centre_of;
+  std::vector<std::string> names;
+  for (const View& view : set.frames.front().views) {
+    names.push_back(view.name);
+    centre_of[view.name] = view.CenterInWorld();
+  }
+  const PhotoPlaces located = ReadPhotoPlaces(options.gps, names);
+  RequirePlaces(located, options.gps.string(), "the set");
+  found.lines = located.without_place;
+  std::vector<Eigen::Vector3d> centres;
+  for (const std::string& name : located.names) centres.push_back(centre_of.at(name));
+  const calib::PositionScale scale = calib::ScaleFromPositions(centres, located.EastNorthUp());
+  found.relative_sigma = scale.relative_sigma;
+  found.keeps_axes = !(scale.turn_sigma_rad <= calib::kMostTurnSigmaRad);
+  found.metric_from_scene = scale.metric_from_scene;
+  if (found.keeps_axes) {
+    found.metric_from_scene = {};
+    found.metric_from_scene.scale = scale.metric_from_scene.scale;
+  }
+  std::vector<std::string> left_out;
+  for (const size_t i : scale.left_out) left_out.push_back(located.names[i]);
+  const double turn_deg = scale.turn_sigma_rad * 180 / std::numbers::pi;
+  found.json["method"] = "gps";
+  found.json["photos"] = located.names.size();
+  found.json["left_out"] = left_out;
+  found.json["settled"] = scale.settled;
+  found.json["rms_m"] = scale.rms_m;
+  found.json["turn_sigma_deg"] = turn_deg;
+  found.json["axes"] = found.keeps_axes ? "as before" : "east, north, up";
+  if (!found.keeps_axes) {
+    found.json["origin"] = Json::parse(located.OriginJson());
+  }
+  found.lines.push_back(fmt::format("{} positions, {:.2f} m RMS; turn known to {:.2g} degrees",
+                                    located.names.size() - left_out.size(), scale.rms_m, turn_deg));
+  if (!left_out.empty()) {
+    found.lines.push_back(fmt::format("do not agree, left out: {}", fmt::join(left_out, ", ")));
+  }
+  if (!scale.settled) {
+    found.lines.push_back(
+        "which positions agree did not settle: with another pass others would be left out");
+  }
+  found.lines.push_back(found.keeps_axes
+                            ? "the cameras stand nearly on a line, and the turn about it is not "
+                              "known: axes are left as they were"
+                            : located.AxesLine());
+  return found;
+}
+
+Found FromBoard(const ScaleOptions& options, const DtrSet& set, Progress& progress) {
+  const calib::Board& board = *options.board;
+  BoardInSet in_set = FindBoard(options.set, set, board, options.threads, progress);
+  calib::BoardScale scale = calib::ScaleFromBoard(board, in_set.sights);
+  Found found;
+  found.metric_from_scene.scale = 1 / scale.scene_from_board.scale;
+  found.relative_sigma = scale.relative_sigma;
+  scale.left_out.insert(scale.left_out.end(), in_set.without.begin(), in_set.without.end());
+  found.json["method"] = "board";
+  found.json["board"] = calib::TextOf(board);
+  found.json["views"] = scale.views;
+  found.json["corners"] = scale.corners;
+  found.json["outliers"] = scale.outliers;
+  found.json["rms_px"] = scale.rms_px;
+  found.json["left_out"] = Json::array();
+  for (const calib::LeftOut& item : scale.left_out) {
+    found.json["left_out"].push_back({{"name", item.name}, {"reason", item.reason}});
+    found.lines.push_back(fmt::format("left out: {}: {}", item.name, item.reason));
+  }
+  found.lines.push_back(fmt::format("the board in {} views: {} corners, {} outliers, RMS {:.3f} px",
+                                    scale.views.size(), scale.corners, scale.outliers,
+                                    scale.rms_px));
+  return found;
+}
+
+Found FindScale(const ScaleOptions& options, const DtrSet& set, Progress& progress) {
+  if (options.board) return FromBoard(options, set, progress);
+  return options.gps.empty() ? FromDistances(options, set) : FromGps(options, set);
+}
+
+Bounds Carried(const Bounds& bounds, const calib::Similarity& b_from_a) {
+  if (bounds.empty()) return bounds;
+  Bounds carried;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Eigen::Vector3d p =
+        b_from_a * Eigen::Vector3d((corner & 1 ? bounds.max : bounds.min).x(),
+                                   (corner & 2 ? bounds.max : bounds.min).y(),
+                                   (corner & 4 ? bounds.max : bounds.min).z());
+    carried.min = corner == 0 ? p : Eigen::Vector3d(carried.min.cwiseMin(p));
+    carried.max = corner == 0 ? p : Eigen::Vector3d(carried.max.cwiseMax(p));
+  }
+  return carried;
+}
+
+// Thresholds in scene units among the options that the set was pruned for.
+void CarryStoredOptions(double scale, DtrSet& set) {
+  const std::string text = io::PrunedJson(set);
+  if (text.empty()) return;
+  Json pruned = Json::parse(text);
+  RenderOptions stored =
+      WithArguments({}, io::RenderArguments(set), "set.json: pruned.render_arguments");
+  for (std::optional<double>* length : {&stored.absolute_delta, &stored.absolute_depth_break}) {
+    if (*length) **length *= scale;
+  }
+  const std::vector<std::string> arguments = RenderOptionArguments(stored);
+  if (pruned.contains("render_arguments")) pruned["render_arguments"] = arguments;
+  io::SetPrunedJson(set, pruned.dump());
+}
+
+// All that set.json says in lengths. Where axes stay, so does the user's origin.
+void Carry(const Found& found, DtrSet& set) {
+  const calib::Similarity& metric = found.metric_from_scene;
+  set.unit = LengthUnit::kMetre;
+  set.world_origin =
+      found.keeps_axes ? Eigen::Vector3d(metric.scale * set.world_origin) : Eigen::Vector3d::Zero();
+  set.scene_center = metric * set.scene_center;
+  set.bounds = Carried(set.bounds, metric);
+  CarryStoredOptions(metric.scale, set);
+  for (Frame& frame : set.frames) {
+    for (View& view : frame.views) {
+      view.cam_from_world = metric.CamFromB(view.cam_from_world);
+      view.reference_baseline *= metric.scale;
+      view.near_z *= metric.scale;
+      view.far_z *= metric.scale;
+    }
+  }
+}
+
+// Depth and sigma of the old view, times the scale, written for the new one. Float rounding must
+// not carry a depth past the ends of its range, which are rounded apart from it.
+void CarryDepth(const fs::path& from, View old_view, double scale, View& view, LengthUnit unit,
+                io::SetWriter& writer) {
+  io::LoadOptions load;
+  load.images = false;
+  load.sigma = true;
+  load.threads = 1;
+  io::LoadPixels(from, old_view, load);
+  const auto near = static_cast<float>(view.near_z), far = static_cast<float>(view.far_z);
+  for (float& z : old_view.depth.grid().data()) {
+    if (!DepthImage::IsHole(z)) z = std::clamp(static_cast<float>(scale * z), near, far);
+  }
+  if (old_view.inverse_depth_sigma) {
+    for (float& sigma : old_view.inverse_depth_sigma->data()) {
+      sigma = static_cast<float>(sigma / scale);
+    }
+  }
+  view.depth = std::move(old_view.depth);
+  view.inverse_depth_sigma = std::move(old_view.inverse_depth_sigma);
+  writer.WriteView(view, unit);
+  view.depth = {};
+  view.inverse_depth_sigma.reset();
+}
+
+void WriteViews(const ScaleOptions& options, const DtrSet& old_set, double scale, DtrSet& set,
+                io::SetWriter& writer, Progress& progress) {
+  for (size_t f = 0; f < set.frames.size(); ++f) {
+    auto& views = set.frames[f].views;
+    progress.Stage("writing in metres", static_cast<int>(views.size()));
+    for (size_t i = 0; i < views.size(); ++i) {
+      progress.ThrowIfInterrupted();
+      const View& old_view = old_set.frames[f].views[i];
+      if (writer.RestoreView(views[i])) {
+        progress.Update(static_cast<int>(i) + 1);
+        continue;
+      }
+      View unchanged = old_view;
+      unchanged.depth_file.reset();
+      unchanged.sigma_file.reset();
+      unchanged.mesh_file.reset();
+      writer.CopyFiles(options.set, unchanged);
+      if (old_view.depth_file) CarryDepth(options.set, old_view, scale, views[i], set.unit, writer);
+      progress.Update(static_cast<int>(i) + 1);
+    }
+  }
+}
+
+void Record(const Found& found, DtrSet& set, ScaleReport& report) {
+  Json entry = {{"metres_per_unit", found.metric_from_scene.scale},
+                {"relative_sigma", found.relative_sigma}};
+  entry.update(found.json);
+  Json provenance = Json::parse(set.provenance_json);
+  if (!provenance["scale"].is_array()) provenance["scale"] = Json::array();
+  provenance["scale"].push_back(entry);
+  set.provenance_json = provenance.dump();
+  entry["set"] = report.written.string();
+  entry["unit"] = NameOf(set.unit);
+  report.json = entry.dump(1);
+  report.metres_per_unit = found.metric_from_scene.scale;
+  report.relative_sigma = found.relative_sigma;
+  report.lines = found.lines;
+}
+
+}  // namespace
+
+ScaleReport ScaleSet(const ScaleOptions& options, Progress& progress) {
+  RunLog log;
+  log.Begin("scale");
+  const DtrSet old_set = io::ReadSet(options.set);
+  const Found found = FindScale(options, old_set, progress);
+  const bool in_place = options.output.empty();
+  ScaleReport report;
+  report.written = in_place ? options.set : options.output;
+  DtrSet set = old_set;
+  Carry(found, set);
+  const Json fingerprint = {{"tool_version", DTR_VERSION},
+                            {"scale", found.metric_from_scene.scale},
+                            {"method", found.json},
+                            {"set_sha256", Sha256OfFile(options.set / "set.json")}};
+  io::SetWriter writer(report.written, fingerprint.dump(), in_place || options.force);
+  WriteViews(options, old_set, found.metric_from_scene.scale, set, writer, progress);
+  WriteMeshes(set, writer, options.threads, progress);
+  std::vector<Check> checks;
+  if (set.sparse_file) {
+    SparseScene sparse = io::LoadSparse(options.set, old_set);
+    for (SparsePoint& point : sparse.points) {
+      point.p_in_world = found.metric_from_scene * point.p_in_world;
+    }
+    writer.WriteSparse(set, sparse);
+    checks = ValidateSet(writer.folder(), set, sparse, {}, options.threads, progress).tests;
+  }
+  Record(found, set, report);
+  WriteSetPage(writer, set, {report.written.stem().string(), "", checks, {}, 0, options.threads},
+               progress);
+  log.End();
+  // What the stages before cost is still what this set cost.
+  io::RunRecord record = log.Record(ResolveThreads(options.threads));
+  const std::vector<io::RunStage> earlier = io::ReadRunStages(options.set);
+  record.stages.insert(record.stages.begin(), earlier.begin(), earlier.end());
+  io::WriteRunRecord(writer.folder(), record);
+  writer.Finish(set);
+  return report;
+}
+
+}  // namespace dtr::pipeline

@@ -1,0 +1,30 @@
+// pipeline/sfm_settings.h -- what may be chosen of structure from motion.
+#pragma once
+#include <string>
+
+#include "calib/colmap/sfm.h"
+
+namespace dtr::pipeline {
+
+/// Which photos share intrinsics (camera_groups.h).
+enum class CameraPer { kAuto, kFolder, kPhoto, kSet };
+/// "auto", "folder", "photo", "set".
+const char* NameOf(CameraPer per);
+
+/// How COLMAP goes about it. Each choice decides the result; docs/accuracy/SPEED.md has what they
+/// cost and what they are worth.
+struct SfmChoice {
+  int feature_size_px = 0;  ///< long side of the photos for features; 0: from the memory
+  int features = 0;         ///< most per photo; 0: colmap::kMostFeatures, or what a preset says
+  colmap::Matching matching = colmap::Matching::kAuto;
+  std::string lens_model = colmap::SfmOptions().lens_model;
+  CameraPer camera_per = CameraPer::kAuto;
+
+  bool operator==(const SfmChoice&) const = default;
+};
+
+/// JSON object: feature_size_px, features, matching, lens_model, and camera_per where it is not
+/// auto.
+std::string ToJson(const SfmChoice& choice);
+
+}  // namespace dtr::pipeline

@@ -1,0 +1,144 @@
+#include "pipeline/stereo.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "dtr/base/error.h"
+#include "dtr/base/hash.h"
+#include "dtr/base/parallel_for.h"
+#include "dtr/eval/json.h"
+#include "dtr/io/pruned.h"
+#include "dtr/io/set_io.h"
+#include "dtr/render/instants.h"
+#include "pipeline/detail/depth/depth_engine.h"
+#include "pipeline/detail/depth/depth_stage.h"
+#include "pipeline/detail/pages/set_page.h"
+#include "pipeline/detail/photos/input_hash.h"
+#include "pipeline/detail/run/finishing.h"
+#include "pipeline/detail/run/kept_notes.h"
+#include "pipeline/detail/run/run_log.h"
+#include "pipeline/validate.h"
+
+namespace dtr::pipeline {
+namespace {
+
+// The set without pixels and without any depth.
+DtrSet ReadForDepth(const std::filesystem::path& folder) {
+  DtrSet set = io::ReadSet(folder);
+  RequireOneFrame(set);
+  if (!set.sparse_file) {
+    throw Error(
+        folder.string() +
+        ": expected sparse points to find depth ranges from, found none; build the set from "
+        "its photos with dtr build");
+  }
+  for (View& view : set.frames.front().views) {
+    view.depth_file.reset();
+    view.sigma_file.reset();
+    view.mesh_file.reset();
+    view.near_z = view.far_z = 0;
+    view.depth_scale = 1;
+    if (view.depth_coding == DepthCoding::kZstdInverseDepth) {
+      view.depth_coding = View{}.depth_coding;  // its steps were for the old range
+      view.depth_steps = 0;
+    }
+  }
+  return set;
+}
+
+// set.json does not tell what held-out files contain.
+nlohmann::json HeldOutHashes(const DtrSet& set) {
+  auto hashes = nlohmann::json::array();
+  for (const View& view : set.frames.front().views) {
+    if (view.role == ViewRole::kHeldOut) hashes.push_back(view.image_file->sha256);
+  }
+  return hashes;
+}
+
+// The images of the old set in the new one.
+void CopyImages(const std::filesystem::path& from, DtrSet& set, int threads, io::SetWriter& writer,
+                Progress& progress) {
+  io::LoadOptions load;
+  load.depth = false;
+  load.threads = threads;
+  for (View& view : set.frames.front().views) {
+    progress.ThrowIfInterrupted();
+    io::LoadPixels(from, view, load);
+    StoreImage(view, set.unit, writer);
+  }
+}
+
+}  // namespace
+
+RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& listener) {
+  const stereo::Effort effort = EffortOf(options.depth);
+  RequireEngine(options.depth);
+  const bool in_place = options.output.empty();
+  RunLog log;
+  KeptNotes progress(listener);
+  log.Begin("depth");
+  RecomputeReport report;
+  report.written = in_place ? options.set : options.output;
+  DtrSet set = ReadForDepth(options.set);
+  const SparseScene sparse = io::LoadSparse(options.set, set);
+
+  const nlohmann::json fingerprint = {{"tool_version", DTR_VERSION},
+                                      {"settings", SettingsJson(options.depth.engine, effort)},
+                                      {"time_budget_s", options.depth.time_budget_s.value_or(0)},
+                                      {"depth_error_px", options.depth.depth_error_px.value_or(0)},
+                                      {"seed", options.seed},
+                                      {"workspace_sha256", InputHash(options.depth.workspace)},
+                                      {"set_sha256", Sha256OfFile(options.set / "set.json")},
+                                      {"held_out", HeldOutHashes(set)}};
+  io::SetWriter writer(report.written, fingerprint.dump(), in_place || options.force);
+  CopyImages(options.set, set, options.threads, writer, progress);
+  const stereo::Effort spent =
+      DepthStage(set, sparse, options.depth, effort,
+                 {options.threads, options.seed, options.normals}, writer, progress);
+  // What was left out of the former depth says nothing of this.
+  if (!io::PrunedJson(set).empty()) {
+    progress.Note("the record of what was pruned goes with the depth that was pruned");
+    io::SetPrunedJson(set, "");
+  }
+  FinishScene(set, {}, writer, options.threads, progress);
+  if (options.depth.depth_error_px) {
+    RecodeDepth(set, *options.depth.depth_error_px, writer, options.threads,
+                options.depth.memory_gb.value_or(kDefaultMemoryGb), progress);
+  }
+  const DepthCount count = WriteMeshes(set, writer, options.threads, progress);
+  writer.WriteSparse(set, sparse);
+  nlohmann::ordered_json provenance = nlohmann::ordered_json::parse(set.provenance_json);
+  provenance["depth_engine"] = options.depth.engine;
+  auto& recorded = provenance["options"];
+  if (!recorded.is_object()) recorded = nlohmann::ordered_json::object();  // an imported set
+  for (const char* old : {"neighbours", "round_neighbours", "iterations", "rounds"}) {
+    recorded.erase(old);
+  }
+  recorded.update(SettingsJson(options.depth.engine, spent));
+  recorded["seed"] = options.seed;
+  recorded.erase("depth_error_px");
+  if (options.depth.depth_error_px) recorded["depth_error_px"] = *options.depth.depth_error_px;
+  set.provenance_json = provenance.dump();
+  report.depth_maps = count.maps;
+  report.depth_completeness = count.Completeness();
+  SetLimits limits;
+  limits.memory_gb = std::min(limits.memory_gb, options.depth.memory_gb.value_or(kDefaultMemoryGb));
+  const auto validation =
+      ValidateSet(writer.folder(), set, sparse, limits, options.threads, progress);
+  set.verdict_json = eval::VerdictJson(validation.tests);  // other depth, other verdict
+  WriteSetPage(writer, set,
+               {report.written.stem().string(),
+                options.depth.engine,
+                validation.tests,
+                {},
+                0,
+                options.threads},
+               progress);
+  log.End();
+  io::WriteRunRecord(writer.folder(),
+                     log.Record(ResolveThreads(options.threads), progress.lines()));
+  writer.Finish(set);
+  return report;
+}
+
+}  // namespace dtr::pipeline

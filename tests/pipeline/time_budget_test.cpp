@@ -1,0 +1,73 @@
+// Which settings fit into a number of seconds, given what work costs.
+#include "pipeline/detail/depth/time_budget.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+namespace dtr::pipeline {
+namespace {
+
+// About what a core of a Xeon takes.
+constexpr ProbedCosts kCosts{.search_s = 4e-7, .round_s = 4e-7, .verdict_s = 1.5e-7};
+
+std::vector<stereo::StereoView> Views(int count) {
+  return std::vector<stereo::StereoView>(
+      static_cast<size_t>(count),
+      {PinholeCamera(1000, 600, 900, 900, 500, 300), Pose{}, nullptr, nullptr});
+}
+
+DepthChoice Within(double seconds) {
+  DepthChoice choice;
+  choice.time_budget_s = seconds;
+  return choice;
+}
+
+TEST(TimeBudget, TheLadderRisesAndHoldsThePresets) {
+  const auto views = Views(16);
+  double before = 0;
+  for (const stereo::Effort& effort : EffortLadder()) {
+    const double seconds = PredictSeconds(kCosts, effort, views);
+    EXPECT_GT(seconds, before);
+    before = seconds;
+  }
+  for (const Preset& preset : Presets()) {
+    EXPECT_EQ(std::count(EffortLadder().begin(), EffortLadder().end(), preset.effort), 1)
+        << preset.name;
+  }
+}
+
+TEST(TimeBudget, PicksTheMostThatFits) {
+  const auto views = Views(16);
+  const auto ladder = EffortLadder();
+  for (size_t i = 0; i < ladder.size(); ++i) {
+    const double seconds = PredictSeconds(kCosts, ladder[i], views);
+    EXPECT_EQ(PickEffort(kCosts, Within(1.001 * seconds), views), ladder[i]);
+    EXPECT_EQ(PickEffort(kCosts, Within(0.999 * seconds), views), ladder[i == 0 ? 0 : i - 1]);
+  }
+  EXPECT_EQ(PickEffort(kCosts, Within(1e9), views), ladder.back());
+}
+
+TEST(TimeBudget, WhatIsGivenExplicitlyStays) {
+  DepthChoice choice = Within(1e9);
+  choice.rounds = 1;
+  EXPECT_EQ(PickEffort(kCosts, choice, Views(4)).rounds, 1);
+}
+
+TEST(TimeBudget, TwiceThePixelsOrViewsTakeTwiceAsLong) {
+  const stereo::Effort effort;
+  const double once = PredictSeconds(kCosts, effort, Views(16));
+  EXPECT_NEAR(PredictSeconds(kCosts, effort, Views(32)), 2 * once, 1e-9 * once);
+  // Two views have one neighbour each, however many are asked for.
+  const stereo::Effort one{.neighbours = 1, .round_neighbours = 1};
+  EXPECT_EQ(PredictSeconds(kCosts, effort, Views(2)), PredictSeconds(kCosts, one, Views(2)));
+}
+
+TEST(TimeBudget, VisitsByHand) {
+  EXPECT_DOUBLE_EQ(VisitsPerPixel(3, 1), 11);  // 3 + 2, and the first guess
+  EXPECT_DOUBLE_EQ(VisitsPerPixel(3, 3), 1 + 3 / 4.0 + 11 / 16.0);
+  EXPECT_DOUBLE_EQ(VisitsPerPixel(5, 2), 3 + 13 / 4.0);
+}
+
+}  // namespace
+}  // namespace dtr::pipeline
