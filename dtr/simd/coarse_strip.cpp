@@ -20,7 +20,7 @@ constexpr int kLanes = static_cast<int>(hn::MaxLanes(DF()));
 
 // As in coarse_triangles.comp: pixels this near to an edge belong to the triangle, so that rounding
 // leaves no cracks; thinner triangles and backs are not drawn.
-constexpr float kMarginPx = 1.0f / 64, kLeastArea = 1e-6f;
+constexpr float kMarginPx = 1.0f / 256, kLeastArea = 1e-6f;
 /// Pixel ranges never reach farther, so that they fit an int.
 constexpr float kFarPx = 1e6f;
 
