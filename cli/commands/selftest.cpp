@@ -27,6 +27,7 @@ std::vector<selftest::NamedRenderer> Renderers(Console& console) {
       return MakeRenderer(choice, console);
     };
     renderers.push_back({name, make});
+    if (name == "simd") renderers.back().methods = {RenderMethod::kDeferred};
     if (std::ranges::find(known, name) == known.end()) {
       renderers.back().missing = "this program was built without OpenGL";
       continue;

@@ -22,7 +22,7 @@ void CheckOptions(const RenderOptions& options) {
   if (Renderer::Draws(options)) return;
   throw UsageError(
       "--renderer simd: cannot draw by the two-pass method; use --method deferred, or --renderer "
-      "gl or cpu");
+      "auto, gl or cpu");
 }
 
 // What is drawn into, surface, image, depth and marks, stays below this beside the result; larger

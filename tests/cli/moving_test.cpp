@@ -31,7 +31,7 @@ class MovingSetBy : public MovingSphereSet, public ::testing::WithParamInterface
     }
   }
 };
-INSTANTIATE_TEST_SUITE_P(Renderers, MovingSetBy, ::testing::Values("cpu", "gl"));
+INSTANTIATE_TEST_SUITE_P(Renderers, MovingSetBy, ::testing::Values("cpu", "gl", "simd"));
 
 double MeanDifference(const fs::path& a_file, const fs::path& b_file) {
   const ImageRgb8 a = io::ReadImage(a_file), b = io::ReadImage(b_file);
