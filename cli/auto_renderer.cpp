@@ -10,8 +10,7 @@ namespace {
 
 class AutoEngine final : public RenderEngine {
  public:
-  AutoEngine(const RendererChoice& choice, Progress& console)
-      : choice_(choice), console_(console) {
+  AutoEngine(const RendererChoice& choice, Progress& console) : choice_(choice), console_(console) {
 #ifdef DTR_WITH_GL
     gpu_ = MakeGpuEngine(choice, console, why_no_gpu_);
 #else

@@ -75,9 +75,9 @@ class Host {
 };
 
 /// dtr/gl without a scene graph, as the node uses it.
-eval::FrameTime DrawAlone(gl::FittingRenderer& renderer, const RenderScene& scene,
-                          const Host& host, const Pose& cam_from_world,
-                          const RenderOptions& options, int& views_used) {
+eval::FrameTime DrawAlone(gl::FittingRenderer& renderer, const RenderScene& scene, const Host& host,
+                          const Pose& cam_from_world, const RenderOptions& options,
+                          int& views_used) {
   const eval::StopWatch watch;
   const gl::DrawnPicture picture = renderer.Draw(scene, host.camera(), cam_from_world, options);
   gl::WaitForGpu();
@@ -164,17 +164,17 @@ void SayOsgTable(const OsgBench& bench, const eval::BenchMachine& machine, Conso
   console.Say(fmt::format("{}x{}, medians of {} frames of a fly-through; ratio by {} time",
                           bench.width_px, bench.height_px, bench.frames, machine.clock));
   console.Say("");
-  console.Say(fmt::format("{:<22} {:>3} {:>5} {:>10} {:>9} {:>8} {:>10} {:>9} {:>6}",
-                          "Application", "R", "views", "s a frame", "ms", "CPU ms", "alone ms",
-                          "CPU ms", "ratio"));
+  console.Say(fmt::format("{:<22} {:>3} {:>5} {:>10} {:>9} {:>8} {:>10} {:>9} {:>6}", "Application",
+                          "R", "views", "s a frame", "ms", "CPU ms", "alone ms", "CPU ms",
+                          "ratio"));
   for (const OsgRow& row : bench.rows) {
     std::string line = fmt::format("{:<22} {:>3} {:>5} {:>10.4f} {:>9.1f} {:>8.1f}",
                                    row.read_back ? "D+TR on OSG, read back" : "D+TR on OSG",
                                    row.options.resolution, row.views_used, row.osg.median_ms / 1000,
                                    row.osg.median_ms, row.osg_cpu.median_ms);
     if (!row.read_back) {
-      line += fmt::format(" {:>10.1f} {:>9.1f} {:>6.3f}", row.gl.median_ms,
-                          row.gl_cpu.median_ms, bench.RatioOsgOverGl(row));
+      line += fmt::format(" {:>10.1f} {:>9.1f} {:>6.3f}", row.gl.median_ms, row.gl_cpu.median_ms,
+                          bench.RatioOsgOverGl(row));
     }
     console.Say(line);
   }

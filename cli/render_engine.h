@@ -26,7 +26,7 @@ std::unique_ptr<RenderEngine> MakeGpuEngine(const RendererChoice& choice, Progre
 std::unique_ptr<RenderEngine> MakeAutoEngine(const RendererChoice& choice, Progress& console);
 
 /// Any name but "auto".
-std::unique_ptr<RenderEngine> MakeNamedEngine(const std::string& name,
-                                              const RendererChoice& choice, Progress& console);
+std::unique_ptr<RenderEngine> MakeNamedEngine(const std::string& name, const RendererChoice& choice,
+                                              Progress& console);
 
 }  // namespace dtr::cli

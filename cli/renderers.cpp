@@ -107,8 +107,8 @@ std::unique_ptr<RenderEngine> MakeEngine(const RendererChoice& choice, Progress&
 
 }  // namespace
 
-std::unique_ptr<RenderEngine> MakeNamedEngine(const std::string& name,
-                                              const RendererChoice& choice, Progress& console) {
+std::unique_ptr<RenderEngine> MakeNamedEngine(const std::string& name, const RendererChoice& choice,
+                                              Progress& console) {
 #ifdef DTR_WITH_GL
   if (name == "gl") return MakeGlEngine(choice, console);
 #endif

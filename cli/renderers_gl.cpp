@@ -40,8 +40,7 @@ class DriverObjections {
 
 class GlEngine final : public RenderEngine {
  public:
-  GlEngine(std::unique_ptr<gl::EglContext> context, const RendererChoice& choice,
-           Progress& console)
+  GlEngine(std::unique_ptr<gl::EglContext> context, const RendererChoice& choice, Progress& console)
       : context_(std::move(context)), renderer_(SettingsOf(choice, console)) {}
   std::string Description() const override { return context_->Description(); }
   bool HasGpuClock() const override { return timer_.has_gpu_clock(); }
@@ -49,8 +48,8 @@ class GlEngine final : public RenderEngine {
                        const Pose& novel_from_world, const RenderOptions& options) override {
     gl::WaitForGpu();
     const eval::StopWatch watch;
-    const std::optional<double> gpu_ms = timer_.GpuMilliseconds(
-        [&] { renderer_.Draw(scene, novel, novel_from_world, options); });
+    const std::optional<double> gpu_ms =
+        timer_.GpuMilliseconds([&] { renderer_.Draw(scene, novel, novel_from_world, options); });
     eval::FrameTime time = watch.Elapsed();
     time.gpu_ms = gpu_ms;
     objections_.Throw();

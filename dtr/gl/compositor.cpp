@@ -190,9 +190,9 @@ class Compositor::Implementation {
       window_z_.resize(pixels);
       const bool has_guesses = picture.number == taken_number_;
       simd::MapToWindow(mapping, {picture.depth_z, pixels},
-                  has_guesses ? std::span<const std::uint8_t>(taken_guessed_)
-                              : std::span<const std::uint8_t>(),
-                  window_z_);
+                        has_guesses ? std::span<const std::uint8_t>(taken_guessed_)
+                                    : std::span<const std::uint8_t>(),
+                        window_z_);
       send(depth_, GL_RED, GL_FLOAT, window_z_.data());
     }
     brought_number_ = picture.number, brought_mapping_ = mapping;

@@ -32,8 +32,9 @@ class EglContext {
 std::string CurrentContextDescription();
 
 /// From now on the current context counts the errors, undefined behaviour and messages of high
-/// severity that the driver reports (KHR_debug), and prints them to stderr. For tests and development;
-/// builds without NDEBUG make their contexts as debug contexts, in which drivers say more.
+/// severity that the driver reports (KHR_debug), and prints them to stderr. For tests and
+/// development; builds without NDEBUG make their contexts as debug contexts, in which drivers say
+/// more.
 class DebugOutput {
  public:
   DebugOutput();

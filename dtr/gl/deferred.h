@@ -16,8 +16,8 @@ class CoarseDepth {
  public:
   /// The nearest surface of all views of the frame. Their meshes must have been prepared with these
   /// options.
-  void Draw(const RenderFrame& frame, const Band& band, const MeshStore& meshes, ProgramCache& programs,
-            const Targets& targets);
+  void Draw(const RenderFrame& frame, const Band& band, const MeshStore& meshes,
+            ProgramCache& programs, const Targets& targets);
 
   /// Inverse depth in the novel camera as the bits of a float, 0 where nothing is; rows of the
   /// targets' width, the band's first row first. Valid after Draw.

@@ -1,5 +1,5 @@
-// dtr/gl/depth_picture.h -- a view's grid of samples as shaders read it. Only dtr/gl's own .cpp files
-// and its tests include this.
+// dtr/gl/depth_picture.h -- a view's grid of samples as shaders read it. Only dtr/gl's own .cpp
+// files and its tests include this.
 #pragma once
 #include <cstdint>
 #include <vector>

@@ -16,8 +16,9 @@ enum class Drawer {
   kSimd,
 };
 
-/// gl::Renderer and simd::Renderer in one. What the second drew lies in memory (DrawnPicture::rgba),
-/// for gl::Compositor or for a texture of the caller's. Belongs to the context it was made with.
+/// gl::Renderer and simd::Renderer in one. What the second drew lies in memory
+/// (DrawnPicture::rgba), for gl::Compositor or for a texture of the caller's. Belongs to the
+/// context it was made with.
 class FittingRenderer {
  public:
   /// Throws as gl::Renderer. `settings.gpu_bytes` holds for both.

@@ -42,7 +42,8 @@ struct DrawnPicture {
   unsigned marks = 0;  ///< RGBA8UI: views blended; 255 at the Delta border (SPEC 6.2)
   const std::uint32_t* rgba = nullptr;  ///< in memory: as image, red the lowest byte; else null
   const float* depth_z = nullptr;       ///< in memory: as depth
-  /// In memory: what MapToWindow makes of depth_z by `mapping`, where Draw was given one; else null.
+  /// In memory: what MapToWindow makes of depth_z by `mapping`, where Draw was given one; else
+  /// null.
   const float* window_z = nullptr;
   simd::WindowDepthMapping mapping;
   /// No two pictures of a process have the same, whoever drew them.

@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "dtr/gl/drawing.h"
-#include "dtr/render/frame.h"
 #include "dtr/gl/program.h"
 #include "dtr/gl/view_store.h"
+#include "dtr/render/frame.h"
 
 namespace dtr::gl {
 
@@ -23,8 +23,8 @@ class Resolver {
 
   /// From the layers of `targets` (two passes) or the depth in `coarse_depth` (deferred; a storage
   /// buffer) into the results of `targets`.
-  void Draw(const RenderFrame& frame, const Band& band, const ViewStore& store, ProgramCache& programs,
-            const Targets& targets, GLuint coarse_depth);
+  void Draw(const RenderFrame& frame, const Band& band, const ViewStore& store,
+            ProgramCache& programs, const Targets& targets, GLuint coarse_depth);
 
  private:
   bool BlocksFitUniforms(int views) const;

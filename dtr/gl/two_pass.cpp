@@ -82,8 +82,8 @@ void DrawView(const RenderFrame& frame, const Band& band, int index, ViewStore& 
 
 }  // namespace
 
-void DrawViewLayers(const RenderFrame& frame, const Band& band, ViewStore& store, ProgramCache& programs,
-                    const Targets& targets, bool clip_control) {
+void DrawViewLayers(const RenderFrame& frame, const Band& band, ViewStore& store,
+                    ProgramCache& programs, const Targets& targets, bool clip_control) {
   for (int i = 0; i < static_cast<int>(frame.views.size()); ++i) {
     DrawView(frame, band, i, store, programs, targets, clip_control);
   }

@@ -64,8 +64,9 @@ std::vector<int> CanonicalOrder(const RenderScene& scene, std::vector<int> views
   return views;
 }
 
-RenderFrame MakeFrame(const RenderScene& scene, const PinholeCamera& novel, const Pose& novel_from_world,
-                const RenderOptions& options, const ViewSelection& selection) {
+RenderFrame MakeFrame(const RenderScene& scene, const PinholeCamera& novel,
+                      const Pose& novel_from_world, const RenderOptions& options,
+                      const ViewSelection& selection) {
   RenderFrame frame{scene, novel, options, selection.per_pixel, {}, {}, {}};
   for (const int index : CanonicalOrder(scene, selection.views)) {
     const View& view = *scene.views[static_cast<size_t>(index)];

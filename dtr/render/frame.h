@@ -59,8 +59,9 @@ struct RenderFrame {
 };
 
 /// Of the selection's views; no cut factors yet. Nothing of its arguments is copied but the views.
-RenderFrame MakeFrame(const RenderScene& scene, const PinholeCamera& novel, const Pose& novel_from_world,
-                const RenderOptions& options, const ViewSelection& selection);
+RenderFrame MakeFrame(const RenderScene& scene, const PinholeCamera& novel,
+                      const Pose& novel_from_world, const RenderOptions& options,
+                      const ViewSelection& selection);
 
 /// SPEC 1.4, where the `count` nearest of the selection's views are drawn.
 void SetCutFactors(const ViewSelection& selection, size_t count, RenderFrame& frame);

@@ -1,5 +1,5 @@
-// dtr/render/grid_placement.h -- a view's grid of samples on the novel screen, and which of its tiles
-// can be seen there.
+// dtr/render/grid_placement.h -- a view's grid of samples on the novel screen, and which of its
+// tiles can be seen there.
 #pragma once
 #include <Eigen/Core>
 

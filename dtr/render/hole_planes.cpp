@@ -88,8 +88,8 @@ struct Found {
   PicturePlane plane = PicturePlane::Zero();
   size_t support = 0;
 };
-Found BestOfTriples(const PlacedSamples& samples, double reach, double least_area,
-                    double tolerance, Random& random) {
+Found BestOfTriples(const PlacedSamples& samples, double reach, double least_area, double tolerance,
+                    Random& random) {
   Found best;
   // Positions are drawn, not numbers of samples, and as many whatever is there: one sample more or
   // less, as two renderers may have it, changes no other draw.

@@ -37,8 +37,7 @@ void MeshCache::Prepare(const std::vector<const View*>& views, const RenderOptio
   }
   for (size_t k = 0; k < missing.size(); ++k) {
     if (on_new_mesh_) on_new_mesh_(*missing[k], meshes[k]);
-    views_.insert_or_assign(missing[k],
-                            Stored{KeyOf(*missing[k], options), std::move(meshes[k])});
+    views_.insert_or_assign(missing[k], Stored{KeyOf(*missing[k], options), std::move(meshes[k])});
   }
 }
 

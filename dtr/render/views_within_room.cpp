@@ -50,7 +50,9 @@ size_t ViewsWithinRoom::Prepare(RenderFrame& frame, const std::vector<const View
   }
 }
 
-bool ViewsWithinRoom::AllFit(const RenderFrame& frame) const { return MostBytesOf(frame) <= room_bytes_; }
+bool ViewsWithinRoom::AllFit(const RenderFrame& frame) const {
+  return MostBytesOf(frame) <= room_bytes_;
+}
 
 size_t ViewsWithinRoom::PrepareWithinRoom(RenderFrame& frame,
                                           const std::vector<const View*>& nearest_first) {

@@ -1,4 +1,5 @@
-// dtr/render/views_within_room.h -- what a renderer prepared of its views, within a number of bytes.
+// dtr/render/views_within_room.h -- what a renderer prepared of its views, within a number of
+// bytes.
 #pragma once
 #include <cstddef>
 #include <cstdint>

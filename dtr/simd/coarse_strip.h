@@ -3,8 +3,8 @@
 #pragma once
 #include <vector>
 
-#include "dtr/render/grid_placement.h"
 #include "dtr/render/adaptive_mesh.h"
+#include "dtr/render/grid_placement.h"
 
 namespace dtr::simd {
 

@@ -127,11 +127,11 @@ HWY_INLINE Colour ColourAt(const PixelView& view, const float* linear, VF x, VF 
   const VF u = hn::Sub(x, hn::ConvertTo(DF(), left)), v = hn::Sub(y, hn::ConvertTo(DF(), above));
   const auto [a, b, c, e] = PixelsAt(view, left, above, asked);
   const auto mixed = [&](VF p, VF q, VF r, VF s) { return Lerp(Lerp(p, q, u), Lerp(r, s, u), v); };
-  return {mixed(Light<0>(linear, a), Light<0>(linear, b), Light<0>(linear, c), Light<0>(linear, e)),
-          mixed(Light<8>(linear, a), Light<8>(linear, b), Light<8>(linear, c), Light<8>(linear, e)),
-          mixed(Light<16>(linear, a), Light<16>(linear, b), Light<16>(linear, c),
-                Light<16>(linear, e)),
-          mixed(Channel<24>(a), Channel<24>(b), Channel<24>(c), Channel<24>(e))};
+  return {
+      mixed(Light<0>(linear, a), Light<0>(linear, b), Light<0>(linear, c), Light<0>(linear, e)),
+      mixed(Light<8>(linear, a), Light<8>(linear, b), Light<8>(linear, c), Light<8>(linear, e)),
+      mixed(Light<16>(linear, a), Light<16>(linear, b), Light<16>(linear, c), Light<16>(linear, e)),
+      mixed(Channel<24>(a), Channel<24>(b), Channel<24>(c), Channel<24>(e))};
 }
 
 /// SPEC 5.3: the view's fragment near `surface`; 0: the view shows another surface there, or none.
@@ -249,16 +249,15 @@ HWY_INLINE Front FindFragments(const PixelRow& row, std::span<const PixelView> v
   const VF zero = hn::Zero(d);
   VF front = zero, border = Constant(kFar);
   for (size_t i = 0; i < views.size(); ++i) {
-    VF w =
-        FragmentAt(views[i], {views[i], rays}, surface, group->image_x(i), group->image_y(i));
+    VF w = FragmentAt(views[i], {views[i], rays}, surface, group->image_x(i), group->image_y(i));
     if (row.nearest_views > 0 && !hn::AllFalse(d, hn::Gt(w, zero))) {  // SPEC 1.3
       const VF t = PreciseRadiansOf({views[i], rays, w});
       w = hn::IfThenElseZero(hn::Le(t, Constant(row.max_angle_rad)), w);
     }
     hn::Store(w, d, group->inverse_depth(i));
     front = hn::Max(front, w);
-    border = hn::Max(border,
-                     hn::IfThenElse(hn::Gt(w, zero), Moved(row, views[i], w), Constant(kFar)));
+    border =
+        hn::Max(border, hn::IfThenElse(hn::Gt(w, zero), Moved(row, views[i], w), Constant(kFar)));
   }
   return {front, border};
 }
@@ -271,8 +270,8 @@ HWY_INLINE MF AtBorder(size_t views, const Front& front, Group* group) {
   MF at_border = hn::Lt(zero, zero);
   for (size_t i = 0; i < views; ++i) {
     const VF w = hn::Load(d, group->inverse_depth(i));
-    at_border = hn::Or(
-        at_border, hn::And(hn::Gt(w, zero), hn::Le(hn::Abs(hn::Sub(w, front.border)), margin)));
+    at_border = hn::Or(at_border,
+                       hn::And(hn::Gt(w, zero), hn::Le(hn::Abs(hn::Sub(w, front.border)), margin)));
   }
   return at_border;
 }

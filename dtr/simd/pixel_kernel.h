@@ -1,5 +1,5 @@
-// dtr/simd/pixel_kernel.h -- SPEC 4 to 6 for a row of pixels of the deferred method, several at once
-// with the processor's vector instructions. Only dtr/simd's own .cpp files include this.
+// dtr/simd/pixel_kernel.h -- SPEC 4 to 6 for a row of pixels of the deferred method, several at
+// once with the processor's vector instructions. Only dtr/simd's own .cpp files include this.
 #pragma once
 #include <cstddef>
 #include <cstdint>

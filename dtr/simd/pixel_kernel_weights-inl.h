@@ -1,5 +1,5 @@
-// dtr/simd/pixel_kernel_weights-inl.h -- SPEC 4.5, 4.6 and 4.8: what views weigh at a pixel. Compiled
-// per instruction set: include only from pixel_kernel.cpp.
+// dtr/simd/pixel_kernel_weights-inl.h -- SPEC 4.5, 4.6 and 4.8: what views weigh at a pixel.
+// Compiled per instruction set: include only from pixel_kernel.cpp.
 #if defined(DTR_SIMD_PIXEL_KERNEL_WEIGHTS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef DTR_SIMD_PIXEL_KERNEL_WEIGHTS_INL_H_
 #undef DTR_SIMD_PIXEL_KERNEL_WEIGHTS_INL_H_
@@ -123,8 +123,8 @@ HWY_INLINE Weighed WeighByInverseAngle(const PixelRow& row, std::span<const Pixe
   return sum;
 }
 
-/// The rank-th smallest angle (0: the smallest) of the group's fragments; kHidden where there are no
-/// more.
+/// The rank-th smallest angle (0: the smallest) of the group's fragments; kHidden where there are
+/// no more.
 HWY_INLINE VF RankedAngle(size_t views, int rank, Group* group) {
   const DF d;
   const VF enough = Constant(static_cast<float>(rank) + 1);
@@ -134,8 +134,8 @@ HWY_INLINE VF RankedAngle(size_t views, int rank, Group* group) {
     if (hn::AllTrue(d, hn::Ge(t, ranked))) continue;
     VF not_larger = hn::Zero(d);
     for (size_t j = 0; j < views; ++j) {
-      not_larger = hn::Add(not_larger,
-                           hn::IfThenElseZero(hn::Le(hn::Load(d, group->angle(j)), t), Constant(1)));
+      not_larger = hn::Add(
+          not_larger, hn::IfThenElseZero(hn::Le(hn::Load(d, group->angle(j)), t), Constant(1)));
     }
     ranked = hn::IfThenElse(hn::Ge(not_larger, enough), hn::Min(ranked, t), ranked);
   }

@@ -146,8 +146,7 @@ class Renderer::Implementation {
     std::vector<PlacedMesh> placed;
     for (size_t i = 0; i < frame.views.size(); ++i) {
       const AdaptiveMesh& mesh = views_.meshes().MeshOf(*frame.views[i]);
-      placed.push_back(
-          {&mesh, PlaceGrid(*frame.views[i], mesh, frame.placements[i], frame.novel)});
+      placed.push_back({&mesh, PlaceGrid(*frame.views[i], mesh, frame.placements[i], frame.novel)});
     }
     surface_.Draw(placed, frame.novel.width_px(), band, frame.options.threads);
   }

@@ -1,5 +1,5 @@
-// dtr/simd/renderer.h -- RENDER_SPEC's deferred method with the processor's vector instructions: the
-// fast renderer of machines without a GPU. Needs no OpenGL.
+// dtr/simd/renderer.h -- RENDER_SPEC's deferred method with the processor's vector instructions:
+// the fast renderer of machines without a GPU. Needs no OpenGL.
 #pragma once
 #include <cstddef>
 #include <cstdint>

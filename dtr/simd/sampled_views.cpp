@@ -4,10 +4,10 @@
 #include <stdexcept>
 
 #include "dtr/base/parallel_for.h"
-#include "dtr/simd/pixel_kernel.h"
 #include "dtr/render/stored_depth.h"
 #include "dtr/render/texture.h"
 #include "dtr/render/triangulation.h"
+#include "dtr/simd/pixel_kernel.h"
 
 namespace dtr::simd {
 namespace {

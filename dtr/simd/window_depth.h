@@ -1,5 +1,5 @@
-// dtr/simd/window_depth.h -- depth as a host's depth buffer has it, of a picture in memory, with the
-// processor's vector instructions.
+// dtr/simd/window_depth.h -- depth as a host's depth buffer has it, of a picture in memory, with
+// the processor's vector instructions.
 #pragma once
 #include <cstdint>
 #include <span>

@@ -1,6 +1,6 @@
-// parity_report SET.dtr: how far dtr/simd and the reference are apart from the set's held-out views,
-// or from each view that is left out in turn where none is held out; by the deferred method, holes
-// not filled, every pixel counted.
+// parity_report SET.dtr: how far dtr/simd and the reference are apart from the set's held-out
+// views, or from each view that is left out in turn where none is held out; by the deferred method,
+// holes not filled, every pixel counted.
 #include <algorithm>
 #include <cstdio>
 #include <string>

@@ -1,5 +1,5 @@
-// tests/simd/exact_scenes.h -- the exact scenes of `datasets` as small sets, and one that is damaged
-// as real captures are.
+// tests/simd/exact_scenes.h -- the exact scenes of `datasets` as small sets, and one that is
+// damaged as real captures are.
 #pragma once
 #include <cmath>
 #include <numbers>

@@ -24,8 +24,8 @@ class InvarianceOf {
       RenderScene views = MakeRenderScene(scene.set);
       std::rotate(views.views.begin(), views.views.begin() + 2, views.views.end());
       Renderer renderer;
-      ExpectSameBytes(expected, renderer.Render(views, scene.novel.camera, scene.novel.cam_from_world,
-                                                OptionsOf(method_)));
+      ExpectSameBytes(expected, renderer.Render(views, scene.novel.camera,
+                                                scene.novel.cam_from_world, OptionsOf(method_)));
     }
   }
 
@@ -39,8 +39,8 @@ class InvarianceOf {
       const RenderScene views = MakeRenderScene(scene.set);
       const View& input = *views.views.front();
       renderer.Render(views, input.camera, input.cam_from_world, OptionsOf(method_));
-      ExpectSameBytes(expected, renderer.Render(views, scene.novel.camera, scene.novel.cam_from_world,
-                                                OptionsOf(method_)));
+      ExpectSameBytes(expected, renderer.Render(views, scene.novel.camera,
+                                                scene.novel.cam_from_world, OptionsOf(method_)));
     }
   }
 

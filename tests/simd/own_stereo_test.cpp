@@ -54,11 +54,11 @@ NamedScene WithOwnDepth(NamedScene scene) {
   options.neighbours.count = engine->Neighbours();
   SilentProgress progress;
   std::vector<DepthImage> maps(views.size());
-  stereo::ComputeDepthMaps(photos, sparse, *engine, options, progress, {},
-                           [&](int view, stereo::DepthEstimate&& estimate,
-                               const stereo::DepthRange&) {
-                             maps[static_cast<size_t>(view)] = std::move(estimate.depth);
-                           });
+  stereo::ComputeDepthMaps(
+      photos, sparse, *engine, options, progress, {},
+      [&](int view, stereo::DepthEstimate&& estimate, const stereo::DepthRange&) {
+        maps[static_cast<size_t>(view)] = std::move(estimate.depth);
+      });
   for (size_t v = 0; v < views.size(); ++v) views[v].depth = std::move(maps[v]);
   FinishGeometry(scene.set);
   return scene;
@@ -74,8 +74,7 @@ TEST(OwnStereoParity, HoldsAtEveryPixel) {
     options.resolution = resolution;
     const auto& [name, set, novel] = scene;
     const RenderResult expected = cpu::Render(views, novel.camera, novel.cam_from_world, options);
-    const RenderResult found =
-        renderer.Render(views, novel.camera, novel.cam_from_world, options);
+    const RenderResult found = renderer.Render(views, novel.camera, novel.cam_from_world, options);
     EXPECT_GT(expected.coverage_share, 0.3);
     EXPECT_LT(expected.coverage_share, 0.97) << "stereo leaves holes";
     all.Add(CompareWhole(expected, found));

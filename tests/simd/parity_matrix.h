@@ -15,8 +15,7 @@ namespace dtr::testing {
 
 /// The reference against another renderer (gl::Renderer, simd::Renderer).
 template <typename Renderer>
-Comparison ExpectParity(Renderer& renderer, const NamedScene& scene,
-                               const RenderOptions& options) {
+Comparison ExpectParity(Renderer& renderer, const NamedScene& scene, const RenderOptions& options) {
   const RenderScene views = MakeRenderScene(scene.set);
   const auto& [name, set, novel] = scene;
   const RenderResult expected = cpu::Render(views, novel.camera, novel.cam_from_world, options);
@@ -33,7 +32,7 @@ Comparison ExpectParity(Renderer& renderer, const NamedScene& scene,
 /// hold, and their sum. Prints a line.
 template <typename Renderer>
 void ExpectParityOf(Renderer& renderer, const NamedScene& scene, RenderMethod method,
-                           Primitive primitive, int views) {
+                    Primitive primitive, int views) {
   const std::string what = std::string(method == RenderMethod::kTwoPass ? "two-pass" : "deferred") +
                            (primitive == Primitive::kMesh ? " mesh" : " splat");
   Comparison all;
@@ -56,8 +55,8 @@ void ExpectParityOf(Renderer& renderer, const NamedScene& scene, RenderMethod me
   EXPECT_GT(all.compared, all.total / 4) << scene.name << " " << what;
 }
 
-/// The deferred method, which knows no primitive (SPEC 5.1): its image must be the same, to the bit,
-/// for another one.
+/// The deferred method, which knows no primitive (SPEC 5.1): its image must be the same, to the
+/// bit, for another one.
 template <typename Renderer>
 void ExpectParityOfDeferred(Renderer& renderer, const NamedScene& scene, int views) {
   ExpectParityOf(renderer, scene, RenderMethod::kDeferred, Primitive::kMesh, views);

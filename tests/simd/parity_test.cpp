@@ -1,5 +1,5 @@
-// The vector renderer against the reference: the measure of comparison.h on exact scenes, on one that
-// is damaged as real captures are, and on simple shapes with masks, gains and few samples.
+// The vector renderer against the reference: the measure of comparison.h on exact scenes, on one
+// that is damaged as real captures are, and on simple shapes with masks, gains and few samples.
 #include <gtest/gtest.h>
 
 #include <algorithm>

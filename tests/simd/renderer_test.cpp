@@ -41,8 +41,8 @@ TEST(SimdRenderer, AnImageLeftInMemoryIsTheOneThatRenderGives) {
   EXPECT_THROW(renderer.ReadBack(), std::logic_error);
   renderer.Forget();
   EXPECT_EQ(renderer.view_bytes(), 0u);
-  ExpectSameBytes(rendered, renderer.Render(views, scene.novel.camera, scene.novel.cam_from_world,
-                                            options));
+  ExpectSameBytes(rendered,
+                  renderer.Render(views, scene.novel.camera, scene.novel.cam_from_world, options));
 }
 
 TEST(SimdRenderer, NoValidViewGivesAnEmptyImage) {

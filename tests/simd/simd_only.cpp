@@ -1,5 +1,5 @@
-// A program of dtr/simd and nothing else: draws a plane from a view beside it. What it is linked with
-// is tested, too (links_no_opengl.cmake).
+// A program of dtr/simd and nothing else: draws a plane from a view beside it. What it is linked
+// with is tested, too (links_no_opengl.cmake).
 #include <cstdio>
 
 #include "dtr/render/scene.h"

@@ -30,7 +30,7 @@ struct AppSettings {
   int width_px = 1280, height_px = 800;
   RenderOptions render;
   size_t gpu_bytes = size_t{4} << 30;
-  std::string shader_folder;                          ///< as gl::RendererSettings
+  std::string shader_folder;  ///< as gl::RendererSettings
   gl::Drawer drawer = gl::Drawer::kFitting;
   std::filesystem::path output = ".";                 ///< folder for what the user saves
   std::string output_stem = "view";                   ///< first part of those files' names
