@@ -6,7 +6,7 @@
 namespace dtr::calib {
 namespace {
 
-constexpr int kMostTerms = 100'000;
+constexpr int kMaxTerms = 100'000;
 constexpr double kPrecision = 1e-15;
 constexpr double kTiny = 1e-300;
 
@@ -15,7 +15,7 @@ constexpr double kTiny = 1e-300;
 template <typename Term>
 double ContinuedFraction(double b0, const Term& term) {
   double value = b0 != 0 ? b0 : kTiny, c = value, d = 0;
-  for (int i = 1; i < kMostTerms; ++i) {
+  for (int i = 1; i < kMaxTerms; ++i) {
     double a = 0, b = 0;
     term(i, &a, &b);
     d = b + a * d;
@@ -35,7 +35,7 @@ double GammaTail(double a, double x) {
   const double front = std::exp(a * std::log(x) - x - std::lgamma(a));
   if (x < a + 1) {
     double term = 1 / a, sum = term;
-    for (int n = 1; n < kMostTerms && term > kPrecision * sum; ++n) {
+    for (int n = 1; n < kMaxTerms && term > kPrecision * sum; ++n) {
       term *= x / (a + n);
       sum += term;
     }

@@ -11,7 +11,7 @@
 namespace dtr::calib {
 
 /// Lens models with COLMAP's names and ids (its sensor models 0 to 10); the parameter order is
-/// COLMAP's too. Ids beyond are refused by the readers, by name.
+/// COLMAP's too. Ids beyond are rejected by the readers, by name.
 enum class LensModel : int {
   kSimplePinhole = 0,        ///< f, cx, cy
   kPinhole = 1,              ///< fx, fy, cx, cy

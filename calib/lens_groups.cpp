@@ -7,8 +7,8 @@
 namespace dtr::calib {
 namespace {
 
-/// Farther apart lie pictures that were cropped.
-constexpr double kMostShiftShare = 5 * kStabiliserShare;
+/// Farther apart lie images that were cropped.
+constexpr double kMaxShiftShare = 5 * kStabiliserShare;
 
 double Median(std::vector<double> values) {
   std::sort(values.begin(), values.end());
@@ -22,7 +22,7 @@ std::vector<std::uint32_t> NearTheMedian(const Cameras& cameras,
                                          const std::vector<std::uint32_t>& ids) {
   const LensCamera& any = cameras.at(ids.front());
   const auto centre = static_cast<size_t>(FocalCount(any.model));
-  const double most = kMostShiftShare * std::max(any.width_px, any.height_px);
+  const double most = kMaxShiftShare * std::max(any.width_px, any.height_px);
   std::vector<std::uint32_t> near = ids;
   for (const size_t axis : {centre, centre + 1}) {
     std::vector<double> places;

@@ -13,7 +13,7 @@ inline constexpr double kPrecisionPx = 1e-3;
 /// Standard deviation that outliers are told by is at least this, however exact the other
 /// observations are: some photos may be exact and others rounded, and what fits to 0.1 px (five
 /// of it) misleads nobody.
-inline constexpr double kLeastOutlierSigmaPx = 0.02;
+inline constexpr double kMinOutlierSigmaPx = 0.02;
 
 /// What covariances for unit noise are multiplied by, where residuals say that noise is `sigma_px`.
 inline double VarianceOf(double sigma_px) {

@@ -14,8 +14,8 @@
 namespace dtr::calib {
 namespace {
 
-constexpr double kMostDisagreement = 5;  // sigmas
-constexpr int kMostPasses = 20;
+constexpr double kMaxDisagreement = 5;  // sigmas
+constexpr int kMaxPasses = 20;
 constexpr double kRoundingShare = 1e-12;  // share of what is known best: rounding
 
 double RelativeSigma(const MeasuredDistance& d) {
@@ -77,7 +77,7 @@ DistanceScale ScaleFromDistances(std::span<const MeasuredDistance> distances) {
   for (const MeasuredDistance& d : distances) {
     const double length = (d.b - d.a).norm();
     const double relative = length > 0 ? RelativeSigma(d) : std::numeric_limits<double>::infinity();
-    if (!(relative <= kMostRelativeSigma)) {
+    if (!(relative <= kMaxRelativeSigma)) {
       throw Error(fmt::format(
           "{}: expected points whose distance is known to 10 %, found {:.4g} +- {:.2g} units; take "
           "points farther apart, or click each of them in more views",
@@ -102,7 +102,7 @@ DistanceScale ScaleFromDistances(std::span<const MeasuredDistance> distances) {
     squares += off * off;
   }
   const auto worst = std::max_element(scale.sigmas.begin(), scale.sigmas.end());
-  if (*worst > kMostDisagreement) {
+  if (*worst > kMaxDisagreement) {
     const auto i = static_cast<size_t>(worst - scale.sigmas.begin());
     throw Error(fmt::format(
         "{}: expected distances that agree, found {:.5g} m per unit here and {:.5g} in all, {:.1f} "
@@ -149,15 +149,15 @@ double SigmaOfRadius(double radius_m) {
 PositionScale AlignToPositions(std::span<const Eigen::Vector3d> centres,
                                std::span<const Eigen::Vector3d> positions_m,
                                std::optional<double> known_scale) {
-  if (centres.size() != positions_m.size() || centres.size() < kFewestPositions) {
-    throw Error(fmt::format("scale: expected at least {} positions, found {}", kFewestPositions,
+  if (centres.size() != positions_m.size() || centres.size() < kMinPositions) {
+    throw Error(fmt::format("scale: expected at least {} positions, found {}", kMinPositions,
                             std::min(centres.size(), positions_m.size())));
   }
   PositionScale scale;
   std::vector<bool> used, next(centres.size(), true);
   std::vector<Eigen::Vector3d> a, b;
   scale.settled = false;
-  for (int pass = 0; !scale.settled && pass < kMostPasses; ++pass) {
+  for (int pass = 0; !scale.settled && pass < kMaxPasses; ++pass) {
     used = next;
     a.clear();
     b.clear();
@@ -166,7 +166,7 @@ PositionScale AlignToPositions(std::span<const Eigen::Vector3d> centres,
       a.push_back(centres[i]);
       b.push_back(positions_m[i]);
     }
-    if (a.size() < kFewestPositions || 2 * a.size() < centres.size()) {
+    if (a.size() < kMinPositions || 2 * a.size() < centres.size()) {
       throw Error(fmt::format(
           "scale: expected positions that agree with the cameras, found that {} of {} do", a.size(),
           centres.size()));
@@ -200,7 +200,7 @@ PositionScale AlignToPositions(std::span<const Eigen::Vector3d> centres,
 }
 
 void RequireKnownScale(const PositionScale& scale) {
-  if (scale.relative_sigma <= kMostRelativeSigma) return;
+  if (scale.relative_sigma <= kMaxRelativeSigma) return;
   throw Error(fmt::format(
       "scale: expected a scale known to 10 %, found one to {:.0f} %: positions that err by {:.2g} "
       "m RMS, of cameras that stand too near to each other for that; measure a --distance",

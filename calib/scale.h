@@ -22,7 +22,7 @@ struct MeasuredDistance {
 };
 
 /// A scale that is known worse says little more than an order of size.
-inline constexpr double kMostRelativeSigma = 0.1;
+inline constexpr double kMaxRelativeSigma = 0.1;
 
 /// A length without a stated error is taken to be measured to a thousandth, as with a tape.
 inline constexpr double kUnstatedRelativeSigma = 1e-3;
@@ -45,7 +45,7 @@ Eigen::Vector3d EarthFromGeodetic(double latitude_deg, double longitude_deg, dou
 /// EarthFromGeodetic(place)).
 Eigen::Matrix3d EnuFromEarth(double latitude_deg, double longitude_deg);
 
-inline constexpr size_t kFewestPositions = 4;
+inline constexpr size_t kMinPositions = 4;
 inline constexpr double kPositionOutlierSigmas = 4;
 /// Standard deviation per axis of a place on the map whose error is said as a radius, as EXIF's
 /// GPSHPositioningError is: 68 % of the errors are taken to lie within, and to be normal and equal
@@ -56,7 +56,7 @@ double SigmaOfRadius(double radius_m);
 inline constexpr double kMedianLength = 1.538;
 
 /// Where the turn of a similarity is known worse, which axis is up is not known either.
-inline constexpr double kMostTurnSigmaRad = 5 * std::numbers::pi / 180;
+inline constexpr double kMaxTurnSigmaRad = 5 * std::numbers::pi / 180;
 
 struct PositionScale {
   Similarity metric_from_scene;
@@ -84,7 +84,7 @@ PositionScale AlignToPositions(std::span<const Eigen::Vector3d> centres,
                                std::span<const Eigen::Vector3d> positions_m,
                                std::optional<double> known_scale = {});
 
-/// Throws Error where such a scale would be uncertain by more than kMostRelativeSigma.
+/// Throws Error where such a scale would be uncertain by more than kMaxRelativeSigma.
 void RequireKnownScale(const PositionScale& scale);
 
 /// AlignToPositions, the scale unknown, and RequireKnownScale.

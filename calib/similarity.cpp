@@ -27,12 +27,12 @@ Points Stack(std::span<const Eigen::Vector3d> points, const char* which) {
   return stacked;
 }
 
-void RefuseLines(const Points& centred, const char* which) {
+void RejectLines(const Points& centred, const char* which) {
   const Eigen::Vector3d extent = Eigen::JacobiSVD<Points>(centred).singularValues();
   if (!(extent(0) > 0) || !(extent(1) > kThinnest * extent(0))) {
     throw Error(std::string("alignment: expected points that are not on one line, found the ") +
                 which + " set " + (extent(0) > 0 ? "on a line" : "in one point") +
-                "; the turn about it is unknown: use more points");
+                "; the rotation about it is unknown: use more points");
   }
 }
 
@@ -67,8 +67,8 @@ Similarity AlignPoints(std::span<const Eigen::Vector3d> points_in_a,
   const Eigen::Vector3d mean_a = a.rowwise().mean(), mean_b = b.rowwise().mean();
   a.colwise() -= mean_a;
   b.colwise() -= mean_b;
-  RefuseLines(a, "first");
-  RefuseLines(b, "second");
+  RejectLines(a, "first");
+  RejectLines(b, "second");
 
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(b * a.transpose(),
                                               Eigen::ComputeFullU | Eigen::ComputeFullV);
@@ -102,7 +102,7 @@ Similarity AlignPointsAtScale(std::span<const Eigen::Vector3d> points_in_a,
 Similarity TurnAndShift(std::span<const Eigen::Vector3d> points_in_a,
                         std::span<const Eigen::Vector3d> points_in_b,
                         std::span<const Eigen::Vector3d> sigmas) {
-  constexpr int kMostSteps = 20;
+  constexpr int kMaxSteps = 20;
   const Eigen::Vector3d middle = MeanOf(points_in_a);
   const auto rows = 3 * static_cast<Eigen::Index>(points_in_a.size());
   const auto misses_of = [&](const Similarity& b_from_a) {
@@ -115,7 +115,7 @@ Similarity TurnAndShift(std::span<const Eigen::Vector3d> points_in_a,
   };
   Similarity best;
   Eigen::VectorXd misses = misses_of(best);
-  for (int step = 0; step < kMostSteps; ++step) {
+  for (int step = 0; step < kMaxSteps; ++step) {
     Eigen::MatrixXd columns(rows, 6);
     for (size_t i = 0; i < points_in_a.size(); ++i) {
       const Eigen::Vector3d arm = best.rotation * (points_in_a[i] - middle);

@@ -97,8 +97,8 @@ bool StartAlongMeanRay(std::span<const Sight> sights, int left_out, Eigen::Vecto
 
 }  // namespace
 
-Sight MakeSight(const PinholeCamera& camera, const Pose& cam_from_world,
-                const Eigen::Vector2d& pixel) {
+Sight MakeObservation(const PinholeCamera& camera, const Pose& cam_from_world,
+                      const Eigen::Vector2d& pixel) {
   Sight sight;
   sight.camera = &camera;
   sight.cam_from_world_rotation = cam_from_world.rotation.toRotationMatrix();

@@ -17,9 +17,9 @@ struct Sight {
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
 };
 
-/// Builds a sight with its ray.
-Sight MakeSight(const PinholeCamera& camera, const Pose& cam_from_world,
-                const Eigen::Vector2d& pixel);
+/// Builds an observation with its ray.
+Sight MakeObservation(const PinholeCamera& camera, const Pose& cam_from_world,
+                      const Eigen::Vector2d& pixel);
 
 /// How a triangulation ended.
 enum class TriangulationStatus {
@@ -36,11 +36,11 @@ struct Triangulation {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
 };
 
-/// Point seen by all of `sights` but number `left_out` (-1: none). Starts at the point nearest to
-/// all rays (linear least squares), then Gauss-Newton with Levenberg's damping on reprojection
-/// error under Huber's loss, so that one wrong sight among many does not carry the point away.
-/// Coordinates are taken relative to the cameras and steps are relative to the matrix itself, so
-/// neither the world's origin nor its scale matters.
+/// Point seen by all of `observations` but number `left_out` (-1: none). Starts at the point
+/// nearest to all rays (linear least squares), then Gauss-Newton with Levenberg's damping on
+/// reprojection error under Huber's loss, so that one wrong observation among many does not carry
+/// the point away. Coordinates are taken relative to the cameras and steps are relative to the
+/// matrix itself, so neither the world's origin nor its scale matters.
 Triangulation Triangulate(std::span<const Sight> sights, int left_out);
 
 /// Pixel residual (observed minus predicted) of a point, and its derivative with respect to the

@@ -25,7 +25,7 @@ struct UndistortedPhoto {
 /// Resampling is a normalised Lanczos kernel of 6x6 pixels (Turkowski 1990): half a pixel off the
 /// grid it keeps 91 % of a pattern of 3 pixels per period, where cubic convolution (Keys 1981)
 /// keeps 69 % and bilinear 50 %; stereo matches and held-out figures would both see that loss. A
-/// lens keeps its scale within a few tens of per cent over the picture, so no wider kernel is
+/// lens keeps its scale within a few tens of per cent over the image, so no wider kernel is
 /// needed against aliasing. Works on stored sRGB values. The same bytes for any number of threads
 /// (0: all cores). Throws Error when the photo has not the size the lens was calibrated for,
 /// std::invalid_argument when the lens is impossible.

@@ -16,7 +16,7 @@ namespace dtr::calib {
 namespace {
 
 constexpr double kMinAngle =
-    1.0 * std::numbers::pi / 180;  // COLMAP's stereo refuses below 1 degree
+    1.0 * std::numbers::pi / 180;  // COLMAP's stereo rejects below 1 degree
 /// The point's predicted error in the tested camera, in units of the observation's own. At 2 the
 /// residual of an honest camera is sqrt(1 + 4) = 2.2 times the noise at worst; beyond, residuals
 /// tell about the triangulation and no longer about the camera.
@@ -82,17 +82,19 @@ std::vector<std::vector<int>> Tracks(const SparseScene& scene) {
   return tracks;
 }
 
-/// Largest angle between two rays of a track without one of its sights. The widest pair of all
-/// answers for every sight not in it, so only its two members need a second search.
+/// Largest angle between two rays of a track without one of its observations. The widest pair of
+/// all answers for every observation not in it, so only its two members need a second search.
 class WidestAngle {
  public:
-  explicit WidestAngle(std::span<const Sight> sights) : sights_(sights) { Search(-1, &a_, &b_); }
+  explicit WidestAngle(std::span<const Sight> sights) : observations_(sights) {
+    Search(-1, &a_, &b_);
+  }
   double Without(int left_out) const {
     int a = a_, b = b_;
     if (left_out == a || left_out == b) Search(left_out, &a, &b);
     if (a < 0) return 0;
-    const Eigen::Vector3d &u = sights_[static_cast<size_t>(a)].direction,
-                          &v = sights_[static_cast<size_t>(b)].direction;
+    const Eigen::Vector3d &u = observations_[static_cast<size_t>(a)].direction,
+                          &v = observations_[static_cast<size_t>(b)].direction;
     return std::atan2(u.cross(v).norm(), u.dot(v));
   }
 
@@ -100,11 +102,11 @@ class WidestAngle {
   void Search(int left_out, int* a, int* b) const {
     double smallest = std::numeric_limits<double>::infinity();
     *a = *b = -1;
-    for (int i = 0; i < static_cast<int>(sights_.size()); ++i) {
+    for (int i = 0; i < static_cast<int>(observations_.size()); ++i) {
       for (int j = 0; j < i; ++j) {
         if (i == left_out || j == left_out) continue;
-        const double cosine = sights_[static_cast<size_t>(i)].direction.dot(
-            sights_[static_cast<size_t>(j)].direction);
+        const double cosine = observations_[static_cast<size_t>(i)].direction.dot(
+            observations_[static_cast<size_t>(j)].direction);
         if (cosine < smallest) {
           smallest = cosine;
           *a = j;
@@ -113,7 +115,7 @@ class WidestAngle {
       }
     }
   }
-  std::span<const Sight> sights_;
+  std::span<const Sight> observations_;
   int a_ = -1, b_ = -1;
 };
 
@@ -254,9 +256,9 @@ void AddTests(const ValidateLimits& limits, ValidationReport* report) {
   tests.push_back(Untested(*report, limits));
 }
 
-/// Every n-th of the arrows, so that no more than kMostArrows are left.
+/// Every n-th of the arrows, so that no more than kMaxArrows are left.
 void ThinOut(std::vector<ResidualArrow>& arrows) {
-  const size_t step = (arrows.size() + kMostArrows - 1) / kMostArrows;
+  const size_t step = (arrows.size() + kMaxArrows - 1) / kMaxArrows;
   if (step < 2) return;
   size_t kept = 0;
   for (size_t i = 0; i < arrows.size(); i += step) arrows[kept++] = arrows[i];
@@ -314,7 +316,7 @@ ValidationReport ValidateReprojection(std::span<const PinholeCamera> cameras,
       for (const int index : tracks[static_cast<size_t>(p)]) {
         const SparseObservation& o = scene.observations[static_cast<size_t>(index)];
         const auto view = static_cast<size_t>(o.view);
-        sights.push_back(MakeSight(cameras[view], cam_from_world[view], o.pixel));
+        sights.push_back(MakeObservation(cameras[view], cam_from_world[view], o.pixel));
         track_verdicts.push_back(&verdicts[static_cast<size_t>(index)]);
         Verdict& verdict = *track_verdicts.back();
         verdict.fate = Fate::kShortTrack;

@@ -48,7 +48,7 @@ struct PlacedPixel {
 };
 
 /// Arrows that a camera keeps at most: enough to see a pattern by, few enough to draw.
-inline constexpr size_t kMostArrows = 1500;
+inline constexpr size_t kMaxArrows = 1500;
 
 /// What became of one camera's observations.
 struct CameraValidation {

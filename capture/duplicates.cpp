@@ -33,7 +33,7 @@ std::string PictureHash(const Photo& photo) {
 std::vector<LeftOut> DropSamePictures(Capture& capture,
                                       const std::function<bool(const std::string&)>& preferred) {
   const std::set<std::string> suspects = Suspects(capture);
-  std::map<std::string, std::vector<std::string>> names_of;  // by picture
+  std::map<std::string, std::vector<std::string>> names_of;  // by image
   for (const Photo& photo : capture.photos) {
     if (suspects.contains(photo.name)) names_of[PictureHash(photo)].push_back(photo.name);
   }

@@ -8,7 +8,7 @@
 
 namespace dtr::capture {
 
-/// A photo that was taken out, and the one with the same picture that stays.
+/// A photo that was taken out, and the one with the same image that stays.
 struct LeftOut {
   std::string name, same_as;
 };

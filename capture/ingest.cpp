@@ -36,7 +36,7 @@ std::string CameraGroup(const Photo& photo, const io::ImageHeader& header) {
   std::string group = known(photo.make) + "|" + known(photo.model) + "|" +
                       std::to_string(photo.width_px) + "x" + std::to_string(photo.height_px) + "|" +
                       focal;
-  // A turned camera has its principal point elsewhere on the upright picture.
+  // A turned camera has its principal point elsewhere on the upright image.
   if (photo.exif_orientation != 1) group += kTurnedGroup + std::to_string(photo.exif_orientation);
   return group;
 }

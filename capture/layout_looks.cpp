@@ -150,11 +150,11 @@ ImageKind Looks::KindOf(const std::vector<std::string>& samples, bool called_mas
 
 bool Looks::IsReducedSize(const std::string& smaller, const std::string& larger) {
   const ImageSize small = SizeOf(smaller), large = SizeOf(larger);
-  constexpr double kLeastFactor = 1.2, kRoundingPx = 1;
+  constexpr double kMinFactor = 1.2, kRoundingPx = 1;
   if (small.width_px == 0 || large.width_px == 0) return false;
   const double factor =
       static_cast<double>(large.width_px + large.height_px) / (small.width_px + small.height_px);
-  return factor >= kLeastFactor &&
+  return factor >= kMinFactor &&
          std::abs(large.width_px / factor - small.width_px) <= kRoundingPx &&
          std::abs(large.height_px / factor - small.height_px) <= kRoundingPx;
 }

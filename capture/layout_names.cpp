@@ -133,7 +133,7 @@ NamedImage ReadName(const std::string& name) {
   for (const std::string& token : Tokens(BareName(name))) {
     if (const auto kind = KindOf(token)) {
       if (!read.by_folder) read.kind = *kind;
-      // instant-ngp's dynamic_mask_NAME is bright where the photo is not to be used.
+      // time step-ngp's dynamic_mask_NAME is bright where the photo is not to be used.
       if (dynamic && *kind == ImageKind::kMask) read.kind = ImageKind::kInverseMask;
       behind_kind = true;
       continue;

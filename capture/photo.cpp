@@ -55,7 +55,7 @@ void DropFaulty(Capture& capture, const std::vector<Fault>& faults) {
     }
     return name;
   };
-  std::set<std::string> shown;  // originals whose picture a photo that is kept shows
+  std::set<std::string> shown;  // originals whose image a photo that is kept shows
   std::vector<Photo> kept;
   for (Photo& photo : capture.photos) {
     if (photo.screening && !photo.screening->duplicate_of.empty()) {
@@ -66,7 +66,7 @@ void DropFaulty(Capture& capture, const std::vector<Fault>& faults) {
     for (size_t i = 0; photo.screening && i < photo.screening->faults.size(); ++i) {
       const Fault fault = photo.screening->faults[i];
       if (std::find(faults.begin(), faults.end(), fault) == faults.end()) continue;
-      // The sharp retake of blurred photos that go: nothing else shows the picture.
+      // The sharp retake of blurred photos that go: nothing else shows the image.
       if (fault == Fault::kDuplicate && !shown.contains(picture)) continue;
       reason += (reason.empty() ? "dropped: " : "; ") + photo.screening->remarks[i];
     }

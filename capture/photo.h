@@ -29,7 +29,7 @@ struct Screening {
   double overexposed_share = 0;   ///< of the usable pixels: those with a channel at 254 or 255
   double underexposed_share = 0;  ///< pixels with all channels at 0 or 1
   /// Name of the first photo with the same bytes, else of an earlier one that shows the same
-  /// picture; empty where there is none.
+  /// image; empty where there is none.
   std::string duplicate_of;
   std::vector<Fault> faults;
   std::vector<std::string> remarks;  ///< one line for each fault, with the measure that says so
@@ -72,7 +72,7 @@ struct Photo {
 
   std::optional<VideoFrame> video_frame;
 
-  /// What of the photo may be used, NAME_mask.EXT beside NAME.EXT: an upright picture of its size,
+  /// What of the photo may be used, NAME_mask.EXT beside NAME.EXT: an upright image of its size,
   /// dark where the photo is not to be used (moving things, the photographer, the turntable).
   /// Empty: all of it.
   std::filesystem::path mask_file;
@@ -106,7 +106,7 @@ struct Capture {
 };
 
 /// Takes out the photos that have one of these faults and lists them under `skipped`. A duplicate
-/// of a photo that goes stays: it is the only one left of its picture.
+/// of a photo that goes stays: it is the only one left of its image.
 void DropFaulty(Capture& capture, const std::vector<Fault>& faults);
 
 /// What a camera group says of turned photos, with the orientation behind it.
@@ -125,14 +125,14 @@ void TakeAsStored(Photo& photo);
 void RequireEnoughPhotos(const Capture& capture, const std::filesystem::path& where);
 
 /// The photo upright (or as stored, where the photo says so), 8-bit sRGB, without colours that its
-/// alpha hides (io::ReadImageAndMask). Throws Error when the file is unreadable or has no longer the
-/// size it had when it was ingested.
+/// alpha hides (io::ReadImageAndMask). Throws Error when the file is unreadable or has no longer
+/// the size it had when it was ingested.
 ImageRgb8 ReadPhoto(const Photo& photo);
 
-/// What of the photo may be used, on the photo's grid, by its mask file and by its alpha, which must
-/// both allow it; empty where it has neither. A mask is an upright image, but one that fits only the
-/// photo as it is stored is taken as that. Throws Error when the mask is unreadable, is not of the
-/// photo's size, or nothing is left.
+/// What of the photo may be used, on the photo's grid, by its mask file and by its alpha, which
+/// must both allow it; empty where it has neither. A mask is an upright image, but one that fits
+/// only the photo as it is stored is taken as that. Throws Error when the mask is unreadable, is
+/// not of the photo's size, or nothing is left.
 Mask ReadPhotoMask(const Photo& photo);
 
 /// Both at once, with what the alpha says whatever `photo` tells of it.

@@ -73,7 +73,7 @@ void Add(Screening& screening, Fault fault, std::string remark) {
   screening.remarks.push_back(std::move(remark));
 }
 
-// An earlier photo that shows the same picture as photos[index].
+// An earlier photo that shows the same image as photos[index].
 void FindSamePicture(std::vector<Photo>& photos, size_t index) {
   Screening& screening = *photos[index].screening;
   const double contrast = ContrastOf(screening.thumbnail);
@@ -85,7 +85,7 @@ void FindSamePicture(std::vector<Photo>& photos, size_t index) {
     if (!(difference < kSamePicture * contrast)) continue;
     screening.duplicate_of = photos[other].name;
     return Add(screening, Fault::kDuplicate,
-               fmt::format("shows the same picture as {}: they differ by {:.1f} % of its contrast",
+               fmt::format("shows the same image as {}: they differ by {:.1f} % of its contrast",
                            photos[other].name, 100 * difference / contrast));
   }
 }

@@ -28,13 +28,13 @@ void Require(const std::error_code& error, const fs::path& file) {
   if (error) throw Error(file.string() + ": cannot be written: " + error.message());
 }
 
-void RefuseOccupied(const fs::path& folder, bool replace) {
+void RejectOccupied(const fs::path& folder, bool replace) {
   std::error_code error;
   if (!fs::exists(fs::symlink_status(folder, error))) return;
   const bool is_folder = fs::is_directory(folder, error);
   if (is_folder && fs::is_empty(folder, error) && !error) return;
   if (is_folder && replace && fs::exists(folder / kCaptureFile, error)) {
-    return RefuseForeign(folder, [](const std::string& name) {
+    return RejectForeign(folder, [](const std::string& name) {
       static const std::set<std::string> kOurs{
           "images", "masks", kCaptureFile, kContactSheetFile, kPageFile, WorkFolder::MarkOf(kKind)};
       return kOurs.contains(name);
@@ -85,7 +85,7 @@ struct CaptureWriter::State {
   std::optional<WorkFolder> work;
 
   void Recover() const;
-  void RefuseForeign() const;
+  void RejectForeign() const;
   void MoveIntoPlace();
 };
 
@@ -107,9 +107,9 @@ void CaptureWriter::State::Recover() const {
 }
 
 // Before any work: at its end the old capture would find no room.
-void CaptureWriter::State::RefuseForeign() const {
-  WorkFolder::RefuseForeign(partial, kKind);
-  if (options.replace) WorkFolder::RefuseForeign(aside, kKind);
+void CaptureWriter::State::RejectForeign() const {
+  WorkFolder::RejectForeign(partial, kKind);
+  if (options.replace) WorkFolder::RejectForeign(aside, kKind);
 }
 
 // What was there goes only once the new capture is there.
@@ -139,9 +139,9 @@ CaptureWriter::CaptureWriter(const fs::path& folder, const StoreOptions& options
   state_->options = options;
   AsError([&] {
     state_->Recover();
-    state_->RefuseForeign();
+    state_->RejectForeign();
   });
-  RefuseOccupied(state_->folder, options.replace);
+  RejectOccupied(state_->folder, options.replace);
 }
 
 CaptureWriter::~CaptureWriter() = default;
@@ -153,7 +153,7 @@ fs::path CaptureWriter::Open() {
 
 void CaptureWriter::Write(const Capture& capture, Progress& progress) {
   const fs::path partial = Open();
-  RefuseOccupied(state_->folder, state_->options.replace);
+  RejectOccupied(state_->folder, state_->options.replace);
   const bool masked = std::any_of(capture.photos.begin(), capture.photos.end(),
                                   [](const Photo& photo) { return photo.HasMask(); });
   std::error_code error;

@@ -10,7 +10,7 @@ namespace dtr::capture {
 
 /// Name of the file that makes a folder a capture.
 inline constexpr char kCaptureFile[] = "capture.json";
-/// What is made in the workspace of `dtr calibrate photos` (WorkFolder's KIND): it holds pictures
+/// What is made in the workspace of `dtr calibrate photos` (WorkFolder's KIND): it holds images
 /// that are no photos.
 inline constexpr char kCalibrationKind[] = "calibration";
 /// What `dtr capture` adds for people: all photos on one, and a page about them.

@@ -103,7 +103,7 @@ void SayReportTable(const eval::BenchReport& report, const eval::BenchMachine& m
   for (const eval::BenchRow& row : report.rows) {
     if (row.views_used != at.views_used || row.resolution != at.resolution) continue;
     console.Say(fmt::format(
-        "a whole picture by {}: {:.1f} ms, {:.1f} CPU ms (drawn {:.1f}, read back {:.1f}, holes "
+        "a whole frame by {}: {:.1f} ms, {:.1f} CPU ms (drawn {:.1f}, read back {:.1f}, holes "
         "filled {:.1f} CPU ms)",
         NameOf(row.method), row.whole_ms(), row.whole_cpu_ms(), row.cpu.median_ms,
         row.read_back_cpu.median_ms, row.fill_cpu.median_ms));

@@ -15,7 +15,7 @@ namespace dtr::cli {
 namespace {
 
 // NaN passes every comparison by which CLI11 holds numbers to a range.
-void RefuseWhatIsNoNumber(CLI::App& command) {
+void RejectWhatIsNoNumber(CLI::App& command) {
   const auto finite = [](const std::string& text) -> std::string {
     char* end = nullptr;
     const double value = std::strtod(text.c_str(), &end);
@@ -41,7 +41,7 @@ void RefuseWhatIsNoNumber(CLI::App& command) {
   }
 }
 
-void RefuseOutputs(const CLI::App& command, const std::string& json_target) {
+void RejectOutputs(const CLI::App& command, const std::string& json_target) {
   if (!json_target.empty() && json_target != "-") {
     RequireFolderOf(json_target, "--json");
     if (std::filesystem::is_directory(json_target)) {
@@ -91,10 +91,10 @@ void AddCommand(CLI::App& app, const std::string& name, const std::string& descr
       ->type_name("N");
   command->add_option("--seed", common->seed, "Seed of everything random")->type_name("N");
   const Action action = prepare(*command);
-  RefuseWhatIsNoNumber(*command);
+  RejectWhatIsNoNumber(*command);
   // The exit code leaves through CLI::RuntimeError, CLI11's way of ending with a code of one's own.
   command->callback([command, common, action] {
-    RefuseOutputs(*command, common->json_target);
+    RejectOutputs(*command, common->json_target);
     Console console(common->json_target == "-");
     const int code = action(Context{*common, console});
     if (code != kDone) throw CLI::RuntimeError(code);

@@ -38,7 +38,7 @@ void AddCommand(CLI::App& app, const std::string& name, const std::string& descr
 /// --lens FILE of the commands that take a known lens.
 CLI::Option* AddLensOption(CLI::App& command, std::filesystem::path& lens);
 
-/// --memory GB of the commands that hold as many pictures at a time as fit into it; 4 without it.
+/// --memory GB of the commands that hold as many images at a time as fit into it; 4 without it.
 void AddMemoryOption(CLI::App& command, double& memory_gb, const std::string& description);
 
 // One function per command, each in commands/NAME.cpp.

@@ -104,8 +104,8 @@ void Console::Say(const std::string& line) {
 bool Console::StopRequested() const { return g_interrupted != 0; }
 
 std::string Console::InterruptedLine() const {
-  return keeps_work_ ? "interrupted; what was finished is kept, the same command continues"
-                     : "interrupted; the same command begins anew";
+  return keeps_work_ ? "interrupted; what was finished is saved, the same command continues"
+                     : "interrupted; the same command starts from the beginning";
 }
 
 void Console::FinishStage() {

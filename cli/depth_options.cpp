@@ -25,7 +25,7 @@ void AddDepthOptions(CLI::App& command, const std::vector<std::string>& engines,
       .add_option("--time-budget", choice.time_budget_s,
                   "Seconds for the depth stage on this machine: a measured probe picks neighbours, "
                   "iterations "
-                  "and rounds, which the set records")
+                  "and passes, which the set records")
       ->check(CLI::Range(1e-6, 1e9))
       ->type_name("S");
   command
@@ -47,13 +47,14 @@ void AddDepthOptions(CLI::App& command, const std::vector<std::string>& engines,
       ->check(CLI::Range(1e-6, 100.0))
       ->type_name("PX");
   overriding("--neighbours", choice.neighbours, "Views that the search asks", 1,
-             pipeline::kMostNeighbours);
-  overriding("--round-neighbours", choice.round_neighbours, "Views that the rounds ask", 1,
-             pipeline::kMostNeighbours);
+             pipeline::kMaxNeighbours);
+  overriding("--round-neighbours", choice.round_neighbours,
+             "Views that the geometric-consistency passes use", 1, pipeline::kMaxNeighbours);
   overriding("--iterations", choice.iterations, "Visits per pixel and level of the search", 1,
              pipeline::kMostIterations);
-  overriding("--rounds", choice.rounds, "Rounds in which views are held to each other's planes", 0,
-             pipeline::kMostRounds);
+  overriding("--rounds", choice.rounds,
+             "Geometric-consistency passes, in which views are checked against each other's planes",
+             0, pipeline::kMaxRounds);
 }
 
 }  // namespace dtr::cli

@@ -78,9 +78,9 @@ int Run(int argc, char** argv) {
   }
 }
 
-/// Every picture and every view takes tens of megabytes and frees them for the next to take again.
-/// glibc would hand them back in between, and the system clear them anew page by page: a tenth of
-/// the time of a picture with holes. What is kept is bounded.
+/// Every image and every view takes tens of megabytes and frees them for the next to take again.
+/// glibc would hand them back in between, and the system clear them again page by page: a tenth of
+/// the time of an image with holes. What is kept is bounded.
 void KeepFreedMemory() {
 #ifdef __GLIBC__
   mallopt(M_MMAP_THRESHOLD, 32 << 20);
@@ -103,7 +103,8 @@ int main(int argc, char** argv) {
     return dtr::cli::kFailed;
   } catch (const std::filesystem::filesystem_error& error) {
     fmt::print(stderr,
-               "dtr: {}: expected a place that can be used, found: {}; mend it or choose another\n",
+               "dtr: {}: expected a folder or file that can be used, found: {}; fix it or choose "
+               "another\n",
                error.path1().string(), error.code().message());
     return dtr::cli::kFailed;
   } catch (const std::bad_alloc&) {

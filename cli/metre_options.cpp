@@ -17,7 +17,7 @@ struct Typed {
   DistanceEnds ends;
 };
 
-[[noreturn]] void Refuse(const Typed& typed, const std::string& what) {
+[[noreturn]] void Reject(const Typed& typed, const std::string& what) {
   const char* form =
       typed.ends == DistanceEnds::kCameras
           ? "left01,right01=12cm: A and B each a photo, whose camera is meant"
@@ -51,20 +51,20 @@ std::optional<double> NumberFrom(const std::string& word) {
 pipeline::ScalePoint PointFrom(const std::string& text, const Typed& whole) {
   pipeline::ScalePoint point{text, {}};
   if (whole.ends == DistanceEnds::kCameras) {
-    if (text.empty()) Refuse(whole, "a photo without a name");
+    if (text.empty()) Reject(whole, "a photo without a name");
     point.clicks.push_back({text, {}});  // with all its signs: photos may have them in their names
     return point;
   }
   for (const std::string& part : Split(text, '+')) {
     const auto words = Split(part, ':');
-    if (words.front().empty()) Refuse(whole, "a view without a name");
+    if (words.front().empty()) Reject(whole, "a view without a name");
     pipeline::ScaleClick click{words.front(), {}};
     if (words.size() == 3) {
       const auto x = NumberFrom(words[1]), y = NumberFrom(words[2]);
-      if (!x || !y) Refuse(whole, fmt::format("no pixel is '{}:{}'", words[1], words[2]));
+      if (!x || !y) Reject(whole, fmt::format("no pixel is '{}:{}'", words[1], words[2]));
       click.pixel = Eigen::Vector2d(*x, *y);
     } else if (words.size() != 1) {
-      Refuse(whole, fmt::format("no point is '{}'", part));
+      Reject(whole, fmt::format("no point is '{}'", part));
     }
     point.clicks.push_back(std::move(click));
   }
@@ -73,7 +73,7 @@ pipeline::ScalePoint PointFrom(const std::string& text, const Typed& whole) {
 
 double MetresFrom(const std::string& word, const Typed& whole) {
   const auto length = calib::LengthFrom(word);
-  if (!length || !length->has_unit) Refuse(whole, fmt::format("no length is '{}'", word));
+  if (!length || !length->has_unit) Reject(whole, fmt::format("no length is '{}'", word));
   return length->value;
 }
 
@@ -92,9 +92,9 @@ pipeline::GpsSigma GpsSigmaFrom(const std::string& text) {
 pipeline::ScaleDistance DistanceFrom(const std::string& text, DistanceEnds ends) {
   const Typed typed{text, ends};
   const size_t equals = text.rfind('=');
-  if (equals == std::string::npos) Refuse(typed, "found no '='");
+  if (equals == std::string::npos) Reject(typed, "found no '='");
   const auto points = Split(text.substr(0, equals), ',');
-  if (points.size() != 2) Refuse(typed, fmt::format("found {} ends", points.size()));
+  if (points.size() != 2) Reject(typed, fmt::format("found {} ends", points.size()));
   pipeline::ScaleDistance distance;
   distance.text = text;
   distance.a = PointFrom(points[0], typed);
@@ -107,24 +107,26 @@ pipeline::ScaleDistance DistanceFrom(const std::string& text, DistanceEnds ends)
 }
 
 CLI::Option* AddGpsFlag(CLI::App& command, bool& gps) {
-  return command.add_flag("--gps", gps,
-                          "Hold the places that the photos' EXIF says they were taken at: cameras "
-                          "in metres east, north and up; places that do not tell the scale only "
-                          "turn and shift what --distance scales");
+  return command.add_flag(
+      "--gps", gps,
+      "Constrain cameras to the positions that the photos' EXIF says they were taken at: cameras "
+      "in metres east, north and up; positions that do not determine the scale only "
+      "rotate and translate what --distance scales");
 }
 
 CLI::Option* AddMetreOptions(CLI::App& command, CLI::Option& gps, MetreWords& words) {
   command
       .add_option_function<std::string>(
           "--gps-sigma", [&words](const std::string& word) { words.gps_sigma = word; },
-          "Standard deviation of these places per axis, on the map and in height, in place of what "
-          "EXIF says or the places themselves show")
+          "Standard deviation of these positions per axis, on the map and in height, instead of "
+          "what "
+          "EXIF says or the positions themselves show")
       ->needs(&gps)
       ->type_name("M[,V]");
   return command
       .add_option(
           "--distance", words.distances,
-          "A measured distance between the cameras of photos A and B, to be held; LENGTH as "
+          "A measured distance between the cameras of photos A and B, a constraint; LENGTH as "
           "2.5m, or 2.5m+-5mm with its standard deviation; may be given more than once")
       ->type_name("A,B=LENGTH");
 }

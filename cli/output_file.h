@@ -1,4 +1,4 @@
-// cli/output_file.h -- outputs that cannot be written are refused before the work, not after it.
+// cli/output_file.h -- outputs that cannot be written are rejected before the work, not after it.
 #pragma once
 #include <filesystem>
 #include <string>

@@ -143,7 +143,8 @@ std::shared_ptr<RenderOptions> AddRenderOptions(CLI::App& command) {
   command.add_flag_callback(
       "--blend-srgb", [&options] { options.blend_in_linear_light = false; },
       "Blend sRGB values, the default");
-  command.add_flag("--fill-holes", options.fill_holes, "Fill unseen pixels from the background");
+  command.add_flag("--fill-holes", options.fill_holes,
+                   "Fill pixels that no view sees from the background");
   return shared;
 }
 

@@ -11,7 +11,7 @@ namespace {
 
 using io::JsonObject;
 
-constexpr size_t kMostGroups = 8;  // that a plot tells apart
+constexpr size_t kMaxGroups = 8;  // that a plot tells apart
 
 /// An index into a list of `count`, which stands under `key`; empty where it is null.
 std::optional<size_t> IndexAt(const JsonObject& json, const std::string& key, size_t count) {
@@ -69,17 +69,17 @@ std::optional<eval::Times> MachineTimes(const JsonObject& stage) {
   if (!stage.Has("machine_ms")) return std::nullopt;
   const JsonObject json = stage.Object("machine_ms");
   eval::Times times;
-  times.least_ms = json.Number("least");
+  times.min_ms = json.Number("least");
   times.median_ms = json.Number("median");
-  times.most_ms = json.Number("most");
+  times.max_ms = json.Number("most");
   return times;
 }
 
 void RequireFewGroups(const JsonObject& json, const std::vector<PointFacts>& points) {
   std::set<std::string> groups;
   for (const PointFacts& point : points) groups.insert(point.group);
-  if (groups.size() > kMostGroups) {
-    json.Fail("points", fmt::format("at most {} values of the first option", kMostGroups),
+  if (groups.size() > kMaxGroups) {
+    json.Fail("points", fmt::format("at most {} values of the first option", kMaxGroups),
               std::to_string(groups.size()));
   }
 }

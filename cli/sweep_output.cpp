@@ -32,7 +32,7 @@ Json MachineJson(const SweptStage& swept) {
   }
   if (times_ms.empty()) return nullptr;
   const eval::Times times = eval::TimesOf(times_ms);
-  return {{"least", times.least_ms}, {"median", times.median_ms}, {"most", times.most_ms}};
+  return {{"least", times.min_ms}, {"median", times.median_ms}, {"most", times.max_ms}};
 }
 
 bool OnFront(const SweptStage& swept, size_t point) {
@@ -124,7 +124,7 @@ void SayStage(const StageFacts& stage, Console& console) {
   if (stage.machine) {
     console.Say(fmt::format(
         "the machine: a fixed piece of work took {:.3g} to {:.3g} ms between points, median {:.3g}",
-        stage.machine->least_ms, stage.machine->most_ms, stage.machine->median_ms));
+        stage.machine->min_ms, stage.machine->max_ms, stage.machine->median_ms));
   }
 }
 

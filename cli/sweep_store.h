@@ -12,7 +12,8 @@ namespace dtr::cli {
 
 /// The results of all stages in one JSON file:
 /// {format:1, measurements:[{stage,context,setting,cost,cost_least,cost_most,error,psnr_db,
-///  machine_ms,figures:{...}}]}. Written anew, atomically, after every measurement. What other sets
+///  machine_ms,figures:{...}}]}. Written again, atomically, after every measurement. What other
+///  sets
 /// and conditions left there stays.
 class SweepFile {
  public:

@@ -13,7 +13,7 @@ void AddVideoOptions(CLI::App& command, capture::VideoOptions& options) {
           ->type_name("N");
   command
       .add_option("--motion", options.motion,
-                  "Of a video: motion between two frames, of the picture's long side [0.06]")
+                  "Of a video: motion between two frames, of the image's long side [0.06]")
       ->excludes(every)
       ->type_name("SHARE");
   command

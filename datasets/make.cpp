@@ -26,7 +26,7 @@ constexpr int kMinSidePx = 16, kMaxSidePx = 16384;
 // less than this.
 constexpr double kMaxScale = 1e6;
 constexpr double kMaxOffset = 1e9;
-constexpr double kMaxSeconds = 1;  // then the ball leaves the pictures
+constexpr double kMaxSeconds = 1;  // then the ball leaves the images
 constexpr double kMaxDriftStops = 10;
 constexpr int kMinVisibleOthers = 2;  // as docs/ACCURACY.md counts pixels with true depth
 
@@ -137,7 +137,7 @@ void MakeDataset(const DatasetSpec& given, const fs::path& given_folder, int thr
   if (spec.layout.empty()) spec.layout = scene.framing().layouts.front();
   const std::vector<Pose> poses = MakeLayout(scene, spec.layout, spec.views);
 
-  // A lens that folds over is refused here, before any file is written.
+  // A lens that folds over is rejected here, before any file is written.
   PhotoOptions probe;
   probe.lens = {spec.k1, spec.k2};
   CheckPhotoOptions(MakeCamera(spec.width_px, spec.height_px, spec.focal_35mm), probe);

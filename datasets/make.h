@@ -28,7 +28,7 @@ struct DatasetSpec {
   /// are transformed.
   Eigen::Vector3d world_offset = Eigen::Vector3d::Zero();
   double scale = 1;
-  double time_s = 0;  ///< the instant, where something moves (MakeScene)
+  double time_s = 0;  ///< the time step, where something moves (MakeScene)
   int jpeg_quality = 95;
 };
 

@@ -26,7 +26,7 @@ struct PhotoOptions {
   double gain = 1;         ///< exposure: factor on linear light
   RadialLens lens;
   std::uint64_t seed = 0;  ///< of the noise; give every view its own
-  int threads = 0;         ///< 0: all cores; the picture does not depend on it
+  int threads = 0;         ///< 0: all cores; the image does not depend on it
 };
 
 /// Throws UsageError for options out of range, or a lens that folds over inside the image.

@@ -173,7 +173,7 @@ void AddMiddle(SceneBuilder& b, const RoomPalette& p, Random& random) {
 
 /// What stands against the walls.
 void AddAlongWalls(SceneBuilder& b, const RoomPalette& p) {
-  // Sofa under pictures, left wall.
+  // Sofa under images, left wall.
   b.Box({-3.45, 0.1, 0.22}, {0.42, 1.0, 0.22}, p.cloth);
   b.Box({-3.80, 0.1, 0.62}, {0.12, 1.0, 0.3}, p.cloth);
   b.Box({-3.45, 1.2, 0.35}, {0.42, 0.1, 0.35}, p.cloth);
@@ -184,7 +184,7 @@ void AddAlongWalls(SceneBuilder& b, const RoomPalette& p) {
   b.Box({-3.97, 0.75, 1.75}, {0.025, 0.42, 0.32}, p.painting);
   b.Box({-3.97, -0.35, 1.8}, {0.025, 0.3, 0.4}, p.painting);
   b.Box({-3.97, -1.9, 1.6}, {0.025, 0.35, 0.25}, p.rug);
-  // Sideboard with a globe, vases and a leaning picture, wall y = -3.
+  // Sideboard with a globe, vases and a leaning image, wall y = -3.
   b.Box({-1.0, -2.75, 0.42}, {1.1, 0.22, 0.42}, p.oak);
   for (int i = 0; i < 3; ++i) b.Box({-1.7 + 0.7 * i, -2.52, 0.45}, {0.3, 0.015, 0.3}, p.walnut);
   b.Sphere({-1.6, -2.72, 1.06}, 0.2, p.painting);

@@ -11,7 +11,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Grows when the same spec begins to give other pictures.
+// Grows when the same spec begins to give other images.
 constexpr int kGeneratorVersion = 1;
 
 // The beginning of a wrong value, whatever its strings hold.
@@ -80,7 +80,7 @@ DatasetSpec ParseSpecJson(const std::string& text, const std::string& source) {
   if (version != kGeneratorVersion) {
     throw Error(source + ": generator_version: expected " + std::to_string(kGeneratorVersion) +
                 ", found " + std::to_string(version) +
-                "; the same pictures need the version of dtr that made them");
+                "; the same images need the version of dtr that made them");
   }
   DatasetSpec spec;
   spec.scene = FieldOf<std::string>(json, "scene", &Json::is_string, "a name", source);

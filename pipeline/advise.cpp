@@ -32,7 +32,7 @@ std::vector<advise::CoarseView> CoarseViewsOf(const std::filesystem::path& folde
 std::vector<std::string> AdviceLines(const advise::Advice& advice) {
   const auto poor = std::ranges::count_if(advice.places, &advise::Place::poor);
   std::string missing =
-      fmt::format("coverage: {} of {} places between and beyond the cameras are poor", poor,
+      fmt::format("coverage: {} of {} positions between and beyond the cameras are poor", poor,
                   advice.places.size());
   if (!advice.add.empty()) {
     const advise::Place& place = advice.places[advice.add.front().place];

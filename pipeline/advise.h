@@ -14,7 +14,7 @@ namespace dtr::pipeline {
 std::vector<advise::CoarseView> CoarseViewsOf(const std::filesystem::path& folder,
                                               const DtrSet& set, int threads, Progress& progress);
 
-/// "3 of 40 places ... are poor", and what is to be done about it: two lines for who reads on in
+/// "3 of 40 positions ... are poor", and what is to be done about it: two lines for who reads on in
 /// `dtr advise`. The same for any number of threads.
 std::vector<std::string> AdviceLines(const advise::Advice& advice);
 

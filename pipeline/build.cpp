@@ -16,7 +16,7 @@
 #include "dtr/base/parallel_for.h"
 #include "dtr/eval/json.h"
 #include "dtr/io/set_io.h"
-#include "dtr/io/verdict.h"
+#include "dtr/io/validation_result.h"
 #include "pipeline/advise.h"
 #include "pipeline/calibrate.h"
 #include "pipeline/capture.h"
@@ -30,7 +30,7 @@
 #include "pipeline/detail/run/build_options.h"
 #include "pipeline/detail/run/finishing.h"
 #include "pipeline/detail/run/force_stage.h"
-#include "pipeline/detail/run/kept_notes.h"
+#include "pipeline/detail/run/recorded_notes.h"
 #include "pipeline/detail/run/run_log.h"
 #include "pipeline/validate.h"
 
@@ -157,7 +157,7 @@ std::vector<SparsePoint> SourcePoints(const SparseScene& sparse, const std::vect
 }
 
 // Photos that are there twice add nothing, and would show what is held out. Given places say that
-// they are photos of their own; those of a rig belong to its instants.
+// they are photos of their own; those of a rig belong to its time steps.
 void LeaveOutSamePictures(const BuildOptions& options, capture::Capture& photos,
                           Progress& progress) {
   if (options.keep_duplicates || !options.poses.empty() || !options.rig.empty()) return;
@@ -286,7 +286,7 @@ void SayRemarks(const BuildReport& report, size_t photos, Progress& progress) {
   if (report.screening.empty()) return;
   const auto& [name, remarks] = report.screening.front();
   progress.Note(
-      fmt::format("screening: {} of {} photos have a remark and are kept, first {}: {}; "
+      fmt::format("screening: {} of {} photos have a remark and are used, first {}: {}; "
                   "dtr capture --drop leaves such photos out",
                   report.screening.size(), photos, name, remarks.front()));
 }
@@ -303,7 +303,7 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
   const double memory_gb = options.depth.memory_gb.value_or(kDefaultMemoryGb);
   BuildReport report;
   RunLog log;
-  KeptNotes progress(listener);
+  RecordedNotes progress(listener);
 
   RequireCalibration(options.poses);
   io::SetWriter::RequireTarget(options.output, options.force);
@@ -319,7 +319,7 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
     RequireMetres(options.metres, photos, options.photos.string(),
                   options.holdout_strict ? held_out : std::vector<bool>());
     if (!rig) return;
-    (void)PhotosOfRig(*rig, photos);  // refused here, before any work
+    (void)PhotosOfRig(*rig, photos);  // rejected here, before any work
     TellPhotosTheirLens(*rig, photos);
   };
   if (!from_video) {

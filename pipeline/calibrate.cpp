@@ -88,12 +88,12 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
 
 // Boards are looked at as their photos are stored (board_photos.h); turned upright a photo has its
 // principal point elsewhere.
-void RefuseTurned(const capture::Capture& capture, const char* known) {
+void RejectTurned(const capture::Capture& capture, const char* known) {
   for (const capture::Photo& photo : capture.photos) {
     if (!capture::IsTurned(photo)) continue;
     throw Error(fmt::format(
         "{}: expected a photo as it is stored, for {} is known of such, found one that its EXIF "
-        "orientation turned; take the tag out of it (exiftool -Orientation= FILE)",
+        "orientation rotated; take the tag out of it (exiftool -Orientation= FILE)",
         photo.name, known));
   }
 }
@@ -147,8 +147,8 @@ CalibratedPhotos CalibratePhotos(const capture::Capture& capture, const Calibrat
   CalibrateOptions checked = options;
   checked.held_out.resize(capture.photos.size(), false);
   RequireCalibration(checked.poses);
-  if (checked.rig) RefuseTurned(capture, "the rig");
-  if (checked.lens) RefuseTurned(capture, "the lens");
+  if (checked.rig) RejectTurned(capture, "the rig");
+  if (checked.lens) RejectTurned(capture, "the intrinsics");
   fs::create_directories(workspace);
   CalibratedPhotos calibrated = checked.poses.empty()
                                     ? FromSfm(capture, checked, workspace, progress)

@@ -26,12 +26,13 @@ struct CalibrateOptions {
   int threads = 0;
   std::uint64_t seed = 0;
   double memory_gb = 4;
-  bool refine = true;  ///< bundle adjustment after SfM, where held-out sights say that it pays
+  bool refine =
+      true;  ///< bundle adjustment after SfM, where held-out observations say that it pays
   std::optional<calib::LensCamera> lens;  ///< of all photos, known: SfM's own is replaced by it
   std::optional<SetRig> rig;              ///< took all photos: its lenses, places and scale hold
   MetreOptions metres;  ///< places and distances to hold while SfM's model is refined
   /// The name of the photos where SfM's model must determine its cameras, else Error before it is
-  /// refined; empty: nobody asks.
+  /// refined; empty: unset.
   std::string determined = {};
   SfmChoice sfm = {};
   bool fixed_intrinsics = false;  ///< the model's are to be held; CalibratePhotos sets it
@@ -62,7 +63,7 @@ struct CalibratedPhotos {
 /// Throws Error where that is broken.
 bool NeedsFeatures(const std::filesystem::path& poses);
 
-/// Refuses before any work what cannot work: UsageError for `poses` that do not exist, Error when
+/// Rejects before any work what cannot work: UsageError for `poses` that do not exist, Error when
 /// COLMAP is needed (NeedsFeatures) and not installed.
 void RequireCalibration(const std::filesystem::path& poses);
 

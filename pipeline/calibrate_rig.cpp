@@ -38,8 +38,9 @@ Inputs InputsOf(const calib::Board& board, const RigPhotos& photos,
       const calib::LensCamera& lens = given->second.given.value();
       if (lens.width_px != camera.width_px || lens.height_px != camera.height_px) {
         throw Error(fmt::format(
-            "--camera {}: expected a lens of {} x {} px as its photos are, found {} x {}; give the "
-            "lens of this camera",
+            "--camera {}: expected intrinsics of {} x {} px as its photos are, found {} x {}; give "
+            "the "
+            "intrinsics of this camera",
             camera.name, camera.width_px, camera.height_px, lens.width_px, lens.height_px));
       }
       inputs.push_back({camera.name, given->second.model, camera.width_px, camera.height_px, lens});
@@ -81,7 +82,7 @@ bool TakeSimplerModel(size_t camera, Inputs& inputs, RigSummary& summary) {
   }
   if (simpler == nullptr) return false;
   summary.simpler.push_back(
-      fmt::format("{}: {}, for in the rig {} turns back before the corner of the image", input.name,
+      fmt::format("{}: {}, for in the rig {} folds back before the corner of the image", input.name,
                   NameOf(simpler->model), NameOf(input.model)));
   input.model = simpler->model;
   return true;
@@ -110,7 +111,7 @@ void RequireGiven(const RigPhotos& photos, const RigCalibrationOptions& options)
   for (const RigPhotoCamera& camera : photos.cameras) {
     if (!options.given.contains(camera.name)) {
       throw UsageError(
-          fmt::format("--camera: expected a lens for every camera or for none, found "
+          fmt::format("--camera: expected intrinsics for every camera or for none, found "
                       "none for {}",
                       camera.name));
     }
@@ -193,7 +194,7 @@ calib::RigCameraInput GivenLens(const calib::LensCamera& given, const std::strin
     input.given = camera;
     return input;
   }
-  throw Error(fmt::format("{}: expected a lens that boards are solved with, found {}", where,
+  throw Error(fmt::format("{}: expected intrinsics that boards are solved with, found {}", where,
                           calib::NameOf(camera.model)));
 }
 

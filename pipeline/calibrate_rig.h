@@ -19,7 +19,7 @@ struct RigCalibrationOptions {
   std::optional<calib::BoardModel> model;  ///< empty: each camera's own, by held-out views
   calib::SolveOptions solve;
   bool fixed_lenses = false;
-  bool free_running = false;  ///< cameras take their pictures when they like: delays are found too
+  bool free_running = false;  ///< cameras take their images when they like: delays are found too
   std::map<std::string, calib::RigCameraInput> given;  ///< lenses by camera; then they are fixed
   int threads = 0;
   std::uint64_t seed = 0;
@@ -34,7 +34,7 @@ struct RigSummary {
   int passes = 1;                    ///< solves, of free-running cameras
   /// Of cameras that were taken to be synchronised: what speaks against it (calib/judge).
   std::vector<std::optional<calib::CameraDelay>> delays;
-  calib::PatternTest unsteady;  ///< pictures that keep no common rate (calib/judge)
+  calib::PatternTest unsteady;  ///< images that keep no common rate (calib/judge)
 };
 
 /// Solves for the rig behind the photos. Throws UsageError when lenses are given for some cameras

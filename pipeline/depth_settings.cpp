@@ -67,10 +67,10 @@ stereo::Effort EffortFromJson(const std::string& text, const std::string& where)
     }
     return static_cast<int>(value);
   };
-  return {.neighbours = number("neighbours", 1, kMostNeighbours),
-          .round_neighbours = number("round_neighbours", 1, kMostNeighbours),
+  return {.neighbours = number("neighbours", 1, kMaxNeighbours),
+          .round_neighbours = number("round_neighbours", 1, kMaxNeighbours),
           .iterations = number("iterations", 1, kMostIterations),
-          .rounds = number("rounds", 0, kMostRounds)};
+          .rounds = number("rounds", 0, kMaxRounds)};
 }
 
 nlohmann::ordered_json SettingsJson(const std::string& engine, const stereo::Effort& effort) {

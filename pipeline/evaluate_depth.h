@@ -11,7 +11,7 @@ namespace dtr::pipeline {
 /// Scores the depth of the set's source views (loaded) against `truth`: a folder with cameras.json,
 /// depth maps in depth/ named as the list says, and optionally masks/NAME_visible.png and
 /// NAME_texture.png. Truth of an exact scene made by `dtr dataset` (dataset.json beside it) is cast
-/// anew where the set's grid is another; other truth must be on that grid already.
+/// again where the set's grid is another; other truth must be on that grid already.
 /// The gauge: cameras that agree with the true ones are taken as they are; else one similarity is
 /// fitted to the camera centres and its residual is told.
 /// Throws Error when a grid differs, the cameras cannot be aligned or a file is missing or broken.

@@ -43,8 +43,7 @@ io::ImageAndMask ReadCameraImage(const io::NamedCamera& named, const fs::path& f
   const io::ImageHeader header = io::ReadImageHeader(file);
   const PinholeCamera& camera = named.camera;
   const StoredSize stored{header.width_px, header.height_px, header.exif_orientation};
-  const auto grid =
-      GridOfSize(camera.width_px(), camera.height_px(), stored, options.photo_grid);
+  const auto grid = GridOfSize(camera.width_px(), camera.height_px(), stored, options.photo_grid);
   if (!grid) {
     throw Error(file.string() + ": expected " + PixelsText(camera.width_px(), camera.height_px()) +
                 " pixels as the camera says, found " +
@@ -288,7 +287,7 @@ void TellOf(const io::CameraList& list, const std::vector<ViewNote>& notes, Prog
   }
   if (turned > 0) {
     progress.Note(std::to_string(turned) + " photos, first " + first +
-                  ": turned by their EXIF orientation, as their cameras describe them");
+                  ": rotated by their EXIF orientation, as their cameras describe them");
   }
   if (distorted > 0) {
     progress.Note(std::to_string(distorted) +
@@ -389,7 +388,7 @@ io::AlphaTotals ImportSet(const io::CameraList& list, const ImportOptions& optio
   if (options.depth_dir.empty() && (points == nullptr || points->points.empty())) {
     throw UsageError(
         "import: expected depth maps (--depth) or a model with points, found neither; without them "
-        "nobody knows where the scene is");
+        "the position of the scene is unknown");
   }
   io::SetWriter::RequireTarget(target, force);  // before any file is hashed
   const nlohmann::json inputs = Inputs(list, options, progress);
@@ -398,7 +397,7 @@ io::AlphaTotals ImportSet(const io::CameraList& list, const ImportOptions& optio
   try {
     return WriteSet(list, options, inputs.dump(), points, writer, progress);
   } catch (const Error&) {
-    // An import starts anew anyway, and what it left would stand in the way of mended inputs.
+    // An import starts again anyway, and what it left would stand in the way of mended inputs.
     writer.Discard();
     throw;
   }

@@ -37,7 +37,7 @@ struct ImportOptions {
   /// What the depth numbers measure; empty: what the list says for each camera.
   std::optional<DepthKind> depth_kind;
   /// Scene units per number in a depth file. Empty: 1 for float files; whole numbers are
-  /// refused, as they are never scene units by themselves.
+  /// rejected, as they are never scene units by themselves.
   std::optional<double> depth_unit;
   /// io::CameraList::photo_grid of the list.
   PhotoGrid photo_grid = PhotoGrid::kUpright;

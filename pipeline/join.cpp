@@ -109,7 +109,7 @@ void WriteViews(const fs::path& folder, size_t index, Frame& frame, LengthUnit u
 
 void JoinSets(const std::vector<fs::path>& sets, const fs::path& target, const JoinOptions& options,
               Progress& progress) {
-  if (sets.size() < 2) throw UsageError("join: expected two sets or more, one for each instant");
+  if (sets.size() < 2) throw UsageError("join: expected two sets or more, one for each time step");
   std::vector<DtrSet> stills;
   for (const fs::path& folder : sets) {
     stills.push_back(ReadStill(folder));

@@ -31,9 +31,9 @@ std::optional<size_t> FindPhoto(const std::vector<std::string>& names,
 }
 
 calib::KnownMetres KnownOf(const calib::SfmModel& model, const MetreOptions& options,
-                           const PhotoPlaces& places) {
+                           const PhotoPositions& places) {
   calib::KnownMetres known;
-  known.most_passes = options.most_passes;
+  known.max_passes = options.max_passes;
   std::map<std::string, int> image_of;
   for (const calib::SfmImage& image : model.images) {
     image_of.emplace(image.name, static_cast<int>(image_of.size()));
@@ -67,7 +67,7 @@ calib::KnownMetres KnownOf(const calib::SfmModel& model, const MetreOptions& opt
   return known;
 }
 
-// Which way is up is known worse than kMostTurnSigmaRad.
+// Which way is up is known worse than kMaxTurnSigmaRad.
 std::string TurnLine(const calib::MetricReport& report) {
   constexpr double kNoTurnSigmaRad = 1;  // beyond, an error of a turn is no small number any more
   const std::string known =
@@ -75,15 +75,17 @@ std::string TurnLine(const calib::MetricReport& report) {
           ? fmt::format("is known to {:.0f} degrees only", report.turn_sigma_rad / kDegree)
           : "is not known";
   // No axis is known better than the scale: the arms about it are no longer.
-  if (report.places_relative_sigma > calib::kMostTurnSigmaRad) {
-    return "the places err too much for cameras that stand so near to each other: the turn, and "
+  if (report.places_relative_sigma > calib::kMaxTurnSigmaRad) {
+    return "the positions err too much for cameras that stand so near to each other: the rotation, "
+           "and "
            "with it what is north and up, " +
            known;
   }
-  return "the cameras stand nearly on a line: the turn about it, and with it what is up, " + known;
+  return "the cameras stand nearly on a line: the rotation about it, and with it what is up, " +
+         known;
 }
 
-void TellOfPlaces(const calib::SfmModel& model, const PhotoPlaces& places,
+void TellOfPlaces(const calib::SfmModel& model, const PhotoPositions& places,
                   const calib::MetricReport& report, RefinedInMetres& out, Json& scale) {
   std::vector<std::string> left_out;
   for (const int i : report.left_out) {
@@ -119,19 +121,19 @@ void TellOfPlaces(const calib::SfmModel& model, const PhotoPlaces& places,
     out.lines.push_back(fmt::format("do not agree, left out: {}", fmt::join(left_out, ", ")));
   }
   if (!report.settled) {
-    out.lines.push_back(
-        fmt::format("which places agree, and how far they err, did not settle in {} passes; give "
-                    "--gps-sigma where you know it",
-                    report.passes));
+    out.lines.push_back(fmt::format(
+        "which positions agree, and how far they err, did not settle in {} passes; give "
+        "--gps-sigma where you know it",
+        report.passes));
   }
   if (!report.places_tell_scale) {
     out.lines.push_back(fmt::format(
-        "the places alone tell the scale to {:.0f} % only: it is that of the distances, "
-        "and they turn and shift the whole",
+        "the positions alone determine the scale to {:.0f} % only: it is that of the distances, "
+        "and they rotate and translate the whole",
         100 * report.places_relative_sigma));
   }
   out.lines.push_back(places.AxesLine());
-  if (!(report.turn_sigma_rad <= calib::kMostTurnSigmaRad)) {
+  if (!(report.turn_sigma_rad <= calib::kMaxTurnSigmaRad)) {
     out.lines.push_back(TurnLine(report));
   }
 }
@@ -163,7 +165,7 @@ void RequireCameras(const MetreOptions& options, const std::vector<std::string>&
       if (point->text.find_first_of(":+") != std::string::npos) {
         throw UsageError(fmt::format(
             "--distance {}: expected two photos, as left01,right01=12cm, found '{}'; points of "
-            "pictures are for dtr calibrate scale, of a finished set",
+            "images are for dtr calibrate scale, of a finished set",
             d.text, point->text));
       }
       throw UsageError(fmt::format("--distance {}: no photo is named '{}'; {} has {} ... ({})",
@@ -196,7 +198,7 @@ void RequireMetres(const MetreOptions& options, const capture::Capture& photos,
     }
   }
   if (!options.gps) return;
-  RequirePlaces(PhotoPlacesOf(photos, adjusted), where,
+  RequirePlaces(PhotoPositionsOf(photos, adjusted), where,
                 adjusted.size() == names.size() ? "the folder" : "those not held out strictly");
 }
 
@@ -212,7 +214,7 @@ std::string ToJson(const MetreOptions& options) {
 }
 
 RefinedInMetres RefineInMetres(const calib::SfmModel& model, const MetreOptions& options,
-                               const PhotoPlaces& places, const calib::RefineOptions& refine) {
+                               const PhotoPositions& places, const calib::RefineOptions& refine) {
   const calib::KnownMetres known = KnownOf(model, options, places);
   RefinedInMetres out;
   out.start = calib::StartInMetres(model, known, refine);

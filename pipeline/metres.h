@@ -20,7 +20,7 @@ struct MetreOptions {
   bool gps = false;
   std::optional<GpsSigma> gps_sigma;
   std::vector<ScaleDistance> distances;  ///< between cameras, called as their photos are
-  int most_passes = calib::KnownMetres().most_passes;
+  int max_passes = calib::KnownMetres().max_passes;
 
   bool any() const { return gps || !distances.empty(); }
 };
@@ -35,12 +35,12 @@ struct RefinedInMetres {
 };
 
 /// Throws UsageError where a distance is not between two of these photos, by names, or an extension
-/// is needed to tell photos apart: pixels of pictures are for `dtr calibrate scale`, of a finished
+/// is needed to tell photos apart: pixels of images are for `dtr calibrate scale`, of a finished
 /// set. `whose`: "the model".
 void RequireCameras(const MetreOptions& options, const std::vector<std::string>& names,
                     const std::string& whose);
 
-/// Refuses before any work what cannot be had of these photos: RequireCameras, a distance to a
+/// Rejects before any work what cannot be had of these photos: RequireCameras, a distance to a
 /// photo with `held_back[i]` (empty: none), which will be no part of the model, and with --gps too
 /// few of the others that say where they were taken. `where`: their folder.
 void RequireMetres(const MetreOptions& options, const capture::Capture& photos,
@@ -53,6 +53,6 @@ std::string ToJson(const MetreOptions& options);
 /// options.gps is not set. Throws Error as they do, and where a distance names a photo without a
 /// camera.
 RefinedInMetres RefineInMetres(const calib::SfmModel& model, const MetreOptions& options,
-                               const PhotoPlaces& places, const calib::RefineOptions& refine);
+                               const PhotoPositions& places, const calib::RefineOptions& refine);
 
 }  // namespace dtr::pipeline

@@ -11,7 +11,7 @@
 #include "dtr/io/pruned.h"
 #include "dtr/io/set_io.h"
 #include "dtr/prune/probes.h"
-#include "dtr/render/instants.h"
+#include "dtr/render/time_steps.h"
 #include "pipeline/detail/depth/view_coder.h"
 #include "pipeline/detail/run/prune_journal.h"
 #include "pipeline/detail/run/run_log.h"
@@ -25,7 +25,7 @@ using Json = nlohmann::ordered_json;
 constexpr int kTimedCameras = 3, kTimedRepeats = 3;
 
 /// Room for what set.json says of the pruning; it is written when all is decided.
-constexpr std::uint64_t kMostBytesOfReport = 16384;
+constexpr std::uint64_t kMaxBytesOfReport = 16384;
 
 /// What is in no view's files.
 std::uint64_t OtherBytesOf(const DtrSet& set, const fs::path& folder) {
@@ -195,19 +195,19 @@ eval::Times FrameBefore(const PruneSetOptions& options, const DtrSet& set,
 
 void ExpectGoalsReached(const PruneSetOptions& options, const DtrSet& pruned,
                         const PruneSetReport& report) {
-  const auto refuse = [&](const std::string& expected, const std::string& found) {
+  const auto reject = [&](const std::string& expected, const std::string& found) {
     throw Error(
         fmt::format("{}: expected {} within a loss of {:g} dB, found {}; allow more by "
                     "--max-loss-db",
                     options.output.string(), expected, options.prune.max_loss_db, found));
   };
   const std::uint64_t bytes =
-      OtherBytesOf(pruned, options.set) + kMostBytesOfReport + BytesOfViews(pruned);
+      OtherBytesOf(pruned, options.set) + kMaxBytesOfReport + BytesOfViews(pruned);
   if (options.max_bytes && bytes > *options.max_bytes) {
-    refuse(fmt::format("at most {} bytes", *options.max_bytes), fmt::format("{}", bytes));
+    reject(fmt::format("at most {} bytes", *options.max_bytes), fmt::format("{}", bytes));
   }
   if (options.frame_ms && report.frame_after.median_ms > *options.frame_ms) {
-    refuse(fmt::format("frames of at most {:g} ms", *options.frame_ms),
+    reject(fmt::format("frames of at most {:g} ms", *options.frame_ms),
            fmt::format("{:.1f} ms", report.frame_after.median_ms));
   }
 }
@@ -237,7 +237,7 @@ PruneSetReport PruneSet(const PruneSetOptions& options, Progress& progress) {
   io::SetWriter writer(options.output, Fingerprint(options, set), options.force);
   prune::PruneOptions prune = options.prune;
   prune.render.threads = options.threads;
-  prune.other_bytes = static_cast<double>(OtherBytesOf(set, options.set) + kMostBytesOfReport);
+  prune.other_bytes = static_cast<double>(OtherBytesOf(set, options.set) + kMaxBytesOfReport);
   PruneJournal journal(writer.work_folder() / "measured.jsonl");
   prune.journal = &journal;
   const auto cameras = prune::DrawProbes(set, kTimedCameras, prune.seed);

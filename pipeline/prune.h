@@ -39,7 +39,7 @@ struct PruneSetReport {
 
 /// Writes `output`; `set` is only read. Nothing of `output` exists until it is whole. Throws
 /// UsageError where `output` is there already (and `force` is off), Error for sets of several
-/// instants and of views without depth, and where the loss does not allow to reach a goal.
+/// time steps and of views without depth, and where the loss does not allow to reach a goal.
 PruneSetReport PruneSet(const PruneSetOptions& options, Progress& progress);
 
 }  // namespace dtr::pipeline

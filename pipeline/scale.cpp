@@ -72,14 +72,14 @@ Found FromGps(const ScaleOptions& options, const DtrSet& set) {
     names.push_back(view.name);
     centre_of[view.name] = view.CenterInWorld();
   }
-  const PhotoPlaces located = ReadPhotoPlaces(options.gps, names);
+  const PhotoPositions located = ReadPhotoPositions(options.gps, names);
   RequirePlaces(located, options.gps.string(), "the set");
   found.lines = located.without_place;
   std::vector<Eigen::Vector3d> centres;
   for (const std::string& name : located.names) centres.push_back(centre_of.at(name));
   const calib::PositionScale scale = calib::ScaleFromPositions(centres, located.EastNorthUp());
   found.relative_sigma = scale.relative_sigma;
-  found.keeps_axes = !(scale.turn_sigma_rad <= calib::kMostTurnSigmaRad);
+  found.keeps_axes = !(scale.turn_sigma_rad <= calib::kMaxTurnSigmaRad);
   found.metric_from_scene = scale.metric_from_scene;
   if (found.keeps_axes) {
     found.metric_from_scene = {};
@@ -98,7 +98,7 @@ Found FromGps(const ScaleOptions& options, const DtrSet& set) {
   if (!found.keeps_axes) {
     found.json["origin"] = Json::parse(located.OriginJson());
   }
-  found.lines.push_back(fmt::format("{} positions, {:.2f} m RMS; turn known to {:.2g} degrees",
+  found.lines.push_back(fmt::format("{} positions, {:.2f} m RMS; rotation known to {:.2g} degrees",
                                     located.names.size() - left_out.size(), scale.rms_m, turn_deg));
   if (!left_out.empty()) {
     found.lines.push_back(fmt::format("do not agree, left out: {}", fmt::join(left_out, ", ")));
@@ -107,10 +107,10 @@ Found FromGps(const ScaleOptions& options, const DtrSet& set) {
     found.lines.push_back(
         "which positions agree did not settle: with another pass others would be left out");
   }
-  found.lines.push_back(found.keeps_axes
-                            ? "the cameras stand nearly on a line, and the turn about it is not "
-                              "known: axes are left as they were"
-                            : located.AxesLine());
+  found.lines.push_back(
+      found.keeps_axes ? "the cameras stand nearly on a line, and the rotation about it is not "
+                         "known: axes are left as they were"
+                       : located.AxesLine());
   return found;
 }
 

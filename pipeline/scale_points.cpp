@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kClickSigmaPx = 1;
 constexpr double kUnknownDisparitySigmaPx = 1;
-constexpr double kMostMissPx = 5;
+constexpr double kMaxMissPx = 5;
 
 const View& ViewOf(const DtrSet& set, const ScaleClick& click) {
   const auto& views = set.frames.front().views;
@@ -32,13 +32,13 @@ void RequireInside(const View& view, const ScalePoint& point, const Eigen::Vecto
 
 PlacedPoint FromDepth(const std::filesystem::path& folder, View view, const ScalePoint& point,
                       const Eigen::Vector2d& pixel) {
-  const auto refuse = [&](const char* why) {
+  const auto reject = [&](const char* why) {
     return Error(fmt::format(
         "{}: expected depth there, found {}; click a pixel beside it, or the same point in two "
         "views: {}+VIEW:X:Y",
         point.text, why, point.text));
   };
-  if (!view.depth_file) throw refuse("a view without a depth map");
+  if (!view.depth_file) throw reject("a view without a depth map");
   io::LoadOptions load;
   load.images = false;
   load.sigma = true;
@@ -46,14 +46,14 @@ PlacedPoint FromDepth(const std::filesystem::path& folder, View view, const Scal
   const int x = static_cast<int>(pixel.x()) / view.depth_scale;
   const int y = static_cast<int>(pixel.y()) / view.depth_scale;
   const float z = view.depth(x, y);
-  if (DepthImage::IsHole(z)) throw refuse("a hole");
+  if (DepthImage::IsHole(z)) throw reject("a hole");
   double inverse_sigma = 0;
   if (view.inverse_depth_sigma && (*view.inverse_depth_sigma)(x, y) > 0) {
     inverse_sigma = (*view.inverse_depth_sigma)(x, y);
   } else if (view.reference_baseline > 0) {
     inverse_sigma = kUnknownDisparitySigmaPx / (view.camera.fx_px() * view.reference_baseline);
   } else {
-    throw refuse("one whose uncertainty nothing tells");
+    throw reject("one whose uncertainty is not known");
   }
   const Eigen::Vector3d p_in_cam = view.camera.CamFromPixel(pixel, z, DepthKind::kPlaneZ);
   Eigen::Matrix3d in_cam = Eigen::Matrix3d::Zero();
@@ -77,20 +77,20 @@ PlacedPoint FromRays(const DtrSet& set, const ScalePoint& point) {
                       point.text, click.view_id));
     }
     RequireInside(view, point, *click.pixel);
-    sights.push_back(calib::MakeSight(view.camera, view.cam_from_world, *click.pixel));
+    sights.push_back(calib::MakeObservation(view.camera, view.cam_from_world, *click.pixel));
   }
   const calib::Triangulation found = calib::Triangulate(sights, -1);
   if (found.status != calib::TriangulationStatus::kConverged) {
     throw Error(fmt::format(
         "{}: expected rays that meet before the cameras, found {}; click the same point in views "
-        "from different places",
+        "from different positions",
         point.text,
         found.status == calib::TriangulationStatus::kBehind ? "none that do" : "parallel ones"));
   }
   for (size_t i = 0; i < sights.size(); ++i) {
     Eigen::Vector2d miss;
     Eigen::Matrix<double, 2, 3> unused;
-    if (PixelResidual(sights[i], found.p_in_world, &miss, &unused) && miss.norm() <= kMostMissPx) {
+    if (PixelResidual(sights[i], found.p_in_world, &miss, &unused) && miss.norm() <= kMaxMissPx) {
       continue;
     }
     throw Error(fmt::format(

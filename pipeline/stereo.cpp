@@ -9,13 +9,13 @@
 #include "dtr/eval/json.h"
 #include "dtr/io/pruned.h"
 #include "dtr/io/set_io.h"
-#include "dtr/render/instants.h"
+#include "dtr/render/time_steps.h"
 #include "pipeline/detail/depth/depth_engine.h"
 #include "pipeline/detail/depth/depth_stage.h"
 #include "pipeline/detail/pages/set_page.h"
 #include "pipeline/detail/photos/input_hash.h"
 #include "pipeline/detail/run/finishing.h"
-#include "pipeline/detail/run/kept_notes.h"
+#include "pipeline/detail/run/recorded_notes.h"
 #include "pipeline/detail/run/run_log.h"
 #include "pipeline/validate.h"
 
@@ -75,7 +75,7 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& listen
   RequireEngine(options.depth);
   const bool in_place = options.output.empty();
   RunLog log;
-  KeptNotes progress(listener);
+  RecordedNotes progress(listener);
   log.Begin("depth");
   RecomputeReport report;
   report.written = in_place ? options.set : options.output;
@@ -125,7 +125,7 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& listen
   limits.memory_gb = std::min(limits.memory_gb, options.depth.memory_gb.value_or(kDefaultMemoryGb));
   const auto validation =
       ValidateSet(writer.folder(), set, sparse, limits, options.threads, progress);
-  set.verdict_json = eval::VerdictJson(validation.tests);  // other depth, other verdict
+  set.verdict_json = eval::VerdictJson(validation.tests);  // other depth, other validation result
   WriteSetPage(writer, set,
                {report.written.stem().string(),
                 options.depth.engine,

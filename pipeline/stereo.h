@@ -25,9 +25,9 @@ struct RecomputeReport {
   double depth_completeness = 0;  ///< share of the source views' depth pixels that have a depth
 };
 
-/// Writes the set anew with depth maps by `engine`; cameras, images and sparse points stay. The old
-/// set is whole until the new one is. Throws Error when the set carries no sparse points to find
-/// depth ranges from, UsageError when the output exists.
+/// Writes the set again with depth maps by `engine`; cameras, images and sparse points stay. The
+/// old set is whole until the new one is. Throws Error when the set carries no sparse points to
+/// find depth ranges from, UsageError when the output exists.
 RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& progress);
 
 }  // namespace dtr::pipeline

@@ -78,7 +78,7 @@ calib::ValidationReport ValidateSet(const std::filesystem::path& folder, const D
   calib::ValidationReport report = ReprojectionOfSet(set, sparse, limits.reprojection, threads);
   progress.ThrowIfInterrupted();
   AddCrossDepth(folder, set, limits, threads, report, progress);
-  progress.Stage("cameras against their sights", 0);
+  progress.Stage("cameras against their observations", 0);
   const Cameras of = CamerasOf(set);
   const calib::Judgement judgement = calib::Judge(
       calib::BundleOf(of.cameras, of.poses, of.names, sparse), limits.judge, threads, &progress);

@@ -44,7 +44,7 @@ UnseenPhotos UnseenOfRig(const calib::Calibration& calibration, const std::files
                          const std::string& pattern, int threads, Progress& progress) {
   if (pattern != "*") {
     throw UsageError(fmt::format(
-        "--pattern {}: is for the photos of one camera; a rig's cameras are told apart by their "
+        "--pattern {}: is for the photos of one camera; a rig's cameras are distinguished by their "
         "folders or names",
         pattern));
   }
@@ -105,9 +105,9 @@ std::vector<calib::LeftOut> TakeOutSeen(const calib::Calibration& calibration,
     seen.push_back(
         {view.seen.name,
          CornersMoved(calibration, *same)
-             ? "not unseen: the calibration was made from a photo of this name"
+             ? "not held out: the calibration was made from a photo of this name"
              : fmt::format(
-                   "not unseen: its corners are those of {}, which the calibration was made from",
+                   "not held out: its corners are those of {}, which the calibration was made from",
                    same->seen.name)});
     return true;
   });

@@ -33,8 +33,8 @@ struct UnseenPhotos {
 UnseenPhotos ReadUnseen(const calib::Calibration& calibration, const std::filesystem::path& folder,
                         const std::string& pattern, int threads, Progress& progress);
 
-/// The report as a page: verdict and tests, residual vectors, coverage, maps, worst views. Views
-/// are drawn over their photos where `images` has them.
+/// The report as a page: validation result and tests, residual vectors, coverage, maps, worst
+/// views. Views are drawn over their photos where `images` has them.
 std::string CalibrationPage(const calib::Calibration& calibration, const calib::JudgeReport& report,
                             const std::string& title,
                             const std::optional<std::filesystem::path>& images);

@@ -36,13 +36,13 @@ struct DepthMapsOptions {
 /// The limit is too low for a single view with its neighbours.
 class NotEnoughMemory : public Error {
  public:
-  NotEnoughMemory(const std::string& message, std::uint64_t least_bytes)
-      : Error(message), least_bytes_(least_bytes) {}
+  NotEnoughMemory(const std::string& message, std::uint64_t min_bytes)
+      : Error(message), min_bytes_(min_bytes) {}
   /// The least limit that works.
-  std::uint64_t least_bytes() const { return least_bytes_; }
+  std::uint64_t min_bytes() const { return min_bytes_; }
 
  private:
-  std::uint64_t least_bytes_;
+  std::uint64_t min_bytes_;
 };
 
 /// Computes the depth map of every view for which `already_done(view)` is false and hands it to

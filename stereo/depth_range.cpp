@@ -36,7 +36,7 @@ std::vector<DepthRange> DepthRangesFromPoints(std::span<const StereoView> views,
     if (inverse_depths.size() < needed) {
       const std::string who = v < options.names.size() ? options.names[v] : std::to_string(v);
       throw Error("view " + who + ": expected at least " + std::to_string(needed) +
-                  " sparse points in its sight, which tell how deep it looks, found " +
+                  " sparse points in view, which give its depth range, found " +
                   std::to_string(inverse_depths.size()) +
                   "; take more photos of what it shows, or leave it out");
     }

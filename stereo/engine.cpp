@@ -9,18 +9,18 @@ namespace dtr::stereo {
 
 PlaneMap Engine::Match(std::span<const StereoView>, int, std::span<const int>, const DepthRange&,
                        const EngineOptions&) const {
-  throw std::logic_error(name() + ": has no rounds");
+  throw std::logic_error(name() + ": has no geometric-consistency passes");
 }
 
 PlaneMap Engine::Refine(std::span<const StereoView>, int, std::span<const int>, const DepthRange&,
                         std::span<const PlaneMap* const>, int, const EngineOptions&) const {
-  throw std::logic_error(name() + ": has no rounds");
+  throw std::logic_error(name() + ": has no geometric-consistency passes");
 }
 
 DepthEstimate Engine::Judge(std::span<const StereoView>, int, std::span<const int>,
                             const DepthRange&, std::span<const PlaneMap* const>,
                             const EngineOptions&) const {
-  throw std::logic_error(name() + ": has no rounds");
+  throw std::logic_error(name() + ": has no geometric-consistency passes");
 }
 
 namespace {
@@ -35,7 +35,7 @@ void CheckRange(const char* what, int value, int least, int most) {
 
 std::unique_ptr<Engine> MakeEngine(const std::string& name, const Effort& effort) {
   CheckRange("neighbours", effort.neighbours, 1, 8);
-  CheckRange("neighbours in the rounds", effort.round_neighbours, 1, 8);
+  CheckRange("neighbours in the passes", effort.round_neighbours, 1, 8);
   CheckRange("iterations", effort.iterations, 1, 20);
   CheckRange("rounds", effort.rounds, 0, 8);
   if (name == "sgbm") return std::make_unique<SgbmEngine>(PairLimits{}, effort.neighbours);

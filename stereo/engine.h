@@ -37,7 +37,7 @@ struct DepthEstimate {
 /// How much work goes into a depth map. Every value may change the result.
 struct Effort {
   int neighbours = 5;        ///< views that the search asks, at most
-  int round_neighbours = 8;  ///< views that the rounds and the verdict ask, at most 8
+  int round_neighbours = 8;  ///< views that the rounds and the validation result ask, at most 8
   /// Visits per pixel on the levels between the coarsest (two more) and full size (two fewer, but
   /// one at least).
   int iterations = 3;
@@ -90,7 +90,7 @@ class Engine {
   virtual PlaneMap Match(std::span<const StereoView> views, int reference,
                          std::span<const int> neighbours, const DepthRange& range,
                          const EngineOptions& options) const;
-  /// One round: the planes of `reference` anew, starting from `maps[reference]` and held to the
+  /// One round: the planes of `reference` again, starting from `maps[reference]` and held to the
   /// planes of its neighbours. `maps` has one entry per view, null where there is none; `round`
   /// counts from 1.
   virtual PlaneMap Refine(std::span<const StereoView> views, int reference,

@@ -30,7 +30,7 @@ struct ViewNeighbours {
 /// Chooses the neighbours of every view.
 /// A pair's score is the sum over its shared points of a weight of the triangulation angle (a
 /// piecewise Gaussian as in Yao et al., MVSNet, ECCV 2018, supplement sec. 1.1: small angles give
-/// no depth, large ones different pictures) times a weight of the ratio of the image scales.
+/// no depth, large ones different images) times a weight of the ratio of the image scales.
 /// A view with too few observations is scored with stand-in points instead: the points of the whole
 /// scene inside its frustum, or, without any, a grid of rays at depths guessed from the cameras.
 /// Long lenses and far scenes may have no pair of min_angle_deg at all: their pairs are ranked by

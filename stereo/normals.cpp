@@ -7,7 +7,7 @@
 namespace dtr::stereo {
 namespace {
 
-constexpr double kMostSigmas = 2;
+constexpr double kMaxSigmas = 2;
 
 }  // namespace
 
@@ -27,7 +27,7 @@ Grid<float> NormalsOf(const PlaneMap& planes, const DepthImage& depth, const Gri
       if (DepthImage::IsHole(depth(x, y))) continue;
       const double w = planes.inverse_depth(x, y);
       const double off = w / planes.unit_z - 1.0 / depth(x, y);
-      if (!(std::abs(off) <= kMostSigmas * sigma(x, y))) continue;
+      if (!(std::abs(off) <= kMaxSigmas * sigma(x, y))) continue;
       // unit_z / z = n . (X / Z, Y / Z, 1), so n . (X, Y, Z) = unit_z: n points away.
       const double across = planes.slope_x(x, y) * camera.fx_px();
       const double down = planes.slope_y(x, y) * camera.fy_px();

@@ -90,7 +90,7 @@ void RunRounds(const Collection& collection, std::span<const int> needed, PlaneM
   const std::vector<std::vector<int>> missing = Missing(collection, needed, store);
   for (int round = 0; round < static_cast<int>(missing.size()); ++round) {
     const std::vector<int>& views = missing[static_cast<size_t>(round)];
-    progress.Stage(round == 0 ? "matching" : "consistency round " + std::to_string(round),
+    progress.Stage(round == 0 ? "matching" : "consistency pass " + std::to_string(round),
                    static_cast<int>(views.size()));
     int done = 0;
     for (const int view : views) {

@@ -58,16 +58,17 @@ std::string AdvicePage(const std::string& name, const DtrSet& set, const advise:
   const auto poor = std::count_if(advice.places.begin(), advice.places.end(),
                                   [](const auto& place) { return place.poor; });
   report::HtmlReport page("Advice on " + name);
-  page.Verdict(poor == 0, fmt::format("{} of {} places between and beyond the cameras are poor",
+  page.Verdict(poor == 0, fmt::format("{} of {} positions between and beyond the cameras are poor",
                                       poor, advice.places.size()));
   page.Paragraph(fmt::format(
-      "A place is poor where more than {} of what it sees is in no photo, or where a twentieth of "
+      "A position is poor where more than {} of what it sees is in no photo, or where a twentieth "
+      "of "
       "the points it sees have no photo within {:.0f} degrees, seen from the point. Pixels that "
       "photos show but that have no depth (sky, plain walls) are counted apart: another camera "
-      "would not mend them.",
+      "would not fix them.",
       Percent(options.max_unseen), options.max_gap_deg));
   page.Section("Cameras to add");
-  if (advice.add.empty()) page.Paragraph("None would leave fewer or better poor places.");
+  if (advice.add.empty()) page.Paragraph("None would leave fewer or better poor positions.");
   std::vector<std::vector<report::Cell>> rows;
   for (size_t i = 0; i < advice.add.size(); ++i) {
     const auto& addition = advice.add[i];
@@ -77,7 +78,7 @@ std::string AdvicePage(const std::string& name, const DtrSet& set, const advise:
                     fmt::format("{} -> {}", addition.poor_before, addition.poor_after)});
   }
   if (!rows.empty()) {
-    page.Table({"order", "where", "in no photo", "nearest photo, degrees", "poor places"}, rows);
+    page.Table({"order", "where", "in no photo", "nearest photo, degrees", "poor positions"}, rows);
   }
   page.Section("Cameras that add nothing");
   if (advice.redundant.empty()) page.Paragraph("Every camera shows something of its own.");
@@ -89,7 +90,7 @@ std::string AdvicePage(const std::string& name, const DtrSet& set, const advise:
     page.Table({"camera", "shown by those that stay"}, rows);
   }
   AddMap(page, set, advice);
-  page.Section("All places");
+  page.Section("All positions");
   std::vector<advise::Place> places = advice.places;
   std::stable_sort(places.begin(), places.end(),
                    [](const auto& a, const auto& b) { return a.poor > b.poor; });

@@ -10,11 +10,11 @@
 namespace dtr::viewer {
 namespace {
 
-constexpr double kRadPerWindow = std::numbers::pi;  // dragging across the picture's longer side
+constexpr double kRadPerWindow = std::numbers::pi;  // dragging across the image's longer side
 constexpr double kScrollFactor = 0.85;              // of the distance that is left after a step
 constexpr double kSpeedFactor = 1.25;               // per step of the wheel
 constexpr double kSceneSizesPerSecond = 0.3;
-constexpr double kLeastSpeedShare = 1e-4, kMostSpeedShare = 100;  // of the scene's size per second
+constexpr double kMinSpeedShare = 1e-4, kMaxSpeedShare = 100;  // of the scene's size per second
 constexpr double kGlideSeconds = 0.35;
 constexpr double kTapSeconds = 1.0 / 30;     // what a short press of a fly key moves
 constexpr double kLongestStepSeconds = 0.1;  // a slow frame must not throw the camera far
@@ -77,8 +77,7 @@ double SceneSize(const Surroundings& surroundings) {
 
 Bounds Foreground(const Surroundings& surroundings) {
   const Bounds& bounds = surroundings.bounds;
-  const Eigen::Vector3d reach =
-      Eigen::Vector3d::Constant(kMostSceneSizes * SceneSize(surroundings));
+  const Eigen::Vector3d reach = Eigen::Vector3d::Constant(kMaxSceneSizes * SceneSize(surroundings));
   const Bounds foreground{bounds.min.cwiseMax(surroundings.center - reach),
                           bounds.max.cwiseMin(surroundings.center + reach)};
   return bounds.empty() || foreground.empty() ? bounds : foreground;
@@ -103,7 +102,7 @@ Controller::Controller(Surroundings surroundings, const Eigen::Vector3d& up, int
 
 void Controller::set_fly_speed(double units_per_s) {
   const double size = scene_size();
-  fly_speed_ = std::clamp(units_per_s, kLeastSpeedShare * size, kMostSpeedShare * size);
+  fly_speed_ = std::clamp(units_per_s, kMinSpeedShare * size, kMaxSpeedShare * size);
 }
 
 void Controller::Handle(const InputEvent& event) {

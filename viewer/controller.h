@@ -14,7 +14,7 @@ namespace dtr::viewer {
 
 /// What the controller knows of the scene. The views must outlive it.
 struct Surroundings {
-  std::vector<const View*> views;  ///< source views: what pictures are drawn from
+  std::vector<const View*> views;  ///< source views: what images are drawn from
   /// Input cameras, those of held-out photos too, in the order in which they are stepped through.
   std::vector<const View*> cameras;
   Bounds bounds;
@@ -27,17 +27,17 @@ Surroundings SurroundingsOf(const DtrSet& set, size_t frame = 0);
 /// nothing): bounds can reach to the horizon.
 double SceneSize(const Surroundings& surroundings);
 
-/// What to look at: the bounds without what lies further from the middle than kMostSceneSizes
+/// What to look at: the bounds without what lies further from the middle than kMaxSceneSizes
 /// times the scene's size along an axis, as sky and horizon do; all of them where nothing is left.
 Bounds Foreground(const Surroundings& surroundings);
-inline constexpr double kMostSceneSizes = 4;
+inline constexpr double kMaxSceneSizes = 4;
 
 /// The camera of a window and how it moves. Left drag: orbit about the point under the cursor.
 /// Right drag: look around. Middle drag: pan. Wheel: towards the point under the cursor; while
 /// flying or looking, the speed of flight. Fly keys: fly.
 class Controller {
  public:
-  /// Plane z of what the picture shows at a pixel; none where it shows nothing.
+  /// Plane z of what the image shows at a pixel; none where it shows nothing.
   using DepthAt = std::function<std::optional<double>(const Eigen::Vector2d& pixel)>;
 
   /// Starts at the first source view's camera, or nowhere in particular without one. `up`: WorldUp,
@@ -51,8 +51,8 @@ class Controller {
   void set_fly_speed(double units_per_s);
   Eigen::Vector3d up() const { return up_; }
   const Surroundings& surroundings() const { return surroundings_; }
-  /// Another instant of the same scene: the camera stays where it is and goes on as it went, and up
-  /// stays up.
+  /// Another time step of the same scene: the camera stays where it is and goes on as it went, and
+  /// up stays up.
   void SetSurroundings(Surroundings surroundings) { surroundings_ = std::move(surroundings); }
 
   void Handle(const InputEvent& event);
@@ -77,7 +77,7 @@ class Controller {
   /// Index into `cameras` of the one whose place this is just now; none between them.
   std::optional<size_t> at_view() const;
   std::optional<size_t> nearest_view() const;
-  /// Index into `views`: the nearest that pictures are drawn from.
+  /// Index into `views`: the nearest that images are drawn from.
   std::optional<size_t> nearest_source() const;
   double scene_size() const { return SceneSize(surroundings_); }
 

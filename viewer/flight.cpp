@@ -20,7 +20,7 @@ void Flight::MoveWorld(const Eigen::Vector3d& origin_shift) {
 std::vector<NovelCamera> Flight::Frames(const PinholeCamera& like) const {
   if (keys_.empty()) return {};
   std::vector<NovelCamera> frames = keys_;
-  const int per_key = std::clamp(frames_per_key, 1, kMostFramesPerKey);
+  const int per_key = std::clamp(frames_per_key, 1, kMaxFramesPerKey);
   if (per_key > 1) {
     frames = PathThrough(keys_, static_cast<int>(keys_.size() - 1) * per_key + 1);
   }

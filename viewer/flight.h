@@ -10,7 +10,7 @@ namespace dtr::viewer {
 /// The path of a session of the viewer.
 class Flight {
  public:
-  static constexpr int kMostFramesPerKey = 240;
+  static constexpr int kMaxFramesPerKey = 240;
 
   const std::vector<NovelCamera>& keys() const { return keys_; }
   void AddKey(const NovelCamera& key) { keys_.push_back(key); }
@@ -20,11 +20,11 @@ class Flight {
   /// The world's origin moved by so much.
   void MoveWorld(const Eigen::Vector3d& origin_shift);
 
-  /// Frames from one key to the next, 1 to kMostFramesPerKey: with 1 the keys themselves are the
+  /// Frames from one key to the next, 1 to kMaxFramesPerKey: with 1 the keys themselves are the
   /// frames, else a smooth path through them, at an even speed.
   int frames_per_key = 24;
 
-  /// All frames with the lens of `like`, whose size is the picture's. Empty without a key.
+  /// All frames with the lens of `like`, whose size is the image's. Empty without a key.
   std::vector<NovelCamera> Frames(const PinholeCamera& like) const;
 
   /// Flies from the first frame on, or stops. Nothing happens without a key.

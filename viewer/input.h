@@ -13,7 +13,7 @@ inline constexpr int kFlyKeys = 6;
 struct ButtonEvent {
   Button button = Button::kLeft;
   bool pressed = false;
-  double x_px = 0, y_px = 0;  ///< of the picture
+  double x_px = 0, y_px = 0;  ///< of the image
 };
 struct MoveEvent {
   double x_px = 0, y_px = 0;

@@ -35,8 +35,8 @@ struct ViewFindings {
   double depth_share = 0;                ///< of its pixels that have depth
   std::optional<double> sigma_px;        ///< median of sigma in px of disparity
   std::optional<double> psnr_db;         ///< rendered without it, over what was seen
-  double coverage = 0;                   ///< of its picture, seen by the others
-  std::map<std::string, double> shares;  ///< of the picture, by the other views' names
+  double coverage = 0;                   ///< of its image, seen by the others
+  std::map<std::string, double> shares;  ///< of the image, by the other views' names
   ImageRgb8 photo, rendered, weights;    ///< small
 };
 
@@ -72,7 +72,7 @@ void RenderWithoutItself(const View& view, const View& loaded, ViewStream& strea
   const auto [width, height] =
       TargetSize(view.camera.width_px(), view.camera.height_px(), kSmallPx);
   const PinholeCamera small = view.camera.Resized(width, height);
-  // Depth no finer than the picture: the page is not to take an hour.
+  // Depth no finer than the image: the page is not to take an hour.
   options.resolution =
       std::max(options.resolution, view.camera.width_px() / view.depth_scale / width);
   stream.Hide({&view});
@@ -172,12 +172,12 @@ void AddMaps(report::HtmlReport& page, const DtrSet& set, const Findings& findin
              return error->second <= facts.error_limit_px ? "#2c9c4b" : "#d43b2f";
            }));
   page.Image(
-      "places by the number of views that have depth there: brighter is more, green is none; "
+      "positions by the number of views that have depth there: brighter is more, green is none; "
       "the same window as the map of cameras",
       findings.coverage);
 }
 
-/// The colour of a view in the pictures of weights.
+/// The colour of a view in the images of weights.
 report::Picture Swatch(const Rgb& colour, const std::string& name) {
   constexpr int kSwatchPx = 14;
   ImageRgb8 square(kSwatchPx, kSwatchPx, 3);
@@ -208,7 +208,7 @@ void AddContributions(report::HtmlReport& page, const DtrSet& set, const Finding
   for (const ViewFindings& found : findings.views) {
     for (const auto& [name, share] : found.shares) total[name] += share;
   }
-  // A view's own picture is drawn without it.
+  // A view's own image is drawn without it.
   const auto others = static_cast<double>(std::max<size_t>(2, findings.views.size()) - 1);
   for (const ViewFindings& found : findings.views) {
     rows.push_back({report::Picture{found.weights, "weights of " + found.view->name},
@@ -218,11 +218,11 @@ void AddContributions(report::HtmlReport& page, const DtrSet& set, const Finding
   }
   page.Section("Which view contributes where");
   page.Paragraph(
-      "Every view is rendered without its own photo. The picture mixes one colour per other view, "
+      "Every view is rendered without its own photo. The image mixes one colour per other view, "
       "that of the square beside its name, by their shares of each pixel; green is what none of "
       "them saw. The last column is what the view "
-      "itself gives to the pictures of all the others: one near 0 % could be left out.");
-  page.Table({"Shares", "Its colour", "In place of", "Largest shares of the picture",
+      "itself gives to the images of all the others: one near 0 % could be left out.");
+  page.Table({"Shares", "Its colour", "In place of", "Largest shares of the image",
               "Seen by the others", "Gives to the others"},
              rows);
 }

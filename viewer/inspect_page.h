@@ -23,7 +23,7 @@ struct StageCost {
 /// Everything but the views' pixels.
 struct InspectFacts {
   std::string name;
-  std::vector<Check> checks;               ///< the set's verdict; empty: not validated
+  std::vector<Check> checks;               ///< the set's validation result; empty: not validated
   std::map<std::string, double> error_px;  ///< held-out reprojection RMS by view name
   double error_limit_px = 0;               ///< above it a view is bad
   std::vector<StageCost> stages;

@@ -15,7 +15,7 @@ namespace dtr::viewer {
 namespace {
 
 constexpr double kMarginShare = 0.05;  // of the longer side
-constexpr int kMapWidthPx = 760, kMostMapHeightPx = 1200;
+constexpr int kMapWidthPx = 760, kMaxMapHeightPx = 1200;
 constexpr double kWedgeShare = 0.05;  // of the map's width: length of a camera
 constexpr int kSamplesAcross = 480;   // of a depth map
 
@@ -33,7 +33,7 @@ Ground GroundOf(const DtrSet& set) {
   }
   Ground ground;
   const Eigen::Vector3d up = WorldUp(set);
-  // Seen from above, looking down: LookAlong puts what the cameras look at at the top; of pictures
+  // Seen from above, looking down: LookAlong puts what the cameras look at at the top; of images
   // from the air what is at the top of most of them.
   const bool from_the_air = forward.normalized().dot(-up) >= kFromTheAir;
   const Pose from_above =
@@ -107,7 +107,7 @@ ImageRgb8 CoverageFromAbove::Picture(int views) const {
 std::string CameraMapSvg(const DtrSet& set, const Ground& ground,
                          const std::function<std::string(const View&)>& colour_of) {
   const Eigen::Vector2d size = ground.max - ground.min;
-  const double scale = std::min(kMapWidthPx / size.x(), kMostMapHeightPx / size.y());
+  const double scale = std::min(kMapWidthPx / size.x(), kMaxMapHeightPx / size.y());
   const double wedge = kWedgeShare * kMapWidthPx;
   std::string svg = fmt::format(
       "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0:.0f}\" height=\"{1:.0f}\" "

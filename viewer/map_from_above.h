@@ -14,7 +14,7 @@ namespace dtr::viewer {
 /// A window on the ground plane. The plane's axes are `right` and `down` (world, unit length,
 /// level); down is the mean direction in which the cameras look, turned: cameras stand below what
 /// they see. Where cameras look at right angles at the plane in which they stand, as from the air,
-/// that plane is level; down is then what is at the bottom of their pictures.
+/// that plane is level; down is then what is at the bottom of their images.
 struct Ground {
   Eigen::Vector3d right = Eigen::Vector3d::UnitX(), down = Eigen::Vector3d::UnitY();
   Eigen::Vector2d min = Eigen::Vector2d::Zero(), max = Eigen::Vector2d::Ones();  ///< scene units

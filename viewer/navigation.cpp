@@ -150,7 +150,7 @@ Pose ViewAll(const Bounds& bounds, std::span<const Pose> cams_from_world, const 
   const bool steep = forward.cross(up).norm() < std::sin(kPoleRad);
   const Pose at_middle = LookAlong(
       middle, forward, steep ? CommonAxis(cams_from_world, -Eigen::Vector3d::UnitY()) : up);
-  // How far back each corner asks the camera to go, on each side of the picture.
+  // How far back each corner asks the camera to go, on each side of the image.
   double back = 0;
   for (int corner = 0; corner < 8; ++corner) {
     const Eigen::Vector3d sign(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1);

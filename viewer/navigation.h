@@ -59,14 +59,14 @@ NovelCamera Between(const NovelCamera& from, const NovelCamera& to, double share
 std::optional<size_t> NearestView(std::span<const View* const> views, const Pose& cam_from_world,
                                   double scene_size);
 
-/// A pose from which all of `bounds` is inside the picture of `lens`. It looks at the middle along
+/// A pose from which all of `bounds` is inside the image of `lens`. It looks at the middle along
 /// the mean axis of the cameras, level with `up`; where the cameras look in all directions along
-/// the first one's. Where that is straight up or down, the top of the picture is that of most of
+/// the first one's. Where that is straight up or down, the top of the image is that of most of
 /// theirs.
 Pose ViewAll(const Bounds& bounds, std::span<const Pose> cams_from_world, const Eigen::Vector3d& up,
              const PinholeCamera& lens);
 
-/// Pose of a camera at `center` that looks along `forward` with `up` upwards in the picture.
+/// Pose of a camera at `center` that looks along `forward` with `up` upwards in the image.
 Pose LookAlong(const Eigen::Vector3d& center, const Eigen::Vector3d& forward,
                const Eigen::Vector3d& up);
 

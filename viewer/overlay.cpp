@@ -7,7 +7,7 @@
 namespace dtr::viewer {
 namespace {
 
-constexpr double kMostOfDisplay = 0.25;
+constexpr double kMaxOfDisplay = 0.25;
 
 }  // namespace
 
@@ -36,7 +36,7 @@ bool MayBeLaidOver(const std::array<Eigen::Vector2d, 4>& corners,
     const Eigen::Vector2d &a = corners[i], &b = corners[(i + 1) % 4];
     twice_area += a.x() * b.y() - b.x() * a.y();
   }
-  return std::abs(twice_area) <= 2 * kMostOfDisplay * display_px.prod();
+  return std::abs(twice_area) <= 2 * kMaxOfDisplay * display_px.prod();
 }
 
 }  // namespace dtr::viewer

@@ -1,4 +1,4 @@
-// viewer/overlay.h -- what may lie over a picture: names that can be read, photos that hide little.
+// viewer/overlay.h -- what may lie over an image: names that can be read, photos that hide little.
 #pragma once
 #include <Eigen/Geometry>
 #include <array>

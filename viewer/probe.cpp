@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kPixelVariance = 1.0 / 12;  // of a position anywhere in a pixel
 
-/// The camera of a single pixel of a picture.
+/// The camera of a single pixel of an image.
 PinholeCamera PixelCamera(const PinholeCamera& camera, int x, int y) {
   return {1, 1, camera.fx_px(), camera.fy_px(), camera.cx_px() - x, camera.cy_px() - y};
 }

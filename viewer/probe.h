@@ -34,7 +34,7 @@ struct Probe {
   std::vector<ProbeView> views;  ///< those with a share, largest first
 };
 
-/// Of the pixel (x, y) of a picture that shows a surface at plane z `depth_z` > 0 there. The views
+/// Of the pixel (x, y) of an image that shows a surface at plane z `depth_z` > 0 there. The views
 /// must be loaded.
 Probe ProbePixel(const RenderScene& scene, const NovelCamera& novel, const RenderOptions& options,
                  int x, int y, double depth_z, const SigmaOf& sigma_of);

@@ -1,4 +1,4 @@
-// viewer/shown.h -- what the pixels of the picture mean.
+// viewer/shown.h -- what the pixels of the image mean.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -27,7 +27,7 @@ const char* LegendOf(Shown shown);
 using Rgb = std::array<std::uint8_t, 3>;
 
 /// The colours by which kWeights and wireframes tell views apart: of one set always the same,
-/// whatever is drawn from. Views of one name at several instants share one. Neighbours differ.
+/// whatever is drawn from. Views of one name at several time steps share one. Neighbours differ.
 class ViewColours {
  public:
   ViewColours() = default;
@@ -48,8 +48,8 @@ struct Drawn {
   const ViewColours& colours;
 };
 
-/// A false-colour picture; unseen pixels have report::kHoleColor. Not for kColour, which is the
-/// picture itself, nor for kWireframe, which keeps meshes (viewer/wireframe.h).
+/// A false-colour image; unseen pixels have report::kHoleColor. Not for kColour, which is the
+/// image itself, nor for kWireframe, which keeps meshes (viewer/wireframe.h).
 ImageRgb8 FalseColour(Shown shown, const Drawn& drawn, const SigmaOf& sigma_of);
 
 }  // namespace dtr::viewer

@@ -18,7 +18,7 @@ class Stopwatch {
   Clock::time_point start_ = Clock::now();
 };
 
-/// Whether a camera, or whatever a picture is of, rests. The very first picture need not wait.
+/// Whether a camera, or whatever an image is of, rests. The very first image need not wait.
 class Stillness {
  public:
   void Moved() {

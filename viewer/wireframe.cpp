@@ -10,14 +10,14 @@ namespace dtr::viewer {
 namespace {
 
 constexpr int kRowsTogether = 64;
-constexpr int kPictureShare = 3;  // one part in so many of the picture's brightness stays
+constexpr int kPictureShare = 3;  // one part in so many of the image's brightness stays
 
 RenderOptions MeshOptions(RenderOptions options) {
   if (options.method != RenderMethod::kDeferred) options.mesh_tolerance_px = 0;
   return options;
 }
 
-/// An end of an edge in the picture: pixels, and 1/z, which is straight along a projected line.
+/// An end of an edge in the image: pixels, and 1/z, which is straight along a projected line.
 struct End {
   Eigen::Vector3d at{0, 0, 0};  ///< x, y, 1/z
   bool in_front = false;
@@ -30,7 +30,7 @@ End Project(const NovelCamera& camera, const Eigen::Vector3d& p_in_world) {
   return {{pixel->x(), pixel->y(), 1 / p_in_cam.z()}, true};
 }
 
-/// Rows [first, end) of the picture that is drawn over.
+/// Rows [first, end) of the image that is drawn over.
 struct Rows {
   int first = 0, end = 0;
 };
@@ -96,7 +96,7 @@ std::vector<Eigen::Vector3d> PointsOf(const AdaptiveMesh& mesh, const View& view
   for (const AdaptiveMesh::Vertex& vertex : mesh.vertices) {
     const Eigen::Vector3d ray =
         camera.RayFromPixel({mesh.DepthPixel(vertex.x), mesh.DepthPixel(vertex.y)});
-    // What lies at infinity or beyond is drawn nowhere: PixelFromCam refuses it.
+    // What lies at infinity or beyond is drawn nowhere: PixelFromCam rejects it.
     points.push_back(world_from_cam * (ray / static_cast<double>(vertex.inverse_depth)));
   }
   return points;

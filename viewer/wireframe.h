@@ -1,4 +1,4 @@
-// viewer/wireframe.h -- the reduced meshes that pictures start from, as lines over the picture.
+// viewer/wireframe.h -- the reduced meshes that images start from, as lines over the image.
 #pragma once
 #include <Eigen/Core>
 #include <cstdint>
@@ -11,11 +11,11 @@
 
 namespace dtr::viewer {
 
-/// Draws wireframes and keeps the meshes of the last picture's views, which must not die before the
-/// next call; pixels that were read anew make new ones.
+/// Draws wireframes and keeps the meshes of the last image's views, which must not die before the
+/// next call; pixels that were read again make new ones.
 class Wireframe {
  public:
-  /// The picture, darkened, and over it the edges of its views' meshes (SPEC 5.1), each view in its
+  /// The image, darkened, and over it the edges of its views' meshes (SPEC 5.1), each view in its
   /// colour, the nearest view's on top. An edge is hidden where it lies more than the view's
   /// Delta behind the surface shown, in 1/z. The two passes draw full grids: theirs are reduced
   /// with no tolerance, so that only blocks which are flat to the digit are joined. Splats have no

@@ -14,14 +14,14 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
 // A turn that is less well known says little of what is up.
-constexpr double kMostTurnSigmaDeg = 5;  // as for taking axes from GPS: calib/scale.h
+constexpr double kMaxTurnSigmaDeg = 5;  // as for taking axes from GPS: calib/scale.h
 
 // Mean square sine between x axes and the level, by the axes that agree: beyond that cameras are
 // rolled at will. The axes' own spread in the level weighs against the other evidence times this.
-const double kMostRoll = std::pow(std::sin(12 * kDegree), 2);
+const double kMaxRoll = std::pow(std::sin(12 * kDegree), 2);
 constexpr double kWeightOfPrior = 0.01;
 // Least absolute deviations by reweighted squares: sines below this count alike.
-constexpr double kLeastSine = 0.02;
+constexpr double kMinSine = 0.02;
 constexpr int kReweightings = 20;
 // Cosine to the vertical: 75 degrees and more from it, it tells no side.
 constexpr double kTellsSide = 0.26;
@@ -43,7 +43,7 @@ std::optional<StandingPlane> PlaneOf(std::span<const Pose> cams_from_world,
                                      const Eigen::Vector3d& scene_center) {
   // Off the plane in shares of its shorter axis, that in shares of its longer one, and this in
   // shares of the way to the scene.
-  constexpr double kMostOffPlane = 0.2, kLeastAcross = 0.15, kLeastSpread = 1e-3;
+  constexpr double kMaxOffPlane = 0.2, kMinAcross = 0.15, kMinSpread = 1e-3;
   const auto count = static_cast<double>(cams_from_world.size());
   if (count < 4) return std::nullopt;
   StandingPlane plane;
@@ -56,23 +56,23 @@ std::optional<StandingPlane> PlaneOf(std::span<const Pose> cams_from_world,
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(spread);  // ascending
   const Eigen::Vector3d size = axes.eigenvalues().cwiseMax(0).cwiseSqrt();
-  if (!(size[0] <= kMostOffPlane * size[1]) || !(size[1] >= kLeastAcross * size[2])) {
+  if (!(size[0] <= kMaxOffPlane * size[1]) || !(size[1] >= kMinAcross * size[2])) {
     return std::nullopt;
   }
   plane.normal = axes.eigenvectors().col(0);
   plane.spread = size[2];
-  if (!(plane.spread > kLeastSpread * (scene_center - plane.middle).norm())) return std::nullopt;
+  if (!(plane.spread > kMinSpread * (scene_center - plane.middle).norm())) return std::nullopt;
   return plane;
 }
 
 /// True where cameras look straight at the plane that they stand in, and see little more than where
-/// they stand: pictures from the air. A rig before a wall stands in a plane, too, but sees more.
+/// they stand: images from the air. A rig before a wall stands in a plane, too, but sees more.
 bool LookAtTheirPlane(const StandingPlane& plane, const Eigen::Vector3d& mean_forward,
                       const Eigen::Vector3d& scene_center) {
-  constexpr double kLeastSpreadOverDistance = 0.4;
+  constexpr double kMinSpreadOverDistance = 0.4;
   const double distance = std::abs(plane.normal.dot(scene_center - plane.middle));
   return std::abs(plane.normal.dot(mean_forward)) >= kFromTheAir &&
-         plane.spread >= kLeastSpreadOverDistance * distance;
+         plane.spread >= kMinSpreadOverDistance * distance;
 }
 
 /// All that is known of up but the level of x axes.
@@ -109,8 +109,7 @@ std::optional<Eigen::Vector3d> KnownUp(const DtrSet& set) {
   for (const auto& scale : scales) {
     if (!scale.is_object() || scale.value("axes", nlohmann::json()) != "east, north, up") continue;
     const auto turn = scale.value("turn_sigma_deg", nlohmann::json());
-    if (turn.is_number() && turn.get<double>() <= kMostTurnSigmaDeg)
-      return Eigen::Vector3d::UnitZ();
+    if (turn.is_number() && turn.get<double>() <= kMaxTurnSigmaDeg) return Eigen::Vector3d::UnitZ();
   }
   return std::nullopt;
 }
@@ -126,7 +125,7 @@ Eigen::Vector3d UpOfCameras(std::span<const Pose> cams_from_world,
     double weights = 0;
     for (const Pose& pose : cams_from_world) {
       const Eigen::Vector3d x = AxisInWorld(pose, Eigen::Vector3d::UnitX());
-      const double weight = 1 / std::max(std::abs(x.dot(up)), kLeastSine);
+      const double weight = 1 / std::max(std::abs(x.dot(up)), kMinSine);
       squares += weight * x * x.transpose();
       weights += weight;
     }
@@ -136,8 +135,8 @@ Eigen::Vector3d UpOfCameras(std::span<const Pose> cams_from_world,
     up = axes.eigenvectors().col(0);
     roll = up.dot(squares * up);
   }
-  if (!(roll <= kMostRoll)) return prior;
-  // Pictures from the air on one line: what their images call up is a direction of the compass and
+  if (!(roll <= kMaxRoll)) return prior;
+  // Images from the air on one line: what their images call up is a direction of the compass and
   // does not tell the side. That is then where they do not look.
   const Eigen::Vector3d side = std::abs(up.dot(prior)) >= kTellsSide
                                    ? prior

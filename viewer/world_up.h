@@ -8,7 +8,7 @@
 
 namespace dtr::viewer {
 
-/// Cosine to straight down, 35 degrees: cameras that look down more steeply take pictures from the
+/// Cosine to straight down, 35 degrees: cameras that look down more steeply take images from the
 /// air, others what lies ahead of them.
 inline constexpr double kFromTheAir = 0.8191520442889918;
 
@@ -36,7 +36,7 @@ Eigen::Vector3d UpOfCameras(std::span<const Pose> cams_from_world,
                             const Eigen::Vector3d& scene_center);
 
 /// What is up in most of the images (unit length, world frame), whatever is up in the world: where
-/// cameras look down it is the top of their pictures. Without a common one it is the first one's.
+/// cameras look down it is the top of their images. Without a common one it is the first one's.
 Eigen::Vector3d UpInImages(std::span<const Pose> cams_from_world);
 
 }  // namespace dtr::viewer

@@ -13,7 +13,7 @@
 namespace dtr::calib {
 namespace {
 
-constexpr int kMostCornersPerSide = 1000;
+constexpr int kMaxCornersPerSide = 1000;
 
 // In the order of OpenCV's PREDEFINED_DICTIONARY_NAME.
 constexpr const char* kDictionaries[] = {
@@ -24,7 +24,7 @@ constexpr const char* kDictionaries[] = {
     "DICT_ARUCO_ORIGINAL", "DICT_APRILTAG_16h5", "DICT_APRILTAG_25h9", "DICT_APRILTAG_36h10",
     "DICT_APRILTAG_36h11"};
 
-[[noreturn]] void RefuseText(const std::string& text, const std::string& what) {
+[[noreturn]] void RejectText(const std::string& text, const std::string& what) {
   throw UsageError(
       fmt::format("--board {}: {}; expected chessboard:WxH:SQUARE (W x H inner corners) or "
                   "charuco:WxH:SQUARE:MARKER[:DICTIONARY][:inverted] (W x H squares)",
@@ -81,9 +81,9 @@ void CheckBoard(const Board& board, const std::string& where) {
   // OpenCV finds no chessboard with fewer than 3.
   const int least = board.kind == Board::Kind::kChessboard ? 3 : 2;
   for (const int side : {board.columns, board.rows}) {
-    if (side < least || side > kMostCornersPerSide) {
+    if (side < least || side > kMaxCornersPerSide) {
       throw Error(fmt::format("{}: expected {} to {} inner corners per side, found {} x {}", where,
-                              least, kMostCornersPerSide, board.columns, board.rows));
+                              least, kMaxCornersPerSide, board.columns, board.rows));
     }
   }
   if (!(board.square > 0) || !std::isfinite(board.square)) {
@@ -108,26 +108,26 @@ Board BoardFromText(const std::string& text) {
     board.kind = Board::Kind::kCharuco;
     board.dictionary = "DICT_4X4_50";
   } else if (parts[0] != "chessboard") {
-    RefuseText(text, "unknown kind '" + parts[0] + "'");
+    RejectText(text, "unknown kind '" + parts[0] + "'");
   }
   const bool charuco = board.kind == Board::Kind::kCharuco;
-  if (parts.size() < (charuco ? 4u : 3u)) RefuseText(text, "too few parts");
+  if (parts.size() < (charuco ? 4u : 3u)) RejectText(text, "too few parts");
   if (!SizeFrom(parts[1], &board.columns, &board.rows)) {
-    RefuseText(text, "no size in '" + parts[1] + "'");
+    RejectText(text, "no size in '" + parts[1] + "'");
   }
   const auto square = LengthFrom(parts[2]);
-  if (!square) RefuseText(text, "no length in '" + parts[2] + "'");
+  if (!square) RejectText(text, "no length in '" + parts[2] + "'");
   board.square = square->value;
   board.metric = square->has_unit;
   size_t next = 3;
   if (charuco) {
-    if (std::min(board.columns, board.rows) < 0) RefuseText(text, "no size in '" + parts[1] + "'");
+    if (std::min(board.columns, board.rows) < 0) RejectText(text, "no size in '" + parts[1] + "'");
     board.columns -= 1;  // squares to inner corners
     board.rows -= 1;
     const auto marker = LengthFrom(parts[next++]);
-    if (!marker) RefuseText(text, "no marker size in '" + parts[3] + "'");
+    if (!marker) RejectText(text, "no marker size in '" + parts[3] + "'");
     if (marker->has_unit && !square->has_unit) {
-      RefuseText(text, "a marker with a unit on a square without one");
+      RejectText(text, "a marker with a unit on a square without one");
     }
     board.marker_share = marker->has_unit ? marker->value / square->value : marker->value;
     if (next < parts.size() && parts[next] != "inverted") board.dictionary = parts[next++];
@@ -136,7 +136,7 @@ Board BoardFromText(const std::string& text) {
       ++next;
     }
   }
-  if (next != parts.size()) RefuseText(text, "unexpected '" + parts[next] + "'");
+  if (next != parts.size()) RejectText(text, "unexpected '" + parts[next] + "'");
   try {
     CheckBoard(board, "--board " + text);
   } catch (const Error& error) {

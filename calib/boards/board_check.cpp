@@ -12,7 +12,7 @@
 namespace dtr::calib {
 namespace {
 
-constexpr int kFewestVotes = 2;  // one photo may be of something else
+constexpr int kMinVotes = 2;  // one photo may be of something else
 constexpr double kSameCornerPx = 2;
 
 bool SameSides(const GridSize& a, const GridSize& b) {
@@ -171,7 +171,7 @@ std::string DescribeOtherBoard(const Board& given, std::span<const BoardVerdict>
                        [&](const auto& a, const auto& b) { return votes_for(a) < votes_for(b); });
   if (most == others.end()) return "";
   const auto votes = static_cast<size_t>(votes_for(*most));
-  if (votes < std::min<size_t>(kFewestVotes, verdicts.size()) || 2 * votes < others.size()) {
+  if (votes < std::min<size_t>(kMinVotes, verdicts.size()) || 2 * votes < others.size()) {
     return "";
   }
   Board shown = most->other;

@@ -15,8 +15,8 @@ namespace {
 constexpr double kRoundingLevels = 0.2887;   // of whole grey levels: 1 / sqrt(12)
 constexpr double kMedianOfNormal = 0.67449;  // of |x| for a standard normal x
 constexpr double kMaskGain = 6;              // root of the sum of squares of Immerkaer's mask
-constexpr double kLeastConditioned = 1e-3;   // smaller over larger eigenvalue: an edge, no corner
-constexpr size_t kFewestNoisyCorners = 4;
+constexpr double kMinConditioned = 1e-3;     // smaller over larger eigenvalue: an edge, no corner
+constexpr size_t kMinNoisyCorners = 4;
 
 Eigen::Vector2d GradientAt(const Grid<std::uint8_t>& grey, int x, int y) {
   return {0.5 * (grey(x + 1, y) - grey(x - 1, y)), 0.5 * (grey(x, y + 1) - grey(x, y - 1))};
@@ -53,7 +53,7 @@ std::optional<double> SquaredGain(const Grid<std::uint8_t>& grey, const Eigen::V
   }
   const double half_trace = 0.5 * normal.trace();
   const double spread = std::sqrt(std::max(0.0, half_trace * half_trace - normal.determinant()));
-  if (!(half_trace - spread > kLeastConditioned * (half_trace + spread))) return {};
+  if (!(half_trace - spread > kMinConditioned * (half_trace + spread))) return {};
   const Eigen::Matrix2d inverse = normal.inverse();
   double sum = 0;
   for (int y = 0; y < side + 2; ++y) {
@@ -98,7 +98,7 @@ double CornerNoise(const Grid<std::uint8_t>& grey, std::span<const BoardCorner> 
       gains.push_back(std::sqrt(0.5 * *gain));
     }
   }
-  if (gains.size() < kFewestNoisyCorners) return std::numeric_limits<double>::quiet_NaN();
+  if (gains.size() < kMinNoisyCorners) return std::numeric_limits<double>::quiet_NaN();
   return PixelNoise(grey, corners) * UpperMedian(gains);
 }
 

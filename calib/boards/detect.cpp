@@ -17,7 +17,7 @@ namespace dtr::calib {
 namespace {
 
 constexpr int kSmallestHalfWindowPx = 2;
-constexpr size_t kFewestCorners = 4;  // a homography needs as many
+constexpr size_t kMinCorners = 4;  // a homography needs as many
 // Of the way to the next corner; more, and the window sees that corner's edges too.
 constexpr double kWindowShare = 0.45;
 
@@ -133,10 +133,10 @@ Detection DetectBoard(const Grid<std::uint8_t>& grey, const Board& board,
     detection.reason = "OpenCV's detector gave up: " + error.err;
     return detection;
   }
-  if (charuco && (found.size() < kFewestCorners || !SpanAPlane(found, board))) {
+  if (charuco && (found.size() < kMinCorners || !SpanAPlane(found, board))) {
     detection.reason = fmt::format("expected at least {} corners of the board, found {}",
-                                   kFewestCorners, found.size());
-    if (found.size() >= kFewestCorners) detection.reason += " on one line";
+                                   kMinCorners, found.size());
+    if (found.size() >= kMinCorners) detection.reason += " on one line";
     return detection;
   }
   if (found.empty()) {

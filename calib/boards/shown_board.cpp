@@ -21,11 +21,11 @@ namespace {
 
 constexpr double kIntoQuadrant = 0.3;   // of the way to the next corners, along both
 constexpr double kContrastShare = 0.4;  // of the seed's: shading and blur
-constexpr double kLeastContrast = 15;   // grey levels
+constexpr double kMinContrast = 15;     // grey levels
 constexpr double kFarthestMove = 0.2;   // of the spacing, by refinement
 constexpr double kLeastAngle = 0.5;     // sine, between the two directions of the lattice
 constexpr double kLineShare = 0.5;      // of the longest line; shorter ones are not the board's
-constexpr size_t kMostCorners = 10000;
+constexpr size_t kMaxCorners = 10000;
 constexpr int kCandidates = 1000, kSeeds = 40, kNeighbours = 8;
 constexpr int kSmallestBoard = 3;  // corners per side
 
@@ -80,10 +80,10 @@ double Sine(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
 
 // Grows a lattice from one corner to all that hang together with it.
 std::map<std::pair<int, int>, Node> Grown(const Grid<std::uint8_t>& grey, const Node& seed) {
-  const double least = std::max(kLeastContrast, kContrastShare * SaddleContrast(grey, seed));
+  const double least = std::max(kMinContrast, kContrastShare * SaddleContrast(grey, seed));
   std::map<std::pair<int, int>, Node> nodes{{{0, 0}, seed}};
   std::deque<std::pair<int, int>> open{{0, 0}};
-  while (!open.empty() && nodes.size() < kMostCorners) {
+  while (!open.empty() && nodes.size() < kMaxCorners) {
     const auto [column, row] = open.front();
     open.pop_front();
     const Node from = nodes.at({column, row});
@@ -144,7 +144,7 @@ std::optional<Node> SeedAt(const Grid<std::uint8_t>& grey, const Eigen::Vector2d
   std::partial_sort(ways.begin(), ways.begin() + static_cast<long>(count), ways.end(),
                     [](const auto& a, const auto& b) { return a.norm() < b.norm(); });
   std::optional<Node> best;
-  double most = kLeastContrast;
+  double most = kMinContrast;
   for (size_t i = 0; i < count; ++i) {
     for (size_t j = 0; j < i; ++j) {
       if (Sine(ways[i], ways[j]) < kLeastAngle) continue;
@@ -180,10 +180,10 @@ std::optional<ShownChessboard> FindChessboard(const Grid<std::uint8_t>& grey) {
 
 namespace {
 
-constexpr int kMostSquares = 30;       // per row of a ChArUco board
-constexpr size_t kFewestMarkers = 6;   // a homography takes 4
+constexpr int kMaxSquares = 30;        // per row of a ChArUco board
+constexpr size_t kMinMarkers = 6;      // a homography takes 4
 constexpr double kInlierShare = 0.25;  // of a marker's side
-constexpr double kLeastInliers = 0.8;  // of the markers
+constexpr double kMinInliers = 0.8;    // of the markers
 
 struct SeenMarkers {
   std::vector<int> ids;
@@ -232,9 +232,9 @@ double InlierShare(const SeenMarkers& seen, int columns, bool first_white) {
 }
 
 void FindLayout(const SeenMarkers& seen, ShownMarkers& shown) {
-  if (seen.ids.size() < kFewestMarkers) return;
-  double most = kLeastInliers;
-  for (int columns = 2; columns <= kMostSquares; ++columns) {
+  if (seen.ids.size() < kMinMarkers) return;
+  double most = kMinInliers;
+  for (int columns = 2; columns <= kMaxSquares; ++columns) {
     for (const bool first_white : {false, true}) {
       const double share = InlierShare(seen, columns, first_white);
       if (share <= most) continue;

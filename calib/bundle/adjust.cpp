@@ -13,9 +13,9 @@
 #include "calib/bundle/gauge.h"
 #include "calib/bundle/lens_params.h"
 #include "calib/bundle/normalised.h"
+#include "calib/bundle/observation_rows.h"
 #include "calib/bundle/priors.h"
 #include "calib/bundle/rig_adjust.h"
-#include "calib/bundle/sight_rows.h"
 #include "calib/solve/board_start.h"
 #include "calib/solve/solver_ends.h"
 #include "dtr/base/error.h"
@@ -25,10 +25,10 @@ namespace {
 
 constexpr double kSameScale = 0.05;  // relative change at which the robust loss is settled
 constexpr double kCauchySigmas = 2;  // scale of the robust loss
-constexpr int kMostRobustPasses = 5, kMostOutlierPasses = 4;
+constexpr int kMaxRobustPasses = 5, kMaxOutlierPasses = 4;
 constexpr size_t kDenseImages = 100;  // up to here the cameras' system is solved as a dense one
 
-[[noreturn]] void Refuse(const std::string& what) { throw Error("bundle adjustment: " + what); }
+[[noreturn]] void Reject(const std::string& what) { throw Error("bundle adjustment: " + what); }
 
 std::vector<Eigen::Vector2d> ResidualsOf(const Bundle& bundle, const Normalised& n) {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
@@ -41,15 +41,15 @@ std::vector<Eigen::Vector2d> ResidualsOf(const Bundle& bundle, const Normalised&
   return residuals;
 }
 
-// Sights nearer than `limit_px` to their predictions.
+// Observations nearer than `limit_px` to their predictions.
 std::vector<bool> Within(const std::vector<Eigen::Vector2d>& residuals, double limit_px) {
   std::vector<bool> within;
   for (const Eigen::Vector2d& r : residuals) within.push_back(r.allFinite() && r.norm() < limit_px);
   return within;
 }
 
-// How many of these sights each point has.
-std::vector<int> SightsOfPoints(const Bundle& bundle, const std::vector<bool>& counts) {
+// How many of these observations each point has.
+std::vector<int> ObservationsOfPoints(const Bundle& bundle, const std::vector<bool>& counts) {
   std::vector<int> sights(bundle.points.size());
   for (size_t i = 0; i < counts.size(); ++i) {
     sights[static_cast<size_t>(bundle.observations[i].point)] += counts[i];
@@ -57,20 +57,21 @@ std::vector<int> SightsOfPoints(const Bundle& bundle, const std::vector<bool>& c
   return sights;
 }
 
-// What a point that moves to where its `sights` want it leaves of their residuals: of two sights'
-// four coordinates one is left, which both share, so that their lengths follow a normal law of one
-// dimension, and the third smallest of them is smaller still than the share of the squares says.
+// What a point that moves to where its `observations` want it leaves of their residuals: of two
+// observations' four coordinates one is left, which both share, so that their lengths follow a
+// normal law of one dimension, and the third smallest of them is smaller still than the share of
+// the squares says.
 double ShareOfLength(int sights) {
   constexpr double kOfTwo = 0.338;  // 0.4307 / sqrt(2) over 0.9005: lower terciles of the two laws
   return sights == 2 ? kOfTwo : std::sqrt(1 - 1.5 / sights);
 }
 
-// Standard deviation of a sight's coordinate. Without regard to what points take up, tracks of two
-// would make it far too small; under the robust loss their points would then settle on one of the
-// two sights, and make it smaller still.
+// Standard deviation of an observation's coordinate. Without regard to what points take up, tracks
+// of two would make it far too small; under the robust loss their points would then settle on one
+// of the two observations, and make it smaller still.
 double SigmaOf(const Bundle& bundle, const std::vector<Eigen::Vector2d>& residuals) {
   const std::vector<int> sights =
-      SightsOfPoints(bundle, Within(residuals, std::numeric_limits<double>::infinity()));
+      ObservationsOfPoints(bundle, Within(residuals, std::numeric_limits<double>::infinity()));
   std::vector<double> lengths;
   for (size_t i = 0; i < residuals.size(); ++i) {
     const int of_point = sights[static_cast<size_t>(bundle.observations[i].point)];
@@ -78,11 +79,11 @@ double SigmaOf(const Bundle& bundle, const std::vector<Eigen::Vector2d>& residua
       lengths.push_back(residuals[i].norm() / ShareOfLength(of_point));
     }
   }
-  if (lengths.empty()) Refuse("expected points in front of the cameras that see them, found none");
+  if (lengths.empty()) Reject("expected points in front of the cameras that see them, found none");
   return std::max(RobustSigma(std::move(lengths)), kPrecisionPx);
 }
 
-// Ways to turn, move and scale everything that sights do not tell, and priors leave open.
+// Ways to turn, move and scale everything that observations do not tell, and priors leave open.
 double OpenGauge(const AdjustOptions& options) {
   const double scale = options.distances.empty() ? 1 : 0;
   switch (options.positions.size()) {
@@ -122,8 +123,8 @@ double CameraUnknowns(const Bundle& bundle, const std::vector<bool>& image_used,
 // `sigma_px`: what priors were weighted with.
 void Describe(const Bundle& start, const std::vector<Eigen::Vector2d>& residuals, size_t rigs,
               const AdjustOptions& options, double sigma_px, Adjusted& out) {
-  // A sight that is alone in seeing its point is met whatever the cameras are.
-  const std::vector<int> sights = SightsOfPoints(out.bundle, out.used);
+  // A observation that is alone in seeing its point is met whatever the cameras are.
+  const std::vector<int> sights = ObservationsOfPoints(out.bundle, out.used);
   for (size_t i = 0; i < residuals.size(); ++i) {
     if (sights[static_cast<size_t>(out.bundle.observations[i].point)] < 2) out.used[i] = false;
   }
@@ -170,7 +171,7 @@ ceres::Solver::Options SolverOptions(size_t images, bool robust) {
   return options;
 }
 
-// One solve over the sights with used[i]; Cauchy's loss where a scale is given.
+// One solve over the observations with used[i]; Cauchy's loss where a scale is given.
 ceres::Solver::Summary Minimise(const Bundle& bundle, const AdjustOptions& options,
                                 const std::vector<bool>& used, double sigma_px, double cauchy_px,
                                 Normalised& n) {
@@ -219,7 +220,7 @@ ceres::Solver::Summary Minimise(const Bundle& bundle, const AdjustOptions& optio
   ceres::Solver::Summary summary;
   ceres::Solve(solver, &problem, &summary);
   progress.ThrowIfInterrupted();
-  if (!summary.IsSolutionUsable()) Refuse("the observations have no least-squares solution");
+  if (!summary.IsSolutionUsable()) Reject("the observations have no least-squares solution");
   n.FollowRig();
   return summary;
 }
@@ -258,13 +259,13 @@ bool MayGetTangential(const LensCamera& lens) {
 }
 
 bool Contradicts(const Adjusted& held, const Adjusted& free) {
-  constexpr double kMostSigmaGrowth = 1.5;
+  constexpr double kMaxSigmaGrowth = 1.5;
   constexpr double kLeastSights = 0.9;
-  // Errors of a sight's own size are no contradiction, however exact the photos are.
+  // Errors of an observation's own size are no contradiction, however exact the photos are.
   constexpr double kHarmlessSigmaPx = 0.5;
   // Where all was needed for the unknowns nothing is known of the noise, and none is supposed.
   const double noise = std::isfinite(free.sigma_px) ? free.sigma_px : 0;
-  const double most = std::max(kMostSigmaGrowth * noise, kHarmlessSigmaPx);
+  const double most = std::max(kMaxSigmaGrowth * noise, kHarmlessSigmaPx);
   return !(held.sigma_px <= most) || held.sights < kLeastSights * free.sights;
 }
 
@@ -301,27 +302,26 @@ Adjusted Solve(const Bundle& bundle, const AdjustOptions& options, Normalised& n
            summary.termination_type == ceres::USER_SUCCESS;
   };
   const double none = std::numeric_limits<double>::infinity();
-  for (int pass = 0; options.outlier_sigmas > 0 && pass < kMostRobustPasses; ++pass) {
-    solve(Within(residuals, none), kCauchySigmas * std::max(sigma, kLeastOutlierSigmaPx));
+  for (int pass = 0; options.outlier_sigmas > 0 && pass < kMaxRobustPasses; ++pass) {
+    solve(Within(residuals, none), kCauchySigmas * std::max(sigma, kMinOutlierSigmaPx));
     const double next = SigmaOf(bundle, residuals);
     const bool settled = std::abs(next - sigma) <= kSameScale * sigma ||
-                         std::max(next, sigma) <= kLeastOutlierSigmaPx;  // the same loss again
+                         std::max(next, sigma) <= kMinOutlierSigmaPx;  // the same loss again
     sigma = next;
     if (settled) break;
   }
   const auto limit = [&] {
-    return options.outlier_sigmas > 0
-               ? options.outlier_sigmas * std::max(sigma, kLeastOutlierSigmaPx)
-               : none;
+    return options.outlier_sigmas > 0 ? options.outlier_sigmas * std::max(sigma, kMinOutlierSigmaPx)
+                                      : none;
   };
   out.used = Within(residuals, limit());
-  for (int pass = 0; pass < kMostOutlierPasses; ++pass) {
+  for (int pass = 0; pass < kMaxOutlierPasses; ++pass) {
     out.converged = solve(out.used, 0);
     sigma = SigmaOf(bundle, residuals);
     std::vector<bool> used = Within(residuals, limit());
     out.unsettled = Differences(used, out.used);
     if (out.unsettled == 0) break;
-    if (pass + 1 < kMostOutlierPasses) out.used = std::move(used);
+    if (pass + 1 < kMaxOutlierPasses) out.used = std::move(used);
   }
   out.bundle = n.LocalAt(bundle);
   if (options.positions.empty() && !options.fix_poses && n.members.empty()) {
@@ -340,7 +340,7 @@ Adjusted Adjust(const Bundle& bundle, const AdjustOptions& options) {
   const Bundle start = IsTangential(options.lens) ? WithTangential(bundle) : bundle;
   Normalised n = Normalised::Around(start);
   if (IsPerImage(options.lens)) {
-    if (options.fix_poses) Refuse("principal points per image: expected poses that may move");
+    if (options.fix_poses) Reject("principal points per image: expected poses that may move");
     n.shift.assign(bundle.images.size(), {});
   }
   return Solve(start, options, n);
@@ -350,14 +350,14 @@ Adjusted AdjustRig(const Bundle& bundle, std::span<const RigImage> images,
                    const std::vector<Pose>& rig_from_world, const AdjustOptions& options) {
   if (images.size() != bundle.images.size() || options.fix_poses || !options.positions.empty() ||
       !options.distances.empty() || IsPerImage(options.lens) || IsTangential(options.lens)) {
-    Refuse(
-        "expected a rig with a place for every image, and no poses, priors, tangential "
+    Reject(
+        "expected a rig with a position for every image, and no poses, priors, tangential "
         "distortion or principal points of images beside it");
   }
   Bundle rigid = bundle;
   for (size_t i = 0; i < images.size(); ++i) {
     const auto frame = static_cast<size_t>(images[i].frame);
-    if (images[i].frame < 0 || frame >= rig_from_world.size()) Refuse("expected a known frame");
+    if (images[i].frame < 0 || frame >= rig_from_world.size()) Reject("expected a known frame");
     rigid.images[i].cam_from_world = images[i].cam_from_rig * rig_from_world[frame];
   }
   CheckBundle(rigid);

@@ -21,7 +21,7 @@ enum class LensFreedom {
   kTangential,
   /// All, and the principal point of every image by itself, as image stabilisers move it. It is
   /// held near its lens's by a standard deviation of kStabiliserShare of the image's long side, so
-  /// that what the sights cannot tell stays put. Not with poses that are fixed, nor for rigs.
+  /// that what the observations cannot tell stays put. Not with poses that are fixed, nor for rigs.
   kPrincipalPointPerImage,
   kTangentialPerImage,  ///< both of these
 };
@@ -49,7 +49,7 @@ inline constexpr double kKnownPrincipalPointShare = 0.02, kKnownAspectSigma = 0.
 
 struct AdjustOptions {
   LensFreedom lens = LensFreedom::kNoPrincipalPoint;
-  /// Sights farther from their predictions than this many standard deviations (robust: of the
+  /// Observations farther from their predictions than this many standard deviations (robust: of the
   /// better third) do not count; 0: all count.
   double outlier_sigmas = 5;
   bool fix_poses = false;  ///< only points (and lenses, as `lens` says) move
@@ -63,7 +63,7 @@ struct AdjustOptions {
   /// start, to this standard deviation of its logarithm. An orbit at one height leaves that open,
   /// too.
   double aspect_sigma = 0;
-  /// Asked after every iteration whether to stop: Interrupted is thrown then. Null: nobody asks.
+  /// Asked after every iteration whether to stop: Interrupted is thrown then. Null: unset.
   const Progress* progress = nullptr;
 };
 
@@ -82,36 +82,38 @@ bool MayGetTangential(const LensCamera& lens);
 struct Adjusted {
   Bundle bundle;
   LensFreedom lens = LensFreedom::kFixed;
-  std::vector<bool> used;  ///< per sight: false for outliers and sights without a pixel
+  std::vector<bool> used;  ///< per observation: false for outliers and observations without a pixel
   int sights = 0;          ///< used ones
-  /// Standard deviation of a used sight's coordinate, unknowns counted, lenses' and poses' as far
-  /// as they were free; infinite where there are as many unknowns as numbers.
+  /// Standard deviation of a used observation's coordinate, unknowns counted, lenses' and poses' as
+  /// far as they were free; infinite where there are as many unknowns as numbers.
   double sigma_px = 0;
-  double rms_px = 0;      ///< root mean squared residual length of the used sights
-  int without_pixel = 0;  ///< sights whose point has no pixel: behind the camera
+  double rms_px = 0;      ///< root mean squared residual length of the used observations
+  int without_pixel = 0;  ///< observations whose point has no pixel: behind the camera
   int iterations = 0;
   bool converged = false;
-  /// Sights whose part in the solve would change once more: which are outliers was decided anew
-  /// after each of four solves, and had not settled with the last. 0: it had.
+  /// Observations whose part in the solve would change once more: which are outliers was decided
+  /// again after each of four solves, and had not settled with the last. 0: it had.
   int unsettled = 0;
 };
 
-/// Minimises the sum over sights of |predicted - observed|^2, starting at `bundle`: under Cauchy's
-/// loss until cameras and scale have settled, then least squares of the sights that agree.
+/// Minimises the sum over observations of |predicted - observed|^2, starting at `bundle`: under
+/// Cauchy's loss until cameras and scale have settled, then least squares of the observations that
+/// agree.
 ///
 /// Inside, the world is centred and scaled, and points are directions with inverse distances
-/// (sight_cost.h). The gauge is that of the start: without priors, the result is turned, scaled and
-/// moved as a whole to be as near to the start's cameras as can be (gauge.h); no camera is singled
-/// out. With priors on positions, these decide; with distances alone, these decide the scale.
+/// (observation_cost.h). The gauge is that of the start: without priors, the result is turned,
+/// scaled and moved as a whole to be as near to the start's cameras as can be (gauge.h); no camera
+/// is singled out. With priors on positions, these decide; with distances alone, these decide the
+/// scale.
 ///
 /// One thread, sums in one order: the same bits every time. Throws Error as CheckBundle does, on
-/// priors that cannot be meant, and when no sight has a pixel or the solver finds no finite
-/// solution. What the sights cannot decide is told by Judge (judge.h), not here.
+/// priors that cannot be meant, and when no observation has a pixel or the solver finds no finite
+/// solution. What the observations cannot decide is told by Judge (judge.h), not here.
 Adjusted Adjust(const Bundle& bundle, const AdjustOptions& options);
 
-/// Whether `held`, which held more than `free` did, contradicts the sights: what is left of them is
-/// half as large again (and more than half a pixel), or a tenth of them agrees no longer. What
-/// disagrees with a camera is left out, and shows as that.
+/// Whether `held`, which held more than `free` did, contradicts the observations: what is left of
+/// them is half as large again (and more than half a pixel), or a tenth of them agrees no longer.
+/// What disagrees with a camera is left out, and shows as that.
 bool Contradicts(const Adjusted& held, const Adjusted& free);
 
 /// Residuals predicted - observed in px, NaN where the point has no pixel; the bundle's order.

@@ -14,7 +14,8 @@
 namespace dtr::calib {
 namespace {
 
-// Sights of the points that at least two images see, sorted; points in the order of their keys.
+// Observations of the points that at least two images see, sorted; points in the order of their
+// keys.
 struct Track {
   std::vector<std::pair<int, Eigen::Vector2d>> sights;  // image, pixel
 };
@@ -64,7 +65,7 @@ Eigen::Vector2d PrincipalPoint(const LensCamera& lens) {
 }
 
 void AddSharedLenses(const SfmModel& model, Bundle& bundle) {
-  std::map<std::uint32_t, LensCamera> used;  // a lens without sights would be undetermined
+  std::map<std::uint32_t, LensCamera> used;  // a lens without observations would be undetermined
   for (const SfmImage& image : model.images) {
     used.emplace(image.camera_id, model.cameras.at(image.camera_id));
   }
@@ -149,21 +150,21 @@ Bundle BundleOf(std::span<const PinholeCamera> cameras, std::span<const Pose> ca
 
 namespace {
 
-// Sights of points they do not belong to, as structure from motion leaves them out, too (COLMAP:
-// more than 4 px).
+// Observations of points they do not belong to, as structure from motion leaves them out, too
+// (COLMAP: more than 4 px).
 struct Wrong {
   std::set<std::pair<int, std::uint64_t>> of_images;  ///< image, point id
-  std::map<std::uint64_t, int> right_of_point;        ///< sights that stay
+  std::map<std::uint64_t, int> right_of_point;        ///< observations that stay
 };
 
-Wrong WrongSights(const Bundle& bundle) {
-  constexpr double kMostPx = 4;
+Wrong WrongObservations(const Bundle& bundle) {
+  constexpr double kMaxPx = 4;
   Wrong wrong;
   const auto residuals = Residuals(bundle);
   for (size_t i = 0; i < residuals.size(); ++i) {
     const BundleObservation& o = bundle.observations[i];
     const auto id = bundle.point_ids[static_cast<size_t>(o.point)];
-    if (residuals[i].norm() <= kMostPx) {
+    if (residuals[i].norm() <= kMaxPx) {
       ++wrong.right_of_point[id];
     } else {
       wrong.of_images.insert({o.image, id});  // NaN, too: no pixel
@@ -217,7 +218,7 @@ SfmModel ModelOf(const Bundle& bundle, const SfmModel& model, bool separate_lens
     point.p_in_world = place;
     points.emplace(bundle.point_ids[p], point);
   }
-  const auto wrong = WrongSights(bundle);
+  const auto wrong = WrongObservations(bundle);
   for (auto at = points.begin(); at != points.end();) {
     const auto found = wrong.right_of_point.find(at->first);
     const bool placed = found != wrong.right_of_point.end() && found->second >= 2;
@@ -237,35 +238,35 @@ SfmModel ModelOf(const Bundle& bundle, const SfmModel& model, bool separate_lens
 }
 
 void CheckBundle(const Bundle& bundle) {
-  const auto refuse = [](const std::string& what) { throw Error("bundle adjustment: " + what); };
+  const auto reject = [](const std::string& what) { throw Error("bundle adjustment: " + what); };
   if (bundle.images.size() < 2) {
-    refuse(fmt::format("expected at least 2 images, found {}", bundle.images.size()));
+    reject(fmt::format("expected at least 2 images, found {}", bundle.images.size()));
   }
-  if (bundle.observations.empty()) refuse("expected points that two images see, found none");
+  if (bundle.observations.empty()) reject("expected points that two images see, found none");
   for (const LensCamera& lens : bundle.lenses) {
     try {
       lens.Check();
     } catch (const std::invalid_argument& error) {
-      refuse(error.what());
+      reject(error.what());
     }
     if (lens.model == LensModel::kFov) {
-      refuse("expected a lens model other than FOV; undistort the images first");
+      reject("expected intrinsics model other than FOV; undistort the images first");
     }
   }
   const auto lenses = static_cast<int>(bundle.lenses.size());
   for (const BundleImage& image : bundle.images) {
     if (image.lens < 0 || image.lens >= lenses) {
-      refuse(
-          fmt::format("{}: expected a lens 0 to {}, found {}", image.name, lenses - 1, image.lens));
+      reject(fmt::format("{}: expected intrinsics 0 to {}, found {}", image.name, lenses - 1,
+                         image.lens));
     }
     if (!image.shift_px.allFinite() || !image.cam_from_world.rotation.coeffs().allFinite() ||
         !image.cam_from_world.translation.allFinite()) {
-      refuse(image.name + ": expected a finite pose and principal point");
+      reject(image.name + ": expected a finite pose and principal point");
     }
   }
   for (size_t p = 0; p < bundle.points.size(); ++p) {
     if (!bundle.points[p].allFinite() || bundle.points[p].isZero()) {
-      refuse(fmt::format("point {}: expected a finite place or direction", p));
+      reject(fmt::format("point {}: expected a finite position or direction", p));
     }
   }
   const auto images = static_cast<int>(bundle.images.size());
@@ -273,7 +274,7 @@ void CheckBundle(const Bundle& bundle) {
   for (const BundleObservation& o : bundle.observations) {
     if (o.image < 0 || o.image >= images || o.point < 0 || o.point >= points ||
         !o.pixel.allFinite()) {
-      refuse(
+      reject(
           fmt::format("expected observations of images 0 to {} and points 0 to {} at finite "
                       "pixels, found image {}, point {}",
                       images - 1, points - 1, o.image, o.point));

@@ -1,4 +1,5 @@
-// calib/bundle/bundle.h -- cameras, poses, points and sights, as bundle adjustment takes them.
+// calib/bundle/bundle.h -- cameras, poses, points and observations, as bundle adjustment takes
+// them.
 #pragma once
 #include <Eigen/Core>
 #include <cstdint>
@@ -52,14 +53,15 @@ Bundle BundleOf(std::span<const PinholeCamera> cameras, std::span<const Pose> ca
                 std::span<const std::string> names, const SparseScene& scene);
 
 /// `model` with the bundle's cameras, poses and points; features keep their pixels. Where images of
-/// a lens have shifts, each gets a camera of its own, and the lens keeps the id it had. Sights that
-/// miss their point by more than 4 px leave its track. Points that are not in the bundle, lie at
-/// infinity or keep fewer than two sights leave the model; `dropped` says how many.
-/// Requires a bundle that BundleOf made of this model.
+/// a lens have shifts, each gets a camera of its own, and the lens keeps the id it had.
+/// Observations that miss their point by more than 4 px leave its track. Points that are not in the
+/// bundle, lie at infinity or keep fewer than two observations leave the model; `dropped` says how
+/// many. Requires a bundle that BundleOf made of this model.
 SfmModel ModelOf(const Bundle& bundle, const SfmModel& model, bool separate_lenses, int* dropped);
 
 /// Throws Error where an index is out of range, a number is not finite, a lens has the model FOV
-/// (which the formula of bundle adjustment lacks), or there are fewer than two images or no sights.
+/// (which the formula of bundle adjustment lacks), or there are fewer than two images or no
+/// observations.
 void CheckBundle(const Bundle& bundle);
 
 }  // namespace dtr::calib

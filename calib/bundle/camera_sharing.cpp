@@ -73,9 +73,9 @@ class Comparison {
   }
 
   std::string WhyNot() const {
-    if (points_ < kFewestHeldOut) {
+    if (points_ < kMinHeldOut) {
       return fmt::format("{} points are in {} photos or more; the test needs {}", points_,
-                         kMinTrack, kFewestHeldOut);
+                         kMinTrack, kMinHeldOut);
     }
     if (!std::isfinite(scale_px_)) return "there are as many unknowns as observations";
     return "";

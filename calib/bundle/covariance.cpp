@@ -13,7 +13,7 @@
 #include "calib/bundle/gauge.h"
 #include "calib/bundle/lens_params.h"
 #include "calib/bundle/normalised.h"
-#include "calib/bundle/sight_rows.h"
+#include "calib/bundle/observation_rows.h"
 
 namespace dtr::calib {
 namespace {
@@ -21,14 +21,14 @@ namespace {
 // Eigenvalues of a matrix with a unit diagonal below this are rounding: of sums of thousands.
 constexpr double kSingular = 1e-13;
 // A direction of the gauge is settled when the priors' information about it is more than this share
-// of the sights' typical information.
+// of the observations' typical information.
 constexpr double kSettled = 1e-12;
 
-// Adds what the sights of one point, the point eliminated, say about lenses and poses.
+// Adds what the observations of one point, the point eliminated, say about lenses and poses.
 void AddPoint(const Normalised& n, const Bundle& bundle, const BundleCovariance& layout,
               const std::vector<const BundleObservation*>& sights, Eigen::MatrixXd& information) {
-  std::vector<int> columns;  // unknowns these sights depend on
-  std::vector<SightRows> rows;
+  std::vector<int> columns;  // unknowns these observations depend on
+  std::vector<ObservationRows> rows;
   std::vector<std::pair<int, int>> lens_image;
   const auto column_of = [&](int unknown) {
     const auto found = std::find(columns.begin(), columns.end(), unknown);
@@ -37,7 +37,7 @@ void AddPoint(const Normalised& n, const Bundle& bundle, const BundleCovariance&
     return static_cast<long>(columns.size()) - 1;
   };
   for (const BundleObservation* sight : sights) {
-    SightRows made;
+    ObservationRows made;
     if (!RowsOf(n, bundle, *sight, made)) continue;
     const int lens = bundle.images[static_cast<size_t>(sight->image)].lens;
     for (size_t k = 0; k < layout.free_params[static_cast<size_t>(lens)].size(); ++k) {
@@ -50,7 +50,7 @@ void AddPoint(const Normalised& n, const Bundle& bundle, const BundleCovariance&
     lens_image.emplace_back(lens, sight->image);
   }
   const auto height = 2 * static_cast<long>(rows.size());
-  if (height < 4) return;  // one sight says nothing about anything but its point
+  if (height < 4) return;  // one observation says nothing about anything but its point
   Eigen::MatrixXd by_point(height, 3);
   Eigen::MatrixXd by_rest = Eigen::MatrixXd::Zero(height, static_cast<long>(columns.size()));
   for (size_t i = 0; i < rows.size(); ++i) {
@@ -104,7 +104,8 @@ Eigen::MatrixXd PriorInformation(const Normalised& n, const Bundle& bundle,
                                  const BundleCovariance& layout, const AdjustOptions& options,
                                  long unknowns) {
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(unknowns, unknowns);
-  const double unit_px = layout.sigma_px * n.unit;  // sights' units: everything is scaled by sigma
+  const double unit_px =
+      layout.sigma_px * n.unit;  // observations' units: everything is scaled by sigma
   for (const PositionPrior& p : options.positions) {
     const long at = layout.image_at[static_cast<size_t>(p.image)] + 3;
     for (int k = 0; k < 3; ++k) {
@@ -137,7 +138,7 @@ std::string NameOfUnknown(const Bundle& bundle, const BundleCovariance& layout, 
     const long k = unknown - layout.lens_at[i];
     if (k < 0 || k >= static_cast<long>(layout.free_params[i].size())) continue;
     const auto names = ParameterNames(bundle.lenses[i].model);
-    return fmt::format("{} of lens {}",
+    return fmt::format("{} of camera {}",
                        names[static_cast<size_t>(layout.free_params[i][static_cast<size_t>(k)])],
                        i + 1);
   }
@@ -227,7 +228,7 @@ BundleCovariance CovarianceOf(const Adjusted& adjusted, const AdjustOptions& opt
     out.image_at.push_back(unknowns);
     unknowns += 6;
   }
-  if (unknowns > kMostUnknowns) return out;
+  if (unknowns > kMaxUnknowns) return out;
   out.computed = true;
   const Normalised n = Normalised::Around(bundle);
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(unknowns, unknowns);
@@ -258,7 +259,7 @@ Eigen::Matrix2d TransferCovariance(const Bundle& bundle, const BundleCovariance&
     one.observations.push_back({i, 0, Eigen::Vector2d::Zero()});
   }
   const Normalised n = Normalised::Around(one);
-  SightRows rows[3];
+  ObservationRows rows[3];
   for (size_t i = 0; i < 3; ++i) {
     if (!RowsOf(n, one, one.observations[i], rows[i])) return none;
   }

@@ -1,4 +1,4 @@
-// calib/bundle/covariance.h -- what the sights leave uncertain about lenses and poses.
+// calib/bundle/covariance.h -- what the observations leave uncertain about lenses and poses.
 #pragma once
 #include <Eigen/Core>
 #include <string>
@@ -13,12 +13,12 @@ namespace dtr::calib {
 /// order: per lens its free parameters, per image a turn w (radians, along the camera's axes:
 /// p_in_cam = exp(w) p_in_cam) and the centre's shift (world units).
 ///
-/// The gauge: where the sights do not tell a common turn, shift or scale of everything, the
+/// The gauge: where the observations do not tell a common turn, shift or scale of everything, the
 /// covariance is that of the free network: no camera is held, the sum of the variances is the least
 /// that any gauge gives (inner constraints: Triggs et al. 2000, sec. 9.4). What does not depend on
 /// the gauge, such as TransferCovariance below, comes out the same under any.
 struct BundleCovariance {
-  bool computed = false;   ///< false beyond kMostUnknowns
+  bool computed = false;   ///< false beyond kMaxUnknowns
   bool determined = true;  ///< false: besides the gauge, something is not determined
   int gauge_freedom = 0;   ///< 7 without priors, 6 where a distance is known, 0 with positions
   /// Largest over smallest singular value of the reduced J, columns of length 1, gauge left out:
@@ -36,7 +36,7 @@ struct BundleCovariance {
 };
 
 /// Above, the matrix is not computed: 2000 unknowns (some 330 photos) take 32 MB and 20 s.
-inline constexpr int kMostUnknowns = 2000;
+inline constexpr int kMaxUnknowns = 2000;
 
 /// At a solution of Adjust; `options` as given to it. Deterministic.
 BundleCovariance CovarianceOf(const Adjusted& adjusted, const AdjustOptions& options);

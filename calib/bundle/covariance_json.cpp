@@ -26,7 +26,7 @@ std::string ToJson(const Adjusted& adjusted, const BundleCovariance& covariance)
   Json json;
   json["sigma_px"] = std::isfinite(covariance.sigma_px) ? Json(covariance.sigma_px) : Json(nullptr);
   const bool has_condition = covariance.computed && std::isfinite(covariance.condition);
-  json["computed"] = covariance.computed;  // false: more than kMostUnknowns
+  json["computed"] = covariance.computed;  // false: more than kMaxUnknowns
   json["condition"] = has_condition ? Json(covariance.condition) : Json(nullptr);
   json["gauge_freedom"] = covariance.computed ? Json(covariance.gauge_freedom) : Json(nullptr);
   json["determined"] = covariance.computed ? Json(covariance.determined) : Json(nullptr);

@@ -15,12 +15,12 @@ namespace {
 
 // An inverse distance that is not this many standard deviations from zero is no distance.
 constexpr double kSeesDistance = 4;
-constexpr double kSmallAngleDeg = 1;      // COLMAP's stereo refuses below 1 degree
-constexpr double kCollinear = 0.01;       // second over first extent of the centres, or points
-constexpr double kPlanar = 0.03;          // third over second extent of the points
-constexpr double kForwardDeg = 20;        // between the way and the axis
-constexpr double kMostTracksOfTwo = 0.9;  // share of points
-constexpr double kSameSights = 0.9;       // share of a photo's sights that another repeats
+constexpr double kSmallAngleDeg = 1;       // COLMAP's stereo rejects below 1 degree
+constexpr double kCollinear = 0.01;        // second over first extent of the centres, or points
+constexpr double kPlanar = 0.03;           // third over second extent of the points
+constexpr double kForwardDeg = 20;         // between the way and the axis
+constexpr double kMaxTracksOfTwo = 0.9;    // share of points
+constexpr double kSameObservations = 0.9;  // share of a photo's observations that another repeats
 constexpr double kSamePx = 0.01;
 
 struct Geometry {
@@ -107,7 +107,7 @@ std::string DuplicateImages(const Adjusted& adjusted) {
   for (const auto& [pair, times] : same) {
     const int least =
         std::min(count[static_cast<size_t>(pair.first)], count[static_cast<size_t>(pair.second)]);
-    if (least < 10 || times < kSameSights * least) continue;
+    if (least < 10 || times < kSameObservations * least) continue;
     names += fmt::format("{}{} = {}", names.empty() ? "" : ", ",
                          bundle.images[static_cast<size_t>(pair.first)].name,
                          bundle.images[static_cast<size_t>(pair.second)].name);
@@ -123,7 +123,7 @@ std::string UselessFocal(const Adjusted& adjusted, const BundleCovariance& covar
     const Eigen::MatrixXd of_lens = covariance.OfLens(adjusted.bundle, static_cast<int>(i));
     const double f = adjusted.bundle.lenses[i].params[0], sigma = std::sqrt(of_lens(0, 0));
     if (!(sigma <= max_share * f)) {
-      return fmt::format("focal length {:.4g} px +- {:.2g} of lens {}", f, sigma, i + 1);
+      return fmt::format("focal length {:.4g} px +- {:.2g} of camera {}", f, sigma, i + 1);
     }
   }
   return "";
@@ -163,7 +163,7 @@ std::vector<Degeneracy> FindDegeneracies(const Adjusted& adjusted,
   if (no_distance) {
     add("pure_rotation",
         fmt::format("half the points have a parallax of less than {:.1f} standard deviations: the "
-                    "cameras turn in one place, or everything is far away",
+                    "cameras rotate in one position, or everything is far away",
                     parallax.median_significance),
         true);
   } else if (parallax.median_angle_deg < kSmallAngleDeg) {
@@ -200,7 +200,7 @@ std::vector<Degeneracy> FindDegeneracies(const Adjusted& adjusted,
     if (flat[1] < kCollinear * flat[0]) {
       add("collinear_points",
           fmt::format(
-              "the points lie on a line, to {:.2g} of its length: cameras may turn about it",
+              "the points lie on a line, to {:.2g} of its length: cameras may rotate about it",
               flat[1] / flat[0]),
           harmful);
     } else if (flat[2] < kPlanar * flat[1]) {
@@ -212,7 +212,7 @@ std::vector<Degeneracy> FindDegeneracies(const Adjusted& adjusted,
   const auto twos = std::count_if(g.tracks.begin(), g.tracks.end(),
                                   [](const auto& track) { return track.size() == 2; });
   const double share = static_cast<double>(twos) / static_cast<double>(g.tracks.size());
-  if (share > kMostTracksOfTwo) {
+  if (share > kMaxTracksOfTwo) {
     add("tracks_of_two",
         fmt::format("{:.0f} % of the points are seen by two images only", 100 * share), harmful);
   }

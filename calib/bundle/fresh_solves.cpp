@@ -37,7 +37,7 @@ std::vector<Degeneracy> OpenIntrinsics(const Adjusted& fresh, const BundleCovari
                          const char* unit) {
       if (sigma <= kOpen * known) return;
       open.push_back({name,
-                      fmt::format("the observations determine {} of lens {} to {:.2g}{} at best, "
+                      fmt::format("the observations determine {} of camera {} to {:.2g}{} at best, "
                                   "as on an orbit at one height; the stored one is taken as right",
                                   what, i + 1, sigma, unit),
                       false});
@@ -71,7 +71,7 @@ FreshSolves SolveWith(const Bundle& stored, const Halves& halves, const AdjustOp
 
 Halves HalvesOf(const Bundle& stored) {
   Halves halves;
-  const Bundle enough = WithoutUnseen(stored, kFewestSightsOfHalf);
+  const Bundle enough = WithoutUnseen(stored, kMinObservationsOfHalf);
   for (const BundleImage& image : stored.images) {
     const bool kept =
         std::any_of(enough.images.begin(), enough.images.end(),

@@ -8,7 +8,7 @@
 
 namespace dtr::calib {
 
-inline constexpr int kFewestSightsOfHalf = 30;  ///< of an image in halves, of all: half must do
+inline constexpr int kMinObservationsOfHalf = 30;  ///< of an image in halves, of all: half must do
 
 /// The bundle with the observations of points that `keep` takes by their index.
 template <typename Keep>

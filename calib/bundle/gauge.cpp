@@ -10,7 +10,7 @@
 namespace dtr::calib {
 namespace {
 
-constexpr int kMostSteps = 20;
+constexpr int kMaxSteps = 20;
 constexpr double kSettledGauge = 1e-15;  // of shift, turn and growth, in normalised units
 
 void Move(const Similarity& b_from_a, Bundle& bundle) {
@@ -68,7 +68,7 @@ Eigen::MatrixXd GaugeDirections(const std::vector<PoseFrame>& poses,
 }
 
 void MoveToGaugeOf(const Bundle& start, Bundle& now, bool keep_scale) {
-  for (int step = 0; step < kMostSteps; ++step) {
+  for (int step = 0; step < kMaxSteps; ++step) {
     std::vector<PoseFrame> poses;
     for (const BundleImage& image : now.images) {
       poses.push_back({image.cam_from_world.rotation.toRotationMatrix(),

@@ -4,12 +4,13 @@
 #include <vector>
 
 #include "calib/bundle/bundle.h"
-#include "calib/bundle/sight_cost.h"
+#include "calib/bundle/observation_cost.h"
 
 namespace dtr::calib {
 
-/// Derivatives of all poses (6 rows each: turn w, shift v of the centre, as in sight_cost.h) by a
-/// shift, a turn and a growth of the world: 7 columns, the last zero where all stand in the origin.
+/// Derivatives of all poses (6 rows each: turn w, shift v of the centre, as in observation_cost.h)
+/// by a shift, a turn and a growth of the world: 7 columns, the last zero where all stand in the
+/// origin.
 Eigen::MatrixXd GaugeColumns(const std::vector<PoseFrame>& poses);
 
 /// Orthonormal directions, one per column, of `unknowns` unknowns that move the world as a whole:

@@ -71,8 +71,8 @@ std::vector<double> LossesOfUnseenPoints(const Bundle& cameras, const Bundle& as
   return losses;
 }
 
-SightSplit SplitSights(const Bundle& bundle, std::uint64_t seed) {
-  SightSplit split{bundle, {}};
+ObservationSplit SplitObservations(const Bundle& bundle, std::uint64_t seed) {
+  ObservationSplit split{bundle, {}};
   split.training.observations.clear();
   const auto& all = bundle.observations;
   for (size_t begin = 0, end = 0; begin < all.size(); begin = end) {
@@ -89,8 +89,8 @@ SightSplit SplitSights(const Bundle& bundle, std::uint64_t seed) {
   return split;
 }
 
-std::vector<double> LossesOfHeldOutSights(const Bundle& cameras, const SightSplit& split,
-                                          double scale_px) {
+std::vector<double> LossesOfHeldOutObservations(const Bundle& cameras,
+                                                const ObservationSplit& split, double scale_px) {
   Bundle asked = Placed(cameras, split.training).bundle;
   asked.observations = split.held_out;
   std::vector<double> losses;

@@ -1,4 +1,4 @@
-// calib/bundle/held_out.h -- what cameras make of points and sights that they have not seen.
+// calib/bundle/held_out.h -- what cameras make of points and observations that they have not seen.
 #pragma once
 #include <cstdint>
 #include <optional>
@@ -10,8 +10,8 @@
 namespace dtr::calib {
 
 /// Below so many points a comparison would be a matter of luck; only those count that so many
-/// images see: one sight to hold out, three to place the point.
-inline constexpr int kFewestHeldOut = 100, kMinTrack = 4;
+/// images see: one observation to hold out, three to place the point.
+inline constexpr int kMinHeldOut = 100, kMinTrack = 4;
 
 /// About `most` of the points, drawn by their ids.
 Bundle SomePoints(const Bundle& bundle, int most, std::uint64_t seed);
@@ -26,24 +26,24 @@ struct PointFold {
 /// Two: each half is asked once. Halves are drawn by the points' ids.
 std::vector<PointFold> PointFolds(const Bundle& bundle, std::uint64_t seed);
 
-/// Per point of `asked` that kMinTrack images or more see: the mean over its sights of Cauchy's
-/// loss (px^2), the point placed as the cameras (lenses and images) explain it best. A sight
-/// without a pixel counts like one far off. `sigma_px`, where asked for, becomes the standard
-/// deviation of a sight's coordinate.
+/// Per point of `asked` that kMinTrack images or more see: the mean over its observations of
+/// Cauchy's loss (px^2), the point placed as the cameras (lenses and images) explain it best. A
+/// observation without a pixel counts like one far off. `sigma_px`, where asked for, becomes the
+/// standard deviation of an observation's coordinate.
 std::vector<double> LossesOfUnseenPoints(const Bundle& cameras, const Bundle& asked,
                                          double scale_px, double* sigma_px = nullptr);
 
 /// One sight of each point that kMinTrack images or more see is kept apart.
-struct SightSplit {
+struct ObservationSplit {
   Bundle training;
   std::vector<BundleObservation> held_out;
 };
-SightSplit SplitSights(const Bundle& bundle, std::uint64_t seed);
+ObservationSplit SplitObservations(const Bundle& bundle, std::uint64_t seed);
 
-/// Cauchy's loss (px^2) of each sight kept apart, its point placed by the others alone: for cameras
-/// that have seen all sights.
-std::vector<double> LossesOfHeldOutSights(const Bundle& cameras, const SightSplit& split,
-                                          double scale_px);
+/// Cauchy's loss (px^2) of each observation kept apart, its point placed by the others alone: for
+/// cameras that have seen all observations.
+std::vector<double> LossesOfHeldOutObservations(const Bundle& cameras,
+                                                const ObservationSplit& split, double scale_px);
 
 /// Cauchy's loss (px^2) of a residual; of one that is not finite as if 100 scales long.
 double CauchyLoss(const Eigen::Vector2d& residual_px, double scale_px);

@@ -21,10 +21,10 @@ namespace dtr::calib {
 namespace {
 
 constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
-constexpr size_t kFewestPoints = 50;
+constexpr size_t kMinPoints = 50;
 constexpr int kFewestSights = 10;  // of an image: its pose has 6 unknowns, these 20 numbers
 constexpr double kSquare = 1e-3;   // relative difference of fx and fy
-constexpr double kMostJudgedPoints = 4000;
+constexpr double kMaxJudgedPoints = 4000;
 constexpr std::uint64_t kDraw = 0xd4a3;
 
 // With distortion, zero where it starts: what undistortion left behind becomes a parameter. Pixels
@@ -141,8 +141,8 @@ Check Difference(const char* name, double sigmas, double moved_px, double max_si
   return check;
 }
 
-// Where two halves differ by more than predicted, errors are larger than the sights' scatter says
-// (they are not independent, or the lens is another): uncertainties grow by that factor.
+// Where two halves differ by more than predicted, errors are larger than the observations' scatter
+// says (they are not independent, or the lens is another): uncertainties grow by that factor.
 void WidenByHalves(Judgement& judgement) {
   const double factor =
       std::isfinite(judgement.halves_ratio) ? std::max(1.0, judgement.halves_ratio) : 1;
@@ -154,7 +154,7 @@ void WidenByHalves(Judgement& judgement) {
     camera.sigmas /= factor;
     camera.turn_sigma_rad *= factor;
     camera.centre_sigma *= factor;
-    camera.picture_shift_px *= factor;
+    camera.image_shift_px *= factor;
     for (PlacedPixel& point : camera.placed) point.sigma_px *= factor;
   }
 }
@@ -187,7 +187,7 @@ void AddHalves(const BundleLimits& limits, const Halves& halves, const FreshSolv
         "halves_ratio", kNothing, limits.max_halves_ratio,
         fmt::format(
             "expected two photos of {} observations or more, whose halves can be solved apart",
-            kFewestSightsOfHalf)));
+            kMinObservationsOfHalf)));
     return;
   }
   const BundleCovariance covariances[2] = {CovarianceOf(solved[0], solves.options),
@@ -209,7 +209,7 @@ void AddHalves(const BundleLimits& limits, const Halves& halves, const FreshSolv
   }
   if (!halves.left_out.empty()) {
     check.reason += fmt::format("; without photos of fewer than {} observations: {}",
-                                kFewestSightsOfHalf, halves.left_out);
+                                kMinObservationsOfHalf, halves.left_out);
   }
   judgement.tests.push_back(std::move(check));
 }
@@ -229,14 +229,14 @@ void AddDegeneracies(Judgement& judgement) {
 void AddPicture(const BundleLimits& limits, Judgement& judgement) {
   const CameraJudgement* worst = nullptr;
   for (const CameraJudgement& camera : judgement.cameras) {
-    if (std::isfinite(camera.picture_shift_px) &&
-        (worst == nullptr || camera.picture_shift_px > worst->picture_shift_px)) {
+    if (std::isfinite(camera.image_shift_px) &&
+        (worst == nullptr || camera.image_shift_px > worst->image_shift_px)) {
       worst = &camera;
     }
   }
   judgement.tests.push_back(AtMost(
-      "picture_shift_px", worst != nullptr ? worst->picture_shift_px : kNothing,
-      limits.max_picture_shift_px,
+      "image_shift_px", worst != nullptr ? worst->image_shift_px : kNothing,
+      limits.max_image_shift_px,
       worst != nullptr
           ? fmt::format("{}: 95 % of its points, placed by two neighbours, are uncertain by less",
                         worst->name)
@@ -257,7 +257,7 @@ Bundle Drawn(const Bundle& given, double share) {
   std::vector<bool> kept(given.points.size());
   for (size_t p = 0; p < kept.size(); ++p) kept[p] = UniformFromHash(HashOf(p, kDraw)) < share;
   for (const BundleObservation& o : given.observations) {
-    const bool few = share * sights[static_cast<size_t>(o.image)] < 2 * kFewestSightsOfHalf;
+    const bool few = share * sights[static_cast<size_t>(o.image)] < 2 * kMinObservationsOfHalf;
     if (few) kept[static_cast<size_t>(o.point)] = true;
   }
   return WithPoints(given, [&](std::uint64_t p) { return kept[static_cast<size_t>(p)]; });
@@ -291,11 +291,11 @@ Judgement JudgePart(const Bundle& given, const BundleLimits& limits, int threads
   for (const BundleObservation& o : given.observations) seen[static_cast<size_t>(o.point)] = true;
   const auto points = static_cast<size_t>(std::count(seen.begin(), seen.end(), true));
   const Bundle stored = WithDistortion(
-      WithoutUnseen(Drawn(given, kMostJudgedPoints / static_cast<double>(points)), kFewestSights));
-  if (points < kFewestPoints) {
-    return NotJudged(judgement,
-                     fmt::format("expected {} points or more that two views see, found {}",
-                                 kFewestPoints, points));
+      WithoutUnseen(Drawn(given, kMaxJudgedPoints / static_cast<double>(points)), kFewestSights));
+  if (points < kMinPoints) {
+    return NotJudged(
+        judgement,
+        fmt::format("expected {} points or more that two views see, found {}", kMinPoints, points));
   }
   if (stored.images.size() < 2) {
     return NotJudged(judgement,
@@ -322,7 +322,7 @@ Judgement JudgePart(const Bundle& given, const BundleLimits& limits, int threads
   AddDegeneracies(judgement);
   if (!covariance.computed) {
     return NotJudged(judgement, fmt::format("more than {} unknowns: too many for their covariance",
-                                            kMostUnknowns));
+                                            kMaxUnknowns));
   }
   if (!covariance.determined) {
     return NotJudged(judgement, "the observations do not determine " + covariance.weakest);
@@ -332,7 +332,7 @@ Judgement JudgePart(const Bundle& given, const BundleLimits& limits, int threads
                      fmt::format("the fresh solve did not settle in {} steps", fresh.iterations));
   }
   CompareWithStored(stored, fresh, covariance, judgement);
-  PictureShifts(fresh, covariance, threads, judgement.cameras);
+  ImageShifts(fresh, covariance, threads, judgement.cameras);
   AddHalves(limits, halves, solves, judgement);
   WidenByHalves(judgement);
   AddDifferences(limits, judgement);
@@ -389,26 +389,26 @@ void Join(const Judgement& part, Judgement& all) {
 }  // namespace
 
 double NegligiblePx(const BundleLimits& limits, double sigma_px) {
-  return std::clamp(limits.negligible_sigmas * sigma_px, limits.least_negligible_px,
-                    limits.most_negligible_px);
+  return std::clamp(limits.negligible_sigmas * sigma_px, limits.min_negligible_px,
+                    limits.max_negligible_px);
 }
 
 Judgement Judge(const Bundle& given, const BundleLimits& limits, int threads,
                 const Progress* progress) {
   // With distortion, as it is solved for.
-  // Photos of fewer sights are those of the test cameras_untested.
+  // Photos of fewer observations are those of the test cameras_untested.
   const Bundle seen = WithoutUnseen(given, kFewestSights);
   if (seen.images.empty()) {
-    Judgement none = NotJudged({}, "no photo has points to judge by");
+    Judgement none = NotJudged({}, "no photo has points to validate by");
     AddNotJudged(given, none);
     return none;
   }
   Judgement all;
-  if (JudgedUnknowns(WithDistortion(seen)) <= limits.most_unknowns) {
+  if (JudgedUnknowns(WithDistortion(seen)) <= limits.max_unknowns) {
     all = JudgePart(seen, limits, threads, progress);
   } else {
     // Half of what one part may have: work grows with the cube.
-    const std::vector<Bundle> parts = PartsOf(seen, limits.most_unknowns / 2);
+    const std::vector<Bundle> parts = PartsOf(seen, limits.max_unknowns / 2);
     for (const Bundle& part : parts) Join(JudgePart(part, limits, threads, progress), all);
     all.parts = static_cast<int>(parts.size());
   }

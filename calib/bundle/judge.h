@@ -14,27 +14,27 @@ struct BundleLimits {
   /// unknowns of a pose, chance alone exceeds 5 once in 3000.
   double max_sigmas = 5;
   /// A difference that moves the scene's points in the image by less than this many standard
-  /// deviations of one sight's coordinate, but between the least and the most, is no fault, however
-  /// many standard deviations of the cameras it is: solvers that treat outliers otherwise differ by
-  /// as much.
+  /// deviations of one observation's coordinate, but between the least and the most, is no fault,
+  /// however many standard deviations of the cameras it is: solvers that treat outliers otherwise
+  /// differ by as much.
   double negligible_sigmas = 3;
-  double least_negligible_px = 0.1, most_negligible_px = 0.4;
+  double min_negligible_px = 0.1, max_negligible_px = 0.4;
   /// Two disjoint halves of the points, solved apart: RMS of their difference over the predicted.
   double max_halves_ratio = 3;
   /// 95 % of a third view's points, as its two best neighbours place them: standard deviation.
-  double max_picture_shift_px = 1;
+  double max_image_shift_px = 1;
   /// Residuals as of photos whose rows were read while the camera turned: RMS per coordinate that
   /// such turns explain beyond chance.
   double max_shutter_px = 0.1;
   /// Residuals that a lens model cannot follow, along the radius or by regions: RMS per coordinate
   /// that is beyond chance. Features err by themselves where a scene's texture does.
   double max_lens_pattern_px = 0.1;
-  double min_p = 1e-4;                ///< less likely by chance than this is no chance
-  int most_unknowns = kMostUnknowns;  ///< of a bundle that is judged in one part
-  double max_focal_share = 0.1;       ///< standard deviation of a focal length over itself
+  double min_p = 1e-4;              ///< less likely by chance than this is no chance
+  int max_unknowns = kMaxUnknowns;  ///< of a bundle that is judged in one part
+  double max_focal_share = 0.1;     ///< standard deviation of a focal length over itself
 };
 
-/// What of a difference is too little to matter, where a sight's coordinate has `sigma_px`.
+/// What of a difference is too little to matter, where an observation's coordinate has `sigma_px`.
 double NegligiblePx(const BundleLimits& limits, double sigma_px);
 
 /// A way in which the views do not suffice, by name.
@@ -47,12 +47,12 @@ struct Degeneracy {
 /// What is known of one camera (image) after the fresh solve.
 struct CameraJudgement {
   std::string name;
-  double sigmas = 0;                ///< stored pose against the fresh one
-  double moved_px = 0;              ///< RMS over its sights, stored camera against fresh one, in
-                                    ///< the world that is nearest to most (moved.h)
-  double turn_sigma_rad = 0;        ///< largest axis of the turn's uncertainty
-  double centre_sigma = 0;          ///< of the centre's, world units, in the free network's gauge
-  double picture_shift_px = 0;      ///< 95 %; NaN where no two neighbours place its points
+  double sigmas = 0;          ///< stored pose against the fresh one
+  double moved_px = 0;        ///< RMS over its observations, stored camera against fresh one, in
+                              ///< the world that is nearest to most (moved.h)
+  double turn_sigma_rad = 0;  ///< largest axis of the turn's uncertainty
+  double centre_sigma = 0;    ///< of the centre's, world units, in the free network's gauge
+  double image_shift_px = 0;  ///< 95 %; NaN where no two neighbours place its points
   std::vector<PlacedPixel> placed;  ///< the points that it is the 95 % of
 };
 
@@ -64,8 +64,8 @@ struct LensJudgement {
 };
 
 struct Judgement {
-  /// Why (some) images of 10 sights or more have no judgement; empty where all have one. The test
-  /// photos_not_judged then fails: no evidence is no pass.
+  /// Why (some) images of 10 observations or more have no judgement; empty where all have one. The
+  /// test photos_not_judged then fails: no evidence is no pass.
   std::string not_judged;
   int parts = 1;  ///< that the images were judged in
   std::vector<Check> tests;
@@ -76,8 +76,9 @@ struct Judgement {
   int sights = 0;
 };
 
-/// Judges cameras and poses of undistorted views against their own sights:
-///  - all are solved for anew from the sights, distortion included, and the stored ones compared
+/// Judges cameras and poses of undistorted views against their own observations:
+///  - all are solved for again from the observations, distortion included, and the stored ones
+///  compared
 ///    with that, each pose and each lens as a Mahalanobis distance;
 ///  - two halves of the points, dealt by chance, are solved apart and compared; where they differ
 ///    by more than predicted, all uncertainties are widened by that factor;
@@ -87,7 +88,7 @@ struct Judgement {
 ///  row
 ///    by row (shutter.h).
 /// Some 4000 points, drawn by their index, take part, and all of photos that would be left few.
-/// More than some 220 photos (kMostUnknowns with three turns each) are judged in parts of about 100
+/// More than some 220 photos (kMaxUnknowns with three turns each) are judged in parts of about 100
 /// that see the same points, each by itself; of every test the worst part's figure is told.
 /// Deterministic for any number of threads. Throws Error on a broken bundle only, and Interrupted
 /// where `progress` asks for it.
@@ -100,7 +101,7 @@ std::vector<Degeneracy> FindDegeneracies(const Adjusted& adjusted,
                                          const BundleCovariance& covariance,
                                          double max_focal_share);
 
-/// JSON object: parts, sigma_px, condition, halves_ratio, sights, lenses[], cameras[],
+/// JSON object: parts, sigma_px, condition, halves_ratio, observations, lenses[], cameras[],
 /// degeneracies[], not_judged.
 std::string ToJson(const Judgement& judgement);
 

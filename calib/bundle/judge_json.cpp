@@ -35,7 +35,7 @@ std::string ToJson(const Judgement& judgement) {
                                {"moved_px", number(camera.moved_px)},
                                {"turn_sigma_rad", number(camera.turn_sigma_rad)},
                                {"centre_sigma", number(camera.centre_sigma)},
-                               {"picture_shift_px", number(camera.picture_shift_px)}});
+                               {"image_shift_px", number(camera.image_shift_px)}});
   }
   json["degeneracies"] = Json::array();
   for (const Degeneracy& d : judgement.degeneracies) {

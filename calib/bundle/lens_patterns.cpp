@@ -19,7 +19,7 @@ size_t LensOf(const Bundle& bundle, const BundleObservation& sight) {
   return static_cast<size_t>(bundle.images[static_cast<size_t>(sight.image)].lens);
 }
 
-// As many lenses as fit, those with most sights first.
+// As many lenses as fit, those with most observations first.
 Places PlacesOf(const Adjusted& adjusted, const BundleCovariance& layout, long per_lens) {
   const Bundle& bundle = adjusted.bundle;
   std::vector<int> sights(bundle.lenses.size());
@@ -48,7 +48,7 @@ Eigen::Vector2d FromMiddle(const LensCamera& lens, const Eigen::Vector2d& pixel)
   return pixel - Eigen::Vector2d(k.cx_px(), k.cy_px());
 }
 
-// Per lens: how far from its principal point the farthest sight lies that counts, px.
+// Per lens: how far from its principal point the farthest observation lies that counts, px.
 std::vector<double> Reaches(const Adjusted& adjusted) {
   const Bundle& bundle = adjusted.bundle;
   std::vector<double> reach(bundle.lenses.size(), 1);
@@ -67,7 +67,7 @@ LensPatternTest TestRadialPattern(const Adjusted& adjusted, const BundleCovarian
   const Bundle& bundle = adjusted.bundle;
   const Places places = PlacesOf(adjusted, layout, kRings);
   const std::vector<double> reach = Reaches(adjusted);
-  const auto rings_of = [&](const BundleObservation& sight, const SightRows& rows) {
+  const auto rings_of = [&](const BundleObservation& sight, const ObservationRows& rows) {
     std::vector<ExtraColumn> columns;
     const size_t lens = LensOf(bundle, sight);
     const Eigen::Vector2d way = FromMiddle(bundle.lenses[lens], DrawnAt(sight, rows));
@@ -88,7 +88,7 @@ LensPatternTest TestRadialPattern(const Adjusted& adjusted, const BundleCovarian
 LensPatternTest TestRegionalPattern(const Adjusted& adjusted, const BundleCovariance& layout) {
   const Bundle& bundle = adjusted.bundle;
   const Places places = PlacesOf(adjusted, layout, 2L * kPatternRegions * kPatternRegions);
-  const auto region_of = [&](const BundleObservation& sight, const SightRows& rows) {
+  const auto region_of = [&](const BundleObservation& sight, const ObservationRows& rows) {
     std::vector<ExtraColumn> columns;
     const size_t lens = LensOf(bundle, sight);
     if (places.first[lens] < 0) return columns;

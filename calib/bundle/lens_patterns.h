@@ -8,7 +8,8 @@ namespace dtr::calib {
 /// A pattern of every lens by itself, over all its images.
 struct LensPatternTest {
   WiderFit fit;
-  int lenses_left_out = 0;  ///< those of fewest sights, where more unknowns than can be tested
+  int lenses_left_out =
+      0;  ///< those of fewest observations, where more unknowns than can be tested
 };
 
 /// Along the radius from the principal point, as a function of the radius (kRings).

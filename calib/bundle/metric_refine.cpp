@@ -14,10 +14,10 @@
 namespace dtr::calib {
 namespace {
 
-constexpr int kMostTriedPoints = 4000;   // that decide which places agree
+constexpr int kMaxTriedPoints = 4000;    // that decide which places agree
 constexpr double kSettledSpread = 0.05;  // relative change of a standard deviation
-constexpr double kLeastSigmaM = 1e-3;    // nobody knows a place on Earth better
-constexpr double kMostOff = 5;           // standard deviations of a distance
+constexpr double kMinSigmaM = 1e-3;      // nobody knows a place on Earth better
+constexpr double kMaxOff = 5;            // standard deviations of a distance
 // What a model may be longer at one end than at the other before anything is adjusted.
 constexpr double kScaleDrift = 0.02;
 
@@ -68,7 +68,7 @@ Pairs PairsOf(const SfmModel& model, const KnownMetres& known, const std::vector
 // Which places agree, and how far those err that do not say so.
 struct Held {
   std::vector<bool> used;
-  double sigma_flat_m = kLeastSigmaM, sigma_up_m = kLeastSigmaM;
+  double sigma_flat_m = kMinSigmaM, sigma_up_m = kMinSigmaM;
 
   Eigen::Vector3d SigmaOf(const KnownPlace& place) const {
     const double flat = place.sigma_flat_m > 0 ? place.sigma_flat_m : sigma_flat_m;
@@ -87,16 +87,16 @@ std::vector<PositionPrior> PositionsOf(const KnownMetres& known, const Held& hel
 
 void RequireEnough(const Held& held) {
   const auto agree = static_cast<size_t>(std::count(held.used.begin(), held.used.end(), true));
-  if (agree >= kFewestPositions && 2 * agree >= held.used.size()) return;
+  if (agree >= kMinPositions && 2 * agree >= held.used.size()) return;
   throw Error(
       fmt::format("GPS: expected positions that agree with the cameras, found that {} of {} do",
                   agree, held.used.size()));
 }
 
-// What a position leaves of its error as its camera follows it, per place and axis: 1 where sights
-// decide, 0 where nothing else does (Helmert's redundancy numbers). Where the covariance is too
-// large to be worked out, the numbers of a similarity alone are counted (seven, six where distances
-// hold the scale), and errors come out too small by what the model bends.
+// What a position leaves of its error as its camera follows it, per place and axis: 1 where
+// observations decide, 0 where nothing else does (Helmert's redundancy numbers). Where the
+// covariance is too large to be worked out, the numbers of a similarity alone are counted (seven,
+// six where distances hold the scale), and errors come out too small by what the model bends.
 std::vector<Eigen::Vector3d> Redundancies(const KnownMetres& known, const Held& held,
                                           const BundleCovariance* covariance) {
   const auto agree = static_cast<double>(std::count(held.used.begin(), held.used.end(), true));
@@ -129,8 +129,8 @@ Held Judged(const KnownMetres& known, const std::vector<Eigen::Vector3d>& misses
       up_count += shares[i].z();
     }
   }
-  if (flat_count > 0) held.sigma_flat_m = std::max(kLeastSigmaM, std::sqrt(flat / flat_count));
-  if (up_count > 0) held.sigma_up_m = std::max(kLeastSigmaM, std::sqrt(up / up_count));
+  if (flat_count > 0) held.sigma_flat_m = std::max(kMinSigmaM, std::sqrt(flat / flat_count));
+  if (up_count > 0) held.sigma_up_m = std::max(kMinSigmaM, std::sqrt(up / up_count));
   std::vector<double> lengths;
   for (size_t i = 0; i < misses.size(); ++i) {
     lengths.push_back(misses[i].cwiseQuotient(held.SigmaOf(known.places[i])).norm());
@@ -181,7 +181,7 @@ void RequireAgreement(const SfmModel& model, const KnownMetres& known,
     const double sigma =
         std::hypot(by_gps * places.relative_sigma, SigmaOf(d), by_gps * kScaleDrift);
     const double off = std::abs(d.length_m - by_gps) / sigma;
-    if (off <= kMostOff) continue;
+    if (off <= kMaxOff) continue;
     throw Error(fmt::format(
         "{}: expected a distance that agrees with the photos' GPS, found {:.4g} m between these "
         "cameras by GPS, {:.1f} standard deviations off; is it the right pair?",
@@ -201,8 +201,8 @@ std::vector<Eigen::Vector3d> ErrorsOf(const KnownMetres& known, const std::vecto
                                       double found) {
   std::vector<Eigen::Vector3d> sigmas;
   for (size_t i = 0; i < agree.size(); ++i) {
-    const double flat = std::max({found, known.places[i].sigma_flat_m, kLeastSigmaM});
-    const double up = std::max({found, known.places[i].sigma_up_m, kLeastSigmaM});
+    const double flat = std::max({found, known.places[i].sigma_flat_m, kMinSigmaM});
+    const double up = std::max({found, known.places[i].sigma_up_m, kMinSigmaM});
     if (agree[i]) sigmas.push_back(Believed(known.places[i], {flat, flat, up}));
   }
   return sigmas;
@@ -219,7 +219,7 @@ Similarity FromPlaces(const SfmModel& model, const KnownMetres& known, Held& hel
   FillUncertainty(PairsOf(model, known, agree).centres, ErrorsOf(known, agree, placed.sigma_m),
                   placed);
   RequireAgreement(model, known, placed);
-  report.places_tell_scale = known.distances.empty() || placed.relative_sigma <= kMostRelativeSigma;
+  report.places_tell_scale = known.distances.empty() || placed.relative_sigma <= kMaxRelativeSigma;
   if (!report.places_tell_scale) {
     placed = AlignToPositions(pairs.centres, pairs.positions_m, FromDistances(model, known).scale);
   }
@@ -231,7 +231,7 @@ Similarity FromPlaces(const SfmModel& model, const KnownMetres& known, Held& hel
 // Turns and shifts the model to places that tell no more: held, they would bend nothing that photos
 // tell, and a solve finds a turn that is worth no more than theirs in very many steps.
 Held TurnToPlaces(const KnownMetres& known, Held held, MetricStart& start) {
-  for (int pass = 0; pass < known.most_passes; ++pass) {
+  for (int pass = 0; pass < known.max_passes; ++pass) {
     const Held next = Judged(known, Misses(known, start.model), held, nullptr);
     RequireEnough(next);
     start.report.passes = pass + 1;
@@ -249,8 +249,8 @@ Held TurnToPlaces(const KnownMetres& known, Held held, MetricStart& start) {
 void RequireNoContradiction(const Adjusted& held, const Adjusted& free) {
   if (!Contradicts(held, free)) return;
   throw Error(fmt::format(
-      "bundle adjustment: expected photos that agree with the places and distances given, found "
-      "residuals of {:.2f} px per coordinate and {} observations that agree with these held, "
+      "bundle adjustment: expected photos that agree with the positions and distances given, found "
+      "residuals of {:.2f} px per coordinate and {} observations that agree with these fixed, "
       "{:.2f} px and {} without; are their standard deviations too small, or is a distance of "
       "another pair?",
       held.sigma_px, held.sights, free.sigma_px, free.sights));
@@ -263,7 +263,7 @@ void SettlePlaces(const KnownMetres& known, MetricStart& start, Held held) {
   const SfmModel model =
       options.known_lenses ? WithLenses(start.model, *options.known_lenses) : start.model;
   const Bundle some =
-      SomePoints(BundleOf(model, options.separate_lenses), kMostTriedPoints, options.seed);
+      SomePoints(BundleOf(model, options.separate_lenses), kMaxTriedPoints, options.seed);
   AdjustOptions adjust =
       OptionsFor(options.known_lenses ? LensFreedom::kFixed : LensFreedom::kNoPrincipalPoint);
   adjust.progress = options.progress;
@@ -272,7 +272,7 @@ void SettlePlaces(const KnownMetres& known, MetricStart& start, Held held) {
   Bundle bundle = some;
   const bool placed = !known.places.empty() && start.report.places_tell_scale;
   if (placed) held = Judged(known, Misses(known, bundle), held, nullptr);
-  for (int pass = 0; pass < known.most_passes; ++pass) {
+  for (int pass = 0; pass < known.max_passes; ++pass) {
     if (placed) RequireEnough(held);
     if (placed) adjust.positions = PositionsOf(known, held);
     const Adjusted adjusted = Adjust(bundle, adjust);
@@ -287,7 +287,7 @@ void SettlePlaces(const KnownMetres& known, MetricStart& start, Held held) {
       start.report.passes = pass + 1;
       start.report.settled = settled;
     }
-    if (settled || pass + 1 == known.most_passes) {
+    if (settled || pass + 1 == known.max_passes) {
       RequireNoContradiction(adjusted, free);
       break;
     }
@@ -357,7 +357,7 @@ void Complete(const KnownMetres& known, const SfmModel& adjusted, MetricStart& s
     report.found_m.push_back(DistanceOf(adjusted, d));
     const double off = (report.found_m.back() - d.length_m) / SigmaOf(d);
     report.sigmas_off.push_back(std::abs(off));
-    if (report.sigmas_off.back() <= kMostOff) continue;
+    if (report.sigmas_off.back() <= kMaxOff) continue;
     throw Error(
         fmt::format("{}: expected a distance that the photos agree with, found {:.5g} m after "
                     "adjustment, {:.1f} "
@@ -369,12 +369,14 @@ void Complete(const KnownMetres& known, const SfmModel& adjusted, MetricStart& s
     weights += std::pow(report.places_relative_sigma, -2);
   }
   report.relative_sigma = 1 / std::sqrt(weights);
-  if (!(report.relative_sigma <= kMostRelativeSigma)) {
-    throw Error(fmt::format(
-        "bundle adjustment: expected places or distances that tell the scale to {:.0f} %, found "
-        "ones that tell it to {:.0f} %: they err too much for cameras that stand so near to each "
-        "other",
-        100 * kMostRelativeSigma, 100 * report.relative_sigma));
+  if (!(report.relative_sigma <= kMaxRelativeSigma)) {
+    throw Error(
+        fmt::format("bundle adjustment: expected positions or distances that determine the scale "
+                    "to {:.0f} %, found "
+                    "ones that determine it to {:.0f} %: they err too much for cameras that stand "
+                    "so near to each "
+                    "other",
+                    100 * kMaxRelativeSigma, 100 * report.relative_sigma));
   }
 }
 
@@ -403,7 +405,7 @@ Refined RefineInMetres(const KnownMetres& known, MetricStart& start) {
   Refined refined = Refine(start.model, start.options);
   if (!refined.changed) {
     throw Error(
-        fmt::format("bundle adjustment: expected a model that places and distances can be "
+        fmt::format("bundle adjustment: expected a model that positions and distances can be "
                     "held for, found none: {}; dtr calibrate scale carries a set as a whole",
                     refined.reason));
   }

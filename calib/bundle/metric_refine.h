@@ -29,7 +29,7 @@ struct KnownMetres {
   std::vector<KnownPlace> places;
   std::vector<KnownDistance> distances;
   /// Rounds after which it is given up that places settle (MetricReport::settled).
-  int most_passes = 10;
+  int max_passes = 10;
 };
 
 /// What holding it did.
@@ -64,7 +64,7 @@ struct MetricStart {
 };
 
 /// Carries `model` into metres: by the similarity to the places (x east, y north, z up); where they
-/// do not tell the scale to kMostRelativeSigma and distances do, by the mean scale of these, turned
+/// do not tell the scale to kMaxRelativeSigma and distances do, by the mean scale of these, turned
 /// and shifted to the places as a whole; where only distances are known, by that scale, its axes
 /// kept. Places that tell the scale are held: some 4000 points are
 /// adjusted, the places held (lenses without the principal point, or as known), again and again
@@ -80,7 +80,7 @@ MetricStart StartInMetres(const SfmModel& model, const KnownMetres& known,
 
 /// Refines it (Refine): the model in metres, `start.report` completed. Throws Error, naming it,
 /// where a distance is missed by more than 5 of its standard deviations, where the scale comes out
-/// uncertain by more than kMostRelativeSigma, and where the model cannot be refined: nothing would
+/// uncertain by more than kMaxRelativeSigma, and where the model cannot be refined: nothing would
 /// hold then.
 Refined RefineInMetres(const KnownMetres& known, MetricStart& start);
 

@@ -6,17 +6,17 @@
 #include <limits>
 
 #include "calib/bundle/gauge.h"
-#include "calib/bundle/sight_rows.h"
+#include "calib/bundle/observation_rows.h"
 
 namespace dtr::calib {
 namespace {
 
 constexpr int kReweightings = 20;
-constexpr double kLeastPx = 1e-3;  // images that move less count alike
+constexpr double kMinPx = 1e-3;  // images that move less count alike
 
 using Gauge = Eigen::Matrix<double, 7, 1>;
 
-struct MovedSight {
+struct MovedObservation {
   size_t image;
   Eigen::Vector2d by_px;
   Eigen::Matrix<double, 2, 7> by_gauge;
@@ -29,13 +29,13 @@ Bundle WithCameras(const Bundle& fresh, const Bundle& other_cameras) {
   return other;
 }
 
-std::vector<MovedSight> SightsOf(const Adjusted& solved, const Bundle& other) {
+std::vector<MovedObservation> SightsOf(const Adjusted& solved, const Bundle& other) {
   const auto fresh = Residuals(solved.bundle);
   const Normalised n = Normalised::Around(other);
   const Eigen::MatrixXd of_poses = GaugeColumns(n.poses);
-  std::vector<MovedSight> sights;
+  std::vector<MovedObservation> sights;
   for (size_t i = 0; i < fresh.size(); ++i) {
-    SightRows rows;
+    ObservationRows rows;
     const BundleObservation& o = other.observations[i];
     if (!solved.used[i] || !fresh[i].allFinite() || !RowsOf(n, other, o, rows)) continue;
     sights.push_back({static_cast<size_t>(o.image), rows.residual - fresh[i],
@@ -44,9 +44,10 @@ std::vector<MovedSight> SightsOf(const Adjusted& solved, const Bundle& other) {
   return sights;
 }
 
-std::vector<double> RmsOf(const std::vector<MovedSight>& sights, size_t images, const Gauge& g) {
+std::vector<double> RmsOf(const std::vector<MovedObservation>& sights, size_t images,
+                          const Gauge& g) {
   std::vector<double> squared(images), count(images);
-  for (const MovedSight& sight : sights) {
+  for (const MovedObservation& sight : sights) {
     squared[sight.image] += (sight.by_px + sight.by_gauge * g).squaredNorm();
     count[sight.image] += 1;
   }
@@ -66,16 +67,16 @@ std::vector<double> MovedPx(const Adjusted& solved, const Bundle& other_cameras)
 
 std::vector<double> MovedPxInNearestWorld(const Adjusted& solved, const Bundle& other_cameras) {
   const Bundle other = WithCameras(solved.bundle, other_cameras);
-  const std::vector<MovedSight> sights = SightsOf(solved, other);
+  const std::vector<MovedObservation> sights = SightsOf(solved, other);
   std::vector<double> count(other.images.size());
-  for (const MovedSight& sight : sights) count[sight.image] += 1;
+  for (const MovedObservation& sight : sights) count[sight.image] += 1;
   Gauge g = Gauge::Zero();
   for (int k = 0; k < kReweightings; ++k) {
     const std::vector<double> rms = RmsOf(sights, other.images.size(), g);
     Eigen::Matrix<double, 7, 7> normal = Eigen::Matrix<double, 7, 7>::Zero();
     Gauge right = Gauge::Zero();
-    for (const MovedSight& sight : sights) {
-      const double weight = 1 / (count[sight.image] * std::max(rms[sight.image], kLeastPx));
+    for (const MovedObservation& sight : sights) {
+      const double weight = 1 / (count[sight.image] * std::max(rms[sight.image], kMinPx));
       normal += weight * sight.by_gauge.transpose() * sight.by_gauge;
       right += weight * sight.by_gauge.transpose() * sight.by_px;
     }

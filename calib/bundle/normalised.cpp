@@ -14,11 +14,11 @@ namespace {
 
 // Centres closer together than this share of the points' distance are one place.
 constexpr double kOnePlace = 1e-9;
-constexpr double kLeastRadius = 1e-3;  // of what a lens sees, on the plane of its formula
+constexpr double kMinRadius = 1e-3;  // of what a lens sees, on the plane of its formula
 
 // Largest |q| that each lens sees a point at.
 std::vector<double> LargestRadii(const Bundle& bundle) {
-  std::vector<double> largest(bundle.lenses.size(), kLeastRadius);
+  std::vector<double> largest(bundle.lenses.size(), kMinRadius);
   for (const BundleObservation& o : bundle.observations) {
     const BundleImage& image = bundle.images[static_cast<size_t>(o.image)];
     const auto lens = static_cast<size_t>(image.lens);
@@ -141,12 +141,12 @@ void Normalised::ToWorld(Bundle& bundle) const {
 std::unique_ptr<ceres::CostFunction> Normalised::Cost(const Bundle& bundle,
                                                       const BundleObservation& sight) const {
   const auto image = static_cast<size_t>(sight.image);
-  SightExtras extras;
+  ObservationExtras extras;
   if (!members.empty()) extras.member = &members[image];
   if (!shift.empty()) extras.shift_scale_px = ShiftScalePx(bundle, image);
-  return SightCost(lenses[static_cast<size_t>(bundle.images[image].lens)], poses[image],
-                   points[static_cast<size_t>(sight.point)],
-                   sight.pixel - bundle.images[image].shift_px, extras);
+  return ObservationCost(lenses[static_cast<size_t>(bundle.images[image].lens)], poses[image],
+                         points[static_cast<size_t>(sight.point)],
+                         sight.pixel - bundle.images[image].shift_px, extras);
 }
 
 double Normalised::ShiftScalePx(const Bundle& bundle, size_t image) const {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "calib/bundle/bundle.h"
-#include "calib/bundle/sight_cost.h"
+#include "calib/bundle/observation_cost.h"
 
 namespace dtr::calib {
 
@@ -20,7 +20,7 @@ struct Normalised {
   std::vector<LensFrame> lenses;
   std::vector<PoseFrame> poses;
   std::vector<PointFrame> points;
-  std::vector<std::array<double, kMostParams>> theta;
+  std::vector<std::array<double, kMaxParams>> theta;
   std::vector<std::array<double, 6>> motion;
   std::vector<std::array<double, 3>> place;
   /// Per image, added to its shift in units of ShiftScalePx; empty where shifts are known.

@@ -5,8 +5,8 @@
 namespace dtr::calib {
 namespace {
 
-constexpr int kShared = 10;          // points that an image must share with a part to join it
-constexpr size_t kLeastOfPart = 20;  // images; fewer are joined by those of other parts
+constexpr int kShared = 10;        // points that an image must share with a part to join it
+constexpr size_t kMinOfPart = 20;  // images; fewer are joined by those of other parts
 constexpr int kUnknownsOfImage = 9;
 
 // Which images see a point, and the points of an image.
@@ -26,7 +26,7 @@ class Part {
  public:
   Part(const Bundle& bundle, const Sights& sights)
       : bundle_(bundle),
-        sights_(sights),
+        observations_(sights),
         wanted_(bundle.images.size()),
         lens_used_(bundle.lenses.size()),
         point_seen_(bundle.points.size()),
@@ -37,24 +37,24 @@ class Part {
     wanted_[image] = true;
     ++size_;
     lens_used_[LensOf(image)] = true;
-    for (const int point : sights_.of_image[image]) {
+    for (const int point : observations_.of_image[image]) {
       const auto p = static_cast<size_t>(point);
       if (point_seen_[p]) continue;
       point_seen_[p] = true;
-      for (const int other : sights_.of_point[p]) ++shared_[static_cast<size_t>(other)];
+      for (const int other : observations_.of_point[p]) ++shared_[static_cast<size_t>(other)];
     }
   }
 
   // The image that shares most points with the part, among those that may join; none where none
   // shares enough, or where it would be too much.
   template <typename MayJoin>
-  bool Grow(int most_unknowns, const MayJoin& may_join) {
+  bool Grow(int max_unknowns, const MayJoin& may_join) {
     size_t best = wanted_.size();
     for (size_t i = 0; i < wanted_.size(); ++i) {
       if (wanted_[i] || !may_join(i) || shared_[i] < kShared) continue;
       if (best == wanted_.size() || shared_[i] > shared_[best]) best = i;
     }
-    if (best == wanted_.size() || unknowns_ + Cost(best) > most_unknowns) return false;
+    if (best == wanted_.size() || unknowns_ + Cost(best) > max_unknowns) return false;
     Add(best);
     return true;
   }
@@ -71,7 +71,7 @@ class Part {
   }
 
   const Bundle& bundle_;
-  const Sights& sights_;
+  const Sights& observations_;
   std::vector<bool> wanted_, lens_used_, point_seen_;
   std::vector<int> shared_;
   int unknowns_ = 0;
@@ -123,7 +123,7 @@ int JudgedUnknowns(const Bundle& bundle) {
   return unknowns;
 }
 
-std::vector<Bundle> PartsOf(const Bundle& bundle, int most_unknowns) {
+std::vector<Bundle> PartsOf(const Bundle& bundle, int max_unknowns) {
   const Sights sights(bundle);
   std::vector<bool> taken(bundle.images.size());
   std::vector<Bundle> parts;
@@ -131,9 +131,9 @@ std::vector<Bundle> PartsOf(const Bundle& bundle, int most_unknowns) {
     if (taken[first]) continue;
     Part part(bundle, sights);
     part.Add(first);
-    while (part.Grow(most_unknowns, [&](size_t i) { return !taken[i]; })) {
+    while (part.Grow(max_unknowns, [&](size_t i) { return !taken[i]; })) {
     }
-    while (part.size() < kLeastOfPart && part.Grow(most_unknowns, [](size_t) { return true; })) {
+    while (part.size() < kMinOfPart && part.Grow(max_unknowns, [](size_t) { return true; })) {
     }
     for (size_t i = 0; i < taken.size(); ++i) taken[i] = taken[i] || part.wanted()[i];
     parts.push_back(OnlyImages(bundle, part.wanted()));

@@ -10,16 +10,16 @@ namespace dtr::calib {
 /// them see; points keep their numbers.
 Bundle OnlyImages(const Bundle& bundle, const std::vector<bool>& wanted);
 
-/// Without images of fewer than `fewest` sights.
+/// Without images of fewer than `fewest` observations.
 Bundle WithoutUnseen(const Bundle& bundle, int fewest);
 
 /// Unknowns of a bundle that is judged: its lenses' parameters, and per image a pose and the three
 /// turns of a rolling shutter.
 int JudgedUnknowns(const Bundle& bundle);
 
-/// Every image of a bundle in one part of `most_unknowns` at most, images that see the same points
+/// Every image of a bundle in one part of `max_unknowns` at most, images that see the same points
 /// together: parts grow by the image that shares most points with what they hold. What is left over
 /// is joined by images of other parts, so that no part is too small to be judged. Deterministic.
-std::vector<Bundle> PartsOf(const Bundle& bundle, int most_unknowns);
+std::vector<Bundle> PartsOf(const Bundle& bundle, int max_unknowns);
 
 }  // namespace dtr::calib

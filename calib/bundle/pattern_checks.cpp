@@ -25,7 +25,8 @@ Check LensCheck(const char* name, const std::string& what, const LensPatternTest
                 const BundleLimits& limits) {
   Check check = CheckOf(name, what, test.fit, limits.min_p, limits.max_lens_pattern_px);
   if (test.lenses_left_out > 0) {
-    check.reason += fmt::format("; without {} lenses of fewest observations", test.lenses_left_out);
+    check.reason +=
+        fmt::format("; without {} cameras with the fewest observations", test.lenses_left_out);
   }
   return check;
 }
@@ -34,7 +35,7 @@ Check ShutterCheck(const Adjusted& fresh, const BundleCovariance& layout,
                    const BundleLimits& limits) {
   const ShutterTest test = TestShutter(fresh, layout);
   Check check =
-      CheckOf("rolling_shutter_px", "residuals as of cameras that turn while the rows are read",
+      CheckOf("rolling_shutter_px", "residuals as of cameras that rotate while the rows are read",
               test.fit, limits.min_p, limits.max_shutter_px);
   if (check.passed || test.sigmas.empty()) return check;
   const auto surest = static_cast<size_t>(std::max_element(test.sigmas.begin(), test.sigmas.end()) -
@@ -49,13 +50,13 @@ Check ShutterCheck(const Adjusted& fresh, const BundleCovariance& layout,
 
 std::vector<Check> PatternChecks(const Adjusted& fresh, const BundleCovariance& layout,
                                  const BundleLimits& limits) {
-  return {
-      LensCheck("radial_pattern_px", "residuals along the radius that the lens model cannot follow",
-                TestRadialPattern(fresh, layout), limits),
-      LensCheck("regional_pattern_px",
-                "mean residuals of image regions that the lens model cannot follow",
-                TestRegionalPattern(fresh, layout), limits),
-      ShutterCheck(fresh, layout, limits)};
+  return {LensCheck("radial_pattern_px",
+                    "residuals along the radius that the camera model cannot follow",
+                    TestRadialPattern(fresh, layout), limits),
+          LensCheck("regional_pattern_px",
+                    "mean residuals of image regions that the camera model cannot follow",
+                    TestRegionalPattern(fresh, layout), limits),
+          ShutterCheck(fresh, layout, limits)};
 }
 
 }  // namespace dtr::calib

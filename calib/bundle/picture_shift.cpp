@@ -12,10 +12,10 @@ namespace dtr::calib {
 namespace {
 
 constexpr double kNoShift = std::numeric_limits<double>::quiet_NaN();
-constexpr int kPointsPerView = 40;  // that its picture's shift is worked out at
+constexpr int kPointsPerView = 40;  // that its image's shift is worked out at
 
-// Sights of each image, by index, of points that are places.
-std::vector<std::vector<int>> SightsByImage(const Adjusted& fresh) {
+// Observations of each image, by index, of points that are places.
+std::vector<std::vector<int>> ObservationsByImage(const Adjusted& fresh) {
   std::vector<std::vector<int>> sights(fresh.bundle.images.size());
   for (size_t i = 0; i < fresh.bundle.observations.size(); ++i) {
     const BundleObservation& o = fresh.bundle.observations[i];
@@ -58,7 +58,7 @@ std::vector<PlacedPixel> Placed(const Adjusted& fresh, const BundleCovariance& c
 }
 
 // 95 % of their standard deviations.
-double PictureShift(const std::vector<PlacedPixel>& placed) {
+double ImageShift(const std::vector<PlacedPixel>& placed) {
   if (placed.empty()) return kNoShift;
   std::vector<double> shifts;
   for (const PlacedPixel& point : placed) shifts.push_back(point.sigma_px);
@@ -68,9 +68,9 @@ double PictureShift(const std::vector<PlacedPixel>& placed) {
 
 }  // namespace
 
-void PictureShifts(const Adjusted& fresh, const BundleCovariance& covariance, int threads,
-                   std::vector<CameraJudgement>& cameras) {
-  const auto sights = SightsByImage(fresh);
+void ImageShifts(const Adjusted& fresh, const BundleCovariance& covariance, int threads,
+                 std::vector<CameraJudgement>& cameras) {
+  const auto sights = ObservationsByImage(fresh);
   std::vector<std::vector<int>> seen_by(fresh.bundle.points.size());
   for (size_t i = 0; i < sights.size(); ++i) {
     for (const int s : sights[i]) {
@@ -82,7 +82,7 @@ void PictureShifts(const Adjusted& fresh, const BundleCovariance& covariance, in
   ParallelFor(0, static_cast<int>(sights.size()), threads, [&](int i) {
     CameraJudgement& camera = cameras[static_cast<size_t>(i)];
     camera.placed = Placed(fresh, covariance, sights, seen_by, i);
-    camera.picture_shift_px = PictureShift(camera.placed);
+    camera.image_shift_px = ImageShift(camera.placed);
   });
 }
 

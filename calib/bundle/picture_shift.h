@@ -1,5 +1,5 @@
-// calib/bundle/picture_shift.h -- internal to calib/bundle: what a calibration's uncertainty does
-// to the picture.
+// calib/bundle/image_shift.h -- internal to calib/bundle: what a calibration's uncertainty does
+// to the image.
 #pragma once
 #include <vector>
 
@@ -7,8 +7,8 @@
 
 namespace dtr::calib {
 
-/// Fills in `placed` and `picture_shift_px` of every image's judgement (TransferCovariance).
-void PictureShifts(const Adjusted& fresh, const BundleCovariance& covariance, int threads,
-                   std::vector<CameraJudgement>& cameras);
+/// Fills in `placed` and `image_shift_px` of every image's judgement (TransferCovariance).
+void ImageShifts(const Adjusted& fresh, const BundleCovariance& covariance, int threads,
+                 std::vector<CameraJudgement>& cameras);
 
 }  // namespace dtr::calib

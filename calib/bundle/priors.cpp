@@ -10,7 +10,7 @@
 namespace dtr::calib {
 namespace {
 
-[[noreturn]] void RefusePrior(const std::string& what) {
+[[noreturn]] void RejectPrior(const std::string& what) {
   throw Error("bundle adjustment: " + what);
 }
 
@@ -139,13 +139,13 @@ void CheckPriors(const Bundle& bundle, const AdjustOptions& options) {
   for (const PositionPrior& p : options.positions) {
     if (!known(p.image) || !p.centre.allFinite() || !(p.sigma.array() > 0).all() ||
         !p.sigma.allFinite()) {
-      RefusePrior("expected known positions of its images, finite and with sigmas above 0");
+      RejectPrior("expected known positions of its images, finite and with sigmas above 0");
     }
   }
   for (const DistancePrior& d : options.distances) {
     if (!known(d.image_a) || !known(d.image_b) || d.image_a == d.image_b || !(d.distance > 0) ||
         !(d.sigma > 0) || !std::isfinite(d.distance + d.sigma)) {
-      RefusePrior(
+      RejectPrior(
           "expected known distances between two of its images, above 0 and with sigmas above 0");
     }
   }

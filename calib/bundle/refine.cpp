@@ -18,18 +18,20 @@
 namespace dtr::calib {
 namespace {
 
-constexpr double kLossSigmas = 2;  // scale of the loss that unseen points and sights are judged by
+constexpr double kLossSigmas =
+    2;  // scale of the loss that unseen points and observations are judged by
 constexpr int kMostPoints = 4000;  // that the candidates are compared on
 // A principal point for every image also takes up what other faults of a lens model leave, and
 // costs the lens's own principal point: what the images share, nothing but the prior says. So it
 // must meet unseen points closer by this share; a stabiliser's pixels are worth several times that.
-constexpr double kLeastGainPerImage = 0.01;
+constexpr double kMinGainPerImage = 0.01;
 constexpr std::array kRisingFreedom{LensFreedom::kNoPrincipalPoint, LensFreedom::kAll,
                                     LensFreedom::kTangential, LensFreedom::kPrincipalPointPerImage,
                                     LensFreedom::kTangentialPerImage};
 
 constexpr size_t kNoneConverged = ~size_t{0}, kNoScale = kNoneConverged - 1;
-constexpr double kSurelySigmas = 5;  // errors of real sights go together: predicted ones are small
+constexpr double kSurelySigmas =
+    5;  // errors of real observations go together: predicted ones are small
 
 bool HasPriors(const RefineOptions& options) {
   return !options.positions.empty() || !options.distances.empty();
@@ -74,7 +76,7 @@ double PrincipalPointSigmas(const Bundle& bundle, const RefineOptions& refine) {
 bool IsWorthIt(const RefineCandidate& candidate, const RefineCandidate& chosen) {
   if (!(candidate.high_px2 < 0)) return false;
   const bool newly_per_image = IsPerImage(*candidate.lens) && !IsPerImage(*chosen.lens);
-  return !newly_per_image || candidate.held_out_px < (1 - kLeastGainPerImage) * chosen.held_out_px;
+  return !newly_per_image || candidate.held_out_px < (1 - kMinGainPerImage) * chosen.held_out_px;
 }
 
 std::vector<RefineCandidate> CandidatesFor(const Bundle& bundle, bool separate_lenses) {
@@ -121,9 +123,9 @@ std::vector<std::vector<double>> TryOnUnseenPoints(const Bundle& bundle,
 }
 
 /// Which lens parameters to free, by points that were not adjusted to; index of the candidate, or
-/// kNoneConverged, or kNoScale where nothing says how far sights err. A candidate whose solve did
-/// not converge is not taken.
-size_t Choose(const Bundle& bundle, const SightSplit& split, const RefineOptions& options,
+/// kNoneConverged, or kNoScale where nothing says how far observations err. A candidate whose solve
+/// did not converge is not taken.
+size_t Choose(const Bundle& bundle, const ObservationSplit& split, const RefineOptions& options,
               Refined& refined) {
   auto& candidates = refined.candidates;
   candidates = CandidatesFor(bundle, options.separate_lenses);
@@ -143,31 +145,31 @@ size_t Choose(const Bundle& bundle, const SightSplit& split, const RefineOptions
     bool better = chosen == 0 || IsWorthIt(candidate, candidates[chosen]);
     if (!better && candidate.lens == LensFreedom::kAll && !(candidate.low_px2 > 0)) {
       // A principal point off its place is nearly a turn of all cameras, which unseen points hardly
-      // tell; what all sights together say of it is known by its covariance.
+      // tell; what all observations together say of it is known by its covariance.
       candidate.principal_point_sigmas = PrincipalPointSigmas(some, options);
       better = candidate.principal_point_sigmas > kSurelySigmas;
     }
     if (candidate.converged && better) chosen = i;
   }
   if (!candidates[0].converged || chosen == 0) return kNoneConverged;
-  // Now like with like: adjusted to all sights, as the given model was.
+  // Now like with like: adjusted to all observations, as the given model was.
   refined.adjusted = Adjust(bundle, SolveOptions(options, candidates[chosen].lens));
-  const auto given = LossesOfHeldOutSights(bundle, split, scale_px);
-  const auto adjusted = LossesOfHeldOutSights(refined.adjusted.bundle, split, scale_px);
+  const auto given = LossesOfHeldOutObservations(bundle, split, scale_px);
+  const auto adjusted = LossesOfHeldOutObservations(refined.adjusted.bundle, split, scale_px);
   refined.given_px = std::sqrt(Mean(given));
   refined.adjusted_px = std::sqrt(Mean(adjusted));
-  refined.held_out_sights = static_cast<int>(split.held_out.size());
+  refined.held_out_observations = static_cast<int>(split.held_out.size());
   if (!refined.adjusted.converged) return kNoneConverged;
   if (HasPriors(options)) return chosen;
   if (refined.given_px <= kPrecisionPx) return 0;  // exact: what is left is rounding
-  // Beyond chance: a model that saw fewer sights, or none, need not be wrong for it.
+  // Beyond chance: a model that saw fewer observations, or none, need not be wrong for it.
   return BootstrapOfDifference(adjusted, given, options.seed).second < 0 ? chosen : 0;
 }
 
 bool Refinable(const SfmModel& model, std::string* reason) {
   for (const auto& [id, camera] : model.cameras) {
     if (camera.model != LensModel::kFov) continue;
-    *reason = "the lens model FOV cannot be adjusted";
+    *reason = "the camera model FOV cannot be adjusted";
     return false;
   }
   if (model.images.size() < 3) {
@@ -198,12 +200,12 @@ SfmModel WithLenses(SfmModel model, const std::map<std::uint32_t, LensCamera>& l
   for (auto& [id, camera] : model.cameras) {
     const auto known = lenses.find(id);
     if (known == lenses.end()) {
-      throw Error(
-          fmt::format("bundle adjustment: expected a known lens for camera {}, found none", id));
+      throw Error(fmt::format(
+          "bundle adjustment: expected known intrinsics for camera {}, found none", id));
     }
     if (known->second.width_px != camera.width_px || known->second.height_px != camera.height_px) {
       throw Error(fmt::format(
-          "bundle adjustment: expected a lens for images of {}x{}, found one "
+          "bundle adjustment: expected intrinsics for images of {}x{}, found one "
           "for {}x{}; scale it to the photos",
           camera.width_px, camera.height_px, known->second.width_px, known->second.height_px));
     }
@@ -221,10 +223,11 @@ Refined Refine(const SfmModel& model, const RefineOptions& options) {
     refined.lens = LensFreedom::kFixed;
     refined.adjusted = Adjust(BundleOf(known), SolveOptions(options, refined.lens));
     if (!refined.adjusted.converged) {
-      throw Error(fmt::format(
-          "bundle adjustment: expected to converge with the lens that was given, found none of it "
-          "after {} iterations; is it the lens of these photos?",
-          refined.adjusted.iterations));
+      throw Error(
+          fmt::format("bundle adjustment: expected to converge with the intrinsics that were "
+                      "given, found none of it "
+                      "after {} iterations; are they those of these photos?",
+                      refined.adjusted.iterations));
     }
     Finish(known, options, refined);
     return refined;
@@ -232,12 +235,13 @@ Refined Refine(const SfmModel& model, const RefineOptions& options) {
   AskDetermined(model, options);
   if (!Refinable(model, &refined.reason)) return refined;
   const Bundle bundle = BundleOf(model, options.separate_lenses);
-  const SightSplit split = SplitSights(SomePoints(bundle, kMostPoints, options.seed), options.seed);
+  const ObservationSplit split =
+      SplitObservations(SomePoints(bundle, kMostPoints, options.seed), options.seed);
   const auto enough = split.held_out.size();
-  if (enough < kFewestHeldOut) {
-    refined.held_out_sights = static_cast<int>(enough);
+  if (enough < kMinHeldOut) {
+    refined.held_out_observations = static_cast<int>(enough);
     refined.reason = fmt::format("expected {} points that {} or more images see, found {}",
-                                 kFewestHeldOut, kMinTrack, enough);
+                                 kMinHeldOut, kMinTrack, enough);
     return refined;
   }
   const size_t chosen = Choose(bundle, split, options, refined);
@@ -287,11 +291,11 @@ void RequireDetermined(const SfmModel& model, const RefineOptions& options,
 
 double HeldOutErrorPx(const SfmModel& model, std::uint64_t seed, int* count) {
   const Bundle bundle = BundleOf(model);
-  const SightSplit split = SplitSights(SomePoints(bundle, kMostPoints, seed), seed);
+  const ObservationSplit split = SplitObservations(SomePoints(bundle, kMostPoints, seed), seed);
   // Cauchy's loss is monotone in the length: its inverse gives the lengths back.
   constexpr double kScalePx = 1;
   std::vector<double> lengths_px;
-  for (const double loss : LossesOfHeldOutSights(bundle, split, kScalePx)) {
+  for (const double loss : LossesOfHeldOutObservations(bundle, split, kScalePx)) {
     lengths_px.push_back(kScalePx * std::sqrt(std::expm1(loss / (kScalePx * kScalePx))));
   }
   *count = static_cast<int>(lengths_px.size());
@@ -313,7 +317,7 @@ std::string ToJson(const Refined& refined) {
   json["refined"] = refined.changed;
   if (!refined.reason.empty()) json["reason"] = refined.reason;
   if (refined.lens) json["lens"] = NameOf(*refined.lens);
-  json["held_out_sights"] = refined.held_out_sights;
+  json["held_out_observations"] = refined.held_out_observations;
   json["given_px"] = refined.given_px;
   json["adjusted_px"] = refined.adjusted_px;
   json["candidates"] = nlohmann::ordered_json::array();
@@ -330,7 +334,7 @@ std::string ToJson(const Refined& refined) {
     json["rms_px"] = refined.adjusted.rms_px;
     json["iterations"] = refined.adjusted.iterations;
     json["converged"] = refined.adjusted.converged;
-    json["unsettled_sights"] = refined.adjusted.unsettled;
+    json["unsettled_observations"] = refined.adjusted.unsettled;
     json["points_dropped"] = refined.points_dropped;
   }
   if (!refined.covariance_json.empty()) {

@@ -1,5 +1,5 @@
-// calib/bundle/refine.h -- is a model better after bundle adjustment? Only if held-out sights say
-// so.
+// calib/bundle/refine.h -- is a model better after bundle adjustment? Only if held-out observations
+// say so.
 #pragma once
 #include <cstdint>
 #include <map>
@@ -18,21 +18,21 @@ struct RefineOptions {
   std::optional<std::map<std::uint32_t, LensCamera>> known_lenses;
   bool separate_lenses = false;  ///< every image a lens of its own
   bool covariance = false;       ///< work out Refined::covariance_json
-  /// What is known beside the sights, in the model's world and unit; `image` is an index into
+  /// What is known beside the observations, in the model's world and unit; `image` is an index into
   /// SfmModel::images. Held by every solve, those of the candidates, too.
   std::vector<PositionPrior> positions;
   std::vector<DistancePrior> distances;
   /// The name of the model, or of its photos, where it must determine its cameras:
-  /// Refine asks RequireDetermined before it adjusts anything. Empty: nobody asks.
+  /// Refine asks RequireDetermined before it adjusts anything. Empty: unset.
   std::string determined;
   /// What helps where it does not; empty: more views, or a camera that is known.
   std::string advice = {};
   int threads = 0;
-  std::uint64_t seed = 0;              ///< of the sights that are held out
+  std::uint64_t seed = 0;              ///< of the observations that are held out
   const Progress* progress = nullptr;  ///< AdjustOptions::progress of every solve
 };
 
-/// A way to refine, and what it does to sights it has not seen.
+/// A way to refine, and what it does to observations it has not seen.
 struct RefineCandidate {
   std::string name;                 ///< "as given" or a LensFreedom
   std::optional<LensFreedom> lens;  ///< empty: cameras as given
@@ -51,10 +51,11 @@ struct Refined {
   bool changed = false;  ///< false: the model is as it was given
   std::string reason;    ///< why nothing was changed; empty otherwise
   std::vector<RefineCandidate> candidates;
-  int held_out_sights = 0;  ///< that the model as given and the adjusted one were compared on,
+  int held_out_observations =
+      0;  ///< that the model as given and the adjusted one were compared on,
   double given_px = 0, adjusted_px = 0;  ///< root mean of Cauchy's loss over these
   std::optional<LensFreedom> lens;
-  Adjusted adjusted;  ///< of the chosen candidate, all sights; bundle emptied
+  Adjusted adjusted;  ///< of the chosen candidate, all observations; bundle emptied
   /// Of that (covariance_json.h), where it was asked for and the model was changed.
   std::string covariance_json;
   int points_dropped = 0;
@@ -64,21 +65,21 @@ struct Refined {
 /// the principal point, with it, with tangential distortion, and with a principal point for every
 /// image (stabilised lenses), and tried on the other half, and the other way round: more is freed
 /// only if that explains unseen points better beyond the bootstrap interval, and for numbers that
-/// every image has by itself by 1 % at least. The chosen way is then run on all sights, as
+/// every image has by itself by 1 % at least. The chosen way is then run on all observations, as
 /// structure from motion was; the result is taken only if its cameras predict one sight of each
 /// point from the others better than the cameras as given, beyond the bootstrap interval.
 ///
 /// With known lenses, poses and points are adjusted to them without being asked whether it pays;
 /// with known positions or distances, the lenses' freedom is chosen as above, and the result taken
-/// whether or not it predicts the sights better: what is known is to hold.
+/// whether or not it predicts the observations better: what is known is to hold.
 /// Deterministic for any number of threads. What cannot be refined (a lens model FOV, too few
 /// points) comes back unchanged, with the reason; errors of broken models are thrown, and
 /// those of RequireDetermined where options.determined asks for it.
 Refined Refine(const SfmModel& model, const RefineOptions& options);
 
 /// In what ways the views of a model do not suffice (judge.h), its poses, points and lenses free as
-/// Refine leaves them, what is known beside the sights held. At most 4000 points take part. A model
-/// with a FOV lens has none to tell of.
+/// Refine leaves them, what is known beside the observations held. At most 4000 points take part. A
+/// model with a FOV lens has none to tell of.
 std::vector<Degeneracy> DegeneraciesOf(const SfmModel& model, const RefineOptions& options);
 
 /// Throws Error naming the degeneracy where one leaves poses, points or focal lengths undetermined.
@@ -98,13 +99,13 @@ double HeldOutErrorPx(const SfmModel& model, std::uint64_t seed, int* count);
 /// another size.
 SfmModel WithLenses(SfmModel model, const std::map<std::uint32_t, LensCamera>& lenses);
 
-/// What is to be said of a result that is no error: that which sights count had not settled. Empty:
-/// nothing.
+/// What is to be said of a result that is no error: that which observations count had not settled.
+/// Empty: nothing.
 std::string RemarkOn(const Refined& refined);
 
-/// JSON object: refined, reason, lens, candidates[].{name,held_out_px,converged}, held_out_sights,
-/// given_px, adjusted_px, sigma_px, rms_px, iterations, converged, unsettled_sights,
-/// points_dropped, covariance (where asked for).
+/// JSON object: refined, reason, lens, candidates[].{name,held_out_px,converged},
+/// held_out_observations, given_px, adjusted_px, sigma_px, rms_px, iterations, converged,
+/// unsettled_observations, points_dropped, covariance (where asked for).
 std::string ToJson(const Refined& refined);
 
 }  // namespace dtr::calib

@@ -12,9 +12,9 @@
 namespace dtr::calib {
 namespace {
 
-constexpr double kMostScaleSpread = 0.2;
+constexpr double kMaxScaleSpread = 0.2;
 
-[[noreturn]] void RefuseRig(const std::string& what) { throw Error("rig: " + what); }
+[[noreturn]] void RejectRig(const std::string& what) { throw Error("rig: " + what); }
 
 SfmModel WithLenses(SfmModel model, const KnownRig& rig,
                     const std::map<std::string, RigPhoto>& photo_of) {
@@ -25,11 +25,11 @@ SfmModel WithLenses(SfmModel model, const KnownRig& rig,
   }
   for (SfmImage& image : model.images) {
     const auto photo = photo_of.find(image.name);
-    if (photo == photo_of.end()) RefuseRig(image.name + ": expected a photo of the rig");
+    if (photo == photo_of.end()) RejectRig(image.name + ": expected a photo of the rig");
     const LensCamera& lens = rig.lenses[photo->second.camera];
     const LensCamera& was = old.at(image.camera_id);
     if (lens.width_px != was.width_px || lens.height_px != was.height_px) {
-      RefuseRig(fmt::format("{}: expected {} x {} px as the calibration has, found {} x {}",
+      RejectRig(fmt::format("{}: expected {} x {} px as the calibration has, found {} x {}",
                             image.name, lens.width_px, lens.height_px, was.width_px,
                             was.height_px));
     }
@@ -75,14 +75,14 @@ void FindScale(const Bundle& bundle, const Frames& frames, RigRefined& refined) 
     }
   }
   if (scales.empty()) {
-    RefuseRig("expected an instant that two cameras saw from different places, found none");
+    RejectRig("expected a time step that two cameras saw from different positions, found none");
   }
   refined.pairs = static_cast<int>(scales.size());
   refined.scale = UpperMedian(scales);
   for (double& s : scales) s = std::abs(s - refined.scale);
   refined.scale_spread = 1.4826 * UpperMedian(scales) / refined.scale;
-  if (refined.scale_spread > kMostScaleSpread) {
-    RefuseRig(
+  if (refined.scale_spread > kMaxScaleSpread) {
+    RejectRig(
         fmt::format("expected photos of this rig, found distances between its cameras that "
                     "scatter by {:.0f} %",
                     100 * refined.scale_spread));
@@ -122,7 +122,7 @@ void Scale(double scale, Bundle& bundle) {
 
 void RequireConverged(const Adjusted& adjusted, const char* what) {
   if (!adjusted.converged) {
-    RefuseRig(fmt::format("expected the solve {} to converge, found none of it after {} iterations",
+    RejectRig(fmt::format("expected the solve {} to converge, found none of it after {} iterations",
                           what, adjusted.iterations));
   }
 }
@@ -137,7 +137,7 @@ RigRefined RefineRig(const SfmModel& model, const KnownRig& rig,
   options.lens = LensFreedom::kFixed;
   options.progress = progress;
   const Adjusted free = Adjust(BundleOf(known), options);
-  RequireConverged(free, "with the rig's lenses");
+  RequireConverged(free, "with the rig's intrinsics");
   refined.free_sigma_px = free.sigma_px;
   Bundle bundle = free.bundle;
   const Frames frames = FramesOf(bundle, rig, photo_of);
@@ -149,11 +149,11 @@ RigRefined RefineRig(const SfmModel& model, const KnownRig& rig,
     rig_from_world.push_back(RigOf(bundle, frames, members));
   }
   refined.adjusted = AdjustRig(bundle, frames.images, rig_from_world, options);
-  RequireConverged(refined.adjusted, "with the rig's places");
+  RequireConverged(refined.adjusted, "with the rig's positions");
   if (Contradicts(refined.adjusted, free)) {
-    RefuseRig(fmt::format(
+    RejectRig(fmt::format(
         "expected photos of this rig, found residuals of {:.2f} px per coordinate and {} "
-        "observations that agree with its places held, {:.2f} px and {} without; was a camera "
+        "observations that agree with its positions fixed, {:.2f} px and {} without; was a camera "
         "moved since?",
         refined.adjusted.sigma_px, refined.adjusted.sights, free.sigma_px, free.sights));
   }

@@ -11,7 +11,7 @@
 
 namespace dtr::calib {
 
-/// Which camera of the rig took an image, and at which instant.
+/// Which camera of the rig took an image, and at which time step.
 struct RigImage {
   int frame = 0;
   Pose cam_from_rig;  ///< in the bundle's unit
@@ -30,7 +30,7 @@ struct KnownRig {
   std::vector<Pose> cam_from_rig;  ///< per camera, in the rig's unit
 };
 
-/// Camera (index into KnownRig) and instant of a photo.
+/// Camera (index into KnownRig) and time step of a photo.
 struct RigPhoto {
   size_t camera = 0;
   std::string frame;
@@ -47,12 +47,12 @@ struct RigRefined {
 };
 
 /// Poses and points of a model, given the lenses and places of a rig: lenses are held, the model is
-/// brought to the rig's unit by the cameras that saw an instant together, and all is adjusted with
+/// brought to the rig's unit by the cameras that saw a time step together, and all is adjusted with
 /// every frame rigid. `photo_of` must know every image by name.
 /// Throws Error where an image has another size than its camera, where no frame has two cameras
 /// that stand apart, where the photos contradict the rig (single scales scatter by more than a
-/// fifth, or the residuals grow by half or a tenth of the sights is lost for the rig), and where a
-/// solve does not converge. `progress`: AdjustOptions::progress.
+/// fifth, or the residuals grow by half or a tenth of the observations is lost for the rig), and
+/// where a solve does not converge. `progress`: AdjustOptions::progress.
 RigRefined RefineRig(const SfmModel& model, const KnownRig& rig,
                      const std::map<std::string, RigPhoto>& photo_of,
                      const Progress* progress = nullptr);

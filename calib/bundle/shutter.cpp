@@ -10,7 +10,7 @@ namespace dtr::calib {
 ShutterTest TestShutter(const Adjusted& adjusted, const BundleCovariance& layout) {
   const Bundle& bundle = adjusted.bundle;
   // How far down the image, from -1/2 to 1/2, times the turn of all of it.
-  const auto turns_of = [&](const BundleObservation& sight, const SightRows& rows) {
+  const auto turns_of = [&](const BundleObservation& sight, const ObservationRows& rows) {
     const auto lens = static_cast<size_t>(bundle.images[static_cast<size_t>(sight.image)].lens);
     const double share = DrawnAt(sight, rows).y() / bundle.lenses[lens].height_px - 0.5;
     std::vector<ExtraColumn> columns;

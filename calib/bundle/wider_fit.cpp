@@ -14,7 +14,7 @@ namespace {
 // Of columns of length 1: what is left of one that the other unknowns do not make as well.
 constexpr double kDependent = 1e-6;
 
-// The unknowns that the sights of one point depend on, in the order of their first use.
+// The unknowns that the observations of one point depend on, in the order of their first use.
 class Columns {
  public:
   long Of(long unknown) {
@@ -49,13 +49,13 @@ class Normal {
     std::vector<std::vector<std::pair<long, Eigen::Vector2d>>> rows;
     std::vector<Eigen::Matrix<double, 2, 3>> by_point;
     for (const BundleObservation* sight : sights) {
-      SightRows seen;
+      ObservationRows seen;
       if (!RowsOf(n_, bundle_, *sight, seen)) continue;
       rows.push_back(RestOf(*sight, seen, columns));
       by_point.push_back(seen.point);
     }
     const auto height = 2 * static_cast<long>(rows.size());
-    if (height < 4) return;  // one sight says nothing about anything but its point
+    if (height < 4) return;  // one observation says nothing about anything but its point
     Eigen::MatrixXd points(height, 3);
     Eigen::MatrixXd rest =
         Eigen::MatrixXd::Zero(height, static_cast<long>(columns.unknowns().size()));
@@ -92,7 +92,7 @@ class Normal {
 
  private:
   std::vector<std::pair<long, Eigen::Vector2d>> RestOf(const BundleObservation& sight,
-                                                       const SightRows& seen,
+                                                       const ObservationRows& seen,
                                                        Columns& columns) const {
     const auto image = static_cast<size_t>(sight.image);
     const auto lens = static_cast<size_t>(bundle_.images[image].lens);
@@ -152,7 +152,7 @@ WiderFit Judged(const Eigen::MatrixXd& left, const Eigen::VectorXd& units, doubl
   }
   const double below = free - fit.freedom;
   if (fit.freedom == 0 || !(below > 0)) {
-    fit.not_tested = "the observations do not tell it from the other unknowns";
+    fit.not_tested = "the observations do not separate it from the other unknowns";
     return fit;
   }
   // Of exact observations rounding is left, which may as well come out below zero.
@@ -189,10 +189,10 @@ WiderFit FitWider(const Adjusted& adjusted, const BundleCovariance& layout, long
 }
 
 long MostExtra(const BundleCovariance& layout) {
-  return kMostUnknowns - (layout.image_at.back() + 6);
+  return kMaxUnknowns - (layout.image_at.back() + 6);
 }
 
-Eigen::Vector2d DrawnAt(const BundleObservation& sight, const SightRows& rows) {
+Eigen::Vector2d DrawnAt(const BundleObservation& sight, const ObservationRows& rows) {
   return sight.pixel + rows.residual;
 }
 

@@ -7,18 +7,18 @@
 #include <vector>
 
 #include "calib/bundle/covariance.h"
-#include "calib/bundle/sight_rows.h"
+#include "calib/bundle/observation_rows.h"
 
 namespace dtr::calib {
 
-/// How a sight's residual, px, follows one more unknown.
+/// How an observation's residual, px, follows one more unknown.
 struct ExtraColumn {
   long unknown = 0;
   Eigen::Vector2d by;
 };
-/// Those that a sight feels; none of them twice.
+/// Those that an observation feels; none of them twice.
 using ExtraColumns =
-    std::function<std::vector<ExtraColumn>(const BundleObservation&, const SightRows&)>;
+    std::function<std::vector<ExtraColumn>(const BundleObservation&, const ObservationRows&)>;
 
 struct WiderFit {
   std::string not_tested;  ///< why there is no figure; empty where there is one
@@ -36,11 +36,11 @@ struct WiderFit {
 WiderFit FitWider(const Adjusted& adjusted, const BundleCovariance& layout, long extra,
                   const ExtraColumns& columns);
 
-/// How many unknowns may be added before the test is refused.
+/// How many unknowns may be added before the test is rejected.
 long MostExtra(const BundleCovariance& layout);
 
-/// Where a sight's point is drawn. Not where it was seen: a pattern made of that holds the residual
-/// itself.
-Eigen::Vector2d DrawnAt(const BundleObservation& sight, const SightRows& rows);
+/// Where an observation's point is drawn. Not where it was seen: a pattern made of that holds the
+/// residual itself.
+Eigen::Vector2d DrawnAt(const BundleObservation& sight, const ObservationRows& rows);
 
 }  // namespace dtr::calib

@@ -18,12 +18,12 @@ namespace {
 /// COLMAP numbers a pair by kPairBase * the lower image id + the higher one.
 constexpr sqlite3_int64 kPairBase = 2147483647;
 
-[[noreturn]] void Refuse(const std::filesystem::path& database, const std::string& found) {
+[[noreturn]] void Reject(const std::filesystem::path& database, const std::string& found) {
   throw Error(database.string() + ": expected a COLMAP database with a table of images, found: " +
-              found + "; delete the workspace to make it anew");
+              found + "; delete the workspace to start again");
 }
 
-/// A database that is only read; what cannot be read is refused by its name.
+/// A database that is only read; what cannot be read is rejected by its name.
 class Database {
  public:
   explicit Database(const std::filesystem::path& file) : file_(file) {
@@ -31,7 +31,7 @@ class Database {
     sqlite3* opened = nullptr;
     const int failure = sqlite3_open_v2(file.c_str(), &opened, SQLITE_OPEN_READONLY, nullptr);
     handle_.reset(opened);
-    if (failure != SQLITE_OK) Refuse(file, sqlite3_errstr(failure));
+    if (failure != SQLITE_OK) Reject(file, sqlite3_errstr(failure));
   }
 
   /// Calls `on_row` with every row that the query finds.
@@ -39,13 +39,13 @@ class Database {
   void ForEachRow(const char* query, const OnRow& on_row) const {
     sqlite3_stmt* prepared = nullptr;
     if (sqlite3_prepare_v2(handle_.get(), query, -1, &prepared, nullptr) != SQLITE_OK) {
-      Refuse(file_, sqlite3_errmsg(handle_.get()));
+      Reject(file_, sqlite3_errmsg(handle_.get()));
     }
     const std::unique_ptr<sqlite3_stmt, decltype(&sqlite3_finalize)> statement(prepared,
                                                                                &sqlite3_finalize);
     int step = SQLITE_ROW;
     while ((step = sqlite3_step(prepared)) == SQLITE_ROW) on_row(prepared);
-    if (step != SQLITE_DONE) Refuse(file_, sqlite3_errmsg(handle_.get()));
+    if (step != SQLITE_DONE) Reject(file_, sqlite3_errmsg(handle_.get()));
   }
 
   /// A matrix as COLMAP stores it, row by row; valid until the next row is read.
@@ -71,7 +71,7 @@ class Database {
     constexpr auto kSize = static_cast<sqlite3_int64>(sizeof(Number));
     if (rows < 0 || (rows > 0 && (cols < min_cols || cols > kMaxCols ||
                                   bytes % (kSize * cols) != 0 || bytes / (kSize * cols) != rows))) {
-      Refuse(file_, "a matrix of " + std::to_string(rows) + " x " + std::to_string(cols) + " in " +
+      Reject(file_, "a matrix of " + std::to_string(rows) + " x " + std::to_string(cols) + " in " +
                         std::to_string(bytes) + " bytes");
     }
     return {data, static_cast<size_t>(rows), static_cast<size_t>(cols)};
@@ -79,7 +79,7 @@ class Database {
 
   std::uint32_t Id(sqlite3_int64 id) const {
     if (id < 1 || id > std::numeric_limits<std::uint32_t>::max()) {
-      Refuse(file_, "the id " + std::to_string(id));
+      Reject(file_, "the id " + std::to_string(id));
     }
     return static_cast<std::uint32_t>(id);
   }
@@ -111,7 +111,7 @@ std::map<std::string, DatabaseIds> ReadDatabaseIds(const std::filesystem::path& 
   std::map<std::string, DatabaseIds> images;
   opened.ForEachRow("SELECT name, image_id, camera_id FROM images", [&](sqlite3_stmt* row) {
     const auto* name = reinterpret_cast<const char*>(sqlite3_column_text(row, 0));
-    if (name == nullptr) Refuse(database, "an image without a name");
+    if (name == nullptr) Reject(database, "an image without a name");
     images[name] = {opened.Id(sqlite3_column_int64(row, 1)),
                     opened.Id(sqlite3_column_int64(row, 2))};
   });
@@ -155,7 +155,7 @@ void ForEachMatchedPair(const std::filesystem::path& database,
         for (size_t i = 0; i < matches.rows; ++i) {
           const std::uint32_t in_a = matches.At(i, 0), in_b = matches.At(i, 1);
           if (in_a >= a.size() || in_b >= b.size()) {
-            Refuse(database, "a match of a feature that its image lacks");
+            Reject(database, "a match of a feature that its image lacks");
           }
           pair.moved_px.push_back(std::hypot(a[in_a][0] - b[in_b][0], a[in_a][1] - b[in_b][1]));
         }

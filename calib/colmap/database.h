@@ -16,7 +16,7 @@ struct DatabaseIds {
 };
 
 /// The images of a database by name. COLMAP numbers them in the order in which its threads finish,
-/// and its older versions refuse a model with other numbers.
+/// and its older versions reject a model with other numbers.
 /// Throws Error when the file is no COLMAP database.
 std::map<std::string, DatabaseIds> ReadDatabaseIds(const std::filesystem::path& database);
 

@@ -28,7 +28,7 @@ struct Header {
   size_t bytes = 0;
 };
 
-[[noreturn]] void Refuse(const fs::path& file, const std::string& expected,
+[[noreturn]] void Reject(const fs::path& file, const std::string& expected,
                          const std::string& found) {
   throw Error(
       fmt::format("{}: expected {}, found {}; give the workspace of these very images and cameras",
@@ -42,7 +42,7 @@ Header ParseHeader(const fs::path& file, std::string_view content) {
     const char* end = content.data() + std::min(content.size(), kLongestHeader);
     const auto [next, error] = std::from_chars(begin, end, *number);
     if (error != std::errc() || next == end || *next != '&' || *number <= 0) {
-      Refuse(file, "a depth map that begins with \"width&height&channels&\"", "something else");
+      Reject(file, "a depth map that begins with \"width&height&channels&\"", "something else");
     }
     header.bytes = static_cast<size_t>(next + 1 - content.data());
   }
@@ -87,12 +87,12 @@ DepthImage ReadDenseDepth(const fs::path& file, int width_px, int height_px) {
   const std::string content = ReadFile(file, kLongestHeader + count * sizeof(float));
   const Header header = ParseHeader(file, content);
   if (header.width != width_px || header.height != height_px || header.channels != 1) {
-    Refuse(file, fmt::format("a depth map of {}x{} and 1 channel", width_px, height_px),
+    Reject(file, fmt::format("a depth map of {}x{} and 1 channel", width_px, height_px),
            fmt::format("{}x{} and {}", header.width, header.height, header.channels));
   }
   const size_t expected = header.bytes + count * sizeof(float);
   if (content.size() != expected) {
-    Refuse(file, fmt::format("{} bytes", expected), std::to_string(content.size()));
+    Reject(file, fmt::format("{} bytes", expected), std::to_string(content.size()));
   }
   DepthImage depth(width_px, height_px);
   std::memcpy(depth.grid().data().data(), content.data() + header.bytes, count * sizeof(float));

@@ -72,7 +72,7 @@ calib::SfmModel ModelFromViews(const DtrSet& set, const SparseScene& scene,
                                const std::function<ImageRgb8(const View&)>& image_of) {
   if (set.frames.size() != 1) {
     throw Error("export to COLMAP: expected a set with one frame, found " +
-                std::to_string(set.frames.size()) + "; a COLMAP model shows one instant");
+                std::to_string(set.frames.size()) + "; a COLMAP model shows one time step");
   }
   const auto& views = set.frames.front().views;
   calib::SfmModel model;
@@ -81,7 +81,7 @@ calib::SfmModel ModelFromViews(const DtrSet& set, const SparseScene& scene,
   for (const View& view : views) {
     if (!names.insert(view.name).second) {
       throw Error(view.name +
-                  ": expected a unique name, found it twice; COLMAP tells images apart "
+                  ": expected a unique name, found it twice; COLMAP distinguishes images "
                   "by their names");
     }
     calib::SfmImage& image = model.images.emplace_back();

@@ -30,7 +30,7 @@ inline constexpr double kQueueBytesPerPixel = 3;
 inline constexpr double kFill = 0.9;
 /// Long side used when the memory allows and nothing else is asked.
 inline constexpr int kPreferredSidePx = 2400;
-/// Below this long side features no longer tell photos apart; less memory is refused.
+/// Below this long side features no longer tell photos apart; less memory is rejected.
 inline constexpr int kSmallestSidePx = 640;
 
 /// Chooses threads and size: the size first (`requested_side_px`, or kPreferredSidePx when 0), then

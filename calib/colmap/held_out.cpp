@@ -258,7 +258,7 @@ HeldOutResult RegisterHeldOut(const fs::path& images_dir, std::span<const SfmIma
                               std::span<const SfmImageInput> sources,
                               const fs::path& source_workspace, const fs::path& workspace,
                               const SfmOptions& options, Progress& progress) {
-  LensModelOf(options);  // refuse before any work
+  LensModelOf(options);  // reject before any work
   MakeFolder(workspace);
   const Frozen frozen = FrozenFrom(source_model, sources, images_dir, source_workspace, workspace);
   std::vector<SfmImageInput> photos(held_out.begin(), held_out.end());

@@ -41,7 +41,7 @@ Tracks TracksOf(const calib::SfmModel& model) {
   return tracks;
 }
 
-// What ReadModel would refuse must not be written.
+// What ReadModel would reject must not be written.
 void CheckModel(const fs::path& folder, const calib::SfmModel& model) {
   RawModel raw;
   raw.cameras_file = folder / "cameras";
@@ -207,7 +207,7 @@ bool HasFiles(const fs::path& folder, const char* extension) {
 
 // A model of the other format, or the rigs of another model, would be read in place of, or along
 // with, what is written now.
-void RefuseOtherFiles(const fs::path& folder, const char* extension) {
+void RejectOtherFiles(const fs::path& folder, const char* extension) {
   for (const char* name : {"cameras", "images", "points3D", "rigs", "frames"}) {
     for (const char* other : {".bin", ".txt"}) {
       const fs::path file = folder / (std::string(name) + other);
@@ -254,7 +254,7 @@ void WriteModel(const fs::path& folder, const calib::SfmModel& model, Format for
   std::error_code failure;
   fs::create_directories(folder, failure);
   if (failure) throw Error(folder.string() + ": cannot be made: " + failure.message());
-  RefuseOtherFiles(folder, format == Format::kBinary ? ".bin" : ".txt");
+  RejectOtherFiles(folder, format == Format::kBinary ? ".bin" : ".txt");
   format == Format::kBinary ? WriteBinary(folder, model) : WriteText(folder, model);
 }
 

@@ -29,7 +29,7 @@ std::filesystem::path ModelFolderIn(const std::filesystem::path& folder);
 /// Writes the three files of a model into `folder` (made when absent), the cameras last; where one
 /// cannot be written none appears, and an earlier model stays as it is. Doubles
 /// survive both formats bit for bit; reading the result gives the model back.
-/// Throws Error on a model that ReadModel would refuse, when the folder holds files of a model in
+/// Throws Error on a model that ReadModel would reject, when the folder holds files of a model in
 /// the other format, or when a file cannot be written.
 void WriteModel(const std::filesystem::path& folder, const calib::SfmModel& model, Format format);
 

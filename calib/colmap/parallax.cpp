@@ -53,8 +53,8 @@ std::string LackOfParallax(const PairCounts& counts) {
     return fmt::format(
         "{} of {} matched pairs of photos show most of their common features at the same position "
         "in both: the camera did not move against what stands still (a turntable, or a thing held "
-        "into the picture); mask what stands still, by NAME_mask.png beside each NAME.jpg, black "
-        "where the photo is not to be used; where nothing turned, move the camera between photos",
+        "into the image); mask what stands still, by NAME_mask.png beside each NAME.jpg, black "
+        "where the photo is not to be used; where nothing rotated, move the camera between photos",
         counts.still, counts.matched);
   }
   if (HalfOrMore(counts.without_parallax, counts.matched)) {

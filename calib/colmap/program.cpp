@@ -53,7 +53,7 @@ class CauseFinder {
   std::string Cause() const {
     if (!unwritten_.empty()) return unwritten_;
     if (!error_.empty()) return error_;
-    return last_.empty() ? "it said nothing" : "last line: " + last_;
+    return last_.empty() ? "it printed nothing" : "last line: " + last_;
   }
 
  private:

@@ -20,14 +20,14 @@ constexpr std::uint64_t kLongestSidePx = 1'000'000;  // no photo is larger; keep
 constexpr double kUnitLength = 1e-14;
 constexpr double kShortestQuaternion = 1e-3;  // below, the rotation is noise (COLMAP writes 1)
 
-[[noreturn]] void Refuse(const std::string& where, const std::string& what) {
+[[noreturn]] void Reject(const std::string& where, const std::string& what) {
   throw Error(where + ": " + what);
 }
 
 void AddCameras(const RawModel& raw, calib::SfmModel& model) {
   for (const auto& camera : raw.cameras) {
     if (!model.cameras.emplace(camera.id, camera.camera).second) {
-      Refuse(raw.cameras_file.string(),
+      Reject(raw.cameras_file.string(),
              fmt::format("camera {}: expected one, found it twice", camera.id));
     }
   }
@@ -37,7 +37,7 @@ void AddPoints(const RawModel& raw, calib::SfmModel& model) {
   for (const auto& point : raw.points) {
     if (point.id == calib::SfmFeature::kNoPoint ||
         !model.points.emplace(point.id, point.point).second) {
-      Refuse(raw.points_file.string(),
+      Reject(raw.points_file.string(),
              fmt::format("point {}: expected a unique id, found it twice", point.id));
     }
   }
@@ -48,19 +48,19 @@ void CheckImages(const RawModel& raw, const calib::SfmModel& model) {
   std::set<std::string> names;
   for (const calib::SfmImage& image : raw.images) {
     const auto where = fmt::format("{}: image {}", raw.images_file.string(), image.id);
-    if (!ids.insert(image.id).second) Refuse(where, "expected a unique id, found it twice");
+    if (!ids.insert(image.id).second) Reject(where, "expected a unique id, found it twice");
     RequireSafeName(image.name, where + ": its name");  // it is put behind folders of photos
     if (!names.insert(image.name).second) {
-      Refuse(where, fmt::format("expected a unique name, found '{}' twice", image.name));
+      Reject(where, fmt::format("expected a unique name, found '{}' twice", image.name));
     }
     if (!model.cameras.contains(image.camera_id)) {
-      Refuse(where, fmt::format("expected a camera of {}, found the absent id {}",
+      Reject(where, fmt::format("expected a camera of {}, found the absent id {}",
                                 raw.cameras_file.filename().string(), image.camera_id));
     }
     for (size_t i = 0; i < image.features.size(); ++i) {
       const auto id = image.features[i].point_id;
       if (id != calib::SfmFeature::kNoPoint && !model.points.contains(id)) {
-        Refuse(where, fmt::format("feature {}: expected a point of {}, found the absent id {}", i,
+        Reject(where, fmt::format("feature {}: expected a point of {}, found the absent id {}", i,
                                   raw.points_file.filename().string(), id));
       }
     }
@@ -85,7 +85,7 @@ void CheckTracks(const RawModel& raw) {
       if (image == images.end() || element.feature >= image->second->features.size() ||
           image->second->features[element.feature].point_id != point.id ||
           !seen_by_tracks.emplace(element.image_id, element.feature).second) {
-        Refuse(fmt::format("{}: point {}", raw.points_file.string(), point.id),
+        Reject(fmt::format("{}: point {}", raw.points_file.string(), point.id),
                fmt::format("its track names feature {} of image {}, which {} does not confirm; the "
                            "files do not belong together or one is cut short",
                            element.feature, element.image_id, raw.images_file.filename().string()));
@@ -93,7 +93,7 @@ void CheckTracks(const RawModel& raw) {
     }
   }
   if (seen_by_tracks.size() != seen_by_features) {
-    Refuse(
+    Reject(
         raw.points_file.string(),
         fmt::format("expected tracks of {} features in all, as {} says, found {}", seen_by_features,
                     raw.images_file.filename().string(), seen_by_tracks.size()));
@@ -104,7 +104,7 @@ void CheckTracks(const RawModel& raw) {
 
 calib::LensModel CheckedLensModel(const std::string& where, int model_id) {
   if (model_id < 0 || model_id > kLastLensModel) {
-    Refuse(where, fmt::format("expected a camera model 0 to {}, found the unknown id {}; "
+    Reject(where, fmt::format("expected a camera model 0 to {}, found the unknown id {}; "
                               "undistort the images first (colmap image_undistorter)",
                               kLastLensModel, model_id));
   }
@@ -116,7 +116,7 @@ calib::LensCamera CheckedCamera(const std::string& where, int model_id, std::uin
   calib::LensCamera camera;
   camera.model = CheckedLensModel(where, model_id);
   if (width_px < 1 || width_px > kLongestSidePx || height_px < 1 || height_px > kLongestSidePx) {
-    Refuse(where, fmt::format("expected an image size of 1 to {} px, found {} x {}", kLongestSidePx,
+    Reject(where, fmt::format("expected an image size of 1 to {} px, found {} x {}", kLongestSidePx,
                               width_px, height_px));
   }
   camera.width_px = static_cast<int>(width_px);
@@ -125,13 +125,13 @@ calib::LensCamera CheckedCamera(const std::string& where, int model_id, std::uin
   try {
     camera.Check();
   } catch (const std::invalid_argument& error) {
-    Refuse(where, error.what());
+    Reject(where, error.what());
   }
   return camera;
 }
 
 double CheckedFinite(const std::string& where, double value) {
-  if (!std::isfinite(value)) Refuse(where, "expected a finite number, found NaN or infinity");
+  if (!std::isfinite(value)) Reject(where, "expected a finite number, found NaN or infinity");
   return value;
 }
 
@@ -143,7 +143,7 @@ Pose CheckedPose(const std::string& where, const double wxyz[4], const double tr
   CheckedFinite(where, cam_from_world.translation.squaredNorm());
   const double length = cam_from_world.rotation.norm();
   if (!(length > kShortestQuaternion)) {
-    Refuse(where, fmt::format("expected a rotation quaternion of length 1, found {}", length));
+    Reject(where, fmt::format("expected a rotation quaternion of length 1, found {}", length));
   }
   if (std::abs(length - 1) > kUnitLength) cam_from_world.rotation.normalize();
   return cam_from_world;

@@ -31,7 +31,7 @@ class BinaryReader {
     return value;
   }
 
-  // A count of records of at least `record_bytes` each: refused when the file cannot hold them.
+  // A count of records of at least `record_bytes` each: rejected when the file cannot hold them.
   size_t TakeCount(size_t record_bytes, const char* what) {
     const auto count = Take<std::uint64_t>();
     if (count > rest_.size() / record_bytes) {

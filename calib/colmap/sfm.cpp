@@ -119,7 +119,7 @@ bool AllHavePriors(const std::vector<CameraGroup>& groups) {
 std::vector<calib::SfmModel> MadeOtherwise(Workspace& workspace, const fs::path& models,
                                            const std::vector<CameraGroup>& groups,
                                            const SfmOptions& options) {
-  constexpr double kMostPhotos = 0.75;
+  constexpr double kMaxPhotos = 0.75;
   std::vector<calib::SfmModel> fixed;
   if (AllHavePriors(groups)) {
     workspace.progress().Note(
@@ -131,7 +131,7 @@ std::vector<calib::SfmModel> MadeOtherwise(Workspace& workspace, const fs::path&
   };
   std::vector<calib::SfmModel> forward;
   if (static_cast<double>(photos(fixed)) <
-      kMostPhotos * static_cast<double>(workspace.images().size())) {
+      kMaxPhotos * static_cast<double>(workspace.images().size())) {
     workspace.progress().Note(
         "COLMAP found no two photos to start from; trying two that may lie in line with what they "
         "see");
@@ -189,7 +189,7 @@ SfmResult RunSfm(const fs::path& images_dir, std::span<const SfmImageInput> imag
   if (images.size() < 2) {
     throw UsageError(
         fmt::format("{}: expected at least two photos, found {}; depth needs a second "
-                    "place to look from",
+                    "position to look from",
                     images_dir.string(), images.size()));
   }
   Workspace workspace(workspace_folder, images_dir, images, "", ResolveThreads(options.threads),
@@ -210,9 +210,8 @@ SfmResult RunSfm(const fs::path& images_dir, std::span<const SfmImageInput> imag
     // One homography explains most pairs of a wall or a box, too, of which there is a model: that
     // is worth a line where the model does not determine its cameras, not here.
     if (CameraStoodStill(pairs)) progress.Note(result.report.lack_of_parallax);
-    result.report.why_not_registered =
-        WhyWithoutCamera(workspace, result.model,
-                         result.report.forward_motion ? kFewestInliersForward : kFewestInliers);
+    result.report.why_not_registered = WhyWithoutCamera(
+        workspace, result.model, result.report.forward_motion ? kMinInliersForward : kMinInliers);
   } catch (const Error& error) {  // the model is whole: a diagnosis is not worth its loss
     progress.Note(fmt::format(
         "what the matches say of parallax and of photos without a camera is not known: {}",

@@ -19,7 +19,7 @@ struct SfmImageInput {
   int width_px = 0, height_px = 0;
   std::optional<double> focal_prior_px;  ///< empty: COLMAP's own guess from EXIF, else 1.2 w
   std::string camera_group = {};         ///< photos of one group and size share intrinsics
-  std::filesystem::path mask_file = {};  ///< no features where this picture is black; empty: none
+  std::filesystem::path mask_file = {};  ///< no features where this image is black; empty: none
 };
 
 /// Which pairs of photos are matched in full.

@@ -34,7 +34,7 @@ std::string TextOf(const std::vector<CameraGroup>& groups, const ExtractionPlan&
 calib::LensModel LensModelOf(const SfmOptions& options) {
   const auto model = calib::LensModelFromName(options.lens_model);
   if (!model) {
-    throw UsageError("lens model: expected a name like SIMPLE_RADIAL, RADIAL or OPENCV, found '" +
+    throw UsageError("camera model: expected a name like SIMPLE_RADIAL, RADIAL or OPENCV, found '" +
                      options.lens_model + "'");
   }
   return *model;
@@ -77,7 +77,7 @@ void AllowForwardMotion(Arguments& arguments) {
   arguments.AddIfKnown({"Mapper.init_max_forward_motion"}, "1")
       .AddIfKnown({"Mapper.init_min_tri_angle"}, "2")
       .AddIfKnown({"Mapper.filter_min_tri_angle"}, "0.5")
-      .AddIfKnown({"Mapper.abs_pose_min_num_inliers"}, std::to_string(kFewestInliersForward));
+      .AddIfKnown({"Mapper.abs_pose_min_num_inliers"}, std::to_string(kMinInliersForward));
 }
 
 void CompleteReport(const Workspace& workspace, const calib::SfmModel& model, SfmReport& report) {

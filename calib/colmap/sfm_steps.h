@@ -37,6 +37,6 @@ inline constexpr char kForwardMotionNote[] = "forward_motion";
 inline constexpr char kFixedIntrinsicsNote[] = "fixed_intrinsics";
 
 /// Points that must agree with the place of a photo: COLMAP's own limit, and that of such a walk.
-inline constexpr int kFewestInliers = 30, kFewestInliersForward = 15;
+inline constexpr int kMinInliers = 30, kMinInliersForward = 15;
 
 }  // namespace dtr::colmap

@@ -11,7 +11,7 @@ namespace dtr::colmap {
 namespace {
 
 /// COLMAP forgets pairs that have fewer features in common (TwoViewGeometry.min_num_inliers).
-constexpr int kFewestOfAPair = 15;
+constexpr int kMinOfAPair = 15;
 
 /// Of some photos the one that another photo has most in common with.
 struct Partners {
@@ -33,12 +33,12 @@ struct InCommon {
   Partners with_camera, without;
 };
 
-std::string Reason(std::int64_t features, const InCommon& common, int fewest_common) {
+std::string Reason(std::int64_t features, const InCommon& common, int min_common) {
   const auto& [with_camera, without] = common;
   if (features == 0) return "nothing in it to recognise";
   if (with_camera.count == 0 && without.count == 0) {
     return fmt::format("{} features, fewer than {} of them in any other photo", features,
-                       kFewestOfAPair);
+                       kMinOfAPair);
   }
   if (with_camera.count == 0) {
     return fmt::format(
@@ -48,16 +48,15 @@ std::string Reason(std::int64_t features, const InCommon& common, int fewest_com
   }
   return fmt::format("{} of its {} features in common with {}, with no photo more; {}",
                      with_camera.most, features, with_camera.name,
-                     with_camera.most < fewest_common
-                         ? fmt::format("COLMAP places a photo by {} that agree", fewest_common)
-                         : "COLMAP found no place that they agree on with those of other photos");
+                     with_camera.most < min_common
+                         ? fmt::format("COLMAP registers a photo by {} that agree", min_common)
+                         : "COLMAP found no pose that they agree on with those of other photos");
 }
 
 }  // namespace
 
 std::map<std::string, std::string> WhyWithoutCamera(const Workspace& workspace,
-                                                    const calib::SfmModel& model,
-                                                    int fewest_common) {
+                                                    const calib::SfmModel& model, int min_common) {
   std::set<std::string> registered;
   for (const calib::SfmImage& image : model.images) registered.insert(image.name);
   std::map<std::string, std::string> reasons;
@@ -84,7 +83,7 @@ std::map<std::string, std::string> WhyWithoutCamera(const Workspace& workspace,
     if (registered.contains(name)) continue;
     const auto features = matches.features.find(id);
     reasons[name] = Reason(features == matches.features.end() ? 0 : features->second,
-                           in_common[name], fewest_common);
+                           in_common[name], min_common);
   }
   return reasons;
 }

@@ -91,11 +91,11 @@ void Link(const fs::path& target, const fs::path& link) {
 // COLMAP writes on without a word when the disk is full: what is then missing or cut short looks
 // like another fault. Throws Error when there is no room for as much as a large photo's features.
 void ThrowFullDisk(const fs::path& folder, const std::string& consequence) {
-  constexpr std::uintmax_t kLeastBytes = std::uintmax_t{1} << 20;
+  constexpr std::uintmax_t kMinBytes = std::uintmax_t{1} << 20;
   std::error_code unknown;
   const fs::space_info space = fs::space(folder, unknown);
   const bool said = consequence.find("disk is full") != std::string::npos;
-  if (!said && (unknown || space.available >= kLeastBytes)) return;
+  if (!said && (unknown || space.available >= kMinBytes)) return;
   throw Error(fmt::format(
       "{}: No space left on device; make room, the same command continues; what came of it: {}",
       folder.string(), consequence));

@@ -13,9 +13,9 @@
 
 namespace dtr::calib {
 
-/// Of a rig whose cameras take their pictures when they like.
+/// Of a rig whose cameras take their images when they like.
 struct KeptDelay {
-  /// Its pictures of a frame are later than the first camera's by this, in frames, and the standard
+  /// Its images of a frame are later than the first camera's by this, in frames, and the standard
   /// deviation.
   double frames = 0, sigma = 0;
   /// Its corners are kept where they would have been seen at the moment of the frame's camera with
@@ -41,7 +41,7 @@ struct CalibratedCamera {
 struct CalibratedView {
   BoardView seen;
   size_t camera = 0;  ///< index into Calibration::cameras
-  size_t frame = 0;   ///< views of one frame show the board at the same instant; in order of time
+  size_t frame = 0;   ///< views of one frame show the board at the same time step; in order of time
   Pose cam_from_board;
   std::vector<int> outliers;  ///< rising ids of corners that were not used
 };
@@ -50,7 +50,7 @@ struct CalibratedView {
 struct TriedModel {
   BoardModel model = BoardModel::kPinhole;
   bool chosen = false;
-  std::optional<double> held_out_rms_px;  ///< empty where it was refused
+  std::optional<double> held_out_rms_px;  ///< empty where it was rejected
   double low_px = 0, high_px = 0;         ///< interval of the difference to the best model's
   std::string refused;                    ///< why; empty where it was not
 };

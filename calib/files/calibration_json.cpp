@@ -156,7 +156,7 @@ Eigen::MatrixXd ReadCovariance(const JsonObject& object, const char* key, int si
                                bool all_zero = false) {
   Eigen::MatrixXd covariance = ReadMatrix(object, key, size, size);
   if (all_zero) {
-    if (!covariance.isZero(0)) object.Fail(key, "zeros, the lenses were given");
+    if (!covariance.isZero(0)) object.Fail(key, "zeros, the intrinsics were given");
     return covariance;
   }
   for (int i = 0; i < size; ++i) {

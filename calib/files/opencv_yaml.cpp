@@ -145,7 +145,8 @@ std::vector<double> OpenCvCoefficients(const LensCamera& camera) {
     case LensModel::kThinPrismFisheye:
       break;
   }
-  throw Error("OpenCV has no lens model " + NameOf(camera.model) + "; write a COLMAP cameras.txt");
+  throw Error("OpenCV has no camera model " + NameOf(camera.model) +
+              "; write a COLMAP cameras.txt");
 }
 
 bool IsFisheye(LensModel model) {

@@ -55,7 +55,7 @@ Check TestViewCount(const JudgedCalibration& calibration, double min_views) {
     return static_cast<double>(std::count_if(calibration.kept.begin(), calibration.kept.end(),
                                              [&](const RigView& v) { return v.camera == c; }));
   });
-  check.reason = fmt::format("{}: views of the board, fewest of a camera", check.reason);
+  check.reason = fmt::format("{}: views of the board, minimum over the cameras", check.reason);
   return check;
 }
 
@@ -74,14 +74,15 @@ Check TestTilt(const JudgedCalibration& calibration, const Rig& fitted, double m
       if (view.camera != c) continue;
       normals.push_back(fitted.rig_from_board[view.frame].rotation * Eigen::Vector3d::UnitZ());
     }
-    double least_cosine = 1;
+    double min_cosine = 1;
     for (const auto& a : normals) {
-      for (const auto& b : normals) least_cosine = std::min(least_cosine, std::abs(a.dot(b)));
+      for (const auto& b : normals) min_cosine = std::min(min_cosine, std::abs(a.dot(b)));
     }
-    return std::acos(std::min(1.0, least_cosine)) * 180 / std::numbers::pi;
+    return std::acos(std::min(1.0, min_cosine)) * 180 / std::numbers::pi;
   });
   check.reason = fmt::format(
-      "{}: largest angle between two boards; parallel ones cannot tell focal length from distance",
+      "{}: largest angle between two boards; parallel ones cannot separate focal length from "
+      "distance",
       check.reason);
   return check;
 }

@@ -17,16 +17,16 @@
 namespace dtr::calib {
 namespace {
 
-constexpr double kMostDelay = 3;    // frames; farther apart, they are paired wrongly
+constexpr double kMaxDelay = 3;     // frames; farther apart, they are paired wrongly
 constexpr double kWidestGap = 1.5;  // frames between neighbours that are interpolated
 // Corners that count in one solve and not in the next move real delays by some tenths of a sigma.
 constexpr double kSettledSigmas = 0.5;
 constexpr double kChanceSigmas = 2;  // a camera that is taken for free stays so above this
-constexpr int kMostPasses = 16;
-// From then on the corners that count stay the same: decided anew in every solve, a few at the
+constexpr int kMaxPasses = 16;
+// From then on the corners that count stay the same: decided again in every solve, a few at the
 // limit can take turns for ever, and the delays with them.
 constexpr int kDecidedAfter = 5;
-constexpr long kReach = 4;  // frames to either side that may be neighbours: kMostDelay and one
+constexpr long kReach = 4;  // frames to either side that may be neighbours: kMaxDelay and one
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Delays = std::vector<double>;  // per camera, frames
@@ -288,8 +288,9 @@ void WidenByDelays(const Path& path, const Delays& delays, const std::vector<boo
     information.AddPose(by_shared, frame.by_motion);
   }
   if (!information.Invert()) {
-    Refuse(
-        "the delays cannot be told from the cameras' places and lenses; show the board in more "
+    Reject(
+        "the delays cannot be separated from the cameras' positions and intrinsics; show the board "
+        "in more "
         "frames that follow each other, moving to different sides");
   }
   const double freedom = solution.freedom - static_cast<double>(count);
@@ -322,7 +323,7 @@ FreeRunning SolveFreeRunning(const Board& board, std::span<const RigCameraInput>
   solve.solve.cover_image = false;  // of what is kept alone
   std::vector<RigCameraInput> inputs(cameras.begin(), cameras.end());
   std::string last;  // delays, and by how much they changed
-  for (free.passes = 1; free.passes <= kMostPasses; ++free.passes) {
+  for (free.passes = 1; free.passes <= kMaxPasses; ++free.passes) {
     free.solution = SolveRig(board, inputs, moved, frames, solve);
     KeepFlips(board, free.solution.flipped, views);
     KeepFlips(board, free.solution.flipped, moved);
@@ -342,11 +343,11 @@ FreeRunning SolveFreeRunning(const Board& board, std::span<const RigCameraInput>
       CameraDelay& delay = *free.delays[c];
       const double more = delay.frames;
       delay.frames += delays[c];
-      if (!(std::abs(delay.frames) <= kMostDelay)) {
+      if (!(std::abs(delay.frames) <= kMaxDelay)) {
         throw Error(fmt::format(
-            "camera {}: expected pictures within {} frames of camera {}'s, found {:+.1f}; its "
+            "camera {}: expected photos within {} frames of camera {}'s, found {:+.1f}; its "
             "frames are paired with others than their own: cut the videos to one start",
-            cameras[c].name, kMostDelay, cameras[0].name, delay.frames));
+            cameras[c].name, kMaxDelay, cameras[0].name, delay.frames));
       }
       const bool is_free =
           std::abs(delay.frames) > (free.moved[c] ? kChanceSigmas : kDelaySigmas) * delay.sigma;
@@ -360,7 +361,8 @@ FreeRunning SolveFreeRunning(const Board& board, std::span<const RigCameraInput>
     if (!any) {
       throw Error(
           "calibration: expected a board that moves through frames that follow each other, found "
-          "none that tells the cameras' moments; show it in more frames, or let the cameras be "
+          "none that determines the cameras' moments; show it in more frames, or let the cameras "
+          "be "
           "synchronised");
     }
     if (settled) {
@@ -386,7 +388,7 @@ FreeRunning SolveFreeRunning(const Board& board, std::span<const RigCameraInput>
   throw Error(
       fmt::format("calibration: expected delays that settle, found them still changing after {} "
                   "solves (frames: {}); show the board in more frames that follow each other",
-                  kMostPasses, last));
+                  kMaxPasses, last));
 }
 
 }  // namespace dtr::calib

@@ -1,4 +1,4 @@
-// calib/judge/free_running.h -- rigs whose cameras take their pictures when they like.
+// calib/judge/free_running.h -- rigs whose cameras take their images when they like.
 #pragma once
 #include <optional>
 #include <span>
@@ -9,14 +9,14 @@
 
 namespace dtr::calib {
 
-/// How much later than the first camera's a camera's pictures of a frame are, in frames.
+/// How much later than the first camera's a camera's images of a frame are, in frames.
 struct CameraDelay {
   double frames = 0, sigma = 0;  ///< sigma: standard deviation
 };
 
 struct FreeRunning {
   /// Of corners that are moved to where they would have been seen had all cameras of a frame taken
-  /// their pictures at one moment: that of the camera of the frame with the least delay. Views
+  /// their images at one moment: that of the camera of the frame with the least delay. Views
   /// whose moment lies between no two frames are left out. The covariance takes the delays as
   /// unknown.
   RigSolution solution;
@@ -38,7 +38,7 @@ std::vector<std::optional<CameraDelay>> DelaysOf(const Board& board, const RigSo
 /// was between two frames is interpolated from its poses in up to four of them around (a cubic in
 /// the turn's logarithm and the shift), no two neighbours more than 1.5 frames apart. After five
 /// solves the corners that count stay the same: where some lie at the limit of what is an outlier,
-/// solves that decide on them anew would take turns for ever. Corners that `views` call outliers
+/// solves that decide on them again would take turns for ever. Corners that `views` call outliers
 /// are dropped, as by SolveRig. `frames` are in order of time and equally far from each other.
 /// Throws Error as SolveRig does, where no delay can be told (a board that stands still, or frames
 /// that do not follow each other), where a delay is beyond 3 frames, and where the delays do not

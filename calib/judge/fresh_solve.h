@@ -31,7 +31,7 @@ std::vector<RigView> FramesWhere(const std::vector<RigView>& views,
 /// Frames are dealt in turn; those without a view do not take part.
 std::map<size_t, size_t> OrderOfFrames(const std::vector<RigView>& views);
 
-/// Kept views in five folds, each predicted by a solve of the others; `refused` tells of a fold
+/// Kept views in five folds, each predicted by a solve of the others; `rejected` tells of a fold
 /// whose others could not be solved.
 Residuals HeldOut(const JudgedCalibration& calibration, int threads, std::string* refused);
 

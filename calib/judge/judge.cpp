@@ -19,8 +19,8 @@ namespace dtr::calib {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr int kFewestInRegion = 20;  // corners; below, a region's RMS is a guess
-constexpr double kMostOfImage = 0.95;
+constexpr int kMinInRegion = 20;  // corners; below, a region's RMS is a guess
+constexpr double kMaxOfImage = 0.95;
 constexpr double kFar = 1000;  // times the boards' distance: as good as at infinity
 
 // All that is tested, step by step.
@@ -44,7 +44,7 @@ class Judging {
       kept_ =
           SolveFresh(calibration_, calibration_.kept, calibration_.kept_frames, Loss::kQuadratic);
     } else {
-      kept_.refused = "the file keeps no observations";
+      kept_.refused = "the file has no observations";
     }
     if (unseen_) fresh_ = SolveFresh(calibration_, unseen_->views, unseen_->frames, Loss::kRobust);
     if (kept_.solution) {
@@ -190,7 +190,7 @@ class Judging {
     for (const JudgedCamera& camera : report_.cameras) {
       std::vector<double> rms;
       for (const ResidualStats& region : camera.regions) {
-        if (region.count >= kFewestInRegion) rms.push_back(region.rms_px);
+        if (region.count >= kMinInRegion) rms.push_back(region.rms_px);
       }
       if (rms.empty()) continue;
       std::sort(rms.begin(), rms.end());
@@ -198,8 +198,8 @@ class Judging {
       for (size_t i = 0; i < camera.regions.size(); ++i) {
         const ResidualStats& region = camera.regions[i];
         // No region is out of line by what misleads nobody.
-        const double ratio = region.rms_px / std::max(typical, kLeastOutlierSigmaPx);
-        if (region.count < kFewestInRegion || !(ratio > worst)) continue;
+        const double ratio = region.rms_px / std::max(typical, kMinOutlierSigmaPx);
+        if (region.count < kMinInRegion || !(ratio > worst)) continue;
         worst = ratio;
         where = fmt::format(
             "{}: row {}, column {} of 3 x 3 has RMS {:.3f} px, the median region "
@@ -271,7 +271,7 @@ class Judging {
   }
 
   static const char* NameOfSolve(const Reference& reference) {
-    return reference.unseen ? "the unseen views'" : "fresh";
+    return reference.unseen ? "the held-out views'" : "fresh";
   }
 
   // Keeps in `check` the part that is farthest beyond its limit.
@@ -284,7 +284,7 @@ class Judging {
                                      LargestPart(layout, difference, covariance, at, count),
                                      report_.cameras[camera].difference.Largest());
     // What was calibrated elsewhere does not say how uncertain it is: pixels must do.
-    const double shown_px = report_.cameras[camera].difference.Quantile(kMostOfImage);
+    const double shown_px = report_.cameras[camera].difference.Quantile(kMaxOfImage);
     if (calibration_.kept.empty() && distance > limit && shown_px <= limits_.max_uncertainty_px) {
       reason += fmt::format(
           "; {:.3g} sigma of that solve alone, for the file does not say what it is uncertain by, "
@@ -385,7 +385,7 @@ class Judging {
     for (const JudgedCamera& camera : report_.cameras) {
       // A lens that has no ray for a pixel that it should show does not know where it looks; what
       // could not be computed is the worst, not the best.
-      double value = map_of(camera).Quantile(kMostOfImage);
+      double value = map_of(camera).Quantile(kMaxOfImage);
       const bool has_rays = std::isfinite(value);
       if (!has_rays) value = std::numeric_limits<double>::infinity();
       if (value <= check.value) continue;
@@ -433,7 +433,7 @@ class Judging {
       const double board = BoardDistance(calibration_.board, a.rig, c);
       const ImageMap shifts = ShiftMap(a, sensitivity, difference, c, board);
       shift = std::max(shift, shifts.Largest());
-      most = std::max(most, shifts.Quantile(kMostOfImage));
+      most = std::max(most, shifts.Quantile(kMaxOfImage));
       predicted =
           std::max(predicted, UncertaintyMap(a, sensitivity, covariance, c, board).Largest());
     }
@@ -449,10 +449,11 @@ class Judging {
         fmt::format("two halves, solved apart, differ by {:.3g} px at most, in 95 % of the "
                     "image by {:.3g} px, predicted sigma {:.3g} px; {}",
                     shift, most, predicted,
-                    small ? fmt::format("no chance (p = {:.2g}), but less than {} px: the "
-                                        "whole is within its limit",
-                                        p, harmless)
-                          : std::string("told is the probability of this or more by chance"))));
+                    small
+                        ? fmt::format("no chance (p = {:.2g}), but less than {} px: the "
+                                      "whole is within its limit",
+                                      p, harmless)
+                        : std::string("the value is the probability of this or more by chance"))));
   }
 
   void TestPatterns() {

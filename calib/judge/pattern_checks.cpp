@@ -53,16 +53,16 @@ std::vector<Check> PatternChecks(const Board& board, const Fresh& fresh,
     checks.push_back(PatternCheck(name, what, test.p, test.amplitude_px, limits.min_p, limit));
   };
   add("radial_pattern_px", TestRadial(solution),
-      "residuals along the radius that the lens model cannot follow");
+      "residuals along the radius that the camera model cannot follow");
   add("regional_pattern_px", TestRegional(solution),
-      "mean residuals of image regions that the lens model cannot follow");
+      "mean residuals of image regions that the camera model cannot follow");
   add("board_shape_px", TestBoardShape(board, solution), "residuals as of a board that is bent");
   add("rolling_shutter_px", TestRollingShutter(board, solution),
       "residuals as of boards that move while the rows are read");
   if (solution.rig.cameras.size() < 2) return checks;
   checks.push_back(DelayCheck(solution, limits));
   add("unsteady_clocks_px", TestUnsteadyClocks(solution),
-      "residuals as of pictures that are not taken at one rate");
+      "residuals as of photos that are not taken at one rate");
   return checks;
 }
 

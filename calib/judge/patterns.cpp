@@ -15,7 +15,7 @@ namespace dtr::calib {
 namespace {
 
 // Every corner that may lie elsewhere is three unknowns, and work grows with their cube.
-constexpr int kMostCornersOfShutter = 150;
+constexpr int kMaxCornersOfShutter = 150;
 constexpr double kDependent = 1e-7;  // of columns of length 1: what is left of one that others span
 
 // What is left of the rows of `rest` where the columns of `own` are fitted for this frame alone.
@@ -311,8 +311,8 @@ PatternTest TestRollingShutter(const Board& board, const RigSolution& solution) 
     }
     return columns;
   };
-  const std::vector<int> place = SomeCorners(board.CornerCount(), kMostCornersOfShutter);
-  const long count = 3 * std::min(board.CornerCount(), kMostCornersOfShutter);
+  const std::vector<int> place = SomeCorners(board.CornerCount(), kMaxCornersOfShutter);
+  const long count = 3 * std::min(board.CornerCount(), kMaxCornersOfShutter);
   const auto corners_elsewhere = [&](const FrameRows& frame) {
     Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(frame.residuals.size(), count);
     for (size_t i = 0; i < frame.origins.size(); ++i) {

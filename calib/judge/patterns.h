@@ -46,7 +46,7 @@ PatternTest TestRollingShutter(const Board& board, const RigSolution& solution);
 /// Per camera but the first: an image that is late by a time, in frames; the board's speed from the
 /// frames before and after. coefficients: the delays. p is 1 for a single camera.
 PatternTest TestTimeOffset(const RigSolution& solution);
-/// The same with a delay of every frame's own, beyond one that all frames share: pictures that are
+/// The same with a delay of every frame's own, beyond one that all frames share: images that are
 /// not taken at one rate. p is 1 for a single camera.
 PatternTest TestUnsteadyClocks(const RigSolution& solution);
 

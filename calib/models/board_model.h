@@ -23,7 +23,7 @@ enum class BoardModel {
 inline constexpr BoardModel kBoardModels[] = {BoardModel::kPinhole, BoardModel::kBrown4,
                                               BoardModel::kBrown5, BoardModel::kBrown8,
                                               BoardModel::kFisheye};
-inline constexpr int kMostLensParameters = 12;  ///< of brown8
+inline constexpr int kMaxLensParameters = 12;  ///< of brown8
 
 /// "pinhole", "brown4", ...
 std::string NameOf(BoardModel model);

@@ -25,20 +25,20 @@ namespace dtr::calib {
 namespace {
 
 constexpr double kOutlierSigmas = 5;
-constexpr double kMostRelativeSigma = 0.1;  // as with distances (calib/scale.cpp)
+constexpr double kMaxRelativeSigma = 0.1;  // as with distances (calib/scale.cpp)
 constexpr double kLeastAngle = 1 * std::numbers::pi / 180;
 // Scatter beyond what a set's own gate allows is no noise: views that contradict each other must
 // not make room for each other.
-constexpr double kMostSigmaPx = 1.5;
+constexpr double kMaxSigmaPx = 1.5;
 constexpr double kStartScalePx = 2;  // of Cauchy's loss, before a sigma is known
-constexpr size_t kMostOfPairs = 40;  // views whose pairs are tried
-constexpr int kMostSteps = 50;
+constexpr size_t kMaxOfPairs = 40;   // views whose pairs are tried
+constexpr int kMaxSteps = 50;
 constexpr double kWithoutPixel = 100;  // cost of a corner behind its camera
 
 using Vector7 = Eigen::Matrix<double, 7, 1>;
 using Matrix7 = Eigen::Matrix<double, 7, 7>;
 
-[[noreturn]] void RefuseScale(const std::string& what) { throw Error("scale by a board: " + what); }
+[[noreturn]] void RejectScale(const std::string& what) { throw Error("scale by a board: " + what); }
 
 // A corner as a view saw it.
 struct Corner {
@@ -51,14 +51,14 @@ struct Corner {
 // Everything but the similarity.
 struct Problem {
   const Board& board;
-  std::span<const BoardSight> sights;
+  std::span<const BoardObservation> sights;
   std::vector<BoardView> seen;  // counted from the end that fits
   std::vector<bool> view_used;
   std::vector<Corner> corners;
 };
 
-Corner CornerOf(const BoardSight& sight, size_t view, const BoardCorner& corner) {
-  return {view, corner.id, MakeSight(sight.camera, sight.cam_from_world, corner.pixel), true};
+Corner CornerOf(const BoardObservation& sight, size_t view, const BoardCorner& corner) {
+  return {view, corner.id, MakeObservation(sight.camera, sight.cam_from_world, corner.pixel), true};
 }
 
 double CauchyCost(double length_px, double scale_px) {
@@ -72,11 +72,11 @@ double LengthPx(const Sight& sight, const Eigen::Vector3d& p_in_world) {
              : std::numeric_limits<double>::infinity();
 }
 
-double CostOf(const Board& board, const BoardSight& sight, const BoardView& seen,
+double CostOf(const Board& board, const BoardObservation& sight, const BoardView& seen,
               const Similarity& scene_from_board) {
   double cost = 0;
   for (const BoardCorner& corner : seen.corners) {
-    cost += CauchyCost(LengthPx(MakeSight(sight.camera, sight.cam_from_world, corner.pixel),
+    cost += CauchyCost(LengthPx(MakeObservation(sight.camera, sight.cam_from_world, corner.pixel),
                                 scene_from_board * board.Corner(corner.id)),
                        kStartScalePx);
   }
@@ -86,8 +86,8 @@ double CostOf(const Board& board, const BoardSight& sight, const BoardView& seen
 bool MayBeTurned(const Board& board) { return board.kind == Board::Kind::kChessboard; }
 
 // The view, counted from the end that fits better.
-BoardView Fitting(const Board& board, const BoardSight& sight, const Similarity& scene_from_board,
-                  double* cost) {
+BoardView Fitting(const Board& board, const BoardObservation& sight,
+                  const Similarity& scene_from_board, double* cost) {
   *cost = CostOf(board, sight, sight.seen, scene_from_board);
   if (!MayBeTurned(board)) return sight.seen;
   BoardView turned = TurnedByHalf(board, sight.seen);
@@ -98,16 +98,16 @@ BoardView Fitting(const Board& board, const BoardSight& sight, const Similarity&
 }
 
 // Where two views alone see the board; empty where their corners do not tell.
-std::optional<Similarity> FromPair(const Board& board, const BoardSight& a, const BoardSight& b,
-                                   const BoardView& seen_by_b) {
+std::optional<Similarity> FromPair(const Board& board, const BoardObservation& a,
+                                   const BoardObservation& b, const BoardView& seen_by_b) {
   std::vector<Eigen::Vector3d> on_board, in_scene;
   double widest = 0;
   for (const BoardCorner& corner : a.seen.corners) {
     const auto same = std::find_if(seen_by_b.corners.begin(), seen_by_b.corners.end(),
                                    [&](const BoardCorner& c) { return c.id == corner.id; });
     if (same == seen_by_b.corners.end()) continue;
-    const Sight sights[] = {MakeSight(a.camera, a.cam_from_world, corner.pixel),
-                            MakeSight(b.camera, b.cam_from_world, same->pixel)};
+    const Sight sights[] = {MakeObservation(a.camera, a.cam_from_world, corner.pixel),
+                            MakeObservation(b.camera, b.cam_from_world, same->pixel)};
     const Triangulation point = Triangulate(sights, -1);
     if (point.status != TriangulationStatus::kConverged) continue;
     widest = std::max(widest, std::atan2(sights[0].direction.cross(sights[1].direction).norm(),
@@ -115,7 +115,7 @@ std::optional<Similarity> FromPair(const Board& board, const BoardSight& a, cons
     on_board.push_back(board.Corner(corner.id));
     in_scene.push_back(point.p_in_world);
   }
-  if (on_board.size() < kFewestCorners || widest < kLeastAngle) return std::nullopt;
+  if (on_board.size() < kMinCorners || widest < kLeastAngle) return std::nullopt;
   try {
     return AlignPoints(on_board, in_scene);
   } catch (const Error&) {
@@ -124,13 +124,13 @@ std::optional<Similarity> FromPair(const Board& board, const BoardSight& a, cons
 }
 
 // Of what all pairs of views say, that which all views together agree with best.
-Similarity Start(const Board& board, std::span<const BoardSight> sights) {
+Similarity Start(const Board& board, std::span<const BoardObservation> sights) {
   std::optional<Similarity> best;
   double least = std::numeric_limits<double>::infinity();
   const auto ask = [&](const std::optional<Similarity>& candidate) {
     if (!candidate) return;
     double sum = 0;
-    for (const BoardSight& sight : sights) {
+    for (const BoardObservation& sight : sights) {
       double cost = 0;
       Fitting(board, sight, *candidate, &cost);
       sum += cost;
@@ -139,7 +139,7 @@ Similarity Start(const Board& board, std::span<const BoardSight> sights) {
     least = sum;
     best = candidate;
   };
-  const size_t step = (sights.size() + kMostOfPairs - 1) / kMostOfPairs;
+  const size_t step = (sights.size() + kMaxOfPairs - 1) / kMaxOfPairs;
   for (size_t i = 0; i < sights.size(); i += step) {
     for (size_t j = 0; j < i; j += step) {
       ask(FromPair(board, sights[i], sights[j], sights[j].seen));
@@ -148,7 +148,7 @@ Similarity Start(const Board& board, std::span<const BoardSight> sights) {
     }
   }
   if (!best) {
-    RefuseScale(
+    RejectScale(
         "expected two views that see the board under an angle of a degree or more, found none; "
         "take photos of it from different sides");
   }
@@ -210,7 +210,7 @@ Similarity Minimised(const Problem& problem, Similarity at, std::optional<double
   Vector7 right;
   double damping = 1e-6;
   double cost = Accumulate(problem, at, cauchy_px, normal, &right);
-  for (int k = 0; k < kMostSteps; ++k) {
+  for (int k = 0; k < kMaxSteps; ++k) {
     Matrix7 damped = *normal;
     damped.diagonal() *= 1 + damping;
     const Vector7 step = damped.ldlt().solve(right);
@@ -245,7 +245,7 @@ std::vector<double> UsedLengths(const Problem& problem, const Similarity& scene_
 
 double SigmaOf(const Problem& problem, const Similarity& scene_from_board) {
   return std::clamp(RobustSigma(UsedLengths(problem, scene_from_board)), kSmallestSigmaPx,
-                    kMostSigmaPx);
+                    kMaxSigmaPx);
 }
 
 // Drops corners that are off, and views of which most are. False when nothing changed.
@@ -262,8 +262,8 @@ bool DropOutliers(const Similarity& scene_from_board, Problem& problem) {
     kept[corner.view] += used;
   }
   for (size_t v = 0; v < problem.seen.size(); ++v) {
-    const bool used = kept[v] >= kFewestCorners &&
-                      static_cast<double>(kept[v]) >= kLeastAgreeing * static_cast<double>(all[v]);
+    const bool used = kept[v] >= kMinCorners &&
+                      static_cast<double>(kept[v]) >= kMinAgreeing * static_cast<double>(all[v]);
     changed = changed || used != problem.view_used[v];
     problem.view_used[v] = used;
   }
@@ -276,8 +276,8 @@ size_t UsedViews(const Problem& problem) {
 
 void RequireAgreement(const Problem& problem) {
   const size_t agreeing = UsedViews(problem), all = problem.seen.size();
-  if (agreeing >= kFewestViews && 2 * agreeing >= all) return;
-  RefuseScale(
+  if (agreeing >= kMinViews && 2 * agreeing >= all) return;
+  RejectScale(
       fmt::format("expected views that agree where the board lies, found that {} of {} do; it must "
                   "stay where it is while the photos are taken",
                   agreeing, all));
@@ -323,8 +323,8 @@ void Describe(const Problem& problem, const Matrix7& normal, BoardScale& scale) 
   const Matrix7 covariance = VarianceOf(sigma_px) * normal.inverse();
   scale.relative_sigma =
       std::max(RootOfVariance(covariance(0, 0)), Jackknife(problem, scale.scene_from_board));
-  if (!(scale.relative_sigma <= kMostRelativeSigma)) {
-    RefuseScale(fmt::format(
+  if (!(scale.relative_sigma <= kMaxRelativeSigma)) {
+    RejectScale(fmt::format(
         "expected a scale known to 10 %, found one to {:.0f} %; show the board larger, and from "
         "more sides",
         100 * scale.relative_sigma));
@@ -333,9 +333,9 @@ void Describe(const Problem& problem, const Matrix7& normal, BoardScale& scale) 
 
 }  // namespace
 
-BoardScale ScaleFromBoard(const Board& board, std::span<const BoardSight> sights) {
-  if (sights.size() < kFewestViews) {
-    RefuseScale(fmt::format("expected the board in {} views or more, found it in {}", kFewestViews,
+BoardScale ScaleFromBoard(const Board& board, std::span<const BoardObservation> sights) {
+  if (sights.size() < kMinViews) {
+    RejectScale(fmt::format("expected the board in {} views or more, found it in {}", kMinViews,
                             sights.size()));
   }
   Similarity at = Start(board, sights);
@@ -349,14 +349,14 @@ BoardScale ScaleFromBoard(const Board& board, std::span<const BoardSight> sights
   }
   Matrix7 normal;
   double scale_px = kStartScalePx;
-  for (int pass = 0; pass < kMostRobustPasses; ++pass) {
+  for (int pass = 0; pass < kMaxRobustPasses; ++pass) {
     at = Minimised(problem, at, scale_px, &normal);
     const double next = kCauchySigmas * SigmaOf(problem, at);
     if (std::abs(next - scale_px) < kSameScale * scale_px) break;
     scale_px = next;
   }
   DropOutliers(at, problem);
-  for (int pass = 0; pass < kMostOutlierPasses; ++pass) {
+  for (int pass = 0; pass < kMaxOutlierPasses; ++pass) {
     RequireAgreement(problem);
     at = Minimised(problem, at, {}, &normal);
     if (!DropOutliers(at, problem)) break;

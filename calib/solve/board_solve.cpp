@@ -20,7 +20,7 @@
 namespace dtr::calib {
 namespace {
 
-constexpr double kLeastTiltDeg = 3;         // between two boards: below, they count as parallel
+constexpr double kMinTiltDeg = 3;           // between two boards: below, they count as parallel
 constexpr double kLargestFocalError = 0.1;  // relative; above, the solution is of no use
 
 // What is being solved: the views in it, the camera and poses so far.
@@ -62,7 +62,7 @@ void Minimise(const Board& board, BoardModel model, std::optional<double> cauchy
   const LensCoordinates lens = CoordinatesAround(model, state.camera, LargestRadius(board, state));
   std::vector<PoseCoordinates> poses;
   for (const Pose& pose : state.cam_from_board) poses.push_back(CoordinatesAround(pose, pivot));
-  std::array<double, kMostLensParameters> theta{};
+  std::array<double, kMaxLensParameters> theta{};
   std::vector<std::array<double, 6>> motions(poses.size(), std::array<double, 6>{});
   ceres::Solver::Options options = SolverOptions();
   options.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
@@ -84,7 +84,7 @@ void Minimise(const Board& board, BoardModel model, std::optional<double> cauchy
                                SigmaOfUsed(Lengths(board, state), state.used))) {
     problem.AddResidualBlock(prior.release(), nullptr, theta.data());
   }
-  if (!Solve(options, state.camera, &problem)) Refuse("the corners have no least-squares solution");
+  if (!Solve(options, state.camera, &problem)) Reject("the corners have no least-squares solution");
   std::vector<double> params;
   for (int k = 0; k < FreeParameterCount(model); ++k) {
     const auto i = static_cast<size_t>(k);
@@ -93,7 +93,7 @@ void Minimise(const Board& board, BoardModel model, std::optional<double> cauchy
   try {
     state.camera = CameraFrom(model, state.camera.width_px, state.camera.height_px, params);
   } catch (const std::invalid_argument&) {
-    Refuse(
+    Reject(
         fmt::format("no camera of the model {} explains the corners; take views of the board "
                     "from more directions",
                     NameOf(model)));
@@ -140,8 +140,8 @@ void TakeOutDisagreeing(State& state, std::vector<LeftOut>& left_out) {
   for (size_t i = state.views.size(); i-- > 0;) {
     const auto& used = state.used[i];
     const auto agreeing = static_cast<size_t>(std::count(used.begin(), used.end(), true));
-    if (agreeing >= kFewestCorners &&
-        static_cast<double>(agreeing) >= kLeastAgreeing * static_cast<double>(used.size())) {
+    if (agreeing >= kMinCorners &&
+        static_cast<double>(agreeing) >= kMinAgreeing * static_cast<double>(used.size())) {
       continue;
     }
     TakeOutView(i,
@@ -149,9 +149,9 @@ void TakeOutDisagreeing(State& state, std::vector<LeftOut>& left_out) {
                             used.size()),
                 state, left_out);
   }
-  if (state.views.size() < kFewestViews) {
-    Refuse(fmt::format("expected at least {} images that one camera explains, found {}",
-                       kFewestViews, state.views.size()));
+  if (state.views.size() < kMinViews) {
+    Reject(fmt::format("expected at least {} images that one camera explains, found {}", kMinViews,
+                       state.views.size()));
   }
 }
 
@@ -159,7 +159,7 @@ void SolveRobustly(const Board& board, BoardModel model, double outlier_sigmas, 
                    std::vector<LeftOut>& left_out) {
   state.used = Within(Lengths(board, state), std::numeric_limits<double>::infinity());
   double scale = kCauchySigmas * SigmaOfUsed(Lengths(board, state), state.used);
-  for (int pass = 0; pass < kMostRobustPasses; ++pass) {
+  for (int pass = 0; pass < kMaxRobustPasses; ++pass) {
     Minimise(board, model, scale, state);
     const bool repaired = RepairPoses(board, state);
     const double next = kCauchySigmas * SigmaOfUsed(Lengths(board, state), state.used);
@@ -169,7 +169,7 @@ void SolveRobustly(const Board& board, BoardModel model, double outlier_sigmas, 
   }
   state.used = Within(Lengths(board, state), OutlierLimitPx(outlier_sigmas, scale / kCauchySigmas));
   TakeOutDisagreeing(state, left_out);
-  for (int pass = 0; pass < kMostOutlierPasses; ++pass) {
+  for (int pass = 0; pass < kMaxOutlierPasses; ++pass) {
     Minimise(board, model, {}, state);
     const auto lengths = Lengths(board, state);
     Used used = Within(lengths, OutlierLimitPx(outlier_sigmas, ScatterOfUsed(lengths, state.used)));
@@ -182,7 +182,7 @@ void SolveRobustly(const Board& board, BoardModel model, double outlier_sigmas, 
 // Least squares until the residuals, which say what the prior weighs, do not shrink any more.
 void MinimiseSettled(const Board& board, BoardModel model, State& state) {
   double sigma = SigmaOfUsed(Lengths(board, state), state.used);
-  for (int pass = 0; pass < kMostRobustPasses; ++pass) {
+  for (int pass = 0; pass < kMaxRobustPasses; ++pass) {
     Minimise(board, model, {}, state);
     const double next = SigmaOfUsed(Lengths(board, state), state.used);
     const bool settled = std::abs(next - sigma) < kSameScale * sigma;
@@ -198,8 +198,8 @@ void SolveQuadratically(const Board& board, BoardModel model, State& state) {
   state.used = Within(Lengths(board, state), std::numeric_limits<double>::infinity());
   for (const auto& used : state.used) {
     if (std::count(used.begin(), used.end(), false) > 0) {
-      Refuse(
-          "with a quadratic loss every corner counts, and some have no place in the image; "
+      Reject(
+          "with a quadratic loss every corner counts, and some have no position in the image; "
           "leave the loss robust");
     }
   }
@@ -207,23 +207,23 @@ void SolveQuadratically(const Board& board, BoardModel model, State& state) {
   MinimiseSettled(board, model, state);
 }
 
-void RefuseParallelBoards(const State& state) {
-  double least_cosine = 1;
+void RejectParallelBoards(const State& state) {
+  double min_cosine = 1;
   const auto normal = [&](size_t i) -> Eigen::Vector3d {
     return state.cam_from_board[i].rotation * Eigen::Vector3d::UnitZ();
   };
   for (size_t i = 0; i < state.views.size(); ++i) {
     for (size_t j = 0; j < i; ++j) {
-      least_cosine = std::min(least_cosine, std::abs(normal(i).dot(normal(j))));
+      min_cosine = std::min(min_cosine, std::abs(normal(i).dot(normal(j))));
     }
   }
-  const double tilt_deg = std::acos(std::min(1.0, least_cosine)) * 180 / std::numbers::pi;
-  if (tilt_deg < kLeastTiltDeg) {
-    Refuse(
+  const double tilt_deg = std::acos(std::min(1.0, min_cosine)) * 180 / std::numbers::pi;
+  if (tilt_deg < kMinTiltDeg) {
+    Reject(
         fmt::format("parallel boards: expected boards tilted against each other by at least {} "
-                    "degrees, found {:.2f}; focal length and distance cannot be told apart; "
+                    "degrees, found {:.2f}; focal length and distance cannot be distinguished; "
                     "tilt the board by 20 to 45 degrees, to different sides",
-                    kLeastTiltDeg, tilt_deg));
+                    kMinTiltDeg, tilt_deg));
   }
 }
 
@@ -242,18 +242,18 @@ ArrowInformation InformationOf(const Board& board, BoardModel model, const State
   return calib::InformationOf(RowsOf(board, rig, layout), layout);
 }
 
-void RefuseUseless(const BoardSolution& solution, bool cover_image) {
+void RejectUseless(const BoardSolution& solution, bool cover_image) {
   const double error = std::sqrt(std::max(solution.covariance(0, 0), solution.covariance(1, 1)));
   const double focal = std::min(solution.camera.params[0], solution.camera.params[1]);
   if (!(error < kLargestFocalError * focal)) {
-    Refuse(
+    Reject(
         fmt::format("the focal length is not determined, {:.4g} px +- {:.2g}: the boards are too "
                     "parallel to each other, too few or too far away; fill the image and tilt "
                     "them by 20 to 45 degrees, to different sides",
                     focal, error));
   }
   if (cover_image && !CoversImage(solution.camera)) {
-    Refuse(TurnsBack(solution.model));
+    Reject(TurnsBack(solution.model));
   }
 }
 
@@ -277,7 +277,7 @@ void Describe(const Board& board, const State& state, BoardSolution& solution) {
                         6.0 * static_cast<double>(state.views.size());
   const double freedom = 2.0 * solution.corners - unknowns;
   if (!(freedom > 0)) {
-    Refuse(fmt::format("expected more corners than half of {} unknowns, found {}; take more views",
+    Reject(fmt::format("expected more corners than half of {} unknowns, found {}; take more views",
                        unknowns, solution.corners));
   }
   solution.rms_px = std::sqrt(sum / solution.corners);
@@ -304,7 +304,7 @@ State StateFrom(const Board& board, std::span<const BoardView> views, int width_
 
 std::string TurnsBack(BoardModel model) {
   return fmt::format(
-      "the distortion of the model {} turns back before the corner of the image; show the board "
+      "the distortion of the model {} folds back before the corner of the image; show the board "
       "near the corners, or choose fewer coefficients",
       NameOf(model));
 }
@@ -323,8 +323,8 @@ std::vector<double> BoardSolution::FreeParameters() const {
 
 BoardSolution SolveBoard(const Board& board, std::span<const BoardView> views, int width_px,
                          int height_px, BoardModel model, const SolveOptions& options) {
-  if (views.size() < kFewestViews) {
-    Refuse(fmt::format("expected at least {} images with the board, found {}", kFewestViews,
+  if (views.size() < kMinViews) {
+    Reject(fmt::format("expected at least {} images with the board, found {}", kMinViews,
                        views.size()));
   }
   BoardSolution solution;
@@ -335,19 +335,19 @@ BoardSolution SolveBoard(const Board& board, std::span<const BoardView> views, i
   } else {
     SolveQuadratically(board, model, state);
   }
-  RefuseParallelBoards(state);
+  RejectParallelBoards(state);
   solution.camera = state.camera;
   Describe(board, state, solution);
   solution.information = InformationOf(board, model, state);
   solution.covariance = VarianceOf(solution.sigma_px) * solution.information.lens_covariance();
-  RefuseUseless(solution, options.cover_image);
+  RejectUseless(solution, options.cover_image);
   return solution;
 }
 
 std::optional<Pose> SolvePose(const Board& board, const BoardView& view, const LensCamera& camera,
                               std::span<const int> ignored) {
   if (camera.model == LensModel::kFov) {
-    throw Error("calibration: a pose cannot be solved with the lens model FOV; use another one");
+    throw Error("calibration: a pose cannot be solved with the camera model FOV; use another one");
   }
   const auto start = PoseOfBoard(board, view, camera);
   if (!start) return std::nullopt;
@@ -363,7 +363,7 @@ std::optional<Pose> SolvePose(const Board& board, const BoardView& view, const L
         PoseCost(camera, pose, board.Corner(corner.id) - pivot, corner.pixel).release(), nullptr,
         motion.data());
   }
-  if (problem.NumResidualBlocks() < static_cast<int>(kFewestCorners)) return std::nullopt;
+  if (problem.NumResidualBlocks() < static_cast<int>(kMinCorners)) return std::nullopt;
   ceres::Solver::Options options = SolverOptions();
   options.linear_solver_type = ceres::DENSE_QR;
   if (!Solve(options, camera, &problem)) return std::nullopt;

@@ -24,7 +24,7 @@ struct SolveOptions {
   /// A corner farther from its prediction than this many standard deviations is an outlier. Of
   /// normal errors exp(-k^2 / 2) are: 4e-6 at 5.
   double outlier_sigmas = 5;
-  /// Refuse a distortion that turns back inside the image (CoversImage). Off where a camera only
+  /// Reject a distortion that turns back inside the image (CoversImage). Off where a camera only
   /// has to explain boards and will not be kept.
   bool cover_image = true;
 };
@@ -81,7 +81,7 @@ BoardSolution SolveBoard(const Board& board, std::span<const BoardView> views, i
 std::optional<Pose> SolvePose(const Board& board, const BoardView& view, const LensCamera& camera,
                               std::span<const int> ignored = {});
 
-/// What is said of a lens that CoversImage refuses.
+/// What is said of a lens that CoversImage rejects.
 std::string TurnsBack(BoardModel model);
 
 /// True when `ids`, sorted, holds `id`.

@@ -19,7 +19,7 @@ namespace {
 // Of the image's long side; 0.15 is a 190-degree fisheye on the short side of 4:3, 29 a 2-degree
 // tele lens.
 constexpr double kShortestFocal = 0.15, kLongestFocal = 30, kFocalStep = 1.3;
-constexpr size_t kMostViewsToTry = 20;   // enough to choose among starts
+constexpr size_t kMaxViewsToTry = 20;    // enough to choose among starts
 constexpr double kInlierShare = 0.02;    // of the distance: undistorted starts are this far off
 constexpr double kSmallestThird = 0.35;  // quantile of lengths that RobustSigma looks at
 const double kThirdOfRayleigh = std::sqrt(-2 * std::log(1 - kSmallestThird));
@@ -56,7 +56,7 @@ Rays RaysOf(const Board& board, const BoardView& view, const LensMap& lens) {
 
 // Keeps the corners that one homography explains.
 bool KeepAgreeing(Rays& rays) {
-  if (rays.board.size() < kFewestCorners) return false;
+  if (rays.board.size() < kMinCorners) return false;
   double extent = 0;
   for (const cv::Point2d& ray : rays.rays) extent = std::max(extent, cv::norm(ray - rays.rays[0]));
   std::vector<std::uint8_t> agrees;
@@ -71,7 +71,7 @@ bool KeepAgreeing(Rays& rays) {
   }
   rays.board = std::move(kept.board);
   rays.rays = std::move(kept.rays);
-  return rays.board.size() >= kFewestCorners;
+  return rays.board.size() >= kMinCorners;
 }
 
 Pose PoseFromOpenCv(const cv::Mat& rotation_vector, const cv::Mat& translation, const Board& board,
@@ -116,7 +116,7 @@ std::vector<double> CandidateFocals(const Board& board, std::span<const BoardVie
 
 std::vector<BoardView> SomeOf(std::span<const BoardView> views) {
   std::vector<BoardView> some;
-  const size_t count = std::min(views.size(), kMostViewsToTry);
+  const size_t count = std::min(views.size(), kMaxViewsToTry);
   for (size_t i = 0; i < count; ++i) some.push_back(views[i * views.size() / count]);
   return some;
 }
@@ -209,11 +209,11 @@ BoardStart StartBoard(const Board& board, std::span<const BoardView> views, int 
       with_pose += best.cam_from_board.back() ? 1 : 0;
     }
   }
-  if (with_pose < kFewestViews) {
+  if (with_pose < kMinViews) {
     throw Error(fmt::format(
         "calibration: expected at least {} images whose corners lie like those of a {}, found {}; "
         "is it the board that was photographed?",
-        kFewestViews, TextOf(board), with_pose));
+        kMinViews, TextOf(board), with_pose));
   }
   return best;
 }

@@ -18,11 +18,11 @@
 namespace dtr::calib {
 namespace {
 
-constexpr size_t kFewestViewsToChoose = 5;  // 4 to solve from, 1 to hold out
+constexpr size_t kMinViewsToChoose = 5;  // 4 to solve from, 1 to hold out
 // Held-out photos share the print, the lighting and the corner detector with the others: of their
 // errors, too, more coefficients explain a part. Gains below these are none of the lens for sure.
-constexpr double kLeastGain = 0.1;      // of the held-out RMS
-constexpr double kLeastGainPx = 0.005;  // far below what a corner detector does (0.03 px)
+constexpr double kLeastGain = 0.1;    // of the held-out RMS
+constexpr double kMinGainPx = 0.005;  // far below what a corner detector does (0.03 px)
 
 // Sum of squared residual lengths over a view's corners, and their number.
 struct ViewError {
@@ -163,7 +163,7 @@ std::string TextOf(const RadialBend& bend) {
       "between the outermost corner seen, {:.0f} px from the "
       "principal point, and the image's corner at {:.0f} px",
       bend.seen_px, bend.border_px);
-  if (bend.folds) return "turns back " + where;
+  if (bend.folds) return "folds back " + where;
   return fmt::format(
       "bends {}: its scale changes by a factor of {:.2f} there, by {:.2f} where "
       "corners were seen",
@@ -172,7 +172,7 @@ std::string TextOf(const RadialBend& bend) {
 
 // Models that bend where no corner holds them do not count where another one explains held-out
 // views nearly as well.
-void RefuseBent(std::span<const BoardView> views, std::vector<ModelScore>& scores) {
+void RejectBent(std::span<const BoardView> views, std::vector<ModelScore>& scores) {
   std::vector<RadialBend> bends(scores.size());
   double least = std::numeric_limits<double>::infinity();
   for (size_t m = 0; m < scores.size(); ++m) {
@@ -183,7 +183,7 @@ void RefuseBent(std::span<const BoardView> views, std::vector<ModelScore>& score
   for (size_t m = 0; m < scores.size(); ++m) {
     ModelScore& score = scores[m];
     if (!score.refused.empty() || bends[m].Plausible()) continue;
-    if (least <= kBendGivesWay * score.held_out_rms_px + kLeastGainPx) {
+    if (least <= kBendGivesWay * score.held_out_rms_px + kMinGainPx) {
       score.refused = TextOf(bends[m]);
     }
   }
@@ -218,17 +218,17 @@ void Bootstrap(const ErrorsByModel& errors, size_t best, const ChoiceOptions& op
 
 }  // namespace
 
-bool NotSeparated(double rms_px, double least_px) {
-  return rms_px - least_px <= std::max(kLeastGain * least_px, kLeastGainPx);
+bool NotSeparated(double rms_px, double min_px) {
+  return rms_px - min_px <= std::max(kLeastGain * min_px, kMinGainPx);
 }
 
 ModelChoice ChooseModel(const Board& board, std::span<const BoardView> views, int width_px,
                         int height_px, const ChoiceOptions& options) {
-  if (views.size() < kFewestViewsToChoose) {
+  if (views.size() < kMinViewsToChoose) {
     throw Error(
         fmt::format("--model auto: expected at least {} images with the board to hold some "
                     "out, found {}; take more, or name a model",
-                    kFewestViewsToChoose, views.size()));
+                    kMinViewsToChoose, views.size()));
   }
   ModelChoice choice;
   choice.scores = SolveAll(board, views, width_px, height_px, options);
@@ -238,7 +238,7 @@ ModelChoice ChooseModel(const Board& board, std::span<const BoardView> views, in
   for (size_t m = 0; m < choice.scores.size(); ++m) {
     if (choice.scores[m].refused.empty()) choice.scores[m].held_out_rms_px = Rms(errors[m], all);
   }
-  RefuseBent(views, choice.scores);
+  RejectBent(views, choice.scores);
   std::vector<size_t> counting;
   for (size_t m = 0; m < choice.scores.size(); ++m) {
     if (choice.scores[m].refused.empty()) counting.push_back(m);
@@ -249,10 +249,10 @@ ModelChoice ChooseModel(const Board& board, std::span<const BoardView> views, in
   });
   Bootstrap(errors, choice.best, options, choice.scores);
   choice.chosen = choice.best;
-  const double least_px = choice.scores[choice.best].held_out_rms_px;
+  const double min_px = choice.scores[choice.best].held_out_rms_px;
   for (const size_t m : counting) {
     const ModelScore &score = choice.scores[m], &chosen = choice.scores[choice.chosen];
-    const bool as_good = score.low_px <= 0 || NotSeparated(score.held_out_rms_px, least_px);
+    const bool as_good = score.low_px <= 0 || NotSeparated(score.held_out_rms_px, min_px);
     if (as_good && ComplexityOf(score.model) < ComplexityOf(chosen.model)) choice.chosen = m;
   }
   return choice;

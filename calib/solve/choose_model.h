@@ -23,7 +23,7 @@ struct ChoiceOptions {
 struct ModelScore {
   BoardModel model = BoardModel::kPinhole;
   int coefficients = 0;                   ///< FreeParameterCount
-  std::optional<BoardSolution> solution;  ///< of all views; empty when the model was refused
+  std::optional<BoardSolution> solution;  ///< of all views; empty when the model was rejected
   double held_out_rms_px = 0;
   /// Interval of (its held-out RMS - the best model's); both zero for the best one.
   double low_px = 0, high_px = 0;
@@ -43,7 +43,7 @@ inline constexpr double kBendGivesWay = 1.5;
 /// True where an RMS is larger than the least one by no more than 10 % or 0.005 px. Photos share
 /// the print, the lighting and the corner detector: of such errors, held out or not, more
 /// coefficients explain a part, so a gain as small as this is not certain to be one of the lens.
-bool NotSeparated(double rms_px, double least_px);
+bool NotSeparated(double rms_px, double min_px);
 
 /// Held-out error: the views are dealt to `folds` groups in turn; each group is predicted by a
 /// camera solved from all the others, its poses alone fitted (SolvePose). Corners that no model's

@@ -11,7 +11,7 @@
 
 namespace dtr::calib {
 
-void Refuse(const std::string& what) { throw Error("calibration: " + what); }
+void Reject(const std::string& what) { throw Error("calibration: " + what); }
 
 ceres::Solver::Options SolverOptions() {
   ceres::Solver::Options options = SilentOptions();
@@ -34,7 +34,7 @@ bool Solve(ceres::Solver::Options options, const LensCamera& camera, ceres::Prob
 }
 
 double OutlierLimitPx(double outlier_sigmas, double sigma_px) {
-  return outlier_sigmas * std::max(sigma_px, kLeastOutlierSigmaPx);
+  return outlier_sigmas * std::max(sigma_px, kMinOutlierSigmaPx);
 }
 
 Used Within(const std::vector<std::vector<double>>& lengths_px, double limit_px) {
@@ -53,7 +53,7 @@ double SigmaOfUsed(const std::vector<std::vector<double>>& lengths_px, const Use
       if (used[i][j]) all.push_back(lengths_px[i][j]);
     }
   }
-  if (all.empty()) Refuse("expected corners that a camera explains, found none");
+  if (all.empty()) Reject("expected corners that a camera explains, found none");
   return std::max(RobustSigma(std::move(all)), kSmallestSigmaPx);
 }
 

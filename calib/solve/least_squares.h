@@ -10,7 +10,7 @@
 namespace dtr::calib {
 
 /// Throws Error: "calibration: " and what is missing.
-[[noreturn]] void Refuse(const std::string& what);
+[[noreturn]] void Reject(const std::string& what);
 
 /// Levenberg-Marquardt to the last digits, silent: the same bits every time.
 ceres::Solver::Options SolverOptions();
@@ -22,7 +22,7 @@ bool Solve(ceres::Solver::Options options, const LensCamera& camera, ceres::Prob
 constexpr double kCauchySigmas = 3;        // scale of the robust loss
 constexpr double kSameScale = 0.05;        // relative change at which the robust loss is settled
 constexpr double kSmallestSigmaPx = 1e-7;  // that the loss is scaled by, where corners are exact
-constexpr int kMostRobustPasses = 6, kMostOutlierPasses = 10;
+constexpr int kMaxRobustPasses = 6, kMaxOutlierPasses = 10;
 
 using Used = std::vector<std::vector<bool>>;  // per view, per corner
 
@@ -32,7 +32,7 @@ double OutlierLimitPx(double outlier_sigmas, double sigma_px);
 /// Corners nearer than `limit_px` to their predictions.
 Used Within(const std::vector<std::vector<double>>& lengths_px, double limit_px);
 
-/// RobustSigma of the lengths that are used, at least kSmallestSigmaPx. Refuses where there are
+/// RobustSigma of the lengths that are used, at least kSmallestSigmaPx. Rejects where there are
 /// none.
 double SigmaOfUsed(const std::vector<std::vector<double>>& lengths_px, const Used& used);
 

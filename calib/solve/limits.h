@@ -4,8 +4,8 @@
 
 namespace dtr::calib {
 
-constexpr size_t kFewestCorners = 4;        // of a view: a pose has 6 unknowns, these 8 numbers
-constexpr size_t kFewestViews = 3;          // of a camera: two agree about anything
-constexpr double kLeastAgreeing = 1.0 / 3;  // of a view's corners; else its pose is a guess
+constexpr size_t kMinCorners = 4;         // of a view: a pose has 6 unknowns, these 8 numbers
+constexpr size_t kMinViews = 3;           // of a camera: two agree about anything
+constexpr double kMinAgreeing = 1.0 / 3;  // of a view's corners; else its pose is a guess
 
 }  // namespace dtr::calib

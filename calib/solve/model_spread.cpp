@@ -24,7 +24,7 @@ std::vector<BoardView> WithoutOutliers(std::span<const BoardView> views,
   for (size_t i = 0; i < views.size(); ++i) {
     BoardView view = views[i];
     std::erase_if(view.corners, [&](const auto& corner) { return Holds(outliers[i], corner.id); });
-    if (view.corners.size() >= kFewestCorners) some.push_back(std::move(view));
+    if (view.corners.size() >= kMinCorners) some.push_back(std::move(view));
   }
   return some;
 }

@@ -45,8 +45,8 @@ bool Residual(const LensFormula<T>& lens, const T p_in_cam[3], const Eigen::Vect
 
 template <int kFree, typename T>
 LensFormula<T> LensAt(const LensCoordinates& lens, const T* theta) {
-  T params[kMostLensParameters];
-  for (size_t i = 0; i < kMostLensParameters; ++i) {
+  T params[kMaxLensParameters];
+  for (size_t i = 0; i < kMaxLensParameters; ++i) {
     params[i] = i < kFree ? lens.centre[i] + lens.scale[i] * theta[i] : T(0);
   }
   return FormulaOf(LensModelOf(lens.model), params);

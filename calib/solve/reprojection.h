@@ -16,7 +16,7 @@ namespace dtr::calib {
 /// the edge of what was seen by about as much.
 struct LensCoordinates {
   BoardModel model = BoardModel::kPinhole;
-  std::array<double, kMostLensParameters> centre{}, scale{};
+  std::array<double, kMaxLensParameters> centre{}, scale{};
 };
 
 /// Coordinates around `camera` for corners drawn at up to `largest_radius` on the plane of

@@ -19,14 +19,15 @@ struct RigCamera {
   Pose cam_from_rig;
 };
 
-/// What one camera saw at one instant.
+/// What one camera saw at one time step.
 struct RigView {
   size_t camera = 0, frame = 0;
   BoardView seen;
   std::vector<int> outliers;  ///< rising ids of corners that do not count
 };
 
-/// A rig, the board's pose at every instant, and the observations. A single camera is a rig of one.
+/// A rig, the board's pose at every time step, and the observations. A single camera is a rig of
+/// one.
 struct Rig {
   std::vector<RigCamera> cameras;
   std::vector<Pose> rig_from_board;  ///< per frame

@@ -68,7 +68,7 @@ std::vector<double> LargestRadii(const Board& board, const Rig& rig, const Used&
 struct Unknowns {
   std::vector<LensCoordinates> lenses;
   std::vector<PoseCoordinates> places, frames;
-  std::vector<std::array<double, kMostLensParameters>> thetas;
+  std::vector<std::array<double, kMaxLensParameters>> thetas;
   std::vector<std::array<double, 6>> place_motions, frame_motions;
 };
 
@@ -105,7 +105,7 @@ void TakeOver(const Board& board, const Unknowns& u, Rig& rig) {
       camera.camera =
           CameraFrom(camera.model, camera.camera.width_px, camera.camera.height_px, params);
     } catch (const std::invalid_argument&) {
-      Refuse(fmt::format("camera {}: no lens of the model {} explains the corners", camera.name,
+      Reject(fmt::format("camera {}: no camera of the model {} explains the corners", camera.name,
                          calib::NameOf(camera.model)));
     }
     camera.cam_from_rig = PoseAt(u.places[c], u.place_motions[c].data(), kRigOrigin);
@@ -175,7 +175,7 @@ void Minimise(const Board& board, bool free_lenses, std::optional<double> cauchy
     if (c == 0) problem.SetParameterBlockConstant(u.place_motions[c].data());
   }
   if (!Solve(options, LargestImage(rig), &problem)) {
-    Refuse("the corners of the rig have no least-squares solution");
+    Reject("the corners of the rig have no least-squares solution");
   }
   TakeOver(board, u, rig);
 }
@@ -235,8 +235,8 @@ void ChooseFramePoses(const Board& board, double scale_px, Rig& rig) {
 void TakeOutDisagreeing(Rig& rig, std::vector<LeftOut>& left_out) {
   std::erase_if(rig.views, [&](const RigView& view) {
     const size_t all = view.seen.corners.size(), agreeing = all - view.outliers.size();
-    if (agreeing >= kFewestCorners &&
-        static_cast<double>(agreeing) >= kLeastAgreeing * static_cast<double>(all)) {
+    if (agreeing >= kMinCorners &&
+        static_cast<double>(agreeing) >= kMinAgreeing * static_cast<double>(all)) {
       return false;
     }
     left_out.push_back(
@@ -269,7 +269,7 @@ void SolveRobustly(const Board& board, const RigOptions& options, Rig& rig,
                    std::vector<LeftOut>& left_out) {
   double scale = kCauchySigmas * SigmaOfUsed(ResidualLengths(board, rig), UsedOf(rig));
   ChooseFramePoses(board, scale, rig);
-  for (int pass = 0; pass < kMostRobustPasses; ++pass) {
+  for (int pass = 0; pass < kMaxRobustPasses; ++pass) {
     Minimise(board, options.free_lenses, scale, Drawable(ResidualLengths(board, rig)), rig);
     ChooseFramePoses(board, scale, rig);
     const double next = kCauchySigmas * SigmaOfUsed(ResidualLengths(board, rig), UsedOf(rig));
@@ -279,7 +279,7 @@ void SolveRobustly(const Board& board, const RigOptions& options, Rig& rig,
   }
   NameOutliers(board, options.solve.outlier_sigmas, SigmaOfUsed, rig);
   TakeOutDisagreeing(rig, left_out);
-  for (int pass = 0; pass < kMostOutlierPasses; ++pass) {
+  for (int pass = 0; pass < kMaxOutlierPasses; ++pass) {
     Minimise(board, options.free_lenses, {}, UsedOf(rig), rig);
     if (!NameOutliers(board, options.solve.outlier_sigmas, ScatterOfUsed, rig)) break;
     TakeOutDisagreeing(rig, left_out);
@@ -292,13 +292,13 @@ void SolveQuadratically(const Board& board, const RigOptions& options, Rig& rig)
   Minimise(board, options.free_lenses, {}, Drawable(ResidualLengths(board, rig)), rig);
   // Corners that the start could not draw count now.
   if (Drawable(ResidualLengths(board, rig)) != UsedOf(rig)) {
-    Refuse(
-        "with a quadratic loss every corner counts, and some have no place in the image; leave "
+    Reject(
+        "with a quadratic loss every corner counts, and some have no position in the image; leave "
         "the loss robust");
   }
   // Until the residuals, which say what the prior of the lenses weighs, do not shrink any more.
   double sigma = SigmaOfUsed(ResidualLengths(board, rig), UsedOf(rig));
-  for (int pass = 0; pass < kMostRobustPasses; ++pass) {
+  for (int pass = 0; pass < kMaxRobustPasses; ++pass) {
     Minimise(board, options.free_lenses, {}, UsedOf(rig), rig);
     const double next = SigmaOfUsed(ResidualLengths(board, rig), UsedOf(rig));
     const bool settled = std::abs(next - sigma) < kSameScale * sigma;
@@ -333,7 +333,7 @@ void Describe(const Board& board, RigSolution& solution) {
   solution.freedom = 2.0 * solution.corners - solution.layout.size() -
                      6.0 * static_cast<double>(solution.rows.size());
   if (!(solution.freedom > 0)) {
-    Refuse(
+    Reject(
         fmt::format("expected more numbers than unknowns, found {} corners in {} frames; take "
                     "more views",
                     solution.corners, solution.rows.size()));
@@ -401,7 +401,7 @@ void MinimiseFrame(const Board& board, const std::vector<size_t>& views, const U
                                motion.data());
     }
   }
-  if (problem.NumResidualBlocks() < static_cast<int>(kFewestCorners)) return;
+  if (problem.NumResidualBlocks() < static_cast<int>(kMinCorners)) return;
   ceres::Solver::Options options = SolverOptions();
   options.linear_solver_type = ceres::DENSE_QR;
   if (Solve(options, LargestImage(rig), &problem)) {
@@ -439,10 +439,10 @@ RigSolution SolveRig(const Board& board, std::span<const RigCameraInput> cameras
   RigStart start = StartRig(board, std::move(started), std::move(posed), frames);
   solution.rig = std::move(start.rig);
   solution.flipped = std::move(start.flipped);
-  if (solution.rig.views.empty()) Refuse("no view of the board can be used");
+  if (solution.rig.views.empty()) Reject("no view of the board can be used");
   solution.layout = RigLayout(solution.rig.cameras, options.free_lenses);
   if (solution.layout.size() == 0) {
-    Refuse("expected something to solve for, found one camera whose lens is given");
+    Reject("expected something to solve for, found one camera whose intrinsics are given");
   }
   if (options.solve.loss == Loss::kRobust) {
     SolveRobustly(board, options, solution.rig, solution.left_out);

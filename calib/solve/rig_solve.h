@@ -70,7 +70,7 @@ void RequireCoveredImages(const Rig& rig);
 /// own pose, then least squares over all views of the frame. With Loss::kRobust corners beyond
 /// `outlier_sigmas` are left out of the fit and named. Views that no pose explains are returned in
 /// `left_out`; chessboards that were counted from the other end than their frame's first view are
-/// counted anew and named in `flipped`.
+/// counted again and named in `flipped`.
 Rig FitFrames(const Board& board, std::vector<RigCamera> cameras, std::vector<RigView> views,
               size_t frames, const SolveOptions& options, std::vector<LeftOut>& left_out,
               std::vector<std::string>* flipped = nullptr);

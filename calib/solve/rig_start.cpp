@@ -17,7 +17,7 @@
 namespace dtr::calib {
 namespace {
 
-constexpr size_t kMostCandidates = 60;  // answers that are compared; one good one is enough
+constexpr size_t kMaxCandidates = 60;  // answers that are compared; one good one is enough
 
 bool CanTurn(const Board& board) { return board.kind == Board::Kind::kChessboard; }
 
@@ -60,7 +60,7 @@ Shared SharedFrames(const std::vector<PosedView>& views, size_t from, size_t to)
 Pose RelativePose(const Board& board, const Shared& shared) {
   Pose best;
   double least = std::numeric_limits<double>::infinity();
-  const size_t count = std::min(shared.size(), kMostCandidates);
+  const size_t count = std::min(shared.size(), kMaxCandidates);
   for (size_t k = 0; k < count; ++k) {
     const auto& [from, to] = shared[k * shared.size() / count];
     for (const bool turn : {false, true}) {
@@ -104,7 +104,7 @@ void PlaceCameras(const Board& board, const std::vector<PosedView>& views,
       for (size_t c = 0; c < cameras.size(); ++c) {
         if (!placed[c]) names += (names.empty() ? "" : ", ") + cameras[c].name;
       }
-      Refuse(
+      Reject(
           fmt::format("no frame shows the board to one of the cameras {} and to one connected "
                       "with {}; show it to both at once",
                       names, cameras[0].name));

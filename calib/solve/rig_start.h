@@ -26,7 +26,7 @@ void DropOutliers(std::vector<RigView>& views);
 
 /// Views that are counted from the same end within a frame, and the poses of the frames' boards.
 struct Counted {
-  std::vector<RigView> views;        ///< flipped ones with their corners counted anew
+  std::vector<RigView> views;        ///< flipped ones with their corners counted again
   std::vector<Pose> rig_from_board;  ///< by each frame's first view; of frames without one, nothing
   std::vector<std::string> flipped;  ///< names of views that were counted from the other end
 };
@@ -38,7 +38,7 @@ Counted CountFromOneEnd(const Board& board, const std::vector<RigCamera>& camera
 
 /// A rig to start Newton from.
 struct RigStart {
-  Rig rig;                           ///< flipped views have their corners counted anew
+  Rig rig;                           ///< flipped views have their corners counted again
   std::vector<std::string> flipped;  ///< names of views that were counted from the other end
 };
 

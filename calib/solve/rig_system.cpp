@@ -36,14 +36,14 @@ struct Evaluated {
 
 Evaluated Evaluate(const NaturalCamera& camera, const PoseCoordinates& rig_from_board,
                    const Eigen::Vector3d& corner, const Eigen::Vector2d& observed_px) {
-  static constexpr std::array<double, kMostLensParameters> kZero{};
+  static constexpr std::array<double, kMaxLensParameters> kZero{};
   Evaluated out;
   out.by_lens.resize(2, FreeParameterCount(camera.lens.model));
   const double* blocks[] = {kZero.data(), kZero.data(), kZero.data()};
   double* jacobians[] = {out.by_lens.data(), out.by_place.data(), out.by_motion.data()};
   const auto cost = RigCost(camera.lens, camera.place, rig_from_board, corner, observed_px);
   if (!cost->Evaluate(blocks, out.residual.data(), jacobians)) {
-    throw Error("calibration: a corner left the lens");
+    throw Error("calibration: a corner left the field of view");
   }
   return out;
 }

@@ -146,7 +146,7 @@ std::vector<FoundRotation> FindRotations(const Board& board, std::span<const Boa
   for (size_t i = 0; i < rotated.size(); ++i) {
     if (!is_explained[i]) {
       found[i].undecided =
-          "neither way agrees with the camera of the other photos; is it of another "
+          "neither rotation agrees with the camera of the other photos; is it of another "
           "camera, zoom or crop?";
     } else if (IsClear(all[i])) {
       found[i].rotation = kRotations[BetterOf(all[i])];

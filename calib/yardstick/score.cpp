@@ -48,14 +48,15 @@ std::vector<Eigen::Vector2d> ResidualsOf(const Track& track,
     const auto ray = camera->second.lens.RayFromPixel(track[i].pixel);
     const auto pixel = ray ? camera->second.pinhole.PixelFromCam(*ray) : std::nullopt;
     if (!pixel) continue;
-    sights.push_back(MakeSight(camera->second.pinhole, camera->second.cam_from_world, *pixel));
+    sights.push_back(
+        MakeObservation(camera->second.pinhole, camera->second.cam_from_world, *pixel));
     at.push_back(i);
   }
   if (sights.size() < 3) return residuals;  // one is held out, two place the point
   for (size_t k = 0; k < sights.size(); ++k) {
     const Triangulation point = Triangulate(sights, static_cast<int>(k));
     if (point.status != TriangulationStatus::kConverged) continue;
-    const PhotoSight& seen = track[at[k]];
+    const PhotoObservation& seen = track[at[k]];
     const PhotoCamera& camera = cameras.at(seen.photo);
     const auto pixel = camera.lens.PixelFromCam(camera.cam_from_world * point.p_in_world);
     if (pixel) residuals[at[k]] = *pixel - seen.pixel;
@@ -65,15 +66,16 @@ std::vector<Eigen::Vector2d> ResidualsOf(const Track& track,
 
 }  // namespace
 
-YardstickScore ScoreCameras(const SfmModel& model, std::span<const std::string> photos,
-                            std::span<const Track> tracks, double loss_scale_px, int threads) {
+ReferenceTracksScore ScoreCameras(const SfmModel& model, std::span<const std::string> photos,
+                                  std::span<const Track> tracks, double loss_scale_px,
+                                  int threads) {
   const std::map<int, PhotoCamera> cameras = CamerasOf(model, photos);
   std::vector<std::vector<Eigen::Vector2d>> residuals(tracks.size());
   ParallelFor(0, static_cast<int>(tracks.size()), threads, [&](int i) {
     const auto t = static_cast<size_t>(i);
     residuals[t] = ResidualsOf(tracks[t], cameras);
   });
-  YardstickScore score;
+  ReferenceTracksScore score;
   const double missed_px = kMissedScales * loss_scale_px;
   std::vector<double> losses, lengths;
   for (const auto& of_track : residuals) {

@@ -18,11 +18,11 @@ namespace {
 
 constexpr int kMostFeatures = 4000;  // per photo: two photos then take a tenth of a second
 // A tenth of OpenCV's: small photos have few features, and of many the strongest are kept.
-constexpr float kLeastResponse = 1e-4F;
+constexpr float kMinResponse = 1e-4F;
 constexpr float kRatio = 0.8f;            // Lowe 2004
 constexpr double kEpipolarShare = 0.003;  // of the long side: lenses bend lines by about as much
 constexpr double kConfidence = 0.999;
-constexpr size_t kFewestAgreeing = 20;  // a fundamental matrix has 7 unknowns
+constexpr size_t kMinAgreeing = 20;  // a fundamental matrix has 7 unknowns
 
 struct Features {
   std::vector<cv::Point2f> at;      // OpenCV's pixels of the photo as it was looked at
@@ -41,7 +41,8 @@ cv::Mat Grey(const ImageRgb8& image) {
 }
 
 void Shrink(cv::Mat& grey, cv::Mat& mask) {
-  const double factor = static_cast<double>(kYardstickSidePx) / std::max(grey.cols, grey.rows);
+  const double factor =
+      static_cast<double>(kReferenceTracksSidePx) / std::max(grey.cols, grey.rows);
   if (factor >= 1) return;
   const cv::Size size(std::max(1, static_cast<int>(std::lround(factor * grey.cols))),
                       std::max(1, static_cast<int>(std::lround(factor * grey.rows))));
@@ -49,7 +50,7 @@ void Shrink(cv::Mat& grey, cv::Mat& mask) {
   if (!mask.empty()) cv::resize(mask, mask, size, 0, 0, cv::INTER_NEAREST);
 }
 
-Features FeaturesOf(const YardstickPhoto& photo) {
+Features FeaturesOf(const ReferenceTracksPhoto& photo) {
   cv::Mat grey = Grey(photo.image), mask;
   if (!photo.mask.empty()) {
     mask = cv::Mat(photo.mask.height(), photo.mask.width(), CV_8UC1,
@@ -57,7 +58,7 @@ Features FeaturesOf(const YardstickPhoto& photo) {
   }
   Shrink(grey, mask);
   std::vector<cv::KeyPoint> points;
-  const auto akaze = cv::AKAZE::create(cv::AKAZE::DESCRIPTOR_MLDB, 0, 3, kLeastResponse);
+  const auto akaze = cv::AKAZE::create(cv::AKAZE::DESCRIPTOR_MLDB, 0, 3, kMinResponse);
   akaze->detect(grey, points, mask);
   std::stable_sort(points.begin(), points.end(),
                    [](const auto& a, const auto& b) { return a.response > b.response; });
@@ -88,7 +89,7 @@ using Pairs = std::vector<std::pair<int, int>>;  // features of two photos
 
 // What belongs together in two photos.
 Pairs Agreeing(const Features& a, const Features& b) {
-  if (a.at.size() < kFewestAgreeing || b.at.size() < kFewestAgreeing) return {};
+  if (a.at.size() < kMinAgreeing || b.at.size() < kMinAgreeing) return {};
   const std::vector<int> forth = Nearest(a.bits, b.bits), back = Nearest(b.bits, a.bits);
   Pairs pairs;
   std::vector<cv::Point2f> at_a, at_b;
@@ -99,8 +100,8 @@ Pairs Agreeing(const Features& a, const Features& b) {
     at_a.push_back(a.at[static_cast<size_t>(i)]);
     at_b.push_back(b.at[static_cast<size_t>(j)]);
   }
-  if (pairs.size() < kFewestAgreeing) return {};
-  // OpenCV draws with a generator that it seeds anew every time.
+  if (pairs.size() < kMinAgreeing) return {};
+  // OpenCV draws with a generator that it seeds again every time.
   std::vector<std::uint8_t> agrees;
   const double most_px = kEpipolarShare * std::max(a.long_side, b.long_side);
   cv::findFundamentalMat(at_a, at_b, cv::FM_RANSAC, most_px, kConfidence, agrees);
@@ -108,7 +109,7 @@ Pairs Agreeing(const Features& a, const Features& b) {
   for (size_t i = 0; i < agrees.size(); ++i) {
     if (agrees[i] != 0) agreeing.push_back(pairs[i]);
   }
-  if (agreeing.size() < kFewestAgreeing) agreeing.clear();
+  if (agreeing.size() < kMinAgreeing) agreeing.clear();
   return agreeing;
 }
 
@@ -132,7 +133,7 @@ class Joined {
   std::vector<size_t> parent_;
 };
 
-// Whether no photo has two sights; they lie by rising photo.
+// Whether no photo has two observations; they lie by rising photo.
 bool OncePerPhoto(const Track& track) {
   return std::adjacent_find(track.begin(), track.end(), [](const auto& a, const auto& b) {
            return a.photo == b.photo;
@@ -170,10 +171,10 @@ std::vector<Track> Chained(const std::vector<Features>& features,
 
 }  // namespace
 
-std::vector<Track> FindTracks(int photos, const std::function<YardstickPhoto(int)>& read,
+std::vector<Track> FindTracks(int photos, const std::function<ReferenceTracksPhoto(int)>& read,
                               int threads, Progress& progress) {
   std::vector<Features> features;
-  progress.Stage("yardstick: features", photos);
+  progress.Stage("reference tracks: features", photos);
   for (int i = 0; i < photos; ++i) {
     progress.ThrowIfInterrupted();
     features.push_back(FeaturesOf(read(i)));
@@ -184,7 +185,7 @@ std::vector<Track> FindTracks(int photos, const std::function<YardstickPhoto(int
     for (int b = a + 1; b < photos; ++b) pairs.emplace_back(a, b);
   }
   std::vector<Pairs> agreeing(pairs.size());
-  progress.Stage("yardstick: matching", static_cast<int>(pairs.size()));
+  progress.Stage("reference tracks: matching", static_cast<int>(pairs.size()));
   std::atomic<int> done = 0;
   ParallelFor(0, static_cast<int>(pairs.size()), threads, [&](int k) {
     progress.ThrowIfInterrupted();

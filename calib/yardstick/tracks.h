@@ -1,5 +1,5 @@
-// calib/yardstick/tracks.h -- points of a scene as photos show them, found without cameras and not
-// by the features of structure from motion.
+// calib/reference tracks/tracks.h -- points of a scene as photos show them, found without cameras
+// and not by the features of structure from motion.
 #pragma once
 #include <Eigen/Core>
 #include <functional>
@@ -11,21 +11,22 @@
 namespace dtr::calib {
 
 /// Where a photo shows a point.
-struct PhotoSight {
+struct PhotoObservation {
   int photo = 0;
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
 };
 
-/// One point: at most one sight per photo, by rising photo.
-using Track = std::vector<PhotoSight>;
+/// One point: at most one observation per photo, by rising photo.
+using Track = std::vector<PhotoObservation>;
 
 /// What FindTracks asks for of a photo.
-struct YardstickPhoto {
+struct ReferenceTracksPhoto {
   ImageRgb8 image;
   Mask mask;  ///< of the image's size, or empty: all of it may be used
 };
 
-/// Sights of fewer photos tell no camera from another: one is held out, three place the point.
+/// Observations of fewer photos tell no camera from another: one is held out, three place the
+/// point.
 inline constexpr int kFewestSights = 4;
 
 /// Points that kFewestSights photos or more show. AKAZE (Alcantarilla, Nuevo, Bartoli, BMVC 2013)
@@ -35,11 +36,11 @@ inline constexpr int kFewestSights = 4;
 /// fundamental matrix agrees; no camera is asked. Chains that come back to a photo at another place
 /// are left out. What is wrong all the same is the same for every camera it is held against.
 ///
-/// `read` gives photo i; one photo is held at a time. Photos larger than kYardstickSidePx are
+/// `read` gives photo i; one photo is held at a time. Photos larger than kReferenceTracksSidePx are
 /// looked at shrunk; pixels are always those of the whole photo. The same result for any number of
 /// threads.
-std::vector<Track> FindTracks(int photos, const std::function<YardstickPhoto(int)>& read,
+std::vector<Track> FindTracks(int photos, const std::function<ReferenceTracksPhoto(int)>& read,
                               int threads, Progress& progress);
-inline constexpr int kYardstickSidePx = 2400;
+inline constexpr int kReferenceTracksSidePx = 2400;
 
 }  // namespace dtr::calib

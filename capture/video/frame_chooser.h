@@ -19,7 +19,7 @@ struct ChosenFrame {
   bool operator==(const ChosenFrame&) const = default;
 };
 
-/// What one instant looks like: one small grey picture for each camera, and how sharp the pictures
+/// What one time step looks like: one small grey image for each camera, and how sharp the images
 /// are at full size, asked for only where it matters.
 struct Instant {
   int number = 0;
@@ -28,20 +28,20 @@ struct Instant {
   std::function<double()> sharpness;
 };
 
-/// Keeps frames `motion` (of the picture's long side) apart: once the picture has moved by three
+/// Keeps frames `motion` (of the image's long side) apart: once the image has moved by three
 /// quarters of it, the sharpest frame is taken of those until five quarters. A camera that stands
 /// still gives one frame, whatever its speed frames are spread evenly over the way, and frames that
-/// a shaken hand blurred are passed over where a sharp one is near. Where the picture is lost (a
-/// cut, a fast turn) it begins anew.
+/// a shaken hand blurred are passed over where a sharp one is near. Where the image is lost (a
+/// cut, a fast turn) it begins again.
 ///
-/// Several cameras of a rig keep the same instants, by the mean of their motions. Holds at most 64
-/// small pictures per camera, whatever the video's length. Deterministic.
+/// Several cameras of a rig keep the same time steps, by the mean of their motions. Holds at most
+/// 64 small images per camera, whatever the video's length. Deterministic.
 class FrameChooser {
  public:
   /// Throws std::invalid_argument unless 0 < motion <= 1.
   explicit FrameChooser(double motion);
 
-  /// The next instant of the video.
+  /// The next time step of the video.
   void Add(Instant instant);
   /// No more will come. Call it once.
   std::vector<ChosenFrame> Finish();

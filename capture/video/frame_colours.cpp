@@ -18,7 +18,7 @@ extern "C" {
 namespace dtr::capture {
 namespace {
 
-constexpr double kMostStretched = 10;  // pixels are never that much longer than wide
+constexpr double kMaxStretched = 10;  // pixels are never that much longer than wide
 
 const AVPixFmtDescriptor& Descriptor(int format) {
   static const AVPixFmtDescriptor kNone{};
@@ -57,7 +57,7 @@ void MakeSquare(AVRational aspect, FrameKind& kind) {
   kind.out_height = kind.height;
   if (aspect.num <= 0 || aspect.den <= 0) return;
   const double ratio = av_q2d(aspect);
-  if (ratio > kMostStretched || ratio < 1 / kMostStretched) return;
+  if (ratio > kMaxStretched || ratio < 1 / kMaxStretched) return;
   if (ratio > 1) kind.out_width = static_cast<int>(std::lround(kind.width * ratio));
   if (ratio < 1) kind.out_height = static_cast<int>(std::lround(kind.height / ratio));
 }

@@ -16,7 +16,7 @@ namespace dtr::capture {
 namespace {
 
 constexpr double kCutShort = 0.98;  // of what is promised; headers count a few frames too many
-constexpr double kSomeFrames = 2;  // that a duration counts more than are shown
+constexpr double kSomeFrames = 2;   // that a duration counts more than are shown
 
 // Orientation 5 and above exchange width and height.
 bool SameSize(const FrameKind& a, int orientation_a, const FrameKind& b, int orientation_b) {
@@ -103,7 +103,7 @@ bool VideoReader::Next() {
 
 ImageRgb8 VideoReader::Picture() const {
   Parts& parts = *parts_;
-  if (parts.frame == nullptr) throw std::logic_error("VideoReader::Picture: no frame");
+  if (parts.frame == nullptr) throw std::logic_error("VideoReader::Image: no frame");
   try {
     if (!parts.converter || parts.converter->kind() != parts.kind) {
       parts.converter.emplace(parts.kind);

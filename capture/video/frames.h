@@ -56,7 +56,7 @@ class VideoReader {
   double time_s_ = 0;
 };
 
-/// Calls `take` with each frame's number and picture; stops when it returns false. Throws Error
+/// Calls `take` with each frame's number and image; stops when it returns false. Throws Error
 /// where the file is no video or holds no frame.
 void ForEachFrame(const std::filesystem::path& file,
                   const std::function<bool(int, const ImageRgb8&)>& take);

@@ -21,7 +21,7 @@ namespace dtr::capture {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr int kSmallSidePx = 320;      // motion is looked at in such pictures
+constexpr int kSmallSidePx = 320;      // motion is looked at in such images
 constexpr int kJpegQuality = 98;       // the video lost more before
 constexpr double kSameRate = 1e-3;     // relative
 constexpr double kSameInstant = 0.75;  // of the time between two frames
@@ -36,7 +36,7 @@ class Together {
     for (const fs::path& file : files) readers_.push_back(std::make_unique<VideoReader>(file));
   }
 
-  // To the next instant that all have; false once one of the videos has no more.
+  // To the next time step that all have; false once one of the videos has no more.
   bool Next() {
     bool all = true;
     for (const auto& reader : readers_) all = reader->Next() && all;
@@ -233,7 +233,7 @@ void RequireOptions(const VideoOptions& options) {
   if (options.most < 0) throw UsageError("--max-frames: expected a number of frames above 0");
   if (!(options.motion > 0 && options.motion <= 1)) {
     throw UsageError(fmt::format(
-        "--motion: expected a share of the picture above 0 and up to 1, found {}", options.motion));
+        "--motion: expected a share of the image above 0 and up to 1, found {}", options.motion));
   }
 }
 

@@ -11,8 +11,8 @@ namespace dtr::capture {
 struct VideoOptions {
   /// Take every N-th frame, whatever it shows; 0: choose by motion and sharpness (FrameChooser).
   int every = 0;
-  /// Motion of the picture between frames that are taken, of its long side. 0.06 leaves about nine
-  /// tenths of the picture to its successor and two thirds to the fifth after it.
+  /// Motion of the image between frames that are taken, of its long side. 0.06 leaves about nine
+  /// tenths of the image to its successor and two thirds to the fifth after it.
   double motion = 0.06;
   int most = 0;  ///< at most so many frames of each video: the sharpest of equal parts; 0: no limit
   /// The videos began at the same moment and run at the same rate, as a rig's do: the same frames
@@ -31,7 +31,7 @@ std::vector<std::filesystem::path> VideosOf(const std::filesystem::path& source)
 /// (which must be new or empty) as JPEG of quality 98: frame_NNNNNN.jpg by number in the video, of
 /// several videos below a folder with the video's name. The photos say which frame of which video
 /// they are, and those of one video share a camera. What could not be decoded, and of synchronised
-/// videos what is longer than the shortest, is listed under `skipped`. Holds a few pictures at a
+/// videos what is longer than the shortest, is listed under `skipped`. Holds a few images at a
 /// time. The same videos and options give the same bytes.
 /// Throws Error where a file is no video, has a name that is no UTF-8, holds no frame or no frame
 /// with texture, cannot be decoded a second time, or synchronised videos differ in rate; UsageError

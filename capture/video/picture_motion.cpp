@@ -12,8 +12,8 @@
 namespace dtr::capture {
 namespace {
 
-constexpr int kMostCorners = 300;
-constexpr int kFewestCorners = 20;        // fewer may all lie on one moving thing
+constexpr int kMaxCorners = 300;
+constexpr int kMinCorners = 20;           // fewer may all lie on one moving thing
 constexpr double kCornerQuality = 0.01;   // of the best corner's smaller eigenvalue
 constexpr double kCornerDistance = 0.02;  // of the long side, so that they spread
 constexpr float kComesBack = 0.5F;        // px, there and back
@@ -42,7 +42,7 @@ PictureMotion::PictureMotion(const Grid<std::uint8_t>& grey)
   Corners& corners = *corners_;
   corners.last = MatOf(grey);
   corners.long_side = std::max(grey.width(), grey.height());
-  cv::goodFeaturesToTrack(corners.last, corners.start, kMostCorners, kCornerQuality,
+  cv::goodFeaturesToTrack(corners.last, corners.start, kMaxCorners, kCornerQuality,
                           kCornerDistance * corners.long_side);
   corners.now = corners.start;
   corners.count = corners.start.size();
@@ -52,7 +52,7 @@ PictureMotion::~PictureMotion() = default;
 PictureMotion::PictureMotion(PictureMotion&&) noexcept = default;
 PictureMotion& PictureMotion::operator=(PictureMotion&&) noexcept = default;
 
-bool PictureMotion::has_texture() const { return corners_->count >= kFewestCorners; }
+bool PictureMotion::has_texture() const { return corners_->count >= kMinCorners; }
 
 PictureMotion::State PictureMotion::Follow(const Grid<std::uint8_t>& grey) {
   Corners& corners = *corners_;

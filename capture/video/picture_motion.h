@@ -1,4 +1,4 @@
-// capture/video/picture_motion.h -- how far the picture of a camera has moved.
+// capture/video/picture_motion.h -- how far the image of a camera has moved.
 #pragma once
 #include <memory>
 
@@ -6,14 +6,14 @@
 
 namespace dtr::capture {
 
-/// Follows corners of one picture through the pictures after it (Shi & Tomasi 1994, "Good features
+/// Follows corners of one image through the images after it (Shi & Tomasi 1994, "Good features
 /// to track"; Lucas & Kanade with pyramids, Bouguet 2000), there and back: a corner that does not
 /// come back to where it was is dropped.
 class PictureMotion {
  public:
-  /// What has become of the first picture's corners.
+  /// What has become of the first image's corners.
   struct State {
-    double moved = 0;  ///< median way of those still followed, of the picture's long side
+    double moved = 0;  ///< median way of those still followed, of the image's long side
     double kept = 1;   ///< share of them still followed
   };
 
@@ -24,9 +24,9 @@ class PictureMotion {
   PictureMotion(PictureMotion&&) noexcept;
   PictureMotion& operator=(PictureMotion&&) noexcept;
 
-  /// False where the first picture has too few corners to say anything.
+  /// False where the first image has too few corners to say anything.
   bool has_texture() const;
-  /// `grey` is the next picture, of the same size.
+  /// `grey` is the next image, of the same size.
   State Follow(const Grid<std::uint8_t>& grey);
 
  private:

@@ -10,7 +10,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/io/set_io.h"
-#include "dtr/render/instants.h"
+#include "dtr/render/time_steps.h"
 #include "pipeline/advise.h"
 #include "viewer/advice_page.h"
 
@@ -60,13 +60,13 @@ std::string ToJson(const advise::Advice& advice, const DtrSet& set) {
 void Say(const advise::Advice& advice, Console& console) {
   const auto poor = std::count_if(advice.places.begin(), advice.places.end(),
                                   [](const auto& place) { return place.poor; });
-  console.Say(fmt::format("looked from {} places between and beyond the cameras: {} are poor",
+  console.Say(fmt::format("looked from {} positions between and beyond the cameras: {} are poor",
                           advice.places.size(), poor));
   for (const auto& addition : advice.add) {
     const auto& place = advice.places[addition.place];
     console.Say(fmt::format(
         "  add a camera {}: {:.0f} % of what it sees is in no photo, nearest photo within {:.0f} "
-        "degrees; poor places {} -> {}",
+        "degrees; poor positions {} -> {}",
         place.where, 100 * place.unseen_share, place.gap_deg, addition.poor_before,
         addition.poor_after));
   }
@@ -115,8 +115,9 @@ void AddAdviseCommand(CLI::App& app) {
                command.add_option("SET", options->set, "The set")->required();
                command.add_option("-o,--output", options->output, "A page about it, an .html file");
                command
-                   .add_option("--max-unseen", options->advise.max_unseen,
-                               "A place is poor where more of what it sees is in no photo [0.05]")
+                   .add_option(
+                       "--max-unseen", options->advise.max_unseen,
+                       "A position is poor where more of what it sees is in no photo [0.05]")
                    ->check(CLI::Range(0.0, 1.0))
                    ->type_name("SHARE");
                command
@@ -130,7 +131,7 @@ void AddAdviseCommand(CLI::App& app) {
                    ->check(CLI::Range(0.5, 1.0))
                    ->type_name("SHARE");
                command
-                   .add_option("--add", options->advise.most_cameras_to_add,
+                   .add_option("--add", options->advise.max_cameras_to_add,
                                "At most so many cameras to add [5]")
                    ->check(CLI::Range(0, 100))
                    ->type_name("N");

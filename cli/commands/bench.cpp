@@ -12,7 +12,7 @@
 #include "dtr/base/machine.h"
 #include "dtr/eval/bench_json.h"
 #include "dtr/io/set_io.h"
-#include "dtr/render/instants.h"
+#include "dtr/render/time_steps.h"
 #include "pipeline/detail/render/novel_frames.h"
 #include "pipeline/view_names.h"
 #ifdef DTR_HAS_OSG
@@ -70,7 +70,7 @@ int RunGrowthTable(const BenchArguments& options, RenderOptions render, const Dt
   render.resolution = ResolutionsOf(options).front();
   NovelCamera novel;
   if (options.like.empty()) {
-    // Between cameras, where no view has the picture already; the middle is seen by most.
+    // Between cameras, where no view has the image already; the middle is seen by most.
     constexpr int kStepsOfPath = 9;
     novel = FlyThrough(set, kStepsOfPath)[kStepsOfPath / 2];
   } else {
@@ -158,7 +158,7 @@ void DeclareOptions(CLI::App& command, BenchArguments& options) {
               "in OpenSceneGraph, beside the same frame alone")
           ->check(CLI::IsMember({"report", "weights", "growth", "osg"}))
           ->type_name("report|weights|growth|osg");
-  command.add_option("--size", options.size, "Size of the timed pictures; 0 keeps the proportions")
+  command.add_option("--size", options.size, "Size of the timed frames; 0 keeps the proportions")
       ->type_name("WxH");
   command
       .add_option("--repeats", options.repeats,
@@ -171,7 +171,7 @@ void DeclareOptions(CLI::App& command, BenchArguments& options) {
           "render, report, weights: so many held-out photos (or left-out ones) to look from [2]")
       ->check(CLI::Range(1, 100000))
       ->type_name("N");
-  command.add_option("--like", options.like, "growth: from a view's place [between two]")
+  command.add_option("--like", options.like, "growth: from a view's position [between two]")
       ->type_name("VIEW");
   AddRendererOptions(command, options.renderer);
   options.render = AddRenderOptions(command);

@@ -44,7 +44,8 @@ class Measurable {
 
 std::vector<std::string> RendererArguments(const SweepRequest& request) {
   std::vector<std::string> arguments;
-  if (request.renderer.name != RendererChoice{}.name) arguments = {"--renderer", request.renderer.name};
+  if (request.renderer.name != RendererChoice{}.name)
+    arguments = {"--renderer", request.renderer.name};
   if (!request.renderer.shader_folder.empty()) {
     arguments.insert(arguments.end(), {"--shader-dir", request.renderer.shader_folder.string()});
   }
@@ -73,7 +74,7 @@ class RenderStage final : public Measurable {
   std::string Conditions() const override {
     const std::vector<std::string> names = sweep_.Cameras();
     return fmt::format(
-        "seen from {} ({}); pictures timed at {}; median of {} frames after an untimed one, mean "
+        "seen from {} ({}); frames timed at {}; median of {} frames after an untimed one, mean "
         "over the cameras; PSNR over whole frames, holes filled, at the photo's own size",
         names.size() == 1 ? "1 photo" : fmt::format("{} photos", names.size()),
         fmt::join(names, ", "), request_.size.empty() ? "the photo's size" : request_.size,
@@ -203,7 +204,7 @@ std::string ContextOf(const SweepRequest& request, const Measurable& measurable,
   return Sha256(std::as_bytes(std::span(text)));
 }
 
-[[noreturn]] void RefusePoint(const std::string& word, const std::string& expected) {
+[[noreturn]] void RejectPoint(const std::string& word, const std::string& expected) {
   throw UsageError(fmt::format("--point: expected {}, found '{}'", expected, word));
 }
 
@@ -219,12 +220,12 @@ eval::SweepSetting SettingOf(const eval::SweepStage& stage, const std::string& t
     if (equals == std::string::npos || axis == stage.axes.end()) {
       std::vector<std::string> names;
       for (const eval::SweepAxis& one : stage.axes) names.push_back(one.name);
-      RefusePoint(word, fmt::format("default or NAME=VALUE,... with names of {{{}}}",
+      RejectPoint(word, fmt::format("default or NAME=VALUE,... with names of {{{}}}",
                                     fmt::join(names, ",")));
     }
     const auto value = std::find(axis->values.begin(), axis->values.end(), word.substr(equals + 1));
     if (value == axis->values.end()) {
-      RefusePoint(word,
+      RejectPoint(word,
                   fmt::format("a value of {{{}}} for {}", fmt::join(axis->values, ","), name));
     }
     setting[static_cast<size_t>(axis - stage.axes.begin())] =
@@ -276,7 +277,7 @@ SweptStage SweepOne(const Measurable& measurable, const SweepRequest& request,
   } else {
     const auto store =
         file->Of(swept.stage, ContextOf(request, measurable, arguments, context, machine));
-    swept.points = eval::Sweep(swept.stage, request.most_points, *store, context.console);
+    swept.points = eval::Sweep(swept.stage, request.max_points, *store, context.console);
   }
   for (const eval::SweepPoint& point : swept.points) {
     swept.commands.push_back(
@@ -328,10 +329,9 @@ eval::BenchMachine MachineOf(const eval::TimedRenderer& renderer) {
 
 void AddSweepOptions(CLI::App& command, CLI::Option* table, SweepRequest& request) {
   command
-      .add_option(
-          "--stage", request.stages,
-          "Stages to sweep: render; stereo: depth by engine, preset and image size; "
-          "storage: codings and planes; calibration: what SfM is told, of --photos [render]")
+      .add_option("--stage", request.stages,
+                  "Stages to sweep: render; stereo: depth by engine, preset and image size; "
+                  "storage: codings and planes; calibration: options of SfM, of --photos [render]")
       ->delimiter(',')
       ->check(CLI::IsMember({"render", "stereo", "storage", "calibration"}))
       ->excludes(table)
@@ -348,7 +348,7 @@ void AddSweepOptions(CLI::App& command, CLI::Option* table, SweepRequest& reques
           "command goes on [NAME-bench beside the set]")
       ->excludes(table)
       ->type_name("DIR");
-  command.add_option("--max-points", request.most_points, "Most settings measured per stage [60]")
+  command.add_option("--max-points", request.max_points, "Most settings measured per stage [60]")
       ->check(CLI::Range(1, 100000))
       ->excludes(table)
       ->type_name("N");
@@ -388,7 +388,7 @@ void AddSweepOptions(CLI::App& command, CLI::Option* table, SweepRequest& reques
       ->type_name("PX,...");
   command
       .add_option("--truth", request.truth,
-                  "stereo: folder with cameras.json and true depth/ to judge depth by")
+                  "stereo: folder with cameras.json and true depth/ to measure depth against")
       ->check(CLI::ExistingDirectory)
       ->excludes(table)
       ->type_name("DIR");

@@ -18,9 +18,9 @@ struct SweepRequest {
   std::filesystem::path output;  ///< folder; empty: NAME-bench beside the set
   std::filesystem::path truth;
   std::vector<int> max_sizes_px;
-  std::filesystem::path photos;  ///< to calibrate anew
+  std::filesystem::path photos;  ///< to calibrate again
   std::vector<int> feature_sizes_px;
-  int most_points = 60;
+  int max_points = 60;
   double max_loss_db = 0.1;
   std::optional<double> budget_ms;
 

@@ -75,7 +75,7 @@ void AddBuildCommand(CLI::App& app) {
         command
             .add_option("--rig", options->rig,
                         "Calibration of the rig that took all photos, of `dtr calibrate rig`: its "
-                        "lenses, places and scale are held")
+                        "intrinsics, positions and scale are fixed")
             ->type_name("RIG.json");
         command.add_flag("!--no-refine", options->refine,
                          "Take COLMAP's cameras as they are, without bundle adjustment");

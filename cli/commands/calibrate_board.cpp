@@ -84,7 +84,7 @@ void SayCamera(const calib::Calibration& calibration, Console& console) {
   const auto middle = UpperMedian(noise);
   console.Say(
       fmt::format("the noise of the pixels alone would make {:.4f} px (median view); what is "
-                  "above that is lens model, board, blur or motion",
+                  "above that is camera model, board, blur or motion",
                   middle));
 }
 

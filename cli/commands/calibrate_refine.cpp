@@ -23,17 +23,17 @@ struct CalibrateRefineArguments {
 void SayRefined(const calib::Refined& refined, Console& console) {
   for (const auto& candidate : refined.candidates) {
     console.Say(
-        fmt::format("{:<26} unseen points: {:.4f} px", candidate.name, candidate.held_out_px));
+        fmt::format("{:<26} held-out points: {:.4f} px", candidate.name, candidate.held_out_px));
   }
-  if (refined.held_out_sights > 0) {
+  if (refined.held_out_observations > 0) {
     console.Say(fmt::format("{} held-out observations: as given {:.4f} px, adjusted {:.4f} px",
-                            refined.held_out_sights, refined.given_px, refined.adjusted_px));
+                            refined.held_out_observations, refined.given_px, refined.adjusted_px));
   }
   if (!refined.changed) {
     console.Say("left as given: " + refined.reason);
   } else {
     console.Say(
-        fmt::format("refined, lenses {}: RMS {:.4f} px, sigma {:.4f} px per "
+        fmt::format("refined, intrinsics {}: RMS {:.4f} px, sigma {:.4f} px per "
                     "coordinate, {} points dropped",
                     NameOf(*refined.lens), refined.adjusted.rms_px, refined.adjusted.sigma_px,
                     refined.points_dropped));
@@ -47,9 +47,9 @@ pipeline::RefinedInMetres HoldMetres(const CalibrateRefineArguments& options,
                                      const calib::RefineOptions& refine) {
   const std::vector<std::string> names = calib::ImageNames(model);
   pipeline::RequireCameras(metres, names, "the model");
-  pipeline::PhotoPlaces places;
+  pipeline::PhotoPositions places;
   if (metres.gps) {
-    places = pipeline::ReadPhotoPlaces(options.gps, names);
+    places = pipeline::ReadPhotoPositions(options.gps, names);
     pipeline::RequirePlaces(places, options.gps.string(), "the model");
   }
   return pipeline::RefineInMetres(model, metres, places, refine);
@@ -101,42 +101,45 @@ int RunRefine(const CalibrateRefineArguments& options, const Context& context) {
 
 CLI::Option* AddLensOption(CLI::App& command, std::filesystem::path& lens) {
   return command
-      .add_option("--lens", lens,
-                  "The lens of all photos, known: a .json of `dtr calibrate board`, a .yml or "
-                  ".xml of OpenCV or a cameras.txt; it is not changed")
+      .add_option(
+          "--lens", lens,
+          "The intrinsics of all photos, known: a .json of `dtr calibrate board`, a .yml or "
+          ".xml of OpenCV or a cameras.txt; it is not changed")
       ->check(CLI::ExistingFile)
       ->type_name("FILE");
 }
 
 void AddCalibrateRefineCommand(CLI::App& calibrate) {
-  AddCommand(calibrate, "refine",
-             "Bundle adjustment of a COLMAP model, where held-out observations say that it pays",
-             "dtr calibrate refine sparse/0 -o refined/ --lens camera.json",
-             [](CLI::App& command) -> Action {
-               auto options = std::make_shared<CalibrateRefineArguments>();
-               command.add_option("MODEL", options->model, "Folder of the COLMAP model")
-                   ->required()
-                   ->check(CLI::ExistingDirectory);
-               command.add_option("-o,--output", options->output, "Folder for the new model")
-                   ->required()
-                   ->type_name("DIR");
-               AddLensOption(command, options->lens);
-               CLI::Option* gps =
-                   command
-                       .add_option("--gps", options->gps,
-                                   "Folder of the model's photos, whose EXIF says where they were "
-                                   "taken: these places are held, and the model gets metres east, "
-                                   "north and up")
-                       ->check(CLI::ExistingDirectory)
-                       ->type_name("PHOTOS");
-               AddMetreOptions(command, *gps, options->metres);
-               command.add_flag("--separate-lenses", options->separate,
-                                "Every photo a lens of its own, as with a zoom that was moved");
-               command.add_flag("--covariance", options->covariance,
-                                "Add what is uncertain about every pose and lens to --json, where "
-                                "the model is refined");
-               return [options](const Context& context) { return RunRefine(*options, context); };
-             });
+  AddCommand(
+      calibrate, "refine",
+      "Bundle adjustment of a COLMAP model, where held-out observations say that it pays",
+      "dtr calibrate refine sparse/0 -o refined/ --lens camera.json",
+      [](CLI::App& command) -> Action {
+        auto options = std::make_shared<CalibrateRefineArguments>();
+        command.add_option("MODEL", options->model, "Folder of the COLMAP model")
+            ->required()
+            ->check(CLI::ExistingDirectory);
+        command.add_option("-o,--output", options->output, "Folder for the new model")
+            ->required()
+            ->type_name("DIR");
+        AddLensOption(command, options->lens);
+        CLI::Option* gps =
+            command
+                .add_option(
+                    "--gps", options->gps,
+                    "Folder of the model's photos, whose EXIF says where they were "
+                    "taken: these positions constrain the solve, and the model gets metres east, "
+                    "north and up")
+                ->check(CLI::ExistingDirectory)
+                ->type_name("PHOTOS");
+        AddMetreOptions(command, *gps, options->metres);
+        command.add_flag("--separate-lenses", options->separate,
+                         "Every photo intrinsics of its own, as with a zoom that was moved");
+        command.add_flag("--covariance", options->covariance,
+                         "Add what is uncertain about every pose and camera to --json, where "
+                         "the model is refined");
+        return [options](const Context& context) { return RunRefine(*options, context); };
+      });
 }
 
 }  // namespace dtr::cli

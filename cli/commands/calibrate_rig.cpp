@@ -32,11 +32,11 @@ std::optional<calib::BoardModel> RigModelFrom(const std::string& name) {
 
 std::string DelayText(const std::string& camera, const std::string& first, double frames,
                       double sigma) {
-  return fmt::format("{}: its pictures are {:.4f} +- {:.2g} frames {} {}'s", camera,
-                     std::abs(frames), sigma, frames < 0 ? "before" : "after", first);
+  return fmt::format("{}: its photos are {:.4f} +- {:.2g} frames {} {}'s", camera, std::abs(frames),
+                     sigma, frames < 0 ? "before" : "after", first);
 }
 
-// When the cameras take their pictures: what was found, or what speaks against one clock.
+// When the cameras take their images: what was found, or what speaks against one clock.
 void SayDelays(const calib::Calibration& calibration, const pipeline::RigSummary& summary,
                Console& console) {
   const std::string& first = calibration.cameras.front().name;
@@ -59,7 +59,7 @@ void SayDelays(const calib::Calibration& calibration, const pipeline::RigSummary
   const calib::JudgeLimits limits;
   if (summary.unsteady.p < limits.min_p && summary.unsteady.amplitude_px > limits.max_pattern_px) {
     console.Say(fmt::format(
-        "the cameras keep no common rate: a delay of each picture's own, beyond one per camera, "
+        "the cameras have no common rate: a delay of each photo's own, beyond one per camera, "
         "explains {:.3f} px RMS per coordinate; what is said to be uncertain is so by more",
         summary.unsteady.amplitude_px));
   }
@@ -82,12 +82,12 @@ void SayRig(const calib::Calibration& calibration, const pipeline::RigSummary& s
     const Eigen::VectorXd sigma = camera.place_covariance.diagonal().cwiseSqrt();
     const Eigen::AngleAxisd turn(camera.cam_from_rig.rotation);
     const Eigen::Vector3d w = turn.angle() * turn.axis();
-    console.Say(fmt::format("  turn    {:.5f}, {:.5f}, {:.5f} rad +- {:.1g}, {:.1g}, {:.1g}", w.x(),
-                            w.y(), w.z(), sigma[0], sigma[1], sigma[2]));
-    console.Say(fmt::format("  shift   {:.5g}, {:.5g}, {:.5g} +- {:.1g}, {:.1g}, {:.1g}", t.x(),
-                            t.y(), t.z(), sigma[3], sigma[4], sigma[5]));
+    console.Say(fmt::format("  rotation     {:.5f}, {:.5f}, {:.5f} rad +- {:.1g}, {:.1g}, {:.1g}",
+                            w.x(), w.y(), w.z(), sigma[0], sigma[1], sigma[2]));
+    console.Say(fmt::format("  translation  {:.5g}, {:.5g}, {:.5g} +- {:.1g}, {:.1g}, {:.1g}",
+                            t.x(), t.y(), t.z(), sigma[3], sigma[4], sigma[5]));
   }
-  for (const std::string& line : summary.simpler) console.Say("simpler lens: " + line);
+  for (const std::string& line : summary.simpler) console.Say("simpler camera model: " + line);
   for (const std::string& name : summary.flipped) {
     console.Say("counted from the other end, repaired: " + name);
   }
@@ -181,7 +181,7 @@ void AddCalibrateRigCommand(CLI::App& calibrate) {
             ->type_name("NAME");
         command
             .add_option("--clocks", options->clocks,
-                        "synchronised: pictures of a frame are of one moment; free: each camera "
+                        "synchronised: photos of a frame are taken at one time; free: each camera "
                         "takes its own when it likes, at the same rate, and its delay is found "
                         "from the board's motion [synchronised]")
             ->check(CLI::IsMember({"synchronised", "free"}))

@@ -6,7 +6,7 @@
 #include "cli/metre_options.h"
 #include "dtr/base/error.h"
 #include "dtr/io/set_io.h"
-#include "dtr/render/instants.h"
+#include "dtr/render/time_steps.h"
 #include "pipeline/scale.h"
 #include "pipeline/view_names.h"
 
@@ -21,7 +21,8 @@ struct CalibrateScaleArguments {
 
 // The views of the set that somebody named.
 void NameViews(const DtrSet& set, pipeline::ScalePoint& point) {
-  for (pipeline::ScaleClick& click : point.clicks) click.view_id = pipeline::FindView(set, click.view_id).id;
+  for (pipeline::ScaleClick& click : point.clicks)
+    click.view_id = pipeline::FindView(set, click.view_id).id;
 }
 
 calib::Board MetricBoard(const std::string& text) {

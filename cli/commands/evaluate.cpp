@@ -12,7 +12,7 @@
 #include "dtr/eval/json.h"
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
-#include "dtr/render/instants.h"
+#include "dtr/render/time_steps.h"
 #include "pipeline/evaluate_depth.h"
 
 namespace dtr::cli {

@@ -14,7 +14,7 @@
 #include "pipeline/detail/cameras/camera_files.h"
 #include "pipeline/detail/cameras/known_poses.h"
 #include "pipeline/detail/photos/import_photos.h"
-#include "pipeline/detail/run/kept_notes.h"
+#include "pipeline/detail/run/recorded_notes.h"
 #include "pipeline/import.h"
 
 namespace dtr::cli {
@@ -148,7 +148,7 @@ Json ResultJson(const ImportArguments& options, const pipeline::CamerasFromFile&
 }
 
 int RunImport(ImportArguments options, const Context& context) {
-  pipeline::KeptNotes progress(context.console);
+  pipeline::RecordedNotes progress(context.console);
   auto cameras = pipeline::ReadCameraFile(options.cameras, options.format,
                                           {options.import.images_dir, options.import.depth_dir,
                                            options.import.mask_dir, options.allow_missing});

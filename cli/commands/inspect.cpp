@@ -15,7 +15,7 @@
 #include "dtr/base/files.h"
 #include "dtr/io/run_record.h"
 #include "dtr/io/set_io.h"
-#include "dtr/render/instants.h"
+#include "dtr/render/time_steps.h"
 #include "pipeline/detail/render/set_stream.h"
 #include "pipeline/validate.h"
 #include "viewer/inspect_page.h"
@@ -126,7 +126,7 @@ int RunInspect(const InspectArguments& options, const Context& context) {
   }
   io::CollapseDuplicates(set);
   const auto stream = pipeline::StreamOf(options.set, set, {DescribeRenderScene(set)},
-                               {options.memory_gb, threads}, context.console);
+                                         {options.memory_gb, threads}, context.console);
   RenderOptions render = StoredRenderOptions(set);
   render.threads = threads;
   WriteFileAtomically(options.output,

@@ -16,10 +16,10 @@ void AddJoinCommand(CLI::App& app) {
     pipeline::JoinOptions join;
   };
   AddCommand(
-      app, "join", "Make a moving set of sets of single instants, in their order",
-      "dtr join t0.dtr t1.dtr -o moving.dtr --fps 24", [](CLI::App& command) -> Action {
+      app, "join", "Make a dynamic set of sets of single time steps, in their order",
+      "dtr join t0.dtr t1.dtr -o dynamic.dtr --fps 24", [](CLI::App& command) -> Action {
         auto options = std::make_shared<Options>();
-        command.add_option("SETS", options->sets, "A set for each instant, first to last")
+        command.add_option("SETS", options->sets, "A set for each time step, first to last")
             ->required();
         command.add_option("-o,--output", options->output, "The set to write, NAME.dtr")
             ->required()

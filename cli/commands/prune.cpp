@@ -46,7 +46,7 @@ void SayResult(const PruneArguments& options, const pipeline::PruneSetReport& re
         "WARNING: held-out photos lose more than was allowed; give a smaller --max-loss-db");
   }
   if (!pruned.put_back.empty()) {
-    console.Say(fmt::format("  {} decisions taken back, as other places showed more loss",
+    console.Say(fmt::format("  {} decisions taken back, as other positions showed more loss",
                             pruned.put_back.size()));
   }
   console.Say(fmt::format("  dtr info {} says what was left out; drawn with: {}",
@@ -81,7 +81,7 @@ int RunPrune(PruneArguments& options, const Context& context) {
 
 void AddPruneCommand(CLI::App& app) {
   AddCommand(
-      app, "prune", "Leave out what a set's pictures do not need",
+      app, "prune", "Leave out what a set's images do not need",
       "dtr prune scene.dtr -o small.dtr --max-loss-db 0.1", [](CLI::App& command) -> Action {
         auto options = std::make_shared<PruneArguments>();
         prune::PruneOptions& prune = options->prune.prune;
@@ -90,10 +90,10 @@ void AddPruneCommand(CLI::App& app) {
             ->required()
             ->type_name("SET2.dtr");
         command
-            .add_option(
-                "--max-loss-db", prune.max_loss_db,
-                "How much worse pictures may get, PSNR in dB, mean over places that decided "
-                "nothing [0.1]")
+            .add_option("--max-loss-db", prune.max_loss_db,
+                        "How much worse rendered images may get, PSNR in dB, mean over positions "
+                        "that decided "
+                        "nothing [0.1]")
             ->check(CLI::Range(0.0, 20.0))
             ->type_name("L");
         command
@@ -122,7 +122,7 @@ void AddPruneCommand(CLI::App& app) {
             ->type_name("N");
         command
             .add_option("--probe-crop", prune.probe_crop,
-                        "Of deciding photos a window of 1/N per axis counts; checking pictures are "
+                        "Of deciding photos a window of 1/N per axis counts; checking frames are "
                         "whole [2]")
             ->check(CLI::Range(1, 16))
             ->type_name("N");

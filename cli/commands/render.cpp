@@ -16,8 +16,8 @@
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
 #include "dtr/io/video.h"
-#include "dtr/render/instants.h"
 #include "dtr/render/scene.h"
+#include "dtr/render/time_steps.h"
 #include "dtr/render/view_stream.h"
 #include "pipeline/detail/render/dynamic_scene.h"
 #include "pipeline/detail/render/novel_frames.h"
@@ -31,7 +31,7 @@ struct RenderCommandArguments {
   fs::path set, output, depth_out, coverage_out;
   pipeline::NovelCameraRequest request;
   std::string exclude;
-  std::optional<size_t> frame;  ///< of a moving set
+  std::optional<size_t> frame;  ///< of a dynamic set
   bool play = false;
   RendererChoice renderer;
   double memory_gb = 4;
@@ -111,7 +111,8 @@ nlohmann::ordered_json FrameJson(const std::string& file, double ms, size_t show
 }
 
 // With --play, one camera sees every frame of the set.
-std::vector<pipeline::NovelFrame> CamerasOf(const RenderCommandArguments& options, const DtrSet& set) {
+std::vector<pipeline::NovelFrame> CamerasOf(const RenderCommandArguments& options,
+                                            const DtrSet& set) {
   std::vector<pipeline::NovelFrame> cameras =
       pipeline::NovelFrames(AtFrame(set, options.frame.value_or(0)), options.request);
   if (!options.play) return cameras;
@@ -123,7 +124,7 @@ std::vector<pipeline::NovelFrame> CamerasOf(const RenderCommandArguments& option
   return all;
 }
 
-// The frame of the set that picture `i` shows; paths run through time.
+// The frame of the set that image `i` shows; paths run through time.
 size_t FrameShown(const RenderCommandArguments& options, const DtrSet& set, size_t i,
                   size_t pictures) {
   return options.frame ? *options.frame : FrameOfPicture(i, pictures, set.frames.size());
@@ -139,8 +140,8 @@ int RunRender(const RenderCommandArguments& options, const Context& context) {
   render.threads = context.common.threads;
   // Before anything is loaded: a machine without OpenGL should say so at once.
   const eval::RenderFunction render_view = MakeRenderer(options.renderer, context.console);
-  pipeline::DynamicScene moving(options.set, described, options.exclude, {options.memory_gb, render.threads},
-                      context.console);
+  pipeline::DynamicScene moving(options.set, described, options.exclude,
+                                {options.memory_gb, render.threads}, context.console);
   moving.At(FrameShown(options, described, 0, cameras.size()));  // names are checked here
 
   FrameSink sink(options.output, several);
@@ -161,7 +162,7 @@ int RunRender(const RenderCommandArguments& options, const Context& context) {
     const std::chrono::duration<double, std::milli> ms = std::chrono::steady_clock::now() - start;
     if (result.views_used.empty()) {
       context.console.Note(
-          fmt::format("WARNING: {}: no view is valid for this camera: the picture "
+          fmt::format("WARNING: {}: no view is valid for this camera: the image "
                       "is empty",
                       cameras[i].name));
     }
@@ -194,7 +195,7 @@ void AddRenderCommand(CLI::App& app) {
                         "One frame: an image; several: a folder or an .mp4 file")
             ->required();
         auto* where = command.add_option_group("where", "Where to look from (exactly one)");
-        where->add_option("--like", options->request.like, "From a view's place")
+        where->add_option("--like", options->request.like, "From a view's position")
             ->type_name("VIEW");
         where->add_option("--camera", options->request.camera_file, "From a cameras.json")
             ->type_name("FILE");
@@ -210,11 +211,11 @@ void AddRenderCommand(CLI::App& app) {
             ->type_name("WxH");
         command
             .add_option("--frame", options->frame,
-                        "Of a moving set: the frame to show, from 0 [a path runs through all]")
+                        "Of a dynamic set: the frame to show, from 0 [a path runs through all]")
             ->check(CLI::Range(0, 1 << 30))
             ->type_name("N");
         command.add_flag("--play", options->play,
-                         "Of a moving set: every frame in turn, from one place");
+                         "Of a dynamic set: every frame in turn, from one position");
         command.add_option("--exclude", options->exclude, "Views not to render from")
             ->type_name("NAME,...");
         AddRendererOptions(command, options->renderer);

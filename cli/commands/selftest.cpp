@@ -71,7 +71,7 @@ int RunSelftest(const SelftestArguments& options, const Context& context) {
 void AddSelftestCommand(CLI::App& app) {
   AddCommand(
       app, "selftest",
-      "Stiff and extreme cases of every stage, each held against its bound; exit 1 when one "
+      "Stiff and extreme cases of every stage, each with its bound; exit 1 when one "
       "fails",
       "dtr selftest --stability -o STABILITY.md", [](CLI::App& command) -> Action {
         auto options = std::make_shared<SelftestArguments>();

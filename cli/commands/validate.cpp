@@ -10,7 +10,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/io/set_io.h"
-#include "dtr/render/instants.h"
+#include "dtr/render/time_steps.h"
 #include "pipeline/detail/pages/validation_page.h"
 #include "pipeline/validate.h"
 
@@ -38,17 +38,17 @@ void SayReport(const calib::ValidationReport& report, Console& console) {
                             test.name, test.value, test.limit, test.reason));
   }
   if (!report.not_judged.empty()) {
-    console.Say("not judged by a fresh bundle adjustment: " + report.not_judged);
+    console.Say("not validated by a fresh bundle adjustment: " + report.not_judged);
   }
   for (const std::string& name : report.untested) {
     console.Say("not tested, too few observations: " + name);
   }
   for (const std::string& name : report.kept_apart) {
-    console.Say("not tested, held out without observations; dtr evaluate judges by it: " + name);
+    console.Say("not tested, held out without observations; dtr evaluate measures by it: " + name);
   }
 }
 
-void RefuseForSets(const ValidateCalibrationOptions& options) {
+void RejectForSets(const ValidateCalibrationOptions& options) {
   for (const auto& [given, name] :
        {std::pair{options.images.has_value(), "--images"},
         std::pair{options.pattern.has_value(), "--pattern"},
@@ -67,7 +67,7 @@ int RunValidate(ValidateArguments options, const Context& context) {
     options.calibration.file = options.set;
     return RunValidateCalibration(options.calibration, context);
   }
-  RefuseForSets(options.calibration);
+  RejectForSets(options.calibration);
   double& max_rms_px = options.limits.reprojection.max_rms_px;
   max_rms_px = options.calibration.max_rms_px.value_or(max_rms_px);
   options.limits.max_cross_px = options.max_cross_px.value_or(options.limits.max_cross_px);
@@ -113,16 +113,17 @@ void AddValidateCommand(CLI::App& app) {
             ->check(kPositive)
             ->type_name("PX");
         command
-            .add_option("--max-cross", options->max_cross_px,
-                        fmt::format("Limit of the way of depth into a neighbour and back, median "
-                                    "of a set's pixels; the worst view may have twice as much [{}]",
-                                    options->limits.max_cross_px))
+            .add_option(
+                "--max-cross", options->max_cross_px,
+                fmt::format("Limit of the error of depth carried into a neighbour and back, median "
+                            "of a set's pixels; the worst view may have twice as much [{}]",
+                            options->limits.max_cross_px))
             ->check(kPositive)
             ->type_name("PX");
         command
             .add_option("--images", calibration.images,
                         "Photos of the board that the calibration has not seen; without them it is "
-                        "judged on those it was made from")
+                        "validated on those it was made from")
             ->type_name("DIR");
         command
             .add_option("--pattern", calibration.pattern,
@@ -142,7 +143,7 @@ void AddValidateCommand(CLI::App& app) {
             ->type_name("PX");
         command
             .add_option("--at", calibration.at,
-                        "Of a calibration file: also tell the projections' standard deviation at "
+                        "Of a calibration file: also report the projections' standard deviation at "
                         "these distances from the camera, as 2m or 60cm, or in the unit of the "
                         "board's squares")
             ->delimiter(',')

@@ -40,8 +40,8 @@ void SayReport(const calib::JudgeReport& report, Console& console) {
   }
   if (!report.unseen) {
     console.Say(
-        "judged on the views that made the calibration; --images DIR with photos of the board "
-        "that it has not seen says more");
+        "validated on the views that made the calibration; --images DIR with photos of the board "
+        "that were held out tell more");
   }
 }
 
@@ -88,13 +88,13 @@ calib::Calibration Read(const ValidateCalibrationOptions& options) {
     calib::Calibration calibration = calib::ReadCalibration(options.file);
     if (calibration.views.empty() && !options.images) {
       throw UsageError(
-          fmt::format("{}: keeps no observations; give photos of the board by --images", file));
+          fmt::format("{}: has no observations; give photos of the board by --images", file));
     }
     return calibration;
   }
   if (!options.images || !options.board) {
     throw UsageError(fmt::format(
-        "{}: keeps neither board nor observations; expected --board BOARD and --images DIR", file));
+        "{}: has neither board nor observations; expected --board BOARD and --images DIR", file));
   }
   return pipeline::ForeignCalibration(options.file, calib::BoardFromText(*options.board));
 }

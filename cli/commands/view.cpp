@@ -18,15 +18,15 @@
 #include "dtr/base/machine.h"
 #include "dtr/base/memory_budget.h"
 #include "dtr/io/set_io.h"
-#include "dtr/io/verdict.h"
-#include "dtr/render/instants.h"
+#include "dtr/io/validation_result.h"
 #include "dtr/render/option_arguments.h"
+#include "dtr/render/time_steps.h"
 #include "pipeline/detail/render/novel_frames.h"
 #include "pipeline/detail/render/set_stream.h"
 #include "pipeline/validate.h"
 #include "pipeline/view_names.h"
+#include "viewer/frame_rate_controller.h"
 #include "viewer/glfw/app.h"
-#include "viewer/governor.h"
 
 namespace dtr::cli {
 namespace {
@@ -53,7 +53,7 @@ std::unique_ptr<viewer::OpenedSet> Open(const Options& options, const Context& c
   opened->defaults = StoredRenderOptions(opened->set);
   io::CollapseDuplicates(opened->set);
   opened->stream = pipeline::StreamOf(options.set, opened->set, DescribeFrames(opened->set, {}),
-                            {options.memory_gb, context.common.threads}, context.console);
+                                      {options.memory_gb, context.common.threads}, context.console);
   return opened;
 }
 
@@ -87,7 +87,7 @@ std::string CommandLine(const Options& options, const viewer::OpenedSet& opened,
   if (!excluded.empty()) words.insert(words.end(), {"--exclude", excluded});
   const auto further = RenderOptionArguments(wanted.options, opened.defaults);
   words.insert(words.end(), further.begin(), further.end());
-  // Where memory holds fewer views than a picture asks for, it is another picture.
+  // Where memory holds fewer views than an image asks for, it is another image.
   const Options defaults;
   if (options.memory_gb != defaults.memory_gb) {
     words.insert(words.end(), {"--memory", fmt::format("{}", options.memory_gb)});
@@ -210,7 +210,7 @@ std::string FileStamp(const fs::path& file) {
                      found.st_mtim.tv_nsec);
 }
 
-/// Of the files that pictures are made of; empty while one is missing.
+/// Of the files that images are made of; empty while one is missing.
 std::string ViewStampOf(const fs::path& set, const View& view) {
   std::string stamp;
   for (const auto* file : {&view.image_file, &view.mask_file, &view.depth_file}) {
@@ -224,7 +224,8 @@ std::string ViewStampOf(const fs::path& set, const View& view) {
 
 std::vector<NovelCamera> CamerasOf(const std::vector<pipeline::NovelFrame>& frames) {
   std::vector<NovelCamera> cameras;
-  for (const pipeline::NovelFrame& frame : frames) cameras.push_back({frame.camera, frame.cam_from_world});
+  for (const pipeline::NovelFrame& frame : frames)
+    cameras.push_back({frame.camera, frame.cam_from_world});
   return cameras;
 }
 
@@ -304,7 +305,8 @@ viewer::AppSettings SettingsOf(const Options& options, const Context& context, c
       request.fly_through_frames == 0) {
     return settings;
   }
-  const std::vector<pipeline::NovelFrame> frames = pipeline::NovelFrames(AtFrame(set, options.instant), request);
+  const std::vector<pipeline::NovelFrame> frames =
+      pipeline::NovelFrames(AtFrame(set, options.instant), request);
   settings.start = NovelCamera{frames.front().camera, frames.front().cam_from_world};
   if (frames.size() > 1) settings.play = CamerasOf(frames);
   return settings;
@@ -350,10 +352,11 @@ void AddViewCommand(CLI::App& app) {
         command.add_option("SET", options->set, "The set")->required();
         command
             .add_option("-o,--output", options->output,
-                        "Folder for pictures, cameras and paths that are saved [.]")
+                        "Folder for images, cameras and paths that are saved [.]")
             ->type_name("DIR");
         auto* where = command.add_option_group("where", "Where to start (at most one)");
-        where->add_option("--like", options->request.like, "At a view's place")->type_name("VIEW");
+        where->add_option("--like", options->request.like, "At a view's position")
+            ->type_name("VIEW");
         where->add_option("--camera", options->request.camera_file, "At a cameras.json's camera")
             ->type_name("FILE");
         where->add_option("--path", options->request.path_file, "Fly along a cameras.json first")
@@ -369,14 +372,14 @@ void AddViewCommand(CLI::App& app) {
             ->type_name("N");
         command
             .add_option("--frame", options->instant,
-                        "Of a moving set: the frame shown first, from 0 [0]")
+                        "Of a dynamic set: the frame shown first, from 0 [0]")
             ->check(CLI::Range(0, 1 << 30))
             ->type_name("N");
-        command.add_flag("--play", options->play, "Of a moving set: play it at once");
+        command.add_flag("--play", options->play, "Of a dynamic set: play it at once");
         command
             .add_option("--largest-divisor", options->largest_divisor,
-                        "While the camera moves, divide the picture's sides by no more than N [8]")
-            ->check(CLI::Range(1, viewer::ResolutionGovernor::kMostDivisor))
+                        "While the camera moves, divide the image's sides by no more than N [8]")
+            ->check(CLI::Range(1, viewer::ResolutionFrameRateController::kMaxDivisor))
             ->type_name("N");
         command.add_option("--size", options->size, "Size of the window [1280x800]")
             ->type_name("WxH");
@@ -384,7 +387,7 @@ void AddViewCommand(CLI::App& app) {
             ->type_name("NAME,...");
         command
             .add_option("--frames", options->frames,
-                        "Close after N frames, once the picture is whole; for scripts")
+                        "Close after N frames, once the image is whole; for scripts")
             ->check(CLI::Range(1, 100'000'000))
             ->type_name("N");
         command
@@ -394,7 +397,7 @@ void AddViewCommand(CLI::App& app) {
         command.add_flag("--no-panel", options->no_panel, "Begin without the panel");
         command.add_flag("--cameras", options->cameras, "Begin with the input cameras shown");
         command.add_flag("--photo", options->photo,
-                         "Begin with the nearest photo beside the picture");
+                         "Begin with the nearest photo beside the image");
         command
             .add_option("--state-file", options->state_file,
                         "Keep FILE telling, as JSON, what the window shows; for scripts")

@@ -105,7 +105,7 @@ Outcome ManyBlendedViews(const Conditions&) {
 Outcome AllUnderflow(const Conditions&) {
   Outcome outcome;
   Shares shares;
-  double least_best = 1;
+  double min_best = 1;
   for (const BlendWeight weight : kWeights) {
     BlendParameters p = Of(weight);
     p.exponent = 1000;
@@ -116,10 +116,10 @@ Outcome AllUnderflow(const Conditions&) {
     shares.Draw(p, angles, outcome);
     std::vector<double> found(angles.size());
     BlendShares(p, angles, found);
-    least_best = std::min(least_best, found[1]);
+    min_best = std::min(min_best, found[1]);
   }
   shares.AddTo(outcome);
-  outcome.Add(AtLeast("least share of the best view", least_best, 1 - 1e-12,
+  outcome.Add(AtLeast("smallest share of the best view", min_best, 1 - 1e-12,
                       "where all weights are 0 in doubles, the nearest view is what is left"));
   return outcome;
 }

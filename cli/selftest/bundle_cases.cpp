@@ -84,8 +84,8 @@ Outcome FarFromTheOrigin(const Conditions&) {
 /// Errors of a lens's parameters over those that noise of `noise_px` explains: RMS against noise.
 void AddNoiseLevel(const Adjusted& out, double noise_px, Outcome& outcome) {
   outcome.Add(Exactly("converged", out.converged, 1, "the solver ends at a minimum"));
-  outcome.Add(AtMost("sigma of the sights over the noise added", out.sigma_px / noise_px, 1.1,
-                     "1 where the solution is the best one; 2000 sights scatter by 2 %"));
+  outcome.Add(AtMost("sigma of the observations over the noise added", out.sigma_px / noise_px, 1.1,
+                     "1 where the solution is the best one; 2000 observations scatter by 2 %"));
 }
 
 void AddFocalError(const Adjusted& out, double truth_px, double bound, const char* reason,
@@ -109,7 +109,7 @@ Outcome MixedMagnitudes(const Conditions&) {
   };
   const Adjusted out = Solve(Perturbed(MakeBundle(spec), 0.01), LensFreedom::kAll, outcome);
   AddNoiseLevel(out, 0.3, outcome);
-  AddFocalError(out, 9000, 1e-3, "0.3 px of noise in 2000 sights and more; seen: below 1e-4",
+  AddFocalError(out, 9000, 1e-3, "0.3 px of noise in 2000 observations and more; seen: below 1e-4",
                 outcome);
   return outcome;
 }
@@ -145,12 +145,12 @@ Outcome Undecided(const SceneSpec& spec, std::initializer_list<const char*> name
   Solve(bundle, LensFreedom::kNoPrincipalPoint, outcome);
   const calib::Judgement judgement = calib::Judge(bundle, {}, conditions.threads);
   for (const Check& test : judgement.tests) outcome.not_finite += std::isnan(test.value);
-  outcome.Add(Exactly("the judge names the degeneracy", Names(judgement, names), 1,
-                      "what the views cannot decide is told, not guessed"));
-  outcome.Add(Exactly("the judge passes the calibration", AllPassed(judgement.tests), 0,
+  outcome.Add(Exactly("the validation names the degeneracy", Names(judgement, names), 1,
+                      "what the views cannot decide is reported, not guessed"));
+  outcome.Add(Exactly("the validation passes the calibration", AllPassed(judgement.tests), 0,
                       "numbers that nothing supports must not pass"));
   for (const calib::Degeneracy& d : judgement.degeneracies) {
-    if (d.harmful) outcome.refusal = d.name + ": " + d.detail;
+    if (d.harmful) outcome.rejection = d.name + ": " + d.detail;
   }
   return outcome;
 }
@@ -203,7 +203,7 @@ Outcome NarrowLens(const Conditions&) {
     return Eigen::Vector3d(x, y, random.Uniform(-0.03, 0.03));
   };
   const Bundle truth = MakeBundle(spec);
-  Bundle start = Perturbed(truth, 1e-3);  // some 20 px off in a picture of 0.1 units
+  Bundle start = Perturbed(truth, 1e-3);  // some 20 px off in an image of 0.1 units
   start.lenses = truth.lenses;  // known: so narrow a lens cannot be told from its distance
   outcome.Add(AtLeast("largest error of a predicted pixel at the start, px",
                       LargestDifference(Projections(start), Projections(truth)), 10,
@@ -245,11 +245,12 @@ Outcome FisheyeOf190Degrees(const Conditions&) {
     const Eigen::Vector3d p = truth.points[static_cast<size_t>(sight.point)].head<3>();
     behind += (pose * p).z() < 0;
   }
-  outcome.Add(AtLeast("sights beyond 90 degrees", static_cast<double>(behind), 20,
+  outcome.Add(AtLeast("observations beyond 90 degrees", static_cast<double>(behind), 20,
                       "the case is about them"));
   const Adjusted out = Solve(Perturbed(truth, 0.01), LensFreedom::kNoPrincipalPoint, outcome);
   AddNoiseLevel(out, 0.3, outcome);
-  AddFocalError(out, focal, 0.005, "sights all around leave the focal length no freedom", outcome);
+  AddFocalError(out, focal, 0.005, "observations all around leave the focal length no freedom",
+                outcome);
   return outcome;
 }
 
@@ -263,10 +264,11 @@ Outcome HalfAreOutliers(const Conditions&) {
     sight.pixel += Eigen::Vector2d(x, random.Uniform(-80, 80));
   }
   const Adjusted out = Solve(Perturbed(spoiled, 0.02), LensFreedom::kNoPrincipalPoint, outcome);
-  outcome.Add(AtMost("sigma of the sights that count, px", out.sigma_px, 0.3,
-                     "0.1 px of noise, and wrong sights that agree by chance within 5 sigmas"));
-  AddFocalError(out, 900, 5.0 / 900, "half of the sights decide as well as all, but for sqrt(2)",
-                outcome);
+  outcome.Add(
+      AtMost("sigma of the observations that count, px", out.sigma_px, 0.3,
+             "0.1 px of noise, and wrong observations that agree by chance within 5 sigmas"));
+  AddFocalError(out, 900, 5.0 / 900,
+                "half of the observations decide as well as all, but for sqrt(2)", outcome);
   return outcome;
 }
 
@@ -277,7 +279,7 @@ Outcome AMillionPixelsOff(const Conditions&) {
   spoiled.observations[5].pixel.x() += 1e6;
   const Adjusted good = Solve(clean, LensFreedom::kAll, outcome);
   const Adjusted out = Solve(spoiled, LensFreedom::kAll, outcome);
-  outcome.Add(Exactly("the sight counts", out.used[5], 0, "it agrees with nothing"));
+  outcome.Add(Exactly("the observation counts", out.used[5], 0, "it agrees with nothing"));
   outcome.Add(AtMost("change of the focal length, px",
                      std::abs(out.bundle.lenses[0].params[0] - good.bundle.lenses[0].params[0]),
                      0.1, "one sight of 1600 less"));
@@ -289,7 +291,8 @@ Outcome FocalThirtyPercentOff(const Conditions&) {
   Bundle start = MakeBundle({});
   start.lenses[0].params[0] *= 1.3;
   const Adjusted out = Solve(start, LensFreedom::kAll, outcome);
-  AddFocalError(out, 900, 1e-6, "exact sights: what is left is where the solver stops", outcome);
+  AddFocalError(out, 900, 1e-6, "exact observations: what is left is where the solver stops",
+                outcome);
   return outcome;
 }
 
@@ -310,7 +313,7 @@ Outcome BrokenNumbers(const Conditions&) {
   Outcome outcome;
   Bundle broken = MakeBundle({});
   broken.observations[3].pixel.x() = std::nan("");
-  ExpectRefusal(outcome, "a sight at NaN", [&] { Adjust(broken, {}); });
+  ExpectRejection(outcome, "an observation at NaN", [&] { Adjust(broken, {}); });
   return outcome;
 }
 
@@ -325,18 +328,18 @@ std::vector<Case> BundleCases() {
           {kBundleStage, "world 1e7 units from its origin", true, FarFromTheOrigin},
           {kBundleStage, "mixed magnitudes: f 9000 px, depths 1 : 10 000", true, MixedMagnitudes},
           {kBundleStage, "nearly planar: a slab 4 x 3 x 0.002", true, NearlyFlat},
-          {kBundleStage, "a plane faced squarely, lens unknown", true, FlatFacedSquarely},
+          {kBundleStage, "a plane faced squarely, intrinsics unknown", true, FlatFacedSquarely},
           {kBundleStage, "camera centres on a line", true, CentresOnALine},
           {kBundleStage, "points on a line", false, PointsOnALine},
-          {kBundleStage, "a lens of 1 degree, known", true, NarrowLens},
-          {kBundleStage, "rays 0.1 degrees apart, lens unknown", true, NarrowLensFree},
-          {kBundleStage, "a fisheye lens of 190 degrees", true, FisheyeOf190Degrees},
-          {kBundleStage, "half of the sights are outliers, 2 % off at the start", true,
+          {kBundleStage, "a camera of 1 degree, known", true, NarrowLens},
+          {kBundleStage, "rays 0.1 degrees apart, intrinsics unknown", true, NarrowLensFree},
+          {kBundleStage, "a fisheye camera of 190 degrees", true, FisheyeOf190Degrees},
+          {kBundleStage, "half of the observations are outliers, 2 % off at the start", true,
            HalfAreOutliers},
-          {kBundleStage, "one sight a million pixels off", true, AMillionPixelsOff},
+          {kBundleStage, "one observation a million pixels off", true, AMillionPixelsOff},
           {kBundleStage, "focal length 30 % off at the start", true, FocalThirtyPercentOff},
           {kBundleStage, "everything 30 % off at the start", true, AllThirtyPercentOff},
-          {kBundleStage, "a sight that is no number", true, BrokenNumbers}};
+          {kBundleStage, "an observation that is no number", true, BrokenNumbers}};
 }
 
 }  // namespace dtr::selftest

@@ -41,7 +41,8 @@ inline Measure Exactly(std::string what, double value, double bound, std::string
 struct Outcome {
   std::vector<Measure> measures;
   long long not_finite = 0;  ///< NaNs and infinities among all that was put out; must be 0
-  std::string refusal;  ///< how an input that cannot be solved is refused, in the program's words
+  std::string
+      rejection;  ///< how an input that cannot be solved is rejected, in the program's words
 
   void Add(Measure measure) { measures.push_back(std::move(measure)); }
   /// Counts what is not finite.
@@ -53,7 +54,7 @@ struct Outcome {
 };
 
 /// Calls `work`, which must throw dtr::Error; its words are kept. A measure says whether it did.
-void ExpectRefusal(Outcome& outcome, const std::string& what, const std::function<void()>& work);
+void ExpectRejection(Outcome& outcome, const std::string& what, const std::function<void()>& work);
 
 /// Any renderer: cpu::Render, or one that draws with OpenGL.
 using RenderFunction =

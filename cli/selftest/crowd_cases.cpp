@@ -14,12 +14,12 @@ using testing::Photograph;
 using testing::Shot;
 using testing::ShotFrom;
 
-/// That a picture is there at all and is the right one, where a case is about something else.
+/// That an image is there at all and is the right one, where a case is about something else.
 void AddPicture(const RenderResult& result, const View& truth, RenderMethod method,
                 Outcome& outcome) {
   const Score score = ScoreOf(result, truth, 0.01);
-  outcome.Add(AtLeast(std::string("share of the picture that is seen") + InWords(method),
-                      score.seen, 0.95, "the views see all but what the square hides and a rim"));
+  outcome.Add(AtLeast(std::string("share of the image that is seen") + InWords(method), score.seen,
+                      0.95, "the views see all but what the square hides and a rim"));
   outcome.Add(AtLeast(std::string("share of it with the depth within 1 %") + InWords(method),
                       score.right, 0.95, "the square's outline of 160 px may lie a pixel off"));
   outcome.Add(AtLeast(std::string("share of it with the true colour") + InWords(method),
@@ -72,7 +72,7 @@ void KeepWorst(const Score& score, Score& worst) {
 
 constexpr double kNarrowRad = 1e-3, kAllRad = std::numbers::pi;
 
-/// Pictures from the middle view's place and from half-way to the next, of views that agree.
+/// Images from the middle view's place and from half-way to the next, of views that agree.
 void AddExtremePictures(Drawing& draw, RenderMethod method, Outcome& outcome) {
   const DtrSet& set = draw.Keep(testing::SquareBeforePlane());
   const Shot own = ShotFrom("n", {0, 0, 0}, {0, 0, 10}),
@@ -93,24 +93,24 @@ void AddExtremePictures(Drawing& draw, RenderMethod method, Outcome& outcome) {
   }
   const std::string name = InWords(method);
   constexpr const char* kOutline = "the square's outline of 160 px may lie a pixel off";
-  outcome.Add(Exactly("least share seen from a view's own place" + name, worst_own.seen, 1,
+  outcome.Add(Exactly("smallest share seen from a view's own position" + name, worst_own.seen, 1,
                       "the view shows all of it, whatever the others weigh"));
-  outcome.Add(AtLeast("least share of it with the depth within 1 %" + name, worst_own.right, 0.95,
-                      kOutline));
-  outcome.Add(AtLeast("least share of it with the true colour" + name, worst_own.colour, 0.95,
-                      "4 levels; the outline again"));
-  outcome.Add(AtLeast("least share seen between two views" + name, worst_between.seen, 0.95,
-                      "the views see all but what the square hides and a rim"));
-  outcome.Add(AtLeast("least share of that with the depth within 1 %" + name, worst_between.right,
+  outcome.Add(AtLeast("smallest share of it with the depth within 1 %" + name, worst_own.right,
                       0.95, kOutline));
-  outcome.Add(AtLeast("least share of that with the true colour" + name, worst_between.colour, 0.95,
+  outcome.Add(AtLeast("smallest share of it with the true colour" + name, worst_own.colour, 0.95,
                       "4 levels; the outline again"));
+  outcome.Add(AtLeast("smallest share seen between two views" + name, worst_between.seen, 0.95,
+                      "the views see all but what the square hides and a rim"));
+  outcome.Add(AtLeast("smallest share of that with the depth within 1 %" + name,
+                      worst_between.right, 0.95, kOutline));
+  outcome.Add(AtLeast("smallest share of that with the true colour" + name, worst_between.colour,
+                      0.95, "4 levels; the outline again"));
   outcome.Add(Exactly("share seen between views within 0.001 rad" + name, seen_by_nobody, 0,
                       "the nearest is 0.025 rad away: not valid"));
 }
 
 /// Where a view is alone, by its place or by its weight, its photo comes back; gains, as every
-/// other view has one, tell which photos a picture is mixed of.
+/// other view has one, tell which photos an image is mixed of.
 void AddAloneAmongOthers(Drawing& draw, RenderMethod method, Outcome& outcome) {
   DtrSet gained = testing::SquareBeforePlane();
   for (View& view : gained.frames[0].views) view.gain = {0.5, 0.6, 0.7};
@@ -134,9 +134,9 @@ void AddAloneAmongOthers(Drawing& draw, RenderMethod method, Outcome& outcome) {
     least = std::min(least, share_of_photo(weight, kNarrowRad));
   }
   outcome.Add(
-      Exactly(std::string("least share of a photo that comes back, others beyond the limit") +
+      Exactly(std::string("smallest share of a photo that comes back, others beyond the limit") +
                   InWords(method),
-              least, 1, "the only valid view, drawn from its own place"));
+              least, 1, "the only valid view, drawn from its own position"));
   outcome.Add(AtLeast(std::string("share of it beside others at e^(-1e6 t)") + InWords(method),
                       share_of_photo(BlendWeight::kExponential, kAllRad), 0.95,
                       "the others are 0.05 rad away: e^-50 000; the square's outline"));
@@ -165,7 +165,7 @@ Outcome ManyViews(Drawing draw) {
       changed += !testing::SameBytes(expected, draw.Draw(order, novel, options));
     }
     outcome.Add(
-        Exactly(std::string("pictures that change with the order of 256 views") + InWords(method),
+        Exactly(std::string("images that change with the order of 256 views") + InWords(method),
                 changed, 0, "sums are taken in one order"));
   }
   return draw.Finish(outcome);
@@ -190,9 +190,9 @@ Outcome DuplicateCameras(Drawing draw) {
     for (const RenderScene& order : Reordered(MakeRenderScene(twice))) {
       changed += !testing::SameBytes(expected, draw.Draw(order, novel, OptionsOf(method)));
     }
-    outcome.Add(Exactly(
-        std::string("pictures that change when every view is there twice") + InWords(method),
-        changed, 0, "equal views count once"));
+    outcome.Add(
+        Exactly(std::string("images that change when every view is there twice") + InWords(method),
+                changed, 0, "equal views count once"));
   }
   return draw.Finish(outcome);
 }

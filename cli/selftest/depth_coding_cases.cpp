@@ -37,8 +37,8 @@ DepthImage ThroughFile(const DepthImage& depth, const DepthFormat& format, Outco
     DepthImage back = io::ReadDepth(folder / name, format, depth.width(), depth.height());
     outcome.LookAtAll(back.grid().data());
     return back;
-  } catch (const Error& refusal) {  // without the folder, whose name is another each time
-    std::string words = refusal.what();
+  } catch (const Error& rejection) {  // without the folder, whose name is another each time
+    std::string words = rejection.what();
     const std::string prefix = folder.path().string() + "/";
     if (words.starts_with(prefix)) words.erase(0, prefix.size());
     throw Error(words);
@@ -132,7 +132,7 @@ Outcome EndOfMillimetres(const Conditions&) {
   trips.Through(depth, format, outcome);
   trips.AddTo(outcome);
   depth(2, 0) = 65.536f;
-  ExpectRefusal(outcome, "65.536 m", [&] { ThroughFile(depth, format, outcome); });
+  ExpectRejection(outcome, "65.536 m", [&] { ThroughFile(depth, format, outcome); });
   return outcome;
 }
 
@@ -146,7 +146,7 @@ Outcome EndOfHalf(const Conditions&) {
   trips.Through(depth, format, outcome);
   trips.AddTo(outcome);
   depth(2, 0) = 65536.0f;
-  ExpectRefusal(outcome, "65 536", [&] { ThroughFile(depth, format, outcome); });
+  ExpectRejection(outcome, "65 536", [&] { ThroughFile(depth, format, outcome); });
   return outcome;
 }
 
@@ -162,7 +162,7 @@ Outcome Denormals(const Conditions&) {
   outcome.Add(Exactly("depths that change, exr-float", back.grid() != depth.grid(), 0,
                       "a float survives bit for bit"));
   const DepthFormat as_half{DepthCoding::kExrHalf, kSmallest, 1, LengthUnit::kUnknown};
-  ExpectRefusal(outcome, "1e-40 as half", [&] { ThroughFile(depth, as_half, outcome); });
+  ExpectRejection(outcome, "1e-40 as half", [&] { ThroughFile(depth, as_half, outcome); });
   return outcome;
 }
 
@@ -217,8 +217,8 @@ Outcome NoNumbers(const Conditions&) {
     depth(0, 0) = bad;
     for (const auto& [coding, steps] : kCodings) {
       const DepthFormat format{coding, 1, 2, LengthUnit::kMetre, steps};
-      ExpectRefusal(outcome, std::string(name) + " as " + io::NameOf(coding),
-                    [&] { ThroughFile(depth, format, outcome); });
+      ExpectRejection(outcome, std::string(name) + " as " + io::NameOf(coding),
+                      [&] { ThroughFile(depth, format, outcome); });
     }
   }
   return outcome;

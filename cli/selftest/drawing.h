@@ -1,4 +1,4 @@
-// cli/selftest/drawing.h -- what cases of rendering draw with, and how their pictures are judged.
+// cli/selftest/drawing.h -- what cases of rendering draw with, and how their images are judged.
 #pragma once
 #include <deque>
 #include <string>
@@ -11,7 +11,7 @@ namespace dtr::selftest {
 
 const char* InWords(RenderMethod method);  ///< ", two passes", to end a measure's words with
 
-/// What a case draws with: one renderer, counts of what is wrong with its pictures.
+/// What a case draws with: one renderer, counts of what is wrong with its images.
 class Drawing {
  public:
   Drawing(const NamedRenderer& renderer, const Conditions& conditions)

@@ -46,7 +46,7 @@ Outcome NearAndFar(Drawing draw) {
   const View truth = Photograph(surface, novel);
   for (const RenderMethod method : draw.methods()) {
     const Score score = ScoreOf(draw.Draw(set, novel, OptionsOf(method)), truth, 0.01);
-    outcome.Add(AtLeast(std::string("share of the picture that is seen") + InWords(method),
+    outcome.Add(AtLeast(std::string("share of the image that is seen") + InWords(method),
                         score.seen, 0.95, "five views see all but a rim"));
     outcome.Add(AtLeast(std::string("share of it with the depth within 1 %") + InWords(method),
                         score.right, 0.95, "the square's outline of 170 px may lie a pixel off"));
@@ -87,10 +87,10 @@ Outcome WildDepth(Drawing draw) {
     }
   }
   for (const RenderMethod method : draw.methods()) {
-    double least_seen = 1;
+    double min_seen = 1;
     for (const double x : {0.0, 0.3, 2.0}) {
       const Shot novel = ShotFrom("n", {x, 0.1, 0}, {0, 0, 9});
-      least_seen = std::min(least_seen, draw.Draw(set, novel, OptionsOf(method)).coverage_share);
+      min_seen = std::min(min_seen, draw.Draw(set, novel, OptionsOf(method)).coverage_share);
     }
     RenderOptions alone = OptionsOf(method);
     alone.views = 1;
@@ -100,20 +100,20 @@ Outcome WildDepth(Drawing draw) {
       own.cam_from_world = view.cam_from_world;
       given.Count(draw.Draw(set, own, alone), view.depth);
     }
-    outcome.Add(AtLeast(std::string("least share of a picture that is seen") + InWords(method),
-                        least_seen, 0.5,
+    outcome.Add(AtLeast(std::string("smallest share of an image that is seen") + InWords(method),
+                        min_seen, 0.5,
                         "19 of 20 samples are cells of their own, most behind others; seen: 0.63"));
-    outcome.Add(AtLeast(
-        std::string("share of a view's depths that are drawn at its own place") + InWords(method),
-        given.back / given.measured, 0.999, "each pixel is a cell of its own"));
+    outcome.Add(AtLeast(std::string("share of a view's depths that are drawn at its own position") +
+                            InWords(method),
+                        given.back / given.measured, 0.999, "each pixel is a cell of its own"));
     outcome.Add(
         Exactly(std::string("pixels drawn where a view alone has no depth") + InWords(method),
-                given.made_up, 0, "what nobody saw is not shown"));
+                given.made_up, 0, "what no view saw is not shown"));
   }
   return draw.Finish(std::move(outcome));
 }
 
-/// Pictures of a world that is scaled or moved against those of the world at home.
+/// Images of a world that is scaled or moved against those of the world at home.
 Outcome InWorlds(Drawing draw, const std::vector<std::pair<double, Eigen::Vector3d>>& worlds,
                  const char* reason) {
   Outcome outcome;
@@ -222,7 +222,7 @@ Outcome ZoomedIn(Drawing draw) {
   const View truth = Photograph(surface, novel);
   for (const RenderMethod method : draw.methods()) {
     const Score score = ScoreOf(draw.Draw(set, novel, OptionsOf(method)), truth, 1e-4);
-    outcome.Add(Exactly(std::string("share of the picture that is seen") + InWords(method),
+    outcome.Add(Exactly(std::string("share of the image that is seen") + InWords(method),
                         score.seen, 1, "a tenth of a pixel of the views, well inside of them"));
     outcome.Add(AtLeast(std::string("share of it with the depth within 1e-4") + InWords(method),
                         score.right, 0.99, "a plane is interpolated exactly"));
@@ -230,7 +230,7 @@ Outcome ZoomedIn(Drawing draw) {
   return draw.Finish(outcome);
 }
 
-/// Pixels of the true picture whose surface lies in the picture of some view: all of a plane in
+/// Pixels of the true image whose surface lies in the image of some view: all of a plane in
 /// the union of the views' frusta.
 double Photographed(const View& truth, const DtrSet& set) {
   const Pose world_from_cam = truth.cam_from_world.Inverse();
@@ -266,8 +266,8 @@ Outcome FieldsOfView(Drawing draw) {
       const RenderResult result = draw.Draw(set, novel, OptionsOf(method));
       const Score score = ScoreOf(result, truth, 0.01);
       if (degrees <= 10) {
-        outcome.Add(Exactly("share of the picture that is seen, " + at + InWords(method),
-                            score.seen, 1, "well inside of all views"));
+        outcome.Add(Exactly("share of the image that is seen, " + at + InWords(method), score.seen,
+                            1, "well inside of all views"));
       }
       const auto seen = static_cast<double>(std::ranges::count(result.coverage.data(), 255));
       outcome.Add(AtMost(
@@ -300,8 +300,8 @@ Outcome EmptySets(Drawing draw) {
     }
   }
   outcome.Add(Exactly("share seen of no views, of holes alone, from behind", seen, 0,
-                      "what nobody saw is not shown"));
-  ExpectRefusal(outcome, "a set without a frame", [] { MakeRenderScene(DtrSet{}); });
+                      "what no view saw is not shown"));
+  ExpectRejection(outcome, "a set without a frame", [] { MakeRenderScene(DtrSet{}); });
   return draw.Finish(outcome);
 }
 

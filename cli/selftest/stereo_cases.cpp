@@ -1,5 +1,5 @@
-// The PatchMatch engine where geometry, light or pictures are at their limits. Bounds come from
-// what the pictures can tell (datasets/exact/stereo_score.h) and from geometry.
+// The PatchMatch engine where geometry, light or images are at their limits. Bounds come from
+// what the images can tell (datasets/exact/stereo_score.h) and from geometry.
 #include <cmath>
 #include <numbers>
 
@@ -33,7 +33,7 @@ constexpr int kWidth = 96, kHeight = 72;
 constexpr double kFocal = 84;
 const PinholeCamera kCamera(kWidth, kHeight, kFocal, kFocal, 0.5 * kWidth, 0.5 * kHeight);
 constexpr DepthRange kRange{2.5, 8};
-/// Its coarsest detail has 15 px at depth 4, its finest 2: pictures of it are hardly aliased.
+/// Its coarsest detail has 15 px at depth 4, its finest 2: images of it are hardly aliased.
 constexpr double kTextureSize = 0.7;
 /// Noise of a grey value: two roundings to 8 bits (0.29 each), sampling by 2x2 rays and linearly
 /// between pixels.
@@ -46,11 +46,11 @@ constexpr double kAffinePx = 9 / kFocal;
 
 /// What a well-textured surface must reach, and why just that.
 struct Expected {
-  double least_kept = 0.95;
+  double min_kept = 0.95;
   const char* kept_reason = "textured everywhere; a border of one pixel is 5 %";
   double beyond_limit_px = 0;  ///< allowed to the median error beyond LimitPx
-  const char* median_reason = "twice the Cramer-Rao bound of 7 x 7 windows of this picture";
-  double most_past_1px = 0.01;
+  const char* median_reason = "twice the Cramer-Rao bound of 7 x 7 windows of this image";
+  double max_past_1px = 0.01;
   const char* past_reason = "wrong depth is worse than none: one pixel in a hundred, a choice";
 };
 
@@ -75,18 +75,18 @@ DepthEstimate Run(const std::vector<StereoView>& views, const DepthRange& range,
 
 void AddScore(const Score& score, const Shot& shot, const Expected& expected, Outcome& outcome,
               const std::string& where = "") {
-  outcome.Add(AtLeast("share of pixels with depth" + where, score.kept, expected.least_kept,
+  outcome.Add(AtLeast("share of pixels with depth" + where, score.kept, expected.min_kept,
                       expected.kept_reason));
   outcome.Add(AtMost("median error, px" + where, score.median_px,
                      LimitPx(shot) + expected.beyond_limit_px, expected.median_reason));
   outcome.Add(AtMost("share of these off by more than 1 px" + where, score.past_1px,
-                     expected.most_past_1px, expected.past_reason));
+                     expected.max_past_1px, expected.past_reason));
 }
 
 void AddNothingKept(const Score& score, double most, const char* reason, Outcome& outcome,
                     const std::string& where = "") {
   outcome.Add(AtMost("share of pixels with depth" + where, score.kept, most, reason));
-  outcome.refusal = "holes: a pixel that cannot be measured has no depth";
+  outcome.rejection = "holes: a pixel that cannot be measured has no depth";
 }
 
 /// A lens so long that the range is the same number of pixels of disparity at any baseline.
@@ -112,7 +112,7 @@ Outcome LessThanNoise(const Conditions& conditions) {
   const auto shots = ShotsFrom(Slanted(), {Facing({0, 0, 0}), Facing({4e-4, 0, 0})});
   const auto views = ViewsOf(shots);
   AddNothingKept(ScoreFirst(views, Run(views, kRange, conditions, outcome), shots[0].truth), 0,
-                 "the whole range is 0.01 px of disparity: nothing can be told", outcome);
+                 "the whole range is 0.01 px of disparity: nothing can be determined", outcome);
   return outcome;
 }
 
@@ -132,17 +132,16 @@ Outcome BaselineAsLongAsTheDepth(const Conditions& conditions) {
       ShotsFrom(Slanted(), {LookingAt({0, 0, 0}, target), LookingAt({4, 0, 0}, target)});
   const auto views = ViewsOf(shots);
   const Expected expected{
-      .least_kept = 0.85,
-      .kept_reason =
-          "a tenth of the picture is outside the other one; a border of one pixel is 5 %",
+      .min_kept = 0.85,
+      .kept_reason = "a tenth of the image is outside the other one; a border of one pixel is 5 %",
       .beyond_limit_px = kAffinePx,
       .median_reason =
           "twice the Cramer-Rao bound of 7 x 7 windows, and the 0.107 px that corners "
           "of windows taken as affine are off by at 45 degrees",
-      .most_past_1px = 0.03,
+      .max_past_1px = 0.03,
       .past_reason =
           "wrong depth is worse than none: one pixel in a hundred, a choice, and two more "
-          "where the two pictures' common part ends, whose windows are cut"};
+          "where the two images' common part ends, whose windows are cut"};
   AddScore(ScoreFirst(views, Run(views, kRange, conditions, outcome), shots[0].truth), shots[0],
            expected, outcome);
   return outcome;
@@ -162,14 +161,14 @@ Outcome DepthsOneToAThousand(const Conditions& conditions) {
   const auto views = ViewsOf(shots);
   const DepthImage& truth = shots[0].truth;
   const DepthEstimate estimate = Run(views, {0.8, 1500}, conditions, outcome);
-  Expected expected{.most_past_1px = 0.02,
+  Expected expected{.max_past_1px = 0.02,
                     .past_reason =
                         "wrong depth is worse than none: two pixels in a hundred, a choice: one of "
                         "surfaces, one where windows along the outline hold both"};
   AddScore(ScoreFirst(views, estimate, truth, [&](int x, int y) { return truth(x, y) < 10; }),
            shots[0], expected, outcome, ", near");
   // 0.008 px of disparity: all that can be told is that it is far, with a sigma that says so.
-  expected.least_kept = 0.93;
+  expected.min_kept = 0.93;
   expected.kept_reason = "windows within 3 px of the sphere's outline, 125 px long, hold both: 7 %";
   const Score far =
       ScoreFirst(views, estimate, truth, [&](int x, int y) { return truth(x, y) > 10; });
@@ -212,7 +211,7 @@ Outcome Repetition(const Conditions& conditions) {
     std::vector<StereoView> views = ViewsOf(shots);
     views.resize(count);
     AddNothingKept(ScoreFirst(views, Run(views, {2, 16}, conditions, outcome), shots[0].truth),
-                   0.05, "three depths explain the pictures alike; a border of one pixel is 5 %",
+                   0.05, "three depths explain the images alike; a border of one pixel is 5 %",
                    outcome, count == 2 ? ", 2 views" : ", 3 views");
   }
   return outcome;
@@ -255,7 +254,7 @@ Outcome OneBit(const Conditions& conditions) {
   outcome.Add(AtMost("median error, px", score.median_px, 0.5 / std::sqrt(3.0),
                      "an edge is known to half a pixel: a uniform law of that half-width"));
   outcome.Add(AtMost("share of these off by more than 1 px", score.past_1px, 0.05,
-                     "edges are off by 0.5 px in each picture at most; windows hold several"));
+                     "edges are off by 0.5 px in each image at most; windows hold several"));
   return outcome;
 }
 
@@ -266,10 +265,10 @@ Outcome CopiesOfOnePhoto(const Conditions& conditions) {
   const auto views = ViewsOf(shots);
   AddNothingKept(ScoreFirst({views[0], views[1]},
                             Run({views[0], views[1]}, kRange, conditions, outcome), shots[0].truth),
-                 0.05, "zero disparity is infinity, beyond the range", outcome, ", other place");
+                 0.05, "zero disparity is infinity, beyond the range", outcome, ", other position");
   AddNothingKept(ScoreFirst({views[0], views[2]},
                             Run({views[0], views[2]}, kRange, conditions, outcome), shots[0].truth),
-                 0, "no baseline", outcome, ", same place");
+                 0, "no baseline", outcome, ", same position");
   return outcome;
 }
 
@@ -298,7 +297,7 @@ Outcome UnitAndOrigin(const Conditions& conditions) {
     return Run(views, {kRange.near_z * scale, kRange.far_z * scale}, conditions, outcome).depth;
   };
   const DepthImage base = in_world(1, {0, 0, 0});
-  const char* reason = "the world's unit and origin are nobody's business";
+  const char* reason = "the world's unit and origin do not matter";
   for (const double scale : {1e-6, 1e6}) {
     outcome.Add(
         Exactly(std::string("share of pixels that change, unit ") + (scale < 1 ? "1e-6" : "1e6"),
@@ -321,7 +320,7 @@ std::vector<Case> StereoCases() {
           {kStereoStage, "baseline / depth 1e-4, a short lens", true, LessThanNoise},
           {kStereoStage, "baseline / depth 0.1, two views", true, BaselineOfATenth},
           {kStereoStage, "baseline / depth 1", true, BaselineAsLongAsTheDepth},
-          {kStereoStage, "depths 1 : 1000 in one picture", true, DepthsOneToAThousand},
+          {kStereoStage, "depths 1 : 1000 in one image", true, DepthsOneToAThousand},
           {kStereoStage, "no texture", true, WithoutTexture},
           {kStereoStage, "a pattern that repeats 3 times within the range", true, Repetition},
           {kStereoStage, "exposure +-1 EV between neighbours", true, Exposure},

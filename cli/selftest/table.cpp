@@ -62,8 +62,9 @@ void AddRow(const Row& row, std::string& text) {
                         BoundOf(m), Verdict(Holds(m)), Cell(m.reason));
     name.clear();
   }
-  if (!row.outcome.refusal.empty()) {
-    text += fmt::format("| {} | refused with: `{}` | | | | |\n", name, Cell(row.outcome.refusal));
+  if (!row.outcome.rejection.empty()) {
+    text +=
+        fmt::format("| {} | rejected with: `{}` | | | | |\n", name, Cell(row.outcome.rejection));
     name.clear();
   }
   const std::string faults = OtherFaults(row);
@@ -86,15 +87,15 @@ bool Holds(const Measure& m) {
   return m.value == m.bound;
 }
 
-void ExpectRefusal(Outcome& outcome, const std::string& what, const std::function<void()>& work) {
+void ExpectRejection(Outcome& outcome, const std::string& what, const std::function<void()>& work) {
   bool refused = false;
   try {
     work();
   } catch (const Error& error) {
     refused = true;
-    outcome.refusal = error.what();
+    outcome.rejection = error.what();
   }
-  outcome.Add(Exactly(what + " is refused", refused, 1, "nothing is solved that cannot be"));
+  outcome.Add(Exactly(what + " is rejected", refused, 1, "nothing is solved that cannot be"));
 }
 
 bool Row::passed() const {
@@ -158,7 +159,8 @@ std::vector<std::string> TextLines(const Row& row) {
     lines.push_back(fmt::format("{:<5} {}: {}: {}: {} ({})", Verdict(Holds(m)), row.stage, row.name,
                                 m.what, Number(m.value), BoundOf(m)));
   }
-  if (!row.outcome.refusal.empty()) lines.push_back("      refused with: " + row.outcome.refusal);
+  if (!row.outcome.rejection.empty())
+    lines.push_back("      rejected with: " + row.outcome.rejection);
   const std::string faults = OtherFaults(row);
   if (!faults.empty())
     lines.push_back(fmt::format("FAILS {}: {}: {}", row.stage, row.name, faults));
@@ -173,7 +175,7 @@ std::string ToJson(const std::vector<Row>& rows) {
                  {"quick", row.quick},
                  {"passed", row.skipped.empty() ? Json(row.passed()) : Json(nullptr)},
                  {"not_finite", row.outcome.not_finite},
-                 {"refusal", row.outcome.refusal},
+                 {"rejection", row.outcome.rejection},
                  {"error", row.error},
                  {"skipped", row.skipped},
                  {"measures", Json::array()}};
@@ -191,7 +193,7 @@ std::string ToMarkdown(const std::vector<Row>& rows) {
     if (row.stage != stage) {
       stage = row.stage;
       text += fmt::format(
-          "\n## {}\n\n| case | measured | value | bound | verdict | why this bound |\n"
+          "\n## {}\n\n| case | measured | value | bound | result | why this bound |\n"
           "|---|---|---|---|---|---|\n",
           stage);
     }

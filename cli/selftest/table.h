@@ -29,10 +29,11 @@ std::vector<Row> RunCases(const std::vector<Case>& cases, const Conditions& cond
 /// "58 of 68 cases hold", and how many failed or were skipped, with the reasons.
 std::string Summary(const std::vector<Row>& rows);
 
-/// One line a measure, for a terminal: stage, case, what, value, bound, verdict.
+/// One line a measure, for a terminal: stage, case, what, value, bound, validation result.
 std::vector<std::string> TextLines(const Row& row);
 
-/// JSON object: passed (nothing failed), rows[].{stage,case,quick,passed,not_finite,refusal,error,
+/// JSON object: passed (nothing failed),
+/// rows[].{stage,case,quick,passed,not_finite,rejection,error,
 /// skipped,measures[].{what,value,relation,bound,passed,reason}}. Values that are no numbers are
 /// null, and so is `passed` of a row that was skipped.
 std::string ToJson(const std::vector<Row>& rows);

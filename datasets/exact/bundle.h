@@ -19,7 +19,7 @@ struct SceneSpec {
   /// Camera `i` of `n`, and a point of the scene; the default is an arc around a box of side 2.
   std::function<Pose(int, int)> pose = {};
   std::function<Eigen::Vector3d(Random&)> point = {};
-  int most_sights = 1000;  ///< of a point
+  int max_observations = 1000;  ///< of a point
 };
 
 /// A camera at `centre` that looks at `target`, its y axis down (world z is up: not as in
@@ -46,7 +46,7 @@ inline Eigen::Vector3d BoxPoint(Random& random) {
   return {x, y, random.Uniform(-1.5, 1.5)};
 }
 
-/// The true bundle with noisy sights.
+/// The true bundle with noisy observations.
 inline calib::Bundle MakeBundle(const SceneSpec& spec) {
   Random random(spec.seed);
   calib::Bundle bundle;
@@ -65,7 +65,8 @@ inline calib::Bundle MakeBundle(const SceneSpec& spec) {
           spec.lens.PixelFromCam(bundle.images[static_cast<size_t>(i)].cam_from_world * point);
       const Eigen::Vector2d noise(random.Normal(), random.Normal());
       if (!pixel || pixel->x() < 0 || pixel->y() < 0 || pixel->x() > spec.lens.width_px ||
-          pixel->y() > spec.lens.height_px || static_cast<int>(sights.size()) >= spec.most_sights) {
+          pixel->y() > spec.lens.height_px ||
+          static_cast<int>(sights.size()) >= spec.max_observations) {
         continue;
       }
       sights.push_back({i, static_cast<int>(bundle.points.size()), *pixel + spec.noise_px * noise});
@@ -109,7 +110,7 @@ inline calib::Bundle Moved(calib::Bundle bundle, const calib::Similarity& b_from
   return bundle;
 }
 
-/// Predicted pixels of all sights.
+/// Predicted pixels of all observations.
 inline std::vector<Eigen::Vector2d> Projections(const calib::Bundle& bundle) {
   auto residuals = calib::Residuals(bundle);
   for (size_t i = 0; i < residuals.size(); ++i) residuals[i] += bundle.observations[i].pixel;

@@ -84,7 +84,7 @@ inline long long Contradictions(const RenderResult& result) {
   return count;
 }
 
-/// True when two pictures agree to the byte in every plane.
+/// True when two images agree to the byte in every plane.
 inline bool SameBytes(const RenderResult& a, const RenderResult& b) {
   return a.image == b.image && a.depth.grid() == b.depth.grid() && a.coverage == b.coverage &&
          a.view_count == b.view_count && a.delta_border == b.delta_border;
@@ -109,7 +109,7 @@ inline DtrSet FromAround(const Surface& surface, int count, double spread,
 inline constexpr int kSameLevels = 1;
 inline constexpr double kOutlineShare = 0.005;
 
-/// Share of the pixels more than that apart, or seen in one picture alone.
+/// Share of the pixels more than that apart, or seen in one image alone.
 inline double ShareApart(const RenderResult& a, const RenderResult& b) {
   long long apart = 0;
   for (int y = 0; y < a.image.height(); ++y) {
@@ -121,7 +121,7 @@ inline double ShareApart(const RenderResult& a, const RenderResult& b) {
   return static_cast<double>(apart) / static_cast<double>(a.coverage.data().size());
 }
 
-/// The world scaled and moved; the picture must not know.
+/// The world scaled and moved; the image must not know.
 inline DtrSet Moved(DtrSet set, double scale, const Eigen::Vector3d& offset) {
   for (View& view : set.frames[0].views) {
     const Eigen::Vector3d centre = scale * view.CenterInWorld() + offset;

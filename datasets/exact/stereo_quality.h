@@ -1,4 +1,4 @@
-// datasets/exact/stereo_quality.h -- what the tests of the depth engines share: pictures of a
+// datasets/exact/stereo_quality.h -- what the tests of the depth engines share: images of a
 // surface from some places, an estimate for the first of them, and how good it is.
 #pragma once
 #include <algorithm>

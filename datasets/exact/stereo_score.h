@@ -25,9 +25,9 @@ inline Pose LookingAt(const Vector3d& centre, const Vector3d& target) {
   return {q, -(q * centre)};
 }
 
-/// Pixels by which the picture of a point at depth `z` behind `pixel` of `view` moves in `other`
+/// Pixels by which the image of a point at depth `z` behind `pixel` of `view` moves in `other`
 /// per unit of inverse depth: focal length times baseline where nothing is turned. 0 where it is
-/// not in the picture.
+/// not in the image.
 inline double PxPerInverseDepth(const StereoView& view, const StereoView& other,
                                 const Eigen::Vector2d& pixel, double z) {
   const Pose other_from_view = other.cam_from_world * view.cam_from_world.Inverse();
@@ -43,7 +43,7 @@ inline double PxPerInverseDepth(const StereoView& view, const StereoView& other,
 
 /// Cramer-Rao bound of matching two windows of 7x7 pixels whose grey values carry independent noise
 /// of standard deviation `noise` each: sigma^2 = 2 noise^2 / sum of squared slopes along `along`
-/// (a unit vector); the median over the picture, in pixels. No method does better; one that gives
+/// (a unit vector); the median over the image, in pixels. No method does better; one that gives
 /// a window's border less weight does worse by about 2.
 inline double MatchingLimitPx(const ImageRgb8& image, const Eigen::Vector2d& along, double noise) {
   std::vector<double> limits;

@@ -74,9 +74,9 @@ std::vector<size_t> WorstPlaces(const std::vector<Place>& places, const AdviseOp
 // `places` and `looks` are worked on: they come to hold what the added cameras would show.
 std::vector<Addition> ChooseAdditions(std::vector<Place> places, std::vector<Look>& looks,
                                       const AdviseOptions& options, Progress& progress) {
-  progress.Stage("cameras to add", options.most_cameras_to_add);
+  progress.Stage("cameras to add", options.max_cameras_to_add);
   std::vector<Addition> additions;
-  for (int n = 0; n < options.most_cameras_to_add; ++n) {
+  for (int n = 0; n < options.max_cameras_to_add; ++n) {
     progress.ThrowIfInterrupted();
     const std::vector<size_t> tried = WorstPlaces(places, options);
     std::vector<double> gains(tried.size());
@@ -107,7 +107,7 @@ Advice Advise(std::span<const CoarseView> views, const AdviseOptions& options, P
   Advice advice;
   advice.places = PlacesAmong(views);
   const int count = static_cast<int>(advice.places.size());
-  progress.Stage("looking from new places", count);
+  progress.Stage("looking from new positions", count);
   std::vector<Look> looks(advice.places.size());
   std::atomic<int> done{0};
   ParallelFor(0, count, options.threads, [&](int i) {

@@ -18,7 +18,7 @@ struct AdviseOptions {
   double max_gap_deg = 15;
   /// A camera adds nothing where others show this share of its points, as large and from nearby.
   double redundant_share = 0.99;
-  int most_cameras_to_add = 5;
+  int max_cameras_to_add = 5;
   int threads = 0;  ///< 0: all cores
 };
 

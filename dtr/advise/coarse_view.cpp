@@ -28,7 +28,7 @@ CoarseView MakeCoarse(const View& view, int side_px) {
   return coarse;
 }
 
-Sight SightOf(const CoarseView& view, const Eigen::Vector3d& p_in_world, double tolerance) {
+Sight ObservationOf(const CoarseView& view, const Eigen::Vector3d& p_in_world, double tolerance) {
   const Eigen::Vector3d p_in_cam = view.cam_from_world * p_in_world;
   const auto pixel = view.camera.PixelFromCam(p_in_cam);
   if (!pixel || !view.camera.Contains(*pixel)) return Sight::kOutside;

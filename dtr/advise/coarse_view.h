@@ -23,18 +23,18 @@ CoarseView MakeCoarse(const View& view, int side_px);
 
 /// What a view knows of a point.
 enum class Sight {
-  kOutside,  ///< beyond its picture, or behind it
+  kOutside,  ///< beyond its image, or behind it
   kHidden,   ///< something of it stands before the point
   kNothing,  ///< it looks there, but has no depth
   kSeen,     ///< its surface is there
   kBeyond,   ///< its surface is further away: it looks through the point
 };
 
-/// Tolerance of SightOf between coarse samples of one surface.
+/// Tolerance of ObservationOf between coarse samples of one surface.
 inline constexpr double kOneSurface = 0.03;
 
 /// `tolerance`: difference of inverse depths, relative, up to which two are of one surface; the
 /// nearest of the 3x3 samples about the point's pixel counts, as coarse slopes demand.
-Sight SightOf(const CoarseView& view, const Eigen::Vector3d& p_in_world, double tolerance);
+Sight ObservationOf(const CoarseView& view, const Eigen::Vector3d& p_in_world, double tolerance);
 
 }  // namespace dtr::advise

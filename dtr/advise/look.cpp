@@ -98,7 +98,7 @@ Look LookFrom(const Place& place, std::span<const CoarseView> views) {
         for (const double times : kFarDepths) {
           const bool looked_at =
               usual > 0 && std::any_of(near.begin(), near.end(), [&](size_t i) {
-                return SightOf(views[i], at(usual * times), kOneSurface) == Sight::kNothing;
+                return ObservationOf(views[i], at(usual * times), kOneSurface) == Sight::kNothing;
               });
           if (looked_at) glance.what = Glance::What::kDepthless;
         }
@@ -109,7 +109,7 @@ Look LookFrom(const Place& place, std::span<const CoarseView> views) {
       const auto owner = static_cast<size_t>(buffer.owner(x, y));
       Count(point, center, views[owner].CenterInWorld(), glance);
       for (const size_t i : near) {
-        if (i == owner || SightOf(views[i], point, kOneSurface) != Sight::kSeen) continue;
+        if (i == owner || ObservationOf(views[i], point, kOneSurface) != Sight::kSeen) continue;
         Count(point, center, views[i].CenterInWorld(), glance);
       }
     }
@@ -123,7 +123,7 @@ void AddPhoto(const CoarseView& other, Look& look) {
   for (Glance& glance : look.glances) {
     if (glance.what == Glance::What::kDepthless) continue;
     const Eigen::Vector3d point = glance.point.cast<double>();
-    const Sight sight = SightOf(other, point, kOneSurface);
+    const Sight sight = ObservationOf(other, point, kOneSurface);
     const bool shown =
         glance.what == Glance::What::kSeen ? sight == Sight::kSeen : sight == Sight::kNothing;
     if (shown) Count(point, here, there, glance);

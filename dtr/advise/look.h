@@ -7,7 +7,7 @@
 
 namespace dtr::advise {
 
-/// One pixel of a place's picture.
+/// One pixel of a place's image.
 struct Glance {
   enum class What : std::uint8_t { kUnseen, kDepthless, kSeen };
   What what = What::kUnseen;
@@ -16,7 +16,7 @@ struct Glance {
   Eigen::Vector3f point = Eigen::Vector3f::Zero();  ///< surface; of unseen pixels a guess
 };
 
-/// A place's picture, and the place as a view, its depth being what the photos make of it.
+/// A place's image, and the place as a view, its depth being what the photos make of it.
 struct Look {
   std::vector<Glance> glances;  ///< row by row
   CoarseView view;

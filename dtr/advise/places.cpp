@@ -11,7 +11,7 @@ namespace dtr::advise {
 namespace {
 
 constexpr size_t kNeighbours = 3;
-constexpr double kMostTurn = std::numbers::pi / 3;  // as valid views, SPEC 1
+constexpr double kMaxTurn = std::numbers::pi / 3;  // as valid views, SPEC 1
 constexpr int kPlaceSidePx = 96;
 
 Eigen::Vector3d AxisOf(const Pose& cam_from_world) {
@@ -36,7 +36,7 @@ std::vector<size_t> NearestViews(std::span<const CoarseView> views, const Pose& 
   std::vector<std::pair<double, size_t>> near;
   for (size_t i = 0; i < views.size(); ++i) {
     const double cosine = axis.dot(AxisOf(views[i].cam_from_world));
-    if (cosine < std::cos(kMostTurn)) continue;
+    if (cosine < std::cos(kMaxTurn)) continue;
     near.emplace_back((views[i].CenterInWorld() - center).norm(), i);
   }
   std::sort(near.begin(), near.end());

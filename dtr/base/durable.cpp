@@ -156,7 +156,7 @@ bool IsLitter(const std::string& name) {
 
 }  // namespace
 
-void RefuseForeign(const fs::path& folder, const std::function<bool(const std::string&)>& ours) {
+void RejectForeign(const fs::path& folder, const std::function<bool(const std::string&)>& ours) {
   std::set<std::string> foreign;
   for (const auto& entry : fs::directory_iterator(folder)) {
     const std::string name = entry.path().filename().string();

@@ -19,7 +19,7 @@ void SyncFolder(const std::filesystem::path& folder);
 /// SyncFile and SyncFolder for everything below `root`, and for itself; links are not followed.
 void SyncTree(const std::filesystem::path& root);
 
-/// Throws Error naming both where the system refuses.
+/// Throws Error naming both where the system rejects.
 void Rename(const std::filesystem::path& from, const std::filesystem::path& to);
 
 /// Copies content, not permissions to the letter: the copy can be written by its owner even where
@@ -48,7 +48,7 @@ bool IsEmptyFolder(const std::filesystem::path& folder);
 /// Before a folder is replaced: throws UsageError naming the first entry (by name) that is not
 /// `ours`, as somebody's notes would go with the folder. What IsTemporaryFile knows, and what
 /// desktops leave everywhere (.DS_Store, Thumbs.db), is nobody's.
-void RefuseForeign(const std::filesystem::path& folder,
+void RejectForeign(const std::filesystem::path& folder,
                    const std::function<bool(const std::string& name)>& ours);
 
 /// Held by one process at a time; the system releases it when the process ends, however it ends.

@@ -1,4 +1,4 @@
-// dtr/base/error.h -- the two ways a job can be refused.
+// dtr/base/error.h -- the two ways a job can be rejected.
 #pragma once
 #include <stdexcept>
 #include <string>

@@ -14,7 +14,7 @@ namespace fs = std::filesystem;
 
 std::string ReadFile(const fs::path& file, std::uintmax_t limit_bytes) {
   std::error_code error;
-  std::ignore = fs::file_size(file, error);  // says why, and refuses folders, which open
+  std::ignore = fs::file_size(file, error);  // says why, and rejects folders, which open
   if (error) throw Error(file.string() + ": cannot be read: " + error.message());
   // The size of what is open: another file may take the name at any time.
   std::ifstream in(file, std::ios::binary | std::ios::ate);
@@ -32,7 +32,7 @@ std::string ReadFile(const fs::path& file, std::uintmax_t limit_bytes) {
     throw Error(file.string() + ": expected " + std::to_string(size) + " bytes, found " +
                 std::to_string(in.gcount()) + " that can be read" +
                 (errno != 0 ? std::string(": ") + std::strerror(errno) : "") +
-                "; read it again once nothing writes it, or copy it anew");
+                "; read it again once nothing writes it, or copy it again");
   }
   return content;
 }

@@ -11,7 +11,7 @@ namespace dtr {
 
 /// Allocator of std::vector that asks the system for huge pages (2 MiB, Linux' madvise) where a
 /// block fills at least half of one. A processor keeps some 2000 pages' addresses at hand; the
-/// views of one picture take 10000 of the usual 4 KiB, so every other look-up would wait for a
+/// views of one image take 10000 of the usual 4 KiB, so every other look-up would wait for a
 /// second one. Systems that give no huge pages give the usual ones.
 template <typename T>
 class HugePageAllocator {

@@ -76,7 +76,7 @@ TemporaryFolder::TemporaryFolder(const fs::path& parent, const std::string& pref
   } catch (const std::system_error& failure) {
     throw Error(name +
                 ": expected to create a temporary folder, found: " + failure.code().message() +
-                "; choose another place, or set TMPDIR to a folder that can be written");
+                "; choose another folder, or set TMPDIR to a folder that can be written");
   }
   path_ = name;
 }

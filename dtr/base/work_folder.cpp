@@ -25,7 +25,7 @@ fs::path WorkFolder::Of(const fs::path& target) {
   return WithoutTrailingSlash(target).string() + ".partial";
 }
 
-void WorkFolder::RefuseForeign(const fs::path& folder, const std::string& kind) {
+void WorkFolder::RejectForeign(const fs::path& folder, const std::string& kind) {
   if (!fs::exists(fs::symlink_status(folder)) || IsEmptyFolder(folder)) return;
   if (fs::is_regular_file(folder / MarkOf(kind))) return;
   throw UsageError(folder.string() + ": expected nothing or an unfinished " + kind +
@@ -40,7 +40,7 @@ FileLock WorkFolder::Lock(const fs::path& folder, const std::string& kind) {
 WorkFolder::WorkFolder(fs::path folder, std::string kind)
     : path_(std::move(folder)), kind_(std::move(kind)) {
   try {
-    RefuseForeign(path_, kind_);
+    RejectForeign(path_, kind_);
     fs::create_directories(path_);
     lock_ = Lock(path_, kind_);
     Clear(path_, MarkOf(kind_));

@@ -19,7 +19,7 @@ class WorkFolder {
   static std::string MarkOf(const std::string& kind) { return kind + ".lock"; }
   /// Throws UsageError unless there is nothing, an empty folder or unfinished work of this kind:
   /// it may be somebody's interrupted build.
-  static void RefuseForeign(const std::filesystem::path& folder, const std::string& kind);
+  static void RejectForeign(const std::filesystem::path& folder, const std::string& kind);
   /// The lock of a folder of this kind. Throws UsageError while another process has it.
   static FileLock Lock(const std::filesystem::path& folder, const std::string& kind);
 

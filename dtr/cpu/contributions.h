@@ -10,7 +10,7 @@
 
 namespace dtr::cpu {
 
-/// All grids have the size of the picture.
+/// All grids have the size of the image.
 struct Contributions {
   std::vector<int> views;  ///< indices into the scene's, in canonical order
   std::vector<Grid<float>>
@@ -19,8 +19,8 @@ struct Contributions {
   std::vector<Grid<float>> inverse_depth;
 };
 
-/// Of a picture whose surface is `depth` (plane z, as any renderer gives it): SPEC 5.3 from there,
-/// then SPEC 4.2 to 4.8. By the deferred method these are the picture's own shares; by two passes,
+/// Of an image whose surface is `depth` (plane z, as any renderer gives it): SPEC 5.3 from there,
+/// then SPEC 4.2 to 4.8. By the deferred method these are the image's own shares; by two passes,
 /// whose fragments lie on triangles, near ones. Throws as Render.
 Contributions ContributionsTo(const DepthImage& depth, const RenderScene& scene,
                               const PinholeCamera& novel, const Pose& novel_from_world,

@@ -1,4 +1,4 @@
-// dtr/cpu/layer.h -- one view drawn into a band of the novel picture.
+// dtr/cpu/layer.h -- one view drawn into a band of the novel image.
 #pragma once
 #include <Eigen/Core>
 #include <vector>
@@ -9,7 +9,7 @@
 
 namespace dtr::cpu {
 
-/// Rows [first_row, first_row + rows) of the novel picture.
+/// Rows [first_row, first_row + rows) of the novel image.
 struct Band {
   int width_px = 0, first_row = 0, rows = 0;
 };

@@ -12,7 +12,7 @@ namespace dtr::cpu {
 std::vector<double> NearestSurface(std::span<const Layer> layers);
 
 /// SPEC 5.2: replaces each pixel's surface (1/z, row-major; 0: none) with what the views hold
-/// together, where their patches have it; where they refuse it with the next one behind, or none.
+/// together, where their patches have it; where they reject it with the next one behind, or none.
 /// Does not depend on the number of threads.
 void KeepSurfacesThatViewsHold(std::span<const ViewInNovel> views, const PinholeCamera& novel,
                                const RenderOptions& options, const Band& band,

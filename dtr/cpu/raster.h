@@ -4,13 +4,13 @@
 
 namespace dtr::cpu {
 
-/// A point of the novel picture: position in pixels and inverse depth, which is linear on screen.
+/// A point of the novel image: position in pixels and inverse depth, which is linear on screen.
 struct ScreenVertex {
   double x = 0, y = 0, inverse_depth = 0;
 };
 
 /// Rounds a screen coordinate to 1/2048 pixel: then products of differences are exact in double on
-/// pictures up to 16384 pixels a side, and neighbouring triangles leave no crack (SPEC 2.4).
+/// images up to 16384 pixels a side, and neighbouring triangles leave no crack (SPEC 2.4).
 double SnapToSubpixel(double coordinate_px);
 
 /// SPEC 2.4. Draws a triangle whose vertices run clockwise on the screen (y down), the nearest

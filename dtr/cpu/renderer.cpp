@@ -16,7 +16,7 @@
 namespace dtr::cpu {
 namespace {
 
-// Layers of all views over one band stay below this; a larger picture takes several bands.
+// Layers of all views over one band stay below this; a larger image takes several bands.
 constexpr size_t kBandBytes = size_t{256} << 20;
 constexpr size_t kLayerBytesPerPixel = sizeof(double);
 

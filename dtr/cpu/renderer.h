@@ -12,9 +12,9 @@ namespace dtr::cpu {
 /// in double precision, by the two-pass method of Verlani et al. 2006 or by the deferred one, as
 /// RENDER_SPEC states them.
 /// The result does not depend on the order of the views or on the number of threads. Where no view
-/// is valid the picture is empty: black, no depth, no coverage.
-/// With options.fill_holes, FillHolesFromViews is applied to the finished picture.
-/// Throws dtr::UsageError for options without a meaning and for pictures beyond 2^28 pixels, and
+/// is valid the image is empty: black, no depth, no coverage.
+/// With options.fill_holes, FillHolesFromViews is applied to the finished image.
+/// Throws dtr::UsageError for options without a meaning and for images beyond 2^28 pixels, and
 /// dtr::Error for a pose that is not finite.
 RenderResult Render(const RenderScene& scene, const PinholeCamera& novel,
                     const Pose& novel_from_world, const RenderOptions& options);

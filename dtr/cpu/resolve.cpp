@@ -165,7 +165,7 @@ class RowResolver {
 
   const ResolveSettings& settings_;
   const std::span<const ResolveView> views_;
-  const std::span<Grid<float>> shares_of_views_;  ///< empty: nobody asks
+  const std::span<Grid<float>> shares_of_views_;  ///< empty: unset
   std::vector<Fragment> fragments_;
   std::vector<double> angles_, shares_, factors_;
   double cut_rad_ = 0;  ///< SPEC 1.4, with the per-pixel rule

@@ -19,7 +19,7 @@ struct ResolveView {
   Grid<std::uint8_t> rim_factors;  ///< SPEC 4.8
 };
 
-/// What it needs to know about the picture.
+/// What it needs to know about the image.
 struct ResolveSettings {
   PinholeCamera novel{1, 1, 1, 1, 0, 0};
   BlendParameters blend;
@@ -29,9 +29,9 @@ struct ResolveSettings {
   bool linear_light = true;
 };
 
-/// Resolves row `y` of the picture into `result`. The views must come in canonical order: sums run
+/// Resolves row `y` of the image into `result`. The views must come in canonical order: sums run
 /// in that order, so that the bits depend on nothing else.
-/// With `shares`, a grid of the picture's size per view, each is also told its share of the colour.
+/// With `shares`, a grid of the image's size per view, each is also told its share of the colour.
 void ResolveRow(const ResolveSettings& settings, std::span<const ResolveView> views, int y,
                 RenderResult& result, std::span<Grid<float>> shares = {});
 

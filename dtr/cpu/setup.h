@@ -1,4 +1,4 @@
-// dtr/cpu/setup.h -- what is the same for all pixels of a picture.
+// dtr/cpu/setup.h -- what is the same for all pixels of an image.
 #pragma once
 #include <vector>
 
@@ -8,7 +8,7 @@
 
 namespace dtr::cpu {
 
-/// The views of a picture in canonical order. `views` points into `placed`; layers are the
+/// The views of an image in canonical order. `views` points into `placed`; layers are the
 /// caller's to fill in.
 struct Setup {
   std::vector<int> order;  ///< indices into the scene's views

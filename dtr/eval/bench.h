@@ -35,7 +35,7 @@ struct BenchRow {
   std::optional<double> psnr_covered_db;  ///< where some view saw the pixel
   double coverage = 0;
   double fps() const { return 1000 / frame.median_ms; }
-  /// With everything a picture on disk needs: drawn, read back, filled.
+  /// With everything an image on disk needs: drawn, read back, filled.
   double whole_ms() const { return frame.median_ms + read_back.median_ms + fill.median_ms; }
   double whole_cpu_ms() const {
     return cpu.median_ms + read_back_cpu.median_ms + fill_cpu.median_ms;

@@ -47,8 +47,8 @@ std::vector<const View*> EvenlyAmong(const std::vector<const View*>& views, int 
 void Add(const Times& times, Times& sum) {
   sum.median_ms += times.median_ms;
   sum.spread_ms += times.spread_ms;
-  sum.least_ms += times.least_ms;
-  sum.most_ms += times.most_ms;
+  sum.min_ms += times.min_ms;
+  sum.max_ms += times.max_ms;
 }
 
 void Add(const std::optional<double>& value, std::optional<double>& sum, int& count) {
@@ -66,7 +66,7 @@ void Measure(const Place& place, const std::vector<RenderOptions>& variants, int
     filler.Fill(place.scene, camera, pose, variants[m], result);
   };
   for (size_t m = 0; m < count; ++m) {
-    // Untimed: shaders are compiled and meshes made. Its picture serves the quality.
+    // Untimed: shaders are compiled and meshes made. Its image serves the quality.
     renderer.Draw(place.scene, place.photo->camera, pose, variants[m]);
     RenderResult result = renderer.ReadBack();
     fill(m, place.photo->camera, result);
@@ -137,8 +137,8 @@ BenchRow RowSums::Mean(const RenderOptions& options) const {
        {&row.frame, &row.cpu, &row.read_back, &row.read_back_cpu, &row.fill, &row.fill_cpu}) {
     times->median_ms /= cameras_;
     times->spread_ms /= cameras_;
-    times->least_ms /= cameras_;
-    times->most_ms /= cameras_;
+    times->min_ms /= cameras_;
+    times->max_ms /= cameras_;
   }
   if (row.psnr_db) *row.psnr_db /= psnr_count_;
   if (row.psnr_covered_db) *row.psnr_covered_db /= psnr_covered_count_;

@@ -26,7 +26,7 @@ class RowSums {
   void AddTimes(const FrameTimes& frame, const FrameTimes& read_back, const FrameTimes& fill);
   /// `valid`: views that were to be drawn (SPEC 1.2).
   void AddQuality(const View& photo, const RenderResult& filled, int valid);
-  /// Some picture was drawn from fewer views than are valid: the renderer had no room for them.
+  /// Some image was drawn from fewer views than are valid: the renderer had no room for them.
   bool cut() const { return cut_; }
   BenchRow Mean(const RenderOptions& options) const;
 

@@ -166,8 +166,8 @@ SweepMeasurement RenderSweep::Measure(const SweepSetting& setting) const {
   const Times& cost = renderer_.HasGpuClock() ? row.frame : row.cpu;
   SweepMeasurement measured;
   measured.cost = cost.median_ms;
-  measured.cost_least = cost.least_ms;
-  measured.cost_most = cost.most_ms;
+  measured.cost_least = cost.min_ms;
+  measured.cost_most = cost.max_ms;
   measured.psnr_db = *row.psnr_db;
   measured.error = RmsLevels(*row.psnr_db);
   measured.figures = {{"views_used", row.views_used},

@@ -42,7 +42,7 @@ class RenderSweep {
   std::vector<SweepAxis> axes_;
 };
 
-/// The error of pictures of this PSNR, in 8-bit levels.
+/// The error of images of this PSNR, in 8-bit levels.
 double RmsLevels(double psnr_db);
 
 }  // namespace dtr::eval

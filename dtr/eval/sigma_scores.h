@@ -28,8 +28,8 @@ struct SigmaScores {
 class SigmaScorer {
  public:
   SigmaScorer();
-  /// `error` >= 0 and `sigma` > 0 in one unit, the same in all calls. Anything else is refused with
-  /// std::invalid_argument. `outlier`: whoever adds the error calls it one.
+  /// `error` >= 0 and `sigma` > 0 in one unit, the same in all calls. Anything else is rejected
+  /// with std::invalid_argument. `outlier`: whoever adds the error calls it one.
   void Add(double error, double sigma, bool outlier);
   SigmaScores Scores() const;
 

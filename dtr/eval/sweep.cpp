@@ -132,7 +132,7 @@ std::vector<SweepSetting> OneAtATime(const SweepStage& stage) {
 
 std::vector<SweepSetting> Promising(const SweepStage& stage, std::span<const SweepPoint> points,
                                     int count) {
-  constexpr double kLeastPromise = 0.01;  // of the front's extent: below what repeats tell apart
+  constexpr double kMinPromise = 0.01;  // of the front's extent: below what repeats tell apart
   const std::vector<size_t> indices = ParetoFront(points);
   if (indices.size() < 2) return {};
   std::vector<LogPoint> front;
@@ -149,13 +149,13 @@ std::vector<SweepSetting> Promising(const SweepStage& stage, std::span<const Swe
   ForEachSetting(stage, start, 0, [&](const SweepSetting& setting) {
     if (effects.Measured(setting)) return;
     const std::optional<LogPoint> predicted = effects.Predict(setting);
-    if (predicted && GainOver(front, extent, *predicted) > kLeastPromise) {
+    if (predicted && GainOver(front, extent, *predicted) > kMinPromise) {
       candidates.push_back({setting, *predicted});
     }
   });
   std::vector<SweepSetting> chosen;
   while (static_cast<int>(chosen.size()) < count) {
-    double most = kLeastPromise;
+    double most = kMinPromise;
     const Candidate* best = nullptr;
     for (const Candidate& candidate : candidates) {
       if (const double gain = GainOver(front, extent, candidate.predicted); gain > most) {
@@ -181,13 +181,13 @@ SweepPoint MeasurePoint(const SweepStage& stage, const SweepSetting& setting) {
   return {setting, std::move(measured)};
 }
 
-std::vector<SweepPoint> Sweep(const SweepStage& stage, int most_points, SweepStore& store,
+std::vector<SweepPoint> Sweep(const SweepStage& stage, int max_points, SweepStore& store,
                               Progress& progress) {
   constexpr int kPerRound = 4;
   std::vector<SweepPoint> points;
-  progress.Stage("bench " + stage.name, most_points);
+  progress.Stage("bench " + stage.name, max_points);
   const auto add = [&](const SweepSetting& setting) {
-    if (static_cast<int>(points.size()) >= most_points) return;
+    if (static_cast<int>(points.size()) >= max_points) return;
     progress.ThrowIfInterrupted();
     if (std::optional<SweepMeasurement> known = store.Find(setting)) {
       points.push_back({setting, std::move(*known)});
@@ -198,7 +198,7 @@ std::vector<SweepPoint> Sweep(const SweepStage& stage, int most_points, SweepSto
     progress.Update(static_cast<int>(points.size()));
   };
   for (const SweepSetting& setting : OneAtATime(stage)) add(setting);
-  while (static_cast<int>(points.size()) < most_points) {
+  while (static_cast<int>(points.size()) < max_points) {
     const std::vector<SweepSetting> round = Promising(stage, points, kPerRound);
     if (round.empty()) break;
     for (const SweepSetting& setting : round) add(setting);

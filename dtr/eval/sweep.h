@@ -25,7 +25,7 @@ struct SweepMeasurement {
   double cost = 0;                        ///< median of the repeats, > 0
   double cost_least = 0, cost_most = 0;   ///< of the repeats
   double error = 0;                       ///< > 0, smaller is better
-  std::optional<double> psnr_db;          ///< where the error is one of pictures
+  std::optional<double> psnr_db;          ///< where the error is one of images
   double machine_ms = 0;                  ///< what CalibrationLoop() took about then; 0: not timed
   std::map<std::string, double> figures;  ///< what else is known, by name
 };
@@ -112,9 +112,9 @@ class SweepStore {
 SweepPoint MeasurePoint(const SweepStage& stage, const SweepSetting& setting);
 
 /// Measures the settings one at a time around the default, then rounds of the promising
-/// combinations, until `most_points` are measured or nothing promises more. In order of measuring.
+/// combinations, until `max_points` are measured or nothing promises more. In order of measuring.
 /// Throws what the stage and the store throw, and Interrupted between points.
-std::vector<SweepPoint> Sweep(const SweepStage& stage, int most_points, SweepStore& store,
+std::vector<SweepPoint> Sweep(const SweepStage& stage, int max_points, SweepStore& store,
                               Progress& progress);
 
 /// Processor milliseconds, the median of three, of a fixed piece of work (arithmetic on numbers

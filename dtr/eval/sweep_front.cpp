@@ -30,17 +30,17 @@ CostRange RangeOf(const SweepPoint& point, std::span<const SweepPoint> sweep) {
   const SweepMeasurement& measured = point.measured;
   CostRange range{measured.cost_least, measured.cost_most};
   if (measured.machine_ms <= 0) return range;
-  double least_ms = measured.machine_ms, most_ms = measured.machine_ms;
+  double min_ms = measured.machine_ms, max_ms = measured.machine_ms;
   for (const SweepPoint& other : sweep) {
     if (other.measured.machine_ms <= 0) continue;
-    least_ms = std::min(least_ms, other.measured.machine_ms);
-    most_ms = std::max(most_ms, other.measured.machine_ms);
+    min_ms = std::min(min_ms, other.measured.machine_ms);
+    max_ms = std::max(max_ms, other.measured.machine_ms);
   }
   // Repeats follow each other in one process. Frames of 1 to 70 CPU ms drawn by another one minutes
   // later on a busy machine took up to 9.6 % less (scripts/bench-replay).
   constexpr double kBetweenRuns = 0.1;
-  range.least *= (1 - kBetweenRuns) * least_ms / measured.machine_ms;
-  range.most *= (1 + kBetweenRuns) * most_ms / measured.machine_ms;
+  range.least *= (1 - kBetweenRuns) * min_ms / measured.machine_ms;
+  range.most *= (1 + kBetweenRuns) * max_ms / measured.machine_ms;
   return range;
 }
 

@@ -50,7 +50,7 @@ std::unique_ptr<TimedRenderer> TimeOnCpu(
 /// Median and interquartile range of repeated measurements, linear between values, and their ends.
 struct Times {
   double median_ms = 0, spread_ms = 0;
-  double least_ms = 0, most_ms = 0;
+  double min_ms = 0, max_ms = 0;
 };
 /// Throws std::invalid_argument for an empty list.
 Times TimesOf(std::vector<double> milliseconds);

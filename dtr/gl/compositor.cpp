@@ -14,7 +14,7 @@ namespace dtr::gl {
 namespace {
 
 /// What compositing changes, put back at the end of the scope. StateGuard would not do: it takes
-/// away what shall hold for the picture (depth test, blending, masks).
+/// away what shall hold for the image (depth test, blending, masks).
 class CompositeGuard {
  public:
   CompositeGuard() {
@@ -79,7 +79,7 @@ bool TopRowFirst() {
   return origin == GL_UPPER_LEFT;
 }
 
-/// Per axis the factor (x, y) and what is added (z, w); 0 is the picture's top row.
+/// Per axis the factor (x, y) and what is added (z, w); 0 is the image's top row.
 Eigen::Vector4d PictureFromPixel(const Viewport& viewport) {
   const double x = 1.0 / viewport.width, y = 1.0 / viewport.height;
   if (TopRowFirst()) return {x, y, -x * viewport.x, -y * viewport.y};
@@ -160,7 +160,7 @@ class Compositor::Implementation {
   }
 
  private:
-  /// A picture in memory to the GPU, its depth as the host's buffer has it: a software rasteriser
+  /// An image in memory to the GPU, its depth as the host's buffer has it: a software rasteriser
   /// takes several times as long for that sum as the processor's vector instructions, and longer
   /// for texels of an array than of a plain texture. Within a CompositeGuard.
   void Bring(const DrawnPicture& picture, const simd::WindowDepthMapping& mapping) {

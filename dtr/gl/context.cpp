@@ -25,7 +25,7 @@ constexpr EGLint kContextFlags = 0;
 constexpr EGLint kContextFlags = EGL_CONTEXT_OPENGL_DEBUG_BIT_KHR;
 #endif
 
-[[noreturn]] void Refuse(const std::string& found) {
+[[noreturn]] void Reject(const std::string& found) {
   throw Error("OpenGL: expected a context of version 4.3 or newer through EGL, found " + found +
               "; use --renderer cpu");
 }
@@ -142,7 +142,7 @@ struct EglContext::State {
 };
 
 EglContext::EglContext() : state_(std::make_unique<State>()) {
-  if (const char* const missing = MissingLibrary()) Refuse(std::string("no ") + missing);
+  if (const char* const missing = MissingLibrary()) Reject(std::string("no ") + missing);
   bool any_display = false;
   for (const EGLDisplay display : CandidateDisplays()) {
     EGLint major = 0, minor = 0;
@@ -157,7 +157,7 @@ EglContext::EglContext() : state_(std::make_unique<State>()) {
     }
     eglDestroyContext(display, context);
   }
-  Refuse(any_display ? "only older ones" : "no display that EGL can open");
+  Reject(any_display ? "only older ones" : "no display that EGL can open");
 }
 
 std::unique_ptr<EglContext> EglContext::OnGpu(std::string& why) {

@@ -8,7 +8,7 @@
 
 namespace dtr::gl {
 
-/// The picture of a grid of samples that own_depth.glsl reads: `values` with the last row and
+/// The image of a grid of samples that own_depth.glsl reads: `values` with the last row and
 /// column once more, and below them whether a block is whole or masked (its values are 0 then,
 /// which whole ones' never are): of block (x, y) bit (y + 1) % kBlocksPerTexel of the texel (x + 1,
 /// rows + 1 + (y + 1) / kBlocksPerTexel), as a number.

@@ -60,7 +60,7 @@ inline Texture MakeTarget(GLenum target, GLenum format, int width, int height, i
   } else {
     glTexStorage2D(target, 1, format, width, height);
   }
-  ThrowOnError("a picture of " + std::to_string(width) + "x" + std::to_string(height) +
+  ThrowOnError("an image of " + std::to_string(width) + "x" + std::to_string(height) +
                " pixels from " + std::to_string(layers) + " views");
   glTexParameteri(target, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
   glTexParameteri(target, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
@@ -97,12 +97,12 @@ struct Targets {
           "OpenGL: this driver cannot draw into RGBA8, R32F and RGBA8UI at once; "
           "use --renderer cpu");
     }
-    ThrowOnError("a picture of " + std::to_string(new_width) + "x" + std::to_string(new_rows) +
+    ThrowOnError("an image of " + std::to_string(new_width) + "x" + std::to_string(new_rows) +
                  " pixels");
     width = new_width, rows = new_rows, layer_count = new_layers;  // now it holds
   }
 
-  /// A picture that no view shows anything of.
+  /// An image that no view shows anything of.
   void ClearResults() const {
     glBindFramebuffer(GL_FRAMEBUFFER, result_framebuffer.name());
     const GLfloat nothing[4] = {0, 0, 0, 0};

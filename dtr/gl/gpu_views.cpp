@@ -8,7 +8,7 @@ namespace {
 // More than any view takes per sample of its geometry and depth. The two passes' mesh: every block
 // open, with four quarter cells of four points and six indices each. The reduced mesh: two
 // triangles of three corners and a cell.
-constexpr size_t kMostBytesOfMesh = 320, kMostBytesOfSplats = 48, kMostBytesOfReducedMesh = 80;
+constexpr size_t kMaxBytesOfMesh = 320, kMaxBytesOfSplats = 48, kMaxBytesOfReducedMesh = 80;
 constexpr size_t kBytesPerPixel = 4;  // GL_RGBA8
 
 size_t PixelsOf(const LayerSize& size) {
@@ -18,9 +18,9 @@ size_t PixelsOf(const LayerSize& size) {
 LayerSize SizeOf(const PinholeCamera& camera) { return {camera.width_px(), camera.height_px()}; }
 
 size_t MostBytesOf(const View& view, const RenderOptions& options, const LayerSizes& sizes) {
-  const size_t per_sample = options.method == RenderMethod::kDeferred ? kMostBytesOfReducedMesh
-                            : options.primitive == Primitive::kSplat  ? kMostBytesOfSplats
-                                                                      : kMostBytesOfMesh;
+  const size_t per_sample = options.method == RenderMethod::kDeferred ? kMaxBytesOfReducedMesh
+                            : options.primitive == Primitive::kSplat  ? kMaxBytesOfSplats
+                                                                      : kMaxBytesOfMesh;
   return kBytesPerPixel * PixelsOf(sizes.LayerFor(SizeOf(view.camera))) +
          kBytesPerPixel * PixelsOf(sizes.LayerFor(DepthPictureSize(view, options.resolution))) +
          per_sample * PixelsOf(SizeOf(view.DepthCamera()));

@@ -19,7 +19,7 @@ int Rounded(int side_px, int step_px, int most_px) {
 }  // namespace
 
 LayerSizes::LayerSizes(const std::vector<const View*>& views, int resolution, int most_px)
-    : most_px_(most_px) {
+    : max_px_(most_px) {
   std::vector<LayerSize> images, depths;
   for (const View* view : views) {
     images.push_back({view->camera.width_px(), view->camera.height_px()});
@@ -33,12 +33,12 @@ LayerSizes::LayerSizes(const std::vector<const View*>& views, int resolution, in
 bool LayerSizes::AreFew(const std::vector<LayerSize>& pictures) const {
   std::set<LayerSize> layers;
   for (const LayerSize& picture : pictures) layers.insert(LayerFor(picture));
-  return layers.size() <= static_cast<size_t>(kMostSizes);
+  return layers.size() <= static_cast<size_t>(kMaxSizes);
 }
 
 LayerSize LayerSizes::LayerFor(const LayerSize& picture) const {
-  return {Rounded(picture.width_px, step_px_, most_px_),
-          Rounded(picture.height_px, step_px_, most_px_)};
+  return {Rounded(picture.width_px, step_px_, max_px_),
+          Rounded(picture.height_px, step_px_, max_px_)};
 }
 
 LayerSize DepthPictureSize(int columns, int rows) {

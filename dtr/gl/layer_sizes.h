@@ -13,12 +13,12 @@ struct LayerSize {
   auto operator<=>(const LayerSize&) const = default;
 };
 
-/// A shader reads from few arrays (texture units), and an array has layers of one size. Pictures of
-/// up to kMostSizes sizes have layers of their own size; of more, sides are rounded up to multiples
-/// of a step until no more than kMostSizes are left.
+/// A shader reads from few arrays (texture units), and an array has layers of one size. Images of
+/// up to kMaxSizes sizes have layers of their own size; of more, sides are rounded up to multiples
+/// of a step until no more than kMaxSizes are left.
 class LayerSizes {
  public:
-  static constexpr int kMostSizes = 5;
+  static constexpr int kMaxSizes = 5;
 
   LayerSizes() = default;
   /// For the images of these views and their depth at every `resolution`-th pixel; `most_px`: the
@@ -31,16 +31,16 @@ class LayerSizes {
  private:
   bool AreFew(const std::vector<LayerSize>& pictures) const;
 
-  int step_px_ = 1, most_px_ = 0;
+  int step_px_ = 1, max_px_ = 0;
 };
 
-/// Of the picture in which shaders find a grid of samples (DepthPicture); none for an empty grid.
+/// Of the image in which shaders find a grid of samples (DepthPicture); none for an empty grid.
 LayerSize DepthPictureSize(int columns, int rows);
 /// Of the view's depth map at every `resolution`-th pixel (SPEC 2.1).
 LayerSize DepthPictureSize(const View& view, int resolution);
 
-/// A picture of `channels` values a pixel with its last column and row once more where the layer is
-/// larger: what a texture unit finds where it clamps to the edge of a layer of the picture's size.
+/// An image of `channels` values a pixel with its last column and row once more where the layer is
+/// larger: what a texture unit finds where it clamps to the edge of a layer of the image's size.
 template <typename T>
 std::vector<T> WithEdge(const T* values, const LayerSize& size, int channels,
                         const LayerSize& with_edge) {
@@ -57,7 +57,7 @@ std::vector<T> WithEdge(const T* values, const LayerSize& size, int channels,
   return out;
 }
 
-/// What of a layer a picture takes: its size and, where the layer is larger, a pixel of edge.
+/// What of a layer an image takes: its size and, where the layer is larger, a pixel of edge.
 LayerSize SizeWithEdge(const LayerSize& picture, const LayerSize& layer);
 
 }  // namespace dtr::gl

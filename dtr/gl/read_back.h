@@ -6,7 +6,7 @@
 
 namespace dtr::gl {
 
-/// SPEC 6: the band's rows of `targets` into those of `result`, which has the picture's size.
+/// SPEC 6: the band's rows of `targets` into those of `result`, which has the image's size.
 void ReadBack(const Targets& targets, const Band& band, RenderResult& result);
 
 }  // namespace dtr::gl

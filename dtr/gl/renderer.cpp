@@ -37,7 +37,7 @@ void CheckPictureSize(const PinholeCamera& novel) {
   GLint max_px = 0;
   glGetIntegerv(GL_MAX_TEXTURE_SIZE, &max_px);
   if (novel.width_px() > max_px || novel.height_px() > max_px) {
-    throw Error("OpenGL: expected a picture of at most " + std::to_string(max_px) +
+    throw Error("OpenGL: expected an image of at most " + std::to_string(max_px) +
                 " pixels a side on this driver, found " + std::to_string(novel.width_px()) + "x" +
                 std::to_string(novel.height_px()) + "; use --renderer cpu");
   }
@@ -63,7 +63,7 @@ class Renderer::Implementation {
  public:
   explicit Implementation(RendererSettings settings)
       : settings_(std::move(settings)),
-        most_storage_bytes_(std::min(settings_.most_storage_bytes, MostStorageBytes())),
+        max_storage_bytes_(std::min(settings_.max_storage_bytes, MostStorageBytes())),
         views_(settings_.gpu_bytes, settings_.warn),
         programs_(settings_.shader_folder) {}
 
@@ -157,7 +157,7 @@ class Renderer::Implementation {
     ThrowOnError("drawing");
   }
 
-  /// The whole picture at once.
+  /// The whole image at once.
   DrawnPicture DrawWhole(RenderFrame frame, const ViewSelection& selection) {
     drawn_.reset();
     ForgetErrors();
@@ -205,16 +205,16 @@ class Renderer::Implementation {
   int RowsWithinMemory(const RenderFrame& frame) const {
     const size_t row_bytes = LayerRowBytes(frame);
     size_t rows = settings_.layer_bytes / (row_bytes * static_cast<size_t>(LayersOf(frame)));
-    if (frame.deferred()) rows = std::min(rows, most_storage_bytes_ / row_bytes);
+    if (frame.deferred()) rows = std::min(rows, max_storage_bytes_ / row_bytes);
     return static_cast<int>(
         std::clamp<size_t>(rows, 1, static_cast<size_t>(frame.novel.height_px())));
   }
 
   void CheckStorage(const RenderFrame& frame) const {
     const size_t bytes = LayerRowBytes(frame) * static_cast<size_t>(frame.novel.height_px());
-    if (!frame.deferred() || bytes <= most_storage_bytes_) return;
-    throw Error("OpenGL: expected a picture whose depth is within this driver's storage block of " +
-                std::to_string(most_storage_bytes_) + " bytes, found " +
+    if (!frame.deferred() || bytes <= max_storage_bytes_) return;
+    throw Error("OpenGL: expected an image whose depth is within this driver's storage block of " +
+                std::to_string(max_storage_bytes_) + " bytes, found " +
                 std::to_string(frame.novel.width_px()) + "x" +
                 std::to_string(frame.novel.height_px()) +
                 " pixels of 4 bytes; use --renderer cpu, --method two-pass or a smaller --size");
@@ -225,7 +225,7 @@ class Renderer::Implementation {
   }
 
   const RendererSettings settings_;
-  const size_t most_storage_bytes_;
+  const size_t max_storage_bytes_;
   GpuViews views_;
   bool warned_of_room_ = false;
   ProgramCache programs_;

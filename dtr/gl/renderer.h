@@ -16,25 +16,25 @@
 
 namespace dtr::gl {
 
-/// What does not change the picture, beyond the last digits.
+/// What does not change the image, beyond the last digits.
 struct RendererSettings {
   /// Where shaders come from, for development; empty: from the program itself.
   std::string shader_folder;
-  /// Memory for the views' fragments; a picture that needs more is drawn in bands of rows.
+  /// Memory for the views' fragments; an image that needs more is drawn in bands of rows.
   size_t layer_bytes = size_t{256} << 20;
   /// Memory for the views themselves. Those drawn longest ago make room for others; where one
-  /// picture's do not fit, it is drawn from the nearest that do, and `warn` is told so once.
+  /// image's do not fit, it is drawn from the nearest that do, and `warn` is told so once.
   size_t gpu_bytes = size_t{4} << 30;
-  /// Told of what the picture goes without, a line each, on the thread that draws.
+  /// Told of what the image goes without, a line each, on the thread that draws.
   std::function<void(const std::string&)> warn = [](const std::string&) {};
   /// Leave unused what the driver has beyond OpenGL 4.3, as on one that has no more.
   bool only_opengl_43 = false;
   /// Take its storage blocks for no larger than this, as on one that has smaller ones.
-  size_t most_storage_bytes = SIZE_MAX;
+  size_t max_storage_bytes = SIZE_MAX;
 };
 
-/// A picture that was drawn and lies on the GPU: names of GL_TEXTURE_2D_ARRAY textures of one layer
-/// that belong to the renderer and hold the picture until its next call. Row 0 is the top row. A
+/// An image that was drawn and lies on the GPU: names of GL_TEXTURE_2D_ARRAY textures of one layer
+/// that belong to the renderer and hold the image until its next call. Row 0 is the top row. A
 /// FittingRenderer's may lie in its memory instead, as long: then there are no textures (0).
 struct DrawnPicture {
   unsigned image = 0;  ///< RGBA8, sRGB values; alpha 1 where some view saw the pixel, else 0
@@ -46,7 +46,7 @@ struct DrawnPicture {
   /// null.
   const float* window_z = nullptr;
   simd::WindowDepthMapping mapping;
-  /// No two pictures of a process have the same, whoever drew them.
+  /// No two images of a process have the same, whoever drew them.
   std::uint64_t number = 0;
   int width_px = 0, height_px = 0;
   std::vector<int> views_used;  ///< as RenderResult::views_used
@@ -70,7 +70,7 @@ class Renderer {
   /// RendererSettings::gpu_bytes: they must not change or die as long as this renderer draws them
   /// (Forget() ends that); their pixels may go and be read again in between, as ViewStream does.
   /// The result does not depend on the order of the views; equal calls give
-  /// equal bytes. Throws dtr::UsageError for options without a meaning and for pictures beyond 2^28
+  /// equal bytes. Throws dtr::UsageError for options without a meaning and for images beyond 2^28
   /// pixels, and dtr::Error for a pose that is not finite, for what the driver cannot hold (naming
   /// its limit) and for a shader that does not compile (file and line).
   RenderResult Render(const RenderScene& scene, const PinholeCamera& novel,
@@ -83,7 +83,7 @@ class Renderer {
   DrawnPicture Draw(const RenderScene& scene, const PinholeCamera& novel,
                     const Pose& novel_from_world, const RenderOptions& options);
 
-  /// The picture of the last Draw, which must be the last call that drew (std::logic_error): what
+  /// The image of the last Draw, which must be the last call that drew (std::logic_error): what
   /// Render gives without filling.
   RenderResult ReadBack();
 

@@ -16,7 +16,7 @@ static_assert(sizeof(ViewBlock) == 10 * 16, "std430: ten vec4");
 // Unit 0 has the layers; the arrays of images and depths follow.
 constexpr int kMaxImageArrays = StateGuard::kTextureUnits - 1;
 // Variants of the resolving shader hold so many views, doubled until all fit.
-constexpr int kFewestViews = 8;
+constexpr int kMinViews = 8;
 constexpr GLuint kViewsBinding = 0, kResolveDepthBinding = 2;  // as in resolve.frag
 
 std::array<float, 4> Row(const Eigen::Vector3d& row, double last) {
@@ -32,7 +32,7 @@ static_assert(static_cast<int>(BlendWeight::kCosine) == 0 &&
               static_cast<int>(BlendWeight::kKNearest) == 4);
 
 int RoomFor(int views) {
-  int room = kFewestViews;
+  int room = kMinViews;
   while (room < views) room *= 2;
   return room;
 }
@@ -98,7 +98,7 @@ int Resolver::SlotOf(std::vector<int>& bound, int array) const {
   if (image_arrays_.size() + depth_arrays_.size() == static_cast<size_t>(kMaxImageArrays)) {
     // Sizes are few (LayerSizes): there are more arrays where one would be larger than 1 GiB.
     throw Error(
-        "OpenGL: expected the images and depth maps of one picture in at most " +
+        "OpenGL: expected the images and depth maps of one image in at most " +
         std::to_string(kMaxImageArrays) +
         " texture arrays of up to 1 GiB, found more; use --renderer cpu, fewer --views or a "
         "smaller --gpu-memory");

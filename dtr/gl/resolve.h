@@ -1,4 +1,4 @@
-// dtr/gl/resolve.h -- the pass over the pixels that makes one picture of the views. Only dtr/gl's
+// dtr/gl/resolve.h -- the pass over the pixels that makes one image of the views. Only dtr/gl's
 // own .cpp files include this.
 #pragma once
 #include <string>
@@ -11,7 +11,7 @@
 
 namespace dtr::gl {
 
-/// SPEC 4.2 to 4.7, 5.2 and 6. Once per picture SetViews, then Draw for every band.
+/// SPEC 4.2 to 4.7, 5.2 and 6. Once per image SetViews, then Draw for every band.
 class Resolver {
  public:
   /// Asks the driver for its limits: a context must be current.

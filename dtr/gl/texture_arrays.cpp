@@ -9,7 +9,7 @@
 namespace dtr::gl {
 namespace {
 
-// An array texture takes its memory at once on some drivers; a larger one would be refused whole.
+// An array texture takes its memory at once on some drivers; a larger one would be rejected whole.
 constexpr size_t kMaxArrayBytes = size_t{1} << 30;
 
 size_t LayerBytesOf(GLenum format, int width_px, int height_px) {

@@ -1,4 +1,4 @@
-// dtr/gl/texture_arrays.h -- layers of texture arrays, one array for pictures of one size. Only
+// dtr/gl/texture_arrays.h -- layers of texture arrays, one array for images of one size. Only
 // dtr/gl's own .cpp files include this.
 #pragma once
 #include <cstddef>
@@ -21,7 +21,7 @@ size_t BytesPerPixel(GLenum format);
 class TextureArrays {
  public:
   /// A layer that nobody uses; where there is none, in a new array of `new_layers` (fewer where the
-  /// driver's limits say so). Throws dtr::Error, naming the limit, for pictures that no array of
+  /// driver's limits say so). Throws dtr::Error, naming the limit, for images that no array of
   /// this driver holds, and where the GPU's memory is full.
   ImageSlot Take(GLenum format, int width_px, int height_px, int new_layers);
   /// Gives a layer back; an array without a used one is deleted.

@@ -8,7 +8,7 @@
 namespace dtr::gl {
 namespace {
 
-// llvmpipe keeps what it has set up of a picture (some 200 bytes a triangle) in memory until it is
+// llvmpipe keeps what it has set up of an image (some 200 bytes a triangle) in memory until it is
 // flushed: pieces that fit a core's cache cost a fifth less than whole meshes
 // (docs/accuracy/SPEED.md). A GPU would only lose by it.
 constexpr GLsizei kIndicesPerFlush = 3 * 50000;
@@ -37,7 +37,7 @@ void DrawView(const RenderFrame& frame, const Band& band, int index, ViewStore& 
   glDrawBuffer(GL_NONE);
   glReadBuffer(GL_NONE);
   const int width = frame.novel.width_px(), height = frame.novel.height_px();
-  // Row 0 of a target is the picture's top row: no flip, and y grows downwards as in SPEC.
+  // Row 0 of a target is the image's top row: no flip, and y grows downwards as in SPEC.
   glViewport(0, -band.first, width, height);
   const float nothing = 0;
   glClearBufferfv(GL_DEPTH, 0, &nothing);

@@ -51,7 +51,7 @@ class ViewStore {
                      const LayersFor& new_layers);
   /// After PrepareImages.
   ImageSlot ImageOf(const View& view) { return Find(view).image.value(); }
-  /// Of the layer that a picture lies in, which may be larger.
+  /// Of the layer that an image lies in, which may be larger.
   LayerSize SizeOf(const ImageSlot& slot) const { return arrays_.SizeOf(slot); }
   GLuint texture_array(int index) const { return arrays_.name(index); }
 

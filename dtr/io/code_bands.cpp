@@ -22,7 +22,7 @@ constexpr char kBandMagic[9] = "DTRBAND1";
 constexpr size_t kBandHeaderBytes = 8 + 3 * 4;
 // Enough pixels for the entropy coder's tables to pay, few enough that photos have several bands.
 constexpr int kRowsPerBand = 128;
-constexpr int kMostRowsPerBand = 1 << 16;
+constexpr int kMaxRowsPerBand = 1 << 16;
 constexpr int kLevel = 19;           // written once, read often; decoding is no slower for it
 constexpr std::uint8_t kWide = 255;  // the residual's 16 bits stand among the wide ones
 
@@ -153,15 +153,15 @@ unsigned long long ContentSize(std::string_view frame) {
     Fail("a zstd frame that says its size", "none");
   }
   // RFC 8878: a block holds at most 128 KiB and takes 4 bytes at least.
-  constexpr unsigned long long kMostPerByte = (128 << 10) / 4;
-  if (size > kMostPerByte * frame.size()) {
+  constexpr unsigned long long kMaxPerByte = (128 << 10) / 4;
+  if (size > kMaxPerByte * frame.size()) {
     Fail("a zstd frame of " + std::to_string(size) + " bytes",
          "one too short for them, of " + std::to_string(frame.size()));
   }
   return size;
 }
 
-/// Refuses a band that says itself that it is none, before anything is allocated for it.
+/// Rejects a band that says itself that it is none, before anything is allocated for it.
 void ExpectPlausible(const std::array<std::string_view, kParts>& frames, int width_px, int rows) {
   const size_t validity = RowBytes(width_px) * static_cast<size_t>(rows);
   const size_t pixels = static_cast<size_t>(width_px) * static_cast<size_t>(rows);
@@ -300,7 +300,7 @@ Grid<std::uint16_t> DecodeBands(std::string_view bytes, int width_px, int height
     Fail(std::to_string(width_px) + "x" + std::to_string(height_px) + " pixels",
          std::to_string(width) + "x" + std::to_string(height));
   }
-  if (rows == 0 || rows > kMostRowsPerBand) {
+  if (rows == 0 || rows > kMaxRowsPerBand) {
     Fail("1 to 65536 rows a band", std::to_string(rows));
   }
   const int rows_per_band = static_cast<int>(rows);

@@ -1,4 +1,4 @@
-// dtr/io/code_bands.h -- internal to dtr/io: a picture of 16-bit codes with holes, compressed
+// dtr/io/code_bands.h -- internal to dtr/io: an image of 16-bit codes with holes, compressed
 // without loss in bands of rows that decode apart from each other (docs/FORMAT.md, section 4.1).
 #pragma once
 #include <cstdint>
@@ -13,7 +13,7 @@ namespace dtr::io {
 /// Throws Error unless the grid has one channel and pixels.
 std::string EncodeBands(const Grid<std::uint16_t>& codes, int threads = 1);
 
-/// The inverse. The size that the picture must have is checked, as are all sizes in the file,
+/// The inverse. The size that the image must have is checked, as are all sizes in the file,
 /// before anything is allocated. Throws Error (without a file's name) for whatever EncodeBands
 /// cannot have written: another size, missing or additional bytes, a checksum that does not hold.
 Grid<std::uint16_t> DecodeBands(std::string_view bytes, int width_px, int height_px,

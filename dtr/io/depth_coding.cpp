@@ -255,7 +255,7 @@ DepthImage RoundToCoding(const DepthImage& depth, const DepthFormat& format) {
     case DepthCoding::kExrFloat:
       break;
   }
-  ForEachDepth(depth, [](int, int, float) {});  // refuses what no coding may hold
+  ForEachDepth(depth, [](int, int, float) {});  // rejects what no coding may hold
   return depth;
 }
 

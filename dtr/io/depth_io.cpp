@@ -43,7 +43,7 @@ bool IsDepthOfALayer(const std::string& channel) {
 }
 
 // The channel Z or Y, else the one that a layer calls its depth (Blender: ViewLayer.Depth.Z), else
-// the first of a picture that holds nothing else.
+// the first of an image that holds nothing else.
 int DepthChannel(const ImageSpec& spec, const fs::path& file) {
   for (const char* name : {"Z", "Y"}) {
     const int channel = spec.channelindex(name);
@@ -65,13 +65,13 @@ int DepthChannel(const ImageSpec& spec, const fs::path& file) {
               names.substr(0, 200) + "; write the depth into a file of its own");
 }
 
-// Programs that render a part of a picture write that part alone.
+// Programs that render a part of an image write that part alone.
 void ExpectWholePicture(const ImageSpec& spec, const fs::path& file) {
   if (spec.x == spec.full_x && spec.y == spec.full_y && spec.width == spec.full_width &&
       spec.height == spec.full_height) {
     return;
   }
-  throw Error(file.string() + ": expected pixels for the whole picture of " +
+  throw Error(file.string() + ": expected pixels for the whole image of " +
               std::to_string(spec.full_width) + "x" + std::to_string(spec.full_height) +
               ", found " + std::to_string(spec.width) + "x" + std::to_string(spec.height) +
               " of them from (" + std::to_string(spec.x - spec.full_x) + ", " +

@@ -17,7 +17,7 @@ Grid<float> ReadFloatGrid(const std::filesystem::path& file,
                           std::uint64_t limit_px = kImageLimitPx);
 
 /// Writes one channel named Y, ZIP, float32 or half; deterministic bytes. With `half`, values that
-/// half cannot hold (|v| > 65504) are refused. Throws Error.
+/// half cannot hold (|v| > 65504) are rejected. Throws Error.
 void WriteExr(const std::filesystem::path& file, const Grid<float>& grid, bool half = false);
 
 /// Writes three channels named X, Y, Z, ZIP, float32; deterministic bytes. Throws Error.

@@ -18,7 +18,7 @@ constexpr size_t kLongestName = 255;  // OpenEXR's "long names"
 // A chunk of up to this size needs no proof (some twenty times as much is allocated to read it); of
 // a larger one each byte of the file stands for at most as many as deflate packs into one (zlib's
 // manual).
-constexpr std::uint64_t kAlwaysPlausibleBytes = 2 << 20, kMostPacking = 1032;
+constexpr std::uint64_t kAlwaysPlausibleBytes = 2 << 20, kMaxPacking = 1032;
 constexpr std::uint64_t kOffsetBytes = 8;  // of a chunk, in the table after the headers
 
 struct Reader {
@@ -47,7 +47,7 @@ std::uint32_t ReadLittle32(std::ifstream& in) {
 
 std::int64_t ReadInt(std::ifstream& in) { return static_cast<std::int32_t>(ReadLittle32(in)); }
 
-// Up to a zero byte; what is longer than any name ends it as well, and is refused as a length.
+// Up to a zero byte; what is longer than any name ends it as well, and is rejected as a length.
 std::string ReadName(std::ifstream& in) {
   std::string name;
   for (int c = in.get(); c > 0 && name.size() <= kLongestName; c = in.get()) {
@@ -76,7 +76,7 @@ std::int64_t LinesOfChunk(int compression) {
   // none, RLE, ZIPS, ZIP, PIZ, PXR24, B44, B44A, DWAA, DWAB
   constexpr std::array<std::int64_t, 10> kLines{1, 1, 1, 16, 32, 16, 32, 32, 32, 256};
   const auto known = static_cast<size_t>(compression);
-  return compression >= 0 && known < kLines.size() ? kLines[known] : 1;  // OpenEXR refuses others
+  return compression >= 0 && known < kLines.size() ? kLines[known] : 1;  // OpenEXR rejects others
 }
 
 // Channels up to an empty name; adds their bytes to `part`. UINTMAX_MAX: no end within the file.
@@ -130,23 +130,23 @@ void ExpectPlausiblePart(Reader& exr, const Part& part) {
                                          std::to_string(part.tile_height)
                                    : " in chunks of " + std::to_string(part.lines) + " lines") +
                             " of " + std::to_string(part.bytes_per_px) + " bytes a pixel";
-  const auto refuse = [&](const std::string& expected) {
+  const auto reject = [&](const std::string& expected) {
     throw Error(exr.file.string() + ": damaged EXR: expected " + expected + " of " +
                 std::to_string(exr.size) + " bytes, found " + found + "; copy the file again");
   };
-  if (part.width <= 0 || part.height <= 0) refuse("at least one pixel in a file");
+  if (part.width <= 0 || part.height <= 0) reject("at least one pixel in a file");
   const std::int64_t chunk_width = tiled ? part.tile_width : part.width;
   const std::int64_t chunk_height = tiled ? part.tile_height : part.lines;
   const std::uint64_t across = DivideUp(part.width, chunk_width);
   const std::uint64_t down = DivideUp(part.height, chunk_height);  // each at most 2^32
   if (across > exr.size || down > exr.size || across * down > exr.Left() / kOffsetBytes) {
-    refuse("a table of chunks that fits into a file");
+    reject("a table of chunks that fits into a file");
   }
-  const std::uint64_t most = kAlwaysPlausibleBytes + kMostPacking * exr.size;
+  const std::uint64_t most = kAlwaysPlausibleBytes + kMaxPacking * exr.size;
   const auto most_px = most / std::max<std::uint64_t>(part.bytes_per_px, 1);
   const auto px_wide = static_cast<std::uint64_t>(chunk_width);
   if (static_cast<std::uint64_t>(chunk_height) > most_px / px_wide) {
-    refuse("chunks that can be packed into a file");
+    reject("chunks that can be packed into a file");
   }
 }
 

@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 constexpr size_t kPngSignatureBytes = 8;
 // Deflate packs at most 1032 bytes into one (zlib's manual); of one bit a pixel those are 8256
 // pixels. Images that small in memory need no such check.
-constexpr std::uint64_t kMostPxPerByte = 8256, kAlwaysPlausiblePx = 4 << 20;
+constexpr std::uint64_t kMaxPxPerByte = 8256, kAlwaysPlausiblePx = 4 << 20;
 
 bool StartsAsPng(std::ifstream& in) {
   std::array<char, kPngSignatureBytes> start{};
@@ -130,7 +130,7 @@ void ExpectPlausibleSize(const fs::path& file, int width_px, int height_px) {
   const std::uint64_t found_px =
       static_cast<std::uint64_t>(width_px) * static_cast<std::uint64_t>(height_px);
   const std::uint64_t bytes = fs::file_size(file);
-  if (found_px <= kAlwaysPlausiblePx || found_px / kMostPxPerByte <= bytes) return;
+  if (found_px <= kAlwaysPlausiblePx || found_px / kMaxPxPerByte <= bytes) return;
   throw Error(file.string() + ": damaged image: expected as many pixels as " +
               std::to_string(bytes) + " bytes can hold, found " + std::to_string(width_px) + "x" +
               std::to_string(height_px) + "; copy the file again");

@@ -11,7 +11,7 @@ namespace dtr::io {
 /// allocate what they take for a size.
 void ExpectImageKind(const std::filesystem::path& file);
 
-/// Throws Error for a PNG that lacks its end and for an EXR that ExpectPlausibleExr refuses; other
+/// Throws Error for a PNG that lacks its end and for an EXR that ExpectPlausibleExr rejects; other
 /// files pass.
 void ExpectWholeFile(const std::filesystem::path& file);
 

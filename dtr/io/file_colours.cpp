@@ -136,9 +136,9 @@ struct Box {
 };
 
 std::vector<Box> BoxesIn(FileBytes& file, std::uint64_t begin, std::uint64_t end) {
-  constexpr size_t kMostBoxes = 10'000;
+  constexpr size_t kMaxBoxes = 10'000;
   std::vector<Box> boxes;
-  for (std::uint64_t at = begin; at + 8 <= end && boxes.size() < kMostBoxes;) {
+  for (std::uint64_t at = begin; at + 8 <= end && boxes.size() < kMaxBoxes;) {
     const std::string head = file.At(at, std::min<std::uint64_t>(16, end - at));
     if (head.size() < 8) break;
     std::uint64_t size = Big(head, 0, 4), header = 8;

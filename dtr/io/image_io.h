@@ -1,4 +1,4 @@
-// dtr/io/image_io.h -- photos and masks in, pictures out.
+// dtr/io/image_io.h -- photos and masks in, images out.
 #pragma once
 #include <cstdint>
 #include <filesystem>
@@ -53,7 +53,7 @@ inline constexpr std::uint64_t kImageLimitPx = 400'000'000;
 
 struct ImageReadOptions {
   bool apply_exif_orientation = false;     ///< turn the image upright
-  std::uint64_t limit_px = kImageLimitPx;  ///< larger images are refused before allocation
+  std::uint64_t limit_px = kImageLimitPx;  ///< larger images are rejected before allocation
 };
 
 /// Reads an image as 8-bit sRGB of 3 channels.
@@ -65,7 +65,7 @@ struct ImageReadOptions {
 /// those of other files are taken as sRGB-coded. Float and half samples (EXR, HDR, float TIFF) are
 /// taken as linear light in the primaries of the file, else sRGB's. All are clipped to [0, 1] and
 /// rounded to 8 bits.
-/// NaN and infinity among them are refused. Only the first image of a file is read.
+/// NaN and infinity among them are rejected. Only the first image of a file is read.
 /// Throws Error when the file is no image, is damaged or cut short, or is larger than the limit.
 ImageRgb8 ReadImage(const std::filesystem::path& file, const ImageReadOptions& options = {});
 
@@ -135,8 +135,8 @@ struct ExifFocal {
 void WriteJpegWithExif(const std::filesystem::path& file, const ImageRgb8& image, int quality,
                        const ExifFocal& exif);
 
-/// The image or mask as it must be turned for EXIF orientation 1..8 (others: unchanged), of any number of
-/// channels.
+/// The image or mask as it must be turned for EXIF orientation 1..8 (others: unchanged), of any
+/// number of channels.
 Grid<std::uint8_t> ApplyExifOrientation(const Grid<std::uint8_t>& image, int exif_orientation);
 
 /// The orientation that undoes another: 6 and 8 undo each other, all others themselves.

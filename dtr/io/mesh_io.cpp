@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 constexpr char kMeshMagic[9] = "DTRMESH1";
 constexpr size_t kHashBytes = 32;
 constexpr std::uintmax_t kLargestMeshBytes = std::uintmax_t{512} << 20;
-constexpr int kMostSamples = 1 << 20;  // a side: an image has at most 400 Mpx
+constexpr int kMaxSamples = 1 << 20;  // a side: an image has at most 400 Mpx
 constexpr double kNoAbsoluteBreak = -1;
 constexpr int kRootSide = BlockCover::kRootSide;
 static_assert(kRootSide == 16, "a rectangle is four numbers of 4 bits");
@@ -67,7 +67,7 @@ class MeshBytes {
   size_t left() const { return rest_.size(); }
   [[noreturn]] void Fail(const std::string& expected, const std::string& found) const {
     throw Error(file_.string() + ": reduced mesh: expected " + expected + ", found " + found +
-                "; `dtr stereo` writes it anew");
+                "; `dtr stereo` writes it again");
   }
 
  private:
@@ -93,9 +93,9 @@ StoredMesh FromText(const std::string& content, const fs::path& file) {
     if (value < least || value > most) bytes.Fail(what, std::to_string(value));
     return static_cast<int>(value);
   };
-  mesh.resolution = take_count("a resolution of 1 to 1048576", 1, kMostSamples);
-  cover.columns = take_count("at most 1048576 columns", 0, kMostSamples);
-  cover.rows = take_count("at most 1048576 rows", 0, kMostSamples);
+  mesh.resolution = take_count("a resolution of 1 to 1048576", 1, kMaxSamples);
+  cover.columns = take_count("at most 1048576 columns", 0, kMaxSamples);
+  cover.rows = take_count("at most 1048576 rows", 0, kMaxSamples);
   take_count("0 in bytes 20 to 23", 0, 0);
   mesh.depth_sha256 = HexOfBytes(bytes.Take(kHashBytes));
   mesh.mask_sha256 = HexOfBytes(bytes.Take(kHashBytes));

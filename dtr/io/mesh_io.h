@@ -6,7 +6,7 @@
 
 namespace dtr::io {
 
-/// Writes the file atomically; throws Error for a mesh that ReadMesh would refuse.
+/// Writes the file atomically; throws Error for a mesh that ReadMesh would reject.
 void WriteMesh(const std::filesystem::path& file, const StoredMesh& mesh);
 
 /// Throws Error for anything but a whole and consistent file. Whether it is of a view's depth is

@@ -27,7 +27,7 @@ std::string TextAt(const Json& object, const char* key) {
   return found != object.end() && found->is_string() ? found->get<std::string>() : "?";
 }
 
-/// The steps of a list, a line each; of another tool: no reason to refuse the set.
+/// The steps of a list, a line each; of another tool: no reason to reject the set.
 void DescribeSteps(const Json& pruned, const char* list, const char* before,
                    std::ostringstream& out) {
   const auto found = pruned.find(list);
@@ -103,9 +103,9 @@ std::string DescribePruned(const DtrSet& set) {
   const Json pruned = ParseJson(text, kWhere);
   std::ostringstream out;
   out.precision(3);
-  const auto loss_db = NumberAt(pruned, "loss_db"), most_db = NumberAt(pruned, "max_loss_db");
+  const auto loss_db = NumberAt(pruned, "loss_db"), max_db = NumberAt(pruned, "max_loss_db");
   out << "left out by dtr prune";
-  if (loss_db && most_db) out << ", " << *loss_db << " dB lost of " << *most_db << " allowed";
+  if (loss_db && max_db) out << ", " << *loss_db << " dB lost of " << *max_db << " allowed";
   out << ":\n";
   DescribeSteps(pruned, "removed", "", out);
   DescribeSteps(pruned, "put_back", "taken back: ", out);

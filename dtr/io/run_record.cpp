@@ -7,7 +7,7 @@
 namespace dtr::io {
 namespace {
 
-constexpr std::uintmax_t kMostRecordBytes = 64 << 20;
+constexpr std::uintmax_t kMaxRecordBytes = 64 << 20;
 
 double NumberOr0(const Json& object, const char* name) {
   const auto found = object.find(name);
@@ -26,9 +26,9 @@ std::vector<RunStage> ReadRunStages(const std::filesystem::path& set_folder) {
   const std::filesystem::path file = set_folder / "report" / "run.json";
   std::vector<RunStage> stages;
   if (!std::filesystem::exists(file)) return stages;
-  const Json record = Json::parse(ReadFile(file, kMostRecordBytes), nullptr, false);
+  const Json record = Json::parse(ReadFile(file, kMaxRecordBytes), nullptr, false);
   if (record.is_discarded()) {
-    throw Error(file.string() + ": expected JSON, found something else; remove it or build anew");
+    throw Error(file.string() + ": expected JSON, found something else; remove it or build again");
   }
   if (!record.is_object() || !record.contains("stages") || !record["stages"].is_array()) {
     return stages;

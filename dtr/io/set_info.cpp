@@ -16,7 +16,7 @@
 #include "dtr/io/pruned.h"
 #include "dtr/io/set_io.h"
 #include "dtr/io/set_json.h"
-#include "dtr/io/verdict.h"
+#include "dtr/io/validation_result.h"
 
 namespace dtr::io {
 namespace {
@@ -78,7 +78,7 @@ std::string VerdictLine(const DtrSet& set) {
   std::string failed;
   const auto tests = verdict.find("tests");
   for (const Json& test : tests != verdict.end() && tests->is_array() ? *tests : Json::array()) {
-    // A verdict of another form, from another tool, is no reason to refuse the set.
+    // A validation result of another form, from another tool, is no reason to reject the set.
     const bool known = test.is_object() && test.contains("passed") && test.contains("name") &&
                        test["passed"] == false && test["name"].is_string();
     if (known) failed += (failed.empty() ? "" : ", ") + test["name"].get<std::string>();
@@ -111,9 +111,9 @@ std::string RigLine(const DtrSet& set) {
     line << between << camera["name"].get<std::string>();
     between = ", ";
   }
-  line << "; places and scale are the rig's";
+  line << "; positions and scale are the rig's";
   if (part(rig, "frames").is_number() && part(rig, "scale_spread").is_number()) {
-    line << ", " << rig["frames"] << " instants, whose scales scatter by "
+    line << ", " << rig["frames"] << " time steps, whose scales scatter by "
          << 100 * rig["scale_spread"].get<double>() << " %";
   }
   return line.str() + "\n";

@@ -143,8 +143,8 @@ class SetWriter {
   std::unique_ptr<State> state_;
 };
 
-/// Writes set.json anew in a finished set, atomically, for changes that touch metadata only (a
-/// verdict, a baseline). Files are not touched; unknown fields stay. Throws like ReadSet.
+/// Writes set.json again in a finished set, atomically, for changes that touch metadata only (a
+/// validation result, a baseline). Files are not touched; unknown fields stay. Throws like ReadSet.
 void RewriteMetadata(const std::filesystem::path& set_folder, const DtrSet& set);
 
 /// What a stage of a run cost.
@@ -168,8 +168,8 @@ void WriteRunRecord(const std::filesystem::path& set_folder, const RunRecord& re
 
 /// For people: a summary and one line per view.
 std::string DescribeSet(const DtrSet& set);
-/// For machines, the output of `dtr info --json`: `unit`, `verdict`, `views[].{id, name, role,
-/// width_px, height_px, ...}` over all frames; pretty-printed.
+/// For machines, the output of `dtr info --json`: `unit`, `validation result`, `views[].{id, name,
+/// role, width_px, height_px, ...}` over all frames; pretty-printed.
 std::string InfoJson(const DtrSet& set);
 
 }  // namespace dtr::io

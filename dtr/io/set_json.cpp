@@ -296,7 +296,7 @@ Json ToJson(const Frame& frame) {
 
 std::string ObjectText(const JsonObject& root, const std::string& key) {
   if (!root.Has(key)) return "{}";
-  (void)root.Object(key);  // refuses anything else
+  (void)root.Object(key);  // rejects anything else
   return root.Value(key).dump();
 }
 
@@ -375,7 +375,7 @@ std::string JsonFromSet(const DtrSet& set, const std::string& file) {
   root["verdict"] = ParseJson(set.verdict_json, file + ": verdict");
   Restore(root, set.extra_json, {"bounds", "sparse"});
   const std::string text = PrettyJson(root, file);
-  SetFromJson(text, file);  // NaN turns into null here and is refused with its field
+  SetFromJson(text, file);  // NaN turns into null here and is rejected with its field
   return text;
 }
 

@@ -66,7 +66,7 @@ std::optional<StoredMesh> UsableMesh(const fs::path& set_folder, const View& vie
     problem = error.what();
   }
   options.warn("WARNING: " + view.name +
-               ": its reduced mesh is left out and made anew: " + problem);
+               ": its reduced mesh is left out and made again: " + problem);
   return std::nullopt;
 }
 

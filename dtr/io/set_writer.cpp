@@ -169,13 +169,13 @@ void SetWriter::State::ExpectReplaceable() const {
     throw UsageError(target.string() + ": expected a D+TR set to replace, found something else; " +
                      "it is left alone");
   }
-  RefuseForeign(target, [](const std::string& name) {
+  RejectForeign(target, [](const std::string& name) {
     return name == kSetFile || name == kSparseFile || name == kReportFolder ||
            std::find(std::begin(kPixelFolders), std::end(kPixelFolders), name) !=
                std::end(kPixelFolders);
   });
   if (fs::is_directory(target / kReportFolder)) {
-    RefuseForeign(target / kReportFolder, [](const std::string& name) {
+    RejectForeign(target / kReportFolder, [](const std::string& name) {
       return name == "index.html" || name == "run.json";
     });
   }

@@ -41,24 +41,24 @@ class SparseBytes {
 
 // The rules that writer and reader share.
 void ExpectGood(const fs::path& file, const SparseScene& scene) {
-  const auto refuse = [&](const std::string& what, size_t index, const std::string& expected) {
+  const auto reject = [&](const std::string& what, size_t index, const std::string& expected) {
     throw Error(file.string() + ": " + what + " " + std::to_string(index) + ": expected " +
                 expected);
   };
   for (size_t i = 0; i < scene.points.size(); ++i) {
-    if (!scene.points[i].p_in_world.allFinite()) refuse("point", i, "finite coordinates");
+    if (!scene.points[i].p_in_world.allFinite()) reject("point", i, "finite coordinates");
   }
   for (size_t i = 0; i < scene.observations.size(); ++i) {
     const SparseObservation& seen = scene.observations[i];
-    if (seen.view < 0) refuse("observation", i, "a view index of at least 0");
+    if (seen.view < 0) reject("observation", i, "a view index of at least 0");
     if (seen.point < 0 || static_cast<size_t>(seen.point) >= scene.points.size()) {
-      refuse("observation", i, "a point index below " + std::to_string(scene.points.size()));
+      reject("observation", i, "a point index below " + std::to_string(scene.points.size()));
     }
-    if (!seen.pixel.allFinite()) refuse("observation", i, "a finite pixel");
+    if (!seen.pixel.allFinite()) reject("observation", i, "a finite pixel");
     if (i == 0) continue;
     const SparseObservation& before = scene.observations[i - 1];
     if (std::pair(seen.view, seen.point) < std::pair(before.view, before.point)) {
-      refuse("observation", i, "the order (view, point)");
+      reject("observation", i, "the order (view, point)");
     }
   }
 }

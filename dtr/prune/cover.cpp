@@ -13,11 +13,11 @@ namespace dtr::prune {
 namespace {
 
 constexpr int kPlacesAlongTile = 8;
-constexpr double kMostPlaces = 65536;  // of a view: what memory and time are for
-constexpr double kWithinPx = 1;        // of disparity; SPEC 5.2 holds a surface as far
+constexpr double kMaxPlaces = 65536;  // of a view: what memory and time are for
+constexpr double kWithinPx = 1;       // of disparity; SPEC 5.2 holds a surface as far
 // Pixels of a coverer on the area of one of the view's: 1.5 times as coarse per axis shows as blur
 // of less than what resampling costs.
-constexpr double kLeastDensity = 1 / (1.5 * 1.5);
+constexpr double kMinDensity = 1 / (1.5 * 1.5);
 
 bool IsUsable(const View& view, int depth_x, int depth_y) {
   const int s = view.depth_scale;
@@ -49,7 +49,7 @@ std::vector<int> CoverNeighboursOf(int index, const std::vector<const View*>& vi
     angles.emplace_back(AngleBetween(centre - target, other - target), i);
   }
   std::sort(angles.begin(), angles.end());
-  angles.resize(std::min<size_t>(angles.size(), kMostCoverers));
+  angles.resize(std::min<size_t>(angles.size(), kMaxCoverers));
   std::vector<int> neighbours;
   for (const auto& [angle, i] : angles) neighbours.push_back(i);
   return neighbours;
@@ -139,7 +139,7 @@ class PlaceFinder {
     const Eigen::Vector2d du = *u - *pixel, dv = *v - *pixel;
     // Negative: the other sees the surface's back.
     const double per_pixel = other.depth_scale / static_cast<double>(view_.depth_scale);
-    if (du.x() * dv.y() - du.y() * dv.x() < kLeastDensity / (per_pixel * per_pixel)) {
+    if (du.x() * dv.y() - du.y() * dv.x() < kMinDensity / (per_pixel * per_pixel)) {
       return std::nullopt;
     }
     const auto seen = ColourAt(other, other.depth_scale * *pixel, false);
@@ -166,7 +166,7 @@ class PlaceFinder {
 TileGrid TileGridOf(const View& view) {
   TileGrid grid;
   const double width = view.depth.width(), height = view.depth.height();
-  while (width * height > kMostPlaces * grid.step_px * grid.step_px) grid.step_px += 4;
+  while (width * height > kMaxPlaces * grid.step_px * grid.step_px) grid.step_px += 4;
   grid.columns = (view.depth.width() + grid.size_px() - 1) / grid.size_px();
   grid.rows = (view.depth.height() + grid.size_px() - 1) / grid.size_px();
   static_assert(kPlacesAlongTile == 8);

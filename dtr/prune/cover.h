@@ -27,13 +27,13 @@ struct Coverer {
   float squared_difference = 0;  ///< of the colours there, 8-bit values, mean of the channels
 };
 
-inline constexpr int kMostCoverers = 6;
+inline constexpr int kMaxCoverers = 6;
 
 /// A place of a view that has depth: its coverers, `count` of them.
 struct CoveredPlace {
   std::int32_t tile = -1;
   std::uint8_t count = 0;
-  std::array<Coverer, kMostCoverers> coverers;
+  std::array<Coverer, kMaxCoverers> coverers;
 };
 
 struct CoveredView {

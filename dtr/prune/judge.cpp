@@ -10,7 +10,7 @@
 namespace dtr::prune {
 namespace {
 
-// Equal pictures have no error at all; one that is smaller than this no eye and no 8 bits show.
+// Equal images have no error at all; one that is smaller than this no eye and no 8 bits show.
 constexpr double kSmallestError = 1e-3;
 
 double MeanOf(const eval::SquaredError& error) {
@@ -32,7 +32,7 @@ std::vector<Place> HeldOutPlaces(const DtrSet& set) {
 
 namespace {
 
-/// A part of a picture: the n-th of crop x crop, over and over.
+/// A part of an image: the n-th of crop x crop, over and over.
 struct WindowOf {
   WindowOf(const PinholeCamera& whole, int n, int crop)
       : width(std::max(1, whole.width_px() / crop)),
@@ -130,7 +130,7 @@ std::vector<ImageRgb8> Pictures(const DtrSet& set, std::span<const std::string> 
 
 double Errors::NewErrorShare() const {
   if (!(change > 0)) return 1;
-  return std::max(kLeastShare, (after - before) / change);
+  return std::max(kMinShare, (after - before) / change);
 }
 
 Errors CompareWithPhotos(std::span<const Place> places, std::span<const ImageRgb8> before,

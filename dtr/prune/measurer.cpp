@@ -94,7 +94,7 @@ void Measurer::Prepare() {
   whole.coding.mesh_tolerance_px = options_.render.mesh_tolerance_px;
   whole.coding.mesh_resolution = options_.render.resolution;
   const Coded coded = CodedAs(whole.coding);
-  progress_.Note("pictures of the whole set");
+  progress_.Note("images of the whole set");
   const DtrSet& set = coded->set;
   deciding_.places = LeftOutPlaces(set, options_.probes, options_.probe_crop);
   deciding_novel_.places = NovelPlaces(Windows(

@@ -35,15 +35,15 @@ struct Check {
   double probe_loss_db = 0, probe_error_db = 0;  ///< mean over places, and its standard error
   double witness_loss_db = 0, witness_error_db = 0;
   std::optional<double> photo_loss_db, photo_frame_loss_db;
-  double error_db = 0;  ///< PSNR of the witnesses' pictures before
+  double error_db = 0;  ///< PSNR of the witnesses' images before
   /// Few places can be lucky: a loss is taken for as large as it may well be elsewhere. Two
   /// standard errors above the mean from between the cameras, as many as one likes; one above it
   /// where photos are: these are few, differ more from each other than what is lost, and two would
-  /// refuse steps that photos gain by.
-  bool Holds(double most_db) const { return RoomDb(most_db) >= 0; }
+  /// reject steps that photos gain by.
+  bool Holds(double max_db) const { return RoomDb(max_db) >= 0; }
   /// What may be lost on top before it holds no longer.
-  double RoomDb(double most_db) const {
-    return most_db -
+  double RoomDb(double max_db) const {
+    return max_db -
            std::max(probe_loss_db + 2 * probe_error_db, witness_loss_db + witness_error_db);
   }
 };
@@ -71,7 +71,7 @@ class Measurer {
 
   /// At the deciding places: the larger of the losses at photos and from novel cameras.
   Measured Measure(const Setting& setting);
-  /// Without looking: for what no picture shows.
+  /// Without looking: for what no image shows.
   double BytesOf(const Setting& setting);
   Check CheckOf(const Setting& setting);
   /// Keeps this setting's set in memory: the next ones are tried beside it.
@@ -98,7 +98,7 @@ class Measurer {
   std::vector<double> NovelLossesDb(Looks& looks, const Setting& setting,
                                     const Errors& with_all_at_photos);
   const std::vector<ImageRgb8>& KeptPictures(Looks& looks, const Setting& kept);
-  /// Pictures of the whole set, once they are needed.
+  /// Images of the whole set, once they are needed.
   void Prepare();
   std::vector<ImageRgb8> PicturesOf(const Setting& setting, const Coded& coded, const Looks& looks,
                                     std::vector<Mask>* coverage = nullptr);

@@ -11,17 +11,17 @@
 namespace dtr::prune {
 namespace {
 
-// Windows of pictures from few places decide, others check: a decided loss this much smaller than
+// Windows of images from few places decide, others check: a decided loss this much smaller than
 // the budget mostly holds at once.
 constexpr double kDecidingShare = 0.85;
-constexpr int kMostTriedAgain = 24;  // decisions after one that was at fault
+constexpr int kMaxTriedAgain = 24;  // decisions after one that was at fault
 // What was taken back, and what a check finds cheaper than the places that decide, leaves room for
-// others: so often decisions are made and checked anew.
-constexpr int kMostPasses = 4;
+// others: so often decisions are made and checked again.
+constexpr int kMaxPasses = 4;
 // Differences of a loss below this are chance; without a floor, what costs nothing would divide by
 // 0.
 constexpr double kSmallestLossDb = 1e-3;
-constexpr size_t kFewestViews = 3;  // where one is left out to look from its place, two remain
+constexpr size_t kMinViews = 3;  // where one is left out to look from its place, two remain
 // Of ln(before / after), where the square root of it starts to flatten: what was saved of one kind
 // (bytes, work) makes more of the same worth less, so that a set is not made small alone.
 constexpr double kFirstSaving = 0.1;
@@ -65,7 +65,7 @@ class Pruner {
 
   PruneReport Run() {
     Begin();
-    for (int pass = 0; pass < kMostPasses; ++pass) {
+    for (int pass = 0; pass < kMaxPasses; ++pass) {
       const size_t verified = pass == 0 ? 0 : report_.removed.size();
       if (pass > 0) {
         // The check sees other places than those that decide, and may leave more room than these.
@@ -160,7 +160,7 @@ class Pruner {
     const auto after = mover_.After(history_.back(), candidate.move);
     candidate.worth = -std::numeric_limits<double>::infinity();
     candidate.measured.loss_db = std::numeric_limits<double>::infinity();
-    if (!after || mover_.SourcesLeft(*after) < kFewestViews) return;
+    if (!after || mover_.SourcesLeft(*after) < kMinViews) return;
     candidate.after = *after;
     candidate.measured = measurer_.Measure(*after);
     const double saving = Saved(candidate.measured) - Saved(now_);
@@ -264,7 +264,7 @@ class Pruner {
   /// decisions. The first `verified` hold. The decision after that run is at fault; of those that
   /// came later each is tried again without it. True when some were taken back.
   bool CheckFrom(size_t verified) {
-    progress_.Stage("checking from other places", 0);
+    progress_.Stage("checking from other positions", 0);
     size_t holds = verified, fails = history_.size();
     if (verified == 0) Accept(CheckAloud(history_.front(), "the whole set"));
     for (size_t next = history_.size() - 1; holds < next; next = (holds + fails) / 2) {
@@ -289,7 +289,7 @@ class Pruner {
     int tries = 0;
     for (size_t n = holds; n < decisions.size(); ++n) {
       const Setting candidate = Redone(history_.back(), history[n], history[n + 1]);
-      const bool tried = n > holds && tries < kMostTriedAgain;
+      const bool tried = n > holds && tries < kMaxTriedAgain;
       const Check check = tried ? CheckAloud(candidate, "again " + decisions[n].what) : Check{};
       tries += tried;
       if (tried && check.Holds(options_.max_loss_db)) {

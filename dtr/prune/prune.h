@@ -1,4 +1,4 @@
-// dtr/prune/prune.h -- what can be left out of a set without its pictures getting worse by more
+// dtr/prune/prune.h -- what can be left out of a set without its images getting worse by more
 // than a given loss.
 #pragma once
 #include <cstdint>
@@ -18,7 +18,7 @@ struct PruneOptions {
   double max_loss_db = 0.1;
   int probes = 12;       ///< source views whose photos decide, each left out in turn
   int checks = 8;        ///< novel cameras that decide, and as many others that check
-  int probe_crop = 2;    ///< of deciding pictures a window of 1/this per axis counts
+  int probe_crop = 2;    ///< of deciding images a window of 1/this per axis counts
   RenderOptions render;  ///< what the set is drawn with before
   std::uint64_t seed = 0;
   /// Enough is left out when the set takes at most so many bytes and its frames this share of
@@ -43,7 +43,7 @@ struct PruneReport {
   std::vector<Removal> removed;
   std::vector<Removal> put_back;  ///< decided, but the check did not bear it out
   double decided_loss_db = 0;     ///< of `removed`, at the deciding places
-  /// Whole pictures, at cameras that decided nothing, and the standard error of that mean.
+  /// Whole images, at cameras that decided nothing, and the standard error of that mean.
   double checked_probe_loss_db = 0, probe_error_db = 0;
   /// Mean over photos of source views that did not decide (of all, where all decide).
   double witness_loss_db = 0, witness_error_db = 0;
@@ -61,7 +61,7 @@ struct PruneReport {
 /// work per dB that it is measured to cost, until nothing fits the loss. What it costs is the
 /// larger loss of two: at source views left out in turn, and between input cameras. `set`: loaded
 /// with images and depth, and held-out photos where it has some: they only judge. The outcome is
-/// then looked at anew, at full size, from other cameras and against the photos, and the last
+/// then looked at again, at full size, from other cameras and against the photos, and the last
 /// decisions are taken back until the loss holds; then it goes on without these, a few times.
 /// Depends on the set, the options and the renderer alone, not on threads or times, nor on how
 /// often it was interrupted.

@@ -27,7 +27,7 @@ inline constexpr std::array kLevelled = {Kind::kTiles,  Kind::kViewsUsed, Kind::
                                          Kind::kMesh};
 const char* NameOf(Kind kind);
 
-/// Steps of each kind, dearest first. Of `tiles`: 1 + the index of a rule.
+/// Steps of each kind, most expensive first. Of `tiles`: 1 + the index of a rule.
 std::vector<double> LevelsOf(Kind kind);
 /// True where all levels are tried at once: they may pay where the first of them does not.
 bool MaySkipLevels(Kind kind);

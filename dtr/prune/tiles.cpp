@@ -6,7 +6,7 @@
 namespace dtr::prune {
 namespace {
 
-constexpr double kLeastCovered = 0.95;  // of a tile's places; the rest is holes and outlines
+constexpr double kMinCovered = 0.95;  // of a tile's places; the rest is holes and outlines
 
 /// Chooses tiles, keeping count of who still covers what.
 class TileChooser {
@@ -75,7 +75,7 @@ class TileChooser {
       ++covered;
       squared += SquaredDifference(view.places[p]);
     }
-    return covered > 0 && covered >= kLeastCovered * places &&
+    return covered > 0 && covered >= kMinCovered * places &&
            squared <= rule_.levels * rule_.levels * covered;
   }
 

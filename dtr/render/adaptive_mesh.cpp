@@ -13,7 +13,7 @@ namespace {
 
 using Rectangle = BlockCover::Rectangle;
 using Range = AdaptiveMesh::Range;
-constexpr int kMostSideSamples = 32767;  // a side; positions in half samples fit 16 bits
+constexpr int kMaxSideSamples = 32767;  // a side; positions in half samples fit 16 bits
 constexpr int kTileSide = AdaptiveMesh::kTileSide;
 static_assert(kTileSide % BlockCover::kRootSide == 0, "a rectangle lies in one tile");
 
@@ -288,8 +288,8 @@ AdaptiveMesh MakeAdaptiveMesh(const SampleGrid& samples, const BreakRule& rule,
                 std::to_string(w.height()) + " samples, found " + std::to_string(cover.columns) +
                 "x" + std::to_string(cover.rows));
   }
-  if (w.width() > kMostSideSamples || w.height() > kMostSideSamples) {
-    throw Error("reduced mesh: expected at most " + std::to_string(kMostSideSamples) +
+  if (w.width() > kMaxSideSamples || w.height() > kMaxSideSamples) {
+    throw Error("reduced mesh: expected at most " + std::to_string(kMaxSideSamples) +
                 " depth samples a side, found " + std::to_string(w.width()) + "x" +
                 std::to_string(w.height()) + "; use a larger --resolution");
   }

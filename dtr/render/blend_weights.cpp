@@ -12,7 +12,7 @@ namespace {
 constexpr double kNoWeight = -std::numeric_limits<double>::infinity();
 
 // SPEC 4.8: stands for the other views where there are none.
-constexpr double kLeastOthers = 1e-6;
+constexpr double kMinOthers = 1e-6;
 
 double LogOrNone(double weight) { return weight > 0 ? std::log(weight) : kNoWeight; }
 
@@ -108,7 +108,7 @@ void FadeShares(std::span<const double> factors, std::span<double> shares) {
   bool fades = false;
   for (size_t i = 0; i < shares.size(); ++i) {
     fades = fades || factors[i] < 1;
-    const double others = 1 - shares[i] + kLeastOthers;
+    const double others = 1 - shares[i] + kMinOthers;
     shares[i] *= factors[i] * others / (others + (1 - factors[i]) * shares[i]);
   }
   if (fades) DivideBySum(shares);

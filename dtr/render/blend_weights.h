@@ -7,7 +7,7 @@
 
 namespace dtr {
 
-/// Parameters of a weight that do not change within one picture.
+/// Parameters of a weight that do not change within one image.
 struct BlendParameters {
   BlendWeight blend = BlendWeight::kCosine;
   double exponent = 8, falloff = 8;

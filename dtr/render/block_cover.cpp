@@ -13,7 +13,7 @@ constexpr int kRootSide = BlockCover::kRootSide;
 // Smaller aligned squares would leave more pieces than they save corners.
 constexpr int kSmallestSquare = 8;
 // Beside depth breaks smaller pieces are left to the cells of their samples.
-constexpr int kFewestBlocks = 3;
+constexpr int kMinBlocks = 3;
 constexpr BlockTriangles kBothTriangles{{kA | kB | kD, kA | kD | kC}};
 
 /// Covers one root square.
@@ -104,7 +104,7 @@ class RootMaker {
       if (width * height > best_width * best_height) best_width = width, best_height = height;
     }
     // Cells do for the crumbs beside breaks, and cost less than their triangles.
-    if (best_width * best_height < kFewestBlocks && IsBesideBreak(i, j)) return;
+    if (best_width * best_height < kMinBlocks && IsBesideBreak(i, j)) return;
     Take(i, j, best_width, best_height);
   }
 

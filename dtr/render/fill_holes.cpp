@@ -11,7 +11,7 @@
 namespace dtr {
 namespace {
 
-/// What is known of a picture: plane z where its colour stands, 0 at a hole.
+/// What is known of an image: plane z where its colour stands, 0 at a hole.
 using KnownDepth = Grid<float>;
 
 constexpr std::uint8_t kHole = 255;
@@ -154,7 +154,7 @@ class HoleRow {
     }
   }
 
-  /// Only where something of the guess remains. As the picture would show it alone, in 8 bits.
+  /// Only where something of the guess remains. As the image would show it alone, in 8 bits.
   void AskAtGuesses() {
     const auto needed = [](const Hole& hole) {
       return hole.guess > 0 && (hole.rest > 0 || !(hole.answered > 0));

@@ -9,7 +9,7 @@
 namespace dtr {
 namespace {
 
-// Far beyond any photo; refuses a slip of the pen before memory is asked for.
+// Far beyond any photo; rejects a slip of the pen before memory is asked for.
 constexpr long long kMaxNovelPixels = 1LL << 28;
 // Surfaces nearer to the novel camera than this share of the view's baseline are cut (SPEC 2.5).
 constexpr double kNearPlaneShare = 1e-3;
@@ -18,7 +18,7 @@ constexpr double kNearPlaneShare = 1e-3;
 
 void CheckNovelCamera(const PinholeCamera& novel, const Pose& novel_from_world) {
   if (static_cast<long long>(novel.width_px()) * novel.height_px() > kMaxNovelPixels) {
-    throw UsageError("picture: expected at most 2^28 pixels, found " +
+    throw UsageError("image: expected at most 2^28 pixels, found " +
                      std::to_string(novel.width_px()) + "x" + std::to_string(novel.height_px()) +
                      "; give a smaller --size");
   }

@@ -1,4 +1,4 @@
-// dtr/render/frame.h -- the parts of drawing one picture that every renderer has in common.
+// dtr/render/frame.h -- the parts of drawing one image that every renderer has in common.
 #pragma once
 #include <Eigen/Core>
 #include <cstddef>
@@ -14,7 +14,7 @@
 
 namespace dtr {
 
-/// Throws dtr::UsageError for pictures beyond 2^28 pixels and dtr::Error for a pose that is not
+/// Throws dtr::UsageError for images beyond 2^28 pixels and dtr::Error for a pose that is not
 /// finite or has no rotation.
 void CheckNovelCamera(const PinholeCamera& novel, const Pose& novel_from_world);
 

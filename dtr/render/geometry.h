@@ -23,7 +23,7 @@ inline constexpr double kQuickAngleSeries[] = {0.0028662257,  -0.0161657367, 0.0
                                                0.1999355085,  -0.3333314528, 1};
 
 /// The same angle from the length of the cross product (not negative) and the dot product, to
-/// within 2e-8 rad and at a quarter of the cost: for weights, of which a picture needs millions.
+/// within 2e-8 rad and at a quarter of the cost: for weights, of which an image needs millions.
 inline double QuickAngle(double cross_length, double dot) {
   const double side = std::abs(dot);
   const double longer = std::max(cross_length, side);

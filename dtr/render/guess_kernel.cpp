@@ -17,9 +17,9 @@
 HWY_BEFORE_NAMESPACE();
 namespace dtr::HWY_NAMESPACE {
 
-// Products and sums apart, never fused: pictures are the same on every processor.
-constexpr int kTriedDepths = 8;      // SPEC 7.2
-constexpr double kLeastFade = 1e-3;  // a lone view answers too
+// Products and sums apart, never fused: images are the same on every processor.
+constexpr int kTriedDepths = 8;    // SPEC 7.2
+constexpr double kMinFade = 1e-3;  // a lone view answers too
 
 HWY_INLINE VD Constant(double value) { return hn::Set(DD(), value); }
 
@@ -121,7 +121,7 @@ HWY_INLINE VD FadeAtRim(const GuessView& view, VD x, VD y) {
   const VD lower = hn::Sub(Constant(view.height_px), y);
   const VD to_rim = hn::Min(hn::Min(x, y), hn::Min(right, lower));
   const VD share = hn::Div(to_rim, Constant(view.fade_width_px));
-  const VD t = hn::Min(hn::Max(share, Constant(kLeastFade)), Constant(1));
+  const VD t = hn::Min(hn::Max(share, Constant(kMinFade)), Constant(1));
   return hn::Mul(hn::Mul(t, t), hn::Sub(Constant(3), hn::Mul(Constant(2), t)));
 }
 

@@ -58,7 +58,7 @@ void AnglesOfViews(std::span<const GuessView> views, const GuessRow& row, const 
 /// Fills in the shares of the weight `inverse-angle`, as BlendShares has them.
 void ShareByInverseAngle(double pixel_angle_rad, int power, GuessAnswers& answers);
 
-/// The views' colours in the picture's exposure, blended; `answered`: 1 where some view answered,
+/// The views' colours in the image's exposure, blended; `answered`: 1 where some view answered,
 /// else 0.
 void MixAnswers(std::span<const GuessView> views, GuessAnswers& answers, GuessLanes (&rgb)[3],
                 GuessLanes& answered);

@@ -12,9 +12,9 @@ namespace dtr {
 namespace {
 
 // SPEC 7.4.
-constexpr double kExposureSamples = 20000, kNearWhite = 0.85, kMostExposure = 2,
+constexpr double kExposureSamples = 20000, kNearWhite = 0.85, kMaxExposure = 2,
                  kExposureNoise = 0.01;
-constexpr int kFewestExposed = 200;
+constexpr int kMinExposed = 200;
 constexpr double kRimShare = 0.05;  // of the shorter side
 
 Eigen::Matrix3d CalibrationOf(const PinholeCamera& camera) {
@@ -53,7 +53,7 @@ bool ColourOf(const GuessedColours::Placed& placed, const Eigen::Vector2d& pixel
   return true;
 }
 
-/// What the view shows of a surface that the picture shows at a pixel; none where it measured
+/// What the view shows of a surface that the image shows at a pixel; none where it measured
 /// another.
 std::optional<Eigen::Vector3d> ColourOfSurface(const GuessedColours::Placed& placed, int x, int y,
                                                double inverse_depth) {
@@ -116,11 +116,11 @@ void GuessedColours::MatchExposures(const Grid<float>& seen, const ImageRgb8& im
         ++count;
       }
     }
-    if (count < kFewestExposed) return;
+    if (count < kMinExposed) return;
     for (int c = 0; c < 3; ++c) {
       if (!(in_view[c] > 0)) continue;
       const double exposure =
-          std::clamp(in_picture[c] / in_view[c], 1 / kMostExposure, kMostExposure);
+          std::clamp(in_picture[c] / in_view[c], 1 / kMaxExposure, kMaxExposure);
       if (std::abs(exposure - 1) > kExposureNoise) placed.exposure[c] = exposure;
     }
   });

@@ -24,7 +24,7 @@ inline double Exposed(double linear, double exposure) {
   return exposure * linear / std::sqrt(std::sqrt(1 + (fourth(exposure) - 1) * fourth(linear)));
 }
 
-/// The views of one picture, asked pixel by pixel. The views must outlive it.
+/// The views of one image, asked pixel by pixel. The views must outlive it.
 class GuessedColours {
  public:
   /// Asks the first K of `views_used` (indices into the scene, nearest first).
@@ -42,8 +42,8 @@ class GuessedColours {
     Eigen::Vector3d exposure = Eigen::Vector3d::Ones();  ///< as Exposed takes it
     std::array<std::array<double, 256>, 3> linear{};     ///< of the photo's values: LinearAfterGain
   };
-  /// SPEC 7.4: the views in the picture's exposure from here on. `seen`: plane z, 0 at holes;
-  /// `image`: the picture.
+  /// SPEC 7.4: the views in the image's exposure from here on. `seen`: plane z, 0 at holes;
+  /// `image`: the image.
   void MatchExposures(const Grid<float>& seen, const ImageRgb8& image, int threads);
 
   /// In the order of the ids.

@@ -10,7 +10,7 @@ namespace dtr {
 namespace {
 
 constexpr int kCellPx = 8, kMaxCells = 1 << 15;
-/// The photo, in the picture's exposure.
+/// The photo, in the image's exposure.
 Grid<float> InExposure(const ShrunkPhoto& photo, const Eigen::Vector3d& exposure) {
   Grid<float> picture(photo.light.width(), photo.light.height(), 4);
   for (int y = 0; y < picture.height(); ++y) {

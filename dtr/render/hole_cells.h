@@ -1,4 +1,4 @@
-// dtr/render/hole_cells.h -- SPEC 7.3: a picture in cells, and what it costs to put one of them at
+// dtr/render/hole_cells.h -- SPEC 7.3: an image in cells, and what it costs to put one of them at
 // a depth.
 #pragma once
 #include <span>
@@ -11,12 +11,12 @@
 
 namespace dtr {
 
-/// Squares of pixels of a picture with holes. Costs are in levels of sRGB.
+/// Squares of pixels of an image with holes. Costs are in levels of sRGB.
 class HoleCells {
  public:
-  static constexpr float kMostCost = kMostHoleCost;
+  static constexpr float kMaxCost = kMaxHoleCost;
 
-  /// `seen`: plane z where the picture was seen, 0 at holes. What is passed must outlive the cells.
+  /// `seen`: plane z where the image was seen, 0 at holes. What is passed must outlive the cells.
   /// Does not depend on the number of threads.
   HoleCells(const Grid<float>& seen, const GuessedColours& guesses, ShrunkPhotos& photos,
             int threads);

@@ -19,7 +19,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace dtr::HWY_NAMESPACE {
 
-// Products and sums apart, never fused: pictures are the same on every processor.
+// Products and sums apart, never fused: images are the same on every processor.
 using DF = hn::Rebind<float, DD>;
 using DI = hn::Rebind<std::int32_t, DD>;
 
@@ -190,10 +190,10 @@ HWY_INLINE void CostsOfLanes(const CostPlace& place, std::span<const CostView> v
   hn::Store(hn::Div(through, asked), d, seen_through);
   hn::Store(asked, d, says);
   for (size_t lane = 0; lane < kLanes; ++lane) {
-    float cost = kMostHoleCost;
+    float cost = kMaxHoleCost;
     if (counts[lane] == 1) cost = kOneViewCost;
-    if (counts[lane] > 1) cost = std::min(kMostHoleCost, static_cast<float>(differences[lane]));
-    if (says[lane] > 0) cost += kMostHoleCost * static_cast<float>(seen_through[lane]);
+    if (counts[lane] > 1) cost = std::min(kMaxHoleCost, static_cast<float>(differences[lane]));
+    if (says[lane] > 0) cost += kMaxHoleCost * static_cast<float>(seen_through[lane]);
     costs[lane] = cost;
   }
 }

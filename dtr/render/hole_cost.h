@@ -7,7 +7,7 @@
 
 namespace dtr {
 
-/// A view as it is asked about a position of the picture.
+/// A view as it is asked about a position of the image.
 struct CostView {
   double pixel_at_infinity[3], pixel_per_inverse_depth[3];  ///< homogeneous pixel of the view
   double centre[3];                                         ///< in the novel frame
@@ -19,13 +19,13 @@ struct CostView {
   int cell_columns, cell_rows;
 };
 
-/// A position of the picture.
+/// A position of the image.
 struct CostPlace {
   double ray[3], ray_squared;  ///< z = 1
   int cell_px;                 ///< of the views' cells
 };
 
-constexpr float kMostHoleCost = 40;  ///< levels of sRGB
+constexpr float kMaxHoleCost = 40;  ///< levels of sRGB
 
 /// costs[i] of inverse_depths[i]. The same bytes whatever the processor's vectors hold.
 void HoleCosts(const CostPlace& place, std::span<const CostView> views,

@@ -11,12 +11,12 @@
 namespace dtr {
 namespace {
 
-constexpr int kMostPlanes = 8, kTrials = 600, kFits = 5, kDraws = 8;
-constexpr double kMostSamples = 6000;
-constexpr double kLeastShare = 0.01;   // of the samples, for a plane
-constexpr double kCloser = 0.6;        // from one fit to the next
-constexpr double kReach = 0.4;         // of the longer side, from a triple's first position
-constexpr double kLeastArea = 0.0004;  // of all, of a triple's triangle
+constexpr int kMaxPlanes = 8, kTrials = 600, kFits = 5, kDraws = 8;
+constexpr double kMaxSamples = 6000;
+constexpr double kMinShare = 0.01;   // of the samples, for a plane
+constexpr double kCloser = 0.6;      // from one fit to the next
+constexpr double kReach = 0.4;       // of the longer side, from a triple's first position
+constexpr double kMinArea = 0.0004;  // of all, of a triple's triangle
 
 /// Samples, and where each lies among all positions that may have one.
 struct PlacedSamples : PlaneSamples {
@@ -34,7 +34,7 @@ struct PlacedSamples : PlaneSamples {
 
 PlacedSamples SamplesOf(const Grid<double>& inverse_depth) {
   const double count = static_cast<double>(inverse_depth.width()) * inverse_depth.height();
-  const int step = std::max(1, static_cast<int>(std::ceil(std::sqrt(count / kMostSamples))));
+  const int step = std::max(1, static_cast<int>(std::ceil(std::sqrt(count / kMaxSamples))));
   PlacedSamples samples;
   for (int y = step / 2; y < inverse_depth.height(); y += step) {
     for (int x = step / 2; x < inverse_depth.width(); x += step) {
@@ -88,7 +88,7 @@ struct Found {
   PicturePlane plane = PicturePlane::Zero();
   size_t support = 0;
 };
-Found BestOfTriples(const PlacedSamples& samples, double reach, double least_area, double tolerance,
+Found BestOfTriples(const PlacedSamples& samples, double reach, double min_area, double tolerance,
                     Random& random) {
   Found best;
   // Positions are drawn, not numbers of samples, and as many whatever is there: one sample more or
@@ -111,7 +111,7 @@ Found BestOfTriples(const PlacedSamples& samples, double reach, double least_are
     if ((b - a).norm() > reach || (c - a).norm() > reach) continue;
     Eigen::Matrix3d positions;
     positions << a.transpose(), b.transpose(), c.transpose();
-    if (std::abs(positions.determinant()) < 2 * least_area) continue;
+    if (std::abs(positions.determinant()) < 2 * min_area) continue;
     const std::vector<double>& w = samples.inverse_depth;
     const PicturePlane plane = positions.inverse() * Eigen::Vector3d(w[i], w[j], w[k]);
     const size_t support = PlaneSupport(samples, plane.x(), plane.y(), plane.z(), tolerance);
@@ -124,13 +124,13 @@ Found BestOfTriples(const PlacedSamples& samples, double reach, double least_are
 
 std::vector<PicturePlane> FindPlanes(const Grid<double>& inverse_depth, double tolerance) {
   PlacedSamples samples = SamplesOf(inverse_depth);
-  const auto least = static_cast<size_t>(kLeastShare * static_cast<double>(samples.size())) + 3;
+  const auto least = static_cast<size_t>(kMinShare * static_cast<double>(samples.size())) + 3;
   const double reach = kReach * std::max(inverse_depth.width(), inverse_depth.height());
-  const double least_area = kLeastArea * inverse_depth.width() * inverse_depth.height();
+  const double min_area = kMinArea * inverse_depth.width() * inverse_depth.height();
   Random random(1);
   std::vector<PicturePlane> planes;
-  while (static_cast<int>(planes.size()) < kMostPlanes && samples.size() >= least) {
-    const Found best = BestOfTriples(samples, reach, least_area, tolerance, random);
+  while (static_cast<int>(planes.size()) < kMaxPlanes && samples.size() >= least) {
+    const Found best = BestOfTriples(samples, reach, min_area, tolerance, random);
     if (best.support < least) break;
     planes.push_back(Fitted(best.plane, samples, tolerance));
     // What lies near it would only give the same plane again.

@@ -1,4 +1,4 @@
-// dtr/render/hole_planes.h -- SPEC 7.3: the planes that surfaces of a picture lie on.
+// dtr/render/hole_planes.h -- SPEC 7.3: the planes that surfaces of an image lie on.
 #pragma once
 #include <Eigen/Core>
 #include <vector>
@@ -7,10 +7,10 @@
 
 namespace dtr {
 
-/// A plane as inverse depth over a picture: 1/z at position (x, y) is plane . (x, y, 1).
+/// A plane as inverse depth over an image: 1/z at position (x, y) is plane . (x, y, 1).
 using PicturePlane = Eigen::Vector3d;
 
-/// The planes on which most of a picture lies, largest first, at most 8: one after the other by
+/// The planes on which most of an image lies, largest first, at most 8: one after the other by
 /// random triples of positions (RANSAC, Fischler and Bolles 1981), each fitted to what lies within
 /// `tolerance` of it. `inverse_depth`: 0 where nothing is known; its cells' centres are at
 /// (i + 0.5, j + 0.5). Equal inputs give equal planes.

@@ -13,7 +13,7 @@ namespace dtr {
 namespace {
 
 // SPEC 7.3. Costs are in levels of sRGB.
-constexpr float kMostCost = HoleCells::kMostCost;
+constexpr float kMaxCost = HoleCells::kMaxCost;
 constexpr int kMinDepths = 8, kMaxDepths = 256;
 constexpr double kBeyondFarthest = 0.1, kBeforeNearest = 4;  // of the seen range of 1/z
 constexpr double kStrayShare = 0.005;                        // seen depths left out at either end
@@ -78,12 +78,12 @@ class LargeHoles {
   }
   float CostOfGuess(int x, int y) const {
     const double guess = GuessAt(x, y);
-    return guess > 0 ? cells_.CostAt(cells_.Centre(x, y), guess) : 2 * kMostCost;
+    return guess > 0 ? cells_.CostAt(cells_.Centre(x, y), guess) : 2 * kMaxCost;
   }
   /// How far off what was seen of a cell an inverse depth is.
   float CostOfSeen(int x, int y, double inverse_depth) const {
     const double steps = std::abs(inverse_depth - cells_.known(x, y)) / depths_.step;
-    return kMostCost * static_cast<float>(std::min(1.0, steps / kAnchorSteps));
+    return kMaxCost * static_cast<float>(std::min(1.0, steps / kAnchorSteps));
   }
 
   /// 1/z of the cells: what was seen of them, else the depth that the views agree on; 0 where the
@@ -146,7 +146,7 @@ class LargeHoles {
         for (size_t k = 0; k < planes; ++k) {
           float cost = 0;
           if (seen > 0) cost += seen * CostOfSeen(x, y, w[k]);
-          if (hole > 0) cost += hole * (w[k] > 0 ? costs[k] + kPlaneBonus : 4 * kMostCost);
+          if (hole > 0) cost += hole * (w[k] > 0 ? costs[k] + kPlaneBonus : 4 * kMaxCost);
           choice.SetCost(x, y, k, cost);
         }
         // The guess goes on from what was seen: it costs nothing there.

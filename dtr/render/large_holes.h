@@ -10,7 +10,7 @@
 
 namespace dtr {
 
-/// Which of a picture's planes the cells of its holes lie on.
+/// Which of an image's planes the cells of its holes lie on.
 struct HolePlanes {
   static constexpr int kGuess = -1;
 
@@ -24,11 +24,11 @@ struct HolePlanes {
     std::array<double, 4> inverse_depth{}, share{};
   };
   /// At a pixel: what the four cells around chose, each as the bilinear weights say, so that
-  /// nothing of the cells shows in the picture.
+  /// nothing of the cells shows in the image.
   Mix At(int x, int y) const;
 };
 
-/// `seen`: plane z where the picture was seen, 0 at holes. `guessed`: the same with the guesses of
+/// `seen`: plane z where the image was seen, 0 at holes. `guessed`: the same with the guesses of
 /// SPEC 7.2. Empty where there is nothing to choose from. Bounded: at most 2^15 cells and 256
 /// inverse depths. Does not depend on the number of threads, nor on what `photos` kept before.
 HolePlanes ChooseHolePlanes(const Grid<float>& seen, const Grid<float>& guessed,

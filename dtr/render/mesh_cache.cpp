@@ -33,7 +33,7 @@ void MeshCache::Prepare(const std::vector<const View*>& views, const RenderOptio
   for (size_t k = 0; k < missing.size(); ++k) {
     if (unfit[k].empty()) continue;
     warn_("WARNING: " + missing[k]->name +
-          ": its stored mesh does not fit its depth map and was made anew: " + unfit[k]);
+          ": its stored mesh does not fit its depth map and was made again: " + unfit[k]);
   }
   for (size_t k = 0; k < missing.size(); ++k) {
     if (on_new_mesh_) on_new_mesh_(*missing[k], meshes[k]);

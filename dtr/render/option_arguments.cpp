@@ -20,9 +20,9 @@ double RadiansOf(double degrees) { return degrees * std::numbers::pi / 180; }
 
 /// Degrees with as few digits as come back as the same bits.
 std::string DegreesOf(double radians) {
-  constexpr int kMostDigits = 17;
+  constexpr int kMaxDigits = 17;
   const double degrees = radians * 180 / std::numbers::pi;
-  for (int digits = 1; digits <= kMostDigits; ++digits) {
+  for (int digits = 1; digits <= kMaxDigits; ++digits) {
     const double rounded = std::stod(fmt::format("{:.{}g}", degrees, digits));
     if (RadiansOf(rounded) == radians) return fmt::format("{}", rounded);
   }

@@ -1,11 +1,11 @@
-// dtr/render/plane_support.h -- how much of a picture lies on a plane, several samples at once.
+// dtr/render/plane_support.h -- how much of an image lies on a plane, several samples at once.
 #pragma once
 #include <cstddef>
 #include <vector>
 
 namespace dtr {
 
-/// Positions of a picture and their inverse depths.
+/// Positions of an image and their inverse depths.
 struct PlaneSamples {
   std::vector<double> x, y, inverse_depth;  ///< of equal length
   size_t size() const { return x.size(); }

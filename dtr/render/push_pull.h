@@ -15,9 +15,9 @@ enum class Favour {
   kNone,  ///< all alike
 };
 
-/// Which cells of each coarser level the holes of a picture draw on; the others are never made, so
-/// that a picture with few holes costs little more than looking for them. Level l has cells of 2^l
-/// pixels; level 0, the picture itself, is not stored.
+/// Which cells of each coarser level the holes of an image draw on; the others are never made, so
+/// that an image with few holes costs little more than looking for them. Level l has cells of 2^l
+/// pixels; level 0, the image itself, is not stored.
 class HolePyramid {
  public:
   /// `hole` is not 0 where a pixel is unknown.
@@ -34,7 +34,7 @@ class HolePyramid {
 };
 
 /// Push-pull (Gortler et al., The Lumigraph, SIGGRAPH 1996, sec. 3.5) of `kValues` numbers and an
-/// inverse depth per pixel. Made once for a picture; then At() answers for any hole. Does not
+/// inverse depth per pixel. Made once for an image; then At() answers for any hole. Does not
 /// depend on the number of threads.
 template <size_t kValues>
 class PushPull {
@@ -49,7 +49,7 @@ class PushPull {
   template <typename Finest>
   PushPull(const HolePyramid& holes, Favour favour, int threads, const Finest& finest);
 
-  /// What a hole takes; weight 0 when the picture has no known pixel.
+  /// What a hole takes; weight 0 when the image has no known pixel.
   Cell At(int x, int y) const { return levels_.empty() ? Cell{} : Between(levels_.front(), x, y); }
 
  private:

@@ -4,7 +4,7 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/order_statistics.h"
-#include "dtr/render/instants.h"
+#include "dtr/render/time_steps.h"
 
 namespace dtr {
 namespace {

@@ -19,7 +19,7 @@ struct RenderScene {
   /// SPEC 1.3 decided beforehand, for one novel camera and from more views than these.
   std::optional<bool> per_pixel;
   /// What memory holds; K is at most this.
-  std::optional<size_t> most_views;
+  std::optional<size_t> max_views;
 };
 
 /// SPEC 0.4. The source views of the set's only frame (AtFrame chooses it), without those whose id

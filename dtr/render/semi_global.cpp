@@ -50,9 +50,9 @@ void FollowImpl(const LabelPath& path) {
   }
   const float* costs = path.costs;
   float *sums = path.sums, *before = buffers[0].data() + 1, *now = buffers[1].data() + 1;
-  float least_before = 0;
+  float min_before = 0;
   for (int cell = 0; cell < path.cells; ++cell, costs += path.step, sums += path.step) {
-    const auto least = hn::Set(d, least_before), any = hn::Set(d, least_before + path.any);
+    const auto least = hn::Set(d, min_before), any = hn::Set(d, min_before + path.any);
     auto smallest = never;
     for (size_t s = 0; s < path.slots; s += lanes) {
       auto cheapest = hn::Min(hn::LoadU(d, before + s), any);
@@ -65,7 +65,7 @@ void FollowImpl(const LabelPath& path) {
       hn::StoreU(hn::Add(hn::LoadU(d, sums + s), cost), d, sums + s);
       smallest = hn::Min(smallest, cost);
     }
-    least_before = hn::GetLane(hn::MinOfLanes(d, smallest));
+    min_before = hn::GetLane(hn::MinOfLanes(d, smallest));
     std::swap(before, now);
   }
 }

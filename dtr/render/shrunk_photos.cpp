@@ -89,7 +89,7 @@ void ShrunkPhotos::ForgetTooMany(size_t asked) {
   size_t bytes = 0, stay = 0;
   for (const Kept& kept : kept_) {
     bytes += kept.photo->light.data().size() * sizeof(double) + kept.photo->usable.data().size();
-    if (stay >= asked && bytes > most_bytes_) break;
+    if (stay >= asked && bytes > max_bytes_) break;
     ++stay;
   }
   kept_.resize(stay);

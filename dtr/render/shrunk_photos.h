@@ -1,5 +1,5 @@
-// dtr/render/shrunk_photos.h -- the views' photos averaged over cells, kept from picture to
-// picture.
+// dtr/render/shrunk_photos.h -- the views' photos averaged over cells, kept from image to
+// image.
 #pragma once
 #include <array>
 #include <cstddef>
@@ -23,11 +23,11 @@ struct ShrunkPhoto {
 /// too many, but never one of the last call's. Several threads may ask.
 class ShrunkPhotos {
  public:
-  static constexpr size_t kMostBytes = size_t{64} << 20;  ///< some 30 photos of 5 Mpx
-  explicit ShrunkPhotos(size_t most_bytes = kMostBytes) : most_bytes_(most_bytes) {}
+  static constexpr size_t kMaxBytes = size_t{64} << 20;  ///< some 30 photos of 5 Mpx
+  explicit ShrunkPhotos(size_t most_bytes = kMaxBytes) : max_bytes_(most_bytes) {}
 
   /// In the order of the views; missing ones are made on up to `threads` threads. Photos whose
-  /// views are loaded anew are noticed.
+  /// views are loaded again are noticed.
   std::vector<std::shared_ptr<const ShrunkPhoto>> Of(const std::vector<const View*>& views,
                                                      int cell_px, int threads);
   void Clear();
@@ -51,7 +51,7 @@ class ShrunkPhotos {
   /// Those asked for longest ago, beyond the last call's `asked`. The mutex is held.
   void ForgetTooMany(size_t asked);
 
-  const size_t most_bytes_;
+  const size_t max_bytes_;
   std::mutex mutex_;
   std::list<Kept> kept_;  ///< asked for last first
 };

@@ -46,11 +46,11 @@ Rgb MeanOfNeighbours(const View& view, int x, int y) {
 
 // SPEC 4.8: the rim's width is this share of the image's longer side, in whole pixels, at least:
 constexpr double kTextureRimShare = 1.0 / 48;
-constexpr int kLeastRimPx = 8;
+constexpr int kMinRimPx = 8;
 
 int RimWidth(const View& view) {
   const int side = std::max(view.image.width(), view.image.height());
-  return std::max(kLeastRimPx, static_cast<int>(kTextureRimShare * side));
+  return std::max(kMinRimPx, static_cast<int>(kTextureRimShare * side));
 }
 
 /// Chessboard distance to the nearest pixel that is masked or off the image, at most `most`.

@@ -10,13 +10,13 @@ namespace dtr {
 namespace {
 
 // SPEC 1.4: factors fall over this share of the cut's angle, and never to 0.
-constexpr double kFallingShare = 0.25, kLeastFactor = 1.0 / 255;
+constexpr double kFallingShare = 0.25, kMinFactor = 1.0 / 255;
 
 }  // namespace
 
 double CutFactor(double angle_rad, double cut_rad) {
   if (!(cut_rad > 0)) return 1;
-  return std::clamp((cut_rad - angle_rad) / (kFallingShare * cut_rad), kLeastFactor, 1.0);
+  return std::clamp((cut_rad - angle_rad) / (kFallingShare * cut_rad), kMinFactor, 1.0);
 }
 
 std::vector<double> CutFactors(const ViewSelection& selection, size_t count) {
@@ -67,7 +67,7 @@ ViewSelection SelectViews(const RenderScene& scene, const Pose& novel_from_world
   });
   selection.next_angle_rad = options.max_angle_rad;
   const size_t most =
-      std::min(static_cast<size_t>(options.views), scene.most_views.value_or(candidates.size()));
+      std::min(static_cast<size_t>(options.views), scene.max_views.value_or(candidates.size()));
   if (!selection.per_pixel && candidates.size() > most) {
     selection.next_angle_rad = candidates[most].angle_rad;
     candidates.resize(most);

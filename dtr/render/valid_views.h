@@ -37,7 +37,7 @@ bool NeedsPerPixelRule(const RenderScene& scene, const Pose& novel_from_world);
 ViewSelection SelectViews(const RenderScene& scene, const Pose& novel_from_world,
                           const RenderOptions& options);
 
-/// Indices, ascending, of the views that pictures from all these cameras draw from: what must be
+/// Indices, ascending, of the views that images from all these cameras draw from: what must be
 /// loaded. Needs no pixels (DescribeRenderScene).
 std::vector<int> ViewsNeeded(const RenderScene& scene, std::span<const Pose> novel_from_world,
                              const RenderOptions& options);

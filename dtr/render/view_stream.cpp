@@ -301,7 +301,7 @@ RenderScene ViewStream::SceneFor(const Pose& novel_from_world, const RenderOptio
     std::sort(drawn.begin(), drawn.end());
   }
   RenderScene scene = SceneOf(drawn);
-  if (!all_fit && wait == Wait::kForAll) scene.most_views = needed.slots.size();
+  if (!all_fit && wait == Wait::kForAll) scene.max_views = needed.slots.size();
   scene.per_pixel = needed.per_pixel;
   return scene;
 }

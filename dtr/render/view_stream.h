@@ -1,5 +1,5 @@
 // dtr/render/view_stream.h -- the pixels of a set that may be larger than memory: read in the
-// background when a picture needs them, dropped when others need the room.
+// background when an image needs them, dropped when others need the room.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -20,7 +20,7 @@ namespace dtr {
 /// Frees the pixels of a view, and what was made of them; its description stays.
 void DropPixels(View& view);
 
-/// Keeps the pixels of the source views that pictures are drawn from, those used last, within a
+/// Keeps the pixels of the source views that images are drawn from, those used last, within a
 /// number of bytes. All members belong to one thread; reading runs on others, which see copies of
 /// the views only, so that the pixels of a view change inside calls of this class and nowhere else.
 /// What a waiting call gives depends on the set, the camera, the options and the bytes alone.
@@ -37,11 +37,11 @@ class ViewStream {
   };
 
   enum class Wait {
-    kForAll,   ///< still frames: until every view that the picture needs is there or lost
-    kForNone,  ///< moving pictures: what is there, and the rest is asked for
+    kForAll,   ///< still frames: until every view that the image needs is there or lost
+    kForNone,  ///< moving images: what is there, and the rest is asked for
   };
 
-  /// What pictures are drawn from.
+  /// What images are drawn from.
   enum class Pixels {
     kInMemory,    ///< views whose pixels are there
     kOrReleased,  ///< and those whose pixels were released, for a renderer that holds what it needs
@@ -54,7 +54,7 @@ class ViewStream {
   };
 
   /// `set` is as io::ReadSet gives it, without pixels; `described` is DescribeRenderScene of it, or
-  /// of a moving set DescribeFrames. Both outlive the stream, and the views stay where they are.
+  /// of a dynamic set DescribeFrames. Both outlive the stream, and the views stay where they are.
   ViewStream(DtrSet& set, std::vector<RenderScene> described, Loader load, Settings settings);
   ViewStream(DtrSet& set, RenderScene described, Loader load, Settings settings)
       : ViewStream(set, std::vector<RenderScene>{std::move(described)}, std::move(load),
@@ -64,31 +64,31 @@ class ViewStream {
   ViewStream(const ViewStream&) = delete;
   ViewStream& operator=(const ViewStream&) = delete;
 
-  /// The scene to draw a picture of this camera from: SelectViews of it names only views whose
+  /// The scene to draw an image of this camera from: SelectViews of it names only views whose
   /// pixels are in memory. They stay there until the next call. Released pixels that it needs are
-  /// waited for, whatever `wait` says: a moving picture would lose what it had. Where the bytes do
-  /// not hold all that the picture needs, the nearest that fit are drawn from, which is said once.
+  /// waited for, whatever `wait` says: a moving image would lose what it had. Where the bytes do
+  /// not hold all that the image needs, the nearest that fit are drawn from, which is said once.
   /// A view that cannot be read is left out, which is said, and another takes its place. Throws
   /// dtr::Error when no view of the set can be read.
   RenderScene SceneFor(const Pose& novel_from_world, const RenderOptions& options, Wait wait,
                        Pixels pixels = Pixels::kInMemory);
 
-  /// Begins to read what a later picture needs, as far as there is room beside the last one's.
+  /// Begins to read what a later image needs, as far as there is room beside the last one's.
   void Prefetch(const Pose& novel_from_world, const RenderOptions& options,
                 Pixels pixels = Pixels::kInMemory);
 
-  /// Of a moving set: pictures are of this frame until the next call; at first of frame 0. All
+  /// Of a dynamic set: images are of this frame until the next call; at first of frame 0. All
   /// frames share the bytes.
   void ShowFrame(size_t frame) { shown_ = frame; }
 
   /// Drops the pixels of a view that is in memory: a renderer made its own of them. They are read
-  /// again when a picture needs them itself.
+  /// again when an image needs them itself.
   void Release(const View& view);
 
   /// Leaves out these views (pointers into the set), as --exclude does, until the next call.
   void Hide(std::vector<const View*> views) { hidden_ = std::move(views); }
 
-  /// Lost views for which this says yes are tried anew when a picture needs them: files come back.
+  /// Lost views for which this says yes are tried again when an image needs them: files come back.
   /// Returns how many. One that fails again for the same reason is not warned of again.
   size_t RetryLost(const std::function<bool(const View&)>& may_be_read);
 
@@ -113,7 +113,7 @@ class ViewStream {
   };
   class Readers;
 
-  /// Indices into slots_ of what the picture needs, nearest first, as many as the bytes hold.
+  /// Indices into slots_ of what the image needs, nearest first, as many as the bytes hold.
   struct Needed {
     std::vector<size_t> slots;
     bool per_pixel = false;

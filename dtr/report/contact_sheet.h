@@ -1,4 +1,4 @@
-// dtr/report/contact_sheet.h -- many pictures on one.
+// dtr/report/contact_sheet.h -- many images on one.
 #pragma once
 #include <span>
 
@@ -11,8 +11,8 @@ namespace dtr::report {
 /// Throws std::invalid_argument unless max_side_px is positive.
 ImageRgb8 Shrink(const ImageRgb8& image, int max_side_px);
 
-/// Pictures in rows of `columns`, each shrunk into a square cell of `cell_px` and centred, on a
-/// dark ground. Empty pictures leave their cell empty. An empty list gives an empty image.
+/// Images in rows of `columns`, each shrunk into a square cell of `cell_px` and centred, on a
+/// dark ground. Empty images leave their cell empty. An empty list gives an empty image.
 /// Throws std::invalid_argument unless columns and cell_px are positive.
 ImageRgb8 ContactSheet(std::span<const ImageRgb8> images, int columns, int cell_px);
 

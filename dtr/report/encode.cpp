@@ -96,7 +96,7 @@ std::string EncodeJpeg(const ImageRgb8& image, int quality) {
   if (image.empty() || image.channels() != 3 || image.width() > JPEG_MAX_DIMENSION ||
       image.height() > JPEG_MAX_DIMENSION) {
     throw Error(
-        fmt::format("report: expected an RGB picture of 1..{} pixels per side, found {}x{} "
+        fmt::format("report: expected an RGB image of 1..{} pixels per side, found {}x{} "
                     "with {} channels",
                     JPEG_MAX_DIMENSION, image.width(), image.height(), image.channels()));
   }
@@ -109,7 +109,7 @@ std::string EncodeJpeg(const ImageRgb8& image, int quality) {
   if (setjmp(errors.jump) != 0) {
     jpeg_destroy_compress(&info);
     std::free(buffer);
-    throw Error(fmt::format("report: a picture of {}x{} cannot be encoded: {}", image.width(),
+    throw Error(fmt::format("report: an image of {}x{} cannot be encoded: {}", image.width(),
                             image.height(), errors.message));
   }
   jpeg_create_compress(&info);

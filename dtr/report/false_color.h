@@ -1,4 +1,4 @@
-// dtr/report/false_color.h -- depth as pictures. Closer is brighter.
+// dtr/report/false_color.h -- depth as images. Closer is brighter.
 #pragma once
 #include <array>
 #include <cstdint>

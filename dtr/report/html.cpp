@@ -139,7 +139,7 @@ void HtmlReport::Plot(std::string_view caption, std::string_view svg) {
 
 std::string HtmlReport::Finish() const {
   std::string page = "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n";
-  // The browser itself refuses whatever is not in the page.
+  // The browser itself rejects whatever is not in the page.
   page +=
       "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; "
       "style-src 'unsafe-inline'\">\n"

@@ -9,22 +9,22 @@
 
 namespace dtr::report {
 
-/// A table cell: text, or a picture with a description for those who cannot see it.
+/// A table cell: text, or an image with a description for those who cannot see it.
 struct Picture {
   ImageRgb8 image;
   std::string description;
 };
 using Cell = std::variant<std::string, Picture>;
 
-/// Builds a page from top to bottom. All text is escaped; pictures are inlined as JPEG, plots as
-/// SVG pictures, in which a browser runs no script. The same calls give the same bytes.
+/// Builds a page from top to bottom. All text is escaped; images are inlined as JPEG, plots as
+/// SVG images, in which a browser runs no script. The same calls give the same bytes.
 class HtmlReport {
  public:
   explicit HtmlReport(std::string_view title);
 
   void Section(std::string_view title);
   void Paragraph(std::string_view text);
-  /// A short fact above the rest, in colour: a verdict.
+  /// A short fact above the rest, in colour: a validation result.
   void Verdict(bool good, std::string_view text);
   /// Numbers are set right-aligned: columns whose every cell is a number, optionally with a unit.
   /// Throws std::invalid_argument when a row has not the header's number of cells.

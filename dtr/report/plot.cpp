@@ -21,7 +21,7 @@ constexpr std::array<const char*, 8> kColors{"#0072b2", "#d55e00", "#009e73", "#
 
 struct Axis {
   double low = 1, high = 10;  // of the data
-  double from = 0, to = 1;    // on the picture
+  double from = 0, to = 1;    // on the image
   double At(double value) const {
     return from + (to - from) * std::log(value / low) / std::log(high / low);
   }
@@ -29,8 +29,8 @@ struct Axis {
 
 /// The data's range with a margin at both ends.
 Axis Spanning(double low, double high, double from, double to) {
-  constexpr double kMargin = 0.06, kLeastRatio = 1.05;
-  const double ratio = std::max(high / low, kLeastRatio);
+  constexpr double kMargin = 0.06, kMinRatio = 1.05;
+  const double ratio = std::max(high / low, kMinRatio);
   const double middle = std::sqrt(low * high), half = std::pow(ratio, 0.5 + kMargin);
   return {middle / half, middle * half, from, to};
 }
@@ -134,7 +134,7 @@ std::string Marker(const PlotPoint& point, const Axis& x, const Axis& y) {
   std::string svg = fmt::format("<g fill=\"{0}\" stroke=\"{0}\">\n<title>{1}</title>\n",
                                 kColors[point.group], EscapeHtml(point.tip));
   if (point.x_low < point.x_high) {
-    // Bars may end beyond the axes, where the picture ends, too.
+    // Bars may end beyond the axes, where the image ends, too.
     const double from = std::clamp(x.At(point.x_low), x.from, x.to);
     const double to = std::clamp(x.At(point.x_high), x.from, x.to);
     svg +=

@@ -34,9 +34,9 @@ struct SetReportInfo {
   std::function<View(const View&)> load;
 };
 
-/// Adds: facts, verdict and checks, the table of views (thumbnails of image, depth and sigma where
-/// loaded; name, role, size, focal length, share of pixels with depth, depth range), skipped
-/// photos, stage times.
+/// Adds: facts, validation result and checks, the table of views (thumbnails of image, depth and
+/// sigma where loaded; name, role, size, focal length, share of pixels with depth, depth range),
+/// skipped photos, stage times.
 void AddSetSections(HtmlReport& page, const DtrSet& set, const SetReportInfo& info);
 
 /// A whole page of these sections. Deterministic but for the times given.

@@ -8,7 +8,7 @@ namespace dtr::simd {
 namespace {
 
 // Strips of rows are drawn at once; thinner ones would set up too many triangles twice.
-constexpr int kFewestRows = 64;
+constexpr int kMinRows = 64;
 
 }  // namespace
 
@@ -20,7 +20,7 @@ void CoarseRaster::Draw(const std::vector<PlacedMesh>& meshes, int width_px, con
     ProjectVertices(*meshes[k].mesh, meshes[k].placement, points_[k]);
   });
   nearest_.assign(static_cast<size_t>(width_px) * static_cast<size_t>(band.count), 0);
-  const int most = std::max(1, band.count / kFewestRows);
+  const int most = std::max(1, band.count / kMinRows);
   const int strips = std::min(most, ResolveThreads(threads));
   ParallelFor(0, strips, threads, [&](int s) {
     const int from = static_cast<int>(static_cast<long long>(band.count) * s / strips);

@@ -20,7 +20,7 @@ constexpr int kLanes = static_cast<int>(hn::MaxLanes(DF()));
 
 // As in coarse_triangles.comp: pixels this near to an edge belong to the triangle, so that rounding
 // leaves no cracks; thinner triangles and backs are not drawn.
-constexpr float kMarginPx = 1.0f / 256, kLeastArea = 1e-6f;
+constexpr float kMarginPx = 1.0f / 256, kMinArea = 1e-6f;
 /// Pixel ranges never reach farther, so that they fit an int.
 constexpr float kFarPx = 1e6f;
 
@@ -69,7 +69,7 @@ struct Strip : CoarseStrip {
     if (left > right) return;
     const float abx = b.x - a.x, aby = b.y - a.y, acx = c.x - a.x, acy = c.y - a.y;
     const float area = abx * acy - aby * acx;
-    if (!(area > kLeastArea)) return;
+    if (!(area > kMinArea)) return;
     const float abw = b.inverse_depth - a.inverse_depth, acw = c.inverse_depth - a.inverse_depth;
     const float per_area = 1 / area;
     const Plane plane{a.x,

@@ -1,4 +1,4 @@
-// dtr/simd/coarse_strip.h -- SPEC 5.1 for some rows of a picture, with the processor's vector
+// dtr/simd/coarse_strip.h -- SPEC 5.1 for some rows of an image, with the processor's vector
 // instructions. Only dtr/simd's own .cpp files include this.
 #pragma once
 #include <vector>
@@ -14,7 +14,7 @@ struct ScreenPoint {
   float inverse_depth = 0;  ///< of the novel camera; 0: not in front of the near plane
 };
 
-/// Rows [first, last] of the picture.
+/// Rows [first, last] of the image.
 struct CoarseStrip {
   float* pixels;  ///< inverse depth; of the first row
   int width, first, last;

@@ -52,7 +52,7 @@ struct PixelView {
   float image_per_sample[2], image_offset[2];
 };
 
-/// A row of the picture.
+/// A row of the image.
 struct PixelRow {
   int width_px;
   float inverse_fx, inverse_fy, cx, cy;  ///< of the novel camera, pixels

@@ -10,12 +10,12 @@
 HWY_BEFORE_NAMESPACE();
 namespace dtr::simd::HWY_NAMESPACE {
 
-constexpr float kLeastOthers = 1e-6f;
+constexpr float kMinOthers = 1e-6f;
 constexpr float kHalfPi = 1.57079632679f;
 // As weights.glsl: stands for the logarithm of 0. Beyond any angle: stands for a hidden fragment's.
 constexpr float kNoWeight = -1e38f, kHidden = 10;
 // SPEC 1.4.
-constexpr float kFallingShare = 0.25f, kLeastFactor = 1.0f / 255;
+constexpr float kFallingShare = 0.25f, kMinFactor = 1.0f / 255;
 
 /// The pixels of a group and what the views show of them: per view a vector of each.
 class Group {
@@ -259,7 +259,7 @@ HWY_INLINE VF DropAllButNearest(const PixelRow& row, std::span<const PixelView> 
 HWY_INLINE VF CutFactorAt(VF t, VF cut) {
   const VF one = Constant(1);
   const VF some = hn::Div(hn::Sub(cut, t), hn::Mul(Constant(kFallingShare), cut));
-  const VF factor = hn::Min(hn::Max(some, Constant(kLeastFactor)), one);
+  const VF factor = hn::Min(hn::Max(some, Constant(kMinFactor)), one);
   return hn::IfThenElse(hn::Gt(cut, hn::Zero(DF())), factor, one);
 }
 
@@ -267,7 +267,7 @@ HWY_INLINE VF CutFactorAt(VF t, VF cut) {
 /// weights need not fit float32.
 HWY_INLINE VF FadedShare(VF share, VF factor) {
   const VF others =
-      hn::Add(Constant(kLeastOthers), hn::Max(hn::Sub(Constant(1), share), hn::Zero(DF())));
+      hn::Add(Constant(kMinOthers), hn::Max(hn::Sub(Constant(1), share), hn::Zero(DF())));
   const VF rest = hn::MulAdd(hn::Sub(Constant(1), factor), share, others);
   return hn::Div(hn::Mul(hn::Mul(share, factor), others), rest);
 }

@@ -5,7 +5,7 @@ namespace {
 
 // More than any view takes: of its image a pixel of RGBA, and per sample its 1/z as a float, its
 // bit, and two triangles of three corners and a cell of the reduced mesh.
-constexpr size_t kBytesPerPixel = 4, kMostBytesPerSample = 96;
+constexpr size_t kBytesPerPixel = 4, kMaxBytesPerSample = 96;
 
 size_t PixelsOf(const PinholeCamera& camera) {
   return static_cast<size_t>(camera.width_px()) * static_cast<size_t>(camera.height_px());
@@ -43,7 +43,7 @@ size_t PreparedViews::MostBytesOf(const RenderFrame& frame) const {
   size_t most = 0;
   for (const View* view : frame.views) {
     most += kBytesPerPixel * PixelsOf(view->camera) +
-            kMostBytesPerSample * PixelsOf(view->DepthCamera());
+            kMaxBytesPerSample * PixelsOf(view->DepthCamera());
   }
   return most;
 }

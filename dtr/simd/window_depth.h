@@ -1,4 +1,4 @@
-// dtr/simd/window_depth.h -- depth as a host's depth buffer has it, of a picture in memory, with
+// dtr/simd/window_depth.h -- depth as a host's depth buffer has it, of an image in memory, with
 // the processor's vector instructions.
 #pragma once
 #include <cstdint>

@@ -8,7 +8,8 @@
 
 namespace dtr {
 
-/// A figure held against its limit. `validate` prints a list of these; sets carry them as verdict.
+/// A figure held against its limit. `validate` prints a list of these; sets carry them as
+/// validation result.
 struct Check {
   std::string name;  ///< unit in the name: "held_out_rms_px"
   double value = 0;  ///< what was measured; not a number where nothing could be measured

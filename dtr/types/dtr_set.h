@@ -21,7 +21,7 @@ struct Bounds {
   bool empty() const { return (min.array() > max.array()).any(); }
 };
 
-/// The views of one instant. A still scene has exactly one.
+/// The views of one time step. A still scene has exactly one.
 struct Frame {
   double time_s = 0;
   std::vector<View> views;

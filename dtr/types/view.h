@@ -23,7 +23,7 @@ const char* NameOf(ViewRole role);
 /// How depth lies on disk (docs/FORMAT.md).
 enum class DepthCoding {
   kExrFloat,           ///< "exr-float": float32 EXR
-  kExrHalf,            ///< "exr-half": half EXR; refuses depths beyond half's range
+  kExrHalf,            ///< "exr-half": half EXR; rejects depths beyond half's range
   kPng16Millimetre,    ///< "png16-mm": 16-bit PNG, millimetres; unit metre required, <= 65.535 m
   kPng16InverseDepth,  ///< "png16-inverse": 16-bit PNG linear in 1/z between far and near
   kZstdInverseDepth,   ///< "zstd-inverse": the same in `depth_steps` steps, our own compression

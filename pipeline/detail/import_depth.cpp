@@ -74,7 +74,7 @@ DepthImage ReadCameraDepth(const io::NamedCamera& named, const ImportOptions& op
   if (!scale) {
     throw Error(file.string() + ": a depth map of " + SizeText(depth.width(), depth.height()) +
                 " pixels has another shape than its photo of " + SizeText(width_px, height_px) +
-                ": both must show the same; give maps that are neither cropped nor turned");
+                ": both must show the same; give maps that are neither cropped nor rotated");
   }
   const int width = width_px / *scale, height = height_px / *scale;
   const Eigen::Array2d map_per_photo(static_cast<double>(depth.width()) / width_px,

@@ -23,7 +23,8 @@ namespace dtr::stereo::patchmatch::HWY_NAMESPACE {
 /// Candidates per visit: the pixel's own plane, 4 near and 4 far regions, 2 guesses.
 constexpr int kPlanes = 11;
 /// A view sees a pixel when more than this many candidates match well in it and fewer than that
-/// badly. ACMH's 2 and 3 take the sight from all views next to silhouettes and behind thin things.
+/// badly. ACMH's 2 and 3 take the observation from all views next to silhouettes and behind thin
+/// things.
 constexpr float kGoodPlanes = 1.0f, kBadPlanes = 7.0f;
 constexpr int kNearSamples = 7, kFarSamples = 11;
 /// What a first guess costs more when one view alone speaks for it. By the mean of two a surface
@@ -193,7 +194,7 @@ void ChooseViews(const Level& level, const Sweep& sweep, const State& state, con
     for (; i > 0 && thought[order[i - 1]] < thought[v]; --i) order[i] = order[i - 1];
     order[i] = v;
   }
-  const VF share = hn::Set(d, kLeastWeight);
+  const VF share = hn::Set(d, kMinWeight);
   VF largest = hn::Zero(d);
   for (size_t i = 0; i < views; ++i) {
     const size_t v = order[i];

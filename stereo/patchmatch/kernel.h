@@ -142,7 +142,7 @@ void ExpectRow(const Level& level, int y, State* state);
 void JudgeRow(const Level& level, const State& state, int y, const float* wanted, Verdict* out);
 
 /// Whether other places on a pixel's ray match about as well as its plane: where a texture repeats
-/// within 12 pixels of disparity, and at infinity, where pictures are copies or mirrors show far
+/// within 12 pixels of disparity, and at infinity, where images are copies or mirrors show far
 /// things. Worked out for pixels 0, 2, 4, ... of the row: ambiguous[x / 2] is 1 or 0.
 void AmbiguousRow(const Level& level, const State& state, int y, std::uint8_t* ambiguous);
 

@@ -34,7 +34,7 @@ constexpr float kSmallestArea = 0.05f;
 constexpr float kCostPerRoundTripPx = 0.2f, kLargestRoundTripPx = 3.0f;
 /// Views with less than this share of the best view's weight have no say. On plaza, share of all
 /// true pixels within 1 %: 77.7 % with 0.1, 79.7 % with 0.3, 79.8 % with 0.5 and less precise.
-constexpr float kLeastWeight = 0.4f;
+constexpr float kMinWeight = 0.4f;
 
 /// Pixels x, x + 2, x + 4, ... of a row with their windows of the reference.
 struct Group {

@@ -27,11 +27,11 @@ constexpr float kRivalApartPx = 2.0f;
 /// Largest cost of a place that matches; places match alike whose costs differ by about this part
 /// of the pixel's own cost and what resampling costs. On room, courtyard and plaza 0.2 % of the
 /// pixels that are right by a pixel have such a place, and 3 % of the wrong ones.
-constexpr float kRivalCost = 0.4f, kRivalNoise = 0.1f, kLeastRivalNoise = 0.03f;
+constexpr float kRivalCost = 0.4f, kRivalNoise = 0.1f, kMinRivalNoise = 0.03f;
 /// The first look, at a place not found to a fraction of a pixel yet, may cost so much more.
 constexpr float kRivalScoutSlack = 0.15f;
 /// Nobody knows where a pixel is when the other places together are this likely against its own.
-constexpr float kMostRivalOdds = 0.5f;
+constexpr float kMaxRivalOdds = 0.5f;
 /// Round trips that miss by less end on the same surface.
 constexpr float kConsistentPx = 1.0f;
 
@@ -51,8 +51,8 @@ struct Said {
   HWY_ALIGN float off_px[kMaxViews][kLanes];  ///< RoundTripPx
 };
 
-/// Shares of the views in a verdict. After rounds, a view counts by how well it agrees, in looks
-/// and in place; before, by what the sweeps found.
+/// Shares of the views in a validation result. After rounds, a view counts by how well it agrees,
+/// in looks and in place; before, by what the sweeps found.
 void WeighViews(const Level& level, const State& state, const Group& g, VF w, VF a, VF b,
                 float (*weights)[kLanes], Said* said) {
   const DF d;
@@ -70,7 +70,7 @@ void WeighViews(const Level& level, const State& state, const Group& g, VF w, VF
     largest = hn::Max(largest, weight);
     hn::Store(weight, d, weights[v]);
   }
-  const VF least = hn::Mul(largest, hn::Set(d, kLeastWeight));
+  const VF least = hn::Mul(largest, hn::Set(d, kMinWeight));
   for (size_t v = 0; v < level.sources.size(); ++v) {
     const VF weight = hn::Load(d, weights[v]);
     const VF kept = hn::IfThenZeroElse(hn::Lt(weight, least), weight);
@@ -129,7 +129,7 @@ size_t LoudestView(const Level& level, const float (*weights)[kLanes]) {
 /// Odds that the pixel lies at another place that costs `cost`, where `asked` says so.
 VF RivalOdds(VF own, VF cost, hn::Mask<DF> asked) {
   const DF d;
-  const VF noise = hn::MulAdd(hn::Set(d, kRivalNoise), own, hn::Set(d, kLeastRivalNoise));
+  const VF noise = hn::MulAdd(hn::Set(d, kRivalNoise), own, hn::Set(d, kMinRivalNoise));
   const VF more = hn::Max(hn::Div(hn::Sub(cost, own), noise), hn::Set(d, -20.0f));
   return hn::IfThenElseZero(hn::And(asked, hn::Lt(cost, hn::Set(d, kRivalCost))),
                             hn::Exp(d, hn::Neg(more)));
@@ -200,7 +200,7 @@ void AmbiguousRowImpl(const Level& level, const State& state, int y, std::uint8_
     const VF own = MeanScore(level, g, weights, w, a, b);
     hn::Store(RivalsOdds(level, g, weights, w, a, b, px, own), d, odds);
     for (int i = 0; i < static_cast<int>(kLanes) && x + 2 * i < width; ++i) {
-      ambiguous[x / 2 + i] = odds[i] > kMostRivalOdds;
+      ambiguous[x / 2 + i] = odds[i] > kMaxRivalOdds;
     }
   }
 }
@@ -211,7 +211,7 @@ struct Witnesses {
   HWY_ALIGN float weight[kMaxViews][kLanes];     ///< share in the common cost
   HWY_ALIGN float certainty[kMaxViews][kLanes];  ///< weight times curvature
   HWY_ALIGN float vertex[kMaxViews][kLanes];     ///< the view's own minimum, steps
-  /// Unit vector along which a change of inverse depth moves the view's picture, in pixels of the
+  /// Unit vector along which a change of inverse depth moves the view's image, in pixels of the
   /// reference: noise of the reference pulls views with opposite baselines to opposite sides.
   HWY_ALIGN float along_x[kMaxViews][kLanes];
   HWY_ALIGN float along_y[kMaxViews][kLanes];

@@ -57,7 +57,7 @@ Eigen::Vector3d GapBetween(const StereoView& view, const StereoView& other, doub
   return (gap / step).array().round() * step;
 }
 
-/// False for pictures of so few colours that every texture is made of them: line art, thresholded
+/// False for images of so few colours that every texture is made of them: line art, thresholded
 /// scans. There a window's weights by colour would leave one colour of it, and no texture.
 /// What a mask hides has no say.
 bool ColoursTellSurfacesApart(const StereoView& view) {

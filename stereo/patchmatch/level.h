@@ -1,4 +1,4 @@
-// stereo/patchmatch/level.h -- one level of the pyramid: pictures, projections, planes.
+// stereo/patchmatch/level.h -- one level of the pyramid: images, projections, planes.
 #pragma once
 #include <span>
 #include <vector>
@@ -9,7 +9,7 @@
 
 namespace dtr::stereo::patchmatch {
 
-/// A neighbour's pictures from full size down, as textures.
+/// A neighbour's images from full size down, as textures.
 struct SourcePyramid {
   const StereoView* view = nullptr;
   std::vector<PinholeCamera> cameras;
@@ -17,13 +17,13 @@ struct SourcePyramid {
   const PlaneMap* surface = nullptr;  ///< its planes at full size, if known; borrowed
 };
 
-/// The picture and its halvings, `levels` in all. Requires sizes of at least 2^(levels - 1).
+/// The image and its halvings, `levels` in all. Requires sizes of at least 2^(levels - 1).
 std::vector<Picture> Pyramid(Picture full, int levels);
 
 /// Throws Error for photos wider than kWidestTexture.
 SourcePyramid MakeSource(const StereoView& view, int levels);
 
-/// Sets up matching `reference` (a level's picture of `view`) with the sources' pictures at
+/// Sets up matching `reference` (a level's image of `view`) with the sources' images at
 /// `index`.
 Level MakeLevel(const StereoView& view, const Picture& reference,
                 std::span<const SourcePyramid> sources, size_t index, const DepthRange& range,

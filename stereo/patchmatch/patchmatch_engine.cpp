@@ -19,7 +19,7 @@ using namespace patchmatch;
 constexpr int kCoarsestSidePx = 256;
 constexpr int kSmallestSidePx = 24;
 /// The first guess tries one inverse depth per pixel of disparity, within these bounds.
-constexpr double kLeastSamples = 48, kMostSamples = 128;
+constexpr double kLeastSamples = 48, kMaxSamples = 128;
 /// Visits per pixel on the coarsest level more than on those between, and on the finest fewer.
 constexpr int kMoreIterations = 2;
 constexpr float kFirstStepPx = 4.0f, kFinestStepPx = 1.0f;
@@ -32,7 +32,7 @@ constexpr int kFirstRoundNumber = 1000;  // names random numbers apart from the 
 constexpr double kSmallestDisparityPx = 0.5;
 
 /// Bytes per pixel: the reference's grey values, colours and mask; planes and costs; the weight of
-/// a view; two guesses, and a grid they are made from; its picture with all halvings; planes to
+/// a view; two guesses, and a grid they are made from; its image with all halvings; planes to
 /// hand out; a depth map with what judging it takes; a neighbour's textures with all halvings.
 constexpr double kReferenceBytes = 12, kStateBytes = 16, kWeightBytes = 4, kGuessBytes = 28,
                  kPictureBytes = 7, kPlaneBytes = 12, kVerdictBytes = 54, kSourceBytes = 7;
@@ -133,7 +133,7 @@ State SearchPyramid(const StereoView& view, std::span<const Picture> pictures,
       }
       const double scale = std::exp2(-static_cast<double>(index));
       const int samples =
-          static_cast<int>(std::clamp(range_px * scale, kLeastSamples, kMostSamples));
+          static_cast<int>(std::clamp(range_px * scale, kLeastSamples, kMaxSamples));
       state = EmptyState(level);
       ParallelFor(0, level.reference.height, options.threads,
                   [&](int y) { SearchRow(level, samples, y, &state); });
@@ -156,13 +156,13 @@ State SearchPyramid(const StereoView& view, std::span<const Picture> pictures,
 /// What is matched with what, at all sizes.
 struct Problem {
   Problem(std::span<const StereoView> views, int reference, std::span<const int> neighbours,
-          const DepthRange& depth_range, std::span<const PlaneMap* const> maps, int most_sources,
+          const DepthRange& depth_range, std::span<const PlaneMap* const> maps, int max_sources,
           const EngineOptions& options)
       : view(&views[static_cast<size_t>(reference)]), range(depth_range) {
     CheckRequest(views, reference, neighbours, range);
     const int levels = maps.empty() ? LevelsFor(views, reference, neighbours) : 1;
     pictures = Pyramid(MakePicture(*view), levels);
-    sources = MakeSources(views, reference, neighbours, range, maps, most_sources, levels,
+    sources = MakeSources(views, reference, neighbours, range, maps, max_sources, levels,
                           options.threads);
   }
 

@@ -14,12 +14,12 @@ namespace {
 /// Half sides of the windows, smallest first.
 constexpr int kRadii[] = {8, 16, 32, 64};
 /// Least share of a window's pixels that must be believed.
-constexpr double kLeastShare = 0.06;
+constexpr double kMinShare = 0.06;
 /// The believed pixels' centre of mass may be so far off the pixel, in half sides, and they must
 /// spread at least so much in every direction: else the plane is continued, not spanned.
-constexpr double kMostOffCentre = 0.35, kLeastSpread = 0.25;
+constexpr double kMaxOffCentre = 0.35, kMinSpread = 0.25;
 /// They lie on a plane when they miss it by no more than this, pixels of disparity.
-constexpr double kMostRmsPx = 1.5;
+constexpr double kMaxRmsPx = 1.5;
 /// The pixel looks like them when it is within so many of their standard deviations, and levels.
 constexpr double kLooksSigmas = 2.0, kLooksLevels = 6.0;
 /// Inverse depths are known no better than this, and no plane fits better, pixels of disparity.
@@ -101,22 +101,22 @@ bool LooksLike(const Sums& s, double grey) {
 std::optional<Plane> FitAround(const Sums& s, int x, int y, int radius, double grey,
                                double px_per_w) {
   const double side = 2 * radius + 1;
-  if (!(s[12] >= kLeastShare * side * side)) return {};
+  if (!(s[12] >= kMinShare * side * side)) return {};
   const double mx = s[1] / s[0], my = s[2] / s[0], mw = s[6] / s[0];
-  if (std::max(std::abs(mx - x), std::abs(my - y)) > kMostOffCentre * radius) return {};
+  if (std::max(std::abs(mx - x), std::abs(my - y)) > kMaxOffCentre * radius) return {};
   if (!LooksLike(s, grey)) return {};
   const double xx = s[3] / s[0] - mx * mx, xy = s[4] / s[0] - mx * my, yy = s[5] / s[0] - my * my;
   const double xw = s[7] / s[0] - mx * mw, yw = s[8] / s[0] - my * mw, ww = s[9] / s[0] - mw * mw;
   // The smaller eigenvalue: the spread across the direction in which it is least.
   const double least = 0.5 * (xx + yy - std::hypot(xx - yy, 2 * xy));
-  if (!(least >= kLeastSpread * kLeastSpread * radius * radius)) return {};
+  if (!(least >= kMinSpread * kMinSpread * radius * radius)) return {};
   const double det = xx * yy - xy * xy;
   Plane plane;
   plane.a = (xw * yy - yw * xy) / det;
   plane.b = (yw * xx - xw * xy) / det;
   plane.w = mw + plane.a * (x - mx) + plane.b * (y - my);
   plane.rms_px = px_per_w * std::sqrt(std::max(0.0, ww - plane.a * xw - plane.b * yw));
-  if (!(plane.rms_px <= kMostRmsPx) || !(plane.w > 0)) return {};
+  if (!(plane.rms_px <= kMaxRmsPx) || !(plane.w > 0)) return {};
   return plane;
 }
 
@@ -153,7 +153,7 @@ Prior PlanarPrior(const Grid<float>& wanted, const PriorSupport& support, const 
   ParallelFor(0, (height + kBandRows - 1) / kBandRows, threads, [&](int band) {
     const int begin = band * kBandRows, end = std::min(height, begin + kBandRows);
     for (const int radius : kRadii) {
-      if (!any_open(begin, end)) break;  // sums that nobody asks for
+      if (!any_open(begin, end)) break;  // sums that unset for
       Band sums(support, picture, radius);
       for (int y = begin; y < end; ++y) {
         sums.MoveTo(y, y == begin);

@@ -15,13 +15,13 @@ constexpr double kSpeckleShare = 1e-4;
 constexpr float kConnectedPx = 1.0f;
 /// Bars of a fence and leaves are small too; they stay when on average so many views' planes lead
 /// to them. On plaza 0.6 % more true pixels within 1 %, 0.2 % more outliers.
-constexpr float kLeastSupport = 1.5f;
+constexpr float kMinSupport = 1.5f;
 /// Other speckles are asked in the squares of so many pixels around a speckle's. They agree within
 /// this share of the range that was searched, at least so many pixels; of those around, weighted by
 /// their pixels, so many must.
 constexpr int kSquarePx = 16;
-constexpr float kAgreeingShareOfRange = 0.03f, kLeastAgreeingPx = 2.0f;
-constexpr float kLeastCompany = 1.0f / 3;
+constexpr float kAgreeingShareOfRange = 0.03f, kMinAgreeingPx = 2.0f;
+constexpr float kMinCompany = 1.0f / 3;
 
 struct Speckle {
   std::vector<std::pair<int, int>> pixels;
@@ -81,7 +81,7 @@ class Speckles {
   bool IsSupported(const std::vector<std::pair<int, int>>& area) const {
     int support = 0;
     for (const auto& [x, y] : area) support += evidence_.consistent(x, y);
-    return static_cast<float>(support) >= kLeastSupport * static_cast<float>(area.size());
+    return static_cast<float>(support) >= kMinSupport * static_cast<float>(area.size());
   }
 
   /// Erases what has no support; keeps the rest to be asked about.
@@ -122,7 +122,7 @@ class Speckles {
 
   bool HasCompany(const Speckle& speckle) const {
     const float reach =
-        std::max(kLeastAgreeingPx / speckle.px_per_w, kAgreeingShareOfRange * evidence_.w_range);
+        std::max(kMinAgreeingPx / speckle.px_per_w, kAgreeingShareOfRange * evidence_.w_range);
     size_t others = 0, agreeing = 0;
     const int column = speckle.square % columns_, row = speckle.square / columns_;
     for (int v = std::max(0, row - 1); v <= std::min(rows_ - 1, row + 1); ++v) {
@@ -135,7 +135,7 @@ class Speckles {
         }
       }
     }
-    return static_cast<float>(agreeing) >= kLeastCompany * static_cast<float>(others);
+    return static_cast<float>(agreeing) >= kMinCompany * static_cast<float>(others);
   }
 
   const SpeckleEvidence& evidence_;

@@ -15,7 +15,7 @@ struct SpeckleEvidence {
   float w_range = 0;  ///< largest less smallest near_z / z of the search
 };
 
-/// Makes holes of connected areas smaller than a 10,000th of the picture where too few views lead
+/// Makes holes of connected areas smaller than a 10,000th of the image where too few views lead
 /// to them, and where the small areas around lie at other depths: bars of a fence and leaves have
 /// company at their own depth, chance matches (ground that repeats, surfaces beyond the range) are
 /// scattered over all of it.

@@ -27,9 +27,9 @@ constexpr Limits kAfterSearch{0.8f, 1.0f, 1};
 constexpr Limits kAfterRounds{1.0f, 5.0f, 0};
 /// Least variance of the pixels that look like the centre (grey levels squared). A window of sky at
 /// a roof has the roof's texture, and would get its depth.
-constexpr float kLeastTexture = 3.0f;
+constexpr float kMinTexture = 3.0f;
 /// Largest cost where the texture is weak: that of noise, which is 1, and its scatter.
-constexpr float kWeakCost = 1.1f, kLeastWeakCost = 1e-6f;
+constexpr float kWeakCost = 1.1f, kMinWeakCost = 1e-6f;
 /// Depths less sure than this, pixels of disparity, are held to the planes around them.
 constexpr float kVaguePx = 0.6f;
 /// The planes around a pixel are asked so often: what they have filled is around the next ones.
@@ -69,7 +69,7 @@ float SigmaWithDoubt(const Verdict& v) {
   return std::hypot(v.sigma, ProbabilityOfWrong(v) * kWrongByPx / v.px);
 }
 
-/// What the pictures say of a pixel and what the planes around it do, as independent measurements.
+/// What the images say of a pixel and what the planes around it do, as independent measurements.
 void Combine(float prior, float prior_sigma, Verdict* v) {
   const float seen = v->sigma > 0 ? 1 / (v->sigma * v->sigma) : 0;
   const float expected = 1 / (prior_sigma * prior_sigma);
@@ -109,7 +109,7 @@ bool HasSurfaces(const Level& level) {
                      [](const Source& s) { return s.surface != nullptr; });
 }
 
-/// The verdicts on all pixels of a view, as they come about.
+/// The validation results on all pixels of a view, as they come about.
 class Trust {
  public:
   Trust(const Level& level, const StereoView& view, const DepthRange& range, int threads,
@@ -121,7 +121,7 @@ class Trust {
         state_(state),
         result_{DepthImage(width(), height()), Grid<float>(width(), height())} {}
 
-  /// By what the pictures say of each pixel alone, and of whole areas.
+  /// By what the images say of each pixel alone, and of whole areas.
   void BelieveWhatIsSeen() {
     const Limits limits = HasSurfaces(level_) ? kAfterRounds : kAfterSearch;
     Grid<std::uint8_t> consistent(width(), height());
@@ -132,9 +132,9 @@ class Trust {
         const Verdict& v = row[static_cast<size_t>(x)];
         if (view_.mask != nullptr && !view_.mask->empty() && (*view_.mask)(x, y) == 0) continue;
         px_per_w_(x, y) = v.px;
-        if (v.cost <= kWeakCost) cost_(x, y) = std::max(v.cost, kLeastWeakCost);
+        if (v.cost <= kWeakCost) cost_(x, y) = std::max(v.cost, kMinWeakCost);
         consistent(x, y) = static_cast<std::uint8_t>(v.consistent);
-        const bool weak = !(v.texture >= kLeastTexture) || !(v.sigma * v.px <= limits.sigma_px);
+        const bool weak = !(v.texture >= kMinTexture) || !(v.sigma * v.px <= limits.sigma_px);
         if (weak || !(v.cost <= limits.cost) || v.agreeing < limits.agreeing) continue;
         if (v.sigma > 0) Keep(x, y, v);
       }
@@ -146,7 +146,7 @@ class Trust {
   }
 
   /// Gives a depth to what has none, and a better one to what is vague, where the planes around
-  /// lead to one that the pictures do not speak against. False, and nothing is done, where that
+  /// lead to one that the images do not speak against. False, and nothing is done, where that
   /// could be of use to hardly a pixel.
   bool AskThePlanesAround() {
     std::atomic<std::int64_t> doubtful{0};

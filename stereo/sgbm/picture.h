@@ -1,4 +1,4 @@
-// stereo/sgbm/picture.h -- grey pictures for matching: masks filled, resampled, shrunk.
+// stereo/sgbm/image.h -- grey images for matching: masks filled, resampled, shrunk.
 #pragma once
 #include <Eigen/Core>
 #include <cstdint>
@@ -15,7 +15,7 @@ struct Picture {
   Mask usable;       ///< 255 where the view's mask allows it
 };
 
-/// Grey picture of a view. Masked pixels are bridged linearly along their row (or column, where a
+/// Grey image of a view. Masked pixels are bridged linearly along their row (or column, where a
 /// whole row is masked), so that their content has no influence and they bring no edges of their
 /// own. Throws Error when the image or mask has not the camera's size.
 Picture MakePicture(const StereoView& view);
@@ -23,7 +23,7 @@ Picture MakePicture(const StereoView& view);
 /// Half the size per axis by averaging 2x2 pixels (a last odd row or column is dropped).
 Picture Halved(const Picture& picture);
 
-/// A picture seen by a turned virtual camera.
+/// An image seen by a turned virtual camera.
 struct WarpedPicture {
   Grid<std::uint8_t> grey;
   Mask usable;  ///< 255 where the source has a usable pixel

@@ -13,7 +13,7 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 /// Smallest z of a corner's unit ray in the rectified frame: beyond 75 deg from the common axis the
-/// picture is stretched so much (1 / cos^2 > 14) that block matching means nothing.
+/// image is stretched so much (1 / cos^2 > 14) that block matching means nothing.
 constexpr double kMinCornerCosine = 0.26;
 /// A baseline shorter than this share of the near depth gives less than a disparity of one pixel
 /// over any range at any usual focal length.
@@ -152,9 +152,9 @@ std::optional<Sweep> RectifiedPair::SweepAround(const Eigen::Vector3d& n_in_refe
 
 std::optional<RectifiedPair> RectifyPair(const StereoView& reference, const StereoView& neighbour,
                                          const DepthRange& range, const PairLimits& limits,
-                                         std::string* refusal) {
-  const auto refuse = [&](const char* why) {
-    *refusal = why;
+                                         std::string* rejection) {
+  const auto reject = [&](const char* why) {
+    *rejection = why;
     return std::nullopt;
   };
   RectifiedPair pair;
@@ -162,9 +162,9 @@ std::optional<RectifiedPair> RectifyPair(const StereoView& reference, const Ster
   const Vector3d offset = neighbour.cam_from_world.TargetOriginInSource() -
                           reference.cam_from_world.TargetOriginInSource();
   pair.baseline = offset.norm();
-  if (!(pair.baseline > kMinBaselineToDepth * range.near_z)) return refuse("no baseline");
+  if (!(pair.baseline > kMinBaselineToDepth * range.near_z)) return reject("no baseline");
   const auto rect_from_world = RectFromWorld(reference, neighbour, offset / pair.baseline);
-  if (!rect_from_world) return refuse("viewing directions along the baseline or apart");
+  if (!rect_from_world) return reject("viewing directions along the baseline or apart");
   pair.rect_from_reference =
       *rect_from_world * reference.cam_from_world.rotation.conjugate().toRotationMatrix();
   pair.rect_from_neighbour =
@@ -172,12 +172,12 @@ std::optional<RectifiedPair> RectifyPair(const StereoView& reference, const Ster
 
   const Extent left = ExtentOf(reference.camera, pair.rect_from_reference);
   const Extent right = ExtentOf(neighbour.camera, pair.rect_from_neighbour);
-  if (!left.in_front || !right.in_front) return refuse("an epipole lies in or near an image");
+  if (!left.in_front || !right.in_front) return reject("an epipole lies in or near an image");
   const Search search = SearchOf(pair.baseline, range, left);
   const Window window{std::max(left.x0, right.x0 + search.low),
                       std::min(left.x1, right.x1 + search.high), std::max(left.y0, right.y0),
                       std::min(left.y1, right.y1)};
-  if (window.x0 >= window.x1 || window.y0 >= window.y1) return refuse("the images do not overlap");
+  if (window.x0 >= window.x1 || window.y0 >= window.y1) return reject("the images do not overlap");
 
   const double max_pixels = kMaxGrowth * reference.camera.width_px() * reference.camera.height_px();
   const double focal_px =
@@ -185,7 +185,7 @@ std::optional<RectifiedPair> RectifyPair(const StereoView& reference, const Ster
                window, max_pixels, limits, &pair);
   const int width = Cover((window.x1 - window.x0) * focal_px);
   const int height = Cover((window.y1 - window.y0) * focal_px);
-  if (width < kMinSize || height < kMinSize) return refuse("the common area is too small");
+  if (width < kMinSize || height < kMinSize) return reject("the common area is too small");
 
   pair.camera = PinholeCamera(width, height, focal_px, focal_px, -window.x0 * focal_px,
                               -window.y0 * focal_px);

@@ -51,10 +51,10 @@ struct RectifiedPair {
 /// Rectifies a pair for the depths of `range` in the reference view. The images keep about the
 /// reference's resolution unless `limits` asks for less. Follows Fusiello, Trucco, Verri, "A
 /// compact algorithm for rectification of stereo pairs", MVA 2000, from exact poses. Empty, with
-/// the reason in `*refusal`, when there is no baseline, when an epipole lies in or near an image
+/// the reason in `*rejection`, when there is no baseline, when an epipole lies in or near an image
 /// (forward motion), or when the images do not overlap.
 std::optional<RectifiedPair> RectifyPair(const StereoView& reference, const StereoView& neighbour,
                                          const DepthRange& range, const PairLimits& limits,
-                                         std::string* refusal);
+                                         std::string* rejection);
 
 }  // namespace dtr::stereo

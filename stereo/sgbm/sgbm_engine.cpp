@@ -91,8 +91,8 @@ std::vector<Eigen::Vector3d> FindPlanes(const StereoView& reference, const Pictu
   rectified.reserve(kCoarsePairs);
   std::vector<Task> tasks;
   for (size_t i = 0; i < std::min(kCoarsePairs, pairs.size()); ++i) {
-    std::string refusal;
-    const auto pair = RectifyPair(reference, *pairs[i].neighbour, range, coarse, &refusal);
+    std::string rejection;
+    const auto pair = RectifyPair(reference, *pairs[i].neighbour, range, coarse, &rejection);
     if (!pair) return {};
     rectified.push_back(*pair);
     for (const double slope : kCoarseSlopes) {
@@ -139,14 +139,14 @@ DepthEstimate SgbmEngine::Estimate(std::span<const StereoView> views, int refere
   std::vector<Pair> pairs;
   std::string reasons;
   for (const int n : neighbours) {
-    std::string refusal;
+    std::string rejection;
     const StereoView& other = views[static_cast<size_t>(n)];
-    const auto whole = RectifyPair(view, other, range, limits_, &refusal);
-    const auto fine = RectifyPair(view, other, range, kFineLimits, &refusal);
+    const auto whole = RectifyPair(view, other, range, limits_, &rejection);
+    const auto fine = RectifyPair(view, other, range, kFineLimits, &rejection);
     if (whole && fine) {
       pairs.push_back({*whole, *fine, &other});
     } else {
-      reasons += "; with view " + std::to_string(n) + ": " + refusal;
+      reasons += "; with view " + std::to_string(n) + ": " + rejection;
     }
   }
   if (pairs.empty()) {

@@ -47,15 +47,15 @@ const Place& PlaceCalled(const Advice& advice, const std::string& where) {
   throw std::out_of_range(where);
 }
 
-TEST(SightOf, KnowsSeenHiddenBeyondAndNothing) {
+TEST(ObservationOf, KnowsSeenHiddenBeyondAndNothing) {
   const auto views = Row(Square(0, 0, kWallZ, 2), {0});
   const CoarseView& view = views[0];
-  EXPECT_EQ(SightOf(view, {0, 0, kWallZ}, 0.03), Sight::kSeen);
-  EXPECT_EQ(SightOf(view, {0, 0, 1.2 * kWallZ}, 0.03), Sight::kHidden);
-  EXPECT_EQ(SightOf(view, {0, 0, 0.8 * kWallZ}, 0.03), Sight::kBeyond);
-  EXPECT_EQ(SightOf(view, {3.5, 0, kWallZ}, 0.03), Sight::kNothing);
-  EXPECT_EQ(SightOf(view, {30, 0, kWallZ}, 0.03), Sight::kOutside);
-  EXPECT_EQ(SightOf(view, {0, 0, -1}, 0.03), Sight::kOutside);
+  EXPECT_EQ(ObservationOf(view, {0, 0, kWallZ}, 0.03), Sight::kSeen);
+  EXPECT_EQ(ObservationOf(view, {0, 0, 1.2 * kWallZ}, 0.03), Sight::kHidden);
+  EXPECT_EQ(ObservationOf(view, {0, 0, 0.8 * kWallZ}, 0.03), Sight::kBeyond);
+  EXPECT_EQ(ObservationOf(view, {3.5, 0, kWallZ}, 0.03), Sight::kNothing);
+  EXPECT_EQ(ObservationOf(view, {30, 0, kWallZ}, 0.03), Sight::kOutside);
+  EXPECT_EQ(ObservationOf(view, {0, 0, -1}, 0.03), Sight::kOutside);
 }
 
 TEST(Advise, AnglesAreThoseOfTheWorld) {
@@ -90,7 +90,7 @@ TEST(Advise, AsksForACameraWhereOneIsMissing) {
 }
 
 TEST(Advise, SkyIsNotWhatACameraCouldMend) {
-  // Only the lower half of the pictures has a surface.
+  // Only the lower half of the images has a surface.
   const auto views = Row(Square(0, 50, kWallZ, 50), {0, 1, 2, 3});
   for (const Place& place : AdviseOn(views).places) {
     if (place.where.starts_with("beyond")) continue;
@@ -109,7 +109,7 @@ TEST(Advise, WhatAPillarHidesFromEverybodyIsUnseen) {
   aside.cam_from_world.translation = {-1.5, 0, 0};
   const Look look = LookFrom(aside, views);
   Measure(look, {}, aside);
-  // Of the 9.6 x 7.2 of the wall that it sees: both pictures end 1.3 before its own, and the
+  // Of the 9.6 x 7.2 of the wall that it sees: both images end 1.3 before its own, and the
   // shadows of the pillar share 3.4 x 5.
   EXPECT_NEAR(aside.unseen_share, 1.3 / 9.6 + 3.4 * 5 / (9.6 * 7.2), 0.02);
   EXPECT_LT(aside.depthless_share, 0.02);
@@ -136,7 +136,7 @@ TEST(Advise, IsTheSameForAnyNumberOfThreads) {
   for (size_t i = 0; i < one.add.size(); ++i) EXPECT_EQ(one.add[i].place, three.add[i].place);
 }
 
-TEST(Advise, RefusesALoneViewAndBearsViewsWithoutDepth) {
+TEST(Advise, RejectsALoneViewAndBearsViewsWithoutDepth) {
   EXPECT_THROW(AdviseOn(Row(Plane({0, 0, 1}, kWallZ), {0})), std::invalid_argument);
   const Advice blind = AdviseOn(Row(Square(0, 0, -5, 1), {0, 1, 1}));
   for (const Place& place : blind.places) {

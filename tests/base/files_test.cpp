@@ -33,7 +33,7 @@ TEST(WriteFileAtomically, FailureIsAnErrorAndLeavesNoTemporaryFile) {
   EXPECT_EQ(files, 1);
 }
 
-TEST(ReadFile, RefusesMoreThanTheLimit) {
+TEST(ReadFile, RejectsMoreThanTheLimit) {
   const testing::TemporaryFolder folder;
   WriteFileAtomically(folder / "a.txt", "12345");
   EXPECT_EQ(ReadFile(folder / "a.txt", 5), "12345");

@@ -53,7 +53,7 @@ int Run(const std::string& folder, const std::string& photos, int folds) {
   const SfmModel model = colmap::ReadModel(folder);
   std::vector<std::string> names;
   for (const SfmImage& image : model.images) names.push_back(image.name);
-  const pipeline::PhotoPlaces places = pipeline::ReadPhotoPlaces(photos, names);
+  const pipeline::PhotoPositions places = pipeline::ReadPhotoPositions(photos, names);
   const std::vector<Eigen::Vector3d> positions_m = places.EastNorthUp();
   KnownMetres all;
   for (size_t i = 0; i < positions_m.size(); ++i) {
@@ -76,14 +76,14 @@ int Run(const std::string& folder, const std::string& photos, int folds) {
     AddAsAWhole(model, start.options.positions, asked, whole);
     AddAsAWhole(free.model, start.options.positions, asked, refined_whole);
     std::fprintf(stderr,
-                 "fold %d: lenses %s, %zu places do not agree, taken to err by %.2f, %.2f m\n",
+                 "fold %d: lenses %s, %zu positions do not agree, taken to err by %.2f, %.2f m\n",
                  fold, NameOf(*refined.lens), start.report.left_out.size(),
                  start.report.sigma_flat_m, start.report.sigma_up_m);
   }
   std::printf(
-      "| model | places not given: on the map, m RMS | in height, m RMS |\n|---|---|---|\n");
+      "| model | positions not given: on the map, m RMS | in height, m RMS |\n|---|---|---|\n");
   whole.Print("carried as a whole");
-  refined_whole.Print("refined without places, carried as a whole");
+  refined_whole.Print("refined without positions, carried as a whole");
   adjusted.Print("adjusted to the others");
   return 0;
 }

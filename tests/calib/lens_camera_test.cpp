@@ -263,7 +263,7 @@ TEST(LensCamera, PinholeKeepsSizeFocalLengthsAndPrincipalPoint) {
   EXPECT_EQ(one.Pinhole(), PinholeCamera(640, 480, 500, 500, 321, 239));
 }
 
-TEST(LensCamera, RefusesImpossibleParameters) {
+TEST(LensCamera, RejectsImpossibleParameters) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const auto check = [](LensModel model, int width, std::vector<double> params) {
     LensCamera{model, width, 480, std::move(params)}.Check();

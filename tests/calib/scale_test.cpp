@@ -50,7 +50,7 @@ TEST(ScaleFromDistances, PredictedUncertaintyIsWhatNoiseDoes) {
   EXPECT_NEAR(squares / kSolves, 1, 0.1);
 }
 
-TEST(ScaleFromDistances, WhatDoesNotFitIsRefusedByName) {
+TEST(ScaleFromDistances, WhatDoesNotFitIsRejectedByName) {
   const MeasuredDistance together = Between({1, 1, 1}, {1, 1, 1}, 2);
   EXPECT_THROW(ScaleFromDistances(std::span(&together, 1)), Error);
   const MeasuredDistance near = Between({0, 0, 0}, {0.005, 0, 0}, 2);
@@ -212,14 +212,14 @@ TEST(AlignToPositions, PositionsThatTakeTurnsToAgreeAreTold) {
   EXPECT_EQ(scale.rms_m, AlignmentRms(AlignPoints(a, b), a, b));
 }
 
-TEST(AlignToPositions, PositionsOfWhichTooFewAgreeAreRefused) {
+TEST(AlignToPositions, PositionsOfWhichTooFewAgreeAreRejected) {
   // A triangle, and its middle, which the three hold where it is.
   const std::vector<Eigen::Vector3d> centres = {{2, 0, 0}, {-1, 1.7, 0}, {-1, -1.7, 0}, {0, 0, 0}};
   std::vector<Eigen::Vector3d> positions = centres;
   positions[3].z() = 0.5;
   try {
     (void)AlignToPositions(centres, positions);
-    FAIL() << "nothing was refused";
+    FAIL() << "nothing was rejected";
   } catch (const Error& error) {
     EXPECT_STREQ(error.what(),
                  "scale: expected positions that agree with the cameras, found that 3 of 4 do");
@@ -236,7 +236,7 @@ TEST(SigmaOfRadius, TwoThirdsOfTheErrorsLieWithinTheRadius) {
   EXPECT_NEAR(within, 0.68 * kDraws, 3 * std::sqrt(0.68 * 0.32 * kDraws));
 }
 
-TEST(ScaleFromPositions, WhatSaysNothingIsRefused) {
+TEST(ScaleFromPositions, WhatSaysNothingIsRejected) {
   const Walk vague = MakeWalk(60, 3);
   EXPECT_THROW(ScaleFromPositions(vague.centres, vague.positions), Error);
   Walk line = MakeWalk(0, 4);

@@ -150,7 +150,7 @@ TEST(AlignPoints, FlatSetsAreEnoughAndNeverMirrored) {
   EXPECT_NEAR(AlignPoints(solid, mirrored).rotation.toRotationMatrix().determinant(), 1, 1e-12);
 }
 
-TEST(AlignPoints, RefusesWhatCannotBeAligned) {
+TEST(AlignPoints, RejectsWhatCannotBeAligned) {
   const Points line{{0, 0, 0}, {1, 2, 3}, {2, 4, 6}, {3, 6, 9}};
   const Points corner{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   const Points point(4, Eigen::Vector3d(1, 1, 1));

@@ -114,8 +114,8 @@ TEST(Undistort, MaskTellsExactlyWhichPixelsTheLensSaw) {
       }
     }
     EXPECT_EQ(photo.mask.empty(), missing == 0);
-    // Barrel pictures of the whole view squeeze more in than the pinhole shows: every pixel has a
-    // source. Pincushion pictures end before the pinhole's corners.
+    // Barrel images of the whole view squeeze more in than the pinhole shows: every pixel has a
+    // source. Pincushion images end before the pinhole's corners.
     EXPECT_EQ(missing > 0, lens.model == LensModel::kOpenCv)
         << NameOf(lens.model) << " " << missing;
   }
@@ -167,7 +167,7 @@ TEST(Undistort, WhatMayNotBeUsedIsMaskedWhereTheLensShowsIt) {
 }
 
 TEST(Undistort, RaysBeyondTheModelsReachAreMasked) {
-  // The distortion turns back at r = 0.58, inside the picture: nothing beyond may be shown.
+  // The distortion turns back at r = 0.58, inside the image: nothing beyond may be shown.
   const LensCamera lens{LensModel::kSimpleRadial, kWidth, kHeight, {60, 80, 60, -1.0}};
   const UndistortedPhoto photo = Undistort(ImageRgb8(kWidth, kHeight, 3, 200), lens, 0, 1);
   ASSERT_FALSE(photo.mask.empty());
@@ -237,7 +237,7 @@ TEST(Undistort, SameBytesForAnyNumberOfThreads) {
   }
 }
 
-TEST(Undistort, RefusesAPhotoOfAnotherSize) {
+TEST(Undistort, RejectsAPhotoOfAnotherSize) {
   EXPECT_THROW(Undistort(ImageRgb8(kHeight, kWidth, 3), kBarrel, 0, 1), Error);
 }
 

@@ -150,7 +150,7 @@ TEST(IngestPhotos, TurnsPhotosUprightForEveryOrientation) {
   }
 }
 
-TEST(ReadPhoto, RefusesAFileThatChangedItsSize) {
+TEST(ReadPhoto, RejectsAFileThatChangedItsSize) {
   const TemporaryFolder folder;
   io::WriteImage(folder / "a.png", NoisePhoto(16, 8, 1));
   const Capture capture = Ingest(folder.path());
@@ -164,7 +164,7 @@ TEST(FocalFromExif, FollowsTheDiagonalOfThirtyFiveMillimetreFilm) {
   header.height_px = 2400;
   EXPECT_FALSE(FocalFromExif(header).focal_px);
   EXPECT_EQ(FocalFromExif(header).source, "none");
-  header.focal_35mm = 50;  // a 36x24 picture: 100 pixels per millimetre
+  header.focal_35mm = 50;  // a 36x24 image: 100 pixels per millimetre
   EXPECT_NEAR(*FocalFromExif(header).focal_px, 5000, 1e-9);
   EXPECT_EQ(FocalFromExif(header).source, "exif-35mm");
   std::swap(header.width_px, header.height_px);
@@ -265,14 +265,14 @@ TEST(JudgePhotos, ShotsOfOnePictureAreDuplicatesAndASmallStepIsNone) {
   const TemporaryFolder folder;
   io::WriteImage(folder / "a.png", Blobs(0, 3, 1));
   io::WriteImage(folder / "b.png", Blobs(0, 3, 2));  // from the same tripod
-  io::WriteImage(folder / "c.png", Blobs(2, 3, 3));  // half a per cent of the picture further
+  io::WriteImage(folder / "c.png", Blobs(2, 3, 3));  // half a per cent of the image further
   io::WriteImage(folder / "d.png", Blobs(2, 3, 4));
   const Capture capture = Ingest(folder.path());
   ASSERT_EQ(capture.photos.size(), 4u);
   EXPECT_THAT(capture.photos[0].screening->faults, IsEmpty());
   EXPECT_THAT(capture.photos[1].screening->faults, ElementsAre(Fault::kDuplicate));
   EXPECT_EQ(capture.photos[1].screening->duplicate_of, "a.png");
-  EXPECT_THAT(capture.photos[1].screening->remarks[0], HasSubstr("same picture as a.png"));
+  EXPECT_THAT(capture.photos[1].screening->remarks[0], HasSubstr("same image as a.png"));
   EXPECT_EQ(capture.photos[2].screening->duplicate_of, "");
   EXPECT_EQ(capture.photos[3].screening->duplicate_of, "c.png");
 }
@@ -346,7 +346,7 @@ TEST(DropFaulty, TheSharpRetakeOfABlurredPhotoStays) {
   for (size_t i : {1, 2}) {
     capture.photos[i].screening->duplicate_of = "blurred.jpg";
     capture.photos[i].screening->faults = {Fault::kDuplicate};
-    capture.photos[i].screening->remarks = {"shows the same picture as blurred.jpg"};
+    capture.photos[i].screening->remarks = {"shows the same image as blurred.jpg"};
   }
   Capture duplicates_alone = capture;
   DropFaulty(capture, {Fault::kBlurred, Fault::kDuplicate});

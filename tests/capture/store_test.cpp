@@ -245,7 +245,7 @@ TEST(WriteCapture, AReplacementCutOffHalfWayGivesTheOldCaptureBack) {
   EXPECT_TRUE(fs::exists(folder / "out/thesis"));
 }
 
-TEST(ReadCapture, NestingThatWouldFillTheStackIsRefused) {
+TEST(ReadCapture, NestingThatWouldFillTheStackIsRejected) {
   const std::string deep(1 << 20, '[');
   EXPECT_THAT(MessageOf<Error>([&] { CaptureFromJson(deep, "capture.json"); }),
               HasSubstr("capture.json: expected at most 64 levels of nesting"));

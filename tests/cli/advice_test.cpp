@@ -1,5 +1,5 @@
-// Advice that a refusal gives leads to the goal: each row is refused, does what the line says, and
-// is then done.
+// Advice that a rejection gives leads to the goal: each row is rejected, does what the line says,
+// and is then done.
 #include <functional>
 
 #include "dtr/io/depth_io.h"
@@ -20,13 +20,13 @@ struct Advised {
 void ExpectAllLeadToTheGoal(const std::vector<Advised>& rows) {
   for (const Advised& row : rows) {
     SCOPED_TRACE(fmt::format("dtr {}", fmt::join(row.refused, " ")));
-    ExpectRefused(Dtr(row.refused), row.code, row.advice);
+    ExpectRejected(Dtr(row.refused), row.code, row.advice);
     if (row.follow) row.follow();
     DtrOk(row.done);
   }
 }
 
-class Advice : public Refusals {
+class Advice : public Rejections {
  protected:
   std::string NewSet() { return In(fmt::format("{}.dtr", sets_++)); }
   std::vector<std::string> Import(const std::string& cameras, const std::string& images,
@@ -177,10 +177,10 @@ TEST_F(Advice, OfPosesForPhotosLeadsToTheGoal) {
     return further;
   };
   DtrOk(taken({}));
-  // What such a model brings: no points, so that they would be triangulated; names are refused
+  // What such a model brings: no points, so that they would be triangulated; names are rejected
   // first.
-  ExpectRefused(Dtr(build({"--poses", model})), kFailed,
-                "name the photos as it does, or give theirs");
+  ExpectRejected(Dtr(build({"--poses", model})), kFailed,
+                 "name the photos as it does, or give theirs");
   ExpectAllLeadToTheGoal({{kWrongUsage,
                            "choose another name or pass --force to replace it",
                            taken({}),

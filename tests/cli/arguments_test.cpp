@@ -19,26 +19,26 @@ TEST_F(Arguments, NumbersThatAreNone) {
   for (const char* word : {"nan", "-nan", "inf", "1e999", "4GB"}) {
     SCOPED_TRACE(word);
     const Ran ran = Dtr({"capture", Photos(), "-o", In("capture"), "--memory", word});
-    ExpectRefused(ran, kWrongUsage, words);
+    ExpectRejected(ran, kWrongUsage, words);
     EXPECT_NE(ran.err.find("--memory" + words + word), std::string::npos) << ran.err;
   }
-  ExpectRefused(Dtr({"advise", Shared("good.dtr"), "--max-gap", "nan"}), kWrongUsage, words);
-  ExpectRefused(Dtr({"bench", Shared("good.dtr"), "--views", "2,nan"}), kWrongUsage, words);
+  ExpectRejected(Dtr({"advise", Shared("good.dtr"), "--max-gap", "nan"}), kWrongUsage, words);
+  ExpectRejected(Dtr({"bench", Shared("good.dtr"), "--views", "2,nan"}), kWrongUsage, words);
   EXPECT_FALSE(fs::exists(In("capture")));
 }
 
 TEST_F(Arguments, OutputsWithoutANameOrWithTheNameOfAnother) {
-  ExpectRefused(Dtr({"capture", Photos(), "-o", ""}), kWrongUsage,
-                "--output: expected a name, found an empty one");
-  ExpectRefused(Dtr({"render", Shared("good.dtr"), "--renderer", "cpu", "--like", "0001", "-o",
-                     In("view.png"), "--json", In("./view.png")}),
-                kWrongUsage, ": expected another file than --output, found it");
+  ExpectRejected(Dtr({"capture", Photos(), "-o", ""}), kWrongUsage,
+                 "--output: expected a name, found an empty one");
+  ExpectRejected(Dtr({"render", Shared("good.dtr"), "--renderer", "cpu", "--like", "0001", "-o",
+                      In("view.png"), "--json", In("./view.png")}),
+                 kWrongUsage, ": expected another file than --output, found it");
   EXPECT_FALSE(fs::exists(In("view.png")));
 }
 
 TEST_F(Arguments, WordsOfSeveralLines) {
-  ExpectRefused(Dtr({"info", In("a\nb.dtr")}), kWrongUsage,
-                "expected no control characters, found '");
+  ExpectRejected(Dtr({"info", In("a\nb.dtr")}), kWrongUsage,
+                 "expected no control characters, found '");
 }
 
 TEST_F(Arguments, AVideoMayHaveAnyName) {
@@ -54,13 +54,13 @@ TEST_F(Arguments, AVideoMayHaveAnyName) {
 TEST_F(Arguments, TwoCalibrationsInOneFolder) {
   fs::create_directories(In("model/workspace"));
   const FileLock lock = WorkFolder::Lock(In("model/workspace"), capture::kCalibrationKind);
-  ExpectRefused(Dtr({"calibrate", "photos", Photos(), "-o", In("model")}), kWrongUsage,
-                "workspace: another process is writing this calibration; wait for it");
+  ExpectRejected(Dtr({"calibrate", "photos", Photos(), "-o", In("model")}), kWrongUsage,
+                 "workspace: another process is writing this calibration; wait for it");
 }
 
 TEST_F(Arguments, ASetInThePlaceOfPhotos) {
-  ExpectRefused(Dtr({"build", Shared("good.dtr"), "-o", In("set.dtr")}), kWrongUsage,
-                "expected a folder of photos, found a D+TR set; give the photos it was made of");
+  ExpectRejected(Dtr({"build", Shared("good.dtr"), "-o", In("set.dtr")}), kWrongUsage,
+                 "expected a folder of photos, found a D+TR set; give the photos it was made of");
 }
 
 }  // namespace

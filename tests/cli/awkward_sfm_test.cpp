@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 
 void WritePlain(const fs::path& file, const ImageRgb8& image) { io::WriteImage(file, image); }
 
-// Of another camera: the middle of the picture alone.
+// Of another camera: the middle of the image alone.
 void WriteMiddle(const fs::path& file, const ImageRgb8& image) {
   constexpr int kCutPx = 24;
   ImageRgb8 middle(image.width() - 2 * kCutPx, image.height(), 3);
@@ -53,7 +53,7 @@ constexpr Kind kKinds[kArcPhotos] = {
 
 // Largest distance of a camera from its true place, after alignment, as a share of the median
 // distance between neighbours. Measured: 0.0017; COLMAP does not repeat itself exactly.
-constexpr double kMostOff = 0.01;
+constexpr double kMaxOff = 0.01;
 
 TEST(AwkwardPhotosThroughColmap, AllHaveTheirCameras) {
   if (FindProgram("colmap").empty()) GTEST_SKIP() << "SKIPPED: colmap is absent";
@@ -86,7 +86,7 @@ TEST(AwkwardPhotosThroughColmap, AllHaveTheirCameras) {
   std::nth_element(steps.begin(), steps.begin() + steps.size() / 2, steps.end());
   const calib::Similarity aligned = calib::AlignPoints(found, expected);
   for (size_t i = 0; i < found.size(); ++i) {
-    EXPECT_LT((aligned * found[i] - expected[i]).norm(), kMostOff * steps[steps.size() / 2])
+    EXPECT_LT((aligned * found[i] - expected[i]).norm(), kMaxOff * steps[steps.size() / 2])
         << kKinds[i].name;
   }
 }

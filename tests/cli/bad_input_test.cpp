@@ -56,12 +56,12 @@ class BadInput : public CourtyardAndSet {
 
 TEST_F(BadInput, FoldersWithoutEnoughPhotos) {
   fs::create_directories(folder_ / "photos");
-  ExpectRefused(Build(In("photos")), kFailed, "expected photos, found none");
+  ExpectRejected(Build(In("photos")), kFailed, "expected photos, found none");
   fs::copy(Photos() + "/0000.jpg", In("photos"));
-  ExpectRefused(Build(In("photos")), kFailed, "expected at least 2 photos, found 1");
-  ExpectRefused(Build(In("absent")), kWrongUsage, "expected a folder of photos, found nothing");
-  ExpectRefused(Build(Photos() + "/0000.jpg"), kWrongUsage,
-                "expected a folder of photos, found something else");
+  ExpectRejected(Build(In("photos")), kFailed, "expected at least 2 photos, found 1");
+  ExpectRejected(Build(In("absent")), kWrongUsage, "expected a folder of photos, found nothing");
+  ExpectRejected(Build(Photos() + "/0000.jpg"), kWrongUsage,
+                 "expected a folder of photos, found something else");
   ExpectNothingBuilt();
 }
 
@@ -72,9 +72,9 @@ TEST_F(BadInput, ALensFileIsReadBeforeAnyPhoto) {
     return Dtr({"calibrate", "photos", In("photos"), "-o", In("calibration"), "--lens", In(lens)});
   };
   WriteFileAtomically(In("lens.json"), "{}");
-  ExpectRefused(calibrate("lens.json"), kFailed, "format: expected a string, found nothing");
+  ExpectRejected(calibrate("lens.json"), kFailed, "format: expected a string, found nothing");
   WriteFileAtomically(In("lens.ini"), "");
-  ExpectRefused(calibrate("lens.ini"), kWrongUsage, "expected a .json of `dtr calibrate board`");
+  ExpectRejected(calibrate("lens.ini"), kWrongUsage, "expected a .json of `dtr calibrate board`");
   EXPECT_FALSE(fs::exists(In("calibration")));
 }
 
@@ -95,14 +95,14 @@ TEST_F(BadInput, ATextFileAmongThePhotosIsSkippedAndNamed) {
 TEST_F(BadInput, ColmapThatIsAbsentOrFails) {
   {
     const Environment path("PATH", In("bin"));
-    ExpectRefused(Build(Photos()), kFailed, "colmap: program not found on the PATH");
-    ExpectRefused(Build(Photos(), {"--poses", Shared("courtyard/cameras.json")}), kFailed,
-                  "colmap: program not found on the PATH");
+    ExpectRejected(Build(Photos()), kFailed, "colmap: program not found on the PATH");
+    ExpectRejected(Build(Photos(), {"--poses", Shared("courtyard/cameras.json")}), kFailed,
+                   "colmap: program not found on the PATH");
     ExpectNothingBuilt();
   }
   colmap::testing::FakeColmap colmap;
   colmap.Fail("feature_extractor", "echo full; exit 3");
-  ExpectRefused(
+  ExpectRejected(
       Build(Photos()), kFailed,
       "colmap feature_extractor (features): expected exit code 0, found 3: last line: full");
   EXPECT_FALSE(fs::exists(In("set.dtr")));
@@ -113,14 +113,15 @@ TEST_F(BadInput, PhotosWithNothingInCommon) {
   // Photos are numbered for COLMAP, whatever their names.
   colmap.LeaveDatabase({"000000.jpg", "000001.jpg", "000002.jpg", "000003.jpg", "000004.jpg",
                         "000005.jpg", "000006.jpg"});
-  ExpectRefused(Build(Photos()), kFailed, "found that they have too little in common");
+  ExpectRejected(Build(Photos()), kFailed, "found that they have too little in common");
   EXPECT_FALSE(fs::exists(In("set.dtr")));
 }
 
 TEST_F(BadInput, CameraGroupsOfKnownCameras) {
   for (const char* known : {"--poses", "--rig"}) {
-    ExpectRefused(Build(Photos(), {"--camera-per", "set", known, Shared("courtyard/cameras.json")}),
-                  kWrongUsage, "--camera-per: says which photos share intrinsics that SfM finds");
+    ExpectRejected(
+        Build(Photos(), {"--camera-per", "set", known, Shared("courtyard/cameras.json")}),
+        kWrongUsage, "--camera-per: says which photos share intrinsics that SfM finds");
   }
   EXPECT_FALSE(fs::exists(In("set.dtr")));
 }
@@ -129,26 +130,27 @@ TEST_F(BadInput, OutputsThatExistOrCannotBeMade) {
   fs::create_directories(folder_ / "set.dtr");
   WriteFileAtomically(In("set.dtr/mine"), "precious");
   const std::vector<std::string> poses = {"--poses", Shared("courtyard/sparse")};
-  ExpectRefused(Build(Photos(), poses), kWrongUsage, "expected no such folder yet, found one");
-  ExpectRefused(Build(Photos(), {"--force", "--poses", Shared("courtyard/sparse")}), kWrongUsage,
-                "expected a D+TR set to replace, found something else");
+  ExpectRejected(Build(Photos(), poses), kWrongUsage, "expected no such folder yet, found one");
+  ExpectRejected(Build(Photos(), {"--force", "--poses", Shared("courtyard/sparse")}), kWrongUsage,
+                 "expected a D+TR set to replace, found something else");
   EXPECT_EQ(Text(In("set.dtr/mine")), "precious");
   const Ran onto_file = Dtr({"build", Photos(), "-o", In("set.dtr/mine"), "--force"});
-  ExpectRefused(onto_file, kWrongUsage, "expected no such folder yet, found a file");
+  ExpectRejected(onto_file, kWrongUsage, "expected no such folder yet, found a file");
   EXPECT_THAT(onto_file.err, Not(HasSubstr("== photos")));  // said before any is read
-  ExpectRefused(Dtr({"evaluate", Shared("good.dtr"), "--pictures", In("set.dtr/mine")}),
-                kWrongUsage, ": expected a folder, found a file");
+  ExpectRejected(Dtr({"evaluate", Shared("good.dtr"), "--pictures", In("set.dtr/mine")}),
+                 kWrongUsage, ": expected a folder, found a file");
   const auto build_into = [&](const std::string& set) {
     return Dtr({"build", Photos(), "-o", set, "--poses", Shared("courtyard/sparse")});
   };
-  ExpectRefused(build_into(In("set.dtr/mine/set.dtr")), kFailed, "cannot be made: Not a directory");
-  ExpectRefused(build_into("/proc/set.dtr"), kFailed, "cannot be made: No such file or directory");
-  ExpectRefused(Dtr({"export", Shared("good.dtr"), "-o", In("set.dtr")}), kWrongUsage,
-                "exists already; choose another folder");
-  ExpectRefused(Dtr({"export", Shared("good.dtr"), "-o", In("absent/colmap")}), kWrongUsage,
-                "expected an existing folder to write into, found nothing");
-  ExpectRefused(Dtr({"info", Shared("good.dtr"), "--json", In("absent/info.json")}), kWrongUsage,
-                "expected an existing folder to write into, found nothing");
+  ExpectRejected(build_into(In("set.dtr/mine/set.dtr")), kFailed,
+                 "cannot be made: Not a directory");
+  ExpectRejected(build_into("/proc/set.dtr"), kFailed, "cannot be made: No such file or directory");
+  ExpectRejected(Dtr({"export", Shared("good.dtr"), "-o", In("set.dtr")}), kWrongUsage,
+                 "exists already; choose another folder");
+  ExpectRejected(Dtr({"export", Shared("good.dtr"), "-o", In("absent/colmap")}), kWrongUsage,
+                 "expected an existing folder to write into, found nothing");
+  ExpectRejected(Dtr({"info", Shared("good.dtr"), "--json", In("absent/info.json")}), kWrongUsage,
+                 "expected an existing folder to write into, found nothing");
 }
 
 TEST_F(BadInput, HoldoutsAndPosesThatDoNotFit) {
@@ -158,30 +160,30 @@ TEST_F(BadInput, HoldoutsAndPosesThatDoNotFit) {
                                : std::vector<std::string>{"--poses", Shared("courtyard/sparse"),
                                                           option, value});
   };
-  ExpectRefused(with("--holdout", "0000,0001,0002,0003,0004,0005"), kWrongUsage,
-                "expected at least 2 photos to build from, found 1 of 7");
-  ExpectRefused(with("--holdout", "every:1"), kWrongUsage,
-                "expected every:N with a whole number N >= 2, found '1'");
-  ExpectRefused(with("--holdout", "nobody"), kWrongUsage, "no photo is named 'nobody'");
-  ExpectRefused(with("--poses", In("absent")), kWrongUsage, "no such file or folder");
+  ExpectRejected(with("--holdout", "0000,0001,0002,0003,0004,0005"), kWrongUsage,
+                 "expected at least 2 photos to build from, found 1 of 7");
+  ExpectRejected(with("--holdout", "every:1"), kWrongUsage,
+                 "expected every:N with a whole number N >= 2, found '1'");
+  ExpectRejected(with("--holdout", "nobody"), kWrongUsage, "no photo is named 'nobody'");
+  ExpectRejected(with("--poses", In("absent")), kWrongUsage, "no such file or folder");
   fs::create_directories(folder_ / "empty");
   EXPECT_EQ(with("--poses", In("empty")).code, kFailed);
   ExpectNothingBuilt();
 }
 
 TEST_F(BadInput, WordsThatMeanNothing) {
-  ExpectRefused(Dtr({"info", Shared("good.dtr"), "--frobnicate"}), kWrongUsage,
-                "The following argument was not expected: --frobnicate");
-  ExpectRefused(Dtr({"frobnicate"}), kWrongUsage, "no command is called 'frobnicate'");
-  ExpectRefused(Dtr({}), kWrongUsage, "A subcommand is required");
-  ExpectRefused(Dtr({"build"}), kWrongUsage, "PHOTOS is required");
-  ExpectRefused(Build(Photos(), {"--engine", "magic"}), kWrongUsage, "--engine: magic not in");
-  ExpectRefused(Build(Photos(), {"--threads", "-1"}), kWrongUsage,
-                "--threads: Value -1 not in range");
-  ExpectRefused(Dtr({"info", Shared("good.dtr"), "--threads", "1.5"}), kWrongUsage,
-                "--threads: expected a whole number, found 1.5");
-  ExpectRefused(Dtr({"join", Shared("good.dtr"), Shared("good.dtr"), "-o", In("j"), "--fps", "0"}),
-                kWrongUsage, "--fps: expected a number above 0, found 0");
+  ExpectRejected(Dtr({"info", Shared("good.dtr"), "--frobnicate"}), kWrongUsage,
+                 "The following argument was not expected: --frobnicate");
+  ExpectRejected(Dtr({"frobnicate"}), kWrongUsage, "no command is called 'frobnicate'");
+  ExpectRejected(Dtr({}), kWrongUsage, "A subcommand is required");
+  ExpectRejected(Dtr({"build"}), kWrongUsage, "PHOTOS is required");
+  ExpectRejected(Build(Photos(), {"--engine", "magic"}), kWrongUsage, "--engine: magic not in");
+  ExpectRejected(Build(Photos(), {"--threads", "-1"}), kWrongUsage,
+                 "--threads: Value -1 not in range");
+  ExpectRejected(Dtr({"info", Shared("good.dtr"), "--threads", "1.5"}), kWrongUsage,
+                 "--threads: expected a whole number, found 1.5");
+  ExpectRejected(Dtr({"join", Shared("good.dtr"), Shared("good.dtr"), "-o", In("j"), "--fps", "0"}),
+                 kWrongUsage, "--fps: expected a number above 0, found 0");
 }
 
 TEST_F(BadInput, SetsCutShort) {
@@ -190,26 +192,27 @@ TEST_F(BadInput, SetsCutShort) {
   constexpr size_t kCuts = 12;  // tests/io cuts in-process, 13 bytes at a time
   for (size_t i = 0; i < kCuts; ++i) {
     WriteFileAtomically(set / "set.json", text.substr(0, i * (text.size() - 1) / kCuts));
-    ExpectRefused(Dtr({"info", set.string()}), kFailed, "expected JSON, found an error after byte");
+    ExpectRejected(Dtr({"info", set.string()}), kFailed,
+                   "expected JSON, found an error after byte");
   }
-  ExpectRefused(Dtr({"info", In("absent.dtr")}), kFailed,
-                "expected the folder of a D+TR set, found nothing");
+  ExpectRejected(Dtr({"info", In("absent.dtr")}), kFailed,
+                 "expected the folder of a D+TR set, found nothing");
   fs::remove(set / "set.json");
-  ExpectRefused(Dtr({"info", set.string()}), kFailed,
-                "expected the file that makes a folder a D+TR set");
+  ExpectRejected(Dtr({"info", set.string()}), kFailed,
+                 "expected the file that makes a folder a D+TR set");
 }
 
 TEST_F(BadInput, SetsWithWrongFields) {
-  ExpectRefused(InfoAfter("\"format_version\": 1", "\"format_version\": 7"), kFailed,
-                "format_version: expected 1, found 7");
-  ExpectRefused(InfoAfter("\"translation\": [", "\"translation\": [NaN, "), kFailed,
-                "expected JSON, found an error after byte");
-  ExpectRefused(InfoAfter("\"translation\": [", "\"translation\": [null, "), kFailed,
-                "cam_from_world.translation: expected 3 numbers");
-  ExpectRefused(InfoAfter("\"fx_px\": ", "\"fx_px\": -"), kFailed,
-                "camera.fx_px: expected a positive number");
-  ExpectRefused(InfoAfter("\"images/0001.png\"", "\"../0001.png\""), kFailed,
-                "image.path: expected a relative path inside the set's folder");
+  ExpectRejected(InfoAfter("\"format_version\": 1", "\"format_version\": 7"), kFailed,
+                 "format_version: expected 1, found 7");
+  ExpectRejected(InfoAfter("\"translation\": [", "\"translation\": [NaN, "), kFailed,
+                 "expected JSON, found an error after byte");
+  ExpectRejected(InfoAfter("\"translation\": [", "\"translation\": [null, "), kFailed,
+                 "cam_from_world.translation: expected 3 numbers");
+  ExpectRejected(InfoAfter("\"fx_px\": ", "\"fx_px\": -"), kFailed,
+                 "camera.fx_px: expected a positive number");
+  ExpectRejected(InfoAfter("\"images/0001.png\"", "\"../0001.png\""), kFailed,
+                 "image.path: expected a relative path inside the set's folder");
 }
 
 TEST_F(BadInput, SetsOfAnotherToolStayReadable) {
@@ -223,10 +226,11 @@ TEST_F(BadInput, SetsOfAnotherToolStayReadable) {
 TEST_F(BadInput, SetsWithMissingOrDamagedFiles) {
   fs::path set = Copy();
   fs::remove(set / "depth/0001.png");
-  ExpectRefused(Dtr({"info", set.string()}), kFailed, "depth.path: expected a file, found nothing");
+  ExpectRejected(Dtr({"info", set.string()}), kFailed,
+                 "depth.path: expected a file, found nothing");
   set = Copy();
   fs::resize_file(set / "images/0001.png", 100);
-  ExpectRefused(Dtr({"info", set.string()}), kFailed, "bytes as recorded, found 100");
+  ExpectRejected(Dtr({"info", set.string()}), kFailed, "bytes as recorded, found 100");
   for (const char* file : {"images/0001.png", "held_out/images/0004.png"}) {
     set = Copy();
     std::string bytes = Text(set / file);
@@ -273,21 +277,21 @@ TEST_F(BadInput, AViewThatCannotBeReadIsLeftOutOfAPictureAndNamed) {
 }
 
 TEST_F(BadInput, PicturesThatCannotBeAskedForOrWritten) {
-  ExpectRefused(Render({"--like", "nobody", "-o", In("view.png")}), kWrongUsage,
-                "no view is named 'nobody'");
-  ExpectRefused(Render({"-o", In("view.png")}), kWrongUsage, "Exactly 1 option from");
-  ExpectRefused(Render({"--like", "0001", "-o", In("view.xyz")}), kWrongUsage,
-                "expected a name ending in .png or .jpg or .jpeg, found '.xyz'");
-  ExpectRefused(Render({"--like", "0001", "-o", In("absent/view.png")}), kWrongUsage,
-                "expected an existing folder to write into, found nothing");
-  ExpectRefused(Render({"--fly-through", "3", "-o", In("path.png")}), kWrongUsage,
-                "several frames need a folder or an .mp4 file");
-  ExpectRefused(Render({"--like", "0001", "-o", In("view.png"), "--size", "0x0"}), kWrongUsage,
-                "expected at least one side above 0");
-  ExpectRefused(Render({"--like", "0001", "-o", In("view.png"), "--depth-out", In("d.png")}),
-                kWrongUsage, "expected a name ending in .exr, found '.png'");
-  ExpectRefused(Render({"--camera", In("absent.json"), "-o", In("view.png")}), kFailed,
-                "cannot be read: No such file or directory");
+  ExpectRejected(Render({"--like", "nobody", "-o", In("view.png")}), kWrongUsage,
+                 "no view is named 'nobody'");
+  ExpectRejected(Render({"-o", In("view.png")}), kWrongUsage, "Exactly 1 option from");
+  ExpectRejected(Render({"--like", "0001", "-o", In("view.xyz")}), kWrongUsage,
+                 "expected a name ending in .png or .jpg or .jpeg, found '.xyz'");
+  ExpectRejected(Render({"--like", "0001", "-o", In("absent/view.png")}), kWrongUsage,
+                 "expected an existing folder to write into, found nothing");
+  ExpectRejected(Render({"--fly-through", "3", "-o", In("path.png")}), kWrongUsage,
+                 "several frames need a folder or an .mp4 file");
+  ExpectRejected(Render({"--like", "0001", "-o", In("view.png"), "--size", "0x0"}), kWrongUsage,
+                 "expected at least one side above 0");
+  ExpectRejected(Render({"--like", "0001", "-o", In("view.png"), "--depth-out", In("d.png")}),
+                 kWrongUsage, "expected a name ending in .exr, found '.png'");
+  ExpectRejected(Render({"--camera", In("absent.json"), "-o", In("view.png")}), kFailed,
+                 "cannot be read: No such file or directory");
   EXPECT_THAT(Contents(folder_.path()), IsEmpty());
 }
 

@@ -13,7 +13,8 @@ namespace {
 
 using Json = nlohmann::json;
 
-// A good calibration of these photos, by any run of COLMAP: what the yardstick's own sights err by.
+// A good calibration of these photos, by any run of COLMAP: what the reference tracks's own
+// observations err by.
 constexpr double kGoodPx = 0.6;
 
 TEST(BenchCalibrationByColmap, SmallerFeaturesCostLessAndErrMore) {

@@ -1,4 +1,4 @@
-// `dtr bench --stage calibration`: photos calibrated anew. A fake COLMAP leaves cameras whose
+// `dtr bench --stage calibration`: photos calibrated again. A fake COLMAP leaves cameras whose
 // errors are known, so that it is known, too, which of them must be told to be better.
 #include <fmt/format.h>
 
@@ -62,8 +62,8 @@ class BenchCalibration : public ::testing::Test {
     colmap::WriteModel(colmap / "model.0", model, colmap::Format::kBinary);
     colmap.LeaveDatabase(aliases);
   }
-  /// The truth with every second camera turned to the right by so many pixels, the sights as they
-  /// are.
+  /// The truth with every second camera turned to the right by so many pixels, the observations as
+  /// they are.
   static calib::SfmModel Turned(double by_px) {
     calib::SfmModel model = *truth_;
     const Eigen::Quaterniond turn(Eigen::AngleAxisd(by_px / kFocalPx, Eigen::Vector3d::UnitY()));
@@ -98,7 +98,7 @@ TEST_F(BenchCalibration, WorseCamerasHaveALargerErrorAndRefinementMendsThem) {
   const Json truth = Point("refine=no");
   EXPECT_GT(truth["cost"], 0);
   EXPECT_EQ(truth["figures"]["not_registered"], 0);
-  EXPECT_EQ(truth["figures"]["yardstick_predicted"], truth["figures"]["yardstick_sights"]);
+  EXPECT_EQ(truth["figures"]["reference_tracks_predicted"], truth["figures"]["yardstick_sights"]);
   EXPECT_GT(truth["figures"]["yardstick_sights"], 400);
   EXPECT_LT(truth["figures"]["median_px"], 0.5);
   double last = truth["error"];
@@ -108,7 +108,7 @@ TEST_F(BenchCalibration, WorseCamerasHaveALargerErrorAndRefinementMendsThem) {
     EXPECT_GT(error, 1.1 * last) << by_px;
     last = error;
   }
-  // Exact sights say where the cameras look: adjusted, they are the true ones again.
+  // Exact observations say where the cameras look: adjusted, they are the true ones again.
   EXPECT_NEAR(Point("refine=yes")["error"], truth["error"], 0.02 * truth["error"].get<double>());
 }
 
@@ -132,9 +132,9 @@ TEST_F(BenchCalibration, FewerCamerasAreNoAdvantage) {
   EXPECT_EQ(point["figures"]["not_registered"], 1);
   EXPECT_EQ(point["figures"]["yardstick_sights"], all["figures"]["yardstick_sights"]);
   EXPECT_GT(point["error"], 1.5 * all["error"].get<double>());
-  // By hand: a sight that is missed counts as 10 scales of half a pixel per 1000.
+  // By hand: an observation that is missed counts as 10 scales of half a pixel per 1000.
   const double sights = point["figures"]["yardstick_sights"],
-               missed = sights - point["figures"]["yardstick_predicted"].get<double>(),
+               missed = sights - point["figures"]["reference_tracks_predicted"].get<double>(),
                missed_px = 10 * 0.0005 * kCamera.width_px();
   EXPECT_GT(missed, 0.05 * sights);
   EXPECT_GT(point["error"], missed_px * std::sqrt(missed / sights));
@@ -231,34 +231,35 @@ TEST_F(BenchCalibration, OtherPhotosAreMeasuredAnew) {
   EXPECT_EQ(Json::parse(Text(folder_ / "out/work.json"))["measurements"].size(), 2u);
 }
 
-TEST_F(BenchCalibration, WhatCannotBeMeasuredIsRefused) {
+TEST_F(BenchCalibration, WhatCannotBeMeasuredIsRejected) {
   colmap::testing::FakeColmap colmap;
   const std::string set = (*shared_ / "set.dtr").string(), photos = (*shared_ / "photos").string();
   const auto bench = [&](std::vector<std::string> words) {
     words.insert(words.begin(), {"bench", set, "--renderer", "cpu"});
     return Dtr(words);
   };
-  ExpectRefused(bench({"--photos", photos}), kWrongUsage,
-                "--photos, --feature-size: expected --stage calibration with them");
-  ExpectRefused(bench({"--stage", "stereo", "--feature-size", "200"}), kWrongUsage,
-                "--photos, --feature-size: expected --stage calibration with them");
-  ExpectRefused(
+  ExpectRejected(bench({"--photos", photos}), kWrongUsage,
+                 "--photos, --feature-size: expected --stage calibration with them");
+  ExpectRejected(bench({"--stage", "stereo", "--feature-size", "200"}), kWrongUsage,
+                 "--photos, --feature-size: expected --stage calibration with them");
+  ExpectRejected(
       bench({"--stage", "calibration"}), kWrongUsage,
       "--stage calibration: expected --photos with it, the folder that the set was built from");
-  ExpectRefused(Dtr(Words({"--point", "refine=perhaps"})), kWrongUsage,
-                "--point: expected a value of {yes,no} for refine, found 'refine=perhaps'");
+  ExpectRejected(Dtr(Words({"--point", "refine=perhaps"})), kWrongUsage,
+                 "--point: expected a value of {yes,no} for refine, found 'refine=perhaps'");
   // Photos that are not the set's, and such as nothing can be judged by.
   fs::create_directories(folder_ / "grey");
   for (int i = 0; i < kPhotos; ++i) {
     const ImageRgb8 grey(480, 320, 3, static_cast<std::uint8_t>(60 + 20 * i));
     io::WriteImage(folder_ / "grey" / fmt::format("{:04}.jpg", i), grey);
   }
-  ExpectRefused(bench({"--stage", "calibration", "--photos", (folder_ / "grey").string()}), kFailed,
-                "expected 100 points that 4 or more photos show, to judge cameras by, found 0; "
-                "take photos that overlap more");
+  ExpectRejected(bench({"--stage", "calibration", "--photos", (folder_ / "grey").string()}),
+                 kFailed,
+                 "expected 100 points that 4 or more photos show, to measure cameras by, found 0; "
+                 "take photos that overlap more");
   fs::rename(folder_ / "grey/0005.jpg", folder_ / "grey/other.jpg");
-  ExpectRefused(bench({"--stage", "calibration", "--photos", (folder_ / "grey").string()}), kFailed,
-                "was built from, found none called 0005.jpg");
+  ExpectRejected(bench({"--stage", "calibration", "--photos", (folder_ / "grey").string()}),
+                 kFailed, "was built from, found none called 0005.jpg");
 }
 
 }  // namespace

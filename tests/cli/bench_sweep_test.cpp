@@ -126,7 +126,7 @@ TEST_F(BenchSweep, GoesOnFromWhatWasMeasured) {
     ASSERT_EQ(Dtr(Sweep("3")).code, kFailed) << length;
   }
   WriteFileAtomically(folder_ / "out/work.json", R"({"format": 2, "measurements": []})");
-  ExpectRefused(Dtr(Sweep("3")), kFailed, "work.json: format: expected 1, found 2");
+  ExpectRejected(Dtr(Sweep("3")), kFailed, "work.json: format: expected 1, found 2");
 }
 
 TEST_F(BenchSweep, DepthByEngineAndSize) {
@@ -152,13 +152,13 @@ TEST_F(BenchSweep, DepthByEngineAndSize) {
 TEST_F(BenchSweep, TruthThatShowsNothingIsTold) {
   const fs::path truth = folder_ / "truth";
   fs::copy(Shared("courtyard"), truth, fs::copy_options::recursive);
-  fs::remove(truth / "dataset.json");  // from which truth is cast anew
+  fs::remove(truth / "dataset.json");  // from which truth is cast again
   for (const auto& entry : fs::directory_iterator(truth / "depth")) {
     io::WriteExr(entry.path(), Grid<float>(kCourtyardWidthPx, kCourtyardHeightPx));
   }
-  ExpectRefused(Dtr({"bench", Shared("cameras.dtr"), "--stage", "stereo", "--max-size", "192",
-                     "--truth", truth.string(), "--point", "engine=sgbm", "--renderer", "cpu"}),
-                kFailed, "bench stereo: expected true pixels to score, found none");
+  ExpectRejected(Dtr({"bench", Shared("cameras.dtr"), "--stage", "stereo", "--max-size", "192",
+                      "--truth", truth.string(), "--point", "engine=sgbm", "--renderer", "cpu"}),
+                 kFailed, "bench stereo: expected true pixels to score, found none");
 }
 
 TEST_F(BenchSweep, StorageByBytes) {
@@ -209,28 +209,28 @@ TEST_F(BenchSweep, StorageAsTheSetLiesAndInFewerBytes) {
   EXPECT_NE(jpeg["error"], own["error"]);
 }
 
-TEST_F(BenchSweep, WhatCannotBeMeasuredIsRefused) {
+TEST_F(BenchSweep, WhatCannotBeMeasuredIsRejected) {
   const auto bench = [](std::vector<std::string> words) {
     words.insert(words.begin(), {"bench", Shared("true.dtr"), "--renderer", "cpu"});
     return Dtr(words);
   };
-  ExpectRefused(bench({"--point", "color=red"}), kWrongUsage,
-                "--point: expected default or NAME=VALUE,... with names of "
-                "{method,views,resolution,blend,mesh-tolerance,delta,point-size,exponent,falloff,"
-                "blend-k,max-angle}, found "
-                "'color=red'");
-  ExpectRefused(bench({"--point", "resolution=9"}), kWrongUsage,
-                "--point: expected a value of {1,2,4} for resolution, found 'resolution=9'");
-  ExpectRefused(bench({"--point", "views=4", "-o", (folder_ / "x").string()}), kWrongUsage,
-                "--point: expected no --output beside it, for one setting writes no folder");
-  ExpectRefused(bench({"--point", "default", "--stage", "render,storage"}), kWrongUsage,
-                "--point: expected one --stage with it, found several");
-  ExpectRefused(bench({"--budget-ms", "5", "--stage", "storage"}), kWrongUsage,
-                "--budget-ms: expected --stage render with it");
-  ExpectRefused(bench({"--max-size", "5"}), kWrongUsage,
-                "--truth, --max-size: expected --stage stereo with them");
-  ExpectRefused(bench({"--point", "default", "--table", "report"}), kWrongUsage,
-                "--table excludes --point");
+  ExpectRejected(bench({"--point", "color=red"}), kWrongUsage,
+                 "--point: expected default or NAME=VALUE,... with names of "
+                 "{method,views,resolution,blend,mesh-tolerance,delta,point-size,exponent,falloff,"
+                 "blend-k,max-angle}, found "
+                 "'color=red'");
+  ExpectRejected(bench({"--point", "resolution=9"}), kWrongUsage,
+                 "--point: expected a value of {1,2,4} for resolution, found 'resolution=9'");
+  ExpectRejected(bench({"--point", "views=4", "-o", (folder_ / "x").string()}), kWrongUsage,
+                 "--point: expected no --output beside it, for one setting writes no folder");
+  ExpectRejected(bench({"--point", "default", "--stage", "render,storage"}), kWrongUsage,
+                 "--point: expected one --stage with it, found several");
+  ExpectRejected(bench({"--budget-ms", "5", "--stage", "storage"}), kWrongUsage,
+                 "--budget-ms: expected --stage render with it");
+  ExpectRejected(bench({"--max-size", "5"}), kWrongUsage,
+                 "--truth, --max-size: expected --stage stereo with them");
+  ExpectRejected(bench({"--point", "default", "--table", "report"}), kWrongUsage,
+                 "--table excludes --point");
 }
 
 }  // namespace

@@ -52,7 +52,7 @@ TEST_F(BuildCoverage, IsWhatAdviseFindsAndTheSameForAnyNumberOfThreads) {
   for (const Json& place : advice["places"]) poor += place["poor"].get<bool>();
   EXPECT_GT(poor, 0) << "nothing would be tested";
   EXPECT_THAT(lines[0], HasSubstr("coverage: " + std::to_string(poor) + " of " +
-                                  std::to_string(advice["places"].size()) + " places"));
+                                  std::to_string(advice["places"].size()) + " positions"));
   ASSERT_FALSE(advice["add"].empty());
   EXPECT_THAT(lines[0], HasSubstr(advice["add"][0]["where"].get<std::string>()));
   if (advice["adds_nothing"].empty()) {

@@ -127,7 +127,7 @@ TEST_F(BuildInMetres, ADistanceBetweenCamerasIsHeldByCalibratePhotos) {
 }
 
 // Photos that structure from motion finds no camera for hold nothing.
-TEST_F(BuildInMetres, TooFewCamerasForWhatIsKnownAreRefused) {
+TEST_F(BuildInMetres, TooFewCamerasForWhatIsKnownAreRejected) {
   calib::SfmModel model = colmap::ReadModel(colmap_ / "model.0");
   model.images.resize(3);
   std::erase_if(model.points, [&](const auto& item) {
@@ -138,18 +138,19 @@ TEST_F(BuildInMetres, TooFewCamerasForWhatIsKnownAreRefused) {
   });
   fs::remove_all(colmap_ / "model.0");
   colmap::WriteModel(colmap_ / "model.0", model, colmap::Format::kBinary);
-  ExpectRefused(Build({"--gps"}), kFailed,
-                "--gps: expected at least 4 photos of those with a camera with latitude, longitude "
-                "and altitude, found 3");
+  ExpectRejected(
+      Build({"--gps"}), kFailed,
+      "--gps: expected at least 4 photos of those with a camera with latitude, longitude "
+      "and altitude, found 3");
   fs::remove_all(folder_ / "set.dtr.partial");
-  ExpectRefused(Build({"--distance", "0000,0006=1m"}), kFailed,
-                "--distance 0000,0006=1m: expected two photos that have a camera, found none of "
-                "0006");
+  ExpectRejected(Build({"--distance", "0000,0006=1m"}), kFailed,
+                 "--distance 0000,0006=1m: expected two photos that have a camera, found none of "
+                 "0006");
 }
 
 // A wall faced squarely by a lens that nobody knows: with places or without, `calibrate photos`
 // asks as `calibrate refine` does, before anything is refined.
-TEST_F(BuildInMetres, PhotosThatDoNotDetermineTheirCamerasAreRefusedBeforeTheyAreRefined) {
+TEST_F(BuildInMetres, PhotosThatDoNotDetermineTheirCamerasAreRejectedBeforeTheyAreRefined) {
   const calib::LensCamera lens{calib::LensModel::kPinhole, 192, 128, {150, 150, 96, 64}};
   bundle::SceneSpec spec{.images = kPhotos, .points = 400, .lens = lens, .noise_px = 0.1};
   spec.pose = [](int i, int) {
@@ -175,31 +176,31 @@ TEST_F(BuildInMetres, PhotosThatDoNotDetermineTheirCamerasAreRefusedBeforeTheyAr
     std::vector<std::string> words{"calibrate", "photos", In("photos"), "-o", In("model")};
     words.insert(words.end(), how.begin(), how.end());
     const Ran ran = Dtr(words);
-    ExpectRefused(ran, kFailed, "planar_scene: the points lie in a plane");
+    ExpectRejected(ran, kFailed, "planar_scene: the points lie in a plane");
     EXPECT_THAT(ran.err, Not(HasSubstr("positions:"))) << "refined already";
     EXPECT_FALSE(fs::exists(folder_ / "model/cameras.bin"));
   }
 }
 
-TEST_F(BuildInMetres, WhatCannotBeHeldIsRefusedBeforeAnyWork) {
-  ExpectRefused(Build({"--gps", "--no-refine"}), kWrongUsage,
-                "--gps, --distance: are held by the bundle adjustment of what SfM finds; expected "
-                "no --poses, --rig or --no-refine beside them");
-  ExpectRefused(Build({"--distance", "0000,nobody=1m"}), kWrongUsage,
-                "--distance 0000,nobody=1m: no photo is named 'nobody'");
-  ExpectRefused(
+TEST_F(BuildInMetres, WhatCannotBeHeldIsRejectedBeforeAnyWork) {
+  ExpectRejected(Build({"--gps", "--no-refine"}), kWrongUsage,
+                 "--gps, --distance: are held by the bundle adjustment of what SfM finds; expected "
+                 "no --poses, --rig or --no-refine beside them");
+  ExpectRejected(Build({"--distance", "0000,nobody=1m"}), kWrongUsage,
+                 "--distance 0000,nobody=1m: no photo is named 'nobody'");
+  ExpectRejected(
       Build({"--distance", "0000,0006=1m", "--holdout", "every:3", "--holdout-strict"}),
       kWrongUsage,
       "--distance 0000,0006=1m: expected photos that take part in bundle adjustment, found "
       "0000.jpg, which --holdout-strict keeps out of it");
-  ExpectRefused(Build({"--gps", "--holdout", "0000,0001,0002,0003", "--holdout-strict"}), kFailed,
-                "expected at least 4 photos of those not held out strictly with latitude, "
-                "longitude and altitude, found 3");
+  ExpectRejected(Build({"--gps", "--holdout", "0000,0001,0002,0003", "--holdout-strict"}), kFailed,
+                 "expected at least 4 photos of those not held out strictly with latitude, "
+                 "longitude and altitude, found 3");
   for (const CourtyardPhoto& photo : photos_) fs::remove(folder_ / "photos" / photo.name);
   fs::copy(folder_ / "plain", folder_ / "photos", fs::copy_options::recursive);
-  ExpectRefused(Build({"--gps"}), kFailed,
-                "expected at least 4 photos of the folder with latitude, longitude and altitude, "
-                "found 0");
+  ExpectRejected(Build({"--gps"}), kFailed,
+                 "expected at least 4 photos of the folder with latitude, longitude and altitude, "
+                 "found 0");
   EXPECT_FALSE(fs::exists(folder_ / "set.dtr"));
   EXPECT_FALSE(fs::exists(folder_ / "set.dtr.partial"));
 }

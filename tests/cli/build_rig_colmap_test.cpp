@@ -55,7 +55,7 @@ TEST(BuildRigByColmap, PhotosOfARigBecomeASetInMetresWithItsPlaces) {
   for (size_t i = 0; i < found.size(); ++i) {
     worst = std::max(worst, (aligned * found[i] - truth[i]).norm());
   }
-  std::printf("scale %.5f, worst place %.2f mm\n", aligned.scale, 1e3 * worst);
+  std::printf("scale %.5f, worst position %.2f mm\n", aligned.scale, 1e3 * worst);
   EXPECT_NEAR(aligned.scale, 1, kScale);
   EXPECT_LT(worst, kPlaceM);
   const Json info = Json::parse(DtrOk({"info", set_folder, "--json", "-"}).out);

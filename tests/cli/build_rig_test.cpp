@@ -117,7 +117,8 @@ TEST_F(BuildRig, TheRigGivesPlacesAndMetres) {
     EXPECT_DOUBLE_EQ(views[i].camera.fx_px(), kLeft.fx_px());
     EXPECT_DOUBLE_EQ(views[i + kInstants].camera.cy_px(), kRight.cy_px());
   }
-  // From one instant to another the scale is as good as sights of 0.2 px on 192 pixels make it.
+  // From one time step to another the scale is as good as observations of 0.2 px on 192 pixels make
+  // it.
   EXPECT_NEAR(apart(0, kInstants - 1) / truly_apart(0, kInstants - 1), 1, 0.01);
 
   const Json info = Json::parse(DtrOk({"info", In("set.dtr"), "--json", "-"}).out);
@@ -129,9 +130,10 @@ TEST_F(BuildRig, TheRigGivesPlacesAndMetres) {
   EXPECT_EQ(rig["file"], "rig.json");
   EXPECT_EQ(rig["frames"], kInstants);
   EXPECT_NEAR(rig["scale"], kUnit, 0.01 * kUnit);
-  EXPECT_THAT(DtrOk({"info", In("set.dtr")}).out,
-              HasSubstr("rig: rig.json with cameras left, right; places and scale are the rig's, 5 "
-                        "instants"));
+  EXPECT_THAT(
+      DtrOk({"info", In("set.dtr")}).out,
+      HasSubstr("rig: rig.json with cameras left, right; positions and scale are the rig's, 5 "
+                "instants"));
 
   // A set whose scale has been changed since is no longer the rig's, and validate says so.
   DtrOk({"calibrate", "scale", In("set.dtr"), "--distance",
@@ -166,49 +168,49 @@ TEST_F(BuildRig, AStrictlyHeldOutPhotoTakesItsCamerasLens) {
   EXPECT_TRUE(TestOf(verdict, "cameras_untested")["passed"]);
 }
 
-TEST_F(BuildRig, ARigThatHasMovedSinceIsRefused) {
+TEST_F(BuildRig, ARigThatHasMovedSinceIsRejected) {
   colmap::testing::FakeColmap colmap;
   LeaveModel(colmap);
   Pose turned = RightFromLeft();
   turned.rotation =
       Eigen::Quaterniond(Eigen::AngleAxisd(0.03, Eigen::Vector3d::UnitY())) * turned.rotation;
   WriteRig("turned.json", turned);
-  ExpectRefused(Build({"--rig", In("turned.json")}), kFailed,
-                "rig: expected photos of this rig, found residuals of");
+  ExpectRejected(Build({"--rig", In("turned.json")}), kFailed,
+                 "rig: expected photos of this rig, found residuals of");
   EXPECT_FALSE(fs::exists(In("set.dtr")));
 }
 
-TEST_F(BuildRig, PhotosThatAreNotTheRigsAreRefusedBeforeAnyWork) {
+TEST_F(BuildRig, PhotosThatAreNotTheRigsAreRejectedBeforeAnyWork) {
   colmap::testing::FakeColmap colmap;
   const std::vector<std::string> with_rig{"--rig", In("rig.json")};
-  ExpectRefused(Build({"--rig", In("absent.json")}), kWrongUsage,
-                "expected a .json of dtr calibrate rig, found nothing");
-  ExpectRefused(Build({"--rig", In("rig.json"), "--poses", In("photos")}), kWrongUsage,
-                "--rig: places what SfM finds; expected no --poses beside it");
-  ExpectRefused(Build({"--rig", In("rig.json"), "--no-refine"}), kWrongUsage,
-                "--rig: is bundle adjustment; expected no --no-refine beside it");
+  ExpectRejected(Build({"--rig", In("absent.json")}), kWrongUsage,
+                 "expected a .json of dtr calibrate rig, found nothing");
+  ExpectRejected(Build({"--rig", In("rig.json"), "--poses", In("photos")}), kWrongUsage,
+                 "--rig: positions what SfM finds; expected no --poses beside it");
+  ExpectRejected(Build({"--rig", In("rig.json"), "--no-refine"}), kWrongUsage,
+                 "--rig: is bundle adjustment; expected no --no-refine beside it");
   calib::Calibration alone = CalibrationOf(kRig);
   alone.cameras.pop_back();
   calib::WriteCalibration(folder_ / "alone.json", alone);
-  ExpectRefused(Build({"--rig", In("alone.json")}), kFailed,
-                "expected a rig of 2 cameras or more, found 1");
+  ExpectRejected(Build({"--rig", In("alone.json")}), kFailed,
+                 "expected a rig of 2 cameras or more, found 1");
 
   io::WriteImage(folder_ / "photos/hand.png", ImageRgb8(192, 128, 3, 100));
-  ExpectRefused(Build(with_rig), kFailed,
-                "photo hand.png: expected one of the cameras left, right: CAMERA/NAME or CAMERA "
-                "and a number");
+  ExpectRejected(Build(with_rig), kFailed,
+                 "photo hand.png: expected one of the cameras left, right: CAMERA/NAME or CAMERA "
+                 "and a number");
   fs::remove(folder_ / "photos/hand.png");
   io::WriteImage(folder_ / "photos/right/0009.png", ImageRgb8(96, 64, 3, 100));
-  ExpectRefused(Build(with_rig), kFailed,
-                "photo right/0009.png: expected 192 x 128 px as camera right was calibrated with, "
-                "found 96 x 64");
+  ExpectRejected(Build(with_rig), kFailed,
+                 "photo right/0009.png: expected 192 x 128 px as camera right was calibrated with, "
+                 "found 96 x 64");
   fs::remove(folder_ / "photos/right/0009.png");
   for (int i = 0; i < kInstants; ++i) {
     fs::rename(folder_ / fmt::format("photos/right/{:04}.png", i),
                folder_ / fmt::format("photos/right/1{:03}.png", i));
   }
-  ExpectRefused(Build(with_rig), kFailed,
-                "expected photos of one instant from two cameras that stand apart, found none");
+  ExpectRejected(Build(with_rig), kFailed,
+                 "expected photos taken at one time from two cameras that stand apart, found none");
   EXPECT_TRUE(colmap.Calls().empty());
 }
 
@@ -222,11 +224,11 @@ TEST_F(BuildRig, VideosMustBeOfTheSameInstants) {
                    {"build", In("videos"), "-o", In("set.dtr"), "--rig", In("rig.json")});
     return Dtr(further);
   };
-  ExpectRefused(build({}), kWrongUsage,
-                "--rig: needs frames of the same instants; expected --synchronised for videos");
+  ExpectRejected(build({}), kWrongUsage,
+                 "--rig: needs frames taken at the same times; expected --synchronised for videos");
   WriteFileAtomically(folder_ / "videos/timestamps.csv", "sync_index,cam_id,frame_index\n");
-  ExpectRefused(build({"--synchronised"}), kWrongUsage,
-                "expected videos whose frames of equal number are of one instant, found");
+  ExpectRejected(build({"--synchronised"}), kWrongUsage,
+                 "expected videos whose frames of equal number are taken at one time, found");
 }
 
 }  // namespace

@@ -77,24 +77,24 @@ TEST_F(CalibrateBoard, WhatCannotWorkIsSaidInOneLine) {
   const std::string photos = In("photos");
   fs::create_directory(photos);
   const std::vector<std::string> good{"--board", kChessboard, "-o", In("c.json")};
-  ExpectRefused(Board(In("absent"), good), kWrongUsage, "expected a folder of photos of a board");
-  ExpectRefused(Board(photos, good), kWrongUsage, "expected photos matching '*', found none");
+  ExpectRejected(Board(In("absent"), good), kWrongUsage, "expected a folder of photos of a board");
+  ExpectRejected(Board(photos, good), kWrongUsage, "expected photos matching '*', found none");
   io::WriteImage(fs::path(photos) / "grey.png", ImageRgb8(320, 240, 3, 128));
-  ExpectRefused(Board(photos, good), kFailed, "found it in none of 1");
-  ExpectRefused(Board(photos, {"--board", "chess:9x6", "-o", In("c.json")}), kWrongUsage,
-                "unknown kind 'chess'");
-  ExpectRefused(Board(photos, {"--board", kChessboard, "-o", In("c.xml")}), kWrongUsage,
-                "expected a name ending in .json or .yml or .yaml or .txt, found '.xml'");
-  ExpectRefused(Board(photos, {"--board", kChessboard, "--model", "magic", "-o", In("c.json")}),
-                kWrongUsage, "--model magic: expected auto or the name of a model");
+  ExpectRejected(Board(photos, good), kFailed, "found it in none of 1");
+  ExpectRejected(Board(photos, {"--board", "chess:9x6", "-o", In("c.json")}), kWrongUsage,
+                 "unknown kind 'chess'");
+  ExpectRejected(Board(photos, {"--board", kChessboard, "-o", In("c.xml")}), kWrongUsage,
+                 "expected a name ending in .json or .yml or .yaml or .txt, found '.xml'");
+  ExpectRejected(Board(photos, {"--board", kChessboard, "--model", "magic", "-o", In("c.json")}),
+                 kWrongUsage, "--model magic: expected auto or the name of a model");
   EXPECT_FALSE(fs::exists(In("c.json")));
 }
 
 TEST_F(CalibrateBoard, ABoardOfAnotherSizeIsNamedBeforeAnythingIsSolved) {
   DTR_REQUIRE_DATA(Photos());
   const auto refused = [&](const std::string& given, const std::string& expected) {
-    ExpectRefused(Board(Photos(), {"--images", "left*.jpg", "--board", given, "-o", In("c.json")}),
-                  kWrongUsage, expected);
+    ExpectRejected(Board(Photos(), {"--images", "left*.jpg", "--board", given, "-o", In("c.json")}),
+                   kWrongUsage, expected);
   };
   // Its corners lie on part of the board that is shown.
   refused("chessboard:8x6:1", "show a chessboard of 9x6 inner corners, none the given one");
@@ -102,7 +102,7 @@ TEST_F(CalibrateBoard, ABoardOfAnotherSizeIsNamedBeforeAnythingIsSolved) {
   EXPECT_FALSE(fs::exists(In("c.json")));
 }
 
-TEST_F(CalibrateBoard, TooFewPhotosAreRefused) {
+TEST_F(CalibrateBoard, TooFewPhotosAreRejected) {
   DTR_REQUIRE_DATA(Photos());
   const std::string two = In("two");
   fs::create_directory(two);
@@ -110,10 +110,10 @@ TEST_F(CalibrateBoard, TooFewPhotosAreRefused) {
     fs::copy_file(Photos() / name, fs::path(two) / name);
   }
   const std::vector<std::string> common{"--board", kChessboard, "-o", In("c.json")};
-  ExpectRefused(Board(two, common), kFailed, "--model auto: expected at least 5 images");
+  ExpectRejected(Board(two, common), kFailed, "--model auto: expected at least 5 images");
   auto named = common;
   named.insert(named.end(), {"--model", "brown4"});
-  ExpectRefused(Board(two, named), kFailed, "expected at least 3 images with the board, found 2");
+  ExpectRejected(Board(two, named), kFailed, "expected at least 3 images with the board, found 2");
   EXPECT_FALSE(fs::exists(In("c.json")));
 }
 

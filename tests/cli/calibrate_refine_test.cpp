@@ -1,4 +1,4 @@
-// `dtr calibrate refine` as its users meet it: models that cannot be refined, refused by name; GPS
+// `dtr calibrate refine` as its users meet it: models that cannot be refined, rejected by name; GPS
 // and distances that are held.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ namespace {
 
 const calib::LensCamera kLens{calib::LensModel::kPinhole, 1000, 800, {900, 905, 504, 397}};
 
-TEST(CalibrateRefine, DegenerateModelsAreRefusedByName) {
+TEST(CalibrateRefine, DegenerateModelsAreRejectedByName) {
   const TemporaryFolder folder;
   const auto refine = [&](const std::string& name, const bundle::SceneSpec& spec) {
     const std::string model = (folder / name).string();
@@ -32,8 +32,8 @@ TEST(CalibrateRefine, DegenerateModelsAreRefusedByName) {
   spec.pose = [](int i, int) {
     return bundle::LookAt({0, -6, 1}, {0.4 * i - 1, 0, 0.2 * (i % 3)});
   };
-  ExpectRefused(refine("turning", spec), kFailed,
-                ": pure_rotation: half the points have a parallax");
+  ExpectRejected(refine("turning", spec), kFailed,
+                 ": pure_rotation: half the points have a parallax");
   EXPECT_EQ(FilesIn(folder / "turning-out"), 0) << "nothing that means nothing is left";
   spec.pose = [](int i, int) {  // a wall faced squarely: focal length and distance are one
     const Eigen::Vector3d centre(0.5 * (i % 3) - 0.5, -6, 0.5 * (i / 3));
@@ -43,7 +43,7 @@ TEST(CalibrateRefine, DegenerateModelsAreRefusedByName) {
     const double x = random.Uniform(-2, 2);
     return Eigen::Vector3d(x, 0, random.Uniform(-1.5, 1.5));
   };
-  ExpectRefused(refine("wall", spec), kFailed, ": planar_scene: the points lie in a plane");
+  ExpectRejected(refine("wall", spec), kFailed, ": planar_scene: the points lie in a plane");
 }
 
 using Json = nlohmann::json;
@@ -71,11 +71,11 @@ TEST(CalibrateRefine, OutliersThatDoNotSettleAreTold) {
   ASSERT_EQ(ran.code, 0) << ran.err;
   const Json json = Json::parse(Text(folder / "told.json"));
   ASSERT_EQ(json["refined"], true) << json;
-  ASSERT_GT(json["unsettled_sights"], 0) << "settled: the test tells nothing";
+  ASSERT_GT(json["unsettled_observations"], 0) << "settled: the test tells nothing";
   EXPECT_THAT(ran.out, HasSubstr(fmt::format(
                            "which observations are outliers did not settle: {} of "
                            "{} would change with another solve",
-                           json["unsettled_sights"].get<int>(), bundle.observations.size())));
+                           json["unsettled_observations"].get<int>(), bundle.observations.size())));
 }
 
 constexpr double kUnit = 2.5;  // metres that a unit of the model is
@@ -188,7 +188,8 @@ TEST_F(RefineToPlaces, WhatExifOrTheUserSaysOfTheErrorIsTaken) {
   ran = Refine({"--gps", In("photos"), "--json", "-"});
   ASSERT_EQ(ran.code, 0) << ran.err;
   scale = Json::parse(ran.out)["scale"];
-  EXPECT_NEAR(scale["relative_sigma"], 0.02, 0.01) << "a vague place takes nothing from the others";
+  EXPECT_NEAR(scale["relative_sigma"], 0.02, 0.01)
+      << "a vague position takes nothing from the others";
   std::filesystem::remove_all(folder_ / "out");
   ran = Refine({"--gps", In("photos"), "--gps-sigma", "0.1,0.2", "--json", "-"});
   ASSERT_EQ(ran.code, 0) << ran.err;
@@ -214,22 +215,23 @@ TEST_F(RefineToPlaces, ADistanceSetsTheUnit) {
 }
 
 // Places that err by more than tells the scale: a distance does, and they turn and shift the whole.
-TEST_F(RefineToPlaces, VaguePlacesTurnWhatADistanceScalesAndAreRefusedWithoutOne) {
+TEST_F(RefineToPlaces, VaguePlacesTurnWhatADistanceScalesAndAreRejectedWithoutOne) {
   Random random(11);
   for (size_t i = 0; i < centres_.size(); ++i) {
     const double x = random.Normal(), y = random.Normal();
     WritePhotoAt(folder_ / fmt::format("photos/image{}.jpg", 100 + i),
                  centres_[i] + 1.5 * Eigen::Vector3d(x, y, random.Normal()));
   }
-  ExpectRefused(Refine({"--gps", In("photos")}), kFailed,
-                "scale: expected a scale known to 10 %, found one to ");
+  ExpectRejected(Refine({"--gps", In("photos")}), kFailed,
+                 "scale: expected a scale known to 10 %, found one to ");
   const Ran ran =
       Refine({"--gps", In("photos"), "--distance",
               fmt::format("image100,image107={:.9g}m", Metres(0, 7)), "--json", In("told.json")});
   ASSERT_EQ(ran.code, 0) << ran.err;
   EXPECT_THAT(ran.out, HasSubstr("it is that of the distances"));
-  EXPECT_THAT(ran.out, HasSubstr("the places err too much for cameras that stand so near to each "
-                                 "other: the turn, and with it what is north and up, is known to"));
+  EXPECT_THAT(ran.out,
+              HasSubstr("the positions err too much for cameras that stand so near to each "
+                        "other: the turn, and with it what is north and up, is known to"));
   const Json scale = Json::parse(Text(In("told.json")))["scale"];
   EXPECT_EQ(scale["places_tell_scale"], false);
   EXPECT_GT(scale["places_relative_sigma"], 0.1);
@@ -245,7 +247,7 @@ TEST_F(RefineToPlaces, VaguePlacesTurnWhatADistanceScalesAndAreRefusedWithoutOne
   }
 }
 
-TEST_F(RefineToPlaces, PlacesThatTellNothingAreRefused) {
+TEST_F(RefineToPlaces, PlacesThatTellNothingAreRejected) {
   for (size_t i = 5; i < centres_.size(); ++i) {
     std::filesystem::remove(folder_ / fmt::format("photos/image{}.jpg", 100 + i));
   }
@@ -255,14 +257,14 @@ TEST_F(RefineToPlaces, PlacesThatTellNothingAreRefused) {
     WritePhotoAt(folder_ / fmt::format("photos/image{}.jpg", 100 + i), centres_[i] + off,
                  i < 3 ? 0.3 : 0.003);
   }
-  ExpectRefused(Refine({"--gps", In("photos")}), kFailed,
-                "GPS: expected positions that agree with the cameras, found that 3 of 5 do");
+  ExpectRejected(Refine({"--gps", In("photos")}), kFailed,
+                 "GPS: expected positions that agree with the cameras, found that 3 of 5 do");
   for (size_t i = 0; i < 5; ++i) {
     WritePhotoAt(folder_ / fmt::format("photos/image{}.jpg", 100 + i), {20, 30, 0});
   }
-  ExpectRefused(Refine({"--gps", In("photos")}), kFailed,
-                "alignment: expected points that are not on one line, found the second set in one "
-                "point; the turn about it is unknown: use more points");
+  ExpectRejected(Refine({"--gps", In("photos")}), kFailed,
+                 "alignment: expected points that are not on one line, found the second set in one "
+                 "point; the rotation about it is unknown: use more points");
 }
 
 // EXIF says a radius, of which 68 % is taken to lie within.
@@ -274,7 +276,8 @@ TEST_F(RefineToPlaces, TheErrorThatExifSaysIsARadius) {
   pipeline::MetreOptions options;
   options.gps = true;
   const auto refined = pipeline::RefineInMetres(
-      model, options, pipeline::ReadPhotoPlaces(folder_ / "photos", calib::ImageNames(model)), {});
+      model, options, pipeline::ReadPhotoPositions(folder_ / "photos", calib::ImageNames(model)),
+      {});
   ASSERT_EQ(refined.start.options.positions.size(), centres_.size());
   for (const calib::PositionPrior& p : refined.start.options.positions) {
     EXPECT_NEAR(p.sigma.x(), 0.3 / 1.50959, 1e-4);
@@ -286,16 +289,17 @@ TEST_F(RefineToPlaces, PlacesThatDoNotSettleAreTold) {
   pipeline::MetreOptions options;
   options.gps = true;
   const calib::SfmModel model = colmap::ReadModel(In("model"));
-  const auto places = pipeline::ReadPhotoPlaces(folder_ / "photos", calib::ImageNames(model));
-  const auto told = [&](int most_passes) {
-    options.most_passes = most_passes;
+  const auto places = pipeline::ReadPhotoPositions(folder_ / "photos", calib::ImageNames(model));
+  const auto told = [&](int max_passes) {
+    options.max_passes = max_passes;
     const auto refined = pipeline::RefineInMetres(model, options, places, {});
     const Json scale = Json::parse(refined.scale_json);
-    EXPECT_LE(scale["passes"], most_passes);
+    EXPECT_LE(scale["passes"], max_passes);
     const std::string line = fmt::format(
-        "which places agree, and how far they err, did not settle in {} passes; give --gps-sigma "
+        "which positions agree, and how far they err, did not settle in {} passes; give "
+        "--gps-sigma "
         "where you know it",
-        most_passes);
+        max_passes);
     const auto& lines = refined.lines;
     EXPECT_EQ(std::find(lines.begin(), lines.end(), line) != lines.end(), !scale["settled"]);
     return scale["settled"].get<bool>();
@@ -304,54 +308,55 @@ TEST_F(RefineToPlaces, PlacesThatDoNotSettleAreTold) {
   EXPECT_FALSE(told(1)) << "settled at once: the test tells nothing";
 }
 
-TEST_F(RefineToPlaces, AWordThatTwoPhotosMayBeMeantByIsRefused) {
+TEST_F(RefineToPlaces, AWordThatTwoPhotosMayBeMeantByIsRejected) {
   calib::SfmModel model = colmap::ReadModel(In("model"));
   model.images[5].name = "image104.png";
   std::filesystem::remove_all(In("model"));
   colmap::WriteModel(In("model"), model, colmap::Format::kBinary);
-  ExpectRefused(Refine({"--distance", "image100,image104=5m"}), kWrongUsage,
-                "--distance image100,image104=5m: 'image104' may be image104.jpg or image104.png; "
-                "name the photo with its extension");
+  ExpectRejected(Refine({"--distance", "image100,image104=5m"}), kWrongUsage,
+                 "--distance image100,image104=5m: 'image104' may be image104.jpg or image104.png; "
+                 "name the photo with its extension");
   const auto distance = fmt::format("image100,image104.png={:.9g}m", Metres(0, 5));
   const Ran ran = Refine({"--distance", distance});
   EXPECT_EQ(ran.code, 0) << ran.err;
 }
 
-TEST_F(RefineToPlaces, WhatCannotBeHeldIsRefused) {
+TEST_F(RefineToPlaces, WhatCannotBeHeldIsRejected) {
   const auto distance = [&](const std::string& text) { return Refine({"--distance", text}); };
-  ExpectRefused(distance("image100:1:2,image101=5m"), kWrongUsage,
-                "expected two photos, as left01,right01=12cm, found 'image100:1:2'");
-  ExpectRefused(distance("image100:x:2,image101=5m"), kWrongUsage,
-                "expected two photos, as left01,right01=12cm, found 'image100:x:2'");
-  ExpectRefused(distance("image100,image101=5"), kWrongUsage,
-                "no length is '5'; expected A,B=LENGTH, as left01,right01=12cm: A and B each a "
-                "photo, whose camera is meant, LENGTH in mm, cm or m");
-  ExpectRefused(Refine({"--gps", In("photos"), "--gps-sigma", ""}), kWrongUsage,
-                "--gps-sigma : expected metres above 0, as 3 or 3,6 (on the map, in height)");
-  ExpectRefused(distance("nobody,image101=5m"), kWrongUsage, "no photo is named 'nobody'");
-  ExpectRefused(distance("image100,image100=5m"), kWrongUsage,
-                "expected two photos, found 'image100' twice");
-  ExpectRefused(distance("image100,image101"), kWrongUsage, "found no '='");
-  ExpectRefused(Refine({"--gps", In("photos"), "--gps-sigma", "0"}), kWrongUsage,
-                "--gps-sigma 0: expected metres above 0, as 3 or 3,6 (on the map, in height)");
-  ExpectRefused(Refine({"--gps", In("photos"), "--gps-sigma", "5"}), kFailed,
-                "expected places or distances that tell the scale to 10 %, found ones that tell "
-                "it to ");
-  ExpectRefused(Refine({"--gps-sigma", "3"}), kWrongUsage, "--gps-sigma requires --gps");
+  ExpectRejected(distance("image100:1:2,image101=5m"), kWrongUsage,
+                 "expected two photos, as left01,right01=12cm, found 'image100:1:2'");
+  ExpectRejected(distance("image100:x:2,image101=5m"), kWrongUsage,
+                 "expected two photos, as left01,right01=12cm, found 'image100:x:2'");
+  ExpectRejected(distance("image100,image101=5"), kWrongUsage,
+                 "no length is '5'; expected A,B=LENGTH, as left01,right01=12cm: A and B each a "
+                 "photo, whose camera is meant, LENGTH in mm, cm or m");
+  ExpectRejected(Refine({"--gps", In("photos"), "--gps-sigma", ""}), kWrongUsage,
+                 "--gps-sigma : expected metres above 0, as 3 or 3,6 (on the map, in height)");
+  ExpectRejected(distance("nobody,image101=5m"), kWrongUsage, "no photo is named 'nobody'");
+  ExpectRejected(distance("image100,image100=5m"), kWrongUsage,
+                 "expected two photos, found 'image100' twice");
+  ExpectRejected(distance("image100,image101"), kWrongUsage, "found no '='");
+  ExpectRejected(Refine({"--gps", In("photos"), "--gps-sigma", "0"}), kWrongUsage,
+                 "--gps-sigma 0: expected metres above 0, as 3 or 3,6 (on the map, in height)");
+  ExpectRejected(
+      Refine({"--gps", In("photos"), "--gps-sigma", "5"}), kFailed,
+      "expected positions or distances that determine the scale to 10 %, found ones that tell "
+      "it to ");
+  ExpectRejected(Refine({"--gps-sigma", "3"}), kWrongUsage, "--gps-sigma requires --gps");
   std::filesystem::create_directories(folder_ / "empty");
-  ExpectRefused(Refine({"--gps", In("empty")}), kFailed,
-                "expected at least 4 photos of the model with latitude, longitude and altitude, "
-                "found 0");
-  ExpectRefused(Refine({"--gps", In("photos"), "--distance", "image100,image107=1m"}), kFailed,
-                "expected a distance that agrees with the photos' GPS, found ");
-  ExpectRefused(
+  ExpectRejected(Refine({"--gps", In("empty")}), kFailed,
+                 "expected at least 4 photos of the model with latitude, longitude and altitude, "
+                 "found 0");
+  ExpectRejected(Refine({"--gps", In("photos"), "--distance", "image100,image107=1m"}), kFailed,
+                 "expected a distance that agrees with the photos' GPS, found ");
+  ExpectRejected(
       Refine({"--distance", "image100,image107=8m", "--distance", "image101,image106=9m"}), kFailed,
       "expected distances that agree, found ");
   // Too little for a model that is bent, too much for these photos.
   const std::string one = fmt::format("image100,image107={:.9g}m", Metres(0, 7));
   const std::string other = fmt::format("image101,image106={:.9g}m", 1.05 * Metres(1, 6));
-  ExpectRefused(Refine({"--distance", one, "--distance", other}), kFailed,
-                "expected a distance that the photos agree with, found ");
+  ExpectRejected(Refine({"--distance", one, "--distance", other}), kFailed,
+                 "expected a distance that the photos agree with, found ");
   EXPECT_EQ(FilesIn(folder_ / "out"), 0);
 }
 

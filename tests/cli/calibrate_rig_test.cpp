@@ -113,8 +113,8 @@ TEST_F(CalibrateRig, ACalibrationThatKeepsNothingIsJudgedByPhotosOnly) {
   Json bare = ChessboardRig()["json"];
   bare["views"] = Json::array();
   const std::string file = Write("bare.json", bare);
-  ExpectRefused(Dtr({"validate", file}), kWrongUsage,
-                "keeps no observations; give photos of the board by --images");
+  ExpectRejected(Dtr({"validate", file}), kWrongUsage,
+                 "has no observations; give photos of the board by --images");
   const Ran ran = Dtr({"validate", file, "--images", Photos().string(), "--json", "-"});
   EXPECT_TRUE(ran.code == 0 || ran.code == 1) << ran.err;
   const Json json = Json::parse(ran.out);
@@ -126,19 +126,19 @@ TEST_F(CalibrateRig, WhatIsNoRigIsSaidInOneLine) {
   const std::string photos = In("photos");
   fs::create_directory(photos);
   const std::vector<std::string> good{"-o", In("rig.json")};
-  ExpectRefused(Rig(In("absent"), good), kWrongUsage,
-                "expected a folder of what the cameras of a rig saw, found nothing");
+  ExpectRejected(Rig(In("absent"), good), kWrongUsage,
+                 "expected a folder of what the cameras of a rig saw, found nothing");
   const auto photo = [&](const std::string& name) {
     io::WriteImage(fs::path(photos) / name, ImageRgb8(320, 240, 3, 128));
   };
   photo("left01.png");
-  ExpectRefused(Rig(photos, good), kWrongUsage, "expected at least 2 cameras");
+  ExpectRejected(Rig(photos, good), kWrongUsage, "expected at least 2 cameras");
   photo("right01.png");
-  ExpectRefused(Rig(photos, good), kFailed, "camera left: expected photos of a");
-  // One camera sees an instant once: which of the two would be the rig's?
+  ExpectRejected(Rig(photos, good), kFailed, "camera left: expected photos of a");
+  // One camera sees a time step once: which of the two would be the rig's?
   photo("left01.jpg");
-  ExpectRefused(Rig(photos, good), kFailed,
-                "frame 01 of camera left: expected one image of every camera in a frame");
+  ExpectRejected(Rig(photos, good), kFailed,
+                 "frame 01 of camera left: expected one image of every camera in a frame");
   EXPECT_FALSE(fs::exists(In("rig.json")));
 }
 

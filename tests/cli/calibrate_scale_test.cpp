@@ -90,7 +90,7 @@ TEST_F(CalibrateScale, PixelsWithDepthAndPixelsOfTwoViewsAgreeWithTheTruth) {
   };
   const Eigen::Vector3d p = point(90, 70), q = point(40, 110);
   const double metres = kUnit * (p - q).norm();
-  // Clicked in every view that has it on its image: two of these small pictures say too little.
+  // Clicked in every view that has it on its image: two of these small images say too little.
   const auto in_all = [&](const Eigen::Vector3d& x) {
     std::string clicks;
     for (const View& view : set.frames[0].views) {
@@ -129,27 +129,27 @@ TEST_F(CalibrateScale, AViewThatOnlyItsExtensionTellsIsNamedInFull) {
   views[1]["name"] = "a/IMG.jpg";
   views[2]["name"] = "a/IMG.png";
   WriteFileAtomically(folder_ / "small.dtr/set.json", set.dump());
-  ExpectRefused(Scale({"--distance", "a/IMG,0005=5m"}), kWrongUsage,
-                "'a/IMG' may be a/IMG.jpg or a/IMG.png; name the photo with its extension");
+  ExpectRejected(Scale({"--distance", "a/IMG,0005=5m"}), kWrongUsage,
+                 "'a/IMG' may be a/IMG.jpg or a/IMG.png; name the photo with its extension");
   EXPECT_EQ(Scale({"--distance", "a/IMG.png,0005=5m"}).code, 0);
 }
 
-TEST_F(CalibrateScale, WhatSaysNothingIsRefused) {
+TEST_F(CalibrateScale, WhatSaysNothingIsRejected) {
   const auto before = Contents(folder_ / "small.dtr");
-  ExpectRefused(Scale({}), kWrongUsage,
-                "expected --distance (once or more), --board or --gps, found none of them");
-  ExpectRefused(Scale({"--distance", "0000,0001"}), kWrongUsage, "found no '='");
-  ExpectRefused(Scale({"--distance", "0000,0001=5"}), kWrongUsage, "no length is '5'");
-  ExpectRefused(Scale({"--distance", "0000:x:1,0001=5m"}), kWrongUsage, "no pixel is 'x:1'");
-  ExpectRefused(Scale({"--distance", "0001:1e5:1,0002=5m"}), kWrongUsage,
-                "expected a pixel of the 192 x 128 of view");
-  ExpectRefused(Scale({"--distance", "0001,0001=5m"}), kFailed,
-                "expected points whose distance is known to 10 %, found 0 +- 0 units");
-  ExpectRefused(Scale({"--distance", "0001:90:70+0002:10:10,0001=5m"}), kFailed,
-                "expected the same point in every view");
-  ExpectRefused(Scale({"--gps", In("courtyard/images")}), kFailed,
-                "expected at least 4 photos of the set with latitude, longitude and altitude, "
-                "found 0");
+  ExpectRejected(Scale({}), kWrongUsage,
+                 "expected --distance (once or more), --board or --gps, found none of them");
+  ExpectRejected(Scale({"--distance", "0000,0001"}), kWrongUsage, "found no '='");
+  ExpectRejected(Scale({"--distance", "0000,0001=5"}), kWrongUsage, "no length is '5'");
+  ExpectRejected(Scale({"--distance", "0000:x:1,0001=5m"}), kWrongUsage, "no pixel is 'x:1'");
+  ExpectRejected(Scale({"--distance", "0001:1e5:1,0002=5m"}), kWrongUsage,
+                 "expected a pixel of the 192 x 128 of view");
+  ExpectRejected(Scale({"--distance", "0001,0001=5m"}), kFailed,
+                 "expected points whose distance is known to 10 %, found 0 +- 0 units");
+  ExpectRejected(Scale({"--distance", "0001:90:70+0002:10:10,0001=5m"}), kFailed,
+                 "expected the same point in every view");
+  ExpectRejected(Scale({"--gps", In("courtyard/images")}), kFailed,
+                 "expected at least 4 photos of the set with latitude, longitude and altitude, "
+                 "found 0");
   EXPECT_TRUE(DifferingFiles(before, Contents(folder_ / "small.dtr")).empty());
 }
 

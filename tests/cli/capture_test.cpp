@@ -45,10 +45,10 @@ TEST(CaptureCommand, ShowsWhatItTookAndDropsWhatItIsToldTo) {
       {"capture", (folder / "fewer").string(), "-o", (folder / "copy").string(), "--json", "-"});
   EXPECT_EQ(Json::parse(again.out)["photos"].size(), static_cast<size_t>(kCourtyardViews));
 
-  ExpectRefused(Dtr({"capture", photos.string(), "-o", (folder / "x").string(), "--drop", "ugly"}),
-                2, "expected blurred, overexposed, underexposed or duplicate");
-  ExpectRefused(Dtr({"capture", photos.string(), "-o", (folder / "all").string()}), 2,
-                "expected a new folder");
+  ExpectRejected(Dtr({"capture", photos.string(), "-o", (folder / "x").string(), "--drop", "ugly"}),
+                 2, "expected blurred, overexposed, underexposed or duplicate");
+  ExpectRejected(Dtr({"capture", photos.string(), "-o", (folder / "all").string()}), 2,
+                 "expected a new folder");
   EXPECT_FALSE(fs::exists(folder / "x"));
 }
 
@@ -119,7 +119,7 @@ TEST(BuildCommand, TakesAVideoForPhotos) {
   std::vector<std::string> other = command;
   other[8] = "--motion";
   other[9] = "0.2";
-  ExpectRefused(Dtr(other), 2, "expected no such folder yet");
+  ExpectRejected(Dtr(other), 2, "expected no such folder yet");
 }
 
 // The natural call in a folder of videos, and options that are known to fail once frames are there.
@@ -135,7 +135,7 @@ TEST(BuildCommand, AFolderOfVideosMayHoldTheSet) {
                                    "--engine",  "none",
                                    "--every",   "1",
                                    "--holdout", "nobody"};
-  ExpectRefused(Dtr(command), 2, "--holdout: no photo is named 'nobody'");
+  ExpectRejected(Dtr(command), 2, "--holdout: no photo is named 'nobody'");
   EXPECT_FALSE(fs::exists(set.string() + ".partial"));  // it would stand in the next one's way
   command.back() = "frame_000002.jpg";
   DtrOk(command);

@@ -24,7 +24,7 @@ inline Pose RightFromLeft() {
   return pose;
 }
 
-/// left/0000.png ... of all instants, then right/0000.png ...
+/// left/0000.png ... of all time steps, then right/0000.png ...
 inline std::vector<CourtyardPhoto> PhotosOf(const CourtyardRig& rig, int instants) {
   std::vector<CourtyardPhoto> photos;
   const std::vector<Pose> places = CourtyardArc(instants);

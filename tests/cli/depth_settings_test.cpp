@@ -93,9 +93,9 @@ TEST_F(DepthSettings, NormalsAreUnitVectorsTurnedToTheCamera) {
   }
   EXPECT_GT(known, 0.5 * kCourtyardWidthPx * kCourtyardHeightPx);
   EXPECT_EQ(turned, known);
-  ExpectRefused(Dtr({"stereo", Cameras().string(), "-o", (folder_ / "no.dtr").string(), "--engine",
-                     "sgbm", "--normals", folder.string()}),
-                kWrongUsage, "--normals: expected --engine patchmatch");
+  ExpectRejected(Dtr({"stereo", Cameras().string(), "-o", (folder_ / "no.dtr").string(), "--engine",
+                      "sgbm", "--normals", folder.string()}),
+                 kWrongUsage, "--normals: expected --engine patchmatch");
 }
 
 TEST_F(DepthSettings, AnImportedSetThatKnowsNoneGetsThem) {
@@ -128,9 +128,9 @@ TEST_F(DepthSettings, ATimeBudgetPicksSettingsThatMakeTheSameBytesAgain) {
   // What is given explicitly stays.
   EXPECT_EQ(OptionsOf(Stereo("partly", {"--time-budget", "0.001", "--rounds", "1"})).at("rounds"),
             1);
-  ExpectRefused(Dtr({"stereo", Cameras().string(), "-o", (folder_ / "no.dtr").string(), "--engine",
-                     "sgbm", "--time-budget", "9"}),
-                2, "--time-budget: picks settings of --engine patchmatch");
+  ExpectRejected(Dtr({"stereo", Cameras().string(), "-o", (folder_ / "no.dtr").string(), "--engine",
+                      "sgbm", "--time-budget", "9"}),
+                 2, "--time-budget: picks settings of --engine patchmatch");
 }
 
 TEST_F(DepthSettings, AnExplicitOptionOverridesThePreset) {
@@ -152,7 +152,7 @@ TEST_F(DepthSettings, TheLeastMemoryThatWorksIsNamedAndMakesTheSameBytes) {
     return Dtr({"stereo", Cameras().string(), "-o", set, "--preset", "fast", "--memory", gb});
   };
   const Ran refused = with_memory("0.27");
-  ExpectRefused(refused, 2, "--memory 0.27: expected at least");
+  ExpectRejected(refused, 2, "--memory 0.27: expected at least");
   const std::string words = "expected at least ";
   const std::string least =
       refused.err.substr(refused.err.find(words) + words.size(), std::string("0.000").size());
@@ -214,13 +214,13 @@ TEST_F(DepthByColmap, RunsWhereThereIsCudaAndReadsWhatAWorkspaceHas) {
 
 TEST_F(DepthByColmap, SaysWhatToDoWhereThereIsNoCuda) {
   const colmap::testing::FakeColmap fake;
-  ExpectRefused(Dtr({"stereo", Cameras().string(), "-o", (folder_ / "no.dtr").string(), "--engine",
-                     "colmap"}),
-                1, "colmap patch_match_stereo: expected a COLMAP with CUDA");
+  ExpectRejected(Dtr({"stereo", Cameras().string(), "-o", (folder_ / "no.dtr").string(), "--engine",
+                      "colmap"}),
+                 1, "colmap patch_match_stereo: expected a COLMAP with CUDA");
   EXPECT_FALSE(fs::exists(folder_ / "no.dtr.partial"));
-  ExpectRefused(Dtr({"stereo", Cameras().string(), "-o", (folder_ / "no.dtr").string(),
-                     "--workspace", folder_.path().string()}),
-                2, "--workspace: is read by --engine colmap");
+  ExpectRejected(Dtr({"stereo", Cameras().string(), "-o", (folder_ / "no.dtr").string(),
+                      "--workspace", folder_.path().string()}),
+                 2, "--workspace: is read by --engine colmap");
 }
 
 }  // namespace

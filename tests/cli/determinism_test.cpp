@@ -78,7 +78,7 @@ TEST_F(Building, ARunThatWasCutOffAnywhereIsFinishedToTheSameBytes) {
     if (first.signal == 0 && first.code == 0) continue;  // it was faster than the signal
     ++interrupted;
     EXPECT_FALSE(fs::exists(set));
-    if (cut.signal == SIGTERM) ExpectRefused(first, 1, "interrupted; what was finished is kept");
+    if (cut.signal == SIGTERM) ExpectRejected(first, 1, "interrupted; what was finished is saved");
     DtrOk(Arguments(set, "2"));
     EXPECT_THAT(DifferingFiles(expected, Contents(set)), IsEmpty()) << cut.folder << cut.files;
     EXPECT_FALSE(fs::exists(set.string() + ".partial"));
@@ -94,10 +94,10 @@ TEST_F(Building, OtherInputsOrOptionsNeverContinueAnInterruptedRun) {
   const auto left = Contents(set.string() + ".partial");
   std::vector<std::string> other = Arguments(set);
   other.insert(other.end(), {"--seed", "7"});
-  ExpectRefused(Dtr(other), 2, "expected work of the same inputs and options, found others");
+  ExpectRejected(Dtr(other), 2, "expected work of the same inputs and options, found others");
   ChangePhoto(folder_ / "courtyard/images/0000.jpg");  // held out, and still an input
-  ExpectRefused(Dtr(Arguments(set)), 2,
-                "expected work of the same inputs and options, found others");
+  ExpectRejected(Dtr(Arguments(set)), 2,
+                 "expected work of the same inputs and options, found others");
   EXPECT_THAT(DifferingFiles(left, Contents(set.string() + ".partial")), IsEmpty());
 }
 

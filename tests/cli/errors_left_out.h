@@ -19,15 +19,15 @@ inline constexpr LeftOut kLeftOut[] = {
 
     // Reasons that stand beside what is left out, in a line of the page.
     {"calib/solve/choose_model.cpp", "held out, "},
-    {"calib/solve/rig_system.cpp", "a corner left the lens"},
+    {"calib/solve/rig_system.cpp", "a corner left the field of view"},
 
     // Said to a program that calls a library wrongly: dtr has asked for the same before, as its own
     // lines on the page say, or never calls it so.
-    {"calib/bundle/refine.cpp", "expected a known lens for camera"},
+    {"calib/bundle/refine.cpp", "expected known intrinsics for camera"},
     {"calib/colmap/held_out.cpp", "expected every image of the model among the sources"},
     {"calib/colmap/known_poses.cpp", "expected at least two photos with poses, found"},
-    {"calib/colmap/sfm.cpp", "depth needs a second place to look from"},
-    {"calib/colmap/sfm_steps.cpp", "lens model: expected a name like"},
+    {"calib/colmap/sfm.cpp", "depth needs a second position to look from"},
+    {"calib/colmap/sfm_steps.cpp", "camera model: expected a name like"},
     {"calib/colmap/workspace.cpp", "expected every photo once"},
     {"calib/colmap/workspace.cpp", "expected a positive size"},
     {"calib/colmap/workspace.cpp", "expected images of this workspace only"},
@@ -35,7 +35,7 @@ inline constexpr LeftOut kLeftOut[] = {
     {"calib/scale.cpp", "expected a measured distance"},
     {"calib/scale.cpp", "scale: expected at least"},
     {"calib/similarity.cpp", "found NaN or infinity"},
-    {"calib/solve/board_solve.cpp", "with the lens model FOV"},
+    {"calib/solve/board_solve.cpp", "with the camera model FOV"},
     {"calib/sparse_from_sfm.cpp", ""},
     {"calib/validate.cpp", ""},
     {"capture/video/ingest_video.cpp", "expected a number of frames above 0"},
@@ -82,7 +82,7 @@ inline constexpr LeftOut kLeftOut[] = {
     {"dtr/render/frame.cpp", "expected a finite pose"},
     {"dtr/render/geometry.cpp", "the depth map must have the image's size"},
     {"dtr/render/geometry.cpp", "set: expected at least one frame"},
-    {"dtr/render/instants.cpp", "set: expected at least one frame"},
+    {"dtr/render/time_steps.cpp", "set: expected at least one frame"},
     {"dtr/render/scene.cpp", ""},
     {"dtr/report/encode.cpp", ""},
     {"stereo/depth_maps.cpp", "depth ranges: expected one per view"},

@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uintmax_t kMostBytes = 1 << 24;
+constexpr std::uintmax_t kMaxBytes = 1 << 24;
 constexpr size_t kFewest = 8;  // letters; less is a joint between words of others
 
 /// What one throw spells out.
@@ -92,7 +92,7 @@ std::string LongestPiece(const std::vector<std::string>& literals) {
 
 std::vector<Thrown> ThrownBy(const fs::path& file) {
   std::vector<Thrown> all;
-  const std::string source = ReadFile(file, kMostBytes);
+  const std::string source = ReadFile(file, kMaxBytes);
   for (const std::string start :
        {"throw Error(", "throw UsageError(", "throw dtr::Error(", "throw dtr::UsageError("}) {
     for (size_t at = source.find(start); at != std::string::npos; at = source.find(start, at + 1)) {
@@ -108,7 +108,8 @@ std::vector<Thrown> ThrownBy(const fs::path& file) {
 
 std::vector<Thrown> EverythingThrown() {
   std::vector<Thrown> all;
-  for (const char* folder : {"calib", "capture", "cli", "datasets", "dtr", "pipeline", "stereo", "viewer"}) {
+  for (const char* folder :
+       {"calib", "capture", "cli", "datasets", "dtr", "pipeline", "stereo", "viewer"}) {
     for (const auto& entry : fs::recursive_directory_iterator(folder)) {
       const std::string extension = entry.path().extension().string();
       if (extension != ".cpp" && extension != ".h") continue;
@@ -121,7 +122,7 @@ std::vector<Thrown> EverythingThrown() {
 
 // Line breaks of the page are spaces.
 std::string Page() {
-  std::string page = ReadFile("docs/ERRORS.md", kMostBytes);
+  std::string page = ReadFile("docs/ERRORS.md", kMaxBytes);
   std::replace(page.begin(), page.end(), '\n', ' ');
   return page;
 }

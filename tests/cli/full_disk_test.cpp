@@ -27,7 +27,7 @@ struct Command {
   // Bytes that hold times or paths, or are COLMAP's own, differ from run to run.
   bool repeats = true;
   // How often too little room must have been met: 1 for a single small file.
-  int least_stops = 2;
+  int min_stops = 2;
   // Where whole files may appear one by one before all are there.
   std::string one_by_one = {};
 
@@ -70,27 +70,27 @@ const Command kCommands[] = {
      .one_by_one = "bench/"},
     {.name = "dataset",
      .words = "dataset make courtyard --views 3 --width 96 --height 64 -o IN/made"},
-    {.name = "inspect", .words = "inspect OF/good.dtr -o IN/report.html", .least_stops = 1},
-    {.name = "advise", .words = "advise OF/good.dtr -o IN/advice.html", .least_stops = 1},
+    {.name = "inspect", .words = "inspect OF/good.dtr -o IN/report.html", .min_stops = 1},
+    {.name = "advise", .words = "advise OF/good.dtr -o IN/advice.html", .min_stops = 1},
     {.name = "evaluate",
      .words = "evaluate OF/good.dtr --leave-one-out --pictures IN/compare --renderer cpu",
      .one_by_one = "compare/"},
     {.name = "validate",
      .words = "validate OF/cameras.dtr --report IN/report.html",
-     .least_stops = 1},
+     .min_stops = 1},
     {.name = "board",
      .words = "calibrate board DATA/chessboard_stereo_640x480 --images left0*.jpg --board "
               "chessboard:9x6:1 --model brown4 -o IN/left.json",
-     .least_stops = 1},
+     .min_stops = 1},
     {.name = "rig",
      .words =
          "calibrate rig DATA/chessboard_stereo_640x480 --board chessboard:9x6:1 --model brown4 "
          "-o IN/rig.json -o IN/rig.yml",
-     .least_stops = 1},
+     .min_stops = 1},
     {.name = "json",
      .words = "info OF/good.dtr --json IN/info.json",
      .repeats = false,
-     .least_stops = 1},
+     .min_stops = 1},
 };
 
 class FullDiskOf : public ::testing::TestWithParam<Command> {
@@ -183,10 +183,10 @@ TEST_P(FullDiskOf, IsSaidInOneLineLosesNothingAndRoomMakesItWhole) {
     const Ran ran = Dtr(In(full));
     if (ran.code == 0) break;
     ++stops;
-    ExpectRefused(ran, kFailed, "No space left on device");
+    ExpectRejected(ran, kFailed, "No space left on device");
     ExpectNothingLostOrHalf(before, expected, Whole(full));
   }
-  EXPECT_GE(stops, GetParam().least_stops);
+  EXPECT_GE(stops, GetParam().min_stops);
   const auto found = All(full);
   if (GetParam().repeats) {
     EXPECT_THAT(DifferingFiles(expected, found), ::testing::IsEmpty());

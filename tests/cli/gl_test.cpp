@@ -41,8 +41,8 @@ TEST_F(OpenGl, AMachineWithoutItIsToldInOneLine) {
       args.insert(args.end(), {"--like", "0001", "-o", In("v.png")});
     }
     const Ran ran = Dtr(args);
-    ExpectRefused(ran, kFailed,
-                  "OpenGL: expected a context of version 4.3 or newer through EGL, found");
+    ExpectRejected(ran, kFailed,
+                   "OpenGL: expected a context of version 4.3 or newer through EGL, found");
     EXPECT_THAT(ran.err, HasSubstr("; use --renderer cpu"));
   }
   EXPECT_FALSE(fs::exists(In("v.png")));
@@ -63,8 +63,8 @@ TEST_F(OpenGl, AutoTakesSimdWithoutAGpuAndSaysSo) {
   const Ran two_pass = Render({"--method", "two-pass"});
   EXPECT_EQ(two_pass.code, 0) << two_pass.err;
   EXPECT_THAT(two_pass.err, HasSubstr("renderer: cpu for the two-pass method"));
-  ExpectRefused(Render({"--method", "two-pass", "--renderer", "simd"}), kWrongUsage,
-                "--renderer simd: cannot draw by the two-pass method; use --method deferred");
+  ExpectRejected(Render({"--method", "two-pass", "--renderer", "simd"}), kWrongUsage,
+                 "--renderer simd: cannot draw by the two-pass method; use --method deferred");
 }
 
 TEST_F(OpenGl, AutoDrawsTwoPassesWithADriverOfTheProcessorWhereThereIsOne) {
@@ -93,7 +93,7 @@ TEST_F(OpenGl, OpenSceneGraphsTableSaysWhatItAdds) {
     if (refused.err.find("built with OpenSceneGraph") != std::string::npos) {
       GTEST_SKIP() << refused.err;
     }
-    ExpectRefused(refused, kFailed, "expected a display for OpenSceneGraph's window, found none");
+    ExpectRejected(refused, kFailed, "expected a display for OpenSceneGraph's window, found none");
   }
   const VirtualDisplay display;
   if (!display.up()) GTEST_SKIP() << "no display: Xvfb is missing or did not come up";
@@ -112,8 +112,8 @@ TEST_F(OpenGl, OpenSceneGraphsTableSaysWhatItAdds) {
 
 TEST_F(OpenGl, AnOlderContextIsToldInOneLine) {
   const Environment old("MESA_GL_VERSION_OVERRIDE", "3.3");
-  ExpectRefused(Render({"--renderer", "gl"}), kFailed,
-                "OpenGL: expected a context of version 4.3 or newer through EGL, found");
+  ExpectRejected(Render({"--renderer", "gl"}), kFailed,
+                 "OpenGL: expected a context of version 4.3 or newer through EGL, found");
 }
 
 TEST_F(OpenGl, ShadersComeFromAFolderWhereOneIsGiven) {
@@ -127,15 +127,15 @@ TEST_F(OpenGl, ShadersComeFromAFolderWhereOneIsGiven) {
   const std::string file = In("shaders/mesh.vert");
   WriteFileAtomically(file, "// one\nvoid main() { nothing = 1; }\n");
   const Ran broken = Render({"--method", "two-pass", "--shader-dir", In("shaders")});
-  ExpectRefused(broken, kFailed, "shader mesh.vert:2: ");
+  ExpectRejected(broken, kFailed, "shader mesh.vert:2: ");
   EXPECT_THAT(broken.err, HasSubstr("; use --renderer cpu"));
   fs::remove(file);
-  ExpectRefused(Render({"--method", "two-pass", "--shader-dir", In("shaders")}), kFailed,
-                "mesh.vert: cannot be read");
-  ExpectRefused(Render({"--shader-dir", In("absent")}), kWrongUsage,
-                "expected a folder of shaders such as dtr/gl/shaders, found none");
-  ExpectRefused(Render({"--shader-dir", In("shaders"), "--renderer", "cpu"}), kWrongUsage,
-                "expected --renderer gl with it, found cpu");
+  ExpectRejected(Render({"--method", "two-pass", "--shader-dir", In("shaders")}), kFailed,
+                 "mesh.vert: cannot be read");
+  ExpectRejected(Render({"--shader-dir", In("absent")}), kWrongUsage,
+                 "expected a folder of shaders such as dtr/gl/shaders, found none");
+  ExpectRejected(Render({"--shader-dir", In("shaders"), "--renderer", "cpu"}), kWrongUsage,
+                 "expected --renderer gl with it, found cpu");
 }
 
 TEST_F(OpenGl, AskingForSplatsPicksTheMethodThatHasThem) {
@@ -164,7 +164,7 @@ TEST_F(OpenGl, BenchPrintsATableForPeopleAndOneForPrograms) {
         EXPECT_TRUE(row.contains(name)) << name;
       }
       EXPECT_GT(row["ms"], 0);
-      EXPECT_GT(row["psnr_db"], 15);  // the two pictures are of one place
+      EXPECT_GT(row["psnr_db"], 15);  // the two images are of one place
     }
     EXPECT_TRUE(json["ratio_two_pass_over_deferred"].is_number());
     EXPECT_TRUE(json["loss_db"].is_number());
@@ -196,10 +196,10 @@ TEST_F(OpenGl, BenchMeasuresGrowth) {
 }
 
 TEST_F(OpenGl, BenchOfNothingOrOfWordsThatMeanNothing) {
-  ExpectRefused(Dtr({"bench", Set(), "--table", "magic", "--renderer", "cpu"}), kWrongUsage,
-                "--table: magic not in {report,weights,growth,osg}");
-  ExpectRefused(Dtr({"bench", In("absent.dtr"), "--renderer", "cpu"}), kFailed,
-                "expected the folder of a D+TR set, found nothing");
+  ExpectRejected(Dtr({"bench", Set(), "--table", "magic", "--renderer", "cpu"}), kWrongUsage,
+                 "--table: magic not in {report,weights,growth,osg}");
+  ExpectRejected(Dtr({"bench", In("absent.dtr"), "--renderer", "cpu"}), kFailed,
+                 "expected the folder of a D+TR set, found nothing");
 }
 
 }  // namespace

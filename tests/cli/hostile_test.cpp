@@ -50,8 +50,8 @@ TEST_F(Hostile, NamesInASetNeverLeadOutOfTheFolderOfAnExport) {
     bad.replace(text.find(field), field.size(), "\"name\": \"" + name + "\"");
     WriteFileAtomically(folder_ / "bad.dtr/set.json", bad);
     fs::create_directories(folder_ / "below");
-    ExpectRefused(Dtr({"export", In("bad.dtr"), "--format", "colmap", "-o", In("below/out")}),
-                  kFailed, "name: expected the photo's name, a relative path inside its folder");
+    ExpectRejected(Dtr({"export", In("bad.dtr"), "--format", "colmap", "-o", In("below/out")}),
+                   kFailed, "name: expected the photo's name, a relative path inside its folder");
     EXPECT_EQ(FilesIn(folder_ / "below"), 0);
     EXPECT_FALSE(fs::exists(folder_ / "abs"));
     EXPECT_FALSE(fs::exists(folder_ / "x.jpg"));
@@ -69,18 +69,18 @@ TEST_F(Hostile, AResultThatCannotBeToldIsAFailure) {
   for (const std::string& words :
        {"info " + set + " --json -", "info " + set, std::string("dataset list --json -"),
         std::string("completion"), std::string("--version"), std::string("build --help")}) {
-    ExpectRefused(DtrInto(words, "/dev/full", In("err")), kFailed,
-                  "standard output: cannot be written: No space left on device");
+    ExpectRejected(DtrInto(words, "/dev/full", In("err")), kFailed,
+                   "standard output: cannot be written: No space left on device");
     const Ran fits = DtrInto(words, In("out"), In("err"));
     EXPECT_EQ(fits.err.find("cannot be written"), std::string::npos) << words;
     EXPECT_FALSE(Text(In("out")).empty()) << words;
   }
 }
 
-TEST_F(Hostile, ArgumentsThatJsonCannotHoldAreRefusedBeforeAnyWork) {
+TEST_F(Hostile, ArgumentsThatJsonCannotHoldAreRejectedBeforeAnyWork) {
   const std::string name = In("caf\xe9\n.dtr");
   const Ran ran = Dtr({"build", Photos(), "-o", name});
-  ExpectRefused(ran, kWrongUsage, "expected UTF-8, found");
+  ExpectRejected(ran, kWrongUsage, "expected UTF-8, found");
   EXPECT_THAT(ran.err, HasSubstr("caf??.dtr'; rename"));  // on one line
   EXPECT_EQ(FilesIn(folder_.path()), 0);
 }
@@ -102,7 +102,7 @@ TEST_F(Hostile, AnInterruptedBuildIsNotTakenForACapture) {
       {"export", {"export", Good().string()}}};
   for (auto [kind, words] : others) {
     words.insert(words.end(), {"-o", In("set.dtr")});
-    ExpectRefused(
+    ExpectRejected(
         Dtr(words), kWrongUsage,
         "expected nothing or an unfinished " + kind + ", found something else; move it away");
     EXPECT_EQ(Contents(folder_ / "set.dtr.partial"), before) << kind;
@@ -119,7 +119,7 @@ TEST_F(Hostile, APhotoEditedInACaptureIsAnotherInput) {
   EXPECT_EQ(BeginBuild(capture).code, kFailed);
   EXPECT_EQ(BeginBuild(capture).err.find(others), std::string::npos);  // the same goes on
   ChangePhoto(folder_ / "capture/images/0002.jpg");
-  ExpectRefused(BeginBuild(capture), kWrongUsage, others);
+  ExpectRejected(BeginBuild(capture), kWrongUsage, others);
 }
 
 TEST_F(Hostile, MemoryThatChangesTheFeaturesIsAnotherInput) {
@@ -149,7 +149,7 @@ TEST_F(Hostile, MemoryThatChangesTheFeaturesIsAnotherInput) {
     };
     EXPECT_EQ(begin("4").code, kFailed);
     EXPECT_EQ(begin("3.9").err.find(others), std::string::npos);
-    ExpectRefused(begin("0.5"), kWrongUsage, others);
+    ExpectRejected(begin("0.5"), kWrongUsage, others);
     fs::remove_all(folder_ / "set.dtr.partial");
   }
 }
@@ -161,7 +161,7 @@ TEST_F(Hostile, WhatScreeningSeesIsSaid) {
                  ImageRgb8(kCourtyardWidthPx, kCourtyardHeightPx, 3, 255));
   const Ran ran = DtrOk({"build", In("c/images"), "-o", In("set.dtr"), "--poses", In("c/sparse"),
                          "--engine", "none", "--json", "-"});
-  EXPECT_THAT(ran.err, HasSubstr("screening: 1 of 7 photos have a remark and are kept, first "
+  EXPECT_THAT(ran.err, HasSubstr("screening: 1 of 7 photos have a remark and are used, first "
                                  "0003.jpg: "));
   EXPECT_THAT(ran.out, HasSubstr("\"screening\": [\n  {\n   \"name\": \"0003.jpg\""));
   EXPECT_THAT(Text(In("set.dtr/report/run.json")), HasSubstr("0003.jpg"));

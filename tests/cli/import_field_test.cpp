@@ -111,7 +111,7 @@ TEST_F(FieldScene, BackslashesInPathsAreSeparators) {
 TEST_F(FieldScene, AFrameWithoutItsPhotoIsNamedAndLeftOutWhereAllowed) {
   const fs::path file = Field("_scene") / "transforms_missing.json";
   const Ran refused = Dtr(Import(file));
-  ExpectRefused(refused, kFailed, "have no photo, first");
+  ExpectRejected(refused, kFailed, "have no photo, first");
   EXPECT_THAT(refused.err, AllOf(HasSubstr("1 of its 7 cameras"), HasSubstr("frame 6"),
                                  HasSubstr("frame_00099.jpg"), HasSubstr("--allow-missing")));
   EXPECT_FALSE(fs::exists(Set()));
@@ -171,8 +171,8 @@ TEST_F(FieldScene, DepthMapsOfAnOddRatioAreResampled) {
   EXPECT_THAT(Notes(), HasSubstr("depth maps of 64x48 for photos of 480x360: resampled to 80x60"));
   const DtrSet set = io::LoadSet(Set());
   EXPECT_EQ(set.frames[0].views[0].depth_scale, 6);
-  constexpr double kMostError = 0.001;  // the exact map's pixels are 1 mm; the issue asks for 1 %
-  EXPECT_LT(MedianError(set), kMostError);
+  constexpr double kMaxError = 0.001;  // the exact map's pixels are 1 mm; the issue asks for 1 %
+  EXPECT_LT(MedianError(set), kMaxError);
 }
 
 TEST_F(FieldScene, PhotosWithDistortionAreUndistortedAndTheirDepthMapsToo) {
@@ -219,8 +219,8 @@ TEST_F(FieldScene, ATransformsJsonWithDistortionIsNoViewToRender) {
   DtrOk(Import(Field("_scene") / "transforms_dfull.json"));
   const fs::path dist = Field("_scene") / "transforms_dist.json";
   const std::string frames = (folder_ / "frames").string();
-  ExpectRefused(Dtr({"render", Set(), "--path", dist.string(), "-o", frames}), kFailed,
-                "has distortion, and views are rendered without");
+  ExpectRejected(Dtr({"render", Set(), "--path", dist.string(), "-o", frames}), kFailed,
+                 "has distortion, and views are rendered without");
   DtrOk({"render", Set(), "--path", Changed("transforms_dist.json", {{"k1", 0}}).string(),
          "--renderer", "cpu", "--size", "60x45", "-o", frames});
 }
@@ -323,7 +323,7 @@ TEST_F(FieldScene, PhotosOfOneCameraInEveryOrientationAreTakenAsStored) {
 }
 
 // Paths without an extension (text2room #7), and with blanks and letters of other languages
-// (instant-ngp #1096).
+// (time step-ngp #1096).
 TEST_F(FieldScene, PathsMayLackTheExtensionAndHoldAnyLetter) {
   Json file = Json::parse(Text(Field("_scene") / "transforms_dfull.json"));
   const fs::path made = folder_ / "made";

@@ -60,11 +60,11 @@ TEST_F(InspectBench, AnotherFolderIsTakenWhenItIsNamed) {
   Bench({"-o", In("elsewhere")});
   EXPECT_THAT(Page(), Not(HasSubstr(kHeading)));
   EXPECT_THAT(Page({"--bench", In("elsewhere")}), HasSubstr(kHeading));
-  ExpectRefused(Inspect({"--bench", In("nowhere")}), kFailed,
-                "expected bench.json of dtr bench in it, found none");
+  ExpectRejected(Inspect({"--bench", In("nowhere")}), kFailed,
+                 "expected bench.json of dtr bench in it, found none");
 }
 
-TEST_F(InspectBench, WhatIsNoSweepIsRefused) {
+TEST_F(InspectBench, WhatIsNoSweepIsRejected) {
   Bench();
   const fs::path file = In("scene-bench/bench.json");
   const std::string good = Text(file);

@@ -75,7 +75,7 @@ TEST_F(LeftOut, NeitherWhereNoCamerasAreGivenAndTheLensDistorts) {
   EXPECT_THAT(colmap.Calls(), Contains(HasSubstr("mapper")));
 }
 
-TEST_F(LeftOut, BundleAdjustmentWhereUnseenSightsArePredictedNoBetter) {
+TEST_F(LeftOut, BundleAdjustmentWhereUnseenObservationsArePredictedNoBetter) {
   colmap::testing::FakeColmap colmap;
   LeaveModel(colmap);
   Build({"--engine", "none"});

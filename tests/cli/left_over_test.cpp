@@ -31,8 +31,8 @@ class LeftOver : public CourtyardAndSet {
   }
   // Kills runs until one was hit after `begun`: a fast one may be over before that is seen.
   void Kill(const std::vector<std::string>& words, const std::function<bool()>& begun) {
-    constexpr int kMostTries = 50;
-    for (int i = 0; i < kMostTries; ++i) {
+    constexpr int kMaxTries = 50;
+    for (int i = 0; i < kMaxTries; ++i) {
       const Ran ran = Dtr(words, {SIGKILL, begun});
       if (ran.signal == SIGKILL) return;
       ASSERT_EQ(ran.code, 0) << ran.err;
@@ -52,7 +52,7 @@ TEST_F(LeftOver, AVideosFrames) {
                                         "24",     "--renderer",       "cpu",
                                         "-o",     Work("path.mp4")};
   const fs::path frames = Work("path.mp4.partial");
-  // While pictures are drawn, and while they are encoded.
+  // While images are drawn, and while they are encoded.
   Kill(render, [&] { return FilesIn(frames) >= 4; });
   EXPECT_GE(FilesIn(frames), 4);
   Kill(render, [&] { return fs::exists(frames / "video.mp4"); });
@@ -95,7 +95,7 @@ TEST_F(LeftOver, AnImportHalfWritten) {
               IsEmpty());
 }
 
-TEST_F(LeftOver, AMovingSetHalfJoined) {
+TEST_F(LeftOver, ADynamicSetHalfJoined) {
   const std::vector<std::string> joining{"join", Shared("good.dtr"), Shared("good.dtr"), "-o",
                                          Work("moving.dtr")};
   Kill(joining, [&] { return fs::exists(Work("moving.dtr.partial")); });
@@ -138,7 +138,7 @@ TEST_F(LeftOver, ABuildThatGoesOnCountsWhatColmapTookBefore) {
   colmap.Fail("mapper", "exit 3");
   const std::vector<std::string> building{"build", Photos(), "--engine",
                                           "none",  "-o",     Work("set.dtr")};
-  ExpectRefused(Dtr(building), 1, "expected exit code 0, found 3");
+  ExpectRejected(Dtr(building), 1, "expected exit code 0, found 3");
   colmap.Succeed("mapper");
   DtrOk(building);
   const auto stages = io::ReadRunStages(Work("set.dtr"));

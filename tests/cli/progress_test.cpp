@@ -30,13 +30,13 @@ TEST_F(ProgressTold, TheMemoryOfColmapIsCounted) {
   colmap.Fail("feature_extractor",
               "head -c 300000000 /dev/zero | tail -c 300000000 > /dev/null; sleep 1");
   const Ran ran = DtrOk({"build", Photos(), "-o", In("set.dtr"), "--engine", "none"});
-  constexpr double kLeastMib = 280;
+  constexpr double kMinMib = 280;
   std::smatch told;
   ASSERT_TRUE(std::regex_search(ran.err, told, std::regex("features: .*at most ([0-9]+) MiB")))
       << ran.err;
-  EXPECT_GE(std::stod(told[1]), kLeastMib);
+  EXPECT_GE(std::stod(told[1]), kMinMib);
   const auto record = nlohmann::json::parse(Text(In("set.dtr") + "/report/run.json"));
-  EXPECT_GE(record["stages"].back()["peak_rss_kib"], kLeastMib * 1024);
+  EXPECT_GE(record["stages"].back()["peak_rss_kib"], kMinMib * 1024);
   const std::vector<std::string> arguments = {"build",       Photos(),   "-o",
                                               In("set.dtr"), "--engine", "none"};
   std::vector<std::string> recorded = record["command"];

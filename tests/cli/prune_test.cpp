@@ -86,7 +86,7 @@ TEST_F(Pruning, KeepsItsPromiseSaysWhatItDidAndIsAnOrdinarySet) {
             picture("other.png", {"--views", "1", "--resolution", "4"}));
 
   // Again: what is pruned can be pruned, written over only when asked, and exported.
-  ExpectRefused(Dtr(Arguments("small.dtr")), 2, "pass --force to replace it");
+  ExpectRejected(Dtr(Arguments("small.dtr")), 2, "pass --force to replace it");
   DtrOk({"export", small, "--format", "colmap", "-o", (folder_ / "colmap").string()});
   DtrOk({"prune", small, "-o", (folder_ / "smaller.dtr").string(), "--max-loss-db", "1", "--probes",
          "2", "--checks", "2", "--renderer", "cpu"});
@@ -103,7 +103,7 @@ TEST_F(Pruning, GivesTheSameBytesForAnyNumberOfThreadsAndAfterAnInterruption) {
               IsEmpty());
 }
 
-TEST_F(Pruning, RefusesAGoalThatTheLossDoesNotAllow) {
+TEST_F(Pruning, RejectsAGoalThatTheLossDoesNotAllow) {
   const std::string set = (folder_ / "set.dtr").string();
   const std::vector<std::string> prune = {
       "prune", set,          "-o", (folder_ / "x.dtr").string(), "--probes", "2", "--checks",
@@ -112,11 +112,11 @@ TEST_F(Pruning, RefusesAGoalThatTheLossDoesNotAllow) {
     more.insert(more.begin(), prune.begin(), prune.end());
     return Dtr(more);
   };
-  ExpectRefused(with({"--max-bytes", "1000"}), 1,
-                "expected at most 1000 bytes within a loss of 0.1 dB, found");
+  ExpectRejected(with({"--max-bytes", "1000"}), 1,
+                 "expected at most 1000 bytes within a loss of 0.1 dB, found");
   EXPECT_FALSE(fs::exists(folder_ / "x.dtr"));
   // What was measured for one goal serves the next.
-  ExpectRefused(with({"--frame-ms", "0.001"}), 1, "expected frames of at most");
+  ExpectRejected(with({"--frame-ms", "0.001"}), 1, "expected frames of at most");
   // One that is reached at once by what nobody sees ends the rest.
   std::uint64_t bytes = 0;
   for (const auto& entry : fs::recursive_directory_iterator(set)) {
@@ -131,14 +131,14 @@ TEST_F(Pruning, RefusesAGoalThatTheLossDoesNotAllow) {
   EXPECT_LE(Json::parse(Text(folder_ / "x.json"))["removed"].size(), 1u);
 }
 
-TEST_F(Pruning, RefusesMeasurementsThatAreNone) {
+TEST_F(Pruning, RejectsMeasurementsThatAreNone) {
   std::vector<std::string> arguments = Arguments("cut.dtr");
   const fs::path journal = folder_ / "cut.dtr.partial/work/measured.jsonl";
   (void)Dtr(arguments, {SIGINT, [&] { return fs::exists(journal) && fs::file_size(journal) > 0; }});
   ASSERT_TRUE(fs::exists(journal));
   const std::string kept = Text(journal);
   std::ofstream(journal, std::ios::app) << "no measurement\n";
-  ExpectRefused(Dtr(arguments), 1, "expected measurements of dtr prune, found");
+  ExpectRejected(Dtr(arguments), 1, "expected measurements of dtr prune, found");
 
   // The names are right, the numbers are gone.
   std::string emptied;
@@ -149,17 +149,17 @@ TEST_F(Pruning, RefusesMeasurementsThatAreNone) {
     emptied += entry.dump() + "\n";
   }
   std::ofstream(journal) << emptied;
-  ExpectRefused(Dtr(arguments), 1, "numbers, found 0; delete the folder to start over");
+  ExpectRejected(Dtr(arguments), 1, "numbers, found 0; delete the folder to start over");
   fs::resize_file(journal, (256u << 20) + 1);
-  ExpectRefused(Dtr(arguments), 1, "256 MiB of measurements, found");
+  ExpectRejected(Dtr(arguments), 1, "256 MiB of measurements, found");
 }
 
-TEST_F(Pruning, RefusesASetWithoutDepth) {
+TEST_F(Pruning, RejectsASetWithoutDepth) {
   const std::string plain = (folder_ / "plain.dtr").string();
   DtrOk({"build", (folder_ / "courtyard/images").string(), "-o", plain, "--poses",
          (folder_ / "courtyard/sparse").string(), "--engine", "none"});
   const Ran ran = Dtr({"prune", plain, "-o", (folder_ / "x.dtr").string(), "--renderer", "cpu"});
-  ExpectRefused(ran, 1, "expected depth, found none; run dtr stereo first");
+  ExpectRejected(ran, 1, "expected depth, found none; run dtr stereo first");
 }
 
 }  // namespace

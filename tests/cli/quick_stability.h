@@ -15,12 +15,12 @@
 namespace dtr::selftest {
 
 /// A page of the table without the values, which differ a little from machine to machine: its
-/// third column, and what follows "refused with". Without the line that counts cases.
+/// third column, and what follows "rejected with". Without the line that counts cases.
 inline std::vector<std::string> LinesWithoutValues(std::istream& page) {
   std::vector<std::string> lines;
   for (std::string line; std::getline(page, line);) {
-    if (const size_t refusal = line.find("refused with:"); refusal != std::string::npos) {
-      line.erase(refusal + std::string("refused with:").size());
+    if (const size_t rejection = line.find("rejected with:"); rejection != std::string::npos) {
+      line.erase(rejection + std::string("rejected with:").size());
     } else if (line.starts_with("| ")) {
       const size_t what = line.find(" | "), value = line.find(" | ", what + 3);
       const size_t bound = line.find(" | ", value + 3);
@@ -84,7 +84,7 @@ inline void ExpectHoldsAsDocumented(const Case& each) {
   ASSERT_NE(first, documented.end()) << "docs/STABILITY.md lacks: " << found.front();
   const auto length = std::min<std::ptrdiff_t>(std::ssize(found), documented.end() - first);
   EXPECT_EQ(std::vector<std::string>(first, first + length), found)
-      << "dtr selftest --stability -o docs/STABILITY.md writes it anew";
+      << "dtr selftest --stability -o docs/STABILITY.md writes it again";
 }
 
 }  // namespace dtr::selftest

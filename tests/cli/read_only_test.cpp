@@ -69,10 +69,10 @@ TEST_F(ReadOnly, FoldersThatCannotBeWrittenAndPhotosThatCannotBeReadAreSaidInOne
   fs::permissions(Photos() / "0002.jpg", fs::perms::none);
   const AsNobody nobody;
   DTR_REQUIRE_NOBODY(nobody);
-  ExpectRefused(Dtr(Build(Photos(), Photos() / "set.dtr")), kFailed,
-                "cannot be made: Permission denied");
-  ExpectRefused(Dtr({"capture", Photos().string(), "-o", (Photos() / "capture").string()}), kFailed,
-                "capture.partial: cannot be written: Permission denied");
+  ExpectRejected(Dtr(Build(Photos(), Photos() / "set.dtr")), kFailed,
+                 "cannot be made: Permission denied");
+  ExpectRejected(Dtr({"capture", Photos().string(), "-o", (Photos() / "capture").string()}),
+                 kFailed, "capture.partial: cannot be written: Permission denied");
   const Ran ran = DtrOk(Build(Photos(), Mine() / "set.dtr"));
   EXPECT_THAT(Text(Mine() / "set.dtr/set.json"), HasSubstr("0002.jpg"));
   EXPECT_EQ(io::ReadSet(Mine() / "set.dtr").frames.at(0).views.size(), size_t{kCourtyardViews} - 1);

@@ -1,4 +1,4 @@
-// tests/cli/refusals.h -- lists of commands that must be refused, and files to refuse them over.
+// tests/cli/rejections.h -- lists of commands that must be rejected, and files to reject them over.
 #pragma once
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -20,20 +20,20 @@ namespace dtr::testing {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
-struct Refusal {
+struct Rejection {
   int code;
   std::string words;  // of the line, and of the page
   std::vector<std::string> args;
 };
 
-inline void ExpectAllRefused(const std::vector<Refusal>& refusals) {
-  for (const Refusal& refusal : refusals) {
-    SCOPED_TRACE(fmt::format("dtr {}", fmt::join(refusal.args, " ")));
-    ExpectRefused(Dtr(refusal.args), refusal.code, refusal.words);
+inline void ExpectAllRejected(const std::vector<Rejection>& rejections) {
+  for (const Rejection& rejection : rejections) {
+    SCOPED_TRACE(fmt::format("dtr {}", fmt::join(rejection.args, " ")));
+    ExpectRejected(Dtr(rejection.args), rejection.code, rejection.words);
   }
 }
 
-class Refusals : public CourtyardAndSet {
+class Rejections : public CourtyardAndSet {
  protected:
   static void SetUpTestSuite() {
     CourtyardAndSet::SetUpTestSuite();

@@ -21,14 +21,14 @@ TEST_F(ResumingLong, TwentyRandomKills) {
 TEST_F(ResumingLong, FullDiskAtEveryStage) {
   GrowUntilFinished(24, 10);
   FillAt("depth");
-  for (const char* stage : {"reading photos", "matching", "consistency round 1", "depth"}) {
+  for (const char* stage : {"reading photos", "matching", "consistency pass 1", "depth"}) {
     EXPECT_THAT(stopped_in_, Contains(Key(stage)));
   }
   EXPECT_THAT(stopped_in_["reading photos"], Contains("images"));
   EXPECT_THAT(stopped_in_["matching"], Contains("work"));
-  EXPECT_THAT(stopped_in_["consistency round 1"], Contains("work"));
+  EXPECT_THAT(stopped_in_["consistency pass 1"], Contains("work"));
   EXPECT_THAT(stopped_in_["depth"], Contains(AnyOf("depth", "sigma")));
-  EXPECT_THAT(stopped_in_["cameras against their sights"], Contains("sparse.bin"));
+  EXPECT_THAT(stopped_in_["cameras against their observations"], Contains("sparse.bin"));
   EXPECT_THAT(stopped_in_["page"], Contains("report"));
 }
 
@@ -36,7 +36,7 @@ TEST_F(ResumingLong, FullDiskAtEveryStage) {
 TEST_F(VideoBySfm, FullDiskAtEveryStage) {
   GrowUntilFinished(96, 8);
   for (const char* stage : {"writing frames", "writing photos", "mapping", "undistorting",
-                            "matching", "bundle adjustment", "consistency round 1", "page"}) {
+                            "matching", "bundle adjustment", "consistency pass 1", "page"}) {
     EXPECT_THAT(stopped_in_, Contains(Key(stage)));
   }
 }

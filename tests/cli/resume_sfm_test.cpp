@@ -25,7 +25,7 @@ using Clock = std::chrono::steady_clock;
 using Points = std::vector<Eigen::Vector3d>;
 
 constexpr int kKills = 10;
-constexpr double kMostShift = 0.01;  // of the median distance to the next camera
+constexpr double kMaxShift = 0.01;  // of the median distance to the next camera
 
 std::vector<std::string> Build(const fs::path& photos, const fs::path& set) {
   return {"build", photos.string(), "-o", set.string(), "--max-size", "96", "--rounds",
@@ -57,7 +57,7 @@ void ExpectSameCameras(const Points& expected, const Points& found) {
   const calib::Similarity aligned = calib::AlignPoints(found, expected);
   const double baseline = MedianNeighbourBaseline(expected);
   for (size_t i = 0; i < found.size(); ++i) {
-    EXPECT_LT((aligned * found[i] - expected[i]).norm(), kMostShift * baseline) << i;
+    EXPECT_LT((aligned * found[i] - expected[i]).norm(), kMaxShift * baseline) << i;
   }
 }
 
@@ -131,7 +131,7 @@ TEST_F(ResumingSfm, AFullDiskIsSaidAndTheSameCommandContinuesWithRoom) {
     const Ran ran = Dtr(Build(Photos(), set));
     if (ran.code == 0) break;
     ++stops;
-    ExpectRefused(ran, kFailed, "No space left on device");
+    ExpectRejected(ran, kFailed, "No space left on device");
     EXPECT_FALSE(fs::exists(set)) << kib;
     if (!fs::exists(features)) continue;
     if (!features_at) features_at = fs::last_write_time(features);

@@ -34,7 +34,8 @@ TEST_F(Resuming, AForcedStageIsDoneAgainToTheSameBytes) {
   }
   std::vector<std::string> unknown = Arguments(Set("unknown"));
   unknown.insert(unknown.end(), {"--force-stage", "magic"});
-  ExpectRefused(Dtr(unknown), 2, "--force-stage: magic not in {capture,calibration,undistortion,depth}");
+  ExpectRejected(Dtr(unknown), 2,
+                 "--force-stage: magic not in {capture,calibration,undistortion,depth}");
 }
 
 TEST_F(FullDisk, IsSaidInOneLineAndTheSameCommandContinuesWithRoom) { GrowUntilFinished(160, 2); }

@@ -84,7 +84,7 @@ class Resuming : public ::testing::Test {
         if (!std::filesystem::exists(set)) continue;
         // In the moment after its last rename: the set is whole, which the next run says and clears
         // away what lies beside it.
-        ExpectRefused(Dtr(Arguments(set)), 2, "expected no such folder yet, found one");
+        ExpectRejected(Dtr(Arguments(set)), 2, "expected no such folder yet, found one");
         ExpectFinished(set);
         std::filesystem::remove_all(set);
         continue;
@@ -105,24 +105,24 @@ class Resuming : public ::testing::Test {
 class FullDisk : public Resuming {
  protected:
   // Room grows by `step_kib` whenever the run stopped for want of it, until it is finished.
-  void GrowUntilFinished(long step_kib, int least_stops) {
+  void GrowUntilFinished(long step_kib, int min_stops) {
     const std::filesystem::path disk_folder = folder_ / "disk";
     const SmallDisk disk(disk_folder);
     if (!disk.mounted()) GTEST_SKIP() << "SKIPPED: no file system can be mounted here";
     const std::filesystem::path set = disk_folder / "set.dtr";
     int stops = 0;
-    constexpr int kMostStops = 400;
-    for (long kib = 64; stops < kMostStops; kib += step_kib) {
+    constexpr int kMaxStops = 400;
+    for (long kib = 64; stops < kMaxStops; kib += step_kib) {
       disk.Grow(kib);
       const Ran ran = Dtr(Arguments(set));
       if (ran.code == 0) break;
       ++stops;
-      ExpectRefused(ran, 1, "No space left on device");
+      ExpectRejected(ran, 1, "No space left on device");
       EXPECT_FALSE(std::filesystem::exists(set)) << kib;
       ExpectNoTemporaryFiles(set.string() + ".partial");
       stopped_in_[LastStage(ran)].insert(PartNamed(ran, set));
     }
-    EXPECT_GE(stops, least_stops);
+    EXPECT_GE(stops, min_stops);
     ExpectFinished(set);
   }
   // The disk is full once a file lies in `part` of the set in the making; with room it is finished.
@@ -142,7 +142,7 @@ class FullDisk : public Resuming {
                                }
                                return false;
                              }});
-    ExpectRefused(ran, 1, "No space left on device");
+    ExpectRejected(ran, 1, "No space left on device");
     EXPECT_FALSE(std::filesystem::exists(set));
     ExpectNoTemporaryFiles(set.string() + ".partial");
     stopped_in_[LastStage(ran)].insert(PartNamed(ran, set));

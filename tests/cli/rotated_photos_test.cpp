@@ -164,7 +164,7 @@ TEST_F(RotatedPhotos, WhatCannotBePutBackIsLeftOutWithTheReason) {
       "few", "left", [](int i) { return i > 2 ? kClockwise : 1; }, 4);
   const Ran few = Dtr({"calibrate", "board", In("few"), "--board", kChessboard, "--model", "brown4",
                        "-o", In("few.json")});
-  ExpectRefused(few, kFailed, "expected at least 3 images with the board, found 2");
+  ExpectRejected(few, kFailed, "expected at least 3 images with the board, found 2");
   EXPECT_THAT(few.err, HasSubstr("2 photos that a program had rotated left out; left03.png: "));
 }
 
@@ -198,7 +198,7 @@ TEST_F(RotatedPhotos, WhereNoneCanBePutBackValidateSaysWhy) {
   Write(
       "rotated", "left", [](int) { return kClockwise; }, 3);
   WriteFileAtomically(In("camera.txt"), "1 OPENCV 640 480 533 533 320 240 -0.28 0.08 0 0\n");
-  ExpectRefused(
+  ExpectRejected(
       Dtr({"validate", In("camera.txt"), "--board", kChessboard, "--images", In("rotated")}),
       kFailed,
       "none of the photos that show the board can be used; left01.png: its 480 x 640 px "

@@ -73,7 +73,7 @@ Ran DtrOk(const std::vector<std::string>& args) {
   return ran;
 }
 
-void ExpectRefused(const Ran& ran, int code, const std::string& text) {
+void ExpectRejected(const Ran& ran, int code, const std::string& text) {
   EXPECT_EQ(ran.signal, 0) << ran.err;
   EXPECT_EQ(ran.code, code) << ran.err;
   const std::vector<std::string> lines = ran.ErrorLines();

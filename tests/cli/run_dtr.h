@@ -35,9 +35,9 @@ Ran Dtr(const std::vector<std::string>& args, const Interruption& interruption =
 /// Runs it and expects exit code 0.
 Ran DtrOk(const std::vector<std::string>& args);
 
-/// Expects a refusal: this exit code, one line that begins with "dtr: ", the last one on stderr,
+/// Expects a rejection: this exit code, one line that begins with "dtr: ", the last one on stderr,
 /// with `text` in it. docs/ERRORS.md must list the text, so that the page stays true.
-void ExpectRefused(const Ran& ran, int code, const std::string& text);
+void ExpectRejected(const Ran& ran, int code, const std::string& text);
 
 /// Bytes of every file below `folder` by relative path; report/run.json, which holds times and is
 /// outside all hashes, is left out.

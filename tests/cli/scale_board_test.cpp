@@ -49,7 +49,9 @@ class ScaleByBoard : public ::testing::Test {
       const Pose pose = CamFromBoard(board, i);
       Pose seen = pose;
       const bool elsewhere = std::find(moved.begin(), moved.end(), i) != moved.end();
-      if (elsewhere) seen = pose * Pose{Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.03, 0.02 * (i - 3), 0)};
+      if (elsewhere)
+        seen =
+            pose * Pose{Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.03, 0.02 * (i - 3), 0)};
       const auto grey =
           calib::testing::Photo(board, kCamera, seen, 1, static_cast<std::uint64_t>(i));
       ImageRgb8 image(grey.width(), grey.height(), 3);
@@ -115,23 +117,24 @@ TEST_F(ScaleByBoard, AViewOfABoardThatWasMovedIsLeftOutByName) {
   EXPECT_NEAR(json["metres_per_unit"], kUnit, 2e-3 * kUnit);
 }
 
-TEST_F(ScaleByBoard, BoardsThatTellNothingAreRefused) {
+TEST_F(ScaleByBoard, BoardsThatTellNothingAreRejected) {
   MakeSet("moving.dtr", {1, 2, 3, 5});
-  ExpectRefused(Scale("moving.dtr", kBoardText), kFailed,
-                "scale by a board: expected views that agree where the board lies, found that");
-  ExpectRefused(
+  ExpectRejected(Scale("moving.dtr", kBoardText), kFailed,
+                 "scale by a board: expected views that agree where the board lies, found that");
+  ExpectRejected(
       Scale("moving.dtr", "charuco:5x6:30mm:0.7"), kWrongUsage,
       "6 of 6 photos looked at show a chessboard of 7x5 inner corners, none the given one; "
       "give chessboard:7x5:SQUARE");
   MakeSet("two.dtr", {}, 2);
-  ExpectRefused(Scale("two.dtr", kBoardText), kFailed,
-                "--board chessboard:7x5:0.03m: expected it in 3 views of");
-  ExpectRefused(Scale("moving.dtr", "chessboard:7x5:30"), kWrongUsage,
-                "--board chessboard:7x5:30: expected a square in mm, cm or m, found a length "
-                "without a unit");
-  ExpectRefused(Dtr({"calibrate", "scale", In("moving.dtr"), "--board", kBoardText, "--distance",
-                     "0000,0001=1m"}),
-                kWrongUsage, "expected --distance (once or more), --board or --gps, found several");
+  ExpectRejected(Scale("two.dtr", kBoardText), kFailed,
+                 "--board chessboard:7x5:0.03m: expected it in 3 views of");
+  ExpectRejected(Scale("moving.dtr", "chessboard:7x5:30"), kWrongUsage,
+                 "--board chessboard:7x5:30: expected a square in mm, cm or m, found a length "
+                 "without a unit");
+  ExpectRejected(Dtr({"calibrate", "scale", In("moving.dtr"), "--board", kBoardText, "--distance",
+                      "0000,0001=1m"}),
+                 kWrongUsage,
+                 "expected --distance (once or more), --board or --gps, found several");
   EXPECT_FALSE(std::filesystem::exists(folder_ / "metric.dtr"));
 }
 

@@ -49,7 +49,7 @@ TEST(StabilityTable, WithoutOpenGlItsCasesAreNamedAsSkipped) {
 }
 
 TEST(StabilityTable, APageNeedsTheWholeTable) {
-  ExpectRefused(Dtr({"selftest", "-o", "table.md"}), 2, "expected --stability with it");
+  ExpectRejected(Dtr({"selftest", "-o", "table.md"}), 2, "expected --stability with it");
 }
 
 }  // namespace

@@ -61,17 +61,17 @@ TEST(StabilityRow, NothingMeasuredWhatIsNotFiniteAndWhatIsThrownFailIt) {
   EXPECT_NE(ToMarkdown({thrown}).find("broken"), std::string::npos);
 }
 
-TEST(StabilityRow, ARefusalMustHappenAndKeepsItsWords) {
+TEST(StabilityRow, ARejectionMustHappenAndKeepsItsWords) {
   const Row refused = RunOne([](const Conditions&) {
     Outcome outcome;
-    ExpectRefusal(outcome, "it", [] { throw Error("words"); });
+    ExpectRejection(outcome, "it", [] { throw Error("words"); });
     return outcome;
   });
   EXPECT_TRUE(refused.passed());
-  EXPECT_EQ(refused.outcome.refusal, "words");
+  EXPECT_EQ(refused.outcome.rejection, "words");
   EXPECT_FALSE(RunOne([](const Conditions&) {
                  Outcome outcome;
-                 ExpectRefusal(outcome, "it", [] {});
+                 ExpectRejection(outcome, "it", [] {});
                  return outcome;
                }).passed());
 }
@@ -89,7 +89,7 @@ TEST(StabilityTable, JsonHasTheDocumentedNames) {
   const Json json = Json::parse(ToJson({row}));
   EXPECT_FALSE(json["passed"]);
   const Json& found = json["rows"].at(0);
-  for (const char* name : {"stage", "case", "quick", "passed", "not_finite", "refusal", "error",
+  for (const char* name : {"stage", "case", "quick", "passed", "not_finite", "rejection", "error",
                            "skipped", "measures"}) {
     EXPECT_TRUE(found.contains(name)) << name;
   }
@@ -148,7 +148,7 @@ TEST(StabilityTable, ThePageHasEveryCaseAndNoOther) {
       continue;
     found.push_back(line.substr(2, line.find(" | ") - 2));
   }
-  EXPECT_EQ(found, expected) << "dtr selftest --stability -o docs/STABILITY.md writes it anew";
+  EXPECT_EQ(found, expected) << "dtr selftest --stability -o docs/STABILITY.md writes it again";
 }
 
 class QuickStability : public ::testing::TestWithParam<Case> {};

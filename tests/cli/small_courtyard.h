@@ -42,7 +42,7 @@ calib::SfmModel CourtyardModel(const std::vector<CourtyardPhoto>& photos, double
 /// Names a model's images 000000.jpg, 000001.jpg, ..., as COLMAP gets them, and returns the names.
 std::vector<std::string> NumberImages(calib::SfmModel& model);
 
-/// Replaces a photo by another picture of the same size.
+/// Replaces a photo by another image of the same size.
 void ChangePhoto(const std::filesystem::path& photo);
 
 }  // namespace dtr::testing

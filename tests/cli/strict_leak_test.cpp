@@ -42,7 +42,7 @@ TEST(StrictHoldout, APhotoChangesNothingButItsOwnPoseFromThePhotosOn) {
                 fs::copy_options::overwrite_existing);
   // COLMAP is not repeatable, so both builds go on from one calibration: the first is cut off
   // behind it, and the second is given what that left. A checkpoint holds for the second only if
-  // nothing it was made from has changed with the photo; the photo's own is made anew.
+  // nothing it was made from has changed with the photo; the photo's own is made again.
   const auto build = [&](const std::string& side) -> std::vector<std::string> {
     return {"build",
             (folder / side / "images").string(),
@@ -86,7 +86,7 @@ TEST(StrictHoldout, APhotoChangesNothingButItsOwnPoseFromThePhotosOn) {
   const auto pose = [](const Json& set) {
     return set["frames"][0]["views"][kChanged]["cam_from_world"];
   };
-  EXPECT_NE(pose(set_a), pose(set_b)) << "the photo was not registered anew";
+  EXPECT_NE(pose(set_a), pose(set_b)) << "the photo was not registered again";
   for (Json* set : {&set_a, &set_b}) {
     Json& view = (*set)["frames"][0]["views"][kChanged];
     EXPECT_EQ(view["name"], kChangedPhoto);

@@ -61,9 +61,9 @@ TEST(TurntableThroughColmap, TheReasonIsReportedAndItsAdviceLeadsToCameras) {
     return Dtr({"calibrate", "photos", folder / "photos", "-o", folder / output, "--feature-size",
                 "400", "--features", "1500"});
   };
-  ExpectRefused(calibrate("none"), kFailed,
-                "matched pairs of photos show most of their common features at the same position "
-                "in both: ");
+  ExpectRejected(calibrate("none"), kFailed,
+                 "matched pairs of photos show most of their common features at the same position "
+                 "in both: ");
   EXPECT_FALSE(fs::exists(folder / "none" / "cameras.bin"));
 
   std::vector<fs::path> photos;

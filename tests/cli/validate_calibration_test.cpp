@@ -36,14 +36,14 @@ TEST_F(ValidateCalibration, PhotosThatItWasMadeFromAreNotUnseenAndAreNamed) {
   const Ran ran = Validate(
       "left.json", {"--images", Photos().string(), "--pattern", "left*.jpg", "--json", "-"});
   ASSERT_TRUE(ran.code == 0 || ran.code == kFailed) << ran.err;
-  EXPECT_THAT(ran.err, HasSubstr("left out: left01.jpg: not unseen: its corners are those of "
+  EXPECT_THAT(ran.err, HasSubstr("left out: left01.jpg: not held out: its corners are those of "
                                  "left01.jpg"));
   EXPECT_THAT(ran.err, Not(HasSubstr("left out: left11.jpg")));
   const Json json = Json::parse(ran.out);
   const Json& views = json["cameras"][0]["views"];
   EXPECT_EQ(views.size(), 5u);
   for (const Json& view : views) EXPECT_THAT(view["name"], HasSubstr("left1"));
-  ExpectRefused(
+  ExpectRejected(
       Validate("left.json", {"--images", Photos().string(), "--pattern", "left0*.jpg"}), kFailed,
       "expected photos that the calibration has not seen, found only those that it was made from");
 }
@@ -53,8 +53,8 @@ TEST_F(ValidateCalibration, ACameraFromElsewhereIsJudgedByPhotosOfABoard) {
   Calibrate();
   std::map<std::string, double> rms_px;
   for (const char* file : {"left.yml", "left.txt"}) {
-    ExpectRefused(Validate(file, {"--images", Photos().string()}), kWrongUsage,
-                  "keeps neither board nor observations; expected --board BOARD and --images DIR");
+    ExpectRejected(Validate(file, {"--images", Photos().string()}), kWrongUsage,
+                   "has neither board nor observations; expected --board BOARD and --images DIR");
     const Ran ran = Validate(file, {"--images", Photos().string(), "--pattern", "left*.jpg",
                                     "--board", kChessboard, "--json", "-"});
     ASSERT_TRUE(ran.code == 0 || ran.code == kFailed) << ran.err;
@@ -90,21 +90,21 @@ TEST_F(ValidateCalibration, UncertaintyIsToldAtChosenDistances) {
   EXPECT_GT(p95(0), 0);
   EXPECT_GT(p95(1), p95(0)) << "the boards stood some 15 away";
   EXPECT_NEAR(p95(2), camera["far_uncertainty_px"]["p95"].get<double>(), 0.02 * p95(2));
-  ExpectRefused(Validate("left.json", {"--at", "2m"}), kWrongUsage,
-                "--at 2m: the board's squares have no unit");
-  ExpectRefused(Validate("left.json", {"--at", "0"}), kWrongUsage,
-                "--at: expected distances above 0, as 2m or 60cm, found '0'");
+  ExpectRejected(Validate("left.json", {"--at", "2m"}), kWrongUsage,
+                 "--at 2m: the board's squares have no unit");
+  ExpectRejected(Validate("left.json", {"--at", "0"}), kWrongUsage,
+                 "--at: expected distances above 0, as 2m or 60cm, found '0'");
 }
 
-TEST_F(ValidateCalibration, OptionsThatDoNotBelongTogetherAreRefused) {
+TEST_F(ValidateCalibration, OptionsThatDoNotBelongTogetherAreRejected) {
   DTR_REQUIRE_DATA(Photos());
   Calibrate();
-  ExpectRefused(Validate("left.json", {"--pattern", "left*.jpg"}), kWrongUsage,
-                "--pattern: says which photos of --images DIR; expected that, too");
-  ExpectRefused(Validate("left.json", {"--images", Photos().string(), "--board", kChessboard}),
-                kWrongUsage, "says which board it was made from");
-  ExpectRefused(Validate("left.json", {"--max-cross", "1"}), kWrongUsage,
-                "--max-cross: is for sets, not for calibration files");
+  ExpectRejected(Validate("left.json", {"--pattern", "left*.jpg"}), kWrongUsage,
+                 "--pattern: says which photos of --images DIR; expected that, too");
+  ExpectRejected(Validate("left.json", {"--images", Photos().string(), "--board", kChessboard}),
+                 kWrongUsage, "says which board it was made from");
+  ExpectRejected(Validate("left.json", {"--max-cross", "1"}), kWrongUsage,
+                 "--max-cross: is for sets, not for calibration files");
 }
 
 TEST(FrameTimes, AMissingNumberIsAGapAndPlacesAreForOtherNames) {

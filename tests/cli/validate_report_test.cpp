@@ -76,7 +76,7 @@ TEST_F(ValidateReport, DepthIsHeldAgainstTheNeighboursDepthAndItsLimitIsAnOption
   EXPECT_EQ(tests.at("worst_view_cross_depth_px")["limit"], 2);
   EXPECT_GT(tests.at("cross_depth_px")["value"], 0);
   EXPECT_EQ(json["cross_depth"]["views"].size(), 7u);
-  // The set's verdict is of this depth.
+  // The set's validation result is of this depth.
   const auto info = nlohmann::json::parse(DtrOk({"info", In("deep.dtr"), "--json", "-"}).out);
   EXPECT_EQ(cross(info["verdict"]["tests"]).at("cross_depth_px")["value"],
             tests.at("cross_depth_px")["value"]);
@@ -90,9 +90,9 @@ TEST_F(ValidateReport, DepthIsHeldAgainstTheNeighboursDepthAndItsLimitIsAnOption
           .empty());
 }
 
-TEST_F(ValidateReport, APageThatCannotBeWrittenIsRefusedBeforeAnyWork) {
-  ExpectRefused(Dtr({"validate", In("set.dtr"), "--report", In("page.txt")}), kWrongUsage,
-                "expected a name ending in .html, found '.txt'");
+TEST_F(ValidateReport, APageThatCannotBeWrittenIsRejectedBeforeAnyWork) {
+  ExpectRejected(Dtr({"validate", In("set.dtr"), "--report", In("page.txt")}), kWrongUsage,
+                 "expected a name ending in .html, found '.txt'");
 }
 
 // What is darkest is told, and what is the least where that is another.
@@ -104,10 +104,10 @@ TEST(AddMap, TheCaptionSaysWhatTheColoursMean) {
     return page.Finish();
   };
   EXPECT_THAT(caption({2, 3, 4}),
-              HasSubstr("Error: 0 px (dark; the least is 2 px) to 4 px (bright),"));
+              HasSubstr("Error: 0 px (dark; the smallest is 2 px) to 4 px (bright),"));
   EXPECT_THAT(caption({2, 30, 60}), HasSubstr("Error: 2 px (dark) to 60 px (bright), by the"));
   EXPECT_THAT(caption({0.01, 30, 600}),
-              HasSubstr("Error: 0.6 px (dark with all below; the least is 0.01 px) to 600 px"));
+              HasSubstr("Error: 0.6 px (dark with all below; the smallest is 0.01 px) to 600 px"));
 }
 
 }  // namespace

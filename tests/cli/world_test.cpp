@@ -63,7 +63,7 @@ class Worlds : public ::testing::Test {
       }
       const double allowed = i == kSplatPicture ? kShareOnRims : 0;
       EXPECT_LE(static_cast<double>(beyond), allowed * static_cast<double>(of_a[i].data().size()))
-          << "picture " << i << ", worst difference " << worst;
+          << "image " << i << ", worst difference " << worst;
       EXPECT_GT(seen, static_cast<long>(of_a[i].data().size()) / 2) << "almost nothing was seen";
     }
   }

@@ -258,7 +258,7 @@ TEST(HeldSurfaces, WhatIsMaskedSaysNothing) {
   nearest.mask = Mask(nearest.camera.width_px(), nearest.camera.height_px());
   const RenderResult masked = picture();
   EXPECT_NEAR(masked.depth(48, 36), 10, 1e-4);
-  // What a masked view would weigh is the others': the picture is that of the set without it.
+  // What a masked view would weigh is the others': the image is that of the set without it.
   const std::vector<std::string> without = {nearest.id};
   ExpectSameBytes(masked, Render(MakeRenderScene(set, without), novel.camera, novel.cam_from_world,
                                  OptionsOf(RenderMethod::kDeferred)));

@@ -1,4 +1,4 @@
-// SPEC 7.3 and 7.4 in whole pictures: large holes, and photos of different exposure.
+// SPEC 7.3 and 7.4 in whole images: large holes, and photos of different exposure.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -15,7 +15,7 @@ namespace {
 using namespace dtr::testing;
 
 constexpr int kWidth = 192, kHeight = 144;
-constexpr double kMostKnownZ = 6;  // nearer ground has no depth
+constexpr double kMaxKnownZ = 6;  // nearer ground has no depth
 
 Shot Wide(const std::string& id, const Eigen::Vector3d& center) {
   Shot shot = ShotFrom(id, center, {0, 0, 12});
@@ -34,7 +34,7 @@ DtrSet GroundWithoutDepth(const std::vector<double>& exposures) {
                            Wide("v" + std::to_string(i), {static_cast<double>(i) - 1.5, 0, 0}));
     for (int y = 0; y < kHeight; ++y) {
       for (int x = 0; x < kWidth; ++x) {
-        if (view.depth(x, y) < kMostKnownZ) view.depth(x, y) = 0;
+        if (view.depth(x, y) < kMaxKnownZ) view.depth(x, y) = 0;
         for (int c = 0; c < 3; ++c) {
           const double linear = LinearFromSrgb8()[view.image(x, y, c)];
           view.image(x, y, c) = Srgb8FromLinear(0.6 * exposures[i] * linear);

@@ -115,7 +115,7 @@ TEST(Render, ALoneOneByOneViewIsDrawnAsItsCell) {
   EXPECT_EQ(result.image(16, 16, 0), 200);
 }
 
-TEST(Render, RefusesWhatHasNoMeaning) {
+TEST(Render, RejectsWhatHasNoMeaning) {
   const DtrSet set = SquareBeforePlane();
   const RenderScene scene = MakeRenderScene(set);
   Pose pose;

@@ -77,7 +77,7 @@ TEST(Layout, NeighboursAreFarEnoughApartForDepthAndNearEnoughToMatch) {
   }
 }
 
-TEST(Layout, WhatASceneHasNoRoomForIsRefused) {
+TEST(Layout, WhatASceneHasNoRoomForIsRejected) {
   const Scene plane = MakeScene("plane", 1);
   try {
     MakeLayout(plane, "ring", 8);

@@ -184,9 +184,9 @@ TEST(MakeDataset, LensBendsThePhotosAndLeavesTruthAlone) {
   }
 }
 
-TEST(MakeDataset, WrongRequestsAreRefusedBeforeAnyFileIsWritten) {
+TEST(MakeDataset, WrongRequestsAreRejectedBeforeAnyFileIsWritten) {
   const testing::TemporaryFolder folder;
-  const auto refuse = [&](auto change, const std::string& word) {
+  const auto reject = [&](auto change, const std::string& word) {
     DatasetSpec spec = Small("plane");
     change(spec);
     try {
@@ -198,24 +198,24 @@ TEST(MakeDataset, WrongRequestsAreRefusedBeforeAnyFileIsWritten) {
     EXPECT_FALSE(fs::exists(folder / "set"));
     EXPECT_FALSE(fs::exists(folder / "set.partial"));
   };
-  refuse([](DatasetSpec& s) { s.views = 1; }, "views");
-  refuse([](DatasetSpec& s) { s.views = 20000; }, "views");
-  refuse([](DatasetSpec& s) { s.width_px = 0; }, "width");
-  refuse([](DatasetSpec& s) { s.height_px = 1 << 20; }, "height");
-  refuse([](DatasetSpec& s) { s.noise = std::nan(""); }, "noise");
-  refuse([](DatasetSpec& s) { s.scale = 0; }, "scale");
-  refuse([](DatasetSpec& s) { s.world_offset.y() = HUGE_VAL; }, "world offset");
-  refuse([](DatasetSpec& s) { s.jpeg_quality = 101; }, "quality");
-  refuse([](DatasetSpec& s) { s.scene = "moon"; }, "moon");
-  refuse([](DatasetSpec& s) { s.layout = "ring"; }, "ring");
-  refuse([](DatasetSpec& s) { s.k1 = -3; }, "lens");
+  reject([](DatasetSpec& s) { s.views = 1; }, "views");
+  reject([](DatasetSpec& s) { s.views = 20000; }, "views");
+  reject([](DatasetSpec& s) { s.width_px = 0; }, "width");
+  reject([](DatasetSpec& s) { s.height_px = 1 << 20; }, "height");
+  reject([](DatasetSpec& s) { s.noise = std::nan(""); }, "noise");
+  reject([](DatasetSpec& s) { s.scale = 0; }, "scale");
+  reject([](DatasetSpec& s) { s.world_offset.y() = HUGE_VAL; }, "world offset");
+  reject([](DatasetSpec& s) { s.jpeg_quality = 101; }, "quality");
+  reject([](DatasetSpec& s) { s.scene = "moon"; }, "moon");
+  reject([](DatasetSpec& s) { s.layout = "ring"; }, "ring");
+  reject([](DatasetSpec& s) { s.k1 = -3; }, "lens");
 
   fs::create_directory(folder / "taken");
   EXPECT_THROW(Make(Small("plane"), folder / "taken"), UsageError);
   EXPECT_TRUE(fs::is_empty(folder / "taken"));
 }
 
-TEST(DatasetSpec, JsonRoundTripsAndRefusesEveryTruncation) {
+TEST(DatasetSpec, JsonRoundTripsAndRejectsEveryTruncation) {
   DatasetSpec spec = Small("sphere");
   spec.layout = "grid";
   spec.noise = 0.1;

@@ -146,7 +146,7 @@ TEST(RenderTruth, DistortedPhotoShowsTheIdealOnesPixelsWhereTheLensPutsThem) {
   EXPECT_LT(error / count, 0.25 * error_if_ignored / count);
 }
 
-TEST(RenderTruth, LensThatFoldsTheImageOverIsRefused) {
+TEST(RenderTruth, LensThatFoldsTheImageOverIsRejected) {
   const Scene scene = MakeScene("plane", 1);
   const PinholeCamera camera = MakeCamera(24, 16);
   PhotoOptions options = Quick();

@@ -191,7 +191,7 @@ TEST(Scene, RadianceDoesNotDependOnWhereOneLooksFrom) {
   EXPECT_GT(compared, 1500);
 }
 
-TEST(Scene, UnknownNamesAreRefusedWithTheKnownOnes) {
+TEST(Scene, UnknownNamesAreRejectedWithTheKnownOnes) {
   try {
     MakeScene("castle", 1);
     FAIL();

@@ -1,4 +1,4 @@
-// tests/eval/clockwork.h -- a renderer whose times and pictures are worked out, and sets for it.
+// tests/eval/clockwork.h -- a renderer whose times and images are worked out, and sets for it.
 #pragma once
 #include <gtest/gtest.h>
 

@@ -84,7 +84,7 @@ TEST(DepthScorer, NothingToScoreGivesNoFigures) {
   EXPECT_FALSE(scorer.Scores().median_relative_error.has_value());
 }
 
-TEST(DepthScorer, OtherGridsAndKindsAreRefused) {
+TEST(DepthScorer, OtherGridsAndKindsAreRejected) {
   DepthScorer scorer;
   EXPECT_THROW(scorer.Add(DepthImage(4, 4), DepthImage(8, 8), {}, 1, 1), Error);
   EXPECT_THROW(scorer.Add(DepthImage(4, 4), DepthImage(4, 4), Mask(4, 3), 1, 1), Error);
@@ -111,7 +111,7 @@ TEST(SubsampleTruth, TakesTheCentrePixelsOfOddScalesOnly) {
   EXPECT_THROW(SubsampleTruth(truth, -3), Error);
 }
 
-TEST(RequireSameGrid, RefusesTheSmallestResampling) {
+TEST(RequireSameGrid, RejectsTheSmallestResampling) {
   const PinholeCamera camera(640, 480, 500, 500, 320, 240);
   EXPECT_NO_THROW(RequireSameGrid(PinholeCamera(640, 480, 500 + 1e-7, 500, 320, 240), camera, "a"));
   EXPECT_THROW(RequireSameGrid(PinholeCamera(640, 480, 500, 500, 320.5, 240), camera, "a"), Error);

@@ -22,7 +22,7 @@ ImageRgb8 RandomImage(int width, int height, std::uint64_t seed) {
   return image;
 }
 
-/// A smooth picture and a noisy copy: SSIM strictly between 0 and 1.
+/// A smooth image and a noisy copy: SSIM strictly between 0 and 1.
 std::pair<ImageRgb8, ImageRgb8> NoisyPair(int width, int height) {
   Random random(5);
   ImageRgb8 clean(width, height, 3), noisy(width, height, 3);
@@ -66,7 +66,7 @@ TEST(Psnr, IdenticalIsInfiniteAndNothingIsEmpty) {
   EXPECT_FALSE(Psnr(a, a, Mask(9, 6)).has_value());
 }
 
-TEST(Metrics, SizesThatDifferAreRefused) {
+TEST(Metrics, SizesThatDifferAreRejected) {
   const ImageRgb8 a = RandomImage(20, 20, 1);
   EXPECT_THROW(Psnr(a, RandomImage(20, 21, 1), {}), std::invalid_argument);
   EXPECT_THROW(Psnr(a, a, Mask(19, 20)), std::invalid_argument);

@@ -212,7 +212,7 @@ TEST(Sweep, StopsAtTheMostPointsAndGoesOnFromWhatIsKept) {
   for (size_t i = 0; i < whole.size(); ++i) EXPECT_EQ(again[i].setting, whole[i].setting);
 }
 
-TEST(Sweep, RefusesACostThatNoLogarithmHas) {
+TEST(Sweep, RejectsACostThatNoLogarithmHas) {
   SilentProgress progress;
   Memory memory;
   SweepStage stage = Independent();

@@ -123,8 +123,8 @@ TEST(Triangulate, HandWorkedPointOfTwoCameras) {
   // Two cameras side by side, 2 apart, looking along z: the point (1, 0, 4) lies between them.
   const PinholeCamera camera(200, 100, 100, 100, 100, 50);
   const Pose left, right{Eigen::Quaterniond::Identity(), {-2, 0, 0}};
-  const std::vector<Sight> sights{MakeSight(camera, left, {125, 50}),
-                                  MakeSight(camera, right, {75, 50})};
+  const std::vector<Sight> sights{MakeObservation(camera, left, {125, 50}),
+                                  MakeObservation(camera, right, {75, 50})};
   const Triangulation found = Triangulate(sights, -1);
   ASSERT_EQ(found.status, TriangulationStatus::kConverged);
   EXPECT_LT((found.p_in_world - Eigen::Vector3d(1, 0, 4)).norm(), 1e-12);
@@ -133,8 +133,8 @@ TEST(Triangulate, HandWorkedPointOfTwoCameras) {
 TEST(Triangulate, ParallelRaysFixNoPoint) {
   const PinholeCamera camera(200, 100, 100, 100, 100, 50);
   const Pose left, right{Eigen::Quaterniond::Identity(), {-2, 0, 0}};
-  const std::vector<Sight> sights{MakeSight(camera, left, {100, 50}),
-                                  MakeSight(camera, right, {100, 50})};
+  const std::vector<Sight> sights{MakeObservation(camera, left, {100, 50}),
+                                  MakeObservation(camera, right, {100, 50})};
   EXPECT_EQ(Triangulate(sights, -1).status, TriangulationStatus::kDegenerate);
   EXPECT_EQ(Triangulate(sights, 0).status, TriangulationStatus::kDegenerate);
 }
@@ -144,19 +144,19 @@ TEST(Triangulate, RaysThatPartHaveNoPointInFront) {
   // They meet behind: turned round, both cameras see each other's side instead.
   const Pose back{Eigen::Quaterniond(Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitY())),
                   {0, 0, -3}};
-  const std::vector<Sight> sights{MakeSight(camera, Pose{}, {100, 20}),
-                                  MakeSight(camera, back, {100, 80})};
+  const std::vector<Sight> sights{MakeObservation(camera, Pose{}, {100, 20}),
+                                  MakeObservation(camera, back, {100, 80})};
   EXPECT_NE(Triangulate(sights, -1).status, TriangulationStatus::kConverged);
 }
 
-TEST(Triangulate, OneWrongSightAmongManyDoesNotCarryThePointAway) {
+TEST(Triangulate, OneWrongObservationAmongManyDoesNotCarryThePointAway) {
   Calibration c = Arc(8, 1, 0);
   std::vector<Sight> sights;
   for (size_t i = 0; i < 8; ++i) {
-    sights.push_back(MakeSight(c.cameras[i], c.poses[i], c.scene.observations[i].pixel));
+    sights.push_back(MakeObservation(c.cameras[i], c.poses[i], c.scene.observations[i].pixel));
   }
-  sights[3] =
-      MakeSight(c.cameras[3], c.poses[3], c.scene.observations[3].pixel + Eigen::Vector2d(40, -25));
+  sights[3] = MakeObservation(c.cameras[3], c.poses[3],
+                              c.scene.observations[3].pixel + Eigen::Vector2d(40, -25));
   const Triangulation found = Triangulate(sights, -1);
   ASSERT_EQ(found.status, TriangulationStatus::kConverged);
   Eigen::Vector2d residual;
@@ -169,7 +169,7 @@ TEST(PixelResidual, DerivativeIsThatOfTheValue) {
   const Calibration c = Arc(4, 20, 0);
   for (const SparseObservation& o : c.scene.observations) {
     const auto view = static_cast<size_t>(o.view);
-    const Sight sight = MakeSight(c.cameras[view], c.poses[view], o.pixel);
+    const Sight sight = MakeObservation(c.cameras[view], c.poses[view], o.pixel);
     const Eigen::Vector3d p =
         c.scene.points[static_cast<size_t>(o.point)].p_in_world +
         0.1 * Eigen::Vector3d(random.Normal(), random.Normal(), random.Normal());
@@ -242,7 +242,8 @@ TEST(Validate, RegionsShowWhereTheLensDoesNotFit) {
 
 TEST(Validate, CountsWhatCannotBeTested) {
   Calibration c = Arc(4, 30, 0);
-  // A point of two views, a feature matched twice in one image, and three sights from one place.
+  // A point of two views, a feature matched twice in one image, and three observations from one
+  // place.
   c.scene.points.push_back(c.scene.points[0]);
   c.scene.observations.push_back({0, 30, c.scene.observations[0].pixel});
   c.scene.observations.push_back({1, 30, c.scene.observations[30].pixel});
@@ -268,7 +269,7 @@ TEST(Validate, CountsWhatCannotBeTested) {
 
 TEST(Validate, StrictlyHeldOutCamerasAreKeptApartAndOthersAreNot) {
   Calibration c = Arc(8, 60, 0);
-  // Without a sight: 2 and 5. With 7 sights, too few to judge: 3.
+  // Without an observation: 2 and 5. With 7 observations, too few to judge: 3.
   std::erase_if(c.scene.observations, [](const SparseObservation& o) {
     return o.view == 2 || o.view == 5 || (o.view == 3 && o.point >= 7);
   });
@@ -278,7 +279,7 @@ TEST(Validate, StrictlyHeldOutCamerasAreKeptApartAndOthersAreNot) {
   const ValidationReport open = validate({});
   EXPECT_THAT(open.untested, ::testing::ElementsAre("view2", "view3", "view5"));
   EXPECT_TRUE(open.kept_apart.empty());
-  // A source without a sight, or a held-out camera with a few, is as suspect as before.
+  // A source without an observation, or a held-out camera with a few, is as suspect as before.
   const ValidationReport two = validate({false, false, true, true, true, false, false, false});
   EXPECT_THAT(two.untested, ::testing::ElementsAre("view3", "view5"));
   EXPECT_THAT(two.kept_apart, ::testing::ElementsAre("view2"));
@@ -310,7 +311,7 @@ TEST(Validate, PointsBehindTheCamerasAreCounted) {
   EXPECT_FALSE(Outcome(c.Validate(), "impossible_share").passed);
 }
 
-TEST(Validate, ImpossibleInputIsRefused) {
+TEST(Validate, ImpossibleInputIsRejected) {
   const Calibration good = Arc(4, 10, 0);
   Calibration c = good;
   c.scene.observations[5].point = 10;

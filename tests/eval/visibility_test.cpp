@@ -81,7 +81,7 @@ TEST(VisibleMask, NeedsTwoOtherViews) {
   EXPECT_EQ(VisibleMask(Borrow(a), two)(40, 30), 255);
 }
 
-TEST(Visibility, DepthOfTheWrongSizeIsRefused) {
+TEST(Visibility, DepthOfTheWrongSizeIsRejected) {
   const View view = PlaneView(0, 0, false);
   TrueView broken = Borrow(view);
   broken.depth = nullptr;

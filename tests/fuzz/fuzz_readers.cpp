@@ -19,8 +19,8 @@ namespace {
 namespace fs = std::filesystem;
 constexpr size_t kLongestInput = 1 << 16;
 constexpr size_t kLargestCorpus = 64;
-constexpr int kKeepOneIn = 16;         // of the inputs that were taken for good files
-constexpr size_t kMostPrefixes = 400;  // of long files, some
+constexpr int kKeepOneIn = 16;        // of the inputs that were taken for good files
+constexpr size_t kMaxPrefixes = 400;  // of long files, some
 
 struct Options {
   std::vector<std::string> readers;
@@ -67,7 +67,7 @@ class Session {
 
   void Run(long inputs, std::uint64_t seed) {
     for (const std::string& good : reader_.seeds) {
-      if (!Try(good)) Complain("a good file is refused", good);
+      if (!Try(good)) Complain("a good file is rejected", good);
     }
     for (const std::string& good : reader_.seeds) TryPrefixes(good);
     Random random(seed);
@@ -104,7 +104,7 @@ class Session {
 
  private:
   void TryPrefixes(const std::string& good) {
-    const size_t step = good.size() / kMostPrefixes + 1;
+    const size_t step = good.size() / kMaxPrefixes + 1;
     for (size_t bytes = 0; bytes < good.size(); bytes += step) Try(good.substr(0, bytes));
   }
   void Complain(const std::string& trouble, const std::string& input) {

@@ -35,11 +35,11 @@ void EndAfter(int seconds) {
   setitimer(ITIMER_PROF, &timer, nullptr);
 }
 
-// The words of a refusal must be one line, so that a program can show them.
+// The words of a rejection must be one line, so that a program can show them.
 std::string TroubleWithWords(const std::string& words) {
-  if (words.empty()) return "refused without a word";
+  if (words.empty()) return "rejected without a word";
   for (const char c : words) {
-    if (c == '\n' || c == '\r' || c == '\0') return "refused in more than one line: " + words;
+    if (c == '\n' || c == '\r' || c == '\0') return "rejected in more than one line: " + words;
   }
   return "";
 }

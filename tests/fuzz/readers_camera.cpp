@@ -75,7 +75,7 @@ Reader OpenPfm(const fs::path& folder) {
           }};
 }
 
-// NeRF's, instant-ngp's and nerfstudio's ways to say the same.
+// NeRF's, time step-ngp's and nerfstudio's ways to say the same.
 Reader OpenTransforms(const fs::path& folder) {
   const fs::path file = folder / "transforms.json";
   const std::string frames =

@@ -26,7 +26,7 @@ Reader OpenSet(const fs::path& folder) {
           {ReadFile(set / "set.json", kSeedLimitBytes)},
           [set] {
             const DtrSet read = io::ReadSet(set);
-            // What was taken must be fit to be told of, and to be loaded or refused.
+            // What was taken must be fit to be told of, and to be loaded or rejected.
             io::DescribeSet(read);
             io::InfoJson(read);
             io::LoadSet(set, {.sigma = true, .held_out = true, .threads = 1});

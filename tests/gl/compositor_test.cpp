@@ -1,5 +1,5 @@
-// A picture in a host's framebuffer, wherever it lies: what the host drew before stays where it is
-// nearer, and where the picture has nothing. Held to a sum in double precision, pixel by pixel.
+// An image in a host's framebuffer, wherever it lies: what the host drew before stays where it is
+// nearer, and where the image has nothing. Held to a sum in double precision, pixel by pixel.
 #include "dtr/gl/compositor.h"
 
 #include <algorithm>
@@ -21,12 +21,12 @@ constexpr double kDepthApart = 2e-7;
 // Pixels whose depth is that near to a plane or to what was there may fall to either side; none
 // did.
 constexpr int kUndecided = 3;
-// Of the host's framebuffer: no pixel's centre lies between two of a picture of 86x64.
+// Of the host's framebuffer: no pixel's centre lies between two of an image of 86x64.
 constexpr int kWidth = 132, kHeight = 128;
 constexpr float kBehind = 0.9F, kBefore = 0.05F;
 constexpr std::array<std::uint8_t, 3> kHosts = {10, 200, 30};
 
-/// What a host has set when it asks for a picture.
+/// What a host has set when it asks for an image.
 struct HostState {
   const char* name;
   double near_z = 1, far_z = 100;
@@ -124,8 +124,8 @@ class Host {
   GLuint color_ = 0, depth_ = 0;
 };
 
-/// Pixels of `shown` that are not what `picture`, with `depth` in it, makes of the host's. Guesses
-/// are where `picture` saw nothing and `depth` has something.
+/// Pixels of `shown` that are not what `image`, with `depth` in it, makes of the host's. Guesses
+/// are where `image` saw nothing and `depth` has something.
 struct Apart {
   int pixels = 0, of_picture = 0, of_host = 0;
 };
@@ -191,7 +191,7 @@ TEST_F(CompositorTest, ATextureAndAPictureInMemoryAreShownWhereTheyAreInFront) {
     Host host;
     const DrawnPicture drawn = Draw(renderer);
     ASSERT_EQ(drawn.rgba != nullptr, in_memory);
-    for (const HostState& state : States()) {  // one picture, whose depth is mapped ever anew
+    for (const HostState& state : States()) {  // one image, whose depth is mapped ever again
       const Shown shown =
           host.With(state, [&] { compositor.Composite(drawn, ProjectionOf(state)); });
       const Apart apart = ApartFrom(shown, picture, picture.depth.grid(), state);
@@ -266,7 +266,7 @@ TEST_F(CompositorTest, LeavesTheHostsStateAsItWas) {
   Host host;
   const DrawnPicture drawn = Draw(renderer);
   const Texture array = Texture::Make(), plain = Texture::Make(), other = Texture::Make();
-  // Textures are made as the first picture comes; unit 15 is where the renderer makes its own.
+  // Textures are made as the first image comes; unit 15 is where the renderer makes its own.
   constexpr GLenum kUnits[] = {GL_TEXTURE0, GL_TEXTURE15};
   host.With(States().front(), [&] {
     for (const GLenum unit : kUnits) {

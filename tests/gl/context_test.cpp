@@ -33,13 +33,13 @@ void OpenWith(const char* variable, const char* value) {
   std::exit(0);
 }
 
-TEST(EglContextDeathTest, AnOlderContextIsRefusedInOneLineThatNamesTheCpuRenderer) {
+TEST(EglContextDeathTest, AnOlderContextIsRejectedInOneLineThatNamesTheCpuRenderer) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   EXPECT_EXIT(OpenWith("MESA_GL_VERSION_OVERRIDE", "4.2"), ::testing::ExitedWithCode(1),
               "OpenGL: expected a context of version 4.3 or newer.*--renderer cpu");
 }
 
-TEST(EglContextDeathTest, AMachineWithoutADriverIsRefusedInOneLineThatNamesTheCpuRenderer) {
+TEST(EglContextDeathTest, AMachineWithoutADriverIsRejectedInOneLineThatNamesTheCpuRenderer) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   EXPECT_EXIT(OpenWith("__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent"),
               ::testing::ExitedWithCode(1),

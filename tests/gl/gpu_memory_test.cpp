@@ -118,7 +118,7 @@ TEST_F(GpuMemory, LayersAreUsedAgainAndEmptyArraysGo) {
   EXPECT_EQ(other.array, b.array);  // the index is free again
 }
 
-TEST_F(GpuMemory, WhatTheDriverCannotHoldIsRefusedInOneLine) {
+TEST_F(GpuMemory, WhatTheDriverCannotHoldIsRejectedInOneLine) {
   const StateGuard guard;
   GLint largest = 0;
   glGetIntegerv(GL_MAX_TEXTURE_SIZE, &largest);

@@ -1,4 +1,4 @@
-// The measure of parity_test.cpp on larger pictures: the figures of docs/accuracy/RENDERING.md.
+// The measure of parity_test.cpp on larger images: the figures of docs/accuracy/RENDERING.md.
 #include <gtest/gtest.h>
 
 #include "tests/gl/gl_testing.h"

@@ -116,7 +116,7 @@ TEST_F(Parity, WouldSeeAnotherWeightOrAnotherNumberOfViews) {
   }
 }
 
-// What the deferred method is for: the two passes' picture, up to the rims of photos and outlines.
+// What the deferred method is for: the two passes' image, up to the rims of photos and outlines.
 TEST_F(Parity, TheDeferredMethodShowsWhatTheTwoPassesShow) {
   constexpr double kDeferredApart = 0.02;
   Renderer renderer;
@@ -153,7 +153,7 @@ TEST_F(Parity, DepthAndCountsAgreeToo) {
         counts_apart += a.view_count(x, y) != b.view_count(x, y);
       }
     }
-    EXPECT_LE(counts_apart, seen / 100);  // the outlines of the views' own pictures
+    EXPECT_LE(counts_apart, seen / 100);  // the outlines of the views' own images
   }
 }
 

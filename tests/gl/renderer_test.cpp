@@ -232,7 +232,7 @@ TEST_F(Render, ViewsOfAnyNumberOfSizesMakeOnePicture) {
     EXPECT_EQ(found.views_used.size(), 20u);
     const RenderResult expected = cpu::Render(scene, novel.camera, novel.cam_from_world, options);
     EXPECT_LE(ShareApart(expected, found), kOutlineShare);
-    // Few sizes lie in layers of their own: the same picture but for how it is added up. The view
+    // Few sizes lie in layers of their own: the same image but for how it is added up. The view
     // after the last one stays, for the others fade by its angle.
     options.views = 4;
     RenderScene few = scene;
@@ -290,8 +290,8 @@ TEST(LayerSizes, AreTheViewsOwnWhereTheseAreFewAndElseFewAndLargeEnough) {
       images.insert(layer);
       depths.insert(few.LayerFor(depth));
     }
-    EXPECT_LE(images.size(), static_cast<size_t>(LayerSizes::kMostSizes));
-    EXPECT_LE(depths.size(), static_cast<size_t>(LayerSizes::kMostSizes));
+    EXPECT_LE(images.size(), static_cast<size_t>(LayerSizes::kMaxSizes));
+    EXPECT_LE(depths.size(), static_cast<size_t>(LayerSizes::kMaxSizes));
   }
   const LayerSizes tight(views, 1, 100);  // no layer beyond the driver's limit
   EXPECT_LE(tight.LayerFor({97, 63}).width_px, 100);
@@ -346,11 +346,11 @@ TEST_F(Render, LeavesBufferRangesClipDistancesAndStateOfDrawBuffersAsTheyWere) {
   glBindBufferBase(GL_UNIFORM_BUFFER, 0, 0);
 }
 
-TEST_F(Render, DepthBeyondAStorageBlockGoesInBandsOrIsRefusedNamingTheLimit) {
+TEST_F(Render, DepthBeyondAStorageBlockGoesInBandsOrIsRejectedNamingTheLimit) {
   const NamedScene scene = ParityScenes()[1];
   const RenderScene views = MakeRenderScene(scene.set);
   RendererSettings small;
-  small.most_storage_bytes = 4 * 96 * 10;  // ten rows
+  small.max_storage_bytes = 4 * 96 * 10;  // ten rows
   Renderer renderer(small);
   const RenderResult banded =
       renderer.Render(views, scene.novel.camera, scene.novel.cam_from_world, {});

@@ -130,7 +130,7 @@ TEST_F(Smooth, TheMeasureWouldSeeAPop) {
   for (const bool pops : {false, true}) {
     const Smoothness s =
         MeasureSmoothness(views, path, {}, [&](const NovelCamera& novel, int frame) {
-          // The pop: for one frame the picture of a place 12 steps ahead.
+          // The pop: for one frame the image of a place 12 steps ahead.
           const NovelCamera& from = pops && frame == 40 ? path[52] : novel;
           return renderer.Render(views, from.camera, from.cam_from_world, {});
         });

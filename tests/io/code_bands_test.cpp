@@ -95,7 +95,7 @@ TEST(CodeBands, EveryTruncatedPrefixAndEveryFlippedBitIsAnError) {
   }
 }
 
-TEST(CodeBands, HostileSizesAreRefusedBeforeAnythingIsAllocated) {
+TEST(CodeBands, HostileSizesAreRejectedBeforeAnythingIsAllocated) {
   const std::string bytes = EncodeBands(Codes(8, 8, 1, 7));
   const auto with = [&](size_t at, std::uint32_t value) {
     std::string changed = bytes;
@@ -125,7 +125,7 @@ long PeakAddressSpaceKib() {
 // room for the map is made.
 TEST(CodeBands, AMapThatTheFileCannotHoldTakesNoMemory) {
   constexpr int kSide = 20000, kRows = 10000;
-  constexpr long kMostKib = 64 << 10;  // the codes alone would be 800 MB
+  constexpr long kMaxKib = 64 << 10;  // the codes alone would be 800 MB
   const auto file = [&](const std::string& frame) {
     std::string bytes("DTRBAND1");
     const auto put = [&](std::uint32_t value) {
@@ -153,7 +153,7 @@ TEST(CodeBands, AMapThatTheFileCannotHoldTakesNoMemory) {
   EXPECT_THROW(DecodeBands(file("no frame at all"), kSide, kSide), Error);
   EXPECT_THROW(DecodeBands(file(frame(7)), kSide, kSide), Error);
   EXPECT_THROW(DecodeBands(file(frame(kSide / 8 * kRows)), kSide, kSide), Error);
-  EXPECT_LT(PeakAddressSpaceKib() - before, kMostKib);
+  EXPECT_LT(PeakAddressSpaceKib() - before, kMaxKib);
 }
 
 DepthImage DepthWithin(Random& random, double near_z, double far_z) {
@@ -195,7 +195,7 @@ TEST(StepsForError, KeepsEveryInverseDepthWithinTheBoundAndEveryHole) {
   }
 }
 
-TEST(StepsForError, RefusesWhatSixteenBitsOrFloatCannotKeep) {
+TEST(StepsForError, RejectsWhatSixteenBitsOrFloatCannotKeep) {
   EXPECT_EQ(StepsForError(1, 2, 10), 1);
   EXPECT_THROW(StepsForError(1, 2, 1e-7), Error);       // 2.5 million steps
   EXPECT_THROW(StepsForError(1, 1.0001, 1e-8), Error);  // below float's rounding

@@ -77,7 +77,7 @@ TEST(Png16Inverse, IsMonotoneAndStableOverAllCodes) {
   EXPECT_EQ(EncodeInverseDepth(depth, 0.3, 9.0), codes);
 }
 
-TEST(Png16Inverse, RefusesDepthOutsideTheRangeAndBadRanges) {
+TEST(Png16Inverse, RejectsDepthOutsideTheRangeAndBadRanges) {
   DepthImage depth(2, 2);
   depth(1, 1) = 3;
   EXPECT_THROW(EncodeInverseDepth(depth, 1, 2), Error);
@@ -94,7 +94,7 @@ TEST(Png16Inverse, RefusesDepthOutsideTheRangeAndBadRanges) {
   EXPECT_THROW(EncodeInverseDepth(DepthImage(2, 2, DepthKind::kRayDistance), 1, 2), Error);
 }
 
-TEST(Png16Millimetre, RoundsToAMillimetreAndRefusesWhatDoesNotFit) {
+TEST(Png16Millimetre, RoundsToAMillimetreAndRejectsWhatDoesNotFit) {
   DepthImage depth(3, 1);
   depth(0, 0) = 65.535f;
   depth(1, 0) = 1.2344f;
@@ -106,7 +106,7 @@ TEST(Png16Millimetre, RoundsToAMillimetreAndRefusesWhatDoesNotFit) {
   EXPECT_THROW(EncodePng16Millimetre(depth), Error);
 }
 
-// An EXR with these channels, channel k 10 + k throughout; `x` columns of the picture before it.
+// An EXR with these channels, channel k 10 + k throughout; `x` columns of the image before it.
 void WriteLayers(const std::filesystem::path& file, const std::vector<std::string>& channels,
                  int x = 0) {
   OIIO::ImageSpec spec(4, 3, static_cast<int>(channels.size()), OIIO::TypeDesc::FLOAT);
@@ -147,16 +147,16 @@ TEST(ReadFloatGrid, DepthOfALayerIsFoundByItsName) {
   }
 }
 
-TEST(ReadFloatGrid, APartOfAPictureIsRefused) {
+TEST(ReadFloatGrid, APartOfAPictureIsRejected) {
   const TemporaryFolder folder;
   WriteLayers(folder / "part.exr", {"Z"}, 4);
   EXPECT_THAT(
       testing::MessageOf<Error>([&] { ReadFloatGrid(folder / "part.exr"); }),
-      ::testing::HasSubstr("expected pixels for the whole picture of 8x3, found 4x3 of them from "
+      ::testing::HasSubstr("expected pixels for the whole image of 8x3, found 4x3 of them from "
                            "(4, 0) on"));
 }
 
-TEST(ExrHalf, RoundsLikeOpenExrAndRefusesWhatDoesNotFit) {
+TEST(ExrHalf, RoundsLikeOpenExrAndRejectsWhatDoesNotFit) {
   const TemporaryFolder folder;
   Random random(2);
   DepthImage depth = RandomDepth(random, 33, 17, 0.01f, 60000.0f);
@@ -202,7 +202,7 @@ TEST_P(DepthFiles, EveryTruncatedPrefixIsAnError) {
   testing::ExpectEveryPrefixIsAnError(file, 1, [&] { ReadDepth(file, format, 8, 6); });
 }
 
-TEST_P(DepthFiles, RefuseDepthOutsideTheRange) {
+TEST_P(DepthFiles, RejectDepthOutsideTheRange) {
   const TemporaryFolder folder;
   DepthImage depth(4, 4);
   depth(1, 2) = 3;
@@ -262,7 +262,7 @@ TEST(Sigma, KeepsEightBits) {
   EXPECT_THROW(WriteSigma(folder / "sigma.exr", sigma), Error);
 }
 
-TEST(ReadFloatGrid, RefusesIntegersAndReadPng16RefusesBytes) {
+TEST(ReadFloatGrid, RejectsIntegersAndReadPng16RejectsBytes) {
   const TemporaryFolder folder;
   WritePng16(folder / "a.png", Grid<std::uint16_t>(3, 2, 1, 500));
   EXPECT_EQ(ReadPng16(folder / "a.png")(2, 1), 500);

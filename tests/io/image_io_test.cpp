@@ -109,7 +109,7 @@ TEST(ReadImage, SixteenBitsAreRoundedAndFloatsAreLinearLight) {
   EXPECT_EQ(ReadImage(folder / "linear.exr").data(), (std::vector<std::uint8_t>{128, 255, 0}));
 }
 
-TEST(ReadImage, RefusesNaNAndInfinity) {
+TEST(ReadImage, RejectsNaNAndInfinity) {
   const TemporaryFolder folder;
   for (const float bad : {std::numeric_limits<float>::quiet_NaN(), HUGE_VALF}) {
     WriteForeign<float>(folder / "bad.exr", ImageSpec(1, 1, 3, TypeDesc::FLOAT), {0, bad, 0});
@@ -117,7 +117,7 @@ TEST(ReadImage, RefusesNaNAndInfinity) {
   }
 }
 
-TEST(ReadImage, RefusesTextFoldersAbsentFilesAndTooManyPixels) {
+TEST(ReadImage, RejectsTextFoldersAbsentFilesAndTooManyPixels) {
   const TemporaryFolder folder;
   WriteFileAtomically(folder / "text.jpg", "this is no photo");
   EXPECT_THROW(ReadImage(folder / "text.jpg"), Error);
@@ -129,7 +129,7 @@ TEST(ReadImage, RefusesTextFoldersAbsentFilesAndTooManyPixels) {
   EXPECT_THROW(ReadImage(folder / "a.png", {.limit_px = 99}), Error);
 }
 
-std::string RefusalOf(const std::filesystem::path& file) {
+std::string RejectionOf(const std::filesystem::path& file) {
   try {
     ReadImage(file);
   } catch (const Error& error) {
@@ -139,7 +139,7 @@ std::string RefusalOf(const std::filesystem::path& file) {
 }
 
 // OpenEXR would allocate what the header claims, up to 2 GiB, before it reads.
-TEST(ReadImage, AnExrThatClaimsMoreThanItHoldsIsRefusedBeforeAllocation) {
+TEST(ReadImage, AnExrThatClaimsMoreThanItHoldsIsRejectedBeforeAllocation) {
   const TemporaryFolder folder;
   const auto file = folder / "a.exr";
   WriteForeign<float>(file, ImageSpec(1, 1, 3, TypeDesc::FLOAT), {0.5f, 0.25f, 0.125f});
@@ -150,16 +150,16 @@ TEST(ReadImage, AnExrThatClaimsMoreThanItHoldsIsRefusedBeforeAllocation) {
     std::string bad = good;
     bad.replace(length_at, 4, claim, 4);
     WriteFileAtomically(file, bad);
-    EXPECT_THAT(RefusalOf(file), ::testing::HasSubstr("damaged EXR"));
+    EXPECT_THAT(RejectionOf(file), ::testing::HasSubstr("damaged EXR"));
   }
   std::string channels = good;  // the list of channels runs on past its own length
   channels[good.find("compression") - 1] = 'x';
   WriteFileAtomically(file, channels);
-  EXPECT_THAT(RefusalOf(file), ::testing::HasSubstr("damaged EXR"));
+  EXPECT_THAT(RejectionOf(file), ::testing::HasSubstr("damaged EXR"));
 }
 
 // OpenEXR allocates a chunk's pixels and the table of all chunks by the header alone.
-TEST(ReadImage, AnExrOfMoreOrLargerChunksThanItsFileHoldsIsRefused) {
+TEST(ReadImage, AnExrOfMoreOrLargerChunksThanItsFileHoldsIsRejected) {
   const TemporaryFolder folder;
   const auto file = folder / "a.exr";
   WriteForeign<float>(file, ImageSpec(4, 4, 1, TypeDesc::FLOAT), std::vector<float>(16, 0.5f));
@@ -186,30 +186,30 @@ TEST(ReadImage, AnExrOfMoreOrLargerChunksThanItsFileHoldsIsRefused) {
       {with_window(3, -1), "at least one pixel"}};
   for (const auto& [bad, complaint] : cases) {
     WriteFileAtomically(file, bad);
-    EXPECT_THAT(RefusalOf(file), ::testing::HasSubstr(complaint));
+    EXPECT_THAT(RejectionOf(file), ::testing::HasSubstr(complaint));
   }
 }
 
 // Without this OpenImageIO offers the file to every decoder it has.
-TEST(ReadImage, AFileThatBeginsLikeNoImageIsRefusedWithItsBeginning) {
+TEST(ReadImage, AFileThatBeginsLikeNoImageIsRejectedWithItsBeginning) {
   const TemporaryFolder folder;
   WriteImage(folder / "a.png", SmoothImage(8, 6));
   std::string bytes = ReadFile(folder / "a.png", 1 << 20);
   EXPECT_NO_THROW(ReadImage(folder / "a.png"));
   bytes[1] = 'Q';
   WriteFileAtomically(folder / "a.png", bytes);
-  EXPECT_THAT(RefusalOf(folder / "a.png"), ::testing::HasSubstr("begins with \".QNG"));
+  EXPECT_THAT(RejectionOf(folder / "a.png"), ::testing::HasSubstr("begins with \".QNG"));
   WriteFileAtomically(folder / "notes.jpg", "These are no pixels.");
-  EXPECT_THAT(RefusalOf(folder / "notes.jpg"),
+  EXPECT_THAT(RejectionOf(folder / "notes.jpg"),
               ::testing::HasSubstr("no readable image: expected a PNG, JPEG"));
   WriteFileAtomically(folder / "empty.jpg", "");
-  EXPECT_THAT(RefusalOf(folder / "empty.jpg"), ::testing::HasSubstr("begins with \"\""));
+  EXPECT_THAT(RejectionOf(folder / "empty.jpg"), ::testing::HasSubstr("begins with \"\""));
 }
 
-TEST(ReadImage, ASizeThatTheFileCannotHoldIsRefusedBeforeAllocation) {
+TEST(ReadImage, ASizeThatTheFileCannotHoldIsRejectedBeforeAllocation) {
   const TemporaryFolder folder;
   WriteFileAtomically(folder / "a.ppm", "P6\n19999 19999\n255\n" + std::string(300, 'x'));
-  EXPECT_THAT(RefusalOf(folder / "a.ppm"),
+  EXPECT_THAT(RejectionOf(folder / "a.ppm"),
               ::testing::HasSubstr("expected as many pixels as 319 bytes can hold, found 19999x"));
   // White masks of photos are small files, and real.
   WriteMask(folder / "m.png", Mask(3000, 2000, 1, 255));

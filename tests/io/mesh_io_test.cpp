@@ -59,38 +59,38 @@ TEST(MeshFile, EveryTruncatedPrefixIsAnError) {
                                       [&] { ReadMesh(folder / "mesh.bin"); });
 }
 
-TEST(MeshFile, RefusesHostileNumbers) {
+TEST(MeshFile, RejectsHostileNumbers) {
   const TemporaryFolder folder;
   const auto file = folder / "mesh.bin";
   WriteMesh(file, SmallMesh());
   const std::string good = ReadFile(file, 1 << 20);
-  const auto expect_refused = [&](const std::string& content, const char* what) {
+  const auto expect_rejected = [&](const std::string& content, const char* what) {
     WriteFileAtomically(file, content);
     EXPECT_THROW(ReadMesh(file), Error) << what;
   };
-  expect_refused(good + std::string(2, '\0'), "trailing bytes");
+  expect_rejected(good + std::string(2, '\0'), "trailing bytes");
   const auto with = [&](size_t at, const std::string& bytes) {
     std::string bad = good;
     return bad.replace(at, bytes.size(), bytes);
   };
-  expect_refused(with(0, "X"), "magic");
-  expect_refused(with(8, std::string(4, '\0')), "resolution 0");
-  expect_refused(with(12, std::string(4, '\xff')), "columns beyond any image");
-  expect_refused(with(12, std::string("\x00\x00\x10\x00", 4)), "more root squares than bytes");
-  expect_refused(with(20, "\1"), "reserved bytes");
-  expect_refused(with(24, std::string(32, '\0')), "no depth hash");
+  expect_rejected(with(0, "X"), "magic");
+  expect_rejected(with(8, std::string(4, '\0')), "resolution 0");
+  expect_rejected(with(12, std::string(4, '\xff')), "columns beyond any image");
+  expect_rejected(with(12, std::string("\x00\x00\x10\x00", 4)), "more root squares than bytes");
+  expect_rejected(with(20, "\1"), "reserved bytes");
+  expect_rejected(with(24, std::string(32, '\0')), "no depth hash");
   for (const double bad :
        {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), -2.0}) {
     const std::string bytes(reinterpret_cast<const char*>(&bad), 8);
-    for (const size_t at : {88u, 96u, 104u}) expect_refused(with(at, bytes), "threshold");
+    for (const size_t at : {88u, 96u, 104u}) expect_rejected(with(at, bytes), "threshold");
   }
-  expect_refused(with(112, std::string(8, '\xff')), "number of rectangles");
-  expect_refused(with(kFirstRoot, std::string(2, '\xff')), "rectangles of a root square");
-  expect_refused(with(kFirstRoot, std::string(2, '\0')), "rectangles left over");
-  expect_refused(with(kFirstRoot + 2, "\x01"), "a rectangle beyond its root square and the map");
+  expect_rejected(with(112, std::string(8, '\xff')), "number of rectangles");
+  expect_rejected(with(kFirstRoot, std::string(2, '\xff')), "rectangles of a root square");
+  expect_rejected(with(kFirstRoot, std::string(2, '\0')), "rectangles left over");
+  expect_rejected(with(kFirstRoot + 2, "\x01"), "a rectangle beyond its root square and the map");
 }
 
-TEST(MeshFile, RefusesRectanglesThatOverlap) {
+TEST(MeshFile, RejectsRectanglesThatOverlap) {
   const TemporaryFolder folder;
   const auto file = folder / "mesh.bin";
   StoredMesh mesh = SmallMesh();
@@ -105,7 +105,7 @@ TEST(MeshFile, RefusesRectanglesThatOverlap) {
   EXPECT_THROW(WriteMesh(file, mesh), Error);
 }
 
-TEST(MeshFile, WriterRefusesWhatTheReaderWould) {
+TEST(MeshFile, WriterRejectsWhatTheReaderWould) {
   const TemporaryFolder folder;
   StoredMesh mesh = SmallMesh();
   mesh.cover.rectangles[0] = {30, 0, 16, 16};

@@ -102,7 +102,7 @@ TEST_F(EditedSet, ErrorsNameFileFieldExpectedAndFound) {
                        ": frames[0].views[1].camera.fx_px: expected a positive number, found -1");
 }
 
-TEST_F(EditedSet, WrongVersionsAndFormatsAreRefused) {
+TEST_F(EditedSet, WrongVersionsAndFormatsAreRejected) {
   EXPECT_THAT(ErrorAfter("", "\"format_version\": 1", "\"format_version\": 2"),
               HasSubstr("format_version: expected 1, found 2"));
   EXPECT_THAT(ErrorAfter("", "\"format_version\": 1", "\"format_version\": \"1\""),
@@ -111,7 +111,7 @@ TEST_F(EditedSet, WrongVersionsAndFormatsAreRefused) {
   EXPECT_THAT(ErrorAfter("", "\"metre\"", "\"feet\""), HasSubstr("unit: expected"));
 }
 
-TEST_F(EditedSet, NumbersThatAreNoneAreRefused) {
+TEST_F(EditedSet, NumbersThatAreNoneAreRejected) {
   for (const char* bad : {"1e999", "-1e999", "null", "\"1\"", "NaN", "[1]", "true"}) {
     EXPECT_NE(ErrorAfter("", "\"cx_px\": 4.05", std::string("\"cx_px\": ") + bad), "") << bad;
     EXPECT_NE(ErrorAfter("\"translation\"", "0.0", bad), "") << bad;
@@ -127,7 +127,7 @@ TEST_F(EditedSet, PosesMustBeRotations) {
               HasSubstr("expected 4 numbers"));
 }
 
-TEST_F(EditedSet, FieldsOutOfRangeAreRefused) {
+TEST_F(EditedSet, FieldsOutOfRangeAreRejected) {
   EXPECT_THAT(ErrorAfter("", "\"width_px\": 8,\n", "\"width_px\": 0,\n"), HasSubstr("width_px"));
   EXPECT_THAT(ErrorAfter("", "\"width_px\": 8,\n", "\"width_px\": 2000000000,\n"),
               HasSubstr("at most"));
@@ -167,7 +167,7 @@ TEST_F(EditedSet, PathsMustStayInTheSet) {
   }
 }
 
-TEST_F(EditedSet, SymbolicLinksOutOfTheSetAreRefused) {
+TEST_F(EditedSet, SymbolicLinksOutOfTheSetAreRejected) {
   fs::rename(set_ / "images/view0.png", folder_ / "outside.png");
   fs::create_symlink(folder_ / "outside.png", set_ / "images/view0.png");
   EXPECT_THAT(ErrorOf([&] { ReadSet(set_); }),
@@ -193,7 +193,7 @@ TEST_F(EditedSet, MissingFilesAndOtherSizesAreNamed) {
   EXPECT_THAT(VerifySet(set_), ElementsAre(HasSubstr("views[0].depth.path")));
 }
 
-TEST_F(EditedSet, DeepNestingIsRefused) {
+TEST_F(EditedSet, DeepNestingIsRejected) {
   const std::string deep = std::string(100000, '[') + std::string(100000, ']');
   EXPECT_THAT(ErrorAfter("", "\"format\"", "\"deep\": " + deep + ", \"format\""),
               HasSubstr("nesting"));
@@ -286,7 +286,7 @@ TEST_F(EditedSet, UnknownFieldsSurviveReadAndWrite) {
   EXPECT_EQ(Text(set_ / "set.json"), once);
 }
 
-TEST(ReadSet, RefusesWhatIsNoSet) {
+TEST(ReadSet, RejectsWhatIsNoSet) {
   const TemporaryFolder folder;
   EXPECT_THROW(ReadSet(folder / "absent.dtr"), Error);
   EXPECT_THROW(ReadSet(folder.path()), Error);
@@ -348,7 +348,7 @@ TEST(LoadSet, BringsThePixelsBackAndLeavesHeldOutViewsOut) {
   EXPECT_THAT(LoadSparse(folder / "small.dtr", all).observations, SizeIs(2));
 }
 
-TEST(LoadSet, PixelsOfAnotherSizeAreRefused) {
+TEST(LoadSet, PixelsOfAnotherSizeAreRejected) {
   const TemporaryFolder folder;
   WriteSmallSet(folder / "small.dtr");
   DtrSet set = ReadSet(folder / "small.dtr");

@@ -83,7 +83,7 @@ TEST(SetWriter, AReplacementCutOffHalfWayGivesTheOldSetBack) {
   EXPECT_THAT(VerifySet(folder / "small.dtr"), IsEmpty());
 }
 
-TEST(SetWriter, WhatLiesWhereTheOldSetMustGoIsRefusedBeforeAnyWork) {
+TEST(SetWriter, WhatLiesWhereTheOldSetMustGoIsRejectedBeforeAnyWork) {
   const TemporaryFolder folder;
   WriteSmallSet(folder / "small.dtr");
   fs::create_directories(folder / "small.dtr.replaced/thesis");

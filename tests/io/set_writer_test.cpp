@@ -213,7 +213,7 @@ TEST(SetWriter, CopiesOfFilesThatMayOnlyBeReadCanBeReplaced) {
   EXPECT_NO_THROW(writer.CopyFiles(folder / "from.dtr", views[0]));
 }
 
-TEST(SetWriter, FinishRefusesWhatReadSetWouldAndKeepsTheWork) {
+TEST(SetWriter, FinishRejectsWhatReadSetWouldAndKeepsTheWork) {
   const TemporaryFolder folder;
   SetWriter writer(folder / "small.dtr", kFingerprint, false);
   DtrSet set = EmptySet();
@@ -238,25 +238,25 @@ TEST(SetWriter, FinishRefusesWhatReadSetWouldAndKeepsTheWork) {
   EXPECT_THAT(VerifySet(folder / "small.dtr"), IsEmpty());
 }
 
-TEST(SetWriter, ViewsThatDoNotFitAreRefused) {
+TEST(SetWriter, ViewsThatDoNotFitAreRejected) {
   const TemporaryFolder folder;
   SetWriter writer(folder / "small.dtr", kFingerprint, false);
-  const auto expect_refused = [&](const auto& change) {
+  const auto expect_rejected = [&](const auto& change) {
     View view = SmallView(1);
     change(view);
     EXPECT_THROW(writer.WriteView(view, LengthUnit::kUnknown), Error);
   };
-  expect_refused([](View& v) { v.id = "../x"; });
-  expect_refused([](View& v) { v.image = ImageRgb8(8, 7, 3); });
-  expect_refused([](View& v) { v.mask = Mask(7, 6); });
-  expect_refused([](View& v) { v.depth_scale = 1; });
-  expect_refused([](View& v) { v.depth_scale = 3; });
-  expect_refused([](View& v) { v.inverse_depth_sigma = Grid<float>(8, 6); });
-  expect_refused([](View& v) { v.role = ViewRole::kHeldOut; });
-  expect_refused([](View& v) { v.depth(0, 0) = -1; });
-  expect_refused([](View& v) { v.near_z = 5, v.far_z = 6; });
-  expect_refused([](View& v) { v.depth_coding = DepthCoding::kPng16Millimetre; });  // no metres
-  expect_refused([](View& v) { v.name = "\xff\xfe.jpg"; });                         // no UTF-8
+  expect_rejected([](View& v) { v.id = "../x"; });
+  expect_rejected([](View& v) { v.image = ImageRgb8(8, 7, 3); });
+  expect_rejected([](View& v) { v.mask = Mask(7, 6); });
+  expect_rejected([](View& v) { v.depth_scale = 1; });
+  expect_rejected([](View& v) { v.depth_scale = 3; });
+  expect_rejected([](View& v) { v.inverse_depth_sigma = Grid<float>(8, 6); });
+  expect_rejected([](View& v) { v.role = ViewRole::kHeldOut; });
+  expect_rejected([](View& v) { v.depth(0, 0) = -1; });
+  expect_rejected([](View& v) { v.near_z = 5, v.far_z = 6; });
+  expect_rejected([](View& v) { v.depth_coding = DepthCoding::kPng16Millimetre; });  // no metres
+  expect_rejected([](View& v) { v.name = "\xff\xfe.jpg"; });                         // no UTF-8
 }
 
 TEST(SetWriter, EveryCodingIsReadBackWithinItsRange) {
@@ -312,7 +312,7 @@ TEST(SetWriter, RecodedDepthKeepsItsBoundItsRangeAndTheCheckpoint) {
   EXPECT_THAT(VerifySet(folder / "small.dtr"), IsEmpty());
 }
 
-TEST(SetWriter, CopiesFilesAndRefusesDamagedOnes) {
+TEST(SetWriter, CopiesFilesAndRejectsDamagedOnes) {
   const TemporaryFolder folder;
   const DtrSet from = WriteSmallSet(folder / "from.dtr");
   {

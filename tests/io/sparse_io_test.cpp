@@ -44,30 +44,30 @@ TEST(SparseFile, EveryTruncatedPrefixIsAnError) {
                                       [&] { ReadSparse(folder / "sparse.bin"); });
 }
 
-TEST(SparseFile, RefusesHostileCountsVersionsAndTrailingBytes) {
+TEST(SparseFile, RejectsHostileCountsVersionsAndTrailingBytes) {
   const TemporaryFolder folder;
   const auto file = folder / "sparse.bin";
   WriteSparse(file, SmallScene());
   const std::string good = ReadFile(file, 1 << 20);
-  const auto expect_refused = [&](const std::string& content) {
+  const auto expect_rejected = [&](const std::string& content) {
     WriteFileAtomically(file, content);
     EXPECT_THROW(ReadSparse(file), Error);
   };
-  expect_refused(good + '\0');
+  expect_rejected(good + '\0');
   for (const size_t at : {0u, 8u, 12u, 16u, 23u, 24u, 31u}) {  // magic, version, both counts
     std::string bad = good;
     bad[at] = static_cast<char>(bad[at] ^ 0x55);
-    expect_refused(bad);
+    expect_rejected(bad);
   }
   std::string bad_point = good;  // of observation 0
   bad_point[32 + 2 * 24 + 4] = 9;
-  expect_refused(bad_point);
+  expect_rejected(bad_point);
   std::string bad_view = good;  // 2^31 and more is no int
   bad_view[32 + 2 * 24 + 2 * 24 + 3] = '\xff';
-  expect_refused(bad_view);
+  expect_rejected(bad_view);
 }
 
-TEST(SparseFile, WriterRefusesWhatTheReaderWould) {
+TEST(SparseFile, WriterRejectsWhatTheReaderWould) {
   const TemporaryFolder folder;
   SparseScene scene = SmallScene();
   std::swap(scene.observations[0], scene.observations[2]);

@@ -19,7 +19,7 @@ using osgDTR::DepthTR;
 
 constexpr double kShareOfBorderPixels = 2e-4;
 
-/// A picture as dtr/gl draws it, in a context of its own.
+/// An image as dtr/gl draws it, in a context of its own.
 RenderResult DrawnAlone(const DtrSet& set, const Shot& novel, const RenderOptions& options) {
   const gl::EglContext context;
   gl::FittingRenderer renderer;

@@ -1,4 +1,4 @@
-// Hole filling among models: the picture of dtr/gl, with a depth that models hide by and are hidden
+// Hole filling among models: the image of dtr/gl, with a depth that models hide by and are hidden
 // by.
 #include "tests/gl/gl_testing.h"
 #include "tests/simd/exact_scenes.h"
@@ -26,14 +26,14 @@ RenderOptions Filled(RenderMethod method = RenderMethod::kDeferred) {
   return options;
 }
 
-/// A picture as dtr/gl draws it, in a context of its own.
+/// An image as dtr/gl draws it, in a context of its own.
 RenderResult DrawnAlone(const DtrSet& set, const Shot& novel, const RenderOptions& options) {
   const gl::EglContext context;
   gl::FittingRenderer renderer;
   return renderer.Render(MakeRenderScene(set), novel.camera, novel.cam_from_world, options);
 }
 
-/// Of pixels that are not as they should be, in shares of the picture.
+/// Of pixels that are not as they should be, in shares of the image.
 struct Wrong {
   double colour = 0, empty = 0;
 };
@@ -99,7 +99,7 @@ TEST_F(FillTest, WhenStillMeansNotWhileMovingAndOnceItRests) {
   const osg::ref_ptr<DepthTR> node = FilledWhenStill(named.set);
   OffscreenViewer viewer(node.get(), named.novel.camera, named.novel.cam_from_world);
   const RenderResult expected = DrawnAlone(named.set, named.novel, Filled(RenderMethod::kDeferred));
-  EXPECT_EQ(Compare(viewer.Draw(), expected).empty, 0) << "the first picture waits for nothing";
+  EXPECT_EQ(Compare(viewer.Draw(), expected).empty, 0) << "the first image waits for nothing";
   Pose aside = named.novel.cam_from_world;
   aside.translation.x() += 0.01;
   viewer.Look(aside);
@@ -112,7 +112,7 @@ TEST_F(FillTest, WhenStillMeansNotWhileMovingAndOnceItRests) {
   EXPECT_LT(wrong.colour, kShareOfBorderPixels);
   viewer.Look(aside);
   node->setFillTime(osgDTR::FillTime::kAlways);
-  EXPECT_EQ(Compare(viewer.Draw(), expected).empty, 0) << "of every picture";
+  EXPECT_EQ(Compare(viewer.Draw(), expected).empty, 0) << "of every image";
 }
 
 /// Whether a pixel of the window shows nothing.
@@ -136,7 +136,7 @@ TEST_F(FillTest, WhenStillAlsoFillsANodeThatAWindowShowsTwice) {
   right->setDrawBuffer(GL_FRONT);
   const osg::Matrixd aside = osg::Matrixd::translate(0.2, 0, 0);
   ASSERT_TRUE(viewer.viewer.addSlave(right.get(), osg::Matrixd(), aside));
-  EXPECT_FALSE(AnyEmpty(viewer.Draw())) << "the first pictures wait for nothing";
+  EXPECT_FALSE(AnyEmpty(viewer.Draw())) << "the first images wait for nothing";
   Pose moved = named.novel.cam_from_world;
   moved.translation.x() += 0.01;
   viewer.Look(moved);

@@ -15,13 +15,13 @@ namespace dtr::testing {
 namespace {
 
 constexpr int kFrames = 10000, kSettled = 2000;
-// 256 bytes a frame. Pictures here take 77 KB: one leaked in each frame would be 600 MB.
-constexpr double kMostGrowthBytes = 256.0 * (kFrames - kSettled);
+// 256 bytes a frame. Images here take 77 KB: one leaked in each frame would be 600 MB.
+constexpr double kMaxGrowthBytes = 256.0 * (kFrames - kSettled);
 
 using GrowthTest = OsgTest;
 
 /// Twice in the window, moving and resting, with options that change and holes that are filled:
-/// pictures come and go in all ways there are.
+/// images come and go in all ways there are.
 TEST_F(GrowthTest, TenThousandFramesLeaveNothingBehind) {
   const NamedScene named = ExactScene("courtyard", 5, 120, 80);
   osg::ref_ptr<osgDTR::DepthTR> node = new osgDTR::DepthTR;
@@ -54,7 +54,7 @@ TEST_F(GrowthTest, TenThousandFramesLeaveNothingBehind) {
                   static_cast<double>(MemoryBytes()) / 1e6);
     }
   }
-  EXPECT_LT(static_cast<double>(MemoryBytes()) - static_cast<double>(settled), kMostGrowthBytes);
+  EXPECT_LT(static_cast<double>(MemoryBytes()) - static_cast<double>(settled), kMaxGrowthBytes);
 }
 
 }  // namespace

@@ -65,7 +65,7 @@ TEST(NovelCamera, APointIsSeenWhereOpenSceneGraphSeesIt) {
               device.z(), 1e-12);
 }
 
-TEST(NovelCamera, WhatIsNoPinholeCameraIsRefused) {
+TEST(NovelCamera, WhatIsNoPinholeCameraIsRejected) {
   const osg::Matrixd good = osg::Matrixd::perspective(40, 1.5, 1, 100), none;
   osg::Matrixd skewed = good;
   skewed(1, 0) = 0.1;
@@ -178,7 +178,7 @@ TEST(Report, BlendFunctionsAreTheirFormulas) {
   EXPECT_THROW(node->cosAngleBlending(t, w, flags, {4}), UsageError);
 }
 
-TEST(Report, LoadRefusesWhatIsNoSetAndKeepsWhatWasThere) {
+TEST(Report, LoadRejectsWhatIsNoSetAndKeepsWhatWasThere) {
   const osg::ref_ptr<DepthTR> node = SquareNode();
   EXPECT_THROW(node->load("/nowhere.dtr"), Error);
   EXPECT_EQ(node->numberOfInputViews(), 5);

@@ -70,7 +70,7 @@ TEST_F(SceneGraphTest, MovesTurnsAndGrowsWithWhatStandsAboveIt) {
   EXPECT_LE(Differing(viewer.Draw(), alone), kMovedShare * Drawn(alone));
 }
 
-TEST_F(SceneGraphTest, UnevenScalesAndMirrorsAreRefusedNotShownWrong) {
+TEST_F(SceneGraphTest, UnevenScalesAndMirrorsAreRejectedNotShownWrong) {
   for (const osg::Vec3d& scale : {osg::Vec3d(1, 2, 1), osg::Vec3d(-1, 1, 1)}) {
     osg::ref_ptr<osg::MatrixTransform> above = new osg::MatrixTransform(osg::Matrixd::scale(scale));
     above->addChild(SquareNode());
@@ -221,13 +221,14 @@ osg::ref_ptr<osg::Node> ShaderModel() {
   texture->setFilter(osg::Texture::MIN_FILTER, osg::Texture::NEAREST);
   texture->setFilter(osg::Texture::MAG_FILTER, osg::Texture::NEAREST);
   osg::ref_ptr<osg::Program> program = new osg::Program;
-  program->addShader(new osg::Shader(osg::Shader::VERTEX,
-                                     "#version 120\nattribute vec2 place; varying vec2 at;\n"
-                                     "void main() { at = place; gl_Position = ftransform(); }\n"));
+  program->addShader(
+      new osg::Shader(osg::Shader::VERTEX,
+                      "#version 120\nattribute vec2 position; varying vec2 at;\n"
+                      "void main() { at = position; gl_Position = ftransform(); }\n"));
   program->addShader(new osg::Shader(
       osg::Shader::FRAGMENT,
-      "#version 120\nuniform sampler2D picture; uniform vec3 tint; varying vec2 at;\n"
-      "void main() { gl_FragColor = vec4(tint * texture2D(picture, at).rgb, 1.0); }\n"));
+      "#version 120\nuniform sampler2D image; uniform vec3 tint; varying vec2 at;\n"
+      "void main() { gl_FragColor = vec4(tint * texture2D(image, at).rgb, 1.0); }\n"));
   program->addBindAttribLocation("place", kAttribute);
   osg::StateSet* const state = square->getOrCreateStateSet();
   state->setAttributeAndModes(program);

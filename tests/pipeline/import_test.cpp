@@ -253,7 +253,7 @@ TEST_F(ImportTest, WhatIsMissingOrDoesNotFitIsNamed) {
   EXPECT_THAT(ErrorOfImport(), HasSubstr("named like the photo photo 2.png, found 0"));
 }
 
-TEST_F(ImportTest, AMaskThatLeavesNothingIsRefused) {
+TEST_F(ImportTest, AMaskThatLeavesNothingIsRejected) {
   options_.mask_dir = folder_ / "masks";
   fs::create_directory(options_.mask_dir);
   list_.cameras[0].mask_file = "ones.png";

@@ -58,7 +58,7 @@ TEST_F(PlaneFilesTest, ThoseOfAnotherCalibrationAreNotTaken) {
   EXPECT_FALSE(PlaneFiles(folder_, kMadeFrom).Has(1, 4));
 }
 
-TEST_F(PlaneFilesTest, RefusesEveryTruncatedOrDamagedFile) {
+TEST_F(PlaneFilesTest, RejectsEveryTruncatedOrDamagedFile) {
   PlaneFiles files(folder_, kMadeFrom);
   files.Save(0, 0, Planes());
   const fs::path file = folder_ / "round0_view0.planes";

@@ -1,5 +1,5 @@
 // Four webcams whose calibration another program published: what of it our own solves of the same
-// pictures confirm, and what the pictures themselves cannot decide (docs/CALIBRATION.md has the
+// images confirm, and what the images themselves cannot decide (docs/CALIBRATION.md has the
 // figures that this prints).
 #include <gtest/gtest.h>
 
@@ -122,7 +122,7 @@ TEST_F(PublishedRig, ItsPlacesAreOursToAHundredthAndTheClocksAreWhatIsWrong) {
   const RigSolution ours = SolveRig(board_, inputs, photos_.views, frames, options);
   const JudgeReport theirs =
       Judge({board_, published_, {}, 0, false}, UnseenViews{photos_.views, frames}, {});
-  std::printf("RMS with the published places %.3f px, with ours %.3f px\n", RmsOf(theirs),
+  std::printf("RMS with the published positions %.3f px, with ours %.3f px\n", RmsOf(theirs),
               ours.rms_px);
   EXPECT_LT(RmsOf(theirs), 1.05 * ours.rms_px);
   for (size_t c = 1; c < published_.size(); ++c) {

@@ -1,4 +1,4 @@
-// Videos of a rig: frames of one number are of one instant, also behind a damaged frame.
+// Videos of a rig: frames of one number are of one time step, also behind a damaged frame.
 #include <gtest/gtest.h>
 
 #include <map>

@@ -114,7 +114,7 @@ TEST(DrawProbes, LiesBetweenTwoCamerasAndDoesNotDependOnTheirOrder) {
     EXPECT_NEAR(center.y(), 0, 1e-12);
     EXPECT_LT(std::abs(center.x()), 0.25 * 0.5 * (kViews - 1));
     for (const View& view : set.frames[0].views) {
-      EXPECT_GT((center - view.CenterInWorld()).norm(), 1e-3) << "no novel place";
+      EXPECT_GT((center - view.CenterInWorld()).norm(), 1e-3) << "no novel position";
     }
   }
   std::reverse(set.frames[0].views.begin(), set.frames[0].views.end());
@@ -145,7 +145,7 @@ TEST(Errors, OfEqualImagesAndOfNoPixelsAreFinite) {
 }
 
 TEST(Errors, TellNewErrorFromOneThatTakesAnothersPlace) {
-  // The photo is 100; before, pictures are 103 everywhere.
+  // The photo is 100; before, images are 103 everywhere.
   const std::vector<Place> places = {{{}, ImageRgb8(4, 4, 3, 100), {}, {}}};
   const std::vector<ImageRgb8> before = {ImageRgb8(4, 4, 3, 103)};
   // 97 is just as wrong as 103, so nothing is lost however far the two are apart.
@@ -154,7 +154,7 @@ TEST(Errors, TellNewErrorFromOneThatTakesAnothersPlace) {
   EXPECT_EQ(swapped.after, 9);
   EXPECT_EQ(swapped.change, 36);
   EXPECT_EQ(swapped.psnr_loss_db, 0);
-  EXPECT_EQ(swapped.NewErrorShare(), kLeastShare);
+  EXPECT_EQ(swapped.NewErrorShare(), kMinShare);
   // 106 is four times as wrong: 6.02 dB.
   const Errors worse = CompareWithPhotos(places, before, std::vector{ImageRgb8(4, 4, 3, 106)});
   EXPECT_NEAR(worse.psnr_loss_db, 10 * std::log10(4.0), 1e-12);
@@ -433,7 +433,7 @@ TEST(Prune, StopsWhereEnoughIsLeftOut) {
   EXPECT_LE(left, 0.6);
 }
 
-TEST(Prune, RefusesOptionsWithoutAMeaning) {
+TEST(Prune, RejectsOptionsWithoutAMeaning) {
   const DtrSet set = Row(3);
   EXPECT_THROW(PruneWith(set, SmallOptions(-1)), UsageError);
   EXPECT_THROW(PruneWith(set, SmallOptions(std::nan(""))), UsageError);

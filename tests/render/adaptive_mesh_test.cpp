@@ -178,7 +178,7 @@ TEST(AdaptiveMesh, DoesNotDependOnTheNumberOfThreads) {
   EXPECT_EQ(one.rectangles, many.rectangles);
 }
 
-TEST(AdaptiveMesh, RefusesTheCoverOfAnotherDepthMap) {
+TEST(AdaptiveMesh, RejectsTheCoverOfAnotherDepthMap) {
   const SampleGrid samples = Samples(40, 40, Hills);
   const BreakRule rule{kBreak, std::nullopt};
   const BlockCover cover = CoverBlocks(samples.inverse_depth, rule, kTolerance, 1);

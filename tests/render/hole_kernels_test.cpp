@@ -1,5 +1,5 @@
 // SPEC 7.2 and 7.3: the kernels against the same steps one by one in plain double precision, to the
-// bit: pictures must not depend on what a processor's vectors hold.
+// bit: images must not depend on what a processor's vectors hold.
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>

@@ -67,7 +67,7 @@ TEST(ShrunkPhotos, ThoseAskedForLongestAgoAreForgotten) {
   for (const View& view : views) made.push_back(photos.Of({&view}, 8, 1).front());
   EXPECT_TRUE(made.front().expired());
   for (size_t i = 1; i < made.size(); ++i) EXPECT_FALSE(made[i].expired()) << i;
-  // What one picture needs is kept even where it is too much.
+  // What one image needs is kept even where it is too much.
   ShrunkPhotos small(kPhotoBytes);
   std::vector<const View*> all;
   for (const View& view : views) all.push_back(&view);

@@ -4,9 +4,9 @@
 
 #include <numbers>
 
+#include "datasets/exact/analytic_scene.h"
 #include "dtr/base/error.h"
 #include "dtr/render/geometry.h"
-#include "datasets/exact/analytic_scene.h"
 
 namespace dtr {
 namespace {
@@ -116,11 +116,11 @@ TEST(CutFactors, AViewThatComesInTakesThePlaceOfOneWithoutAJump) {
 TEST(SelectViews, MemoryThatHoldsFewerIsASmallerK) {
   const DtrSet set = Ring({5, -10, 29, 32});
   RenderScene scene = MakeRenderScene(set);
-  scene.most_views = 2;
+  scene.max_views = 2;
   RenderOptions fewer;
   fewer.views = 2;
   const ViewSelection held = SelectViews(scene, kFront, {});
-  scene.most_views.reset();
+  scene.max_views.reset();
   const ViewSelection expected = SelectViews(scene, kFront, fewer);
   EXPECT_EQ(held.views, expected.views);
   EXPECT_EQ(held.next_angle_rad, expected.next_angle_rad);
@@ -161,20 +161,20 @@ TEST(MakeRenderScene, DuplicatesCountOnce) {
   EXPECT_EQ(MakeRenderScene(set).views.size(), 3u);
 }
 
-TEST(MakeRenderScene, RefusesWhatCannotBeDrawn) {
+TEST(MakeRenderScene, RejectsWhatCannotBeDrawn) {
   const DtrSet good = Ring({0, 10});
-  const auto refuses = [&](auto change) {
+  const auto rejects = [&](auto change) {
     DtrSet set = good;
     change(set.frames[0].views[1]);
     EXPECT_THROW(MakeRenderScene(set), Error);
   };
-  refuses([](View& v) { v.image = ImageRgb8(); });
-  refuses([](View& v) { v.image = ImageRgb8(8, 6, 1); });
-  refuses([](View& v) { v.depth = DepthImage(); });
-  refuses([](View& v) { v.depth = DepthImage(8, 5); });
-  refuses([](View& v) { v.depth = DepthImage(8, 6, DepthKind::kRayDistance); });
-  refuses([](View& v) { v.mask = Mask(6, 8); });
-  refuses([](View& v) { v.cam_from_world.translation.x() = std::nan(""); });
+  rejects([](View& v) { v.image = ImageRgb8(); });
+  rejects([](View& v) { v.image = ImageRgb8(8, 6, 1); });
+  rejects([](View& v) { v.depth = DepthImage(); });
+  rejects([](View& v) { v.depth = DepthImage(8, 5); });
+  rejects([](View& v) { v.depth = DepthImage(8, 6, DepthKind::kRayDistance); });
+  rejects([](View& v) { v.mask = Mask(6, 8); });
+  rejects([](View& v) { v.cam_from_world.translation.x() = std::nan(""); });
   EXPECT_THROW(MakeRenderScene(DtrSet{}), Error);
 }
 

@@ -11,7 +11,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/random.h"
 #include "dtr/render/geometry.h"
-#include "dtr/render/instants.h"
+#include "dtr/render/time_steps.h"
 #include "dtr/render/valid_views.h"
 
 namespace dtr {
@@ -62,7 +62,7 @@ RenderOptions Nearest(int views) {
   return options;
 }
 
-/// The ids that a picture is drawn from, nearest first; every one must be whole.
+/// The ids that an image is drawn from, nearest first; every one must be whole.
 std::vector<std::string> Drawn(const Disk& disk, const RenderScene& scene, const Pose& camera,
                                const RenderOptions& options) {
   std::vector<std::string> ids;
@@ -251,7 +251,7 @@ TEST(ViewStream, ReleasedViewsAreDrawnFromWithoutPixelsAndReadAgainWhenThoseAreN
     EXPECT_EQ(disk.reads, 3);
     EXPECT_TRUE(nearest.image.empty());
   }
-  // A moving picture that needs the pixels does not go without the view it had.
+  // A moving image that needs the pixels does not go without the view it had.
   scene = stream.SceneFor(camera, Nearest(3), ViewStream::Wait::kForNone);
   EXPECT_EQ(Drawn(disk, scene, camera, Nearest(3)), expected);
   EXPECT_EQ(disk.reads, 4);
@@ -292,7 +292,7 @@ TEST(ViewStream, FilesThatComeBackAreReadAgain) {
   EXPECT_LE(stream.bytes(), 8 * disk.view_bytes);
 }
 
-TEST(ViewStream, FramesOfAMovingSetShareTheRoomAndNothingElse) {
+TEST(ViewStream, FramesOfADynamicSetShareTheRoomAndNothingElse) {
   Disk disk;
   Frame later = disk.set.frames[0];
   for (View& view : later.views) {
@@ -319,7 +319,7 @@ TEST(ViewStream, FramesOfAMovingSetShareTheRoomAndNothingElse) {
   EXPECT_EQ(drawn(1), second);
   EXPECT_EQ(disk.reads, 6);
   EXPECT_EQ(drawn(0), first);
-  // An instant of which nothing can be read is no reason to go without the others.
+  // An time step of which nothing can be read is no reason to go without the others.
   for (const auto& [id, view] : disk.files) {
     if (!id.starts_with("w")) disk.broken[id] = "gone";
   }

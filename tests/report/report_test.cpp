@@ -56,7 +56,7 @@ TEST(EscapeHtml, HostileTextBecomesHarmless) {
   EXPECT_EQ(EscapeHtml("\xC3<b>"), bad + "&lt;b&gt;");  // a broken sequence swallows nothing
 }
 
-TEST(EncodeJpeg, IsAJpegAndRefusesWhatIsNoPicture) {
+TEST(EncodeJpeg, IsAJpegAndRejectsWhatIsNoPicture) {
   const ImageRgb8 image(33, 17, 3, 90);
   const std::string file = EncodeJpeg(image, 90);
   EXPECT_EQ(file.substr(0, 3), "\xFF\xD8\xFF");
@@ -176,7 +176,7 @@ TEST(HtmlReport, NumbersStandUnderEachOtherAndNamesThatBeginWithDigitsDoNot) {
   EXPECT_THAT(html, HasSubstr("class=\"number\">12.5 %"));
 }
 
-TEST(HtmlReport, RowsOfAnotherLengthAreRefused) {
+TEST(HtmlReport, RowsOfAnotherLengthAreRejected) {
   HtmlReport page("t");
   EXPECT_THROW(page.Table({"a", "b"}, {{std::string("1")}}), std::invalid_argument);
 }
@@ -256,7 +256,7 @@ TEST(ScatterSvg, EqualFactorsAreEqualDistancesAndPointsSayWhatTheyAre) {
   EXPECT_EQ(svg, ScatterSvg(TwoGroups()));
 }
 
-TEST(ScatterSvg, RefusesWhatNoLogarithmHas) {
+TEST(ScatterSvg, RejectsWhatNoLogarithmHas) {
   Plot plot = TwoGroups();
   plot.points[1].y = 0;
   EXPECT_THROW(ScatterSvg(plot), std::invalid_argument);

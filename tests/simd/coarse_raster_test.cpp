@@ -92,7 +92,7 @@ TEST(CoarseRaster, DoesNotDependOnTheNumberOfThreads) {
 }
 
 TEST(CoarseRaster, WhatIsLeftOutBeforeDrawingWouldNotHaveShown) {
-  // Each tile drawn alone by a camera that does not see it must leave the picture empty. Cameras
+  // Each tile drawn alone by a camera that does not see it must leave the image empty. Cameras
   // among the surfaces, looking anywhere; the tile test is switched off by drawing tiles whose
   // bounds are those of everything.
   const auto scenes = ParityScenes();

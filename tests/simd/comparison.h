@@ -50,7 +50,7 @@ struct Comparison {
   }
 };
 
-/// SPEC 2.3's threshold for the novel picture: the strictest of the scene's views.
+/// SPEC 2.3's threshold for the novel image: the strictest of the scene's views.
 inline BreakRule StrictestBreaks(const RenderScene& scene, const RenderOptions& options) {
   BreakRule rule{1e300, options.absolute_depth_break};
   for (const View* view : scene.views) {

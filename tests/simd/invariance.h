@@ -34,7 +34,7 @@ class InvarianceOf {
       const RenderResult expected = Draw(scene.set, scene.novel, 1);
       ExpectSameBytes(expected, Draw(scene.set, scene.novel, 3));
       ExpectSameBytes(expected, Draw(scene.set, scene.novel, 1));
-      // Within one renderer, after another picture.
+      // Within one renderer, after another image.
       Renderer renderer;
       const RenderScene views = MakeRenderScene(scene.set);
       const View& input = *views.views.front();

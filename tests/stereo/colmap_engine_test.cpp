@@ -1,4 +1,4 @@
-// Depth maps that COLMAP made: whose pixel a number belongs to, and which maps are refused.
+// Depth maps that COLMAP made: whose pixel a number belongs to, and which maps are rejected.
 #include "stereo/colmap/colmap_engine.h"
 
 #include <gmock/gmock.h>
@@ -10,8 +10,8 @@
 #include "calib/colmap/dense.h"
 #include "calib/colmap/export.h"
 #include "calib/colmap/model_io.h"
-#include "dtr/base/files.h"
 #include "datasets/exact/stereo_quality.h"
+#include "dtr/base/files.h"
 #include "tests/support/test_data.h"
 #include "tests/support/truncation.h"
 
@@ -179,9 +179,9 @@ TEST(ColmapEngine, AViewWithoutAMapHasNoDepth) {
                NoUsablePair);
 }
 
-TEST(ColmapEngine, CamerasOfAnotherCalibrationAreRefused) {
+TEST(ColmapEngine, CamerasOfAnotherCalibrationAreRejected) {
   const Workspace workspace(TwoShots());
-  const auto refusal = [&](const auto& change) {
+  const auto rejection = [&](const auto& change) {
     std::vector<StereoView> views = workspace.views;
     change(views[1]);
     Workspace other(TwoShots());
@@ -193,18 +193,18 @@ TEST(ColmapEngine, CamerasOfAnotherCalibrationAreRefused) {
     }
     return std::string("none");
   };
-  EXPECT_EQ(refusal([](StereoView&) {}), "none");
-  EXPECT_THAT(refusal([](StereoView& v) { v.camera = PinholeCamera(80, 60, 75, 75, 40, 30); }),
+  EXPECT_EQ(rejection([](StereoView&) {}), "none");
+  EXPECT_THAT(rejection([](StereoView& v) { v.camera = PinholeCamera(80, 60, 75, 75, 40, 30); }),
               HasSubstr("view photo1.jpg: expected an image of 80x60, found 160x120"));
   EXPECT_THAT(
-      refusal([](StereoView& v) { v.camera = PinholeCamera(160, 120, 150, 150, 81.8, 58.7); }),
+      rejection([](StereoView& v) { v.camera = PinholeCamera(160, 120, 150, 150, 81.8, 58.7); }),
       HasSubstr("expected its focal lengths and principal point, found 0.5"));
-  EXPECT_THAT(refusal([](StereoView& v) {
+  EXPECT_THAT(rejection([](StereoView& v) {
                 const Eigen::Quaterniond turn(Eigen::AngleAxisd(0.01, Vector3d::UnitZ()));
                 v.cam_from_world = Pose{turn, Vector3d::Zero()} * v.cam_from_world;
               }),
               HasSubstr("expected its rotation, found 1.5"));
-  EXPECT_THAT(refusal([](StereoView& v) { v.cam_from_world.translation.x() += 0.01; }),
+  EXPECT_THAT(rejection([](StereoView& v) { v.cam_from_world.translation.x() += 0.01; }),
               HasSubstr("expected its centre, found 1."));
 }
 
@@ -227,17 +227,17 @@ TEST(ColmapEngine, ANameMayHaveAnotherExtensionButNotBeMissing) {
               ThrowsMessage<Error>(HasSubstr("view photo7.jpg: expected an image of this name")));
 }
 
-TEST(DenseDepth, EveryPrefixIsRefused) {
+TEST(DenseDepth, EveryPrefixIsRejected) {
   const dtr::testing::TemporaryFolder folder;
   const fs::path file = folder / "map.bin";
   WriteFileAtomically(file, Bytes(7, 5, std::vector<float>(35, 1.5f)));
   dtr::testing::ExpectEveryPrefixIsAnError(file, 1, [&] { colmap::ReadDenseDepth(file, 7, 5); });
 }
 
-TEST(DenseDepth, WhatIsNoMapOfThisSizeIsRefusedBeforeAnythingIsAllocated) {
+TEST(DenseDepth, WhatIsNoMapOfThisSizeIsRejectedBeforeAnythingIsAllocated) {
   const dtr::testing::TemporaryFolder folder;
   const fs::path file = folder / "map.bin";
-  const auto refusal = [&](const std::string& bytes) {
+  const auto rejection = [&](const std::string& bytes) {
     WriteFileAtomically(file, bytes);
     try {
       colmap::ReadDenseDepth(file, 7, 5);
@@ -247,16 +247,17 @@ TEST(DenseDepth, WhatIsNoMapOfThisSizeIsRefusedBeforeAnythingIsAllocated) {
     return std::string("none");
   };
   const std::vector<float> numbers(35, 1.5f);
-  EXPECT_EQ(refusal(Bytes(7, 5, numbers)), "none");
-  EXPECT_THAT(refusal(Bytes(5, 7, numbers)), HasSubstr("expected a depth map of 7x5"));
-  EXPECT_THAT(refusal(Bytes(7, 5, numbers, 3)), HasSubstr("found 7x5 and 3"));
-  EXPECT_THAT(refusal(Bytes(2147483647, 2147483647, numbers)), HasSubstr("found 2147483647x"));
+  EXPECT_EQ(rejection(Bytes(7, 5, numbers)), "none");
+  EXPECT_THAT(rejection(Bytes(5, 7, numbers)), HasSubstr("expected a depth map of 7x5"));
+  EXPECT_THAT(rejection(Bytes(7, 5, numbers, 3)), HasSubstr("found 7x5 and 3"));
+  EXPECT_THAT(rejection(Bytes(2147483647, 2147483647, numbers)), HasSubstr("found 2147483647x"));
   for (const char* header : {"-7&5&1&", "7&0&1&", "99999999999&5&1&", "7 5 1 ", "7&5&1", "&&&", "",
                              "7&5&1x", "0x7&5&1&"}) {
-    EXPECT_THAT(refusal(header + std::string(140, 'x')), HasSubstr("map.bin: expected")) << header;
+    EXPECT_THAT(rejection(header + std::string(140, 'x')), HasSubstr("map.bin: expected"))
+        << header;
   }
-  EXPECT_THAT(refusal(Bytes(7, 5, std::vector<float>(36, 1.5f))), HasSubstr("map.bin: expected"));
-  EXPECT_THAT(refusal(Bytes(7, 5, numbers) + std::string(1 << 20, 'x')), HasSubstr("map.bin"));
+  EXPECT_THAT(rejection(Bytes(7, 5, std::vector<float>(36, 1.5f))), HasSubstr("map.bin: expected"));
+  EXPECT_THAT(rejection(Bytes(7, 5, numbers) + std::string(1 << 20, 'x')), HasSubstr("map.bin"));
 }
 
 }  // namespace

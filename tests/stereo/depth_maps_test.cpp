@@ -25,14 +25,14 @@ class WallEngine : public Engine {
   DepthEstimate Estimate(std::span<const StereoView>, int reference, std::span<const int>,
                          const DepthRange&, const EngineOptions&) const override {
     ++calls;
-    if (reference == refuse) throw NoUsablePair("view " + std::to_string(reference) + ": no pair");
+    if (reference == reject) throw NoUsablePair("view " + std::to_string(reference) + ": no pair");
     DepthEstimate e{DepthImage(64, 48), Grid<float>(64, 48, 1, 0.01f)};
     std::fill(e.depth.grid().data().begin(), e.depth.grid().data().end(), kWallZ);
     e.depth(reference + 5, 10) = 2;
     return e;
   }
   mutable std::atomic<int> calls{0};
-  int refuse = -1;
+  int reject = -1;
 };
 
 /// Does so without planes for the first two views it is given.
@@ -54,7 +54,7 @@ class RoundsEngine final : public Engine {
   PlaneMap Match(std::span<const StereoView>, int reference, std::span<const int>,
                  const DepthRange&, const EngineOptions&) const override {
     ++calls;
-    if (reference == refuse) throw NoUsablePair("view " + std::to_string(reference) + ": no pair");
+    if (reference == reject) throw NoUsablePair("view " + std::to_string(reference) + ": no pair");
     return Flat(0.25f + 0.001f * static_cast<float>(reference));
   }
   PlaneMap Refine(std::span<const StereoView>, int reference, std::span<const int> neighbours,
@@ -77,7 +77,7 @@ class RoundsEngine final : public Engine {
     return e;
   }
   mutable int calls = 0;
-  int refuse = -1;
+  int reject = -1;
 
  private:
   static PlaneMap Flat(float w) {
@@ -207,7 +207,7 @@ TEST(ComputeDepthMaps, WithoutTheFilterNothingIsRemoved) {
 
 TEST(ComputeDepthMaps, AViewWithoutAPairGetsHolesAndANote) {
   WallEngine engine;
-  engine.refuse = 1;
+  engine.reject = 1;
   Recorder progress;
   const Results results = Compute(Cameras(4), engine, {}, progress);
   ASSERT_EQ(results.size(), 4u);
@@ -276,7 +276,7 @@ TEST(RunRounds, GoesOnFromWhatTheStoreHasToTheSameBytes) {
 
 TEST(RunRounds, AViewWithoutAPairHasNoPlanesForItsNeighboursEither) {
   RoundsEngine engine;
-  engine.refuse = 1;
+  engine.reject = 1;
   Recorder progress;
   const Results results = Compute(Cameras(4), engine, Options(3, 1, 0), progress);
   EXPECT_TRUE(DepthImage::IsHole(results[1].second.depth(32, 24)));

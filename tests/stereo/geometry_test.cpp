@@ -73,7 +73,7 @@ TEST(ChooseNeighbours, PrefersViewsThatShareMorePoints) {
 
 TEST(ChooseNeighbours, PrefersEqualImageScale) {
   auto views = Arc({0, 7, -7});
-  views[1].cam_from_world.translation.z() = 20;  // half as large in the picture
+  views[1].cam_from_world.translation.z() = 20;  // half as large in the image
   EXPECT_EQ(ChooseNeighbours(views, Ball(views, 50), {})[0].views.front(), 2);
 }
 
@@ -102,7 +102,7 @@ TEST(ChooseNeighbours, SaysWhenItGuessesFromTheCamerasAlone) {
   EXPECT_EQ(ChooseNeighbours(row, {}, {.count = 1})[0].views, (std::vector<int>{1}));
 }
 
-TEST(ChooseNeighbours, RefusesObservationsOfMissingViewsOrPoints) {
+TEST(ChooseNeighbours, RejectsObservationsOfMissingViewsOrPoints) {
   const auto views = Arc({0, 7});
   SparseScene scene = Ball(views, 20);
   scene.observations.push_back({2, 0, Vector2d(1, 1)});
@@ -141,7 +141,7 @@ TEST(DepthRanges, AViewThatSeesTooFewPointsIsNamed) {
         DepthRangesFromPoints(views, {}, {.names = {"a.jpg", "b.jpg"}});
       },
       ThrowsMessage<Error>(
-          HasSubstr("view a.jpg: expected at least 12 sparse points in its sight, which "
+          HasSubstr("view a.jpg: expected at least 12 sparse points in its observation, which "
                     "tell how deep it looks, found 0; take more photos of what it shows")));
 }
 
@@ -151,9 +151,9 @@ TEST(RectifyPair, PutsPointsOnOneRowWithTheDisparityOfTheirDepth) {
   for (const Pose& neighbour : {Facing({0.5, 0, 0}), Facing({-0.5, 0, 0}), Facing({0, 0.4, 0}),
                                 Facing({0.3, -0.3, 0}, 90), Facing({0.4, 0.1, 0.05}, -30)}) {
     const StereoView a = ViewAt(Facing({0, 0, 0}, 10)), b = ViewAt(neighbour);
-    std::string refusal;
-    const auto pair = RectifyPair(a, b, range, {}, &refusal);
-    ASSERT_TRUE(pair) << refusal;
+    std::string rejection;
+    const auto pair = RectifyPair(a, b, range, {}, &rejection);
+    ASSERT_TRUE(pair) << rejection;
     const Sweep full = pair->FullSweep(0);
     for (int i = 0; i < 50; ++i) {
       const double z = random.Uniform(range.near_z, range.far_z);
@@ -175,9 +175,9 @@ TEST(RectifyPair, PutsPointsOnOneRowWithTheDisparityOfTheirDepth) {
 
 TEST(RectifyPair, SweepAroundAPlaneIsConstantOnIt) {
   const StereoView a = ViewAt(Facing({0, 0, 0})), b = ViewAt(Facing({0.4, 0.2, 0}, 20));
-  std::string refusal;
-  const auto pair = RectifyPair(a, b, {3, 12}, {}, &refusal);
-  ASSERT_TRUE(pair) << refusal;
+  std::string rejection;
+  const auto pair = RectifyPair(a, b, {3, 12}, {}, &rejection);
+  ASSERT_TRUE(pair) << rejection;
   const Vector3d n(0.05, -0.1, 0.2);  // n . p = 1
   const auto sweep = pair->SweepAround(n, 32);
   ASSERT_TRUE(sweep);
@@ -189,13 +189,13 @@ TEST(RectifyPair, SweepAroundAPlaneIsConstantOnIt) {
   }
 }
 
-TEST(RectifyPair, RefusesWhatCannotBeRectifiedAndSaysWhy) {
+TEST(RectifyPair, RejectsWhatCannotBeRectifiedAndSaysWhy) {
   const StereoView a = ViewAt(Facing({0, 0, 0}));
   const DepthRange range{3, 12};
   const auto why = [&](const StereoView& b) {
-    std::string refusal;
-    EXPECT_FALSE(RectifyPair(a, b, range, {}, &refusal));
-    return refusal;
+    std::string rejection;
+    EXPECT_FALSE(RectifyPair(a, b, range, {}, &rejection));
+    return rejection;
   };
   EXPECT_EQ(why(a), "no baseline");
   EXPECT_NE(why(ViewAt(Facing({0, 0, 1}))), "");
@@ -207,10 +207,10 @@ TEST(RectifyPair, RefusesWhatCannotBeRectifiedAndSaysWhy) {
 
 TEST(RectifyPair, StaysWithinItsLimits) {
   const StereoView a = ViewAt(Facing({0, 0, 0})), b = ViewAt(Facing({1.5, 0, 0}));
-  std::string refusal;
+  std::string rejection;
   const PairLimits limits{.max_disparities = 128, .max_volume = 2'000'000};
-  const auto pair = RectifyPair(a, b, {1, 12}, limits, &refusal);
-  ASSERT_TRUE(pair) << refusal;
+  const auto pair = RectifyPair(a, b, {1, 12}, limits, &rejection);
+  ASSERT_TRUE(pair) << rejection;
   const int steps = pair->FullSweep(0).steps;
   EXPECT_LE(steps, 128);
   EXPECT_LE(std::int64_t{steps} * pair->camera.width_px() * pair->camera.height_px(), 2'100'000);

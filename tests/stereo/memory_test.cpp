@@ -8,8 +8,8 @@
 #include <map>
 #include <new>
 
-#include "stereo/depth_maps.h"
 #include "datasets/exact/stereo_quality.h"
+#include "stereo/depth_maps.h"
 #include "tests/support/test_data.h"
 
 namespace {
@@ -170,7 +170,7 @@ class MemoryLimit : public ::testing::Test {
     try {
       Compute(engine, 1, 1);
     } catch (const NotEnoughMemory& error) {
-      return error.least_bytes();
+      return error.min_bytes();
     }
     ADD_FAILURE() << "one byte is enough?";
     return 0;

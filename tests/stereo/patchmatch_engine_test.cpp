@@ -29,7 +29,7 @@ constexpr double kFocal = 140;
 /// Baseline 0.4 at depth 4: 14 px of disparity, so 1 px is 7 % of depth.
 constexpr double kBaseline = 0.4;
 constexpr DepthRange kRange{2.5, 8};
-/// Median error on clean synthetic pictures; measured 0.02 px, 8-bit pictures leave that much.
+/// Median error on clean synthetic images; measured 0.02 px, 8-bit images leave that much.
 constexpr double kMedianPx = 0.05;
 
 const PinholeCamera kCamera(kWidth, kHeight, kFocal, kFocal, 0.5 * kWidth, 0.5 * kHeight);
@@ -125,7 +125,7 @@ TEST(PatchMatchEngine, AnyDirectionOfTheBaselineWillDo) {
     SCOPED_TRACE(c.name);
     const auto shots = Shots(Slanted(), {Facing({0, 0, 0}), c.neighbour});
     const Quality q = Judge(EstimateFirst(ViewsOf(shots)), shots[0].truth);
-    EXPECT_GT(q.kept, 0.5);  // a rolled or vertical partner sees less of the picture
+    EXPECT_GT(q.kept, 0.5);  // a rolled or vertical partner sees less of the image
     EXPECT_LT(q.median_px, 2 * kMedianPx);
     EXPECT_LT(q.bad_share, c.bad_share);
   }
@@ -454,7 +454,7 @@ TEST(PatchMatchEngine, PlanesAreFittedToWeakTextureAndLeftOutWhereItSuffices) {
   };
   EXPECT_EQ(without_planes(), 1);
   // A patch of wall of one colour, as wide as the windows: from here on it is a thousandth of the
-  // picture and more that planes may help.
+  // image and more that planes may help.
   for (Shot& shot : shots) {
     for (int y = 50; y < 70; ++y) std::fill_n(shot.image.row(y) + 3 * 70, 3 * 20, std::uint8_t{90});
   }
@@ -472,7 +472,7 @@ TEST(PatchMatchEngine, ExposureDoesNotMatter) {
   EXPECT_LT(q.bad_share, 0.01);
 }
 
-TEST(PatchMatchEngine, RefusesAnEmptyRangeAndAWrongSize) {
+TEST(PatchMatchEngine, RejectsAnEmptyRangeAndAWrongSize) {
   auto shots = Shots(Slanted(), {Facing({0, 0, 0}), Facing({kBaseline, 0, 0})});
   EXPECT_THROW(EstimateFirst(ViewsOf(shots), {4, 4}), Error);
   EXPECT_THROW(EstimateFirst(ViewsOf(shots), {0, 4}), Error);

@@ -1,6 +1,6 @@
-// The PatchMatch engine where geometry or pictures are at their limits; those that concern users
+// The PatchMatch engine where geometry or images are at their limits; those that concern users
 // are cases of `dtr selftest` (cli/selftest/stereo_cases.cpp). Bounds come from
-// what the pictures can tell (datasets/exact/stereo_score.h) and from geometry.
+// what the images can tell (datasets/exact/stereo_score.h) and from geometry.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -28,7 +28,7 @@ constexpr int kWidth = 96, kHeight = 72;
 constexpr double kFocal = 84;
 const PinholeCamera kCamera(kWidth, kHeight, kFocal, kFocal, 0.5 * kWidth, 0.5 * kHeight);
 constexpr DepthRange kRange{2.5, 8};
-/// Its coarsest detail has 15 px at depth 4, its finest 2: pictures of it are hardly aliased.
+/// Its coarsest detail has 15 px at depth 4, its finest 2: images of it are hardly aliased.
 constexpr double kTextureSize = 0.7;
 /// Noise of a grey value: two roundings to 8 bits (0.29 each), sampling by 2x2 rays and linearly
 /// between pixels.

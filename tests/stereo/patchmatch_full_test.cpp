@@ -1,4 +1,4 @@
-// The PatchMatch engine on pictures of full size.
+// The PatchMatch engine on images of full size.
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 

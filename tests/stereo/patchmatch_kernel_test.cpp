@@ -147,7 +147,7 @@ TEST(PatchMatchKernel, RoundsBeginWithTheViewsWhosePlanesLeadBack) {
   EXPECT_GT(equal, 0.9 * all);
 }
 
-TEST(PatchMatchKernel, TooWideAPhotoIsRefusedByItsWidth) {
+TEST(PatchMatchKernel, TooWideAPhotoIsRejectedByItsWidth) {
   const ImageRgb8 image(kWidestTexture + 1, 1, 3);
   StereoView view{PinholeCamera(image.width(), 1, 100, 100, 50, 0.5), {}, &image, nullptr};
   try {

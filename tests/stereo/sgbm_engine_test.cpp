@@ -25,7 +25,7 @@ constexpr double kFocal = 200;
 /// Baseline 0.4 at depth 4: 20 px of disparity, so 1 px is 5 % of depth.
 constexpr double kBaseline = 0.4;
 constexpr DepthRange kRange{2.5, 8};
-/// Median error on clean synthetic pictures; SGBM's pull to whole pixels leaves about 0.1 px.
+/// Median error on clean synthetic images; SGBM's pull to whole pixels leaves about 0.1 px.
 constexpr double kMedianPx = 0.2;
 /// Share of the pixels both cameras see (all but a strip of 20 to 30 columns) that get depth.
 constexpr double kMinKept = 0.75;
@@ -87,7 +87,7 @@ TEST(SgbmEngine, VerticalAndRolledAndLeftHandPairsGiveTheSameDepth) {
     SCOPED_TRACE(c.name);
     const auto shots = Shots(Slanted(), {Facing({0, 0, 0}), c.neighbour});
     const Quality q = Judge(EstimateFirst(ViewsOf(shots)), shots[0].truth);
-    EXPECT_GT(q.kept, 0.55);  // a rolled or vertical partner sees less of the picture
+    EXPECT_GT(q.kept, 0.55);  // a rolled or vertical partner sees less of the image
     EXPECT_LT(q.median_px, kMedianPx);
     EXPECT_LT(q.bad_share, 0.03);
   }
@@ -121,16 +121,16 @@ TEST(SgbmEngine, SigmaDescribesTheError) {
       within += std::abs(1 / z - 1 / shots[0].truth(x, y)) <= sigma;
     }
   }
-  // 68 % for a perfect model; clean pictures do better than the noise assumed for photos.
+  // 68 % for a perfect model; clean images do better than the noise assumed for photos.
   EXPECT_GT(within, 0.6 * all);
 }
 
-TEST(SgbmEngine, WithoutABaselineThePairIsRefused) {
+TEST(SgbmEngine, WithoutABaselineThePairIsRejected) {
   const auto shots = Shots(Slanted(), {Facing({0, 0, 0}), Facing({0, 0, 0})});
   EXPECT_THROW(EstimateFirst(ViewsOf(shots)), NoUsablePair);
 }
 
-TEST(SgbmEngine, ForwardMotionIsRefusedAndTheOtherNeighboursAreUsed) {
+TEST(SgbmEngine, ForwardMotionIsRejectedAndTheOtherNeighboursAreUsed) {
   const auto shots =
       Shots(Slanted(), {Facing({0, 0, 0}), Facing({0.05, 0, 0.5}), Facing({kBaseline, 0, 0})});
   auto views = ViewsOf(shots);
@@ -210,7 +210,7 @@ TEST(SgbmEngine, ScaleAndOffsetOfTheWorldDoNotMatter) {
   }
 }
 
-TEST(SgbmEngine, RefusesAnEmptyRangeAndAWrongSize) {
+TEST(SgbmEngine, RejectsAnEmptyRangeAndAWrongSize) {
   auto shots = Shots(Slanted(), {Facing({0, 0, 0}), Facing({kBaseline, 0, 0})});
   EXPECT_THROW(EstimateFirst(ViewsOf(shots), {4, 4}), Error);
   EXPECT_THROW(EstimateFirst(ViewsOf(shots), {0, 4}), Error);

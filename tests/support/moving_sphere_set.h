@@ -1,4 +1,4 @@
-// tests/support/moving_sphere_set.h -- tests of the program on one small moving set, made once a
+// tests/support/moving_sphere_set.h -- tests of the program on one small dynamic set, made once a
 // suite.
 #pragma once
 #include <gtest/gtest.h>
@@ -11,8 +11,8 @@
 
 namespace dtr::testing {
 
-/// Set() is of a ball that rolls by a third of its radius between instants half a second apart,
-/// seen by four cameras; each instant is a set of its own, too: At("t0.dtr"), At("t0.5.dtr"), ...
+/// Set() is of a ball that rolls by a third of its radius between time steps half a second apart,
+/// seen by four cameras; each time step is a set of its own, too: At("t0.dtr"), At("t0.5.dtr"), ...
 /// beside its photos, At("t0"), ... For reading only; every test has a folder of its own.
 class MovingSphereSet : public ::testing::Test {
  protected:

@@ -1,4 +1,4 @@
-// tests/support/photo_kinds.h -- a picture as other programs and cameras would write it.
+// tests/support/photo_kinds.h -- an image as other programs and cameras would write it.
 #pragma once
 #include <OpenImageIO/imageio.h>
 #include <gtest/gtest.h>
@@ -131,7 +131,7 @@ inline void WriteInks(const std::filesystem::path& file, int width_px, int heigh
   WriteJpegAs(file, width_px, height_px, inks, {JCS_CMYK, JCS_CMYK, marker});
 }
 
-/// The picture in cyan, magenta and yellow, without black.
+/// The image in cyan, magenta and yellow, without black.
 inline void WriteCmyk(const std::filesystem::path& file, const ImageRgb8& image) {
   std::vector<JSAMPLE> inks;
   for (size_t i = 0; i < image.data().size(); ++i) {

@@ -19,7 +19,7 @@ namespace dtr::testing {
 ///
 /// The server chooses a free number itself and writes it once it takes connections. `xvfb-run`
 /// waits for a signal instead, which is lost when it comes before the wait or is ignored by the
-/// caller: then it waits for ever. Nor does it start anew when its last window closes, for whoever
+/// caller: then it waits for ever. Nor does it start again when its last window closes, for whoever
 /// opens the next one meanwhile is turned away.
 class VirtualDisplay {
  public:

@@ -80,7 +80,7 @@ TEST(AreaAverage, IsTheExactBoxMeanForAnyRatio) {
   }
 }
 
-TEST(AreaAverage, EqualSizeIsTheSameImageAndEnlargingIsRefused) {
+TEST(AreaAverage, EqualSizeIsTheSameImageAndEnlargingIsRejected) {
   Random random(6);
   ImageRgb8 image(9, 7, 3);
   for (auto& value : image.data()) value = static_cast<std::uint8_t>(random.Index(256));

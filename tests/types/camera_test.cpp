@@ -49,7 +49,7 @@ TEST(PinholeCamera, ResizedCameraSeesTheSamePartOfTheWorld) {
   EXPECT_NEAR(half_px.y(), full_px.y() / 3, kRoundTripPx);
 }
 
-TEST(PinholeCamera, RefusesImpossibleParameters) {
+TEST(PinholeCamera, RejectsImpossibleParameters) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THROW(PinholeCamera(0, 480, 500, 500, 0, 0), std::invalid_argument);
   EXPECT_THROW(PinholeCamera(640, 480, -500, 500, 0, 0), std::invalid_argument);

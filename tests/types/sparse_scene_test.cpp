@@ -28,7 +28,7 @@ TEST(RestrictToViews, KeepsPointsThatTwoKeptViewsSee) {
   EXPECT_EQ(kept.observations.back().pixel.x(), 5);
 }
 
-TEST(RestrictToViews, RefusesViewsThatAreNotThere) {
+TEST(RestrictToViews, RejectsViewsThatAreNotThere) {
   EXPECT_THROW(RestrictToViews(ThreeViews(), {true, true}), std::invalid_argument);
 }
 

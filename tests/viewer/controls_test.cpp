@@ -36,7 +36,7 @@ class Controls : public MovingWindow {
     return state;
   }
   Json Look() {
-    return Look("a whole picture", [](const Json&) { return true; });
+    return Look("a whole image", [](const Json&) { return true; });
   }
   static bool Has(const Json& state, const std::string& name, bool visible = false) {
     for (const Json& control : state["controls"]) {
@@ -157,7 +157,7 @@ std::vector<Controls::Row> Controls::InspectRows() {
          WaitUntilStill();
          const ImageRgb8 before = Screen();
          Click("border", 0.95);
-         ExpectScreenChanges(before, 500, "the border between picture and photo");
+         ExpectScreenChanges(before, 500, "the border between image and photo");
          Choose("compare with", "nothing");
        }},
       {"views to draw from",
@@ -286,7 +286,7 @@ std::vector<Controls::Row> Controls::PathRows() {
            return !s["recording"].get<bool>() && fs::exists(In("moving-video-001.mp4"));
          });
        }},
-      {"Keep", [this] { Fold("Keep", "save picture"); }},
+      {"Keep", [this] { Fold("Keep", "save image"); }},
       {"copy command line",
        [this] {
          File("copy command line", "moving-camera-001.json");
@@ -294,7 +294,7 @@ std::vector<Controls::Row> Controls::PathRows() {
            return s["message"].get<std::string>().starts_with("dtr render ");
          });
        }},
-      {"save picture", [this] { File("save picture", "moving-picture-001.png"); }},
+      {"save image", [this] { File("save image", "moving-picture-001.png"); }},
       {"save window", [this] { File("save window", "moving-window-001.png"); }},
   };
 }

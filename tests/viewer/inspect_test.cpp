@@ -79,15 +79,15 @@ TEST_F(Inspect, SaysWhatStagesCost) {
   EXPECT_THAT(page, HasSubstr("12.5 s"));
   EXPECT_THAT(page, HasSubstr("1024 MB"));
   WriteFileAtomically(In("s.dtr/report/run.json"), "{\"stages\":[");
-  ExpectRefused(Dtr({"inspect", In("s.dtr"), "-o", In("page.html")}), kFailed,
-                "run.json: expected JSON, found something else");
+  ExpectRejected(Dtr({"inspect", In("s.dtr"), "-o", In("page.html")}), kFailed,
+                 "run.json: expected JSON, found something else");
 }
 
 TEST_F(Inspect, WhatCannotWorkIsSaidInOneLine) {
-  ExpectRefused(Dtr({"inspect", In("absent.dtr"), "-o", In("page.html")}), kFailed,
-                "expected the folder of a D+TR set, found nothing");
-  ExpectRefused(Dtr({"inspect", Set(), "-o", In("page.pdf")}), kWrongUsage,
-                "expected a name ending in .html");
+  ExpectRejected(Dtr({"inspect", In("absent.dtr"), "-o", In("page.html")}), kFailed,
+                 "expected the folder of a D+TR set, found nothing");
+  ExpectRejected(Dtr({"inspect", Set(), "-o", In("page.pdf")}), kWrongUsage,
+                 "expected a name ending in .html");
 }
 
 }  // namespace

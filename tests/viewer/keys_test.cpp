@@ -66,7 +66,7 @@ void Keys::RightDrag() {
 
 void Keys::MiddleDrag() {
   const Json start = Now();
-  const Json panned = After(Drag(2), "another place", MovedFrom(start));
+  const Json panned = After(Drag(2), "another position", MovedFrom(start));
   EXPECT_LT(Turned(start, panned), 1e-9);
   const Eigen::Vector3d way = WayInCam(start, panned);
   EXPECT_LT(way.x(), 0) << "the scene follows the hand to the right";
@@ -201,7 +201,7 @@ void Keys::RecordsIt() {
 
 void Keys::SavesPicture() {
   Press("p");
-  Wait("a picture", [&](const Json&) { return fs::exists(In("moving-picture-001.png")); });
+  Wait("an image", [&](const Json&) { return fs::exists(In("moving-picture-001.png")); });
   EXPECT_EQ(io::ReadImage(In("moving-picture-001.png")).width(), width_px_);
 }
 

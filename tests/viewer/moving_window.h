@@ -1,4 +1,4 @@
-// tests/viewer/moving_window.h -- `dtr view` of a moving set on a display of its own.
+// tests/viewer/moving_window.h -- `dtr view` of a dynamic set on a display of its own.
 #pragma once
 #include <Eigen/Geometry>
 #include <cmath>
@@ -27,7 +27,7 @@ inline int Differing(const ImageRgb8& a, const ImageRgb8& b) {
   return count;
 }
 
-/// Three instants of a rolling ball, in a window at the screen's corner.
+/// Three time steps of a rolling ball, in a window at the screen's corner.
 class MovingWindow : public MovingSphereSet {
  protected:
   using Json = nlohmann::json;
@@ -53,7 +53,7 @@ class MovingWindow : public MovingSphereSet {
     return viewer_->WaitFor(what, holds);
   }
   Json Now() {
-    return Wait("a whole picture", [](const Json&) { return true; });
+    return Wait("a whole image", [](const Json&) { return true; });
   }
   static void Do(const std::vector<std::string>& words) { ViewerProgram::Do(words); }
   static void Press(const std::string& key) { Do({"key", key}); }
@@ -119,7 +119,7 @@ class MovingWindow : public MovingSphereSet {
     return [before](const Json& now) { return Turned(before, now) > 1e-4; };
   }
 
-  /// Plays by whatever `press` does and stops again, until another instant is shown.
+  /// Plays by whatever `press` does and stops again, until another time step is shown.
   void ExpectPlays(const std::function<void()>& press) {
     const Json start = Now();
     for (int i = 0; i < 20; ++i) {
@@ -129,7 +129,7 @@ class MovingWindow : public MovingSphereSet {
       WaitUntilStill();
       if (Now()["instant"] != start["instant"]) return;
     }
-    ADD_FAILURE() << "playing never came to another instant";
+    ADD_FAILURE() << "playing never came to another time step";
   }
 
   /// Types a file's name into the window that asks for a path.

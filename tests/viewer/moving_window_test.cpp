@@ -16,7 +16,7 @@ TEST_F(MovingWindowTest, BeginsAtAnyInstantAndShowsWhatRenderShows) {
   EXPECT_EQ(start["instant"], 1);
   EXPECT_EQ(start["instants"], 3);
   Do({"mousemove", "40", "30", "key", "p"});
-  Wait("a picture", [&](const Json&) { return fs::exists(In("moving-picture-001.png")); });
+  Wait("an image", [&](const Json&) { return fs::exists(In("moving-picture-001.png")); });
   DtrOk({"render", Set(), "--frame", "1", "--like", "0002", "-o", In("rendered.png")});
   EXPECT_EQ(
       Differing(io::ReadImage(In("moving-picture-001.png")), io::ReadImage(In("rendered.png"))), 0);
@@ -28,7 +28,7 @@ TEST_F(MovingWindowTest, WhatIsLeftOutOfOneInstantIsLeftOutOfAll) {
   Do({"mousemove", "40", "30", "key", "h"});
   Wait("a view left out", [](const Json& s) { return s["hidden"] == Json::array({"0000.jpg"}); });
   Press("n");
-  const Json next = Wait("the next instant", [](const Json& s) { return s["instant"] == 1; });
+  const Json next = Wait("the next time step", [](const Json& s) { return s["instant"] == 1; });
   EXPECT_EQ(next["hidden"], Json::array({"0000.jpg"}));
   for (const Json& name : next["views_used"]) EXPECT_NE(name, "0000.jpg");
 }
@@ -39,11 +39,11 @@ TEST_F(MovingWindowTest, PlaysFromTheStartAndEndsWithAWholePicture) {
   const Json json = Json::parse(DtrOk({"view", Set(), "--play", "--frames", "100", "--size",
                                        "96x64", "-o", folder_.path().string(), "--json", "-"})
                                     .out);
-  // Between instants a frame waits 20 ms: there were at least three of half a second.
+  // Between time steps a frame waits 20 ms: there were at least three of half a second.
   EXPECT_GE(json["moving"]["frames"], 3);
   EXPECT_TRUE(json["last"]["still"].get<bool>());
   EXPECT_FALSE(json["last"]["playing_time"].get<bool>());
-  ExpectRefused(Dtr({"view", Set(), "--frame", "3"}), kWrongUsage, "--frame");
+  ExpectRejected(Dtr({"view", Set(), "--frame", "3"}), kWrongUsage, "--frame");
 }
 
 TEST_F(MovingWindowTest, AFileThatVanishedAndCameBackIsDrawnFromAgain) {
@@ -64,11 +64,11 @@ TEST_F(MovingWindowTest, AFileThatVanishedAndCameBackIsDrawnFromAgain) {
   });
   Do({"key", "w"});
   const Json without =
-      Wait("a picture without it", [](const Json& s) { return s["views_used"].size() == 3; });
+      Wait("an image without it", [](const Json& s) { return s["views_used"].size() == 3; });
   for (const Json& name : without["views_used"]) EXPECT_NE(name, first.name);
   fs::rename(In("away.jpg"), photo);
   const Json again =
-      Wait("a picture with it", [](const Json& s) { return s["views_used"].size() == 4; });
+      Wait("an image with it", [](const Json& s) { return s["views_used"].size() == 4; });
   EXPECT_EQ(again["reloads"], 0) << "the set itself never changed";
   Press("g");
   Wait("figures under the cursor", [](const Json& s) { return s["under_cursor"].size() == 4; });

@@ -134,19 +134,19 @@ TEST(ViewAll, HasEveryCornerInThePictureAndNoneToSpare) {
   for (const PinholeCamera& lens : {kLens, PinholeCamera(300, 900, 400, 500, 100, 500)}) {
     const std::vector<Pose> cameras = {RandomPose(random), RandomPose(random)};
     const Pose pose = ViewAll(bounds, cameras, kUp, lens);
-    double least_margin = 1e9;
+    double min_margin = 1e9;
     for (int corner = 0; corner < 8; ++corner) {
       const Eigen::Vector3d p(corner & 1 ? 5 : -3, corner & 2 ? 2 : -1, corner & 4 ? 11 : 4);
       const auto pixel = lens.PixelFromCam(pose * p);
       ASSERT_TRUE(pixel);
-      least_margin = std::min({least_margin, pixel->x(), pixel->y(), lens.width_px() - pixel->x(),
-                               lens.height_px() - pixel->y()});
+      min_margin = std::min({min_margin, pixel->x(), pixel->y(), lens.width_px() - pixel->x(),
+                             lens.height_px() - pixel->y()});
     }
-    EXPECT_NEAR(least_margin, 0, 1e-6);
+    EXPECT_NEAR(min_margin, 0, 1e-6);
   }
 }
 
-// Pictures from the air: up cannot be up in them; north, which is at the top of most, can.
+// Images from the air: up cannot be up in them; north, which is at the top of most, can.
 TEST(ViewAll, LookingStraightDownHasTheTopOfMostPicturesAtItsTop) {
   const Eigen::Vector3d up = Eigen::Vector3d::UnitZ(), north = Eigen::Vector3d::UnitY();
   const std::vector<Pose> cameras = {LookAlong({0, 0, 9}, {0, 0.02, -1}, north),

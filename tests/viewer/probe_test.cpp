@@ -83,7 +83,7 @@ TEST_F(ProbeTest, SharesOfAPixelAreThoseOfThePicture) {
 }
 
 TEST_F(ProbeTest, SharesTimesColoursAreTheRenderersColours) {
-  // Black and white views: the picture's grey is the white ones' share.
+  // Black and white views: the image's grey is the white ones' share.
   for (size_t i = 0; i < 3; ++i) {
     View& view = set_.frames[0].views[i];
     view.image = ImageRgb8(96, 72, 3, i == 1 ? 255 : 0);

@@ -1,4 +1,4 @@
-// Random inputs to a real window of a moving set, several draws of them: no crash, no hang, and an
+// Random inputs to a real window of a dynamic set, several draws of them: no crash, no hang, and an
 // end when it is asked for.
 #include <fstream>
 
@@ -63,7 +63,7 @@ TEST_P(RandomInputTest, LeavesAViewerThatWorks) {
   if (!display.up()) GTEST_SKIP() << "no display: Xvfb is missing or did not come up";
   if (FindProgram("xdotool").empty()) GTEST_SKIP() << "xdotool is missing";
   ViewerProgram viewer(Set(), folder_.path(), {"--size", "600x400"});
-  viewer.WaitFor("the first picture", [](const auto&) { return true; });
+  viewer.WaitFor("the first image", [](const auto&) { return true; });
   Random random(static_cast<std::uint64_t>(GetParam()));
   const int inputs = GetParam() == kFirstSeed ? kInputs : kInputsOfOthers;
   const std::string script = In("inputs");

@@ -5,7 +5,7 @@
 namespace dtr::viewer {
 namespace {
 
-/// Four instants of 0.25 s.
+/// Four time steps of 0.25 s.
 FrameClock Quarters() {
   DtrSet set;
   for (const double time_s : {10.0, 10.25, 10.5, 10.75}) set.frames.emplace_back().time_s = time_s;

@@ -58,7 +58,7 @@ class ViewerProgram {
     EXPECT_TRUE(RunProcess(argv, {}).Ok()) << words.front();
   }
 
-  /// The state once it is of a whole picture and `holds`; a failure after a while.
+  /// The state once it is of a whole image and `holds`; a failure after a while.
   Json WaitFor(const std::string& what, const std::function<bool(const Json&)>& holds) {
     const auto start = std::chrono::steady_clock::now();
     Json state;

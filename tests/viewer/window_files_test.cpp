@@ -35,12 +35,12 @@ TEST_F(ViewerWindow, TheCommandLineOfAPrunedSetSaysWhatDiffersFromItsOwnOptions)
     std::vector<std::string> args{"--size", "320x240", "--no-panel"};
     args.insert(args.end(), one.options.begin(), one.options.end());
     ViewerProgram viewer(set, folder.path(), args);
-    viewer.WaitFor("the first picture", Anything);
+    viewer.WaitFor("the first image", Anything);
     ViewerProgram::Do({"mousemove", "150", "120", "key", "Right"});
     viewer.WaitFor("the next view", [](const Json& s) { return s["at_view"] == "0002.jpg"; });
     ViewerProgram::Do({"key", "p"});
     const fs::path picture = folder / "mine-picture-001.png";
-    viewer.WaitFor("a saved picture", [&](const Json&) { return fs::exists(picture); });
+    viewer.WaitFor("a saved image", [&](const Json&) { return fs::exists(picture); });
     ViewerProgram::Do({"key", "l"});
     const std::string command = viewer.WaitFor("a command line", [](const Json& s) {
       return s["message"].get<std::string>().starts_with("dtr render ");
@@ -84,7 +84,7 @@ TEST_F(ViewerWindow, TheCommandLineSaysWhatItDoesNotDraw) {
   NeedDisplay();
   if (IsSkipped()) return;
   ViewerProgram viewer(Set(), folder_.path(), {"--size", "320x240", "--no-panel"});
-  viewer.WaitFor("the first picture", Anything);
+  viewer.WaitFor("the first image", Anything);
   int made = 0;
   const auto command_of = [&](const std::string& shown) {
     viewer.WaitFor(shown, [&](const Json& s) { return s["shown"] == shown; });
@@ -141,13 +141,13 @@ TEST_F(ViewerWindow, AHandThatHoldsStillInADragWaitsForNoWholePicture) {
   NeedDisplay();
   if (IsSkipped()) return;
   ViewerProgram viewer(Set(), folder_.path(), {"--size", "320x240", "--no-panel"});
-  const Json start = viewer.WaitFor("the first picture", Anything);
+  const Json start = viewer.WaitFor("the first image", Anything);
   ViewerProgram::Do(
       {"mousemove", "150", "120", "mousedown", "1", "mousemove", "180", "124", "sleep", "1.5"});
   const Json held = viewer.WaitFor("what was", Anything);
-  EXPECT_EQ(Moved(start, held), 0) << "a whole picture in the middle of a drag";
+  EXPECT_EQ(Moved(start, held), 0) << "a whole image in the middle of a drag";
   ViewerProgram::Do({"mouseup", "1"});
-  viewer.WaitFor("a whole picture of the new place", MovedFrom(start));
+  viewer.WaitFor("a whole image of the new position", MovedFrom(start));
 }
 
 TEST_F(ViewerWindow, AFolderThatGoesAwayIsToldOf) {
@@ -156,13 +156,13 @@ TEST_F(ViewerWindow, AFolderThatGoesAwayIsToldOf) {
   const fs::path output = In("output");
   fs::create_directory(output);
   ViewerProgram viewer(Set(), folder_.path(), {"--size", "320x240", "--no-panel"}, output);
-  viewer.WaitFor("the first picture", Anything);
+  viewer.WaitFor("the first image", Anything);
   fs::remove(output);
   fs::create_symlink("output", output);  // leads to itself: not even its absence can be told
   int told = 0;
   for (const char* key : {"p", "F12", "l", "k"}) {
     ViewerProgram::Do({"mousemove", std::to_string(100 + told++), "120", "key", key});
-    viewer.WaitFor(std::string("word of no place for ") + key, [](const Json& s) {
+    viewer.WaitFor(std::string("word of no position for ") + key, [](const Json& s) {
       return s["message"].get<std::string>().find("symbolic links") != std::string::npos;
     });
     ViewerProgram::Do({"key", "r"});  // another message
@@ -174,7 +174,7 @@ TEST_F(ViewerWindow, AFolderThatGoesAwayIsToldOf) {
   fs::remove(output);
   fs::create_directory(output);
   ViewerProgram::Do({"key", "p"});
-  viewer.WaitFor("a picture",
+  viewer.WaitFor("an image",
                  [&](const Json&) { return fs::exists(output / "good-picture-001.png"); });
 }
 
@@ -184,7 +184,7 @@ TEST_F(ViewerWindow, CtrlQQuitsOutOfATextFieldAndARecording) {
   if (FindProgram("ffmpeg").empty()) GTEST_SKIP() << "ffmpeg is missing";
   {
     ViewerProgram viewer(Set(), folder_.path(), {"--size", "320x240", "--no-panel"});
-    viewer.WaitFor("the first picture", Anything);
+    viewer.WaitFor("the first image", Anything);
     ViewerProgram::Do({"mousemove", "160", "120", "key", "o"});
     viewer.WaitFor("a text field", [](const Json& s) { return s["asks_for_path"].get<bool>(); });
     ViewerProgram::Do({"sleep", "0.5", "type", "--delay", "20", "abc"});
@@ -201,7 +201,7 @@ TEST_F(ViewerWindow, CtrlQQuitsOutOfATextFieldAndARecording) {
     return count;
   };
   ViewerProgram viewer(Set(), recorded, {"--size", "320x240", "--no-panel"});
-  viewer.WaitFor("the first picture", Anything);
+  viewer.WaitFor("the first image", Anything);
   ViewerProgram::Do({"mousemove", "160", "120"});
   for (int key = 1; key <= 5; ++key) {  // long enough not to be done before it is left
     ViewerProgram::Do({"key", "k"});
@@ -227,7 +227,7 @@ TEST_F(ViewerWindow, ACommaInANameEndsItInNoCommandLine) {
   }
   WriteFileAtomically(set / "set.json", json.dump());
   ViewerProgram viewer(set, folder_.path(), {"--size", "320x240", "--no-panel"});
-  viewer.WaitFor("the first picture", Anything);
+  viewer.WaitFor("the first image", Anything);
   ViewerProgram::Do({"mousemove", "160", "120", "key", "h"});
   viewer.WaitFor("a view left out", [](const Json& s) { return s["hidden"].size() == 1; });
   ViewerProgram::Do({"key", "l"});

@@ -16,7 +16,7 @@ TEST_F(ViewerWindow, KeysDragsAndTheWheelMoveTheCamera) {
   NeedDisplay();
   if (IsSkipped()) return;
   ViewerProgram viewer(Set(), folder_.path(), {"--size", "600x400", "--no-panel"});
-  const Json start = viewer.WaitFor("the first picture", Anything);
+  const Json start = viewer.WaitFor("the first image", Anything);
   EXPECT_EQ(start["at_view"], "0001.jpg");  // 0000 is held out
   EXPECT_EQ(start["width_px"], 600);
   EXPECT_GT(start["coverage"], 0.5);
@@ -66,13 +66,13 @@ TEST_F(ViewerWindow, TheCommandLineDrawsThePictureInTheWindow) {
     args.insert(args.end(), options.begin(), options.end());
     const TemporaryFolder folder;
     ViewerProgram viewer(Set(), folder.path(), args);
-    const Json start = viewer.WaitFor("the first picture", Anything);
+    const Json start = viewer.WaitFor("the first image", Anything);
     ViewerProgram::Do(
         {"mousemove", "150", "120", "mousedown", "1", "mousemove", "170", "124", "mouseup", "1"});
     viewer.WaitFor("an orbit", MovedFrom(start));
     ViewerProgram::Do({"key", "p"});
     const fs::path picture = folder / "good-picture-001.png";
-    viewer.WaitFor("a saved picture", [&](const Json&) { return fs::exists(picture); });
+    viewer.WaitFor("a saved image", [&](const Json&) { return fs::exists(picture); });
     ViewerProgram::Do({"key", "l"});
     const Json state = viewer.WaitFor("a command line", [](const Json& s) {
       return s["message"].get<std::string>().starts_with("dtr render ");
@@ -93,7 +93,7 @@ TEST_F(ViewerWindow, APathIsRecordedThatRenderAndViewRead) {
   const std::string path = In("good-path-001.json");
   {
     ViewerProgram viewer(Set(), folder_.path(), {"--size", "320x240", "--no-panel"});
-    viewer.WaitFor("the first picture", Anything);
+    viewer.WaitFor("the first image", Anything);
     ViewerProgram::Do({"mousemove", "150", "120", "key", "k"});
     viewer.WaitFor("a path", [&](const Json&) { return fs::exists(path); });
     ViewerProgram::Do({"key", "Right"});
@@ -122,7 +122,7 @@ TEST_F(ViewerWindow, APathIsLoadedAndFilmedInTheWindow) {
     WriteFileAtomically(path, two.dump());
   }
   ViewerProgram viewer(Set(), folder_.path(), {"--size", "162x122", "--no-panel"});
-  viewer.WaitFor("the first picture", Anything);
+  viewer.WaitFor("the first image", Anything);
   ViewerProgram::Do({"mousemove", "80", "60", "key", "r"});
   const Json none = viewer.WaitFor("no path to film", [](const Json& s) {
     return s["message"].get<std::string>().starts_with("a video needs a path");
@@ -133,7 +133,7 @@ TEST_F(ViewerWindow, APathIsLoadedAndFilmedInTheWindow) {
     ViewerProgram::Do({"key", "Return"});
   };
   load(In("absent.json"));
-  viewer.WaitFor("a refusal", [](const Json& s) {
+  viewer.WaitFor("a rejection", [](const Json& s) {
     return s["message"].get<std::string>().find("absent.json") != std::string::npos;
   });
   load(path);
@@ -163,7 +163,7 @@ TEST_F(ViewerWindow, TheSetOnTheDiskIsReadAnewAndItsLossIsNoCrash) {
   const fs::path set = In("mine.dtr");
   fs::copy(Set(), set, fs::copy_options::recursive);
   ViewerProgram viewer(set, folder_.path(), {"--size", "320x240", "--no-panel"});
-  viewer.WaitFor("the first picture", Anything);
+  viewer.WaitFor("the first image", Anything);
   ViewerProgram::Do({"mousemove", "150", "120", "key", "Right"});
   viewer.WaitFor("another view", [](const Json& s) { return s["at_view"] == "0002.jpg"; });
   const std::string good = Text(set / "set.json");
@@ -205,7 +205,7 @@ TEST_F(ViewerWindow, WhatIsInspectedIsSaid) {
   NeedDisplay();
   if (IsSkipped()) return;
   ViewerProgram viewer(Set(), folder_.path(), {"--size", "400x300", "--no-panel"});
-  viewer.WaitFor("the first picture", Anything);
+  viewer.WaitFor("the first image", Anything);
   ViewerProgram::Do({"mousemove", "200", "200", "key", "g"});
   const Json probed = viewer.WaitFor("figures under the cursor",
                                      [](const Json& s) { return !s["under_cursor"].empty(); });
@@ -252,12 +252,12 @@ TEST_F(ViewerWindow, PixelsGoOnceTheyAreSampledAndComeBackForWhoLooksAtThem) {
   EXPECT_EQ(bytes({"--fill-holes"}), std::pair(decoded, decoded));
 
   ViewerProgram viewer(Set(), folder_.path(), {"--size", "320x240", "--no-panel"});
-  viewer.WaitFor("the first picture", Anything);
+  viewer.WaitFor("the first image", Anything);
   int saved = 0;
   const auto save = [&] {
     const fs::path file = In("good-picture-00" + std::to_string(++saved) + ".png");
     ViewerProgram::Do({"key", "p"});
-    viewer.WaitFor("a saved picture", [&](const Json&) { return fs::exists(file); });
+    viewer.WaitFor("a saved image", [&](const Json&) { return fs::exists(file); });
     return io::ReadImage(file);
   };
   ViewerProgram::Do({"mousemove", "160", "120"});
@@ -280,7 +280,7 @@ TEST_F(ViewerWindow, ThePanelTakesItsClicksAndTheWindowIsSaved) {
   NeedDisplay();
   if (IsSkipped()) return;
   ViewerProgram viewer(Set(), folder_.path(), {"--size", "900x700"});
-  const Json start = viewer.WaitFor("the first picture", Anything);
+  const Json start = viewer.WaitFor("the first image", Anything);
   EXPECT_TRUE(start["panel"].get<bool>());
   ViewerProgram::Do({"mousemove", "100", "690", "mousedown", "1", "mousemove", "200", "690",
                      "mouseup", "1", "click", "4"});
@@ -343,21 +343,21 @@ TEST_F(ViewerWindow, ASetWhoseCalibrationFailedItsTestsSaysSo) {
 TEST_F(ViewerWindow, WhatCannotWorkIsSaidInOneLine) {
   {
     const Environment no_display("DISPLAY", "");
-    ExpectRefused(Dtr({"view", Set()}), kFailed,
-                  "window: expected a display to open it on, found none");
+    ExpectRejected(Dtr({"view", Set()}), kFailed,
+                   "window: expected a display to open it on, found none");
     EXPECT_THAT(Dtr({"view", Set()}).err, HasSubstr("dtr render"));
   }
-  ExpectRefused(Dtr({"view", In("absent.dtr")}), kFailed,
-                "expected the folder of a D+TR set, found nothing");
-  ExpectRefused(Dtr({"view", Set(), "--screenshot", In("a.png")}), kWrongUsage,
-                "--screenshot: expected --frames N with it");
-  ExpectRefused(Dtr({"view", Set(), "-o", In("absent")}), kWrongUsage,
-                "expected a folder to save into, found none");
+  ExpectRejected(Dtr({"view", In("absent.dtr")}), kFailed,
+                 "expected the folder of a D+TR set, found nothing");
+  ExpectRejected(Dtr({"view", Set(), "--screenshot", In("a.png")}), kWrongUsage,
+                 "--screenshot: expected --frames N with it");
+  ExpectRejected(Dtr({"view", Set(), "-o", In("absent")}), kWrongUsage,
+                 "expected a folder to save into, found none");
   NeedDisplay();
   if (IsSkipped()) return;
   const Environment old("MESA_GL_VERSION_OVERRIDE", "3.3");
-  ExpectRefused(Dtr({"view", Set()}), kFailed,
-                "window: expected OpenGL 4.3 or newer on this display");
+  ExpectRejected(Dtr({"view", Set()}), kFailed,
+                 "window: expected OpenGL 4.3 or newer on this display");
 }
 
 }  // namespace

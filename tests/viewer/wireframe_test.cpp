@@ -12,7 +12,7 @@ using testing::Photograph;
 using testing::Plane;
 using testing::Shot;
 
-/// Two views of a plane at z = 10; the picture is the first one's own.
+/// Two views of a plane at z = 10; the image is the first one's own.
 class WireframeTest : public ::testing::Test {
  protected:
   WireframeTest() {

@@ -15,12 +15,12 @@
 #include "dtr/base/machine.h"
 #include "dtr/gl/glfw/window.h"
 #include "dtr/io/video.h"
+#include "viewer/glfw/error_text.h"
 #include "viewer/glfw/keeper.h"
 #include "viewer/glfw/panel.h"
 #include "viewer/glfw/path_tools.h"
 #include "viewer/glfw/run_figures.h"
 #include "viewer/glfw/session.h"
-#include "viewer/glfw/trouble.h"
 #include "viewer/glfw/user_interface.h"
 #include "viewer/time_player.h"
 
@@ -113,7 +113,7 @@ class App {
       if (paths_.recording()) paths_.Abort("the set on the disk changed");
       session_ = std::move(next);
       ++reloads_;
-      Tell("the set on the disk changed and was read anew");
+      Tell("the set on the disk changed and was read again");
     } catch (const std::exception& error) {
       Tell(Said(error) + " (the window goes on with what it has read)");
     }
@@ -237,7 +237,7 @@ class App {
   void PlayOrStop() {
     if (session_->clock().frames() > 1) return time_.StartOrStop();
     Tell(
-        "only moving sets can be played: this one has a single instant (dtr join makes moving "
+        "only dynamic sets can be played: this one has a single time step (dtr join makes moving "
         "sets)");
   }
 
@@ -274,7 +274,7 @@ class App {
     return moves ? PictureSchedule::Pace::kMoving : PictureSchedule::Pace::kResting;
   }
 
-  /// By itself: there is another picture with the next frame.
+  /// By itself: there is another image with the next frame.
   bool CameraMoves() const {
     return playing() || paths_.Wanted() || paths_.flight().flying() ||
            session_->controller.moving();
@@ -292,11 +292,11 @@ class App {
 
   bool whole() const { return session_->schedule.WholeFor(Order()); }
 
-  /// Gives the video its picture once that is whole.
+  /// Gives the video its image once that is whole.
   void Film() {
     paths_.Tend();
     if (!paths_.Wanted()) return;
-    if (const auto& refusal = session_->schedule.refusal()) return paths_.Abort(*refusal);
+    if (const auto& rejection = session_->schedule.rejection()) return paths_.Abort(*rejection);
     if (whole()) paths_.Filmed(session_->maker.Image());
   }
 
@@ -348,7 +348,7 @@ class App {
     for (const Action action : pressed) Do(action);
   }
 
-  /// What is kept is of whole pictures: it waits for one.
+  /// What is kept is of whole images: it waits for one.
   void KeepWhatWasAskedFor() {
     const bool last_frame = ReachedFrames();
     if (!whole()) return;
@@ -384,14 +384,14 @@ class App {
     Tell(command + WhatACommandLeavesOut(shown_, inspection.compared));
   }
 
-  /// Throws Error where the last frame's picture could not be made: nobody is there to see why.
+  /// Throws Error where the last frame's image could not be made: nobody is there to see why.
   bool ReachedFrames() const {
     const bool last = LastFrame();
-    if (last && session_->schedule.refusal()) throw Error(*session_->schedule.refusal());
+    if (last && session_->schedule.rejection()) throw Error(*session_->schedule.rejection());
     return last && whole() && settling_ <= 0 && !session_->inspector.reading();
   }
 
-  /// As many frames as were asked for are drawn; a whole picture may still be to come.
+  /// As many frames as were asked for are drawn; a whole image may still be to come.
   bool LastFrame() const {
     return settings_.frames > 0 && figures_.frames() + 1 >= settings_.frames && !playing();
   }
@@ -403,7 +403,7 @@ class App {
   }
 
   void FinishFrame() {
-    if (LastFrame()) time_.Stop();  // what is kept is of a picture that stands still
+    if (LastFrame()) time_.Stop();  // what is kept is of an image that stands still
     if (ReachedFrames()) quit_ = true;
     --settling_;
     const bool any =
@@ -414,8 +414,8 @@ class App {
     if (whole() && settling_ <= 0 && host_.state_changed) host_.state_changed(State());
     if (quit_ || settling_ > 0 || CameraMoves() || !session_->schedule.MadeFor(Order())) return;
     if (!time_.playing()) moving_fps_ = 0;
-    // A still picture is due soon, or when its views have been read; a video is nearly there; so
-    // is the next instant.
+    // A still image is due soon, or when its views have been read; a video is nearly there; so
+    // is the next time step.
     const bool due = session_->schedule.Due() || paths_.recording() || time_.playing() ||
                      session_->inspector.reading();
     glfwWaitEventsTimeout(due ? kReadingSeconds : kIdleSeconds);

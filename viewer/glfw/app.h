@@ -40,10 +40,10 @@ struct AppSettings {
   std::vector<NovelCamera> play;
   int laps = 1;                      ///< so many times
   std::optional<NovelCamera> start;  ///< none: the first input camera
-  size_t instant = 0;                ///< of a moving set: the frame shown first
-  bool play_time = false;            ///< of a moving set: from there on
-  int frames = 0;                    ///< close after so many, once the picture is whole; 0: never
-  int largest_divisor = 8;           ///< of the sides of pictures while moving
+  size_t instant = 0;                ///< of a dynamic set: the frame shown first
+  bool play_time = false;            ///< of a dynamic set: from there on
+  int frames = 0;                    ///< close after so many, once the image is whole; 0: never
+  int largest_divisor = 8;           ///< of the sides of images while moving
   std::filesystem::path screenshot;  ///< of the window, written at the end; empty: none
 };
 
@@ -64,16 +64,16 @@ struct ControlPlace {
 /// What the window shows just now.
 struct AppState {
   int frames = 0;      ///< drawn so far
-  bool still = false;  ///< the picture is whole, in full resolution and of all its views
+  bool still = false;  ///< the image is whole, in full resolution and of all its views
   NovelCamera camera;
   std::string at_view;       ///< name of the input camera it is at; empty: none
   bool at_held_out = false;  ///< that camera's photo is held out
-  std::string photo;         ///< name of the view whose photo is beside the picture; empty: none
+  std::string photo;         ///< name of the view whose photo is beside the image; empty: none
   int thumbnails = 0;        ///< input cameras that are shown with their photo
   std::string shown;         ///< what the pixels mean: "colour", "depth", ...
-  int divisor = 1;           ///< of the picture's sides
+  int divisor = 1;           ///< of the image's sides
   std::vector<std::string> views_used;
-  double coverage = 0;   ///< share of pixels that some view saw; of still pictures
+  double coverage = 0;   ///< share of pixels that some view saw; of still images
   double fly_speed = 0;  ///< scene units per second
   bool help = false, panel = true, cameras = false, magnifier = false;
   std::string compared;                   ///< with what: "nothing", "nearest photo", ...
@@ -82,9 +82,9 @@ struct AppState {
   std::string distance;                   ///< between two marks; empty: none
   int path_keys = 0;                      ///< cameras of the path
   int frames_per_key = 0;                 ///< from one to the next
-  int reloads = 0;                        ///< how often the set was read anew
-  size_t instant = 0, instants = 1;       ///< of a moving set: the frame shown, of how many
-  bool playing_time = false;              ///< one instant after the other
+  int reloads = 0;                        ///< how often the set was read again
+  size_t instant = 0, instants = 1;       ///< of a dynamic set: the frame shown, of how many
+  bool playing_time = false;              ///< one time step after the other
   bool recording = false;
   bool asks_for_path = false;          ///< a window asks for a file
   std::vector<ControlPlace> controls;  ///< of the panel, from top to bottom
@@ -97,16 +97,16 @@ struct ToDraw {
   std::filesystem::path camera_file;  ///< cameras.json of one camera
   RenderOptions options;
   std::vector<const View*> hidden;  ///< views not to draw from
-  std::optional<size_t> instant;    ///< of a moving set: its frame
+  std::optional<size_t> instant;    ///< of a dynamic set: its frame
   /// Beside the colours: the depth, what was seen.
   bool depth = false, coverage = false;
 };
 
 /// What the viewer leaves to the program around it.
 struct Host {
-  /// Reads the set anew; throws dtr::Error where it cannot.
+  /// Reads the set again; throws dtr::Error where it cannot.
   std::function<std::unique_ptr<OpenedSet>()> open;
-  /// Differs whenever another set lies on the disk, or none: then it is read anew. Cheap. Null:
+  /// Differs whenever another set lies on the disk, or none: then it is read again. Cheap. Null:
   /// nothing is watched.
   std::function<std::string()> stamp;
   /// The cameras of a path file, in the set's stored world. Throws dtr::Error.
@@ -116,7 +116,7 @@ struct Host {
   /// The photo of a view, source or held out. Called on a thread of its own; throws where it
   /// cannot.
   std::function<ImageRgb8(const View&)> load_photo;
-  /// The command that draws a picture.
+  /// The command that draws an image.
   std::function<std::string(const OpenedSet&, const ToDraw&)> command_line;
   /// Differs whenever other files of a view lie on the disk; empty while one is missing. Cheap.
   /// Null: views that could not be read are never tried again.
@@ -125,7 +125,7 @@ struct Host {
   std::function<std::map<std::string, ViewVerdict>()> verdicts;
   /// A line for whoever started the program.
   std::function<void(const std::string&)> say;
-  /// Told whenever the window has a whole picture and shows what the last input did; null: nobody
+  /// Told whenever the window has a whole image and shows what the last input did; null: nobody
   /// asks.
   std::function<void(const AppState&)> state_changed;
 };
@@ -139,12 +139,12 @@ struct FrameTimes {
 /// What a run of the viewer measured.
 struct AppReport {
   AppState last;
-  /// From the call of RunViewer to the first picture shown that has something of the set, of
+  /// From the call of RunViewer to the first image shown that has something of the set, of
   /// whatever size, and to the first whole one: the first after a flight where it begins with one.
   double first_picture_ms = 0, first_picture_cpu_ms = 0;
   double first_whole_picture_ms = 0, first_whole_picture_cpu_ms = 0;
   FrameTimes moving;
-  std::map<int, FrameTimes> moving_by_divisor;  ///< of the picture's sides
+  std::map<int, FrameTimes> moving_by_divisor;  ///< of the image's sides
   /// Physical memory held, sampled every so many frames: what grows shows.
   static constexpr int kFramesPerSample = 500;
   std::vector<size_t> memory_bytes;

@@ -46,7 +46,7 @@ void EndRight(ImDrawList& list, float border) {
   list.AddLine({border * display.x, 0}, {border * display.x, display.y}, kLine, 2);
 }
 
-/// A line of text that can be read on any picture.
+/// A line of text that can be read on any image.
 void Label(ImDrawList& list, const ImVec2& at, ImU32 colour, const std::string& text) {
   const ImVec2 size = ImGui::CalcTextSize(text.c_str());
   list.AddRectFilled({at.x - 4, at.y - 2}, {at.x + size.x + 4, at.y + size.y + 2}, kGround);
@@ -63,7 +63,7 @@ void Text(const std::string& line) { ImGui::TextUnformatted(line.c_str()); }
 /// A camera as it is drawn; none of a point behind the one who looks.
 struct Frustum {
   std::optional<ImVec2> centre;
-  std::array<std::optional<ImVec2>, 4> corners;  ///< of the picture: from the top left, clockwise
+  std::array<std::optional<ImVec2>, 4> corners;  ///< of the image: from the top left, clockwise
 };
 
 Frustum FrustumOf(const View& view, const NovelCamera& seen_from, double length) {
@@ -201,8 +201,8 @@ void InspectionOverlay::DrawPhoto(const Inspection& inspection, const View& view
     if (photo != nullptr) {
       photo_.Upload(*photo);
       photo_of_ = &view;
-    } else if (const std::string* refusal = photos.RefusalOf(view)) {
-      label += ": photo not read: " + *refusal;
+    } else if (const std::string* rejection = photos.RejectionOf(view)) {
+      label += ": photo not read: " + *rejection;
     } else {
       label += ": photo is being read";
     }
@@ -314,7 +314,7 @@ void InspectionOverlay::DrawMagnifier(const Inspection& inspection, const Pictur
                          view.behind_px));
       }
     } else {
-      Text("no view sees this pixel, or the picture moves");
+      Text("no view sees this pixel, or the image moves");
     }
   }
   ImGui::End();

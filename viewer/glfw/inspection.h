@@ -1,4 +1,4 @@
-// viewer/glfw/inspection.h -- what lies over the picture: cameras, another picture, figures of a
+// viewer/glfw/inspection.h -- what lies over the image: cameras, another image, figures of a
 // point.
 #pragma once
 #include <array>
@@ -23,29 +23,29 @@ enum class Compared { kNothing, kPhoto, kOtherMethod, kOtherPrimitive };
 inline constexpr std::array kAllCompared{Compared::kNothing, Compared::kPhoto,
                                          Compared::kOtherMethod, Compared::kOtherPrimitive};
 const char* NameOf(Compared compared);
-/// A line for the end of a command that draws the picture in the window: `dtr render` knows
+/// A line for the end of a command that draws the image in the window: `dtr render` knows
 /// colours, depth and coverage. Empty where it draws all of it.
 std::string WhatACommandLeavesOut(Shown shown, Compared compared);
-/// The options of the other picture; none where it is no rendering.
+/// The options of the other image; none where it is no rendering.
 std::optional<RenderOptions> OptionsOf(Compared compared, const RenderOptions& options);
 
-/// What the user asked to see over the picture.
+/// What the user asked to see over the image.
 struct Inspection {
   bool cameras = false, magnifier = false;
   Compared compared = Compared::kNothing;
-  float border = 0.5F;                ///< share of the window left of the other picture
+  float border = 0.5F;                ///< share of the window left of the other image
   std::vector<const View*> hidden;    ///< not drawn from
   std::vector<Probe> marks;           ///< at most two: a distance
   std::optional<Probe> under_cursor;  ///< of the last cursor at rest
   std::string unit;                   ///< of lengths: "m" or "units"
 
-  /// True while the pixels of the picture's views are looked at; photos are read by themselves.
+  /// True while the pixels of the image's views are looked at; photos are read by themselves.
   bool LooksAtPixels() const {
     return magnifier || (compared != Compared::kNothing && compared != Compared::kPhoto);
   }
   bool IsHidden(const View& view) const;
   void Toggle(const View& view);
-  /// Adds a mark; a third begins anew.
+  /// Adds a mark; a third begins again.
   void Mark(const Probe& probe);
   /// "2.310 +- 0.021 m"; empty without two marks.
   std::string DistanceText() const;
@@ -54,7 +54,7 @@ struct Inspection {
 /// Draws it with ImGui.
 class InspectionOverlay {
  public:
-  /// The other picture, right of the border, and what each side is drawn by.
+  /// The other image, right of the border, and what each side is drawn by.
   void DrawCompared(const Inspection& inspection, const PictureTexture& other,
                     const RenderOptions& left, const RenderOptions& right);
   /// The photo of `view` where it would lie if this were its camera; as long as there is none,
@@ -75,7 +75,7 @@ class InspectionOverlay {
   const PictureTexture* Thumbnail(const View& view, PictureMaker& maker, PhotoShelf& photos);
 
   std::map<const View*, std::unique_ptr<PictureTexture>> thumbnails_;
-  int thumbnails_shown_ = 0;  ///< of this instant's cameras
+  int thumbnails_shown_ = 0;  ///< of this time step's cameras
   PictureTexture photo_;
   const View* photo_of_ = nullptr;
 };

@@ -5,7 +5,7 @@
 #include <exception>
 #include <utility>
 
-#include "viewer/glfw/trouble.h"
+#include "viewer/glfw/error_text.h"
 
 namespace dtr::viewer {
 

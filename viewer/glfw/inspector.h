@@ -1,4 +1,4 @@
-// viewer/glfw/inspector.h -- what is looked up about the whole picture, and drawn over it.
+// viewer/glfw/inspector.h -- what is looked up about the whole image, and drawn over it.
 #pragma once
 #include <functional>
 #include <future>
@@ -35,9 +35,9 @@ class Inspector {
   Inspection& inspection() { return inspection_; }
   const Inspection& inspection() const { return inspection_; }
 
-  /// To be marked on the next whole picture.
+  /// To be marked on the next whole image.
   void MarkAt(const Eigen::Vector2d& pixel) { to_mark_.push_back(pixel); }
-  /// Looks up what is asked for, of a whole picture; otherwise forgets what was of another.
+  /// Looks up what is asked for, of a whole image; otherwise forgets what was of another.
   void Look(bool whole, const RenderOptions& options, const Eigen::Vector2d& cursor_px);
   /// Draws it with ImGui.
   void Draw(const RenderOptions& options);
@@ -45,9 +45,9 @@ class Inspector {
   bool reading() const { return photos_.reading(); }
   /// Photos that could not be read, of views that `again` says yes to.
   void TryPhotosAgain(const std::function<bool(const View&)>& again) {
-    photos_.ForgetRefusals(again);
+    photos_.ForgetRejections(again);
   }
-  /// The view whose photo is beside the picture; null: none.
+  /// The view whose photo is beside the image; null: none.
   const View* photo() const;
   /// Input cameras that are shown with their photo.
   int thumbnails() const { return inspection_.cameras ? overlay_.thumbnails() : 0; }
@@ -60,8 +60,8 @@ class Inspector {
   Inspection inspection_;
   InspectionOverlay overlay_;
   PhotoShelf photos_;
-  int picture_ = -1;                         ///< number of the picture that what follows is of
-  std::optional<RenderOptions> other_made_;  ///< options of the other picture beside it
+  int picture_ = -1;                         ///< number of the image that what follows is of
+  std::optional<RenderOptions> other_made_;  ///< options of the other image beside it
   std::optional<Eigen::Vector2d> probed_;    ///< where the cursor rested
   Eigen::Vector2d last_cursor_{-1, -1};
   Stopwatch cursor_rests_;

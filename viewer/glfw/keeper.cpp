@@ -39,8 +39,8 @@ void WriteCameras(const fs::path& file, const std::vector<NovelCamera>& cameras,
 }  // namespace
 
 fs::path Keeper::Free(const std::string& kind, const std::vector<std::string>& extensions) const {
-  constexpr int kMostFiles = 100000;
-  for (int number = 1; number < kMostFiles; ++number) {
+  constexpr int kMaxFiles = 100000;
+  for (int number = 1; number < kMaxFiles; ++number) {
     const std::string stem = fmt::format("{}-{}-{:03}", stem_, kind, number);
     const bool taken = std::any_of(
         extensions.begin(), extensions.end(),

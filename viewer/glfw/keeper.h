@@ -11,14 +11,14 @@ struct GLFWwindow;
 
 namespace dtr::viewer {
 
-/// Writes into one folder under names that are still free: STEM-picture-001.png, ... Everything
+/// Writes into one folder under names that are still free: STEM-image-001.png, ... Everything
 /// throws dtr::Error where it cannot write.
 class Keeper {
  public:
   Keeper(std::filesystem::path folder, std::string stem)
       : folder_(std::move(folder)), stem_(std::move(stem)) {}
 
-  /// The last picture made: colours as `dtr render` writes them, false colours as shown.
+  /// The last image made: colours as `dtr render` writes them, false colours as shown.
   std::filesystem::path SavePicture(PictureMaker& maker) const;
   /// The window as drawn but not yet presented.
   std::filesystem::path SaveWindow(GLFWwindow* window) const;

@@ -78,7 +78,7 @@ void Figures(const PanelModel& model) {
   // One line always, so that what stands below keeps its place while one clicks.
   PanelText(picture.divisor == 1
                 ? fmt::format("seen by some view: {:.1f} %", 100 * picture.coverage)
-                : std::string("seen by some view: told when still"));
+                : std::string("seen by some view: shown when still"));
   std::vector<std::string> names;
   for (const int index : picture.views_used) {
     names.push_back(picture.scene.views[static_cast<size_t>(index)]->name);
@@ -141,7 +141,7 @@ void InspectControls(Widgets& widgets, PanelModel& model) {
 void TimeControls(Widgets& widgets, PanelModel& model) {
   TimeModel& time = model.time;
   PanelText(
-      fmt::format("{:.3f} s, instant {} of {}", time.seconds, time.instant + 1, time.instants));
+      fmt::format("{:.3f} s, time step {} of {}", time.seconds, time.instant + 1, time.instants));
   widgets.Whole("instant", time.instant, 0, time.instants - 1, false);
   if (widgets.Arrow("earlier", ImGuiDir_Left)) model.pressed.push_back(Action::kPreviousInstant);
   ImGui::SameLine();
@@ -158,7 +158,7 @@ void PathControls(Widgets& widgets, PanelModel& model) {
                          ? 0
                          : static_cast<int>(flight.keys().size() - 1) * flight.frames_per_key + 1;
   PanelText(fmt::format("{} cameras, {} frames", flight.keys().size(), frames));
-  widgets.Whole("frames per camera", flight.frames_per_key, 1, Flight::kMostFramesPerKey);
+  widgets.Whole("frames per camera", flight.frames_per_key, 1, Flight::kMaxFramesPerKey);
   if (widgets.Button("add camera")) model.pressed.push_back(Action::kAddKey);
   ImGui::SameLine();
   if (widgets.Button("load...")) model.pressed.push_back(Action::kOpenPath);
@@ -173,7 +173,7 @@ void PathControls(Widgets& widgets, PanelModel& model) {
 
 void KeepControls(Widgets& widgets, PanelModel& model) {
   if (widgets.Button("copy command line")) model.pressed.push_back(Action::kCopyCommand);
-  if (widgets.Button("save picture")) model.pressed.push_back(Action::kSavePicture);
+  if (widgets.Button("save image")) model.pressed.push_back(Action::kSavePicture);
   ImGui::SameLine();
   if (widgets.Button("save window")) model.pressed.push_back(Action::kSaveWindow);
 }

@@ -12,10 +12,10 @@
 
 namespace dtr::viewer {
 
-/// Of a moving set.
+/// Of a dynamic set.
 struct TimeModel {
   int instants = 1, instant = 0;
-  double seconds = 0;  ///< since the first instant
+  double seconds = 0;  ///< since the first time step
   bool playing = false;
 };
 

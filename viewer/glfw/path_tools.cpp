@@ -8,8 +8,8 @@
 #include <system_error>
 #include <utility>
 
-#include "dtr/render/instants.h"
-#include "viewer/glfw/trouble.h"
+#include "dtr/render/time_steps.h"
+#include "viewer/glfw/error_text.h"
 
 namespace dtr::viewer {
 

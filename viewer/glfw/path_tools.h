@@ -30,20 +30,20 @@ class PathTools {
 
   void AddKey(const NovelCamera& camera, const DtrSet& set);
   void Load(const std::filesystem::path& file, const DtrSet& set);
-  /// Begins to film the path with pictures of the lens's size, or stops and keeps nothing.
+  /// Begins to film the path with images of the lens's size, or stops and keeps nothing.
   void StartOrStopRecording(const PinholeCamera& like, const DtrSet& set);
   bool recording() const { return recording_ != nullptr; }
   /// "recording 12 of 48"; empty while nothing is recorded.
   std::string Progress() const;
 
-  /// The camera whose whole picture is wanted for the video; null: none.
+  /// The camera whose whole image is wanted for the video; null: none.
   const NovelCamera* Wanted() const { return recording_ ? recording_->Wanted() : nullptr; }
-  /// Of a moving set with so many frames: the one that picture shows; videos run through time.
+  /// Of a dynamic set with so many frames: the one that image shows; videos run through time.
   size_t WantedFrame(size_t frames) const;
   void Filmed(const ImageRgb8& picture);
   /// To be called every frame: ends a recording whose video is there.
   void Tend();
-  /// Gives up a recording whose pictures cannot be made.
+  /// Gives up a recording whose images cannot be made.
   void Abort(const std::string& why);
 
  private:

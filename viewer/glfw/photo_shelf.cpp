@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "dtr/report/contact_sheet.h"
-#include "viewer/glfw/trouble.h"
+#include "viewer/glfw/error_text.h"
 
 namespace dtr::viewer {
 
@@ -16,7 +16,7 @@ PhotoShelf::~PhotoShelf() {
 const ImageRgb8* PhotoShelf::Small(const View& view) {
   const auto found = small_.find(&view);
   if (found != small_.end()) return &found->second;
-  if (load_ && !RefusalOf(view) && small_asked_.insert(&view).second) {
+  if (load_ && !RejectionOf(view) && small_asked_.insert(&view).second) {
     small_wanted_.push_back(&view);
   }
   return nullptr;
@@ -24,13 +24,13 @@ const ImageRgb8* PhotoShelf::Small(const View& view) {
 
 const ImageRgb8* PhotoShelf::Whole(const View& view) {
   if (whole_of_ == &view) return &whole_;
-  whole_wanted_ = load_ && !RefusalOf(view) ? &view : nullptr;
+  whole_wanted_ = load_ && !RejectionOf(view) ? &view : nullptr;
   return nullptr;
 }
 
-const std::string* PhotoShelf::RefusalOf(const View& view) const {
-  const auto found = refusals_.find(&view);
-  return found != refusals_.end() ? &found->second : nullptr;
+const std::string* PhotoShelf::RejectionOf(const View& view) const {
+  const auto found = rejections_.find(&view);
+  return found != rejections_.end() ? &found->second : nullptr;
 }
 
 void PhotoShelf::Begin(const View& view) {
@@ -45,9 +45,9 @@ void PhotoShelf::Begin(const View& view) {
     read.view = at;
     try {
       read.photo = load(described);
-      if (read.photo.empty()) read.refusal = "the set has none";
+      if (read.photo.empty()) read.rejection = "the set has none";
     } catch (const std::exception& error) {
-      read.refusal = Said(error);
+      read.rejection = Said(error);
     }
     return read;
   });
@@ -57,8 +57,8 @@ void PhotoShelf::Tend() {
   if (reading_.valid()) {
     if (reading_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
     Read read = reading_.get();
-    if (!read.refusal.empty()) {
-      refusals_[read.view] = read.refusal;
+    if (!read.rejection.empty()) {
+      rejections_[read.view] = read.rejection;
       small_asked_.erase(read.view);
       if (whole_wanted_ == read.view) whole_wanted_ = nullptr;
     } else {
@@ -75,7 +75,7 @@ void PhotoShelf::Tend() {
   while (!small_wanted_.empty()) {
     const View* next = small_wanted_.front();
     small_wanted_.pop_front();
-    if (!small_.contains(next) && !RefusalOf(*next)) return Begin(*next);
+    if (!small_.contains(next) && !RejectionOf(*next)) return Begin(*next);
   }
 }
 

@@ -65,7 +65,7 @@ void PictureMaker::MakeStill(const PictureOrder& order) {
   stream_.ShowFrame(order.instant);
   stream_.Hide(order.hidden);
   stream_.Prefetch(order.camera.cam_from_world, order.options, PixelsFor(order));
-  // Once nothing is on its way it is the picture that dtr render makes.
+  // Once nothing is on its way it is the image that dtr render makes.
   const bool whole = stream_.reading() == 0;
   Make(order, 1, whole ? ViewStream::Wait::kForAll : ViewStream::Wait::kForNone);
   picture_.whole = whole;
@@ -94,7 +94,7 @@ void PictureMaker::Make(const PictureOrder& order, int divisor, ViewStream::Wait
   // What is thrown from here on leaves no figures of another scene behind.
   picture_.views_used.clear();
   picture_.whole = false;
-  // Of another instant nothing is there yet that could be shown meanwhile.
+  // Of another time step nothing is there yet that could be shown meanwhile.
   if (std::exchange(picture_.instant, order.instant) != order.instant) {
     wait = ViewStream::Wait::kForAll;
   }
@@ -144,7 +144,7 @@ void PictureMaker::BringPixels() {
       stream_.SceneFor(picture_.camera.cam_from_world, picture_.options, ViewStream::Wait::kForAll);
   if (scene.views != picture_.scene.views) {
     throw Error(
-        "picture: expected its views to be there still, found one that cannot be read any "
+        "image: expected its views to be there still, found one that cannot be read any "
         "more; is the set's disk there?");
   }
 }

@@ -1,4 +1,4 @@
-// viewer/glfw/picture_maker.h -- the pictures the window shows, drawn with the current context.
+// viewer/glfw/picture_maker.h -- the images the window shows, drawn with the current context.
 #pragma once
 #include <map>
 #include <optional>
@@ -22,21 +22,21 @@ struct PictureOrder {
   NovelCamera camera;
   RenderOptions options;
   Shown shown = Shown::kColour;
-  size_t instant = 0;               ///< of a moving set: its frame
-  std::vector<const View*> hidden;  ///< views of that instant not to draw from
+  size_t instant = 0;               ///< of a dynamic set: its frame
+  std::vector<const View*> hidden;  ///< views of that time step not to draw from
   /// Something will look at the views' own pixels: they stay in memory. Else they go where the
   /// renderer holds what it made of them.
   bool inspected = false;
 };
 
-/// Milliseconds that each stage of a picture took.
+/// Milliseconds that each stage of an image took.
 struct StageTimes {
   double views = 0;    ///< choosing and waiting for views
   double draw = 0;     ///< dtr/gl, until the GPU was done
   double inspect = 0;  ///< reading back, filling, false colours
 };
 
-/// A picture with all that is known of it.
+/// An image with all that is known of it.
 struct MadePicture {
   PictureTexture texture;
   NovelCamera camera;  ///< as drawn: smaller than asked for by `divisor`
@@ -64,23 +64,23 @@ class PictureMaker {
   /// In full, of the views that are there; whole once no view is being read any more.
   void MakeStill(const PictureOrder& order);
 
-  /// Begins to read what the same picture of another instant needs, as far as there is room.
+  /// Begins to read what the same image of another time step needs, as far as there is room.
   void ReadAhead(const PictureOrder& order);
 
-  /// Another picture of the same camera beside the whole one, with other options.
+  /// Another image of the same camera beside the whole one, with other options.
   void MakeOther(const RenderOptions& options);
   const PictureTexture& other() const { return other_; }
 
   const MadePicture& picture() const { return picture_; }
-  /// Brings the pixels of a whole picture's views back into memory, for those who look at them.
+  /// Brings the pixels of a whole image's views back into memory, for those who look at them.
   /// Throws dtr::Error where one cannot be read any more.
   void BringPixels();
-  /// A small picture of the view's photo; null until it was drawn from.
+  /// A small image of the view's photo; null until it was drawn from.
   const ImageRgb8* ThumbnailOf(const View& view);
 
-  /// The picture's pixels as they are kept: colours as `dtr render` writes them, else as shown.
+  /// The image's pixels as they are kept: colours as `dtr render` writes them, else as shown.
   ImageRgb8 Image();
-  /// Of the last picture; the first call after it reads it back from the GPU.
+  /// Of the last image; the first call after it reads it back from the GPU.
   const RenderResult& Result();
 
  private:
@@ -100,7 +100,7 @@ class PictureMaker {
   PictureTexture other_;
   std::optional<RenderResult> result_;
   HoleFiller filler_;
-  std::vector<const View*> hidden_;  ///< from the picture
+  std::vector<const View*> hidden_;  ///< from the image
   std::map<const View*, ImageRgb8> thumbnails_;
 };
 

@@ -3,7 +3,7 @@
 #include <exception>
 #include <utility>
 
-#include "viewer/glfw/trouble.h"
+#include "viewer/glfw/error_text.h"
 
 namespace dtr::viewer {
 namespace {
@@ -17,7 +17,7 @@ bool SameOrder(const PictureOrder& a, const PictureOrder& b) {
          a.shown == b.shown && a.instant == b.instant && a.hidden == b.hidden;
 }
 
-/// All but what only changes what pixels mean: it can wait for the whole picture.
+/// All but what only changes what pixels mean: it can wait for the whole image.
 bool SamePlace(const PictureOrder& a, PictureOrder b) {
   b.shown = a.shown;
   b.hidden = a.hidden;
@@ -30,10 +30,11 @@ PictureSchedule::PictureSchedule(PictureMaker& maker, int largest_divisor,
                                  std::function<void(const std::string&)> tell)
     : maker_(maker),
       tell_(std::move(tell)),
-      governors_(kAllShown.size(), ResolutionGovernor(kMovingTargetMs, largest_divisor)) {}
+      governors_(kAllShown.size(),
+                 ResolutionFrameRateController(kMovingTargetMs, largest_divisor)) {}
 
 bool PictureSchedule::WholeFor(const PictureOrder& order) const {
-  return MadeFor(order) && has_picture_ && !refusal_ && maker_.picture().whole;
+  return MadeFor(order) && has_picture_ && !rejection_ && maker_.picture().whole;
 }
 
 bool PictureSchedule::MadeFor(const PictureOrder& order) const {
@@ -51,7 +52,7 @@ bool PictureSchedule::Make(const PictureOrder& order, Pace pace) {
 }
 
 void PictureSchedule::MakeNow(const PictureOrder& order, bool small) {
-  refusal_.reset();
+  rejection_.reset();
   has_picture_ = false;
   ++count_;
   made_ = order;
@@ -65,7 +66,7 @@ void PictureSchedule::MakeNow(const PictureOrder& order, bool small) {
     told_.clear();
   } catch (const std::exception& error) {
     const std::string said = Said(error);
-    if (!small) refusal_ = said;
+    if (!small) rejection_ = said;
     if (std::exchange(told_, said) != said) tell_(said);
   }
 }

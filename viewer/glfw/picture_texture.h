@@ -1,4 +1,4 @@
-// viewer/glfw/picture_texture.h -- a picture on the GPU that stays when the renderer draws another.
+// viewer/glfw/picture_texture.h -- an image on the GPU that stays when the renderer draws another.
 #pragma once
 #include "dtr/gl/renderer.h"
 #include "dtr/types/grid.h"

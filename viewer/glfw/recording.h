@@ -1,4 +1,4 @@
-// viewer/glfw/recording.h -- a path into a video, picture by picture while the window stays alive.
+// viewer/glfw/recording.h -- a path into a video, image by image while the window stays alive.
 #pragma once
 #include <atomic>
 #include <filesystem>
@@ -12,7 +12,7 @@
 
 namespace dtr::viewer {
 
-/// The window draws each camera whole and gives its picture; then the video is encoded on a thread
+/// The window draws each camera whole and gives its image; then the video is encoded on a thread
 /// of its own. Destroyed before its end it leaves nothing behind.
 class Recording {
  public:
@@ -25,9 +25,9 @@ class Recording {
   const std::filesystem::path& target() const { return target_; }
   size_t frames() const { return cameras_.size(); }
   size_t drawn() const { return drawn_; }
-  /// The camera whose picture is wanted; null once all are there.
+  /// The camera whose image is wanted; null once all are there.
   const NovelCamera* Wanted() const;
-  /// Its picture. Encoding begins with the last one.
+  /// Its image. Encoding begins with the last one.
   void Add(const ImageRgb8& picture);
   /// True once the video is there. Throws dtr::Error where encoding failed.
   bool Done();

@@ -9,9 +9,9 @@ namespace dtr::viewer {
 /// Fills an AppReport while the viewer runs. Time begins when this is made.
 class RunFigures {
  public:
-  /// A frame that drew a moving picture, of 1/`divisor` of the window per side.
+  /// A frame that drew a moving image, of 1/`divisor` of the window per side.
   void Moved(int divisor, double ms, double cpu_ms);
-  /// A frame was presented. `any`: its picture has something of the set; `whole`: all of it.
+  /// A frame was presented. `any`: its image has something of the set; `whole`: all of it.
   void EndFrame(bool any, bool whole);
   int frames() const { return report_.last.frames; }
   const AppReport& report() const { return report_; }

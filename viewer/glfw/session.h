@@ -6,17 +6,17 @@
 #include <string>
 #include <vector>
 
-#include "dtr/render/instants.h"
+#include "dtr/render/time_steps.h"
 #include "viewer/controller.h"
 #include "viewer/glfw/app.h"
 #include "viewer/glfw/inspector.h"
 #include "viewer/glfw/picture_maker.h"
 #include "viewer/glfw/picture_schedule.h"
-#include "viewer/sigma_shelf.h"
+#include "viewer/sigma_cache.h"
 
 namespace dtr::viewer {
 
-/// Replaced as a whole when the set is read anew. Belongs to the current context, as gl::Renderer.
+/// Replaced as a whole when the set is read again. Belongs to the current context, as gl::Renderer.
 class Session {
  public:
   using Tell = std::function<void(const std::string&)>;
@@ -34,20 +34,21 @@ class Session {
 
   const OpenedSet& opened() const { return *opened_; }
 
-  /// Of a moving set: the frame that is shown. What is left out of one is left out of all, by name.
+  /// Of a dynamic set: the frame that is shown. What is left out of one is left out of all, by
+  /// name.
   size_t instant() const { return instant_; }
   void ShowInstant(size_t instant);
   const FrameClock& clock() const { return clock_; }
 
-  /// Tries views anew that could not be read and whose files have changed since, or came back.
+  /// Tries views again that could not be read and whose files have changed since, or came back.
   void RetryLostViews();
-  /// What the shown picture shows there, as plane z of the present camera.
+  /// What the shown image shows there, as plane z of the present camera.
   std::optional<double> DepthAt(const Eigen::Vector2d& pixel);
-  /// Also of views that this instant lacks.
+  /// Also of views that this time step lacks.
   std::vector<std::string> HiddenNames() const;
-  /// The views of that instant that are called so.
+  /// The views of that time step that are called so.
   std::vector<const View*> HiddenAt(size_t instant) const;
-  /// Writes down what of the window's state is the set's: camera, picture, inspection, instant.
+  /// Writes down what of the window's state is the set's: camera, image, inspection, time step.
   void Describe(AppState& state) const;
 
  private:
@@ -59,8 +60,8 @@ class Session {
   const FrameClock clock_;
   size_t instant_ = 0;
   std::map<const View*, std::string> tried_views_, tried_photos_;  ///< stamps of lost ones' files
-  SigmaShelf sigmas_;
-  std::vector<std::string> hidden_elsewhere_;  ///< names that this instant lacks
+  SigmaCache sigmas_;
+  std::vector<std::string> hidden_elsewhere_;  ///< names that this time step lacks
 
  public:
   PictureMaker maker;

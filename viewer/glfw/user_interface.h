@@ -44,7 +44,7 @@ class UserInterface {
   /// To be called inside an ImGui window: the cursor over it is ImGui's.
   void ThisPanelIsOurs();
 
-  /// The cursor, pixels of the picture; off it where the cursor is.
+  /// The cursor, pixels of the image; off it where the cursor is.
   Eigen::Vector2d cursor_px() const { return cursor_px_; }
   bool CursorOverPanels() const;
 

@@ -11,8 +11,8 @@
 namespace osgDTR {
 namespace {
 
-// A window that shows a node more often draws all of them anew in every frame.
-constexpr size_t kMostAppearances = 16;
+// A window that shows a node more often draws all of them again in every frame.
+constexpr size_t kMaxAppearances = 16;
 
 dtr::gl::RendererSettings Settings() {
   dtr::gl::RendererSettings settings;
@@ -33,10 +33,10 @@ ContextRenderer::Appearance& ContextRenderer::Next(std::optional<unsigned> frame
     frame_ = frame;
   }
   // Who draws without counting frames never begins a new one.
-  if (in_frame_ == kMostAppearances) in_frame_ = 0;
+  if (in_frame_ == kMaxAppearances) in_frame_ = 0;
   if (in_frame_ == appearances_.size()) {
     appearances_.emplace_back();
-    if (shown_before_) appearances_.back().stillness.Moved();  // it came into the picture
+    if (shown_before_) appearances_.back().stillness.Moved();  // it came into the image
   }
   return appearances_[in_frame_++];
 }

@@ -19,22 +19,22 @@
 
 namespace osgDTR {
 
-/// A picture that was made for one of a node's appearances in a window.
+/// An image that was made for one of a node's appearances in a window.
 struct MadePicture {
   dtr::gl::DrawnPicture picture;
   bool in_renderer =
       false;  ///< it holds until the renderer's next; else the compositor's own has it
 };
 
-/// A renderer of one graphics context, and what its last pictures were of.
+/// A renderer of one graphics context, and what its last images were of.
 class ContextRenderer {
  public:
   ContextRenderer();
 
-  /// Puts a picture of what is said into the framebuffer. It is made anew only when one of these
+  /// Puts an image of what is said into the framebuffer. It is made again only when one of these
   /// differs from the frame before: a viewer draws a still scene again and again. A window may show
   /// a node several times in a frame: the n-th of a frame goes with the n-th of the frame before.
-  /// `draw` is given the compositor that takes pictures from memory and whether the picture is to
+  /// `draw` is given the compositor that takes images from memory and whether the image is to
   /// be whole: with `may_wait` not before nothing has differed for a while. `frame`:
   /// OpenSceneGraph's number of it; empty: a frame of its own.
   template <typename Draw>

@@ -95,7 +95,7 @@ int DepthTR::getInstant() const { return static_cast<int>(drawable_->state_->Get
 
 void DepthTR::setInstant(int instant) {
   if (instant < 0 || instant >= numberOfInstants()) {
-    throw dtr::UsageError("DepthTR: expected an instant from 0 to " +
+    throw dtr::UsageError("DepthTR: expected a time step from 0 to " +
                           std::to_string(numberOfInstants() - 1) + ", found " +
                           std::to_string(instant));
   }

@@ -29,8 +29,8 @@ enum class DrawPath {
 
 /// When holes are filled, where the options say that they are.
 enum class FillTime {
-  kAlways,     ///< every new picture, also while the camera moves
-  kWhenStill,  ///< once nothing has changed for a moment, as in `dtr view`: moving pictures stay
+  kAlways,     ///< every new image, also while the camera moves
+  kWhenStill,  ///< once nothing has changed for a moment, as in `dtr view`: moving images stay
                ///< fast
 };
 
@@ -58,18 +58,18 @@ class DepthTR : public osg::Geode {
   /// What the set was pruned for, else the library's options; loading does not set them.
   dtr::RenderOptions getDefaultRenderOptions() const;
   bool isLoaded() const { return getScene() != nullptr; }
-  /// The instant that is shown; null without a set.
+  /// The time step that is shown; null without a set.
   std::shared_ptr<const LoadedScene> getScene() const;
 
-  // Moving sets. All instants are in memory; to show another is a change for the update phase.
+  // Moving sets. All time steps are in memory; to show another is a change for the update phase.
 
   int numberOfInstants() const;  ///< 1 of a still scene, 0 without a set
   int getInstant() const;
   /// From 0; throws dtr::UsageError for others.
   void setInstant(int instant);
-  /// Seconds from the first instant to this one.
+  /// Seconds from the first time step to this one.
   double getInstantTime(int instant) const;
-  /// Goes on from the shown instant with the viewer's simulation time, round and round, or stops.
+  /// Goes on from the shown time step with the viewer's simulation time, round and round, or stops.
   void setPlaying(bool playing);
   bool isPlaying() const { return playing_; }
   void traverse(osg::NodeVisitor& visitor) override;
@@ -88,7 +88,7 @@ class DepthTR : public osg::Geode {
   /// deferred method (RENDER_SPEC 5).
   void setMode(Mode mode);
 
-  /// The source views of the instant that is shown.
+  /// The source views of the time step that is shown.
   const std::vector<InputView>& inputViews() const { return input_views_; }
   int numberOfInputViews() const { return static_cast<int>(input_views_.size()); }
   /// OpenSceneGraph's view matrix of an input camera, from this node's coordinates.
@@ -112,7 +112,7 @@ class DepthTR : public osg::Geode {
   /// that), first row at the bottom as OSG has it; from at most `reqNumber` views. Throws
   /// std::logic_error before setNovelView.
   osg::ref_ptr<osg::Image> getNovelView(dtr::BlendWeight blendType, int reqNumber);
-  /// Of the last getNovelView: picture, depth, coverage, views used.
+  /// Of the last getNovelView: image, depth, coverage, views used.
   const dtr::RenderResult& getNovelResult() const;
   /// Draws input view `vn` alone as seen from the novel camera.
   void projectView(int vn, Mode type, int resolution, float pointSize);
@@ -170,7 +170,7 @@ class DepthTR : public osg::Geode {
   std::optional<NovelView> novel_;
   int current_view_ = -1;
   bool playing_ = false;
-  /// The simulation time at which the first instant began; none until the next update.
+  /// The simulation time at which the first time step began; none until the next update.
   std::optional<double> played_from_s_;
 };
 

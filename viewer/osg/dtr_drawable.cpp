@@ -38,7 +38,7 @@ MadePicture DrawPicture(dtr::gl::FittingRenderer& renderer, dtr::gl::Compositor&
 }  // namespace
 
 DepthTR::dtrDrawable::dtrDrawable() : state_(std::make_unique<State>()) {
-  setSupportsDisplayList(false);  // every camera sees another picture
+  setSupportsDisplayList(false);  // every camera sees another image
   setUseDisplayList(false);
 }
 

@@ -62,7 +62,7 @@ const char* NextMethod(RenderOptions& options) {
   return "deferred";
 }
 
-/// None, when still, every picture.
+/// None, when still, every image.
 const char* NextFilling(DepthTR& node, RenderOptions& options) {
   if (!options.fill_holes) {
     options.fill_holes = true;
@@ -71,7 +71,7 @@ const char* NextFilling(DepthTR& node, RenderOptions& options) {
   }
   if (node.getFillTime() == FillTime::kWhenStill) {
     node.setFillTime(FillTime::kAlways);
-    return "every picture";
+    return "every image";
   }
   options.fill_holes = false;
   return "off";
@@ -79,7 +79,7 @@ const char* NextFilling(DepthTR& node, RenderOptions& options) {
 
 constexpr int kCoarsestResolution = 4;
 
-/// The keys of moving sets; false for others, and for sets that stand still.
+/// The keys of dynamic sets; false for others, and for sets that stand still.
 bool HandleTime(int key, DepthTR& node) {
   const int count = node.numberOfInstants();
   if (count < 2) return false;
@@ -88,7 +88,7 @@ bool HandleTime(int key, DepthTR& node) {
     case '.':
       node.setPlaying(false);
       node.setInstant((node.getInstant() + (key == '.' ? 1 : count - 1)) % count);
-      OSG_NOTICE << "D+TR instant: " << node.getInstant() << " of " << count << ", "
+      OSG_NOTICE << "D+TR time step: " << node.getInstant() << " of " << count << ", "
                  << node.getInstantTime(node.getInstant()) << " s" << std::endl;
       return true;
     case 'j':
@@ -268,9 +268,10 @@ void KeyHandler::getUsage(osg::ApplicationUsage& usage) const {
   usage.addKeyboardMouseBinding("D+TR: r", "Every pixel, 2nd, 4th pixel of the depth maps");
   usage.addKeyboardMouseBinding("D+TR: [, ]", "One view less, one more");
   usage.addKeyboardMouseBinding("D+TR: u",
-                                "Fill what no view saw: when still, in every picture, not");
-  usage.addKeyboardMouseBinding("D+TR: comma, full stop", "Previous, next instant of a moving set");
-  usage.addKeyboardMouseBinding("D+TR: j", "Play a moving set, stop");
+                                "Fill what no view saw: when still, in every image, not");
+  usage.addKeyboardMouseBinding("D+TR: comma, full stop",
+                                "Previous, next time step of a dynamic set");
+  usage.addKeyboardMouseBinding("D+TR: j", "Play a dynamic set, stop");
   usage.addKeyboardMouseBinding("D+TR: x", "Read back and blend on the processor, on and off");
 }
 

@@ -8,10 +8,10 @@
 namespace osgDTR {
 
 /// Keys for a DepthTR: n N next and previous input view, v blend weight, k method and primitive,
-/// r resolution, [ ] number of views, u hole filling, x the report's read-back path; of moving sets
-/// , . previous and next instant, j playing. Add it to a viewer's event handlers, or to a node's
-/// event callbacks, as the osgDB plugin does. Handlers of one window share its keys: options change
-/// for all their nodes, and n N go through the input views of one after those of the other.
+/// r resolution, [ ] number of views, u hole filling, x the report's read-back path; of dynamic
+/// sets , . previous and next time step, j playing. Add it to a viewer's event handlers, or to a
+/// node's event callbacks, as the osgDB plugin does. Handlers of one window share its keys: options
+/// change for all their nodes, and n N go through the input views of one after those of the other.
 class KeyHandler : public osgGA::GUIEventHandler {
  public:
   /// `starts_at_input`: home, which is where viewers start, becomes the first input camera.

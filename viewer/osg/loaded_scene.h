@@ -7,25 +7,25 @@
 #include <vector>
 
 #include "dtr/render/fill_holes.h"
-#include "dtr/render/instants.h"
 #include "dtr/render/options.h"
 #include "dtr/render/scene.h"
+#include "dtr/render/time_steps.h"
 #include "dtr/types/dtr_set.h"
 
 namespace osgDTR {
 
-/// One instant of a set.
+/// One time step of a set.
 struct LoadedScene {
-  dtr::DtrSet set;         ///< its only frame is that instant
+  dtr::DtrSet set;         ///< its only frame is that time step
   dtr::RenderScene scene;  ///< of `set`
 };
 
 /// Never changes once it is made; used by several threads at a time.
 struct LoadedSet {
   std::vector<LoadedScene> instants;  ///< one of a still scene
-  dtr::FrameClock clock;              ///< of the instants
+  dtr::FrameClock clock;              ///< of the time steps
   dtr::RenderOptions defaults;        ///< what the set was pruned for, else the library's
-  /// Of what can be drawn at any instant, but for single pixels that lie far beyond all others of
+  /// Of what can be drawn at any time step, but for single pixels that lie far beyond all others of
   /// their views; DtrSet::bounds leaves out the outermost 1 %.
   osg::BoundingBox bounds;
   mutable dtr::HoleFiller hole_filler;  ///< keeps what it makes of the photos, for all who draw

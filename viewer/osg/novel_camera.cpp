@@ -17,7 +17,7 @@ constexpr double kUneven = 1e-6;
 /// gl_from_cam = diag(1, -1, -1): x right, y up, z back.
 const Eigen::Vector3d kGlFromCam(1, -1, -1);
 
-[[noreturn]] void Refuse(const std::string& expected, const std::string& found) {
+[[noreturn]] void Reject(const std::string& expected, const std::string& found) {
   throw Error("DepthTR: expected " + expected + ", found " + found +
               "; it is not drawn for this camera");
 }
@@ -35,19 +35,19 @@ Similarity SimilarityOf(const osg::Matrixd& modelview) {
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) linear(row, column) = modelview(column, row);
     result.translation[row] = modelview(3, row);
-    if (modelview(row, 3) != 0) Refuse("an affine modelview matrix", "a projective one");
+    if (modelview(row, 3) != 0) Reject("an affine modelview matrix", "a projective one");
   }
   if (!linear.allFinite() || !result.translation.allFinite() || modelview(3, 3) != 1) {
-    Refuse("a finite affine modelview matrix", "another");
+    Reject("a finite affine modelview matrix", "another");
   }
   const double determinant = linear.determinant();
-  if (!(determinant > 0)) Refuse("a node that is not mirrored", "a mirrored or flat one");
+  if (!(determinant > 0)) Reject("a node that is not mirrored", "a mirrored or flat one");
   result.scale = std::cbrt(determinant);
   result.rotation = linear / result.scale;
   const Eigen::Matrix3d error =
       result.rotation * result.rotation.transpose() - Eigen::Matrix3d::Identity();
   if (!(error.cwiseAbs().maxCoeff() < kUneven)) {
-    Refuse("a node scaled alike along all axes", "uneven scales");
+    Reject("a node scaled alike along all axes", "uneven scales");
   }
   return result;
 }
@@ -58,14 +58,14 @@ NovelCamera NovelCameraOf(const osg::Matrixd& modelview, const osg::Matrixd& pro
                           int width_px, int height_px) {
   const osg::Matrixd& p = projection;
   if (p(2, 3) != -1 || p(3, 3) != 0) {
-    Refuse("a perspective projection", "an orthographic or projective one");
+    Reject("a perspective projection", "an orthographic or projective one");
   }
   const double others[] = {p(0, 1), p(0, 2), p(0, 3), p(1, 0), p(1, 2), p(1, 3), p(3, 0), p(3, 1)};
   for (const double other : others) {
-    if (other != 0) Refuse("a projection without skew", "a skewed one");
+    if (other != 0) Reject("a projection without skew", "a skewed one");
   }
   if (!(p(0, 0) > 0) || !(p(1, 1) > 0)) {
-    Refuse("a projection that keeps left and right, up and down", "a mirrored one");
+    Reject("a projection that keeps left and right, up and down", "a mirrored one");
   }
   const Similarity eye_from_local = SimilarityOf(modelview);
   const double half_width = 0.5 * width_px, half_height = 0.5 * height_px;

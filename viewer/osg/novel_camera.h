@@ -17,7 +17,7 @@ struct NovelCamera {
 
 /// From OSG's matrices (row vectors: p_in_eye = p_in_local * modelview) and the viewport's size in
 /// pixels. The modelview may turn, shift and scale alike along all axes.
-/// Throws dtr::Error, one line, for what shows no picture of a pinhole camera: mirrored or unevenly
+/// Throws dtr::Error, one line, for what shows no image of a pinhole camera: mirrored or unevenly
 /// scaled nodes, orthographic or skewed projections.
 NovelCamera NovelCameraOf(const osg::Matrixd& modelview, const osg::Matrixd& projection,
                           int width_px, int height_px);
@@ -25,7 +25,7 @@ NovelCamera NovelCameraOf(const osg::Matrixd& modelview, const osg::Matrixd& pro
 /// OSG's view matrix of a pose in the same world.
 osg::Matrixd ViewMatrixOf(const dtr::Pose& cam_from_world);
 
-/// OSG's projection matrix that makes pictures of this camera's size show what it sees.
+/// OSG's projection matrix that makes images of this camera's size show what it sees.
 osg::Matrixd ProjectionMatrixOf(const dtr::PinholeCamera& camera, double near_z, double far_z);
 
 }  // namespace osgDTR

@@ -20,7 +20,7 @@ struct PluginOptions {
   dtr::RenderOptions render;
   DrawPath path = DrawPath::kGpu;
   FillTime fill_time = FillTime::kAlways;
-  int instant = 0;    ///< of a moving set: the first to be shown
+  int instant = 0;    ///< of a dynamic set: the first to be shown
   bool play = false;  ///< from there on
   bool keys = true;   ///< the report's keys, and the first input camera as home
 };
@@ -127,15 +127,15 @@ class ReaderWriterDTR : public osgDB::ReaderWriter {
  public:
   ReaderWriterDTR() {
     supportsExtension("dtr", "Depth + texture representation: the set's folder, or its set.json");
-    supportsOption("views", "Views that a picture is blended from at most [8]");
+    supportsOption("views", "Views that an image is blended from at most [8]");
     supportsOption("resolution", "Every R-th depth pixel [1]");
     supportsOption("blend", "cosine|exponential|angle|inverse-angle|k-nearest");
     supportsOption("method", "deferred|two-pass");
     supportsOption("primitive", "mesh|splat, of two-pass");
     supportsOption("fill-holes",
                    "on|still|off: fill what no view saw; still: not while moving [off]");
-    supportsOption("instant", "Of a moving set: the instant that is shown [0]");
-    supportsOption("play", "on|off: of a moving set: play it, round and round [off]");
+    supportsOption("instant", "Of a dynamic set: the time step that is shown [0]");
+    supportsOption("play", "on|off: of a dynamic set: play it, in a loop [off]");
     supportsOption("path", "gpu|read-back");
     supportsOption("keys", "on|off: the keys of the founding report [on]");
   }

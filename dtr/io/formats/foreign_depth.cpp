@@ -33,7 +33,7 @@ std::string LowerExtension(const std::filesystem::path& file) {
 // numpy's arrays of one image: rows and columns, with or without an axis of length 1.
 Grid<float> FloatsFromNpy(const std::filesystem::path& file, std::uint64_t limit_px) {
   const NpyArray array =
-      ReadNpy(file, {.half = true, .integers = true, .any_value = true, .most_values = limit_px});
+      ReadNpy(file, {.half = true, .integers = true, .any_value = true, .max_values = limit_px});
   std::vector<size_t> shape = array.shape;
   if (shape.size() == 3 && shape.back() == 1) shape.pop_back();
   if (shape.size() == 3 && shape.front() == 1) shape.erase(shape.begin());
@@ -117,10 +117,10 @@ DepthImage ReadForeignDepth(const std::filesystem::path& file, DepthKind kind, d
 
 DepthImage ReadDepthOfAnySize(const std::filesystem::path& file, DepthKind kind, double unit_scale,
                               int width_px, int height_px) {
-  constexpr std::uint64_t kMostPerPixel = 16;  // four times finer than the photo per axis
+  constexpr std::uint64_t kMaxPerPixel = 16;  // four times finer than the photo per axis
   RequireUnit(file, unit_scale);
   const Grid<float> numbers =
-      ReadNumbers(file, std::min(kImageLimitPx, kMostPerPixel * PixelsOf(width_px, height_px)));
+      ReadNumbers(file, std::min(kImageLimitPx, kMaxPerPixel * PixelsOf(width_px, height_px)));
   return Scaled(file, numbers, kind, unit_scale);
 }
 

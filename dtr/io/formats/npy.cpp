@@ -236,11 +236,11 @@ NpyArray ParseNpy(std::string_view bytes, const std::string& source, const NpyOp
   const std::string_view data = bytes.substr(begin);
   const auto count = CountOf(header.shape, data.size() / header.item_bytes);
   if (!count || *count * header.item_bytes != data.size()) {
-    throw Error(source + ": expected as many bytes as the shape tells, found " +
+    throw Error(source + ": expected as many bytes as the shape says, found " +
                 std::to_string(data.size()) + "; the file is damaged");
   }
-  if (*count > options.most_values) {
-    throw Error(source + ": expected at most " + std::to_string(options.most_values) +
+  if (*count > options.max_values) {
+    throw Error(source + ": expected at most " + std::to_string(options.max_values) +
                 " numbers, found " + std::to_string(*count));
   }
   NpyArray array;

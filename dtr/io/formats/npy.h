@@ -17,10 +17,10 @@ struct NpyArray {
 
 /// What else than finite float32 and float64 is read.
 struct NpyOptions {
-  bool half = false;              ///< float16
-  bool integers = false;          ///< of 8, 16 and 32 bits, signed or not
-  bool any_value = false;         ///< NaN and infinity too
-  size_t most_values = 1u << 27;  ///< larger arrays are refused before they are allocated
+  bool half = false;             ///< float16
+  bool integers = false;         ///< of 8, 16 and 32 bits, signed or not
+  bool any_value = false;        ///< NaN and infinity too
+  size_t max_values = 1u << 27;  ///< larger arrays are rejected before they are allocated
 };
 
 /// Reads a .npy file, format versions 1, 2 and 3 (numpy's NEP 1), of float32 or float64 in either

@@ -34,7 +34,7 @@ PinholeCamera ScaledToImage(const PinholeCamera& full_size, const SizedImage& st
     throw Error(what + ": expected an image of the shape " + std::to_string(full_size.width_px()) +
                 "x" + std::to_string(full_size.height_px()) + ", found " +
                 std::to_string(stored.width_px) + "x" + std::to_string(stored.height_px) +
-                "; give the images the cameras were written for, neither turned nor cropped");
+                "; give the images the cameras were written for, neither rotated nor cropped");
   }
   const double sx = static_cast<double>(image.width_px) / full_size.width_px();
   const double sy = static_cast<double>(image.height_px) / full_size.height_px();

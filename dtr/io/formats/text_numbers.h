@@ -13,7 +13,7 @@ inline bool IsBlank(char c) { return c == ' ' || c == '\t' || c == '\n' || c == 
 /// Reads blank-separated words of a text. Every error is an Error "source:line: what, ...".
 class TextNumbers {
  public:
-  /// Whole file; refuses files above 64 MB: the formats read with this hold a few numbers a camera.
+  /// Whole file; rejects files above 64 MB: the formats read with this hold a few numbers a camera.
   explicit TextNumbers(const std::filesystem::path& file);
   TextNumbers(std::string text, std::string source);
 

@@ -204,14 +204,14 @@ void NoteUnused(const Json& root, const Json& frames, const std::string& source,
   look(root);
   for (const Json& frame : frames) look(frame);
   const bool moved = unused.contains("applied_transform") || unused.contains("applied_scale");
-  constexpr size_t kMostNamed = 12;
+  constexpr size_t kMaxNamed = 12;
   std::string names;
   size_t named = 0;
   for (const std::string& name : unused) {
-    if (named++ == kMostNamed) break;
+    if (named++ == kMaxNamed) break;
     names += (names.empty() ? "" : ", ") + name;
   }
-  if (unused.size() > kMostNamed) names += fmt::format(" and {} more", unused.size() - kMostNamed);
+  if (unused.size() > kMaxNamed) names += fmt::format(" and {} more", unused.size() - kMaxNamed);
   if (!unused.empty()) {
     out.notes.push_back(fmt::format(
         "{}: fields that are not used: {}{}", source, names,

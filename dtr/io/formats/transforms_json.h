@@ -1,4 +1,4 @@
-// dtr/io/formats/transforms_json.h -- transforms.json of NeRF, instant-ngp and nerfstudio.
+// dtr/io/formats/transforms_json.h -- transforms.json of NeRF, time step-ngp and nerfstudio.
 //
 // Poses are camera-to-world with OpenGL axes (x right, y up, z back). Intrinsics stand at the top
 // or in each frame: fl_x, fl_y, cx, cy, w, h, or camera_angle_x alone (NeRF's synthetic scenes: f =

@@ -40,8 +40,8 @@ std::vector<size_t> FrameTimes(const std::vector<std::string>& names) {
   if (numbers.size() < 2) return places;
   size_t step = 0;
   for (const size_t number : numbers) step = std::gcd(step, number - numbers.front());
-  constexpr size_t kMostGaps = 100;
-  if ((numbers.back() - numbers.front()) / step > kMostGaps * names.size()) return places;
+  constexpr size_t kMaxGaps = 100;
+  if ((numbers.back() - numbers.front()) / step > kMaxGaps * names.size()) return places;
   for (size_t i = 0; i < numbers.size(); ++i) places[i] = (numbers[i] - numbers.front()) / step;
   return places;
 }

@@ -8,7 +8,7 @@
 
 namespace dtr::pipeline {
 
-/// A camera of a rig and an instant, as names say them.
+/// A camera of a rig and a time step, as names say them.
 struct RigName {
   std::string camera, frame;
 };

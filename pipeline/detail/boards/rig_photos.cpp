@@ -32,7 +32,7 @@ struct Shot {
   fs::path file;      // of a photo; of a video where number >= 0
   int number = -1;    // frame of a video
   std::string name;   // to list it by
-  std::string frame;  // instant
+  std::string frame;  // time step
   size_t camera = 0;
   int width_px = 0, height_px = 0;
   calib::Detection found;
@@ -122,7 +122,7 @@ Layout FromNames(const std::vector<fs::path>& photos) {
   return layout;
 }
 
-// Of one camera: which frame of its video belongs to which instant. A table that has as many rows
+// Of one camera: which frame of its video belongs to which time step. A table that has as many rows
 // as the video has frames is a table of them in order, though it may count them from another start:
 // recorders number from when a camera began.
 std::map<int, int> InstantsOf(const RigTimestamps& timestamps, int camera, int frames) {
@@ -219,7 +219,7 @@ Layout FromVideos(const fs::path& folder, const std::vector<fs::path>& videos, P
       shot.frame = fmt::format("{}", number);
       if (timed) {
         const auto at = own.find(number);
-        if (at == own.end()) continue;  // a frame without an instant says nothing of the rig
+        if (at == own.end()) continue;  // a frame without a time step says nothing of the rig
         shot.frame = fmt::format("{}", at->second);
       }
       layout.shots.push_back(std::move(shot));
@@ -242,7 +242,7 @@ std::vector<fs::path> VideosIn(const fs::path& folder) {
   return videos;
 }
 
-// One camera sees an instant once.
+// One camera sees a time step once.
 void RequireOneShotPerFrame(const Layout& layout) {
   std::map<std::pair<size_t, std::string>, const Shot*> seen;
   for (const Shot& shot : layout.shots) {

@@ -30,9 +30,9 @@ struct RigPhotos {
 
 /// Three layouts, told apart by what the folder holds:
 ///  - sub-folders, one per camera, with photos; photos of the same name (without extension) are of
-///    one instant;
-///  - photos named CAMERA and a number, as left01.jpg and right01.jpg; same number, same instant;
-///  - videos, one per camera; frames of the same number are of one instant, or as timestamps.csv
+///    one time step;
+///  - photos named CAMERA and a number, as left01.jpg and right01.jpg; same number, same time step;
+///  - videos, one per camera; frames of the same number are of one time step, or as timestamps.csv
 ///    beside them says (columns sync_index, cam_id, frame_index; cam_id is the number at the end of
 ///    the video's name; without frame_index a camera's rows in order are its frames).
 /// Photos that a program has rotated are put back on the grid of their camera's others

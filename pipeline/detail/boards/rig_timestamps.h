@@ -1,5 +1,5 @@
-// pipeline/detail/boards/rig_timestamps.h -- which frames of videos are of one instant, as a table
-// says.
+// pipeline/detail/boards/rig_timestamps.h -- which frames of videos are of one time step, as a
+// table says.
 #pragma once
 #include <filesystem>
 #include <map>

@@ -15,7 +15,7 @@
 namespace dtr::pipeline {
 namespace {
 
-constexpr size_t kFewestViews = 3;
+constexpr size_t kMinViews = 3;
 
 ImageRgb8 ImageOf(const std::filesystem::path& folder, View view) {
   io::LoadOptions load;
@@ -68,10 +68,10 @@ BoardInSet FindBoard(const std::filesystem::path& folder, const DtrSet& set,
                              view.cam_from_world,
                              {view.name, std::move(found[i].corners), found[i].noise_px}});
   }
-  if (in_set.sights.size() >= kFewestViews) return in_set;
+  if (in_set.sights.size() >= kMinViews) return in_set;
   throw Error(fmt::format(
       "--board {}: expected it in {} views of {} or more, found it in {} of {}{}",
-      calib::TextOf(board), kFewestViews, folder.string(), in_set.sights.size(), views.size(),
+      calib::TextOf(board), kMinViews, folder.string(), in_set.sights.size(), views.size(),
       in_set.without.empty() ? ""
                              : fmt::format("; {} says: {}", in_set.without.front().name,
                                            in_set.without.front().reason)));

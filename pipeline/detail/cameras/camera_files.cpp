@@ -52,7 +52,7 @@ std::map<std::string, std::string> ImagesByStem(const fs::path& folder) {
   return by_stem;
 }
 
-// Leaves out what has no photo, or says so: `name` may leave its folder, which readers refuse.
+// Leaves out what has no photo, or says so: `name` may leave its folder, which readers reject.
 bool HasPhoto(const std::string& name, const CameraFileFolders& folders) {
   return !WhyUnsafeName(name).empty() || IsFile(folders.images / name);
 }

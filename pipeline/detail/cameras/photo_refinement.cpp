@@ -42,7 +42,7 @@ void Remark(const calib::Refined& refined, PhotoRefinement& out) {
 // Holds what is known in metres.
 void HoldMetres(const capture::Capture& capture, const CalibrateOptions& options,
                 const calib::RefineOptions& refine, Json& report, PhotoRefinement& out) {
-  const PhotoPlaces places = PhotoPlacesOf(capture, calib::ImageNames(out.model));
+  const PhotoPositions places = PhotoPositionsOf(capture, calib::ImageNames(out.model));
   if (options.metres.gps) RequirePlaces(places, "--gps", "those with a camera");
   RefinedInMetres refined = RefineInMetres(out.model, options.metres, places, refine);
   report["bundle_adjustment"] = Json::parse(refined.json);

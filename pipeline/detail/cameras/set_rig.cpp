@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 using io::Json;
 
 // The set's poses are the rig's to rounding when it is built; features are not found to better.
-constexpr double kMostPlacesPx = 0.1;
+constexpr double kMaxPlacesPx = 0.1;
 constexpr char kProvenance[] = "provenance";
 
 std::string ListedPhotos(const std::vector<std::string>& names) {
@@ -53,8 +53,8 @@ void RequireSharedInstant(const SetRig& rig, const std::map<std::string, calib::
     if (StandApart(rig, first, photo.camera)) return;
   }
   throw Error(fmt::format(
-      "--rig {}: expected photos of one instant from two cameras that stand apart, found none; "
-      "photos of one instant have equal names or numbers, as left/0001.jpg and right/0001.jpg",
+      "--rig {}: expected photos taken at one time from two cameras that stand apart, found none; "
+      "photos taken at one time have equal names or numbers, as left/0001.jpg and right/0001.jpg",
       rig.file));
 }
 
@@ -79,7 +79,7 @@ Pose PoseFrom(const io::JsonObject& object, const char* key) {
   const Eigen::Matrix3d rotation = matrix.leftCols<3>();
   const bool turns = (rotation.transpose() * rotation).isIdentity(1e-6) && matrix.allFinite() &&
                      rotation.determinant() > 0;
-  if (!turns) object.Fail(key, "a rotation and a shift");
+  if (!turns) object.Fail(key, "a rotation and a translation");
   return {Eigen::Quaterniond(rotation).normalized(), matrix.col(3)};
 }
 
@@ -120,7 +120,7 @@ SetRig ReadSetRig(const fs::path& file) {
   const calib::Calibration calibration = calib::ReadCalibration(file);
   if (calibration.cameras.size() < 2) {
     throw Error(fmt::format(
-        "--rig {}: expected a rig of 2 cameras or more, found 1; a lens alone is for dtr "
+        "--rig {}: expected a rig of 2 cameras or more, found 1; one camera alone is for dtr "
         "calibrate photos --lens",
         file.string()));
   }
@@ -210,8 +210,8 @@ std::optional<Check> RigPlaces(const DtrSet& set, const SparseScene& sparse, con
   for (const SparseObservation& o : sparse.observations) {
     seen[static_cast<size_t>(o.view)].push_back(o.point);
   }
-  std::map<std::string, std::pair<size_t, size_t>> first_of;  // instant -> view, camera
-  Check check{"rig_places_px", std::numeric_limits<double>::quiet_NaN(), kMostPlacesPx, false, ""};
+  std::map<std::string, std::pair<size_t, size_t>> first_of;  // time step -> view, camera
+  Check check{"rig_places_px", std::numeric_limits<double>::quiet_NaN(), kMaxPlacesPx, false, ""};
   std::string worst;
   int pairs = 0;
   for (size_t i = 0; i < views.size(); ++i) {
@@ -232,8 +232,8 @@ std::optional<Check> RigPlaces(const DtrSet& set, const SparseScene& sparse, con
   }
   if (pairs == 0) return std::nullopt;
   check.passed = check.value <= check.limit;
-  check.reason = fmt::format("{} views held against {}; the farthest from its place is {}", pairs,
-                             rig.file, worst);
+  check.reason = fmt::format("{} views compared with {}; the farthest from its position is {}",
+                             pairs, rig.file, worst);
   return check;
 }
 

@@ -27,9 +27,9 @@ struct SetRig {
 /// Error where it is broken or holds a single camera.
 SetRig ReadSetRig(const std::filesystem::path& file);
 
-/// Which camera took each photo and at which instant, by name (rig_names.h). Throws Error naming
+/// Which camera took each photo and at which time step, by name (rig_names.h). Throws Error naming
 /// the first photo that no camera of the rig took or that is not of its camera's size, and where no
-/// instant was seen by two cameras that stand apart.
+/// time step was seen by two cameras that stand apart.
 std::map<std::string, calib::RigPhoto> PhotosOfRig(const SetRig& rig,
                                                    const capture::Capture& capture);
 
@@ -48,10 +48,10 @@ std::string PlaceByRig(const SetRig& rig, const capture::Capture& capture, calib
 /// where it is broken.
 std::optional<SetRig> RigOfSet(const DtrSet& set);
 
-/// `rig_places_px`: do the set's cameras stand to each other as the rig's do? Of every instant, the
-/// points of a view, moved along when the rig's place (in the set's unit) relative to the instant's
-/// first view replaces its own, in RMS pixels; the worst view. Views without observations are left
-/// out; empty where no instant has two others, as after views were pruned.
+/// `rig_places_px`: do the set's cameras stand to each other as the rig's do? Of every time step,
+/// the points of a view, moved along when the rig's place (in the set's unit) relative to the time
+/// step's first view replaces its own, in RMS pixels; the worst view. Views without observations
+/// are left out; empty where no time step has two others, as after views were pruned.
 std::optional<Check> RigPlaces(const DtrSet& set, const SparseScene& sparse, const SetRig& rig);
 
 }  // namespace dtr::pipeline

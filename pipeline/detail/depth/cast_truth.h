@@ -18,7 +18,7 @@ struct ViewTruth {
   Mask scored;
 };
 
-/// A scene whose truth can be cast anew: never resampled, so nothing is invented at silhouettes.
+/// A scene whose truth can be cast again: never resampled, so nothing is invented at silhouettes.
 class CastTruth {
  public:
   /// Empty unless `folder` has a dataset.json. `list` is its cameras.json. Throws Error when it is

@@ -49,10 +49,11 @@ std::unique_ptr<stereo::Engine> MakeColmapEngine(const fs::path& given, const De
       given.empty() ? Eigen::Vector3d::Zero().eval() : Eigen::Vector3d(of.world_origin);
   auto engine = std::make_unique<stereo::ColmapEngine>(workspace, names, of.stereo, world_origin);
   if (engine->photometric_maps() > 0) {
-    progress.Note(fmt::format(
-        "colmap: {} of {} depth maps are photometric, not held to each other by COLMAP: their "
-        "geometric ones are not there",
-        engine->photometric_maps(), names.size()));
+    progress.Note(
+        fmt::format("colmap: {} of {} depth maps are photometric, not checked against each other "
+                    "by COLMAP: their "
+                    "geometric ones are not there",
+                    engine->photometric_maps(), names.size()));
   }
   return engine;
 }

@@ -23,7 +23,7 @@ struct DepthSources {
   std::filesystem::path work_folder;  ///< for files an engine leaves
 };
 
-/// Refuses, before anything costs time, a choice that cannot be carried out on this machine:
+/// Rejects, before anything costs time, a choice that cannot be carried out on this machine:
 /// UsageError for a workspace without engine `colmap` or a time budget without `patchmatch`; Error
 /// when `colmap` shall compute and has no CUDA.
 void RequireEngine(const DepthChoice& choice);

@@ -29,7 +29,7 @@ double RoundingInSigmas(const View& view) {
 
 void ChooseDepthCoding(View& view) {
   if (view.depth_coding != DepthCoding::kPng16InverseDepth) return;
-  if (RoundingInSigmas(view) > kMostRoundingInSigmas) view.depth_coding = DepthCoding::kExrFloat;
+  if (RoundingInSigmas(view) > kMaxRoundingInSigmas) view.depth_coding = DepthCoding::kExrFloat;
 }
 
 std::string SayDepthCodings(const std::vector<View>& views) {

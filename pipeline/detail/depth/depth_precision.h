@@ -13,7 +13,7 @@ namespace dtr::pipeline {
 double RoundingInSigmas(const View& view);
 
 /// What rounding may be: it raises no more than a tenth of the pixels' deviations by over 0.5 %.
-inline constexpr double kMostRoundingInSigmas = 0.1;
+inline constexpr double kMaxRoundingInSigmas = 0.1;
 
 /// Sets the coding of a view with depth: png16-inverse where 16 bits hold, else exr-float.
 void ChooseDepthCoding(View& view);

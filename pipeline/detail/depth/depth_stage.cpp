@@ -54,21 +54,20 @@ void ComputeWithin(const std::optional<double>& memory_gb, stereo::DepthMapsOpti
     compute();
   } catch (const stereo::NotEnoughMemory& error) {
     // Rounded up, so that the number printed works when it is given.
-    const double least_gb =
-        std::ceil(1e3 * static_cast<double>(error.least_bytes() + kProgramBytes) /
-                  kBytesPerGigabyte) /
-        1e3;
+    const double min_gb = std::ceil(1e3 * static_cast<double>(error.min_bytes() + kProgramBytes) /
+                                    kBytesPerGigabyte) /
+                          1e3;
     if (memory_gb) {
       throw UsageError(fmt::format(
           "--memory {}: expected at least {:.3f} (GB) for a view with its neighbours; give as "
           "much, fewer --neighbours or smaller images",
-          *memory_gb, least_gb));
+          *memory_gb, min_gb));
     }
     progress.Note(
         fmt::format("depth takes {:.3f} GB of memory: what a view with its neighbours "
                     "needs",
-                    least_gb));
-    options.memory_bytes = error.least_bytes();
+                    min_gb));
+    options.memory_bytes = error.min_bytes();
     compute();
   }
 }
@@ -207,7 +206,7 @@ stereo::Effort DepthStage(DtrSet& set, const SparseScene& sparse, const DepthCho
                                     : asked;
   if (!options.normals.empty() && (choice.engine != "patchmatch" || effort.rounds == 0)) {
     throw UsageError(
-        "--normals: expected --engine patchmatch with one round or more, whose planes they are of");
+        "--normals: expected --engine patchmatch with one pass or more, whose planes they are of");
   }
   const auto engine = MakeDepthEngine(choice, effort,
                                       {views, sources.indices, sources.stereo, &scene,

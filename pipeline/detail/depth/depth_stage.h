@@ -24,7 +24,7 @@ struct DepthStageOptions {
 void StoreImage(View& view, LengthUnit unit, io::SetWriter& writer);
 
 /// Computes the depth of every source view with the engine chosen ("none": none, all holes are
-/// refused later by renderers) and writes it through `writer`, which has the views' images
+/// rejected later by renderers) and writes it through `writer`, which has the views' images
 /// (StoreImage). Views finished by an earlier, interrupted run are taken from the writer. Only
 /// source views and the points they alone know reach the engine. Pixels are in memory only as long
 /// as they are worked with, within the memory chosen: UsageError when that is too little. Returns

@@ -12,8 +12,8 @@
 namespace dtr::pipeline {
 namespace {
 
-constexpr size_t kMostCandidates = 2'000'000;  // 48 MB
-constexpr double kSameDepth = 0.02;            // relative; what depth maps of one scene differ by
+constexpr size_t kMaxCandidates = 2'000'000;  // 48 MB
+constexpr double kSameDepth = 0.02;           // relative; what depth maps of one scene differ by
 
 View WithDepth(const std::filesystem::path& folder, View view, int threads) {
   io::LoadOptions load;
@@ -49,7 +49,7 @@ int StepFor(const DtrSet& set) {
     pixels += double(view.camera.width_px()) * view.camera.height_px() / view.depth_scale /
               view.depth_scale;
   }
-  return std::max(1, static_cast<int>(std::ceil(std::sqrt(pixels / kMostCandidates))));
+  return std::max(1, static_cast<int>(std::ceil(std::sqrt(pixels / kMaxCandidates))));
 }
 
 // The first point of every voxel with that side.
@@ -115,7 +115,7 @@ SparseScene PointsFromDepth(const std::filesystem::path& folder, const DtrSet& s
     if (view.depth_file) AddCandidates(WithDepth(folder, view, threads), step, points);
     progress.Update(++done);
   }
-  points = Thinned(std::move(points), options.most_points);
+  points = Thinned(std::move(points), options.max_points);
   SparseScene all;
   for (const Eigen::Vector3d& point : points) all.points.push_back({point});
   std::vector<bool> is_source;

@@ -163,13 +163,13 @@ stereo::Effort EffortWithinBudget(const stereo::Collection& c, const DepthChoice
     effort = PickEffort(*costs, choice, c.views);
     const double expected_s = PredictSeconds(*costs, effort, c.views);
     progress.Note(fmt::format(
-        "time budget {} s: {} neighbours, {} in {} rounds, {} iterations; expected {:.1f} s{}",
+        "time budget {} s: {} neighbours, {} in {} passes, {} iterations; expected {:.1f} s{}",
         *choice.time_budget_s, effort.neighbours, effort.round_neighbours, effort.rounds,
         effort.iterations, expected_s,
         expected_s > *choice.time_budget_s ? ", MORE than the budget: nothing cheaper is left"
                                            : ""));
   } else {
-    progress.Note("time budget: no view has a usable pair to try; the least effort is taken");
+    progress.Note("time budget: no view has a usable pair to try; the lowest settings are used");
   }
   WriteFileAtomically(record, SettingsJson("patchmatch", effort).dump());
   return effort;

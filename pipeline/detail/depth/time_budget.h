@@ -13,7 +13,7 @@ namespace dtr::pipeline {
 
 /// What work costs here and now, wall-clock seconds per pixel of a view. Measured at full effort of
 /// one kind, from which other efforts follow: the search costs in proportion to its neighbours and
-/// its visits per pixel, a round and the verdict in proportion to theirs.
+/// its visits per pixel, a round and the validation result in proportion to theirs.
 struct ProbedCosts {
   double search_s = 0;   ///< per pixel, neighbour and visit
   double round_s = 0;    ///< per pixel and neighbour
@@ -34,8 +34,8 @@ double PredictSeconds(const ProbedCosts& costs, const stereo::Effort& effort,
 /// The efforts a budget chooses among, cheapest first; presets are among them.
 std::span<const stereo::Effort> EffortLadder();
 
-/// The dearest effort of the ladder that should fit into the budget, else the cheapest; what the
-/// choice gives explicitly stays.
+/// The most expensive effort of the ladder that should fit into the budget, else the cheapest; what
+/// the choice gives explicitly stays.
 stereo::Effort PickEffort(const ProbedCosts& costs, const DepthChoice& choice,
                           std::span<const stereo::StereoView> views);
 

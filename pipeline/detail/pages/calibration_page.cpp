@@ -23,9 +23,9 @@ void AddCameraTable(report::HtmlReport& page, const calib::JudgeReport& judged) 
   std::vector<std::vector<report::Cell>> rows;
   for (const calib::JudgedCamera& camera : judged.cameras) {
     for (const auto& [what, stats] :
-         {std::pair{judged.unseen ? "unseen, boards refitted" : "kept, boards refitted",
+         {std::pair{judged.unseen ? "held out, boards refitted" : "stored, boards refitted",
                     &camera.stored},
-          std::pair{"kept, held out", &camera.held_out}}) {
+          std::pair{"stored, held out", &camera.held_out}}) {
       if (stats->count == 0) continue;
       rows.push_back({camera.name, std::string(what), std::to_string(stats->count),
                       FixedPx(stats->rms_px), FixedPx(stats->median_px), FixedPx(stats->p95_px),

@@ -15,7 +15,7 @@ namespace dtr::pipeline {
 namespace {
 
 constexpr int kThumbnailPx = 192;
-constexpr int kWidestSheet = 12;  // pictures in a row
+constexpr int kWidestSheet = 12;  // images in a row
 
 using Rows = std::vector<std::vector<report::Cell>>;
 

@@ -111,7 +111,7 @@ void AddMap(report::HtmlReport& page, const std::string& what, const std::string
   const std::string least =
       shade.darkest() == shade.least()
           ? ""
-          : fmt::format("{}; the least is {:.3g}{}",
+          : fmt::format("{}; the smallest is {:.3g}{}",
                         shade.darkest() > shade.least() ? " with all below" : "", shade.least(),
                         unit);
   page.Svg(fmt::format("{}: {:.3g}{} (dark{}) to {:.3g}{} (bright){}, median {:.3g}{}{}", what,

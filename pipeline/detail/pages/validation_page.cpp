@@ -21,9 +21,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr size_t kWorstShownViews = 4;
-constexpr size_t kMostDrawn = 1500, kMostOfView = 500;  // arrows of a plot; more is a blot
-constexpr int kCoverageColumns = 24;                    // of a map that counts
-constexpr int kPlacedColumns = 12;                      // of a map with some 40 points per view
+constexpr size_t kMaxDrawn = 1500, kMaxOfView = 500;  // arrows of a plot; more is a blot
+constexpr int kCoverageColumns = 24;                  // of a map that counts
+constexpr int kPlacedColumns = 12;                    // of a map with some 40 points per view
 constexpr int kPhotoSidePx = 720;
 
 // Views of one size of image, as indices.
@@ -61,7 +61,7 @@ void AddViewTable(report::HtmlReport& page, const std::vector<View>& views,
              rows);
   if (!report.kept_apart.empty()) {
     page.Paragraph(fmt::format(
-        "Held out without observations, so not tested here; dtr evaluate judges the set by them: "
+        "Held out without observations, so not tested here; dtr evaluate measures the set by them: "
         "{}.",
         fmt::join(report.kept_apart, ", ")));
   }
@@ -136,7 +136,7 @@ void AddImager(report::HtmlReport& page, const PlotSize& size,
       residuals.push_back(arrow.residual_px);
     }
   }
-  const std::vector<calib::ResidualArrow> arrows = Thinned(all, kMostDrawn);
+  const std::vector<calib::ResidualArrow> arrows = Thinned(all, kMaxDrawn);
   page.Section(fmt::format("All views of {} x {} px together ({})", size.width_px, size.height_px,
                            views.size()));
   if (arrows.empty()) {
@@ -151,10 +151,11 @@ void AddImager(report::HtmlReport& page, const PlotSize& size,
                   arrows.size(), gain),
       ImagePlot(size, Arrows(size, arrows, gain)));
   AddMap(page, "Coverage: tested observations per cell", "", size, Coverage(size, report, views));
-  AddMap(page,
-         "Uncertainty: standard deviation of where two other views place a view's points, for the "
-         "calibration's sake alone",
-         " px", size, PlacedMap(size, report, views));
+  AddMap(
+      page,
+      "Uncertainty: standard deviation of where two other views position a view's points, for the "
+      "calibration's sake alone",
+      " px", size, PlacedMap(size, report, views));
 }
 
 void AddWorstViews(report::HtmlReport& page, const fs::path& folder, const std::vector<View>& views,
@@ -183,7 +184,7 @@ void AddWorstViews(report::HtmlReport& page, const fs::path& folder, const std::
                          camera.name, camera.held_out.rms_px, camera.held_out.worst_px,
                          camera.held_out.count, gain),
              ImagePlot(size, PhotoBehind(size, report::Shrink(view.image, kPhotoSidePx)) +
-                                 Arrows(size, Thinned(camera.arrows, kMostOfView), gain)));
+                                 Arrows(size, Thinned(camera.arrows, kMaxOfView), gain)));
   }
 }
 
@@ -198,7 +199,7 @@ std::string ValidationPage(const fs::path& folder, const DtrSet& set,
   page.Section("Can the calibration be trusted?");
   report::AddChecks(page, report.tests);
   if (!report.not_judged.empty()) {
-    page.Paragraph("Not judged by a fresh bundle adjustment: " + report.not_judged);
+    page.Paragraph("Not validated by a fresh bundle adjustment: " + report.not_judged);
   }
   AddViewTable(page, views, report);
   page.Section("Residuals by region of the image, all views");

@@ -120,7 +120,7 @@ PhotoRefinement RefineSfm(const SfmRun& run, colmap::SfmResult& sfm, Progress& p
     const double focal_px = sfm.model.cameras.begin()->second.params.front();
     return report(taken, {{"exif_px", focal_px}, {"taken", "exif"}},
                   fmt::format("focal length: COLMAP made a model only with EXIF's {:.0f} px; {}",
-                              focal_px, taken.fixed ? "it is held" : "adjusted afterwards"));
+                              focal_px, taken.fixed ? "it is fixed" : "adjusted afterwards"));
   }
   const auto contradiction = ContradictsExif(sfm.model, run.inputs);
   if (!contradiction) return as_found();
@@ -158,13 +158,13 @@ PhotoRefinement RefineSfm(const SfmRun& run, colmap::SfmResult& sfm, Progress& p
     sfm.model = std::move(fixed_sfm->model);
     return report(exif, json,
                   Line(*contradiction, exif, &found) + "; " +
-                      (exif.fixed ? "EXIF's is held" : "EXIF's is taken and adjusted"));
+                      (exif.fixed ? "EXIF's is used" : "EXIF's is taken and adjusted"));
   }
   json["taken"] = "exif";
   sfm.model = std::move(fixed_sfm->model);
   return report(exif, json,
                 Line(*contradiction, exif, nullptr) + "the observations do not determine it; " +
-                    (exif.fixed ? "EXIF's is held" : "EXIF's is taken and adjusted"));
+                    (exif.fixed ? "EXIF's is used" : "EXIF's is taken and adjusted"));
 }
 
 }  // namespace dtr::pipeline

@@ -52,7 +52,7 @@ PhotoGrid GridOfModel(const fs::path& model_folder) {
 
 void MarkUpright(const fs::path& model_folder) {
   WriteFileAtomically(model_folder / kMark,
-                      "The cameras of this model are of photos turned upright by their EXIF "
+                      "The cameras of this model are of photos rotated upright by their EXIF "
                       "orientation.\n");
 }
 
@@ -68,7 +68,7 @@ void TakePhotosAsCamerasDo(const fs::path& poses, capture::Capture& photos, Prog
     if (photo.exif_orientation == 1 || camera == sizes.by_name.end()) continue;
     const auto grid = GridOfSize(camera->second.first, camera->second.second,
                                  capture::StoredSizeOf(photo), sizes.convention);
-    if (!grid) continue;  // refused by its size when it is read
+    if (!grid) continue;  // rejected by its size when it is read
     if (*grid == PhotoGrid::kUpright) {
       if (turned++ == 0) first_turned = photo.name;
     } else {
@@ -84,7 +84,7 @@ void TakePhotosAsCamerasDo(const fs::path& poses, capture::Capture& photos, Prog
   }
   if (turned > 0) {
     progress.Note(fmt::format(
-        "{} photos, first {}: turned by their EXIF orientation, as their cameras describe them",
+        "{} photos, first {}: rotated by their EXIF orientation, as their cameras describe them",
         turned, first_turned));
   }
 }

@@ -17,7 +17,8 @@ namespace fs = std::filesystem;
 /// Times as far from the middle as half of the places are: a long walk's ends lie within.
 constexpr double kFarFromMiddle = 4;
 
-void Add(const std::string& name, const std::optional<io::GpsPosition>& gps, PhotoPlaces& places) {
+void Add(const std::string& name, const std::optional<io::GpsPosition>& gps,
+         PhotoPositions& places) {
   if (!gps || !gps->altitude_m) {
     places.without_place.push_back((gps ? "without altitude: " : "without GPS: ") + name);
     return;
@@ -34,7 +35,7 @@ Eigen::Vector3d OnEarth(const io::GpsPosition& p) {
 
 // A photo without a fix may say latitude 0, longitude 0: east, north and up there are other axes.
 // The middle is that of most photos, whatever some say.
-size_t PhotoPlaces::Origin() const {
+size_t PhotoPositions::Origin() const {
   std::vector<Eigen::Vector3d> on_earth;
   for (const io::GpsPosition& place : places) on_earth.push_back(OnEarth(place));
   Eigen::Vector3d middle;
@@ -52,7 +53,7 @@ size_t PhotoPlaces::Origin() const {
   return static_cast<size_t>(first - off_m.begin());
 }
 
-std::vector<Eigen::Vector3d> PhotoPlaces::EastNorthUp() const {
+std::vector<Eigen::Vector3d> PhotoPositions::EastNorthUp() const {
   std::vector<Eigen::Vector3d> positions_m;
   if (places.empty()) return positions_m;
   const io::GpsPosition& origin = places[Origin()];
@@ -63,11 +64,11 @@ std::vector<Eigen::Vector3d> PhotoPlaces::EastNorthUp() const {
   return positions_m;
 }
 
-std::string PhotoPlaces::AxesLine() const {
-  return fmt::format("axes: x east, y north, z up, from the place of {}", names[Origin()]);
+std::string PhotoPositions::AxesLine() const {
+  return fmt::format("axes: x east, y north, z up, from the position of {}", names[Origin()]);
 }
 
-std::string PhotoPlaces::OriginJson() const {
+std::string PhotoPositions::OriginJson() const {
   const io::GpsPosition& origin = places[Origin()];
   return nlohmann::ordered_json{{"latitude_deg", origin.latitude_deg},
                                 {"longitude_deg", origin.longitude_deg},
@@ -75,8 +76,8 @@ std::string PhotoPlaces::OriginJson() const {
       .dump();
 }
 
-PhotoPlaces ReadPhotoPlaces(const fs::path& folder, const std::vector<std::string>& names) {
-  PhotoPlaces places;
+PhotoPositions ReadPhotoPositions(const fs::path& folder, const std::vector<std::string>& names) {
+  PhotoPositions places;
   for (const std::string& name : names) {
     const fs::path photo = folder / name;
     if (fs::is_regular_file(photo)) {
@@ -88,8 +89,9 @@ PhotoPlaces ReadPhotoPlaces(const fs::path& folder, const std::vector<std::strin
   return places;
 }
 
-PhotoPlaces PhotoPlacesOf(const capture::Capture& capture, const std::vector<std::string>& names) {
-  PhotoPlaces places;
+PhotoPositions PhotoPositionsOf(const capture::Capture& capture,
+                                const std::vector<std::string>& names) {
+  PhotoPositions places;
   for (const std::string& name : names) {
     const auto photo = std::find_if(capture.photos.begin(), capture.photos.end(),
                                     [&](const capture::Photo& p) { return p.name == name; });
@@ -98,12 +100,13 @@ PhotoPlaces PhotoPlacesOf(const capture::Capture& capture, const std::vector<std
   return places;
 }
 
-void RequirePlaces(const PhotoPlaces& places, const std::string& where, const std::string& whose) {
-  if (places.places.size() >= calib::kFewestPositions) return;
+void RequirePlaces(const PhotoPositions& places, const std::string& where,
+                   const std::string& whose) {
+  if (places.places.size() >= calib::kMinPositions) return;
   throw Error(
       fmt::format("{}: expected at least {} photos of {} with latitude, longitude and altitude, "
                   "found {}",
-                  where, calib::kFewestPositions, whose, places.places.size()));
+                  where, calib::kMinPositions, whose, places.places.size()));
 }
 
 }  // namespace dtr::pipeline

@@ -1,4 +1,4 @@
-// pipeline/detail/photos/photo_places.h -- where photos say that they were taken.
+// pipeline/detail/photos/photo_positions.h -- where photos say that they were taken.
 #pragma once
 #include <Eigen/Core>
 #include <filesystem>
@@ -11,7 +11,7 @@
 namespace dtr::pipeline {
 
 /// Photos with latitude, longitude and altitude in their EXIF.
-struct PhotoPlaces {
+struct PhotoPositions {
   std::vector<std::string> names;
   std::vector<io::GpsPosition> places;     ///< of these; each has an altitude
   std::vector<std::string> without_place;  ///< lines that name the others, with what is missing
@@ -27,14 +27,16 @@ struct PhotoPlaces {
 };
 
 /// Of the files of these names below `folder`. Throws Error where one is there and no image.
-PhotoPlaces ReadPhotoPlaces(const std::filesystem::path& folder,
-                            const std::vector<std::string>& names);
+PhotoPositions ReadPhotoPositions(const std::filesystem::path& folder,
+                                  const std::vector<std::string>& names);
 
 /// Of the photos of these names: what was read when they were taken in.
-PhotoPlaces PhotoPlacesOf(const capture::Capture& capture, const std::vector<std::string>& names);
+PhotoPositions PhotoPositionsOf(const capture::Capture& capture,
+                                const std::vector<std::string>& names);
 
 /// Throws Error with fewer places than a similarity can be told from (calib/scale.h). `where`: the
 /// folder; `whose`: "the set", "the model".
-void RequirePlaces(const PhotoPlaces& places, const std::string& where, const std::string& whose);
+void RequirePlaces(const PhotoPositions& places, const std::string& where,
+                   const std::string& whose);
 
 }  // namespace dtr::pipeline

@@ -1,8 +1,8 @@
 #include "pipeline/detail/render/dynamic_scene.h"
 
 #include "dtr/io/set_io.h"
-#include "dtr/render/instants.h"
 #include "dtr/render/scene.h"
+#include "dtr/render/time_steps.h"
 #include "dtr/render/view_stream.h"
 #include "pipeline/view_names.h"
 

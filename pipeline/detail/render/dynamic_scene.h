@@ -1,4 +1,4 @@
-// pipeline/detail/render/dynamic_scene.h -- the frames of a set, one at a time, to draw pictures
+// pipeline/detail/render/dynamic_scene.h -- the frames of a set, one at a time, to draw images
 // from.
 #pragma once
 #include <filesystem>

@@ -61,7 +61,7 @@ std::vector<NovelFrame> FromFile(const DtrSet& set, const std::filesystem::path&
         {std::filesystem::path(named.name).stem().string(), named.camera, cam_from_world});
   }
   if (cameras.empty()) throw Error(file.string() + ": expected at least one camera, found none");
-  // Two cameras of one stem (left/0.jpg, right/0.jpg) must not overwrite each other's pictures.
+  // Two cameras of one stem (left/0.jpg, right/0.jpg) must not overwrite each other's images.
   std::set<std::string> stems;
   for (const NovelFrame& frame : cameras) stems.insert(frame.name);
   if (stems.size() < cameras.size()) {

@@ -42,7 +42,7 @@ void RequireOptions(const BuildOptions& options) {
   }
   if (options.rig.empty()) return;
   if (!options.poses.empty()) {
-    throw UsageError("--rig: places what SfM finds; expected no --poses beside it");
+    throw UsageError("--rig: positions what SfM finds; expected no --poses beside it");
   }
   if (!options.refine) {
     throw UsageError("--rig: is bundle adjustment; expected no --no-refine beside it");
@@ -50,11 +50,11 @@ void RequireOptions(const BuildOptions& options) {
   if (!from_video) return;
   if (!options.video.synchronised) {
     throw UsageError(
-        "--rig: needs frames of the same instants; expected --synchronised for videos");
+        "--rig: needs frames taken at the same times; expected --synchronised for videos");
   }
   if (std::filesystem::exists(options.photos / "timestamps.csv")) {
     throw UsageError(fmt::format(
-        "--rig {}: expected videos whose frames of equal number are of one instant, found {}, "
+        "--rig {}: expected videos whose frames of equal number are taken at one time, found {}, "
         "which says which are; give photos, one folder per camera, of equal names",
         options.rig.string(), (options.photos / "timestamps.csv").string()));
   }

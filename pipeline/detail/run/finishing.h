@@ -15,7 +15,7 @@ namespace dtr::pipeline {
 void FinishScene(DtrSet& set, std::span<const SparsePoint> points, const io::SetWriter& writer,
                  int threads, Progress& progress);
 
-/// Stores the depth of every source view anew as zstd-inverse, with 1/z off by at most `error_px`
+/// Stores the depth of every source view again as zstd-inverse, with 1/z off by at most `error_px`
 /// pixels of disparity from what the stereo engine gave. After FinishScene: pixels of disparity
 /// need the baselines. Maps in memory at a time take at most `memory_gb` (GB of 1e9 bytes). Throws
 /// Error where 16 bits cannot keep the bound.

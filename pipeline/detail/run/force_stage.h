@@ -10,7 +10,7 @@ namespace dtr::pipeline {
 std::vector<std::string> StagesKept();
 
 /// Removes what the stage `name` and all after it left in the partial set `folder` (io::SetWriter),
-/// so that the run does them anew. Throws UsageError for a name not in StagesKept, Error when a
+/// so that the run does them again. Throws UsageError for a name not in StagesKept, Error when a
 /// file cannot be removed.
 void ForgetStage(const std::filesystem::path& folder, const std::string& name);
 

@@ -15,12 +15,12 @@ using Json = nlohmann::ordered_json;
 PruneJournal::PruneJournal(const std::filesystem::path& file) : file_(file) {
   std::uintmax_t whole = 0;
   if (std::ifstream in(file); in) {
-    constexpr std::uintmax_t kMostBytes = 256 << 20;  // of a day's measurements thousands
-    if (std::filesystem::file_size(file) > kMostBytes) {
+    constexpr std::uintmax_t kMaxBytes = 256 << 20;  // of a day's measurements thousands
+    if (std::filesystem::file_size(file) > kMaxBytes) {
       throw Error(
           fmt::format("{}: expected at most {} MiB of measurements, found {} MiB; delete the "
                       "folder to start over",
-                      file.string(), kMostBytes >> 20, std::filesystem::file_size(file) >> 20));
+                      file.string(), kMaxBytes >> 20, std::filesystem::file_size(file) >> 20));
     }
     std::string line;
     while (std::getline(in, line) && !in.eof()) {  // at its end: the line has none

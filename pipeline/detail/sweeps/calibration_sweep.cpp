@@ -26,8 +26,8 @@ namespace fs = std::filesystem;
 
 enum CalibrationAxis : size_t { kFeatureSize, kFeatures, kMatching, kLensModel, kRefine };
 constexpr const char *kYes = "yes", *kNo = "no";
-// Scale of the loss over the photos' long side: half a pixel of 1000, about what sights err by, so
-// that wrong ones, which err the same by any cameras, do not hide what the cameras do.
+// Scale of the loss over the photos' long side: half a pixel of 1000, about what observations err
+// by, so that wrong ones, which err the same by any cameras, do not hide what the cameras do.
 constexpr double kLossShare = 0.0005;
 constexpr double kExact = 1e-9;  // px; what stands for 0 on a logarithmic axis
 
@@ -55,19 +55,19 @@ void RequirePhotosOfTheSet(const CalibrationSweepOptions& options,
   }
 }
 
-std::vector<calib::Track> YardstickOf(const capture::Capture& photos, const fs::path& folder,
-                                      int threads, Progress& progress) {
+std::vector<calib::Track> ReferenceTracksOf(const capture::Capture& photos, const fs::path& folder,
+                                            int threads, Progress& progress) {
   const auto read = [&](int i) {
     const capture::Photo& photo = photos.photos[static_cast<size_t>(i)];
     capture::PhotoPixels pixels = capture::ReadPhotoAndMask(photo);
-    return calib::YardstickPhoto{std::move(pixels.image), std::move(pixels.mask)};
+    return calib::ReferenceTracksPhoto{std::move(pixels.image), std::move(pixels.mask)};
   };
   auto tracks = calib::FindTracks(static_cast<int>(photos.photos.size()), read, threads, progress);
-  if (tracks.size() < calib::kFewestHeldOut) {
+  if (tracks.size() < calib::kMinHeldOut) {
     throw Error(fmt::format(
-        "--photos {}: expected {} points that {} or more photos show, to judge cameras by, found "
+        "--photos {}: expected {} points that {} or more photos show, to measure cameras by, found "
         "{}; take photos that overlap more",
-        folder.string(), calib::kFewestHeldOut, calib::kFewestSights, tracks.size()));
+        folder.string(), calib::kMinHeldOut, calib::kFewestSights, tracks.size()));
   }
   return tracks;
 }
@@ -105,7 +105,7 @@ CalibrationSweep::CalibrationSweep(CalibrationSweepOptions options, Progress& pr
     longest = std::max({longest, photo.width_px, photo.height_px});
   }
   RequirePhotosOfTheSet(options_, names_);
-  tracks_ = YardstickOf(photos_, options_.photos, options_.threads, progress_);
+  tracks_ = ReferenceTracksOf(photos_, options_.photos, options_.threads, progress_);
   loss_scale_px_ = kLossShare * longest;
   axes_ = {{"feature-size",
             SizeValues(options_.feature_sizes_px, FeatureImageSizePx(sizes_px, kDefaultMemoryGb))},
@@ -152,13 +152,13 @@ eval::SweepMeasurement CalibrationSweep::Measure(const eval::SweepSetting& setti
                   calibrated.engine_cpu_s + calibrated.kept_refinement_cpu_s;
   measured.cost_least = measured.cost_most = measured.cost;
 
-  const calib::YardstickScore score =
+  const calib::ReferenceTracksScore score =
       calib::ScoreCameras(calibrated.model, names_, tracks_, loss_scale_px_, options_.threads);
   measured.error = std::max(score.error_px, kExact);
   measured.figures = {{"not_registered", static_cast<double>(calibrated.not_registered.size())},
                       {"points", static_cast<double>(calibrated.model.points.size())},
                       {"yardstick_sights", score.sights},
-                      {"yardstick_predicted", score.predicted},
+                      {"reference_tracks_predicted", score.predicted},
                       {"median_px", score.median_px}};
   return measured;
 }
@@ -169,8 +169,9 @@ std::string CalibrationSweep::Identity() const {
 
 std::string CalibrationSweep::Conditions() const {
   return fmt::format(
-      "{} photos, one calibration of each setting; judged by {} points that structure from motion "
-      "knows nothing of, every sight of them held out in turn",
+      "{} photos, one calibration of each setting; measured by {} points that structure from "
+      "motion "
+      "knows nothing of, every observation of them held out in turn",
       names_.size(), tracks_.size());
 }
 

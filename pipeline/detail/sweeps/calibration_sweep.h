@@ -1,6 +1,6 @@
 // pipeline/detail/sweeps/calibration_sweep.h -- the calibration of a set's photos as a stage to
 // sweep: what structure from motion may be told, by what it takes and how well its cameras predict
-// sights that they were not adjusted to.
+// observations that they were not adjusted to.
 #pragma once
 #include <cstdint>
 #include <filesystem>
@@ -30,18 +30,20 @@ struct CalibrationSweepOptions {
 
 /// Cost: processor seconds of the stage `calibration` of `dtr build`, COLMAP's included; those of
 /// runs that lie in the workspace are the ones it recorded. Error: px of the whole photo, root mean
-/// of Cauchy's loss over the sights of one yardstick (calib/yardstick), each held out in turn; a
-/// sight that a setting's cameras cannot predict, for want of a camera, counts as far off. Figures:
-/// `not_registered`, `points`, `yardstick_sights`, `yardstick_predicted`, `median_px`.
+/// of Cauchy's loss over the observations of one reference tracks (calib/reference tracks), each
+/// held out in turn; a observation that a setting's cameras cannot predict, for want of a camera,
+/// counts as far off. Figures: `not_registered`, `points`, `yardstick_sights`,
+/// `reference_tracks_predicted`, `median_px`.
 class CalibrationSweep {
  public:
-  /// Reads the photos and finds the yardstick. Throws UsageError for a folder without photos, Error
-  /// for photos of another set, for such as share too little to judge by, and without COLMAP.
+  /// Reads the photos and finds the reference tracks. Throws UsageError for a folder without
+  /// photos, Error for photos of another set, for such as share too little to judge by, and without
+  /// COLMAP.
   CalibrationSweep(CalibrationSweepOptions options, Progress& progress);
   eval::SweepStage Stage() const;  ///< its functions borrow this object
   /// What decides the results beside the settings: photos, COLMAP.
   std::string Identity() const;
-  /// For people: what the yardstick is.
+  /// For people: what the reference tracks is.
   std::string Conditions() const;
 
  private:

@@ -37,7 +37,7 @@ void JudgePictures(const DtrSet& set, const RenderOptions& render,
   evaluate.render = render;
   evaluate.leave_one_out = std::none_of(
       views.begin(), views.end(), [](const View& view) { return view.role == ViewRole::kHeldOut; });
-  SilentProgress silent;  // the sweep counts points, not pictures
+  SilentProgress silent;  // the sweep counts points, not images
   const eval::ViewScore mean = eval::EvaluateHeldOut(set, evaluate, renderer, silent).mean;
   if (!mean.psnr_db) throw Error("bench: no photo has a pixel to compare with");
   measured.psnr_db = mean.psnr_db;

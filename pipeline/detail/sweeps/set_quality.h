@@ -1,4 +1,4 @@
-// pipeline/detail/sweeps/set_quality.h -- what a finished set is worth in pictures, for sweeps.
+// pipeline/detail/sweeps/set_quality.h -- what a finished set is worth in images, for sweeps.
 #pragma once
 #include <filesystem>
 

@@ -1,5 +1,5 @@
 // pipeline/detail/sweeps/storage_sweep.h -- how a set lies on disk as a stage to sweep: codings of
-// depth and images, planes that can be left out, by bytes and what is lost in pictures.
+// depth and images, planes that can be left out, by bytes and what is lost in images.
 #pragma once
 #include <filesystem>
 #include <functional>
@@ -22,7 +22,7 @@ struct StorageSweepOptions {
   int threads = 0;
 };
 
-/// Cost: bytes of the source views' files. Error: RMS levels of pictures from the set read back.
+/// Cost: bytes of the source views' files. Error: RMS levels of images from the set read back.
 /// What the set has lost when it was first written stays lost. Figure `load_cpu_ms`: processor time
 /// of reading images and depth, median of three.
 class StorageSweep {

@@ -66,7 +66,7 @@ TEST(BoardText, ReadsWhatItSays) {
   EXPECT_EQ(BoardFromText(TextOf(board)), board);
 }
 
-TEST(BoardText, RefusesWhatIsNoBoard) {
+TEST(BoardText, RejectsWhatIsNoBoard) {
   for (const char* text :
        {"", "chessboard", "chessboard:9x6", "chessboard:9:1", "chessboard:1x6:1",
         "chessboard:9x6:0", "chessboard:9x6:-1", "chessboard:9x6:1km", "chessboard:9x6:1:2",
@@ -101,7 +101,7 @@ TEST(DetectBoard, CharucoCornersAreWhereTheyAreWholePartlyAndInverted) {
   for (const bool inverted : {false, true}) {
     Board board = kCharuco;
     board.inverted = inverted;
-    for (const double aside : {0.0, 0.15}) {  // partly out of the picture
+    for (const double aside : {0.0, 0.15}) {  // partly out of the image
       Pose pose = Tilted(kCharuco, 0.4, 0.45);
       pose.translation.x() += aside;
       const auto grey = Photo(board, kCamera, pose, 0, 1);

@@ -1,4 +1,4 @@
-// tests/calib/boards/rendered_board.h -- pictures of boards with corners known exactly.
+// tests/calib/boards/rendered_board.h -- images of boards with corners known exactly.
 #pragma once
 #include <Eigen/Core>
 #include <Eigen/LU>

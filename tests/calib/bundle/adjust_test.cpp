@@ -64,7 +64,7 @@ double WorstDerivativeError(const ceres::CostFunction& cost,
   return worst;
 }
 
-TEST(SightCost, DerivativesAgreeWithDifferencesForEveryLens) {
+TEST(ObservationCost, DerivativesAgreeWithDifferencesForEveryLens) {
   const std::pair<LensModel, std::vector<double>> lenses[] = {
       {LensModel::kSimplePinhole, {900, 500, 400}},
       {LensModel::kPinhole, {900, 905, 500, 400}},
@@ -87,14 +87,14 @@ TEST(SightCost, DerivativesAgreeWithDifferencesForEveryLens) {
     const PointFrame point = FrameAround(place, ArcPose(3, 5).TargetOriginInSource());
     for (const auto& [model, params] : lenses) {
       const LensFrame lens = FrameAround({model, 1000, 800, params}, 0.6);
-      const auto cost = SightCost(lens, pose, point, {480, 410});
-      const double theta[kMostParams] = {0.01, -0.02, 0.015, 0.01, 0.02, -0.01, 0.01, 0.01};
+      const auto cost = ObservationCost(lens, pose, point, {480, 410});
+      const double theta[kMaxParams] = {0.01, -0.02, 0.015, 0.01, 0.02, -0.01, 0.01, 0.01};
       const std::vector<double> motion{0.02, -0.01, 0.03, 0.05, 0.02, -0.04};
       const std::vector<double> place_shift{0.01, -0.02, 0.003};
       std::vector<std::vector<double>> blocks{{theta, theta + params.size()}, motion, place_shift};
       EXPECT_LT(WorstDerivativeError(*cost, blocks), 1e-6)
           << NameOf(model) << ", weight " << weight;
-      const auto shifted = SightCost(lens, pose, point, {480, 410}, {nullptr, 540});
+      const auto shifted = ObservationCost(lens, pose, point, {480, 410}, {nullptr, 540});
       blocks.push_back({0.01, -0.02});
       EXPECT_LT(WorstDerivativeError(*shifted, blocks), 1e-6)
           << NameOf(model) << " with a shift, weight " << weight;
@@ -102,7 +102,7 @@ TEST(SightCost, DerivativesAgreeWithDifferencesForEveryLens) {
   }
 }
 
-TEST(Adjust, ExactSightsGiveTheTruthBackFromAStartThatIsOff) {
+TEST(Adjust, ExactObservationsGiveTheTruthBackFromAStartThatIsOff) {
   const Bundle truth = MakeBundle({});
   const Adjusted out = Adjust(Perturbed(truth, 0.02), With(LensFreedom::kAll));
   EXPECT_TRUE(out.converged);
@@ -134,7 +134,7 @@ TEST(Adjust, ShiftsOfImagesAreToldFromTurns) {
   for (BundleObservation& o : start.observations) o.pixel += shift_of(o.image);
   const Adjusted out = Adjust(start, With(LensFreedom::kPrincipalPointPerImage));
   EXPECT_TRUE(out.converged);
-  EXPECT_LT(out.rms_px, 1e-4) << "exact sights; only the weak hold on the shifts is felt";
+  EXPECT_LT(out.rms_px, 1e-4) << "exact observations; only the weak hold on the shifts is felt";
   for (int i = 0; i < static_cast<int>(truth.images.size()); ++i) {
     const Eigen::Vector2d apart =
         out.bundle.images[static_cast<size_t>(i)].shift_px - out.bundle.images[0].shift_px;
@@ -148,7 +148,7 @@ TEST(Adjust, ShiftsOfImagesAreToldFromTurns) {
 TEST(Adjust, SigmaIsTheNoiseThatWasAdded) {
   const Adjusted out =
       Adjust(MakeBundle({.points = 1000, .noise_px = 0.4}), With(LensFreedom::kAll));
-  EXPECT_NEAR(out.sigma_px, 0.4, 0.4 * 0.02);  // 6000 sights and more: 1 % is one sigma
+  EXPECT_NEAR(out.sigma_px, 0.4, 0.4 * 0.02);  // 6000 observations and more: 1 % is one sigma
 }
 
 // The mean over many draws, whatever is free: every unknown is counted once.
@@ -168,7 +168,7 @@ TEST(Adjust, SigmaCountsTheUnknownsThatAreFree) {
       const Eigen::Vector3d centre =
           bundle.images[static_cast<size_t>(i)].cam_from_world.TargetOriginInSource();
       const double x = random.Normal(), y = random.Normal();
-      constexpr double kKnown = 1e-4;  // nearer than the sights say: it counts
+      constexpr double kKnown = 1e-4;  // nearer than the observations say: it counts
       known.positions.push_back({i, centre + kKnown * Eigen::Vector3d(x, y, random.Normal()),
                                  Eigen::Vector3d::Constant(kKnown)});
     }
@@ -285,7 +285,7 @@ TEST(Adjust, AKnownDistanceDecidesTheScale) {
               20.0, 1e-3);
 }
 
-TEST(Adjust, RefusesWhatCannotBeMeant) {
+TEST(Adjust, RejectsWhatCannotBeMeant) {
   Bundle bundle = MakeBundle({});
   Bundle broken = bundle;
   broken.observations[3].pixel.x() = std::nan("");

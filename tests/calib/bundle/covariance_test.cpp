@@ -25,7 +25,7 @@ SceneSpec Small(std::uint64_t seed) {
   return {.images = 5, .points = 60, .noise_px = 0.3, .seed = seed};
 }
 
-// The true scene with new noise on its sights: the start of a solve that knows its gauge.
+// The true scene with new noise on its observations: the start of a solve that knows its gauge.
 Bundle Noisy(const Bundle& truth, std::uint64_t seed) {
   Bundle bundle = truth;
   Random random(seed);

@@ -62,7 +62,7 @@ TEST(Judge, DegenerateWaysAreRecognised) {
   spec.pose = [](int i, int) { return LookAt({0, -9.0 + 0.5 * i, 0.5}, {0, 0, 0.5}); };
   EXPECT_TRUE(recognised("forward_motion"));
   spec.pose = {};
-  spec.most_sights = 2;
+  spec.max_observations = 2;
   EXPECT_TRUE(recognised("tracks_of_two"));
 }
 
@@ -70,7 +70,7 @@ TEST(Judge, OrdinaryScenesHaveNoDegeneracy) {
   const Judgement judgement = Judge(Honest(5), {});
   EXPECT_TRUE(judgement.degeneracies.empty()) << ToJson(judgement);
   EXPECT_GT(judgement.condition, 1);
-  EXPECT_LT(judgement.cameras[0].picture_shift_px, 1);
+  EXPECT_LT(judgement.cameras[0].image_shift_px, 1);
 }
 
 TEST(Judge, TheSameForAnyNumberOfThreads) {
@@ -96,7 +96,7 @@ TEST(Judge, TooFewPointsFailAndSayWhy) {
   EXPECT_TRUE(TestOf(Judge(Honest(6), {}), "photos_not_judged")->passed);
 }
 
-TEST(Judge, APhotoOfFewSightsLeavesTheHalvesToTheOthers) {
+TEST(Judge, APhotoOfFewObservationsLeavesTheHalvesToTheOthers) {
   Bundle bundle = Honest(8);
   int seen = 0;
   std::erase_if(bundle.observations,
@@ -109,13 +109,14 @@ TEST(Judge, APhotoOfFewSightsLeavesTheHalvesToTheOthers) {
   EXPECT_THAT(test->reason, ::testing::HasSubstr(bundle.images[3].name));
 }
 
-TEST(Judge, APhotoOfFewSightsAmongManyPointsKeepsThemAll) {
+TEST(Judge, APhotoOfFewObservationsAmongManyPointsKeepsThemAll) {
   Bundle bundle = MakeBundle({.images = 6, .points = 9000, .lens = kPinholeLens, .noise_px = 0.3});
   int seen = 0;
   std::erase_if(bundle.observations,
                 [&](const BundleObservation& o) { return o.image == 3 && ++seen > 40; });
   const Judgement judgement = Judge(bundle, {});
-  // Of 4000 points drawn it would have 18 sights: too few for halves, and by chance for anything.
+  // Of 4000 points drawn it would have 18 observations: too few for halves, and by chance for
+  // anything.
   EXPECT_THAT(TestOf(judgement, "halves_ratio")->reason,
               ::testing::Not(::testing::HasSubstr(bundle.images[3].name)));
   EXPECT_EQ(judgement.cameras.size(), 6u);
@@ -124,10 +125,10 @@ TEST(Judge, APhotoOfFewSightsAmongManyPointsKeepsThemAll) {
 
 TEST(Judge, MoreThanCanBeJudgedAtOnceIsJudgedInParts) {
   const SceneSpec spec{
-      .images = 60, .points = 500, .lens = kPinholeLens, .noise_px = 0.3, .most_sights = 8};
+      .images = 60, .points = 500, .lens = kPinholeLens, .noise_px = 0.3, .max_observations = 8};
   const Bundle honest = Adjust(MakeBundle(spec), AllFree()).bundle;
   BundleLimits limits;
-  limits.most_unknowns = 500;
+  limits.max_unknowns = 500;
   const Judgement judgement = Judge(honest, limits);
   EXPECT_GT(judgement.parts, 2);
   EXPECT_EQ(judgement.cameras.size(), 60u);

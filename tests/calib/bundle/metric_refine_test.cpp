@@ -36,7 +36,7 @@ SfmModel Moved(const Bundle& bundle) {
   return ModelFrom(testing::Moved(bundle, world));
 }
 
-// What structure from motion makes of it: adjusted to the sights alone, in another world.
+// What structure from motion makes of it: adjusted to the observations alone, in another world.
 SfmModel Found(const Bundle& truth, const LensCamera& lens) {
   Bundle start = truth;
   start.lenses[0] = lens;
@@ -80,10 +80,10 @@ Held Hold(const SfmModel& model, const KnownMetres& known, const RefineOptions& 
   return held;
 }
 
-void ExpectRefusal(const SfmModel& model, const KnownMetres& known, const std::string& words) {
+void ExpectRejection(const SfmModel& model, const KnownMetres& known, const std::string& words) {
   try {
     Hold(model, known);
-    FAIL() << "nothing was refused: " << words;
+    FAIL() << "nothing was rejected: " << words;
   } catch (const Error& error) {
     EXPECT_THAT(error.what(), HasSubstr(words));
   }
@@ -122,7 +122,7 @@ void Tell(const char* what, const SfmModel& model, const Held& held, const Bundl
   std::printf(
       "%s: cameras off the truth, RMS: %.3f m as a whole, %.3f m refined and as a whole, %.3f m "
       "with "
-      "places held\n",
+      "positions held\n",
       what, BentM(model, truth), BentM(Refine(model, {}).model, truth),
       OffM(held.refined.model, truth));
 }
@@ -132,7 +132,7 @@ TEST(RefineInMetres, GpsStraightensAWalkThatALensHasBent) {
   const SfmModel model = Found(truth, WrongLens(truth.lenses[0]));
   const KnownMetres known = Places(truth, 0.1);
   const Held held = Hold(model, known);
-  Tell("bent by the lens, places to 0.1 m", model, held, truth);
+  Tell("bent by the lens, positions to 0.1 m", model, held, truth);
   EXPECT_GT(BentM(model, truth), 0.3) << "not bent: the test tells nothing";
   EXPECT_LT(OffM(held.refined.model, truth), 0.25 * BentM(model, truth));
   EXPECT_THAT(held.start.report.left_out, IsEmpty());
@@ -156,7 +156,7 @@ TEST(RefineInMetres, GpsHoldsAWalkThatNoiseHasBentWhateverTheLensesAreAllowed) {
     RefineOptions options;
     if (known) options.known_lenses = {{1, truth.lenses[0]}};
     const Held held = Hold(model, Places(truth, 0.05), options);
-    Tell("bent by noise, places to 0.05 m", model, held, truth);
+    Tell("bent by noise, positions to 0.05 m", model, held, truth);
     EXPECT_LT(OffM(held.refined.model, truth), 0.5 * BentM(model, truth));
   }
 }
@@ -168,7 +168,7 @@ TEST(RefineInMetres, AWrongPlaceIsNamedAndLeftOut) {
   known.places[7].position_m += Eigen::Vector3d(0, 4, 0);
   known.places[30].position_m += Eigen::Vector3d(300, 0, 20);
   const Held held = Hold(model, known);
-  Tell("bent by the lens, places to 0.1 m and two wrong", model, held, truth);
+  Tell("bent by the lens, positions to 0.1 m and two wrong", model, held, truth);
   EXPECT_EQ(held.start.report.left_out, (std::vector<int>{7, 30}));
   EXPECT_LT(OffM(held.refined.model, truth), 0.25 * BentM(model, truth));
 }
@@ -232,7 +232,7 @@ TEST(RefineInMetres, VaguePlacesTurnAndShiftWhatADistanceScales) {
   constexpr int kDraws = 6;
   for (std::uint64_t seed = 1; seed <= kDraws; ++seed) {
     KnownMetres known = Places(truth, kPlacesM, seed);
-    ExpectRefusal(model, known, "scale: expected a scale known to 10 %, found one to ");
+    ExpectRejection(model, known, "scale: expected a scale known to 10 %, found one to ");
     known.distances = {{"--distance A,B", 0, 7, length_m, 0.001}};
     const Held held = Hold(model, known);
     const MetricReport& report = held.start.report;
@@ -248,7 +248,7 @@ TEST(RefineInMetres, VaguePlacesTurnAndShiftWhatADistanceScales) {
     turns += std::pow(turn_rad / report.turn_sigma_rad, 2) / kDraws;
     kept += static_cast<int>(held.start.places.size());
     known.distances[0].length_m = 10 * length_m;
-    ExpectRefusal(model, known, "expected a distance that agrees with the photos' GPS, found ");
+    ExpectRejection(model, known, "expected a distance that agrees with the photos' GPS, found ");
   }
   // Three axes, of which the one known worst is predicted.
   EXPECT_GT(turns, 0.5);
@@ -277,7 +277,7 @@ TEST(RefineInMetres, TheSameForAnyNumberOfThreads) {
   EXPECT_EQ(CentresOf(one.refined.model), CentresOf(four.refined.model));
 }
 
-TEST(RefineInMetres, WhatContradictsIsRefused) {
+TEST(RefineInMetres, WhatContradictsIsRejected) {
   const Bundle truth = MakeBundle({.points = 400, .noise_px = 0.3});
   const SfmModel model = ModelFrom(truth);
   const auto centres = CentresOf(truth);
@@ -286,20 +286,21 @@ TEST(RefineInMetres, WhatContradictsIsRefused) {
   };
   KnownMetres known = Places(truth, 0.02);
   known.distances = {{"--distance A,B", 0, 7, 1.5 * apart(0, 7), 0.01}};
-  ExpectRefusal(model, known,
-                "--distance A,B: expected a distance that agrees with the photos' GPS");
+  ExpectRejection(model, known,
+                  "--distance A,B: expected a distance that agrees with the photos' GPS");
   known.places.clear();
   known.distances = {{"one", 0, 7, apart(0, 7), 0.001}, {"other", 1, 6, 2 * apart(1, 6), 0.001}};
-  ExpectRefusal(model, known, "expected distances that agree");
+  ExpectRejection(model, known, "expected distances that agree");
   known.distances[1].length_m = 1.01 * apart(1, 6);
-  ExpectRefusal(model, known, "expected a distance that the photos agree with");
+  ExpectRejection(model, known, "expected a distance that the photos agree with");
   // Places that claim what they do not keep: photos bend before such claims.
   known = Places(truth, 0.3);
   for (KnownPlace& place : known.places) place.sigma_flat_m = place.sigma_up_m = 1e-4;
-  ExpectRefusal(model, known, "expected photos that agree with the places and distances given");
+  ExpectRejection(model, known,
+                  "expected photos that agree with the positions and distances given");
   // Nothing to choose lenses by: nothing would be held.
-  ExpectRefusal(ModelFrom(MakeBundle({.points = 50})), Places(truth, 0.02),
-                "expected a model that places and distances can be held for, found none");
+  ExpectRejection(ModelFrom(MakeBundle({.points = 50})), Places(truth, 0.02),
+                  "expected a model that positions and distances can constrain, found none");
 }
 
 }  // namespace

@@ -87,7 +87,7 @@ inline calib::Bundle NoisyScene(SceneKind kind, double noise_px, std::uint64_t s
       return LookAt({6 * std::sin(angle), -6 * std::cos(angle), 2.0}, Eigen::Vector3d::Zero());
     };
   }
-  if (kind == SceneKind::kThrees) spec.most_sights = 3;
+  if (kind == SceneKind::kThrees) spec.max_observations = 3;
   calib::Bundle bundle = MakeBundle(spec);
   if (kind == SceneKind::kMixed) KeepPairsOfMost(seed, bundle);
   return bundle;
@@ -171,7 +171,7 @@ inline std::vector<Check> ValidationOf(const calib::Bundle& bundle, double noise
   std::vector<Check> tests =
       calib::ValidateReprojection(cameras, poses, scene, limits, names, 1).tests;
   calib::BundleLimits judge;
-  judge.max_picture_shift_px *= scale;
+  judge.max_image_shift_px *= scale;
   const calib::Judgement judgement = calib::Judge(bundle, judge, 1);
   tests.insert(tests.end(), judgement.tests.begin(), judgement.tests.end());
   return tests;

@@ -52,7 +52,7 @@ TEST(NoiseSweep, WhatIsUndeterminedFailsAtEveryNoise) {
   turning.pose = [](int i, int) {
     return testing::LookAt({0, -6, 1}, {0.4 * i - 1, 0, 0.2 * (i % 3)});
   };
-  SceneSpec chain{.points = 150, .lens = testing::kPinholeOfSweep, .most_sights = 2};
+  SceneSpec chain{.points = 150, .lens = testing::kPinholeOfSweep, .max_observations = 2};
   for (SceneSpec* spec : {&turning, &chain}) {
     for (const double noise_px : testing::kFewNoisesPx) {
       spec->noise_px = noise_px;

@@ -124,9 +124,10 @@ TEST(Patterns, AWavyLensIsSeenByRegions) {
   EXPECT_FALSE(test->passed) << test->reason;
 }
 
-// A lens for every photo, and room for few of their unknowns: those with most sights are tested.
-TEST(Patterns, OfTooManyLensesThoseWithMostSightsAreTested) {
-  Bundle bundle = MakeBundle({.images = 60, .points = 900, .noise_px = 0.3, .most_sights = 8});
+// A lens for every photo, and room for few of their unknowns: those with most observations are
+// tested.
+TEST(Patterns, OfTooManyLensesThoseWithMostObservationsAreTested) {
+  Bundle bundle = MakeBundle({.images = 60, .points = 900, .noise_px = 0.3, .max_observations = 8});
   const LensCamera lens = bundle.lenses[0];
   bundle.lenses.assign(bundle.images.size(), lens);
   for (size_t i = 0; i < bundle.images.size(); ++i) bundle.images[i].lens = static_cast<int>(i);

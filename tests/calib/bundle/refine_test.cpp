@@ -18,7 +18,7 @@ using testing::MakeBundle;
 using testing::ModelFrom;
 using testing::SceneSpec;
 
-// What a stabiliser of up to 10 px does to the sights of image i.
+// What a stabiliser of up to 10 px does to the observations of image i.
 Eigen::Vector2d ShiftOf(int image) {
   return {10 * std::sin(2.4 * image), 7 * std::cos(1.7 * image)};
 }
@@ -39,7 +39,7 @@ TEST(Refine, FreesThePrincipalPointWhereItIsWrong) {
   EXPECT_NEAR(refined.model.cameras.at(1).params[1], 504, 2);
 }
 
-TEST(Refine, FreesAPrincipalPointThatAllSightsTellAndUnseenPointsDoNot) {
+TEST(Refine, FreesAPrincipalPointThatAllObservationsTellAndUnseenPointsDoNot) {
   // Features are of any sharpness, most good, few bad: what one point says of another is dull.
   Bundle bundle = MakeBundle(Noisy());
   Random random(7);
@@ -55,7 +55,7 @@ TEST(Refine, FreesAPrincipalPointThatAllSightsTellAndUnseenPointsDoNot) {
   EXPECT_EQ(refined.lens, LensFreedom::kAll);
   EXPECT_NEAR(refined.model.cameras.at(1).params[1], 504, 3);
   ASSERT_EQ(refined.candidates[2].lens, LensFreedom::kAll);
-  EXPECT_GE(refined.candidates[2].high_px2, 0) << "unseen points would do";
+  EXPECT_GE(refined.candidates[2].high_px2, 0) << "held-out points would do";
   EXPECT_GT(refined.candidates[2].principal_point_sigmas, 5);
 }
 
@@ -173,7 +173,7 @@ TEST(Refine, AKnownLensReplacesTheModels) {
   EXPECT_LT(refined.adjusted.sigma_px, 0.32);
 }
 
-TEST(Refine, AKnownLensOfAnotherSizeIsRefused) {
+TEST(Refine, AKnownLensOfAnotherSizeIsRejected) {
   SfmModel model = ModelFrom(MakeBundle(Noisy()));
   LensCamera known = model.cameras[1];
   known.width_px *= 2;
@@ -198,7 +198,7 @@ TEST(Refine, TooFewPointsAreLeftAlone) {
   EXPECT_NE(refined.reason.find("expected 100"), std::string::npos);
 }
 
-TEST(Refine, CamerasThatTurnOnTheSpotAreRefusedByName) {
+TEST(Refine, CamerasThatTurnOnTheSpotAreRejectedByName) {
   const SfmModel good = ModelFrom(MakeBundle(Noisy()));
   EXPECT_NO_THROW(RequireDetermined(good, {}, "model"));
   SceneSpec turning = Noisy();
@@ -207,7 +207,7 @@ TEST(Refine, CamerasThatTurnOnTheSpotAreRefusedByName) {
   };
   try {
     RequireDetermined(ModelFrom(MakeBundle(turning)), {}, "model");
-    FAIL() << "nothing was refused";
+    FAIL() << "nothing was rejected";
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find("pure_rotation"), std::string::npos) << error.what();
   }

@@ -4,7 +4,7 @@
 
 #include <ceres/ceres.h>
 
-#include "calib/bundle/sight_cost.h"
+#include "calib/bundle/observation_cost.h"
 #include "dtr/base/error.h"
 #include "tests/calib/bundle/synthetic_bundle.h"
 
@@ -108,7 +108,7 @@ TEST(RigMember, TheCamerasMotionIsThatOfTheRig) {
   EXPECT_LT((by_rig.translation - by_itself.translation).norm(), 1e-12);
 }
 
-TEST(RefineRig, ExactSightsGiveTheTruthInTheRigsUnit) {
+TEST(RefineRig, ExactObservationsGiveTheTruthInTheRigsUnit) {
   Scene scene = MakeScene(0, 1);
   Disturb(scene.model, 2);
   const RigRefined refined = RefineRig(scene.model, scene.rig, scene.photo_of);
@@ -156,7 +156,7 @@ TEST(RefineRig, PlacesStayRigidUnderNoise) {
   EXPECT_NEAR(span(frames["0"][0], frames["7"][0]), truth, 0.005 * truth);
 }
 
-TEST(RefineRig, WhatContradictsTheRigIsRefused) {
+TEST(RefineRig, WhatContradictsTheRigIsRejected) {
   const Scene scene = MakeScene(0.3, 5);
   KnownRig moved = scene.rig;
   moved.cam_from_rig[1].rotation =
@@ -170,7 +170,7 @@ TEST(RefineRig, WhatContradictsTheRigIsRefused) {
   other_size.lenses[0].width_px = 500;
   EXPECT_THROW(RefineRig(scene.model, other_size, scene.photo_of), Error);
   auto apart = scene.photo_of;
-  for (auto& [name, photo] : apart) photo.frame = name;  // no instant that two cameras saw
+  for (auto& [name, photo] : apart) photo.frame = name;  // no time step that two cameras saw
   EXPECT_THROW(RefineRig(scene.model, scene.rig, apart), Error);
   auto unknown = scene.photo_of;
   unknown.erase("left100");

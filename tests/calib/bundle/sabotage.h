@@ -25,8 +25,8 @@ inline AdjustOptions AllFree() {
   return options;
 }
 
-// A set as `dtr build` leaves it: adjusted to its own noisy sights. What is seen fills the images:
-// where nothing is seen, no fault of the lens shows.
+// A set as `dtr build` leaves it: adjusted to its own noisy observations. What is seen fills the
+// images: where nothing is seen, no fault of the lens shows.
 inline Bundle Honest(std::uint64_t seed, int points = 300) {
   SceneSpec spec{
       .images = 7, .points = points, .lens = kPinholeLens, .noise_px = 0.3, .seed = seed};
@@ -51,8 +51,8 @@ inline Eigen::Vector3d Direction(Random& random) {
   return Eigen::Vector3d(x, y, random.Normal()).normalized();
 }
 
-// The sights as a camera sees them that turns, by up to this from an image's first row to its last,
-// while the rows are read; the turn is each image's own.
+// The observations as a camera sees them that turns, by up to this from an image's first row to its
+// last, while the rows are read; the turn is each image's own.
 inline void ReadRowByRow(double largest_turn_rad, Random& random, Bundle& bundle) {
   std::vector<Eigen::Vector3d> turns;
   for (size_t i = 0; i < bundle.images.size(); ++i) {
@@ -71,7 +71,7 @@ inline void ReadRowByRow(double largest_turn_rad, Random& random, Bundle& bundle
   }
 }
 
-// The sights as a lens draws them that waves, by this much, twice across its image, as a
+// The observations as a lens draws them that waves, by this much, twice across its image, as a
 // bent pane before it does: slower waves are what distortion follows.
 inline void Ripple(double height_px, Bundle& bundle) {
   for (BundleObservation& o : bundle.observations) {
@@ -101,8 +101,8 @@ inline double SigmasOfPose(const Bundle& honest, const Bundle& stored,
   return most;
 }
 
-// A pattern's strength: what is left of it in exact sights, over its limit; 5 where it reaches
-// that. Poses, lens and points follow the rest of it.
+// A pattern's strength: what is left of it in exact observations, over its limit; 5 where it
+// reaches that. Poses, lens and points follow the rest of it.
 template <typename Spoil, typename Test>
 double SigmasOfPattern(const Bundle& honest, const Spoil& spoil, const Test& test,
                        double limit_px) {

@@ -139,7 +139,7 @@ std::pair<Bundle, Bundle> TrueAndSeen(SceneSpec spec, double noise_px = kNoisePx
   return {std::move(truth), MakeBundle(spec)};
 }
 
-// Of each point the sights of two images, drawn by chance.
+// Of each point the observations of two images, drawn by chance.
 Bundle OfTwo(Bundle bundle) {
   std::vector<BundleObservation> kept;
   Random random(3);
@@ -167,7 +167,8 @@ TEST(Stiff, TracksOfTwoGiveTheTruth) {
 // apart by the next pair's.
 TEST(Stiff, AChainOfTracksOfTwoIsNamed) {
   ExpectNamed(
-      MakeBundle({.points = 500, .lens = kPinholeLens, .noise_px = kNoisePx, .most_sights = 2}),
+      MakeBundle(
+          {.points = 500, .lens = kPinholeLens, .noise_px = kNoisePx, .max_observations = 2}),
       {"tracks_of_two"});
 }
 
@@ -191,7 +192,7 @@ TEST(Stiff, RaysATenthOfADegreeApartAreNamedWhereTheLensIsNot) {
   ExpectNamed(TrueAndSeen(NarrowRays(), 0.02).second, {"small_angles", "pure_rotation"});
 }
 
-TEST(Stiff, OneSightAMillionPixelsOffIsLeftOutAndMovesNothing) {
+TEST(Stiff, OneObservationAMillionPixelsOffIsLeftOutAndMovesNothing) {
   const auto [truth, seen] = TrueAndSeen({});
   const Held clean = ExpectTheTruth(truth, seen, LensFreedom::kAll);
   for (const Eigen::Vector2d& off : {Eigen::Vector2d(1e6, 0), Eigen::Vector2d(-6e5, 8e5)}) {
@@ -203,7 +204,8 @@ TEST(Stiff, OneSightAMillionPixelsOffIsLeftOutAndMovesNothing) {
     }
     held.chi_squared = 0;
     CompareWith(clean.out.bundle, held);
-    // Squared, over 46 unknowns: of 1600 sights one less moves them by 1 sigma or so, all together.
+    // Squared, over 46 unknowns: of 1600 observations one less moves them by 1 sigma or so, all
+    // together.
     EXPECT_LT(held.chi_squared, 0.1);
   }
 }
@@ -287,11 +289,11 @@ TEST(Stiff, TwoIdenticalCamerasAmongOthersGiveTheTruth) {
   const auto [truth, seen] = TrueAndSeen(WithTheSameCameraTwice());
   const Held held = ExpectTheTruth(truth, Perturbed(seen, 0.01), LensFreedom::kAll);
   EXPECT_TRUE(FindDegeneracies(held.out, held.covariance, BundleLimits{}.max_focal_share).empty())
-      << "two photos from one place are no copies of each other";
+      << "two photos from one position are no copies of each other";
 }
 
 TEST(Stiff, TheSamePhotoTwiceAmongOthersIsNamed) {
-  Bundle bundle = MakeBundle(WithTheSameCameraTwice());  // no noise: the same sights
+  Bundle bundle = MakeBundle(WithTheSameCameraTwice());  // no noise: the same observations
   bundle.images[0].name = "first.jpg", bundle.images[1].name = "again.jpg";
   const Judgement judgement = ExpectNamed(bundle, {"duplicate_images"});
   EXPECT_EQ(Find(judgement.degeneracies, "duplicate_images")->detail, "first.jpg = again.jpg");
@@ -319,7 +321,7 @@ TEST(Stiff, APointThatTwoRaysATenthOfADegreeApartPlaceErrsAsPredicted) {
     for (const Pose& pose : {left, right}) {
       const Eigen::Vector2d noise(random.Normal(), random.Normal());
       sights.push_back(
-          MakeSight(camera, pose, *camera.PixelFromCam(pose * p) + kPointNoisePx * noise));
+          MakeObservation(camera, pose, *camera.PixelFromCam(pose * p) + kPointNoisePx * noise));
     }
     const Triangulation found = Triangulate(sights, -1);
     ASSERT_EQ(found.status, TriangulationStatus::kConverged);

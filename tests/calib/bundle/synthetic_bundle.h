@@ -34,7 +34,7 @@ inline constexpr int kChain = 40;
 /// A walk along a wall of 40 m, which every photo shows a part of: points are seen by four photos
 /// in a row, and what errs in one step is carried through all others.
 inline SceneSpec Walk(double noise_px = 1) {
-  SceneSpec spec{.images = kChain, .points = 900, .noise_px = noise_px, .most_sights = 4};
+  SceneSpec spec{.images = kChain, .points = 900, .noise_px = noise_px, .max_observations = 4};
   spec.pose = [](int i, int) {
     const Eigen::Vector3d centre(i, 0.6 * std::sin(0.7 * i), 1.5 + 0.3 * std::cos(0.5 * i));
     return LookAt(centre, centre + Eigen::Vector3d(0.3 * std::sin(1.1 * i), 10, 0));

@@ -65,7 +65,7 @@ TEST_P(BothFormats, EveryCameraModelSurvivesBitForBit) {
   ExpectSame(model, ReadModel(folder / "other"));
 }
 
-TEST_P(BothFormats, EveryTruncatedPrefixIsRefused) {
+TEST_P(BothFormats, EveryTruncatedPrefixIsRejected) {
   const dtr::testing::TemporaryFolder folder;
   WriteModel(folder.path(), ModelWithEveryCamera(kSeed), GetParam());
   for (const char* stem : {"cameras", "images", "points3D"}) {
@@ -111,7 +111,7 @@ TEST(ReadModel, UnknownCameraModelIsNamedByItsNumber) {
   EXPECT_THAT(MessageOf(folder.path()), HasSubstr("unknown id 17"));
 }
 
-TEST(ReadModel, HugeCountIsRefusedBeforeAnyAllocation) {
+TEST(ReadModel, HugeCountIsRejectedBeforeAnyAllocation) {
   for (const char* name : {"cameras.bin", "images.bin", "points3D.bin"}) {
     const dtr::testing::TemporaryFolder folder;
     WriteModel(folder.path(), ModelWithEveryCamera(kSeed), Format::kBinary);
@@ -162,7 +162,7 @@ TEST_F(HandWritten, WindowsLineEndsAreRead) {
   EXPECT_EQ(ReadModel(folder_.path()).images[1].name, "first photo.jpg");
 }
 
-TEST_F(HandWritten, NotANumberIsRefused) {
+TEST_F(HandWritten, NotANumberIsRejected) {
   Write(cameras_, "1 1 0 0 0 nan 0 0 1 a.jpg\n\n", "");
   EXPECT_THAT(MessageOf(folder_.path()), HasSubstr("images.txt: line 1"));
   Write("1 PINHOLE 640 480 500 inf 320 240\n", images_, points_);
@@ -171,7 +171,7 @@ TEST_F(HandWritten, NotANumberIsRefused) {
   EXPECT_THAT(MessageOf(folder_.path()), HasSubstr("points3D.txt: line 1"));
 }
 
-TEST_F(HandWritten, RecordsThatContradictEachOtherAreRefused) {
+TEST_F(HandWritten, RecordsThatContradictEachOtherAreRejected) {
   Write(cameras_ + cameras_, images_, points_);
   EXPECT_THAT(MessageOf(folder_.path()), HasSubstr("camera 1: expected one, found it twice"));
   Write(cameras_, images_ + "2 1 0 0 0 0 0 0 1 c.jpg\n\n", points_);
@@ -198,7 +198,7 @@ TEST_F(HandWritten, RecordsThatContradictEachOtherAreRefused) {
   EXPECT_THAT(MessageOf(folder_.path()), HasSubstr("quaternion"));
 }
 
-TEST_F(HandWritten, NamesThatLeaveTheFolderOfPhotosAreRefused) {
+TEST_F(HandWritten, NamesThatLeaveTheFolderOfPhotosAreRejected) {
   for (const char* bad : {"/etc/passwd", "../a.jpg", "cam0/../../a.jpg", "cam0/"}) {
     Write(cameras_, "1 1 0 0 0 0 0 0 1 " + std::string(bad) + "\n\n", "");
     EXPECT_THAT(MessageOf(folder_.path()), HasSubstr("images.txt: image 1: its name: expected a"));
@@ -212,7 +212,7 @@ TEST(ReadModel, FolderWithoutAModelIsNamed) {
   EXPECT_THAT(MessageOf(folder.path()), HasSubstr(folder.path().string()));
 }
 
-TEST(WriteModel, RefusesWhatReadModelWouldRefuse) {
+TEST(WriteModel, RejectsWhatReadModelWouldReject) {
   const dtr::testing::TemporaryFolder folder;
   auto model = ModelWithEveryCamera(kSeed);
   model.images[0].features[0].point_id = 999;

@@ -56,14 +56,14 @@ TEST_F(RunSfmWithFake, SaysWhatPhotosWithoutACameraHaveInCommonWithOthers) {
   EXPECT_THAT(why({{0, 1, 90}, {0, 2, 20}, {1, 2, 20}, {2, 3, 40}}),
               ElementsAre(Pair("d.png",
                                "20 of its 100 features in common with a b.jpg, with no "
-                               "photo more; COLMAP places a photo by 30 that agree"),
+                               "photo more; COLMAP registers a photo by 30 that agree"),
                           Pair("Über uns/b photo.JPG",
                                "in common with a photo alone that has no camera either, most with "
                                "d.png (40 features)")));
   EXPECT_THAT(why({{0, 2, 15}, {1, 2, 60}}),
               ElementsAre(Pair("d.png",
                                "60 of its 100 features in common with c.jpg, with no photo "
-                               "more; COLMAP found no place that they agree on with those "
+                               "more; COLMAP found no pose that they agree on with those "
                                "of other photos"),
                           Pair("Über uns/b photo.JPG",
                                "100 features, fewer than 15 of them in any other photo")));
@@ -303,7 +303,7 @@ TEST_F(RunSfmWithFake, HeldOutPhotosOfSuchAWalkAreRegisteredByTheThresholdsThatM
   EXPECT_THAT(registered("held"), Not(HasSubstr(fewer))) << "in the workspace of another model";
 }
 
-TEST_F(RunSfmWithFake, GarbageModelIsRefused) {
+TEST_F(RunSfmWithFake, GarbageModelIsRejected) {
   WriteFileAtomically(fake_ / "model.0" / "images.bin", "garbage");
   EXPECT_THAT(MessageOfRun(), HasSubstr("images.bin"));
 }

@@ -81,7 +81,7 @@ TEST(ToSparseScene, WorldOriginIsSubtracted) {
   EXPECT_EQ(scene.points[0].p_in_world, Eigen::Vector3d(0, 0.25, 4));
 }
 
-TEST(ToSparseScene, NamesThatDoNotFitAreRefused) {
+TEST(ToSparseScene, NamesThatDoNotFitAreRejected) {
   const SfmModel model = ThreeViews();
   const std::vector<PinholeCamera> grids(2, model.cameras.at(1).Pinhole());
   EXPECT_THROW(ToSparseScene(model, std::vector<std::string>{"a", "z"}, grids), Error);
@@ -129,7 +129,7 @@ TEST(ModelFromViews, AddsTheWorldOriginAndSurvivesTheFiles) {
   colmap::testing::ExpectSame(model, colmap::ReadModel(folder / "m"));
 }
 
-TEST(ModelFromViews, ScenesAndSetsThatDoNotFitAreRefused) {
+TEST(ModelFromViews, ScenesAndSetsThatDoNotFitAreRejected) {
   DtrSet set = TwoViewSet();
   SparseScene scene;
   scene.observations = {{0, 0, {1, 1}}};

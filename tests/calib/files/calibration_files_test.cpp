@@ -37,7 +37,7 @@ Calibration Example(BoardModel model) {
   calibration.views[1].seen.rotation = PhotoRotation::kCounterclockwise;
   calibration.left_out.push_back({"blurred.jpg", "expected the whole board"});
   calibration.models.push_back({model, true, 0.2, -0.01, 0.02, ""});
-  calibration.models.push_back({BoardModel::kBrown8, false, {}, 0, 0, "turns back"});
+  calibration.models.push_back({BoardModel::kBrown8, false, {}, 0, 0, "folds back"});
   return calibration;
 }
 
@@ -72,7 +72,7 @@ TEST(CalibrationFile, EverythingSurvivesWritingAndReading) {
     }
     EXPECT_EQ(read.left_out[0].reason, "expected the whole board");
     EXPECT_EQ(read.models[0].held_out_rms_px, 0.2);
-    EXPECT_EQ(read.models[1].refused, "turns back");
+    EXPECT_EQ(read.models[1].refused, "folds back");
     EXPECT_FALSE(read.models[1].held_out_rms_px);
   }
 }
@@ -232,7 +232,7 @@ TEST(OpenCvYaml, AStereoFileProjectsToTheSamePixelsInBothCameras) {
   }
 }
 
-TEST(OpenCvYaml, AStereoFileOfTwoSizesOrKindsIsRefused) {
+TEST(OpenCvYaml, AStereoFileOfTwoSizesOrKindsIsRejected) {
   const dtr::testing::TemporaryFolder folder;
   const LensCamera pinhole = TypicalCamera(BoardModel::kBrown4);
   LensCamera larger = pinhole;

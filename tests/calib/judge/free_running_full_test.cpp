@@ -53,11 +53,11 @@ TEST(FreeRunningFull, DelaysAreFoundWithinTheirSigmasAndTheRigWithThem) {
 TEST(FreeRunningFull, SolvedAsIfSynchronisedTheRigIsFarOff) {
   const auto cameras = RowOfCameras(3, 0.05);
   const auto views = LateViews(cameras, kDelays, 20);
-  // Lenses bend to make up for the delays: so far that one is refused, or not enough.
+  // Lenses bend to make up for the delays: so far that one is rejected, or not enough.
   try {
     EXPECT_GT(SolveRig(kBoard, InputsOf(cameras), views, kFrames).rms_px, 5 * kNoisePx);
-  } catch (const Error& refusal) {
-    EXPECT_THAT(refusal.what(), ::testing::HasSubstr("turns back before the corner"));
+  } catch (const Error& rejection) {
+    EXPECT_THAT(rejection.what(), ::testing::HasSubstr("folds back before the corner"));
   }
   const FreeRunning free = SolveFreeRunning(kBoard, InputsOf(cameras), views, kFrames);
   // What validate makes of the corners that are kept: nothing of the delays is left in them.
@@ -79,7 +79,7 @@ TEST(FreeRunningFull, MomentsThatNoFrameIsNearAreLeftOutByName) {
   EXPECT_LT(std::abs(free.delays[1]->frames - 0.5), 3.5 * free.delays[1]->sigma);
 }
 
-// Webcams: every picture a little before or after its time, which moves corners by far more than
+// Webcams: every image a little before or after its time, which moves corners by far more than
 // they err. Which of them are outliers changes with the delays, and the delays with them.
 TEST(FreeRunningFull, PicturesThatDoNotKeepTimeSettleToo) {
   constexpr double kJitter = 0.1;
@@ -119,8 +119,8 @@ TEST(FreeRunningFull, PicturesThatDoNotKeepTimeSettleToo) {
 }
 
 // What validate then makes of the kept corners: it takes the board's speed at the frames' own
-// moments, the solve at the delayed ones, and where every picture has a delay of its own the two
-// weigh these otherwise. That breaks the test of delays, by less than the pictures' own scatter.
+// moments, the solve at the delayed ones, and where every image has a delay of its own the two
+// weigh these otherwise. That breaks the test of delays, by less than the images' own scatter.
 TEST(FreeRunningFull, PicturesThatDoNotKeepTimeLeaveARestOfTheDelay) {
   const auto cameras = RowOfCameras(2, 0.05);
   const auto views = LateViews(cameras, {0, -0.6}, 6, 0.1);

@@ -48,14 +48,14 @@ TEST(FreeRunning, OutliersThatAreBroughtAreDroppedAndItsOwnAreNamed) {
   EXPECT_NEAR(free.solution.sigma_px, kNoisePx, 0.05 * kNoisePx);  // so the delay was found, too
 }
 
-TEST(FreeRunning, ABoardThatTellsNoTimeIsRefused) {
+TEST(FreeRunning, ABoardThatTellsNoTimeIsRejected) {
   const auto cameras = RowOfCameras(2, 0.1);
   auto views = LateViews(cameras, {0, 0.5}, 5);
   // Every third frame alone: where the board was between them, nobody knows.
   std::erase_if(views, [](const RigView& view) { return view.frame % 3 != 0; });
   try {
     SolveFreeRunning(kBoard, InputsOf(cameras), views, kFrames);
-    FAIL() << "not refused";
+    FAIL() << "not rejected";
   } catch (const Error& error) {
     EXPECT_THAT(error.what(),
                 ::testing::HasSubstr("expected a board that moves through frames that follow"));

@@ -31,7 +31,7 @@ inline Pose BoardAt(double time) {
 }
 
 /// What cameras see that are late by `delays`: whole boards, with noise. `jitter`: standard
-/// deviation of every picture's own moment, in frames.
+/// deviation of every image's own moment, in frames.
 inline std::vector<RigView> LateViews(const std::vector<RigCamera>& cameras,
                                       const std::vector<double>& delays, std::uint64_t seed,
                                       double jitter = 0) {

@@ -158,7 +158,7 @@ inline void ShiftLens(const RigSolution& solution, std::initializer_list<int> wh
   });
 }
 
-// Solves what may be degenerate; a solve that names why it refuses is a catch.
+// Solves what may be degenerate; a solve that names why it rejects is a catch.
 inline void SolveOrNameIt(const Scene& scene, std::uint64_t seed, SabotageCase& out) {
   try {
     out.calibration = CalibrationOf(SolveScene(scene, kCornerNoisePx, seed));
@@ -400,8 +400,8 @@ inline void JudgeSabotage(Sabotage kind, std::uint64_t seed, Tally& tally) {
   std::string broken;
   bool caught = false;
   if (!spoiled.refused.empty()) {
-    broken = "refused: " + spoiled.refused;
-    for (const char* word : {"parallel", "not determined", "do not determine", "turns back"}) {
+    broken = "rejected: " + spoiled.refused;
+    for (const char* word : {"parallel", "not determined", "do not determine", "folds back"}) {
       caught = caught || spoiled.refused.find(word) != std::string::npos;
     }
   } else {

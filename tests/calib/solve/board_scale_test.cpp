@@ -20,7 +20,7 @@ constexpr double kUnit = 0.4;  // units of the board per unit of the scene
 constexpr double kNoisePx = 0.1;
 
 // The board in a scene whose unit is kUnit, far from its origin, as `count` cameras see it.
-std::vector<BoardSight> Sights(int count, std::uint64_t seed, double noise_px) {
+std::vector<BoardObservation> Sights(int count, std::uint64_t seed, double noise_px) {
   const LensCamera lens = TypicalCamera(BoardModel::kPinhole);
   const SyntheticViews truth = ExactViews(lens, count, seed);
   Similarity scene_from_board;
@@ -28,10 +28,10 @@ std::vector<BoardSight> Sights(int count, std::uint64_t seed, double noise_px) {
   scene_from_board.rotation = Eigen::AngleAxisd(1, Eigen::Vector3d(1, 2, 3).normalized());
   scene_from_board.translation = {50, -20, 7};
   Random random(HashOf(seed, 1));
-  std::vector<BoardSight> sights;
+  std::vector<BoardObservation> sights;
   for (size_t i = 0; i < truth.views.size(); ++i) {
-    BoardSight sight{lens.Pinhole(), scene_from_board.CamFromB(truth.cam_from_board[i]),
-                     truth.views[i]};
+    BoardObservation sight{lens.Pinhole(), scene_from_board.CamFromB(truth.cam_from_board[i]),
+                           truth.views[i]};
     for (BoardCorner& corner : sight.seen.corners) {
       corner.pixel += noise_px * Eigen::Vector2d(random.Normal(), random.Normal());
     }
@@ -41,14 +41,14 @@ std::vector<BoardSight> Sights(int count, std::uint64_t seed, double noise_px) {
 }
 
 // The board lies elsewhere in this view.
-void MoveBoard(BoardSight& sight, double x_px) {
+void MoveBoard(BoardObservation& sight, double x_px) {
   for (BoardCorner& corner : sight.seen.corners) corner.pixel.x() += x_px;
 }
 
-void ExpectRefused(const std::vector<BoardSight>& sights, const std::string& text) {
+void ExpectRejected(const std::vector<BoardObservation>& sights, const std::string& text) {
   try {
     ScaleFromBoard(kBoard, sights);
-    FAIL() << "not refused";
+    FAIL() << "not rejected";
   } catch (const Error& error) {
     EXPECT_THAT(error.what(), HasSubstr(text));
   }
@@ -133,14 +133,14 @@ TEST(BoardScale, SomePosesMayBeRounded) {
   }
 }
 
-TEST(BoardScale, WhatSaysNothingIsRefused) {
-  ExpectRefused(Sights(2, 5, 0), "expected the board in 3 views or more, found it in 2");
+TEST(BoardScale, WhatSaysNothingIsRejected) {
+  ExpectRejected(Sights(2, 5, 0), "expected the board in 3 views or more, found it in 2");
   auto same = Sights(4, 5, 0);
-  for (BoardSight& sight : same) sight = same.front();
-  ExpectRefused(same, "expected two views that see the board under an angle of a degree or more");
+  for (BoardObservation& sight : same) sight = same.front();
+  ExpectRejected(same, "expected two views that see the board under an angle of a degree or more");
   auto moved = Sights(6, 5, kNoisePx);
   for (size_t i = 1; i < moved.size(); ++i) MoveBoard(moved[i], 17.0 * static_cast<double>(i * i));
-  ExpectRefused(moved, "expected views that agree where the board lies");
+  ExpectRejected(moved, "expected views that agree where the board lies");
 }
 
 }  // namespace

@@ -40,10 +40,10 @@ double LargestDifferencePx(const LensCamera& a, const LensCamera& b) {
   return largest;
 }
 
-void ExpectRefused(const std::vector<BoardView>& views, BoardModel model, const char* words) {
+void ExpectRejected(const std::vector<BoardView>& views, BoardModel model, const char* words) {
   try {
     Solve(views, model);
-    FAIL() << "not refused: " << words;
+    FAIL() << "not rejected: " << words;
   } catch (const Error& error) {
     EXPECT_THAT(error.what(), ::testing::HasSubstr(words));
   }
@@ -164,15 +164,15 @@ TEST(BoardSolve, DegenerateViewsAreNamedNotSolved) {
     }
     parallel.push_back(std::move(view));
   }
-  ExpectRefused(Noisy(parallel, 0.1, 1), BoardModel::kPinhole,
-                "the focal length is not determined");
+  ExpectRejected(Noisy(parallel, 0.1, 1), BoardModel::kPinhole,
+                 "the focal length is not determined");
   const auto views = Noisy(ExactViews(camera, 12, 4).views, 0.1, 1);
-  ExpectRefused({views[0], views[1]}, BoardModel::kPinhole, "at least 3 images");
+  ExpectRejected({views[0], views[1]}, BoardModel::kPinhole, "at least 3 images");
   // The same board three times under other names.
-  ExpectRefused({views[0], views[0], views[0]}, BoardModel::kPinhole, "parallel boards");
+  ExpectRejected({views[0], views[0], views[0]}, BoardModel::kPinhole, "parallel boards");
 }
 
-TEST(BoardSolve, ADistortionThatTurnsBackInsideTheImageIsRefused) {
+TEST(BoardSolve, ADistortionThatTurnsBackInsideTheImageIsRejected) {
   // Boards in the middle third only: six radial coefficients fit noise, not the lens.
   const LensCamera camera = TypicalCamera(BoardModel::kBrown4);
   int refused = 0;

@@ -95,7 +95,7 @@ TEST(ChooseModel, DoesNotDependOnThreads) {
   }
 }
 
-TEST(ChooseModel, FewViewsAreRefusedInOneLine) {
+TEST(ChooseModel, FewViewsAreRejectedInOneLine) {
   const auto views = ExactViews(TypicalCamera(BoardModel::kPinhole), 4, 5).views;
   try {
     Choose(views);

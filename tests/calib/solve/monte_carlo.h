@@ -92,7 +92,7 @@ inline MonteCarlo RunMonteCarlo(BoardModel model, int solves, int views, double 
 }
 
 // Acceptance of board calibration: 99 %, 0.9 to 1.1, 1 %.
-constexpr double kInsideThreeSigmas = 0.99, kLeastChiSquared = 0.9, kMostChiSquared = 1.1;
+constexpr double kInsideThreeSigmas = 0.99, kMinChiSquared = 0.9, kMaxChiSquared = 1.1;
 constexpr double kSameRms = 0.01;
 
 }  // namespace dtr::calib::testing

@@ -20,8 +20,8 @@ TEST_P(MonteCarloFull, PredictedUncertaintyIsWhatNoiseDoes) {
   const MonteCarlo result = RunMonteCarlo(GetParam(), Solves(), 12, 0.1);
   EXPECT_GE(result.worst_share, kInsideThreeSigmas);
   for (const double chi_squared : {result.chi_squared, result.lens_chi_squared}) {
-    EXPECT_GT(chi_squared, kLeastChiSquared);
-    EXPECT_LT(chi_squared, kMostChiSquared);
+    EXPECT_GT(chi_squared, kMinChiSquared);
+    EXPECT_LT(chi_squared, kMaxChiSquared);
   }
   EXPECT_NEAR(result.rms_ratio, 1, kSameRms);
 }

@@ -95,7 +95,7 @@ TEST(RigSolve, FittedFramesAreCountedFromOneEndToo) {
   EXPECT_LT(worst, 6 * kNoisePx);  // of normal errors; a board from the other end misses by 100 px
 }
 
-TEST(RigSolve, ALensThatTurnsBackInsideTheImageIsRefusedByCamera) {
+TEST(RigSolve, ALensThatTurnsBackInsideTheImageIsRejectedByCamera) {
   auto cameras = RowOfCameras(2, 0.1);
   // Its image ends 288 px from the middle, where the corner is 400 px away.
   cameras[1].camera = CameraFrom(BoardModel::kBrown4, 640, 480,
@@ -106,7 +106,7 @@ TEST(RigSolve, ALensThatTurnsBackInsideTheImageIsRefusedByCamera) {
   RigOptions options;
   EXPECT_THAT([&] { SolveRig(kBoard, inputs, NoisyViews(truth, kNoisePx, 5), 15, options); },
               ::testing::ThrowsMessage<Error>(::testing::HasSubstr(
-                  "camera cam1: the distortion of the model brown4 turns back")));
+                  "camera cam1: the distortion of the model brown4 folds back")));
   options.solve.cover_image = false;
   EXPECT_NO_THROW(SolveRig(kBoard, inputs, NoisyViews(truth, kNoisePx, 5), 15, options));
 }
@@ -178,7 +178,7 @@ TEST(RigSolve, CamerasThatNoFrameConnectsAreNamed) {
   std::erase_if(views, [](const RigView& v) { return (v.frame < 12) != (v.camera == 0); });
   try {
     SolveRig(kBoard, InputsOf(cameras), views, 24);
-    FAIL() << "not refused";
+    FAIL() << "not rejected";
   } catch (const Error& error) {
     EXPECT_THAT(error.what(), HasSubstr("cam1"));
   }
@@ -194,7 +194,7 @@ TEST(RigSolve, OneCameraWhoseLensIsGivenLeavesNothingToSolveFor) {
     SolveRig(kBoard, inputs, ExactRig(cameras, 8, 3).views, 8, options);
     FAIL() << "was solved";
   } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("found one camera whose lens is given"),
+    EXPECT_NE(std::string(error.what()).find("found one camera whose intrinsics are given"),
               std::string::npos)
         << error.what();
   }

@@ -97,7 +97,7 @@ TEST(RotatedViews, ACameraThatIsTheSameUpsideDownLeavesThemUndecided) {
 TEST(RotatedViews, PhotosOfAnotherCameraAreNotTakenForRotatedOnes) {
   const LensCamera other = WithParams({530, 530, 300, 260, 0.05, 0, 0, 0});
   for (const FoundRotation& found : FoundOf(TypicalCamera(BoardModel::kBrown4), other, 6)) {
-    EXPECT_THAT(found.undecided, HasSubstr("neither way agrees"));
+    EXPECT_THAT(found.undecided, HasSubstr("neither rotation agrees"));
   }
 }
 

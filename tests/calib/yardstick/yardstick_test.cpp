@@ -1,5 +1,5 @@
-// The yardstick that calibrations are compared by: residuals of cameras whose errors are known, and
-// sights in rendered photos whose cameras are known.
+// The reference tracks that calibrations are compared by: residuals of cameras whose errors are
+// known, and observations in rendered photos whose cameras are known.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -15,10 +15,10 @@
 namespace dtr::testing {
 namespace {
 
+using calib::ReferenceTracksScore;
 using calib::ScoreCameras;
 using calib::SfmModel;
 using calib::Track;
-using calib::YardstickScore;
 
 constexpr double kScalePx = 2;
 
@@ -38,7 +38,7 @@ struct Scene {
   SfmModel model = ModelFrom(bundle);
   std::vector<Track> tracks = TracksOf(bundle);
   std::vector<std::string> photos = calib::ImageNames(model);
-  YardstickScore Score(const SfmModel& cameras, int threads = 1) const {
+  ReferenceTracksScore Score(const SfmModel& cameras, int threads = 1) const {
     return ScoreCameras(cameras, photos, tracks, kScalePx, threads);
   }
 };
@@ -48,27 +48,27 @@ void Turn(calib::SfmImage& image, double angle_rad) {
   image.cam_from_world = Pose{turn, Eigen::Vector3d::Zero()} * image.cam_from_world;
 }
 
-TEST(ScoreCameras, TrueCamerasMissExactSightsByRoundingOnly) {
+TEST(ScoreCameras, TrueCamerasMissExactObservationsByRoundingOnly) {
   constexpr double kRoundingPx = 1e-5;  // the triangulation stops when it moves by 1e-9 px
   const Scene scene(0);
-  const YardstickScore score = scene.Score(scene.model);
+  const ReferenceTracksScore score = scene.Score(scene.model);
   ASSERT_GT(score.sights, 500);
   EXPECT_EQ(score.predicted, score.sights);
   EXPECT_LT(score.error_px, kRoundingPx);
 }
 
-TEST(ScoreCameras, TrueCamerasMissNoisySightsByTheNoise) {
-  // Two coordinates of the sight itself, and what the others' noise does to the point: with n
+TEST(ScoreCameras, TrueCamerasMissNoisyObservationsByTheNoise) {
+  // Two coordinates of the observation itself, and what the others' noise does to the point: with n
   // others 2 * sigma^2 * (1 + about 1/n to 2/n); the loss, of 20 scales, takes off less than a
   // hundredth.
   constexpr double kNoisePx = 0.1;
   const Scene scene(kNoisePx);
   const double least = kNoisePx * std::sqrt(2.0);
-  const YardstickScore score = scene.Score(scene.model);
+  const ReferenceTracksScore score = scene.Score(scene.model);
   EXPECT_GT(score.error_px, least);
   EXPECT_LT(score.error_px, 1.4 * least);
   EXPECT_GT(score.median_px, 0.8 * least);
-  const YardstickScore again = scene.Score(scene.model, 3);
+  const ReferenceTracksScore again = scene.Score(scene.model, 3);
   EXPECT_EQ(again.error_px, score.error_px) << "by the number of threads";
 }
 
@@ -81,7 +81,7 @@ TEST(ScoreCameras, TheErrorGrowsWithThatOfTheCameras) {
     for (size_t i = 0; i < turned.images.size(); i += 3) {
       Turn(turned.images[i], shift_px / focal_px);
     }
-    const YardstickScore score = scene.Score(turned);
+    const ReferenceTracksScore score = scene.Score(turned);
     EXPECT_GT(score.error_px, last + 0.1 * shift_px) << shift_px;
     EXPECT_LT(score.error_px, 2 * shift_px) << "no more than cameras were turned, twice over";
     last = score.error_px;
@@ -98,9 +98,9 @@ TEST(ScoreCameras, APhotoWithoutACameraIsNoAdvantage) {
   size_t lost = 0, all = 0;
   for (const Track& track : scene.tracks) {
     all += track.size();
-    for (const calib::PhotoSight& sight : track) lost += sight.photo == 2;
+    for (const calib::PhotoObservation& sight : track) lost += sight.photo == 2;
   }
-  const YardstickScore whole = scene.Score(scene.model), score = scene.Score(fewer);
+  const ReferenceTracksScore whole = scene.Score(scene.model), score = scene.Score(fewer);
   EXPECT_EQ(score.sights, whole.sights);
   EXPECT_EQ(score.sights - score.predicted, static_cast<int>(lost));
   // By hand: each counts as missed by 10 scales.
@@ -114,7 +114,7 @@ TEST(ScoreCameras, APhotoWithoutACameraIsNoAdvantage) {
 }
 
 /// Photos of the courtyard, and the cameras that took them.
-class RenderedYardstick : public ::testing::Test {
+class RenderedReferenceTracks : public ::testing::Test {
  protected:
   static constexpr int kPhotos = 6;
   void SetUp() override {
@@ -142,11 +142,11 @@ class RenderedYardstick : public ::testing::Test {
         kPhotos,
         [&](int i) {
           const std::string& name = model_.images[static_cast<size_t>(i)].name;
-          return calib::YardstickPhoto{io::ReadImage(folder_ / "made/images" / name), mask};
+          return calib::ReferenceTracksPhoto{io::ReadImage(folder_ / "made/images" / name), mask};
         },
         threads, silent);
   }
-  YardstickScore Score(const SfmModel& model, const std::vector<Track>& tracks) const {
+  ReferenceTracksScore Score(const SfmModel& model, const std::vector<Track>& tracks) const {
     return ScoreCameras(model, calib::ImageNames(model_), tracks, 1, 0);
   }
 
@@ -154,10 +154,10 @@ class RenderedYardstick : public ::testing::Test {
   SfmModel model_;
 };
 
-TEST_F(RenderedYardstick, TheTrueCamerasAreTheBest) {
+TEST_F(RenderedReferenceTracks, TheTrueCamerasAreTheBest) {
   const std::vector<Track> tracks = Find(2);
-  ASSERT_GE(tracks.size(), static_cast<size_t>(calib::kFewestHeldOut));
-  const YardstickScore truth = Score(model_, tracks);
+  ASSERT_GE(tracks.size(), static_cast<size_t>(calib::kMinHeldOut));
+  const ReferenceTracksScore truth = Score(model_, tracks);
   EXPECT_EQ(truth.predicted, truth.sights);
   EXPECT_LT(truth.median_px, 0.5) << "a slip of half a pixel, or wrong matches";
   for (const double shift_px : {-1.0, 1.0}) {
@@ -173,7 +173,7 @@ TEST_F(RenderedYardstick, TheTrueCamerasAreTheBest) {
   }
 }
 
-TEST_F(RenderedYardstick, IsTheSameForAnyNumberOfThreadsAndHeedsMasks) {
+TEST_F(RenderedReferenceTracks, IsTheSameForAnyNumberOfThreadsAndHeedsMasks) {
   const std::vector<Track> one = Find(1), three = Find(3);
   ASSERT_EQ(one.size(), three.size());
   for (size_t t = 0; t < one.size(); ++t) {
@@ -187,7 +187,7 @@ TEST_F(RenderedYardstick, IsTheSameForAnyNumberOfThreadsAndHeedsMasks) {
   Mask left(480, 320, 1, 0);
   for (int y = 0; y < 320; ++y) std::fill_n(left.row(y), 240, std::uint8_t{255});
   for (const Track& track : Find(2, left)) {
-    for (const calib::PhotoSight& sight : track) EXPECT_LE(sight.pixel.x(), 241);
+    for (const calib::PhotoObservation& sight : track) EXPECT_LE(sight.pixel.x(), 241);
   }
 }
 

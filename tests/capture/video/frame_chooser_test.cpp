@@ -99,7 +99,7 @@ TEST(FrameChooser, CamerasOfARigAreTakenTogether) {
   }
 }
 
-TEST(FrameChooser, RefusesMotionOutOfRange) {
+TEST(FrameChooser, RejectsMotionOutOfRange) {
   EXPECT_THROW(FrameChooser(0), std::invalid_argument);
   EXPECT_THROW(FrameChooser(1.5), std::invalid_argument);
 }

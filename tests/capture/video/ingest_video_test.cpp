@@ -54,7 +54,7 @@ TEST(IngestVideos, TakesEveryNthFrameAndSaysWhichItIs) {
   EXPECT_NEAR(second.video_frame->time_s, 0.4, 0.041);  // FFmpeg may count from the frame's end
   EXPECT_EQ(second.camera_group, capture.photos[2].camera_group);
   EXPECT_THAT(capture.skipped, IsEmpty());
-  // The picture is that of the frame: 40 px further than the first.
+  // The image is that of the frame: 40 px further than the first.
   const ImageRgb8 first_picture = ReadPhoto(capture.photos[0]), picture = ReadPhoto(second);
   double difference = 0;
   for (int x = 0; x < 200; ++x) {
@@ -133,7 +133,7 @@ TEST(IngestVideos, NamesThatMeetEachOtherOrAreNoFoldersOfPhotosKeepTheirExtensio
                           "w.avi/frame_000000.jpg", "w.mkv/frame_000000.jpg"));
 }
 
-TEST(IngestVideos, RefusesVideosOfDifferentRatesAsOneRig) {
+TEST(IngestVideos, RejectsVideosOfDifferentRatesAsOneRig) {
   const TemporaryFolder folder;
   WriteVideo(folder / "left.avi", Places(5, 4), 25);
   WriteVideo(folder / "right.avi", Places(5, 4), 30);
@@ -168,7 +168,7 @@ TEST(IngestVideos, SaysWhatIsNoVideoAndWhatHasNothingToSee) {
       HasSubstr("--motion"));
 }
 
-TEST(IngestVideos, FramesWithoutTextureAreRefused) {
+TEST(IngestVideos, FramesWithoutTextureAreRejected) {
   const TemporaryFolder folder;
   const fs::path file = folder / "fog.avi";
   {
@@ -228,7 +228,7 @@ TEST(IngestVideos, AVideoThatChangesWhileItIsReadIsAnErrorAndNotAShorterOne) {
               HasSubstr("again, found the end after"));
 }
 
-TEST(IngestVideos, NamesThatJsonCannotHoldAreRefusedFirst) {
+TEST(IngestVideos, NamesThatJsonCannotHoldAreRejectedFirst) {
   const TemporaryFolder folder;
   for (const char* name : {"caf\xe9.avi", "two\nlines.avi"}) {
     EXPECT_THAT(MessageOf<Error>([&] { Ingest({folder / name}, {}, folder / "frames"); }),

@@ -1,4 +1,4 @@
-// tests/capture/video/moving_picture.h -- pictures of a camera that moves past a wall.
+// tests/capture/video/moving_picture.h -- images of a camera that moves past a wall.
 #pragma once
 #include <cmath>
 #include <filesystem>

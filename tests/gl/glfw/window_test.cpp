@@ -25,7 +25,7 @@ void OpenWithoutDisplay() {
   std::exit(0);
 }
 
-TEST(WindowDeathTest, WithoutADisplayIsRefusedInOneLine) {
+TEST(WindowDeathTest, WithoutADisplayIsRejectedInOneLine) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   EXPECT_EXIT(OpenWithoutDisplay(), ::testing::ExitedWithCode(1),
               "window: expected a display to open it on, found none");

@@ -100,7 +100,7 @@ TEST(CamerasJson, EveryFieldSurvivesWritingAndReading) {
   }
 }
 
-TEST(CamerasJson, EveryTruncatedPrefixIsRefused) {
+TEST(CamerasJson, EveryTruncatedPrefixIsRejected) {
   for (size_t length = 0; length < kOneCamera.size(); ++length) {
     EXPECT_THROW(ParseCamerasJson(kOneCamera.substr(0, length), "list.json"), Error) << length;
   }
@@ -133,14 +133,14 @@ TEST(CamerasJson, WrongFieldsAreNamedInOneLine) {
   EXPECT_THAT(ErrorOf("[]"), HasSubstr("expected an object"));
 }
 
-TEST(CamerasJson, TheSameNameTwiceIsRefused) {
+TEST(CamerasJson, TheSameNameTwiceIsRejected) {
   std::string twice = kOneCamera;
   const size_t begin = twice.find("[{") + 1, end = twice.rfind("]}");
   twice.insert(end, ", " + twice.substr(begin, end - begin));
   EXPECT_THAT(ErrorOf(twice), HasSubstr("unique names"));
 }
 
-TEST(CamerasJson, DeeplyNestedTextIsRefusedWithoutExhaustingTheStack) {
+TEST(CamerasJson, DeeplyNestedTextIsRejectedWithoutExhaustingTheStack) {
   EXPECT_THAT(ErrorOf(std::string(1000000, '[')), HasSubstr("list.json: "));
 }
 

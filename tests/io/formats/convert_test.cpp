@@ -261,7 +261,7 @@ TEST(ConvertDataset, ImagesAreCopiedByteByByte) {
             ReadFile(source / "images/0003.jpg", kLimit));
 }
 
-TEST(ConvertDataset, WrongRequestsAreRefusedAndLeaveNothing) {
+TEST(ConvertDataset, WrongRequestsAreRejectedAndLeaveNothing) {
   TemporaryFolder folder;
   fs::create_directory(folder / "empty");
   EXPECT_THROW(ConvertDataset("nothing", folder / "empty", folder / "out"), UsageError);

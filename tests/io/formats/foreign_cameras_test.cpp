@@ -38,10 +38,10 @@ std::string ErrorOf(const Body& body) {
   return "no error";
 }
 
-// All prefixes that lose a word or more are refused. (Losing digits of the last number alone leaves
-// a good text: none of these formats has an end mark.)
+// All prefixes that lose a word or more are rejected. (Losing digits of the last number alone
+// leaves a good text: none of these formats has an end mark.)
 template <typename Reader>
-void ExpectPrefixesRefused(const std::string& good, const Reader& read) {
+void ExpectPrefixesRejected(const std::string& good, const Reader& read) {
   testing::TemporaryFolder folder;
   const size_t last_word = good.find_last_of(" \n", good.find_last_not_of(" \n"));
   for (size_t length = 0; length <= last_word; ++length) {
@@ -59,7 +59,7 @@ TEST(CameraFromK, CentreOriginGainsHalfAPixel) {
             PinholeCamera(640, 480, 525, 526, 319.5, 239.5));
 }
 
-TEST(CameraFromK, WhatIsNoPinholeIsRefused) {
+TEST(CameraFromK, WhatIsNoPinholeIsRejected) {
   const auto with = [](int row, int column, double value) {
     Eigen::Matrix3d k = Eigen::Vector3d(5, 5, 1).asDiagonal();
     k(row, column) = value;
@@ -82,7 +82,7 @@ TEST(MiddleburyPar, RowsAreWorldToCamera) {
   EXPECT_EQ(cameras[0].k(1, 2), 2);
   const Eigen::Vector3d p_in_cam = cameras[0].cam_from_world * Eigen::Vector3d(10, 20, 30);
   EXPECT_LT((p_in_cam - Eigen::Vector3d(-19, 12, 33)).norm(), kExact);
-  ExpectPrefixesRefused(good, ReadMiddleburyPar);
+  ExpectPrefixesRejected(good, ReadMiddleburyPar);
   Write(folder / "more.txt", good + "b.png\n");
   EXPECT_THAT(ErrorOf([&] { ReadMiddleburyPar(folder / "more.txt"); }),
               HasSubstr("more.txt:3: expected the end"));
@@ -102,7 +102,7 @@ TEST(StrechaCamera, RotationIsCameraToWorldAndTheCentreIsGiven) {
   // X_cam = R^T (X - C): one step along world x is one step along -y of the camera.
   const Eigen::Vector3d p_in_cam = camera.cam_from_world * Eigen::Vector3d(8, 8, 9);
   EXPECT_LT((p_in_cam - Eigen::Vector3d(0, -1, 0)).norm(), kExact);
-  ExpectPrefixesRefused(good, ReadStrechaCamera);
+  ExpectPrefixesRejected(good, ReadStrechaCamera);
   std::string distorted = good;
   distorted.replace(distorted.find("0 0 0"), 5, "0 .1 0");
   Write(folder / "d.camera", distorted);
@@ -118,7 +118,7 @@ TEST(Open3dLog, PosesAreCameraToWorld) {
   EXPECT_EQ(poses[0].id, 5);
   const Eigen::Vector3d center = poses[0].cam_from_world.TargetOriginInSource();
   EXPECT_LT((center - Eigen::Vector3d(7, 8, 9)).norm(), kExact);
-  ExpectPrefixesRefused(good, ReadOpen3dLog);
+  ExpectPrefixesRejected(good, ReadOpen3dLog);
   Write(folder / "twice.log", good + good);
   EXPECT_THAT(ErrorOf([&] { ReadOpen3dLog(folder / "twice.log"); }), HasSubstr("twice.log:6"));
 }
@@ -129,7 +129,7 @@ TEST(WorldFromCamText, ThePoseIsInverted) {
   Write(folder / "pose.txt", good);
   const Eigen::Vector3d center = ReadWorldFromCamText(folder / "pose.txt").TargetOriginInSource();
   EXPECT_LT((center - Eigen::Vector3d(7, 8, 9)).norm(), kExact);
-  ExpectPrefixesRefused(good, ReadWorldFromCamText);
+  ExpectPrefixesRejected(good, ReadWorldFromCamText);
   Write(folder / "nan.txt", "nan" + good.substr(1));
   EXPECT_THAT(ErrorOf([&] { ReadWorldFromCamText(folder / "nan.txt"); }),
               HasSubstr("nan.txt:1: expected a 4x4 pose as a finite number, found \"nan\""));
@@ -170,14 +170,14 @@ TEST(Llff, AxesAreDownRightBackwardsAndIntrinsicsFollowTheImage) {
   EXPECT_LT((p_in_cam - Eigen::Vector3d(3, -2, 10)).norm(), kExact);
 }
 
-TEST(Llff, FilesThatDoNotFitTheImagesAreRefused) {
+TEST(Llff, FilesThatDoNotFitTheImagesAreRejected) {
   testing::TemporaryFolder folder;
   Write(folder / "p.npy", LlffFile(1));
   EXPECT_THAT(ErrorOf([&] { ReadLlff(folder / "p.npy", {}); }), HasSubstr("as many rows"));
   EXPECT_THAT(ErrorOf([&] {
                 ReadLlff(folder / "p.npy", {{"a.png", 30, 40}});
               }),
-              HasSubstr("neither turned nor cropped"));
+              HasSubstr("neither rotated nor cropped"));
   Write(folder / "far.npy", LlffFile(1, 6));
   EXPECT_THAT(ErrorOf([&] {
                 ReadLlff(folder / "far.npy", {{"a.png", 40, 30}});
@@ -225,7 +225,7 @@ TEST(TransformsJson, AnAngleAloneGivesTheFocalLength) {
   EXPECT_EQ(camera.cy_px(), 7.5);
 }
 
-TEST(TransformsJson, AFocalLengthBeyondAllNumbersIsRefused) {
+TEST(TransformsJson, AFocalLengthBeyondAllNumbersIsRejected) {
   const auto with = [](const std::string& fields) {
     return ErrorOf([&] {
       Transforms(TransformsWith(R"("w": 40, "h": 30, "fl_x": 50, "fl_y": 51, "cx": 21, "cy": 14)",
@@ -237,7 +237,7 @@ TEST(TransformsJson, AFocalLengthBeyondAllNumbersIsRefused) {
   EXPECT_THAT(with(R"("w": 400, "h": 300, "fl_x": 5e-324)"), HasSubstr("above 0 at"));
 }
 
-TEST(TransformsJson, WhatWouldBeReadWronglyIsRefused) {
+TEST(TransformsJson, WhatWouldBeReadWronglyIsRejected) {
   const auto with = [](const std::string& from, const std::string& to) {
     return ErrorOf([&] { Transforms(TransformsWith(from, to)); });
   };
@@ -254,7 +254,7 @@ TEST(TransformsJson, WhatWouldBeReadWronglyIsRefused) {
   EXPECT_THAT(with("./images", "../images"), HasSubstr("leaves its folder"));
   EXPECT_THAT(with("[0,1,0,9]", "[0,-1,0,9]"), HasSubstr("mirroring"));
   EXPECT_THAT(with("[0,1,0,9]", "[0,2,0,9]"), HasSubstr("rotation matrix"));
-  EXPECT_THAT(with("\"h\": 30", "\"h\": 60"), HasSubstr("neither turned nor cropped"));
+  EXPECT_THAT(with("\"h\": 30", "\"h\": 60"), HasSubstr("neither rotated nor cropped"));
   EXPECT_THAT(ErrorOf([&] { Transforms("{\"frames\": [3]}"); }), HasSubstr("expected an object"));
 }
 
@@ -353,7 +353,7 @@ TEST(TransformsJson, OfATurnedPhotoTheShapeSaysWhichPixelsAreMeant) {
   EXPECT_EQ(camera(30, 40).height_px(), 20);
 }
 
-TEST(TransformsJson, EveryTruncatedPrefixIsRefused) {
+TEST(TransformsJson, EveryTruncatedPrefixIsRejected) {
   for (size_t length = 0; length < kTransforms.size(); ++length) {
     EXPECT_THROW(Transforms(kTransforms.substr(0, length)), Error) << length;
   }

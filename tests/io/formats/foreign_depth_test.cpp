@@ -72,7 +72,7 @@ TEST(ForeignDepth, MapsMayBeAWholePartOfTheImage) {
   EXPECT_THAT(ErrorOf(folder / "a.exr", 1, 2, 1), HasSubstr("a.exr: "));
 }
 
-TEST(ForeignDepth, WhatIsNoDepthMapIsRefused) {
+TEST(ForeignDepth, WhatIsNoDepthMapIsRejected) {
   testing::TemporaryFolder folder;
   WritePfm(folder / "rgb.pfm", Grid<float>(4, 2, 3));
   EXPECT_THAT(ErrorOf(folder / "rgb.pfm"), HasSubstr("one channel"));
@@ -160,7 +160,7 @@ TEST(ForeignDepth, ATiffOf16BitsIsOfWholeNumbers) {
               ::testing::ElementsAre(1, 2));
 }
 
-TEST(ForeignDepth, EveryTruncatedPrefixIsRefused) {
+TEST(ForeignDepth, EveryTruncatedPrefixIsRejected) {
   testing::TemporaryFolder folder;
   WriteExr(folder / "a.exr", Numbers());
   WritePfm(folder / "a.pfm", Numbers());

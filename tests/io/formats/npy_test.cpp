@@ -61,7 +61,7 @@ TEST(Npy, ScalarsAndEmptyArraysAreArrays) {
   EXPECT_THAT(ParseNpy(empty, "a.npy").values, ElementsAre());
 }
 
-TEST(Npy, EveryTruncatedPrefixIsRefused) {
+TEST(Npy, EveryTruncatedPrefixIsRejected) {
   const std::string good = File<double>(kDouble23, {1, 2, 3, 4, 5, 6});
   for (size_t length = 0; length < good.size(); ++length) {
     EXPECT_THROW(ParseNpy(std::string_view(good).substr(0, length), "a.npy"), Error) << length;
@@ -69,7 +69,7 @@ TEST(Npy, EveryTruncatedPrefixIsRefused) {
   EXPECT_THROW(ParseNpy(good + "x", "a.npy"), Error);
 }
 
-TEST(Npy, HostileHeadersAreRefusedInOneLine) {
+TEST(Npy, HostileHeadersAreRejectedInOneLine) {
   const auto error_of = [](const std::string& dictionary) -> std::string {
     try {
       ParseNpy(File<double>(dictionary, {1, 2, 3, 4, 5, 6}), "a.npy");
@@ -99,7 +99,7 @@ TEST(Npy, HostileHeadersAreRefusedInOneLine) {
   EXPECT_THAT(error_of(kDouble23 + "print(1)"), HasSubstr("end of the header"));
 }
 
-TEST(Npy, NumbersThatAreNotFiniteAreRefused) {
+TEST(Npy, NumbersThatAreNotFiniteAreRejected) {
   EXPECT_THROW(ParseNpy(File<double>(kDouble23, {1, 2, 3, 4, 5, NAN}), "a.npy"), Error);
   EXPECT_THROW(ParseNpy(File<double>(kDouble23, {INFINITY, 2, 3, 4, 5, 6}), "a.npy"), Error);
 }

@@ -41,7 +41,7 @@ TEST(Pfm, BothByteOrdersAndChannelCountsSurviveWritingAndReading) {
   EXPECT_FALSE(std::filesystem::exists(folder / "b.pfm"));
 }
 
-TEST(Pfm, EveryTruncatedPrefixIsRefused) {
+TEST(Pfm, EveryTruncatedPrefixIsRejected) {
   testing::TemporaryFolder folder;
   WritePfm(folder / "a.pfm", Grid<float>(3, 2, 3, 1.5f));
   const std::string good = ReadFile(folder / "a.pfm", 1000);
@@ -51,7 +51,7 @@ TEST(Pfm, EveryTruncatedPrefixIsRefused) {
   EXPECT_THROW(ParsePfm(good + "x", "a.pfm"), Error);
 }
 
-TEST(Pfm, HostileHeadersAreRefusedBeforeAnyAllocation) {
+TEST(Pfm, HostileHeadersAreRejectedBeforeAnyAllocation) {
   const auto error_of = [](const std::string& bytes) -> std::string {
     try {
       ParsePfm(bytes, "a.pfm");

@@ -1,6 +1,6 @@
 // A hybrid scene: the founding report's road, truck and boxes (its section 3.1.1, figures 14 to 19)
 // in a courtyard of depth images. `osgdtr_hybrid SET.dtr` opens a window; with a second argument it
-// writes one picture instead and ends, or the models alone where that ends in .osgt: then
+// writes one image instead and ends, or the models alone where that ends in .osgt: then
 // `osgviewer SET.dtr FILE.osgt` shows the same. docs/OSG.md says how the set is made.
 #include <osg/Geode>
 #include <osg/PositionAttitudeTransform>
@@ -97,7 +97,7 @@ void WritePicture(osgViewer::Viewer& viewer, const std::string& file) {
   for (int frame = 0; frame < 3; ++frame) viewer.frame();
   osg::ref_ptr<osgDB::Options> options = new osgDB::Options("JPEG_QUALITY 88");
   if (!osgDB::writeImageFile(*image, file, options)) {
-    throw std::runtime_error(file + ": expected a picture that can be written, found none");
+    throw std::runtime_error(file + ": expected an image that can be written, found none");
   }
 }
 

@@ -1,4 +1,4 @@
-// dtr/io/verdict.h -- what a set's verdict says, in a line.
+// dtr/io/validation result.h -- what a set's validation result says, in a line.
 #pragma once
 #include <string>
 

@@ -1,4 +1,5 @@
-// calib/bundle/sight_cost.h -- internal to calib/bundle: one sight's residual, for Ceres.
+// calib/bundle/observation_cost.h -- internal to calib/bundle: one observation's residual, for
+// Ceres.
 #pragma once
 #include <ceres/ceres.h>
 #include <ceres/rotation.h>
@@ -19,7 +20,7 @@ namespace dtr::calib {
 ///           camera that sees it, where the solve starts) and an inverse distance. rho = 0 is a
 ///           point at infinity, where nothing special happens (Civera et al. 2008).
 /// The projection needs p only up to a positive factor: d + rho (anchor - centre - v).
-inline constexpr size_t kMostParams = 12;
+inline constexpr size_t kMaxParams = 12;
 struct LensFrame {
   LensModel model = LensModel::kPinhole;
   std::vector<double> centre, scale;
@@ -68,8 +69,8 @@ struct RigMember {
   }
 };
 
-/// What not every sight has; one of the two at most.
-struct SightExtras {
+/// What not every observation has; one of the two at most.
+struct ObservationExtras {
   const RigMember* member = nullptr;  ///< borrowed; the pose block is the rig's
   /// Above 0: a fourth block of two numbers, times this, moves the image's principal point.
   double shift_scale_px = 0;
@@ -77,9 +78,9 @@ struct SightExtras {
 
 /// Predicted minus observed pixel; parameter blocks lens, pose (w, v), point (a, b, rho). Fails
 /// where the point has no pixel. The frames are borrowed.
-std::unique_ptr<ceres::CostFunction> SightCost(const LensFrame& lens, const PoseFrame& pose,
-                                               const PointFrame& point,
-                                               const Eigen::Vector2d& observed_px,
-                                               const SightExtras& extras = {});
+std::unique_ptr<ceres::CostFunction> ObservationCost(const LensFrame& lens, const PoseFrame& pose,
+                                                     const PointFrame& point,
+                                                     const Eigen::Vector2d& observed_px,
+                                                     const ObservationExtras& extras = {});
 
 }  // namespace dtr::calib

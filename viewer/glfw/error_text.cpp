@@ -1,4 +1,4 @@
-#include "viewer/glfw/trouble.h"
+#include "viewer/glfw/error_text.h"
 
 #include <filesystem>
 #include <new>
@@ -12,7 +12,7 @@ std::string Said(const std::exception& error) {
   }
   if (const auto* of_files = dynamic_cast<const std::filesystem::filesystem_error*>(&error)) {
     return of_files->path1().string() +
-           ": expected a place that can be used, found: " + of_files->code().message();
+           ": expected a folder or file that can be used, found: " + of_files->code().message();
   }
   return error.what();
 }

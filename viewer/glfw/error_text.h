@@ -1,4 +1,4 @@
-// viewer/glfw/trouble.h -- what went wrong, in a line for the window. The window outlives all of
+// viewer/glfw/error_text.h -- what went wrong, in a line for the window. The window outlives all of
 // it.
 #pragma once
 #include <exception>

@@ -1,4 +1,4 @@
-// pipeline/detail/run/kept_notes.h -- what was told on the way, kept for the record of the run.
+// pipeline/detail/run/recorded_notes.h -- what was told on the way, kept for the record of the run.
 #pragma once
 #include <mutex>
 #include <string>
@@ -9,9 +9,9 @@
 namespace dtr::pipeline {
 
 /// Passes everything on and remembers the notes: what was left out, and why, and warnings.
-class KeptNotes final : public Progress {
+class RecordedNotes final : public Progress {
  public:
-  explicit KeptNotes(Progress& listener) : listener_(listener) {}
+  explicit RecordedNotes(Progress& listener) : listener_(listener) {}
   void Stage(const std::string& name, int total) override { listener_.Stage(name, total); }
   void Update(int done) override { listener_.Update(done); }
   void Note(const std::string& line) override;

@@ -1,4 +1,4 @@
-// A set of two instants: made, joined, told of, drawn through time, and refused where only still
+// A set of two time steps: made, joined, told of, drawn through time, and rejected where only still
 // scenes are known.
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include "dtr/base/files.h"
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
-#include "dtr/render/instants.h"
+#include "dtr/render/time_steps.h"
 #include "tests/cli/run_dtr.h"
 #include "tests/support/moving_sphere_set.h"
 
@@ -18,10 +18,10 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
-class MovingSet : public MovingSphereSet {};
+class DynamicSet : public MovingSphereSet {};
 
-/// By each renderer: both must know which instant a picture shows.
-class MovingSetBy : public MovingSphereSet, public ::testing::WithParamInterface<const char*> {
+/// By each renderer: both must know which time step an image shows.
+class DynamicSetBy : public MovingSphereSet, public ::testing::WithParamInterface<const char*> {
  protected:
   void SetUp() override {
     const Ran ran = Dtr({"render", Set(), "--renderer", GetParam(), "--like", "0001.jpg", "--frame",
@@ -31,7 +31,7 @@ class MovingSetBy : public MovingSphereSet, public ::testing::WithParamInterface
     }
   }
 };
-INSTANTIATE_TEST_SUITE_P(Renderers, MovingSetBy, ::testing::Values("cpu", "gl", "simd"));
+INSTANTIATE_TEST_SUITE_P(Renderers, DynamicSetBy, ::testing::Values("cpu", "gl", "simd"));
 
 double MeanDifference(const fs::path& a_file, const fs::path& b_file) {
   const ImageRgb8 a = io::ReadImage(a_file), b = io::ReadImage(b_file);
@@ -41,7 +41,7 @@ double MeanDifference(const fs::path& a_file, const fs::path& b_file) {
   return sum / static_cast<double>(a.data().size());
 }
 
-TEST_F(MovingSet, HasBothInstantsAndEveryFileItsHash) {
+TEST_F(DynamicSet, HasBothInstantsAndEveryFileItsHash) {
   const Json info = Json::parse(DtrOk({"info", Set(), "--verify", "--json", "-"}).out);
   EXPECT_EQ(info["frames"], 2);
   EXPECT_EQ(info["views"].size(), 8u);
@@ -57,7 +57,7 @@ TEST_F(MovingSet, HasBothInstantsAndEveryFileItsHash) {
   }
 }
 
-TEST_F(MovingSet, PixelsAreThoseOfTheSetsThatWereJoined) {
+TEST_F(DynamicSet, PixelsAreThoseOfTheSetsThatWereJoined) {
   const DtrSet moving = io::LoadSet(Set());
   for (const auto& [name, frame] : {std::pair{"t0.dtr", 0u}, std::pair{"t0.5.dtr", 1u}}) {
     const DtrSet still = io::LoadSet(At(name));
@@ -69,7 +69,7 @@ TEST_F(MovingSet, PixelsAreThoseOfTheSetsThatWereJoined) {
   }
 }
 
-TEST_P(MovingSetBy, EachFrameShowsItsOwnInstant) {
+TEST_P(DynamicSetBy, EachFrameShowsItsOwnInstant) {
   const std::string name[] = {"t0", "t0.5"};
   for (const size_t frame : {0u, 1u}) {
     const std::string picture = In("frame" + std::to_string(frame) + ".png");
@@ -81,7 +81,7 @@ TEST_P(MovingSetBy, EachFrameShowsItsOwnInstant) {
   }
 }
 
-TEST_P(MovingSetBy, PlaysFromOnePlaceAndAlongAPath) {
+TEST_P(DynamicSetBy, PlaysFromOnePlaceAndAlongAPath) {
   const Json played = Json::parse(DtrOk({"render", Set(), "--renderer", GetParam(), "--like",
                                          "0001.jpg", "--play", "-o", In("played"), "--json", "-"})
                                       .out);
@@ -99,9 +99,9 @@ TEST_P(MovingSetBy, PlaysFromOnePlaceAndAlongAPath) {
   EXPECT_GT(fs::file_size(In("flown.mp4")), 1000u);
 }
 
-// Pictures from sets of one instant each and from the moving set are the same, to the byte: no
-// view of another instant has a say, nor what a renderer kept of one.
-TEST_P(MovingSetBy, AnInstantOfAMovingSetIsDrawnAsASetOfItsOwn) {
+// Images from sets of one time step each and from the dynamic set are the same, to the byte: no
+// view of another time step has a say, nor what a renderer kept of one.
+TEST_P(DynamicSetBy, AnInstantOfADynamicSetIsDrawnAsASetOfItsOwn) {
   DtrOk(
       {"render", Set(), "--renderer", GetParam(), "--like", "0002.jpg", "--play", "-o", In("all")});
   const std::string sets[] = {At("t0.dtr"), At("t0.5.dtr")};
@@ -113,7 +113,7 @@ TEST_P(MovingSetBy, AnInstantOfAMovingSetIsDrawnAsASetOfItsOwn) {
   }
 }
 
-TEST_F(MovingSet, WhatKnowsStillScenesAloneSaysSo) {
+TEST_F(DynamicSet, WhatKnowsStillScenesAloneSaysSo) {
   const std::string words = "expected one frame, found 2";
   for (const std::vector<std::string>& command : std::vector<std::vector<std::string>>{
            {"evaluate", Set(), "--renderer", "cpu", "--leave-one-out"},
@@ -124,24 +124,24 @@ TEST_F(MovingSet, WhatKnowsStillScenesAloneSaysSo) {
            {"advise", Set()},
            {"bench", Set(), "--renderer", "cpu"}}) {
     SCOPED_TRACE(command.front());
-    ExpectRefused(Dtr(command), 2, words);
+    ExpectRejected(Dtr(command), 2, words);
   }
-  ExpectRefused(Dtr({"render", Set(), "--renderer", "cpu", "--like", "0001.jpg", "--frame", "2",
-                     "-o", At("none.png")}),
-                2, "expected 0 to 1, the set has 2 frames");
-  ExpectRefused(Dtr({"render", Set(), "--renderer", "cpu", "--fly-through", "4", "--play", "-o",
-                     At("none.mp4")}),
-                2, "--play: expected --like or --camera with it");
-  ExpectRefused(Dtr({"export", Set(), "-o", At("colmap")}), 1,
-                "export to COLMAP: expected a set with one frame, found 2");
-  ExpectRefused(Dtr({"join", Set(), Set(), "-o", At("again.dtr")}), 2,
-                "expected a set of one frame, found 2");
-  ExpectRefused(Dtr({"dataset", "make", "plane", "-o", At("p"), "--time", "1"}), 2,
-                "where nothing moves");
+  ExpectRejected(Dtr({"render", Set(), "--renderer", "cpu", "--like", "0001.jpg", "--frame", "2",
+                      "-o", At("none.png")}),
+                 2, "expected 0 to 1, the set has 2 frames");
+  ExpectRejected(Dtr({"render", Set(), "--renderer", "cpu", "--fly-through", "4", "--play", "-o",
+                      At("none.mp4")}),
+                 2, "--play: expected --like or --camera with it");
+  ExpectRejected(Dtr({"export", Set(), "-o", At("colmap")}), 1,
+                 "export to COLMAP: expected a set with one frame, found 2");
+  ExpectRejected(Dtr({"join", Set(), Set(), "-o", At("again.dtr")}), 2,
+                 "expected a set of one frame, found 2");
+  ExpectRejected(Dtr({"dataset", "make", "plane", "-o", At("p"), "--time", "1"}), 2,
+                 "where nothing moves");
 }
 
 // What up is, and whose metres, are told by the scale's provenance.
-TEST_F(MovingSet, HowLengthsWereFoundIsKeptWhereAllInstantsSayTheSame) {
+TEST_F(DynamicSet, HowLengthsWereFoundIsKeptWhereAllInstantsSayTheSame) {
   const auto joined_scale = [&](const std::vector<Json>& scales) {
     std::vector<std::string> join = {"join"};
     for (size_t i = 0; i < scales.size(); ++i) {

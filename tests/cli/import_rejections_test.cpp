@@ -1,4 +1,4 @@
-// What `dtr import` takes and refuses: cameras, depth and masks of other programs.
+// What `dtr import` takes and rejects: cameras, depth and masks of other programs.
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
 #include "tests/cli/refusals.h"
@@ -6,7 +6,7 @@
 namespace dtr::testing {
 namespace {
 
-TEST_F(Refusals, WhatCannotBeImported) {
+TEST_F(Rejections, WhatCannotBeImported) {
   const auto import = [&](const std::string& cameras, std::vector<std::string> further) {
     further.insert(further.begin(), {"import", "--cameras", cameras, "-o", In("set.dtr")});
     return further;
@@ -21,7 +21,7 @@ TEST_F(Refusals, WhatCannotBeImported) {
   const std::string pngs = Folder("pngs"), empty = Folder("empty");
   fs::copy(depth, pngs, fs::copy_options::recursive);
   io::WriteImage(In("pngs/0000.png"), ImageRgb8(4, 4, 3));
-  ExpectAllRefused({
+  ExpectAllRejected({
       {kWrongUsage, ": no such file or folder", import(In("cameras.json"), {"--images", Photos()})},
       {kWrongUsage, "a transforms.json or a poses_bounds.npy, found another name; give --format",
        import(Write("cameras.xml", ""), {"--images", Photos()})},
@@ -35,7 +35,8 @@ TEST_F(Refusals, WhatCannotBeImported) {
        import(good, {"--images", Photos(), "--holdout", "nobody"})},
       {kFailed, "; give the folder of its photos",
        import(good, {"--images", empty, "--depth", depth})},
-      {kFailed, "expected one depth map (.exr, .pfm, .png, .tif, .npy) named like the photo 0000.jpg",
+      {kFailed,
+       "expected one depth map (.exr, .pfm, .png, .tif, .npy) named like the photo 0000.jpg",
        import(sparse, {"--images", Photos(), "--depth", empty})},
       {kFailed,
        "pixels as the camera says, found 192x128; give the images the cameras were made for",
@@ -51,7 +52,7 @@ TEST_F(Refusals, WhatCannotBeImported) {
 }
 
 // Of cameras whose file names no masks they are found by the photos' names, beside the photos, too.
-TEST_F(Refusals, MasksThatNoFileNamesAreFound) {
+TEST_F(Rejections, MasksThatNoFileNamesAreFound) {
   Mask mask(kCourtyardWidthPx, kCourtyardHeightPx, 1, 255);
   mask(3, 4) = 0;
   const std::string masks = Folder("masks");
@@ -77,7 +78,7 @@ TEST_F(Refusals, MasksThatNoFileNamesAreFound) {
   EXPECT_EQ(masked(photos, photos, "b.dtr"), "0001.jpg ");
 }
 
-TEST_F(Refusals, CamerasOfOtherProgramsThatAreNone) {
+TEST_F(Rejections, CamerasOfOtherProgramsThatAreNone) {
   const auto import = [&](const std::string& cameras) {
     return std::vector<std::string>{"import", "--cameras", cameras,      "--images",
                                     Photos(), "-o",        In("set.dtr")};
@@ -87,7 +88,7 @@ TEST_F(Refusals, CamerasOfOtherProgramsThatAreNone) {
   skewed["views"][0]["cam_from_world"][0][0] = 5;
   const std::string frame = R"("file_path": "0000.jpg", "transform_matrix": )"
                             "[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]";
-  ExpectAllRefused({
+  ExpectAllRejected({
       {kFailed, "views: expected a list of at least one camera, found another",
        import(Write("none.json", R"({"views": []})"))},
       {kFailed, "views[1].name: expected unique names, found \"0000.jpg\" twice",

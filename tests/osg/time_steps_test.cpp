@@ -1,10 +1,10 @@
-// Moving sets as nodes: which instant is shown, by hand and by the viewer's time.
+// Moving sets as nodes: which time step is shown, by hand and by the viewer's time.
 #include "tests/gl/gl_testing.h"
 // clang-format keeps this group apart.
 #include <osg/MatrixTransform>
 
 #include "dtr/base/error.h"
-#include "dtr/render/instants.h"
+#include "dtr/render/time_steps.h"
 #include "tests/osg/osg_testing.h"
 #include "viewer/osg/depth_tr.h"
 #include "viewer/osg/key_handler.h"
@@ -44,7 +44,7 @@ osg::ref_ptr<DepthTR> NodeOf(DtrSet set) {
   return node;
 }
 
-/// What each instant looks like as a set of its own.
+/// What each time step looks like as a set of its own.
 std::vector<ImageRgb8> Alone() {
   std::vector<ImageRgb8> pictures;
   for (DtrSet& still : SplitFrames(MovingSquare())) {
@@ -100,7 +100,7 @@ TEST_F(InstantsTest, PlayingFollowsTheViewersTime) {
     OffscreenViewer viewer(above.get(), Ahead().camera, Ahead().cam_from_world, threading);
     EXPECT_EQ(viewer.DrawAt(99).image, alone[0]);
     node->setInstant(1);
-    node->setPlaying(true);  // from instant 1 on, whatever the time is now
+    node->setPlaying(true);  // from time step 1 on, whatever the time is now
     const std::pair<double, size_t> expected[] = {{100.0, 1}, {100.4, 1}, {100.6, 2},
                                                   {101.1, 0}, {101.6, 1}, {103.2, 1}};
     for (const auto& [time_s, instant] : expected) {

@@ -1,14 +1,14 @@
-#include "pipeline/detail/run/kept_notes.h"
+#include "pipeline/detail/run/recorded_notes.h"
 
 namespace dtr::pipeline {
 
-void KeptNotes::Note(const std::string& line) {
+void RecordedNotes::Note(const std::string& line) {
   listener_.Note(line);
   const std::lock_guard lock(mutex_);
   lines_.push_back(line);
 }
 
-std::vector<std::string> KeptNotes::lines() const {
+std::vector<std::string> RecordedNotes::lines() const {
   const std::lock_guard lock(mutex_);
   return lines_;
 }

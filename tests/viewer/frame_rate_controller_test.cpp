@@ -1,4 +1,4 @@
-#include "viewer/governor.h"
+#include "viewer/frame_rate_controller.h"
 
 #include <gtest/gtest.h>
 
@@ -9,9 +9,9 @@ namespace {
 
 constexpr double kTargetMs = 60;
 
-/// Draws `frames` frames on a machine that takes `whole_ms` for a picture in full and `fixed_ms`
+/// Draws `frames` frames on a machine that takes `whole_ms` for an image in full and `fixed_ms`
 /// for a frame of no size at all; returns the divisors of the last quarter.
-std::set<int> Settle(ResolutionGovernor& governor, double whole_ms, double fixed_ms,
+std::set<int> Settle(ResolutionFrameRateController& governor, double whole_ms, double fixed_ms,
                      int frames = 200) {
   std::set<int> last;
   for (int frame = 0; frame < frames; ++frame) {
@@ -22,33 +22,33 @@ std::set<int> Settle(ResolutionGovernor& governor, double whole_ms, double fixed
   return last;
 }
 
-TEST(ResolutionGovernor, FindsTheLargestPictureThatIsFastEnoughAndStaysThere) {
+TEST(ResolutionFrameRateController, FindsTheLargestPictureThatIsFastEnoughAndStaysThere) {
   for (const auto& [whole_ms, fixed_ms, expected] :
        {std::tuple(20.0, 5.0, 1), {100.0, 5.0, 2}, {300.0, 5.0, 3}, {900.0, 10.0, 5}}) {
-    ResolutionGovernor governor(kTargetMs);
+    ResolutionFrameRateController governor(kTargetMs);
     EXPECT_EQ(Settle(governor, whole_ms, fixed_ms), std::set<int>{expected}) << whole_ms;
   }
 }
 
-TEST(ResolutionGovernor, NeverGoesBelowTheLeastSizeAskedFor) {
+TEST(ResolutionFrameRateController, NeverGoesBelowTheLeastSizeAskedFor) {
   for (const int most : {1, 2, 5}) {
-    ResolutionGovernor governor(kTargetMs, most);
+    ResolutionFrameRateController governor(kTargetMs, most);
     EXPECT_LE(governor.divisor(), most);
     EXPECT_EQ(Settle(governor, 1e6, 5), std::set<int>{most});
   }
 }
 
-TEST(ResolutionGovernor, HoldsTheTargetWhereAnyPictureCan) {
+TEST(ResolutionFrameRateController, HoldsTheTargetWhereAnyPictureCan) {
   for (double whole_ms = 10; whole_ms < 3000; whole_ms *= 1.3) {
-    ResolutionGovernor governor(kTargetMs);
+    ResolutionFrameRateController governor(kTargetMs);
     for (const int divisor : Settle(governor, whole_ms, 3)) {
       EXPECT_LE(3 + whole_ms / (divisor * divisor), kTargetMs) << whole_ms;
     }
   }
 }
 
-TEST(ResolutionGovernor, FollowsALoadThatChanges) {
-  ResolutionGovernor governor(kTargetMs);
+TEST(ResolutionFrameRateController, FollowsALoadThatChanges) {
+  ResolutionFrameRateController governor(kTargetMs);
   Settle(governor, 20, 5);
   EXPECT_EQ(governor.divisor(), 1);
   Settle(governor, 2000, 5, 10);
@@ -57,10 +57,10 @@ TEST(ResolutionGovernor, FollowsALoadThatChanges) {
   EXPECT_EQ(governor.divisor(), 1);
 }
 
-TEST(ResolutionGovernor, NeverLeavesItsRange) {
-  ResolutionGovernor governor(kTargetMs);
+TEST(ResolutionFrameRateController, NeverLeavesItsRange) {
+  ResolutionFrameRateController governor(kTargetMs);
   Settle(governor, 1e9, 1e9);
-  EXPECT_EQ(governor.divisor(), ResolutionGovernor::kMostDivisor);
+  EXPECT_EQ(governor.divisor(), ResolutionFrameRateController::kMaxDivisor);
   Settle(governor, 0, 0, 1000);
   EXPECT_EQ(governor.divisor(), 1);
 }

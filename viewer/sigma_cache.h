@@ -1,4 +1,4 @@
-// viewer/sigma_shelf.h -- sigmas of the views that a picture is drawn from, read when they are
+// viewer/sigma_cache.h -- sigmas of the views that an image is drawn from, read when they are
 // asked for.
 #pragma once
 #include <functional>
@@ -10,19 +10,19 @@
 
 namespace dtr::viewer {
 
-/// Keeps what it read until a picture of other views needs the room: sigmas are as large as depth,
+/// Keeps what it read until an image of other views needs the room: sigmas are as large as depth,
 /// and --memory knows nothing of them.
-class SigmaShelf {
+class SigmaCache {
  public:
   using Load = std::function<Grid<float>(const View&)>;
-  explicit SigmaShelf(Load load) : load_(std::move(load)) {}
+  explicit SigmaCache(Load load) : load_(std::move(load)) {}
 
   /// Null where it must be read first: the look-up for every pixel.
   const Grid<float>* Known(const View& view) const {
     const auto known = kept_.find(&view);
     return known != kept_.end() ? &known->second : nullptr;
   }
-  /// `in_picture`: the views that may be asked for before the picture changes; all others'
+  /// `in_picture`: the views that may be asked for before the image changes; all others'
   /// sigmas go when one is read. The pointer holds until then.
   const Grid<float>* Of(const View& view, const std::set<const View*>& in_picture) {
     if (const Grid<float>* known = Known(view)) return known;

@@ -1,4 +1,4 @@
-#include "viewer/sigma_shelf.h"
+#include "viewer/sigma_cache.h"
 
 #include <gtest/gtest.h>
 
@@ -7,11 +7,11 @@
 namespace dtr::viewer {
 namespace {
 
-TEST(SigmaShelf, KeepsThoseOfThePictureAndReadsEachOnce) {
+TEST(SigmaCache, KeepsThoseOfThePictureAndReadsEachOnce) {
   View views[4];
   for (int i = 0; i < 4; ++i) views[i].id = std::string(1, static_cast<char>('a' + i));
   std::string read;
-  SigmaShelf shelf([&](const View& view) {
+  SigmaCache shelf([&](const View& view) {
     read += view.id;
     return Grid<float>(2, 1, 1, static_cast<float>(view.id[0]));
   });
@@ -24,7 +24,7 @@ TEST(SigmaShelf, KeepsThoseOfThePictureAndReadsEachOnce) {
   EXPECT_EQ(kept, shelf.Of(views[1], second));
   shelf.Of(views[2], second);
   EXPECT_EQ(shelf.size(), 2u) << "the first view's went";
-  EXPECT_EQ((*kept)(0, 0), 'b') << "a picture's own stay where they are";
+  EXPECT_EQ((*kept)(0, 0), 'b') << "an image's own stay where they are";
   for (int i = 0; i < 4; ++i) shelf.Of(views[i], {&views[i]});
   EXPECT_EQ(shelf.size(), 1u);
   EXPECT_EQ(read, "abcabcd");

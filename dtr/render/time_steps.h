@@ -1,4 +1,4 @@
-// dtr/render/instants.h -- moving sets: several frames, of which a picture shows one.
+// dtr/render/time steps.h -- dynamic sets: several frames, of which an image shows one.
 #pragma once
 #include <cstddef>
 #include <span>
@@ -27,8 +27,8 @@ void RequireOneFrame(const DtrSet& set);
 std::vector<RenderScene> DescribeFrames(const DtrSet& set,
                                         std::span<const std::string> excluded_names = {});
 
-/// The frame that picture `i` of `pictures` shows when they run through all `frames` from the
-/// first to the last, each for an equal share of the pictures.
+/// The frame that image `i` of `images` shows when they run through all `frames` from the
+/// first to the last, each for an equal share of the images.
 size_t FrameOfPicture(size_t i, size_t pictures, size_t frames);
 
 /// Which frame is shown when a set is played round and round: each until the next one's time, the

@@ -1,20 +1,20 @@
-// Requests that need no set-up of their own to be refused: each in one line that docs/ERRORS.md
+// Requests that need no set-up of their own to be rejected: each in one line that docs/ERRORS.md
 // lists, with the right exit code.
-#include "tests/cli/refusals.h"
 #include "dtr/io/image_io.h"
 #include "tests/capture/photo_files.h"
+#include "tests/cli/refusals.h"
 #include "tests/support/environment.h"
 
 namespace dtr::testing {
 namespace {
 
-TEST_F(Refusals, WhatIsNoDataSet) {
+TEST_F(Rejections, WhatIsNoDataSet) {
   const std::string taken = Folder("taken"), file = Write("file", "");
   const auto make = [&](const std::string& scene, std::vector<std::string> further) {
     further.insert(further.begin(), {"dataset", "make", scene, "-o", In("made")});
     return further;
   };
-  ExpectAllRefused({
+  ExpectAllRejected({
       {kWrongUsage, "scene: expected courtyard, plane, stairs, sphere or room, found 'park'",
        make("park", {})},
       {kWrongUsage, "for scene 'plane', found 'circle'", make("plane", {"--layout", "circle"})},
@@ -51,9 +51,9 @@ TEST_F(Refusals, WhatIsNoDataSet) {
   EXPECT_FALSE(fs::exists(In("made")));
 }
 
-TEST_F(Refusals, ASetOfOneViewServesNothingThatComparesViews) {
+TEST_F(Rejections, ASetOfOneViewServesNothingThatComparesViews) {
   const std::string one = Shared("one.dtr");
-  ExpectAllRefused({
+  ExpectAllRejected({
       {kWrongUsage,
        "evaluate: expected a held-out view in the set, found none; build it with",
        {"evaluate", one, "--renderer", "cpu"}},
@@ -70,7 +70,7 @@ TEST_F(Refusals, ASetOfOneViewServesNothingThatComparesViews) {
        "pruning: expected at least 2 source views to look between, found 1",
        {"prune", one, "--renderer", "cpu", "-o", In("pruned.dtr")}},
       {kWrongUsage,
-       "join: expected two sets or more, one for each instant",
+       "join: expected two sets or more, one for each time step",
        {"join", one, "-o", In("moving.dtr")}},
       {kFailed,
        ": unit: expected metre as in",
@@ -79,7 +79,7 @@ TEST_F(Refusals, ASetOfOneViewServesNothingThatComparesViews) {
   EXPECT_FALSE(fs::exists(In("moving.dtr")));
 }
 
-TEST_F(Refusals, TruthThatIsNotTheSets) {
+TEST_F(Rejections, TruthThatIsNotTheSets) {
   Json others = Cameras(), longer = Cameras(), few = Cameras();
   for (size_t i = 0; i < others["views"].size(); ++i) {
     others["views"][i]["name"] = fmt::format("other{}.jpg", i);
@@ -95,7 +95,7 @@ TEST_F(Refusals, TruthThatIsNotTheSets) {
     return std::vector<std::string>{"evaluate", Shared("good.dtr"), "--renderer",
                                     "cpu",      "--depth",          In(truth)};
   };
-  ExpectAllRefused({
+  ExpectAllRejected({
       {kFailed, "expected true cameras of the set's views by name, found none of 7",
        evaluate("others")},
       {kFailed, "cast the truth again on the set's cameras", evaluate("longer")},
@@ -105,9 +105,9 @@ TEST_F(Refusals, TruthThatIsNotTheSets) {
   });
 }
 
-TEST_F(Refusals, ASetWithoutPointsServesNothingThatNeedsThem) {
+TEST_F(Rejections, ASetWithoutPointsServesNothingThatNeedsThem) {
   const std::string set = Shared("good.dtr");
-  ExpectAllRefused({
+  ExpectAllRejected({
       {kFailed,
        "sparse: expected the points behind the calibration, found nothing; build the set",
        {"validate", set}},
@@ -120,7 +120,7 @@ TEST_F(Refusals, ASetWithoutPointsServesNothingThatNeedsThem) {
   });
 }
 
-TEST_F(Refusals, PicturesOfNoSizeOrOfSeveralCameras) {
+TEST_F(Rejections, PicturesOfNoSizeOrOfSeveralCameras) {
   const auto render = [&](std::vector<std::string> further) {
     further.insert(further.begin(), {"render", Shared("good.dtr"), "--renderer", "cpu"});
     return further;
@@ -129,12 +129,12 @@ TEST_F(Refusals, PicturesOfNoSizeOrOfSeveralCameras) {
   huge["views"].erase(huge["views"].begin() + 1, huge["views"].end());
   huge["views"][0]["width"] = huge["views"][0]["height"] = 20000;
   const std::string picture = In("view.png"), folder = Folder("folder.png");
-  ExpectAllRefused({
+  ExpectAllRejected({
       {kWrongUsage, "--size 10: expected WxH, such as 1280x720",
        render({"--like", "0001", "-o", picture, "--size", "10"})},
       {kWrongUsage, "expected WxH in pixels, each 0 to 16384, found '99999'",
        render({"--like", "0001", "-o", picture, "--size", "99999x10"})},
-      {kWrongUsage, "picture: expected at most 2^28 pixels, found 20000x20000",
+      {kWrongUsage, "image: expected at most 2^28 pixels, found 20000x20000",
        render({"--camera", Write("huge.json", huge.dump()), "-o", picture})},
       {kWrongUsage, "expected one camera, found 7; give --path for several",
        render({"--camera", Shared("courtyard/cameras.json"), "-o", picture})},
@@ -150,26 +150,26 @@ TEST_F(Refusals, PicturesOfNoSizeOrOfSeveralCameras) {
   EXPECT_FALSE(fs::exists(In("frames")));
 }
 
-TEST_F(Refusals, VideosWithoutFfmpegOrWithOneThatFails) {
+TEST_F(Rejections, VideosWithoutFfmpegOrWithOneThatFails) {
   const Environment path("PATH", In("bin"));
   const std::vector<std::string> fly = {
       "render", Shared("good.dtr"), "--renderer", "cpu", "--fly-through",
       "2",      "--size",           "24x16",      "-o",  In("path.mp4")};
-  ExpectRefused(Dtr(fly), kFailed,
-                "program ffmpeg not found on the PATH; install it or write images to a folder");
+  ExpectRejected(Dtr(fly), kFailed,
+                 "program ffmpeg not found on the PATH; install it or write images to a folder");
   Program("ffmpeg", "echo no such encoder; exit 3");
-  ExpectRefused(Dtr(fly), kFailed, "ffmpeg failed with exit code 3: no such encoder");
+  ExpectRejected(Dtr(fly), kFailed, "ffmpeg failed with exit code 3: no such encoder");
   const fs::directory_iterator left(folder_.path());
   EXPECT_EQ(std::distance(begin(left), end(left)), 1) << "more than bin/ is left";
 }
 
 // A lens is calibrated on photos as they are stored; of an upright one it would be a mirrored one.
-TEST_F(Refusals, APhotoThatIsTurnedIsNotOfAKnownLens) {
+TEST_F(Rejections, APhotoThatIsTurnedIsNotOfAKnownLens) {
   const std::string photos = Folder("turned");
   fs::copy(Photos(), photos, fs::copy_options::recursive | fs::copy_options::overwrite_existing);
   capture::testing::AddExifOrientation(In("turned/0001.jpg"), 3);
   Write("one/cameras.txt", "1 PINHOLE 192 128 150 150 96 64\n");
-  ExpectAllRefused(
+  ExpectAllRejected(
       {{kFailed,
         "0001.jpg: expected a photo as it is stored, for the lens is known of such, found one that "
         "its EXIF orientation turned",
@@ -182,11 +182,11 @@ TEST_F(Refusals, APhotoThatIsTurnedIsNotOfAKnownLens) {
                                    "they are stored"));
 }
 
-TEST_F(Refusals, CalibrationsOfTakenFoldersAndOfOtherLenses) {
+TEST_F(Rejections, CalibrationsOfTakenFoldersAndOfOtherLenses) {
   const std::string taken = Folder("taken");
   Write("taken/cameras.bin", "");
   Write("two/cameras.txt", "1 PINHOLE 192 128 150 150 96 64\n2 PINHOLE 192 128 150 150 96 64\n");
-  ExpectAllRefused({
+  ExpectAllRejected({
       {kWrongUsage,
        "expected no model yet, found one; remove it or choose another folder",
        {"calibrate", "photos", Photos(), "-o", taken}},
@@ -201,13 +201,13 @@ TEST_F(Refusals, CalibrationsOfTakenFoldersAndOfOtherLenses) {
        {"calibrate", "scale", Shared("good.dtr"), "-o", In("metres.dtr"), "--distance",
         "0001:5:5+0002,0003=5m"}},
       {kFailed,
-       "click the same point in views from different places",
+       "click the same point in views from different positions",
        {"calibrate", "scale", Shared("good.dtr"), "-o", In("metres.dtr"), "--distance",
         "0001:5:64+0005:187:64,0003=5m"}},
   });
 }
 
-TEST_F(Refusals, BoardsAndRigsThatCannotBe) {
+TEST_F(Rejections, BoardsAndRigsThatCannotBe) {
   const auto board = [&](const std::string& words) {
     return std::vector<std::string>{"calibrate",  "board",   Photos(), "-o",
                                     In("c.json"), "--board", words};
@@ -227,7 +227,7 @@ TEST_F(Refusals, BoardsAndRigsThatCannotBe) {
   Write("empty/timestamps.csv", "");
   Write("names/timestamps.csv", "sync_index,cam_id,frame_index\n0,0,0\n");
   Write("number/timestamps.csv", "sync_index,cam_id,frame_index\n0,first,0\n");
-  ExpectAllRefused({
+  ExpectAllRejected({
       {kWrongUsage, "inner corners per side, found 2 x 9", board("chessboard:2x9:25mm")},
       {kWrongUsage, "no length in '-1'; expected chessboard:WxH:SQUARE",
        board("chessboard:9x6:-1")},
@@ -245,14 +245,14 @@ TEST_F(Refusals, BoardsAndRigsThatCannotBe) {
   EXPECT_FALSE(fs::exists(In("rig.json")));
 }
 
-TEST_F(Refusals, PosesThatAreNotOfThesePhotos) {
+TEST_F(Rejections, PosesThatAreNotOfThesePhotos) {
   int sets = 0;  // what one begins is not in the way of the next
   const auto build = [&](std::vector<std::string> further) {
     further.insert(further.begin(), {"build", Photos(), "-o", In(fmt::format("{}.dtr", sets++))});
     return further;
   };
   const std::string pinhole = "PINHOLE 100 100 150 150 50 50";
-  ExpectAllRefused({
+  ExpectAllRejected({
       {kWrongUsage, "--holdout-strict: keeps the photos of --holdout out of SfM; it needs",
        build({"--holdout-strict"})},
       {kWrongUsage, "a cameras.json, a transforms.json or a poses_bounds.npy",
@@ -268,35 +268,35 @@ TEST_F(Refusals, PosesThatAreNotOfThesePhotos) {
   });
   for (int i = 0; i < sets; ++i) EXPECT_FALSE(fs::exists(In(fmt::format("{}.dtr", i))));
   Write("set.dtr.partial", "mine");
-  ExpectRefused(
+  ExpectRejected(
       Dtr({"build", Photos(), "-o", In("set.dtr"), "--poses", Shared("courtyard/sparse")}),
       kWrongUsage, "expected a folder or nothing, found a file; move it away");
   EXPECT_EQ(Text(In("set.dtr.partial")), "mine");
 }
 
-TEST_F(Refusals, AProgramCalledColmapThatIsNotIt) {
+TEST_F(Rejections, AProgramCalledColmapThatIsNotIt) {
   const Environment path("PATH", In("bin"));
   const auto build = [&] { return Dtr({"build", Photos(), "-o", In("set.dtr")}); };
   Program("colmap", "exit 3");
-  ExpectRefused(build(), kFailed, "'colmap help' failed (exit code 3); reinstall COLMAP");
+  ExpectRejected(build(), kFailed, "'colmap help' failed (exit code 3); reinstall COLMAP");
   Program("colmap", "echo Hello");
-  ExpectRefused(build(), kFailed,
-                "expected a program that calls itself COLMAP, found one that does not");
+  ExpectRejected(build(), kFailed,
+                 "expected a program that calls itself COLMAP, found one that does not");
   Program("colmap", "echo COLMAP 9.9");
-  ExpectRefused(build(), kFailed, "without it; install another version (3.8 is the one this was");
-  ExpectRefused(Dtr({"build", Photos(), "-o", In("other.dtr"), "--memory", "0.001"}), kWrongUsage,
-                "--memory 0.001: expected at least");
+  ExpectRejected(build(), kFailed, "without it; install another version (3.8 is the one this was");
+  ExpectRejected(Dtr({"build", Photos(), "-o", In("other.dtr"), "--memory", "0.001"}), kWrongUsage,
+                 "--memory 0.001: expected at least");
   EXPECT_FALSE(fs::exists(In("set.dtr")));
   EXPECT_FALSE(fs::exists(In("other.dtr")));
 }
 
-TEST_F(Refusals, DepthThatCannotBeHad) {
+TEST_F(Rejections, DepthThatCannotBeHad) {
   const std::string set = In("set.dtr");
   DtrOk({"build", Photos(), "-o", set, "--poses", Shared("courtyard/sparse"), "--engine", "none",
          "--max-size", "96"});
   Model("lens/sparse", "SIMPLE_RADIAL 96 64 75 48 32 0.1", "0000.jpg", "0001.jpg");
   Model("other/sparse", "PINHOLE 96 64 75 75 48 32", "a.jpg", "b.jpg");
-  ExpectAllRefused({
+  ExpectAllRejected({
       {kFailed,
        "camera 1: expected an undistorted camera, found SIMPLE_RADIAL",
        {"stereo", set, "-o", In("a.dtr"), "--engine", "colmap", "--workspace", In("lens")}},
@@ -310,10 +310,10 @@ TEST_F(Refusals, DepthThatCannotBeHad) {
   for (const char* name : {"a.dtr", "b.dtr", "c.dtr"}) EXPECT_FALSE(fs::exists(In(name)));
 }
 
-TEST_F(Refusals, OptionsOfVideosForPhotosAndOfPhotosForVideos) {
+TEST_F(Rejections, OptionsOfVideosForPhotosAndOfPhotosForVideos) {
   const std::string video = Write("walk.mp4", "");
   const std::string found = "for --every, --motion, --max-frames and --synchronised, found neither";
-  ExpectAllRefused({
+  ExpectAllRejected({
       {kWrongUsage, found, {"capture", Photos(), "-o", In("c"), "--every", "2"}},
       {kWrongUsage, found, {"build", Photos(), "-o", In("s.dtr"), "--max-frames", "5"}},
       {kWrongUsage, found, {"build", Photos(), "-o", In("s.dtr"), "--synchronised"}},
@@ -323,56 +323,58 @@ TEST_F(Refusals, OptionsOfVideosForPhotosAndOfPhotosForVideos) {
   });
 }
 
-TEST_F(Refusals, PhotosThatAreAllDropped) {
+TEST_F(Rejections, PhotosThatAreAllDropped) {
   Folder("dark");
   for (const char* name : {"dark/a.png", "dark/b.png"}) {
     io::WriteImage(In(name), ImageRgb8(64, 48, 3));
   }
-  ExpectRefused(Dtr({"capture", In("dark"), "-o", In("capture"), "--drop", "underexposed"}),
-                kFailed,
-                "expected photos without the faults of --drop, found none; leave out --drop");
+  ExpectRejected(Dtr({"capture", In("dark"), "-o", In("capture"), "--drop", "underexposed"}),
+                 kFailed,
+                 "expected photos without the faults of --drop, found none; leave out --drop");
   EXPECT_FALSE(fs::exists(In("capture")));
 }
 
-TEST_F(Refusals, FilesAndFoldersOfAnotherKind) {
+TEST_F(Rejections, FilesAndFoldersOfAnotherKind) {
   const std::string file = Write("file", "");
-  ExpectAllRefused({
+  ExpectAllRejected({
       {kFailed,
        "cannot be read: Is a directory",
        {"render", Shared("good.dtr"), "--renderer", "cpu", "--camera", Folder("folder"), "-o",
         In("view.png")}},
       {kFailed,
-       "expected a place that can be used, found: Not a directory; mend it or choose another",
+       "expected a folder or file that can be used, found: Not a directory; fix it or choose "
+       "another",
        {"evaluate", Shared("good.dtr"), "--renderer", "cpu", "--pictures", file + "/pictures"}},
   });
 }
 
-TEST_F(Refusals, AFileThatEndsBeforeItsSize) {
+TEST_F(Rejections, AFileThatEndsBeforeItsSize) {
   // The kernel says 4096 bytes of it, and gives some dozens.
   const fs::path shorter = "/sys/kernel/mm/transparent_hugepage/enabled";
   if (!fs::exists(shorter)) GTEST_SKIP() << "no " << shorter;
-  ExpectRefused(Dtr({"render", Shared("good.dtr"), "--renderer", "cpu", "--camera",
-                     shorter.string(), "-o", In("view.png")}),
-                kFailed, "that can be read; read it again once nothing writes it, or copy it anew");
+  ExpectRejected(Dtr({"render", Shared("good.dtr"), "--renderer", "cpu", "--camera",
+                      shorter.string(), "-o", In("view.png")}),
+                 kFailed,
+                 "that can be read; read it again once nothing writes it, or copy it again");
 }
 
-TEST_F(Refusals, AFolderForTemporaryFilesThatTakesNone) {
-  ExpectRefused(Shell(fmt::format("TMPDIR=/proc exec {} bench {} --renderer cpu --stage render "
-                                  "--point default",
-                                  DTR_PROGRAM, Shared("good.dtr"))),
-                kFailed, "choose another place, or set TMPDIR to a folder that can be written");
+TEST_F(Rejections, AFolderForTemporaryFilesThatTakesNone) {
+  ExpectRejected(Shell(fmt::format("TMPDIR=/proc exec {} bench {} --renderer cpu --stage render "
+                                   "--point default",
+                                   DTR_PROGRAM, Shared("good.dtr"))),
+                 kFailed, "choose another folder, or set TMPDIR to a folder that can be written");
 }
 
-TEST_F(Refusals, TooLittleMemoryIsSaidInOneLine) {
+TEST_F(Rejections, TooLittleMemoryIsSaidInOneLine) {
 #ifdef __SANITIZE_ADDRESS__
   GTEST_SKIP() << "the sanitizer takes addresses without end";
 #endif
-  // Room to start in, and less than the picture: 16384 x 16384 pixels.
+  // Room to start in, and less than the image: 16384 x 16384 pixels.
   const Ran ran = Shell(
       fmt::format("ulimit -v 1500000; exec {} render {} --renderer cpu --threads 1 --like 0001 "
                   "--size 16384x16384 -o {}",
                   DTR_PROGRAM, Shared("good.dtr"), In("view.png")));
-  ExpectRefused(ran, kFailed, "memory: expected enough for this job, found too little");
+  ExpectRejected(ran, kFailed, "memory: expected enough for this job, found too little");
   EXPECT_FALSE(fs::exists(In("view.png")));
 }
 

@@ -1,4 +1,4 @@
-#include "dtr/render/instants.h"
+#include "dtr/render/time_steps.h"
 
 #include <algorithm>
 #include <cmath>
@@ -37,7 +37,7 @@ void RequireOneFrame(const DtrSet& set) {
   if (set.frames.empty()) throw Error("set: expected at least one frame, found none");
   if (set.frames.size() == 1) return;
   throw UsageError("set: expected one frame, found " + std::to_string(set.frames.size()) +
-                   "; moving sets are for `dtr render`, `dtr view` (--frame) and `dtr info`");
+                   "; dynamic sets are for `dtr render`, `dtr view` (--frame) and `dtr info`");
 }
 
 std::vector<RenderScene> DescribeFrames(const DtrSet& set,

@@ -1,4 +1,4 @@
-#include "calib/bundle/sight_cost.h"
+#include "calib/bundle/observation_cost.h"
 
 #include <ceres/rotation.h>
 
@@ -77,7 +77,7 @@ template <int kLens>
 std::unique_ptr<ceres::CostFunction> Cost(const LensFrame& lens, const PoseFrame& pose,
                                           const PointFrame& point,
                                           const Eigen::Vector2d& observed_px,
-                                          const SightExtras& extras) {
+                                          const ObservationExtras& extras) {
   using Functor = Sighting<kLens>;
   if (extras.shift_scale_px > 0) {
     return std::make_unique<ceres::AutoDiffCostFunction<ShiftedSighting<kLens>, 2, kLens, 6, 3, 2>>(
@@ -144,10 +144,10 @@ PointFrame FrameAround(const Eigen::Vector4d& point, const Eigen::Vector3d& anch
   return frame;
 }
 
-std::unique_ptr<ceres::CostFunction> SightCost(const LensFrame& lens, const PoseFrame& pose,
-                                               const PointFrame& point,
-                                               const Eigen::Vector2d& observed_px,
-                                               const SightExtras& extras) {
+std::unique_ptr<ceres::CostFunction> ObservationCost(const LensFrame& lens, const PoseFrame& pose,
+                                                     const PointFrame& point,
+                                                     const Eigen::Vector2d& observed_px,
+                                                     const ObservationExtras& extras) {
   switch (ParameterCount(lens.model)) {
     case 3:
       return Cost<3>(lens, pose, point, observed_px, extras);
@@ -160,7 +160,7 @@ std::unique_ptr<ceres::CostFunction> SightCost(const LensFrame& lens, const Pose
     case 12:
       return Cost<12>(lens, pose, point, observed_px, extras);
   }
-  throw std::logic_error("SightCost: no model has this number of parameters");
+  throw std::logic_error("ObservationCost: no model has this number of parameters");
 }
 
 }  // namespace dtr::calib

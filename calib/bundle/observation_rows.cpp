@@ -1,4 +1,4 @@
-#include "calib/bundle/sight_rows.h"
+#include "calib/bundle/observation_rows.h"
 
 #include <Eigen/QR>
 
@@ -7,7 +7,7 @@
 namespace dtr::calib {
 
 bool RowsOf(const Normalised& n, const Bundle& bundle, const BundleObservation& sight,
-            SightRows& rows) {
+            ObservationRows& rows) {
   const auto image = static_cast<size_t>(sight.image);
   const auto lens = static_cast<size_t>(bundle.images[image].lens);
   const double* blocks[] = {n.theta[lens].data(), n.motion[image].data(),

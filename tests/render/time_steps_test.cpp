@@ -1,4 +1,4 @@
-#include "dtr/render/instants.h"
+#include "dtr/render/time_steps.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// calib/bundle/sight_rows.h -- internal to calib/bundle: one sight's derivatives.
+// calib/bundle/observation_rows.h -- internal to calib/bundle: one observation's derivatives.
 #pragma once
 #include <Eigen/Core>
 #include <vector>
@@ -8,8 +8,8 @@
 
 namespace dtr::calib {
 
-/// Of the residual, px, by the solver's coordinates (sight_cost.h).
-struct SightRows {
+/// Of the residual, px, by the solver's coordinates (observation_cost.h).
+struct ObservationRows {
   Eigen::Vector2d residual;
   Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor> lens;
   Eigen::Matrix<double, 2, 6, Eigen::RowMajor> pose;
@@ -18,7 +18,7 @@ struct SightRows {
 
 /// False where the point has no pixel.
 bool RowsOf(const Normalised& n, const Bundle& bundle, const BundleObservation& sight,
-            SightRows& rows);
+            ObservationRows& rows);
 
 /// What is left of rows where a point is fitted to them. Orthogonal elimination: subtracting
 /// W V^-1 W^T would lose the digits that tell far points' depth.

@@ -1,4 +1,4 @@
-// What the lenses and photos of a rig are refused for: the words of docs/ERRORS.md.
+// What the lenses and photos of a rig are rejected for: the words of docs/ERRORS.md.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -40,9 +40,10 @@ class GivenLenses : public ::testing::Test {
 };
 
 TEST_F(GivenLenses, AreOfEveryCameraAndOfNoOther) {
-  EXPECT_THAT([&] { Calibrate({"left"}); },
-              ThrowsMessage<UsageError>(HasSubstr(
-                  "--camera: expected a lens for every camera or for none, found none for right")));
+  EXPECT_THAT(
+      [&] { Calibrate({"left"}); },
+      ThrowsMessage<UsageError>(HasSubstr(
+          "--camera: expected intrinsics for every camera or for none, found none for right")));
   EXPECT_THAT(
       [&] {
         Calibrate({"left", "middle", "right"});
@@ -59,15 +60,15 @@ TEST_F(GivenLenses, AreOfTheCamerasSizeAndOfAModelThatBoardsTell) {
         Calibrate({"left", "right"}, wide);
       },
       ThrowsMessage<Error>(HasSubstr(
-          "--camera left: expected a lens of 64 x 48 px as its photos are, found 128 x 48; "
-          "give the lens of this camera")));
+          "--camera left: expected intrinsics of 64 x 48 px as its photos are, found 128 x 48; "
+          "give the intrinsics of this camera")));
   const calib::LensCamera fov{calib::LensModel::kFov, 64, 48, {60, 60, 32, 24, 0.9}};
   EXPECT_THAT(
       [&] {
         Calibrate({"left", "right"}, fov);
       },
       ThrowsMessage<Error>(
-          HasSubstr("lens.txt: expected a lens that boards are solved with, found FOV")));
+          HasSubstr("lens.txt: expected intrinsics that boards are solved with, found FOV")));
 }
 
 TEST(RigFile, OfOpenCvHasTwoCameras) {
