@@ -9,8 +9,8 @@
 
 #include "dtr/base/error.h"
 #include "dtr/gl/context.h"
+#include "dtr/gl/fitting_renderer.h"
 #include "dtr/gl/frame_timer.h"
-#include "dtr/gl/renderer.h"
 #include "viewer/osg/depth_tr.h"
 #include "viewer/osg/novel_camera.h"
 
@@ -74,17 +74,8 @@ class Host {
   osgViewer::Viewer viewer_;
 };
 
-/// dtr/gl without a scene graph, as others use it and as the node does.
-struct Alone {
-  static gl::RendererSettings InMemory() {
-    gl::RendererSettings settings;
-    settings.in_memory = true;
-    return settings;
-  }
-  gl::Renderer plain, in_memory{InMemory()};
-};
-
-eval::FrameTime DrawAlone(gl::Renderer& renderer, const RenderScene& scene, const Host& host,
+/// dtr/gl without a scene graph, as the node uses it.
+eval::FrameTime DrawAlone(gl::FittingRenderer& renderer, const RenderScene& scene, const Host& host,
                           const Pose& cam_from_world, const RenderOptions& options,
                           int& views_used) {
   const eval::StopWatch watch;
@@ -96,12 +87,12 @@ eval::FrameTime DrawAlone(gl::Renderer& renderer, const RenderScene& scene, cons
 }
 
 OsgRow MeasureRow(const RenderOptions& options, const std::vector<NovelCamera>& path, Host& host,
-                  osgDTR::DepthTR& node, Alone& alone) {
+                  osgDTR::DepthTR& node, gl::FittingRenderer& alone) {
   node.setDrawPath(osgDTR::DrawPath::kGpu);
   node.setRenderOptions(options);
   OsgRow row;
   row.options = options;
-  eval::FrameTimes on_osg, by_gl, in_memory;
+  eval::FrameTimes on_osg, by_gl;
   const RenderScene& scene = node.getScene()->scene;
   for (const bool counted : {false, true}) {
     for (const NovelCamera& novel : path) {
@@ -109,19 +100,14 @@ OsgRow MeasureRow(const RenderOptions& options, const std::vector<NovelCamera>& 
       host.MakeCurrent();
       gl::WaitForGpu();
       const eval::FrameTime gl_time =
-          DrawAlone(alone.plain, scene, host, novel.cam_from_world, options, row.views_used);
-      const eval::FrameTime in_memory_time =
-          DrawAlone(alone.in_memory, scene, host, novel.cam_from_world, options, row.views_used);
+          DrawAlone(alone, scene, host, novel.cam_from_world, options, row.views_used);
       if (!counted) continue;
       on_osg.Add(osg_time);
       by_gl.Add(gl_time);
-      in_memory.Add(in_memory_time);
     }
   }
   row.gl = by_gl.Frame();
   row.gl_cpu = by_gl.Cpu();
-  row.gl_in_memory = in_memory.Frame();
-  row.gl_in_memory_cpu = in_memory.Cpu();
   row.osg = on_osg.Frame();
   row.osg_cpu = on_osg.Cpu();
   return row;
@@ -140,7 +126,7 @@ OsgRow MeasureReadBack(const OsgRow& like, const std::vector<NovelCamera>& path,
         host.Draw(path[static_cast<size_t>(i) % path.size()].cam_from_world);
     if (i > 0) times.Add(time);
   }
-  row.gl = row.gl_cpu = row.gl_in_memory = row.gl_in_memory_cpu = {};
+  row.gl = row.gl_cpu = {};
   row.osg = times.Frame();
   row.osg_cpu = times.Cpu();
   return row;
@@ -161,7 +147,7 @@ OsgBench MeasureOnOsg(DtrSet set, const std::vector<NovelCamera>& path,
   bench.frames = static_cast<int>(path.size());
   bench.drawn_by_processor = !gl::FrameTimer().has_gpu_clock();
   {
-    Alone alone;
+    gl::FittingRenderer alone;
     for (const RenderOptions& options : variants) {
       progress.ThrowIfInterrupted();
       bench.rows.push_back(MeasureRow(options, path, host, *node, alone));
@@ -178,18 +164,17 @@ void SayOsgTable(const OsgBench& bench, const eval::BenchMachine& machine, Conso
   console.Say(fmt::format("{}x{}, medians of {} frames of a fly-through; ratio by {} time",
                           bench.width_px, bench.height_px, bench.frames, machine.clock));
   console.Say("");
-  console.Say(fmt::format("{:<22} {:>3} {:>5} {:>10} {:>9} {:>8} {:>10} {:>9} {:>6} {:>10} {:>6}",
-                          "Application", "R", "views", "s a frame", "ms", "CPU ms", "alone ms",
-                          "CPU ms", "ratio", "in memory", "ratio"));
+  console.Say(fmt::format("{:<22} {:>3} {:>5} {:>10} {:>9} {:>8} {:>10} {:>9} {:>6}", "Application",
+                          "R", "views", "s a frame", "ms", "CPU ms", "alone ms", "CPU ms",
+                          "ratio"));
   for (const OsgRow& row : bench.rows) {
     std::string line = fmt::format("{:<22} {:>3} {:>5} {:>10.4f} {:>9.1f} {:>8.1f}",
                                    row.read_back ? "D+TR on OSG, read back" : "D+TR on OSG",
                                    row.options.resolution, row.views_used, row.osg.median_ms / 1000,
                                    row.osg.median_ms, row.osg_cpu.median_ms);
     if (!row.read_back) {
-      line += fmt::format(" {:>10.1f} {:>9.1f} {:>6.3f} {:>10.1f} {:>6.3f}", row.gl.median_ms,
-                          row.gl_cpu.median_ms, bench.RatioOsgOverGl(row),
-                          row.gl_in_memory_cpu.median_ms, bench.RatioOsgOverGlInMemory(row));
+      line += fmt::format(" {:>10.1f} {:>9.1f} {:>6.3f}", row.gl.median_ms, row.gl_cpu.median_ms,
+                          bench.RatioOsgOverGl(row));
     }
     console.Say(line);
   }
@@ -210,17 +195,11 @@ std::string OsgJson(const OsgBench& bench, const eval::BenchMachine& machine) {
               {"cpu_ms", row.osg_cpu.median_ms},
               {"gl_ms", nullptr},
               {"gl_cpu_ms", nullptr},
-              {"ratio_osg_over_gl", nullptr},
-              {"gl_in_memory_ms", nullptr},
-              {"gl_in_memory_cpu_ms", nullptr},
-              {"ratio_osg_over_gl_in_memory", nullptr}};
+              {"ratio_osg_over_gl", nullptr}};
     if (!row.read_back) {
       json["gl_ms"] = row.gl.median_ms;
       json["gl_cpu_ms"] = row.gl_cpu.median_ms;
       json["ratio_osg_over_gl"] = bench.RatioOsgOverGl(row);
-      json["gl_in_memory_ms"] = row.gl_in_memory.median_ms;
-      json["gl_in_memory_cpu_ms"] = row.gl_in_memory_cpu.median_ms;
-      json["ratio_osg_over_gl_in_memory"] = bench.RatioOsgOverGlInMemory(row);
       largest = std::max(largest, bench.RatioOsgOverGl(row));
     }
     rows.push_back(json);

@@ -20,8 +20,6 @@ struct OsgRow {
   RenderOptions options;
   int views_used = 0;  ///< most of any frame
   eval::Times gl, gl_cpu, osg, osg_cpu;
-  /// By a renderer that gives its images as the node's does: RendererSettings::in_memory.
-  eval::Times gl_in_memory, gl_in_memory_cpu;
 };
 
 struct OsgBench {
@@ -33,15 +31,11 @@ struct OsgBench {
     return drawn_by_processor ? row.osg_cpu.median_ms / row.gl_cpu.median_ms
                               : row.osg.median_ms / row.gl.median_ms;
   }
-  double RatioOsgOverGlInMemory(const OsgRow& row) const {
-    return drawn_by_processor ? row.osg_cpu.median_ms / row.gl_in_memory_cpu.median_ms
-                              : row.osg.median_ms / row.gl_in_memory.median_ms;
-  }
 };
 
 /// Draws the cameras of `path` one after the other, every frame once by a viewer with the set as
-/// its scene and once each by a gl::Renderer of its own that leaves its images in memory and one
-/// that does not, in the same graphics context, in turns, after one lap that is not counted. A
+/// its scene and once by a gl::FittingRenderer of its own, in the same graphics context, in turns,
+/// after one lap that is not counted. A
 /// frame is finished when its pixels are. `variants` give a row each; the first also one by the
 /// read-back path, of a few frames. The window is one in memory. Throws Error, one line, where no
 /// display can be opened.
@@ -52,8 +46,7 @@ OsgBench MeasureOnOsg(DtrSet set, const std::vector<NovelCamera>& path,
 void SayOsgTable(const OsgBench& bench, const eval::BenchMachine& machine, Console& console);
 
 /// {table:"osg",width_px,height_px,frames,rows:[{path,method,views_used,resolution,
-///  seconds_per_frame,ms,spread_ms,cpu_ms,gl_ms,gl_cpu_ms,ratio_osg_over_gl,gl_in_memory_ms,
-///  gl_in_memory_cpu_ms,ratio_osg_over_gl_in_memory}],
+///  seconds_per_frame,ms,spread_ms,cpu_ms,gl_ms,gl_cpu_ms,ratio_osg_over_gl}],
 ///  largest_ratio_osg_over_gl,machine}; `path`: "gpu", or "read-back", which has no gl_... and no
 /// ratio (null).
 std::string OsgJson(const OsgBench& bench, const eval::BenchMachine& machine);

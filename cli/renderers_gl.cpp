@@ -1,8 +1,9 @@
 // The OpenGL renderer with a context of its own.
 #include <memory>
 #include <optional>
+#include <utility>
 
-#include "cli/renderers.h"
+#include "cli/render_engine.h"
 #include "dtr/base/error.h"
 #include "dtr/base/memory_budget.h"
 #include "dtr/gl/context.h"
@@ -37,53 +38,50 @@ class DriverObjections {
 #endif
 };
 
-/// Members die in reverse order: the context last.
-struct Drawing {
-  Drawing(const RendererChoice& choice, Progress& console)
-      : renderer(SettingsOf(choice, console)) {}
-  gl::EglContext context;
-  DriverObjections objections;
-  gl::Renderer renderer;
-};
-
-class TimedGlRenderer final : public eval::TimedRenderer {
+class GlEngine final : public RenderEngine {
  public:
-  TimedGlRenderer(const RendererChoice& choice, Progress& console) : drawing_(choice, console) {}
-  std::string Description() const override { return drawing_.context.Description(); }
+  GlEngine(std::unique_ptr<gl::EglContext> context, const RendererChoice& choice, Progress& console)
+      : context_(std::move(context)), renderer_(SettingsOf(choice, console)) {}
+  std::string Description() const override { return context_->Description(); }
   bool HasGpuClock() const override { return timer_.has_gpu_clock(); }
   eval::FrameTime Draw(const RenderScene& scene, const PinholeCamera& novel,
                        const Pose& novel_from_world, const RenderOptions& options) override {
     gl::WaitForGpu();
     const eval::StopWatch watch;
-    const std::optional<double> gpu_ms = timer_.GpuMilliseconds(
-        [&] { drawing_.renderer.Draw(scene, novel, novel_from_world, options); });
+    const std::optional<double> gpu_ms =
+        timer_.GpuMilliseconds([&] { renderer_.Draw(scene, novel, novel_from_world, options); });
     eval::FrameTime time = watch.Elapsed();
     time.gpu_ms = gpu_ms;
-    drawing_.objections.Throw();
+    objections_.Throw();
     return time;
   }
-  RenderResult ReadBack() override { return drawing_.renderer.ReadBack(); }
+  RenderResult ReadBack() override { return renderer_.ReadBack(); }
+  RenderResult Render(const RenderScene& scene, const PinholeCamera& novel,
+                      const Pose& novel_from_world, const RenderOptions& options) override {
+    RenderResult result = renderer_.Render(scene, novel, novel_from_world, options);
+    objections_.Throw();
+    return result;
+  }
 
  private:
-  Drawing drawing_;
+  // Members die in reverse order: the context last.
+  const std::unique_ptr<gl::EglContext> context_;
+  DriverObjections objections_;
+  gl::Renderer renderer_;
   gl::FrameTimer timer_;
 };
 
 }  // namespace
 
-eval::RenderFunction MakeGlRenderer(const RendererChoice& choice, Progress& console) {
-  auto drawing = std::make_shared<Drawing>(choice, console);
-  return [drawing](const RenderScene& scene, const PinholeCamera& novel,
-                   const Pose& novel_from_world, const RenderOptions& options) {
-    RenderResult result = drawing->renderer.Render(scene, novel, novel_from_world, options);
-    drawing->objections.Throw();
-    return result;
-  };
+std::unique_ptr<RenderEngine> MakeGlEngine(const RendererChoice& choice, Progress& console) {
+  return std::make_unique<GlEngine>(std::make_unique<gl::EglContext>(), choice, console);
 }
 
-std::unique_ptr<eval::TimedRenderer> MakeTimedGlRenderer(const RendererChoice& choice,
-                                                         Progress& console) {
-  return std::make_unique<TimedGlRenderer>(choice, console);
+std::unique_ptr<RenderEngine> MakeGpuEngine(const RendererChoice& choice, Progress& console,
+                                            std::string& why) {
+  std::unique_ptr<gl::EglContext> context = gl::EglContext::OnGpu(why);
+  if (!context) return nullptr;
+  return std::make_unique<GlEngine>(std::move(context), choice, console);
 }
 
 }  // namespace dtr::cli

@@ -44,7 +44,8 @@ class Measurable {
 
 std::vector<std::string> RendererArguments(const SweepRequest& request) {
   std::vector<std::string> arguments;
-  if (request.renderer.name != DefaultRenderer()) arguments = {"--renderer", request.renderer.name};
+  if (request.renderer.name != RendererChoice{}.name)
+    arguments = {"--renderer", request.renderer.name};
   if (!request.renderer.shader_folder.empty()) {
     arguments.insert(arguments.end(), {"--shader-dir", request.renderer.shader_folder.string()});
   }

@@ -16,17 +16,18 @@ struct SelftestArguments {
   std::filesystem::path table;
 };
 
-/// Both renderers; one that this program or this machine lacks with the reason.
+/// All renderers; one that this program or this machine lacks with the reason.
 std::vector<selftest::NamedRenderer> Renderers(Console& console) {
   std::vector<selftest::NamedRenderer> renderers;
   const std::vector<std::string> known = RendererNames();
-  for (const std::string name : {"gl", "cpu"}) {
+  for (const std::string name : {"gl", "simd", "cpu"}) {
     const auto make = [name, &console] {
       RendererChoice choice;
       choice.name = name;
       return MakeRenderer(choice, console);
     };
     renderers.push_back({name, make});
+    if (name == "simd") renderers.back().methods = {RenderMethod::kDeferred};
     if (std::ranges::find(known, name) == known.end()) {
       renderers.back().missing = "this program was built without OpenGL";
       continue;

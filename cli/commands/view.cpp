@@ -270,6 +270,11 @@ viewer::Host MakeHost(const Options& options, const Context& context) {
   return host;
 }
 
+gl::Drawer DrawerOf(const std::string& renderer) {
+  if (renderer == "gl") return gl::Drawer::kOpenGl;
+  return renderer == "simd" ? gl::Drawer::kSimd : gl::Drawer::kFitting;
+}
+
 viewer::AppSettings SettingsOf(const Options& options, const Context& context, const DtrSet& set) {
   viewer::AppSettings settings;
   settings.hidden = pipeline::ResolveViewNames(AtFrame(set, options.instant), options.exclude);
@@ -283,6 +288,7 @@ viewer::AppSettings SettingsOf(const Options& options, const Context& context, c
   settings.render.threads = context.common.threads;
   settings.gpu_bytes = static_cast<size_t>(options.renderer.gpu_memory_gb * kBytesPerGigabyte);
   settings.shader_folder = options.renderer.shader_folder.string();
+  settings.drawer = DrawerOf(options.renderer.name);
   settings.output = options.output;
   settings.output_stem = WithoutTrailingSlash(options.set).stem().string();
   settings.panel = !options.no_panel;
@@ -396,7 +402,7 @@ void AddViewCommand(CLI::App& app) {
             .add_option("--state-file", options->state_file,
                         "Keep FILE telling, as JSON, what the window shows; for scripts")
             ->type_name("FILE");
-        AddOpenGlOptions(command, options->renderer);
+        AddWindowRendererOptions(command, options->renderer);
         AddMemoryOption(command, options->memory_gb,
                         "Memory for the views' pixels; others are dropped and read again [4]");
         options->render = AddRenderOptions(command);

@@ -63,9 +63,10 @@ using RenderFunction =
 
 /// A renderer by name; every case makes its own.
 struct NamedRenderer {
-  std::string name;  ///< "cpu" or "gl"
+  std::string name;  ///< "cpu", "gl" or "simd"
   std::function<RenderFunction()> make;
   std::string missing = {};  ///< why this program or machine has none; its cases are skipped
+  std::vector<RenderMethod> methods = {RenderMethod::kTwoPass, RenderMethod::kDeferred};
 };
 
 /// What the cases run with.

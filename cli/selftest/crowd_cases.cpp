@@ -9,7 +9,6 @@
 namespace dtr::selftest {
 namespace {
 
-using testing::kBothMethods;
 using testing::OptionsOf;
 using testing::Photograph;
 using testing::Shot;
@@ -151,7 +150,7 @@ Outcome ManyViews(Drawing draw) {
   const Shot novel = ShotFrom("n", {0.17, 0.11, 0.3}, {0, 0, 10});
   const View truth = Photograph(testing::SquareAndPlane(), novel);
   const RenderScene scene = MakeRenderScene(set);
-  for (const RenderMethod method : kBothMethods) {
+  for (const RenderMethod method : draw.methods()) {
     RenderOptions options = OptionsOf(method);
     options.views = 256;
     const RenderResult expected = draw.Draw(scene, novel, options);
@@ -182,7 +181,7 @@ Outcome DuplicateCameras(Drawing draw) {
   }
   const Shot novel = ShotFrom("n", {0.17, 0.11, 0.3}, {0, 0, 10});
   const View truth = Photograph(testing::SquareAndPlane(), novel);
-  for (const RenderMethod method : kBothMethods) {
+  for (const RenderMethod method : draw.methods()) {
     const RenderResult expected = draw.Draw(set, novel, OptionsOf(method));
     AddPicture(expected, truth, method, outcome);
     outcome.Add(Exactly(std::string("views blended at a pixel, at most") + InWords(method),
@@ -200,7 +199,7 @@ Outcome DuplicateCameras(Drawing draw) {
 
 Outcome ExtremeWeights(Drawing draw) {
   Outcome outcome;
-  for (const RenderMethod method : kBothMethods) {
+  for (const RenderMethod method : draw.methods()) {
     AddExtremePictures(draw, method, outcome);
     AddAloneAmongOthers(draw, method, outcome);
   }

@@ -2,6 +2,7 @@
 #pragma once
 #include <deque>
 #include <string>
+#include <vector>
 
 #include "cli/selftest/cases.h"
 #include "datasets/exact/render_scenes.h"
@@ -14,7 +15,9 @@ const char* InWords(RenderMethod method);  ///< ", two passes", to end a measure
 class Drawing {
  public:
   Drawing(const NamedRenderer& renderer, const Conditions& conditions)
-      : render_(renderer.make()), threads_(conditions.threads) {}
+      : render_(renderer.make()), methods_(renderer.methods), threads_(conditions.threads) {}
+
+  const std::vector<RenderMethod>& methods() const { return methods_; }  ///< that it draws
 
   RenderResult Draw(const RenderScene& scene, const testing::Shot& novel, RenderOptions options);
   RenderResult Draw(const DtrSet& set, const testing::Shot& novel, const RenderOptions& options);
@@ -28,6 +31,7 @@ class Drawing {
  private:
   std::deque<DtrSet> kept_;
   RenderFunction render_;
+  std::vector<RenderMethod> methods_;
   int threads_;
   long long contradictions_ = 0, not_finite_ = 0;
 };

@@ -10,7 +10,6 @@
 namespace dtr::selftest {
 namespace {
 
-using testing::kBothMethods;
 using testing::kNoHit;
 using testing::Moved;
 using testing::OptionsOf;
@@ -45,7 +44,7 @@ Outcome NearAndFar(Drawing draw) {
   const DtrSet set = OnALine(surface, 5, 0.001, {0, 0, 1e4});
   const Shot novel = ShotFrom("n", {0.0004, 0.0002, 0.0005}, {0, 0, 1e4});
   const View truth = Photograph(surface, novel);
-  for (const RenderMethod method : kBothMethods) {
+  for (const RenderMethod method : draw.methods()) {
     const Score score = ScoreOf(draw.Draw(set, novel, OptionsOf(method)), truth, 0.01);
     outcome.Add(AtLeast(std::string("share of the image that is seen") + InWords(method),
                         score.seen, 0.95, "five views see all but a rim"));
@@ -87,7 +86,7 @@ Outcome WildDepth(Drawing draw) {
       if (random.Index(9) == 0) z = kOdd[random.Index(6)];
     }
   }
-  for (const RenderMethod method : kBothMethods) {
+  for (const RenderMethod method : draw.methods()) {
     double min_seen = 1;
     for (const double x : {0.0, 0.3, 2.0}) {
       const Shot novel = ShotFrom("n", {x, 0.1, 0}, {0, 0, 9});
@@ -122,7 +121,7 @@ Outcome InWorlds(Drawing draw, const std::vector<std::pair<double, Eigen::Vector
                                 Plane({0.2, 0, 1}, 11));
   const DtrSet set = testing::FromAround(surface, 6, 0.7, {0, 0, 9});
   const Shot novel = ShotFrom("n", {0.17, 0.11, 0.3}, {0.2, -0.1, 10});
-  for (const RenderMethod method : kBothMethods) {
+  for (const RenderMethod method : draw.methods()) {
     const RenderResult home = draw.Draw(set, novel, OptionsOf(method));
     double worst = 0;
     for (const auto& [scale, offset] : worlds) {
@@ -160,7 +159,7 @@ Outcome GrazingPlane(Drawing draw) {
   const DtrSet set = SetOf(std::move(views));
   const Shot novel = ShotFrom("n", {0.004, -0.002, 0.002}, {0.004, -0.002, 1});
   const View truth = Photograph(floor, novel);
-  for (const RenderMethod method : kBothMethods) {
+  for (const RenderMethod method : draw.methods()) {
     const Score score = ScoreOf(draw.Draw(set, novel, OptionsOf(method)), truth, 0.02);
     outcome.Add(AtLeast(std::string("share of the floor that is seen") + InWords(method),
                         score.seen, 0.9,
@@ -190,7 +189,7 @@ Outcome OnePixelRods(Drawing draw) {
        {std::tuple{input, ", from an input camera", 0.99},
         {ShotFrom("n", {0.1, 0.05, 0}, {0, 0, 10}), ", between cameras", 0.8}}) {
     const DepthImage truth = Photograph(surface, novel).depth;
-    for (const RenderMethod method : kBothMethods) {
+    for (const RenderMethod method : draw.methods()) {
       const RenderResult result = draw.Draw(set, novel, OptionsOf(method));
       double rods = 0, found = 0;
       for (int y = 0; y < truth.height(); ++y) {
@@ -221,7 +220,7 @@ Outcome ZoomedIn(Drawing draw) {
   Shot novel = ShotFrom("n", {0.17, 0.11, 0.3}, {0.2, -0.1, 10});
   novel.camera = PinholeCamera(96, 72, 1e5, 1e5, 48, 36);
   const View truth = Photograph(surface, novel);
-  for (const RenderMethod method : kBothMethods) {
+  for (const RenderMethod method : draw.methods()) {
     const Score score = ScoreOf(draw.Draw(set, novel, OptionsOf(method)), truth, 1e-4);
     outcome.Add(Exactly(std::string("share of the image that is seen") + InWords(method),
                         score.seen, 1, "a tenth of a pixel of the views, well inside of them"));
@@ -263,7 +262,7 @@ Outcome FieldsOfView(Drawing draw) {
     const View truth = Photograph(surface, novel);
     const double photographed = Photographed(truth, set);
     const std::string at = std::to_string(static_cast<int>(degrees)) + " degrees";
-    for (const RenderMethod method : kBothMethods) {
+    for (const RenderMethod method : draw.methods()) {
       const RenderResult result = draw.Draw(set, novel, OptionsOf(method));
       const Score score = ScoreOf(result, truth, 0.01);
       if (degrees <= 10) {
@@ -290,7 +289,7 @@ Outcome EmptySets(Drawing draw) {
   for (View& view : holes.frames[0].views) view.depth = DepthImage(96, 72);
   const DtrSet whole = testing::SquareBeforePlane();
   double seen = 0;
-  for (const RenderMethod method : kBothMethods) {
+  for (const RenderMethod method : draw.methods()) {
     for (const Primitive primitive : {Primitive::kMesh, Primitive::kSplat}) {
       RenderOptions options = OptionsOf(method);
       options.primitive = primitive;

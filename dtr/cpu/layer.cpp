@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 
 #include "dtr/cpu/raster.h"
 #include "dtr/render/closed_cells.h"
@@ -49,6 +50,25 @@ class ViewPainter {
     }
   }
 
+  /// SPEC 5.1; requires a point size of 1.
+  void PaintReducedMesh(const AdaptiveMesh& mesh) {
+    std::vector<SurfacePoint> points;
+    std::vector<Vertex> vertices;
+    for (const AdaptiveMesh::Vertex& v : mesh.vertices) {
+      points.push_back({mesh.DepthPixel(v.x), mesh.DepthPixel(v.y), v.inverse_depth});
+      vertices.push_back(ProjectAt(points.back()));
+    }
+    for (size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {
+      const std::uint32_t a = mesh.indices[i], b = mesh.indices[i + 1], c = mesh.indices[i + 2];
+      PaintTriangle({&vertices[a], &vertices[b], &vertices[c]}, {points[a], points[b], points[c]});
+    }
+    for (const AdaptiveMesh::Cell& cell : mesh.cells) {
+      const int i = (cell.x - 1) / 2, j = (cell.y - 1) / 2;
+      const Vertex vertex = ProjectAt(PointOf(i, j));
+      if (vertex.in_front) PaintSplat(i, j, vertex.screen);
+    }
+  }
+
   void PaintSplats() {
     if (samples_.inverse_depth.empty()) return;
     for (int j = 0; j < samples_.inverse_depth.height(); ++j) {
@@ -83,13 +103,17 @@ class ViewPainter {
             inverse_depth * inverse};
   }
 
-  Vertex ProjectAt(double u, double v, double inverse_depth) const {
+  SurfacePoint PointOf(int i, int j) const {
+    return {samples_.Centre(i), samples_.Centre(j), samples_.inverse_depth(i, j)};
+  }
+
+  Vertex ProjectAt(const SurfacePoint& point) const {
     Vertex vertex;
-    vertex.exists = inverse_depth > 0;
+    vertex.exists = point.inverse_depth > 0;
     if (!vertex.exists) return vertex;
-    const Eigen::Vector3d q = Homogeneous(u, v, inverse_depth);
-    vertex.in_front = InFront(q, inverse_depth);
-    if (vertex.in_front) vertex.screen = Screen(q, inverse_depth);
+    const Eigen::Vector3d q = Homogeneous(point.u, point.v, point.inverse_depth);
+    vertex.in_front = InFront(q, point.inverse_depth);
+    if (vertex.in_front) vertex.screen = Screen(q, point.inverse_depth);
     return vertex;
   }
 
@@ -99,8 +123,7 @@ class ViewPainter {
     std::vector<Vertex> row(static_cast<size_t>(columns) + 2);
     if (j < 0 || j >= samples_.inverse_depth.height()) return row;
     for (int i = 0; i < columns; ++i) {
-      row[static_cast<size_t>(i + 1)] =
-          ProjectAt(samples_.Centre(i), samples_.Centre(j), samples_.inverse_depth(i, j));
+      row[static_cast<size_t>(i + 1)] = ProjectAt(PointOf(i, j));
     }
     return row;
   }
@@ -116,7 +139,7 @@ class ViewPainter {
     const bool inside = i >= 0 && j >= 0 && i + 1 < w.width() && j + 1 < w.height();
     const BlockTriangles block = inside ? TrianglesOfBlock(w, i, j, rule_) : BlockTriangles{};
     for (const std::uint8_t corners : block.corners) {
-      if (corners != 0) PaintTriangle(i, j, corners, corner);
+      if (corners != 0) PaintTriangleOfBlock(i, j, corners, corner);
     }
     const std::uint8_t open = OpenCorners(block);
     for (int c = 0; c < 4; ++c) {
@@ -124,29 +147,36 @@ class ViewPainter {
     }
   }
 
-  void PaintTriangle(int i, int j, std::uint8_t corners, const Vertex* const (&corner)[4]) {
+  void PaintTriangleOfBlock(int i, int j, std::uint8_t corners, const Vertex* const (&corner)[4]) {
     // Clockwise on the screen of the view, y down: A B D C without the missing corner.
-    std::array<int, 3> order{};
+    std::array<const Vertex*, 3> vertices{};
+    std::array<SurfacePoint, 3> points;
     size_t count = 0;
     for (const int c : {0, 1, 3, 2}) {
-      if (corners & (1 << c)) order[count++] = c;
+      if ((corners & (1 << c)) == 0) continue;
+      points[count] = PointOf(i + (c & 1), j + (c >> 1));
+      vertices[count++] = corner[c];
     }
-    const Vertex &a = *corner[order[0]], &b = *corner[order[1]], &c = *corner[order[2]];
-    const int in_front = a.in_front + b.in_front + c.in_front;
+    PaintTriangle(vertices, points);
+  }
+
+  void PaintTriangle(const std::array<const Vertex*, 3>& vertices,
+                     const std::array<SurfacePoint, 3>& points) {
+    const auto& [a, b, c] = vertices;
+    const int in_front = a->in_front + b->in_front + c->in_front;
     if (in_front == 3) {
-      DrawTriangle(a.screen, b.screen, c.screen, layer_);
+      DrawTriangle(a->screen, b->screen, c->screen, layer_);
     } else if (in_front > 0) {
-      PaintClipped(i, j, order);
+      PaintClipped(points);
     }
   }
 
   /// SPEC 2.5: the part of a triangle beyond the near plane, Sutherland and Hodgman 1974.
-  void PaintClipped(int i, int j, const std::array<int, 3>& order) {
+  void PaintClipped(const std::array<SurfacePoint, 3>& points) {
     Eigen::Vector3d point[3];
     for (size_t k = 0; k < 3; ++k) {
-      const int x = i + (order[k] & 1), y = j + (order[k] >> 1);
-      const double w = samples_.inverse_depth(x, y);
-      point[k] = Homogeneous(samples_.Centre(x), samples_.Centre(y), w) / w;
+      const auto& [u, v, w] = points[k];
+      point[k] = Homogeneous(u, v, w) / w;
     }
     std::array<ScreenVertex, 4> polygon;
     size_t count = 0;
@@ -171,7 +201,7 @@ class ViewPainter {
     const auto cell = QuarterCell(samples_, i + (corner & 1), j + (corner >> 1), corner, rule_);
     std::array<Vertex, 4> v;
     for (size_t k = 0; k < 4; ++k) {
-      v[k] = ProjectAt(cell[k].u, cell[k].v, cell[k].inverse_depth);
+      v[k] = ProjectAt(cell[k]);
       if (!v[k].in_front) return;
     }
     DrawTriangle(v[0].screen, v[1].screen, v[3].screen, layer_);
@@ -221,6 +251,15 @@ Layer DrawView(const ViewInNovel& view_in_novel, const PinholeCamera& novel,
   } else {
     painter.PaintSplats();
   }
+  return painter.TakeLayer();
+}
+
+Layer DrawReducedMesh(const ViewInNovel& view_in_novel, const AdaptiveMesh& mesh,
+                      const PinholeCamera& novel, const RenderOptions& options, const Band& band) {
+  RenderOptions drawn = options;
+  drawn.point_size = 1;
+  ViewPainter painter(view_in_novel, novel, drawn, band);
+  painter.PaintReducedMesh(mesh);
   return painter.TakeLayer();
 }
 

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "dtr/render/adaptive_mesh.h"
 #include "dtr/render/options.h"
 #include "dtr/types/view.h"
 
@@ -35,5 +36,9 @@ struct ViewInNovel {
 /// arguments; work per sample is bounded by the size of the band.
 Layer DrawView(const ViewInNovel& view_in_novel, const PinholeCamera& novel,
                const RenderOptions& options, const Band& band);
+
+/// SPEC 5.1: the same of the view's reduced mesh.
+Layer DrawReducedMesh(const ViewInNovel& view_in_novel, const AdaptiveMesh& mesh,
+                      const PinholeCamera& novel, const RenderOptions& options, const Band& band);
 
 }  // namespace dtr::cpu

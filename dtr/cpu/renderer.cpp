@@ -1,13 +1,14 @@
 #include "dtr/cpu/renderer.h"
 
 #include <algorithm>
-#include <limits>
+#include <string>
 
 #include "dtr/base/parallel_for.h"
 #include "dtr/cpu/layer.h"
 #include "dtr/cpu/own_depth.h"
 #include "dtr/cpu/resolve.h"
 #include "dtr/cpu/setup.h"
+#include "dtr/render/adaptive_mesh.h"
 #include "dtr/render/fill_holes.h"
 #include "dtr/render/frame.h"
 #include "dtr/render/valid_views.h"
@@ -25,47 +26,47 @@ int RowsPerBand(const PinholeCamera& novel, size_t views) {
   return static_cast<int>(std::min<size_t>(rows, static_cast<size_t>(novel.height_px())));
 }
 
-/// Moves a start depth nearer by pixels of disparity, the smallest that any of the views has.
-void MoveStart(const std::vector<ViewInNovel>& views, const RenderOptions& options, double shift_px,
-               std::vector<double>& start) {
-  double pixel = std::numeric_limits<double>::infinity();
-  for (const ViewInNovel& view : views) {
-    pixel = std::min(pixel, ThresholdsOf(*view.view, options).pixel);
-  }
-  for (double& w : start) {
-    if (w > 0) w = std::max(w + shift_px * pixel, 0.0);
-  }
+/// SPEC 5.1: the reduced mesh of each view; none by two passes.
+std::vector<AdaptiveMesh> MakeMeshes(const std::vector<ViewInNovel>& views,
+                                     const RenderOptions& options) {
+  std::vector<AdaptiveMesh> meshes;
+  if (options.method != RenderMethod::kDeferred) return meshes;
+  meshes.resize(views.size());
+  ParallelFor(0, static_cast<int>(views.size()), options.threads, [&](int i) {
+    const auto k = static_cast<size_t>(i);
+    std::string unfit;  // of a stored cover; the mesh is the same without it
+    meshes[k] = MakeAdaptiveMesh(*views[k].view, options, 1, unfit);
+  });
+  return meshes;
 }
 
-/// One layer per view: SPEC 2 and 3, or SPEC 5.
-std::vector<Layer> DrawLayers(const std::vector<ViewInNovel>& views, const PinholeCamera& novel,
-                              const RenderOptions& options, const Band& band,
-                              double start_shift_px) {
-  const bool deferred = options.method == RenderMethod::kDeferred;
-  RenderOptions drawn = options;
-  if (deferred) drawn.primitive = Primitive::kMesh;  // SPEC 5.1
+/// One layer per view: SPEC 2 and 3, or SPEC 5 from `meshes`.
+std::vector<Layer> DrawLayers(const std::vector<ViewInNovel>& views,
+                              const std::vector<AdaptiveMesh>& meshes, const PinholeCamera& novel,
+                              const RenderOptions& options, const Band& band) {
   const int count = static_cast<int>(views.size());
   std::vector<Layer> layers(views.size(), Layer(Band{}));
   const auto fill = [&](const auto& make_layer) {
     ParallelFor(0, count, options.threads, [&](int i) {
       const auto k = static_cast<size_t>(i);
-      layers[k] = make_layer(views[k]);
+      layers[k] = make_layer(k);
     });
   };
-  fill([&](const ViewInNovel& view) { return DrawView(view, novel, drawn, band); });
-  if (!deferred) return layers;
+  if (options.method != RenderMethod::kDeferred) {
+    fill([&](size_t k) { return DrawView(views[k], novel, options, band); });
+    return layers;
+  }
+  fill([&](size_t k) { return DrawReducedMesh(views[k], meshes[k], novel, options, band); });
   std::vector<double> surfaces = NearestSurface(layers);
-  if (start_shift_px != 0) MoveStart(views, options, start_shift_px, surfaces);
   KeepSurfacesThatViewsHold(views, novel, options, band, surfaces);
-  fill([&](const ViewInNovel& view) {
-    return FindOwnFragments(view, novel, options, band, surfaces);
-  });
+  fill([&](size_t k) { return FindOwnFragments(views[k], novel, options, band, surfaces); });
   return layers;
 }
 
-RenderResult Draw(const RenderScene& scene, const PinholeCamera& novel,
-                  const Pose& novel_from_world, const RenderOptions& options,
-                  double start_shift_px) {
+}  // namespace
+
+RenderResult Render(const RenderScene& scene, const PinholeCamera& novel,
+                    const Pose& novel_from_world, const RenderOptions& options) {
   CheckRenderOptions(options);
   CheckNovelCamera(novel, novel_from_world);
   RenderResult result = EmptyResult(novel);
@@ -76,12 +77,12 @@ RenderResult Draw(const RenderScene& scene, const PinholeCamera& novel,
   Setup setup = MakeSetup(scene, selection, novel, novel_from_world, options);
   std::vector<ResolveView>& views = setup.views;
 
+  const std::vector<AdaptiveMesh> meshes = MakeMeshes(setup.placed, options);
   const int rows_per_band = RowsPerBand(novel, views.size());
   for (int first_row = 0; first_row < novel.height_px(); first_row += rows_per_band) {
     const Band band{novel.width_px(), first_row,
                     std::min(rows_per_band, novel.height_px() - first_row)};
-    const std::vector<Layer> layers =
-        DrawLayers(setup.placed, novel, options, band, start_shift_px);
+    const std::vector<Layer> layers = DrawLayers(setup.placed, meshes, novel, options, band);
     for (size_t i = 0; i < views.size(); ++i) views[i].layer = &layers[i];
     ParallelFor(band.first_row, band.first_row + band.rows, options.threads,
                 [&](int y) { ResolveRow(setup.settings, views, y, result); });
@@ -89,19 +90,6 @@ RenderResult Draw(const RenderScene& scene, const PinholeCamera& novel,
   result.coverage_share = CoverageShare(result.coverage);
   if (options.fill_holes) FillHolesFromViews(scene, novel, novel_from_world, options, result);
   return result;
-}
-
-}  // namespace
-
-RenderResult Render(const RenderScene& scene, const PinholeCamera& novel,
-                    const Pose& novel_from_world, const RenderOptions& options) {
-  return Draw(scene, novel, novel_from_world, options, 0);
-}
-
-RenderResult RenderFromMovedStart(const RenderScene& scene, const PinholeCamera& novel,
-                                  const Pose& novel_from_world, const RenderOptions& options,
-                                  double start_shift_px) {
-  return Draw(scene, novel, novel_from_world, options, start_shift_px);
 }
 
 }  // namespace dtr::cpu

@@ -19,11 +19,4 @@ namespace dtr::cpu {
 RenderResult Render(const RenderScene& scene, const PinholeCamera& novel,
                     const Pose& novel_from_world, const RenderOptions& options);
 
-/// The same by the deferred method with the start of SPEC 5.1 moved nearer by so many pixels of
-/// disparity (of the view whose pixel is smallest). Other renderers may start that far off: where
-/// this changes the image two of them may rightly differ, and comparisons judge apart.
-RenderResult RenderFromMovedStart(const RenderScene& scene, const PinholeCamera& novel,
-                                  const Pose& novel_from_world, const RenderOptions& options,
-                                  double start_shift_px);
-
 }  // namespace dtr::cpu

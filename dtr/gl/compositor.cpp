@@ -9,7 +9,6 @@
 #include "dtr/gl/driver.h"
 #include "dtr/gl/objects.h"
 #include "dtr/gl/program.h"
-#include "dtr/gl/window_depth.h"
 
 namespace dtr::gl {
 namespace {
@@ -100,8 +99,8 @@ Viewport CurrentViewport() {
   return {box[0], box[1], box[2], box[3]};
 }
 
-WindowDepthMapping CurrentMapping(const DepthProjection& projection) {
-  WindowDepthMapping mapping;
+simd::WindowDepthMapping CurrentMapping(const DepthProjection& projection) {
+  simd::WindowDepthMapping mapping;
   mapping.at_infinity = static_cast<float>(projection.at_infinity);
   mapping.per_inverse_depth = static_cast<float>(projection.per_inverse_depth);
   GLint mode = GL_NEGATIVE_ONE_TO_ONE;
@@ -121,7 +120,7 @@ class Compositor::Implementation {
 
   void Composite(const DrawnPicture& picture, const DepthProjection& projection) {
     const Viewport viewport = CurrentViewport();
-    const WindowDepthMapping mapping = CurrentMapping(projection);
+    const simd::WindowDepthMapping mapping = CurrentMapping(projection);
     const bool in_memory = picture.rgba != nullptr;
     const CompositeGuard guard;
     if (in_memory) Bring(picture, mapping);
@@ -164,7 +163,7 @@ class Compositor::Implementation {
   /// An image in memory to the GPU, its depth as the host's buffer has it: a software rasteriser
   /// takes several times as long for that sum as the processor's vector instructions, and longer
   /// for texels of an array than of a plain texture. Within a CompositeGuard.
-  void Bring(const DrawnPicture& picture, const WindowDepthMapping& mapping) {
+  void Bring(const DrawnPicture& picture, const simd::WindowDepthMapping& mapping) {
     const bool known = picture.number != 0 && picture.number == brought_number_;
     if (known && mapping == brought_mapping_) return;
     brought_number_ = 0;  // until all of it is there
@@ -190,10 +189,10 @@ class Compositor::Implementation {
     } else {
       window_z_.resize(pixels);
       const bool has_guesses = picture.number == taken_number_;
-      MapToWindow(mapping, {picture.depth_z, pixels},
-                  has_guesses ? std::span<const std::uint8_t>(taken_guessed_)
-                              : std::span<const std::uint8_t>(),
-                  window_z_);
+      simd::MapToWindow(mapping, {picture.depth_z, pixels},
+                        has_guesses ? std::span<const std::uint8_t>(taken_guessed_)
+                                    : std::span<const std::uint8_t>(),
+                        window_z_);
       send(depth_, GL_RED, GL_FLOAT, window_z_.data());
     }
     brought_number_ = picture.number, brought_mapping_ = mapping;
@@ -208,7 +207,7 @@ class Compositor::Implementation {
   Texture image_, depth_;  ///< of what was brought last
   int width_ = 0, height_ = 0;
   std::uint64_t brought_number_ = 0;
-  WindowDepthMapping brought_mapping_;
+  simd::WindowDepthMapping brought_mapping_;
 };
 
 Compositor::Compositor(std::string shader_folder)

@@ -24,8 +24,8 @@ struct DepthProjection {
 };
 
 /// How the current context's state (glDepthRange, glClipControl, GL_DEPTH_CLAMP) and a host's
-/// projection map depth: for Renderer::Draw, just before the image is composited.
-WindowDepthMapping CurrentMapping(const DepthProjection& projection);
+/// projection map depth: for FittingRenderer::Draw, just before the image is composited.
+simd::WindowDepthMapping CurrentMapping(const DepthProjection& projection);
 
 /// Draws images into the framebuffer that the current context draws to, pixel for pixel over its
 /// viewport, with depth: the host's depth test, its mask, blending, scissor, stencil and colour

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "dtr/base/error.h"
+#include "dtr/gl/driver.h"
 
 namespace dtr::gl {
 namespace {
@@ -29,11 +30,15 @@ constexpr EGLint kContextFlags = EGL_CONTEXT_OPENGL_DEBUG_BIT_KHR;
               "; use `renderer` cpu");
 }
 
-/// epoxy ends the program when a library is absent, so this asks first.
-void RequireLibrary(const char* name, const char* alternative) {
-  if (dlopen(name, RTLD_LAZY | RTLD_GLOBAL) != nullptr) return;
-  if (alternative != nullptr && dlopen(alternative, RTLD_LAZY | RTLD_GLOBAL) != nullptr) return;
-  Reject(std::string("no ") + name);
+/// epoxy ends the program when a library is absent, so this asks first. Null, or the name of one
+/// that is.
+const char* MissingLibrary() {
+  const auto is_there = [](const char* name) {
+    return dlopen(name, RTLD_LAZY | RTLD_GLOBAL) != nullptr;
+  };
+  if (!is_there("libEGL.so.1")) return "libEGL.so.1";
+  if (!is_there("libOpenGL.so.0") && !is_there("libGL.so.1")) return "libOpenGL.so.0";
+  return nullptr;
 }
 
 bool HasWord(const char* list, std::string_view word) {
@@ -46,19 +51,26 @@ bool HasWord(const char* list, std::string_view word) {
   return false;
 }
 
-/// Displays to try: devices with hardware first, software last, then what needs no device.
-std::vector<EGLDisplay> CandidateDisplays() {
+/// What EGL lists of its displays.
+struct Displays {
   std::vector<EGLDisplay> hardware, software;
+  bool lists_devices = false;  ///< else nothing is known of the hardware
+};
+
+Displays FindDisplays() {
+  Displays displays;
+  auto& [hardware, software, lists_devices] = displays;
   const char* extensions = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
   const auto platform_display = reinterpret_cast<PFNEGLGETPLATFORMDISPLAYEXTPROC>(
       eglGetProcAddress("eglGetPlatformDisplayEXT"));
-  if (platform_display == nullptr) return {};
+  if (platform_display == nullptr) return displays;
   const auto query_devices =
       reinterpret_cast<PFNEGLQUERYDEVICESEXTPROC>(eglGetProcAddress("eglQueryDevicesEXT"));
   const auto device_string = reinterpret_cast<PFNEGLQUERYDEVICESTRINGEXTPROC>(
       eglGetProcAddress("eglQueryDeviceStringEXT"));
   if (HasWord(extensions, "EGL_EXT_platform_device") && query_devices != nullptr &&
       device_string != nullptr) {
+    lists_devices = true;
     std::array<EGLDeviceEXT, 16> devices{};
     EGLint count = 0;
     query_devices(static_cast<EGLint>(devices.size()), devices.data(), &count);
@@ -74,8 +86,15 @@ std::vector<EGLDisplay> CandidateDisplays() {
     software.insert(software.begin(),
                     platform_display(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr));
   }
-  hardware.insert(hardware.end(), software.begin(), software.end());
-  return hardware;
+  return displays;
+}
+
+/// Displays to try: devices with hardware first, software last, then what needs no device.
+std::vector<EGLDisplay> CandidateDisplays() {
+  Displays displays = FindDisplays();
+  displays.hardware.insert(displays.hardware.end(), displays.software.begin(),
+                           displays.software.end());
+  return displays.hardware;
 }
 
 EGLContext CreateContext(EGLDisplay display) {
@@ -123,8 +142,7 @@ struct EglContext::State {
 };
 
 EglContext::EglContext() : state_(std::make_unique<State>()) {
-  RequireLibrary("libEGL.so.1", nullptr);
-  RequireLibrary("libOpenGL.so.0", "libGL.so.1");
+  if (const char* const missing = MissingLibrary()) Reject(std::string("no ") + missing);
   bool any_display = false;
   for (const EGLDisplay display : CandidateDisplays()) {
     EGLint major = 0, minor = 0;
@@ -140,6 +158,21 @@ EglContext::EglContext() : state_(std::make_unique<State>()) {
     eglDestroyContext(display, context);
   }
   Reject(any_display ? "only older ones" : "no display that EGL can open");
+}
+
+std::unique_ptr<EglContext> EglContext::OnGpu(std::string& why) {
+  why = "no GPU was found";
+  if (MissingLibrary() != nullptr) return nullptr;
+  // A software driver's context takes tens of milliseconds: not where devices are listed.
+  const Displays displays = FindDisplays();
+  if (displays.lists_devices && displays.hardware.empty()) return nullptr;
+  try {
+    auto context = std::make_unique<EglContext>();
+    if (!DrawsOnProcessor()) return context;
+  } catch (const Error&) {
+    why = "the GPU's driver has no OpenGL 4.3";
+  }
+  return nullptr;
 }
 
 EglContext::~EglContext() {

@@ -14,6 +14,8 @@ class EglContext {
   /// OpenGL, or none of version 4.3.
   EglContext();
   ~EglContext();
+  /// One whose driver draws with a GPU, else null and in `why` the reason, half a line.
+  static std::unique_ptr<EglContext> OnGpu(std::string& why);
   EglContext(const EglContext&) = delete;
   EglContext& operator=(const EglContext&) = delete;
 
@@ -30,8 +32,9 @@ class EglContext {
 std::string CurrentContextDescription();
 
 /// From now on the current context counts the errors, undefined behaviour and messages of high
-/// severity that the driver reports (KHR_debug), and prints them to stderr. For tests and development;
-/// builds without NDEBUG make their contexts as debug contexts, in which drivers say more.
+/// severity that the driver reports (KHR_debug), and prints them to stderr. For tests and
+/// development; builds without NDEBUG make their contexts as debug contexts, in which drivers say
+/// more.
 class DebugOutput {
  public:
   DebugOutput();

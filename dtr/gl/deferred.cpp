@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 
+#include "dtr/render/grid_placement.h"
+
 namespace dtr::gl {
 namespace {
 
@@ -35,10 +37,8 @@ void CoarseDepth::AddBatches(int first, int count, int log2_sharing) {
   }
 }
 
-void CoarseDepth::Draw(const Frame& frame, const Band& band, const MeshStore& meshes,
+void CoarseDepth::Draw(const RenderFrame& frame, const Band& band, const MeshStore& meshes,
                        ProgramCache& programs, const Targets& targets) {
-  if (!by_shaders_) DrawOnProcessor(frame, band, meshes);
-  if (frame.on_processor) return;
   const auto pixels = static_cast<GLsizeiptr>(targets.width) * targets.rows;
   if (!buffer_) buffer_ = Buffer::Make();
   glBindBuffer(GL_SHADER_STORAGE_BUFFER, buffer_.name());
@@ -47,25 +47,10 @@ void CoarseDepth::Draw(const Frame& frame, const Band& band, const MeshStore& me
                  GL_STREAM_COPY);
     pixels_ = pixels;
   }
-  if (by_shaders_) {
-    DrawByShaders(frame, band, meshes, programs);
-  } else {
-    glBufferSubData(GL_SHADER_STORAGE_BUFFER, 0,
-                    static_cast<GLsizeiptr>(raster_.nearest().size() * sizeof(float)),
-                    raster_.nearest().data());
-  }
+  DrawByShaders(frame, band, meshes, programs);
 }
 
-void CoarseDepth::DrawOnProcessor(const Frame& frame, const Band& band, const MeshStore& meshes) {
-  std::vector<PlacedMesh> placed;
-  for (size_t i = 0; i < frame.views.size(); ++i) {
-    const AdaptiveMesh& mesh = meshes.MeshOf(*frame.views[i]).mesh;
-    placed.push_back({&mesh, PlaceGrid(*frame.views[i], mesh, frame.placements[i], frame.novel)});
-  }
-  raster_.Draw(placed, frame.novel.width_px(), band, frame.options.threads);
-}
-
-void CoarseDepth::DrawByShaders(const Frame& frame, const Band& band, const MeshStore& meshes,
+void CoarseDepth::DrawByShaders(const RenderFrame& frame, const Band& band, const MeshStore& meshes,
                                 ProgramCache& programs) {
   glClearBufferData(GL_SHADER_STORAGE_BUFFER, GL_R32UI, GL_RED_INTEGER, GL_UNSIGNED_INT, nullptr);
   glBindBufferBase(GL_SHADER_STORAGE_BUFFER, kCoarseDepthBinding, buffer_.name());
@@ -76,7 +61,7 @@ void CoarseDepth::DrawByShaders(const Frame& frame, const Band& band, const Mesh
   std::vector<GridPlacement> placements;
   batches_.clear();
   for (size_t i = 0; i < frame.views.size(); ++i) {
-    const AdaptiveMesh& mesh = meshes.MeshOf(*frame.views[i]).mesh;
+    const AdaptiveMesh& mesh = meshes.LayoutOf(*frame.views[i]);
     placements.push_back(PlaceGrid(*frame.views[i], mesh, frame.placements[i], frame.novel));
     for (const bool cells : {false, true}) {
       const int first = static_cast<int>(batches_.size());

@@ -4,31 +4,24 @@
 #include <cstdint>
 #include <vector>
 
-#include "dtr/gl/coarse_raster.h"
 #include "dtr/gl/drawing.h"
-#include "dtr/gl/frame.h"
 #include "dtr/gl/mesh_store.h"
 #include "dtr/gl/program.h"
+#include "dtr/render/frame.h"
 
 namespace dtr::gl {
 
 /// Draws the views' reduced meshes into one depth per pixel; keeps its buffer from frame to frame.
 class CoarseDepth {
  public:
-  /// `by_shaders`: as the store that keeps the meshes was told; else on the CPU.
-  explicit CoarseDepth(bool by_shaders) : by_shaders_(by_shaders) {}
-
   /// The nearest surface of all views of the frame. Their meshes must have been prepared with these
   /// options.
-  void Draw(const Frame& frame, const Band& band, const MeshStore& meshes, ProgramCache& programs,
-            const Targets& targets);
+  void Draw(const RenderFrame& frame, const Band& band, const MeshStore& meshes,
+            ProgramCache& programs, const Targets& targets);
 
   /// Inverse depth in the novel camera as the bits of a float, 0 where nothing is; rows of the
   /// targets' width, the band's first row first. Valid after Draw.
   GLuint buffer() const { return buffer_.name(); }
-
-  /// The same in memory, for frames that are drawn on the processor; there is no buffer of those.
-  const std::vector<float>& nearest() const { return raster_.nearest(); }
 
  private:
   /// What a group of invocations draws, as coarse_depth.glsl says.
@@ -36,15 +29,12 @@ class CoarseDepth {
     std::uint32_t first = 0, count_and_sharing = 0;
   };
   void AddBatches(int first, int count, int log2_sharing);
-  void DrawByShaders(const Frame& frame, const Band& band, const MeshStore& meshes,
+  void DrawByShaders(const RenderFrame& frame, const Band& band, const MeshStore& meshes,
                      ProgramCache& programs);
-  void DrawOnProcessor(const Frame& frame, const Band& band, const MeshStore& meshes);
 
-  const bool by_shaders_;
   Buffer buffer_, batch_buffer_;
   GLsizeiptr pixels_ = 0;
   std::vector<Batch> batches_;
-  CoarseRaster raster_;
 };
 
 }  // namespace dtr::gl

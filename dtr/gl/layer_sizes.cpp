@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <set>
 
-#include "dtr/gl/stored_depth.h"
+#include "dtr/gl/depth_picture.h"
 
 namespace dtr::gl {
 namespace {

@@ -1,11 +1,10 @@
 #include "dtr/gl/mesh_store.h"
 
 #include <cstdint>
-#include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "dtr/base/error.h"
-#include "dtr/base/parallel_for.h"
 #include "dtr/gl/driver.h"
 
 namespace dtr::gl {
@@ -41,61 +40,34 @@ Buffer Upload(const View& view, const std::vector<T>& values, size_t& bytes) {
   return buffer;
 }
 
+CoarseMesh Uploaded(const View& view, const AdaptiveMesh& mesh) {
+  CoarseMesh uploaded;
+  uploaded.triangles = Upload(view, Corners(mesh), uploaded.bytes);
+  uploaded.cells = Upload(view, mesh.cells, uploaded.bytes);
+  return uploaded;
+}
+
 }  // namespace
 
-MeshStore::Key MeshStore::KeyOf(const View& view, const RenderOptions& options) {
-  return {options.resolution, MeshRuleOf(view, options), view.depth.grid().data().data()};
-}
-
-void MeshStore::Prepare(const std::vector<const View*>& views, const RenderOptions& options) {
-  std::vector<const View*> missing;
-  for (const View* view : views) {
-    if (Has(*view, options)) {
-      views_.at(view).key.depth_data = view->depth.grid().data().data();
-    } else if (view->depth.empty()) {
-      throw std::logic_error(view->name + ": neither its depth is there nor its mesh");
-    } else {
-      missing.push_back(view);
-    }
-  }
-  std::vector<AdaptiveMesh> meshes(missing.size());
-  std::vector<std::string> unfit(missing.size());
-  // One view alone has all cores; of several each has one.
-  const int threads_each = missing.size() > 1 ? 1 : options.threads;
-  ParallelFor(0, static_cast<int>(missing.size()), options.threads, [&](int i) {
-    const auto k = static_cast<size_t>(i);
-    meshes[k] = MakeAdaptiveMesh(*missing[k], options, threads_each, unfit[k]);
-  });
-  for (size_t k = 0; k < missing.size(); ++k) {
-    if (unfit[k].empty()) continue;
-    warn_("WARNING: " + missing[k]->name +
-          ": its stored mesh does not fit its depth map and was made again: " + unfit[k]);
-  }
-  for (size_t k = 0; k < missing.size(); ++k) {
-    Stored stored{KeyOf(*missing[k], options), {}};
-    CoarseMesh& mesh = stored.mesh;
-    if (for_shaders_) {
-      mesh.triangles = Upload(*missing[k], Corners(meshes[k]), mesh.bytes);
-      mesh.cells = Upload(*missing[k], meshes[k].cells, mesh.bytes);
-      meshes[k].vertices = {}, meshes[k].indices = {}, meshes[k].cells = {};
-    }
-    mesh.mesh = std::move(meshes[k]);
-    views_.insert_or_assign(missing[k], std::move(stored));
-  }
-}
-
-bool MeshStore::Has(const View& view, const RenderOptions& options) const {
-  const auto found = views_.find(&view);
-  if (found == views_.end()) return false;
-  Key wanted = KeyOf(view, options);
-  const void* const stored = found->second.key.depth_data;
-  if (view.depth.empty() || stored == nullptr) wanted.depth_data = stored;
-  return found->second.key == wanted;
-}
+MeshStore::MeshStore(MeshCache::Warn warn)
+    : cache_(std::move(warn), [this](const View& view, AdaptiveMesh& mesh) {
+        meshes_.insert_or_assign(&view, Uploaded(view, mesh));
+        mesh.vertices = {}, mesh.indices = {}, mesh.cells = {};
+      }) {}
 
 size_t MeshStore::BytesOf(const View& view) const {
-  const auto found = views_.find(&view);
-  return found == views_.end() ? 0 : found->second.mesh.bytes;
+  const auto found = meshes_.find(&view);
+  return found == meshes_.end() ? 0 : found->second.bytes;
+}
+
+void MeshStore::Drop(const View& view) {
+  cache_.Drop(view);
+  meshes_.erase(&view);
+}
+
+void MeshStore::Clear() {
+  cache_.Clear();
+  meshes_.clear();
 }
 
 }  // namespace dtr::gl

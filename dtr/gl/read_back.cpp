@@ -20,16 +20,4 @@ void ReadBack(const Targets& targets, const Band& band, RenderResult& result) {
   StoreRows(band, width, image.data(), marks.data(), result);
 }
 
-void StoreRows(const Band& band, int width_px, const std::uint8_t* image, const std::uint8_t* marks,
-               RenderResult& result) {
-  const size_t pixels = static_cast<size_t>(width_px) * static_cast<size_t>(band.count);
-  const size_t first = static_cast<size_t>(band.first) * static_cast<size_t>(width_px);
-  for (size_t p = 0; p < pixels; ++p) {
-    for (size_t c = 0; c < 3; ++c) result.image.data()[3 * (first + p) + c] = image[4 * p + c];
-    result.coverage.data()[first + p] = image[4 * p + 3];
-    result.view_count.data()[first + p] = marks[4 * p];
-    result.delta_border.data()[first + p] = marks[4 * p + 1];
-  }
-}
-
 }  // namespace dtr::gl

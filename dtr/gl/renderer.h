@@ -4,26 +4,17 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "dtr/gl/window_depth.h"
 #include "dtr/render/options.h"
 #include "dtr/render/result.h"
 #include "dtr/render/scene.h"
+#include "dtr/simd/window_depth.h"
 #include "dtr/types/camera.h"
 #include "dtr/types/pose.h"
 
 namespace dtr::gl {
-
-/// Who draws the deferred method: the surface that it starts from (SPEC 5.1), and its pixels where
-/// ProcessorResolver knows how.
-enum class CoarseDrawer {
-  kFitting,    ///< shaders, or our own code where the driver itself draws on the CPU
-  kShaders,    ///< compute shaders
-  kProcessor,  ///< our own code, on the CPU
-};
 
 /// What does not change the image, beyond the last digits.
 struct RendererSettings {
@@ -36,37 +27,30 @@ struct RendererSettings {
   size_t gpu_bytes = size_t{4} << 30;
   /// Told of what the image goes without, a line each, on the thread that draws.
   std::function<void(const std::string&)> warn = [](const std::string&) {};
-  CoarseDrawer coarse_drawer = CoarseDrawer::kFitting;
   /// Leave unused what the driver has beyond OpenGL 4.3, as on one that has no more.
   bool only_opengl_43 = false;
   /// Take its storage blocks for no larger than this, as on one that has smaller ones.
   size_t max_storage_bytes = SIZE_MAX;
-  /// Draw() leaves images that the processor drew where they are (DrawnPicture::rgba, depth_z),
-  /// for gl::Compositor.
-  bool in_memory = false;
 };
 
 /// An image that was drawn and lies on the GPU: names of GL_TEXTURE_2D_ARRAY textures of one layer
-/// that belong to the renderer and hold the image until its next call. Row 0 is the top row.
-/// Where RendererSettings::in_memory asks for it and the processor drew, there are no textures (0):
-/// it then lies in the renderer's memory, as long.
+/// that belong to the renderer and hold the image until its next call. Row 0 is the top row. A
+/// FittingRenderer's may lie in its memory instead, as long: then there are no textures (0).
 struct DrawnPicture {
   unsigned image = 0;  ///< RGBA8, sRGB values; alpha 1 where some view saw the pixel, else 0
   unsigned depth = 0;  ///< R32F, plane z in scene units; 0 where unseen
   unsigned marks = 0;  ///< RGBA8UI: views blended; 255 at the Delta border (SPEC 6.2)
   const std::uint32_t* rgba = nullptr;  ///< in memory: as image, red the lowest byte; else null
   const float* depth_z = nullptr;       ///< in memory: as depth
-  /// In memory: what MapToWindow makes of depth_z by `mapping`, where Draw was told one; else null.
+  /// In memory: what MapToWindow makes of depth_z by `mapping`, where Draw was given one; else
+  /// null.
   const float* window_z = nullptr;
-  WindowDepthMapping mapping;
+  simd::WindowDepthMapping mapping;
   /// No two images of a process have the same, whoever drew them.
   std::uint64_t number = 0;
   int width_px = 0, height_px = 0;
   std::vector<int> views_used;  ///< as RenderResult::views_used
-  /// The renderer holds all that images by these options need of these views: their pixels may go
-  /// and need not come back for them (CanDraw). So where it draws on the processor; it then has
-  /// what it made of them in memory.
-  bool views_held = false;
+  bool views_held = false;      ///< as simd::DrawnImage; never of textures
 };
 
 /// Draws scenes with the OpenGL context that is current, into targets of its own, and leaves the
@@ -96,15 +80,8 @@ class Renderer {
   /// filled (options.fill_holes is not looked at). Drawn at once, whatever layer_bytes says. May
   /// return before the GPU has finished. Throws as Render; also dtr::Error where the deferred
   /// method's depth (4 bytes a pixel) is more than one storage block of this driver.
-  /// `mapping`: images left in memory get window_z, too, while their depth is in the cache.
   DrawnPicture Draw(const RenderScene& scene, const PinholeCamera& novel,
-                    const Pose& novel_from_world, const RenderOptions& options,
-                    const std::optional<WindowDepthMapping>& mapping = std::nullopt);
-
-  /// True when this image can be drawn though the pixels of some of its views went: the renderer
-  /// holds what it would make of them. (Of others it has what it needs: the pixels.)
-  bool CanDraw(const RenderScene& scene, const PinholeCamera& novel, const Pose& novel_from_world,
-               const RenderOptions& options) const;
+                    const Pose& novel_from_world, const RenderOptions& options);
 
   /// The image of the last Draw, which must be the last call that drew (std::logic_error): what
   /// Render gives without filling.

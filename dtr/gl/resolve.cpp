@@ -107,7 +107,7 @@ int Resolver::SlotOf(std::vector<int>& bound, int array) const {
   return static_cast<int>(bound.size()) - 1;
 }
 
-void Resolver::SetViews(const Frame& frame, ViewStore& store) {
+void Resolver::SetViews(const RenderFrame& frame, ViewStore& store) {
   image_arrays_.clear();
   depth_arrays_.clear();
   std::vector<ViewBlock> blocks;
@@ -129,7 +129,7 @@ void Resolver::SetViews(const Frame& frame, ViewStore& store) {
                blocks.data(), GL_STREAM_DRAW);
 }
 
-const Program& Resolver::ProgramFor(const Frame& frame, ProgramCache& programs) const {
+const Program& Resolver::ProgramFor(const RenderFrame& frame, ProgramCache& programs) const {
   const int views = static_cast<int>(frame.views.size());
   const auto define = [](const char* name, auto value) {
     return std::string(name) + " " + std::to_string(static_cast<long>(value));
@@ -143,7 +143,7 @@ const Program& Resolver::ProgramFor(const Frame& frame, ProgramCache& programs) 
        define("LINEAR_LIGHT", frame.options.blend_in_linear_light)});
 }
 
-void Resolver::Draw(const Frame& frame, const Band& band, const ViewStore& store,
+void Resolver::Draw(const RenderFrame& frame, const Band& band, const ViewStore& store,
                     ProgramCache& programs, const Targets& targets, GLuint coarse_depth) {
   const RenderOptions& options = frame.options;
   const BlendParameters blend = BlendParametersOf(options, frame.novel.fx_px());

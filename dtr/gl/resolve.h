@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "dtr/gl/drawing.h"
-#include "dtr/gl/frame.h"
 #include "dtr/gl/program.h"
 #include "dtr/gl/view_store.h"
+#include "dtr/render/frame.h"
 
 namespace dtr::gl {
 
@@ -19,17 +19,17 @@ class Resolver {
 
   /// Puts what the shader knows of each view on the GPU. The views must have been prepared. Throws
   /// dtr::Error where their images and depths lie in more texture arrays than there are units for.
-  void SetViews(const Frame& frame, ViewStore& store);
+  void SetViews(const RenderFrame& frame, ViewStore& store);
 
   /// From the layers of `targets` (two passes) or the depth in `coarse_depth` (deferred; a storage
   /// buffer) into the results of `targets`.
-  void Draw(const Frame& frame, const Band& band, const ViewStore& store, ProgramCache& programs,
-            const Targets& targets, GLuint coarse_depth);
+  void Draw(const RenderFrame& frame, const Band& band, const ViewStore& store,
+            ProgramCache& programs, const Targets& targets, GLuint coarse_depth);
 
  private:
   bool BlocksFitUniforms(int views) const;
   int SlotOf(std::vector<int>& bound, int array) const;
-  const Program& ProgramFor(const Frame& frame, ProgramCache& programs) const;
+  const Program& ProgramFor(const RenderFrame& frame, ProgramCache& programs) const;
 
   GLint max_uniform_bytes_ = 0;
   VertexArray empty_array_;

@@ -26,7 +26,7 @@ void DrawTriangles(GLsizei index_count) {
   }
 }
 
-void DrawView(const Frame& frame, const Band& band, int index, ViewStore& store,
+void DrawView(const RenderFrame& frame, const Band& band, int index, ViewStore& store,
               ProgramCache& programs, const Targets& targets, bool clip_control) {
   const auto i = static_cast<size_t>(index);
   const View& view = *frame.views[i];
@@ -82,8 +82,8 @@ void DrawView(const Frame& frame, const Band& band, int index, ViewStore& store,
 
 }  // namespace
 
-void DrawViewLayers(const Frame& frame, const Band& band, ViewStore& store, ProgramCache& programs,
-                    const Targets& targets, bool clip_control) {
+void DrawViewLayers(const RenderFrame& frame, const Band& band, ViewStore& store,
+                    ProgramCache& programs, const Targets& targets, bool clip_control) {
   for (int i = 0; i < static_cast<int>(frame.views.size()); ++i) {
     DrawView(frame, band, i, store, programs, targets, clip_control);
   }

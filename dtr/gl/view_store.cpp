@@ -4,8 +4,9 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
+#include "dtr/gl/depth_picture.h"
 #include "dtr/gl/driver.h"
-#include "dtr/gl/stored_depth.h"
+#include "dtr/render/stored_depth.h"
 #include "dtr/render/texture.h"
 #include "dtr/render/triangulation.h"
 
@@ -109,7 +110,7 @@ void ViewStore::Drop(const View& view) {
   views_.erase(found);
 }
 
-size_t ViewStore::BytesOf(const View& view) {
+size_t ViewStore::BytesOf(const View& view) const {
   const auto found = views_.find(&view);
   if (found == views_.end()) return 0;
   const Stored& stored = found->second;

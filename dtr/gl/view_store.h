@@ -56,7 +56,7 @@ class ViewStore {
   GLuint texture_array(int index) const { return arrays_.name(index); }
 
   /// What lies on the GPU of a view.
-  size_t BytesOf(const View& view);
+  size_t BytesOf(const View& view) const;
   void Drop(const View& view);
   /// Drops what was made of the view for other methods and primitives.
   void DropUnusedBy(const RenderOptions& options, const View& view);

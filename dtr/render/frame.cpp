@@ -64,4 +64,44 @@ std::vector<int> CanonicalOrder(const RenderScene& scene, std::vector<int> views
   return views;
 }
 
+RenderFrame MakeFrame(const RenderScene& scene, const PinholeCamera& novel,
+                      const Pose& novel_from_world, const RenderOptions& options,
+                      const ViewSelection& selection) {
+  RenderFrame frame{scene, novel, options, selection.per_pixel, {}, {}, {}};
+  for (const int index : CanonicalOrder(scene, selection.views)) {
+    const View& view = *scene.views[static_cast<size_t>(index)];
+    frame.views.push_back(&view);
+    frame.placements.push_back(PlaceView(view, novel_from_world));
+    frame.cut_factors.push_back(1);
+  }
+  return frame;
+}
+
+void SetCutFactors(const ViewSelection& selection, size_t count, RenderFrame& frame) {
+  const std::vector<double> factors = CutFactors(selection, count);
+  for (size_t k = 0; k < count; ++k) {
+    const View* view = frame.scene.views[static_cast<size_t>(selection.views[k])];
+    const auto at = std::find(frame.views.begin(), frame.views.end(), view);
+    frame.cut_factors[static_cast<size_t>(at - frame.views.begin())] = factors[k];
+  }
+}
+
+std::vector<const View*> NearestFirst(const RenderScene& scene, const ViewSelection& selection) {
+  std::vector<const View*> views;
+  for (const int index : selection.views) views.push_back(scene.views[static_cast<size_t>(index)]);
+  return views;
+}
+
+void StoreRows(const Band& band, int width_px, const std::uint8_t* image, const std::uint8_t* marks,
+               RenderResult& result) {
+  const size_t pixels = static_cast<size_t>(width_px) * static_cast<size_t>(band.count);
+  const size_t first = static_cast<size_t>(band.first) * static_cast<size_t>(width_px);
+  for (size_t p = 0; p < pixels; ++p) {
+    for (size_t c = 0; c < 3; ++c) result.image.data()[3 * (first + p) + c] = image[4 * p + c];
+    result.coverage.data()[first + p] = image[4 * p + 3];
+    result.view_count.data()[first + p] = marks[4 * p];
+    result.delta_border.data()[first + p] = marks[4 * p + 1];
+  }
+}
+
 }  // namespace dtr

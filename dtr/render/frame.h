@@ -1,10 +1,14 @@
 // dtr/render/frame.h -- the parts of drawing one image that every renderer has in common.
 #pragma once
 #include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
 #include <vector>
 
+#include "dtr/render/options.h"
 #include "dtr/render/result.h"
 #include "dtr/render/scene.h"
+#include "dtr/render/valid_views.h"
 #include "dtr/types/camera.h"
 #include "dtr/types/pose.h"
 
@@ -33,5 +37,47 @@ ViewPlacement PlaceView(const View& view, const Pose& novel_from_world);
 
 /// SPEC 4.7: `views`, indices into the scene, in the order in which sums run: that of the ids.
 std::vector<int> CanonicalOrder(const RenderScene& scene, std::vector<int> views);
+
+/// One rendered image as every pass of a fast renderer sees it: the views that take part, in
+/// canonical order.
+struct RenderFrame {
+  const RenderScene& scene;
+  const PinholeCamera& novel;
+  const RenderOptions& options;
+  bool per_pixel = false;  ///< SPEC 1.3
+  std::vector<const View*> views;
+  std::vector<ViewPlacement> placements;  ///< of the views
+  std::vector<double> cut_factors;        ///< SPEC 1.4, of the views
+
+  void Erase(size_t view) {
+    const auto at = static_cast<std::ptrdiff_t>(view);
+    views.erase(views.begin() + at);
+    placements.erase(placements.begin() + at);
+    cut_factors.erase(cut_factors.begin() + at);
+  }
+  bool deferred() const { return options.method == RenderMethod::kDeferred; }
+};
+
+/// Of the selection's views; no cut factors yet. Nothing of its arguments is copied but the views.
+RenderFrame MakeFrame(const RenderScene& scene, const PinholeCamera& novel,
+                      const Pose& novel_from_world, const RenderOptions& options,
+                      const ViewSelection& selection);
+
+/// SPEC 1.4, where the `count` nearest of the selection's views are drawn.
+void SetCutFactors(const ViewSelection& selection, size_t count, RenderFrame& frame);
+
+/// Views of a selection, nearest first.
+std::vector<const View*> NearestFirst(const RenderScene& scene, const ViewSelection& selection);
+
+/// Rows [first, first + count) of a rendered image.
+struct Band {
+  int first = 0, count = 0;
+};
+
+/// SPEC 6: the band's rows of pixels of 4 bytes into those of `result`, which has the rendered
+/// image's size; all but depth. `image`: RGBA, alpha 255 where seen; `marks`: views blended, 255 at
+/// the Delta border, two unused.
+void StoreRows(const Band& band, int width_px, const std::uint8_t* image, const std::uint8_t* marks,
+               RenderResult& result);
 
 }  // namespace dtr

@@ -11,23 +11,36 @@
 namespace dtr {
 namespace {
 
-constexpr int kMaxPlanes = 8, kTrials = 600, kFits = 5;
+constexpr int kMaxPlanes = 8, kTrials = 600, kFits = 5, kDraws = 8;
 constexpr double kMaxSamples = 6000;
 constexpr double kMinShare = 0.01;   // of the samples, for a plane
 constexpr double kCloser = 0.6;      // from one fit to the next
 constexpr double kReach = 0.4;       // of the longer side, from a triple's first position
 constexpr double kMinArea = 0.0004;  // of all, of a triple's triangle
 
-PlaneSamples SamplesOf(const Grid<double>& inverse_depth) {
+/// Samples, and where each lies among all positions that may have one.
+struct PlacedSamples : PlaneSamples {
+  std::vector<int> positions;  ///< of the samples
+  std::vector<int> sample_at;  ///< by position; -1: none
+
+  void Add(double sample_x, double sample_y, double w, int position) {
+    sample_at[static_cast<size_t>(position)] = static_cast<int>(x.size());
+    x.push_back(sample_x);
+    y.push_back(sample_y);
+    inverse_depth.push_back(w);
+    positions.push_back(position);
+  }
+};
+
+PlacedSamples SamplesOf(const Grid<double>& inverse_depth) {
   const double count = static_cast<double>(inverse_depth.width()) * inverse_depth.height();
   const int step = std::max(1, static_cast<int>(std::ceil(std::sqrt(count / kMaxSamples))));
-  PlaneSamples samples;
+  PlacedSamples samples;
   for (int y = step / 2; y < inverse_depth.height(); y += step) {
     for (int x = step / 2; x < inverse_depth.width(); x += step) {
-      if (!(inverse_depth(x, y) > 0)) continue;
-      samples.x.push_back(x + 0.5);
-      samples.y.push_back(y + 0.5);
-      samples.inverse_depth.push_back(inverse_depth(x, y));
+      const auto position = static_cast<int>(samples.sample_at.size());
+      samples.sample_at.push_back(-1);
+      if (inverse_depth(x, y) > 0) samples.Add(x + 0.5, y + 0.5, inverse_depth(x, y), position);
     }
   }
   return samples;
@@ -42,13 +55,12 @@ bool LiesOn(const PicturePlane& plane, const PlaneSamples& samples, size_t i, do
 }
 
 /// What does not lie within `tolerance` of the plane.
-PlaneSamples Without(const PicturePlane& plane, const PlaneSamples& samples, double tolerance) {
-  PlaneSamples left;
+PlacedSamples Without(const PicturePlane& plane, const PlacedSamples& samples, double tolerance) {
+  PlacedSamples left;
+  left.sample_at.assign(samples.sample_at.size(), -1);
   for (size_t i = 0; i < samples.size(); ++i) {
     if (LiesOn(plane, samples, i, tolerance)) continue;
-    left.x.push_back(samples.x[i]);
-    left.y.push_back(samples.y[i]);
-    left.inverse_depth.push_back(samples.inverse_depth[i]);
+    left.Add(samples.x[i], samples.y[i], samples.inverse_depth[i], samples.positions[i]);
   }
   return left;
 }
@@ -76,14 +88,24 @@ struct Found {
   PicturePlane plane = PicturePlane::Zero();
   size_t support = 0;
 };
-Found BestOfTriples(const PlaneSamples& samples, double reach, double min_area, double tolerance,
+Found BestOfTriples(const PlacedSamples& samples, double reach, double min_area, double tolerance,
                     Random& random) {
   Found best;
-  const auto pick = [&] {
-    return static_cast<size_t>(random.Index(static_cast<int>(samples.size())));
+  // Positions are drawn, not numbers of samples, and as many whatever is there: one sample more or
+  // less, as two renderers may have it, changes no other draw.
+  const auto pick = [&]() -> int {
+    int found = -1;
+    for (int draw = 0; draw < kDraws; ++draw) {
+      const int position = random.Index(static_cast<int>(samples.sample_at.size()));
+      if (found < 0) found = samples.sample_at[static_cast<size_t>(position)];
+    }
+    return found;
   };
   for (int trial = 0; trial < kTrials; ++trial) {
-    const size_t i = pick(), j = pick(), k = pick();
+    const int picked[3] = {pick(), pick(), pick()};
+    if (*std::min_element(picked, picked + 3) < 0) continue;
+    const auto i = static_cast<size_t>(picked[0]), j = static_cast<size_t>(picked[1]),
+               k = static_cast<size_t>(picked[2]);
     const Eigen::Vector3d a = PositionOf(samples, i), b = PositionOf(samples, j),
                           c = PositionOf(samples, k);
     if ((b - a).norm() > reach || (c - a).norm() > reach) continue;
@@ -101,7 +123,7 @@ Found BestOfTriples(const PlaneSamples& samples, double reach, double min_area, 
 }  // namespace
 
 std::vector<PicturePlane> FindPlanes(const Grid<double>& inverse_depth, double tolerance) {
-  PlaneSamples samples = SamplesOf(inverse_depth);
+  PlacedSamples samples = SamplesOf(inverse_depth);
   const auto least = static_cast<size_t>(kMinShare * static_cast<double>(samples.size())) + 3;
   const double reach = kReach * std::max(inverse_depth.width(), inverse_depth.height());
   const double min_area = kMinArea * inverse_depth.width() * inverse_depth.height();

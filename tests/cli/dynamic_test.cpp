@@ -31,7 +31,7 @@ class DynamicSetBy : public MovingSphereSet, public ::testing::WithParamInterfac
     }
   }
 };
-INSTANTIATE_TEST_SUITE_P(Renderers, DynamicSetBy, ::testing::Values("cpu", "gl"));
+INSTANTIATE_TEST_SUITE_P(Renderers, DynamicSetBy, ::testing::Values("cpu", "gl", "simd"));
 
 double MeanDifference(const fs::path& a_file, const fs::path& b_file) {
   const ImageRgb8 a = io::ReadImage(a_file), b = io::ReadImage(b_file);

@@ -13,6 +13,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr size_t kMaxShaderBytes = 1 << 20;
 
@@ -25,7 +26,7 @@ class OpenGl : public SmallCourtyardSet {
   }
   /// Only a machine without OpenGL has none: every other failure is one.
   bool HasOpenGl() {
-    const Ran ran = Render();
+    const Ran ran = Render({"--renderer", "gl"});
     if (ran.code == 0) return true;
     EXPECT_THAT(ran.err, HasSubstr("OpenGL: expected a context of version 4.3"));
     return false;
@@ -35,9 +36,10 @@ class OpenGl : public SmallCourtyardSet {
 TEST_F(OpenGl, AMachineWithoutItIsToldInOneLine) {
   const Environment no_driver("__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent");
   for (const char* command : {"render", "evaluate", "bench"}) {
-    std::vector<std::string> args{command, Set()};
-    if (std::string(command) == "render")
-      args = {command, Set(), "--like", "0001", "-o", In("v.png")};
+    std::vector<std::string> args{command, Set(), "--renderer", "gl"};
+    if (std::string(command) == "render") {
+      args.insert(args.end(), {"--like", "0001", "-o", In("v.png")});
+    }
     const Ran ran = Dtr(args);
     ExpectRejected(ran, kFailed,
                    "OpenGL: expected a context of version 4.3 or newer through EGL, found");
@@ -45,6 +47,31 @@ TEST_F(OpenGl, AMachineWithoutItIsToldInOneLine) {
   }
   EXPECT_FALSE(fs::exists(In("v.png")));
   EXPECT_EQ(Render({"--renderer", "cpu"}).code, 0);
+}
+
+TEST_F(OpenGl, AutoTakesSimdWithoutAGpuAndSaysSo) {
+  const Environment no_driver("__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent");
+  const Ran deferred = Render({"--method", "deferred"});
+  EXPECT_EQ(deferred.code, 0) << deferred.err;
+  EXPECT_THAT(deferred.err, HasSubstr("renderer: simd ("));
+  const std::string by_auto = Text(In("v.png"));
+  const Ran named = Render({"--method", "deferred", "--renderer", "simd"});
+  EXPECT_EQ(named.code, 0) << named.err;
+  EXPECT_THAT(named.err, Not(HasSubstr("renderer:")));
+  EXPECT_EQ(Text(In("v.png")), by_auto);
+
+  const Ran two_pass = Render({"--method", "two-pass"});
+  EXPECT_EQ(two_pass.code, 0) << two_pass.err;
+  EXPECT_THAT(two_pass.err, HasSubstr("renderer: cpu for the two-pass method"));
+  ExpectRejected(Render({"--method", "two-pass", "--renderer", "simd"}), kWrongUsage,
+                 "--renderer simd: cannot draw by the two-pass method; use --method deferred");
+}
+
+TEST_F(OpenGl, AutoDrawsTwoPassesWithADriverOfTheProcessorWhereThereIsOne) {
+  if (!HasOpenGl()) GTEST_SKIP() << "no OpenGL 4.3";
+  const Ran ran = Render({"--method", "two-pass"});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.err, HasSubstr("renderer: gl ("));
 }
 
 TEST_F(OpenGl, NeedsNoDisplay) {
@@ -85,13 +112,14 @@ TEST_F(OpenGl, OpenSceneGraphsTableSaysWhatItAdds) {
 
 TEST_F(OpenGl, AnOlderContextIsToldInOneLine) {
   const Environment old("MESA_GL_VERSION_OVERRIDE", "3.3");
-  ExpectRejected(Render(), kFailed,
+  ExpectRejected(Render({"--renderer", "gl"}), kFailed,
                  "OpenGL: expected a context of version 4.3 or newer through EGL, found");
 }
 
 TEST_F(OpenGl, ShadersComeFromAFolderWhereOneIsGiven) {
   if (!HasOpenGl()) GTEST_SKIP() << "no OpenGL 4.3";
   fs::copy("dtr/gl/shaders", In("shaders"));  // tests run in the root of the sources
+  ASSERT_EQ(Render({"--renderer", "gl"}).code, 0);
   const std::string embedded = Text(In("v.png"));
   ASSERT_EQ(Render({"--shader-dir", In("shaders")}).code, 0);
   EXPECT_EQ(Text(In("v.png")), embedded);
@@ -122,7 +150,7 @@ TEST_F(OpenGl, AskingForSplatsPicksTheMethodThatHasThem) {
 
 TEST_F(OpenGl, BenchPrintsATableForPeopleAndOneForPrograms) {
   if (!HasOpenGl()) GTEST_SKIP() << "no OpenGL 4.3";
-  for (const char* renderer : {"gl", "cpu"}) {
+  for (const char* renderer : {"auto", "gl", "cpu"}) {
     const Ran ran =
         DtrOk({"bench", Set(), "--table", "report", "--size", "60x0", "--repeats", "1", "--views",
                "2,3", "--cameras", "1", "--renderer", renderer, "--json", In("bench.json")});

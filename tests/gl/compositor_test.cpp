@@ -167,32 +167,26 @@ Apart ApartFrom(const Shown& shown, const RenderResult& picture, const Grid<floa
   return apart;
 }
 
-RendererSettings DrawnByTheProcessor(bool in_memory) {
-  RendererSettings settings;
-  settings.in_memory = in_memory;
-  settings.coarse_drawer = CoarseDrawer::kProcessor;
-  return settings;
-}
-
 class CompositorTest : public testing::GlTest {
  protected:
   /// The damaged scene: holes, masks, a step.
   const NamedScene scene_ = ParityScenes()[3];
   const RenderScene views_ = MakeRenderScene(scene_.set);
 
-  DrawnPicture Draw(Renderer& renderer) const {
+  DrawnPicture Draw(FittingRenderer& renderer) const {
     return renderer.Draw(views_, scene_.novel.camera, scene_.novel.cam_from_world, {});
   }
-  RenderResult Render() const {
-    Renderer renderer;
+  RenderResult Render(Drawer drawer = Drawer::kOpenGl) const {
+    FittingRenderer renderer({}, drawer);
     return renderer.Render(views_, scene_.novel.camera, scene_.novel.cam_from_world, {});
   }
 };
 
 TEST_F(CompositorTest, ATextureAndAPictureInMemoryAreShownWhereTheyAreInFront) {
-  const RenderResult picture = Render();
   for (const bool in_memory : {false, true}) {
-    Renderer renderer(DrawnByTheProcessor(in_memory));
+    const Drawer drawer = in_memory ? Drawer::kSimd : Drawer::kOpenGl;
+    const RenderResult picture = Render(drawer);
+    FittingRenderer renderer({}, drawer);
     Compositor compositor;
     Host host;
     const DrawnPicture drawn = Draw(renderer);
@@ -209,8 +203,8 @@ TEST_F(CompositorTest, ATextureAndAPictureInMemoryAreShownWhereTheyAreInFront) {
 }
 
 TEST_F(CompositorTest, DepthThatIsMappedAsItIsDrawnIsTheSame) {
-  const RenderResult picture = Render();
-  Renderer renderer(DrawnByTheProcessor(true));
+  const RenderResult picture = Render(Drawer::kSimd);
+  FittingRenderer renderer({}, Drawer::kSimd);
   Compositor compositor;
   Host host;
   for (const HostState& state : States()) {
@@ -218,7 +212,7 @@ TEST_F(CompositorTest, DepthThatIsMappedAsItIsDrawnIsTheSame) {
       const Shown shown = host.With(state, [&] {
         DepthProjection projection = ProjectionOf(state);
         if (!as_said) projection.at_infinity *= 1.01;
-        const WindowDepthMapping mapping = CurrentMapping(projection);
+        const simd::WindowDepthMapping mapping = CurrentMapping(projection);
         const DrawnPicture drawn =
             renderer.Draw(views_, scene_.novel.camera, scene_.novel.cam_from_world, {}, mapping);
         EXPECT_NE(drawn.window_z, nullptr);
@@ -233,7 +227,7 @@ TEST_F(CompositorTest, DepthThatIsMappedAsItIsDrawnIsTheSame) {
 }
 
 TEST_F(CompositorTest, TheNextPictureTakesThePlaceOfTheLast) {
-  Renderer renderer(DrawnByTheProcessor(true));
+  FittingRenderer renderer({}, Drawer::kSimd);
   Compositor compositor;
   Host host;
   const HostState plain = States().front();
@@ -267,7 +261,7 @@ TEST_F(CompositorTest, WhatIsGuessedIsNeverCutOff) {
 }
 
 TEST_F(CompositorTest, LeavesTheHostsStateAsItWas) {
-  Renderer renderer(DrawnByTheProcessor(true));
+  FittingRenderer renderer({}, Drawer::kSimd);
   Compositor compositor;
   Host host;
   const DrawnPicture drawn = Draw(renderer);

@@ -152,15 +152,14 @@ TEST_F(Extremes, RandomCamerasGiveNoNanAndNoContradiction) {
     scenes.push_back(std::move(odd));
   }
   const int cameras = CamerasToTry();
-  RendererSettings shaders;  // what a GPU would draw with
-  shaders.coarse_drawer = CoarseDrawer::kShaders;
   // Options change less often than cameras: other resolutions and primitives need other meshes.
   const int cameras_per_options = std::max(4, cameras / 500);
   int seen = 0;
   for (size_t i = 0; i < scenes.size(); ++i) {
     const RenderScene views = MakeRenderScene(scenes[i].set);
     const Levels levels = LevelsOf(scenes[i].set);
-    Renderer fitting, by_shaders(shaders);
+    Renderer by_shaders;
+    FittingRenderer fitting({}, Drawer::kSimd);
     RenderOptions options;
     for (int k = static_cast<int>(i); k < cameras; k += static_cast<int>(scenes.size())) {
       Random random(static_cast<std::uint64_t>(k));
@@ -168,8 +167,10 @@ TEST_F(Extremes, RandomCamerasGiveNoNanAndNoContradiction) {
         options = OddOptions(random);
       const Shot shot = OddShot(views, random);
       SCOPED_TRACE(scenes[i].name + ", camera " + std::to_string(k));
-      Renderer& renderer = k / static_cast<int>(scenes.size()) % 2 == 0 ? fitting : by_shaders;
-      const RenderResult result = renderer.Render(views, shot.camera, shot.cam_from_world, options);
+      const bool simd = k / static_cast<int>(scenes.size()) % 2 == 0;
+      const RenderResult result =
+          simd ? fitting.Render(views, shot.camera, shot.cam_from_world, options)
+               : by_shaders.Render(views, shot.camera, shot.cam_from_world, options);
       ExpectSound(result);
       EXPECT_EQ(PixelsBeyond(levels, result), 0);
       if (HasFatalFailure()) return;

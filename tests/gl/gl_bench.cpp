@@ -34,13 +34,13 @@ double LeastMilliseconds(const std::function<void()>& draw) {
   return *std::min_element(times.begin(), times.end());
 }
 
-double DrawingMilliseconds(const dtr::gl::Frame& frame) {
+double DrawingMilliseconds(const dtr::RenderFrame& frame) {
   const dtr::gl::StateGuard guard;
   dtr::gl::ViewStore store;
   dtr::gl::ProgramCache programs("");
   dtr::gl::Targets targets;
   store.Prepare(frame.views, frame.options);
-  const dtr::gl::Band band{0, frame.novel.height_px()};
+  const dtr::Band band{0, frame.novel.height_px()};
   targets.Fit(frame.novel.width_px(), band.count, static_cast<int>(frame.views.size()));
   return LeastMilliseconds([&] {
     dtr::gl::DrawViewLayers(frame, band, store, programs, targets, dtr::gl::HasClipControl());
@@ -48,12 +48,9 @@ double DrawingMilliseconds(const dtr::gl::Frame& frame) {
 }
 
 double FrameMilliseconds(const dtr::RenderScene& scene, const dtr::NovelCamera& novel,
-                         dtr::RenderOptions options, dtr::RenderMethod method,
-                         dtr::gl::CoarseDrawer drawer) {
+                         dtr::RenderOptions options, dtr::RenderMethod method) {
   options.method = method;
-  dtr::gl::RendererSettings settings;
-  settings.coarse_drawer = drawer;
-  dtr::gl::Renderer renderer(settings);
+  dtr::gl::Renderer renderer;
   return LeastMilliseconds(
       [&] { renderer.Draw(scene, novel.camera, novel.cam_from_world, options); });
 }
@@ -73,7 +70,7 @@ int main(int argc, char** argv) {
   if (argc > 2) options.views = std::atoi(argv[2]);
   if (argc > 3) options.resolution = std::atoi(argv[3]);
   const dtr::gl::EglContext context;
-  dtr::gl::Frame frame{scene, novel.camera, options, false, false, {}, {}, {}};
+  dtr::RenderFrame frame{scene, novel.camera, options, false, {}, {}, {}};
   double triangles = 0;
   for (const int index : dtr::SelectViews(scene, novel.cam_from_world, options).views) {
     const dtr::View& view = *scene.views[static_cast<size_t>(index)];
@@ -85,17 +82,15 @@ int main(int argc, char** argv) {
   std::printf("%s; %dx%d, R %d: %.2f M triangles from %zu views, %.1f CPU ms, %.1f ns each\n",
               context.Description().c_str(), novel.camera.width_px(), novel.camera.height_px(),
               options.resolution, 1e-6 * triangles, frame.views.size(), ms, 1e6 * ms / triangles);
-  const auto whole = [&](dtr::RenderMethod method, dtr::gl::CoarseDrawer drawer) {
-    return FrameMilliseconds(scene, novel, options, method, drawer);
+  const auto whole = [&](dtr::RenderMethod method) {
+    return FrameMilliseconds(scene, novel, options, method);
   };
-  using dtr::gl::CoarseDrawer;
-  const double two_pass = whole(dtr::RenderMethod::kTwoPass, CoarseDrawer::kFitting);
-  const double deferred = whole(dtr::RenderMethod::kDeferred, CoarseDrawer::kFitting);
-  const double shaders = whole(dtr::RenderMethod::kDeferred, CoarseDrawer::kShaders);
+  const double two_pass = whole(dtr::RenderMethod::kTwoPass);
+  const double deferred = whole(dtr::RenderMethod::kDeferred);
   std::printf(
       "whole frames: two passes %.1f CPU ms (%.1f ns a triangle, %.1f for each of its two passes), "
-      "deferred %.1f (%.1f times as fast), deferred by shaders %.1f (%.1f)\n",
+      "deferred %.1f (%.1f times as fast)\n",
       two_pass, 1e6 * two_pass / triangles, 0.5e6 * two_pass / triangles, deferred,
-      two_pass / deferred, shaders, two_pass / shaders);
+      two_pass / deferred);
   return 0;
 }

@@ -7,36 +7,13 @@
 #include "dtr/gl/drawing.h"
 #include "dtr/gl/texture_arrays.h"
 #include "tests/gl/gl_testing.h"
+#include "tests/simd/many_views.h"
 
 namespace dtr::gl {
 namespace {
 
 using namespace dtr::testing;
 using GpuMemory = GlTest;
-
-constexpr int kViews = 12;
-
-/// Views along a line before a wall with a square on it; every fourth has another size.
-DtrSet ManyViews() {
-  std::vector<View> views;
-  for (int i = 0; i < kViews; ++i) {
-    Shot shot = ShotFrom("v" + std::string(1, static_cast<char>('a' + i)),
-                         {0.4 * (i - kViews / 2), 0, 0}, {0, 0, 10});
-    if (i % 4 == 3) shot.camera = PinholeCamera(80, 50, 75, 75, 40, 25);
-    views.push_back(Photograph(SquareAndPlane(), shot));
-  }
-  return SetOf(std::move(views));
-}
-
-Shot CameraAt(double x) { return ShotFrom("n", {x, 0.1, 0.2}, {0, 0, 10}); }
-constexpr double kWalk[] = {-2.2, -1.1, 0.1, 1.3, 2.1, 0.3, -1.9, 2.2};
-
-RenderOptions Options(RenderMethod method, Primitive primitive = Primitive::kMesh) {
-  RenderOptions options = OptionsOf(method);
-  options.primitive = primitive;
-  options.views = 4;
-  return options;
-}
 
 std::vector<RenderOptions> EveryWay() {
   return {Options(RenderMethod::kTwoPass), Options(RenderMethod::kTwoPass, Primitive::kSplat),
@@ -180,67 +157,6 @@ TEST_F(GpuMemoryFull, IsSaidInOneLine) {
     EXPECT_NE(line.find("--renderer cpu"), std::string::npos) << line;
     EXPECT_EQ(line.find('\n'), std::string::npos) << line;
   }
-}
-
-TEST_F(GpuMemory, WhatIsHeldIsDrawnWithoutPixels) {
-  DtrSet set = ManyViews();
-  std::vector<View>& views = set.frames[0].views;
-  const std::vector<View> with_pixels = views;
-  const RenderScene scene = MakeRenderScene(set);
-  RendererSettings settings;
-  settings.coarse_drawer = CoarseDrawer::kProcessor;
-  Renderer renderer(settings);
-  const Shot novel = CameraAt(0.1);
-  const auto draw = [&](const RenderOptions& options) {
-    const DrawnPicture drawn = renderer.Draw(scene, novel.camera, novel.cam_from_world, options);
-    return std::pair(renderer.ReadBack(), drawn);
-  };
-  const auto can_draw = [&](const RenderOptions& options) {
-    return renderer.CanDraw(scene, novel.camera, novel.cam_from_world, options);
-  };
-  const auto drop = [&](const std::vector<int>& used) {
-    for (const int index : used) {
-      View& view = views[static_cast<size_t>(index)];
-      view.image = {};
-      view.depth = {};
-    }
-  };
-  const RenderOptions deferred = Options(RenderMethod::kDeferred);
-  const auto [first, drawn] = draw(deferred);
-  ASSERT_TRUE(drawn.views_held);
-  ASSERT_GT(first.coverage_share, 0.5);
-  drop(drawn.views_used);
-  EXPECT_TRUE(can_draw(deferred));
-  EXPECT_EQ(draw(deferred).first.image, first.image);
-  EXPECT_EQ(draw(deferred).first.depth, first.depth);
-  // Others need the pixels: other samples, other views, meshes for every pixel.
-  RenderOptions coarser = deferred, more = deferred;
-  coarser.resolution = 2;
-  more.views = 5;
-  EXPECT_FALSE(can_draw(coarser));
-  EXPECT_FALSE(can_draw(Options(RenderMethod::kTwoPass)));
-  EXPECT_TRUE(can_draw(more)) << "the fifth has its pixels";
-
-  views = with_pixels;  // as they are read again: elsewhere in memory
-  EXPECT_EQ(draw(deferred).first.image, first.image);
-  EXPECT_FALSE(draw(Options(RenderMethod::kTwoPass)).second.views_held);
-  EXPECT_EQ(draw(coarser).first.image, DrawAlone(scene, 0.1, coarser).result.image);
-  drop(drawn.views_used);
-  EXPECT_THROW(draw(deferred), Error) << "what it held was of coarser samples";
-}
-
-TEST_F(GpuMemory, NothingIsHeldWhereViewsMakeRoomForOneAnother) {
-  const DtrSet set = ManyViews();
-  const RenderScene scene = MakeRenderScene(set);
-  const RenderOptions deferred = Options(RenderMethod::kDeferred);
-  RendererSettings settings;
-  settings.coarse_drawer = CoarseDrawer::kProcessor;
-  settings.gpu_bytes = DrawAlone(scene, 0.1, deferred).bytes;  // as long as none lies beside them
-  Renderer renderer(settings);
-  const Shot novel = CameraAt(0.1);
-  const DrawnPicture drawn = renderer.Draw(scene, novel.camera, novel.cam_from_world, deferred);
-  EXPECT_EQ(drawn.views_used.size(), 4u);
-  EXPECT_FALSE(drawn.views_held);
 }
 
 }  // namespace

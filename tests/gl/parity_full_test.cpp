@@ -1,7 +1,8 @@
 // The measure of parity_test.cpp on larger images: the figures of docs/accuracy/RENDERING.md.
 #include <gtest/gtest.h>
 
-#include "tests/gl/parity_matrix.h"
+#include "tests/gl/gl_testing.h"
+#include "tests/simd/parity_matrix.h"
 
 namespace dtr::gl {
 namespace {
@@ -11,7 +12,8 @@ using namespace dtr::testing;
 class FullParity : public GlTest, public ::testing::WithParamInterface<std::string> {};
 
 TEST_P(FullParity, HoldsForEveryMethodWeightPrimitiveAndResolution) {
-  ExpectParityOfAll(ExactOrDamagedScene(GetParam(), 9, 480, 320), 8);
+  Renderer renderer;
+  ExpectParityOfAll(renderer, ExactOrDamagedScene(GetParam(), 9, 480, 320), 8);
 }
 
 INSTANTIATE_TEST_SUITE_P(, FullParity, ::testing::ValuesIn(ExactSceneNames()),

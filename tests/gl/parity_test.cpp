@@ -6,9 +6,9 @@
 #include <cstdio>
 
 #include "dtr/cpu/renderer.h"
-#include "tests/gl/comparison.h"
-#include "tests/gl/parity_matrix.h"
-#include "tests/support/instruction_sets.h"
+#include "tests/gl/gl_testing.h"
+#include "tests/simd/comparison.h"
+#include "tests/simd/parity_matrix.h"
 
 namespace dtr::gl {
 namespace {
@@ -18,7 +18,8 @@ using namespace dtr::testing;
 class ExactSceneParity : public GlTest, public ::testing::WithParamInterface<std::string> {};
 
 TEST_P(ExactSceneParity, HoldsForEveryMethodWeightPrimitiveAndResolution) {
-  ExpectParityOfAll(ExactOrDamagedScene(GetParam(), 5, 192, 128), 4);
+  Renderer renderer;
+  ExpectParityOfAll(renderer, ExactOrDamagedScene(GetParam(), 5, 192, 128), 4);
 }
 
 INSTANTIATE_TEST_SUITE_P(, ExactSceneParity, ::testing::ValuesIn(ExactSceneNames()),
@@ -27,36 +28,13 @@ INSTANTIATE_TEST_SUITE_P(, ExactSceneParity, ::testing::ValuesIn(ExactSceneNames
 class ShapeParity : public GlTest, public ::testing::WithParamInterface<int> {};
 
 TEST_P(ShapeParity, HoldsForEveryMethodWeightPrimitiveAndResolution) {
-  ExpectParityOfAll(ParityScenes()[static_cast<size_t>(GetParam())], 4);
+  Renderer renderer;
+  ExpectParityOfAll(renderer, ParityScenes()[static_cast<size_t>(GetParam())], 4);
 }
 
 INSTANTIATE_TEST_SUITE_P(, ShapeParity, ::testing::Range(0, 6));
 
 using Parity = GlTest;
-
-// What a GPU draws: also where the processor has a kernel of its own (ProcessorResolver).
-void ExpectParityOfShaders(const NamedScene& scene) {
-  RendererSettings settings;
-  settings.coarse_drawer = CoarseDrawer::kShaders;
-  Renderer renderer(settings);
-  ExpectParityOf(renderer, scene, RenderMethod::kDeferred, Primitive::kMesh, 4);
-}
-
-TEST_P(ExactSceneParity, HoldsForTheShadersOfAGpu) {
-  ExpectParityOfShaders(ExactOrDamagedScene(GetParam(), 5, 192, 128));
-}
-
-TEST_P(ShapeParity, HoldsForTheShadersOfAGpu) {
-  ExpectParityOfShaders(ParityScenes()[static_cast<size_t>(GetParam())]);
-}
-
-// The kernel of the deferred method is chosen by the processor; every choice draws the reference.
-TEST_F(Parity, HoldsWithEveryInstructionSet) {
-  WithEachInstructionSet([](auto) {
-    Renderer renderer;
-    ExpectParityOf(renderer, ParityScenes()[3], RenderMethod::kDeferred, Primitive::kMesh, 4);
-  });
-}
 
 TEST_F(Parity, HoldsForTheReportsAbsoluteThresholdsAndInLinearLight) {
   Renderer renderer;
@@ -74,51 +52,20 @@ TEST_F(Parity, HoldsForTheReportsAbsoluteThresholdsAndInLinearLight) {
   }
 }
 
-// Masked samples are no holes: they say nothing (SPEC 5.2), and squares of them are passed over.
 TEST_F(Parity, HoldsWhereViewsAreMaskedInLargePieces) {
-  NamedScene scene = ExactOrDamagedScene("courtyard", 5, 192, 128);
-  int k = 0;
-  for (View& view : scene.set.frames[0].views) {
-    if (view.mask.empty()) view.mask = Mask(192, 128, 1, 255);
-    for (int y = 0; y < 128; ++y) {
-      for (int x = 0; x < 192; ++x) {
-        const bool masked = (x / 64 + y / 64 + k) % 3 == 0;
-        const bool hole = x < 70 && y > 60 && k % 2 == 0;
-        if (masked) view.mask(x, y) = 0;
-        if (masked || hole) view.depth(x, y) = 0;
-      }
-    }
-    ++k;
-  }
-  RendererSettings shaders;
-  shaders.coarse_drawer = CoarseDrawer::kShaders;
-  Renderer by_processor, by_shaders(shaders);
+  const NamedScene scene = MaskedInLargePieces();
+  Renderer renderer;
   for (const int resolution : {1, 2}) {
     RenderOptions options = OptionsOf(RenderMethod::kDeferred);
     options.resolution = resolution;
-    EXPECT_TRUE(ExpectParity(by_processor, scene, options).Holds()) << resolution;
-    EXPECT_TRUE(ExpectParity(by_shaders, scene, options).Holds()) << resolution;
+    EXPECT_TRUE(ExpectParity(renderer, scene, options).Holds()) << resolution;
   }
 }
 
-// A map without one sample was never looked at (SPEC 2.1): from its own place others are seen.
 TEST_F(Parity, HoldsWhereAViewHasNoDepthAtAll) {
-  NamedScene scene = ExactOrDamagedScene("courtyard", 5, 192, 128);
-  View& empty = scene.set.frames[0].views[2];
-  for (float& z : empty.depth.grid().data()) z = 0;
-  scene.novel.camera = empty.camera;
-  scene.novel.cam_from_world = empty.cam_from_world;
-  RendererSettings shaders;
-  shaders.coarse_drawer = CoarseDrawer::kShaders;
-  Renderer by_processor, by_shaders(shaders);
-  const RenderOptions options = OptionsOf(RenderMethod::kDeferred);
-  EXPECT_TRUE(ExpectParity(by_processor, scene, options).Holds());
-  EXPECT_TRUE(ExpectParity(by_shaders, scene, options).Holds());
-  const RenderResult picture = cpu::Render(MakeRenderScene(scene.set), scene.novel.camera,
-                                           scene.novel.cam_from_world, options);
-  const auto& coverage = picture.coverage.data();
-  EXPECT_GT(std::count_if(coverage.begin(), coverage.end(), [](auto c) { return c != 0; }),
-            static_cast<std::ptrdiff_t>(coverage.size() / 2));
+  Renderer renderer;
+  EXPECT_TRUE(
+      ExpectParity(renderer, OneViewWithoutDepth(), OptionsOf(RenderMethod::kDeferred)).Holds());
 }
 
 TEST_F(Parity, WouldSeeHalfAPixel) {

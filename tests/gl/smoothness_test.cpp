@@ -12,8 +12,9 @@
 #include <vector>
 
 #include "dtr/render/camera_path.h"
-#include "tests/gl/comparison.h"
-#include "tests/gl/exact_scenes.h"
+#include "tests/gl/gl_testing.h"
+#include "tests/simd/comparison.h"
+#include "tests/simd/exact_scenes.h"
 
 namespace dtr::gl {
 namespace {

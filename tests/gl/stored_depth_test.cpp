@@ -1,10 +1,11 @@
 // Depth on the GPU in the set's 16 bits: what the shader decodes is what the file says.
-#include "dtr/gl/stored_depth.h"
+#include "dtr/render/stored_depth.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "dtr/gl/depth_picture.h"
 #include "dtr/gl/layer_sizes.h"
 #include "dtr/types/inverse_depth_code.h"
 #include "tests/gl/gl_testing.h"

@@ -1,5 +1,6 @@
 // epoxy's header, in the first of these, must come before OpenSceneGraph's.
-#include "tests/gl/exact_scenes.h"
+#include "tests/gl/gl_testing.h"
+#include "tests/simd/exact_scenes.h"
 // clang-format keeps this group apart.
 #include <osg/Geometry>
 #include <osg/MatrixTransform>
@@ -21,7 +22,7 @@ constexpr double kShareOfBorderPixels = 2e-4;
 /// An image as dtr/gl draws it, in a context of its own.
 RenderResult DrawnAlone(const DtrSet& set, const Shot& novel, const RenderOptions& options) {
   const gl::EglContext context;
-  gl::Renderer renderer;
+  gl::FittingRenderer renderer;
   return renderer.Render(MakeRenderScene(set), novel.camera, novel.cam_from_world, options);
 }
 

@@ -1,6 +1,7 @@
 // Hole filling among models: the image of dtr/gl, with a depth that models hide by and are hidden
 // by.
-#include "tests/gl/exact_scenes.h"
+#include "tests/gl/gl_testing.h"
+#include "tests/simd/exact_scenes.h"
 // clang-format keeps this group apart.
 #include <osg/Group>
 
@@ -28,7 +29,7 @@ RenderOptions Filled(RenderMethod method = RenderMethod::kDeferred) {
 /// An image as dtr/gl draws it, in a context of its own.
 RenderResult DrawnAlone(const DtrSet& set, const Shot& novel, const RenderOptions& options) {
   const gl::EglContext context;
-  gl::Renderer renderer;
+  gl::FittingRenderer renderer;
   return renderer.Render(MakeRenderScene(set), novel.camera, novel.cam_from_world, options);
 }
 

@@ -1,5 +1,6 @@
 // 10 000 frames in OpenSceneGraph leave nothing behind.
-#include "tests/gl/exact_scenes.h"
+#include "tests/gl/gl_testing.h"
+#include "tests/simd/exact_scenes.h"
 // clang-format keeps this group apart.
 #include <osg/PositionAttitudeTransform>
 

@@ -1,5 +1,6 @@
 // A model of known shape stands in the courtyard: who hides whom, pixel by pixel.
-#include "tests/gl/exact_scenes.h"
+#include "tests/gl/gl_testing.h"
+#include "tests/simd/exact_scenes.h"
 // clang-format keeps this group apart.
 #include <osg/MatrixTransform>
 #include <osg/PositionAttitudeTransform>

@@ -1,5 +1,6 @@
 // The program osgviewer with the plugin, as its users start it.
-#include "tests/gl/exact_scenes.h"
+#include "tests/gl/gl_testing.h"
+#include "tests/simd/exact_scenes.h"
 // clang-format keeps this group apart.
 #include <fcntl.h>
 #include <signal.h>
@@ -78,7 +79,7 @@ void Keep(const std::string& name, const ImageRgb8& image) {
 RenderResult FromInputCamera(const DtrSet& set, const View& view,
                              const RenderOptions& options = {}) {
   const gl::EglContext context;
-  gl::Renderer renderer;
+  gl::FittingRenderer renderer;
   // OpenSceneGraph's DisplaySettings: a screen 0.26 m high seen from 0.5 m.
   const double focal = kHeight * 0.5 / 0.26;
   return renderer.Render(MakeRenderScene(set),

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "dtr/gl/fitting_renderer.h"
 #include "dtr/render/camera_path.h"
 #include "dtr/render/options.h"
 #include "dtr/render/view_stream.h"
@@ -29,7 +30,8 @@ struct AppSettings {
   int width_px = 1280, height_px = 800;
   RenderOptions render;
   size_t gpu_bytes = size_t{4} << 30;
-  std::string shader_folder;                          ///< as gl::RendererSettings
+  std::string shader_folder;  ///< as gl::RendererSettings
+  gl::Drawer drawer = gl::Drawer::kFitting;
   std::filesystem::path output = ".";                 ///< folder for what the user saves
   std::string output_stem = "view";                   ///< first part of those files' names
   bool panel = true, cameras = false, photo = false;  ///< shown from the start; photo: compared

@@ -40,10 +40,10 @@ PinholeCamera Smaller(const PinholeCamera& camera, int divisor) {
 }  // namespace
 
 PictureMaker::PictureMaker(ViewStream& stream, ViewColours colours, gl::RendererSettings settings,
-                           SigmaOf sigma_of)
+                           gl::Drawer drawer, SigmaOf sigma_of)
     : stream_(stream),
       colours_(std::move(colours)),
-      renderer_(std::move(settings)),
+      renderer_(std::move(settings), drawer),
       sigma_of_(std::move(sigma_of)) {}
 
 ImageRgb8 PictureMaker::InFalseColour() {

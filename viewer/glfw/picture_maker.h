@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "dtr/gl/renderer.h"
+#include "dtr/gl/fitting_renderer.h"
 #include "dtr/render/camera_path.h"
 #include "dtr/render/fill_holes.h"
 #include "dtr/render/view_stream.h"
@@ -55,7 +55,7 @@ class PictureMaker {
  public:
   /// The stream must outlive it.
   PictureMaker(ViewStream& stream, ViewColours colours, gl::RendererSettings settings,
-               SigmaOf sigma_of);
+               gl::Drawer drawer, SigmaOf sigma_of);
 
   const ViewColours& colours() const { return colours_; }
 
@@ -93,7 +93,7 @@ class PictureMaker {
 
   ViewStream& stream_;
   const ViewColours colours_;
-  gl::Renderer renderer_;
+  gl::FittingRenderer renderer_;
   const SigmaOf sigma_of_;
   Wireframe wireframe_;
   MadePicture picture_;

@@ -27,6 +27,10 @@ void PictureTexture::Fit(int width_px, int height_px) {
 
 void PictureTexture::Take(const gl::DrawnPicture& drawn) {
   Fit(drawn.width_px, drawn.height_px);
+  if (drawn.rgba != nullptr) {
+    Send(drawn.rgba);
+    return;
+  }
   glCopyImageSubData(drawn.image, GL_TEXTURE_2D_ARRAY, 0, 0, 0, 0, name_, GL_TEXTURE_2D, 0, 0, 0, 0,
                      drawn.width_px, drawn.height_px, 1);
 }
@@ -39,10 +43,13 @@ void PictureTexture::Upload(const ImageRgb8& image, const Mask& alpha) {
     for (size_t c = 0; c < 3; ++c) rgba[4 * p + c] = image.data()[3 * p + c];
     rgba[4 * p + 3] = alpha.empty() ? 255 : alpha.data()[p];
   }
+  Send(rgba.data());
+}
+
+void PictureTexture::Send(const void* rgba) {
   glBindTexture(GL_TEXTURE_2D, name_);
   glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
-  glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, image.width(), image.height(), GL_RGBA, GL_UNSIGNED_BYTE,
-                  rgba.data());
+  glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, width_px_, height_px_, GL_RGBA, GL_UNSIGNED_BYTE, rgba);
 }
 
 }  // namespace dtr::viewer

@@ -14,7 +14,7 @@ class PictureTexture {
   PictureTexture(const PictureTexture&) = delete;
   PictureTexture& operator=(const PictureTexture&) = delete;
 
-  /// Copies what the renderer drew, on the GPU.
+  /// Copies what the renderer drew, from the GPU or from memory.
   void Take(const gl::DrawnPicture& drawn);
   /// `alpha` empty: all of it is shown; else of the image's size.
   void Upload(const ImageRgb8& image, const Mask& alpha = {});
@@ -26,6 +26,7 @@ class PictureTexture {
 
  private:
   void Fit(int width_px, int height_px);
+  void Send(const void* rgba);
 
   unsigned name_ = 0;
   int width_px_ = 0, height_px_ = 0;

@@ -26,7 +26,7 @@ Session::Session(const AppSettings& settings, const Host& host, const Tell& tell
       clock_(opened_->set),
       sigmas_(host.load_sigma),
       maker(*opened_->stream, ViewColours(opened_->set), MakerSettings(settings, tell),
-            [this](const View& view) { return SigmaOfView(view); }),
+            settings.drawer, [this](const View& view) { return SigmaOfView(view); }),
       schedule(maker, settings.largest_divisor, tell),
       controller(SurroundingsOf(opened_->set), WorldUp(opened_->set), width_px, height_px,
                  [this](const Eigen::Vector2d& pixel) { return DepthAt(pixel); }),

@@ -17,7 +17,6 @@ constexpr size_t kMaxAppearances = 16;
 dtr::gl::RendererSettings Settings() {
   dtr::gl::RendererSettings settings;
   settings.warn = [](const std::string& line) { OSG_WARN << line << std::endl; };
-  settings.in_memory = true;
   return settings;
 }
 

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "dtr/gl/compositor.h"
-#include "dtr/gl/renderer.h"
+#include "dtr/gl/fitting_renderer.h"
 #include "viewer/osg/loaded_scene.h"
 #include "viewer/osg/novel_camera.h"
 #include "viewer/stillness.h"
@@ -60,7 +60,7 @@ class ContextRenderer {
     shown.compositor.Composite(shown.last->made.picture, novel.projection);
   }
 
-  dtr::gl::Renderer renderer;
+  dtr::gl::FittingRenderer renderer;
   std::atomic<bool> abandoned = false;  ///< its context is gone: kept, but never used again
 
  private:

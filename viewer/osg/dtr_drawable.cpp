@@ -11,7 +11,7 @@ namespace osgDTR {
 namespace {
 
 /// As the settings say, filled or not.
-MadePicture DrawPicture(dtr::gl::Renderer& renderer, dtr::gl::Compositor& compositor,
+MadePicture DrawPicture(dtr::gl::FittingRenderer& renderer, dtr::gl::Compositor& compositor,
                         const DrawSettings& settings, const NovelCamera& novel, bool fill) {
   const dtr::RenderScene& scene = settings.set->instants[settings.instant].scene;
   const dtr::RenderOptions& options = settings.options;
@@ -26,7 +26,8 @@ MadePicture DrawPicture(dtr::gl::Renderer& renderer, dtr::gl::Compositor& compos
     renderer.Draw(scene, novel.camera, novel.cam_from_local, options);
     result = renderer.ReadBack();
   } else {
-    result = RenderByReadBack(renderer, scene, novel.camera, novel.cam_from_local, options);
+    result =
+        RenderByReadBack(renderer.open_gl(), scene, novel.camera, novel.cam_from_local, options);
   }
   if (!fill) return {compositor.Take(result), false};
   const dtr::Grid<float> depth =

@@ -4,7 +4,7 @@ layout(local_size_x = 64) in;
 layout(std430, binding = 1) readonly buffer Corners { uvec2 corners[]; };  // half samples, 1/z
 
 // Pixels this near to an edge belong to the triangle: rounding leaves no cracks.
-const float kMarginPx = 1.0 / 64.0;
+const float kMarginPx = 1.0 / 256.0;
 
 // Screen positions and inverse depths; this invocation draws every `sharing`-th row.
 void Triangle(vec3 a, vec3 b, vec3 c, int share, int sharing) {

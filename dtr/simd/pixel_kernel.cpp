@@ -1,0 +1,393 @@
+#include "dtr/simd/pixel_kernel.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "dtr/render/colour.h"
+
+// The rest of this file is compiled once per instruction set; the best one is chosen at run time.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "dtr/simd/pixel_kernel.cpp"
+#include <hwy/aligned_allocator.h>
+#include <hwy/cache_control.h>
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+// After highway.h.
+#include <hwy/contrib/math/math-inl.h>
+
+#include "dtr/simd/pixel_kernel_map-inl.h"
+#include "dtr/simd/pixel_kernel_weights-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace dtr::simd::HWY_NAMESPACE {
+
+// As in own_depth.glsl and resolve.frag of dtr/gl.
+constexpr float kHeldBeforePx = 1.0f, kBeforePx = 0.5f, kBehindPx = 2.0f;
+constexpr float kHoleSay = 0.25f;
+constexpr int kTriedSurfaces = 3;
+constexpr float kBorderShare = 1e-4f;
+
+/// SPEC 5.2: what the views say of a surface.
+struct Votes {
+  VF held, refused;
+  VF front;   ///< 1/z of the nearest whole patch of those that hold it; 0: none
+  VF behind;  ///< 1/z of the nearest surface that a view sees through it; 0: none
+};
+
+HWY_INLINE void AddVote(const PixelView& view, VF surface, VF seen, MF whole, VF say,
+                        Votes* votes) {
+  const DF d;
+  const VF nearer = hn::Sub(seen, surface), zero = hn::Zero(d);
+  const MF shows = hn::Gt(seen, zero);
+  const MF through = hn::And(shows, hn::Lt(nearer, Constant(-kBehindPx * view.pixel)));
+  const MF holds =
+      hn::And(hn::AndNot(through, shows), hn::Le(nearer, Constant(kHeldBeforePx * view.pixel)));
+  const VF hole_say = hn::Mul(Constant(kHoleSay), say);
+  votes->refused =
+      hn::Add(votes->refused, hn::IfThenElse(shows, hn::IfThenElseZero(through, say), hole_say));
+  votes->held = hn::Add(votes->held, hn::IfThenElseZero(holds, say));
+  votes->behind = hn::Max(votes->behind, hn::IfThenElseZero(through, seen));
+  const MF near = hn::Le(nearer, Constant(kBeforePx * view.pixel));
+  votes->front =
+      hn::Max(votes->front, hn::IfThenElseZero(hn::And(hn::And(holds, whole), near), seen));
+}
+
+struct Colour {
+  VF r, g, b, a;  ///< of 255
+};
+
+template <int kShift>
+HWY_INLINE VF Channel(VU texel) {
+  return hn::ConvertTo(
+      DF(), hn::BitCast(DI(), hn::And(hn::ShiftRight<kShift>(texel), hn::Set(DU(), 255))));
+}
+
+struct FourPixels {
+  VU a, b, c, e;  ///< a b above c e
+};
+
+#if HWY_TARGET != HWY_SCALAR
+/// Of 2 kLanes pixels from `first` on, for each lane the one at its index.
+HWY_INLINE VU PixelsFrom(const std::uint32_t* first, VI index) {
+  const VI near = hn::BitCast(DI(), hn::LoadU(DU(), first));
+  const VI far = hn::BitCast(DI(), hn::LoadU(DU(), first + kLanes));
+  const auto is_near = hn::Lt(index, hn::Set(DI(), static_cast<int>(kLanes)));
+  return hn::BitCast(DU(), hn::IfThenElse(is_near, Lookup(near, index), Lookup(far, index)));
+}
+#endif
+
+/// Around the pixels that are asked for. One beyond the image's border weighs nothing.
+HWY_INLINE FourPixels PixelsAt(const PixelView& view, VI left, VI above,
+                               [[maybe_unused]] MF asked) {
+  const VI one = hn::Set(DI(), 1), width = hn::Set(DI(), view.width_px);
+#if HWY_TARGET != HWY_SCALAR
+  const Window window(left, above, asked);
+  if (window.holds) {
+    const std::uint32_t* first =
+        view.rgba + static_cast<std::ptrdiff_t>(window.row) * view.width_px + window.column;
+    const VI right = hn::Add(window.right, one);
+    FourPixels pixels{PixelsFrom(first, window.right), PixelsFrom(first, right),
+                      PixelsFrom(first + view.width_px, window.right),
+                      PixelsFrom(first + view.width_px, right)};
+    if (window.two_rows) {
+      const auto second = hn::RebindMask(DU(), window.lower);
+      pixels.a = hn::IfThenElse(second, pixels.c, pixels.a);
+      pixels.b = hn::IfThenElse(second, pixels.e, pixels.b);
+      first += 2 * static_cast<std::ptrdiff_t>(view.width_px);
+      pixels.c = hn::IfThenElse(second, PixelsFrom(first, window.right), pixels.c);
+      pixels.e = hn::IfThenElse(second, PixelsFrom(first, right), pixels.e);
+    }
+    return pixels;
+  }
+#endif
+  const VI index = hn::Add(hn::Mul(above, width), left), below = hn::Add(index, width);
+  return {hn::GatherIndex(DU(), view.rgba, index),
+          hn::GatherIndex(DU(), view.rgba, hn::Add(index, one)),
+          hn::GatherIndex(DU(), view.rgba, below),
+          hn::GatherIndex(DU(), view.rgba, hn::Add(below, one))};
+}
+
+/// A channel's value: 8-bit sRGB, or what a table has for it.
+template <int kShift>
+HWY_INLINE VF Light(const float* linear, VU texel) {
+  if (linear == nullptr) return Channel<kShift>(texel);
+  const VU level = hn::And(hn::ShiftRight<kShift>(texel), hn::Set(DU(), 255));
+  return hn::GatherIndex(DF(), linear, hn::BitCast(DI(), level));
+}
+
+/// SPEC 4.4 and, as alpha, the rim's factor of 4.8; of no meaning where it is not asked for.
+/// `linear`: as PixelRow.
+HWY_INLINE Colour ColourAt(const PixelView& view, const float* linear, VF x, VF y, MF asked) {
+  const DI di;
+  const VF zero = hn::Zero(DF());
+  x = hn::Min(hn::Max(x, zero), Constant(static_cast<float>(view.width_px - 1)));
+  y = hn::Min(hn::Max(y, zero), Constant(static_cast<float>(view.height_px - 1)));
+  const VI left = hn::ConvertTo(di, x), above = hn::ConvertTo(di, y);  // not negative
+  const VF u = hn::Sub(x, hn::ConvertTo(DF(), left)), v = hn::Sub(y, hn::ConvertTo(DF(), above));
+  const auto [a, b, c, e] = PixelsAt(view, left, above, asked);
+  const auto mixed = [&](VF p, VF q, VF r, VF s) { return Lerp(Lerp(p, q, u), Lerp(r, s, u), v); };
+  return {
+      mixed(Light<0>(linear, a), Light<0>(linear, b), Light<0>(linear, c), Light<0>(linear, e)),
+      mixed(Light<8>(linear, a), Light<8>(linear, b), Light<8>(linear, c), Light<8>(linear, e)),
+      mixed(Light<16>(linear, a), Light<16>(linear, b), Light<16>(linear, c), Light<16>(linear, e)),
+      mixed(Channel<24>(a), Channel<24>(b), Channel<24>(c), Channel<24>(e))};
+}
+
+/// SPEC 5.3: the view's fragment near `surface`; 0: the view shows another surface there, or none.
+/// Leaves where the fragment lies on the image.
+HWY_INLINE VF FragmentAt(const PixelView& view, const RayOnGrid& base, VF surface, float* image_x,
+                         float* image_y) {
+  const DF d;
+  const Position position = PositionAt(view, base, surface);
+  if (hn::AllFalse(d, position.on_map)) return hn::Zero(d);
+  if (view.cells != nullptr &&
+      hn::AllFalse(d, hn::And(position.on_map, IsCell(CellsAt(view, position), kCellOfSamples)))) {
+    return hn::Zero(d);
+  }
+  const VF w = Meet(view, base, position, PatchAt(view, position));
+  const VF nearer = hn::Sub(w, surface);
+  const VF z = hn::MulAdd(w, Constant(view.grid_z[3]), base.z);
+  MF found = hn::And(hn::Gt(w, hn::Zero(d)), hn::Gt(z, hn::Zero(d)));
+  found = hn::And(found, hn::And(hn::Le(nearer, Constant(kBeforePx * view.pixel)),
+                                 hn::Ge(nearer, Constant(-kBehindPx * view.pixel))));
+  const VF per_z = hn::Div(Constant(1), z);
+  VF x = hn::Mul(hn::MulAdd(w, Constant(view.grid_x[3]), base.x), per_z);
+  VF y = hn::Mul(hn::MulAdd(w, Constant(view.grid_y[3]), base.y), per_z);
+  x = hn::IfThenElseZero(
+      found, hn::MulAdd(x, Constant(view.image_per_sample[0]), Constant(view.image_offset[0])));
+  y = hn::IfThenElseZero(
+      found, hn::MulAdd(y, Constant(view.image_per_sample[1]), Constant(view.image_offset[1])));
+  hn::Store(x, d, image_x);
+  hn::Store(y, d, image_y);
+  // SPEC 4.4: no fragment where all pixels around are masked.
+  if (view.masked && !hn::AllFalse(d, found))
+    found = hn::And(found, hn::Gt(ColourAt(view, nullptr, x, y, found).a, hn::Zero(d)));
+  return hn::IfThenElseZero(found, w);
+}
+
+/// Asks for what the later steps read of a view around where the first step looked: the processor
+/// then fetches it while other views are worked on.
+HWY_INLINE void PrefetchAround(const PixelView& view, const Position& position) {
+  const float x = hn::GetLane(position.x), y = hn::GetLane(position.y);
+  const auto column = static_cast<std::ptrdiff_t>(x), row = static_cast<std::ptrdiff_t>(y);
+  if (view.codes != nullptr) {
+    // The next group's samples; from the right row of the two that the second step will need.
+    const std::uint16_t* code = view.codes + (row + 1) * view.stride + column + 1 + 2 * kLanes;
+    hwy::Prefetch(code);
+    hwy::Prefetch(code + view.stride);
+  }
+  const float image_x = x * view.image_per_sample[0] + view.image_offset[0];
+  const float image_y = y * view.image_per_sample[1] + view.image_offset[1];
+  const auto pixel_x = static_cast<std::ptrdiff_t>(std::max(image_x, 0.0f));
+  const auto pixel_y = static_cast<std::ptrdiff_t>(std::max(image_y, 0.0f));
+  const std::uint32_t* pixel = view.rgba + pixel_y * view.width_px + pixel_x;
+  for (const int below : {0, 1}) {
+    hwy::Prefetch(pixel + below * view.width_px);
+    hwy::Prefetch(pixel + below * view.width_px + kLanes);
+  }
+}
+
+/// SPEC 5.2: the surface that is held; 0 where none is.
+HWY_INLINE VF HeldSurface(const PixelRow& row, std::span<const PixelView> views, const Rays& rays,
+                          VF surface) {
+  const DF d;
+  const VF zero = hn::Zero(d);
+  VF held = zero;
+  MF asked = hn::Gt(surface, zero);
+  for (int tried = 0; tried < kTriedSurfaces && !hn::AllFalse(d, asked); ++tried) {
+    Votes votes{zero, zero, zero, zero};
+    for (const PixelView& view : views) {
+      const RayOnGrid base(view, rays);
+      const Position position = PositionAt(view, base, surface);
+      if (hn::AllFalse(d, position.on_map)) continue;
+      VF say =
+          hn::IfThenElseZero(position.on_map, SayAt({view, rays, surface}, row.pixel_angle_rad));
+      if (view.cells != nullptr) {
+        const VU cells = CellsAt(view, position);
+        if (hn::AllFalse(d, hn::And(position.on_map, IsCell(cells, kCellOfSamples)))) {
+          say = hn::IfThenElseZero(IsCell(cells, kCellOfHoles), say);
+          votes.refused = hn::MulAdd(Constant(kHoleSay), say, votes.refused);
+          continue;
+        }
+      }
+      if (tried == 0) PrefetchAround(view, position);
+      const Patch patch = PatchAt(view, position);
+      const VF seen = Meet(view, base, position, patch);
+      AddVote(view, surface, seen, patch.whole, hn::IfThenZeroElse(patch.masked, say), &votes);
+    }
+    const MF holds = hn::And(asked, hn::Ge(votes.held, votes.refused));
+    const VF front = hn::IfThenElse(hn::Gt(votes.front, zero), votes.front, surface);
+    held = hn::IfThenElse(holds, front, held);
+    surface = votes.behind;
+    asked = hn::And(hn::AndNot(holds, asked), hn::Gt(surface, zero));
+  }
+  return held;
+}
+
+struct Pixels {
+  VU image, marks;
+  VF depth;
+};
+
+/// SPEC 4.2: where Delta moves a fragment.
+HWY_INLINE VF Moved(const PixelRow& row, const PixelView& view, VF w) {
+  if (row.absolute_delta < 0) return hn::Sub(w, Constant(view.delta));
+  const VF one = Constant(1);
+  return hn::Min(w, hn::Div(one, hn::Add(hn::Div(one, w), Constant(row.absolute_delta))));
+}
+
+/// The nearest fragment, and the border of SPEC 4.2.
+struct Front {
+  VF nearest, border;
+};
+
+/// SPEC 5.3 and 4.2: each view's fragment near `surface` into the group.
+HWY_INLINE Front FindFragments(const PixelRow& row, std::span<const PixelView> views,
+                               const Rays& rays, VF surface, Group* group) {
+  const DF d;
+  const VF zero = hn::Zero(d);
+  VF front = zero, border = Constant(kFar);
+  for (size_t i = 0; i < views.size(); ++i) {
+    VF w = FragmentAt(views[i], {views[i], rays}, surface, group->image_x(i), group->image_y(i));
+    if (row.nearest_views > 0 && !hn::AllFalse(d, hn::Gt(w, zero))) {  // SPEC 1.3
+      const VF t = PreciseRadiansOf({views[i], rays, w});
+      w = hn::IfThenElseZero(hn::Le(t, Constant(row.max_angle_rad)), w);
+    }
+    hn::Store(w, d, group->inverse_depth(i));
+    front = hn::Max(front, w);
+    border =
+        hn::Max(border, hn::IfThenElse(hn::Gt(w, zero), Moved(row, views[i], w), Constant(kFar)));
+  }
+  return {front, border};
+}
+
+/// SPEC 6.2.
+HWY_INLINE MF AtBorder(size_t views, const Front& front, Group* group) {
+  const DF d;
+  const VF zero = hn::Zero(d);
+  const VF margin = hn::Mul(Constant(kBorderShare), hn::Sub(front.nearest, front.border));
+  MF at_border = hn::Lt(zero, zero);
+  for (size_t i = 0; i < views; ++i) {
+    const VF w = hn::Load(d, group->inverse_depth(i));
+    at_border = hn::Or(at_border,
+                       hn::And(hn::Gt(w, zero), hn::Le(hn::Abs(hn::Sub(w, front.border)), margin)));
+  }
+  return at_border;
+}
+
+/// SPEC 4.4, 4.7, 4.8: the colours' sum, of 255 or in linear light, and, as alpha, that of the
+/// shares. `cut`: of SPEC 1.4, with the per-pixel rule.
+HWY_INLINE Colour Blend(const PixelRow& row, std::span<const PixelView> views, VF total, VF cut,
+                        Group* group) {
+  const DF d;
+  const VF zero = hn::Zero(d);
+  VF r = zero, g = zero, b = zero, sum = zero;
+  const VF per_total = hn::Div(Constant(1), total);
+  for (size_t i = 0; i < views.size(); ++i) {
+    const VF weight = hn::Load(d, group->weight(i));
+    const MF weighs = hn::Gt(weight, zero);
+    if (hn::AllFalse(d, weighs)) continue;
+    const Colour colour = ColourAt(views[i], row.linear, hn::Load(d, group->image_x(i)),
+                                   hn::Load(d, group->image_y(i)), weighs);
+    VF factor = hn::Mul(hn::Max(colour.a, Constant(1)), Constant(views[i].cut_factor / 255));
+    if (row.nearest_views > 0) {
+      factor = hn::Mul(factor, CutFactorAt(hn::Load(d, group->angle(i)), cut));
+    }
+    const VF faded = FadedShare(hn::Mul(weight, per_total), factor);
+    r = hn::MulAdd(faded, colour.r, r);
+    g = hn::MulAdd(faded, colour.g, g);
+    b = hn::MulAdd(faded, colour.b, b);
+    sum = hn::Add(sum, faded);
+  }
+  return {r, g, b, sum};
+}
+
+/// The nearest 8-bit sRGB value of linear light.
+HWY_INLINE VU LevelOfLight(VF light) {
+  HWY_ALIGN float lights[kLanes];
+  HWY_ALIGN std::uint32_t levels[kLanes];
+  hn::Store(light, DF(), lights);
+  for (size_t i = 0; i < kLanes; ++i) levels[i] = Srgb8FromLinear(lights[i]);
+  return hn::Load(DU(), levels);
+}
+
+HWY_INLINE Pixels ResolveGroup(const PixelRow& row, std::span<const PixelView> views, VF x,
+                               VF surface, Group* group) {
+  const DF d;
+  const VF zero = hn::Zero(d);
+  const VF ray_x = hn::Mul(hn::Sub(x, Constant(row.cx)), Constant(row.inverse_fx));
+  const float ray_y = (row.y - row.cy) * row.inverse_fy;
+  const Rays rays{ray_x, ray_y, hn::MulAdd(ray_x, ray_x, Constant(ray_y * ray_y + 1))};
+  const Pixels none{hn::Zero(DU()), hn::Zero(DU()), zero};
+  surface = HeldSurface(row, views, rays, surface);
+  if (hn::AllFalse(d, hn::Gt(surface, zero))) return none;
+
+  const Front front = FindFragments(row, views, rays, surface, group);
+  const MF seen = hn::Gt(front.nearest, zero);
+  if (hn::AllFalse(d, seen)) return none;
+  const MF at_border = AtBorder(views.size(), front, group);
+  VF cut = zero;
+  if (row.nearest_views > 0) cut = DropAllButNearest(row, views, rays, front.border, group);
+  const Weighed weighed = WeighFragments(row, views, rays, front.border, group);
+  const Colour sum = Blend(row, views, weighed.total, cut, group);
+
+  const VF per_sum = hn::Div(Constant(1), sum.a), half = Constant(0.5f);
+  const auto level = [&](VF of_sum) {
+    const VF c = hn::IfThenElseZero(seen, of_sum);
+    if (row.linear != nullptr) return LevelOfLight(hn::Mul(c, per_sum));
+    return hn::BitCast(DU(), hn::ConvertTo(DI(), hn::MulAdd(c, per_sum, half)));
+  };
+  const auto seen_bits = hn::RebindMask(DU(), seen);
+  VU image = hn::Or(level(sum.r), hn::Set(DU(), 0xff000000u));
+  image = hn::Or(image, hn::Or(hn::ShiftLeft<8>(level(sum.g)), hn::ShiftLeft<16>(level(sum.b))));
+  const VF blended = hn::Min(weighed.blended, Constant(255));
+  VU marks = hn::BitCast(DU(), hn::ConvertTo(DI(), blended));
+  marks =
+      hn::Or(marks, hn::IfThenElseZero(hn::RebindMask(DU(), at_border), hn::Set(DU(), 0xff00u)));
+  return {hn::IfThenElseZero(seen_bits, image), hn::IfThenElseZero(seen_bits, marks),
+          hn::IfThenElseZero(seen, hn::Div(Constant(1), front.nearest))};
+}
+
+const char* NameImpl() { return hwy::TargetName(HWY_TARGET); }
+
+void ResolveRowImpl(const PixelRow& row, std::span<const PixelView> views) {
+  const DF d;
+  Group group(std::max<size_t>(1, views.size()));
+  for (int x = 0; x < row.width_px; x += static_cast<int>(kLanes)) {
+    const auto count = std::min(kLanes, static_cast<size_t>(row.width_px - x));
+    HWY_ALIGN float surfaces[kLanes] = {};
+    std::copy_n(row.surface + x, count, surfaces);
+    const VF surface = hn::Load(d, surfaces);
+    Pixels pixels{hn::Zero(DU()), hn::Zero(DU()), hn::Zero(d)};
+    if (!hn::AllFalse(d, hn::Gt(surface, hn::Zero(d)))) {
+      pixels = ResolveGroup(row, views, hn::Iota(d, static_cast<float>(x) + 0.5f), surface, &group);
+    }
+    HWY_ALIGN std::uint32_t lanes[2][kLanes];
+    HWY_ALIGN float depths[kLanes];
+    hn::Store(pixels.image, DU(), lanes[0]);
+    hn::Store(pixels.marks, DU(), lanes[1]);
+    hn::Store(pixels.depth, d, depths);
+    std::copy_n(lanes[0], count, row.image + x);
+    std::copy_n(lanes[1], count, row.marks + x);
+    std::copy_n(depths, count, row.depth + x);
+  }
+}
+
+}  // namespace dtr::simd::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace dtr::simd {
+
+HWY_EXPORT(NameImpl);
+HWY_EXPORT(ResolveRowImpl);
+
+const char* InstructionSet() { return HWY_DYNAMIC_DISPATCH(NameImpl)(); }
+
+void ResolvePixelRow(const PixelRow& row, std::span<const PixelView> views) {
+  HWY_DYNAMIC_DISPATCH(ResolveRowImpl)(row, views);
+}
+
+}  // namespace dtr::simd
+#endif
