@@ -146,7 +146,7 @@ Json FromWords(const Json& list, const std::string& where) {
     }
     Json value = Json::parse(text, nullptr, false);
     if (!value.is_number() && !value.is_boolean()) value = text;
-    if (flag == "`blend_srgb`" && value.is_boolean()) value = !value.get<bool>();
+    if (flag == "--blend-srgb" && value.is_boolean()) value = !value.get<bool>();
     object[FieldOf(flag.substr(2))] = value;
   }
   return object;
