@@ -1,5 +1,6 @@
 // --renderer auto: gl where a GPU draws, else simd for all that it draws.
 #include <fmt/format.h>
+#include <stdexcept>
 
 #include "cli/render_engine.h"
 #include "dtr/base/error.h"
@@ -30,7 +31,10 @@ class AutoEngine final : public RenderEngine {
     drawn_by_ = &EngineFor(options);
     return drawn_by_->Draw(scene, novel, novel_from_world, options);
   }
-  RenderResult ReadBack() override { return drawn_by_->ReadBack(); }
+  RenderResult ReadBack() override {
+    if (drawn_by_ == nullptr) throw std::logic_error("ReadBack: nothing was drawn");
+    return drawn_by_->ReadBack();
+  }
   RenderResult Render(const RenderScene& scene, const PinholeCamera& novel,
                       const Pose& novel_from_world, const RenderOptions& options) override {
     return EngineFor(options).Render(scene, novel, novel_from_world, options);

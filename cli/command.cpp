@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "cli/number_checks.h"
+#include "cli/option_names.h"
 #include "cli/output_file.h"
 #include "cli/standard_output.h"
 #include "dtr/base/error.h"
@@ -60,8 +61,9 @@ void RejectOutputs(const CLI::App& command, const std::string& json_target) {
 
 }  // namespace
 
-void Context::EmitJson(const std::string& json_text) const {
+void Context::EmitJson(const std::string& json) const {
   if (common.json_target.empty()) return;
+  const std::string json_text = WithOptionNames(json);  // of the messages in it
   if (common.json_target == "-") {
     WriteOut(json_text + "\n");
   } else {

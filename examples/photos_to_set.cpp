@@ -35,7 +35,7 @@ int main(int argc, char** argv) {
     }
     std::cout << report.set.frames.front().views.size() << " views, calibration "
               << (report.validation_passed ? "passed" : "failed") << " its validation\n";
-  } catch (const dtr::Error& error) {
+  } catch (const std::exception& error) {
     std::cerr << error.what() << "\n";
     return 1;
   }

@@ -44,16 +44,18 @@ int main(int argc, char** argv) {
       if (!dtr::IsCalled(view.name, argv[2]) || view.depth.empty()) continue;
       int count = 0;
       const std::string points = Points(view, &count);
-      std::ofstream(argv[3]) << "ply\nformat ascii 1.0\nelement vertex " << count
-                             << "\nproperty float x\nproperty float y\nproperty float z\n"
-                                "property uchar red\nproperty uchar green\nproperty uchar blue\n"
-                                "property float sigma\nend_header\n"
-                             << points;
+      std::ofstream file(argv[3]);
+      file << "ply\nformat ascii 1.0\nelement vertex " << count
+           << "\nproperty float x\nproperty float y\nproperty float z\n"
+              "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+              "property float sigma\nend_header\n"
+           << points << std::flush;
+      if (!file) throw dtr::Error(std::string(argv[3]) + ": cannot be written");
       std::cout << argv[3] << ": " << count << " points\n";
       return 0;
     }
     std::cerr << argv[2] << ": no view with depth is called so\n";
-  } catch (const dtr::Error& error) {
+  } catch (const std::exception& error) {
     std::cerr << error.what() << "\n";
   }
   return 1;

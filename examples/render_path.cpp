@@ -1,4 +1,5 @@
-// render_path SET.dtr FOLDER -- renders a path along the set's own cameras to FOLDER/000000.png, ...
+// render_path SET.dtr FOLDER -- renders a path along the set's own cameras to FOLDER/000000.png,
+// ...
 #include <dtr/cpu/renderer.h>
 #include <pipeline/render.h>
 
@@ -18,12 +19,13 @@ int main(int argc, char** argv) {
   request.render.fill_holes = true;
   try {
     dtr::SilentProgress nobody;
-    const auto report = dtr::pipeline::Render(request, dtr::cpu::Render, nobody);
+    const auto report = dtr::pipeline::Render(
+        request, [] { return dtr::cpu::Render; }, nobody);
     for (const dtr::pipeline::RenderedFile& frame : report.frames) {
       std::cout << frame.file << ": " << 100 * frame.coverage << " % seen, by "
                 << frame.views_used.size() << " views, " << frame.render_ms << " ms\n";
     }
-  } catch (const dtr::Error& error) {
+  } catch (const std::exception& error) {
     std::cerr << error.what() << "\n";
     return 1;
   }

@@ -32,9 +32,9 @@ struct RigSummary {
   std::vector<std::string> flipped;
   std::vector<std::string> simpler;  ///< cameras that got a simpler model, and why, a line each
   int passes = 1;                    ///< solves, of free-running cameras
-  /// Of cameras that were taken to be synchronised: what speaks against it (calib/judge).
+  /// Of cameras that were taken to be synchronised: what speaks against it (calib/validation).
   std::vector<std::optional<calib::CameraDelay>> delays;
-  calib::PatternTest unsteady;  ///< images that keep no common rate (calib/judge)
+  calib::PatternTest unsteady;  ///< images that keep no common rate (calib/validation)
 };
 
 /// Solves for the rig behind the photos. Throws UsageError when lenses are given for some cameras

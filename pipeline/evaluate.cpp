@@ -47,7 +47,7 @@ EvaluateResult Evaluate(const EvaluateRequest& request,
                         Progress& progress) {
   if (fs::exists(request.pictures) && !fs::is_directory(request.pictures)) {
     throw UsageError(
-        fmt::format("`images` {}: expected a folder, found a file", request.pictures.string()));
+        fmt::format("`pictures` {}: expected a folder, found a file", request.pictures.string()));
   }
   const DtrSet set = Load(request, progress);
   EvaluateResult result;

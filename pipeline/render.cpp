@@ -103,11 +103,13 @@ RenderedFile Facts(const std::string& file, double ms, size_t frame, const Rende
 
 }  // namespace
 
-RenderReport Render(const RenderRequest& request, const eval::RenderFunction& draw,
+RenderReport Render(const RenderRequest& request,
+                    const std::function<eval::RenderFunction()>& make_renderer,
                     Progress& progress) {
   const DtrSet described = io::ReadSet(request.set);
   const auto cameras = CamerasOf(request, described);
   RequireOneOutput(request);
+  const eval::RenderFunction draw = make_renderer();
   RenderOptions render = request.render;
   render.threads = request.threads;
   DynamicScene moving(request.set, described, request.exclude, {request.memory_gb, render.threads},

@@ -1,6 +1,7 @@
 // pipeline/render.h -- new views of a set, to files.
 #pragma once
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <utility>
@@ -54,10 +55,11 @@ struct RenderReport {
 };
 
 /// Renders the frames one after the other and writes each; pixels of views are read as they are
-/// needed. What no view saw is transparent in a PNG unless it is filled. `draw` is any renderer, as
-/// cpu::Render. Throws UsageError for a request that asks for what cannot be had together, Error
-/// for a broken set. A video that is interrupted is not left behind; images are, as far as they go.
-RenderReport Render(const RenderRequest& request, const eval::RenderFunction& draw,
-                    Progress& progress);
+/// needed. What no view saw is transparent in a PNG unless it is filled. `make_renderer` gives any
+/// renderer, as cpu::Render; it is called once, before anything is loaded. Throws UsageError for a
+/// request that asks for what cannot be had together, Error for a broken set. A video that is
+/// interrupted is not left behind; images are, as far as they go.
+RenderReport Render(const RenderRequest& request,
+                    const std::function<eval::RenderFunction()>& make_renderer, Progress& progress);
 
 }  // namespace dtr::pipeline

@@ -123,7 +123,7 @@ double CameraUnknowns(const Bundle& bundle, const std::vector<bool>& image_used,
 // `sigma_px`: what priors were weighted with.
 void Describe(const Bundle& start, const std::vector<Eigen::Vector2d>& residuals, size_t rigs,
               const AdjustOptions& options, double sigma_px, Adjusted& out) {
-  // A observation that is alone in seeing its point is met whatever the cameras are.
+  // An observation that is alone in seeing its point is met whatever the cameras are.
   const std::vector<int> sights = ObservationsOfPoints(out.bundle, out.used);
   for (size_t i = 0; i < residuals.size(); ++i) {
     if (sights[static_cast<size_t>(out.bundle.observations[i].point)] < 2) out.used[i] = false;

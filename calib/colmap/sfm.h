@@ -40,7 +40,7 @@ struct SfmOptions {
   Matching matching = Matching::kAuto;
   int threads = 0;            ///< 0: all cores
   std::uint64_t seed = 0;     ///< of COLMAP's random choices, as far as it heeds it
-  double memory_gb = 4;       ///< COLMAP stays below this many GiB
+  double memory_gb = 4;       ///< COLMAP stays below this many GB (1e9 bytes)
   int max_image_size_px = 0;  ///< long side for features; 0: from the memory
   int max_features = 0;       ///< most per photo, the largest kept; 0: kMostFeatures
   /// COLMAP's name. On the 11 photos of Sceaux castle (a compact camera), 8900 points each, the

@@ -1,4 +1,4 @@
-// calib/bundle/solver_ends.h -- internal to calib/solve and calib/bundle: when Ceres is done.
+// calib/solve/solver_ends.h -- internal to calib/solve and calib/bundle: when Ceres is done.
 #pragma once
 #include <ceres/ceres.h>
 

@@ -1,4 +1,5 @@
-// calib/validation/board_residuals.h -- internal to calib/judge: residuals of views, and figures of them.
+// calib/validation/board_residuals.h -- internal to calib/validation: residuals of views, and
+// figures of them.
 #pragma once
 #include <Eigen/Core>
 #include <vector>

@@ -1,5 +1,5 @@
-// calib/validation/board_solves.h -- internal to calib/judge: solves made to judge a calibration
-// by, and how far two solves differ.
+// calib/validation/board_solves.h -- internal to calib/validation: solves made to judge a
+// calibration by, and how far two solves differ.
 #pragma once
 #include <Eigen/Core>
 #include <functional>

@@ -1,5 +1,5 @@
-// calib/validation/image_shift.h -- internal to calib/bundle: what a calibration's uncertainty does
-// to the image.
+// calib/validation/image_shift.h -- internal to calib/validation: what a calibration's uncertainty
+// does to the image.
 #pragma once
 #include <vector>
 

@@ -1,5 +1,5 @@
-// calib/validation/photo_patterns.h -- internal to calib/bundle: residuals that follow a pattern, held
-// against the limits.
+// calib/validation/photo_patterns.h -- internal to calib/validation: residuals that follow a
+// pattern, held against the limits.
 #pragma once
 #include <vector>
 

@@ -1,4 +1,5 @@
-// calib/validation/photo_solves.h -- internal to calib/bundle: stored cameras, solved for again.
+// calib/validation/photo_solves.h -- internal to calib/validation: stored cameras, solved for
+// again.
 #pragma once
 #include <string>
 #include <vector>

@@ -1,5 +1,5 @@
-// calib/validation/report_json.h -- what the reports of all judges write alike. For their .cpp files only: shows
-// the JSON library.
+// calib/validation/report_json.h -- internal to calib/validation: what the reports of all judges
+// write alike. For their .cpp files only: shows the JSON library.
 #pragma once
 #include <nlohmann/json.hpp>
 #include <vector>

@@ -54,9 +54,8 @@ int RunRender(const RenderArguments& options, const Context& context) {
   request.render = *options.render;
   request.threads = context.common.threads;
   RequireOutputs(request);
-  // Before anything is loaded: a machine without OpenGL should say so at once.
-  const eval::RenderFunction draw = MakeRenderer(options.renderer, context.console);
-  const pipeline::RenderReport report = pipeline::Render(request, draw, context.console);
+  const pipeline::RenderReport report = pipeline::Render(
+      request, [&] { return MakeRenderer(options.renderer, context.console); }, context.console);
   context.console.Say(fmt::format("{}: {} frame{}", request.output.string(), report.frames.size(),
                                   request.several() ? "s" : ""));
   context.EmitJson(ToJson(report));

@@ -45,6 +45,7 @@ Json ToJson(const Measure& m) {
 
 /// A cell of a Markdown table.
 std::string Cell(std::string text) {
+  std::replace(text.begin(), text.end(), '`', '\'');  // within a code span
   for (size_t at = 0; (at = text.find('|', at)) != std::string::npos; at += 2) {
     text.insert(at, "\\");
   }

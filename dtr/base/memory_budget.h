@@ -1,12 +1,21 @@
 // dtr/base/memory_budget.h -- room for things that several threads hold at a time.
 #pragma once
 #include <condition_variable>
+#include <cstdio>
 #include <mutex>
+#include <string>
 
 namespace dtr {
 
 /// The unit of every limit on memory, on the command line too.
 inline constexpr double kBytesPerGigabyte = 1e9;
+
+/// "4", "0.25": a size in gigabytes, for messages.
+inline std::string GigabytesText(size_t bytes) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", static_cast<double>(bytes) / kBytesPerGigabyte);
+  return text;
+}
 
 /// What a decoded photo takes at most while it is looked at, turned or written: its pixels as they
 /// come, as 8 bits, and once more as what they become.

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "dtr/base/error.h"
+#include "dtr/base/memory_budget.h"
 #include "dtr/gl/deferred.h"
 #include "dtr/gl/drawing.h"
 #include "dtr/gl/driver.h"
@@ -134,8 +135,7 @@ class Renderer::Implementation {
     if (std::exchange(warned_of_room_, true)) return;
     settings_.warn("WARNING: drawn from the nearest " + std::to_string(fitting) + " of " +
                    std::to_string(wanted) + " views: more do not fit into " +
-                   std::to_string(settings_.gpu_bytes >> 20) +
-                   " MiB of GPU memory; give `gpu_memory`");
+                   GigabytesText(settings_.gpu_bytes) + " GB of GPU memory; give `gpu_memory`");
   }
 
   /// Band by band, so that the views' fragments stay within the memory for them.

@@ -24,7 +24,7 @@ struct RendererSettings {
   size_t layer_bytes = size_t{256} << 20;
   /// Memory for the views themselves. Those drawn longest ago make room for others; where one
   /// image's do not fit, it is drawn from the nearest that do, and `warn` is told so once.
-  size_t gpu_bytes = size_t{4} << 30;
+  size_t gpu_bytes = 4'000'000'000;
   /// Told of what the image goes without, a line each, on the thread that draws.
   std::function<void(const std::string&)> warn = [](const std::string&) {};
   /// Leave unused what the driver has beyond OpenGL 4.3, as on one that has no more.

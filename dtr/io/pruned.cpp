@@ -11,7 +11,7 @@ namespace {
 constexpr char kPruned[] = "pruned";
 constexpr char kWhere[] = "set.json: pruned";
 constexpr char kRender[] = "render";
-constexpr char kRenderWords[] = "render_arguments";  // of version 0.1: a list of words
+constexpr char kRenderWords[] = "render_arguments";  // of earlier builds: a list of words
 
 Json ExtraOf(const DtrSet& set) {
   return set.extra_json.empty() ? Json::object() : ParseJson(set.extra_json, kWhere);
@@ -103,7 +103,12 @@ StoredRenderOptions RenderOptionsOf(const DtrSet& set) {
   const Json pruned = ParseJson(text, kWhere);
   for (const char* field : {kRender, kRenderWords}) {
     const auto found = pruned.find(field);
-    if (found != pruned.end()) return {found->dump(), std::string(kWhere) + "." + field};
+    if (found == pruned.end()) continue;
+    const std::string where = std::string(kWhere) + "." + field;
+    if (!found->is_structured()) {
+      throw Error(where + ": expected an object, found " + found->dump());
+    }
+    return {found->dump(), where};
   }
   return {};
 }

@@ -18,7 +18,8 @@ struct StoredRenderOptions {
   std::string where;        ///< the field of set.json, for messages
 };
 
-/// `pruned.render`; `pruned.render_arguments` of sets of version 0.1; "{}" where there is neither.
+/// `pruned.render`; `pruned.render_arguments` of sets of earlier builds; "{}" where there is
+/// neither.
 StoredRenderOptions RenderOptionsOf(const DtrSet& set);
 
 /// For people: what was left out and why and what was taken back, a line each, and the losses that

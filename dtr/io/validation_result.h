@@ -1,4 +1,4 @@
-// dtr/io/validation result.h -- what a set's validation result says, in a line.
+// dtr/io/validation_result.h -- what a set's validation result says, in a line.
 #pragma once
 #include <string>
 

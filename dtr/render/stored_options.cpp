@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -110,7 +111,7 @@ const std::vector<Field>& Fields() {
   return fields;
 }
 
-/// The field that --flag of version 0.1 set: by the same name but for units.
+/// The field that --flag of earlier builds set: by the same name but for units.
 std::string FieldOf(std::string flag) {
   for (char& c : flag) c = c == '-' ? '_' : c;
   if (flag == "blend_linear" || flag == "blend_srgb") return "blend_in_linear_light";
@@ -123,6 +124,14 @@ std::string FieldOf(std::string flag) {
 }
 
 bool IsFlag(const std::string& text) { return text.rfind("--", 0) == 0; }
+
+Json ValueOf(const std::string& text) {
+  if (text == "true" || text == "false") return text == "true";
+  double number = 0;
+  const char* const end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, number);
+  return error == std::errc() && stop == end ? Json(number) : Json(text);
+}
 
 /// ["--views", "4", "--fill-holes=false"] as {"views": 4, "fill_holes": false}.
 Json FromWords(const Json& list, const std::string& where) {
@@ -144,8 +153,7 @@ Json FromWords(const Json& list, const std::string& where) {
     } else if (i + 1 < words.size() && !IsFlag(words[i + 1])) {
       text = words[++i];
     }
-    Json value = Json::parse(text, nullptr, false);
-    if (!value.is_number() && !value.is_boolean()) value = text;
+    Json value = ValueOf(text);
     if (flag == "--blend-srgb" && value.is_boolean()) value = !value.get<bool>();
     object[FieldOf(flag.substr(2))] = value;
   }
@@ -184,7 +192,10 @@ RenderOptions WithStoredOptions(const RenderOptions& base, const std::string& js
     } catch (const Unfit& unfit) {
       throw Error(where + ": " + name + ": expected " + unfit.expected + ", found " + value.dump());
     } catch (const Error& error) {
-      throw Error(where + ": " + error.what());
+      // "`delta`: expected ..." of the options: the file has a field.
+      const std::string text = error.what();
+      const size_t rest = text.find(": ");
+      throw Error(where + ": " + name + text.substr(rest == std::string::npos ? 0 : rest));
     }
   }
   return options;

@@ -1,4 +1,4 @@
-// dtr/render/time steps.h -- dynamic sets: several frames, of which an image shows one.
+// dtr/render/time_steps.h -- dynamic sets: several frames, of which an image shows one.
 #pragma once
 #include <cstddef>
 #include <span>

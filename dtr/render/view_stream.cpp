@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "dtr/base/error.h"
+#include "dtr/base/memory_budget.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/render/valid_views.h"
 
@@ -264,7 +265,7 @@ void ViewStream::WarnOfRoom(size_t fitting, size_t wanted) {
   if (std::exchange(warned_of_room_, true)) return;
   settings_.warn("WARNING: drawn from the nearest " + std::to_string(fitting) + " of " +
                  std::to_string(wanted) + " views: more do not fit into " +
-                 std::to_string(settings_.host_bytes >> 20) + " MiB of memory; give `memory`");
+                 GigabytesText(settings_.host_bytes) + " GB of memory; give `memory`");
 }
 
 RenderScene ViewStream::SceneFor(const Pose& novel_from_world, const RenderOptions& options,

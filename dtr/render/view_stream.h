@@ -31,8 +31,8 @@ class ViewStream {
   using Loader = std::function<void(View&)>;
 
   struct Settings {
-    size_t host_bytes = size_t{4} << 30;  ///< pixels in memory; one view is always kept
-    int threads = 0;                      ///< that read; 0: all cores
+    size_t host_bytes = 4'000'000'000;  ///< pixels in memory; one view is always kept
+    int threads = 0;                    ///< that read; 0: all cores
     std::function<void(const std::string&)> warn = [](const std::string&) {};
   };
 

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "dtr/base/error.h"
+#include "dtr/base/memory_budget.h"
 #include "dtr/render/fill_holes.h"
 #include "dtr/render/frame.h"
 #include "dtr/render/grid_placement.h"
@@ -171,8 +172,8 @@ class Renderer::Implementation {
     if (std::exchange(warned_of_room_, true)) return;
     settings_.warn("WARNING: drawn from the nearest " + std::to_string(fitting) + " of " +
                    std::to_string(wanted) + " views: more do not fit into " +
-                   std::to_string(settings_.view_bytes >> 20) +
-                   " MiB of memory for views; give `gpu_memory`");
+                   GigabytesText(settings_.view_bytes) +
+                   " GB of memory for views; give `gpu_memory`");
   }
 
   const RendererSettings settings_;

@@ -21,7 +21,7 @@ namespace dtr::simd {
 struct RendererSettings {
   /// Memory for what is made of the views. Those drawn longest ago make room for others; where one
   /// frame's do not fit, it is drawn from the nearest that do, and `warn` is called once.
-  size_t view_bytes = size_t{4} << 30;
+  size_t view_bytes = 4'000'000'000;
   /// Gets a line for whatever the rendered image goes without, on the thread that draws.
   std::function<void(const std::string&)> warn = [](const std::string&) {};
 };

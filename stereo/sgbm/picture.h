@@ -1,4 +1,4 @@
-// stereo/sgbm/image.h -- grey images for matching: masks filled, resampled, shrunk.
+// stereo/sgbm/picture.h -- grey images for matching: masks filled, resampled, shrunk.
 #pragma once
 #include <Eigen/Core>
 #include <cstdint>

@@ -15,7 +15,7 @@ MeasuredDistance Between(const Eigen::Vector3d& a, const Eigen::Vector3d& b, dou
                          double sigma = 1e-3) {
   const Eigen::Matrix3d covariance = sigma * sigma * Eigen::Matrix3d::Identity();
   constexpr double kExact = 1e-12;  // metres
-  return {"--distance", a, b, covariance, covariance, length_m, kExact};
+  return {"`distance`", a, b, covariance, covariance, length_m, kExact};
 }
 
 Eigen::Vector3d Draw(Random& random) {

@@ -98,8 +98,9 @@ TEST_F(BenchCalibration, WorseCamerasHaveALargerErrorAndRefinementMendsThem) {
   const Json truth = Point("refine=no");
   EXPECT_GT(truth["cost"], 0);
   EXPECT_EQ(truth["figures"]["not_registered"], 0);
-  EXPECT_EQ(truth["figures"]["reference_tracks_predicted"], truth["figures"]["yardstick_sights"]);
-  EXPECT_GT(truth["figures"]["yardstick_sights"], 400);
+  EXPECT_EQ(truth["figures"]["reference_tracks_predicted"],
+            truth["figures"]["reference_observations"]);
+  EXPECT_GT(truth["figures"]["reference_observations"], 400);
   EXPECT_LT(truth["figures"]["median_px"], 0.5);
   double last = truth["error"];
   for (const double by_px : {2.0, 4.0}) {
@@ -130,10 +131,10 @@ TEST_F(BenchCalibration, FewerCamerasAreNoAdvantage) {
   Leave(colmap, fewer);
   const Json point = Point("refine=no");
   EXPECT_EQ(point["figures"]["not_registered"], 1);
-  EXPECT_EQ(point["figures"]["yardstick_sights"], all["figures"]["yardstick_sights"]);
+  EXPECT_EQ(point["figures"]["reference_observations"], all["figures"]["reference_observations"]);
   EXPECT_GT(point["error"], 1.5 * all["error"].get<double>());
   // By hand: an observation that is missed counts as 10 scales of half a pixel per 1000.
-  const double sights = point["figures"]["yardstick_sights"],
+  const double sights = point["figures"]["reference_observations"],
                missed = sights - point["figures"]["reference_tracks_predicted"].get<double>(),
                missed_px = 10 * 0.0005 * kCamera.width_px();
   EXPECT_GT(missed, 0.05 * sights);

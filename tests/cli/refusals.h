@@ -1,4 +1,4 @@
-// tests/cli/rejections.h -- lists of commands that must be rejected, and files to reject them over.
+// tests/cli/refusals.h -- lists of commands that must be rejected, and files to reject them over.
 #pragma once
 #include <fmt/format.h>
 #include <fmt/ranges.h>

@@ -113,7 +113,7 @@ TEST(WithStoredOptions, SaysWhichValueHasNoMeaning) {
   EXPECT_EQ(ErrorOf(R"({"method": "best"})"),
             "here: method: expected deferred|two-pass, found \"best\"");
   EXPECT_EQ(ErrorOf(R"({"fill_holes": 1})"), "here: fill_holes: expected true or false, found 1");
-  EXPECT_EQ(ErrorOf(R"({"delta_px": -1})"), "here: `delta`: expected 0 or more, found -1.000000");
+  EXPECT_EQ(ErrorOf(R"({"delta_px": -1})"), "here: delta_px: expected 0 or more, found -1.000000");
   EXPECT_EQ(ErrorOf("7"), "here: expected an object, found 7");
   EXPECT_EQ(ErrorOf(R"(["--views", "many"])"), "here: views: expected a number, found \"many\"");
   EXPECT_EQ(ErrorOf(R"(["--views", 4])"),

@@ -132,7 +132,7 @@ TEST(MeasureReportTable, SaysWhyThereAreNoMoreRows) {
     EXPECT_EQ(report.ends[0].for_memory, memory);
     ASSERT_THAT(listener.lines, ::testing::SizeIs(1));
     EXPECT_THAT(listener.lines[0],
-                ::testing::HasSubstr(memory ? "memory holds only 4 of them; give --gpu-memory"
+                ::testing::HasSubstr(memory ? "memory holds only 4 of them; give `gpu_memory`"
                                             : "only 4 are valid here"));
     const auto json = nlohmann::json::parse(ToJson("report", report, machine));
     EXPECT_EQ(json["ends"][0]["reason"], memory ? "memory" : "valid views");

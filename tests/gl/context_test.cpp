@@ -36,14 +36,14 @@ void OpenWith(const char* variable, const char* value) {
 TEST(EglContextDeathTest, AnOlderContextIsRejectedInOneLineThatNamesTheCpuRenderer) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   EXPECT_EXIT(OpenWith("MESA_GL_VERSION_OVERRIDE", "4.2"), ::testing::ExitedWithCode(1),
-              "OpenGL: expected a context of version 4.3 or newer.*--renderer cpu");
+              "OpenGL: expected a context of version 4.3 or newer.*`renderer` cpu");
 }
 
 TEST(EglContextDeathTest, AMachineWithoutADriverIsRejectedInOneLineThatNamesTheCpuRenderer) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   EXPECT_EXIT(OpenWith("__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent"),
               ::testing::ExitedWithCode(1),
-              "OpenGL: expected a context of version 4.3 or newer.*--renderer cpu");
+              "OpenGL: expected a context of version 4.3 or newer.*`renderer` cpu");
 }
 
 // What GlTest relies on: a call that the driver objects to does not pass unseen.

@@ -87,7 +87,7 @@ TEST_F(GpuMemory, DrawsFromTheNearestThatFitAndSaysSoOnce) {
     ASSERT_EQ(warnings.size(), 1u);
     EXPECT_NE(warnings[0].find("drawn from the nearest 2 of 4 views"), std::string::npos)
         << warnings[0];
-    EXPECT_NE(warnings[0].find("--gpu-memory"), std::string::npos);
+    EXPECT_NE(warnings[0].find("`gpu_memory`"), std::string::npos);
     // Less than one view: one is drawn all the same.
     settings.gpu_bytes = 1;
     Renderer tiny(settings);
@@ -129,7 +129,7 @@ TEST_F(GpuMemory, WhatTheDriverCannotHoldIsRejectedInOneLine) {
   } catch (const Error& error) {
     const std::string line = error.what();
     EXPECT_NE(line.find("at most " + std::to_string(largest)), std::string::npos) << line;
-    EXPECT_NE(line.find("--renderer cpu"), std::string::npos) << line;
+    EXPECT_NE(line.find("`renderer` cpu"), std::string::npos) << line;
   }
 }
 
@@ -154,7 +154,7 @@ TEST_F(GpuMemoryFull, IsSaidInOneLine) {
   } catch (const Error& error) {
     const std::string line = error.what();
     EXPECT_NE(line.find("out of GPU memory"), std::string::npos) << line;
-    EXPECT_NE(line.find("--renderer cpu"), std::string::npos) << line;
+    EXPECT_NE(line.find("`renderer` cpu"), std::string::npos) << line;
     EXPECT_EQ(line.find('\n'), std::string::npos) << line;
   }
 }

@@ -18,6 +18,8 @@
 namespace dtr::pipeline {
 namespace {
 
+using namespace io;
+
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 
@@ -275,7 +277,7 @@ TEST_F(ImportTest, WholeNumbersNeedAStatedUnit) {
     WritePng16(file, Grid<std::uint16_t>(kWidth, kHeight, 1, 2500));
     fs::remove(fs::path(file).replace_extension(".exr"));
   }
-  EXPECT_THAT(ErrorOfImport(), HasSubstr("--depth-unit"));
+  EXPECT_THAT(ErrorOfImport(), HasSubstr("`depth_unit`"));
   options_.depth_unit = 0.001;
   EXPECT_EQ(ImportViews(list_, options_).at(0).depth(4, 4), 2.5f);
 }

@@ -43,13 +43,13 @@ TEST_F(GivenLenses, AreOfEveryCameraAndOfNoOther) {
   EXPECT_THAT(
       [&] { Calibrate({"left"}); },
       ThrowsMessage<UsageError>(HasSubstr(
-          "--camera: expected intrinsics for every camera or for none, found none for right")));
+          "`camera`: expected intrinsics for every camera or for none, found none for right")));
   EXPECT_THAT(
       [&] {
         Calibrate({"left", "middle", "right"});
       },
       ThrowsMessage<UsageError>(
-          HasSubstr("--camera middle: no such camera; the first one is left")));
+          HasSubstr("`camera` middle: no such camera; the first one is left")));
 }
 
 TEST_F(GivenLenses, AreOfTheCamerasSizeAndOfAModelThatBoardsTell) {
@@ -60,7 +60,7 @@ TEST_F(GivenLenses, AreOfTheCamerasSizeAndOfAModelThatBoardsTell) {
         Calibrate({"left", "right"}, wide);
       },
       ThrowsMessage<Error>(HasSubstr(
-          "--camera left: expected intrinsics of 64 x 48 px as its photos are, found 128 x 48; "
+          "`camera` left: expected intrinsics of 64 x 48 px as its photos are, found 128 x 48; "
           "give the intrinsics of this camera")));
   const calib::LensCamera fov{calib::LensModel::kFov, 64, 48, {60, 60, 32, 24, 0.9}};
   EXPECT_THAT(
@@ -90,7 +90,7 @@ TEST(UnseenPhotosOfARig, AreOfItsCamerasWithoutAPattern) {
         ReadUnseen(CalibrationOf({"a", "b"}), folder.path(), "a*", 1, silent);
       },
       ThrowsMessage<UsageError>(HasSubstr(
-          "--pattern a*: is for the photos of one camera; a rig's cameras are told apart")));
+          "`pattern` a*: is for the photos of one camera; a rig's cameras are distinguished")));
 }
 
 }  // namespace

@@ -201,12 +201,12 @@ TEST(CheckRenderOptions, NamesTheOptionThatHasNoMeaning) {
     return "";
   };
   EXPECT_EQ(message([](RenderOptions&) {}), "");
-  EXPECT_NE(message([](auto& o) { o.views = 0; }).find("--views"), std::string::npos);
-  EXPECT_NE(message([](auto& o) { o.delta_px = std::nan(""); }).find("--delta"), std::string::npos);
-  EXPECT_NE(message([](auto& o) { o.falloff = -1; }).find("--falloff"), std::string::npos);
-  EXPECT_NE(message([](auto& o) { o.max_angle_rad = 4; }).find("--max-angle"), std::string::npos);
-  EXPECT_NE(message([](auto& o) { o.point_size = 0; }).find("--point-size"), std::string::npos);
-  EXPECT_NE(message([](auto& o) { o.resolution = 0; }).find("--resolution"), std::string::npos);
+  EXPECT_NE(message([](auto& o) { o.views = 0; }).find("`views`"), std::string::npos);
+  EXPECT_NE(message([](auto& o) { o.delta_px = std::nan(""); }).find("`delta`"), std::string::npos);
+  EXPECT_NE(message([](auto& o) { o.falloff = -1; }).find("`falloff`"), std::string::npos);
+  EXPECT_NE(message([](auto& o) { o.max_angle_rad = 4; }).find("`max_angle`"), std::string::npos);
+  EXPECT_NE(message([](auto& o) { o.point_size = 0; }).find("`point_size`"), std::string::npos);
+  EXPECT_NE(message([](auto& o) { o.resolution = 0; }).find("`resolution`"), std::string::npos);
 }
 
 }  // namespace

@@ -319,7 +319,7 @@ TEST(ViewStream, FramesOfADynamicSetShareTheRoomAndNothingElse) {
   EXPECT_EQ(drawn(1), second);
   EXPECT_EQ(disk.reads, 6);
   EXPECT_EQ(drawn(0), first);
-  // An time step of which nothing can be read is no reason to go without the others.
+  // A time step of which nothing can be read is no reason to go without the others.
   for (const auto& [id, view] : disk.files) {
     if (!id.starts_with("w")) disk.broken[id] = "gone";
   }

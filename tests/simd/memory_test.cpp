@@ -72,7 +72,7 @@ TEST(SimdMemory, DrawsFromTheNearestThatFitAndSaysSoOnce) {
   }
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_NE(warnings[0].find("drawn from the nearest 2 of 4 views"), std::string::npos);
-  EXPECT_NE(warnings[0].find("--gpu-memory"), std::string::npos);
+  EXPECT_NE(warnings[0].find("`gpu_memory`"), std::string::npos);
 }
 
 TEST(SimdMemory, WhatIsHeldIsDrawnWithoutPixels) {

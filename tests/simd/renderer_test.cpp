@@ -71,7 +71,7 @@ TEST(SimdRenderer, WhatCannotBeDrawnIsNamed) {
     FAIL() << "it was drawn";
   } catch (const UsageError& error) {
     const std::string line = error.what();
-    EXPECT_NE(line.find("--method deferred"), std::string::npos) << line;
+    EXPECT_NE(line.find("`method` deferred"), std::string::npos) << line;
     EXPECT_EQ(line.find('\n'), std::string::npos) << line;
   }
   Pose broken = scene.novel.cam_from_world;

@@ -156,7 +156,7 @@ TEST(PatchMatchKernel, TooWideAPhotoIsRejectedByItsWidth) {
   } catch (const Error& error) {
     EXPECT_STREQ(error.what(),
                  "patchmatch: expected photos at most 32735 pixels wide, found 32736; shrink them "
-                 "(--max-size)");
+                 "(`max_size`)");
   }
 }
 

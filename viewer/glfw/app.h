@@ -29,7 +29,7 @@ struct AppSettings {
   std::string warning;  ///< the first message in the window; empty: none
   int width_px = 1280, height_px = 800;
   RenderOptions render;
-  size_t gpu_bytes = size_t{4} << 30;
+  size_t gpu_bytes = 4'000'000'000;
   std::string shader_folder;  ///< as gl::RendererSettings
   gl::Drawer drawer = gl::Drawer::kFitting;
   std::filesystem::path output = ".";                 ///< folder for what the user saves

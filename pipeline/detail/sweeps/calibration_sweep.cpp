@@ -157,7 +157,7 @@ eval::SweepMeasurement CalibrationSweep::Measure(const eval::SweepSetting& setti
   measured.error = std::max(score.error_px, kExact);
   measured.figures = {{"not_registered", static_cast<double>(calibrated.not_registered.size())},
                       {"points", static_cast<double>(calibrated.model.points.size())},
-                      {"yardstick_sights", score.sights},
+                      {"reference_observations", score.sights},
                       {"reference_tracks_predicted", score.predicted},
                       {"median_px", score.median_px}};
   return measured;

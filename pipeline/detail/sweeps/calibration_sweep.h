@@ -30,20 +30,20 @@ struct CalibrationSweepOptions {
 
 /// Cost: processor seconds of the stage `calibration` of `dtr build`, COLMAP's included; those of
 /// runs that lie in the workspace are the ones it recorded. Error: px of the whole photo, root mean
-/// of Cauchy's loss over the observations of one reference tracks (calib/reference tracks), each
-/// held out in turn; a observation that a setting's cameras cannot predict, for want of a camera,
-/// counts as far off. Figures: `not_registered`, `points`, `yardstick_sights`,
+/// of Cauchy's loss over the observations of one set of reference tracks (calib/reference_tracks),
+/// each held out in turn; an observation that a setting's cameras cannot predict, for want of a
+/// camera, counts as far off. Figures: `not_registered`, `points`, `reference_observations`,
 /// `reference_tracks_predicted`, `median_px`.
 class CalibrationSweep {
  public:
   /// Reads the photos and finds the reference tracks. Throws UsageError for a folder without
-  /// photos, Error for photos of another set, for such as share too little to judge by, and without
-  /// COLMAP.
+  /// photos, Error for photos of another set, for such as share too little to measure by, and
+  /// without COLMAP.
   CalibrationSweep(CalibrationSweepOptions options, Progress& progress);
   eval::SweepStage Stage() const;  ///< its functions borrow this object
   /// What decides the results beside the settings: photos, COLMAP.
   std::string Identity() const;
-  /// For people: what the reference tracks is.
+  /// For people: what the reference tracks are.
   std::string Conditions() const;
 
  private:

@@ -200,7 +200,7 @@ TEST(RefineInMetres, DistancesSetTheUnitAndStretchWhatHasShrunk) {
     for (const auto& [a, b] : {std::pair(0, 13), std::pair(13, 26), std::pair(26, 39)}) {
       const double length_m =
           (centres[static_cast<size_t>(a)] - centres[static_cast<size_t>(b)]).norm();
-      known.distances.push_back({"--distance", a, b, length_m, kTapeM});
+      known.distances.push_back({"`distance`", a, b, length_m, kTapeM});
     }
     RefineOptions options;
     options.known_lenses = {{1, truth.lenses[0]}};
@@ -233,7 +233,7 @@ TEST(RefineInMetres, VaguePlacesTurnAndShiftWhatADistanceScales) {
   for (std::uint64_t seed = 1; seed <= kDraws; ++seed) {
     KnownMetres known = Places(truth, kPlacesM, seed);
     ExpectRejection(model, known, "scale: expected a scale known to 10 %, found one to ");
-    known.distances = {{"--distance A,B", 0, 7, length_m, 0.001}};
+    known.distances = {{"`distance` A,B", 0, 7, length_m, 0.001}};
     const Held held = Hold(model, known);
     const MetricReport& report = held.start.report;
     EXPECT_FALSE(report.places_tell_scale);
@@ -285,9 +285,9 @@ TEST(RefineInMetres, WhatContradictsIsRejected) {
     return (centres[static_cast<size_t>(a)] - centres[static_cast<size_t>(b)]).norm();
   };
   KnownMetres known = Places(truth, 0.02);
-  known.distances = {{"--distance A,B", 0, 7, 1.5 * apart(0, 7), 0.01}};
+  known.distances = {{"`distance` A,B", 0, 7, 1.5 * apart(0, 7), 0.01}};
   ExpectRejection(model, known,
-                  "--distance A,B: expected a distance that agrees with the photos' GPS");
+                  "`distance` A,B: expected a distance that agrees with the photos' GPS");
   known.places.clear();
   known.distances = {{"one", 0, 7, apart(0, 7), 0.001}, {"other", 1, 6, 2 * apart(1, 6), 0.001}};
   ExpectRejection(model, known, "expected distances that agree");

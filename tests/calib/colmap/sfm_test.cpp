@@ -205,7 +205,7 @@ TEST_F(RunSfmWithFake, PhotosThatMatchButFitNoCameraAreNotCalledWithoutOverlap) 
   fs::remove_all(fake_ / "model.1");
   fake_.LeaveDatabase(Aliases(), {}, {{0, 1, 40}, {0, 2, 40}, {1, 2, 40}, {2, 3, 40}});
   EXPECT_THAT(MessageOfRun(), AllOf(HasSubstr("4 pairs of photos match"),
-                                    HasSubstr("--camera-per folder or photo")));
+                                    HasSubstr("`camera_per` folder or photo")));
 }
 
 TEST_F(RunSfmWithFake, AModelOfPhotosMostlyWithoutParallaxIsRemarkedOn) {

@@ -165,7 +165,7 @@ TEST(IngestVideos, SaysWhatIsNoVideoAndWhatHasNothingToSee) {
               HasSubstr("no such file"));
   EXPECT_THAT(
       MessageOf<UsageError>([&] { Ingest({folder / "x.mp4"}, {.motion = 0}, folder / "c"); }),
-      HasSubstr("--motion"));
+      HasSubstr("`motion`"));
 }
 
 TEST(IngestVideos, FramesWithoutTextureAreRejected) {
@@ -177,7 +177,7 @@ TEST(IngestVideos, FramesWithoutTextureAreRejected) {
     for (int i = 0; i < 5; ++i) video.write(cv::Mat(48, 64, CV_8UC3, cv::Scalar::all(128)));
   }
   EXPECT_THAT(MessageOf<Error>([&] { Ingest({file}, {}, folder / "frames"); }),
-              HasSubstr("fog.avi: expected frames with texture, found none among 5; give --every"));
+              HasSubstr("fog.avi: expected frames with texture, found none among 5; give `every`"));
   EXPECT_EQ(Ingest({file}, {.every = 2}, folder / "every").photos.size(), 3u);
 }
 
