@@ -92,8 +92,8 @@ void RejectTurned(const capture::Capture& capture, const char* known) {
   for (const capture::Photo& photo : capture.photos) {
     if (!capture::IsTurned(photo)) continue;
     throw Error(fmt::format(
-        "{}: expected a photo as it is stored, for {} is known of such, found one that its EXIF "
-        "orientation rotated; take the tag out of it (exiftool -Orientation= FILE)",
+        "{}: expected a photo as it is stored, which {} of, found one that its EXIF orientation "
+        "rotated; take the tag out of it (exiftool -Orientation= FILE)",
         photo.name, known));
   }
 }
@@ -147,8 +147,8 @@ CalibratedPhotos CalibratePhotos(const capture::Capture& capture, const Calibrat
   CalibrateOptions checked = options;
   checked.held_out.resize(capture.photos.size(), false);
   RequireCalibration(checked.poses);
-  if (checked.rig) RejectTurned(capture, "the rig");
-  if (checked.lens) RejectTurned(capture, "the intrinsics");
+  if (checked.rig) RejectTurned(capture, "the rig is");
+  if (checked.lens) RejectTurned(capture, "the intrinsics are");
   fs::create_directories(workspace);
   CalibratedPhotos calibrated = checked.poses.empty()
                                     ? FromSfm(capture, checked, workspace, progress)

@@ -145,7 +145,7 @@ std::string NameOfUnknown(const Bundle& bundle, const BundleCovariance& layout, 
   for (size_t i = 0; i < layout.image_at.size(); ++i) {
     const long k = unknown - layout.image_at[i];
     if (k < 0 || k >= 6) continue;
-    return fmt::format("{} of {}", k < 3 ? "turn" : "place", bundle.images[i].name);
+    return fmt::format("{} of {}", k < 3 ? "rotation" : "position", bundle.images[i].name);
   }
   return "";
 }

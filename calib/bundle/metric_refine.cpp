@@ -405,8 +405,8 @@ Refined RefineInMetres(const KnownMetres& known, MetricStart& start) {
   Refined refined = Refine(start.model, start.options);
   if (!refined.changed) {
     throw Error(
-        fmt::format("bundle adjustment: expected a model that positions and distances can be "
-                    "held for, found none: {}; dtr calibrate scale carries a set as a whole",
+        fmt::format("bundle adjustment: expected a model that positions and distances can "
+                    "constrain, found none: {}; dtr calibrate scale carries a set as a whole",
                     refined.reason));
   }
   Complete(known, refined.model, start);

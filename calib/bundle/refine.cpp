@@ -205,7 +205,7 @@ SfmModel WithLenses(SfmModel model, const std::map<std::uint32_t, LensCamera>& l
     }
     if (known->second.width_px != camera.width_px || known->second.height_px != camera.height_px) {
       throw Error(fmt::format(
-          "bundle adjustment: expected intrinsics for images of {}x{}, found one "
+          "bundle adjustment: expected intrinsics for images of {}x{}, found some "
           "for {}x{}; scale it to the photos",
           camera.width_px, camera.height_px, known->second.width_px, known->second.height_px));
     }

@@ -213,9 +213,8 @@ SfmResult RunSfm(const fs::path& images_dir, std::span<const SfmImageInput> imag
     result.report.why_not_registered = WhyWithoutCamera(
         workspace, result.model, result.report.forward_motion ? kMinInliersForward : kMinInliers);
   } catch (const Error& error) {  // the model is whole: a diagnosis is not worth its loss
-    progress.Note(fmt::format(
-        "what the matches say of parallax and of photos without a camera is not known: {}",
-        error.what()));
+    progress.Note(
+        fmt::format("parallax and photos without a camera cannot be analysed: {}", error.what()));
   }
   return result;
 }

@@ -53,7 +53,7 @@ void AddBuildCommand(CLI::App& app) {
         AddVideoOptions(command, options->video);
         command
             .add_option("--holdout", options->holdout,
-                        "Photos kept out of depth and textures, to measure with")
+                        "Photos held out from depth and textures, to measure with")
             ->type_name("every:N|NAME,...");
         command.add_flag("--holdout-strict", options->holdout_strict,
                          "Keep them out of SfM too and register them afterwards");

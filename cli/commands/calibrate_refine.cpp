@@ -112,7 +112,7 @@ CLI::Option* AddLensOption(CLI::App& command, std::filesystem::path& lens) {
 void AddCalibrateRefineCommand(CLI::App& calibrate) {
   AddCommand(
       calibrate, "refine",
-      "Bundle adjustment of a COLMAP model, where held-out observations say that it pays",
+      "Bundle adjustment of a COLMAP model, used where held-out observations gain",
       "dtr calibrate refine sparse/0 -o refined/ --lens camera.json",
       [](CLI::App& command) -> Action {
         auto options = std::make_shared<CalibrateRefineArguments>();

@@ -60,7 +60,7 @@ void SayDelays(const calib::Calibration& calibration, const pipeline::RigSummary
   if (summary.unsteady.p < limits.min_p && summary.unsteady.amplitude_px > limits.max_pattern_px) {
     console.Say(fmt::format(
         "the cameras have no common rate: a delay of each photo's own, beyond one per camera, "
-        "explains {:.3f} px RMS per coordinate; what is said to be uncertain is so by more",
+        "explains {:.3f} px RMS per coordinate; the stated uncertainties are too small",
         summary.unsteady.amplitude_px));
   }
 }

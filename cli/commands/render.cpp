@@ -53,9 +53,13 @@ int RunRender(const RenderArguments& options, const Context& context) {
   pipeline::RenderRequest request = options.request;
   request.render = *options.render;
   request.threads = context.common.threads;
-  RequireOutputs(request);
   const pipeline::RenderReport report = pipeline::Render(
-      request, [&] { return MakeRenderer(options.renderer, context.console); }, context.console);
+      request,
+      [&] {
+        RequireOutputs(request);  // its cameras are there
+        return MakeRenderer(options.renderer, context.console);
+      },
+      context.console);
   context.console.Say(fmt::format("{}: {} frame{}", request.output.string(), report.frames.size(),
                                   request.several() ? "s" : ""));
   context.EmitJson(ToJson(report));

@@ -95,7 +95,7 @@ void AddValidateCommand(CLI::App& app) {
   AddCommand(
       app, "validate",
       "Reprojection tests of a set's or a board's calibration; exit 1 when one fails",
-      "dtr validate left.json --images unseen/ --report left.html",
+      "dtr validate left.json --images held_out/ --report left.html",
       [](CLI::App& command) -> Action {
         auto options = std::make_shared<ValidateArguments>();
         command

@@ -184,7 +184,7 @@ TEST_F(BuildInMetres, PhotosThatDoNotDetermineTheirCamerasAreRejectedBeforeTheyA
 
 TEST_F(BuildInMetres, WhatCannotBeHeldIsRejectedBeforeAnyWork) {
   ExpectRejected(Build({"--gps", "--no-refine"}), kWrongUsage,
-                 "--gps, --distance: are held by the bundle adjustment of what SfM finds; expected "
+                 "--gps, --distance: constrain the bundle adjustment of what SfM finds; expected "
                  "no --poses, --rig or --no-refine beside them");
   ExpectRejected(Build({"--distance", "0000,nobody=1m"}), kWrongUsage,
                  "--distance 0000,nobody=1m: no photo is named 'nobody'");

@@ -133,7 +133,7 @@ TEST_F(BuildRig, TheRigGivesPlacesAndMetres) {
   EXPECT_THAT(
       DtrOk({"info", In("set.dtr")}).out,
       HasSubstr("rig: rig.json with cameras left, right; positions and scale are the rig's, 5 "
-                "instants"));
+                "time steps"));
 
   // A set whose scale has been changed since is no longer the rig's, and validate says so.
   DtrOk({"calibrate", "scale", In("set.dtr"), "--distance",
@@ -186,7 +186,7 @@ TEST_F(BuildRig, PhotosThatAreNotTheRigsAreRejectedBeforeAnyWork) {
   ExpectRejected(Build({"--rig", In("absent.json")}), kWrongUsage,
                  "expected a .json of dtr calibrate rig, found nothing");
   ExpectRejected(Build({"--rig", In("rig.json"), "--poses", In("photos")}), kWrongUsage,
-                 "--rig: positions what SfM finds; expected no --poses beside it");
+                 "--rig: sets the poses of what SfM finds; expected no --poses beside it");
   ExpectRejected(Build({"--rig", In("rig.json"), "--no-refine"}), kWrongUsage,
                  "--rig: is bundle adjustment; expected no --no-refine beside it");
   calib::Calibration alone = CalibrationOf(kRig);

@@ -231,7 +231,7 @@ TEST_F(RefineToPlaces, VaguePlacesTurnWhatADistanceScalesAndAreRejectedWithoutOn
   EXPECT_THAT(ran.out, HasSubstr("it is that of the distances"));
   EXPECT_THAT(ran.out,
               HasSubstr("the positions err too much for cameras that stand so near to each "
-                        "other: the turn, and with it what is north and up, is known to"));
+                        "other: the rotation, and with it what is north and up, is known to"));
   const Json scale = Json::parse(Text(In("told.json")))["scale"];
   EXPECT_EQ(scale["places_tell_scale"], false);
   EXPECT_GT(scale["places_relative_sigma"], 0.1);
@@ -297,7 +297,7 @@ TEST_F(RefineToPlaces, PlacesThatDoNotSettleAreTold) {
     EXPECT_LE(scale["passes"], max_passes);
     const std::string line = fmt::format(
         "which positions agree, and how far they err, did not settle in {} passes; give "
-        "--gps-sigma "
+        "`gps_sigma` "
         "where you know it",
         max_passes);
     const auto& lines = refined.lines;

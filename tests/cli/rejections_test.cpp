@@ -171,8 +171,8 @@ TEST_F(Rejections, APhotoThatIsTurnedIsNotOfAKnownLens) {
   Write("one/cameras.txt", "1 PINHOLE 192 128 150 150 96 64\n");
   ExpectAllRejected(
       {{kFailed,
-        "0001.jpg: expected a photo as it is stored, for the lens is known of such, found one that "
-        "its EXIF orientation turned",
+        "0001.jpg: expected a photo as it is stored, which the intrinsics are of, found one that "
+        "its EXIF orientation rotated",
         {"calibrate", "photos", photos, "-o", In("new"), "--lens", In("one/cameras.txt")}}});
   // Cameras of a model that says nothing else are of the pixels as stored.
   const Ran built = DtrOk({"build", photos, "-o", In("set.dtr"), "--poses",

@@ -84,7 +84,7 @@ TEST_F(RunSfmWithFake, AModelIsNotLostWithTheDatabaseThatSaysWhyPhotosAreNotInIt
   const SfmResult again = Run();
   EXPECT_EQ(again.model.images.size(), 3u);
   EXPECT_THAT(again.report.why_not_registered, ElementsAre());
-  EXPECT_THAT(listener_.notes, Contains(HasSubstr("of photos without a camera is not known: ")));
+  EXPECT_THAT(listener_.notes, Contains(HasSubstr("photos without a camera cannot be analysed: ")));
 }
 
 TEST_F(RunSfmWithFake, KeepsArgumentsLogAndExitCode) {
