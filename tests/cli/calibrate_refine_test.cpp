@@ -340,7 +340,7 @@ TEST_F(RefineToPlaces, WhatCannotBeHeldIsRejected) {
                  "--gps-sigma 0: expected metres above 0, as 3 or 3,6 (on the map, in height)");
   ExpectRejected(
       Refine({"--gps", In("photos"), "--gps-sigma", "5"}), kFailed,
-      "expected positions or distances that determine the scale to 10 %, found ones that tell "
+      "expected positions or distances that determine the scale to 10 %, found ones that determine "
       "it to ");
   ExpectRejected(Refine({"--gps-sigma", "3"}), kWrongUsage, "--gps-sigma requires --gps");
   std::filesystem::create_directories(folder_ / "empty");
