@@ -229,7 +229,7 @@ TEST_F(RotatedPhotos, ValidateReadsAndDrawsThemAsTheUnrotated) {
                          In(folder + ".html"), "--json", "-"});
     ASSERT_TRUE(ran.code == 0 || ran.code == kFailed) << ran.err;
     // The first nine made the calibration, rotated or not.
-    EXPECT_THAT(ran.err, HasSubstr("left out: left09.png: not unseen"));
+    EXPECT_THAT(ran.err, HasSubstr("left out: left09.png: not held out"));
     EXPECT_THAT(ran.err, Not(HasSubstr("left out: left10.png")));
     json[folder] = Json::parse(ran.out);
     photos[folder] = PhotosIn(Text(In(folder + ".html")));
