@@ -1,13 +1,13 @@
-// point_cloud SET.dtr VIEW CLOUD.ply -- the depth map of a view as coloured points in the world,
-// each with the standard deviation of its depth.
+// point_cloud SET.dtr VIEW CLOUD.ply -- depth of a view as coloured points with standard
+// deviations.
 #include <dtr/io/set_io.h>
 
 #include <fstream>
 #include <iostream>
 #include <sstream>
+#include <stdexcept>
 
 namespace {
-
 // One line for every pixel with depth: x y z red green blue sigma; lengths in the set's unit.
 std::string Points(const dtr::View& view, int* count) {
   // A depth map may have 1/depth_scale of the photo's pixels; DepthCamera is that of its grid.
@@ -30,7 +30,6 @@ std::string Points(const dtr::View& view, int* count) {
   }
   return lines.str();
 }
-
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -50,7 +49,7 @@ int main(int argc, char** argv) {
               "property uchar red\nproperty uchar green\nproperty uchar blue\n"
               "property float sigma\nend_header\n"
            << points << std::flush;
-      if (!file) throw dtr::Error(std::string(argv[3]) + ": cannot be written");
+      if (!file) throw std::runtime_error(argv[3] + std::string(": cannot be written"));
       std::cout << argv[3] << ": " << count << " points\n";
       return 0;
     }
