@@ -1,5 +1,4 @@
-// point_cloud SET.dtr VIEW CLOUD.ply -- depth of a view as coloured points with standard
-// deviations.
+// point_cloud SET.dtr VIEW CLOUD.ply -- a depth map as coloured points with their deviations.
 #include <dtr/io/set_io.h>
 
 #include <fstream>
@@ -13,6 +12,7 @@ std::string Points(const dtr::View& view, int* count) {
   // A depth map may have 1/depth_scale of the photo's pixels; DepthCamera is that of its grid.
   const dtr::PinholeCamera camera = view.DepthCamera();
   const dtr::Pose world_from_cam = view.cam_from_world.Inverse();
+  const auto& sigma = view.inverse_depth_sigma;  // of 1/z
   std::ostringstream lines;
   for (int y = 0; y < camera.height_px(); ++y) {
     for (int x = 0; x < camera.width_px(); ++x) {
@@ -22,7 +22,6 @@ std::string Points(const dtr::View& view, int* count) {
       const Eigen::Vector3d point =
           world_from_cam * camera.CamFromPixel(centre, z, dtr::DepthKind::kPlaneZ);
       const std::uint8_t* rgb = &view.image(view.depth_scale * x, view.depth_scale * y);
-      const auto& sigma = view.inverse_depth_sigma;  // of 1/z
       lines << point.transpose() << ' ' << +rgb[0] << ' ' << +rgb[1] << ' ' << +rgb[2] << ' '
             << (sigma ? z * z * (*sigma)(x, y) : 0) << '\n';
       ++*count;
@@ -53,9 +52,9 @@ int main(int argc, char** argv) {
       std::cout << argv[3] << ": " << count << " points\n";
       return 0;
     }
-    std::cerr << argv[2] << ": no view with depth is called so\n";
+    throw std::runtime_error(argv[2] + std::string(": no view with depth is called so"));
   } catch (const std::exception& error) {
     std::cerr << error.what() << "\n";
+    return 1;
   }
-  return 1;
 }
