@@ -13,7 +13,8 @@ struct ResidualStats {
   Eigen::Vector2d mean_px = Eigen::Vector2d::Zero();  ///< of the vectors: what is systematic
 };
 
-/// Where something was seen, and its residual there, predicted less observed.
+/// Where something was seen, and its residual there: predicted less observed, the other sign than
+/// ResidualStats.
 struct ResidualArrow {
   Eigen::Vector2d pixel, residual_px;
 };

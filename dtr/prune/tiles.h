@@ -23,8 +23,8 @@ struct TileRule {
 
 /// The redundant tiles, one view after the other, the one first that others cover most (MIV's
 /// pruning graph: its children). A tile that is left out covers nothing, and one that others rely
-/// on stays: the graph has no cycles. Tiles of which a twentieth or more is not covered, has no
-/// depth, or is masked stay too. Does not depend on the order of the set's views.
+/// on stays: the graph has no cycles. Tiles of which a twentieth or more is not covered or has no
+/// depth stay too; masked pixels do not count. Does not depend on the order of the set's views.
 TilesLeftOut RedundantTiles(const CoverMap& map, const TileRule& rule);
 
 /// The view without these tiles: masked, without depth, all of one colour (their mean, so that they
