@@ -141,8 +141,8 @@ TEST(DepthRanges, AViewThatSeesTooFewPointsIsNamed) {
         DepthRangesFromPoints(views, {}, {.names = {"a.jpg", "b.jpg"}});
       },
       ThrowsMessage<Error>(
-          HasSubstr("view a.jpg: expected at least 12 sparse points in its observation, which "
-                    "tell how deep it looks, found 0; take more photos of what it shows")));
+          HasSubstr("view a.jpg: expected at least 12 sparse points in view, which "
+                    "give its depth range, found 0; take more photos of what it shows")));
 }
 
 TEST(RectifyPair, PutsPointsOnOneRowWithTheDisparityOfTheirDepth) {
