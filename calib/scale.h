@@ -70,7 +70,7 @@ struct PositionScale {
 
 /// Fills in how well such a similarity is known where the coordinates of position i err
 /// independently by `sigmas_m[i]`, metres > 0; `centres` as metric_from_scene takes them. By least
-/// squares: a vague place takes nothing from what exact ones tell. Infinite where nothing is told.
+/// squares: a vague place takes nothing from what exact ones tell. Infinite where nothing is known.
 void FillUncertainty(std::span<const Eigen::Vector3d> centres,
                      std::span<const Eigen::Vector3d> sigmas_m, PositionScale& scale);
 

@@ -21,7 +21,7 @@ std::string NameOf(Fault fault);
 /// The fault of that name; empty for any other text.
 std::optional<Fault> FaultCalled(const std::string& name);
 
-/// What the pixels and bytes of a photo say about its use. It is told, never acted upon here.
+/// What the pixels and bytes of a photo say about its use. It is reported, never acted upon here.
 struct Screening {
   /// Variance of the 4-neighbour Laplacian over the variance of the brightness itself: falls with
   /// blur, does not change with contrast. 0 for a photo of one colour.

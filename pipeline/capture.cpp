@@ -10,7 +10,7 @@ namespace fs = std::filesystem;
 std::vector<fs::path> VideosFor(const fs::path& source, const capture::VideoOptions& video) {
   std::vector<fs::path> videos = capture::VideosOf(source);
   const capture::VideoOptions plain;
-  // What is not there is told by who reads it.
+  // What is not there is reported by who reads it.
   if (videos.empty() && fs::exists(source) &&
       (video.every != plain.every || video.motion != plain.motion || video.most != plain.most ||
        video.synchronised)) {

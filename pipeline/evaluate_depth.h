@@ -13,7 +13,7 @@ namespace dtr::pipeline {
 /// NAME_texture.png. Truth of an exact scene made by `dtr dataset` (dataset.json beside it) is cast
 /// again where the set's grid is another; other truth must be on that grid already.
 /// The gauge: cameras that agree with the true ones are taken as they are; else one similarity is
-/// fitted to the camera centres and its residual is told.
+/// fitted to the camera centres and its residual is reported.
 /// Throws Error when a grid differs, the cameras cannot be aligned or a file is missing or broken.
 eval::DepthScores EvaluateDepth(const DtrSet& set, const std::filesystem::path& truth, int threads,
                                 Progress& progress);

@@ -30,7 +30,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-// The way into metres, and what is told of it.
+// The way into metres, and what is reported of it.
 struct Found {
   calib::Similarity metric_from_scene;
   bool keeps_axes = true;

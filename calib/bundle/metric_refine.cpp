@@ -314,7 +314,7 @@ double Understated(const std::vector<Eigen::Vector3d>& misses,
   return std::max(1.0, std::sqrt(squares / (3.0 * static_cast<double>(misses.size()) - 7)));
 }
 
-// What is told of the places.
+// What is reported of the positions.
 void CompletePlaces(const KnownMetres& known, const SfmModel& adjusted, MetricStart& start) {
   MetricReport& report = start.report;
   std::vector<bool> used(known.places.size());
@@ -342,7 +342,7 @@ void CompletePlaces(const KnownMetres& known, const SfmModel& adjusted, MetricSt
   report.places_relative_sigma = scale.relative_sigma;
 }
 
-// What is told of the result.
+// What is reported of the result.
 void Complete(const KnownMetres& known, const SfmModel& adjusted, MetricStart& start) {
   MetricReport& report = start.report;
   std::vector<Eigen::Vector3d> before, after;

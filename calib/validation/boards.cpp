@@ -212,7 +212,7 @@ class Judging {
   }
 
   // What the stored calibration is held against: a solve of the views that made it, which must be
-  // the same numbers, and one of unseen views, which errs by itself. The worse of both is told.
+  // the same numbers, and one of unseen views, which errs by itself. The worse of both is reported.
   struct Reference {
     const Fresh& fresh;
     bool unseen = false;

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "calib/solve/rig_solve.h"
 #include "calib/validation/patterns.h"
 #include "calib/validation/projection.h"
-#include "calib/solve/rig_solve.h"
 #include "calib/validation/reprojection.h"
 #include "dtr/types/check.h"
 
@@ -96,11 +96,11 @@ struct BoardValidation {
 };
 
 /// Everything docs/VALIDATION.md lists, in its order. A test that cannot be made fails and says
-/// why; a degeneracy is named. `distances` (board units, > 0): where else uncertainty is told,
+/// why; a degeneracy is named. `distances` (board units, > 0): where else uncertainty is reported,
 /// which breaks no test. Requires kept or unseen views of every camera; throws Error without.
-BoardValidation ValidateBoards(const ValidatedCalibration& calibration, const std::optional<UnseenViews>& unseen,
-                  const BoardLimits& limits, int threads = 0,
-                  std::span<const double> distances = {});
+BoardValidation ValidateBoards(const ValidatedCalibration& calibration,
+                               const std::optional<UnseenViews>& unseen, const BoardLimits& limits,
+                               int threads = 0, std::span<const double> distances = {});
 
 /// JSON object: passed, tests[] as `validate` of sets has them; cameras[] with stored and held_out
 /// residuals, noise_px, regions[9], coverage, uncertainty_px and far_uncertainty_px {largest, p95,

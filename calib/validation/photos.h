@@ -84,7 +84,7 @@ struct PhotosValidation {
 ///    by row (shutter.h).
 /// Some 4000 points, drawn by their index, take part, and all of photos that would be left few.
 /// More than some 220 photos (kMaxUnknowns with three turns each) are judged in parts of about 100
-/// that see the same points, each by itself; of every test the worst part's figure is told.
+/// that see the same points, each by itself; of every test the worst part's figure is reported.
 /// Deterministic for any number of threads. Throws Error on a broken bundle only, and Interrupted
 /// where `progress` asks for it.
 PhotosValidation ValidatePhotos(const Bundle& stored, const BundleLimits& limits, int threads = 0,

@@ -14,7 +14,8 @@ struct ValidateCalibrationOptions {
   std::optional<std::filesystem::path> images, report;
   std::optional<std::string> pattern, board;  ///< of the photos' names; as calibrate board has it
   std::optional<double> max_rms_px, max_uncertainty_px;
-  std::vector<std::string> at;  ///< distances at which uncertainty is told, as people write lengths
+  std::vector<std::string>
+      at;  ///< distances at which uncertainty is reported, as people write lengths
 };
 
 /// Judges, prints one line per test, writes the page where asked for; kFailed when a test breaks.

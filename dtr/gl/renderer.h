@@ -23,7 +23,7 @@ struct RendererSettings {
   /// Memory for the views' fragments; an image that needs more is drawn in bands of rows.
   size_t layer_bytes = size_t{256} << 20;
   /// Memory for the views themselves. Those drawn longest ago make room for others; where one
-  /// image's do not fit, it is drawn from the nearest that do, and `warn` is told so once.
+  /// image's do not fit, it is drawn from the nearest that do, and `warn` gets one line.
   size_t gpu_bytes = 4'000'000'000;
   /// Told of what the image goes without, a line each, on the thread that draws.
   std::function<void(const std::string&)> warn = [](const std::string&) {};

@@ -43,7 +43,8 @@ DtrSet LoadSet(const std::filesystem::path& set_folder, const LoadOptions& optio
 /// `collapse_duplicates` do not matter here. Sizes are checked against the view before any pixel is
 /// read. A view without depth or sigma keeps them empty. The depth is the stored one: rounded to
 /// its coding. A reduced mesh that is missing, damaged (also in a single bit: its hash is checked)
-/// or of an earlier depth map is left out, which `options.warn` is told: renderers make their own.
+/// or of an earlier depth map is left out, which `options.warn` is called for: renderers make their
+/// own.
 void LoadPixels(const std::filesystem::path& set_folder, View& view, const LoadOptions& options);
 
 /// Points and observations behind the calibration; views are indices into frames[0].views as

@@ -84,7 +84,7 @@ struct Answers {
 };
 
 /// Bilinear between the cells around the lanes' pixels. Of lanes whose cells are not all usable
-/// nothing is told but that they are not.
+/// nothing is known but that they are not.
 HWY_INLINE MD ColoursAt(const CostView& view, int cell_px, VD x, VD y, MD asked, VD* rgb) {
   const DD d;
   const DI di;

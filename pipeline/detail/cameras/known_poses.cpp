@@ -132,7 +132,7 @@ CalibratedPhotos FromColmapModel(const capture::Capture& capture, const Calibrat
   RequireSharedNames(model.images.size(), options.poses, given.first, capture);
   given.world_origin = RecentreModel(model);
   CalibratedPhotos calibrated;
-  // With one photo to build from there is nothing to triangulate, which is told later.
+  // With one photo to build from there is nothing to triangulate, which is reported later.
   const auto sources = std::count_if(model.images.begin(), model.images.end(), [&](const auto& i) {
     return !IsHeldOut(i.name, capture, options);
   });
