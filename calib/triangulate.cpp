@@ -15,24 +15,25 @@ constexpr double kMinReciprocalCondition = 1e-12;  // below, the rays are parall
 
 /// Point nearest to all rays: minimises the sum of squared distances (Hartley & Sturm 1997 call it
 /// the midpoint method). False when the rays are parallel.
-bool MeetingPoint(std::span<const Sight> sights, int left_out, Eigen::Vector3d* p_in_world) {
+bool MeetingPoint(std::span<const Observation> observations, int left_out,
+                  Eigen::Vector3d* p_in_world) {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   int count = 0;
-  for (size_t i = 0; i < sights.size(); ++i) {
+  for (size_t i = 0; i < observations.size(); ++i) {
     if (static_cast<int>(i) == left_out) continue;
-    origin += sights[i].center;
+    origin += observations[i].center;
     ++count;
   }
   if (count < 2) return false;
   origin /= count;
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
-  for (size_t i = 0; i < sights.size(); ++i) {
+  for (size_t i = 0; i < observations.size(); ++i) {
     if (static_cast<int>(i) == left_out) continue;
-    const Eigen::Vector3d& d = sights[i].direction;
+    const Eigen::Vector3d& d = observations[i].direction;
     const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - d * d.transpose();
     normal += across;
-    right += across * (sights[i].center - origin);
+    right += across * (observations[i].center - origin);
   }
   const Eigen::LDLT<Eigen::Matrix3d> solver(normal);
   if (solver.info() != Eigen::Success || solver.rcond() < kMinReciprocalCondition) return false;
@@ -47,14 +48,15 @@ struct Linearised {
 };
 
 /// Cost infinite when the point is behind a camera.
-Linearised Linearise(std::span<const Sight> sights, int left_out, const Eigen::Vector3d& p) {
+Linearised Linearise(std::span<const Observation> observations, int left_out,
+                     const Eigen::Vector3d& p) {
   Linearised at;
   double cost = 0;
-  for (size_t i = 0; i < sights.size(); ++i) {
+  for (size_t i = 0; i < observations.size(); ++i) {
     if (static_cast<int>(i) == left_out) continue;
     Eigen::Vector2d r;
     Eigen::Matrix<double, 2, 3> jacobian;
-    if (!PixelResidual(sights[i], p, &r, &jacobian)) return Linearised{};
+    if (!PixelResidual(observations[i], p, &r, &jacobian)) return Linearised{};
     const double length = r.norm();
     const double weight = length <= kHuberPx ? 1.0 : kHuberPx / length;
     cost += length <= kHuberPx ? length * length : kHuberPx * (2 * length - kHuberPx);
@@ -67,26 +69,27 @@ Linearised Linearise(std::span<const Sight> sights, int left_out, const Eigen::V
 
 /// A start in front of all cameras where the meeting point is not: along the mean ray, at growing
 /// distances. The best of them; false when none is in front of all cameras.
-bool StartAlongMeanRay(std::span<const Sight> sights, int left_out, Eigen::Vector3d* p_in_world) {
+bool StartAlongMeanRay(std::span<const Observation> observations, int left_out,
+                       Eigen::Vector3d* p_in_world) {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero(), direction = Eigen::Vector3d::Zero();
   int count = 0;
-  for (size_t i = 0; i < sights.size(); ++i) {
+  for (size_t i = 0; i < observations.size(); ++i) {
     if (static_cast<int>(i) == left_out) continue;
-    origin += sights[i].center;
-    direction += sights[i].direction;
+    origin += observations[i].center;
+    direction += observations[i].direction;
     ++count;
   }
   origin /= count;
   double spread = 0;
-  for (size_t i = 0; i < sights.size(); ++i) {
+  for (size_t i = 0; i < observations.size(); ++i) {
     if (static_cast<int>(i) != left_out) {
-      spread = std::max(spread, (sights[i].center - origin).norm());
+      spread = std::max(spread, (observations[i].center - origin).norm());
     }
   }
   double best = std::numeric_limits<double>::infinity();
   for (double reach = spread; reach <= 1024 * spread && spread > 0; reach *= 2) {
     const Eigen::Vector3d p = origin + reach * direction.normalized();
-    const double cost = Linearise(sights, left_out, p).cost;
+    const double cost = Linearise(observations, left_out, p).cost;
     if (cost < best) {
       best = cost;
       *p_in_world = p;
@@ -97,46 +100,46 @@ bool StartAlongMeanRay(std::span<const Sight> sights, int left_out, Eigen::Vecto
 
 }  // namespace
 
-Sight MakeObservation(const PinholeCamera& camera, const Pose& cam_from_world,
-                      const Eigen::Vector2d& pixel) {
-  Sight sight;
-  sight.camera = &camera;
-  sight.cam_from_world_rotation = cam_from_world.rotation.toRotationMatrix();
-  sight.center = cam_from_world.TargetOriginInSource();
-  sight.direction =
-      sight.cam_from_world_rotation.transpose() * camera.RayFromPixel(pixel).normalized();
-  sight.pixel = pixel;
-  return sight;
+Observation MakeObservation(const PinholeCamera& camera, const Pose& cam_from_world,
+                            const Eigen::Vector2d& pixel) {
+  Observation observation;
+  observation.camera = &camera;
+  observation.cam_from_world_rotation = cam_from_world.rotation.toRotationMatrix();
+  observation.center = cam_from_world.TargetOriginInSource();
+  observation.direction =
+      observation.cam_from_world_rotation.transpose() * camera.RayFromPixel(pixel).normalized();
+  observation.pixel = pixel;
+  return observation;
 }
 
-bool PixelResidual(const Sight& sight, const Eigen::Vector3d& p_in_world, Eigen::Vector2d* residual,
-                   Eigen::Matrix<double, 2, 3>* pixel_by_point) {
-  const Eigen::Vector3d p = sight.cam_from_world_rotation * (p_in_world - sight.center);
+bool PixelResidual(const Observation& observation, const Eigen::Vector3d& p_in_world,
+                   Eigen::Vector2d* residual, Eigen::Matrix<double, 2, 3>* pixel_by_point) {
+  const Eigen::Vector3d p = observation.cam_from_world_rotation * (p_in_world - observation.center);
   if (!(p.z() > 0)) return false;
   const double x = p.x() / p.z(), y = p.y() / p.z();
-  const double fx = sight.camera->fx_px(), fy = sight.camera->fy_px();
-  *residual =
-      sight.pixel - Eigen::Vector2d(fx * x + sight.camera->cx_px(), fy * y + sight.camera->cy_px());
+  const double fx = observation.camera->fx_px(), fy = observation.camera->fy_px();
+  *residual = observation.pixel - Eigen::Vector2d(fx * x + observation.camera->cx_px(),
+                                                  fy * y + observation.camera->cy_px());
   if (!residual->allFinite()) return false;
   if (pixel_by_point != nullptr) {
     Eigen::Matrix<double, 2, 3> by_cam;
     by_cam << fx, 0, -fx * x, 0, fy, -fy * y;
-    *pixel_by_point = (by_cam / p.z()) * sight.cam_from_world_rotation;
+    *pixel_by_point = (by_cam / p.z()) * observation.cam_from_world_rotation;
   }
   return true;
 }
 
-Triangulation Triangulate(std::span<const Sight> sights, int left_out) {
+Triangulation Triangulate(std::span<const Observation> observations, int left_out) {
   Triangulation result;
   Eigen::Vector3d p;
-  if (!MeetingPoint(sights, left_out, &p)) return result;
-  Linearised at = Linearise(sights, left_out, p);
+  if (!MeetingPoint(observations, left_out, &p)) return result;
+  Linearised at = Linearise(observations, left_out, p);
   if (!std::isfinite(at.cost)) {
-    if (!StartAlongMeanRay(sights, left_out, &p)) {
+    if (!StartAlongMeanRay(observations, left_out, &p)) {
       result.status = TriangulationStatus::kBehind;
       return result;
     }
-    at = Linearise(sights, left_out, p);
+    at = Linearise(observations, left_out, p);
   }
   double damping = 1e-6;  // relative to the diagonal; Levenberg-Marquardt's usual small start
   for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
@@ -146,7 +149,7 @@ Triangulation Triangulate(std::span<const Sight> sights, int left_out) {
     if (!step.allFinite()) return result;
     const double moved_px = std::sqrt(std::max(0.0, step.dot(at.matrix * step)));
     if (moved_px < kConvergedPx) break;
-    const Linearised next = Linearise(sights, left_out, p + step);
+    const Linearised next = Linearise(observations, left_out, p + step);
     if (next.cost <= at.cost) {
       p += step;
       at = next;

@@ -8,8 +8,8 @@
 
 namespace dtr::calib {
 
-/// One sight of a point: a camera with its centre and rotation in the world, and the pixel.
-struct Sight {
+/// One observation of a point: a camera with its centre and rotation in the world, and the pixel.
+struct Observation {
   const PinholeCamera* camera = nullptr;
   Eigen::Matrix3d cam_from_world_rotation = Eigen::Matrix3d::Identity();
   Eigen::Vector3d center = Eigen::Vector3d::Zero();      ///< in world
@@ -18,8 +18,8 @@ struct Sight {
 };
 
 /// Builds an observation with its ray.
-Sight MakeObservation(const PinholeCamera& camera, const Pose& cam_from_world,
-                      const Eigen::Vector2d& pixel);
+Observation MakeObservation(const PinholeCamera& camera, const Pose& cam_from_world,
+                            const Eigen::Vector2d& pixel);
 
 /// How a triangulation ended.
 enum class TriangulationStatus {
@@ -41,11 +41,11 @@ struct Triangulation {
 /// reprojection error under Huber's loss, so that one wrong observation among many does not carry
 /// the point away. Coordinates are taken relative to the cameras and steps are relative to the
 /// matrix itself, so neither the world's origin nor its scale matters.
-Triangulation Triangulate(std::span<const Sight> sights, int left_out);
+Triangulation Triangulate(std::span<const Observation> observations, int left_out);
 
 /// Pixel residual (observed minus predicted) of a point, and its derivative with respect to the
 /// point. False when the point is not in front of the camera.
-bool PixelResidual(const Sight& sight, const Eigen::Vector3d& p_in_world, Eigen::Vector2d* residual,
-                   Eigen::Matrix<double, 2, 3>* pixel_by_point);
+bool PixelResidual(const Observation& observation, const Eigen::Vector3d& p_in_world,
+                   Eigen::Vector2d* residual, Eigen::Matrix<double, 2, 3>* pixel_by_point);
 
 }  // namespace dtr::calib

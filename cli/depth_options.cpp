@@ -51,7 +51,7 @@ void AddDepthOptions(CLI::App& command, const std::vector<std::string>& engines,
   overriding("--round-neighbours", choice.round_neighbours,
              "Views that the geometric-consistency passes use", 1, pipeline::kMaxNeighbours);
   overriding("--iterations", choice.iterations, "Visits per pixel and level of the search", 1,
-             pipeline::kMostIterations);
+             pipeline::kMaxIterations);
   overriding("--rounds", choice.rounds,
              "Geometric-consistency passes, in which views are checked against each other's planes",
              0, pipeline::kMaxRounds);

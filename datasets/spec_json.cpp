@@ -16,9 +16,9 @@ constexpr int kGeneratorVersion = 1;
 
 // The beginning of a wrong value, whatever its strings hold.
 std::string Shown(const Json& value) {
-  constexpr size_t kMost = 60;
+  constexpr size_t kMax = 60;
   const std::string text = value.dump(-1, ' ', true, Json::error_handler_t::replace);
-  return text.size() > kMost ? text.substr(0, kMost) + "..." : text;
+  return text.size() > kMax ? text.substr(0, kMax) + "..." : text;
 }
 
 /// The member `key` as T; throws Error naming it when it is absent or of another kind.

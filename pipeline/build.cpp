@@ -58,7 +58,7 @@ Json OptionsJson(const BuildOptions& options, const stereo::Effort& effort) {
   if (!options.rig.empty()) json["rig"] = options.rig.filename().string();
   if (options.metres.any()) json["metres"] = Json::parse(ToJson(options.metres));
   SfmChoice plain;
-  plain.features = colmap::kMostFeatures;
+  plain.features = colmap::kMaxFeatures;
   if (options.sfm != plain) json["sfm"] = Json::parse(ToJson(options.sfm));
   json["seed"] = options.seed;
   if (options.depth.depth_error_px) json["depth_error_px"] = *options.depth.depth_error_px;

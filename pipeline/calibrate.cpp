@@ -116,7 +116,7 @@ colmap::SfmOptions SfmOptionsFor(const CalibrateOptions& options) {
   sfm.seed = options.seed;
   sfm.memory_gb = options.memory_gb;
   sfm.max_image_size_px = options.sfm.feature_size_px;
-  sfm.max_features = options.sfm.features < colmap::kMostFeatures ? options.sfm.features : 0;
+  sfm.max_features = options.sfm.features < colmap::kMaxFeatures ? options.sfm.features : 0;
   sfm.matching = options.sfm.matching;
   sfm.lens_model = options.sfm.lens_model;
   return sfm;

@@ -27,7 +27,7 @@ const Preset& PresetCalled(const std::string& name);
 inline constexpr double kDefaultMemoryGb = 4;
 
 /// The most that an effort may have of each; rounds may be none, the others are 1 at least.
-inline constexpr int kMaxNeighbours = 8, kMostIterations = 20, kMaxRounds = 8;
+inline constexpr int kMaxNeighbours = 8, kMaxIterations = 20, kMaxRounds = 8;
 
 /// What was asked for: a preset, and what overrides it.
 struct DepthChoice {

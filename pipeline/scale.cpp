@@ -117,7 +117,7 @@ Found FromGps(const ScaleOptions& options, const DtrSet& set) {
 Found FromBoard(const ScaleOptions& options, const DtrSet& set, Progress& progress) {
   const calib::Board& board = *options.board;
   BoardInSet in_set = FindBoard(options.set, set, board, options.threads, progress);
-  calib::BoardScale scale = calib::ScaleFromBoard(board, in_set.sights);
+  calib::BoardScale scale = calib::ScaleFromBoard(board, in_set.observations);
   Found found;
   found.metric_from_scene.scale = 1 / scale.scene_from_board.scale;
   found.relative_sigma = scale.relative_sigma;

@@ -68,7 +68,7 @@ PlacedPoint FromDepth(const std::filesystem::path& folder, View view, const Scal
 }
 
 PlacedPoint FromRays(const DtrSet& set, const ScalePoint& point) {
-  std::vector<calib::Sight> sights;
+  std::vector<calib::Observation> observations;
   for (const ScaleClick& click : point.clicks) {
     const View& view = ViewOf(set, click);
     if (!click.pixel) {
@@ -77,9 +77,9 @@ PlacedPoint FromRays(const DtrSet& set, const ScalePoint& point) {
                       point.text, click.view_id));
     }
     RequireInside(view, point, *click.pixel);
-    sights.push_back(calib::MakeObservation(view.camera, view.cam_from_world, *click.pixel));
+    observations.push_back(calib::MakeObservation(view.camera, view.cam_from_world, *click.pixel));
   }
-  const calib::Triangulation found = calib::Triangulate(sights, -1);
+  const calib::Triangulation found = calib::Triangulate(observations, -1);
   if (found.status != calib::TriangulationStatus::kConverged) {
     throw Error(fmt::format(
         "{}: expected rays that meet before the cameras, found {}; click the same point in views "
@@ -87,10 +87,11 @@ PlacedPoint FromRays(const DtrSet& set, const ScalePoint& point) {
         point.text,
         found.status == calib::TriangulationStatus::kBehind ? "none that do" : "parallel ones"));
   }
-  for (size_t i = 0; i < sights.size(); ++i) {
+  for (size_t i = 0; i < observations.size(); ++i) {
     Eigen::Vector2d miss;
     Eigen::Matrix<double, 2, 3> unused;
-    if (PixelResidual(sights[i], found.p_in_world, &miss, &unused) && miss.norm() <= kMaxMissPx) {
+    if (PixelResidual(observations[i], found.p_in_world, &miss, &unused) &&
+        miss.norm() <= kMaxMissPx) {
       continue;
     }
     throw Error(fmt::format(

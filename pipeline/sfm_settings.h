@@ -15,7 +15,7 @@ const char* NameOf(CameraPer per);
 /// cost and what they are worth.
 struct SfmChoice {
   int feature_size_px = 0;  ///< long side of the photos for features; 0: from the memory
-  int features = 0;         ///< most per photo; 0: colmap::kMostFeatures, or what a preset says
+  int features = 0;         ///< most per photo; 0: colmap::kMaxFeatures, or what a preset says
   colmap::Matching matching = colmap::Matching::kAuto;
   std::string lens_model = colmap::SfmOptions().lens_model;
   CameraPer camera_per = CameraPer::kAuto;

@@ -19,12 +19,12 @@
 namespace dtr::calib {
 namespace {
 
-constexpr double kIntoQuadrant = 0.3;   // of the way to the next corners, along both
-constexpr double kContrastShare = 0.4;  // of the seed's: shading and blur
-constexpr double kMinContrast = 15;     // grey levels
-constexpr double kFarthestMove = 0.2;   // of the spacing, by refinement
-constexpr double kLeastAngle = 0.5;     // sine, between the two directions of the lattice
-constexpr double kLineShare = 0.5;      // of the longest line; shorter ones are not the board's
+constexpr double kIntoQuadrant = 0.3;    // of the way to the next corners, along both
+constexpr double kContrastShare = 0.4;   // of the seed's: shading and blur
+constexpr double kMinContrast = 15;      // grey levels
+constexpr double kFarthestMove = 0.2;    // of the spacing, by refinement
+constexpr double kMinLatticeSine = 0.5;  // sine, between the two directions of the lattice
+constexpr double kLineShare = 0.5;       // of the longest line; shorter ones are not the board's
 constexpr size_t kMaxCorners = 10000;
 constexpr int kCandidates = 1000, kSeeds = 40, kNeighbours = 8;
 constexpr int kSmallestBoard = 3;  // corners per side
@@ -147,7 +147,7 @@ std::optional<Node> SeedAt(const Grid<std::uint8_t>& grey, const Eigen::Vector2d
   double most = kMinContrast;
   for (size_t i = 0; i < count; ++i) {
     for (size_t j = 0; j < i; ++j) {
-      if (Sine(ways[i], ways[j]) < kLeastAngle) continue;
+      if (Sine(ways[i], ways[j]) < kMinLatticeSine) continue;
       const Node node{pixel, ways[i], ways[j]};
       const double contrast = SaddleContrast(grey, node);
       // Of ways that show as much the first ones, which are nearer.

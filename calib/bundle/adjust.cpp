@@ -50,31 +50,31 @@ std::vector<bool> Within(const std::vector<Eigen::Vector2d>& residuals, double l
 
 // How many of these observations each point has.
 std::vector<int> ObservationsOfPoints(const Bundle& bundle, const std::vector<bool>& counts) {
-  std::vector<int> sights(bundle.points.size());
+  std::vector<int> observations(bundle.points.size());
   for (size_t i = 0; i < counts.size(); ++i) {
-    sights[static_cast<size_t>(bundle.observations[i].point)] += counts[i];
+    observations[static_cast<size_t>(bundle.observations[i].point)] += counts[i];
   }
-  return sights;
+  return observations;
 }
 
 // What a point that moves to where its `observations` want it leaves of their residuals: of two
 // observations' four coordinates one is left, which both share, so that their lengths follow a
 // normal law of one dimension, and the third smallest of them is smaller still than the share of
 // the squares says.
-double ShareOfLength(int sights) {
+double ShareOfLength(int observations) {
   constexpr double kOfTwo = 0.338;  // 0.4307 / sqrt(2) over 0.9005: lower terciles of the two laws
-  return sights == 2 ? kOfTwo : std::sqrt(1 - 1.5 / sights);
+  return observations == 2 ? kOfTwo : std::sqrt(1 - 1.5 / observations);
 }
 
 // Standard deviation of an observation's coordinate. Without regard to what points take up, tracks
 // of two would make it far too small; under the robust loss their points would then settle on one
 // of the two observations, and make it smaller still.
 double SigmaOf(const Bundle& bundle, const std::vector<Eigen::Vector2d>& residuals) {
-  const std::vector<int> sights =
+  const std::vector<int> observations =
       ObservationsOfPoints(bundle, Within(residuals, std::numeric_limits<double>::infinity()));
   std::vector<double> lengths;
   for (size_t i = 0; i < residuals.size(); ++i) {
-    const int of_point = sights[static_cast<size_t>(bundle.observations[i].point)];
+    const int of_point = observations[static_cast<size_t>(bundle.observations[i].point)];
     if (residuals[i].allFinite() && of_point > 1) {
       lengths.push_back(residuals[i].norm() / ShareOfLength(of_point));
     }
@@ -124,9 +124,10 @@ double CameraUnknowns(const Bundle& bundle, const std::vector<bool>& image_used,
 void Describe(const Bundle& start, const std::vector<Eigen::Vector2d>& residuals, size_t rigs,
               const AdjustOptions& options, double sigma_px, Adjusted& out) {
   // An observation that is alone in seeing its point is met whatever the cameras are.
-  const std::vector<int> sights = ObservationsOfPoints(out.bundle, out.used);
+  const std::vector<int> observations = ObservationsOfPoints(out.bundle, out.used);
   for (size_t i = 0; i < residuals.size(); ++i) {
-    if (sights[static_cast<size_t>(out.bundle.observations[i].point)] < 2) out.used[i] = false;
+    if (observations[static_cast<size_t>(out.bundle.observations[i].point)] < 2)
+      out.used[i] = false;
   }
   double squared = 0;
   std::vector<bool> image_used(out.bundle.images.size()), point_used(out.bundle.points.size());
@@ -135,15 +136,15 @@ void Describe(const Bundle& start, const std::vector<Eigen::Vector2d>& residuals
     if (!out.used[i]) continue;
     const BundleObservation& o = out.bundle.observations[i];
     squared += residuals[i].squaredNorm();
-    ++out.sights;
+    ++out.observations;
     image_used[static_cast<size_t>(o.image)] = point_used[static_cast<size_t>(o.point)] = true;
   }
-  out.rms_px = std::sqrt(squared / std::max(1, out.sights));
+  out.rms_px = std::sqrt(squared / std::max(1, out.observations));
   const auto points = static_cast<double>(std::count(point_used.begin(), point_used.end(), true));
   double known = 0;
   squared += sigma_px * sigma_px * PriorSquares(start, out.bundle, options, &known);
-  const double freedom =
-      2.0 * out.sights + known - 3 * points - CameraUnknowns(out.bundle, image_used, rigs, options);
+  const double freedom = 2.0 * out.observations + known - 3 * points -
+                         CameraUnknowns(out.bundle, image_used, rigs, options);
   // As many unknowns as numbers: all are explained, and nothing says how well.
   out.sigma_px =
       freedom > 0 ? std::sqrt(squared / freedom) : std::numeric_limits<double>::infinity();
@@ -179,13 +180,13 @@ ceres::Solver::Summary Minimise(const Bundle& bundle, const AdjustOptions& optio
   ceres::Problem problem;
   for (size_t i = 0; i < bundle.observations.size(); ++i) {
     if (!used[i]) continue;
-    const BundleObservation& sight = bundle.observations[i];
-    const auto image = static_cast<size_t>(sight.image);
+    const BundleObservation& observation = bundle.observations[i];
+    const auto image = static_cast<size_t>(observation.image);
     const auto lens = static_cast<size_t>(bundle.images[image].lens);
     std::vector<double*> blocks{n.theta[lens].data(), n.MotionOf(image),
-                                n.place[static_cast<size_t>(sight.point)].data()};
+                                n.place[static_cast<size_t>(observation.point)].data()};
     if (!n.shift.empty()) blocks.push_back(n.shift[image].data());
-    problem.AddResidualBlock(n.Cost(bundle, sight).release(),
+    problem.AddResidualBlock(n.Cost(bundle, observation).release(),
                              cauchy_px > 0 ? new ceres::CauchyLoss(cauchy_px) : nullptr, blocks);
   }
   AddPriors(bundle, options, sigma_px, n, problem);
@@ -260,13 +261,13 @@ bool MayGetTangential(const LensCamera& lens) {
 
 bool Contradicts(const Adjusted& held, const Adjusted& free) {
   constexpr double kMaxSigmaGrowth = 1.5;
-  constexpr double kLeastSights = 0.9;
+  constexpr double kMinObservationShare = 0.9;
   // Errors of an observation's own size are no contradiction, however exact the photos are.
   constexpr double kHarmlessSigmaPx = 0.5;
   // Where all was needed for the unknowns nothing is known of the noise, and none is supposed.
   const double noise = std::isfinite(free.sigma_px) ? free.sigma_px : 0;
   const double most = std::max(kMaxSigmaGrowth * noise, kHarmlessSigmaPx);
-  return !(held.sigma_px <= most) || held.sights < kLeastSights * free.sights;
+  return !(held.sigma_px <= most) || held.observations < kMinObservationShare * free.observations;
 }
 
 std::vector<Eigen::Vector2d> Residuals(const Bundle& bundle) {

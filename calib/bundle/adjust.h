@@ -83,7 +83,7 @@ struct Adjusted {
   Bundle bundle;
   LensFreedom lens = LensFreedom::kFixed;
   std::vector<bool> used;  ///< per observation: false for outliers and observations without a pixel
-  int sights = 0;          ///< used ones
+  int observations = 0;    ///< used ones
   /// Standard deviation of a used observation's coordinate, unknowns counted, lenses' and poses' as
   /// far as they were free; infinite where there are as many unknowns as numbers.
   double sigma_px = 0;

@@ -17,19 +17,20 @@ namespace {
 // Observations of the points that at least two images see, sorted; points in the order of their
 // keys.
 struct Track {
-  std::vector<std::pair<int, Eigen::Vector2d>> sights;  // image, pixel
+  std::vector<std::pair<int, Eigen::Vector2d>> observations;  // image, pixel
 };
 
-void AddSight(Track& track, int image, const Eigen::Vector2d& pixel) {
-  const bool again = std::any_of(track.sights.begin(), track.sights.end(),
-                                 [image](const auto& sight) { return sight.first == image; });
-  if (!again) track.sights.emplace_back(image, pixel);
+void AddObservation(Track& track, int image, const Eigen::Vector2d& pixel) {
+  const bool again =
+      std::any_of(track.observations.begin(), track.observations.end(),
+                  [image](const auto& observation) { return observation.first == image; });
+  if (!again) track.observations.emplace_back(image, pixel);
 }
 
 void AppendPoint(const Eigen::Vector3d& p_in_world, const Track& track, Bundle& bundle) {
   const int point = static_cast<int>(bundle.points.size());
   bundle.points.push_back(p_in_world.homogeneous());
-  for (const auto& [image, pixel] : track.sights) {
+  for (const auto& [image, pixel] : track.observations) {
     bundle.observations.push_back({image, point, pixel});
   }
 }
@@ -107,11 +108,11 @@ Bundle BundleOf(const SfmModel& model, bool separate_lenses) {
     const SfmImage& image = model.images[i];
     for (const SfmFeature& feature : image.features) {
       if (feature.point_id == SfmFeature::kNoPoint) continue;
-      AddSight(tracks[feature.point_id], static_cast<int>(i), feature.pixel);
+      AddObservation(tracks[feature.point_id], static_cast<int>(i), feature.pixel);
     }
   }
   for (const auto& [id, track] : tracks) {
-    if (track.sights.size() < 2) continue;
+    if (track.observations.size() < 2) continue;
     bundle.point_ids.push_back(id);
     AppendPoint(model.points.at(id).p_in_world, track, bundle);
   }
@@ -138,10 +139,10 @@ Bundle BundleOf(std::span<const PinholeCamera> cameras, std::span<const Pose> ca
   }
   std::vector<Track> tracks(scene.points.size());
   for (const SparseObservation& o : scene.observations) {
-    AddSight(tracks.at(static_cast<size_t>(o.point)), o.view, o.pixel);
+    AddObservation(tracks.at(static_cast<size_t>(o.point)), o.view, o.pixel);
   }
   for (size_t p = 0; p < tracks.size(); ++p) {
-    if (tracks[p].sights.size() >= 2) {
+    if (tracks[p].observations.size() >= 2) {
       AppendPoint(scene.points[p].p_in_world, tracks[p], bundle);
     }
   }

@@ -26,7 +26,8 @@ constexpr double kSettled = 1e-12;
 
 // Adds what the observations of one point, the point eliminated, say about lenses and poses.
 void AddPoint(const Normalised& n, const Bundle& bundle, const BundleCovariance& layout,
-              const std::vector<const BundleObservation*>& sights, Eigen::MatrixXd& information) {
+              const std::vector<const BundleObservation*>& observations,
+              Eigen::MatrixXd& information) {
   std::vector<int> columns;  // unknowns these observations depend on
   std::vector<ObservationRows> rows;
   std::vector<std::pair<int, int>> lens_image;
@@ -36,18 +37,18 @@ void AddPoint(const Normalised& n, const Bundle& bundle, const BundleCovariance&
     columns.push_back(unknown);
     return static_cast<long>(columns.size()) - 1;
   };
-  for (const BundleObservation* sight : sights) {
+  for (const BundleObservation* observation : observations) {
     ObservationRows made;
-    if (!RowsOf(n, bundle, *sight, made)) continue;
-    const int lens = bundle.images[static_cast<size_t>(sight->image)].lens;
+    if (!RowsOf(n, bundle, *observation, made)) continue;
+    const int lens = bundle.images[static_cast<size_t>(observation->image)].lens;
     for (size_t k = 0; k < layout.free_params[static_cast<size_t>(lens)].size(); ++k) {
       column_of(layout.lens_at[static_cast<size_t>(lens)] + static_cast<int>(k));
     }
     for (int k = 0; k < 6; ++k) {
-      column_of(layout.image_at[static_cast<size_t>(sight->image)] + k);
+      column_of(layout.image_at[static_cast<size_t>(observation->image)] + k);
     }
     rows.push_back(std::move(made));
-    lens_image.emplace_back(lens, sight->image);
+    lens_image.emplace_back(lens, observation->image);
   }
   const auto height = 2 * static_cast<long>(rows.size());
   if (height < 4) return;  // one observation says nothing about anything but its point
@@ -237,7 +238,7 @@ BundleCovariance CovarianceOf(const Adjusted& adjusted, const AdjustOptions& opt
     if (!adjusted.used[i]) continue;
     tracks[static_cast<size_t>(bundle.observations[i].point)].push_back(&bundle.observations[i]);
   }
-  for (const auto& sights : tracks) AddPoint(n, bundle, out, sights, information);
+  for (const auto& observations : tracks) AddPoint(n, bundle, out, observations, information);
   const Eigen::MatrixXd priors = PriorInformation(n, bundle, out, options, unknowns);
   const Eigen::MatrixXd open = OpenDirections(GaugeDirections(n.poses, out.image_at, unknowns),
                                               priors, information.trace() / unknowns);

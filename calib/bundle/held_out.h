@@ -33,7 +33,7 @@ std::vector<PointFold> PointFolds(const Bundle& bundle, std::uint64_t seed);
 std::vector<double> LossesOfUnseenPoints(const Bundle& cameras, const Bundle& asked,
                                          double scale_px, double* sigma_px = nullptr);
 
-/// One sight of each point that kMinTrack images or more see is kept apart.
+/// One observation of each point that kMinTrack images or more see is kept apart.
 struct ObservationSplit {
   Bundle training;
   std::vector<BundleObservation> held_out;

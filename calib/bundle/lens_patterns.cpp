@@ -15,21 +15,21 @@ struct Places {
   int left_out = 0;
 };
 
-size_t LensOf(const Bundle& bundle, const BundleObservation& sight) {
-  return static_cast<size_t>(bundle.images[static_cast<size_t>(sight.image)].lens);
+size_t LensOf(const Bundle& bundle, const BundleObservation& observation) {
+  return static_cast<size_t>(bundle.images[static_cast<size_t>(observation.image)].lens);
 }
 
 // As many lenses as fit, those with most observations first.
 Places PlacesOf(const Adjusted& adjusted, const BundleCovariance& layout, long per_lens) {
   const Bundle& bundle = adjusted.bundle;
-  std::vector<int> sights(bundle.lenses.size());
+  std::vector<int> observations(bundle.lenses.size());
   for (size_t i = 0; i < bundle.observations.size(); ++i) {
-    if (adjusted.used[i]) ++sights[LensOf(bundle, bundle.observations[i])];
+    if (adjusted.used[i]) ++observations[LensOf(bundle, bundle.observations[i])];
   }
   std::vector<size_t> order(bundle.lenses.size());
   std::iota(order.begin(), order.end(), size_t{0});
   std::stable_sort(order.begin(), order.end(),
-                   [&](size_t a, size_t b) { return sights[a] > sights[b]; });
+                   [&](size_t a, size_t b) { return observations[a] > observations[b]; });
   Places places{std::vector<long>(bundle.lenses.size(), -1), 0, 0};
   const long most = MostExtra(layout);
   for (const size_t lens : order) {
@@ -67,10 +67,10 @@ LensPatternTest TestRadialPattern(const Adjusted& adjusted, const BundleCovarian
   const Bundle& bundle = adjusted.bundle;
   const Places places = PlacesOf(adjusted, layout, kRings);
   const std::vector<double> reach = Reaches(adjusted);
-  const auto rings_of = [&](const BundleObservation& sight, const ObservationRows& rows) {
+  const auto rings_of = [&](const BundleObservation& observation, const ObservationRows& rows) {
     std::vector<ExtraColumn> columns;
-    const size_t lens = LensOf(bundle, sight);
-    const Eigen::Vector2d way = FromMiddle(bundle.lenses[lens], DrawnAt(sight, rows));
+    const size_t lens = LensOf(bundle, observation);
+    const Eigen::Vector2d way = FromMiddle(bundle.lenses[lens], DrawnAt(observation, rows));
     const double radius = way.norm();
     if (places.first[lens] < 0 || !(radius > 0)) return columns;
     const auto weights = RingWeights(radius / reach[lens]);
@@ -88,11 +88,11 @@ LensPatternTest TestRadialPattern(const Adjusted& adjusted, const BundleCovarian
 LensPatternTest TestRegionalPattern(const Adjusted& adjusted, const BundleCovariance& layout) {
   const Bundle& bundle = adjusted.bundle;
   const Places places = PlacesOf(adjusted, layout, 2L * kPatternRegions * kPatternRegions);
-  const auto region_of = [&](const BundleObservation& sight, const ObservationRows& rows) {
+  const auto region_of = [&](const BundleObservation& observation, const ObservationRows& rows) {
     std::vector<ExtraColumn> columns;
-    const size_t lens = LensOf(bundle, sight);
+    const size_t lens = LensOf(bundle, observation);
     if (places.first[lens] < 0) return columns;
-    const int region = PatternRegionOf(DrawnAt(sight, rows), bundle.lenses[lens].width_px,
+    const int region = PatternRegionOf(DrawnAt(observation, rows), bundle.lenses[lens].width_px,
                                        bundle.lenses[lens].height_px);
     for (long axis = 0; axis < 2; ++axis) {
       columns.push_back({places.first[lens] + 2 * region + axis, Eigen::Vector2d::Unit(axis)});

@@ -253,7 +253,7 @@ void RequireNoContradiction(const Adjusted& held, const Adjusted& free) {
       "residuals of {:.2f} px per coordinate and {} observations that agree with these fixed, "
       "{:.2f} px and {} without; are their standard deviations too small, or is a distance of "
       "another pair?",
-      held.sigma_px, held.sights, free.sigma_px, free.sights));
+      held.sigma_px, held.observations, free.sigma_px, free.observations));
 }
 
 // Adjusts some points until the places settle, and holds what comes out against the photos.

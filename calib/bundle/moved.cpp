@@ -29,27 +29,27 @@ Bundle WithCameras(const Bundle& fresh, const Bundle& other_cameras) {
   return other;
 }
 
-std::vector<MovedObservation> SightsOf(const Adjusted& solved, const Bundle& other) {
+std::vector<MovedObservation> ObservationsOf(const Adjusted& solved, const Bundle& other) {
   const auto fresh = Residuals(solved.bundle);
   const Normalised n = Normalised::Around(other);
   const Eigen::MatrixXd of_poses = GaugeColumns(n.poses);
-  std::vector<MovedObservation> sights;
+  std::vector<MovedObservation> observations;
   for (size_t i = 0; i < fresh.size(); ++i) {
     ObservationRows rows;
     const BundleObservation& o = other.observations[i];
     if (!solved.used[i] || !fresh[i].allFinite() || !RowsOf(n, other, o, rows)) continue;
-    sights.push_back({static_cast<size_t>(o.image), rows.residual - fresh[i],
-                      rows.pose * of_poses.middleRows<6>(6L * o.image)});
+    observations.push_back({static_cast<size_t>(o.image), rows.residual - fresh[i],
+                            rows.pose * of_poses.middleRows<6>(6L * o.image)});
   }
-  return sights;
+  return observations;
 }
 
-std::vector<double> RmsOf(const std::vector<MovedObservation>& sights, size_t images,
+std::vector<double> RmsOf(const std::vector<MovedObservation>& observations, size_t images,
                           const Gauge& g) {
   std::vector<double> squared(images), count(images);
-  for (const MovedObservation& sight : sights) {
-    squared[sight.image] += (sight.by_px + sight.by_gauge * g).squaredNorm();
-    count[sight.image] += 1;
+  for (const MovedObservation& observation : observations) {
+    squared[observation.image] += (observation.by_px + observation.by_gauge * g).squaredNorm();
+    count[observation.image] += 1;
   }
   for (size_t i = 0; i < images; ++i) {
     squared[i] =
@@ -62,29 +62,30 @@ std::vector<double> RmsOf(const std::vector<MovedObservation>& sights, size_t im
 
 std::vector<double> MovedPx(const Adjusted& solved, const Bundle& other_cameras) {
   const Bundle other = WithCameras(solved.bundle, other_cameras);
-  return RmsOf(SightsOf(solved, other), other.images.size(), Gauge::Zero());
+  return RmsOf(ObservationsOf(solved, other), other.images.size(), Gauge::Zero());
 }
 
 std::vector<double> MovedPxInNearestWorld(const Adjusted& solved, const Bundle& other_cameras) {
   const Bundle other = WithCameras(solved.bundle, other_cameras);
-  const std::vector<MovedObservation> sights = SightsOf(solved, other);
+  const std::vector<MovedObservation> observations = ObservationsOf(solved, other);
   std::vector<double> count(other.images.size());
-  for (const MovedObservation& sight : sights) count[sight.image] += 1;
+  for (const MovedObservation& observation : observations) count[observation.image] += 1;
   Gauge g = Gauge::Zero();
   for (int k = 0; k < kReweightings; ++k) {
-    const std::vector<double> rms = RmsOf(sights, other.images.size(), g);
+    const std::vector<double> rms = RmsOf(observations, other.images.size(), g);
     Eigen::Matrix<double, 7, 7> normal = Eigen::Matrix<double, 7, 7>::Zero();
     Gauge right = Gauge::Zero();
-    for (const MovedObservation& sight : sights) {
-      const double weight = 1 / (count[sight.image] * std::max(rms[sight.image], kMinPx));
-      normal += weight * sight.by_gauge.transpose() * sight.by_gauge;
-      right += weight * sight.by_gauge.transpose() * sight.by_px;
+    for (const MovedObservation& observation : observations) {
+      const double weight =
+          1 / (count[observation.image] * std::max(rms[observation.image], kMinPx));
+      normal += weight * observation.by_gauge.transpose() * observation.by_gauge;
+      right += weight * observation.by_gauge.transpose() * observation.by_px;
     }
     const Gauge next = -normal.completeOrthogonalDecomposition().solve(right);
     if (!next.allFinite()) break;
     g = next;
   }
-  return RmsOf(sights, other.images.size(), g);
+  return RmsOf(observations, other.images.size(), g);
 }
 
 }  // namespace dtr::calib

@@ -139,14 +139,14 @@ void Normalised::ToWorld(Bundle& bundle) const {
 }
 
 std::unique_ptr<ceres::CostFunction> Normalised::Cost(const Bundle& bundle,
-                                                      const BundleObservation& sight) const {
-  const auto image = static_cast<size_t>(sight.image);
+                                                      const BundleObservation& observation) const {
+  const auto image = static_cast<size_t>(observation.image);
   ObservationExtras extras;
   if (!members.empty()) extras.member = &members[image];
   if (!shift.empty()) extras.shift_scale_px = ShiftScalePx(bundle, image);
   return ObservationCost(lenses[static_cast<size_t>(bundle.images[image].lens)], poses[image],
-                         points[static_cast<size_t>(sight.point)],
-                         sight.pixel - bundle.images[image].shift_px, extras);
+                         points[static_cast<size_t>(observation.point)],
+                         observation.pixel - bundle.images[image].shift_px, extras);
 }
 
 double Normalised::ShiftScalePx(const Bundle& bundle, size_t image) const {
@@ -154,14 +154,15 @@ double Normalised::ShiftScalePx(const Bundle& bundle, size_t image) const {
   return lens.scale[static_cast<size_t>(FocalCount(lens.model))];
 }
 
-bool Normalised::Residual(const Bundle& bundle, const BundleObservation& sight,
+bool Normalised::Residual(const Bundle& bundle, const BundleObservation& observation,
                           Eigen::Vector2d* residual) const {
-  const auto image = static_cast<size_t>(sight.image);
+  const auto image = static_cast<size_t>(observation.image);
   const auto lens = static_cast<size_t>(bundle.images[image].lens);
   const double* blocks[] = {theta[lens].data(), motion[image].data(),
-                            place[static_cast<size_t>(sight.point)].data(),
+                            place[static_cast<size_t>(observation.point)].data(),
                             shift.empty() ? nullptr : shift[image].data()};
-  return Cost(bundle, sight)->Evaluate(blocks, residual->data(), nullptr) && residual->allFinite();
+  return Cost(bundle, observation)->Evaluate(blocks, residual->data(), nullptr) &&
+         residual->allFinite();
 }
 
 }  // namespace dtr::calib

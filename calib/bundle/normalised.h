@@ -49,9 +49,9 @@ struct Normalised {
   Eigen::Vector3d Centre(size_t image) const;
   Eigen::Vector4d Place(size_t point) const;
   std::unique_ptr<ceres::CostFunction> Cost(const Bundle& bundle,
-                                            const BundleObservation& sight) const;
+                                            const BundleObservation& observation) const;
   /// Residual in px (predicted minus observed); false where there is none.
-  bool Residual(const Bundle& bundle, const BundleObservation& sight,
+  bool Residual(const Bundle& bundle, const BundleObservation& observation,
                 Eigen::Vector2d* residual) const;
 };
 

@@ -13,7 +13,7 @@ namespace dtr::calib {
 namespace {
 
 template <int kLens>
-struct Sighting {
+struct ObservationFunctor {
   const LensFrame& lens;
   const PoseFrame& pose;
   const PointFrame& point;
@@ -46,14 +46,14 @@ struct Sighting {
 };
 
 template <int kLens>
-struct ShiftedSighting {
-  Sighting<kLens> sighting;
+struct ShiftedObservationFunctor {
+  ObservationFunctor<kLens> functor;
   double shift_scale_px;
 
   template <typename T>
   bool operator()(const T* theta, const T* motion, const T* place, const T* shift,
                   T* residual) const {
-    if (!sighting(theta, motion, place, residual)) return false;
+    if (!functor(theta, motion, place, residual)) return false;
     residual[0] += shift_scale_px * shift[0];
     residual[1] += shift_scale_px * shift[1];
     return true;
@@ -61,15 +61,15 @@ struct ShiftedSighting {
 };
 
 template <int kLens>
-struct RigSighting {
-  Sighting<kLens> sighting;
+struct RigObservationFunctor {
+  ObservationFunctor<kLens> functor;
   const RigMember& member;
 
   template <typename T>
   bool operator()(const T* theta, const T* rig_motion, const T* place, T* residual) const {
     T motion[6];
     member.Motion(rig_motion, motion);
-    return sighting(theta, motion, place, residual);
+    return functor(theta, motion, place, residual);
   }
 };
 
@@ -78,15 +78,18 @@ std::unique_ptr<ceres::CostFunction> Cost(const LensFrame& lens, const PoseFrame
                                           const PointFrame& point,
                                           const Eigen::Vector2d& observed_px,
                                           const ObservationExtras& extras) {
-  using Functor = Sighting<kLens>;
+  using Functor = ObservationFunctor<kLens>;
   if (extras.shift_scale_px > 0) {
-    return std::make_unique<ceres::AutoDiffCostFunction<ShiftedSighting<kLens>, 2, kLens, 6, 3, 2>>(
-        new ShiftedSighting<kLens>{{lens, pose, point, observed_px}, extras.shift_scale_px});
+    return std::make_unique<
+        ceres::AutoDiffCostFunction<ShiftedObservationFunctor<kLens>, 2, kLens, 6, 3, 2>>(
+        new ShiftedObservationFunctor<kLens>{{lens, pose, point, observed_px},
+                                             extras.shift_scale_px});
   }
   const RigMember* member = extras.member;
   if (member != nullptr) {
-    return std::make_unique<ceres::AutoDiffCostFunction<RigSighting<kLens>, 2, kLens, 6, 3>>(
-        new RigSighting<kLens>{{lens, pose, point, observed_px}, *member});
+    return std::make_unique<
+        ceres::AutoDiffCostFunction<RigObservationFunctor<kLens>, 2, kLens, 6, 3>>(
+        new RigObservationFunctor<kLens>{{lens, pose, point, observed_px}, *member});
   }
   return std::make_unique<ceres::AutoDiffCostFunction<Functor, 2, kLens, 6, 3>>(
       new Functor{lens, pose, point, observed_px});

@@ -6,15 +6,15 @@
 
 namespace dtr::calib {
 
-bool RowsOf(const Normalised& n, const Bundle& bundle, const BundleObservation& sight,
+bool RowsOf(const Normalised& n, const Bundle& bundle, const BundleObservation& observation,
             ObservationRows& rows) {
-  const auto image = static_cast<size_t>(sight.image);
+  const auto image = static_cast<size_t>(observation.image);
   const auto lens = static_cast<size_t>(bundle.images[image].lens);
   const double* blocks[] = {n.theta[lens].data(), n.motion[image].data(),
-                            n.place[static_cast<size_t>(sight.point)].data()};
+                            n.place[static_cast<size_t>(observation.point)].data()};
   rows.lens.resize(2, static_cast<long>(n.lenses[lens].centre.size()));
   double* jacobians[] = {rows.lens.data(), rows.pose.data(), rows.point.data()};
-  return n.Cost(bundle, sight)->Evaluate(blocks, rows.residual.data(), jacobians) &&
+  return n.Cost(bundle, observation)->Evaluate(blocks, rows.residual.data(), jacobians) &&
          rows.lens.allFinite() && rows.pose.allFinite() && rows.point.allFinite();
 }
 

@@ -17,7 +17,7 @@ struct ObservationRows {
 };
 
 /// False where the point has no pixel.
-bool RowsOf(const Normalised& n, const Bundle& bundle, const BundleObservation& sight,
+bool RowsOf(const Normalised& n, const Bundle& bundle, const BundleObservation& observation,
             ObservationRows& rows);
 
 /// What is left of rows where a point is fitted to them. Orthogonal elimination: subtracting

@@ -10,9 +10,9 @@ constexpr size_t kMinOfPart = 20;  // images; fewer are joined by those of other
 constexpr int kUnknownsOfImage = 9;
 
 // Which images see a point, and the points of an image.
-struct Sights {
+struct ObservationsByTrack {
   std::vector<std::vector<int>> of_point, of_image;
-  explicit Sights(const Bundle& bundle)
+  explicit ObservationsByTrack(const Bundle& bundle)
       : of_point(bundle.points.size()), of_image(bundle.images.size()) {
     for (const BundleObservation& o : bundle.observations) {
       of_point[static_cast<size_t>(o.point)].push_back(o.image);
@@ -24,9 +24,9 @@ struct Sights {
 // A part that grows image by image.
 class Part {
  public:
-  Part(const Bundle& bundle, const Sights& sights)
+  Part(const Bundle& bundle, const ObservationsByTrack& observations)
       : bundle_(bundle),
-        observations_(sights),
+        observations_(observations),
         wanted_(bundle.images.size()),
         lens_used_(bundle.lenses.size()),
         point_seen_(bundle.points.size()),
@@ -71,7 +71,7 @@ class Part {
   }
 
   const Bundle& bundle_;
-  const Sights& observations_;
+  const ObservationsByTrack& observations_;
   std::vector<bool> wanted_, lens_used_, point_seen_;
   std::vector<int> shared_;
   int unknowns_ = 0;
@@ -110,10 +110,11 @@ Bundle OnlyImages(const Bundle& bundle, const std::vector<bool>& wanted) {
 }
 
 Bundle WithoutUnseen(const Bundle& bundle, int fewest) {
-  std::vector<int> sights(bundle.images.size());
-  for (const BundleObservation& o : bundle.observations) ++sights[static_cast<size_t>(o.image)];
+  std::vector<int> observations(bundle.images.size());
+  for (const BundleObservation& o : bundle.observations)
+    ++observations[static_cast<size_t>(o.image)];
   std::vector<bool> wanted;
-  for (const int count : sights) wanted.push_back(count >= fewest);
+  for (const int count : observations) wanted.push_back(count >= fewest);
   return OnlyImages(bundle, wanted);
 }
 
@@ -124,12 +125,12 @@ int ValidationUnknowns(const Bundle& bundle) {
 }
 
 std::vector<Bundle> PartsOf(const Bundle& bundle, int max_unknowns) {
-  const Sights sights(bundle);
+  const ObservationsByTrack observations(bundle);
   std::vector<bool> taken(bundle.images.size());
   std::vector<Bundle> parts;
   for (size_t first = 0; first < taken.size(); ++first) {
     if (taken[first]) continue;
-    Part part(bundle, sights);
+    Part part(bundle, observations);
     part.Add(first);
     while (part.Grow(max_unknowns, [&](size_t i) { return !taken[i]; })) {
     }

@@ -20,7 +20,7 @@ namespace {
 
 constexpr double kLossSigmas =
     2;  // scale of the loss that unseen points and observations are judged by
-constexpr int kMostPoints = 4000;  // that the candidates are compared on
+constexpr int kMaxComparedPoints = 4000;  // that the candidates are compared on
 // A principal point for every image also takes up what other faults of a lens model leave, and
 // costs the lens's own principal point: what the images share, nothing but the prior says. So it
 // must meet unseen points closer by this share; a stabiliser's pixels are worth several times that.
@@ -133,7 +133,7 @@ size_t Choose(const Bundle& bundle, const ObservationSplit& split, const RefineO
   LossesOfUnseenPoints(bundle, split.training, 1, &sigma_px);
   if (!std::isfinite(sigma_px)) return kNoScale;
   const double scale_px = kLossSigmas * std::max(sigma_px, kPrecisionPx);
-  const Bundle some = SomePoints(bundle, kMostPoints, options.seed);
+  const Bundle some = SomePoints(bundle, kMaxComparedPoints, options.seed);
   const auto losses = TryOnUnseenPoints(some, options, scale_px, candidates);
   size_t chosen = 0;
   for (size_t i = 1; i < candidates.size(); ++i) {
@@ -236,7 +236,7 @@ Refined Refine(const SfmModel& model, const RefineOptions& options) {
   if (!Refinable(model, &refined.reason)) return refined;
   const Bundle bundle = BundleOf(model, options.separate_lenses);
   const ObservationSplit split =
-      SplitObservations(SomePoints(bundle, kMostPoints, options.seed), options.seed);
+      SplitObservations(SomePoints(bundle, kMaxComparedPoints, options.seed), options.seed);
   const auto enough = split.held_out.size();
   if (enough < kMinHeldOut) {
     refined.held_out_observations = static_cast<int>(enough);
@@ -262,7 +262,7 @@ std::vector<Degeneracy> DegeneraciesOf(const SfmModel& model, const RefineOption
     if (camera.model == LensModel::kFov) return {};
   }
   const Bundle bundle =
-      SomePoints(BundleOf(model, options.separate_lenses), kMostPoints, options.seed);
+      SomePoints(BundleOf(model, options.separate_lenses), kMaxComparedPoints, options.seed);
   const AdjustOptions adjust = SolveOptions(
       options, options.known_lenses ? LensFreedom::kFixed : LensFreedom::kNoPrincipalPoint);
   const Adjusted adjusted = Adjust(bundle, adjust);
@@ -291,7 +291,8 @@ void RequireDetermined(const SfmModel& model, const RefineOptions& options,
 
 double HeldOutErrorPx(const SfmModel& model, std::uint64_t seed, int* count) {
   const Bundle bundle = BundleOf(model);
-  const ObservationSplit split = SplitObservations(SomePoints(bundle, kMostPoints, seed), seed);
+  const ObservationSplit split =
+      SplitObservations(SomePoints(bundle, kMaxComparedPoints, seed), seed);
   // Cauchy's loss is monotone in the length: its inverse gives the lengths back.
   constexpr double kScalePx = 1;
   std::vector<double> lengths_px;

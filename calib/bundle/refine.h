@@ -66,8 +66,8 @@ struct Refined {
 /// image (stabilised lenses), and tried on the other half, and the other way round: more is freed
 /// only if that explains unseen points better beyond the bootstrap interval, and for numbers that
 /// every image has by itself by 1 % at least. The chosen way is then run on all observations, as
-/// structure from motion was; the result is taken only if its cameras predict one sight of each
-/// point from the others better than the cameras as given, beyond the bootstrap interval.
+/// structure from motion was; the result is taken only if its cameras predict one observation of
+/// each point from the others better than the cameras as given, beyond the bootstrap interval.
 ///
 /// With known lenses, poses and points are adjusted to them without being asked whether it pays;
 /// with known positions or distances, the lenses' freedom is chosen as above, and the result taken

@@ -155,7 +155,8 @@ RigRefined RefineRig(const SfmModel& model, const KnownRig& rig,
         "expected photos of this rig, found residuals of {:.2f} px per coordinate and {} "
         "observations that agree with its positions fixed, {:.2f} px and {} without; was a camera "
         "moved since?",
-        refined.adjusted.sigma_px, refined.adjusted.sights, free.sigma_px, free.sights));
+        refined.adjusted.sigma_px, refined.adjusted.observations, free.sigma_px,
+        free.observations));
   }
   refined.model = ModelOf(refined.adjusted.bundle, known, false, &refined.points_dropped);
   refined.adjusted.bundle = {};

@@ -10,11 +10,13 @@ namespace dtr::calib {
 ShutterTest TestShutter(const Adjusted& adjusted, const BundleCovariance& layout) {
   const Bundle& bundle = adjusted.bundle;
   // How far down the image, from -1/2 to 1/2, times the turn of all of it.
-  const auto turns_of = [&](const BundleObservation& sight, const ObservationRows& rows) {
-    const auto lens = static_cast<size_t>(bundle.images[static_cast<size_t>(sight.image)].lens);
-    const double share = DrawnAt(sight, rows).y() / bundle.lenses[lens].height_px - 0.5;
+  const auto turns_of = [&](const BundleObservation& observation, const ObservationRows& rows) {
+    const auto lens =
+        static_cast<size_t>(bundle.images[static_cast<size_t>(observation.image)].lens);
+    const double share = DrawnAt(observation, rows).y() / bundle.lenses[lens].height_px - 0.5;
     std::vector<ExtraColumn> columns;
-    for (long k = 0; k < 3; ++k) columns.push_back({3 * sight.image + k, share * rows.pose.col(k)});
+    for (long k = 0; k < 3; ++k)
+      columns.push_back({3 * observation.image + k, share * rows.pose.col(k)});
     return columns;
   };
   const long turns = 3 * static_cast<long>(bundle.images.size());

@@ -44,14 +44,14 @@ class Normal {
     matrix_.setZero(base_ + extra_ + 1, base_ + extra_ + 1);
   }
 
-  void AddPoint(const std::vector<const BundleObservation*>& sights) {
+  void AddPoint(const std::vector<const BundleObservation*>& observations) {
     Columns columns;
     std::vector<std::vector<std::pair<long, Eigen::Vector2d>>> rows;
     std::vector<Eigen::Matrix<double, 2, 3>> by_point;
-    for (const BundleObservation* sight : sights) {
+    for (const BundleObservation* observation : observations) {
       ObservationRows seen;
-      if (!RowsOf(n_, bundle_, *sight, seen)) continue;
-      rows.push_back(RestOf(*sight, seen, columns));
+      if (!RowsOf(n_, bundle_, *observation, seen)) continue;
+      rows.push_back(RestOf(*observation, seen, columns));
       by_point.push_back(seen.point);
     }
     const auto height = 2 * static_cast<long>(rows.size());
@@ -91,10 +91,10 @@ class Normal {
   int coordinates() const { return coordinates_; }
 
  private:
-  std::vector<std::pair<long, Eigen::Vector2d>> RestOf(const BundleObservation& sight,
+  std::vector<std::pair<long, Eigen::Vector2d>> RestOf(const BundleObservation& observation,
                                                        const ObservationRows& seen,
                                                        Columns& columns) const {
-    const auto image = static_cast<size_t>(sight.image);
+    const auto image = static_cast<size_t>(observation.image);
     const auto lens = static_cast<size_t>(bundle_.images[image].lens);
     std::vector<std::pair<long, Eigen::Vector2d>> rest;
     const auto& free = layout_.free_params[lens];
@@ -105,7 +105,7 @@ class Normal {
     for (long k = 0; k < 6; ++k) {
       rest.emplace_back(columns.Of(layout_.image_at[image] + k), seen.pose.col(k));
     }
-    for (const ExtraColumn& column : of_extra_(sight, seen)) {
+    for (const ExtraColumn& column : of_extra_(observation, seen)) {
       rest.emplace_back(columns.Of(base_ + column.unknown), column.by);
     }
     rest.emplace_back(columns.Of(base_ + extra_), seen.residual);
@@ -183,7 +183,7 @@ WiderFit FitWider(const Adjusted& adjusted, const BundleCovariance& layout, long
     if (!adjusted.used[i]) continue;
     tracks[static_cast<size_t>(bundle.observations[i].point)].push_back(&bundle.observations[i]);
   }
-  for (const auto& sights : tracks) normal.AddPoint(sights);
+  for (const auto& observations : tracks) normal.AddPoint(observations);
   const Eigen::MatrixXd left = normal.WithoutBase();
   return Judged(left, normal.UnitsOfExtra(), normal.Free(), normal.coordinates());
 }
@@ -192,8 +192,8 @@ long MostExtra(const BundleCovariance& layout) {
   return kMaxUnknowns - (layout.image_at.back() + 6);
 }
 
-Eigen::Vector2d DrawnAt(const BundleObservation& sight, const ObservationRows& rows) {
-  return sight.pixel + rows.residual;
+Eigen::Vector2d DrawnAt(const BundleObservation& observation, const ObservationRows& rows) {
+  return observation.pixel + rows.residual;
 }
 
 }  // namespace dtr::calib

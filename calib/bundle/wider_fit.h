@@ -41,6 +41,6 @@ long MostExtra(const BundleCovariance& layout);
 
 /// Where an observation's point is drawn. Not where it was seen: a pattern made of that holds the
 /// residual itself.
-Eigen::Vector2d DrawnAt(const BundleObservation& sight, const ObservationRows& rows);
+Eigen::Vector2d DrawnAt(const BundleObservation& observation, const ObservationRows& rows);
 
 }  // namespace dtr::calib

@@ -34,7 +34,7 @@ enum class Matching {
 inline constexpr int kExhaustiveLimit = 60;
 
 /// COLMAP's own limit, which MatchingThreads (matching.h) counts on.
-inline constexpr int kMostFeatures = 8192;
+inline constexpr int kMaxFeatures = 8192;
 
 struct SfmOptions {
   Matching matching = Matching::kAuto;
@@ -42,7 +42,7 @@ struct SfmOptions {
   std::uint64_t seed = 0;     ///< of COLMAP's random choices, as far as it heeds it
   double memory_gb = 4;       ///< COLMAP stays below this many GB (1e9 bytes)
   int max_image_size_px = 0;  ///< long side for features; 0: from the memory
-  int max_features = 0;       ///< most per photo, the largest kept; 0: kMostFeatures
+  int max_features = 0;       ///< most per photo, the largest kept; 0: kMaxFeatures
   /// COLMAP's name. On the 11 photos of Sceaux castle (a compact camera), 8900 points each, the
   /// mean reprojection error is 0.613 px with SIMPLE_RADIAL, 0.532 with RADIAL, 0.522 with OPENCV,
   /// whose fx and fy then differ by 0.8 %: more freedom than a sensor of square pixels has.

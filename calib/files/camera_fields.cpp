@@ -151,12 +151,12 @@ std::string SeemsToBe(const std::vector<Field>& fields) {
 }
 
 std::string NamesOf(const std::vector<Field>& fields) {
-  constexpr size_t kMost = 8;
+  constexpr size_t kMax = 8;
   std::string names;
-  for (size_t i = 0; i < std::min(kMost, fields.size()); ++i) {
+  for (size_t i = 0; i < std::min(kMax, fields.size()); ++i) {
     names += (i > 0 ? ", " : "") + Shown(fields[i].name);
   }
-  return fields.empty() ? "nothing" : fields.size() > kMost ? names + ", ..." : names;
+  return fields.empty() ? "nothing" : fields.size() > kMax ? names + ", ..." : names;
 }
 
 }  // namespace

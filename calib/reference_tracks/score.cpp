@@ -36,11 +36,11 @@ std::map<int, PhotoCamera> CamerasOf(const SfmModel& model, std::span<const std:
 const Eigen::Vector2d kNotPredicted =
     Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
 
-/// Residual of each sight of a track, NaN where it is not predicted.
+/// Residual of each observation of a track, NaN where it is not predicted.
 std::vector<Eigen::Vector2d> ResidualsOf(const Track& track,
                                          const std::map<int, PhotoCamera>& cameras) {
   std::vector<Eigen::Vector2d> residuals(track.size(), kNotPredicted);
-  std::vector<Sight> sights;
+  std::vector<Observation> observations;
   std::vector<size_t> at;  // in the track
   for (size_t i = 0; i < track.size(); ++i) {
     const auto camera = cameras.find(track[i].photo);
@@ -48,13 +48,13 @@ std::vector<Eigen::Vector2d> ResidualsOf(const Track& track,
     const auto ray = camera->second.lens.RayFromPixel(track[i].pixel);
     const auto pixel = ray ? camera->second.pinhole.PixelFromCam(*ray) : std::nullopt;
     if (!pixel) continue;
-    sights.push_back(
+    observations.push_back(
         MakeObservation(camera->second.pinhole, camera->second.cam_from_world, *pixel));
     at.push_back(i);
   }
-  if (sights.size() < 3) return residuals;  // one is held out, two place the point
-  for (size_t k = 0; k < sights.size(); ++k) {
-    const Triangulation point = Triangulate(sights, static_cast<int>(k));
+  if (observations.size() < 3) return residuals;  // one is held out, two place the point
+  for (size_t k = 0; k < observations.size(); ++k) {
+    const Triangulation point = Triangulate(observations, static_cast<int>(k));
     if (point.status != TriangulationStatus::kConverged) continue;
     const PhotoObservation& seen = track[at[k]];
     const PhotoCamera& camera = cameras.at(seen.photo);
@@ -85,7 +85,7 @@ ReferenceTracksScore ScoreCameras(const SfmModel& model, std::span<const std::st
       if (predicted) lengths.push_back(residual.norm());
     }
   }
-  score.sights = static_cast<int>(losses.size());
+  score.observations = static_cast<int>(losses.size());
   score.predicted = static_cast<int>(lengths.size());
   if (!losses.empty()) score.error_px = std::sqrt(Mean(losses));
   if (!lengths.empty()) score.median_px = UpperMedian(lengths);

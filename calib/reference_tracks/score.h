@@ -18,14 +18,14 @@ struct ReferenceTracksScore {
   /// Root mean over all observations of Cauchy's loss (bundle/held_out.h), or of what is missed.
   double error_px = 0;
   double median_px = 0;  ///< residual length of the observations that are predicted; 0 without any
-  int sights = 0;        ///< of the reference tracks: the same for all cameras
+  int observations = 0;  ///< of the reference tracks: the same for all cameras
   int predicted = 0;     ///< of them
 };
 
-/// Holds out every sight of every track in turn: the point is placed by the cameras of its other
-/// observations (Triangulate, two of them at least) and the residual is taken in the photo, lens
-/// included. Observations of photos without a camera in the model are not predicted, and help to
-/// place nothing. `photos` are the names that tracks count by. The same result for any number of
+/// Holds out every observation of every track in turn: the point is placed by the cameras of its
+/// other observations (Triangulate, two of them at least) and the residual is taken in the photo,
+/// lens included. Observations of photos without a camera in the model are not predicted, and help
+/// to place nothing. `photos` are the names that tracks count by. The same result for any number of
 /// threads.
 ReferenceTracksScore ScoreCameras(const SfmModel& model, std::span<const std::string> photos,
                                   std::span<const Track> tracks, double loss_scale_px, int threads);

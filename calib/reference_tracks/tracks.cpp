@@ -16,7 +16,7 @@
 namespace dtr::calib {
 namespace {
 
-constexpr int kMostFeatures = 4000;  // per photo: two photos then take a tenth of a second
+constexpr int kMaxReferenceFeatures = 4000;  // per photo: two photos then take a tenth of a second
 // A tenth of OpenCV's: small photos have few features, and of many the strongest are kept.
 constexpr float kMinResponse = 1e-4F;
 constexpr float kRatio = 0.8f;            // Lowe 2004
@@ -62,7 +62,7 @@ Features FeaturesOf(const ReferenceTracksPhoto& photo) {
   akaze->detect(grey, points, mask);
   std::stable_sort(points.begin(), points.end(),
                    [](const auto& a, const auto& b) { return a.response > b.response; });
-  if (points.size() > kMostFeatures) points.resize(kMostFeatures);
+  if (points.size() > kMaxReferenceFeatures) points.resize(kMaxReferenceFeatures);
   Features features;
   akaze->compute(grey, points, features.bits);
   for (const cv::KeyPoint& point : points) features.at.push_back(point.pt);
@@ -164,7 +164,7 @@ std::vector<Track> Chained(const std::vector<Features>& features,
   }
   std::vector<Track> tracks;
   for (auto& [root, chain] : chains) {
-    if (chain.size() >= kFewestSights && OncePerPhoto(chain)) tracks.push_back(std::move(chain));
+    if (chain.size() >= kMinTrackLength && OncePerPhoto(chain)) tracks.push_back(std::move(chain));
   }
   return tracks;
 }

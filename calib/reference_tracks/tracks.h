@@ -27,9 +27,9 @@ struct ReferenceTracksPhoto {
 
 /// Observations of fewer photos tell no camera from another: one is held out, three place the
 /// point.
-inline constexpr int kFewestSights = 4;
+inline constexpr int kMinTrackLength = 4;
 
-/// Points that kFewestSights photos or more show. AKAZE (Alcantarilla, Nuevo, Bartoli, BMVC 2013)
+/// Points that kMinTrackLength photos or more show. AKAZE (Alcantarilla, Nuevo, Bartoli, BMVC 2013)
 /// looks for other places than COLMAP's SIFT, in another scale space, and describes them by bits:
 /// what it finds took no part in any calibration, whatever the settings of that. Two photos'
 /// features belong together where each is the other's nearest, clearly nearer than the next, and a

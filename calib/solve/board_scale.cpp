@@ -26,7 +26,7 @@ namespace {
 
 constexpr double kOutlierSigmas = 5;
 constexpr double kMaxRelativeSigma = 0.1;  // as with distances (calib/scale.cpp)
-constexpr double kLeastAngle = 1 * std::numbers::pi / 180;
+constexpr double kMinParallax = 1 * std::numbers::pi / 180;
 // Scatter beyond what a set's own gate allows is no noise: views that contradict each other must
 // not make room for each other.
 constexpr double kMaxSigmaPx = 1.5;
@@ -44,41 +44,43 @@ using Matrix7 = Eigen::Matrix<double, 7, 7>;
 struct Corner {
   size_t view = 0;
   int id = 0;
-  Sight sight;
+  Observation observation;
   bool used = true;
 };
 
 // Everything but the similarity.
 struct Problem {
   const Board& board;
-  std::span<const BoardObservation> sights;
+  std::span<const BoardObservation> observations;
   std::vector<BoardView> seen;  // counted from the end that fits
   std::vector<bool> view_used;
   std::vector<Corner> corners;
 };
 
-Corner CornerOf(const BoardObservation& sight, size_t view, const BoardCorner& corner) {
-  return {view, corner.id, MakeObservation(sight.camera, sight.cam_from_world, corner.pixel), true};
+Corner CornerOf(const BoardObservation& observation, size_t view, const BoardCorner& corner) {
+  return {view, corner.id,
+          MakeObservation(observation.camera, observation.cam_from_world, corner.pixel), true};
 }
 
 double CauchyCost(double length_px, double scale_px) {
   return std::isfinite(length_px) ? std::log1p(std::pow(length_px / scale_px, 2)) : kWithoutPixel;
 }
 
-double LengthPx(const Sight& sight, const Eigen::Vector3d& p_in_world) {
+double LengthPx(const Observation& observation, const Eigen::Vector3d& p_in_world) {
   Eigen::Vector2d residual;
-  return PixelResidual(sight, p_in_world, &residual, nullptr)
+  return PixelResidual(observation, p_in_world, &residual, nullptr)
              ? residual.norm()
              : std::numeric_limits<double>::infinity();
 }
 
-double CostOf(const Board& board, const BoardObservation& sight, const BoardView& seen,
+double CostOf(const Board& board, const BoardObservation& observation, const BoardView& seen,
               const Similarity& scene_from_board) {
   double cost = 0;
   for (const BoardCorner& corner : seen.corners) {
-    cost += CauchyCost(LengthPx(MakeObservation(sight.camera, sight.cam_from_world, corner.pixel),
-                                scene_from_board * board.Corner(corner.id)),
-                       kStartScalePx);
+    cost += CauchyCost(
+        LengthPx(MakeObservation(observation.camera, observation.cam_from_world, corner.pixel),
+                 scene_from_board * board.Corner(corner.id)),
+        kStartScalePx);
   }
   return cost;
 }
@@ -86,13 +88,13 @@ double CostOf(const Board& board, const BoardObservation& sight, const BoardView
 bool MayBeTurned(const Board& board) { return board.kind == Board::Kind::kChessboard; }
 
 // The view, counted from the end that fits better.
-BoardView Fitting(const Board& board, const BoardObservation& sight,
+BoardView Fitting(const Board& board, const BoardObservation& observation,
                   const Similarity& scene_from_board, double* cost) {
-  *cost = CostOf(board, sight, sight.seen, scene_from_board);
-  if (!MayBeTurned(board)) return sight.seen;
-  BoardView turned = TurnedByHalf(board, sight.seen);
-  const double other = CostOf(board, sight, turned, scene_from_board);
-  if (other >= *cost) return sight.seen;
+  *cost = CostOf(board, observation, observation.seen, scene_from_board);
+  if (!MayBeTurned(board)) return observation.seen;
+  BoardView turned = TurnedByHalf(board, observation.seen);
+  const double other = CostOf(board, observation, turned, scene_from_board);
+  if (other >= *cost) return observation.seen;
   *cost = other;
   return turned;
 }
@@ -106,16 +108,17 @@ std::optional<Similarity> FromPair(const Board& board, const BoardObservation& a
     const auto same = std::find_if(seen_by_b.corners.begin(), seen_by_b.corners.end(),
                                    [&](const BoardCorner& c) { return c.id == corner.id; });
     if (same == seen_by_b.corners.end()) continue;
-    const Sight sights[] = {MakeObservation(a.camera, a.cam_from_world, corner.pixel),
-                            MakeObservation(b.camera, b.cam_from_world, same->pixel)};
-    const Triangulation point = Triangulate(sights, -1);
+    const Observation observations[] = {MakeObservation(a.camera, a.cam_from_world, corner.pixel),
+                                        MakeObservation(b.camera, b.cam_from_world, same->pixel)};
+    const Triangulation point = Triangulate(observations, -1);
     if (point.status != TriangulationStatus::kConverged) continue;
-    widest = std::max(widest, std::atan2(sights[0].direction.cross(sights[1].direction).norm(),
-                                         sights[0].direction.dot(sights[1].direction)));
+    widest = std::max(widest,
+                      std::atan2(observations[0].direction.cross(observations[1].direction).norm(),
+                                 observations[0].direction.dot(observations[1].direction)));
     on_board.push_back(board.Corner(corner.id));
     in_scene.push_back(point.p_in_world);
   }
-  if (on_board.size() < kMinCorners || widest < kLeastAngle) return std::nullopt;
+  if (on_board.size() < kMinCorners || widest < kMinParallax) return std::nullopt;
   try {
     return AlignPoints(on_board, in_scene);
   } catch (const Error&) {
@@ -124,27 +127,28 @@ std::optional<Similarity> FromPair(const Board& board, const BoardObservation& a
 }
 
 // Of what all pairs of views say, that which all views together agree with best.
-Similarity Start(const Board& board, std::span<const BoardObservation> sights) {
+Similarity Start(const Board& board, std::span<const BoardObservation> observations) {
   std::optional<Similarity> best;
   double least = std::numeric_limits<double>::infinity();
   const auto ask = [&](const std::optional<Similarity>& candidate) {
     if (!candidate) return;
     double sum = 0;
-    for (const BoardObservation& sight : sights) {
+    for (const BoardObservation& observation : observations) {
       double cost = 0;
-      Fitting(board, sight, *candidate, &cost);
+      Fitting(board, observation, *candidate, &cost);
       sum += cost;
     }
     if (sum >= least) return;
     least = sum;
     best = candidate;
   };
-  const size_t step = (sights.size() + kMaxOfPairs - 1) / kMaxOfPairs;
-  for (size_t i = 0; i < sights.size(); i += step) {
+  const size_t step = (observations.size() + kMaxOfPairs - 1) / kMaxOfPairs;
+  for (size_t i = 0; i < observations.size(); i += step) {
     for (size_t j = 0; j < i; j += step) {
-      ask(FromPair(board, sights[i], sights[j], sights[j].seen));
+      ask(FromPair(board, observations[i], observations[j], observations[j].seen));
       if (!MayBeTurned(board)) continue;
-      ask(FromPair(board, sights[i], sights[j], TurnedByHalf(board, sights[j].seen)));
+      ask(FromPair(board, observations[i], observations[j],
+                   TurnedByHalf(board, observations[j].seen)));
     }
   }
   if (!best) {
@@ -169,7 +173,7 @@ double Accumulate(const Problem& problem, const Similarity& scene_from_board,
     const Eigen::Vector3d place = problem.board.Corner(corner.id);
     Eigen::Vector2d residual;  // observed less predicted
     Eigen::Matrix<double, 2, 3> by_point;
-    if (!PixelResidual(corner.sight, scene_from_board * place, &residual, &by_point)) {
+    if (!PixelResidual(corner.observation, scene_from_board * place, &residual, &by_point)) {
       cost += kWithoutPixel;
       continue;
     }
@@ -238,7 +242,8 @@ std::vector<double> UsedLengths(const Problem& problem, const Similarity& scene_
   std::vector<double> lengths;
   for (const Corner& corner : problem.corners) {
     if (!corner.used || !problem.view_used[corner.view]) continue;
-    lengths.push_back(LengthPx(corner.sight, scene_from_board * problem.board.Corner(corner.id)));
+    lengths.push_back(
+        LengthPx(corner.observation, scene_from_board * problem.board.Corner(corner.id)));
   }
   return lengths;
 }
@@ -255,7 +260,7 @@ bool DropOutliers(const Similarity& scene_from_board, Problem& problem) {
   std::vector<size_t> all(problem.seen.size(), 0), kept(problem.seen.size(), 0);
   for (Corner& corner : problem.corners) {
     const bool used =
-        LengthPx(corner.sight, scene_from_board * problem.board.Corner(corner.id)) < limit;
+        LengthPx(corner.observation, scene_from_board * problem.board.Corner(corner.id)) < limit;
     changed = changed || used != corner.used;
     corner.used = used;
     ++all[corner.view];
@@ -333,18 +338,18 @@ void Describe(const Problem& problem, const Matrix7& normal, BoardScale& scale) 
 
 }  // namespace
 
-BoardScale ScaleFromBoard(const Board& board, std::span<const BoardObservation> sights) {
-  if (sights.size() < kMinViews) {
+BoardScale ScaleFromBoard(const Board& board, std::span<const BoardObservation> observations) {
+  if (observations.size() < kMinViews) {
     RejectScale(fmt::format("expected the board in {} views or more, found it in {}", kMinViews,
-                            sights.size()));
+                            observations.size()));
   }
-  Similarity at = Start(board, sights);
-  Problem problem{board, sights, {}, std::vector<bool>(sights.size(), true), {}};
-  for (size_t v = 0; v < sights.size(); ++v) {
+  Similarity at = Start(board, observations);
+  Problem problem{board, observations, {}, std::vector<bool>(observations.size(), true), {}};
+  for (size_t v = 0; v < observations.size(); ++v) {
     double cost = 0;
-    problem.seen.push_back(Fitting(board, sights[v], at, &cost));
+    problem.seen.push_back(Fitting(board, observations[v], at, &cost));
     for (const BoardCorner& corner : problem.seen.back().corners) {
-      problem.corners.push_back(CornerOf(sights[v], v, corner));
+      problem.corners.push_back(CornerOf(observations[v], v, corner));
     }
   }
   Matrix7 normal;

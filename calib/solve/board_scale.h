@@ -39,6 +39,6 @@ struct BoardScale {
 /// The board must not move between the views. Throws Error with fewer than 3 views, where fewer
 /// than 3 or than half of them agree, where no two see corners under an angle of a degree or more,
 /// and where the scale would be uncertain by more than 10 %. Deterministic.
-BoardScale ScaleFromBoard(const Board& board, std::span<const BoardObservation> sights);
+BoardScale ScaleFromBoard(const Board& board, std::span<const BoardObservation> observations);
 
 }  // namespace dtr::calib

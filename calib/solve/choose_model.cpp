@@ -21,8 +21,8 @@ namespace {
 constexpr size_t kMinViewsToChoose = 5;  // 4 to solve from, 1 to hold out
 // Held-out photos share the print, the lighting and the corner detector with the others: of their
 // errors, too, more coefficients explain a part. Gains below these are none of the lens for sure.
-constexpr double kLeastGain = 0.1;    // of the held-out RMS
-constexpr double kMinGainPx = 0.005;  // far below what a corner detector does (0.03 px)
+constexpr double kMinRelativeGain = 0.1;  // of the held-out RMS
+constexpr double kMinGainPx = 0.005;      // far below what a corner detector does (0.03 px)
 
 // Sum of squared residual lengths over a view's corners, and their number.
 struct ViewError {
@@ -219,7 +219,7 @@ void Bootstrap(const ErrorsByModel& errors, size_t best, const ChoiceOptions& op
 }  // namespace
 
 bool NotSeparated(double rms_px, double min_px) {
-  return rms_px - min_px <= std::max(kLeastGain * min_px, kMinGainPx);
+  return rms_px - min_px <= std::max(kMinRelativeGain * min_px, kMinGainPx);
 }
 
 ModelChoice ChooseModel(const Board& board, std::span<const BoardView> views, int width_px,

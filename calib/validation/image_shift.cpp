@@ -16,22 +16,22 @@ constexpr int kPointsPerView = 40;  // that its image's shift is worked out at
 
 // Observations of each image, by index, of points that are places.
 std::vector<std::vector<int>> ObservationsByImage(const Adjusted& fresh) {
-  std::vector<std::vector<int>> sights(fresh.bundle.images.size());
+  std::vector<std::vector<int>> observations(fresh.bundle.images.size());
   for (size_t i = 0; i < fresh.bundle.observations.size(); ++i) {
     const BundleObservation& o = fresh.bundle.observations[i];
     if (fresh.used[i] && fresh.bundle.points[static_cast<size_t>(o.point)][3] > 0) {
-      sights[static_cast<size_t>(o.image)].push_back(static_cast<int>(i));
+      observations[static_cast<size_t>(o.image)].push_back(static_cast<int>(i));
     }
   }
-  return sights;
+  return observations;
 }
 
 // An image's points, and the standard deviation (px per axis) of where the two images that share
 // most points with it place them.
 std::vector<PlacedPixel> Placed(const Adjusted& fresh, const BundleCovariance& covariance,
-                                const std::vector<std::vector<int>>& sights,
+                                const std::vector<std::vector<int>>& observations,
                                 const std::vector<std::vector<int>>& seen_by, int image) {
-  const auto& own = sights[static_cast<size_t>(image)];
+  const auto& own = observations[static_cast<size_t>(image)];
   std::map<int, int> shared;
   for (const int i : own) {
     const auto point = static_cast<size_t>(fresh.bundle.observations[static_cast<size_t>(i)].point);
@@ -70,18 +70,18 @@ double ImageShift(const std::vector<PlacedPixel>& placed) {
 
 void ImageShifts(const Adjusted& fresh, const BundleCovariance& covariance, int threads,
                  std::vector<PhotoValidation>& cameras) {
-  const auto sights = ObservationsByImage(fresh);
+  const auto observations = ObservationsByImage(fresh);
   std::vector<std::vector<int>> seen_by(fresh.bundle.points.size());
-  for (size_t i = 0; i < sights.size(); ++i) {
-    for (const int s : sights[i]) {
+  for (size_t i = 0; i < observations.size(); ++i) {
+    for (const int s : observations[i]) {
       const auto point =
           static_cast<size_t>(fresh.bundle.observations[static_cast<size_t>(s)].point);
       seen_by[point].push_back(static_cast<int>(i));
     }
   }
-  ParallelFor(0, static_cast<int>(sights.size()), threads, [&](int i) {
+  ParallelFor(0, static_cast<int>(observations.size()), threads, [&](int i) {
     PhotoValidation& camera = cameras[static_cast<size_t>(i)];
-    camera.placed = Placed(fresh, covariance, sights, seen_by, i);
+    camera.placed = Placed(fresh, covariance, observations, seen_by, i);
     camera.image_shift_px = ImageShift(camera.placed);
   });
 }

@@ -22,8 +22,8 @@ namespace {
 
 constexpr double kNoValue = std::numeric_limits<double>::quiet_NaN();
 constexpr size_t kMinPoints = 50;
-constexpr int kFewestSights = 10;  // of an image: its pose has 6 unknowns, these 20 numbers
-constexpr double kSquare = 1e-3;   // relative difference of fx and fy
+constexpr int kMinImageObservations = 10;  // of an image: its pose has 6 unknowns, these 20 numbers
+constexpr double kSquare = 1e-3;           // relative difference of fx and fy
 constexpr double kMaxValidationPoints = 4000;
 constexpr std::uint64_t kDraw = 0xd4a3;
 
@@ -252,12 +252,14 @@ PhotosValidation NotValidated(PhotosValidation judgement, const std::string& why
 // could leave too few for halves.
 Bundle Drawn(const Bundle& given, double share) {
   if (share >= 1) return given;
-  std::vector<int> sights(given.images.size());
-  for (const BundleObservation& o : given.observations) ++sights[static_cast<size_t>(o.image)];
+  std::vector<int> observations(given.images.size());
+  for (const BundleObservation& o : given.observations)
+    ++observations[static_cast<size_t>(o.image)];
   std::vector<bool> kept(given.points.size());
   for (size_t p = 0; p < kept.size(); ++p) kept[p] = UniformFromHash(HashOf(p, kDraw)) < share;
   for (const BundleObservation& o : given.observations) {
-    const bool few = share * sights[static_cast<size_t>(o.image)] < 2 * kMinObservationsOfHalf;
+    const bool few =
+        share * observations[static_cast<size_t>(o.image)] < 2 * kMinObservationsOfHalf;
     if (few) kept[static_cast<size_t>(o.point)] = true;
   }
   return WithPoints(given, [&](std::uint64_t p) { return kept[static_cast<size_t>(p)]; });
@@ -276,7 +278,7 @@ void AddNotValidated(const Bundle& given, PhotosValidation& all) {
     all.not_validated.clear();  // what one part could not judge another has
   } else if (all.not_validated.empty()) {
     all.not_validated = fmt::format("fewer than {} observations of what photos beside them see: {}",
-                                    kFewestSights, fmt::join(lost, ", "));
+                                    kMinImageObservations, fmt::join(lost, ", "));
   }
   all.tests.push_back({"photos_not_validated", static_cast<double>(lost.size()), 0, lost.empty(),
                        lost.empty() ? "a fresh bundle adjustment has all"
@@ -291,7 +293,7 @@ PhotosValidation JudgePart(const Bundle& given, const BundleLimits& limits, int 
   for (const BundleObservation& o : given.observations) seen[static_cast<size_t>(o.point)] = true;
   const auto points = static_cast<size_t>(std::count(seen.begin(), seen.end(), true));
   const Bundle stored = WithDistortion(WithoutUnseen(
-      Drawn(given, kMaxValidationPoints / static_cast<double>(points)), kFewestSights));
+      Drawn(given, kMaxValidationPoints / static_cast<double>(points)), kMinImageObservations));
   if (points < kMinPoints) {
     return NotValidated(
         judgement,
@@ -300,7 +302,7 @@ PhotosValidation JudgePart(const Bundle& given, const BundleLimits& limits, int 
   if (stored.images.size() < 2) {
     return NotValidated(judgement,
                         fmt::format("expected two photos or more of {} observations each, found {}",
-                                    kFewestSights, stored.images.size()));
+                                    kMinImageObservations, stored.images.size()));
   }
   const Halves halves = HalvesOf(stored);
   FreshSolves solves;
@@ -313,7 +315,7 @@ PhotosValidation JudgePart(const Bundle& given, const BundleLimits& limits, int 
   }
   const Adjusted& fresh = solves.solved[0];
   const BundleCovariance& covariance = solves.covariance;
-  judgement.sights = fresh.sights;
+  judgement.observations = fresh.observations;
   judgement.sigma_px = fresh.sigma_px;
   judgement.condition = covariance.condition;
   judgement.degeneracies = FindDegeneracies(fresh, covariance, limits.max_focal_share);
@@ -384,7 +386,7 @@ void Join(const PhotosValidation& part, PhotosValidation& all) {
   if (std::isnan(part.halves_ratio) || part.halves_ratio > all.halves_ratio) {
     all.halves_ratio = part.halves_ratio;  // and NaN, once there, stays
   }
-  all.sights += part.sights;
+  all.observations += part.observations;
 }
 
 }  // namespace
@@ -398,7 +400,7 @@ PhotosValidation ValidatePhotos(const Bundle& given, const BundleLimits& limits,
                                 const Progress* progress) {
   // With distortion, as it is solved for.
   // Photos of fewer observations are those of the test cameras_untested.
-  const Bundle seen = WithoutUnseen(given, kFewestSights);
+  const Bundle seen = WithoutUnseen(given, kMinImageObservations);
   if (seen.images.empty()) {
     PhotosValidation none = NotValidated({}, "no photo has points to validate by");
     AddNotValidated(given, none);

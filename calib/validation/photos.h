@@ -68,7 +68,7 @@ struct PhotosValidation {
   std::vector<IntrinsicsValidation> lenses;
   std::vector<Degeneracy> degeneracies;
   double sigma_px = 0, condition = 0, halves_ratio = 0;
-  int sights = 0;
+  int observations = 0;
 };
 
 /// Judges cameras and poses of undistorted views against their own observations:

@@ -11,7 +11,7 @@ std::string ToJson(const PhotosValidation& judgement) {
   Json json;
   if (!judgement.not_validated.empty()) json["not_validated"] = judgement.not_validated;
   json["parts"] = judgement.parts;
-  json["observations"] = judgement.sights;
+  json["observations"] = judgement.observations;
   json["sigma_px"] = number(judgement.sigma_px);
   json["condition"] = number(judgement.condition);
   json["halves_ratio"] = number(judgement.halves_ratio);

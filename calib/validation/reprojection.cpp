@@ -86,7 +86,7 @@ std::vector<std::vector<int>> Tracks(const SparseScene& scene) {
 /// all answers for every observation not in it, so only its two members need a second search.
 class WidestAngle {
  public:
-  explicit WidestAngle(std::span<const Sight> sights) : observations_(sights) {
+  explicit WidestAngle(std::span<const Observation> observations) : observations_(observations) {
     Search(-1, &a_, &b_);
   }
   double Without(int left_out) const {
@@ -115,28 +115,28 @@ class WidestAngle {
       }
     }
   }
-  std::span<const Sight> observations_;
+  std::span<const Observation> observations_;
   int a_ = -1, b_ = -1;
 };
 
-void TestTrack(std::span<const Sight> sights, std::span<Verdict*> verdicts) {
-  if (sights.size() < kMinTrack) return;
-  const WidestAngle widest(sights);
-  for (size_t i = 0; i < sights.size(); ++i) {
+void TestTrack(std::span<const Observation> observations, std::span<Verdict*> verdicts) {
+  if (observations.size() < kMinTrack) return;
+  const WidestAngle widest(observations);
+  for (size_t i = 0; i < observations.size(); ++i) {
     Verdict& verdict = *verdicts[i];
     const int left_out = static_cast<int>(i);
     if (widest.Without(left_out) < kMinAngle) {
       verdict.fate = Fate::kWeak;
       continue;
     }
-    const Triangulation point = Triangulate(sights, left_out);
+    const Triangulation point = Triangulate(observations, left_out);
     if (point.status == TriangulationStatus::kDegenerate) {
       verdict.fate = Fate::kWeak;
       continue;
     }
     Eigen::Matrix<double, 2, 3> jacobian;
     if (point.status == TriangulationStatus::kBehind ||
-        !PixelResidual(sights[i], point.p_in_world, &verdict.held_out_px, &jacobian)) {
+        !PixelResidual(observations[i], point.p_in_world, &verdict.held_out_px, &jacobian)) {
       verdict.fate = Fate::kImpossible;
       continue;
     }
@@ -280,20 +280,20 @@ ValidationReport ValidateReprojection(std::span<const PinholeCamera> cameras,
   const int points = static_cast<int>(tracks.size());
   ParallelFor(0, (points + kBlock - 1) / kBlock, threads, [&](int block) {
     for (int p = block * kBlock; p < std::min(points, (block + 1) * kBlock); ++p) {
-      std::vector<Sight> sights;
+      std::vector<Observation> observations;
       std::vector<Verdict*> track_verdicts;
       for (const int index : tracks[static_cast<size_t>(p)]) {
         const SparseObservation& o = scene.observations[static_cast<size_t>(index)];
         const auto view = static_cast<size_t>(o.view);
-        sights.push_back(MakeObservation(cameras[view], cam_from_world[view], o.pixel));
+        observations.push_back(MakeObservation(cameras[view], cam_from_world[view], o.pixel));
         track_verdicts.push_back(&verdicts[static_cast<size_t>(index)]);
         Verdict& verdict = *track_verdicts.back();
         verdict.fate = Fate::kShortTrack;
         verdict.stored_in_front =
-            PixelResidual(sights.back(), scene.points[static_cast<size_t>(p)].p_in_world,
+            PixelResidual(observations.back(), scene.points[static_cast<size_t>(p)].p_in_world,
                           &verdict.stored_px, nullptr);
       }
-      TestTrack(sights, track_verdicts);
+      TestTrack(observations, track_verdicts);
     }
   });
 

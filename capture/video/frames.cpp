@@ -115,11 +115,11 @@ ImageRgb8 VideoReader::Picture() const {
 }
 
 int VideoReader::frames_promised() const {
-  constexpr double kMost = 1e9;
+  constexpr double kMax = 1e9;
   const VideoDecoder& decoder = parts_->decoder;
   if (decoder.frames_counted() > 0) return decoder.frames_counted();
   const double count = std::round(decoder.duration_s() * decoder.frames_per_second());
-  return count > 0 && count < kMost ? static_cast<int>(count) : 0;
+  return count > 0 && count < kMax ? static_cast<int>(count) : 0;
 }
 
 bool VideoReader::PromisesMoreThan(int frames) const {

@@ -245,8 +245,8 @@ bool VideoDecoder::NeedsDolbyVision() const {
 }
 
 int VideoDecoder::frames_counted() const {
-  constexpr std::int64_t kMost = 1'000'000'000;  // broken headers promise anything
-  if (stream().nb_frames <= 0 || stream().nb_frames > kMost) return 0;
+  constexpr std::int64_t kMax = 1'000'000'000;  // broken headers promise anything
+  if (stream().nb_frames <= 0 || stream().nb_frames > kMax) return 0;
   // An edit list has frames decoded, for others to refer to, that are not shown.
   int hidden = 0;
   const int entries = avformat_index_get_entries_count(&stream());

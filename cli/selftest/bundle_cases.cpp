@@ -240,9 +240,9 @@ Outcome FisheyeOf190Degrees(const Conditions&) {
   };
   const Bundle truth = MakeBundle(spec);
   long long behind = 0;
-  for (const auto& sight : truth.observations) {
-    const Pose& pose = truth.images[static_cast<size_t>(sight.image)].cam_from_world;
-    const Eigen::Vector3d p = truth.points[static_cast<size_t>(sight.point)].head<3>();
+  for (const auto& observation : truth.observations) {
+    const Pose& pose = truth.images[static_cast<size_t>(observation.image)].cam_from_world;
+    const Eigen::Vector3d p = truth.points[static_cast<size_t>(observation.point)].head<3>();
     behind += (pose * p).z() < 0;
   }
   outcome.Add(AtLeast("observations beyond 90 degrees", static_cast<double>(behind), 20,
@@ -258,10 +258,10 @@ Outcome HalfAreOutliers(const Conditions&) {
   Outcome outcome;
   Bundle spoiled = MakeBundle({.points = 400, .noise_px = 0.1});
   Random random(3);
-  for (auto& sight : spoiled.observations) {
+  for (auto& observation : spoiled.observations) {
     if (random.Uniform() < 0.5) continue;
     const double x = random.Uniform(-80, 80);
-    sight.pixel += Eigen::Vector2d(x, random.Uniform(-80, 80));
+    observation.pixel += Eigen::Vector2d(x, random.Uniform(-80, 80));
   }
   const Adjusted out = Solve(Perturbed(spoiled, 0.02), LensFreedom::kNoPrincipalPoint, outcome);
   outcome.Add(
@@ -282,7 +282,7 @@ Outcome AMillionPixelsOff(const Conditions&) {
   outcome.Add(Exactly("the observation counts", out.used[5], 0, "it agrees with nothing"));
   outcome.Add(AtMost("change of the focal length, px",
                      std::abs(out.bundle.lenses[0].params[0] - good.bundle.lenses[0].params[0]),
-                     0.1, "one sight of 1600 less"));
+                     0.1, "one observation of 1600 less"));
   return outcome;
 }
 

@@ -57,7 +57,7 @@ inline calib::Bundle MakeBundle(const SceneSpec& spec) {
   }
   for (int p = 0; p < spec.points; ++p) {
     const Eigen::Vector3d point = spec.point ? spec.point(random) : BoxPoint(random);
-    std::vector<calib::BundleObservation> sights;
+    std::vector<calib::BundleObservation> observations;
     const int first = random.Index(spec.images);
     for (int k = 0; k < spec.images; ++k) {
       const int i = (first + k) % spec.images;
@@ -66,17 +66,18 @@ inline calib::Bundle MakeBundle(const SceneSpec& spec) {
       const Eigen::Vector2d noise(random.Normal(), random.Normal());
       if (!pixel || pixel->x() < 0 || pixel->y() < 0 || pixel->x() > spec.lens.width_px ||
           pixel->y() > spec.lens.height_px ||
-          static_cast<int>(sights.size()) >= spec.max_observations) {
+          static_cast<int>(observations.size()) >= spec.max_observations) {
         continue;
       }
-      sights.push_back({i, static_cast<int>(bundle.points.size()), *pixel + spec.noise_px * noise});
+      observations.push_back(
+          {i, static_cast<int>(bundle.points.size()), *pixel + spec.noise_px * noise});
     }
-    if (sights.size() < 2) continue;
-    std::sort(sights.begin(), sights.end(),
+    if (observations.size() < 2) continue;
+    std::sort(observations.begin(), observations.end(),
               [](const auto& a, const auto& b) { return a.image < b.image; });
     bundle.point_ids.push_back(bundle.points.size() + 1);
     bundle.points.push_back(point.homogeneous());
-    bundle.observations.insert(bundle.observations.end(), sights.begin(), sights.end());
+    bundle.observations.insert(bundle.observations.end(), observations.begin(), observations.end());
   }
   return bundle;
 }

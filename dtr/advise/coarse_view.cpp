@@ -28,10 +28,11 @@ CoarseView MakeCoarse(const View& view, int side_px) {
   return coarse;
 }
 
-Sight ObservationOf(const CoarseView& view, const Eigen::Vector3d& p_in_world, double tolerance) {
+Visibility VisibilityOf(const CoarseView& view, const Eigen::Vector3d& p_in_world,
+                        double tolerance) {
   const Eigen::Vector3d p_in_cam = view.cam_from_world * p_in_world;
   const auto pixel = view.camera.PixelFromCam(p_in_cam);
-  if (!pixel || !view.camera.Contains(*pixel)) return Sight::kOutside;
+  if (!pixel || !view.camera.Contains(*pixel)) return Visibility::kOutside;
   const int x = static_cast<int>(pixel->x()), y = static_cast<int>(pixel->y());
   double nearest = 1e300;  // relative difference of inverse depths
   bool before = false;
@@ -48,10 +49,10 @@ Sight ObservationOf(const CoarseView& view, const Eigen::Vector3d& p_in_world, d
     }
   }
   if (depths == 0 || (DepthImage::IsHole(view.depth(x, y)) && nearest >= tolerance)) {
-    return Sight::kNothing;
+    return Visibility::kNothing;
   }
-  if (nearest < tolerance) return Sight::kSeen;
-  return before ? Sight::kHidden : Sight::kBeyond;
+  if (nearest < tolerance) return Visibility::kSeen;
+  return before ? Visibility::kHidden : Visibility::kBeyond;
 }
 
 }  // namespace dtr::advise

@@ -22,7 +22,7 @@ struct CoarseView {
 CoarseView MakeCoarse(const View& view, int side_px);
 
 /// What a view knows of a point.
-enum class Sight {
+enum class Visibility {
   kOutside,  ///< beyond its image, or behind it
   kHidden,   ///< something of it stands before the point
   kNothing,  ///< it looks there, but has no depth
@@ -30,11 +30,12 @@ enum class Sight {
   kBeyond,   ///< its surface is further away: it looks through the point
 };
 
-/// Tolerance of ObservationOf between coarse samples of one surface.
+/// Tolerance of VisibilityOf between coarse samples of one surface.
 inline constexpr double kOneSurface = 0.03;
 
 /// `tolerance`: difference of inverse depths, relative, up to which two are of one surface; the
 /// nearest of the 3x3 samples about the point's pixel counts, as coarse slopes demand.
-Sight ObservationOf(const CoarseView& view, const Eigen::Vector3d& p_in_world, double tolerance);
+Visibility VisibilityOf(const CoarseView& view, const Eigen::Vector3d& p_in_world,
+                        double tolerance);
 
 }  // namespace dtr::advise

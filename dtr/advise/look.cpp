@@ -96,10 +96,10 @@ Look LookFrom(const Place& place, std::span<const CoarseView> views) {
       if (DepthImage::IsHole(z)) {
         glance.point = at(std::max(usual, 1e-30)).cast<float>();
         for (const double times : kFarDepths) {
-          const bool looked_at =
-              usual > 0 && std::any_of(near.begin(), near.end(), [&](size_t i) {
-                return ObservationOf(views[i], at(usual * times), kOneSurface) == Sight::kNothing;
-              });
+          const bool looked_at = usual > 0 && std::any_of(near.begin(), near.end(), [&](size_t i) {
+                                   return VisibilityOf(views[i], at(usual * times), kOneSurface) ==
+                                          Visibility::kNothing;
+                                 });
           if (looked_at) glance.what = Glance::What::kDepthless;
         }
         continue;
@@ -109,7 +109,7 @@ Look LookFrom(const Place& place, std::span<const CoarseView> views) {
       const auto owner = static_cast<size_t>(buffer.owner(x, y));
       Count(point, center, views[owner].CenterInWorld(), glance);
       for (const size_t i : near) {
-        if (i == owner || ObservationOf(views[i], point, kOneSurface) != Sight::kSeen) continue;
+        if (i == owner || VisibilityOf(views[i], point, kOneSurface) != Visibility::kSeen) continue;
         Count(point, center, views[i].CenterInWorld(), glance);
       }
     }
@@ -123,9 +123,9 @@ void AddPhoto(const CoarseView& other, Look& look) {
   for (Glance& glance : look.glances) {
     if (glance.what == Glance::What::kDepthless) continue;
     const Eigen::Vector3d point = glance.point.cast<double>();
-    const Sight sight = ObservationOf(other, point, kOneSurface);
-    const bool shown =
-        glance.what == Glance::What::kSeen ? sight == Sight::kSeen : sight == Sight::kNothing;
+    const Visibility visibility = VisibilityOf(other, point, kOneSurface);
+    const bool shown = glance.what == Glance::What::kSeen ? visibility == Visibility::kSeen
+                                                          : visibility == Visibility::kNothing;
     if (shown) Count(point, here, there, glance);
   }
 }

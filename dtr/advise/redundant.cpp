@@ -41,7 +41,7 @@ Shown ShownOf(std::span<const CoarseView> views, size_t index, double max_angle_
       std::uint32_t bits = 0;
       for (size_t k = 0; k < shown.others.size() && k < kViewsAsked; ++k) {
         const CoarseView& other = views[shown.others[k]];
-        const bool covers = ObservationOf(other, p, kOneSurface) == Sight::kSeen &&
+        const bool covers = VisibilityOf(other, p, kOneSurface) == Visibility::kSeen &&
                             AngleBetween(center - p, other.CenterInWorld() - p) <= max_angle_rad &&
                             Magnification(other, p) >= kAsLarge * Magnification(view, p);
         if (covers) bits |= 1U << k;

@@ -73,14 +73,14 @@ std::vector<View> TurnedCopies(const RenderScene& scene, const std::vector<int>&
   const int used = std::min<int>(kUsedOfLargeSet, static_cast<int>(nearest_first.size()));
   const double first = angle_of(nearest_first.front());
   const double last = angle_of(nearest_first[static_cast<size_t>(used - 1)]);
-  const Eigen::Vector3d sight = to_novel.normalized();
+  const Eigen::Vector3d line_of_sight = to_novel.normalized();
   std::vector<View> copies;
   for (int i = 0; i < count; ++i) {
     // Turned by t, a copy of the nearest view stands between t - first and t + first off.
     const double share = kFirstCopy + (kLastCopy - kFirstCopy) * i / count;
     const double turn = last + first + share * std::max(0.0, max_angle_rad - last - 2 * first);
     const Eigen::Vector3d axis =
-        Eigen::AngleAxisd(i * kGoldenAngleRad, sight) * sight.unitOrthogonal();
+        Eigen::AngleAxisd(i * kGoldenAngleRad, line_of_sight) * line_of_sight.unitOrthogonal();
     const Eigen::Quaterniond world_turn(Eigen::AngleAxisd(turn, axis));
     const View& original = *scene.views[static_cast<size_t>(nearest_first.front())];
     View copy;

@@ -130,8 +130,8 @@ void Alpha::StraightenAs(std::vector<T>& values, int channels, float most) const
         values[c] =
             static_cast<T>(std::lround(std::min(most, static_cast<float>(values[c]) / alpha)));
       } else {
-        constexpr T kMost = std::numeric_limits<T>::max();
-        values[c] = std::clamp(values[c] / alpha, -kMost, kMost);
+        constexpr T kMax = std::numeric_limits<T>::max();
+        values[c] = std::clamp(values[c] / alpha, -kMax, kMax);
       }
     }
   }

@@ -90,8 +90,8 @@ std::string NamesOf(const std::vector<std::string>& names) {
 // A value of 0 to 1 as a whole number of so many bits.
 template <typename T>
 T NumberOf(float value) {
-  constexpr auto kMost = static_cast<float>(std::numeric_limits<T>::max());
-  return static_cast<T>(std::clamp(value, 0.0F, 1.0F) * kMost + 0.5F);
+  constexpr auto kMax = static_cast<float>(std::numeric_limits<T>::max());
+  return static_cast<T>(std::clamp(value, 0.0F, 1.0F) * kMax + 0.5F);
 }
 
 // Channels of an EXR may be anything.

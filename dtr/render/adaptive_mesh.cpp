@@ -117,8 +117,8 @@ class MeshMaker {
   int TriangleCount() const { return static_cast<int>(mesh_.indices.size() / 3); }
 
   static AdaptiveMesh::Tile NewTile() {
-    constexpr float kMost = std::numeric_limits<float>::max();
-    constexpr Range kNothing{kMost, -kMost};
+    constexpr float kMax = std::numeric_limits<float>::max();
+    constexpr Range kNothing{kMax, -kMax};
     return {0, 0, 0, 0, kNothing, kNothing, kNothing, kNothing, kNothing};
   }
 

@@ -21,7 +21,7 @@ using MF = hn::Mask<DF>;
 constexpr size_t kLanes = hn::MaxLanes(DF());
 
 // SPEC 6.1: inverse depths whose depth float32 holds as a normal number.
-constexpr float kLeast = 1e-37f, kMost = 1e37f, kFar = -3.4e38f;
+constexpr float kMin = 1e-37f, kMax = 1e37f, kFar = -3.4e38f;
 
 HWY_INLINE VF Constant(float value) { return hn::Set(DF(), value); }
 HWY_INLINE VF Lerp(VF a, VF b, VF share) { return hn::MulAdd(share, hn::Sub(b, a), a); }
@@ -237,7 +237,7 @@ HWY_INLINE VF Meet(const PixelView& view, const RayOnGrid& base, const Position&
       hn::MulAdd(patch.slope_x, base.x, hn::MulAdd(patch.slope_y, base.y, hn::Mul(rest, base.z))),
       facing);
   const MF meets = hn::And(hn::Gt(facing, hn::Zero(DF())),
-                           hn::And(hn::Ge(w, Constant(kLeast)), hn::Le(w, Constant(kMost))));
+                           hn::And(hn::Ge(w, Constant(kMin)), hn::Le(w, Constant(kMax))));
   return hn::IfThenElseZero(hn::And(patch.exists, meets), w);
 }
 

@@ -19,7 +19,7 @@ using namespace patchmatch;
 constexpr int kCoarsestSidePx = 256;
 constexpr int kSmallestSidePx = 24;
 /// The first guess tries one inverse depth per pixel of disparity, within these bounds.
-constexpr double kLeastSamples = 48, kMaxSamples = 128;
+constexpr double kMinSamples = 48, kMaxSamples = 128;
 /// Visits per pixel on the coarsest level more than on those between, and on the finest fewer.
 constexpr int kMoreIterations = 2;
 constexpr float kFirstStepPx = 4.0f, kFinestStepPx = 1.0f;
@@ -132,8 +132,7 @@ State SearchPyramid(const StereoView& view, std::span<const Picture> pictures,
         range_px = std::max(range_px, RangePx(view, *s.view, range));
       }
       const double scale = std::exp2(-static_cast<double>(index));
-      const int samples =
-          static_cast<int>(std::clamp(range_px * scale, kLeastSamples, kMaxSamples));
+      const int samples = static_cast<int>(std::clamp(range_px * scale, kMinSamples, kMaxSamples));
       state = EmptyState(level);
       ParallelFor(0, level.reference.height, options.threads,
                   [&](int y) { SearchRow(level, samples, y, &state); });

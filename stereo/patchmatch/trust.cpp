@@ -51,7 +51,7 @@ constexpr float kRangeSigmas = 3.0f;
 /// photos differ, few of them have a minimum there, the minimum is flat. Fitted to sigmas that were
 /// about 0.8 times as large: the log odds are higher by 0.1 for it.
 constexpr float kOddsOfWrong = -2.7f, kOddsPerCost = 3.6f, kOddsPerView = -0.44f;
-constexpr float kOddsPerLogSigma = 0.44f, kLeastSigmaPx = 0.02f;
+constexpr float kOddsPerLogSigma = 0.44f, kMinSigmaPx = 0.02f;
 /// What a wrong depth adds to sigma, pixels of disparity. Wrong depths are wrong by tens of pixels;
 /// as much as that would make the right ones that look like them, which are more, too modest.
 constexpr float kWrongByPx = 2.5f;
@@ -60,7 +60,7 @@ constexpr float kWrongByPx = 2.5f;
 float ProbabilityOfWrong(const Verdict& v) {
   const float odds = kOddsOfWrong + kOddsPerCost * std::min(v.cost, 1.0f) +
                      kOddsPerView * static_cast<float>(v.agreeing) +
-                     kOddsPerLogSigma * std::log(v.sigma * v.px + kLeastSigmaPx);
+                     kOddsPerLogSigma * std::log(v.sigma * v.px + kMinSigmaPx);
   return 1 / (1 + std::exp(-odds));
 }
 

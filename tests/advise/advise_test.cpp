@@ -47,15 +47,15 @@ const Place& PlaceCalled(const Advice& advice, const std::string& where) {
   throw std::out_of_range(where);
 }
 
-TEST(ObservationOf, KnowsSeenHiddenBeyondAndNothing) {
+TEST(VisibilityOf, KnowsSeenHiddenBeyondAndNothing) {
   const auto views = Row(Square(0, 0, kWallZ, 2), {0});
   const CoarseView& view = views[0];
-  EXPECT_EQ(ObservationOf(view, {0, 0, kWallZ}, 0.03), Sight::kSeen);
-  EXPECT_EQ(ObservationOf(view, {0, 0, 1.2 * kWallZ}, 0.03), Sight::kHidden);
-  EXPECT_EQ(ObservationOf(view, {0, 0, 0.8 * kWallZ}, 0.03), Sight::kBeyond);
-  EXPECT_EQ(ObservationOf(view, {3.5, 0, kWallZ}, 0.03), Sight::kNothing);
-  EXPECT_EQ(ObservationOf(view, {30, 0, kWallZ}, 0.03), Sight::kOutside);
-  EXPECT_EQ(ObservationOf(view, {0, 0, -1}, 0.03), Sight::kOutside);
+  EXPECT_EQ(VisibilityOf(view, {0, 0, kWallZ}, 0.03), Visibility::kSeen);
+  EXPECT_EQ(VisibilityOf(view, {0, 0, 1.2 * kWallZ}, 0.03), Visibility::kHidden);
+  EXPECT_EQ(VisibilityOf(view, {0, 0, 0.8 * kWallZ}, 0.03), Visibility::kBeyond);
+  EXPECT_EQ(VisibilityOf(view, {3.5, 0, kWallZ}, 0.03), Visibility::kNothing);
+  EXPECT_EQ(VisibilityOf(view, {30, 0, kWallZ}, 0.03), Visibility::kOutside);
+  EXPECT_EQ(VisibilityOf(view, {0, 0, -1}, 0.03), Visibility::kOutside);
 }
 
 TEST(Advise, AnglesAreThoseOfTheWorld) {

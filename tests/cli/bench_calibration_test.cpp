@@ -134,11 +134,11 @@ TEST_F(BenchCalibration, FewerCamerasAreNoAdvantage) {
   EXPECT_EQ(point["figures"]["reference_observations"], all["figures"]["reference_observations"]);
   EXPECT_GT(point["error"], 1.5 * all["error"].get<double>());
   // By hand: an observation that is missed counts as 10 scales of half a pixel per 1000.
-  const double sights = point["figures"]["reference_observations"],
-               missed = sights - point["figures"]["reference_tracks_predicted"].get<double>(),
+  const double observations = point["figures"]["reference_observations"],
+               missed = observations - point["figures"]["reference_tracks_predicted"].get<double>(),
                missed_px = 10 * 0.0005 * kCamera.width_px();
-  EXPECT_GT(missed, 0.05 * sights);
-  EXPECT_GT(point["error"], missed_px * std::sqrt(missed / sights));
+  EXPECT_GT(missed, 0.05 * observations);
+  EXPECT_GT(point["error"], missed_px * std::sqrt(missed / observations));
 }
 
 TEST_F(BenchCalibration, ColmapIsToldWhatTheSettingSays) {

@@ -54,9 +54,9 @@ TEST(CalibrateRefine, OutliersThatDoNotSettleAreTold) {
   const TemporaryFolder folder;
   calib::Bundle bundle = bundle::MakeBundle({.images = 8, .points = 600, .lens = kLens});
   Random random(7);
-  for (calib::BundleObservation& sight : bundle.observations) {
+  for (calib::BundleObservation& observation : bundle.observations) {
     const double x = random.Normal(), y = random.Normal();
-    sight.pixel += 0.3 * Eigen::Vector2d(x, y) / std::abs(random.Normal());
+    observation.pixel += 0.3 * Eigen::Vector2d(x, y) / std::abs(random.Normal());
   }
   const calib::SfmModel model = ModelFrom(bundle);
   colmap::WriteModel(folder / "model", model, colmap::Format::kBinary);

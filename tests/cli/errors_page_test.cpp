@@ -20,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::uintmax_t kMaxBytes = 1 << 24;
-constexpr size_t kFewest = 8;  // letters; less is a joint between words of others
+constexpr size_t kMinLetters = 8;  // less is a joint between words of others
 
 /// What one throw spells out.
 struct Thrown {
@@ -113,7 +113,7 @@ std::vector<Thrown> ThrownBy(const fs::path& file) {
        {"throw Error(", "throw UsageError(", "throw dtr::Error(", "throw dtr::UsageError("}) {
     for (size_t at = source.find(start); at != std::string::npos; at = source.find(start, at + 1)) {
       const std::string words = LongestPiece(Expression(source, at + start.size()).Literals());
-      if (words.size() < kFewest) continue;
+      if (words.size() < kMinLetters) continue;
       const auto line =
           1 + std::count(source.begin(), source.begin() + static_cast<long>(at), '\n');
       all.push_back({file.generic_string(), static_cast<int>(line), words});

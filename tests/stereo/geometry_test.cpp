@@ -124,7 +124,7 @@ TEST(DepthRanges, AreWidenedPercentilesOfTheObservedPoints) {
   EXPECT_NEAR(range.far_z, 2 / 0.101, 1e-9);
 }
 
-TEST(DepthRanges, OfAViewWithoutObservationsComeFromAllPointsInSight) {
+TEST(DepthRanges, OfAViewWithoutObservationsComeFromAllVisiblePoints) {
   const auto views = Arc({0, 7});
   SparseScene scene = Ball(views, 50);
   const auto before = DepthRangesFromPoints(views, scene, {});

@@ -64,14 +64,14 @@ BoardInSet FindBoard(const std::filesystem::path& folder, const DtrSet& set,
       in_set.without.push_back({view.name, found[i].reason});
       continue;
     }
-    in_set.sights.push_back({view.camera,
-                             view.cam_from_world,
-                             {view.name, std::move(found[i].corners), found[i].noise_px}});
+    in_set.observations.push_back({view.camera,
+                                   view.cam_from_world,
+                                   {view.name, std::move(found[i].corners), found[i].noise_px}});
   }
-  if (in_set.sights.size() >= kMinViews) return in_set;
+  if (in_set.observations.size() >= kMinViews) return in_set;
   throw Error(fmt::format(
       "`board` {}: expected it in {} views of {} or more, found it in {} of {}{}",
-      calib::TextOf(board), kMinViews, folder.string(), in_set.sights.size(), views.size(),
+      calib::TextOf(board), kMinViews, folder.string(), in_set.observations.size(), views.size(),
       in_set.without.empty() ? ""
                              : fmt::format("; {} says: {}", in_set.without.front().name,
                                            in_set.without.front().reason)));

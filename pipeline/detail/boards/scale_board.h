@@ -12,7 +12,7 @@ namespace dtr::pipeline {
 
 /// The board in the images of a set, one view at a time per thread.
 struct BoardInSet {
-  std::vector<calib::BoardObservation> sights;
+  std::vector<calib::BoardObservation> observations;
   std::vector<calib::LeftOut> without;  ///< views in which it was not found, and why
 };
 

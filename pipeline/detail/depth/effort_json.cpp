@@ -21,7 +21,7 @@ stereo::Effort EffortFromJson(const std::string& text, const std::string& where)
   };
   return {.neighbours = number("neighbours", 1, kMaxNeighbours),
           .round_neighbours = number("round_neighbours", 1, kMaxNeighbours),
-          .iterations = number("iterations", 1, kMostIterations),
+          .iterations = number("iterations", 1, kMaxIterations),
           .rounds = number("rounds", 0, kMaxRounds)};
 }
 

@@ -12,7 +12,7 @@ BuildOptions ByPreset(BuildOptions options) {
   const Preset& preset = PresetCalled(options.depth.preset);
   if (options.max_size_px < 0) options.max_size_px = preset.max_size_px;
   if (options.sfm.features == 0) {
-    options.sfm.features = options.poses.empty() ? preset.features : colmap::kMostFeatures;
+    options.sfm.features = options.poses.empty() ? preset.features : colmap::kMaxFeatures;
   }
   return options;
 }

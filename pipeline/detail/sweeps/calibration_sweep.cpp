@@ -67,7 +67,7 @@ std::vector<calib::Track> ReferenceTracksOf(const capture::Capture& photos, cons
     throw Error(fmt::format(
         "`photos` {}: expected {} points that {} or more photos show, to measure cameras by, found "
         "{}; take photos that overlap more",
-        folder.string(), calib::kMinHeldOut, calib::kFewestSights, tracks.size()));
+        folder.string(), calib::kMinHeldOut, calib::kMinTrackLength, tracks.size()));
   }
   return tracks;
 }
@@ -87,7 +87,7 @@ std::vector<std::string> MatchingValues(size_t photos) {
 
 std::vector<std::string> FeatureValues() {
   std::vector<std::string> values;
-  for (const int part : {1, 2, 4}) values.push_back(std::to_string(colmap::kMostFeatures / part));
+  for (const int part : {1, 2, 4}) values.push_back(std::to_string(colmap::kMaxFeatures / part));
   return values;
 }
 
@@ -157,7 +157,7 @@ eval::SweepMeasurement CalibrationSweep::Measure(const eval::SweepSetting& setti
   measured.error = std::max(score.error_px, kExact);
   measured.figures = {{"not_registered", static_cast<double>(calibrated.not_registered.size())},
                       {"points", static_cast<double>(calibrated.model.points.size())},
-                      {"reference_observations", score.sights},
+                      {"reference_observations", score.observations},
                       {"reference_tracks_predicted", score.predicted},
                       {"median_px", score.median_px}};
   return measured;

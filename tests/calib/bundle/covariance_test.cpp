@@ -29,9 +29,9 @@ SceneSpec Small(std::uint64_t seed) {
 Bundle Noisy(const Bundle& truth, std::uint64_t seed) {
   Bundle bundle = truth;
   Random random(seed);
-  for (auto& sight : bundle.observations) {
+  for (auto& observation : bundle.observations) {
     const double x = random.Normal();
-    sight.pixel += 0.3 * Eigen::Vector2d(x, random.Normal());
+    observation.pixel += 0.3 * Eigen::Vector2d(x, random.Normal());
   }
   return bundle;
 }

@@ -317,13 +317,13 @@ TEST(Stiff, APointThatTwoRaysATenthOfADegreeApartPlaceErrsAsPredicted) {
   Random random(5);
   double chi_squared = 0;
   for (int k = 0; k < kDraws; ++k) {
-    std::vector<Sight> sights;
+    std::vector<Observation> observations;
     for (const Pose& pose : {left, right}) {
       const Eigen::Vector2d noise(random.Normal(), random.Normal());
-      sights.push_back(
+      observations.push_back(
           MakeObservation(camera, pose, *camera.PixelFromCam(pose * p) + kPointNoisePx * noise));
     }
-    const Triangulation found = Triangulate(sights, -1);
+    const Triangulation found = Triangulate(observations, -1);
     ASSERT_EQ(found.status, TriangulationStatus::kConverged);
     const Eigen::Vector3d error = found.p_in_world - p;
     chi_squared += error.dot(found.covariance.ldlt().solve(error)) /

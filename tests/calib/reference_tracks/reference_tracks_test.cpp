@@ -27,7 +27,7 @@ std::vector<Track> TracksOf(const calib::Bundle& bundle) {
   for (const calib::BundleObservation& o : bundle.observations) {
     tracks[static_cast<size_t>(o.point)].push_back({o.image, o.pixel});
   }
-  std::erase_if(tracks, [](const Track& track) { return track.size() < calib::kFewestSights; });
+  std::erase_if(tracks, [](const Track& track) { return track.size() < calib::kMinTrackLength; });
   return tracks;
 }
 
@@ -52,8 +52,8 @@ TEST(ScoreCameras, TrueCamerasMissExactObservationsByRoundingOnly) {
   constexpr double kRoundingPx = 1e-5;  // the triangulation stops when it moves by 1e-9 px
   const Scene scene(0);
   const ReferenceTracksScore score = scene.Score(scene.model);
-  ASSERT_GT(score.sights, 500);
-  EXPECT_EQ(score.predicted, score.sights);
+  ASSERT_GT(score.observations, 500);
+  EXPECT_EQ(score.predicted, score.observations);
   EXPECT_LT(score.error_px, kRoundingPx);
 }
 
@@ -98,11 +98,11 @@ TEST(ScoreCameras, APhotoWithoutACameraIsNoAdvantage) {
   size_t lost = 0, all = 0;
   for (const Track& track : scene.tracks) {
     all += track.size();
-    for (const calib::PhotoObservation& sight : track) lost += sight.photo == 2;
+    for (const calib::PhotoObservation& observation : track) lost += observation.photo == 2;
   }
   const ReferenceTracksScore whole = scene.Score(scene.model), score = scene.Score(fewer);
-  EXPECT_EQ(score.sights, whole.sights);
-  EXPECT_EQ(score.sights - score.predicted, static_cast<int>(lost));
+  EXPECT_EQ(score.observations, whole.observations);
+  EXPECT_EQ(score.observations - score.predicted, static_cast<int>(lost));
   // By hand: each counts as missed by 10 scales.
   const double far_off = 100 * kScalePx * kScalePx;
   EXPECT_GT(score.error_px,
@@ -158,7 +158,7 @@ TEST_F(RenderedReferenceTracks, TheTrueCamerasAreTheBest) {
   const std::vector<Track> tracks = Find(2);
   ASSERT_GE(tracks.size(), static_cast<size_t>(calib::kMinHeldOut));
   const ReferenceTracksScore truth = Score(model_, tracks);
-  EXPECT_EQ(truth.predicted, truth.sights);
+  EXPECT_EQ(truth.predicted, truth.observations);
   EXPECT_LT(truth.median_px, 0.5) << "a slip of half a pixel, or wrong matches";
   for (const double shift_px : {-1.0, 1.0}) {
     SfmModel turned = model_;
@@ -187,7 +187,7 @@ TEST_F(RenderedReferenceTracks, IsTheSameForAnyNumberOfThreadsAndHeedsMasks) {
   Mask left(480, 320, 1, 0);
   for (int y = 0; y < 320; ++y) std::fill_n(left.row(y), 240, std::uint8_t{255});
   for (const Track& track : Find(2, left)) {
-    for (const calib::PhotoObservation& sight : track) EXPECT_LE(sight.pixel.x(), 241);
+    for (const calib::PhotoObservation& observation : track) EXPECT_LE(observation.pixel.x(), 241);
   }
 }
 

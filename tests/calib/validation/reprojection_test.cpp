@@ -123,9 +123,9 @@ TEST(Triangulate, HandWorkedPointOfTwoCameras) {
   // Two cameras side by side, 2 apart, looking along z: the point (1, 0, 4) lies between them.
   const PinholeCamera camera(200, 100, 100, 100, 100, 50);
   const Pose left, right{Eigen::Quaterniond::Identity(), {-2, 0, 0}};
-  const std::vector<Sight> sights{MakeObservation(camera, left, {125, 50}),
-                                  MakeObservation(camera, right, {75, 50})};
-  const Triangulation found = Triangulate(sights, -1);
+  const std::vector<Observation> observations{MakeObservation(camera, left, {125, 50}),
+                                              MakeObservation(camera, right, {75, 50})};
+  const Triangulation found = Triangulate(observations, -1);
   ASSERT_EQ(found.status, TriangulationStatus::kConverged);
   EXPECT_LT((found.p_in_world - Eigen::Vector3d(1, 0, 4)).norm(), 1e-12);
 }
@@ -133,10 +133,10 @@ TEST(Triangulate, HandWorkedPointOfTwoCameras) {
 TEST(Triangulate, ParallelRaysFixNoPoint) {
   const PinholeCamera camera(200, 100, 100, 100, 100, 50);
   const Pose left, right{Eigen::Quaterniond::Identity(), {-2, 0, 0}};
-  const std::vector<Sight> sights{MakeObservation(camera, left, {100, 50}),
-                                  MakeObservation(camera, right, {100, 50})};
-  EXPECT_EQ(Triangulate(sights, -1).status, TriangulationStatus::kDegenerate);
-  EXPECT_EQ(Triangulate(sights, 0).status, TriangulationStatus::kDegenerate);
+  const std::vector<Observation> observations{MakeObservation(camera, left, {100, 50}),
+                                              MakeObservation(camera, right, {100, 50})};
+  EXPECT_EQ(Triangulate(observations, -1).status, TriangulationStatus::kDegenerate);
+  EXPECT_EQ(Triangulate(observations, 0).status, TriangulationStatus::kDegenerate);
 }
 
 TEST(Triangulate, RaysThatPartHaveNoPointInFront) {
@@ -144,23 +144,24 @@ TEST(Triangulate, RaysThatPartHaveNoPointInFront) {
   // They meet behind: turned round, both cameras see each other's side instead.
   const Pose back{Eigen::Quaterniond(Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitY())),
                   {0, 0, -3}};
-  const std::vector<Sight> sights{MakeObservation(camera, Pose{}, {100, 20}),
-                                  MakeObservation(camera, back, {100, 80})};
-  EXPECT_NE(Triangulate(sights, -1).status, TriangulationStatus::kConverged);
+  const std::vector<Observation> observations{MakeObservation(camera, Pose{}, {100, 20}),
+                                              MakeObservation(camera, back, {100, 80})};
+  EXPECT_NE(Triangulate(observations, -1).status, TriangulationStatus::kConverged);
 }
 
 TEST(Triangulate, OneWrongObservationAmongManyDoesNotCarryThePointAway) {
   Calibration c = Arc(8, 1, 0);
-  std::vector<Sight> sights;
+  std::vector<Observation> observations;
   for (size_t i = 0; i < 8; ++i) {
-    sights.push_back(MakeObservation(c.cameras[i], c.poses[i], c.scene.observations[i].pixel));
+    observations.push_back(
+        MakeObservation(c.cameras[i], c.poses[i], c.scene.observations[i].pixel));
   }
-  sights[3] = MakeObservation(c.cameras[3], c.poses[3],
-                              c.scene.observations[3].pixel + Eigen::Vector2d(40, -25));
-  const Triangulation found = Triangulate(sights, -1);
+  observations[3] = MakeObservation(c.cameras[3], c.poses[3],
+                                    c.scene.observations[3].pixel + Eigen::Vector2d(40, -25));
+  const Triangulation found = Triangulate(observations, -1);
   ASSERT_EQ(found.status, TriangulationStatus::kConverged);
   Eigen::Vector2d residual;
-  ASSERT_TRUE(PixelResidual(sights[0], found.p_in_world, &residual, nullptr));
+  ASSERT_TRUE(PixelResidual(observations[0], found.p_in_world, &residual, nullptr));
   EXPECT_LT(residual.norm(), 1.0);  // without Huber: 6.5 px
 }
 
@@ -169,17 +170,17 @@ TEST(PixelResidual, DerivativeIsThatOfTheValue) {
   const Calibration c = Arc(4, 20, 0);
   for (const SparseObservation& o : c.scene.observations) {
     const auto view = static_cast<size_t>(o.view);
-    const Sight sight = MakeObservation(c.cameras[view], c.poses[view], o.pixel);
+    const Observation observation = MakeObservation(c.cameras[view], c.poses[view], o.pixel);
     const Eigen::Vector3d p =
         c.scene.points[static_cast<size_t>(o.point)].p_in_world +
         0.1 * Eigen::Vector3d(random.Normal(), random.Normal(), random.Normal());
     Eigen::Vector2d residual, up, down;
     Eigen::Matrix<double, 2, 3> jacobian;
-    ASSERT_TRUE(PixelResidual(sight, p, &residual, &jacobian));
+    ASSERT_TRUE(PixelResidual(observation, p, &residual, &jacobian));
     for (int k = 0; k < 3; ++k) {
       const Eigen::Vector3d step = 1e-5 * Eigen::Vector3d::Unit(k);
-      ASSERT_TRUE(PixelResidual(sight, p + step, &up, nullptr));
-      ASSERT_TRUE(PixelResidual(sight, p - step, &down, nullptr));
+      ASSERT_TRUE(PixelResidual(observation, p + step, &up, nullptr));
+      ASSERT_TRUE(PixelResidual(observation, p - step, &down, nullptr));
       // The residual is observed minus predicted; the derivative is that of the prediction.
       EXPECT_LT(((up - down) / 2e-5 + jacobian.col(k)).norm(), kDerivative * jacobian.norm());
     }
