@@ -78,12 +78,9 @@ bool IsPerImage(LensFreedom freedom);
 bool IsTangential(LensFreedom freedom);
 bool MayGetTangential(const LensCamera& lens);
 
-/// How a solve ended.
-struct Adjusted {
-  Bundle bundle;
-  LensFreedom lens = LensFreedom::kFixed;
-  std::vector<bool> used;  ///< per observation: false for outliers and observations without a pixel
-  int observations = 0;    ///< used ones
+/// How a solve ended, in numbers.
+struct AdjustSummary {
+  int observations = 0;  ///< used ones
   /// Standard deviation of a used observation's coordinate, unknowns counted, lenses' and poses' as
   /// far as they were free; infinite where there are as many unknowns as numbers.
   double sigma_px = 0;
@@ -94,6 +91,13 @@ struct Adjusted {
   /// Observations whose part in the solve would change once more: which are outliers was decided
   /// again after each of four solves, and had not settled with the last. 0: it had.
   int unsettled = 0;
+};
+
+/// What a solve found.
+struct Adjusted : AdjustSummary {
+  Bundle bundle;
+  LensFreedom lens = LensFreedom::kFixed;
+  std::vector<bool> used;  ///< per observation: false for outliers and observations without a pixel
 };
 
 /// Minimises the sum over observations of |predicted - observed|^2, starting at `bundle`: under

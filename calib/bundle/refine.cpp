@@ -7,10 +7,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <nlohmann/json.hpp>
 
 #include "calib/bundle/covariance.h"
-#include "calib/bundle/covariance_json.h"
 #include "calib/bundle/held_out.h"
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
@@ -187,9 +185,10 @@ void Finish(const SfmModel& model, const RefineOptions& options, Refined& refine
   refined.model =
       ModelOf(refined.adjusted.bundle, model, options.separate_lenses, &refined.points_dropped);
   if (options.covariance) {
-    refined.covariance_json = ToJson(
+    refined.covariance = CovarianceReportOf(
         refined.adjusted, CovarianceOf(refined.adjusted, SolveOptions(options, refined.lens)));
   }
+  refined.solve = refined.adjusted;
   refined.adjusted.bundle = {};
   refined.changed = true;
 }
@@ -311,37 +310,6 @@ std::string RemarkOn(const Refined& refined) {
       "bundle adjustment: which observations are outliers did not settle: {} of {} would change "
       "with another solve",
       refined.adjusted.unsettled, refined.adjusted.used.size());
-}
-
-std::string ToJson(const Refined& refined) {
-  nlohmann::ordered_json json;
-  json["refined"] = refined.changed;
-  if (!refined.reason.empty()) json["reason"] = refined.reason;
-  if (refined.lens) json["lens"] = NameOf(*refined.lens);
-  json["held_out_observations"] = refined.held_out_observations;
-  json["given_px"] = refined.given_px;
-  json["adjusted_px"] = refined.adjusted_px;
-  json["candidates"] = nlohmann::ordered_json::array();
-  for (const RefineCandidate& c : refined.candidates) {
-    json["candidates"].push_back({{"name", c.name},
-                                  {"held_out_px", c.held_out_px},
-                                  {"low_px2", c.low_px2},
-                                  {"high_px2", c.high_px2},
-                                  {"principal_point_sigmas", c.principal_point_sigmas},
-                                  {"converged", c.converged}});
-  }
-  if (refined.changed) {
-    json["sigma_px"] = refined.adjusted.sigma_px;
-    json["rms_px"] = refined.adjusted.rms_px;
-    json["iterations"] = refined.adjusted.iterations;
-    json["converged"] = refined.adjusted.converged;
-    json["unsettled_observations"] = refined.adjusted.unsettled;
-    json["points_dropped"] = refined.points_dropped;
-  }
-  if (!refined.covariance_json.empty()) {
-    json["covariance"] = nlohmann::ordered_json::parse(refined.covariance_json);
-  }
-  return json.dump();
 }
 
 }  // namespace dtr::calib

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "calib/bundle/adjust.h"
+#include "calib/bundle/covariance_report.h"
 #include "calib/bundle/degeneracy.h"
 #include "calib/sfm_model.h"
 
@@ -17,7 +18,7 @@ struct RefineOptions {
   /// Lenses that are known, by camera id: they are held, and replace the model's.
   std::optional<std::map<std::uint32_t, LensCamera>> known_lenses;
   bool separate_lenses = false;  ///< every image a lens of its own
-  bool covariance = false;       ///< work out Refined::covariance_json
+  bool covariance = false;       ///< work out RefineReport::covariance
   /// What is known beside the observations, in the model's world and unit; `image` is an index into
   /// SfmModel::images. Held by every solve, those of the candidates, too.
   std::vector<PositionPrior> positions;
@@ -46,8 +47,8 @@ struct RefineCandidate {
   double principal_point_sigmas = 0;
 };
 
-struct Refined {
-  SfmModel model;        ///< the chosen one
+/// What refinement did, without the model: numbers for records.
+struct RefineReport {
   bool changed = false;  ///< false: the model is as it was given
   std::string reason;    ///< why nothing was changed; empty otherwise
   std::vector<RefineCandidate> candidates;
@@ -55,10 +56,15 @@ struct Refined {
       0;  ///< that the model as given and the adjusted one were compared on,
   double given_px = 0, adjusted_px = 0;  ///< root mean of Cauchy's loss over these
   std::optional<LensFreedom> lens;
-  Adjusted adjusted;  ///< of the chosen candidate, all observations; bundle emptied
-  /// Of that (covariance_json.h), where it was asked for and the model was changed.
-  std::string covariance_json;
+  AdjustSummary solve;  ///< of the chosen candidate, all observations; only where `changed`
   int points_dropped = 0;
+  /// Of that solve, where it was asked for and the model was changed.
+  std::optional<CovarianceReport> covariance;
+};
+
+struct Refined : RefineReport {
+  SfmModel model;     ///< the chosen one
+  Adjusted adjusted;  ///< of the chosen candidate, all observations; bundle emptied
 };
 
 /// Bundle adjustment of `model` where it pays. Cameras are adjusted to half of the points, without
@@ -106,6 +112,6 @@ std::string RemarkOn(const Refined& refined);
 /// JSON object: refined, reason, lens, candidates[].{name,held_out_px,converged},
 /// held_out_observations, given_px, adjusted_px, sigma_px, rms_px, iterations, converged,
 /// unsettled_observations, points_dropped, covariance (where asked for).
-std::string ToJson(const Refined& refined);
+std::string ToJson(const RefineReport& report);
 
 }  // namespace dtr::calib

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "dtr/base/error.h"
 #include "dtr/base/order_statistics.h"
@@ -160,20 +159,8 @@ RigRefined RefineRig(const SfmModel& model, const KnownRig& rig,
   }
   refined.model = ModelOf(refined.adjusted.bundle, known, false, &refined.points_dropped);
   refined.adjusted.bundle = {};
+  refined.solve = refined.adjusted;
   return refined;
-}
-
-std::string ToJson(const RigRefined& refined) {
-  const nlohmann::ordered_json json = {{"scale", refined.scale},
-                                       {"scale_spread", refined.scale_spread},
-                                       {"frames", refined.frames},
-                                       {"pairs", refined.pairs},
-                                       {"free_sigma_px", refined.free_sigma_px},
-                                       {"sigma_px", refined.adjusted.sigma_px},
-                                       {"rms_px", refined.adjusted.rms_px},
-                                       {"iterations", refined.adjusted.iterations},
-                                       {"points_dropped", refined.points_dropped}};
-  return json.dump();
 }
 
 }  // namespace dtr::calib

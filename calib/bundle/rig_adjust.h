@@ -36,14 +36,19 @@ struct RigPhoto {
   std::string frame;
 };
 
-struct RigRefined {
-  SfmModel model;           ///< in the rig's unit; its cameras are the rig's, ids from 1
+/// What RefineRig did, without the model: numbers for records.
+struct RigReport {
   double scale = 1;         ///< rig units per unit of the model that was given
   double scale_spread = 0;  ///< of single pairs of cameras: 1.4826 median deviation over the scale
   int frames = 0, pairs = 0;
   double free_sigma_px = 0;  ///< of the solve without the rig, lenses known
-  Adjusted adjusted;         ///< of the solve with it; bundle emptied
+  AdjustSummary solve;       ///< with it
   int points_dropped = 0;
+};
+
+struct RigRefined : RigReport {
+  SfmModel model;     ///< in the rig's unit; its cameras are the rig's, ids from 1
+  Adjusted adjusted;  ///< of the solve with the rig; bundle emptied
 };
 
 /// Poses and points of a model, given the lenses and places of a rig: lenses are held, the model is
@@ -56,9 +61,5 @@ struct RigRefined {
 RigRefined RefineRig(const SfmModel& model, const KnownRig& rig,
                      const std::map<std::string, RigPhoto>& photo_of,
                      const Progress* progress = nullptr);
-
-/// JSON object: scale, scale_spread, frames, pairs, free_sigma_px, sigma_px, rms_px,
-/// points_dropped.
-std::string ToJson(const RigRefined& refined);
 
 }  // namespace dtr::calib

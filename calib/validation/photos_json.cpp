@@ -1,48 +1,51 @@
-#include <cmath>
-#include <nlohmann/json.hpp>
-
-#include "calib/validation/photos.h"
+#include "calib/validation/report_json.h"
+#include "dtr/base/json_number.h"
 
 namespace dtr::calib {
 
-std::string ToJson(const PhotosValidation& judgement) {
-  using Json = nlohmann::ordered_json;
-  const auto number = [](double v) { return std::isfinite(v) ? Json(v) : Json(nullptr); };
+using Json = nlohmann::ordered_json;
+
+Json JsonOf(const PhotosValidation& judgement) {
   Json json;
   if (!judgement.not_validated.empty()) json["not_validated"] = judgement.not_validated;
   json["parts"] = judgement.parts;
   json["observations"] = judgement.observations;
-  json["sigma_px"] = number(judgement.sigma_px);
-  json["condition"] = number(judgement.condition);
-  json["halves_ratio"] = number(judgement.halves_ratio);
+  json["sigma_px"] = NumberOrNull(judgement.sigma_px);
+  json["condition"] = NumberOrNull(judgement.condition);
+  json["halves_ratio"] = NumberOrNull(judgement.halves_ratio);
   json["lenses"] = Json::array();
   for (const IntrinsicsValidation& lens : judgement.lenses) {
     Json params = Json::array();
     for (size_t k = 0; k < lens.names.size(); ++k) {
       params.push_back({{"name", lens.names[k]},
-                        {"stored", number(lens.stored[k])},
-                        {"fresh", number(lens.fresh[k])},
-                        {"sigma", number(lens.sigma[k])}});
+                        {"stored", NumberOrNull(lens.stored[k])},
+                        {"fresh", NumberOrNull(lens.fresh[k])},
+                        {"sigma", NumberOrNull(lens.sigma[k])}});
     }
-    json["lenses"].push_back({{"difference_sigmas", number(lens.sigmas)},
-                              {"moved_px", number(lens.moved_px)},
+    json["lenses"].push_back({{"difference_sigmas", NumberOrNull(lens.sigmas)},
+                              {"moved_px", NumberOrNull(lens.moved_px)},
                               {"params", params}});
   }
   json["cameras"] = Json::array();
   for (const PhotoValidation& camera : judgement.cameras) {
     json["cameras"].push_back({{"name", camera.name},
-                               {"difference_sigmas", number(camera.sigmas)},
-                               {"moved_px", number(camera.moved_px)},
-                               {"turn_sigma_rad", number(camera.turn_sigma_rad)},
-                               {"centre_sigma", number(camera.centre_sigma)},
-                               {"image_shift_px", number(camera.image_shift_px)}});
+                               {"difference_sigmas", NumberOrNull(camera.sigmas)},
+                               {"moved_px", NumberOrNull(camera.moved_px)},
+                               {"turn_sigma_rad", NumberOrNull(camera.turn_sigma_rad)},
+                               {"centre_sigma", NumberOrNull(camera.centre_sigma)},
+                               {"image_shift_px", NumberOrNull(camera.image_shift_px)}});
   }
   json["degeneracies"] = Json::array();
   for (const Degeneracy& d : judgement.degeneracies) {
     json["degeneracies"].push_back(
         {{"name", d.name}, {"detail", d.detail}, {"harmful", d.harmful}});
   }
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return json;
+}
+
+std::string ToJson(const PhotosValidation& judgement) {
+  // Names come from files, as in the reports beside this.
+  return JsonOf(judgement).dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 }  // namespace dtr::calib

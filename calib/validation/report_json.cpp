@@ -1,16 +1,13 @@
 #include "calib/validation/report_json.h"
 
-#include <cmath>
+#include "dtr/base/json_number.h"
 
 namespace dtr::calib {
 
-using Json = nlohmann::ordered_json;
-
-Json NumberOrNull(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-
-Json ToJsonValue(const ResidualStats& stats) {
-  const bool any = stats.count > 0;
-  const auto number = [any](double value) { return any ? NumberOrNull(value) : Json(nullptr); };
+nlohmann::ordered_json JsonOf(const ResidualStats& stats) {
+  const auto number = [any = stats.count > 0](double value) {
+    return any ? NumberOrNull(value) : nlohmann::ordered_json(nullptr);
+  };
   return {{"count", stats.count},
           {"rms_px", number(stats.rms_px)},
           {"median_px", number(stats.median_px)},
@@ -18,18 +15,6 @@ Json ToJsonValue(const ResidualStats& stats) {
           {"worst_px", number(stats.worst_px)},
           {"mean_x_px", number(stats.mean_px.x())},
           {"mean_y_px", number(stats.mean_px.y())}};
-}
-
-Json ToJsonValue(const std::vector<Check>& tests) {
-  Json json = Json::array();
-  for (const Check& test : tests) {
-    json.push_back({{"name", test.name},
-                    {"value", NumberOrNull(test.value)},
-                    {"limit", NumberOrNull(test.limit)},
-                    {"passed", test.passed},
-                    {"reason", test.reason}});
-  }
-  return json;
 }
 
 }  // namespace dtr::calib

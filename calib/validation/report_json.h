@@ -1,21 +1,20 @@
-// calib/validation/report_json.h -- internal to calib/validation: what the reports of all judges
-// write alike. For their .cpp files only: shows the JSON library.
+// calib/validation/report_json.h -- internal to this project: reports of validation as JSON
+// objects, to be put into larger ones; public headers have the structs.
 #pragma once
-#include <nlohmann/json.hpp>
-#include <vector>
+#include <nlohmann/json_fwd.hpp>
 
+#include "calib/validation/boards.h"
+#include "calib/validation/photos.h"
 #include "calib/validation/reprojection.h"
-#include "dtr/types/check.h"
 
 namespace dtr::calib {
 
-/// JSON has no NaN: what was not measured is null.
-nlohmann::ordered_json NumberOrNull(double value);
+/// As ToJson of the same struct (reprojection.h, boards.h, photos.h).
+nlohmann::ordered_json JsonOf(const ValidationReport& report);
+nlohmann::ordered_json JsonOf(const BoardValidation& report);
+nlohmann::ordered_json JsonOf(const PhotosValidation& report);
 
 /// {count,rms_px,median_px,p95_px,worst_px,mean_x_px,mean_y_px}; nulls where count is 0.
-nlohmann::ordered_json ToJsonValue(const ResidualStats& stats);
-
-/// [{name,value,limit,passed,reason}].
-nlohmann::ordered_json ToJsonValue(const std::vector<Check>& tests);
+nlohmann::ordered_json JsonOf(const ResidualStats& stats);
 
 }  // namespace dtr::calib

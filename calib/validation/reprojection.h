@@ -54,10 +54,6 @@ struct ValidationReport {
   /// Held-out cameras without a single observation, as --holdout-strict stores them: nothing here
   /// can test them, and nothing is asked of them; what they saw judges the set (`dtr evaluate`).
   std::vector<std::string> kept_apart;
-  std::string adjustment_json;  ///< what a fresh bundle adjustment says (bundle/judge.h); may be ""
-  std::string cross_depth_json;  ///< depth held against depth (eval/cross_depth.h); may be ""
-  /// Why no fresh bundle adjustment judged it; empty where one did.
-  std::string not_validated;
   bool passed() const { return AllPassed(tests); }
 };
 
@@ -88,9 +84,8 @@ ValidationReport ValidateReprojection(std::span<const PinholeCamera> cameras,
 
 /// JSON object: passed, tests[].{name,value,limit,passed,reason},
 /// cameras[].{name,held_out,stored,short_tracks,weak_geometry,impossible}, held_out, stored,
-/// regions[9], untested[], kept_apart[], adjustment and cross_depth {views[], all} (where there are
-/// such); residuals as
-/// {count,rms_px,median_px,p95_px,worst_px,mean_x_px, mean_y_px}.
+/// regions[9], untested[], kept_apart[]; residuals as
+/// {count,rms_px,median_px,p95_px,worst_px,mean_x_px,mean_y_px}.
 std::string ToJson(const ValidationReport& report);
 
 }  // namespace dtr::calib

@@ -1,52 +1,47 @@
 #include "dtr/eval/json.h"
 
-#include <cmath>
-#include <nlohmann/json.hpp>
-
 #include "dtr/eval/metrics.h"
+#include "dtr/eval/report_json.h"
+#include "dtr/types/check_json.h"
 
 namespace dtr::eval {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// JSON has neither NaN nor infinity.
-Json Number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-Json Number(const std::optional<double>& value) { return value ? Number(*value) : Json(nullptr); }
-
 Json Value(const ViewScore& score) {
   return {{"name", score.name},
-          {"psnr_db", Number(score.psnr_db)},
-          {"psnr_covered_db", Number(score.psnr_covered_db)},
-          {"psnr_own_depth_db", Number(score.psnr_own_depth_db)},
+          {"psnr_db", NumberOrNull(score.psnr_db)},
+          {"psnr_covered_db", NumberOrNull(score.psnr_covered_db)},
+          {"psnr_own_depth_db", NumberOrNull(score.psnr_own_depth_db)},
           {"identical", IdenticalFigures({{"psnr_db", score.psnr_db},
                                           {"psnr_covered_db", score.psnr_covered_db},
                                           {"psnr_own_depth_db", score.psnr_own_depth_db}})},
-          {"ssim", Number(score.ssim)},
-          {"coverage", Number(score.coverage)},
+          {"ssim", NumberOrNull(score.ssim)},
+          {"coverage", NumberOrNull(score.coverage)},
           {"views_used", score.views_used},
-          {"render_ms", Number(score.render_ms)}};
+          {"render_ms", NumberOrNull(score.render_ms)}};
 }
 
 Json Value(const DepthScores& s) {
-  return {{"share_within_1pct", Number(s.share_within_1pct)},
-          {"share_within_2pct", Number(s.share_within_2pct)},
-          {"share_within_half_px", Number(s.share_within_half_px)},
-          {"share_within_1px", Number(s.share_within_1px)},
-          {"share_within_2px", Number(s.share_within_2px)},
-          {"median_relative_error", Number(s.median_relative_error)},
-          {"outlier_share", Number(s.outlier_share)},
-          {"outlier_share_5pct", Number(s.outlier_share_5pct)},
-          {"depth_completeness", Number(s.depth_completeness)},
-          {"share_estimated_without_truth", Number(s.share_estimated_without_truth)},
-          {"edge_displacement_px", Number(s.edges.displacement_px)},
-          {"edge_fattening_px", Number(s.edges.fattening_px)},
-          {"edges_found_share", Number(s.edges.found_share)},
-          {"share_within_1_sigma", Number(s.sigma.share_within_1_sigma)},
-          {"share_within_2_sigma", Number(s.sigma.share_within_2_sigma)},
-          {"share_within_3_sigma", Number(s.sigma.share_within_3_sigma)},
-          {"sparsification_ratio", Number(s.sigma.sparsification_ratio)},
-          {"sparsification_ratio_if_normal", Number(s.sigma.sparsification_ratio_if_normal)},
+  return {{"share_within_1pct", NumberOrNull(s.share_within_1pct)},
+          {"share_within_2pct", NumberOrNull(s.share_within_2pct)},
+          {"share_within_half_px", NumberOrNull(s.share_within_half_px)},
+          {"share_within_1px", NumberOrNull(s.share_within_1px)},
+          {"share_within_2px", NumberOrNull(s.share_within_2px)},
+          {"median_relative_error", NumberOrNull(s.median_relative_error)},
+          {"outlier_share", NumberOrNull(s.outlier_share)},
+          {"outlier_share_5pct", NumberOrNull(s.outlier_share_5pct)},
+          {"depth_completeness", NumberOrNull(s.depth_completeness)},
+          {"share_estimated_without_truth", NumberOrNull(s.share_estimated_without_truth)},
+          {"edge_displacement_px", NumberOrNull(s.edges.displacement_px)},
+          {"edge_fattening_px", NumberOrNull(s.edges.fattening_px)},
+          {"edges_found_share", NumberOrNull(s.edges.found_share)},
+          {"share_within_1_sigma", NumberOrNull(s.sigma.share_within_1_sigma)},
+          {"share_within_2_sigma", NumberOrNull(s.sigma.share_within_2_sigma)},
+          {"share_within_3_sigma", NumberOrNull(s.sigma.share_within_3_sigma)},
+          {"sparsification_ratio", NumberOrNull(s.sigma.sparsification_ratio)},
+          {"sparsification_ratio_if_normal", NumberOrNull(s.sigma.sparsification_ratio_if_normal)},
           {"outlier_share_by_tenth", s.sigma.outlier_share_by_tenth},
           {"truth_pixels", s.truth_pixels},
           {"kept_pixels", s.kept_pixels}};
@@ -58,20 +53,8 @@ Json Value(const CrossDepthOfView& view) {
           {"compared", view.compared},
           {"occluded", view.occluded},
           {"contradicted", view.contradicted},
-          {"median_px", any ? Number(view.median_px) : Json(nullptr)},
-          {"p95_px", any ? Number(view.p95_px) : Json(nullptr)}};
-}
-
-Json Value(const std::vector<Check>& tests) {
-  Json list = Json::array();
-  for (const Check& test : tests) {
-    list.push_back({{"name", test.name},
-                    {"value", Number(test.value)},
-                    {"limit", Number(test.limit)},
-                    {"passed", test.passed},
-                    {"reason", test.reason}});
-  }
-  return list;
+          {"median_px", any ? NumberOrNull(view.median_px) : Json(nullptr)},
+          {"p95_px", any ? NumberOrNull(view.p95_px) : Json(nullptr)}};
 }
 
 /// Names come from files: bytes that are no UTF-8 must not make the whole report unreadable.
@@ -97,18 +80,20 @@ std::string ToJson(const EvaluationReport& report, const std::optional<DepthScor
 
 std::string ToJson(const DepthScores& scores) { return Text(Value(scores)); }
 
-std::string ToJson(const CrossDepthReport& report) {
+Json JsonOf(const CrossDepthReport& report) {
   Json json;
   json["passed"] = report.passed();
-  json["tests"] = Value(report.tests);
+  json["tests"] = dtr::JsonOf(report.tests);
   json["views"] = Json::array();
   for (const CrossDepthOfView& view : report.views) json["views"].push_back(Value(view));
   json["all"] = Value(report.all);
-  return Text(json);
+  return json;
 }
 
+std::string ToJson(const CrossDepthReport& report) { return Text(JsonOf(report)); }
+
 std::string VerdictJson(const std::vector<Check>& tests) {
-  return Text({{"passed", AllPassed(tests)}, {"tests", Value(tests)}}, -1);
+  return Text({{"passed", AllPassed(tests)}, {"tests", dtr::JsonOf(tests)}}, -1);
 }
 
 }  // namespace dtr::eval
