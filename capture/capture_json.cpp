@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "capture/contents_json.h"
 #include "dtr/base/error.h"
 #include "dtr/base/file_names.h"
 #include "dtr/io/json_fields.h"
@@ -255,8 +256,8 @@ std::string CaptureToJson(const Capture& capture) {
   for (const Remark& remark : capture.remarks) {
     json["remarks"].push_back({{"name", remark.name}, {"text", remark.text}});
   }
-  json["contents"] = Json::parse(JsonOf(capture.contents));  // for people and other programs
-  return json.dump(1) + "\n";
+  json["contents"] = JsonOf(capture.contents);  // for people and other programs
+  return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 Capture CaptureFromJson(std::string_view text, const std::string& source) {

@@ -1,7 +1,6 @@
 #include "capture/contents.h"
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
 namespace dtr::capture {
 namespace {
@@ -58,26 +57,6 @@ std::string LineOf(const FolderContents& contents) {
     line += ")";
   }
   return line;
-}
-
-std::string JsonOf(const FolderContents& contents) {
-  nlohmann::ordered_json json{
-      {"photos", contents.photos},         {"masks", contents.masks},
-      {"depth_maps", contents.depth_maps}, {"videos", contents.videos},
-      {"cameras", contents.cameras},       {"ignored", nlohmann::ordered_json::array()}};
-  for (const Ignored& ignored : contents.ignored) {
-    json["ignored"].push_back({{"kind", ignored.kind},
-                               {"files", ignored.files},
-                               {"where", ignored.where},
-                               {"reason", ignored.reason}});
-  }
-  return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
-}
-
-std::string JsonWith(const FolderContents& contents, const std::string& json_object) {
-  auto json = nlohmann::ordered_json::parse(json_object);
-  json["contents"] = nlohmann::ordered_json::parse(JsonOf(contents));
-  return json.dump(1);
 }
 
 }  // namespace dtr::capture

@@ -1,4 +1,4 @@
-// capture/contents.h -- what a folder of photos holds, in one line and in JSON.
+// capture/contents.h -- what a folder of photos holds, and that in one line.
 #pragma once
 #include <string>
 #include <vector>
@@ -32,10 +32,5 @@ struct FolderContents {
 
 /// "4 photos of 1 camera, 4 masks; ignored: reduced copies (8: images_2/, images_4/), ...".
 std::string LineOf(const FolderContents& contents);
-
-/// The same as a JSON object.
-std::string JsonOf(const FolderContents& contents);
-/// A JSON object with a field "contents" at its end.
-std::string JsonWith(const FolderContents& contents, const std::string& json_object);
 
 }  // namespace dtr::capture

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
 #include "cli/number_checks.h"
 #include "cli/option_names.h"
@@ -69,6 +70,10 @@ void Context::EmitJson(const std::string& json) const {
   } else {
     WriteFileAtomically(common.json_target, json_text + "\n");
   }
+}
+
+void Context::EmitJson(const nlohmann::ordered_json& json, int indent) const {
+  EmitJson(json.dump(indent, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
 }
 
 void AddMemoryOption(CLI::App& command, double& memory_gb, const std::string& description) {

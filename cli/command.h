@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "cli/console.h"
@@ -24,6 +25,9 @@ struct Context {
   Console& console;
   /// Writes the machine-readable result where --json asked for it; nothing without --json.
   void EmitJson(const std::string& json_text) const;
+  /// Prints it, with `indent` spaces a level (-1: on one line). Names come from files: bytes that
+  /// are no UTF-8 are replaced, so that they do not make the whole result unreadable.
+  void EmitJson(const nlohmann::ordered_json& json, int indent = 1) const;
 };
 
 /// Exit codes of the command line.

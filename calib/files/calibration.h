@@ -75,10 +75,6 @@ Calibration ReadCalibration(const std::filesystem::path& file);
 /// Writes a .json file, atomically. Doubles read back exactly.
 void WriteCalibration(const std::filesystem::path& file, const Calibration& calibration);
 
-/// The camera, views (name, RMS, corner count, outliers) and models as JSON for --json: the same
-/// field names, without the observations.
-std::string SummaryJson(const Calibration& calibration);
-
 /// Largest calibration file that is read: 100 000 views of 50 corners.
 inline constexpr std::uintmax_t kLargestCalibrationBytes = 256u << 20;
 

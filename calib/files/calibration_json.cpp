@@ -7,9 +7,11 @@
 
 #include "calib/files/calibration.h"
 #include "calib/files/camera_fields.h"
+#include "calib/files/summary_json.h"
 #include "calib/lens_map.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
+#include "dtr/base/json_number.h"
 #include "dtr/io/json_fields.h"
 
 namespace dtr::calib {
@@ -22,9 +24,6 @@ constexpr const char* kFormat = "dtr-calibration";
 constexpr int kVersion = 1;
 constexpr double kSymmetric = 1e-9;  // relative; written exactly, so rounding alone
 constexpr double kRotation = 1e-6;   // R^T R = I, as for every pose file (CONVENTIONS.md)
-
-/// JSON has no NaN: what was not measured is null.
-Json Number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 Json ParamsJson(const CalibratedCamera& camera) {
   const auto names = FreeParameterNames(camera.model);
@@ -83,7 +82,7 @@ Json ViewJson(const CalibratedView& view) {
   Json json{{"name", view.seen.name},
             {"camera", view.camera},
             {"frame", view.frame},
-            {"noise_px", Number(view.seen.noise_px)},
+            {"noise_px", NumberOrNull(view.seen.noise_px)},
             {"cam_from_board", PoseJson(view.cam_from_board)},
             {"corners", corners},
             {"outliers", view.outliers}};
@@ -330,7 +329,7 @@ Calibration ReadCalibration(const std::filesystem::path& file) {
   return calibration;
 }
 
-std::string SummaryJson(const Calibration& calibration) {
+Json SummaryJson(const Calibration& calibration) {
   Json json{{"board", TextOf(calibration.board)}};
   json["cameras"] = Json::array();
   for (const auto& camera : calibration.cameras) json["cameras"].push_back(CameraJson(camera));
@@ -341,8 +340,8 @@ std::string SummaryJson(const Calibration& calibration) {
                              {"camera", view.camera},
                              {"frame", view.frame},
                              {"corners", view.seen.corners.size()},
-                             {"rms_px", Number(ViewRmsPx(calibration, view))},
-                             {"noise_px", Number(view.seen.noise_px)},
+                             {"rms_px", NumberOrNull(ViewRmsPx(calibration, view))},
+                             {"noise_px", NumberOrNull(view.seen.noise_px)},
                              {"outliers", view.outliers}});
     AddRotation(view, json["views"].back());
     rotated.Add(view.seen.rotation);
@@ -351,8 +350,7 @@ std::string SummaryJson(const Calibration& calibration) {
                             {"counterclockwise", rotated.counterclockwise}};
   json["models"] = ModelsJson(calibration.models);
   json["left_out"] = LeftOutJson(calibration.left_out);
-  // Names come from files: bytes that are no UTF-8 must not make the whole summary unreadable.
-  return json.dump(1, ' ', false, Json::error_handler_t::replace);
+  return json;
 }
 
 }  // namespace dtr::calib

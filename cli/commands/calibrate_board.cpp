@@ -3,8 +3,11 @@
 
 #include <cmath>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
+#include "calib/files/summary_json.h"
 #include "calib/models/board_model.h"
+#include "capture/contents_json.h"
 #include "cli/command.h"
 #include "cli/output_file.h"
 #include "dtr/base/error.h"
@@ -108,7 +111,9 @@ int RunCalibrateBoard(const CalibrateBoardArguments& options, const Context& con
   for (const fs::path& output : options.outputs) pipeline::WriteCameraFile(output, calibration);
   SayModels(calibration, context.console);
   SayCamera(calibration, context.console);
-  context.EmitJson(capture::JsonWith(photos.contents, calib::SummaryJson(calibration)));
+  nlohmann::ordered_json json = calib::SummaryJson(calibration);
+  json["contents"] = capture::JsonOf(photos.contents);
+  context.EmitJson(json);
   return kDone;
 }
 

@@ -3,8 +3,11 @@
 
 #include <cmath>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
+#include "calib/files/summary_json.h"
 #include "calib/validation/boards.h"
+#include "capture/contents_json.h"
 #include "cli/command.h"
 #include "cli/output_file.h"
 #include "dtr/base/error.h"
@@ -135,7 +138,9 @@ int RunCalibrateRig(const CalibrateRigArguments& options, const Context& context
   for (const fs::path& output : options.outputs) pipeline::WriteRigFile(output, calibration);
   SayRig(calibration, summary, context.console);
   SayDelays(calibration, summary, context.console);
-  context.EmitJson(capture::JsonWith(photos.contents, calib::SummaryJson(calibration)));
+  nlohmann::ordered_json json = calib::SummaryJson(calibration);
+  json["contents"] = capture::JsonOf(photos.contents);
+  context.EmitJson(json);
   return kDone;
 }
 

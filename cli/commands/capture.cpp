@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "capture/capture.h"
+#include "capture/contents_json.h"
 #include "cli/command.h"
 #include "cli/video_options.h"
 #include "dtr/base/error.h"
@@ -49,7 +50,7 @@ Json ToJson(const capture::Photo& photo) {
   return json;
 }
 
-std::string ToJson(const capture::Capture& capture) {
+Json ToJson(const capture::Capture& capture) {
   Json json;
   json["photos"] = Json::array();
   for (const auto& photo : capture.photos) json["photos"].push_back(ToJson(photo));
@@ -61,8 +62,8 @@ std::string ToJson(const capture::Capture& capture) {
   for (const auto& remark : capture.remarks) {
     json["remarks"].push_back({{"name", remark.name}, {"text", remark.text}});
   }
-  json["contents"] = Json::parse(capture::JsonOf(capture.contents));
-  return json.dump(1);
+  json["contents"] = capture::JsonOf(capture.contents);
+  return json;
 }
 
 std::vector<capture::Fault> FaultsIn(const std::vector<std::string>& names) {

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "capture/contents_json.h"
 #include "capture/ingest.h"
 #include "cli/command.h"
 #include "datasets/convert/convert.h"
@@ -145,8 +146,8 @@ void AddConvert(CLI::App& dataset) {
                  context.console.Say(fmt::format(
                      "{}: cameras.json and images/ (and depth/, masks/ where the set has them)",
                      options->output.string()));
-                 context.EmitJson(capture::JsonWith(
-                     contents, Json{{"folder", options->output.string()}}.dump()));
+                 context.EmitJson(Json{{"folder", options->output.string()},
+                                       {"contents", capture::JsonOf(contents)}});
                  return kDone;
                };
              });

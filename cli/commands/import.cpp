@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "capture/contents_json.h"
 #include "cli/command.h"
 #include "cli/number_checks.h"
 
@@ -24,6 +25,7 @@ Json ResultJson(const pipeline::ImportReport& report) {
   for (const auto& [name, reason] : report.skipped) {
     json["skipped"].push_back({{"name", name}, {"reason", reason}});
   }
+  json["contents"] = capture::JsonOf(report.contents);
   return json;
 }
 
@@ -36,7 +38,7 @@ int RunImport(pipeline::ImportRequest request, const std::string& depth_kind,
   const pipeline::ImportReport report = pipeline::Import(request, context.console);
   context.console.Say(fmt::format("{}: {} views, {} held out", request.output.string(),
                                   report.views, report.held_out));
-  context.EmitJson(capture::JsonWith(report.contents, ResultJson(report).dump()));
+  context.EmitJson(ResultJson(report));
   return kDone;
 }
 

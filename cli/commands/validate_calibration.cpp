@@ -6,6 +6,7 @@
 
 #include "calib/boards/board.h"
 #include "calib/boards/length.h"
+#include "calib/validation/report_json.h"
 #include "cli/output_file.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
@@ -131,9 +132,9 @@ int RunValidateCalibration(const ValidateCalibrationOptions& options, const Cont
                                                   options.images));
     context.console.Say("report: " + options.report->string());
   }
-  auto json = nlohmann::ordered_json::parse(calib::ToJson(report));
+  nlohmann::ordered_json json = calib::JsonOf(report);
   json["skipped"] = skipped;
-  context.EmitJson(json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  context.EmitJson(json, -1);
   return report.passed() ? kDone : kFailed;
 }
 

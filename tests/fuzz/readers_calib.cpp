@@ -1,6 +1,9 @@
 // Calibrations, captures, and what a run keeps between its stages.
+#include <nlohmann/json.hpp>
+
 #include "calib/files/calibration.h"
 #include "calib/files/opencv_yaml.h"
+#include "calib/files/summary_json.h"
 #include "calib/models/board_model.h"
 #include "capture/capture_json.h"
 #include "capture/photo.h"
@@ -41,7 +44,7 @@ Reader OpenCalibration(const fs::path& folder) {
     calib::WriteCalibration(file, SomeCalibration(model));
     seeds.push_back(ReadFile(file, kSeedLimitBytes));
   }
-  return {file, seeds, [=] { calib::SummaryJson(calib::ReadCalibration(file)); }};
+  return {file, seeds, [=] { (void)calib::SummaryJson(calib::ReadCalibration(file)); }};
 }
 
 Reader OpenYaml(const fs::path& folder) {
