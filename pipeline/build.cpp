@@ -22,17 +22,17 @@
 #include "pipeline/capture.h"
 #include "pipeline/detail/depth/depth_engine.h"
 #include "pipeline/detail/depth/depth_stage.h"
-#include "pipeline/detail/depth/effort_json.h"
 #include "pipeline/detail/pages/set_page.h"
 #include "pipeline/detail/photos/holdout.h"
 #include "pipeline/detail/photos/input_hash.h"
-#include "pipeline/detail/photos/model_grid.h"
 #include "pipeline/detail/photos/undistort_photos.h"
+#include "pipeline/detail/reports/build_json.h"
 #include "pipeline/detail/run/build_options.h"
 #include "pipeline/detail/run/finishing.h"
 #include "pipeline/detail/run/force_stage.h"
 #include "pipeline/detail/run/recorded_notes.h"
 #include "pipeline/detail/run/run_log.h"
+#include "pipeline/model_grid.h"
 #include "pipeline/validate.h"
 
 namespace dtr::pipeline {
@@ -44,25 +44,6 @@ std::vector<std::string> NamesOf(const capture::Capture& capture) {
   std::vector<std::string> names;
   for (const capture::Photo& photo : capture.photos) names.push_back(photo.name);
   return names;
-}
-
-Json OptionsJson(const BuildOptions& options, const stereo::Effort& effort) {
-  // Everything that can change a byte of the set, and nothing else: threads and memory do not.
-  Json json = SettingsJson(options.depth.engine, effort);
-  json["max_size_px"] = options.max_size_px;
-  json["holdout"] = options.holdout;
-  json["holdout_strict"] = options.holdout_strict;
-  json["poses"] = options.poses.filename().string();
-  json["refine"] = options.refine;
-  if (options.keep_duplicates) json["keep_duplicates"] = true;
-  if (!options.rig.empty()) json["rig"] = options.rig.filename().string();
-  if (options.metres.any()) json["metres"] = Json::parse(ToJson(options.metres));
-  SfmChoice plain;
-  plain.features = colmap::kMaxFeatures;
-  if (options.sfm != plain) json["sfm"] = Json::parse(ToJson(options.sfm));
-  json["seed"] = options.seed;
-  if (options.depth.depth_error_px) json["depth_error_px"] = *options.depth.depth_error_px;
-  return json;
 }
 
 // Photos by name, size and content: equal values mean the same input. Hashes of held-out photos are
@@ -186,35 +167,12 @@ void RequireTwoSources(const capture::Capture& capture, const std::vector<bool>&
                   sources, calibrated.not_registered.size()));
 }
 
-Json ProvenanceJson(const BuildOptions& options, const Json& option_values, const Json& photos,
-                    const CalibratedPhotos& calibrated, const BuildReport& report) {
-  Json provenance;
-  provenance["tool"] = "dtr";
-  provenance["tool_version"] = DTR_VERSION;
-  provenance["calibration"] = Json::parse(calibrated.report_json);
-  provenance["calibration"]["engine"] = calibrated.engine;
-  if (!calibrated.scale_json.empty()) {
-    provenance["scale"] = Json::array({Json::parse(calibrated.scale_json)});
-  }
-  provenance["depth_engine"] = options.depth.engine;
-  provenance["options"] = option_values;
-  provenance["photos"] = photos;
-  provenance["not_registered"] = report.not_registered;
-  provenance["held_out_not_registered"] = report.held_out_not_registered;
-  provenance["skipped"] = Json::array();
-  for (const auto& [name, reason] : report.skipped) {
-    provenance["skipped"].push_back({{"name", name}, {"reason", reason}});
-  }
-  return provenance;
-}
-
 // The reprojection tests of every calibrated photo, held-out ones included.
-calib::ValidationReport Validate(const std::filesystem::path& folder, DtrSet& set,
-                                 const SparseScene& sparse, double memory_gb, BuildReport& report,
-                                 int threads, Progress& progress) {
+SetValidation Validate(const std::filesystem::path& folder, DtrSet& set, const SparseScene& sparse,
+                       double memory_gb, BuildReport& report, int threads, Progress& progress) {
   SetLimits limits;
   limits.memory_gb = std::min(limits.memory_gb, memory_gb);
-  calib::ValidationReport validation = ValidateSet(folder, set, sparse, limits, threads, progress);
+  SetValidation validation = ValidateSet(folder, set, sparse, limits, threads, progress);
   report.validated = true;
   report.validation_passed = validation.passed();
   set.verdict_json = eval::VerdictJson(validation.tests);
@@ -234,52 +192,6 @@ void AdviseOn(const std::filesystem::path& folder, DtrSet set, BuildReport& repo
   advise::AdviseOptions options;
   options.threads = threads;
   report.coverage = AdviceLines(advise::Advise(views, options, progress));
-}
-
-Json ScreeningJson(const BuildReport& report) {
-  Json json = Json::array();
-  for (const auto& [name, remarks] : report.screening) {
-    json.push_back({{"name", name}, {"remarks", remarks}});
-  }
-  return json;
-}
-
-Json ReportJson(const BuildReport& report, const CalibratedPhotos& calibrated, const RunLog& log,
-                const std::filesystem::path& output) {
-  Json json;
-  json["set"] = output.string();
-  json["views"] = Json::array();
-  for (const View& view : report.set.frames.front().views) {
-    json["views"].push_back({{"name", view.name},
-                             {"role", NameOf(view.role)},
-                             {"width_px", view.camera.width_px()},
-                             {"height_px", view.camera.height_px()}});
-  }
-  json["not_registered"] = report.not_registered;
-  json["why_not_registered"] = report.why_not_registered;
-  json["skipped"] = Json::array();
-  for (const auto& [name, reason] : report.skipped) {
-    json["skipped"].push_back({{"name", name}, {"reason", reason}});
-  }
-  json["remarks"] = Json::array();
-  for (const auto& [name, text] : report.remarks) {
-    json["remarks"].push_back({{"name", name}, {"text", text}});
-  }
-  json["contents"] = Json::parse(capture::JsonOf(report.contents));
-  json["screening"] = ScreeningJson(report);
-  const Json calibration = Json::parse(calibrated.report_json);
-  if (calibration.contains("camera_sharing")) {
-    json["camera_sharing"] = calibration["camera_sharing"];
-  }
-  json["coverage"] = report.coverage;
-  json["validation_passed"] = report.validated ? Json(report.validation_passed) : Json(nullptr);
-  json["stages"] = Json::array();
-  for (const io::RunStage& stage : log.stages()) {
-    json["stages"].push_back(
-        {{"name", stage.name}, {"wall_s", stage.wall_s}, {"cpu_s", stage.cpu_s}});
-  }
-  json["peak_memory_mib"] = static_cast<double>(PeakMemoryBytesWithPrograms()) / (1 << 20);
-  return json;
 }
 
 // One line about what screening found, if it found anything.
@@ -377,21 +289,19 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
   is_source.flip();
 
   log.Begin("calibration");
+  CalibrateOptions calibrate;
+  calibrate.poses = options.poses;
+  calibrate.held_out = held_out;
+  calibrate.strict = options.holdout_strict;
+  calibrate.threads = options.threads;
+  calibrate.seed = options.seed;
+  calibrate.memory_gb = memory_gb;
+  calibrate.refine = options.refine;
+  calibrate.rig = rig;
+  calibrate.metres = options.metres;
+  calibrate.sfm = options.sfm;
   const CalibratedPhotos calibrated =
-      CalibratePhotos(photos,
-                      {options.poses,
-                       held_out,
-                       options.holdout_strict,
-                       options.threads,
-                       options.seed,
-                       memory_gb,
-                       options.refine,
-                       {},
-                       rig,
-                       options.metres,
-                       {},
-                       options.sfm},
-                      writer.work_folder() / "calibration", progress);
+      CalibratePhotos(photos, calibrate, writer.work_folder() / "calibration", progress);
   log.AddEarlier(calibrated.earlier_wall_s, calibrated.earlier_cpu_s);
   report.not_registered = calibrated.not_registered;
   report.why_not_registered = calibrated.why_not_registered;
@@ -426,12 +336,16 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
   set.provenance_json = ProvenanceJson(options, OptionsJson(options, spent),
                                        PhotosJson(photos, is_source), calibrated, report)
                             .dump();
-  const calib::ValidationReport validation =
+  const SetValidation validation =
       Validate(writer.folder(), set, sparse, memory_gb, report, options.threads, progress);
   writer.WriteSparse(set, sparse);
   WriteSetPage(writer, set,
-               {options.output.stem().string(), options.depth.engine, validation.tests,
-                report.skipped, report.not_registered.size(), options.threads},
+               {.name = options.output.stem().string(),
+                .engine = options.depth.engine,
+                .checks = validation.tests,
+                .skipped = report.skipped,
+                .not_registered = report.not_registered.size(),
+                .threads = options.threads},
                progress);
   AdviseOn(writer.folder(), set, report, options.threads, progress);
   log.End();
@@ -442,7 +356,10 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
   io::WriteRunRecord(writer.folder(), record);
   writer.Finish(set);
   report.set = std::move(set);
-  report.json = ReportJson(report, calibrated, log, options.output).dump(1);
+  report.written = options.output;
+  report.calibration = calibrated.report;
+  report.stages = log.stages();
+  report.peak_memory_mib = static_cast<double>(PeakMemoryBytesWithPrograms()) / (1 << 20);
   return report;
 }
 

@@ -8,7 +8,9 @@
 
 #include "capture/video/ingest_video.h"
 #include "dtr/base/progress.h"
+#include "dtr/io/set_io.h"
 #include "dtr/types/dtr_set.h"
+#include "pipeline/calibration_report.h"
 #include "pipeline/depth_settings.h"
 #include "pipeline/metres.h"
 #include "pipeline/sfm_settings.h"
@@ -50,8 +52,20 @@ struct BuildReport {
   std::vector<std::pair<std::string, std::vector<std::string>>> screening;
   bool validated = false, validation_passed = false;
   std::vector<std::string> coverage;  ///< what the capture lacks, in words; empty without depth
-  std::string json;                   ///< for --json
+  std::filesystem::path written;      ///< the set
+  CalibrationReport calibration;
+  std::vector<io::RunStage> stages;  ///< what each cost
+  double peak_memory_mib = 0;        ///< with COLMAP's
 };
+
+/// JSON object: set, views[].{name,role,width_px,height_px}, not_registered[], why_not_registered,
+/// skipped[], remarks[], contents, screening[], camera_sharing (where folders were compared),
+/// coverage[], validation_passed (null: not validated), stages[], peak_memory_mib.
+std::string ToJson(const BuildReport& report);
+
+/// What BuildOptions::force_stage may be: the stages of which a build keeps something between runs,
+/// in their order.
+std::vector<std::string> StagesKept();
 
 /// Builds a set. Continues an interrupted run of the same input and options; throws UsageError when
 /// the output exists (without force) or belongs to another run.

@@ -10,16 +10,18 @@
 #include "calib/colmap/model_io.h"
 #include "calib/colmap/program.h"
 #include "calib/colmap/sfm.h"
+#include "capture/contents_json.h"
 #include "capture/sfm_images.h"
 #include "dtr/base/error.h"
 #include "pipeline/detail/cameras/known_poses.h"
 #include "pipeline/detail/photos/exif_focal.h"
+#include "pipeline/detail/reports/calibration_json.h"
+#include "pipeline/detail/reports/text.h"
 
 namespace dtr::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
 
 // The photos with `wanted[i]`, in their order.
 capture::Capture Subset(const capture::Capture& capture, const std::vector<bool>& wanted) {
@@ -30,18 +32,14 @@ capture::Capture Subset(const capture::Capture& capture, const std::vector<bool>
   return subset;
 }
 
-// What can be told about an SfM run without times and paths, so that equal runs stay equal.
-Json SfmJson(const colmap::SfmReport& report, const calib::SfmModel& model) {
-  Json json;
-  json["mean_reprojection_error_px"] = report.mean_reprojection_error_px;
-  json["images_per_model"] = report.images_per_model;
-  if (!report.lack_of_parallax.empty()) json["lack_of_parallax"] = report.lack_of_parallax;
-  if (report.forward_motion) json["forward_motion"] = true;
-  json["feature_image_size_px"] = report.max_image_size_px;
-  json["points"] = model.points.size();
-  json["lens_model"] =
-      model.cameras.empty() ? "" : calib::NameOf(model.cameras.begin()->second.model);
-  return json;
+SfmSummary SummaryOf(const colmap::SfmReport& report, const calib::SfmModel& model) {
+  return {.mean_reprojection_error_px = report.mean_reprojection_error_px,
+          .images_per_model = report.images_per_model,
+          .lack_of_parallax = report.lack_of_parallax,
+          .forward_motion = report.forward_motion,
+          .feature_image_size_px = report.max_image_size_px,
+          .lens_model =
+              model.cameras.empty() ? "" : calib::NameOf(model.cameras.begin()->second.model)};
 }
 
 CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions& options,
@@ -59,8 +57,13 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
   colmap::SfmResult sfm =
       colmap::RunSfm(workspace / "photos", inputs, workspace / "sfm", sfm_options, progress);
 
-  PhotoRefinement refined =
-      RefineSfm({capture, options, groups, inputs, sfm_options, workspace}, sfm, progress);
+  PhotoRefinement refined = RefineSfm({.capture = capture,
+                                       .options = options,
+                                       .groups = groups,
+                                       .inputs = inputs,
+                                       .sfm_options = sfm_options,
+                                       .workspace = workspace},
+                                      sfm, progress);
   CalibratedPhotos calibrated;
   calibrated.engine = sfm.report.version;
   calibrated.why_not_registered = sfm.report.why_not_registered;
@@ -70,15 +73,14 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
     calibrated.earlier_cpu_s += step.cpu_s;
     calibrated.earlier_wall_s += step.wall_s;
   }
-  Json report = SfmJson(sfm.report, sfm.model);
-  report.update(Json::parse(refined.report_json));
+  calibrated.report = std::move(refined.report);
+  calibrated.report.sfm = SummaryOf(sfm.report, sfm.model);
+  calibrated.report.points = sfm.model.points.size();
   calibrated.kept_refinement_cpu_s = refined.earlier_cpu_s;
   calibrated.earlier_cpu_s += refined.earlier_cpu_s;
   calibrated.earlier_wall_s += refined.earlier_wall_s;
   calibrated.model = std::move(refined.model);
   calibrated.unit = refined.unit;
-  calibrated.scale_json = std::move(refined.scale_json);
-  calibrated.report_json = report.dump();
   if (options.strict) {
     RegisterHeldOutPhotos(Subset(capture, options.held_out), inputs, groups, workspace, sfm_options,
                           calibrated.model, progress);
@@ -99,6 +101,17 @@ void RejectTurned(const capture::Capture& capture, const char* known) {
 }
 
 }  // namespace
+
+std::string ToJson(const CalibratedPhotos& calibrated, const capture::FolderContents& contents) {
+  nlohmann::ordered_json json = JsonOf(calibrated.report);
+  json["engine"] = calibrated.engine;
+  json["unit"] = NameOf(calibrated.unit);
+  json["registered"] = calibrated.model.images.size();
+  json["not_registered"] = calibrated.not_registered;
+  json["why_not_registered"] = calibrated.why_not_registered;
+  json["contents"] = capture::JsonOf(contents);
+  return Text(json);
+}
 
 std::vector<colmap::SfmImageInput> SfmInputs(const capture::Capture& capture,
                                              const CameraGroups& groups, const fs::path& folder) {

@@ -11,6 +11,7 @@
 #include "capture/capture.h"
 #include "dtr/base/progress.h"
 #include "dtr/types/dtr_set.h"
+#include "pipeline/calibration_report.h"
 #include "pipeline/metres.h"
 #include "pipeline/set_rig.h"
 #include "pipeline/sfm_settings.h"
@@ -48,16 +49,19 @@ struct CalibratedPhotos {
   std::vector<std::string> not_registered;  ///< photos without a camera
   /// By name, a clause that says why one has none, where that is known.
   std::map<std::string, std::string> why_not_registered;
-  std::string engine;       ///< "colmap 3.8", "cameras.json", ...
-  std::string report_json;  ///< details for the provenance; no times, no paths
+  std::string engine;  ///< "colmap 3.8", "cameras.json", ...
+  CalibrationReport report;
   /// Processor seconds of COLMAP's runs, those of an earlier call that this one went on from, too.
   double engine_cpu_s = 0;
   /// Of those runs and of bundle adjustment, what the earlier call's took: processor and wall-clock
   /// seconds.
   double earlier_cpu_s = 0, earlier_wall_s = 0;
   double kept_refinement_cpu_s = 0;  ///< of bundle adjustment that an earlier call did
-  std::string scale_json;  ///< entry of the provenance's `scale`; empty: lengths are SfM's
 };
+
+/// JSON object: the report by its field names (`calibration` of a set's provenance), engine, unit,
+/// registered (how many), not_registered[], why_not_registered, contents (of the photos' folder).
+std::string ToJson(const CalibratedPhotos& calibrated, const capture::FolderContents& contents);
 
 /// Whether COLMAP must look for features: not where `poses` is a model that brings its points.
 /// Throws Error where that is broken.

@@ -43,7 +43,11 @@ Inputs InputsOf(const calib::Board& board, const RigPhotos& photos,
             "intrinsics of this camera",
             camera.name, camera.width_px, camera.height_px, lens.width_px, lens.height_px));
       }
-      inputs.push_back({camera.name, given->second.model, camera.width_px, camera.height_px, lens});
+      inputs.push_back({.name = camera.name,
+                        .model = given->second.model,
+                        .width_px = camera.width_px,
+                        .height_px = camera.height_px,
+                        .given = lens});
       continue;
     }
     calib::BoardModel model = calib::BoardModel::kPinhole;

@@ -1,12 +1,14 @@
-// pipeline/capture.h -- photos or videos, as a capture.
+// pipeline/capture.h -- photos or videos, as a capture to look at before hours are spent on it.
 #pragma once
 #include <filesystem>
 #include <functional>
+#include <string>
 #include <vector>
 
 #include "capture/photo.h"
 #include "capture/video/ingest_video.h"
 #include "dtr/base/progress.h"
+#include "dtr/types/grid.h"
 
 namespace dtr::pipeline {
 
@@ -22,5 +24,14 @@ std::vector<std::filesystem::path> VideosFor(const std::filesystem::path& source
 capture::Capture Ingest(const std::filesystem::path& source, const capture::VideoOptions& video,
                         const std::function<std::filesystem::path()>& frames_folder,
                         Progress& progress);
+
+/// What the photos look like: one contact sheet, and a page that opens offline with it, the photos
+/// that have faults (what is wrong, by how much), all photos and what was skipped.
+struct CaptureLook {
+  ImageRgb8 contact_sheet;
+  std::string page;
+};
+CaptureLook LookAt(const capture::Capture& capture, const std::string& title, int threads,
+                   double memory_gb, Progress& progress);
 
 }  // namespace dtr::pipeline

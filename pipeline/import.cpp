@@ -136,9 +136,11 @@ ImportOptions OptionsFor(const ImportRequest& request, CamerasFromFile& cameras,
 
 ImportReport Import(ImportRequest request, Progress& listener) {
   RecordedNotes progress(listener);
-  CamerasFromFile cameras =
-      ReadCameraFile(request.cameras, request.format,
-                     {request.images, request.depth, request.masks, request.allow_missing});
+  CamerasFromFile cameras = ReadCameraFile(request.cameras, request.format,
+                                           {.images = request.images,
+                                            .depth = request.depth,
+                                            .masks = request.masks,
+                                            .allow_missing = request.allow_missing});
   for (const std::string& note : cameras.notes) progress.Note(note);
   const ImportOptions options = OptionsFor(request, cameras, progress);
   io::SetWriter::RequireTarget(request.output, request.force);

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "calib/scale.h"
@@ -14,8 +13,6 @@
 
 namespace dtr::pipeline {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 constexpr double kDegree = std::numbers::pi / 180;
 
@@ -85,26 +82,29 @@ std::string TurnLine(const calib::MetricReport& report) {
          known;
 }
 
-void TellOfPlaces(const calib::SfmModel& model, const PhotoPositions& places,
-                  const calib::MetricReport& report, RefinedInMetres& out, Json& scale) {
+PositionsReport ReportOf(const calib::SfmModel& model, const PhotoPositions& places,
+                         const calib::MetricReport& report) {
   std::vector<std::string> left_out;
   for (const int i : report.left_out) {
     left_out.push_back(model.images[static_cast<size_t>(i)].name);
   }
-  const double turn_deg = report.turn_sigma_rad / kDegree;
-  scale["photos"] = places.names.size();
-  scale["left_out"] = left_out;
-  scale["given_rms_m"] = report.given_rms_m;
-  scale["rms_m"] = report.rms_m;
-  scale["found_sigma_flat_m"] = report.sigma_flat_m > 0 ? Json(report.sigma_flat_m) : Json();
-  scale["found_sigma_up_m"] = report.sigma_up_m > 0 ? Json(report.sigma_up_m) : Json();
-  scale["places_tell_scale"] = report.places_tell_scale;
-  scale["places_relative_sigma"] = report.places_relative_sigma;
-  scale["passes"] = report.passes;
-  scale["settled"] = report.settled;
-  scale["turn_sigma_deg"] = turn_deg;
-  scale["axes"] = "east, north, up";
-  scale["origin"] = Json::parse(places.OriginJson());
+  return {.photos = static_cast<int>(places.names.size()),
+          .left_out = std::move(left_out),
+          .given_rms_m = report.given_rms_m,
+          .rms_m = report.rms_m,
+          .found_sigma_flat_m = report.sigma_flat_m,
+          .found_sigma_up_m = report.sigma_up_m,
+          .tell_scale = report.places_tell_scale,
+          .relative_sigma = report.places_relative_sigma,
+          .passes = report.passes,
+          .settled = report.settled,
+          .turn_sigma_deg = report.turn_sigma_rad / kDegree,
+          .origin = places.places[places.Origin()]};
+}
+
+void TellOfPlaces(const PhotoPositions& places, const calib::MetricReport& report,
+                  RefinedInMetres& out) {
+  const std::vector<std::string>& left_out = out.report.positions->left_out;
   out.lines = places.without_place;
   out.lines.push_back(fmt::format(
       "{} positions: {:.2f} m RMS of the model as a whole, {:.2f} m as adjusted to them",
@@ -138,20 +138,12 @@ void TellOfPlaces(const calib::SfmModel& model, const PhotoPositions& places,
   }
 }
 
-void TellOfDistances(const MetreOptions& options, const calib::MetricReport& report,
-                     RefinedInMetres& out, Json& scale) {
-  scale["distances"] = Json::array();
-  for (size_t i = 0; i < options.distances.size(); ++i) {
-    const ScaleDistance& d = options.distances[i];
-    scale["distances"].push_back({{"text", d.text},
-                                  {"length_m", d.length_m},
-                                  {"given_m", report.given_m[i]},
-                                  {"found_m", report.found_m[i]},
-                                  {"sigmas_off", report.sigmas_off[i]}});
+void TellOfDistances(const std::vector<DistanceReport>& distances, RefinedInMetres& out) {
+  for (const DistanceReport& d : distances) {
     out.lines.push_back(
         fmt::format("{}: {:.6g} m in the model as a whole, {:.6g} m as adjusted, {:.2f} standard "
                     "deviations off",
-                    d.text, report.given_m[i], report.found_m[i], report.sigmas_off[i]));
+                    d.text, d.given_m, d.found_m, d.sigmas_off));
   }
 }
 
@@ -202,17 +194,6 @@ void RequireMetres(const MetreOptions& options, const capture::Capture& photos,
                 adjusted.size() == names.size() ? "the folder" : "those not held out strictly");
 }
 
-std::string ToJson(const MetreOptions& options) {
-  Json json;
-  json["gps"] = options.gps;
-  if (options.gps_sigma) {
-    json["gps_sigma_m"] = {options.gps_sigma->flat_m, options.gps_sigma->up_m};
-  }
-  json["distances"] = Json::array();
-  for (const ScaleDistance& d : options.distances) json["distances"].push_back(d.text);
-  return json.dump();
-}
-
 RefinedInMetres RefineInMetres(const calib::SfmModel& model, const MetreOptions& options,
                                const PhotoPositions& places, const calib::RefineOptions& refine) {
   const calib::KnownMetres known = KnownOf(model, options, places);
@@ -220,21 +201,22 @@ RefinedInMetres RefineInMetres(const calib::SfmModel& model, const MetreOptions&
   out.start = calib::StartInMetres(model, known, refine);
   out.refined = calib::RefineInMetres(known, out.start);
   const calib::MetricReport& report = out.start.report;
-  Json scale = {{"metres_per_unit", report.metres_per_unit},
-                {"relative_sigma", report.relative_sigma}};
-  scale["method"] = !options.gps                ? "distance"
-                    : options.distances.empty() ? "gps"
-                                                : "gps and distance";
-  scale["bundle_adjustment"] = true;
-  if (options.gps) TellOfPlaces(model, places, report, out, scale);
-  if (!options.distances.empty()) TellOfDistances(options, report, out, scale);
+  out.report.metres_per_unit = report.metres_per_unit;
+  out.report.relative_sigma = report.relative_sigma;
+  if (options.gps) {
+    out.report.positions = ReportOf(model, places, report);
+    TellOfPlaces(places, report, out);
+  }
+  for (size_t i = 0; i < options.distances.size(); ++i) {
+    out.report.distances.push_back({.text = options.distances[i].text,
+                                    .length_m = options.distances[i].length_m,
+                                    .given_m = report.given_m[i],
+                                    .found_m = report.found_m[i],
+                                    .sigmas_off = report.sigmas_off[i]});
+  }
+  TellOfDistances(out.report.distances, out);
   out.lines.push_back(fmt::format("one unit was {:.6g} m +- {:.2g} %; lengths are in metres now",
                                   report.metres_per_unit, 100 * report.relative_sigma));
-  out.scale_json = scale.dump();
-  Json json = Json::parse(calib::ToJson(out.refined));
-  json["unit"] = "metre";
-  json["scale"] = scale;
-  out.json = json.dump();
   return out;
 }
 

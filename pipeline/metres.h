@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "calib/bundle/metric_refine.h"
+#include "dtr/io/image_io.h"
 #include "pipeline/photo_positions.h"
 #include "pipeline/scale_points.h"
 
@@ -25,14 +26,47 @@ struct MetreOptions {
   bool any() const { return gps || !distances.empty(); }
 };
 
+/// Positions of photos as the refinement met them (calib::MetricReport has what each means).
+struct PositionsReport {
+  int photos = 0;                     ///< with a position
+  std::vector<std::string> left_out;  ///< of these, those that do not agree with the others
+  double given_rms_m = 0, rms_m = 0;
+  /// Standard deviations that were found, per axis on the map and in height; 0: all were stated.
+  double found_sigma_flat_m = 0, found_sigma_up_m = 0;
+  bool tell_scale = true;
+  double relative_sigma = 0;  ///< of the scale, as the positions alone give it
+  int passes = 0;
+  bool settled = true;
+  double turn_sigma_deg = 0;
+  io::GpsPosition origin;  ///< of the world, whose axes are east, north, up
+};
+
+/// A measured distance beside the same in the model as a whole and in the adjusted one.
+struct DistanceReport {
+  std::string text;  ///< as it was given
+  double length_m = 0, given_m = 0, found_m = 0;
+  double sigmas_off = 0;  ///< found_m from length_m, in standard deviations
+};
+
+/// How a model that was refined in metres got its size.
+struct MetreReport {
+  double metres_per_unit = 1;  ///< of the model that was given
+  double relative_sigma = 0;
+  std::optional<PositionsReport> positions;  ///< with --gps
+  std::vector<DistanceReport> distances;
+};
+
 /// A model that was refined in metres.
 struct RefinedInMetres {
   calib::Refined refined;
   calib::MetricStart start;        ///< with the priors that were held
   std::vector<std::string> lines;  ///< for people
-  std::string json;                ///< of calib::ToJson(refined), and `scale` as below
-  std::string scale_json;          ///< as `dtr calibrate scale` keeps it in a set's provenance
+  MetreReport report;
 };
+
+/// JSON object: that of calib::ToJson(refined), `unit`, and as `scale` the report by its field
+/// names, as `dtr calibrate scale` keeps it in a set's provenance.
+std::string ToJson(const RefinedInMetres& refined);
 
 /// Throws UsageError where a distance is not between two of these photos, by names, or an extension
 /// is needed to tell photos apart: pixels of images are for `dtr calibrate scale`, of a finished
@@ -45,9 +79,6 @@ void RequireCameras(const MetreOptions& options, const std::vector<std::string>&
 /// few of the others that say where they were taken. `where`: their folder.
 void RequireMetres(const MetreOptions& options, const capture::Capture& photos,
                    const std::string& where, const std::vector<bool>& held_back = {});
-
-/// JSON object: what can change a result.
-std::string ToJson(const MetreOptions& options);
 
 /// Refines `model` as StartInMetres and RefineInMetres do. `places` may be empty where
 /// options.gps is not set. Throws Error as they do, and where a distance names a photo without a

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
 #include "calib/scale.h"
 #include "dtr/base/error.h"
@@ -66,14 +65,6 @@ std::vector<Eigen::Vector3d> PhotoPositions::EastNorthUp() const {
 
 std::string PhotoPositions::AxesLine() const {
   return fmt::format("axes: x east, y north, z up, from the position of {}", names[Origin()]);
-}
-
-std::string PhotoPositions::OriginJson() const {
-  const io::GpsPosition& origin = places[Origin()];
-  return nlohmann::ordered_json{{"latitude_deg", origin.latitude_deg},
-                                {"longitude_deg", origin.longitude_deg},
-                                {"altitude_m", *origin.altitude_m}}
-      .dump();
 }
 
 PhotoPositions ReadPhotoPositions(const fs::path& folder, const std::vector<std::string>& names) {

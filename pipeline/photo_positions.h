@@ -22,8 +22,6 @@ struct PhotoPositions {
   std::vector<Eigen::Vector3d> EastNorthUp() const;
   /// What the axes are, for people.
   std::string AxesLine() const;
-  /// The origin, as sets keep it: latitude_deg, longitude_deg, altitude_m.
-  std::string OriginJson() const;
 };
 
 /// Of the files of these names below `folder`. Throws Error where one is there and no image.

@@ -7,13 +7,15 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/hash.h"
+#include "dtr/base/json_number.h"
 #include "dtr/base/parallel_for.h"
-#include "dtr/io/pruned.h"
+#include "dtr/io/pruned_json.h"
 #include "dtr/io/set_io.h"
 #include "dtr/prune/probes.h"
-#include "dtr/render/stored_options.h"
+#include "dtr/render/stored_options_json.h"
 #include "dtr/render/time_steps.h"
 #include "pipeline/detail/depth/view_coder.h"
+#include "pipeline/detail/reports/text.h"
 #include "pipeline/detail/run/prune_journal.h"
 #include "pipeline/detail/run/run_log.h"
 
@@ -80,12 +82,12 @@ std::string Fingerprint(const PruneSetOptions& options, const DtrSet& set) {
               {"checks", prune.checks},
               {"probe_crop", prune.probe_crop},
               {"renderer", options.renderer},
-              {"render", Json::parse(dtr::ToJson(prune.render))},
+              {"render", dtr::JsonOf(prune.render)},
               {"seed", prune.seed}}
       .dump();
 }
 
-Json ToJson(const std::vector<prune::Removal>& removals) {
+Json RemovalsJson(const std::vector<prune::Removal>& removals) {
   Json list = Json::array();
   for (const prune::Removal& removal : removals) {
     list.push_back({{"kind", removal.kind},
@@ -111,9 +113,9 @@ Json PrunedJson(const PruneSetOptions& options, const PruneSetReport& report) {
           {"probes", options.prune.probes},
           {"checks", options.prune.checks},
           {"seed", options.prune.seed},
-          {"render", Json::parse(dtr::ToJson(pruned.setting.render))},
-          {"removed", ToJson(pruned.removed)},
-          {"put_back", ToJson(pruned.put_back)}};
+          {"render", dtr::JsonOf(pruned.setting.render)},
+          {"removed", RemovalsJson(pruned.removed)},
+          {"put_back", RemovalsJson(pruned.put_back)}};
 }
 
 /// sparse.bin of the views that are left, on their grids.
@@ -213,22 +215,6 @@ void ExpectGoalsReached(const PruneSetOptions& options, const DtrSet& pruned,
   }
 }
 
-Json ReportJson(const PruneSetOptions& options, const PruneSetReport& report) {
-  Json json = {{"set", options.output.string()}};
-  json.update(PrunedJson(options, report));
-  const auto told = [](const std::optional<double>& db) { return db ? Json(*db) : Json(nullptr); };
-  json["photo_loss_db"] = told(report.pruned.photo_loss_db);
-  json["photo_frame_loss_db"] = told(report.pruned.photo_frame_loss_db);
-  json["bytes_before"] = report.bytes_before;
-  json["bytes_after"] = report.bytes_after;
-  json["bytes_ratio"] =
-      static_cast<double>(report.bytes_before) / static_cast<double>(report.bytes_after);
-  json["frame_before_ms"] = report.frame_before.median_ms;
-  json["frame_after_ms"] = report.frame_after.median_ms;
-  json["frame_ratio"] = report.frame_before.median_ms / report.frame_after.median_ms;
-  return json;
-}
-
 }  // namespace
 
 PruneSetReport PruneSet(const PruneSetOptions& options, Progress& progress) {
@@ -256,7 +242,7 @@ PruneSetReport PruneSet(const PruneSetOptions& options, Progress& progress) {
 
   log.Begin("writing");
   DtrSet pruned = WritePruned(options, set, coder, setting, writer, progress);
-  io::SetPrunedJson(pruned, PrunedJson(options, report).dump());
+  io::SetPruned(pruned, PrunedJson(options, report));
   log.Begin("timing");
   {
     DtrSet loaded = pruned;
@@ -278,8 +264,22 @@ PruneSetReport PruneSet(const PruneSetOptions& options, Progress& progress) {
   writer.Finish(pruned);
   report.bytes_before = BytesOf(set, options.set);
   report.bytes_after = BytesOf(pruned, options.output);
-  report.json = ReportJson(options, report).dump(1);
   return report;
+}
+
+std::string ToJson(const PruneSetOptions& options, const PruneSetReport& report) {
+  Json json = {{"set", options.output.string()}};
+  json.update(PrunedJson(options, report));
+  json["photo_loss_db"] = NumberOrNull(report.pruned.photo_loss_db);
+  json["photo_frame_loss_db"] = NumberOrNull(report.pruned.photo_frame_loss_db);
+  json["bytes_before"] = report.bytes_before;
+  json["bytes_after"] = report.bytes_after;
+  json["bytes_ratio"] =
+      static_cast<double>(report.bytes_before) / static_cast<double>(report.bytes_after);
+  json["frame_before_ms"] = report.frame_before.median_ms;
+  json["frame_after_ms"] = report.frame_after.median_ms;
+  json["frame_ratio"] = report.frame_before.median_ms / report.frame_after.median_ms;
+  return Text(json);
 }
 
 }  // namespace dtr::pipeline

@@ -31,8 +31,12 @@ struct PruneSetReport {
   prune::PruneReport pruned;
   std::uint64_t bytes_before = 0, bytes_after = 0;  ///< of all files but held_out/ and report/
   eval::Times frame_before, frame_after;  ///< CPU time without a GPU's clock, else its own
-  std::string json;                       ///< what --json gives
 };
+
+/// JSON object: set, the fields of `pruned` of its set.json (docs/FORMAT.md, 2.1), photo_loss_db,
+/// photo_frame_loss_db, bytes_before, bytes_after, bytes_ratio, frame_before_ms, frame_after_ms,
+/// frame_ratio.
+std::string ToJson(const PruneSetOptions& options, const PruneSetReport& report);
 
 /// Writes `output`; `set` is only read. Nothing of `output` exists until it is whole. Throws
 /// UsageError where `output` is there already (and `force` is off), Error for sets of several

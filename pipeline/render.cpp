@@ -15,7 +15,7 @@
 #include "dtr/render/time_steps.h"
 #include "dtr/render/view_stream.h"
 #include "pipeline/detail/render/dynamic_scene.h"
-#include "pipeline/detail/render/novel_frames.h"
+#include "pipeline/novel_frames.h"
 
 namespace dtr::pipeline {
 namespace {

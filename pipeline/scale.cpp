@@ -14,11 +14,14 @@
 #include "dtr/base/hash.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/io/pruned.h"
+#include "dtr/io/pruned_json.h"
 #include "dtr/io/run_record.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/stored_options.h"
+#include "dtr/render/stored_options_json.h"
 #include "pipeline/detail/boards/scale_board.h"
 #include "pipeline/detail/pages/set_page.h"
+#include "pipeline/detail/reports/metres_json.h"
 #include "pipeline/detail/run/finishing.h"
 #include "pipeline/detail/run/run_log.h"
 #include "pipeline/photo_positions.h"
@@ -34,32 +37,33 @@ using Json = nlohmann::ordered_json;
 struct Found {
   calib::Similarity metric_from_scene;
   bool keeps_axes = true;
-  double relative_sigma = 0;
-  Json json;
-  std::vector<std::string> lines;
+  ScaleReport report;
 };
 
 Found FromDistances(const ScaleOptions& options, const DtrSet& set) {
   std::vector<calib::MeasuredDistance> distances;
   for (const ScaleDistance& d : options.distances) {
     const PlacedPoint a = Place(options.set, set, d.a), b = Place(options.set, set, d.b);
-    distances.push_back({"`distance` " + d.text, a.p_in_world, b.p_in_world, a.covariance,
-                         b.covariance, d.length_m, d.sigma_m});
+    distances.push_back({.name = "`distance` " + d.text,
+                         .a = a.p_in_world,
+                         .b = b.p_in_world,
+                         .covariance_a = a.covariance,
+                         .covariance_b = b.covariance,
+                         .length_m = d.length_m,
+                         .sigma_m = d.sigma_m});
   }
   const calib::DistanceScale scale = calib::ScaleFromDistances(distances);
   Found found;
   found.metric_from_scene.scale = scale.metres_per_unit;
-  found.relative_sigma = scale.relative_sigma;
-  found.json["method"] = "distance";
-  found.json["distances"] = Json::array();
+  found.report.relative_sigma = scale.relative_sigma;
   for (size_t i = 0; i < distances.size(); ++i) {
-    const double units = (distances[i].b - distances[i].a).norm();
-    found.json["distances"].push_back({{"text", options.distances[i].text},
-                                       {"units", units},
-                                       {"length_m", distances[i].length_m},
-                                       {"sigmas_off", scale.sigmas[i]}});
-    found.lines.push_back(fmt::format("{}: {:.6g} units, {:.2f} standard deviations off",
-                                      options.distances[i].text, units, scale.sigmas[i]));
+    const ScaledDistance scaled{.text = options.distances[i].text,
+                                .units = (distances[i].b - distances[i].a).norm(),
+                                .length_m = distances[i].length_m,
+                                .sigmas_off = scale.sigmas[i]};
+    found.report.distances.push_back(scaled);
+    found.report.lines.push_back(fmt::format("{}: {:.6g} units, {:.2f} standard deviations off",
+                                             scaled.text, scaled.units, scaled.sigmas_off));
   }
   return found;
 }
@@ -74,43 +78,39 @@ Found FromGps(const ScaleOptions& options, const DtrSet& set) {
   }
   const PhotoPositions located = ReadPhotoPositions(options.gps, names);
   RequirePlaces(located, options.gps.string(), "the set");
-  found.lines = located.without_place;
+  std::vector<std::string>& lines = found.report.lines;
+  lines = located.without_place;
   std::vector<Eigen::Vector3d> centres;
   for (const std::string& name : located.names) centres.push_back(centre_of.at(name));
   const calib::PositionScale scale = calib::ScaleFromPositions(centres, located.EastNorthUp());
-  found.relative_sigma = scale.relative_sigma;
+  found.report.relative_sigma = scale.relative_sigma;
   found.keeps_axes = !(scale.turn_sigma_rad <= calib::kMaxTurnSigmaRad);
   found.metric_from_scene = scale.metric_from_scene;
   if (found.keeps_axes) {
     found.metric_from_scene = {};
     found.metric_from_scene.scale = scale.metric_from_scene.scale;
   }
-  std::vector<std::string> left_out;
-  for (const size_t i : scale.left_out) left_out.push_back(located.names[i]);
-  const double turn_deg = scale.turn_sigma_rad * 180 / std::numbers::pi;
-  found.json["method"] = "gps";
-  found.json["photos"] = located.names.size();
-  found.json["left_out"] = left_out;
-  found.json["settled"] = scale.settled;
-  found.json["rms_m"] = scale.rms_m;
-  found.json["turn_sigma_deg"] = turn_deg;
-  found.json["axes"] = found.keeps_axes ? "as before" : "east, north, up";
-  if (!found.keeps_axes) {
-    found.json["origin"] = Json::parse(located.OriginJson());
-  }
-  found.lines.push_back(fmt::format("{} positions, {:.2f} m RMS; rotation known to {:.2g} degrees",
-                                    located.names.size() - left_out.size(), scale.rms_m, turn_deg));
-  if (!left_out.empty()) {
-    found.lines.push_back(fmt::format("do not agree, left out: {}", fmt::join(left_out, ", ")));
+  ScaledByPositions& positions = found.report.positions.emplace();
+  positions.photos = located.names.size();
+  for (const size_t i : scale.left_out) positions.left_out.push_back(located.names[i]);
+  positions.settled = scale.settled;
+  positions.rms_m = scale.rms_m;
+  positions.turn_sigma_deg = scale.turn_sigma_rad * 180 / std::numbers::pi;
+  if (!found.keeps_axes) positions.origin = located.places[located.Origin()];
+  lines.push_back(fmt::format("{} positions, {:.2f} m RMS; rotation known to {:.2g} degrees",
+                              positions.photos - positions.left_out.size(), positions.rms_m,
+                              positions.turn_sigma_deg));
+  if (!positions.left_out.empty()) {
+    lines.push_back(fmt::format("do not agree, left out: {}", fmt::join(positions.left_out, ", ")));
   }
   if (!scale.settled) {
-    found.lines.push_back(
+    lines.push_back(
         "which positions agree did not settle: with another pass others would be left out");
   }
-  found.lines.push_back(
-      found.keeps_axes ? "the cameras stand nearly on a line, and the rotation about it is not "
-                         "known: axes are left as they were"
-                       : located.AxesLine());
+  lines.push_back(found.keeps_axes
+                      ? "the cameras stand nearly on a line, and the rotation about it is not "
+                        "known: axes are left as they were"
+                      : located.AxesLine());
   return found;
 }
 
@@ -118,30 +118,26 @@ Found FromBoard(const ScaleOptions& options, const DtrSet& set, Progress& progre
   const calib::Board& board = *options.board;
   BoardInSet in_set = FindBoard(options.set, set, board, options.threads, progress);
   calib::BoardScale scale = calib::ScaleFromBoard(board, in_set.observations);
+  scale.left_out.insert(scale.left_out.end(), in_set.without.begin(), in_set.without.end());
   Found found;
   found.metric_from_scene.scale = 1 / scale.scene_from_board.scale;
-  found.relative_sigma = scale.relative_sigma;
-  scale.left_out.insert(scale.left_out.end(), in_set.without.begin(), in_set.without.end());
-  found.json["method"] = "board";
-  found.json["board"] = calib::TextOf(board);
-  found.json["views"] = scale.views;
-  found.json["corners"] = scale.corners;
-  found.json["outliers"] = scale.outliers;
-  found.json["rms_px"] = scale.rms_px;
-  found.json["left_out"] = Json::array();
+  found.report.relative_sigma = scale.relative_sigma;
   for (const calib::LeftOut& item : scale.left_out) {
-    found.json["left_out"].push_back({{"name", item.name}, {"reason", item.reason}});
-    found.lines.push_back(fmt::format("left out: {}: {}", item.name, item.reason));
+    found.report.lines.push_back(fmt::format("left out: {}: {}", item.name, item.reason));
   }
-  found.lines.push_back(fmt::format("the board in {} views: {} corners, {} outliers, RMS {:.3f} px",
-                                    scale.views.size(), scale.corners, scale.outliers,
-                                    scale.rms_px));
+  found.report.lines.push_back(
+      fmt::format("the board in {} views: {} corners, {} outliers, RMS {:.3f} px",
+                  scale.views.size(), scale.corners, scale.outliers, scale.rms_px));
+  found.report.board = {.board = calib::TextOf(board), .scale = std::move(scale)};
   return found;
 }
 
 Found FindScale(const ScaleOptions& options, const DtrSet& set, Progress& progress) {
-  if (options.board) return FromBoard(options, set, progress);
-  return options.gps.empty() ? FromDistances(options, set) : FromGps(options, set);
+  Found found = options.board         ? FromBoard(options, set, progress)
+                : options.gps.empty() ? FromDistances(options, set)
+                                      : FromGps(options, set);
+  found.report.metres_per_unit = found.metric_from_scene.scale;
+  return found;
 }
 
 Bounds Carried(const Bounds& bounds, const calib::Similarity& b_from_a) {
@@ -160,17 +156,16 @@ Bounds Carried(const Bounds& bounds, const calib::Similarity& b_from_a) {
 
 // Thresholds in scene units among the options that the set was pruned for.
 void CarryStoredOptions(double scale, DtrSet& set) {
-  const std::string text = io::PrunedJson(set);
-  if (text.empty()) return;
-  Json pruned = Json::parse(text);
+  Json pruned = io::PrunedOf(set);
+  if (pruned.is_null()) return;
   const auto [json, where] = io::RenderOptionsOf(set);
   RenderOptions stored = WithStoredOptions({}, json, where);
   for (std::optional<double>* length : {&stored.absolute_delta, &stored.absolute_depth_break}) {
     if (*length) **length *= scale;
   }
   pruned.erase("render_arguments");
-  pruned["render"] = Json::parse(ToJson(stored));
-  io::SetPrunedJson(set, pruned.dump());
+  pruned["render"] = JsonOf(stored);
+  io::SetPruned(set, pruned);
 }
 
 // All that set.json says in lengths. Where axes stay, so does the user's origin.
@@ -240,20 +235,11 @@ void WriteViews(const ScaleOptions& options, const DtrSet& old_set, double scale
   }
 }
 
-void Record(const Found& found, DtrSet& set, ScaleReport& report) {
-  Json entry = {{"metres_per_unit", found.metric_from_scene.scale},
-                {"relative_sigma", found.relative_sigma}};
-  entry.update(found.json);
+void Record(const ScaleReport& report, DtrSet& set) {
   Json provenance = Json::parse(set.provenance_json);
   if (!provenance["scale"].is_array()) provenance["scale"] = Json::array();
-  provenance["scale"].push_back(entry);
+  provenance["scale"].push_back(ScaleJson(report));
   set.provenance_json = provenance.dump();
-  entry["set"] = report.written.string();
-  entry["unit"] = NameOf(set.unit);
-  report.json = entry.dump(1);
-  report.metres_per_unit = found.metric_from_scene.scale;
-  report.relative_sigma = found.relative_sigma;
-  report.lines = found.lines;
 }
 
 }  // namespace
@@ -264,13 +250,13 @@ ScaleReport ScaleSet(const ScaleOptions& options, Progress& progress) {
   const DtrSet old_set = io::ReadSet(options.set);
   const Found found = FindScale(options, old_set, progress);
   const bool in_place = options.output.empty();
-  ScaleReport report;
+  ScaleReport report = found.report;
   report.written = in_place ? options.set : options.output;
   DtrSet set = old_set;
   Carry(found, set);
   const Json fingerprint = {{"tool_version", DTR_VERSION},
                             {"scale", found.metric_from_scene.scale},
-                            {"method", found.json},
+                            {"method", ScaleMethodJson(report)},
                             {"set_sha256", Sha256OfFile(options.set / "set.json")}};
   io::SetWriter writer(report.written, fingerprint.dump(), in_place || options.force);
   WriteViews(options, old_set, found.metric_from_scene.scale, set, writer, progress);
@@ -284,8 +270,13 @@ ScaleReport ScaleSet(const ScaleOptions& options, Progress& progress) {
     writer.WriteSparse(set, sparse);
     checks = ValidateSet(writer.folder(), set, sparse, {}, options.threads, progress).tests;
   }
-  Record(found, set, report);
-  WriteSetPage(writer, set, {report.written.stem().string(), "", checks, {}, 0, options.threads},
+  Record(report, set);
+  WriteSetPage(writer, set,
+               {.name = report.written.stem().string(),
+                .engine = {},
+                .checks = checks,
+                .skipped = {},
+                .threads = options.threads},
                progress);
   log.End();
   // What the stages before cost is still what this set cost.

@@ -58,13 +58,6 @@ void RequireSharedInstant(const SetRig& rig, const std::map<std::string, calib::
       rig.file));
 }
 
-Json PoseJson(const Pose& pose) {
-  const Eigen::Matrix3d r = pose.rotation.toRotationMatrix();
-  Json rows = Json::array();
-  for (int i = 0; i < 3; ++i) rows.push_back({r(i, 0), r(i, 1), r(i, 2), pose.translation[i]});
-  return rows;
-}
-
 Pose PoseFrom(const io::JsonObject& object, const char* key) {
   const Json& rows = object.Array(key);
   Eigen::Matrix<double, 3, 4> matrix;
@@ -169,21 +162,13 @@ void TellPhotosTheirLens(const SetRig& rig, capture::Capture& capture) {
   }
 }
 
-std::string PlaceByRig(const SetRig& rig, const capture::Capture& capture, calib::SfmModel& model,
-                       const Progress& progress) {
+calib::RigReport PlaceByRig(const SetRig& rig, const capture::Capture& capture,
+                            calib::SfmModel& model, const Progress& progress) {
   calib::RigRefined refined =
       calib::RefineRig(model, rig.known, PhotosOfRig(rig, capture), &progress);
   KeepIds(model, refined.model);
-  Json json = io::ParseJson(calib::ToJson(refined), "rig");
-  json["file"] = rig.file;
-  json["unit"] = NameOf(rig.unit);
-  json["cameras"] = Json::array();
-  for (size_t c = 0; c < rig.names.size(); ++c) {
-    json["cameras"].push_back(
-        {{"name", rig.names[c]}, {"cam_from_rig", PoseJson(rig.known.cam_from_rig[c])}});
-  }
   model = std::move(refined.model);
-  return json.dump();
+  return refined;
 }
 
 std::optional<SetRig> RigOfSet(const DtrSet& set) {

@@ -38,14 +38,12 @@ std::map<std::string, calib::RigPhoto> PhotosOfRig(const SetRig& rig,
 void TellPhotosTheirLens(const SetRig& rig, capture::Capture& capture);
 
 /// Bundle adjustment of `model` by calib::RefineRig. Cameras keep the ids that structure from
-/// motion gave them. Returns what the set's provenance keeps under `calibration.rig`, as JSON: what
-/// RefineRig reports, `file`, `unit`, `cameras[]` (`name`, `cam_from_rig` as 3 rows of 4). Throws
-/// Interrupted where `progress` asks for it.
-std::string PlaceByRig(const SetRig& rig, const capture::Capture& capture, calib::SfmModel& model,
-                       const Progress& progress);
+/// motion gave them. Throws Interrupted where `progress` asks for it.
+calib::RigReport PlaceByRig(const SetRig& rig, const capture::Capture& capture,
+                            calib::SfmModel& model, const Progress& progress);
 
-/// What that left in a set's provenance; empty for sets that were built without a rig. Throws Error
-/// where it is broken.
+/// The rig in a set's provenance, without its lenses; empty for sets that were built without a rig.
+/// Throws Error where it is broken.
 std::optional<SetRig> RigOfSet(const DtrSet& set);
 
 /// `rig_places_px`: do the set's cameras stand to each other as the rig's do? Of every time step,

@@ -1,7 +1,5 @@
 #include "pipeline/sfm_settings.h"
 
-#include <nlohmann/json.hpp>
-
 namespace dtr::pipeline {
 
 const char* NameOf(CameraPer per) {
@@ -16,16 +14,6 @@ const char* NameOf(CameraPer per) {
       return "set";
   }
   return "";
-}
-
-std::string ToJson(const SfmChoice& choice) {
-  nlohmann::ordered_json json{{"feature_size_px", choice.feature_size_px},
-                              {"features", choice.features},
-                              {"matching", colmap::NameOf(choice.matching)},
-                              {"lens_model", choice.lens_model}};
-  // Builds that were begun before there was a choice go on.
-  if (choice.camera_per != CameraPer::kAuto) json["camera_per"] = NameOf(choice.camera_per);
-  return json.dump();
 }
 
 }  // namespace dtr::pipeline

@@ -23,8 +23,4 @@ struct SfmChoice {
   bool operator==(const SfmChoice&) const = default;
 };
 
-/// JSON object: feature_size_px, features, matching, lens_model, and camera_per where it is not
-/// auto.
-std::string ToJson(const SfmChoice& choice);
-
 }  // namespace dtr::pipeline

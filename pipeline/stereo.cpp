@@ -128,12 +128,11 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& listen
       ValidateSet(writer.folder(), set, sparse, limits, options.threads, progress);
   set.verdict_json = eval::VerdictJson(validation.tests);  // other depth, other validation result
   WriteSetPage(writer, set,
-               {report.written.stem().string(),
-                options.depth.engine,
-                validation.tests,
-                {},
-                0,
-                options.threads},
+               {.name = report.written.stem().string(),
+                .engine = options.depth.engine,
+                .checks = validation.tests,
+                .skipped = {},
+                .threads = options.threads},
                progress);
   log.End();
   io::WriteRunRecord(writer.folder(),

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <atomic>
+#include <nlohmann/json.hpp>
 
+#include "calib/validation/report_json.h"
 #include "dtr/base/memory_budget.h"
 #include "dtr/eval/cross_depth.h"
-#include "dtr/eval/json.h"
+#include "dtr/eval/report_json.h"
 #include "dtr/io/set_io.h"
 #include "pipeline/set_rig.h"
 
@@ -33,7 +35,7 @@ Cameras CamerasOf(const DtrSet& set) {
 
 // Appends what depth says, where two views or more have any.
 void AddCrossDepth(const std::filesystem::path& folder, const DtrSet& set, const SetLimits& limits,
-                   int threads, calib::ValidationReport& report, Progress& progress) {
+                   int threads, SetValidation& report, Progress& progress) {
   std::vector<const View*> with_depth;
   for (const View& view : set.frames.front().views) {
     if (view.depth_file) with_depth.push_back(&view);
@@ -47,7 +49,7 @@ void AddCrossDepth(const std::filesystem::path& folder, const DtrSet& set, const
   options.threads = threads;
   progress.Stage("depth across views", static_cast<int>(with_depth.size()));
   std::atomic<int> brought = 0;  // some more than once, where memory is short
-  const auto cross = eval::CrossDepth(with_depth, options, [&](const View& view) {
+  auto cross = eval::CrossDepth(with_depth, options, [&](const View& view) {
     progress.ThrowIfInterrupted();
     View loaded = view;
     loaded.mesh_file.reset();  // renderers' alone
@@ -59,7 +61,7 @@ void AddCrossDepth(const std::filesystem::path& folder, const DtrSet& set, const
     return std::move(loaded.depth);
   });
   report.tests.insert(report.tests.end(), cross.tests.begin(), cross.tests.end());
-  report.cross_depth_json = eval::ToJson(cross);
+  report.cross_depth = std::move(cross);
 }
 
 }  // namespace
@@ -71,16 +73,16 @@ calib::ValidationReport ReprojectionOfSet(const DtrSet& set, const SparseScene& 
                                      of.held_out);
 }
 
-calib::ValidationReport ValidateSet(const std::filesystem::path& folder, const DtrSet& set,
-                                    const SparseScene& sparse, const SetLimits& limits, int threads,
-                                    Progress& progress) {
+SetValidation ValidateSet(const std::filesystem::path& folder, const DtrSet& set,
+                          const SparseScene& sparse, const SetLimits& limits, int threads,
+                          Progress& progress) {
   progress.Stage("reprojection tests", 0);
-  calib::ValidationReport report = ReprojectionOfSet(set, sparse, limits.reprojection, threads);
+  SetValidation report{{ReprojectionOfSet(set, sparse, limits.reprojection, threads)}, {}, {}};
   progress.ThrowIfInterrupted();
   AddCrossDepth(folder, set, limits, threads, report, progress);
   progress.Stage("cameras against their observations", 0);
   const Cameras of = CamerasOf(set);
-  const calib::PhotosValidation judgement = calib::ValidatePhotos(
+  calib::PhotosValidation judgement = calib::ValidatePhotos(
       calib::BundleOf(of.cameras, of.poses, of.names, sparse), limits.photos, threads, &progress);
   report.tests.insert(report.tests.end(), judgement.tests.begin(), judgement.tests.end());
   const auto rig = RigOfSet(set);
@@ -92,9 +94,20 @@ calib::ValidationReport ValidateSet(const std::filesystem::path& folder, const D
                      [&](const auto& validated) { return validated.name == judged.name; });
     if (camera != report.cameras.end()) camera->placed = judged.placed;
   }
-  report.adjustment_json = calib::ToJson(judgement);
-  report.not_validated = judgement.not_validated;
+  report.adjustment = std::move(judgement);
   return report;
+}
+
+std::string ToJson(const SetValidation& report) {
+  using Json = nlohmann::ordered_json;
+  Json json = calib::JsonOf(report);
+  json["adjustment"] = calib::JsonOf(report.adjustment);
+  if (report.cross_depth) {
+    json["cross_depth"] = eval::JsonOf(*report.cross_depth);
+    for (const char* told_above : {"passed", "tests"}) json["cross_depth"].erase(told_above);
+  }
+  // Names come from files: bytes that are no UTF-8 must not make the whole report unreadable.
+  return json.dump(2, ' ', false, Json::error_handler_t::replace);
 }
 
 }  // namespace dtr::pipeline

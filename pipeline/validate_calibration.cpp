@@ -121,10 +121,14 @@ calib::ValidatedCalibration ToValidate(const calib::Calibration& calibration) {
   judged.board = calibration.board;
   judged.free_lenses = !calibration.lenses_given;
   for (const calib::CalibratedCamera& camera : calibration.cameras) {
-    judged.cameras.push_back({camera.name, camera.model, camera.camera, camera.cam_from_rig});
+    judged.cameras.push_back({.name = camera.name,
+                              .model = camera.model,
+                              .camera = camera.camera,
+                              .cam_from_rig = camera.cam_from_rig});
   }
   for (const calib::CalibratedView& view : calibration.views) {
-    judged.kept.push_back({view.camera, view.frame, view.seen, view.outliers});
+    judged.kept.push_back(
+        {.camera = view.camera, .frame = view.frame, .seen = view.seen, .outliers = view.outliers});
     judged.kept_frames = std::max(judged.kept_frames, view.frame + 1);
   }
   std::stable_sort(judged.kept.begin(), judged.kept.end(), [](const auto& a, const auto& b) {

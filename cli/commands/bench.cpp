@@ -13,7 +13,7 @@
 #include "dtr/eval/bench_json.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/time_steps.h"
-#include "pipeline/detail/render/novel_frames.h"
+#include "pipeline/novel_frames.h"
 #include "pipeline/view_names.h"
 #ifdef DTR_HAS_OSG
 #include "cli/osg_bench.h"

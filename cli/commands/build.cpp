@@ -9,7 +9,6 @@
 #include "cli/sfm_options.h"
 #include "cli/video_options.h"
 #include "pipeline/build.h"
-#include "pipeline/detail/run/force_stage.h"
 
 namespace dtr::cli {
 namespace {
@@ -98,7 +97,7 @@ void AddBuildCommand(CLI::App& app) {
           options->seed = context.common.seed;
           const auto report = pipeline::BuildSet(*options, context.console);
           SayResult(*options, report, context.console);
-          context.EmitJson(report.json);
+          context.EmitJson(pipeline::ToJson(report));
           return kDone;
         };
       });

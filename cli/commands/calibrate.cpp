@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 
 #include "calib/colmap/model_io.h"
 #include "capture/ingest.h"
@@ -15,7 +14,7 @@
 #include "dtr/base/work_folder.h"
 #include "pipeline/calibrate.h"
 #include "pipeline/camera_file.h"
-#include "pipeline/detail/photos/model_grid.h"
+#include "pipeline/model_grid.h"
 
 namespace dtr::cli {
 namespace {
@@ -67,14 +66,7 @@ int RunCalibratePhotos(const CalibrateArguments& options, const Context& context
                                   options.output.string(), calibrated.model.images.size(),
                                   photos.photos.size(), calibrated.model.points.size()));
   SayNotRegistered(calibrated.not_registered, calibrated.why_not_registered, context.console);
-  auto json = nlohmann::ordered_json::parse(calibrated.report_json);
-  json["engine"] = calibrated.engine;
-  json["unit"] = NameOf(calibrated.unit);
-  json["registered"] = calibrated.model.images.size();
-  json["not_registered"] = calibrated.not_registered;
-  json["why_not_registered"] = calibrated.why_not_registered;
-  json["contents"] = nlohmann::ordered_json::parse(capture::JsonOf(photos.contents));
-  context.EmitJson(json.dump(1));
+  context.EmitJson(pipeline::ToJson(calibrated, photos.contents));
   return kDone;
 }
 

@@ -8,8 +8,8 @@
 #include "cli/metre_options.h"
 #include "dtr/base/error.h"
 #include "pipeline/camera_file.h"
-#include "pipeline/detail/photos/model_grid.h"
 #include "pipeline/metres.h"
+#include "pipeline/model_grid.h"
 
 namespace dtr::cli {
 namespace {
@@ -87,7 +87,7 @@ int RunRefine(const CalibrateRefineArguments& options, const Context& context) {
     SayRefined(in_metres.refined, context.console);
     for (const std::string& line : in_metres.lines) context.console.Say(line);
     WriteRefined(options, model_folder, in_metres.refined.model);
-    context.EmitJson(in_metres.json);
+    context.EmitJson(pipeline::ToJson(in_metres));
     return kDone;
   }
   const calib::Refined refined = calib::Refine(model, refine);

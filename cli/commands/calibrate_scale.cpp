@@ -57,7 +57,7 @@ int RunScale(CalibrateScaleArguments options, const Context& context) {
   context.console.Say(fmt::format("{}: one unit was {:.6g} m +- {:.2g} %; the set is in metres now",
                                   report.written.string(), report.metres_per_unit,
                                   100 * report.relative_sigma));
-  context.EmitJson(report.json);
+  context.EmitJson(pipeline::ToJson(report));
   return kDone;
 }
 

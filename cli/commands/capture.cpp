@@ -11,7 +11,6 @@
 #include "dtr/base/files.h"
 #include "dtr/io/image_io.h"
 #include "pipeline/capture.h"
-#include "pipeline/detail/pages/capture_page.h"
 
 namespace dtr::cli {
 namespace {

@@ -16,7 +16,7 @@
 #include "dtr/io/run_record.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/time_steps.h"
-#include "pipeline/detail/render/set_stream.h"
+#include "pipeline/set_stream.h"
 #include "pipeline/validate.h"
 #include "viewer/inspect_page.h"
 

@@ -70,7 +70,7 @@ int RunPrune(PruneArguments& options, const Context& context) {
   (void)options.prune.make_renderer();
   const auto report = pipeline::PruneSet(options.prune, context.console);
   SayResult(options, report, context.console);
-  context.EmitJson(report.json);
+  context.EmitJson(pipeline::ToJson(options.prune, report));
   return kDone;
 }
 

@@ -11,7 +11,6 @@
 #include "dtr/base/files.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/time_steps.h"
-#include "pipeline/detail/pages/validation_page.h"
 #include "pipeline/validate.h"
 
 namespace dtr::cli {
@@ -24,7 +23,7 @@ struct ValidateArguments {
   ValidateCalibrationOptions calibration;
 };
 
-void SayReport(const calib::ValidationReport& report, Console& console) {
+void SayReport(const pipeline::SetValidation& report, Console& console) {
   console.Say(fmt::format("{:<24} {:>7} {:>8} {:>8} {:>8} {:>8}", "camera (held-out, px)", "count",
                           "RMS", "median", "95 %", "worst"));
   for (const auto& camera : report.cameras) {
@@ -37,8 +36,8 @@ void SayReport(const calib::ValidationReport& report, Console& console) {
     console.Say(fmt::format("{} {}: {:.4g} (limit {:.4g}): {}", test.passed ? "passed" : "FAILED",
                             test.name, test.value, test.limit, test.reason));
   }
-  if (!report.not_validated.empty()) {
-    console.Say("not validated by a fresh bundle adjustment: " + report.not_validated);
+  if (!report.adjustment.not_validated.empty()) {
+    console.Say("not validated by a fresh bundle adjustment: " + report.adjustment.not_validated);
   }
   for (const std::string& name : report.untested) {
     console.Say("not tested, too few observations: " + name);
@@ -85,7 +84,7 @@ int RunValidate(ValidateArguments options, const Context& context) {
         *page, pipeline::ValidationPage(options.set, set, report, "Calibration of " + name));
     context.console.Say("report: " + page->string());
   }
-  context.EmitJson(calib::ToJson(report));
+  context.EmitJson(pipeline::ToJson(report));
   return report.passed() ? kDone : kFailed;
 }
 

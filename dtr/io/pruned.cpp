@@ -4,6 +4,7 @@
 
 #include "dtr/base/error.h"
 #include "dtr/io/json_fields.h"
+#include "dtr/io/pruned_json.h"
 
 namespace dtr::io {
 namespace {
@@ -77,30 +78,37 @@ std::string InWords(const std::string& options_json) {
 
 }  // namespace
 
-std::string PrunedJson(const DtrSet& set) {
+Json PrunedOf(const DtrSet& set) {
   const Json extra = ExtraOf(set);
   const auto found = extra.find(kPruned);
-  if (found == extra.end()) return "";
+  if (found == extra.end()) return nullptr;
   if (!found->is_object()) {
     throw Error(std::string(kWhere) + ": expected an object, found " + found->dump());
   }
-  return found->dump();
+  return *found;
+}
+
+void SetPruned(DtrSet& set, const Json& pruned) {
+  Json extra = ExtraOf(set);
+  extra[kPruned] = pruned;
+  set.extra_json = extra.dump();
+}
+
+std::string PrunedJson(const DtrSet& set) {
+  const Json pruned = PrunedOf(set);
+  return pruned.is_null() ? "" : pruned.dump();
 }
 
 void SetPrunedJson(DtrSet& set, const std::string& json) {
+  if (!json.empty()) return SetPruned(set, ParseJson(json, kWhere));
   Json extra = ExtraOf(set);
-  if (json.empty()) {
-    extra.erase(kPruned);
-  } else {
-    extra[kPruned] = ParseJson(json, kWhere);
-  }
+  extra.erase(kPruned);
   set.extra_json = extra.dump();
 }
 
 StoredRenderOptions RenderOptionsOf(const DtrSet& set) {
-  const std::string text = PrunedJson(set);
-  if (text.empty()) return {};
-  const Json pruned = ParseJson(text, kWhere);
+  const Json pruned = PrunedOf(set);
+  if (pruned.is_null()) return {};
   for (const char* field : {kRender, kRenderWords}) {
     const auto found = pruned.find(field);
     if (found == pruned.end()) continue;
@@ -114,9 +122,8 @@ StoredRenderOptions RenderOptionsOf(const DtrSet& set) {
 }
 
 std::string DescribePruned(const DtrSet& set) {
-  const std::string text = PrunedJson(set);
-  if (text.empty()) return "";
-  const Json pruned = ParseJson(text, kWhere);
+  const Json pruned = PrunedOf(set);
+  if (pruned.is_null()) return "";
   std::ostringstream out;
   out.precision(3);
   const auto loss_db = NumberAt(pruned, "loss_db"), max_db = NumberAt(pruned, "max_loss_db");

@@ -14,6 +14,7 @@
 #include "dtr/io/depth_io.h"
 #include "dtr/io/json_fields.h"
 #include "dtr/io/pruned.h"
+#include "dtr/io/pruned_json.h"
 #include "dtr/io/set_io.h"
 #include "dtr/io/set_json.h"
 #include "dtr/io/validation_result.h"
@@ -182,9 +183,7 @@ std::string InfoJson(const DtrSet& set) {
   if (!set.bounds.empty()) {
     info["bounds"] = {{"min", Numbers(set.bounds.min)}, {"max", Numbers(set.bounds.max)}};
   }
-  if (const std::string pruned = PrunedJson(set); !pruned.empty()) {
-    info["pruned"] = ParseJson(pruned, "pruned");
-  }
+  if (Json pruned = PrunedOf(set); !pruned.is_null()) info["pruned"] = std::move(pruned);
   std::uint64_t bytes = set.sparse_file ? set.sparse_file->bytes : 0;
   for (size_t f = 0; f < set.frames.size(); ++f) {
     for (const View& view : set.frames[f].views) {

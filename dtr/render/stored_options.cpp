@@ -13,6 +13,7 @@
 #include "dtr/base/error.h"
 #include "dtr/render/degrees.h"
 #include "dtr/render/option_names.h"
+#include "dtr/render/stored_options_json.h"
 
 namespace dtr {
 namespace {
@@ -162,13 +163,17 @@ Json FromWords(const Json& list, const std::string& where) {
 
 }  // namespace
 
-std::string ToJson(const RenderOptions& options, const RenderOptions& base) {
+Json JsonOf(const RenderOptions& options, const RenderOptions& base) {
   Json object = Json::object();
   for (const Field& field : Fields()) {
     Json value = field.write(options);
     if (value != field.write(base)) object[field.name] = std::move(value);
   }
-  return object.dump();
+  return object;
+}
+
+std::string ToJson(const RenderOptions& options, const RenderOptions& base) {
+  return JsonOf(options, base).dump();
 }
 
 RenderOptions WithStoredOptions(const RenderOptions& base, const std::string& json,

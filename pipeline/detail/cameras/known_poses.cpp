@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <map>
-#include <nlohmann/json.hpp>
 
 #include "calib/colmap/held_out.h"
 #include "calib/colmap/known_poses.h"
@@ -279,8 +278,7 @@ CalibratedPhotos FromKnownPoses(const capture::Capture& capture, const Calibrate
   CalibratedPhotos calibrated = fs::is_directory(options.poses)
                                     ? FromColmapModel(capture, options, workspace, progress)
                                     : FromCameraList(capture, options, workspace, progress);
-  calibrated.report_json =
-      nlohmann::ordered_json{{"points", calibrated.model.points.size()}}.dump();
+  calibrated.report.points = calibrated.model.points.size();
   return calibrated;
 }
 

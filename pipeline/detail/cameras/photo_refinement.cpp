@@ -11,6 +11,8 @@
 #include "dtr/base/machine.h"
 #include "pipeline/detail/photos/folder_cameras.h"
 #include "pipeline/detail/photos/input_hash.h"
+#include "pipeline/detail/reports/calibration_json.h"
+#include "pipeline/detail/reports/metres_json.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -41,20 +43,19 @@ void Remark(const calib::Refined& refined, PhotoRefinement& out) {
 
 // Holds what is known in metres.
 void HoldMetres(const capture::Capture& capture, const CalibrateOptions& options,
-                const calib::RefineOptions& refine, Json& report, PhotoRefinement& out) {
+                const calib::RefineOptions& refine, PhotoRefinement& out) {
   const PhotoPositions places = PhotoPositionsOf(capture, calib::ImageNames(out.model));
   if (options.metres.gps) RequirePlaces(places, "`gps`", "those with a camera");
   RefinedInMetres refined = RefineInMetres(out.model, options.metres, places, refine);
-  report["bundle_adjustment"] = Json::parse(refined.json);
+  out.report.bundle_adjustment = {.refined = refined.refined, .metres = std::move(refined.report)};
   out.model = std::move(refined.refined.model);
-  out.scale_json = std::move(refined.scale_json);
   Remark(refined.refined, out);
   out.notes.insert(out.notes.end(), refined.lines.begin(), refined.lines.end());
 }
 
 // Where it pays; deterministic.
 void RefineLenses(const capture::Capture& capture, const CalibrateOptions& options,
-                  calib::RefineOptions refine, Json& report, PhotoRefinement& out) {
+                  calib::RefineOptions refine, PhotoRefinement& out) {
   if (options.lens) {
     refine.known_lenses.emplace();
     for (const auto& [id, camera] : out.model.cameras) {
@@ -62,9 +63,9 @@ void RefineLenses(const capture::Capture& capture, const CalibrateOptions& optio
     }
   }
   if (options.fixed_intrinsics) refine.known_lenses = out.model.cameras;
-  if (options.metres.any()) return HoldMetres(capture, options, refine, report, out);
+  if (options.metres.any()) return HoldMetres(capture, options, refine, out);
   calib::Refined refined = calib::Refine(out.model, refine);
-  report["bundle_adjustment"] = Json::parse(calib::ToJson(refined));
+  out.report.bundle_adjustment = {.refined = refined, .metres = {}};
   if (!refined.changed) out.notes.push_back("bundle adjustment left out: " + refined.reason);
   Remark(refined, out);
   out.model = std::move(refined.model);
@@ -77,16 +78,16 @@ LengthUnit UnitFor(const CalibrateOptions& options) {
 
 // Which folders share intrinsics.
 void ShareFolders(const capture::Capture& capture, const CalibrateOptions& options,
-                  const CameraGroups& groups, bool test, Json& report, PhotoRefinement& out,
+                  const CameraGroups& groups, bool test, PhotoRefinement& out,
                   const Progress& progress) {
   if (options.sfm.camera_per != CameraPer::kAuto) {
-    report["camera_sharing"] = {{"camera_per", NameOf(options.sfm.camera_per)}};
+    out.report.camera_sharing = {.camera_per = options.sfm.camera_per, .tests = {}};
   }
   if (groups.pools().empty()) return;
   FolderCameras chosen = ChooseFolderCameras(groups, capture, out.model, test,
                                              {options.threads, options.seed, &progress});
-  report["camera_sharing"] = {{"camera_per", NameOf(options.sfm.camera_per)},
-                              {"tests", Json::parse(chosen.json)}};
+  out.report.camera_sharing = {.camera_per = options.sfm.camera_per,
+                               .tests = std::move(chosen.tests)};
   out.model = std::move(chosen.model);
   out.notes.insert(out.notes.end(), chosen.notes.begin(), chosen.notes.end());
 }
@@ -96,17 +97,16 @@ PhotoRefinement WorkOut(const capture::Capture& capture, const CalibrateOptions&
                         Progress& progress) {
   PhotoRefinement out;
   out.model = model;
-  Json report = Json::object();
   if (options.rig) {
     progress.Stage("bundle adjustment of the rig", 0);
-    report["rig"] = Json::parse(PlaceByRig(*options.rig, capture, out.model, progress));
+    out.report.rig = {.adjusted = PlaceByRig(*options.rig, capture, out.model, progress),
+                      .rig = *options.rig};
   } else {
     if (!groups.pools().empty()) progress.Stage("cameras of folders", 0);
-    ShareFolders(capture, options, groups, !options.fixed_intrinsics, report, out, progress);
+    ShareFolders(capture, options, groups, !options.fixed_intrinsics, out, progress);
     progress.Stage("bundle adjustment", 0);
-    RefineLenses(capture, options, RefineOptionsFor(options, progress), report, out);
+    RefineLenses(capture, options, RefineOptionsFor(options, progress), out);
   }
-  out.report_json = report.dump();
   return out;
 }
 
@@ -118,7 +118,7 @@ Json StampOf(const capture::Capture& capture, const CalibrateOptions& options,
                 {"model_sha256", InputHash(sfm_folder)},
                 {"seed", options.seed},
                 {"determined", !options.determined.empty()},
-                {"metres", Json::parse(ToJson(options.metres))},
+                {"metres", JsonOf(options.metres)},
                 {"rig", options.rig ? options.rig->file : ""}};
   if (options.lens) {
     stamp["lens"] = {{"model", calib::NameOf(options.lens->model)},
@@ -143,7 +143,8 @@ Json StampOf(const capture::Capture& capture, const CalibrateOptions& options,
 }
 
 // A damaged checkpoint costs time, never the job.
-std::optional<PhotoRefinement> KeptRefinement(const fs::path& folder, const Json& stamp) {
+std::optional<PhotoRefinement> KeptRefinement(const fs::path& folder,
+                                              const std::optional<SetRig>& rig, const Json& stamp) {
   if (!fs::exists(folder / kRecord)) return {};
   try {
     const Json record = Json::parse(ReadFile(folder / kRecord, kLargestRecordBytes));
@@ -151,8 +152,7 @@ std::optional<PhotoRefinement> KeptRefinement(const fs::path& folder, const Json
     if (record.at("model_sha256") != InputHash(folder / kModel)) return {};
     PhotoRefinement kept;
     kept.model = colmap::ReadModel(folder / kModel);
-    kept.report_json = record.at("report").dump();
-    kept.scale_json = record.at("scale").get<std::string>();
+    kept.report = RefinementFrom(record.at("report"), rig);
     kept.notes = record.at("notes").get<std::vector<std::string>>();
     kept.earlier_wall_s = record.at("wall_s").get<double>();
     kept.earlier_cpu_s = record.at("cpu_s").get<double>();
@@ -173,8 +173,7 @@ void Keep(const PhotoRefinement& refined, const Json& stamp, double wall_s, doub
   colmap::WriteModel(folder / kModel, refined.model, colmap::Format::kBinary);
   const Json record = {{"stamp", stamp},
                        {"model_sha256", InputHash(folder / kModel)},
-                       {"report", Json::parse(refined.report_json)},
-                       {"scale", refined.scale_json},
+                       {"report", RefinementJson(refined.report)},
                        {"notes", refined.notes},
                        {"wall_s", wall_s},
                        {"cpu_s", cpu_s}};
@@ -195,14 +194,12 @@ PhotoRefinement RefinePhotos(const capture::Capture& capture, const CalibrateOpt
       calib::RequireDetermined(model, refine, options.determined);
     }
     refined.model = model;
-    Json report = Json::object();
-    ShareFolders(capture, options, groups, false, report, refined, progress);
-    refined.report_json = report.dump();
+    ShareFolders(capture, options, groups, false, refined, progress);
     for (const std::string& line : refined.notes) progress.Note(line);
     return refined;
   }
   const Json stamp = StampOf(capture, options, groups, sfm_folder);
-  if (auto kept = KeptRefinement(folder, stamp)) {
+  if (auto kept = KeptRefinement(folder, options.rig, stamp)) {
     refined = std::move(*kept);
   } else {
     const double cpu_start_ms = ProcessCpuMilliseconds();

@@ -14,9 +14,8 @@ namespace dtr::pipeline {
 struct PhotoRefinement {
   calib::SfmModel model;
   LengthUnit unit = LengthUnit::kArbitrary;
-  std::string report_json =
-      "{}";  ///< `rig` or `bundle_adjustment`, `camera_sharing`; none where not asked for
-  std::string scale_json;          ///< as CalibratedPhotos::scale_json
+  /// `rig` or `bundle_adjustment`, `camera_sharing`; none where not asked for.
+  CalibrationReport report;
   std::vector<std::string> notes;  ///< for people; said already
   /// What it took an earlier call, whose result this is; 0 where it was worked out just now.
   double earlier_wall_s = 0, earlier_cpu_s = 0;

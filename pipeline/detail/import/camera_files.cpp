@@ -15,9 +15,9 @@
 #include "dtr/io/formats/transforms_json.h"
 #include "dtr/io/image_io.h"
 #include "pipeline/detail/photos/holdout.h"
-#include "pipeline/detail/photos/model_grid.h"
 #include "pipeline/detail/photos/named_files.h"
 #include "pipeline/import.h"
+#include "pipeline/model_grid.h"
 
 namespace dtr::pipeline {
 namespace {

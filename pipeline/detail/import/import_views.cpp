@@ -223,7 +223,7 @@ std::string Fingerprint(const nlohmann::json& inputs, const io::CameraList& list
     }
     named.distortion.reset();
   }
-  fingerprint["cameras"] = nlohmann::json::parse(io::FormatCamerasJson(pinholes));
+  fingerprint["cameras"] = io::FormatCamerasJson(pinholes);
   fingerprint["depth_coding"] = io::NameOf(options.depth_coding);
   fingerprint["held_out"] = options.held_out;
   if (points != nullptr) fingerprint["points_sha256"] = HashOf(*points);

@@ -1,5 +1,3 @@
-#include "pipeline/detail/pages/capture_page.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,6 +8,7 @@
 #include "dtr/base/parallel_for.h"
 #include "dtr/report/contact_sheet.h"
 #include "dtr/report/html.h"
+#include "pipeline/capture.h"
 
 namespace dtr::pipeline {
 namespace {

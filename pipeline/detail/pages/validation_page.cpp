@@ -1,5 +1,3 @@
-#include "pipeline/detail/pages/validation_page.h"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -14,6 +12,7 @@
 #include "dtr/report/html.h"
 #include "dtr/report/set_report.h"
 #include "pipeline/detail/pages/residual_plots.h"
+#include "pipeline/validate.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -190,16 +189,17 @@ void AddWorstViews(report::HtmlReport& page, const fs::path& folder, const std::
 
 }  // namespace
 
-std::string ValidationPage(const fs::path& folder, const DtrSet& set,
-                           const calib::ValidationReport& report, const std::string& title) {
+std::string ValidationPage(const fs::path& folder, const DtrSet& set, const SetValidation& report,
+                           const std::string& title) {
   const std::vector<View>& views = set.frames.front().views;
   report::HtmlReport page(title);
   page.Verdict(report.passed(), report.passed() ? "The calibration passed its tests"
                                                 : "The calibration broke at least one test");
   page.Section("Can the calibration be trusted?");
   report::AddChecks(page, report.tests);
-  if (!report.not_validated.empty()) {
-    page.Paragraph("Not validated by a fresh bundle adjustment: " + report.not_validated);
+  if (!report.adjustment.not_validated.empty()) {
+    page.Paragraph("Not validated by a fresh bundle adjustment: " +
+                   report.adjustment.not_validated);
   }
   AddViewTable(page, views, report);
   page.Section("Residuals by region of the image, all views");

@@ -5,15 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <nlohmann/json.hpp>
 
 #include "calib/bundle/refine.h"
 #include "dtr/base/order_statistics.h"
 
 namespace dtr::pipeline {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 // Held-out observations are clearly better predicted where half of them lie nearer by this share.
 constexpr double kClearlyBetter = 0.9;
@@ -107,24 +104,24 @@ PhotoRefinement RefineSfm(const SfmRun& run, colmap::SfmResult& sfm, Progress& p
                         run.workspace / "sfm" / "model", run.workspace / "refined", progress);
   };
   if (given) return as_found();
-  const auto report = [&](Attempt& taken, Json json, const std::string& line) {
-    Json all = Json::parse(taken.refined.report_json);
-    json["focal_fixed"] = taken.fixed;
-    all["exif_focal"] = std::move(json);
-    taken.refined.report_json = all.dump();
+  const auto report = [&](Attempt& taken, ExifFocal focal, bool exif_taken,
+                          const std::string& line) {
+    focal.exif_taken = exif_taken;
+    focal.focal_fixed = taken.fixed;
+    taken.refined.report.exif_focal = focal;
     progress.Note(line);
     return std::move(taken.refined);
   };
   if (sfm.report.fixed_intrinsics) {
     Attempt taken = FromExif(run, options, sfm, "model", progress);
     const double focal_px = sfm.model.cameras.begin()->second.params.front();
-    return report(taken, {{"exif_px", focal_px}, {"taken", "exif"}},
+    return report(taken, {.exif_px = focal_px}, true,
                   fmt::format("focal length: COLMAP made a model only with EXIF's {:.0f} px; {}",
                               focal_px, taken.fixed ? "it is fixed" : "adjusted afterwards"));
   }
   const auto contradiction = ContradictsExif(sfm.model, run.inputs);
   if (!contradiction) return as_found();
-  Json json{{"exif_px", contradiction->exif_px}, {"found_px", contradiction->found_px}};
+  ExifFocal focal{.exif_px = contradiction->exif_px, .found_px = contradiction->found_px};
   auto fixed_sfm = colmap::MapWithFixedIntrinsics(run.workspace / "photos", run.inputs,
                                                   run.workspace / "sfm", run.sfm_options, progress);
   const auto enough = [](size_t part, size_t of, double share) {
@@ -133,36 +130,32 @@ PhotoRefinement RefineSfm(const SfmRun& run, colmap::SfmResult& sfm, Progress& p
   if (!fixed_sfm ||
       !enough(fixed_sfm->model.images.size(), sfm.model.images.size(), kEnoughPhotos)) {
     Attempt taken = Refined(run, options, sfm, "model", "refined", progress);
-    json["taken"] = "found";
-    return report(taken, json,
+    return report(taken, focal, false,
                   Line(*contradiction, taken, nullptr) +
                       "with EXIF's COLMAP registers fewer photos; the found one is taken");
   }
   const bool undetermined = !WhyUndetermined(run, sfm.model, progress).empty();
   Attempt exif = FromExif(run, options, *fixed_sfm, colmap::kFixedModel, progress);
-  json["exif_error_px"] = exif.error_px;
+  focal.exif_error_px = exif.error_px;
   if (!undetermined) {
     Attempt found = Refined(run, options, sfm, "model", "refined", progress);
-    json["found_error_px"] = found.error_px;
+    focal.found_error_px = found.error_px;
     const bool rival = enough(static_cast<size_t>(found.observations),
                               static_cast<size_t>(exif.observations), kEnoughObservations);
     const bool exif_is_rival = enough(static_cast<size_t>(exif.observations),
                                       static_cast<size_t>(found.observations), kEnoughObservations);
     if (!exif_is_rival || (rival && found.error_px < kClearlyBetter * exif.error_px)) {
-      json["taken"] = "found";
-      return report(found, json,
+      return report(found, focal, false,
                     Line(*contradiction, found, &exif) +
                         "; the found one is taken (photos that were cropped or zoomed digitally?)");
     }
-    json["taken"] = "exif";
     sfm.model = std::move(fixed_sfm->model);
-    return report(exif, json,
+    return report(exif, focal, true,
                   Line(*contradiction, exif, &found) + "; " +
                       (exif.fixed ? "EXIF's is used" : "EXIF's is taken and adjusted"));
   }
-  json["taken"] = "exif";
   sfm.model = std::move(fixed_sfm->model);
-  return report(exif, json,
+  return report(exif, focal, true,
                 Line(*contradiction, exif, nullptr) + "the observations do not determine it; " +
                     (exif.fixed ? "EXIF's is used" : "EXIF's is taken and adjusted"));
 }

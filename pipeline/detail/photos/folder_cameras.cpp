@@ -4,12 +4,9 @@
 
 #include <algorithm>
 #include <map>
-#include <nlohmann/json.hpp>
 
 namespace dtr::pipeline {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 // What the model has of a pool.
 struct Registered {
@@ -83,30 +80,25 @@ std::string LineFor(const calib::SharedCameras& result, const Registered& regist
                      result.shared_converged ? "" : ", which do not converge", focal);
 }
 
-Json JsonOf(const calib::SharedCameras& result, const Registered& registered,
-            const std::string& not_tested) {
-  Json json;
-  json["photos"] = registered.photos;
-  json["folders"] = Json::array();
-  for (const auto& [id, folder] : registered.folder_of) json["folders"].push_back(Shown(folder));
-  json["cameras"] = Json::array();
+FolderSharing ReportOf(const calib::SharedCameras& result, const Registered& registered,
+                       const std::string& not_tested) {
+  FolderSharing report;
+  report.photos = registered.photos;
+  for (const auto& [id, folder] : registered.folder_of) report.folders.push_back(Shown(folder));
   for (const auto& group : result.groups) {
-    Json folders = Json::array();
-    for (const std::uint32_t id : group) folders.push_back(Shown(registered.folder_of.at(id)));
-    json["cameras"].push_back(
-        {{"folders", folders},
-         {"focal_px", result.model.cameras.at(group.front()).params.front()}});
+    FolderSharing::Camera& camera = report.cameras.emplace_back();
+    for (const std::uint32_t id : group) {
+      camera.folders.push_back(Shown(registered.folder_of.at(id)));
+    }
+    camera.focal_px = result.model.cameras.at(group.front()).params.front();
   }
-  if (!not_tested.empty()) {
-    json["not_tested"] = not_tested;
-    return json;
-  }
-  json["shared_px"] = result.shared_px;
-  json["separate_px"] = result.separate_px;
-  json["low_px2"] = result.low_px2;
-  json["high_px2"] = result.high_px2;
-  json["shared_converged"] = result.shared_converged;
-  return json;
+  report.not_tested = not_tested;
+  report.shared_px = result.shared_px;
+  report.separate_px = result.separate_px;
+  report.low_px2 = result.low_px2;
+  report.high_px2 = result.high_px2;
+  report.shared_converged = result.shared_converged;
+  return report;
 }
 
 }  // namespace
@@ -116,7 +108,6 @@ FolderCameras ChooseFolderCameras(const CameraGroups& groups, const capture::Cap
                                   const calib::SharingOptions& options) {
   FolderCameras out;
   out.model = model;
-  Json json = Json::array();
   for (const FolderPool& pool : groups.pools()) {
     const Registered registered = RegisteredOf(pool, groups, capture, out.model);
     if (registered.folder_of.size() < 2) continue;  // one camera: nothing to decide
@@ -134,10 +125,9 @@ FolderCameras ChooseFolderCameras(const CameraGroups& groups, const capture::Cap
       out.notes.back() += fmt::format("; {} folders of fewer than {} photos share with {}",
                                       pool.small.size(), kMinPhotosPerFolder, Shown(pool.largest));
     }
-    json.push_back(JsonOf(result, registered, not_tested));
+    out.tests.push_back(ReportOf(result, registered, not_tested));
     out.model = std::move(result.model);
   }
-  out.json = json.dump();
   return out;
 }
 

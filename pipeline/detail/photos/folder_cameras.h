@@ -5,6 +5,7 @@
 
 #include "calib/bundle/camera_sharing.h"
 #include "capture/capture.h"
+#include "pipeline/calibration_report.h"
 #include "pipeline/detail/photos/camera_groups.h"
 
 namespace dtr::pipeline {
@@ -12,9 +13,7 @@ namespace dtr::pipeline {
 /// A model whose folders share intrinsics where held-out observations allow it.
 struct FolderCameras {
   calib::SfmModel model;
-  /// JSON array, one object per pool: folders, photos, cameras[] (folders that share), shared_px,
-  /// separate_px, low_px2, high_px2, not_tested. "[]" where no group lies in several folders.
-  std::string json = "[]";
+  std::vector<FolderSharing> tests;  ///< one per pool that is of several cameras
   std::vector<std::string> notes;  ///< a line per pool
 };
 

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "dtr/types/dtr_set.h"
-#include "pipeline/detail/render/set_stream.h"
+#include "pipeline/set_stream.h"
 
 namespace dtr::pipeline {
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "dtr/base/error.h"
+#include "pipeline/build.h"
 
 namespace dtr::pipeline {
 namespace {

@@ -6,12 +6,9 @@
 
 namespace dtr::pipeline {
 
-/// The stages of which a build keeps something between runs, in their order.
-std::vector<std::string> StagesKept();
-
 /// Removes what the stage `name` and all after it left in the partial set `folder` (io::SetWriter),
-/// so that the run does them again. Throws UsageError for a name not in StagesKept, Error when a
-/// file cannot be removed.
+/// so that the run does them again. Throws UsageError for a name not in StagesKept
+/// (pipeline/build.h), Error when a file cannot be removed.
 void ForgetStage(const std::filesystem::path& folder, const std::string& name);
 
 }  // namespace dtr::pipeline

@@ -1,4 +1,4 @@
-#include "pipeline/detail/render/novel_frames.h"
+#include "pipeline/novel_frames.h"
 
 #include <fmt/format.h>
 

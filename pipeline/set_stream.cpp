@@ -1,4 +1,4 @@
-#include "pipeline/detail/render/set_stream.h"
+#include "pipeline/set_stream.h"
 
 #include <memory>
 #include <mutex>

@@ -1,5 +1,4 @@
-// pipeline/detail/render/set_stream.h -- the views of a set on disk, read when an image needs
-// them.
+// pipeline/set_stream.h -- the views of a set on disk, read when an image needs them.
 #pragma once
 #include <filesystem>
 #include <memory>

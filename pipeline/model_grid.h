@@ -1,5 +1,4 @@
-// pipeline/detail/photos/model_grid.h -- which pixels of photos with an EXIF orientation a model
-// describes.
+// pipeline/model_grid.h -- which pixels of photos with an EXIF orientation a model describes.
 #pragma once
 #include <filesystem>
 

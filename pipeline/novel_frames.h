@@ -1,4 +1,4 @@
-// pipeline/detail/render/novel_frames.h -- the cameras of a request to render.
+// pipeline/novel_frames.h -- the cameras of a request to render.
 #pragma once
 #include <string>
 #include <vector>

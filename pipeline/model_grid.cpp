@@ -1,4 +1,4 @@
-#include "pipeline/detail/photos/model_grid.h"
+#include "pipeline/model_grid.h"
 
 #include <fmt/format.h>
 

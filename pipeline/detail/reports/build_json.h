@@ -1,0 +1,23 @@
+// pipeline/detail/reports/build_json.h -- what a build records, as JSON.
+#pragma once
+#include <nlohmann/json_fwd.hpp>
+
+#include "pipeline/build.h"
+#include "pipeline/calibrate.h"
+
+namespace dtr::pipeline {
+
+/// Everything that can change a byte of the set, and nothing else: threads and memory do not.
+nlohmann::ordered_json OptionsJson(const BuildOptions& options, const stereo::Effort& effort);
+
+/// The provenance of the set; `option_values` and `photos` as they stand in it.
+nlohmann::ordered_json ProvenanceJson(const BuildOptions& options,
+                                      const nlohmann::ordered_json& option_values,
+                                      const nlohmann::ordered_json& photos,
+                                      const CalibratedPhotos& calibrated,
+                                      const BuildReport& report);
+
+/// [{name, remarks[]}].
+nlohmann::ordered_json ScreeningJson(const BuildReport& report);
+
+}  // namespace dtr::pipeline
