@@ -111,9 +111,12 @@ StageFacts StageOf(const JsonObject& json) {
 
 }  // namespace
 
-SweepFacts ReadSweep(const std::string& json, const std::string& file) {
-  const io::Json value = io::ParseJson(json, file);
-  const JsonObject top(value, file, "");
+SweepFacts ReadSweep(const std::string& text, const std::string& file) {
+  return FactsOf(io::ParseJson(text, file), file);
+}
+
+SweepFacts FactsOf(const io::Json& json, const std::string& file) {
+  const JsonObject top(json, file, "");
   SweepFacts facts;
   facts.set = top.String("set");
   const JsonObject machine = top.Object("machine");

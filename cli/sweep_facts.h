@@ -1,6 +1,7 @@
 // cli/sweep_facts.h -- bench.json read back: what the console, the page and `dtr inspect` tell of a
 // sweep.
 #pragma once
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -41,7 +42,9 @@ struct SweepFacts {
 
 /// `json`: what SweepJson gives. Throws Error, which begins with `file` and names the field, where
 /// it is something else.
-SweepFacts ReadSweep(const std::string& json, const std::string& file);
+SweepFacts FactsOf(const nlohmann::ordered_json& json, const std::string& file);
+/// The same of the text of a file.
+SweepFacts ReadSweep(const std::string& text, const std::string& file);
 
 /// "2 photos without a camera" of a calibration that has such; empty otherwise.
 std::string WithoutCamera(const PointFacts& point);

@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "dtr/base/files.h"
+#include "dtr/base/json_number.h"
 #include "dtr/eval/metrics.h"
 
 namespace dtr::cli {
@@ -15,10 +16,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-template <typename T>
-Json OrNull(const std::optional<T>& value) {
-  return value ? Json(*value) : Json(nullptr);
-}
+Json OrNull(const std::optional<size_t>& value) { return value ? Json(*value) : Json(nullptr); }
 
 std::string NameOf(const SweptStage& swept, size_t point) {
   return eval::Describe(swept.stage, swept.points[point].setting);
@@ -46,6 +44,8 @@ Json PointJson(const SweptStage& swept, size_t i) {
     options[swept.stage.axes[axis].name] =
         swept.stage.axes[axis].values[static_cast<size_t>(point.setting[axis])];
   }
+  Json figures = Json::object();
+  for (const auto& [name, value] : point.measured.figures) figures[name] = NumberOrNull(value);
   const eval::CostRange range = eval::RangeOf(point, swept.points);
   return {{"setting", NameOf(swept, i)},
           {"options", options},
@@ -54,11 +54,11 @@ Json PointJson(const SweptStage& swept, size_t i) {
           {"cost_least", range.least},
           {"cost_most", range.most},
           {"error", point.measured.error},
-          {"psnr_db", OrNull(point.measured.psnr_db)},
+          {"psnr_db", NumberOrNull(point.measured.psnr_db)},
           {"identical", eval::IdenticalFigures({{"psnr_db", point.measured.psnr_db}})},
           {"machine_ms", point.measured.machine_ms},
           {"on_front", OnFront(swept, i)},
-          {"figures", point.measured.figures}};
+          {"figures", figures}};
 }
 
 Json DefaultJson(const std::optional<eval::DefaultVerdict>& usual) {
@@ -81,7 +81,7 @@ Json StageJson(const SweptStage& swept) {
           {"knee", OrNull(swept.knee)},
           {"max_loss_db", swept.max_loss_db},
           {"cheapest_within_loss", OrNull(swept.cheapest)},
-          {"budget", OrNull(swept.budget)},
+          {"budget", NumberOrNull(swept.budget)},
           {"best_within_budget", OrNull(swept.within_budget)},
           {"default", DefaultJson(swept.usual)},
           {"machine_ms", MachineJson(swept)}};
@@ -159,18 +159,17 @@ std::filesystem::path SweepFolderOf(const std::filesystem::path& set) {
   return folder.parent_path() / (folder.stem().string() + "-bench");
 }
 
-std::string SweepJson(const SweepRun& run) {
+Json SweepJson(const SweepRun& run) {
   Json stages = Json::array();
   for (const SweptStage& swept : run.stages) stages.push_back(StageJson(swept));
-  const Json json{{"set", run.set},
-                  {"machine",
-                   {{"cpu", run.machine.cpu},
-                    {"cores", run.machine.cores},
-                    {"renderer", run.machine.renderer},
-                    {"version", run.machine.version},
-                    {"clock", run.machine.clock}}},
-                  {"stages", stages}};
-  return json.dump(1);
+  return {{"set", run.set},
+          {"machine",
+           {{"cpu", run.machine.cpu},
+            {"cores", run.machine.cores},
+            {"renderer", run.machine.renderer},
+            {"version", run.machine.version},
+            {"clock", run.machine.clock}}},
+          {"stages", stages}};
 }
 
 std::string SweepCsv(const SweepRun& run) {

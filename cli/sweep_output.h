@@ -2,6 +2,7 @@
 #pragma once
 #include <filesystem>
 #include <map>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -44,7 +45,7 @@ void SaySweep(const SweepFacts& facts, Console& console);
 ///  machine_ms,on_front,figures:{...}}], front:[index], knee, max_loss_db, cheapest_within_loss,
 ///  budget, best_within_budget, default:{at,on_front,beaten_by,within_spread},
 ///  machine_ms:{least,median,most}}]}. What is not there is null.
-std::string SweepJson(const SweepRun& run);
+nlohmann::ordered_json SweepJson(const SweepRun& run);
 /// A line per point: stage,setting,cost,cost_least,cost_most,error,psnr_db,on_front,machine_ms,
 /// command.
 std::string SweepCsv(const SweepRun& run);

@@ -15,6 +15,7 @@
 #include "dtr/base/machine.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/eval/json.h"
+#include "dtr/io/run_record_json.h"
 #include "dtr/io/set_io.h"
 #include "dtr/io/validation_result.h"
 #include "pipeline/advise.h"
@@ -351,9 +352,8 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
   log.End();
   std::vector<std::string> lines = progress.lines();
   lines.insert(lines.end(), report.coverage.begin(), report.coverage.end());
-  io::RunRecord record = log.Record(ResolveThreads(options.threads), std::move(lines));
-  record.extra_json = Json{{"screening", ScreeningJson(report)}}.dump();
-  io::WriteRunRecord(writer.folder(), record);
+  io::WriteRunRecord(writer.folder(), log.Record(ResolveThreads(options.threads), std::move(lines)),
+                     {{"screening", ScreeningJson(report)}});
   writer.Finish(set);
   report.set = std::move(set);
   report.written = options.output;

@@ -10,6 +10,7 @@
 #include "dtr/base/json_number.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/io/pruned_json.h"
+#include "dtr/io/run_record_json.h"
 #include "dtr/io/set_io.h"
 #include "dtr/prune/probes.h"
 #include "dtr/render/stored_options_json.h"
@@ -256,11 +257,9 @@ PruneSetReport PruneSet(const PruneSetOptions& options, Progress& progress) {
   }
   ExpectGoalsReached(options, pruned, report);
   log.End();
-  io::RunRecord record = log.Record(ResolveThreads(options.threads));
-  record.extra_json = Json{{"frame_before_ms", report.frame_before.median_ms},
-                           {"frame_after_ms", report.frame_after.median_ms}}
-                          .dump();
-  io::WriteRunRecord(writer.folder(), record);
+  io::WriteRunRecord(writer.folder(), log.Record(ResolveThreads(options.threads)),
+                     {{"frame_before_ms", report.frame_before.median_ms},
+                      {"frame_after_ms", report.frame_after.median_ms}});
   writer.Finish(pruned);
   report.bytes_before = BytesOf(set, options.set);
   report.bytes_after = BytesOf(pruned, options.output);

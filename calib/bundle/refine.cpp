@@ -11,6 +11,7 @@
 #include "calib/bundle/covariance.h"
 #include "calib/bundle/held_out.h"
 #include "dtr/base/error.h"
+#include "dtr/base/order_statistics.h"
 #include "dtr/base/parallel_for.h"
 
 namespace dtr::calib {
@@ -300,8 +301,7 @@ double HeldOutErrorPx(const SfmModel& model, std::uint64_t seed, int* count) {
   }
   *count = static_cast<int>(lengths_px.size());
   if (lengths_px.empty()) return std::numeric_limits<double>::quiet_NaN();
-  std::nth_element(lengths_px.begin(), lengths_px.begin() + *count / 2, lengths_px.end());
-  return lengths_px[static_cast<size_t>(*count / 2)];
+  return UpperMedian(lengths_px);
 }
 
 std::string RemarkOn(const Refined& refined) {

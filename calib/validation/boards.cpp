@@ -13,6 +13,7 @@
 #include "calib/validation/board_residuals.h"
 #include "calib/validation/board_solves.h"
 #include "dtr/base/error.h"
+#include "dtr/base/order_statistics.h"
 #include "dtr/base/parallel_for.h"
 
 namespace dtr::calib {
@@ -104,8 +105,7 @@ class Judging {
       }
     }
     if (noise.empty()) return kNaN;
-    std::sort(noise.begin(), noise.end());
-    return noise[noise.size() / 2];
+    return UpperMedian(noise);
   }
 
   void FillRegions(size_t c) {
@@ -194,8 +194,7 @@ class Judging {
         if (region.count >= kMinInRegion) rms.push_back(region.rms_px);
       }
       if (rms.empty()) continue;
-      std::sort(rms.begin(), rms.end());
-      const double typical = rms[rms.size() / 2];
+      const double typical = UpperMedian(rms);
       for (size_t i = 0; i < camera.regions.size(); ++i) {
         const ResidualStats& region = camera.regions[i];
         // No region is out of line by what misleads nobody.

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 #include <sstream>
 #include <thread>
 
@@ -413,10 +414,10 @@ int RunSweep(const SweepRequest& request, const Context& context) {
     run.stages.push_back(
         SweepOne(*measurable, request, context, run.machine, file ? &*file : nullptr));
   }
-  const std::string json = SweepJson(run);
-  const SweepFacts facts = ReadSweep(json, kSweepFile);
+  const nlohmann::ordered_json json = SweepJson(run);
+  const SweepFacts facts = FactsOf(json, kSweepFile);
   if (!one_point) {
-    WriteFileAtomically(output / kSweepFile, json + "\n");
+    WriteFileAtomically(output / kSweepFile, json.dump(1) + "\n");
     WriteFileAtomically(output / "bench.csv", SweepCsv(run));
     WriteFileAtomically(output / "bench.html", SweepPage(facts));
     for (const auto& [name, svg] : SweepPlots(facts)) {

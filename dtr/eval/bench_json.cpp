@@ -3,6 +3,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "dtr/base/json_number.h"
 #include "dtr/eval/metrics.h"
 #include "dtr/render/option_names.h"
 
@@ -10,10 +11,6 @@ namespace dtr::eval {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-Json NumberOrNull(const std::optional<double>& value) {
-  return value && std::isfinite(*value) ? Json(*value) : Json(nullptr);
-}
 
 Json Value(const BenchMachine& machine) {
   return {{"cpu", machine.cpu},

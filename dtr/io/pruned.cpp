@@ -61,9 +61,23 @@ void DescribeLoss(const Json& pruned, const std::string& kind, const char* words
   out << " dB\n";
 }
 
+/// The rendering options among what was pruned, and the name of their field; null where there are
+/// none.
+std::pair<Json, std::string> StoredOptionsIn(const Json& pruned) {
+  for (const char* field : {kRender, kRenderWords}) {
+    const auto found = pruned.find(field);
+    if (found == pruned.end()) continue;
+    const std::string where = std::string(kWhere) + "." + field;
+    if (!found->is_structured()) {
+      throw Error(where + ": expected an object, found " + found->dump());
+    }
+    return {*found, where};
+  }
+  return {nullptr, ""};
+}
+
 /// {"views": 4, "method": "two-pass"} as: views 4, method two-pass.
-std::string InWords(const std::string& options_json) {
-  const Json options = Json::parse(options_json);
+std::string InWords(const Json& options) {
   std::string words;
   for (const auto& [name, value] : options.items()) {
     const std::string text = value.is_string() ? value.get<std::string>() : value.dump();
@@ -109,16 +123,9 @@ void SetPrunedJson(DtrSet& set, const std::string& json) {
 StoredRenderOptions RenderOptionsOf(const DtrSet& set) {
   const Json pruned = PrunedOf(set);
   if (pruned.is_null()) return {};
-  for (const char* field : {kRender, kRenderWords}) {
-    const auto found = pruned.find(field);
-    if (found == pruned.end()) continue;
-    const std::string where = std::string(kWhere) + "." + field;
-    if (!found->is_structured()) {
-      throw Error(where + ": expected an object, found " + found->dump());
-    }
-    return {found->dump(), where};
-  }
-  return {};
+  const auto [options, where] = StoredOptionsIn(pruned);
+  if (options.is_null()) return {};
+  return {options.dump(), where};
 }
 
 std::string DescribePruned(const DtrSet& set) {
@@ -134,7 +141,7 @@ std::string DescribePruned(const DtrSet& set) {
   DescribeSteps(pruned, "put_back", "taken back: ", out);
   DescribeLoss(pruned, "probe", "lost between input cameras", out);
   DescribeLoss(pruned, "witness", "lost at photos that did not decide", out);
-  out << "rendered by default with: " << InWords(RenderOptionsOf(set).json) << "\n";
+  out << "rendered by default with: " << InWords(StoredOptionsIn(pruned).first) << "\n";
   return out.str();
 }
 

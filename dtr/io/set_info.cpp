@@ -15,6 +15,7 @@
 #include "dtr/io/json_fields.h"
 #include "dtr/io/pruned.h"
 #include "dtr/io/pruned_json.h"
+#include "dtr/io/run_record_json.h"
 #include "dtr/io/set_io.h"
 #include "dtr/io/set_json.h"
 #include "dtr/io/validation_result.h"
@@ -196,6 +197,10 @@ std::string InfoJson(const DtrSet& set) {
 }
 
 void WriteRunRecord(const fs::path& set_folder, const RunRecord& record) {
+  WriteRunRecord(set_folder, record, Json::object());
+}
+
+void WriteRunRecord(const fs::path& set_folder, const RunRecord& record, const Json& extra) {
   Json run = {{"written_utc", UtcNow()},
               {"command", record.command},
               {"threads", record.threads},
@@ -208,8 +213,6 @@ void WriteRunRecord(const fs::path& set_folder, const RunRecord& record) {
                              {"peak_rss_kib", stage.peak_rss_kib}});
   }
   run["log"] = record.log;
-  const Json extra = ParseJson(record.extra_json, "run record");
-  if (!extra.is_object()) throw Error("run record: expected an object of extra fields");
   for (const auto& [key, value] : extra.items()) {
     if (!run.contains(key)) run[key] = value;
   }

@@ -160,8 +160,7 @@ struct RunRecord {
   std::vector<std::string> command;  ///< argv
   std::vector<RunStage> stages;
   int threads = 0;
-  std::vector<std::string> log;   ///< lines worth keeping
-  std::string extra_json = "{}";  ///< more fields of the same kind
+  std::vector<std::string> log;  ///< lines worth keeping
 };
 
 /// Adds host (name, system, processor, cores) and the time of day, and writes report/run.json.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 
+#include "dtr/base/order_statistics.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/render/geometry.h"
 #include "dtr/render/scene.h"
@@ -30,9 +31,7 @@ double MedianDepth(const View& view) {
     if (!DepthImage::IsHole(z)) depths.push_back(z);
   }
   if (depths.empty()) return 0;
-  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
-  std::nth_element(depths.begin(), middle, depths.end());
-  return *middle;
+  return UpperMedian(depths);
 }
 
 /// The views nearest by angle at what the view looks at; ties to the smaller index.

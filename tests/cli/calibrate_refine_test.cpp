@@ -293,16 +293,16 @@ TEST_F(RefineToPlaces, PlacesThatDoNotSettleAreTold) {
   const auto told = [&](int max_passes) {
     options.max_passes = max_passes;
     const auto refined = pipeline::RefineInMetres(model, options, places, {});
-    const Json scale = Json::parse(refined.scale_json);
-    EXPECT_LE(scale["passes"], max_passes);
+    const pipeline::PositionsReport& positions = refined.report.positions.value();
+    EXPECT_LE(positions.passes, max_passes);
     const std::string line = fmt::format(
         "which positions agree, and how far they err, did not settle in {} passes; give "
         "`gps_sigma` "
         "where you know it",
         max_passes);
     const auto& lines = refined.lines;
-    EXPECT_EQ(std::find(lines.begin(), lines.end(), line) != lines.end(), !scale["settled"]);
-    return scale["settled"].get<bool>();
+    EXPECT_EQ(std::find(lines.begin(), lines.end(), line) != lines.end(), !positions.settled);
+    return positions.settled;
   };
   EXPECT_TRUE(told(10));
   EXPECT_FALSE(told(1)) << "settled at once: the test tells nothing";

@@ -6,11 +6,13 @@
 #include <fstream>
 #include <limits>
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/io/depth_io.h"
+#include "dtr/io/run_record_json.h"
 #include "dtr/io/set_io.h"
 #include "tests/io/small_set.h"
 #include "tests/support/message_of.h"
@@ -367,8 +369,7 @@ TEST(WriteRunRecord, LiesOutsideTheHashes) {
   RunRecord record;
   record.command = {"dtr", "build"};
   record.stages = {{"stereo", 1.5, 2.5, 1000}};
-  record.extra_json = R"({"note": 1})";
-  WriteRunRecord(folder / "small.dtr", record);
+  WriteRunRecord(folder / "small.dtr", record, {{"note", 1}});
   EXPECT_THAT(VerifySet(folder / "small.dtr"), IsEmpty());
   const std::string text = ReadFile(folder / "small.dtr/report/run.json", 1 << 20);
   for (const char* field : {"\"host\"", "\"cores\"", "\"wall_s\": 1.5", "\"note\": 1"}) {

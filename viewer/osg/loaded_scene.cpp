@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "dtr/base/error.h"
+#include "dtr/base/order_statistics.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/io/pruned.h"
 #include "dtr/io/set_io.h"
@@ -30,10 +31,7 @@ float FarthestDepth(const dtr::View& view) {
     if (!dtr::DepthImage::IsHole(z)) depths.push_back(z);
   }
   if (depths.empty()) return 0;
-  const auto rank =
-      static_cast<std::ptrdiff_t>((1 - kOutlierShare) * static_cast<double>(depths.size() - 1));
-  std::nth_element(depths.begin(), depths.begin() + rank, depths.end());
-  return static_cast<float>(kOutlierFactor) * depths[static_cast<size_t>(rank)];
+  return static_cast<float>(kOutlierFactor) * dtr::QuantileOf(depths, 1 - kOutlierShare);
 }
 
 bool HasCompany(const dtr::DepthImage& depth, int x, int y, float farthest) {

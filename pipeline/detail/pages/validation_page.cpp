@@ -7,6 +7,7 @@
 #include <map>
 
 #include "dtr/base/error.h"
+#include "dtr/base/order_statistics.h"
 #include "dtr/io/set_io.h"
 #include "dtr/report/contact_sheet.h"
 #include "dtr/report/html.h"
@@ -108,10 +109,7 @@ calib::ImageMap PlacedMap(const PlotSize& size, const calib::ValidationReport& r
     }
   }
   for (size_t i = 0; i < cells.size(); ++i) {
-    if (cells[i].empty()) continue;
-    const auto middle = cells[i].begin() + static_cast<long>(cells[i].size() / 2);
-    std::nth_element(cells[i].begin(), middle, cells[i].end());
-    map.values[i] = *middle;
+    if (!cells[i].empty()) map.values[i] = UpperMedian(cells[i]);
   }
   return map;
 }

@@ -62,7 +62,7 @@ TEST(Refine, FreesAPrincipalPointThatAllObservationsTellAndUnseenPointsDoNot) {
 TEST(Refine, TellsTheCovarianceOfEveryPoseAndLensWhereAsked) {
   SfmModel model = ModelFrom(MakeBundle(Noisy()));
   model.cameras[1].params[1] += 12;
-  EXPECT_TRUE(Refine(model, {}).covariance_json.empty());
+  EXPECT_FALSE(Refine(model, {}).covariance.has_value());
   RefineOptions options;
   options.covariance = true;
   const auto json = nlohmann::json::parse(ToJson(Refine(model, options)))["covariance"];
