@@ -4,6 +4,7 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/order_statistics.h"
+#include "dtr/base/size_text.h"
 #include "dtr/render/time_steps.h"
 
 namespace dtr {
@@ -12,10 +13,6 @@ namespace {
 // A photographer with one neighbour stands about this share of the distance away; only sets of a
 // single camera need it, where no pair of photos defines a disparity.
 constexpr double kLoneCameraBaseline = 0.1;
-
-std::string SizeText(int width_px, int height_px) {
-  return std::to_string(width_px) + "x" + std::to_string(height_px);
-}
 
 void RequireSize(const View& view, const char* what, int width_px, int height_px,
                  const PinholeCamera& expected) {

@@ -7,6 +7,7 @@
 
 #include "calib/colmap/dense.h"
 #include "dtr/base/order_statistics.h"
+#include "dtr/base/size_text.h"
 
 namespace dtr::stereo {
 namespace {
@@ -43,10 +44,6 @@ class ByName {
   std::map<std::string, const colmap::DenseImage*> whole_, stems_;
 };
 
-std::string SizeText(const PinholeCamera& camera) {
-  return std::to_string(camera.width_px()) + "x" + std::to_string(camera.height_px());
-}
-
 /// Distance to the nearest other camera that is elsewhere.
 double NearestCamera(std::span<const StereoView> views, size_t index) {
   double nearest = std::numeric_limits<double>::infinity();
@@ -65,7 +62,8 @@ std::string Difference(const StereoView& view, const colmap::DenseImage& image,
   const PinholeCamera& a = view.camera;
   const PinholeCamera& b = image.camera;
   if (a.width_px() != b.width_px() || a.height_px() != b.height_px()) {
-    return "an image of " + SizeText(a) + ", found " + SizeText(b);
+    return "an image of " + SizeText(a.width_px(), a.height_px()) + ", found " +
+           SizeText(b.width_px(), b.height_px());
   }
   const double off_px =
       std::max({std::abs(a.fx_px() - b.fx_px()), std::abs(a.fy_px() - b.fy_px()),

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "dtr/base/error.h"
+#include "dtr/base/size_text.h"
 #include "dtr/io/formats/depth_grid.h"
 #include "dtr/io/formats/foreign_depth.h"
 
@@ -11,10 +12,6 @@ namespace dtr::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string SizeText(int width_px, int height_px) {
-  return std::to_string(width_px) + "x" + std::to_string(height_px);
-}
 
 // Ray distances of pixels that a lens displaced: each has the ray of its own place.
 DepthImage ToPlaneZOfDistorted(DepthImage depth, const io::NamedCamera& named,

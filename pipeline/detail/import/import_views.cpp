@@ -11,6 +11,7 @@
 #include "dtr/base/hash.h"
 #include "dtr/base/memory_budget.h"
 #include "dtr/base/parallel_for.h"
+#include "dtr/base/size_text.h"
 #include "dtr/io/depth_io.h"
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
@@ -21,10 +22,6 @@ namespace dtr::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string PixelsText(int width_px, int height_px) {
-  return std::to_string(width_px) + "x" + std::to_string(height_px);
-}
 
 bool HasDepth(const io::NamedCamera& named, const ImportOptions& options) {
   return !options.depth_dir.empty() && !options.held_out.contains(named.name);
@@ -45,9 +42,8 @@ io::ImageAndMask ReadCameraImage(const io::NamedCamera& named, const fs::path& f
   const StoredSize stored{header.width_px, header.height_px, header.exif_orientation};
   const auto grid = GridOfSize(camera.width_px(), camera.height_px(), stored, options.photo_grid);
   if (!grid) {
-    throw Error(file.string() + ": expected " + PixelsText(camera.width_px(), camera.height_px()) +
-                " pixels as the camera says, found " +
-                PixelsText(header.width_px, header.height_px) +
+    throw Error(file.string() + ": expected " + SizeText(camera.width_px(), camera.height_px()) +
+                " pixels as the camera says, found " + SizeText(header.width_px, header.height_px) +
                 "; give the images the cameras were made for");
   }
   const bool upright = *grid == PhotoGrid::kUpright;
@@ -61,8 +57,8 @@ Mask ReadCameraMask(const io::NamedCamera& named, const ImportOptions& options) 
   const Mask mask = io::ReadMask(file);
   if (mask.width() != named.camera.width_px() || mask.height() != named.camera.height_px()) {
     throw Error(file.string() + ": expected a mask of " +
-                PixelsText(named.camera.width_px(), named.camera.height_px()) + " pixels, found " +
-                PixelsText(mask.width(), mask.height()));
+                SizeText(named.camera.width_px(), named.camera.height_px()) + " pixels, found " +
+                SizeText(mask.width(), mask.height()));
   }
   if (std::none_of(mask.data().begin(), mask.data().end(), [](auto value) { return value != 0; })) {
     throw Error(
