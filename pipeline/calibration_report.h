@@ -54,7 +54,7 @@ struct RigPlacement {
 /// Bundle adjustment without a rig.
 struct BundleAdjustment {
   calib::RefineReport refined;
-  std::optional<MetreReport> metres;  ///< where positions or distances were held
+  std::optional<MetreReport> metres;  ///< where positions or distances constrained it
 };
 
 /// A focal length of EXIF that contradicts what structure from motion found

@@ -94,7 +94,7 @@ PositionsReport ReportOf(const calib::SfmModel& model, const PhotoPositions& pla
           .rms_m = report.rms_m,
           .found_sigma_flat_m = report.sigma_flat_m,
           .found_sigma_up_m = report.sigma_up_m,
-          .tell_scale = report.places_tell_scale,
+          .determine_scale = report.places_tell_scale,
           .relative_sigma = report.places_relative_sigma,
           .passes = report.passes,
           .settled = report.settled,

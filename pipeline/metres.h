@@ -33,7 +33,7 @@ struct PositionsReport {
   double given_rms_m = 0, rms_m = 0;
   /// Standard deviations that were found, per axis on the map and in height; 0: all were stated.
   double found_sigma_flat_m = 0, found_sigma_up_m = 0;
-  bool tell_scale = true;
+  bool determine_scale = true;
   double relative_sigma = 0;  ///< of the scale, as the positions alone give it
   int passes = 0;
   bool settled = true;

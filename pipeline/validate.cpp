@@ -104,7 +104,7 @@ std::string ToJson(const SetValidation& report) {
   json["adjustment"] = calib::JsonOf(report.adjustment);
   if (report.cross_depth) {
     json["cross_depth"] = eval::JsonOf(*report.cross_depth);
-    for (const char* told_above : {"passed", "tests"}) json["cross_depth"].erase(told_above);
+    for (const char* listed_above : {"passed", "tests"}) json["cross_depth"].erase(listed_above);
   }
   // Names come from files: bytes that are no UTF-8 must not make the whole report unreadable.
   return json.dump(2, ' ', false, Json::error_handler_t::replace);

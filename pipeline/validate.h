@@ -38,19 +38,19 @@ struct SetValidation : calib::ValidationReport {
 /// {views[], all} where there is such.
 std::string ToJson(const SetValidation& report);
 
-/// The same, and then the set is judged by a fresh bundle adjustment (calib/validation/photos.h),
-/// whose tests and figures join the report: some seconds. A set that was built with a rig must
-/// still stand as that does (RigPlaces, set_rig.h). Where views have depth, it is carried into the
-/// neighbours and back; their maps are read from `folder`, as many at a time as memory_gb holds
-/// (one with its neighbours where it holds less).
+/// ReprojectionOfSet, and then the set is validated by a fresh bundle adjustment
+/// (calib/validation/photos.h), whose tests and figures join the report: some seconds. A set that
+/// was built with a rig must still stand as that does (RigPlaces, set_rig.h). Where views have
+/// depth, it is carried into the neighbours and back; their maps are read from `folder`, as many at
+/// a time as memory_gb holds (one with its neighbours where it holds less).
 SetValidation ValidateSet(const std::filesystem::path& folder, const DtrSet& set,
                           const SparseScene& sparse, const SetLimits& limits, int threads,
                           Progress& progress);
 
-/// The same as a page. Verdict and tests; a table of the views; for every size of image, all views
+/// That as a page. Result and tests; a table of the views; for every size of image, all views
 /// together: residual vectors, coverage, and how uncertain the image is where the fresh bundle
-/// adjustment told; and the worst views, drawn over their images, read from `folder` one at a time.
-/// `set` and `report` belong together. Deterministic.
+/// adjustment gave it; and the worst views, drawn over their images, read from `folder` one at a
+/// time. `set` and `report` belong together. Deterministic.
 std::string ValidationPage(const std::filesystem::path& folder, const DtrSet& set,
                            const SetValidation& report, const std::string& title);
 

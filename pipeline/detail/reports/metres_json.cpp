@@ -21,7 +21,7 @@ void AppendPositions(const PositionsReport& positions, Json& json) {
   json["rms_m"] = positions.rms_m;
   json["found_sigma_flat_m"] = FoundSigma(positions.found_sigma_flat_m);
   json["found_sigma_up_m"] = FoundSigma(positions.found_sigma_up_m);
-  json["places_tell_scale"] = positions.tell_scale;
+  json["places_tell_scale"] = positions.determine_scale;
   json["places_relative_sigma"] = positions.relative_sigma;
   json["passes"] = positions.passes;
   json["settled"] = positions.settled;
@@ -38,7 +38,7 @@ PositionsReport PositionsFrom(const Json& json) {
   positions.rms_m = NumberOrNan(json.at("rms_m"));
   positions.found_sigma_flat_m = FoundSigmaFrom(json.at("found_sigma_flat_m"));
   positions.found_sigma_up_m = FoundSigmaFrom(json.at("found_sigma_up_m"));
-  positions.tell_scale = json.at("places_tell_scale").get<bool>();
+  positions.determine_scale = json.at("places_tell_scale").get<bool>();
   positions.relative_sigma = NumberOrNan(json.at("places_relative_sigma"));
   positions.passes = json.at("passes").get<int>();
   positions.settled = json.at("settled").get<bool>();
