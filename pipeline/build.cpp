@@ -22,7 +22,7 @@
 #include "pipeline/capture.h"
 #include "pipeline/detail/depth/depth_engine.h"
 #include "pipeline/detail/depth/depth_stage.h"
-#include "pipeline/detail/depth/effort_json.h"
+#include "pipeline/detail/depth/quality_json.h"
 #include "pipeline/detail/pages/set_page.h"
 #include "pipeline/detail/photos/holdout.h"
 #include "pipeline/detail/photos/input_hash.h"
@@ -46,9 +46,9 @@ std::vector<std::string> NamesOf(const capture::Capture& capture) {
   return names;
 }
 
-Json OptionsJson(const BuildOptions& options, const stereo::Effort& effort) {
+Json OptionsJson(const BuildOptions& options, const stereo::QualitySettings& quality) {
   // Everything that can change a byte of the set, and nothing else: threads and memory do not.
-  Json json = SettingsJson(options.depth.engine, effort);
+  Json json = SettingsJson(options.depth.engine, quality);
   json["max_size_px"] = options.max_size_px;
   json["holdout"] = options.holdout;
   json["holdout_strict"] = options.holdout_strict;
@@ -159,10 +159,9 @@ std::vector<SparsePoint> SourcePoints(const SparseScene& sparse, const std::vect
 
 // Photos that are there twice add nothing, and would show what is held out. Given places say that
 // they are photos of their own; those of a rig belong to its time steps.
-void LeaveOutSamePictures(const BuildOptions& options, capture::Capture& photos,
-                          Progress& progress) {
+void LeaveOutSameImages(const BuildOptions& options, capture::Capture& photos, Progress& progress) {
   if (options.keep_duplicates || !options.poses.empty() || !options.rig.empty()) return;
-  const auto left_out = capture::DropSamePictures(
+  const auto left_out = capture::DropSameImages(
       photos, [&](const std::string& name) { return IsNamed(options.holdout, name); });
   for (const auto& [name, same_as] : left_out) {
     progress.Note(name + " left out: it has the same pixels as " + same_as);
@@ -217,9 +216,9 @@ calib::ValidationReport Validate(const std::filesystem::path& folder, DtrSet& se
   calib::ValidationReport validation = ValidateSet(folder, set, sparse, limits, threads, progress);
   report.validated = true;
   report.validation_passed = validation.passed();
-  set.verdict_json = eval::VerdictJson(validation.tests);
+  set.validation_json = eval::ValidationJson(validation.tests);
   if (!report.validation_passed) {
-    progress.Note(io::VerdictWarning(set));
+    progress.Note(io::ValidationWarning(set));
   }
   return validation;
 }
@@ -296,7 +295,7 @@ void SayRemarks(const BuildReport& report, size_t photos, Progress& progress) {
 
 BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
   const BuildOptions options = ByPreset(asked);
-  const stereo::Effort effort = EffortOf(options.depth);
+  const stereo::QualitySettings quality = QualityOf(options.depth);
   RequireEngine(options.depth);
   RequireOptions(options);
   std::optional<SetRig> rig;
@@ -313,7 +312,7 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
   capture::Capture photos;
   std::vector<bool> held_out;
   const auto look = [&] {
-    LeaveOutSamePictures(options, photos, progress);
+    LeaveOutSameImages(options, photos, progress);
     capture::RequireEnoughPhotos(photos, options.photos);
     if (!options.poses.empty()) TakePhotosAsCamerasDo(options.poses, photos, progress);
     held_out = ChooseHeldOut(options.holdout, NamesOf(photos));
@@ -330,7 +329,7 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
   }
   Json fingerprint = {
       {"tool_version", DTR_VERSION},
-      {"options", OptionsJson(options, effort)},
+      {"options", OptionsJson(options, quality)},
       {"time_budget_s", options.depth.time_budget_s.value_or(0)},
       {"photos", from_video ? VideoJson(options)
                             : PhotosJson(photos, std::vector<bool>(held_out.size(), true))},
@@ -414,8 +413,8 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
   const SparseScene sparse = SparseOf(calibrated, views);
 
   log.Begin("depth");
-  const stereo::Effort spent = DepthStage(set, sparse, options.depth, effort,
-                                          {options.threads, options.seed}, writer, progress);
+  const stereo::QualitySettings spent = DepthStage(
+      set, sparse, options.depth, quality, {options.threads, options.seed}, writer, progress);
 
   log.Begin("finishing");
   FinishScene(set, SourcePoints(sparse, views), writer, options.threads, progress);

@@ -25,11 +25,11 @@ struct SetLimits {
   double memory_gb = 1;  ///< 1e9 bytes: of depth maps held for that at a time
 };
 
-/// The same, and then the set is judged by a fresh bundle adjustment (calib/validation/photos.h), whose
-/// tests and figures join the report: some seconds. A set that was built with a rig must still
-/// stand as that does (RigPlaces, set_rig.h). Where views have depth, it is carried into the
-/// neighbours and back; their maps are read from `folder`, as many at a time as memory_gb holds
-/// (one with its neighbours where it holds less).
+/// The same, and then the set is evaluated by a fresh bundle adjustment
+/// (calib/validation/photos.h), whose tests and figures join the report: some seconds. A set that
+/// was built with a rig must still stand as that does (RigPlaces, set_rig.h). Where views have
+/// depth, it is carried into the neighbours and back; their maps are read from `folder`, as many at
+/// a time as memory_gb holds (one with its neighbours where it holds less).
 calib::ValidationReport ValidateSet(const std::filesystem::path& folder, const DtrSet& set,
                                     const SparseScene& sparse, const SetLimits& limits, int threads,
                                     Progress& progress);

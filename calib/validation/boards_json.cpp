@@ -56,7 +56,7 @@ std::string ToJson(const BoardValidation& report) {
   }
   json["rotated_photos"] = {{"clockwise", rotated.clockwise},
                             {"counterclockwise", rotated.counterclockwise}};
-  json["unseen"] = report.unseen;
+  json["test_photos"] = report.test_views;
   json["flipped"] = report.flipped;
   json["sigma_px"] = NumberOrNull(report.sigma_px);
   json["condition"] = NumberOrNull(report.condition);

@@ -5,18 +5,18 @@
 
 namespace dtr::calib {
 
-std::string ToJson(const PhotosValidation& judgement) {
+std::string ToJson(const PhotosValidation& validation) {
   using Json = nlohmann::ordered_json;
   const auto number = [](double v) { return std::isfinite(v) ? Json(v) : Json(nullptr); };
   Json json;
-  if (!judgement.not_validated.empty()) json["not_validated"] = judgement.not_validated;
-  json["parts"] = judgement.parts;
-  json["observations"] = judgement.observations;
-  json["sigma_px"] = number(judgement.sigma_px);
-  json["condition"] = number(judgement.condition);
-  json["halves_ratio"] = number(judgement.halves_ratio);
+  if (!validation.not_validated.empty()) json["not_validated"] = validation.not_validated;
+  json["parts"] = validation.parts;
+  json["observations"] = validation.observations;
+  json["sigma_px"] = number(validation.sigma_px);
+  json["condition"] = number(validation.condition);
+  json["halves_ratio"] = number(validation.halves_ratio);
   json["lenses"] = Json::array();
-  for (const IntrinsicsValidation& lens : judgement.lenses) {
+  for (const IntrinsicsValidation& lens : validation.lenses) {
     Json params = Json::array();
     for (size_t k = 0; k < lens.names.size(); ++k) {
       params.push_back({{"name", lens.names[k]},
@@ -29,7 +29,7 @@ std::string ToJson(const PhotosValidation& judgement) {
                               {"params", params}});
   }
   json["cameras"] = Json::array();
-  for (const PhotoValidation& camera : judgement.cameras) {
+  for (const PhotoValidation& camera : validation.cameras) {
     json["cameras"].push_back({{"name", camera.name},
                                {"difference_sigmas", number(camera.sigmas)},
                                {"moved_px", number(camera.moved_px)},
@@ -38,7 +38,7 @@ std::string ToJson(const PhotosValidation& judgement) {
                                {"image_shift_px", number(camera.image_shift_px)}});
   }
   json["degeneracies"] = Json::array();
-  for (const Degeneracy& d : judgement.degeneracies) {
+  for (const Degeneracy& d : validation.degeneracies) {
     json["degeneracies"].push_back(
         {{"name", d.name}, {"detail", d.detail}, {"harmful", d.harmful}});
   }

@@ -1,4 +1,4 @@
-// calib/validation/report_json.h -- internal to calib/validation: what the reports of all judges
+// calib/validation/report_json.h -- internal to calib/validation: what all validation reports
 // write alike. For their .cpp files only: shows the JSON library.
 #pragma once
 #include <nlohmann/json.hpp>

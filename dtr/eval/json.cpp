@@ -107,7 +107,7 @@ std::string ToJson(const CrossDepthReport& report) {
   return Text(json);
 }
 
-std::string VerdictJson(const std::vector<Check>& tests) {
+std::string ValidationJson(const std::vector<Check>& tests) {
   return Text({{"passed", AllPassed(tests)}, {"tests", Value(tests)}}, -1);
 }
 

@@ -194,8 +194,8 @@ std::string ValidationPage(const fs::path& folder, const DtrSet& set,
                            const calib::ValidationReport& report, const std::string& title) {
   const std::vector<View>& views = set.frames.front().views;
   report::HtmlReport page(title);
-  page.Verdict(report.passed(), report.passed() ? "The calibration passed its tests"
-                                                : "The calibration broke at least one test");
+  page.Result(report.passed(), report.passed() ? "The calibration passed its tests"
+                                               : "The calibration broke at least one test");
   page.Section("Can the calibration be trusted?");
   report::AddChecks(page, report.tests);
   if (!report.not_validated.empty()) {

@@ -8,7 +8,7 @@
 
 namespace dtr::pipeline {
 
-/// Verdict and tests; a table of the views; for every size of image, all views together: residual
+/// Result and tests; a table of the views; for every size of image, all views together: residual
 /// vectors, coverage, and how uncertain the image is where the fresh bundle adjustment told; and
 /// the worst views, drawn over their images, read from `folder` one at a time. `set` and `report`
 /// belong together (validate_set.h). Deterministic.
