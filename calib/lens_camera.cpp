@@ -12,7 +12,7 @@ namespace dtr::calib {
 namespace {
 
 struct ModelFacts {
-  LensModel model;
+  CameraModel model;
   const char* name;
   int parameters;
   int focal_lengths;
@@ -20,35 +20,35 @@ struct ModelFacts {
 };
 
 constexpr std::array<ModelFacts, 11> kModels{{
-    {LensModel::kSimplePinhole, "SIMPLE_PINHOLE", 3, 1, false},
-    {LensModel::kPinhole, "PINHOLE", 4, 2, false},
-    {LensModel::kSimpleRadial, "SIMPLE_RADIAL", 4, 1, false},
-    {LensModel::kRadial, "RADIAL", 5, 1, false},
-    {LensModel::kOpenCv, "OPENCV", 8, 2, false},
-    {LensModel::kOpenCvFisheye, "OPENCV_FISHEYE", 8, 2, true},
-    {LensModel::kFullOpenCv, "FULL_OPENCV", 12, 2, false},
-    {LensModel::kFov, "FOV", 5, 2, false},
-    {LensModel::kSimpleRadialFisheye, "SIMPLE_RADIAL_FISHEYE", 4, 1, true},
-    {LensModel::kRadialFisheye, "RADIAL_FISHEYE", 5, 1, true},
-    {LensModel::kThinPrismFisheye, "THIN_PRISM_FISHEYE", 12, 2, true},
+    {CameraModel::kSimplePinhole, "SIMPLE_PINHOLE", 3, 1, false},
+    {CameraModel::kPinhole, "PINHOLE", 4, 2, false},
+    {CameraModel::kSimpleRadial, "SIMPLE_RADIAL", 4, 1, false},
+    {CameraModel::kRadial, "RADIAL", 5, 1, false},
+    {CameraModel::kOpenCv, "OPENCV", 8, 2, false},
+    {CameraModel::kOpenCvFisheye, "OPENCV_FISHEYE", 8, 2, true},
+    {CameraModel::kFullOpenCv, "FULL_OPENCV", 12, 2, false},
+    {CameraModel::kFov, "FOV", 5, 2, false},
+    {CameraModel::kSimpleRadialFisheye, "SIMPLE_RADIAL_FISHEYE", 4, 1, true},
+    {CameraModel::kRadialFisheye, "RADIAL_FISHEYE", 5, 1, true},
+    {CameraModel::kThinPrismFisheye, "THIN_PRISM_FISHEYE", 12, 2, true},
 }};
 
-const ModelFacts& FactsOf(LensModel model) {
+const ModelFacts& FactsOf(CameraModel model) {
   for (const ModelFacts& facts : kModels) {
     if (facts.model == model) return facts;
   }
-  throw std::invalid_argument("LensModel: unknown id " + std::to_string(static_cast<int>(model)));
+  throw std::invalid_argument("CameraModel: unknown id " + std::to_string(static_cast<int>(model)));
 }
 
 }  // namespace
 
-int ParameterCount(LensModel model) { return FactsOf(model).parameters; }
+int ParameterCount(CameraModel model) { return FactsOf(model).parameters; }
 
-int FocalCount(LensModel model) { return FactsOf(model).focal_lengths; }
+int FocalCount(CameraModel model) { return FactsOf(model).focal_lengths; }
 
-std::string NameOf(LensModel model) { return FactsOf(model).name; }
+std::string NameOf(CameraModel model) { return FactsOf(model).name; }
 
-std::optional<LensModel> LensModelFromName(const std::string& name) {
+std::optional<CameraModel> CameraModelFromName(const std::string& name) {
   for (const ModelFacts& facts : kModels) {
     if (name == facts.name) return facts.model;
   }
@@ -102,12 +102,12 @@ std::optional<Eigen::Vector3d> LensCamera::RayFromPixel(const Eigen::Vector2d& p
 }
 
 LensCamera WithTwoFocalLengths(LensCamera camera) {
-  static const std::map<LensModel, LensModel> kWider{
-      {LensModel::kSimplePinhole, LensModel::kPinhole},
-      {LensModel::kSimpleRadial, LensModel::kOpenCv},
-      {LensModel::kRadial, LensModel::kOpenCv},
-      {LensModel::kSimpleRadialFisheye, LensModel::kOpenCvFisheye},
-      {LensModel::kRadialFisheye, LensModel::kOpenCvFisheye}};
+  static const std::map<CameraModel, CameraModel> kWider{
+      {CameraModel::kSimplePinhole, CameraModel::kPinhole},
+      {CameraModel::kSimpleRadial, CameraModel::kOpenCv},
+      {CameraModel::kRadial, CameraModel::kOpenCv},
+      {CameraModel::kSimpleRadialFisheye, CameraModel::kOpenCvFisheye},
+      {CameraModel::kRadialFisheye, CameraModel::kOpenCvFisheye}};
   const auto wider = kWider.find(camera.model);
   if (wider == kWider.end()) return camera;
   camera.model = wider->second;

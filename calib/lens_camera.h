@@ -12,7 +12,7 @@ namespace dtr::calib {
 
 /// Lens models with COLMAP's names and ids (its sensor models 0 to 10); the parameter order is
 /// COLMAP's too. Ids beyond are rejected by the readers, by name.
-enum class LensModel : int {
+enum class CameraModel : int {
   kSimplePinhole = 0,        ///< f, cx, cy
   kPinhole = 1,              ///< fx, fy, cx, cy
   kSimpleRadial = 2,         ///< f, cx, cy, k
@@ -27,17 +27,17 @@ enum class LensModel : int {
 };
 
 /// Number of parameters of a model.
-int ParameterCount(LensModel model);
+int ParameterCount(CameraModel model);
 /// 1 or 2: focal lengths come first, the principal point follows, then the distortion.
-int FocalCount(LensModel model);
+int FocalCount(CameraModel model);
 /// "OPENCV" and the like.
-std::string NameOf(LensModel model);
+std::string NameOf(CameraModel model);
 /// Inverse of NameOf; empty for names this version does not know.
-std::optional<LensModel> LensModelFromName(const std::string& name);
+std::optional<CameraModel> CameraModelFromName(const std::string& name);
 
 /// A camera with a lens. Pixels: origin at the outer corner of the top-left pixel.
 struct LensCamera {
-  LensModel model = LensModel::kPinhole;
+  CameraModel model = CameraModel::kPinhole;
   int width_px = 0, height_px = 0;
   std::vector<double> params;  ///< ParameterCount(model) values, COLMAP's order
 

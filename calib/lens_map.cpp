@@ -80,7 +80,7 @@ double FirstPositiveRoot(const Polynomial& p) {
 
 LensMap::LensMap(const LensCamera& camera)
     : formula_((camera.Check(), FormulaOf(camera.model, camera.params.data()))) {
-  if (camera.model == LensModel::kFov) {
+  if (camera.model == CameraModel::kFov) {
     fov_ = camera.params[4] != 0;  // the limit omega -> 0 is the pinhole camera
     omega_ = std::abs(camera.params[4]);
   }

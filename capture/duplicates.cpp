@@ -20,7 +20,7 @@ std::set<std::string> Suspects(const Capture& capture) {
 }
 
 // Equal for photos that give equal views wherever they stand.
-std::string PictureHash(const Photo& photo) {
+std::string ImageHash(const Photo& photo) {
   const PhotoPixels read = ReadPhotoAndMask(photo);
   const ImageRgb8& pixels = read.image;
   return std::to_string(pixels.width()) + "x" + std::to_string(pixels.height()) + " " +
@@ -30,12 +30,12 @@ std::string PictureHash(const Photo& photo) {
 
 }  // namespace
 
-std::vector<LeftOut> DropSamePictures(Capture& capture,
-                                      const std::function<bool(const std::string&)>& preferred) {
+std::vector<LeftOut> DropSameImages(Capture& capture,
+                                    const std::function<bool(const std::string&)>& preferred) {
   const std::set<std::string> suspects = Suspects(capture);
   std::map<std::string, std::vector<std::string>> names_of;  // by image
   for (const Photo& photo : capture.photos) {
-    if (suspects.contains(photo.name)) names_of[PictureHash(photo)].push_back(photo.name);
+    if (suspects.contains(photo.name)) names_of[ImageHash(photo)].push_back(photo.name);
   }
   std::map<std::string, std::string> same_as;
   for (const auto& [picture, names] : names_of) {

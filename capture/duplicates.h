@@ -18,7 +18,7 @@ struct LeftOut {
 /// Needs the screening of IngestPhotos: what that does not call a duplicate is not looked at, what
 /// it does is compared pixel by pixel, so that shots that merely resemble each other stay. Throws
 /// Error when such a photo can no longer be read.
-std::vector<LeftOut> DropSamePictures(Capture& capture,
-                                      const std::function<bool(const std::string&)>& preferred);
+std::vector<LeftOut> DropSameImages(Capture& capture,
+                                    const std::function<bool(const std::string&)>& preferred);
 
 }  // namespace dtr::capture

@@ -242,7 +242,7 @@ Capture IngestPhotos(const fs::path& folder, const IngestOptions& options, Progr
             [](const Skipped& a, const Skipped& b) { return a.name < b.name; });
   if (capture.photos.empty()) ThrowNoPhotos(folder, capture);
   AssignIds(capture.photos);
-  JudgePhotos(capture.photos);
+  ScreenPhotos(capture.photos);
   Announce(capture, progress);
   return capture;
 }

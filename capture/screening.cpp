@@ -21,7 +21,7 @@ constexpr double kBlurred = 0.25;        // of the median sharpness of photos of
 constexpr double kClipped = 0.25;        // share of a photo's pixels
 constexpr size_t kPhotosForAMedian = 3;
 constexpr int kThumbnailSidePx = 64;
-constexpr double kSamePicture = 0.03;  // of the thumbnail's contrast
+constexpr double kSameImage = 0.03;  // of the thumbnail's contrast
 constexpr size_t kPhotosLookedBackAt = 100;
 
 // Sums of a value and its square, exact within a row, rows added in their order.
@@ -74,7 +74,7 @@ void Add(Screening& screening, Fault fault, std::string remark) {
 }
 
 // An earlier photo that shows the same image as photos[index].
-void FindSamePicture(std::vector<Photo>& photos, size_t index) {
+void FindSameImage(std::vector<Photo>& photos, size_t index) {
   Screening& screening = *photos[index].screening;
   const double contrast = ContrastOf(screening.thumbnail);
   const size_t first = index - std::min(index, kPhotosLookedBackAt);
@@ -82,7 +82,7 @@ void FindSamePicture(std::vector<Photo>& photos, size_t index) {
     const auto& earlier = photos[other].screening;
     if (!earlier || earlier->thumbnail.empty() || !earlier->duplicate_of.empty()) continue;
     const double difference = DifferenceOf(screening.thumbnail, earlier->thumbnail);
-    if (!(difference < kSamePicture * contrast)) continue;
+    if (!(difference < kSameImage * contrast)) continue;
     screening.duplicate_of = photos[other].name;
     return Add(screening, Fault::kDuplicate,
                fmt::format("shows the same image as {}: they differ by {:.1f} % of its contrast",
@@ -170,7 +170,7 @@ Screening MeasurePhoto(const ImageRgb8& photo, const Mask& mask) {
   return screening;
 }
 
-void JudgePhotos(std::vector<Photo>& photos) {
+void ScreenPhotos(std::vector<Photo>& photos) {
   const auto medians = MedianSharpnessByCamera(photos);
   std::map<std::string, std::string> first_with_content;
   for (size_t i = 0; i < photos.size(); ++i) {
@@ -185,7 +185,7 @@ void JudgePhotos(std::vector<Photo>& photos) {
       screening.duplicate_of = first->second;
       Add(screening, Fault::kDuplicate, "has the same bytes as " + first->second);
     } else if (!screening.thumbnail.empty()) {
-      FindSamePicture(photos, i);
+      FindSameImage(photos, i);
     }
     const auto median = medians.find(photo.camera_group);
     if (median != medians.end() && screening.sharpness < kBlurred * median->second) {

@@ -20,6 +20,6 @@ Screening MeasurePhoto(const ImageRgb8& photo, const Mask& mask = {});
 /// that were there. A photo is a duplicate of an earlier one that has the same bytes, or of one
 /// among the 100 before it whose thumbnail differs by less than 3 % of its own contrast (root mean
 /// squares): an image that moved by more than about 0.15 % of its width differs by more.
-void JudgePhotos(std::vector<Photo>& photos);
+void ScreenPhotos(std::vector<Photo>& photos);
 
 }  // namespace dtr::capture

@@ -79,7 +79,7 @@ eval::FrameTime DrawAlone(gl::FittingRenderer& renderer, const RenderScene& scen
                           const Pose& cam_from_world, const RenderOptions& options,
                           int& views_used) {
   const eval::StopWatch watch;
-  const gl::DrawnPicture picture = renderer.Draw(scene, host.camera(), cam_from_world, options);
+  const gl::DrawnFrame picture = renderer.Draw(scene, host.camera(), cam_from_world, options);
   gl::WaitForGpu();
   const eval::FrameTime time = watch.Elapsed();
   views_used = std::max(views_used, static_cast<int>(picture.views_used.size()));

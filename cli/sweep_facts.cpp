@@ -51,10 +51,10 @@ PointFacts PointOf(const JsonObject& json) {
   return point;
 }
 
-std::optional<eval::DefaultVerdict> UsualOf(const JsonObject& stage, size_t count) {
+std::optional<eval::DefaultAssessment> UsualOf(const JsonObject& stage, size_t count) {
   if (!stage.Has("default")) return std::nullopt;
   const JsonObject json = stage.Object("default");
-  eval::DefaultVerdict usual;
+  eval::DefaultAssessment usual;
   const auto at = IndexAt(json, "at", count);
   if (!at) json.Fail("at", "a point's index");
   usual.at = *at;

@@ -30,7 +30,7 @@ struct StageFacts {
   std::optional<size_t> knee, cheapest, within_budget;
   double max_loss_db = 0;
   std::optional<double> budget;
-  std::optional<eval::DefaultVerdict> usual;
+  std::optional<eval::DefaultAssessment> usual;
   std::optional<eval::Times> machine;  ///< of the calibration loop; least, median and most
 };
 

@@ -61,7 +61,7 @@ Json PointJson(const SweptStage& swept, size_t i) {
           {"figures", figures}};
 }
 
-Json DefaultJson(const std::optional<eval::DefaultVerdict>& usual) {
+Json DefaultJson(const std::optional<eval::DefaultAssessment>& usual) {
   if (!usual) return nullptr;
   return {{"at", usual->at},
           {"on_front", usual->on_front},
@@ -145,7 +145,7 @@ void SweptStage::FindDefaults() {
   cheapest = eval::CheapestWithin(points, max_loss_db);
   within_budget.reset();
   if (budget) within_budget = eval::BestWithin(points, *budget);
-  usual = eval::JudgeDefault(points, front);
+  usual = eval::AssessDefault(points, front);
 }
 
 void SaySweep(const SweepFacts& facts, Console& console) {

@@ -27,7 +27,7 @@ struct SweptStage {
   std::vector<size_t> front;
   std::optional<size_t> knee;  ///< index into points, as those below
   std::optional<size_t> cheapest, within_budget;
-  std::optional<eval::DefaultVerdict> usual;
+  std::optional<eval::DefaultAssessment> usual;
   /// Fills in the last five from the points.
   void FindDefaults();
 };

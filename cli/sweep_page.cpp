@@ -112,7 +112,7 @@ std::string Findings(const StageFacts& stage) {
 
 void AddStage(report::HtmlReport& page, const StageFacts& stage) {
   page.Section(stage.name + ": " + stage.error_name + " against " + stage.cost_name);
-  if (stage.usual) page.Verdict(stage.usual->on_front, DefaultSentence(stage));
+  if (stage.usual) page.Result(stage.usual->on_front, DefaultSentence(stage));
   page.Paragraph(stage.conditions);
   page.Plot(
       "Both axes are logarithmic; bars are the range in which another run may lie. Rest the "

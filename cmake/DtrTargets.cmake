@@ -1,8 +1,9 @@
 # dtr_library(NAME SOURCES ... [APART ...] [PUBLIC libs...] [PRIVATE libs...]): one static library per folder. With
 # DTR_UNITY its sources are compiled several at a time; those of APART each alone.
-# dtr_test(NAME SOURCES ... [APART ...] LIBS ... [LABELS ...] [TIMEOUT s]): one GoogleTest program, discovered by CTest.
-# dtr_one_entry_test(the same): one entry of CTest for all its tests, which share what is slow to start. It fails when
-# one of them does, and is skipped when one of them was and none failed.
+# dtr_test(NAME SOURCES ... [APART ...] LIBS ... [LABELS ...] [TIMEOUT s]): one GoogleTest program, an entry of CTest for
+# each of its suites (cmake/DiscoverSuites.cmake). An entry fails when one of its tests does, and is skipped when one of
+# them was and none failed.
+# dtr_one_entry_test(the same): one entry of CTest for all its suites, which share what is slow to start.
 
 function(dtr_compile_options target)
   # Bits must match between machines and thread counts: no contraction into FMA, no fast maths.
@@ -61,40 +62,50 @@ function(dtr_library name)
   install(TARGETS ${name} EXPORT dtrTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT dev)
 endfunction()
 
-function(dtr_test name)
+# Links in a fifth of the time; there are some ninety programs of tests.
+find_program(DTR_GOLD ld.gold)
+
+function(dtr_test_program name)
   cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;APART;LIBS;LABELS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES} ${ARG_APART})
   dtr_unity(${name} ${ARG_APART})
-  target_link_libraries(${name} PRIVATE ${ARG_LIBS} GTest::gtest GTest::gmock GTest::gtest_main)
+  target_link_libraries(${name} PRIVATE ${ARG_LIBS} dtr_test_main GTest::gtest GTest::gmock)
   dtr_test_options(${name})
+  if(DTR_GOLD AND NOT DTR_SANITIZE)
+    target_link_options(${name} PRIVATE -fuse-ld=gold)
+  endif()
+endfunction()
+
+function(dtr_test name)
+  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;APART;LIBS;LABELS" ${ARGN})
+  dtr_test_program(${name} ${ARGN})
   if(NOT ARG_TIMEOUT)
-    set(ARG_TIMEOUT 300)
+    set(ARG_TIMEOUT 900)
   endif()
   # The default of DTR_DATA lies beside the checkout; tests say SKIPPED where it is absent.
-  set(properties TIMEOUT ${ARG_TIMEOUT})
-  gtest_discover_tests(${name} TEST_PREFIX "${name}/" DISCOVERY_TIMEOUT 60
-    WORKING_DIRECTORY ${PROJECT_SOURCE_DIR} PROPERTIES ${properties})
-  if(ARG_LABELS)
-    # gtest_discover_tests takes a list of labels apart; CTest reads them from a file of our own.
-    set(file ${CMAKE_CURRENT_BINARY_DIR}/${name}_labels.cmake)
-    file(WRITE ${file} "if(${name}_TESTS)
-  set_tests_properties(\${${name}_TESTS} PROPERTIES LABELS \"${ARG_LABELS}\")
+  set(entries ${CMAKE_CURRENT_BINARY_DIR}/${name}_suites.cmake)
+  add_custom_command(TARGET ${name} POST_BUILD VERBATIM BYPRODUCTS ${entries}
+    COMMAND ${CMAKE_COMMAND} -DPROGRAM=$<TARGET_FILE:${name}> -DNAME=${name} -DOUTPUT=${entries}
+      -DFOLDER=${PROJECT_SOURCE_DIR} -DTIMEOUT=${ARG_TIMEOUT} "-DLABELS=${ARG_LABELS}"
+      -P ${PROJECT_SOURCE_DIR}/cmake/DiscoverSuites.cmake)
+  # A program that was not built is an entry that fails.
+  set(file ${CMAKE_CURRENT_BINARY_DIR}/${name}_entries.cmake)
+  file(WRITE ${file} "if(EXISTS \"${entries}\")
+  include(\"${entries}\")
+else()
+  add_test(${name}_NOT_BUILT ${name}_NOT_BUILT)
 endif()
 ")
-    set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES ${file})
-  endif()
+  set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES ${file})
 endfunction()
 
 function(dtr_one_entry_test name)
   cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;APART;LIBS;LABELS" ${ARGN})
-  add_executable(${name} ${ARG_SOURCES} ${ARG_APART})
-  dtr_unity(${name} ${ARG_APART})
-  target_link_libraries(${name} PRIVATE ${ARG_LIBS} dtr_one_entry_main GTest::gtest GTest::gmock)
-  dtr_test_options(${name})
+  dtr_test_program(${name} ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
   endif()
   add_test(NAME ${name} COMMAND ${name} WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
-  # 77: kSkippedExitCode of tests/support/one_entry_main.h.
+  # 77: kSkippedExitCode of tests/support/test_main.h.
   set_tests_properties(${name} PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT ${ARG_TIMEOUT} SKIP_RETURN_CODE 77)
 endfunction()

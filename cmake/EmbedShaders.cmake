@@ -5,7 +5,7 @@ foreach(file IN LISTS FILES)
   get_filename_component(name "${file}" NAME)
   string(APPEND body "      {\"${name}\", R\"glsl(${text})glsl\"},\n")
 endforeach()
-file(WRITE "${OUTPUT}" "// Made from dtr/gl/shaders by cmake/EmbedShaders.cmake.
+file(WRITE "${OUTPUT}" "// Made from dtr/gl/shaders and what they include by cmake/EmbedShaders.cmake.
 #include \"dtr/gl/program.h\"
 
 namespace dtr::gl {

@@ -44,7 +44,7 @@ Pose WrittenPose(const Pose& cam_from_scene, double scale, const Eigen::Vector3d
 ///   cameras.json             the ideal pinhole cameras (docs/CONVENTIONS.md)
 ///   depth/NNNN.exr           plane z at pixel centres of the ideal pinhole grid, float32
 ///   masks/NNNN_visible.png   255: the surface point is seen by at least 2 other views
-///   masks/NNNN_texture.png   255: textured, judged on the ideal grid and before noise
+///   masks/NNNN_texture.png   255: textured, evaluated on the ideal grid and before noise
 ///   dataset.json, SOURCE.md  how it was made
 /// The folder appears when all is done, under its name with ".partial" before.
 /// Throws UsageError when it exists or the spec is out of range (naming the field), Error when

@@ -141,10 +141,9 @@ std::vector<SparsePoint> SourcePoints(const SparseScene& sparse, const std::vect
 
 // Photos that are there twice add nothing, and would show what is held out. Given places say that
 // they are photos of their own; those of a rig belong to its time steps.
-void LeaveOutSamePictures(const BuildOptions& options, capture::Capture& photos,
-                          Progress& progress) {
+void LeaveOutSameImages(const BuildOptions& options, capture::Capture& photos, Progress& progress) {
   if (options.keep_duplicates || !options.poses.empty() || !options.rig.empty()) return;
-  const auto left_out = capture::DropSamePictures(
+  const auto left_out = capture::DropSameImages(
       photos, [&](const std::string& name) { return IsNamed(options.holdout, name); });
   for (const auto& [name, same_as] : left_out) {
     progress.Note(name + " left out: it has the same pixels as " + same_as);
@@ -176,9 +175,9 @@ SetValidation Validate(const std::filesystem::path& folder, DtrSet& set, const S
   SetValidation validation = ValidateSet(folder, set, sparse, limits, threads, progress);
   report.validated = true;
   report.validation_passed = validation.passed();
-  set.verdict_json = eval::VerdictJson(validation.tests);
+  set.validation_json = eval::ValidationJson(validation.tests);
   if (!report.validation_passed) {
-    progress.Note(io::VerdictWarning(set));
+    progress.Note(io::ValidationWarning(set));
   }
   return validation;
 }
@@ -209,7 +208,7 @@ void SayRemarks(const BuildReport& report, size_t photos, Progress& progress) {
 
 BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
   const BuildOptions options = ByPreset(asked);
-  const stereo::Effort effort = EffortOf(options.depth);
+  const stereo::QualitySettings quality = QualityOf(options.depth);
   RequireEngine(options.depth);
   RequireOptions(options);
   std::optional<SetRig> rig;
@@ -226,7 +225,7 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
   capture::Capture photos;
   std::vector<bool> held_out;
   const auto look = [&] {
-    LeaveOutSamePictures(options, photos, progress);
+    LeaveOutSameImages(options, photos, progress);
     capture::RequireEnoughPhotos(photos, options.photos);
     if (!options.poses.empty()) TakePhotosAsCamerasDo(options.poses, photos, progress);
     held_out = ChooseHeldOut(options.holdout, NamesOf(photos));
@@ -243,7 +242,7 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
   }
   Json fingerprint = {
       {"tool_version", DTR_VERSION},
-      {"options", OptionsJson(options, effort)},
+      {"options", OptionsJson(options, quality)},
       {"time_budget_s", options.depth.time_budget_s.value_or(0)},
       {"photos", from_video ? VideoJson(options)
                             : PhotosJson(photos, std::vector<bool>(held_out.size(), true))},
@@ -325,8 +324,8 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
   const SparseScene sparse = SparseOf(calibrated, views);
 
   log.Begin("depth");
-  const stereo::Effort spent = DepthStage(set, sparse, options.depth, effort,
-                                          {options.threads, options.seed}, writer, progress);
+  const stereo::QualitySettings spent = DepthStage(
+      set, sparse, options.depth, quality, {options.threads, options.seed}, writer, progress);
 
   log.Begin("finishing");
   FinishScene(set, SourcePoints(sparse, views), writer, options.threads, progress);

@@ -21,15 +21,15 @@ constexpr Preset kPresets[] = {
     {.name = "fast",
      .max_size_px = 800,
      .features = 4096,
-     .effort = {.neighbours = 4, .round_neighbours = 6, .iterations = 2, .rounds = 1}},
+     .quality = {.neighbours = 4, .round_neighbours = 6, .iterations = 2, .rounds = 1}},
     {.name = "balanced",
      .max_size_px = 1024,
      .features = colmap::kMaxFeatures,
-     .effort = {.neighbours = 5, .round_neighbours = 8, .iterations = 3, .rounds = 2}},
+     .quality = {.neighbours = 5, .round_neighbours = 8, .iterations = 3, .rounds = 2}},
     {.name = "best",
      .max_size_px = 0,
      .features = colmap::kMaxFeatures,
-     .effort = {.neighbours = 8, .round_neighbours = 8, .iterations = 5, .rounds = 3}},
+     .quality = {.neighbours = 8, .round_neighbours = 8, .iterations = 5, .rounds = 3}},
 };
 
 }  // namespace
@@ -43,16 +43,16 @@ const Preset& PresetCalled(const std::string& name) {
   throw UsageError(fmt::format("`preset`: expected fast, balanced or best, found '{}'", name));
 }
 
-stereo::Effort Overridden(stereo::Effort effort, const DepthChoice& choice) {
-  effort.neighbours = choice.neighbours.value_or(effort.neighbours);
-  effort.round_neighbours = choice.round_neighbours.value_or(effort.round_neighbours);
-  effort.iterations = choice.iterations.value_or(effort.iterations);
-  effort.rounds = choice.rounds.value_or(effort.rounds);
-  return effort;
+stereo::QualitySettings Overridden(stereo::QualitySettings quality, const DepthChoice& choice) {
+  quality.neighbours = choice.neighbours.value_or(quality.neighbours);
+  quality.round_neighbours = choice.round_neighbours.value_or(quality.round_neighbours);
+  quality.iterations = choice.iterations.value_or(quality.iterations);
+  quality.rounds = choice.rounds.value_or(quality.rounds);
+  return quality;
 }
 
-stereo::Effort EffortOf(const DepthChoice& choice) {
-  return Overridden(PresetCalled(choice.preset).effort, choice);
+stereo::QualitySettings QualityOf(const DepthChoice& choice) {
+  return Overridden(PresetCalled(choice.preset).quality, choice);
 }
 
 }  // namespace dtr::pipeline

@@ -14,7 +14,7 @@ struct Preset {
   const char* name;
   int max_size_px;  ///< long side of the images of a set that is built; 0: full size
   int features;     ///< most of a photo whose camera structure from motion looks for
-  stereo::Effort effort;
+  stereo::QualitySettings quality;
 };
 
 /// The table of presets, cheapest first. `dtr bench --stage stereo` measures what each costs and
@@ -42,9 +42,9 @@ struct DepthChoice {
 };
 
 /// An effort with what the choice gives explicitly in its place.
-stereo::Effort Overridden(stereo::Effort effort, const DepthChoice& choice);
+stereo::QualitySettings Overridden(stereo::QualitySettings quality, const DepthChoice& choice);
 
 /// The effort that a choice comes to, but for a time budget.
-stereo::Effort EffortOf(const DepthChoice& choice);
+stereo::QualitySettings QualityOf(const DepthChoice& choice);
 
 }  // namespace dtr::pipeline

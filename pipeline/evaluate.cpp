@@ -45,9 +45,9 @@ DtrSet Load(const EvaluateRequest& request, Progress& progress) {
 EvaluateResult Evaluate(const EvaluateRequest& request,
                         const std::function<eval::RenderFunction()>& make_renderer,
                         Progress& progress) {
-  if (fs::exists(request.pictures) && !fs::is_directory(request.pictures)) {
+  if (fs::exists(request.images) && !fs::is_directory(request.images)) {
     throw UsageError(
-        fmt::format("`pictures` {}: expected a folder, found a file", request.pictures.string()));
+        fmt::format("`images` {}: expected a folder, found a file", request.images.string()));
   }
   const DtrSet set = Load(request, progress);
   EvaluateResult result;
@@ -59,10 +59,10 @@ EvaluateResult Evaluate(const EvaluateRequest& request,
   evaluate.render = request.render;
   evaluate.render.threads = request.threads;
   evaluate.not_registered = NotRegistered(set);
-  if (!request.pictures.empty()) {
-    fs::create_directories(request.pictures);
+  if (!request.images.empty()) {
+    fs::create_directories(request.images);
     evaluate.on_rendered = [&](const View& view, const RenderResult& filled) {
-      io::WriteImage(request.pictures / (view.id + ".png"),
+      io::WriteImage(request.images / (view.id + ".png"),
                      eval::ComparisonImage(filled.image, view.image, view.mask));
     };
   }

@@ -89,7 +89,7 @@ std::vector<NovelFrame> CamerasOf(const RenderRequest& request, const DtrSet& se
 
 // The frame of the set that rendered frame `i` shows; paths run through time.
 size_t FrameShown(const RenderRequest& request, const DtrSet& set, size_t i, size_t count) {
-  return request.frame ? *request.frame : FrameOfPicture(i, count, set.frames.size());
+  return request.frame ? *request.frame : TimeStepOfImage(i, count, set.frames.size());
 }
 
 RenderedFile Facts(const std::string& file, double ms, size_t frame, const RenderScene& scene,

@@ -125,15 +125,15 @@ Layout FromNames(const std::vector<fs::path>& photos) {
 // Of one camera: which frame of its video belongs to which time step. A table that has as many rows
 // as the video has frames is a table of them in order, though it may count them from another start:
 // recorders number from when a camera began.
-std::map<int, int> InstantsOf(const RigTimestamps& timestamps, int camera, int frames) {
+std::map<int, int> TimeStepsOf(const RigTimestamps& timestamps, int camera, int frames) {
   std::map<int, int> own;
-  for (const auto& [key, instant] : timestamps.instants) {
-    if (key.first == camera) own.emplace(key.second, instant);
+  for (const auto& [key, time_step] : timestamps.time_steps) {
+    if (key.first == camera) own.emplace(key.second, time_step);
   }
   if (static_cast<int>(own.size()) != frames) return own;
   std::map<int, int> in_order;
-  for (const auto& [number, instant] : own) {
-    in_order.emplace(static_cast<int>(in_order.size()), instant);
+  for (const auto& [number, time_step] : own) {
+    in_order.emplace(static_cast<int>(in_order.size()), time_step);
   }
   return in_order;
 }
@@ -200,7 +200,7 @@ Layout FromVideos(const fs::path& folder, const std::vector<fs::path>& videos, P
     const VideoFrames frames = FramesIn(video, progress);
     std::map<int, int> own;
     if (timed) {
-      own = InstantsOf(timestamps, *id, frames.count);
+      own = TimeStepsOf(timestamps, *id, frames.count);
       if (own.empty()) {
         throw Error(
             fmt::format("{}: timestamps.csv has no row of cam_id {}, the number at the end of the "

@@ -46,7 +46,8 @@ bool StandApart(const SetRig& rig, size_t a, size_t b) {
   return places[a].TargetOriginInSource() != places[b].TargetOriginInSource();
 }
 
-void RequireSharedInstant(const SetRig& rig, const std::map<std::string, calib::RigPhoto>& photos) {
+void RequireSharedTimeStep(const SetRig& rig,
+                           const std::map<std::string, calib::RigPhoto>& photos) {
   std::map<std::string, size_t> first_of;
   for (const auto& [name, photo] : photos) {
     const size_t first = first_of.emplace(photo.frame, photo.camera).first->second;
@@ -148,7 +149,7 @@ std::map<std::string, calib::RigPhoto> PhotosOfRig(const SetRig& rig,
     }
     photos.emplace(photo.name, *found);
   }
-  RequireSharedInstant(rig, photos);
+  RequireSharedTimeStep(rig, photos);
   return photos;
 }
 

@@ -12,7 +12,7 @@
 #include "dtr/render/time_steps.h"
 #include "pipeline/detail/depth/depth_engine.h"
 #include "pipeline/detail/depth/depth_stage.h"
-#include "pipeline/detail/depth/effort_json.h"
+#include "pipeline/detail/depth/quality_json.h"
 #include "pipeline/detail/pages/set_page.h"
 #include "pipeline/detail/photos/input_hash.h"
 #include "pipeline/detail/run/finishing.h"
@@ -72,7 +72,7 @@ void CopyImages(const std::filesystem::path& from, DtrSet& set, int threads, io:
 }  // namespace
 
 RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& listener) {
-  const stereo::Effort effort = EffortOf(options.depth);
+  const stereo::QualitySettings quality = QualityOf(options.depth);
   RequireEngine(options.depth);
   const bool in_place = options.output.empty();
   RunLog log;
@@ -84,7 +84,7 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& listen
   const SparseScene sparse = io::LoadSparse(options.set, set);
 
   const nlohmann::json fingerprint = {{"tool_version", DTR_VERSION},
-                                      {"settings", SettingsJson(options.depth.engine, effort)},
+                                      {"settings", SettingsJson(options.depth.engine, quality)},
                                       {"time_budget_s", options.depth.time_budget_s.value_or(0)},
                                       {"depth_error_px", options.depth.depth_error_px.value_or(0)},
                                       {"seed", options.seed},
@@ -93,8 +93,8 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& listen
                                       {"held_out", HeldOutHashes(set)}};
   io::SetWriter writer(report.written, fingerprint.dump(), in_place || options.force);
   CopyImages(options.set, set, options.threads, writer, progress);
-  const stereo::Effort spent =
-      DepthStage(set, sparse, options.depth, effort,
+  const stereo::QualitySettings spent =
+      DepthStage(set, sparse, options.depth, quality,
                  {options.threads, options.seed, options.normals}, writer, progress);
   // What was left out of the former depth says nothing of this.
   if (!io::PrunedJson(set).empty()) {
@@ -126,7 +126,8 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& listen
   limits.memory_gb = std::min(limits.memory_gb, options.depth.memory_gb.value_or(kDefaultMemoryGb));
   const auto validation =
       ValidateSet(writer.folder(), set, sparse, limits, options.threads, progress);
-  set.verdict_json = eval::VerdictJson(validation.tests);  // other depth, other validation result
+  set.validation_json =
+      eval::ValidationJson(validation.tests);  // other depth, other validation result
   WriteSetPage(writer, set,
                {.name = report.written.stem().string(),
                 .engine = options.depth.engine,

@@ -82,19 +82,19 @@ SetValidation ValidateSet(const std::filesystem::path& folder, const DtrSet& set
   AddCrossDepth(folder, set, limits, threads, report, progress);
   progress.Stage("cameras against their observations", 0);
   const Cameras of = CamerasOf(set);
-  calib::PhotosValidation judgement = calib::ValidatePhotos(
+  calib::PhotosValidation validation = calib::ValidatePhotos(
       calib::BundleOf(of.cameras, of.poses, of.names, sparse), limits.photos, threads, &progress);
-  report.tests.insert(report.tests.end(), judgement.tests.begin(), judgement.tests.end());
+  report.tests.insert(report.tests.end(), validation.tests.begin(), validation.tests.end());
   const auto rig = RigOfSet(set);
   const auto places = rig ? RigPlaces(set, sparse, *rig) : std::nullopt;
   if (places) report.tests.push_back(*places);
-  for (const calib::PhotoValidation& judged : judgement.cameras) {
+  for (const calib::PhotoValidation& validated_photo : validation.cameras) {
     const auto camera =
         std::find_if(report.cameras.begin(), report.cameras.end(),
-                     [&](const auto& validated) { return validated.name == judged.name; });
-    if (camera != report.cameras.end()) camera->placed = judged.placed;
+                     [&](const auto& validated) { return validated.name == validated_photo.name; });
+    if (camera != report.cameras.end()) camera->placed = validated_photo.placed;
   }
-  report.adjustment = std::move(judgement);
+  report.adjustment = std::move(validation);
   return report;
 }
 

@@ -28,20 +28,21 @@ void RequireSize(const calib::CalibratedCamera& camera, int width_px, int height
                   width_px, height_px));
 }
 
-UnseenPhotos UnseenOfCamera(const calib::Calibration& calibration,
-                            const std::filesystem::path& folder, const std::string& pattern,
-                            int threads, Progress& progress) {
+TestPhotos UnseenOfCamera(const calib::Calibration& calibration,
+                          const std::filesystem::path& folder, const std::string& pattern,
+                          int threads, Progress& progress) {
   const BoardPhotos photos = ReadBoardPhotos(folder, pattern, calibration.board, {}, threads,
                                              progress, calibration.cameras[0].camera);
   RequireSize(calibration.cameras[0], photos.width_px, photos.height_px, folder);
-  UnseenPhotos found{{}, photos.left_out};
-  calib::UnseenViews& unseen = found.unseen;
-  for (const auto& view : photos.views) unseen.views.push_back({0, unseen.frames++, view, {}});
+  TestPhotos found{{}, photos.left_out};
+  calib::TestViews& test_views = found.test_views;
+  for (const auto& view : photos.views)
+    test_views.views.push_back({0, test_views.frames++, view, {}});
   return found;
 }
 
-UnseenPhotos UnseenOfRig(const calib::Calibration& calibration, const std::filesystem::path& folder,
-                         const std::string& pattern, int threads, Progress& progress) {
+TestPhotos UnseenOfRig(const calib::Calibration& calibration, const std::filesystem::path& folder,
+                       const std::string& pattern, int threads, Progress& progress) {
   if (pattern != "*") {
     throw UsageError(fmt::format(
         "`pattern` {}: is for the photos of one camera; a rig's cameras are distinguished by their "
@@ -65,14 +66,15 @@ UnseenPhotos UnseenOfRig(const calib::Calibration& calibration, const std::files
     index[c] = static_cast<size_t>(found - calibration.cameras.begin());
     RequireSize(*found, photos.cameras[c].width_px, photos.cameras[c].height_px, folder);
   }
-  UnseenPhotos of_rig{{}, std::move(photos.left_out)};
-  calib::UnseenViews& unseen = of_rig.unseen;
-  unseen.frames = photos.frames.size();
-  unseen.views = std::move(photos.views);
-  for (calib::RigView& view : unseen.views) view.camera = index[view.camera];
-  std::stable_sort(unseen.views.begin(), unseen.views.end(), [](const auto& a, const auto& b) {
-    return std::pair(a.frame, a.camera) < std::pair(b.frame, b.camera);
-  });
+  TestPhotos of_rig{{}, std::move(photos.left_out)};
+  calib::TestViews& test_views = of_rig.test_views;
+  test_views.frames = photos.frames.size();
+  test_views.views = std::move(photos.views);
+  for (calib::RigView& view : test_views.views) view.camera = index[view.camera];
+  std::stable_sort(test_views.views.begin(), test_views.views.end(),
+                   [](const auto& a, const auto& b) {
+                     return std::pair(a.frame, a.camera) < std::pair(b.frame, b.camera);
+                   });
   return of_rig;
 }
 
@@ -153,13 +155,14 @@ calib::Calibration ForeignCalibration(const std::filesystem::path& file,
   return calibration;
 }
 
-UnseenPhotos ReadUnseen(const calib::Calibration& calibration, const std::filesystem::path& folder,
-                        const std::string& pattern, int threads, Progress& progress) {
-  UnseenPhotos photos = calibration.cameras.size() == 1
-                            ? UnseenOfCamera(calibration, folder, pattern, threads, progress)
-                            : UnseenOfRig(calibration, folder, pattern, threads, progress);
-  const std::vector<calib::LeftOut> seen = TakeOutSeen(calibration, photos.unseen.views);
-  if (photos.unseen.views.empty()) {
+TestPhotos ReadTestPhotos(const calib::Calibration& calibration,
+                          const std::filesystem::path& folder, const std::string& pattern,
+                          int threads, Progress& progress) {
+  TestPhotos photos = calibration.cameras.size() == 1
+                          ? UnseenOfCamera(calibration, folder, pattern, threads, progress)
+                          : UnseenOfRig(calibration, folder, pattern, threads, progress);
+  const std::vector<calib::LeftOut> seen = TakeOutSeen(calibration, photos.test_views.views);
+  if (photos.test_views.views.empty()) {
     throw Error(fmt::format(
         "{}: expected photos that the calibration has not seen, found only those that it was made "
         "from, {} first; take others, or leave `images` out",

@@ -1,4 +1,4 @@
-// pipeline/validate_calibration.h -- a calibration file and perhaps unseen photos, judged.
+// pipeline/validate_calibration.h -- a calibration file and perhaps unseen photos, evaluated.
 #pragma once
 #include <filesystem>
 #include <optional>
@@ -14,12 +14,12 @@ namespace dtr::pipeline {
 calib::ValidatedCalibration ToValidate(const calib::Calibration& calibration);
 
 /// A camera from elsewhere (.yml, .yaml of OpenCV or ROS, cameras.txt of COLMAP with one camera),
-/// to be judged by photos of a board: no observations. Throws Error where the lens is of a model
+/// to be validated by photos of a board: no observations. Throws Error where the lens is of a model
 /// that boards are not solved with, and as ReadLens (lens_file.h) does.
 calib::Calibration ForeignCalibration(const std::filesystem::path& file, const calib::Board& board);
 
-struct UnseenPhotos {
-  calib::UnseenViews unseen;
+struct TestPhotos {
+  calib::TestViews test_views;
   /// Without a usable board, of another size, repeated, or what the calibration was made from.
   std::vector<calib::LeftOut> left_out;
 };
@@ -30,8 +30,9 @@ struct UnseenPhotos {
 /// the calibration keeps (of one with moved corners: whose name) is the one that it was made from,
 /// and is left out. Throws Error when sizes
 /// differ from the calibration's, a camera is not there or nothing is left.
-UnseenPhotos ReadUnseen(const calib::Calibration& calibration, const std::filesystem::path& folder,
-                        const std::string& pattern, int threads, Progress& progress);
+TestPhotos ReadTestPhotos(const calib::Calibration& calibration,
+                          const std::filesystem::path& folder, const std::string& pattern,
+                          int threads, Progress& progress);
 
 /// The report as a page: validation result and tests, residual vectors, coverage, maps, worst
 /// views. Views are drawn over their photos where `images` has them.

@@ -47,7 +47,7 @@ struct Checker {
   double px_per_inverse_depth;
 
   /// +1: confirms, -1: refutes, 0: says nothing.
-  int Judge(const Eigen::Vector3d& p_in_view, double tolerance_px) const {
+  int Vote(const Eigen::Vector3d& p_in_view, double tolerance_px) const {
     const Eigen::Vector3d p = other_from_view * p_in_view;
     const auto pixel = other->view->camera.PixelFromCam(p);
     if (!pixel) return 0;
@@ -81,9 +81,9 @@ DepthEstimate FilterByConsistency(const StereoView& view, const DepthEstimate& e
       const Eigen::Vector3d p = view.camera.CamFromPixel({x + 0.5, y + 0.5}, z, DepthKind::kPlaneZ);
       int confirming = 0, refuting = 0;
       for (const Checker& checker : checkers) {
-        const int verdict = checker.Judge(p, options.tolerance_px);
-        confirming += verdict > 0;
-        refuting += verdict < 0;
+        const int vote = checker.Vote(p, options.tolerance_px);
+        confirming += vote > 0;
+        refuting += vote < 0;
       }
       if (confirming >= options.min_agreeing && confirming >= refuting) {
         if (refuting > 0) result.inverse_depth_sigma(x, y) *= Doubt(confirming, refuting);

@@ -158,8 +158,8 @@ class Run {
       const PlanesAround around(Together(), planes_, engine_.Rounds(), view);
       if (!around.HasOwn()) return holes();
       const Room room(Together(), view);
-      return engine_.Judge(room.views(), view, NeighboursOf(view),
-                           ranges_[static_cast<size_t>(view)], around.maps(), engine_options);
+      return engine_.Filter(room.views(), view, NeighboursOf(view),
+                            ranges_[static_cast<size_t>(view)], around.maps(), engine_options);
     }
     if (NeighboursOf(view).empty()) {
       progress_.Note("view " + std::to_string(view) + ": no neighbours, no depth");

@@ -17,9 +17,9 @@ PlaneMap Engine::Refine(std::span<const StereoView>, int, std::span<const int>, 
   throw std::logic_error(name() + ": has no geometric-consistency passes");
 }
 
-DepthEstimate Engine::Judge(std::span<const StereoView>, int, std::span<const int>,
-                            const DepthRange&, std::span<const PlaneMap* const>,
-                            const EngineOptions&) const {
+DepthEstimate Engine::Filter(std::span<const StereoView>, int, std::span<const int>,
+                             const DepthRange&, std::span<const PlaneMap* const>,
+                             const EngineOptions&) const {
   throw std::logic_error(name() + ": has no geometric-consistency passes");
 }
 
@@ -33,13 +33,13 @@ void CheckRange(const char* what, int value, int least, int most) {
 
 }  // namespace
 
-std::unique_ptr<Engine> MakeEngine(const std::string& name, const Effort& effort) {
-  CheckRange("neighbours", effort.neighbours, 1, 8);
-  CheckRange("neighbours in the passes", effort.round_neighbours, 1, 8);
-  CheckRange("iterations", effort.iterations, 1, 20);
-  CheckRange("rounds", effort.rounds, 0, 8);
-  if (name == "sgbm") return std::make_unique<SgbmEngine>(PairLimits{}, effort.neighbours);
-  if (name == "patchmatch") return std::make_unique<PatchMatchEngine>(effort);
+std::unique_ptr<Engine> MakeEngine(const std::string& name, const QualitySettings& quality) {
+  CheckRange("neighbours", quality.neighbours, 1, 8);
+  CheckRange("neighbours in the passes", quality.round_neighbours, 1, 8);
+  CheckRange("iterations", quality.iterations, 1, 20);
+  CheckRange("rounds", quality.rounds, 0, 8);
+  if (name == "sgbm") return std::make_unique<SgbmEngine>(PairLimits{}, quality.neighbours);
+  if (name == "patchmatch") return std::make_unique<PatchMatchEngine>(quality);
   throw UsageError("stereo engine: expected one of patchmatch, sgbm, found '" + name + "'");
 }
 

@@ -35,14 +35,14 @@ struct DepthEstimate {
 };
 
 /// How much work goes into a depth map. Every value may change the result.
-struct Effort {
+struct QualitySettings {
   int neighbours = 5;        ///< views that the search asks, at most
   int round_neighbours = 8;  ///< views that the rounds and the validation result ask, at most 8
   /// Visits per pixel on the levels between the coarsest (two more) and full size (two fewer, but
   /// one at least).
   int iterations = 3;
   int rounds = 2;  ///< rounds in which views take account of each other's planes
-  bool operator==(const Effort&) const = default;
+  bool operator==(const QualitySettings&) const = default;
 };
 
 struct EngineOptions {
@@ -98,15 +98,15 @@ class Engine {
                           std::span<const PlaneMap* const> maps, int round,
                           const EngineOptions& options) const;
   /// What of the planes after the last round is believed, and how much.
-  virtual DepthEstimate Judge(std::span<const StereoView> views, int reference,
-                              std::span<const int> neighbours, const DepthRange& range,
-                              std::span<const PlaneMap* const> maps,
-                              const EngineOptions& options) const;
+  virtual DepthEstimate Filter(std::span<const StereoView> views, int reference,
+                               std::span<const int> neighbours, const DepthRange& range,
+                               std::span<const PlaneMap* const> maps,
+                               const EngineOptions& options) const;
 };
 
 /// Engine by its name on the command line ("sgbm"), which makes use of `neighbours` alone.
 /// Throws UsageError for unknown names and for an effort out of range: 1 to 8 neighbours, 1 to 20
 /// iterations, 0 to 8 rounds.
-std::unique_ptr<Engine> MakeEngine(const std::string& name, const Effort& effort = {});
+std::unique_ptr<Engine> MakeEngine(const std::string& name, const QualitySettings& quality = {});
 
 }  // namespace dtr::stereo

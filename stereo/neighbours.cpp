@@ -13,7 +13,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// A view with fewer observations, or a pair with fewer shared points, is not judged by them.
+/// A view with fewer observations, or a pair with fewer shared points, is not evaluated by them.
 constexpr size_t kMinObservations = 12;
 constexpr size_t kMinShared = 4;
 /// Best triangulation angle for rectified matching of block windows, and how fast it gets worse.

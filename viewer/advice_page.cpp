@@ -58,8 +58,8 @@ std::string AdvicePage(const std::string& name, const DtrSet& set, const advise:
   const auto poor = std::count_if(advice.places.begin(), advice.places.end(),
                                   [](const auto& place) { return place.poor; });
   report::HtmlReport page("Advice on " + name);
-  page.Verdict(poor == 0, fmt::format("{} of {} positions between and beyond the cameras are poor",
-                                      poor, advice.places.size()));
+  page.Result(poor == 0, fmt::format("{} of {} positions between and beyond the cameras are poor",
+                                     poor, advice.places.size()));
   page.Paragraph(fmt::format(
       "A position is poor where more than {} of what it sees is in no photo, or where a twentieth "
       "of "
@@ -96,7 +96,7 @@ std::string AdvicePage(const std::string& name, const DtrSet& set, const advise:
                    [](const auto& a, const auto& b) { return a.poor > b.poor; });
   rows.clear();
   for (const auto& place : places) rows.push_back(RowOf(place));
-  page.Table({"where", "verdict", "seen", "without depth", "in no photo", "in one photo only",
+  page.Table({"where", "result", "seen", "without depth", "in no photo", "in one photo only",
               "nearest photo, degrees"},
              rows);
   return page.Finish();

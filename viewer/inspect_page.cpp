@@ -140,12 +140,12 @@ std::string PercentText(double share) { return fmt::format("{:.1f} %", 100 * sha
 void AddVerdict(report::HtmlReport& page, const InspectFacts& facts) {
   page.Section("Can the calibration be trusted?");
   if (facts.checks.empty()) {
-    page.Verdict(false, "This set was never validated: run dtr validate");
+    page.Result(false, "This set was never validated: run dtr validate");
     return;
   }
   const bool good = AllPassed(facts.checks);
-  page.Verdict(good, good ? "The calibration passed its checks"
-                          : "The calibration broke at least one check");
+  page.Result(good, good ? "The calibration passed its checks"
+                         : "The calibration broke at least one check");
   report::AddChecks(page, facts.checks);
 }
 

@@ -45,7 +45,7 @@ cpu::Contributions ContributionsOf(const Drawn& drawn) {
 }
 
 /// The views' colours, mixed by their shares.
-ImageRgb8 WeightPicture(const Drawn& drawn) {
+ImageRgb8 WeightImage(const Drawn& drawn) {
   const cpu::Contributions found = ContributionsOf(drawn);
   return Painted(drawn.result, [&](size_t p) {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -63,7 +63,7 @@ ImageRgb8 WeightPicture(const Drawn& drawn) {
 }
 
 /// Standard deviation of depth over depth, by the views' shares; 0 where no view has one.
-Grid<float> SigmaPicture(const Drawn& drawn, const SigmaOf& sigma_of) {
+Grid<float> SigmaImage(const Drawn& drawn, const SigmaOf& sigma_of) {
   const cpu::Contributions found = ContributionsOf(drawn);
   const DepthImage& depth = drawn.result.depth;
   Grid<float> picture(depth.width(), depth.height());
@@ -150,9 +150,9 @@ ImageRgb8 FalseColour(Shown shown, const Drawn& drawn, const SigmaOf& sigma_of) 
     case Shown::kDepth:
       return report::ColorizeDepth(result.depth);
     case Shown::kSigma:
-      return report::ColorizeSigma(SigmaPicture(drawn, sigma_of));
+      return report::ColorizeSigma(SigmaImage(drawn, sigma_of));
     case Shown::kWeights:
-      return WeightPicture(drawn);
+      return WeightImage(drawn);
     case Shown::kViewCount:
       return Painted(result, [&](size_t p) {
         return report::PaletteColor(

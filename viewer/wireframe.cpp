@@ -10,7 +10,7 @@ namespace dtr::viewer {
 namespace {
 
 constexpr int kRowsTogether = 64;
-constexpr int kPictureShare = 3;  // one part in so many of the image's brightness stays
+constexpr int kImageShare = 3;  // one part in so many of the image's brightness stays
 
 RenderOptions MeshOptions(RenderOptions options) {
   if (options.method != RenderMethod::kDeferred) options.mesh_tolerance_px = 0;
@@ -135,7 +135,7 @@ void Wireframe::Keep(const Drawn& drawn) {
 ImageRgb8 Wireframe::Draw(const Drawn& drawn) {
   Keep(drawn);
   ImageRgb8 image = drawn.result.image;
-  for (std::uint8_t& value : image.data()) value /= kPictureShare;
+  for (std::uint8_t& value : image.data()) value /= kImageShare;
   const std::vector<int>& nearest_first = drawn.result.views_used;
   const int height = image.height(), bands = (height + kRowsTogether - 1) / kRowsTogether;
   for (size_t k = nearest_first.size(); k-- > 0;) {

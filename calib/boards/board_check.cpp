@@ -50,30 +50,28 @@ bool CanBe(const ShownMarkers& shown, bool inverted, const Board& given) {
          shown.columns == given.columns + 1 && shown.rows <= given.rows + 1;
 }
 
-BoardVerdict VerdictOfMarkers(const Grid<std::uint8_t>& grey, const Board& given,
-                              const std::string& dictionary, bool inverted) {
-  BoardVerdict verdict;
+BoardCheck CheckMarkers(const Grid<std::uint8_t>& grey, const Board& given,
+                        const std::string& dictionary, bool inverted) {
+  BoardCheck check;
   const auto shown = MarkersShown(grey, inverted, dictionary);
-  if (!shown || shown->columns == 0) return verdict;
-  verdict.first_square_white = shown->first_square_white;
-  verdict.shows_given = CanBe(*shown, inverted, given) && !shown->first_square_white;
-  if (verdict.shows_given) return verdict;
-  verdict.other = CharucoOf(*shown, inverted);
+  if (!shown || shown->columns == 0) return check;
+  check.first_square_white = shown->first_square_white;
+  check.shows_given = CanBe(*shown, inverted, given) && !shown->first_square_white;
+  if (check.shows_given) return check;
+  check.other = CharucoOf(*shown, inverted);
   // Dictionaries of one family begin with the same markers: the given one is not wrong.
   const bool fits = FamilyOf(shown->dictionary) == FamilyOf(given.dictionary) &&
                     DictionaryNumber(shown->dictionary) <= DictionaryNumber(given.dictionary);
-  if (fits) verdict.other.dictionary = given.dictionary;
-  return verdict;
+  if (fits) check.other.dictionary = given.dictionary;
+  return check;
 }
 
-bool SaysNothing(const BoardVerdict& verdict) {
-  return !verdict.shows_given && verdict.other.columns == 0;
-}
+bool SaysNothing(const BoardCheck& check) { return !check.shows_given && check.other.columns == 0; }
 
-BoardVerdict VerdictOfAnyMarkers(const Grid<std::uint8_t>& grey, const Board& given) {
-  BoardVerdict verdict = VerdictOfMarkers(grey, given, "", given.inverted);
-  if (SaysNothing(verdict)) verdict = VerdictOfMarkers(grey, given, "", !given.inverted);
-  return verdict;
+BoardCheck CheckAnyMarkers(const Grid<std::uint8_t>& grey, const Board& given) {
+  BoardCheck check = CheckMarkers(grey, given, "", given.inverted);
+  if (SaysNothing(check)) check = CheckMarkers(grey, given, "", !given.inverted);
+  return check;
 }
 
 // By quads: OpenCV's other detector takes seconds for a size that is not shown.
@@ -95,24 +93,24 @@ bool LieOn(const std::vector<BoardCorner>& corners, const ShownChessboard& latti
 
 // What is seen may be less than the given board, of which reflections hide lines, and the largest
 // board in a photo may be one in the background: the given one is looked for as well.
-BoardVerdict VerdictOfChessboard(const Grid<std::uint8_t>& grey, const Board& given) {
-  BoardVerdict verdict;
+BoardCheck CheckChessboard(const Grid<std::uint8_t>& grey, const Board& given) {
+  BoardCheck check;
   const auto shown = FindChessboard(grey);
-  if (!shown) return verdict;
+  if (!shown) return check;
   if (given.kind == Board::Kind::kChessboard) {
     const GridSize size{given.columns, given.rows};
-    verdict.shows_given = SameSides(shown->size, size);
-    if (!verdict.shows_given) {
+    check.shows_given = SameSides(shown->size, size);
+    if (!check.shows_given) {
       const auto corners = CornersOf(grey, given);
-      verdict.shows_given =
+      check.shows_given =
           !corners.empty() && !(ReachesBeyond(shown->size, size) && LieOn(corners, *shown));
     }
   }
-  if (!verdict.shows_given) verdict.other = ChessboardOf(shown->size, given);
-  return verdict;
+  if (!check.shows_given) check.other = ChessboardOf(shown->size, given);
+  return check;
 }
 
-bool Agree(const BoardVerdict& a, const BoardVerdict& b) {
+bool Agree(const BoardCheck& a, const BoardCheck& b) {
   if (a.other.kind != b.other.kind || a.other.columns != b.other.columns) return false;
   if (a.other.kind == Board::Kind::kChessboard) return a.other.rows == b.other.rows;
   return FamilyOf(a.other.dictionary) == FamilyOf(b.other.dictionary) &&
@@ -146,41 +144,41 @@ std::string Advice(const Board& given, const Board& other, bool first_square_whi
 
 }  // namespace
 
-BoardVerdict VerdictOf(const Grid<std::uint8_t>& grey, const Board& given) {
+BoardCheck CheckBoard(const Grid<std::uint8_t>& grey, const Board& given) {
   if (given.kind == Board::Kind::kChessboard) {
-    const BoardVerdict verdict = VerdictOfChessboard(grey, given);
-    return SaysNothing(verdict) ? VerdictOfAnyMarkers(grey, given) : verdict;
+    const BoardCheck check = CheckChessboard(grey, given);
+    return SaysNothing(check) ? CheckAnyMarkers(grey, given) : check;
   }
-  BoardVerdict verdict = VerdictOfMarkers(grey, given, given.dictionary, given.inverted);
-  if (SaysNothing(verdict)) verdict = VerdictOfAnyMarkers(grey, given);
-  return SaysNothing(verdict) ? VerdictOfChessboard(grey, given) : verdict;
+  BoardCheck check = CheckMarkers(grey, given, given.dictionary, given.inverted);
+  if (SaysNothing(check)) check = CheckAnyMarkers(grey, given);
+  return SaysNothing(check) ? CheckChessboard(grey, given) : check;
 }
 
-std::string DescribeOtherBoard(const Board& given, std::span<const BoardVerdict> verdicts) {
-  std::vector<BoardVerdict> others;
-  for (const BoardVerdict& verdict : verdicts) {
-    if (verdict.shows_given) return "";
-    if (verdict.other.columns > 0) others.push_back(verdict);
+std::string DescribeOtherBoard(const Board& given, std::span<const BoardCheck> checks) {
+  std::vector<BoardCheck> others;
+  for (const BoardCheck& check : checks) {
+    if (check.shows_given) return "";
+    if (check.other.columns > 0) others.push_back(check);
   }
-  const auto votes_for = [&](const BoardVerdict& one) {
+  const auto votes_for = [&](const BoardCheck& one) {
     return std::count_if(others.begin(), others.end(),
-                         [&](const BoardVerdict& other) { return Agree(one, other); });
+                         [&](const BoardCheck& other) { return Agree(one, other); });
   };
   const auto most =
       std::max_element(others.begin(), others.end(),
                        [&](const auto& a, const auto& b) { return votes_for(a) < votes_for(b); });
   if (most == others.end()) return "";
   const auto votes = static_cast<size_t>(votes_for(*most));
-  if (votes < std::min<size_t>(kMinVotes, verdicts.size()) || 2 * votes < others.size()) {
+  if (votes < std::min<size_t>(kMinVotes, checks.size()) || 2 * votes < others.size()) {
     return "";
   }
   Board shown = most->other;
-  for (const BoardVerdict& other : others) {
+  for (const BoardCheck& other : others) {
     if (Agree(*most, other) && other.other.rows > shown.rows) shown = other.other;
   }
   return fmt::format(
       "expected {}, as given; {} of {} photos looked at show {}, none the given one; {}",
-      SizeText(given), votes, verdicts.size(), SizeText(shown),
+      SizeText(given), votes, checks.size(), SizeText(shown),
       Advice(given, shown, most->first_square_white));
 }
 

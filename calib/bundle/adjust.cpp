@@ -256,7 +256,7 @@ bool IsTangential(LensFreedom freedom) {
 }
 
 bool MayGetTangential(const LensCamera& lens) {
-  return lens.model == LensModel::kSimpleRadial || lens.model == LensModel::kRadial;
+  return lens.model == CameraModel::kSimpleRadial || lens.model == CameraModel::kRadial;
 }
 
 bool Contradicts(const Adjusted& held, const Adjusted& free) {

@@ -125,7 +125,7 @@ Bundle BundleOf(std::span<const PinholeCamera> cameras, std::span<const Pose> ca
   std::map<std::vector<double>, int> lens_of;
   for (size_t i = 0; i < cameras.size(); ++i) {
     const PinholeCamera& c = cameras[i];
-    const LensCamera lens{LensModel::kPinhole,
+    const LensCamera lens{CameraModel::kPinhole,
                           c.width_px(),
                           c.height_px(),
                           {c.fx_px(), c.fy_px(), c.cx_px(), c.cy_px()}};
@@ -250,7 +250,7 @@ void CheckBundle(const Bundle& bundle) {
     } catch (const std::invalid_argument& error) {
       reject(error.what());
     }
-    if (lens.model == LensModel::kFov) {
+    if (lens.model == CameraModel::kFov) {
       reject("expected intrinsics model other than FOV; undistort the images first");
     }
   }

@@ -68,7 +68,7 @@ class Comparison {
     adjust_.progress = options.progress;
     const Bundle some = SomePoints(BundleOf(model), kMaxPoints, options.seed);
     double sigma_px = 0;
-    points_ = LossesOfUnseenPoints(some, some, 1, &sigma_px).size();
+    points_ = LossesOfHeldOutPoints(some, some, 1, &sigma_px).size();
     scale_px_ = kSharedLossSigmas * std::max(sigma_px, kMinSigmaPx);
   }
 
@@ -88,7 +88,7 @@ class Comparison {
     ParallelFor(0, static_cast<int>(folds.size()), options_.threads, [&](int i) {
       const auto at = static_cast<size_t>(i);
       const Adjusted trained = Adjust(folds[at].training, adjust_);
-      halves[at] = {LossesOfUnseenPoints(trained.bundle, folds[at].asked, scale_px_),
+      halves[at] = {LossesOfHeldOutPoints(trained.bundle, folds[at].asked, scale_px_),
                     trained.converged};
     });
     Trial trial{{}, true};
@@ -183,7 +183,7 @@ SharedCameras ShareCameras(const SfmModel& model, std::vector<std::uint32_t> cam
     return out;
   }
   for (const auto& [id, camera] : model.cameras) {
-    if (camera.model != LensModel::kFov) continue;
+    if (camera.model != CameraModel::kFov) continue;
     out.not_tested = "the camera model FOV cannot be adjusted";
     return out;
   }

@@ -54,8 +54,8 @@ std::vector<PointFold> PointFolds(const Bundle& bundle, std::uint64_t seed) {
   return {{halves[0], halves[1]}, {halves[1], halves[0]}};
 }
 
-std::vector<double> LossesOfUnseenPoints(const Bundle& cameras, const Bundle& asked,
-                                         double scale_px, double* sigma_px) {
+std::vector<double> LossesOfHeldOutPoints(const Bundle& cameras, const Bundle& asked,
+                                          double scale_px, double* sigma_px) {
   const Adjusted placed = Placed(cameras, asked);
   if (sigma_px != nullptr) *sigma_px = placed.sigma_px;
   const std::vector<Eigen::Vector2d> residuals = Residuals(placed.bundle);

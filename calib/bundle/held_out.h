@@ -30,8 +30,8 @@ std::vector<PointFold> PointFolds(const Bundle& bundle, std::uint64_t seed);
 /// Cauchy's loss (px^2), the point placed as the cameras (lenses and images) explain it best. A
 /// observation without a pixel counts like one far off. `sigma_px`, where asked for, becomes the
 /// standard deviation of an observation's coordinate.
-std::vector<double> LossesOfUnseenPoints(const Bundle& cameras, const Bundle& asked,
-                                         double scale_px, double* sigma_px = nullptr);
+std::vector<double> LossesOfHeldOutPoints(const Bundle& cameras, const Bundle& asked,
+                                          double scale_px, double* sigma_px = nullptr);
 
 /// One observation of each point that kMinTrack images or more see is kept apart.
 struct ObservationSplit {

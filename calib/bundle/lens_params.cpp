@@ -2,7 +2,7 @@
 
 namespace dtr::calib {
 
-std::vector<std::string> ParameterNames(LensModel model) {
+std::vector<std::string> ParameterNames(CameraModel model) {
   const auto with = [](std::vector<std::string> names, std::vector<std::string> more) {
     names.insert(names.end(), more.begin(), more.end());
     return names;
@@ -10,25 +10,25 @@ std::vector<std::string> ParameterNames(LensModel model) {
   const std::vector<std::string> one{"f_px", "cx_px", "cy_px"};
   const std::vector<std::string> two{"fx_px", "fy_px", "cx_px", "cy_px"};
   switch (model) {
-    case LensModel::kSimplePinhole:
+    case CameraModel::kSimplePinhole:
       return one;
-    case LensModel::kPinhole:
+    case CameraModel::kPinhole:
       return two;
-    case LensModel::kSimpleRadial:
-    case LensModel::kSimpleRadialFisheye:
+    case CameraModel::kSimpleRadial:
+    case CameraModel::kSimpleRadialFisheye:
       return with(one, {"k1"});
-    case LensModel::kRadial:
-    case LensModel::kRadialFisheye:
+    case CameraModel::kRadial:
+    case CameraModel::kRadialFisheye:
       return with(one, {"k1", "k2"});
-    case LensModel::kOpenCv:
+    case CameraModel::kOpenCv:
       return with(two, {"k1", "k2", "p1", "p2"});
-    case LensModel::kOpenCvFisheye:
+    case CameraModel::kOpenCvFisheye:
       return with(two, {"k1", "k2", "k3", "k4"});
-    case LensModel::kFullOpenCv:
+    case CameraModel::kFullOpenCv:
       return with(two, {"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"});
-    case LensModel::kFov:
+    case CameraModel::kFov:
       return with(two, {"omega"});
-    case LensModel::kThinPrismFisheye:
+    case CameraModel::kThinPrismFisheye:
       return with(two, {"k1", "k2", "p1", "p2", "k3", "k4", "sx1", "sy1"});
   }
   return {};

@@ -7,7 +7,8 @@
 
 namespace dtr::calib {
 
-/// "f_px" or "fx_px", "fy_px", then "cx_px", "cy_px", then the coefficients, in LensModel's order.
-std::vector<std::string> ParameterNames(LensModel model);
+/// "f_px" or "fx_px", "fy_px", then "cx_px", "cy_px", then the coefficients, in CameraModel's
+/// order.
+std::vector<std::string> ParameterNames(CameraModel model);
 
 }  // namespace dtr::calib

@@ -66,7 +66,7 @@ Pairs PairsOf(const SfmModel& model, const KnownMetres& known, const std::vector
 }
 
 // Which places agree, and how far those err that do not say so.
-struct Held {
+struct Agreement {
   std::vector<bool> used;
   double sigma_flat_m = kMinSigmaM, sigma_up_m = kMinSigmaM;
 
@@ -76,30 +76,33 @@ struct Held {
   }
 };
 
-std::vector<PositionPrior> PositionsOf(const KnownMetres& known, const Held& held) {
+std::vector<PositionPrior> PositionsOf(const KnownMetres& known, const Agreement& agreement) {
   std::vector<PositionPrior> positions;
   for (size_t i = 0; i < known.places.size(); ++i) {
     const KnownPlace& place = known.places[i];
-    if (held.used[i]) positions.push_back({place.image, place.position_m, held.SigmaOf(place)});
+    if (agreement.used[i])
+      positions.push_back({place.image, place.position_m, agreement.SigmaOf(place)});
   }
   return positions;
 }
 
-void RequireEnough(const Held& held) {
-  const auto agree = static_cast<size_t>(std::count(held.used.begin(), held.used.end(), true));
-  if (agree >= kMinPositions && 2 * agree >= held.used.size()) return;
+void RequireEnough(const Agreement& agreement) {
+  const auto agree =
+      static_cast<size_t>(std::count(agreement.used.begin(), agreement.used.end(), true));
+  if (agree >= kMinPositions && 2 * agree >= agreement.used.size()) return;
   throw Error(
       fmt::format("GPS: expected positions that agree with the cameras, found that {} of {} do",
-                  agree, held.used.size()));
+                  agree, agreement.used.size()));
 }
 
 // What a position leaves of its error as its camera follows it, per place and axis: 1 where
 // observations decide, 0 where nothing else does (Helmert's redundancy numbers). Where the
 // covariance is too large to be worked out, the numbers of a similarity alone are counted (seven,
 // six where distances hold the scale), and errors come out too small by what the model bends.
-std::vector<Eigen::Vector3d> Redundancies(const KnownMetres& known, const Held& held,
+std::vector<Eigen::Vector3d> Redundancies(const KnownMetres& known, const Agreement& agreement,
                                           const BundleCovariance* covariance) {
-  const auto agree = static_cast<double>(std::count(held.used.begin(), held.used.end(), true));
+  const auto agree =
+      static_cast<double>(std::count(agreement.used.begin(), agreement.used.end(), true));
   const double absorbed = known.distances.empty() ? 7 : 6;
   std::vector<Eigen::Vector3d> shares(known.places.size(),
                                       Eigen::Vector3d::Constant(1 - absorbed / (3 * agree)));
@@ -107,19 +110,19 @@ std::vector<Eigen::Vector3d> Redundancies(const KnownMetres& known, const Held& 
   for (size_t i = 0; i < shares.size(); ++i) {
     const Eigen::Vector3d variance =
         covariance->OfImage(known.places[i].image).diagonal().tail<3>();
-    const Eigen::Vector3d sigma = held.SigmaOf(known.places[i]);
+    const Eigen::Vector3d sigma = agreement.SigmaOf(known.places[i]);
     shares[i] = (1 - (variance.array() / sigma.array().square())).cwiseMax(0);
   }
   return shares;
 }
 
 // By what the cameras, as they are now, miss their places.
-Held Judged(const KnownMetres& known, const std::vector<Eigen::Vector3d>& misses, Held held,
-            const BundleCovariance* covariance) {
-  const std::vector<Eigen::Vector3d> shares = Redundancies(known, held, covariance);
+Agreement Reweighted(const KnownMetres& known, const std::vector<Eigen::Vector3d>& misses,
+                     Agreement agreement, const BundleCovariance* covariance) {
+  const std::vector<Eigen::Vector3d> shares = Redundancies(known, agreement, covariance);
   double flat = 0, up = 0, flat_count = 0, up_count = 0;
   for (size_t i = 0; i < misses.size(); ++i) {
-    if (!held.used[i]) continue;
+    if (!agreement.used[i]) continue;
     if (!(known.places[i].sigma_flat_m > 0)) {
       flat += misses[i].head<2>().squaredNorm();
       flat_count += shares[i].head<2>().sum();
@@ -129,19 +132,19 @@ Held Judged(const KnownMetres& known, const std::vector<Eigen::Vector3d>& misses
       up_count += shares[i].z();
     }
   }
-  if (flat_count > 0) held.sigma_flat_m = std::max(kMinSigmaM, std::sqrt(flat / flat_count));
-  if (up_count > 0) held.sigma_up_m = std::max(kMinSigmaM, std::sqrt(up / up_count));
+  if (flat_count > 0) agreement.sigma_flat_m = std::max(kMinSigmaM, std::sqrt(flat / flat_count));
+  if (up_count > 0) agreement.sigma_up_m = std::max(kMinSigmaM, std::sqrt(up / up_count));
   std::vector<double> lengths;
   for (size_t i = 0; i < misses.size(); ++i) {
-    lengths.push_back(misses[i].cwiseQuotient(held.SigmaOf(known.places[i])).norm());
+    lengths.push_back(misses[i].cwiseQuotient(agreement.SigmaOf(known.places[i])).norm());
   }
   std::vector<double> sorted = lengths;
   const double limit = kPositionOutlierSigmas * std::max(1.0, UpperMedian(sorted) / kMedianLength);
-  for (size_t i = 0; i < lengths.size(); ++i) held.used[i] = lengths[i] <= limit;
-  return held;
+  for (size_t i = 0; i < lengths.size(); ++i) agreement.used[i] = lengths[i] <= limit;
+  return agreement;
 }
 
-bool IsSettled(const Held& before, const Held& now) {
+bool IsSettled(const Agreement& before, const Agreement& now) {
   const auto same = [](double a, double b) { return std::abs(std::log(b / a)) <= kSettledSpread; };
   return before.used == now.used && same(before.sigma_flat_m, now.sigma_flat_m) &&
          same(before.sigma_up_m, now.sigma_up_m);
@@ -209,7 +212,7 @@ std::vector<Eigen::Vector3d> ErrorsOf(const KnownMetres& known, const std::vecto
 }
 
 // The way into metres, and the places that agree with it.
-Similarity FromPlaces(const SfmModel& model, const KnownMetres& known, Held& held,
+Similarity FromPlaces(const SfmModel& model, const KnownMetres& known, Agreement& agreement,
                       MetricReport& report) {
   const Pairs pairs = PairsOf(model, known, std::vector<bool>(known.places.size(), true));
   PositionScale placed = AlignToPositions(pairs.centres, pairs.positions_m);
@@ -223,41 +226,41 @@ Similarity FromPlaces(const SfmModel& model, const KnownMetres& known, Held& hel
   if (!report.places_tell_scale) {
     placed = AlignToPositions(pairs.centres, pairs.positions_m, FromDistances(model, known).scale);
   }
-  held.used.assign(known.places.size(), true);
-  for (const size_t i : placed.left_out) held.used[i] = false;
+  agreement.used.assign(known.places.size(), true);
+  for (const size_t i : placed.left_out) agreement.used[i] = false;
   return placed.metric_from_scene;
 }
 
 // Turns and shifts the model to places that tell no more: held, they would bend nothing that photos
 // tell, and a solve finds a turn that is worth no more than theirs in very many steps.
-Held TurnToPlaces(const KnownMetres& known, Held held, MetricStart& start) {
+Agreement TurnToPlaces(const KnownMetres& known, Agreement agreement, MetricStart& start) {
   for (int pass = 0; pass < known.max_passes; ++pass) {
-    const Held next = Judged(known, Misses(known, start.model), held, nullptr);
+    const Agreement next = Reweighted(known, Misses(known, start.model), agreement, nullptr);
     RequireEnough(next);
     start.report.passes = pass + 1;
-    start.report.settled = pass > 0 && IsSettled(held, next);
+    start.report.settled = pass > 0 && IsSettled(agreement, next);
     if (start.report.settled) break;
-    held = next;
-    const Pairs pairs = PairsOf(start.model, known, held.used);
+    agreement = next;
+    const Pairs pairs = PairsOf(start.model, known, agreement.used);
     std::vector<Eigen::Vector3d> sigmas;
-    for (const PositionPrior& p : PositionsOf(known, held)) sigmas.push_back(p.sigma);
+    for (const PositionPrior& p : PositionsOf(known, agreement)) sigmas.push_back(p.sigma);
     start.model = Moved(start.model, TurnAndShift(pairs.centres, pairs.positions_m, sigmas));
   }
-  return held;
+  return agreement;
 }
 
-void RequireNoContradiction(const Adjusted& held, const Adjusted& free) {
-  if (!Contradicts(held, free)) return;
+void RequireNoContradiction(const Adjusted& agreement, const Adjusted& free) {
+  if (!Contradicts(agreement, free)) return;
   throw Error(fmt::format(
       "bundle adjustment: expected photos that agree with the positions and distances given, found "
       "residuals of {:.2f} px per coordinate and {} observations that agree with these fixed, "
       "{:.2f} px and {} without; are their standard deviations too small, or is a distance of "
       "another pair?",
-      held.sigma_px, held.observations, free.sigma_px, free.observations));
+      agreement.sigma_px, agreement.observations, free.sigma_px, free.observations));
 }
 
 // Adjusts some points until the places settle, and holds what comes out against the photos.
-void SettlePlaces(const KnownMetres& known, MetricStart& start, Held held) {
+void SettlePlaces(const KnownMetres& known, MetricStart& start, Agreement agreement) {
   const RefineOptions& options = start.options;
   // Of the lenses as they are known: what decides about places is to see what the result will.
   const SfmModel model =
@@ -271,18 +274,18 @@ void SettlePlaces(const KnownMetres& known, MetricStart& start, Held held) {
   adjust.distances = options.distances;
   Bundle bundle = some;
   const bool placed = !known.places.empty() && start.report.places_tell_scale;
-  if (placed) held = Judged(known, Misses(known, bundle), held, nullptr);
+  if (placed) agreement = Reweighted(known, Misses(known, bundle), agreement, nullptr);
   for (int pass = 0; pass < known.max_passes; ++pass) {
-    if (placed) RequireEnough(held);
-    if (placed) adjust.positions = PositionsOf(known, held);
+    if (placed) RequireEnough(agreement);
+    if (placed) adjust.positions = PositionsOf(known, agreement);
     const Adjusted adjusted = Adjust(bundle, adjust);
     bundle = adjusted.bundle;
-    Held next = held;
+    Agreement next = agreement;
     if (placed) {
       const BundleCovariance covariance = CovarianceOf(adjusted, adjust);
-      next = Judged(known, Misses(known, bundle), held, &covariance);
+      next = Reweighted(known, Misses(known, bundle), agreement, &covariance);
     }
-    const bool settled = IsSettled(held, next);
+    const bool settled = IsSettled(agreement, next);
     if (placed) {
       start.report.passes = pass + 1;
       start.report.settled = settled;
@@ -291,15 +294,15 @@ void SettlePlaces(const KnownMetres& known, MetricStart& start, Held held) {
       RequireNoContradiction(adjusted, free);
       break;
     }
-    held = next;
+    agreement = next;
   }
-  start.places = PositionsOf(known, held);
+  start.places = PositionsOf(known, agreement);
   if (placed) start.options.positions = start.places;
   for (size_t i = 0; i < known.places.size(); ++i) {
     const KnownPlace& place = known.places[i];
-    if (!held.used[i]) start.report.left_out.push_back(place.image);
-    if (!(place.sigma_flat_m > 0)) start.report.sigma_flat_m = held.sigma_flat_m;
-    if (!(place.sigma_up_m > 0)) start.report.sigma_up_m = held.sigma_up_m;
+    if (!agreement.used[i]) start.report.left_out.push_back(place.image);
+    if (!(place.sigma_flat_m > 0)) start.report.sigma_flat_m = agreement.sigma_flat_m;
+    if (!(place.sigma_up_m > 0)) start.report.sigma_up_m = agreement.sigma_up_m;
   }
 }
 
@@ -386,18 +389,18 @@ MetricStart StartInMetres(const SfmModel& model, const KnownMetres& known,
                           const RefineOptions& options) {
   MetricStart start;
   start.options = options;
-  Held held;
+  Agreement agreement;
   const Similarity metric_from_model = known.places.empty()
                                            ? FromDistances(model, known)
-                                           : FromPlaces(model, known, held, start.report);
+                                           : FromPlaces(model, known, agreement, start.report);
   start.model = Moved(model, metric_from_model);
   start.report.metres_per_unit = metric_from_model.scale;
   for (const KnownDistance& d : known.distances) {
     start.options.distances.push_back({d.image_a, d.image_b, d.length_m, SigmaOf(d)});
     start.report.given_m.push_back(DistanceOf(start.model, d));
   }
-  if (!start.report.places_tell_scale) held = TurnToPlaces(known, held, start);
-  SettlePlaces(known, start, held);
+  if (!start.report.places_tell_scale) agreement = TurnToPlaces(known, agreement, start);
+  SettlePlaces(known, start, agreement);
   return start;
 }
 

@@ -96,13 +96,14 @@ std::unique_ptr<ceres::CostFunction> Cost(const LensFrame& lens, const PoseFrame
 }
 
 // What a coefficient multiplies at radius r: tangential and prism terms r^2, radial ones r^(2i+1).
-double LeverOf(LensModel model, size_t coefficient, double r) {
-  const bool tangential_third = model == LensModel::kOpenCv || model == LensModel::kFullOpenCv ||
-                                model == LensModel::kThinPrismFisheye;
+double LeverOf(CameraModel model, size_t coefficient, double r) {
+  const bool tangential_third = model == CameraModel::kOpenCv ||
+                                model == CameraModel::kFullOpenCv ||
+                                model == CameraModel::kThinPrismFisheye;
   if (!tangential_third) return std::pow(r, 2 * static_cast<double>(coefficient) + 3);
   if (coefficient < 2) return std::pow(r, 2 * static_cast<double>(coefficient) + 3);
   if (coefficient < 4) return r * r;
-  if (model == LensModel::kThinPrismFisheye) {
+  if (model == CameraModel::kThinPrismFisheye) {
     return coefficient < 6 ? std::pow(r, 2 * static_cast<double>(coefficient - 2) + 3) : r * r;
   }
   return coefficient == 4 ? std::pow(r, 7)

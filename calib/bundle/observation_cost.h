@@ -22,7 +22,7 @@ namespace dtr::calib {
 /// The projection needs p only up to a positive factor: d + rho (anchor - centre - v).
 inline constexpr size_t kMaxParams = 12;
 struct LensFrame {
-  LensModel model = LensModel::kPinhole;
+  CameraModel model = CameraModel::kPinhole;
   std::vector<double> centre, scale;
 };
 struct PoseFrame {

@@ -109,7 +109,7 @@ Bundle OnlyImages(const Bundle& bundle, const std::vector<bool>& wanted) {
   return some;
 }
 
-Bundle WithoutUnseen(const Bundle& bundle, int fewest) {
+Bundle WithoutWeakImages(const Bundle& bundle, int fewest) {
   std::vector<int> observations(bundle.images.size());
   for (const BundleObservation& o : bundle.observations)
     ++observations[static_cast<size_t>(o.image)];

@@ -18,7 +18,7 @@ namespace dtr::calib {
 namespace {
 
 constexpr double kLossSigmas =
-    2;  // scale of the loss that unseen points and observations are judged by
+    2;  // scale of the loss that unseen points and observations are evaluated by
 constexpr int kMaxComparedPoints = 4000;  // that the candidates are compared on
 // A principal point for every image also takes up what other faults of a lens model leave, and
 // costs the lens's own principal point: what the images share, nothing but the prior says. So it
@@ -107,7 +107,7 @@ std::vector<std::vector<double>> TryOnUnseenPoints(const Bundle& bundle,
     const Adjusted trained =
         Adjust(fold.training, SolveOptions(options, candidates[at / folds.size()].lens));
     converged[at] = trained.converged;
-    parts[at] = LossesOfUnseenPoints(trained.bundle, fold.asked, scale_px);
+    parts[at] = LossesOfHeldOutPoints(trained.bundle, fold.asked, scale_px);
   });
   std::vector<std::vector<double>> losses(candidates.size());
   for (size_t i = 0; i < parts.size(); ++i) {
@@ -129,7 +129,7 @@ size_t Choose(const Bundle& bundle, const ObservationSplit& split, const RefineO
   auto& candidates = refined.candidates;
   candidates = CandidatesFor(bundle, options.separate_lenses);
   double sigma_px = 0;
-  LossesOfUnseenPoints(bundle, split.training, 1, &sigma_px);
+  LossesOfHeldOutPoints(bundle, split.training, 1, &sigma_px);
   if (!std::isfinite(sigma_px)) return kNoScale;
   const double scale_px = kLossSigmas * std::max(sigma_px, kPrecisionPx);
   const Bundle some = SomePoints(bundle, kMaxComparedPoints, options.seed);
@@ -167,7 +167,7 @@ size_t Choose(const Bundle& bundle, const ObservationSplit& split, const RefineO
 
 bool Refinable(const SfmModel& model, std::string* reason) {
   for (const auto& [id, camera] : model.cameras) {
-    if (camera.model != LensModel::kFov) continue;
+    if (camera.model != CameraModel::kFov) continue;
     *reason = "the camera model FOV cannot be adjusted";
     return false;
   }
@@ -259,7 +259,7 @@ Refined Refine(const SfmModel& model, const RefineOptions& options) {
 
 std::vector<Degeneracy> DegeneraciesOf(const SfmModel& model, const RefineOptions& options) {
   for (const auto& [id, camera] : model.cameras) {
-    if (camera.model == LensModel::kFov) return {};
+    if (camera.model == CameraModel::kFov) return {};
   }
   const Bundle bundle =
       SomePoints(BundleOf(model, options.separate_lenses), kMaxComparedPoints, options.seed);

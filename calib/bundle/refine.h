@@ -83,9 +83,9 @@ struct Refined : RefineReport {
 /// those of RequireDetermined where options.determined asks for it.
 Refined Refine(const SfmModel& model, const RefineOptions& options);
 
-/// In what ways the views of a model do not suffice (judge.h), its poses, points and lenses free as
-/// Refine leaves them, what is known beside the observations held. At most 4000 points take part. A
-/// model with a FOV lens has none to tell of.
+/// In what ways the views of a model do not suffice (degeneracy.h), its poses, points and lenses
+/// free as Refine leaves them, what is known beside the observations held. At most 4000 points take
+/// part. A model with a FOV lens has none to tell of.
 std::vector<Degeneracy> DegeneraciesOf(const SfmModel& model, const RefineOptions& options);
 
 /// Throws Error naming the degeneracy where one leaves poses, points or focal lengths undetermined.

@@ -133,8 +133,8 @@ class Normal {
   int coordinates_ = 0;
 };
 
-WiderFit Judged(const Eigen::MatrixXd& left, const Eigen::VectorXd& units, double free,
-                int coordinates) {
+WiderFit FitFrom(const Eigen::MatrixXd& left, const Eigen::VectorXd& units, double free,
+                 int coordinates) {
   WiderFit fit;
   const long extra = units.size();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
@@ -185,7 +185,7 @@ WiderFit FitWider(const Adjusted& adjusted, const BundleCovariance& layout, long
   }
   for (const auto& observations : tracks) normal.AddPoint(observations);
   const Eigen::MatrixXd left = normal.WithoutBase();
-  return Judged(left, normal.UnitsOfExtra(), normal.Free(), normal.coordinates());
+  return FitFrom(left, normal.UnitsOfExtra(), normal.Free(), normal.coordinates());
 }
 
 long MostExtra(const BundleCovariance& layout) {

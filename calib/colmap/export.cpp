@@ -62,7 +62,7 @@ calib::SfmPoint PointFrom(const SparsePoint& point, const PointSums& sums,
 }  // namespace
 
 calib::LensCamera FromPinhole(const PinholeCamera& camera) {
-  return {calib::LensModel::kPinhole,
+  return {calib::CameraModel::kPinhole,
           camera.width_px(),
           camera.height_px(),
           {camera.fx_px(), camera.fy_px(), camera.cx_px(), camera.cy_px()}};

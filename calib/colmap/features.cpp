@@ -52,19 +52,19 @@ double PeakMib(double working_pixels, double full_pixels, int threads) {
                         kMib;
 }
 
-std::vector<double> FirstGuess(calib::LensModel model, const SfmImageInput& image,
+std::vector<double> FirstGuess(calib::CameraModel model, const SfmImageInput& image,
                                double focal_px) {
   std::vector<double> params(static_cast<size_t>(calib::ParameterCount(model)), 0.0);
   const bool one_focal =
-      model == calib::LensModel::kSimplePinhole || model == calib::LensModel::kSimpleRadial ||
-      model == calib::LensModel::kRadial || model == calib::LensModel::kSimpleRadialFisheye ||
-      model == calib::LensModel::kRadialFisheye;
+      model == calib::CameraModel::kSimplePinhole || model == calib::CameraModel::kSimpleRadial ||
+      model == calib::CameraModel::kRadial || model == calib::CameraModel::kSimpleRadialFisheye ||
+      model == calib::CameraModel::kRadialFisheye;
   size_t next = 0;
   params[next++] = focal_px;
   if (!one_focal) params[next++] = focal_px;
   params[next++] = 0.5 * image.width_px;
   params[next++] = 0.5 * image.height_px;
-  if (model == calib::LensModel::kFov) params[next] = kFovStart;
+  if (model == calib::CameraModel::kFov) params[next] = kFovStart;
   return params;
 }
 
@@ -182,7 +182,7 @@ ExtractionPlan PlanExtraction(const std::vector<SfmImageInput>& images, int thre
 }
 
 std::vector<CameraGroup> GroupCameras(const std::vector<SfmImageInput>& images,
-                                      calib::LensModel model, bool share) {
+                                      calib::CameraModel model, bool share) {
   using Key = std::tuple<std::string, int, int, size_t>;
   std::map<Key, size_t> index;
   std::vector<CameraGroup> groups;

@@ -42,7 +42,7 @@ ExtractionPlan PlanExtraction(const std::vector<SfmImageInput>& images, int thre
 /// Photos that share one camera of the database.
 struct CameraGroup {
   std::vector<size_t> images;  ///< indices into Workspace::images(), rising
-  calib::LensModel model = calib::LensModel::kSimpleRadial;
+  calib::CameraModel model = calib::CameraModel::kSimpleRadial;
   std::vector<double> params;              ///< a good first guess, or empty: COLMAP guesses
   std::optional<std::uint32_t> camera_id;  ///< of the database, when it holds the camera already
 };
@@ -50,7 +50,7 @@ struct CameraGroup {
 /// Groups by camera_group and size (every photo alone when not `share`), in the order of the first
 /// photo's name. The guess is the median focal prior of the group, no distortion.
 std::vector<CameraGroup> GroupCameras(const std::vector<SfmImageInput>& images,
-                                      calib::LensModel model, bool share);
+                                      calib::CameraModel model, bool share);
 
 /// COLMAP's text of camera parameters: exact decimals separated by commas.
 std::string ParamsText(const std::vector<double>& params);

@@ -13,7 +13,7 @@ namespace dtr::colmap {
 /// Photos placed in a frozen model. The model itself is untouched: it is not part of the result.
 struct HeldOutResult {
   /// Registered photos in order of names. `camera_id` is a key of `cameras`; features that were
-  /// matched carry the frozen model's point ids, so that their reprojection can be judged.
+  /// matched carry the frozen model's point ids, so that their reprojection can be evaluated.
   std::vector<calib::SfmImage> images;
   std::map<std::uint32_t, calib::LensCamera> cameras;
   std::vector<std::string> not_registered;

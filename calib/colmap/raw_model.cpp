@@ -13,7 +13,7 @@
 namespace dtr::colmap {
 namespace {
 
-constexpr int kLastLensModel = static_cast<int>(calib::LensModel::kThinPrismFisheye);
+constexpr int kLastCameraModel = static_cast<int>(calib::CameraModel::kThinPrismFisheye);
 constexpr std::uint64_t kLongestSidePx = 1'000'000;  // no photo is larger; keeps int products sane
 // A quaternion this close to unit length is kept bit for bit, so that a model written by us reads
 // back equal; others are normalised, as COLMAP does. Ten times the rounding of a normalisation.
@@ -102,19 +102,19 @@ void CheckTracks(const RawModel& raw) {
 
 }  // namespace
 
-calib::LensModel CheckedLensModel(const std::string& where, int model_id) {
-  if (model_id < 0 || model_id > kLastLensModel) {
+calib::CameraModel CheckedCameraModel(const std::string& where, int model_id) {
+  if (model_id < 0 || model_id > kLastCameraModel) {
     Reject(where, fmt::format("expected a camera model 0 to {}, found the unknown id {}; "
                               "undistort the images first (colmap image_undistorter)",
-                              kLastLensModel, model_id));
+                              kLastCameraModel, model_id));
   }
-  return static_cast<calib::LensModel>(model_id);
+  return static_cast<calib::CameraModel>(model_id);
 }
 
 calib::LensCamera CheckedCamera(const std::string& where, int model_id, std::uint64_t width_px,
                                 std::uint64_t height_px, std::vector<double> params) {
   calib::LensCamera camera;
-  camera.model = CheckedLensModel(where, model_id);
+  camera.model = CheckedCameraModel(where, model_id);
   if (width_px < 1 || width_px > kLongestSidePx || height_px < 1 || height_px > kLongestSidePx) {
     Reject(where, fmt::format("expected an image size of 1 to {} px, found {} x {}", kLongestSidePx,
                               width_px, height_px));

@@ -82,7 +82,7 @@ void ReadCameras(RawModel& raw) {
     const auto width_px = in.Take<std::uint64_t>();
     const auto height_px = in.Take<std::uint64_t>();
     std::vector<double> params(
-        static_cast<size_t>(calib::ParameterCount(CheckedLensModel(where, model_id))));
+        static_cast<size_t>(calib::ParameterCount(CheckedCameraModel(where, model_id))));
     for (double& value : params) value = in.Take<double>();
     camera.camera = CheckedCamera(where, model_id, width_px, height_px, std::move(params));
   }

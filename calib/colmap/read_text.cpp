@@ -209,7 +209,7 @@ std::vector<RawModel::Camera> ReadTextCameras(const std::filesystem::path& file)
     RawModel::Camera camera;
     camera.id = line->Take<std::uint32_t>("a camera id");
     const std::string name(line->TakeWord("a camera model"));
-    const auto model = calib::LensModelFromName(name);
+    const auto model = calib::CameraModelFromName(name);
     if (!model) {
       throw Error(
           fmt::format("{}: expected a camera model SIMPLE_PINHOLE to THIN_PRISM_FISHEYE, "

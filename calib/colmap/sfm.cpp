@@ -185,7 +185,7 @@ std::vector<int> ModelSizes(const Workspace& workspace) {
 
 SfmResult RunSfm(const fs::path& images_dir, std::span<const SfmImageInput> images,
                  const fs::path& workspace_folder, const SfmOptions& options, Progress& progress) {
-  const calib::LensModel lens = LensModelOf(options);
+  const calib::CameraModel lens = ModelOf(options);
   if (images.size() < 2) {
     throw UsageError(
         fmt::format("{}: expected at least two photos, found {}; depth needs a second "
@@ -226,7 +226,7 @@ std::optional<SfmResult> MapWithFixedIntrinsics(const fs::path& images_dir,
   Workspace workspace(workspace_folder, images_dir, images, "", ResolveThreads(options.threads),
                       progress);
   const auto groups =
-      GroupCameras(workspace.images(), LensModelOf(options), options.share_intrinsics_within_group);
+      GroupCameras(workspace.images(), ModelOf(options), options.share_intrinsics_within_group);
   if (!AllHavePriors(groups)) return {};
   SfmResult result;
   FeaturesAndMatches(workspace, groups, options, result.report);

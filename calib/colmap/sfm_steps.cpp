@@ -31,8 +31,8 @@ std::string TextOf(const std::vector<CameraGroup>& groups, const ExtractionPlan&
 
 }  // namespace
 
-calib::LensModel LensModelOf(const SfmOptions& options) {
-  const auto model = calib::LensModelFromName(options.lens_model);
+calib::CameraModel ModelOf(const SfmOptions& options) {
+  const auto model = calib::CameraModelFromName(options.lens_model);
   if (!model) {
     throw UsageError("camera model: expected a name like SIMPLE_RADIAL, RADIAL or OPENCV, found '" +
                      options.lens_model + "'");

@@ -110,11 +110,11 @@ void AddCoefficients(std::vector<double> coefficients, bool fisheye, const std::
                             fisheye ? "4" : "0, 4, 5, 8, 12 or 14", count));
   }
   if (fisheye) {
-    camera.model = LensModel::kOpenCvFisheye;
+    camera.model = CameraModel::kOpenCvFisheye;
   } else if (count == 0) {
-    camera.model = LensModel::kPinhole;
+    camera.model = CameraModel::kPinhole;
   } else {
-    camera.model = count == 4 ? LensModel::kOpenCv : LensModel::kFullOpenCv;
+    camera.model = count == 4 ? CameraModel::kOpenCv : CameraModel::kFullOpenCv;
     coefficients.resize(count == 4 ? 4 : 8, 0.0);
   }
   camera.params.insert(camera.params.end(), coefficients.begin(), coefficients.end());
@@ -123,35 +123,35 @@ void AddCoefficients(std::vector<double> coefficients, bool fisheye, const std::
 std::vector<double> OpenCvCoefficients(const LensCamera& camera) {
   const std::vector<double>& p = camera.params;
   switch (camera.model) {
-    case LensModel::kSimplePinhole:
-    case LensModel::kPinhole:
+    case CameraModel::kSimplePinhole:
+    case CameraModel::kPinhole:
       return {0, 0, 0, 0};
-    case LensModel::kSimpleRadial:
+    case CameraModel::kSimpleRadial:
       return {p[3], 0, 0, 0};
-    case LensModel::kRadial:
+    case CameraModel::kRadial:
       return {p[3], p[4], 0, 0};
-    case LensModel::kSimpleRadialFisheye:
+    case CameraModel::kSimpleRadialFisheye:
       return {p[3], 0, 0, 0};
-    case LensModel::kRadialFisheye:
+    case CameraModel::kRadialFisheye:
       return {p[3], p[4], 0, 0};
-    case LensModel::kOpenCv:
-    case LensModel::kOpenCvFisheye:
+    case CameraModel::kOpenCv:
+    case CameraModel::kOpenCvFisheye:
       return {p[4], p[5], p[6], p[7]};
-    case LensModel::kFullOpenCv: {
+    case CameraModel::kFullOpenCv: {
       const bool rational = p[9] != 0 || p[10] != 0 || p[11] != 0;
       return {p.begin() + 4, p.begin() + (rational ? 12 : 9)};
     }
-    case LensModel::kFov:
-    case LensModel::kThinPrismFisheye:
+    case CameraModel::kFov:
+    case CameraModel::kThinPrismFisheye:
       break;
   }
   throw Error("OpenCV has no camera model " + NameOf(camera.model) +
               "; write a COLMAP cameras.txt");
 }
 
-bool IsFisheye(LensModel model) {
-  return model == LensModel::kOpenCvFisheye || model == LensModel::kSimpleRadialFisheye ||
-         model == LensModel::kRadialFisheye;
+bool IsFisheye(CameraModel model) {
+  return model == CameraModel::kOpenCvFisheye || model == CameraModel::kSimpleRadialFisheye ||
+         model == CameraModel::kRadialFisheye;
 }
 
 std::string Matrix(const char* key, int rows, const std::vector<double>& data) {

@@ -14,17 +14,17 @@ namespace {
 struct BoardModelFacts {
   BoardModel model;
   const char* name;
-  LensModel lens;
+  CameraModel lens;
   int free_parameters;
   int complexity;
 };
 
 constexpr std::array<BoardModelFacts, 5> kFacts{{
-    {BoardModel::kPinhole, "pinhole", LensModel::kPinhole, 4, 0},
-    {BoardModel::kBrown4, "brown4", LensModel::kOpenCv, 8, 1},
-    {BoardModel::kBrown5, "brown5", LensModel::kFullOpenCv, 9, 2},
-    {BoardModel::kBrown8, "brown8", LensModel::kFullOpenCv, 12, 4},
-    {BoardModel::kFisheye, "fisheye", LensModel::kOpenCvFisheye, 8, 3},
+    {BoardModel::kPinhole, "pinhole", CameraModel::kPinhole, 4, 0},
+    {BoardModel::kBrown4, "brown4", CameraModel::kOpenCv, 8, 1},
+    {BoardModel::kBrown5, "brown5", CameraModel::kFullOpenCv, 9, 2},
+    {BoardModel::kBrown8, "brown8", CameraModel::kFullOpenCv, 12, 4},
+    {BoardModel::kFisheye, "fisheye", CameraModel::kOpenCvFisheye, 8, 3},
 }};
 
 const BoardModelFacts& FactsOf(BoardModel model) {
@@ -45,7 +45,7 @@ std::optional<BoardModel> BoardModelFromName(const std::string& name) {
   return std::nullopt;
 }
 
-LensModel LensModelOf(BoardModel model) { return FactsOf(model).lens; }
+CameraModel ModelOf(BoardModel model) { return FactsOf(model).lens; }
 
 int FreeParameterCount(BoardModel model) { return FactsOf(model).free_parameters; }
 
@@ -67,7 +67,7 @@ LensCamera CameraFrom(BoardModel model, int width_px, int height_px,
                                 std::to_string(FreeParameterCount(model)) + " parameters, found " +
                                 std::to_string(free_params.size()));
   }
-  LensCamera camera{LensModelOf(model), width_px, height_px,
+  LensCamera camera{ModelOf(model), width_px, height_px,
                     std::vector<double>(free_params.begin(), free_params.end())};
   camera.params.resize(static_cast<size_t>(ParameterCount(camera.model)), 0.0);
   camera.Check();
@@ -90,7 +90,7 @@ Eigen::Vector2d PrincipalPoint(const LensCamera& camera) {
 }  // namespace
 
 bool IsAskedFor(const LensCamera& camera, const Eigen::Vector2d& pixel) {
-  if (camera.model != LensModel::kOpenCvFisheye) return true;
+  if (camera.model != CameraModel::kOpenCvFisheye) return true;
   const Eigen::Vector2d middle = PrincipalPoint(camera);
   return (pixel - middle).norm() <= CircleRadius(camera, middle);
 }
@@ -99,7 +99,7 @@ bool CoversImage(const LensCamera& camera) {
   const LensMap lens(camera);
   const double w = camera.width_px, h = camera.height_px;
   std::vector<Eigen::Vector2d> places;
-  if (camera.model == LensModel::kOpenCvFisheye) {
+  if (camera.model == CameraModel::kOpenCvFisheye) {
     const Eigen::Vector2d middle = PrincipalPoint(camera);
     const double radius = CircleRadius(camera, middle);
     for (int i = 0; i < 16; ++i) {

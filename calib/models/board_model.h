@@ -30,8 +30,8 @@ std::string NameOf(BoardModel model);
 std::optional<BoardModel> BoardModelFromName(const std::string& name);
 
 /// The model as LensCamera stores it; brown5 is FULL_OPENCV with k4 = k5 = k6 = 0.
-LensModel LensModelOf(BoardModel model);
-/// How many of that LensModel's parameters, the first ones, are estimated. The others are zero.
+CameraModel ModelOf(BoardModel model);
+/// How many of that CameraModel's parameters, the first ones, are estimated. The others are zero.
 int FreeParameterCount(BoardModel model);
 /// Order of simplicity: how far a model can bend where no corner holds it. Perspective models come
 /// first, by their radial terms; a fisheye has four of them; of a quotient the denominator can

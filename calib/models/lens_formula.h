@@ -13,7 +13,7 @@ namespace dtr::calib {
 /// then distorted, with s = |q|^2 (Brown 1966; Kannala & Brandt 2006; Weng et al. 1992):
 ///   d = q * (1 + k1 s + k2 s^2 + k3 s^3 + k4 s^4) / (1 + d1 s + d2 s^2 + d3 s^3)
 ///     + (2 p1 qx qy + p2 (s + 2 qx^2) + sx s,  2 p2 qx qy + p1 (s + 2 qy^2) + sy s)
-/// and pixel = f * d + c. LensModel::kFov has a radial factor of its own (lens_map.h).
+/// and pixel = f * d + c. CameraModel::kFov has a radial factor of its own (lens_map.h).
 /// T is double, or a type that carries derivatives (ceres::Jet). No guard: LensMap knows where the
 /// formula stops being a lens.
 template <typename T>
@@ -73,38 +73,39 @@ struct LensFormula {
 };
 
 /// The formula's coefficients out of a model's parameters (ParameterCount(model) values in the
-/// order of LensModel). Of kFov only focal lengths and principal point are taken.
+/// order of CameraModel). Of kFov only focal lengths and principal point are taken.
 template <typename T>
-LensFormula<T> FormulaOf(LensModel model, const T* params) {
-  const bool one_focal = model == LensModel::kSimplePinhole || model == LensModel::kSimpleRadial ||
-                         model == LensModel::kRadial || model == LensModel::kSimpleRadialFisheye ||
-                         model == LensModel::kRadialFisheye;
+LensFormula<T> FormulaOf(CameraModel model, const T* params) {
+  const bool one_focal = model == CameraModel::kSimplePinhole ||
+                         model == CameraModel::kSimpleRadial || model == CameraModel::kRadial ||
+                         model == CameraModel::kSimpleRadialFisheye ||
+                         model == CameraModel::kRadialFisheye;
   LensFormula<T> formula{params[0], params[one_focal ? 0 : 1], params[one_focal ? 1 : 2],
                          params[one_focal ? 2 : 3]};
   const T* k = params + (one_focal ? 3 : 4);
   switch (model) {
-    case LensModel::kSimplePinhole:
-    case LensModel::kPinhole:
-    case LensModel::kFov:
+    case CameraModel::kSimplePinhole:
+    case CameraModel::kPinhole:
+    case CameraModel::kFov:
       break;
-    case LensModel::kSimpleRadialFisheye:
+    case CameraModel::kSimpleRadialFisheye:
       formula.fisheye = true;
       [[fallthrough]];
-    case LensModel::kSimpleRadial:
+    case CameraModel::kSimpleRadial:
       formula.numerator[0] = k[0];
       break;
-    case LensModel::kRadialFisheye:
+    case CameraModel::kRadialFisheye:
       formula.fisheye = true;
       [[fallthrough]];
-    case LensModel::kRadial:
+    case CameraModel::kRadial:
       formula.numerator[0] = k[0];
       formula.numerator[1] = k[1];
       break;
-    case LensModel::kOpenCvFisheye:
+    case CameraModel::kOpenCvFisheye:
       formula.fisheye = true;
       formula.numerator = {k[0], k[1], k[2], k[3]};
       break;
-    case LensModel::kThinPrismFisheye:
+    case CameraModel::kThinPrismFisheye:
       formula.fisheye = true;
       formula.numerator = {k[0], k[1], k[4], k[5]};
       formula.p1 = k[2];
@@ -112,11 +113,11 @@ LensFormula<T> FormulaOf(LensModel model, const T* params) {
       formula.sx = k[6];
       formula.sy = k[7];
       break;
-    case LensModel::kFullOpenCv:
+    case CameraModel::kFullOpenCv:
       formula.numerator[2] = k[4];
       formula.denominator = {k[5], k[6], k[7]};
       [[fallthrough]];
-    case LensModel::kOpenCv:
+    case CameraModel::kOpenCv:
       formula.numerator[0] = k[0];
       formula.numerator[1] = k[1];
       formula.p1 = k[2];

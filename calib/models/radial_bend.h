@@ -27,7 +27,7 @@ struct RadialBend {
 /// is allowed beyond the corners seen is the change up to them, continued by the law of the first
 /// term of every model (the square of |q|), times 2 for further terms, and a floor for lenses that
 /// hardly change. Requires `seen_px`, the outermost distance from the principal point at which a
-/// corner was seen, to be positive; LensModel::kFov is not measured.
+/// corner was seen, to be positive; CameraModel::kFov is not measured.
 RadialBend RadialBendOf(const LensCamera& camera, double seen_px);
 
 /// Largest distance from the principal point of these corners, px, but for those in `outliers`'

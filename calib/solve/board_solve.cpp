@@ -346,7 +346,7 @@ BoardSolution SolveBoard(const Board& board, std::span<const BoardView> views, i
 
 std::optional<Pose> SolvePose(const Board& board, const BoardView& view, const LensCamera& camera,
                               std::span<const int> ignored) {
-  if (camera.model == LensModel::kFov) {
+  if (camera.model == CameraModel::kFov) {
     throw Error("calibration: a pose cannot be solved with the camera model FOV; use another one");
   }
   const auto start = PoseOfBoard(board, view, camera);

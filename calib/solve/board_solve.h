@@ -76,8 +76,8 @@ BoardSolution SolveBoard(const Board& board, std::span<const BoardView> views, i
                          int height_px, BoardModel model, const SolveOptions& options = {});
 
 /// The pose alone, the camera as given: least squares on all corners but those in `ignored`
-/// (sorted ids). Empty where no pose explains them. Throws Error for LensModel::kFov, which boards
-/// are not solved with.
+/// (sorted ids). Empty where no pose explains them. Throws Error for CameraModel::kFov, which
+/// boards are not solved with.
 std::optional<Pose> SolvePose(const Board& board, const BoardView& view, const LensCamera& camera,
                               std::span<const int> ignored = {});
 

@@ -27,9 +27,9 @@ struct OtherModel {
 /// only where they fit clearly better (3 standard errors). Where the chosen one itself bends there,
 /// also those that fit nearly as well (kBendGivesWay). Corners in `outliers` (sorted ids, by view)
 /// are not used. As another model puts all boards into another frame, that motion is fitted to all
-/// corners and taken out, as ProjectionSensitivity does to first order (calib/validation/projection.h;
-/// D. Kogan, mrcal, "cross-reprojection"). Empty where the chosen model itself cannot be solved
-/// from these views alone. The same for any number of threads.
+/// corners and taken out, as ProjectionSensitivity does to first order
+/// (calib/validation/projection.h; D. Kogan, mrcal, "cross-reprojection"). Empty where the chosen
+/// model itself cannot be solved from these views alone. The same for any number of threads.
 std::vector<OtherModel> OtherModels(const Board& board, BoardModel chosen, int width_px,
                                     int height_px, std::span<const BoardView> views,
                                     std::span<const std::vector<int>> outliers, int threads = 0);

@@ -25,12 +25,13 @@ constexpr double kMaxOfImage = 0.95;
 constexpr double kFar = 1000;  // times the boards' distance: as good as at infinity
 
 // All that is tested, step by step.
-class Judging {
+class BoardValidator {
  public:
-  Judging(const ValidatedCalibration& calibration, const std::optional<UnseenViews>& unseen,
-          const BoardLimits& limits, int threads, std::span<const double> distances)
-      : calibration_(calibration), unseen_(unseen), limits_(limits), threads_(threads) {
-    report_.unseen = unseen.has_value();
+  BoardValidator(const ValidatedCalibration& calibration,
+                 const std::optional<TestViews>& test_views, const BoardLimits& limits, int threads,
+                 std::span<const double> distances)
+      : calibration_(calibration), test_views_(test_views), limits_(limits), threads_(threads) {
+    report_.test_views = test_views.has_value();
     for (const RigCamera& camera : calibration.cameras) {
       report_.cameras.push_back({});
       report_.cameras.back().name = camera.name;
@@ -47,7 +48,8 @@ class Judging {
     } else {
       kept_.refused = "the file has no observations";
     }
-    if (unseen_) fresh_ = SolveFresh(calibration_, unseen_->views, unseen_->frames, Loss::kRobust);
+    if (test_views_)
+      fresh_ = SolveFresh(calibration_, test_views_->views, test_views_->frames, Loss::kRobust);
     if (kept_.solution) {
       report_.sigma_px = kept_.solution->sigma_px;
       report_.condition = kept_.solution->information.condition();
@@ -67,13 +69,15 @@ class Judging {
 
   // The views that the stored calibration is held against.
   const std::vector<RigView>& Tested() const {
-    return unseen_ ? unseen_->views : calibration_.kept;
+    return test_views_ ? test_views_->views : calibration_.kept;
   }
-  size_t TestedFrames() const { return unseen_ ? unseen_->frames : calibration_.kept_frames; }
+  size_t TestedFrames() const {
+    return test_views_ ? test_views_->frames : calibration_.kept_frames;
+  }
 
   void FitStored() {
     SolveOptions options;
-    options.loss = unseen_ ? Loss::kRobust : Loss::kQuadratic;
+    options.loss = test_views_ ? Loss::kRobust : Loss::kQuadratic;
     std::vector<LeftOut> left_out;
     fitted_ = FitFrames(calibration_.board, calibration_.cameras, Tested(), TestedFrames(), options,
                         left_out, &report_.flipped);
@@ -145,16 +149,16 @@ class Judging {
   void TestResiduals() {
     BoardResiduals judged = stored_;
     std::string refused;
-    if (!unseen_) {
+    if (!test_views_) {
       judged = HeldOut(calibration_, threads_, &refused);
       for (size_t c = 0; c < report_.cameras.size(); ++c) {
         report_.cameras[c].held_out = Summarise(judged.by_camera[c]);
       }
     }
-    const char* rms_name = unseen_ ? "unseen_rms_px" : "held_out_rms_px";
-    const char* ratio_name = unseen_ ? "unseen_rms_ratio" : "held_out_rms_ratio";
+    const char* rms_name = test_views_ ? "test_rms_px" : "held_out_rms_px";
+    const char* ratio_name = test_views_ ? "test_rms_ratio" : "held_out_rms_ratio";
     const size_t frames =
-        unseen_ ? OrderOfFrames(fitted_.views).size() : OrderOfFrames(calibration_.kept).size();
+        test_views_ ? OrderOfFrames(fitted_.views).size() : OrderOfFrames(calibration_.kept).size();
     if (judged.corners == 0 || !refused.empty()) {
       const std::string why = refused.empty() ? "no view could be predicted" : refused;
       Add(NotTested(rms_name, limits_.max_rms_px, why));
@@ -168,8 +172,8 @@ class Judging {
       Add(AtMost(rms_name, std::sqrt(judged.squares / judged.corners), limits_.max_rms_px,
                  fmt::format("{} corners {}; noise of the pixels alone, per coordinate: {}",
                              judged.corners,
-                             unseen_ ? "that the calibration has not seen"
-                                     : "predicted by solves of the other views",
+                             test_views_ ? "that the calibration has not seen"
+                                         : "predicted by solves of the other views",
                              noise)));
       const double promised = kept_.solution    ? kept_.solution->sigma_px
                               : fresh_.solution ? fresh_.solution->sigma_px
@@ -214,9 +218,9 @@ class Judging {
   // the same numbers, and one of unseen views, which errs by itself. The worse of both is reported.
   struct Reference {
     const Fresh& fresh;
-    bool unseen = false;
+    bool test_views = false;
     double Limit(double min_p, double self, int count) const {
-      return unseen ? std::sqrt(ChiSquaredLimit(min_p, count)) : self;
+      return test_views ? std::sqrt(ChiSquaredLimit(min_p, count)) : self;
     }
   };
 
@@ -224,7 +228,7 @@ class Judging {
     const double self = limits_.max_self_difference_sigmas;
     std::vector<Reference> references;
     if (!calibration_.kept.empty()) references.push_back({kept_, false});
-    if (unseen_) references.push_back({fresh_, true});
+    if (test_views_) references.push_back({fresh_, true});
     const bool rig = calibration_.cameras.size() > 1;
     Check lens{"lens_difference_sigmas", -1, self, true, ""};
     Check place{"place_difference_sigmas", -1, self, true, ""};
@@ -250,7 +254,7 @@ class Judging {
         Difference(solution.layout, calibration_.cameras, solution.rig.cameras);
     Eigen::MatrixXd covariance = solution.covariance;
     // Unseen views: both calibrations err.
-    if (reference.unseen && kept_.solution) covariance += kept_.solution->covariance;
+    if (reference.test_views && kept_.solution) covariance += kept_.solution->covariance;
     const ProjectionSensitivity sensitivity(solution);
     for (size_t c = 0; c < calibration_.cameras.size(); ++c) {
       ValidatedCamera& camera = report_.cameras[c];
@@ -271,7 +275,7 @@ class Judging {
   }
 
   static const char* NameOfSolve(const Reference& reference) {
-    return reference.unseen ? "the held-out views'" : "fresh";
+    return reference.test_views ? "the held-out views'" : "fresh";
   }
 
   // Keeps in `check` the part that is farthest beyond its limit.
@@ -322,7 +326,7 @@ class Judging {
 
   void TestData() {
     Rig fitted = fitted_;
-    if (unseen_ && kept_.solution) fitted = kept_.solution->rig;
+    if (test_views_ && kept_.solution) fitted = kept_.solution->rig;
     Add(TestBoardsFromBehind(calibration_, fitted_));
     if (calibration_.kept.empty()) return;
     Add(TestViewCount(calibration_, limits_.min_views));
@@ -461,7 +465,7 @@ class Judging {
   }
 
   const ValidatedCalibration& calibration_;
-  const std::optional<UnseenViews>& unseen_;
+  const std::optional<TestViews>& test_views_;
   const BoardLimits& limits_;
   int threads_;
   BoardValidation report_;
@@ -473,17 +477,18 @@ class Judging {
 }  // namespace
 
 BoardValidation ValidateBoards(const ValidatedCalibration& calibration,
-                               const std::optional<UnseenViews>& unseen, const BoardLimits& limits,
-                               int threads, std::span<const double> distances) {
-  const auto& views = unseen ? unseen->views : calibration.kept;
+                               const std::optional<TestViews>& test_views,
+                               const BoardLimits& limits, int threads,
+                               std::span<const double> distances) {
+  const auto& views = test_views ? test_views->views : calibration.kept;
   for (size_t c = 0; c < calibration.cameras.size(); ++c) {
     if (std::none_of(views.begin(), views.end(), [&](const auto& v) { return v.camera == c; })) {
       throw Error(fmt::format("validate: camera {}: expected views of the board {}, found none",
                               calibration.cameras[c].name,
-                              unseen ? "among the images" : "in the file; give `images`"));
+                              test_views ? "among the images" : "in the file; give `images`"));
     }
   }
-  return Judging(calibration, unseen, limits, threads, distances).Run();
+  return BoardValidator(calibration, test_views, limits, threads, distances).Run();
 }
 
 }  // namespace dtr::calib

@@ -46,7 +46,7 @@ struct ValidatedCalibration {
 };
 
 /// Views of the board that the calibration has not seen.
-struct UnseenViews {
+struct TestViews {
   std::vector<RigView> views;
   size_t frames = 0;
 };
@@ -89,9 +89,9 @@ struct BoardValidation {
   std::vector<ValidatedCamera> cameras;
   /// Chessboards among the tested views that were counted from the other end, and repaired.
   std::vector<std::string> flipped;
-  bool unseen = false;   ///< whether views were given that the calibration had not seen
-  double sigma_px = 0;   ///< of the solve of the kept corners
-  double condition = 0;  ///< ArrowInformation::condition of it
+  bool test_views = false;  ///< whether views were given that the calibration had not seen
+  double sigma_px = 0;      ///< of the solve of the kept corners
+  double condition = 0;     ///< ArrowInformation::condition of it
   bool passed() const { return AllPassed(tests); }
 };
 
@@ -99,12 +99,13 @@ struct BoardValidation {
 /// why; a degeneracy is named. `distances` (board units, > 0): where else uncertainty is reported,
 /// which breaks no test. Requires kept or unseen views of every camera; throws Error without.
 BoardValidation ValidateBoards(const ValidatedCalibration& calibration,
-                               const std::optional<UnseenViews>& unseen, const BoardLimits& limits,
-                               int threads = 0, std::span<const double> distances = {});
+                               const std::optional<TestViews>& test_views,
+                               const BoardLimits& limits, int threads = 0,
+                               std::span<const double> distances = {});
 
 /// JSON object: passed, tests[] as `validate` of sets has them; cameras[] with stored and held_out
 /// residuals, noise_px, regions[9], coverage, uncertainty_px and far_uncertainty_px {largest, p95,
-/// median}, uncertainty_at[] (the same with distance), views[]; sigma_px, condition, unseen,
+/// median}, uncertainty_at[] (the same with distance), views[]; sigma_px, condition, test_photos,
 /// flipped[].
 std::string ToJson(const BoardValidation& report);
 

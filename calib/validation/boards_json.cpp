@@ -54,7 +54,7 @@ Json JsonOf(const BoardValidation& report) {
   }
   json["rotated_photos"] = {{"clockwise", rotated.clockwise},
                             {"counterclockwise", rotated.counterclockwise}};
-  json["unseen"] = report.unseen;
+  json["test_photos"] = report.test_views;
   json["flipped"] = report.flipped;
   json["sigma_px"] = NumberOrNull(report.sigma_px);
   json["condition"] = NumberOrNull(report.condition);

@@ -7,7 +7,7 @@
 
 namespace dtr::calib {
 
-/// Fills in `placed` and `image_shift_px` of every image's judgement (TransferCovariance).
+/// Fills in `placed` and `image_shift_px` of every image's validation result (TransferCovariance).
 void ImageShifts(const Adjusted& fresh, const BundleCovariance& covariance, int threads,
                  std::vector<PhotoValidation>& cameras);
 

@@ -42,7 +42,7 @@ void Stack(const Eigen::MatrixXd& rows, Eigen::MatrixXd& triangle) {
 }
 
 // Of `rows` residuals; `below` is what they number less all unknowns.
-PatternTest Judged(double rows, double explained, double left, int freedom, double below) {
+PatternTest TestOf(double rows, double explained, double left, int freedom, double below) {
   PatternTest test;
   test.freedom = freedom;
   if (freedom <= 0 || !(below > 0)) return test;
@@ -109,7 +109,7 @@ PatternTest TestSharedPattern(const RigSolution& solution, const PatternColumns&
       std::pow(triangle(shared + count, shared + count), 2) + right.squaredNorm() - explained;
   const auto freedom = static_cast<int>(qr.rank());
   PatternTest test =
-      Judged(2.0 * solution.corners, explained, left, freedom, solution.freedom - freedom);
+      TestOf(2.0 * solution.corners, explained, left, freedom, solution.freedom - freedom);
   if (qr.rank() < felt_count) return test;
   const Eigen::VectorXd c = qr.solve(right).cwiseQuotient(lengths);
   const Eigen::MatrixXd inverse =
@@ -228,7 +228,7 @@ std::vector<int> SomeCorners(int corners, int most) {
 PatternTest TestFramePattern(std::span<const FrameRows> rows, const PatternColumns& columns,
                              const PatternColumns& nuisance) {
   const Fit without = FitOf(rows, {}, nuisance), with = FitOf(rows, columns, nuisance);
-  return Judged(static_cast<double>(with.rows), without.squares - with.squares, with.squares,
+  return TestOf(static_cast<double>(with.rows), without.squares - with.squares, with.squares,
                 static_cast<int>(with.unknowns - without.unknowns),
                 static_cast<double>(with.rows - with.unknowns));
 }

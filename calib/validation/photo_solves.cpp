@@ -71,7 +71,7 @@ FreshSolves SolveWith(const Bundle& stored, const Halves& halves, const AdjustOp
 
 Halves HalvesOf(const Bundle& stored) {
   Halves halves;
-  const Bundle enough = WithoutUnseen(stored, kMinObservationsOfHalf);
+  const Bundle enough = WithoutWeakImages(stored, kMinObservationsOfHalf);
   for (const BundleImage& image : stored.images) {
     const bool kept =
         std::any_of(enough.images.begin(), enough.images.end(),

@@ -32,9 +32,9 @@ constexpr std::uint64_t kDraw = 0xd4a3;
 // would make every real one differ.
 Bundle WithDistortion(Bundle bundle) {
   for (LensCamera& lens : bundle.lenses) {
-    if (lens.model != LensModel::kPinhole) continue;
+    if (lens.model != CameraModel::kPinhole) continue;
     const bool square = std::abs(lens.params[0] / lens.params[1] - 1) < kSquare;
-    lens.model = square ? LensModel::kRadial : LensModel::kOpenCv;
+    lens.model = square ? CameraModel::kRadial : CameraModel::kOpenCv;
     if (square) lens.params.erase(lens.params.begin() + 1);
     lens.params.resize(static_cast<size_t>(ParameterCount(lens.model)), 0);
   }
@@ -61,7 +61,7 @@ Eigen::VectorXd ParamDifference(const LensCamera& from, const LensCamera& to) {
 }
 
 void CompareWithStored(const Bundle& stored, const Adjusted& fresh,
-                       const BundleCovariance& covariance, PhotosValidation& judgement) {
+                       const BundleCovariance& covariance, PhotosValidation& validation) {
   const std::vector<double> moved = MovedPxInNearestWorld(fresh, stored);
   Bundle only_lenses = fresh.bundle;
   only_lenses.lenses = stored.lenses;
@@ -79,7 +79,7 @@ void CompareWithStored(const Bundle& stored, const Adjusted& fresh,
     };
     camera.turn_sigma_rad = largest(variance.topLeftCorner<3, 3>());
     camera.centre_sigma = largest(variance.bottomRightCorner<3, 3>());
-    judgement.cameras.push_back(std::move(camera));
+    validation.cameras.push_back(std::move(camera));
   }
   for (size_t i = 0; i < stored.lenses.size(); ++i) {
     IntrinsicsValidation lens;
@@ -95,7 +95,7 @@ void CompareWithStored(const Bundle& stored, const Adjusted& fresh,
         lens.moved_px = moved_by_lens[image];
       }
     }
-    judgement.lenses.push_back(std::move(lens));
+    validation.lenses.push_back(std::move(lens));
   }
 }
 
@@ -143,14 +143,14 @@ Check Difference(const char* name, double sigmas, double moved_px, double max_si
 
 // Where two halves differ by more than predicted, errors are larger than the observations' scatter
 // says (they are not independent, or the lens is another): uncertainties grow by that factor.
-void WidenByHalves(PhotosValidation& judgement) {
+void WidenByHalves(PhotosValidation& validation) {
   const double factor =
-      std::isfinite(judgement.halves_ratio) ? std::max(1.0, judgement.halves_ratio) : 1;
-  for (IntrinsicsValidation& lens : judgement.lenses) {
+      std::isfinite(validation.halves_ratio) ? std::max(1.0, validation.halves_ratio) : 1;
+  for (IntrinsicsValidation& lens : validation.lenses) {
     lens.sigmas /= factor;
     for (double& sigma : lens.sigma) sigma *= factor;
   }
-  for (PhotoValidation& camera : judgement.cameras) {
+  for (PhotoValidation& camera : validation.cameras) {
     camera.sigmas /= factor;
     camera.turn_sigma_rad *= factor;
     camera.centre_sigma *= factor;
@@ -159,19 +159,20 @@ void WidenByHalves(PhotosValidation& judgement) {
   }
 }
 
-void AddDifferences(const BundleLimits& limits, PhotosValidation& judgement) {
-  const double negligible_px = NegligiblePx(limits, judgement.sigma_px);
+void AddDifferences(const BundleLimits& limits, PhotosValidation& validation) {
+  const double negligible_px = NegligiblePx(limits, validation.sigma_px);
   // What could not be computed is the worst, not the best.
   const auto rank = [&](const auto& item) {
     if (item.moved_px <= negligible_px) return 0.0;
     return std::isfinite(item.sigmas) ? item.sigmas : std::numeric_limits<double>::infinity();
   };
   const auto by_rank = [&](const auto& a, const auto& b) { return rank(a) < rank(b); };
-  const auto lens = std::max_element(judgement.lenses.begin(), judgement.lenses.end(), by_rank);
-  judgement.tests.push_back(Difference("lens_difference_sigmas", lens->sigmas, lens->moved_px,
-                                       limits.max_sigmas, negligible_px, LensReason(*lens)));
-  const auto camera = std::max_element(judgement.cameras.begin(), judgement.cameras.end(), by_rank);
-  judgement.tests.push_back(Difference(
+  const auto lens = std::max_element(validation.lenses.begin(), validation.lenses.end(), by_rank);
+  validation.tests.push_back(Difference("lens_difference_sigmas", lens->sigmas, lens->moved_px,
+                                        limits.max_sigmas, negligible_px, LensReason(*lens)));
+  const auto camera =
+      std::max_element(validation.cameras.begin(), validation.cameras.end(), by_rank);
+  validation.tests.push_back(Difference(
       "camera_difference_sigmas", camera->sigmas, camera->moved_px, limits.max_sigmas,
       negligible_px,
       fmt::format("{}: its stored pose against a fresh solve; its points move by {:.3g} px",
@@ -179,11 +180,11 @@ void AddDifferences(const BundleLimits& limits, PhotosValidation& judgement) {
 }
 
 void AddHalves(const BundleLimits& limits, const Halves& halves, const FreshSolves& solves,
-               PhotosValidation& judgement) {
+               PhotosValidation& validation) {
   const Adjusted* solved = solves.solved + 1;
-  judgement.halves_ratio = kNoValue;
+  validation.halves_ratio = kNoValue;
   if (halves.parts.empty()) {
-    judgement.tests.push_back(AtMost(
+    validation.tests.push_back(AtMost(
         "halves_ratio", kNoValue, limits.max_halves_ratio,
         fmt::format(
             "expected two photos of {} observations or more, whose halves can be solved apart",
@@ -193,17 +194,17 @@ void AddHalves(const BundleLimits& limits, const Halves& halves, const FreshSolv
   const BundleCovariance covariances[2] = {CovarianceOf(solved[0], solves.options),
                                            CovarianceOf(solved[1], solves.options)};
   if (covariances[0].determined && covariances[1].determined) {
-    judgement.halves_ratio = HalvesRatio(solved, covariances);
+    validation.halves_ratio = HalvesRatio(solved, covariances);
   }
   Check check =
-      AtMost("halves_ratio", judgement.halves_ratio, limits.max_halves_ratio,
+      AtMost("halves_ratio", validation.halves_ratio, limits.max_halves_ratio,
              "two halves of the points, solved apart: their poses' difference over the predicted");
   double moved_px = 0;
   for (const double px : MovedPxInNearestWorld(solved[0], solved[1].bundle)) {
     if (px > moved_px) moved_px = px;
   }
   // Exact observations leave rounding, of which no ratio means anything.
-  if (moved_px <= NegligiblePx(limits, judgement.sigma_px)) {
+  if (moved_px <= NegligiblePx(limits, validation.sigma_px)) {
     check.passed = true;
     check.reason += fmt::format("; points move by {:.2g} px at most", moved_px);
   }
@@ -211,30 +212,30 @@ void AddHalves(const BundleLimits& limits, const Halves& halves, const FreshSolv
     check.reason += fmt::format("; without photos of fewer than {} observations: {}",
                                 kMinObservationsOfHalf, halves.left_out);
   }
-  judgement.tests.push_back(std::move(check));
+  validation.tests.push_back(std::move(check));
 }
 
-void AddDegeneracies(PhotosValidation& judgement) {
+void AddDegeneracies(PhotosValidation& validation) {
   std::string reason;
   int harmful = 0;
-  for (const Degeneracy& d : judgement.degeneracies) {
+  for (const Degeneracy& d : validation.degeneracies) {
     if (!d.harmful) continue;
     reason += fmt::format("{}{}: {}", reason.empty() ? "" : "; ", d.name, d.detail);
     ++harmful;
   }
-  judgement.tests.push_back(
+  validation.tests.push_back(
       AtMost("degeneracies", harmful, 0, reason.empty() ? "none that matters" : reason));
 }
 
-void AddPicture(const BundleLimits& limits, PhotosValidation& judgement) {
+void AddImage(const BundleLimits& limits, PhotosValidation& validation) {
   const PhotoValidation* worst = nullptr;
-  for (const PhotoValidation& camera : judgement.cameras) {
+  for (const PhotoValidation& camera : validation.cameras) {
     if (std::isfinite(camera.image_shift_px) &&
         (worst == nullptr || camera.image_shift_px > worst->image_shift_px)) {
       worst = &camera;
     }
   }
-  judgement.tests.push_back(AtMost(
+  validation.tests.push_back(AtMost(
       "image_shift_px", worst != nullptr ? worst->image_shift_px : kNoValue,
       limits.max_image_shift_px,
       worst != nullptr
@@ -243,12 +244,12 @@ void AddPicture(const BundleLimits& limits, PhotosValidation& judgement) {
           : "no view's points are placed by two others"));
 }
 
-PhotosValidation NotValidated(PhotosValidation judgement, const std::string& why) {
-  judgement.not_validated = why;
-  return judgement;
+PhotosValidation NotValidated(PhotosValidation validation, const std::string& why) {
+  validation.not_validated = why;
+  return validation;
 }
 
-// Points to judge by, a share of all by their hash; and all points of images of which the draw
+// Points to evaluate by, a share of all by their hash; and all points of images of which the draw
 // could leave too few for halves.
 Bundle Drawn(const Bundle& given, double share) {
   if (share >= 1) return given;
@@ -275,7 +276,7 @@ void AddNotValidated(const Bundle& given, PhotosValidation& all) {
     if (!judged) lost.push_back(image.name);
   }
   if (lost.empty()) {
-    all.not_validated.clear();  // what one part could not judge another has
+    all.not_validated.clear();  // what one part could not evaluate another has
   } else if (all.not_validated.empty()) {
     all.not_validated = fmt::format("fewer than {} observations of what photos beside them see: {}",
                                     kMinImageObservations, fmt::join(lost, ", "));
@@ -286,21 +287,21 @@ void AddNotValidated(const Bundle& given, PhotosValidation& all) {
                                           all.not_validated});
 }
 
-PhotosValidation JudgePart(const Bundle& given, const BundleLimits& limits, int threads,
-                           const Progress* progress) {
-  PhotosValidation judgement;
+PhotosValidation ValidatePart(const Bundle& given, const BundleLimits& limits, int threads,
+                              const Progress* progress) {
+  PhotosValidation validation;
   std::vector<bool> seen(given.points.size());
   for (const BundleObservation& o : given.observations) seen[static_cast<size_t>(o.point)] = true;
   const auto points = static_cast<size_t>(std::count(seen.begin(), seen.end(), true));
-  const Bundle stored = WithDistortion(WithoutUnseen(
+  const Bundle stored = WithDistortion(WithoutWeakImages(
       Drawn(given, kMaxValidationPoints / static_cast<double>(points)), kMinImageObservations));
   if (points < kMinPoints) {
     return NotValidated(
-        judgement,
+        validation,
         fmt::format("expected {} points or more that two views see, found {}", kMinPoints, points));
   }
   if (stored.images.size() < 2) {
-    return NotValidated(judgement,
+    return NotValidated(validation,
                         fmt::format("expected two photos or more of {} observations each, found {}",
                                     kMinImageObservations, stored.images.size()));
   }
@@ -311,39 +312,39 @@ PhotosValidation JudgePart(const Bundle& given, const BundleLimits& limits, int 
   } catch (const Interrupted&) {
     throw;
   } catch (const Error& error) {
-    return NotValidated(judgement, error.what());
+    return NotValidated(validation, error.what());
   }
   const Adjusted& fresh = solves.solved[0];
   const BundleCovariance& covariance = solves.covariance;
-  judgement.observations = fresh.observations;
-  judgement.sigma_px = fresh.sigma_px;
-  judgement.condition = covariance.condition;
-  judgement.degeneracies = FindDegeneracies(fresh, covariance, limits.max_focal_share);
-  judgement.degeneracies.insert(judgement.degeneracies.end(), solves.open.begin(),
-                                solves.open.end());
-  AddDegeneracies(judgement);
+  validation.observations = fresh.observations;
+  validation.sigma_px = fresh.sigma_px;
+  validation.condition = covariance.condition;
+  validation.degeneracies = FindDegeneracies(fresh, covariance, limits.max_focal_share);
+  validation.degeneracies.insert(validation.degeneracies.end(), solves.open.begin(),
+                                 solves.open.end());
+  AddDegeneracies(validation);
   if (!covariance.computed) {
     return NotValidated(
-        judgement,
+        validation,
         fmt::format("more than {} unknowns: too many for their covariance", kMaxUnknowns));
   }
   if (!covariance.determined) {
-    return NotValidated(judgement, "the observations do not determine " + covariance.weakest);
+    return NotValidated(validation, "the observations do not determine " + covariance.weakest);
   }
   if (!fresh.converged) {
     return NotValidated(
-        judgement, fmt::format("the fresh solve did not settle in {} steps", fresh.iterations));
+        validation, fmt::format("the fresh solve did not settle in {} steps", fresh.iterations));
   }
-  CompareWithStored(stored, fresh, covariance, judgement);
-  ImageShifts(fresh, covariance, threads, judgement.cameras);
-  AddHalves(limits, halves, solves, judgement);
-  WidenByHalves(judgement);
-  AddDifferences(limits, judgement);
-  AddPicture(limits, judgement);
+  CompareWithStored(stored, fresh, covariance, validation);
+  ImageShifts(fresh, covariance, threads, validation.cameras);
+  AddHalves(limits, halves, solves, validation);
+  WidenByHalves(validation);
+  AddDifferences(limits, validation);
+  AddImage(limits, validation);
   for (Check& check : PatternChecks(fresh, covariance, limits)) {
-    judgement.tests.push_back(std::move(check));
+    validation.tests.push_back(std::move(check));
   }
-  return judgement;
+  return validation;
 }
 
 // The worse of two checks of one name: what failed, and then by how much; what could not be worked
@@ -368,7 +369,7 @@ void JoinTests(const PhotosValidation& part, PhotosValidation& all) {
   }
 }
 
-// One judgement of many: the worst of each test, every camera once.
+// One validation result of many: the worst of each test, every camera once.
 void Join(const PhotosValidation& part, PhotosValidation& all) {
   JoinTests(part, all);
   for (const PhotoValidation& camera : part.cameras) {
@@ -400,7 +401,7 @@ PhotosValidation ValidatePhotos(const Bundle& given, const BundleLimits& limits,
                                 const Progress* progress) {
   // With distortion, as it is solved for.
   // Photos of fewer observations are those of the test cameras_untested.
-  const Bundle seen = WithoutUnseen(given, kMinImageObservations);
+  const Bundle seen = WithoutWeakImages(given, kMinImageObservations);
   if (seen.images.empty()) {
     PhotosValidation none = NotValidated({}, "no photo has points to validate by");
     AddNotValidated(given, none);
@@ -408,11 +409,11 @@ PhotosValidation ValidatePhotos(const Bundle& given, const BundleLimits& limits,
   }
   PhotosValidation all;
   if (ValidationUnknowns(WithDistortion(seen)) <= limits.max_unknowns) {
-    all = JudgePart(seen, limits, threads, progress);
+    all = ValidatePart(seen, limits, threads, progress);
   } else {
     // Half of what one part may have: work grows with the cube.
     const std::vector<Bundle> parts = PartsOf(seen, limits.max_unknowns / 2);
-    for (const Bundle& part : parts) Join(JudgePart(part, limits, threads, progress), all);
+    for (const Bundle& part : parts) Join(ValidatePart(part, limits, threads, progress), all);
     all.parts = static_cast<int>(parts.size());
   }
   AddNotValidated(seen, all);

@@ -32,7 +32,7 @@ struct BundleLimits {
   /// that is beyond chance. Features err by themselves where a scene's texture does.
   double max_lens_pattern_px = 0.1;
   double min_p = 1e-4;                      ///< less likely by chance than this is no chance
-  int max_unknowns = kMaxUnknowns;          ///< of a bundle that is judged in one part
+  int max_unknowns = kMaxUnknowns;          ///< of a bundle that is evaluated in one part
   double max_focal_share = kMaxFocalShare;  ///< standard deviation of a focal length over itself
 };
 
@@ -59,10 +59,10 @@ struct IntrinsicsValidation {
 };
 
 struct PhotosValidation {
-  /// Why (some) images of 10 observations or more have no judgement; empty where all have one. The
-  /// test photos_not_validated then fails: no evidence is no pass.
+  /// Why (some) images of 10 observations or more have no validation result; empty where all have
+  /// one. The test photos_not_validated then fails: no evidence is no pass.
   std::string not_validated;
-  int parts = 1;  ///< that the images were judged in
+  int parts = 1;  ///< that the images were evaluated in
   std::vector<Check> tests;
   std::vector<PhotoValidation> cameras;
   std::vector<IntrinsicsValidation> lenses;
@@ -71,7 +71,7 @@ struct PhotosValidation {
   int observations = 0;
 };
 
-/// Judges cameras and poses of undistorted views against their own observations:
+/// Validates cameras and poses of undistorted views against their own observations:
 ///  - all are solved for again from the observations, distortion included, and the stored ones
 ///  compared
 ///    with that, each pose and each lens as a Mahalanobis distance;
@@ -83,8 +83,8 @@ struct PhotosValidation {
 ///  row
 ///    by row (shutter.h).
 /// Some 4000 points, drawn by their index, take part, and all of photos that would be left few.
-/// More than some 220 photos (kMaxUnknowns with three turns each) are judged in parts of about 100
-/// that see the same points, each by itself; of every test the worst part's figure is reported.
+/// More than some 220 photos (kMaxUnknowns with three turns each) are evaluated in parts of about
+/// 100 that see the same points, each by itself; of every test the worst part's figure is reported.
 /// Deterministic for any number of threads. Throws Error on a broken bundle only, and Interrupted
 /// where `progress` asks for it.
 PhotosValidation ValidatePhotos(const Bundle& stored, const BundleLimits& limits, int threads = 0,
@@ -92,6 +92,6 @@ PhotosValidation ValidatePhotos(const Bundle& stored, const BundleLimits& limits
 
 /// JSON object: parts, sigma_px, condition, halves_ratio, observations, lenses[], cameras[],
 /// degeneracies[], not_validated.
-std::string ToJson(const PhotosValidation& judgement);
+std::string ToJson(const PhotosValidation& validation);
 
 }  // namespace dtr::calib

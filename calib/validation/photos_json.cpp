@@ -5,16 +5,16 @@ namespace dtr::calib {
 
 using Json = nlohmann::ordered_json;
 
-Json JsonOf(const PhotosValidation& judgement) {
+Json JsonOf(const PhotosValidation& validation) {
   Json json;
-  if (!judgement.not_validated.empty()) json["not_validated"] = judgement.not_validated;
-  json["parts"] = judgement.parts;
-  json["observations"] = judgement.observations;
-  json["sigma_px"] = NumberOrNull(judgement.sigma_px);
-  json["condition"] = NumberOrNull(judgement.condition);
-  json["halves_ratio"] = NumberOrNull(judgement.halves_ratio);
+  if (!validation.not_validated.empty()) json["not_validated"] = validation.not_validated;
+  json["parts"] = validation.parts;
+  json["observations"] = validation.observations;
+  json["sigma_px"] = NumberOrNull(validation.sigma_px);
+  json["condition"] = NumberOrNull(validation.condition);
+  json["halves_ratio"] = NumberOrNull(validation.halves_ratio);
   json["lenses"] = Json::array();
-  for (const IntrinsicsValidation& lens : judgement.lenses) {
+  for (const IntrinsicsValidation& lens : validation.lenses) {
     Json params = Json::array();
     for (size_t k = 0; k < lens.names.size(); ++k) {
       params.push_back({{"name", lens.names[k]},
@@ -27,7 +27,7 @@ Json JsonOf(const PhotosValidation& judgement) {
                               {"params", params}});
   }
   json["cameras"] = Json::array();
-  for (const PhotoValidation& camera : judgement.cameras) {
+  for (const PhotoValidation& camera : validation.cameras) {
     json["cameras"].push_back({{"name", camera.name},
                                {"difference_sigmas", NumberOrNull(camera.sigmas)},
                                {"moved_px", NumberOrNull(camera.moved_px)},
@@ -36,16 +36,16 @@ Json JsonOf(const PhotosValidation& judgement) {
                                {"image_shift_px", NumberOrNull(camera.image_shift_px)}});
   }
   json["degeneracies"] = Json::array();
-  for (const Degeneracy& d : judgement.degeneracies) {
+  for (const Degeneracy& d : validation.degeneracies) {
     json["degeneracies"].push_back(
         {{"name", d.name}, {"detail", d.detail}, {"harmful", d.harmful}});
   }
   return json;
 }
 
-std::string ToJson(const PhotosValidation& judgement) {
+std::string ToJson(const PhotosValidation& validation) {
   // Names come from files, as in the reports beside this.
-  return JsonOf(judgement).dump(-1, ' ', false, Json::error_handler_t::replace);
+  return JsonOf(validation).dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 }  // namespace dtr::calib

@@ -28,7 +28,7 @@ constexpr int kMinTrack = 3;  // two cameras to triangulate, one to test
 enum class Fate { kRepeated, kShortTrack, kWeak, kImpossible, kTested };
 
 /// Outcome for one observation.
-struct Verdict {
+struct ObservationTest {
   Fate fate = Fate::kRepeated;
   Eigen::Vector2d held_out_px = Eigen::Vector2d::Zero();
   bool stored_in_front = false;
@@ -119,30 +119,30 @@ class WidestAngle {
   int a_ = -1, b_ = -1;
 };
 
-void TestTrack(std::span<const Observation> observations, std::span<Verdict*> verdicts) {
+void TestTrack(std::span<const Observation> observations, std::span<ObservationTest*> tests) {
   if (observations.size() < kMinTrack) return;
   const WidestAngle widest(observations);
   for (size_t i = 0; i < observations.size(); ++i) {
-    Verdict& verdict = *verdicts[i];
+    ObservationTest& test = *tests[i];
     const int left_out = static_cast<int>(i);
     if (widest.Without(left_out) < kMinAngle) {
-      verdict.fate = Fate::kWeak;
+      test.fate = Fate::kWeak;
       continue;
     }
     const Triangulation point = Triangulate(observations, left_out);
     if (point.status == TriangulationStatus::kDegenerate) {
-      verdict.fate = Fate::kWeak;
+      test.fate = Fate::kWeak;
       continue;
     }
     Eigen::Matrix<double, 2, 3> jacobian;
     if (point.status == TriangulationStatus::kBehind ||
-        !PixelResidual(observations[i], point.p_in_world, &verdict.held_out_px, &jacobian)) {
-      verdict.fate = Fate::kImpossible;
+        !PixelResidual(observations[i], point.p_in_world, &test.held_out_px, &jacobian)) {
+      test.fate = Fate::kImpossible;
       continue;
     }
     const double amplification =
         std::sqrt((jacobian * point.covariance * jacobian.transpose()).trace() / 2);
-    verdict.fate = amplification <= kMaxAmplification ? Fate::kTested : Fate::kWeak;
+    test.fate = amplification <= kMaxAmplification ? Fate::kTested : Fate::kWeak;
   }
 }
 
@@ -274,26 +274,26 @@ ValidationReport ValidateReprojection(std::span<const PinholeCamera> cameras,
                                       const std::vector<bool>& held_out) {
   CheckInput(cameras, cam_from_world, scene, names, held_out);
   const std::vector<std::vector<int>> tracks = Tracks(scene);
-  std::vector<Verdict> verdicts(scene.observations.size());
+  std::vector<ObservationTest> tests(scene.observations.size());
 
   constexpr int kBlock = 64;  // points per work item, so that handing out costs nothing
   const int points = static_cast<int>(tracks.size());
   ParallelFor(0, (points + kBlock - 1) / kBlock, threads, [&](int block) {
     for (int p = block * kBlock; p < std::min(points, (block + 1) * kBlock); ++p) {
       std::vector<Observation> observations;
-      std::vector<Verdict*> track_verdicts;
+      std::vector<ObservationTest*> track_tests;
       for (const int index : tracks[static_cast<size_t>(p)]) {
         const SparseObservation& o = scene.observations[static_cast<size_t>(index)];
         const auto view = static_cast<size_t>(o.view);
         observations.push_back(MakeObservation(cameras[view], cam_from_world[view], o.pixel));
-        track_verdicts.push_back(&verdicts[static_cast<size_t>(index)]);
-        Verdict& verdict = *track_verdicts.back();
-        verdict.fate = Fate::kShortTrack;
-        verdict.stored_in_front =
+        track_tests.push_back(&tests[static_cast<size_t>(index)]);
+        ObservationTest& test = *track_tests.back();
+        test.fate = Fate::kShortTrack;
+        test.stored_in_front =
             PixelResidual(observations.back(), scene.points[static_cast<size_t>(p)].p_in_world,
-                          &verdict.stored_px, nullptr);
+                          &test.stored_px, nullptr);
       }
-      TestTrack(observations, track_verdicts);
+      TestTrack(observations, track_tests);
     }
   });
 
@@ -303,24 +303,24 @@ ValidationReport ValidateReprojection(std::span<const PinholeCamera> cameras,
   std::vector<Eigen::Vector2d> all_predicted, all_stored;
   std::vector<bool> observed(cameras.size(), false);
   std::array<std::vector<Eigen::Vector2d>, kRegionsPerAxis * kRegionsPerAxis> regions;
-  for (size_t i = 0; i < verdicts.size(); ++i) {
+  for (size_t i = 0; i < tests.size(); ++i) {
     const auto view = static_cast<size_t>(scene.observations[i].view);
-    const Verdict& verdict = verdicts[i];
+    const ObservationTest& test = tests[i];
     CameraValidation& camera = report.cameras[view];
     observed[view] = true;
-    if (verdict.fate == Fate::kRepeated) continue;
-    camera.short_tracks += verdict.fate == Fate::kShortTrack;
-    camera.weak_geometry += verdict.fate == Fate::kWeak;
-    camera.impossible += verdict.fate == Fate::kImpossible || !verdict.stored_in_front;
-    if (verdict.fate == Fate::kTested) {
-      predicted[view].push_back(verdict.held_out_px);
-      all_predicted.push_back(verdict.held_out_px);
-      camera.arrows.push_back({scene.observations[i].pixel, -verdict.held_out_px});
-      regions[RegionOf(cameras[view], scene.observations[i].pixel)].push_back(verdict.held_out_px);
+    if (test.fate == Fate::kRepeated) continue;
+    camera.short_tracks += test.fate == Fate::kShortTrack;
+    camera.weak_geometry += test.fate == Fate::kWeak;
+    camera.impossible += test.fate == Fate::kImpossible || !test.stored_in_front;
+    if (test.fate == Fate::kTested) {
+      predicted[view].push_back(test.held_out_px);
+      all_predicted.push_back(test.held_out_px);
+      camera.arrows.push_back({scene.observations[i].pixel, -test.held_out_px});
+      regions[RegionOf(cameras[view], scene.observations[i].pixel)].push_back(test.held_out_px);
     }
-    if (verdict.stored_in_front) {
-      stored[view].push_back(verdict.stored_px);
-      all_stored.push_back(verdict.stored_px);
+    if (test.stored_in_front) {
+      stored[view].push_back(test.stored_px);
+      all_stored.push_back(test.stored_px);
     }
   }
   for (size_t i = 0; i < cameras.size(); ++i) {

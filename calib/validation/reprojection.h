@@ -1,5 +1,5 @@
 // calib/validation/reprojection.h -- can a calibration be trusted? Residuals on observations it is
-// not judged with.
+// not evaluated with.
 #pragma once
 #include <Eigen/Core>
 #include <array>
@@ -25,7 +25,7 @@ struct ValidateLimits {
   double max_mean_px = 0.25;        ///< mean residual vector of the stored points, all cameras
   double max_camera_mean_px = 0.4;  ///< the same for the worst camera
   double max_impossible_share = 0.01;  ///< observations no point in front of the cameras explains
-  int min_observations = 20;           ///< a camera with fewer tested ones cannot be judged
+  int min_observations = 20;           ///< a camera with fewer tested ones cannot be evaluated
 };
 
 /// Arrows that a camera keeps at most: enough to see a pattern by, few enough to draw.
@@ -37,10 +37,11 @@ struct CameraValidation {
   ResidualStats held_out;  ///< against points triangulated from the other cameras alone
   ResidualStats stored;    ///< against the points as stored
   int short_tracks = 0;    ///< points seen by fewer than 3 cameras: nothing to hold out
-  int weak_geometry = 0;   ///< the other cameras do not fix the point well enough to judge
+  int weak_geometry = 0;   ///< the other cameras do not fix the point well enough to evaluate
   int impossible = 0;      ///< no point in front of the cameras explains the observations
   std::vector<ResidualArrow> arrows;  ///< of `held_out`: all, or evenly many of them
-  std::vector<PlacedPixel> placed;  ///< of a fresh bundle adjustment (bundle/judge.h); may be empty
+  std::vector<PlacedPixel>
+      placed;  ///< of a fresh bundle adjustment (calib/validation/photos.h); may be empty
 };
 
 struct ValidationReport {
@@ -52,7 +53,7 @@ struct ValidationReport {
   std::array<ResidualStats, kRegionsPerAxis * kRegionsPerAxis> regions;
   std::vector<std::string> untested;  ///< cameras with too few tested observations
   /// Held-out cameras without a single observation, as --holdout-strict stores them: nothing here
-  /// can test them, and nothing is asked of them; what they saw judges the set (`dtr evaluate`).
+  /// can test them, and nothing is asked of them; what they saw validates the set (`dtr evaluate`).
   std::vector<std::string> kept_apart;
   bool passed() const { return AllPassed(tests); }
 };

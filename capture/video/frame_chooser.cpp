@@ -13,19 +13,19 @@ constexpr double kLost = 0.3;          // share of corners still followed
 constexpr size_t kLongestWindow = 64;  // frames in memory
 
 // The mean over cameras that have something to follow; nothing where none has.
-std::optional<PictureMotion::State> Followed(std::vector<PictureMotion>& cameras,
-                                             const Instant& instant) {
-  PictureMotion::State mean{0, 0};
+std::optional<FrameMotion::State> Followed(std::vector<FrameMotion>& cameras,
+                                           const TimeStep& time_step) {
+  FrameMotion::State mean{0, 0};
   int count = 0;
   for (size_t i = 0; i < cameras.size(); ++i) {
-    const PictureMotion::State state = cameras[i].Follow(instant.greys[i]);
+    const FrameMotion::State state = cameras[i].Follow(time_step.greys[i]);
     if (!cameras[i].has_texture()) continue;
     mean.moved += state.moved;
     mean.kept += state.kept;
     ++count;
   }
   if (count == 0) return {};
-  return PictureMotion::State{mean.moved / count, mean.kept / count};
+  return FrameMotion::State{mean.moved / count, mean.kept / count};
 }
 
 }  // namespace
@@ -34,17 +34,17 @@ FrameChooser::FrameChooser(double motion) : motion_(motion) {
   if (!(motion > 0 && motion <= 1)) throw std::invalid_argument("FrameChooser: motion");
 }
 
-void FrameChooser::Add(Instant instant) { Consider({std::move(instant), 0, 0, false}); }
+void FrameChooser::Add(TimeStep time_step) { Consider({std::move(time_step), 0, 0, false}); }
 
-void FrameChooser::Follow(const Instant& instant) {
+void FrameChooser::Follow(const TimeStep& time_step) {
   followed_.clear();
-  for (const auto& grey : instant.greys) followed_.emplace_back(grey);
+  for (const auto& grey : time_step.greys) followed_.emplace_back(grey);
 }
 
 // Nothing is kept that this frame could be measured by: following begins here, if there is anything
 // to follow.
 void FrameChooser::BeginAt(Waiting waiting) {
-  Follow(waiting.instant);
+  Follow(waiting.time_step);
   anchor_is_kept_ = false;
   const bool textured = std::any_of(followed_.begin(), followed_.end(),
                                     [](const auto& camera) { return camera.has_texture(); });
@@ -54,9 +54,9 @@ void FrameChooser::BeginAt(Waiting waiting) {
 // Puts a frame into the window; a window begins with a candidate.
 void FrameChooser::Open(Waiting waiting, double moved, bool candidate) {
   if (window_.empty() && !candidate) return;
-  if (waiting.instant.sharpness) {  // asked once, while the frame's pixels are there
-    waiting.sharpness = waiting.instant.sharpness();
-    waiting.instant.sharpness = nullptr;
+  if (waiting.time_step.sharpness) {  // asked once, while the frame's pixels are there
+    waiting.sharpness = waiting.time_step.sharpness();
+    waiting.time_step.sharpness = nullptr;
   }
   waiting.moved = moved;
   waiting.candidate = candidate;
@@ -72,15 +72,15 @@ std::vector<FrameChooser::Waiting> FrameChooser::Close() {
       std::max_element(window.begin(), window.end(), [](const auto& a, const auto& b) {
         return std::pair(a.candidate, a.sharpness) < std::pair(b.candidate, b.sharpness);
       });
-  chosen_.push_back({best->instant.number, best->instant.time_s, best->moved, best->sharpness});
-  Follow(best->instant);
+  chosen_.push_back({best->time_step.number, best->time_step.time_s, best->moved, best->sharpness});
+  Follow(best->time_step);
   anchor_is_kept_ = true;
   window.erase(window.begin(), best + 1);
   return window;
 }
 
 void FrameChooser::Consider(Waiting waiting) {
-  const auto state = Followed(followed_, waiting.instant);
+  const auto state = Followed(followed_, waiting.time_step);
   if (!state) return BeginAt(std::move(waiting));
   const double begins = anchor_is_kept_ ? kWindowBegins * motion_ : 0;
   const double ends = (anchor_is_kept_ ? kWindowEnds : kStartWindow) * motion_;

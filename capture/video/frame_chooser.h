@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "capture/video/picture_motion.h"
+#include "capture/video/frame_motion.h"
 #include "dtr/types/grid.h"
 
 namespace dtr::capture {
@@ -21,7 +21,7 @@ struct ChosenFrame {
 
 /// What one time step looks like: one small grey image for each camera, and how sharp the images
 /// are at full size, asked for only where it matters.
-struct Instant {
+struct TimeStep {
   int number = 0;
   double time_s = 0;
   std::vector<Grid<std::uint8_t>> greys;
@@ -42,27 +42,27 @@ class FrameChooser {
   explicit FrameChooser(double motion);
 
   /// The next time step of the video.
-  void Add(Instant instant);
+  void Add(TimeStep time_step);
   /// No more will come. Call it once.
   std::vector<ChosenFrame> Finish();
 
  private:
   struct Waiting {
-    Instant instant;
+    TimeStep time_step;
     double moved = 0, sharpness = 0;
     bool candidate = false;
   };
 
   void Consider(Waiting waiting);
   void BeginAt(Waiting waiting);
-  void Follow(const Instant& instant);
+  void Follow(const TimeStep& time_step);
   void Open(Waiting waiting, double moved, bool candidate);
   std::vector<Waiting> Close();
 
   double motion_;
-  std::vector<PictureMotion> followed_;  // from the anchor on, one for each camera
-  bool anchor_is_kept_ = false;          // else the anchor is only where following began
-  std::vector<Waiting> window_;          // since the first candidate, in order
+  std::vector<FrameMotion> followed_;  // from the anchor on, one for each camera
+  bool anchor_is_kept_ = false;        // else the anchor is only where following began
+  std::vector<Waiting> window_;        // since the first candidate, in order
   std::vector<ChosenFrame> chosen_;
 };
 

@@ -21,11 +21,11 @@ namespace dtr::capture {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr int kSmallSidePx = 320;      // motion is looked at in such images
-constexpr int kJpegQuality = 98;       // the video lost more before
-constexpr double kSameRate = 1e-3;     // relative
-constexpr double kSameInstant = 0.75;  // of the time between two frames
-constexpr int kSaidEvery = 10;         // frames between two words of progress
+constexpr int kSmallSidePx = 320;       // motion is looked at in such images
+constexpr int kJpegQuality = 98;        // the video lost more before
+constexpr double kSameRate = 1e-3;      // relative
+constexpr double kSameTimeStep = 0.75;  // of the time between two frames
+constexpr int kSaidEvery = 10;          // frames between two words of progress
 
 using Videos = std::vector<fs::path>;
 
@@ -86,7 +86,7 @@ class Together {
     if (!drift_.empty() || rate <= 0) return;
     for (size_t i = 1; i < readers_.size(); ++i) {
       const double apart_s = readers_[i]->time_s() - readers_.front()->time_s();
-      if (std::abs(apart_s) * rate < kSameInstant) continue;
+      if (std::abs(apart_s) * rate < kSameTimeStep) continue;
       drift_ = fmt::format(
           "frame {} is shown at {:.3f} s, that of {} at {:.3f} s: from there on the same number is "
           "another moment; are frames missing in one of them?",
@@ -114,7 +114,7 @@ double MeanSharpness(const std::vector<ImageRgb8>& pictures) {
   return std::pow(product, 1.0 / static_cast<double>(pictures.size()));
 }
 
-std::vector<ImageRgb8> PicturesOf(const Together& videos) {
+std::vector<ImageRgb8> ImagesOf(const Together& videos) {
   std::vector<ImageRgb8> pictures;
   for (const auto& reader : videos.readers()) pictures.push_back(reader->Picture());
   return pictures;
@@ -162,14 +162,14 @@ Choice ChooseFrames(const Videos& files, const VideoOptions& options, Capture& r
     if (options.every > 0) {
       if (number < due) continue;
       due = (number / options.every + 1) * options.every;
-      const double sharpness = options.most > 0 ? MeanSharpness(PicturesOf(videos)) : 0;
+      const double sharpness = options.most > 0 ? MeanSharpness(ImagesOf(videos)) : 0;
       choice.frames.push_back({number, videos.time_s(), 0, sharpness});
       continue;
     }
-    const std::vector<ImageRgb8> pictures = PicturesOf(videos);
-    Instant instant{number, videos.time_s(), {}, [&] { return MeanSharpness(pictures); }};
-    for (const ImageRgb8& picture : pictures) instant.greys.push_back(SmallGrey(picture));
-    chooser.Add(std::move(instant));
+    const std::vector<ImageRgb8> pictures = ImagesOf(videos);
+    TimeStep time_step{number, videos.time_s(), {}, [&] { return MeanSharpness(pictures); }};
+    for (const ImageRgb8& picture : pictures) time_step.greys.push_back(SmallGrey(picture));
+    chooser.Add(std::move(time_step));
   }
   progress.Update(choice.seen);
   if (choice.seen == 0) {
@@ -201,7 +201,7 @@ void WriteFrames(const Videos& files, const std::vector<fs::path>& folders,
     }
     if (videos.number() != frames[next].number) continue;
     progress.ThrowIfInterrupted();
-    const std::vector<ImageRgb8> pictures = PicturesOf(videos);
+    const std::vector<ImageRgb8> pictures = ImagesOf(videos);
     ParallelFor(0, static_cast<int>(pictures.size()), threads, [&](int i) {
       const fs::path name =
           folders[static_cast<size_t>(i)] / fmt::format("frame_{:06}.jpg", frames[next].number);
@@ -298,7 +298,7 @@ Capture IngestVideos(const Videos& videos, const VideoOptions& options, const fs
   }
   capture.skipped.insert(capture.skipped.end(), reported.skipped.begin(), reported.skipped.end());
   capture.remarks.insert(capture.remarks.end(), reported.remarks.begin(), reported.remarks.end());
-  JudgePhotos(capture.photos);
+  ScreenPhotos(capture.photos);
   return capture;
 }
 

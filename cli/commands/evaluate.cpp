@@ -96,7 +96,7 @@ void AddEvaluateCommand(CLI::App& app) {
                                "Folder with cameras.json and true depth/")
                    ->type_name("TRUTH");
                command
-                   .add_option("--pictures", options->request.pictures,
+                   .add_option("--images,--pictures", options->request.images,
                                "Write rendering | photo | difference for every view")
                    ->type_name("DIR");
                AddRendererOptions(command, options->renderer);

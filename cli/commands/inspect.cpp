@@ -50,7 +50,7 @@ Json ListOf(const Json& object, const char* name) {
 
 std::vector<Check> ChecksOf(const DtrSet& set) {
   std::vector<Check> checks;
-  for (const Json& test : ListOf(Json::parse(set.verdict_json, nullptr, false), "tests")) {
+  for (const Json& test : ListOf(Json::parse(set.validation_json, nullptr, false), "tests")) {
     if (!test.is_object()) continue;
     const auto passed = test.find("passed");
     checks.push_back({TextOr(test, "name"), NumberOr(test, "value", NAN),

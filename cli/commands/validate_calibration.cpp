@@ -27,7 +27,7 @@ void SayReport(const calib::BoardValidation& report, Console& console) {
   console.Say(fmt::format("{:<16} {:<10} {:>7} {:>8} {:>8} {:>8} {:>8} {:>8}", "camera, px",
                           "corners", "count", "RMS", "median", "95 %", "worst", "noise"));
   for (const calib::ValidatedCamera& camera : report.cameras) {
-    SayStats(camera.name, report.unseen ? "unseen" : "kept", camera.stored, camera.noise_px,
+    SayStats(camera.name, report.test_views ? "held out" : "own", camera.stored, camera.noise_px,
              console);
     SayStats(camera.name, "held out", camera.held_out, camera.noise_px, console);
   }
@@ -39,7 +39,7 @@ void SayReport(const calib::BoardValidation& report, Console& console) {
     console.Say(fmt::format("counted from the other end, and repaired: {}",
                             fmt::join(report.flipped, ", ")));
   }
-  if (!report.unseen) {
+  if (!report.test_views) {
     console.Say(
         "validated on the views that made the calibration; --images DIR with photos of the board "
         "that were held out tell more");
@@ -109,20 +109,20 @@ int RunValidateCalibration(const ValidateCalibrationOptions& options, const Cont
   limits.max_rms_px = options.max_rms_px.value_or(limits.max_rms_px);
   limits.max_uncertainty_px = options.max_uncertainty_px.value_or(limits.max_uncertainty_px);
   const std::vector<double> distances = DistancesOf(options.at, calibration.board);
-  std::optional<calib::UnseenViews> unseen;
+  std::optional<calib::TestViews> test_views;
   auto skipped = nlohmann::ordered_json::array();
   if (options.images) {
-    pipeline::UnseenPhotos photos =
-        pipeline::ReadUnseen(calibration, *options.images, options.pattern.value_or("*"),
-                             context.common.threads, context.console);
+    pipeline::TestPhotos photos =
+        pipeline::ReadTestPhotos(calibration, *options.images, options.pattern.value_or("*"),
+                                 context.common.threads, context.console);
     for (const calib::LeftOut& photo : photos.left_out) {
       context.console.Say(fmt::format("left out: {}: {}", photo.name, photo.reason));
       skipped.push_back({{"name", photo.name}, {"reason", photo.reason}});
     }
-    unseen = std::move(photos.unseen);
+    test_views = std::move(photos.test_views);
   }
   const calib::BoardValidation report = calib::ValidateBoards(
-      pipeline::ToValidate(calibration), unseen, limits, context.common.threads, distances);
+      pipeline::ToValidate(calibration), test_views, limits, context.common.threads, distances);
   SayReport(report, context.console);
   SayUncertainty(report, calibration.board.metric, context.console);
   if (options.report) {

@@ -18,7 +18,8 @@ struct ValidateCalibrationOptions {
       at;  ///< distances at which uncertainty is reported, as people write lengths
 };
 
-/// Judges, prints one line per test, writes the page where asked for; kFailed when a test breaks.
+/// Validates, prints one line per test, writes the page where asked for; kFailed when a test
+/// breaks.
 int RunValidateCalibration(const ValidateCalibrationOptions& options, const Context& context);
 
 }  // namespace dtr::cli

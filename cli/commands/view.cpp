@@ -41,7 +41,7 @@ struct Options {
   RendererChoice renderer;
   double memory_gb = 4;
   int frames = 0, laps = 1, largest_divisor = 8;
-  size_t instant = 0;
+  size_t time_step = 0;
   bool play = false, no_panel = false, cameras = false, photo = false;
   std::shared_ptr<RenderOptions> render;
 };
@@ -77,7 +77,7 @@ std::string CommandLine(const Options& options, const viewer::OpenedSet& opened,
   if (wanted.coverage) {
     words.insert(words.end(), {"--coverage-out", Beside(camera_file, "-coverage.png")});
   }
-  if (wanted.instant) words.insert(words.end(), {"--frame", std::to_string(*wanted.instant)});
+  if (wanted.time_step) words.insert(words.end(), {"--frame", std::to_string(*wanted.time_step)});
   std::string excluded;
   for (const View* view : wanted.hidden) {
     // A comma would end the name; ids have none.
@@ -144,8 +144,8 @@ Json StateJson(const viewer::AppState& state) {
           {"recording", state.recording},
           {"asks_for_path", state.asks_for_path},
           {"reloads", state.reloads},
-          {"instant", state.instant},
-          {"instants", state.instants},
+          {"time_step", state.time_step},
+          {"time_steps", state.time_steps},
           {"playing_time", state.playing_time},
           {"controls", ControlsJson(state.controls)},
           {"message", state.message},
@@ -172,10 +172,10 @@ Json ReportJson(const viewer::AppReport& report) {
     moving["by_divisor"].push_back(one);
   }
   return {{"frames", report.last.frames},
-          {"first_picture_ms", report.first_picture_ms},
-          {"first_picture_cpu_ms", report.first_picture_cpu_ms},
-          {"first_whole_picture_ms", report.first_whole_picture_ms},
-          {"first_whole_picture_cpu_ms", report.first_whole_picture_cpu_ms},
+          {"first_frame_ms", report.first_frame_ms},
+          {"first_frame_cpu_ms", report.first_frame_cpu_ms},
+          {"first_whole_frame_ms", report.first_whole_frame_ms},
+          {"first_whole_frame_cpu_ms", report.first_whole_frame_cpu_ms},
           {"moving", moving},
           {"view_bytes", report.view_bytes},
           {"view_bytes_held", report.view_bytes_held},
@@ -186,20 +186,20 @@ Json ReportJson(const viewer::AppReport& report) {
 }
 
 /// Each camera's held-out error against the limit for the worst one.
-std::map<std::string, viewer::ViewVerdict> Verdicts(const Options& options,
-                                                    const Context& context) {
+std::map<std::string, viewer::ViewValidation> ValidateViews(const Options& options,
+                                                            const Context& context) {
   const DtrSet set = io::ReadSet(options.set);
-  std::map<std::string, viewer::ViewVerdict> verdicts;
-  if (!set.sparse_file) return verdicts;  // nothing to judge by
+  std::map<std::string, viewer::ViewValidation> validations;
+  if (!set.sparse_file) return validations;  // nothing to evaluate by
   const calib::ValidateLimits limits;
   const auto report = pipeline::ReprojectionOfSet(set, io::LoadSparse(options.set, set), limits,
                                                   context.common.threads);
   for (const auto& camera : report.cameras) {
     if (camera.held_out.count < limits.min_observations) continue;
-    verdicts[camera.name] = {camera.held_out.rms_px <= limits.max_camera_rms_px,
-                             fmt::format("{:.2f} px", camera.held_out.rms_px)};
+    validations[camera.name] = {camera.held_out.rms_px <= limits.max_camera_rms_px,
+                                fmt::format("{:.2f} px", camera.held_out.rms_px)};
   }
-  return verdicts;
+  return validations;
 }
 
 /// Not of its bytes: nothing is read for it. Empty where there is no such file.
@@ -257,7 +257,7 @@ viewer::Host MakeHost(const Options& options, const Context& context) {
   host.command_line = [&](const viewer::OpenedSet& opened, const viewer::ToDraw& wanted) {
     return CommandLine(options, opened, wanted);
   };
-  host.verdicts = [&] { return Verdicts(options, context); };
+  host.validations = [&] { return ValidateViews(options, context); };
   host.say = [&](const std::string& line) { context.console.Note(line); };
   if (!options.state_file.empty()) {
     host.state_changed = [&, last = std::string()](const viewer::AppState& state) mutable {
@@ -277,9 +277,9 @@ gl::Drawer DrawerOf(const std::string& renderer) {
 
 viewer::AppSettings SettingsOf(const Options& options, const Context& context, const DtrSet& set) {
   viewer::AppSettings settings;
-  settings.hidden = pipeline::ResolveViewNames(AtFrame(set, options.instant), options.exclude);
+  settings.hidden = pipeline::ResolveViewNames(AtFrame(set, options.time_step), options.exclude);
   const PinholeCamera size = pipeline::WithSize({1280, 800, 1, 1, 0, 0}, options.size);
-  settings.warning = io::VerdictWarning(set);
+  settings.warning = io::ValidationWarning(set);
   settings.title = WithoutTrailingSlash(options.set).filename().string() + " - dtr view";
   if (!settings.warning.empty()) settings.title += " - " + settings.warning;
   settings.width_px = size.width_px();
@@ -295,7 +295,7 @@ viewer::AppSettings SettingsOf(const Options& options, const Context& context, c
   settings.cameras = options.cameras;
   settings.photo = options.photo;
   settings.frames = options.frames;
-  settings.instant = options.instant;
+  settings.time_step = options.time_step;
   settings.play_time = options.play;
   settings.laps = options.laps;
   settings.largest_divisor = options.largest_divisor;
@@ -306,7 +306,7 @@ viewer::AppSettings SettingsOf(const Options& options, const Context& context, c
     return settings;
   }
   const std::vector<pipeline::NovelFrame> frames =
-      pipeline::NovelFrames(AtFrame(set, options.instant), request);
+      pipeline::NovelFrames(AtFrame(set, options.time_step), request);
   settings.start = NovelCamera{frames.front().camera, frames.front().cam_from_world};
   if (frames.size() > 1) settings.play = CamerasOf(frames);
   return settings;
@@ -334,7 +334,7 @@ int RunView(const Options& options, const Context& context) {
   }
   ReturnFreedMemory();
   const DtrSet set = io::ReadSet(options.set);
-  const std::string warning = io::VerdictWarning(set);
+  const std::string warning = io::ValidationWarning(set);
   if (!warning.empty()) context.console.Note(warning);
   const viewer::AppReport report =
       viewer::RunViewer(SettingsOf(options, context, set), MakeHost(options, context));
@@ -371,7 +371,7 @@ void AddViewCommand(CLI::App& app) {
             ->check(CLI::Range(1, 1'000'000))
             ->type_name("N");
         command
-            .add_option("--frame", options->instant,
+            .add_option("--frame", options->time_step,
                         "Of a dynamic set: the frame shown first, from 0 [0]")
             ->check(CLI::Range(0, 1 << 30))
             ->type_name("N");

@@ -14,9 +14,9 @@ using calib::Adjust;
 using calib::Adjusted;
 using calib::AdjustOptions;
 using calib::Bundle;
+using calib::CameraModel;
 using calib::LensCamera;
 using calib::LensFreedom;
-using calib::LensModel;
 using calib::Similarity;
 using testing::bundle::LargestDifference;
 using testing::bundle::LookAt;
@@ -98,10 +98,12 @@ void AddFocalError(const Adjusted& out, double truth_px, double bound, const cha
 // start that is off.
 Outcome MixedMagnitudes(const Conditions&) {
   Outcome outcome;
-  SceneSpec spec{
-      .points = 400,
-      .lens = {LensModel::kOpenCv, 8000, 6000, {9000, 9020, 4010, 2990, -0.05, 0.01, 2e-4, -1e-4}},
-      .noise_px = 0.3};
+  SceneSpec spec{.points = 400,
+                 .lens = {CameraModel::kOpenCv,
+                          8000,
+                          6000,
+                          {9000, 9020, 4010, 2990, -0.05, 0.01, 2e-4, -1e-4}},
+                 .noise_px = 0.3};
   spec.point = [](Random& random) {
     const double x = random.Uniform(-2, 2), z = random.Uniform(-1.5, 1.5);
     const double far = random.Index(2) == 0 ? 1 : std::pow(10, random.Uniform(0, 4));
@@ -129,27 +131,27 @@ Outcome NearlyFlat(const Conditions&) {
   return outcome;
 }
 
-bool Names(const calib::PhotosValidation& judgement, std::initializer_list<const char*> names) {
-  return std::ranges::any_of(judgement.degeneracies, [&](const calib::Degeneracy& d) {
+bool Names(const calib::PhotosValidation& validation, std::initializer_list<const char*> names) {
+  return std::ranges::any_of(validation.degeneracies, [&](const calib::Degeneracy& d) {
     return std::ranges::any_of(names, [&](const char* name) { return d.name == name; });
   });
 }
 
-const LensCamera kPinhole{LensModel::kSimplePinhole, 1000, 800, {900, 500, 400}};
+const LensCamera kPinhole{CameraModel::kSimplePinhole, 1000, 800, {900, 500, 400}};
 
-/// What the judge says of data that cannot decide: a named reason and a failed test.
+/// What the validation says of data that cannot decide: a named reason and a failed test.
 Outcome Undecided(const SceneSpec& spec, std::initializer_list<const char*> names,
                   const Conditions& conditions) {
   Outcome outcome;
   const Bundle bundle = MakeBundle(spec);
   Solve(bundle, LensFreedom::kNoPrincipalPoint, outcome);
-  const calib::PhotosValidation judgement = calib::ValidatePhotos(bundle, {}, conditions.threads);
-  for (const Check& test : judgement.tests) outcome.not_finite += std::isnan(test.value);
-  outcome.Add(Exactly("the validation names the degeneracy", Names(judgement, names), 1,
+  const calib::PhotosValidation validation = calib::ValidatePhotos(bundle, {}, conditions.threads);
+  for (const Check& test : validation.tests) outcome.not_finite += std::isnan(test.value);
+  outcome.Add(Exactly("the validation names the degeneracy", Names(validation, names), 1,
                       "what the views cannot decide is reported, not guessed"));
-  outcome.Add(Exactly("the validation passes the calibration", AllPassed(judgement.tests), 0,
+  outcome.Add(Exactly("the validation passes the calibration", AllPassed(validation.tests), 0,
                       "numbers that nothing supports must not pass"));
-  for (const calib::Degeneracy& d : judgement.degeneracies) {
+  for (const calib::Degeneracy& d : validation.degeneracies) {
     if (d.harmful) outcome.rejection = d.name + ": " + d.detail;
   }
   return outcome;
@@ -196,7 +198,7 @@ Outcome NarrowLens(const Conditions&) {
   Outcome outcome;
   const double focal = 500 / std::tan(0.5 * std::numbers::pi / 180);
   SceneSpec spec{.points = 400,
-                 .lens = {LensModel::kSimplePinhole, 1000, 800, {focal, 500, 400}},
+                 .lens = {CameraModel::kSimplePinhole, 1000, 800, {focal, 500, 400}},
                  .noise_px = 0.3};
   spec.point = [](Random& random) {
     const double x = random.Uniform(-0.04, 0.04), y = random.Uniform(-0.04, 0.04);
@@ -226,10 +228,12 @@ Outcome NarrowLensFree(const Conditions& conditions) {
 Outcome FisheyeOf190Degrees(const Conditions&) {
   Outcome outcome;
   const double half = 95 * std::numbers::pi / 180, focal = 500 / half;
-  SceneSpec spec{
-      .points = 400,
-      .lens = {LensModel::kOpenCvFisheye, 1000, 1000, {focal, focal, 500, 500, 0.01, -0.002, 0, 0}},
-      .noise_px = 0.3};
+  SceneSpec spec{.points = 400,
+                 .lens = {CameraModel::kOpenCvFisheye,
+                          1000,
+                          1000,
+                          {focal, focal, 500, 500, 0.01, -0.002, 0, 0}},
+                 .noise_px = 0.3};
   spec.pose = [](int i, int) {
     return LookAt({0.8 * (i % 3) - 0.8, 0.7 * (i / 3) - 0.7, 0.4 * (i % 2)},
                   {0.5 * (i % 2), 20, 0.3 * (i % 3)});

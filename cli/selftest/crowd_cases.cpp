@@ -15,8 +15,8 @@ using testing::Shot;
 using testing::ShotFrom;
 
 /// That an image is there at all and is the right one, where a case is about something else.
-void AddPicture(const RenderResult& result, const View& truth, RenderMethod method,
-                Outcome& outcome) {
+void AddImage(const RenderResult& result, const View& truth, RenderMethod method,
+              Outcome& outcome) {
   const Score score = ScoreOf(result, truth, 0.01);
   outcome.Add(AtLeast(std::string("share of the image that is seen") + InWords(method), score.seen,
                       0.95, "the views see all but what the square hides and a rim"));
@@ -73,7 +73,7 @@ void KeepWorst(const Score& score, Score& worst) {
 constexpr double kNarrowRad = 1e-3, kAllRad = std::numbers::pi;
 
 /// Images from the middle view's place and from half-way to the next, of views that agree.
-void AddExtremePictures(Drawing& draw, RenderMethod method, Outcome& outcome) {
+void AddExtremeImages(Drawing& draw, RenderMethod method, Outcome& outcome) {
   const DtrSet& set = draw.Keep(testing::SquareBeforePlane());
   const Shot own = ShotFrom("n", {0, 0, 0}, {0, 0, 10}),
              between = ShotFrom("n", {0.25, 0, 0}, {0, 0, 10});
@@ -154,7 +154,7 @@ Outcome ManyViews(Drawing draw) {
     RenderOptions options = OptionsOf(method);
     options.views = 256;
     const RenderResult expected = draw.Draw(scene, novel, options);
-    AddPicture(expected, truth, method, outcome);
+    AddImage(expected, truth, method, outcome);
     outcome.Add(Exactly(std::string("views used") + InWords(method),
                         static_cast<double>(expected.views_used.size()), 256,
                         "all are valid, and asked for"));
@@ -183,7 +183,7 @@ Outcome DuplicateCameras(Drawing draw) {
   const View truth = Photograph(testing::SquareAndPlane(), novel);
   for (const RenderMethod method : draw.methods()) {
     const RenderResult expected = draw.Draw(set, novel, OptionsOf(method));
-    AddPicture(expected, truth, method, outcome);
+    AddImage(expected, truth, method, outcome);
     outcome.Add(Exactly(std::string("views blended at a pixel, at most") + InWords(method),
                         MostBlended(expected), 5, "all five see the middle"));
     double changed = !testing::SameBytes(expected, draw.Draw(twice, novel, OptionsOf(method)));
@@ -200,7 +200,7 @@ Outcome DuplicateCameras(Drawing draw) {
 Outcome ExtremeWeights(Drawing draw) {
   Outcome outcome;
   for (const RenderMethod method : draw.methods()) {
-    AddExtremePictures(draw, method, outcome);
+    AddExtremeImages(draw, method, outcome);
     AddAloneAmongOthers(draw, method, outcome);
   }
   return draw.Finish(outcome);

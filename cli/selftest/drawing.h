@@ -1,4 +1,4 @@
-// cli/selftest/drawing.h -- what cases of rendering draw with, and how their images are judged.
+// cli/selftest/drawing.h -- what cases of rendering draw with, and how their images are evaluated.
 #pragma once
 #include <deque>
 #include <string>

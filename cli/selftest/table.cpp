@@ -18,7 +18,7 @@ const char* Sign(Relation relation) {
   return relation == Relation::kAtLeast ? ">=" : "=";
 }
 
-std::string Verdict(bool holds) { return holds ? "holds" : "FAILS"; }
+std::string HoldsOrFails(bool holds) { return holds ? "holds" : "FAILS"; }
 
 /// Three digits: more differ from one mathematical library to the next.
 std::string Number(double value) { return fmt::format("{:.3g}", value); }
@@ -60,7 +60,7 @@ void AddRow(const Row& row, std::string& text) {
   }
   for (const Measure& m : row.outcome.measures) {
     text += fmt::format("| {} | {} | {} | {} | {} | {} |\n", name, Cell(m.what), Number(m.value),
-                        BoundOf(m), Verdict(Holds(m)), Cell(m.reason));
+                        BoundOf(m), HoldsOrFails(Holds(m)), Cell(m.reason));
     name.clear();
   }
   if (!row.outcome.rejection.empty()) {
@@ -117,7 +117,7 @@ std::vector<Row> RunCases(const std::vector<Case>& cases, const Conditions& cond
     Row row{each->stage, each->name, each->quick, {}, {}, each->skipped};
     try {
       if (row.skipped.empty()) row.outcome = each->run(conditions);
-    } catch (const std::exception& error) {  // a case that ends the program judges no other case
+    } catch (const std::exception& error) {  // a case that throws must not end the others
       row.error = error.what();
     }
     rows.push_back(std::move(row));
@@ -157,8 +157,8 @@ std::vector<std::string> TextLines(const Row& row) {
     return {fmt::format("SKIPPED {}: {}: {}", row.stage, row.name, row.skipped)};
   }
   for (const Measure& m : row.outcome.measures) {
-    lines.push_back(fmt::format("{:<5} {}: {}: {}: {} ({})", Verdict(Holds(m)), row.stage, row.name,
-                                m.what, Number(m.value), BoundOf(m)));
+    lines.push_back(fmt::format("{:<5} {}: {}: {}: {} ({})", HoldsOrFails(Holds(m)), row.stage,
+                                row.name, m.what, Number(m.value), BoundOf(m)));
   }
   if (!row.outcome.rejection.empty())
     lines.push_back("      rejected with: " + row.outcome.rejection);

@@ -13,7 +13,7 @@ namespace dtr::testing::bundle {
 /// What is seen, from where.
 struct SceneSpec {
   int images = 8, points = 200;
-  calib::LensCamera lens{calib::LensModel::kRadial, 1000, 800, {900, 504, 397, -0.05, 0.01}};
+  calib::LensCamera lens{calib::CameraModel::kRadial, 1000, 800, {900, 504, 397, -0.05, 0.01}};
   double noise_px = 0;
   std::uint64_t seed = 1;
   /// Camera `i` of `n`, and a point of the scene; the default is an arc around a box of side 2.

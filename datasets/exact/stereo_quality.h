@@ -46,7 +46,7 @@ struct Quality {
 
 /// Errors in px of disparity, `px` of them to a unit of inverse depth (focal length x baseline);
 /// `mean_px` is signed, without outliers over 2 px, and 0 where nothing is left.
-inline Quality JudgeAt(double px, const DepthEstimate& estimate, const DepthImage& truth) {
+inline Quality QualityAt(double px, const DepthEstimate& estimate, const DepthImage& truth) {
   std::vector<double> errors;
   double sum = 0;
   int near = 0;

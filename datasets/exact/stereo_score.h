@@ -137,8 +137,8 @@ inline DepthEstimate WholeRun(const std::vector<StereoView>& views, const DepthR
                         Grid<float>(camera.width_px(), camera.height_px())});
       continue;
     }
-    judged.push_back(engine->Judge(views, v, neighbours[static_cast<size_t>(v)].views, range,
-                                   around.maps(), collection.options));
+    judged.push_back(engine->Filter(views, v, neighbours[static_cast<size_t>(v)].views, range,
+                                    around.maps(), collection.options));
   }
   std::vector<OtherDepth> others;
   for (size_t v = 1; v < views.size(); ++v) others.push_back({&views[v], &judged[v]});

@@ -32,8 +32,8 @@ std::filesystem::path FindProgram(const std::string& program);
 /// kill -9 leaves no orphan that writes on. Throws Error when it cannot be started.
 ProcessResult RunProcess(const std::vector<std::string>& argv, const ProcessOptions& options);
 
-/// Name and arguments that this program was started with, byte for byte; empty where the system does
-/// not say.
+/// Name and arguments that this program was started with, byte for byte; empty where the system
+/// does not say.
 std::vector<std::string> CommandLine();
 
 }  // namespace dtr

@@ -5,19 +5,12 @@
 
 #include "dtr/base/parallel_for.h"
 #include "dtr/render/blend_weights.h"
+#include "dtr/render/deferred_limits.h"
 #include "dtr/render/scene.h"
 #include "dtr/render/triangulation.h"
 
 namespace dtr::cpu {
 namespace {
-
-// SPEC 5.2 and 5.3, in pixels of disparity.
-constexpr double kHeldBeforePx = 1, kBeforePx = 0.5, kBehindPx = 2;
-
-// SPEC 5.2: a hole says less against a surface than a depth behind it; so many surfaces of a pixel
-// are tried.
-constexpr double kHoleSay = 0.25;
-constexpr int kTriedSurfaces = 3;
 
 // SPEC 5.3: a position this close to a sample, or to the middle between two, is on it. From an
 // input camera's own place every position is, and rounding would choose between blocks.
@@ -28,10 +21,10 @@ double OnGrid(double position) {
   return std::abs(position - half) < kOnGrid ? half : position;
 }
 
-/// What the views say of a surface; shares of their weights.
+/// How the views vote on a surface; shares of their weights.
 struct Votes {
-  double held = 0, refused = 0;
-  double front = 0;   ///< 1/z of the nearest whole patch of those that hold it; 0: none
+  double support = 0, against = 0;
+  double front = 0;   ///< 1/z of the nearest whole patch of those that support it; 0: none
   double behind = 0;  ///< 1/z of the nearest surface that a view sees through it; 0: none
 };
 
@@ -63,44 +56,45 @@ class OwnFragmentFinder {
 
   bool HasSamples() const { return !samples_.inverse_depth.empty(); }
 
-  /// Adds what the view says of a surface at 1/z = `start` on `ray`.
+  /// Adds the view's vote on a surface at 1/z = `start` on `ray`.
   void Vote(const Eigen::Vector3d& ray, double start, double pixel_angle_rad, Votes& votes) const {
     const Eigen::Vector3d base = grid_from_novel_ * ray;
     const auto position = PositionOnGrid(base, start);
     if (!position) return;
-    const double say = Say(ray, start, pixel_angle_rad);
+    const double vote = VoteWeight(ray, start, pixel_angle_rad);
     const Patch patch = PatchAt(*position);
     const double seen = Meet(base, *position, patch);
     if (!(seen > 0)) {
-      if (!patch.masked) votes.refused += kHoleSay * say;
+      if (!patch.masked) votes.against += kHoleVote * vote;
     } else if (seen - start < -kBehindPx * thresholds_.pixel) {
-      votes.refused += say;
+      votes.against += vote;
       votes.behind = std::max(votes.behind, seen);
-    } else if (seen - start <= kHeldBeforePx * thresholds_.pixel) {
-      votes.held += say;
-      if (patch.whole && seen - start <= kBeforePx * thresholds_.pixel) {
+    } else if (seen - start <= kSupportBeforePx * thresholds_.pixel) {
+      votes.support += vote;
+      if (patch.whole && seen - start <= kFragmentBeforePx * thresholds_.pixel) {
         votes.front = std::max(votes.front, seen);
       }
     }  // else the view looks at something before it
   }
 
   /// 1/z in the novel camera where `ray` (z = 1, novel frame) meets the view's surface near
-  /// `held`; 0 where the view shows another surface there, or none.
-  double Find(const Eigen::Vector3d& ray, double held) const {
+  /// `surface`; 0 where the view shows another surface there, or none.
+  double Find(const Eigen::Vector3d& ray, double surface) const {
     const Eigen::Vector3d base = grid_from_novel_ * ray;
-    const auto position = PositionOnGrid(base, held);
+    const auto position = PositionOnGrid(base, surface);
     if (!position) return 0;
     const double w = Meet(base, *position, PatchAt(*position));
-    return w > 0 && Within(w - held) && (base + minus_center_ * w).z() > 0 ? w : 0;
+    return w > 0 && Within(w - surface) && (base + minus_center_ * w).z() > 0 ? w : 0;
   }
 
  private:
   bool Within(double nearer) const {
-    return nearer <= kBeforePx * thresholds_.pixel && nearer >= -kBehindPx * thresholds_.pixel;
+    return nearer <= kFragmentBeforePx * thresholds_.pixel &&
+           nearer >= -kBehindPx * thresholds_.pixel;
   }
 
   /// 1 / (tan^2 t + t_pixel^2), t the angle of SPEC 4.5 at the point ray / w; 0 from 90 degrees on.
-  double Say(const Eigen::Vector3d& ray, double w, double pixel_angle_rad) const {
+  double VoteWeight(const Eigen::Vector3d& ray, double w, double pixel_angle_rad) const {
     const Eigen::Vector3d to_view = center_ * w - ray;
     const double dot = to_view.dot(-ray);
     if (!(dot > 0)) return 0;
@@ -188,11 +182,11 @@ void KeepSurfacesThatViewsHold(std::span<const ViewInNovel> views, const Pinhole
     if (!finders.back().HasSamples()) finders.pop_back();
   }
   const double pixel_angle_rad = BlendParametersOf(options, novel.fx_px()).pixel_angle_rad;
-  const auto held = [&](const Eigen::Vector3d& ray, double surface) {
-    for (int tried = 0; tried < kTriedSurfaces && surface > 0; ++tried) {
+  const auto surface_of = [&](const Eigen::Vector3d& ray, double surface) {
+    for (int tried = 0; tried < kMaxSurfaces && surface > 0; ++tried) {
       Votes votes;
       for (const auto& finder : finders) finder.Vote(ray, surface, pixel_angle_rad, votes);
-      if (votes.held >= votes.refused) return votes.front > 0 ? votes.front : surface;
+      if (votes.support >= votes.against) return votes.front > 0 ? votes.front : surface;
       surface = votes.behind;
     }
     return 0.0;
@@ -201,7 +195,7 @@ void KeepSurfacesThatViewsHold(std::span<const ViewInNovel> views, const Pinhole
     for (int x = 0; x < band.width_px; ++x) {
       double& surface = surfaces[static_cast<size_t>(row) * static_cast<size_t>(band.width_px) +
                                  static_cast<size_t>(x)];
-      surface = held(novel.RayFromPixel({x + 0.5, band.first_row + row + 0.5}), surface);
+      surface = surface_of(novel.RayFromPixel({x + 0.5, band.first_row + row + 0.5}), surface);
     }
   });
 }

@@ -6,16 +6,13 @@
 #include <vector>
 
 #include "dtr/render/colour.h"
+#include "dtr/render/deferred_limits.h"
 #include "dtr/render/geometry.h"
 #include "dtr/render/texture.h"
 #include "dtr/render/valid_views.h"
 
 namespace dtr::cpu {
 namespace {
-
-// Renderers that agree on depth to single precision may differ on fragments this near to the
-// border, a share of Delta; tests look at them apart.
-constexpr double kBorderShare = 1e-4;
 
 struct Fragment {
   const ResolveView* view = nullptr;

@@ -92,7 +92,7 @@ Json JsonOf(const CrossDepthReport& report) {
 
 std::string ToJson(const CrossDepthReport& report) { return Text(JsonOf(report)); }
 
-std::string VerdictJson(const std::vector<Check>& tests) {
+std::string ValidationJson(const std::vector<Check>& tests) {
   return Text({{"passed", AllPassed(tests)}, {"tests", dtr::JsonOf(tests)}}, -1);
 }
 

@@ -31,8 +31,8 @@ std::string ToJson(const DepthScores& scores);
 ///  median_px,p95_px}],all:{the same}}.
 std::string ToJson(const CrossDepthReport& report);
 
-/// {"passed":bool,"tests":[...]}: a validation result, as sets carry it in DtrSet::verdict_json.
+/// {"passed":bool,"tests":[...]}: a validation result, as sets carry it in DtrSet::validation_json.
 /// Compact.
-std::string VerdictJson(const std::vector<Check>& tests);
+std::string ValidationJson(const std::vector<Check>& tests);
 
 }  // namespace dtr::eval

@@ -5,7 +5,7 @@
 
 namespace dtr::eval {
 
-/// How well stated standard deviations describe errors. Empty: there was no pixel to judge.
+/// How well stated standard deviations describe errors. Empty: there was no pixel to evaluate.
 struct SigmaScores {
   /// Share of errors inside 1, 2, 3 standard deviations; 0.683, 0.954, 0.997 for normal errors.
   std::optional<double> share_within_1_sigma, share_within_2_sigma, share_within_3_sigma;

@@ -74,7 +74,7 @@ std::optional<size_t> CheapestWithin(std::span<const SweepPoint> points, double 
 std::optional<size_t> BestWithin(std::span<const SweepPoint> points, double budget);
 
 /// What is to be said of the default among all points.
-struct DefaultVerdict {
+struct DefaultAssessment {
   size_t at = 0;  ///< index of the default
   bool on_front = false;
   /// The point that saves the most of its cost with no more error than the default; empty on the
@@ -84,8 +84,8 @@ struct DefaultVerdict {
   bool within_spread = false;
 };
 /// Empty where the default was not measured.
-std::optional<DefaultVerdict> JudgeDefault(std::span<const SweepPoint> points,
-                                           std::span<const size_t> front);
+std::optional<DefaultAssessment> AssessDefault(std::span<const SweepPoint> points,
+                                               std::span<const size_t> front);
 
 /// The default, every value of axis 0 alone, and every other value of every other axis, alone, on
 /// the first value of axis 0 under which it means something; where there is none, on the first

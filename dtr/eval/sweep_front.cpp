@@ -103,25 +103,26 @@ std::optional<size_t> BestWithin(std::span<const SweepPoint> points, double budg
       });
 }
 
-std::optional<DefaultVerdict> JudgeDefault(std::span<const SweepPoint> points,
-                                           std::span<const size_t> front) {
-  DefaultVerdict verdict;
-  while (verdict.at < points.size() && !IsDefault(points[verdict.at].setting)) ++verdict.at;
-  if (verdict.at == points.size()) return std::nullopt;
-  verdict.on_front = std::find(front.begin(), front.end(), verdict.at) != front.end();
-  if (verdict.on_front) return verdict;
-  const SweepPoint& usual = points[verdict.at];
-  verdict.beaten_by = Pick(
+std::optional<DefaultAssessment> AssessDefault(std::span<const SweepPoint> points,
+                                               std::span<const size_t> front) {
+  DefaultAssessment assessment;
+  while (assessment.at < points.size() && !IsDefault(points[assessment.at].setting))
+    ++assessment.at;
+  if (assessment.at == points.size()) return std::nullopt;
+  assessment.on_front = std::find(front.begin(), front.end(), assessment.at) != front.end();
+  if (assessment.on_front) return assessment;
+  const SweepPoint& usual = points[assessment.at];
+  assessment.beaten_by = Pick(
       points,
       [&](const SweepMeasurement& point) {
         return &point != &usual.measured && point.error <= usual.measured.error;
       },
       [](const SweepMeasurement& a, const SweepMeasurement& b) { return a.cost < b.cost; });
-  if (verdict.beaten_by) {
-    verdict.within_spread =
-        RangeOf(points[*verdict.beaten_by], points).most >= RangeOf(usual, points).least;
+  if (assessment.beaten_by) {
+    assessment.within_spread =
+        RangeOf(points[*assessment.beaten_by], points).most >= RangeOf(usual, points).least;
   }
-  return verdict;
+  return assessment;
 }
 
 }  // namespace dtr::eval

@@ -80,7 +80,7 @@ bool TopRowFirst() {
 }
 
 /// Per axis the factor (x, y) and what is added (z, w); 0 is the image's top row.
-Eigen::Vector4d PictureFromPixel(const Viewport& viewport) {
+Eigen::Vector4d ImageFromPixel(const Viewport& viewport) {
   const double x = 1.0 / viewport.width, y = 1.0 / viewport.height;
   if (TopRowFirst()) return {x, y, -x * viewport.x, -y * viewport.y};
   return {x, -y, -x * viewport.x, y * (viewport.y + viewport.height)};
@@ -118,7 +118,7 @@ class Compositor::Implementation {
   explicit Implementation(std::string shader_folder)
       : programs_(std::move(shader_folder)), empty_array_(VertexArray::Make()) {}
 
-  void Composite(const DrawnPicture& picture, const DepthProjection& projection) {
+  void Composite(const DrawnFrame& picture, const DepthProjection& projection) {
     const Viewport viewport = CurrentViewport();
     const simd::WindowDepthMapping mapping = CurrentMapping(projection);
     const bool in_memory = picture.rgba != nullptr;
@@ -129,7 +129,7 @@ class Compositor::Implementation {
         {in_memory ? "MAPPED 1" : "MAPPED 0"}));
     set.Set("image", 0);
     set.Set("depth", 1);
-    set.Set("picture_from_pixel", PictureFromPixel(viewport));
+    set.Set("image_from_pixel", ImageFromPixel(viewport));
     set.Set("mapping", Eigen::Vector4d(mapping.at_infinity, mapping.per_inverse_depth,
                                        mapping.least, mapping.scale));
     set.Set("clamps", mapping.clamps ? 1 : 0);
@@ -141,7 +141,7 @@ class Compositor::Implementation {
   }
 
   /// Where `depth` has one and no view saw the pixel it is a guess.
-  DrawnPicture Take(const RenderResult& result, const Grid<float>& depth) {
+  DrawnFrame Take(const RenderResult& result, const Grid<float>& depth) {
     const size_t pixels = result.coverage.data().size();
     taken_rgba_.resize(pixels);
     taken_guessed_.resize(pixels);
@@ -151,11 +151,11 @@ class Compositor::Implementation {
       taken_guessed_[p] = result.coverage.data()[p] == 0;
     }
     taken_depth_ = depth.data();
-    DrawnPicture picture;
+    DrawnFrame picture;
     picture.width_px = result.image.width(), picture.height_px = result.image.height();
     picture.views_used = result.views_used;
     picture.rgba = taken_rgba_.data(), picture.depth_z = taken_depth_.data();
-    picture.number = taken_number_ = NextPictureNumber();
+    picture.number = taken_number_ = NextFrameNumber();
     return picture;
   }
 
@@ -163,7 +163,7 @@ class Compositor::Implementation {
   /// An image in memory to the GPU, its depth as the host's buffer has it: a software rasteriser
   /// takes several times as long for that sum as the processor's vector instructions, and longer
   /// for texels of an array than of a plain texture. Within a CompositeGuard.
-  void Bring(const DrawnPicture& picture, const simd::WindowDepthMapping& mapping) {
+  void Bring(const DrawnFrame& picture, const simd::WindowDepthMapping& mapping) {
     const bool known = picture.number != 0 && picture.number == brought_number_;
     if (known && mapping == brought_mapping_) return;
     brought_number_ = 0;  // until all of it is there
@@ -214,15 +214,15 @@ Compositor::Compositor(std::string shader_folder)
     : implementation_(std::make_unique<Implementation>(std::move(shader_folder))) {}
 Compositor::~Compositor() = default;
 
-void Compositor::Composite(const DrawnPicture& picture, const DepthProjection& projection) {
+void Compositor::Composite(const DrawnFrame& picture, const DepthProjection& projection) {
   implementation_->Composite(picture, projection);
 }
 
-DrawnPicture Compositor::Take(const RenderResult& result) {
+DrawnFrame Compositor::Take(const RenderResult& result) {
   return implementation_->Take(result, result.depth.grid());
 }
 
-DrawnPicture Compositor::TakeFilled(const RenderResult& result, const Grid<float>& depth) {
+DrawnFrame Compositor::TakeFilled(const RenderResult& result, const Grid<float>& depth) {
   return implementation_->Take(result, depth);
 }
 

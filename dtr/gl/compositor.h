@@ -42,14 +42,14 @@ class Compositor {
   /// `image` fills the viewport, whatever its size (nearest pixels). It is cut at the host's near
   /// and far planes as other surfaces are. Colours are written as they are: sRGB values, also where
   /// GL_FRAMEBUFFER_SRGB is on. One that is composited again is not brought to the GPU again.
-  void Composite(const DrawnPicture& picture, const DepthProjection& projection);
+  void Composite(const DrawnFrame& picture, const DepthProjection& projection);
 
   /// An image from memory, holding until the next one is taken.
-  DrawnPicture Take(const RenderResult& result);
+  DrawnFrame Take(const RenderResult& result);
   /// The same of an image whose holes were filled; `depth` is what HoleFiller::Fill gave. What is
   /// guessed is never cut: beyond the host's near or far plane it lies just within it, for a host
   /// sets these by what was seen, and skies have no end.
-  DrawnPicture TakeFilled(const RenderResult& result, const Grid<float>& depth);
+  DrawnFrame TakeFilled(const RenderResult& result, const Grid<float>& depth);
 
  private:
   class Implementation;

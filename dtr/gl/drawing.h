@@ -45,8 +45,8 @@ inline Eigen::Vector4d Intrinsics(const PinholeCamera& camera) {
   return {camera.fx_px(), camera.fy_px(), camera.cx_px(), camera.cy_px()};
 }
 
-/// DrawnPicture::number of the next one.
-inline std::uint64_t NextPictureNumber() {
+/// DrawnFrame::number of the next one.
+inline std::uint64_t NextFrameNumber() {
   static std::atomic<std::uint64_t> last = 0;  // contexts draw in threads of their own
   return ++last;
 }

@@ -14,11 +14,11 @@ bool PrefersSimd(Drawer drawer) {
   return drawer == Drawer::kFitting ? DrawsOnProcessor() : drawer == Drawer::kSimd;
 }
 
-DrawnPicture InMemory(simd::DrawnImage drawn) {
-  DrawnPicture picture;
+DrawnFrame InMemory(simd::DrawnImage drawn) {
+  DrawnFrame picture;
   picture.rgba = drawn.rgba, picture.depth_z = drawn.depth_z, picture.window_z = drawn.window_z;
   picture.mapping = drawn.mapping;
-  picture.number = NextPictureNumber();
+  picture.number = NextFrameNumber();
   picture.width_px = drawn.width_px, picture.height_px = drawn.height_px;
   picture.views_used = std::move(drawn.views_used);
   picture.views_held = drawn.views_held;
@@ -38,9 +38,9 @@ RenderResult FittingRenderer::Render(const RenderScene& scene, const PinholeCame
                          : open_gl_.Render(scene, novel, novel_from_world, options);
 }
 
-DrawnPicture FittingRenderer::Draw(const RenderScene& scene, const PinholeCamera& novel,
-                                   const Pose& novel_from_world, const RenderOptions& options,
-                                   const std::optional<simd::WindowDepthMapping>& mapping) {
+DrawnFrame FittingRenderer::Draw(const RenderScene& scene, const PinholeCamera& novel,
+                                 const Pose& novel_from_world, const RenderOptions& options,
+                                 const std::optional<simd::WindowDepthMapping>& mapping) {
   drawn_by_simd_ = BySimd(options);
   return drawn_by_simd_ ? InMemory(simd_.Draw(scene, novel, novel_from_world, options, mapping))
                         : open_gl_.Draw(scene, novel, novel_from_world, options);

@@ -17,7 +17,7 @@ enum class Drawer {
 };
 
 /// gl::Renderer and simd::Renderer in one. What the second drew lies in memory
-/// (DrawnPicture::rgba), for gl::Compositor or for a texture of the caller's. Belongs to the
+/// (DrawnFrame::rgba), for gl::Compositor or for a texture of the caller's. Belongs to the
 /// context it was made with.
 class FittingRenderer {
  public:
@@ -27,9 +27,9 @@ class FittingRenderer {
   /// As gl::Renderer. `mapping`: images in memory get window_z, too.
   RenderResult Render(const RenderScene& scene, const PinholeCamera& novel,
                       const Pose& novel_from_world, const RenderOptions& options);
-  DrawnPicture Draw(const RenderScene& scene, const PinholeCamera& novel,
-                    const Pose& novel_from_world, const RenderOptions& options,
-                    const std::optional<simd::WindowDepthMapping>& mapping = std::nullopt);
+  DrawnFrame Draw(const RenderScene& scene, const PinholeCamera& novel,
+                  const Pose& novel_from_world, const RenderOptions& options,
+                  const std::optional<simd::WindowDepthMapping>& mapping = std::nullopt);
   RenderResult ReadBack();
   void Forget();
 

@@ -22,7 +22,7 @@ size_t MostBytesOf(const View& view, const RenderOptions& options, const LayerSi
                             : options.primitive == Primitive::kSplat  ? kMaxBytesOfSplats
                                                                       : kMaxBytesOfMesh;
   return kBytesPerPixel * PixelsOf(sizes.LayerFor(SizeOf(view.camera))) +
-         kBytesPerPixel * PixelsOf(sizes.LayerFor(DepthPictureSize(view, options.resolution))) +
+         kBytesPerPixel * PixelsOf(sizes.LayerFor(PackedDepthSize(view, options.resolution))) +
          per_sample * PixelsOf(SizeOf(view.DepthCamera()));
 }
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <set>
 
-#include "dtr/gl/depth_picture.h"
+#include "dtr/gl/packed_depth.h"
 
 namespace dtr::gl {
 namespace {
@@ -23,7 +23,7 @@ LayerSizes::LayerSizes(const std::vector<const View*>& views, int resolution, in
   std::vector<LayerSize> images, depths;
   for (const View* view : views) {
     images.push_back({view->camera.width_px(), view->camera.height_px()});
-    depths.push_back(DepthPictureSize(*view, resolution));
+    depths.push_back(PackedDepthSize(*view, resolution));
   }
   while (step_px_ < most_px && !(AreFew(images) && AreFew(depths))) {
     step_px_ = step_px_ == 1 ? kFirstStepPx : 2 * step_px_;
@@ -41,19 +41,19 @@ LayerSize LayerSizes::LayerFor(const LayerSize& picture) const {
           Rounded(picture.height_px, step_px_, max_px_)};
 }
 
-LayerSize DepthPictureSize(int columns, int rows) {
+LayerSize PackedDepthSize(int columns, int rows) {
   if (columns == 0 || rows == 0) return {};
   const int rows_of_bits = (rows + 1 + kBlocksPerTexel - 1) / kBlocksPerTexel;
   return {columns + 1, rows + 1 + rows_of_bits};
 }
 
-LayerSize DepthPictureSize(const View& view, int resolution) {
+LayerSize PackedDepthSize(const View& view, int resolution) {
   const PinholeCamera camera = view.DepthCamera();
   const int first = resolution / 2;
   const auto along = [&](int pixels) {
     return pixels > first ? (pixels - first + resolution - 1) / resolution : 0;
   };
-  return DepthPictureSize(along(camera.width_px()), along(camera.height_px()));
+  return PackedDepthSize(along(camera.width_px()), along(camera.height_px()));
 }
 
 LayerSize SizeWithEdge(const LayerSize& picture, const LayerSize& layer) {

@@ -34,10 +34,10 @@ class LayerSizes {
   int step_px_ = 1, max_px_ = 0;
 };
 
-/// Of the image in which shaders find a grid of samples (DepthPicture); none for an empty grid.
-LayerSize DepthPictureSize(int columns, int rows);
+/// Of the image in which shaders find a grid of samples (PackedDepth); none for an empty grid.
+LayerSize PackedDepthSize(int columns, int rows);
 /// Of the view's depth map at every `resolution`-th pixel (SPEC 2.1).
-LayerSize DepthPictureSize(const View& view, int resolution);
+LayerSize PackedDepthSize(const View& view, int resolution);
 
 /// An image of `channels` values a pixel with its last column and row once more where the layer is
 /// larger: what a texture unit finds where it clamps to the edge of a layer of the image's size.

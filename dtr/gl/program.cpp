@@ -1,6 +1,7 @@
 #include "dtr/gl/program.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <regex>
 #include <sstream>
 
@@ -38,8 +39,9 @@ class Source {
  private:
   std::string Load(const std::string& file) const {
     if (!folder_.empty()) return ReadFile(folder_ + "/" + file, kMaxShaderBytes);
+    const std::string name = std::filesystem::path(file).filename().string();
     for (const EmbeddedShader& shader : EmbeddedShaders()) {
-      if (shader.name == file) return std::string(shader.text);
+      if (shader.name == name) return std::string(shader.text);
     }
     throw Error("shader " + file + ": expected among the embedded shaders, found none");
   }

@@ -34,7 +34,7 @@ void CheckContext() {
   }
 }
 
-void CheckPictureSize(const PinholeCamera& novel) {
+void CheckImageSize(const PinholeCamera& novel) {
   GLint max_px = 0;
   glGetIntegerv(GL_MAX_TEXTURE_SIZE, &max_px);
   if (novel.width_px() > max_px || novel.height_px() > max_px) {
@@ -76,7 +76,7 @@ class Renderer::Implementation {
     const ViewSelection selection = SelectViews(scene, novel_from_world, options);
     result.views_used = selection.views;
     if (selection.views.empty()) return result;
-    CheckPictureSize(novel);
+    CheckImageSize(novel);
     RenderFrame frame = MakeFrame(scene, novel, novel_from_world, options, selection);
     RequireAllLoaded(frame);
     DrawInBands(std::move(frame), selection, result);
@@ -85,11 +85,11 @@ class Renderer::Implementation {
     return result;
   }
 
-  DrawnPicture Draw(const RenderScene& scene, const PinholeCamera& novel,
-                    const Pose& novel_from_world, const RenderOptions& options) {
+  DrawnFrame Draw(const RenderScene& scene, const PinholeCamera& novel,
+                  const Pose& novel_from_world, const RenderOptions& options) {
     CheckRenderOptions(options);
     CheckNovelCamera(novel, novel_from_world);
-    CheckPictureSize(novel);
+    CheckImageSize(novel);
     const ViewSelection selection = SelectViews(scene, novel_from_world, options);
     RenderFrame frame = MakeFrame(scene, novel, novel_from_world, options, selection);
     RequireAllLoaded(frame);
@@ -158,16 +158,16 @@ class Renderer::Implementation {
   }
 
   /// The whole image at once.
-  DrawnPicture DrawWhole(RenderFrame frame, const ViewSelection& selection) {
+  DrawnFrame DrawWhole(RenderFrame frame, const ViewSelection& selection) {
     drawn_.reset();
     ForgetErrors();
     const StateGuard guard;
     CheckViewCount(frame.views.size());
-    DrawnPicture drawn;
+    DrawnFrame drawn;
     drawn.width_px = frame.novel.width_px(), drawn.height_px = frame.novel.height_px();
     if (!frame.views.empty()) drawn.views_used = Prepare(frame, selection);
     CheckStorage(frame);
-    drawn.number = NextPictureNumber();
+    drawn.number = NextFrameNumber();
     FitTargets(frame, drawn.height_px);
     if (frame.views.empty()) {
       targets_.ClearResults();
@@ -233,7 +233,7 @@ class Renderer::Implementation {
   CoarseDepth coarse_depth_;
   Resolver resolver_;
   HoleFiller hole_filler_;
-  std::optional<DrawnPicture> drawn_;  ///< while it can be read back
+  std::optional<DrawnFrame> drawn_;  ///< while it can be read back
 };
 
 Renderer::Renderer(RendererSettings settings) {
@@ -247,8 +247,8 @@ RenderResult Renderer::Render(const RenderScene& scene, const PinholeCamera& nov
   return implementation_->Render(scene, novel, novel_from_world, options);
 }
 
-DrawnPicture Renderer::Draw(const RenderScene& scene, const PinholeCamera& novel,
-                            const Pose& novel_from_world, const RenderOptions& options) {
+DrawnFrame Renderer::Draw(const RenderScene& scene, const PinholeCamera& novel,
+                          const Pose& novel_from_world, const RenderOptions& options) {
   return implementation_->Draw(scene, novel, novel_from_world, options);
 }
 

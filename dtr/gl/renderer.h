@@ -36,7 +36,7 @@ struct RendererSettings {
 /// An image that was drawn and lies on the GPU: names of GL_TEXTURE_2D_ARRAY textures of one layer
 /// that belong to the renderer and hold the image until its next call. Row 0 is the top row. A
 /// FittingRenderer's may lie in its memory instead, as long: then there are no textures (0).
-struct DrawnPicture {
+struct DrawnFrame {
   unsigned image = 0;  ///< RGBA8, sRGB values; alpha 1 where some view saw the pixel, else 0
   unsigned depth = 0;  ///< R32F, plane z in scene units; 0 where unseen
   unsigned marks = 0;  ///< RGBA8UI: views blended; 255 at the Delta border (SPEC 6.2)
@@ -80,8 +80,8 @@ class Renderer {
   /// filled (options.fill_holes is not looked at). Drawn at once, whatever layer_bytes says. May
   /// return before the GPU has finished. Throws as Render; also dtr::Error where the deferred
   /// method's depth (4 bytes a pixel) is more than one storage block of this driver.
-  DrawnPicture Draw(const RenderScene& scene, const PinholeCamera& novel,
-                    const Pose& novel_from_world, const RenderOptions& options);
+  DrawnFrame Draw(const RenderScene& scene, const PinholeCamera& novel,
+                  const Pose& novel_from_world, const RenderOptions& options);
 
   /// The image of the last Draw, which must be the last call that drew (std::logic_error): what
   /// Render gives without filling.

@@ -4,8 +4,8 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
-#include "dtr/gl/depth_picture.h"
 #include "dtr/gl/driver.h"
+#include "dtr/gl/packed_depth.h"
 #include "dtr/render/stored_depth.h"
 #include "dtr/render/texture.h"
 #include "dtr/render/triangulation.h"
@@ -181,7 +181,7 @@ void ViewStore::PrepareDeferred(const std::vector<const View*>& views, const Ren
         deferred && deferred->first == key &&
         (deferred->second.columns == 0 ||
          SizeOf(deferred->second.depth) ==
-             sizes.LayerFor(DepthPictureSize(deferred->second.columns, deferred->second.rows)));
+             sizes.LayerFor(PackedDepthSize(deferred->second.columns, deferred->second.rows)));
     if (!there) missing.push_back(view);
   }
   std::vector<SampleGrid> grids(missing.size());
@@ -193,8 +193,8 @@ void ViewStore::PrepareDeferred(const std::vector<const View*>& views, const Ren
     depths[k] = StoreDepth(view, grids[k]);
     const BreakRule breaks = BreakRuleOf(view, options);
     StoredDepth& depth = depths[k];
-    if (!depth.codes.empty()) depth.codes = DepthPicture(depth.codes, grids[k], breaks);
-    if (!depth.values.empty()) depth.values = DepthPicture(depth.values, grids[k], breaks);
+    if (!depth.codes.empty()) depth.codes = PackedDepth(depth.codes, grids[k], breaks);
+    if (!depth.values.empty()) depth.values = PackedDepth(depth.values, grids[k], breaks);
   });
   for (size_t k = 0; k < missing.size(); ++k) {
     const View& view = *missing[k];
@@ -207,7 +207,7 @@ void ViewStore::PrepareDeferred(const std::vector<const View*>& views, const Ren
     if (!w.empty()) {
       const bool coded = !depths[k].codes.empty();
       deferred.depth_offset = depths[k].offset, deferred.depth_factor = depths[k].factor;
-      const LayerSize size = DepthPictureSize(w.width(), w.height());
+      const LayerSize size = PackedDepthSize(w.width(), w.height());
       if (coded) {
         deferred.largest_bits = UINT16_MAX;
         deferred.depth = Put(view, depths[k].codes.data(), {GL_R16, GL_RED, GL_UNSIGNED_SHORT, 1},

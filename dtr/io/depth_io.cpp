@@ -66,7 +66,7 @@ int DepthChannel(const ImageSpec& spec, const fs::path& file) {
 }
 
 // Programs that render a part of an image write that part alone.
-void ExpectWholePicture(const ImageSpec& spec, const fs::path& file) {
+void ExpectWholeImage(const ImageSpec& spec, const fs::path& file) {
   if (spec.x == spec.full_x && spec.y == spec.full_y && spec.width == spec.full_width &&
       spec.height == spec.full_height) {
     return;
@@ -94,7 +94,7 @@ Grid<float> ReadFloatsOf(OIIO::ImageInput& in, const fs::path& file) {
     throw Error(file.string() + ": expected float samples, found " +
                 std::string(spec.format.c_str()) + "; say how its numbers are coded");
   }
-  ExpectWholePicture(spec, file);
+  ExpectWholeImage(spec, file);
   Grid<float> grid(spec.width, spec.height);
   const int channel = DepthChannel(spec, file);
   ReadPixels(in, file, channel, channel + 1, TypeDesc::FLOAT, grid.data().data());

@@ -79,11 +79,11 @@ std::string EncodeImage(const std::string& extension, const OIIO::ImageSpec& spe
   SetUpOnce();
   const std::string name = "memory" + extension;
   auto out = OIIO::ImageOutput::create(name);
-  OIIO::ImageSpec with_effort = spec;
-  with_effort.attribute("png:compressionLevel", kPngLevel);
+  OIIO::ImageSpec with_quality = spec;
+  with_quality.attribute("png:compressionLevel", kPngLevel);
   std::vector<unsigned char> bytes;
   OIIO::Filesystem::IOVecOutput memory(bytes);
-  if (!out || !out->set_ioproxy(&memory) || !out->open(name, with_effort) ||
+  if (!out || !out->set_ioproxy(&memory) || !out->open(name, with_quality) ||
       !out->write_image(type, pixels) || !out->close()) {
     throw Error("image cannot be encoded as " + extension + ": " +
                 OneLine(out ? out->geterror() : OIIO::geterror()));

@@ -72,14 +72,15 @@ std::string Megabytes(std::uint64_t bytes) {
 
 }  // namespace
 
-std::string VerdictLine(const DtrSet& set) {
-  const Json verdict = ParseJson(set.verdict_json, "verdict");
-  if (verdict.empty()) return "not validated";
-  if (!verdict.contains("passed") || !verdict["passed"].is_boolean()) return verdict.dump();
-  if (verdict["passed"].get<bool>()) return "passed";
+std::string ValidationLine(const DtrSet& set) {
+  const Json validation = ParseJson(set.validation_json, "verdict");
+  if (validation.empty()) return "not validated";
+  if (!validation.contains("passed") || !validation["passed"].is_boolean())
+    return validation.dump();
+  if (validation["passed"].get<bool>()) return "passed";
   std::string failed;
-  const auto tests = verdict.find("tests");
-  for (const Json& test : tests != verdict.end() && tests->is_array() ? *tests : Json::array()) {
+  const auto tests = validation.find("tests");
+  for (const Json& test : tests != validation.end() && tests->is_array() ? *tests : Json::array()) {
     // A validation result of another form, from another tool, is no reason to reject the set.
     const bool known = test.is_object() && test.contains("passed") && test.contains("name") &&
                        test["passed"] == false && test["name"].is_string();
@@ -88,8 +89,8 @@ std::string VerdictLine(const DtrSet& set) {
   return "FAILED" + (failed.empty() ? "" : ": " + failed) + "; dtr validate says more";
 }
 
-std::string VerdictWarning(const DtrSet& set) {
-  const std::string line = VerdictLine(set);
+std::string ValidationWarning(const DtrSet& set) {
+  const std::string line = ValidationLine(set);
   return line.starts_with("FAILED") ? "WARNING: validation " + line : "";
 }
 
@@ -165,7 +166,7 @@ std::string DescribeSet(const DtrSet& set) {
       << set.frames.size() << (set.frames.size() == 1 ? " frame, " : " frames, ")
       << Megabytes(bytes) << "\nunit: " << NameOf(set.unit) << "\n"
       << RigLine(set) << "scene centre: (" << set.scene_center.transpose()
-      << ")\nverdict: " << VerdictLine(set) << "\nviews:\n";
+      << ")\nvalidation: " << ValidationLine(set) << "\nviews:\n";
   return out.str() + lines.str() + DescribePruned(set);
 }
 
@@ -178,7 +179,7 @@ std::string InfoJson(const DtrSet& set) {
                {"frames", set.frames.size()},
                {"bytes", 0},
                {"has_sparse", set.sparse_file.has_value()},
-               {"verdict", ParseJson(set.verdict_json, "verdict")},
+               {"verdict", ParseJson(set.validation_json, "verdict")},
                {"provenance", ParseJson(set.provenance_json, "provenance")},
                {"views", Json::array()}};
   if (!set.bounds.empty()) {

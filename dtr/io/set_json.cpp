@@ -326,7 +326,7 @@ DtrSet SetFrom(const JsonObject& root) {
     set.frames.push_back(FrameFrom(root.Item("frames", i), set.unit, ids));
   }
   set.provenance_json = ObjectText(root, "provenance");
-  set.verdict_json = ObjectText(root, "verdict");
+  set.validation_json = ObjectText(root, "verdict");
   Json extra = root.Unknown();
   extra.update(nested);
   set.extra_json = TextOrEmpty(extra);
@@ -372,7 +372,7 @@ std::string JsonFromSet(const DtrSet& set, const std::string& file) {
   root["frames"] = Json::array();
   for (const Frame& frame : set.frames) root["frames"].push_back(ToJson(frame));
   root["provenance"] = ParseJson(set.provenance_json, file + ": provenance");
-  root["verdict"] = ParseJson(set.verdict_json, file + ": verdict");
+  root["verdict"] = ParseJson(set.validation_json, file + ": verdict");
   Restore(root, set.extra_json, {"bounds", "sparse"});
   const std::string text = PrettyJson(root, file);
   SetFromJson(text, file);  // NaN turns into null here and is rejected with its field

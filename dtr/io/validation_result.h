@@ -7,9 +7,9 @@
 namespace dtr::io {
 
 /// "passed", "not validated", or "FAILED: TEST, ...; dtr validate says more".
-std::string VerdictLine(const DtrSet& set);
+std::string ValidationLine(const DtrSet& set);
 
 /// A line to be shown wherever a set whose calibration failed its tests is used; empty for others.
-std::string VerdictWarning(const DtrSet& set);
+std::string ValidationWarning(const DtrSet& set);
 
 }  // namespace dtr::io

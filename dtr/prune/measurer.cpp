@@ -12,7 +12,7 @@ namespace {
 // Novel cameras that decide are others than those that check.
 constexpr std::uint64_t kOtherCameras = 0x9e3779b97f4a7c15u;
 // Of the setting as it is, and of the one that is tried.
-constexpr size_t kKeptPictures = 2;
+constexpr size_t kKeptImages = 2;
 
 /// What no view of the whole set sees is guessed before and after, and guesses turn on trifles: it
 /// says nothing of what is lost. From places that see nothing all counts.
@@ -105,49 +105,50 @@ void Measurer::Prepare() {
   photos_whole_ = photos_.places;
   for (Looks* looks : {&deciding_, &deciding_novel_, &checking_, &witnesses_, &photos_}) {
     std::vector<Mask> coverage;
-    looks->before = PicturesOf(whole, coded, *looks, &coverage);
+    looks->before = ImagesOf(whole, coded, *looks, &coverage);
     for (size_t i = 0; i < coverage.size(); ++i) CountSeen(coverage[i], looks->places[i]);
   }
 }
 
-std::vector<ImageRgb8> Measurer::PicturesOf(const Setting& setting, const Coded& coded,
-                                            const Looks& looks, std::vector<Mask>* coverage) {
+std::vector<ImageRgb8> Measurer::ImagesOf(const Setting& setting, const Coded& coded,
+                                          const Looks& looks, std::vector<Mask>* coverage) {
   progress_.ThrowIfInterrupted();
-  return Pictures(coded->set, setting.without, looks.places, setting.render, RendererFor(coded),
-                  coverage);
+  return Images(coded->set, setting.without, looks.places, setting.render, RendererFor(coded),
+                coverage);
 }
 
 /// PSNR loss, and the mean squares before, after and of the change.
 Errors Measurer::AtPhotos(const std::string& what, const Looks& looks, Setting setting) {
-  // Tiles lean on the very views that are left out here; from between the cameras they are judged.
+  // Tiles lean on the very views that are left out here; from between the cameras they are
+  // evaluated.
   setting.coding.tiles.clear();
   const auto numbers = Numbers(what + " " + KeyOf(setting), 5, [&] {
     Prepare();
     const Errors errors = CompareWithPhotos(looks.places, looks.before,
-                                            PicturesOf(setting, CodedAs(setting.coding), looks));
+                                            ImagesOf(setting, CodedAs(setting.coding), looks));
     return std::vector<double>{errors.before, errors.after, errors.change, errors.psnr_loss_db,
                                errors.psnr_loss_error_db};
   });
   return {numbers[0], numbers[1], numbers[2], numbers[3], numbers[4]};
 }
 
-const std::vector<ImageRgb8>& Measurer::KeptPictures(Looks& looks, const Setting& kept) {
+const std::vector<ImageRgb8>& Measurer::KeptImages(Looks& looks, const Setting& kept) {
   const std::string key = KeyOf(kept);
   const auto known = std::find_if(looks.kept.begin(), looks.kept.end(),
                                   [&](const auto& entry) { return entry.first == key; });
   if (known != looks.kept.end()) return known->second;
-  if (looks.kept.size() == kKeptPictures) looks.kept.pop_front();
-  looks.kept.emplace_back(key, PicturesOf(kept, CodedAs(kept.coding), looks));
+  if (looks.kept.size() == kKeptImages) looks.kept.pop_front();
+  looks.kept.emplace_back(key, ImagesOf(kept, CodedAs(kept.coding), looks));
   return looks.kept.back().second;
 }
 
 std::vector<double> Measurer::NovelLossesDb(Looks& looks, const Setting& setting,
                                             const Errors& with_all_at_photos) {
   const Setting kept = WithNothingRemoved(setting);
-  const std::vector<ImageRgb8>& recoded = KeptPictures(looks, kept);
+  const std::vector<ImageRgb8>& recoded = KeptImages(looks, kept);
   std::vector<double> removed(looks.places.size(), 0.0);
   if (KeyOf(kept) != KeyOf(setting)) {
-    removed = Changes(looks.places, recoded, PicturesOf(setting, CodedAs(setting.coding), looks));
+    removed = Changes(looks.places, recoded, ImagesOf(setting, CodedAs(setting.coding), looks));
   }
   return LossesDb(Changes(looks.places, looks.before, recoded), removed, with_all_at_photos);
 }
@@ -174,7 +175,7 @@ Check Measurer::CheckOf(const Setting& setting) {
     // Held-out photos are looked at and heeded in nothing: the set would be chosen by what it is
     // measured with.
     if (!photos_.places.empty()) {
-      const auto after = PicturesOf(setting, CodedAs(setting.coding), photos_);
+      const auto after = ImagesOf(setting, CodedAs(setting.coding), photos_);
       for (const auto& places : {photos_.places, photos_whole_}) {
         found.push_back(CompareWithPhotos(places, photos_.before, after).psnr_loss_db);
       }

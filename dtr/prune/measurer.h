@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "dtr/base/progress.h"
-#include "dtr/prune/judge.h"
+#include "dtr/prune/image_loss.h"
 #include "dtr/prune/setting.h"
 
 namespace dtr::prune {
@@ -97,11 +97,11 @@ class Measurer {
   /// `with_all_at_photos`: of the setting with nothing removed.
   std::vector<double> NovelLossesDb(Looks& looks, const Setting& setting,
                                     const Errors& with_all_at_photos);
-  const std::vector<ImageRgb8>& KeptPictures(Looks& looks, const Setting& kept);
+  const std::vector<ImageRgb8>& KeptImages(Looks& looks, const Setting& kept);
   /// Images of the whole set, once they are needed.
   void Prepare();
-  std::vector<ImageRgb8> PicturesOf(const Setting& setting, const Coded& coded, const Looks& looks,
-                                    std::vector<Mask>* coverage = nullptr);
+  std::vector<ImageRgb8> ImagesOf(const Setting& setting, const Coded& coded, const Looks& looks,
+                                  std::vector<Mask>* coverage = nullptr);
 
   const DtrSet& set_;
   const MeasurerOptions options_;

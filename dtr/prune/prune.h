@@ -8,7 +8,7 @@
 
 #include "dtr/base/progress.h"
 #include "dtr/prune/coding.h"
-#include "dtr/prune/judge.h"
+#include "dtr/prune/image_loss.h"
 #include "dtr/prune/measurer.h"
 #include "dtr/prune/setting.h"
 
@@ -60,7 +60,7 @@ struct PruneReport {
 /// quality, depth error, size, mesh tolerance or number of views used) what saves most bytes and
 /// work per dB that it is measured to cost, until nothing fits the loss. What it costs is the
 /// larger loss of two: at source views left out in turn, and between input cameras. `set`: loaded
-/// with images and depth, and held-out photos where it has some: they only judge. The outcome is
+/// with images and depth, and held-out photos where it has some: they only evaluate. The outcome is
 /// then looked at again, at full size, from other cameras and against the photos, and the last
 /// decisions are taken back until the loss holds; then it goes on without these, a few times.
 /// Depends on the set, the options and the renderer alone, not on threads or times, nor on how

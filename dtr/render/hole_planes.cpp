@@ -50,12 +50,12 @@ Eigen::Vector3d PositionOf(const PlaneSamples& samples, size_t i) {
   return {samples.x[i], samples.y[i], 1};
 }
 
-bool LiesOn(const PicturePlane& plane, const PlaneSamples& samples, size_t i, double tolerance) {
+bool LiesOn(const ImagePlane& plane, const PlaneSamples& samples, size_t i, double tolerance) {
   return std::abs(plane.dot(PositionOf(samples, i)) - samples.inverse_depth[i]) <= tolerance;
 }
 
 /// What does not lie within `tolerance` of the plane.
-PlacedSamples Without(const PicturePlane& plane, const PlacedSamples& samples, double tolerance) {
+PlacedSamples Without(const ImagePlane& plane, const PlacedSamples& samples, double tolerance) {
   PlacedSamples left;
   left.sample_at.assign(samples.sample_at.size(), -1);
   for (size_t i = 0; i < samples.size(); ++i) {
@@ -66,7 +66,7 @@ PlacedSamples Without(const PicturePlane& plane, const PlacedSamples& samples, d
 }
 
 /// Least squares over what lies on the plane already, closer and closer.
-PicturePlane Fitted(PicturePlane plane, const PlaneSamples& samples, double tolerance) {
+ImagePlane Fitted(ImagePlane plane, const PlaneSamples& samples, double tolerance) {
   for (int i = 0; i < kFits; ++i, tolerance *= kCloser) {
     Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
     Eigen::Vector3d right = Eigen::Vector3d::Zero();
@@ -76,7 +76,7 @@ PicturePlane Fitted(PicturePlane plane, const PlaneSamples& samples, double tole
       normal += position * position.transpose();
       right += samples.inverse_depth[k] * position;
     }
-    const PicturePlane next = normal.ldlt().solve(right);
+    const ImagePlane next = normal.ldlt().solve(right);
     if (!next.allFinite()) break;
     plane = next;
   }
@@ -85,7 +85,7 @@ PicturePlane Fitted(PicturePlane plane, const PlaneSamples& samples, double tole
 
 /// The plane of most support among those through random triples; support 0: none was found.
 struct Found {
-  PicturePlane plane = PicturePlane::Zero();
+  ImagePlane plane = ImagePlane::Zero();
   size_t support = 0;
 };
 Found BestOfTriples(const PlacedSamples& samples, double reach, double min_area, double tolerance,
@@ -113,7 +113,7 @@ Found BestOfTriples(const PlacedSamples& samples, double reach, double min_area,
     positions << a.transpose(), b.transpose(), c.transpose();
     if (std::abs(positions.determinant()) < 2 * min_area) continue;
     const std::vector<double>& w = samples.inverse_depth;
-    const PicturePlane plane = positions.inverse() * Eigen::Vector3d(w[i], w[j], w[k]);
+    const ImagePlane plane = positions.inverse() * Eigen::Vector3d(w[i], w[j], w[k]);
     const size_t support = PlaneSupport(samples, plane.x(), plane.y(), plane.z(), tolerance);
     if (support > best.support) best = {plane, support};
   }
@@ -122,13 +122,13 @@ Found BestOfTriples(const PlacedSamples& samples, double reach, double min_area,
 
 }  // namespace
 
-std::vector<PicturePlane> FindPlanes(const Grid<double>& inverse_depth, double tolerance) {
+std::vector<ImagePlane> FindPlanes(const Grid<double>& inverse_depth, double tolerance) {
   PlacedSamples samples = SamplesOf(inverse_depth);
   const auto least = static_cast<size_t>(kMinShare * static_cast<double>(samples.size())) + 3;
   const double reach = kReach * std::max(inverse_depth.width(), inverse_depth.height());
   const double min_area = kMinArea * inverse_depth.width() * inverse_depth.height();
   Random random(1);
-  std::vector<PicturePlane> planes;
+  std::vector<ImagePlane> planes;
   while (static_cast<int>(planes.size()) < kMaxPlanes && samples.size() >= least) {
     const Found best = BestOfTriples(samples, reach, min_area, tolerance, random);
     if (best.support < least) break;

@@ -62,7 +62,7 @@ class LargeHoles {
     if (depths_.count == 0) return found;
     found.cell_px = cells_.cell_px();
     found.planes = FindPlanes(Swept(), depths_.step);
-    for (PicturePlane& plane : found.planes) plane.head<2>() /= cells_.cell_px();
+    for (ImagePlane& plane : found.planes) plane.head<2>() /= cells_.cell_px();
     found.planes.push_back({0, 0, depths_.farthest});
     Choose(found);
     return found;
@@ -183,7 +183,7 @@ HolePlanes::Mix HolePlanes::At(int x, int y) const {
   std::array<int, 4> plane_of{};
   const auto add = [&](int plane, double share) {
     if (plane == kGuess || !(share > 0)) return;
-    const double w = planes[static_cast<size_t>(plane)].dot(PicturePlane(x + 0.5, y + 0.5, 1));
+    const double w = planes[static_cast<size_t>(plane)].dot(ImagePlane(x + 0.5, y + 0.5, 1));
     if (!(w > 0)) return;
     const auto end = plane_of.begin() + mix.count;
     const auto k = static_cast<size_t>(std::find(plane_of.begin(), end, plane) - plane_of.begin());

@@ -15,7 +15,7 @@ struct HolePlanes {
   static constexpr int kGuess = -1;
 
   int cell_px = 1;  ///< cells are squares of so many pixels
-  std::vector<PicturePlane> planes;
+  std::vector<ImagePlane> planes;
   Grid<int> chosen;  ///< index of a plane, or kGuess: what was known or guessed stays
 
   /// Inverse depths and their shares, at most 1 together; the rest is the guess's.

@@ -53,7 +53,7 @@ std::vector<RenderScene> DescribeFrames(const DtrSet& set,
   return scenes;
 }
 
-size_t FrameOfPicture(size_t i, size_t pictures, size_t frames) { return i * frames / pictures; }
+size_t TimeStepOfImage(size_t i, size_t pictures, size_t frames) { return i * frames / pictures; }
 
 FrameClock::FrameClock(const DtrSet& set) {
   const size_t count = set.frames.size();

@@ -24,7 +24,7 @@ h1 { font-size: 1.7rem; line-height: 1.2; margin: 0 0 1.5rem; overflow-wrap: bre
 h2 { font-size: 1.15rem; margin: 2.4rem 0 .8rem; padding-bottom: .3rem;
   border-bottom: 2px solid var(--accent); }
 p { max-width: 46rem; margin: .6rem 0; white-space: pre-line; overflow-wrap: break-word; }
-.verdict { display: inline-block; font-weight: 600; padding: .3rem .8rem; border-radius: 1rem;
+.result { display: inline-block; font-weight: 600; padding: .3rem .8rem; border-radius: 1rem;
   border: 1.5px solid currentColor; max-width: none; }
 .good { color: var(--good); } .bad { color: var(--bad); }
 .scroll { overflow-x: auto; background: var(--card); border: 1px solid var(--line);
@@ -79,9 +79,9 @@ void HtmlReport::Section(std::string_view title) {
 
 void HtmlReport::Paragraph(std::string_view text) { body_ += "<p>" + EscapeHtml(text) + "</p>\n"; }
 
-void HtmlReport::Verdict(bool good, std::string_view text) {
+void HtmlReport::Result(bool good, std::string_view text) {
   // The sign repeats what the colour says, for print and for the colour-blind.
-  body_ += std::string("<p class=\"verdict ") + (good ? "good\">&#10003; " : "bad\">&#10007; ") +
+  body_ += std::string("<p class=\"result ") + (good ? "good\">&#10003; " : "bad\">&#10007; ") +
            EscapeHtml(text) + "</p>\n";
 }
 

@@ -25,7 +25,7 @@ class HtmlReport {
   void Section(std::string_view title);
   void Paragraph(std::string_view text);
   /// A short fact above the rest, in colour: a validation result.
-  void Verdict(bool good, std::string_view text);
+  void Result(bool good, std::string_view text);
   /// Numbers are set right-aligned: columns whose every cell is a number, optionally with a unit.
   /// Throws std::invalid_argument when a row has not the header's number of cells.
   void Table(const std::vector<std::string>& header, const std::vector<std::vector<Cell>>& rows);

@@ -78,8 +78,8 @@ void AddChecks(HtmlReport& page, const std::vector<Check>& checks) {
 void AddSetSections(HtmlReport& page, const DtrSet& set, const SetReportInfo& info) {
   if (!info.checks.empty()) {
     const bool good = AllPassed(info.checks);
-    page.Verdict(good, good ? "The calibration passed its checks"
-                            : "The calibration broke at least one check");
+    page.Result(good, good ? "The calibration passed its checks"
+                           : "The calibration broke at least one check");
   }
   std::vector<std::vector<Cell>> facts;
   for (const auto& [name, value] : info.facts) facts.push_back({name, value});

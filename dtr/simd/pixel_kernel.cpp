@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "dtr/render/colour.h"
+#include "dtr/render/deferred_limits.h"
 
 // The rest of this file is compiled once per instruction set; the best one is chosen at run time.
 #undef HWY_TARGET_INCLUDE
@@ -22,35 +23,29 @@
 HWY_BEFORE_NAMESPACE();
 namespace dtr::simd::HWY_NAMESPACE {
 
-// As in own_depth.glsl and resolve.frag of dtr/gl.
-constexpr float kHeldBeforePx = 1.0f, kBeforePx = 0.5f, kBehindPx = 2.0f;
-constexpr float kHoleSay = 0.25f;
-constexpr int kTriedSurfaces = 3;
-constexpr float kBorderShare = 1e-4f;
-
-/// SPEC 5.2: what the views say of a surface.
+/// SPEC 5.2: how the views vote on a surface.
 struct Votes {
-  VF held, refused;
-  VF front;   ///< 1/z of the nearest whole patch of those that hold it; 0: none
+  VF support, against;
+  VF front;   ///< 1/z of the nearest whole patch of those that support it; 0: none
   VF behind;  ///< 1/z of the nearest surface that a view sees through it; 0: none
 };
 
-HWY_INLINE void AddVote(const PixelView& view, VF surface, VF seen, MF whole, VF say,
+HWY_INLINE void AddVote(const PixelView& view, VF surface, VF seen, MF whole, VF vote,
                         Votes* votes) {
   const DF d;
   const VF nearer = hn::Sub(seen, surface), zero = hn::Zero(d);
   const MF shows = hn::Gt(seen, zero);
   const MF through = hn::And(shows, hn::Lt(nearer, Constant(-kBehindPx * view.pixel)));
-  const MF holds =
-      hn::And(hn::AndNot(through, shows), hn::Le(nearer, Constant(kHeldBeforePx * view.pixel)));
-  const VF hole_say = hn::Mul(Constant(kHoleSay), say);
-  votes->refused =
-      hn::Add(votes->refused, hn::IfThenElse(shows, hn::IfThenElseZero(through, say), hole_say));
-  votes->held = hn::Add(votes->held, hn::IfThenElseZero(holds, say));
+  const MF supports =
+      hn::And(hn::AndNot(through, shows), hn::Le(nearer, Constant(kSupportBeforePx * view.pixel)));
+  const VF hole_vote = hn::Mul(Constant(kHoleVote), vote);
+  votes->against =
+      hn::Add(votes->against, hn::IfThenElse(shows, hn::IfThenElseZero(through, vote), hole_vote));
+  votes->support = hn::Add(votes->support, hn::IfThenElseZero(supports, vote));
   votes->behind = hn::Max(votes->behind, hn::IfThenElseZero(through, seen));
-  const MF near = hn::Le(nearer, Constant(kBeforePx * view.pixel));
+  const MF near = hn::Le(nearer, Constant(kFragmentBeforePx * view.pixel));
   votes->front =
-      hn::Max(votes->front, hn::IfThenElseZero(hn::And(hn::And(holds, whole), near), seen));
+      hn::Max(votes->front, hn::IfThenElseZero(hn::And(hn::And(supports, whole), near), seen));
 }
 
 struct Colour {
@@ -149,7 +144,7 @@ HWY_INLINE VF FragmentAt(const PixelView& view, const RayOnGrid& base, VF surfac
   const VF nearer = hn::Sub(w, surface);
   const VF z = hn::MulAdd(w, Constant(view.grid_z[3]), base.z);
   MF found = hn::And(hn::Gt(w, hn::Zero(d)), hn::Gt(z, hn::Zero(d)));
-  found = hn::And(found, hn::And(hn::Le(nearer, Constant(kBeforePx * view.pixel)),
+  found = hn::And(found, hn::And(hn::Le(nearer, Constant(kFragmentBeforePx * view.pixel)),
                                  hn::Ge(nearer, Constant(-kBehindPx * view.pixel))));
   const VF per_z = hn::Div(Constant(1), z);
   VF x = hn::Mul(hn::MulAdd(w, Constant(view.grid_x[3]), base.x), per_z);
@@ -188,41 +183,41 @@ HWY_INLINE void PrefetchAround(const PixelView& view, const Position& position) 
   }
 }
 
-/// SPEC 5.2: the surface that is held; 0 where none is.
+/// SPEC 5.2: the supported surface; 0 where none is.
 HWY_INLINE VF HeldSurface(const PixelRow& row, std::span<const PixelView> views, const Rays& rays,
                           VF surface) {
   const DF d;
   const VF zero = hn::Zero(d);
-  VF held = zero;
+  VF supported = zero;
   MF asked = hn::Gt(surface, zero);
-  for (int tried = 0; tried < kTriedSurfaces && !hn::AllFalse(d, asked); ++tried) {
+  for (int tried = 0; tried < kMaxSurfaces && !hn::AllFalse(d, asked); ++tried) {
     Votes votes{zero, zero, zero, zero};
     for (const PixelView& view : views) {
       const RayOnGrid base(view, rays);
       const Position position = PositionAt(view, base, surface);
       if (hn::AllFalse(d, position.on_map)) continue;
-      VF say =
+      VF vote =
           hn::IfThenElseZero(position.on_map, SayAt({view, rays, surface}, row.pixel_angle_rad));
       if (view.cells != nullptr) {
         const VU cells = CellsAt(view, position);
         if (hn::AllFalse(d, hn::And(position.on_map, IsCell(cells, kCellOfSamples)))) {
-          say = hn::IfThenElseZero(IsCell(cells, kCellOfHoles), say);
-          votes.refused = hn::MulAdd(Constant(kHoleSay), say, votes.refused);
+          vote = hn::IfThenElseZero(IsCell(cells, kCellOfHoles), vote);
+          votes.against = hn::MulAdd(Constant(kHoleVote), vote, votes.against);
           continue;
         }
       }
       if (tried == 0) PrefetchAround(view, position);
       const Patch patch = PatchAt(view, position);
       const VF seen = Meet(view, base, position, patch);
-      AddVote(view, surface, seen, patch.whole, hn::IfThenZeroElse(patch.masked, say), &votes);
+      AddVote(view, surface, seen, patch.whole, hn::IfThenZeroElse(patch.masked, vote), &votes);
     }
-    const MF holds = hn::And(asked, hn::Ge(votes.held, votes.refused));
+    const MF supports = hn::And(asked, hn::Ge(votes.support, votes.against));
     const VF front = hn::IfThenElse(hn::Gt(votes.front, zero), votes.front, surface);
-    held = hn::IfThenElse(holds, front, held);
+    supported = hn::IfThenElse(supports, front, supported);
     surface = votes.behind;
-    asked = hn::And(hn::AndNot(holds, asked), hn::Gt(surface, zero));
+    asked = hn::And(hn::AndNot(supports, asked), hn::Gt(surface, zero));
   }
-  return held;
+  return supported;
 }
 
 struct Pixels {

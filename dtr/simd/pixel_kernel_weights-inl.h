@@ -54,10 +54,10 @@ struct Angle {
 /// 1 / (tan^2 t + t_pixel^2); 0 from 90 degrees on.
 HWY_INLINE VF SayAt(const Angle& angle, float pixel_angle_rad) {
   const VF along_squared = hn::Mul(angle.along, angle.along);
-  const VF say = hn::Div(
+  const VF vote = hn::Div(
       along_squared,
       hn::MulAdd(along_squared, Constant(pixel_angle_rad * pixel_angle_rad), angle.across_squared));
-  return hn::IfThenElseZero(hn::Gt(angle.along, hn::Zero(DF())), say);
+  return hn::IfThenElseZero(hn::Gt(angle.along, hn::Zero(DF())), vote);
 }
 
 /// t in radians; off by less than 3e-5 of itself (minimax polynomial), far below what shows in 8

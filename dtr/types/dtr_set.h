@@ -40,7 +40,7 @@ struct DtrSet {
   std::vector<Frame> frames;
   std::optional<StoredFile> sparse_file;  ///< points and observations behind the calibration
   std::string provenance_json = "{}";     ///< source photos, engines, options, tool version
-  std::string verdict_json = "{}";        ///< what `validate` found; {} = not validated
+  std::string validation_json = "{}";     ///< what `validate` found; {} = not validated
   std::string extra_json;                 ///< unknown top-level fields, kept verbatim
 };
 

@@ -13,8 +13,8 @@
 // clang-format off: after highway.h
 #include <hwy/contrib/math/math-inl.h>
 
+#include "stereo/patchmatch/kernel_estimate-inl.h"
 #include "stereo/patchmatch/kernel_ncc-inl.h"
-#include "stereo/patchmatch/kernel_verdict-inl.h"
 // clang-format on
 
 HWY_BEFORE_NAMESPACE();
@@ -123,14 +123,14 @@ void CollectCandidates(const State& state, const Group& g, int far_regions, Cand
   for (int i = 0; i < far_regions; ++i) {
     AddRegion(state, g, kDirections[i][0], kDirections[i][1], true, c);
   }
-  for (const State::Guess& guess : state.guesses) {
-    const VF w = LoadColour(guess.w, g.x, g.y);
+  for (const State::Hypothesis& hypothesis : state.hypotheses) {
+    const VF w = LoadColour(hypothesis.w, g.x, g.y);
     const auto given = hn::Gt(w, hn::Zero(d));
     if (hn::AllFalse(d, given)) continue;
     const int n = c->count++;
     hn::Store(hn::IfThenElse(given, w, hn::Set(d, kNothing)), d, c->w[n]);
-    hn::Store(LoadColour(guess.a, g.x, g.y), d, c->a[n]);
-    hn::Store(LoadColour(guess.b, g.x, g.y), d, c->b[n]);
+    hn::Store(LoadColour(hypothesis.a, g.x, g.y), d, c->a[n]);
+    hn::Store(LoadColour(hypothesis.b, g.x, g.y), d, c->b[n]);
   }
 }
 
@@ -446,7 +446,7 @@ HWY_EXPORT(SearchRowImpl);
 HWY_EXPORT(SweepRowImpl);
 HWY_EXPORT(ScoreRowImpl);
 HWY_EXPORT(ExpectRowImpl);
-HWY_EXPORT(JudgeRowImpl);
+HWY_EXPORT(EstimateRowImpl);
 HWY_EXPORT(AmbiguousRowImpl);
 HWY_EXPORT(TargetName);
 
@@ -463,8 +463,9 @@ std::int64_t ScoreRow(const Level& level, const State& state, int y, std::span<c
                       float* costs) {
   return HWY_DYNAMIC_DISPATCH(ScoreRowImpl)(level, state, y, steps, costs);
 }
-void JudgeRow(const Level& level, const State& state, int y, const float* wanted, Verdict* out) {
-  HWY_DYNAMIC_DISPATCH(JudgeRowImpl)(level, state, y, wanted, out);
+void EstimateRow(const Level& level, const State& state, int y, const float* wanted,
+                 PixelEstimate* out) {
+  HWY_DYNAMIC_DISPATCH(EstimateRowImpl)(level, state, y, wanted, out);
 }
 void AmbiguousRow(const Level& level, const State& state, int y, std::uint8_t* ambiguous) {
   HWY_DYNAMIC_DISPATCH(AmbiguousRowImpl)(level, state, y, ambiguous);

@@ -82,10 +82,10 @@ struct State {
   BorderedGrid w, a, b, cost;
   std::vector<BorderedGrid> weight;  ///< per source; they sum to 1
   /// Planes that the neighbours' maps suggest, tried where w > 0; may be none.
-  struct Guess {
+  struct Hypothesis {
     BorderedGrid w, a, b;
   };
-  std::vector<Guess> guesses;
+  std::vector<Hypothesis> hypotheses;
 };
 
 /// One level: what is matched. Inverse depths are in units in which the range's near end is 1.
@@ -107,8 +107,8 @@ struct Sweep {
   float step_px = 4;    ///< largest random change, pixels of disparity at the window's centre
 };
 
-/// Verdict on one pixel.
-struct Verdict {
+/// PixelEstimate on one pixel.
+struct PixelEstimate {
   float w = 0;         ///< inverse depth at the minimum of the cost
   float sigma = 0;     ///< its standard deviation by the cost's curvature and the views' agreement
   float cost = 0;      ///< weighted mean of 1 - NCC
@@ -137,9 +137,10 @@ std::int64_t SweepRow(const Level& level, const Sweep& sweep, int y, State* stat
 /// SweepRow need not look at most of them.
 void ExpectRow(const Level& level, int y, State* state);
 
-/// Finds the minimum of the cost to a fraction of a pixel and judges it. `out` has a row's length,
-/// as has `wanted`: pixels where that is 0 may be left out. Null: all are wanted.
-void JudgeRow(const Level& level, const State& state, int y, const float* wanted, Verdict* out);
+/// Finds the minimum of the cost to a fraction of a pixel and validates it. `out` has a row's
+/// length, as has `wanted`: pixels where that is 0 may be left out. Null: all are wanted.
+void EstimateRow(const Level& level, const State& state, int y, const float* wanted,
+                 PixelEstimate* out);
 
 /// Whether other places on a pixel's ray match about as well as its plane: where a texture repeats
 /// within 12 pixels of disparity, and at infinity, where images are copies or mirrors show far

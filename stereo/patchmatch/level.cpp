@@ -16,7 +16,7 @@ namespace {
 /// Binary digits of a camera's place relative to another's.
 constexpr double kGapBits = 18;
 
-Texture MakeTexture(const Picture& picture) {
+Texture MakeTexture(const GreyImage& picture) {
   Texture t;
   t.width = picture.grey.width();
   t.height = picture.grey.height();
@@ -104,8 +104,8 @@ Bordered<std::int32_t> ColourOf(const StereoView& view, int width, int height, i
 
 }  // namespace
 
-std::vector<Picture> Pyramid(Picture full, int levels) {
-  std::vector<Picture> pictures;
+std::vector<GreyImage> Pyramid(GreyImage full, int levels) {
+  std::vector<GreyImage> pictures;
   pictures.push_back(std::move(full));
   while (static_cast<int>(pictures.size()) < levels) pictures.push_back(Halved(pictures.back()));
   return pictures;
@@ -119,14 +119,14 @@ SourcePyramid MakeSource(const StereoView& view, int levels) {
   }
   SourcePyramid source;
   source.view = &view;
-  for (const Picture& picture : Pyramid(MakePicture(view), levels)) {
+  for (const GreyImage& picture : Pyramid(MakeGreyImage(view), levels)) {
     source.cameras.push_back(picture.camera);
     source.textures.push_back(MakeTexture(picture));
   }
   return source;
 }
 
-Level MakeLevel(const StereoView& view, const Picture& reference,
+Level MakeLevel(const StereoView& view, const GreyImage& reference,
                 std::span<const SourcePyramid> sources, size_t index, const DepthRange& range,
                 std::uint64_t seed) {
   Level level;

@@ -5,7 +5,7 @@
 
 #include "stereo/engine.h"
 #include "stereo/patchmatch/kernel.h"
-#include "stereo/sgbm/picture.h"
+#include "stereo/sgbm/grey_image.h"
 
 namespace dtr::stereo::patchmatch {
 
@@ -18,14 +18,14 @@ struct SourcePyramid {
 };
 
 /// The image and its halvings, `levels` in all. Requires sizes of at least 2^(levels - 1).
-std::vector<Picture> Pyramid(Picture full, int levels);
+std::vector<GreyImage> Pyramid(GreyImage full, int levels);
 
 /// Throws Error for photos wider than kWidestTexture.
 SourcePyramid MakeSource(const StereoView& view, int levels);
 
 /// Sets up matching `reference` (a level's image of `view`) with the sources' images at
 /// `index`.
-Level MakeLevel(const StereoView& view, const Picture& reference,
+Level MakeLevel(const StereoView& view, const GreyImage& reference,
                 std::span<const SourcePyramid> sources, size_t index, const DepthRange& range,
                 std::uint64_t seed);
 

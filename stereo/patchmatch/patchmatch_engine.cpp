@@ -6,7 +6,7 @@
 
 #include "dtr/base/parallel_for.h"
 #include "dtr/base/random.h"
-#include "stereo/patchmatch/guesses.h"
+#include "stereo/patchmatch/hypotheses.h"
 #include "stereo/patchmatch/level.h"
 #include "stereo/patchmatch/trust.h"
 
@@ -23,7 +23,7 @@ constexpr double kMinSamples = 48, kMaxSamples = 128;
 /// Visits per pixel on the coarsest level more than on those between, and on the finest fewer.
 constexpr int kMoreIterations = 2;
 constexpr float kFirstStepPx = 4.0f, kFinestStepPx = 1.0f;
-/// In the place of Effort::iterations where the result is only looked at.
+/// In the place of QualitySettings::iterations where the result is only looked at.
 constexpr int kLookIterations = 1;
 /// Visits per pixel in each round of geometric consistency.
 constexpr int kRefineIterations = 1;
@@ -33,9 +33,9 @@ constexpr double kSmallestDisparityPx = 0.5;
 
 /// Bytes per pixel: the reference's grey values, colours and mask; planes and costs; the weight of
 /// a view; two guesses, and a grid they are made from; its image with all halvings; planes to
-/// hand out; a depth map with what judging it takes; a neighbour's textures with all halvings.
+/// hand out; a depth map with what evaluating it takes; a neighbour's textures with all halvings.
 constexpr double kReferenceBytes = 12, kStateBytes = 16, kWeightBytes = 4, kGuessBytes = 28,
-                 kPictureBytes = 7, kPlaneBytes = 12, kVerdictBytes = 54, kSourceBytes = 7;
+                 kImageBytes = 7, kPlaneBytes = 12, kEstimateBytes = 54, kSourceBytes = 7;
 constexpr double kSmallThingsBytes = 1 << 18;
 
 void CheckRequest(std::span<const StereoView> views, int reference, std::span<const int> neighbours,
@@ -116,7 +116,7 @@ void RunSweeps(const Level& level, Sweep sweep, int iterations, float step_px, i
 }
 
 /// Planes of the finest level.
-State SearchPyramid(const StereoView& view, std::span<const Picture> pictures,
+State SearchPyramid(const StereoView& view, std::span<const GreyImage> pictures,
                     std::span<const SourcePyramid> sources, const DepthRange& range, int iterations,
                     const EngineOptions& options, Level* finest) {
   State state;
@@ -160,7 +160,7 @@ struct Problem {
       : view(&views[static_cast<size_t>(reference)]), range(depth_range) {
     CheckRequest(views, reference, neighbours, range);
     const int levels = maps.empty() ? LevelsFor(views, reference, neighbours) : 1;
-    pictures = Pyramid(MakePicture(*view), levels);
+    pictures = Pyramid(MakeGreyImage(*view), levels);
     sources = MakeSources(views, reference, neighbours, range, maps, max_sources, levels,
                           options.threads);
   }
@@ -176,13 +176,13 @@ struct Problem {
 
   const StereoView* view;
   DepthRange range;
-  std::vector<Picture> pictures;
+  std::vector<GreyImage> pictures;
   std::vector<SourcePyramid> sources;
   Level finest;
 };
 
-DepthEstimate Judged(const Problem& problem, int threads, State* state,
-                     std::atomic<int>* without_planes) {
+DepthEstimate Assessed(const Problem& problem, int threads, State* state,
+                       std::atomic<int>* without_planes) {
   bool planes_left_out = false;
   DepthEstimate estimate =
       TrustedDepth(problem.finest, *problem.view, problem.range, threads, state, &planes_left_out);
@@ -192,10 +192,10 @@ DepthEstimate Judged(const Problem& problem, int threads, State* state,
 
 }  // namespace
 
-int PatchMatchEngine::Rounds() const { return effort_.rounds; }
+int PatchMatchEngine::Rounds() const { return quality_.rounds; }
 
 int PatchMatchEngine::Neighbours() const {
-  return std::min(kMaxViews, std::max(effort_.neighbours, effort_.round_neighbours));
+  return std::min(kMaxViews, std::max(quality_.neighbours, quality_.round_neighbours));
 }
 
 std::uint64_t PatchMatchEngine::WorkBytes(std::span<const StereoView> views, int reference,
@@ -208,11 +208,11 @@ std::uint64_t PatchMatchEngine::WorkBytes(std::span<const StereoView> views, int
   const size_t sources = std::min<size_t>(neighbours.size(), static_cast<size_t>(Neighbours()));
   const double state = kReferenceBytes + kStateBytes + kWeightBytes * static_cast<double>(sources);
   const double search = area(w, h, kBorder) * state + std::max(area(w / 2, h / 2, kBorder) * state,
-                                                               area(w, h, 0) * kVerdictBytes);
-  const double round = effort_.rounds == 0 ? 0
-                                           : area(w, h, kBorder) * (state + kGuessBytes) +
-                                                 area(w, h, 0) * kPlaneBytes;
-  double bytes = kSmallThingsBytes + std::max(search, round) + area(w, h, 0) * kPictureBytes;
+                                                               area(w, h, 0) * kEstimateBytes);
+  const double round = quality_.rounds == 0 ? 0
+                                            : area(w, h, kBorder) * (state + kGuessBytes) +
+                                                  area(w, h, 0) * kPlaneBytes;
+  double bytes = kSmallThingsBytes + std::max(search, round) + area(w, h, 0) * kImageBytes;
   for (size_t i = 0; i < sources; ++i) {
     const PinholeCamera& c = views[static_cast<size_t>(neighbours[i])].camera;
     bytes += kSourceBytes * area(c.width_px(), c.height_px(), kTextureBorder);
@@ -224,24 +224,24 @@ DepthEstimate PatchMatchEngine::Estimate(std::span<const StereoView> views, int 
                                          std::span<const int> neighbours, const DepthRange& range,
                                          const EngineOptions& options) const {
   Problem problem(views, reference, neighbours, range, {}, Neighbours(), options);
-  State state = problem.Search(options.look ? kLookIterations : effort_.iterations, options);
-  return Judged(problem, options.threads, &state, &without_planes_);
+  State state = problem.Search(options.look ? kLookIterations : quality_.iterations, options);
+  return Assessed(problem, options.threads, &state, &without_planes_);
 }
 
 PlaneMap PatchMatchEngine::Match(std::span<const StereoView> views, int reference,
                                  std::span<const int> neighbours, const DepthRange& range,
                                  const EngineOptions& options) const {
-  Problem problem(views, reference, neighbours, range, {}, effort_.neighbours, options);
-  return PlanesOf(problem.finest, problem.Search(effort_.iterations, options), range);
+  Problem problem(views, reference, neighbours, range, {}, quality_.neighbours, options);
+  return PlanesOf(problem.finest, problem.Search(quality_.iterations, options), range);
 }
 
 PlaneMap PatchMatchEngine::Refine(std::span<const StereoView> views, int reference,
                                   std::span<const int> neighbours, const DepthRange& range,
                                   std::span<const PlaneMap* const> maps, int round,
                                   const EngineOptions& options) const {
-  Problem problem(views, reference, neighbours, range, maps, effort_.round_neighbours, options);
+  Problem problem(views, reference, neighbours, range, maps, quality_.round_neighbours, options);
   State state = problem.Resume(*maps[static_cast<size_t>(reference)], options);
-  GuessFromSurfaces(problem.finest, &state);
+  HypothesesFromSurfaces(problem.finest, &state);
   ParallelFor(0, problem.finest.reference.height, options.threads,
               [&](int y) { ExpectRow(problem.finest, y, &state); });
   Sweep sweep;
@@ -253,13 +253,13 @@ PlaneMap PatchMatchEngine::Refine(std::span<const StereoView> views, int referen
   return PlanesOf(problem.finest, state, range);
 }
 
-DepthEstimate PatchMatchEngine::Judge(std::span<const StereoView> views, int reference,
-                                      std::span<const int> neighbours, const DepthRange& range,
-                                      std::span<const PlaneMap* const> maps,
-                                      const EngineOptions& options) const {
-  Problem problem(views, reference, neighbours, range, maps, effort_.round_neighbours, options);
+DepthEstimate PatchMatchEngine::Filter(std::span<const StereoView> views, int reference,
+                                       std::span<const int> neighbours, const DepthRange& range,
+                                       std::span<const PlaneMap* const> maps,
+                                       const EngineOptions& options) const {
+  Problem problem(views, reference, neighbours, range, maps, quality_.round_neighbours, options);
   State state = problem.Resume(*maps[static_cast<size_t>(reference)], options);
-  return Judged(problem, options.threads, &state, &without_planes_);
+  return Assessed(problem, options.threads, &state, &without_planes_);
 }
 
 }  // namespace dtr::stereo

@@ -7,7 +7,7 @@
 
 namespace dtr::stereo::patchmatch {
 
-/// What small areas are judged by.
+/// What small areas are evaluated by.
 struct SpeckleEvidence {
   const Grid<float>& px_per_w;           ///< pixels of disparity per unit of near_z / z
   const Grid<std::uint8_t>& consistent;  ///< views whose planes lead to the pixel

@@ -57,7 +57,7 @@ constexpr float kOddsPerLogSigma = 0.44f, kMinSigmaPx = 0.02f;
 constexpr float kWrongByPx = 2.5f;
 
 /// How likely the depth is wrong, from 0 to 1.
-float ProbabilityOfWrong(const Verdict& v) {
+float ProbabilityOfWrong(const PixelEstimate& v) {
   const float odds = kOddsOfWrong + kOddsPerCost * std::min(v.cost, 1.0f) +
                      kOddsPerView * static_cast<float>(v.agreeing) +
                      kOddsPerLogSigma * std::log(v.sigma * v.px + kMinSigmaPx);
@@ -65,12 +65,12 @@ float ProbabilityOfWrong(const Verdict& v) {
 }
 
 /// Standard deviation of a depth that is exact to v.sigma unless it is wrong.
-float SigmaWithDoubt(const Verdict& v) {
+float SigmaWithDoubt(const PixelEstimate& v) {
   return std::hypot(v.sigma, ProbabilityOfWrong(v) * kWrongByPx / v.px);
 }
 
 /// What the images say of a pixel and what the planes around it do, as independent measurements.
-void Combine(float prior, float prior_sigma, Verdict* v) {
+void Combine(float prior, float prior_sigma, PixelEstimate* v) {
   const float seen = v->sigma > 0 ? 1 / (v->sigma * v->sigma) : 0;
   const float expected = 1 / (prior_sigma * prior_sigma);
   v->w = (seen * v->w + expected * prior) / (seen + expected);
@@ -126,10 +126,10 @@ class Trust {
     const Limits limits = HasSurfaces(level_) ? kAfterRounds : kAfterSearch;
     Grid<std::uint8_t> consistent(width(), height());
     ParallelFor(0, height(), threads_, [&](int y) {
-      std::vector<Verdict> row(static_cast<size_t>(width()));
-      JudgeRow(level_, *state_, y, nullptr, row.data());
+      std::vector<PixelEstimate> row(static_cast<size_t>(width()));
+      EstimateRow(level_, *state_, y, nullptr, row.data());
       for (int x = 0; x < width(); ++x) {
-        const Verdict& v = row[static_cast<size_t>(x)];
+        const PixelEstimate& v = row[static_cast<size_t>(x)];
         if (view_.mask != nullptr && !view_.mask->empty() && (*view_.mask)(x, y) == 0) continue;
         px_per_w_(x, y) = v.px;
         if (v.cost <= kWeakCost) cost_(x, y) = std::max(v.cost, kMinWeakCost);
@@ -167,10 +167,10 @@ class Trust {
     const Prior prior =
         PlanarPrior(cost_, {believed_, sigma_px_, px_per_w_}, level_.reference, threads_, state_);
     ParallelFor(0, height(), threads_, [&](int y) {
-      std::vector<Verdict> row(static_cast<size_t>(width()));
-      JudgeRow(level_, *state_, y, prior.w.row(y), row.data());
+      std::vector<PixelEstimate> row(static_cast<size_t>(width()));
+      EstimateRow(level_, *state_, y, prior.w.row(y), row.data());
       for (int x = 0; x < width(); ++x) {
-        Verdict& v = row[static_cast<size_t>(x)];
+        PixelEstimate& v = row[static_cast<size_t>(x)];
         if (prior.w(x, y) == 0 || !(v.cost <= cost_(x, y) + kPriorCost)) continue;
         Combine(prior.w(x, y), prior.sigma(x, y), &v);
         Keep(x, y, v);
@@ -185,7 +185,7 @@ class Trust {
   int width() const { return level_.reference.width; }
   int height() const { return level_.reference.height; }
 
-  void Keep(int x, int y, const Verdict& v) {
+  void Keep(int x, int y, const PixelEstimate& v) {
     // What lies beyond the range by no more than it may be wrong lies at its end.
     const float slack = kRangeSigmas * v.sigma;
     if (!(v.w >= level_.w_min - slack) || !(v.w <= level_.w_max + slack)) return;

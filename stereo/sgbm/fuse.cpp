@@ -54,11 +54,11 @@ void Gather(const std::vector<Opinion>& opinions, const Opinion& depth, Group* g
 /// Groups of equal size and baselines must not be told apart by rounding; the first one wins then.
 constexpr double kHeavier = 1 + 1e-6;
 
-struct Verdict {
+struct FusedDepth {
   double inverse_depth = 0, sigma = 0;  ///< 0, 0: a hole
 };
 
-Verdict MeanOf(const Group& group) {
+FusedDepth MeanOf(const Group& group) {
   double mean = 0, spread = 0;
   for (const Opinion& o : group.members) {
     mean += o.inverse_depth / (o.step * o.step) / group.weight;
@@ -81,7 +81,7 @@ class Voter {
   /// Opinions must come sorted by pair.
   void Add(const Opinion& opinion) { opinions_.push_back(opinion); }
 
-  Verdict Vote() {
+  FusedDepth Vote() {
     best_.members.clear();
     best_.weight = 0;
     for (const Opinion& candidate : opinions_) {
@@ -130,13 +130,13 @@ DepthEstimate FusePairs(const PinholeCamera& camera, const Mask* mask,
           voter.Add({sweep.pair, inverse_depth, sweep.StepAt(ray)});
         }
       }
-      const Verdict verdict = voter.Vote();
-      if (!(verdict.inverse_depth >= 1.0 / range.far_z) ||
-          !(verdict.inverse_depth <= 1.0 / range.near_z)) {
+      const FusedDepth fused = voter.Vote();
+      if (!(fused.inverse_depth >= 1.0 / range.far_z) ||
+          !(fused.inverse_depth <= 1.0 / range.near_z)) {
         continue;
       }
-      result.depth(x, y) = static_cast<float>(1.0 / verdict.inverse_depth);
-      result.inverse_depth_sigma(x, y) = static_cast<float>(verdict.sigma);
+      result.depth(x, y) = static_cast<float>(1.0 / fused.inverse_depth);
+      result.inverse_depth_sigma(x, y) = static_cast<float>(fused.sigma);
     }
   });
   return result;

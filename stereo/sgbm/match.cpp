@@ -31,7 +31,7 @@ cv::Mat Wrap(Grid<std::uint8_t>& grid) {
 
 /// Steps of the sweep per pixel of the left image (its margin of `steps` columns included); NaN
 /// where nothing matches.
-Grid<float> Steps(WarpedPicture& left, WarpedPicture& right, int steps) {
+Grid<float> Steps(WarpedImage& left, WarpedImage& right, int steps) {
   const auto matcher =
       cv::StereoSGBM::create(0, steps, kBlock, kPenalty1, kPenalty2, kMaxLeftRightPx, kGradientCap,
                              kUniquenessPercent, 0, 0, cv::StereoSGBM::MODE_HH);
@@ -104,10 +104,10 @@ VirtualImage RightImage(const RectifiedPair& pair, const Sweep& sweep) {
 
 }  // namespace
 
-PairDepth MatchPair(const Picture& reference, const Picture& neighbour, const RectifiedPair& pair,
-                    const Sweep& sweep, const PinholeCamera& grid) {
-  WarpedPicture left = Warp(reference, LeftImage(pair, sweep));
-  WarpedPicture right = Warp(neighbour, RightImage(pair, sweep));
+PairDepth MatchPair(const GreyImage& reference, const GreyImage& neighbour,
+                    const RectifiedPair& pair, const Sweep& sweep, const PinholeCamera& grid) {
+  WarpedImage left = Warp(reference, LeftImage(pair, sweep));
+  WarpedImage right = Warp(neighbour, RightImage(pair, sweep));
   const Grid<float> steps = Steps(left, right, sweep.steps);
 
   PairDepth result;

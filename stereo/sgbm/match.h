@@ -2,7 +2,7 @@
 #pragma once
 #include <Eigen/Core>
 
-#include "stereo/sgbm/picture.h"
+#include "stereo/sgbm/grey_image.h"
 #include "stereo/sgbm/rectify.h"
 
 namespace dtr::stereo {
@@ -22,7 +22,7 @@ struct PairDepth {
 /// of `grid`, the reference's camera or a resized one. The neighbour's image is sheared by the
 /// sweep's plane first. Values may lie outside the searched depth range (also <= 0: beyond
 /// infinity). Single-threaded and deterministic.
-PairDepth MatchPair(const Picture& reference, const Picture& neighbour, const RectifiedPair& pair,
-                    const Sweep& sweep, const PinholeCamera& grid);
+PairDepth MatchPair(const GreyImage& reference, const GreyImage& neighbour,
+                    const RectifiedPair& pair, const Sweep& sweep, const PinholeCamera& grid);
 
 }  // namespace dtr::stereo

@@ -76,9 +76,9 @@ struct Task {
 };
 
 /// The large slanted planes of the reference view, from a coarse pass over several slopes.
-std::vector<Eigen::Vector3d> FindPlanes(const StereoView& reference, const Picture& picture,
+std::vector<Eigen::Vector3d> FindPlanes(const StereoView& reference, const GreyImage& picture,
                                         const std::vector<Pair>& pairs,
-                                        const std::vector<Picture>& pictures,
+                                        const std::vector<GreyImage>& pictures,
                                         const DepthRange& range, const PairLimits& limits,
                                         const EngineOptions& options) {
   const PinholeCamera& camera = reference.camera;
@@ -154,9 +154,9 @@ DepthEstimate SgbmEngine::Estimate(std::span<const StereoView> views, int refere
                        std::to_string(neighbours.size()) + " neighbours" + reasons);
   }
 
-  const Picture picture = MakePicture(view);
-  std::vector<Picture> pictures;
-  for (const Pair& pair : pairs) pictures.push_back(MakePicture(*pair.neighbour));
+  const GreyImage picture = MakeGreyImage(view);
+  std::vector<GreyImage> pictures;
+  for (const Pair& pair : pairs) pictures.push_back(MakeGreyImage(*pair.neighbour));
   const std::vector<Task> tasks =
       TasksOf(pairs, FindPlanes(view, picture, pairs, pictures, range, limits_, options));
   std::vector<PairDepth> sweeps(tasks.size());

@@ -11,7 +11,7 @@ namespace dtr {
 namespace {
 
 // The most that `threads` threads held at a time when each item takes `bytes`.
-double MostHeld(double room_gb, double bytes, int threads) {
+double MaxHeld(double room_gb, double bytes, int threads) {
   MemoryBudget budget(room_gb);
   std::atomic<int> held{0}, most{0};
   ParallelFor(0, 60, threads, [&](int) {
@@ -26,11 +26,11 @@ double MostHeld(double room_gb, double bytes, int threads) {
 }
 
 TEST(MemoryBudget, IsNeverExceeded) {
-  EXPECT_LE(MostHeld(1, 0.3e9, 8), 0.9e9);
-  EXPECT_LE(MostHeld(1, 0.9e9, 8), 0.9e9);
+  EXPECT_LE(MaxHeld(1, 0.3e9, 8), 0.9e9);
+  EXPECT_LE(MaxHeld(1, 0.9e9, 8), 0.9e9);
 }
 
-TEST(MemoryBudget, LetsThroughOneThatIsLargerThanAllOfIt) { EXPECT_EQ(MostHeld(1, 5e9, 8), 5e9); }
+TEST(MemoryBudget, LetsThroughOneThatIsLargerThanAllOfIt) { EXPECT_EQ(MaxHeld(1, 5e9, 8), 5e9); }
 
 TEST(MemoryBudget, WithoutABoundNobodyWaits) {
   MemoryBudget budget(0);

@@ -42,7 +42,7 @@ Truth ReadTruth(const fs::path& file) {
   for (const io::NamedCamera& named : io::ReadCamerasJson(file).cameras) {
     const PinholeCamera& c = named.camera;
     truth.cam_from_world[named.name] = named.cam_from_world;
-    truth.lens = {LensModel::kPinhole,
+    truth.lens = {CameraModel::kPinhole,
                   c.width_px(),
                   c.height_px(),
                   {c.fx_px(), c.fy_px(), c.cx_px(), c.cy_px()}};

@@ -14,9 +14,9 @@
 #include <functional>
 #include <string>
 
-#include "stereo/patchmatch/guesses.h"
-#include "stereo/patchmatch/level.h"
 #include "datasets/exact/stereo_quality.h"
+#include "stereo/patchmatch/hypotheses.h"
+#include "stereo/patchmatch/level.h"
 
 namespace {
 
@@ -68,7 +68,7 @@ struct Scene {
     shots = testing::ShotsOf(testing::SphereBeforeWall(), camera, poses);
     views = testing::ViewsOf(shots);
     for (size_t i = 1; i < views.size(); ++i) sources.push_back(MakeSource(views[i], 1));
-    picture = MakePicture(views[0]);
+    picture = MakeGreyImage(views[0]);
     for (const testing::Shot& shot : shots) {
       truth.push_back({Grid<float>(kWidth, kHeight), Grid<float>(kWidth, kHeight),
                        Grid<float>(kWidth, kHeight)});
@@ -152,7 +152,7 @@ void Run(int repeats) {
 
   const Level known = scene.At(true);
   State guessed = StateOf(known, scene.truth[0], kRange);
-  GuessFromSurfaces(known, &guessed);
+  HypothesesFromSurfaces(known, &guessed);
   sweep.step_px = 1;
   sweep.far_regions = 0;
   Print("consistency round",

@@ -22,20 +22,20 @@ constexpr double kRoundTripPx = 1e-11;  // Newton to the last bits; worst of all
 constexpr double kOpenCvPx = 1e-9;      // the same formula in double, coordinates below 1000
 constexpr int kDraws = 300;             // lenses per model; a second in all
 
-TEST(LensModel, NamesAndParameterCountsAreColmaps) {
-  EXPECT_EQ(NameOf(LensModel::kOpenCv), "OPENCV");
-  EXPECT_EQ(ParameterCount(LensModel::kFullOpenCv), 12);
-  for (const LensModel model : kAllModels) {
-    EXPECT_EQ(LensModelFromName(NameOf(model)), model);
+TEST(CameraModel, NamesAndParameterCountsAreColmaps) {
+  EXPECT_EQ(NameOf(CameraModel::kOpenCv), "OPENCV");
+  EXPECT_EQ(ParameterCount(CameraModel::kFullOpenCv), 12);
+  for (const CameraModel model : kAllModels) {
+    EXPECT_EQ(CameraModelFromName(NameOf(model)), model);
     Random random(1);
     EXPECT_EQ(RandomLens(model, random).params.size(), static_cast<size_t>(ParameterCount(model)));
   }
-  EXPECT_FALSE(LensModelFromName("opencv"));
-  EXPECT_THROW(ParameterCount(static_cast<LensModel>(11)), std::invalid_argument);
+  EXPECT_FALSE(CameraModelFromName("opencv"));
+  EXPECT_THROW(ParameterCount(static_cast<CameraModel>(11)), std::invalid_argument);
 }
 
 TEST(LensCamera, HandWorkedPixels) {
-  const auto pixel = [](LensModel model, std::vector<double> params, Eigen::Vector3d p) {
+  const auto pixel = [](CameraModel model, std::vector<double> params, Eigen::Vector3d p) {
     return *LensCamera{model, 640, 480, std::move(params)}.PixelFromCam(p);
   };
   const Eigen::Vector3d p(0.6, -0.4, 2);  // x/z 0.3, y/z -0.2, r^2 0.13
@@ -43,18 +43,18 @@ TEST(LensCamera, HandWorkedPixels) {
     EXPECT_NEAR(found.x(), x, kHandWorkedPx);
     EXPECT_NEAR(found.y(), y, kHandWorkedPx);
   };
-  expect(pixel(LensModel::kSimplePinhole, {500, 320, 240}, p), 470, 140);
-  expect(pixel(LensModel::kPinhole, {500, 400, 320, 240}, p), 470, 160);
+  expect(pixel(CameraModel::kSimplePinhole, {500, 320, 240}, p), 470, 140);
+  expect(pixel(CameraModel::kPinhole, {500, 400, 320, 240}, p), 470, 160);
   // Factor 1 + 0.1 * 0.13 = 1.013.
-  expect(pixel(LensModel::kSimpleRadial, {500, 320, 240, 0.1}, p), 471.95, 138.7);
+  expect(pixel(CameraModel::kSimpleRadial, {500, 320, 240, 0.1}, p), 471.95, 138.7);
   // Factor 1.013 - 0.2 * 0.0169 = 1.00962.
-  expect(pixel(LensModel::kRadial, {500, 320, 240, 0.1, -0.2}, p), 471.443, 139.038);
+  expect(pixel(CameraModel::kRadial, {500, 320, 240, 0.1, -0.2}, p), 471.443, 139.038);
   // Plus 2 p1 x y + p2 (r2 + 2 x2) = -0.00012 + 0.00062 and 2 p2 x y + p1 (r2 + 2 y2)
   // = -0.00024 + 0.00021.
-  expect(pixel(LensModel::kOpenCv, {500, 400, 320, 240, 0.1, -0.2, 0.001, 0.002}, p), 471.693,
+  expect(pixel(CameraModel::kOpenCv, {500, 400, 320, 240, 0.1, -0.2, 0.001, 0.002}, p), 471.693,
          159.2184);
   // Factor 1.00962 / (1 + 0.3 * 0.13) = 1.00962 / 1.039.
-  expect(pixel(LensModel::kFullOpenCv, {500, 400, 320, 240, 0.1, -0.2, 0, 0, 0, 0.3, 0, 0}, p),
+  expect(pixel(CameraModel::kFullOpenCv, {500, 400, 320, 240, 0.1, -0.2, 0, 0, 0, 0.3, 0, 0}, p),
          320 + 150 * 1.00962 / 1.039, 240 - 80 * 1.00962 / 1.039);
 }
 
@@ -62,23 +62,23 @@ TEST(LensCamera, HandWorkedFisheyePixels) {
   // 45 degrees off the axis: angle pi/4, its square 0.6168502751.
   const Eigen::Vector3d p(3, 0, 3);
   const double angle = std::numbers::pi / 4, s = angle * angle;
-  const auto x = [&](LensModel model, std::vector<double> params) {
+  const auto x = [&](CameraModel model, std::vector<double> params) {
     return LensCamera{model, 640, 480, std::move(params)}.PixelFromCam(p)->x() - 320;
   };
-  EXPECT_NEAR(x(LensModel::kSimpleRadialFisheye, {500, 320, 240, 0.1}), 416.9227354, 1e-6);
-  EXPECT_NEAR(x(LensModel::kRadialFisheye, {500, 320, 240, 0.1, 0.2}),
+  EXPECT_NEAR(x(CameraModel::kSimpleRadialFisheye, {500, 320, 240, 0.1}), 416.9227354, 1e-6);
+  EXPECT_NEAR(x(CameraModel::kRadialFisheye, {500, 320, 240, 0.1, 0.2}),
               500 * angle * (1 + 0.1 * s + 0.2 * s * s), kHandWorkedPx);
-  EXPECT_NEAR(x(LensModel::kOpenCvFisheye, {500, 500, 320, 240, 0, 0, 0, 0}), 392.6990817, 1e-6);
+  EXPECT_NEAR(x(CameraModel::kOpenCvFisheye, {500, 500, 320, 240, 0, 0, 0, 0}), 392.6990817, 1e-6);
   // The prism adds sx r^2 to x.
-  EXPECT_NEAR(x(LensModel::kThinPrismFisheye, {500, 500, 320, 240, 0, 0, 0, 0, 0, 0, 0.01, 0.5}),
+  EXPECT_NEAR(x(CameraModel::kThinPrismFisheye, {500, 500, 320, 240, 0, 0, 0, 0, 0, 0, 0.01, 0.5}),
               392.6990817 + 5 * s, 1e-6);
   // FOV draws r = 1 at atan(2 tan(0.5)) / 1.
-  EXPECT_NEAR(x(LensModel::kFov, {500, 500, 320, 240, 1}), 500 * std::atan(2 * std::tan(0.5)),
+  EXPECT_NEAR(x(CameraModel::kFov, {500, 500, 320, 240, 1}), 500 * std::atan(2 * std::tan(0.5)),
               kHandWorkedPx);
 }
 
 TEST(LensCamera, PixelAndRayRoundTripForEveryModel) {
-  for (const LensModel model : kAllModels) {
+  for (const CameraModel model : kAllModels) {
     Random random(7 + static_cast<int>(model));
     int found = 0;
     for (int i = 0; i < kDraws; ++i) {
@@ -103,7 +103,7 @@ TEST(LensCamera, RayAndPixelRoundTripForEveryModel) {
   // to be drawn at the same pixel. Rays near the model's edge are ill-conditioned: kept 10 %
   // inside.
   constexpr double kRadians = 1e-13;  // worst of all draws 9.4e-16
-  for (const LensModel model : kAllModels) {
+  for (const CameraModel model : kAllModels) {
     Random random(70 + static_cast<int>(model));
     for (int i = 0; i < kDraws; ++i) {
       const LensMap lens(RandomLens(model, random));
@@ -151,14 +151,15 @@ void ExpectSamePixels(const LensCamera& camera, const std::vector<cv::Point3d>& 
 
 TEST(LensCamera, PerspectiveModelsAgreeWithOpenCv) {
   Random random(11);
-  for (const LensModel model : {LensModel::kPinhole, LensModel::kSimpleRadial, LensModel::kRadial,
-                                LensModel::kOpenCv, LensModel::kFullOpenCv}) {
+  for (const CameraModel model :
+       {CameraModel::kPinhole, CameraModel::kSimpleRadial, CameraModel::kRadial,
+        CameraModel::kOpenCv, CameraModel::kFullOpenCv}) {
     for (int i = 0; i < kDraws; ++i) {
       const LensCamera camera = RandomLens(model, random);
       const auto& p = camera.params;
       std::vector<double> coefficients(8, 0.0);  // k1, k2, p1, p2, k3, k4, k5, k6
-      if (model == LensModel::kSimpleRadial) coefficients[0] = p[3];
-      if (model == LensModel::kRadial) std::copy(p.begin() + 3, p.end(), coefficients.begin());
+      if (model == CameraModel::kSimpleRadial) coefficients[0] = p[3];
+      if (model == CameraModel::kRadial) std::copy(p.begin() + 3, p.end(), coefficients.begin());
       if (p.size() >= 8) std::copy(p.begin() + 4, p.end(), coefficients.begin());
       const auto points = RandomPoints(random);
       std::vector<cv::Point2d> expected;
@@ -171,13 +172,13 @@ TEST(LensCamera, PerspectiveModelsAgreeWithOpenCv) {
 
 TEST(LensCamera, FisheyeModelsAgreeWithOpenCv) {
   Random random(12);
-  for (const LensModel model :
-       {LensModel::kOpenCvFisheye, LensModel::kSimpleRadialFisheye, LensModel::kRadialFisheye}) {
+  for (const CameraModel model : {CameraModel::kOpenCvFisheye, CameraModel::kSimpleRadialFisheye,
+                                  CameraModel::kRadialFisheye}) {
     for (int i = 0; i < kDraws; ++i) {
       const LensCamera camera = RandomLens(model, random);
       const auto& p = camera.params;
       cv::Vec4d coefficients(0, 0, 0, 0);
-      const size_t first = model == LensModel::kOpenCvFisheye ? 4 : 3;
+      const size_t first = model == CameraModel::kOpenCvFisheye ? 4 : 3;
       for (size_t k = first; k < p.size(); ++k) coefficients[static_cast<int>(k - first)] = p[k];
       const auto points = RandomPoints(random);
       std::vector<cv::Point2d> expected;
@@ -189,7 +190,7 @@ TEST(LensCamera, FisheyeModelsAgreeWithOpenCv) {
 }
 
 TEST(LensCamera, PointsBehindTheCameraAndNoNumbersHaveNoPixel) {
-  for (const LensModel model : kAllModels) {
+  for (const CameraModel model : kAllModels) {
     Random random(13);
     const LensCamera camera = RandomLens(model, random);
     EXPECT_FALSE(camera.PixelFromCam({0, 0, -1})) << NameOf(model);
@@ -197,13 +198,13 @@ TEST(LensCamera, PointsBehindTheCameraAndNoNumbersHaveNoPixel) {
     EXPECT_FALSE(camera.PixelFromCam({std::numeric_limits<double>::quiet_NaN(), 0, 1}));
     EXPECT_FALSE(camera.RayFromPixel({std::numeric_limits<double>::infinity(), 0}));
   }
-  EXPECT_FALSE((LensCamera{LensModel::kPinhole, 640, 480, {500, 500, 320, 240}}.PixelFromCam(
+  EXPECT_FALSE((LensCamera{CameraModel::kPinhole, 640, 480, {500, 500, 320, 240}}.PixelFromCam(
       {0.1, 0.1, -1})));
 }
 
 TEST(LensCamera, NothingIsSeenBeyondTheRadiusWhereDistortionTurnsBack) {
   // r (1 - 0.3 r^2) grows until 1 = 0.9 r^2: r = 1.0540925534, drawn at 0.7027283689.
-  const LensCamera camera{LensModel::kSimpleRadial, 640, 480, {500, 320, 240, -0.3}};
+  const LensCamera camera{CameraModel::kSimpleRadial, 640, 480, {500, 320, 240, -0.3}};
   EXPECT_NEAR(LensMap(camera).max_radius(), 1.0540925534, 1e-9);
   EXPECT_TRUE(camera.PixelFromCam({1.05, 0, 1}));
   EXPECT_FALSE(camera.PixelFromCam({1.06, 0, 1}));
@@ -215,7 +216,7 @@ TEST(LensCamera, NothingIsSeenBeyondTheRadiusWhereDistortionTurnsBack) {
 TEST(LensCamera, RationalModelEndsAtItsPole) {
   // r / (1 - 0.25 r^2) rises to infinity at r = 2 and is negative beyond.
   const LensCamera camera{
-      LensModel::kFullOpenCv, 640, 480, {500, 500, 320, 240, 0, 0, 0, 0, 0, -0.25, 0, 0}};
+      CameraModel::kFullOpenCv, 640, 480, {500, 500, 320, 240, 0, 0, 0, 0, 0, -0.25, 0, 0}};
   EXPECT_NEAR(LensMap(camera).max_radius(), 2, 1e-12);
   EXPECT_FALSE(camera.PixelFromCam({2.5, 0, 1}));
   const auto far_pixel = camera.PixelFromCam({1.99, 0, 1});
@@ -225,7 +226,7 @@ TEST(LensCamera, RationalModelEndsAtItsPole) {
 }
 
 TEST(LensCamera, FisheyeSeesBeyondNinetyDegrees) {
-  const LensCamera camera{LensModel::kOpenCvFisheye, 640, 480, {200, 200, 320, 240, 0, 0, 0, 0}};
+  const LensCamera camera{CameraModel::kOpenCvFisheye, 640, 480, {200, 200, 320, 240, 0, 0, 0, 0}};
   for (const double degrees : {1e-7, 1.0, 89.0, 90.0, 91.0, 120.0, 179.0}) {
     const double angle = degrees * std::numbers::pi / 180;
     const Eigen::Vector3d ray(std::sin(angle) * 0.6, std::sin(angle) * 0.8, std::cos(angle));
@@ -239,41 +240,43 @@ TEST(LensCamera, FisheyeSeesBeyondNinetyDegrees) {
 
 TEST(LensCamera, FovOfATinyAngleIsThePinholeCamera) {
   for (const double omega : {0.0, 1e-12, 1e-7}) {
-    const LensCamera camera{LensModel::kFov, 640, 480, {500, 500, 320, 240, omega}};
+    const LensCamera camera{CameraModel::kFov, 640, 480, {500, 500, 320, 240, omega}};
     EXPECT_EQ(camera.IsUndistorted(), omega == 0);
     EXPECT_NEAR(camera.PixelFromCam({1, 1, 2})->x(), 570, 1e-9);
     EXPECT_NEAR(camera.RayFromPixel({570, 240})->x(), std::sqrt(0.2), 1e-12);
   }
-  const LensCamera impossible{LensModel::kFov, 640, 480, {500, 500, 320, 240, 3.5}};
+  const LensCamera impossible{CameraModel::kFov, 640, 480, {500, 500, 320, 240, 3.5}};
   EXPECT_FALSE(impossible.PixelFromCam({1, 1, 2}));
   EXPECT_FALSE(impossible.RayFromPixel({321, 240}));
 }
 
 TEST(LensCamera, OnlyPerspectiveModelsWithZeroCoefficientsAreUndistorted) {
-  EXPECT_TRUE((LensCamera{LensModel::kPinhole, 4, 4, {5, 5, 2, 2}}.IsUndistorted()));
-  EXPECT_TRUE((LensCamera{LensModel::kOpenCv, 4, 4, {5, 5, 2, 2, 0, 0, 0, 0}}.IsUndistorted()));
-  EXPECT_FALSE((LensCamera{LensModel::kOpenCv, 4, 4, {5, 5, 2, 2, 0, 0, 0, 1e-9}}.IsUndistorted()));
-  EXPECT_FALSE((LensCamera{LensModel::kSimpleRadialFisheye, 4, 4, {5, 2, 2, 0}}.IsUndistorted()));
+  EXPECT_TRUE((LensCamera{CameraModel::kPinhole, 4, 4, {5, 5, 2, 2}}.IsUndistorted()));
+  EXPECT_TRUE((LensCamera{CameraModel::kOpenCv, 4, 4, {5, 5, 2, 2, 0, 0, 0, 0}}.IsUndistorted()));
+  EXPECT_FALSE(
+      (LensCamera{CameraModel::kOpenCv, 4, 4, {5, 5, 2, 2, 0, 0, 0, 1e-9}}.IsUndistorted()));
+  EXPECT_FALSE((LensCamera{CameraModel::kSimpleRadialFisheye, 4, 4, {5, 2, 2, 0}}.IsUndistorted()));
 }
 
 TEST(LensCamera, PinholeKeepsSizeFocalLengthsAndPrincipalPoint) {
-  const LensCamera two{LensModel::kOpenCv, 640, 480, {500, 510, 321, 239, 0.1, 0, 0, 0}};
+  const LensCamera two{CameraModel::kOpenCv, 640, 480, {500, 510, 321, 239, 0.1, 0, 0, 0}};
   EXPECT_EQ(two.Pinhole(), PinholeCamera(640, 480, 500, 510, 321, 239));
-  const LensCamera one{LensModel::kRadial, 640, 480, {500, 321, 239, 0.1, 0}};
+  const LensCamera one{CameraModel::kRadial, 640, 480, {500, 321, 239, 0.1, 0}};
   EXPECT_EQ(one.Pinhole(), PinholeCamera(640, 480, 500, 500, 321, 239));
 }
 
 TEST(LensCamera, RejectsImpossibleParameters) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  const auto check = [](LensModel model, int width, std::vector<double> params) {
+  const auto check = [](CameraModel model, int width, std::vector<double> params) {
     LensCamera{model, width, 480, std::move(params)}.Check();
   };
-  EXPECT_NO_THROW(check(LensModel::kPinhole, 640, {500, 500, 320, 240}));
-  EXPECT_THROW(check(LensModel::kPinhole, 0, {500, 500, 320, 240}), std::invalid_argument);
-  EXPECT_THROW(check(LensModel::kPinhole, 640, {500, 500, 320}), std::invalid_argument);
-  EXPECT_THROW(check(LensModel::kPinhole, 640, {500, 0, 320, 240}), std::invalid_argument);
-  EXPECT_THROW(check(LensModel::kPinhole, 640, {500, 500, nan, 240}), std::invalid_argument);
-  EXPECT_THROW(check(static_cast<LensModel>(99), 640, {500, 500, 320, 240}), std::invalid_argument);
+  EXPECT_NO_THROW(check(CameraModel::kPinhole, 640, {500, 500, 320, 240}));
+  EXPECT_THROW(check(CameraModel::kPinhole, 0, {500, 500, 320, 240}), std::invalid_argument);
+  EXPECT_THROW(check(CameraModel::kPinhole, 640, {500, 500, 320}), std::invalid_argument);
+  EXPECT_THROW(check(CameraModel::kPinhole, 640, {500, 0, 320, 240}), std::invalid_argument);
+  EXPECT_THROW(check(CameraModel::kPinhole, 640, {500, 500, nan, 240}), std::invalid_argument);
+  EXPECT_THROW(check(static_cast<CameraModel>(99), 640, {500, 500, 320, 240}),
+               std::invalid_argument);
 }
 
 }  // namespace

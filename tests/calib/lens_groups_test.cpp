@@ -5,7 +5,7 @@
 namespace dtr::calib {
 namespace {
 
-const LensCamera kPhone{LensModel::kRadial, 1000, 750, {800, 500, 375, 0.05, -0.02}};
+const LensCamera kPhone{CameraModel::kRadial, 1000, 750, {800, 500, 375, 0.05, -0.02}};
 
 LensCamera Shifted(double dx, double dy) {
   LensCamera camera = kPhone;

@@ -21,11 +21,11 @@ constexpr double kFocal = 150;
 // (worst found 1.83).
 constexpr double kIntensity = 2.5;
 
-const LensCamera kBarrel{LensModel::kRadial, kWidth, kHeight, {kFocal, 83, 58, -0.12, 0.02}};
+const LensCamera kBarrel{CameraModel::kRadial, kWidth, kHeight, {kFocal, 83, 58, -0.12, 0.02}};
 const LensCamera kPincushion{
-    LensModel::kOpenCv, kWidth, kHeight, {kFocal, 152, 83, 58, 0.15, 0.02, 1e-3, -2e-3}};
+    CameraModel::kOpenCv, kWidth, kHeight, {kFocal, 152, 83, 58, 0.15, 0.02, 1e-3, -2e-3}};
 const LensCamera kFisheye{
-    LensModel::kOpenCvFisheye, kWidth, kHeight, {kFocal, kFocal, 83, 58, 0.03, 0, 0, 0}};
+    CameraModel::kOpenCvFisheye, kWidth, kHeight, {kFocal, kFocal, 83, 58, 0.03, 0, 0, 0}};
 
 // A scene at infinity: its brightness in 0..255 by direction, with patterns of at least 8 pixels
 // per period at the focal length used.
@@ -116,7 +116,7 @@ TEST(Undistort, MaskTellsExactlyWhichPixelsTheLensSaw) {
     EXPECT_EQ(photo.mask.empty(), missing == 0);
     // Barrel images of the whole view squeeze more in than the pinhole shows: every pixel has a
     // source. Pincushion images end before the pinhole's corners.
-    EXPECT_EQ(missing > 0, lens.model == LensModel::kOpenCv)
+    EXPECT_EQ(missing > 0, lens.model == CameraModel::kOpenCv)
         << NameOf(lens.model) << " " << missing;
   }
 }
@@ -133,7 +133,7 @@ TEST(Undistort, CornersOfAPincushionPhotoAreMaskedAndItsCentreIsNot) {
 TEST(Undistort, WhatMayNotBeUsedIsMaskedWhereTheLensShowsIt) {
   for (const LensCamera& lens :
        {kBarrel, kPincushion,
-        LensCamera{LensModel::kPinhole, kWidth, kHeight, {kFocal, kFocal, 83, 58}}}) {
+        LensCamera{CameraModel::kPinhole, kWidth, kHeight, {kFocal, kFocal, 83, 58}}}) {
     Mask usable(kWidth, kHeight, 1, 255);
     for (int y = 30; y < 60; ++y) {
       for (int x = 20; x < 50; ++x) usable(x, y) = 0;
@@ -168,7 +168,7 @@ TEST(Undistort, WhatMayNotBeUsedIsMaskedWhereTheLensShowsIt) {
 
 TEST(Undistort, RaysBeyondTheModelsReachAreMasked) {
   // The distortion turns back at r = 0.58, inside the image: nothing beyond may be shown.
-  const LensCamera lens{LensModel::kSimpleRadial, kWidth, kHeight, {60, 80, 60, -1.0}};
+  const LensCamera lens{CameraModel::kSimpleRadial, kWidth, kHeight, {60, 80, 60, -1.0}};
   const UndistortedPhoto photo = Undistort(ImageRgb8(kWidth, kHeight, 3, 200), lens, 0, 1);
   ASSERT_FALSE(photo.mask.empty());
   EXPECT_EQ(photo.mask(80, 60), 255);
@@ -180,7 +180,7 @@ TEST(Undistort, PhotosWithoutDistortionKeepTheirBytes) {
   Random random(8);
   ImageRgb8 photo(kWidth, kHeight, 3);
   for (auto& value : photo.data()) value = static_cast<std::uint8_t>(random.Index(256));
-  const LensCamera lens{LensModel::kOpenCv, kWidth, kHeight, {150, 150, 80, 60, 0, 0, 0, 0}};
+  const LensCamera lens{CameraModel::kOpenCv, kWidth, kHeight, {150, 150, 80, 60, 0, 0, 0, 0}};
   const UndistortedPhoto same = Undistort(photo, lens, 0, 1);
   EXPECT_EQ(same.image, photo);
   EXPECT_TRUE(same.mask.empty());
@@ -255,7 +255,7 @@ TEST(UndistortedPixel, InvertsWhatUndistortionDid) {
     }
   }
   // A fisheye's ray at 100 degrees is on no pinhole image.
-  const LensCamera wide{LensModel::kOpenCvFisheye, 640, 640, {150, 150, 320, 320, 0, 0, 0, 0}};
+  const LensCamera wide{CameraModel::kOpenCvFisheye, 640, 640, {150, 150, 320, 320, 0, 0, 0, 0}};
   EXPECT_FALSE(UndistortedPixel(wide, wide.Pinhole(), {320 + 150 * 1.75, 320}));
 }
 

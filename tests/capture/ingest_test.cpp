@@ -238,9 +238,9 @@ TEST(Screening, DuplicatesBlurAndClippingAreRemarkedAndNothingIsDropped) {
   io::WriteImage(folder / "bright.png", bright);
   const Capture capture = Ingest(folder.path());
   ASSERT_EQ(capture.photos.size(), 7u);  // blurred, bright, sharp0..3, z_copy
-  const auto& blurred_verdict = *capture.photos[0].screening;
-  ASSERT_EQ(blurred_verdict.remarks.size(), 1u);
-  EXPECT_THAT(blurred_verdict.remarks[0], HasSubstr("blurred"));
+  const auto& blurred_screening = *capture.photos[0].screening;
+  ASSERT_EQ(blurred_screening.remarks.size(), 1u);
+  EXPECT_THAT(blurred_screening.remarks[0], HasSubstr("blurred"));
   EXPECT_NEAR(capture.photos[1].screening->overexposed_share, 47.0 / 48, 1e-12);
   EXPECT_THAT(capture.photos[1].screening->remarks.back(), HasSubstr("overexposed"));
   EXPECT_THAT(capture.photos[2].screening->remarks, IsEmpty());
@@ -261,7 +261,7 @@ ImageRgb8 Blobs(double shift_px, int noise, std::uint64_t seed) {
   return image;
 }
 
-TEST(JudgePhotos, ShotsOfOnePictureAreDuplicatesAndASmallStepIsNone) {
+TEST(ScreenPhotos, ShotsOfOnePictureAreDuplicatesAndASmallStepIsNone) {
   const TemporaryFolder folder;
   io::WriteImage(folder / "a.png", Blobs(0, 3, 1));
   io::WriteImage(folder / "b.png", Blobs(0, 3, 2));  // from the same tripod
@@ -277,7 +277,7 @@ TEST(JudgePhotos, ShotsOfOnePictureAreDuplicatesAndASmallStepIsNone) {
   EXPECT_EQ(capture.photos[3].screening->duplicate_of, "c.png");
 }
 
-TEST(DropSamePictures, TakesOutWhatHasTheSamePixelsAndKeepsWhatResembles) {
+TEST(DropSameImages, TakesOutWhatHasTheSamePixelsAndKeepsWhatResembles) {
   const TemporaryFolder folder;
   const auto none = [](const std::string&) { return false; };
   io::WriteImage(folder / "a.png", Blobs(0, 3, 1));
@@ -288,7 +288,7 @@ TEST(DropSamePictures, TakesOutWhatHasTheSamePixelsAndKeepsWhatResembles) {
   fs::copy_file(folder / "a.png", folder / "e.png");
   Capture capture = Ingest(folder.path());
   ASSERT_EQ(capture.photos.size(), 5u);
-  const auto left_out = DropSamePictures(capture, none);
+  const auto left_out = DropSameImages(capture, none);
   EXPECT_THAT(NamesOf(capture), ElementsAre("a.png", "b.jpg", "d.png"));
   ASSERT_EQ(left_out.size(), 2u);
   EXPECT_EQ(left_out[0].name + " " + left_out[0].same_as, "c.jpg b.jpg");
@@ -296,10 +296,10 @@ TEST(DropSamePictures, TakesOutWhatHasTheSamePixelsAndKeepsWhatResembles) {
   ASSERT_EQ(capture.skipped.size(), 2u);
   EXPECT_EQ(capture.skipped[1].name, "e.png");
   EXPECT_THAT(capture.skipped[1].reason, HasSubstr("same pixels as a.png"));
-  EXPECT_THAT(DropSamePictures(capture, none), IsEmpty());
+  EXPECT_THAT(DropSameImages(capture, none), IsEmpty());
 }
 
-TEST(DropSamePictures, MasksAndPreferenceHaveASay) {
+TEST(DropSameImages, MasksAndPreferenceHaveASay) {
   const TemporaryFolder folder;
   for (const char* name : {"a.png", "b.png", "c.png"}) {
     io::WriteImage(folder / name, Blobs(0, 3, 1));
@@ -312,7 +312,7 @@ TEST(DropSamePictures, MasksAndPreferenceHaveASay) {
   Capture capture = Ingest(folder.path());
   ASSERT_EQ(capture.photos.size(), 3u);
   // a shows less than b and c do; c is asked for.
-  const auto left_out = DropSamePictures(capture, [](const auto& name) { return name == "c.png"; });
+  const auto left_out = DropSameImages(capture, [](const auto& name) { return name == "c.png"; });
   EXPECT_THAT(NamesOf(capture), ElementsAre("a.png", "c.png"));
   ASSERT_EQ(left_out.size(), 1u);
   EXPECT_EQ(left_out[0].name + " " + left_out[0].same_as, "b.png c.png");

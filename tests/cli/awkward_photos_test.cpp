@@ -152,7 +152,7 @@ void WriteHeld(const fs::path& file, const ImageRgb8& upright, int orientation) 
 struct DepthFound {
   double complete = 0, right = 0;
 };
-DepthFound Judged(const View& view, const DepthImage& truth) {
+DepthFound FoundDepth(const View& view, const DepthImage& truth) {
   const double scale_px = view.camera.fx_px() * view.reference_baseline;
   int known = 0, both = 0, right = 0;
   for (int y = 0; y < truth.height(); ++y) {
@@ -244,8 +244,8 @@ TEST(AwkwardPhotos, OfEverySizeLensShapeAndOrientationMakeOneSet) {
     EXPECT_EQ(views[i].image, Meant(folder.path(), kShots[i]));
     // How a camera was held and how it wrote its file moves nothing.
     EXPECT_EQ(views[i].depth.grid(), plain[i].depth.grid());
-    const DepthFound found =
-        Judged(views[i], datasets::RenderDepth(scene, shots[i].camera, shots[i].cam_from_scene));
+    const DepthFound found = FoundDepth(
+        views[i], datasets::RenderDepth(scene, shots[i].camera, shots[i].cam_from_scene));
     EXPECT_GT(found.complete, kCompleteEach);
     EXPECT_GT(found.right, kRightEach);
     complete += found.complete / static_cast<double>(views.size());

@@ -137,7 +137,7 @@ TEST_F(BadInput, OutputsThatExistOrCannotBeMade) {
   const Ran onto_file = Dtr({"build", Photos(), "-o", In("set.dtr/mine"), "--force"});
   ExpectRejected(onto_file, kWrongUsage, "expected no such folder yet, found a file");
   EXPECT_THAT(onto_file.err, Not(HasSubstr("== photos")));  // said before any is read
-  ExpectRejected(Dtr({"evaluate", Shared("good.dtr"), "--pictures", In("set.dtr/mine")}),
+  ExpectRejected(Dtr({"evaluate", Shared("good.dtr"), "--images", In("set.dtr/mine")}),
                  kWrongUsage, ": expected a folder, found a file");
   const auto build_into = [&](const std::string& set) {
     return Dtr({"build", Photos(), "-o", set, "--poses", Shared("courtyard/sparse")});
@@ -216,9 +216,11 @@ TEST_F(BadInput, SetsWithWrongFields) {
 }
 
 TEST_F(BadInput, SetsOfAnotherToolStayReadable) {
-  EXPECT_EQ(InfoAfter("\"verdict\": {}", "\"verdict\": {\"passed\": false, \"tests\": [1]}").code,
-            0);
-  EXPECT_EQ(InfoAfter("\"verdict\": {}", "\"verdict\": {\"passed\": false, \"tests\": 1}").code, 0);
+  EXPECT_EQ(
+      InfoAfter("\"verdict\": {}", "\"verdict\": {\"passed\": false, \"tests\": [1]}").code,
+      0);
+  EXPECT_EQ(
+      InfoAfter("\"verdict\": {}", "\"verdict\": {\"passed\": false, \"tests\": 1}").code, 0);
   InfoAfter("\"provenance\": {", "\"provenance\": {\"held_out_not_registered\": [1],");
   EXPECT_EQ(Dtr({"evaluate", In("bad.dtr"), "--renderer", "cpu"}).code, 0);
 }

@@ -40,7 +40,7 @@ class BenchCalibration : public ::testing::Test {
     RenderCourtyard(*shared_ / "photos", photos);
     *truth_ = CourtyardModel(photos);
     for (auto& [id, camera] : truth_->cameras) {
-      camera.model = calib::LensModel::kRadial;
+      camera.model = calib::CameraModel::kRadial;
       camera.params = {kFocalPx, 240, 160, 0, 0};
     }
     colmap::testing::FakeColmap colmap;
@@ -248,7 +248,7 @@ TEST_F(BenchCalibration, WhatCannotBeMeasuredIsRejected) {
       "--stage calibration: expected --photos with it, the folder that the set was built from");
   ExpectRejected(Dtr(Words({"--point", "refine=perhaps"})), kWrongUsage,
                  "--point: expected a value of {yes,no} for refine, found 'refine=perhaps'");
-  // Photos that are not the set's, and such as nothing can be judged by.
+  // Photos that are not the set's, and such as nothing can be evaluated by.
   fs::create_directories(folder_ / "grey");
   for (int i = 0; i < kPhotos; ++i) {
     const ImageRgb8 grey(480, 320, 3, static_cast<std::uint8_t>(60 + 20 * i));

@@ -93,9 +93,9 @@ TEST_F(BuildInMetres, GpsOfThePhotosGivesASetInMetres) {
     EXPECT_LT((way - truth).norm(), 5 * kPlacesM) << i;
   }
   // Held places are no fault of the cameras: a fresh solve without them finds the same.
-  const Json verdict = Json::parse(set.verdict_json);
+  const Json validation = Json::parse(set.validation_json);
   std::vector<std::string> passed;
-  for (const Json& test : verdict["tests"]) {
+  for (const Json& test : validation["tests"]) {
     if (test["passed"]) passed.push_back(test["name"]);
   }
   EXPECT_THAT(passed, IsSupersetOf({"camera_difference_sigmas", "lens_difference_sigmas"}));
@@ -151,7 +151,7 @@ TEST_F(BuildInMetres, TooFewCamerasForWhatIsKnownAreRejected) {
 // A wall faced squarely by a lens that nobody knows: with places or without, `calibrate photos`
 // asks as `calibrate refine` does, before anything is refined.
 TEST_F(BuildInMetres, PhotosThatDoNotDetermineTheirCamerasAreRejectedBeforeTheyAreRefined) {
-  const calib::LensCamera lens{calib::LensModel::kPinhole, 192, 128, {150, 150, 96, 64}};
+  const calib::LensCamera lens{calib::CameraModel::kPinhole, 192, 128, {150, 150, 96, 64}};
   bundle::SceneSpec spec{.images = kPhotos, .points = 400, .lens = lens, .noise_px = 0.1};
   spec.pose = [](int i, int) {
     const Eigen::Vector3d centre(0.5 * (i % 3) - 0.5, -6, 0.5 * (i / 3));

@@ -19,7 +19,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr int kInstants = 7;
+constexpr int kTimeSteps = 7;
 // 480 px are the least at which SIFT finds enough here. The two lenses are different ones.
 const CourtyardRig kRig{{480, 320, 380, 380, 241, 159}, {480, 320, 400, 400, 236, 164}};
 // The truth is a rig a metre from walls: places to a hundredth of its own arm of half a metre.
@@ -28,7 +28,7 @@ constexpr double kPlaceM = 0.005, kScale = 0.005;
 TEST(BuildRigByColmap, PhotosOfARigBecomeASetInMetresWithItsPlaces) {
   if (FindProgram("colmap").empty()) GTEST_SKIP() << "colmap is absent";
   const TemporaryFolder folder;
-  const auto photos = PhotosOf(kRig, kInstants);
+  const auto photos = PhotosOf(kRig, kTimeSteps);
   RenderCourtyard(folder / "photos", photos);
   calib::WriteCalibration(folder / "rig.json", CalibrationOf(kRig));
   const std::string set_folder = (folder / "set.dtr").string();
@@ -46,8 +46,8 @@ TEST(BuildRigByColmap, PhotosOfARigBecomeASetInMetresWithItsPlaces) {
     found.push_back(views[i].CenterInWorld());
     truth.push_back(photos[i].cam_from_scene.TargetOriginInSource());
   }
-  for (size_t i = 0; i < kInstants; ++i) {  // the rig's own arm, to rounding
-    EXPECT_NEAR((found[i] - found[i + kInstants]).norm(),
+  for (size_t i = 0; i < kTimeSteps; ++i) {  // the rig's own arm, to rounding
+    EXPECT_NEAR((found[i] - found[i + kTimeSteps]).norm(),
                 RightFromLeft().TargetOriginInSource().norm(), 1e-9);
   }
   const calib::Similarity aligned = calib::AlignPoints(found, truth);

@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 using Json = nlohmann::json;
 using ::testing::HasSubstr;
 
-constexpr int kInstants = 5;
+constexpr int kTimeSteps = 5;
 constexpr double kUnit = 0.31;    // scene units, which are metres, per unit of the model
 constexpr double kNoisePx = 0.2;  // of the features
 constexpr std::uint32_t kLeftId = 7, kRightId = 3;  // of the cameras in COLMAP's database
@@ -29,7 +29,7 @@ constexpr std::uint32_t kLeftId = 7, kRightId = 3;  // of the cameras in COLMAP'
 const PinholeCamera kLeft(192, 128, 150, 150, 96, 64), kRight(192, 128, 154, 154, 94, 66);
 const CourtyardRig kRig{kLeft, kRight};
 
-std::vector<CourtyardPhoto> RigPhotos() { return PhotosOf(kRig, kInstants); }
+std::vector<CourtyardPhoto> RigPhotos() { return PhotosOf(kRig, kTimeSteps); }
 
 class BuildRig : public ::testing::Test {
  protected:
@@ -77,8 +77,8 @@ class BuildRig : public ::testing::Test {
   TemporaryFolder folder_;
 };
 
-Json TestOf(const Json& verdict, const std::string& name) {
-  for (const Json& test : verdict["tests"]) {
+Json TestOf(const Json& validation, const std::string& name) {
+  for (const Json& test : validation["tests"]) {
     if (test["name"] == name) return test;
   }
   ADD_FAILURE() << "no test " << name;
@@ -112,14 +112,14 @@ TEST_F(BuildRig, TheRigGivesPlacesAndMetres) {
             truth[b].cam_from_scene.TargetOriginInSource())
         .norm();
   };
-  for (size_t i = 0; i < kInstants; ++i) {
-    EXPECT_NEAR(apart(i, i + kInstants), truly_apart(i, i + kInstants), 1e-9);
+  for (size_t i = 0; i < kTimeSteps; ++i) {
+    EXPECT_NEAR(apart(i, i + kTimeSteps), truly_apart(i, i + kTimeSteps), 1e-9);
     EXPECT_DOUBLE_EQ(views[i].camera.fx_px(), kLeft.fx_px());
-    EXPECT_DOUBLE_EQ(views[i + kInstants].camera.cy_px(), kRight.cy_px());
+    EXPECT_DOUBLE_EQ(views[i + kTimeSteps].camera.cy_px(), kRight.cy_px());
   }
   // From one time step to another the scale is as good as observations of 0.2 px on 192 pixels make
   // it.
-  EXPECT_NEAR(apart(0, kInstants - 1) / truly_apart(0, kInstants - 1), 1, 0.01);
+  EXPECT_NEAR(apart(0, kTimeSteps - 1) / truly_apart(0, kTimeSteps - 1), 1, 0.01);
 
   const Json info = Json::parse(DtrOk({"info", In("set.dtr"), "--json", "-"}).out);
   const Json places = TestOf(info["verdict"], "rig_places_px");
@@ -128,7 +128,7 @@ TEST_F(BuildRig, TheRigGivesPlacesAndMetres) {
   EXPECT_TRUE(TestOf(info["verdict"], "camera_difference_sigmas")["passed"]);
   const Json& rig = info["provenance"]["calibration"]["rig"];
   EXPECT_EQ(rig["file"], "rig.json");
-  EXPECT_EQ(rig["frames"], kInstants);
+  EXPECT_EQ(rig["frames"], kTimeSteps);
   EXPECT_NEAR(rig["scale"], kUnit, 0.01 * kUnit);
   EXPECT_THAT(
       DtrOk({"info", In("set.dtr")}).out,
@@ -137,7 +137,7 @@ TEST_F(BuildRig, TheRigGivesPlacesAndMetres) {
 
   // A set whose scale has been changed since is no longer the rig's, and validate says so.
   DtrOk({"calibrate", "scale", In("set.dtr"), "--distance",
-         fmt::format("{},{}=1m", views[0].id, views[kInstants].id), "-o", In("scaled.dtr")});
+         fmt::format("{},{}=1m", views[0].id, views[kTimeSteps].id), "-o", In("scaled.dtr")});
   const Ran scaled = Dtr({"validate", In("scaled.dtr"), "--json", "-"});
   EXPECT_EQ(scaled.code, kFailed);
   const Json told = Json::parse(scaled.out);
@@ -163,9 +163,9 @@ TEST_F(BuildRig, AStrictlyHeldOutPhotoTakesItsCamerasLens) {
   EXPECT_EQ(view.name, held_out);
   EXPECT_EQ(view.role, ViewRole::kHeldOut);
   EXPECT_DOUBLE_EQ(view.camera.fx_px(), kRight.fx_px());
-  const Json verdict = Json::parse(set.verdict_json);
-  EXPECT_TRUE(TestOf(verdict, "rig_places_px")["passed"]);
-  EXPECT_TRUE(TestOf(verdict, "cameras_untested")["passed"]);
+  const Json validation = Json::parse(set.validation_json);
+  EXPECT_TRUE(TestOf(validation, "rig_places_px")["passed"]);
+  EXPECT_TRUE(TestOf(validation, "cameras_untested")["passed"]);
 }
 
 TEST_F(BuildRig, ARigThatHasMovedSinceIsRejected) {
@@ -205,7 +205,7 @@ TEST_F(BuildRig, PhotosThatAreNotTheRigsAreRejectedBeforeAnyWork) {
                  "photo right/0009.png: expected 192 x 128 px as camera right was calibrated with, "
                  "found 96 x 64");
   fs::remove(folder_ / "photos/right/0009.png");
-  for (int i = 0; i < kInstants; ++i) {
+  for (int i = 0; i < kTimeSteps; ++i) {
     fs::rename(folder_ / fmt::format("photos/right/{:04}.png", i),
                folder_ / fmt::format("photos/right/1{:03}.png", i));
   }
@@ -214,7 +214,7 @@ TEST_F(BuildRig, PhotosThatAreNotTheRigsAreRejectedBeforeAnyWork) {
   EXPECT_TRUE(colmap.Calls().empty());
 }
 
-TEST_F(BuildRig, VideosMustBeOfTheSameInstants) {
+TEST_F(BuildRig, VideosMustBeOfTheSameTimeSteps) {
   fs::create_directories(folder_ / "videos");
   for (const char* name : {"left.mp4", "right.mp4"}) {
     WriteFileAtomically(folder_ / "videos" / name, "never read");

@@ -18,7 +18,7 @@
 namespace dtr::testing {
 namespace {
 
-const calib::LensCamera kLens{calib::LensModel::kPinhole, 1000, 800, {900, 905, 504, 397}};
+const calib::LensCamera kLens{calib::CameraModel::kPinhole, 1000, 800, {900, 905, 504, 397}};
 
 TEST(CalibrateRefine, DegenerateModelsAreRejectedByName) {
   const TemporaryFolder folder;

@@ -25,11 +25,11 @@ inline Pose RightFromLeft() {
 }
 
 /// left/0000.png ... of all time steps, then right/0000.png ...
-inline std::vector<CourtyardPhoto> PhotosOf(const CourtyardRig& rig, int instants) {
+inline std::vector<CourtyardPhoto> PhotosOf(const CourtyardRig& rig, int time_steps) {
   std::vector<CourtyardPhoto> photos;
-  const std::vector<Pose> places = CourtyardArc(instants);
+  const std::vector<Pose> places = CourtyardArc(time_steps);
   for (const bool right : {false, true}) {
-    for (int i = 0; i < instants; ++i) {
+    for (int i = 0; i < time_steps; ++i) {
       const Pose& left = places[static_cast<size_t>(i)];
       photos.push_back({fmt::format("{}/{:04}.png", right ? "right" : "left", i),
                         right ? rig.right : rig.left, right ? RightFromLeft() * left : left});
@@ -47,7 +47,7 @@ inline calib::Calibration CalibrationOf(const CourtyardRig& rig,
     const PinholeCamera& c = right ? rig.right : rig.left;
     calib::CalibratedCamera camera;
     camera.name = right ? "right" : "left";
-    camera.camera = {calib::LensModel::kPinhole,
+    camera.camera = {calib::CameraModel::kPinhole,
                      c.width_px(),
                      c.height_px(),
                      {c.fx_px(), c.fy_px(), c.cx_px(), c.cy_px()}};

@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 struct Scene {
   std::string name;
   std::string views;
-  double within_1px;  ///< floor, share of all judged pixels
+  double within_1px;  ///< floor, share of all evaluated pixels
   double outliers;    ///< ceiling, share of kept pixels off by more than 2 %
 };
 

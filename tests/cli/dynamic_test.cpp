@@ -41,7 +41,7 @@ double MeanDifference(const fs::path& a_file, const fs::path& b_file) {
   return sum / static_cast<double>(a.data().size());
 }
 
-TEST_F(DynamicSet, HasBothInstantsAndEveryFileItsHash) {
+TEST_F(DynamicSet, HasBothTimeStepsAndEveryFileItsHash) {
   const Json info = Json::parse(DtrOk({"info", Set(), "--verify", "--json", "-"}).out);
   EXPECT_EQ(info["frames"], 2);
   EXPECT_EQ(info["views"].size(), 8u);
@@ -69,7 +69,7 @@ TEST_F(DynamicSet, PixelsAreThoseOfTheSetsThatWereJoined) {
   }
 }
 
-TEST_P(DynamicSetBy, EachFrameShowsItsOwnInstant) {
+TEST_P(DynamicSetBy, EachFrameShowsItsOwnTimeStep) {
   const std::string name[] = {"t0", "t0.5"};
   for (const size_t frame : {0u, 1u}) {
     const std::string picture = In("frame" + std::to_string(frame) + ".png");
@@ -101,7 +101,7 @@ TEST_P(DynamicSetBy, PlaysFromOnePlaceAndAlongAPath) {
 
 // Images from sets of one time step each and from the dynamic set are the same, to the byte: no
 // view of another time step has a say, nor what a renderer kept of one.
-TEST_P(DynamicSetBy, AnInstantOfADynamicSetIsDrawnAsASetOfItsOwn) {
+TEST_P(DynamicSetBy, AnTimeStepOfADynamicSetIsDrawnAsASetOfItsOwn) {
   DtrOk(
       {"render", Set(), "--renderer", GetParam(), "--like", "0002.jpg", "--play", "-o", In("all")});
   const std::string sets[] = {At("t0.dtr"), At("t0.5.dtr")};
@@ -141,7 +141,7 @@ TEST_F(DynamicSet, WhatKnowsStillScenesAloneSaysSo) {
 }
 
 // What up is, and whose metres, are told by the scale's provenance.
-TEST_F(DynamicSet, HowLengthsWereFoundIsKeptWhereAllInstantsSayTheSame) {
+TEST_F(DynamicSet, HowLengthsWereFoundIsKeptWhereAllTimeStepsSayTheSame) {
   const auto joined_scale = [&](const std::vector<Json>& scales) {
     std::vector<std::string> join = {"join"};
     for (size_t i = 0; i < scales.size(); ++i) {
@@ -165,11 +165,11 @@ TEST_F(DynamicSet, HowLengthsWereFoundIsKeptWhereAllInstantsSayTheSame) {
   EXPECT_EQ(joined_scale({Json(), gps}), Json());
 }
 
-TEST(FrameOfPicture, GivesEveryFrameItsShare) {
-  EXPECT_EQ(FrameOfPicture(0, 1, 5), 0u);
-  EXPECT_EQ(FrameOfPicture(9, 10, 2), 1u);
-  EXPECT_EQ(FrameOfPicture(4, 10, 2), 0u);
-  EXPECT_EQ(FrameOfPicture(2, 3, 7), 4u);
+TEST(TimeStepOfImage, GivesEveryFrameItsShare) {
+  EXPECT_EQ(TimeStepOfImage(0, 1, 5), 0u);
+  EXPECT_EQ(TimeStepOfImage(9, 10, 2), 1u);
+  EXPECT_EQ(TimeStepOfImage(4, 10, 2), 0u);
+  EXPECT_EQ(TimeStepOfImage(2, 3, 7), 4u);
 }
 
 }  // namespace

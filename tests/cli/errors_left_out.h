@@ -85,7 +85,7 @@ inline constexpr LeftOut kLeftOut[] = {
     {"stereo/depth_maps.cpp", "depth ranges: expected one per view"},
     {"stereo/engine.cpp", "stereo engine: expected one of"},
     {"stereo/patchmatch/patchmatch_engine.cpp", "depth range, expected"},
-    {"stereo/sgbm/picture.cpp", ""},
+    {"stereo/sgbm/grey_image.cpp", ""},
     {"stereo/sgbm/sgbm_engine.cpp", "depth range, expected"},
 
     // Said to the application that OpenSceneGraph's node is part of.

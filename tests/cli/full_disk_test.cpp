@@ -73,7 +73,7 @@ const Command kCommands[] = {
     {.name = "inspect", .words = "inspect OF/good.dtr -o IN/report.html", .min_stops = 1},
     {.name = "advise", .words = "advise OF/good.dtr -o IN/advice.html", .min_stops = 1},
     {.name = "evaluate",
-     .words = "evaluate OF/good.dtr --leave-one-out --pictures IN/compare --renderer cpu",
+     .words = "evaluate OF/good.dtr --leave-one-out --images IN/compare --renderer cpu",
      .one_by_one = "compare/"},
     {.name = "validate",
      .words = "validate OF/cameras.dtr --report IN/report.html",

@@ -47,7 +47,7 @@ class LeftOut : public ::testing::Test {
     calib::SfmModel model = colmap::ReadModel(folder_ / "courtyard/sparse");
     for (auto& [id, camera] : model.cameras) {
       const PinholeCamera c = camera.Pinhole();
-      camera.model = calib::LensModel::kSimpleRadial;
+      camera.model = calib::CameraModel::kSimpleRadial;
       camera.params = {c.fx_px(), c.cx_px(), c.cy_px(), k1};
     }
     std::vector<std::string> aliases = NumberImages(model);

@@ -344,7 +344,7 @@ TEST_F(Rejections, FilesAndFoldersOfAnotherKind) {
       {kFailed,
        "expected a folder or file that can be used, found: Not a directory; fix it or choose "
        "another",
-       {"evaluate", Shared("good.dtr"), "--renderer", "cpu", "--pictures", file + "/pictures"}},
+       {"evaluate", Shared("good.dtr"), "--renderer", "cpu", "--images", file + "/pictures"}},
   });
 }
 

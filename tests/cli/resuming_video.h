@@ -25,7 +25,7 @@ class VideoBySfm : public FullDisk {
     calib::SfmModel model = colmap::ReadModel(courtyard / "sparse");
     for (auto& [id, camera] : model.cameras) {
       const PinholeCamera c = camera.Pinhole();
-      camera.model = calib::LensModel::kSimpleRadial;
+      camera.model = calib::CameraModel::kSimpleRadial;
       camera.params = {c.fx_px(), c.cx_px(), c.cy_px(), -0.01};
     }
     Random random(3);

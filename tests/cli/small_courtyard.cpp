@@ -48,7 +48,7 @@ void AddPoint(const World& world, const Eigen::Vector3d& p, const Eigen::Vector3
 
 // The number of a camera among those of the model, where it is put if it is new.
 std::uint32_t IdOf(const PinholeCamera& camera, calib::SfmModel& model) {
-  const calib::LensCamera lens{calib::LensModel::kPinhole,
+  const calib::LensCamera lens{calib::CameraModel::kPinhole,
                                camera.width_px(),
                                camera.height_px(),
                                {camera.fx_px(), camera.fy_px(), camera.cx_px(), camera.cy_px()}};

@@ -33,7 +33,7 @@ class Worlds : public ::testing::Test {
     return set;
   }
   // What a set shows from one of its views without using that view, and from between its views.
-  std::vector<ImageRgb8> Pictures(const fs::path& set) {
+  std::vector<ImageRgb8> Images(const fs::path& set) {
     const fs::path out = set.string() + ".pictures";
     fs::create_directories(out);
     DtrOk({"render", set.string(), "--renderer", "cpu", "--like", "0003", "--exclude", "0003", "-o",
@@ -48,9 +48,9 @@ class Worlds : public ::testing::Test {
     }
     return pictures;
   }
-  static constexpr size_t kSplatPicture = 1;
-  void ExpectSamePictures(const fs::path& a, const fs::path& b) {
-    const auto of_a = Pictures(a), of_b = Pictures(b);
+  static constexpr size_t kSplatImage = 1;
+  void ExpectSameImages(const fs::path& a, const fs::path& b) {
+    const auto of_a = Images(a), of_b = Images(b);
     for (size_t i = 0; i < of_a.size(); ++i) {
       ASSERT_EQ(of_a[i].data().size(), of_b[i].data().size());
       long seen = 0, beyond = 0;
@@ -61,7 +61,7 @@ class Worlds : public ::testing::Test {
         beyond += difference > kLevels;
         seen += of_a[i].data()[k] > 0;
       }
-      const double allowed = i == kSplatPicture ? kShareOnRims : 0;
+      const double allowed = i == kSplatImage ? kShareOnRims : 0;
       EXPECT_LE(static_cast<double>(beyond), allowed * static_cast<double>(of_a[i].data().size()))
           << "image " << i << ", worst difference " << worst;
       EXPECT_GT(seen, static_cast<long>(of_a[i].data().size()) / 2) << "almost nothing was seen";
@@ -71,17 +71,18 @@ class Worlds : public ::testing::Test {
 };
 
 TEST_F(Worlds, AWorldFarFromZeroLooksTheSame) {
-  ExpectSamePictures(Import("here", 1, {0, 0, 0}), Import("far", 1, kUtmOffset));
+  ExpectSameImages(Import("here", 1, {0, 0, 0}), Import("far", 1, kUtmOffset));
 }
 
 TEST_F(Worlds, AWorldOfAnotherSizeLooksTheSame) {
   const fs::path plain = Import("plain", 1, {0, 0, 0});
-  ExpectSamePictures(plain, Import("small", 1e-3, {0, 0, 0}));
-  ExpectSamePictures(plain, Import("large", 1e3, {0, 0, 0}));
+  ExpectSameImages(plain, Import("small", 1e-3, {0, 0, 0}));
+  ExpectSameImages(plain, Import("large", 1e3, {0, 0, 0}));
 }
 
 TEST_F(Worlds, ExactTruthIsCastAnewForASetOfAnotherGrid) {
-  // Stored depth of half the size, judged by a truth of the whole size: equal but for its coding.
+  // Stored depth of half the size, evaluated by a truth of the whole size: equal but for its
+  // coding.
   constexpr double kMedianOfCoding = 1e-4;  // half a step of 65534 in 1/z over a range of 20 : 1
   const fs::path large = folder_ / "large", small = folder_ / "small", set = folder_ / "small.dtr";
   MakeSmallCourtyard(large, 10, kUtmOffset);

@@ -63,7 +63,7 @@ TEST(DepthScorer, TruthIsScaledToTheSet) {
   EXPECT_FALSE(scorer.Scores().share_within_1px.has_value());
 }
 
-TEST(DepthScorer, JudgesStatedSigmasAndSkipsPixelsWithoutOne) {
+TEST(DepthScorer, EvaluatesStatedSigmasAndSkipsPixelsWithoutOne) {
   const Worked w;
   Grid<float> sigma(8, 1);
   sigma(1, 0) = 1e-3f;  // error 0.0005: inside

@@ -184,9 +184,10 @@ TEST(EvaluationJson, CrossDepthAndVerdict) {
   EXPECT_EQ(json["passed"], true);
   EXPECT_EQ(json["tests"][0]["name"], "cross_depth_px");
   EXPECT_EQ(json["views"].size(), 2u);
-  const auto verdict = nlohmann::json::parse(VerdictJson({{"a_px", 2, 1, false, "too much"}}));
-  EXPECT_EQ(verdict["passed"], false);
-  EXPECT_EQ(verdict["tests"][0]["reason"], "too much");
+  const auto validation =
+      nlohmann::json::parse(ValidationJson({{"a_px", 2, 1, false, "too much"}}));
+  EXPECT_EQ(validation["passed"], false);
+  EXPECT_EQ(validation["tests"][0]["reason"], "too much");
 }
 
 TEST(ComparisonImage, ShowsTheDifferenceFourfold) {

@@ -79,7 +79,7 @@ TEST(SigmaScorer, OutliersAmongTheMostCertain) {
   for (const double share : alike.Scores().outlier_share_by_tenth) EXPECT_NEAR(share, 0.2, 1e-12);
 }
 
-TEST(SigmaScorer, NothingToJudgeGivesNoFigures) {
+TEST(SigmaScorer, NothingToEvaluateGivesNoFigures) {
   SigmaScorer scorer;
   EXPECT_FALSE(scorer.Scores().share_within_1_sigma.has_value());
   scorer.Add(0, 1, false);

@@ -73,19 +73,19 @@ TEST(RangeOf, IsWidenedByHowMuchTheMachineMoved) {
   EXPECT_DOUBLE_EQ(RangeOf(points[1], points).least, 20);
 }
 
-TEST(JudgeDefault, NamesWhatSavesMost) {
+TEST(AssessDefault, NamesWhatSavesMost) {
   std::vector<SweepPoint> points{At(10, 2), At(12, 1), At(6, 2), At(4, 2), At(1, 5)};
   points[0].setting = {0};
-  auto verdict = JudgeDefault(points, ParetoFront(points));
-  ASSERT_TRUE(verdict.has_value());
-  EXPECT_FALSE(verdict->on_front);
-  EXPECT_EQ(verdict->beaten_by, 3u);
-  EXPECT_FALSE(verdict->within_spread);
+  auto assessment = AssessDefault(points, ParetoFront(points));
+  ASSERT_TRUE(assessment.has_value());
+  EXPECT_FALSE(assessment->on_front);
+  EXPECT_EQ(assessment->beaten_by, 3u);
+  EXPECT_FALSE(assessment->within_spread);
   points[3].measured.cost_most = 10.5;  // of a cost that is no time
-  EXPECT_TRUE(JudgeDefault(points, ParetoFront(points))->within_spread);
+  EXPECT_TRUE(AssessDefault(points, ParetoFront(points))->within_spread);
   points[0].measured.error = 1.5;
-  EXPECT_TRUE(JudgeDefault(points, ParetoFront(points))->on_front);
-  EXPECT_FALSE(JudgeDefault(std::span(points).subspan(1), {}).has_value());
+  EXPECT_TRUE(AssessDefault(points, ParetoFront(points))->on_front);
+  EXPECT_FALSE(AssessDefault(std::span(points).subspan(1), {}).has_value());
 }
 
 /// A stage of three choices with independent effects. The tolerance is of "slow" alone.

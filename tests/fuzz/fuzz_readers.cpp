@@ -10,8 +10,8 @@
 #include <optional>
 
 #include "dtr/base/files.h"
-#include "tests/fuzz/judge.h"
 #include "tests/fuzz/mutate.h"
+#include "tests/fuzz/outcome.h"
 
 namespace dtr::fuzz {
 namespace {
@@ -82,16 +82,16 @@ class Session {
       }
     }
     fmt::print("{:<20} {:>9} inputs, {:>8} of them good files, {} troubles\n", name_, tried_,
-               accepted_, troubles_);
+               accepted_, error_texts_);
     std::fflush(stdout);
   }
 
   bool Try(const std::string& input) {
-    const Verdict verdict = Judge(reader_, input);
+    const Outcome outcome = TryInput(reader_, input);
     ++tried_;
-    if (verdict.accepted) ++accepted_;
-    if (!verdict.trouble.empty()) Complain(verdict.trouble, input);
-    return verdict.accepted;
+    if (outcome.accepted) ++accepted_;
+    if (!outcome.error_text.empty()) Complain(outcome.error_text, input);
+    return outcome.accepted;
   }
 
   void WriteSeeds(const fs::path& folder) const {
@@ -100,33 +100,33 @@ class Session {
       WriteFileAtomically(folder / name_ / std::to_string(i), reader_.seeds[i]);
     }
   }
-  int troubles() const { return troubles_; }
+  int error_texts() const { return error_texts_; }
 
  private:
   void TryPrefixes(const std::string& good) {
     const size_t step = good.size() / kMaxPrefixes + 1;
     for (size_t bytes = 0; bytes < good.size(); bytes += step) Try(good.substr(0, bytes));
   }
-  void Complain(const std::string& trouble, const std::string& input) {
+  void Complain(const std::string& error_text, const std::string& input) {
     constexpr int kShown = 5;
-    if (++troubles_ > kShown) return;
-    const fs::path kept = fs::current_path() / fmt::format("fuzz-{}-{}", name_, troubles_);
+    if (++error_texts_ > kShown) return;
+    const fs::path kept = fs::current_path() / fmt::format("fuzz-{}-{}", name_, error_texts_);
     WriteFileAtomically(kept, input);
-    fmt::print(stderr, "{}: {}; input in {}\n", name_, trouble, kept.string());
+    fmt::print(stderr, "{}: {}; input in {}\n", name_, error_text, kept.string());
   }
 
   std::string name_;
   Reader reader_;
   std::vector<std::string> corpus_;
   long tried_ = 0, accepted_ = 0;
-  int troubles_ = 0;
+  int error_texts_ = 0;
 };
 
 int Main(const Options& options) {
   const fs::path folder = MakeFolder();
   fmt::print("inputs lie in {} while they are read\n", folder.string());
   std::fflush(stdout);
-  int troubles = 0;
+  int error_texts = 0;
   size_t used = 0;
   for (const ReaderKind& kind : AllReaders()) {
     if (options.list) fmt::print("{}\n", kind.name);
@@ -143,7 +143,7 @@ int Main(const Options& options) {
     } else {
       session.Run(options.inputs, options.seed);
     }
-    troubles += session.troubles();
+    error_texts += session.error_texts();
     fs::remove_all(folder / kind.name);
   }
   fs::remove_all(folder);
@@ -151,7 +151,7 @@ int Main(const Options& options) {
     fmt::print(stderr, "fuzz_readers: no such reader; see --list\n");
     return 2;
   }
-  return troubles == 0 ? 0 : 1;
+  return error_texts == 0 ? 0 : 1;
 }
 
 }  // namespace

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <optional>
 
-#include "tests/fuzz/judge.h"
+#include "tests/fuzz/outcome.h"
 
 namespace {
 
@@ -26,8 +26,8 @@ extern "C" int LLVMFuzzerInitialize(int*, char***) {
 }
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  const auto verdict = dtr::fuzz::Judge(*reader, {reinterpret_cast<const char*>(data), size});
-  if (verdict.trouble.empty()) return 0;
-  std::fprintf(stderr, "%s: %s\n", DTR_FUZZ_READER, verdict.trouble.c_str());
+  const auto outcome = dtr::fuzz::TryInput(*reader, {reinterpret_cast<const char*>(data), size});
+  if (outcome.error_text.empty()) return 0;
+  std::fprintf(stderr, "%s: %s\n", DTR_FUZZ_READER, outcome.error_text.c_str());
   std::abort();
 }

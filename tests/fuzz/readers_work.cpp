@@ -2,13 +2,13 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/sweep_facts.h"
-#include "pipeline/detail/depth/effort_json.h"
 #include "cli/sweep_store.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/io/run_record.h"
 #include "pipeline/depth_settings.h"
 #include "pipeline/detail/boards/rig_timestamps.h"
+#include "pipeline/detail/depth/quality_json.h"
 #include "pipeline/detail/run/prune_journal.h"
 #include "tests/fuzz/readers.h"
 
@@ -96,7 +96,7 @@ Reader OpenBench(const fs::path& folder) {
 Reader OpenEffort(const fs::path& folder) {
   const fs::path file = folder / "effort.json";
   return {file, {pipeline::SettingsJson("patchmatch", {}).dump()}, [=] {
-            pipeline::EffortFromJson(ReadFile(file, kSeedLimitBytes), file.string());
+            pipeline::QualityFromJson(ReadFile(file, kSeedLimitBytes), file.string());
           }};
 }
 

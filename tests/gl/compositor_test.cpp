@@ -173,7 +173,7 @@ class CompositorTest : public testing::GlTest {
   const NamedScene scene_ = ParityScenes()[3];
   const RenderScene views_ = MakeRenderScene(scene_.set);
 
-  DrawnPicture Draw(FittingRenderer& renderer) const {
+  DrawnFrame Draw(FittingRenderer& renderer) const {
     return renderer.Draw(views_, scene_.novel.camera, scene_.novel.cam_from_world, {});
   }
   RenderResult Render(Drawer drawer = Drawer::kOpenGl) const {
@@ -189,7 +189,7 @@ TEST_F(CompositorTest, ATextureAndAPictureInMemoryAreShownWhereTheyAreInFront) {
     FittingRenderer renderer({}, drawer);
     Compositor compositor;
     Host host;
-    const DrawnPicture drawn = Draw(renderer);
+    const DrawnFrame drawn = Draw(renderer);
     ASSERT_EQ(drawn.rgba != nullptr, in_memory);
     for (const HostState& state : States()) {  // one image, whose depth is mapped ever again
       const Shown shown =
@@ -213,7 +213,7 @@ TEST_F(CompositorTest, DepthThatIsMappedAsItIsDrawnIsTheSame) {
         DepthProjection projection = ProjectionOf(state);
         if (!as_said) projection.at_infinity *= 1.01;
         const simd::WindowDepthMapping mapping = CurrentMapping(projection);
-        const DrawnPicture drawn =
+        const DrawnFrame drawn =
             renderer.Draw(views_, scene_.novel.camera, scene_.novel.cam_from_world, {}, mapping);
         EXPECT_NE(drawn.window_z, nullptr);
         EXPECT_EQ(drawn.mapping, mapping);
@@ -234,7 +234,7 @@ TEST_F(CompositorTest, TheNextPictureTakesThePlaceOfTheLast) {
   host.With(plain, [&] { compositor.Composite(Draw(renderer), ProjectionOf(plain)); });
   RenderOptions nearest;
   nearest.views = 1;
-  const DrawnPicture drawn =
+  const DrawnFrame drawn =
       renderer.Draw(views_, scene_.novel.camera, scene_.novel.cam_from_world, nearest);
   const Shown shown = host.With(plain, [&] { compositor.Composite(drawn, ProjectionOf(plain)); });
   const RenderResult picture = renderer.ReadBack();
@@ -254,7 +254,7 @@ TEST_F(CompositorTest, WhatIsGuessedIsNeverCutOff) {
   Compositor compositor;
   Host host;
   for (HostState state : States()) {
-    const DrawnPicture taken = compositor.TakeFilled(picture, depth);
+    const DrawnFrame taken = compositor.TakeFilled(picture, depth);
     const Shown shown = host.With(state, [&] { compositor.Composite(taken, ProjectionOf(state)); });
     EXPECT_LE(ApartFrom(shown, picture, depth, state).pixels, kUndecided) << state.name;
   }
@@ -264,7 +264,7 @@ TEST_F(CompositorTest, LeavesTheHostsStateAsItWas) {
   FittingRenderer renderer({}, Drawer::kSimd);
   Compositor compositor;
   Host host;
-  const DrawnPicture drawn = Draw(renderer);
+  const DrawnFrame drawn = Draw(renderer);
   const Texture array = Texture::Make(), plain = Texture::Make(), other = Texture::Make();
   // Textures are made as the first image comes; unit 15 is where the renderer makes its own.
   constexpr GLenum kUnits[] = {GL_TEXTURE0, GL_TEXTURE15};

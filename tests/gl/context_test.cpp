@@ -135,7 +135,7 @@ TEST_F(Context, AShaderThatDoesNotCompileIsNamedWithItsLine) {
 }
 
 TEST_F(Context, EveryEmbeddedShaderSaysWhichStepItIs) {
-  EXPECT_EQ(EmbeddedShaders().size(), 14u);
+  EXPECT_EQ(EmbeddedShaders().size(), 15u);
   for (const EmbeddedShader& shader : EmbeddedShaders()) {
     EXPECT_FALSE(shader.text.empty()) << shader.name;
   }

@@ -68,7 +68,7 @@ TEST_F(Render, APictureLeftOnTheGpuIsTheOneThatRenderReads) {
     RenderOptions options = OptionsOf(RenderMethod::kTwoPass);
     options.method = method;
     options.fill_holes = true;  // Draw fills nothing
-    const DrawnPicture drawn =
+    const DrawnFrame drawn =
         renderer.Draw(views, scene.novel.camera, scene.novel.cam_from_world, options);
     EXPECT_TRUE(glIsTexture(drawn.image) && glIsTexture(drawn.depth) && glIsTexture(drawn.marks));
     EXPECT_EQ(drawn.width_px, scene.novel.camera.width_px());
@@ -280,13 +280,13 @@ TEST(LayerSizes, AreTheViewsOwnWhereTheseAreFewAndElseFewAndLargeEnough) {
     std::set<LayerSize> images, depths;
     for (const View* view : views) {
       const LayerSize image{view->image.width(), view->image.height()};
-      const LayerSize layer = few.LayerFor(image), depth = DepthPictureSize(*view, resolution);
+      const LayerSize layer = few.LayerFor(image), depth = PackedDepthSize(*view, resolution);
       EXPECT_GE(layer.width_px, image.width_px);
       EXPECT_GE(layer.height_px, image.height_px);
       EXPECT_GE(few.LayerFor(depth).width_px, depth.width_px);
       const SampleGrid samples = MakeSampleGrid(*view, resolution);
       EXPECT_EQ(depth,
-                DepthPictureSize(samples.inverse_depth.width(), samples.inverse_depth.height()));
+                PackedDepthSize(samples.inverse_depth.width(), samples.inverse_depth.height()));
       images.insert(layer);
       depths.insert(few.LayerFor(depth));
     }

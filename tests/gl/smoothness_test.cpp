@@ -2,7 +2,7 @@
 //
 // The measure: along FlyThrough's path of 100 steps, the change of a frame is the largest change of
 // any pixel (of 255, of three channels) from the frame before; pixels within 2 of a depth break
-// (SPEC 2.3) in either frame, or unseen in either, are not judged. The largest change may be 3
+// (SPEC 2.3) in either frame, or unseen in either, are not evaluated. The largest change may be 3
 // times the median of all frames: texture that moves changes pixels, a view that pops changes them
 // all at once.
 #include <gtest/gtest.h>

@@ -5,8 +5,8 @@
 
 #include <cmath>
 
-#include "dtr/gl/depth_picture.h"
 #include "dtr/gl/layer_sizes.h"
+#include "dtr/gl/packed_depth.h"
 #include "dtr/types/inverse_depth_code.h"
 #include "tests/gl/gl_testing.h"
 
@@ -14,7 +14,7 @@ namespace dtr::gl {
 namespace {
 
 using namespace dtr::testing;
-using StoredDepthPicture = GlTest;
+using StoredPackedDepth = GlTest;
 
 /// As a set on disk gives its depth back.
 void RoundToCodes(View& view, double near_z, double far_z) {
@@ -110,7 +110,7 @@ TEST(StoredDepth, WhatCodesCannotHoldStaysFloat) {
   EXPECT_TRUE(StoreDepth(view, samples).codes.empty());
 }
 
-TEST(DepthPicture, HasTheEdgeOnceMoreAndThenABitPerBlock) {
+TEST(PackedDepth, HasTheEdgeOnceMoreAndThenABitPerBlock) {
   SampleGrid samples;
   samples.inverse_depth = Grid<double>(19, 35);
   samples.masked = Grid<std::uint8_t>(19, 35);
@@ -126,8 +126,8 @@ TEST(DepthPicture, HasTheEdgeOnceMoreAndThenABitPerBlock) {
     }
   }
   const BreakRule rule{0.01, std::nullopt};
-  const std::vector<float> picture = DepthPicture(values, samples, rule);
-  const LayerSize size = DepthPictureSize(19, 35);
+  const std::vector<float> picture = PackedDepth(values, samples, rule);
+  const LayerSize size = PackedDepthSize(19, 35);
   ASSERT_EQ(size, (LayerSize{20, 36 + 3}));
   ASSERT_EQ(picture.size(), 20u * 39u);
   const auto at = [&](int x, int y) { return picture[static_cast<size_t>(y * 20 + x)]; };
@@ -151,7 +151,7 @@ TEST(DepthPicture, HasTheEdgeOnceMoreAndThenABitPerBlock) {
   EXPECT_EQ(at(19, 35), at(18, 34));
 }
 
-TEST_F(StoredDepthPicture, IsThatOfFloatDepth) {
+TEST_F(StoredPackedDepth, IsThatOfFloatDepth) {
   NamedScene scene = ParityScenes()[3];  // holes and masks
   for (View& view : scene.set.frames[0].views) RoundToCodes(view, 3, 30);
   RenderOptions options;

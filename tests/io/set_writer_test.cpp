@@ -352,9 +352,9 @@ TEST(RewriteMetadata, ChangesTheVerdictAndNothingElse) {
   WriteSmallSet(target);
   auto before = Contents(target);
   DtrSet set = ReadSet(target);
-  set.verdict_json = R"({"passed":true})";
+  set.validation_json = R"({"passed":true})";
   RewriteMetadata(target, set);
-  EXPECT_EQ(ReadSet(target).verdict_json, R"({"passed":true})");
+  EXPECT_EQ(ReadSet(target).validation_json, R"({"passed":true})");
   auto after = Contents(target);
   before.erase("set.json");
   after.erase("set.json");

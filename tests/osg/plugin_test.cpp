@@ -37,7 +37,7 @@ TEST_F(Plugin, OptionsWithoutAMeaningAreToldBeforeAnythingIsRead) {
   std::filesystem::create_directories(folder / "a.dtr");
   WriteFileAtomically(folder / "a.dtr/set.json", "no set");
   const std::string set = (folder / "a.dtr").string();
-  for (const char* option : {"views=many", "resolution=2x", "instant="}) {
+  for (const char* option : {"views=many", "resolution=2x", "time-step="}) {
     const auto result = Load(set, option);
     EXPECT_FALSE(result.success()) << option;
     EXPECT_THAT(result.message(), AllOf(StartsWith("osgdb_dtr: option "),

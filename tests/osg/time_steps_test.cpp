@@ -55,32 +55,32 @@ std::vector<ImageRgb8> Alone() {
   return pictures;
 }
 
-class InstantsTest : public OsgTest {};
+class TimeStepsTest : public OsgTest {};
 
-TEST_F(InstantsTest, EachIsShownAsASetOfItsOwnWouldBe) {
+TEST_F(TimeStepsTest, EachIsShownAsASetOfItsOwnWouldBe) {
   const std::vector<ImageRgb8> alone = Alone();
   ASSERT_EQ(alone.size(), 3U);
   EXPECT_NE(alone[0], alone[1]);
   EXPECT_NE(alone[1], alone[2]);
   const osg::ref_ptr<DepthTR> node = NodeOf(MovingSquare());
-  EXPECT_EQ(node->numberOfInstants(), 3);
-  EXPECT_EQ(node->getInstantTime(2), 2 * kStep);
+  EXPECT_EQ(node->numberOfTimeSteps(), 3);
+  EXPECT_EQ(node->getTimeStepTime(2), 2 * kStep);
   OffscreenViewer viewer(node.get(), Ahead().camera, Ahead().cam_from_world);
-  for (const int instant : {0, 2, 1, 0}) {
-    node->setInstant(instant);
-    EXPECT_EQ(node->getInstant(), instant);
-    EXPECT_EQ(viewer.Draw().image, alone[static_cast<size_t>(instant)]) << instant;
+  for (const int time_step : {0, 2, 1, 0}) {
+    node->setTimeStep(time_step);
+    EXPECT_EQ(node->getTimeStep(), time_step);
+    EXPECT_EQ(viewer.Draw().image, alone[static_cast<size_t>(time_step)]) << time_step;
     EXPECT_EQ(&node->inputViews()[0].view(), node->getScene()->scene.views[0]);
   }
-  EXPECT_THROW(node->setInstant(3), UsageError);
-  EXPECT_THROW(node->setInstant(-1), UsageError);
+  EXPECT_THROW(node->setTimeStep(3), UsageError);
+  EXPECT_THROW(node->setTimeStep(-1), UsageError);
 }
 
-TEST_F(InstantsTest, TheBoundHoldsAllOfThem) {
+TEST_F(TimeStepsTest, TheBoundHoldsAllOfThem) {
   const osg::ref_ptr<DepthTR> node = NodeOf(MovingSquare());
   const osg::BoundingBox bounds = node->getDtrDrawable()->getBoundingBox();
-  for (int instant = 0; instant < 3; ++instant) {
-    node->setInstant(instant);
+  for (int time_step = 0; time_step < 3; ++time_step) {
+    node->setTimeStep(time_step);
     for (const osgDTR::InputView& view : node->inputViews()) {
       for (const osg::Vec3f& point : view.get3D()) {
         if (point == osg::Vec3f()) continue;
@@ -90,7 +90,7 @@ TEST_F(InstantsTest, TheBoundHoldsAllOfThem) {
   }
 }
 
-TEST_F(InstantsTest, PlayingFollowsTheViewersTime) {
+TEST_F(TimeStepsTest, PlayingFollowsTheViewersTime) {
   const std::vector<ImageRgb8> alone = Alone();
   for (const Threading threading :
        {Threading::SingleThreaded, Threading::CullThreadPerCameraDrawThreadPerContext}) {
@@ -99,13 +99,13 @@ TEST_F(InstantsTest, PlayingFollowsTheViewersTime) {
     above->addChild(node);
     OffscreenViewer viewer(above.get(), Ahead().camera, Ahead().cam_from_world, threading);
     EXPECT_EQ(viewer.DrawAt(99).image, alone[0]);
-    node->setInstant(1);
+    node->setTimeStep(1);
     node->setPlaying(true);  // from time step 1 on, whatever the time is now
     const std::pair<double, size_t> expected[] = {{100.0, 1}, {100.4, 1}, {100.6, 2},
                                                   {101.1, 0}, {101.6, 1}, {103.2, 1}};
-    for (const auto& [time_s, instant] : expected) {
-      EXPECT_EQ(viewer.DrawAt(time_s).image, alone[instant]) << time_s;
-      EXPECT_EQ(node->getInstant(), static_cast<int>(instant)) << time_s;
+    for (const auto& [time_s, time_step] : expected) {
+      EXPECT_EQ(viewer.DrawAt(time_s).image, alone[time_step]) << time_s;
+      EXPECT_EQ(node->getTimeStep(), static_cast<int>(time_step)) << time_s;
     }
     node->setPlaying(false);
     EXPECT_EQ(viewer.DrawAt(104.2).image, alone[1]) << "it stands still";
@@ -131,35 +131,35 @@ bool Press(osgDTR::KeyHandler& handler, int key) {
   return handler.handle(*event, viewer);
 }
 
-TEST(InstantKeys, StepAndPlay) {
+TEST(TimeStepKeys, StepAndPlay) {
   const osg::ref_ptr<DepthTR> node = NodeOf(MovingSquare());
   const osg::ref_ptr<osgDTR::KeyHandler> handler = new osgDTR::KeyHandler(node.get());
   EXPECT_TRUE(Press(*handler, '.'));
-  EXPECT_EQ(node->getInstant(), 1);
+  EXPECT_EQ(node->getTimeStep(), 1);
   EXPECT_TRUE(Press(*handler, ','));
   EXPECT_TRUE(Press(*handler, ','));
-  EXPECT_EQ(node->getInstant(), 2);
+  EXPECT_EQ(node->getTimeStep(), 2);
   EXPECT_TRUE(Press(*handler, 'j'));
   EXPECT_TRUE(node->isPlaying());
   EXPECT_TRUE(Press(*handler, '.'));
   EXPECT_FALSE(node->isPlaying()) << "a step by hand stops it";
 }
 
-TEST(InstantKeys, MeanNothingToAStillScene) {
+TEST(TimeStepKeys, MeanNothingToAStillScene) {
   const osg::ref_ptr<DepthTR> node = NodeOf(SquareBeforePlane());
   const osg::ref_ptr<osgDTR::KeyHandler> handler = new osgDTR::KeyHandler(node.get());
-  EXPECT_EQ(node->numberOfInstants(), 1);
+  EXPECT_EQ(node->numberOfTimeSteps(), 1);
   for (const int key : {',', '.', 'j'}) EXPECT_FALSE(Press(*handler, key));
 }
 
-TEST(Instants, ACopyIsAtTheSameInstantAndPlaysByItself) {
+TEST(TimeSteps, ACopyIsAtTheSameTimeStepAndPlaysByItself) {
   const osg::ref_ptr<DepthTR> node = NodeOf(MovingSquare());
-  node->setInstant(2);
+  node->setTimeStep(2);
   const osg::ref_ptr<DepthTR> copy = osg::clone(node.get(), osg::CopyOp::DEEP_COPY_ALL);
-  EXPECT_EQ(copy->getInstant(), 2);
+  EXPECT_EQ(copy->getTimeStep(), 2);
   EXPECT_EQ(copy->getScene(), node->getScene());
-  copy->setInstant(0);
-  EXPECT_EQ(node->getInstant(), 2);
+  copy->setTimeStep(0);
+  EXPECT_EQ(node->getTimeStep(), 2);
 }
 
 }  // namespace

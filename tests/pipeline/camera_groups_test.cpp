@@ -84,7 +84,7 @@ TEST(CameraGroups, OneFolderOrOneCameraPerFolderBySizeIsNoQuestion) {
 
 calib::SfmModel ModelWithFocal(double focal_px) {
   calib::SfmModel model;
-  model.cameras[4] = {calib::LensModel::kSimpleRadial, 800, 600, {focal_px, 400, 300, 0}};
+  model.cameras[4] = {calib::CameraModel::kSimpleRadial, 800, 600, {focal_px, 400, 300, 0}};
   for (const char* name : {"a.jpg", "b.jpg", "c.jpg"}) {
     calib::SfmImage image;
     image.name = name;

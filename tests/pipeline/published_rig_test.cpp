@@ -70,7 +70,7 @@ double ValueOf(const BoardValidation& report, const std::string& name) {
   return found == report.tests.end() ? std::nan("") : found->value;
 }
 
-double RmsOf(const BoardValidation& report) { return ValueOf(report, "unseen_rms_px"); }
+double RmsOf(const BoardValidation& report) { return ValueOf(report, "test_rms_px"); }
 
 class PublishedRig : public ::testing::Test {
  protected:
@@ -88,7 +88,7 @@ class PublishedRig : public ::testing::Test {
 
 TEST_F(PublishedRig, ItsLensesExplainOurCornersAsWellAsOurOwn) {
   for (size_t c = 0; c < published_.size(); ++c) {
-    UnseenViews own{{}, photos_.frames.size()};
+    TestViews own{{}, photos_.frames.size()};
     for (RigView view : photos_.views) {
       if (view.camera != c) continue;
       view.camera = 0;
@@ -97,7 +97,7 @@ TEST_F(PublishedRig, ItsLensesExplainOurCornersAsWellAsOurOwn) {
     RigCamera alone = published_[c];
     alone.cam_from_rig = {};
     const BoardValidation report = ValidateBoards({board_, {alone}, {}, 0, true}, own, {});
-    const double ratio = ValueOf(report, "unseen_rms_ratio");
+    const double ratio = ValueOf(report, "test_rms_ratio");
     std::printf(
         "%s: RMS %.3f px, %.2f of our own sigma, lenses differ by %.1f sigmas, ours is "
         "uncertain by %.3g px\n",
@@ -121,7 +121,7 @@ TEST_F(PublishedRig, ItsPlacesAreOursToAHundredthAndTheClocksAreWhatIsWrong) {
   const size_t frames = photos_.frames.size();
   const RigSolution ours = SolveRig(board_, inputs, photos_.views, frames, options);
   const BoardValidation theirs =
-      ValidateBoards({board_, published_, {}, 0, false}, UnseenViews{photos_.views, frames}, {});
+      ValidateBoards({board_, published_, {}, 0, false}, TestViews{photos_.views, frames}, {});
   std::printf("RMS with the published positions %.3f px, with ours %.3f px\n", RmsOf(theirs),
               ours.rms_px);
   EXPECT_LT(RmsOf(theirs), 1.05 * ours.rms_px);

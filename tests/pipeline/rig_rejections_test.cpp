@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
-const calib::LensCamera kLens{calib::LensModel::kPinhole, 64, 48, {60, 60, 32, 24}};
+const calib::LensCamera kLens{calib::CameraModel::kPinhole, 64, 48, {60, 60, 32, 24}};
 
 calib::Calibration CalibrationOf(const std::vector<std::string>& cameras) {
   calib::Calibration calibration;
@@ -62,7 +62,7 @@ TEST_F(GivenLenses, AreOfTheCamerasSizeAndOfAModelThatBoardsTell) {
       ThrowsMessage<Error>(HasSubstr(
           "`camera` left: expected intrinsics of 64 x 48 px as its photos are, found 128 x 48; "
           "give the intrinsics of this camera")));
-  const calib::LensCamera fov{calib::LensModel::kFov, 64, 48, {60, 60, 32, 24, 0.9}};
+  const calib::LensCamera fov{calib::CameraModel::kFov, 64, 48, {60, 60, 32, 24, 0.9}};
   EXPECT_THAT(
       [&] {
         Calibrate({"left", "right"}, fov);
@@ -87,7 +87,7 @@ TEST(UnseenPhotosOfARig, AreOfItsCamerasWithoutAPattern) {
   SilentProgress silent;
   EXPECT_THAT(
       [&] {
-        ReadUnseen(CalibrationOf({"a", "b"}), folder.path(), "a*", 1, silent);
+        ReadTestPhotos(CalibrationOf({"a", "b"}), folder.path(), "a*", 1, silent);
       },
       ThrowsMessage<UsageError>(HasSubstr(
           "`pattern` a*: is for the photos of one camera; a rig's cameras are distinguished")));

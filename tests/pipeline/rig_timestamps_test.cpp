@@ -25,13 +25,13 @@ class RigTimestampsFile : public ::testing::Test {
   }
 };
 
-const RigInstants kTwoCameras{{{0, 0}, 3}, {{0, 1}, 4}, {{1, 0}, 3}, {{1, 1}, 4}};
+const RigTimeSteps kTwoCameras{{{0, 0}, 3}, {{0, 1}, 4}, {{1, 0}, 3}, {{1, 1}, 4}};
 
 TEST_F(RigTimestampsFile, ColumnsMayStandInAnyOrderAmongOthers) {
   const RigTimestamps read = Read(
       "frame_time,frame_index,note,cam_id,sync_index\n"
       "0.1,0,x,0,3\n0.2,0,x,1,3\n0.3,1,x,0,4\n0.4,1,x,1,4\n");
-  EXPECT_EQ(read.instants, kTwoCameras);
+  EXPECT_EQ(read.time_steps, kTwoCameras);
   EXPECT_FALSE(read.counted);
 }
 
@@ -40,20 +40,20 @@ TEST_F(RigTimestampsFile, WithoutFrameIndexRowsOfACameraInOrderOfTimeAreItsFrame
                            "3,0,0.1\n4,0,0.3\n3,1,0.2\n4,1,0.4\n",     // camera after camera
                            "4,1,0.4\n4,0,0.3\n3,1,0.2\n3,0,0.1\n"}) {  // last one first
     const RigTimestamps read = Read(std::string("sync_index,cam_id,frame_time\n") + rows);
-    EXPECT_EQ(read.instants, kTwoCameras) << rows;
+    EXPECT_EQ(read.time_steps, kTwoCameras) << rows;
     EXPECT_TRUE(read.counted);
   }
 }
 
-TEST_F(RigTimestampsFile, ACameraThatMissedAnInstantHasNoFrameThere) {
-  const RigInstants expected{{{0, 0}, 0}, {{0, 1}, 1}, {{0, 2}, 2}, {{1, 0}, 0}, {{1, 1}, 2}};
-  EXPECT_EQ(Read("sync_index,cam_id,frame_time\n0,0,1\n0,1,1\n1,0,2\n2,0,3\n2,1,3\n").instants,
+TEST_F(RigTimestampsFile, ACameraThatMissedAnTimeStepHasNoFrameThere) {
+  const RigTimeSteps expected{{{0, 0}, 0}, {{0, 1}, 1}, {{0, 2}, 2}, {{1, 0}, 0}, {{1, 1}, 2}};
+  EXPECT_EQ(Read("sync_index,cam_id,frame_time\n0,0,1\n0,1,1\n1,0,2\n2,0,3\n2,1,3\n").time_steps,
             expected);
   EXPECT_EQ(
-      Read("sync_index,cam_id,frame_time\n0,0,1\n0,1,1\n1,0,2\n1,1,\n2,0,3\n2,1,3\n").instants,
+      Read("sync_index,cam_id,frame_time\n0,0,1\n0,1,1\n1,0,2\n1,1,\n2,0,3\n2,1,3\n").time_steps,
       expected);
   EXPECT_EQ(Read("sync_index,cam_id,frame_index\n0,0,0\n0,1,0.0\n1,0,1\n1,1,nan\n2,0,2\n2,1,1.0\n")
-                .instants,
+                .time_steps,
             expected);
 }
 
@@ -66,7 +66,7 @@ TEST_F(RigTimestampsFile, LineEndsMarksQuotesAndSeparatorsOfOtherProgramsAreRead
         "sync_index;cam_id;frame_index\n3;0;0\n3;1;0\n4;0;1\n4;1;1",
         "\n sync_index , cam_id , frame_index \n\n3, 0, 0\n3, 1, 0\n\n4, 0, 1\n4, 1, 1\n\n",
         "sync_index\tcam_id\tframe_index\n3\t0\t0\n3\t1\t0\n4\t0\t1\n4\t1\t1\n"}) {
-    EXPECT_EQ(Read(text).instants, kTwoCameras) << text;
+    EXPECT_EQ(Read(text).time_steps, kTwoCameras) << text;
   }
 }
 

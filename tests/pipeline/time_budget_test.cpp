@@ -9,7 +9,7 @@ namespace dtr::pipeline {
 namespace {
 
 // About what a core of a Xeon takes.
-constexpr ProbedCosts kCosts{.search_s = 4e-7, .round_s = 4e-7, .verdict_s = 1.5e-7};
+constexpr ProbedCosts kCosts{.search_s = 4e-7, .round_s = 4e-7, .check_s = 1.5e-7};
 
 std::vector<stereo::StereoView> Views(int count) {
   return std::vector<stereo::StereoView>(
@@ -26,41 +26,41 @@ DepthChoice Within(double seconds) {
 TEST(TimeBudget, TheLadderRisesAndHoldsThePresets) {
   const auto views = Views(16);
   double before = 0;
-  for (const stereo::Effort& effort : EffortLadder()) {
-    const double seconds = PredictSeconds(kCosts, effort, views);
+  for (const stereo::QualitySettings& quality : QualityLadder()) {
+    const double seconds = PredictSeconds(kCosts, quality, views);
     EXPECT_GT(seconds, before);
     before = seconds;
   }
   for (const Preset& preset : Presets()) {
-    EXPECT_EQ(std::count(EffortLadder().begin(), EffortLadder().end(), preset.effort), 1)
+    EXPECT_EQ(std::count(QualityLadder().begin(), QualityLadder().end(), preset.quality), 1)
         << preset.name;
   }
 }
 
 TEST(TimeBudget, PicksTheMostThatFits) {
   const auto views = Views(16);
-  const auto ladder = EffortLadder();
+  const auto ladder = QualityLadder();
   for (size_t i = 0; i < ladder.size(); ++i) {
     const double seconds = PredictSeconds(kCosts, ladder[i], views);
-    EXPECT_EQ(PickEffort(kCosts, Within(1.001 * seconds), views), ladder[i]);
-    EXPECT_EQ(PickEffort(kCosts, Within(0.999 * seconds), views), ladder[i == 0 ? 0 : i - 1]);
+    EXPECT_EQ(PickQuality(kCosts, Within(1.001 * seconds), views), ladder[i]);
+    EXPECT_EQ(PickQuality(kCosts, Within(0.999 * seconds), views), ladder[i == 0 ? 0 : i - 1]);
   }
-  EXPECT_EQ(PickEffort(kCosts, Within(1e9), views), ladder.back());
+  EXPECT_EQ(PickQuality(kCosts, Within(1e9), views), ladder.back());
 }
 
 TEST(TimeBudget, WhatIsGivenExplicitlyStays) {
   DepthChoice choice = Within(1e9);
   choice.rounds = 1;
-  EXPECT_EQ(PickEffort(kCosts, choice, Views(4)).rounds, 1);
+  EXPECT_EQ(PickQuality(kCosts, choice, Views(4)).rounds, 1);
 }
 
 TEST(TimeBudget, TwiceThePixelsOrViewsTakeTwiceAsLong) {
-  const stereo::Effort effort;
-  const double once = PredictSeconds(kCosts, effort, Views(16));
-  EXPECT_NEAR(PredictSeconds(kCosts, effort, Views(32)), 2 * once, 1e-9 * once);
+  const stereo::QualitySettings quality;
+  const double once = PredictSeconds(kCosts, quality, Views(16));
+  EXPECT_NEAR(PredictSeconds(kCosts, quality, Views(32)), 2 * once, 1e-9 * once);
   // Two views have one neighbour each, however many are asked for.
-  const stereo::Effort one{.neighbours = 1, .round_neighbours = 1};
-  EXPECT_EQ(PredictSeconds(kCosts, effort, Views(2)), PredictSeconds(kCosts, one, Views(2)));
+  const stereo::QualitySettings one{.neighbours = 1, .round_neighbours = 1};
+  EXPECT_EQ(PredictSeconds(kCosts, quality, Views(2)), PredictSeconds(kCosts, one, Views(2)));
 }
 
 TEST(TimeBudget, VisitsByHand) {

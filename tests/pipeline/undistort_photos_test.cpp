@@ -27,7 +27,7 @@ class UndistortPhotosTest : public ::testing::Test {
  protected:
   void SetUp() override {
     calibrated_.model.cameras[1] = {
-        calib::LensModel::kSimpleRadial, kWidthPx, kHeightPx, {35, 20, 15, -0.1}};
+        calib::CameraModel::kSimpleRadial, kWidthPx, kHeightPx, {35, 20, 15, -0.1}};
     for (int i = 0; i < kPhotos; ++i) {
       const std::string name = "p" + std::to_string(i) + ".png";
       io::WriteImage(folder_ / name, Picture(i));

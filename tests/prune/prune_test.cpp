@@ -233,7 +233,7 @@ TEST(LeftOutPlaces, AreSeenWithoutTheViewAndItsCopies) {
   EXPECT_EQ(places[1].photo(3, 5, 1), view.image(48 + 3, 5, 1));
   const Eigen::Vector3d ray = places[1].novel.camera.RayFromPixel({3.5, 5.5});
   EXPECT_NEAR((ray - view.camera.RayFromPixel({51.5, 5.5})).norm(), 0, 1e-12);
-  const auto pictures = Pictures(set, {}, std::span(places).first(1), {}, &cpu::Render);
+  const auto pictures = Images(set, {}, std::span(places).first(1), {}, &cpu::Render);
   EXPECT_NE(pictures[0], places[0].photo);
 }
 

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "datasets/exact/analytic_scene.h"
 #include "dtr/base/error.h"
 #include "dtr/render/geometry.h"
-#include "datasets/exact/analytic_scene.h"
 
 namespace dtr {
 namespace {

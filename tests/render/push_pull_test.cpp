@@ -17,7 +17,7 @@ struct Known {
   Mask hole;
 };
 
-Known RandomPicture(int width, int height, double hole_share, Random& random) {
+Known RandomImage(int width, int height, double hole_share, Random& random) {
   Known known{Grid<double>(width, height), Grid<double>(width, height), Mask(width, height)};
   for (size_t p = 0; p < known.hole.data().size(); ++p) {
     known.inverse_depth.data()[p] = random.Uniform(0.1, 2);
@@ -94,7 +94,7 @@ TEST(PushPull, MakesOnlyWhatHolesDrawOnAndStillGivesWhatTheWholePyramidGives) {
   for (const auto& [width, height] : {std::pair{1, 1}, {1, 7}, {9, 1}, {33, 20}, {64, 65}}) {
     for (const double share : {0.01, 0.3, 0.95, 1.0}) {
       for (const Favour favour : {Favour::kFar, Favour::kNone}) {
-        Known known = RandomPicture(width, height, share, random);
+        Known known = RandomImage(width, height, share, random);
         for (int x = 0; x < width / 2; ++x) known.hole(x, height / 2) = kHole;
         Grid<Plain::Cell> plain(width, height);
         for (size_t p = 0; p < plain.data().size(); ++p) {
@@ -119,7 +119,7 @@ TEST(PushPull, MakesOnlyWhatHolesDrawOnAndStillGivesWhatTheWholePyramidGives) {
 
 TEST(PushPull, DoesNotDependOnTheNumberOfThreads) {
   Random random(5);
-  const Known known = RandomPicture(200, 300, 0.8, random);
+  const Known known = RandomImage(200, 300, 0.8, random);
   const PushPull<1> one = Filled(known, Favour::kFar, 1), three = Filled(known, Favour::kFar, 3);
   for (int y = 0; y < 300; ++y) {
     for (int x = 0; x < 200; ++x) {

@@ -152,7 +152,7 @@ TEST(HtmlReport, NeedsNothingFromOutsideAndRunsNothing) {
   HtmlReport page("Title <1>");
   page.Section("A & B");
   page.Paragraph("<img src=x onerror=alert(1)>");
-  page.Verdict(false, "broken");
+  page.Result(false, "broken");
   page.Table({"name", "value"}, {{std::string("</td><script>"), std::string("3.5 dB")}});
   page.Image("cap\"tion", ImageRgb8(4, 3, 3, 50));
   page.Svg("plot", "<svg xmlns=\"http://www.w3.org/2000/svg\"><script>alert(1)</script></svg>");

@@ -12,12 +12,12 @@ namespace dtr::testing {
 
 /// What two renderers may differ by: 2 of 255 levels (rounding to 8 bits twice, single precision)
 /// on all but a share of the pixels, those where rounding turns a decision. Those at the Delta
-/// border are not judged, and must be few.
+/// border are not evaluated, and must be few.
 inline constexpr int kLevels = 2;
 inline constexpr double kApartShare = 0.002, kCoverageShare = 0.002, kBorderShare = 0.01;
 
 struct Comparison {
-  long long compared = 0, apart = 0;         ///< seen by both and judged; more than kLevels apart
+  long long compared = 0, apart = 0;  ///< seen by both and evaluated; more than kLevels apart
   long long judged = 0, coverage_apart = 0;  ///< neither at a break nor at the Delta border
   long long border = 0, total = 0;           ///< flagged by the reference: at the Delta border
   int largest = 0;

@@ -51,7 +51,7 @@ void ExpectParityOf(Renderer& renderer, const NamedScene& scene, RenderMethod me
   }
   std::printf("%-18s %-14s %s\n", scene.name.c_str(), what.c_str(), all.Text().c_str());
   EXPECT_TRUE(all.Holds()) << scene.name << " " << what;
-  // Enough is judged: a measure that leaves out everything holds always.
+  // Enough is evaluated: a measure that leaves out everything holds always.
   EXPECT_GT(all.compared, all.total / 4) << scene.name << " " << what;
 }
 

@@ -68,9 +68,9 @@ class RoundsEngine final : public Engine {
     }
     return Flat(sum);
   }
-  DepthEstimate Judge(std::span<const StereoView>, int reference, std::span<const int>,
-                      const DepthRange&, std::span<const PlaneMap* const> maps,
-                      const EngineOptions&) const override {
+  DepthEstimate Filter(std::span<const StereoView>, int reference, std::span<const int>,
+                       const DepthRange&, std::span<const PlaneMap* const> maps,
+                       const EngineOptions&) const override {
     DepthEstimate e{DepthImage(64, 48), Grid<float>(64, 48, 1, 0.01f)};
     const float w = maps[static_cast<size_t>(reference)]->inverse_depth(0, 0);
     for (float& z : e.depth.grid().data()) z = 1 / w;

@@ -11,7 +11,7 @@
 namespace dtr::stereo {
 namespace {
 
-/// Neither focal length nor baseline is published; any will do, depth is judged as disparity.
+/// Neither focal length nor baseline is published; any will do, depth is evaluated as disparity.
 constexpr double kFocal = 500, kBaseline = 1;
 
 struct Pair {

@@ -43,13 +43,13 @@ DepthEstimate EstimateFirst(const std::vector<StereoView>& views, const DepthRan
   return testing::EstimateFirstBy("patchmatch", views, range, threads);
 }
 
-Quality Judge(const DepthEstimate& estimate, const DepthImage& truth) {
-  return testing::JudgeAt(kFocal * kBaseline, estimate, truth);
+Quality QualityOf(const DepthEstimate& estimate, const DepthImage& truth) {
+  return testing::QualityAt(kFocal * kBaseline, estimate, truth);
 }
 
 TEST(PatchMatchEngine, FindsASlantedPlaneToAFractionOfAPixelFromTwoViews) {
   const auto shots = Shots(Slanted(), {Facing({0, 0, 0}), Facing({kBaseline, 0, 0})});
-  const Quality q = Judge(EstimateFirst(ViewsOf(shots)), shots[0].truth);
+  const Quality q = QualityOf(EstimateFirst(ViewsOf(shots)), shots[0].truth);
   EXPECT_GT(q.kept, 0.8);  // a strip of 14 to 20 columns is seen by one camera only
   EXPECT_LT(q.median_px, kMedianPx);
   EXPECT_LT(q.bad_share, 0.01);
@@ -58,10 +58,10 @@ TEST(PatchMatchEngine, FindsASlantedPlaneToAFractionOfAPixelFromTwoViews) {
 TEST(PatchMatchEngine, HalfAPixelInThePrincipalPointWouldShow) {
   const auto shots = Shots(Slanted(), {Facing({0, 0, 0}), Facing({kBaseline, 0, 0})});
   std::vector<StereoView> views = ViewsOf(shots);
-  const double right = Judge(EstimateFirst(views), shots[0].truth).mean_px;
+  const double right = QualityOf(EstimateFirst(views), shots[0].truth).mean_px;
   views[1].camera =
       PinholeCamera(kWidth, kHeight, kFocal, kFocal, 0.5 * kWidth + 0.5, 0.5 * kHeight);
-  const double slipped = Judge(EstimateFirst(views), shots[0].truth).mean_px;
+  const double slipped = QualityOf(EstimateFirst(views), shots[0].truth).mean_px;
   EXPECT_LT(std::abs(right), 0.02);
   EXPECT_NEAR(slipped - right, 0.5, 0.05);
 }
@@ -70,7 +70,7 @@ TEST(PatchMatchEngine, FindsASphereBeforeAWallFromFourNeighbours) {
   const auto shots = Shots(
       SphereBeforeWall(), {Facing({0, 0, 0}), Facing({kBaseline, 0, 0}), Facing({-kBaseline, 0, 0}),
                            Facing({0, kBaseline, 0}), Facing({0, -kBaseline, 0})});
-  const Quality q = Judge(EstimateFirst(ViewsOf(shots)), shots[0].truth);
+  const Quality q = QualityOf(EstimateFirst(ViewsOf(shots)), shots[0].truth);
   EXPECT_GT(q.kept, 0.9);  // what one side hides the other shows
   EXPECT_LT(q.median_px, kMedianPx);
   EXPECT_LT(q.bad_share, 0.03);
@@ -124,7 +124,7 @@ TEST(PatchMatchEngine, AnyDirectionOfTheBaselineWillDo) {
   for (const auto& c : cases) {
     SCOPED_TRACE(c.name);
     const auto shots = Shots(Slanted(), {Facing({0, 0, 0}), c.neighbour});
-    const Quality q = Judge(EstimateFirst(ViewsOf(shots)), shots[0].truth);
+    const Quality q = QualityOf(EstimateFirst(ViewsOf(shots)), shots[0].truth);
     EXPECT_GT(q.kept, 0.5);  // a rolled or vertical partner sees less of the image
     EXPECT_LT(q.median_px, 2 * kMedianPx);
     EXPECT_LT(q.bad_share, c.bad_share);
@@ -161,7 +161,7 @@ void ExpectTheSameFromAllInstructionSets(const DepthImage& truth, Estimate estim
     EXPECT_EQ(found.inverse_depth_sigma, same->inverse_depth_sigma);
   });
   if (!first[0] || !first[1]) return;
-  const Quality plain = Judge(*first[0], truth), fused = Judge(*first[1], truth);
+  const Quality plain = QualityOf(*first[0], truth), fused = QualityOf(*first[1], truth);
   EXPECT_NEAR(plain.kept, fused.kept, 0.01);
   EXPECT_NEAR(plain.median_px, fused.median_px, 0.005);
   EXPECT_NEAR(plain.bad_share, fused.bad_share, 0.01);
@@ -199,7 +199,7 @@ DepthEstimate AfterRounds(const std::vector<StereoView>& views, int threads = 2)
     }
   }
   for (size_t v = 0; v < views.size(); ++v) known[v] = &maps[v];
-  return engine->Judge(views, 0, others(0), kRange, known, {.threads = threads});
+  return engine->Filter(views, 0, others(0), kRange, known, {.threads = threads});
 }
 
 /// The sphere from the first `count` of: the middle, right, left, below, above.
@@ -214,8 +214,8 @@ std::vector<Shot> SphereFrom(size_t count) {
 TEST(PatchMatchEngine, RoundsFillWhatOneViewAloneGetsWrong) {
   const auto shots = SphereFrom(5);
   const auto views = ViewsOf(shots);
-  const Quality alone = Judge(EstimateFirst(views), shots[0].truth);
-  const Quality together = Judge(AfterRounds(views), shots[0].truth);
+  const Quality alone = QualityOf(EstimateFirst(views), shots[0].truth);
+  const Quality together = QualityOf(AfterRounds(views), shots[0].truth);
   EXPECT_GT(together.kept * (1 - together.bad_share), alone.kept * (1 - alone.bad_share));
   EXPECT_GT(together.kept, 0.97);
   EXPECT_LT(together.median_px, kMedianPx);
@@ -418,7 +418,7 @@ TEST(PatchMatchEngine, MaskedPixelsAreHolesAndTheirContentHasNoInfluence) {
   pair.PaintUnderTheMasks();
   const DepthEstimate after = pair.Estimate();
   EXPECT_EQ(before.depth, after.depth);
-  EXPECT_LT(Judge(after, pair.shots[0].truth).bad_share, 0.02);
+  EXPECT_LT(QualityOf(after, pair.shots[0].truth).bad_share, 0.02);
 }
 
 TEST(PatchMatchEngine, ColoursUnderAMaskDoNotTurnLineArtIntoAPhoto) {
@@ -439,7 +439,7 @@ TEST(PatchMatchEngine, ATexturelessWallIsHoles) {
     for (auto& value : shot.image.data())
       value = static_cast<std::uint8_t>(127 + HashBits(n++) % 3);
   }
-  EXPECT_LT(Judge(EstimateFirst(ViewsOf(shots)), shots[0].truth).kept, 0.01);
+  EXPECT_LT(QualityOf(EstimateFirst(ViewsOf(shots)), shots[0].truth).kept, 0.01);
 }
 
 TEST(PatchMatchEngine, PlanesAreFittedToWeakTextureAndLeftOutWhereItSuffices) {
@@ -466,7 +466,7 @@ TEST(PatchMatchEngine, ExposureDoesNotMatter) {
   for (auto& value : shots[1].image.data()) {
     value = static_cast<std::uint8_t>(0.6 * value + 10);
   }
-  const Quality q = Judge(EstimateFirst(ViewsOf(shots)), shots[0].truth);
+  const Quality q = QualityOf(EstimateFirst(ViewsOf(shots)), shots[0].truth);
   EXPECT_GT(q.kept, 0.75);
   EXPECT_LT(q.median_px, kMedianPx);
   EXPECT_LT(q.bad_share, 0.01);

@@ -26,7 +26,7 @@ struct Fixture {
             dtr::stereo::testing::SphereBeforeWall(), kCamera,
             {Facing({0, 0, 0}), Facing({0.4, 0, 0}), Facing({0, 0.4, 0})})),
         views(dtr::stereo::testing::ViewsOf(shots)),
-        picture(MakePicture(views[0])),
+        picture(MakeGreyImage(views[0])),
         sources{MakeSource(views[1], 1), MakeSource(views[2], 1)} {}
 
   /// What a view sees, its inverse depths multiplied.
@@ -44,14 +44,14 @@ struct Fixture {
 
   std::vector<dtr::stereo::testing::Shot> shots;
   std::vector<StereoView> views;
-  Picture picture;
+  GreyImage picture;
   std::vector<SourcePyramid> sources;
 };
 
 /// 1 - NCC of a window parallel to the image in the first source, in double precision.
 double PlainCost(const Fixture& f, const Level& level, int x, int y, double w) {
   const Source& s = level.sources[0];
-  const Picture other = MakePicture(f.views[1]);
+  const GreyImage other = MakeGreyImage(f.views[1]);
   const auto grey = [&](int i, int j) {
     return std::floor(other.grey(std::clamp(i, 0, kWidth - 1), std::clamp(j, 0, kHeight - 1)) +
                       0.5);

@@ -41,13 +41,13 @@ DepthEstimate EstimateFirst(const std::vector<StereoView>& views, const DepthRan
   return testing::EstimateFirstBy("sgbm", views, range, threads);
 }
 
-Quality Judge(const DepthEstimate& estimate, const DepthImage& truth) {
-  return testing::JudgeAt(kFocal * kBaseline, estimate, truth);
+Quality QualityOf(const DepthEstimate& estimate, const DepthImage& truth) {
+  return testing::QualityAt(kFocal * kBaseline, estimate, truth);
 }
 
 TEST(SgbmEngine, FindsASlantedPlaneFromTwoViews) {
   const auto shots = Shots(Slanted(), {Facing({0, 0, 0}), Facing({kBaseline, 0, 0})});
-  const Quality q = Judge(EstimateFirst(ViewsOf(shots)), shots[0].truth);
+  const Quality q = QualityOf(EstimateFirst(ViewsOf(shots)), shots[0].truth);
   EXPECT_GT(q.kept, kMinKept);
   EXPECT_LT(q.median_px, kMedianPx);
   EXPECT_LT(q.bad_share, 0.02);
@@ -57,7 +57,7 @@ TEST(SgbmEngine, FindsASphereBeforeAWallFromFourNeighbours) {
   const auto shots = Shots(
       SphereBeforeWall(), {Facing({0, 0, 0}), Facing({kBaseline, 0, 0}), Facing({-kBaseline, 0, 0}),
                            Facing({0, kBaseline, 0}), Facing({0, -kBaseline, 0})});
-  const Quality q = Judge(EstimateFirst(ViewsOf(shots)), shots[0].truth);
+  const Quality q = QualityOf(EstimateFirst(ViewsOf(shots)), shots[0].truth);
   EXPECT_GT(q.kept, 0.9);  // what one side hides the other shows
   EXPECT_LT(q.median_px, kMedianPx);
   EXPECT_LT(q.bad_share, 0.03);
@@ -66,10 +66,10 @@ TEST(SgbmEngine, FindsASphereBeforeAWallFromFourNeighbours) {
 TEST(SgbmEngine, HalfAPixelInThePrincipalPointWouldShow) {
   const auto shots = Shots(Slanted(), {Facing({0, 0, 0}), Facing({kBaseline, 0, 0})});
   std::vector<StereoView> views = ViewsOf(shots);
-  const double right = Judge(EstimateFirst(views), shots[0].truth).mean_px;
+  const double right = QualityOf(EstimateFirst(views), shots[0].truth).mean_px;
   views[1].camera =
       PinholeCamera(kWidth, kHeight, kFocal, kFocal, 0.5 * kWidth + 0.5, 0.5 * kHeight);
-  const double slipped = Judge(EstimateFirst(views), shots[0].truth).mean_px;
+  const double slipped = QualityOf(EstimateFirst(views), shots[0].truth).mean_px;
   EXPECT_LT(std::abs(right), 0.08);  // 0.02 to 0.05 px remain of the pull to whole pixels
   EXPECT_NEAR(slipped - right, 0.5, 0.1);
 }
@@ -86,7 +86,7 @@ TEST(SgbmEngine, VerticalAndRolledAndLeftHandPairsGiveTheSameDepth) {
   for (const auto& c : cases) {
     SCOPED_TRACE(c.name);
     const auto shots = Shots(Slanted(), {Facing({0, 0, 0}), c.neighbour});
-    const Quality q = Judge(EstimateFirst(ViewsOf(shots)), shots[0].truth);
+    const Quality q = QualityOf(EstimateFirst(ViewsOf(shots)), shots[0].truth);
     EXPECT_GT(q.kept, 0.55);  // a rolled or vertical partner sees less of the image
     EXPECT_LT(q.median_px, kMedianPx);
     EXPECT_LT(q.bad_share, 0.03);
@@ -135,7 +135,7 @@ TEST(SgbmEngine, ForwardMotionIsRejectedAndTheOtherNeighboursAreUsed) {
       Shots(Slanted(), {Facing({0, 0, 0}), Facing({0.05, 0, 0.5}), Facing({kBaseline, 0, 0})});
   auto views = ViewsOf(shots);
   const DepthEstimate with_three = EstimateFirst(views);
-  EXPECT_LT(Judge(with_three, shots[0].truth).median_px, kMedianPx);
+  EXPECT_LT(QualityOf(with_three, shots[0].truth).median_px, kMedianPx);
   views.resize(2);
   try {
     EstimateFirst(views);
@@ -168,7 +168,7 @@ TEST(SgbmEngine, MaskedPixelsAreHolesAndTheirContentHasNoInfluence) {
   }
   const DepthEstimate after = estimate();
   EXPECT_EQ(before.depth, after.depth);
-  EXPECT_LT(Judge(after, shots[0].truth).bad_share, 0.05);
+  EXPECT_LT(QualityOf(after, shots[0].truth).bad_share, 0.05);
 }
 
 TEST(SgbmEngine, ATexturelessWallIsMostlyHoles) {
@@ -179,7 +179,7 @@ TEST(SgbmEngine, ATexturelessWallIsMostlyHoles) {
     for (auto& value : shot.image.data())
       value = static_cast<std::uint8_t>(127 + HashBits(n++) % 3);
   }
-  EXPECT_LT(Judge(EstimateFirst(ViewsOf(shots)), shots[0].truth).kept, 0.3);
+  EXPECT_LT(QualityOf(EstimateFirst(ViewsOf(shots)), shots[0].truth).kept, 0.3);
 }
 
 TEST(SgbmEngine, ScaleAndOffsetOfTheWorldDoNotMatter) {

@@ -10,7 +10,7 @@ namespace {
 constexpr int kWidth = 200, kHeight = 150;  // speckles have fewer than 3 pixels
 constexpr float kPxPerW = 100, kRange = 1;  // w from 0.2 to 1.2: a hundred pixels of disparity
 
-struct Picture {
+struct GreyImage {
   DepthEstimate estimate{DepthImage(kWidth, kHeight), Grid<float>(kWidth, kHeight)};
   Grid<float> px_per_w = Grid<float>(kWidth, kHeight, 1, kPxPerW);
   Grid<std::uint8_t> consistent = Grid<std::uint8_t>(kWidth, kHeight, 1, 2);
@@ -36,7 +36,7 @@ struct Picture {
 };
 
 TEST(Speckles, SurfacesStay) {
-  Picture picture;
+  GreyImage picture;
   for (int y = 20; y < 80; ++y) {
     for (int x = 20; x < 120; ++x) picture.Set(x, y, 0.3 + 0.002 * x);
   }
@@ -44,7 +44,7 @@ TEST(Speckles, SurfacesStay) {
 }
 
 TEST(Speckles, WhatFewViewsLeadToGoes) {
-  Picture picture;
+  GreyImage picture;
   for (int y = 10; y < 140; y += 3) {
     for (int x = 10; x < 190; x += 3) picture.Set(x, y, 0.5);
   }
@@ -54,7 +54,7 @@ TEST(Speckles, WhatFewViewsLeadToGoes) {
 
 // Leaves, wire netting: nothing is connected, all of it lies at much the same depth.
 TEST(Speckles, ThinThingsKeepEachOther) {
-  Picture picture;
+  GreyImage picture;
   Random random(1);
   for (int y = 10; y < 140; y += 3) {
     for (int x = 10; x < 190; x += 3) picture.Set(x, y, 0.5 + 0.01 * random.Normal());
@@ -63,14 +63,14 @@ TEST(Speckles, ThinThingsKeepEachOther) {
 }
 
 TEST(Speckles, OneAloneStays) {
-  Picture picture;
+  GreyImage picture;
   picture.Set(50, 50, 0.5);
   EXPECT_EQ(picture.Left(), 1);
 }
 
 // Ground that repeats: chance gives each of them two views, and any depth.
 TEST(Speckles, ChanceIsTakenOut) {
-  Picture picture;
+  GreyImage picture;
   Random random(2);
   for (int y = 10; y < 140; y += 3) {
     for (int x = 10; x < 190; x += 3) picture.Set(x, y, random.Uniform(0.2, 1.2));
@@ -79,7 +79,7 @@ TEST(Speckles, ChanceIsTakenOut) {
 }
 
 TEST(Speckles, ThinThingsBeforeAWallStay) {
-  Picture picture;
+  GreyImage picture;
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth; ++x) picture.Set(x, y, (x + y) % 7 == 0 ? 0.9 : 0.4);
   }

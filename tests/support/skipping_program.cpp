@@ -1,4 +1,4 @@
-// Not a test: what one_entry_main_test runs.
+// Not a test: what test_main_test runs.
 #include <gtest/gtest.h>
 
 TEST(Program, Passes) {}

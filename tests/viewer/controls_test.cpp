@@ -192,10 +192,10 @@ std::vector<Controls::Row> Controls::WhereRows() {
            return s["fly_speed"].get<double>() > 10 * slow["fly_speed"].get<double>();
          });
        }},
-      {"Time", [this] { Fold("Time", "instant"); }},
-      {"instant", [this] { ClickUntilItIs("instant", "instant", 1); }},
-      {"later", [this] { ClickUntilItIs("later", "instant", 2); }},
-      {"earlier", [this] { ClickUntilItIs("earlier", "instant", 1); }},
+      {"Time", [this] { Fold("Time", "time step"); }},
+      {"time step", [this] { ClickUntilItIs("time_step", "time_step", 1); }},
+      {"later", [this] { ClickUntilItIs("later", "time_step", 2); }},
+      {"earlier", [this] { ClickUntilItIs("earlier", "time_step", 1); }},
       {"play", [this] { ExpectPlays([this] { Click("play"); }); }},
   };
 }
@@ -294,7 +294,7 @@ std::vector<Controls::Row> Controls::PathRows() {
            return s["message"].get<std::string>().starts_with("dtr render ");
          });
        }},
-      {"save image", [this] { File("save image", "moving-picture-001.png"); }},
+      {"save image", [this] { File("save image", "moving-image-001.png"); }},
       {"save window", [this] { File("save window", "moving-window-001.png"); }},
   };
 }

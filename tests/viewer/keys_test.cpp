@@ -32,18 +32,18 @@ class Keys : public MovingWindow {
   void Fly(const std::vector<std::pair<const char*, Eigen::Vector3d>>& keys);
   void ThroughViews();
   void NearestView();
-  void KindsOfPicture();
+  void KindsOfImage();
   void Cameras();
   void Magnifier();
   void Comparisons();
   void HiddenView();
   void Marks();
-  void Instants();
+  void TimeSteps();
   void AddsCameras();
   void LoadsAPath();
   void FliesAlongIt();
   void RecordsIt();
-  void SavesPicture();
+  void SavesImage();
   void SavesWindow();
   void CommandLine();
   void Panel();
@@ -114,7 +114,7 @@ void Keys::NearestView() {
   AfterItIs({"key", "c"}, "at_view", at["at_view"]);
 }
 
-void Keys::KindsOfPicture() {
+void Keys::KindsOfImage() {
   AfterItIs({"key", "Down"}, "shown", "depth");
   AfterItIs({"key", "Down"}, "shown", "sigma");
   AfterItIs({"key", "Up"}, "shown", "depth");
@@ -155,16 +155,16 @@ void Keys::Marks() {
       "a distance", [](const Json& s) { return s["distance"] != ""; }, 20);
 }
 
-void Keys::Instants() {
+void Keys::TimeSteps() {
   const Json start = Now();
-  EXPECT_EQ(start["instants"], 3);
-  EXPECT_EQ(start["instant"], 0);
-  AfterItIs({"key", "n"}, "instant", 1);
-  AfterItIs({"key", "b"}, "instant", 0);
-  const Json last = AfterItIs({"key", "b"}, "instant", 2);
+  EXPECT_EQ(start["time_steps"], 3);
+  EXPECT_EQ(start["time_step"], 0);
+  AfterItIs({"key", "n"}, "time_step", 1);
+  AfterItIs({"key", "b"}, "time_step", 0);
+  const Json last = AfterItIs({"key", "b"}, "time_step", 2);
   EXPECT_EQ(last["at_view"], start["at_view"]);
   EXPECT_LT(WayInCam(start, last).norm(), 1e-12) << "time passes, the camera stays";
-  AfterItIs({"key", "n"}, "instant", 0);
+  AfterItIs({"key", "n"}, "time_step", 0);
 }
 
 void Keys::AddsCameras() {
@@ -193,16 +193,16 @@ void Keys::RecordsIt() {
   const std::string video = In("moving-video-001.mp4");
   const Json end = Wait(
       "a video", [&](const Json& s) { return !s["recording"].get<bool>() && fs::exists(video); });
-  EXPECT_EQ(end["instant"], 2) << "a path runs through time";
+  EXPECT_EQ(end["time_step"], 2) << "a path runs through time";
   // Frame by frame what dtr render makes of the same cameras.
   DtrOk({"render", Set(), "--path", In("moving-video-001.json"), "-o", In("frames")});
   EXPECT_EQ(FilesIn(In("frames")), 3);
 }
 
-void Keys::SavesPicture() {
+void Keys::SavesImage() {
   Press("p");
-  Wait("an image", [&](const Json&) { return fs::exists(In("moving-picture-001.png")); });
-  EXPECT_EQ(io::ReadImage(In("moving-picture-001.png")).width(), width_px_);
+  Wait("an image", [&](const Json&) { return fs::exists(In("moving-image-001.png")); });
+  EXPECT_EQ(io::ReadImage(In("moving-image-001.png")).width(), width_px_);
 }
 
 void Keys::SavesWindow() {
@@ -222,7 +222,7 @@ void Keys::CommandLine() {
   EXPECT_NE(command.find("--frame 2"), std::string::npos) << command;
   ASSERT_TRUE(RunProcess({"sh", "-c", std::string(DTR_PROGRAM) + command.substr(3)}, {}).Ok());
   EXPECT_EQ(io::ReadImage(In("moving-camera-001.png")).data(),
-            io::ReadImage(In("moving-picture-001.png")).data())
+            io::ReadImage(In("moving-image-001.png")).data())
       << command;
 }
 
@@ -265,7 +265,7 @@ std::vector<Keys::Row> Keys::Rows() {
          After({"key", "v"}, "all in view", MovedFrom(start));
          Press("c");
        }},
-      {"Down, Up", [this] { KindsOfPicture(); }},
+      {"Down, Up", [this] { KindsOfImage(); }},
       {"F", [this] { Cameras(); }},
       {"G", [this] { Magnifier(); }},
       {"X", [this] { Comparisons(); }},
@@ -274,18 +274,18 @@ std::vector<Keys::Row> Keys::Rows() {
       {"T", [this] { ExpectPlays([] { Press("t"); }); }},
       {"N, B",
        [this] {
-         while (Now()["instant"] != 0) {
+         while (Now()["time_step"] != 0) {
            const Json before = Now();
            After({"key", "n"}, "another",
-                 [&](const Json& s) { return s["instant"] != before["instant"]; });
+                 [&](const Json& s) { return s["time_step"] != before["time_step"]; });
          }
-         Instants();
+         TimeSteps();
        }},
       {"K", [this] { AddsCameras(); }},
       {"O", [this] { LoadsAPath(); }},
       {"Space", [this] { FliesAlongIt(); }},
       {"R", [this] { RecordsIt(); }},
-      {"P", [this] { SavesPicture(); }},
+      {"P", [this] { SavesImage(); }},
       {"F12", [this] { SavesWindow(); }},
       {"L", [this] { CommandLine(); }},
       {"Tab", [this] { Panel(); }},

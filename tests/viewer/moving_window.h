@@ -127,7 +127,7 @@ class MovingWindow : public MovingSphereSet {
       std::this_thread::sleep_for(std::chrono::milliseconds(700));
       press();
       WaitUntilStill();
-      if (Now()["instant"] != start["instant"]) return;
+      if (Now()["time_step"] != start["time_step"]) return;
     }
     ADD_FAILURE() << "playing never came to another time step";
   }

@@ -9,26 +9,26 @@ using Json = nlohmann::json;
 
 using MovingWindowTest = MovingWindow;
 
-TEST_F(MovingWindowTest, BeginsAtAnyInstantAndShowsWhatRenderShows) {
+TEST_F(MovingWindowTest, BeginsAtAnyTimeStepAndShowsWhatRenderShows) {
   Open(96, 64, {"--no-panel", "--frame", "1", "--like", "0002"});
   if (IsSkipped()) return;
   const Json start = Now();
-  EXPECT_EQ(start["instant"], 1);
-  EXPECT_EQ(start["instants"], 3);
+  EXPECT_EQ(start["time_step"], 1);
+  EXPECT_EQ(start["time_steps"], 3);
   Do({"mousemove", "40", "30", "key", "p"});
-  Wait("an image", [&](const Json&) { return fs::exists(In("moving-picture-001.png")); });
+  Wait("an image", [&](const Json&) { return fs::exists(In("moving-image-001.png")); });
   DtrOk({"render", Set(), "--frame", "1", "--like", "0002", "-o", In("rendered.png")});
   EXPECT_EQ(
-      Differing(io::ReadImage(In("moving-picture-001.png")), io::ReadImage(In("rendered.png"))), 0);
+      Differing(io::ReadImage(In("moving-image-001.png")), io::ReadImage(In("rendered.png"))), 0);
 }
 
-TEST_F(MovingWindowTest, WhatIsLeftOutOfOneInstantIsLeftOutOfAll) {
+TEST_F(MovingWindowTest, WhatIsLeftOutOfOneTimeStepIsLeftOutOfAll) {
   Open(96, 64, {"--no-panel"});
   if (IsSkipped()) return;
   Do({"mousemove", "40", "30", "key", "h"});
   Wait("a view left out", [](const Json& s) { return s["hidden"] == Json::array({"0000.jpg"}); });
   Press("n");
-  const Json next = Wait("the next time step", [](const Json& s) { return s["instant"] == 1; });
+  const Json next = Wait("the next time step", [](const Json& s) { return s["time_step"] == 1; });
   EXPECT_EQ(next["hidden"], Json::array({"0000.jpg"}));
   for (const Json& name : next["views_used"]) EXPECT_NE(name, "0000.jpg");
 }

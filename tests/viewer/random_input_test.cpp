@@ -79,7 +79,7 @@ TEST_P(RandomInputTest, LeavesAViewerThatWorks) {
   ViewerProgram::Do({script});
   ViewerProgram::Do({"key", "ctrl+q"});
   EXPECT_EQ(viewer.WaitForEnd(), 0);
-  EXPECT_TRUE(std::filesystem::exists(In("moving-picture-001.png"))) << "inputs did arrive";
+  EXPECT_TRUE(std::filesystem::exists(In("moving-image-001.png"))) << "inputs did arrive";
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, RandomInputTest, ::testing::Values(kFirstSeed, 7, 31));

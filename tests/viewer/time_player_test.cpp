@@ -12,7 +12,7 @@ FrameClock Quarters() {
   return FrameClock(set);
 }
 
-TEST(TimePlayer, ShowsEachInstantForAsLongAsItLasts) {
+TEST(TimePlayer, ShowsEachTimeStepForAsLongAsItLasts) {
   const FrameClock clock = Quarters();
   TimePlayer player;
   EXPECT_EQ(player.Advance(0.1, clock, 2), 2u) << "it stands still";
@@ -26,7 +26,7 @@ TEST(TimePlayer, ShowsEachInstantForAsLongAsItLasts) {
   EXPECT_EQ(player.Advance(0.1, clock, shown), shown);
 }
 
-TEST(TimePlayer, GoesOnFromAnInstantThatWasChosenByHand) {
+TEST(TimePlayer, GoesOnFromAnTimeStepThatWasChosenByHand) {
   const FrameClock clock = Quarters();
   TimePlayer player;
   player.StartOrStop();
@@ -36,7 +36,7 @@ TEST(TimePlayer, GoesOnFromAnInstantThatWasChosenByHand) {
   EXPECT_EQ(player.Advance(0.1, clock, 3), 0u);
 }
 
-TEST(TimePlayer, ASlowFrameLeavesNoInstantOut) {
+TEST(TimePlayer, ASlowFrameLeavesNoTimeStepOut) {
   const FrameClock clock = Quarters();
   TimePlayer player;
   player.StartOrStop();

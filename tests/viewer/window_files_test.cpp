@@ -39,7 +39,7 @@ TEST_F(ViewerWindow, TheCommandLineOfAPrunedSetSaysWhatDiffersFromItsOwnOptions)
     ViewerProgram::Do({"mousemove", "150", "120", "key", "Right"});
     viewer.WaitFor("the next view", [](const Json& s) { return s["at_view"] == "0002.jpg"; });
     ViewerProgram::Do({"key", "p"});
-    const fs::path picture = folder / "mine-picture-001.png";
+    const fs::path picture = folder / "mine-image-001.png";
     viewer.WaitFor("a saved image", [&](const Json&) { return fs::exists(picture); });
     ViewerProgram::Do({"key", "l"});
     const std::string command = viewer.WaitFor("a command line", [](const Json& s) {
@@ -175,7 +175,7 @@ TEST_F(ViewerWindow, AFolderThatGoesAwayIsToldOf) {
   fs::create_directory(output);
   ViewerProgram::Do({"key", "p"});
   viewer.WaitFor("an image",
-                 [&](const Json&) { return fs::exists(output / "good-picture-001.png"); });
+                 [&](const Json&) { return fs::exists(output / "good-image-001.png"); });
 }
 
 TEST_F(ViewerWindow, CtrlQQuitsOutOfATextFieldAndARecording) {

@@ -71,7 +71,7 @@ TEST_F(ViewerWindow, TheCommandLineDrawsThePictureInTheWindow) {
         {"mousemove", "150", "120", "mousedown", "1", "mousemove", "170", "124", "mouseup", "1"});
     viewer.WaitFor("an orbit", MovedFrom(start));
     ViewerProgram::Do({"key", "p"});
-    const fs::path picture = folder / "good-picture-001.png";
+    const fs::path picture = folder / "good-image-001.png";
     viewer.WaitFor("a saved image", [&](const Json&) { return fs::exists(picture); });
     ViewerProgram::Do({"key", "l"});
     const Json state = viewer.WaitFor("a command line", [](const Json& s) {
@@ -255,7 +255,7 @@ TEST_F(ViewerWindow, PixelsGoOnceTheyAreSampledAndComeBackForWhoLooksAtThem) {
   viewer.WaitFor("the first image", Anything);
   int saved = 0;
   const auto save = [&] {
-    const fs::path file = In("good-picture-00" + std::to_string(++saved) + ".png");
+    const fs::path file = In("good-image-00" + std::to_string(++saved) + ".png");
     ViewerProgram::Do({"key", "p"});
     viewer.WaitFor("a saved image", [&](const Json&) { return fs::exists(file); });
     return io::ReadImage(file);
@@ -314,8 +314,8 @@ TEST_F(ViewerWindow, AFlightIsTimedAndItsEndIsSaved) {
   EXPECT_GE(json["frames"], 20);
   EXPECT_GE(json["moving"]["frames"], 10);
   EXPECT_GT(json["moving"]["fps"], 0);
-  EXPECT_GT(json["first_picture_ms"], 0);
-  EXPECT_GT(json["first_whole_picture_ms"], json["first_picture_ms"]) << "at the flight's end";
+  EXPECT_GT(json["first_frame_ms"], 0);
+  EXPECT_GT(json["first_whole_frame_ms"], json["first_frame_ms"]) << "at the flight's end";
   EXPECT_TRUE(json["last"]["still"].get<bool>());
   EXPECT_EQ(io::ReadImage(In("end.png")).height(), 240);
 }
@@ -324,7 +324,7 @@ TEST_F(ViewerWindow, ASetWhoseCalibrationFailedItsTestsSaysSo) {
   const fs::path copy = folder_ / "failed.dtr";
   fs::copy(Set(), copy, fs::copy_options::recursive);
   DtrSet set = io::ReadSet(copy);
-  set.verdict_json =
+  set.validation_json =
       R"({"passed":false,"tests":[{"name":"held_out_rms_px","passed":false,"value":9,"limit":1}]})";
   io::RewriteMetadata(copy, set);
   const char* warning = "WARNING: validation FAILED: held_out_rms_px";

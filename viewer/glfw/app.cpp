@@ -16,7 +16,7 @@
 #include "dtr/gl/glfw/window.h"
 #include "dtr/io/video.h"
 #include "viewer/glfw/error_text.h"
-#include "viewer/glfw/keeper.h"
+#include "viewer/glfw/file_saver.h"
 #include "viewer/glfw/panel.h"
 #include "viewer/glfw/path_tools.h"
 #include "viewer/glfw/run_figures.h"
@@ -38,8 +38,8 @@ class App {
         host_(host),
         window_({settings.width_px, settings.height_px, settings.title, true}),
         interface_(window_.handle()),
-        keeper_(settings.output, settings.output_stem),
-        paths_(host, keeper_, [this](const std::string& line) { Tell(line); }),
+        saver_(settings.output, settings.output_stem),
+        paths_(host, saver_, [this](const std::string& line) { Tell(line); }),
         path_dialog_(settings.output),
         stamp_(host.stamp ? host.stamp() : ""),
         session_(OpenSession()),
@@ -51,7 +51,7 @@ class App {
     inspection.cameras = settings.cameras;
     if (settings.photo) inspection.compared = Compared::kPhoto;
     if (settings.start) controller().JumpTo(*settings.start);
-    session_->ShowInstant(settings.instant);
+    session_->ShowTimeStep(settings.time_step);
     if (settings.play_time) PlayOrStop();
     if (!settings.warning.empty()) message_ = settings.warning;
   }
@@ -67,9 +67,9 @@ class App {
       HandleInput();
       FitToWindow();
       Fly(passed);
-      session_->ShowInstant(time_.Advance(passed, session_->clock(), session_->instant()));
+      session_->ShowTimeStep(time_.Advance(passed, session_->clock(), session_->time_step()));
       const bool drew_moving = session_->schedule.Make(Order(), Pace());
-      if (time_.playing()) ReadNextInstant();
+      if (time_.playing()) ReadNextTimeStep();
       const Stopwatch of_window;
       Film();
       DrawInterface();
@@ -170,7 +170,7 @@ class App {
       case Action::kPanel:
         panel_ = !panel_;
         return;
-      case Action::kSavePicture:
+      case Action::kSaveImage:
         save_picture_ = true;
         return;
       case Action::kSaveWindow:
@@ -205,10 +205,10 @@ class App {
         return paths_.flight().StartOrStop(controller().camera().camera);
       case Action::kRecord:
         return paths_.StartOrStopRecording(controller().camera().camera, session_->opened().set);
-      case Action::kNextInstant:
-        return StepInstant(1);
-      case Action::kPreviousInstant:
-        return StepInstant(-1);
+      case Action::kNextTimeStep:
+        return StepTimeStep(1);
+      case Action::kPreviousTimeStep:
+        return StepTimeStep(-1);
       case Action::kPlayTime:
         return PlayOrStop();
       case Action::kNextShown:
@@ -227,11 +227,11 @@ class App {
     shown_ = kAllShown[static_cast<size_t>((static_cast<int>(at) + by + count) % count)];
   }
 
-  void StepInstant(int by) {
+  void StepTimeStep(int by) {
     const auto count = static_cast<int>(session_->clock().frames());
     time_.Stop();
-    session_->ShowInstant(
-        static_cast<size_t>((static_cast<int>(session_->instant()) + by + count) % count));
+    session_->ShowTimeStep(
+        static_cast<size_t>((static_cast<int>(session_->time_step()) + by + count) % count));
   }
 
   void PlayOrStop() {
@@ -242,10 +242,10 @@ class App {
   }
 
   /// In the background, so that it is there when its turn comes.
-  void ReadNextInstant() {
-    PictureOrder next = Order();
-    next.instant = (next.instant + 1) % session_->clock().frames();
-    next.hidden = session_->HiddenAt(next.instant);
+  void ReadNextTimeStep() {
+    FrameRequest next = Order();
+    next.time_step = (next.time_step + 1) % session_->clock().frames();
+    next.hidden = session_->HiddenAt(next.time_step);
     session_->maker.ReadAhead(next);
   }
 
@@ -256,7 +256,7 @@ class App {
     } else if (const NovelCamera* wanted = paths_.Wanted()) {
       controller().JumpTo(*wanted);
       time_.Stop();
-      session_->ShowInstant(paths_.WantedFrame(session_->clock().frames()));
+      session_->ShowTimeStep(paths_.WantedFrame(session_->clock().frames()));
     } else if (const auto flown = paths_.flight().Advance(passed_s, io::kVideoFramesPerSecond)) {
       controller().JumpTo(*flown);
     }
@@ -267,11 +267,11 @@ class App {
     return played_ < settings_.play.size() * static_cast<size_t>(settings_.laps);
   }
 
-  PictureSchedule::Pace Pace() const {
-    if (paths_.Wanted()) return PictureSchedule::Pace::kWhole;
+  FrameSchedule::Pace Pace() const {
+    if (paths_.Wanted()) return FrameSchedule::Pace::kWhole;
     // A hand that holds still in the middle of a drag will go on.
     const bool moves = CameraMoves() || session_->controller.dragging() || time_.playing();
-    return moves ? PictureSchedule::Pace::kMoving : PictureSchedule::Pace::kResting;
+    return moves ? FrameSchedule::Pace::kMoving : FrameSchedule::Pace::kResting;
   }
 
   /// By itself: there is another image with the next frame.
@@ -280,12 +280,12 @@ class App {
            session_->controller.moving();
   }
 
-  PictureOrder Order() const {
+  FrameRequest Order() const {
     const NovelCamera* wanted = paths_.Wanted();  // of its own size, whatever the window's is now
     return {wanted ? *wanted : session_->controller.camera(),
             options_,
             shown_,
-            session_->instant(),
+            session_->time_step(),
             session_->inspector.inspection().hidden,
             session_->inspector.inspection().LooksAtPixels()};
   }
@@ -303,7 +303,7 @@ class App {
   void DrawInterface() {
     session_->inspector.Look(whole(), options_, interface_.cursor_px());
     interface_.BeginFrame();
-    const MadePicture& picture = session_->maker.picture();
+    const MadeFrame& picture = session_->maker.picture();
     if (!picture.texture.empty()) {
       const auto id = static_cast<std::intptr_t>(picture.texture.name());
       ImGui::GetBackgroundDrawList()->AddImage(reinterpret_cast<ImTextureID>(id), {0, 0},
@@ -313,7 +313,7 @@ class App {
     std::vector<Action> pressed;
     controls_.clear();
     if (panel_) {
-      const size_t instant = session_->instant();
+      const size_t time_step = session_->time_step();
       PanelModel model{picture,
                        controller(),
                        options_,
@@ -322,8 +322,8 @@ class App {
                        session_->inspector.inspection(),
                        session_->maker.colours(),
                        paths_.flight(),
-                       {static_cast<int>(session_->clock().frames()), static_cast<int>(instant),
-                        session_->clock().StartOf(instant), time_.playing()},
+                       {static_cast<int>(session_->clock().frames()), static_cast<int>(time_step),
+                        session_->clock().StartOf(time_step), time_.playing()},
                        paths_.Progress(),
                        message_,
                        window_ms_,
@@ -333,7 +333,7 @@ class App {
       DrawPanel(interface_, model);
       pressed = std::move(model.pressed);
       controls_ = std::move(model.controls);
-      session_->ShowInstant(static_cast<size_t>(model.time.instant));
+      session_->ShowTimeStep(static_cast<size_t>(model.time.time_step));
     }
     if (help_) DrawHelp(interface_, help_);
     if (path_dialog_.open()) {
@@ -355,10 +355,10 @@ class App {
     try {
       if (std::exchange(copy_command_, false)) CopyCommand();
       if (std::exchange(save_picture_, false)) {
-        Tell("saved " + keeper_.SavePicture(session_->maker).string());
+        Tell("saved " + saver_.SaveImage(session_->maker).string());
       }
       if (std::exchange(save_window_, false)) {
-        Tell("saved " + keeper_.SaveWindow(window_.handle()).string());
+        Tell("saved " + saver_.SaveWindow(window_.handle()).string());
       }
       if (last_frame && !settings_.screenshot.empty()) {
         SaveWindowAs(settings_.screenshot, window_.handle());
@@ -371,14 +371,14 @@ class App {
 
   void CopyCommand() {
     const Inspection& inspection = session_->inspector.inspection();
-    const PictureOrder order = Order();
-    ToDraw wanted{keeper_.SaveCamera(order.camera, session_->opened().set),
+    const FrameRequest order = Order();
+    ToDraw wanted{saver_.SaveCamera(order.camera, session_->opened().set),
                   order.options,
                   order.hidden,
                   {},
                   shown_ == Shown::kDepth,
                   shown_ == Shown::kCoverage};
-    if (session_->clock().frames() > 1) wanted.instant = session_->instant();
+    if (session_->clock().frames() > 1) wanted.time_step = session_->time_step();
     const std::string command = host_.command_line(session_->opened(), wanted);
     glfwSetClipboardString(window_.handle(), command.c_str());
     Tell(command + WhatACommandLeavesOut(shown_, inspection.compared));
@@ -447,7 +447,7 @@ class App {
   std::string message_;
   gl::Window window_;
   UserInterface interface_;
-  Keeper keeper_;
+  FileSaver saver_;
   PathTools paths_;
   PathDialog path_dialog_;
   std::string stamp_;  ///< of the set that was opened, or tried to be, last

@@ -40,7 +40,7 @@ struct AppSettings {
   std::vector<NovelCamera> play;
   int laps = 1;                      ///< so many times
   std::optional<NovelCamera> start;  ///< none: the first input camera
-  size_t instant = 0;                ///< of a dynamic set: the frame shown first
+  size_t time_step = 0;              ///< of a dynamic set: the frame shown first
   bool play_time = false;            ///< of a dynamic set: from there on
   int frames = 0;                    ///< close after so many, once the image is whole; 0: never
   int largest_divisor = 8;           ///< of the sides of images while moving
@@ -48,7 +48,7 @@ struct AppSettings {
 };
 
 /// What validation says of a view's calibration.
-struct ViewVerdict {
+struct ViewValidation {
   bool good = false;
   std::string text;  ///< one line
 };
@@ -83,7 +83,7 @@ struct AppState {
   int path_keys = 0;                      ///< cameras of the path
   int frames_per_key = 0;                 ///< from one to the next
   int reloads = 0;                        ///< how often the set was read again
-  size_t instant = 0, instants = 1;       ///< of a dynamic set: the frame shown, of how many
+  size_t time_step = 0, time_steps = 1;   ///< of a dynamic set: the frame shown, of how many
   bool playing_time = false;              ///< one time step after the other
   bool recording = false;
   bool asks_for_path = false;          ///< a window asks for a file
@@ -97,7 +97,7 @@ struct ToDraw {
   std::filesystem::path camera_file;  ///< cameras.json of one camera
   RenderOptions options;
   std::vector<const View*> hidden;  ///< views not to draw from
-  std::optional<size_t> instant;    ///< of a dynamic set: its frame
+  std::optional<size_t> time_step;  ///< of a dynamic set: its frame
   /// Beside the colours: the depth, what was seen.
   bool depth = false, coverage = false;
 };
@@ -122,7 +122,7 @@ struct Host {
   /// Null: views that could not be read are never tried again.
   std::function<std::string(const View&)> view_stamp;
   /// What validation says of each view, by its name. Called on a thread of its own.
-  std::function<std::map<std::string, ViewVerdict>()> verdicts;
+  std::function<std::map<std::string, ViewValidation>()> validations;
   /// A line for whoever started the program.
   std::function<void(const std::string&)> say;
   /// Told whenever the window has a whole image and shows what the last input did; null: nobody
@@ -141,8 +141,8 @@ struct AppReport {
   AppState last;
   /// From the call of RunViewer to the first image shown that has something of the set, of
   /// whatever size, and to the first whole one: the first after a flight where it begins with one.
-  double first_picture_ms = 0, first_picture_cpu_ms = 0;
-  double first_whole_picture_ms = 0, first_whole_picture_cpu_ms = 0;
+  double first_frame_ms = 0, first_frame_cpu_ms = 0;
+  double first_whole_frame_ms = 0, first_whole_frame_cpu_ms = 0;
   FrameTimes moving;
   std::map<int, FrameTimes> moving_by_divisor;  ///< of the image's sides
   /// Physical memory held, sampled every so many frames: what grows shows.

@@ -20,7 +20,7 @@ constexpr ImU32 kMark = IM_COL32(255, 225, 60, 255);
 constexpr double kFrustumShare = 0.06;  // of the scene's size: length of a drawn camera
 constexpr int kMagnifiedPx = 25, kMagnification = 8;
 
-ImTextureID IdOf(const PictureTexture& texture) {
+ImTextureID IdOf(const FrameTexture& texture) {
   return reinterpret_cast<ImTextureID>(static_cast<std::intptr_t>(texture.name()));
 }
 
@@ -90,7 +90,7 @@ bool HidesLittle(const std::array<std::optional<ImVec2>, 4>& corners) {
 
 /// `photo` may be null.
 void DrawFrustum(ImDrawList& list, const Frustum& frustum, ImU32 colour,
-                 const PictureTexture* photo) {
+                 const FrameTexture* photo) {
   const auto& corners = frustum.corners;
   if (photo != nullptr && HidesLittle(corners)) {
     list.AddImageQuad(IdOf(*photo), *corners[0], *corners[1], *corners[2], *corners[3], {0, 0},
@@ -178,7 +178,7 @@ std::string Inspection::DistanceText() const {
                      unit);
 }
 
-void InspectionOverlay::DrawCompared(const Inspection& inspection, const PictureTexture& other,
+void InspectionOverlay::DrawCompared(const Inspection& inspection, const FrameTexture& other,
                                      const RenderOptions& left, const RenderOptions& right) {
   ImDrawList& list = *ImGui::GetBackgroundDrawList();
   const ImVec2 display = ImGui::GetIO().DisplaySize;
@@ -192,7 +192,7 @@ void InspectionOverlay::DrawCompared(const Inspection& inspection, const Picture
 }
 
 void InspectionOverlay::DrawPhoto(const Inspection& inspection, const View& view,
-                                  const NovelCamera& camera, PhotoShelf& photos) {
+                                  const NovelCamera& camera, PhotoCache& photos) {
   ImDrawList& list = *ImGui::GetBackgroundDrawList();
   CoverRight(list, inspection.border);
   std::string label = view.name + (view.role == ViewRole::kHeldOut ? " (held out)" : "");
@@ -222,22 +222,22 @@ void InspectionOverlay::DrawPhoto(const Inspection& inspection, const View& view
   Label(list, {inspection.border * display.x + 10, 8}, kLine, label);
 }
 
-const PictureTexture* InspectionOverlay::Thumbnail(const View& view, PictureMaker& maker,
-                                                   PhotoShelf& photos) {
+const FrameTexture* InspectionOverlay::Thumbnail(const View& view, FrameMaker& maker,
+                                                 PhotoCache& photos) {
   auto thumbnail = thumbnails_.find(&view);
   if (thumbnail == thumbnails_.end()) {
     const ImageRgb8* small = maker.ThumbnailOf(view);
     if (small == nullptr) small = photos.Small(view);
     if (small == nullptr) return nullptr;
-    thumbnail = thumbnails_.emplace(&view, std::make_unique<PictureTexture>()).first;
+    thumbnail = thumbnails_.emplace(&view, std::make_unique<FrameTexture>()).first;
     thumbnail->second->Upload(*small);
   }
   return thumbnail->second.get();
 }
 
 void InspectionOverlay::DrawCameras(const Controller& controller, const Inspection& inspection,
-                                    const std::map<std::string, ViewVerdict>& verdicts,
-                                    PictureMaker& maker, PhotoShelf& photos) {
+                                    const std::map<std::string, ViewValidation>& validations,
+                                    FrameMaker& maker, PhotoCache& photos) {
   ImDrawList& list = *ImGui::GetBackgroundDrawList();
   const NovelCamera& camera = controller.camera();
   const double length = kFrustumShare * controller.scene_size();
@@ -245,21 +245,22 @@ void InspectionOverlay::DrawCameras(const Controller& controller, const Inspecti
   std::vector<CameraName> names;
   std::vector<PlacedName> places;
   for (const View* view : controller.surroundings().cameras) {
-    const auto verdict = verdicts.find(view->name);
+    const auto validation = validations.find(view->name);
     const bool held_out = view->role == ViewRole::kHeldOut;
-    const ImU32 colour = held_out                     ? kHeldOut
-                         : inspection.IsHidden(*view) ? kOff
-                         : verdict == verdicts.end()  ? kUntested
-                         : verdict->second.good       ? kGood
-                                                      : kBad;
-    const PictureTexture* photo = Thumbnail(*view, maker, photos);
+    const ImU32 colour = held_out                          ? kHeldOut
+                         : inspection.IsHidden(*view)      ? kOff
+                         : validation == validations.end() ? kUntested
+                         : validation->second.good         ? kGood
+                                                           : kBad;
+    const FrameTexture* photo = Thumbnail(*view, maker, photos);
     thumbnails_shown_ += photo != nullptr;
     const Frustum frustum = FrustumOf(*view, camera, length);
     DrawFrustum(list, frustum, colour, photo);
     const auto& at = frustum.corners[3];
     if (!at) continue;
-    names.push_back({colour, view->name + (held_out ? " (held out)" : "") +
-                                 (verdict == verdicts.end() ? "" : " " + verdict->second.text)});
+    names.push_back(
+        {colour, view->name + (held_out ? " (held out)" : "") +
+                     (validation == validations.end() ? "" : " " + validation->second.text)});
     const ImVec2 size = ImGui::CalcTextSize(names.back().text.c_str());
     places.push_back(
         {(camera.cam_from_world * view->CenterInWorld()).norm(),
@@ -286,7 +287,7 @@ void InspectionOverlay::DrawMarks(const Inspection& inspection, const NovelCamer
   Label(list, middle, kMark, inspection.DistanceText());
 }
 
-void InspectionOverlay::DrawMagnifier(const Inspection& inspection, const PictureTexture& picture) {
+void InspectionOverlay::DrawMagnifier(const Inspection& inspection, const FrameTexture& picture) {
   const ImVec2 display = ImGui::GetIO().DisplaySize;
   ImGui::SetNextWindowPos({display.x - 8, 8}, ImGuiCond_Always, {1, 0});
   ImGui::SetNextWindowBgAlpha(0.9F);

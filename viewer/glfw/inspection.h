@@ -10,8 +10,8 @@
 
 #include "viewer/controller.h"
 #include "viewer/glfw/app.h"
-#include "viewer/glfw/photo_shelf.h"
-#include "viewer/glfw/picture_maker.h"
+#include "viewer/glfw/frame_maker.h"
+#include "viewer/glfw/photo_cache.h"
 #include "viewer/probe.h"
 #include "viewer/shown.h"
 
@@ -55,28 +55,28 @@ struct Inspection {
 class InspectionOverlay {
  public:
   /// The other image, right of the border, and what each side is drawn by.
-  void DrawCompared(const Inspection& inspection, const PictureTexture& other,
+  void DrawCompared(const Inspection& inspection, const FrameTexture& other,
                     const RenderOptions& left, const RenderOptions& right);
   /// The photo of `view` where it would lie if this were its camera; as long as there is none,
   /// why.
   void DrawPhoto(const Inspection& inspection, const View& view, const NovelCamera& camera,
-                 PhotoShelf& photos);
+                 PhotoCache& photos);
   /// With small photos of the input cameras, those of held-out photos in a colour of their own.
   void DrawCameras(const Controller& controller, const Inspection& inspection,
-                   const std::map<std::string, ViewVerdict>& verdicts, PictureMaker& maker,
-                   PhotoShelf& photos);
+                   const std::map<std::string, ViewValidation>& validations, FrameMaker& maker,
+                   PhotoCache& photos);
   void DrawMarks(const Inspection& inspection, const NovelCamera& camera);
-  void DrawMagnifier(const Inspection& inspection, const PictureTexture& picture);
+  void DrawMagnifier(const Inspection& inspection, const FrameTexture& picture);
   int thumbnails() const { return thumbnails_shown_; }
   const View* photo_of() const { return photo_of_; }
 
  private:
   /// Null as long as there is no small photo of it.
-  const PictureTexture* Thumbnail(const View& view, PictureMaker& maker, PhotoShelf& photos);
+  const FrameTexture* Thumbnail(const View& view, FrameMaker& maker, PhotoCache& photos);
 
-  std::map<const View*, std::unique_ptr<PictureTexture>> thumbnails_;
+  std::map<const View*, std::unique_ptr<FrameTexture>> thumbnails_;
   int thumbnails_shown_ = 0;  ///< of this time step's cameras
-  PictureTexture photo_;
+  FrameTexture photo_;
   const View* photo_of_ = nullptr;
 };
 

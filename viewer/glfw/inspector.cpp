@@ -48,7 +48,7 @@ void Inspector::Look(bool whole, const RenderOptions& options, const Eigen::Vect
 std::optional<Probe> Inspector::ProbeAt(const Eigen::Vector2d& pixel) {
   const int x = static_cast<int>(std::floor(pixel.x()));
   const int y = static_cast<int>(std::floor(pixel.y()));
-  const MadePicture& picture = from_.maker.picture();
+  const MadeFrame& picture = from_.maker.picture();
   const DepthImage& depth = from_.maker.Result().depth;
   if (!depth.Contains(x, y) || DepthImage::IsHole(depth(x, y))) return std::nullopt;
   from_.maker.BringPixels();
@@ -57,14 +57,14 @@ std::optional<Probe> Inspector::ProbeAt(const Eigen::Vector2d& pixel) {
 }
 
 void Inspector::AskForVerdicts() {
-  if (!inspection_.cameras || !from_.verdicts) return;
-  if (!std::exchange(verdicts_asked_, true)) {
-    verdicts_coming_ = std::async(std::launch::async, from_.verdicts);
+  if (!inspection_.cameras || !from_.validations) return;
+  if (!std::exchange(validations_asked_, true)) {
+    validations_coming_ = std::async(std::launch::async, from_.validations);
   }
-  if (verdicts_coming_.valid() &&
-      verdicts_coming_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) {
+  if (validations_coming_.valid() &&
+      validations_coming_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) {
     try {
-      verdicts_ = verdicts_coming_.get();
+      validations_ = validations_coming_.get();
     } catch (const std::exception& error) {
       from_.tell(Said(error));
     }
@@ -83,7 +83,7 @@ void Inspector::Draw(const RenderOptions& options) {
     overlay_.DrawCompared(inspection_, from_.maker.other(), options, *other_made_);
   }
   if (inspection_.cameras) {
-    overlay_.DrawCameras(controller, inspection_, verdicts_, from_.maker, photos_);
+    overlay_.DrawCameras(controller, inspection_, validations_, from_.maker, photos_);
   }
   overlay_.DrawMarks(inspection_, controller.camera());
   if (inspection_.magnifier) overlay_.DrawMagnifier(inspection_, from_.maker.picture().texture);

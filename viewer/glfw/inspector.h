@@ -9,9 +9,9 @@
 
 #include "viewer/controller.h"
 #include "viewer/glfw/app.h"
+#include "viewer/glfw/frame_maker.h"
+#include "viewer/glfw/frame_schedule.h"
 #include "viewer/glfw/inspection.h"
-#include "viewer/glfw/picture_maker.h"
-#include "viewer/glfw/picture_schedule.h"
 #include "viewer/probe.h"
 
 namespace dtr::viewer {
@@ -19,13 +19,13 @@ namespace dtr::viewer {
 /// Of one set: everything here points to its views.
 class Inspector {
  public:
-  using Verdicts = std::map<std::string, ViewVerdict>;
+  using Validations = std::map<std::string, ViewValidation>;
   struct Sources {
-    PictureMaker& maker;
-    const PictureSchedule& schedule;
+    FrameMaker& maker;
+    const FrameSchedule& schedule;
     const Controller& controller;
     SigmaOf sigma_of;
-    std::function<Verdicts()> verdicts;  ///< may be null; called on a thread of its own
+    std::function<Validations()> validations;  ///< may be null; called on a thread of its own
     std::function<ImageRgb8(const View&)> load_photo;  ///< as Host::load_photo
     std::function<void(const std::string&)> tell;
   };
@@ -59,16 +59,16 @@ class Inspector {
   const Sources from_;
   Inspection inspection_;
   InspectionOverlay overlay_;
-  PhotoShelf photos_;
+  PhotoCache photos_;
   int picture_ = -1;                         ///< number of the image that what follows is of
   std::optional<RenderOptions> other_made_;  ///< options of the other image beside it
   std::optional<Eigen::Vector2d> probed_;    ///< where the cursor rested
   Eigen::Vector2d last_cursor_{-1, -1};
   Stopwatch cursor_rests_;
   std::vector<Eigen::Vector2d> to_mark_;
-  std::future<Verdicts> verdicts_coming_;
-  Verdicts verdicts_;
-  bool verdicts_asked_ = false;
+  std::future<Validations> validations_coming_;
+  Validations validations_;
+  bool validations_asked_ = false;
 };
 
 }  // namespace dtr::viewer

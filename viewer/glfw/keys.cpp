@@ -45,7 +45,7 @@ constexpr std::array kBindings{
     Binding{GLFW_KEY_RIGHT, Action::kNextView}, Binding{GLFW_KEY_LEFT, Action::kPreviousView},
     Binding{GLFW_KEY_C, Action::kNearestView},  Binding{GLFW_KEY_V, Action::kShowAll},
     Binding{GLFW_KEY_HOME, Action::kShowAll},   Binding{GLFW_KEY_F1, Action::kHelp},
-    Binding{GLFW_KEY_TAB, Action::kPanel},      Binding{GLFW_KEY_P, Action::kSavePicture},
+    Binding{GLFW_KEY_TAB, Action::kPanel},      Binding{GLFW_KEY_P, Action::kSaveImage},
     Binding{GLFW_KEY_F12, Action::kSaveWindow}, Binding{GLFW_KEY_L, Action::kCopyCommand},
     Binding{GLFW_KEY_DOWN, Action::kNextShown}, Binding{GLFW_KEY_UP, Action::kPreviousShown},
     Binding{GLFW_KEY_F, Action::kCameras},      Binding{GLFW_KEY_G, Action::kMagnifier},
@@ -53,7 +53,7 @@ constexpr std::array kBindings{
     Binding{GLFW_KEY_M, Action::kMark},         Binding{GLFW_KEY_K, Action::kAddKey},
     Binding{GLFW_KEY_O, Action::kOpenPath},     Binding{GLFW_KEY_SPACE, Action::kFlyPath},
     Binding{GLFW_KEY_R, Action::kRecord},       Binding{GLFW_KEY_T, Action::kPlayTime},
-    Binding{GLFW_KEY_N, Action::kNextInstant},  Binding{GLFW_KEY_B, Action::kPreviousInstant},
+    Binding{GLFW_KEY_N, Action::kNextTimeStep}, Binding{GLFW_KEY_B, Action::kPreviousTimeStep},
 };
 
 }  // namespace

@@ -63,7 +63,7 @@ void RenderControls(Widgets& widgets, RenderOptions& options, const RenderOption
 }
 
 void Figures(const PanelModel& model) {
-  const MadePicture& picture = model.picture;
+  const MadeFrame& picture = model.picture;
   const PinholeCamera& lens = picture.camera.camera;
   PanelText(fmt::format("{} x {} px{}", lens.width_px(), lens.height_px(),
                         picture.divisor > 1 ? fmt::format(" (1/{} while moving)", picture.divisor)
@@ -140,12 +140,12 @@ void InspectControls(Widgets& widgets, PanelModel& model) {
 
 void TimeControls(Widgets& widgets, PanelModel& model) {
   TimeModel& time = model.time;
-  PanelText(
-      fmt::format("{:.3f} s, time step {} of {}", time.seconds, time.instant + 1, time.instants));
-  widgets.Whole("instant", time.instant, 0, time.instants - 1, false);
-  if (widgets.Arrow("earlier", ImGuiDir_Left)) model.pressed.push_back(Action::kPreviousInstant);
+  PanelText(fmt::format("{:.3f} s, time step {} of {}", time.seconds, time.time_step + 1,
+                        time.time_steps));
+  widgets.Whole("time step", time.time_step, 0, time.time_steps - 1, false);
+  if (widgets.Arrow("earlier", ImGuiDir_Left)) model.pressed.push_back(Action::kPreviousTimeStep);
   ImGui::SameLine();
-  if (widgets.Arrow("later", ImGuiDir_Right)) model.pressed.push_back(Action::kNextInstant);
+  if (widgets.Arrow("later", ImGuiDir_Right)) model.pressed.push_back(Action::kNextTimeStep);
   ImGui::SameLine();
   if (widgets.Button("play", time.playing ? "stand still" : "play")) {
     model.pressed.push_back(Action::kPlayTime);
@@ -173,7 +173,7 @@ void PathControls(Widgets& widgets, PanelModel& model) {
 
 void KeepControls(Widgets& widgets, PanelModel& model) {
   if (widgets.Button("copy command line")) model.pressed.push_back(Action::kCopyCommand);
-  if (widgets.Button("save image")) model.pressed.push_back(Action::kSavePicture);
+  if (widgets.Button("save image")) model.pressed.push_back(Action::kSaveImage);
   ImGui::SameLine();
   if (widgets.Button("save window")) model.pressed.push_back(Action::kSaveWindow);
 }
@@ -194,7 +194,7 @@ void DrawPanel(UserInterface& interface, PanelModel& model) {
     ImGui::TextWrapped("%s", LegendOf(model.shown));
     if (widgets.Header("Inspect")) InspectControls(widgets, model);
     if (widgets.Header("Where")) WhereControls(widgets, model);
-    if (model.time.instants > 1 && widgets.Header("Time")) TimeControls(widgets, model);
+    if (model.time.time_steps > 1 && widgets.Header("Time")) TimeControls(widgets, model);
     if (widgets.Header("Render options")) {
       RenderControls(widgets, model.options, model.defaults);
     }

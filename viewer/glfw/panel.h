@@ -5,23 +5,23 @@
 
 #include "viewer/controller.h"
 #include "viewer/flight.h"
+#include "viewer/glfw/frame_maker.h"
 #include "viewer/glfw/inspection.h"
 #include "viewer/glfw/keys.h"
-#include "viewer/glfw/picture_maker.h"
 #include "viewer/glfw/user_interface.h"
 
 namespace dtr::viewer {
 
 /// Of a dynamic set.
 struct TimeModel {
-  int instants = 1, instant = 0;
+  int time_steps = 1, time_step = 0;
   double seconds = 0;  ///< since the first time step
   bool playing = false;
 };
 
 /// What the panel shows and changes.
 struct PanelModel {
-  const MadePicture& picture;
+  const MadeFrame& picture;
   Controller& controller;
   RenderOptions& options;
   const RenderOptions& defaults;  ///< the set's own

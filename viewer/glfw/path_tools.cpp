@@ -22,7 +22,7 @@ PathTools::~PathTools() {
 void PathTools::AddKey(const NovelCamera& camera, const DtrSet& set) {
   try {
     flight_.AddKey(camera);
-    tell_("added to " + keeper_.SavePath(flight_.keys(), set).string());
+    tell_("added to " + saver_.SavePath(flight_.keys(), set).string());
   } catch (const std::exception& error) {
     tell_(Said(error));
   }
@@ -31,7 +31,7 @@ void PathTools::AddKey(const NovelCamera& camera, const DtrSet& set) {
 void PathTools::Load(const fs::path& file, const DtrSet& set) {
   try {
     flight_.Replace(host_.read_path(set, file));
-    keeper_.BeginNewPath();
+    saver_.BeginNewPath();
     tell_(fmt::format("{}: {} cameras", file.string(), flight_.keys().size()));
   } catch (const std::exception& error) {
     tell_(Said(error));
@@ -45,7 +45,7 @@ void PathTools::StartOrStopRecording(const PinholeCamera& like, const DtrSet& se
     if (frames.empty()) {
       return tell_("a video needs a path: K adds cameras to it, O loads one from a file");
     }
-    const fs::path video = keeper_.NameVideo(frames, set);
+    const fs::path video = saver_.NameVideo(frames, set);
     flight_.Stop();
     recording_ = std::make_unique<Recording>(video, std::move(frames));
   } catch (const std::exception& error) {
@@ -60,7 +60,7 @@ std::string PathTools::Progress() const {
 }
 
 size_t PathTools::WantedFrame(size_t frames) const {
-  return FrameOfPicture(recording_->drawn(), recording_->frames(), frames);
+  return TimeStepOfImage(recording_->drawn(), recording_->frames(), frames);
 }
 
 void PathTools::Filmed(const ImageRgb8& picture) {

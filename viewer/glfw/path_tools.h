@@ -8,7 +8,7 @@
 
 #include "viewer/flight.h"
 #include "viewer/glfw/app.h"
-#include "viewer/glfw/keeper.h"
+#include "viewer/glfw/file_saver.h"
 #include "viewer/glfw/recording.h"
 #include "viewer/glfw/user_interface.h"
 
@@ -17,8 +17,8 @@ namespace dtr::viewer {
 /// The path and what is done with it. Trouble is told, not thrown.
 class PathTools {
  public:
-  PathTools(const Host& host, Keeper& keeper, std::function<void(const std::string&)> tell)
-      : host_(host), keeper_(keeper), tell_(std::move(tell)) {}
+  PathTools(const Host& host, FileSaver& saver, std::function<void(const std::string&)> tell)
+      : host_(host), saver_(saver), tell_(std::move(tell)) {}
 
   /// Leaves nothing behind of a recording that is not finished.
   ~PathTools();
@@ -50,7 +50,7 @@ class PathTools {
   std::filesystem::path DropRecording();
 
   const Host& host_;
-  Keeper& keeper_;
+  FileSaver& saver_;
   const std::function<void(const std::string&)> tell_;
   Flight flight_;
   std::unique_ptr<Recording> recording_;

@@ -15,8 +15,8 @@ void RunFigures::EndFrame(bool any, bool whole) {
   if (report_.last.frames % AppReport::kFramesPerSample == 0) {
     report_.memory_bytes.push_back(MemoryBytes());
   }
-  if (any || whole) TimeUnlessTimed(report_.first_picture_ms, report_.first_picture_cpu_ms);
-  if (whole) TimeUnlessTimed(report_.first_whole_picture_ms, report_.first_whole_picture_cpu_ms);
+  if (any || whole) TimeUnlessTimed(report_.first_frame_ms, report_.first_frame_cpu_ms);
+  if (whole) TimeUnlessTimed(report_.first_whole_frame_ms, report_.first_whole_frame_cpu_ms);
 }
 
 void RunFigures::TimeUnlessTimed(double& ms, double& cpu_ms) const {

@@ -31,7 +31,7 @@ Session::Session(const AppSettings& settings, const Host& host, const Tell& tell
       controller(SurroundingsOf(opened_->set), WorldUp(opened_->set), width_px, height_px,
                  [this](const Eigen::Vector2d& pixel) { return DepthAt(pixel); }),
       inspector({maker, schedule, controller,
-                 [this](const View& view) { return SigmaOfView(view); }, host.verdicts,
+                 [this](const View& view) { return SigmaOfView(view); }, host.validations,
                  host.load_photo, tell}) {
   inspector.inspection().unit = opened_->set.unit == LengthUnit::kMetre ? "m" : "units";
   Hide(settings.hidden);
@@ -50,7 +50,7 @@ Eigen::Vector3d Session::ContinueFrom(const Session& before) {
   mine.border = theirs.border;
   mine.hidden.clear();
   Hide(before.HiddenNames());
-  ShowInstant(std::min(before.instant(), clock_.frames() - 1));
+  ShowTimeStep(std::min(before.time_step(), clock_.frames() - 1));
   return shift;
 }
 
@@ -63,10 +63,10 @@ void Session::Hide(const std::vector<std::string>& names) {
   }
 }
 
-void Session::ShowInstant(size_t instant) {
-  if (std::exchange(instant_, instant) == instant) return;
+void Session::ShowTimeStep(size_t time_step) {
+  if (std::exchange(time_step_, time_step) == time_step) return;
   const std::vector<std::string> hidden = HiddenNames();
-  controller.SetSurroundings(SurroundingsOf(opened_->set, instant));
+  controller.SetSurroundings(SurroundingsOf(opened_->set, time_step));
   inspector.inspection().hidden.clear();
   Hide(hidden);
 }
@@ -86,7 +86,7 @@ void Session::RetryLostViews() {
 
 const Grid<float>* Session::SigmaOfView(const View& view) {
   if (const Grid<float>* known = sigmas_.Known(view)) return known;
-  const MadePicture& picture = maker.picture();
+  const MadeFrame& picture = maker.picture();
   std::set<const View*> in_picture;
   for (const int index : picture.views_used) {
     in_picture.insert(picture.scene.views[static_cast<size_t>(index)]);
@@ -113,10 +113,10 @@ std::vector<std::string> Session::HiddenNames() const {
   return names;
 }
 
-std::vector<const View*> Session::HiddenAt(size_t instant) const {
+std::vector<const View*> Session::HiddenAt(size_t time_step) const {
   const std::vector<std::string> names = HiddenNames();
   std::vector<const View*> hidden;
-  for (const View& view : opened_->set.frames.at(instant).views) {
+  for (const View& view : opened_->set.frames.at(time_step).views) {
     if (std::find(names.begin(), names.end(), view.name) != names.end()) hidden.push_back(&view);
   }
   return hidden;
@@ -130,10 +130,10 @@ void Session::Describe(AppState& state) const {
     state.at_held_out = view.role == ViewRole::kHeldOut;
   }
   state.fly_speed = controller.fly_speed();
-  state.instant = instant_;
-  state.instants = clock_.frames();
+  state.time_step = time_step_;
+  state.time_steps = clock_.frames();
 
-  const MadePicture& picture = maker.picture();
+  const MadeFrame& picture = maker.picture();
   state.divisor = picture.divisor;
   for (const int index : picture.views_used) {
     state.views_used.push_back(picture.scene.views[static_cast<size_t>(index)]->name);

@@ -9,9 +9,9 @@
 #include "dtr/render/time_steps.h"
 #include "viewer/controller.h"
 #include "viewer/glfw/app.h"
+#include "viewer/glfw/frame_maker.h"
+#include "viewer/glfw/frame_schedule.h"
 #include "viewer/glfw/inspector.h"
-#include "viewer/glfw/picture_maker.h"
-#include "viewer/glfw/picture_schedule.h"
 #include "viewer/sigma_cache.h"
 
 namespace dtr::viewer {
@@ -36,8 +36,8 @@ class Session {
 
   /// Of a dynamic set: the frame that is shown. What is left out of one is left out of all, by
   /// name.
-  size_t instant() const { return instant_; }
-  void ShowInstant(size_t instant);
+  size_t time_step() const { return time_step_; }
+  void ShowTimeStep(size_t time_step);
   const FrameClock& clock() const { return clock_; }
 
   /// Tries views again that could not be read and whose files have changed since, or came back.
@@ -47,7 +47,7 @@ class Session {
   /// Also of views that this time step lacks.
   std::vector<std::string> HiddenNames() const;
   /// The views of that time step that are called so.
-  std::vector<const View*> HiddenAt(size_t instant) const;
+  std::vector<const View*> HiddenAt(size_t time_step) const;
   /// Writes down what of the window's state is the set's: camera, image, inspection, time step.
   void Describe(AppState& state) const;
 
@@ -58,14 +58,14 @@ class Session {
   const Host& host_;
   const std::unique_ptr<OpenedSet> opened_;
   const FrameClock clock_;
-  size_t instant_ = 0;
+  size_t time_step_ = 0;
   std::map<const View*, std::string> tried_views_, tried_photos_;  ///< stamps of lost ones' files
   SigmaCache sigmas_;
   std::vector<std::string> hidden_elsewhere_;  ///< names that this time step lacks
 
  public:
-  PictureMaker maker;
-  PictureSchedule schedule;
+  FrameMaker maker;
+  FrameSchedule schedule;
   Controller controller;
   Inspector inspector;
 };

@@ -82,7 +82,7 @@ struct UserInterface::Callbacks {
   static void Cursor(GLFWwindow* window, double x, double y) {
     UserInterface& self = Of(window);
     self.any_input_ = true;
-    self.cursor_px_ = self.ToPicture(x, y);
+    self.cursor_px_ = self.ToImage(x, y);
     self.inputs_.emplace_back(MoveEvent{self.cursor_px_.x(), self.cursor_px_.y()});
   }
 
@@ -200,7 +200,7 @@ void UserInterface::ThisPanelIsOurs() {
   new_panels_.push_back({at.x, at.y, at.x + size.x, at.y + size.y});
 }
 
-Eigen::Vector2d UserInterface::ToPicture(double x, double y) const {
+Eigen::Vector2d UserInterface::ToImage(double x, double y) const {
   int window_width = 1, window_height = 1, width_px = 1, height_px = 1;
   glfwGetWindowSize(window_, &window_width, &window_height);
   glfwGetFramebufferSize(window_, &width_px, &height_px);

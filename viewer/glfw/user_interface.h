@@ -51,7 +51,7 @@ class UserInterface {
  private:
   struct Callbacks;
   friend struct Callbacks;
-  Eigen::Vector2d ToPicture(double x, double y) const;
+  Eigen::Vector2d ToImage(double x, double y) const;
 
   /// As GLFW tells it.
   struct KeyChange {

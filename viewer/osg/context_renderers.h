@@ -20,8 +20,8 @@
 namespace osgDTR {
 
 /// An image that was made for one of a node's appearances in a window.
-struct MadePicture {
-  dtr::gl::DrawnPicture picture;
+struct MadeFrame {
+  dtr::gl::DrawnFrame picture;
   bool in_renderer =
       false;  ///< it holds until the renderer's next; else the compositor's own has it
 };
@@ -53,7 +53,7 @@ class ContextRenderer {
     if (!same || !Holds(*shown.last) || (whole && !shown.last->whole)) {
       shown.last.reset();
       ++drawn_;  // also where this fails: the renderer may have begun
-      MadePicture made = draw(shown.compositor, whole);
+      MadeFrame made = draw(shown.compositor, whole);
       shown.last = Last{settings_version, novel.camera,   novel.cam_from_local, whole,
                         drawn_,           std::move(made)};
     }
@@ -70,7 +70,7 @@ class ContextRenderer {
     dtr::Pose pose;
     bool whole;
     unsigned long number;  ///< among all that the renderer was asked for
-    MadePicture made;
+    MadeFrame made;
     bool Is(unsigned version, const NovelCamera& novel) const {
       return settings_version == version && camera == novel.camera &&
              pose.rotation.coeffs() == novel.cam_from_local.rotation.coeffs() &&

@@ -44,7 +44,7 @@ DepthTR::DepthTR(const DepthTR& other, const osg::CopyOp& copyop) : osg::Geode(o
   init();
   drawable_->state_->settings = other.drawable_->state_->Get();
   drawable_->dirtyBound();
-  if (isLoaded()) ShowInstant(drawable_->state_->settings.instant);
+  if (isLoaded()) ShowTimeStep(drawable_->state_->settings.time_step);
   setPlaying(other.playing_);
 }
 
@@ -64,10 +64,10 @@ void DepthTR::TakeSet(std::shared_ptr<const LoadedSet> set) {
   played_from_s_.reset();
   drawable_->state_->Set([&](DrawSettings& settings) {
     settings.set = std::move(set);
-    settings.instant = 0;
+    settings.time_step = 0;
   });
   drawable_->dirtyBound();
-  ShowInstant(0);
+  ShowTimeStep(0);
 }
 
 std::shared_ptr<const LoadedScene> DepthTR::getScene() const {
@@ -79,33 +79,33 @@ dtr::RenderOptions DepthTR::getDefaultRenderOptions() const {
   return set ? set->defaults : dtr::RenderOptions();
 }
 
-void DepthTR::ShowInstant(size_t instant) {
-  drawable_->state_->Set([&](DrawSettings& settings) { settings.instant = instant; });
+void DepthTR::ShowTimeStep(size_t time_step) {
+  drawable_->state_->Set([&](DrawSettings& settings) { settings.time_step = time_step; });
   input_views_.clear();
   for (const dtr::View* view : getScene()->scene.views) input_views_.emplace_back(*view);
   if (novel_) setNovelView(novel_->camera, novel_->cam_from_world);  // of these views now
 }
 
-int DepthTR::numberOfInstants() const {
+int DepthTR::numberOfTimeSteps() const {
   const auto set = drawable_->state_->Get().set;
-  return set ? static_cast<int>(set->instants.size()) : 0;
+  return set ? static_cast<int>(set->time_steps.size()) : 0;
 }
 
-int DepthTR::getInstant() const { return static_cast<int>(drawable_->state_->Get().instant); }
+int DepthTR::getTimeStep() const { return static_cast<int>(drawable_->state_->Get().time_step); }
 
-void DepthTR::setInstant(int instant) {
-  if (instant < 0 || instant >= numberOfInstants()) {
+void DepthTR::setTimeStep(int time_step) {
+  if (time_step < 0 || time_step >= numberOfTimeSteps()) {
     throw dtr::UsageError("DepthTR: expected a time step from 0 to " +
-                          std::to_string(numberOfInstants() - 1) + ", found " +
-                          std::to_string(instant));
+                          std::to_string(numberOfTimeSteps() - 1) + ", found " +
+                          std::to_string(time_step));
   }
   played_from_s_.reset();  // goes on from here
-  ShowInstant(static_cast<size_t>(instant));
+  ShowTimeStep(static_cast<size_t>(time_step));
 }
 
-double DepthTR::getInstantTime(int instant) const {
+double DepthTR::getTimeStepTime(int time_step) const {
   const auto set = drawable_->state_->Get().set;
-  return set ? set->clock.StartOf(static_cast<size_t>(instant)) : 0;
+  return set ? set->clock.StartOf(static_cast<size_t>(time_step)) : 0;
 }
 
 void DepthTR::setPlaying(bool playing) {
@@ -121,9 +121,9 @@ void DepthTR::PlayAt(double simulation_time_s) {
   const DrawSettings shown = drawable_->state_->Get();
   if (!shown.set) return;
   const dtr::FrameClock& clock = shown.set->clock;
-  if (!played_from_s_) played_from_s_ = simulation_time_s - clock.StartOf(shown.instant);
-  const size_t instant = clock.FrameAt(simulation_time_s - *played_from_s_);
-  if (instant != shown.instant) ShowInstant(instant);
+  if (!played_from_s_) played_from_s_ = simulation_time_s - clock.StartOf(shown.time_step);
+  const size_t time_step = clock.FrameAt(simulation_time_s - *played_from_s_);
+  if (time_step != shown.time_step) ShowTimeStep(time_step);
 }
 
 void DepthTR::traverse(osg::NodeVisitor& visitor) {

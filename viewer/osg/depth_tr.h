@@ -40,7 +40,7 @@ enum class FillTime {
 /// (set.json: world relative to world_origin).
 ///
 /// Drawing may run on any threads beside setters of options, which take hold with the next frame;
-/// load(), setScene() and setInstant() belong into the update phase, as every change of a scene
+/// load(), setScene() and setTimeStep() belong into the update phase, as every change of a scene
 /// graph's shape.
 /// The report's own operations (setNovelView to saveProjectedImage) keep their results here, belong
 /// to one thread at a time and never touch what is drawn.
@@ -63,12 +63,12 @@ class DepthTR : public osg::Geode {
 
   // Moving sets. All time steps are in memory; to show another is a change for the update phase.
 
-  int numberOfInstants() const;  ///< 1 of a still scene, 0 without a set
-  int getInstant() const;
+  int numberOfTimeSteps() const;  ///< 1 of a still scene, 0 without a set
+  int getTimeStep() const;
   /// From 0; throws dtr::UsageError for others.
-  void setInstant(int instant);
+  void setTimeStep(int time_step);
   /// Seconds from the first time step to this one.
-  double getInstantTime(int instant) const;
+  double getTimeStepTime(int time_step) const;
   /// Goes on from the shown time step with the viewer's simulation time, round and round, or stops.
   void setPlaying(bool playing);
   bool isPlaying() const { return playing_; }
@@ -156,7 +156,7 @@ class DepthTR : public osg::Geode {
   };
   void init();  // Shared constructor code, generates the drawable
   void TakeSet(std::shared_ptr<const LoadedSet> set);
-  void ShowInstant(size_t instant);
+  void ShowTimeStep(size_t time_step);
   void PlayAt(double simulation_time_s);
   NovelView& RequireNovelView();
   void BlendBy(dtr::BlendWeight blend, std::optional<int> k, const std::vector<double>& angles,

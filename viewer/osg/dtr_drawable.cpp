@@ -11,9 +11,9 @@ namespace osgDTR {
 namespace {
 
 /// As the settings say, filled or not.
-MadePicture DrawPicture(dtr::gl::FittingRenderer& renderer, dtr::gl::Compositor& compositor,
-                        const DrawSettings& settings, const NovelCamera& novel, bool fill) {
-  const dtr::RenderScene& scene = settings.set->instants[settings.instant].scene;
+MadeFrame DrawFrame(dtr::gl::FittingRenderer& renderer, dtr::gl::Compositor& compositor,
+                    const DrawSettings& settings, const NovelCamera& novel, bool fill) {
+  const dtr::RenderScene& scene = settings.set->time_steps[settings.time_step].scene;
   const dtr::RenderOptions& options = settings.options;
   const bool on_gpu = settings.path == DrawPath::kGpu;
   if (on_gpu && !fill) {
@@ -74,11 +74,11 @@ void DepthTR::dtrDrawable::Draw(osg::RenderInfo& info) const {
   const bool fills = settings.options.fill_holes;
   const bool may_wait = fills && settings.fill_time == FillTime::kWhenStill;
   const osg::FrameStamp* const stamp = state.getFrameStamp();
-  context->Show(
-      stamp != nullptr ? std::optional(stamp->getFrameNumber()) : std::nullopt, settings.set,
-      settings.version, novel, may_wait, [&](dtr::gl::Compositor& compositor, bool whole) {
-        return DrawPicture(context->renderer, compositor, settings, novel, fills && whole);
-      });
+  context->Show(stamp != nullptr ? std::optional(stamp->getFrameNumber()) : std::nullopt,
+                settings.set, settings.version, novel, may_wait,
+                [&](dtr::gl::Compositor& compositor, bool whole) {
+                  return DrawFrame(context->renderer, compositor, settings, novel, fills && whole);
+                });
 }
 
 void DepthTR::dtrDrawable::releaseGLObjects(osg::State* state) const {

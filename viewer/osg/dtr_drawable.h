@@ -14,14 +14,14 @@ namespace osgDTR {
 /// What a frame is drawn by; copied when the frame begins.
 struct DrawSettings {
   std::shared_ptr<const LoadedSet> set;
-  size_t instant = 0;
+  size_t time_step = 0;
   dtr::RenderOptions options;
   DrawPath path = DrawPath::kGpu;
   FillTime fill_time = FillTime::kAlways;
   unsigned version = 0;  ///< rises with every change
   /// Null without a set.
   std::shared_ptr<const LoadedScene> Scene() const {
-    return set ? std::shared_ptr<const LoadedScene>(set, &set->instants.at(instant)) : nullptr;
+    return set ? std::shared_ptr<const LoadedScene>(set, &set->time_steps.at(time_step)) : nullptr;
   }
 };
 

@@ -81,15 +81,15 @@ constexpr int kCoarsestResolution = 4;
 
 /// The keys of dynamic sets; false for others, and for sets that stand still.
 bool HandleTime(int key, DepthTR& node) {
-  const int count = node.numberOfInstants();
+  const int count = node.numberOfTimeSteps();
   if (count < 2) return false;
   switch (key) {
     case ',':
     case '.':
       node.setPlaying(false);
-      node.setInstant((node.getInstant() + (key == '.' ? 1 : count - 1)) % count);
-      OSG_NOTICE << "D+TR time step: " << node.getInstant() << " of " << count << ", "
-                 << node.getInstantTime(node.getInstant()) << " s" << std::endl;
+      node.setTimeStep((node.getTimeStep() + (key == '.' ? 1 : count - 1)) % count);
+      OSG_NOTICE << "D+TR time step: " << node.getTimeStep() << " of " << count << ", "
+                 << node.getTimeStepTime(node.getTimeStep()) << " s" << std::endl;
       return true;
     case 'j':
       node.setPlaying(!node.isPlaying());

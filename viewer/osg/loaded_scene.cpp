@@ -72,19 +72,19 @@ std::shared_ptr<const LoadedSet> MakeSet(dtr::DtrSet set) {
   loaded->clock = dtr::FrameClock(set);
   std::vector<const dtr::View*> views;
   for (dtr::DtrSet& still : dtr::SplitFrames(std::move(set))) {
-    LoadedScene& instant = loaded->instants.emplace_back();
-    instant.set = std::move(still);  // its views stay where they are
-    instant.scene = dtr::MakeRenderScene(instant.set);
-    views.insert(views.end(), instant.scene.views.begin(), instant.scene.views.end());
+    LoadedScene& time_step = loaded->time_steps.emplace_back();
+    time_step.set = std::move(still);  // its views stay where they are
+    time_step.scene = dtr::MakeRenderScene(time_step.set);
+    views.insert(views.end(), time_step.scene.views.begin(), time_step.scene.views.end());
   }
-  if (loaded->instants.empty()) throw dtr::Error("set: expected at least one frame, found none");
+  if (loaded->time_steps.empty()) throw dtr::Error("set: expected at least one frame, found none");
   std::vector<osg::BoundingBox> bounds(views.size());
   dtr::ParallelFor(0, static_cast<int>(bounds.size()), 0, [&](int i) {
     const auto k = static_cast<size_t>(i);
     bounds[k] = BoundsOf(*views[k]);
   });
   for (const osg::BoundingBox& one : bounds) loaded->bounds.expandBy(one);
-  const auto stored = dtr::io::RenderOptionsOf(loaded->instants.front().set);
+  const auto stored = dtr::io::RenderOptionsOf(loaded->time_steps.front().set);
   loaded->defaults = dtr::WithStoredOptions({}, stored.json, stored.where);
   return loaded;
 }

@@ -22,9 +22,9 @@ struct LoadedScene {
 
 /// Never changes once it is made; used by several threads at a time.
 struct LoadedSet {
-  std::vector<LoadedScene> instants;  ///< one of a still scene
-  dtr::FrameClock clock;              ///< of the time steps
-  dtr::RenderOptions defaults;        ///< what the set was pruned for, else the library's
+  std::vector<LoadedScene> time_steps;  ///< one of a still scene
+  dtr::FrameClock clock;                ///< of the time steps
+  dtr::RenderOptions defaults;          ///< what the set was pruned for, else the library's
   /// Of what can be drawn at any time step, but for single pixels that lie far beyond all others of
   /// their views; DtrSet::bounds leaves out the outermost 1 %.
   osg::BoundingBox bounds;

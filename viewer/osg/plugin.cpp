@@ -20,7 +20,7 @@ struct PluginOptions {
   dtr::RenderOptions render;
   DrawPath path = DrawPath::kGpu;
   FillTime fill_time = FillTime::kAlways;
-  int instant = 0;    ///< of a dynamic set: the first to be shown
+  int time_step = 0;  ///< of a dynamic set: the first to be shown
   bool play = false;  ///< from there on
   bool keys = true;   ///< the report's keys, and the first input camera as home
 };
@@ -89,7 +89,7 @@ PluginOptions Parse(const osgDB::Options* given, const dtr::RenderOptions& defau
                                      {{"gpu", DrawPath::kGpu}, {"read-back", DrawPath::kReadBack}});
     }
     if (name == "keys") options.keys = OnOrOff(name, value);
-    if (name == "instant") options.instant = WholeNumber(name, value);
+    if (name == "time-step") options.time_step = WholeNumber(name, value);
     if (name == "play") options.play = OnOrOff(name, value);
     if (name == "fill-holes") {
       options.render.fill_holes = value != "off";
@@ -134,7 +134,7 @@ class ReaderWriterDTR : public osgDB::ReaderWriter {
     supportsOption("primitive", "mesh|splat, of two-pass");
     supportsOption("fill-holes",
                    "on|still|off: fill what no view saw; still: not while moving [off]");
-    supportsOption("instant", "Of a dynamic set: the time step that is shown [0]");
+    supportsOption("time-step", "Of a dynamic set: the time step that is shown [0]");
     supportsOption("play", "on|off: of a dynamic set: play it, in a loop [off]");
     supportsOption("path", "gpu|read-back");
     supportsOption("keys", "on|off: the keys of the founding report [on]");
@@ -164,7 +164,7 @@ class ReaderWriterDTR : public osgDB::ReaderWriter {
       node->setRenderOptions(parsed.render);
       node->setDrawPath(parsed.path);
       node->setFillTime(parsed.fill_time);
-      node->setInstant(parsed.instant);
+      node->setTimeStep(parsed.time_step);
       node->setPlaying(parsed.play);
       node->setName(folder.filename().string());
       if (parsed.keys) node->addEventCallback(new KeyHandler(node.get(), true));

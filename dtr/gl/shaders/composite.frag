@@ -9,16 +9,16 @@ uniform sampler2DArray depth;  // plane z, scene units; 0 where there is nothing
 uniform vec4 mapping;  // device z = x + y / z; least device z = z; window z from 0 to 1 = (device z - z) * w
 uniform int clamps;    // 1: the host has GL_DEPTH_CLAMP on
 #endif
-uniform vec4 picture_from_pixel;  // place in the picture, 0 to 1 = pixel of the framebuffer times xy plus zw
+uniform vec4 image_from_pixel;  // position in the image, 0 to 1 = pixel of the framebuffer times xy plus zw
 
 layout(location = 0) out vec4 out_colour;
 
 void main() {
   // A pixel's centre lies half a pixel inside the viewport, its texel inside the picture.
 #if MAPPED
-  vec2 place = gl_FragCoord.xy * picture_from_pixel.xy + picture_from_pixel.zw;
+  vec2 place = gl_FragCoord.xy * image_from_pixel.xy + image_from_pixel.zw;
 #else
-  vec3 place = vec3(gl_FragCoord.xy * picture_from_pixel.xy + picture_from_pixel.zw, 0.0);
+  vec3 place = vec3(gl_FragCoord.xy * image_from_pixel.xy + image_from_pixel.zw, 0.0);
 #endif
   float z = texture(depth, place).r;
   vec4 colour = texture(image, place);

@@ -1,8 +1,10 @@
-// SPEC 5.2, 5.3: what a view's full-resolution depth map says of a surface at a pixel, and the
-// view's own fragment there. Expects `depths`, an array of sampler2DArray laid out as DepthPicture
+// SPEC 5.2, 5.3: how a view's full-resolution depth map votes on a surface at a pixel, and the
+// view's own fragment there. Expects `depths`, an array of sampler2DArray laid out as PackedDepth
 // (dtr/gl/stored_depth.h) says: one value per sample (0: none) that a view's OwnMap turns into 1/z,
 // the last row and column once more, then which blocks are whole or all masked. Filtered to the nearest.
 // No branch: software rasterisers run both sides of one anyway.
+#include "../../render/deferred_limits.h"
+
 struct OwnMap {
   vec4 grid;    // 1 / width, 1 / height of the layer; columns / 2, rows / 2 of the samples in it
   vec3 stored;  // 1/z of a stored value v: x + y v; z: a pixel of disparity (of 1/z)
@@ -11,16 +13,12 @@ struct OwnMap {
   int layer;    // in it
 };
 
-// SPEC 5.2: what the views say of a surface.
+// SPEC 5.2: how the views vote on a surface.
 struct Votes {
-  float held, refused;
-  float front;   // 1/z of the nearest whole patch of those that hold it; 0: none
+  float support, against;
+  float front;   // 1/z of the nearest whole patch of those that support it; 0: none
   float behind;  // 1/z of the nearest surface that a view sees through it; 0: none
 };
-
-const float kHeldBeforePx = 1.0, kBeforePx = 0.5, kBehindPx = 2.0;
-const float kHoleSay = 0.25;
-const int kTriedSurfaces = 3;
 
 // On the map, whose first sample's centre is at 0.5; `q`: position, homogeneous.
 bool IsOnMap(OwnMap map, vec3 q, vec2 position) {
@@ -73,28 +71,28 @@ float OwnDepth(OwnMap map, vec3 base, vec3 away, float surface, out bool on_map,
   return on_map && stored > 0.0 && facing > 0.0 && w > 0.0 ? w : 0.0;
 }
 
-// The view's say of `surface`, where its own patch lies at `seen` on the ray.
+// The view's vote on `surface`, where its own patch lies at `seen` on the ray.
 void AddVote(OwnMap map, float surface, float seen, bool whole, bool masked, bool on_map,
-             float say, inout Votes votes) {
+             float vote, inout Votes votes) {
   float nearer = seen - surface;
   bool hole = !(seen > 0.0);
-  say = on_map && !masked ? say : 0.0;
+  vote = on_map && !masked ? vote : 0.0;
   bool through = !hole && nearer < -kBehindPx * map.stored.z;
-  bool holds = !hole && !through && nearer <= kHeldBeforePx * map.stored.z;
-  votes.refused += hole ? kHoleSay * say : (through ? say : 0.0);
-  votes.held += holds ? say : 0.0;
-  bool near = holds && whole && nearer <= kBeforePx * map.stored.z;
+  bool supports = !hole && !through && nearer <= kSupportBeforePx * map.stored.z;
+  votes.against += hole ? kHoleVote * vote : (through ? vote : 0.0);
+  votes.support += supports ? vote : 0.0;
+  bool near = supports && whole && nearer <= kFragmentBeforePx * map.stored.z;
   votes.front = max(votes.front, near ? seen : 0.0);
   votes.behind = max(votes.behind, on_map && through ? seen : 0.0);
 }
 
-// The view's fragment near `surface`, which the views hold; 0 where this one shows another there, or
+// The view's fragment near `surface`, which the views support; 0 where this one shows another there, or
 // none.
 float Fragment(OwnMap map, vec3 base, vec3 away, float surface) {
   bool on_map, whole, masked;
   float w = OwnDepth(map, base, away, surface, on_map, whole, masked);
   float nearer = w - surface;
-  bool found = w > 0.0 && nearer <= kBeforePx * map.stored.z &&
+  bool found = w > 0.0 && nearer <= kFragmentBeforePx * map.stored.z &&
                nearer >= -kBehindPx * map.stored.z && base.z + away.z * w > 0.0;
   return found ? w : 0.0;
 }

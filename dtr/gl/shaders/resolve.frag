@@ -1,4 +1,4 @@
-// SPEC 4.2 to 4.8 and 6: what the views' nearest fragments say together, pixel by pixel. One sum in
+// SPEC 4.2 to 4.8 and 6: how the views' nearest fragments are blended, pixel by pixel. One sum in
 // the views' canonical order and one division: nothing depends on the order they were drawn in.
 // Defines: MAX_VIEWS, IMAGE_ARRAYS, DEPTH_ARRAYS (0: two passes, else SPEC 5), BLEND, PER_PIXEL,
 // LINEAR_LIGHT, VIEWS_IN_UNIFORMS.
@@ -10,6 +10,7 @@ uniform int width_px;
 uniform sampler2DArray layers;  // near_z / z in the novel camera, a layer per view; 0: none
 #endif
 uniform sampler2DArray images[IMAGE_ARRAYS];
+#include "../../render/deferred_limits.h"
 #include "view_block.glsl"
 #include "colour.glsl"
 #include "weights.glsl"
@@ -31,7 +32,6 @@ layout(location = 0) out vec4 out_image;   // sRGB; alpha 1 where seen
 layout(location = 1) out float out_depth;  // plane z of the front surface
 layout(location = 2) out uvec4 out_marks;  // view count, 255 at the Delta border, unused
 
-const float kBorderShare = 1e-4;       // SPEC 6.2
 const float kLargestFloat = 3.4e38;
 
 float fragment[MAX_VIEWS];  // 1/z; 0: absent
@@ -76,10 +76,10 @@ float Say(ViewBlock view, vec3 ray, float w) {
   return 1.0 / (dot(across, across) / (along * along) + pixel_angle_rad * pixel_angle_rad);
 }
 
-// SPEC 5.2, 5.3: every view's fragment on the nearest surface that the views hold together.
+// SPEC 5.2, 5.3: every view's fragment on the nearest surface that the views support.
 bool FindOwnFragments(vec3 ray, float surface) {
-  bool held = false;
-  for (int tried = 0; tried < kTriedSurfaces && surface > 0.0 && !held; ++tried) {
+  bool supported = false;
+  for (int tried = 0; tried < kMaxSurfaces && surface > 0.0 && !supported; ++tried) {
     Votes votes = Votes(0.0, 0.0, 0.0, 0.0);
     for (int i = 0; i < view_count; ++i) {
       ViewBlock view = views[i];
@@ -89,10 +89,10 @@ bool FindOwnFragments(vec3 ray, float surface) {
           OwnDepth(map, BaseOf(view, ray), AwayOf(view), surface, on_map, whole, masked);
       AddVote(map, surface, seen, whole, masked, on_map, Say(view, ray, surface), votes);
     }
-    held = votes.held >= votes.refused;
-    surface = !held ? votes.behind : votes.front > 0.0 ? votes.front : surface;
+    supported = votes.support >= votes.against;
+    surface = !supported ? votes.behind : votes.front > 0.0 ? votes.front : surface;
   }
-  if (!held) return false;
+  if (!supported) return false;
   for (int i = 0; i < view_count; ++i) {
     ViewBlock view = views[i];
     fragment[i] = Fragment(MapOf(view), BaseOf(view, ray), AwayOf(view), surface);

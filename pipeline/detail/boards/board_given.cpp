@@ -17,16 +17,16 @@ constexpr std::size_t kImages = 8;
 
 void RequireGivenBoard(const std::string& where, const calib::Board& board, std::size_t count,
                        const std::function<ImageRgb8(std::size_t)>& load, int threads) {
-  std::vector<calib::BoardVerdict> verdicts(std::min(kImages, count));
-  ParallelFor(0, static_cast<int>(verdicts.size()), threads, [&](int i) {
+  std::vector<calib::BoardCheck> checks(std::min(kImages, count));
+  ParallelFor(0, static_cast<int>(checks.size()), threads, [&](int i) {
     const auto at = static_cast<std::size_t>(i);
     try {
-      verdicts[at] = calib::VerdictOf(calib::GreyOf(load(at * count / verdicts.size())), board);
+      checks[at] = calib::CheckBoard(calib::GreyOf(load(at * count / checks.size())), board);
     } catch (const Error&) {
       // Is reported where every image is read.
     }
   });
-  const std::string other = calib::DescribeOtherBoard(board, verdicts);
+  const std::string other = calib::DescribeOtherBoard(board, checks);
   if (!other.empty()) throw UsageError(where + ": " + other);
 }
 

@@ -67,7 +67,7 @@ bool IsMissing(std::string cell) {
 }
 
 struct Row {
-  int instant = 0, camera = 0;
+  int time_step = 0, camera = 0;
   std::optional<int> frame;  // empty where the table has no such column
 };
 
@@ -86,7 +86,7 @@ class Table {
   Table(std::string file, const std::string& heading)
       : file_(std::move(file)), separator_(SeparatorOf(heading)) {
     names_ = CellsOf(heading, separator_);
-    instant_ = Require("sync_index");
+    time_step_ = Require("sync_index");
     camera_ = Require("cam_id");
     frame_ = Find("frame_index");
     time_ = Find("frame_time");
@@ -98,8 +98,9 @@ class Table {
   std::optional<Row> RowOf(const std::string& line, int number) const {
     const std::vector<std::string> cells = CellsOf(line, separator_);
     const auto cell = [&](size_t at) { return at < cells.size() ? cells[at] : std::string(); };
-    Row row{
-        Number(cell(instant_), number, "sync_index"), Number(cell(camera_), number, "cam_id"), {}};
+    Row row{Number(cell(time_step_), number, "sync_index"),
+            Number(cell(camera_), number, "cam_id"),
+            {}};
     const auto& presence = frame_ ? frame_ : time_;
     if (presence && IsMissing(cell(*presence))) return std::nullopt;
     if (frame_) row.frame = Number(cell(*frame_), number, "frame_index");
@@ -126,14 +127,14 @@ class Table {
   std::string file_;
   char separator_;
   std::vector<std::string> names_;
-  size_t instant_ = 0, camera_ = 0;
+  size_t time_step_ = 0, camera_ = 0;
   std::optional<size_t> frame_, time_;
 };
 
 // A table without frame numbers: a camera's rows, in order of time, are its frames.
 void CountFrames(std::vector<Row>& rows) {
   std::stable_sort(rows.begin(), rows.end(),
-                   [](const Row& a, const Row& b) { return a.instant < b.instant; });
+                   [](const Row& a, const Row& b) { return a.time_step < b.time_step; });
   std::map<int, int> next;
   for (Row& row : rows) row.frame = next[row.camera]++;
 }
@@ -168,12 +169,12 @@ RigTimestamps ReadRigTimestamps(const std::filesystem::path& file) {
   if (timestamps.counted) CountFrames(rows);
   for (const Row& row : rows) {
     const auto [at, fresh] =
-        timestamps.instants.emplace(std::pair(row.camera, *row.frame), row.instant);
-    if (fresh || at->second == row.instant) continue;
+        timestamps.time_steps.emplace(std::pair(row.camera, *row.frame), row.time_step);
+    if (fresh || at->second == row.time_step) continue;
     throw Error(fmt::format(
         "{}: cam_id {}: frame_index {} stands at sync_index {} and at {}; a frame is of one time "
         "step",
-        file.string(), row.camera, *row.frame, at->second, row.instant));
+        file.string(), row.camera, *row.frame, at->second, row.time_step));
   }
   return timestamps;
 }

@@ -10,10 +10,10 @@
 namespace dtr::pipeline {
 
 /// (cam_id, frame_index) -> sync_index.
-using RigInstants = std::map<std::pair<int, int>, int>;
+using RigTimeSteps = std::map<std::pair<int, int>, int>;
 
 struct RigTimestamps {
-  RigInstants instants;
+  RigTimeSteps time_steps;
   /// True where the table has no column frame_index: frames are then the rows of a camera, counted
   /// from 0 in the order of sync_index.
   bool counted = false;

@@ -36,7 +36,7 @@ ViewTruth CastTruth::On(const View& view, size_t index, int threads) const {
   const Pose& cam_from_scene = cams_from_scene_[index];
   std::vector<Pose> others = cams_from_scene_;
   others.erase(others.begin() + static_cast<std::ptrdiff_t>(index));
-  datasets::PhotoOptions clean;  // texture is judged before noise and exposure
+  datasets::PhotoOptions clean;  // texture is evaluated before noise and exposure
   clean.supersampling = spec_.supersampling;
   clean.threads = threads;
   ViewTruth truth{datasets::RenderDepth(scene_, view.camera, cam_from_scene, threads, spec_.scale),

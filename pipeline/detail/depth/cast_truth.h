@@ -27,8 +27,8 @@ class CastTruth {
                                              const io::CameraList& list);
 
   /// Casts through the view's own camera from the true pose of list.cameras[index]. Scored is what
-  /// two other true cameras see and what has texture, judged as `dtr dataset` does, on the view's
-  /// grid.
+  /// two other true cameras see and what has texture, evaluated as `dtr dataset` does, on the
+  /// view's grid.
   ViewTruth On(const View& view, size_t index, int threads) const;
 
  private:

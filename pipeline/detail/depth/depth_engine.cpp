@@ -73,11 +73,11 @@ void RequireEngine(const DepthChoice& choice) {
 }
 
 std::unique_ptr<stereo::Engine> MakeDepthEngine(const DepthChoice& choice,
-                                                const stereo::Effort& effort,
+                                                const stereo::QualitySettings& quality,
                                                 const DepthSources& of, Progress& progress) {
   if (choice.engine == "none") return nullptr;
   if (choice.engine == "colmap") return MakeColmapEngine(choice.workspace, of, progress);
-  return stereo::MakeEngine(choice.engine, effort);
+  return stereo::MakeEngine(choice.engine, quality);
 }
 
 }  // namespace dtr::pipeline

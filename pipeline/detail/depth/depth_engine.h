@@ -31,7 +31,7 @@ void RequireEngine(const DepthChoice& choice);
 /// The engine of a choice; null for "none". Engine `colmap` without a workspace has one filled by
 /// the program, in the work folder. Throws as ColmapEngine and RunPatchMatchStereo do.
 std::unique_ptr<stereo::Engine> MakeDepthEngine(const DepthChoice& choice,
-                                                const stereo::Effort& effort,
+                                                const stereo::QualitySettings& quality,
                                                 const DepthSources& of, Progress& progress);
 
 }  // namespace dtr::pipeline

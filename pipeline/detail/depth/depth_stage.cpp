@@ -155,9 +155,10 @@ void WriteDepth(View& view, stereo::DepthEstimate&& estimate, LengthUnit unit,
 }
 
 // The effort that fits into the time budget, by a probe with as many neighbours as any effort asks.
-stereo::Effort WithinBudget(std::span<const stereo::StereoView> views, const SparseScene& scene,
-                            const DepthChoice& choice, const stereo::DepthMapsOptions& options,
-                            const std::filesystem::path& record, Progress& progress) {
+stereo::QualitySettings WithinBudget(std::span<const stereo::StereoView> views,
+                                     const SparseScene& scene, const DepthChoice& choice,
+                                     const stereo::DepthMapsOptions& options,
+                                     const std::filesystem::path& record, Progress& progress) {
   stereo::NeighbourOptions most;
   most.count = stereo::MakeEngine("patchmatch")->Neighbours();
   const auto neighbours = stereo::ChooseNeighbours(views, scene, most);
@@ -176,9 +177,10 @@ void StoreImage(View& view, LengthUnit unit, io::SetWriter& writer) {
   view.mask = {};
 }
 
-stereo::Effort DepthStage(DtrSet& set, const SparseScene& sparse, const DepthChoice& choice,
-                          const stereo::Effort& asked, const DepthStageOptions& options,
-                          io::SetWriter& writer, Progress& progress) {
+stereo::QualitySettings DepthStage(DtrSet& set, const SparseScene& sparse,
+                                   const DepthChoice& choice, const stereo::QualitySettings& asked,
+                                   const DepthStageOptions& options, io::SetWriter& writer,
+                                   Progress& progress) {
   if (choice.engine == "none") {
     progress.Note("depth left out: `engine` none");
     return asked;
@@ -200,15 +202,15 @@ stereo::Effort DepthStage(DtrSet& set, const SparseScene& sparse, const DepthCho
   depth_options.load_pixels = [&](int source) {
     return ReadPixels(writer.folder(), view_of(source), options.threads);
   };
-  const stereo::Effort effort = choice.time_budget_s
-                                    ? WithinBudget(sources.stereo, scene, choice, depth_options,
-                                                   writer.work_folder() / "effort.json", progress)
-                                    : asked;
-  if (!options.normals.empty() && (choice.engine != "patchmatch" || effort.rounds == 0)) {
+  const stereo::QualitySettings quality =
+      choice.time_budget_s ? WithinBudget(sources.stereo, scene, choice, depth_options,
+                                          writer.work_folder() / "effort.json", progress)
+                           : asked;
+  if (!options.normals.empty() && (choice.engine != "patchmatch" || quality.rounds == 0)) {
     throw UsageError(
         "`normals`: expected `engine` patchmatch with one pass or more, whose planes they are of");
   }
-  const auto engine = MakeDepthEngine(choice, effort,
+  const auto engine = MakeDepthEngine(choice, quality,
                                       {views, sources.indices, sources.stereo, &scene,
                                        set.world_origin, writer.folder(), writer.work_folder()},
                                       progress);
@@ -237,7 +239,7 @@ stereo::Effort DepthStage(DtrSet& set, const SparseScene& sparse, const DepthCho
   });
   for (const int index : sources.indices) normals.Deliver(views[static_cast<size_t>(index)]);
   if (const std::string codings = SayDepthCodings(views); !codings.empty()) progress.Note(codings);
-  return effort;
+  return quality;
 }
 
 }  // namespace dtr::pipeline

@@ -29,8 +29,10 @@ void StoreImage(View& view, LengthUnit unit, io::SetWriter& writer);
 /// source views and the points they alone know reach the engine. Pixels are in memory only as long
 /// as they are worked with, within the memory chosen: UsageError when that is too little. Returns
 /// the effort spent: `effort` or, with a time budget, what fitted into that.
-stereo::Effort DepthStage(DtrSet& set, const SparseScene& sparse, const DepthChoice& choice,
-                          const stereo::Effort& effort, const DepthStageOptions& options,
-                          io::SetWriter& writer, Progress& progress);
+stereo::QualitySettings DepthStage(DtrSet& set, const SparseScene& sparse,
+                                   const DepthChoice& choice,
+                                   const stereo::QualitySettings& quality,
+                                   const DepthStageOptions& options, io::SetWriter& writer,
+                                   Progress& progress);
 
 }  // namespace dtr::pipeline

@@ -10,7 +10,7 @@
 #include <optional>
 
 #include "dtr/base/files.h"
-#include "pipeline/detail/depth/effort_json.h"
+#include "pipeline/detail/depth/quality_json.h"
 #include "stereo/widen.h"
 
 namespace dtr::pipeline {
@@ -18,12 +18,12 @@ namespace {
 
 constexpr std::uintmax_t kLargestRecord = 1 << 16;
 constexpr int kProbeSidePx = 384;
-constexpr stereo::Effort kProbeEffort{};  // balanced
+constexpr stereo::QualitySettings kProbeQuality{};  // balanced
 /// Sides at which the engine's pyramid ends, and what its first guess costs in visits.
 constexpr int kCoarsestSidePx = 256;
 constexpr double kFirstGuessVisits = 6;
 
-constexpr stereo::Effort kLadder[] = {
+constexpr stereo::QualitySettings kLadder[] = {
     {.neighbours = 2, .round_neighbours = 4, .iterations = 1, .rounds = 0},
     {.neighbours = 3, .round_neighbours = 5, .iterations = 2, .rounds = 1},
     {.neighbours = 4, .round_neighbours = 6, .iterations = 2, .rounds = 1},
@@ -95,7 +95,7 @@ ProbedCosts ProbeCosts(const stereo::Collection& c, int view) {
     views.push_back({small[i].camera, pose, &small[i].pixels.image, &small[i].pixels.mask});
     if (i > 0) others.push_back(static_cast<int>(i));
   }
-  const auto engine = stereo::MakeEngine("patchmatch", kProbeEffort);
+  const auto engine = stereo::MakeEngine("patchmatch", kProbeQuality);
   const stereo::DepthRange& range = c.ranges[static_cast<size_t>(view)];
   std::vector<stereo::PlaneMap> maps(views.size());
   ProbedCosts costs;
@@ -109,71 +109,72 @@ ProbedCosts ProbeCosts(const stereo::Collection& c, int view) {
   }
   costs.round_s =
       SecondsOf([&] { engine->Refine(views, 0, others, range, pointers, 1, c.options); });
-  costs.verdict_s = SecondsOf([&] { engine->Judge(views, 0, others, range, pointers, c.options); });
+  costs.check_s = SecondsOf([&] { engine->Filter(views, 0, others, range, pointers, c.options); });
   const double pixels = PixelsOf(small[0].camera);
   const double available = static_cast<double>(others.size());
-  const double searched = std::min<double>(kProbeEffort.neighbours, available);
-  const double asked = std::min<double>(kProbeEffort.round_neighbours, available);
+  const double searched = std::min<double>(kProbeQuality.neighbours, available);
+  const double asked = std::min<double>(kProbeQuality.round_neighbours, available);
   costs.search_s /=
-      pixels * searched * VisitsPerPixel(kProbeEffort.iterations, LevelsOf(small[0].camera));
+      pixels * searched * VisitsPerPixel(kProbeQuality.iterations, LevelsOf(small[0].camera));
   costs.round_s /= pixels * asked;
-  costs.verdict_s /= pixels * asked;
+  costs.check_s /= pixels * asked;
   return costs;
 }
 
-double PredictSeconds(const ProbedCosts& costs, const stereo::Effort& effort,
+double PredictSeconds(const ProbedCosts& costs, const stereo::QualitySettings& quality,
                       std::span<const stereo::StereoView> views) {
   const double others = static_cast<double>(views.size()) - 1;
-  const double searched = std::min<double>(effort.neighbours, others);
-  const double asked = std::min<double>(effort.round_neighbours, others);
+  const double searched = std::min<double>(quality.neighbours, others);
+  const double asked = std::min<double>(quality.round_neighbours, others);
   double seconds = 0;
   for (const stereo::StereoView& view : views) {
-    const double visits = VisitsPerPixel(effort.iterations, LevelsOf(view.camera));
+    const double visits = VisitsPerPixel(quality.iterations, LevelsOf(view.camera));
     // Every range is looked at once before the search (stereo/widen.h); how many of them move, and
     // are looked at again, is not known yet.
     const double side = std::max(view.camera.width_px(), view.camera.height_px());
     const double shrink = stereo::LookSide(view.camera) / side;
     seconds += PixelsOf(view.camera) * shrink * shrink * costs.search_s *
                std::min<double>(stereo::kLookNeighbours, std::max(searched, asked)) *
-               VisitsPerPixel(effort.iterations, 1);
+               VisitsPerPixel(quality.iterations, 1);
     seconds += PixelsOf(view.camera) * (costs.search_s * searched * visits +
-                                        (costs.round_s * effort.rounds + costs.verdict_s) * asked);
+                                        (costs.round_s * quality.rounds + costs.check_s) * asked);
   }
   return seconds;
 }
 
-std::span<const stereo::Effort> EffortLadder() { return kLadder; }
+std::span<const stereo::QualitySettings> QualityLadder() { return kLadder; }
 
-stereo::Effort PickEffort(const ProbedCosts& costs, const DepthChoice& choice,
-                          std::span<const stereo::StereoView> views) {
-  stereo::Effort picked = Overridden(kLadder[0], choice);
-  for (const stereo::Effort& rung : kLadder) {
-    const stereo::Effort effort = Overridden(rung, choice);
-    if (PredictSeconds(costs, effort, views) <= *choice.time_budget_s) picked = effort;
+stereo::QualitySettings PickQuality(const ProbedCosts& costs, const DepthChoice& choice,
+                                    std::span<const stereo::StereoView> views) {
+  stereo::QualitySettings picked = Overridden(kLadder[0], choice);
+  for (const stereo::QualitySettings& rung : kLadder) {
+    const stereo::QualitySettings quality = Overridden(rung, choice);
+    if (PredictSeconds(costs, quality, views) <= *choice.time_budget_s) picked = quality;
   }
   return picked;
 }
 
-stereo::Effort EffortWithinBudget(const stereo::Collection& c, const DepthChoice& choice,
-                                  const std::filesystem::path& record, Progress& progress) {
+stereo::QualitySettings EffortWithinBudget(const stereo::Collection& c, const DepthChoice& choice,
+                                           const std::filesystem::path& record,
+                                           Progress& progress) {
   if (std::filesystem::exists(record)) {
-    return EffortFromJson(ReadFile(record, kLargestRecord), record.string());
+    return QualityFromJson(ReadFile(record, kLargestRecord), record.string());
   }
-  stereo::Effort effort = Overridden(kLadder[0], choice);
+  stereo::QualitySettings quality = Overridden(kLadder[0], choice);
   if (const auto costs = FirstProbe(c)) {
-    effort = PickEffort(*costs, choice, c.views);
-    const double expected_s = PredictSeconds(*costs, effort, c.views);
+    quality = PickQuality(*costs, choice, c.views);
+    const double expected_s = PredictSeconds(*costs, quality, c.views);
     progress.Note(fmt::format(
         "time budget {} s: {} neighbours, {} in {} passes, {} iterations; expected {:.1f} s{}",
-        *choice.time_budget_s, effort.neighbours, effort.round_neighbours, effort.rounds,
-        effort.iterations, expected_s,
+        *choice.time_budget_s, quality.neighbours, quality.round_neighbours, quality.rounds,
+        quality.iterations, expected_s,
         expected_s > *choice.time_budget_s ? ", MORE than the budget: nothing cheaper is left"
                                            : ""));
   } else {
     progress.Note("time budget: no view has a usable pair to try; the lowest settings are used");
   }
-  WriteFileAtomically(record, SettingsJson("patchmatch", effort).dump());
-  return effort;
+  WriteFileAtomically(record, SettingsJson("patchmatch", quality).dump());
+  return quality;
 }
 
 }  // namespace dtr::pipeline

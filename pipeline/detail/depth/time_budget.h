@@ -15,9 +15,9 @@ namespace dtr::pipeline {
 /// one kind, from which other efforts follow: the search costs in proportion to its neighbours and
 /// its visits per pixel, a round and the validation result in proportion to theirs.
 struct ProbedCosts {
-  double search_s = 0;   ///< per pixel, neighbour and visit
-  double round_s = 0;    ///< per pixel and neighbour
-  double verdict_s = 0;  ///< per pixel and neighbour
+  double search_s = 0;  ///< per pixel, neighbour and visit
+  double round_s = 0;   ///< per pixel and neighbour
+  double check_s = 0;   ///< per pixel and neighbour
 };
 
 /// Visits per pixel of full size that a search makes on all its levels; `levels` >= 1.
@@ -28,20 +28,21 @@ double VisitsPerPixel(int iterations, int levels);
 ProbedCosts ProbeCosts(const stereo::Collection& collection, int view);
 
 /// Seconds that all of the views should take.
-double PredictSeconds(const ProbedCosts& costs, const stereo::Effort& effort,
+double PredictSeconds(const ProbedCosts& costs, const stereo::QualitySettings& quality,
                       std::span<const stereo::StereoView> views);
 
 /// The efforts a budget chooses among, cheapest first; presets are among them.
-std::span<const stereo::Effort> EffortLadder();
+std::span<const stereo::QualitySettings> QualityLadder();
 
 /// The most expensive effort of the ladder that should fit into the budget, else the cheapest; what
 /// the choice gives explicitly stays.
-stereo::Effort PickEffort(const ProbedCosts& costs, const DepthChoice& choice,
-                          std::span<const stereo::StereoView> views);
+stereo::QualitySettings PickQuality(const ProbedCosts& costs, const DepthChoice& choice,
+                                    std::span<const stereo::StereoView> views);
 
 /// Probes the first view that has neighbours, picks for choice.time_budget_s and says so in one
 /// line. What was picked is kept in `record`, so that an interrupted run goes on with the same.
-stereo::Effort EffortWithinBudget(const stereo::Collection& collection, const DepthChoice& choice,
-                                  const std::filesystem::path& record, Progress& progress);
+stereo::QualitySettings EffortWithinBudget(const stereo::Collection& collection,
+                                           const DepthChoice& choice,
+                                           const std::filesystem::path& record, Progress& progress);
 
 }  // namespace dtr::pipeline

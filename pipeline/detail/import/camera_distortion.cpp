@@ -38,12 +38,12 @@ class LensDistortion final : public CameraDistortion {
 calib::LensCamera CameraModelOf(const io::NamedCamera& named) {
   const PinholeCamera& pinhole = named.camera;
   if (!named.distortion) {
-    return {calib::LensModel::kPinhole,
+    return {calib::CameraModel::kPinhole,
             pinhole.width_px(),
             pinhole.height_px(),
             {pinhole.fx_px(), pinhole.fy_px(), pinhole.cx_px(), pinhole.cy_px()}};
   }
-  const auto model = calib::LensModelFromName(named.distortion->model);
+  const auto model = calib::CameraModelFromName(named.distortion->model);
   if (!model) {
     throw Error(named.name + ": cannot be undistorted, no camera model is called " +
                 named.distortion->model);

@@ -23,7 +23,7 @@ void AddCameraTable(report::HtmlReport& page, const calib::BoardValidation& judg
   std::vector<std::vector<report::Cell>> rows;
   for (const calib::ValidatedCamera& camera : judged.cameras) {
     for (const auto& [what, stats] :
-         {std::pair{judged.unseen ? "held out, boards refitted" : "stored, boards refitted",
+         {std::pair{judged.test_views ? "held out, boards refitted" : "stored, boards refitted",
                     &camera.stored},
           std::pair{"stored, held out", &camera.held_out}}) {
       if (stats->count == 0) continue;
@@ -83,8 +83,8 @@ std::string CalibrationPage(const calib::Calibration& calibration,
                             const calib::BoardValidation& judged, const std::string& title,
                             const std::optional<fs::path>& images) {
   report::HtmlReport page(title);
-  page.Verdict(judged.passed(), judged.passed() ? "The calibration passed its tests"
-                                                : "The calibration broke at least one test");
+  page.Result(judged.passed(), judged.passed() ? "The calibration passed its tests"
+                                               : "The calibration broke at least one test");
   page.Section("Can the calibration be trusted?");
   report::AddChecks(page, judged.tests);
   AddCameraTable(page, judged);

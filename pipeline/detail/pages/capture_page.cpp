@@ -81,8 +81,8 @@ CaptureLook LookAt(const capture::Capture& capture, const std::string& title, in
     (IsFaulty(photo) ? faulty : good).push_back(RowOf(photo, thumbnails[i]));
   }
   report::HtmlReport page(title);
-  page.Verdict(faulty.empty(), fmt::format("{} photos, {} with a remark, {} skipped", count,
-                                           faulty.size(), capture.skipped.size()));
+  page.Result(faulty.empty(), fmt::format("{} photos, {} with a remark, {} skipped", count,
+                                          faulty.size(), capture.skipped.size()));
   page.Paragraph(
       "Sharpness is the variance of the 4-neighbour Laplacian over the variance of the brightness: "
       "compare it between photos of one camera. Overexposed: a channel at 254 or 255; "

@@ -191,8 +191,8 @@ std::string ValidationPage(const fs::path& folder, const DtrSet& set, const SetV
                            const std::string& title) {
   const std::vector<View>& views = set.frames.front().views;
   report::HtmlReport page(title);
-  page.Verdict(report.passed(), report.passed() ? "The calibration passed its tests"
-                                                : "The calibration broke at least one test");
+  page.Result(report.passed(), report.passed() ? "The calibration passed its tests"
+                                               : "The calibration broke at least one test");
   page.Section("Can the calibration be trusted?");
   report::AddChecks(page, report.tests);
   if (!report.adjustment.not_validated.empty()) {

@@ -3,7 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "capture/contents_json.h"
-#include "pipeline/detail/depth/effort_json.h"
+#include "pipeline/detail/depth/quality_json.h"
 #include "pipeline/detail/reports/calibration_json.h"
 #include "pipeline/detail/reports/metres_json.h"
 #include "pipeline/detail/reports/text.h"
@@ -25,8 +25,8 @@ Json JsonOf(const SfmChoice& choice) {
 
 }  // namespace
 
-Json OptionsJson(const BuildOptions& options, const stereo::Effort& effort) {
-  Json json = SettingsJson(options.depth.engine, effort);
+Json OptionsJson(const BuildOptions& options, const stereo::QualitySettings& quality) {
+  Json json = SettingsJson(options.depth.engine, quality);
   json["max_size_px"] = options.max_size_px;
   json["holdout"] = options.holdout;
   json["holdout_strict"] = options.holdout_strict;

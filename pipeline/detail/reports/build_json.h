@@ -8,7 +8,8 @@
 namespace dtr::pipeline {
 
 /// Everything that can change a byte of the set, and nothing else: threads and memory do not.
-nlohmann::ordered_json OptionsJson(const BuildOptions& options, const stereo::Effort& effort);
+nlohmann::ordered_json OptionsJson(const BuildOptions& options,
+                                   const stereo::QualitySettings& quality);
 
 /// The provenance of the set; `option_values` and `photos` as they stand in it.
 nlohmann::ordered_json ProvenanceJson(const BuildOptions& options,

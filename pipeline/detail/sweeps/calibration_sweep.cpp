@@ -24,7 +24,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-enum CalibrationAxis : size_t { kFeatureSize, kFeatures, kMatching, kLensModel, kRefine };
+enum CalibrationAxis : size_t { kFeatureSize, kFeatures, kMatching, kCameraModel, kRefine };
 constexpr const char *kYes = "yes", *kNo = "no";
 // Scale of the loss over the photos' long side: half a pixel of 1000, about what observations err
 // by, so that wrong ones, which err the same by any cameras, do not hide what the cameras do.
@@ -35,7 +35,7 @@ constexpr double kExact = 1e-9;  // px; what stands for 0 on a logarithmic axis
 capture::Capture PhotosOf(const CalibrationSweepOptions& options, Progress& progress) {
   capture::Capture photos = capture::IngestPhotos(
       options.photos, {.threads = options.threads, .memory_gb = kDefaultMemoryGb}, progress);
-  (void)capture::DropSamePictures(photos, [](const std::string&) { return false; });
+  (void)capture::DropSameImages(photos, [](const std::string&) { return false; });
   capture::RequireEnoughPhotos(photos, options.photos);
   return photos;
 }
@@ -127,7 +127,7 @@ SfmChoice CalibrationSweep::ChoiceOf(const eval::SweepSetting& setting) const {
                               colmap::Matching::kSequential}) {
     if (Value(setting, kMatching) == colmap::NameOf(matching)) choice.matching = matching;
   }
-  choice.lens_model = Value(setting, kLensModel);
+  choice.lens_model = Value(setting, kCameraModel);
   return choice;
 }
 
@@ -141,7 +141,7 @@ eval::SweepMeasurement CalibrationSweep::Measure(const eval::SweepSetting& setti
   calibrate.sfm = ChoiceOf(setting);
   // Refinement begins where COLMAP ends: with and without it there is one workspace.
   std::string folder;
-  for (const CalibrationAxis axis : {kFeatureSize, kFeatures, kMatching, kLensModel}) {
+  for (const CalibrationAxis axis : {kFeatureSize, kFeatures, kMatching, kCameraModel}) {
     folder += (folder.empty() ? "" : "-") + Value(setting, axis);
   }
   const double start_ms = ProcessCpuMilliseconds();

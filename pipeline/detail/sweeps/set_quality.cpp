@@ -20,8 +20,8 @@ const std::filesystem::path& Made(const std::filesystem::path& folder) {
 ScratchFolder::ScratchFolder(const std::filesystem::path& folder)
     : TemporaryFolder(Made(folder), ".measured-") {}
 
-DtrSet LoadToJudge(const std::filesystem::path& folder, bool sigma, int threads,
-                   Progress& progress) {
+DtrSet LoadToEvaluate(const std::filesystem::path& folder, bool sigma, int threads,
+                      Progress& progress) {
   io::LoadOptions load;
   load.held_out = true;
   load.sigma = sigma;
@@ -30,8 +30,8 @@ DtrSet LoadToJudge(const std::filesystem::path& folder, bool sigma, int threads,
   return io::LoadSet(folder, load);
 }
 
-void JudgePictures(const DtrSet& set, const RenderOptions& render,
-                   const eval::RenderFunction& renderer, eval::SweepMeasurement& measured) {
+void EvaluateImages(const DtrSet& set, const RenderOptions& render,
+                    const eval::RenderFunction& renderer, eval::SweepMeasurement& measured) {
   const std::vector<View>& views = set.frames.front().views;
   eval::EvaluateOptions evaluate;
   evaluate.render = render;

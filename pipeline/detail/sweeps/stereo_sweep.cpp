@@ -138,8 +138,8 @@ eval::SweepMeasurement StereoSweep::Measure(const eval::SweepSetting& setting) c
   if (other_stages_s_) measured.figures["build_cpu_s"] = *other_stages_s_ + measured.cost;
   measured.figures["share_with_depth"] = report.depth_completeness;
 
-  const DtrSet set = LoadToJudge(made, !options_.truth.empty(), options_.threads, notes);
-  JudgePictures(set, options_.render, options_.make_renderer(), measured);
+  const DtrSet set = LoadToEvaluate(made, !options_.truth.empty(), options_.threads, notes);
+  EvaluateImages(set, options_.render, options_.make_renderer(), measured);
   if (!options_.truth.empty()) {
     measured.error =
         ErrorByTruth(EvaluateDepth(set, options_.truth, options_.threads, notes), measured);

@@ -18,7 +18,7 @@ namespace dtr::pipeline {
 struct StereoSweepOptions {
   std::filesystem::path set;
   std::filesystem::path work;   ///< existing folder for the sets made; each is removed after use
-  std::filesystem::path truth;  ///< of EvaluateDepth; empty: images alone are judged
+  std::filesystem::path truth;  ///< of EvaluateDepth; empty: images alone are evaluated
   /// Long sides of the images to try, the first the default; 0 and what is larger: as they are.
   /// Empty: as they are, seven tenths, half.
   std::vector<int> max_sizes_px;

@@ -182,11 +182,11 @@ eval::SweepMeasurement StorageSweep::Measure(const eval::SweepSetting& setting) 
   DtrSet loaded;
   for (int i = 0; i < kLoads; ++i) {
     const double start_ms = ProcessCpuMilliseconds();
-    loaded = LoadToJudge(made, false, options_.threads, progress_);
+    loaded = LoadToEvaluate(made, false, options_.threads, progress_);
     load_ms.push_back(ProcessCpuMilliseconds() - start_ms);
   }
   measured.figures["load_cpu_ms"] = eval::TimesOf(load_ms).median_ms;
-  JudgePictures(loaded, options_.render, options_.make_renderer(), measured);
+  EvaluateImages(loaded, options_.render, options_.make_renderer(), measured);
   return measured;
 }
 

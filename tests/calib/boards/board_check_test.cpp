@@ -26,16 +26,16 @@ Board Charuco(int columns, int rows, const std::string& dictionary, bool inverte
 // What photos of one board say of another one that was given.
 std::string Said(const Board& shown, const Board& given,
                  const std::vector<double>& tilts = {0, 0.3, -0.4}) {
-  std::vector<BoardVerdict> verdicts;
+  std::vector<BoardCheck> checks;
   for (const double tilt : tilts) {
     Pose pose;
     pose.rotation = Eigen::AngleAxisd(tilt, Eigen::Vector3d(0.6, 0.8, 0)) *
                     Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitZ());
     const Eigen::Vector3d middle = 0.5 * (shown.Corner(0) + shown.Corner(shown.CornerCount() - 1));
     pose.translation = Eigen::Vector3d(0, 0, 0.8) - pose.rotation * middle;
-    verdicts.push_back(VerdictOf(Photo(shown, kCamera, pose, 2, 1), given));
+    checks.push_back(CheckBoard(Photo(shown, kCamera, pose, 2, 1), given));
   }
-  return DescribeOtherBoard(given, verdicts);
+  return DescribeOtherBoard(given, checks);
 }
 
 TEST(BoardCheck, TheGivenBoardPasses) {
@@ -49,8 +49,8 @@ TEST(BoardCheck, TheGivenBoardPasses) {
 TEST(BoardCheck, ALargerOrSmallerChessboardIsNamed) {
   EXPECT_THAT(Said(Chessboard(12, 12), Chessboard(9, 6)),
               HasSubstr("3 of 3 photos looked at show a chessboard of 12x12 inner corners"));
-  EXPECT_THAT(Said(Chessboard(9, 6), Chessboard(7, 5)), HasSubstr("give chessboard:9x6:SQUARE"));
-  EXPECT_THAT(Said(Chessboard(9, 6), Chessboard(5, 11)), HasSubstr("give chessboard:6x9:SQUARE"));
+  EXPECT_THAT(Said(Chessboard(9, 6), Chessboard(7, 5), {0.3}), HasSubstr("give chessboard:9x6:SQUARE"));
+  EXPECT_THAT(Said(Chessboard(9, 6), Chessboard(5, 11), {0.3}), HasSubstr("give chessboard:6x9:SQUARE"));
 }
 
 TEST(BoardCheck, ANumberOfSquaresIsRecognisedAsSuch) {
@@ -88,28 +88,29 @@ TEST(BoardCheck, ALargerBoardBehindTheGivenOneIsNotTakenForIt) {
   for (int y = 0; y < grey.height(); ++y) {
     for (int x = 320; x < grey.width(); ++x) grey(x, y) = right(x, y);
   }
-  EXPECT_TRUE(VerdictOf(grey, given).shows_given);
+  EXPECT_TRUE(CheckBoard(grey, given).shows_given);
 }
 
 TEST(BoardCheck, PhotosThatDisagreeSayNothing) {
   const Board given = Chessboard(9, 6);
   const auto other = [](int columns, int rows) {
-    BoardVerdict verdict;
-    verdict.other = Chessboard(columns, rows);
-    return verdict;
+    BoardCheck check;
+    check.other = Chessboard(columns, rows);
+    return check;
   };
-  BoardVerdict agrees;
+  BoardCheck agrees;
   agrees.shows_given = true;
-  using Verdicts = std::vector<BoardVerdict>;
-  EXPECT_EQ(DescribeOtherBoard(given, Verdicts{}), "");
-  EXPECT_EQ(DescribeOtherBoard(given, Verdicts{{}, {}}), "");
-  EXPECT_EQ(DescribeOtherBoard(given, Verdicts{other(12, 12), {}}), "");
-  EXPECT_EQ(DescribeOtherBoard(given, Verdicts{other(12, 12), other(12, 12), agrees}), "");
-  EXPECT_EQ(DescribeOtherBoard(
-                given, Verdicts{other(8, 8), other(8, 8), other(5, 4), other(4, 4), other(3, 3)}),
+  using BoardChecks = std::vector<BoardCheck>;
+  EXPECT_EQ(DescribeOtherBoard(given, BoardChecks{}), "");
+  EXPECT_EQ(DescribeOtherBoard(given, BoardChecks{{}, {}}), "");
+  EXPECT_EQ(DescribeOtherBoard(given, BoardChecks{other(12, 12), {}}), "");
+  EXPECT_EQ(DescribeOtherBoard(given, BoardChecks{other(12, 12), other(12, 12), agrees}), "");
+  EXPECT_EQ(DescribeOtherBoard(given, BoardChecks{other(8, 8), other(8, 8), other(5, 4),
+                                                  other(4, 4), other(3, 3)}),
             "");
-  EXPECT_NE(DescribeOtherBoard(given, Verdicts{other(12, 12)}), "");
-  EXPECT_NE(DescribeOtherBoard(given, Verdicts{other(12, 12), other(12, 12), {}, other(4, 4)}), "");
+  EXPECT_NE(DescribeOtherBoard(given, BoardChecks{other(12, 12)}), "");
+  EXPECT_NE(DescribeOtherBoard(given, BoardChecks{other(12, 12), other(12, 12), {}, other(4, 4)}),
+            "");
 }
 
 }  // namespace

@@ -65,17 +65,18 @@ double WorstDerivativeError(const ceres::CostFunction& cost,
 }
 
 TEST(ObservationCost, DerivativesAgreeWithDifferencesForEveryLens) {
-  const std::pair<LensModel, std::vector<double>> lenses[] = {
-      {LensModel::kSimplePinhole, {900, 500, 400}},
-      {LensModel::kPinhole, {900, 905, 500, 400}},
-      {LensModel::kSimpleRadial, {900, 500, 400, 0.05}},
-      {LensModel::kRadial, {900, 500, 400, 0.05, -0.01}},
-      {LensModel::kOpenCv, {900, 905, 500, 400, 0.05, -0.01, 1e-3, -2e-3}},
-      {LensModel::kOpenCvFisheye, {500, 505, 500, 400, 0.02, -0.01, 1e-3, -2e-4}},
-      {LensModel::kFullOpenCv, {900, 905, 500, 400, .05, -.01, 1e-3, -2e-3, .01, .02, -.01, .003}},
-      {LensModel::kSimpleRadialFisheye, {500, 500, 400, 0.05}},
-      {LensModel::kRadialFisheye, {500, 500, 400, 0.05, -0.01}},
-      {LensModel::kThinPrismFisheye,
+  const std::pair<CameraModel, std::vector<double>> lenses[] = {
+      {CameraModel::kSimplePinhole, {900, 500, 400}},
+      {CameraModel::kPinhole, {900, 905, 500, 400}},
+      {CameraModel::kSimpleRadial, {900, 500, 400, 0.05}},
+      {CameraModel::kRadial, {900, 500, 400, 0.05, -0.01}},
+      {CameraModel::kOpenCv, {900, 905, 500, 400, 0.05, -0.01, 1e-3, -2e-3}},
+      {CameraModel::kOpenCvFisheye, {500, 505, 500, 400, 0.02, -0.01, 1e-3, -2e-4}},
+      {CameraModel::kFullOpenCv,
+       {900, 905, 500, 400, .05, -.01, 1e-3, -2e-3, .01, .02, -.01, .003}},
+      {CameraModel::kSimpleRadialFisheye, {500, 500, 400, 0.05}},
+      {CameraModel::kRadialFisheye, {500, 500, 400, 0.05, -0.01}},
+      {CameraModel::kThinPrismFisheye,
        {500, 505, 500, 400, .02, -.01, 1e-3, -2e-3, .001, .002, 1e-3, 2e-3}},
   };
   const PoseFrame pose{ArcPose(1, 5).rotation.toRotationMatrix(),

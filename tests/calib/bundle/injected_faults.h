@@ -17,7 +17,7 @@ namespace dtr::testing {
 
 using namespace calib;  // NOLINT: the tests' own short-hand
 
-inline const LensCamera kPinholeLens{LensModel::kPinhole, 1000, 800, {900, 905, 504, 397}};
+inline const LensCamera kPinholeLens{CameraModel::kPinhole, 1000, 800, {900, 905, 504, 397}};
 
 inline AdjustOptions AllFree() {
   AdjustOptions options;
@@ -116,9 +116,9 @@ double SigmasOfPattern(const Bundle& honest, const Spoil& spoil, const Test& tes
 
 inline Faulty FaultInjection(const Bundle& honest, int kind, Random& random) {
   Faulty s{honest, 0, "", ""};
-  // With distortion, as whoever judges undistorted views has to allow for.
+  // With distortion, as whoever validates undistorted views has to allow for.
   Bundle distorted = honest;
-  distorted.lenses[0].model = LensModel::kOpenCv;
+  distorted.lenses[0].model = CameraModel::kOpenCv;
   distorted.lenses[0].params.resize(8, 0);
   const BundleCovariance covariance = CovarianceOf(Adjust(distorted, AllFree()), AllFree());
   const double wanted = random.Uniform(8, 40);

@@ -39,7 +39,7 @@ inline std::string NameOf(SceneKind kind) {
 }
 
 inline const calib::LensCamera kPinholeOfSweep{
-    calib::LensModel::kPinhole, 1000, 800, {900, 900, 500, 400}};
+    calib::CameraModel::kPinhole, 1000, 800, {900, 900, 500, 400}};
 
 /// Leaves of three points out of five two observations, by any two of the cameras.
 inline void KeepPairsOfMost(std::uint64_t seed, calib::Bundle& bundle) {

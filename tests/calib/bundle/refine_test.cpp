@@ -94,14 +94,14 @@ TEST(Refine, LeavesThePrincipalPointWhereTheDataDoNotAskForIt) {
 
 TEST(Refine, AddsTangentialDistortionWhereTheLensHasIt) {
   SceneSpec spec = Noisy();
-  spec.lens = {LensModel::kOpenCv, 1000, 800, {900, 900, 504, 397, -0.05, 0.01, 2e-3, -3e-3}};
+  spec.lens = {CameraModel::kOpenCv, 1000, 800, {900, 900, 504, 397, -0.05, 0.01, 2e-3, -3e-3}};
   SfmModel model = ModelFrom(MakeBundle(spec));
-  model.cameras[1] = {LensModel::kRadial, 1000, 800, {900, 504, 397, -0.05, 0.01}};
+  model.cameras[1] = {CameraModel::kRadial, 1000, 800, {900, 504, 397, -0.05, 0.01}};
   const Refined refined = Refine(model, {});
   ASSERT_TRUE(refined.changed);
   EXPECT_EQ(refined.lens, LensFreedom::kTangential);
   const LensCamera& lens = refined.model.cameras.at(1);
-  ASSERT_EQ(lens.model, LensModel::kOpenCv);
+  ASSERT_EQ(lens.model, CameraModel::kOpenCv);
   EXPECT_NEAR(lens.params[6], 2e-3, 3e-4);
   EXPECT_NEAR(lens.params[7], -3e-3, 3e-4);
 }

@@ -38,7 +38,7 @@ struct Scene {
 
 Scene MakeScene(double noise_px, std::uint64_t seed) {
   Scene scene;
-  const LensCamera lens{LensModel::kRadial, 1000, 800, {900, 504, 397, -0.05, 0.01}};
+  const LensCamera lens{CameraModel::kRadial, 1000, 800, {900, 504, 397, -0.05, 0.01}};
   scene.rig = TwoCameras(lens);
   Random random(seed);
   for (int f = 0; f < kFrames; ++f) {
@@ -88,7 +88,7 @@ void Disturb(SfmModel& model, std::uint64_t seed) {
 }
 
 TEST(RigMember, TheCamerasMotionIsThatOfTheRig) {
-  const KnownRig rig = TwoCameras({LensModel::kPinhole, 10, 10, {10, 10, 5, 5}});
+  const KnownRig rig = TwoCameras({CameraModel::kPinhole, 10, 10, {10, 10, 5, 5}});
   const Pose cam_from_rig = rig.cam_from_rig[1], start = ArcPose(2, 8);
   const RigMember member{cam_from_rig.rotation.toRotationMatrix(),
                          start.rotation.conjugate().toRotationMatrix(),

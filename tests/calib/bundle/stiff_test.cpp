@@ -28,7 +28,7 @@ using testing::SceneSpec;
 constexpr double kNoisePx = 0.3;
 constexpr double kSamePx = 1e-6;         // what a world's unit may do to a pixel; 1e-11 seen
 constexpr double kSameMinimumPx = 1e-4;  // where the solver stops, from anywhere; 5e-6 seen
-const LensCamera kPinholeLens{LensModel::kPinhole, 1000, 800, {900, 905, 504, 397}};
+const LensCamera kPinholeLens{CameraModel::kPinhole, 1000, 800, {900, 905, 504, 397}};
 
 AdjustOptions With(LensFreedom lens) {
   AdjustOptions options;
@@ -228,7 +228,8 @@ TEST(Stiff, AStartThirtyPercentOffEndsAtTheSameMinimum) {
 // Focal lengths of thousands of px beside coefficients of 1e-3 and 1e-8.
 TEST(Stiff, TheUnitOfTheWorldChangesNothingForALensOfMixedMagnitudes) {
   SceneSpec spec{
-      .lens = {LensModel::kOpenCv, 4000, 3200, {3600, 3620, 2016, 1588, -0.05, 1e-3, 1e-8, -1e-8}}};
+      .lens = {
+          CameraModel::kOpenCv, 4000, 3200, {3600, 3620, 2016, 1588, -0.05, 1e-3, 1e-8, -1e-8}}};
   const auto [truth, seen] = TrueAndSeen(spec);
   const Held here = ExpectTheTruth(truth, seen, LensFreedom::kAll);
   EXPECT_GT(here.covariance.condition, 1);

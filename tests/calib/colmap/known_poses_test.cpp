@@ -155,7 +155,7 @@ TEST(CannotOverlap, HandWorkedCases) {
   const bool right_first = CannotOverlap(At({1, 0, 0}, 60, camera), At({-1, 0, 0}, -60, camera));
   EXPECT_NE(left_first, right_first);
   PosedImage lens = At({0, 0, -5}, 180, camera);
-  lens.camera = {calib::LensModel::kSimpleRadial, 200, 200, {100, 100, 100, 0.1}};
+  lens.camera = {calib::CameraModel::kSimpleRadial, 200, 200, {100, 100, 100, 0.1}};
   EXPECT_FALSE(CannotOverlap(ahead, lens));
 }
 
@@ -203,7 +203,7 @@ class HeldOutWithFake : public ::testing::Test {
     for (const char* name : {"a.jpg", "b.jpg", "x.jpg", "y.jpg"}) {
       WriteFileAtomically(photos_ / name, std::string("photo ") + name);
     }
-    model_.cameras[4] = {calib::LensModel::kSimpleRadial, 640, 480, {512.25, 320, 240, 0.01}};
+    model_.cameras[4] = {calib::CameraModel::kSimpleRadial, 640, 480, {512.25, 320, 240, 0.01}};
     model_.points[9] = {{0, 0, 5}, {1, 2, 3}, 0.5};
     for (std::uint32_t i = 0; i < 2; ++i) {
       calib::SfmImage image;
@@ -277,7 +277,7 @@ TEST_F(HeldOutWithFake, PlacedPhotosCarryTheFrozenCameraAndPointIds) {
 // and crashes where the lens model is another one by now.
 TEST_F(HeldOutWithFake, TheLensThatPhotosHaveInCommonIsOneOfAnImageOfTheModelThatColmapReads) {
   calib::LensCamera lens{
-      calib::LensModel::kOpenCv, 640, 480, {512, 513, 320, 240, 0.1, 0.2, 3e-3, 4e-3}};
+      calib::CameraModel::kOpenCv, 640, 480, {512, 513, 320, 240, 0.1, 0.2, 3e-3, 4e-3}};
   model_.cameras[4] = lens;
   for (const std::uint32_t i : {0, 1}) {
     lens.params[2] = 318 + 5.0 * i;

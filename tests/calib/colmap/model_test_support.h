@@ -20,7 +20,7 @@ inline calib::SfmModel ModelWithEveryCamera(std::uint64_t seed) {
   constexpr int kModels = 11, kPoints = 5;
   for (int id = 0; id < kModels; ++id) {
     calib::LensCamera camera;
-    camera.model = static_cast<calib::LensModel>(id);
+    camera.model = static_cast<calib::CameraModel>(id);
     camera.width_px = 640 + id;
     camera.height_px = 480 + id;
     const auto count = static_cast<size_t>(calib::ParameterCount(camera.model));

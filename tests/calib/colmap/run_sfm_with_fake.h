@@ -54,7 +54,7 @@ class RunSfmWithFake : public ::testing::Test {
   // A model of the first `count` photos in order of names, under the names COLMAP sees.
   void LeaveModel(int number, size_t count) {
     calib::SfmModel model;
-    model.cameras[1] = {calib::LensModel::kSimpleRadial, 640, 480, {500, 320, 240, 0}};
+    model.cameras[1] = {calib::CameraModel::kSimpleRadial, 640, 480, {500, 320, 240, 0}};
     for (size_t i = 0; i < count; ++i) {
       calib::SfmImage image;
       image.id = static_cast<std::uint32_t>(i + 1);

@@ -16,7 +16,7 @@ constexpr double kExactPx = 1e-9;  // double arithmetic on pixels of some hundre
 // Two views with a lens, a point each sees and one that only the second and third see.
 SfmModel ThreeViews() {
   SfmModel model;
-  model.cameras[1] = {LensModel::kSimpleRadial, 640, 480, {500, 320, 240, 0.1}};
+  model.cameras[1] = {CameraModel::kSimpleRadial, 640, 480, {500, 320, 240, 0.1}};
   model.points[5] = {{0.5, 0.25, 5}, {}, 0};
   model.points[9] = {{-0.5, 0.5, 4}, {}, 0};
   for (std::uint32_t i = 0; i < 3; ++i) {

@@ -287,7 +287,7 @@ TEST(OpenCvYaml, RosFilesAreRead) {
                       "distortion_model: equidistant\n"
                       "distortion_coefficients:\n  rows: 1\n  cols: 4\n  data: [0.1, 0, 0, 0]\n");
   const LensCamera camera = ReadOpenCvYaml(folder / "ros.yaml");
-  EXPECT_EQ(camera.model, LensModel::kOpenCvFisheye);
+  EXPECT_EQ(camera.model, CameraModel::kOpenCvFisheye);
   EXPECT_EQ(camera.params, (std::vector<double>{530, 532, 322, 236, 0.1, 0, 0, 0}));
 }
 
@@ -334,7 +334,7 @@ TEST(OpenCvYaml, OtherNamesOfTheMatricesAndXmlGiveTheSameCamera) {
     for (const char* name : {"a.yml", "a.xml"}) {
       WriteStorage((folder / name).string(), k, d);
       const LensCamera camera = ReadOpenCvYaml(folder / name);
-      EXPECT_EQ(camera.model, LensModel::kOpenCv) << k << name;
+      EXPECT_EQ(camera.model, CameraModel::kOpenCv) << k << name;
       EXPECT_EQ(camera.params, params) << k << name;
       EXPECT_EQ(camera.width_px, 640);
       EXPECT_EQ(camera.height_px, 480);

@@ -129,7 +129,7 @@ class RenderedReferenceTracks : public ::testing::Test {
     for (const io::NamedCamera& named : list.cameras) {
       const PinholeCamera& c = named.camera;
       const auto id = static_cast<std::uint32_t>(model_.images.size() + 1);
-      model_.cameras[id] = {calib::LensModel::kPinhole,
+      model_.cameras[id] = {calib::CameraModel::kPinhole,
                             c.width_px(),
                             c.height_px(),
                             {c.fx_px(), c.fy_px(), c.cx_px(), c.cy_px()}};

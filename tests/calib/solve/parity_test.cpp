@@ -98,7 +98,7 @@ TEST(OpenCvParity, TheChessboardSetHasOpenCvsTrainingRms) {
 
 // The lens of `k` and `distortion` as ours; the first pixel's centre at 0.5.
 LensCamera LensOf(const OpenCvResult& result) {
-  LensCamera lens{LensModel::kFullOpenCv, 640, 480, std::vector<double>(12, 0)};
+  LensCamera lens{CameraModel::kFullOpenCv, 640, 480, std::vector<double>(12, 0)};
   lens.params[0] = result.k.at<double>(0, 0);
   lens.params[1] = result.k.at<double>(1, 1);
   lens.params[2] = result.k.at<double>(0, 2) + 0.5;

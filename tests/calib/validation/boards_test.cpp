@@ -19,37 +19,38 @@ const Check& TestOf(const BoardValidation& report, const std::string& name) {
   return kNone;
 }
 
-TEST(Judge, AnHonestCalibrationPasses) {
+TEST(ValidateBoards, AnHonestCalibrationPasses) {
   Tally tally;
-  JudgeHonest(1, tally);
-  JudgeHonest(2, tally);
+  ValidateHonest(1, tally);
+  ValidateHonest(2, tally);
   EXPECT_EQ(tally.honest_passed, tally.honest);
 }
 
 // One of each kind that is quick; the slow test has them all, by seed.
-class JudgeFaulty : public ::testing::TestWithParam<FaultInjection> {};
+class FaultyBoards : public ::testing::TestWithParam<FaultInjection> {};
 
-TEST_P(JudgeFaulty, IsCaughtByTheTestThatIsMeantForIt) {
+TEST_P(FaultyBoards, IsCaughtByTheTestThatIsMeantForIt) {
   Tally tally;
   for (std::uint64_t seed = 5; tally.faults() < 1; ++seed) {
-    JudgeFaultInjection(GetParam(), seed, tally);
+    ValidateFaultInjection(GetParam(), seed, tally);
   }
   EXPECT_EQ(tally.caught, 1);
 }
 
-INSTANTIATE_TEST_SUITE_P(Kinds, JudgeFaulty,
-                         ::testing::Values(FaultInjection::kFocal, FaultInjection::kMirroredBoard,
-                                           FaultInjection::kSquareSize, FaultInjection::kRollingShutter,
-                                           FaultInjection::kRepeatedViews, FaultInjection::kFewViews,
-                                           FaultInjection::kClusteredViews, FaultInjection::kFrontoParallel));
+INSTANTIATE_TEST_SUITE_P(
+    Kinds, FaultyBoards,
+    ::testing::Values(FaultInjection::kFocal, FaultInjection::kMirroredBoard,
+                      FaultInjection::kSquareSize, FaultInjection::kRollingShutter,
+                      FaultInjection::kRepeatedViews, FaultInjection::kFewViews,
+                      FaultInjection::kClusteredViews, FaultInjection::kFrontoParallel));
 
-TEST(Judge, UnseenViewsTellOfAWrongLens) {
+TEST(ValidateBoards, TestViewsReportAWrongLens) {
   Scene scene = OneCamera(24, 9);
   const RigSolution solution = SolveScene(scene, kCornerNoisePx, 1);
   Scene others = OneCamera(24, 9 + 3000);
   others.cameras = scene.cameras;
   const auto exact = ExactViews(scene.cameras[0].camera, 24, 77);
-  UnseenViews unseen;
+  TestViews unseen;
   for (const BoardView& view : Noisy(exact.views, kCornerNoisePx, 2)) {
     unseen.views.push_back({0, unseen.frames++, view, {}});
   }
@@ -57,9 +58,9 @@ TEST(Judge, UnseenViewsTellOfAWrongLens) {
   const BoardValidation good = ValidateBoards(calibration, unseen, {});
   EXPECT_TRUE(TestOf(good, "lens_difference_sigmas").passed)
       << TestOf(good, "lens_difference_sigmas").reason;
-  EXPECT_TRUE(TestOf(good, "unseen_rms_px").passed);
+  EXPECT_TRUE(TestOf(good, "test_rms_px").passed);
   // The noise is 0.1 px per coordinate: 0.141 px the length.
-  EXPECT_NEAR(TestOf(good, "unseen_rms_px").value, 0.141, 0.01);
+  EXPECT_NEAR(TestOf(good, "test_rms_px").value, 0.141, 0.01);
   calibration.cameras[0].camera.params[0] *= 1.01;
   calibration.cameras[0].camera.params[1] *= 1.01;
   const BoardValidation bad = ValidateBoards(calibration, unseen, {});
@@ -68,11 +69,11 @@ TEST(Judge, UnseenViewsTellOfAWrongLens) {
 }
 
 // What is stored must be what the kept views say, whatever unseen ones allow.
-TEST(Judge, UnseenViewsDoNotExcuseWhatTheKeptOnesContradict) {
+TEST(ValidateBoards, TestViewsDoNotExcuseWhatTheKeptOnesContradict) {
   const Scene scene = OneCamera(24, 9);
   const RigSolution solution = SolveScene(scene, kCornerNoisePx, 1);
   const auto exact = ExactViews(scene.cameras[0].camera, 24, 77);
-  UnseenViews unseen;
+  TestViews unseen;
   for (const BoardView& view : Noisy(exact.views, kCornerNoisePx, 2)) {
     unseen.views.push_back({0, unseen.frames++, view, {}});
   }
@@ -87,7 +88,7 @@ TEST(Judge, UnseenViewsDoNotExcuseWhatTheKeptOnesContradict) {
   EXPECT_THAT(lens.reason, HasSubstr("fresh solve"));
 }
 
-TEST(Judge, PixelsWithoutARayAreNotForgotten) {
+TEST(ValidateBoards, PixelsWithoutARayAreNotForgotten) {
   RigSolution solution = SolveScene(OneCamera(24, 10), kCornerNoisePx, 1);
   solution.rig.cameras[0].camera = CameraFrom(
       BoardModel::kBrown4, 640, 480, std::vector<double>{530, 532, 322, 236, -0.5, 0, 0, 0});
@@ -103,7 +104,7 @@ TEST(Judge, PixelsWithoutARayAreNotForgotten) {
   EXPECT_EQ(map.Quantile(0.1), 0);
 }
 
-TEST(Judge, PredictedProjectionUncertaintyIsTheSpreadOfManySolves) {
+TEST(ValidateBoards, PredictedProjectionUncertaintyIsTheSpreadOfManySolves) {
   const Scene scene = OneCamera(12, 4);
   const RigSolution one = SolveScene(scene, kCornerNoisePx, 1);
   const ProjectionSensitivity sensitivity(one);
@@ -122,7 +123,7 @@ TEST(Judge, PredictedProjectionUncertaintyIsTheSpreadOfManySolves) {
   EXPECT_NEAR(std::sqrt(squares) / predicted, 1, 0.35);
 }
 
-TEST(Judge, WithoutViewsThereIsNothingToJudge) {
+TEST(ValidateBoards, WithoutViewsThereIsNothingToValidate) {
   ValidatedCalibration calibration;
   calibration.board = kBoard;
   calibration.cameras.push_back(
@@ -130,7 +131,7 @@ TEST(Judge, WithoutViewsThereIsNothingToJudge) {
   EXPECT_THROW(ValidateBoards(calibration, {}, {}), Error);
 }
 
-TEST(Judge, TheReportIsJsonWithTheDocumentedNames) {
+TEST(ValidateBoards, TheReportIsJsonWithTheDocumentedNames) {
   const FaultInjectionCase honest = Honest(1);
   const std::string json = ToJson(ValidateBoards(honest.calibration, {}, {}));
   for (const char* name : {"\"passed\"", "\"tests\"", "\"limit\"", "\"reason\"", "\"cameras\"",

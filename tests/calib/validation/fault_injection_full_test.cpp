@@ -11,9 +11,9 @@ TEST(FaultInjectionFull, AllButOneOfThirtyAreCaughtByTheTestThatIsMeantForThem) 
   Tally tally;
   // Drawn on until 30 are strong enough to count.
   for (int k = 0; tally.faults() < kCases && k < 4 * kCases; ++k) {
-    JudgeFaultInjection(static_cast<FaultInjection>(k % kFaultInjections),
-                  HashOf(dtr::testing::FaultInjectionSeed(), static_cast<std::uint64_t>(k)) % 1000000,
-                  tally);
+    ValidateFaultInjection(
+        static_cast<FaultInjection>(k % kFaultInjections),
+        HashOf(dtr::testing::FaultInjectionSeed(), static_cast<std::uint64_t>(k)) % 1000000, tally);
   }
   std::printf("%d of %d caught, %d not detectable\n", tally.caught, tally.faults(),
               tally.not_detectable);
@@ -24,7 +24,7 @@ TEST(FaultInjectionFull, AllButOneOfThirtyAreCaughtByTheTestThatIsMeantForThem) 
 TEST(FaultInjectionFull, AllButOneOfThirtyHonestOnesPass) {
   Tally tally;
   for (std::uint64_t k = 0; k < kCases; ++k) {
-    JudgeHonest(HashOf(dtr::testing::FaultInjectionSeed(), 7777, k) % 1000000, tally);
+    ValidateHonest(HashOf(dtr::testing::FaultInjectionSeed(), 7777, k) % 1000000, tally);
   }
   std::printf("%d of %d pass\n", tally.honest_passed, tally.honest);
   EXPECT_GE(tally.honest_passed, kCases - 1);

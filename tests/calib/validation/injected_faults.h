@@ -44,7 +44,7 @@ enum class FaultInjection {
 };
 inline constexpr int kFaultInjections = 14;
 
-/// A calibration to judge, and what should come of it.
+/// A calibration to evaluate, and what should come of it.
 struct FaultInjectionCase {
   std::string name, expected;  ///< the test that must break; "" for honest ones
   /// By which the test's figure is expected to exceed what noise makes of it, in its own sigmas;
@@ -389,7 +389,7 @@ inline FaultInjectionCase Honest(std::uint64_t seed) {
   return out;
 }
 
-inline void JudgeFaultInjection(FaultInjection kind, std::uint64_t seed, Tally& tally) {
+inline void ValidateFaultInjection(FaultInjection kind, std::uint64_t seed, Tally& tally) {
   const FaultInjectionCase spoiled = Spoiled(kind, seed);
   if (!(spoiled.predicted_sigmas >= 5)) {
     ++tally.not_detectable;
@@ -414,7 +414,7 @@ inline void JudgeFaultInjection(FaultInjection kind, std::uint64_t seed, Tally& 
               spoiled.name.c_str(), spoiled.predicted_sigmas, broken.c_str());
 }
 
-inline void JudgeHonest(std::uint64_t seed, Tally& tally) {
+inline void ValidateHonest(std::uint64_t seed, Tally& tally) {
   const FaultInjectionCase honest = Honest(seed);
   const BoardValidation report = ValidateBoards(honest.calibration, {}, {});
   ++tally.honest;

@@ -45,7 +45,8 @@ inline void ExpectPassed(const ValidatedCalibration& calibration, double noise_p
   EXPECT_TRUE(report.passed()) << "noise " << noise_px << " px: " << BrokenTests(report.tests);
 }
 
-inline void ExpectFound(const ValidatedCalibration& calibration, double noise_px, const char* name) {
+inline void ExpectFound(const ValidatedCalibration& calibration, double noise_px,
+                        const char* name) {
   const BoardValidation report = ReportOf(calibration, noise_px);
   EXPECT_NE(BrokenTest(report.tests, name), nullptr)
       << name << ", noise " << noise_px << " px: " << BrokenTests(report.tests);

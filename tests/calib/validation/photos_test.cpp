@@ -28,20 +28,20 @@ bool Names(const PhotosValidation& judgement, const std::string& degeneracy) {
   return false;
 }
 
-TEST(Judge, FaultInjectionsAreCaughtAndHonestSetsPass) {
+TEST(ValidatePhotos, FaultInjectionsAreCaughtAndHonestSetsPass) {
   const Tally score = FaultInjectionAll(kFaultInjections, 2026);
   EXPECT_EQ(score.missed, 0);
   EXPECT_EQ(score.honest_passed, kFaultInjections);
   EXPECT_GE(score.caught, kFaultInjections - 2);
 }
 
-TEST(Judge, HalvesDifferAsPredicted) {
+TEST(ValidatePhotos, HalvesDifferAsPredicted) {
   const PhotosValidation judgement = ValidatePhotos(Honest(77, 800), {});
   EXPECT_GT(judgement.halves_ratio, 0.5);
   EXPECT_LT(judgement.halves_ratio, 1.7);  // 7 cameras share lens and points: few independent ones
 }
 
-TEST(Judge, PureRotationIsNamed) {
+TEST(ValidatePhotos, PureRotationIsNamed) {
   SceneSpec spec{.images = 6, .points = 200, .lens = kPinholeLens, .noise_px = 0.3};
   spec.pose = [](int i, int) { return LookAt({0, -6, 1}, {0.4 * i - 1, 0, 0.2 * (i % 3)}); };
   const PhotosValidation judgement = ValidatePhotos(MakeBundle(spec), {});
@@ -49,7 +49,7 @@ TEST(Judge, PureRotationIsNamed) {
   EXPECT_FALSE(AllPassed(judgement.tests));
 }
 
-TEST(Judge, DegenerateWaysAreRecognised) {
+TEST(ValidatePhotos, DegenerateWaysAreRecognised) {
   SceneSpec spec{.images = 6, .points = 300, .lens = kPinholeLens, .noise_px = 0.3};
   spec.pose = [](int i, int) { return LookAt({0.3 * i, -6 + 0.0 * i, 1}, {0.3 * i, 0, 1}); };
   const auto recognised = [&](const char* name) {
@@ -66,14 +66,14 @@ TEST(Judge, DegenerateWaysAreRecognised) {
   EXPECT_TRUE(recognised("tracks_of_two"));
 }
 
-TEST(Judge, OrdinaryScenesHaveNoDegeneracy) {
+TEST(ValidatePhotos, OrdinaryScenesHaveNoDegeneracy) {
   const PhotosValidation judgement = ValidatePhotos(Honest(5), {});
   EXPECT_TRUE(judgement.degeneracies.empty()) << ToJson(judgement);
   EXPECT_GT(judgement.condition, 1);
   EXPECT_LT(judgement.cameras[0].image_shift_px, 1);
 }
 
-TEST(Judge, TheSameForAnyNumberOfThreads) {
+TEST(ValidatePhotos, TheSameForAnyNumberOfThreads) {
   const Bundle bundle = Honest(6);
   EXPECT_EQ(ToJson(ValidatePhotos(bundle, {}, 1)), ToJson(ValidatePhotos(bundle, {}, 4)));
 }
@@ -85,7 +85,7 @@ const Check* TestOf(const PhotosValidation& judgement, const std::string& name) 
   return nullptr;
 }
 
-TEST(Judge, TooFewPointsFailAndSayWhy) {
+TEST(ValidatePhotos, TooFewPointsFailAndSayWhy) {
   const PhotosValidation judgement =
       ValidatePhotos(MakeBundle({.points = 20, .lens = kPinholeLens}), {});
   EXPECT_THAT(judgement.not_validated, ::testing::HasSubstr("expected 50 points"));
@@ -97,7 +97,7 @@ TEST(Judge, TooFewPointsFailAndSayWhy) {
   EXPECT_TRUE(TestOf(ValidatePhotos(Honest(6), {}), "photos_not_validated")->passed);
 }
 
-TEST(Judge, APhotoOfFewObservationsLeavesTheHalvesToTheOthers) {
+TEST(ValidatePhotos, APhotoOfFewObservationsLeavesTheHalvesToTheOthers) {
   Bundle bundle = Honest(8);
   int seen = 0;
   std::erase_if(bundle.observations,
@@ -110,7 +110,7 @@ TEST(Judge, APhotoOfFewObservationsLeavesTheHalvesToTheOthers) {
   EXPECT_THAT(test->reason, ::testing::HasSubstr(bundle.images[3].name));
 }
 
-TEST(Judge, APhotoOfFewObservationsAmongManyPointsKeepsThemAll) {
+TEST(ValidatePhotos, APhotoOfFewObservationsAmongManyPointsKeepsThemAll) {
   Bundle bundle = MakeBundle({.images = 6, .points = 9000, .lens = kPinholeLens, .noise_px = 0.3});
   int seen = 0;
   std::erase_if(bundle.observations,
@@ -124,7 +124,7 @@ TEST(Judge, APhotoOfFewObservationsAmongManyPointsKeepsThemAll) {
   EXPECT_TRUE(TestOf(judgement, "photos_not_validated")->passed);
 }
 
-TEST(Judge, MoreThanCanBeJudgedAtOnceIsJudgedInParts) {
+TEST(ValidatePhotos, MoreThanOnePartHoldsIsValidatedInParts) {
   const SceneSpec spec{
       .images = 60, .points = 500, .lens = kPinholeLens, .noise_px = 0.3, .max_observations = 8};
   const Bundle honest = Adjust(MakeBundle(spec), AllFree()).bundle;

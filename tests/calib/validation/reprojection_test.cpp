@@ -270,7 +270,7 @@ TEST(Validate, CountsWhatCannotBeTested) {
 
 TEST(Validate, StrictlyHeldOutCamerasAreKeptApartAndOthersAreNot) {
   Calibration c = Arc(8, 60, 0);
-  // Without an observation: 2 and 5. With 7 observations, too few to judge: 3.
+  // Without an observation: 2 and 5. With 7 observations, too few to evaluate: 3.
   std::erase_if(c.scene.observations, [](const SparseObservation& o) {
     return o.view == 2 || o.view == 5 || (o.view == 3 && o.point >= 7);
   });
@@ -347,7 +347,7 @@ TEST(Validate, JsonSurvivesHostileNames) {
   }
 }
 
-/// One line per judgement: docs/VALIDATION.md's tables are made of them.
+/// One line per validation result: docs/VALIDATION.md's tables are made of them.
 bool PassesTold(const char* what, const ValidationReport& report) {
   std::cout << "  " << what;
   for (const Check& c : report.tests) std::cout << "  " << c.name << " " << c.value;

@@ -5,7 +5,7 @@
 
 #include <stdexcept>
 
-#include "tests/capture/video/moving_picture.h"
+#include "tests/capture/video/moving_image.h"
 
 namespace dtr::capture {
 namespace {
@@ -17,7 +17,7 @@ using testing::kWidth;
 
 constexpr double kMotion = 0.1;  // 32 px of the 320
 
-Instant At(int number, double x_px, double sharpness = 1, int wall = 1) {
+TimeStep At(int number, double x_px, double sharpness = 1, int wall = 1) {
   return {number, number / 25.0, {GreyAt(x_px, wall)}, [sharpness] { return sharpness; }};
 }
 

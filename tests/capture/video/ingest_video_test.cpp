@@ -7,7 +7,7 @@
 #include "capture/video/frames.h"
 #include "dtr/base/error.h"
 #include "tests/capture/photo_files.h"
-#include "tests/capture/video/moving_picture.h"
+#include "tests/capture/video/moving_image.h"
 #include "tests/support/test_data.h"
 
 namespace dtr::capture {

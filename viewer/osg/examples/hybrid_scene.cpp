@@ -19,7 +19,7 @@
 
 namespace {
 
-constexpr int kPictureWidth = 960, kPictureHeight = 640;
+constexpr int kImageWidth = 960, kImageHeight = 640;
 
 osg::ref_ptr<osg::ShapeDrawable> Colored(osg::Shape* shape, const osg::Vec4& color) {
   osg::ref_ptr<osg::ShapeDrawable> drawable = new osg::ShapeDrawable(shape);
@@ -78,20 +78,20 @@ osg::ref_ptr<osg::Group> Models() {
   return scene;
 }
 
-void WritePicture(osgViewer::Viewer& viewer, const std::string& file) {
+void WriteImage(osgViewer::Viewer& viewer, const std::string& file) {
   osg::ref_ptr<osg::GraphicsContext::Traits> traits = new osg::GraphicsContext::Traits;
   traits->readDISPLAY();
-  traits->width = kPictureWidth;
-  traits->height = kPictureHeight;
+  traits->width = kImageWidth;
+  traits->height = kImageHeight;
   traits->pbuffer = true;
   osg::Camera* const camera = viewer.getCamera();
   camera->setGraphicsContext(osg::GraphicsContext::createGraphicsContext(traits.get()));
-  camera->setViewport(0, 0, kPictureWidth, kPictureHeight);
+  camera->setViewport(0, 0, kImageWidth, kImageHeight);
   camera->setRenderTargetImplementation(osg::Camera::FRAME_BUFFER_OBJECT);
-  camera->setProjectionMatrixAsPerspective(44, static_cast<double>(kPictureWidth) / kPictureHeight,
-                                           1, 100);
+  camera->setProjectionMatrixAsPerspective(44, static_cast<double>(kImageWidth) / kImageHeight, 1,
+                                           100);
   const osg::ref_ptr<osg::Image> image = new osg::Image;
-  image->allocateImage(kPictureWidth, kPictureHeight, 1, GL_RGB, GL_UNSIGNED_BYTE);
+  image->allocateImage(kImageWidth, kImageHeight, 1, GL_RGB, GL_UNSIGNED_BYTE);
   camera->attach(osg::Camera::COLOR_BUFFER, image.get());
   viewer.setThreadingModel(osgViewer::ViewerBase::SingleThreaded);
   for (int frame = 0; frame < 3; ++frame) viewer.frame();
@@ -129,7 +129,7 @@ int main(int argc, char** argv) try {
   if (argc == 3) {
     viewer.getCamera()->setViewMatrix(
         courtyard->getInputViewMatrix(courtyard->numberOfInputViews() / 2));
-    WritePicture(viewer, argv[2]);
+    WriteImage(viewer, argv[2]);
     return 0;
   }
   viewer.addEventHandler(new osgDTR::KeyHandler(courtyard.get(), true));
