@@ -40,6 +40,8 @@ void SayReport(const eval::EvaluationReport& report, Console& console) {
     eval::ViewScore mean = report.mean;
     mean.name = "mean";
     SayScore(mean, console);
+    console.Say(fmt::format("mean PSNR after the best gain and offset of each channel: {} dB",
+                            Figure(mean.psnr_cc_db, "{:.2f}")));
   }
   for (const std::string& name : report.not_registered) {
     console.Say("not registered, so not in the means: " + name);

@@ -59,6 +59,7 @@ ViewScore Score(const View& view, const RenderResult& filled, int threads) {
   score.psnr_db = Psnr(filled.image, view.image, view.mask);
   const Mask seen = Intersect(filled.coverage, view.mask);
   score.psnr_covered_db = Psnr(filled.image, view.image, seen);
+  score.psnr_cc_db = ColourCorrectedPsnr(filled.image, view.image, view.mask);
   if (view.depth.width() > 0) {
     score.psnr_own_depth_db =
         Psnr(filled.image, view.image, Intersect(HasOwnDepth(view), view.mask));
@@ -115,6 +116,7 @@ EvaluationReport EvaluateHeldOut(const DtrSet& set, const EvaluateOptions& optio
   mean.name = "mean";
   mean.psnr_db = MeanOf(report.views, &ViewScore::psnr_db);
   mean.psnr_covered_db = MeanOf(report.views, &ViewScore::psnr_covered_db);
+  mean.psnr_cc_db = MeanOf(report.views, &ViewScore::psnr_cc_db);
   mean.psnr_own_depth_db = MeanOf(report.views, &ViewScore::psnr_own_depth_db);
   mean.ssim = MeanOf(report.views, &ViewScore::ssim);
   for (const ViewScore& view : report.views) {

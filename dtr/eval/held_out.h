@@ -36,6 +36,8 @@ struct ViewScore {
   std::string name;
   std::optional<double> psnr_db;          ///< usable pixels of the photo, after hole filling
   std::optional<double> psnr_covered_db;  ///< those of them that some view saw
+  /// As psnr_db, after the best gain and offset per channel (ColourCorrectedPsnr).
+  std::optional<double> psnr_cc_db;
   /// Usable pixels where the photo's own depth map has a value, after hole filling: what published
   /// comparisons of renderers call the valid area. Empty for a view without depth (a held-out one).
   std::optional<double> psnr_own_depth_db;

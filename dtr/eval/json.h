@@ -10,8 +10,8 @@
 
 namespace dtr::eval {
 
-/// {"views":[{name,psnr_db,psnr_covered_db,psnr_own_depth_db,identical:[...],ssim,coverage,views_used,
-///    render_ms}],
+/// {"views":[{name,psnr_db,psnr_covered_db,psnr_cc_db,psnr_own_depth_db,identical:[...],ssim,coverage,
+///    views_used,render_ms}],
 ///  "mean":{the same},"not_registered":count,"not_registered_names":[...],"leave_one_out":bool,
 ///  "depth":{...}}.
 /// A figure that is not defined (no pixel to compare) or infinite (all pixels equal) is null;

@@ -104,6 +104,33 @@ std::optional<double> Psnr(const ImageRgb8& image, const ImageRgb8& reference, c
   return 10 * std::log10(kPeak * kPeak * static_cast<double>(error.samples) / error.sum);
 }
 
+std::optional<double> ColourCorrectedPsnr(const ImageRgb8& image, const ImageRgb8& reference,
+                                          const Mask& mask) {
+  RequireSameSize(image, reference, mask);
+  constexpr int kChannels = 3;
+  std::array<Moments, kChannels> sums{};
+  long long pixels = 0;
+  for (int y = 0; y < image.height(); ++y) {
+    for (int x = 0; x < image.width(); ++x) {
+      if (!mask.empty() && mask(x, y) == 0) continue;
+      ++pixels;
+      for (int c = 0; c < kChannels; ++c) {
+        const double a = image(x, y, c), b = reference(x, y, c);
+        sums[static_cast<size_t>(c)].Add(1, {a, b, a * a, b * b, a * b});
+      }
+    }
+  }
+  if (pixels == 0) return std::nullopt;
+  // Equal images have equal sums, which leave exactly nothing.
+  const auto n = static_cast<double>(pixels);
+  double left = 0;
+  for (const Moments& m : sums) {
+    const double xx = n * m.xx - m.x * m.x, yy = n * m.yy - m.y * m.y, xy = n * m.xy - m.x * m.y;
+    left += std::max(0.0, xx > 0 ? yy - xy * (xy / xx) : yy) / n;
+  }
+  return 10 * std::log10(kPeak * kPeak * kChannels * n / left);
+}
+
 std::vector<std::string> IdenticalFigures(
     std::initializer_list<std::pair<const char*, std::optional<double>>> psnrs_db) {
   std::vector<std::string> names;

@@ -25,6 +25,12 @@ SquaredError CompareSquared(const ImageRgb8& image, const ImageRgb8& reference, 
 /// leaves no pixel. Sizes as for CompareSquared.
 std::optional<double> Psnr(const ImageRgb8& image, const ImageRgb8& reference, const Mask& mask);
 
+/// The same after the gain and offset of each channel of `image` that fit best (least squares over
+/// the pixels that count, values not clamped): what is left is no difference of exposure or white
+/// balance. At least Psnr.
+std::optional<double> ColourCorrectedPsnr(const ImageRgb8& image, const ImageRgb8& reference,
+                                          const Mask& mask);
+
 /// Names of those that are infinite. Programs that read JSON tell by it "all pixels are equal" from
 /// "no pixel to compare", as both are null there.
 std::vector<std::string> IdenticalFigures(

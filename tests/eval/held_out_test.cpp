@@ -152,7 +152,7 @@ TEST(EvaluationJson, HasTheNamesOfTheInterface) {
   options.not_registered = {"lost \"\xff.jpg"};
   const EvaluationReport report = EvaluateHeldOut(SmallSet(), options, Painter(114), progress);
   const auto json = nlohmann::json::parse(ToJson(report, DepthScores{}));
-  for (const char* key : {"psnr_db", "psnr_covered_db", "ssim", "coverage"}) {
+  for (const char* key : {"psnr_db", "psnr_covered_db", "psnr_cc_db", "ssim", "coverage"}) {
     EXPECT_TRUE(json["views"][0][key].is_number()) << key;
     EXPECT_TRUE(json["mean"][key].is_number()) << key;
   }

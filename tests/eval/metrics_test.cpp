@@ -66,6 +66,33 @@ TEST(Psnr, IdenticalIsInfiniteAndNothingIsEmpty) {
   EXPECT_FALSE(Psnr(a, a, Mask(9, 6)).has_value());
 }
 
+TEST(ColourCorrectedPsnr, GainAndOffsetOfAChannelAreNoError) {
+  ImageRgb8 a(40, 30, 3), b(40, 30, 3);
+  for (int y = 0; y < 30; ++y) {
+    for (int x = 0; x < 40; ++x) {
+      for (int c = 0; c < 3; ++c) {
+        a(x, y, c) = static_cast<std::uint8_t>(2 * x + y + 7 * c);
+        b(x, y, c) = static_cast<std::uint8_t>(2 * a(x, y, c) + 5 * c);
+      }
+    }
+  }
+  EXPECT_GT(ColourCorrectedPsnr(a, b, {}), 150);  // rounding of sums alone
+  EXPECT_LT(*Psnr(a, b, {}), 20);
+  b(3, 4, 1) = static_cast<std::uint8_t>(b(3, 4, 1) + 30);  // which no gain explains
+  EXPECT_NEAR(*ColourCorrectedPsnr(a, b, {}), 10 * std::log10(255.0 * 255 * 3600 / 900), 0.05);
+  Mask mask(40, 30, 1, 255);
+  mask(3, 4) = 0;
+  EXPECT_GT(ColourCorrectedPsnr(a, b, mask), 150);
+}
+
+TEST(ColourCorrectedPsnr, ConstantImagesAndEqualOnes) {
+  const ImageRgb8 flat(6, 6, 3, 90), other(6, 6, 3, 120), random = RandomImage(9, 6, 2);
+  EXPECT_TRUE(std::isinf(*ColourCorrectedPsnr(flat, other, {})));  // an offset is all
+  EXPECT_TRUE(std::isinf(*ColourCorrectedPsnr(random, random, {})));
+  EXPECT_FALSE(ColourCorrectedPsnr(flat, other, Mask(6, 6)).has_value());
+  EXPECT_THROW(ColourCorrectedPsnr(flat, random, {}), std::invalid_argument);
+}
+
 TEST(Metrics, SizesThatDifferAreRejected) {
   const ImageRgb8 a = RandomImage(20, 20, 1);
   EXPECT_THROW(Psnr(a, RandomImage(20, 21, 1), {}), std::invalid_argument);
