@@ -6,10 +6,12 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <optional>
 #include <sstream>
 #include <thread>
 
 #include "dtr/base/files.h"
+#include "tests/cli/program_server.h"
 #include "tests/support/test_data.h"
 
 namespace dtr::testing {
@@ -32,6 +34,25 @@ constexpr char kErrorPage[] = "docs/ERRORS.md";  // tests run in the root of the
   _exit(127);
 }
 
+// The status as waitpid gives it.
+int RunByItself(const std::vector<std::string>& args, const TemporaryFolder& folder,
+                const Interruption& interruption) {
+  const pid_t child = fork();
+  if (child == 0) Exec(args, folder / "out", folder / "err");
+  int status = 0;
+  bool sent = interruption.signal == 0;
+  while (!sent && waitpid(child, &status, WNOHANG) == 0) {
+    if (interruption.when()) {
+      kill(child, interruption.signal);
+      sent = true;
+    } else {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+  }
+  if (sent) waitpid(child, &status, 0);
+  return status;
+}
+
 }  // namespace
 
 std::vector<std::string> Ran::ErrorLines() const {
@@ -45,19 +66,9 @@ std::vector<std::string> Ran::ErrorLines() const {
 
 Ran Dtr(const std::vector<std::string>& args, const Interruption& interruption) {
   const TemporaryFolder folder;
-  const pid_t child = fork();
-  if (child == 0) Exec(args, folder / "out", folder / "err");
-  int status = 0;
-  bool told = interruption.signal == 0;
-  while (!told && waitpid(child, &status, WNOHANG) == 0) {
-    if (interruption.when()) {
-      kill(child, interruption.signal);
-      told = true;
-    } else {
-      std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    }
-  }
-  if (told) waitpid(child, &status, 0);
+  std::optional<int> ended;
+  if (interruption.signal == 0) ended = RunByServer(args, folder / "out", folder / "err");
+  const int status = ended ? *ended : RunByItself(args, folder, interruption);
   Ran ran;
   if (WIFSIGNALED(status)) ran.signal = WTERMSIG(status);
   if (WIFEXITED(status)) ran.code = WEXITSTATUS(status);

@@ -1,0 +1,127 @@
+#include "cli/program.h"
+
+#include <fmt/format.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
+
+#include <algorithm>
+#include <exception>
+#include <filesystem>
+#include <sstream>
+#include <string>
+
+#include "cli/command.h"
+#include "cli/option_names.h"
+#include "cli/standard_output.h"
+#include "dtr/base/error.h"
+#include "dtr/base/utf8.h"
+
+namespace dtr::cli {
+namespace {
+
+int Run(int argc, char** argv) {
+  CLI::App app("dtr -- Depth + Texture Representation: photos in, novel views out");
+  app.set_version_flag("--version", DTR_VERSION);
+  app.require_subcommand(1);
+  AddBuildCommand(app);
+  AddCaptureCommand(app);
+  AddCalibrateCommand(app);
+  AddValidateCommand(app);
+  AddStereoCommand(app);
+  AddInfoCommand(app);
+  AddRenderCommand(app);
+#ifdef DTR_WITH_WINDOWS
+  AddViewCommand(app);
+#endif
+  AddInspectCommand(app);
+  AddAdviseCommand(app);
+  AddEvaluateCommand(app);
+  AddBenchCommand(app);
+  AddPruneCommand(app);
+  AddImportCommand(app);
+  AddExportCommand(app);
+  AddJoinCommand(app);
+  AddDatasetCommand(app);
+  AddSelftestCommand(app);
+  AddManualCommands(app, DTR_VERSION);
+  LearnOptionNames(app);
+  // They come back in JSON and in the record of the run, which hold nothing else.
+  for (int i = 1; i < argc; ++i) {
+    std::string shown = argv[i];
+    // Messages are one line each.
+    const bool control = std::any_of(shown.begin(), shown.end(), [](char c) {
+      return static_cast<unsigned char>(c) < ' ' || c == '\x7f';
+    });
+    const bool utf8 = IsUtf8(argv[i]);
+    if (utf8 && !control) continue;
+    for (char& c : shown) c = c >= ' ' && c <= '~' ? c : '?';  // for any terminal
+    fmt::print(stderr, "dtr: argument {}: expected {}, found '{}'; rename the file or folder\n", i,
+               utf8 ? "no control characters" : "UTF-8", shown);
+    return kWrongUsage;
+  }
+  // CLI11 would say that a command is missing, not that this one does not exist.
+  const auto is_called = [&](const CLI::App* command) { return command->get_name() == argv[1]; };
+  if (argc > 1 && argv[1][0] != '-' && app.get_subcommands(is_called).empty()) {
+    fmt::print(stderr, "dtr: no command is called '{}'; see dtr --help\n", argv[1]);
+    return kWrongUsage;
+  }
+  try {
+    app.parse(argc, argv);
+    return kDone;
+  } catch (const CLI::RuntimeError& ended) {
+    return ended.get_exit_code();
+  } catch (const CLI::Success& help_or_version) {
+    std::ostringstream text;
+    const int code = app.exit(help_or_version, text, text);
+    WriteOut(text.str());
+    return code;
+  } catch (const CLI::ParseError& error) {
+    fmt::print(stderr, "dtr: {}; see dtr --help\n", error.what());
+    return kWrongUsage;
+  }
+}
+
+/// Every image and every view takes tens of megabytes and frees them for the next to take again.
+/// glibc would hand them back in between, and the system clear them again page by page: a tenth of
+/// the time of an image with holes. What is kept is bounded.
+void KeepFreedMemory() {
+#ifdef __GLIBC__
+  mallopt(M_MMAP_THRESHOLD, 32 << 20);
+  mallopt(M_TRIM_THRESHOLD, 128 << 20);
+#endif
+}
+
+}  // namespace
+
+int RunProgram(int argc, char** argv) {
+  KeepFreedMemory();
+  CatchInterrupts();
+  try {
+    return Run(argc, argv);
+  } catch (const UsageError& error) {
+    fmt::print(stderr, "dtr: {}\n", WithOptionNames(error.what()));
+    return kWrongUsage;
+  } catch (const Error& error) {
+    fmt::print(stderr, "dtr: {}\n", WithOptionNames(error.what()));
+    return kFailed;
+  } catch (const std::filesystem::filesystem_error& error) {
+    fmt::print(stderr,
+               "dtr: {}: expected a folder or file that can be used, found: {}; fix it or choose "
+               "another\n",
+               error.path1().string(), error.code().message());
+    return kFailed;
+  } catch (const std::bad_alloc&) {
+    fmt::print(stderr,
+               "dtr: memory: expected enough for this job, found too little; close other programs, "
+               "or lower --max-size, --size or --memory\n");
+    return kFailed;
+  } catch (const std::exception& error) {
+    fmt::print(stderr,
+               "dtr: expected no fault of its own, found: {}; report this line and the command\n",
+               error.what());
+    return kFailed;
+  }
+}
+
+}  // namespace dtr::cli
