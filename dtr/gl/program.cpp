@@ -1,7 +1,6 @@
 #include "dtr/gl/program.h"
 
 #include <algorithm>
-#include <filesystem>
 #include <regex>
 #include <sstream>
 
@@ -38,10 +37,11 @@ class Source {
 
  private:
   std::string Load(const std::string& file) const {
-    if (!folder_.empty()) return ReadFile(folder_ + "/" + file, kMaxShaderBytes);
-    const std::string name = std::filesystem::path(file).filename().string();
+    // What C++ is compiled with, too, is no shader to be edited (deferred_limits.h).
+    const bool in_folder = !folder_.empty() && !file.ends_with(".h");
+    if (in_folder) return ReadFile(folder_ + "/" + file, kMaxShaderBytes);
     for (const EmbeddedShader& shader : EmbeddedShaders()) {
-      if (shader.name == name) return std::string(shader.text);
+      if (shader.name == file) return std::string(shader.text);
     }
     throw Error("shader " + file + ": expected among the embedded shaders, found none");
   }

@@ -91,7 +91,7 @@ struct Scene {
   std::vector<testing::Shot> shots;
   std::vector<StereoView> views;
   std::vector<SourcePyramid> sources;
-  Picture picture;
+  GreyImage picture;
   std::vector<PlaneMap> truth;
 };
 

@@ -20,6 +20,7 @@ namespace {
 // What a process hands down, and a server that runs already would not.
 struct Inherited {
   uid_t user = geteuid();
+  std::filesystem::path mounts = std::filesystem::read_symlink("/proc/self/ns/mnt");
   std::array<rlimit, RLIM_NLIMITS> limits{};
 
   Inherited() {
@@ -28,7 +29,7 @@ struct Inherited {
     }
   }
   bool operator==(const Inherited& other) const {
-    return user == other.user &&
+    return user == other.user && mounts == other.mounts &&
            std::memcmp(limits.data(), other.limits.data(), sizeof(limits)) == 0;
   }
 };

@@ -13,7 +13,8 @@ namespace dtr::testing {
 
 /// Runs `dtr ARGS...` to its end with this process's environment, folder and umask, its outputs
 /// in files; gives the status as waitpid does. Empty where only a start of its own is the same
-/// thing: after the user or a limit of this process changed, or while another thread runs one.
+/// thing: after the user, a limit or the mounts of this process changed, or while another thread
+/// runs one.
 std::optional<int> RunByServer(const std::vector<std::string>& args,
                                const std::filesystem::path& out, const std::filesystem::path& err);
 

@@ -7,6 +7,7 @@
 
 #include <cerrno>
 #include <cstdint>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <string>
@@ -32,7 +33,11 @@ namespace {
   std::vector<char*> argv = {strdup(DTR_PROGRAM)};
   for (const std::string& arg : run.args) argv.push_back(strdup(arg.c_str()));
   argv.push_back(nullptr);
-  std::exit(dtr::cli::RunProgram(static_cast<int>(argv.size()) - 1, argv.data()));
+  const int code = dtr::cli::RunProgram(static_cast<int>(argv.size()) - 1, argv.data());
+  // No exit(): log4cplus, which comes with the image library, started threads as it was loaded, has
+  // none of them here, and would wait for them.
+  std::fflush(nullptr);
+  _exit(code);
 }
 
 }  // namespace

@@ -53,6 +53,15 @@ int RunByItself(const std::vector<std::string>& args, const TemporaryFolder& fol
   return status;
 }
 
+Ran RanWith(int status, const TemporaryFolder& folder) {
+  Ran ran;
+  if (WIFSIGNALED(status)) ran.signal = WTERMSIG(status);
+  if (WIFEXITED(status)) ran.code = WEXITSTATUS(status);
+  ran.out = Text(folder / "out");
+  ran.err = Text(folder / "err");
+  return ran;
+}
+
 }  // namespace
 
 std::vector<std::string> Ran::ErrorLines() const {
@@ -65,16 +74,15 @@ std::vector<std::string> Ran::ErrorLines() const {
 }
 
 Ran Dtr(const std::vector<std::string>& args, const Interruption& interruption) {
+  if (interruption.signal != 0) return DtrByItself(args, interruption);
   const TemporaryFolder folder;
-  std::optional<int> ended;
-  if (interruption.signal == 0) ended = RunByServer(args, folder / "out", folder / "err");
-  const int status = ended ? *ended : RunByItself(args, folder, interruption);
-  Ran ran;
-  if (WIFSIGNALED(status)) ran.signal = WTERMSIG(status);
-  if (WIFEXITED(status)) ran.code = WEXITSTATUS(status);
-  ran.out = Text(folder / "out");
-  ran.err = Text(folder / "err");
-  return ran;
+  const auto status = RunByServer(args, folder / "out", folder / "err");
+  return status ? RanWith(*status, folder) : DtrByItself(args);
+}
+
+Ran DtrByItself(const std::vector<std::string>& args, const Interruption& interruption) {
+  const TemporaryFolder folder;
+  return RanWith(RunByItself(args, folder, interruption), folder);
 }
 
 Ran DtrOk(const std::vector<std::string>& args) {

@@ -29,8 +29,12 @@ struct Interruption {
   std::function<bool()> when;
 };
 
-/// Runs `dtr ARGS...` with the environment as it is.
+/// Runs `dtr ARGS...` with the environment as it is; forked from a server (program_server.h) where
+/// nothing interrupts it.
 Ran Dtr(const std::vector<std::string>& args, const Interruption& interruption = {});
+
+/// Dtr() in a process of its own, whose command line the system knows (/proc).
+Ran DtrByItself(const std::vector<std::string>& args, const Interruption& interruption = {});
 
 /// Runs it and expects exit code 0.
 Ran DtrOk(const std::vector<std::string>& args);

@@ -61,10 +61,17 @@ TEST(TurntableThroughColmap, TheReasonIsReportedAndItsAdviceLeadsToCameras) {
     return Dtr({"calibrate", "photos", folder / "photos", "-o", folder / output, "--feature-size",
                 "400", "--features", "1500"});
   };
-  ExpectRejected(calibrate("none"), kFailed,
-                 "matched pairs of photos show most of their common features at the same position "
-                 "in both: ");
-  EXPECT_FALSE(fs::exists(folder / "none" / "cameras.bin"));
+  const std::string reason =
+      "matched pairs of photos show most of their common features at the same position in both: ";
+  const Ran with_background = calibrate("none");
+  // Now and then COLMAP, which does not repeat itself, makes a model of what stands still: then the
+  // reason is a warning.
+  if (with_background.code == 0) {
+    EXPECT_THAT(with_background.err, ::testing::HasSubstr(reason));
+  } else {
+    ExpectRejected(with_background, kFailed, reason);
+    EXPECT_FALSE(fs::exists(folder / "none" / "cameras.bin"));
+  }
 
   std::vector<fs::path> photos;
   for (const auto& entry : fs::directory_iterator(folder / "photos")) {

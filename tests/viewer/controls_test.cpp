@@ -193,7 +193,7 @@ std::vector<Controls::Row> Controls::WhereRows() {
          });
        }},
       {"Time", [this] { Fold("Time", "time step"); }},
-      {"time step", [this] { ClickUntilItIs("time_step", "time_step", 1); }},
+      {"time step", [this] { ClickUntilItIs("time step", "time_step", 1); }},
       {"later", [this] { ClickUntilItIs("later", "time_step", 2); }},
       {"earlier", [this] { ClickUntilItIs("earlier", "time_step", 1); }},
       {"play", [this] { ExpectPlays([this] { Click("play"); }); }},

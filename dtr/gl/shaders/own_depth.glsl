@@ -3,7 +3,7 @@
 // (dtr/gl/stored_depth.h) says: one value per sample (0: none) that a view's OwnMap turns into 1/z,
 // the last row and column once more, then which blocks are whole or all masked. Filtered to the nearest.
 // No branch: software rasterisers run both sides of one anyway.
-#include "../../render/deferred_limits.h"
+#include "deferred_limits.h"
 
 struct OwnMap {
   vec4 grid;    // 1 / width, 1 / height of the layer; columns / 2, rows / 2 of the samples in it

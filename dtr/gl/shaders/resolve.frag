@@ -10,7 +10,7 @@ uniform int width_px;
 uniform sampler2DArray layers;  // near_z / z in the novel camera, a layer per view; 0: none
 #endif
 uniform sampler2DArray images[IMAGE_ARRAYS];
-#include "../../render/deferred_limits.h"
+#include "deferred_limits.h"
 #include "view_block.glsl"
 #include "colour.glsl"
 #include "weights.glsl"
