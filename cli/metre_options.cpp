@@ -109,7 +109,7 @@ pipeline::ScaleDistance DistanceFrom(const std::string& text, DistanceEnds ends)
 CLI::Option* AddGpsFlag(CLI::App& command, bool& gps) {
   return command.add_flag(
       "--gps", gps,
-      "Constrain cameras to the positions that the photos' EXIF says they were taken at: cameras "
+      "Constrain cameras to the positions in the photos' EXIF: cameras "
       "in metres east, north and up; positions that do not determine the scale only "
       "rotate and translate what --distance scales");
 }
@@ -120,7 +120,7 @@ CLI::Option* AddMetreOptions(CLI::App& command, CLI::Option& gps, MetreWords& wo
           "--gps-sigma", [&words](const std::string& word) { words.gps_sigma = word; },
           "Standard deviation of these positions per axis, on the map and in height, instead of "
           "what "
-          "EXIF says or the positions themselves show")
+          "EXIF gives or the positions themselves show")
       ->needs(&gps)
       ->type_name("M[,V]");
   return command

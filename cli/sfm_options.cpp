@@ -17,7 +17,7 @@ CLI::Option* AddSfmOptions(CLI::App& command, pipeline::SfmChoice& choice) {
                   "allows]")
       ->check(CLI::Range(kSmallestPx, 65536))
       ->type_name("PX");
-  command.add_option("--features", choice.features, "Most features of a photo [8192]")
+  command.add_option("--features", choice.features, "Max features per photo [8192]")
       ->check(CLI::Range(kMinFeatures, colmap::kMaxFeatures))
       ->type_name("N");
   std::map<std::string, colmap::Matching> names;

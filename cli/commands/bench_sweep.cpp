@@ -349,7 +349,7 @@ void AddSweepOptions(CLI::App& command, CLI::Option* table, SweepRequest& reques
           "command goes on [NAME-bench beside the set]")
       ->excludes(table)
       ->type_name("DIR");
-  command.add_option("--max-points", request.max_points, "Most settings measured per stage [60]")
+  command.add_option("--max-points", request.max_points, "Max settings measured per stage [60]")
       ->check(CLI::Range(1, 100000))
       ->excludes(table)
       ->type_name("N");

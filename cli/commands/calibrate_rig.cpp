@@ -181,7 +181,7 @@ void AddCalibrateRigCommand(CLI::App& calibrate) {
         command
             .add_option("--lenses", options->lenses,
                         "free: solved for together with the rig; fixed: as given by --camera, or "
-                        "as each camera's own boards say [free; fixed with --camera]")
+                        "as each camera's own boards give them [free; fixed with --camera]")
             ->check(CLI::IsMember({"free", "fixed"}))
             ->type_name("NAME");
         command

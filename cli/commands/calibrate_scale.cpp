@@ -90,7 +90,7 @@ void AddCalibrateScaleCommand(CLI::App& calibrate) {
                    ->type_name("BOARD");
                command
                    .add_option("--gps", scale.gps,
-                               "Folder of the set's photos, whose EXIF says where they were taken")
+                               "Folder of the set's photos, with positions in EXIF")
                    ->check(CLI::ExistingDirectory)
                    ->type_name("PHOTOS");
                command.add_flag("--force", scale.force, "Replace SET2 when it exists");

@@ -51,7 +51,7 @@ void AddImportCommand(CLI::App& app) {
       [](CLI::App& command) -> Action {
         auto options = std::make_shared<pipeline::ImportRequest>();
         auto depth_kind = std::make_shared<std::string>();
-        command.add_option("--cameras", options->cameras, "cameras.json, or what --format says")
+        command.add_option("--cameras", options->cameras, "cameras.json, or a file of --format")
             ->required()
             ->type_name("FILE");
         command.add_option("--format", options->format, "Format of --cameras [by its name]")

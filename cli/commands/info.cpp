@@ -11,7 +11,7 @@ void AddInfoCommand(CLI::App& app) {
     bool verify = false, held_out_names = false;
   };
   AddCommand(
-      app, "info", "Say what a set contains", "dtr info scene.dtr --verify",
+      app, "info", "Show what a set contains", "dtr info scene.dtr --verify",
       [](CLI::App& command) -> Action {
         auto options = std::make_shared<Options>();
         command.add_option("SET", options->set, "The set")->required();

@@ -27,7 +27,7 @@ constexpr EGLint kContextFlags = EGL_CONTEXT_OPENGL_DEBUG_BIT_KHR;
 
 [[noreturn]] void Reject(const std::string& found) {
   throw Error("OpenGL: expected a context of version 4.3 or newer through EGL, found " + found +
-              "; use `renderer` cpu");
+              "; use `renderer` cpu or simd");
 }
 
 /// epoxy ends the program when a library is absent, so this asks first. Null, or the name of one

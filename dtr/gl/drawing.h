@@ -95,7 +95,7 @@ struct Targets {
     if (glCheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE) {
       throw Error(
           "OpenGL: this driver cannot draw into RGBA8, R32F and RGBA8UI at once; "
-          "use `renderer` cpu");
+          "use `renderer` cpu or simd");
     }
     ThrowOnError("an image of " + std::to_string(new_width) + "x" + std::to_string(new_rows) +
                  " pixels");

@@ -29,7 +29,7 @@ Buffer Upload(const View& view, const std::vector<T>& values, size_t& bytes) {
   if (size > limit) {
     throw Error(view.name + ": expected a reduced mesh within this driver's storage block of " +
                 std::to_string(limit) + " bytes, found " + std::to_string(size) +
-                "; use `renderer` cpu, a larger `mesh_tolerance` or a larger `resolution`");
+                "; use `renderer` cpu or simd, a larger `mesh_tolerance` or a larger `resolution`");
   }
   Buffer buffer = Buffer::Make();
   glBindBuffer(GL_SHADER_STORAGE_BUFFER, buffer.name());

@@ -72,8 +72,9 @@ GLuint FramebufferKind::Create() { return OneName(glGenFramebuffers); }
 void ThrowOnError(const std::string& what) {
   const GLenum error = glGetError();
   if (error == GL_NO_ERROR) return;
-  throw Error("OpenGL: " + what + ": " + ErrorName(error) + " (code " + std::to_string(error) +
-              "); use `renderer` cpu, or a smaller `gpu_memory` or `size`, or fewer `views`");
+  throw Error(
+      "OpenGL: " + what + ": " + ErrorName(error) + " (code " + std::to_string(error) +
+      "); use `renderer` cpu or simd, or a smaller `gpu_memory` or `size`, or fewer `views`");
 }
 
 void ForgetErrors() {

@@ -92,7 +92,7 @@ Shader Compile(const Stage& stage, const std::vector<std::string>& defines,
   if (compiled == GL_TRUE) return shader;
   throw Error("shader " +
               source.FirstError(LogOf(shader.name(), glGetShaderiv, glGetShaderInfoLog)) +
-              "; use `renderer` cpu");
+              "; use `renderer` cpu or simd");
 }
 
 }  // namespace
@@ -111,8 +111,8 @@ Program BuildProgram(const std::vector<Stage>& stages, const std::vector<std::st
   glGetProgramiv(program.name(), GL_LINK_STATUS, &linked);
   if (linked != GL_TRUE) {
     const std::string log = LogOf(program.name(), glGetProgramiv, glGetProgramInfoLog);
-    throw Error("shader " + stages.front().file +
-                ": does not link: " + log.substr(0, log.find('\n')) + "; use `renderer` cpu");
+    throw Error("shader " + stages.front().file + ": does not link: " +
+                log.substr(0, log.find('\n')) + "; use `renderer` cpu or simd");
   }
   return program;
 }

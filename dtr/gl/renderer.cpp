@@ -30,7 +30,7 @@ void CheckContext() {
   if (version < kOldestVersion || !epoxy_is_desktop_gl()) {
     throw Error("OpenGL: expected a current context of version 4.3 or newer, found " +
                 std::to_string(version / 10) + "." + std::to_string(version % 10) +
-                "; use `renderer` cpu");
+                "; use `renderer` cpu or simd");
   }
 }
 
@@ -40,7 +40,7 @@ void CheckImageSize(const PinholeCamera& novel) {
   if (novel.width_px() > max_px || novel.height_px() > max_px) {
     throw Error("OpenGL: expected an image of at most " + std::to_string(max_px) +
                 " pixels a side on this driver, found " + std::to_string(novel.width_px()) + "x" +
-                std::to_string(novel.height_px()) + "; use `renderer` cpu");
+                std::to_string(novel.height_px()) + "; use `renderer` cpu or simd");
   }
 }
 
@@ -50,7 +50,7 @@ void CheckViewCount(size_t views) {
   if (views > static_cast<size_t>(max_layers)) {
     throw Error("OpenGL: expected at most " + std::to_string(max_layers) +
                 " candidate views on this driver, found " + std::to_string(views) +
-                "; use `renderer` cpu or `exclude`");
+                "; use `renderer` cpu or simd, or `exclude`");
   }
 }
 
@@ -213,11 +213,11 @@ class Renderer::Implementation {
   void CheckStorage(const RenderFrame& frame) const {
     const size_t bytes = LayerRowBytes(frame) * static_cast<size_t>(frame.novel.height_px());
     if (!frame.deferred() || bytes <= max_storage_bytes_) return;
-    throw Error("OpenGL: expected an image whose depth is within this driver's storage block of " +
-                std::to_string(max_storage_bytes_) + " bytes, found " +
-                std::to_string(frame.novel.width_px()) + "x" +
-                std::to_string(frame.novel.height_px()) +
-                " pixels of 4 bytes; use `renderer` cpu, `method` two-pass or a smaller `size`");
+    throw Error(
+        "OpenGL: expected an image whose depth is within this driver's storage block of " +
+        std::to_string(max_storage_bytes_) + " bytes, found " +
+        std::to_string(frame.novel.width_px()) + "x" + std::to_string(frame.novel.height_px()) +
+        " pixels of 4 bytes; use `renderer` cpu or simd, `method` two-pass or a smaller `size`");
   }
 
   void FitTargets(const RenderFrame& frame, int rows) {

@@ -97,11 +97,11 @@ int Resolver::SlotOf(std::vector<int>& bound, int array) const {
   if (found != bound.end()) return static_cast<int>(found - bound.begin());
   if (image_arrays_.size() + depth_arrays_.size() == static_cast<size_t>(kMaxImageArrays)) {
     // Sizes are few (LayerSizes): there are more arrays where one would be larger than 1 GiB.
-    throw Error(
-        "OpenGL: expected the images and depth maps of one image in at most " +
-        std::to_string(kMaxImageArrays) +
-        " texture arrays of up to 1 GiB, found more; use `renderer` cpu, fewer `views` or a "
-        "smaller `gpu_memory`");
+    throw Error("OpenGL: expected the images and depth maps of one image in at most " +
+                std::to_string(kMaxImageArrays) +
+                " texture arrays of up to 1 GiB, found more; use `renderer` cpu or simd, fewer "
+                "`views` or a "
+                "smaller `gpu_memory`");
   }
   bound.push_back(array);
   return static_cast<int>(bound.size()) - 1;

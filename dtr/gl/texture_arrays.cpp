@@ -22,7 +22,7 @@ void RequireSize(int width_px, int height_px) {
   if (width_px <= max_size && height_px <= max_size) return;
   throw Error("OpenGL: expected images of at most " + std::to_string(max_size) +
               " pixels a side, found " + std::to_string(width_px) + "x" +
-              std::to_string(height_px) + "; use `renderer` cpu");
+              std::to_string(height_px) + "; use `renderer` cpu or simd");
 }
 
 Texture MakeArray(GLenum format, int width_px, int height_px, int layers) {
