@@ -120,10 +120,10 @@ void AddBookcase(SceneBuilder& b, const RoomPalette& p, double x0, Random& rando
   const double y = kHalfY - kDepth;
   b.Box({x0 - kHalfWidth, y, kTop / 2}, {0.025, kDepth, kTop / 2}, p.walnut);
   b.Box({x0 + kHalfWidth, y, kTop / 2}, {0.025, kDepth, kTop / 2}, p.walnut);
-  for (int cache = 0; cache <= 5; ++cache) {
-    const double z = 0.04 + 0.4 * cache;
+  for (int shelf = 0; shelf <= 5; ++shelf) {
+    const double z = 0.04 + 0.4 * shelf;
     b.Box({x0, y, z}, {kHalfWidth, kDepth, 0.02}, p.walnut);
-    if (cache == 5) break;
+    if (shelf == 5) break;
     double x = x0 - kHalfWidth + 0.05;
     while (x < x0 + kHalfWidth - 0.12) {
       const double half_width = random.Uniform(0.015, 0.045);

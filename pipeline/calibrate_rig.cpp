@@ -191,7 +191,7 @@ calib::RigCameraInput GivenLens(const calib::LensCamera& given, const std::strin
   calib::RigCameraInput input;
   for (const calib::BoardModel model : calib::kBoardModels) {
     // The first model, so the one with the fewest coefficients, that says the same.
-    if (calib::ModelOf(model) != camera.model) continue;
+    if (calib::CameraModelOf(model) != camera.model) continue;
     const auto first_unused = camera.params.begin() + calib::FreeParameterCount(model);
     if (std::any_of(first_unused, camera.params.end(), [](double p) { return p != 0; })) continue;
     input.model = model;

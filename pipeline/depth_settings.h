@@ -26,7 +26,7 @@ const Preset& PresetCalled(const std::string& name);
 /// Memory to stay within unless told otherwise.
 inline constexpr double kDefaultMemoryGb = 4;
 
-/// The most that an effort may have of each; rounds may be none, the others are 1 at least.
+/// The max of each in quality settings; rounds may be none, the others are 1 at least.
 inline constexpr int kMaxNeighbours = 8, kMaxIterations = 20, kMaxRounds = 8;
 
 /// What was asked for: a preset, and what overrides it.
@@ -41,10 +41,10 @@ struct DepthChoice {
   std::filesystem::path workspace;  ///< for engine "colmap"; empty: the program fills one
 };
 
-/// An effort with what the choice gives explicitly in its place.
+/// Quality settings with what the choice gives explicitly in its place.
 stereo::QualitySettings Overridden(stereo::QualitySettings quality, const DepthChoice& choice);
 
-/// The effort that a choice comes to, but for a time budget.
+/// The quality settings of a choice, but for a time budget.
 stereo::QualitySettings QualityOf(const DepthChoice& choice);
 
 }  // namespace dtr::pipeline

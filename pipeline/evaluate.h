@@ -13,8 +13,8 @@ namespace dtr::pipeline {
 
 struct EvaluateRequest {
   std::filesystem::path set;
-  bool leave_one_out = false;      ///< every source view in turn, instead of the held-out ones
-  std::filesystem::path truth;     ///< folder with cameras.json and depth/; empty: no depth scores
+  bool leave_one_out = false;    ///< every source view in turn, instead of the held-out ones
+  std::filesystem::path truth;   ///< folder with cameras.json and depth/; empty: no depth scores
   std::filesystem::path images;  ///< folder for rendering | photo | difference; empty: none
   RenderOptions render;
   int threads = 0;

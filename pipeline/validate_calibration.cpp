@@ -28,9 +28,9 @@ void RequireSize(const calib::CalibratedCamera& camera, int width_px, int height
                   width_px, height_px));
 }
 
-TestPhotos UnseenOfCamera(const calib::Calibration& calibration,
-                          const std::filesystem::path& folder, const std::string& pattern,
-                          int threads, Progress& progress) {
+TestPhotos TestPhotosOfCamera(const calib::Calibration& calibration,
+                              const std::filesystem::path& folder, const std::string& pattern,
+                              int threads, Progress& progress) {
   const BoardPhotos photos = ReadBoardPhotos(folder, pattern, calibration.board, {}, threads,
                                              progress, calibration.cameras[0].camera);
   RequireSize(calibration.cameras[0], photos.width_px, photos.height_px, folder);
@@ -41,8 +41,9 @@ TestPhotos UnseenOfCamera(const calib::Calibration& calibration,
   return found;
 }
 
-TestPhotos UnseenOfRig(const calib::Calibration& calibration, const std::filesystem::path& folder,
-                       const std::string& pattern, int threads, Progress& progress) {
+TestPhotos TestPhotosOfRig(const calib::Calibration& calibration,
+                           const std::filesystem::path& folder, const std::string& pattern,
+                           int threads, Progress& progress) {
   if (pattern != "*") {
     throw UsageError(fmt::format(
         "`pattern` {}: is for the photos of one camera; a rig's cameras are distinguished by their "
@@ -159,8 +160,8 @@ TestPhotos ReadTestPhotos(const calib::Calibration& calibration,
                           const std::filesystem::path& folder, const std::string& pattern,
                           int threads, Progress& progress) {
   TestPhotos photos = calibration.cameras.size() == 1
-                          ? UnseenOfCamera(calibration, folder, pattern, threads, progress)
-                          : UnseenOfRig(calibration, folder, pattern, threads, progress);
+                          ? TestPhotosOfCamera(calibration, folder, pattern, threads, progress)
+                          : TestPhotosOfRig(calibration, folder, pattern, threads, progress);
   const std::vector<calib::LeftOut> seen = TakeOutSeen(calibration, photos.test_views.views);
   if (photos.test_views.views.empty()) {
     throw Error(fmt::format(

@@ -1,4 +1,5 @@
-// pipeline/validate_calibration.h -- a calibration file and perhaps unseen photos, evaluated.
+// pipeline/validate_calibration.h -- validates a calibration file, by held-out photos if there are
+// any.
 #pragma once
 #include <filesystem>
 #include <optional>

@@ -37,7 +37,7 @@ struct DepthEstimate {
 /// How much work goes into a depth map. Every value may change the result.
 struct QualitySettings {
   int neighbours = 5;        ///< views that the search asks, at most
-  int round_neighbours = 8;  ///< views that the rounds and the validation result ask, at most 8
+  int round_neighbours = 8;  ///< views that the passes and the final filter ask, at most 8
   /// Visits per pixel on the levels between the coarsest (two more) and full size (two fewer, but
   /// one at least).
   int iterations = 3;
@@ -105,7 +105,7 @@ class Engine {
 };
 
 /// Engine by its name on the command line ("sgbm"), which makes use of `neighbours` alone.
-/// Throws UsageError for unknown names and for an effort out of range: 1 to 8 neighbours, 1 to 20
+/// Throws UsageError for unknown names and for settings out of range: 1 to 8 neighbours, 1 to 20
 /// iterations, 0 to 8 rounds.
 std::unique_ptr<Engine> MakeEngine(const std::string& name, const QualitySettings& quality = {});
 

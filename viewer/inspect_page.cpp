@@ -137,7 +137,7 @@ Findings FindOut(const DtrSet& set, ViewStream& stream, const InspectFacts& fact
 
 std::string PercentText(double share) { return fmt::format("{:.1f} %", 100 * share); }
 
-void AddVerdict(report::HtmlReport& page, const InspectFacts& facts) {
+void AddValidation(report::HtmlReport& page, const InspectFacts& facts) {
   page.Section("Can the calibration be trusted?");
   if (facts.checks.empty()) {
     page.Result(false, "This set was never validated: run dtr validate");
@@ -293,7 +293,7 @@ std::string InspectPage(const DtrSet& set, ViewStream& stream, const InspectFact
   report::HtmlReport page("Inspection of " + facts.name);
   page.Paragraph(fmt::format("{} source views; lengths in {}.", findings.views.size(),
                              set.unit == LengthUnit::kMetre ? "metres" : "scene units"));
-  AddVerdict(page, facts);
+  AddValidation(page, facts);
   AddSheets(page, findings);
   AddMaps(page, set, findings, facts);
   AddWorstViews(page, findings, facts);

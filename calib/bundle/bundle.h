@@ -31,7 +31,7 @@ struct BundleObservation {
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
 };
 
-/// What bundle adjustment moves, and what it is evaluated by. One gauge: any world, any unit.
+/// What bundle adjustment moves, and what it is fitted to. One gauge: any world, any unit.
 struct Bundle {
   std::vector<LensCamera> lenses;
   std::vector<BundleImage> images;

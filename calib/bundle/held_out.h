@@ -27,7 +27,7 @@ struct PointFold {
 std::vector<PointFold> PointFolds(const Bundle& bundle, std::uint64_t seed);
 
 /// Per point of `asked` that kMinTrack images or more see: the mean over its observations of
-/// Cauchy's loss (px^2), the point placed as the cameras (lenses and images) explain it best. A
+/// Cauchy's loss (px^2), the point placed as the cameras (lenses and images) explain it best. An
 /// observation without a pixel counts like one far off. `sigma_px`, where asked for, becomes the
 /// standard deviation of an observation's coordinate.
 std::vector<double> LossesOfHeldOutPoints(const Bundle& cameras, const Bundle& asked,

@@ -249,14 +249,14 @@ Agreement TurnToPlaces(const KnownMetres& known, Agreement agreement, MetricStar
   return agreement;
 }
 
-void RequireNoContradiction(const Adjusted& agreement, const Adjusted& free) {
-  if (!Contradicts(agreement, free)) return;
+void RequireNoContradiction(const Adjusted& fixed, const Adjusted& free) {
+  if (!Contradicts(fixed, free)) return;
   throw Error(fmt::format(
       "bundle adjustment: expected photos that agree with the positions and distances given, found "
       "residuals of {:.2f} px per coordinate and {} observations that agree with these fixed, "
       "{:.2f} px and {} without; are their standard deviations too small, or is a distance of "
       "another pair?",
-      agreement.sigma_px, agreement.observations, free.sigma_px, free.observations));
+      fixed.sigma_px, fixed.observations, free.sigma_px, free.observations));
 }
 
 // Adjusts some points until the places settle, and holds what comes out against the photos.

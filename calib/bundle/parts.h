@@ -13,13 +13,13 @@ Bundle OnlyImages(const Bundle& bundle, const std::vector<bool>& wanted);
 /// Without images of fewer than `fewest` observations.
 Bundle WithoutWeakImages(const Bundle& bundle, int fewest);
 
-/// Unknowns of a bundle that is evaluated: its lenses' parameters, and per image a pose and the
+/// Unknowns of a bundle that is validated: its lenses' parameters, and per image a pose and the
 /// three turns of a rolling shutter.
 int ValidationUnknowns(const Bundle& bundle);
 
 /// Every image of a bundle in one part of `max_unknowns` at most, images that see the same points
 /// together: parts grow by the image that shares most points with what they hold. What is left over
-/// is joined by images of other parts, so that no part is too small to be evaluated. Deterministic.
+/// is joined by images of other parts, so that no part is too small to be validated. Deterministic.
 std::vector<Bundle> PartsOf(const Bundle& bundle, int max_unknowns);
 
 }  // namespace dtr::calib

@@ -163,7 +163,7 @@ Placed Place(const fs::path& images_dir, const SfmImageInput& photo, const Froze
              SmallSources& small, const fs::path& folder, const SfmOptions& options,
              Progress& progress) {
   Workspace workspace(folder, images_dir, std::span(&photo, 1), kAliasPrefix, 1, progress);
-  auto groups = GroupCameras(workspace.images(), ModelOf(options), true);
+  auto groups = GroupCameras(workspace.images(), CameraModelOf(options), true);
   groups.front().camera_id = SharedCamera(frozen, photo, options.share_intrinsics_within_group);
   ExtractionPlan plan =
       PlanExtraction(workspace.images(), 1, options.memory_gb, options.max_image_size_px);
@@ -258,7 +258,7 @@ HeldOutResult RegisterHeldOut(const fs::path& images_dir, std::span<const SfmIma
                               std::span<const SfmImageInput> sources,
                               const fs::path& source_workspace, const fs::path& workspace,
                               const SfmOptions& options, Progress& progress) {
-  ModelOf(options);  // reject before any work
+  CameraModelOf(options);  // reject before any work
   MakeFolder(workspace);
   const Frozen frozen = FrozenFrom(source_model, sources, images_dir, source_workspace, workspace);
   std::vector<SfmImageInput> photos(held_out.begin(), held_out.end());

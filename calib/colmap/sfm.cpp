@@ -185,7 +185,7 @@ std::vector<int> ModelSizes(const Workspace& workspace) {
 
 SfmResult RunSfm(const fs::path& images_dir, std::span<const SfmImageInput> images,
                  const fs::path& workspace_folder, const SfmOptions& options, Progress& progress) {
-  const calib::CameraModel lens = ModelOf(options);
+  const calib::CameraModel lens = CameraModelOf(options);
   if (images.size() < 2) {
     throw UsageError(
         fmt::format("{}: expected at least two photos, found {}; depth needs a second "
@@ -225,8 +225,8 @@ std::optional<SfmResult> MapWithFixedIntrinsics(const fs::path& images_dir,
                                                 const SfmOptions& options, Progress& progress) {
   Workspace workspace(workspace_folder, images_dir, images, "", ResolveThreads(options.threads),
                       progress);
-  const auto groups =
-      GroupCameras(workspace.images(), ModelOf(options), options.share_intrinsics_within_group);
+  const auto groups = GroupCameras(workspace.images(), CameraModelOf(options),
+                                   options.share_intrinsics_within_group);
   if (!AllHavePriors(groups)) return {};
   SfmResult result;
   FeaturesAndMatches(workspace, groups, options, result.report);

@@ -31,7 +31,7 @@ std::string TextOf(const std::vector<CameraGroup>& groups, const ExtractionPlan&
 
 }  // namespace
 
-calib::CameraModel ModelOf(const SfmOptions& options) {
+calib::CameraModel CameraModelOf(const SfmOptions& options) {
   const auto model = calib::CameraModelFromName(options.lens_model);
   if (!model) {
     throw UsageError("camera model: expected a name like SIMPLE_RADIAL, RADIAL or OPENCV, found '" +

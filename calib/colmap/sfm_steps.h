@@ -12,7 +12,7 @@
 namespace dtr::colmap {
 
 /// The lens model of the options. Throws UsageError on an unknown name.
-calib::CameraModel ModelOf(const SfmOptions& options);
+calib::CameraModel CameraModelOf(const SfmOptions& options);
 
 /// Steps "features" and "matches": fills workspace.database(). What was planned goes to `report`.
 /// Of the pairs that options.matching names only those of `allowed` (a < b, sorted; numbers of

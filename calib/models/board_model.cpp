@@ -45,7 +45,7 @@ std::optional<BoardModel> BoardModelFromName(const std::string& name) {
   return std::nullopt;
 }
 
-CameraModel ModelOf(BoardModel model) { return FactsOf(model).lens; }
+CameraModel CameraModelOf(BoardModel model) { return FactsOf(model).lens; }
 
 int FreeParameterCount(BoardModel model) { return FactsOf(model).free_parameters; }
 
@@ -67,7 +67,7 @@ LensCamera CameraFrom(BoardModel model, int width_px, int height_px,
                                 std::to_string(FreeParameterCount(model)) + " parameters, found " +
                                 std::to_string(free_params.size()));
   }
-  LensCamera camera{ModelOf(model), width_px, height_px,
+  LensCamera camera{CameraModelOf(model), width_px, height_px,
                     std::vector<double>(free_params.begin(), free_params.end())};
   camera.params.resize(static_cast<size_t>(ParameterCount(camera.model)), 0.0);
   camera.Check();

@@ -30,7 +30,7 @@ std::string NameOf(BoardModel model);
 std::optional<BoardModel> BoardModelFromName(const std::string& name);
 
 /// The model as LensCamera stores it; brown5 is FULL_OPENCV with k4 = k5 = k6 = 0.
-CameraModel ModelOf(BoardModel model);
+CameraModel CameraModelOf(BoardModel model);
 /// How many of that CameraModel's parameters, the first ones, are estimated. The others are zero.
 int FreeParameterCount(BoardModel model);
 /// Order of simplicity: how far a model can bend where no corner holds it. Perspective models come

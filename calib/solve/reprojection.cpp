@@ -49,7 +49,7 @@ LensFormula<T> LensAt(const LensCoordinates& lens, const T* theta) {
   for (size_t i = 0; i < kMaxLensParameters; ++i) {
     params[i] = i < kFree ? lens.centre[i] + lens.scale[i] * theta[i] : T(0);
   }
-  return FormulaOf(ModelOf(lens.model), params);
+  return FormulaOf(CameraModelOf(lens.model), params);
 }
 
 template <int kFree>

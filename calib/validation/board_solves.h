@@ -1,4 +1,4 @@
-// calib/validation/board_solves.h -- internal to calib/validation: solves made to evaluate a
+// calib/validation/board_solves.h -- internal to calib/validation: solves made to validate a
 // calibration by, and how far two solves differ.
 #pragma once
 #include <Eigen/Core>

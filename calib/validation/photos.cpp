@@ -249,7 +249,7 @@ PhotosValidation NotValidated(PhotosValidation validation, const std::string& wh
   return validation;
 }
 
-// Points to evaluate by, a share of all by their hash; and all points of images of which the draw
+// Points to validate by, a share of all by their hash; and all points of images of which the draw
 // could leave too few for halves.
 Bundle Drawn(const Bundle& given, double share) {
   if (share >= 1) return given;
@@ -276,7 +276,7 @@ void AddNotValidated(const Bundle& given, PhotosValidation& all) {
     if (!judged) lost.push_back(image.name);
   }
   if (lost.empty()) {
-    all.not_validated.clear();  // what one part could not evaluate another has
+    all.not_validated.clear();  // what one part could not validate another has
   } else if (all.not_validated.empty()) {
     all.not_validated = fmt::format("fewer than {} observations of what photos beside them see: {}",
                                     kMinImageObservations, fmt::join(lost, ", "));

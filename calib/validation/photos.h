@@ -32,7 +32,7 @@ struct BundleLimits {
   /// that is beyond chance. Features err by themselves where a scene's texture does.
   double max_lens_pattern_px = 0.1;
   double min_p = 1e-4;                      ///< less likely by chance than this is no chance
-  int max_unknowns = kMaxUnknowns;          ///< of a bundle that is evaluated in one part
+  int max_unknowns = kMaxUnknowns;          ///< of a bundle that is validated in one part
   double max_focal_share = kMaxFocalShare;  ///< standard deviation of a focal length over itself
 };
 
@@ -62,7 +62,7 @@ struct PhotosValidation {
   /// Why (some) images of 10 observations or more have no validation result; empty where all have
   /// one. The test photos_not_validated then fails: no evidence is no pass.
   std::string not_validated;
-  int parts = 1;  ///< that the images were evaluated in
+  int parts = 1;  ///< that the images were validated in
   std::vector<Check> tests;
   std::vector<PhotoValidation> cameras;
   std::vector<IntrinsicsValidation> lenses;
@@ -72,18 +72,16 @@ struct PhotosValidation {
 };
 
 /// Validates cameras and poses of undistorted views against their own observations:
-///  - all are solved for again from the observations, distortion included, and the stored ones
-///  compared
-///    with that, each pose and each lens as a Mahalanobis distance;
-///  - two halves of the points, dealt by chance, are solved apart and compared; where they differ
+///  - all are solved for again from the observations, distortion included, and the stored ones are
+///    compared with that, each pose and each lens as a Mahalanobis distance;
+///  - two halves of the points, split by chance, are solved apart and compared; where they differ
 ///    by more than predicted, all uncertainties are widened by that factor;
 ///  - the covariance is carried to a third view's pixels (TransferCovariance);
 ///  - degeneracies are looked for by name;
-///  - residuals are held against patterns of the lens (lens_patterns.h) and a shutter that reads
-///  row
-///    by row (shutter.h).
+///  - residuals are checked against patterns of the lens (lens_patterns.h) and a shutter that reads
+///    row by row (shutter.h).
 /// Some 4000 points, drawn by their index, take part, and all of photos that would be left few.
-/// More than some 220 photos (kMaxUnknowns with three turns each) are evaluated in parts of about
+/// More than some 220 photos (kMaxUnknowns with three turns each) are validated in parts of about
 /// 100 that see the same points, each by itself; of every test the worst part's figure is reported.
 /// Deterministic for any number of threads. Throws Error on a broken bundle only, and Interrupted
 /// where `progress` asks for it.

@@ -1,5 +1,5 @@
-// calib/validation/reprojection.h -- can a calibration be trusted? Residuals on observations it is
-// not evaluated with.
+// calib/validation/reprojection.h -- can a calibration be trusted? Residuals on held-out
+// observations.
 #pragma once
 #include <Eigen/Core>
 #include <array>
@@ -53,7 +53,7 @@ struct ValidationReport {
   std::array<ResidualStats, kRegionsPerAxis * kRegionsPerAxis> regions;
   std::vector<std::string> untested;  ///< cameras with too few tested observations
   /// Held-out cameras without a single observation, as --holdout-strict stores them: nothing here
-  /// can test them, and nothing is asked of them; what they saw validates the set (`dtr evaluate`).
+  /// can test them, and nothing is asked of them; what they saw is for `dtr evaluate`.
   std::vector<std::string> kept_apart;
   bool passed() const { return AllPassed(tests); }
 };

@@ -143,9 +143,10 @@ void AddCalibrateBoardCommand(CLI::App& calibrate) {
             ->required()
             ->type_name("BOARD");
         command
-            .add_option("--model", options->model,
-                        "Lens model: pinhole, brown4, brown5, brown8, fisheye, or auto, by photos "
-                        "held out [auto]")
+            .add_option(
+                "--model", options->model,
+                "Camera model: pinhole, brown4, brown5, brown8, fisheye, or auto, by photos "
+                "held out [auto]")
             ->type_name("MODEL");
         command
             .add_option("--images", options->images, "Only photos of these names, as 'left*.jpg'")

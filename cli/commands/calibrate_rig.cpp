@@ -169,9 +169,10 @@ void AddCalibrateRigCommand(CLI::App& calibrate) {
             ->required()
             ->type_name("BOARD");
         command
-            .add_option("--model", options->model,
-                        "Lens model of every camera: pinhole, brown4, brown5, brown8, fisheye, or "
-                        "auto, each camera's own by photos held out [auto]")
+            .add_option(
+                "--model", options->model,
+                "Camera model of every camera: pinhole, brown4, brown5, brown8, fisheye, or "
+                "auto, each camera's own by photos held out [auto]")
             ->type_name("MODEL");
         command
             .add_option("--camera", options->given,

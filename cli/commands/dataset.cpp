@@ -64,7 +64,7 @@ void DeclareMakeOptions(CLI::App& command, MakeOptions& options) {
   command.add_option("--world-offset", options.offset, "Where the written world has its origin")
       ->expected(3)
       ->type_name("X Y Z");
-  command.add_option("--time", spec.time_s, "TimeStep, for scenes that move: sphere [0]")
+  command.add_option("--time", spec.time_s, "Time in seconds, for dynamic scenes: sphere [0]")
       ->type_name("S");
   command.add_option("--scale", spec.scale, "Size of the written world [1]");
 }

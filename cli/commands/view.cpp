@@ -190,7 +190,7 @@ std::map<std::string, viewer::ViewValidation> ValidateViews(const Options& optio
                                                             const Context& context) {
   const DtrSet set = io::ReadSet(options.set);
   std::map<std::string, viewer::ViewValidation> validations;
-  if (!set.sparse_file) return validations;  // nothing to evaluate by
+  if (!set.sparse_file) return validations;  // nothing to validate by
   const calib::ValidateLimits limits;
   const auto report = pipeline::ReprojectionOfSet(set, io::LoadSparse(options.set, set), limits,
                                                   context.common.threads);

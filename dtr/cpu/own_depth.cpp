@@ -173,9 +173,9 @@ std::vector<double> NearestSurface(std::span<const Layer> layers) {
   return nearest;
 }
 
-void KeepSurfacesThatViewsHold(std::span<const ViewInNovel> views, const PinholeCamera& novel,
-                               const RenderOptions& options, const Band& band,
-                               std::span<double> surfaces) {
+void KeepSupportedSurfaces(std::span<const ViewInNovel> views, const PinholeCamera& novel,
+                           const RenderOptions& options, const Band& band,
+                           std::span<double> surfaces) {
   std::vector<OwnFragmentFinder> finders;
   for (const ViewInNovel& view : views) {
     finders.emplace_back(view, options);

@@ -14,9 +14,9 @@ std::vector<double> NearestSurface(std::span<const Layer> layers);
 /// SPEC 5.2: replaces each pixel's surface (1/z, row-major; 0: none) with what the views hold
 /// together, where their patches have it; where they reject it with the next one behind, or none.
 /// Does not depend on the number of threads.
-void KeepSurfacesThatViewsHold(std::span<const ViewInNovel> views, const PinholeCamera& novel,
-                               const RenderOptions& options, const Band& band,
-                               std::span<double> surfaces);
+void KeepSupportedSurfaces(std::span<const ViewInNovel> views, const PinholeCamera& novel,
+                           const RenderOptions& options, const Band& band,
+                           std::span<double> surfaces);
 
 /// SPEC 5.3: the view's own fragments at the pixels of `band`, found on its depth map from the
 /// surfaces that are held (1/z per pixel of the band, row-major; 0: nothing there).

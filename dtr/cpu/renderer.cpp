@@ -58,7 +58,7 @@ std::vector<Layer> DrawLayers(const std::vector<ViewInNovel>& views,
   }
   fill([&](size_t k) { return DrawReducedMesh(views[k], meshes[k], novel, options, band); });
   std::vector<double> surfaces = NearestSurface(layers);
-  KeepSurfacesThatViewsHold(views, novel, options, band, surfaces);
+  KeepSupportedSurfaces(views, novel, options, band, surfaces);
   fill([&](size_t k) { return FindOwnFragments(views[k], novel, options, band, surfaces); });
   return layers;
 }

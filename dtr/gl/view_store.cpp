@@ -42,7 +42,7 @@ Buffer UploadStorage(const View& view, const std::vector<float>& values) {
   if (bytes > limit) {
     throw Error(view.name + ": expected surface samples within this driver's storage block of " +
                 std::to_string(limit) + " bytes, found " + std::to_string(bytes) +
-                "; use `renderer` cpu or simd, or a larger `resolution`");
+                "; use `renderer` cpu or a larger `resolution`");
   }
   Buffer buffer = Buffer::Make();
   glBindBuffer(GL_SHADER_STORAGE_BUFFER, buffer.name());

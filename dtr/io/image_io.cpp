@@ -184,7 +184,7 @@ ImageHeader ReadImageHeader(const fs::path& file) {
   header.focal_plane_px_per_mm = FocalPlanePxPerMm(spec);
   header.make = spec.get_string_attribute("Make");
   header.model = spec.get_string_attribute("Model");
-  header.lens_model = spec.get_string_attribute("Exif:CameraModel");
+  header.lens_model = spec.get_string_attribute("Exif:LensModel");
   header.date_time = spec.get_string_attribute("Exif:DateTimeOriginal");
   header.gps = GpsOf(spec);
   const PhotoColours colours(spec, in->format_name(), file);

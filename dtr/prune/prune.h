@@ -60,11 +60,11 @@ struct PruneReport {
 /// quality, depth error, size, mesh tolerance or number of views used) what saves most bytes and
 /// work per dB that it is measured to cost, until nothing fits the loss. What it costs is the
 /// larger loss of two: at source views left out in turn, and between input cameras. `set`: loaded
-/// with images and depth, and held-out photos where it has some: they only evaluate. The outcome is
-/// then looked at again, at full size, from other cameras and against the photos, and the last
-/// decisions are taken back until the loss holds; then it goes on without these, a few times.
-/// Depends on the set, the options and the renderer alone, not on threads or times, nor on how
-/// often it was interrupted.
+/// with images and depth, and held-out photos where it has some: the result is only measured on
+/// them. The outcome is then looked at again, at full size, from other cameras and against the
+/// photos, and the last decisions are taken back until the loss holds; then it goes on without
+/// these, a few times. Depends on the set, the options and the renderer alone, not on threads or
+/// times, nor on how often it was interrupted.
 PruneReport Prune(const DtrSet& set, const PruneOptions& options, const CodeFunction& code,
                   const RendererMaker& make_renderer, Progress& progress);
 

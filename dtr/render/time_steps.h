@@ -29,7 +29,7 @@ std::vector<RenderScene> DescribeFrames(const DtrSet& set,
 
 /// The frame that image `i` of `images` shows when they run through all `frames` from the
 /// first to the last, each for an equal share of the images.
-size_t TimeStepOfImage(size_t i, size_t pictures, size_t frames);
+size_t TimeStepOfImage(size_t i, size_t images, size_t frames);
 
 /// Which frame is shown when a set is played round and round: each until the next one's time, the
 /// last as long as the others on average. Where times do not rise, as in sets without any, all

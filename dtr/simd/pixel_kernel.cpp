@@ -184,8 +184,8 @@ HWY_INLINE void PrefetchAround(const PixelView& view, const Position& position) 
 }
 
 /// SPEC 5.2: the supported surface; 0 where none is.
-HWY_INLINE VF HeldSurface(const PixelRow& row, std::span<const PixelView> views, const Rays& rays,
-                          VF surface) {
+HWY_INLINE VF SupportedSurface(const PixelRow& row, std::span<const PixelView> views,
+                               const Rays& rays, VF surface) {
   const DF d;
   const VF zero = hn::Zero(d);
   VF supported = zero;
@@ -196,8 +196,8 @@ HWY_INLINE VF HeldSurface(const PixelRow& row, std::span<const PixelView> views,
       const RayOnGrid base(view, rays);
       const Position position = PositionAt(view, base, surface);
       if (hn::AllFalse(d, position.on_map)) continue;
-      VF vote =
-          hn::IfThenElseZero(position.on_map, SayAt({view, rays, surface}, row.pixel_angle_rad));
+      VF vote = hn::IfThenElseZero(position.on_map,
+                                   VoteWeightAt({view, rays, surface}, row.pixel_angle_rad));
       if (view.cells != nullptr) {
         const VU cells = CellsAt(view, position);
         if (hn::AllFalse(d, hn::And(position.on_map, IsCell(cells, kCellOfSamples)))) {
@@ -315,7 +315,7 @@ HWY_INLINE Pixels ResolveGroup(const PixelRow& row, std::span<const PixelView> v
   const float ray_y = (row.y - row.cy) * row.inverse_fy;
   const Rays rays{ray_x, ray_y, hn::MulAdd(ray_x, ray_x, Constant(ray_y * ray_y + 1))};
   const Pixels none{hn::Zero(DU()), hn::Zero(DU()), zero};
-  surface = HeldSurface(row, views, rays, surface);
+  surface = SupportedSurface(row, views, rays, surface);
   if (hn::AllFalse(d, hn::Gt(surface, zero))) return none;
 
   const Front front = FindFragments(row, views, rays, surface, group);

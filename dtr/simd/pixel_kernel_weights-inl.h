@@ -52,7 +52,7 @@ struct Angle {
 };
 
 /// 1 / (tan^2 t + t_pixel^2); 0 from 90 degrees on.
-HWY_INLINE VF SayAt(const Angle& angle, float pixel_angle_rad) {
+HWY_INLINE VF VoteWeightAt(const Angle& angle, float pixel_angle_rad) {
   const VF along_squared = hn::Mul(angle.along, angle.along);
   const VF vote = hn::Div(
       along_squared,

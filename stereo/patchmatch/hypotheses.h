@@ -4,7 +4,7 @@
 
 namespace dtr::stereo::patchmatch {
 
-/// Fills state->guesses: every plane of every source's surface is moved to the pixel of the
+/// Fills state->hypotheses: every plane of every source's surface is moved to the pixel of the
 /// reference where it is seen; of those that differ from the pixel's own plane, the nearest and the
 /// farthest are kept. Behind a thin or near thing, half the views look at what is wanted.
 void HypothesesFromSurfaces(const Level& level, State* state);

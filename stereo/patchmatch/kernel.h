@@ -107,7 +107,7 @@ struct Sweep {
   float step_px = 4;    ///< largest random change, pixels of disparity at the window's centre
 };
 
-/// PixelEstimate on one pixel.
+/// Estimate of one pixel.
 struct PixelEstimate {
   float w = 0;         ///< inverse depth at the minimum of the cost
   float sigma = 0;     ///< its standard deviation by the cost's curvature and the views' agreement
@@ -137,8 +137,9 @@ std::int64_t SweepRow(const Level& level, const Sweep& sweep, int y, State* stat
 /// SweepRow need not look at most of them.
 void ExpectRow(const Level& level, int y, State* state);
 
-/// Finds the minimum of the cost to a fraction of a pixel and validates it. `out` has a row's
-/// length, as has `wanted`: pixels where that is 0 may be left out. Null: all are wanted.
+/// Finds the minimum of the cost to a fraction of a pixel with its sigma and the views that agree.
+/// `out` has a row's length, as has `wanted`: pixels where that is 0 may be left out. Null: all are
+/// wanted.
 void EstimateRow(const Level& level, const State& state, int y, const float* wanted,
                  PixelEstimate* out);
 

@@ -1,10 +1,10 @@
 // stereo/patchmatch/kernel_estimate-inl.h -- what a pixel's plane is worth. Compiled per
 // instruction set: include only from kernel.cpp.
-#if defined(DTR_STEREO_PATCHMATCH_KERNEL_VERDICT_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef DTR_STEREO_PATCHMATCH_KERNEL_VERDICT_INL_H_
-#undef DTR_STEREO_PATCHMATCH_KERNEL_VERDICT_INL_H_
+#if defined(DTR_STEREO_PATCHMATCH_KERNEL_ESTIMATE_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef DTR_STEREO_PATCHMATCH_KERNEL_ESTIMATE_INL_H_
+#undef DTR_STEREO_PATCHMATCH_KERNEL_ESTIMATE_INL_H_
 #else
-#define DTR_STEREO_PATCHMATCH_KERNEL_VERDICT_INL_H_
+#define DTR_STEREO_PATCHMATCH_KERNEL_ESTIMATE_INL_H_
 #endif
 
 #include "stereo/patchmatch/kernel_ncc-inl.h"
@@ -17,7 +17,7 @@ namespace dtr::stereo::patchmatch::HWY_NAMESPACE {
 /// whole, as slopes are smoother than noise; and windows give most weight to pixels whose noise is
 /// like the centre's (1.1 times the variance at a noise of 2 levels, 1.7 at 6).
 constexpr float kNoisePerCost = 1.7f;
-/// Steps of the evaluating parabola and the cost of a view that sees the same surface.
+/// Step of the parabola and the cost of a view that sees the same surface.
 constexpr float kParabolaStepPx = 0.5f;
 constexpr float kAgreeingCost = 0.4f;
 /// How far, in pixels of disparity, other places that match are looked for, and from where on

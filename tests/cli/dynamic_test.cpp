@@ -101,7 +101,7 @@ TEST_P(DynamicSetBy, PlaysFromOnePlaceAndAlongAPath) {
 
 // Images from sets of one time step each and from the dynamic set are the same, to the byte: no
 // view of another time step has a say, nor what a renderer kept of one.
-TEST_P(DynamicSetBy, AnTimeStepOfADynamicSetIsDrawnAsASetOfItsOwn) {
+TEST_P(DynamicSetBy, ATimeStepOfADynamicSetIsDrawnAsASetOfItsOwn) {
   DtrOk(
       {"render", Set(), "--renderer", GetParam(), "--like", "0002.jpg", "--play", "-o", In("all")});
   const std::string sets[] = {At("t0.dtr"), At("t0.5.dtr")};

@@ -59,7 +59,7 @@ TEST(JsonInterface, NamesAreThoseOfTheDesign) {
       OnStdout({"evaluate", set, "--renderer", "cpu", "--depth", (folder / "c").string()});
   ExpectNames(evaluate, {"views", "mean", "not_registered", "depth"});
   for (const Json& scores : {evaluate["views"].at(0), evaluate["mean"]}) {
-    ExpectNames(scores, {"psnr_db", "psnr_covered_db", "ssim", "coverage"});
+    ExpectNames(scores, {"psnr_db", "psnr_covered_db", "psnr_cc_db", "ssim", "coverage"});
   }
   EXPECT_EQ(evaluate["views"].at(0)["name"], "0000.jpg");
   ExpectNames(evaluate["depth"],

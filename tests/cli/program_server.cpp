@@ -34,6 +34,8 @@ struct Inherited {
   }
 };
 
+constexpr int kNoServer = 126 << 8;  // as waitpid gives exit code 126
+
 class Server {
  public:
   Server() {
@@ -61,12 +63,13 @@ class Server {
   std::optional<int> Run(const ProgramRun& run) {
     if (socket_ < 0 || !(inherited_ == Inherited())) return std::nullopt;
     std::int32_t status = 0;
-    if (!SendRun(socket_, run) || !ReadAll(socket_, &status, sizeof(status))) {
+    if (!SendRun(socket_, run)) {
       close(socket_);
       socket_ = -1;
       return std::nullopt;
     }
-    return status;
+    // A run that has begun is not begun again: what it left would be in the way.
+    return ReadAll(socket_, &status, sizeof(status)) ? status : kNoServer;
   }
 
  private:
@@ -150,6 +153,10 @@ std::optional<ProgramRun> ReceiveRun(int socket) {
 
 std::optional<int> RunByServer(const std::vector<std::string>& args,
                                const std::filesystem::path& out, const std::filesystem::path& err) {
+#ifdef DTR_SANITIZED
+  // LeakSanitizer looks at exit(), and ThreadSanitizer wants no threads before a fork.
+  return std::nullopt;
+#endif
   static std::mutex one_run;
   const std::unique_lock lock(one_run, std::try_to_lock);
   if (!lock) return std::nullopt;

@@ -46,8 +46,8 @@ int main() {
   while (const auto run = dtr::testing::ReceiveRun(dtr::testing::kServerSocket)) {
     const pid_t child = fork();
     if (child == 0) Become(*run);
-    int status = 0;
-    while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+    int status = 127 << 8;  // of a fork that failed
+    while (child > 0 && waitpid(child, &status, 0) < 0 && errno == EINTR) {
     }
     const std::int32_t sent = status;
     if (!dtr::testing::WriteAll(dtr::testing::kServerSocket, &sent, sizeof(sent))) break;

@@ -96,7 +96,7 @@ TEST(FindOwnFragments, FollowsSlopesSteeperThanTheDepthBreak) {
   EXPECT_EQ(found, 60);
 }
 
-TEST(KeepSurfacesThatViewsHold, PutsASurfaceWhereTheViewsPatchHasIt) {
+TEST(KeepSupportedSurfaces, PutsASurfaceWhereTheViewsPatchHasIt) {
   // As in RefinesAWrongStartToTheViewsOwnSurface: what is left of the start's error is 0.015 of it.
   const Surface plane = Plane({-0.3, 0, 1}, 10);
   const Pair pair(plane, {0.5, 0, 0});
@@ -106,7 +106,7 @@ TEST(KeepSurfacesThatViewsHold, PutsASurfaceWhereTheViewsPatchHasIt) {
   const auto held = [&](double wrong_px) {
     std::vector<double> surfaces(static_cast<size_t>(band.width_px * band.rows), 0.0);
     surfaces[pixel] = truth + wrong_px * kPixelOfDisparity;
-    KeepSurfacesThatViewsHold({&pair.in_novel, 1}, pair.novel, {}, band, surfaces);
+    KeepSupportedSurfaces({&pair.in_novel, 1}, pair.novel, {}, band, surfaces);
     return surfaces[pixel];
   };
   for (const double wrong_px : {-0.45, 0.0, 0.45, 1.9}) {

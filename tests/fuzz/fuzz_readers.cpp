@@ -1,6 +1,6 @@
 // fuzz_readers [--reader NAME]... [--inputs N] [--seed S] [--file INPUT] [--seeds-to DIR] [--list]
 // Gives readers good files, every beginning of them, and N changed ones each; exit 1 where one
-// breaks a rule of judge.h. `--file INPUT` reads one input again. An input that crashes stays in
+// breaks a rule of outcome.h. `--file INPUT` reads one input again. An input that crashes stays in
 // the folder that is named.
 #include <fmt/format.h>
 
@@ -82,7 +82,7 @@ class Session {
       }
     }
     fmt::print("{:<20} {:>9} inputs, {:>8} of them good files, {} troubles\n", name_, tried_,
-               accepted_, error_texts_);
+               accepted_, failures_);
     std::fflush(stdout);
   }
 
@@ -100,7 +100,7 @@ class Session {
       WriteFileAtomically(folder / name_ / std::to_string(i), reader_.seeds[i]);
     }
   }
-  int error_texts() const { return error_texts_; }
+  int failures() const { return failures_; }
 
  private:
   void TryPrefixes(const std::string& good) {
@@ -109,8 +109,8 @@ class Session {
   }
   void Complain(const std::string& error_text, const std::string& input) {
     constexpr int kShown = 5;
-    if (++error_texts_ > kShown) return;
-    const fs::path kept = fs::current_path() / fmt::format("fuzz-{}-{}", name_, error_texts_);
+    if (++failures_ > kShown) return;
+    const fs::path kept = fs::current_path() / fmt::format("fuzz-{}-{}", name_, failures_);
     WriteFileAtomically(kept, input);
     fmt::print(stderr, "{}: {}; input in {}\n", name_, error_text, kept.string());
   }
@@ -119,14 +119,14 @@ class Session {
   Reader reader_;
   std::vector<std::string> corpus_;
   long tried_ = 0, accepted_ = 0;
-  int error_texts_ = 0;
+  int failures_ = 0;
 };
 
 int Main(const Options& options) {
   const fs::path folder = MakeFolder();
   fmt::print("inputs lie in {} while they are read\n", folder.string());
   std::fflush(stdout);
-  int error_texts = 0;
+  int failures = 0;
   size_t used = 0;
   for (const ReaderKind& kind : AllReaders()) {
     if (options.list) fmt::print("{}\n", kind.name);
@@ -143,7 +143,7 @@ int Main(const Options& options) {
     } else {
       session.Run(options.inputs, options.seed);
     }
-    error_texts += session.error_texts();
+    failures += session.failures();
     fs::remove_all(folder / kind.name);
   }
   fs::remove_all(folder);
@@ -151,7 +151,7 @@ int Main(const Options& options) {
     fmt::print(stderr, "fuzz_readers: no such reader; see --list\n");
     return 2;
   }
-  return error_texts == 0 ? 0 : 1;
+  return failures == 0 ? 0 : 1;
 }
 
 }  // namespace

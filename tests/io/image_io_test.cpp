@@ -285,6 +285,14 @@ TEST(ApplyExifOrientation, FollowsTheCornersOfTheExifTable) {
   }
 }
 
+TEST(ReadImageHeader, NamesTheLens) {
+  const TemporaryFolder folder;
+  OIIO::ImageSpec spec(2, 2, 3, OIIO::TypeDesc::UINT8);
+  spec.attribute("Exif:LensModel", "Lens 1");
+  WriteForeign<std::uint8_t>(folder / "lens.jpg", spec, std::vector<std::uint8_t>(12, 100));
+  EXPECT_EQ(ReadImageHeader(folder / "lens.jpg").lens_model, "Lens 1");
+}
+
 TEST(WriteJpegWithExif, HeaderReadsTheLensBack) {
   const TemporaryFolder folder;
   WriteJpegWithExif(folder / "a.jpg", SmoothImage(32, 20), 95, {4.25, 26.0, "Acme", "Model 1"});

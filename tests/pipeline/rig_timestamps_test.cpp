@@ -45,7 +45,7 @@ TEST_F(RigTimestampsFile, WithoutFrameIndexRowsOfACameraInOrderOfTimeAreItsFrame
   }
 }
 
-TEST_F(RigTimestampsFile, ACameraThatMissedAnTimeStepHasNoFrameThere) {
+TEST_F(RigTimestampsFile, ACameraThatMissedATimeStepHasNoFrameThere) {
   const RigTimeSteps expected{{{0, 0}, 0}, {{0, 1}, 1}, {{0, 2}, 2}, {{1, 0}, 0}, {{1, 1}, 2}};
   EXPECT_EQ(Read("sync_index,cam_id,frame_time\n0,0,1\n0,1,1\n1,0,2\n2,0,3\n2,1,3\n").time_steps,
             expected);

@@ -26,7 +26,7 @@ TEST(TimePlayer, ShowsEachTimeStepForAsLongAsItLasts) {
   EXPECT_EQ(player.Advance(0.1, clock, shown), shown);
 }
 
-TEST(TimePlayer, GoesOnFromAnTimeStepThatWasChosenByHand) {
+TEST(TimePlayer, GoesOnFromATimeStepThatWasChosenByHand) {
   const FrameClock clock = Quarters();
   TimePlayer player;
   player.StartOrStop();

@@ -56,7 +56,7 @@ std::optional<Probe> Inspector::ProbeAt(const Eigen::Vector2d& pixel) {
                     from_.sigma_of);
 }
 
-void Inspector::AskForVerdicts() {
+void Inspector::AskForValidations() {
   if (!inspection_.cameras || !from_.validations) return;
   if (!std::exchange(validations_asked_, true)) {
     validations_coming_ = std::async(std::launch::async, from_.validations);
@@ -72,7 +72,7 @@ void Inspector::AskForVerdicts() {
 }
 
 void Inspector::Draw(const RenderOptions& options) {
-  AskForVerdicts();
+  AskForValidations();
   const Controller& controller = from_.controller;
   const auto nearest = controller.nearest_view();
   photos_.Tend();

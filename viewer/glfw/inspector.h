@@ -54,7 +54,7 @@ class Inspector {
 
  private:
   std::optional<Probe> ProbeAt(const Eigen::Vector2d& pixel);
-  void AskForVerdicts();
+  void AskForValidations();
 
   const Sources from_;
   Inspection inspection_;

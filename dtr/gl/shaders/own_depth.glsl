@@ -1,6 +1,6 @@
 // SPEC 5.2, 5.3: how a view's full-resolution depth map votes on a surface at a pixel, and the
 // view's own fragment there. Expects `depths`, an array of sampler2DArray laid out as PackedDepth
-// (dtr/gl/stored_depth.h) says: one value per sample (0: none) that a view's OwnMap turns into 1/z,
+// (dtr/gl/packed_depth.h) says: one value per sample (0: none) that a view's OwnMap turns into 1/z,
 // the last row and column once more, then which blocks are whole or all masked. Filtered to the nearest.
 // No branch: software rasterisers run both sides of one anyway.
 #include "deferred_limits.h"

@@ -68,7 +68,7 @@ vec3 BaseOf(ViewBlock view, vec3 ray) { return OnGrid(view, PointInView(view, ra
 vec3 AwayOf(ViewBlock view) { return OnGrid(view, PointInView(view, vec3(0.0), 1.0)); }
 
 // 1 / (tan^2 t + t_pixel^2), t the angle of SPEC 4.5 at the point ray / w; 0 from 90 degrees on.
-float Say(ViewBlock view, vec3 ray, float w) {
+float VoteWeight(ViewBlock view, vec3 ray, float w) {
   vec3 to_view = Centre(view) * w - ray;
   float along = dot(to_view, -ray);
   if (!(along > 0.0)) return 0.0;
@@ -87,7 +87,7 @@ bool FindOwnFragments(vec3 ray, float surface) {
       bool on_map, whole, masked;
       float seen =
           OwnDepth(map, BaseOf(view, ray), AwayOf(view), surface, on_map, whole, masked);
-      AddVote(map, surface, seen, whole, masked, on_map, Say(view, ray, surface), votes);
+      AddVote(map, surface, seen, whole, masked, on_map, VoteWeight(view, ray, surface), votes);
     }
     supported = votes.support >= votes.against;
     surface = !supported ? votes.behind : votes.front > 0.0 ? votes.front : surface;

@@ -161,6 +161,8 @@ std::optional<PhotoRefinement> KeptRefinement(const fs::path& folder,
     return {};
   } catch (const nlohmann::json::exception&) {
     return {};
+  } catch (const std::bad_optional_access&) {  // a record of a rig, and none was given
+    return {};
   }
 }
 

@@ -164,7 +164,7 @@ stereo::QualitySettings WithinBudget(std::span<const stereo::StereoView> views,
   const auto neighbours = stereo::ChooseNeighbours(views, scene, most);
   const auto ranges = stereo::DepthRangesFromPoints(views, scene, options.range);
   stereo::Pages pages;
-  return EffortWithinBudget(
+  return QualityWithinBudget(
       {views, neighbours, ranges, nullptr, options.engine, options.load_pixels, &pages}, choice,
       record, progress);
 }

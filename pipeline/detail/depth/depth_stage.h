@@ -28,7 +28,7 @@ void StoreImage(View& view, LengthUnit unit, io::SetWriter& writer);
 /// (StoreImage). Views finished by an earlier, interrupted run are taken from the writer. Only
 /// source views and the points they alone know reach the engine. Pixels are in memory only as long
 /// as they are worked with, within the memory chosen: UsageError when that is too little. Returns
-/// the effort spent: `effort` or, with a time budget, what fitted into that.
+/// the quality settings used: `quality` or, with a time budget, what fitted into that.
 stereo::QualitySettings DepthStage(DtrSet& set, const SparseScene& sparse,
                                    const DepthChoice& choice,
                                    const stereo::QualitySettings& quality,

@@ -7,12 +7,12 @@
 
 namespace dtr::pipeline {
 
-/// What of the engine and its effort decides the bytes of a depth map, by the names of the options:
-/// given explicitly, they make the same maps whatever preset they came from.
+/// What of the engine and its quality settings decides the bytes of a depth map, by the names of
+/// the options: given explicitly, they make the same maps whatever preset they came from.
 nlohmann::ordered_json SettingsJson(const std::string& engine,
                                     const stereo::QualitySettings& quality);
-/// The effort in what SettingsJson gave for `patchmatch`. Throws Error naming `where`, also where
-/// it has more than the most.
+/// The quality settings in what SettingsJson gave for `patchmatch`. Throws Error naming `where`,
+/// also where it has more than the most.
 stereo::QualitySettings QualityFromJson(const std::string& text, const std::string& where);
 
 }  // namespace dtr::pipeline

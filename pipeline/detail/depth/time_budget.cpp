@@ -154,9 +154,9 @@ stereo::QualitySettings PickQuality(const ProbedCosts& costs, const DepthChoice&
   return picked;
 }
 
-stereo::QualitySettings EffortWithinBudget(const stereo::Collection& c, const DepthChoice& choice,
-                                           const std::filesystem::path& record,
-                                           Progress& progress) {
+stereo::QualitySettings QualityWithinBudget(const stereo::Collection& c, const DepthChoice& choice,
+                                            const std::filesystem::path& record,
+                                            Progress& progress) {
   if (std::filesystem::exists(record)) {
     return QualityFromJson(ReadFile(record, kLargestRecord), record.string());
   }

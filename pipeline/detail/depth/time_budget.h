@@ -11,9 +11,9 @@
 
 namespace dtr::pipeline {
 
-/// What work costs here and now, wall-clock seconds per pixel of a view. Measured at full effort of
-/// one kind, from which other efforts follow: the search costs in proportion to its neighbours and
-/// its visits per pixel, a round and the validation result in proportion to theirs.
+/// What work costs here and now, wall-clock seconds per pixel of a view. Measured with one
+/// kind of settings, from which others follow: the search costs in proportion to its neighbours and
+/// its visits per pixel, a pass and the final filter in proportion to theirs.
 struct ProbedCosts {
   double search_s = 0;  ///< per pixel, neighbour and visit
   double round_s = 0;   ///< per pixel and neighbour
@@ -31,18 +31,19 @@ ProbedCosts ProbeCosts(const stereo::Collection& collection, int view);
 double PredictSeconds(const ProbedCosts& costs, const stereo::QualitySettings& quality,
                       std::span<const stereo::StereoView> views);
 
-/// The efforts a budget chooses among, cheapest first; presets are among them.
+/// The settings a budget chooses among, cheapest first; presets are among them.
 std::span<const stereo::QualitySettings> QualityLadder();
 
-/// The most expensive effort of the ladder that should fit into the budget, else the cheapest; what
-/// the choice gives explicitly stays.
+/// The most expensive settings of the ladder that should fit into the budget, else the cheapest;
+/// what the choice gives explicitly stays.
 stereo::QualitySettings PickQuality(const ProbedCosts& costs, const DepthChoice& choice,
                                     std::span<const stereo::StereoView> views);
 
 /// Probes the first view that has neighbours, picks for choice.time_budget_s and says so in one
 /// line. What was picked is kept in `record`, so that an interrupted run goes on with the same.
-stereo::QualitySettings EffortWithinBudget(const stereo::Collection& collection,
-                                           const DepthChoice& choice,
-                                           const std::filesystem::path& record, Progress& progress);
+stereo::QualitySettings QualityWithinBudget(const stereo::Collection& collection,
+                                            const DepthChoice& choice,
+                                            const std::filesystem::path& record,
+                                            Progress& progress);
 
 }  // namespace dtr::pipeline

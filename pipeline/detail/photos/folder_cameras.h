@@ -14,7 +14,7 @@ namespace dtr::pipeline {
 struct FolderCameras {
   calib::SfmModel model;
   std::vector<FolderSharing> tests;  ///< one per pool that is of several cameras
-  std::vector<std::string> notes;  ///< a line per pool
+  std::vector<std::string> notes;    ///< a line per pool
 };
 
 /// Tests each of groups.pools() (calib::ShareCameras). Without `test`, the model stays as it is and
