@@ -178,7 +178,7 @@ TEST(EvaluationJson, InfiniteAndUndefinedFiguresAreNull) {
   EXPECT_TRUE(json["mean"]["ssim"].is_null());
 }
 
-TEST(EvaluationJson, CrossDepthAndVerdict) {
+TEST(EvaluationJson, CrossDepthAndValidationResult) {
   const std::vector<View> views{testing::PlaneView(0, 0, false), testing::PlaneView(1, 0, false)};
   const View* pointers[] = {&views[0], &views[1]};
   const auto json = nlohmann::json::parse(ToJson(CrossDepth(pointers)));

@@ -81,7 +81,7 @@ class Session {
         corpus_[reader_.seeds.size() + static_cast<size_t>(random.Index(spare))] = input;
       }
     }
-    fmt::print("{:<20} {:>9} inputs, {:>8} of them good files, {} troubles\n", name_, tried_,
+    fmt::print("{:<20} {:>9} inputs, {:>8} of them good files, {} failures\n", name_, tried_,
                accepted_, failures_);
     std::fflush(stdout);
   }

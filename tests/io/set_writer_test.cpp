@@ -346,7 +346,7 @@ TEST(SetWriter, JpegIsForSourcesOnly) {
   EXPECT_NO_THROW(LoadSet(folder / "small.dtr", {.held_out = true}));
 }
 
-TEST(RewriteMetadata, ChangesTheVerdictAndNothingElse) {
+TEST(RewriteMetadata, ChangesTheValidationResultAndNothingElse) {
   const TemporaryFolder folder;
   const fs::path target = folder / "small.dtr";
   WriteSmallSet(target);

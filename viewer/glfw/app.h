@@ -153,7 +153,7 @@ struct AppReport {
 };
 
 /// Shows the set until the window is closed. Throws dtr::Error where no window can be opened, the
-/// display has no OpenGL 4.3 or the set cannot be opened at the start; later trouble is told in
+/// display has no OpenGL 4.3 or the set cannot be opened at the start; later errors are shown in
 /// the window. To be called on the program's first thread.
 AppReport RunViewer(const AppSettings& settings, const Host& host);
 

@@ -21,7 +21,7 @@ class FrameSchedule {
     kWhole,    ///< none but whole ones, however long they take
   };
 
-  /// `largest_divisor`: moving images are never smaller. `tell` is given each trouble once.
+  /// `largest_divisor`: moving images are never smaller. `tell` is given each error text once.
   FrameSchedule(FrameMaker& maker, int largest_divisor,
                 std::function<void(const std::string&)> tell);
 
