@@ -9,6 +9,7 @@
 #include "dtr/cpu/resolve.h"
 #include "dtr/cpu/setup.h"
 #include "dtr/render/adaptive_mesh.h"
+#include "dtr/render/exposure.h"
 #include "dtr/render/fill_holes.h"
 #include "dtr/render/frame.h"
 #include "dtr/render/valid_views.h"
@@ -86,6 +87,9 @@ RenderResult Render(const RenderScene& scene, const PinholeCamera& novel,
     for (size_t i = 0; i < views.size(); ++i) views[i].layer = &layers[i];
     ParallelFor(band.first_row, band.first_row + band.rows, options.threads,
                 [&](int y) { ResolveRow(setup.settings, views, y, result); });
+  }
+  if (const auto curve = CurveOf(FrameExposure(scene, selection, novel_from_world))) {
+    curve->Apply(result.image);
   }
   result.coverage_share = CoverageShare(result.coverage);
   if (options.fill_holes) FillHolesFromViews(scene, novel, novel_from_world, options, result);

@@ -140,7 +140,8 @@ const Program& Resolver::ProgramFor(const RenderFrame& frame, ProgramCache& prog
        define("DEPTH_ARRAYS", depth_arrays_.size()),
        define("BLEND", BlendNumber(frame.options.blend)),
        define("VIEWS_IN_UNIFORMS", BlocksFitUniforms(views)), define("PER_PIXEL", frame.per_pixel),
-       define("LINEAR_LIGHT", frame.options.blend_in_linear_light)});
+       define("LINEAR_LIGHT", frame.options.blend_in_linear_light),
+       define("EXPOSED", frame.exposure != Eigen::Vector3d::Ones())});
 }
 
 void Resolver::Draw(const RenderFrame& frame, const Band& band, const ViewStore& store,
@@ -160,6 +161,7 @@ void Resolver::Draw(const RenderFrame& frame, const Band& band, const ViewStore&
   set.Set("max_angle_rad", blend.max_angle_rad);
   set.Set("pixel_angle_rad", blend.pixel_angle_rad);
   set.Set("width_px", frame.novel.width_px());
+  if (frame.exposure != Eigen::Vector3d::Ones()) set.Set("exposure", frame.exposure);
   set.Set("layers", 0);
   glActiveTexture(GL_TEXTURE0);
   glBindTexture(GL_TEXTURE_2D_ARRAY, targets.layers.name());

@@ -5,6 +5,7 @@
 #include <tuple>
 
 #include "dtr/base/error.h"
+#include "dtr/render/exposure.h"
 
 namespace dtr {
 namespace {
@@ -67,7 +68,8 @@ std::vector<int> CanonicalOrder(const RenderScene& scene, std::vector<int> views
 RenderFrame MakeFrame(const RenderScene& scene, const PinholeCamera& novel,
                       const Pose& novel_from_world, const RenderOptions& options,
                       const ViewSelection& selection) {
-  RenderFrame frame{scene, novel, options, selection.per_pixel, {}, {}, {}};
+  RenderFrame frame{scene, novel, options, selection.per_pixel,
+                    {},    {},    {},      FrameExposure(scene, selection, novel_from_world)};
   for (const int index : CanonicalOrder(scene, selection.views)) {
     const View& view = *scene.views[static_cast<size_t>(index)];
     frame.views.push_back(&view);

@@ -46,8 +46,9 @@ struct RenderFrame {
   const RenderOptions& options;
   bool per_pixel = false;  ///< SPEC 1.3
   std::vector<const View*> views;
-  std::vector<ViewPlacement> placements;  ///< of the views
-  std::vector<double> cut_factors;        ///< SPEC 1.4, of the views
+  std::vector<ViewPlacement> placements;               ///< of the views
+  std::vector<double> cut_factors;                     ///< SPEC 1.4, of the views
+  Eigen::Vector3d exposure = Eigen::Vector3d::Ones();  ///< SPEC 4.9
 
   void Erase(size_t view) {
     const auto at = static_cast<std::ptrdiff_t>(view);

@@ -12,17 +12,11 @@
 #include "dtr/render/options.h"
 #include "dtr/render/scene.h"
 #include "dtr/types/camera.h"
+#include "dtr/render/exposure.h"
 #include "dtr/types/grid.h"
 #include "dtr/types/pose.h"
 
 namespace dtr {
-
-/// Linear light in [0, 1] in another exposure: times `exposure` (above 0) in the dark, bent so that
-/// white stays white, for what a photo clipped is as bright in any. Rising; 1 / exposure undoes it.
-inline double Exposed(double linear, double exposure) {
-  const auto fourth = [](double v) { return v * v * v * v; };
-  return exposure * linear / std::sqrt(std::sqrt(1 + (fourth(exposure) - 1) * fourth(linear)));
-}
 
 /// The views of one image, asked pixel by pixel. The views must outlive it.
 class GuessedColours {

@@ -5,6 +5,7 @@
 
 #include "dtr/base/parallel_for.h"
 #include "dtr/render/colour.h"
+#include "dtr/render/exposure.h"
 
 namespace dtr {
 namespace {
@@ -29,7 +30,7 @@ ShrunkPhoto Shrink(const View& view, int cell_px) {
       shrunk.usable(x, y) = 255;
       for (int c = 0; c < 3; ++c) {
         const double mean = static_cast<double>(sum[c]) / count / 255;
-        shrunk.light(x, y, c) = std::min(1.0, view.gain[c] * LinearFromSrgb(mean));
+        shrunk.light(x, y, c) = Exposed(LinearFromSrgb(mean), view.gain[c]);
       }
     }
   }

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "dtr/render/colour.h"
+#include "dtr/render/exposure.h"
 
 namespace dtr {
 namespace {
@@ -13,13 +14,13 @@ using Rgb = std::array<std::uint8_t, 3>;
 
 bool Usable(const View& view, int x, int y) { return view.mask.empty() || view.mask(x, y) != 0; }
 
-/// The pixel times the view's gain.
+/// The pixel in the exposure of the set's mean.
 Rgb Corrected(const View& view, int x, int y) {
   const std::uint8_t* photo = &view.image(x, y);
   Rgb rgb{photo[0], photo[1], photo[2]};
   for (size_t c = 0; c < 3; ++c) {
     const double gain = view.gain[static_cast<Eigen::Index>(c)];
-    if (gain != 1) rgb[c] = Srgb8FromLinear(gain * LinearFromSrgb8()[rgb[c]]);
+    if (gain != 1) rgb[c] = Srgb8FromLinear(Exposed(LinearFromSrgb8()[rgb[c]], gain));
   }
   return rgb;
 }
@@ -120,7 +121,7 @@ std::array<double, 256> LinearAfterGain(const View& view, int channel) {
   std::array<double, 256> linear = LinearFromSrgb8();
   const double gain = view.gain[channel];
   if (gain == 1) return linear;
-  for (double& light : linear) light = LinearFromSrgb8()[Srgb8FromLinear(gain * light)];
+  for (double& light : linear) light = LinearFromSrgb8()[Srgb8FromLinear(Exposed(light, gain))];
   return linear;
 }
 

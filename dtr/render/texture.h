@@ -37,12 +37,12 @@ Grid<std::uint8_t> RimFactors(const View& view);
 /// The same at image position `pixel`, at most 1: bilinear, clamped at the border.
 double RimFactorAt(const Grid<std::uint8_t>& factors, const Eigen::Vector2d& pixel);
 
-/// The view's image as renderers sample it, RGBA, row by row: the photo times the view's gain (in
-/// linear light, cut at white, rounded to 8 bits of sRGB) with RimFactors as alpha. A masked pixel
+/// The view's image as renderers sample it, RGBA, row by row: the photo exposed by the
+/// view's gain (Exposed, rounded to 8 bits of sRGB) with RimFactors as alpha. A masked pixel
 /// has the mean of the usable ones among its 8 neighbours, black where there is none.
 std::vector<std::uint8_t> SampledImage(const View& view);
 
-/// Linear light of each 8-bit value of a channel of the photo, times the view's gain, rounded as in
+/// Linear light of each 8-bit value of a channel of the photo, exposed and rounded as in
 /// SampledImage.
 std::array<double, 256> LinearAfterGain(const View& view, int channel);
 

@@ -7,6 +7,7 @@
 #include "dtr/base/parallel_for.h"
 #include "dtr/render/blend_weights.h"
 #include "dtr/render/colour.h"
+#include "dtr/render/exposure.h"
 
 namespace dtr::simd {
 namespace {
@@ -126,6 +127,7 @@ void Resolver::Draw(const RenderFrame& frame, const Band& band, const SampledVie
   marks_.resize(pixels);
   if (mapping) window_.resize(pixels);
   const std::vector<float> linear(LinearFromSrgb8().begin(), LinearFromSrgb8().end());
+  const std::optional<ExposureCurve> curve = CurveOf(frame.exposure);
   const PixelRow any_row = RowOf(frame, linear.data());
   // A thread's rows lie together: they read the same pixels of the views.
   const int pieces = (band.count + kRowsTogether - 1) / kRowsTogether;
@@ -139,9 +141,10 @@ void Resolver::Draw(const RenderFrame& frame, const Band& band, const SampledVie
       row.image = &image_[first], row.depth = &depth_[first], row.marks = &marks_[first];
       ResolvePixelRow(row, views);
     }
+    const size_t from = static_cast<size_t>(piece * kRowsTogether) * width;
+    const size_t count = static_cast<size_t>(end) * width - from;
+    if (curve) curve->Apply({&image_[from], count});
     if (mapping) {
-      const size_t from = static_cast<size_t>(piece * kRowsTogether) * width;
-      const size_t count = static_cast<size_t>(end) * width - from;
       MapToWindow(*mapping, {&depth_[from], count}, {}, {&window_[from], count});
     }
   });

@@ -56,7 +56,7 @@ struct View {
   int depth_scale = 1;            ///< s: the depth map is 1/s of the image per axis
   double near_z = 0, far_z = 0;   ///< range of the stored depth; 0 for held-out views
   double reference_baseline = 0;  ///< docs/FORMAT.md; the baseline of every figure in px
-  Eigen::Vector3d gain = Eigen::Vector3d::Ones();  ///< linear RGB factor towards the set's mean
+  Eigen::Vector3d gain = Eigen::Vector3d::Ones();  ///< exposure towards the set's mean (SPEC 4.4)
 
   std::optional<StoredFile> image_file, depth_file, sigma_file, mask_file, mesh_file;
   std::optional<StoredMesh> mesh;  ///< of mesh_file, for this very depth and mask; may be absent

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include "dtr/base/error.h"
+#include "dtr/render/colour.h"
+#include "dtr/render/exposure.h"
 #include "dtr/render/geometry.h"
 #include "tests/cpu/render_testing.h"
 
@@ -236,19 +238,52 @@ TEST(Render, DeltaDecidesWhatIsBlended) {
   EXPECT_EQ(render(0.99 * disparity).coverage.data(), render(50).coverage.data());
 }
 
-TEST(Render, GainIsAppliedInLinearLight) {
-  DtrSet set = SetOf({Photograph(Plane({0, 0, 1}, 10), Shot{})});
-  View& view = set.frames[0].views[0];
-  for (auto& value : view.image.data()) value = 100;
-  view.gain = {1, 2, 0.5};
-  for (const bool linear : {true, false}) {
-    RenderOptions options = OptionsOf(RenderMethod::kTwoPass);
-    options.blend_in_linear_light = linear;
-    const RenderResult result =
-        Render(MakeRenderScene(set), view.camera, view.cam_from_world, options);
-    EXPECT_EQ(result.image(40, 40, 0), 100);
-    EXPECT_EQ(result.image(40, 40, 1), 138);  // sRGB of twice 0.1274 linear
-    EXPECT_EQ(result.image(40, 40, 2), 71);
+// Two photos of one wall, the second exposed by (1, 2, 0.5) against the first, with the gains that
+// bring both to their mean.
+DtrSet TwoExposures() {
+  DtrSet set = SetOf({Photograph(Plane({0, 0, 1}, 10), Shot{}),
+                      Photograph(Plane({0, 0, 1}, 10), ShotFrom("w", {2, 0, 0}, {2, 0, 10}))});
+  const Eigen::Vector3d apart(1, 2, 0.5);
+  for (int k = 0; k < 2; ++k) {
+    View& view = set.frames[0].views[static_cast<size_t>(k)];
+    for (size_t i = 0; i < view.image.data().size(); ++i) {
+      const double exposure = k == 0 ? 1 : apart[static_cast<Eigen::Index>(i % 3)];
+      view.image.data()[i] = Srgb8FromLinear(Exposed(LinearFromSrgb8()[100], exposure));
+    }
+    view.gain = apart.array().pow(k == 0 ? 0.5 : -0.5);
+  }
+  return set;
+}
+
+TEST(Render, AtAnInputCameraTheImageIsExposedAsItsPhoto) {
+  const DtrSet set = TwoExposures();
+  for (const View& view : set.frames[0].views) {
+    for (const RenderMethod method : {RenderMethod::kTwoPass, RenderMethod::kDeferred}) {
+      for (const bool linear : {true, false}) {
+        RenderOptions options = OptionsOf(method);
+        options.blend_in_linear_light = linear;
+        const RenderResult result =
+            Render(MakeRenderScene(set), view.camera, view.cam_from_world, options);
+        for (int c = 0; c < 3; ++c) {
+          EXPECT_NEAR(result.image(40, 40, c), view.image(40, 40, c), 1) << view.id;
+        }
+      }
+    }
+  }
+}
+
+TEST(Render, BetweenTwoInputCamerasItIsExposedBetweenThem) {
+  const DtrSet set = TwoExposures();
+  const auto& views = set.frames[0].views;
+  Pose between = views[0].cam_from_world;
+  between.translation =
+      -(between.rotation * (0.5 * (views[0].CenterInWorld() + views[1].CenterInWorld())));
+  const RenderResult result =
+      Render(MakeRenderScene(set), views[0].camera, between, OptionsOf(RenderMethod::kTwoPass));
+  for (int c = 0; c < 3; ++c) {
+    const double exposure = std::sqrt(Eigen::Vector3d(1, 2, 0.5)[c]);
+    EXPECT_NEAR(result.image(40, 40, c), Srgb8FromLinear(Exposed(LinearFromSrgb8()[100], exposure)),
+                1);
   }
 }
 

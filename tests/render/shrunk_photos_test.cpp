@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "dtr/render/colour.h"
+#include "dtr/render/exposure.h"
 
 namespace dtr {
 namespace {
@@ -35,8 +36,8 @@ TEST(ShrunkPhotos, AverageUsablePixelsOfACellAndApplyTheGain) {
   ASSERT_EQ(photo.light.height(), 2);
   const double linear = LinearFromSrgb(100 / 255.0);
   EXPECT_DOUBLE_EQ(photo.light(0, 0, 0), linear);
-  EXPECT_DOUBLE_EQ(photo.light(0, 0, 1), 0.5 * linear);
-  EXPECT_EQ(photo.light(0, 0, 2), 1);
+  EXPECT_DOUBLE_EQ(photo.light(0, 0, 1), Exposed(linear, 0.5));
+  EXPECT_DOUBLE_EQ(photo.light(0, 0, 2), Exposed(linear, 100));
   EXPECT_NE(photo.usable(0, 0), 0);
   EXPECT_EQ(photo.usable(1, 0), 0);
   EXPECT_DOUBLE_EQ(photo.light(2, 1, 0), linear);

@@ -1,7 +1,7 @@
 // SPEC 4.2 to 4.8 and 6: how the views' nearest fragments are blended, pixel by pixel. One sum in
 // the views' canonical order and one division: nothing depends on the order they were drawn in.
 // Defines: MAX_VIEWS, IMAGE_ARRAYS, DEPTH_ARRAYS (0: two passes, else SPEC 5), BLEND, PER_PIXEL,
-// LINEAR_LIGHT, VIEWS_IN_UNIFORMS.
+// LINEAR_LIGHT, EXPOSED, VIEWS_IN_UNIFORMS.
 #if DEPTH_ARRAYS
 layout(std430, binding = 2) readonly buffer Depth { uint nearest[]; };  // SPEC 5.1
 uniform sampler2DArray depths[DEPTH_ARRAYS];
@@ -27,6 +27,16 @@ uniform int nearest_views;     // K, for the per-pixel rule
 uniform vec4 novel_camera;     // fx, fy, cx, cy, pixels
 uniform float first_row;       // of the band, pixels
 uniform float absolute_delta;  // the report's Delta, scene units; negative: none
+
+#if EXPOSED
+uniform vec3 exposure;
+
+// SPEC 4.9.
+vec3 Exposed(vec3 linear) {
+  vec3 e2 = exposure * exposure, v2 = linear * linear;
+  return exposure * linear / sqrt(sqrt(1.0 + (e2 * e2 - 1.0) * v2 * v2));
+}
+#endif
 
 layout(location = 0) out vec4 out_image;   // sRGB; alpha 1 where seen
 layout(location = 1) out float out_depth;  // plane z of the front surface
@@ -238,7 +248,12 @@ void main() {
     sum += FadedWeight(weight[i], factor, total) * vec4(colour.rgb, 1.0);
   }
   vec3 mean = sum.rgb / sum.a;
-#if LINEAR_LIGHT
+#if EXPOSED
+#if !LINEAR_LIGHT
+  mean = LinearFromSrgb(clamp(mean, 0.0, 1.0));
+#endif
+  mean = SrgbFromLinear(Exposed(clamp(mean, 0.0, 1.0)));
+#elif LINEAR_LIGHT
   mean = SrgbFromLinear(mean);
 #endif
   out_image = vec4(clamp(mean, 0.0, 1.0), 1.0);

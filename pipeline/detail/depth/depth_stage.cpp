@@ -16,6 +16,7 @@
 #include "dtr/io/depth_io.h"
 #include "pipeline/detail/depth/depth_engine.h"
 #include "pipeline/detail/depth/depth_precision.h"
+#include "pipeline/detail/depth/gains.h"
 #include "pipeline/detail/depth/plane_files.h"
 #include "pipeline/detail/depth/time_budget.h"
 #include "stereo/depth_maps.h"
@@ -237,6 +238,7 @@ stereo::QualitySettings DepthStage(DtrSet& set, const SparseScene& sparse,
           WriteDepth(view, std::move(estimate), set.unit, writer);
         });
   });
+  SetGains(set, scene, writer.folder(), options.threads, progress);
   for (const int index : sources.indices) normals.Deliver(views[static_cast<size_t>(index)]);
   if (const std::string codings = SayDepthCodings(views); !codings.empty()) progress.Note(codings);
   return quality;
