@@ -8,6 +8,7 @@
 #include <cmath>
 #include <optional>
 
+#include "dtr/base/order_statistics.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/render/colour.h"
 #include "dtr/render/exposure.h"
@@ -30,12 +31,6 @@ struct Pair {
   double weight;
   Eigen::Vector3d log_exposure;  ///< from what a shows to what b shows
 };
-
-double Median(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 std::optional<Pair> Compare(std::span<const SmallView> views, int a, int b) {
   const SmallView &from = views[static_cast<size_t>(a)], &to = views[static_cast<size_t>(b)];
@@ -64,7 +59,8 @@ std::optional<Pair> Compare(std::span<const SmallView> views, int a, int b) {
   }
   if (log_exposures[0].size() < kMinPixels) return std::nullopt;
   Pair pair{a, b, std::min(1.0, static_cast<double>(log_exposures[0].size()) / kFullPixels), {}};
-  for (int c = 0; c < 3; ++c) pair.log_exposure[c] = Median(log_exposures[static_cast<size_t>(c)]);
+  for (int c = 0; c < 3; ++c)
+    pair.log_exposure[c] = UpperMedian(log_exposures[static_cast<size_t>(c)]);
   return pair;
 }
 
