@@ -41,6 +41,11 @@ int StepsOf(const DepthFormat& format);
 /// Of the depth of a view in a set of that unit.
 DepthFormat FormatOf(const View& view, LengthUnit unit);
 
+/// Of its completed depth.
+DepthFormat CompletedFormatOf(const View& view);
+/// What names all depth of a view, completed depth included, in the file of its reduced mesh.
+std::string DepthHashOf(const View& view);
+
 /// "exr-float", "exr-half", "png16-mm", "png16-inverse", "zstd-inverse".
 const char* NameOf(DepthCoding coding);
 /// Inverse. Throws UsageError naming the known codings.

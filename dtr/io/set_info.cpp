@@ -28,7 +28,8 @@ namespace fs = std::filesystem;
 std::uint64_t BytesOf(const View& view) {
   std::uint64_t bytes = 0;
   for (const auto* file :
-       {&view.image_file, &view.mask_file, &view.depth_file, &view.sigma_file, &view.mesh_file}) {
+       {&view.image_file, &view.mask_file, &view.depth_file, &view.completed_file,
+        &view.sigma_file, &view.mesh_file}) {
     if (*file) bytes += (*file)->bytes;
   }
   return bytes;
@@ -52,6 +53,7 @@ Json ViewInfo(const View& view, size_t frame) {
                {"bytes", BytesOf(view)},
                {"has_mask", view.mask_file.has_value()},
                {"has_depth", view.depth_file.has_value()},
+               {"has_completed_depth", view.completed_file.has_value()},
                {"has_sigma", view.sigma_file.has_value()}};
   if (view.depth_file) {
     info["depth_coding"] = NameOf(view.depth_coding);

@@ -27,6 +27,9 @@ DtrSet ReadSet(const std::filesystem::path& set_folder);
 struct LoadOptions {
   bool images = true;  ///< images and masks
   bool depth = true;   ///< depth maps, and their reduced meshes where the set has them
+  /// With the depth maps the completed depths (View::depth_state), for what is drawn; without them
+  /// depth is what was measured.
+  bool completed = false;
   bool sigma = false;  ///< standard deviations of inverse depth, where a view has them
   bool held_out =
       false;  ///< false: held-out views are left out altogether, so no renderer sees one

@@ -147,6 +147,25 @@ Json DepthFrom(const JsonObject& object, View& view) {
   return object.Unknown();
 }
 
+// The same for the completed depth.
+Json CompletedFrom(const JsonObject& object, View& view) {
+  view.completed_file = StoredFileFromJson(object);
+  view.completed_steps = object.PositiveInt("steps");
+  if (view.completed_steps > InverseDepthCode::kSteps) object.Fail("steps", "1 to 65534");
+  view.completed_near_z = object.Positive("near_z");
+  view.completed_far_z = object.Positive("far_z");
+  if (!(view.completed_near_z < view.completed_far_z)) object.Fail("far_z", "more than near_z");
+  return object.Unknown();
+}
+
+Json CompletedToJson(const View& view) {
+  Json completed = JsonFromStoredFile(*view.completed_file);
+  completed["steps"] = view.completed_steps;
+  completed["near_z"] = view.completed_near_z;
+  completed["far_z"] = view.completed_far_z;
+  return completed;
+}
+
 Json DepthToJson(const View& view) {
   Json depth = JsonFromStoredFile(*view.depth_file);
   depth["coding"] = NameOf(view.depth_coding);
@@ -186,16 +205,24 @@ void FilesFrom(const JsonObject& object, View& view, Json& extra) {
     const JsonObject depth = object.Object("depth");
     Nest(extra, "depth", DepthFrom(depth, view));
   }
+  if (object.Has("completed_depth")) {
+    const JsonObject completed = object.Object("completed_depth");
+    Nest(extra, "completed_depth", CompletedFrom(completed, view));
+  }
   if (view.role == ViewRole::kHeldOut && (view.depth_file || view.sigma_file)) {
     object.Fail(view.depth_file ? "depth" : "sigma", "no depth in a held-out view");
   }
   if (view.sigma_file && !view.depth_file) object.Fail("sigma", "a sigma only beside a depth");
   if (view.mesh_file && !view.depth_file) object.Fail("mesh", "a mesh only beside a depth");
+  if (view.completed_file && !view.depth_file) {
+    object.Fail("completed_depth", "completed depth only beside a depth");
+  }
   ExpectFolder(object, view, view.image_file, "image");
   ExpectFolder(object, view, view.mask_file, "mask");
   ExpectFolder(object, view, view.depth_file, "depth");
   ExpectFolder(object, view, view.sigma_file, "sigma");
   ExpectFolder(object, view, view.mesh_file, "mesh");
+  ExpectFolder(object, view, view.completed_file, "completed_depth");
 }
 
 View ViewFrom(const JsonObject& object) {
@@ -248,12 +275,13 @@ Json ToJson(const View& view, Hashes hashes) {
   if (view.image_file) object["image"] = entry(*view.image_file);
   if (view.mask_file) object["mask"] = entry(*view.mask_file);
   if (view.depth_file) object["depth"] = DepthToJson(view);
+  if (view.completed_file) object["completed_depth"] = CompletedToJson(view);
   if (view.sigma_file) object["sigma"] = entry(*view.sigma_file);
   if (view.mesh_file) object["mesh"] = entry(*view.mesh_file);
   object["reference_baseline"] = view.reference_baseline;
   object["gain_linear_rgb"] = NumbersToJson(view.gain);
   Restore(object, view.extra_json,
-          {"camera", "cam_from_world", "image", "mask", "depth", "sigma", "mesh"});
+          {"camera", "cam_from_world", "image", "mask", "depth", "completed_depth", "sigma", "mesh"});
   return object;
 }
 
@@ -405,6 +433,7 @@ std::vector<NamedFile> FilesOf(const DtrSet& set) {
       add(view.image_file, field + "image");
       add(view.mask_file, field + "mask");
       add(view.depth_file, field + "depth");
+      add(view.completed_file, field + "completed_depth");
       add(view.sigma_file, field + "sigma");
       add(view.mesh_file, field + "mesh", true);
     }

@@ -59,7 +59,7 @@ std::optional<StoredMesh> UsableMesh(const fs::path& set_folder, const View& vie
     }
     StoredMesh mesh = ReadMesh(file);
     const std::string mask = view.mask_file ? view.mask_file->sha256 : "";
-    if (mesh.depth_sha256 == view.depth_file->sha256 && mesh.mask_sha256 == mask) return mesh;
+    if (mesh.depth_sha256 == DepthHashOf(view) && mesh.mask_sha256 == mask) return mesh;
     problem = file.string() +
               ": expected a reduced mesh of this depth map and mask, found one of "
               "others";
@@ -81,11 +81,33 @@ bool AreDuplicates(const View& a, const View& b) {
       (!a.depth_file ||
        (a.depth_coding == b.depth_coding && a.depth_steps == b.depth_steps &&
         a.depth_scale == b.depth_scale && a.near_z == b.near_z && a.far_z == b.far_z));
+  const bool same_completed =
+      same(a.completed_file, b.completed_file) && a.completed_steps == b.completed_steps &&
+      a.completed_near_z == b.completed_near_z && a.completed_far_z == b.completed_far_z;
   return a.image_file && a.role == b.role && a.camera == b.camera &&
          a.cam_from_world.rotation.coeffs() == b.cam_from_world.rotation.coeffs() &&
          a.cam_from_world.translation == b.cam_from_world.translation &&
          same(a.image_file, b.image_file) && same(a.mask_file, b.mask_file) && same_depth &&
-         same(a.sigma_file, b.sigma_file);
+         same(a.sigma_file, b.sigma_file) && same_completed;
+}
+
+/// Puts the completed depths of the view into the holes of its measured ones.
+void AddCompleted(const fs::path& set_folder, View& view) {
+  const fs::path file = set_folder / view.completed_file->path;
+  const DepthImage completed =
+      ReadDepth(file, CompletedFormatOf(view), view.depth.width(), view.depth.height());
+  view.depth_state = Grid<DepthState>(view.depth.width(), view.depth.height());
+  const auto far = static_cast<float>(view.completed_far_z);
+  for (size_t p = 0; p < view.depth_state.data().size(); ++p) {
+    const float z = completed.grid().data()[p];
+    if (DepthImage::IsHole(z)) continue;
+    if (!DepthImage::IsHole(view.depth.grid().data()[p])) {
+      throw Error(file.string() + ": expected no depth where " + view.depth_file->path +
+                  " has some");
+    }
+    view.depth.grid().data()[p] = z;
+    view.depth_state.data()[p] = z < far ? DepthState::kCompleted : DepthState::kFar;
+  }
 }
 
 // "photos/IMG 1.JPG" -> "photos_IMG_1"
@@ -134,8 +156,13 @@ void LoadPixels(const fs::path& set_folder, View& view, const LoadOptions& optio
     view.depth =
         ReadDepth(set_folder / view.depth_file->path, format, depth_width_px, depth_height_px);
   }
+  const bool completes = options.depth && options.completed && view.completed_file;
+  view.depth_state = {};
+  if (completes) AddCompleted(set_folder, view);
   view.mesh.reset();
-  if (options.depth && view.mesh_file && view.depth_file) {
+  // A stored mesh is of all the depth that there is.
+  if (options.depth && view.mesh_file && view.depth_file &&
+      completes == view.completed_file.has_value()) {
     view.mesh = UsableMesh(set_folder, view, options);
   }
   if (options.sigma && view.sigma_file) {

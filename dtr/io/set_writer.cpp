@@ -26,7 +26,8 @@ constexpr char kLock[] = "work/lock";
 constexpr char kSparseFile[] = "sparse.bin";
 constexpr char kReportFolder[] = "report";
 constexpr std::uintmax_t kRecordLimitBytes = 1 << 24;
-constexpr const char* kPixelFolders[] = {"images", "mask", "depth", "sigma", "mesh", "held_out"};
+constexpr const char* kPixelFolders[] = {"images", "mask",  "depth",   "completed",
+                                         "sigma",  "mesh", "held_out"};
 
 // "a/b.dtr/" and "a/b.dtr" are one folder.
 fs::path WithoutSlash(const fs::path& target) {
@@ -341,7 +342,8 @@ void SetWriter::WriteJpeg(View& view, int quality) {
 
 void SetWriter::CopyFiles(const fs::path& set_folder, const View& view) {
   for (const auto* file :
-       {&view.image_file, &view.mask_file, &view.depth_file, &view.sigma_file, &view.mesh_file}) {
+       {&view.image_file, &view.mask_file, &view.depth_file, &view.completed_file,
+        &view.sigma_file, &view.mesh_file}) {
     if (!*file) continue;
     const StoredFile copied = AsError([&] {
       return state_->Store((*file)->path, [&](const fs::path& target) {
@@ -375,7 +377,8 @@ bool SetWriter::State::RestoreView(View& view) const {
       stored.cam_from_world.translation == view.cam_from_world.translation;
   if (!same_view) return false;
   for (const auto* file :
-       {&stored.image_file, &stored.mask_file, &stored.depth_file, &stored.sigma_file}) {
+       {&stored.image_file, &stored.mask_file, &stored.depth_file, &stored.completed_file,
+        &stored.sigma_file}) {
     if (!*file) continue;
     const fs::path full = partial / (*file)->path;
     if (!fs::is_regular_file(full) || Sha256OfFile(full) != (*file)->sha256) return false;
@@ -383,6 +386,10 @@ bool SetWriter::State::RestoreView(View& view) const {
   view.image_file = stored.image_file;
   view.mask_file = stored.mask_file;
   view.depth_file = stored.depth_file;
+  view.completed_file = stored.completed_file;
+  view.completed_steps = stored.completed_steps;
+  view.completed_near_z = stored.completed_near_z;
+  view.completed_far_z = stored.completed_far_z;
   view.sigma_file = stored.sigma_file;
   view.depth_coding = stored.depth_coding;
   view.depth_steps = stored.depth_steps;
@@ -399,7 +406,7 @@ void SetWriter::WriteMesh(View& view, StoredMesh mesh) {
   if (!view.depth_file || !IsSafeId(view.id)) {
     throw Error("view '" + view.name + "': expected stored depth before its mesh");
   }
-  mesh.depth_sha256 = view.depth_file->sha256;
+  mesh.depth_sha256 = DepthHashOf(view);
   mesh.mask_sha256 = view.mask_file ? view.mask_file->sha256 : "";
   view.mesh_file = state_->Store("mesh/" + view.id + ".bin",
                                  [&](const fs::path& file) { dtr::io::WriteMesh(file, mesh); });

@@ -29,6 +29,13 @@ enum class DepthCoding {
   kZstdInverseDepth,   ///< "zstd-inverse": the same in `depth_steps` steps, our own compression
 };
 
+/// What a pixel of View::depth is.
+enum class DepthState : std::uint8_t {
+  kMeasured = 0,   ///< found by stereo or given; also a hole
+  kCompleted = 1,  ///< nothing was measured here: a surface as the views around have it
+  kFar = 2,        ///< completed, without parallax: sky; drawn at View::completed_far_z
+};
+
 /// A file of the set: path relative to the set's folder, content hash (hex SHA-256), size.
 struct StoredFile {
   std::string path;
@@ -49,16 +56,21 @@ struct View {
   ImageRgb8 image;                                 ///< 8-bit sRGB, size of `camera`
   Mask mask;                                       ///< empty: every pixel is usable
   DepthImage depth;                                ///< plane z; size of `camera` / depth_scale
+  /// Of each depth pixel, where completed depths are loaded with the measured ones; else empty.
+  Grid<DepthState> depth_state;
   std::optional<Grid<float>> inverse_depth_sigma;  ///< std. deviation of 1/z, grid of `depth`
 
   DepthCoding depth_coding = DepthCoding::kPng16InverseDepth;
   int depth_steps = 0;            ///< of kZstdInverseDepth, 1...65534; 0 with other codings
   int depth_scale = 1;            ///< s: the depth map is 1/s of the image per axis
   double near_z = 0, far_z = 0;   ///< range of the stored depth; 0 for held-out views
+  int completed_steps = 0;        ///< as depth_steps, of the completed depth (docs/FORMAT.md, 4.2)
+  double completed_near_z = 0, completed_far_z = 0;  ///< its range; 0 where there is none
   double reference_baseline = 0;  ///< docs/FORMAT.md; the baseline of every figure in px
   Eigen::Vector3d gain = Eigen::Vector3d::Ones();  ///< exposure towards the set's mean (SPEC 4.4)
 
-  std::optional<StoredFile> image_file, depth_file, sigma_file, mask_file, mesh_file;
+  std::optional<StoredFile> image_file, depth_file, sigma_file, mask_file, mesh_file,
+      completed_file;
   std::optional<StoredMesh> mesh;  ///< of mesh_file, for this very depth and mask; may be absent
   std::string extra_json;          ///< fields this version does not know, kept verbatim ("" = none)
 

@@ -1,0 +1,48 @@
+// stereo/complete/cells.h -- a view in little: what completion asks of it.
+#pragma once
+#include <Eigen/Core>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "dtr/types/camera.h"
+#include "dtr/types/grid.h"
+#include "dtr/types/pose.h"
+#include "dtr/types/view.h"
+
+namespace dtr::stereo {
+
+/// A plane before a camera: n . p = 1 for its points p in the camera's frame, so that the inverse
+/// depth along a ray (z = 1) is n . ray. Zero is the plane at infinity. Units of 1 / scene unit.
+using ViewPlane = Eigen::Vector3f;
+
+/// A view averaged over square cells of its photo. Grids have shape (rows, columns) of cells.
+struct CellView {
+  PinholeCamera camera{1, 1, 1, 1, 0, 0};  ///< of the grids: a pixel is a cell
+  Pose cam_from_world;
+  Grid<float> colour;         ///< R, G, B, sRGB levels in the mean exposure of the set
+  Mask usable;                ///< 0 where a cell is masked altogether
+  Grid<float> inverse_depth;  ///< median of the measured depths; 0 where less than half has any
+  Grid<float> planes;         ///< ViewPlane of measured cells, 3 channels
+  Grid<std::uint8_t> shared;  ///< 255 where measured, but the cell has holes as well
+  float pixel = 0;            ///< difference of inverse depth that is one cell of disparity
+
+  ViewPlane PlaneAt(int x, int y) const {
+    return {planes(x, y, 0), planes(x, y, 1), planes(x, y, 2)};
+  }
+  Eigen::Vector3f RayAt(float x, float y) const {
+    return {(x - static_cast<float>(camera.cx_px())) / static_cast<float>(camera.fx_px()),
+            (y - static_cast<float>(camera.cy_px())) / static_cast<float>(camera.fy_px()), 1};
+  }
+};
+
+/// Photo pixels per cell: the longer side has at most 340 cells.
+int CellSizeOf(const PinholeCamera& camera);
+
+/// Of a loaded view (image, mask, depth). `cell_px`: CellSizeOf(view.camera).
+CellView MakeCells(const View& view, int cell_px);
+
+/// The same plane before another camera; empty where that camera's centre lies on it.
+std::optional<ViewPlane> PlaneInOther(const ViewPlane& plane, const Pose& other_from_view);
+
+}  // namespace dtr::stereo
