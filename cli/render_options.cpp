@@ -79,13 +79,19 @@ void UseStoredOptions(const CLI::App& command, const DtrSet& set, RenderOptions&
   options = WithStoredOptions(options, json, where, by_user);
 }
 
-RenderOptions StoredRenderOptions(const DtrSet& set) {
+RenderOptions StoredRenderOptions(const DtrSet& set, const RenderOptions& defaults) {
   const auto [json, where] = io::RenderOptionsOf(set);
-  return WithStoredOptions({}, json, where);
+  return WithStoredOptions(defaults, json, where);
 }
 
-std::shared_ptr<RenderOptions> AddRenderOptions(CLI::App& command) {
-  auto shared = std::make_shared<RenderOptions>();
+RenderOptions WholeFrames() {
+  RenderOptions options;
+  options.fill_holes = true;
+  return options;
+}
+
+std::shared_ptr<RenderOptions> AddRenderOptions(CLI::App& command, const RenderOptions& defaults) {
+  auto shared = std::make_shared<RenderOptions>(defaults);
   RenderOptions& options = *shared;
   AddChoice(command, "--method", options.method, kMethods,
             "Algorithm [deferred; with --primitive splat two-pass]");
@@ -150,7 +156,10 @@ std::shared_ptr<RenderOptions> AddRenderOptions(CLI::App& command) {
       "--blend-srgb", [&options] { options.blend_in_linear_light = false; },
       "Blend sRGB values, the default");
   command.add_flag("--fill-holes", options.fill_holes,
-                   "Fill pixels that no view sees from the background");
+                   defaults.fill_holes
+                       ? "Fill pixels that no view sees, the default; --fill-holes=false leaves "
+                         "them black"
+                       : "Fill pixels that no view sees from the background");
   return shared;
 }
 

@@ -10,13 +10,17 @@ namespace dtr::cli {
 
 /// Declares the rendering options on `command`; the returned value holds them after parsing.
 /// Angles are given in degrees and arrive in radians.
-std::shared_ptr<RenderOptions> AddRenderOptions(CLI::App& command);
+std::shared_ptr<RenderOptions> AddRenderOptions(CLI::App& command,
+                                                const RenderOptions& defaults = {});
 
 /// Gives `options`, the parsed ones of `command`, those that the set was pruned for and its user
 /// did not give: they are the set's defaults. Throws Error for what is no option of rendering.
 void UseStoredOptions(const CLI::App& command, const DtrSet& set, RenderOptions& options);
 
 /// The set's own defaults: what it was pruned for, else the library's. Throws as above.
-RenderOptions StoredRenderOptions(const DtrSet& set);
+RenderOptions StoredRenderOptions(const DtrSet& set, const RenderOptions& defaults = {});
+
+/// The defaults of what people look at: holes are filled.
+RenderOptions WholeFrames();
 
 }  // namespace dtr::cli

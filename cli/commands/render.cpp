@@ -113,7 +113,7 @@ void AddRenderCommand(CLI::App& app) {
             .add_option("--coverage-out", options->request.coverage_out,
                         "Write what was seen as PNG")
             ->type_name("FILE");
-        options->render = AddRenderOptions(command);
+        options->render = AddRenderOptions(command, WholeFrames());
         return [options, &command](const Context& context) {
           UseStoredOptions(command, io::ReadSet(options->request.set), *options->render);
           return RunRender(*options, context);

@@ -50,7 +50,7 @@ struct Options {
 std::unique_ptr<viewer::OpenedSet> Open(const Options& options, const Context& context) {
   auto opened = std::make_unique<viewer::OpenedSet>();
   opened->set = io::ReadSet(options.set);
-  opened->defaults = StoredRenderOptions(opened->set);
+  opened->defaults = StoredRenderOptions(opened->set, WholeFrames());
   io::CollapseDuplicates(opened->set);
   opened->stream = pipeline::StreamOf(options.set, opened->set, DescribeFrames(opened->set, {}),
                                       {options.memory_gb, context.common.threads}, context.console);
@@ -149,7 +149,7 @@ Json StateJson(const viewer::AppState& state) {
           {"playing_time", state.playing_time},
           {"controls", ControlsJson(state.controls)},
           {"message", state.message},
-          {"render_options", RenderOptionArguments(state.render)}};
+          {"render_options", RenderOptionArguments(state.render, WholeFrames())}};
 }
 
 Json TimesJson(const viewer::FrameTimes& times) {
@@ -405,7 +405,7 @@ void AddViewCommand(CLI::App& app) {
         AddWindowRendererOptions(command, options->renderer);
         AddMemoryOption(command, options->memory_gb,
                         "Memory for the views' pixels; others are dropped and read again [4]");
-        options->render = AddRenderOptions(command);
+        options->render = AddRenderOptions(command, WholeFrames());
         return [options, &command](const Context& context) {
           UseStoredOptions(command, io::ReadSet(options->set), *options->render);
           return RunView(*options, context);

@@ -24,8 +24,14 @@ double OnGrid(double position) {
 /// How the views vote on a surface; shares of their weights.
 struct Votes {
   double support = 0, against = 0;
-  double front = 0;   ///< 1/z of the nearest whole patch of those that support it; 0: none
-  double behind = 0;  ///< 1/z of the nearest surface that a view sees through it; 0: none
+  double front = 0;        ///< 1/z of the nearest whole patch of those that support it; 0: none
+  double behind = 0;       ///< 1/z of the nearest surface that a view sees through it; 0: none
+  double total = 0;        ///< of the weights of all who see anything there, or a hole
+  double heaviest = 0;     ///< of these weights
+  double of_heaviest = 0;  ///< 1/z of that view's own surface; 0: none
+
+  /// SPEC 5.2.
+  bool OneDecides() const { return of_heaviest > 0 && heaviest > kDecidingShare * total; }
 };
 
 /// The view's surface around a position of its grid: w = inverse_depth at the position, slopes per
@@ -63,9 +69,12 @@ class OwnFragmentFinder {
     if (!position) return;
     const double vote = VoteWeight(ray, start, pixel_angle_rad);
     const Patch patch = PatchAt(*position);
+    if (patch.masked) return;
     const double seen = Meet(base, *position, patch);
+    votes.total += vote;
+    if (vote > votes.heaviest) votes.heaviest = vote, votes.of_heaviest = seen;
     if (!(seen > 0)) {
-      if (!patch.masked) votes.against += kHoleVote * vote;
+      votes.against += kHoleVote * vote;
     } else if (seen - start < -kBehindPx * thresholds_.pixel) {
       votes.against += vote;
       votes.behind = std::max(votes.behind, seen);
@@ -186,6 +195,7 @@ void KeepSupportedSurfaces(std::span<const ViewInNovel> views, const PinholeCame
     for (int tried = 0; tried < kMaxSurfaces && surface > 0; ++tried) {
       Votes votes;
       for (const auto& finder : finders) finder.Vote(ray, surface, pixel_angle_rad, votes);
+      if (votes.OneDecides()) return votes.of_heaviest;
       if (votes.support >= votes.against) return votes.front > 0 ? votes.front : surface;
       surface = votes.behind;
     }

@@ -130,7 +130,7 @@ class RowResolver {
   double FactorOf(const Fragment& f) const {
     const double cut =
         settings_.per_pixel_rule ? CutFactor(f.angle_rad, cut_rad_) : f.view->cut_factor;
-    return cut * RimFactorAt(f.view->rim_factors, f.source_pixel);
+    return cut * f.view->fading.Of(RimFactorAt(f.view->rim_factors, f.source_pixel));
   }
 
   /// SPEC 4.5 to 4.8: weights, one sum, one division.

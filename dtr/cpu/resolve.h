@@ -5,6 +5,7 @@
 #include "dtr/cpu/layer.h"
 #include "dtr/render/blend_weights.h"
 #include "dtr/render/result.h"
+#include "dtr/render/texture.h"
 
 namespace dtr::cpu {
 
@@ -17,6 +18,7 @@ struct ResolveView {
   double delta_inverse_depth = 0;  ///< Delta of this view as a difference of 1/z
   double cut_factor = 1;           ///< SPEC 1.4
   Grid<std::uint8_t> rim_factors;  ///< SPEC 4.8
+  Fading fading;                   ///< SPEC 4.8
 };
 
 /// What it needs to know about the image.

@@ -44,6 +44,8 @@ Setup MakeSetup(const RenderScene& scene, const ViewSelection& selection,
     view.view_from_novel_translation = -(placed.rotation.transpose() * placed.translation);
     view.delta_inverse_depth = ThresholdsOf(*placed.view, options).delta;
     view.rim_factors = RimFactors(*placed.view);
+    view.fading =
+        FadingOf(*placed.view, CornersMovedPx(*placed.view, novel, novel_from_world, scene.center));
   });
   SetCutFactors(selection, setup.order, setup.views);
   ResolveSettings& settings = setup.settings;

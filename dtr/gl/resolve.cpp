@@ -11,7 +11,7 @@ namespace {
 
 #include "dtr/gl/shaders/view_block.glsl"
 
-static_assert(sizeof(ViewBlock) == 10 * 16, "std430: ten vec4");
+static_assert(sizeof(ViewBlock) == 11 * 16, "std430: eleven vec4");
 
 // Unit 0 has the layers; the arrays of images and depths follow.
 constexpr int kMaxImageArrays = StateGuard::kTextureUnits - 1;
@@ -51,7 +51,9 @@ ViewBlock BlockOf(const View& view, const ViewPlacement& placed, double cut_fact
                       static_cast<double>(view.image.height()), thresholds.delta},
                      0);
   block.stored_depth = {0, static_cast<float>(1 / placed.near_z),
-                        static_cast<float>(thresholds.pixel), static_cast<float>(cut_factor)};
+                        static_cast<float>(thresholds.pixel), 0};
+  block.fading = {static_cast<float>(cut_factor), static_cast<float>(placed.fading.gain),
+                  static_cast<float>(placed.fading.offset), 0};
   return block;
 }
 

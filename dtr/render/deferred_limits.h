@@ -12,6 +12,8 @@ const float kBehindPx = 2.0f;
 const float kFragmentBeforePx = 0.5f;
 // SPEC 5.2: the vote of a hole against a surface; a depth behind the surface votes with 1.
 const float kHoleVote = 0.25f;
+// SPEC 5.2: a view with more than this share of all votes' weight decides alone.
+const float kDecidingShare = 0.9f;
 // SPEC 5.2: surfaces of a pixel that are voted on, at most.
 const int kMaxSurfaces = 3;
 // SPEC 6.2: renderers that agree on depth to single precision may differ on fragments this near to

@@ -1,6 +1,7 @@
 #include "dtr/render/frame.h"
 
 #include <algorithm>
+#include <limits>
 #include <string>
 #include <tuple>
 
@@ -56,6 +57,24 @@ ViewPlacement PlaceView(const View& view, const Pose& novel_from_world) {
   return placed;
 }
 
+double CornersMovedPx(const View& view, const PinholeCamera& novel, const Pose& novel_from_world,
+                      const Eigen::Vector3d& scene_center) {
+  const ViewPlacement placed = PlaceView(view, novel_from_world);
+  const double depth = (scene_center - novel_from_world.TargetOriginInSource()).norm();
+  double moved_px = 0;
+  for (const int corner : {0, 1, 2, 3}) {
+    const auto corner_of = [&](const PinholeCamera& camera) {
+      return Eigen::Vector2d(corner % 2 * camera.width_px(), corner / 2 * camera.height_px());
+    };
+    const Eigen::Vector3d p_in_novel = depth * novel.RayFromPixel(corner_of(novel));
+    const auto seen_at =
+        view.camera.PixelFromCam(placed.rotation.transpose() * (p_in_novel - placed.translation));
+    if (!seen_at) return std::numeric_limits<double>::infinity();
+    moved_px = std::max(moved_px, (*seen_at - corner_of(view.camera)).norm());
+  }
+  return moved_px;
+}
+
 std::vector<int> CanonicalOrder(const RenderScene& scene, std::vector<int> views) {
   std::sort(views.begin(), views.end(), [&](int a, int b) {
     const std::string &id_a = scene.views[static_cast<size_t>(a)]->id,
@@ -74,6 +93,8 @@ RenderFrame MakeFrame(const RenderScene& scene, const PinholeCamera& novel,
     const View& view = *scene.views[static_cast<size_t>(index)];
     frame.views.push_back(&view);
     frame.placements.push_back(PlaceView(view, novel_from_world));
+    frame.placements.back().fading =
+        FadingOf(view, CornersMovedPx(view, novel, novel_from_world, scene.center));
     frame.cut_factors.push_back(1);
   }
   return frame;

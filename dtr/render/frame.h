@@ -8,6 +8,7 @@
 #include "dtr/render/options.h"
 #include "dtr/render/result.h"
 #include "dtr/render/scene.h"
+#include "dtr/render/texture.h"
 #include "dtr/render/valid_views.h"
 #include "dtr/types/camera.h"
 #include "dtr/types/pose.h"
@@ -29,11 +30,18 @@ struct ViewPlacement {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< novel_from_view
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();   ///< also the view's centre in novel
   double near_z = 0;  ///< triangles are cut here, SPEC 2.5; scene units
+  Fading fading;      ///< SPEC 4.8; MakeFrame sets it
 };
 
 /// SPEC 0.5: from the difference of the centres, so that the world's offset cancels before anything
 /// is multiplied.
 ViewPlacement PlaceView(const View& view, const Pose& novel_from_world);
+
+/// SPEC 4.8: how far the rendered image is from the view's own: the largest distance, in pixels of
+/// its photo, between a corner of the image as the view sees it at the depth of the scene centre
+/// and the same corner of the photo. Infinite where one is not in front of the view.
+double CornersMovedPx(const View& view, const PinholeCamera& novel, const Pose& novel_from_world,
+                      const Eigen::Vector3d& scene_center);
 
 /// SPEC 4.7: `views`, indices into the scene, in the order in which sums run: that of the ids.
 std::vector<int> CanonicalOrder(const RenderScene& scene, std::vector<int> views);

@@ -15,7 +15,8 @@ namespace {
 constexpr double kExposureSamples = 20000, kNearWhite = 0.85, kMaxExposure = 2,
                  kExposureNoise = 0.01;
 constexpr int kMinExposed = 200;
-constexpr double kRimShare = 0.05;  // of the shorter side
+constexpr double kRimShare = 0.05;   // of the shorter side
+constexpr double kMinFadePx = 1e-6;  // at a view's own place: no pixel's centre is as near
 
 Eigen::Matrix3d CalibrationOf(const PinholeCamera& camera) {
   Eigen::Matrix3d k;
@@ -27,6 +28,12 @@ Eigen::Matrix3d CalibrationOf(const PinholeCamera& camera) {
 float DepthAt(const View& view, int x, int y) {
   if (view.depth_scale == 1) return view.depth(x, y);
   return view.depth(x / view.depth_scale, y / view.depth_scale);
+}
+
+/// SPEC 7.4, and 4.8 near the view's own place.
+double FadeWidth(const View& view, double moved_px) {
+  const int side = std::min(view.camera.width_px(), view.camera.height_px());
+  return std::clamp(kFadePerMoved * moved_px, kMinFadePx, kRimShare * side);
 }
 
 bool Usable(const View& view, const BilinearTaps& taps, size_t tap) {
@@ -87,9 +94,10 @@ GuessedColours::GuessedColours(const RenderScene& scene, const std::vector<int>&
     const ViewPlacement placed = PlaceView(view, novel_from_world);
     const Eigen::Matrix3d pixel_from_novel =
         CalibrationOf(view.camera) * placed.rotation.transpose();
-    views_.push_back({&view, pixel_from_novel * ray_from_pixel,
-                      -(pixel_from_novel * placed.translation), placed.translation,
-                      ThresholdsOf(view, options).delta});
+    views_.push_back(
+        {&view, pixel_from_novel * ray_from_pixel, -(pixel_from_novel * placed.translation),
+         placed.translation, ThresholdsOf(view, options).delta,
+         FadeWidth(view, CornersMovedPx(view, novel, novel_from_world, scene.center))});
     for (int c = 0; c < 3; ++c) {
       views_.back().linear[static_cast<size_t>(c)] = LinearAfterGain(view, c);
     }
@@ -145,7 +153,7 @@ GuessedColours::Row::Row(const GuessedColours& guesses, int y)
     asked.width_px = view.camera.width_px(), asked.height_px = view.camera.height_px();
     asked.depth = view.depth.grid().data().data();
     asked.depth_columns = view.depth.grid().width(), asked.depth_scale = view.depth_scale;
-    asked.fade_width_px = kRimShare * std::min(asked.width_px, asked.height_px);
+    asked.fade_width_px = placed.fade_width_px;
     views_.push_back(asked);
   }
   answers_.views.resize(views_.size());

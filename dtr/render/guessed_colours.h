@@ -8,11 +8,11 @@
 #include <vector>
 
 #include "dtr/render/blend_weights.h"
+#include "dtr/render/exposure.h"
 #include "dtr/render/guess_kernel.h"
 #include "dtr/render/options.h"
 #include "dtr/render/scene.h"
 #include "dtr/types/camera.h"
-#include "dtr/render/exposure.h"
 #include "dtr/types/grid.h"
 #include "dtr/types/pose.h"
 
@@ -33,6 +33,7 @@ class GuessedColours {
     Eigen::Vector3d pixel_per_inverse_depth;  ///< infinity, and what 1/z adds to it
     Eigen::Vector3d center_in_novel;
     double delta_inverse_depth;
+    double fade_width_px;                                ///< SPEC 7.4
     Eigen::Vector3d exposure = Eigen::Vector3d::Ones();  ///< as Exposed takes it
     std::array<std::array<double, 256>, 3> linear{};     ///< of the photo's values: LinearAfterGain
   };

@@ -50,7 +50,7 @@ constexpr double kTextureRimShare = 1.0 / 48;
 constexpr int kMinRimPx = 8;
 
 int RimWidth(const View& view) {
-  const int side = std::max(view.image.width(), view.image.height());
+  const int side = std::max(view.camera.width_px(), view.camera.height_px());
   return std::max(kMinRimPx, static_cast<int>(kTextureRimShare * side));
 }
 
@@ -100,6 +100,12 @@ double RimFactorAt(const Grid<std::uint8_t>& factors, const Eigen::Vector2d& pix
     sum += taps.weights[tap] * factors(taps.columns[tap], taps.rows[tap]);
   }
   return std::max(sum, 1.0) / 255;
+}
+
+Fading FadingOf(const View& view, double moved_px) {
+  const double width = RimWidth(view);
+  const double gain = std::clamp(width / (kFadePerMoved * moved_px), 1.0, width + 1);
+  return {gain, (gain - 1) / width};
 }
 
 std::vector<std::uint8_t> SampledImage(const View& view) {

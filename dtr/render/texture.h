@@ -37,6 +37,18 @@ Grid<std::uint8_t> RimFactors(const View& view);
 /// The same at image position `pixel`, at most 1: bilinear, clamped at the border.
 double RimFactorAt(const Grid<std::uint8_t>& factors, const Eigen::Vector2d& pixel);
 
+/// SPEC 4.8: fading borders are at most this many times as wide as CornersMovedPx.
+inline constexpr double kFadePerMoved = 4;
+
+/// SPEC 4.8: how a view's rim factors become those of one image.
+struct Fading {
+  double gain = 1, offset = 0;
+  double Of(double rim_factor) const { return std::min(1.0, gain * rim_factor + offset); }
+};
+
+/// Of an image that is so far from the view's own (CornersMovedPx).
+Fading FadingOf(const View& view, double moved_px);
+
 /// The view's image as renderers sample it, RGBA, row by row: the photo exposed by the
 /// view's gain (Exposed, rounded to 8 bits of sRGB) with RimFactors as alpha. A masked pixel
 /// has the mean of the usable ones among its 8 neighbours, black where there is none.

@@ -26,13 +26,29 @@ namespace dtr::simd::HWY_NAMESPACE {
 /// SPEC 5.2: how the views vote on a surface.
 struct Votes {
   VF support, against;
-  VF front;   ///< 1/z of the nearest whole patch of those that support it; 0: none
-  VF behind;  ///< 1/z of the nearest surface that a view sees through it; 0: none
+  VF front;            ///< 1/z of the nearest whole patch of those that support it; 0: none
+  VF behind;           ///< 1/z of the nearest surface that a view sees through it; 0: none
+  VF total, heaviest;  ///< of the weights of all who see anything there, or a hole
+  VF of_heaviest;      ///< 1/z of that view's own surface; 0: none
 };
+
+/// What any vote counts for, whatever it says.
+HWY_INLINE void AddWeight(VF seen, VF vote, Votes* votes) {
+  votes->total = hn::Add(votes->total, vote);
+  votes->of_heaviest = hn::IfThenElse(hn::Gt(vote, votes->heaviest), seen, votes->of_heaviest);
+  votes->heaviest = hn::Max(vote, votes->heaviest);
+}
+
+/// SPEC 5.2: one view decides alone.
+HWY_INLINE MF OneDecides(const Votes& votes) {
+  return hn::And(hn::Gt(votes.of_heaviest, hn::Zero(DF())),
+                 hn::Gt(votes.heaviest, hn::Mul(Constant(kDecidingShare), votes.total)));
+}
 
 HWY_INLINE void AddVote(const PixelView& view, VF surface, VF seen, MF whole, VF vote,
                         Votes* votes) {
   const DF d;
+  AddWeight(seen, vote, votes);
   const VF nearer = hn::Sub(seen, surface), zero = hn::Zero(d);
   const MF shows = hn::Gt(seen, zero);
   const MF through = hn::And(shows, hn::Lt(nearer, Constant(-kBehindPx * view.pixel)));
@@ -191,7 +207,7 @@ HWY_INLINE VF SupportedSurface(const PixelRow& row, std::span<const PixelView> v
   VF supported = zero;
   MF asked = hn::Gt(surface, zero);
   for (int tried = 0; tried < kMaxSurfaces && !hn::AllFalse(d, asked); ++tried) {
-    Votes votes{zero, zero, zero, zero};
+    Votes votes{zero, zero, zero, zero, zero, zero, zero};
     for (const PixelView& view : views) {
       const RayOnGrid base(view, rays);
       const Position position = PositionAt(view, base, surface);
@@ -203,6 +219,7 @@ HWY_INLINE VF SupportedSurface(const PixelRow& row, std::span<const PixelView> v
         if (hn::AllFalse(d, hn::And(position.on_map, IsCell(cells, kCellOfSamples)))) {
           vote = hn::IfThenElseZero(IsCell(cells, kCellOfHoles), vote);
           votes.against = hn::MulAdd(Constant(kHoleVote), vote, votes.against);
+          AddWeight(zero, vote, &votes);
           continue;
         }
       }
@@ -211,9 +228,11 @@ HWY_INLINE VF SupportedSurface(const PixelRow& row, std::span<const PixelView> v
       const VF seen = Meet(view, base, position, patch);
       AddVote(view, surface, seen, patch.whole, hn::IfThenZeroElse(patch.masked, vote), &votes);
     }
-    const MF supports = hn::And(asked, hn::Ge(votes.support, votes.against));
+    const MF decided = OneDecides(votes);
+    const MF supports = hn::And(asked, hn::Or(decided, hn::Ge(votes.support, votes.against)));
     const VF front = hn::IfThenElse(hn::Gt(votes.front, zero), votes.front, surface);
-    supported = hn::IfThenElse(supports, front, supported);
+    supported =
+        hn::IfThenElse(supports, hn::IfThenElse(decided, votes.of_heaviest, front), supported);
     surface = votes.behind;
     asked = hn::And(hn::AndNot(supports, asked), hn::Gt(surface, zero));
   }
@@ -285,7 +304,11 @@ HWY_INLINE Colour Blend(const PixelRow& row, std::span<const PixelView> views, V
     if (hn::AllFalse(d, weighs)) continue;
     const Colour colour = ColourAt(views[i], row.linear, hn::Load(d, group->image_x(i)),
                                    hn::Load(d, group->image_y(i)), weighs);
-    VF factor = hn::Mul(hn::Max(colour.a, Constant(1)), Constant(views[i].cut_factor / 255));
+    const VF rim = hn::Max(colour.a, Constant(1));
+    const VF fading =
+        hn::Min(hn::MulAdd(rim, Constant(views[i].fade_gain / 255), Constant(views[i].fade_offset)),
+                Constant(1));
+    VF factor = hn::Mul(fading, Constant(views[i].cut_factor));
     if (row.nearest_views > 0) {
       factor = hn::Mul(factor, CutFactorAt(hn::Load(d, group->angle(i)), cut));
     }

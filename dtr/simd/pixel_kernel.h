@@ -44,6 +44,7 @@ struct PixelView {
   float pixel, delta;  ///< differences of 1/z: SPEC 0.3, 4.2
   float level_range;   ///< blocks whose samples differ by no more are whole; below 0: ask the bits
   float cut_factor;    ///< SPEC 1.4
+  float fade_gain, fade_offset;  ///< SPEC 4.8
   /// SampledImage, after which a row and kReadBeyond more pixels follow; in its pixels, the centre
   /// of the first at 0, a grid position is at image_per_sample * position + image_offset.
   const std::uint32_t* rgba;

@@ -74,6 +74,8 @@ PixelView PlaceView(const View& view, const ViewPlacement& placed, double cut_fa
   out.pixel = static_cast<float>(thresholds.pixel);
   out.delta = static_cast<float>(thresholds.delta);
   out.cut_factor = static_cast<float>(cut_factor);
+  out.fade_gain = static_cast<float>(placed.fading.gain);
+  out.fade_offset = static_cast<float>(placed.fading.offset);
   out.rgba = reinterpret_cast<const std::uint32_t*>(sampled.rgba.data());
   out.masked = MaskNeedsTest(view, options);
   out.width_px = view.camera.width_px(), out.height_px = view.camera.height_px();

@@ -98,15 +98,18 @@ TEST(FindOwnFragments, FollowsSlopesSteeperThanTheDepthBreak) {
 
 TEST(KeepSupportedSurfaces, PutsASurfaceWhereTheViewsPatchHasIt) {
   // As in RefinesAWrongStartToTheViewsOwnSurface: what is left of the start's error is 0.015 of it.
+  // Twice the same view, for one alone decides.
   const Surface plane = Plane({-0.3, 0, 1}, 10);
   const Pair pair(plane, {0.5, 0, 0});
   const Band band{pair.novel.width_px(), 0, pair.novel.height_px()};
   const auto pixel = static_cast<size_t>(30 * band.width_px + 40);
   const double truth = 1 / plane({0.5, 0, 0}, pair.novel.RayFromPixel({40.5, 30.5}));
+  size_t copies = 2;
   const auto held = [&](double wrong_px) {
     std::vector<double> surfaces(static_cast<size_t>(band.width_px * band.rows), 0.0);
     surfaces[pixel] = truth + wrong_px * kPixelOfDisparity;
-    KeepSupportedSurfaces({&pair.in_novel, 1}, pair.novel, {}, band, surfaces);
+    const std::vector<ViewInNovel> views(copies, pair.in_novel);
+    KeepSupportedSurfaces(views, pair.novel, {}, band, surfaces);
     return surfaces[pixel];
   };
   for (const double wrong_px : {-0.45, 0.0, 0.45, 1.9}) {
@@ -116,6 +119,10 @@ TEST(KeepSupportedSurfaces, PutsASurfaceWhereTheViewsPatchHasIt) {
   EXPECT_EQ(held(-0.9), truth - 0.9 * kPixelOfDisparity);
   EXPECT_EQ(held(-1.1), truth - 1.1 * kPixelOfDisparity);  // no say at all
   EXPECT_NEAR(held(2.1), truth, 1e-8);  // seen through: the view's own takes its place
+  copies = 1;
+  for (const double wrong_px : {-3.0, -1.1, -0.9, 1.0, 2.1}) {
+    EXPECT_NEAR(held(wrong_px), truth, 1e-8) << wrong_px;
+  }
 }
 
 TEST(FindOwnFragments, DepthIsNeverMixedAcrossABreak) {

@@ -68,6 +68,17 @@ TEST_F(Parity, HoldsWhereAViewHasNoDepthAtAll) {
       ExpectParity(renderer, OneViewWithoutDepth(), OptionsOf(RenderMethod::kDeferred)).Holds());
 }
 
+// Where one view decides (SPEC 5.2) and where borders fade less (SPEC 4.8).
+TEST_F(Parity, HoldsAtAnInputCamerasOwnPlaceAndNearIt) {
+  Renderer renderer;
+  for (const double share : {0.0, 0.01, 0.1}) {
+    const NamedScene scene = TowardsAnInputCamera(share);
+    for (const RenderMethod method : kBothMethods) {
+      EXPECT_TRUE(ExpectParity(renderer, scene, OptionsOf(method)).Holds()) << share;
+    }
+  }
+}
+
 TEST_F(Parity, WouldSeeHalfAPixel) {
   Renderer renderer;
   for (const std::string& name : ExactSceneNames()) {

@@ -355,7 +355,7 @@ class CountsMeasuring : public Progress {
 
 TEST(Prune, WhatACheckTakesBackStaysOutAndLeavesRoomForOthers) {
   const DtrSet set = Row(6);
-  PruneOptions options = SmallOptions(8);
+  PruneOptions options = SmallOptions(10);
   JpegFailsTheCheck journal(100000);
   options.journal = &journal;
   FakeStore store(set);

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 
 #include "dtr/base/random.h"
 
@@ -62,6 +63,34 @@ TEST(RimFactorAt, IsBilinearAndNeverZero) {
   EXPECT_DOUBLE_EQ(RimFactorAt(factors, {1.0, 0.7}), 0.6);
   EXPECT_DOUBLE_EQ(RimFactorAt(factors, {0, 0}), 0.2);
   EXPECT_DOUBLE_EQ(RimFactorAt(factors, {2.9, 1}), 1.0 / 255);
+}
+
+TEST(FadingOf, AtTheViewsOwnPlaceNothingFadesAndFarAwayAllOfTheRim) {
+  const View view = Grey(64, 40);  // a rim of 8 pixels
+  for (const double rim : {1.0 / 255, 0.5, 1.0}) {
+    EXPECT_EQ(FadingOf(view, 0).Of(rim), 1) << rim;
+    EXPECT_EQ(FadingOf(view, 2).Of(rim), rim) << "4 pixels a pixel moved: 8";
+    EXPECT_EQ(FadingOf(view, std::numeric_limits<double>::infinity()).Of(rim), rim);
+  }
+  // Moved by a pixel the rim is 4 pixels wide and begins one pixel farther out, minus 1/8.
+  for (int steps = 0; steps < 4; ++steps) {
+    EXPECT_NEAR(FadingOf(view, 1).Of(steps / 8.0), (steps + 1) / 4.0 - 1.0 / 8, 1e-12) << steps;
+  }
+  EXPECT_EQ(FadingOf(view, 1).Of(0.5), 1);
+}
+
+TEST(FadingOf, ChangesGraduallyWithTheWay) {
+  const View view = Grey(960, 100);
+  for (int steps = 0; steps < 20; ++steps) {
+    double last = 1;
+    for (double moved_px = 0; moved_px < 10; moved_px += 0.01) {
+      const double factor = FadingOf(view, moved_px).Of(steps / 20.0);
+      EXPECT_LE(factor, last);
+      EXPECT_LT(last - factor, 0.045) << moved_px;  // 1 / (4 e) falls from 1 at e = 1/4
+      last = factor;
+    }
+    EXPECT_EQ(last, steps / 20.0);
+  }
 }
 
 }  // namespace

@@ -88,6 +88,19 @@ inline NamedScene ExactOrDamagedScene(const std::string& name, int views, int wi
                            : ExactScene(name, views, width_px, height_px);
 }
 
+/// The damaged scene, its novel camera moved towards an input camera until a share of the way is
+/// left: there one view decides (SPEC 5.2) and borders fade less (SPEC 4.8).
+inline NamedScene TowardsAnInputCamera(double share_left) {
+  NamedScene scene = ExactOrDamagedScene("damaged", 5, 192, 128);
+  const Pose own = scene.set.frames[0].views[2].cam_from_world;
+  Pose& novel = scene.novel.cam_from_world;
+  const Eigen::Vector3d center =
+      (1 - share_left) * own.TargetOriginInSource() + share_left * novel.TargetOriginInSource();
+  novel.rotation = own.rotation.slerp(share_left, novel.rotation);
+  novel.translation = -(novel.rotation * center);
+  return scene;
+}
+
 /// Masked samples are no holes: they have no vote (SPEC 5.2), and squares of them are passed over.
 inline NamedScene MaskedInLargePieces() {
   NamedScene scene = ExactOrDamagedScene("courtyard", 5, 192, 128);

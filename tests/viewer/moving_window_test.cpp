@@ -47,13 +47,14 @@ TEST_F(MovingWindowTest, PlaysFromTheStartAndEndsWithAWholePicture) {
 }
 
 TEST_F(MovingWindowTest, AFileThatVanishedAndCameBackIsDrawnFromAgain) {
-  // The pixels of what is drawn stay in memory where something looks at them; the magnifier does.
+  // The pixels of what is drawn stay in memory where something looks at them; the magnifier does,
+  // and filling would from the start.
   const fs::path set = In("mine.dtr");
   fs::copy(Set(), set, fs::copy_options::recursive);
   const DtrSet described = io::ReadSet(set);
   const View& first = described.frames[0].views[0];
   const fs::path photo = set / first.image_file->path;
-  Open(200, 140, {"--no-panel"}, set);
+  Open(200, 140, {"--no-panel", "--fill-holes=false"}, set);
   if (IsSkipped()) return;
   const Json whole = Now();
   ASSERT_EQ(whole["views_used"].size(), 4U);

@@ -69,14 +69,14 @@ TEST_F(ViewerWindow, TheDefaultsOfAPrunedSetAreItsOwn) {
     return Json();
   };
   const Json start = viewer.WaitFor("the button", [&](const Json& s) {
-    return !place_of(s).is_null() && s["render_options"] == Json{"--views", "5", "--fill-holes"};
+    return !place_of(s).is_null() && s["render_options"] == Json{"--views", "5"};
   });
   const Json button = place_of(start);
   ViewerProgram::Do({"mousemove", std::to_string(std::lround(button["x"].get<double>() + 20)),
                      std::to_string(std::lround(button["y"].get<double>() + 8)), "sleep", "0.1",
                      "mousedown", "1", "sleep", "0.1", "mouseup", "1"});
   viewer.WaitFor("the set's own options", [](const Json& s) {
-    return s["render_options"] == Json{"--views", "2", "--fill-holes"};
+    return s["render_options"] == Json{"--views", "2"};
   });
 }
 

@@ -18,7 +18,14 @@ struct Votes {
   float support, against;
   float front;   // 1/z of the nearest whole patch of those that support it; 0: none
   float behind;  // 1/z of the nearest surface that a view sees through it; 0: none
+  float total, heaviest;  // of the weights of all who see anything there, or a hole
+  float of_heaviest;      // 1/z of that view's own surface; 0: none
 };
+
+// SPEC 5.2.
+bool OneDecides(Votes votes) {
+  return votes.of_heaviest > 0.0 && votes.heaviest > kDecidingShare * votes.total;
+}
 
 // On the map, whose first sample's centre is at 0.5; `q`: position, homogeneous.
 bool IsOnMap(OwnMap map, vec3 q, vec2 position) {
@@ -77,6 +84,9 @@ void AddVote(OwnMap map, float surface, float seen, bool whole, bool masked, boo
   float nearer = seen - surface;
   bool hole = !(seen > 0.0);
   vote = on_map && !masked ? vote : 0.0;
+  votes.total += vote;
+  votes.of_heaviest = vote > votes.heaviest ? seen : votes.of_heaviest;
+  votes.heaviest = max(votes.heaviest, vote);
   bool through = !hole && nearer < -kBehindPx * map.stored.z;
   bool supports = !hole && !through && nearer <= kSupportBeforePx * map.stored.z;
   votes.against += hole ? kHoleVote * vote : (through ? vote : 0.0);

@@ -90,7 +90,7 @@ float VoteWeight(ViewBlock view, vec3 ray, float w) {
 bool FindOwnFragments(vec3 ray, float surface) {
   bool supported = false;
   for (int tried = 0; tried < kMaxSurfaces && surface > 0.0 && !supported; ++tried) {
-    Votes votes = Votes(0.0, 0.0, 0.0, 0.0);
+    Votes votes = Votes(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
     for (int i = 0; i < view_count; ++i) {
       ViewBlock view = views[i];
       OwnMap map = MapOf(view);
@@ -99,8 +99,10 @@ bool FindOwnFragments(vec3 ray, float surface) {
           OwnDepth(map, BaseOf(view, ray), AwayOf(view), surface, on_map, whole, masked);
       AddVote(map, surface, seen, whole, masked, on_map, VoteWeight(view, ray, surface), votes);
     }
-    supported = votes.support >= votes.against;
-    surface = !supported ? votes.behind : votes.front > 0.0 ? votes.front : surface;
+    bool decided = OneDecides(votes);
+    supported = decided || votes.support >= votes.against;
+    float front = votes.front > 0.0 ? votes.front : surface;
+    surface = decided ? votes.of_heaviest : supported ? front : votes.behind;
   }
   if (!supported) return false;
   for (int i = 0; i < view_count; ++i) {
@@ -240,10 +242,11 @@ void main() {
     if (fragment[i] == 0.0 || !(weight[i] > 0.0)) continue;
     ViewBlock view = views[i];
     vec4 colour = ColourAt(view, SourcePixel(view, PointInView(view, ray, fragment[i])));
+    float factor = min(view.fading.y * colour.a + view.fading.z, 1.0);
 #if PER_PIXEL
-    float factor = colour.a * CutFactor(angle[i], cut);
+    factor *= CutFactor(angle[i], cut);
 #else
-    float factor = colour.a * view.stored_depth.w;
+    factor *= view.fading.x;
 #endif
     sum += FadedWeight(weight[i], factor, total) * vec4(colour.rgb, 1.0);
   }

@@ -18,8 +18,9 @@ struct ViewBlock {
   ivec4 depth_slot;  // texture array, layer in it, unused
   vec4 map;          // 1 / width, 1 / height of that layer; columns / 2, rows / 2 of the grid
   // 1/z of a stored value v is x + y v (two passes: of the layer's); z: a pixel of disparity as a
-  // difference of 1/z (SPEC 0.3); w: SPEC 1.4's factor
+  // difference of 1/z (SPEC 0.3); w: unused
   vec4 stored_depth;
+  vec4 fading;  // SPEC 1.4's factor, SPEC 4.8's gain and offset, unused
 };
 #ifdef __cplusplus
 #undef vec4
