@@ -46,6 +46,8 @@ void AddDepthOptions(CLI::App& command, const std::vector<std::string>& engines,
           "[as good as exact]")
       ->check(CLI::Range(1e-6, 100.0))
       ->type_name("PX");
+  command.add_flag("--completion,!--no-completion", choice.completion,
+                   "Complete depth where none was measured, so that images are whole [on]");
   overriding("--neighbours", choice.neighbours, "Views that the search asks", 1,
              pipeline::kMaxNeighbours);
   overriding("--round-neighbours", choice.round_neighbours,

@@ -121,6 +121,11 @@ std::vector<std::string> RendererNames() {
   return {"auto", "simd", "cpu"};
 }
 
+void AddMeasuredOnly(CLI::App& command, bool& measured_only) {
+  command.add_flag("--measured-only", measured_only,
+                   "Draw measured depth alone, without what was completed");
+}
+
 void AddRendererOptions(CLI::App& command, RendererChoice& choice) {
   AddOptions(command, RendererNames(), choice);
 }

@@ -37,6 +37,8 @@ struct RendererChoice {
 
 /// Adds --renderer, --gpu-memory and, in programs built with OpenGL, --shader-dir to a command.
 void AddRendererOptions(CLI::App& command, RendererChoice& choice);
+/// Declares --measured-only.
+void AddMeasuredOnly(CLI::App& command, bool& measured_only);
 
 /// The same for a window, which "cpu" is too slow for.
 void AddWindowRendererOptions(CLI::App& command, RendererChoice& choice);

@@ -332,6 +332,9 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
   if (options.depth.depth_error_px) {
     RecodeDepth(set, *options.depth.depth_error_px, writer, options.threads, memory_gb, progress);
   }
+  if (options.depth.completion) {
+    CompleteDepth(set, sparse, writer, options.threads, memory_gb, progress);
+  }
   WriteMeshes(set, writer, options.threads, progress);
   set.provenance_json = ProvenanceJson(options, OptionsJson(options, spent),
                                        PhotosJson(photos, is_source), calibrated, report)

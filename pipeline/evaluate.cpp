@@ -32,6 +32,7 @@ std::vector<std::string> NotRegistered(const DtrSet& set) {
 DtrSet Load(const EvaluateRequest& request, Progress& progress) {
   io::LoadOptions load;
   load.held_out = true;
+  load.completed = !request.measured_only;
   load.sigma = !request.truth.empty();
   load.threads = request.threads;
   load.warn = [&progress](const std::string& line) { progress.Note(line); };

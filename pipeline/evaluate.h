@@ -17,6 +17,7 @@ struct EvaluateRequest {
   std::filesystem::path truth;   ///< folder with cameras.json and depth/; empty: no depth scores
   std::filesystem::path images;  ///< folder for rendering | photo | difference; empty: none
   RenderOptions render;
+  bool measured_only = false;  ///< images are drawn without completed depth
   int threads = 0;
 };
 

@@ -101,7 +101,7 @@ eval::DepthScores EvaluateDepth(const DtrSet& set, const fs::path& truth, int th
   const std::vector<Pair> pairs = PairByName(set, list, truth);
   const double scale = ScaleFromTruth(set, list, pairs, progress);
   const auto cast = CastTruth::FromFolder(truth, list);
-  eval::DepthScorer scorer;
+  eval::DepthScorer scorer, of_completed;
   progress.Stage("scoring depth", static_cast<int>(pairs.size()));
   int done = 0;
   for (const Pair& pair : pairs) {
@@ -111,18 +111,26 @@ eval::DepthScores EvaluateDepth(const DtrSet& set, const fs::path& truth, int th
     const PinholeCamera camera = view.DepthCamera();
     // A view that got no depth at all has missed every true pixel of it.
     const DepthImage none(camera.width_px(), camera.height_px());
-    const DepthImage& depth = view.depth.empty() ? none : view.depth;
+    const DepthImage depth = view.depth.empty() ? none : MeasuredDepth(view);
     const ViewTruth found =
         cast && !eval::IsSameGrid(pair.truth->camera, view.camera)
             ? cast->On(view, static_cast<size_t>(pair.truth - list.cameras.data()), threads)
             : StoredTruth(truth, *pair.truth, view);
-    scorer.Add(depth, eval::SubsampleTruth(found.depth, view.depth_scale),
-               eval::SubsampleMask(found.scored, view.depth_scale), scale,
+    const DepthImage truth_there = eval::SubsampleTruth(found.depth, view.depth_scale);
+    if (!view.depth_state.empty())
+      of_completed.Add(CompletedDepth(view), truth_there, {}, scale, 0);
+    scorer.Add(depth, truth_there, eval::SubsampleMask(found.scored, view.depth_scale), scale,
                camera.fx_px() * view.reference_baseline,
                view.inverse_depth_sigma ? &*view.inverse_depth_sigma : nullptr);
     progress.Update(++done);
   }
-  return scorer.Scores();
+  eval::DepthScores scores = scorer.Scores();
+  const eval::DepthScores completed = of_completed.Scores();
+  scores.completed_pixels = completed.kept_pixels;
+  if (completed.outlier_share_5pct) {
+    scores.completed_share_within_5pct = 1 - *completed.outlier_share_5pct;
+  }
+  return scores;
 }
 
 }  // namespace dtr::pipeline

@@ -77,7 +77,7 @@ void Widen(const Bounds& other, Bounds& bounds) {
 void WriteViews(const fs::path& folder, size_t index, Frame& frame, LengthUnit unit,
                 const JoinOptions& options, io::SetWriter& writer, Progress& progress) {
   io::LoadOptions load;
-  load.sigma = load.held_out = true;
+  load.sigma = load.held_out = load.completed = true;
   load.threads = options.threads;
   load.warn = [&](const std::string& line) { progress.Note(line); };
   for (View& view : frame.views) {
@@ -85,7 +85,7 @@ void WriteViews(const fs::path& folder, size_t index, Frame& frame, LengthUnit u
     View joined = view;
     joined.id = fmt::format("t{:04}_{}", index, view.id);
     for (auto* file : {&joined.image_file, &joined.mask_file, &joined.depth_file,
-                       &joined.sigma_file, &joined.mesh_file}) {
+                       &joined.completed_file, &joined.sigma_file, &joined.mesh_file}) {
       file->reset();
     }
     const bool written = writer.RestoreView(joined);  // by a run that was interrupted
@@ -96,6 +96,7 @@ void WriteViews(const fs::path& folder, size_t index, Frame& frame, LengthUnit u
       joined.image = std::move(view.image);
       joined.mask = std::move(view.mask);
       joined.depth = std::move(view.depth);
+      joined.depth_state = std::move(view.depth_state);
       joined.inverse_depth_sigma = std::move(view.inverse_depth_sigma);
       writer.WriteView(joined, unit);
     }

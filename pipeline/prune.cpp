@@ -40,8 +40,8 @@ std::uint64_t BytesOfViews(const DtrSet& set) {
   std::uint64_t bytes = 0;
   for (const View& view : set.frames.front().views) {
     if (view.role != ViewRole::kSource) continue;
-    for (const auto* file :
-         {&view.image_file, &view.mask_file, &view.depth_file, &view.sigma_file, &view.mesh_file}) {
+    for (const auto* file : {&view.image_file, &view.mask_file, &view.depth_file,
+                             &view.completed_file, &view.sigma_file, &view.mesh_file}) {
       if (*file) bytes += (*file)->bytes;
     }
   }
@@ -54,7 +54,7 @@ std::uint64_t BytesOf(const DtrSet& set, const fs::path& folder) {
 
 DtrSet LoadForPruning(const PruneSetOptions& options, Progress& progress) {
   io::LoadOptions load;
-  load.held_out = true;
+  load.held_out = load.completed = true;
   load.collapse_duplicates = false;  // sparse.bin counts the views as they are
   load.threads = options.threads;
   load.warn = [&](const std::string& line) { progress.Note(line); };
@@ -248,6 +248,7 @@ PruneSetReport PruneSet(const PruneSetOptions& options, Progress& progress) {
   {
     DtrSet loaded = pruned;
     io::LoadOptions load;
+    load.completed = true;
     load.threads = options.threads;
     for (View& view : loaded.frames.front().views) {
       if (view.role == ViewRole::kSource) io::LoadPixels(writer.folder(), view, load);

@@ -183,6 +183,8 @@ void Carry(const Found& found, DtrSet& set) {
       view.reference_baseline *= metric.scale;
       view.near_z *= metric.scale;
       view.far_z *= metric.scale;
+      view.completed_near_z *= metric.scale;  // its file holds shares of this range
+      view.completed_far_z *= metric.scale;
     }
   }
 }

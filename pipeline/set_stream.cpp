@@ -34,6 +34,7 @@ std::unique_ptr<ViewStream> StreamOf(const std::filesystem::path& folder, DtrSet
   settings.threads = limits.threads;
   settings.warn = [&console](const std::string& line) { console.Note(line); };
   io::LoadOptions load;
+  load.completed = !limits.measured_only;
   load.warn = SayOnce(console);
   return std::make_unique<ViewStream>(
       set, std::move(described), [folder, load](View& view) { io::LoadPixels(folder, view, load); },

@@ -13,6 +13,7 @@ namespace dtr::pipeline {
 struct StreamLimits {
   double memory_gb = 4;
   int threads = 0;
+  bool measured_only = false;  ///< without completed depth
 };
 
 /// A stream of the pixels in `folder`. `set` is what ReadSet gave, its duplicates collapsed;

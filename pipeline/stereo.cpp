@@ -34,11 +34,7 @@ DtrSet ReadForDepth(const std::filesystem::path& folder) {
         "its photos with dtr build");
   }
   for (View& view : set.frames.front().views) {
-    view.depth_file.reset();
-    view.sigma_file.reset();
-    view.mesh_file.reset();
-    view.near_z = view.far_z = 0;
-    view.depth_scale = 1;
+    DropDepth(view);
     if (view.depth_coding == DepthCoding::kZstdInverseDepth) {
       view.depth_coding = View{}.depth_coding;  // its steps were for the old range
       view.depth_steps = 0;
@@ -87,6 +83,7 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& listen
                                       {"settings", SettingsJson(options.depth.engine, quality)},
                                       {"time_budget_s", options.depth.time_budget_s.value_or(0)},
                                       {"depth_error_px", options.depth.depth_error_px.value_or(0)},
+                                      {"completion", options.depth.completion},
                                       {"seed", options.seed},
                                       {"workspace_sha256", InputHash(options.depth.workspace)},
                                       {"set_sha256", Sha256OfFile(options.set / "set.json")},
@@ -106,6 +103,10 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& listen
     RecodeDepth(set, *options.depth.depth_error_px, writer, options.threads,
                 options.depth.memory_gb.value_or(kDefaultMemoryGb), progress);
   }
+  if (options.depth.completion) {
+    CompleteDepth(set, sparse, writer, options.threads,
+                  options.depth.memory_gb.value_or(kDefaultMemoryGb), progress);
+  }
   const DepthCount count = WriteMeshes(set, writer, options.threads, progress);
   writer.WriteSparse(set, sparse);
   nlohmann::ordered_json provenance = nlohmann::ordered_json::parse(set.provenance_json);
@@ -117,6 +118,7 @@ RecomputeReport RecomputeDepth(const RecomputeOptions& options, Progress& listen
   }
   recorded.update(SettingsJson(options.depth.engine, spent));
   recorded["seed"] = options.seed;
+  recorded["completion"] = options.depth.completion;
   recorded.erase("depth_error_px");
   if (options.depth.depth_error_px) recorded["depth_error_px"] = *options.depth.depth_error_px;
   set.provenance_json = provenance.dump();

@@ -88,7 +88,7 @@ int RunGrowthTable(const BenchArguments& options, RenderOptions render, const Dt
 
 DtrSet LoadWhole(const BenchArguments& options, const Context& context) {
   io::LoadOptions load;
-  load.held_out = true;
+  load.held_out = load.completed = true;
   load.threads = context.common.threads;
   load.warn = [&context](const std::string& line) { context.console.Note(line); };
   return io::LoadSet(options.set, load);

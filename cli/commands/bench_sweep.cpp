@@ -94,7 +94,7 @@ class RenderStage final : public Measurable {
  private:
   static DtrSet Load(const fs::path& folder, const Context& context) {
     io::LoadOptions load;
-    load.held_out = true;
+    load.held_out = load.completed = true;
     load.threads = context.common.threads;
     load.warn = [&context](const std::string& line) { context.console.Note(line); };
     return io::LoadSet(folder, load);

@@ -65,6 +65,10 @@ void SayDepth(const eval::DepthScores& depth, Console& console) {
       percent(depth.sigma.share_within_2_sigma), percent(depth.sigma.share_within_3_sigma),
       Figure(depth.sigma.sparsification_ratio, "{:.2f}"),
       Figure(depth.sigma.sparsification_ratio_if_normal, "{:.2f}")));
+  if (depth.completed_pixels > 0) {
+    console.Say(fmt::format("completed depth: {} of its pixels within 5 % of the true surface",
+                            percent(depth.completed_share_within_5pct)));
+  }
   const std::vector<double>& outliers = depth.sigma.outlier_share_by_tenth;
   if (outliers.empty()) return;
   // Half, and nine tenths.
@@ -101,6 +105,7 @@ void AddEvaluateCommand(CLI::App& app) {
                    .add_option("--images,--pictures", options->request.images,
                                "Write rendering | photo | difference for every view")
                    ->type_name("DIR");
+               AddMeasuredOnly(command, options->request.measured_only);
                AddRendererOptions(command, options->renderer);
                options->render = AddRenderOptions(command);
                return [options, &command](const Context& context) {

@@ -46,7 +46,11 @@ Mask HasOwnDepth(const View& view) {
   Mask mask(view.camera.width_px(), view.camera.height_px());
   for (int y = 0; y < mask.height(); ++y) {
     for (int x = 0; x < mask.width(); ++x) {
-      const float depth = view.depth(x / view.depth_scale, y / view.depth_scale);
+      const int column = x / view.depth_scale, row = y / view.depth_scale;
+      if (!view.depth_state.empty() && view.depth_state(column, row) != DepthState::kMeasured) {
+        continue;
+      }
+      const float depth = view.depth(column, row);
       if (!DepthImage::IsHole(depth)) mask(x, y) = 255;
     }
   }

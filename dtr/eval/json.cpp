@@ -35,6 +35,8 @@ Json Value(const DepthScores& s) {
           {"outlier_share", NumberOrNull(s.outlier_share)},
           {"outlier_share_5pct", NumberOrNull(s.outlier_share_5pct)},
           {"depth_completeness", NumberOrNull(s.depth_completeness)},
+          {"completed_pixels", s.completed_pixels},
+          {"completed_share_within_5pct", NumberOrNull(s.completed_share_within_5pct)},
           {"share_estimated_without_truth", NumberOrNull(s.share_estimated_without_truth)},
           {"edge_displacement_px", NumberOrNull(s.edges.displacement_px)},
           {"edge_fattening_px", NumberOrNull(s.edges.fattening_px)},

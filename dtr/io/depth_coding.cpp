@@ -4,10 +4,12 @@
 #include <bit>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <sstream>
 #include <vector>
 
 #include "dtr/base/error.h"
+#include "dtr/base/hash.h"
 #include "dtr/io/depth_io.h"
 #include "dtr/types/inverse_depth_code.h"
 
@@ -110,6 +112,17 @@ DepthCoding DepthCodingFromName(const std::string& name) {
 const char* ExtensionOf(DepthCoding coding) {
   if (coding == DepthCoding::kZstdInverseDepth) return ".dtz";
   return coding == DepthCoding::kExrFloat || coding == DepthCoding::kExrHalf ? ".exr" : ".png";
+}
+
+DepthFormat CompletedFormatOf(const View& view) {
+  return {DepthCoding::kZstdInverseDepth, view.completed_near_z, view.completed_far_z,
+          LengthUnit::kUnknown, view.completed_steps};
+}
+
+std::string DepthHashOf(const View& view) {
+  if (!view.completed_file) return view.depth_file->sha256;
+  const std::string both = view.depth_file->sha256 + view.completed_file->sha256;
+  return Sha256(std::as_bytes(std::span(both)));
 }
 
 DepthFormat FormatOf(const View& view, LengthUnit unit) {

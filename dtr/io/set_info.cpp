@@ -27,9 +27,8 @@ namespace fs = std::filesystem;
 
 std::uint64_t BytesOf(const View& view) {
   std::uint64_t bytes = 0;
-  for (const auto* file :
-       {&view.image_file, &view.mask_file, &view.depth_file, &view.completed_file,
-        &view.sigma_file, &view.mesh_file}) {
+  for (const auto* file : {&view.image_file, &view.mask_file, &view.depth_file,
+                           &view.completed_file, &view.sigma_file, &view.mesh_file}) {
     if (*file) bytes += (*file)->bytes;
   }
   return bytes;

@@ -117,6 +117,12 @@ class SetWriter {
   /// The caller looks at view.depth_file to see how far the view had got.
   bool RestoreView(View& view) const;
 
+  /// Writes the completed depth of a view whose depth was written, in the range and steps that the
+  /// view names (completed_near_z, completed_far_z, completed_steps); 0 where there is none. Takes
+  /// the mesh away. The checkpoint of WriteView does not have it. Throws Error where a depth is off
+  /// the range.
+  void WriteCompleted(const DepthImage& completed, View& view);
+
   /// Writes the depth that the view has in memory once more, in its coding as it is now, beside the
   /// file of before. The checkpoint of WriteView stays: a run that is interrupted goes on from the
   /// depth as that one wrote it. Takes the mesh away.

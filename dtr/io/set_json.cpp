@@ -280,8 +280,9 @@ Json ToJson(const View& view, Hashes hashes) {
   if (view.mesh_file) object["mesh"] = entry(*view.mesh_file);
   object["reference_baseline"] = view.reference_baseline;
   object["gain_linear_rgb"] = NumbersToJson(view.gain);
-  Restore(object, view.extra_json,
-          {"camera", "cam_from_world", "image", "mask", "depth", "completed_depth", "sigma", "mesh"});
+  Restore(
+      object, view.extra_json,
+      {"camera", "cam_from_world", "image", "mask", "depth", "completed_depth", "sigma", "mesh"});
   return object;
 }
 

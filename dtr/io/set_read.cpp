@@ -92,22 +92,18 @@ bool AreDuplicates(const View& a, const View& b) {
 }
 
 /// Puts the completed depths of the view into the holes of its measured ones.
-void AddCompleted(const fs::path& set_folder, View& view) {
+void ReadCompleted(const fs::path& set_folder, View& view) {
   const fs::path file = set_folder / view.completed_file->path;
   const DepthImage completed =
       ReadDepth(file, CompletedFormatOf(view), view.depth.width(), view.depth.height());
-  view.depth_state = Grid<DepthState>(view.depth.width(), view.depth.height());
-  const auto far = static_cast<float>(view.completed_far_z);
-  for (size_t p = 0; p < view.depth_state.data().size(); ++p) {
-    const float z = completed.grid().data()[p];
-    if (DepthImage::IsHole(z)) continue;
-    if (!DepthImage::IsHole(view.depth.grid().data()[p])) {
-      throw Error(file.string() + ": expected no depth where " + view.depth_file->path +
-                  " has some");
+  for (size_t p = 0; p < completed.grid().data().size(); ++p) {
+    if (DepthImage::IsHole(completed.grid().data()[p]) ||
+        DepthImage::IsHole(view.depth.grid().data()[p])) {
+      continue;
     }
-    view.depth.grid().data()[p] = z;
-    view.depth_state.data()[p] = z < far ? DepthState::kCompleted : DepthState::kFar;
+    throw Error(file.string() + ": expected no depth where " + view.depth_file->path + " has some");
   }
+  AddCompletedDepth(completed, view);
 }
 
 // "photos/IMG 1.JPG" -> "photos_IMG_1"
@@ -158,7 +154,7 @@ void LoadPixels(const fs::path& set_folder, View& view, const LoadOptions& optio
   }
   const bool completes = options.depth && options.completed && view.completed_file;
   view.depth_state = {};
-  if (completes) AddCompleted(set_folder, view);
+  if (completes) ReadCompleted(set_folder, view);
   view.mesh.reset();
   // A stored mesh is of all the depth that there is.
   if (options.depth && view.mesh_file && view.depth_file &&

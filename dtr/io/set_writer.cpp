@@ -26,7 +26,7 @@ constexpr char kLock[] = "work/lock";
 constexpr char kSparseFile[] = "sparse.bin";
 constexpr char kReportFolder[] = "report";
 constexpr std::uintmax_t kRecordLimitBytes = 1 << 24;
-constexpr const char* kPixelFolders[] = {"images", "mask",  "depth",   "completed",
+constexpr const char* kPixelFolders[] = {"images", "mask", "depth",   "completed",
                                          "sigma",  "mesh", "held_out"};
 
 // "a/b.dtr/" and "a/b.dtr" are one folder.
@@ -126,6 +126,7 @@ struct SetWriter::State {
   template <typename Write>
   StoredFile Store(const std::string& path, const Write& write) const;
   void WriteDepthFile(View& view, LengthUnit unit) const;
+  void WriteCompletedFile(const DepthImage& completed, View& view) const;
   void WriteView(View& view, LengthUnit unit) const;
   bool RestoreView(View& view) const;
   void RemoveUnnamed(const DtrSet& set) const;
@@ -296,7 +297,7 @@ void SetWriter::State::WriteView(View& view, LengthUnit unit) const {
   }
   if (!view.depth.empty()) {
     if (view.near_z == 0 && view.far_z == 0) {
-      const DepthRangeOfMap range = RangeOf(view.depth);
+      const DepthRangeOfMap range = RangeOf(MeasuredDepth(view));
       view.near_z = range.near_z;
       view.far_z = range.far_z;
     }
@@ -317,10 +318,30 @@ void SetWriter::State::WriteView(View& view, LengthUnit unit) const {
 
 void SetWriter::State::WriteDepthFile(View& view, LengthUnit unit) const {
   const DepthFormat format = FormatOf(view, unit);
+  const DepthImage measured = MeasuredDepth(view);
   view.depth_file = Store(PathOf(view, "depth", ExtensionOf(view.depth_coding)),
-                          [&](const fs::path& file) { WriteDepth(file, view.depth, format); });
+                          [&](const fs::path& file) { WriteDepth(file, measured, format); });
+  if (!view.depth_state.empty()) WriteCompletedFile(CompletedDepth(view), view);
   view.mesh_file.reset();  // it was of other depth
   view.mesh.reset();
+}
+
+void SetWriter::State::WriteCompletedFile(const DepthImage& completed, View& view) const {
+  const DepthFormat format = CompletedFormatOf(view);
+  view.completed_file = Store(PathOf(view, "completed", ExtensionOf(format.coding)),
+                              [&](const fs::path& file) { WriteDepth(file, completed, format); });
+  view.mesh_file.reset();  // it was without it
+  view.mesh.reset();
+}
+
+void SetWriter::WriteCompleted(const DepthImage& completed, View& view) {
+  const PinholeCamera camera = view.DepthCamera();
+  ExpectGrid(view, "completed depth", completed.width(), completed.height(), camera.width_px(),
+             camera.height_px());
+  if (!view.depth_file) {
+    throw Error("view '" + view.name + "': expected stored depth before completed depth");
+  }
+  AsError([&] { state_->WriteCompletedFile(completed, view); });
 }
 
 void SetWriter::RecodeDepth(View& view, LengthUnit unit) {
@@ -341,9 +362,8 @@ void SetWriter::WriteJpeg(View& view, int quality) {
 }
 
 void SetWriter::CopyFiles(const fs::path& set_folder, const View& view) {
-  for (const auto* file :
-       {&view.image_file, &view.mask_file, &view.depth_file, &view.completed_file,
-        &view.sigma_file, &view.mesh_file}) {
+  for (const auto* file : {&view.image_file, &view.mask_file, &view.depth_file,
+                           &view.completed_file, &view.sigma_file, &view.mesh_file}) {
     if (!*file) continue;
     const StoredFile copied = AsError([&] {
       return state_->Store((*file)->path, [&](const fs::path& target) {
@@ -376,9 +396,8 @@ bool SetWriter::State::RestoreView(View& view) const {
       stored.cam_from_world.rotation.coeffs() == view.cam_from_world.rotation.coeffs() &&
       stored.cam_from_world.translation == view.cam_from_world.translation;
   if (!same_view) return false;
-  for (const auto* file :
-       {&stored.image_file, &stored.mask_file, &stored.depth_file, &stored.completed_file,
-        &stored.sigma_file}) {
+  for (const auto* file : {&stored.image_file, &stored.mask_file, &stored.depth_file,
+                           &stored.completed_file, &stored.sigma_file}) {
     if (!*file) continue;
     const fs::path full = partial / (*file)->path;
     if (!fs::is_regular_file(full) || Sha256OfFile(full) != (*file)->sha256) return false;

@@ -53,19 +53,34 @@ DepthImage ShrunkDepth(const DepthImage& depth, int shrink, double depth_break) 
   return small;
 }
 
+namespace {
+
+/// A mean of rounded numbers may miss the end of the range by one digit.
+DepthImage ShrunkWithin(const DepthImage& depth, int shrink, double depth_break, double near_z,
+                        double far_z) {
+  DepthImage small = ShrunkDepth(depth, shrink, depth_break);
+  const auto nearest = static_cast<float>(near_z), farthest = static_cast<float>(far_z);
+  for (float& z : small.grid().data()) {
+    if (near_z > 0 && !DepthImage::IsHole(z)) z = std::clamp(z, nearest, farthest);
+  }
+  return small;
+}
+
+}  // namespace
+
 View ShrunkView(const View& view, int shrink) {
   View small = view;
   const int width = view.camera.width_px() / shrink, height = view.camera.height_px() / shrink;
   small.camera = view.camera.Resized(width, height);
   small.image = AreaAverage(view.image, width, height);
   if (!view.mask.empty()) small.mask = ShrinkMask(view.mask, width, height);
-  small.depth = ShrunkDepth(view.depth, shrink, ThresholdsOf(view, {}).depth_break);
-  if (view.near_z > 0) {
-    // A mean of rounded numbers may miss the end of the range by one digit.
-    const auto near_z = static_cast<float>(view.near_z), far_z = static_cast<float>(view.far_z);
-    for (float& z : small.depth.grid().data()) {
-      if (!DepthImage::IsHole(z)) z = std::clamp(z, near_z, far_z);
-    }
+  const double depth_break = ThresholdsOf(view, {}).depth_break;
+  small.depth_state = {};
+  small.depth = ShrunkWithin(MeasuredDepth(view), shrink, depth_break, view.near_z, view.far_z);
+  if (!view.depth_state.empty()) {
+    AddCompletedDepth(ShrunkWithin(CompletedDepth(view), shrink, depth_break, view.completed_near_z,
+                                   view.completed_far_z),
+                      small);
   }
   small.inverse_depth_sigma.reset();
   small.mesh.reset();

@@ -9,6 +9,7 @@ namespace {
 
 /// That the view's depth was stored in; none where it was in no code of inverse depth.
 std::optional<InverseDepthCode> CodeOf(const View& view) {
+  if (!view.depth_state.empty()) return std::nullopt;  // two codes, of two ranges
   if (!InverseDepthCode::IsRange(view.near_z, view.far_z)) return std::nullopt;
   if (view.depth_coding == DepthCoding::kPng16InverseDepth) {
     return InverseDepthCode(view.near_z, view.far_z);

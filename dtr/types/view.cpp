@@ -16,6 +16,50 @@ PinholeCamera View::DepthCamera() const {
   return camera.Resized(camera.width_px() / depth_scale, camera.height_px() / depth_scale);
 }
 
+DepthImage MeasuredDepth(const View& view) {
+  DepthImage measured = view.depth;
+  for (size_t p = 0; p < view.depth_state.data().size(); ++p) {
+    if (view.depth_state.data()[p] != DepthState::kMeasured) measured.grid().data()[p] = 0;
+  }
+  return measured;
+}
+
+DepthImage CompletedDepth(const View& view) {
+  if (view.depth_state.empty()) return {};
+  DepthImage completed(view.depth.width(), view.depth.height());
+  for (size_t p = 0; p < view.depth_state.data().size(); ++p) {
+    if (view.depth_state.data()[p] == DepthState::kMeasured) continue;
+    completed.grid().data()[p] = view.depth.grid().data()[p];
+  }
+  return completed;
+}
+
+void AddCompletedDepth(const DepthImage& completed, View& view) {
+  if (completed.empty()) return;
+  view.depth_state = Grid<DepthState>(view.depth.width(), view.depth.height());
+  const auto far = static_cast<float>(view.completed_far_z);
+  for (size_t p = 0; p < view.depth_state.data().size(); ++p) {
+    const float z = completed.grid().data()[p];
+    float& depth = view.depth.grid().data()[p];
+    if (DepthImage::IsHole(z) || !DepthImage::IsHole(depth)) continue;
+    depth = z;
+    view.depth_state.data()[p] = z < far ? DepthState::kCompleted : DepthState::kFar;
+  }
+}
+
+void DropDepth(View& view) {
+  view.depth = {};
+  view.depth_state = {};
+  view.inverse_depth_sigma.reset();
+  view.mesh.reset();
+  for (auto* file : {&view.depth_file, &view.completed_file, &view.sigma_file, &view.mesh_file}) {
+    file->reset();
+  }
+  view.near_z = view.far_z = view.completed_near_z = view.completed_far_z = 0;
+  view.completed_steps = 0;
+  view.depth_scale = 1;
+}
+
 bool IsCalled(const std::string& name, const std::string& word) {
   const std::filesystem::path photo(name);
   return name == word || (photo.parent_path() / photo.stem()).string() == word;

@@ -53,18 +53,18 @@ struct View {
   PinholeCamera camera{1, 1, 1, 1, 0, 0};  ///< of the image grid
   Pose cam_from_world;                     ///< world: relative to DtrSet::world_origin
 
-  ImageRgb8 image;                                 ///< 8-bit sRGB, size of `camera`
-  Mask mask;                                       ///< empty: every pixel is usable
-  DepthImage depth;                                ///< plane z; size of `camera` / depth_scale
+  ImageRgb8 image;   ///< 8-bit sRGB, size of `camera`
+  Mask mask;         ///< empty: every pixel is usable
+  DepthImage depth;  ///< plane z; size of `camera` / depth_scale
   /// Of each depth pixel, where completed depths are loaded with the measured ones; else empty.
   Grid<DepthState> depth_state;
   std::optional<Grid<float>> inverse_depth_sigma;  ///< std. deviation of 1/z, grid of `depth`
 
   DepthCoding depth_coding = DepthCoding::kPng16InverseDepth;
-  int depth_steps = 0;            ///< of kZstdInverseDepth, 1...65534; 0 with other codings
-  int depth_scale = 1;            ///< s: the depth map is 1/s of the image per axis
-  double near_z = 0, far_z = 0;   ///< range of the stored depth; 0 for held-out views
-  int completed_steps = 0;        ///< as depth_steps, of the completed depth (docs/FORMAT.md, 4.2)
+  int depth_steps = 0;           ///< of kZstdInverseDepth, 1...65534; 0 with other codings
+  int depth_scale = 1;           ///< s: the depth map is 1/s of the image per axis
+  double near_z = 0, far_z = 0;  ///< range of the stored depth; 0 for held-out views
+  int completed_steps = 0;       ///< as depth_steps, of the completed depth (docs/FORMAT.md, 4.2)
   double completed_near_z = 0, completed_far_z = 0;  ///< its range; 0 where there is none
   double reference_baseline = 0;  ///< docs/FORMAT.md; the baseline of every figure in px
   Eigen::Vector3d gain = Eigen::Vector3d::Ones();  ///< exposure towards the set's mean (SPEC 4.4)
@@ -78,6 +78,16 @@ struct View {
   PinholeCamera DepthCamera() const;
   Eigen::Vector3d CenterInWorld() const { return cam_from_world.TargetOriginInSource(); }
 };
+
+/// The depth map without what was completed.
+DepthImage MeasuredDepth(const View& view);
+/// What was completed of it alone, 0 elsewhere; empty where nothing was.
+DepthImage CompletedDepth(const View& view);
+/// Puts completed depths into the holes of the view's measured depth map, of the same size, and
+/// says so in depth_state; what is at least completed_far_z is far. An empty map changes nothing.
+void AddCompletedDepth(const DepthImage& completed, View& view);
+/// The view without depth and all that goes with it, as before any was found.
+void DropDepth(View& view);
 
 /// True where somebody means the photo `name` by `word`: with its extension or without.
 bool IsCalled(const std::string& name, const std::string& word);

@@ -6,7 +6,7 @@
 namespace dtr::stereo {
 namespace {
 
-constexpr float kSamePx = 2;  // cells of disparity
+constexpr float kSeenThroughPx = 2;  // cells of disparity
 
 /// Bilinear; false where a cell around is masked.
 bool ColourAt(const CellView& cells, float x, float y, float* rgb) {
@@ -30,8 +30,7 @@ bool ColourAt(const CellView& cells, float x, float y, float* rgb) {
 }  // namespace
 
 Agreement::Agreement(const CellView& view, std::span<const CellView* const> others,
-                     std::span<const Grid<float>* const> completed,
-                     const AgreementWeights& weights)
+                     std::span<const Grid<float>* const> completed, const AgreementWeights& weights)
     : view_(view), weights_(weights) {
   for (size_t i = 0; i < others.size(); ++i) {
     const CellView& other = *others[i];
@@ -41,13 +40,12 @@ Agreement::Agreement(const CellView& view, std::span<const CellView* const> othe
     const Pose other_from_view = other.cam_from_world * view.cam_from_world.Inverse();
     others_.push_back({&other, completed.empty() ? nullptr : completed[i],
                        (k * other_from_view.rotation.toRotationMatrix()).cast<float>(),
-                       (k * other_from_view.translation).cast<float>(), kSamePx * other.pixel});
+                       (k * other_from_view.translation).cast<float>(), kSeenThroughPx * other.pixel});
   }
 }
 
 float Agreement::CostAt(int x, int y, float w) const {
-  const Eigen::Vector3f ray =
-      view_.RayAt(static_cast<float>(x) + 0.5F, static_cast<float>(y) + 0.5F);
+  const Eigen::Vector3f ray = view_.RayOf(x, y);
   // Of the two that agree best: others may not see the place, though nothing says so.
   float best[2] = {weights_.max_colour, weights_.max_colour};
   int answers = 0, hidden = 0, through = 0, asked = 0, elsewhere = 0;

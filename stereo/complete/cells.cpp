@@ -4,15 +4,16 @@
 #include <algorithm>
 #include <cmath>
 
-#include "dtr/render/exposure.h"
 #include "dtr/render/colour.h"
+#include "dtr/render/exposure.h"
+#include "dtr/render/scene.h"
 
 namespace dtr::stereo {
 namespace {
 
 constexpr int kMaxCells = 340;
-constexpr int kPlaneReach = 2;      // cells on either side, for a plane's slope
-constexpr float kLevel = 1e-3F;     // of the weight, towards a plane of constant depth
+constexpr int kPlaneReach = 2;   // cells on either side, for a plane's slope
+constexpr float kLevel = 1e-3F;  // of the weight, towards a plane of constant depth
 constexpr int kPlaneFits = 3;
 
 struct CellSums {
@@ -41,8 +42,8 @@ void Average(const View& view, int cell_px, CellView& cells) {
       cells.usable(x, y) = 255;
       for (int c = 0; c < 3; ++c) {
         const double mean = sums.rgb[c] / sums.usable / 255;
-        cells.colour(x, y, c) = static_cast<float>(
-            255 * SrgbFromLinear(Exposed(LinearFromSrgb(mean), view.gain[c])));
+        cells.colour(x, y, c) =
+            static_cast<float>(255 * SrgbFromLinear(Exposed(LinearFromSrgb(mean), view.gain[c])));
       }
       const auto known = sums.inverse_depths.size();
       if (2 * known < static_cast<size_t>(sums.usable)) continue;
@@ -77,34 +78,43 @@ ViewPlane FitPlane(const CellView& cells, int x, int y) {
   // From cells to rays: 1/z = a x + b y + c.
   const auto fx = static_cast<float>(cells.camera.fx_px()),
              fy = static_cast<float>(cells.camera.fy_px());
-  const Eigen::Vector3f ray =
-      cells.RayAt(static_cast<float>(x) + 0.5F, static_cast<float>(y) + 0.5F);
+  const Eigen::Vector3f ray = cells.RayOf(x, y);
   const float a = slope.x() * fx, b = slope.y() * fy;
   return {a, b, slope.z() - a * ray.x() - b * ray.y()};
 }
 
-}  // namespace
-
+/// Photo pixels per cell and axis.
 int CellSizeOf(const PinholeCamera& camera) {
   const int side = std::max(camera.width_px(), camera.height_px());
   return (side + kMaxCells - 1) / kMaxCells;
 }
 
-CellView MakeCells(const View& view, int cell_px) {
+}  // namespace
+
+std::uint64_t CellBytes(const PinholeCamera& camera) {
+  const int size = CellSizeOf(camera);
+  const auto columns = static_cast<std::uint64_t>((camera.width_px() + size - 1) / size);
+  const auto rows = static_cast<std::uint64_t>((camera.height_px() + size - 1) / size);
+  return columns * rows * (7 * sizeof(float) + 2);
+}
+
+CellView MakeCells(const View& view) {
+  const int cell_px = CellSizeOf(view.camera);
   const int columns = (view.camera.width_px() + cell_px - 1) / cell_px;
   const int rows = (view.camera.height_px() + cell_px - 1) / cell_px;
   const double size = cell_px;
   CellView cells;
-  cells.camera = PinholeCamera(columns, rows, view.camera.fx_px() / size,
-                               view.camera.fy_px() / size, view.camera.cx_px() / size,
-                               view.camera.cy_px() / size);
+  cells.cell_px = cell_px;
+  cells.camera =
+      PinholeCamera(columns, rows, view.camera.fx_px() / size, view.camera.fy_px() / size,
+                    view.camera.cx_px() / size, view.camera.cy_px() / size);
   cells.cam_from_world = view.cam_from_world;
   cells.colour = Grid<float>(columns, rows, 3);
   cells.usable = Mask(columns, rows);
   cells.inverse_depth = Grid<float>(columns, rows);
   cells.planes = Grid<float>(columns, rows, 3);
   cells.shared = Grid<std::uint8_t>(columns, rows);
-  cells.pixel = static_cast<float>(1 / (cells.camera.fx_px() * view.reference_baseline));
+  cells.pixel = static_cast<float>(1 / (cells.camera.fx_px() * DisparityBaseline(view)));
   Average(view, cell_px, cells);
   for (int y = 0; y < rows; ++y) {
     for (int x = 0; x < columns; ++x) {

@@ -1,6 +1,7 @@
 // stereo/complete/cells.h -- a view in little: what completion asks of it.
 #pragma once
 #include <Eigen/Core>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <vector>
@@ -25,22 +26,28 @@ struct CellView {
   Grid<float> inverse_depth;  ///< median of the measured depths; 0 where less than half has any
   Grid<float> planes;         ///< ViewPlane of measured cells, 3 channels
   Grid<std::uint8_t> shared;  ///< 255 where measured, but the cell has holes as well
+  int cell_px = 1;            ///< photo pixels per cell and axis
   float pixel = 0;            ///< difference of inverse depth that is one cell of disparity
 
   ViewPlane PlaneAt(int x, int y) const {
     return {planes(x, y, 0), planes(x, y, 1), planes(x, y, 2)};
   }
+  /// Ray of a position in cells, z = 1.
   Eigen::Vector3f RayAt(float x, float y) const {
     return {(x - static_cast<float>(camera.cx_px())) / static_cast<float>(camera.fx_px()),
             (y - static_cast<float>(camera.cy_px())) / static_cast<float>(camera.fy_px()), 1};
   }
+  /// Of a cell's centre.
+  Eigen::Vector3f RayOf(int x, int y) const {
+    return RayAt(static_cast<float>(x) + 0.5F, static_cast<float>(y) + 0.5F);
+  }
 };
 
-/// Photo pixels per cell: the longer side has at most 340 cells.
-int CellSizeOf(const PinholeCamera& camera);
-
-/// Of a loaded view (image, mask, depth). `cell_px`: CellSizeOf(view.camera).
-CellView MakeCells(const View& view, int cell_px);
+/// Of a loaded view (image, mask, measured depth) with its reference_baseline. The longer side has
+/// at most 340 cells.
+CellView MakeCells(const View& view);
+/// Bytes of the cells of a view of this camera.
+std::uint64_t CellBytes(const PinholeCamera& camera);
 
 /// The same plane before another camera; empty where that camera's centre lies on it.
 std::optional<ViewPlane> PlaneInOther(const ViewPlane& plane, const Pose& other_from_view);

@@ -3,113 +3,109 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
-#include "dtr/render/exposure.h"
+
 #include "dtr/render/colour.h"
+#include "dtr/render/exposure.h"
 
 namespace dtr::stereo {
 namespace {
 
-constexpr float kAlike = 10;    // levels, between a pixel and a cell
-constexpr float kSamePx = 1;    // cells of disparity
+constexpr float kAlike = 10;  // levels of sRGB between a pixel and a cell, for 1/e of its say
+constexpr float kSameDepthPx = 1;  // cells of disparity: the same surface
+
+/// The planes of the cells around a pixel at its ray, and their say.
+struct Votes {
+  std::array<float, 9> weight{}, inverse_depth{};
+  size_t count = 0;
+
+  void Add(float w, float say) {
+    inverse_depth[count] = std::max(0.0F, w);
+    weight[count++] = say;
+  }
+  /// Of those that lie on one surface, the mean of most say.
+  float Best(float same) const {
+    float most = 0, best = 0;
+    for (size_t a = 0; a < count; ++a) {
+      float sum = 0, mean = 0;
+      for (size_t b = 0; b < count; ++b) {
+        if (std::abs(inverse_depth[a] - inverse_depth[b]) > same) continue;
+        sum += weight[b];
+        mean += weight[b] * inverse_depth[b];
+      }
+      if (sum > most) most = sum, best = mean / sum;
+    }
+    return best;
+  }
+};
+
+class Expansion {
+ public:
+  Expansion(const View& view, const CellView& cells, const CompletedCells& completed)
+      : view_(view), cells_(cells), completed_(completed) {
+    for (int c = 0; c < 3; ++c) {
+      for (int level = 0; level < 256; ++level) {
+        levels_[static_cast<size_t>(c)][static_cast<size_t>(level)] = static_cast<float>(
+            255 * SrgbFromLinear(Exposed(LinearFromSrgb(level / 255.0), view.gain[c])));
+      }
+    }
+  }
+
+  /// Inverse depth at a pixel of the photo; none where its cell has no plane.
+  std::optional<float> At(int x, int y) const {
+    const auto size = static_cast<float>(cells_.cell_px);
+    const float u = (static_cast<float>(x) + 0.5F) / size;
+    const float v = (static_cast<float>(y) + 0.5F) / size;
+    const int column = x / cells_.cell_px, row = y / cells_.cell_px;
+    if (!completed_.Has(column, row)) return std::nullopt;
+    const Eigen::Vector3f ray = cells_.RayAt(u, v);
+    Votes votes;
+    for (int j = row - 1; j <= row + 1; ++j) {
+      for (int i = column - 1; i <= column + 1; ++i) {
+        if (!cells_.usable.Contains(i, j) || cells_.usable(i, j) == 0 || !completed_.Has(i, j)) {
+          continue;
+        }
+        const float du = u - static_cast<float>(i) - 0.5F, dv = v - static_cast<float>(j) - 0.5F;
+        votes.Add(completed_.PlaneAt(i, j).dot(ray),
+                  std::exp(-(du * du + dv * dv) - Difference(x, y, i, j) / kAlike));
+      }
+    }
+    return votes.Best(kSameDepthPx * cells_.pixel);
+  }
+
+ private:
+  /// Of a pixel's colour from that of a cell, levels.
+  float Difference(int x, int y, int column, int row) const {
+    float off = 0;
+    for (int c = 0; c < 3; ++c) {
+      off += std::abs(levels_[static_cast<size_t>(c)][view_.image(x, y, c)] -
+                      cells_.colour(column, row, c));
+    }
+    return off / 3;
+  }
+
+  const View& view_;
+  const CellView& cells_;
+  const CompletedCells& completed_;
+  std::array<std::array<float, 256>, 3> levels_{};  ///< of the photo, in the set's exposure
+};
 
 }  // namespace
 
 DepthImage ExpandCells(const View& view, const CellView& cells, const CompletedCells& completed,
-                       int cell_px, float far_z) {
-  const int scale = view.depth_scale;
+                       float far_z) {
+  const Expansion expansion(view, cells, completed);
   DepthImage depth(view.depth.width(), view.depth.height());
-  std::array<std::array<float, 256>, 3> levels{};
-  for (int c = 0; c < 3; ++c) {
-    for (int v = 0; v < 256; ++v) {
-      levels[static_cast<size_t>(c)][static_cast<size_t>(v)] = static_cast<float>(
-          255 * SrgbFromLinear(Exposed(LinearFromSrgb(v / 255.0), view.gain[c])));
-    }
-  }
-  const auto size = static_cast<float>(cell_px);
+  const int scale = view.depth_scale;
   for (int y = 0; y < depth.height(); ++y) {
     for (int x = 0; x < depth.width(); ++x) {
       if (!DepthImage::IsHole(view.depth(x, y))) continue;
-      const int px = std::min(x * scale + scale / 2, view.image.width() - 1);
-      const int py = std::min(y * scale + scale / 2, view.image.height() - 1);
+      const int px = x * scale + scale / 2, py = y * scale + scale / 2;
       if (!view.mask.empty() && view.mask(px, py) == 0) continue;
-      const float u = (static_cast<float>(px) + 0.5F) / size, v = (static_cast<float>(py) + 0.5F) / size;
-      const Eigen::Vector3f ray = cells.RayAt(u, v);
-      const int cx = static_cast<int>(u), cy = static_cast<int>(v);
-      if (!completed.PlaneAt(std::min(cx, cells.colour.width() - 1), std::min(cy, cells.colour.height() - 1)).allFinite()) continue;
-      std::array<float, 9> weight{}, w{};
-      int n = 0;
-      for (int dy = -1; dy <= 1; ++dy) {
-        for (int dx = -1; dx <= 1; ++dx) {
-          const int i = cx + dx, j = cy + dy;
-          if (!cells.usable.Contains(i, j) || !cells.usable(i, j)) continue;
-          float off = 0;
-          for (int c = 0; c < 3; ++c) {
-            off += std::abs(levels[static_cast<size_t>(c)][view.image(px, py, c)] -
-                            cells.colour(i, j, c)) / 3;
-          }
-          const float du = u - static_cast<float>(i) - 0.5F, dv = v - static_cast<float>(j) - 0.5F;
-          const ViewPlane plane = completed.PlaneAt(i, j);
-          if (!plane.allFinite()) continue;
-          weight[n] = std::exp(-(du * du + dv * dv) - off / kAlike);
-          w[n] = std::max(0.0F, plane.dot(ray));
-          ++n;
-        }
-      }
-      float best = -1, chosen = 0;
-      for (int a = 0; a < n; ++a) {
-        float sum = 0, mean = 0;
-        for (int b = 0; b < n; ++b) {
-          if (std::abs(w[a] - w[b]) > kSamePx * cells.pixel) continue;
-          sum += weight[b], mean += weight[b] * w[b];
-        }
-        if (sum > best) best = sum, chosen = mean / sum;
-      }
-      if (best < 0) continue;
-      depth(x, y) = chosen * far_z > 1 ? 1 / chosen : far_z;
+      const std::optional<float> w = expansion.At(px, py);
+      if (w) depth(x, y) = *w * far_z > 1 ? 1 / *w : far_z;
     }
   }
   return depth;
-}
-
-CompletedCells KeepSupported(const CellView& view, const CompletedCells& completed,
-                             std::span<const CellView* const> others,
-                             std::span<const CompletedCells* const> completed_others, int mode,
-                             float support_px) {
-  CompletedCells kept = completed;
-  const int columns = view.colour.width(), rows = view.colour.height();
-  for (int y = 0; y < rows; ++y) {
-    for (int x = 0; x < columns; ++x) {
-      if (view.inverse_depth(x, y) > 0) continue;
-      const Eigen::Vector3f ray = view.RayAt(static_cast<float>(x) + 0.5F, static_cast<float>(y) + 0.5F);
-      const float w = std::max(completed.PlaneAt(x, y).dot(ray), 1e-4F * view.pixel);
-      bool supported = false, shown = false;
-      for (size_t o = 0; o < others.size() && !supported; ++o) {
-        const CellView& cells = *others[o];
-        const Pose pose = cells.cam_from_world * view.cam_from_world.Inverse();
-        const Eigen::Vector3d p = pose * (ray / w).cast<double>();
-        const auto at = cells.camera.PixelFromCam(p);
-        if (!at || !cells.camera.Contains(*at)) continue;
-        const auto there = static_cast<float>(1 / p.z());
-        const auto u = static_cast<float>(at->x()), v = static_cast<float>(at->y());
-        bool nearer = false;
-        const int R = getenv("J_R") ? atoi(getenv("J_R")) : 0;
-        for (int j = -R; j <= R && !supported; ++j) {
-          for (int i = -R; i <= R && !supported; ++i) {
-            const int cx = static_cast<int>(u) + i, cy = static_cast<int>(v) + j;
-            if (!cells.usable.Contains(cx, cy) || !cells.usable(cx, cy)) continue;
-            const float off = completed_others[o]->PlaneAt(cx, cy).dot(cells.RayAt(u, v)) - there;
-            supported = std::abs(off) <= support_px * cells.pixel;
-            if (i == 0 && j == 0) nearer = off > support_px * cells.pixel;
-          }
-        }
-        if (!nearer) shown = true;
-      }
-      if (supported || (mode != 1 && !shown && (mode == 0 || completed.on_scene_plane(x, y)))) continue;
-      for (int c = 0; c < 3; ++c) kept.planes(x, y, c) = std::numeric_limits<float>::quiet_NaN();
-    }
-  }
-  return kept;
 }
 
 }  // namespace dtr::stereo

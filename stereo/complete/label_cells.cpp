@@ -11,14 +11,15 @@ namespace {
 constexpr int kDirections = 8;
 constexpr std::array<std::array<int, 2>, kDirections> kSteps = {
     {{1, 0}, {-1, 0}, {0, 1}, {0, -1}, {1, 1}, {-1, -1}, {1, -1}, {-1, 1}}};
-constexpr float kSamePx = 2;    // cells of disparity: the same surface
-constexpr int kInset = 1;       // cells from a rim, where planes are taken from
+constexpr float kSamePx = 2;  // cells of disparity: the same surface
+constexpr int kInset = 1;     // cells from a rim, where planes are taken from
 
 /// Candidates of every cell: a plane each, and what it costs.
 class Candidates {
  public:
   Candidates(int columns, int rows, int labels)
-      : labels_(labels), columns_(columns),
+      : labels_(labels),
+        columns_(columns),
         planes_(static_cast<size_t>(columns) * rows * labels, ViewPlane::Constant(kNone)),
         costs_(static_cast<size_t>(columns) * rows * labels, kNever) {}
   static constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
@@ -54,9 +55,9 @@ class Labelling {
         weights_(weights),
         others_(others),
         completed_(completed),
-        agreement_(view, others, PlanesOf(completed), weights.agreement),
         columns_(view.colour.width()),
         rows_(view.colour.height()),
+        agreement_(view, others, PlanesOf(completed), weights.agreement),
         candidates_(columns_, rows_, 1 + kDirections + 2 + static_cast<int>(planes.size())) {
     AddFar();
     AddDirections();
@@ -66,7 +67,7 @@ class Labelling {
   }
 
   CompletedCells Solve() {
-    std::vector<float> sums(static_cast<size_t>(columns_) * rows_ * candidates_.labels(), 0.0F);
+    std::vector<float> sums(SumsAt(0, rows_), 0.0F);
     for (int y = 0; y < rows_; ++y) {
       Follow(0, y, 1, 0, columns_, sums);
       Follow(columns_ - 1, y, -1, 0, columns_, sums);
@@ -90,9 +91,7 @@ class Labelling {
 
  private:
   bool Measured(int x, int y) const { return view_.inverse_depth(x, y) > 0; }
-  Eigen::Vector3f Ray(int x, int y) const {
-    return view_.RayAt(static_cast<float>(x) + 0.5F, static_cast<float>(y) + 0.5F);
-  }
+  Eigen::Vector3f Ray(int x, int y) const { return view_.RayOf(x, y); }
 
   void AddFar() {
     for (int y = 0; y < rows_; ++y) {
@@ -143,8 +142,7 @@ class Labelling {
             if (completed_.empty()) continue;
             there = completed_[o]->PlaneAt(u, v);
           }
-          const Eigen::Vector3f ray =
-              cells.RayAt(static_cast<float>(u) + 0.5F, static_cast<float>(v) + 0.5F);
+          const Eigen::Vector3f ray = cells.RayOf(u, v);
           const float w = there.dot(ray);
           if (!(w > 0)) continue;
           const Eigen::Vector3d p = view_from_other * (ray / w).cast<double>();
@@ -262,9 +260,9 @@ class Labelling {
 
   const CellView& view_;
   const LabelWeights& weights_;
-  const int columns_, rows_;
   std::span<const CellView* const> others_;
   std::span<const CompletedCells* const> completed_;
+  const int columns_, rows_;
   const Agreement agreement_;
   Candidates candidates_;
 };

@@ -1,5 +1,6 @@
 // stereo/complete/label_cells.h -- planes for the cells of a view that nothing was measured of.
 #pragma once
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -12,10 +13,10 @@ namespace dtr::stereo {
 /// What LabelCells weighs. Costs are in levels of sRGB.
 struct LabelWeights {
   AgreementWeights agreement;
-  float far = 0.2F;         ///< of the plane at infinity
-  float jump = 50;          ///< of a jump of depth between neighbouring cells of one colour
-  float jump_px = 2;        ///< cells of disparity from which on it is one
-  float edge_levels = 12;   ///< difference of colours at which a jump costs 1/e
+  float far = 0.2F;        ///< of the plane at infinity
+  float jump = 50;         ///< of a jump of depth between neighbouring cells of one colour
+  float jump_px = 2;       ///< cells of disparity from which on it is one
+  float edge_levels = 12;  ///< difference of colours at which a jump costs 1/e
 };
 
 /// Planes of the cells without measured depth; all zero: far. Measured cells keep theirs.
@@ -24,6 +25,8 @@ struct CompletedCells {
   ViewPlane PlaneAt(int x, int y) const {
     return {planes(x, y, 0), planes(x, y, 1), planes(x, y, 2)};
   }
+  bool Has(int x, int y) const { return planes(x, y, 0) == planes(x, y, 0); }
+  void TakeBack(int x, int y) { planes(x, y, 0) = std::numeric_limits<float>::quiet_NaN(); }
 };
 
 /// `others`: neighbours of the view, best first. `completed`: what an earlier pass gave for these,

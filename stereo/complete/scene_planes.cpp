@@ -35,8 +35,7 @@ std::vector<Sample> SamplesOf(std::span<const CellView> views) {
       for (int x = 0; x < view.inverse_depth.width(); ++x) {
         const float w = view.inverse_depth(x, y);
         if (!(w > 0) || HashBits(at++) % step != 0) continue;
-        const Eigen::Vector3d ray =
-            view.RayAt(static_cast<float>(x) + 0.5F, static_cast<float>(y) + 0.5F).cast<double>();
+        const Eigen::Vector3d ray = view.RayOf(x, y).cast<double>();
         const double z = 1 / static_cast<double>(w);
         const Eigen::Vector3d normal = view.PlaneAt(x, y).cast<double>();
         if (!(normal.norm() > 0)) continue;
@@ -100,7 +99,7 @@ std::vector<ScenePlane> FindScenePlanes(std::span<const CellView> views, int mos
   std::vector<Sample> samples = SamplesOf(views);
   const double least = kMinShare * static_cast<double>(samples.size()) + 3;
   std::vector<ScenePlane> planes;
-  for (int k = 0; k < most && static_cast<double>(samples.size()) > least; ++k) {
+  for (int k = 0; k<most&& static_cast<double>(samples.size())> least; ++k) {
     std::vector<ScenePlane> tried(kTrials);
     std::vector<double> support(kTrials);
     ParallelFor(0, kTrials, threads, [&](int trial) {

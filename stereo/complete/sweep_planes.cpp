@@ -3,6 +3,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <tuple>
+#include <utility>
 
 #include "dtr/base/parallel_for.h"
 #include "dtr/base/random.h"
@@ -13,13 +15,13 @@ namespace dtr::stereo {
 namespace {
 
 constexpr size_t kMaxPlaces = 6000;
-constexpr size_t kNormals = 3;         // known ones, beside the level one
+constexpr size_t kNormals = 3;  // known ones, beside the level one
 constexpr int kOffsets = 160;
-constexpr float kUnexplained = 12;     // levels: cost of a place that no plane explains
-constexpr float kMinContrast = 2;      // levels, between neighbouring cells
-constexpr double kMinShare = 0.02;     // of the places, for a plane
-constexpr int kRefinements = 60;
-constexpr double kParallel = 0.97;     // cosine
+constexpr float kUnexplained = 12;  // levels: cost of a place that no plane explains
+constexpr float kMinContrast = 2;   // levels, between neighbouring cells
+constexpr double kMinExplained = 0.02;  // of the places, for a plane
+constexpr int kRefinements = 8;
+constexpr double kParallel = 0.97;  // cosine
 
 /// A cell without depth.
 struct Place {
@@ -45,8 +47,8 @@ class Sweep {
  public:
   Sweep(std::span<const Neighbourhood> views, int threads) : views_(views), threads_(threads) {
     for (const Neighbourhood& around : views) {
-      agreements_.emplace_back(*around.view, around.others,
-                               std::span<const Grid<float>* const>(), weights_);
+      agreements_.emplace_back(*around.view, around.others, std::span<const Grid<float>* const>(),
+                               weights_);
     }
     weights_.no_view = kUnexplained, weights_.one_view = kUnexplained;
     std::vector<Place> all;
@@ -103,8 +105,7 @@ class Sweep {
  private:
   float CostAt(const Place& p, const ViewPlane& plane) const {
     const CellView& view = *views_[p.view].view;
-    const float w =
-        plane.dot(view.RayAt(static_cast<float>(p.x) + 0.5F, static_cast<float>(p.y) + 0.5F));
+    const float w = plane.dot(view.RayOf(p.x, p.y));
     return w > 0 ? agreements_[p.view].CostAt(p.x, p.y, w) : kUnexplained;
   }
 
@@ -145,6 +146,7 @@ std::vector<ScenePlane> Parallel(const Eigen::Vector3d& normal,
     nearest = std::max(nearest, *std::max_element(w.begin(), w.end()));
   }
   std::vector<ScenePlane> planes;
+  if (!(nearest > 0)) return planes;
   for (int k = 1; k <= kOffsets; ++k) {
     const double distance = kOffsets / (k * 20 * static_cast<double>(nearest));
     for (const double side : {-1.0, 1.0}) planes.push_back({normal, middle + side * distance});
@@ -152,11 +154,29 @@ std::vector<ScenePlane> Parallel(const Eigen::Vector3d& normal,
   return planes;
 }
 
+/// Turned and shifted to where it gains most, closer and closer; and its gain.
+std::pair<ScenePlane, double> Refined(const Sweep& sweep, ScenePlane plane) {
+  double turn = 0.02, shift = 0.02 * std::abs(plane.offset), gain = 0;
+  for (int step = 0; step < kRefinements; ++step, turn *= 0.7, shift *= 0.7) {
+    const Eigen::Vector3d u = plane.normal.unitOrthogonal(), v = plane.normal.cross(u);
+    const Eigen::Vector3d anchor = plane.normal * plane.offset;
+    std::vector<ScenePlane> around = {plane};
+    for (const double sign : {-1.0, 1.0}) {
+      for (const Eigen::Vector3d& axis : {u, v}) {
+        const Eigen::Vector3d normal = (plane.normal + sign * turn * axis).normalized();
+        around.push_back({normal, normal.dot(anchor)});
+      }
+      around.push_back({plane.normal, plane.offset + sign * shift});
+    }
+    std::tie(plane, gain) = sweep.Best(around);
+  }
+  return {plane, gain};
+}
+
 }  // namespace
 
 std::vector<ScenePlane> SweepScenePlanes(std::span<const Neighbourhood> views,
-                                         std::span<const ScenePlane> known, int most,
-                                         int threads) {
+                                         std::span<const ScenePlane> known, int most, int threads) {
   Sweep sweep(views, threads);
   if (sweep.places() == 0) return {};
   std::vector<Eigen::Vector3d> normals = {LevelNormal(views, known)};
@@ -172,22 +192,9 @@ std::vector<ScenePlane> SweepScenePlanes(std::span<const Neighbourhood> views,
     tried.insert(tried.end(), parallel.begin(), parallel.end());
   }
   std::vector<ScenePlane> found;
-  for (int k = 0; k < most; ++k) {
-    auto [best, gain] = sweep.Best(tried);
-    // Closer and closer around it.
-    double turn = 0.02, shift = 0.02 * std::abs(best.offset) + 1e-9;
-    for (int step = 0; step < kRefinements; step += 8, turn *= 0.7, shift *= 0.7) {
-      std::vector<ScenePlane> around = {best};
-      const Eigen::Vector3d u = best.normal.unitOrthogonal(), v = best.normal.cross(u);
-      const Eigen::Vector3d anchor = best.normal * best.offset;
-      for (const auto& [a, b, c] : {std::tuple{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0},
-                                    {0, 0, 1}, {0, 0, -1}}) {
-        const Eigen::Vector3d normal = (best.normal + turn * (a * u + b * v)).normalized();
-        around.push_back({normal, normal.dot(anchor) + shift * c});
-      }
-      std::tie(best, gain) = sweep.Best(around);
-    }
-    if (gain < kMinShare * kUnexplained * static_cast<double>(sweep.places())) break;
+  for (int k = 0; k < most && !tried.empty(); ++k) {
+    const auto [best, gain] = Refined(sweep, sweep.Best(tried).first);
+    if (gain < kMinExplained * kUnexplained * static_cast<double>(sweep.places())) break;
     sweep.Explain(best);
     found.push_back(best);
   }

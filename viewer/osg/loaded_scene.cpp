@@ -91,6 +91,7 @@ std::shared_ptr<const LoadedSet> MakeSet(dtr::DtrSet set) {
 
 std::shared_ptr<const LoadedSet> LoadSet(const std::string& set_folder) {
   dtr::io::LoadOptions options;
+  options.completed = true;
   options.warn = [](const std::string& line) { OSG_WARN << line << std::endl; };
   return MakeSet(dtr::io::LoadSet(set_folder, options));
 }

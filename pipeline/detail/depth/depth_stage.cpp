@@ -18,28 +18,13 @@
 #include "pipeline/detail/depth/depth_precision.h"
 #include "pipeline/detail/depth/gains.h"
 #include "pipeline/detail/depth/plane_files.h"
+#include "pipeline/detail/depth/source_scene.h"
 #include "pipeline/detail/depth/time_budget.h"
 #include "stereo/depth_maps.h"
 #include "stereo/normals.h"
 
 namespace dtr::pipeline {
 namespace {
-
-// The scene as the source views alone know it, with views renumbered to their order among sources.
-SparseScene SourceScene(const SparseScene& sparse, const std::vector<View>& views,
-                        const std::vector<int>& sources) {
-  std::vector<bool> is_source(views.size(), false);
-  std::vector<int> source_index(views.size(), -1);
-  for (size_t s = 0; s < sources.size(); ++s) {
-    is_source[static_cast<size_t>(sources[s])] = true;
-    source_index[static_cast<size_t>(sources[s])] = static_cast<int>(s);
-  }
-  SparseScene scene = RestrictToViews(sparse, is_source);
-  for (SparseObservation& seen : scene.observations) {
-    seen.view = source_index[static_cast<size_t>(seen.view)];
-  }
-  return scene;
-}
 
 // What the program itself takes: code, libraries, points and whatever is not counted one by one.
 constexpr std::uint64_t kProgramBytes = std::uint64_t{256} << 20;

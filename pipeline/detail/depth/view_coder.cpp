@@ -26,6 +26,11 @@ bool IsCoarser(const View& view, double error) {
          InverseDepthCode(view.near_z, view.far_z, format.steps).step() >= error;
 }
 
+void KeepMeasured(View& view) {
+  view.depth = MeasuredDepth(view);
+  view.depth_state = {};
+}
+
 /// True where image, mask and depth are as they were before they are coded.
 bool KeepsPixels(const View& view, const prune::Coding& coding) {
   return coding.shrink == 1 && coding.TilesOf(view) == nullptr;
@@ -52,7 +57,12 @@ View ViewCoder::Recoded(const View& view, const prune::Coding& coding) const {
   if (coding.depth_error_px > 0) {
     const double error = coding.depth_error_px * ThresholdsOf(view, {}).pixel;
     // A view of too wide a range for that bound keeps its coding.
-    if (!IsCoarser(view, error)) (void)io::TrySetDepthError(recoded, error);
+    if (!IsCoarser(view, error)) {
+      const DepthImage completed = CompletedDepth(recoded);
+      KeepMeasured(recoded);
+      (void)io::TrySetDepthError(recoded, error);
+      AddCompletedDepth(completed, recoded);
+    }
   }
   return recoded;
 }
@@ -100,14 +110,24 @@ std::uint64_t ViewCoder::TryView(View& view, const View& before,
                           view.depth_steps == before.depth_steps && same_pixels;
   if (!same_depth) {
     const io::DepthFormat format = io::FormatOf(view, original_.unit);
-    bytes += stored_as(
-        "-depth" + std::string(io::ExtensionOf(format.coding)),
-        [&](const fs::path& file) { io::WriteDepth(file, view.depth, format); },
-        [&](const fs::path& file) {
-          view.depth = io::ReadDepth(file, format, view.depth.width(), view.depth.height());
-        });
+    const auto recoded_as = [&](const std::string& name, const io::DepthFormat& coded,
+                                DepthImage& depth) {
+      bytes += stored_as(
+          name + std::string(io::ExtensionOf(coded.coding)),
+          [&](const fs::path& file) { io::WriteDepth(file, depth, coded); },
+          [&](const fs::path& file) {
+            depth = io::ReadDepth(file, coded, depth.width(), depth.height());
+          });
+    };
+    DepthImage completed = CompletedDepth(view);
+    KeepMeasured(view);
+    recoded_as("-depth", format, view.depth);
+    if (!completed.empty()) {
+      recoded_as("-completed", io::CompletedFormatOf(view), completed);
+      AddCompletedDepth(completed, view);
+    }
   } else {
-    bytes += BytesOf(before.depth_file);
+    bytes += BytesOf(before.depth_file) + BytesOf(before.completed_file);
   }
   const bool same_mesh = same_depth && before.mesh &&
                          coding.mesh_tolerance_px == render_.mesh_tolerance_px &&
@@ -138,7 +158,7 @@ View ViewCoder::Write(const View& view, const prune::Coding& coding, io::SetWrit
                           recoded.depth_steps == view.depth_steps && same_pixels;
   if (coding.jpeg_quality > 0 || !same_pixels) copied.image_file.reset();
   if (!same_pixels) copied.mask_file.reset();
-  if (!same_depth) copied.depth_file.reset();
+  if (!same_depth) copied.depth_file.reset(), copied.completed_file.reset();
   writer.CopyFiles(folder_, copied);
   if (!same_pixels) {
     View pixels = recoded;
@@ -147,15 +167,22 @@ View ViewCoder::Write(const View& view, const prune::Coding& coding, io::SetWrit
     recoded.image_file = pixels.image_file;
     recoded.mask_file = pixels.mask_file;
     recoded.depth_file = pixels.depth_file;
+    recoded.completed_file = pixels.completed_file;
   } else if (!same_depth) {
     writer.RecodeDepth(recoded, original_.unit);
   }
   if (coding.jpeg_quality > 0) writer.WriteJpeg(recoded, coding.jpeg_quality);
+  const DepthImage completed = CompletedDepth(recoded);
+  KeepMeasured(recoded);
   recoded.depth = io::RoundToCoding(recoded.depth, io::FormatOf(recoded, original_.unit));
+  if (!completed.empty()) {
+    AddCompletedDepth(io::RoundToCoding(completed, io::CompletedFormatOf(recoded)), recoded);
+  }
   writer.WriteMesh(recoded, MeshOf(recoded, coding));
   recoded.image = {};
   recoded.mask = {};
   recoded.depth = {};
+  recoded.depth_state = {};
   recoded.mesh.reset();
   return recoded;
 }

@@ -39,6 +39,7 @@ Json OptionsJson(const BuildOptions& options, const stereo::QualitySettings& qua
   plain.features = colmap::kMaxFeatures;
   if (options.sfm != plain) json["sfm"] = JsonOf(options.sfm);
   json["seed"] = options.seed;
+  json["completion"] = options.depth.completion;
   if (options.depth.depth_error_px) json["depth_error_px"] = *options.depth.depth_error_px;
   return json;
 }

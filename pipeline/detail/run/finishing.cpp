@@ -20,10 +20,12 @@ namespace dtr::pipeline {
 namespace {
 
 // A copy of the view with its stored depth and, if wanted, image and mask.
-View Loaded(const View& view, const io::SetWriter& writer, bool images, int threads) {
+View Loaded(const View& view, const io::SetWriter& writer, bool images, int threads,
+            bool completed = false) {
   View loaded = view;
   io::LoadOptions load;
   load.images = images;
+  load.completed = completed;
   load.threads = threads;
   io::LoadPixels(writer.folder(), loaded, load);
   return loaded;
@@ -95,10 +97,11 @@ DepthCount WriteMeshes(DtrSet& set, io::SetWriter& writer, int threads, Progress
   ViewsDone done(set, "meshes", progress);
   for (View& view : set.frames.front().views) {
     if (!HasDepth(view)) continue;
-    const View loaded = Loaded(view, writer, true, threads);
+    const View loaded = Loaded(view, writer, true, threads, true);
     writer.WriteMesh(view, MakeStoredMesh(loaded, RenderOptions{}, threads));
     ++count.maps;
-    for (const float z : loaded.depth.grid().data()) count.with_depth += !DepthImage::IsHole(z);
+    const DepthImage measured = MeasuredDepth(loaded);
+    for (const float z : measured.grid().data()) count.with_depth += !DepthImage::IsHole(z);
     count.pixels += static_cast<long>(loaded.depth.grid().data().size());
     done.OneMore();
   }

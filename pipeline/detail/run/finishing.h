@@ -22,7 +22,14 @@ void FinishScene(DtrSet& set, std::span<const SparsePoint> points, const io::Set
 void RecodeDepth(DtrSet& set, double error_px, io::SetWriter& writer, int threads, double memory_gb,
                  Progress& progress);
 
-/// How much of the source views has a depth.
+/// Completes the depth of every source view (stereo/complete): what was not measured gets the
+/// depth of a surface or is far. After FinishScene: pixels of disparity need the baselines. Where `memory_gb` is too little, or nothing
+/// was measured at all, a note says so and depth stays as it is. `sparse`: views are indices into
+/// the set's.
+void CompleteDepth(DtrSet& set, const SparseScene& sparse, io::SetWriter& writer, int threads,
+                   double memory_gb, Progress& progress);
+
+/// How much of the source views has a measured depth.
 struct DepthCount {
   int maps = 0;
   long with_depth = 0, pixels = 0;

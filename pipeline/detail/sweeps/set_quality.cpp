@@ -23,7 +23,7 @@ ScratchFolder::ScratchFolder(const std::filesystem::path& folder)
 DtrSet LoadToEvaluate(const std::filesystem::path& folder, bool sigma, int threads,
                       Progress& progress) {
   io::LoadOptions load;
-  load.held_out = true;
+  load.held_out = load.completed = true;
   load.sigma = sigma;
   load.threads = threads;
   load.warn = [&progress](const std::string& line) { progress.Note(line); };

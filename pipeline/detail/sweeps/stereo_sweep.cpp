@@ -75,11 +75,7 @@ void WriteResized(const std::filesystem::path& from, const std::filesystem::path
   for (View& view : set.frames.front().views) {
     progress.ThrowIfInterrupted();
     io::LoadPixels(from, view, load);
-    view.depth_file.reset();
-    view.sigma_file.reset();
-    view.mesh_file.reset();
-    view.near_z = view.far_z = 0;
-    view.depth_scale = 1;
+    DropDepth(view);
     const int width = view.camera.width_px(), height = view.camera.height_px();
     const auto [new_width, new_height] =
         TargetSize(width, height, view.role == ViewRole::kSource ? max_size_px : 0);

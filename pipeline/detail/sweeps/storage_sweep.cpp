@@ -96,7 +96,8 @@ std::uint64_t BytesOf(const DtrSet& set) {
   for (const View& view : set.frames.front().views) {
     if (view.role != ViewRole::kSource) continue;
     for (const std::optional<StoredFile>* file :
-         {&view.image_file, &view.depth_file, &view.sigma_file, &view.mask_file, &view.mesh_file}) {
+         {&view.image_file, &view.depth_file, &view.completed_file, &view.sigma_file,
+          &view.mask_file, &view.mesh_file}) {
       if (*file) bytes += (*file)->bytes;
     }
   }

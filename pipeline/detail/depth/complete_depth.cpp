@@ -1,0 +1,117 @@
+// CompleteDepth of finishing.h.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "dtr/base/memory_budget.h"
+#include "dtr/base/parallel_for.h"
+#include "dtr/io/set_io.h"
+#include "dtr/render/scene.h"
+#include "dtr/types/inverse_depth_code.h"
+#include "pipeline/detail/depth/source_scene.h"
+#include "pipeline/detail/run/finishing.h"
+#include "stereo/complete/complete.h"
+#include "stereo/complete/expand.h"
+#include "stereo/neighbours.h"
+
+namespace dtr::pipeline {
+namespace {
+
+constexpr int kNeighbours = 8;
+constexpr double kFarthest = 50;  // times the farthest measured depth: drawn behind everything
+constexpr double kStepPx = 0.5;   // pixels of disparity between depths that are stored
+
+View Loaded(const View& view, const io::SetWriter& writer) {
+  View loaded = view;
+  io::LoadOptions load;
+  load.threads = 1;
+  io::LoadPixels(writer.folder(), loaded, load);
+  return loaded;
+}
+
+std::vector<std::vector<int>> NeighboursOf(const std::vector<View>& views,
+                                           const std::vector<int>& sources,
+                                           const SparseScene& sparse) {
+  std::vector<stereo::StereoView> cameras;
+  for (const int s : sources) {
+    const View& view = views[static_cast<size_t>(s)];
+    cameras.push_back({view.camera, view.cam_from_world, nullptr, nullptr});
+  }
+  stereo::NeighbourOptions options;
+  options.count = kNeighbours;
+  std::vector<std::vector<int>> neighbours;
+  for (auto& of_view :
+       stereo::ChooseNeighbours(cameras, SourceScene(sparse, views, sources), options)) {
+    neighbours.push_back(std::move(of_view.views));
+  }
+  return neighbours;
+}
+
+/// The range of what was completed, and steps that do not show.
+void ChooseCoding(const DepthImage& completed, double far_z, View& view) {
+  double near_z = far_z / 2;
+  for (const float z : completed.grid().data()) {
+    if (z > 0) near_z = std::min(near_z, static_cast<double>(z));
+  }
+  view.completed_near_z = near_z;
+  view.completed_far_z = far_z;
+  const double steps = (1 / near_z - 1 / far_z) / (kStepPx * ThresholdsOf(view, {}).pixel);
+  view.completed_steps =
+      static_cast<int>(std::clamp<double>(std::ceil(steps), 1, InverseDepthCode::kSteps));
+}
+
+}  // namespace
+
+void CompleteDepth(DtrSet& set, const SparseScene& sparse, io::SetWriter& writer, int threads,
+                   double memory_gb, Progress& progress) {
+  std::vector<View>& views = set.frames.front().views;
+  std::vector<int> sources;
+  std::vector<PinholeCamera> cameras;
+  double farthest = 0;
+  for (size_t i = 0; i < views.size(); ++i) {
+    const View& view = views[i];
+    if (view.role != ViewRole::kSource || !view.depth_file) continue;
+    sources.push_back(static_cast<int>(i));
+    cameras.push_back(view.camera);
+    farthest = std::max(farthest, view.far_z);
+  }
+  const auto bytes = static_cast<double>(stereo::CompletionBytes(cameras, threads));
+  if (bytes > memory_gb * kBytesPerGigabyte) {
+    progress.Note(fmt::format(
+        "depth is not completed where none was measured: that takes `memory` {:.3f} (GB)",
+        bytes / kBytesPerGigabyte));
+    return;
+  }
+  std::vector<stereo::CellView> cells(sources.size());
+  const int count = static_cast<int>(sources.size());
+  ParallelFor(0, count, threads, [&](int i) {
+    progress.ThrowIfInterrupted();
+    const View& view = views[static_cast<size_t>(sources[static_cast<size_t>(i)])];
+    cells[static_cast<size_t>(i)] = stereo::MakeCells(Loaded(view, writer));
+  });
+  const bool measured = std::ranges::any_of(cells, [](const stereo::CellView& of_view) {
+    return std::ranges::any_of(of_view.inverse_depth.data(), [](float w) { return w > 0; });
+  });
+  if (!measured) {
+    progress.Note("depth is not completed: none was measured");
+    return;
+  }
+  const auto completed =
+      stereo::CompleteCells(cells, NeighboursOf(views, sources, sparse), threads, progress);
+  const auto far_z = static_cast<float>(kFarthest * farthest);
+  progress.Stage("completed depth", count);
+  for (int i = 0; i < count; ++i) {
+    progress.ThrowIfInterrupted();
+    const auto k = static_cast<size_t>(i);
+    View& view = views[static_cast<size_t>(sources[k])];
+    const DepthImage depth =
+        stereo::ExpandCells(Loaded(view, writer), cells[k], completed[k], far_z);
+    ChooseCoding(depth, static_cast<double>(far_z), view);
+    writer.WriteCompleted(depth, view);
+    progress.Update(i + 1);
+  }
+}
+
+}  // namespace dtr::pipeline

@@ -1,0 +1,89 @@
+#include "stereo/complete/complete.h"
+
+#include <algorithm>
+#include <atomic>
+
+#include "dtr/base/parallel_for.h"
+#include "stereo/complete/scene_planes.h"
+#include "stereo/complete/support.h"
+
+namespace dtr::stereo {
+namespace {
+
+constexpr int kPasses = 2;
+constexpr int kMeasuredPlanes = 12;  // that are looked for: their normals lead the sweep
+constexpr int kLargestPlanes = 3;    // of these, that cells choose among
+constexpr int kSweptPlanes = 2;
+
+/// A view's neighbours, and what an earlier pass gave for them.
+struct Around {
+  std::vector<const CellView*> cells;
+  std::vector<const CompletedCells*> completed;
+};
+
+Around AroundOf(std::span<const CellView> views, const std::vector<int>& neighbours,
+                std::span<const CompletedCells> completed) {
+  Around around;
+  for (const int n : neighbours) {
+    around.cells.push_back(&views[static_cast<size_t>(n)]);
+    if (!completed.empty()) around.completed.push_back(&completed[static_cast<size_t>(n)]);
+  }
+  return around;
+}
+
+std::vector<ScenePlane> PlanesOf(std::span<const CellView> views,
+                                 std::span<const std::vector<int>> neighbours, int threads) {
+  std::vector<ScenePlane> planes = FindScenePlanes(views, kMeasuredPlanes, threads);
+  std::vector<Neighbourhood> around;
+  for (size_t i = 0; i < views.size(); ++i) {
+    around.push_back({&views[i], AroundOf(views, neighbours[i], {}).cells});
+  }
+  const auto swept = SweepScenePlanes(around, planes, kSweptPlanes, threads);
+  planes.resize(std::min<size_t>(planes.size(), kLargestPlanes));
+  planes.insert(planes.end(), swept.begin(), swept.end());
+  return planes;
+}
+
+}  // namespace
+
+std::vector<CompletedCells> CompleteCells(std::span<const CellView> views,
+                                          std::span<const std::vector<int>> neighbours, int threads,
+                                          Progress& progress) {
+  const int count = static_cast<int>(views.size());
+  progress.Stage("completion", kPasses * count);
+  std::atomic<int> done = 0;
+  const std::vector<ScenePlane> planes = PlanesOf(views, neighbours, threads);
+  std::vector<CompletedCells> completed;
+  for (int pass = 0; pass < kPasses; ++pass) {
+    std::vector<CompletedCells> next(views.size());
+    ParallelFor(0, count, threads, [&](int i) {
+      progress.ThrowIfInterrupted();
+      const auto v = static_cast<size_t>(i);
+      const Around around = AroundOf(views, neighbours[v], completed);
+      next[v] = LabelCells(views[v], around.cells, around.completed, planes, {});
+      progress.Update(++done);
+    });
+    completed = std::move(next);
+  }
+  std::vector<CompletedCells> kept(views.size());
+  ParallelFor(0, count, threads, [&](int i) {
+    const auto v = static_cast<size_t>(i);
+    const Around around = AroundOf(views, neighbours[v], completed);
+    kept[v] = KeepSupported(views[v], completed[v], around.cells, around.completed);
+  });
+  return kept;
+}
+
+std::uint64_t CompletionBytes(std::span<const PinholeCamera> cameras, int threads) {
+  constexpr std::uint64_t kLabels = 11 + kLargestPlanes + kSweptPlanes;
+  std::uint64_t bytes = 0, largest = 0;
+  for (const PinholeCamera& camera : cameras) {
+    const std::uint64_t cells = CellBytes(camera);
+    bytes += 2 * cells;  // with two passes' planes
+    largest = std::max(largest, cells);
+  }
+  // Of each label a plane and two costs: 20 bytes, where a cell has 30.
+  return bytes + static_cast<std::uint64_t>(ResolveThreads(threads)) * largest * kLabels;
+}
+
+}  // namespace dtr::stereo

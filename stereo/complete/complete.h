@@ -1,0 +1,24 @@
+// stereo/complete/complete.h -- depth for what no view measured, decided once for a whole set.
+#pragma once
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "dtr/base/progress.h"
+#include "stereo/complete/cells.h"
+#include "stereo/complete/label_cells.h"
+
+namespace dtr::stereo {
+
+/// Planes for all cells of all views (docs/METHODS.md, 10): measured surfaces that go on, those of
+/// other views, the planes of the scene, or infinitely far, whichever the photos agree on; each
+/// view is then held to what the others chose. `neighbours`: of each view, indices of others, best
+/// first. Deterministic for any number of threads. Throws Interrupted between views.
+std::vector<CompletedCells> CompleteCells(std::span<const CellView> views,
+                                          std::span<const std::vector<int>> neighbours, int threads,
+                                          Progress& progress);
+
+/// Bytes that CompleteCells takes at most for views of these cameras, their cells included.
+std::uint64_t CompletionBytes(std::span<const PinholeCamera> cameras, int threads);
+
+}  // namespace dtr::stereo
