@@ -35,7 +35,8 @@ struct RenderRequest {
   std::filesystem::path depth_out;     ///< one frame: its depth as float EXR; empty: none
   std::filesystem::path coverage_out;  ///< one frame: what some view saw as PNG; empty: none
   RenderOptions render;
-  double memory_gb = 4;  ///< for the views' pixels; others are dropped and read again
+  bool measured_only = false;  ///< drawn without completed depth
+  double memory_gb = 4;        ///< for the views' pixels; others are dropped and read again
   int threads = 0;
 
   bool several() const { return play || cameras.several(); }

@@ -103,6 +103,7 @@ void AddRenderCommand(CLI::App& app) {
                          "Of a dynamic set: every frame in turn, from one position");
         command.add_option("--exclude", options->request.exclude, "Views not to render from")
             ->type_name("NAME,...");
+        AddMeasuredOnly(command, options->request.measured_only);
         AddRendererOptions(command, options->renderer);
         AddMemoryOption(command, options->request.memory_gb,
                         "Memory for the views' pixels; others are dropped and read again [4]");

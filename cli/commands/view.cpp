@@ -42,7 +42,7 @@ struct Options {
   double memory_gb = 4;
   int frames = 0, laps = 1, largest_divisor = 8;
   size_t time_step = 0;
-  bool play = false, no_panel = false, cameras = false, photo = false;
+  bool play = false, no_panel = false, cameras = false, photo = false, measured_only = false;
   std::shared_ptr<RenderOptions> render;
 };
 
@@ -52,8 +52,9 @@ std::unique_ptr<viewer::OpenedSet> Open(const Options& options, const Context& c
   opened->set = io::ReadSet(options.set);
   opened->defaults = StoredRenderOptions(opened->set, WholeFrames());
   io::CollapseDuplicates(opened->set);
-  opened->stream = pipeline::StreamOf(options.set, opened->set, DescribeFrames(opened->set, {}),
-                                      {options.memory_gb, context.common.threads}, context.console);
+  opened->stream = pipeline::StreamOf(
+      options.set, opened->set, DescribeFrames(opened->set, {}),
+      {options.memory_gb, context.common.threads, options.measured_only}, context.console);
   return opened;
 }
 
@@ -84,6 +85,7 @@ std::string CommandLine(const Options& options, const viewer::OpenedSet& opened,
     const bool plain = view->name.find(',') == std::string::npos;
     excluded += (excluded.empty() ? "" : ",") + (plain ? view->name : view->id);
   }
+  if (options.measured_only) words.push_back("--measured-only");
   if (!excluded.empty()) words.insert(words.end(), {"--exclude", excluded});
   const auto further = RenderOptionArguments(wanted.options, opened.defaults);
   words.insert(words.end(), further.begin(), further.end());
@@ -404,6 +406,7 @@ void AddViewCommand(CLI::App& app) {
                         "Keep FILE telling, as JSON, what the window shows; for scripts")
             ->type_name("FILE");
         AddWindowRendererOptions(command, options->renderer);
+        AddMeasuredOnly(command, options->measured_only);
         AddMemoryOption(command, options->memory_gb,
                         "Memory for the views' pixels; others are dropped and read again [4]");
         options->render = AddRenderOptions(command, WholeFrames());

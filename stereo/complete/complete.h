@@ -10,7 +10,7 @@
 
 namespace dtr::stereo {
 
-/// Planes for all cells of all views (docs/METHODS.md, 10): measured surfaces that go on, those of
+/// Planes for all cells of all views (docs/METHODS.md, 11.1): measured surfaces that go on, those of
 /// other views, the planes of the scene, or infinitely far, whichever the photos agree on; each
 /// view is then held to what the others chose. `neighbours`: of each view, indices of others, best
 /// first. Deterministic for any number of threads. Throws Interrupted between views.
