@@ -75,7 +75,7 @@ class DepthTR : public osg::Geode {
   void traverse(osg::NodeVisitor& visitor) override;
 
   /// How it is drawn; with `fill_holes` what no view saw is drawn, too, and hides and is hidden by
-  /// the depth that filling guesses. Throws dtr::UsageError for options without a meaning.
+  /// the depth that filling gives it. Throws dtr::UsageError for options without a meaning.
   void setRenderOptions(const dtr::RenderOptions& options);
   dtr::RenderOptions getRenderOptions() const;
   void setDrawPath(DrawPath path);
