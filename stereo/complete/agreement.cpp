@@ -40,7 +40,8 @@ Agreement::Agreement(const CellView& view, std::span<const CellView* const> othe
     const Pose other_from_view = other.cam_from_world * view.cam_from_world.Inverse();
     others_.push_back({&other, completed.empty() ? nullptr : completed[i],
                        (k * other_from_view.rotation.toRotationMatrix()).cast<float>(),
-                       (k * other_from_view.translation).cast<float>(), kSeenThroughPx * other.pixel});
+                       (k * other_from_view.translation).cast<float>(),
+                       kSeenThroughPx * other.pixel});
   }
 }
 

@@ -5,7 +5,6 @@
 
 #include "dtr/base/parallel_for.h"
 #include "stereo/complete/scene_planes.h"
-#include "stereo/complete/support.h"
 
 namespace dtr::stereo {
 namespace {
@@ -65,13 +64,7 @@ std::vector<CompletedCells> CompleteCells(std::span<const CellView> views,
     });
     completed = std::move(next);
   }
-  std::vector<CompletedCells> kept(views.size());
-  ParallelFor(0, count, threads, [&](int i) {
-    const auto v = static_cast<size_t>(i);
-    const Around around = AroundOf(views, neighbours[v], completed);
-    kept[v] = KeepSupported(views[v], completed[v], around.cells, around.completed);
-  });
-  return kept;
+  return completed;
 }
 
 std::uint64_t CompletionBytes(std::span<const PinholeCamera> cameras, int threads) {

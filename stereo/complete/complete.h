@@ -10,10 +10,11 @@
 
 namespace dtr::stereo {
 
-/// Planes for all cells of all views (docs/METHODS.md, 11.1): measured surfaces that go on, those of
-/// other views, the planes of the scene, or infinitely far, whichever the photos agree on; each
-/// view is then held to what the others chose. `neighbours`: of each view, indices of others, best
-/// first. Deterministic for any number of threads. Throws Interrupted between views.
+/// Planes for all cells of all views (docs/METHODS.md, 11.1): measured surfaces that go on, those
+/// of other views, the planes of the scene, or infinitely far, whichever the photos agree on, in
+/// two passes: the second holds each view to what the others chose. `neighbours`: of each view,
+/// indices of others, best first. Deterministic for any number of threads. Throws Interrupted
+/// between views.
 std::vector<CompletedCells> CompleteCells(std::span<const CellView> views,
                                           std::span<const std::vector<int>> neighbours, int threads,
                                           Progress& progress);

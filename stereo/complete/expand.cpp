@@ -10,7 +10,7 @@
 namespace dtr::stereo {
 namespace {
 
-constexpr float kAlike = 10;  // levels of sRGB between a pixel and a cell, for 1/e of its say
+constexpr float kAlike = 10;       // levels of sRGB between a pixel and a cell, for 1/e of its say
 constexpr float kSameDepthPx = 1;  // cells of disparity: the same surface
 
 /// The planes of the cells around a pixel at its ray, and their say.
@@ -50,18 +50,17 @@ class Expansion {
     }
   }
 
-  /// Inverse depth at a pixel of the photo; none where its cell has no plane.
-  std::optional<float> At(int x, int y) const {
+  /// Inverse depth at a pixel of the photo.
+  float At(int x, int y) const {
     const auto size = static_cast<float>(cells_.cell_px);
     const float u = (static_cast<float>(x) + 0.5F) / size;
     const float v = (static_cast<float>(y) + 0.5F) / size;
     const int column = x / cells_.cell_px, row = y / cells_.cell_px;
-    if (!completed_.Has(column, row)) return std::nullopt;
     const Eigen::Vector3f ray = cells_.RayAt(u, v);
     Votes votes;
     for (int j = row - 1; j <= row + 1; ++j) {
       for (int i = column - 1; i <= column + 1; ++i) {
-        if (!cells_.usable.Contains(i, j) || cells_.usable(i, j) == 0 || !completed_.Has(i, j)) {
+        if (!cells_.usable.Contains(i, j) || cells_.usable(i, j) == 0) {
           continue;
         }
         const float du = u - static_cast<float>(i) - 0.5F, dv = v - static_cast<float>(j) - 0.5F;
@@ -101,8 +100,8 @@ DepthImage ExpandCells(const View& view, const CellView& cells, const CompletedC
       if (!DepthImage::IsHole(view.depth(x, y))) continue;
       const int px = x * scale + scale / 2, py = y * scale + scale / 2;
       if (!view.mask.empty() && view.mask(px, py) == 0) continue;
-      const std::optional<float> w = expansion.At(px, py);
-      if (w) depth(x, y) = *w * far_z > 1 ? 1 / *w : far_z;
+      const float w = expansion.At(px, py);
+      depth(x, y) = w * far_z > 1 ? 1 / w : far_z;
     }
   }
   return depth;

@@ -1,7 +1,5 @@
 // stereo/complete/expand.h -- from planes of cells to depths of pixels.
 #pragma once
-#include <optional>
-
 #include "dtr/types/depth_image.h"
 #include "dtr/types/view.h"
 #include "stereo/complete/cells.h"

@@ -1,6 +1,5 @@
 // stereo/complete/label_cells.h -- planes for the cells of a view that nothing was measured of.
 #pragma once
-#include <limits>
 #include <span>
 #include <vector>
 
@@ -25,8 +24,6 @@ struct CompletedCells {
   ViewPlane PlaneAt(int x, int y) const {
     return {planes(x, y, 0), planes(x, y, 1), planes(x, y, 2)};
   }
-  bool Has(int x, int y) const { return planes(x, y, 0) == planes(x, y, 0); }
-  void TakeBack(int x, int y) { planes(x, y, 0) = std::numeric_limits<float>::quiet_NaN(); }
 };
 
 /// `others`: neighbours of the view, best first. `completed`: what an earlier pass gave for these,

@@ -17,8 +17,8 @@ namespace {
 constexpr size_t kMaxPlaces = 6000;
 constexpr size_t kNormals = 3;  // known ones, beside the level one
 constexpr int kOffsets = 160;
-constexpr float kUnexplained = 12;  // levels: cost of a place that no plane explains
-constexpr float kMinContrast = 2;   // levels, between neighbouring cells
+constexpr float kUnexplained = 12;      // levels: cost of a place that no plane explains
+constexpr float kMinContrast = 2;       // levels, between neighbouring cells
 constexpr double kMinExplained = 0.02;  // of the places, for a plane
 constexpr int kRefinements = 8;
 constexpr double kParallel = 0.97;  // cosine
