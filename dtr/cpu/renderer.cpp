@@ -92,7 +92,7 @@ RenderResult Render(const RenderScene& scene, const PinholeCamera& novel,
     curve->Apply(result.image);
   }
   result.coverage_share = CoverageShare(result.coverage);
-  if (options.fill_holes) FillHolesFromViews(scene, novel, novel_from_world, options, result);
+  if (options.fill_holes) FillHoles(result, options.threads);
   return result;
 }
 

@@ -13,7 +13,7 @@ namespace dtr::cpu {
 /// RENDER_SPEC states them.
 /// The result does not depend on the order of the views or on the number of threads. Where no view
 /// is valid the image is empty: black, no depth, no coverage.
-/// With options.fill_holes, FillHolesFromViews is applied to the finished image.
+/// With options.fill_holes, FillHoles is applied to the finished image.
 /// Throws dtr::UsageError for options without a meaning and for images beyond 2^28 pixels, and
 /// dtr::Error for a pose that is not finite.
 RenderResult Render(const RenderScene& scene, const PinholeCamera& novel,

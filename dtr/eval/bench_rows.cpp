@@ -58,18 +58,15 @@ void Add(const std::optional<double>& value, std::optional<double>& sum, int& co
 }
 
 void Measure(const Place& place, const std::vector<RenderOptions>& variants, int repeats,
-             TimedRenderer& renderer, HoleFiller& filler, std::vector<RowSums>& sums) {
+             TimedRenderer& renderer, std::vector<RowSums>& sums) {
   const Pose& pose = place.photo->cam_from_world;
   const size_t count = variants.size();
   std::vector<FrameTimes> frames(count), read_backs(count), fills(count);
-  const auto fill = [&](size_t m, const PinholeCamera& camera, RenderResult& result) {
-    filler.Fill(place.scene, camera, pose, variants[m], result);
-  };
   for (size_t m = 0; m < count; ++m) {
     // Untimed: shaders are compiled and meshes made. Its image serves the quality.
     renderer.Draw(place.scene, place.photo->camera, pose, variants[m]);
     RenderResult result = renderer.ReadBack();
-    fill(m, place.photo->camera, result);
+    FillHoles(result, variants[m].threads);
     const auto valid = static_cast<int>(SelectViews(place.scene, pose, variants[m]).views.size());
     sums[m].AddQuality(*place.photo, result, valid);
     if (!(place.timed == place.photo->camera)) {
@@ -84,7 +81,7 @@ void Measure(const Place& place, const std::vector<RenderOptions>& variants, int
       RenderResult result = renderer.ReadBack();
       read_backs[m].Add(reading.Elapsed());
       const StopWatch filling;
-      fill(m, place.timed, result);
+      FillHoles(result, variants[m].threads);
       fills[m].Add(filling.Elapsed());
     }
   }
@@ -150,10 +147,9 @@ std::vector<RowSums> MeasureRows(const std::vector<Place>& places,
                                  const std::vector<RenderOptions>& variants, int repeats,
                                  TimedRenderer& renderer, const Progress& progress) {
   std::vector<RowSums> sums(variants.size());
-  HoleFiller filler;
   for (const Place& place : places) {
     progress.ThrowIfInterrupted();
-    Measure(place, variants, repeats, renderer, filler, sums);
+    Measure(place, variants, repeats, renderer, sums);
   }
   return sums;
 }

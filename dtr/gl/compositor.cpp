@@ -140,15 +140,15 @@ class Compositor::Implementation {
     glDrawArrays(GL_TRIANGLES, 0, 3);
   }
 
-  /// Where `depth` has one and no view saw the pixel it is a guess.
+  /// Where `depth` has one and no view saw the pixel it is filled.
   DrawnFrame Take(const RenderResult& result, const Grid<float>& depth) {
     const size_t pixels = result.coverage.data().size();
     taken_rgba_.resize(pixels);
-    taken_guessed_.resize(pixels);
+    taken_filled_.resize(pixels);
     for (size_t p = 0; p < pixels; ++p) {
       const std::uint8_t* rgb = &result.image.data()[3 * p];
       taken_rgba_[p] = rgb[0] | rgb[1] << 8 | rgb[2] << 16 | 0xff000000u;
-      taken_guessed_[p] = result.coverage.data()[p] == 0;
+      taken_filled_[p] = result.coverage.data()[p] == 0;
     }
     taken_depth_ = depth.data();
     DrawnFrame picture;
@@ -188,10 +188,10 @@ class Compositor::Implementation {
       send(depth_, GL_RED, GL_FLOAT, picture.window_z);
     } else {
       window_z_.resize(pixels);
-      const bool has_guesses = picture.number == taken_number_;
+      const bool has_filled = picture.number == taken_number_;
       simd::MapToWindow(mapping, {picture.depth_z, pixels},
-                        has_guesses ? std::span<const std::uint8_t>(taken_guessed_)
-                                    : std::span<const std::uint8_t>(),
+                        has_filled ? std::span<const std::uint8_t>(taken_filled_)
+                                   : std::span<const std::uint8_t>(),
                         window_z_);
       send(depth_, GL_RED, GL_FLOAT, window_z_.data());
     }
@@ -201,7 +201,7 @@ class Compositor::Implementation {
   ProgramCache programs_;
   VertexArray empty_array_;
   std::vector<std::uint32_t> taken_rgba_;
-  std::vector<std::uint8_t> taken_guessed_;
+  std::vector<std::uint8_t> taken_filled_;
   std::vector<float> taken_depth_, window_z_;
   std::uint64_t taken_number_ = 0;
   Texture image_, depth_;  ///< of what was brought last

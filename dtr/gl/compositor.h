@@ -46,9 +46,9 @@ class Compositor {
 
   /// An image from memory, holding until the next one is taken.
   DrawnFrame Take(const RenderResult& result);
-  /// The same of an image whose holes were filled; `depth` is what HoleFiller::Fill gave. What is
-  /// guessed is never cut: beyond the host's near or far plane it lies just within it, for a host
-  /// sets these by what was seen, and skies have no end.
+  /// The same of an image whose holes were filled; `depth` is what FillHoles gave. What is filled
+  /// is never cut, so that no hole is left: beyond the host's near or far plane it lies just
+  /// within it.
   DrawnFrame TakeFilled(const RenderResult& result, const Grid<float>& depth);
 
  private:

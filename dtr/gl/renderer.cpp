@@ -81,7 +81,7 @@ class Renderer::Implementation {
     RequireAllLoaded(frame);
     DrawInBands(std::move(frame), selection, result);
     result.coverage_share = CoverageShare(result.coverage);
-    if (options.fill_holes) hole_filler_.Fill(scene, novel, novel_from_world, options, result);
+    if (options.fill_holes) FillHoles(result, options.threads);
     return result;
   }
 
@@ -107,10 +107,7 @@ class Renderer::Implementation {
     return result;
   }
 
-  void Forget() {
-    views_.Clear();
-    hole_filler_.Forget();
-  }
+  void Forget() { views_.Clear(); }
   size_t gpu_bytes() const { return views_.bytes(); }
 
  private:
@@ -232,7 +229,6 @@ class Renderer::Implementation {
   Targets targets_;
   CoarseDepth coarse_depth_;
   Resolver resolver_;
-  HoleFiller hole_filler_;
   std::optional<DrawnFrame> drawn_;  ///< while it can be read back
 };
 

@@ -14,8 +14,8 @@ constexpr std::uint64_t kOtherCameras = 0x9e3779b97f4a7c15u;
 // Of the setting as it is, and of the one that is tried.
 constexpr size_t kKeptImages = 2;
 
-/// What no view of the whole set sees is guessed before and after, and guesses turn on trifles: it
-/// says nothing of what is lost. From places that see nothing all counts.
+/// What no view of the whole set sees is filled before and after, from around it: it says nothing
+/// of what is lost. From places that see nothing all counts.
 void CountSeen(const Mask& coverage, Place& place) {
   const Mask seen = eval::Intersect(coverage, place.mask);
   const auto& pixels = seen.data();

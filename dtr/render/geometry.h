@@ -1,9 +1,6 @@
 // dtr/render/geometry.h -- where a scene is and how far apart its cameras stand, from the data.
 #pragma once
 #include <Eigen/Core>
-#include <algorithm>
-#include <cmath>
-#include <numbers>
 #include <span>
 #include <vector>
 
@@ -16,26 +13,6 @@ namespace dtr {
 /// Angle in [0, pi] between two directions, by atan2(|a x b|, a . b): exact near 0 and pi, where
 /// acos loses half its digits and can give NaN. 0 if a direction is the zero vector.
 double AngleBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b);
-
-/// Abramowitz & Stegun, Handbook of Mathematical Functions, 4.4.49; highest power first.
-inline constexpr double kQuickAngleSeries[] = {0.0028662257,  -0.0161657367, 0.0429096138,
-                                               -0.0752896400, 0.1065626393,  -0.1420889944,
-                                               0.1999355085,  -0.3333314528, 1};
-
-/// The same angle from the length of the cross product (not negative) and the dot product, to
-/// within 2e-8 rad and at a quarter of the cost: for weights, of which an image needs millions.
-inline double QuickAngle(double cross_length, double dot) {
-  const double side = std::abs(dot);
-  const double longer = std::max(cross_length, side);
-  if (!(longer > 0)) return 0;
-  const double x = std::min(cross_length, side) / longer, q = x * x;
-  double series = 0;
-  for (const double coefficient : kQuickAngleSeries) series = coefficient + q * series;
-  const double first_octant = x * series;
-  const double first_quadrant =
-      cross_length > side ? std::numbers::pi / 2 - first_octant : first_octant;
-  return dot < 0 ? std::numbers::pi - first_quadrant : first_quadrant;
-}
 
 /// SPEC 0.3. For each camera the median distance (scene units) to its 4 nearest other cameras by
 /// viewing angle at `scene_center` (ties: the smaller index); the median of what there is when

@@ -2,8 +2,75 @@
 
 #include <algorithm>
 
+#include "dtr/base/parallel_for.h"
+
 namespace dtr {
 namespace {
+
+using Cell = PushPull::Cell;
+using Level = Grid<Cell>;
+
+// Smaller levels are done before another thread would have started.
+constexpr int kRowsWorthThreads = 64;
+
+template <typename Row>
+void ForRows(const Level& level, int threads, const Row& row) {
+  ParallelFor(0, level.height(), level.height() < kRowsWorthThreads ? 1 : threads, row);
+}
+
+/// Sums the cells that are known.
+class Mean {
+ public:
+  void Add(const Cell& cell, double share) {
+    const double weight = cell.weight * share;
+    sum_.weight += weight;
+    for (size_t v = 0; v < sum_.values.size(); ++v) sum_.values[v] += weight * cell.values[v];
+  }
+  Cell Get() const {
+    if (!(sum_.weight > 0)) return {};
+    Cell mean = sum_;
+    for (double& value : mean.values) value /= sum_.weight;
+    mean.weight = std::min(sum_.weight, 1.0);
+    return mean;
+  }
+
+ private:
+  Cell sum_;
+};
+
+/// Pull: each needed coarse cell is the mean of its up to four children.
+template <typename Finer>
+Level Coarser(const Mask& needed, int width, int height, int threads, const Finer& finer) {
+  Level coarse(needed.width(), needed.height());
+  ForRows(coarse, threads, [&](int y) {
+    for (int x = 0; x < coarse.width(); ++x) {
+      if (needed(x, y) == 0) continue;
+      Mean mean;
+      for (int cy = 2 * y; cy < std::min(2 * y + 2, height); ++cy) {
+        for (int cx = 2 * x; cx < std::min(2 * x + 2, width); ++cx) mean.Add(finer(cx, cy), 1);
+      }
+      coarse(x, y) = mean.Get();
+    }
+  });
+  return coarse;
+}
+
+/// Push: the bilinear mean of the four coarse cells around a fine one.
+Cell Between(const Level& coarse, int x, int y) {
+  // A fine cell's centre lies a quarter of a coarse cell beside the coarse centre.
+  const int x0 = (x + 1) / 2 - 1, y0 = (y + 1) / 2 - 1;
+  const double fx = x % 2 == 0 ? 0.75 : 0.25, fy = y % 2 == 0 ? 0.75 : 0.25;
+  Mean mean;
+  for (int j = 0; j < 2; ++j) {
+    for (int i = 0; i < 2; ++i) {
+      if (!coarse.Contains(x0 + i, y0 + j)) continue;
+      mean.Add(coarse(x0 + i, y0 + j), (i == 0 ? 1 - fx : fx) * (j == 0 ? 1 - fy : fy));
+    }
+  }
+  Cell between = mean.Get();
+  if (between.weight > 0) between.weight = 1;
+  return between;
+}
 
 /// Half the size, rounded up; each cell combines its up to four children. `combine` must not mind
 /// one that is given twice. Loops that a compiler turns into vectors.
@@ -73,6 +140,35 @@ HolePyramid::HolePyramid(const Mask& hole) : width_(hole.width()), height_(hole.
   for (size_t level = needed_.size(); level-- > 1;) {
     MarkChildren(needed_[level], needed_[level - 1]);
   }
+}
+
+PushPull::PushPull(const HolePyramid& holes, int threads,
+                   const std::function<Cell(int x, int y)>& finest) {
+  int width = holes.width(), height = holes.height();
+  for (const Mask& needed : holes.needed()) {
+    if (levels_.empty()) {
+      levels_.push_back(Coarser(needed, width, height, threads, finest));
+    } else {
+      const Level& fine = levels_.back();
+      levels_.push_back(
+          Coarser(needed, width, height, threads, [&](int x, int y) { return fine(x, y); }));
+    }
+    width = needed.width(), height = needed.height();
+  }
+  for (size_t level = levels_.size(); level-- > 1;) {
+    const Level& coarse = levels_[level];
+    const Mask& needed = holes.needed()[level - 1];
+    Level& fine = levels_[level - 1];
+    ForRows(fine, threads, [&](int y) {
+      for (int x = 0; x < fine.width(); ++x) {
+        if (needed(x, y) != 0 && !(fine(x, y).weight > 0)) fine(x, y) = Between(coarse, x, y);
+      }
+    });
+  }
+}
+
+PushPull::Cell PushPull::At(int x, int y) const {
+  return levels_.empty() ? Cell{} : Between(levels_.front(), x, y);
 }
 
 }  // namespace dtr

@@ -62,7 +62,7 @@ class Renderer::Implementation {
       resolver_.CopyTo(result);
     }
     result.coverage_share = CoverageShare(result.coverage);
-    if (options.fill_holes) hole_filler_.Fill(scene, novel, novel_from_world, options, result);
+    if (options.fill_holes) FillHoles(result, options.threads);
     return result;
   }
 
@@ -101,10 +101,7 @@ class Renderer::Implementation {
     return result;
   }
 
-  void Forget() {
-    views_.Clear();
-    hole_filler_.Forget();
-  }
+  void Forget() { views_.Clear(); }
   size_t view_bytes() const { return views_.bytes(); }
 
  private:
@@ -181,7 +178,6 @@ class Renderer::Implementation {
   bool warned_of_room_ = false;
   CoarseRaster surface_;
   Resolver resolver_;
-  HoleFiller hole_filler_;
   std::optional<DrawnImage> drawn_;
 };
 

@@ -17,11 +17,11 @@ using DF = hn::ScalableTag<float>;
 using VF = hn::Vec<DF>;
 
 // More than one step of a depth buffer of 24 bits. What is cleared to the far plane, which a
-// reversed projection has at 0, must not hide a guess.
+// reversed projection has at 0, must not hide a filled pixel.
 constexpr float kLastStep = 1.2e-7f;
 
 /// `inset`: how far from window z 0 and 1 a depth must lie; of what is seen 0, above that for
-/// guesses, which are never clipped.
+/// filled pixels, which are never clipped.
 HWY_INLINE VF Mapped(const WindowDepthMapping& m, VF z, VF inset) {
   const DF d;
   const VF zero = hn::Zero(d), one = hn::Set(d, 1.0f), least = hn::Set(d, m.least);
@@ -36,15 +36,15 @@ HWY_INLINE VF Mapped(const WindowDepthMapping& m, VF z, VF inset) {
 }
 
 void MapToWindowImpl(const WindowDepthMapping& mapping, const float* depth_z,
-                     const std::uint8_t* guessed, size_t count, float* window_z) {
+                     const std::uint8_t* filled, size_t count, float* window_z) {
   const DF d;
   const size_t lanes = hn::Lanes(d);
   for (size_t p = 0; p < count; p += lanes) {
     const size_t some = std::min(lanes, count - p);
     HWY_ALIGN float z[hn::MaxLanes(d)] = {}, insets[hn::MaxLanes(d)] = {};
     VF inset = hn::Zero(d);
-    if (guessed != nullptr) {
-      for (size_t i = 0; i < some; ++i) insets[i] = guessed[p + i] != 0 ? kLastStep : 0.0f;
+    if (filled != nullptr) {
+      for (size_t i = 0; i < some; ++i) insets[i] = filled[p + i] != 0 ? kLastStep : 0.0f;
       inset = hn::Load(d, insets);
     }
     if (some == lanes) {
@@ -66,11 +66,11 @@ namespace dtr::simd {
 HWY_EXPORT(MapToWindowImpl);
 
 void MapToWindow(const WindowDepthMapping& mapping, std::span<const float> depth_z,
-                 std::span<const std::uint8_t> guessed, std::span<float> window_z) {
+                 std::span<const std::uint8_t> filled, std::span<float> window_z) {
   assert(window_z.size() == depth_z.size());
-  assert(guessed.empty() || guessed.size() == depth_z.size());
+  assert(filled.empty() || filled.size() == depth_z.size());
   HWY_DYNAMIC_DISPATCH(MapToWindowImpl)
-  (mapping, depth_z.data(), guessed.empty() ? nullptr : guessed.data(), depth_z.size(),
+  (mapping, depth_z.data(), filled.empty() ? nullptr : filled.data(), depth_z.size(),
    window_z.data());
 }
 

@@ -19,10 +19,10 @@ struct WindowDepthMapping {
 inline constexpr float kNoWindowDepth = -1;
 
 /// For each plane z (scene units, 0: a hole) the value for the depth buffer, or kNoWindowDepth.
-/// Where `guessed` is not empty, as long as `depth_z`, and not 0, a depth is a guess: it is not cut
-/// off but lies within the planes, before what is cleared to the far one, be that window z 1 or, of
-/// a reversed projection, 0, where the buffer has 24 bits or more.
+/// Where `filled` is not empty, as long as `depth_z`, and not 0, a depth is of a filled pixel: it
+/// is not cut off but lies within the planes, before what is cleared to the far one, be that window
+/// z 1 or, of a reversed projection, 0, where the buffer has 24 bits or more.
 void MapToWindow(const WindowDepthMapping& mapping, std::span<const float> depth_z,
-                 std::span<const std::uint8_t> guessed, std::span<float> window_z);
+                 std::span<const std::uint8_t> filled, std::span<float> window_z);
 
 }  // namespace dtr::simd

@@ -124,8 +124,8 @@ class Host {
   GLuint color_ = 0, depth_ = 0;
 };
 
-/// Pixels of `shown` that are not what `image`, with `depth` in it, makes of the host's. Guesses
-/// are where `image` saw nothing and `depth` has something.
+/// Pixels of `shown` that are not what `image`, with `depth` in it, makes of the host's.
+/// Filled pixels are where `image` saw nothing and `depth` has something.
 struct Apart {
   int pixels = 0, of_picture = 0, of_host = 0;
 };
@@ -146,11 +146,11 @@ Apart ApartFrom(const Shown& shown, const RenderResult& picture, const Grid<floa
         const int row = static_cast<int>((y - v.y + 0.5) * height / v.height);
         const int j = state.top_first ? row : height - 1 - row;
         const double z = depth(i, j);
-        const bool guessed = picture.coverage(i, j) == 0;
+        const bool filled = picture.coverage(i, j) == 0;
         const double device = projection.at_infinity + projection.per_inverse_depth / z;
         const double inside = std::clamp(device, least, 1.0);
-        const bool drawn = z > 0 && (guessed || state.clamps || inside == device);
-        const double share = std::min((inside - least) / (1 - least), guessed ? far_step : 1.0);
+        const bool drawn = z > 0 && (filled || state.clamps || inside == device);
+        const double share = std::min((inside - least) / (1 - least), filled ? far_step : 1.0);
         const double window = state.range[0] + (state.range[1] - state.range[0]) * share;
         if (drawn && window < expected) {
           expected = window;
@@ -241,16 +241,16 @@ TEST_F(CompositorTest, TheNextPictureTakesThePlaceOfTheLast) {
   EXPECT_LE(ApartFrom(shown, picture, picture.depth.grid(), plain).pixels, kUndecided);
 }
 
-TEST_F(CompositorTest, WhatIsGuessedIsNeverCutOff) {
+TEST_F(CompositorTest, FilledPixelsAreNeverCutOff) {
   const RenderResult picture = Render();
   Grid<float> depth = picture.depth.grid();
-  int guesses = 0;
+  int filled = 0;
   for (size_t p = 0; p < depth.data().size(); ++p) {
     if (picture.coverage.data()[p] != 0) continue;
-    constexpr float kGuesses[] = {2, 8, 1e9F, 0};  // before, between and beyond the planes; none
-    depth.data()[p] = kGuesses[guesses++ % 4];
+    constexpr float kFilledZ[] = {2, 8, 1e9F, 0};  // before, between and beyond the planes; none
+    depth.data()[p] = kFilledZ[filled++ % 4];
   }
-  ASSERT_GT(guesses, 40);
+  ASSERT_GT(filled, 40);
   Compositor compositor;
   Host host;
   for (HostState state : States()) {

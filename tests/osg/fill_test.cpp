@@ -51,7 +51,7 @@ Wrong Compare(const Shown& shown, const RenderResult& expected) {
 }
 
 // OpenSceneGraph's matrices turn a camera in the last digits: pixels at outlines change hands, and
-// with each of them what is guessed from it.
+// with each of them what is filled from it.
 constexpr double kShareOfBorderPixels = 1e-3;
 
 /// From two views, far apart, much of the courtyard is seen by none.
@@ -88,7 +88,7 @@ TEST_F(FillTest, ShowsWhatTheRendererFillsByItself) {
     OffscreenViewer viewer(node.get(), named.novel.camera, named.novel.cam_from_world);
     const Wrong wrong = Compare(viewer.Draw(), expected);
     EXPECT_LT(wrong.colour, kShareOfBorderPixels);
-    EXPECT_EQ(wrong.empty, 0) << "beyond the far plane, too, guesses are drawn";
+    EXPECT_EQ(wrong.empty, 0) << "filled pixels are drawn beyond the far plane, too";
     node->setRenderOptions(OptionsOf(method));
     EXPECT_GT(Compare(viewer.Draw(), expected).empty, 0.04) << "off again";
   }
@@ -167,7 +167,7 @@ TEST_F(FillTest, TheReadBackPathFillsToo) {
   for (size_t i = 0; i < shown.image.data().size(); ++i) {
     sum += std::abs(shown.image.data()[i] - expected.image.data()[i]);
   }
-  // Each view's colours were rounded before they were blended, and exposures are measured on them.
+  // Each view's colours were rounded before they were blended.
   EXPECT_LT(sum / static_cast<double>(shown.image.data().size()), 1);
 }
 
@@ -183,7 +183,7 @@ struct Strip {
   }
 };
 
-/// At the rim of what is seen a guess is a mean of both sides.
+/// Whether some pixel close to it was seen.
 bool AtRim(const RenderResult& drawn, int x, int y) {
   constexpr int kEdgePx = 2;  // as in hybrid_test.cpp
   for (int j = -kEdgePx; j <= kEdgePx; ++j) {
@@ -225,12 +225,12 @@ AtBox Look(const Strip& strip, const Eigen::Vector3d& center, const Eigen::Vecto
   return at;
 }
 
-TEST_F(FillTest, WhatIsGuessedBehindAForegroundHidesAndIsHidden) {
+TEST_F(FillTest, FilledPixelsHideWhatIsBehindTheBackgroundAndNothingBeforeTheForeground) {
   const Strip strip;
   ASSERT_LT(strip.drawn.coverage_share, 0.97);
   for (const bool filled : {false, true}) {
     SCOPED_TRACE(filled ? "filled" : "with holes");
-    const AtBox near = Look(strip, {1.52, 0.1, 7}, {0.4, 0.4, 0.4}, filled);
+    const AtBox near = Look(strip, {1.211, 0.1, 4}, {0.23, 0.23, 0.23}, filled);
     const AtBox far = Look(strip, {2.27, 0.1, 14}, {0.6, 0.6, 0.6}, filled);
     EXPECT_GT(near.of_strip, 100);
     EXPECT_EQ(near.red, near.of_strip);

@@ -355,7 +355,7 @@ class CountsMeasuring : public Progress {
 
 TEST(Prune, WhatACheckTakesBackStaysOutAndLeavesRoomForOthers) {
   const DtrSet set = Row(6);
-  PruneOptions options = SmallOptions(10);
+  PruneOptions options = SmallOptions(15);  // as much as it takes for JPEG to be worth a step
   JpegFailsTheCheck journal(100000);
   options.journal = &journal;
   FakeStore store(set);

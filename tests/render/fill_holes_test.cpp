@@ -48,7 +48,7 @@ TEST(FillHoles, NeverChangesWhatWasSeen) {
       }
     }
     RenderResult again = before;
-    FillHoles(again);
+    FillHoles(again, 3);
     EXPECT_EQ(again.image, result.image);
   }
 }
@@ -61,49 +61,41 @@ TEST(FillHoles, OneColourStaysThatColour) {
   for (const std::uint8_t level : result.image.data()) EXPECT_EQ(level, 77);
 }
 
-TEST(FillHoles, TakesTheBackgroundAtADisocclusion) {
-  // Foreground (white, near) left, background (black level 20, far) right, a hole between them.
-  RenderResult result = Blank(48, 16);
-  for (int y = 0; y < 16; ++y) {
+TEST(FillHoles, NearAndFarHaveEqualWeights) {
+  // Foreground (white, near) left, background (level 20, far) right, a hole in the middle: colours
+  // (in linear light) and inverse depths go evenly from one to the other.
+  constexpr int kWidth = 48, kHeight = 16;
+  RenderResult result = Blank(kWidth, kHeight);
+  for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < 20; ++x) See(result, x, y, 255, 2);
-    for (int x = 28; x < 48; ++x) See(result, x, y, 20, 20);
-  }
-  FillHoles(result);
-  for (int y = 0; y < 16; ++y) {
-    for (int x = 20; x < 28; ++x) EXPECT_LE(result.image(x, y, 0), 30) << x << " " << y;
-  }
-}
-
-// Guesses must neither stand before what hid them nor let through what stands behind all.
-TEST(HoleFiller, SaysHowFarAwayItsGuessesLie) {
-  RenderResult result = Blank(48, 16);
-  for (int y = 0; y < 16; ++y) {
-    for (int x = 0; x < 20; ++x) See(result, x, y, 255, 2);
-    for (int x = 28; x < 48; ++x) See(result, x, y, 20, 20);
+    for (int x = 28; x < kWidth; ++x) See(result, x, y, 20, 20);
   }
   const RenderResult before = result;
-  const Grid<float> depth = HoleFiller().Fill({}, {48, 16, 40, 40, 24, 8}, {}, {}, result);
+  const Grid<float> depth = FillHoles(result);
   EXPECT_EQ(result.depth, before.depth);
-  for (int y = 0; y < 16; ++y) {
-    for (int x = 0; x < 48; ++x) {
+  const std::array<double, 256>& linear = LinearFromSrgb8();
+  constexpr double kLevel = 0.01;  // of 8 bits, in linear light at white
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
       if (before.coverage(x, y) != 0) {
         EXPECT_EQ(depth(x, y), before.depth(x, y));
-      } else {
-        // Of the foreground, ten times as near, a ten thousandth has a say.
-        EXPECT_GT(depth(x, y), 19.9) << x << " " << y;
-        EXPECT_LE(depth(x, y), 20.001) << x << " " << y;
+        continue;
       }
+      const int mirrored = kWidth - 1 - x;
+      EXPECT_NEAR(linear[result.image(x, y, 0)] + linear[result.image(mirrored, y, 0)],
+                  linear[255] + linear[20], kLevel);
+      EXPECT_NEAR(1 / depth(x, y) + 1 / depth(mirrored, y), 1.0 / 2 + 1.0 / 20, 1e-6);
+      EXPECT_LE(result.image(x, y, 0), result.image(x - 1, y, 0));
+      EXPECT_GE(depth(x, y), depth(x - 1, y));
     }
   }
-  RenderResult nothing = Blank(5, 4);
-  const Grid<float> none = HoleFiller().Fill({}, {5, 4, 4, 4, 2, 2}, {}, {}, nothing);
-  for (const float z : none.data()) EXPECT_EQ(z, 0);
 }
 
 TEST(FillHoles, NothingSeenStaysBlack) {
   RenderResult result = Blank(5, 4);
-  FillHoles(result);
+  const Grid<float> depth = FillHoles(result);
   for (const std::uint8_t level : result.image.data()) EXPECT_EQ(level, 0);
+  for (const float z : depth.data()) EXPECT_EQ(z, 0);
 }
 
 TEST(Colour, EightBitValuesSurviveLinearLight) {

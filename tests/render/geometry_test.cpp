@@ -26,18 +26,6 @@ View PlaneView(const std::string& name, const Eigen::Vector3d& center, int scale
   return view;
 }
 
-TEST(QuickAngle, IsTheAngleToWithinItsPromise) {
-  constexpr double kPromiseRad = 2e-8, kSmallRelative = 1e-9;  // Abramowitz & Stegun 4.4.49
-  for (int i = 0; i <= 100000; ++i) {
-    const double angle = std::numbers::pi * i / 100000;
-    EXPECT_NEAR(QuickAngle(3 * std::sin(angle), 3 * std::cos(angle)), angle, kPromiseRad);
-  }
-  EXPECT_NEAR(QuickAngle(1e-12, 1), 1e-12, kSmallRelative * 1e-12);
-  EXPECT_EQ(QuickAngle(0, 0), 0);
-  EXPECT_EQ(QuickAngle(0, 2), 0);
-  EXPECT_DOUBLE_EQ(QuickAngle(0, -2), std::numbers::pi);
-}
-
 TEST(AngleBetween, IsExactNearZeroAndPi) {
   const Eigen::Vector3d a(1, 0, 0);
   EXPECT_DOUBLE_EQ(AngleBetween(a, Eigen::Vector3d(1, 1e-9, 0)), 1e-9);

@@ -13,47 +13,41 @@ constexpr double kRounding = 1e-12;  // the same sums in the same order; values 
 constexpr std::uint8_t kHole = 255;
 
 struct Known {
-  Grid<double> inverse_depth, value;
+  Grid<double> value;
   Mask hole;
 };
 
 Known RandomImage(int width, int height, double hole_share, Random& random) {
-  Known known{Grid<double>(width, height), Grid<double>(width, height), Mask(width, height)};
+  Known known{Grid<double>(width, height), Mask(width, height)};
   for (size_t p = 0; p < known.hole.data().size(); ++p) {
-    known.inverse_depth.data()[p] = random.Uniform(0.1, 2);
     known.value.data()[p] = random.Uniform(0, 1);
     known.hole.data()[p] = random.Uniform(0, 1) < hole_share ? kHole : 0;
   }
   return known;
 }
 
-PushPull<1> Filled(const Known& known, Favour favour, int threads = 1) {
-  return PushPull<1>(HolePyramid(known.hole), favour, threads, [&](int x, int y) {
-    if (known.hole(x, y) != 0) return PushPull<1>::Cell{};
-    return PushPull<1>::Cell{known.inverse_depth(x, y), 1, {known.value(x, y)}};
+PushPull Filled(const Known& known, int threads = 1) {
+  return PushPull(HolePyramid(known.hole), threads, [&](int x, int y) {
+    if (known.hole(x, y) != 0) return PushPull::Cell{};
+    const double value = known.value(x, y);
+    return PushPull::Cell{1, {value, 1 - value, 0.5, 2 * value}};
   });
 }
 
 /// SPEC 7.1 word by word, one cell after the other and nothing left out.
 struct Plain {
   struct Cell {
-    double w = 0, weight = 0, value = 0;
+    double weight = 0, value = 0;
   };
-  static Cell Mean(const std::vector<std::pair<Cell, double>>& cells, bool far) {
-    double farthest = 1e300;
-    for (const auto& [cell, tap] : cells) {
-      if (cell.weight > 0) farthest = std::min(farthest, cell.w);
-    }
+  static Cell Mean(const std::vector<std::pair<Cell, double>>& cells) {
     Cell mean;
     for (const auto& [cell, tap] : cells) {
-      if (!(cell.weight > 0)) continue;
-      const double weight = cell.weight * tap * (far ? std::pow(farthest / cell.w, 4) : 1);
-      mean.w += weight * cell.w, mean.value += weight * cell.value, mean.weight += weight;
+      mean.value += cell.weight * tap * cell.value, mean.weight += cell.weight * tap;
     }
-    if (mean.weight > 0) mean.w /= mean.weight, mean.value /= mean.weight;
+    if (mean.weight > 0) mean.value /= mean.weight;
     return mean;
   }
-  static Grid<Cell> Fill(Grid<Cell> fine, bool far) {
+  static Grid<Cell> Fill(Grid<Cell> fine) {
     if (fine.width() == 1 && fine.height() == 1) return fine;
     Grid<Cell> coarse((fine.width() + 1) / 2, (fine.height() + 1) / 2);
     for (int y = 0; y < coarse.height(); ++y) {
@@ -63,11 +57,11 @@ struct Plain {
           const int cx = 2 * x + c % 2, cy = 2 * y + c / 2;
           if (fine.Contains(cx, cy)) children.emplace_back(fine(cx, cy), 1.0);
         }
-        coarse(x, y) = Mean(children, far);
+        coarse(x, y) = Mean(children);
         coarse(x, y).weight = std::min(coarse(x, y).weight, 1.0);
       }
     }
-    coarse = Fill(std::move(coarse), far);
+    coarse = Fill(std::move(coarse));
     for (int y = 0; y < fine.height(); ++y) {
       for (int x = 0; x < fine.width(); ++x) {
         if (fine(x, y).weight > 0) continue;
@@ -81,7 +75,7 @@ struct Plain {
                                 (1 - std::abs(x0 + i - cx)) * (1 - std::abs(y0 + j - cy)));
           }
         }
-        fine(x, y) = Mean(around, far);
+        fine(x, y) = Mean(around);
         if (fine(x, y).weight > 0) fine(x, y).weight = 1;
       }
     }
@@ -89,28 +83,49 @@ struct Plain {
   }
 };
 
+TEST(PushPull, AHoleTakesItsNeighboursWithEqualWeights) {
+  // A single coarse cell, the mean of the three seen pixels, one of them ten times as near.
+  Mask hole(2, 2);
+  hole(1, 1) = kHole;
+  const PushPull filled(HolePyramid(hole), 1, [&](int x, int y) {
+    if (hole(x, y) != 0) return PushPull::Cell{};
+    const bool near = x == 0 && y == 0;
+    return PushPull::Cell{1, {near ? 0.9 : 0, near ? 0 : 0.6, 0.3, near ? 1 : 0.1}};
+  });
+  const PushPull::Cell cell = filled.At(1, 1);
+  EXPECT_EQ(cell.weight, 1);
+  EXPECT_NEAR(cell.values[0], 0.3, kRounding);
+  EXPECT_NEAR(cell.values[1], 0.4, kRounding);
+  EXPECT_NEAR(cell.values[2], 0.3, kRounding);
+  EXPECT_NEAR(cell.values[3], 0.4, kRounding);
+}
+
+TEST(PushPull, WithoutAKnownPixelNothingIsKnown) {
+  for (const auto& [width, height] : {std::pair{1, 1}, {5, 4}, {64, 64}}) {
+    const Known nothing{Grid<double>(width, height), Mask(width, height, 1, kHole)};
+    EXPECT_EQ(Filled(nothing).At(width / 2, height / 2).weight, 0);
+  }
+}
+
 TEST(PushPull, MakesOnlyWhatHolesDrawOnAndStillGivesWhatTheWholePyramidGives) {
   Random random(11);
   for (const auto& [width, height] : {std::pair{1, 1}, {1, 7}, {9, 1}, {33, 20}, {64, 65}}) {
     for (const double share : {0.01, 0.3, 0.95, 1.0}) {
-      for (const Favour favour : {Favour::kFar, Favour::kNone}) {
-        Known known = RandomImage(width, height, share, random);
-        for (int x = 0; x < width / 2; ++x) known.hole(x, height / 2) = kHole;
-        Grid<Plain::Cell> plain(width, height);
-        for (size_t p = 0; p < plain.data().size(); ++p) {
-          if (known.hole.data()[p] != 0) continue;
-          plain.data()[p] = {known.inverse_depth.data()[p], 1, known.value.data()[p]};
-        }
-        plain = Plain::Fill(std::move(plain), favour == Favour::kFar);
-        const PushPull<1> filled = Filled(known, favour);
-        for (int y = 0; y < height; ++y) {
-          for (int x = 0; x < width; ++x) {
-            if (known.hole(x, y) == 0) continue;
-            const PushPull<1>::Cell cell = filled.At(x, y);
-            EXPECT_EQ(cell.weight, plain(x, y).weight);
-            EXPECT_NEAR(cell.inverse_depth, plain(x, y).w, kRounding);
-            EXPECT_NEAR(cell.values[0], plain(x, y).value, kRounding);
-          }
+      Known known = RandomImage(width, height, share, random);
+      for (int x = 0; x < width / 2; ++x) known.hole(x, height / 2) = kHole;
+      Grid<Plain::Cell> plain(width, height);
+      for (size_t p = 0; p < plain.data().size(); ++p) {
+        if (known.hole.data()[p] == 0) plain.data()[p] = {1, known.value.data()[p]};
+      }
+      plain = Plain::Fill(std::move(plain));
+      const PushPull filled = Filled(known);
+      for (int y = 0; y < height; ++y) {
+        for (int x = 0; x < width; ++x) {
+          if (known.hole(x, y) == 0) continue;
+          const PushPull::Cell cell = filled.At(x, y);
+          EXPECT_EQ(cell.weight, plain(x, y).weight);
+          EXPECT_NEAR(cell.values[0], plain(x, y).value, kRounding);
+          EXPECT_NEAR(cell.values[3], 2 * plain(x, y).value, kRounding);
         }
       }
     }
@@ -120,11 +135,11 @@ TEST(PushPull, MakesOnlyWhatHolesDrawOnAndStillGivesWhatTheWholePyramidGives) {
 TEST(PushPull, DoesNotDependOnTheNumberOfThreads) {
   Random random(5);
   const Known known = RandomImage(200, 300, 0.8, random);
-  const PushPull<1> one = Filled(known, Favour::kFar, 1), three = Filled(known, Favour::kFar, 3);
+  const PushPull one = Filled(known, 1), three = Filled(known, 3);
   for (int y = 0; y < 300; ++y) {
     for (int x = 0; x < 200; ++x) {
       if (known.hole(x, y) == 0) continue;
-      EXPECT_EQ(one.At(x, y).values[0], three.At(x, y).values[0]);
+      EXPECT_EQ(one.At(x, y).values, three.At(x, y).values);
     }
   }
 }

@@ -53,7 +53,7 @@ TEST(MapToWindow, IsTheProjectionForEveryCountOnEveryInstructionSet) {
 // Of a buffer of 24 bits: rounding to the next step begins at half of one.
 constexpr float kStep = 1.0f / ((1 << 24) - 1);
 
-TEST(MapToWindow, GuessesLieBeforeWhatIsClearedToTheFarPlane) {
+TEST(MapToWindow, FilledPixelsLieBeforeWhatIsClearedToTheFarPlane) {
   const std::vector<float> z = {1e-3f, 1, 99, 1e9f, kInfinity, 0, 1e-40f};
   testing::WithEachInstructionSet([&](std::int64_t) {
     std::vector<float> found(z.size());
@@ -65,15 +65,15 @@ TEST(MapToWindow, GuessesLieBeforeWhatIsClearedToTheFarPlane) {
     }
     EXPECT_EQ(found[5], kNoWindowDepth) << "a hole stays one";
     EXPECT_NEAR(found[6], 0, 3 * kStep) << "denormal, but a depth";
-    std::vector<float> not_guessed(z.size());
-    MapToWindow(Usual(), z, std::vector<std::uint8_t>(z.size(), 0), not_guessed);
-    EXPECT_EQ(not_guessed[3], kNoWindowDepth) << "what is seen is cut off";
+    std::vector<float> not_filled(z.size());
+    MapToWindow(Usual(), z, std::vector<std::uint8_t>(z.size(), 0), not_filled);
+    EXPECT_EQ(not_filled[3], kNoWindowDepth) << "what is seen is cut off";
   });
 }
 
 // Window z 1 is the near plane, 0 lies at infinity or at a far plane; the buffer is cleared to 0
 // and what is greater is drawn.
-TEST(MapToWindow, GuessesBeyondAReversedProjectionAreNotHiddenByWhatIsCleared) {
+TEST(MapToWindow, FilledPixelsBeyondAReversedProjectionAreNotHiddenByWhatIsCleared) {
   WindowDepthMapping to_infinity, to_far;
   to_infinity.least = to_far.least = 0, to_infinity.scale = to_far.scale = 1;
   to_infinity.at_infinity = 0, to_infinity.per_inverse_depth = static_cast<float>(kNear);

@@ -248,7 +248,7 @@ std::vector<Controls::Row> Controls::RenderRows() {
          ClickUntil("defaults", [](const Json& s) { return s["render_options"].empty(); });
        }},
       box("blend linear light", "--blend-linear"),
-      box("fill holes (when still)", "--fill-holes=false"),
+      box("fill holes", "--fill-holes=false"),
   };
 }
 

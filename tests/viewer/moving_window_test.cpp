@@ -18,8 +18,8 @@ TEST_F(MovingWindowTest, BeginsAtAnyTimeStepAndShowsWhatRenderShows) {
   Do({"mousemove", "40", "30", "key", "p"});
   Wait("an image", [&](const Json&) { return fs::exists(In("moving-image-001.png")); });
   DtrOk({"render", Set(), "--frame", "1", "--like", "0002", "-o", In("rendered.png")});
-  EXPECT_EQ(
-      Differing(io::ReadImage(In("moving-image-001.png")), io::ReadImage(In("rendered.png"))), 0);
+  EXPECT_EQ(Differing(io::ReadImage(In("moving-image-001.png")), io::ReadImage(In("rendered.png"))),
+            0);
 }
 
 TEST_F(MovingWindowTest, WhatIsLeftOutOfOneTimeStepIsLeftOutOfAll) {
@@ -47,14 +47,13 @@ TEST_F(MovingWindowTest, PlaysFromTheStartAndEndsWithAWholePicture) {
 }
 
 TEST_F(MovingWindowTest, AFileThatVanishedAndCameBackIsDrawnFromAgain) {
-  // The pixels of what is drawn stay in memory where something looks at them; the magnifier does,
-  // and filling would from the start.
+  // The pixels of what is drawn stay in memory where something looks at them; the magnifier does.
   const fs::path set = In("mine.dtr");
   fs::copy(Set(), set, fs::copy_options::recursive);
   const DtrSet described = io::ReadSet(set);
   const View& first = described.frames[0].views[0];
   const fs::path photo = set / first.image_file->path;
-  Open(200, 140, {"--no-panel", "--fill-holes=false"}, set);
+  Open(200, 140, {"--no-panel"}, set);
   if (IsSkipped()) return;
   const Json whole = Now();
   ASSERT_EQ(whole["views_used"].size(), 4U);

@@ -26,9 +26,9 @@ class Laps {
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
-/// Filling, false colours and those who inspect read the views' own pixels.
+/// False colours and those who inspect read the views' own pixels.
 ViewStream::Pixels PixelsFor(const FrameRequest& order) {
-  const bool needed = order.inspected || order.options.fill_holes || order.shown != Shown::kColour;
+  const bool needed = order.inspected || order.shown != Shown::kColour;
   return needed ? ViewStream::Pixels::kInMemory : ViewStream::Pixels::kOrReleased;
 }
 
@@ -152,10 +152,9 @@ void FrameMaker::BringPixels() {
 void FrameMaker::Show(const FrameRequest& order, const gl::DrawnFrame& drawn, bool still) {
   if (order.shown != Shown::kColour) {
     picture_.texture.Upload(InFalseColour());
-  } else if (still && order.options.fill_holes) {
+  } else if (order.options.fill_holes) {
     Result();
-    filler_.Fill(picture_.scene, picture_.camera.camera, picture_.camera.cam_from_world,
-                 order.options, *result_);
+    FillHoles(*result_, order.options.threads);
     picture_.texture.Upload(result_->image);
   } else {
     picture_.texture.Take(drawn);

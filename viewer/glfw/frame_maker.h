@@ -7,7 +7,6 @@
 
 #include "dtr/gl/fitting_renderer.h"
 #include "dtr/render/camera_path.h"
-#include "dtr/render/fill_holes.h"
 #include "dtr/render/view_stream.h"
 #include "viewer/glfw/frame_texture.h"
 #include "viewer/shown.h"
@@ -59,7 +58,7 @@ class FrameMaker {
 
   const ViewColours& colours() const { return colours_; }
 
-  /// Quickly: each side divided by `divisor`, of the views that are in memory, not filled.
+  /// Quickly: each side divided by `divisor`, of the views that are in memory.
   void MakeMoving(const FrameRequest& order, int divisor);
   /// In full, of the views that are there; whole once no view is being read any more.
   void MakeStill(const FrameRequest& order);
@@ -99,7 +98,6 @@ class FrameMaker {
   MadeFrame picture_;
   FrameTexture other_;
   std::optional<RenderResult> result_;
-  HoleFiller filler_;
   std::vector<const View*> hidden_;  ///< from the image
   std::map<const View*, ImageRgb8> thumbnails_;
 };

@@ -54,7 +54,7 @@ void RenderControls(Widgets& widgets, RenderOptions& options, const RenderOption
   widgets.Absolute("absolute-delta", options.absolute_delta);
   widgets.Absolute("absolute-depth-break", options.absolute_depth_break);
   widgets.Check("blend linear light", options.blend_in_linear_light);
-  widgets.Check("fill holes (when still)", options.fill_holes);
+  widgets.Check("fill holes", options.fill_holes);
   if (widgets.Button("defaults")) {
     const int threads = options.threads;
     options = defaults;

@@ -30,8 +30,7 @@ enum class DrawPath {
 /// When holes are filled, where the options say that they are.
 enum class FillTime {
   kAlways,     ///< every new image, also while the camera moves
-  kWhenStill,  ///< once nothing has changed for a moment, as in `dtr view`: moving images stay
-               ///< fast
+  kWhenStill,  ///< once nothing has changed for a moment: moving images need not be read back
 };
 
 /// A scene of depth images that is drawn for the camera that looks at it. A leaf of the scene graph
@@ -75,7 +74,7 @@ class DepthTR : public osg::Geode {
   void traverse(osg::NodeVisitor& visitor) override;
 
   /// How it is drawn; with `fill_holes` what no view saw is drawn, too, and hides and is hidden by
-  /// the depth that filling guesses. Throws dtr::UsageError for options without a meaning.
+  /// the depth that filling gives it. Throws dtr::UsageError for options without a meaning.
   void setRenderOptions(const dtr::RenderOptions& options);
   dtr::RenderOptions getRenderOptions() const;
   void setDrawPath(DrawPath path);

@@ -4,6 +4,7 @@
 #include <osg/Notify>
 #include <osg/RenderInfo>
 
+#include "dtr/render/fill_holes.h"
 #include "viewer/osg/novel_camera.h"
 #include "viewer/osg/read_back.h"
 
@@ -30,8 +31,7 @@ MadeFrame DrawFrame(dtr::gl::FittingRenderer& renderer, dtr::gl::Compositor& com
         RenderByReadBack(renderer.open_gl(), scene, novel.camera, novel.cam_from_local, options);
   }
   if (!fill) return {compositor.Take(result), false};
-  const dtr::Grid<float> depth =
-      settings.set->hole_filler.Fill(scene, novel.camera, novel.cam_from_local, options, result);
+  const dtr::Grid<float> depth = dtr::FillHoles(result, options.threads);
   return {compositor.TakeFilled(result, depth), false};
 }
 

@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "dtr/render/fill_holes.h"
 #include "dtr/render/options.h"
 #include "dtr/render/scene.h"
 #include "dtr/render/time_steps.h"
@@ -28,7 +27,6 @@ struct LoadedSet {
   /// Of what can be drawn at any time step, but for single pixels that lie far beyond all others of
   /// their views; DtrSet::bounds leaves out the outermost 1 %.
   osg::BoundingBox bounds;
-  mutable dtr::HoleFiller hole_filler;  ///< keeps what it makes of the photos, for all who draw
 };
 
 /// Reads the set with images and depth; osg::notify is told of what is left out of it.
