@@ -159,7 +159,7 @@ std::shared_ptr<RenderOptions> AddRenderOptions(CLI::App& command, const RenderO
                    defaults.fill_holes
                        ? "Fill pixels that no view sees, the default; --fill-holes=false leaves "
                          "them black"
-                       : "Fill pixels that no view sees from the background");
+                       : "Fill pixels that no view sees from those around them");
   return shared;
 }
 

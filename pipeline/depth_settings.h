@@ -38,7 +38,7 @@ struct DepthChoice {
   std::optional<double> memory_gb;      ///< gigabytes; absent: kDefaultMemoryGb, or what is needed
   /// Pixels of disparity that storing may move a depth; absent: png16-inverse, practically exact.
   std::optional<double> depth_error_px;
-  bool completion = true;  ///< depth is completed where none was measured
+  bool completion = true;           ///< depth is completed where none was measured
   std::filesystem::path workspace;  ///< for engine "colmap"; empty: the program fills one
 };
 

@@ -129,6 +129,7 @@ ImportOptions OptionsFor(const ImportRequest& request, CamerasFromFile& cameras,
   options.distortion_of = DistortionOf;
   options.memory_gb = request.memory_gb;
   options.threads = request.threads;
+  options.completion = request.completion;
   return options;
 }
 

@@ -26,6 +26,7 @@ struct ImportRequest {
   bool allow_missing = false;           ///< leave out cameras whose photo is not there
   std::filesystem::path output;         ///< NAME.dtr
   bool force = false;                   ///< replace a set that exists
+  bool completion = true;               ///< of depth that is imported (CompleteDepth)
   double memory_gb = 4;                 ///< for views in memory at a time (one may be larger)
   int threads = 0;
   std::uint64_t seed = 0;

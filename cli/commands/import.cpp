@@ -80,6 +80,9 @@ void AddImportCommand(CLI::App& app) {
                         "Folder of masks, dark where a photo is not to be used: as --cameras names "
                         "them, else NAME.png, NAME.EXT.png or NAME_mask.png")
             ->type_name("DIR");
+        command.add_flag("--completion,!--no-completion", options->completion,
+                         "With --depth: complete depth where there is none, so that images are "
+                         "whole [on]");
         AddMemoryOption(command, options->memory_gb,
                         "Memory for views that are read at a time [4]");
         command.add_flag("--allow-missing", options->allow_missing,

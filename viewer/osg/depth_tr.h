@@ -30,8 +30,7 @@ enum class DrawPath {
 /// When holes are filled, where the options say that they are.
 enum class FillTime {
   kAlways,     ///< every new image, also while the camera moves
-  kWhenStill,  ///< once nothing has changed for a moment, as in `dtr view`: moving images stay
-               ///< fast
+  kWhenStill,  ///< once nothing has changed for a moment: moving images need not be read back
 };
 
 /// A scene of depth images that is drawn for the camera that looks at it. A leaf of the scene graph

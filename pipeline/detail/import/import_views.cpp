@@ -16,7 +16,9 @@
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
 #include "dtr/render/geometry.h"
+#include "pipeline/depth_settings.h"
 #include "pipeline/detail/import/import_depth.h"
+#include "pipeline/detail/run/finishing.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -221,6 +223,7 @@ std::string Fingerprint(const nlohmann::json& inputs, const io::CameraList& list
   }
   fingerprint["cameras"] = io::FormatCamerasJson(pinholes);
   fingerprint["depth_coding"] = io::NameOf(options.depth_coding);
+  fingerprint["completion"] = options.completion;
   fingerprint["held_out"] = options.held_out;
   if (points != nullptr) fingerprint["points_sha256"] = HashOf(*points);
   return fingerprint.dump();
@@ -336,8 +339,9 @@ io::AlphaTotals WriteSet(const io::CameraList& list, const ImportOptions& option
   WriteViews(near, options, writer, set, coarse, alpha, progress);
   std::vector<View>& views = set.frames[0].views;
   std::vector<SparsePoint> source_points;
+  SparseScene scene;
   if (points != nullptr) {
-    const SparseScene scene = Shifted(*points, near.world_origin - list.world_origin);
+    scene = Shifted(*points, near.world_origin - list.world_origin);
     source_points = PointsOfSources(scene, views);
     writer.WriteSparse(set, scene);
   }
@@ -346,6 +350,10 @@ io::AlphaTotals WriteSet(const io::CameraList& list, const ImportOptions& option
   set.bounds = coarse.bounds;
   for (size_t i = 0; i < views.size(); ++i) {
     views[i].reference_baseline = coarse.frames[0].views[i].reference_baseline;
+  }
+  if (options.completion && !options.depth_dir.empty()) {
+    const double memory_gb = options.memory_gb > 0 ? options.memory_gb : kDefaultMemoryGb;
+    CompleteDepth(set, scene, writer, options.threads, memory_gb, progress);
   }
   writer.Finish(set);
   return alpha;

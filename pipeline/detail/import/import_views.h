@@ -49,6 +49,7 @@ struct ImportOptions {
   /// Views in memory at a time take at most so many 1e9 bytes (one alone may be larger); 0: no
   /// bound.
   double memory_gb = 0;
+  bool completion = false;  ///< of depth that comes with the views (CompleteDepth)
 };
 
 /// Where the masks of an import lie.
