@@ -1,6 +1,7 @@
 // The writing half of set_io.h.
 #include <algorithm>
 #include <set>
+#include <stdexcept>
 
 #include "dtr/base/durable.h"
 #include "dtr/base/error.h"
@@ -339,7 +340,7 @@ void SetWriter::WriteCompleted(const DepthImage& completed, View& view) {
   ExpectGrid(view, "completed depth", completed.width(), completed.height(), camera.width_px(),
              camera.height_px());
   if (!view.depth_file) {
-    throw Error("view '" + view.name + "': expected stored depth before completed depth");
+    throw std::logic_error("SetWriter::WriteCompleted: the view's depth comes first");
   }
   AsError([&] { state_->WriteCompletedFile(completed, view); });
 }

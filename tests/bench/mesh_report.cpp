@@ -26,6 +26,7 @@ double CpuMilliseconds() {
 int main(int argc, char** argv) {
   if (argc < 2) return 2;
   dtr::io::LoadOptions load;
+  load.completed = true;
   load.images = false;
   const dtr::DtrSet set = dtr::io::LoadSet(argv[1], load);
   std::vector<double> tolerances;

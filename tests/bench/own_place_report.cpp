@@ -17,7 +17,7 @@
 namespace {
 
 void Report(const char* set_file) {
-  const dtr::DtrSet set = dtr::io::LoadSet(set_file, {});
+  const dtr::DtrSet set = dtr::io::LoadSet(set_file, {.completed = true});
   const dtr::RenderScene scene = dtr::MakeRenderScene(set);
   dtr::RenderOptions options;
   options.fill_holes = true;

@@ -18,6 +18,7 @@ int main(int argc, char** argv) {
     return 2;
   }
   dtr::io::LoadOptions load;
+  load.completed = true;
   load.held_out = true;
   const dtr::DtrSet set = dtr::io::LoadSet(argv[1], load);
   const std::vector<dtr::View>& views = set.frames[0].views;

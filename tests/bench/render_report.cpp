@@ -94,6 +94,7 @@ int Main(const std::vector<std::string>& arguments) {
     }
   }
   dtr::io::LoadOptions load;
+  load.completed = true;
   load.held_out = true;
   const dtr::DtrSet set = dtr::io::LoadSet(arguments[0], load);
   for (const Row& row : rows) Report(set, row, leave_one_out);

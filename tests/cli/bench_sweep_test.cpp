@@ -194,7 +194,7 @@ TEST_F(BenchSweep, StorageAsTheSetLiesAndInFewerBytes) {
              coarse = measured("depth=zstd-1px"), jpeg = measured("image=jpeg-95"),
              worse = measured("image=jpeg-70");
   std::uintmax_t bytes = 0;
-  for (const char* folder : {"images", "depth", "sigma", "mask", "mesh"}) {
+  for (const char* folder : {"images", "depth", "completed", "sigma", "mask", "mesh"}) {
     if (!fs::exists(fs::path(Shared("true.dtr")) / folder)) continue;
     for (const auto& entry : fs::directory_iterator(fs::path(Shared("true.dtr")) / folder)) {
       bytes += entry.file_size();

@@ -62,7 +62,7 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "gl_bench SET.dtr [K] [R]\n");
     return 2;
   }
-  const dtr::DtrSet set = dtr::io::LoadSet(argv[1]);
+  const dtr::DtrSet set = dtr::io::LoadSet(argv[1], {.completed = true});
   const dtr::RenderScene scene = dtr::MakeRenderScene(set);
   const dtr::NovelCamera novel = dtr::FlyThrough(set, 9)[4];
   dtr::RenderOptions options;
