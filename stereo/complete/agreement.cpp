@@ -45,57 +45,73 @@ Agreement::Agreement(const CellView& view, std::span<const CellView* const> othe
   }
 }
 
+/// What the views around say of one place.
+struct Agreement::Answers {
+  /// Of the two that agree best: others may not see the place, though nothing says so.
+  float best[2];
+  int asked = 0, answers = 0, hidden = 0, through = 0, elsewhere = 0;
+
+  void AddColour(float difference) {
+    ++answers;
+    if (difference < best[0]) {
+      best[1] = best[0], best[0] = difference;
+    } else {
+      best[1] = std::min(best[1], difference);
+    }
+  }
+
+  float Cost(const AgreementWeights& weights) const {
+    float cost = weights.no_view;
+    if (answers >= 2) {
+      cost = (best[0] + best[1]) / 2;
+    } else if (answers == 1) {
+      cost = std::max(best[0], weights.one_view);
+    }
+    if (asked == 0) return cost;
+    return cost + (weights.hidden * static_cast<float>(hidden) +
+                   weights.through * static_cast<float>(through) +
+                   weights.elsewhere * static_cast<float>(elsewhere)) /
+                      static_cast<float>(asked);
+  }
+};
+
 float Agreement::CostAt(int x, int y, float w) const {
   const Eigen::Vector3f ray = view_.RayOf(x, y);
-  // Of the two that agree best: others may not see the place, though nothing says so.
-  float best[2] = {weights_.max_colour, weights_.max_colour};
-  int answers = 0, hidden = 0, through = 0, asked = 0, elsewhere = 0;
+  Answers answers{{weights_.max_colour, weights_.max_colour}};
   for (const Other& other : others_) {
     const Eigen::Vector3f p = other.turn * ray + w * other.shift;
-    if (!(p.z() > 0)) continue;
-    const float u = p.x() / p.z(), v = p.y() / p.z();
-    const CellView& cells = *other.cells;
-    if (!(u >= 0 && v >= 0 && u < static_cast<float>(cells.colour.width()) &&
-          v < static_cast<float>(cells.colour.height()))) {
-      continue;
-    }
-    const int i = static_cast<int>(u), j = static_cast<int>(v);
-    if (!cells.usable(i, j)) continue;
-    ++asked;
-    const float there = w / p.z(), measured = cells.inverse_depth(i, j);
-    if (measured > there + other.same) {
-      ++hidden;
-      continue;
-    }
-    // A cell that is measured in part may show another surface in the rest.
-    if (measured > 0 && measured < there - other.same && !cells.shared(i, j)) ++through;
-    if (!(measured > 0) && other.completed != nullptr) {
-      const Eigen::Vector3f plane((*other.completed)(i, j, 0), (*other.completed)(i, j, 1),
-                                  (*other.completed)(i, j, 2));
-      elsewhere += std::abs(plane.dot(cells.RayAt(u, v)) - there) > other.same;
-    }
-    float rgb[3];
-    if (!ColourAt(cells, u, v, rgb)) continue;
-    float off = 0;
-    for (int c = 0; c < 3; ++c) off += std::abs(rgb[c] - view_.colour(x, y, c)) / 3;
-    ++answers;
-    if (off < best[0]) {
-      best[1] = best[0], best[0] = off;
-    } else {
-      best[1] = std::min(best[1], off);
-    }
+    if (p.z() > 0) Ask(other, p.x() / p.z(), p.y() / p.z(), w / p.z(), x, y, answers);
   }
-  float cost = weights_.no_view;
-  if (answers >= 2) {
-    cost = (best[0] + best[1]) / 2;
-  } else if (answers == 1) {
-    cost = std::max(best[0], weights_.one_view);
+  return answers.Cost(weights_);
+}
+
+void Agreement::Ask(const Other& other, float u, float v, float there, int x, int y,
+                    Answers& answers) const {
+  const CellView& cells = *other.cells;
+  if (!(u >= 0 && v >= 0 && u < static_cast<float>(cells.colour.width()) &&
+        v < static_cast<float>(cells.colour.height()))) {
+    return;
   }
-  if (asked == 0) return cost;
-  return cost + (weights_.hidden * static_cast<float>(hidden) +
-                 weights_.through * static_cast<float>(through) +
-                 weights_.elsewhere * static_cast<float>(elsewhere)) /
-                    static_cast<float>(asked);
+  const int i = static_cast<int>(u), j = static_cast<int>(v);
+  if (!cells.usable(i, j)) return;
+  ++answers.asked;
+  const float measured = cells.inverse_depth(i, j);
+  if (measured > there + other.same) {
+    ++answers.hidden;
+    return;
+  }
+  // A cell that is measured in part may show another surface in the rest.
+  if (measured > 0 && measured < there - other.same && !cells.shared(i, j)) ++answers.through;
+  if (!(measured > 0) && other.completed != nullptr) {
+    const Eigen::Vector3f plane((*other.completed)(i, j, 0), (*other.completed)(i, j, 1),
+                                (*other.completed)(i, j, 2));
+    answers.elsewhere += std::abs(plane.dot(cells.RayAt(u, v)) - there) > other.same;
+  }
+  float rgb[3];
+  if (!ColourAt(cells, u, v, rgb)) return;
+  float difference = 0;
+  for (int c = 0; c < 3; ++c) difference += std::abs(rgb[c] - view_.colour(x, y, c)) / 3;
+  answers.AddColour(difference);
 }
 
 }  // namespace dtr::stereo

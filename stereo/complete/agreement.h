@@ -1,7 +1,6 @@
 // stereo/complete/agreement.h -- how well the views around agree that a surface is at a depth.
 #pragma once
 #include <Eigen/Core>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -38,6 +37,11 @@ class Agreement {
     Eigen::Vector3f shift;  ///< and what 1/z adds to it
     float same;             ///< difference of its inverse depth up to which it is one surface
   };
+  struct Answers;
+  /// Of a view, what it has at its position (u, v) to say of cell (x, y) at inverse depth `there`
+  /// before that view.
+  void Ask(const Other& other, float u, float v, float there, int x, int y, Answers& answers) const;
+
   const CellView& view_;
   const AgreementWeights& weights_;
   std::vector<Other> others_;

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "dtr/render/colour.h"
 #include "dtr/render/exposure.h"
@@ -20,7 +21,6 @@ struct CellSums {
   double rgb[3] = {};
   int usable = 0;
   std::vector<float> inverse_depths;
-  int pixels = 0;
 };
 
 void Average(const View& view, int cell_px, CellView& cells) {

@@ -1,10 +1,9 @@
 // stereo/complete/cells.h -- a view in little: what completion asks of it.
 #pragma once
 #include <Eigen/Core>
+#include <cmath>
 #include <cstdint>
 #include <optional>
-#include <span>
-#include <vector>
 
 #include "dtr/types/camera.h"
 #include "dtr/types/grid.h"
@@ -36,6 +35,12 @@ struct CellView {
   Eigen::Vector3f RayAt(float x, float y) const {
     return {(x - static_cast<float>(camera.cx_px())) / static_cast<float>(camera.fx_px()),
             (y - static_cast<float>(camera.cy_px())) / static_cast<float>(camera.fy_px()), 1};
+  }
+  /// Mean difference of two cells' colours over the channels, levels.
+  float Difference(int x, int y, int u, int v) const {
+    float difference = 0;
+    for (int c = 0; c < 3; ++c) difference += std::abs(colour(x, y, c) - colour(u, v, c)) / 3;
+    return difference;
   }
   /// Of a cell's centre.
   Eigen::Vector3f RayOf(int x, int y) const {

@@ -68,7 +68,7 @@ std::vector<CompletedCells> CompleteCells(std::span<const CellView> views,
 }
 
 std::uint64_t CompletionBytes(std::span<const PinholeCamera> cameras, int threads) {
-  constexpr std::uint64_t kLabels = 11 + kLargestPlanes + kSweptPlanes;
+  constexpr std::uint64_t kLabels = kOwnLabels + kLargestPlanes + kSweptPlanes;
   std::uint64_t bytes = 0, largest = 0;
   for (const PinholeCamera& camera : cameras) {
     const std::uint64_t cells = CellBytes(camera);

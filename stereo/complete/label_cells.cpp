@@ -11,6 +11,10 @@ namespace {
 constexpr int kDirections = 8;
 constexpr std::array<std::array<int, 2>, kDirections> kSteps = {
     {{1, 0}, {-1, 0}, {0, 1}, {0, -1}, {1, 1}, {-1, -1}, {1, -1}, {-1, 1}}};
+// Which candidate is which. A measured cell has one alone, its own plane, in the place of far.
+constexpr int kFirstDirection = 1, kFirstCarried = kFirstDirection + kDirections;
+constexpr int kCarried = 2, kFirstScenePlane = kFirstCarried + kCarried;
+static_assert(kFirstScenePlane == kOwnLabels);
 constexpr float kSamePx = 2;  // cells of disparity: the same surface
 constexpr int kInset = 1;     // cells from a rim, where planes are taken from
 
@@ -58,8 +62,8 @@ class Labelling {
         columns_(view.colour.width()),
         rows_(view.colour.height()),
         agreement_(view, others, PlanesOf(completed), weights.agreement),
-        candidates_(columns_, rows_, 1 + kDirections + 2 + static_cast<int>(planes.size())) {
-    AddFar();
+        candidates_(columns_, rows_, kFirstScenePlane + static_cast<int>(planes.size())) {
+    AddOwnOrFar();
     AddDirections();
     AddCarried();
     AddScenePlanes(planes);
@@ -93,7 +97,7 @@ class Labelling {
   bool Measured(int x, int y) const { return view_.inverse_depth(x, y) > 0; }
   Eigen::Vector3f Ray(int x, int y) const { return view_.RayOf(x, y); }
 
-  void AddFar() {
+  void AddOwnOrFar() {
     for (int y = 0; y < rows_; ++y) {
       for (int x = 0; x < columns_; ++x) {
         candidates_.PlanesOf(x, y)[0] =
@@ -102,7 +106,7 @@ class Labelling {
     }
   }
 
-  /// Of the nearest measured cell in each direction, a little behind its rim.
+  /// Of the nearest measured cell in each direction.
   void AddDirections() {
     for (int k = 0; k < kDirections; ++k) {
       const int dx = kSteps[static_cast<size_t>(k)][0], dy = kSteps[static_cast<size_t>(k)][1];
@@ -114,60 +118,70 @@ class Labelling {
           const int x = dx > 0 ? i : columns_ - 1 - i;
           ViewPlane plane = ViewPlane::Constant(Candidates::kNone);
           if (Measured(x, y)) {
-            const int px = x - kInset * dx, py = y - kInset * dy;
-            const bool inside = view_.inverse_depth.Contains(px, py) && Measured(px, py) &&
-                                std::abs(view_.PlaneAt(px, py).dot(Ray(x, y)) -
-                                         view_.inverse_depth(x, y)) < kSamePx * view_.pixel;
-            plane = inside ? view_.PlaneAt(px, py) : view_.PlaneAt(x, y);
+            plane = PlaneBehindRim(x, y, dx, dy);
           } else if (carried.Contains(x - dx, y - dy)) {
             for (int c = 0; c < 3; ++c) plane[c] = carried(x - dx, y - dy, c);
           }
           for (int c = 0; c < 3; ++c) carried(x, y, c) = plane[c];
-          if (!Measured(x, y)) candidates_.PlanesOf(x, y)[1 + k] = plane;
+          if (!Measured(x, y)) candidates_.PlanesOf(x, y)[kFirstDirection + k] = plane;
         }
       }
     }
   }
 
-  /// The two nearest surfaces that neighbours have where this view has none.
+  /// That of the measured cell a little further back, where it is the same surface: at rims depths
+  /// are the least sure.
+  ViewPlane PlaneBehindRim(int x, int y, int dx, int dy) const {
+    const int px = x - kInset * dx, py = y - kInset * dy;
+    const bool inside = view_.inverse_depth.Contains(px, py) && Measured(px, py) &&
+                        std::abs(view_.PlaneAt(px, py).dot(Ray(x, y)) - view_.inverse_depth(x, y)) <
+                            kSamePx * view_.pixel;
+    return inside ? view_.PlaneAt(px, py) : view_.PlaneAt(x, y);
+  }
+
+  /// The nearest surfaces that neighbours have where this view has none.
   void AddCarried() {
-    Grid<float> depths(columns_, rows_, 2);
+    Grid<float> depths(columns_, rows_, kCarried);
     for (size_t o = 0; o < others_.size(); ++o) {
       const CellView& cells = *others_[o];
       const Pose view_from_other = view_.cam_from_world * cells.cam_from_world.Inverse();
       for (int v = 0; v < cells.colour.height(); ++v) {
         for (int u = 0; u < cells.colour.width(); ++u) {
-          ViewPlane there = cells.PlaneAt(u, v);
-          if (!(cells.inverse_depth(u, v) > 0)) {
-            if (completed_.empty()) continue;
-            there = completed_[o]->PlaneAt(u, v);
-          }
-          const Eigen::Vector3f ray = cells.RayOf(u, v);
-          const float w = there.dot(ray);
-          if (!(w > 0)) continue;
-          const Eigen::Vector3d p = view_from_other * (ray / w).cast<double>();
-          const auto at = view_.camera.PixelFromCam(p);
-          if (!at || !view_.camera.Contains(*at)) continue;
-          const int x = static_cast<int>(at->x()), y = static_cast<int>(at->y());
-          if (Measured(x, y)) continue;
-          const auto plane = PlaneInOther(there, view_from_other);
-          if (!plane) continue;
-          const auto here = static_cast<float>(1 / p.z());
-          const float near = depths(x, y, 0), second = depths(x, y, 1);
-          ViewPlane* slots = candidates_.PlanesOf(x, y) + 1 + kDirections;
-          if (here > near + kSamePx * view_.pixel) {
-            depths(x, y, 1) = near, slots[1] = slots[0];
-            depths(x, y, 0) = here, slots[0] = *plane;
-          } else if (here < near - kSamePx * view_.pixel && here > second) {
-            depths(x, y, 1) = here, slots[1] = *plane;
-          }
+          const bool measured = cells.inverse_depth(u, v) > 0;
+          if (!measured && completed_.empty()) continue;
+          const ViewPlane there = measured ? cells.PlaneAt(u, v) : completed_[o]->PlaneAt(u, v);
+          Carry(there, cells.RayOf(u, v), view_from_other, depths);
         }
       }
     }
   }
 
+  /// The point of a neighbour's plane on its ray, to where this view would see it. `depths`: 1/z of
+  /// what was carried there so far, the nearest first.
+  void Carry(const ViewPlane& there, const Eigen::Vector3f& ray, const Pose& view_from_other,
+             Grid<float>& depths) {
+    const float w = there.dot(ray);
+    if (!(w > 0)) return;
+    const Eigen::Vector3d p = view_from_other * (ray / w).cast<double>();
+    const auto at = view_.camera.PixelFromCam(p);
+    if (!at || !view_.camera.Contains(*at)) return;
+    const int x = static_cast<int>(at->x()), y = static_cast<int>(at->y());
+    if (Measured(x, y)) return;
+    const auto plane = PlaneInOther(there, view_from_other);
+    if (!plane) return;
+    const auto here = static_cast<float>(1 / p.z());
+    const float near = depths(x, y, 0), second = depths(x, y, 1);
+    ViewPlane* slots = candidates_.PlanesOf(x, y) + kFirstCarried;
+    if (here > near + kSamePx * view_.pixel) {
+      depths(x, y, 1) = near, slots[1] = slots[0];
+      depths(x, y, 0) = here, slots[0] = *plane;
+    } else if (here < near - kSamePx * view_.pixel && here > second) {
+      depths(x, y, 1) = here, slots[1] = *plane;
+    }
+  }
+
   void AddScenePlanes(std::span<const ScenePlane> planes) {
-    int label = 1 + kDirections + 2;
+    int label = kFirstScenePlane;
     for (const ScenePlane& plane : planes) {
       const auto before = plane.Before(view_.cam_from_world);
       for (int y = 0; before && y < rows_; ++y) {
@@ -202,11 +216,7 @@ class Labelling {
   }
 
   float JumpBetween(int x, int y, int u, int v) const {
-    float off = 0;
-    for (int c = 0; c < 3; ++c) {
-      off += std::abs(view_.colour(x, y, c) - view_.colour(u, v, c)) / 3;
-    }
-    return weights_.jump * std::exp(-off / weights_.edge_levels);
+    return weights_.jump * std::exp(-view_.Difference(x, y, u, v) / weights_.edge_levels);
   }
 
   /// Semi-global matching along one path (Hirschmueller 2008, eq. 13), where a change costs by how

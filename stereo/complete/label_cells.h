@@ -9,6 +9,9 @@
 
 namespace dtr::stereo {
 
+/// Candidates of a cell beside the planes of the scene: far, eight directions, two of other views.
+inline constexpr int kOwnLabels = 11;
+
 /// What LabelCells weighs. Costs are in levels of sRGB.
 struct LabelWeights {
   AgreementWeights agreement;

@@ -99,7 +99,8 @@ std::vector<ScenePlane> FindScenePlanes(std::span<const CellView> views, int mos
   std::vector<Sample> samples = SamplesOf(views);
   const double least = kMinShare * static_cast<double>(samples.size()) + 3;
   std::vector<ScenePlane> planes;
-  for (int k = 0; k<most&& static_cast<double>(samples.size())> least; ++k) {
+  for (int k = 0; k < most; ++k) {
+    if (static_cast<double>(samples.size()) <= least) break;
     std::vector<ScenePlane> tried(kTrials);
     std::vector<double> support(kTrials);
     ParallelFor(0, kTrials, threads, [&](int trial) {

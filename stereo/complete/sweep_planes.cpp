@@ -17,11 +17,15 @@ namespace {
 constexpr size_t kMaxPlaces = 6000;
 constexpr size_t kNormals = 3;  // known ones, beside the level one
 constexpr int kOffsets = 160;
+constexpr double kNearestShare = 20;    // of the nearest measured surface's inverse depth, at most
 constexpr float kUnexplained = 12;      // levels: cost of a place that no plane explains
 constexpr float kMinContrast = 2;       // levels, between neighbouring cells
 constexpr double kMinExplained = 0.02;  // of the places, for a plane
 constexpr int kRefinements = 8;
-constexpr double kParallel = 0.97;  // cosine
+constexpr double kFirstTurn = 0.02, kFirstShift = 0.02;  // radians, of the offset
+constexpr double kCloser = 0.7;                          // from one refinement to the next
+constexpr double kParallel = 0.97, kUpright = 0.3;       // cosines, between normals
+constexpr double kHeldLevel = 0.05;  // of a wall's say, for how the cameras are held
 
 /// A cell without depth.
 struct Place {
@@ -34,11 +38,7 @@ bool HasTexture(const CellView& view, int x, int y) {
   float most = 0;
   for (const auto& [dx, dy] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
     if (!view.usable.Contains(x + dx, y + dy) || !view.usable(x + dx, y + dy)) continue;
-    float off = 0;
-    for (int c = 0; c < 3; ++c) {
-      off += std::abs(view.colour(x, y, c) - view.colour(x + dx, y + dy, c)) / 3;
-    }
-    most = std::max(most, off);
+    most = std::max(most, view.Difference(x, y, x + dx, y + dy));
   }
   return most >= kMinContrast;
 }
@@ -125,9 +125,9 @@ Eigen::Vector3d LevelNormal(std::span<const Neighbourhood> views,
     up -= around.view->cam_from_world.rotation.conjugate() * Eigen::Vector3d::UnitY();
   }
   up.normalize();
-  Eigen::Matrix3d walls = 0.05 * (Eigen::Matrix3d::Identity() - up * up.transpose());
+  Eigen::Matrix3d walls = kHeldLevel * (Eigen::Matrix3d::Identity() - up * up.transpose());
   for (const ScenePlane& plane : known) {
-    if (std::abs(plane.normal.dot(up)) < 0.3) walls += plane.normal * plane.normal.transpose();
+    if (std::abs(plane.normal.dot(up)) < kUpright) walls += plane.normal * plane.normal.transpose();
   }
   const Eigen::Vector3d level =
       Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(walls).eigenvectors().col(0);
@@ -148,7 +148,7 @@ std::vector<ScenePlane> Parallel(const Eigen::Vector3d& normal,
   std::vector<ScenePlane> planes;
   if (!(nearest > 0)) return planes;
   for (int k = 1; k <= kOffsets; ++k) {
-    const double distance = kOffsets / (k * 20 * static_cast<double>(nearest));
+    const double distance = kOffsets / (k * kNearestShare * static_cast<double>(nearest));
     for (const double side : {-1.0, 1.0}) planes.push_back({normal, middle + side * distance});
   }
   return planes;
@@ -156,8 +156,8 @@ std::vector<ScenePlane> Parallel(const Eigen::Vector3d& normal,
 
 /// Turned and shifted to where it gains most, closer and closer; and its gain.
 std::pair<ScenePlane, double> Refined(const Sweep& sweep, ScenePlane plane) {
-  double turn = 0.02, shift = 0.02 * std::abs(plane.offset), gain = 0;
-  for (int step = 0; step < kRefinements; ++step, turn *= 0.7, shift *= 0.7) {
+  double turn = kFirstTurn, shift = kFirstShift * std::abs(plane.offset), gain = 0;
+  for (int step = 0; step < kRefinements; ++step, turn *= kCloser, shift *= kCloser) {
     const Eigen::Vector3d u = plane.normal.unitOrthogonal(), v = plane.normal.cross(u);
     const Eigen::Vector3d anchor = plane.normal * plane.offset;
     std::vector<ScenePlane> around = {plane};

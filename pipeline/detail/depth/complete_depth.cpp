@@ -14,7 +14,6 @@
 #include "pipeline/detail/run/finishing.h"
 #include "stereo/complete/complete.h"
 #include "stereo/complete/expand.h"
-#include "stereo/neighbours.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -29,24 +28,6 @@ View Loaded(const View& view, const io::SetWriter& writer) {
   load.threads = 1;
   io::LoadPixels(writer.folder(), loaded, load);
   return loaded;
-}
-
-std::vector<std::vector<int>> NeighboursOf(const std::vector<View>& views,
-                                           const std::vector<int>& sources,
-                                           const SparseScene& sparse) {
-  std::vector<stereo::StereoView> cameras;
-  for (const int s : sources) {
-    const View& view = views[static_cast<size_t>(s)];
-    cameras.push_back({view.camera, view.cam_from_world, nullptr, nullptr});
-  }
-  stereo::NeighbourOptions options;
-  options.count = kNeighbours;
-  std::vector<std::vector<int>> neighbours;
-  for (auto& of_view :
-       stereo::ChooseNeighbours(cameras, SourceScene(sparse, views, sources), options)) {
-    neighbours.push_back(std::move(of_view.views));
-  }
-  return neighbours;
 }
 
 /// The range of what was completed, and steps that do not show.
@@ -98,8 +79,9 @@ void CompleteDepth(DtrSet& set, const SparseScene& sparse, io::SetWriter& writer
     progress.Note("depth is not completed: none was measured");
     return;
   }
-  const auto completed =
-      stereo::CompleteCells(cells, NeighboursOf(views, sources, sparse), threads, progress);
+  const auto neighbours =
+      NeighboursOf(views, sources, SourceScene(sparse, views, sources), kNeighbours);
+  const auto completed = stereo::CompleteCells(cells, neighbours, threads, progress);
   const auto far_z = static_cast<float>(kFarthest * farthest);
   progress.Stage("completed depth", count);
   for (int i = 0; i < count; ++i) {

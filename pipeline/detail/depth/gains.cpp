@@ -7,7 +7,7 @@
 
 #include "dtr/exposure/estimate_gains.h"
 #include "dtr/io/set_io.h"
-#include "stereo/neighbours.h"
+#include "pipeline/detail/depth/source_scene.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -18,32 +18,25 @@ constexpr int kPartners = 8;
 
 void SetGains(DtrSet& set, const SparseScene& sources_scene, const std::filesystem::path& folder,
               int threads, Progress& progress) {
-  std::vector<View*> sources;
-  std::vector<stereo::StereoView> cameras;
-  for (View& view : set.frames.front().views) {
-    if (view.role != ViewRole::kSource) continue;
-    sources.push_back(&view);
-    cameras.push_back({view.camera, view.cam_from_world, nullptr, nullptr});
+  std::vector<View>& views = set.frames.front().views;
+  std::vector<int> sources;
+  for (size_t i = 0; i < views.size(); ++i) {
+    if (views[i].role == ViewRole::kSource) sources.push_back(static_cast<int>(i));
   }
   std::vector<SmallView> small;
-  for (const View* source : sources) {
-    View loaded = *source;
+  for (const int source : sources) {
+    View loaded = views[static_cast<size_t>(source)];
     io::LoadOptions load;
     load.sigma = false;
     load.threads = threads;
     io::LoadPixels(folder, loaded, load);
     small.push_back(ShrinkForGains(loaded));
   }
-  stereo::NeighbourOptions options;
-  options.count = kPartners;
-  std::vector<std::vector<int>> partners;
-  for (auto& neighbours : stereo::ChooseNeighbours(cameras, sources_scene, options)) {
-    partners.push_back(std::move(neighbours.views));
-  }
+  const auto partners = NeighboursOf(views, sources, sources_scene, kPartners);
   const std::vector<Eigen::Vector3d> gains = EstimateGains(small, partners, threads);
   double most = 1;
   for (size_t i = 0; i < sources.size(); ++i) {
-    sources[i]->gain = gains[i];
+    views[static_cast<size_t>(sources[i])].gain = gains[i];
     most = std::max({most, gains[i].maxCoeff(), 1 / gains[i].minCoeff()});
   }
   if (most > 1) {

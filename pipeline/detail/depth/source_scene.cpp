@@ -1,5 +1,9 @@
 #include "pipeline/detail/depth/source_scene.h"
 
+#include <utility>
+
+#include "stereo/neighbours.h"
+
 namespace dtr::pipeline {
 
 SparseScene SourceScene(const SparseScene& sparse, const std::vector<View>& views,
@@ -15,6 +19,23 @@ SparseScene SourceScene(const SparseScene& sparse, const std::vector<View>& view
     seen.view = source_index[static_cast<size_t>(seen.view)];
   }
   return scene;
+}
+
+std::vector<std::vector<int>> NeighboursOf(const std::vector<View>& views,
+                                           const std::vector<int>& sources,
+                                           const SparseScene& scene, int count) {
+  std::vector<stereo::StereoView> cameras;
+  for (const int s : sources) {
+    const View& view = views[static_cast<size_t>(s)];
+    cameras.push_back({view.camera, view.cam_from_world, nullptr, nullptr});
+  }
+  stereo::NeighbourOptions options;
+  options.count = count;
+  std::vector<std::vector<int>> neighbours;
+  for (auto& of_view : stereo::ChooseNeighbours(cameras, scene, options)) {
+    neighbours.push_back(std::move(of_view.views));
+  }
+  return neighbours;
 }
 
 }  // namespace dtr::pipeline

@@ -1,4 +1,4 @@
-// pipeline/detail/depth/source_scene.h -- the points of a set that its source views know.
+// pipeline/detail/depth/source_scene.h -- what the source views of a set have in common.
 #pragma once
 #include <vector>
 
@@ -11,5 +11,11 @@ namespace dtr::pipeline {
 /// `sources`: their indices into `views`.
 SparseScene SourceScene(const SparseScene& sparse, const std::vector<View>& views,
                         const std::vector<int>& sources);
+
+/// Of each of these views its neighbours, at most `count`, best first, as indices into `sources`;
+/// `scene` is what SourceScene gave.
+std::vector<std::vector<int>> NeighboursOf(const std::vector<View>& views,
+                                           const std::vector<int>& sources,
+                                           const SparseScene& scene, int count);
 
 }  // namespace dtr::pipeline
