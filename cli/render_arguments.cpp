@@ -64,6 +64,9 @@ std::vector<std::string> RenderOptionArguments(const RenderOptions& options,
   if (options.fill_holes != base.fill_holes) {
     arguments.Flag(options.fill_holes ? "--fill-holes" : "--fill-holes=false");
   }
+  if (options.smooth_edges != base.smooth_edges) {
+    arguments.Flag(options.smooth_edges ? "--smooth-edges" : "--smooth-edges=false");
+  }
   return arguments.Take();
 }
 

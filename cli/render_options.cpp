@@ -87,6 +87,7 @@ RenderOptions StoredRenderOptions(const DtrSet& set, const RenderOptions& defaul
 RenderOptions WholeFrames() {
   RenderOptions options;
   options.fill_holes = true;
+  options.smooth_edges = true;
   return options;
 }
 
@@ -160,6 +161,10 @@ std::shared_ptr<RenderOptions> AddRenderOptions(CLI::App& command, const RenderO
                        ? "Fill pixels that no view sees, the default; --fill-holes=false leaves "
                          "them black"
                        : "Fill pixels that no view sees from those around them");
+  command.add_flag("--smooth-edges", options.smooth_edges,
+                   defaults.smooth_edges
+                       ? "No stairs at depth edges, the default; --smooth-edges=false leaves them"
+                       : "No stairs at depth edges");
   return shared;
 }
 

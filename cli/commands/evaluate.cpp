@@ -107,7 +107,7 @@ void AddEvaluateCommand(CLI::App& app) {
                    ->type_name("DIR");
                AddMeasuredOnly(command, options->request.measured_only);
                AddRendererOptions(command, options->renderer);
-               options->render = AddRenderOptions(command);
+               options->render = AddRenderOptions(command, WholeFrames());
                return [options, &command](const Context& context) {
                  UseStoredOptions(command, io::ReadSet(options->request.set), *options->render);
                  return RunEvaluate(*options, context);

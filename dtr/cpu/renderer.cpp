@@ -10,7 +10,7 @@
 #include "dtr/cpu/setup.h"
 #include "dtr/render/adaptive_mesh.h"
 #include "dtr/render/exposure.h"
-#include "dtr/render/fill_holes.h"
+#include "dtr/render/finish_image.h"
 #include "dtr/render/frame.h"
 #include "dtr/render/valid_views.h"
 
@@ -92,7 +92,7 @@ RenderResult Render(const RenderScene& scene, const PinholeCamera& novel,
     curve->Apply(result.image);
   }
   result.coverage_share = CoverageShare(result.coverage);
-  if (options.fill_holes) FillHoles(result, options.threads);
+  if (NeedsFinishing(options)) FinishImage(scene, novel, novel_from_world, options, result);
   return result;
 }
 

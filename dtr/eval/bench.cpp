@@ -24,7 +24,7 @@ std::vector<RenderOptions> MethodsOf(const BenchOptions& options, int resolution
     variants.back().resolution = resolution;
     variants.back().views = views;
     variants.back().method = method;
-    variants.back().fill_holes = false;  // filling is timed apart
+    variants.back().fill_holes = variants.back().smooth_edges = false;  // timed apart
   }
   return variants;
 }

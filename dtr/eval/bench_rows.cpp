@@ -4,7 +4,7 @@
 
 #include "dtr/base/error.h"
 #include "dtr/eval/metrics.h"
-#include "dtr/render/fill_holes.h"
+#include "dtr/render/finish_image.h"
 #include "dtr/render/valid_views.h"
 
 namespace dtr::eval {
@@ -61,12 +61,16 @@ void Measure(const Place& place, const std::vector<RenderOptions>& variants, int
              TimedRenderer& renderer, std::vector<RowSums>& sums) {
   const Pose& pose = place.photo->cam_from_world;
   const size_t count = variants.size();
+  const auto finish = [&](const PinholeCamera& camera, RenderOptions options, RenderResult& result) {
+    options.fill_holes = options.smooth_edges = true;
+    FinishImage(place.scene, camera, pose, options, result);
+  };
   std::vector<FrameTimes> frames(count), read_backs(count), fills(count);
   for (size_t m = 0; m < count; ++m) {
     // Untimed: shaders are compiled and meshes made. Its image serves the quality.
     renderer.Draw(place.scene, place.photo->camera, pose, variants[m]);
     RenderResult result = renderer.ReadBack();
-    FillHoles(result, variants[m].threads);
+    finish(place.photo->camera, variants[m], result);
     const auto valid = static_cast<int>(SelectViews(place.scene, pose, variants[m]).views.size());
     sums[m].AddQuality(*place.photo, result, valid);
     if (!(place.timed == place.photo->camera)) {
@@ -81,7 +85,7 @@ void Measure(const Place& place, const std::vector<RenderOptions>& variants, int
       RenderResult result = renderer.ReadBack();
       read_backs[m].Add(reading.Elapsed());
       const StopWatch filling;
-      FillHoles(result, variants[m].threads);
+      finish(place.timed, variants[m], result);
       fills[m].Add(filling.Elapsed());
     }
   }

@@ -159,7 +159,7 @@ std::vector<GrowthSeries> MeasureGrowth(const DtrSet& set, const NovelCamera& no
                                         Progress& progress) {
   const RenderScene scene = MakeRenderScene(set);
   RenderOptions render = options.render;
-  render.fill_holes = false;
+  render.fill_holes = render.smooth_edges = false;
   RenderOptions all = render;
   all.views = static_cast<int>(std::max<size_t>(1, scene.views.size()));
   const ViewSelection nearest = SelectViews(scene, novel.cam_from_world, all);

@@ -142,7 +142,7 @@ RenderOptions RenderSweep::OptionsOf(const SweepSetting& setting) const {
   if (setting.at(kMaxAngle) != 0) {  // the default's degrees need not come back as the same bits
     options.max_angle_rad = std::stod(value(kMaxAngle)) * std::numbers::pi / 180;
   }
-  options.fill_holes = false;  // filling is timed apart
+  options.fill_holes = options.smooth_edges = false;  // timed apart
   return options;
 }
 

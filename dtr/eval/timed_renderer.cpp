@@ -29,10 +29,10 @@ class OnCpu final : public TimedRenderer {
   bool HasGpuClock() const override { return false; }
   FrameTime Draw(const RenderScene& scene, const PinholeCamera& novel, const Pose& novel_from_world,
                  const RenderOptions& options) override {
-    RenderOptions without_filling = options;
-    without_filling.fill_holes = false;
+    RenderOptions unfinished = options;
+    unfinished.fill_holes = unfinished.smooth_edges = false;
     const StopWatch watch;
-    drawn_ = render_(scene, novel, novel_from_world, without_filling);
+    drawn_ = render_(scene, novel, novel_from_world, unfinished);
     return watch.Elapsed();
   }
   RenderResult ReadBack() override { return drawn_; }

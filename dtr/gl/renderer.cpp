@@ -16,7 +16,7 @@
 #include "dtr/gl/resolve.h"
 #include "dtr/gl/two_pass.h"
 #include "dtr/gl/view_store.h"
-#include "dtr/render/fill_holes.h"
+#include "dtr/render/finish_image.h"
 #include "dtr/render/frame.h"
 #include "dtr/render/valid_views.h"
 
@@ -81,7 +81,7 @@ class Renderer::Implementation {
     RequireAllLoaded(frame);
     DrawInBands(std::move(frame), selection, result);
     result.coverage_share = CoverageShare(result.coverage);
-    if (options.fill_holes) FillHoles(result, options.threads);
+    if (NeedsFinishing(options)) FinishImage(scene, novel, novel_from_world, options, result);
     return result;
   }
 

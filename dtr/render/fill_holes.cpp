@@ -7,15 +7,6 @@
 namespace dtr {
 namespace {
 
-/// Plane z, 0 at a hole.
-Grid<float> SeenDepth(const RenderResult& result) {
-  Grid<float> seen = result.depth.grid();
-  for (size_t p = 0; p < seen.data().size(); ++p) {
-    if (result.coverage.data()[p] == 0) seen.data()[p] = 0;
-  }
-  return seen;
-}
-
 Mask HolesOf(const Grid<float>& depth) {
   Mask holes(depth.width(), depth.height());
   for (size_t p = 0; p < holes.data().size(); ++p) holes.data()[p] = depth.data()[p] > 0 ? 0 : 255;
@@ -23,6 +14,14 @@ Mask HolesOf(const Grid<float>& depth) {
 }
 
 }  // namespace
+
+Grid<float> SeenDepth(const RenderResult& result) {
+  Grid<float> seen = result.depth.grid();
+  for (size_t p = 0; p < seen.data().size(); ++p) {
+    if (result.coverage.data()[p] == 0) seen.data()[p] = 0;
+  }
+  return seen;
+}
 
 Grid<float> FillHoles(RenderResult& result, int threads) {
   using Cell = PushPull::Cell;

@@ -5,6 +5,9 @@
 
 namespace dtr {
 
+/// Plane z of what was seen; 0 at holes.
+Grid<float> SeenDepth(const RenderResult& result);
+
 /// Fills the image where coverage is 0, from its surroundings. Depth, coverage, view counts and
 /// coverage_share stay as they are: what is filled never counts as seen. Work is linear in the
 /// pixels; the result does not depend on `threads` (0: as ParallelFor). An image without any

@@ -108,7 +108,8 @@ const std::vector<Field>& Fields() {
       Threshold("absolute_delta", &O::absolute_delta),
       Threshold("absolute_depth_break", &O::absolute_depth_break),
       Truth("blend_in_linear_light", &O::blend_in_linear_light),
-      Truth("fill_holes", &O::fill_holes)};
+      Truth("fill_holes", &O::fill_holes),
+      Truth("smooth_edges", &O::smooth_edges)};
   return fields;
 }
 

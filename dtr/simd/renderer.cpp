@@ -6,7 +6,7 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/memory_budget.h"
-#include "dtr/render/fill_holes.h"
+#include "dtr/render/finish_image.h"
 #include "dtr/render/frame.h"
 #include "dtr/render/grid_placement.h"
 #include "dtr/render/valid_views.h"
@@ -62,7 +62,7 @@ class Renderer::Implementation {
       resolver_.CopyTo(result);
     }
     result.coverage_share = CoverageShare(result.coverage);
-    if (options.fill_holes) FillHoles(result, options.threads);
+    if (NeedsFinishing(options)) FinishImage(scene, novel, novel_from_world, options, result);
     return result;
   }
 

@@ -1,5 +1,5 @@
 // own_place_report: does an input camera's own place show its photo? PSNR of the rendered image,
-// holes filled, against each source photo, drawn from all views; docs/accuracy/RENDERING.md has
+// holes filled and edges smoothed, against each source photo, drawn from all views; docs/accuracy/RENDERING.md has
 // the figures.
 //
 //   own_place_report SET.dtr
@@ -20,7 +20,7 @@ void Report(const char* set_file) {
   const dtr::DtrSet set = dtr::io::LoadSet(set_file, {.completed = true});
   const dtr::RenderScene scene = dtr::MakeRenderScene(set);
   dtr::RenderOptions options;
-  options.fill_holes = true;
+  options.fill_holes = options.smooth_edges = true;
   dtr::simd::Renderer renderer;
   double lowest = std::numeric_limits<double>::infinity(), sum = 0;
   for (const dtr::View* view : scene.views) {

@@ -6,7 +6,7 @@
 
 #include "dtr/base/error.h"
 #include "dtr/gl/frame_timer.h"
-#include "dtr/render/fill_holes.h"
+#include "dtr/render/finish_image.h"
 #include "dtr/report/contact_sheet.h"
 
 namespace dtr::viewer {
@@ -152,9 +152,10 @@ void FrameMaker::BringPixels() {
 void FrameMaker::Show(const FrameRequest& order, const gl::DrawnFrame& drawn, bool still) {
   if (order.shown != Shown::kColour) {
     picture_.texture.Upload(InFalseColour());
-  } else if (order.options.fill_holes) {
+  } else if (NeedsFinishing(order.options)) {
     Result();
-    FillHoles(*result_, order.options.threads);
+    FinishImage(picture_.scene, picture_.camera.camera, picture_.camera.cam_from_world,
+                order.options, *result_);
     picture_.texture.Upload(result_->image);
   } else {
     picture_.texture.Take(drawn);
@@ -168,7 +169,7 @@ void FrameMaker::MakeOther(const RenderOptions& options) {
   const NovelCamera& camera = picture_.camera;
   const RenderScene scene =
       stream_.SceneFor(camera.cam_from_world, options, ViewStream::Wait::kForAll);
-  if (!options.fill_holes) {
+  if (!NeedsFinishing(options)) {
     other_.Take(renderer_.Draw(scene, camera.camera, camera.cam_from_world, options));
     return;
   }

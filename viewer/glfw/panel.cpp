@@ -55,6 +55,7 @@ void RenderControls(Widgets& widgets, RenderOptions& options, const RenderOption
   widgets.Absolute("absolute-depth-break", options.absolute_depth_break);
   widgets.Check("blend linear light", options.blend_in_linear_light);
   widgets.Check("fill holes", options.fill_holes);
+  widgets.Check("smooth edges", options.smooth_edges);
   if (widgets.Button("defaults")) {
     const int threads = options.threads;
     options = defaults;

@@ -4,20 +4,20 @@
 #include <osg/Notify>
 #include <osg/RenderInfo>
 
-#include "dtr/render/fill_holes.h"
+#include "dtr/render/finish_image.h"
 #include "viewer/osg/novel_camera.h"
 #include "viewer/osg/read_back.h"
 
 namespace osgDTR {
 namespace {
 
-/// As the settings say, filled or not.
+/// As the settings say, finished (SPEC 7, 8) or not.
 MadeFrame DrawFrame(dtr::gl::FittingRenderer& renderer, dtr::gl::Compositor& compositor,
-                    const DrawSettings& settings, const NovelCamera& novel, bool fill) {
+                    const DrawSettings& settings, const NovelCamera& novel, bool finish) {
   const dtr::RenderScene& scene = settings.set->time_steps[settings.time_step].scene;
   const dtr::RenderOptions& options = settings.options;
   const bool on_gpu = settings.path == DrawPath::kGpu;
-  if (on_gpu && !fill) {
+  if (on_gpu && !finish) {
     return {renderer.Draw(scene, novel.camera, novel.cam_from_local, options,
                           dtr::gl::CurrentMapping(novel.projection)),
             true};
@@ -30,8 +30,10 @@ MadeFrame DrawFrame(dtr::gl::FittingRenderer& renderer, dtr::gl::Compositor& com
     result =
         RenderByReadBack(renderer.open_gl(), scene, novel.camera, novel.cam_from_local, options);
   }
-  if (!fill) return {compositor.Take(result), false};
-  const dtr::Grid<float> depth = dtr::FillHoles(result, options.threads);
+  if (!finish) return {compositor.Take(result), false};
+  const dtr::Grid<float> depth =
+      dtr::FinishImage(scene, novel.camera, novel.cam_from_local, options, result);
+  if (!options.fill_holes) return {compositor.Take(result), false};
   return {compositor.TakeFilled(result, depth), false};
 }
 
@@ -71,13 +73,13 @@ void DepthTR::dtrDrawable::Draw(osg::RenderInfo& info) const {
   const NovelCamera novel = NovelCameraOf(state.getModelViewMatrix(), state.getProjectionMatrix(),
                                           viewport.width, viewport.height);
   const std::shared_ptr<ContextRenderer> context = state_->contexts.Of(state);
-  const bool fills = settings.options.fill_holes;
-  const bool may_wait = fills && settings.fill_time == FillTime::kWhenStill;
+  const bool finish = dtr::NeedsFinishing(settings.options);
+  const bool may_wait = finish && settings.fill_time == FillTime::kWhenStill;
   const osg::FrameStamp* const stamp = state.getFrameStamp();
   context->Show(stamp != nullptr ? std::optional(stamp->getFrameNumber()) : std::nullopt,
                 settings.set, settings.version, novel, may_wait,
                 [&](dtr::gl::Compositor& compositor, bool whole) {
-                  return DrawFrame(context->renderer, compositor, settings, novel, fills && whole);
+                  return DrawFrame(context->renderer, compositor, settings, novel, finish && whole);
                 });
 }
 

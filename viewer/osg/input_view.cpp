@@ -35,7 +35,7 @@ void InputView::projectView(const dtr::PinholeCamera& novel, const dtr::Pose& no
   alone.per_pixel = false;
   options.method = dtr::RenderMethod::kTwoPass;
   options.max_angle_rad = std::numbers::pi;
-  options.fill_holes = false;
+  options.fill_holes = options.smooth_edges = false;
   dtr::RenderResult result = dtr::cpu::Render(alone, novel, novel_from_world, options);
   projected_.holes = std::move(result.coverage);
   for (std::uint8_t& seen : projected_.holes.data()) seen = seen == 0 ? 255 : 0;

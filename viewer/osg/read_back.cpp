@@ -136,7 +136,7 @@ Projected ProjectAndReadBack(gl::Renderer& renderer, const View& view, const Pin
   alone.views = {&view};
   alone.per_pixel = false;
   options.max_angle_rad = std::numbers::pi;  // which views are valid was decided among all of them
-  options.fill_holes = false;
+  options.fill_holes = options.smooth_edges = false;
   return {&view,
           renderer.Render(alone, novel, novel_from_world, options),
           view.cam_from_world * novel_from_world.Inverse(),
