@@ -63,11 +63,12 @@ class OwnFragmentFinder {
   bool HasSamples() const { return !samples_.inverse_depth.empty(); }
 
   /// Adds the view's vote on a surface at 1/z = `start` on `ray`.
-  void Vote(const Eigen::Vector3d& ray, double start, double pixel_angle_rad, Votes& votes) const {
+  void Vote(const Eigen::Vector3d& ray, double start, const BlendParameters& blend,
+            Votes& votes) const {
     const Eigen::Vector3d base = grid_from_novel_ * ray;
     const auto position = PositionOnGrid(base, start);
     if (!position) return;
-    const double vote = VoteWeight(ray, start, pixel_angle_rad);
+    const double vote = VoteWeight(ray, start, blend);
     const Patch patch = PatchAt(*position);
     if (patch.masked) return;
     const double seen = Meet(base, *position, patch);
@@ -103,12 +104,14 @@ class OwnFragmentFinder {
   }
 
   /// 1 / (tan^2 t + t_pixel^2), t the angle of SPEC 4.5 at the point ray / w; 0 from 90 degrees on.
-  double VoteWeight(const Eigen::Vector3d& ray, double w, double pixel_angle_rad) const {
+  double VoteWeight(const Eigen::Vector3d& ray, double w,
+                    const BlendParameters& blend) const {
+    w = std::max(w, blend.least_inverse_depth);
     const Eigen::Vector3d to_view = center_ * w - ray;
     const double dot = to_view.dot(-ray);
     if (!(dot > 0)) return 0;
     const double tangent_squared = to_view.cross(ray).squaredNorm() / (dot * dot);
-    return 1 / (tangent_squared + pixel_angle_rad * pixel_angle_rad);
+    return 1 / (tangent_squared + blend.pixel_angle_rad * blend.pixel_angle_rad);
   }
 
   /// Where the point at inverse depth w on the ray falls on the grid of samples, the centre of the
@@ -183,18 +186,17 @@ std::vector<double> NearestSurface(std::span<const Layer> layers) {
 }
 
 void KeepSupportedSurfaces(std::span<const ViewInNovel> views, const PinholeCamera& novel,
-                           const RenderOptions& options, const Band& band,
-                           std::span<double> surfaces) {
+                           const RenderOptions& options, const BlendParameters& blend,
+                           const Band& band, std::span<double> surfaces) {
   std::vector<OwnFragmentFinder> finders;
   for (const ViewInNovel& view : views) {
     finders.emplace_back(view, options);
     if (!finders.back().HasSamples()) finders.pop_back();
   }
-  const double pixel_angle_rad = BlendParametersOf(options, novel.fx_px()).pixel_angle_rad;
   const auto surface_of = [&](const Eigen::Vector3d& ray, double surface) {
     for (int tried = 0; tried < kMaxSurfaces && surface > 0; ++tried) {
       Votes votes;
-      for (const auto& finder : finders) finder.Vote(ray, surface, pixel_angle_rad, votes);
+      for (const auto& finder : finders) finder.Vote(ray, surface, blend, votes);
       if (votes.OneDecides()) return votes.of_heaviest;
       if (votes.support >= votes.against) return votes.front > 0 ? votes.front : surface;
       surface = votes.behind;

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "dtr/cpu/layer.h"
+#include "dtr/render/blend_weights.h"
 
 namespace dtr::cpu {
 
@@ -15,8 +16,8 @@ std::vector<double> NearestSurface(std::span<const Layer> layers);
 /// together, where their patches have it; where they reject it with the next one behind, or none.
 /// Does not depend on the number of threads.
 void KeepSupportedSurfaces(std::span<const ViewInNovel> views, const PinholeCamera& novel,
-                           const RenderOptions& options, const Band& band,
-                           std::span<double> surfaces);
+                           const RenderOptions& options, const BlendParameters& blend,
+                           const Band& band, std::span<double> surfaces);
 
 /// SPEC 5.3: the view's own fragments at the pixels of `band`, found on its depth map from the
 /// surfaces that are held (1/z per pixel of the band, row-major; 0: nothing there).

@@ -44,7 +44,8 @@ std::vector<AdaptiveMesh> MakeMeshes(const std::vector<ViewInNovel>& views,
 /// One layer per view: SPEC 2 and 3, or SPEC 5 from `meshes`.
 std::vector<Layer> DrawLayers(const std::vector<ViewInNovel>& views,
                               const std::vector<AdaptiveMesh>& meshes, const PinholeCamera& novel,
-                              const RenderOptions& options, const Band& band) {
+                              const RenderOptions& options, const BlendParameters& blend,
+                              const Band& band) {
   const int count = static_cast<int>(views.size());
   std::vector<Layer> layers(views.size(), Layer(Band{}));
   const auto fill = [&](const auto& make_layer) {
@@ -59,7 +60,7 @@ std::vector<Layer> DrawLayers(const std::vector<ViewInNovel>& views,
   }
   fill([&](size_t k) { return DrawReducedMesh(views[k], meshes[k], novel, options, band); });
   std::vector<double> surfaces = NearestSurface(layers);
-  KeepSupportedSurfaces(views, novel, options, band, surfaces);
+  KeepSupportedSurfaces(views, novel, options, blend, band, surfaces);
   fill([&](size_t k) { return FindOwnFragments(views[k], novel, options, band, surfaces); });
   return layers;
 }
@@ -83,7 +84,7 @@ RenderResult Render(const RenderScene& scene, const PinholeCamera& novel,
   for (int first_row = 0; first_row < novel.height_px(); first_row += rows_per_band) {
     const Band band{novel.width_px(), first_row,
                     std::min(rows_per_band, novel.height_px() - first_row)};
-    const std::vector<Layer> layers = DrawLayers(setup.placed, meshes, novel, options, band);
+    const std::vector<Layer> layers = DrawLayers(setup.placed, meshes, novel, options, setup.settings.blend, band);
     for (size_t i = 0; i < views.size(); ++i) views[i].layer = &layers[i];
     ParallelFor(band.first_row, band.first_row + band.rows, options.threads,
                 [&](int y) { ResolveRow(setup.settings, views, y, result); });

@@ -22,10 +22,6 @@ struct Fragment {
   double angle_rad = 0;                                    ///< SPEC 4.5, at the point
 };
 
-double AngleAtPoint(const Fragment& f) {
-  return AngleBetween(f.view->in_novel->translation - f.point_in_novel, -f.point_in_novel);
-}
-
 class RowResolver {
  public:
   RowResolver(const ResolveSettings& settings, std::span<const ResolveView> views,
@@ -45,12 +41,19 @@ class RowResolver {
     if (settings_.per_pixel_rule) {
       KeepNearestByAngle();
     } else {
-      for (Fragment& f : fragments_) f.angle_rad = AngleAtPoint(f);
+      for (Fragment& f : fragments_) f.angle_rad = AngleAt(f);
     }
     Blend(x, y, result);
   }
 
  private:
+  /// SPEC 4.5.
+  double AngleAt(const Fragment& f) const {
+    const double w = std::max(f.inverse_depth, settings_.blend.least_inverse_depth);
+    const Eigen::Vector3d point_in_novel = (f.inverse_depth / w) * f.point_in_novel;
+    return AngleBetween(f.view->in_novel->translation - point_in_novel, -point_in_novel);
+  }
+
   /// SPEC 4.2: one fragment per view; those without a colour are absent.
   void Collect(int x, int y) {
     fragments_.clear();
@@ -66,7 +69,7 @@ class RowResolver {
       if (DepthImage::IsHole(static_cast<float>(1 / fragment.inverse_depth))) continue;
       fragment.point_in_novel = ray / fragment.inverse_depth;
       if (settings_.per_pixel_rule) {
-        fragment.angle_rad = AngleAtPoint(fragment);
+        fragment.angle_rad = AngleAt(fragment);
         if (fragment.angle_rad > settings_.blend.max_angle_rad) continue;
       }
       if (!FindSourcePixel(fragment)) continue;

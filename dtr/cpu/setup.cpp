@@ -50,7 +50,7 @@ Setup MakeSetup(const RenderScene& scene, const ViewSelection& selection,
   SetCutFactors(selection, setup.order, setup.views);
   ResolveSettings& settings = setup.settings;
   settings.novel = novel;
-  settings.blend = BlendParametersOf(options, novel.fx_px());
+  settings.blend = BlendParametersOf(options, novel.fx_px(), scene.bounds);
   settings.absolute_delta = options.absolute_delta;
   settings.per_pixel_rule = selection.per_pixel;
   settings.views = options.views;

@@ -149,7 +149,7 @@ const Program& Resolver::ProgramFor(const RenderFrame& frame, ProgramCache& prog
 void Resolver::Draw(const RenderFrame& frame, const Band& band, const ViewStore& store,
                     ProgramCache& programs, const Targets& targets, GLuint coarse_depth) {
   const RenderOptions& options = frame.options;
-  const BlendParameters blend = BlendParametersOf(options, frame.novel.fx_px());
+  const BlendParameters blend = BlendParametersOf(options, frame.novel.fx_px(), frame.scene.bounds);
   const int views = static_cast<int>(frame.views.size());
   const Uniforms set(ProgramFor(frame, programs));
   set.Set("view_count", views);
@@ -162,6 +162,7 @@ void Resolver::Draw(const RenderFrame& frame, const Band& band, const ViewStore&
   set.Set("blend_k", blend.blend_k);
   set.Set("max_angle_rad", blend.max_angle_rad);
   set.Set("pixel_angle_rad", blend.pixel_angle_rad);
+  set.Set("least_inverse_depth", blend.least_inverse_depth);
   set.Set("width_px", frame.novel.width_px());
   if (frame.exposure != Eigen::Vector3d::Ones()) set.Set("exposure", frame.exposure);
   set.Set("layers", 0);

@@ -43,9 +43,12 @@ void DivideBySum(std::span<double> shares) {
 
 }  // namespace
 
-BlendParameters BlendParametersOf(const RenderOptions& options, double novel_fx_px) {
+BlendParameters BlendParametersOf(const RenderOptions& options, double novel_fx_px,
+                                  const Bounds& bounds) {
+  const double diagonal = bounds.empty() ? 0 : (bounds.max - bounds.min).norm();
   return {options.blend,   options.exponent,      options.falloff,
-          options.blend_k, options.max_angle_rad, std::atan2(1.0, novel_fx_px)};
+          options.blend_k, options.max_angle_rad, std::atan2(1.0, novel_fx_px),
+          diagonal > 0 ? 1 / diagonal : 0};
 }
 
 double LogWeight(const BlendParameters& parameters, double angle_rad, double next_angle_rad) {

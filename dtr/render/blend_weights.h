@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "dtr/render/options.h"
+#include "dtr/types/dtr_set.h"
 
 namespace dtr {
 
@@ -14,8 +15,13 @@ struct BlendParameters {
   int blend_k = 3;
   double max_angle_rad = 1;
   double pixel_angle_rad = 1e-3;  ///< t_pixel: angle of one novel pixel at the image centre
+  /// 1/z in the novel camera at which t of farther points is taken, 1 / scene units; 0: nowhere.
+  double least_inverse_depth = 0;
 };
-BlendParameters BlendParametersOf(const RenderOptions& options, double novel_fx_px);
+/// `bounds`: of the scene; t of points farther away than its diagonal is taken there. Empty: t is
+/// taken at the points themselves.
+BlendParameters BlendParametersOf(const RenderOptions& options, double novel_fx_px,
+                                  const Bounds& bounds);
 
 /// Natural logarithm of the weight for one angle t >= 0 (radians); -infinity for weight 0.
 /// `next_angle_rad` is t_(k+1) of kKNearest and ignored by the others.

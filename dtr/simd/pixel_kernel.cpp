@@ -213,7 +213,7 @@ HWY_INLINE VF SupportedSurface(const PixelRow& row, std::span<const PixelView> v
       const Position position = PositionAt(view, base, surface);
       if (hn::AllFalse(d, position.on_map)) continue;
       VF vote = hn::IfThenElseZero(position.on_map,
-                                   VoteWeightAt({view, rays, surface}, row.pixel_angle_rad));
+                                   VoteWeightAt({row, view, rays, surface}, row.pixel_angle_rad));
       if (view.cells != nullptr) {
         const VU cells = CellsAt(view, position);
         if (hn::AllFalse(d, hn::And(position.on_map, IsCell(cells, kCellOfSamples)))) {
@@ -265,7 +265,7 @@ HWY_INLINE Front FindFragments(const PixelRow& row, std::span<const PixelView> v
   for (size_t i = 0; i < views.size(); ++i) {
     VF w = FragmentAt(views[i], {views[i], rays}, surface, group->image_x(i), group->image_y(i));
     if (row.nearest_views > 0 && !hn::AllFalse(d, hn::Gt(w, zero))) {  // SPEC 1.3
-      const VF t = PreciseRadiansOf({views[i], rays, w});
+      const VF t = PreciseRadiansOf({row, views[i], rays, w});
       w = hn::IfThenElseZero(hn::Le(t, Constant(row.max_angle_rad)), w);
     }
     hn::Store(w, d, group->inverse_depth(i));

@@ -59,6 +59,7 @@ struct PixelRow {
   float inverse_fx, inverse_fy, cx, cy;  ///< of the novel camera, pixels
   float y;                               ///< of the row's centre, pixels
   float pixel_angle_rad;                 ///< t_pixel of SPEC 4.5
+  float least_inverse_depth;             ///< SPEC 4.5: t of farther points is taken there
   BlendWeight blend;                     ///< and its parameters, as BlendParameters has them
   float exponent, falloff, max_angle_rad;
   int blend_k;

@@ -41,7 +41,8 @@ class Group {
 /// times a common factor. From the view's centre, so that nothing cancels where t is small.
 struct Angle {
   VF across_squared, along;
-  HWY_INLINE Angle(const PixelView& view, const Rays& rays, VF w) {
+  HWY_INLINE Angle(const PixelRow& row, const PixelView& view, const Rays& rays, VF w) {
+    w = hn::Max(w, Constant(row.least_inverse_depth));
     const VF c = hn::MulAdd(rays.x, Constant(view.centre[0]),
                             Constant(view.centre[1] * rays.y + view.centre[2]));
     const VF across = hn::Max(
@@ -109,7 +110,7 @@ HWY_INLINE Weighed WeighByInverseAngle(const PixelRow& row, std::span<const Pixe
     const MF shown = ShownAt(*group, i, border);
     VF weight = zero;
     if (!hn::AllFalse(d, shown)) {
-      const Angle angle(views[i], rays, hn::Load(d, group->inverse_depth(i)));
+      const Angle angle(row, views[i], rays, hn::Load(d, group->inverse_depth(i)));
       const VF base =
           hn::Div(Constant(1), hn::Add(RadiansOf(angle), Constant(row.pixel_angle_rad)));
       weight = base;
@@ -190,7 +191,7 @@ HWY_INLINE Weighed WeighByLogarithms(const PixelRow& row, std::span<const PixelV
     const MF shown = ShownAt(*group, i, border);
     VF t = hidden;
     if (!hn::AllFalse(d, shown)) {
-      const Angle angle(views[i], rays, hn::Load(d, group->inverse_depth(i)));
+      const Angle angle(row, views[i], rays, hn::Load(d, group->inverse_depth(i)));
       t = row.precise_weights ? PreciseRadiansOf(angle) : RadiansOf(angle);
       t = hn::IfThenElse(shown, t, hidden);
     }
@@ -242,7 +243,7 @@ HWY_INLINE VF DropAllButNearest(const PixelRow& row, std::span<const PixelView> 
     VF t = Constant(kHidden);
     if (!hn::AllFalse(d, shown)) {
       t = hn::IfThenElse(
-          shown, PreciseRadiansOf({views[i], rays, hn::Load(d, group->inverse_depth(i))}), t);
+          shown, PreciseRadiansOf({row, views[i], rays, hn::Load(d, group->inverse_depth(i))}), t);
     }
     hn::Store(t, d, group->angle(i));
   }

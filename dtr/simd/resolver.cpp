@@ -90,13 +90,14 @@ PixelView PlaceView(const View& view, const ViewPlacement& placed, double cut_fa
 /// What all rows of the frame have in common. `linear`: light of each 8-bit value.
 PixelRow RowOf(const RenderFrame& frame, const float* linear) {
   const PinholeCamera& novel = frame.novel;
-  const BlendParameters blend = BlendParametersOf(frame.options, novel.fx_px());
+  const BlendParameters blend = BlendParametersOf(frame.options, novel.fx_px(), frame.scene.bounds);
   PixelRow row{};
   row.width_px = novel.width_px();
   row.inverse_fx = static_cast<float>(1 / novel.fx_px());
   row.inverse_fy = static_cast<float>(1 / novel.fy_px());
   row.cx = static_cast<float>(novel.cx_px()), row.cy = static_cast<float>(novel.cy_px());
   row.pixel_angle_rad = static_cast<float>(blend.pixel_angle_rad);
+  row.least_inverse_depth = static_cast<float>(blend.least_inverse_depth);
   row.blend = blend.blend;
   row.exponent = static_cast<float>(blend.exponent);
   row.falloff = static_cast<float>(blend.falloff);

@@ -38,7 +38,7 @@ void Weigh(const dtr::RenderOptions& options, double novel_fx_px, const Angles& 
   weights.assign(angles.size(), 0.0);
   if (counted.empty()) return;
   std::vector<double> shares(counted.size());
-  dtr::BlendShares(dtr::BlendParametersOf(options, novel_fx_px), of_counted, shares);
+  dtr::BlendShares(dtr::BlendParametersOf(options, novel_fx_px, {}), of_counted, shares);
   for (size_t i = 0; i < counted.size(); ++i) weights[counted[i]] = shares[i];
 }
 

@@ -38,12 +38,12 @@ struct Fragment {
 
 class PixelBlender {
  public:
-  PixelBlender(const PinholeCamera& novel, const RenderOptions& options, bool per_pixel,
-               std::span<const Projected> views)
+  PixelBlender(const RenderScene& scene, const PinholeCamera& novel, const RenderOptions& options,
+               bool per_pixel, std::span<const Projected> views)
       : novel_(novel),
         options_(options),
         per_pixel_(per_pixel),
-        weights_(BlendParametersOf(options, novel.fx_px())),
+        weights_(BlendParametersOf(options, novel.fx_px(), scene.bounds)),
         views_(views) {}
 
   void Blend(int x, int y, RenderResult& result) {
@@ -78,10 +78,17 @@ class PixelBlender {
       const float z = view.picture.depth(x, y);
       if (view.picture.coverage(x, y) == 0 || DepthImage::IsHole(z)) continue;
       const Eigen::Vector3d p = ray * static_cast<double>(z);
-      const double angle = AngleBetween(view.view_from_novel.TargetOriginInSource() - p, -p);
+      const double angle = AngleAt(view, p);
       if (per_pixel_ && angle > options_.max_angle_rad) continue;  // SPEC 1.3
       fragments_.push_back({&view, 1 / static_cast<double>(z), angle, p});
     }
+  }
+
+  /// SPEC 4.5.
+  double AngleAt(const Projected& view, const Eigen::Vector3d& p_in_novel) const {
+    const double nearer = p_in_novel.z() * weights_.least_inverse_depth;
+    const Eigen::Vector3d at = p_in_novel / std::max(1.0, nearer);
+    return AngleBetween(view.view_from_novel.TargetOriginInSource() - at, -at);
   }
 
   double Pushed(const Fragment& f) const {
@@ -165,7 +172,7 @@ RenderResult RenderByReadBack(gl::Renderer& renderer, const RenderScene& scene,
     views.back().cut_factor = cuts[static_cast<size_t>(rank - selection.views.begin())];
   }
   ParallelFor(0, novel.height_px(), options.threads, [&](int y) {
-    PixelBlender blender(novel, two_pass, selection.per_pixel, views);
+    PixelBlender blender(scene, novel, two_pass, selection.per_pixel, views);
     for (int x = 0; x < novel.width_px(); ++x) blender.Blend(x, y, result);
   });
   result.coverage_share = CoverageShare(result.coverage);

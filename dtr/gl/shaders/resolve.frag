@@ -50,8 +50,11 @@ float log_weight[MAX_VIEWS], weight[MAX_VIEWS];
 
 vec3 Centre(ViewBlock view) { return vec3(view.row_x.w, view.row_y.w, view.row_z.w); }
 
-// The angle at the point ray / w, from vectors times w: no division, any scale (SPEC 1.1).
+uniform float least_inverse_depth;  // SPEC 4.5
+
+// t of SPEC 4.5 at the point ray / w, from vectors times w: no division, any scale (SPEC 1.1).
 float AngleAt(ViewBlock view, vec3 ray, float w) {
+  w = max(w, least_inverse_depth);
   vec3 to_view = Centre(view) * w - ray;
   return atan(length(cross(to_view, -ray)), dot(to_view, -ray));
 }
@@ -79,6 +82,7 @@ vec3 AwayOf(ViewBlock view) { return OnGrid(view, PointInView(view, vec3(0.0), 1
 
 // 1 / (tan^2 t + t_pixel^2), t the angle of SPEC 4.5 at the point ray / w; 0 from 90 degrees on.
 float VoteWeight(ViewBlock view, vec3 ray, float w) {
+  w = max(w, least_inverse_depth);
   vec3 to_view = Centre(view) * w - ray;
   float along = dot(to_view, -ray);
   if (!(along > 0.0)) return 0.0;
