@@ -49,6 +49,7 @@ RenderOptions RandomOptions(Random& random) {
   if (random.Index(2) == 0) options.absolute_depth_break = 3.5;
   options.blend_in_linear_light = random.Index(2) == 0;
   options.fill_holes = random.Index(2) == 0;
+  options.smooth_edges = random.Index(2) == 0;
   return options;
 }
 

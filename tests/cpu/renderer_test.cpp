@@ -304,6 +304,28 @@ TEST(Render, MaskedPixelsAreNeitherShownNorInTheWay) {
   }
 }
 
+TEST(Render, SmoothsEdgesOfTheFinishedImageAlone) {
+  const DtrSet set = SquareBeforePlane();
+  const RenderScene views = MakeRenderScene(set);
+  const Shot novel = ShotFrom("n", {0.2, 0.1, 0}, {0, 0, 8});
+  const auto render = [&](const RenderOptions& options) {
+    return Render(views, novel.camera, novel.cam_from_world, options);
+  };
+  RenderOptions options = OptionsOf(RenderMethod::kDeferred);
+  for (const bool fill : {false, true}) {
+    options.fill_holes = fill;
+    options.smooth_edges = false;
+    const RenderResult with_stairs = render(options);
+    options.smooth_edges = true;
+    RenderResult smoothed = render(options);
+    options.threads = 3;
+    ExpectSameBytes(render(options), smoothed);
+    EXPECT_NE(smoothed.image, with_stairs.image);
+    smoothed.image = with_stairs.image;
+    ExpectSameBytes(smoothed, with_stairs);
+  }
+}
+
 TEST(Render, FillsTheFinishedImageAndCountsNothingOfItAsSeen) {
   // A square before nothing, photographed in different exposures.
   std::vector<View> views;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "dtr/eval/timed_renderer.h"
+#include "dtr/render/finish_image.h"
 #include "dtr/types/dtr_set.h"
 #include "tests/eval/plane_views.h"
 
@@ -42,7 +43,7 @@ class Clockwork final : public TimedRenderer {
   bool HasGpuClock() const override { return gpu_; }
   FrameTime Draw(const RenderScene& scene, const PinholeCamera& novel, const Pose&,
                  const RenderOptions& options) override {
-    EXPECT_FALSE(options.fill_holes);
+    EXPECT_FALSE(NeedsFinishing(options));
     methods.push_back(options.method);
     blends.insert(options.blend);
     widths.push_back(novel.width_px());

@@ -67,14 +67,14 @@ TEST_F(Render, APictureLeftOnTheGpuIsTheOneThatRenderReads) {
   for (const RenderMethod method : {RenderMethod::kTwoPass, RenderMethod::kDeferred}) {
     RenderOptions options = OptionsOf(RenderMethod::kTwoPass);
     options.method = method;
-    options.fill_holes = true;  // Draw fills nothing
+    options.fill_holes = options.smooth_edges = true;  // Draw does neither
     const DrawnFrame drawn =
         renderer.Draw(views, scene.novel.camera, scene.novel.cam_from_world, options);
     EXPECT_TRUE(glIsTexture(drawn.image) && glIsTexture(drawn.depth) && glIsTexture(drawn.marks));
     EXPECT_EQ(drawn.width_px, scene.novel.camera.width_px());
     EXPECT_EQ(drawn.height_px, scene.novel.camera.height_px());
     const RenderResult read = renderer.ReadBack();
-    options.fill_holes = false;
+    options.fill_holes = options.smooth_edges = false;
     const RenderResult rendered =
         renderer.Render(views, scene.novel.camera, scene.novel.cam_from_world, options);
     ExpectSameBytes(read, rendered);

@@ -32,7 +32,7 @@ Mask WithDepth(const View& view) {
 
 TEST_P(OwnPlace, ShowsThePhotoWhereItHasDepth) {
   RenderOptions options;
-  options.fill_holes = true;
+  options.fill_holes = options.smooth_edges = true;
   Renderer fast;
   for (const View* view : views_.views) {
     const Mask with_depth = WithDepth(*view);

@@ -19,7 +19,7 @@ TEST(SimdRenderer, AnImageLeftInMemoryIsTheOneThatRenderGives) {
   Renderer renderer;
   EXPECT_THROW(renderer.ReadBack(), std::logic_error);
   RenderOptions options = OptionsOf(RenderMethod::kDeferred);
-  options.fill_holes = true;  // Draw fills nothing
+  options.fill_holes = options.smooth_edges = true;  // Draw does neither
   const DrawnImage drawn =
       renderer.Draw(views, scene.novel.camera, scene.novel.cam_from_world, options);
   EXPECT_EQ(drawn.width_px, scene.novel.camera.width_px());
@@ -31,7 +31,7 @@ TEST(SimdRenderer, AnImageLeftInMemoryIsTheOneThatRenderGives) {
     ASSERT_EQ(rgba >> 24, read.coverage.data()[p]);
     ASSERT_EQ(drawn.depth_z[p], read.depth.grid().data()[p]);
   }
-  options.fill_holes = false;
+  options.fill_holes = options.smooth_edges = false;
   const RenderResult rendered =
       renderer.Render(views, scene.novel.camera, scene.novel.cam_from_world, options);
   ExpectSameBytes(read, rendered);

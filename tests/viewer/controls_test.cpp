@@ -249,6 +249,7 @@ std::vector<Controls::Row> Controls::RenderRows() {
        }},
       box("blend linear light", "--blend-linear"),
       box("fill holes", "--fill-holes=false"),
+      box("smooth edges", "--smooth-edges=false"),
   };
 }
 
