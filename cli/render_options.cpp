@@ -84,13 +84,6 @@ RenderOptions StoredRenderOptions(const DtrSet& set, const RenderOptions& defaul
   return WithStoredOptions(defaults, json, where);
 }
 
-RenderOptions WholeFrames() {
-  RenderOptions options;
-  options.fill_holes = true;
-  options.smooth_edges = true;
-  return options;
-}
-
 std::shared_ptr<RenderOptions> AddRenderOptions(CLI::App& command, const RenderOptions& defaults) {
   auto shared = std::make_shared<RenderOptions>(defaults);
   RenderOptions& options = *shared;

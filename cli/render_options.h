@@ -20,7 +20,4 @@ void UseStoredOptions(const CLI::App& command, const DtrSet& set, RenderOptions&
 /// The set's own defaults: what it was pruned for, else the library's. Throws as above.
 RenderOptions StoredRenderOptions(const DtrSet& set, const RenderOptions& defaults = {});
 
-/// The defaults of what people look at: holes are filled.
-RenderOptions WholeFrames();
-
 }  // namespace dtr::cli

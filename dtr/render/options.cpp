@@ -17,6 +17,12 @@ bool AtLeastZero(double value) { return value >= 0 && std::isfinite(value); }
 
 }  // namespace
 
+RenderOptions WholeFrames() {
+  RenderOptions options;
+  options.fill_holes = options.smooth_edges = true;
+  return options;
+}
+
 void CheckRenderOptions(const RenderOptions& options) {
   Require(options.views >= 1, "`views`", "at least 1", options.views);
   Require(options.resolution >= 1, "`resolution`", "at least 1", options.resolution);

@@ -52,6 +52,9 @@ struct RenderOptions {
   bool operator==(const RenderOptions&) const = default;
 };
 
+/// The defaults of programs that show images: holes filled, edges smoothed.
+RenderOptions WholeFrames();
+
 /// Throws dtr::UsageError naming the option when a value has no meaning.
 void CheckRenderOptions(const RenderOptions& options);
 

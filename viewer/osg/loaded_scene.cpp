@@ -85,7 +85,7 @@ std::shared_ptr<const LoadedSet> MakeSet(dtr::DtrSet set) {
   });
   for (const osg::BoundingBox& one : bounds) loaded->bounds.expandBy(one);
   const auto stored = dtr::io::RenderOptionsOf(loaded->time_steps.front().set);
-  loaded->defaults = dtr::WithStoredOptions({}, stored.json, stored.where);
+  loaded->defaults = dtr::WithStoredOptions(dtr::WholeFrames(), stored.json, stored.where);
   return loaded;
 }
 

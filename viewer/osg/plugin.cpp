@@ -91,6 +91,7 @@ PluginOptions Parse(const osgDB::Options* given, const dtr::RenderOptions& defau
     if (name == "keys") options.keys = OnOrOff(name, value);
     if (name == "time-step") options.time_step = WholeNumber(name, value);
     if (name == "play") options.play = OnOrOff(name, value);
+    if (name == "smooth-edges") options.render.smooth_edges = OnOrOff(name, value);
     if (name == "fill-holes") {
       options.render.fill_holes = value != "off";
       options.fill_time = OneOf<FillTime>(
