@@ -74,49 +74,18 @@ HWY_INLINE VF Channel(VU texel) {
       DF(), hn::BitCast(DI(), hn::And(hn::ShiftRight<kShift>(texel), hn::Set(DU(), 255))));
 }
 
-struct FourPixels {
-  VU a, b, c, e;  ///< a b above c e
-};
-
-#if HWY_TARGET != HWY_SCALAR
-/// Of 2 kLanes pixels from `first` on, for each lane the one at its index.
-HWY_INLINE VU PixelsFrom(const std::uint32_t* first, VI index) {
-  const VI near = hn::BitCast(DI(), hn::LoadU(DU(), first));
-  const VI far = hn::BitCast(DI(), hn::LoadU(DU(), first + kLanes));
-  const auto is_near = hn::Lt(index, hn::Set(DI(), static_cast<int>(kLanes)));
-  return hn::BitCast(DU(), hn::IfThenElse(is_near, Lookup(near, index), Lookup(far, index)));
-}
-#endif
-
 /// Around the pixels that are asked for. One beyond the image's border weighs nothing.
-HWY_INLINE FourPixels PixelsAt(const PixelView& view, VI left, VI above,
-                               [[maybe_unused]] MF asked) {
-  const VI one = hn::Set(DI(), 1), width = hn::Set(DI(), view.width_px);
+HWY_INLINE FourWords PixelsAt(const PixelView& view, VI left, VI above, [[maybe_unused]] MF asked) {
 #if HWY_TARGET != HWY_SCALAR
   const Window window(left, above, asked);
   if (window.holds) {
-    const std::uint32_t* first =
-        view.rgba + static_cast<std::ptrdiff_t>(window.row) * view.width_px + window.column;
-    const VI right = hn::Add(window.right, one);
-    FourPixels pixels{PixelsFrom(first, window.right), PixelsFrom(first, right),
-                      PixelsFrom(first + view.width_px, window.right),
-                      PixelsFrom(first + view.width_px, right)};
-    if (window.two_rows) {
-      const auto second = hn::RebindMask(DU(), window.lower);
-      pixels.a = hn::IfThenElse(second, pixels.c, pixels.a);
-      pixels.b = hn::IfThenElse(second, pixels.e, pixels.b);
-      first += 2 * static_cast<std::ptrdiff_t>(view.width_px);
-      pixels.c = hn::IfThenElse(second, PixelsFrom(first, window.right), pixels.c);
-      pixels.e = hn::IfThenElse(second, PixelsFrom(first, right), pixels.e);
-    }
-    return pixels;
+    const std::ptrdiff_t corner =
+        static_cast<std::ptrdiff_t>(window.row) * view.width_px + window.column;
+    return WordsIn(window, view.rgba + corner, view.width_px);
   }
 #endif
-  const VI index = hn::Add(hn::Mul(above, width), left), below = hn::Add(index, width);
-  return {hn::GatherIndex(DU(), view.rgba, index),
-          hn::GatherIndex(DU(), view.rgba, hn::Add(index, one)),
-          hn::GatherIndex(DU(), view.rgba, below),
-          hn::GatherIndex(DU(), view.rgba, hn::Add(below, one))};
+  const VI index = hn::Add(hn::Mul(above, hn::Set(DI(), view.width_px)), left);
+  return GatherWords(view.rgba, index, view.width_px);
 }
 
 /// A channel's value: 8-bit sRGB, or what a table has for it.

@@ -102,6 +102,14 @@ HWY_INLINE VI Lookup(VI table, VI index) {
   return hn::TableLookupLanes(table, hn::IndicesFromVec(di, within));
 }
 
+/// Of 2 kLanes words from `first` on, for each lane the one at its index.
+HWY_INLINE VU WordsFrom(const std::uint32_t* first, VI index) {
+  const VI near = hn::BitCast(DI(), hn::LoadU(DU(), first));
+  const VI far = hn::BitCast(DI(), hn::LoadU(DU(), first + kLanes));
+  const auto is_near = hn::Lt(index, hn::Set(DI(), static_cast<int>(kLanes)));
+  return hn::BitCast(DU(), hn::IfThenElse(is_near, Lookup(near, index), Lookup(far, index)));
+}
+
 /// Of 2 kLanes codes from `first` on, for each lane the one at its index (at most 2 kLanes - 2) and
 /// the next, as PairsOfCodes has them.
 HWY_INLINE VI PairsFrom(const std::uint16_t* first, VI index) {
@@ -114,6 +122,36 @@ HWY_INLINE VI PairsFrom(const std::uint16_t* first, VI index) {
   return hn::IfThenElse(hn::Eq(hn::And(index, one), one), odd, even);
 }
 #endif
+
+struct FourWords {
+  VU a, b, c, d;  ///< a b above c d
+};
+
+#if HWY_TARGET != HWY_SCALAR
+/// Around each lane's place in the window; `corner` is the window's upper left one.
+HWY_INLINE FourWords WordsIn(const Window& window, const std::uint32_t* corner,
+                             std::ptrdiff_t stride) {
+  const VI right = hn::Add(window.right, hn::Set(DI(), 1));
+  FourWords words{WordsFrom(corner, window.right), WordsFrom(corner, right),
+                  WordsFrom(corner + stride, window.right), WordsFrom(corner + stride, right)};
+  if (window.two_rows) {
+    const auto second = hn::RebindMask(DU(), window.lower);
+    words.a = hn::IfThenElse(second, words.c, words.a);
+    words.b = hn::IfThenElse(second, words.d, words.b);
+    corner += 2 * stride;
+    words.c = hn::IfThenElse(second, WordsFrom(corner, window.right), words.c);
+    words.d = hn::IfThenElse(second, WordsFrom(corner, right), words.d);
+  }
+  return words;
+}
+#endif
+
+/// Around the words of these indices, left above, in rows of `stride`.
+HWY_INLINE FourWords GatherWords(const std::uint32_t* words, VI index, int stride) {
+  const VI one = hn::Set(DI(), 1), below = hn::Add(index, hn::Set(DI(), stride));
+  return {hn::GatherIndex(DU(), words, index), hn::GatherIndex(DU(), words, hn::Add(index, one)),
+          hn::GatherIndex(DU(), words, below), hn::GatherIndex(DU(), words, hn::Add(below, one))};
+}
 
 /// Two codes that lie beside each other, the left one in the lower half.
 HWY_INLINE VI PairsOfCodes(const PixelView& view, VI index) {
@@ -133,34 +171,35 @@ struct FourSamples {
 HWY_INLINE FourSamples SamplesOfPairs(VI upper, VI lower) {
   return {LowerCode(upper), UpperCode(upper), LowerCode(lower), UpperCode(lower)};
 }
+HWY_INLINE FourSamples SamplesOfWords(const FourWords& words) {
+  const DF d;
+  return {hn::BitCast(d, words.a), hn::BitCast(d, words.b), hn::BitCast(d, words.c),
+          hn::BitCast(d, words.d)};
+}
 /// Around the positions that are asked for; `index` is that of the left upper ones.
 HWY_INLINE FourSamples SamplesAt(const PixelView& view, [[maybe_unused]] VI x,
                                  [[maybe_unused]] VI y, VI index, [[maybe_unused]] MF asked) {
-  const VI below = hn::Add(index, hn::Set(DI(), view.stride));
-  if (view.codes != nullptr) {
+  const auto* values = reinterpret_cast<const std::uint32_t*>(view.values);
 #if HWY_TARGET != HWY_SCALAR
-    const Window window(x, y, asked);
-    if (window.holds) {
-      const std::uint16_t* first = view.codes +
-                                   static_cast<std::ptrdiff_t>(window.row + 1) * view.stride +
-                                   window.column + 1;
-      VI upper = PairsFrom(first, window.right);
-      VI lower = PairsFrom(first + view.stride, window.right);
-      if (window.two_rows) {
-        const auto second = hn::RebindMask(DI(), window.lower);
-        upper = hn::IfThenElse(second, lower, upper);
-        lower = hn::IfThenElse(second, PairsFrom(first + 2 * view.stride, window.right), lower);
-      }
-      return SamplesOfPairs(upper, lower);
+  const Window window(x, y, asked);
+  if (window.holds) {
+    const std::ptrdiff_t corner =
+        static_cast<std::ptrdiff_t>(window.row + 1) * view.stride + window.column + 1;
+    if (view.codes == nullptr) return SamplesOfWords(WordsIn(window, values + corner, view.stride));
+    const std::uint16_t* first = view.codes + corner;
+    VI upper = PairsFrom(first, window.right);
+    VI lower = PairsFrom(first + view.stride, window.right);
+    if (window.two_rows) {
+      const auto second = hn::RebindMask(DI(), window.lower);
+      upper = hn::IfThenElse(second, lower, upper);
+      lower = hn::IfThenElse(second, PairsFrom(first + 2 * view.stride, window.right), lower);
     }
-#endif
-    return SamplesOfPairs(PairsOfCodes(view, index), PairsOfCodes(view, below));
+    return SamplesOfPairs(upper, lower);
   }
-  const VI one = hn::Set(DI(), 1);
-  return {hn::GatherIndex(DF(), view.values, index),
-          hn::GatherIndex(DF(), view.values, hn::Add(index, one)),
-          hn::GatherIndex(DF(), view.values, below),
-          hn::GatherIndex(DF(), view.values, hn::Add(below, one))};
+#endif
+  if (view.codes == nullptr) return SamplesOfWords(GatherWords(values, index, view.stride));
+  return SamplesOfPairs(PairsOfCodes(view, index),
+                        PairsOfCodes(view, hn::Add(index, hn::Set(DI(), view.stride))));
 }
 
 /// SPEC 5.3: the blocks whose four samples belong together.
