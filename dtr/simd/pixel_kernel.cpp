@@ -156,6 +156,10 @@ HWY_INLINE void PrefetchAround(const PixelView& view, const Position& position) 
     const std::uint16_t* code = view.codes + (row + 1) * view.stride + column + 1 + 2 * kLanes;
     hwy::Prefetch(code);
     hwy::Prefetch(code + view.stride);
+  } else {
+    const float* value = view.values + (row + 1) * view.stride + column + 1 + 2 * kLanes;
+    hwy::Prefetch(value);
+    hwy::Prefetch(value + view.stride);
   }
   const float image_x = x * view.image_per_sample[0] + view.image_offset[0];
   const float image_y = y * view.image_per_sample[1] + view.image_offset[1];
