@@ -1,5 +1,5 @@
 // frame_report: what does a whole frame cost, and did a change of the code change one byte of it?
-// CPU time of frames of a set's fly-through by the renderer without a GPU, holes filled, on one
+// CPU time of frames of a set's fly-through by the renderer without a GPU, holes filled and edges smooth, on one
 // thread, and a hash of all results; two builds of it compare two commits.
 //
 //   frame_report SET.dtr [frames=12] [repeats=5]
@@ -36,7 +36,7 @@ void Report(const char* set_file, int frames, int repeats) {
   const dtr::DtrSet set = dtr::io::LoadSet(set_file, {.completed = true});
   const dtr::RenderScene scene = dtr::MakeRenderScene(set);
   dtr::RenderOptions options;
-  options.fill_holes = true;
+  options.fill_holes = options.smooth_edges = true;
   options.threads = 1;
   dtr::simd::Renderer renderer;
   const std::vector<dtr::NovelCamera> path = dtr::FlyThrough(set, frames);
