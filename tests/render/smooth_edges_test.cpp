@@ -16,18 +16,27 @@ const PinholeCamera kNovel(kWidth, kHeight, 20, 20, kWidth / 2.0, kHeight / 2.0)
 const std::vector<Eigen::Vector3d> kFarAway{{5, 0, 0}};
 
 struct Painted {
-  ImageRgb8 image{kWidth, kHeight, 3};
-  Grid<float> depth{kWidth, kHeight};
+  RenderResult result;
 
+  Painted() : Painted(kWidth, kHeight) {}
+  Painted(int width, int height) {
+    result.image = ImageRgb8(width, height, 3);
+    result.depth = DepthImage(width, height);
+    result.coverage = Mask(width, height);
+  }
+  const ImageRgb8& image() const { return result.image; }
   void Set(int x, int y, std::uint8_t level, float z) {
-    for (int c = 0; c < 3; ++c) image(x, y, c) = level;
-    depth(x, y) = z;
+    for (int c = 0; c < 3; ++c) result.image(x, y, c) = level;
+    result.depth(x, y) = z;
+    result.coverage(x, y) = 255;
   }
   ImageRgb8 Smoothed(std::span<const Eigen::Vector3d> centres, bool filled = true,
                      int threads = 1) const {
-    ImageRgb8 smoothed = image;
-    SmoothEdges(kNovel, centres, depth, filled, threads, smoothed);
-    return smoothed;
+    RenderResult smoothed = result;
+    SmoothEdges(kNovel, centres, filled, threads, smoothed);
+    EXPECT_EQ(smoothed.depth, result.depth);
+    EXPECT_EQ(smoothed.coverage, result.coverage);
+    return smoothed.image;
   }
 };
 
@@ -63,7 +72,7 @@ TEST(SmoothEdges, MixesTheTwoSidesOfADepthEdgeInLinearLight) {
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth; ++x) {
       if (x == 9 || x == 10) continue;
-      EXPECT_EQ(smoothed(x, y), painted.image(x, y)) << x << ", " << y;
+      EXPECT_EQ(smoothed(x, y), painted.image()(x, y)) << x << ", " << y;
     }
   }
 }
@@ -78,15 +87,15 @@ TEST(SmoothEdges, LeavesSlantedPlanesAlone) {
         painted.Set(x, y, static_cast<std::uint8_t>(random.Index(256)), static_cast<float>(1 / w));
       }
     }
-    EXPECT_EQ(painted.Smoothed(kFarAway), painted.image) << slope;
+    EXPECT_EQ(painted.Smoothed(kFarAway), painted.image()) << slope;
   }
 }
 
 TEST(SmoothEdges, LeavesThePhotoAloneAtItsOwnPlace) {
   const Painted painted = Noise();
   const std::vector<Eigen::Vector3d> centres{{5, 0, 0}, {0, 0, 0}};
-  EXPECT_EQ(painted.Smoothed(centres), painted.image);
-  EXPECT_NE(painted.Smoothed(kFarAway), painted.image);
+  EXPECT_EQ(painted.Smoothed(centres), painted.image());
+  EXPECT_NE(painted.Smoothed(kFarAway), painted.image());
 }
 
 TEST(SmoothEdges, ComesGraduallyOnTheWayFromAPhoto) {
@@ -105,9 +114,9 @@ TEST(SmoothEdges, ComesGraduallyOnTheWayFromAPhoto) {
 TEST(SmoothEdges, DoesNotMixInHolesThatAreNotFilled) {
   Painted painted = Step(10);
   for (int y = 0; y < kHeight; ++y) {
-    for (int x = 10; x < kWidth; ++x) painted.depth(x, y) = 0;
+    for (int x = 10; x < kWidth; ++x) painted.result.coverage(x, y) = 0;
   }
-  EXPECT_EQ(painted.Smoothed(kFarAway, false), painted.image);
+  EXPECT_EQ(painted.Smoothed(kFarAway, false), painted.image());
   EXPECT_EQ(painted.Smoothed(kFarAway, true)(9, 8, 0), Srgb8FromLinear(0.8));
 }
 
@@ -115,18 +124,19 @@ TEST(SmoothEdges, DoesNotDependOnThreadsNorOnTheScaleOfTheWorld) {
   Painted painted = Noise();
   const ImageRgb8 smoothed = painted.Smoothed(kFarAway);
   EXPECT_EQ(painted.Smoothed(kFarAway, true, 3), smoothed);
-  for (float& z : painted.depth.data()) z *= 1024;
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) painted.result.depth(x, y) *= 1024;
+  }
   EXPECT_EQ(painted.Smoothed(std::vector<Eigen::Vector3d>{{5 * 1024, 0, 0}}), smoothed);
 }
 
 TEST(SmoothEdges, TakesImagesOfAnySize) {
   for (const auto& [width, height] : {std::pair{1, 1}, {1, 7}, {7, 1}, {2, 2}}) {
-    const PinholeCamera novel(width, height, 5, 5, 0, 0);
-    ImageRgb8 image(width, height, 3, 50);
-    Grid<float> depth(width, height);
-    depth(0, 0) = 1;
-    SmoothEdges(novel, {}, depth, true, 1, image);
-    EXPECT_EQ(image, ImageRgb8(width, height, 3, 50));
+    Painted painted(width, height);
+    painted.Set(0, 0, 50, 1);
+    const ImageRgb8 alone = painted.Smoothed(kFarAway, false);
+    EXPECT_EQ(alone, painted.image());
+    painted.Smoothed(kFarAway, true);
   }
 }
 
