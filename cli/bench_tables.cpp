@@ -104,7 +104,7 @@ void SayReportTable(const eval::BenchReport& report, const eval::BenchMachine& m
     if (row.views_used != at.views_used || row.resolution != at.resolution) continue;
     console.Say(fmt::format(
         "a whole frame by {}: {:.1f} ms, {:.1f} CPU ms (drawn {:.1f}, read back {:.1f}, holes "
-        "filled {:.1f} CPU ms)",
+        "filled and edges smoothed {:.1f} CPU ms)",
         NameOf(row.method), row.whole_ms(), row.whole_cpu_ms(), row.cpu.median_ms,
         row.read_back_cpu.median_ms, row.fill_cpu.median_ms));
   }
@@ -127,7 +127,7 @@ void SayWeightTable(const eval::BenchReport& report, const eval::BenchMachine& m
   }
   console.Say("");
   console.Say(
-      "dB: whole frame, holes filled, * the best of its method and number of views; seen: dB on "
+      "dB: whole frame, holes filled and edges smoothed, * the best of its method and number of views; seen: dB on "
       "pixels that some view saw, and their share; CPU ms: drawing alone");
 }
 

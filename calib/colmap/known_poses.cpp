@@ -129,6 +129,15 @@ calib::SfmModel NumberedAsInDatabase(const Workspace& workspace, const KnownCame
   return model;
 }
 
+// What to say where COLMAP's triangulator fails, as it does where there is nothing to triangulate.
+void RequireMatches(const Workspace& workspace, const KnownCameras& known) {
+  if (!ReadDatabaseMatches(workspace.database()).pairs.empty()) return;
+  throw Error(fmt::format(
+      "expected photos that show the same points to triangulate, found that no two of the {} have "
+      "any in common; photos must overlap and show texture",
+      known.images.size()));
+}
+
 void Triangulate(Workspace& workspace, const KnownCameras& known, const SfmOptions& options) {
   const fs::path input = workspace.folder() / "posed", output = workspace.folder() / "triangulated";
   for (const fs::path& folder : {input, output, workspace.folder() / "model"}) RemoveAll(folder);
@@ -149,11 +158,18 @@ void Triangulate(Workspace& workspace, const KnownCameras& known, const SfmOptio
       .Add({"Mapper.tri_ignore_two_view_tracks"}, "0");
   workspace.progress().Stage("triangulation", static_cast<int>(workspace.images().size()));
   int done = 0;
-  workspace.Run(arguments, [&](const std::string& line) {
-    if (line.find("Triangulating image #") != std::string::npos) {
-      workspace.progress().Update(++done);
-    }
-  });
+  try {
+    workspace.Run(arguments, [&](const std::string& line) {
+      if (line.find("Triangulating image #") != std::string::npos) {
+        workspace.progress().Update(++done);
+      }
+    });
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const Error&) {
+    RequireMatches(workspace, known);
+    throw;
+  }
   calib::SfmModel found = workspace.ReadModelHere(output);
   CheckKept(output.string(), known, found);
   WriteModel(workspace.folder() / "model", WithGivenCameras(known, std::move(found)),

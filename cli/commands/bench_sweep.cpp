@@ -76,7 +76,7 @@ class RenderStage final : public Measurable {
     const std::vector<std::string> names = sweep_.Cameras();
     return fmt::format(
         "seen from {} ({}); frames timed at {}; median of {} frames after an untimed one, mean "
-        "over the cameras; PSNR over whole frames, holes filled, at the photo's own size",
+        "over the cameras; PSNR over whole frames, holes filled and edges smoothed, at the photo's own size",
         names.size() == 1 ? "1 photo" : fmt::format("{} photos", names.size()),
         fmt::join(names, ", "), request_.size.empty() ? "the photo's size" : request_.size,
         request_.bench.repeats);
@@ -145,7 +145,7 @@ class SetStage final : public Measurable {
   eval::SweepStage Stage() const override { return sweep_.Stage(); }
   std::string Conditions() const override {
     return "one run of each; PSNR over all held-out photos (without any: source photos left out in "
-           "turn), whole frames, holes filled, at their own size";
+           "turn), whole frames, holes filled and edges smoothed, at their own size";
   }
   std::vector<std::string> Arguments() const override {
     std::vector<std::string> arguments = RendererArguments(request_);

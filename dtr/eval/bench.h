@@ -31,7 +31,7 @@ struct BenchRow {
   int views_used = 0;  ///< valid views that took part: K, or what there is
   Times frame, cpu;    ///< drawing alone
   Times read_back, read_back_cpu, fill, fill_cpu;
-  std::optional<double> psnr_db;          ///< against the photo, whole frame, holes filled
+  std::optional<double> psnr_db;          ///< against the photo, whole, finished frame
   std::optional<double> psnr_covered_db;  ///< where some view saw the pixel
   double coverage = 0;
   double fps() const { return 1000 / frame.median_ms; }

@@ -18,7 +18,7 @@ struct RenderSweepOptions {
 ///
 /// Cost: drawing a frame, by the GPU's clock or else in processor time, median of the repeats, mean
 /// over the cameras. Error: 255 * 10^(-PSNR/20) of the mean PSNR over the cameras, whole frame,
-/// holes filled; 1e-6 where every pixel is equal.
+/// holes filled and edges smoothed; 1e-6 where every pixel is equal.
 class RenderSweep {
  public:
   /// Throws UsageError when no photo is left to compare with.

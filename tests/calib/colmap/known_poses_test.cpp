@@ -100,6 +100,24 @@ TEST_F(KnownPosesWithFake, MovedPoseIsAnError) {
   EXPECT_THROW(Run(), Error);
 }
 
+TEST_F(KnownPosesWithFake, PhotosWithoutAnythingInCommonAreSaidToBeSo) {
+  fake_.Fail("point_triangulator", "exit 134");
+  try {
+    Run();
+    FAIL() << "nothing was thrown";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("no two of the 3 have any in common"));
+  }
+  fake_.LeaveDatabase({"000002.jpg", "000000.jpg", "000001.jpg"}, {1, 1, 2}, {{0, 1, 40}});
+  dtr::testing::TemporaryFolder other;
+  try {
+    TriangulateWithPoses(photos_.path(), posed_, other / "posed", {}, silent_);
+    FAIL() << "nothing was thrown";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("point_triangulator"));
+  }
+}
+
 TEST_F(KnownPosesWithFake, OnePhotoIsAUsageError) {
   posed_.resize(1);
   EXPECT_THROW(Run(), UsageError);
