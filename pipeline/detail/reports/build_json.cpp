@@ -1,4 +1,5 @@
 #include "pipeline/detail/reports/build_json.h"
+#include "pipeline/detail/photos/lens_of_photo.h"
 
 #include <nlohmann/json.hpp>
 
@@ -57,6 +58,7 @@ Json ProvenanceJson(const BuildOptions& options, const Json& option_values, cons
   provenance["depth_engine"] = options.depth.engine;
   provenance["options"] = option_values;
   provenance["photos"] = photos;
+  AddLenses(calibrated.model, provenance);
   provenance["not_registered"] = report.not_registered;
   provenance["held_out_not_registered"] = report.held_out_not_registered;
   provenance["skipped"] = Json::array();
