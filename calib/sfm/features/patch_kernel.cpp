@@ -96,8 +96,10 @@ HWY_INLINE Gradients GradientsAt(const float* pixel, std::ptrdiff_t stride) {
 
 /// Adds to two neighbouring sums.
 HWY_INLINE void AddPair(const float* pair, float* sums) {
-  const DPair d;
-  hn::StoreU(hn::Add(hn::LoadU(d, sums), hn::LoadU(d, pair)), d, sums);
+  const DPair d;  // of one lane without vectors
+  for (size_t i = 0; i < 2; i += hn::MaxLanes(d)) {
+    hn::StoreU(hn::Add(hn::LoadU(d, sums + i), hn::LoadU(d, pair + i)), d, sums + i);
+  }
 }
 
 /// The pixels of an image that are at most `radius` away in x and y, and have neighbours.
