@@ -253,7 +253,8 @@ void GradientCellsImpl(const PatchPosition& at, float orientation_rad, float* ou
                            gaussian);
   TwoTables<kPaddedCells * kRowOfCells> table;
   CellShares shares;
-  for (int y = square.top; y <= square.bottom; ++y) {
+  const int first = square.top + (square.y - square.top) % kDescriptorRowStep;
+  for (int y = first; y <= square.bottom; y += kDescriptorRowStep) {
     const float dy = static_cast<float>(y) - at.y;
     const auto [from, to] = grid.Reach(dy);
     if (!(from <= to)) continue;

@@ -15,7 +15,7 @@ namespace dtr::sfm::testing {
 namespace {
 
 Features FeaturesOf(const std::filesystem::path& file) {
-  const ImageRgb8 image = ReadImage(file);
+  const ImageRgb8 image = io::ReadImage(file);
   std::vector<float> grey;
   for (size_t i = 0; i < image.data().size(); i += 3) {
     grey.push_back(static_cast<float>(Luma(&image.data()[i])) / (255 * 256));
