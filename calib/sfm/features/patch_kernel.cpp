@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <numbers>
 
 // The rest of this file is compiled once per instruction set; the best one is chosen at run time.
@@ -253,7 +254,7 @@ void GradientCellsImpl(const PatchPosition& at, float orientation_rad, float* ou
                            gaussian);
   TwoTables<kPaddedCells * kRowOfCells> table;
   CellShares shares;
-  const int first = square.top + (square.y - square.top) % kDescriptorRowStep;
+  const int first = square.top + std::abs(square.y - square.top) % kDescriptorRowStep;
   for (int y = first; y <= square.bottom; y += kDescriptorRowStep) {
     const float dy = static_cast<float>(y) - at.y;
     const auto [from, to] = grid.Reach(dy);

@@ -141,8 +141,10 @@ TEST(PatchKernel, CellsAreTheSumsOfTheFormula) {
   PatchPosition corner = middle;
   corner.x = 4.2f;
   corner.y = 107.1f;
+  PatchPosition border = middle;  // its own row has no gradients
+  border.y = 0.1f;
   dtr::testing::WithEachInstructionSet([&](std::int64_t) {
-    for (const PatchPosition& at : {middle, corner}) {
+    for (const PatchPosition& at : {middle, corner, border}) {
       const auto gradients = GradientsOf(image, 110, at, kDescriptorRowStep);
       for (const double orientation : {0.0, 0.7, 2.9, 4.0, 6.2}) {
         const auto cells = GradientCells(at, static_cast<float>(orientation));
