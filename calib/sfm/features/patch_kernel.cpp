@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <numbers>
 
 // The rest of this file is compiled once per instruction set; the best one is chosen at run time.
@@ -96,8 +97,10 @@ HWY_INLINE Gradients GradientsAt(const float* pixel, std::ptrdiff_t stride) {
 
 /// Adds to two neighbouring sums.
 HWY_INLINE void AddPair(const float* pair, float* sums) {
-  const DPair d;
-  hn::StoreU(hn::Add(hn::LoadU(d, sums), hn::LoadU(d, pair)), d, sums);
+  const DPair d;  // of one lane without vectors
+  for (size_t i = 0; i < 2; i += hn::MaxLanes(d)) {
+    hn::StoreU(hn::Add(hn::LoadU(d, sums + i), hn::LoadU(d, pair + i)), d, sums + i);
+  }
 }
 
 /// The pixels of an image that are at most `radius` away in x and y, and have neighbours.
@@ -251,7 +254,8 @@ void GradientCellsImpl(const PatchPosition& at, float orientation_rad, float* ou
                            gaussian);
   TwoTables<kPaddedCells * kRowOfCells> table;
   CellShares shares;
-  for (int y = square.top; y <= square.bottom; ++y) {
+  const int first = square.top + std::abs(square.y - square.top) % kDescriptorRowStep;
+  for (int y = first; y <= square.bottom; y += kDescriptorRowStep) {
     const float dy = static_cast<float>(y) - at.y;
     const auto [from, to] = grid.Reach(dy);
     if (!(from <= to)) continue;

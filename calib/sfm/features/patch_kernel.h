@@ -10,6 +10,10 @@ namespace dtr::sfm {
 constexpr int kDirections = 36;
 /// Cells of a descriptor in each direction, and directions of each cell.
 constexpr int kCells = 4, kCellDirections = 8;
+/// A descriptor reads every second row, counted from its own: patches are blurred by 1.8 pixels or
+/// more, so that neighbouring rows say nearly the same. On plaza this costs 0.4 % of the matches
+/// and saves a third of the time.
+constexpr int kDescriptorRowStep = 2;
 
 /// A feature in its blurred image: position and scale in pixels, centre of the first pixel at 0.
 struct PatchPosition {
@@ -26,6 +30,7 @@ std::array<float, kDirections> DirectionHistogram(const PatchPosition& at);
 /// Gradients in 4 x 4 cells of 3 sigma, rotated by `orientation_rad`, trilinearly shared between
 /// bins and weighted with a Gaussian of 2 cells (Lowe, sec. 6): not normalised; rows of cells from
 /// -y to +y, cells from -x to +x, directions from +x towards +y, all as the feature is rotated.
+/// Only rows at a multiple of kDescriptorRowStep from the feature's are read.
 std::array<float, kCells * kCells * kCellDirections> GradientCells(const PatchPosition& at,
                                                                    float orientation_rad);
 

@@ -94,8 +94,7 @@ bool IsMasked(const Keypoint& k, Size photo, std::span<const std::uint8_t> mask)
          0;
 }
 
-/// The first `count` of `all` by size; the order in which they were found stays, so that patches
-/// that follow each other lie near each other in memory.
+/// The first `count` of `all` by size, in the order they were in.
 std::vector<Located> Largest(std::vector<Located> all, size_t count) {
   if (all.size() <= count) return all;
   std::vector<Located> sorted = all;
@@ -109,6 +108,17 @@ std::vector<Located> Largest(std::vector<Located> all, size_t count) {
   std::erase_if(all, [&](const Located& l) { return larger(last, l); });
   all.resize(std::min(all.size(), count));  // extrema that were found twice
   return all;
+}
+
+/// Patches that follow each other lie near each other in memory.
+void SortByPosition(std::vector<Located>* all) {
+  constexpr float kBandRows = 32;
+  const auto key = [](const Located& l) {
+    const Extremum& e = *l.extremum;
+    return std::tuple(l.octave, e.level, static_cast<int>(e.y / kBandRows), e.x, e.y, e.sigma);
+  };
+  std::sort(all->begin(), all->end(),
+            [&](const Located& a, const Located& b) { return key(a) < key(b); });
 }
 
 std::vector<Located> LocatedIn(const std::vector<Octave>& octaves, Size photo, Size working,
@@ -172,7 +182,8 @@ Features Detect(std::span<const T> grey, Size photo, std::span<const std::uint8_
       Octaves(SourceImage(grey, photo.width, photo.height, working.width, working.height), working,
               options);
   const size_t count = static_cast<size_t>(options.max_features);
-  const auto located = Largest(LocatedIn(octaves, photo, working, mask), count);
+  auto located = Largest(LocatedIn(octaves, photo, working, mask), count);
+  SortByPosition(&located);
   return Described(octaves, Largest(Oriented(octaves, located, options.max_orientations), count));
 }
 
