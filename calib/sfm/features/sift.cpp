@@ -5,6 +5,7 @@
 #include <numeric>
 #include <stdexcept>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "calib/sfm/features/descriptor.h"
@@ -106,12 +107,13 @@ std::vector<Located> Largest(std::vector<Located> all, size_t count) {
                    sorted.end(), larger);
   const Located last = sorted[count - 1];
   std::erase_if(all, [&](const Located& l) { return larger(last, l); });
-  all.resize(std::min(all.size(), count));  // extrema that were found twice
+  all.resize(std::min(all.size(), count));  // features that are the same to the last bit
   return all;
 }
 
-/// Patches that follow each other lie near each other in memory.
-void SortByPosition(std::vector<Located>* all) {
+/// Patches that follow each other then lie near each other in memory. Extrema that the refinement
+/// of several pixels led to are kept once: two of the same would fail every ratio test.
+void SortAndUnite(std::vector<Located>* all) {
   constexpr float kBandRows = 32;
   const auto key = [](const Located& l) {
     const Extremum& e = *l.extremum;
@@ -119,6 +121,8 @@ void SortByPosition(std::vector<Located>* all) {
   };
   std::sort(all->begin(), all->end(),
             [&](const Located& a, const Located& b) { return key(a) < key(b); });
+  const auto same = [&](const Located& a, const Located& b) { return key(a) == key(b); };
+  all->erase(std::unique(all->begin(), all->end(), same), all->end());
 }
 
 std::vector<Located> LocatedIn(const std::vector<Octave>& octaves, Size photo, Size working,
@@ -182,8 +186,9 @@ Features Detect(std::span<const T> grey, Size photo, std::span<const std::uint8_
       Octaves(SourceImage(grey, photo.width, photo.height, working.width, working.height), working,
               options);
   const size_t count = static_cast<size_t>(options.max_features);
-  auto located = Largest(LocatedIn(octaves, photo, working, mask), count);
-  SortByPosition(&located);
+  std::vector<Located> located = LocatedIn(octaves, photo, working, mask);
+  SortAndUnite(&located);
+  located = Largest(std::move(located), count);
   return Described(octaves, Largest(Oriented(octaves, located, options.max_orientations), count));
 }
 

@@ -3,6 +3,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -14,14 +15,14 @@
 namespace dtr::sfm::testing {
 namespace {
 
-Features FeaturesOf(const std::filesystem::path& file) {
+Features FeaturesOf(const std::filesystem::path& file, int max_features) {
   const ImageRgb8 image = io::ReadImage(file);
   std::vector<float> grey;
   for (size_t i = 0; i < image.data().size(); i += 3) {
     grey.push_back(static_cast<float>(Luma(&image.data()[i])) / (255 * 256));
   }
   SiftOptions options;
-  options.max_features = 4000;
+  options.max_features = max_features;
   return DetectSift(std::span<const float>(grey), image.width(), image.height(), {}, options);
 }
 
@@ -71,7 +72,7 @@ TEST(SiftOfPhotos, MatchesLieOnTheTrueEpipolarLines) {
   std::array<Camera, 2> cameras{CameraOf(views[0]), CameraOf(views[1])};
   std::array<Features, 2> features;
   for (size_t i = 0; i < 2; ++i) {
-    features[i] = FeaturesOf(folder / "images" / views[i]["name"].get<std::string>());
+    features[i] = FeaturesOf(folder / "images" / views[i]["name"].get<std::string>(), 4000);
   }
   ASSERT_EQ(features[0].keypoints.size(), 4000u);
   const Eigen::Matrix3d f = Fundamental(cameras[0], cameras[1]);
@@ -93,6 +94,18 @@ TEST(SiftOfPhotos, MatchesLieOnTheTrueEpipolarLines) {
   RecordProperty("median_px", std::to_string(median));
   EXPECT_LT(median, 0.15);
   EXPECT_GT(static_cast<double>(near), 0.9 * static_cast<double>(distances.size()));
+}
+
+// Nine of this photo's extrema are reached from two pixels.
+TEST(SiftOfPhotos, NoFeatureIsThereTwice) {
+  const auto file = dtr::testing::DataFolder() / "plaza" / "images" / "0003.jpg";
+  DTR_REQUIRE_DATA(file);
+  const Features features = FeaturesOf(file, 20000);
+  ASSERT_GT(features.keypoints.size(), 8000u);
+  for (size_t i = 1; i < features.keypoints.size(); ++i) {
+    const Keypoint &a = features.keypoints[i - 1], &b = features.keypoints[i];
+    EXPECT_NE(std::memcmp(&a, &b, sizeof(a)), 0) << a.x_px << ", " << a.y_px;
+  }
 }
 
 }  // namespace
