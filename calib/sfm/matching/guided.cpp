@@ -8,7 +8,8 @@
 namespace dtr::sfm::matching {
 namespace {
 
-constexpr double kMostCellsASide = 1024;
+constexpr double kMostCells = 2048;     // along a strip, and strips
+constexpr double kStripBands = 8;       // width of a strip
 constexpr float kBandRatio = 0.85f;     // on angles, within the band
 constexpr float kFarthestAngle = 0.7f;  // COLMAP's limit for matches anywhere
 
@@ -30,49 +31,71 @@ bool Passes(const Nearest& nearest) {
 
 }  // namespace
 
-FeatureGrid::FeatureGrid(std::span<const Eigen::Vector2d> points,
-                         std::span<const Descriptor> descriptors, double cell) {
-  std::vector<size_t> known;
+StripGrid::StripGrid(std::span<const Eigen::Vector2d> points, int across, double band)
+    : across_(across) {
+  if (points.empty()) return;
+  Eigen::Vector2d low = points.front(), high = low;
+  for (const Eigen::Vector2d& p : points) {
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+  corner_ = {low[across], low[1 - across]};
+  const Eigen::Vector2d size = Eigen::Vector2d(high[across], high[1 - across]) - corner_;
+  width_ = std::max({kStripBands * band, size[0] / kMostCells, 1e-12});
+  height_ = std::max({band, size[1] / kMostCells, 1e-12});
+  strips_ = static_cast<int>(size[0] / width_) + 1;
+  cells_ = static_cast<int>(size[1] / height_) + 1;
+  begin_.assign(static_cast<size_t>(strips_) * static_cast<size_t>(cells_) + 1, 0);
+  std::vector<size_t> cell_of(points.size());
   for (size_t i = 0; i < points.size(); ++i) {
-    if (points[i].allFinite()) known.push_back(i);
+    const int strip = static_cast<int>((points[i][across] - corner_[0]) / width_);
+    const int cell = static_cast<int>((points[i][1 - across] - corner_[1]) / height_);
+    cell_of[i] = static_cast<size_t>(strip * cells_ + cell);
+    ++begin_[cell_of[i] + 1];
   }
-  if (known.empty()) return;
-  Eigen::Vector2d low = points[known.front()], high = low;
-  for (const size_t i : known) {
-    low = low.cwiseMin(points[i]);
-    high = high.cwiseMax(points[i]);
+  for (size_t c = 1; c < begin_.size(); ++c) begin_[c] += begin_[c - 1];
+  entries_.resize(points.size());
+  std::vector<int> next(begin_);
+  for (size_t i = 0; i < points.size(); ++i) {
+    entries_[static_cast<size_t>(next[cell_of[i]]++)] = {points[i][across], points[i][1 - across],
+                                                         static_cast<int>(i)};
   }
-  corner_ = low;
-  cell_ = std::max({cell, (high - low).maxCoeff() / kMostCellsASide, 1e-12});
-  columns_ = static_cast<int>((high.x() - low.x()) / cell_) + 1;
-  rows_ = static_cast<int>((high.y() - low.y()) / cell_) + 1;
-  const auto cell_of = [&](size_t i) {
-    const Eigen::Vector2d at = (points[i] - corner_) / cell_;
-    return static_cast<size_t>(static_cast<int>(at.x()) * rows_ + static_cast<int>(at.y()));
-  };
-  std::stable_sort(known.begin(), known.end(),
-                   [&](size_t i, size_t j) { return cell_of(i) < cell_of(j); });
-  begin_.assign(static_cast<size_t>(columns_) * static_cast<size_t>(rows_) + 1, 0);
-  for (const size_t i : known) {
-    ++begin_[cell_of(i) + 1];
+}
+
+void StripGrid::Near(const Eigen::Vector3d& line, double band, std::vector<int>& found) const {
+  const double across = line[across_], along = line[1 - across_];
+  const double slope = -across / along, half = band / std::abs(along);
+  found.resize(entries_.size());
+  size_t count = 0;
+  for (int s = 0; s < strips_; ++s) {
+    const double x = corner_[0] + s * width_;
+    const double y0 = -(across * x + line.z()) / along, y1 = y0 + slope * width_;
+    const double from = (std::min(y0, y1) - half - corner_[1]) / height_;
+    const double to = (std::max(y0, y1) + half - corner_[1]) / height_;
+    if (!(to >= 0) || !(from < cells_)) continue;
+    const int first = static_cast<int>(std::max(from, 0.0));
+    const int last = static_cast<int>(std::min(to, cells_ - 1.0));
+    const int end = begin_[static_cast<size_t>(s * cells_ + last + 1)];
+    for (int i = begin_[static_cast<size_t>(s * cells_ + first)]; i < end; ++i) {
+      const Entry& e = entries_[static_cast<size_t>(i)];
+      found[count] = e.index;
+      // Without a branch: half of those looked at are near.
+      count += std::abs(across * e.across + along * e.along + line.z()) <= band ? 1 : 0;
+    }
+  }
+  found.resize(count);
+}
+
+FeatureGrid::FeatureGrid(std::span<const Eigen::Vector2d> points,
+                         std::span<const Descriptor> descriptors, double band) {
+  for (size_t i = 0; i < points.size(); ++i) {
+    if (!points[i].allFinite()) continue;
     points_.push_back(points[i]);
     descriptors_.push_back(descriptors[i]);
     feature_.push_back(static_cast<std::uint32_t>(i));
   }
-  for (size_t c = 1; c < begin_.size(); ++c) begin_[c] += begin_[c - 1];
-}
-
-void FeatureGrid::AddRun(int column, int first_row, int last_row, const Eigen::Vector3d& line,
-                         double band, std::vector<int>& found) const {
-  first_row = std::max(first_row, 0);
-  last_row = std::min(last_row, rows_ - 1);
-  if (first_row > last_row) return;
-  const auto row0 = static_cast<size_t>(column * rows_ + first_row);
-  const auto row1 = static_cast<size_t>(column * rows_ + last_row);
-  for (int i = begin_[row0]; i < begin_[row1 + 1]; ++i) {
-    const Eigen::Vector2d& p = points_[static_cast<size_t>(i)];
-    if (std::abs(line.x() * p.x() + line.y() * p.y() + line.z()) <= band) found.push_back(i);
-  }
+  upright_ = StripGrid(points_, 0, band);
+  level_ = StripGrid(points_, 1, band);
 }
 
 void FeatureGrid::Near(const Eigen::Vector3d& line, double band, std::vector<int>& found) const {
@@ -80,27 +103,7 @@ void FeatureGrid::Near(const Eigen::Vector3d& line, double band, std::vector<int
   const double norm = line.head<2>().norm();
   if (!(norm > 0) || !line.allFinite()) return;
   const Eigen::Vector3d unit = line / norm;
-  // In cells, from the corner.
-  const double c = (unit.head<2>().dot(corner_) + unit.z()) / cell_, reach = band / cell_;
-  const auto row_of = [&](double y) {
-    return static_cast<int>(std::floor(std::clamp(y, -1.0, rows_ + 1.0)));
-  };
-  if (std::abs(unit.y()) >= 1e-3) {
-    // In a column the line and its band span an interval of rows.
-    const double slope = -unit.x() / unit.y(), half = reach / std::abs(unit.y());
-    for (int x = 0; x < columns_; ++x) {
-      const double y0 = slope * x - c / unit.y(), y1 = y0 + slope;
-      AddRun(x, row_of(std::min(y0, y1) - half), row_of(std::max(y0, y1) + half), unit, band,
-             found);
-    }
-    return;
-  }
-  // An upright line: its few columns in full.
-  const double slack = reach + std::abs(unit.y()) * rows_ + 1;
-  const double middle = -c / unit.x();
-  const int x0 = static_cast<int>(std::floor(std::clamp(middle - slack, 0.0, columns_ + 1.0)));
-  const int x1 = static_cast<int>(std::floor(std::clamp(middle + slack, -1.0, columns_ - 1.0)));
-  for (int x = x0; x <= x1; ++x) AddRun(x, 0, rows_ - 1, unit, band, found);
+  (std::abs(unit.y()) >= std::abs(unit.x()) ? upright_ : level_).Near(unit, band, found);
 }
 
 FeatureMatches GuidedMatches(const FeatureGrid& a, const FeatureGrid& b, const Eigen::Matrix3d& m,
@@ -111,15 +114,7 @@ FeatureMatches GuidedMatches(const FeatureGrid& a, const FeatureGrid& b, const E
   for (size_t i = 0; i < a.size(); ++i) {
     b.Near(m * a.points()[i].homogeneous(), band, near);
     dots.resize(near.size());
-    // Runs of features next to each other in one call.
-    for (size_t k = 0; k < near.size();) {
-      size_t end = k + 1;
-      while (end < near.size() && near[end] == near[end - 1] + 1) ++end;
-      DotProducts(a.descriptors()[i],
-                  std::span(b.descriptors()).subspan(static_cast<size_t>(near[k]), end - k),
-                  std::span(dots).subspan(k, end - k));
-      k = end;
-    }
+    DotProducts(a.descriptors()[i], b.descriptors(), near, dots);
     for (size_t k = 0; k < near.size(); ++k) {
       Put(of_a[i], near[k], dots[k]);
       Put(of_b[static_cast<size_t>(near[k])], static_cast<int>(i), dots[k]);

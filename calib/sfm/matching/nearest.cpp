@@ -130,7 +130,8 @@ void FindNearestImpl(const Packed& p, Tops& rows, Tops& columns) {
   }
 }
 
-void DotProductsImpl(const std::uint8_t* query, const std::uint8_t* rows, size_t count, int* dots) {
+void DotProductsImpl(const std::uint8_t* query, const std::uint8_t* rows, const int* chosen,
+                     size_t count, int* dots) {
   const hn::CappedTag<std::int16_t, 16> d16;
   const hn::Rebind<std::uint8_t, decltype(d16)> d8;
   const hn::RepartitionToWide<decltype(d16)> d32;
@@ -138,9 +139,10 @@ void DotProductsImpl(const std::uint8_t* query, const std::uint8_t* rows, size_t
   HWY_ALIGN std::int16_t wide[kSize];
   for (size_t k = 0; k < kSize; ++k) wide[k] = query[k];
   for (size_t i = 0; i < count; ++i) {
+    const std::uint8_t* at = rows + static_cast<size_t>(chosen[i]) * kSize;
     auto sum0 = hn::Zero(d32), sum1 = hn::Zero(d32);
     for (size_t k = 0; k < kSize; k += n) {
-      const auto row = hn::PromoteTo(d16, hn::LoadU(d8, rows + i * kSize + k));
+      const auto row = hn::PromoteTo(d16, hn::LoadU(d8, at + k));
       sum0 = hn::ReorderWidenMulAccumulate(d32, row, hn::Load(d16, wide + k), sum0, sum1);
     }
     dots[i] = hn::GetLane(hn::SumOfLanes(d32, hn::Add(sum0, sum1)));
@@ -186,11 +188,12 @@ NearestBothWays FindNearest(std::span<const Descriptor> a, std::span<const Descr
   return {FromTops(of_rows, a.size()), FromTops(of_columns, b.size())};
 }
 
-void DotProducts(const Descriptor& query, std::span<const Descriptor> rows, std::span<int> dots) {
-  assert(rows.size() == dots.size());
-  if (rows.empty()) return;
+void DotProducts(const Descriptor& query, std::span<const Descriptor> rows,
+                 std::span<const int> chosen, std::span<int> dots) {
+  assert(chosen.size() == dots.size());
+  if (chosen.empty()) return;
   HWY_DYNAMIC_DISPATCH(DotProductsImpl)
-  (query.data(), rows.front().data(), rows.size(), dots.data());
+  (query.data(), rows.front().data(), chosen.data(), chosen.size(), dots.data());
 }
 
 float DescriptorAngle(int dot) {

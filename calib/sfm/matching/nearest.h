@@ -25,8 +25,9 @@ struct NearestBothWays {
 /// single precision holds, in any order of summing.
 NearestBothWays FindNearest(std::span<const Descriptor> a, std::span<const Descriptor> b);
 
-/// dots[i] = query . rows[i]; `dots` has the size of `rows`.
-void DotProducts(const Descriptor& query, std::span<const Descriptor> rows, std::span<int> dots);
+/// dots[i] = query . rows[chosen[i]]; `dots` has the size of `chosen`.
+void DotProducts(const Descriptor& query, std::span<const Descriptor> rows,
+                 std::span<const int> chosen, std::span<int> dots);
 
 /// Angle between two descriptors whose length is 512, from their dot product (COLMAP's measure).
 float DescriptorAngle(int dot);

@@ -73,9 +73,12 @@ TEST(SfmNearest, DotProductsOfTheLargestBytesAreExact) {
   Descriptor full;
   full.fill(255);
   const auto rows = Descriptors(9, 3, 255);
-  std::vector<int> dots(rows.size());
-  DotProducts(full, rows, dots);
-  for (size_t i = 0; i < rows.size(); ++i) EXPECT_EQ(dots[i], Dot(full, rows[i]));
+  const std::vector<int> chosen = {8, 0, 3};
+  std::vector<int> dots(chosen.size());
+  DotProducts(full, rows, chosen, dots);
+  for (size_t i = 0; i < chosen.size(); ++i) {
+    EXPECT_EQ(dots[i], Dot(full, rows[static_cast<size_t>(chosen[i])]));
+  }
   EXPECT_EQ(FindNearest(std::vector{full}, std::vector{full}).of_a[0].dot, 128 * 255 * 255);
 }
 
