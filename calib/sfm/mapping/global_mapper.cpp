@@ -12,6 +12,7 @@
 #include "calib/sfm/mapping/points.h"
 #include "calib/sfm/mapping/positioning.h"
 #include "calib/sfm/mapping/resection.h"
+#include "dtr/base/order_statistics.h"
 
 namespace dtr::sfm {
 namespace {
@@ -132,7 +133,8 @@ class Mapper {
     points_ = PointsOf(graph_, cameras_, tracks_, useful, {4}, options_.threads);
     UnplacePoor();
     FilterPoints(graph_, cameras_, {4}, &points_);
-    if (!Adjust(1, true, 40, 1e-9)) return false;
+    // Slow directions, such as focal length against depth, need many iterations.
+    if (!Adjust(FinalCauchy(), true, 100, 1e-9)) return false;
     FilterPoints(graph_, cameras_, {4}, &points_);
     NameLost();
     Normalise();
@@ -173,6 +175,19 @@ class Mapper {
     TakeFromBundle(bundle, image_of, &cameras_, &points_);
     if (lenses) cameras_.rays = RaysOf(graph_, cameras_.lenses, options_.threads);
     return true;
+  }
+
+  // Where errors begin to count as outliers: some times their median, px of an image of 1000 px.
+  double FinalCauchy() const {
+    std::vector<double> errors;
+    for (const MapPoint& point : points_) {
+      for (const TrackFeature& f : point.seen) {
+        const calib::LensCamera& lens = cameras_.lenses[graph_.images[f.image].camera];
+        errors.push_back(ReprojectionErrorPx(graph_, cameras_, f, point.p_in_world) /
+                         LimitPx(1, lens));
+      }
+    }
+    return errors.empty() ? 1 : std::clamp(2.5 * UpperMedian(errors), 0.25, 1.0);
   }
 
   void UnplacePoor() {
