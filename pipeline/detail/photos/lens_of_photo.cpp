@@ -37,6 +37,8 @@ void AddLenses(const calib::SfmModel& model, Json& provenance) {
   for (const calib::SfmImage& image : model.images) camera_of[image.name] = image.camera_id;
   provenance["lenses"] = Json::array();
   for (Json& photo : provenance["photos"]) {
+    // Held-out photos have no hash, and no depth: nothing of their content enters the provenance.
+    if (!photo.contains("sha256")) continue;
     const auto found = camera_of.find(photo.at("name").get<std::string>());
     if (found == camera_of.end()) continue;
     const auto [place, is_new] = index.emplace(found->second, index.size());

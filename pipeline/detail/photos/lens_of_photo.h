@@ -13,8 +13,8 @@ namespace dtr::pipeline {
 /// {"model", "width_px", "height_px", "params"}, in COLMAP's words.
 nlohmann::ordered_json LensJson(const calib::LensCamera& lens);
 
-/// Adds `lenses` to a provenance, and to each of its `photos` that the model has an image of by
-/// name the index `lens` into them.
+/// Adds `lenses` to a provenance, and `lens`, an index into them, to each of its `photos` that the
+/// model has an image of by name. Held-out photos, which have no hash there, get none.
 void AddLenses(const calib::SfmModel& model, nlohmann::ordered_json& provenance);
 
 /// What AddLenses wrote of a photo; empty where the set does not know. Throws Error for a damaged
