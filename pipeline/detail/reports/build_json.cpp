@@ -1,10 +1,10 @@
 #include "pipeline/detail/reports/build_json.h"
-#include "pipeline/detail/photos/lens_of_photo.h"
 
 #include <nlohmann/json.hpp>
 
 #include "capture/contents_json.h"
 #include "pipeline/detail/depth/quality_json.h"
+#include "pipeline/detail/photos/lens_of_photo.h"
 #include "pipeline/detail/reports/calibration_json.h"
 #include "pipeline/detail/reports/metres_json.h"
 #include "pipeline/detail/reports/text.h"
