@@ -103,7 +103,7 @@ sfm::Features FeaturesOf(const fs::path& photo, const fs::path& mask_file, int m
                             mask.height()));
   }
   sfm::SiftOptions options;
-  options.max_features = max_features > 0 ? max_features : kMaxFeatures;
+  options.max_features = max_features > 0 ? max_features : kMaxOwnFeatures;
   options.max_size_px = max_image_size_px;
   return sfm::DetectSift(grey.data(), grey.width(), grey.height(), mask.data(), options);
 }
