@@ -51,6 +51,10 @@ void RequireDepth(const fs::path& folder, const std::vector<View>& views) {
   }
 }
 
+bool AllAreJpeg(const std::vector<View>& views) {
+  return std::all_of(views.begin(), views.end(), [](const View& v) { return IsStoredAsJpeg(v); });
+}
+
 Json JsonOf(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
 std::string Name(const fs::path& set) {
@@ -139,7 +143,7 @@ WebPageReport ExportWebPage(const WebPageRequest& request, Progress& progress) {
       coding.jpeg_quality = std::min(coding.jpeg_quality, *request.jpeg_quality);
     page = PageOf(request, set, views, coding, work.path(), progress);
     report.bytes = page.size();
-    report.jpeg_quality = coding.jpeg_quality;
+    report.jpeg_quality = coding.recodes_jpeg || !AllAreJpeg(views) ? coding.jpeg_quality : 0;
     report.depth_error_px = coding.depth_error_px;
     if (!request.max_mb || static_cast<double>(page.size()) <= *request.max_mb * kBytesPerMb) {
       const fs::path file = work.path() / request.output.filename();

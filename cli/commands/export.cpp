@@ -34,6 +34,9 @@ int RunWeb(const pipeline::WebPageRequest& request, const Context& context) {
   RequireOutputFile(request.output, "-o", {".html", ".htm"});
   const pipeline::WebPageReport report = pipeline::ExportWebPage(request, context.console);
   if (!report.warning.empty()) context.console.Note(report.warning);
+  const std::string photos =
+      report.jpeg_quality > 0 ? fmt::format("photos of JPEG quality {}", report.jpeg_quality)
+                              : "photos as in the set";
   const std::string depth =
       report.depth_error_px > 0
           ? fmt::format("depth within {} px of disparity", report.depth_error_px)
@@ -56,9 +59,9 @@ int RunExport(ExportOptions options, const Context& context) {
 
 void RequireFormat(const ExportOptions& options) {
   const bool web = options.format == "web";
-  if (web && options.colmap.text) throw UsageError("--text: is of --format colmap");
+  if (web && options.colmap.text) throw UsageError("--text conflicts with --format web; leave one of them out");
   if (!web && (options.web.max_mb || options.web.jpeg_quality)) {
-    throw UsageError("--max-mb, --jpeg-quality: are of --format web");
+    throw UsageError("--max-mb and --jpeg-quality need --format web");
   }
 }
 

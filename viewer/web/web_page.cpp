@@ -1,9 +1,11 @@
 #include "viewer/web/web_page.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <stdexcept>
+#include <utility>
 
 #include "viewer/web/web_files.h"
 
@@ -71,11 +73,9 @@ std::string ShadersJson() {
 }
 
 constexpr std::string_view kViewEnd = "</script>\n";
-/// The index has at most four digits.
 std::string ViewStart(size_t index) {
   return "<script type=\"text/plain\" id=\"view-" + std::to_string(index) + "\">";
 }
-constexpr size_t kLongestViewStart = 44;
 
 /// The page around its views: before and after.
 std::pair<std::string, std::string> Frame(const WebPage& page) {
@@ -123,24 +123,12 @@ std::string JoinedScript() {
 
 std::string MakeWebPage(const WebPage& page) {
   auto [text, after] = Frame(page);
-  size_t bytes = text.size() + after.size();
-  for (const std::string& view : page.views) bytes += WebViewTextBytes(view.size());
-  text.reserve(bytes);
   for (size_t i = 0; i < page.views.size(); ++i) {
     text += ViewStart(i);
     text += Base64(page.views[i]);
     text += kViewEnd;
   }
   return text + after;
-}
-
-std::size_t WebPageOverheadBytes(const WebPage& page) {
-  const auto [text, after] = Frame(page);
-  return text.size() + after.size();
-}
-
-std::size_t WebViewTextBytes(std::size_t bytes) {
-  return (bytes + 2) / 3 * 4 + kLongestViewStart + kViewEnd.size();
 }
 
 }  // namespace dtr::web

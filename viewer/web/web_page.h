@@ -17,10 +17,6 @@ struct WebPage {
 /// The whole page: no other file and no server is needed to open it.
 std::string MakeWebPage(const WebPage& page);
 
-/// How large MakeWebPage's text is without its views, and what one of them adds.
-std::size_t WebPageOverheadBytes(const WebPage& page);
-std::size_t WebViewTextBytes(std::size_t bytes);
-
 /// RFC 4648, with padding.
 std::string Base64(std::string_view bytes);
 

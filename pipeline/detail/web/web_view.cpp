@@ -2,7 +2,7 @@
 
 #include <zlib.h>
 
-#include <array>
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -169,10 +169,8 @@ BlockCover CoverOf(const View& set_view, const View& view) {
 
 std::string JpegOf(const View& view, const fs::path& set, const WebCoding& coding,
                    const fs::path& work) {
-  const fs::path stored = set / view.image_file->path;
-  const std::string extension = LowerExtension(stored);
-  if (!coding.recodes_jpeg && (extension == ".jpg" || extension == ".jpeg")) {
-    return ReadFile(stored, kMaxJpegBytes);
+  if (!coding.recodes_jpeg && IsStoredAsJpeg(view)) {
+    return ReadFile(set / view.image_file->path, kMaxJpegBytes);
   }
   const fs::path file = work / (view.id + ".jpg");
   io::WriteImage(file, view.image, coding.jpeg_quality);
@@ -213,6 +211,11 @@ Json JsonOf(const View& view, double baseline) {
 }
 
 }  // namespace
+
+bool IsStoredAsJpeg(const View& view) {
+  const std::string extension = LowerExtension(view.image_file->path);
+  return extension == ".jpg" || extension == ".jpeg";
+}
 
 WebView PackView(const View& view, const fs::path& set, const WebCoding& coding,
                  const fs::path& work) {

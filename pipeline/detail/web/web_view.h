@@ -22,6 +22,9 @@ struct WebView {
   std::string json;  ///< an object
 };
 
+/// Whether its photo can go into a page as it is.
+bool IsStoredAsJpeg(const View& view);
+
 /// Of a view that has its photo, depth (completed depth with it) and mask loaded; sigma, too, where
 /// the set has it. `set`: the set's folder. `work`: a folder for a file that is deleted again.
 WebView PackView(const View& view, const std::filesystem::path& set, const WebCoding& coding,
