@@ -25,7 +25,7 @@ using Json = nlohmann::ordered_json;
 constexpr double kBytesPerMb = 1e6;
 
 /// From as the page is by default to the smallest that still shows the scene.
-constexpr WebCoding kCodings[] = {{85, 0, false},   {75, 0.1, true},  {65, 0.15, true},
+constexpr WebCoding kCodings[] = {{80, 0, false},   {75, 0.1, true},  {65, 0.15, true},
                                   {50, 0.25, true}, {35, 0.35, true}, {25, 0.5, true},
                                   {15, 0.5, true}};
 

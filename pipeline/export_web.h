@@ -15,7 +15,7 @@ struct WebPageRequest {
   std::filesystem::path output;  ///< the file to write
   /// At most so many MB (10^6 bytes): photos and depth are coded more coarsely until the page fits.
   std::optional<double> max_mb;
-  /// Of photos, 1...100; without it 85, and photos that the set stores as JPEG go in as they are.
+  /// Of photos, 1...100; without it 80, and photos that the set stores as JPEG go in as they are.
   std::optional<int> jpeg_quality;
 };
 

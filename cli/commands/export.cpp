@@ -34,9 +34,9 @@ int RunWeb(const pipeline::WebPageRequest& request, const Context& context) {
   RequireOutputFile(request.output, "-o", {".html", ".htm"});
   const pipeline::WebPageReport report = pipeline::ExportWebPage(request, context.console);
   if (!report.warning.empty()) context.console.Note(report.warning);
-  const std::string photos =
-      report.jpeg_quality > 0 ? fmt::format("photos of JPEG quality {}", report.jpeg_quality)
-                              : "photos as in the set";
+  const std::string photos = report.jpeg_quality > 0
+                                 ? fmt::format("photos of JPEG quality {}", report.jpeg_quality)
+                                 : "photos as in the set";
   const std::string depth =
       report.depth_error_px > 0
           ? fmt::format("depth within {} px of disparity", report.depth_error_px)
@@ -59,7 +59,8 @@ int RunExport(ExportOptions options, const Context& context) {
 
 void RequireFormat(const ExportOptions& options) {
   const bool web = options.format == "web";
-  if (web && options.colmap.text) throw UsageError("--text conflicts with --format web; leave one of them out");
+  if (web && options.colmap.text)
+    throw UsageError("--text conflicts with --format web; leave one of them out");
   if (!web && (options.web.max_mb || options.web.jpeg_quality)) {
     throw UsageError("--max-mb and --jpeg-quality need --format web");
   }
@@ -89,7 +90,7 @@ void AddExportCommand(CLI::App& app) {
                    ->type_name("N");
                command
                    .add_option("--jpeg-quality", options->web.jpeg_quality,
-                               "web: of the photos [85, or the JPEG that the set stores]")
+                               "web: of the photos [80, or the JPEG that the set stores]")
                    ->check(CLI::Range(1, 100))
                    ->type_name("Q");
                command.add_option("-o,--output", options->colmap.output, "What to write")

@@ -47,10 +47,10 @@ std::string FromBase64(const std::string& text) {
 std::string Inflated(const std::string& bytes, size_t size) {
   std::string out(size, '\0');
   uLongf filled = static_cast<uLongf>(size);
-  EXPECT_EQ(uncompress(reinterpret_cast<Bytef*>(out.data()), &filled,
-                       reinterpret_cast<const Bytef*>(bytes.data()),
-                       static_cast<uLong>(bytes.size())),
-            Z_OK);
+  EXPECT_EQ(
+      uncompress(reinterpret_cast<Bytef*>(out.data()), &filled,
+                 reinterpret_cast<const Bytef*>(bytes.data()), static_cast<uLong>(bytes.size())),
+      Z_OK);
   EXPECT_EQ(filled, size);
   return out;
 }
@@ -73,7 +73,7 @@ class ExportWeb : public ::testing::Test {
   // Nothing but the courtyard and its set.
   void ExpectNothingLeft() const {
     std::vector<std::string> names;
-    for (const auto& entry : fs::directory_iterator(folder_ / "")) {
+    for (const auto& entry : fs::directory_iterator(folder_.path())) {
       names.push_back(entry.path().filename().string());
     }
     EXPECT_THAT(names, ::testing::UnorderedElementsAre("courtyard", "set.dtr"));
@@ -92,9 +92,9 @@ TEST_F(ExportWeb, HoldsEveryViewWithItsChecksumAndDepth) {
   for (const View& view : set.frames[0].views) {
     if (view.role != ViewRole::kSource) continue;
     const auto& described = json["views"][sources];
-    const std::string bytes = FromBase64(Between(
-        page, "<script type=\"text/plain\" id=\"view-" + std::to_string(sources) + "\">",
-        "</script>"));
+    const std::string bytes = FromBase64(
+        Between(page, "<script type=\"text/plain\" id=\"view-" + std::to_string(sources) + "\">",
+                "</script>"));
     ++sources;
     ASSERT_EQ(described["name"], view.name);
     ASSERT_EQ(described["bytes"], bytes.size());
@@ -103,8 +103,7 @@ TEST_F(ExportWeb, HoldsEveryViewWithItsChecksumAndDepth) {
     EXPECT_EQ(bytes.substr(0, 2), "\xff\xd8");  // a JPEG first
     EXPECT_DOUBLE_EQ(described["camera"][0].get<double>(), view.camera.fx_px());
     const size_t image = described["parts"]["image"][0], depth = described["parts"]["depth"][0];
-    const std::string plain =
-        Inflated(bytes.substr(image, depth), described["parts"]["depth"][1]);
+    const std::string plain = Inflated(bytes.substr(image, depth), described["parts"]["depth"][1]);
     // Each row of validity bits XOR the one above: undone, as many bits as pixels with depth.
     const auto row = static_cast<size_t>(view.depth.width() + 7) / 8;
     std::string bits = plain.substr(0, row * static_cast<size_t>(view.depth.height()));
@@ -140,8 +139,7 @@ TEST_F(ExportWeb, IsTheSameEachTime) {
 
 TEST_F(ExportWeb, AFileThatExistsIsNotReplaced) {
   WriteFileAtomically(folder_ / "page.html", "notes");
-  ExpectRejected(Dtr(Arguments("page.html")), kWrongUsage,
-                 "exists already; choose another file");
+  ExpectRejected(Dtr(Arguments("page.html")), kWrongUsage, "exists already; choose another file");
   EXPECT_EQ(Text(folder_ / "page.html"), "notes");
 }
 
@@ -167,9 +165,9 @@ TEST_F(ExportWeb, ASetWithoutDepthHasNoPage) {
   const fs::path set = folder_ / "flat.dtr";
   DtrOk({"import", "--cameras", (folder_ / "courtyard/cameras.json").string(), "--images",
          (folder_ / "courtyard/images").string(), "-o", set.string()});
-  ExpectRejected(Dtr({"export", set.string(), "--format", "web", "-o",
-                      (folder_ / "page.html").string()}),
-                 kFailed, "has no depth; `dtr stereo` makes it");
+  ExpectRejected(
+      Dtr({"export", set.string(), "--format", "web", "-o", (folder_ / "page.html").string()}),
+      kFailed, "has no depth; `dtr stereo` makes it");
   EXPECT_FALSE(fs::exists(folder_ / "page.html"));
 }
 

@@ -74,7 +74,7 @@ void PutDepth(const CodedMap& map, DepthImage& depth) {
   const InverseDepthCode code(map.near_z, map.far_z, map.steps);
   for (int y = 0; y < depth.height(); ++y) {
     for (int x = 0; x < depth.width(); ++x) {
-      if (map.codes(x, y) != 0) depth.at(x, y) = code.Decode(map.codes(x, y));
+      if (map.codes(x, y) != 0) depth(x, y) = code.Decode(map.codes(x, y));
     }
   }
 }

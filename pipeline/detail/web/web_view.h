@@ -9,7 +9,7 @@ namespace dtr::pipeline {
 
 /// How closely a page holds a set.
 struct WebCoding {
-  int jpeg_quality = 85;
+  int jpeg_quality = 80;
   /// Largest error of depth by rounding, pixels of disparity; 0: the set's own codes.
   double depth_error_px = 0;
   bool recodes_jpeg =
