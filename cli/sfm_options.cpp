@@ -11,6 +11,20 @@ constexpr int kMinFeatures = 128, kSmallestPx = 64;  // with less no photos come
 }  // namespace
 
 CLI::Option* AddSfmOptions(CLI::App& command, pipeline::SfmChoice& choice) {
+  std::map<std::string, colmap::SfmEngine> engines;
+  for (const auto engine :
+       {colmap::SfmEngine::kColmap, colmap::SfmEngine::kGlobal, colmap::SfmEngine::kAuto}) {
+    engines[colmap::NameOf(engine)] = engine;
+  }
+  command
+      .add_option_function<std::string>(
+          "--sfm",
+          [&choice, engines](const std::string& name) { choice.engine = engines.at(name); },
+          "Structure from motion: COLMAP's, our own (global), or our own with COLMAP's mapper "
+          "where "
+          "ours does not pass [colmap]")
+      ->check(CLI::IsMember({"colmap", "global", "auto"}))
+      ->type_name("colmap|global|auto");
   command
       .add_option("--feature-size", choice.feature_size_px,
                   "Long side of the photos when SfM looks for features [2400, or what --memory "

@@ -68,7 +68,7 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
   calibrated.engine = sfm.report.version;
   calibrated.why_not_registered = sfm.report.why_not_registered;
   for (const colmap::StepRecord& step : sfm.report.steps) {
-    calibrated.engine_cpu_s += step.cpu_s;
+    if (!step.argv.empty()) calibrated.engine_cpu_s += step.cpu_s;
     if (!step.from_checkpoint) continue;
     calibrated.earlier_cpu_s += step.cpu_s;
     calibrated.earlier_wall_s += step.wall_s;
@@ -125,6 +125,7 @@ std::vector<colmap::SfmImageInput> SfmInputs(const capture::Capture& capture,
 
 colmap::SfmOptions SfmOptionsFor(const CalibrateOptions& options) {
   colmap::SfmOptions sfm;
+  sfm.engine = options.sfm.engine;
   sfm.threads = options.threads;
   sfm.seed = options.seed;
   sfm.memory_gb = options.memory_gb;
@@ -148,10 +149,11 @@ bool NeedsFeatures(const fs::path& poses) {
   return !fs::is_directory(poses) || colmap::ReadModel(colmap::ModelFolderIn(poses)).points.empty();
 }
 
-void RequireCalibration(const fs::path& poses) {
+void RequireCalibration(const fs::path& poses, colmap::SfmEngine engine) {
   if (!poses.empty() && !fs::exists(poses)) {
     throw UsageError(fmt::format("`poses` {}: no such file or folder", poses.string()));
   }
+  if (poses.empty() && engine != colmap::SfmEngine::kColmap) return;
   if (NeedsFeatures(poses)) (void)colmap::Program();
 }
 
@@ -159,7 +161,7 @@ CalibratedPhotos CalibratePhotos(const capture::Capture& capture, const Calibrat
                                  const fs::path& workspace, Progress& progress) {
   CalibrateOptions checked = options;
   checked.held_out.resize(capture.photos.size(), false);
-  RequireCalibration(checked.poses);
+  RequireCalibration(checked.poses, checked.sfm.engine);
   if (checked.rig) RejectTurned(capture, "the rig is");
   if (checked.lens) RejectTurned(capture, "the intrinsics are");
   fs::create_directories(workspace);

@@ -68,8 +68,9 @@ std::string ToJson(const CalibratedPhotos& calibrated, const capture::FolderCont
 bool NeedsFeatures(const std::filesystem::path& poses);
 
 /// Rejects before any work what cannot work: UsageError for `poses` that do not exist, Error when
-/// COLMAP is needed (NeedsFeatures) and not installed.
-void RequireCalibration(const std::filesystem::path& poses);
+/// COLMAP is needed (by the engine kColmap; by all others for points of given poses, NeedsFeatures)
+/// and not installed.
+void RequireCalibration(const std::filesystem::path& poses, colmap::SfmEngine engine);
 
 /// The long side to which SfM shrinks photos of these sizes (width and height, px), so that looking
 /// for features in them fits into `memory_gb` (`asked_px` at most; 0: nothing is asked): it decides

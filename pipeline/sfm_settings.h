@@ -11,9 +11,10 @@ enum class CameraPer { kAuto, kFolder, kPhoto, kSet };
 /// "auto", "folder", "photo", "set".
 const char* NameOf(CameraPer per);
 
-/// How COLMAP goes about it. Each choice decides the result; docs/accuracy/SPEED.md has what they
+/// How structure from motion goes about it. Each choice decides the result; docs/accuracy/SPEED.md has what they
 /// cost and what they are worth.
 struct SfmChoice {
+  colmap::SfmEngine engine = colmap::SfmOptions().engine;
   int feature_size_px = 0;  ///< long side of the photos for features; 0: from the memory
   int features = 0;         ///< most per photo; 0: colmap::kMaxFeatures, or what a preset says
   colmap::Matching matching = colmap::Matching::kAuto;

@@ -52,22 +52,6 @@ double PeakMib(double working_pixels, double full_pixels, int threads) {
                         kMib;
 }
 
-std::vector<double> FirstGuess(calib::CameraModel model, const SfmImageInput& image,
-                               double focal_px) {
-  std::vector<double> params(static_cast<size_t>(calib::ParameterCount(model)), 0.0);
-  const bool one_focal =
-      model == calib::CameraModel::kSimplePinhole || model == calib::CameraModel::kSimpleRadial ||
-      model == calib::CameraModel::kRadial || model == calib::CameraModel::kSimpleRadialFisheye ||
-      model == calib::CameraModel::kRadialFisheye;
-  size_t next = 0;
-  params[next++] = focal_px;
-  if (!one_focal) params[next++] = focal_px;
-  params[next++] = 0.5 * image.width_px;
-  params[next++] = 0.5 * image.height_px;
-  if (model == calib::CameraModel::kFov) params[next] = kFovStart;
-  return params;
-}
-
 // COLMAP skips what it cannot read and ends with 0.
 void ExpectInDatabase(const Workspace& workspace, const std::filesystem::path& database,
                       const std::vector<size_t>& images) {
@@ -154,6 +138,22 @@ void ExtractBatch(Workspace& workspace, const std::filesystem::path& database,
 }
 
 }  // namespace
+
+std::vector<double> FirstGuess(calib::CameraModel model, const SfmImageInput& image,
+                               double focal_px) {
+  std::vector<double> params(static_cast<size_t>(calib::ParameterCount(model)), 0.0);
+  const bool one_focal =
+      model == calib::CameraModel::kSimplePinhole || model == calib::CameraModel::kSimpleRadial ||
+      model == calib::CameraModel::kRadial || model == calib::CameraModel::kSimpleRadialFisheye ||
+      model == calib::CameraModel::kRadialFisheye;
+  size_t next = 0;
+  params[next++] = focal_px;
+  if (!one_focal) params[next++] = focal_px;
+  params[next++] = 0.5 * image.width_px;
+  params[next++] = 0.5 * image.height_px;
+  if (model == calib::CameraModel::kFov) params[next] = kFovStart;
+  return params;
+}
 
 ExtractionPlan PlanExtraction(const std::vector<SfmImageInput>& images, int threads,
                               double memory_gb, int requested_side_px) {

@@ -52,6 +52,10 @@ struct CameraGroup {
 std::vector<CameraGroup> GroupCameras(const std::vector<SfmImageInput>& images,
                                       calib::CameraModel model, bool share);
 
+/// Parameters of a lens with this focal length, its principal point in the middle, no distortion.
+std::vector<double> FirstGuess(calib::CameraModel model, const SfmImageInput& image,
+                               double focal_px);
+
 /// COLMAP's text of camera parameters: exact decimals separated by commas.
 std::string ParamsText(const std::vector<double>& params);
 

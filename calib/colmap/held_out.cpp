@@ -8,8 +8,11 @@
 #include <optional>
 
 #include "calib/colmap/database.h"
+#include "calib/colmap/graph_database.h"
 #include "calib/colmap/matching.h"
 #include "calib/colmap/model_io.h"
+#include "calib/colmap/own_held_out.h"
+#include "calib/colmap/own_steps.h"
 #include "calib/colmap/pairs.h"
 #include "calib/colmap/sfm_steps.h"
 #include "calib/lens_groups.h"
@@ -98,16 +101,23 @@ void WriteAliased(const fs::path& folder, const Frozen& frozen,
   WriteModel(folder, model, Format::kBinary);
 }
 
-void MatchWithSources(Workspace& workspace, const Frozen& frozen, SmallSources& small,
-                      const SfmOptions& options) {
+// The sources to match a photo with: all, or the most resembling.
+std::vector<size_t> PartnersOf(Workspace& workspace, const Frozen& frozen, SmallSources& small) {
   std::vector<size_t> partners(frozen.sources.size());
   for (size_t i = 0; i < partners.size(); ++i) partners[i] = i;
   if (partners.size() > kExhaustiveLimit) {
     const SmallFeatures own = SmallFeaturesOf(io::ReadImage(workspace.FileOf(0)));
     partners = MostResembling(own, small.Features(workspace.progress()));
   }
+  return partners;
+}
+
+void MatchWithSources(Workspace& workspace, const Frozen& frozen, SmallSources& small,
+                      const SfmOptions& options) {
   std::vector<std::pair<std::string, std::string>> pairs;
-  for (const size_t i : partners) pairs.emplace_back(workspace.AliasOf(0), frozen.aliases[i]);
+  for (const size_t i : PartnersOf(workspace, frozen, small)) {
+    pairs.emplace_back(workspace.AliasOf(0), frozen.aliases[i]);
+  }
   MatchPairs(workspace, workspace.database(), pairs, 1, options.seed);
 }
 
@@ -128,6 +138,41 @@ void Register(Workspace& workspace, const Frozen& frozen, const SfmOptions& opti
   if (frozen.forward_motion) AllowForwardMotion(arguments);
   workspace.Run(arguments, nullptr);
   RemoveAll(input);  // a copy of the frozen model per photo would fill the disk
+}
+
+// The photo's pose by calib/sfm, as a model of it alone in registered/; none there: it has no pose.
+void RegisterHere(Workspace& workspace, const Frozen& frozen, SmallSources& small,
+                  const CameraGroup& group, const ExtractionPlan& plan, std::uint64_t seed) {
+  const fs::path output = workspace.folder() / "registered";
+  RemoveAll(output);
+  std::map<std::string, const calib::SfmImage*> registered;
+  for (const calib::SfmImage& image : frozen.model.images) registered[image.name] = &image;
+  std::vector<SourceView> sources;
+  for (const size_t i : PartnersOf(workspace, frozen, small)) {
+    const auto found = registered.find(frozen.sources[i].name);
+    if (found == registered.end()) continue;
+    sources.push_back({found->second, &frozen.model.cameras.at(found->second->camera_id),
+                       ReadFeatures(frozen.database, static_cast<std::uint32_t>(i + 1))});
+  }
+  const GroupLenses start = LensesOf(workspace, {group});
+  ViewToPlace view{
+      FeaturesOf(workspace.FileOf(0), workspace.images()[0].mask_file, plan.max_image_size_px,
+                 plan.max_features),
+      group.camera_id ? frozen.model.cameras.at(*group.camera_id) : start.lenses.front(),
+      group.camera_id.has_value(), start.focal_is_known.front()};
+  const int min_inliers = frozen.forward_motion ? kMinInliersForward : kMinInliers;
+  auto placed = PlaceView(view, sources, frozen.model, min_inliers, seed, workspace.progress());
+  if (!placed) return;
+  calib::SfmModel model;
+  placed->image.id = placed->image.camera_id = group.camera_id.value_or(1);
+  placed->image.name = workspace.AliasOf(0);
+  model.cameras[placed->image.camera_id] = placed->lens;
+  for (const calib::SfmFeature& feature : placed->image.features) {
+    if (feature.point_id == calib::SfmFeature::kNoPoint) continue;
+    model.points.emplace(feature.point_id, frozen.model.points.at(feature.point_id));
+  }
+  model.images.push_back(std::move(placed->image));
+  WriteModel(output, model, Format::kBinary);
 }
 
 // Lets a photo's programs be stopped, but keeps their stages to itself.
@@ -162,7 +207,8 @@ void KeepFrozenPoints(const calib::SfmModel& model, calib::SfmImage& image) {
 Placed Place(const fs::path& images_dir, const SfmImageInput& photo, const Frozen& frozen,
              SmallSources& small, const fs::path& folder, const SfmOptions& options,
              Progress& progress) {
-  Workspace workspace(folder, images_dir, std::span(&photo, 1), kAliasPrefix, 1, progress);
+  Workspace workspace(folder, images_dir, std::span(&photo, 1), kAliasPrefix, 1, progress,
+                      options.engine);
   auto groups = GroupCameras(workspace.images(), CameraModelOf(options), true);
   groups.front().camera_id = SharedCamera(frozen, photo, options.share_intrinsics_within_group);
   ExtractionPlan plan =
@@ -173,6 +219,11 @@ Placed Place(const fs::path& images_dir, const SfmImageInput& photo, const Froze
                   options.seed, options.lens_model, ParamsText(groups.front().params),
                   frozen.forward_motion ? " forward" : "");
   workspace.Step("registration", inputs, [&] {
+    if (options.engine != SfmEngine::kColmap) {
+      workspace.RunHere(
+          [&] { RegisterHere(workspace, frozen, small, groups.front(), plan, options.seed); });
+      return;
+    }
     CopyDatabase(frozen.database, workspace.database());
     ExtractFeatures(workspace, workspace.database(), groups, plan, options.seed);
     MatchWithSources(workspace, frozen, small, options);
@@ -181,8 +232,9 @@ Placed Place(const fs::path& images_dir, const SfmImageInput& photo, const Froze
   });
   Placed placed;
   placed.runs = workspace.Report().steps;
-  placed.version = workspace.program().version();
-  const calib::SfmModel model = ReadModel(workspace.folder() / "registered");
+  placed.version = workspace.version();
+  const fs::path registered = workspace.folder() / "registered";
+  const calib::SfmModel model = fs::exists(registered) ? ReadModel(registered) : calib::SfmModel{};
   for (const calib::SfmImage& image : model.images) {
     if (image.name != workspace.AliasOf(0)) continue;
     placed.camera = groups.front().camera_id ? frozen.model.cameras.at(*groups.front().camera_id)

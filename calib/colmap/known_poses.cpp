@@ -198,14 +198,15 @@ SfmResult TriangulateWithPoses(const fs::path& images_dir, std::span<const Posed
   }
   const KnownCameras known = Arranged(images);
   Workspace workspace(workspace_folder, images_dir, InputsOf(known.images), "",
-                      ResolveThreads(options.threads), progress);
+                      ResolveThreads(options.threads), progress, options.engine);
   SfmResult result;
   // Where no pair could overlap the cameras are doubtful: the photos themselves are asked then.
   const ImagePairs pairs = PairsThatMayOverlap(known.images);
   FeaturesAndMatches(workspace, known.groups, options, result.report,
-                     pairs.empty() ? std::nullopt : std::optional(pairs));
-  workspace.Step("triangulation", TextOf(known) + fmt::format("seed {}", options.seed),
-                 [&] { Triangulate(workspace, known, options); });
+                     pairs.empty() ? std::nullopt : std::optional(pairs), true);
+  std::string inputs = TextOf(known) + fmt::format("seed {}", options.seed);
+  if (options.engine != SfmEngine::kColmap) inputs += "\n" + workspace.program().version();
+  workspace.Step("triangulation", inputs, [&] { Triangulate(workspace, known, options); });
   result.model = ReadModel(workspace.folder() / "model");
   CompleteReport(workspace, result.model, result.report);
   result.report.not_registered = ImagesWithoutPoints(result.model);

@@ -71,8 +71,10 @@ std::string HowItEnded(const ProcessResult& result) {
 
 }  // namespace
 
+bool Program::IsInstalled() { return !FindProgram(kProgram).empty(); }
+
 Program::Program() {
-  if (FindProgram(kProgram).empty()) {
+  if (!IsInstalled()) {
     throw Error(
         "colmap: program not found on the PATH; install it (apt-get install colmap), or give the "
         "camera poses so that it is not needed");

@@ -19,6 +19,9 @@ class Program {
   /// Throws Error when there is no colmap on the PATH or it does not answer `help`.
   Program();
 
+  /// Whether there is a colmap on the PATH at all.
+  static bool IsInstalled();
+
   const std::string& version() const { return version_; }
   /// Whether it was built with CUDA, by its own words.
   bool has_cuda() const { return has_cuda_; }

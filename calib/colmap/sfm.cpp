@@ -5,7 +5,11 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "calib/colmap/database.h"
+#include "calib/colmap/graph_database.h"
 #include "calib/colmap/model_io.h"
+#include "calib/colmap/own_mapping.h"
+#include "calib/colmap/own_steps.h"
 #include "calib/colmap/parallax.h"
 #include "calib/colmap/sfm_steps.h"
 #include "calib/colmap/without_camera.h"
@@ -54,11 +58,12 @@ enum class Mapping {
 
 // Runs the mapper; false where it found no two photos to start from, which COLMAP takes for an
 // error: it is a finding about the photos.
-bool Map(Workspace& workspace, const fs::path& models, std::uint64_t seed, Mapping mapping) {
+bool Map(Workspace& workspace, const fs::path& database, const fs::path& models, std::uint64_t seed,
+         Mapping mapping) {
   Arguments arguments(workspace.program(), "mapper");
   arguments.AddIfKnown({"random_seed", "default_random_seed"}, fmt::format("{}", seed))
       .AddIfKnown({"Mapper.random_seed"}, fmt::format("{}", seed))
-      .Add({"database_path"}, workspace.database().string())
+      .Add({"database_path"}, database.string())
       .Add({"image_path"}, workspace.images_folder().string())
       .Add({"output_path"}, models.string())
       .Add({"Mapper.num_threads"}, std::to_string(workspace.threads()));
@@ -101,12 +106,13 @@ std::vector<calib::SfmModel> ModelsIn(const Workspace& workspace, const fs::path
   return models;
 }
 
-std::vector<calib::SfmModel> MadeIn(Workspace& workspace, const fs::path& models,
-                                    const SfmOptions& options, Mapping mapping) {
+std::vector<calib::SfmModel> MadeIn(Workspace& workspace, const fs::path& database,
+                                    const fs::path& models, const SfmOptions& options,
+                                    Mapping mapping) {
   RemoveAll(models);
   MakeFolder(models);
-  return Map(workspace, models, options.seed, mapping) ? ModelsIn(workspace, models)
-                                                       : std::vector<calib::SfmModel>();
+  return Map(workspace, database, models, options.seed, mapping) ? ModelsIn(workspace, models)
+                                                                 : std::vector<calib::SfmModel>();
 }
 
 // Every camera has a focal length of EXIF to be fixed at.
@@ -124,7 +130,7 @@ std::vector<calib::SfmModel> MadeOtherwise(Workspace& workspace, const fs::path&
   if (AllHavePriors(groups)) {
     workspace.progress().Note(
         "COLMAP made no model with free focal lengths; trying with those of EXIF, fixed");
-    fixed = MadeIn(workspace, models, options, Mapping::kFixedIntrinsics);
+    fixed = MadeIn(workspace, workspace.database(), models, options, Mapping::kFixedIntrinsics);
   }
   const auto photos = [](const std::vector<calib::SfmModel>& made) {
     return made.empty() ? 0 : made.front().images.size();
@@ -135,7 +141,7 @@ std::vector<calib::SfmModel> MadeOtherwise(Workspace& workspace, const fs::path&
     workspace.progress().Note(
         "COLMAP found no two photos to start from; trying two that may lie in line with what they "
         "see");
-    forward = MadeIn(workspace, models, options, Mapping::kForwardMotion);
+    forward = MadeIn(workspace, workspace.database(), models, options, Mapping::kForwardMotion);
   }
   const bool take_fixed = photos(fixed) > photos(forward);
   WriteFileAtomically(workspace.folder() / (take_fixed ? kFixedIntrinsicsNote : kForwardMotionNote),
@@ -143,14 +149,23 @@ std::vector<calib::SfmModel> MadeOtherwise(Workspace& workspace, const fs::path&
   return take_fixed ? fixed : forward;
 }
 
+std::vector<calib::SfmModel> MadeByColmap(Workspace& workspace,
+                                          const std::vector<CameraGroup>& groups,
+                                          const SfmOptions& options) {
+  const fs::path models = workspace.folder() / "models";
+  auto made = MadeIn(workspace, workspace.database(), models, options, Mapping::kFree);
+  return made.empty() ? MadeOtherwise(workspace, models, groups, options) : made;
+}
+
 void MappingStep(Workspace& workspace, const std::vector<CameraGroup>& groups,
                  const SfmOptions& options) {
-  const fs::path models = workspace.folder() / "models";
-  RemoveAll(workspace.folder() / "model");
-  RemoveAll(workspace.folder() / kForwardMotionNote);
-  RemoveAll(workspace.folder() / kFixedIntrinsicsNote);
-  auto made = MadeIn(workspace, models, options, Mapping::kFree);
-  if (made.empty()) made = MadeOtherwise(workspace, models, groups, options);
+  for (const char* part : {"model", kForwardMotionNote, kFixedIntrinsicsNote, kOwnMappingNote}) {
+    RemoveAll(workspace.folder() / part);
+  }
+  const auto by_colmap = [&] { return MadeByColmap(workspace, groups, options); };
+  const std::vector<calib::SfmModel> made = options.engine == SfmEngine::kColmap
+                                                ? by_colmap()
+                                                : MapOrFallBack(workspace, options, by_colmap);
   if (made.empty()) ThrowNoModel(workspace);
   std::string sizes;
   for (const auto& model : made) sizes += fmt::format("{}\n", model.images.size());
@@ -159,16 +174,29 @@ void MappingStep(Workspace& workspace, const std::vector<CameraGroup>& groups,
 }
 
 // Leaves no model where COLMAP makes none.
-void FixedMappingStep(Workspace& workspace, const SfmOptions& options) {
-  const fs::path models = workspace.folder() / "fixed" / "models",
-                 model = workspace.folder() / kFixedModel;
+void FixedMappingStep(Workspace& workspace, const std::vector<CameraGroup>& groups,
+                      const SfmOptions& options) {
+  const fs::path folder = workspace.folder() / "fixed", model = workspace.folder() / kFixedModel;
   RemoveAll(model);
-  const auto made = MadeIn(workspace, models, options, Mapping::kFixedIntrinsics);
+  fs::path database = workspace.database();
+  if (options.engine != SfmEngine::kColmap) {  // its cameras are what the matches told
+    MakeFolder(folder);
+    database = folder / "database.db";
+    CopyDatabase(workspace.database(), database);
+    const GroupLenses priors = LensesOf(workspace, groups);
+    ReplaceCameras(database, priors.lenses, priors.focal_is_known);
+  }
+  const auto made =
+      MadeIn(workspace, database, folder / "models", options, Mapping::kFixedIntrinsics);
+  if (options.engine != SfmEngine::kColmap) RemoveDatabase(database);
   if (!made.empty()) WriteModel(model, made.front(), Format::kBinary);
 }
 
+// COLMAP's version is among the inputs of all steps where it made the features.
 std::string MappingInputs(const SfmOptions& options) {
-  return fmt::format("seed {}", options.seed);
+  std::string inputs = fmt::format("seed {}", options.seed);
+  if (options.engine != SfmEngine::kColmap) inputs += fmt::format(" {}", NameOf(options.engine));
+  return inputs;
 }
 
 std::vector<int> ModelSizes(const Workspace& workspace) {
@@ -193,7 +221,7 @@ SfmResult RunSfm(const fs::path& images_dir, std::span<const SfmImageInput> imag
                     images_dir.string(), images.size()));
   }
   Workspace workspace(workspace_folder, images_dir, images, "", ResolveThreads(options.threads),
-                      progress);
+                      progress, options.engine);
   const auto groups = GroupCameras(workspace.images(), lens, options.share_intrinsics_within_group);
   SfmResult result;
   FeaturesAndMatches(workspace, groups, options, result.report);
@@ -204,14 +232,16 @@ SfmResult RunSfm(const fs::path& images_dir, std::span<const SfmImageInput> imag
   result.report.fixed_intrinsics = fs::exists(workspace.folder() / kFixedIntrinsicsNote);
   result.report.forward_motion = fs::exists(workspace.folder() / kForwardMotionNote);
   CompleteReport(workspace, result.model, result.report);
+  if (options.engine != SfmEngine::kColmap) ReadOwnMappingNote(workspace, result.report);
   try {
     const PairCounts pairs = CountPairs(workspace);
     result.report.lack_of_parallax = LackOfParallax(pairs);
     // One homography explains most pairs of a wall or a box, too, of which there is a model: that
     // is worth a line where the model does not determine its cameras, not here.
     if (CameraStoodStill(pairs)) progress.Note(result.report.lack_of_parallax);
-    result.report.why_not_registered = WhyWithoutCamera(
-        workspace, result.model, result.report.forward_motion ? kMinInliersForward : kMinInliers);
+    auto why = WhyWithoutCamera(workspace, result.model,
+                                result.report.forward_motion ? kMinInliersForward : kMinInliers);
+    result.report.why_not_registered.merge(why);
   } catch (const Error& error) {  // the model is whole: a diagnosis is not worth its loss
     progress.Note(
         fmt::format("parallax and photos without a camera cannot be analysed: {}", error.what()));
@@ -224,16 +254,17 @@ std::optional<SfmResult> MapWithFixedIntrinsics(const fs::path& images_dir,
                                                 const fs::path& workspace_folder,
                                                 const SfmOptions& options, Progress& progress) {
   Workspace workspace(workspace_folder, images_dir, images, "", ResolveThreads(options.threads),
-                      progress);
+                      progress, options.engine);
   const auto groups = GroupCameras(workspace.images(), CameraModelOf(options),
                                    options.share_intrinsics_within_group);
   if (!AllHavePriors(groups)) return {};
+  if (options.engine != SfmEngine::kColmap && !Program::IsInstalled()) return {};
   SfmResult result;
   FeaturesAndMatches(workspace, groups, options, result.report);
   workspace.Step("mapping", MappingInputs(options),
                  [&] { MappingStep(workspace, groups, options); });
   workspace.Step("fixed mapping", MappingInputs(options),
-                 [&] { FixedMappingStep(workspace, options); });
+                 [&] { FixedMappingStep(workspace, groups, options); });
   if (!fs::exists(workspace.folder() / kFixedModel)) return {};
   result.model = ReadModel(workspace.folder() / kFixedModel);
   result.report.images_per_model = {static_cast<int>(result.model.images.size())};

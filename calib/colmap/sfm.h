@@ -30,6 +30,20 @@ enum class Matching {
   kSequential,   ///< neighbours in the order of names: video
 };
 
+/// What finds features, matches and the first cameras.
+enum class SfmEngine {
+  kColmap,  ///< the `colmap` program alone
+  kGlobal,  ///< calib/sfm alone: features, matches and the global mapper
+  /// calib/sfm; where its model does not pass or leaves photos out, and COLMAP is installed,
+  /// COLMAP's mapper works on the same matches, and the better of both models is taken
+  kAuto,
+};
+/// "colmap", "global", "auto".
+const char* NameOf(SfmEngine engine);
+
+/// What calib/sfm calls itself in records; counts up when its results change.
+inline constexpr char kOwnVersion[] = "dtr global structure from motion 1";
+
 /// At 60 photos every pair (1770) takes some 15 minutes on 2 cores; the cost grows with the square.
 inline constexpr int kExhaustiveLimit = 60;
 
@@ -37,6 +51,7 @@ inline constexpr int kExhaustiveLimit = 60;
 inline constexpr int kMaxFeatures = 8192;
 
 struct SfmOptions {
+  SfmEngine engine = SfmEngine::kColmap;
   Matching matching = Matching::kAuto;
   int threads = 0;            ///< 0: all cores
   std::uint64_t seed = 0;     ///< of COLMAP's random choices, as far as it heeds it
@@ -56,7 +71,7 @@ const char* NameOf(Matching matching);
 /// One run of the program: what was asked, how it ended, what it cost.
 struct StepRecord {
   std::string name;               ///< "features", "matches", "mapping", ...
-  std::vector<std::string> argv;  ///< as executed, no shell
+  std::vector<std::string> argv;  ///< as executed, no shell; empty: work of this program
   int exit_code = 0, signal = 0;
   double wall_s = 0, cpu_s = 0;
   long max_rss_kib = 0;
@@ -65,7 +80,7 @@ struct StepRecord {
 };
 
 struct SfmReport {
-  std::string version;  ///< COLMAP's first line about itself
+  std::string version;  ///< COLMAP's first line about itself, or kOwnVersion
   std::vector<StepRecord> steps;
   Matching matching = Matching::kAuto;  ///< the one used
   int extraction_threads = 0;           ///< features.h: bounded by the memory

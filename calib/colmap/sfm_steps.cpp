@@ -7,6 +7,7 @@
 
 #include "calib/colmap/database.h"
 #include "calib/colmap/matching.h"
+#include "calib/colmap/own_steps.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 
@@ -42,7 +43,7 @@ calib::CameraModel CameraModelOf(const SfmOptions& options) {
 
 void FeaturesAndMatches(Workspace& workspace, const std::vector<CameraGroup>& groups,
                         const SfmOptions& options, SfmReport& report,
-                        const std::optional<ImagePairs>& allowed) {
+                        const std::optional<ImagePairs>& allowed, bool known_lenses) {
   ExtractionPlan plan = PlanExtraction(workspace.images(), workspace.threads(), options.memory_gb,
                                        options.max_image_size_px);
   plan.max_features = options.max_features;
@@ -52,13 +53,21 @@ void FeaturesAndMatches(Workspace& workspace, const std::vector<CameraGroup>& gr
 
   const fs::path features = workspace.folder() / "features.db";
   workspace.Step("features", TextOf(groups, plan, options.seed), [&] {
-    ExtractFeaturesResumably(workspace, features, groups, plan, options.seed);
+    if (options.engine == SfmEngine::kColmap) {
+      ExtractFeaturesResumably(workspace, features, groups, plan, options.seed);
+    } else {
+      OwnFeatures(workspace, features, groups, plan);
+    }
   });
   auto text = fmt::format("matching {} seed {}", static_cast<int>(report.matching), options.seed);
   if (allowed) {
     for (const auto& [a, b] : *allowed) text += fmt::format(" {}-{}", a, b);
   }
   workspace.Step("matches", text, [&] {
+    if (options.engine != SfmEngine::kColmap) {
+      OwnMatches(workspace, features, groups, report.matching, options, known_lenses, allowed);
+      return;
+    }
     // Matching may take hours: an interrupted run of the same inputs goes on with its pairs.
     const fs::path begun = workspace.folder() / "matches.begun";
     const bool go_on = fs::exists(begun) && fs::exists(workspace.database()) &&

@@ -16,10 +16,11 @@ calib::CameraModel CameraModelOf(const SfmOptions& options);
 
 /// Steps "features" and "matches": fills workspace.database(). What was planned goes to `report`.
 /// Of the pairs that options.matching names only those of `allowed` (a < b, sorted; numbers of
-/// images()) are matched, where it is given.
+/// images()) are matched, where it is given. `known_lenses`: the groups' parameters are given, not
+/// guesses.
 void FeaturesAndMatches(Workspace& workspace, const std::vector<CameraGroup>& groups,
                         const SfmOptions& options, SfmReport& report,
-                        const std::optional<ImagePairs>& allowed = {});
+                        const std::optional<ImagePairs>& allowed = {}, bool known_lenses = false);
 
 /// Fills in what every report has: runs, version, who did not register, the error; writes it.
 void CompleteReport(const Workspace& workspace, const calib::SfmModel& model, SfmReport& report);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <chrono>
 #include <nlohmann/json.hpp>
 
 #include "calib/colmap/model_io.h"
@@ -11,6 +12,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/base/hash.h"
+#include "dtr/base/machine.h"
 
 namespace dtr::colmap {
 namespace fs = std::filesystem;
@@ -103,6 +105,18 @@ void ThrowFullDisk(const fs::path& folder, const std::string& consequence) {
 
 }  // namespace
 
+const char* NameOf(SfmEngine engine) {
+  switch (engine) {
+    case SfmEngine::kColmap:
+      return "colmap";
+    case SfmEngine::kGlobal:
+      return "global";
+    case SfmEngine::kAuto:
+      return "auto";
+  }
+  return "";
+}
+
 const char* NameOf(Matching matching) {
   switch (matching) {
     case Matching::kAuto:
@@ -137,11 +151,12 @@ std::string Workspace::AliasFor(const std::string& prefix, size_t index, const s
 
 Workspace::Workspace(const fs::path& folder, const fs::path& images_dir,
                      std::span<const SfmImageInput> images, const std::string& alias_prefix,
-                     int threads, Progress& progress)
+                     int threads, Progress& progress, SfmEngine engine)
     : folder_(fs::absolute(folder)),
       images_(images.begin(), images.end()),
       threads_(threads),
-      progress_(progress) {
+      progress_(progress),
+      engine_(engine) {
   std::sort(images_.begin(), images_.end(),
             [](const auto& a, const auto& b) { return a.name < b.name; });
   RemoveAll(images_folder());
@@ -171,19 +186,31 @@ Workspace::Workspace(const fs::path& folder, const fs::path& images_dir,
   constexpr int kIndent = 1;
   const auto replace = json::error_handler_t::replace;  // names need not be UTF-8
   WriteFileAtomically(folder_ / "images.json", names.dump(kIndent, ' ', false, replace) + "\n");
-  fingerprint_ = HashOfText(program_.version() + identity.dump(-1, ' ', false, replace));
+  if (engine_ == SfmEngine::kColmap) program();
+  fingerprint_ = HashOfText(version() + identity.dump(-1, ' ', false, replace));
+}
+
+std::string Workspace::version() const {
+  return engine_ == SfmEngine::kColmap ? program_->version() : kOwnVersion;
+}
+
+const std::string& Workspace::NameOfAlias(const std::string& alias) const {
+  const auto found = std::find(aliases_.begin(), aliases_.end(), alias);
+  if (found == aliases_.end()) {
+    throw Error(fmt::format("{}: expected images of this workspace only, found '{}'",
+                            folder_.string(), alias));
+  }
+  return images_[static_cast<size_t>(found - aliases_.begin())].name;
+}
+
+Program& Workspace::program() {
+  if (!program_) program_.emplace();
+  return *program_;
 }
 
 calib::SfmModel Workspace::ReadModelHere(const fs::path& folder) const {
   calib::SfmModel model = ReadModel(folder);
-  for (calib::SfmImage& image : model.images) {
-    const auto alias = std::find(aliases_.begin(), aliases_.end(), image.name);
-    if (alias == aliases_.end()) {
-      throw Error(fmt::format("{}: expected images of this workspace only, found '{}'",
-                              folder.string(), image.name));
-    }
-    image.name = images_[static_cast<size_t>(alias - aliases_.begin())].name;
-  }
+  for (calib::SfmImage& image : model.images) image.name = NameOfAlias(image.name);
   return model;  // aliases sort as the names do
 }
 
@@ -248,6 +275,18 @@ void Workspace::Run(const Arguments& arguments,
   }
 }
 
+void Workspace::RunHere(const std::function<void()>& body) {
+  const double cpu_before_ms = ProcessCpuMilliseconds();
+  const auto wall_before = std::chrono::steady_clock::now();
+  body();
+  StepRecord& record = records_.emplace_back();
+  record.name = step_;
+  record.wall_s =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - wall_before).count();
+  record.cpu_s = (ProcessCpuMilliseconds() - cpu_before_ms) / 1e3;
+  record.max_rss_kib = static_cast<long>(PeakMemoryBytes() >> 10);
+}
+
 fs::path Workspace::WriteList(const std::string& name, const std::vector<std::string>& lines) {
   std::string text;
   for (const std::string& line : lines) text += line + "\n";
@@ -258,7 +297,7 @@ fs::path Workspace::WriteList(const std::string& name, const std::vector<std::st
 
 SfmReport Workspace::Report() const {
   SfmReport report;
-  report.version = program_.version();
+  report.version = version();
   report.steps = records_;
   return report;
 }

@@ -18,12 +18,13 @@ namespace dtr::colmap {
 class Workspace {
  public:
   /// Sorts `images` by name (byte order), checks that all are there, links them.
-  /// `alias_prefix` keeps photos of two workspaces apart that meet in one database.
+  /// `alias_prefix` keeps photos of two workspaces apart that meet in one database. With the engine
+  /// kColmap its version is part of every step's inputs; with others COLMAP may be missing.
   /// Throws UsageError on duplicate names or sizes that cannot be, Error on files that are absent
   /// or cannot be linked.
   Workspace(const std::filesystem::path& folder, const std::filesystem::path& images_dir,
             std::span<const SfmImageInput> images, const std::string& alias_prefix, int threads,
-            Progress& progress);
+            Progress& progress, SfmEngine engine = SfmEngine::kColmap);
 
   const std::filesystem::path& folder() const { return folder_; }
   std::filesystem::path images_folder() const { return folder_ / "images"; }
@@ -31,8 +32,11 @@ class Workspace {
   std::filesystem::path database() const { return folder_ / "database.db"; }
   const std::vector<SfmImageInput>& images() const { return images_; }
   std::filesystem::path FileOf(size_t image) const { return images_folder() / AliasOf(image); }
-  Program& program() { return program_; }
+  /// COLMAP, asked for when first needed. Throws Error where it is missing.
+  Program& program();
   Progress& progress() { return progress_; }
+  /// Of what finds features and matches here: COLMAP's, or kOwnVersion.
+  std::string version() const;
   int threads() const { return threads_; }
 
   /// Name under which COLMAP knows images()[image]. COLMAP's lists separate names by blanks and
@@ -40,6 +44,9 @@ class Workspace {
   std::string AliasOf(size_t image) const { return aliases_.at(image); }
   /// The same for photo number `index` of a list sorted by name.
   static std::string AliasFor(const std::string& prefix, size_t index, const std::string& name);
+
+  /// The photo's own name. Throws Error where no photo here has this alias.
+  const std::string& NameOfAlias(const std::string& alias) const;
 
   /// Reads a model COLMAP made here and gives the images their own names back.
   calib::SfmModel ReadModelHere(const std::filesystem::path& folder) const;
@@ -62,6 +69,9 @@ class Workspace {
   /// Runs COLMAP once inside a step; see RunColmap.
   void Run(const Arguments& arguments, const std::function<void(const std::string&)>& on_line);
 
+  /// Runs `body`, work of this program, inside a step, and records what it cost.
+  void RunHere(const std::function<void()>& body);
+
   /// Writes a list file (one line each) and returns its path.
   std::filesystem::path WriteList(const std::string& name, const std::vector<std::string>& lines);
 
@@ -74,7 +84,8 @@ class Workspace {
   std::vector<std::string> aliases_;
   int threads_;
   Progress& progress_;
-  Program program_;
+  SfmEngine engine_;
+  std::optional<Program> program_;
   std::string fingerprint_;
   std::string step_;
   size_t first_of_step_ = 0;  // among records_

@@ -13,7 +13,7 @@
 namespace dtr::sfm {
 
 /// A SIFT descriptor as COLMAP stores it: the square roots of the L1-normalised histogram, times
-/// 512, in VLFeat's order of bins.
+/// 512, in the order of bins of COLMAP's database (Lowe's: directions run against VLFeat's).
 using Descriptor = std::array<std::uint8_t, 128>;
 
 /// Where a feature lies, in pixels of its photo (centre of the first pixel at 0.5), and how it was

@@ -18,6 +18,7 @@ Json JsonOf(const SfmChoice& choice) {
             {"features", choice.features},
             {"matching", colmap::NameOf(choice.matching)},
             {"lens_model", choice.lens_model}};
+  if (choice.engine != colmap::SfmEngine::kColmap) json["sfm"] = colmap::NameOf(choice.engine);
   // Builds that were begun before there was a choice go on.
   if (choice.camera_per != CameraPer::kAuto) json["camera_per"] = NameOf(choice.camera_per);
   return json;

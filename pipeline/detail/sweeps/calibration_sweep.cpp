@@ -95,7 +95,7 @@ std::vector<std::string> FeatureValues() {
 
 CalibrationSweep::CalibrationSweep(CalibrationSweepOptions options, Progress& progress)
     : options_(std::move(options)), progress_(progress) {
-  RequireCalibration({});
+  RequireCalibration({}, colmap::SfmEngine::kColmap);
   photos_ = PhotosOf(options_, progress_);
   std::vector<std::pair<int, int>> sizes_px;
   int longest = 0;

@@ -2,68 +2,23 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <fstream>
-#include <nlohmann/json.hpp>
-
-#include "calib/colmap/export.h"
 #include "calib/colmap/held_out.h"
 #include "calib/colmap/known_poses.h"
 #include "calib/colmap/model_io.h"
 #include "calib/colmap/sfm.h"
 #include "dtr/base/process.h"
 #include "tests/calib/colmap/model_test_support.h"
+#include "tests/calib/colmap/plaza_truth.h"
 #include "tests/support/test_data.h"
 
 namespace dtr::colmap {
 namespace {
 
+using namespace testing;
+
 namespace fs = std::filesystem;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
-
-constexpr int kSidePx = 640;
-constexpr int kFirst = 2, kLast = 7;  // photos used; kHeldOut lies between two of them
-constexpr int kHeldOut = 4;
-// SIFT at 640 px on sharp renderings of 960 px: 0.35 px measured; twice that fails.
-constexpr double kMeanErrorPx = 0.7;
-// Relative rotations against the truth: 0.05 degrees measured with focal length estimated.
-constexpr double kRotationDeg = 0.3;
-
-const fs::path kPlaza = "datasets/plaza";  // tests run in the source folder
-
-struct Truth {
-  std::vector<PosedImage> images;
-  std::vector<SfmImageInput> inputs;
-};
-
-Truth PlazaTruth() {
-  std::ifstream in(kPlaza / "cameras.json");
-  const auto json = nlohmann::json::parse(in);
-  Truth truth;
-  for (const auto& view : json.at("views")) {
-    PosedImage image;
-    image.name = view.at("name");
-    image.camera = FromPinhole(PinholeCamera(view.at("width"), view.at("height"), view.at("fx"),
-                                             view.at("fy"), view.at("cx"), view.at("cy")));
-    Eigen::Matrix3d rotation;
-    for (int r = 0; r < 3; ++r) {
-      for (int c = 0; c < 3; ++c) rotation(r, c) = view.at("cam_from_world")[r][c];
-      image.cam_from_world.translation[r] = view.at("cam_from_world")[r][3];
-    }
-    image.cam_from_world.rotation = Eigen::Quaterniond(rotation).normalized();
-    truth.images.push_back(image);
-    truth.inputs.push_back({image.name, image.camera.width_px, image.camera.height_px,
-                            image.camera.params[0], "plaza"});
-  }
-  return truth;
-}
-
-double DegreesBetween(const Pose& a_from_world, const Pose& b_from_world, const Pose& true_a,
-                      const Pose& true_b) {
-  const auto found = (a_from_world * b_from_world.Inverse()).rotation;
-  const auto expected = (true_a * true_b.Inverse()).rotation;
-  return found.angularDistance(expected) * 180 / std::acos(-1.0);
-}
 
 class RealColmap : public ::testing::Test {
  protected:
@@ -74,12 +29,7 @@ class RealColmap : public ::testing::Test {
     options_.lens_model = "SIMPLE_PINHOLE";
   }
 
-  const Pose& TrueCamFromWorld(const std::string& name) const {
-    for (const auto& image : truth_.images) {
-      if (image.name == name) return image.cam_from_world;
-    }
-    throw std::runtime_error("no such photo: " + name);
-  }
+  const Pose& TrueCamFromWorld(const std::string& name) const { return truth_.CamFromWorld(name); }
 
   Truth truth_;
   SfmOptions options_;

@@ -1,0 +1,188 @@
+#include "calib/colmap/own_steps.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+
+#include "calib/colmap/database.h"
+#include "calib/colmap/graph_database.h"
+#include "calib/sfm/features/sift.h"
+#include "calib/sfm/mapping/global_mapper.h"
+#include "calib/sfm/matching/match_photos.h"
+#include "dtr/base/durable.h"
+#include "dtr/base/error.h"
+#include "dtr/base/files.h"
+#include "dtr/base/parallel_for.h"
+#include "dtr/io/image_io.h"
+
+namespace dtr::colmap {
+namespace fs = std::filesystem;
+namespace {
+
+// Where EXIF says nothing, of the long side: a moderate wide angle, as COLMAP assumes.
+constexpr double kGuessedFocal = 1.2;
+
+// Brightness of a photo by the weights of ITU-R BT.709.
+Grid<std::uint8_t> GreyOf(const ImageRgb8& image) {
+  constexpr int kRed = 54, kGreen = 183, kBlue = 19, kHalf = 128;  // of 256
+  Grid<std::uint8_t> grey(image.width(), image.height());
+  for (int y = 0; y < image.height(); ++y) {
+    const std::uint8_t* from = image.row(y);
+    std::uint8_t* to = grey.row(y);
+    for (int x = 0; x < image.width(); ++x, from += 3) {
+      to[x] = static_cast<std::uint8_t>(
+          (kRed * from[0] + kGreen * from[1] + kBlue * from[2] + kHalf) >> 8);
+    }
+  }
+  return grey;
+}
+
+// All photos in the order of groups.
+std::vector<size_t> InOrder(const std::vector<CameraGroup>& groups) {
+  std::vector<size_t> images;
+  for (const CameraGroup& group : groups) {
+    images.insert(images.end(), group.images.begin(), group.images.end());
+  }
+  return images;
+}
+
+void CreateDatabase(const Workspace& workspace, const fs::path& database,
+                    const std::vector<CameraGroup>& groups) {
+  const GroupLenses known = LensesOf(workspace, groups);
+  std::vector<DatabaseImage> images(workspace.images().size());
+  for (size_t g = 0; g < groups.size(); ++g) {
+    for (const size_t i : groups[g].images) images[i] = {workspace.AliasOf(i), static_cast<int>(g)};
+  }
+  CreateGraphDatabase(database, known.lenses, known.focal_is_known, images);
+}
+
+// The pairs to be matched as the matcher takes them; nothing: it chooses.
+std::optional<std::vector<std::pair<int, int>>> PairsFor(size_t photos, Matching matching,
+                                                         const std::optional<ImagePairs>& allowed) {
+  constexpr size_t kNeighbours = 10;  // of a sequence, and as many at distances of powers of two
+  const auto may = [&](size_t a, size_t b) {
+    return !allowed || std::binary_search(allowed->begin(), allowed->end(), std::pair(a, b));
+  };
+  if (matching == Matching::kPreselected && !allowed) return std::nullopt;
+  std::vector<std::pair<int, int>> pairs;
+  for (size_t a = 0; a < photos; ++a) {
+    for (size_t b = a + 1; b < photos; ++b) {
+      const size_t apart = b - a;
+      const bool power = (apart & (apart - 1)) == 0 && apart < (size_t{1} << kNeighbours);
+      if (matching == Matching::kSequential && apart > kNeighbours && !power) continue;
+      if (may(a, b)) pairs.emplace_back(static_cast<int>(a), static_cast<int>(b));
+    }
+  }
+  return pairs;
+}
+
+}  // namespace
+
+GroupLenses LensesOf(const Workspace& workspace, const std::vector<CameraGroup>& groups) {
+  GroupLenses known;
+  for (const CameraGroup& group : groups) {
+    const SfmImageInput& first = workspace.images()[group.images.front()];
+    const double guess_px = kGuessedFocal * std::max(first.width_px, first.height_px);
+    known.lenses.push_back(
+        {group.model, first.width_px, first.height_px,
+         group.params.empty() ? FirstGuess(group.model, first, guess_px) : group.params});
+    known.focal_is_known.push_back(!group.params.empty());
+  }
+  return known;
+}
+
+sfm::Features FeaturesOf(const fs::path& photo, const fs::path& mask_file, int max_image_size_px,
+                         int max_features) {
+  const Grid<std::uint8_t> grey = GreyOf(io::ReadImage(photo));
+  Mask mask;
+  if (!mask_file.empty()) mask = io::ReadMask(mask_file);
+  sfm::SiftOptions options;
+  options.max_features = max_features > 0 ? max_features : kMaxFeatures;
+  options.max_size_px = max_image_size_px;
+  return sfm::DetectSift(grey.data(), grey.width(), grey.height(), mask.data(), options);
+}
+
+void OwnFeatures(Workspace& workspace, const fs::path& database,
+                 const std::vector<CameraGroup>& groups, const ExtractionPlan& plan) {
+  const fs::path working = database.string() + ".working", note = database.string() + ".begun";
+  const size_t kept = fs::exists(database) ? workspace.Kept(note).value_or(0) : 0;
+  if (kept == 0) {
+    // A note must never meet features of other photos: it goes before a new database comes.
+    RemoveAll(note);
+    SyncFolder(note.parent_path());
+    CreateDatabase(workspace, working, groups);
+    MoveDatabase(working, database);
+  }
+  const std::vector<size_t> images = InOrder(groups);
+  workspace.progress().Stage("features", static_cast<int>(images.size()));
+  workspace.progress().Update(static_cast<int>(kept));
+  std::atomic<int> done = static_cast<int>(kept);
+  for (size_t begin = kept; begin < images.size(); begin += kPhotosPerBatch) {
+    const size_t count = std::min(kPhotosPerBatch, images.size() - begin);
+    const std::span batch = std::span(images).subspan(begin, count);
+    std::vector<sfm::Features> features(count);
+    workspace.RunHere([&] {
+      ParallelFor(0, static_cast<int>(count), plan.threads, [&](int i) {
+        workspace.progress().ThrowIfInterrupted();
+        const size_t image = batch[static_cast<size_t>(i)];
+        features[static_cast<size_t>(i)] =
+            FeaturesOf(workspace.FileOf(image), workspace.images()[image].mask_file,
+                       plan.max_image_size_px, plan.max_features);
+        workspace.progress().Update(++done);
+      });
+      AddFeatures(database, batch, features);
+    });
+    SyncFile(database);
+    workspace.Keep(note, begin + count);
+  }
+}
+
+void OwnMatches(Workspace& workspace, const fs::path& features,
+                const std::vector<CameraGroup>& groups, Matching matching,
+                const SfmOptions& options, bool known_lenses,
+                const std::optional<ImagePairs>& allowed) {
+  GroupLenses known = LensesOf(workspace, groups);
+  std::vector<sfm::MatchPhoto> photos;
+  std::vector<int> group_of(workspace.images().size());
+  for (size_t g = 0; g < groups.size(); ++g) {
+    for (const size_t i : groups[g].images) group_of[i] = static_cast<int>(g);
+  }
+  for (size_t i = 0; i < workspace.images().size(); ++i) {
+    const SfmImageInput& image = workspace.images()[i];
+    photos.push_back({workspace.AliasOf(i), image.width_px, image.height_px, group_of[i],
+                      ReadFeatures(features, static_cast<std::uint32_t>(i + 1))});
+  }
+  const auto pairs = PairsFor(photos.size(), matching, allowed);
+  workspace.RunHere([&] {
+    const sfm::MatchResult result = sfm::MatchPhotos(photos, known.lenses, known.focal_is_known,
+                                                     {.threads = workspace.threads(),
+                                                      .seed = options.seed,
+                                                      .lenses_are_known = known_lenses,
+                                                      .pairs = pairs,
+                                                      .progress = &workspace.progress()});
+    for (const std::string& note : result.notes) workspace.progress().Note(note);
+    CopyDatabase(features, workspace.database());
+    WriteViewGraph(workspace.database(), result.graph);
+  });
+}
+
+GloballyMapped MapHere(Workspace& workspace, const SfmOptions& options) {
+  const sfm::ViewGraph graph = ReadViewGraph(workspace.database());
+  GloballyMapped result;
+  workspace.progress().Stage("mapping", 0);
+  workspace.RunHere([&] {
+    sfm::Mapped mapped = sfm::MapGlobally(
+        graph,
+        {.threads = workspace.threads(), .seed = options.seed, .progress = &workspace.progress()});
+    result.model = std::move(mapped.model);
+    result.why_not = std::move(mapped.why_not);
+    for (const sfm::LeftOut& left_out : mapped.left_out) {
+      result.why_without_camera[graph.images[static_cast<size_t>(left_out.image)].name] =
+          left_out.why;
+    }
+  });
+  return result;
+}
+
+}  // namespace dtr::colmap

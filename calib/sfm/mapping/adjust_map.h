@@ -1,0 +1,29 @@
+// calib/sfm/mapping/adjust_map.h -- internal to calib/sfm/mapping: the one place that adjusts.
+#pragma once
+#include "calib/bundle/bundle.h"
+#include "dtr/base/progress.h"
+
+namespace dtr::sfm {
+
+/// Which of a lens's parameters may move; principal points never do.
+enum class MapLens { kFixed, kFocalAndDistortion };
+
+/// Whether the camera's model is one that can be adjusted here.
+bool CanAdjust(const calib::LensCamera& lens);
+
+struct AdjustMapOptions {
+  std::vector<MapLens> lenses;  ///< per lens of the bundle
+  double cauchy_px = 1;         ///< scale of Cauchy's loss
+  int iterations = 30;
+  double cost_tolerance = 1e-5;  ///< relative; an adjustment that another follows needs no more
+  int threads = 1;
+  const Progress* progress = nullptr;
+};
+
+/// Poses, points and the lenses' free parameters that minimise Cauchy's loss of the reprojection
+/// errors, from where `bundle` is. Observations whose point lies behind the camera do not take
+/// part. False, and the bundle as it was, where there is nothing to adjust or no finite solution.
+/// Requires lenses that CanAdjust. The same bits for any number of threads.
+bool AdjustMap(const AdjustMapOptions& options, calib::Bundle* bundle);
+
+}  // namespace dtr::sfm

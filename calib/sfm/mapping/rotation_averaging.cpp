@@ -1,0 +1,243 @@
+#include "calib/sfm/mapping/rotation_averaging.h"
+
+#include <Eigen/Dense>
+#include <Eigen/SparseCholesky>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "calib/sfm/mapping/so3.h"
+
+namespace dtr::sfm {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+constexpr int kMaxTriplets = 40;
+constexpr double kClosesAtSigmas = 4;
+constexpr int kL1Iterations = 15, kRobustIterations = 15;
+constexpr double kRobustSigmas = 3;
+constexpr double kSettledRad = 1e-5;
+
+struct Edge {
+  int to = 0, pair = 0;
+};
+
+std::vector<std::vector<Edge>> EdgesOf(int images, std::span<const RelativeRotation> pairs) {
+  std::vector<std::vector<Edge>> edges(images);
+  for (size_t p = 0; p < pairs.size(); ++p) {
+    edges[pairs[p].image_a].push_back({pairs[p].image_b, static_cast<int>(p)});
+    edges[pairs[p].image_b].push_back({pairs[p].image_a, static_cast<int>(p)});
+  }
+  for (auto& list : edges) {
+    std::sort(list.begin(), list.end(), [](const Edge& x, const Edge& y) { return x.to < y.to; });
+  }
+  return edges;
+}
+
+Matrix3d WithFloor(const Matrix3d& covariance) {
+  return covariance + kRotationFloorRad * kRotationFloorRad * Matrix3d::Identity();
+}
+
+// A pair's rotation, leading from image `from`.
+struct Directed {
+  Matrix3d rotation, covariance;
+};
+Directed From(const RelativeRotation& pair, int from) {
+  const Matrix3d covariance = WithFloor(pair.covariance);
+  if (pair.image_a == from) return {pair.b_from_a, covariance};
+  // The inverse of exp(w) R is exp(-R^T w) R^T.
+  return {pair.b_from_a.transpose(), pair.b_from_a.transpose() * covariance * pair.b_from_a};
+}
+
+bool Closes(const Directed& ab, const Directed& bc, const Directed& ca) {
+  const Matrix3d ca_bc = ca.rotation * bc.rotation;
+  const Vector3d error = LogOf(ca_bc * ab.rotation);
+  const Matrix3d covariance = ca.covariance +
+                              ca.rotation * bc.covariance * ca.rotation.transpose() +
+                              ca_bc * ab.covariance * ca_bc.transpose();
+  return error.dot(covariance.ldlt().solve(error)) < kClosesAtSigmas * kClosesAtSigmas;
+}
+
+Vector3d ResidualOf(const RelativeRotation& pair, const std::vector<Matrix3d>& world) {
+  return LogOf(pair.b_from_a * world[pair.image_a] * world[pair.image_b].transpose());
+}
+
+void StartFromTree(std::span<const RelativeRotation> pairs, std::span<const double> support,
+                   const std::vector<std::vector<Edge>>& edges, std::vector<Matrix3d>* world,
+                   std::vector<char>* is_root) {
+  std::vector<size_t> order(pairs.size());
+  std::iota(order.begin(), order.end(), size_t{0});
+  const auto weight = [&](size_t p) { return pairs[p].matches * (0.05 + support[p]); };
+  std::stable_sort(order.begin(), order.end(),
+                   [&](size_t x, size_t y) { return weight(x) > weight(y); });
+  std::vector<int> parent(edges.size());
+  std::iota(parent.begin(), parent.end(), 0);
+  const auto root = [&](int i) {
+    while (parent[i] != i) i = parent[i] = parent[parent[i]];
+    return i;
+  };
+  std::vector<char> in_tree(pairs.size());
+  for (const size_t p : order) {
+    const int a = root(pairs[p].image_a), b = root(pairs[p].image_b);
+    if (a == b) continue;
+    parent[a] = b;
+    in_tree[p] = 1;
+  }
+  std::vector<char> reached(edges.size());
+  for (size_t first = 0; first < edges.size(); ++first) {
+    if (reached[first]) continue;
+    (*is_root)[first] = reached[first] = 1;
+    std::vector<int> queue{static_cast<int>(first)};
+    while (!queue.empty()) {
+      const int from = queue.back();
+      queue.pop_back();
+      for (const Edge& edge : edges[from]) {
+        if (!in_tree[edge.pair] || reached[edge.to]) continue;
+        reached[edge.to] = 1;
+        (*world)[edge.to] = From(pairs[edge.pair], from).rotation * (*world)[from];
+        queue.push_back(edge.to);
+      }
+    }
+  }
+}
+
+// One reweighted step; returns the largest rotation in it.
+class Stepper {
+ public:
+  Stepper(std::span<const RelativeRotation> pairs, const std::vector<char>& is_root)
+      : pairs_(pairs), unknown_(is_root.size(), -1) {
+    for (size_t i = 0; i < is_root.size(); ++i) {
+      if (!is_root[i]) unknown_[i] = 3 * unknowns_++;
+    }
+    for (const RelativeRotation& pair : pairs) {
+      information_.push_back(WithFloor(pair.covariance).inverse());
+    }
+  }
+
+  double Step(bool robust, std::vector<Matrix3d>* world) {
+    const int size = 3 * unknowns_;
+    if (size == 0) return 0;
+    std::vector<Eigen::Triplet<double>> entries;
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(size);
+    for (size_t p = 0; p < pairs_.size(); ++p) AddPair(p, robust, *world, &entries, &right);
+    // What robust weights leave without any pair stays where it is.
+    for (int i = 0; i < size; ++i) entries.emplace_back(i, i, 1e-6);
+    Eigen::SparseMatrix<double> matrix(size, size);
+    matrix.setFromTriplets(entries.begin(), entries.end());
+    if (!analysed_) solver_.analyzePattern(matrix);
+    analysed_ = true;
+    solver_.factorize(matrix);
+    if (solver_.info() != Eigen::Success) return 0;
+    const Eigen::VectorXd step = solver_.solve(right);
+    if (!step.allFinite()) return 0;
+    double largest = 0;
+    for (size_t i = 0; i < unknown_.size(); ++i) {
+      if (unknown_[i] < 0) continue;
+      const Vector3d w = step.segment<3>(unknown_[i]);
+      (*world)[i] = Orthonormal(ExpOf(w) * (*world)[i]);
+      largest = std::max(largest, w.norm());
+    }
+    return largest;
+  }
+
+  double Misfit(size_t p, const Vector3d& residual) const {
+    return std::sqrt(std::max(0.0, residual.dot(information_[p] * residual)));
+  }
+
+ private:
+  // With images a, b turned by w_a, w_b the residual r becomes r - w_b + R_ba w_a.
+  void AddPair(size_t p, bool robust, const std::vector<Matrix3d>& world,
+               std::vector<Eigen::Triplet<double>>* entries, Eigen::VectorXd* right) const {
+    const RelativeRotation& pair = pairs_[p];
+    const Vector3d r = ResidualOf(pair, world);
+    const double misfit = Misfit(p, r), share = misfit / kRobustSigmas;
+    const double weight =
+        robust ? 1 / ((1 + share * share) * (1 + share * share)) : 1 / std::max(misfit, 0.5);
+    const Matrix3d h = weight * information_[p];
+    const Matrix3d by_a = world[pair.image_b] * world[pair.image_a].transpose();
+    const int a = unknown_[pair.image_a], b = unknown_[pair.image_b];
+    const auto add = [&](int row, int column, const Matrix3d& block) {
+      for (int i = 0; i < 3; ++i) {
+        for (int k = 0; k < 3; ++k) entries->emplace_back(row + i, column + k, block(i, k));
+      }
+    };
+    if (a >= 0) {
+      add(a, a, by_a.transpose() * h * by_a);
+      right->segment<3>(a) -= by_a.transpose() * h * r;
+    }
+    if (b >= 0) {
+      add(b, b, h);
+      right->segment<3>(b) += h * r;
+    }
+    if (a >= 0 && b >= 0) {
+      const Matrix3d cross = -h * by_a;  // b down, a across
+      add(b, a, cross);
+      add(a, b, cross.transpose());
+    }
+  }
+
+  std::span<const RelativeRotation> pairs_;
+  std::vector<int> unknown_;
+  int unknowns_ = 0;
+  std::vector<Matrix3d> information_;
+  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver_;
+  bool analysed_ = false;
+};
+
+}  // namespace
+
+std::vector<double> TripletSupport(int images, std::span<const RelativeRotation> pairs) {
+  const auto edges = EdgesOf(images, pairs);
+  std::vector<double> support(pairs.size(), 0.5);
+  for (size_t p = 0; p < pairs.size(); ++p) {
+    const int a = pairs[p].image_a, b = pairs[p].image_b;
+    const auto &of_a = edges[a], &of_b = edges[b];
+    // Common neighbours, those with the most matches first.
+    std::vector<std::pair<int, std::pair<int, int>>> common;
+    for (size_t i = 0, k = 0; i < of_a.size() && k < of_b.size();) {
+      if (of_a[i].to == of_b[k].to) {
+        const int weakest = std::min(pairs[of_a[i].pair].matches, pairs[of_b[k].pair].matches);
+        common.push_back({-weakest, {of_a[i].pair, of_b[k].pair}});
+        ++i, ++k;
+      } else {
+        of_a[i].to < of_b[k].to ? ++i : ++k;
+      }
+    }
+    if (common.empty()) continue;
+    std::sort(common.begin(), common.end());
+    if (common.size() > kMaxTriplets) common.resize(kMaxTriplets);
+    int closed = 0;
+    for (const auto& [matches, legs] : common) {
+      const RelativeRotation& ac = pairs[legs.first];
+      const int c = ac.image_a == a ? ac.image_b : ac.image_a;
+      closed += Closes(From(pairs[p], a), From(pairs[legs.second], b), From(ac, c)) ? 1 : 0;
+    }
+    support[p] = static_cast<double>(closed) / static_cast<double>(common.size());
+  }
+  return support;
+}
+
+AveragedRotations AverageRotations(int images, std::span<const RelativeRotation> pairs,
+                                   std::span<const double> support) {
+  AveragedRotations result;
+  result.cam_from_world.assign(images, Matrix3d::Identity());
+  std::vector<char> is_root(images);
+  StartFromTree(pairs, support, EdgesOf(images, pairs), &result.cam_from_world, &is_root);
+  Stepper stepper(pairs, is_root);
+  for (const bool robust : {false, true}) {
+    const int iterations = robust ? kRobustIterations : kL1Iterations;
+    for (int i = 0; i < iterations; ++i) {
+      if (stepper.Step(robust, &result.cam_from_world) < kSettledRad) break;
+    }
+  }
+  for (size_t p = 0; p < pairs.size(); ++p) {
+    const Vector3d r = ResidualOf(pairs[p], result.cam_from_world);
+    result.misfit.push_back(stepper.Misfit(p, r));
+    result.angle_rad.push_back(r.norm());
+  }
+  return result;
+}
+
+}  // namespace dtr::sfm

@@ -1,0 +1,54 @@
+// calib/sfm/matching/match_photos.h -- photos in, pairs with matches and relative poses out.
+#pragma once
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "calib/sfm/view_graph.h"
+#include "dtr/base/progress.h"
+
+namespace dtr::sfm {
+
+/// A photo with its features, the largest scale first.
+struct MatchPhoto {
+  std::string name;
+  int width_px = 0, height_px = 0;
+  int camera = 0;  ///< index into the cameras
+  Features features;
+};
+
+struct MatchOptions {
+  int threads = 0;  ///< 0: all cores; the result does not depend on it
+  std::uint64_t seed = 0;
+  bool lenses_are_known = false;  ///< intrinsics hold as given: no vote
+  /// Pairs (a < b, sorted) to match; empty: all up to 60 photos, of more each with those that
+  /// resemble it and with the next in order.
+  std::optional<std::vector<std::pair<int, int>>> pairs;
+  Progress* progress = nullptr;
+};
+
+struct MatchResult {
+  ViewGraph graph;
+  std::vector<std::string> notes;  ///< what a user should know: focal lengths voted, changed
+};
+
+/// Matches photos and finds the geometry of their pairs:
+/// 1. the largest features of two photos by exact search, ratio test, both ways;
+/// 2. where intrinsics are not known, a vote of the pairs on focal length and first radial
+///    distortion (lens_vote.h), written into the graph's cameras;
+/// 3. an essential matrix (a fundamental matrix where the focal length stays unknown), then all
+///    features along its epipolar lines, and a second robust fit to these.
+/// Distances grow with the photos' long side. `cameras`: priors; `focal_is_known`: of each camera,
+/// EXIF told its focal length. Features of lenses that see more than 85 degrees off their axis are
+/// left out there.
+/// Deterministic: the same bytes for any number of threads. Photos without features get no pairs.
+/// Throws std::invalid_argument when numbers of things that belong together differ or an index is
+/// out of range, Interrupted when `progress` says so.
+MatchResult MatchPhotos(std::span<const MatchPhoto> photos,
+                        std::span<const calib::LensCamera> cameras,
+                        const std::vector<bool>& focal_is_known, const MatchOptions& options);
+
+}  // namespace dtr::sfm

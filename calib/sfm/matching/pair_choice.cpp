@@ -1,0 +1,105 @@
+#include "calib/sfm/matching/pair_choice.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <numeric>
+#include <set>
+#include <stdexcept>
+
+#include "calib/sfm/matching/nearest.h"
+#include "dtr/base/parallel_for.h"
+
+namespace dtr::sfm::matching {
+namespace {
+
+constexpr float kRatio = 0.8f;       // Lowe's
+constexpr size_t kGlance = 300;      // features of a photo that tell whether photos overlap
+constexpr size_t kNearestKept = 12;  // of the partners, by rank; the others are spread
+
+std::vector<int> PartnersOf(const std::vector<int>& scores) {
+  std::vector<int> order(scores.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::erase_if(order, [&](int i) { return scores[static_cast<size_t>(i)] <= 0; });
+  std::stable_sort(order.begin(), order.end(), [&](int i, int j) {
+    return scores[static_cast<size_t>(i)] > scores[static_cast<size_t>(j)];
+  });
+  if (order.size() <= kPartners) return order;
+  constexpr size_t kFar = kPartners - kNearestKept;
+  const double factor = std::pow(static_cast<double>(order.size()) / kNearestKept, 1.0 / kFar);
+  size_t last = kNearestKept - 1;
+  for (size_t k = 1; k <= kFar; ++k) {
+    const double rank = kNearestKept * std::pow(factor, static_cast<double>(k));
+    last = std::clamp(static_cast<size_t>(std::lround(rank)) - 1, last + 1,
+                      order.size() - 1 - (kFar - k));
+    order[kNearestKept + k - 1] = order[last];
+  }
+  order.resize(kPartners);
+  return order;
+}
+
+}  // namespace
+
+std::vector<CoarseMatch> CoarseMatches(const Features& a, const Features& b, size_t largest) {
+  const auto first = [&](const Features& f) {
+    return std::span(f.descriptors).first(std::min(largest, f.descriptors.size()));
+  };
+  const NearestBothWays nearest = FindNearest(first(a), first(b));
+  std::vector<CoarseMatch> matches;
+  for (size_t i = 0; i < nearest.of_a.size(); ++i) {
+    const Nearest& there = nearest.of_a[i];
+    if (there.index < 0) continue;
+    const Nearest& back = nearest.of_b[static_cast<size_t>(there.index)];
+    if (back.index != static_cast<int>(i)) continue;
+    if (!IsDistinct(there, kRatio) || !IsDistinct(back, kRatio)) continue;
+    const int second = std::max(there.second, back.second);
+    matches.push_back({static_cast<int>(i), there.index,
+                       DescriptorAngle(there.dot) / std::max(DescriptorAngle(second), 1e-6f)});
+  }
+  std::stable_sort(matches.begin(), matches.end(),
+                   [](const CoarseMatch& m, const CoarseMatch& n) { return m.ratio < n.ratio; });
+  return matches;
+}
+
+std::vector<std::pair<int, int>> ChoosePairs(std::span<const MatchPhoto> photos,
+                                             const MatchOptions& options, Progress& progress) {
+  const int count = static_cast<int>(photos.size());
+  if (options.pairs) {
+    for (const auto& [a, b] : *options.pairs) {
+      if (a < 0 || b >= count || a >= b)
+        throw std::invalid_argument("MatchPhotos: a pair of no two photos");
+    }
+    return *options.pairs;
+  }
+  std::set<std::pair<int, int>> pairs;
+  if (photos.size() <= kAllPairsUpTo) {
+    for (int a = 0; a < count; ++a) {
+      for (int b = a + 1; b < count; ++b) pairs.emplace(a, b);
+    }
+    return {pairs.begin(), pairs.end()};
+  }
+  std::vector<std::vector<int>> scores(photos.size(), std::vector<int>(photos.size(), 0));
+  progress.Stage("comparing photos", count);
+  std::atomic<int> done = 0;
+  ParallelFor(0, count, options.threads, [&](int a) {
+    progress.ThrowIfInterrupted();
+    for (int b = a + 1; b < count; ++b) {
+      const auto i = static_cast<size_t>(a), j = static_cast<size_t>(b);
+      scores[i][j] =
+          static_cast<int>(CoarseMatches(photos[i].features, photos[j].features, kGlance).size());
+    }
+    progress.Update(++done);
+  });
+  for (size_t a = 0; a < photos.size(); ++a) {
+    for (size_t b = 0; b < a; ++b) scores[a][b] = scores[b][a];
+  }
+  for (int a = 0; a < count; ++a) {
+    if (a + 1 < count) pairs.emplace(a, a + 1);
+    for (const int b : PartnersOf(scores[static_cast<size_t>(a)])) {
+      pairs.emplace(std::min(a, b), std::max(a, b));
+    }
+  }
+  return {pairs.begin(), pairs.end()};
+}
+
+}  // namespace dtr::sfm::matching

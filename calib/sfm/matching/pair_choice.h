@@ -1,0 +1,31 @@
+// calib/sfm/matching/pair_choice.h -- which photos of many are worth matching.
+#pragma once
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "calib/sfm/matching/match_photos.h"
+
+namespace dtr::sfm::matching {
+
+inline constexpr size_t kAllPairsUpTo = 60;  ///< photos
+inline constexpr size_t kPartners = 20;      ///< of each photo, where not all pairs are matched
+
+/// The pairs (a < b, sorted): those asked for, else all of few photos, else each photo with the
+/// next and with its partners by the number of matches among the 300 largest features: the nearest
+/// 12, the others spread geometrically by rank, so that not all baselines are short.
+std::vector<std::pair<int, int>> ChoosePairs(std::span<const MatchPhoto> photos,
+                                             const MatchOptions& options, Progress& progress);
+
+/// A match of two photos' largest features, with what is known of its trust: ratio of the angles to
+/// the nearest and the next, smaller is better.
+struct CoarseMatch {
+  int a = 0, b = 0;
+  float ratio = 0;
+};
+
+/// Mutual nearest neighbours among the `largest` first features of each photo that pass the ratio
+/// test both ways, the most trusted first.
+std::vector<CoarseMatch> CoarseMatches(const Features& a, const Features& b, size_t largest);
+
+}  // namespace dtr::sfm::matching

@@ -1,0 +1,31 @@
+// calib/sfm/matching/vote_cameras.h -- which matches vote on which camera, and what becomes of it.
+#pragma once
+#include <span>
+#include <string>
+#include <vector>
+
+#include "calib/sfm/matching/match_photos.h"
+#include "calib/sfm/matching/pair_choice.h"
+
+namespace dtr::sfm::matching {
+
+/// Distance from an epipolar line that still counts, as a share of the photo's long side: 4 pixels
+/// of 1600. Distortion that a radial lens has no more terms for, and features found at a large
+/// scale, take what localisation leaves.
+inline constexpr double kBand = 4.0 / 1600;
+
+/// The matches of the largest features of two photos.
+struct CoarsePair {
+  int a = 0, b = 0;
+  std::vector<CoarseMatch> matches;
+};
+
+/// Votes (lens_vote.h) on focal length and k1 of every camera, by the pairs whose photos both have
+/// it; cameras of one photo whose priors are the same vote together. At most 40 pairs vote, those
+/// with many matches and parallax. A focal length from EXIF holds unless the vote contradicts it by
+/// more than 15 % at a clearly lower cost. Updates cameras and focal_is_known of `graph` and adds
+/// to `notes`.
+void VoteOnCameras(std::span<const MatchPhoto> photos, std::span<const CoarsePair> pairs,
+                   const MatchOptions& options, ViewGraph& graph, std::vector<std::string>& notes);
+
+}  // namespace dtr::sfm::matching

@@ -1,0 +1,263 @@
+#include "calib/bundle/plain/plain_adjust.h"
+
+#include <ceres/jet.h>
+#include <gtest/gtest.h>
+
+#include "calib/bundle/plain/minimise.h"
+#include "calib/bundle/plain/normal.h"
+#include "calib/models/lens_formula.h"
+#include "dtr/base/error.h"
+#include "tests/calib/bundle/synthetic_bundle.h"
+
+namespace dtr::calib {
+namespace {
+
+using testing::LargestDifference;
+using testing::MakeBundle;
+using testing::Perturbed;
+using testing::Projections;
+using testing::SceneSpec;
+
+const LensCamera kPlainLenses[] = {
+    {CameraModel::kSimplePinhole, 1000, 800, {900, 504, 397}},
+    {CameraModel::kPinhole, 1000, 800, {900, 905, 504, 397}},
+    {CameraModel::kSimpleRadial, 1000, 800, {900, 504, 397, -0.05}},
+    {CameraModel::kRadial, 1000, 800, {900, 504, 397, -0.05, 0.01}},
+    {CameraModel::kOpenCv, 1000, 800, {900, 905, 504, 397, -0.05, 0.01, 1e-3, -2e-3}},
+};
+
+// Both solvers stop where a step promises 1e-11 of the cost: what is left of it is far below this.
+constexpr double kSameCost = 1e-8;
+constexpr double kSamePx = 1e-5;  // of noise of 0.3 px; seen: below 1e-6
+
+double SquaredSum(const Bundle& bundle) {
+  double sum = 0;
+  for (const Eigen::Vector2d& r : Residuals(bundle)) sum += r.squaredNorm();
+  return sum;
+}
+
+PlainOptions AllFree() {
+  PlainOptions options;
+  options.free_principal_point = true;
+  options.cost_tolerance = 1e-12;
+  return options;
+}
+
+TEST(PlainProjection, AgreesWithJetsOfTheFormula) {
+  using Jet = ceres::Jet<double, 11>;
+  for (const LensCamera& lens : kPlainLenses) {
+    const auto count = lens.params.size();
+    Jet params[8], p[3], expected[2];
+    for (size_t i = 0; i < count; ++i) params[i] = Jet(lens.params[i], static_cast<int>(i));
+    const double at[3] = {0.3, -0.2, 1.3};
+    for (int i = 0; i < 3; ++i) p[i] = Jet(at[i], 8 + i);
+    ASSERT_TRUE(FormulaOf(lens.model, params).Project(p, expected));
+    const plain::Intrinsics of = plain::IntrinsicsOf(lens.model, lens.params.data());
+    double pixel[2], by_point[6], by_lens[2 * plain::kColumns];
+    plain::Differentiate(of, at, pixel, by_point, by_lens);
+    for (int k = 0; k < 2; ++k) {
+      EXPECT_NEAR(pixel[k], expected[k].a, 1e-10);
+      for (int i = 0; i < 3; ++i) EXPECT_NEAR(by_point[3 * k + i], expected[k].v[8 + i], 1e-9);
+      for (size_t i = 0; i < count; ++i) {
+        const auto column = plain::ColumnOf(lens.model, static_cast<int>(i));
+        EXPECT_NEAR(by_lens[2 * column + k], expected[k].v[static_cast<long>(i)], 1e-9)
+            << NameOf(lens.model) << " parameter " << i;
+      }
+    }
+    const double behind[3] = {0.1, 0.1, -1};
+    EXPECT_FALSE(plain::Project(of, behind, pixel));
+  }
+}
+
+// The gradient of cameras, lenses and priors against differences of the cost, under Cauchy's loss.
+TEST(PlainAdjust, GradientAgreesWithDifferencesOfTheCost) {
+  for (const LensCamera& lens : kPlainLenses) {
+    const Bundle bundle =
+        Perturbed(MakeBundle({.images = 5, .points = 30, .lens = lens, .noise_px = 0.5}), 0.002);
+    Normalised n = Normalised::Around(bundle);
+    n.shift.assign(bundle.images.size(), {});
+    plain::Settings settings;
+    settings.cauchy_px = 2;
+    settings.free_params.resize(1);
+    for (int k = 0; k < ParameterCount(lens.model); ++k) settings.free_params[0].push_back(k);
+    settings.shift_weights.assign(bundle.images.size(), 0.1);
+    settings.lens_priors.push_back({0, false, FocalCount(lens.model), 500, 0.3});
+    if (FocalCount(lens.model) == 2) settings.lens_priors.push_back({0, true, 0, 0.01, 300});
+    const std::vector<bool> used(bundle.observations.size(), true);
+    const plain::Problem problem(bundle, n, used, settings);
+    const plain::Layout layout(problem);
+    plain::NormalEquations normal(problem, layout);
+    plain::Unknowns x{n.theta, n.motion, n.place, n.shift};
+    normal.Build(x, 1e-4, 1);
+    constexpr double kStep = 1e-6;
+    const auto difference = [&](double& unknown) {
+      const double here = unknown;
+      unknown = here + kStep;
+      const double ahead = problem.CostAt(x, 1);
+      unknown = here - kStep;
+      const double behind = problem.CostAt(x, 1);
+      unknown = here;
+      return (ahead - behind) / (2 * kStep);
+    };
+    const double largest = normal.gradient().cwiseAbs().maxCoeff();
+    const auto expect = [&](double& unknown, long at, const char* what) {
+      EXPECT_NEAR(difference(unknown) / largest, normal.gradient()[at] / largest, 1e-6)
+          << NameOf(lens.model) << " " << what << " " << at;
+    };
+    for (size_t i = 0; i < bundle.images.size(); ++i) {
+      for (size_t k = 0; k < 6; ++k) {
+        expect(x.motion[i][k], layout.offset(i) + static_cast<long>(k), "pose");
+      }
+      for (size_t k = 0; k < 2; ++k) {
+        expect(x.shift[i][k], layout.offset(i) + 6 + static_cast<long>(k), "shift");
+      }
+    }
+    for (size_t k = 0; k < lens.params.size(); ++k) {
+      expect(x.theta[0][k], layout.offset(layout.LensNode(0)) + static_cast<long>(k), "lens");
+    }
+  }
+}
+
+TEST(PlainAdjust, FindsTheMinimumThatCeresFinds) {
+  for (const LensCamera& lens : kPlainLenses) {
+    const Bundle start =
+        Perturbed(MakeBundle({.points = 300, .lens = lens, .noise_px = 0.3}), 0.01);
+    AdjustOptions reference;
+    reference.outlier_sigmas = 0;
+    reference.lens = LensFreedom::kAll;
+    const Adjusted expected = Adjust(start, reference);
+    Bundle found = start;
+    const PlainResult result = AdjustPlain(AllFree(), {}, found);
+    EXPECT_TRUE(result.converged);
+    EXPECT_LT(result.iterations, 15);
+    const double cost = SquaredSum(expected.bundle);
+    EXPECT_NEAR(2 * result.cost / cost, 1, kSameCost) << NameOf(lens.model);
+    EXPECT_NEAR(SquaredSum(found) / cost, 1, kSameCost) << NameOf(lens.model);
+    EXPECT_LT(LargestDifference(Projections(found), Projections(expected.bundle)), kSamePx)
+        << NameOf(lens.model);
+  }
+}
+
+TEST(PlainAdjust, LongWalkIsSolvedSparsely) {
+  SceneSpec spec = testing::Walk(0.3);
+  spec.images = 160, spec.points = 3000;
+  spec.point = [](Random& random) {
+    const double x = random.Uniform(-4, 163), y = random.Uniform(5, 12);
+    return Eigen::Vector3d(x, y, random.Uniform(-2, 5));
+  };
+  const Bundle start = Perturbed(MakeBundle(spec), 1e-3);
+  AdjustOptions reference;
+  reference.outlier_sigmas = 0;
+  reference.lens = LensFreedom::kNoPrincipalPoint;
+  const Adjusted expected = Adjust(start, reference);
+  Bundle found = start;
+  PlainOptions options;
+  options.cost_tolerance = 1e-12;
+  EXPECT_TRUE(AdjustPlain(options, {}, found).converged);
+  EXPECT_NEAR(SquaredSum(found) / SquaredSum(expected.bundle), 1, kSameCost);
+  Normalised n = Normalised::Around(start);
+  plain::Settings settings;
+  settings.free_params = {{0, 3, 4}};
+  const plain::Problem problem(start, n, std::vector<bool>(start.observations.size(), true),
+                               settings);
+  EXPECT_TRUE(plain::Layout(problem).sparse());
+}
+
+TEST(PlainAdjust, SeparateLensesAndShiftsAreSolved) {
+  Bundle start = Perturbed(MakeBundle({.points = 300, .noise_px = 0.3}), 0.003);
+  for (size_t i = 0; i < start.images.size(); ++i) {
+    start.images[i].lens = static_cast<int>(i);
+    if (i > 0) start.lenses.push_back(start.lenses[0]);
+  }
+  AdjustOptions reference;
+  reference.outlier_sigmas = 0;
+  reference.lens = LensFreedom::kAll;
+  const Adjusted expected = Adjust(start, reference);
+  Bundle found = start;
+  EXPECT_TRUE(AdjustPlain(AllFree(), {}, found).converged);
+  EXPECT_NEAR(SquaredSum(found) / SquaredSum(expected.bundle), 1, kSameCost);
+
+  Bundle shifted = MakeBundle({.points = 400});
+  const auto shift_of = [](int image) { return Eigen::Vector2d(6 * std::sin(2.4 * image), image); };
+  for (BundleObservation& o : shifted.observations) o.pixel += shift_of(o.image);
+  PlainOptions options = AllFree();
+  options.principal_point_sigma_px = 1e4;
+  EXPECT_TRUE(AdjustPlain(options, {}, shifted).converged);
+  const Eigen::Vector2d apart = shifted.images[3].shift_px - shifted.images[0].shift_px;
+  EXPECT_LT((apart - (shift_of(3) - shift_of(0))).norm(), 0.05);
+}
+
+TEST(PlainAdjust, TheSameBytesForAnyNumberOfThreads) {
+  const Bundle start =
+      Perturbed(MakeBundle({.images = 12, .points = 3000, .noise_px = 0.3}), 0.003);
+  ASSERT_GT(start.observations.size(), 20000u) << "several parts";
+  PlainOptions options;
+  Bundle one = start, three = start;
+  AdjustPlain(options, {}, one);
+  options.threads = 3;
+  AdjustPlain(options, {}, three);
+  EXPECT_EQ(one.lenses[0].params, three.lenses[0].params);
+  EXPECT_EQ(one.points, three.points);
+  for (size_t i = 0; i < one.images.size(); ++i) {
+    EXPECT_EQ(one.images[i].cam_from_world.translation, three.images[i].cam_from_world.translation);
+  }
+}
+
+TEST(PlainAdjust, WhatIsFixedStays) {
+  const Bundle start = Perturbed(MakeBundle({.noise_px = 0.3}), 0.003);
+  PlainOptions options;
+  options.fixed_images.assign(start.images.size(), false);
+  options.fixed_images[1] = options.fixed_images[4] = true;
+  options.fixed_lenses = {true};
+  Bundle found = start;
+  EXPECT_TRUE(AdjustPlain(options, {}, found).converged);
+  EXPECT_EQ(found.lenses[0].params, start.lenses[0].params);
+  const auto moved = [&](size_t i) {
+    return (found.images[i].cam_from_world.TargetOriginInSource() -
+            start.images[i].cam_from_world.TargetOriginInSource())
+        .norm();
+  };
+  EXPECT_LT(moved(1), 1e-12);
+  EXPECT_LT(moved(4), 1e-12);
+  EXPECT_GT(moved(2), 1e-4);
+}
+
+TEST(PlainAdjust, PointsAloneGoWhereKnownCamerasSeeThem) {
+  const Bundle truth = MakeBundle({});
+  Bundle start = truth;
+  Random random(3);
+  for (Eigen::Vector4d& h : start.points)
+    h.head<3>() += 0.2 * Eigen::Vector3d(random.Normal(), 1, 0);
+  PlainOptions options;
+  options.free_poses = false;
+  options.fixed_lenses = {true};
+  EXPECT_TRUE(AdjustPlain(options, {}, start).converged);
+  for (size_t p = 0; p < truth.points.size(); ++p) {
+    EXPECT_LT((start.points[p] - truth.points[p]).norm(), 1e-6) << p;
+  }
+}
+
+TEST(PlainAdjust, OutliersHardlyMatterUnderCauchysLoss) {
+  const Bundle truth = MakeBundle({.noise_px = 0.1});
+  Bundle start = truth;
+  for (size_t i = 0; i < start.observations.size(); i += 20) start.observations[i].pixel.x() += 60;
+  PlainOptions options;
+  options.cauchy_px = 0.3;
+  EXPECT_TRUE(AdjustPlain(options, {}, start).converged);
+  EXPECT_NEAR(start.lenses[0].params[0], 900, 1);
+  Bundle squares = truth;
+  squares.observations = start.observations;
+  AdjustPlain({}, {}, squares);
+  EXPECT_GT(std::abs(squares.lenses[0].params[0] - 900), 3) << "the loss makes the difference";
+}
+
+TEST(PlainAdjust, RejectsWhatItCannotSolve) {
+  Bundle bundle = MakeBundle({});
+  EXPECT_THROW(AdjustPlain({}, std::vector<bool>(3, true), bundle), Error);
+  EXPECT_THROW(AdjustPlain({}, std::vector<bool>(bundle.observations.size()), bundle), Error);
+  bundle.lenses[0] = {CameraModel::kRadialFisheye, 1000, 800, {900, 504, 397, 0, 0}};
+  EXPECT_THROW(AdjustPlain({}, {}, bundle), Error);
+}
+
+}  // namespace
+}  // namespace dtr::calib

@@ -1,0 +1,241 @@
+#include "calib/sfm/matching/match_photos.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+
+#include "dtr/base/random.h"
+
+namespace dtr::sfm {
+namespace {
+
+constexpr double kFocalPx = 900;
+constexpr double kRad = std::numbers::pi / 180;
+
+calib::LensCamera Camera(double focal_px, double k1 = 0) {
+  return {calib::CameraModel::kSimpleRadial, 1000, 750, {focal_px, 500, 375, k1}};
+}
+
+// A random direction of the positive orthant, of length 512 as COLMAP's descriptors.
+Descriptor Near(const std::array<double, 128>& mean, double noise, Random& random) {
+  std::array<double, 128> values;
+  double sum = 0;
+  for (size_t k = 0; k < values.size(); ++k) {
+    values[k] = std::max(0.0, mean[k] + noise * random.Normal());
+    sum += values[k] * values[k];
+  }
+  Descriptor d;
+  for (size_t k = 0; k < values.size(); ++k) {
+    d[k] = static_cast<std::uint8_t>(std::min(255.0, std::round(512 * values[k] / std::sqrt(sum))));
+  }
+  return d;
+}
+
+struct World {
+  std::vector<Eigen::Vector3d> points;
+  std::vector<std::array<double, 128>> looks;
+};
+
+World WorldOf(int count, std::uint64_t seed, bool plane) {
+  Random random(seed);
+  World world;
+  for (int i = 0; i < count; ++i) {
+    const double x = random.Uniform(-4, 4), y = random.Uniform(-3, 3);
+    world.points.emplace_back(x, y, plane ? 8 + 0.3 * x : random.Uniform(5, 12));
+    std::array<double, 128> look;
+    for (double& v : look) v = std::max(0.0, random.Normal());
+    world.looks.push_back(look);
+  }
+  return world;
+}
+
+struct Where {
+  Eigen::Matrix3d r = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d t = Eigen::Vector3d::Zero();
+};
+
+// A camera at `centre`, turned about y and x.
+Where At(const Eigen::Vector3d& centre, double yaw_deg, double pitch_deg = 0) {
+  Where where;
+  where.r = (Eigen::AngleAxisd(pitch_deg * kRad, Eigen::Vector3d::UnitX()) *
+             Eigen::AngleAxisd(yaw_deg * kRad, Eigen::Vector3d::UnitY()))
+                .toRotationMatrix();
+  where.t = -(where.r * centre);
+  return where;
+}
+
+MatchPhoto Photo(const World& world, const Where& where, const calib::LensCamera& camera,
+                 std::uint64_t seed) {
+  constexpr double kNoisePx = 0.3, kDescriptorNoise = 0.15;
+  Random random(seed);
+  MatchPhoto photo{"photo", camera.width_px, camera.height_px, 0, {}};
+  const auto add = [&](const Eigen::Vector2d& pixel, const Descriptor& descriptor) {
+    photo.features.keypoints.push_back(
+        {static_cast<float>(pixel.x()), static_cast<float>(pixel.y()), 2, 0});
+    photo.features.descriptors.push_back(descriptor);
+  };
+  for (size_t i = 0; i < world.points.size(); ++i) {
+    const auto pixel = camera.PixelFromCam(where.r * world.points[i] + where.t);
+    if (!pixel || pixel->x() < 0 || pixel->y() < 0 || pixel->x() >= camera.width_px ||
+        pixel->y() >= camera.height_px) {
+      continue;
+    }
+    const Eigen::Vector2d noise(random.Normal(), random.Normal());
+    add(*pixel + kNoisePx * noise, Near(world.looks[i], kDescriptorNoise, random));
+    // Every fifth point's look is also somewhere else: a wrong match.
+    if (i % 5 == 0) {
+      photo.features.keypoints.back().x_px = static_cast<float>(random.Uniform(0, 1000));
+      photo.features.keypoints.back().y_px = static_cast<float>(random.Uniform(0, 750));
+    }
+  }
+  return photo;
+}
+
+MatchResult Match(const std::vector<MatchPhoto>& photos, const calib::LensCamera& camera,
+                  bool known, int threads = 2) {
+  MatchOptions options;
+  options.threads = threads;
+  options.lenses_are_known = known;
+  return MatchPhotos(photos, std::vector{camera}, {known}, options);
+}
+
+double RotationErrorDeg(const PairGeometry& pair, const Where& a, const Where& b) {
+  const Eigen::Matrix3d truth = b.r * a.r.transpose();
+  return Eigen::AngleAxisd(truth.transpose() * pair.b_rotation_a).angle() / kRad;
+}
+
+double DirectionErrorDeg(const PairGeometry& pair, const Where& a, const Where& b) {
+  const Eigen::Vector3d truth = (b.t - b.r * a.r.transpose() * a.t).normalized();
+  return std::acos(std::clamp(truth.dot(pair.b_translation_a), -1.0, 1.0)) / kRad;
+}
+
+const std::vector<Where>& Places() {
+  static const std::vector<Where> places = {At({-1.5, 0, 0}, -12, 3), At({-0.3, 0.5, 0.4}, -2, -4),
+                                            At({0.6, -0.4, -0.3}, 5, 6),
+                                            At({1.6, 0.2, 0.5}, 14, -2), At({0.2, -1, 1}, 0, 9)};
+  return places;
+}
+
+std::vector<MatchPhoto> Photos(const World& world, const calib::LensCamera& camera) {
+  std::vector<MatchPhoto> photos;
+  for (const Where& where : Places()) {
+    photos.push_back(Photo(world, where, camera, photos.size() + 10));
+  }
+  return photos;
+}
+
+TEST(MatchPhotos, FindsRotationAndDirectionOfAllPairs) {
+  const auto photos = Photos(WorldOf(500, 1, false), Camera(kFocalPx));
+  const MatchResult result = Match(photos, Camera(kFocalPx), true);
+  ASSERT_EQ(result.graph.pairs.size(), 10u);
+  for (const PairGeometry& pair : result.graph.pairs) {
+    const Where& a = Places()[static_cast<size_t>(pair.image_a)];
+    const Where& b = Places()[static_cast<size_t>(pair.image_b)];
+    EXPECT_EQ(pair.kind, PairKind::kCalibrated);
+    EXPECT_LT(RotationErrorDeg(pair, a, b), 0.15);
+    EXPECT_LT(DirectionErrorDeg(pair, a, b), 1.5);
+    EXPECT_GT(pair.matches.size(), 100u);
+  }
+}
+
+TEST(MatchPhotos, VotesForFocalLengthAndDistortion) {
+  for (const double k1 : {0.0, -0.2}) {
+    const auto photos = Photos(WorldOf(600, 2, false), Camera(kFocalPx, k1));
+    const MatchResult result = Match(photos, Camera(1250), false);
+    const calib::LensCamera& voted = result.graph.cameras[0];
+    EXPECT_TRUE(result.graph.focal_is_known[0]);
+    EXPECT_NEAR(voted.params[0], kFocalPx, 0.02 * kFocalPx);
+    EXPECT_NEAR(voted.params[3], k1, 0.03);
+    EXPECT_EQ(result.notes.size(), 1u);
+  }
+}
+
+TEST(MatchPhotos, HoldsAFocalLengthThatTheVoteDoesNotContradict) {
+  const auto photos = Photos(WorldOf(500, 2, false), Camera(kFocalPx));
+  const double exif_px = 1.03 * kFocalPx;
+  const MatchResult held = MatchPhotos(photos, std::vector{Camera(exif_px)}, {true}, {});
+  EXPECT_DOUBLE_EQ(held.graph.cameras[0].params[0], exif_px);
+  const MatchResult changed = MatchPhotos(photos, std::vector{Camera(2 * kFocalPx)}, {true}, {});
+  EXPECT_NEAR(changed.graph.cameras[0].params[0], kFocalPx, 0.02 * kFocalPx);
+}
+
+TEST(MatchPhotos, PhotosWithoutOverlapGiveNoPair) {
+  const Where where = At({0, 0, 0}, 0);
+  const std::vector<MatchPhoto> photos = {
+      Photo(WorldOf(600, 3, false), where, Camera(kFocalPx), 1),
+      Photo(WorldOf(600, 4, false), where, Camera(kFocalPx), 2)};
+  EXPECT_TRUE(Match(photos, Camera(kFocalPx), true).graph.pairs.empty());
+  EXPECT_TRUE(Match(photos, Camera(kFocalPx), false).graph.pairs.empty());
+}
+
+TEST(MatchPhotos, ACameraThatOnlyTurnsIsARotation) {
+  const World world = WorldOf(600, 5, false);
+  const Where a = At({0, 0, 0}, 0), b = At({0, 0, 0}, 9, 4);
+  const MatchResult result =
+      Match({Photo(world, a, Camera(kFocalPx), 1), Photo(world, b, Camera(kFocalPx), 2)},
+            Camera(kFocalPx), true);
+  ASSERT_EQ(result.graph.pairs.size(), 1u);
+  EXPECT_EQ(result.graph.pairs[0].kind, PairKind::kRotation);
+  EXPECT_LT(RotationErrorDeg(result.graph.pairs[0], a, b), 0.05);
+  EXPECT_EQ(result.graph.pairs[0].b_translation_a.norm(), 0);
+}
+
+TEST(MatchPhotos, APlaneIsSaidToBeOne) {
+  const World world = WorldOf(600, 6, true);
+  const MatchResult result = Match({Photo(world, Places()[0], Camera(kFocalPx), 1),
+                                    Photo(world, Places()[3], Camera(kFocalPx), 2)},
+                                   Camera(kFocalPx), true);
+  ASSERT_EQ(result.graph.pairs.size(), 1u);
+  EXPECT_EQ(result.graph.pairs[0].kind, PairKind::kPlanar);
+}
+
+TEST(MatchPhotos, IdenticalPhotosAreARotationByNothing) {
+  const MatchPhoto photo = Photo(WorldOf(300, 7, false), At({0, 0, 0}, 0), Camera(kFocalPx), 1);
+  const MatchResult result = Match({photo, photo}, Camera(kFocalPx), true);
+  ASSERT_EQ(result.graph.pairs.size(), 1u);
+  EXPECT_EQ(result.graph.pairs[0].kind, PairKind::kRotation);
+  EXPECT_LT(Eigen::AngleAxisd(result.graph.pairs[0].b_rotation_a).angle(), 1e-4);
+}
+
+TEST(MatchPhotos, PhotosWithNoOrOneFeatureGetNoPairs) {
+  const World world = WorldOf(100, 8, false);
+  MatchPhoto none = Photo(world, At({0, 0, 0}, 0), Camera(kFocalPx), 1), one = none;
+  none.features = {};
+  one.features.keypoints.resize(1);
+  one.features.descriptors.resize(1);
+  const MatchPhoto full = Photo(world, At({0.5, 0, 0}, 0), Camera(kFocalPx), 2);
+  const MatchResult result = Match({none, one, full}, Camera(kFocalPx), false);
+  EXPECT_TRUE(result.graph.pairs.empty());
+  EXPECT_EQ(result.graph.images.size(), 3u);
+  EXPECT_TRUE(Match({}, Camera(kFocalPx), false).graph.images.empty());
+}
+
+TEST(MatchPhotos, AnyNumberOfThreadsGivesTheSame) {
+  const auto photos = Photos(WorldOf(400, 9, false), Camera(kFocalPx, -0.1));
+  const MatchResult one = Match(photos, Camera(1200), false, 1);
+  const MatchResult three = Match(photos, Camera(1200), false, 3);
+  EXPECT_EQ(one.graph.cameras[0].params, three.graph.cameras[0].params);
+  ASSERT_EQ(one.graph.pairs.size(), three.graph.pairs.size());
+  for (size_t i = 0; i < one.graph.pairs.size(); ++i) {
+    EXPECT_EQ(one.graph.pairs[i].matches, three.graph.pairs[i].matches);
+    EXPECT_EQ(one.graph.pairs[i].b_rotation_a, three.graph.pairs[i].b_rotation_a);
+    EXPECT_EQ(one.graph.pairs[i].b_translation_a, three.graph.pairs[i].b_translation_a);
+  }
+}
+
+TEST(MatchPhotos, WhatDoesNotBelongTogetherIsRejected) {
+  MatchPhoto photo;
+  photo.camera = 1;
+  const std::vector cameras = {Camera(kFocalPx)};
+  EXPECT_THROW(MatchPhotos(std::vector{photo}, cameras, {true}, {}), std::invalid_argument);
+  photo.camera = 0;
+  EXPECT_THROW(MatchPhotos(std::vector{photo}, cameras, {}, {}), std::invalid_argument);
+  photo.features.keypoints.resize(1);
+  EXPECT_THROW(MatchPhotos(std::vector{photo}, cameras, {true}, {}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace dtr::sfm
