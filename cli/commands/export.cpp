@@ -41,9 +41,9 @@ int RunWeb(const pipeline::WebPageRequest& request, const Context& context) {
       report.depth_error_px > 0
           ? fmt::format("depth within {} px of disparity", report.depth_error_px)
           : "depth as in the set";
-  context.console.Say(fmt::format(
-      "{}: {} views, {:.1f} MB, photos of JPEG quality {}, {}", request.output.string(),
-      report.views, static_cast<double>(report.bytes) / 1e6, report.jpeg_quality, depth));
+  context.console.Say(fmt::format("{}: {} views, {:.1f} MB, {}, {}", request.output.string(),
+                                  report.views, static_cast<double>(report.bytes) / 1e6, photos,
+                                  depth));
   context.EmitJson(
       fmt::format("{{\"views\": {}, \"bytes\": {}, \"jpeg_quality\": {}, \"depth_error_px\": {}}}",
                   report.views, report.bytes, report.jpeg_quality, report.depth_error_px));
