@@ -23,7 +23,7 @@ struct WebPageReport {
   size_t views = 0;
   std::uint64_t bytes = 0;
   int jpeg_quality = 0;       ///< of photos; 0: all are JPEGs that the set stores
-  double depth_error_px = 0;  ///< by rounding, pixels of disparity; 0: as in the set
+  double depth_error_px = 0;  ///< by rounding, pixels of disparity; 0: at most 0.02
   std::string warning;  ///< a failed validation in a line, which the page shows, too; or empty
 };
 

@@ -40,7 +40,7 @@ int RunWeb(const pipeline::WebPageRequest& request, const Context& context) {
   const std::string depth =
       report.depth_error_px > 0
           ? fmt::format("depth within {} px of disparity", report.depth_error_px)
-          : "depth as in the set";
+          : "depth within 0.02 px of disparity of the set's";
   context.console.Say(fmt::format("{}: {} views, {:.1f} MB, {}, {}", request.output.string(),
                                   report.views, static_cast<double>(report.bytes) / 1e6, photos,
                                   depth));

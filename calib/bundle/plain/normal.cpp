@@ -11,8 +11,8 @@ namespace {
 constexpr size_t kPartObservations = 8192;  // that one part sums up at least
 constexpr size_t kMaxParts = 16;
 constexpr size_t kMaxPartNumbers = size_t{1} << 25;  // 256 MB in all parts
-// Of a point's damping: an inverse distance that no observation tells moves as if this share of
-// what its direction is told by told it.
+// Of a point's damping: an inverse distance that no observation determines is damped as if it had
+// this share of the curvature of the cost along the point's direction.
 constexpr double kMinDistanceShare = 1e-6;
 
 size_t PartsOf(size_t observations, size_t storage) {
