@@ -51,7 +51,7 @@ ExportReport ExportColmap(const ExportRequest& request, Progress& progress);
 // Of all that follow: what a set without depth or of several time steps cannot give is an Error, an
 // output that exists a UsageError; a failed validation is noted and stands in the file or beside
 // it; nothing half-written appears. Coordinates that floats cannot hold are written relative to
-// the set's origin, which is noted and stands there too. docs/EXPORT_FORMATS.md has every field.
+// the set's origin, which is noted and stands there too. docs/EXPORT.md has every field.
 
 /// Writes a point cloud, one PLY file: the depth maps fused (detail/export/fuse.h) with normals,
 /// colours, standard deviations and numbers of views. Doubles where the set has an origin.

@@ -11,8 +11,8 @@ enum class CameraPer { kAuto, kFolder, kPhoto, kSet };
 /// "auto", "folder", "photo", "set".
 const char* NameOf(CameraPer per);
 
-/// How structure from motion goes about it. Each choice decides the result; docs/accuracy/SPEED.md has what they
-/// cost and what they are worth.
+/// How structure from motion goes about it. Each choice decides the result; docs/accuracy/SPEED.md
+/// has what they cost and what they are worth.
 struct SfmChoice {
   colmap::SfmEngine engine = colmap::SfmOptions().engine;
   int feature_size_px = 0;  ///< long side of the photos for features; 0: from the memory

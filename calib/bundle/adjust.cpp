@@ -14,6 +14,7 @@
 #include "calib/bundle/lens_params.h"
 #include "calib/bundle/normalised.h"
 #include "calib/bundle/observation_rows.h"
+#include "calib/bundle/plain/minimise_bundle.h"
 #include "calib/bundle/priors.h"
 #include "calib/bundle/rig_adjust.h"
 #include "calib/solve/board_start.h"
@@ -29,17 +30,6 @@ constexpr int kMaxRobustPasses = 5, kMaxOutlierPasses = 4;
 constexpr size_t kDenseImages = 100;  // up to here the cameras' system is solved as a dense one
 
 [[noreturn]] void Reject(const std::string& what) { throw Error("bundle adjustment: " + what); }
-
-std::vector<Eigen::Vector2d> ResidualsOf(const Bundle& bundle, const Normalised& n) {
-  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-  std::vector<Eigen::Vector2d> residuals(bundle.observations.size(),
-                                         Eigen::Vector2d::Constant(kNone));
-  for (size_t i = 0; i < residuals.size(); ++i) {
-    Eigen::Vector2d r;
-    if (n.Residual(bundle, bundle.observations[i], &r)) residuals[i] = r;
-  }
-  return residuals;
-}
 
 // Observations nearer than `limit_px` to their predictions.
 std::vector<bool> Within(const std::vector<Eigen::Vector2d>& residuals, double limit_px) {
@@ -121,7 +111,8 @@ double CameraUnknowns(const Bundle& bundle, const std::vector<bool>& image_used,
 }
 
 // `sigma_px`: what priors were weighted with.
-void Describe(const Bundle& start, const std::vector<Eigen::Vector2d>& residuals, size_t rigs,
+void Describe(const std::vector<LensCamera>& known_lenses,
+              const std::vector<Eigen::Vector2d>& residuals, size_t rigs,
               const AdjustOptions& options, double sigma_px, Adjusted& out) {
   // An observation that is alone in seeing its point is met whatever the cameras are.
   const std::vector<int> observations = ObservationsOfPoints(out.bundle, out.used);
@@ -142,7 +133,7 @@ void Describe(const Bundle& start, const std::vector<Eigen::Vector2d>& residuals
   out.rms_px = std::sqrt(squared / std::max(1, out.observations));
   const auto points = static_cast<double>(std::count(point_used.begin(), point_used.end(), true));
   double known = 0;
-  squared += sigma_px * sigma_px * PriorSquares(start, out.bundle, options, &known);
+  squared += sigma_px * sigma_px * PriorSquares(known_lenses, out.bundle, options, &known);
   const double freedom = 2.0 * out.observations + known - 3 * points -
                          CameraUnknowns(out.bundle, image_used, rigs, options);
   // As many unknowns as numbers: all are explained, and nothing says how well.
@@ -172,10 +163,14 @@ ceres::Solver::Options SolverOptions(size_t images, bool robust) {
   return options;
 }
 
-// One solve over the observations with used[i]; Cauchy's loss where a scale is given.
-ceres::Solver::Summary Minimise(const Bundle& bundle, const AdjustOptions& options,
-                                const std::vector<bool>& used, double sigma_px, double cauchy_px,
-                                Normalised& n) {
+struct Ended {
+  int iterations = 0;
+  bool converged = false;
+};
+
+Ended MinimiseByCeres(const Bundle& bundle, const std::vector<LensCamera>& known,
+                      const AdjustOptions& options, const std::vector<bool>& used, double sigma_px,
+                      double cauchy_px, Normalised& n) {
   ceres::Solver::Options solver = SolverOptions(bundle.images.size(), cauchy_px > 0);
   ceres::Problem problem;
   for (size_t i = 0; i < bundle.observations.size(); ++i) {
@@ -189,7 +184,7 @@ ceres::Solver::Summary Minimise(const Bundle& bundle, const AdjustOptions& optio
     problem.AddResidualBlock(n.Cost(bundle, observation).release(),
                              cauchy_px > 0 ? new ceres::CauchyLoss(cauchy_px) : nullptr, blocks);
   }
-  AddPriors(bundle, options, sigma_px, n, problem);
+  AddPriors(bundle, known, options, sigma_px, n, problem);
   const auto add = [&](double* block, int group) {
     if (problem.HasParameterBlock(block)) {
       solver.linear_solver_ordering->AddElementToGroup(block, group);
@@ -223,7 +218,22 @@ ceres::Solver::Summary Minimise(const Bundle& bundle, const AdjustOptions& optio
   progress.ThrowIfInterrupted();
   if (!summary.IsSolutionUsable()) Reject("the observations have no least-squares solution");
   n.FollowRig();
-  return summary;
+  return {static_cast<int>(summary.iterations.size()),
+          summary.termination_type == ceres::CONVERGENCE ||
+              summary.termination_type == ceres::USER_SUCCESS};
+}
+
+// One solve over the observations with used[i]; Cauchy's loss where a scale is given.
+Ended Minimise(const Bundle& bundle, const std::vector<LensCamera>& known,
+               const AdjustOptions& options, const std::vector<bool>& used, double sigma_px,
+               double cauchy_px, Normalised& n) {
+  if (!ServesPlain(bundle, options, n)) {
+    return MinimiseByCeres(bundle, known, options, used, sigma_px, cauchy_px, n);
+  }
+  const plain::MinimiseResult found =
+      MinimisePlain(bundle, known, options, used, sigma_px, cauchy_px, n);
+  if (!std::isfinite(found.cost)) Reject("the observations have no least-squares solution");
+  return {found.iterations, found.converged};
 }
 
 }  // namespace
@@ -271,16 +281,15 @@ bool Contradicts(const Adjusted& held, const Adjusted& free) {
 }
 
 std::vector<Eigen::Vector2d> Residuals(const Bundle& bundle) {
-  return ResidualsOf(bundle, Normalised::Around(bundle));
+  return Normalised::Around(bundle).Residuals(bundle);
 }
 
 namespace {
 
-Bundle WithTangential(Bundle bundle) {
-  for (LensCamera& lens : bundle.lenses) {
+void AddTangential(std::vector<LensCamera>& lenses) {
+  for (LensCamera& lens : lenses) {
     if (MayGetTangential(lens)) lens = WithTwoFocalLengths(lens);
   }
-  return bundle;
 }
 
 int Differences(const std::vector<bool>& a, const std::vector<bool>& b) {
@@ -289,18 +298,19 @@ int Differences(const std::vector<bool>& a, const std::vector<bool>& b) {
   return count;
 }
 
-Adjusted Solve(const Bundle& bundle, const AdjustOptions& options, Normalised& n) {
+// `known`: the lenses that the options' priors speak of.
+Adjusted Solve(const Bundle& bundle, const std::vector<LensCamera>& known,
+               const AdjustOptions& options, Normalised& n) {
   const Bundle start = n.LocalAt(bundle);
   Adjusted out;
   out.lens = options.lens;
-  std::vector<Eigen::Vector2d> residuals = ResidualsOf(bundle, n);
+  std::vector<Eigen::Vector2d> residuals = n.Residuals(bundle);
   double sigma = SigmaOf(bundle, residuals);
   const auto solve = [&](const std::vector<bool>& used, double cauchy_px) {
-    const auto summary = Minimise(bundle, options, used, sigma, cauchy_px, n);
-    out.iterations += static_cast<int>(summary.iterations.size());
-    residuals = ResidualsOf(bundle, n);
-    return summary.termination_type == ceres::CONVERGENCE ||
-           summary.termination_type == ceres::USER_SUCCESS;
+    const Ended ended = Minimise(bundle, known, options, used, sigma, cauchy_px, n);
+    out.iterations += ended.iterations;
+    residuals = n.Residuals(bundle);
+    return ended.converged;
   };
   const double none = std::numeric_limits<double>::infinity();
   for (int pass = 0; options.outlier_sigmas > 0 && pass < kMaxRobustPasses; ++pass) {
@@ -329,7 +339,7 @@ Adjusted Solve(const Bundle& bundle, const AdjustOptions& options, Normalised& n
     MoveToGaugeOf(start, out.bundle, !options.distances.empty());
   }
   n.ToWorld(out.bundle);
-  Describe(start, residuals, n.rig_motion.size(), options, sigma, out);
+  Describe(known, residuals, n.rig_motion.size(), options, sigma, out);
   return out;
 }
 
@@ -338,13 +348,27 @@ Adjusted Solve(const Bundle& bundle, const AdjustOptions& options, Normalised& n
 Adjusted Adjust(const Bundle& bundle, const AdjustOptions& options) {
   CheckBundle(bundle);
   CheckPriors(bundle, options);
-  const Bundle start = IsTangential(options.lens) ? WithTangential(bundle) : bundle;
+  Bundle start = bundle;
+  std::vector<LensCamera> known =
+      options.known_lenses != nullptr ? *options.known_lenses : bundle.lenses;
+  if (IsTangential(options.lens)) {
+    AddTangential(start.lenses);
+    AddTangential(known);
+  }
+  if (known.size() != start.lenses.size()) Reject("expected known lenses as many as there are");
+  for (size_t i = 0; i < known.size(); ++i) {
+    if (known[i].model == start.lenses[i].model &&
+        known[i].params.size() == start.lenses[i].params.size()) {
+      continue;
+    }
+    Reject("expected known lenses of the models that there are");
+  }
   Normalised n = Normalised::Around(start);
   if (IsPerImage(options.lens)) {
     if (options.fix_poses) Reject("principal points per image: expected poses that may move");
     n.shift.assign(bundle.images.size(), {});
   }
-  return Solve(start, options, n);
+  return Solve(start, known, options, n);
 }
 
 Adjusted AdjustRig(const Bundle& bundle, std::span<const RigImage> images,
@@ -371,7 +395,7 @@ Adjusted AdjustRig(const Bundle& bundle, std::span<const RigImage> images,
                          rig.rotation.conjugate().toRotationMatrix(),
                          image.cam_from_rig.TargetOriginInSource() / n.unit});
   }
-  return Solve(rigid, options, n);
+  return Solve(rigid, rigid.lenses, options, n);
 }
 
 }  // namespace dtr::calib

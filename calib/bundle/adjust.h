@@ -63,6 +63,12 @@ struct AdjustOptions {
   /// start, to this standard deviation of its logarithm. An orbit at one height leaves that open,
   /// too.
   double aspect_sigma = 0;
+  /// The lenses that the two above speak of, as many as the bundle has; null: those of the start.
+  /// With them, a solve can start from another's result. Borrowed.
+  const std::vector<LensCamera>* known_lenses = nullptr;
+  int threads = 1;  ///< 0: all cores; the result is the same. Ceres uses one
+  /// Solve by Ceres what plain/plain_adjust.h can solve, too: the reference of its tests.
+  bool by_ceres = false;
   /// Asked after every iteration whether to stop: Interrupted is thrown then. Null: unset.
   const Progress* progress = nullptr;
 };
@@ -105,15 +111,16 @@ struct Adjusted : AdjustSummary {
 /// agree.
 ///
 /// Inside, the world is centred and scaled, and points are directions with inverse distances
-/// (observation_cost.h). The gauge is that of the start: without priors, the result is turned,
-/// scaled and moved as a whole to be as near to the start's cameras as can be (gauge.h); no camera
-/// is singled out. With priors on positions, these decide; with distances alone, these decide the
-/// scale.
+/// (observation_cost.h). Perspective models up to OPENCV without known positions and distances are
+/// solved by plain/plain_adjust.h, all else by Ceres. The gauge is that of the start: without
+/// priors, the result is turned, scaled and moved as a whole to be as near to the start's cameras
+/// as can be (gauge.h); no camera is singled out. With priors on positions, these decide; with
+/// distances alone, these decide the scale.
 ///
-/// One thread, sums in one order: the same bits every time. Throws Error as CheckBundle does, on
-/// priors that cannot be meant, and when no observation has a pixel or the solver finds no finite
-/// solution. What the observations cannot decide is reported by ValidatePhotos
-/// (calib/validation/photos.h), not here.
+/// Sums in one order: the same bits every time, for any number of threads. Throws Error as
+/// CheckBundle does, on priors that cannot be meant, and when no observation has a pixel or the
+/// solver finds no finite solution. What the observations cannot decide is reported by
+/// ValidatePhotos (calib/validation/photos.h), not here.
 Adjusted Adjust(const Bundle& bundle, const AdjustOptions& options);
 
 /// Whether `held`, which held more than `free` did, contradicts the observations: what is left of

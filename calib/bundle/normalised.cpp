@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "calib/models/lens_formula.h"
 #include "dtr/base/order_statistics.h"
@@ -163,6 +164,40 @@ bool Normalised::Residual(const Bundle& bundle, const BundleObservation& observa
                             shift.empty() ? nullptr : shift[image].data()};
   return Cost(bundle, observation)->Evaluate(blocks, residual->data(), nullptr) &&
          residual->allFinite();
+}
+
+std::vector<Eigen::Vector2d> Normalised::Residuals(const Bundle& bundle) const {
+  std::vector<Eigen::Matrix3d> rotations;
+  for (size_t i = 0; i < poses.size(); ++i) {
+    Eigen::Matrix3d turn;
+    ceres::AngleAxisToRotationMatrix(motion[i].data(), turn.data());
+    rotations.push_back(turn * poses[i].rotation);
+  }
+  std::vector<std::vector<double>> params;
+  for (size_t i = 0; i < lenses.size(); ++i) params.push_back(ParamsAt(lenses[i], theta[i].data()));
+  std::vector<Eigen::Vector2d> residuals;
+  residuals.reserve(bundle.observations.size());
+  for (const BundleObservation& o : bundle.observations) {
+    const auto image = static_cast<size_t>(o.image), point = static_cast<size_t>(o.point);
+    const auto lens = static_cast<size_t>(bundle.images[image].lens);
+    const PointFrame& f = points[point];
+    const auto& x = place[point];
+    const Eigen::Vector3d ray =
+        f.direction + x[0] * f.e1 + x[1] * f.e2 + (f.rho + x[2]) * (f.anchor - Centre(image));
+    const Eigen::Vector3d p = rotations[image] * ray;
+    Eigen::Vector2d r;
+    if (!FormulaOf(lenses[lens].model, params[lens].data()).Project(p.data(), r.data())) {
+      residuals.push_back(Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN()));
+      continue;
+    }
+    r -= o.pixel - bundle.images[image].shift_px;
+    if (!shift.empty()) {
+      r += ShiftScalePx(bundle, image) * Eigen::Map<const Eigen::Vector2d>(shift[image].data());
+    }
+    residuals.push_back(
+        r.allFinite() ? r : Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN()));
+  }
+  return residuals;
 }
 
 }  // namespace dtr::calib

@@ -53,6 +53,8 @@ struct Normalised {
   /// Residual in px (predicted minus observed); false where there is none.
   bool Residual(const Bundle& bundle, const BundleObservation& observation,
                 Eigen::Vector2d* residual) const;
+  /// Of all observations; NaN where there is none.
+  std::vector<Eigen::Vector2d> Residuals(const Bundle& bundle) const;
 };
 
 }  // namespace dtr::calib

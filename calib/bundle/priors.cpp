@@ -1,6 +1,7 @@
 #include "calib/bundle/priors.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -52,22 +53,25 @@ struct ShiftCost {
 // A lens's principal point, likewise, from the third on of its unknowns or the second.
 struct PrincipalPointCost {
   int first;
-  double weight;  // of one unit of the unknowns
+  double weight;              // of one unit of the unknowns
+  std::array<double, 2> off;  // of the start, in these units
   template <typename T>
   bool operator()(T const* const* theta, T* residual) const {
-    for (int i = 0; i < 2; ++i) residual[i] = weight * theta[0][first + i];
+    for (int i = 0; i < 2; ++i) {
+      residual[i] = weight * (theta[0][first + i] + off[static_cast<size_t>(i)]);
+    }
     return true;
   }
 };
 
-// The logarithm of fy / fx less that at the start.
+// The logarithm of fy / fx less that which is known.
 struct AspectCost {
-  double fx_px, fy_px, scale_px, weight;
+  double fx_px, fy_px, scale_px, weight, off;
   template <typename T>
   bool operator()(T const* const* theta, T* residual) const {
     const T fx = 1.0 + scale_px / fx_px * theta[0][0], fy = 1.0 + scale_px / fy_px * theta[0][1];
     if (!(fx > T(0)) || !(fy > T(0))) return false;
-    residual[0] = weight * (log(fy) - log(fx));
+    residual[0] = weight * (log(fy) - log(fx) + off);
     return true;
   }
 };
@@ -81,21 +85,31 @@ void AddLensCost(const Functor& functor, int residuals, const LensFrame& lens, d
   problem.AddResidualBlock(cost, nullptr, theta);
 }
 
-void AddLensPriors(const Bundle& bundle, const AdjustOptions& options, double sigma_px,
-                   Normalised& n, ceres::Problem& problem) {
+// Of a lens with two focal lengths.
+double LogAspect(const std::vector<double>& params) { return std::log(params[1] / params[0]); }
+
+void AddLensPriors(const Bundle& bundle, const std::vector<LensCamera>& known_lenses,
+                   const AdjustOptions& options, double sigma_px, Normalised& n,
+                   ceres::Problem& problem) {
   for (size_t i = 0; i < n.theta.size(); ++i) {
     if (!problem.HasParameterBlock(n.theta[i].data())) continue;
     const LensFrame& lens = n.lenses[i];
     const double known_px = PrincipalPointSigmaPx(bundle.lenses[i], options);
     if (std::isfinite(known_px)) {
       const int first = FocalCount(lens.model);
-      const double weight = sigma_px / known_px * lens.scale[static_cast<size_t>(first)];
-      AddLensCost(PrincipalPointCost{first, weight}, 2, n.lenses[i], n.theta[i].data(), problem);
+      const auto k = static_cast<size_t>(first);
+      const double weight = sigma_px / known_px * lens.scale[k];
+      const std::vector<double>& there = known_lenses[i].params;
+      const std::array<double, 2> off{(lens.centre[k] - there[k]) / lens.scale[k],
+                                      (lens.centre[k + 1] - there[k + 1]) / lens.scale[k]};
+      AddLensCost(PrincipalPointCost{first, weight, off}, 2, n.lenses[i], n.theta[i].data(),
+                  problem);
     }
     const double known = AspectSigma(bundle.lenses[i], options);
     if (std::isfinite(known)) {
-      AddLensCost(AspectCost{lens.centre[0], lens.centre[1], lens.scale[0], sigma_px / known}, 1,
-                  n.lenses[i], n.theta[i].data(), problem);
+      const double off = LogAspect(lens.centre) - LogAspect(known_lenses[i].params);
+      AddLensCost(AspectCost{lens.centre[0], lens.centre[1], lens.scale[0], sigma_px / known, off},
+                  1, n.lenses[i], n.theta[i].data(), problem);
     }
   }
 }
@@ -151,15 +165,16 @@ void CheckPriors(const Bundle& bundle, const AdjustOptions& options) {
   }
 }
 
-void AddPriors(const Bundle& bundle, const AdjustOptions& options, double sigma_px, Normalised& n,
+void AddPriors(const Bundle& bundle, const std::vector<LensCamera>& known,
+               const AdjustOptions& options, double sigma_px, Normalised& n,
                ceres::Problem& problem) {
   AddPlacePriors(options, sigma_px, n, problem);
   AddShiftPriors(bundle, sigma_px, n, problem);
-  AddLensPriors(bundle, options, sigma_px, n, problem);
+  AddLensPriors(bundle, known, options, sigma_px, n, problem);
 }
 
-double PriorSquares(const Bundle& start, const Bundle& bundle, const AdjustOptions& options,
-                    double* numbers) {
+double PriorSquares(const std::vector<LensCamera>& known_lenses, const Bundle& bundle,
+                    const AdjustOptions& options, double* numbers) {
   const auto centre = [&](int image) {
     return bundle.images[static_cast<size_t>(image)].cam_from_world.TargetOriginInSource();
   };
@@ -177,17 +192,15 @@ double PriorSquares(const Bundle& start, const Bundle& bundle, const AdjustOptio
     if (!std::isfinite(known_px)) continue;
     const auto at = static_cast<size_t>(FocalCount(bundle.lenses[i].model));
     for (size_t k = at; k < at + 2; ++k) {
-      squares += std::pow((bundle.lenses[i].params[k] - start.lenses[i].params[k]) / known_px, 2);
+      squares += std::pow((bundle.lenses[i].params[k] - known_lenses[i].params[k]) / known_px, 2);
     }
     *numbers += 2;
   }
   for (size_t i = 0; i < bundle.lenses.size(); ++i) {
     const double known = AspectSigma(bundle.lenses[i], options);
     if (!std::isfinite(known)) continue;
-    const auto aspect = [](const LensCamera& lens) {
-      return std::log(lens.params[1] / lens.params[0]);
-    };
-    squares += std::pow((aspect(bundle.lenses[i]) - aspect(start.lenses[i])) / known, 2);
+    const double off = LogAspect(bundle.lenses[i].params) - LogAspect(known_lenses[i].params);
+    squares += std::pow(off / known, 2);
     *numbers += 1;
   }
   return squares;

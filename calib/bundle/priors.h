@@ -11,12 +11,13 @@ namespace dtr::calib {
 void CheckPriors(const Bundle& bundle, const AdjustOptions& options);
 
 /// Positions, distances, shifts of images and what is known of lenses, in units of an observation's
-/// sigma so that both sums can be added. `n` is borrowed.
-void AddPriors(const Bundle& bundle, const AdjustOptions& options, double sigma_px, Normalised& n,
+/// sigma so that both sums can be added. `known`: the lenses that are known. `n` is borrowed.
+void AddPriors(const Bundle& bundle, const std::vector<LensCamera>& known,
+               const AdjustOptions& options, double sigma_px, Normalised& n,
                ceres::Problem& problem);
 
 /// What the priors miss by, in units of their sigmas, squared; how many numbers they are.
-double PriorSquares(const Bundle& start, const Bundle& bundle, const AdjustOptions& options,
-                    double* numbers);
+double PriorSquares(const std::vector<LensCamera>& known, const Bundle& bundle,
+                    const AdjustOptions& options, double* numbers);
 
 }  // namespace dtr::calib

@@ -40,6 +40,7 @@ bool HasPriors(const RefineOptions& options) {
 AdjustOptions SolveOptions(const RefineOptions& options, const std::optional<LensFreedom>& lens) {
   AdjustOptions adjust = OptionsFor(lens);
   adjust.progress = options.progress;
+  adjust.threads = options.threads;
   if (adjust.fix_poses) return adjust;
   adjust.aspect_sigma = kKnownAspectSigma;
   adjust.positions = options.positions;
@@ -92,6 +93,30 @@ std::vector<RefineCandidate> CandidatesFor(const Bundle& bundle, bool separate_l
   return candidates;
 }
 
+/// The last candidate before `k` that frees no more than it: its solve is where that of `k` starts.
+size_t LastWithin(const std::vector<RefineCandidate>& candidates, size_t k) {
+  const LensFreedom freedom = *candidates[k].lens;
+  for (size_t i = k; i-- > 1;) {
+    const LensFreedom less = *candidates[i].lens;
+    if ((!IsPerImage(less) || IsPerImage(freedom)) &&
+        (!IsTangential(less) || IsTangential(freedom))) {
+      return i;
+    }
+  }
+  return 0;
+}
+
+/// A candidate's solve of a fold, from that of one with less freedom where that converged.
+Adjusted Train(const Bundle& fold, AdjustOptions options, const Adjusted* less) {
+  if (less == nullptr || !less->converged) return Adjust(fold, options);
+  options.known_lenses = &fold.lenses;
+  Bundle start = fold;
+  start.lenses = less->bundle.lenses;
+  start.images = less->bundle.images;
+  start.points = less->bundle.points;
+  return Adjust(start, options);
+}
+
 /// What each candidate's cameras, adjusted to half of the points, make of the other half; per
 /// candidate and point. The model as given has seen them all and cannot be compared with candidates
 /// that have not: it is first by name only.
@@ -101,13 +126,20 @@ std::vector<std::vector<double>> TryOnUnseenPoints(const Bundle& bundle,
   const std::vector<PointFold> folds = PointFolds(bundle, options.seed);
   std::vector<std::vector<double>> parts(candidates.size() * folds.size());
   std::vector<char> converged(parts.size());
-  ParallelFor(0, static_cast<int>(parts.size()), options.threads, [&](int i) {
-    const auto at = static_cast<size_t>(i);
-    const PointFold& fold = folds[at % folds.size()];
-    const Adjusted trained =
-        Adjust(fold.training, SolveOptions(options, candidates[at / folds.size()].lens));
-    converged[at] = trained.converged;
-    parts[at] = LossesOfHeldOutPoints(trained.bundle, fold.asked, scale_px);
+  const int folds_at_once = static_cast<int>(folds.size());
+  const int threads = std::max(1, ResolveThreads(options.threads) / folds_at_once);
+  ParallelFor(0, folds_at_once, options.threads, [&](int i) {
+    const PointFold& fold = folds[static_cast<size_t>(i)];
+    std::vector<Adjusted> trained(candidates.size());
+    for (size_t k = 0; k < candidates.size(); ++k) {
+      const Adjusted* const less = k > 0 ? &trained[LastWithin(candidates, k)] : nullptr;
+      AdjustOptions solve = SolveOptions(options, candidates[k].lens);
+      solve.threads = threads;
+      trained[k] = Train(fold.training, solve, less);
+      const size_t at = k * folds.size() + static_cast<size_t>(i);
+      converged[at] = trained[k].converged;
+      parts[at] = LossesOfHeldOutPoints(trained[k].bundle, fold.asked, scale_px);
+    }
   });
   std::vector<std::vector<double>> losses(candidates.size());
   for (size_t i = 0; i < parts.size(); ++i) {

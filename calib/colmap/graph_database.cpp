@@ -304,10 +304,12 @@ void AddFeatures(const fs::path& database, std::span<const size_t> images,
 sfm::Features ReadFeatures(const fs::path& database, std::uint32_t image_id) {
   const ReadOnlyDatabase opened(database);
   sfm::Features features;
+  int records = 0;
   const std::string of_image = " WHERE image_id = " + std::to_string(image_id);
   opened.ForEachRow(
       ("SELECT rows, cols, data FROM keypoints" + of_image).c_str(), [&](sqlite3_stmt* row) {
         const auto values = opened.Matrix<float>(row, 0, kKeypointColumns);
+        ++records;
         for (size_t i = 0; i < values.rows; ++i) {
           const sfm::Keypoint keypoint{values.At(i, 0), values.At(i, 1), values.At(i, 2),
                                        values.At(i, 3)};
@@ -329,6 +331,7 @@ sfm::Features ReadFeatures(const fs::path& database, std::uint32_t image_id) {
           std::memcpy(features.descriptors.data(), values.data, values.rows * kDescriptorColumns);
         }
       });
+  if (records == 0) RejectDatabase(database, "no features of image " + std::to_string(image_id));
   if (features.keypoints.size() != features.descriptors.size()) {
     RejectDatabase(database, std::to_string(features.keypoints.size()) + " features with " +
                                  std::to_string(features.descriptors.size()) + " descriptors");
@@ -362,13 +365,6 @@ void WriteViewGraph(const fs::path& database, const sfm::ViewGraph& graph) {
         .Blob(std::span<const double>(pair.b_translation_a.data(), 3))
         .Run();
   }
-  transaction.Commit();
-}
-
-void ReplaceCameras(const fs::path& database, std::span<const calib::LensCamera> cameras,
-                    const std::vector<bool>& focal_is_known) {
-  Transaction transaction(database);
-  InsertCameras(transaction, cameras, focal_is_known);
   transaction.Commit();
 }
 

@@ -30,18 +30,13 @@ void CreateGraphDatabase(const std::filesystem::path& database,
 void AddFeatures(const std::filesystem::path& database, std::span<const size_t> images,
                  std::span<const sfm::Features> features);
 
-/// Features of an image by its id. Throws Error where the database has none of it, is no COLMAP
-/// database, or its records do not fit each other.
+/// Features of an image by its id. Throws Error where the database has no record of them, is no
+/// COLMAP database, or its records do not fit each other.
 sfm::Features ReadFeatures(const std::filesystem::path& database, std::uint32_t image_id);
 
 /// Replaces cameras and matches of a database by the graph's: of every pair the matches that agree
 /// with its geometry, both as what was matched and as what was verified.
 void WriteViewGraph(const std::filesystem::path& database, const sfm::ViewGraph& graph);
-
-/// Replaces the cameras alone, which keep their number and order.
-void ReplaceCameras(const std::filesystem::path& database,
-                    std::span<const calib::LensCamera> cameras,
-                    const std::vector<bool>& focal_is_known);
 
 /// The graph that WriteViewGraph wrote, images in the order of ids. Throws Error as ReadFeatures
 /// does.

@@ -148,12 +148,12 @@ calib::LensCamera WithFocal(calib::LensCamera lens, double factor) {
   return lens;
 }
 
-// The focal length, within a fifth of the lens's, with which the points fit best: golden section
-// on its logarithm, the pose settled for each.
+// The focal length, within half and twice the lens's, with which the points fit best: golden
+// section on its logarithm, the pose settled for each.
 calib::LensCamera FitFocal(const ViewToPlace& view, const calib::LensCamera& lens,
                            std::span<const Seen> seen, const Placing& placing) {
   const double golden = (std::sqrt(5.0) - 1) / 2;
-  double low = -0.2, high = 0.2;
+  double low = -std::log(2.0), high = std::log(2.0);
   const auto cost = [&](double log_factor) {
     const calib::LensCamera tried = WithFocal(lens, std::exp(log_factor));
     Placing settled = placing;
@@ -179,7 +179,7 @@ sfm::ViewGraph MatchWith(const ViewToPlace& view, std::span<const SourceView> so
                          std::uint64_t seed, Progress& progress) {
   std::vector<sfm::MatchPhoto> photos;
   std::vector<calib::LensCamera> lenses;
-  std::vector<bool> lens_is_known;
+  std::vector<bool> lens_is_known, focal_is_known;
   std::vector<std::pair<int, int>> pairs;
   const int held = static_cast<int>(sources.size());
   for (int i = 0; i < held; ++i) {
@@ -193,9 +193,15 @@ sfm::ViewGraph MatchWith(const ViewToPlace& view, std::span<const SourceView> so
   photos.push_back(
       {"held-out photo", view.lens.width_px, view.lens.height_px, held, view.features});
   lenses.push_back(view.lens);
-  lens_is_known.push_back(view.lens_is_known || view.focal_is_known);
-  return sfm::MatchPhotos(photos, lenses, lens_is_known,
-                          {.threads = 1, .seed = seed, .pairs = pairs, .progress = &progress})
+  focal_is_known = lens_is_known;
+  lens_is_known.push_back(view.lens_is_known);
+  focal_is_known.push_back(view.lens_is_known || view.focal_is_known);
+  return sfm::MatchPhotos(photos, lenses, focal_is_known,
+                          {.threads = 1,
+                           .seed = seed,
+                           .lens_is_known = lens_is_known,
+                           .pairs = pairs,
+                           .progress = &progress})
       .graph;
 }
 

@@ -2,11 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <optional>
 
 #include "calib/bundle/refine.h"
 #include "calib/colmap/own_steps.h"
+#include "calib/colmap/sfm_steps.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 
@@ -20,20 +22,17 @@ constexpr std::uintmax_t kLargestNote = 1 << 24;
 // other left out are the hard ones.
 constexpr double kClearlyWorse = 1.2;
 
-// The model under the photos' own names.
-calib::SfmModel WithOwnNames(const Workspace& workspace, calib::SfmModel model) {
-  for (calib::SfmImage& image : model.images) image.name = workspace.NameOfAlias(image.name);
-  return model;
-}
+// Observations by which two models are compared; fewer tell nothing.
+constexpr int kMinHeldOut = 50;
 
-bool TakeColmaps(const GloballyMapped& ours, const calib::SfmModel& own,
-                 const calib::SfmModel& colmaps, const SfmOptions& options) {
-  if (!ours.why_not.empty() || own.images.empty()) return true;
-  if (colmaps.images.size() <= own.images.size()) return false;
-  int count = 0;
-  const double own_px = calib::HeldOutErrorPx(own, options.seed, &count);
-  const double colmap_px = calib::HeldOutErrorPx(colmaps, options.seed, &count);
-  return !(colmap_px > kClearlyWorse * own_px);
+bool TakeColmaps(const GloballyMapped& ours, const calib::SfmModel& colmaps,
+                 const SfmOptions& options) {
+  if (!ours.why_not.empty() || ours.model.images.empty()) return true;
+  if (colmaps.images.size() <= ours.model.images.size()) return false;
+  int own_count = 0, colmap_count = 0;
+  const double own_px = calib::HeldOutErrorPx(ours.model, options.seed, &own_count);
+  const double colmap_px = calib::HeldOutErrorPx(colmaps, options.seed, &colmap_count);
+  return std::min(own_count, colmap_count) >= kMinHeldOut && colmap_px <= kClearlyWorse * own_px;
 }
 
 std::string WhyAsked(const Workspace& workspace, const GloballyMapped& ours) {
@@ -47,9 +46,7 @@ void WriteNote(const Workspace& workspace, const GloballyMapped& ours, bool colm
                const std::string& asked_because) {
   json why = json::object();
   if (!colmaps) {
-    for (const auto& [alias, reason] : ours.why_without_camera) {
-      why[workspace.NameOfAlias(alias)] = reason;
-    }
+    for (const auto& [name, reason] : ours.why_without_camera) why[name] = reason;
   }
   const json note = {{"mapper", colmaps ? "colmap" : "global"},
                      {"colmap_asked_because", asked_because},
@@ -58,11 +55,26 @@ void WriteNote(const Workspace& workspace, const GloballyMapped& ours, bool colm
                       note.dump(1, ' ', false, json::error_handler_t::replace) + "\n");
 }
 
-[[noreturn]] void ThrowRefused(const std::string& why, const char* advice) {
+[[noreturn]] void ThrowRejected(const std::string& why, const char* advice) {
   throw Error(
       fmt::format("structure from motion: expected photos that determine their cameras, "
                   "found that {}; {}",
                   why, advice));
+}
+
+// COLMAP's models; where ours passes, a failure of COLMAP is no reason to lose it.
+std::vector<calib::SfmModel> AskColmap(
+    Workspace& workspace, bool ours_passes,
+    const std::function<std::vector<calib::SfmModel>()>& by_colmap) {
+  try {
+    return by_colmap();
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const Error& error) {
+    if (!ours_passes) throw;
+    workspace.progress().Note(fmt::format("COLMAP's mapper failed: {}", error.what()));
+    return {};
+  }
 }
 
 }  // namespace
@@ -70,35 +82,44 @@ void WriteNote(const Workspace& workspace, const GloballyMapped& ours, bool colm
 std::vector<calib::SfmModel> MapOrFallBack(
     Workspace& workspace, const SfmOptions& options,
     const std::function<std::vector<calib::SfmModel>()>& by_colmap) {
-  const GloballyMapped ours = MapHere(workspace, options);
-  calib::SfmModel own = WithOwnNames(workspace, ours.model);
-  const bool passes = ours.why_not.empty() && !own.images.empty();
-  if (passes && own.images.size() == workspace.images().size()) {
+  GloballyMapped ours = MapHere(workspace, options);
+  const bool passes = ours.why_not.empty() && !ours.model.images.empty();
+  if (passes && ours.model.images.size() == workspace.images().size()) {
     WriteNote(workspace, ours, false, "");
-    return {std::move(own)};
+    return {std::move(ours.model)};
   }
   const std::string why = WhyAsked(workspace, ours);
-  const bool ask = options.engine == SfmEngine::kAuto && Program::IsInstalled();
+  const bool may_ask = options.engine == SfmEngine::kAuto;
+  const bool ask = may_ask && Program::IsInstalled();
   if (!ask && !passes) {
-    ThrowRefused(why, options.engine == SfmEngine::kAuto
-                          ? "photos must overlap by half, from several places; or install COLMAP "
-                            "(apt-get install colmap), whose mapper is tried then"
-                          : "photos must overlap by half, from several places; or use --sfm auto, "
-                            "with which COLMAP's mapper is tried");
+    ThrowRejected(why, may_ask ? "photos must overlap by half, from several places; or install "
+                                 "COLMAP (apt-get install colmap), whose mapper is tried then"
+                               : "photos must overlap by half, from several places; or use --sfm "
+                                 "auto, with which COLMAP's mapper is tried");
+  }
+  if (!ask && may_ask) {
+    workspace.progress().Note(fmt::format(
+        "global mapper: {}; with COLMAP installed its mapper would be tried, too", why));
   }
   std::vector<calib::SfmModel> colmaps;
   if (ask) {
     workspace.progress().Note(
         fmt::format("global mapper: {}; trying COLMAP's mapper on the same matches", why));
-    colmaps = by_colmap();
+    colmaps = AskColmap(workspace, passes, by_colmap);
   }
   if (colmaps.empty() && !passes) return {};
-  const bool take = !colmaps.empty() && TakeColmaps(ours, own, colmaps.front(), options);
-  if (ask)
+  const bool take = !colmaps.empty() && TakeColmaps(ours, colmaps.front(), options);
+  if (ask) {
     workspace.progress().Note(take ? "COLMAP's model is taken"
                                    : "the global mapper's model is taken");
+  }
+  if (!take) {  // what COLMAP's attempts left says nothing of our model
+    RemoveAll(workspace.folder() / kFixedIntrinsicsNote);
+    RemoveAll(workspace.folder() / kForwardMotionNote);
+  }
   WriteNote(workspace, ours, take, why);
-  return take ? colmaps : std::vector<calib::SfmModel>{std::move(own)};
+  if (take) return colmaps;
+  return {std::move(ours.model)};
 }
 
 void ReadOwnMappingNote(const Workspace& workspace, SfmReport& report) {

@@ -97,8 +97,13 @@ sfm::Features FeaturesOf(const fs::path& photo, const fs::path& mask_file, int m
   const Grid<std::uint8_t> grey = GreyOf(io::ReadImage(photo));
   Mask mask;
   if (!mask_file.empty()) mask = io::ReadMask(mask_file);
+  if (!mask.empty() && (mask.width() != grey.width() || mask.height() != grey.height())) {
+    throw Error(fmt::format("{}: expected a mask of {} x {}, the size of its photo, found {} x {}",
+                            mask_file.string(), grey.width(), grey.height(), mask.width(),
+                            mask.height()));
+  }
   sfm::SiftOptions options;
-  options.max_features = max_features > 0 ? max_features : kMaxFeatures;
+  options.max_features = max_features > 0 ? max_features : kMaxOwnFeatures;
   options.max_size_px = max_image_size_px;
   return sfm::DetectSift(grey.data(), grey.width(), grey.height(), mask.data(), options);
 }
@@ -111,6 +116,7 @@ void OwnFeatures(Workspace& workspace, const fs::path& database,
     // A note must never meet features of other photos: it goes before a new database comes.
     RemoveAll(note);
     SyncFolder(note.parent_path());
+    RemoveDatabase(database);  // with the journal of a killed write, which SQLite would play back
     CreateDatabase(workspace, working, groups);
     MoveDatabase(working, database);
   }
@@ -155,26 +161,32 @@ void OwnMatches(Workspace& workspace, const fs::path& features,
   }
   const auto pairs = PairsFor(photos.size(), matching, allowed);
   workspace.RunHere([&] {
-    const sfm::MatchResult result = sfm::MatchPhotos(photos, known.lenses, known.focal_is_known,
-                                                     {.threads = workspace.threads(),
-                                                      .seed = options.seed,
-                                                      .lenses_are_known = known_lenses,
-                                                      .pairs = pairs,
-                                                      .progress = &workspace.progress()});
+    const sfm::MatchResult result =
+        sfm::MatchPhotos(photos, known.lenses, known.focal_is_known,
+                         {.threads = workspace.threads(),
+                          .seed = options.seed,
+                          .lens_is_known = std::vector<bool>(known.lenses.size(), known_lenses),
+                          .pairs = pairs,
+                          .progress = &workspace.progress()});
     for (const std::string& note : result.notes) workspace.progress().Note(note);
     CopyDatabase(features, workspace.database());
     WriteViewGraph(workspace.database(), result.graph);
   });
 }
 
-GloballyMapped MapHere(Workspace& workspace, const SfmOptions& options) {
-  const sfm::ViewGraph graph = ReadViewGraph(workspace.database());
+GloballyMapped MapHere(Workspace& workspace, const SfmOptions& options,
+                       const std::optional<GroupLenses>& fixed) {
+  sfm::ViewGraph graph = ReadViewGraph(workspace.database());
+  // Under the photos' own names, which messages name.
+  for (sfm::GraphImage& image : graph.images) image.name = workspace.NameOfAlias(image.name);
+  if (fixed) graph.cameras = fixed->lenses;
   GloballyMapped result;
   workspace.progress().Stage("mapping", 0);
   workspace.RunHere([&] {
-    sfm::Mapped mapped = sfm::MapGlobally(
-        graph,
-        {.threads = workspace.threads(), .seed = options.seed, .progress = &workspace.progress()});
+    sfm::Mapped mapped = sfm::MapGlobally(graph, {.threads = workspace.threads(),
+                                                  .seed = options.seed,
+                                                  .intrinsics_are_known = fixed.has_value(),
+                                                  .progress = &workspace.progress()});
     result.model = std::move(mapped.model);
     result.why_not = std::move(mapped.why_not);
     for (const sfm::LeftOut& left_out : mapped.left_out) {

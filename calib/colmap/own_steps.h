@@ -40,13 +40,15 @@ void OwnMatches(Workspace& workspace, const std::filesystem::path& features,
                 const SfmOptions& options, bool known_lenses,
                 const std::optional<ImagePairs>& allowed);
 
-/// What the global mapper made of the workspace's database, names as COLMAP knows them.
+/// What the global mapper made of the workspace's database, photos under their own names.
 struct GloballyMapped {
   calib::SfmModel model;  ///< without images: none could be placed
   /// Why the model must not be taken as it is: a clause; empty where it passes.
   std::string why_not;
-  std::map<std::string, std::string> why_without_camera;  ///< by alias
+  std::map<std::string, std::string> why_without_camera;
 };
-GloballyMapped MapHere(Workspace& workspace, const SfmOptions& options);
+/// `fixed`: intrinsics that hold, in the place of what the matches determine.
+GloballyMapped MapHere(Workspace& workspace, const SfmOptions& options,
+                       const std::optional<GroupLenses>& fixed = {});
 
 }  // namespace dtr::colmap

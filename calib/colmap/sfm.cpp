@@ -58,12 +58,11 @@ enum class Mapping {
 
 // Runs the mapper; false where it found no two photos to start from, which COLMAP takes for an
 // error: it is a finding about the photos.
-bool Map(Workspace& workspace, const fs::path& database, const fs::path& models, std::uint64_t seed,
-         Mapping mapping) {
+bool Map(Workspace& workspace, const fs::path& models, std::uint64_t seed, Mapping mapping) {
   Arguments arguments(workspace.program(), "mapper");
   arguments.AddIfKnown({"random_seed", "default_random_seed"}, fmt::format("{}", seed))
       .AddIfKnown({"Mapper.random_seed"}, fmt::format("{}", seed))
-      .Add({"database_path"}, database.string())
+      .Add({"database_path"}, workspace.database().string())
       .Add({"image_path"}, workspace.images_folder().string())
       .Add({"output_path"}, models.string())
       .Add({"Mapper.num_threads"}, std::to_string(workspace.threads()));
@@ -106,13 +105,12 @@ std::vector<calib::SfmModel> ModelsIn(const Workspace& workspace, const fs::path
   return models;
 }
 
-std::vector<calib::SfmModel> MadeIn(Workspace& workspace, const fs::path& database,
-                                    const fs::path& models, const SfmOptions& options,
-                                    Mapping mapping) {
+std::vector<calib::SfmModel> MadeIn(Workspace& workspace, const fs::path& models,
+                                    const SfmOptions& options, Mapping mapping) {
   RemoveAll(models);
   MakeFolder(models);
-  return Map(workspace, database, models, options.seed, mapping) ? ModelsIn(workspace, models)
-                                                                 : std::vector<calib::SfmModel>();
+  return Map(workspace, models, options.seed, mapping) ? ModelsIn(workspace, models)
+                                                       : std::vector<calib::SfmModel>();
 }
 
 // Every camera has a focal length of EXIF to be fixed at.
@@ -130,7 +128,7 @@ std::vector<calib::SfmModel> MadeOtherwise(Workspace& workspace, const fs::path&
   if (AllHavePriors(groups)) {
     workspace.progress().Note(
         "COLMAP made no model with free focal lengths; trying with those of EXIF, fixed");
-    fixed = MadeIn(workspace, workspace.database(), models, options, Mapping::kFixedIntrinsics);
+    fixed = MadeIn(workspace, models, options, Mapping::kFixedIntrinsics);
   }
   const auto photos = [](const std::vector<calib::SfmModel>& made) {
     return made.empty() ? 0 : made.front().images.size();
@@ -141,7 +139,7 @@ std::vector<calib::SfmModel> MadeOtherwise(Workspace& workspace, const fs::path&
     workspace.progress().Note(
         "COLMAP found no two photos to start from; trying two that may lie in line with what they "
         "see");
-    forward = MadeIn(workspace, workspace.database(), models, options, Mapping::kForwardMotion);
+    forward = MadeIn(workspace, models, options, Mapping::kForwardMotion);
   }
   const bool take_fixed = photos(fixed) > photos(forward);
   WriteFileAtomically(workspace.folder() / (take_fixed ? kFixedIntrinsicsNote : kForwardMotionNote),
@@ -153,7 +151,7 @@ std::vector<calib::SfmModel> MadeByColmap(Workspace& workspace,
                                           const std::vector<CameraGroup>& groups,
                                           const SfmOptions& options) {
   const fs::path models = workspace.folder() / "models";
-  auto made = MadeIn(workspace, workspace.database(), models, options, Mapping::kFree);
+  auto made = MadeIn(workspace, models, options, Mapping::kFree);
   return made.empty() ? MadeOtherwise(workspace, models, groups, options) : made;
 }
 
@@ -173,22 +171,20 @@ void MappingStep(Workspace& workspace, const std::vector<CameraGroup>& groups,
   WriteModel(workspace.folder() / "model", made.front(), Format::kBinary);
 }
 
-// Leaves no model where COLMAP makes none.
+// Leaves no model where the mapper makes none.
 void FixedMappingStep(Workspace& workspace, const std::vector<CameraGroup>& groups,
                       const SfmOptions& options) {
-  const fs::path folder = workspace.folder() / "fixed", model = workspace.folder() / kFixedModel;
+  const fs::path models = workspace.folder() / "fixed" / "models",
+                 model = workspace.folder() / kFixedModel;
   RemoveAll(model);
-  fs::path database = workspace.database();
-  if (options.engine != SfmEngine::kColmap) {  // its cameras are what the matches told
-    MakeFolder(folder);
-    database = folder / "database.db";
-    CopyDatabase(workspace.database(), database);
-    const GroupLenses priors = LensesOf(workspace, groups);
-    ReplaceCameras(database, priors.lenses, priors.focal_is_known);
+  if (options.engine != SfmEngine::kColmap) {
+    const GloballyMapped mapped = MapHere(workspace, options, LensesOf(workspace, groups));
+    if (mapped.why_not.empty() && !mapped.model.images.empty()) {
+      WriteModel(model, mapped.model, Format::kBinary);
+    }
+    return;
   }
-  const auto made =
-      MadeIn(workspace, database, folder / "models", options, Mapping::kFixedIntrinsics);
-  if (options.engine != SfmEngine::kColmap) RemoveDatabase(database);
+  const auto made = MadeIn(workspace, models, options, Mapping::kFixedIntrinsics);
   if (!made.empty()) WriteModel(model, made.front(), Format::kBinary);
 }
 
@@ -196,6 +192,9 @@ void FixedMappingStep(Workspace& workspace, const std::vector<CameraGroup>& grou
 std::string MappingInputs(const SfmOptions& options) {
   std::string inputs = fmt::format("seed {}", options.seed);
   if (options.engine != SfmEngine::kColmap) inputs += fmt::format(" {}", NameOf(options.engine));
+  if (options.engine == SfmEngine::kAuto) {
+    inputs += Program::IsInstalled() ? " " + Program().version() : " without COLMAP";
+  }
   return inputs;
 }
 
@@ -232,7 +231,10 @@ SfmResult RunSfm(const fs::path& images_dir, std::span<const SfmImageInput> imag
   result.report.fixed_intrinsics = fs::exists(workspace.folder() / kFixedIntrinsicsNote);
   result.report.forward_motion = fs::exists(workspace.folder() / kForwardMotionNote);
   CompleteReport(workspace, result.model, result.report);
-  if (options.engine != SfmEngine::kColmap) ReadOwnMappingNote(workspace, result.report);
+  if (options.engine != SfmEngine::kColmap) {
+    ReadOwnMappingNote(workspace, result.report);
+    WriteReport(workspace.folder(), result.report);
+  }
   try {
     const PairCounts pairs = CountPairs(workspace);
     result.report.lack_of_parallax = LackOfParallax(pairs);
@@ -258,7 +260,6 @@ std::optional<SfmResult> MapWithFixedIntrinsics(const fs::path& images_dir,
   const auto groups = GroupCameras(workspace.images(), CameraModelOf(options),
                                    options.share_intrinsics_within_group);
   if (!AllHavePriors(groups)) return {};
-  if (options.engine != SfmEngine::kColmap && !Program::IsInstalled()) return {};
   SfmResult result;
   FeaturesAndMatches(workspace, groups, options, result.report);
   workspace.Step("mapping", MappingInputs(options),

@@ -50,6 +50,11 @@ inline constexpr int kExhaustiveLimit = 60;
 /// COLMAP's own limit, which MatchingThreads (matching.h) counts on.
 inline constexpr int kMaxFeatures = 8192;
 
+/// What calib/sfm finds in a photo at most: COLMAP counts whole levels of scale, so that its limit
+/// gives 8000 to 15000. The smallest features are the most precise: with 8192 of them the
+/// rotations of fountain were 0.044 degrees off, with these 0.034 (docs/accuracy/CAMERAS.md).
+inline constexpr int kMaxOwnFeatures = 14000;
+
 struct SfmOptions {
   SfmEngine engine = SfmEngine::kColmap;
   Matching matching = Matching::kAuto;
@@ -57,7 +62,7 @@ struct SfmOptions {
   std::uint64_t seed = 0;     ///< of COLMAP's random choices, as far as it heeds it
   double memory_gb = 4;       ///< COLMAP stays below this many GB (1e9 bytes)
   int max_image_size_px = 0;  ///< long side for features; 0: from the memory
-  int max_features = 0;       ///< most per photo, the largest kept; 0: kMaxFeatures
+  int max_features = 0;       ///< max per photo, the largest; 0: kMaxFeatures, or kMaxOwnFeatures
   /// COLMAP's name. On the 11 photos of Sceaux castle (a compact camera), 8900 points each, the
   /// mean reprojection error is 0.613 px with SIMPLE_RADIAL, 0.532 with RADIAL, 0.522 with OPENCV,
   /// whose fx and fy then differ by 0.8 %: more freedom than a sensor of square pixels has.

@@ -4,27 +4,29 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <array>
 #include <map>
 #include <nlohmann/json.hpp>
 
 #include "cli/command.h"
-#include "cli/number_checks.h"
 #include "cli/output_file.h"
+#include "dtr/base/error.h"
 #include "dtr/base/files.h"
+#include "pipeline/export_web.h"
 
 namespace dtr::cli {
 namespace {
 
 using Request = pipeline::ExportRequest;
+using Names = std::vector<std::string>;
 
 struct Format {
   const char* name;
   pipeline::ExportReport (*write)(const Request& request, Progress& progress);
-  std::vector<std::string> extensions;  ///< of the file; empty: a folder
-  const char* points;                   ///< what ExportReport::points counts
+  Names extensions;    ///< of the file; empty: a folder
+  const char* points;  ///< what ExportReport::points counts
 };
 
+// All but `web`, which has a request and a report of its own.
 const std::vector<Format>& Formats() {
   static const std::vector<Format> formats = {
       {"colmap", pipeline::ExportColmap, {}, "points"},
@@ -37,22 +39,47 @@ const std::vector<Format>& Formats() {
   return formats;
 }
 
-const Format& FormatCalled(const std::string& name) {
-  return *std::find_if(Formats().begin(), Formats().end(),
-                       [&](const Format& format) { return format.name == name; });
+Names FormatNames() {
+  Names names;
+  for (const Format& format : Formats()) names.emplace_back(format.name);
+  names.emplace_back("web");
+  return names;
+}
+
+// An option that some formats take.
+struct FormatOption {
+  const CLI::Option* option;
+  Names formats;
+};
+
+struct ExportOptions {
+  std::string format = "colmap";
+  Request request;
+  pipeline::WebPageRequest web;
+  std::vector<FormatOption> of_formats;
+};
+
+void RequireOptionsOfFormat(const ExportOptions& options) {
+  for (const auto& [option, formats] : options.of_formats) {
+    if (option->count() == 0 ||
+        std::find(formats.begin(), formats.end(), options.format) != formats.end()) {
+      continue;
+    }
+    throw UsageError(fmt::format("{} needs --format {}, found --format {}; leave one of them out",
+                                 option->get_name(), fmt::join(formats, " or "), options.format));
+  }
 }
 
 std::string Summary(const Request& request, const Format& format,
                     const pipeline::ExportReport& report) {
-  std::vector<std::string> parts = {fmt::format("{} images", report.images)};
+  Names parts = {fmt::format("{} images", report.images)};
   if (report.depth_maps > 0) parts.push_back(fmt::format("{} depth maps", report.depth_maps));
   if (format.points != nullptr) parts.push_back(fmt::format("{} {}", report.points, format.points));
   return fmt::format("{}: {}{}", request.output.string(), fmt::join(parts, ", "),
                      report.points_from_depth ? " from depth, as the set has no sparse ones" : "");
 }
 
-int RunExport(Request request, const std::string& format_name, const Context& context) {
-  const Format& format = FormatCalled(format_name);
+int RunFormat(Request request, const Format& format, const Context& context) {
   request.output = WithoutTrailingSlash(request.output);
   if (!format.extensions.empty()) RequireOutputFile(request.output, "-o", format.extensions);
   if (!std::filesystem::exists(request.output)) RequireFolderOf(request.output, "-o");
@@ -62,91 +89,159 @@ int RunExport(Request request, const std::string& format_name, const Context& co
   nlohmann::ordered_json json{{"format", format.name}, {"images", report.images}};
   if (report.depth_maps > 0) json["depth_maps"] = report.depth_maps;
   if (format.points != nullptr) json[format.points] = report.points;
-  if (format_name == "colmap") json["points_from"] = report.points_from_depth ? "depth" : "sparse";
+  if (format.write == pipeline::ExportColmap) {
+    json["points_from"] = report.points_from_depth ? "depth" : "sparse";
+  }
   context.EmitJson(json, -1);
   return kDone;
 }
 
-void AddCloudOptions(CLI::App& command, Request& request) {
-  command.add_flag("--completed", request.completed,
-                   "With completed depth, not only what was measured");
-  command
-      .add_option("--min-views", request.min_views,
-                  "ply: views that must show a point at the same depth [2]")
-      ->check(CLI::Range(1, 100))
-      ->type_name("N");
+int RunWeb(const pipeline::WebPageRequest& request, const Context& context) {
+  RequireOutputFile(request.output, "-o", {".html", ".htm"});
+  const pipeline::WebPageReport report = pipeline::ExportWebPage(request, context.console);
+  if (!report.warning.empty()) context.console.Note(report.warning);
+  const std::string photos = report.jpeg_quality > 0
+                                 ? fmt::format("photos of JPEG quality {}", report.jpeg_quality)
+                                 : "photos as in the set";
+  const std::string depth =
+      report.depth_error_px > 0
+          ? fmt::format("depth within {} px of disparity", report.depth_error_px)
+          : "depth within 0.02 px of disparity of the set's";
+  context.console.Say(fmt::format("{}: {} views, {:.1f} MB, {}, {}", request.output.string(),
+                                  report.views, static_cast<double>(report.bytes) / 1e6, photos,
+                                  depth));
+  context.EmitJson(
+      fmt::format("{{\"views\": {}, \"bytes\": {}, \"jpeg_quality\": {}, \"depth_error_px\": {}}}",
+                  report.views, report.bytes, report.jpeg_quality, report.depth_error_px));
+  return kDone;
+}
+
+int RunExport(ExportOptions options, const Context& context) {
+  RequireOptionsOfFormat(options);
+  if (options.format == "web") {
+    options.web.set = options.request.set;
+    options.web.output = options.request.output;
+    return RunWeb(options.web, context);
+  }
+  const auto format = std::find_if(Formats().begin(), Formats().end(), [&](const Format& known) {
+    return known.name == options.format;
+  });
+  return RunFormat(options.request, *format, context);
+}
+
+void AddCloudOptions(CLI::App& command, ExportOptions& options) {
+  Request& request = options.request;
+  options.of_formats.push_back(
+      {command.add_flag("--completed", request.completed,
+                        "With completed depth, not only what was measured"),
+       {"ply", "depth", "nerfstudio", "mvsnet"}});
+  options.of_formats.push_back(
+      {command
+           .add_option("--min-views", request.min_views,
+                       "ply: views that must show a point at the same depth [2]")
+           ->check(CLI::Range(1, 100))
+           ->type_name("N"),
+       {"ply"}});
   AddMemoryOption(command, request.memory_gb, "Memory for depth maps that are held at a time [4]");
 }
 
 // An option whose value is one of some names.
 template <typename T>
-void AddChoice(CLI::App& command, const std::string& name, T& value,
-               const std::map<std::string, T>& values, const std::string& description) {
-  std::vector<std::string> names;
+CLI::Option* AddChoice(CLI::App& command, const std::string& name, T& value,
+                       const std::map<std::string, T>& values, const std::string& description) {
+  Names names;
   for (const auto& [text, unused] : values) names.push_back(text);
-  command
+  return command
       .add_option_function<std::string>(
           name, [&value, values](const std::string& text) { value = values.at(text); }, description)
       ->check(CLI::IsMember(names))
       ->type_name(fmt::format("{}", fmt::join(names, "|")));
 }
 
-void AddDepthOptions(CLI::App& command, Request& request) {
-  using Format = pipeline::DepthFileFormat;
-  AddChoice(command, "--depth-format", request.depth_format,
-            {{"exr", Format::kExr},
-             {"pfm", Format::kPfm},
-             {"png16", Format::kPng16},
-             {"npy", Format::kNpy}},
-            "depth: files of depth [exr]");
-  AddChoice(command, "--depth-kind", request.depth_kind,
-            {{"z", DepthKind::kPlaneZ}, {"ray", DepthKind::kRayDistance}},
-            "depth: z in the camera frame or distance from the camera [z]");
-  AddChoice(command, "--grid", request.depth_grid,
-            {{"set", pipeline::DepthGrid::kSet}, {"photo", pipeline::DepthGrid::kPhoto}},
-            "depth: at the pixels of the set's undistorted images or of the original photos [set]");
+void AddDepthOptions(CLI::App& command, ExportOptions& options) {
+  using FileFormat = pipeline::DepthFileFormat;
+  Request& request = options.request;
+  const Names depth = {"depth"};
+  options.of_formats.push_back({AddChoice(command, "--depth-format", request.depth_format,
+                                          {{"exr", FileFormat::kExr},
+                                           {"pfm", FileFormat::kPfm},
+                                           {"png16", FileFormat::kPng16},
+                                           {"npy", FileFormat::kNpy}},
+                                          "depth: files of depth [exr]"),
+                                depth});
+  options.of_formats.push_back(
+      {AddChoice(command, "--depth-kind", request.depth_kind,
+                 {{"z", DepthKind::kPlaneZ}, {"ray", DepthKind::kRayDistance}},
+                 "depth: z in the camera frame or distance from the camera [z]"),
+       depth});
+  options.of_formats.push_back(
+      {AddChoice(
+           command, "--grid", request.depth_grid,
+           {{"set", pipeline::DepthGrid::kSet}, {"photo", pipeline::DepthGrid::kPhoto}},
+           "depth: at the pixels of the set's undistorted images or of the original photos [set]"),
+       depth});
 }
 
-void AddSplatOptions(CLI::App& command, Request& request) {
-  command.add_option("--max-count", request.max_count, "splat: Gaussians at most [no bound]")
-      ->check(CLI::Range(1, 2000000000))
-      ->type_name("N");
-  command.add_flag(
-      "--full-sh", request.full_sh,
-      "splat: write the coefficients of degrees 1 to 3 too (all 0), which the original "
-      "viewer wants");
+void AddSplatOptions(CLI::App& command, ExportOptions& options) {
+  Request& request = options.request;
+  options.of_formats.push_back(
+      {command.add_option("--max-count", request.max_count, "splat: Gaussians at most [no bound]")
+           ->check(CLI::Range(1, 2000000000))
+           ->type_name("N"),
+       {"splat"}});
+  options.of_formats.push_back(
+      {command.add_flag("--full-sh", request.full_sh,
+                        "splat: write the coefficients of degrees 1 to 3 too (all 0), which the "
+                        "original viewer wants"),
+       {"splat"}});
 }
 
-std::vector<std::string> FormatNames() {
-  std::vector<std::string> names;
-  for (const Format& format : Formats()) names.emplace_back(format.name);
-  return names;
+void AddWebOptions(CLI::App& command, ExportOptions& options) {
+  options.of_formats.push_back(
+      {command
+           .add_option("--max-mb", options.web.max_mb,
+                       "web: at most N MB (10^6 bytes); photos and depth are coded more coarsely "
+                       "until the page fits")
+           ->check(CLI::PositiveNumber)
+           ->type_name("N"),
+       {"web"}});
+  options.of_formats.push_back(
+      {command
+           .add_option("--jpeg-quality", options.web.jpeg_quality,
+                       "web: of the photos [80, or the JPEG that the set stores]")
+           ->check(CLI::Range(1, 100))
+           ->type_name("Q"),
+       {"web"}});
 }
 
 }  // namespace
 
 void AddExportCommand(CLI::App& app) {
-  AddCommand(app, "export",
-             "Write a set for other programs: cameras and images, depth maps, clouds, splats",
-             "dtr export scene.dtr --format colmap -o colmap/", [](CLI::App& command) -> Action {
-               auto options = std::make_shared<Request>();
-               command.add_option("SET", options->set, "The set")->required();
-               auto format = std::make_shared<std::string>("colmap");
-               command.add_option("--format", *format, "Format [colmap]")
-                   ->check(CLI::IsMember(FormatNames()))
-                   ->type_name(fmt::format("{}", fmt::join(FormatNames(), "|")));
-               command.add_flag("--text", options->text,
-                                "colmap: COLMAP's text files instead of binary");
-               AddCloudOptions(command, *options);
-               AddSplatOptions(command, *options);
-               AddDepthOptions(command, *options);
-               command.add_option("-o,--output", options->output, "Folder or file to write")
-                   ->required()
-                   ->type_name("PATH");
-               return [options, format](const Context& context) {
-                 return RunExport(*options, *format, context);
-               };
-             });
+  AddCommand(
+      app, "export",
+      "Write a set for other programs: a web page, cameras and images, depth maps, clouds, splats",
+      "dtr export scene.dtr --format web -o scene.html", [](CLI::App& command) -> Action {
+        auto options = std::make_shared<ExportOptions>();
+        command.add_option("SET", options->request.set, "The set")->required();
+        command
+            .add_option("--format", options->format,
+                        "What to write, see docs/EXPORT.md; web is one HTML file that shows the "
+                        "scene in a browser [colmap]")
+            ->check(CLI::IsMember(FormatNames()))
+            ->type_name(fmt::format("{}", fmt::join(FormatNames(), "|")));
+        options->of_formats.push_back(
+            {command.add_flag("--text", options->request.text,
+                              "colmap: COLMAP's text files instead of binary"),
+             {"colmap"}});
+        AddCloudOptions(command, *options);
+        AddSplatOptions(command, *options);
+        AddDepthOptions(command, *options);
+        AddWebOptions(command, *options);
+        command.add_option("-o,--output", options->request.output, "Folder or file to write")
+            ->required()
+            ->type_name("PATH");
+        return [options](const Context& context) { return RunExport(*options, context); };
+      });
 }
 
 }  // namespace dtr::cli

@@ -11,6 +11,7 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
+#include "dtr/io/code_residuals.h"
 #include "dtr/io/plain_bytes.h"
 
 namespace dtr::io {
@@ -23,15 +24,10 @@ constexpr size_t kBandHeaderBytes = 8 + 3 * 4;
 // Enough pixels for the entropy coder's tables to pay, few enough that photos have several bands.
 constexpr int kRowsPerBand = 128;
 constexpr int kMaxRowsPerBand = 1 << 16;
-constexpr int kLevel = 19;           // written once, read often; decoding is no slower for it
-constexpr std::uint8_t kWide = 255;  // the residual's 16 bits stand among the wide ones
+constexpr int kLevel = 19;  // written once, read often; decoding is no slower for it
 
-/// What a band is stored as, each a zstd frame with checksum, or nothing where empty.
-struct Parts {
-  BandBytes validity;   ///< a bit a pixel, rows padded to bytes, each row XOR the one above
-  BandBytes residuals;  ///< a byte for each pixel that is no hole
-  BandBytes wide;       ///< u16 for each residual kWide
-};
+/// Each part is a zstd frame with checksum, or nothing where empty.
+using Parts = CodeParts;
 constexpr size_t kParts = 3;
 using PartSizes = std::array<std::uint32_t, kParts>;
 
@@ -44,79 +40,9 @@ struct BandRange {
               "; the file is damaged or cut short");
 }
 
-size_t RowBytes(int width_px) { return (static_cast<size_t>(width_px) + 7) / 8; }
-
-/// MED of JPEG-LS (Weinberger, Seroussi, Sapiro, IEEE TIP 2000, eq. 1), as the median of three.
-int Predict(int left, int above, int above_left) {
-  const int low = std::min(left, above), high = std::max(left, above);
-  return std::max(low, std::min(high, left + above - above_left));
-}
-
-/// 0, -1, 1, -2, ... as 0, 1, 2, 3, ...; differences are taken modulo 2^16.
-std::uint16_t Folded(int difference) {
-  const auto d = static_cast<std::int16_t>(difference);
-  return static_cast<std::uint16_t>((d << 1) ^ (d >> 15));
-}
+/// The inverse of folding 0, -1, 1, -2, ... to 0, 1, 2, 3, ...
 int Unfolded(unsigned folded) {
   return static_cast<int>(folded >> 1) ^ -static_cast<int>(folded & 1);
-}
-
-/// The rows that predictions are made from. A hole is taken for what was predicted there, so that
-/// surfaces go on behind it.
-class Surface {
- public:
-  explicit Surface(int width_px) : row_(static_cast<size_t>(width_px) + 1, 0) {}
-  /// Start of a row: what lies beyond its left end is what lies above that.
-  void BeginRow(bool first) {
-    first_ = first;
-    above_left_ = left_ = first ? 0 : row_[1];
-  }
-  int Prediction(int x) const {
-    const int above = first_ ? left_ : row_[static_cast<size_t>(x) + 1];
-    return first_ ? left_ : Predict(left_, above, above_left_);
-  }
-  void Put(int x, int value) {
-    int& cell = row_[static_cast<size_t>(x) + 1];
-    above_left_ = cell;
-    cell = left_ = value;
-  }
-
- private:
-  std::vector<int> row_;  ///< of the row above from x on, of this one before; [0] is not used
-  int left_ = 0, above_left_ = 0;
-  bool first_ = true;
-};
-
-Parts Split(const Grid<std::uint16_t>& codes, const BandRange& band) {
-  const int width = codes.width();
-  const size_t row_bytes = RowBytes(width);
-  Parts parts;
-  parts.validity.assign(row_bytes * static_cast<size_t>(band.rows), 0);
-  Surface surface(width);
-  for (int j = 0; j < band.rows; ++j) {
-    const std::uint16_t* row = codes.row(band.first_row + j);
-    std::uint8_t* bits = &parts.validity[row_bytes * static_cast<size_t>(j)];
-    surface.BeginRow(j == 0);
-    for (int x = 0; x < width; ++x) {
-      const int predicted = surface.Prediction(x);
-      if (row[x] == 0) {
-        surface.Put(x, predicted);
-        continue;
-      }
-      surface.Put(x, row[x]);
-      bits[x / 8] = static_cast<std::uint8_t>(bits[x / 8] | 1 << (x % 8));
-      const std::uint16_t folded = Folded(row[x] - predicted);
-      parts.residuals.push_back(static_cast<std::uint8_t>(std::min<int>(folded, kWide)));
-      if (folded < kWide) continue;
-      parts.wide.push_back(static_cast<std::uint8_t>(folded & 255));
-      parts.wide.push_back(static_cast<std::uint8_t>(folded >> 8));
-    }
-  }
-  for (size_t i = parts.validity.size(); i-- > row_bytes;) {
-    parts.validity[i] =
-        static_cast<std::uint8_t>(parts.validity[i] ^ parts.validity[i - row_bytes]);
-  }
-  return parts;
 }
 
 std::string Compressed(const BandBytes& part) {
@@ -163,7 +89,7 @@ unsigned long long ContentSize(std::string_view frame) {
 
 /// Rejects a band that says itself that it is none, before anything is allocated for it.
 void ExpectPlausible(const std::array<std::string_view, kParts>& frames, int width_px, int rows) {
-  const size_t validity = RowBytes(width_px) * static_cast<size_t>(rows);
+  const size_t validity = ValidityRowBytes(width_px) * static_cast<size_t>(rows);
   const size_t pixels = static_cast<size_t>(width_px) * static_cast<size_t>(rows);
   const auto residuals = ContentSize(frames[1]);
   if (ContentSize(frames[0]) != validity) {
@@ -193,7 +119,7 @@ BandBytes Decompressed(std::string_view frame, size_t size) {
 }
 
 size_t CountValid(BandBytes& validity, int width_px) {
-  const size_t row_bytes = RowBytes(width_px);
+  const size_t row_bytes = ValidityRowBytes(width_px);
   for (size_t i = row_bytes; i < validity.size(); ++i) {
     validity[i] = static_cast<std::uint8_t>(validity[i] ^ validity[i - row_bytes]);
   }
@@ -210,7 +136,7 @@ size_t CountValid(BandBytes& validity, int width_px) {
 Parts DecompressedParts(const std::array<std::string_view, kParts>& frames, int width_px,
                         int rows) {
   Parts parts;
-  parts.validity = Decompressed(frames[0], RowBytes(width_px) * static_cast<size_t>(rows));
+  parts.validity = Decompressed(frames[0], ValidityRowBytes(width_px) * static_cast<size_t>(rows));
   parts.residuals = Decompressed(frames[1], CountValid(parts.validity, width_px));
   const auto wide = std::count(parts.residuals.begin(), parts.residuals.end(), kWide);
   parts.wide = Decompressed(frames[2], 2 * static_cast<size_t>(wide));
@@ -220,11 +146,11 @@ Parts DecompressedParts(const std::array<std::string_view, kParts>& frames, int 
 /// `parts` are consistent with each other: DecompressedParts saw to it.
 void Join(const Parts& parts, const BandRange& band, Grid<std::uint16_t>& codes) {
   const int width = codes.width();
-  const size_t row_bytes = RowBytes(width);
+  const size_t row_bytes = ValidityRowBytes(width);
   const std::uint8_t* residual = parts.residuals.data();
   const std::uint8_t* wide = parts.wide.data();
   bool zero = false;
-  Surface surface(width);
+  PredictedSurface surface(width);
   for (int j = 0; j < band.rows; ++j) {
     std::uint16_t* row = codes.row(band.first_row + j);
     const std::uint8_t* bits = &parts.validity[row_bytes * static_cast<size_t>(j)];
@@ -273,7 +199,8 @@ std::string EncodeBands(const Grid<std::uint16_t>& codes, int threads) {
   const int bands = BandsOf(codes.height(), kRowsPerBand);
   std::vector<std::array<std::string, kParts>> frames(static_cast<size_t>(bands));
   ParallelFor(0, bands, threads, [&](int band) {
-    const Parts parts = Split(codes, RangeOfBand(band, kRowsPerBand, codes.height()));
+    const BandRange range = RangeOfBand(band, kRowsPerBand, codes.height());
+    const Parts parts = SplitCodes(codes, range.first_row, range.rows);
     frames[static_cast<size_t>(band)] = {Compressed(parts.validity), Compressed(parts.residuals),
                                          Compressed(parts.wide)};
   });

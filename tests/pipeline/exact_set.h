@@ -9,6 +9,9 @@
 
 namespace dtr::testing {
 
+/// What an exported point may lie off in an image; half a pixel is 500 times it.
+inline constexpr double kResidualPx = 1e-3;
+
 /// A slanted plane behind a square: no depth of it is the same at two pixels.
 inline Surface SlantedScene() {
   return Union(Square(0.3, -0.2, 5, 0.8), Plane(Eigen::Vector3d(0.3, -0.2, 1).normalized(), 9));

@@ -19,9 +19,6 @@ namespace {
 using ::testing::Contains;
 using ::testing::HasSubstr;
 
-constexpr double kResidualPx =
-    1e-3;  // what an exported point may lie off; half a pixel is 500 times it
-
 std::vector<Eigen::Vector3d> Points(const Ply& ply) {
   std::vector<Eigen::Vector3d> points;
   for (size_t i = 0; i < ply.count; ++i) points.emplace_back(ply["x"][i], ply["y"][i], ply["z"][i]);

@@ -29,7 +29,6 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 using pipeline::DepthFileFormat;
 
-constexpr double kResidualPx = 1e-3;  // half a pixel is 500 times it
 constexpr double kSameFloat = 1e-6;   // relative
 
 json JsonIn(const fs::path& file) { return json::parse(ReadFile(file, 1 << 24)); }
@@ -122,9 +121,12 @@ TEST_F(ExportOfExactDepth, EveryFormatHoldsTheSameNumbers) {
     const fs::path file = request.output / "depth" / (stem + extension);
     const double unit =
         JsonIn(request.output / "cameras.json")["conventions"]["scene_units_per_step"];
-    if (format == DepthFileFormat::kExr)
+    if (format == DepthFileFormat::kExr) {
       EXPECT_NEAR(io::ReadFloatGrid(file)(40, 20) / z, 1, kSameFloat);
-    if (format == DepthFileFormat::kPfm) EXPECT_NEAR(io::ReadPfm(file)(40, 20) / z, 1, kSameFloat);
+    }
+    if (format == DepthFileFormat::kPfm) {
+      EXPECT_NEAR(io::ReadPfm(file)(40, 20) / z, 1, kSameFloat);
+    }
     if (format == DepthFileFormat::kNpy) {
       const io::NpyArray array = io::ReadNpy(file);
       ASSERT_EQ(array.shape, (std::vector<size_t>{72, 96}));
@@ -141,7 +143,9 @@ TEST_F(ExportOfExactDepth, EveryFormatHoldsTheSameNumbers) {
                                   ? Grid<float>()
                                   : io::ReadFloatGrid(request.output / "sigma" / (stem + ".exr"));
     // A tenth of a pixel of disparity at z.
-    if (!sigma.empty()) EXPECT_NEAR(sigma(40, 20), 0.1 / (100 * 0.5) * z * z, 0.01 * 0.002 * z * z);
+    if (!sigma.empty()) {
+      EXPECT_NEAR(sigma(40, 20), 0.1 / (100 * 0.5) * z * z, 0.01 * 0.002 * z * z);
+    }
   }
 }
 

@@ -75,6 +75,15 @@ struct Damping {
   }
 };
 
+// Under a robust loss a point may waver between two of its observations: it would take dozens of
+// steps of all unknowns, whose damping is one, to settle. By itself it takes a few (embedded point
+// iterations: Jeong et al. 2012). Returns the cost.
+double SettlePoints(const Problem& problem, MinimiseOptions options, Unknowns& x) {
+  constexpr int kSteps = 4;
+  options.max_iterations = kSteps;
+  return PlacePoints(problem, options, x).cost;
+}
+
 }  // namespace
 
 double RoundingOf(double cost, size_t coordinates, double largest_px) {
@@ -90,9 +99,12 @@ MinimiseResult Minimise(const Problem& problem, const MinimiseOptions& options, 
   MinimiseResult result;
   result.cost = result.start_cost = problem.CostAt(x, options.threads);
   if (!std::isfinite(result.cost)) return result;
+  const bool robust = problem.loss().scale2 > 0;
+  if (robust) result.cost = SettlePoints(problem, options, x);
   NormalEquations normal(problem, layout);
   ReducedSolver solver(layout);
   Damping damping{options.start_lambda};
+  double before = 0;  // promised by the step before; 0: none
   std::vector<std::array<double, 3>> points;
   while (result.iterations < options.max_iterations && damping.lambda < kMaxLambda) {
     if (options.progress != nullptr) options.progress->ThrowIfInterrupted();
@@ -106,14 +118,17 @@ MinimiseResult Minimise(const Problem& problem, const MinimiseOptions& options, 
     double promised = 0.5 * step->dot(normal.damping().cwiseProduct(*step) - normal.gradient());
     normal.StepPoints(*step, points, &promised);
     const double hidden = RoundingOf(result.cost, 2 * problem.seen().size(), problem.largest_px());
-    const bool last = promised <= std::max(options.cost_tolerance * result.cost, hidden);
+    // What the step after this one will promise, if each promises as much less as this one does.
+    const double next_promised = promised * (before > 0 ? std::min(1.0, promised / before) : 1);
+    const bool last = next_promised <= options.cost_tolerance * result.cost || promised <= hidden;
     Unknowns next = Stepped(problem, layout, x, *step, points);
     const double cost = problem.CostAt(next, options.threads);
     const double ratio = promised > 0 ? (result.cost - cost) / promised : 0;
     if (cost <= result.cost && (last || ratio > kMinRatio)) {
       x = std::move(next);
-      result.cost = cost;
+      result.cost = robust ? SettlePoints(problem, options, x) : cost;
       damping.Accept(ratio);
+      before = promised;
     } else {
       damping.Reject();
     }

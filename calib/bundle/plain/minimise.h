@@ -8,7 +8,8 @@ namespace dtr::calib::plain {
 
 struct MinimiseOptions {
   int max_iterations = 100;
-  /// Converged where a step promises less than this share of the cost; it is still taken.
+  /// Converged where, after a step, the next is expected to promise less than this share of the
+  /// cost; the step is still taken.
   double cost_tolerance = 1e-9;
   double start_lambda = 1e-4;
   int threads = 1;

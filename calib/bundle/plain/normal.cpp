@@ -11,8 +11,8 @@ namespace {
 constexpr size_t kPartObservations = 8192;  // that one part sums up at least
 constexpr size_t kMaxParts = 16;
 constexpr size_t kMaxPartNumbers = size_t{1} << 25;  // 256 MB in all parts
-// Of a point's damping: an inverse distance that no observation tells moves as if this share of
-// what its direction is told by told it.
+// Of a point's damping: an inverse distance that no observation determines is damped as if it had
+// this share of the curvature of the cost along the point's direction.
 constexpr double kMinDistanceShare = 1e-6;
 
 size_t PartsOf(size_t observations, size_t storage) {
@@ -151,24 +151,14 @@ class NormalEquations::Part {
   void Weigh(const double r[2], Row<kCamera>& row) const {
     row.residual[0] = r[0], row.residual[1] = r[1];
     if (!(problem_.loss().scale2 > 0)) return;
-    const double squared = r[0] * r[0] + r[1] * r[1];
-    double of_residual, across, along;
-    problem_.loss().Weights(squared, &of_residual, &across, &along);
-    // across I + (along - across) r r^T / |r|^2
-    const double more = squared > 0 ? (along - across) / squared : 0;
-    const double xx = across + more * r[0] * r[0], xy = more * r[0] * r[1];
-    const double yy = across + more * r[1] * r[1];
-    const auto weigh = [&](double* x, double* y, int count) {
-      for (int i = 0; i < count; ++i) {
-        const double a = x[i], b = y[i];
-        x[i] = xx * a + xy * b;
-        y[i] = xy * a + yy * b;
-      }
+    const double weight = std::sqrt(problem_.loss().Slope(r[0] * r[0] + r[1] * r[1]));
+    const auto weigh = [weight](double* values, int count) {
+      for (int i = 0; i < count; ++i) values[i] *= weight;
     };
-    weigh(row.camera, row.camera + kCamera, kCamera);
-    if (layout_.lenses_move()) weigh(row.lens, row.lens + kMaxFree, kMaxFree);
-    weigh(row.point, row.point + 3, 3);
-    row.residual[0] *= of_residual, row.residual[1] *= of_residual;
+    weigh(row.camera, 2 * kCamera);
+    if (layout_.lenses_move()) weigh(row.lens, 2 * kMaxFree);
+    weigh(row.point, 6);
+    weigh(row.residual, 2);
   }
 
   void Eliminate(EliminatedPoint& e) const {

@@ -11,6 +11,7 @@ namespace {
 
 constexpr double kSmallestLambda = 1e-12, kLargestLambda = 1e12;
 constexpr double kMinShareOfDistance = 1e-6;  // as in normal.cpp
+constexpr double kHarmlessDrift = 1e-7;       // of the cost, that more steps would gain
 
 struct PointEquations {
   Eigen::Matrix3d matrix = Eigen::Matrix3d::Zero();
@@ -36,16 +37,14 @@ PointEquations EquationsOf(const Problem& problem, size_t point, const std::arra
     const Eigen::Matrix<double, 2, 3> by_world = by_p * camera.rotation;
     Eigen::Matrix<double, 2, 3> by_place;
     by_place << by_world * frame.e1, by_world * frame.e2, by_world * offset;
-    double of_residual, across, along;
-    const double squared = r.squaredNorm();
-    problem.loss().Weights(squared, &of_residual, &across, &along);
-    // J^T W J with W = across^2 I + (along^2 - across^2) r r^T / |r|^2, J^T rho' r.
+    // J^T W J with W = slope (I + (bend - 1) r r^T / |r|^2), and J^T slope r.
+    const double squared = r.squaredNorm(), slope = problem.loss().Slope(squared);
     const Eigen::Vector3d towards = by_place.transpose() * r;
-    equations.gradient += across * across * towards;
-    equations.matrix += across * across * by_place.transpose() * by_place;
-    if (squared > 0) {
-      equations.matrix +=
-          (along * along - across * across) / squared * towards * towards.transpose();
+    equations.gradient += slope * towards;
+    equations.matrix += slope * by_place.transpose() * by_place;
+    if (problem.loss().scale2 > 0 && squared > 0) {
+      const double bend = slope * (problem.loss().Bend(squared) - 1) / squared;
+      equations.matrix += bend * towards * towards.transpose();
     }
   }
   return equations;
@@ -53,19 +52,17 @@ PointEquations EquationsOf(const Problem& problem, size_t point, const std::arra
 
 struct PointResult {
   double start_cost = 0, cost = 0;
+  double promised = 0;  ///< what another step would gain, where it did not converge
   int iterations = 0;
-  bool converged = false;
 };
 
 PointResult PlaceOne(const Problem& problem, size_t point, const MinimiseOptions& options,
                      const std::vector<Camera>& cameras, const std::vector<Intrinsics>& lenses,
-                     std::array<double, 3>& place) {
+                     double enough, std::array<double, 3>& place) {
   PointResult result;
   result.cost = result.start_cost = problem.PointCost(point, place, cameras, lenses);
   const size_t count = problem.first(point + 1) - problem.first(point);
   if (count == 0 || !std::isfinite(result.cost)) {
-    result.cost = result.start_cost = count == 0 ? 0 : result.cost;
-    result.converged = count == 0;
     return result;
   }
   double lambda = options.start_lambda, growth = 2;
@@ -83,8 +80,8 @@ PointResult PlaceOne(const Problem& problem, size_t point, const MinimiseOptions
     const double promised =
         0.5 * step.dot(lambda * diagonal.cwiseProduct(step) - equations.gradient);
     const double hidden = RoundingOf(result.cost, 2 * count, problem.largest_px());
-    const bool last =
-        step.allFinite() && promised <= std::max(options.cost_tolerance * result.cost, hidden);
+    const bool last = step.allFinite() && promised <= std::max(enough, hidden);
+    result.promised = last ? 0 : promised;
     const std::array<double, 3> next{place[0] + step[0], place[1] + step[1], place[2] + step[2]};
     const double cost = problem.PointCost(point, next, cameras, lenses);
     if (cost <= result.cost && (last || result.cost - cost > 1e-3 * promised)) {
@@ -97,10 +94,7 @@ PointResult PlaceOne(const Problem& problem, size_t point, const MinimiseOptions
       lambda *= growth;
       growth *= 2;
     }
-    if (last) {
-      result.converged = true;
-      break;
-    }
+    if (last) break;
   }
   return result;
 }
@@ -110,29 +104,33 @@ PointResult PlaceOne(const Problem& problem, size_t point, const MinimiseOptions
 MinimiseResult PlacePoints(const Problem& problem, const MinimiseOptions& options, Unknowns& x) {
   const std::vector<Camera> cameras = problem.CamerasAt(x);
   const std::vector<Intrinsics> lenses = problem.IntrinsicsAt(x);
+  MinimiseResult result;
+  result.cost = result.start_cost = problem.CostAt(x, options.threads);
+  if (!std::isfinite(result.cost)) return result;
+  // Of the mean point's cost: points that two images see have next to none of their own.
+  const double enough = options.cost_tolerance * result.cost /
+                        static_cast<double>(std::max<size_t>(1, problem.points()));
   const size_t chunks = (problem.points() + kChunkPoints - 1) / kChunkPoints;
-  std::vector<MinimiseResult> parts(chunks);
+  std::vector<PointResult> parts(chunks);
   ParallelFor(0, static_cast<int>(chunks), options.threads, [&](int chunk) {
     if (options.progress != nullptr) options.progress->ThrowIfInterrupted();
     const size_t begin = static_cast<size_t>(chunk) * kChunkPoints;
-    MinimiseResult& part = parts[static_cast<size_t>(chunk)];
-    part.converged = true;
+    PointResult& part = parts[static_cast<size_t>(chunk)];
     for (size_t p = begin; p < std::min(begin + kChunkPoints, problem.points()); ++p) {
-      const PointResult one = PlaceOne(problem, p, options, cameras, lenses, x.place[p]);
-      part.start_cost += one.start_cost;
-      part.cost += one.cost;
+      const PointResult one = PlaceOne(problem, p, options, cameras, lenses, enough, x.place[p]);
+      part.cost += one.cost - one.start_cost;
+      part.promised += one.promised;
       part.iterations = std::max(part.iterations, one.iterations);
-      part.converged = part.converged && one.converged;
     }
   });
-  MinimiseResult result;
-  result.converged = true;
-  for (const MinimiseResult& part : parts) {
-    result.start_cost += part.start_cost;
+  double promised = 0;
+  for (const PointResult& part : parts) {
     result.cost += part.cost;
+    promised += part.promised;
     result.iterations = std::max(result.iterations, part.iterations);
-    result.converged = result.converged && part.converged;
   }
+  // Some points may drift for ever, to infinity or along their ray; together they gain nothing.
+  result.converged = promised <= kHarmlessDrift * result.cost;
   return result;
 }
 

@@ -22,7 +22,7 @@ struct PlainOptions {
   /// deviation, px, where an observation's coordinate has one of 1 px. Requires free poses.
   double principal_point_sigma_px = 0;
   double cauchy_px = 0;          ///< scale of Cauchy's loss; 0: least squares
-  double cost_tolerance = 1e-9;  ///< converged where a step promises less, relative to the cost
+  double cost_tolerance = 1e-9;  ///< converged where no step promises more, relative to the cost
   int max_iterations = 50;
   int threads = 1;                     ///< 0: all cores; the result is the same
   const Progress* progress = nullptr;  ///< asked every iteration; Interrupted is thrown

@@ -25,18 +25,10 @@ double Loss::Of(double squared) const {
   return scale2 > 0 ? scale2 * std::log1p(squared / scale2) : squared;
 }
 
-void Loss::Weights(double squared, double* residual, double* across, double* along) const {
-  if (!(scale2 > 0)) {
-    *residual = *across = *along = 1;
-    return;
-  }
-  constexpr double kMinCurvature = 0.1;
-  const double t = squared / scale2;
-  *across = 1 / std::sqrt(1 + t);
-  // rho' + 2 rho'' s over rho' is (1 - t) / (1 + t).
-  const double bend = std::sqrt(std::max((1 - t) / (1 + t), kMinCurvature));
-  *along = *across * bend;
-  *residual = *across / bend;
+double Loss::Bend(double squared) const {
+  constexpr double kMinBend = 0.1;
+  if (!(scale2 > 0)) return 1;
+  return std::max((scale2 - squared) / (scale2 + squared), kMinBend);
 }
 
 Problem::Problem(const Bundle& bundle, const Normalised& n, const std::vector<bool>& used,

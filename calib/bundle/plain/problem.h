@@ -56,10 +56,12 @@ struct Seen {
 struct Loss {
   double scale2 = 0;
   double Of(double squared) const;
-  /// Factors on the residual, and on the derivatives across and along it, that make of half the
-  /// squared residual the loss to second order (Triggs et al. 2000, sec. 4.3); the curvature along
-  /// the residual is kept above a tenth of that across, since far residuals have a negative one.
-  void Weights(double squared, double* residual, double* across, double* along) const;
+  /// The loss's slope by the squared length: the weight of iteratively reweighted least squares,
+  /// whose model of the cost lies above it everywhere (Triggs et al. 2000, sec. 4.3).
+  double Slope(double squared) const { return scale2 > 0 ? scale2 / (scale2 + squared) : 1; }
+  /// The curvature along the residual over that across it; far residuals have a negative one, which
+  /// is kept above a tenth.
+  double Bend(double squared) const;
 };
 
 /// The observations that count, by points; frames are borrowed from `n`.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include "calib/sfm/mapping/acceptance.h"
 #include "calib/sfm/mapping/adjust_map.h"
@@ -166,7 +167,7 @@ class Mapper {
         {}, cauchy, iterations, cost_tolerance, options_.threads, options_.progress};
     double scale = 1;
     for (size_t c = 0; c < images.size(); ++c) {
-      const bool enough = lenses && images[c] >= kImagesForLens;
+      const bool enough = lenses && !options_.intrinsics_are_known && images[c] >= kImagesForLens;
       options.lenses.push_back(enough ? MapLens::kFocalAndDistortion : MapLens::kFixed);
       if (images[c] > 0) scale = std::max(scale, LimitPx(1, cameras_.lenses[c]));
     }
@@ -284,6 +285,7 @@ class Mapper {
     }
     std::vector<size_t> index(graph_.images.size());
     for (size_t i = 0; i < model.images.size(); ++i) index[model.images[i].id - 1] = i;
+    ShareFeaturesOut();
     for (size_t p = 0; p < points_.size(); ++p) {
       double sum = 0;
       for (const TrackFeature& f : points_[p].seen) {
@@ -297,6 +299,24 @@ class Mapper {
               [](const auto& x, const auto& y) { return x.name < y.name; });
     mapped_.statistics.registered = static_cast<int>(model.images.size());
     mapped_.statistics.points = static_cast<int>(points_.size());
+  }
+
+  // A resected image may have given a feature to a point while its old track has it, too: the point
+  // that more images see takes it, and points left with fewer than two go.
+  void ShareFeaturesOut() {
+    std::stable_sort(points_.begin(), points_.end(), [](const MapPoint& x, const MapPoint& y) {
+      return x.seen.size() > y.seen.size();
+    });
+    std::vector<std::vector<char>> taken(graph_.images.size());
+    for (size_t i = 0; i < taken.size(); ++i) taken[i].assign(graph_.images[i].pixels.size(), 0);
+    for (MapPoint& point : points_) {
+      std::erase_if(point.seen, [&](const TrackFeature& f) {
+        return std::exchange(taken[static_cast<size_t>(f.image)][f.feature], char{1}) != 0;
+      });
+    }
+    std::erase_if(points_, [](const MapPoint& point) { return point.seen.size() < 2; });
+    std::stable_sort(points_.begin(), points_.end(),
+                     [](const MapPoint& x, const MapPoint& y) { return x.track < y.track; });
   }
 
   static constexpr double kFirstAngleRad = 0.017;

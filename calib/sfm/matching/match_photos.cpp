@@ -258,11 +258,10 @@ MatchResult MatchPhotos(std::span<const MatchPhoto> photos,
   }
   const auto pairs = ChoosePairs(photos, options, progress);
   const auto coarse = CoarseSearch(photos, pairs, options, progress);
-  if (options.lenses_are_known) {
-    graph.focal_is_known.assign(cameras.size(), true);
-  } else {
-    VoteOnCameras(photos, coarse, options, graph, result.notes);
+  for (size_t c = 0; c < options.lens_is_known.size(); ++c) {
+    if (options.lens_is_known[c]) graph.focal_is_known[c] = true;
   }
+  VoteOnCameras(photos, coarse, options, graph, result.notes);
   graph.pairs = Geometries(photos, coarse, graph, options, progress);
   return result;
 }

@@ -23,7 +23,8 @@ struct MatchPhoto {
 struct MatchOptions {
   int threads = 0;  ///< 0: all cores; the result does not depend on it
   std::uint64_t seed = 0;
-  bool lenses_are_known = false;  ///< intrinsics hold as given: no vote
+  /// Per camera whether its intrinsics hold as given, and no vote changes them; empty: of none.
+  std::vector<bool> lens_is_known = {};
   /// Pairs (a < b, sorted) to match; empty: all up to 60 photos, of more each with those that
   /// resemble it and with the next in order.
   std::optional<std::vector<std::pair<int, int>>> pairs;

@@ -168,13 +168,19 @@ std::optional<Decision> Decide(const std::vector<VotePair>& voters, VoteOptions 
 
 void VoteOnCameras(std::span<const MatchPhoto> photos, std::span<const CoarsePair> pairs,
                    const MatchOptions& options, ViewGraph& graph, std::vector<std::string>& notes) {
-  for (const auto& [first, members] : Groups(photos, graph)) {
+  const auto is_known = [&](int camera) {
+    const auto c = static_cast<size_t>(camera);
+    return c < options.lens_is_known.size() && options.lens_is_known[c];
+  };
+  for (auto [first, members] : Groups(photos, graph)) {
+    std::erase_if(members, is_known);
+    if (members.empty()) continue;
     const auto is_member = [&, &group = members](int photo) {
       const int camera = photos[static_cast<size_t>(photo)].camera;
       return std::find(group.begin(), group.end(), camera) != group.end();
     };
-    const calib::LensCamera prior = graph.cameras[static_cast<size_t>(first)];
-    const bool known = graph.focal_is_known[static_cast<size_t>(first)];
+    const calib::LensCamera prior = graph.cameras[static_cast<size_t>(members.front())];
+    const bool known = graph.focal_is_known[static_cast<size_t>(members.front())];
     const auto radial = RadialIndex(prior.model);
     if (!radial) continue;
     std::vector<const CoarsePair*> own;

@@ -111,9 +111,6 @@ TEST_F(GraphDatabase, FeaturesAndMatchesMayBeWrittenAgain) {
   EXPECT_EQ(ReadFeatures(file_, 2).keypoints[0].x_px, 7);
   WriteViewGraph(file_, SomeGraph());
   EXPECT_EQ(ReadViewGraph(file_).pairs.size(), 1u);
-  ReplaceCameras(file_, kCameras, {false});
-  EXPECT_EQ(ReadViewGraph(file_).cameras[0].params, kCameras[0].params);
-  EXPECT_FALSE(ReadViewGraph(file_).focal_is_known[0]);
 }
 
 TEST_F(GraphDatabase, AFileCutShortIsRejected) {
@@ -137,11 +134,19 @@ TEST_F(GraphDatabase, RecordsThatCannotBeAreRejected) {
               HasSubstr("a match of a feature that its image lacks"));
   EXPECT_THAT(message_after("UPDATE two_view_geometries SET qvec = NULL"),
               HasSubstr("without the rotation"));
-  EXPECT_THAT(message_after("UPDATE two_view_geometries SET config = 99"), HasSubstr("99"));
-  EXPECT_THAT(message_after("UPDATE cameras SET model = 99"), HasSubstr("99"));
+  EXPECT_THAT(message_after("UPDATE two_view_geometries SET config = 99"),
+              HasSubstr("a pair of kind 99"));
+  EXPECT_THAT(message_after("UPDATE cameras SET model = 99"),
+              HasSubstr("a camera of the model 99"));
   EXPECT_THAT(message_after("UPDATE keypoints SET rows = 0, data = ''"),
               HasSubstr("0 features with"));
   EXPECT_THAT(message_after("UPDATE descriptors SET rows = 1000000000"), HasSubstr("1000000000"));
+}
+
+TEST_F(GraphDatabase, AnImageWhoseFeaturesAreLostIsNotOneWithoutAny) {
+  Execute("DELETE FROM keypoints WHERE image_id = 2; DELETE FROM descriptors WHERE image_id = 2");
+  EXPECT_THAT(dtr::testing::MessageOf<Error>([&] { ReadFeatures(file_, 2); }),
+              HasSubstr("no features of image 2"));
 }
 
 TEST_F(GraphDatabase, AFolderThatIsNotThereIsSaidSo) {

@@ -3,11 +3,15 @@
 #include <ceres/jet.h>
 #include <gtest/gtest.h>
 
+#include "calib/bundle/covariance.h"
+#include "calib/bundle/held_out.h"
 #include "calib/bundle/plain/minimise.h"
 #include "calib/bundle/plain/normal.h"
+#include "calib/colmap/model_io.h"
 #include "calib/models/lens_formula.h"
 #include "dtr/base/error.h"
 #include "tests/calib/bundle/synthetic_bundle.h"
+#include "tests/support/test_data.h"
 
 namespace dtr::calib {
 namespace {
@@ -124,6 +128,7 @@ TEST(PlainAdjust, FindsTheMinimumThatCeresFinds) {
         Perturbed(MakeBundle({.points = 300, .lens = lens, .noise_px = 0.3}), 0.01);
     AdjustOptions reference;
     reference.outlier_sigmas = 0;
+    reference.by_ceres = true;
     reference.lens = LensFreedom::kAll;
     const Adjusted expected = Adjust(start, reference);
     Bundle found = start;
@@ -148,6 +153,7 @@ TEST(PlainAdjust, LongWalkIsSolvedSparsely) {
   const Bundle start = Perturbed(MakeBundle(spec), 1e-3);
   AdjustOptions reference;
   reference.outlier_sigmas = 0;
+  reference.by_ceres = true;
   reference.lens = LensFreedom::kNoPrincipalPoint;
   const Adjusted expected = Adjust(start, reference);
   Bundle found = start;
@@ -171,6 +177,7 @@ TEST(PlainAdjust, SeparateLensesAndShiftsAreSolved) {
   }
   AdjustOptions reference;
   reference.outlier_sigmas = 0;
+  reference.by_ceres = true;
   reference.lens = LensFreedom::kAll;
   const Adjusted expected = Adjust(start, reference);
   Bundle found = start;
@@ -249,6 +256,86 @@ TEST(PlainAdjust, OutliersHardlyMatterUnderCauchysLoss) {
   squares.observations = start.observations;
   AdjustPlain({}, {}, squares);
   EXPECT_GT(std::abs(squares.lenses[0].params[0] - 900), 3) << "the loss makes the difference";
+}
+
+// Everything that Adjust does around its solves: the robust passes, the choice of outliers, what is
+// known of lenses and of images' principal points, weighed by the noise that the solve before
+// found: it depends on where the robust solve stopped.
+TEST(PlainAdjust, AdjustGivesWhatItGivesByCeres) {
+  for (const LensFreedom lens :
+       {LensFreedom::kFixed, LensFreedom::kNoPrincipalPoint, LensFreedom::kAll,
+        LensFreedom::kTangential, LensFreedom::kPrincipalPointPerImage,
+        LensFreedom::kTangentialPerImage}) {
+    Bundle start = Perturbed(MakeBundle({.points = 300, .noise_px = 0.3}), 0.003);
+    for (size_t i = 0; i < start.observations.size(); i += 25) {
+      start.observations[i].pixel.y() += 40;
+    }
+    AdjustOptions options;
+    options.lens = lens;
+    options.aspect_sigma = kKnownAspectSigma;
+    options.principal_point_share = kKnownPrincipalPointShare;
+    const Adjusted found = Adjust(start, options);
+    options.by_ceres = true;
+    const Adjusted expected = Adjust(start, options);
+    EXPECT_TRUE(found.converged);
+    EXPECT_EQ(found.used, expected.used) << NameOf(lens);
+    EXPECT_NEAR(found.rms_px / expected.rms_px, 1, 1e-6) << NameOf(lens);
+    EXPECT_NEAR(found.sigma_px / expected.sigma_px, 1, 1e-6) << NameOf(lens);
+    EXPECT_LT(LargestDifference(Projections(found.bundle), Projections(expected.bundle)), 1e-3)
+        << NameOf(lens);
+  }
+}
+
+TEST(PlainAdjust, PlazaGivesWhatItGivesByCeres) {
+  const auto folder = testing::DataFolder() / "plaza/sparse";
+  DTR_REQUIRE_DATA(folder);
+  Bundle start = SomePoints(BundleOf(colmap::ReadModel(folder)), 1000, 1);
+  Random random(5);
+  for (BundleObservation& o : start.observations) {
+    const double x = random.Normal(), y = random.Normal();
+    o.pixel += (random.Uniform(0, 1) < 0.03 ? 20 : 0.3) * Eigen::Vector2d(x, y);
+  }
+  start = Perturbed(start, 3e-3);
+  AdjustOptions options;
+  options.lens = LensFreedom::kAll;
+  const Adjusted found = Adjust(start, options);
+  options.by_ceres = true;
+  const Adjusted expected = Adjust(start, options);
+  EXPECT_EQ(found.used, expected.used);
+  EXPECT_NEAR(found.rms_px / expected.rms_px, 1, kSameCost);
+  const BundleCovariance covariance = CovarianceOf(expected, options);
+  ASSERT_TRUE(covariance.computed && covariance.determined);
+  for (long k = 0; k < 4; ++k) {
+    const auto at = static_cast<size_t>(k);
+    const double sigma =
+        std::sqrt(covariance.matrix(covariance.lens_at[0] + k, covariance.lens_at[0] + k));
+    EXPECT_LT(std::abs(found.bundle.lenses[0].params[at] - expected.bundle.lenses[0].params[at]),
+              1e-3 * sigma);
+  }
+  EXPECT_LT(LargestDifference(Projections(found.bundle), Projections(expected.bundle)), 1e-3);
+}
+
+TEST(PlainAdjust, WhatIsKnownOfLensesHoldsFromAnyStart) {
+  const Bundle bundle = MakeBundle({.points = 300, .noise_px = 0.3});
+  AdjustOptions options;
+  options.lens = LensFreedom::kTangential;
+  options.aspect_sigma = 1e-4;
+  options.principal_point_share = 1e-4;
+  const Adjusted cold = Adjust(bundle, options);
+  options.known_lenses = &bundle.lenses;
+  Bundle elsewhere = bundle;
+  elsewhere.lenses[0].params[1] += 3;
+  for (const bool by_ceres : {false, true}) {
+    options.by_ceres = by_ceres;
+    const Adjusted warm = Adjust(elsewhere, options);
+    for (size_t k = 0; k < 4; ++k) {
+      EXPECT_NEAR(warm.bundle.lenses[0].params[k], cold.bundle.lenses[0].params[k], 1e-3) << k;
+    }
+    EXPECT_NEAR(warm.sigma_px, cold.sigma_px, 1e-7);
+  }
+  const std::vector<LensCamera> none;
+  options.known_lenses = &none;
+  EXPECT_THROW(Adjust(elsewhere, options), Error);
 }
 
 TEST(PlainAdjust, RejectsWhatItCannotSolve) {

@@ -98,7 +98,7 @@ MatchResult Match(const std::vector<MatchPhoto>& photos, const calib::LensCamera
                   bool known, int threads = 2) {
   MatchOptions options;
   options.threads = threads;
-  options.lenses_are_known = known;
+  if (known) options.lens_is_known.assign(1, true);
   return MatchPhotos(photos, std::vector{camera}, {known}, options);
 }
 

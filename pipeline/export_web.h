@@ -1,0 +1,35 @@
+// pipeline/export_web.h -- a set as one HTML file that shows it in a browser (docs/EXPORT.md).
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "dtr/base/progress.h"
+
+namespace dtr::pipeline {
+
+struct WebPageRequest {
+  std::filesystem::path set;
+  std::filesystem::path output;  ///< the file to write
+  /// At most so many MB (10^6 bytes): photos and depth are coded more coarsely until the page fits.
+  std::optional<double> max_mb;
+  /// Of photos, 1...100; without it 80, and photos that the set stores as JPEG go in as they are.
+  std::optional<int> jpeg_quality;
+};
+
+struct WebPageReport {
+  size_t views = 0;
+  std::uint64_t bytes = 0;
+  int jpeg_quality = 0;       ///< of photos; 0: all are JPEGs that the set stores
+  double depth_error_px = 0;  ///< by rounding, pixels of disparity; 0: at most 0.02
+  std::string warning;  ///< a failed validation in a line, which the page shows, too; or empty
+};
+
+/// Writes the page of the set's source views. Nothing of it exists until it is whole. Throws
+/// UsageError where the output exists and for dynamic sets, Error for a set without depth, a broken
+/// one, and where max_mb cannot be met: then it says the least that can.
+WebPageReport ExportWebPage(const WebPageRequest& request, Progress& progress);
+
+}  // namespace dtr::pipeline

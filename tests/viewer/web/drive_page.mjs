@@ -1,0 +1,98 @@
+// node drive_page.mjs PAGE.html CHROMIUM [SCREENSHOTS]: uses a page as people do and prints what it found as JSON.
+// playwright-core is looked for below DTR_PLAYWRIGHT, a folder with node_modules.
+import { createRequire } from "node:module";
+
+const { chromium } = createRequire(`${process.env.DTR_PLAYWRIGHT}/`)("playwright-core");
+const [page_file, program, screenshots] = process.argv.slice(2);
+const kArguments = ["--no-sandbox", "--disable-dev-shm-usage", "--disable-background-networking", "--disable-component-update",
+  "--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
+
+const found = { messages: [] };
+const browser = await chromium.launch({ executablePath: program, args: kArguments });
+const page = await browser.newPage({ viewport: { width: 320, height: 200 }, hasTouch: true });
+page.on("console", (message) => found.messages.push(message.text()));
+page.on("pageerror", (error) => found.messages.push(error.message));
+page.on("request", (request) => { if (!/^(file|blob|data):/.test(request.url())) found.messages.push(request.url()); });
+await page.goto(`file://${page_file}`);
+
+const look = (name) => screenshots && page.screenshot({ path: `${screenshots}/${name}.png` });
+// What the canvas' camera is, as numbers that change when it moves.
+const camera = () => page.evaluate(() => globalThis.dtrPage.camera().centre.join(" "));
+// Until two frames were drawn.
+const drawn = () => page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done()))));
+const problem = () => page.evaluate(() => { const box = document.getElementById("problem"); return box.hidden ? "" : box.textContent; });
+
+if (await page.evaluate(() => globalThis.dtrPage !== undefined)) {
+  await page.evaluate(() => globalThis.dtrPage.allLoaded);
+  found.loaded = await page.evaluate(() => globalThis.dtrPage.renderer.store.loaded.size);
+  found.problem = await problem();
+  if (found.loaded > 0) {
+    await page.evaluate(() => globalThis.dtrPage.firstPicture);
+    await look("first");
+    const box = { x: 160, y: 70 };
+    const centre = () => page.evaluate(([x, y]) => {
+      const { renderer, camera } = { renderer: globalThis.dtrPage.renderer, camera: globalThis.dtrPage.camera() };
+      renderer.draw(camera);
+      const pixels = renderer.pixels(), { width } = camera;
+      globalThis.dtrPage.dirty = true;
+      let black = 0;
+      for (let i = 0; i < pixels.length; i += 4) black += pixels[i] + pixels[i + 1] + pixels[i + 2] === 0 ? 1 : 0;
+      return { black: 4 * black / pixels.length, colour: Array.from(pixels.slice(4 * (y * width + x), 4 * (y * width + x) + 3)) };
+    }, [box.x, box.y]);
+    found.black = (await centre()).black;
+
+    const start = await camera();
+    await page.mouse.move(box.x, box.y);
+    await page.mouse.down();
+    await page.mouse.move(box.x + 30, box.y + 8, { steps: 3 });
+    await page.mouse.up();
+    found.orbits = (await camera()) !== start;
+    const orbited = await camera();
+    await page.mouse.wheel(0, -200);
+    await drawn();
+    found.dollies = (await camera()) !== orbited;
+    const before_key = await camera();
+    await page.keyboard.down("KeyW");
+    await drawn();
+    await drawn();
+    await page.keyboard.up("KeyW");
+    found.flies = (await camera()) !== before_key;
+
+    const touched = await camera();
+    const touch = await page.context().newCDPSession(page);
+    const fingers = (type, ...points) => touch.send("Input.dispatchTouchEvent", { type, touchPoints: points.map(([x, y], id) => ({ x, y, id })) });
+    await fingers("touchStart", [120, 80]);
+    await fingers("touchMove", [150, 80]);
+    await fingers("touchEnd");
+    found.oneFinger = (await camera()) !== touched;
+    const pinched = await camera();
+    await fingers("touchStart", [120, 80], [180, 80]);
+    await fingers("touchMove", [100, 80], [200, 80]);
+    await fingers("touchEnd");
+    found.twoFingers = (await camera()) !== pinched;
+
+    await page.keyboard.press("Period");
+    await page.waitForFunction(() => globalThis.dtrPage.navigation.jump === null);
+    found.photo = await page.evaluate(() => document.getElementById("photo").textContent);
+    await page.keyboard.press("KeyC");
+    await drawn();
+    found.compares = await page.evaluate(() => document.querySelector("button[data-option=compare]").getAttribute("aria-pressed"));
+    await look("compare");
+    await page.keyboard.press("KeyC");
+    await page.keyboard.press("KeyV");
+    await drawn();
+    await look("depth");
+    await page.keyboard.press("KeyV");
+    await page.keyboard.press("KeyM");
+    await drawn();
+    await page.mouse.click(100, 90);
+    await page.mouse.click(200, 110);
+    await drawn();
+    found.distance = await page.evaluate(() => document.querySelector("#marks text")?.textContent ?? "");
+    await look("distance");
+  }
+} else {
+  found.problem = await problem();
+}
+await browser.close();
+console.log(JSON.stringify(found));

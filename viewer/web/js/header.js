@@ -1,0 +1,102 @@
+// The page's description of the set, checked before anything is allocated for it.
+import { fail } from "./problem.js";
+
+const kMaxViews = 4096;
+const kMaxSidePx = 16384;
+const kMaxPixels = 1 << 26;
+const kMaxCode = 65535;
+
+function number(value, where, least, most) {
+  if (typeof value === "number" && value >= least && value <= most) return value;
+  return fail(where, `a number from ${least} to ${most}`, JSON.stringify(value));
+}
+
+function whole(value, where, least, most) {
+  if (Number.isInteger(value) && value >= least && value <= most) return value;
+  return fail(where, `a whole number from ${least} to ${most}`, JSON.stringify(value));
+}
+
+function numbers(value, count, where, least = -1e12, most = 1e12) {
+  if (!Array.isArray(value) || value.length !== count) return fail(where, `${count} numbers`, JSON.stringify(value));
+  return value.map((v, i) => number(v, `${where}[${i}]`, least, most));
+}
+
+function words(value, where) {
+  return typeof value === "string" ? value : fail(where, "text", JSON.stringify(value));
+}
+
+// A range of inverse depth in steps; null where there is none.
+function codeOf(value, where) {
+  if (value === null) return null;
+  if (typeof value !== "object") return fail(where, "an object", JSON.stringify(value));
+  const near = number(value.near_z, `${where}.near_z`, 1e-30, 1e30);
+  const far = number(value.far_z, `${where}.far_z`, near, 1e30);
+  return { near, far, steps: whole(value.steps, `${where}.steps`, 1, kMaxCode - 1) };
+}
+
+function partsOf(value, bytes, where) {
+  const parts = {};
+  let end = 0;
+  for (const name of ["image", "depth", "completed", "mask", "mesh"]) {
+    const sizes = numbers(value?.[name] ?? [0, 0], 2, `${where}.${name}`, 0, 4 * kMaxPixels);
+    const stored = whole(sizes[0], `${where}.${name}[0]`, 0, bytes);
+    const size = whole(sizes[1], `${where}.${name}[1]`, 0, 5 * kMaxPixels);
+    parts[name] = { first: end, end: end + stored, size };
+    end += stored;
+  }
+  return end === bytes ? parts : fail(where, `parts of ${bytes} bytes together`, String(end));
+}
+
+function viewOf(value, index) {
+  const where = `views[${index}]`;
+  const width = whole(value?.width, `${where}.width`, 1, kMaxSidePx);
+  const height = whole(value.height, `${where}.height`, 1, kMaxSidePx);
+  if (width * height > kMaxPixels) fail(where, `at most ${kMaxPixels} pixels`, `${width}x${height}`);
+  const scale = whole(value.depth_scale, `${where}.depth_scale`, 1, kMaxSidePx);
+  if (width % scale || height % scale) fail(`${where}.depth_scale`, "a divisor of the image's sides", String(scale));
+  const [fx, fy, cx, cy] = numbers(value.camera, 4, `${where}.camera`, -1e7, 1e7);
+  if (!(fx > 0 && fy > 0)) fail(`${where}.camera`, "focal lengths above 0", `${fx}, ${fy}`);
+  const measured = codeOf(value.depth, `${where}.depth`);
+  const completed = codeOf(value.completed, `${where}.completed`);
+  if (!measured) fail(`${where}.depth`, "a range of depth", "none");
+  if (measured.steps + (completed ? completed.steps : 0) + 2 > kMaxCode) {
+    fail(where, "steps that fit 16 bits together", "more");
+  }
+  const bytes = whole(value.bytes, `${where}.bytes`, 1, 1 << 30);
+  const rotation = numbers(value.rotation_wxyz, 4, `${where}.rotation_wxyz`, -1.001, 1.001);
+  if (!(Math.abs(Math.hypot(...rotation) - 1) < 1e-3)) fail(`${where}.rotation_wxyz`, "a unit quaternion", "none");
+  return {
+    index, name: words(value.name, `${where}.name`), width, height, scale,
+    columns: width / scale, rows: height / scale, fx, fy, cx, cy, rotation,
+    translation: numbers(value.translation, 3, `${where}.translation`),
+    baseline: number(value.baseline, `${where}.baseline`, 1e-30, 1e30),
+    gain: numbers(value.gain, 3, `${where}.gain`, 1e-3, 1e3), measured, completed,
+    // 0: the set states none.
+    sigmaPx: number(value.sigma_px, `${where}.sigma_px`, 0, 1e6),
+    bytes, crc: whole(value.crc32, `${where}.crc32`, 0, 0xffffffff), parts: partsOf(value.parts, bytes, `${where}.parts`),
+  };
+}
+
+/** The set that the header's text describes. Throws a Problem for whatever the exporter cannot have written. */
+export function parseHeader(text) {
+  let json;
+  try {
+    json = JSON.parse(text);
+  } catch {
+    return fail("set", "a JSON object", "something else");
+  }
+  if (json?.format !== "dtr-web-page" || json.version !== 1) fail("set", "a dtr-web-page of version 1", "another format");
+  if (!Array.isArray(json.views) || json.views.length < 1 || json.views.length > kMaxViews) {
+    fail("set.views", `1 to ${kMaxViews} views`, String(json.views?.length));
+  }
+  const bounds = json.bounds === null ? null
+    : { min: numbers(json.bounds?.min, 3, "set.bounds.min"), max: numbers(json.bounds?.max, 3, "set.bounds.max") };
+  return {
+    name: words(json.name, "set.name"), unit: words(json.unit, "set.unit"), bounds,
+    center: numbers(json.scene_center, 3, "set.scene_center"),
+    validation: words(json.validation, "set.validation"),
+    failed: json.validation_failed === true,
+    figures: Array.isArray(json.figures) ? json.figures.filter((f) => Array.isArray(f) && f.length === 2).map((f) => f.map(String)) : [],
+    views: json.views.map(viewOf),
+  };
+}

@@ -1,0 +1,90 @@
+// Views from the page's text into the store: the most wanted first, decoded beside the page's own thread.
+import { decodeView } from "./decode.js";
+import { Problem } from "./problem.js";
+
+const kMostWorkers = 3;
+
+// One place where views are decoded: a worker with the page's own script, or this thread where there are no workers.
+class Decoder {
+  constructor(script) {
+    this.waiting = new Map();
+    try {
+      this.url = URL.createObjectURL(new Blob([script], { type: "text/javascript" }));
+      this.worker = new Worker(this.url);
+      this.worker.onmessage = ({ data }) => this.settle(data.index, data);
+      this.worker.onerror = () => this.giveUp();
+    } catch {
+      this.worker = null;
+    }
+  }
+
+  settle(index, data) {
+    const promise = this.waiting.get(index);
+    this.waiting.delete(index);
+    if (data.problem) promise?.reject(new Problem(data.problem));
+    else promise?.resolve(data.pixels);
+  }
+
+  // What the worker was asked for is decoded here.
+  giveUp() {
+    this.worker = null;
+    for (const { view, text, resolve, reject } of this.waiting.values()) decodeView(view, text).then(resolve, reject);
+    this.waiting.clear();
+  }
+
+  decode(view, text) {
+    if (!this.worker) return decodeView(view, text);
+    return new Promise((resolve, reject) => {
+      this.waiting.set(view.index, { view, text, resolve, reject });
+      this.worker.postMessage({ view, text });
+    });
+  }
+}
+
+/** Keeps the store filled with the views that are wanted most. */
+export class Loader {
+  /** `order()`: all views, most wanted first; `textOf(view)`: its base64; `loaded(view)` and `failed(view, problem)` are called. */
+  constructor({ store, script, order, textOf, loaded, failed }) {
+    Object.assign(this, { store, order, textOf, loaded, failed, broken: new Set(), busy: new Set() });
+    const workers = Math.max(1, Math.min(kMostWorkers, (navigator.hardwareConcurrency || 2)));
+    this.decoders = Array.from({ length: workers }, () => new Decoder(script));
+  }
+
+  // The views that the store has room for.
+  wanted() {
+    return this.order().filter((view) => !this.broken.has(view.index)).slice(0, this.store.layers);
+  }
+
+  /** All that is wanted is there. */
+  get done() {
+    return this.busy.size === 0 && this.wanted().every((view) => this.store.has(view));
+  }
+
+  next() {
+    return this.wanted().find((view) => !this.store.has(view) && !this.busy.has(view.index));
+  }
+
+  /** Starts what is to be done and returns at once. */
+  run() {
+    for (const decoder of this.decoders) if (!decoder.running) this.work(decoder);
+  }
+
+  async work(decoder) {
+    decoder.running = true;
+    for (let view = this.next(); view; view = this.next()) {
+      this.busy.add(view.index);
+      try {
+        const pixels = await decoder.decode(view, this.textOf(view));
+        this.store.makeRoom(this.order());
+        this.store.put(view, pixels);
+        this.busy.delete(view.index);
+        this.loaded(view);
+      } catch (error) {
+        this.busy.delete(view.index);
+        this.broken.add(view.index);
+        this.failed(view, error);
+      }
+    }
+    decoder.running = false;
+  }
+}

@@ -1,0 +1,243 @@
+// The page: canvas, buttons and what they do, with the renderer behind them.
+import { Renderer } from "./renderer.js";
+import { Loader } from "./loader.js";
+import { Navigation } from "./navigation.js";
+import { Keys, Pointers } from "./input.js";
+import { placed, upOf } from "./camera.js";
+import { ranked } from "./selection.js";
+import { drawMeasure, pickedPoint } from "./measure.js";
+import { Problem } from "./problem.js";
+
+const kMaxCanvasPixels = 2.1e6;
+const kSlowMs = 60, kFastMs = 22;     // a frame while moving: coarser beyond, finer below
+const kScales = [1, 0.75, 0.5, 0.35, 0.25];
+const kMostStepS = 0.1;
+
+const element = (id) => document.getElementById(id);
+
+/** A line for people, until it is clicked away. */
+export function showProblem(text) {
+  const box = element("problem");
+  box.textContent = text;
+  box.hidden = false;
+}
+
+export class Page {
+  constructor(set, shaders, script) {
+    this.set = { ...set, views: set.views.map(placed) };
+    this.canvas = element("canvas");
+    const gl = this.canvas.getContext("webgl2", { alpha: false, antialias: false, depth: false, powerPreference: "high-performance" });
+    if (!gl) {
+      throw new Problem("this page needs WebGL2, which this browser does not offer here; open it in a current Firefox, Chrome, Edge or Safari, with graphics acceleration on");
+    }
+    this.renderer = new Renderer(gl, shaders, this.set);
+    this.navigation = new Navigation(this.set, upOf(this.set.views));
+    this.options = { depth: false, compare: false, measure: false, split: 0.5 };
+    this.points = [];
+    this.level = 0;
+    this.dirty = true;
+    this.last = 0;
+    this.loader = new Loader({
+      store: this.renderer.store, script, order: () => this.order(), textOf: (view) => this.textOf(view),
+      loaded: () => this.arrived(), failed: (view, problem) => this.missing(problem),
+    });
+    this.firstPicture = new Promise((resolve) => { this.pictured = resolve; });
+    this.allLoaded = new Promise((resolve) => { this.complete = resolve; });
+    this.canvas.addEventListener("webglcontextlost", (event) => {
+      event.preventDefault();
+      this.stopped = true;
+      showProblem("the browser took the graphics memory away; reload the page");
+    });
+    this.connect();
+    this.loader.run();
+    requestAnimationFrame((now) => this.tick(now));
+  }
+
+  order() {
+    return ranked(this.set, this.set.views, this.camera()).candidates.map((c) => c.view);
+  }
+
+  textOf(view) {
+    return element(`view-${view.index}`)?.textContent ?? "";
+  }
+
+  arrived() {
+    this.dirty = true;
+    const loaded = this.renderer.store.loaded.size, wanted = Math.min(this.set.views.length, this.renderer.store.layers);
+    element("progress").style.width = loaded < wanted ? `${100 * loaded / wanted}%` : "0";
+    if (this.loader.done) this.complete();
+  }
+
+  missing(problem) {
+    showProblem(String(problem.message ?? problem));
+    if (this.loader.done) this.complete();
+  }
+
+  /** The novel camera at the canvas' size times `scale`. */
+  camera(scale = 1) {
+    const { width, height } = this.canvas;
+    return this.navigation.camera(Math.max(2, Math.round(width * scale)), Math.max(2, Math.round(height * scale)));
+  }
+
+  fitCanvas() {
+    const box = this.canvas.getBoundingClientRect();
+    const wanted = Math.max(1, box.width) * Math.max(1, box.height) * (devicePixelRatio || 1) ** 2;
+    this.ratio = (devicePixelRatio || 1) * Math.min(1, Math.sqrt(kMaxCanvasPixels / wanted));
+    const width = Math.max(2, Math.round(box.width * this.ratio)), height = Math.max(2, Math.round(box.height * this.ratio));
+    if (this.canvas.width === width && this.canvas.height === height) return;
+    this.canvas.width = width;
+    this.canvas.height = height;
+    this.dirty = true;
+  }
+
+  // Pixels of the page to those of the canvas.
+  onCanvas(at) {
+    return at.map((v) => v * this.ratio);
+  }
+
+  /** Depth of what is seen at a pixel of the canvas; null: nothing. */
+  depthAt(pixel) {
+    if (!this.frame) return null;
+    const { novel } = this.frame;
+    return this.renderer.depthAt([pixel[0] * novel.width / this.canvas.width, pixel[1] * novel.height / this.canvas.height]);
+  }
+
+  connect() {
+    const { navigation } = this;
+    const moved = () => { this.dirty = true; };
+    this.pointers = new Pointers(this.canvas, {
+      begin: (at) => this.begin(this.onCanvas(at)),
+      orbit: (dx, dy) => { this.dragLine(dx) || navigation.orbit(dx, dy); moved(); },
+      pan: (dx, dy) => { navigation.pan(dx * this.ratio, dy * this.ratio, this.camera()); moved(); },
+      dolly: (factor, at) => { const p = this.onCanvas(at); navigation.dolly(factor, this.camera(), p, this.depthAt(p)); moved(); },
+      click: (at) => this.click(this.onCanvas(at)),
+    });
+    const commands = {
+      Period: () => this.stepPhoto(1), Comma: () => this.stepPhoto(-1), KeyC: () => this.toggle("compare"),
+      KeyV: () => this.toggle("depth"), KeyM: () => this.toggle("measure"), KeyF: () => this.fullScreen(),
+      KeyH: () => this.togglePanel(), Home: () => this.goTo(0),
+    };
+    this.keys = new Keys(commands);
+    for (const button of document.querySelectorAll("button[data-key]")) button.addEventListener("click", commands[button.dataset.key]);
+    element("problem").addEventListener("click", () => { element("problem").hidden = true; });
+    this.describe();
+  }
+
+  // Where a drag begins decides what it does: the line between image and photo, or the scene around what is there.
+  begin(pixel) {
+    const line = this.options.split * this.canvas.width;
+    this.onLine = this.options.compare && Math.abs(pixel[0] - line) < 20 * this.ratio;
+    const z = this.onLine ? null : this.depthAt(pixel);
+    if (z) this.navigation.pivot = this.pointOf(pixel, z);
+  }
+
+  pointOf(pixel, z) {
+    return pickedPoint(this.camera(), pixel, z, this.nearest()).point;
+  }
+
+  dragLine(dx) {
+    if (!this.onLine) return false;
+    this.options.split = Math.min(0.98, Math.max(0.02, this.options.split + dx * this.ratio / this.canvas.width));
+    return true;
+  }
+
+  /** The photo taken nearest to where the camera is, of those loaded. */
+  nearest() {
+    const loaded = this.order().filter((view) => this.renderer.store.has(view));
+    return loaded[0] ?? this.set.views[0];
+  }
+
+  click(pixel) {
+    if (!this.options.measure) return;
+    const z = this.depthAt(pixel);
+    if (!z) return;
+    if (this.points.length === 2) this.points = [];
+    this.points.push(pickedPoint(this.camera(), pixel, z, this.nearest()));
+    this.dirty = true;
+  }
+
+  toggle(name) {
+    this.options[name] = !this.options[name];
+    if (name === "measure") this.points = [];
+    document.querySelectorAll(`button[data-option=${name}]`).forEach((b) => b.setAttribute("aria-pressed", String(this.options[name])));
+    this.canvas.classList.toggle("measuring", this.options.measure);
+    this.dirty = true;
+  }
+
+  goTo(index) {
+    this.navigation.goTo(index, performance.now());
+    this.describe();
+    this.dirty = true;
+  }
+
+  stepPhoto(by) {
+    this.goTo(this.navigation.photo + by);
+  }
+
+  fullScreen() {
+    if (document.fullscreenElement) document.exitFullscreen();
+    else document.documentElement.requestFullscreen?.().catch(() => {});
+  }
+
+  togglePanel() {
+    element("panel").hidden = !element("panel").hidden;
+  }
+
+  describe() {
+    const { photo } = this.navigation, { views } = this.set;
+    element("photo").textContent = `${photo + 1} / ${views.length}  ${views[photo].name}`;
+  }
+
+  // How coarse a frame is while the camera moves.
+  adapt(ms) {
+    if (ms > kSlowMs) this.level = Math.min(this.level + 1, kScales.length - 1);
+    else if (ms < kFastMs) this.level = Math.max(this.level - 1, 0);
+  }
+
+  tick(now) {
+    if (this.stopped) return;
+    const seconds = Math.min((now - this.last) / 1000, kMostStepS);
+    this.fitCanvas();
+    let moving = this.navigation.step(now);
+    if (this.keys.flying) {
+      const [x, y, z, turn] = this.keys.motion;
+      this.navigation.fly(seconds, [x, y, z], [turn, 0]);
+      moving = true;
+    }
+    moving ||= this.pointers.down.size > 0 && this.dirty;
+    if (moving && this.wasMoving) this.adapt(now - this.last);
+    if (this.dirty || moving || this.coarse) this.drawFrame(moving ? kScales[this.level] : 1);
+    this.wasMoving = moving;
+    this.last = now;
+    requestAnimationFrame((next) => this.tick(next));
+  }
+
+  drawFrame(scale) {
+    this.dirty = false;
+    this.coarse = scale !== 1;
+    if (this.renderer.store.loaded.size === 0) return;
+    this.frame = this.renderer.draw(this.camera(scale));
+    const { options } = this;
+    this.renderer.present(this.frame, {
+      depth: options.depth, photo: options.compare ? this.nearest() : null, photoFrom: options.split * this.canvas.width,
+      inverseDepths: this.inverseDepths(),
+    });
+    drawMeasure(element("marks"), this.camera(), this.points, this.set.unit);
+    this.loader.run();
+    this.pictured();
+  }
+
+  // The range of false colours: that of the measured depth of the views in use.
+  inverseDepths() {
+    const views = this.frame.views.length ? this.frame.views : this.set.views;
+    return [1 / Math.min(...views.map((v) => v.measured.near)), 1 / Math.max(...views.map((v) => v.measured.far))];
+  }
+
+  /** For programs: the image of a camera {width, height, fx, fy, cx, cy, rotation, translation}, RGBA from the top row on. */
+  render(camera, options = {}) {
+    const frame = this.renderer.draw(placed(camera), options);
+    const pixels = this.renderer.pixels(), seen = this.renderer.pixels(true);
+    this.dirty = true;
+    return { width: camera.width, height: camera.height, pixels, seen, views: frame.views.map((v) => v.name), perPixel: frame.perPixel };
+  }
+}
