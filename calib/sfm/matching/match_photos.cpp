@@ -39,8 +39,12 @@ void Check(std::span<const MatchPhoto> photos, std::span<const calib::LensCamera
   }
 }
 
-// A photo as the second stage sees it.
+// A photo as the second stage sees it. The grid borrows the points: it moves, but is not copied.
 struct Seen {
+  Seen() = default;
+  Seen(Seen&&) = default;
+  Seen& operator=(Seen&&) = default;
+
   std::vector<Eigen::Vector2d> points;  // on z = 1; NaN: no ray
   FeatureGrid grid;
   double band = 0;        // BandOf at the centre, on z = 1
