@@ -148,7 +148,7 @@ TEST_F(BadInput, OutputsThatExistOrCannotBeMade) {
                  "cannot be made: Not a directory");
   ExpectRejected(build_into("/proc/set.dtr"), kFailed, "cannot be made: No such file or directory");
   ExpectRejected(Dtr({"export", Shared("good.dtr"), "-o", In("set.dtr")}), kWrongUsage,
-                 "exists already; choose another folder");
+                 "exists already; choose another name");
   ExpectRejected(Dtr({"export", Shared("good.dtr"), "-o", In("absent/colmap")}), kWrongUsage,
                  "expected an existing folder to write into, found nothing");
   ExpectRejected(Dtr({"info", Shared("good.dtr"), "--json", In("absent/info.json")}), kWrongUsage,

@@ -4,6 +4,7 @@
 
 #include "capture/contents_json.h"
 #include "pipeline/detail/depth/quality_json.h"
+#include "pipeline/detail/photos/lens_of_photo.h"
 #include "pipeline/detail/reports/calibration_json.h"
 #include "pipeline/detail/reports/metres_json.h"
 #include "pipeline/detail/reports/text.h"
@@ -58,6 +59,7 @@ Json ProvenanceJson(const BuildOptions& options, const Json& option_values, cons
   provenance["depth_engine"] = options.depth.engine;
   provenance["options"] = option_values;
   provenance["photos"] = photos;
+  AddLenses(calibrated.model, provenance);
   provenance["not_registered"] = report.not_registered;
   provenance["held_out_not_registered"] = report.held_out_not_registered;
   provenance["skipped"] = Json::array();
