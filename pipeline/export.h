@@ -29,7 +29,8 @@ struct ExportRequest {
   int threads = 0;
   double memory_gb = 4;    ///< for depth maps that are held at a time
   bool completed = false;  ///< with completed depth, not only what was measured
-  int min_views = 2;       ///< clouds: views that show a point at the same depth
+  int min_views = 2;       ///< clouds, meshes: views that show a point at the same depth
+  double voxel = 0;        ///< meshes: its width, scene units; 0: twice the median pixel's
   size_t max_count = 0;    ///< splats: Gaussians at most; 0: no bound
   bool full_sh = false;    ///< splats: with the coefficients (all 0) of degrees 1 to 3
   DepthFileFormat depth_format = DepthFileFormat::kExr;
@@ -39,7 +40,8 @@ struct ExportRequest {
 
 struct ExportReport {
   size_t images = 0;               ///< views that were used
-  size_t points = 0;               ///< points, or Gaussians
+  size_t points = 0;               ///< points, vertices or Gaussians
+  size_t triangles = 0;            ///< of meshes
   size_t depth_maps = 0;           ///< files of depth
   bool points_from_depth = false;  ///< as the set has no sparse points
 };
@@ -67,9 +69,14 @@ ExportReport ExportDepth(const ExportRequest& request, Progress& progress);
 /// masks, sparse_pc.ply.
 ExportReport ExportNerfstudio(const ExportRequest& request, Progress& progress);
 
-/// Writes 3D Gaussians, one file, .ply (Kerbl et al. 2023) or .splat by its extension: those of the
-/// fused samples, completed ones too (detail/export/gaussians.h); with `max_count` at most so many,
-/// Error where that cannot be met.
+/// Writes a triangle mesh with normals and vertex colours, one file, .ply or .glb by its extension
+/// (detail/export/mesh.h). Error where `min_views` views show no surface.
+ExportReport ExportMesh(const ExportRequest& request, Progress& progress);
+
+/// Writes 3D Gaussians, one file, .ply (Kerbl et al. 2023), .splat or .glb (KHR_gaussian_splatting)
+/// by its extension: those of the fused samples, completed ones too (detail/export/gaussians.h),
+/// and the sky and a backdrop (detail/export/backdrop.h); with `max_count` at most so many, Error
+/// where that cannot be met.
 ExportReport ExportSplat(const ExportRequest& request, Progress& progress);
 
 /// Writes a folder for MVSNet and its successors: images, cams, depths and pair.txt of the views

@@ -31,7 +31,8 @@ const std::vector<Format>& Formats() {
   static const std::vector<Format> formats = {
       {"colmap", pipeline::ExportColmap, {}, "points"},
       {"ply", pipeline::ExportPly, {".ply"}, "points"},
-      {"splat", pipeline::ExportSplat, {".ply", ".splat"}, "gaussians"},
+      {"mesh", pipeline::ExportMesh, {".ply", ".glb"}, "vertices"},
+      {"splat", pipeline::ExportSplat, {".ply", ".splat", ".glb"}, "gaussians"},
       {"depth", pipeline::ExportDepth, {}, nullptr},
       {"nerfstudio", pipeline::ExportNerfstudio, {}, "points"},
       {"mvsnet", pipeline::ExportMvsnet, {}, nullptr},
@@ -75,6 +76,7 @@ std::string Summary(const Request& request, const Format& format,
   Names parts = {fmt::format("{} images", report.images)};
   if (report.depth_maps > 0) parts.push_back(fmt::format("{} depth maps", report.depth_maps));
   if (format.points != nullptr) parts.push_back(fmt::format("{} {}", report.points, format.points));
+  if (report.triangles > 0) parts.push_back(fmt::format("{} triangles", report.triangles));
   return fmt::format("{}: {}{}", request.output.string(), fmt::join(parts, ", "),
                      report.points_from_depth ? " from depth, as the set has no sparse ones" : "");
 }
@@ -87,6 +89,7 @@ int RunFormat(Request request, const Format& format, const Context& context) {
   const pipeline::ExportReport report = format.write(request, context.console);
   context.console.Say(Summary(request, format, report));
   nlohmann::ordered_json json{{"format", format.name}, {"images", report.images}};
+  if (report.triangles > 0) json["triangles"] = report.triangles;
   if (report.depth_maps > 0) json["depth_maps"] = report.depth_maps;
   if (format.points != nullptr) json[format.points] = report.points;
   if (format.write == pipeline::ExportColmap) {
@@ -132,14 +135,21 @@ void AddCloudOptions(CLI::App& command, ExportOptions& options) {
   options.of_formats.push_back(
       {command.add_flag("--completed", request.completed,
                         "With completed depth, not only what was measured"),
-       {"ply", "depth", "nerfstudio", "mvsnet"}});
+       {"ply", "mesh", "depth", "nerfstudio", "mvsnet"}});
   options.of_formats.push_back(
       {command
            .add_option("--min-views", request.min_views,
-                       "ply: views that must show a point at the same depth [2]")
+                       "ply, mesh: views that must show a point at the same depth [2]")
            ->check(CLI::Range(1, 100))
            ->type_name("N"),
-       {"ply"}});
+       {"ply", "mesh"}});
+  options.of_formats.push_back(
+      {command
+           .add_option("--voxel", request.voxel,
+                       "mesh: width of a voxel in scene units [twice a pixel's on the surface]")
+           ->check(CLI::PositiveNumber)
+           ->type_name("SIZE"),
+       {"mesh"}});
   AddMemoryOption(command, request.memory_gb, "Memory for depth maps that are held at a time [4]");
 }
 
@@ -217,7 +227,8 @@ void AddWebOptions(CLI::App& command, ExportOptions& options) {
 void AddExportCommand(CLI::App& app) {
   AddCommand(
       app, "export",
-      "Write a set for other programs: a web page, cameras and images, depth maps, clouds, splats",
+      "Write a set for other programs: a web page, cameras and images, depth maps, clouds, meshes, "
+      "splats",
       "dtr export scene.dtr --format web -o scene.html", [](CLI::App& command) -> Action {
         auto options = std::make_shared<ExportOptions>();
         command.add_option("SET", options->request.set, "The set")->required();

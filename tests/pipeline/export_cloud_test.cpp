@@ -19,6 +19,8 @@ namespace {
 using ::testing::Contains;
 using ::testing::HasSubstr;
 
+constexpr double kBeyondAll = 30;  // distance from the origin: surfaces are nearer
+
 std::vector<Eigen::Vector3d> Points(const Ply& ply) {
   std::vector<Eigen::Vector3d> points;
   for (size_t i = 0; i < ply.count; ++i) points.emplace_back(ply["x"][i], ply["y"][i], ply["z"][i]);
@@ -233,9 +235,12 @@ TEST_F(ExportCloud, SplatsLieOnTheSurfaceFlatAndFacingTheViews) {
   ASSERT_EQ(ply.count, report_.points);
   EXPECT_EQ(ply.names.size(), 62u);  // as Kerbl et al. write them
   const Eigen::Vector3d plane = Eigen::Vector3d(0.3, -0.2, 1).normalized();
-  size_t on_surface = 0, flat = 0;
+  size_t all = 0, on_surface = 0, flat = 0, on_centres = 0;
   for (size_t i = 0; i < ply.count; ++i) {
     const Eigen::Vector3d p(ply["x"][i], ply["y"][i], ply["z"][i]);
+    if (p.norm() > kBeyondAll) continue;  // the backdrop
+    ++all;
+    on_centres += OffCentrePx(views_, p) < kResidualPx;
     const bool square = std::abs(p.z() - 5) < 0.05;
     on_surface += square || std::abs(plane.dot(p) - 9) < 0.09;
     const Eigen::Quaterniond q(ply["rot_0"][i], ply["rot_1"][i], ply["rot_2"][i], ply["rot_3"][i]);
@@ -245,8 +250,35 @@ TEST_F(ExportCloud, SplatsLieOnTheSurfaceFlatAndFacingTheViews) {
     flat += ply["scale_0"][i] < ply["scale_1"][i] - 0.5 &&
             std::abs(thin.dot(square ? Eigen::Vector3d::UnitZ() : plane)) > 0.95;
   }
-  EXPECT_GT(on_surface, ply.count * 98 / 100);
-  EXPECT_GT(flat, ply.count * 9 / 10);
+  EXPECT_GT(all, 1000u);
+  EXPECT_LT(all, ply.count);
+  EXPECT_GT(on_surface, all * 98 / 100);
+  EXPECT_GT(flat, all * 9 / 10);
+  // Those of one pixel; half a pixel off there would be none.
+  EXPECT_GT(on_centres, all / 5);
+}
+
+TEST_F(ExportCloud, BehindASplatOfEveryViewStandsABackdrop) {
+  Make({});
+  pipeline::ExportRequest request = Request("splats.ply");
+  pipeline::ExportSplat(request, noted_);
+  const Ply ply = ReadPly(request.output);
+  // The middle of each image, and a place beyond its left border.
+  for (const View& view : views_) {
+    for (const double u : {0.5, -0.2}) {
+      const Eigen::Vector2d pixel(u * view.camera.width_px(), 0.5 * view.camera.height_px());
+      bool covered = false;
+      for (size_t i = 0; i < ply.count && !covered; ++i) {
+        const Eigen::Vector3d p(ply["x"][i], ply["y"][i], ply["z"][i]);
+        if (p.norm() < kBeyondAll) continue;
+        const Eigen::Vector3d q = view.cam_from_world * p;
+        const auto at = view.camera.PixelFromCam(q);
+        const double deviation_px = std::exp(ply["scale_1"][i]) * view.camera.fx_px() / q.z();
+        covered = at && (*at - pixel).norm() < deviation_px;
+      }
+      EXPECT_TRUE(covered) << view.name << " " << u;
+    }
+  }
 }
 
 TEST_F(ExportCloud, SplatsAreAsFewAsAskedOrSaidNotToBe) {

@@ -29,7 +29,7 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 using pipeline::DepthFileFormat;
 
-constexpr double kSameFloat = 1e-6;   // relative
+constexpr double kSameFloat = 1e-6;  // relative
 
 json JsonIn(const fs::path& file) { return json::parse(ReadFile(file, 1 << 24)); }
 

@@ -1,4 +1,4 @@
-// tests/pipeline/read_ply.h -- vertices of a binary PLY file, read from its header alone.
+// tests/pipeline/read_ply.h -- vertices of a binary PLY file (triangles may follow), read from its header alone.
 #pragma once
 #include <cstdint>
 #include <cstring>
@@ -33,13 +33,14 @@ inline Ply ReadPly(const std::filesystem::path& file) {
   std::istringstream header(bytes.substr(0, body));
   Ply ply;
   std::vector<std::string> types;
+  size_t triangles = 0;
   for (std::string line; std::getline(header, line);) {
     std::istringstream words(line);
     std::string first, second, third;
     words >> first >> second >> third;
     if (first == "comment") ply.comments.push_back(line.substr(8));
-    if (first == "element") ply.count = std::stoul(third);
-    if (first != "property") continue;
+    if (first == "element") (second == "vertex" ? ply.count : triangles) = std::stoul(third);
+    if (first != "property" || second == "list") continue;
     types.push_back(second);
     ply.names.push_back(third);
   }
@@ -57,7 +58,8 @@ inline Ply ReadPly(const std::filesystem::path& file) {
                                                                : next(std::uint8_t{}));
     }
   }
-  if (at != bytes.size()) throw std::runtime_error("PLY: bytes behind the last vertex");
+  constexpr size_t kTriangleBytes = 13;
+  if (at + kTriangleBytes * triangles != bytes.size()) throw std::runtime_error("PLY: not as long as its header says");
   return ply;
 }
 

@@ -10,11 +10,13 @@
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/base/lower_case.h"
+#include "dtr/render/colour.h"
+#include "pipeline/detail/export/backdrop.h"
 #include "pipeline/detail/export/common.h"
 #include "pipeline/detail/export/file_stream.h"
 #include "pipeline/detail/export/gaussians.h"
+#include "pipeline/detail/export/glb.h"
 #include "pipeline/detail/export/ply_header.h"
-#include "pipeline/detail/export/sample_colours.h"
 #include "pipeline/export.h"
 
 namespace dtr::pipeline {
@@ -29,14 +31,22 @@ class Gaussians {
   Gaussians(const ExportRequest& request, const DtrSet& set) : request_(request), set_(set) {}
 
   std::vector<Gaussian> Make(Progress& progress) {
-    SurfaceViews views(
-        request_.set, set_,
-        {.completed = true, .memory_gb = request_.memory_gb, .threads = request_.threads});
+    SurfaceViews views(request_.set, set_,
+                       {.completed = true,
+                        .colours = true,
+                        .memory_gb = request_.memory_gb,
+                        .threads = request_.threads});
+    Backdrop backdrop(set_, request_.threads);
+    for (const int v : views.WithDepth()) {
+      progress.ThrowIfInterrupted();
+      backdrop.AddView(*views.Get(v));
+    }
+    gaussians_ = backdrop.Gaussians();
     Fuse(
         views, {.min_views = 1, .threads = request_.threads},
         [&](const SurfaceView& surface, const std::vector<FusedSample>& samples) {
           if (samples.empty()) return;
-          SplatTree tree(surface, samples, ColoursOnDepthGrid(request_.set, *surface.view));
+          SplatTree tree(surface, samples);
           if (request_.max_count == 0) {
             tree.AddGaussians(kUsualBound, gaussians_);
           } else {
@@ -61,11 +71,12 @@ class Gaussians {
       costs.insert(costs.end(), own.begin(), own.end());
       samples += tree.samples();
     }
-    if (samples <= request_.max_count) return kUsualBound;
-    const size_t merges = (samples - request_.max_count + 2) / 3;
+    const size_t behind = gaussians_.size();
+    if (samples + behind <= request_.max_count) return kUsualBound;
+    const size_t merges = (samples + behind - request_.max_count + 2) / 3;
     if (merges > costs.size()) {
       throw Error(fmt::format("`max_count` {} cannot be met: the least is {}; prune the set first",
-                              request_.max_count, samples - 3 * costs.size()));
+                              request_.max_count, samples + behind - 3 * costs.size()));
     }
     const auto place = costs.begin() + static_cast<std::ptrdiff_t>(merges) - 1;
     std::nth_element(costs.begin(), place, costs.end());
@@ -132,14 +143,47 @@ void WriteSplat(std::vector<Gaussian> gaussians, FileStream& file) {
   }
 }
 
+// KHR_gaussian_splatting (Khronos, 2026): scales as they are, x y z w. COLOR_0 is for programs that
+// do not know it and draw points: linear light.
+void WriteGlb(const std::vector<Gaussian>& gaussians, const DtrSet& set,
+              const std::filesystem::path& file) {
+  const std::string prefix = "KHR_gaussian_splatting:";
+  GlbPrimitive primitive{.mode = 0, .arrays = {}, .extensions = {}, .unlit = true};
+  primitive.extensions["KHR_gaussian_splatting"] = {{"kernel", "ellipse"},
+                                                    {"colorSpace", "srgb_rec709_display"},
+                                                    {"projection", "perspective"},
+                                                    {"sortingMethod", "cameraDistance"}};
+  GlbArray position("POSITION", "VEC3", GlbArray::kFloat);
+  GlbArray rotation(prefix + "ROTATION", "VEC4", GlbArray::kFloat);
+  GlbArray scale(prefix + "SCALE", "VEC3", GlbArray::kFloat);
+  GlbArray opacity(prefix + "OPACITY", "SCALAR", GlbArray::kFloat);
+  GlbArray degree0(prefix + "SH_DEGREE_0_COEF_0", "VEC3", GlbArray::kFloat);
+  GlbArray colour("COLOR_0", "VEC4", GlbArray::kUint8);
+  for (const Gaussian& gaussian : gaussians) {
+    const Eigen::Quaternionf& q = gaussian.world_from_axes;
+    position.Put(gaussian.position);
+    for (const float v : {q.x(), q.y(), q.z(), q.w()}) rotation.Put(v);
+    scale.Put(gaussian.deviation);
+    opacity.Put(gaussian.opacity);
+    for (const float v : gaussian.rgb) degree0.Put(static_cast<float>((v - 0.5) / kShDegree0));
+    for (const float v : gaussian.rgb) {
+      colour.Put(Byte(static_cast<float>(255 * LinearFromSrgb(std::clamp(v, 0.0f, 1.0f)))));
+    }
+    colour.Put(Byte(255 * gaussian.opacity));
+  }
+  primitive.arrays = {std::move(position), std::move(rotation), std::move(scale),
+                      std::move(opacity),  std::move(degree0),  std::move(colour)};
+  WriteGlb(file, set, primitive);
+}
+
 }  // namespace
 
 ExportReport ExportSplat(const ExportRequest& request, Progress& progress) {
   const DtrSet set = SetWithDepth(request, "splat", progress);
   const std::filesystem::path output = WithoutTrailingSlash(request.output);
   const std::string extension = LowerExtension(output);
-  if (extension != ".ply" && extension != ".splat") {
-    throw UsageError(fmt::format("{}: expected a name ending in .ply or .splat, found '{}'",
+  if (extension != ".ply" && extension != ".splat" && extension != ".glb") {
+    throw UsageError(fmt::format("{}: expected a name ending in .ply or .splat or .glb, found '{}'",
                                  output.string(), output.extension().string()));
   }
   const std::filesystem::path sidecar = output.string() + ".json";
@@ -152,13 +196,17 @@ ExportReport ExportSplat(const ExportRequest& request, Progress& progress) {
   for (const View& view : set.frames.front().views) report.images += view.depth_file.has_value();
   std::vector<Gaussian> gaussians = Gaussians(request, set).Make(progress);
   report.points = gaussians.size();
-  FileStream file(target.path());
-  if (extension == ".ply") {
-    WritePly(gaussians, request, set, file);
+  if (extension == ".glb") {
+    WriteGlb(gaussians, set, target.path());
   } else {
-    WriteSplat(std::move(gaussians), file);
+    FileStream file(target.path());
+    if (extension == ".ply") {
+      WritePly(gaussians, request, set, file);
+    } else {
+      WriteSplat(std::move(gaussians), file);
+    }
+    file.Flush();
   }
-  file.Flush();
   target.Publish();
   if (extension == ".splat") {  // which has no place for words
     nlohmann::ordered_json facts = SetFacts(set);

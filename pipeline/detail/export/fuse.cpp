@@ -20,6 +20,8 @@ constexpr double kSameDepth = 0.05;
 // and calibration take.
 constexpr double kFloorPx = 0.25;
 constexpr int kPlaneRadius = 2;
+// Weight of the colour that another view as near as a sample's own shows.
+constexpr double kOtherColour = 0.5;
 
 // A bit for every pixel of a depth map; set from several threads.
 class Marks {
@@ -168,6 +170,29 @@ class ViewFusion {
     candidate.variances.push_back(sigma * sigma);
   }
 
+  // Means of photos err less than one of them. Those that see the patch coarser blur it, so they
+  // weigh less.
+  std::array<std::uint8_t, 3> Colour(int x, int y, const Candidate& candidate) const {
+    std::array<double, 3> sum{};
+    double weights = 0;
+    const auto add = [&](const SurfaceView& view, const Eigen::Vector2d& pixel, double weight) {
+      const std::array<double, 3> rgb = view.ColourAt(pixel);
+      for (size_t c = 0; c < 3; ++c) sum[c] += weight * rgb[c];
+      weights += weight;
+    };
+    add(surface_, {x + 0.5, y + 0.5}, 1);
+    for (const Confirmation& confirmation : candidate.confirmations) {
+      const SurfaceView& other = *confirmation.other;
+      const double finer =
+          candidate.footprint / Footprint(other, candidate.p_in_world - other.centre,
+                                          1 / confirmation.inverse_depth, candidate.normal);
+      add(other, confirmation.pixel, kOtherColour * std::min(1.0, std::pow(finer, 4)));
+    }
+    std::array<std::uint8_t, 3> rgb{};
+    for (size_t c = 0; c < 3; ++c) rgb[c] = static_cast<std::uint8_t>(sum[c] / weights + 0.5);
+    return rgb;
+  }
+
   FusedSample Fused(int x, int y, Candidate& candidate) const {
     FusedSample sample;
     sample.x = x;
@@ -177,6 +202,7 @@ class ViewFusion {
     sample.views = 1 + static_cast<int>(candidate.confirmations.size());
     sample.p_in_world = candidate.p_in_world;
     sample.sigma = static_cast<float>(candidate.sigma);
+    if (!surface_.colours.empty()) sample.rgb = Colour(x, y, candidate);
     if (!(candidate.sigma > 0)) return sample;
     candidate.distances = {(candidate.p_in_world - surface_.centre).norm()};
     candidate.variances = {candidate.sigma * candidate.sigma};

@@ -1,6 +1,8 @@
 // pipeline/detail/export/fuse.h -- the depth maps of a set as one surface: a sample for each patch.
 #pragma once
 #include <Eigen/Core>
+#include <array>
+#include <cstdint>
 #include <functional>
 #include <vector>
 
@@ -23,8 +25,9 @@ struct FusedSample {
   Eigen::Vector3d p_in_world;  ///< on that pixel's ray; mean of all views that show it
   Eigen::Vector3f normal;      ///< unit length, to the camera, in the world
   float sigma = 0;             ///< standard deviation of its distance, scene units; 0: not known
-  int views = 1;               ///< that show it
-  bool completed = false;      ///< its depth was not measured
+  std::array<std::uint8_t, 3> rgb{};  ///< sRGB, mean of these views; 0 where they have no colours
+  int views = 1;                      ///< that show it
+  bool completed = false;             ///< its depth was not measured
 };
 
 /// What a view contributes, row by row from the top.

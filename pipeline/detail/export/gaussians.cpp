@@ -13,20 +13,21 @@ constexpr float kNoSquare = std::numeric_limits<float>::infinity();
 // What costs 1: colours that deviate by so much (root mean square, 8-bit sRGB), surfaces that bend
 // by so many pixels of disparity.
 constexpr double kColourDeviation = 3, kBendPx = 0.25;
-// Standard deviation of a Gaussian as a share of the distance to its neighbour: less lets what
-// lies behind shine through, more blurs.
-constexpr double kSpread = 0.5;
+// Variance of a Gaussian in an image, by the square of the distance to its neighbour: less lets
+// what lies behind shine through (2 % between four neighbours at this one), more blurs.
+constexpr double kVariance = 0.55;
+// What renderers add to it, square pixels (Kerbl et al. 2023). The rest is never less than kLeast.
+constexpr double kLowPass = 0.3, kLeastVariance = 0.2;
 // Surfaces are drawn no more oblique to the view than this cosine: its pixels know no better.
 constexpr double kLeastCosine = 0.25;
 // Thickness along the normal, shares of the distance to its neighbour.
 constexpr double kThinnest = 0.05, kThickest = 0.3;
 // By the number of views that show a surface there.
-constexpr float kOpacities[] = {0.9f, 0.97f, 0.99f};
+constexpr float kOpacities[] = {0.8f, 0.85f, 0.9f};
 
 }  // namespace
 
-SplatTree::SplatTree(const SurfaceView& surface, const std::vector<FusedSample>& samples,
-                     const ImageRgb8& colours)
+SplatTree::SplatTree(const SurfaceView& surface, const std::vector<FusedSample>& samples)
     : camera_(surface.camera),
       rotation_(surface.rotation),
       centre_(surface.centre),
@@ -34,11 +35,7 @@ SplatTree::SplatTree(const SurfaceView& surface, const std::vector<FusedSample>&
   samples_.reserve(samples.size());
   for (const FusedSample& sample : samples) {
     index_(sample.x, sample.y) = static_cast<std::int32_t>(samples_.size());
-    const std::uint8_t* rgb = &colours(sample.x, sample.y);
-    samples_.push_back({sample.p_in_world.cast<float>(),
-                        sample.normal,
-                        sample.sigma,
-                        {rgb[0], rgb[1], rgb[2]},
+    samples_.push_back({sample.p_in_world.cast<float>(), sample.normal, sample.sigma, sample.rgb,
                         static_cast<std::uint8_t>(std::min(sample.views, 255))});
   }
   for (int k = 1; k <= kLevels; ++k) {
@@ -69,18 +66,31 @@ SplatTree::SplatTree(const SurfaceView& surface, const std::vector<FusedSample>&
   }
 }
 
+// Its Gaussian reaches half a side beyond the square, so what lies there must fit too.
 float SplatTree::CostOf(const SurfaceView& surface, int x, int y, int side) const {
   double sum[3] = {}, squares[3] = {};
-  double w_sum = 0, w_x = 0, w_y = 0;
+  double w_sum = 0, w_x = 0, w_y = 0, spread = 0;
   const double middle = 0.5 * (side - 1);
-  double spread = 0;
+  const int x0 = std::max(0, x - side / 2),
+            x1 = std::min(surface.colours.width(), x + side + side / 2);
+  const int y0 = std::max(0, y - side / 2),
+            y1 = std::min(surface.colours.height(), y + side + side / 2);
+  for (int v = y0; v < y1; ++v) {
+    for (int u = x0; u < x1; ++u) {
+      if (!(surface.inverse_depth(u, v) > 0)) return kNoSquare;
+      for (int c = 0; c < 3; ++c) {
+        sum[c] += surface.colours(u, v, c);
+        squares[c] += double(surface.colours(u, v, c)) * surface.colours(u, v, c);
+      }
+    }
+  }
+  const double around = double(x1 - x0) * (y1 - y0);
+  double deviation = 0;
+  for (int c = 0; c < 3; ++c) {
+    deviation = std::max(deviation, squares[c] / around - sum[c] * sum[c] / (around * around));
+  }
   for (int j = 0; j < side; ++j) {
     for (int i = 0; i < side; ++i) {
-      const Sample& sample = At(x + i, y + j);
-      for (size_t c = 0; c < 3; ++c) {
-        sum[c] += sample.rgb[c];
-        squares[c] += double(sample.rgb[c]) * sample.rgb[c];
-      }
       const double w = surface.inverse_depth(x + i, y + j);
       w_sum += w;
       w_x += w * (i - middle);
@@ -88,17 +98,12 @@ float SplatTree::CostOf(const SurfaceView& surface, int x, int y, int side) cons
       spread += (i - middle) * (i - middle);
     }
   }
-  const double count = double(side) * side;
-  double deviation = 0;
-  for (size_t c = 0; c < 3; ++c) {
-    deviation = std::max(deviation, squares[c] / count - sum[c] * sum[c] / (count * count));
-  }
   double bend = 0;
-  for (int j = 0; j < side; ++j) {
-    for (int i = 0; i < side; ++i) {
-      const double plane =
-          w_sum / count + w_x / spread * (i - middle) + w_y / spread * (j - middle);
-      bend = std::max(bend, std::abs(surface.inverse_depth(x + i, y + j) - plane));
+  for (int v = y0; v < y1; ++v) {
+    for (int u = x0; u < x1; ++u) {
+      const double plane = w_sum / (double(side) * side) + w_x / spread * (u - x - middle) +
+                           w_y / spread * (v - y - middle);
+      bend = std::max(bend, std::abs(surface.inverse_depth(u, v) - plane));
     }
   }
   return static_cast<float>(std::max(std::sqrt(std::max(0.0, deviation)) / kColourDeviation,
@@ -155,9 +160,10 @@ Gaussian SplatTree::GaussianOf(int x, int y, int side) const {
   const Eigen::Vector3d along_v = side * (hit(u, v + 0.25) - hit(u, v - 0.25)) * 2;
   const double least = std::min(along_u.norm(), along_v.norm());
   const double thickness = std::clamp(sigma, kThinnest * least, kThickest * least);
+  const double variance = std::max(kLeastVariance, kVariance - kLowPass / count);
   const Eigen::Matrix3d covariance =
-      kSpread * kSpread * (along_u * along_u.transpose() + along_v * along_v.transpose()) +
-      thickness * thickness * kSpread * kSpread * normal * normal.transpose();
+      variance * (along_u * along_u.transpose() + along_v * along_v.transpose() +
+                  thickness * thickness * normal * normal.transpose());
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance);
   Eigen::Matrix3d axes = solver.eigenvectors();
   if (axes.determinant() < 0) axes.col(0) = -axes.col(0);

@@ -23,9 +23,8 @@ struct Gaussian {
 /// Gaussian; `cost` says what is lost by that: 1 is about what the eye begins to see.
 class SplatTree {
  public:
-  /// `colours` on the grid of the view's depth map.
-  SplatTree(const SurfaceView& surface, const std::vector<FusedSample>& samples,
-            const ImageRgb8& colours);
+  /// `surface` with its colours.
+  SplatTree(const SurfaceView& surface, const std::vector<FusedSample>& samples);
 
   size_t samples() const { return samples_.size(); }
   /// Of every square that can be merged: four become one where its cost is at most the bound. No

@@ -8,6 +8,7 @@
 #include "dtr/base/memory_budget.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/io/set_io.h"
+#include "pipeline/detail/export/sample_colours.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -37,7 +38,8 @@ double MedianInverseDepth(const Grid<float>& inverse_depth) {
 
 double BytesOf(const SurfaceView& surface) {
   return static_cast<double>(4 * surface.inverse_depth.data().size() +
-                             4 * surface.sigma.data().size() + surface.completed.data().size());
+                             4 * surface.sigma.data().size() + surface.completed.data().size() +
+                             surface.far.data().size() + surface.colours.data().size());
 }
 
 }  // namespace
@@ -59,6 +61,21 @@ std::optional<double> SurfaceView::InverseDepthAt(const Eigen::Vector2d& pixel) 
             yn = static_cast<int>(std::floor(pixel.y()));
   if (!inverse_depth.Contains(xn, yn) || !(inverse_depth(xn, yn) > 0)) return std::nullopt;
   return inverse_depth(xn, yn);
+}
+
+std::array<double, 3> SurfaceView::ColourAt(const Eigen::Vector2d& pixel) const {
+  const double x = std::clamp(pixel.x() - 0.5, 0.0, colours.width() - 1.0);
+  const double y = std::clamp(pixel.y() - 0.5, 0.0, colours.height() - 1.0);
+  const int x0 = static_cast<int>(x), y0 = static_cast<int>(y);
+  const int x1 = std::min(x0 + 1, colours.width() - 1), y1 = std::min(y0 + 1, colours.height() - 1);
+  const double u = x - x0, v = y - y0;
+  std::array<double, 3> rgb{};
+  for (int c = 0; c < 3; ++c) {
+    rgb[static_cast<size_t>(c)] =
+        (1 - v) * ((1 - u) * colours(x0, y0, c) + u * colours(x1, y0, c)) +
+        v * ((1 - u) * colours(x0, y1, c) + u * colours(x1, y1, c));
+  }
+  return rgb;
 }
 
 double SurfaceView::SigmaAt(const Eigen::Vector2d& pixel) const {
@@ -137,18 +154,22 @@ SurfaceView SurfaceViews::Load(int index) const {
   surface.centre = listed.CenterInWorld();
   surface.inverse_depth = Grid<float>(view.depth.width(), view.depth.height());
   if (!view.depth_state.empty())
-    surface.completed = Grid<std::uint8_t>(view.depth.width(), view.depth.height());
+    surface.completed = surface.far = Grid<std::uint8_t>(view.depth.width(), view.depth.height());
   for (int y = 0; y < view.depth.height(); ++y) {
     for (int x = 0; x < view.depth.width(); ++x) {
       const float z = view.depth(x, y);
       if (DepthImage::IsHole(z) || !IsUsable(view, x, y)) continue;
       const DepthState state =
           view.depth_state.empty() ? DepthState::kMeasured : view.depth_state(x, y);
-      if (state == DepthState::kFar) continue;
+      if (state == DepthState::kFar) {
+        surface.far(x, y) = 1;
+        continue;
+      }
       surface.inverse_depth(x, y) = 1 / z;
       if (state == DepthState::kCompleted) surface.completed(x, y) = 1;
     }
   }
+  if (options_.colours) surface.colours = ColoursOnDepthGrid(folder_, listed);
   if (view.inverse_depth_sigma) surface.sigma = std::move(*view.inverse_depth_sigma);
   surface.inverse_depth_per_px = listed.reference_baseline > 0
                                      ? 1 / (surface.camera.fx_px() * listed.reference_baseline)

@@ -2,6 +2,7 @@
 // in memory.
 #pragma once
 #include <Eigen/Core>
+#include <array>
 #include <filesystem>
 #include <list>
 #include <map>
@@ -23,6 +24,8 @@ struct SurfaceView {
   Grid<float> inverse_depth;     ///< 1/z, 1 / scene units; 0: no surface, or masked
   Grid<float> sigma;             ///< standard deviation of it; 0: not known; may be empty
   Grid<std::uint8_t> completed;  ///< 1 where depth was completed; empty: nowhere
+  Grid<std::uint8_t> far;        ///< 1 where a view shows the sky; empty: not known
+  ImageRgb8 colours;             ///< in the set's mean exposure; empty: not asked for
   /// A difference of 1/z that is one pixel of disparity to the view's neighbours.
   double inverse_depth_per_px = 0;
 
@@ -37,6 +40,8 @@ struct SurfaceView {
   /// 1/z at a pixel position: bilinear within one surface, else the nearest sample's; empty where
   /// that has none.
   std::optional<double> InverseDepthAt(const Eigen::Vector2d& pixel) const;
+  /// Colour there, bilinear, 0...255. Requires colours.
+  std::array<double, 3> ColourAt(const Eigen::Vector2d& pixel) const;
   /// Sigma of the sample that holds the pixel position; 0 where it is not known.
   double SigmaAt(const Eigen::Vector2d& pixel) const;
 };
@@ -61,6 +66,7 @@ class SurfaceViews {
  public:
   struct Options {
     bool completed = false;  ///< with what was completed, but for what is infinitely far
+    bool colours = false;
     double memory_gb = 4;
     int threads = 0;
   };
