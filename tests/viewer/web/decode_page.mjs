@@ -24,7 +24,9 @@ const views = parseHeader(elementText("set")).views.map((view) => {
     found.inverse += table[code];
   }
   // Bytes that are cut short or too many are never read as depth.
-  for (const wrong of [part.subarray(0, part.length - 1), part.subarray(0, part.length >> 1), part.subarray(0, 3), Uint8Array.of(...part, 0)]) {
+  const longer = new Uint8Array(part.length + 1);
+  longer.set(part);
+  for (const wrong of [part.subarray(0, part.length - 1), part.subarray(0, part.length >> 1), part.subarray(0, 3), longer]) {
     try {
       decodeCodes(wrong, view, view.name);
     } catch {
