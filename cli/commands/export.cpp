@@ -108,9 +108,7 @@ int RunWeb(const pipeline::WebPageRequest& request, const Context& context) {
                                  ? fmt::format("photos of JPEG quality {}", report.jpeg_quality)
                                  : "photos as in the set";
   const std::string depth =
-      report.depth_error_px > 0
-          ? fmt::format("depth within {} px of disparity", report.depth_error_px)
-          : "depth within 0.02 px of disparity of the set's";
+      fmt::format("depth within {} px of disparity of the set's", report.depth_error_px);
   context.console.Say(fmt::format("{}: {} views, {:.1f} MB, {}, {}", request.output.string(),
                                   report.views, static_cast<double>(report.bytes) / 1e6, photos,
                                   depth));
@@ -219,7 +217,7 @@ void AddWebOptions(CLI::App& command, ExportOptions& options) {
   options.of_formats.push_back(
       {command
            .add_option("--jpeg-quality", options.web.jpeg_quality,
-                       "web: of the photos [80, or the JPEG that the set stores]")
+                       "web: of the photos [85, or the JPEG that the set stores]")
            ->check(CLI::Range(1, 100))
            ->type_name("Q"),
        {"web"}});

@@ -97,19 +97,30 @@ std::pair<std::string, std::string> Frame(const WebPage& page) {
 
 }  // namespace
 
-std::string Base64(std::string_view bytes) {
-  constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+std::string TextOfBytes(std::string_view bytes) {
+  // NUL, carriage return and < are changed by HTML. One of them and the value after it are a
+  // character of two bytes.
+  constexpr std::string_view kReplaced("\0\r<", 3);
+  constexpr size_t kPairs = 0x100;
   std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (size_t at = 0; at < bytes.size(); at += 3) {
-    const size_t count = std::min<size_t>(3, bytes.size() - at);
-    std::uint32_t group = 0;
-    for (size_t i = 0; i < 3; ++i) {
-      group = group << 8 | (i < count ? static_cast<unsigned char>(bytes[at + i]) : 0u);
+  text.reserve(bytes.size() / 7 * 8 + 16);
+  const size_t values = (8 * bytes.size() + 6) / 7;
+  const auto byte = [&](size_t i) -> unsigned {
+    return i < bytes.size() ? static_cast<unsigned char>(bytes[i]) : 0;
+  };
+  const auto value = [&](size_t i) -> unsigned {
+    const size_t first = 7 * i / 8;
+    return (byte(first) << 8 | byte(first + 1)) >> (9 - 7 * i % 8) & 127;
+  };
+  for (size_t i = 0; i < values; ++i) {
+    const size_t replaced = kReplaced.find(static_cast<char>(value(i)));
+    if (replaced == std::string_view::npos) {
+      text += static_cast<char>(value(i));
+      continue;
     }
-    for (size_t i = 0; i < 4; ++i) {
-      text += i <= count ? kDigits[group >> (18 - 6 * i) & 63] : '=';
-    }
+    const size_t pair = kPairs + 128 * replaced + value(++i);
+    text += static_cast<char>(0xc0 | pair >> 6);
+    text += static_cast<char>(0x80 | (pair & 63));
   }
   return text;
 }
@@ -125,7 +136,7 @@ std::string MakeWebPage(const WebPage& page) {
   auto [text, after] = Frame(page);
   for (size_t i = 0; i < page.views.size(); ++i) {
     text += ViewStart(i);
-    text += Base64(page.views[i]);
+    text += TextOfBytes(page.views[i]);
     text += kViewEnd;
   }
   return text + after;

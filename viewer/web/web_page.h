@@ -17,8 +17,9 @@ struct WebPage {
 /// The whole page: no other file and no server is needed to open it.
 std::string MakeWebPage(const WebPage& page);
 
-/// RFC 4648, with padding.
-std::string Base64(std::string_view bytes);
+/// Bytes as UTF-8 text that HTML keeps as it is within a script element, 8 bytes for 7
+/// (docs/EXPORT.md, "Text").
+std::string TextOfBytes(std::string_view bytes);
 
 /// The page's modules as one, each after those that it imports.
 std::string JoinedScript();

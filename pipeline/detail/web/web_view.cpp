@@ -12,10 +12,11 @@
 #include "dtr/base/order_statistics.h"
 #include "dtr/io/code_residuals.h"
 #include "dtr/io/depth_io.h"
-#include "dtr/io/image_io.h"
 #include "dtr/render/adaptive_mesh.h"
 #include "dtr/render/scene.h"
+#include "dtr/report/encode.h"
 #include "dtr/types/inverse_depth_code.h"
+#include "pipeline/detail/web/depth_coder.h"
 
 namespace dtr::pipeline {
 namespace {
@@ -25,8 +26,6 @@ using Json = nlohmann::ordered_json;
 
 // Codes of both maps fit into 16 bits together.
 constexpr int kMaxMeasuredSteps = 49152, kMaxCompletedSteps = 16000;
-// Of depth that the set holds in no steps, or too many: far below what stereo knows.
-constexpr double kFineErrorPx = 0.02;
 constexpr std::uintmax_t kMaxJpegBytes = std::uintmax_t{1} << 30;
 
 /// A map in codes of inverse depth, and its depth as it is read back.
@@ -52,16 +51,15 @@ int StepsFor(double near_z, double far_z, double error_px, double pixel) {
   return static_cast<int>(std::clamp(steps, 1.0, static_cast<double>(kMaxMeasuredSteps)));
 }
 
-/// The set's own codes where they fit and are not finer than asked for.
+/// The set's own codes where they are not finer than asked for.
 CodedMap CodedMeasured(const View& view, const DepthImage& measured, const WebCoding& coding) {
   const double pixel = ThresholdsOf(view, {}).pixel;
   io::DepthRangeOfMap range{view.near_z, view.far_z};
   if (!InverseDepthCode::IsRange(range.near_z, range.far_z)) range = io::RangeOf(measured);
   const bool in_steps = view.depth_coding == DepthCoding::kZstdInverseDepth &&
                         view.depth_steps <= kMaxMeasuredSteps && view.depth_steps > 0;
-  const double error_px = coding.depth_error_px > 0 ? coding.depth_error_px : kFineErrorPx;
-  const int wanted = StepsFor(range.near_z, range.far_z, error_px, pixel);
-  const bool own = in_steps && (coding.depth_error_px == 0 || view.depth_steps <= wanted);
+  const int wanted = StepsFor(range.near_z, range.far_z, coding.depth_error_px, pixel);
+  const bool own = in_steps && view.depth_steps <= wanted;
   return Coded(measured, range.near_z, range.far_z, own ? view.depth_steps : wanted);
 }
 
@@ -109,15 +107,6 @@ class Parts {
   std::string bytes_;
   Json json_ = Json::object();
 };
-
-std::string PlainBytes(const CodedMap& map) {
-  const io::CodeParts parts = io::SplitCodes(map.codes, 0, map.codes.height());
-  std::string bytes;
-  for (const auto* part : {&parts.validity, &parts.residuals, &parts.wide}) {
-    bytes.append(part->begin(), part->end());
-  }
-  return bytes;
-}
 
 std::string PlainBytes(const Mask& mask) {
   const size_t row_bytes = io::ValidityRowBytes(mask.width());
@@ -167,16 +156,11 @@ BlockCover CoverOf(const View& set_view, const View& view) {
   return MakeStoredMesh(view, options, 1).cover;
 }
 
-std::string JpegOf(const View& view, const fs::path& set, const WebCoding& coding,
-                   const fs::path& work) {
+std::string JpegOf(const View& view, const fs::path& set, const WebCoding& coding) {
   if (!coding.recodes_jpeg && IsStoredAsJpeg(view)) {
     return ReadFile(set / view.image_file->path, kMaxJpegBytes);
   }
-  const fs::path file = work / (view.id + ".jpg");
-  io::WriteImage(file, view.image, coding.jpeg_quality);
-  std::string bytes = ReadFile(file, kMaxJpegBytes);
-  fs::remove(file);
-  return bytes;
+  return report::EncodeJpeg(view.image, coding.jpeg_quality);
 }
 
 /// Median standard deviation of the measured depth, pixels of disparity; 0: the set has none.
@@ -217,8 +201,7 @@ bool IsStoredAsJpeg(const View& view) {
   return extension == ".jpg" || extension == ".jpeg";
 }
 
-WebView PackView(const View& view, const fs::path& set, const WebCoding& coding,
-                 const fs::path& work) {
+WebView PackView(const View& view, const fs::path& set, const WebCoding& coding) {
   const CodedMap measured = CodedMeasured(view, MeasuredDepth(view), coding);
   const DepthImage completed_depth = CompletedDepth(view);
   const bool completes = completed_depth.width() > 0;
@@ -229,14 +212,14 @@ WebView PackView(const View& view, const fs::path& set, const WebCoding& coding,
   json["completed"] = nullptr;
 
   Parts parts;
-  parts.Add("image", JpegOf(view, set, coding, work), 0);
-  parts.AddDeflated("depth", PlainBytes(measured));
+  parts.Add("image", JpegOf(view, set, coding), 0);
+  CodedMap completed;
   if (completes) {
-    const CodedMap completed = CodedCompleted(view, completed_depth);
+    completed = CodedCompleted(view, completed_depth);
     PutDepth(completed, coded.depth);
     json["completed"] = JsonOf(completed);
-    parts.AddDeflated("completed", PlainBytes(completed));
   }
+  parts.Add("depth", EncodeDepthCodes(measured.codes, completed.codes), 0);
   if (!view.mask.empty()) parts.AddDeflated("mask", PlainBytes(view.mask));
   parts.AddDeflated("mesh", PlainBytes(CoverOf(view, coded)));
   json["parts"] = parts.json();

@@ -1,4 +1,4 @@
-// Bytes as the page holds them: base64, a checksum, deflate. Nothing here trusts a length.
+// Bytes as the page holds them: text, a checksum, deflate. Nothing here trusts a length.
 import { Problem, fail } from "./problem.js";
 
 const kCrcTable = Uint32Array.from({ length: 256 }, (_, n) => {
@@ -14,17 +14,36 @@ export function crc32(bytes) {
   return (c ^ 0xffffffff) >>> 0;
 }
 
-/** Bytes of base64 text; a Problem where it is none. */
-export function bytesOfBase64(text, where) {
-  try {
-    if (Uint8Array.fromBase64) return Uint8Array.fromBase64(text);
-    const binary = atob(text);
-    const bytes = new Uint8Array(binary.length);
-    for (let i = 0; i < binary.length; ++i) bytes[i] = binary.charCodeAt(i);
-    return bytes;
-  } catch {
-    return fail(where, "base64 text", "something else");
+// Values of 7 bits that HTML does not leave as they are; with the value after it each is one character from here on.
+const kReplaced = [0, 13, 60], kPairs = 0x100;
+
+/** `size` bytes out of text that holds 7 bits a character (docs/EXPORT.md, "Text"); a Problem where it holds others. */
+export function bytesOfText(text, size, where) {
+  if (8 * text.length < 4 * size) fail(where, `${size} bytes`, String(Math.floor(text.length * 7 / 8)));
+  const bytes = new Uint8Array(size);
+  let filled = 0, bits = 0, count = 0;
+  const put = (value) => {
+    bits = bits << 7 | value;
+    count += 7;
+    if (count < 8) return;
+    count -= 8;
+    if (filled < size) bytes[filled] = bits >> count;
+    ++filled;
+    bits &= (1 << count) - 1;
+  };
+  for (let i = 0; i < text.length; ++i) {
+    const c = text.charCodeAt(i), pair = c - kPairs;
+    if (c < 128) {
+      put(c);
+    } else if (pair >= 0 && pair < 128 * kReplaced.length) {
+      put(kReplaced[pair >> 7]);
+      put(pair & 127);
+    } else {
+      fail(where, "bytes of its checksum", "others");
+    }
   }
+  // A character of two values may add one at the end.
+  return filled === size || filled === size + 1 ? bytes : fail(where, `${size} bytes`, String(filled));
 }
 
 /** Exactly `size` bytes out of a zlib stream (RFC 1950). No more than that is ever kept. */

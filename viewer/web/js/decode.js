@@ -1,6 +1,6 @@
 // A view out of the page's text: what renderers need of it. Runs in workers, and without a document.
 import { fail } from "./problem.js";
-import { bytesOfBase64, crc32, inflate } from "./bytes.js";
+import { bytesOfText, crc32, inflate } from "./bytes.js";
 import { decodeCodes, inverseDepthTable } from "./depth_codes.js";
 import { Samples, blockFlags } from "./breaks.js";
 import { makeMesh, parseCover } from "./mesh.js";
@@ -43,35 +43,21 @@ function maskedSamples(distance, view) {
   return masked;
 }
 
-// Measured and completed codes in one map.
-function joined(measured, completed, measuredCodes, where) {
-  if (!completed) return measured;
-  for (let k = 0; k < measured.length; ++k) {
-    if (completed[k] === 0) continue;
-    if (measured[k] !== 0) fail(where, "one depth for each pixel", "two");
-    measured[k] = completed[k] + measuredCodes;
-  }
-  return measured;
-}
-
 /** The view of a header with its pixels: photo (ImageBitmap), codes, flags of blocks, mesh, mask distances (null: no mask). */
 export async function decodeView(view, text) {
   const where = `photo ${view.name}`;
-  const bytes = bytesOfBase64(text, where);
-  if (bytes.length !== view.bytes) fail(where, `${view.bytes} bytes`, String(bytes.length));
+  const bytes = bytesOfText(text, view.bytes, where);
   if (crc32(bytes) !== view.crc) fail(where, "bytes of its checksum", "others");
   const part = (name) => bytes.subarray(view.parts[name].first, view.parts[name].end);
   const inflated = (name) => (view.parts[name].size > 0 ? inflate(part(name), view.parts[name].size, `${where}: ${name}`) : null);
-  const [depth, completed, mask, cover] = await Promise.all(["depth", "completed", "mask", "mesh"].map(inflated));
+  const [mask, cover] = await Promise.all(["mask", "mesh"].map(inflated));
   const photo = await createImageBitmap(new Blob([part("image")], { type: "image/jpeg" }),
     { colorSpaceConversion: "none", premultiplyAlpha: "none" }).catch(() => fail(`${where}: image`, "a JPEG", "something else"));
   if (photo.width !== view.width || photo.height !== view.height) {
     fail(`${where}: image`, `${view.width}x${view.height} pixels`, `${photo.width}x${photo.height}`);
   }
   const { columns, rows } = view;
-  const codesOf = (data, code, name) => data && decodeCodes(data, columns, rows, code.steps + 1, `${where}: ${name}`);
-  const codes = joined(codesOf(depth ?? fail(where, "a depth map", "none"), view.measured, "depth"),
-    view.completed ? codesOf(completed, view.completed, "completed") : null, view.measured.steps + 1, where);
+  const codes = decodeCodes(part("depth"), view, `${where}: depth`);
   const distance = mask && maskDistances(mask, view, `${where}: mask`);
   const masked = distance && maskedSamples(distance, view);
   if (masked) for (let k = 0; k < codes.length; ++k) if (masked[k]) codes[k] = 0;

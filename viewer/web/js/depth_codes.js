@@ -1,59 +1,90 @@
-// Codes of inverse depth without loss: validity bits, residuals of a prediction, wide residuals
-// (docs/FORMAT.md 4.1, as one band).
+// Codes of inverse depth without loss: pipeline/detail/web/depth_coder.cpp writes them (docs/EXPORT.md, "Depth").
 import { fail } from "./problem.js";
+import { RangeDecoder, bitModels } from "./range_decoder.js";
 
-function countOfBits(byte) {
-  let n = 0;
-  for (; byte; byte &= byte - 1) ++n;
-  return n;
+// The same numbers stand in pipeline/detail/web/depth_coder.cpp.
+const kClassNeighbours = 729;
+const kActivities = 16, kSides = 3;
+const kMaxError = 64;
+const kUnary = 14;
+const kZero = 0, kNegative = 1, kMore = 2, kLength = kMore + kUnary, kModels = 36;
+const kMaxLength = 16;
+const kRough = [12, 16, 23, 32, 45, 64, 91];
+
+function activityLevel(activity) {
+  if (activity < 8) return activity;
+  let level = 8;
+  while (level < 15 && activity >= kRough[level - 8]) ++level;
+  return level;
 }
 
-// Undoes each row's XOR with the one above it.
-function undoRows(bits, rowBytes) {
-  for (let i = rowBytes; i < bits.length; ++i) bits[i] ^= bits[i - rowBytes];
-}
-
-/** The codes of columns x rows pixels from the inflated parts, one after the other; 0 where there is none. */
-export function decodeCodes(bytes, columns, rows, largest, where) {
-  const rowBytes = (columns + 7) >> 3;
-  const validityBytes = rowBytes * rows;
-  if (bytes.length < validityBytes) fail(where, `at least ${validityBytes} bytes`, String(bytes.length));
-  const validity = bytes.slice(0, validityBytes);
-  undoRows(validity, rowBytes);
-  let valid = 0;
-  for (let i = 0; i < validityBytes; ++i) valid += countOfBits(validity[i]);
-  const wideStart = validityBytes + valid;
-  if (bytes.length < wideStart) fail(where, `${valid} residuals`, "fewer");
-
-  const codes = new Uint16Array(columns * rows);
-  const row = new Int32Array(columns + 1);
-  let residual = validityBytes, wide = wideStart, wrong = false;
-  for (let y = 0; y < rows; ++y) {
-    let left = y === 0 ? 0 : row[1], aboveLeft = left;
-    for (let x = 0; x < columns; ++x) {
-      const above = y === 0 ? left : row[x + 1];
-      let value = left;
-      if (y !== 0) {
-        const low = Math.min(left, above), high = Math.max(left, above);
-        value = Math.max(low, Math.min(high, left + above - aboveLeft));
-      }
-      if (validity[y * rowBytes + (x >> 3)] >> (x & 7) & 1) {
-        if (residual >= wideStart) return fail(where, "bits of the map alone", "more");
-        let folded = bytes[residual++];
-        if (folded === 255) {
-          if (wide + 2 > bytes.length) return fail(where, "wide residuals", "the end");
-          folded = bytes[wide] | bytes[wide + 1] << 8;
-          wide += 2;
-        }
-        value = value + ((folded >> 1) ^ -(folded & 1)) & 0xffff;
-        wrong ||= value === 0 || value > largest;
-        codes[y * columns + x] = value;
-      }
-      aboveLeft = row[x + 1];
-      row[x + 1] = left = value;
+// Per pixel: 0 no depth, 1 measured, 2 completed.
+function decodeClasses(decoder, columns, rows) {
+  const models = bitModels(2 * kClassNeighbours);
+  const classes = new Uint8Array(columns * rows);
+  const at = (x, y) => (x >= 0 && y >= 0 && x < columns ? classes[y * columns + x] : 0);
+  for (let y = 0, k = 0; y < rows; ++y) {
+    for (let x = 0; x < columns; ++x, ++k) {
+      const context = ((((at(x - 1, y) * 3 + at(x, y - 1)) * 3 + at(x - 1, y - 1)) * 3 + at(x + 1, y - 1)) * 3 + at(x - 2, y)) * 3 + at(x, y - 2);
+      if (decoder.bit(models, 2 * context)) classes[k] = 1;
+      else if (decoder.bit(models, 2 * context + 1)) classes[k] = 2;
     }
   }
-  if (wrong || residual !== wideStart || wide !== bytes.length) fail(where, `codes from 1 to ${largest}`, "others");
+  return classes;
+}
+
+function decodeResidual(decoder, models, first) {
+  if (!decoder.bit(models, first + kZero)) return 0;
+  const negative = decoder.bit(models, first + kNegative);
+  let magnitude = 1;
+  while (magnitude <= kUnary && decoder.bit(models, first + kMore + magnitude - 1)) ++magnitude;
+  if (magnitude > kUnary) {
+    let length = 0;
+    while (decoder.bit(models, first + kLength + length)) {
+      if (++length > kMaxLength) return fail(decoder.where, `residuals of ${kMaxLength} bits`, "more");
+    }
+    magnitude = kUnary + (1 << length | decoder.plain(length));
+  }
+  return negative ? -magnitude : magnitude;
+}
+
+// Adds `offset` + the codes 1 to `largest` of the pixels of one class.
+function decodeSurface(decoder, classes, wanted, columns, rows, largest, offset, codes) {
+  const models = bitModels(kActivities * kSides * kModels);
+  const row = new Int32Array(columns), errors = new Int32Array(columns + 1);
+  for (let y = 0, k = 0; y < rows; ++y) {
+    let left = row[0], aboveLeft = left, leftError = 0;
+    for (let x = 0; x < columns; ++x, ++k) {
+      const above = y === 0 ? left : row[x];
+      if (y === 0) aboveLeft = left;
+      const predicted = Math.max(Math.min(left, above), Math.min(Math.max(left, above), left + above - aboveLeft));
+      let value = predicted;
+      if (classes[k] === wanted) {
+        const aboveRight = y > 0 && x + 1 < columns ? row[x + 1] : above;
+        const activity = Math.abs(left - aboveLeft) + Math.abs(above - aboveLeft) + Math.abs(aboveRight - above) +
+          leftError + errors[x] + errors[x + 1];
+        const side = left < above ? 0 : left === above ? 1 : 2;
+        value += decodeResidual(decoder, models, (activityLevel(activity) * kSides + side) * kModels);
+        if (value < 1 || value > largest) fail(decoder.where, `codes from 1 to ${largest}`, "others");
+        codes[k] = offset + value;
+      }
+      aboveLeft = above;
+      row[x] = left = value;
+      errors[x] = leftError = Math.min(Math.abs(value - predicted), kMaxError);
+    }
+  }
+}
+
+/** The codes of a view's samples out of its bytes: 1 to steps + 1 measured, what follows completed, 0 none. */
+export function decodeCodes(bytes, view, where) {
+  const { columns, rows, measured, completed } = view;
+  const decoder = new RangeDecoder(bytes, where);
+  const classes = decodeClasses(decoder, columns, rows);
+  if (!completed && classes.includes(2)) fail(where, "measured depth alone", "completed depth");
+  const codes = new Uint16Array(columns * rows);
+  decodeSurface(decoder, classes, 1, columns, rows, measured.steps + 1, 0, codes);
+  if (completed) decodeSurface(decoder, classes, 2, columns, rows, completed.steps + 1, measured.steps + 1, codes);
+  decoder.finish();
   return codes;
 }
 

@@ -37,7 +37,7 @@ function codeOf(value, where) {
 function partsOf(value, bytes, where) {
   const parts = {};
   let end = 0;
-  for (const name of ["image", "depth", "completed", "mask", "mesh"]) {
+  for (const name of ["image", "depth", "mask", "mesh"]) {
     const sizes = numbers(value?.[name] ?? [0, 0], 2, `${where}.${name}`, 0, 4 * kMaxPixels);
     const stored = whole(sizes[0], `${where}.${name}[0]`, 0, bytes);
     const size = whole(sizes[1], `${where}.${name}[1]`, 0, 5 * kMaxPixels);
@@ -85,7 +85,7 @@ export function parseHeader(text) {
   } catch {
     return fail("set", "a JSON object", "something else");
   }
-  if (json?.format !== "dtr-web-page" || json.version !== 1) fail("set", "a dtr-web-page of version 1", "another format");
+  if (json?.format !== "dtr-web-page" || json.version !== 2) fail("set", "a dtr-web-page of version 2", "another format");
   if (!Array.isArray(json.views) || json.views.length < 1 || json.views.length > kMaxViews) {
     fail("set.views", `1 to ${kMaxViews} views`, String(json.views?.length));
   }
