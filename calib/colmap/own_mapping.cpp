@@ -6,9 +6,14 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "calib/bundle/bundle.h"
+#include "calib/bundle/degeneracy.h"
 #include "calib/bundle/refine.h"
+#include "calib/colmap/graph_database.h"
 #include "calib/colmap/own_steps.h"
+#include "calib/colmap/parallax.h"
 #include "calib/colmap/sfm_steps.h"
+#include "calib/sfm/mapping/model_check.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 
@@ -25,9 +30,41 @@ constexpr double kClearlyWorse = 1.2;
 // Observations by which two models are compared; fewer tell nothing.
 constexpr int kMinHeldOut = 50;
 
-bool TakeColmaps(const GloballyMapped& ours, const calib::SfmModel& colmaps,
-                 const SfmOptions& options) {
+// What the photos leave undetermined of a model, as a clause; empty: nothing. The adjustment that
+// tells is expensive, and made only where the geometry of cameras and points, or pairs that one
+// homography explains, give cause: of a wall, a map that is far from it may look sound.
+std::string WhyUndetermined(Workspace& workspace, const calib::SfmModel& model,
+                            const SfmOptions& options) {
+  calib::Adjusted as_given;
+  as_given.bundle = calib::BundleOf(model);
+  as_given.used.assign(as_given.bundle.observations.size(), true);
+  const auto found = calib::FindDegeneracies(as_given, {}, calib::kMaxFocalShare);
+  const bool suspicious = std::any_of(found.begin(), found.end(), [](const auto& degeneracy) {
+    return degeneracy.name != "duplicate_images" && degeneracy.name != "too_few_views";
+  });
+  if (!suspicious && LackOfParallax(CountPairs(workspace)).empty()) return "";
+  calib::RefineOptions refine;
+  refine.threads = options.threads;
+  refine.seed = options.seed;
+  refine.progress = &workspace.progress();
+  return calib::WhyUndetermined(model, refine);
+}
+
+// Drops COLMAP's models unless the matches agree with the largest. Returns why not.
+std::string DropContradicted(Workspace& workspace, std::vector<calib::SfmModel>& colmaps) {
+  if (colmaps.empty()) return "";
+  sfm::ViewGraph graph = ReadViewGraph(workspace.database());
+  for (sfm::GraphImage& image : graph.images) image.name = workspace.NameOfAlias(image.name);
+  std::string why = sfm::WhyContradicted(graph, colmaps.front(), workspace.threads());
+  if (!why.empty()) colmaps.clear();
+  return why;
+}
+
+// `undetermined`: of our model, which passes otherwise.
+bool TakeColmaps(Workspace& workspace, const GloballyMapped& ours, const std::string& undetermined,
+                 const calib::SfmModel& colmaps, const SfmOptions& options) {
   if (!ours.why_not.empty() || ours.model.images.empty()) return true;
+  if (!undetermined.empty()) return WhyUndetermined(workspace, colmaps, options).empty();
   if (colmaps.images.size() <= ours.model.images.size()) return false;
   int own_count = 0, colmap_count = 0;
   const double own_px = calib::HeldOutErrorPx(ours.model, options.seed, &own_count);
@@ -35,8 +72,13 @@ bool TakeColmaps(const GloballyMapped& ours, const calib::SfmModel& colmaps,
   return std::min(own_count, colmap_count) >= kMinHeldOut && colmap_px <= kClearlyWorse * own_px;
 }
 
-std::string WhyAsked(const Workspace& workspace, const GloballyMapped& ours) {
-  if (!ours.why_not.empty()) return ours.why_not;
+std::string WhyAsked(const Workspace& workspace, const GloballyMapped& ours,
+                     const std::string& undetermined) {
+  if (!ours.why_not.empty()) {
+    const std::string lack = LackOfParallax(CountPairs(workspace));
+    return lack.empty() ? ours.why_not : ours.why_not + "; " + lack;
+  }
+  if (!undetermined.empty()) return undetermined;
   return fmt::format("{} of {} photos have no camera",
                      workspace.images().size() - ours.model.images.size(),
                      workspace.images().size());
@@ -84,13 +126,16 @@ std::vector<calib::SfmModel> MapOrFallBack(
     const std::function<std::vector<calib::SfmModel>()>& by_colmap) {
   GloballyMapped ours = MapHere(workspace, options);
   const bool passes = ours.why_not.empty() && !ours.model.images.empty();
-  if (passes && ours.model.images.size() == workspace.images().size()) {
+  const bool may_ask = options.engine == SfmEngine::kAuto;
+  const bool ask = may_ask && Program::IsInstalled();
+  // A model that validation rejects is no result, however well it fits the matches.
+  const std::string undetermined =
+      passes && ask ? WhyUndetermined(workspace, ours.model, options) : "";
+  if (passes && undetermined.empty() && ours.model.images.size() == workspace.images().size()) {
     WriteNote(workspace, ours, false, "");
     return {std::move(ours.model)};
   }
-  const std::string why = WhyAsked(workspace, ours);
-  const bool may_ask = options.engine == SfmEngine::kAuto;
-  const bool ask = may_ask && Program::IsInstalled();
+  const std::string why = WhyAsked(workspace, ours, undetermined);
   if (!ask && !passes) {
     ThrowRejected(why, may_ask ? "photos must overlap by half, from several places; or install "
                                  "COLMAP (apt-get install colmap), whose mapper is tried then"
@@ -108,7 +153,15 @@ std::vector<calib::SfmModel> MapOrFallBack(
     colmaps = AskColmap(workspace, passes, by_colmap);
   }
   if (colmaps.empty() && !passes) return {};
-  const bool take = !colmaps.empty() && TakeColmaps(ours, colmaps.front(), options);
+  if (const std::string against = DropContradicted(workspace, colmaps); !against.empty()) {
+    if (!passes) {
+      ThrowRejected(why + ", and of COLMAP's model that " + against,
+                    "photos must overlap by half, from several places");
+    }
+    workspace.progress().Note("COLMAP's model does not pass: " + against);
+  }
+  const bool take =
+      !colmaps.empty() && TakeColmaps(workspace, ours, undetermined, colmaps.front(), options);
   if (ask) {
     workspace.progress().Note(take ? "COLMAP's model is taken"
                                    : "the global mapper's model is taken");

@@ -8,9 +8,11 @@
 namespace dtr::colmap {
 
 /// Models of the workspace's database, largest first; none where no photos can be placed. With
-/// SfmEngine::kAuto, a model of the global mapper that does not pass or leaves photos out, and
-/// COLMAP on the PATH, `by_colmap` is called for the models that COLMAP makes of the same matches:
-/// theirs is taken where ours did not pass, or where it has more photos and does not predict
+/// SfmEngine::kAuto, a model of the global mapper that does not pass, that the photos do not
+/// determine (calib/bundle/refine.h, WhyUndetermined) or that leaves photos out, and COLMAP on the
+/// PATH, `by_colmap` is called for the models that COLMAP makes of the same matches. The largest
+/// must agree with the matches (sfm/mapping/model_check.h); it is taken where ours did not pass,
+/// where the photos determine it and not ours, or where it has more photos and does not predict
 /// held-out observations clearly worse. What was decided is noted, and kept in the workspace.
 /// Throws Error where no model passes: the reason, and what helps.
 std::vector<calib::SfmModel> MapOrFallBack(
