@@ -60,11 +60,21 @@ std::string DropContradicted(Workspace& workspace, std::vector<calib::SfmModel>&
   return why;
 }
 
-// `undetermined`: of our model, which passes otherwise.
-bool TakeColmaps(Workspace& workspace, const GloballyMapped& ours, const std::string& undetermined,
-                 const calib::SfmModel& colmaps, const SfmOptions& options) {
-  if (!ours.why_not.empty() || ours.model.images.empty()) return true;
-  if (!undetermined.empty()) return WhyUndetermined(workspace, colmaps, options).empty();
+// A model of the global mapper, and what the photos leave undetermined of it where it passes.
+struct Own {
+  GloballyMapped mapped;
+  std::string undetermined;
+
+  bool Passes() const { return mapped.why_not.empty() && !mapped.model.images.empty(); }
+  // A model that validation rejects is no result, however well it fits the matches.
+  bool IsResult() const { return Passes() && undetermined.empty(); }
+};
+
+bool TakeColmaps(Workspace& workspace, const Own& own, const calib::SfmModel& colmaps,
+                 const SfmOptions& options) {
+  const GloballyMapped& ours = own.mapped;
+  if (!own.Passes()) return true;
+  if (!own.undetermined.empty()) return WhyUndetermined(workspace, colmaps, options).empty();
   if (colmaps.images.size() <= ours.model.images.size()) return false;
   int own_count = 0, colmap_count = 0;
   const double own_px = calib::HeldOutErrorPx(ours.model, options.seed, &own_count);
@@ -72,13 +82,13 @@ bool TakeColmaps(Workspace& workspace, const GloballyMapped& ours, const std::st
   return std::min(own_count, colmap_count) >= kMinHeldOut && colmap_px <= kClearlyWorse * own_px;
 }
 
-std::string WhyAsked(const Workspace& workspace, const GloballyMapped& ours,
-                     const std::string& undetermined) {
+std::string WhyAsked(const Workspace& workspace, const Own& own) {
+  const GloballyMapped& ours = own.mapped;
   if (!ours.why_not.empty()) {
     const std::string lack = LackOfParallax(CountPairs(workspace));
     return lack.empty() ? ours.why_not : ours.why_not + "; " + lack;
   }
-  if (!undetermined.empty()) return undetermined;
+  if (!own.undetermined.empty()) return own.undetermined;
   return fmt::format("{} of {} photos have no camera",
                      workspace.images().size() - ours.model.images.size(),
                      workspace.images().size());
@@ -119,32 +129,77 @@ std::vector<calib::SfmModel> AskColmap(
   }
 }
 
+Own MapOwn(Workspace& workspace, const SfmOptions& options,
+           const std::optional<GroupLenses>& fixed = {}) {
+  Own own{MapHere(workspace, options, fixed), ""};
+  if (own.Passes()) own.undetermined = WhyUndetermined(workspace, own.mapped.model, options);
+  return own;
+}
+
+// The lenses by which photos were matched, where EXIF knows every focal length and no vote of the
+// matches changed one.
+std::optional<GroupLenses> LensesWithExif(const Workspace& workspace,
+                                          const std::vector<CameraGroup>& groups) {
+  const GroupLenses exif = LensesOf(workspace, groups);
+  const sfm::ViewGraph graph = ReadViewGraph(workspace.database());
+  if (graph.cameras.size() != exif.lenses.size()) return std::nullopt;
+  for (size_t i = 0; i < exif.lenses.size(); ++i) {
+    const bool holds =
+        exif.focal_is_known[i] && graph.cameras[i].params[0] == exif.lenses[i].params[0];
+    if (!holds) return std::nullopt;
+  }
+  return GroupLenses{graph.cameras, exif.focal_is_known};
+}
+
+// Where matches alone do not lead to a model (of a wall any focal length fits two photos, of a
+// straight walk any fits all), with EXIF's focal lengths they may: all photos must have a camera.
+bool MapsWithExifHeld(Workspace& workspace, const std::vector<CameraGroup>& groups,
+                      const SfmOptions& options, Own& own) {
+  const auto lenses = LensesWithExif(workspace, groups);
+  if (!lenses) return false;
+  Own held = MapOwn(workspace, options, *lenses);
+  if (!held.Passes() || held.mapped.model.images.size() < workspace.images().size()) return false;
+  workspace.progress().Note(
+      fmt::format("global mapper: {}; EXIF's focal length is held", WhyAsked(workspace, own)));
+  if (!held.undetermined.empty()) {
+    WriteFileAtomically(workspace.folder() / kFixedIntrinsicsNote, "");
+  }
+  own = std::move(held);
+  return true;
+}
+
+// Whether COLMAP's mapper is to be asked: it works, or a note says why not.
+bool CanAsk(Workspace& workspace, const SfmOptions& options, const std::string& why) {
+  if (options.engine != SfmEngine::kAuto) return false;
+  const Program::State state = Program::Find();
+  if (state.Works()) return true;
+  workspace.progress().Note(fmt::format(
+      "global mapper: {}; with COLMAP {} its mapper would be tried, too", why,
+      state.why_not.empty() ? "installed" : "in working order (" + state.why_not + ")"));
+  return false;
+}
+
 }  // namespace
 
 std::vector<calib::SfmModel> MapOrFallBack(
-    Workspace& workspace, const SfmOptions& options,
+    Workspace& workspace, const std::vector<CameraGroup>& groups, const SfmOptions& options,
     const std::function<std::vector<calib::SfmModel>()>& by_colmap) {
-  GloballyMapped ours = MapHere(workspace, options);
-  const bool passes = ours.why_not.empty() && !ours.model.images.empty();
-  const bool may_ask = options.engine == SfmEngine::kAuto;
-  const bool ask = may_ask && Program::IsInstalled();
-  // A model that validation rejects is no result, however well it fits the matches.
-  const std::string undetermined =
-      passes && ask ? WhyUndetermined(workspace, ours.model, options) : "";
-  if (passes && undetermined.empty() && ours.model.images.size() == workspace.images().size()) {
+  Own own = MapOwn(workspace, options);
+  const bool held = !own.IsResult() && MapsWithExifHeld(workspace, groups, options, own);
+  const bool passes = own.Passes();
+  const GloballyMapped& ours = own.mapped;
+  if (held || (own.IsResult() && ours.model.images.size() == workspace.images().size())) {
     WriteNote(workspace, ours, false, "");
-    return {std::move(ours.model)};
+    return {ours.model};
   }
-  const std::string why = WhyAsked(workspace, ours, undetermined);
+  const std::string why = WhyAsked(workspace, own);
+  const bool ask = CanAsk(workspace, options, why);
   if (!ask && !passes) {
-    ThrowRejected(why, may_ask ? "photos must overlap by half, from several places; or install "
-                                 "COLMAP (apt-get install colmap), whose mapper is tried then"
-                               : "photos must overlap by half, from several places; or use --sfm "
-                                 "auto, with which COLMAP's mapper is tried");
-  }
-  if (!ask && may_ask) {
-    workspace.progress().Note(fmt::format(
-        "global mapper: {}; with COLMAP installed its mapper would be tried, too", why));
+    ThrowRejected(why, options.engine == SfmEngine::kAuto
+                           ? "photos must overlap by half, from several places; or install COLMAP "
+                             "(apt-get install colmap), whose mapper is tried then"
+                           : "photos must overlap by half, from several places; or use --sfm auto, "
+                             "with which COLMAP's mapper is tried");
   }
   std::vector<calib::SfmModel> colmaps;
   if (ask) {
@@ -160,8 +215,7 @@ std::vector<calib::SfmModel> MapOrFallBack(
     }
     workspace.progress().Note("COLMAP's model does not pass: " + against);
   }
-  const bool take =
-      !colmaps.empty() && TakeColmaps(workspace, ours, undetermined, colmaps.front(), options);
+  const bool take = !colmaps.empty() && TakeColmaps(workspace, own, colmaps.front(), options);
   if (ask) {
     workspace.progress().Note(take ? "COLMAP's model is taken"
                                    : "the global mapper's model is taken");
@@ -172,7 +226,7 @@ std::vector<calib::SfmModel> MapOrFallBack(
   }
   WriteNote(workspace, ours, take, why);
   if (take) return colmaps;
-  return {std::move(ours.model)};
+  return {ours.model};
 }
 
 void ReadOwnMappingNote(const Workspace& workspace, SfmReport& report) {

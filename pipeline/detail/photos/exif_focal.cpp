@@ -159,7 +159,7 @@ PhotoRefinement RefineSfm(const SfmRun& run, colmap::SfmResult& sfm, Progress& p
     Attempt taken = FromExif(run, options, sfm, "model", progress);
     const double focal_px = sfm.model.cameras.begin()->second.params.front();
     return report(taken, {.exif_px = focal_px}, true,
-                  fmt::format("focal length: COLMAP made a model only with EXIF's {:.0f} px; {}",
+                  fmt::format("focal length: there is a sound model only with EXIF's {:.0f} px; {}",
                               focal_px, taken.fixed ? "it is fixed" : "adjusted afterwards"));
   }
   const auto contradiction = ContradictsExif(sfm.model, run.inputs);
@@ -181,7 +181,7 @@ PhotoRefinement RefineSfm(const SfmRun& run, colmap::SfmResult& sfm, Progress& p
     Attempt taken = Refined(run, options, sfm, "model", "refined", progress);
     return report(taken, focal, false,
                   Line(*contradiction, taken, nullptr) +
-                      "with EXIF's COLMAP registers fewer photos; the found one is taken");
+                      "with EXIF's fewer photos are registered; the found one is taken");
   }
   const bool undetermined = !WhyUndetermined(run, sfm.model, progress).empty();
   Attempt exif = FromExif(run, options, *fixed_sfm, colmap::kFixedModel, progress);
