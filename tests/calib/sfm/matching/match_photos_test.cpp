@@ -56,6 +56,19 @@ TEST(MatchPhotos, HoldsAFocalLengthThatTheVoteDoesNotContradict) {
   EXPECT_NEAR(changed.graph.cameras[0].params[0], kFocalPx, 0.02 * kFocalPx);
 }
 
+// One homography explains each pair of a plane: any focal length agrees with it.
+TEST(MatchPhotos, APlaneHasNoVoteOnTheFocalLength) {
+  const auto photos = Photos(WorldOf(600, 9, true), Camera(kFocalPx));
+  const MatchResult unknown = Match(photos, Camera(1250), false);
+  EXPECT_FALSE(unknown.graph.focal_is_known[0]);
+  EXPECT_DOUBLE_EQ(unknown.graph.cameras[0].params[0], 1250);
+  ASSERT_EQ(unknown.notes.size(), 1u);
+  EXPECT_NE(unknown.notes[0].find("do not determine the focal length"), std::string::npos);
+  const MatchResult known = MatchPhotos(photos, std::vector{Camera(1.6 * kFocalPx)}, {true}, {});
+  EXPECT_DOUBLE_EQ(known.graph.cameras[0].params[0], 1.6 * kFocalPx);
+  EXPECT_TRUE(known.graph.focal_is_known[0]);
+}
+
 TEST(MatchPhotos, PhotosWithoutOverlapGiveNoPair) {
   const Where where = At({0, 0, 0}, 0);
   const std::vector<MatchPhoto> photos = {
