@@ -25,8 +25,8 @@ using Json = nlohmann::ordered_json;
 constexpr double kBytesPerMb = 1e6;
 
 /// From as the page is by default to the smallest that still shows the scene.
-constexpr WebCoding kCodings[] = {{80, 0, false},   {75, 0.1, true},  {65, 0.15, true},
-                                  {50, 0.25, true}, {35, 0.35, true}, {25, 0.5, true},
+constexpr WebCoding kCodings[] = {{85, 0.15, false}, {80, 0.15, true}, {70, 0.2, true},
+                                  {60, 0.25, true},  {45, 0.35, true}, {30, 0.5, true},
                                   {15, 0.5, true}};
 
 /// The source views, each once, in byte order of their ids.
@@ -81,7 +81,7 @@ Json Figures(const DtrSet& set, const std::vector<View>& views) {
 std::string SetJson(const fs::path& folder, const DtrSet& set, const std::vector<View>& views,
                     const std::vector<WebView>& packed) {
   Json json = {{"format", "dtr-web-page"},
-               {"version", 1},
+               {"version", 2},
                {"name", Name(folder)},
                {"unit", NameOf(set.unit)},
                {"scene_center", JsonOf(set.scene_center)},
@@ -100,7 +100,7 @@ std::string SetJson(const fs::path& folder, const DtrSet& set, const std::vector
 }
 
 std::string PageOf(const WebPageRequest& request, const DtrSet& set, const std::vector<View>& views,
-                   const WebCoding& coding, const fs::path& work, Progress& progress) {
+                   const WebCoding& coding, Progress& progress) {
   web::WebPage page{Name(request.set), DTR_VERSION, "", {}};
   std::vector<WebView> packed;
   progress.Stage("packing views", static_cast<int>(views.size()));
@@ -111,7 +111,7 @@ std::string PageOf(const WebPageRequest& request, const DtrSet& set, const std::
     load.completed = load.sigma = true;
     io::LoadPixels(request.set, view, load);
     RequireLoaded(view);
-    packed.push_back(PackView(view, request.set, coding, work));
+    packed.push_back(PackView(view, request.set, coding));
     progress.Update(static_cast<int>(packed.size()));
   }
   page.set_json = SetJson(request.set, set, views, packed);
@@ -141,7 +141,7 @@ WebPageReport ExportWebPage(const WebPageRequest& request, Progress& progress) {
     }
     if (request.jpeg_quality)
       coding.jpeg_quality = std::min(coding.jpeg_quality, *request.jpeg_quality);
-    page = PageOf(request, set, views, coding, work.path(), progress);
+    page = PageOf(request, set, views, coding, progress);
     report.bytes = page.size();
     report.jpeg_quality = coding.recodes_jpeg || !AllAreJpeg(views) ? coding.jpeg_quality : 0;
     report.depth_error_px = coding.depth_error_px;

@@ -15,7 +15,7 @@ struct WebPageRequest {
   std::filesystem::path output;  ///< the file to write
   /// At most so many MB (10^6 bytes): photos and depth are coded more coarsely until the page fits.
   std::optional<double> max_mb;
-  /// Of photos, 1...100; without it 80, and photos that the set stores as JPEG go in as they are.
+  /// Of photos, 1...100; without it 85, and photos that the set stores as JPEG go in as they are.
   std::optional<int> jpeg_quality;
 };
 
@@ -23,7 +23,7 @@ struct WebPageReport {
   size_t views = 0;
   std::uint64_t bytes = 0;
   int jpeg_quality = 0;       ///< of photos; 0: all are JPEGs that the set stores
-  double depth_error_px = 0;  ///< by rounding, pixels of disparity; 0: at most 0.02
+  double depth_error_px = 0;  ///< largest error by rounding, pixels of disparity
   std::string warning;  ///< a failed validation in a line, which the page shows, too; or empty
 };
 

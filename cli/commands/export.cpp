@@ -37,13 +37,9 @@ int RunWeb(const pipeline::WebPageRequest& request, const Context& context) {
   const std::string photos = report.jpeg_quality > 0
                                  ? fmt::format("photos of JPEG quality {}", report.jpeg_quality)
                                  : "photos as in the set";
-  const std::string depth =
-      report.depth_error_px > 0
-          ? fmt::format("depth within {} px of disparity", report.depth_error_px)
-          : "depth within 0.02 px of disparity of the set's";
-  context.console.Say(fmt::format("{}: {} views, {:.1f} MB, {}, {}", request.output.string(),
-                                  report.views, static_cast<double>(report.bytes) / 1e6, photos,
-                                  depth));
+  context.console.Say(fmt::format(
+      "{}: {} views, {:.2f} MB, {}, depth within {} px of disparity", request.output.string(),
+      report.views, static_cast<double>(report.bytes) / 1e6, photos, report.depth_error_px));
   context.EmitJson(
       fmt::format("{{\"views\": {}, \"bytes\": {}, \"jpeg_quality\": {}, \"depth_error_px\": {}}}",
                   report.views, report.bytes, report.jpeg_quality, report.depth_error_px));
@@ -90,7 +86,7 @@ void AddExportCommand(CLI::App& app) {
                    ->type_name("N");
                command
                    .add_option("--jpeg-quality", options->web.jpeg_quality,
-                               "web: of the photos [80, or the JPEG that the set stores]")
+                               "web: of the photos [85, or the JPEG that the set stores]")
                    ->check(CLI::Range(1, 100))
                    ->type_name("Q");
                command.add_option("-o,--output", options->colmap.output, "What to write")

@@ -72,6 +72,9 @@ std::string ShadersJson() {
   return shaders.dump();
 }
 
+// What HTML's parser changes or ends a script element at.
+constexpr std::string_view kForbidden("\0\n\r<", 4);
+
 constexpr std::string_view kViewEnd = "</script>\n";
 std::string ViewStart(size_t index) {
   return "<script type=\"text/plain\" id=\"view-" + std::to_string(index) + "\">";
@@ -97,19 +100,28 @@ std::pair<std::string, std::string> Frame(const WebPage& page) {
 
 }  // namespace
 
-std::string Base64(std::string_view bytes) {
-  constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+std::string TextOfBytes(std::string_view bytes) {
   std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (size_t at = 0; at < bytes.size(); at += 3) {
-    const size_t count = std::min<size_t>(3, bytes.size() - at);
-    std::uint32_t group = 0;
-    for (size_t i = 0; i < 3; ++i) {
-      group = group << 8 | (i < count ? static_cast<unsigned char>(bytes[at + i]) : 0u);
+  text.reserve(bytes.size() * 8 / 7 + 8);
+  const auto seven_from = [&bytes](size_t bit) {
+    const size_t at = bit / 8;
+    const auto byte = [&](size_t i) {
+      return i < bytes.size() ? static_cast<unsigned char>(bytes[i]) : 0u;
+    };
+    return (byte(at) << 8 | byte(at + 1)) >> (9 - bit % 8) & 127;
+  };
+  for (size_t bit = 0; bit < 8 * bytes.size(); bit += 7) {
+    const unsigned seven = seven_from(bit);
+    const size_t forbidden = kForbidden.find(static_cast<char>(seven));
+    if (forbidden == std::string_view::npos) {
+      text += static_cast<char>(seven);
+      continue;
     }
-    for (size_t i = 0; i < 4; ++i) {
-      text += i <= count ? kDigits[group >> (18 - 6 * i) & 63] : '=';
-    }
+    // Two bytes of UTF-8 with it and the next seven bits.
+    bit += 7;
+    const auto code = static_cast<unsigned>(forbidden + 1) << 7 | seven_from(bit);
+    text += static_cast<char>(0xc0 | code >> 6);
+    text += static_cast<char>(0x80 | (code & 63));
   }
   return text;
 }
@@ -125,7 +137,7 @@ std::string MakeWebPage(const WebPage& page) {
   auto [text, after] = Frame(page);
   for (size_t i = 0; i < page.views.size(); ++i) {
     text += ViewStart(i);
-    text += Base64(page.views[i]);
+    text += TextOfBytes(page.views[i]);
     text += kViewEnd;
   }
   return text + after;

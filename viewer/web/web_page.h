@@ -17,8 +17,10 @@ struct WebPage {
 /// The whole page: no other file and no server is needed to open it.
 std::string MakeWebPage(const WebPage& page);
 
-/// RFC 4648, with padding.
-std::string Base64(std::string_view bytes);
+/// Bytes as text of UTF-8 for a script element, 8/7 of their size: seven bits a byte, and what
+/// HTML does not let through with the next seven bits in a character of two bytes (after base122
+/// by K. Albertson, 2016; docs/EXPORT.md, "Bytes as text").
+std::string TextOfBytes(std::string_view bytes);
 
 /// The page's modules as one, each after those that it imports.
 std::string JoinedScript();

@@ -9,11 +9,11 @@ namespace dtr::pipeline {
 
 /// How closely a page holds a set.
 struct WebCoding {
-  int jpeg_quality = 80;
-  /// Largest error of depth by rounding, pixels of disparity; 0: the set's own codes.
-  double depth_error_px = 0;
-  bool recodes_jpeg =
-      false;  ///< also photos that the set stores as JPEG; else those go in as they are
+  int jpeg_quality = 85;
+  /// Largest error of depth by rounding, pixels of disparity.
+  double depth_error_px = 0.15;
+  /// Also photos that the set stores as JPEG; else those go in as they are.
+  bool recodes_jpeg = false;
 };
 
 /// As docs/EXPORT.md describes it.
@@ -26,8 +26,7 @@ struct WebView {
 bool IsStoredAsJpeg(const View& view);
 
 /// Of a view that has its photo, depth (completed depth with it) and mask loaded; sigma, too, where
-/// the set has it. `set`: the set's folder. `work`: a folder for a file that is deleted again.
-WebView PackView(const View& view, const std::filesystem::path& set, const WebCoding& coding,
-                 const std::filesystem::path& work);
+/// the set has it. `set`: the set's folder.
+WebView PackView(const View& view, const std::filesystem::path& set, const WebCoding& coding);
 
 }  // namespace dtr::pipeline

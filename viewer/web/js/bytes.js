@@ -1,5 +1,5 @@
-// Bytes as the page holds them: base64, a checksum, deflate. Nothing here trusts a length.
-import { Problem, fail } from "./problem.js";
+// Bytes as the page holds them: as text, with a checksum. Nothing here trusts a length.
+import { fail } from "./problem.js";
 
 const kCrcTable = Uint32Array.from({ length: 256 }, (_, n) => {
   let c = n;
@@ -14,38 +14,30 @@ export function crc32(bytes) {
   return (c ^ 0xffffffff) >>> 0;
 }
 
-/** Bytes of base64 text; a Problem where it is none. */
-export function bytesOfBase64(text, where) {
-  try {
-    if (Uint8Array.fromBase64) return Uint8Array.fromBase64(text);
-    const binary = atob(text);
-    const bytes = new Uint8Array(binary.length);
-    for (let i = 0; i < binary.length; ++i) bytes[i] = binary.charCodeAt(i);
-    return bytes;
-  } catch {
-    return fail(where, "base64 text", "something else");
-  }
-}
+// Of character codes 128 on: the bits of 128 to 255 stand for the first of what HTML lets not through, and so on.
+const kForbidden = [0, 10, 13, 60];
 
-/** Exactly `size` bytes out of a zlib stream (RFC 1950). No more than that is ever kept. */
-export async function inflate(bytes, size, where) {
-  const out = new Uint8Array(size);
-  let filled = 0;
-  try {
-    const reader = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate")).getReader();
-    for (;;) {
-      const { done, value } = await reader.read();
-      if (done) break;
-      if (filled + value.length > size) {
-        reader.cancel().catch(() => {});
-        return fail(where, `${size} bytes`, "more");
-      }
-      out.set(value, filled);
-      filled += value.length;
+/** The `size` bytes of a text: seven bits a character, fourteen in those beyond ASCII. A Problem where it is none. */
+export function bytesOfText(text, size, where) {
+  const bytes = new Uint8Array(size);
+  let held = 0, count = 0, filled = 0;
+  const put = (seven) => {
+    held = (held << 7 | seven) & 0x7fff;
+    count += 7;
+    if (count < 8) return;
+    count -= 8;
+    if (filled < size) bytes[filled] = held >> count & 255;
+    ++filled;
+  };
+  for (let i = 0; i < text.length; ++i) {
+    const code = text.charCodeAt(i);
+    if (code >= 128) {
+      const forbidden = kForbidden[(code >> 7) - 1];
+      if (forbidden === undefined) return fail(where, "bytes as text", "another character");
+      put(forbidden);
     }
-  } catch (error) {
-    if (error instanceof Problem) throw error;
-    return fail(where, "a whole deflate stream", "a damaged one");
+    put(code & 127);
   }
-  return filled === size ? out : fail(where, `${size} bytes`, String(filled));
+  // What remains are at most thirteen zeros that fill up the last character.
+  return filled === size || filled === size + 1 ? bytes : fail(where, `${size} bytes`, String(filled));
 }

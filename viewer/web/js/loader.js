@@ -43,7 +43,7 @@ class Decoder {
 
 /** Keeps the store filled with the views that are wanted most. */
 export class Loader {
-  /** `order()`: all views, most wanted first; `textOf(view)`: its base64; `loaded(view)` and `failed(view, problem)` are called. */
+  /** `order()`: all views, most wanted first; `textOf(view)`: its bytes as text; `loaded(view)` and `failed(view, problem)` are called. */
   constructor({ store, script, order, textOf, loaded, failed }) {
     Object.assign(this, { store, order, textOf, loaded, failed, broken: new Set(), busy: new Set() });
     const workers = Math.max(1, Math.min(kMostWorkers, (navigator.hardwareConcurrency || 2)));
@@ -64,9 +64,10 @@ export class Loader {
     return this.wanted().find((view) => !this.store.has(view) && !this.busy.has(view.index));
   }
 
-  /** Starts what is to be done and returns at once. */
+  /** Starts what is to be done and returns at once. The first view has the processor to itself: it is all that an image needs. */
   run() {
-    for (const decoder of this.decoders) if (!decoder.running) this.work(decoder);
+    const first = this.store.loaded.size === 0 && this.broken.size === 0;
+    for (const decoder of first ? this.decoders.slice(0, 1) : this.decoders) if (!decoder.running) this.work(decoder);
   }
 
   async work(decoder) {
@@ -83,6 +84,7 @@ export class Loader {
         this.busy.delete(view.index);
         this.broken.add(view.index);
         this.failed(view, error);
+        this.run();
       }
     }
     decoder.running = false;
