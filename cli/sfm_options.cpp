@@ -1,5 +1,7 @@
 #include "cli/sfm_options.h"
 
+#include <fmt/format.h>
+
 #include <map>
 #include <string>
 
@@ -21,8 +23,7 @@ CLI::Option* AddSfmOptions(CLI::App& command, pipeline::SfmChoice& choice) {
           "--sfm",
           [&choice, engines](const std::string& name) { choice.engine = engines.at(name); },
           "Structure from motion: COLMAP's, our own (global), or our own with COLMAP's mapper "
-          "where "
-          "ours does not pass [colmap]")
+          "where ours does not pass [auto]")
       ->check(CLI::IsMember({"colmap", "global", "auto"}))
       ->type_name("colmap|global|auto");
   command
@@ -31,8 +32,11 @@ CLI::Option* AddSfmOptions(CLI::App& command, pipeline::SfmChoice& choice) {
                   "allows]")
       ->check(CLI::Range(kSmallestPx, 65536))
       ->type_name("PX");
-  command.add_option("--features", choice.features, "Max features per photo [8192]")
-      ->check(CLI::Range(kMinFeatures, colmap::kMaxFeatures))
+  command
+      .add_option("--features", choice.features,
+                  fmt::format("Max features per photo [{}; of COLMAP {}, its limit]",
+                              colmap::kMaxOwnFeatures, colmap::kMaxFeatures))
+      ->check(CLI::Range(kMinFeatures, colmap::kMaxOwnFeatures))
       ->type_name("N");
   std::map<std::string, colmap::Matching> names;
   for (const auto matching : {colmap::Matching::kAuto, colmap::Matching::kExhaustive,

@@ -59,8 +59,8 @@ set(CPACK_DEBIAN_PROGRAM_PACKAGE_NAME dtr)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SHLIBDEPS ON)
 # Programs that dtr runs; and the drivers that open a context where there is no screen, which --renderer
 # auto does without.
-set(CPACK_DEBIAN_PROGRAM_PACKAGE_DEPENDS "colmap (>= 3.8), ffmpeg")
-set(CPACK_DEBIAN_PROGRAM_PACKAGE_RECOMMENDS "openscenegraph, libegl1, libgl1-mesa-dri, libegl-mesa0")
+set(CPACK_DEBIAN_PROGRAM_PACKAGE_DEPENDS "ffmpeg")
+set(CPACK_DEBIAN_PROGRAM_PACKAGE_RECOMMENDS "colmap (>= 3.8), openscenegraph, libegl1, libgl1-mesa-dri, libegl-mesa0")
 set(CPACK_DEBIAN_LIBRARIES_DESCRIPTION
   "Static libraries and headers to load, render and measure D+TR sets in programs of
 one's own: find_package(dtr).")

@@ -218,7 +218,7 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
   RunLog log;
   RecordedNotes progress(listener);
 
-  RequireCalibration(options.poses, options.sfm.engine);
+  RequireCalibration(options.poses, options.sfm);
   io::SetWriter::RequireTarget(options.output, options.force);
   log.Begin("capture");
   const bool from_video = !capture::VideosOf(options.photos).empty();

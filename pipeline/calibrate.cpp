@@ -68,7 +68,8 @@ CalibratedPhotos FromSfm(const capture::Capture& capture, const CalibrateOptions
   calibrated.engine = sfm.report.version;
   calibrated.why_not_registered = sfm.report.why_not_registered;
   for (const colmap::StepRecord& step : sfm.report.steps) {
-    if (!step.argv.empty()) calibrated.engine_cpu_s += step.cpu_s;
+    // COLMAP's runs are no time of this process, nor are own steps that an earlier one did.
+    if (!step.argv.empty() || step.from_checkpoint) calibrated.engine_cpu_s += step.cpu_s;
     if (!step.from_checkpoint) continue;
     calibrated.earlier_cpu_s += step.cpu_s;
     calibrated.earlier_wall_s += step.wall_s;
@@ -130,7 +131,8 @@ colmap::SfmOptions SfmOptionsFor(const CalibrateOptions& options) {
   sfm.seed = options.seed;
   sfm.memory_gb = options.memory_gb;
   sfm.max_image_size_px = options.sfm.feature_size_px;
-  sfm.max_features = options.sfm.features < colmap::kMaxFeatures ? options.sfm.features : 0;
+  const int max_features = MaxFeaturesOf(sfm.engine);
+  sfm.max_features = options.sfm.features < max_features ? options.sfm.features : 0;
   sfm.matching = options.sfm.matching;
   sfm.lens_model = options.sfm.lens_model;
   return sfm;
@@ -149,19 +151,23 @@ bool NeedsFeatures(const fs::path& poses) {
   return !fs::is_directory(poses) || colmap::ReadModel(colmap::ModelFolderIn(poses)).points.empty();
 }
 
-void RequireCalibration(const fs::path& poses, colmap::SfmEngine engine) {
+void RequireCalibration(const fs::path& poses, const SfmChoice& sfm) {
+  if (sfm.features > MaxFeaturesOf(sfm.engine)) {
+    throw UsageError(
+        fmt::format("`features` {}: expected at most {}, the limit of `sfm` {}; give fewer",
+                    sfm.features, MaxFeaturesOf(sfm.engine), colmap::NameOf(sfm.engine)));
+  }
   if (!poses.empty() && !fs::exists(poses)) {
     throw UsageError(fmt::format("`poses` {}: no such file or folder", poses.string()));
   }
-  if (poses.empty() && engine != colmap::SfmEngine::kColmap) return;
-  if (NeedsFeatures(poses)) (void)colmap::Program();
+  if (sfm.engine == colmap::SfmEngine::kColmap && NeedsFeatures(poses)) (void)colmap::Program();
 }
 
 CalibratedPhotos CalibratePhotos(const capture::Capture& capture, const CalibrateOptions& options,
                                  const fs::path& workspace, Progress& progress) {
   CalibrateOptions checked = options;
   checked.held_out.resize(capture.photos.size(), false);
-  RequireCalibration(checked.poses, checked.sfm.engine);
+  RequireCalibration(checked.poses, checked.sfm);
   if (checked.rig) RejectTurned(capture, "the rig is");
   if (checked.lens) RejectTurned(capture, "the intrinsics are");
   fs::create_directories(workspace);

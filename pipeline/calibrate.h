@@ -51,7 +51,8 @@ struct CalibratedPhotos {
   std::map<std::string, std::string> why_not_registered;
   std::string engine;  ///< "colmap 3.8", "cameras.json", ...
   CalibrationReport report;
-  /// Processor seconds of COLMAP's runs, those of an earlier call that this one went on from, too.
+  /// Processor seconds of COLMAP's runs, and of all steps of structure from motion of an earlier
+  /// call that this one continued from.
   double engine_cpu_s = 0;
   /// Of those runs and of bundle adjustment, what the earlier call's took: processor and wall-clock
   /// seconds.
@@ -63,14 +64,14 @@ struct CalibratedPhotos {
 /// registered (how many), not_registered[], why_not_registered, contents (of the photos' folder).
 std::string ToJson(const CalibratedPhotos& calibrated, const capture::FolderContents& contents);
 
-/// Whether COLMAP must look for features: not where `poses` is a model that brings its points.
+/// Whether features must be found: not where `poses` is a model that brings its points.
 /// Throws Error where that is broken.
 bool NeedsFeatures(const std::filesystem::path& poses);
 
-/// Rejects before any work what cannot work: UsageError for `poses` that do not exist, Error when
-/// COLMAP is needed (by the engine kColmap; by all others for points of given poses, NeedsFeatures)
-/// and not installed.
-void RequireCalibration(const std::filesystem::path& poses, colmap::SfmEngine engine);
+/// Rejects before any work what cannot work: UsageError for `poses` that do not exist and for more
+/// features than the engine takes, Error when
+/// COLMAP is needed (by SfmEngine::kColmap, where NeedsFeatures) and not installed.
+void RequireCalibration(const std::filesystem::path& poses, const SfmChoice& sfm);
 
 /// The long side to which SfM shrinks photos of these sizes (width and height, px), so that looking
 /// for features in them fits into `memory_gb` (`asked_px` at most; 0: nothing is asked): it decides

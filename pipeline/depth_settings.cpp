@@ -24,11 +24,9 @@ constexpr Preset kPresets[] = {
      .quality = {.neighbours = 4, .round_neighbours = 6, .iterations = 2, .rounds = 1}},
     {.name = "balanced",
      .max_size_px = 1024,
-     .features = colmap::kMaxFeatures,
      .quality = {.neighbours = 5, .round_neighbours = 8, .iterations = 3, .rounds = 2}},
     {.name = "best",
      .max_size_px = 0,
-     .features = colmap::kMaxFeatures,
      .quality = {.neighbours = 8, .round_neighbours = 8, .iterations = 5, .rounds = 3}},
 };
 

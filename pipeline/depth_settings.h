@@ -12,8 +12,8 @@ namespace dtr::pipeline {
 /// Settings that belong together, by name.
 struct Preset {
   const char* name;
-  int max_size_px;  ///< long side of the images of a set that is built; 0: full size
-  int features;     ///< most of a photo whose camera structure from motion looks for
+  int max_size_px;   ///< long side of the images of a set that is built; 0: full size
+  int features = 0;  ///< max per photo of structure from motion; 0: the engine's max
   stereo::QualitySettings quality;
 };
 

@@ -124,7 +124,7 @@ std::string PageOf(const WebPageRequest& request, const DtrSet& set, const std::
 WebPageReport ExportWebPage(const WebPageRequest& request, Progress& progress) {
   if (fs::exists(request.output)) {
     throw UsageError(
-        fmt::format("{}: exists already; choose another file", request.output.string()));
+        fmt::format("{}: exists already; choose another name", request.output.string()));
   }
   DtrSet set = io::ReadSet(request.set);
   RequireOneFrame(set);

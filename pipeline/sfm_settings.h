@@ -16,7 +16,7 @@ const char* NameOf(CameraPer per);
 struct SfmChoice {
   colmap::SfmEngine engine = colmap::SfmOptions().engine;
   int feature_size_px = 0;  ///< long side of the photos for features; 0: from the memory
-  int features = 0;         ///< most per photo; 0: colmap::kMaxFeatures, or what a preset says
+  int features = 0;         ///< max per photo; 0: what a preset says, else the engine's max
   colmap::Matching matching = colmap::Matching::kAuto;
   std::string lens_model = colmap::SfmOptions().lens_model;
   CameraPer camera_per = CameraPer::kAuto;

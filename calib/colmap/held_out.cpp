@@ -11,11 +11,11 @@
 #include "calib/colmap/graph_database.h"
 #include "calib/colmap/matching.h"
 #include "calib/colmap/model_io.h"
-#include "calib/colmap/own_held_out.h"
 #include "calib/colmap/own_steps.h"
 #include "calib/colmap/pairs.h"
 #include "calib/colmap/sfm_steps.h"
 #include "calib/lens_groups.h"
+#include "calib/sfm/registration/register_view.h"
 #include "dtr/base/error.h"
 #include "dtr/base/hash.h"
 #include "dtr/base/parallel_for.h"
@@ -145,33 +145,34 @@ void RegisterHere(Workspace& workspace, const Frozen& frozen, SmallSources& smal
                   const CameraGroup& group, const ExtractionPlan& plan, std::uint64_t seed) {
   const fs::path output = workspace.folder() / "registered";
   RemoveAll(output);
-  std::map<std::string, const calib::SfmImage*> registered;
-  for (const calib::SfmImage& image : frozen.model.images) registered[image.name] = &image;
-  std::vector<SourceView> sources;
+  std::map<std::string, const calib::SfmImage*> image_called;
+  for (const calib::SfmImage& image : frozen.model.images) image_called[image.name] = &image;
+  std::vector<sfm::SourceView> sources;
   for (const size_t i : PartnersOf(workspace, frozen, small)) {
-    const auto found = registered.find(frozen.sources[i].name);
-    if (found == registered.end()) continue;
+    const auto found = image_called.find(frozen.sources[i].name);
+    if (found == image_called.end()) continue;
     sources.push_back({found->second, &frozen.model.cameras.at(found->second->camera_id),
                        ReadFeatures(frozen.database, static_cast<std::uint32_t>(i + 1))});
   }
   const GroupLenses start = LensesOf(workspace, {group});
-  ViewToPlace view{
+  const sfm::UnregisteredView view{
       FeaturesOf(workspace.FileOf(0), workspace.images()[0].mask_file, plan.max_image_size_px,
                  plan.max_features),
       group.camera_id ? frozen.model.cameras.at(*group.camera_id) : start.lenses.front(),
       group.camera_id.has_value(), start.focal_is_known.front()};
   const int min_inliers = frozen.forward_motion ? kMinInliersForward : kMinInliers;
-  auto placed = PlaceView(view, sources, frozen.model, min_inliers, seed, workspace.progress());
-  if (!placed) return;
+  auto registered =
+      sfm::RegisterView(view, sources, frozen.model, min_inliers, seed, workspace.progress());
+  if (!registered) return;
   calib::SfmModel model;
-  placed->image.id = placed->image.camera_id = group.camera_id.value_or(1);
-  placed->image.name = workspace.AliasOf(0);
-  model.cameras[placed->image.camera_id] = placed->lens;
-  for (const calib::SfmFeature& feature : placed->image.features) {
+  registered->image.id = registered->image.camera_id = group.camera_id.value_or(1);
+  registered->image.name = workspace.AliasOf(0);
+  model.cameras[registered->image.camera_id] = registered->camera;
+  for (const calib::SfmFeature& feature : registered->image.features) {
     if (feature.point_id == calib::SfmFeature::kNoPoint) continue;
     model.points.emplace(feature.point_id, frozen.model.points.at(feature.point_id));
   }
-  model.images.push_back(std::move(placed->image));
+  model.images.push_back(std::move(registered->image));
   WriteModel(output, model, Format::kBinary);
 }
 

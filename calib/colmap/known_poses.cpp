@@ -5,9 +5,12 @@
 #include <algorithm>
 
 #include "calib/colmap/database.h"
+#include "calib/colmap/graph_database.h"
 #include "calib/colmap/model_io.h"
+#include "calib/colmap/point_colours.h"
 #include "calib/colmap/sfm_steps.h"
 #include "calib/colmap/view_pyramids.h"
+#include "calib/sfm/mapping/triangulate.h"
 #include "dtr/base/error.h"
 #include "dtr/base/parallel_for.h"
 
@@ -176,6 +179,28 @@ void Triangulate(Workspace& workspace, const KnownCameras& known, const SfmOptio
              Format::kBinary);
 }
 
+// As Triangulate, by calib/sfm.
+void TriangulateHere(Workspace& workspace, const KnownCameras& known) {
+  RemoveAll(workspace.folder() / "model");
+  RequireMatches(workspace, known);
+  workspace.progress().Stage("triangulation", 0);
+  workspace.RunHere([&] {
+    sfm::ViewGraph graph = ReadViewGraph(workspace.database());
+    std::vector<Pose> poses;
+    for (size_t i = 0; i < graph.images.size(); ++i) {
+      graph.images[i].name = known.images[i].name;
+      poses.push_back(known.images[i].cam_from_world);
+    }
+    for (size_t c = 0; c < graph.cameras.size(); ++c) {
+      graph.cameras[c] = known.model.cameras.at(static_cast<std::uint32_t>(c + 1));
+    }
+    calib::SfmModel found = sfm::TriangulateMatches(graph, poses, workspace.threads());
+    ColourPoints(workspace, found);
+    WriteModel(workspace.folder() / "model", WithGivenCameras(known, std::move(found)),
+               Format::kBinary);
+  });
+}
+
 std::vector<std::string> ImagesWithoutPoints(const calib::SfmModel& model) {
   std::vector<std::string> names;
   for (const calib::SfmImage& image : model.images) {
@@ -205,8 +230,10 @@ SfmResult TriangulateWithPoses(const fs::path& images_dir, std::span<const Posed
   FeaturesAndMatches(workspace, known.groups, options, result.report,
                      pairs.empty() ? std::nullopt : std::optional(pairs), true);
   std::string inputs = TextOf(known) + fmt::format("seed {}", options.seed);
-  if (options.engine != SfmEngine::kColmap) inputs += "\n" + workspace.program().version();
-  workspace.Step("triangulation", inputs, [&] { Triangulate(workspace, known, options); });
+  const bool by_colmap = options.engine == SfmEngine::kColmap;
+  workspace.Step("triangulation", inputs, [&] {
+    by_colmap ? Triangulate(workspace, known, options) : TriangulateHere(workspace, known);
+  });
   result.model = ReadModel(workspace.folder() / "model");
   CompleteReport(workspace, result.model, result.report);
   result.report.not_registered = ImagesWithoutPoints(result.model);

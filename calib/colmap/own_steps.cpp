@@ -7,6 +7,7 @@
 
 #include "calib/colmap/database.h"
 #include "calib/colmap/graph_database.h"
+#include "calib/colmap/point_colours.h"
 #include "calib/sfm/features/sift.h"
 #include "calib/sfm/mapping/global_mapper.h"
 #include "calib/sfm/matching/match_photos.h"
@@ -57,14 +58,14 @@ void CreateDatabase(const Workspace& workspace, const fs::path& database,
   CreateGraphDatabase(database, known.lenses, known.focal_is_known, images);
 }
 
-// The pairs to be matched as the matcher takes them; nothing: it chooses.
+// The pairs to be matched, or chosen from; nothing: all.
 std::optional<std::vector<std::pair<int, int>>> PairsFor(size_t photos, Matching matching,
                                                          const std::optional<ImagePairs>& allowed) {
   constexpr size_t kNeighbours = 10;  // of a sequence, and as many at distances of powers of two
   const auto may = [&](size_t a, size_t b) {
     return !allowed || std::binary_search(allowed->begin(), allowed->end(), std::pair(a, b));
   };
-  if (matching == Matching::kPreselected && !allowed) return std::nullopt;
+  if (matching != Matching::kSequential && !allowed) return std::nullopt;
   std::vector<std::pair<int, int>> pairs;
   for (size_t a = 0; a < photos; ++a) {
     for (size_t b = a + 1; b < photos; ++b) {
@@ -167,6 +168,7 @@ void OwnMatches(Workspace& workspace, const fs::path& features,
                           .seed = options.seed,
                           .lens_is_known = std::vector<bool>(known.lenses.size(), known_lenses),
                           .pairs = pairs,
+                          .preselect = matching == Matching::kPreselected,
                           .progress = &workspace.progress()});
     for (const std::string& note : result.notes) workspace.progress().Note(note);
     CopyDatabase(features, workspace.database());
@@ -188,6 +190,7 @@ GloballyMapped MapHere(Workspace& workspace, const SfmOptions& options,
                                                   .intrinsics_are_known = fixed.has_value(),
                                                   .progress = &workspace.progress()});
     result.model = std::move(mapped.model);
+    ColourPoints(workspace, result.model);
     result.why_not = std::move(mapped.why_not);
     for (const sfm::LeftOut& left_out : mapped.left_out) {
       result.why_without_camera[graph.images[static_cast<size_t>(left_out.image)].name] =

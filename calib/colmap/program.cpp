@@ -76,8 +76,8 @@ bool Program::IsInstalled() { return !FindProgram(kProgram).empty(); }
 Program::Program() {
   if (!IsInstalled()) {
     throw Error(
-        "colmap: program not found on the PATH; install it (apt-get install colmap), or give the "
-        "camera poses so that it is not needed");
+        "colmap: program not found on the PATH; install it (apt-get install colmap), or leave out "
+        "--sfm colmap and --engine colmap");
   }
   for (const std::string& line : LinesOf({kProgram, "help"})) {
     // "(Commit ... on ... with CUDA)", or without.

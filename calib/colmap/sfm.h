@@ -1,4 +1,4 @@
-// calib/colmap/sfm.h -- structure from motion by the `colmap` program.
+// calib/colmap/sfm.h -- structure from motion by calib/sfm and the `colmap` program.
 #pragma once
 #include <cstdint>
 #include <filesystem>
@@ -55,8 +55,13 @@ inline constexpr int kMaxFeatures = 8192;
 /// rotations of fountain were 0.044 degrees off, with these 0.034 (docs/accuracy/CAMERAS.md).
 inline constexpr int kMaxOwnFeatures = 14000;
 
+/// The features of a photo that an engine takes at most.
+constexpr int MaxFeaturesOf(SfmEngine engine) {
+  return engine == SfmEngine::kColmap ? kMaxFeatures : kMaxOwnFeatures;
+}
+
 struct SfmOptions {
-  SfmEngine engine = SfmEngine::kColmap;
+  SfmEngine engine = SfmEngine::kAuto;
   Matching matching = Matching::kAuto;
   int threads = 0;            ///< 0: all cores
   std::uint64_t seed = 0;     ///< of COLMAP's random choices, as far as it heeds it

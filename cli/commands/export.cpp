@@ -1,32 +1,101 @@
 #include "pipeline/export.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <map>
+#include <nlohmann/json.hpp>
 
 #include "cli/command.h"
 #include "cli/output_file.h"
+#include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "pipeline/export_web.h"
 
 namespace dtr::cli {
 namespace {
 
-struct ExportOptions {
-  std::string format = "colmap";
-  pipeline::ExportRequest colmap;
-  pipeline::WebPageRequest web;
+using Request = pipeline::ExportRequest;
+using Names = std::vector<std::string>;
+
+struct Format {
+  const char* name;
+  pipeline::ExportReport (*write)(const Request& request, Progress& progress);
+  Names extensions;    ///< of the file; empty: a folder
+  const char* points;  ///< what ExportReport::points counts
 };
 
-int RunColmap(pipeline::ExportRequest request, const Context& context) {
+// All but `web`, which has a request and a report of its own.
+const std::vector<Format>& Formats() {
+  static const std::vector<Format> formats = {
+      {"colmap", pipeline::ExportColmap, {}, "points"},
+      {"ply", pipeline::ExportPly, {".ply"}, "points"},
+      {"mesh", pipeline::ExportMesh, {".ply", ".glb"}, "vertices"},
+      {"splat", pipeline::ExportSplat, {".ply", ".splat", ".glb"}, "gaussians"},
+      {"depth", pipeline::ExportDepth, {}, nullptr},
+      {"nerfstudio", pipeline::ExportNerfstudio, {}, "points"},
+      {"mvsnet", pipeline::ExportMvsnet, {}, nullptr},
+  };
+  return formats;
+}
+
+Names FormatNames() {
+  Names names;
+  for (const Format& format : Formats()) names.emplace_back(format.name);
+  names.emplace_back("web");
+  return names;
+}
+
+// An option that some formats take.
+struct FormatOption {
+  const CLI::Option* option;
+  Names formats;
+};
+
+struct ExportOptions {
+  std::string format = "colmap";
+  Request request;
+  pipeline::WebPageRequest web;
+  std::vector<FormatOption> of_formats;
+};
+
+void RequireOptionsOfFormat(const ExportOptions& options) {
+  for (const auto& [option, formats] : options.of_formats) {
+    if (option->count() == 0 ||
+        std::find(formats.begin(), formats.end(), options.format) != formats.end()) {
+      continue;
+    }
+    throw UsageError(fmt::format("{} needs --format {}, found --format {}; leave one of them out",
+                                 option->get_name(), fmt::join(formats, " or "), options.format));
+  }
+}
+
+std::string Summary(const Request& request, const Format& format,
+                    const pipeline::ExportReport& report) {
+  Names parts = {fmt::format("{} images", report.images)};
+  if (report.depth_maps > 0) parts.push_back(fmt::format("{} depth maps", report.depth_maps));
+  if (format.points != nullptr) parts.push_back(fmt::format("{} {}", report.points, format.points));
+  if (report.triangles > 0) parts.push_back(fmt::format("{} triangles", report.triangles));
+  return fmt::format("{}: {}{}", request.output.string(), fmt::join(parts, ", "),
+                     report.points_from_depth ? " from depth, as the set has no sparse ones" : "");
+}
+
+int RunFormat(Request request, const Format& format, const Context& context) {
   request.output = WithoutTrailingSlash(request.output);
+  if (!format.extensions.empty()) RequireOutputFile(request.output, "-o", format.extensions);
   if (!std::filesystem::exists(request.output)) RequireFolderOf(request.output, "-o");
   request.threads = context.common.threads;
-  const pipeline::ExportReport report = pipeline::ExportColmap(request, context.console);
-  context.console.Say(fmt::format(
-      "{}: {} images, {} points{}", request.output.string(), report.images, report.points,
-      report.points_from_depth ? " from depth, as the set has no sparse ones" : ""));
-  context.EmitJson(fmt::format("{{\"images\": {}, \"points\": {}, \"points_from\": \"{}\"}}",
-                               report.images, report.points,
-                               report.points_from_depth ? "depth" : "sparse"));
+  const pipeline::ExportReport report = format.write(request, context.console);
+  context.console.Say(Summary(request, format, report));
+  nlohmann::ordered_json json{{"format", format.name}, {"images", report.images}};
+  if (report.triangles > 0) json["triangles"] = report.triangles;
+  if (report.depth_maps > 0) json["depth_maps"] = report.depth_maps;
+  if (format.points != nullptr) json[format.points] = report.points;
+  if (format.write == pipeline::ExportColmap) {
+    json["points_from"] = report.points_from_depth ? "depth" : "sparse";
+  }
+  context.EmitJson(json, -1);
   return kDone;
 }
 
@@ -47,56 +116,139 @@ int RunWeb(const pipeline::WebPageRequest& request, const Context& context) {
 }
 
 int RunExport(ExportOptions options, const Context& context) {
-  options.web.set = options.colmap.set;
-  options.web.output = options.colmap.output;
-  return options.format == "web" ? RunWeb(options.web, context)
-                                 : RunColmap(options.colmap, context);
+  RequireOptionsOfFormat(options);
+  if (options.format == "web") {
+    options.web.set = options.request.set;
+    options.web.output = options.request.output;
+    return RunWeb(options.web, context);
+  }
+  const auto format = std::find_if(Formats().begin(), Formats().end(), [&](const Format& known) {
+    return known.name == options.format;
+  });
+  return RunFormat(options.request, *format, context);
 }
 
-void RequireFormat(const ExportOptions& options) {
-  const bool web = options.format == "web";
-  if (web && options.colmap.text)
-    throw UsageError("--text conflicts with --format web; leave one of them out");
-  if (!web && (options.web.max_mb || options.web.jpeg_quality)) {
-    throw UsageError("--max-mb and --jpeg-quality need --format web");
-  }
+void AddCloudOptions(CLI::App& command, ExportOptions& options) {
+  Request& request = options.request;
+  options.of_formats.push_back(
+      {command.add_flag("--completed", request.completed,
+                        "With completed depth, not only what was measured"),
+       {"ply", "mesh", "depth", "nerfstudio", "mvsnet"}});
+  options.of_formats.push_back(
+      {command
+           .add_option("--min-views", request.min_views,
+                       "ply, mesh: views that must show a point at the same depth [2]")
+           ->check(CLI::Range(1, 100))
+           ->type_name("N"),
+       {"ply", "mesh"}});
+  options.of_formats.push_back(
+      {command
+           .add_option("--voxel", request.voxel,
+                       "mesh: width of a voxel in scene units [twice a pixel's on the surface]")
+           ->check(CLI::PositiveNumber)
+           ->type_name("SIZE"),
+       {"mesh"}});
+  AddMemoryOption(command, request.memory_gb, "Memory for depth maps that are held at a time [4]");
+}
+
+// An option whose value is one of some names.
+template <typename T>
+CLI::Option* AddChoice(CLI::App& command, const std::string& name, T& value,
+                       const std::map<std::string, T>& values, const std::string& description) {
+  Names names;
+  for (const auto& [text, unused] : values) names.push_back(text);
+  return command
+      .add_option_function<std::string>(
+          name, [&value, values](const std::string& text) { value = values.at(text); }, description)
+      ->check(CLI::IsMember(names))
+      ->type_name(fmt::format("{}", fmt::join(names, "|")));
+}
+
+void AddDepthOptions(CLI::App& command, ExportOptions& options) {
+  using FileFormat = pipeline::DepthFileFormat;
+  Request& request = options.request;
+  const Names depth = {"depth"};
+  options.of_formats.push_back({AddChoice(command, "--depth-format", request.depth_format,
+                                          {{"exr", FileFormat::kExr},
+                                           {"pfm", FileFormat::kPfm},
+                                           {"png16", FileFormat::kPng16},
+                                           {"npy", FileFormat::kNpy}},
+                                          "depth: files of depth [exr]"),
+                                depth});
+  options.of_formats.push_back(
+      {AddChoice(command, "--depth-kind", request.depth_kind,
+                 {{"z", DepthKind::kPlaneZ}, {"ray", DepthKind::kRayDistance}},
+                 "depth: z in the camera frame or distance from the camera [z]"),
+       depth});
+  options.of_formats.push_back(
+      {AddChoice(
+           command, "--grid", request.depth_grid,
+           {{"set", pipeline::DepthGrid::kSet}, {"photo", pipeline::DepthGrid::kPhoto}},
+           "depth: at the pixels of the set's undistorted images or of the original photos [set]"),
+       depth});
+}
+
+void AddSplatOptions(CLI::App& command, ExportOptions& options) {
+  Request& request = options.request;
+  options.of_formats.push_back(
+      {command.add_option("--max-count", request.max_count, "splat: Gaussians at most [no bound]")
+           ->check(CLI::Range(1, 2000000000))
+           ->type_name("N"),
+       {"splat"}});
+  options.of_formats.push_back(
+      {command.add_flag("--full-sh", request.full_sh,
+                        "splat: write the coefficients of degrees 1 to 3 too (all 0), which the "
+                        "original viewer wants"),
+       {"splat"}});
+}
+
+void AddWebOptions(CLI::App& command, ExportOptions& options) {
+  options.of_formats.push_back(
+      {command
+           .add_option("--max-mb", options.web.max_mb,
+                       "web: at most N MB (10^6 bytes); photos and depth are coded more coarsely "
+                       "until the page fits")
+           ->check(CLI::PositiveNumber)
+           ->type_name("N"),
+       {"web"}});
+  options.of_formats.push_back(
+      {command
+           .add_option("--jpeg-quality", options.web.jpeg_quality,
+                       "web: of the photos [85, or the JPEG that the set stores]")
+           ->check(CLI::Range(1, 100))
+           ->type_name("Q"),
+       {"web"}});
 }
 
 }  // namespace
 
 void AddExportCommand(CLI::App& app) {
-  AddCommand(app, "export",
-             "Write a set for other programs: COLMAP's cameras, points and images, or a web page",
-             "dtr export scene.dtr --format web -o scene.html", [](CLI::App& command) -> Action {
-               auto options = std::make_shared<ExportOptions>();
-               command.add_option("SET", options->colmap.set, "The set")->required();
-               command
-                   .add_option("--format", options->format,
-                               "colmap: a folder with sparse/0 and images; web: one HTML file that "
-                               "shows the scene in a browser, without a server [colmap]")
-                   ->check(CLI::IsMember({"colmap", "web"}))
-                   ->type_name("colmap|web");
-               command.add_flag("--text", options->colmap.text,
-                                "colmap: text files instead of binary");
-               command
-                   .add_option("--max-mb", options->web.max_mb,
-                               "web: at most N MB (10^6 bytes); photos and depth are coded more "
-                               "coarsely until the page fits")
-                   ->check(CLI::PositiveNumber)
-                   ->type_name("N");
-               command
-                   .add_option("--jpeg-quality", options->web.jpeg_quality,
-                               "web: of the photos [85, or the JPEG that the set stores]")
-                   ->check(CLI::Range(1, 100))
-                   ->type_name("Q");
-               command.add_option("-o,--output", options->colmap.output, "What to write")
-                   ->required()
-                   ->type_name("DIR|FILE.html");
-               return [options](const Context& context) {
-                 RequireFormat(*options);
-                 return RunExport(*options, context);
-               };
-             });
+  AddCommand(
+      app, "export",
+      "Write a set for other programs: a web page, cameras and images, depth maps, clouds, meshes, "
+      "splats",
+      "dtr export scene.dtr --format web -o scene.html", [](CLI::App& command) -> Action {
+        auto options = std::make_shared<ExportOptions>();
+        command.add_option("SET", options->request.set, "The set")->required();
+        command
+            .add_option("--format", options->format,
+                        "What to write, see docs/EXPORT.md; web is one HTML file that shows the "
+                        "scene in a browser [colmap]")
+            ->check(CLI::IsMember(FormatNames()))
+            ->type_name(fmt::format("{}", fmt::join(FormatNames(), "|")));
+        options->of_formats.push_back(
+            {command.add_flag("--text", options->request.text,
+                              "colmap: COLMAP's text files instead of binary"),
+             {"colmap"}});
+        AddCloudOptions(command, *options);
+        AddSplatOptions(command, *options);
+        AddDepthOptions(command, *options);
+        AddWebOptions(command, *options);
+        command.add_option("-o,--output", options->request.output, "Folder or file to write")
+            ->required()
+            ->type_name("PATH");
+        return [options](const Context& context) { return RunExport(*options, context); };
+      });
 }
 
 }  // namespace dtr::cli

@@ -26,7 +26,7 @@ class BadInput : public CourtyardAndSet {
  protected:
   // `dtr build` into set.dtr with these arguments after the photos.
   Ran Build(const std::string& photos, std::vector<std::string> further = {}) {
-    further.insert(further.begin(), {"build", photos, "-o", In("set.dtr")});
+    further.insert(further.begin(), {"build", photos, "-o", In("set.dtr"), "--sfm", "colmap"});
     return Dtr(further);
   }
   void ExpectNothingBuilt() {
@@ -100,6 +100,8 @@ TEST_F(BadInput, ColmapThatIsAbsentOrFails) {
                    "colmap: program not found on the PATH");
     ExpectNothingBuilt();
   }
+  ExpectRejected(Build(Photos(), {"--features", "9000"}), kWrongUsage,
+                 "--features 9000: expected at most 8192, the limit of --sfm colmap");
   colmap::testing::FakeColmap colmap;
   colmap.Fail("feature_extractor", "echo full; exit 3");
   ExpectRejected(
@@ -137,8 +139,8 @@ TEST_F(BadInput, OutputsThatExistOrCannotBeMade) {
   const Ran onto_file = Dtr({"build", Photos(), "-o", In("set.dtr/mine"), "--force"});
   ExpectRejected(onto_file, kWrongUsage, "expected no such folder yet, found a file");
   EXPECT_THAT(onto_file.err, Not(HasSubstr("== photos")));  // said before any is read
-  ExpectRejected(Dtr({"evaluate", Shared("good.dtr"), "--images", In("set.dtr/mine")}),
-                 kWrongUsage, ": expected a folder, found a file");
+  ExpectRejected(Dtr({"evaluate", Shared("good.dtr"), "--images", In("set.dtr/mine")}), kWrongUsage,
+                 ": expected a folder, found a file");
   const auto build_into = [&](const std::string& set) {
     return Dtr({"build", Photos(), "-o", set, "--poses", Shared("courtyard/sparse")});
   };
@@ -146,7 +148,7 @@ TEST_F(BadInput, OutputsThatExistOrCannotBeMade) {
                  "cannot be made: Not a directory");
   ExpectRejected(build_into("/proc/set.dtr"), kFailed, "cannot be made: No such file or directory");
   ExpectRejected(Dtr({"export", Shared("good.dtr"), "-o", In("set.dtr")}), kWrongUsage,
-                 "exists already; choose another folder");
+                 "exists already; choose another name");
   ExpectRejected(Dtr({"export", Shared("good.dtr"), "-o", In("absent/colmap")}), kWrongUsage,
                  "expected an existing folder to write into, found nothing");
   ExpectRejected(Dtr({"info", Shared("good.dtr"), "--json", In("absent/info.json")}), kWrongUsage,
@@ -216,11 +218,9 @@ TEST_F(BadInput, SetsWithWrongFields) {
 }
 
 TEST_F(BadInput, SetsOfAnotherToolStayReadable) {
-  EXPECT_EQ(
-      InfoAfter("\"verdict\": {}", "\"verdict\": {\"passed\": false, \"tests\": [1]}").code,
-      0);
-  EXPECT_EQ(
-      InfoAfter("\"verdict\": {}", "\"verdict\": {\"passed\": false, \"tests\": 1}").code, 0);
+  EXPECT_EQ(InfoAfter("\"verdict\": {}", "\"verdict\": {\"passed\": false, \"tests\": [1]}").code,
+            0);
+  EXPECT_EQ(InfoAfter("\"verdict\": {}", "\"verdict\": {\"passed\": false, \"tests\": 1}").code, 0);
   InfoAfter("\"provenance\": {", "\"provenance\": {\"held_out_not_registered\": [1],");
   EXPECT_EQ(Dtr({"evaluate", In("bad.dtr"), "--renderer", "cpu"}).code, 0);
 }

@@ -46,7 +46,7 @@ class BenchCalibration : public ::testing::Test {
     colmap::testing::FakeColmap colmap;
     Leave(colmap, *truth_);
     DtrOk({"build", (*shared_ / "photos").string(), "-o", (*shared_ / "set.dtr").string(),
-           "--engine", "none"});
+           "--engine", "none", "--sfm", "colmap"});
   }
   static void TearDownTestSuite() {
     delete shared_;
@@ -95,7 +95,7 @@ calib::SfmModel* BenchCalibration::truth_ = nullptr;
 TEST_F(BenchCalibration, WorseCamerasHaveALargerErrorAndRefinementMendsThem) {
   colmap::testing::FakeColmap colmap;
   Leave(colmap, *truth_);
-  const Json truth = Point("refine=no");
+  const Json truth = Point("sfm=colmap,refine=no");
   EXPECT_GT(truth["cost"], 0);
   EXPECT_EQ(truth["figures"]["not_registered"], 0);
   EXPECT_EQ(truth["figures"]["reference_tracks_predicted"],
@@ -105,18 +105,19 @@ TEST_F(BenchCalibration, WorseCamerasHaveALargerErrorAndRefinementMendsThem) {
   double last = truth["error"];
   for (const double by_px : {2.0, 4.0}) {
     Leave(colmap, Turned(by_px));
-    const double error = Point("refine=no")["error"];
+    const double error = Point("sfm=colmap,refine=no")["error"];
     EXPECT_GT(error, 1.1 * last) << by_px;
     last = error;
   }
   // Exact observations say where the cameras look: adjusted, they are the true ones again.
-  EXPECT_NEAR(Point("refine=yes")["error"], truth["error"], 0.02 * truth["error"].get<double>());
+  EXPECT_NEAR(Point("sfm=colmap,refine=yes")["error"], truth["error"],
+              0.02 * truth["error"].get<double>());
 }
 
 TEST_F(BenchCalibration, FewerCamerasAreNoAdvantage) {
   colmap::testing::FakeColmap colmap;
   Leave(colmap, *truth_);
-  const Json all = Point("refine=no");
+  const Json all = Point("sfm=colmap,refine=no");
   // The true cameras, but for one photo that finds no place.
   calib::SfmModel fewer = *truth_;
   for (const calib::SfmFeature& feature : fewer.images.back().features) {
@@ -129,7 +130,7 @@ TEST_F(BenchCalibration, FewerCamerasAreNoAdvantage) {
     });
   }
   Leave(colmap, fewer);
-  const Json point = Point("refine=no");
+  const Json point = Point("sfm=colmap,refine=no");
   EXPECT_EQ(point["figures"]["not_registered"], 1);
   EXPECT_EQ(point["figures"]["reference_observations"], all["figures"]["reference_observations"]);
   EXPECT_GT(point["error"], 1.5 * all["error"].get<double>());
@@ -144,7 +145,7 @@ TEST_F(BenchCalibration, FewerCamerasAreNoAdvantage) {
 TEST_F(BenchCalibration, ColmapIsToldWhatTheSettingSays) {
   colmap::testing::FakeColmap colmap;
   Leave(colmap, *truth_);
-  Point("default");
+  Point("sfm=colmap");
   for (const std::string& call : colmap.Calls()) {
     EXPECT_THAT(call, Not(HasSubstr("max_num_features"))) << "COLMAP's own is the default";
   }
@@ -152,7 +153,7 @@ TEST_F(BenchCalibration, ColmapIsToldWhatTheSettingSays) {
   EXPECT_THAT(colmap.Calls(), Contains(HasSubstr("--SiftExtraction.max_image_size 480 ")));
   EXPECT_THAT(colmap.Calls(), Contains(HasSubstr("--ImageReader.camera_model RADIAL ")));
   colmap.ForgetCalls();
-  Point("feature-size=240,features=2048,matching=sequential,lens-model=OPENCV");
+  Point("sfm=colmap,feature-size=240,features=2048,matching=sequential,lens-model=OPENCV");
   EXPECT_THAT(colmap.Calls(), Contains(HasSubstr("--SiftExtraction.max_image_size 240")));
   EXPECT_THAT(colmap.Calls(), Contains(HasSubstr("--SiftExtraction.max_num_features 2048")));
   EXPECT_THAT(colmap.Calls(), Contains(HasSubstr("--ImageReader.camera_model OPENCV ")));
@@ -161,8 +162,8 @@ TEST_F(BenchCalibration, ColmapIsToldWhatTheSettingSays) {
   // The same of a user's own calibration.
   colmap.ForgetCalls();
   DtrOk({"calibrate", "photos", (*shared_ / "photos").string(), "-o", (folder_ / "model").string(),
-         "--feature-size", "240", "--features", "2048", "--matching", "sequential", "--lens-model",
-         "OPENCV"});
+         "--sfm", "colmap", "--feature-size", "240", "--features", "2048", "--matching",
+         "sequential", "--lens-model", "OPENCV"});
   EXPECT_THAT(colmap.Calls(), Contains(HasSubstr("--SiftExtraction.max_image_size 240")));
   EXPECT_THAT(colmap.Calls(), Contains(HasSubstr("--SiftExtraction.max_num_features 2048")));
   EXPECT_THAT(colmap.Calls(), Contains(HasSubstr("--ImageReader.camera_model OPENCV ")));
@@ -179,11 +180,12 @@ TEST_F(BenchCalibration, ABuildKnowsHowItsCamerasWereLookedFor) {
     DtrOk(further);
     return Json::parse(Text(folder_ / "set.dtr/set.json"))["provenance"]["options"];
   };
-  EXPECT_EQ(build({"--features", "2048"})["sfm"]["features"], 2048);
-  EXPECT_FALSE(build({"--features", "8192"}).contains("sfm"))
+  const Json sfm = build({"--sfm", "colmap", "--features", "2048"})["sfm"];
+  EXPECT_EQ(sfm["features"], 2048);
+  EXPECT_EQ(sfm["engine"], "colmap");
+  EXPECT_FALSE(build({"--features", "14000"}).contains("sfm"))
       << "the default changes no byte of a set";
   EXPECT_EQ(build({"--preset", "fast"})["sfm"]["features"], 4096);
-  EXPECT_FALSE(build({"--preset", "fast", "--features", "8192"}).contains("sfm"));
 }
 
 TEST_F(BenchCalibration, CommandsBringTheErrorBackFromWhatColmapLeft) {
@@ -213,7 +215,7 @@ TEST_F(BenchCalibration, CommandsBringTheErrorBackFromWhatColmapLeft) {
   DtrOk(Words({"-o", out, "--max-points", "3", "--feature-size", "480,240"}));
   EXPECT_THAT(colmap.Calls(), ::testing::IsEmpty());
   EXPECT_EQ(Json::parse(Text(folder_ / "out/bench.json"))["stages"][0], stage);
-  Point("default");
+  Point("sfm=colmap");
   EXPECT_THAT(colmap.Calls(), Contains(HasSubstr("mapper")));
 }
 

@@ -69,8 +69,8 @@ class BuildInMetres : public ::testing::Test {
         .norm();
   }
   Ran Build(std::vector<std::string> further) const {
-    further.insert(further.begin(),
-                   {"build", In("photos"), "-o", In("set.dtr"), "--engine", "none"});
+    further.insert(further.begin(), {"build", In("photos"), "-o", In("set.dtr"), "--engine", "none",
+                                     "--sfm", "colmap"});
     return Dtr(further);
   }
   colmap::testing::FakeColmap colmap_;
@@ -110,8 +110,8 @@ TEST_F(BuildInMetres, GpsOfThePhotosGivesASetInMetres) {
 
 TEST_F(BuildInMetres, ADistanceBetweenCamerasIsHeldByCalibratePhotos) {
   const std::string distance = fmt::format("0000,0006.jpg={:.9g}m+-1mm", Metres(0, 6));
-  const Ran ran = Dtr({"calibrate", "photos", In("photos"), "-o", In("model"), "--distance",
-                       distance, "--json", "-"});
+  const Ran ran = Dtr({"calibrate", "photos", In("photos"), "-o", In("model"), "--sfm", "colmap",
+                       "--distance", distance, "--json", "-"});
   ASSERT_EQ(ran.code, 0) << ran.err;
   const Json json = Json::parse(ran.out);
   EXPECT_EQ(json["unit"], "metre");
@@ -173,7 +173,8 @@ TEST_F(BuildInMetres, PhotosThatDoNotDetermineTheirCamerasAreRejectedBeforeTheyA
   colmap::WriteModel(colmap_ / "model.0", model, colmap::Format::kBinary);
   for (const std::vector<std::string>& how :
        {std::vector<std::string>{}, {"--gps"}, {"--no-refine"}}) {
-    std::vector<std::string> words{"calibrate", "photos", In("photos"), "-o", In("model")};
+    std::vector<std::string> words{"calibrate", "photos", In("photos"), "-o",
+                                   In("model"), "--sfm",  "colmap"};
     words.insert(words.end(), how.begin(), how.end());
     const Ran ran = Dtr(words);
     ExpectRejected(ran, kFailed, "planar_scene: the points lie in a plane");

@@ -70,8 +70,8 @@ class BuildRig : public ::testing::Test {
     colmap.LeaveDatabase(aliases, cameras);
   }
   Ran Build(std::vector<std::string> further) const {
-    further.insert(further.begin(),
-                   {"build", In("photos"), "-o", In("set.dtr"), "--engine", "none"});
+    further.insert(further.begin(), {"build", In("photos"), "-o", In("set.dtr"), "--engine", "none",
+                                     "--sfm", "colmap"});
     return Dtr(further);
   }
   TemporaryFolder folder_;

@@ -129,7 +129,7 @@ TEST_F(ExportWeb, IsTheSameEachTime) {
 
 TEST_F(ExportWeb, AFileThatExistsIsNotReplaced) {
   WriteFileAtomically(folder_ / "page.html", "notes");
-  ExpectRejected(Dtr(Arguments("page.html")), kWrongUsage, "exists already; choose another file");
+  ExpectRejected(Dtr(Arguments("page.html")), kWrongUsage, "exists already; choose another name");
   EXPECT_EQ(Text(folder_ / "page.html"), "notes");
 }
 
@@ -163,10 +163,10 @@ TEST_F(ExportWeb, ASetWithoutDepthHasNoPage) {
 
 TEST_F(ExportWeb, OptionsOfAnotherFormatAreRejected) {
   ExpectRejected(Dtr(Arguments("page.html", {"--text"})), kWrongUsage,
-                 "--text conflicts with --format web; leave one of them out");
+                 "--text needs --format colmap, found --format web; leave one of them out");
   ExpectRejected(Dtr({"export", (folder_ / "set.dtr").string(), "--max-mb", "4", "-o",
                       (folder_ / "out").string()}),
-                 kWrongUsage, "--max-mb and --jpeg-quality need --format web");
+                 kWrongUsage, "--max-mb needs --format web, found --format colmap");
   ExpectNothingLeft();
 }
 

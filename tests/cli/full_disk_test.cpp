@@ -51,7 +51,7 @@ const Command kCommands[] = {
      .replaces = "good.dtr"},
     {.name = "refine", .words = "calibrate refine OF/courtyard/sparse -o IN/refined"},
     {.name = "calibrate_photos",
-     .words = "calibrate photos OF/courtyard/images -o IN/model",
+     .words = "calibrate photos OF/courtyard/images -o IN/model --sfm colmap",
      .repeats = false,
      .one_by_one = "model/"},
     {.name = "prune",

@@ -34,7 +34,8 @@ class Hostile : public CourtyardAndSet {
 
   // A build that gets as far as COLMAP, which fails: what it began stays for the next run.
   Ran BeginBuild(const std::string& photos, std::vector<std::string> further = {}) {
-    further.insert(further.begin(), {"build", photos, "-o", In("set.dtr"), "--engine", "none"});
+    further.insert(further.begin(),
+                   {"build", photos, "-o", In("set.dtr"), "--engine", "none", "--sfm", "colmap"});
     return Dtr(further);
   }
 };

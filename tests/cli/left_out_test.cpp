@@ -28,7 +28,8 @@ class LeftOut : public ::testing::Test {
   std::string Set() const { return (folder_ / "set.dtr").string(); }
 
   Ran Build(std::vector<std::string> further) const {
-    further.insert(further.begin(), {"build", Photos().string(), "-o", Set(), "--force"});
+    further.insert(further.begin(),
+                   {"build", Photos().string(), "-o", Set(), "--force", "--sfm", "colmap"});
     return DtrOk(further);
   }
   std::vector<std::string> WithPoses(std::vector<std::string> further = {}) const {

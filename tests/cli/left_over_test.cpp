@@ -117,7 +117,8 @@ TEST_F(LeftOver, ACalibrationThatWasKilledWhileColmapWorked) {
   LeaveModel(colmap, colmap::ReadModel(Shared("courtyard/sparse")));
   colmap.Fail("mapper",
               "echo $$ > \"$here/pid\"; mv \"$here/pid\" \"$here/mapping\"; exec sleep 600");
-  const std::vector<std::string> calibrating{"calibrate", "photos", Photos(), "-o", Work("model")};
+  const std::vector<std::string> calibrating{"calibrate",   "photos", Photos(), "-o",
+                                             Work("model"), "--sfm",  "colmap"};
   Kill(calibrating, [&] { return fs::exists(colmap / "mapping"); });
   const int sleeper = std::stoi(ReadFile(colmap / "mapping", 64));
   for (int i = 0; i < 100 && IsAtWork(sleeper); ++i) usleep(100'000);
@@ -136,8 +137,8 @@ TEST_F(LeftOver, ABuildThatGoesOnCountsWhatColmapTookBefore) {
   LeaveModel(colmap, colmap::ReadModel(Shared("courtyard/sparse")));
   colmap.Fail("feature_extractor", "sleep 3");
   colmap.Fail("mapper", "exit 3");
-  const std::vector<std::string> building{"build", Photos(), "--engine",
-                                          "none",  "-o",     Work("set.dtr")};
+  const std::vector<std::string> building{"build",    Photos(), "--sfm", "colmap",
+                                          "--engine", "none",   "-o",    Work("set.dtr")};
   ExpectRejected(Dtr(building), 1, "expected exit code 0, found 3");
   colmap.Succeed("mapper");
   DtrOk(building);

@@ -29,7 +29,9 @@ TEST_F(ProgressTold, TheMemoryOfColmapIsCounted) {
   LeaveModel(colmap, colmap::ReadModel(Shared("courtyard/sparse")));
   colmap.Fail("feature_extractor",
               "head -c 300000000 /dev/zero | tail -c 300000000 > /dev/null; sleep 1");
-  const Ran ran = DtrByItself({"build", Photos(), "-o", In("set.dtr"), "--engine", "none"});
+  const std::vector<std::string> arguments = {"build",    Photos(), "-o",    In("set.dtr"),
+                                              "--engine", "none",   "--sfm", "colmap"};
+  const Ran ran = DtrByItself(arguments);
   ASSERT_EQ(ran.code, 0) << ran.err;
   constexpr double kMinMib = 280;
   std::smatch told;
@@ -38,8 +40,6 @@ TEST_F(ProgressTold, TheMemoryOfColmapIsCounted) {
   EXPECT_GE(std::stod(told[1]), kMinMib);
   const auto record = nlohmann::json::parse(Text(In("set.dtr") + "/report/run.json"));
   EXPECT_GE(record["stages"].back()["peak_rss_kib"], kMinMib * 1024);
-  const std::vector<std::string> arguments = {"build",       Photos(),   "-o",
-                                              In("set.dtr"), "--engine", "none"};
   std::vector<std::string> recorded = record["command"];
   ASSERT_FALSE(recorded.empty());
   recorded.erase(recorded.begin());  // the program

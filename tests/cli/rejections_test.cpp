@@ -276,7 +276,9 @@ TEST_F(Rejections, PosesThatAreNotOfThesePhotos) {
 
 TEST_F(Rejections, AProgramCalledColmapThatIsNotIt) {
   const Environment path("PATH", In("bin"));
-  const auto build = [&] { return Dtr({"build", Photos(), "-o", In("set.dtr")}); };
+  const auto build = [&] {
+    return Dtr({"build", Photos(), "-o", In("set.dtr"), "--sfm", "colmap"});
+  };
   Program("colmap", "exit 3");
   ExpectRejected(build(), kFailed, "'colmap help' failed (exit code 3); reinstall COLMAP");
   Program("colmap", "echo Hello");

@@ -37,7 +37,9 @@ class VideoBySfm : public FullDisk {
     }
     LeaveModel(colmap_, model);
   }
-  std::vector<std::string> Inputs() const override { return {Video(), "--every", "1"}; }
+  std::vector<std::string> Inputs() const override {
+    return {Video(), "--every", "1", "--sfm", "colmap"};
+  }
   std::string Video() const { return (folder_ / "walk.avi").string(); }
 
   colmap::testing::FakeColmap colmap_;

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
-#include <utility>
 
 #include "calib/sfm/mapping/acceptance.h"
 #include "calib/sfm/mapping/adjust_map.h"
+#include "calib/sfm/mapping/map_model.h"
 #include "calib/sfm/mapping/pair_selection.h"
 #include "calib/sfm/mapping/points.h"
 #include "calib/sfm/mapping/positioning.h"
@@ -269,54 +269,9 @@ class Mapper {
   }
 
   void WriteModel() {
-    calib::SfmModel& model = mapped_.model;
-    for (size_t i = 0; i < graph_.images.size(); ++i) {
-      if (!cameras_.placed[i]) continue;
-      const auto camera = static_cast<std::uint32_t>(graph_.images[i].camera);
-      model.cameras[camera + 1] = cameras_.lenses[camera];
-      calib::SfmImage image{static_cast<std::uint32_t>(i + 1),
-                            graph_.images[i].name,
-                            camera + 1,
-                            cameras_.cam_from_world[i],
-                            {}};
-      for (const Eigen::Vector2d& pixel : graph_.images[i].pixels)
-        image.features.push_back({pixel});
-      model.images.push_back(std::move(image));
-    }
-    std::vector<size_t> index(graph_.images.size());
-    for (size_t i = 0; i < model.images.size(); ++i) index[model.images[i].id - 1] = i;
-    ShareFeaturesOut();
-    for (size_t p = 0; p < points_.size(); ++p) {
-      double sum = 0;
-      for (const TrackFeature& f : points_[p].seen) {
-        model.images[index[f.image]].features[f.feature].point_id = p + 1;
-        sum += ReprojectionErrorPx(graph_, cameras_, f, points_[p].p_in_world);
-      }
-      const auto count = static_cast<double>(points_[p].seen.size());
-      model.points[p + 1] = {points_[p].p_in_world, {}, sum / count};
-    }
-    std::sort(model.images.begin(), model.images.end(),
-              [](const auto& x, const auto& y) { return x.name < y.name; });
-    mapped_.statistics.registered = static_cast<int>(model.images.size());
+    mapped_.model = ModelOf(graph_, cameras_, &points_);
+    mapped_.statistics.registered = static_cast<int>(mapped_.model.images.size());
     mapped_.statistics.points = static_cast<int>(points_.size());
-  }
-
-  // A resected image may have given a feature to a point while its old track has it, too: the point
-  // that more images see takes it, and points left with fewer than two go.
-  void ShareFeaturesOut() {
-    std::stable_sort(points_.begin(), points_.end(), [](const MapPoint& x, const MapPoint& y) {
-      return x.seen.size() > y.seen.size();
-    });
-    std::vector<std::vector<char>> taken(graph_.images.size());
-    for (size_t i = 0; i < taken.size(); ++i) taken[i].assign(graph_.images[i].pixels.size(), 0);
-    for (MapPoint& point : points_) {
-      std::erase_if(point.seen, [&](const TrackFeature& f) {
-        return std::exchange(taken[static_cast<size_t>(f.image)][f.feature], char{1}) != 0;
-      });
-    }
-    std::erase_if(points_, [](const MapPoint& point) { return point.seen.size() < 2; });
-    std::stable_sort(points_.begin(), points_.end(),
-                     [](const MapPoint& x, const MapPoint& y) { return x.track < y.track; });
   }
 
   static constexpr double kFirstAngleRad = 0.017;

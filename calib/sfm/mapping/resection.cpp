@@ -1,16 +1,15 @@
 #include "calib/sfm/mapping/resection.h"
 
+#include <algorithm>
 #include <map>
-#include <opencv2/calib3d.hpp>
 #include <set>
 
-#include "calib/sfm/mapping/so3.h"
+#include "calib/sfm/registration/absolute_pose.h"
 
 namespace dtr::sfm {
 namespace {
 
-constexpr int kRansacIterations = 2000;
-constexpr double kConfidence = 0.9999;
+constexpr int kMinPoints = 6;
 
 using FeatureKey = std::pair<int, std::uint32_t>;
 
@@ -48,46 +47,24 @@ std::vector<FeaturePoint> PointsSeenBy(const ViewGraph& graph, int image,
 std::optional<Pose> Resect(const ViewGraph& graph, const MapCameras& cameras, int image,
                            std::span<const MapPoint> points, double limit_px, int min_agree,
                            std::vector<FeaturePoint>* seen) {
-  std::vector<cv::Point3d> objects;
-  std::vector<cv::Point2d> places;  // on the plane z = 1
+  PointRays known;
   std::vector<FeaturePoint> used;
   for (const FeaturePoint& s : *seen) {
     const Eigen::Vector3d& ray = cameras.rays[image][s.feature];
     if (!(ray.z() > 0.1)) continue;
-    const Eigen::Vector3d& p = points[s.point].p_in_world;
-    objects.emplace_back(p.x(), p.y(), p.z());
-    places.emplace_back(ray.x() / ray.z(), ray.y() / ray.z());
+    known.Add(points[s.point].p_in_world, ray.hnormalized());
     used.push_back(s);
   }
   seen->clear();
-  if (static_cast<int>(used.size()) < std::max(min_agree, 6)) return std::nullopt;
   const calib::LensCamera& lens = cameras.lenses[graph.images[image].camera];
-  const auto limit = static_cast<float>(limit_px / lens.params[0]);
-  cv::Mat rotation_vector, translation;
-  std::vector<int> inliers;
-  if (!cv::solvePnPRansac(objects, places, cv::Mat::eye(3, 3, CV_64F), cv::noArray(),
-                          rotation_vector, translation, false, kRansacIterations, limit,
-                          kConfidence, inliers, cv::SOLVEPNP_AP3P) ||
-      static_cast<int>(inliers.size()) < min_agree) {
-    return std::nullopt;
-  }
-  std::vector<cv::Point3d> in_objects;
-  std::vector<cv::Point2d> in_places;
-  for (const int i : inliers) {
-    in_objects.push_back(objects[i]);
-    in_places.push_back(places[i]);
+  const auto found = FindPose(known, limit_px / lens.params[0], std::max(min_agree, kMinPoints));
+  if (!found) return std::nullopt;
+  PointRays agreeing;
+  for (const int i : found->inliers) {
+    agreeing.Add(known.points[i], known.rays[i]);
     seen->push_back(used[i]);
   }
-  cv::solvePnPRefineLM(in_objects, in_places, cv::Mat::eye(3, 3, CV_64F), cv::noArray(),
-                       rotation_vector, translation);
-  const Eigen::Vector3d w(rotation_vector.at<double>(0), rotation_vector.at<double>(1),
-                          rotation_vector.at<double>(2));
-  Pose pose;
-  pose.rotation = Eigen::Quaterniond(ExpOf(w)).normalized();
-  pose.translation << translation.at<double>(0), translation.at<double>(1),
-      translation.at<double>(2);
-  if (!w.allFinite() || !pose.translation.allFinite()) return std::nullopt;
-  return pose;
+  return RefineAbsolutePose(agreeing, found->cam_from_world);
 }
 
 }  // namespace dtr::sfm

@@ -20,8 +20,8 @@ struct FeaturePoint {
 std::vector<FeaturePoint> PointsSeenBy(const ViewGraph& graph, int image,
                                        std::span<const MapPoint> points);
 
-/// Pose of an image by P3P and RANSAC (Ke & Roumeliotis 2017; OpenCV's), refined over the features
-/// that agree to `limit_px`; these stay in `seen`. Empty where fewer than `min_agree` do.
+/// Pose of an image (FindPose), refined over the features that agree to `limit_px`; these stay in
+/// `seen`. Empty where fewer than `min_agree` do.
 std::optional<Pose> Resect(const ViewGraph& graph, const MapCameras& cameras, int image,
                            std::span<const MapPoint> points, double limit_px, int min_agree,
                            std::vector<FeaturePoint>* seen);

@@ -33,11 +33,15 @@ bool Passes(const Nearest& nearest) {
 
 StripGrid::StripGrid(std::span<const Eigen::Vector2d> points, int across, double band)
     : across_(across) {
-  if (points.empty()) return;
-  Eigen::Vector2d low = points.front(), high = low;
-  for (const Eigen::Vector2d& p : points) {
-    low = low.cwiseMin(p);
-    high = high.cwiseMax(p);
+  std::vector<int> finite;
+  for (size_t i = 0; i < points.size(); ++i) {
+    if (points[i].allFinite()) finite.push_back(static_cast<int>(i));
+  }
+  if (finite.empty()) return;
+  Eigen::Vector2d low = points[static_cast<size_t>(finite.front())], high = low;
+  for (const int i : finite) {
+    low = low.cwiseMin(points[static_cast<size_t>(i)]);
+    high = high.cwiseMax(points[static_cast<size_t>(i)]);
   }
   corner_ = {low[across], low[1 - across]};
   const Eigen::Vector2d size = Eigen::Vector2d(high[across], high[1 - across]) - corner_;
@@ -46,19 +50,18 @@ StripGrid::StripGrid(std::span<const Eigen::Vector2d> points, int across, double
   strips_ = static_cast<int>(size[0] / width_) + 1;
   cells_ = static_cast<int>(size[1] / height_) + 1;
   begin_.assign(static_cast<size_t>(strips_) * static_cast<size_t>(cells_) + 1, 0);
-  std::vector<size_t> cell_of(points.size());
-  for (size_t i = 0; i < points.size(); ++i) {
-    const int strip = static_cast<int>((points[i][across] - corner_[0]) / width_);
-    const int cell = static_cast<int>((points[i][1 - across] - corner_[1]) / height_);
-    cell_of[i] = static_cast<size_t>(strip * cells_ + cell);
-    ++begin_[cell_of[i] + 1];
-  }
+  const auto cell_of = [&](const Eigen::Vector2d& p) {
+    const int strip = static_cast<int>((p[across] - corner_[0]) / width_);
+    const int cell = static_cast<int>((p[1 - across] - corner_[1]) / height_);
+    return static_cast<size_t>(strip * cells_ + cell);
+  };
+  for (const int i : finite) ++begin_[cell_of(points[static_cast<size_t>(i)]) + 1];
   for (size_t c = 1; c < begin_.size(); ++c) begin_[c] += begin_[c - 1];
-  entries_.resize(points.size());
+  entries_.resize(finite.size());
   std::vector<int> next(begin_);
-  for (size_t i = 0; i < points.size(); ++i) {
-    entries_[static_cast<size_t>(next[cell_of[i]]++)] = {points[i][across], points[i][1 - across],
-                                                         static_cast<int>(i)};
+  for (const int i : finite) {
+    const Eigen::Vector2d& p = points[static_cast<size_t>(i)];
+    entries_[static_cast<size_t>(next[cell_of(p)]++)] = {p[across], p[1 - across], i};
   }
 }
 
@@ -87,16 +90,11 @@ void StripGrid::Near(const Eigen::Vector3d& line, double band, std::vector<int>&
 }
 
 FeatureGrid::FeatureGrid(std::span<const Eigen::Vector2d> points,
-                         std::span<const Descriptor> descriptors, double band) {
-  for (size_t i = 0; i < points.size(); ++i) {
-    if (!points[i].allFinite()) continue;
-    points_.push_back(points[i]);
-    descriptors_.push_back(descriptors[i]);
-    feature_.push_back(static_cast<std::uint32_t>(i));
-  }
-  upright_ = StripGrid(points_, 0, band);
-  level_ = StripGrid(points_, 1, band);
-}
+                         std::span<const Descriptor> descriptors, double band)
+    : points_(points),
+      descriptors_(descriptors),
+      upright_(points, 0, band),
+      level_(points, 1, band) {}
 
 void FeatureGrid::Near(const Eigen::Vector3d& line, double band, std::vector<int>& found) const {
   found.clear();
@@ -108,10 +106,11 @@ void FeatureGrid::Near(const Eigen::Vector3d& line, double band, std::vector<int
 
 FeatureMatches GuidedMatches(const FeatureGrid& a, const FeatureGrid& b, const Eigen::Matrix3d& m,
                              double band) {
-  std::vector<Nearest> of_b(b.size());
-  std::vector<Nearest> of_a(a.size());
+  std::vector<Nearest> of_b(b.points().size());
+  std::vector<Nearest> of_a(a.points().size());
   std::vector<int> near, dots;
-  for (size_t i = 0; i < a.size(); ++i) {
+  for (size_t i = 0; i < of_a.size(); ++i) {
+    if (!a.points()[i].allFinite()) continue;
     b.Near(m * a.points()[i].homogeneous(), band, near);
     dots.resize(near.size());
     DotProducts(a.descriptors()[i], b.descriptors(), near, dots);
@@ -121,13 +120,12 @@ FeatureMatches GuidedMatches(const FeatureGrid& a, const FeatureGrid& b, const E
     }
   }
   FeatureMatches matches;
-  for (size_t i = 0; i < a.size(); ++i) {
+  for (size_t i = 0; i < of_a.size(); ++i) {
     if (!Passes(of_a[i])) continue;
     const auto j = static_cast<size_t>(of_a[i].index);
     if (of_b[j].index != static_cast<int>(i) || !Passes(of_b[j])) continue;
-    matches.emplace_back(a.FeatureOf(i), b.FeatureOf(j));
+    matches.emplace_back(static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(j));
   }
-  std::sort(matches.begin(), matches.end());
   return matches;
 }
 

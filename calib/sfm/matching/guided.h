@@ -14,7 +14,8 @@ namespace dtr::sfm::matching {
 class StripGrid {
  public:
   StripGrid() = default;
-  /// `across`: the coordinate on which strips lie side by side, 0 (x) or 1 (y).
+  /// `points`: on z = 1; those that are not finite are left out. `across`: the coordinate on which
+  /// strips lie side by side, 0 (x) or 1 (y).
   /// `band`: distances that Near will be asked for, about; cells grow where they would be too many.
   StripGrid(std::span<const Eigen::Vector2d> points, int across, double band);
 
@@ -34,26 +35,23 @@ class StripGrid {
   int across_ = 0, strips_ = 0, cells_ = 0;
 };
 
-/// All features of a photo whose ray is known.
+/// The features of a photo, which this borrows.
 class FeatureGrid {
  public:
   FeatureGrid() = default;
-  /// `points`: on z = 1, NaN where a feature has no ray (it is left out). `band`: as StripGrid.
+  /// `points`: on z = 1, NaN where a feature has no ray (nothing finds it). `band`: as StripGrid.
   FeatureGrid(std::span<const Eigen::Vector2d> points, std::span<const Descriptor> descriptors,
               double band);
 
-  size_t size() const { return points_.size(); }
-  const std::vector<Eigen::Vector2d>& points() const { return points_; }
-  const std::vector<Descriptor>& descriptors() const { return descriptors_; }
-  std::uint32_t FeatureOf(size_t i) const { return feature_[i]; }
+  std::span<const Eigen::Vector2d> points() const { return points_; }
+  std::span<const Descriptor> descriptors() const { return descriptors_; }
 
-  /// Indices (into the lists above) of the features within `band` of a line.
+  /// Indices of the features within `band` of a line.
   void Near(const Eigen::Vector3d& line, double band, std::vector<int>& found) const;
 
  private:
-  std::vector<Eigen::Vector2d> points_;
-  std::vector<Descriptor> descriptors_;
-  std::vector<std::uint32_t> feature_;
+  std::span<const Eigen::Vector2d> points_;
+  std::span<const Descriptor> descriptors_;
   StripGrid upright_, level_;
 };
 

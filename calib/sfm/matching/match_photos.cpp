@@ -39,11 +39,15 @@ void Check(std::span<const MatchPhoto> photos, std::span<const calib::LensCamera
   }
 }
 
-// A photo as the second stage sees it.
+// A photo as the second stage sees it. The grid borrows the points: it moves, but is not copied.
 struct Seen {
+  Seen() = default;
+  Seen(Seen&&) = default;
+  Seen& operator=(Seen&&) = default;
+
   std::vector<Eigen::Vector2d> points;  // on z = 1; NaN: no ray
   FeatureGrid grid;
-  double band = 0;        // kBand at the centre, on z = 1
+  double band = 0;        // BandOf at the centre, on z = 1
   double band_share = 0;  // share of the photo within a band of a line
 };
 
@@ -63,8 +67,8 @@ Seen See(const MatchPhoto& photo, const calib::LensCamera& camera) {
   }
   const double long_side = std::max(camera.width_px, camera.height_px);
   const double short_side = std::min(camera.width_px, camera.height_px);
-  seen.band = kBand * long_side / camera.params[0];
-  seen.band_share = 2 * kBand * long_side / short_side;
+  seen.band = BandOf(long_side) * long_side / camera.params[0];
+  seen.band_share = 2 * BandOf(long_side) * long_side / short_side;
   seen.grid = FeatureGrid(seen.points, photo.features.descriptors, seen.band);
   return seen;
 }

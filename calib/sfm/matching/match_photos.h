@@ -25,9 +25,10 @@ struct MatchOptions {
   std::uint64_t seed = 0;
   /// Per camera whether its intrinsics hold as given, and no vote changes them; empty: of none.
   std::vector<bool> lens_is_known = {};
-  /// Pairs (a < b, sorted) to match; empty: all up to 60 photos, of more each with those that
-  /// resemble it and with the next in order.
+  /// Pairs (a < b, sorted) that may be matched; empty: all.
   std::optional<std::vector<std::pair<int, int>>> pairs;
+  /// Of these, match each photo with those that resemble it and with the next in order only.
+  bool preselect = false;
   Progress* progress = nullptr;
 };
 

@@ -38,6 +38,44 @@ std::vector<int> PartnersOf(const std::vector<int>& scores) {
   return order;
 }
 
+std::vector<std::pair<int, int>> AllowedPairs(int photos, const MatchOptions& options) {
+  std::vector<std::pair<int, int>> pairs;
+  if (options.pairs) {
+    for (const auto& [a, b] : *options.pairs) {
+      if (a < 0 || b >= photos || a >= b)
+        throw std::invalid_argument("MatchPhotos: a pair of no two photos");
+    }
+    return *options.pairs;
+  }
+  for (int a = 0; a < photos; ++a) {
+    for (int b = a + 1; b < photos; ++b) pairs.emplace_back(a, b);
+  }
+  return pairs;
+}
+
+// Matches among the largest features, per photo and other photo; 0 of pairs that are not allowed.
+std::vector<std::vector<int>> ScoresOf(std::span<const MatchPhoto> photos,
+                                       const std::vector<std::pair<int, int>>& allowed,
+                                       const MatchOptions& options, Progress& progress) {
+  std::vector<std::vector<int>> scores(photos.size(), std::vector<int>(photos.size(), 0));
+  constexpr int kPairsAtOnce = 256;
+  const int count = static_cast<int>(allowed.size());
+  const int chunks = (count + kPairsAtOnce - 1) / kPairsAtOnce;
+  progress.Stage("comparing photos", chunks);
+  std::atomic<int> done = 0;
+  ParallelFor(0, chunks, options.threads, [&](int chunk) {
+    progress.ThrowIfInterrupted();
+    for (int k = chunk * kPairsAtOnce; k < std::min(count, (chunk + 1) * kPairsAtOnce); ++k) {
+      const auto [a, b] = allowed[static_cast<size_t>(k)];
+      const auto i = static_cast<size_t>(a), j = static_cast<size_t>(b);
+      scores[i][j] = scores[j][i] =
+          static_cast<int>(CoarseMatches(photos[i].features, photos[j].features, kGlance).size());
+    }
+    progress.Update(++done);
+  });
+  return scores;
+}
+
 }  // namespace
 
 std::vector<CoarseMatch> CoarseMatches(const Features& a, const Features& b, size_t largest) {
@@ -64,37 +102,14 @@ std::vector<CoarseMatch> CoarseMatches(const Features& a, const Features& b, siz
 std::vector<std::pair<int, int>> ChoosePairs(std::span<const MatchPhoto> photos,
                                              const MatchOptions& options, Progress& progress) {
   const int count = static_cast<int>(photos.size());
-  if (options.pairs) {
-    for (const auto& [a, b] : *options.pairs) {
-      if (a < 0 || b >= count || a >= b)
-        throw std::invalid_argument("MatchPhotos: a pair of no two photos");
-    }
-    return *options.pairs;
-  }
+  const std::vector<std::pair<int, int>> allowed = AllowedPairs(count, options);
+  if (!options.preselect) return allowed;
+  const auto scores = ScoresOf(photos, allowed, options, progress);
   std::set<std::pair<int, int>> pairs;
-  if (photos.size() <= kAllPairsUpTo) {
-    for (int a = 0; a < count; ++a) {
-      for (int b = a + 1; b < count; ++b) pairs.emplace(a, b);
-    }
-    return {pairs.begin(), pairs.end()};
-  }
-  std::vector<std::vector<int>> scores(photos.size(), std::vector<int>(photos.size(), 0));
-  progress.Stage("comparing photos", count);
-  std::atomic<int> done = 0;
-  ParallelFor(0, count, options.threads, [&](int a) {
-    progress.ThrowIfInterrupted();
-    for (int b = a + 1; b < count; ++b) {
-      const auto i = static_cast<size_t>(a), j = static_cast<size_t>(b);
-      scores[i][j] =
-          static_cast<int>(CoarseMatches(photos[i].features, photos[j].features, kGlance).size());
-    }
-    progress.Update(++done);
-  });
-  for (size_t a = 0; a < photos.size(); ++a) {
-    for (size_t b = 0; b < a; ++b) scores[a][b] = scores[b][a];
+  for (const auto& [a, b] : allowed) {
+    if (b == a + 1) pairs.emplace(a, b);
   }
   for (int a = 0; a < count; ++a) {
-    if (a + 1 < count) pairs.emplace(a, a + 1);
     for (const int b : PartnersOf(scores[static_cast<size_t>(a)])) {
       pairs.emplace(std::min(a, b), std::max(a, b));
     }

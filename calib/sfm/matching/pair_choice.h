@@ -8,12 +8,12 @@
 
 namespace dtr::sfm::matching {
 
-inline constexpr size_t kAllPairsUpTo = 60;  ///< photos
-inline constexpr size_t kPartners = 20;      ///< of each photo, where not all pairs are matched
+inline constexpr size_t kPartners = 20;  ///< of each photo, where pairs are preselected
 
-/// The pairs (a < b, sorted): those asked for, else all of few photos, else each photo with the
-/// next and with its partners by the number of matches among the 300 largest features: the nearest
-/// 12, the others spread geometrically by rank, so that not all baselines are short.
+/// The pairs (a < b, sorted): those that may be matched, or, preselected of them, each photo with
+/// the next and with its partners by the number of matches among the 300 largest features: the
+/// nearest 12, the others spread geometrically by rank, so that not all baselines are short.
+/// Throws std::invalid_argument where a pair names no two photos.
 std::vector<std::pair<int, int>> ChoosePairs(std::span<const MatchPhoto> photos,
                                              const MatchOptions& options, Progress& progress);
 

@@ -67,13 +67,14 @@ Candidate CandidateOf(const CoarsePair& coarse, std::span<const MatchPhoto> phot
     if (p.allFinite() && q.allFinite()) points.Add(p, q);
   }
   Candidate candidate;
-  const auto fit = FitFundamental(points, kBand, seed);
+  const double band = BandOf(LongSide(camera));
+  const auto fit = FitFundamental(points, band, seed);
   if (!fit || fit->inliers.size() < kFewestInliers) return candidate;
   PointPairs inliers;
   for (const int i : fit->inliers) {
     inliers.Add(points.a[static_cast<size_t>(i)], points.b[static_cast<size_t>(i)]);
   }
-  const double parallax = MedianHomographyDistance(inliers) / (2 * kBand);
+  const double parallax = MedianHomographyDistance(inliers) / (2 * band);
   candidate.weight =
       static_cast<double>(std::min<size_t>(inliers.size(), 200)) * std::clamp(parallax, 0.0, 1.0);
   candidate.pair.fundamental = fit->m;

@@ -1,5 +1,6 @@
 // calib/sfm/matching/vote_cameras.h -- which matches vote on which camera, and what becomes of it.
 #pragma once
+#include <algorithm>
 #include <span>
 #include <string>
 #include <vector>
@@ -11,8 +12,9 @@ namespace dtr::sfm::matching {
 
 /// Distance from an epipolar line that still counts, as a share of the photo's long side: 4 pixels
 /// of 1600. Distortion that a radial lens has no more terms for, and features found at a large
-/// scale, take what localisation leaves.
-inline constexpr double kBand = 4.0 / 1600;
+/// scale, take what localisation leaves. One pixel at least, to which features of small photos are
+/// no better known than those of large ones.
+inline double BandOf(double long_side_px) { return std::max(4.0 / 1600, 1 / long_side_px); }
 
 /// The matches of the largest features of two photos.
 struct CoarsePair {

@@ -267,4 +267,22 @@ bool NpyHoldsWholeNumbers(const std::filesystem::path& file) {
   return HeaderOf(bytes, file.string(), {.half = true, .integers = true}).first.kind != 'f';
 }
 
+void WriteNpy(const std::filesystem::path& file, const Grid<float>& grid) {
+  static_assert(std::endian::native == std::endian::little);
+  std::string header = "{'descr': '<f4', 'fortran_order': False, 'shape': (" +
+                       std::to_string(grid.height()) + ", " + std::to_string(grid.width()) +
+                       (grid.channels() > 1 ? ", " + std::to_string(grid.channels()) : "") + "), }";
+  // Magic, version and length take 10 bytes; numpy wants the array to begin at a multiple of 64.
+  constexpr size_t kBefore = 10, kAlignment = 64;
+  header.resize((kBefore + header.size() + 1 + kAlignment - 1) / kAlignment * kAlignment - kBefore,
+                ' ');
+  header.back() = '\n';
+  std::string bytes("\x93NUMPY\x01\x00", 8);
+  bytes += static_cast<char>(header.size() & 0xff);
+  bytes += static_cast<char>(header.size() >> 8);
+  bytes += header;
+  bytes.append(reinterpret_cast<const char*>(grid.data().data()), 4 * grid.data().size());
+  WriteFileAtomically(file, bytes);
+}
+
 }  // namespace dtr::io

@@ -6,6 +6,8 @@
 #include <string_view>
 #include <vector>
 
+#include "dtr/types/grid.h"
+
 namespace dtr::io {
 
 /// A numeric array in C order: the last index runs fastest.
@@ -35,5 +37,9 @@ NpyArray ParseNpy(std::string_view bytes, const std::string& source,
 
 /// Whether a .npy file holds an integer type. Throws Error as ReadNpy does for a damaged header.
 bool NpyHoldsWholeNumbers(const std::filesystem::path& file);
+
+/// Writes float32 of shape (height, width), or (height, width, channels), in C order, little
+/// endian, format version 1; atomic. Throws Error when the file cannot be written.
+void WriteNpy(const std::filesystem::path& file, const Grid<float>& grid);
 
 }  // namespace dtr::io

@@ -4,6 +4,7 @@
 
 #include "capture/contents_json.h"
 #include "pipeline/detail/depth/quality_json.h"
+#include "pipeline/detail/photos/lens_of_photo.h"
 #include "pipeline/detail/reports/calibration_json.h"
 #include "pipeline/detail/reports/metres_json.h"
 #include "pipeline/detail/reports/text.h"
@@ -17,8 +18,8 @@ Json JsonOf(const SfmChoice& choice) {
   Json json{{"feature_size_px", choice.feature_size_px},
             {"features", choice.features},
             {"matching", colmap::NameOf(choice.matching)},
-            {"lens_model", choice.lens_model}};
-  if (choice.engine != colmap::SfmEngine::kColmap) json["sfm"] = colmap::NameOf(choice.engine);
+            {"lens_model", choice.lens_model},
+            {"engine", colmap::NameOf(choice.engine)}};
   // Builds that were begun before there was a choice go on.
   if (choice.camera_per != CameraPer::kAuto) json["camera_per"] = NameOf(choice.camera_per);
   return json;
@@ -37,7 +38,7 @@ Json OptionsJson(const BuildOptions& options, const stereo::QualitySettings& qua
   if (!options.rig.empty()) json["rig"] = options.rig.filename().string();
   if (options.metres.any()) json["metres"] = JsonOf(options.metres);
   SfmChoice plain;
-  plain.features = colmap::kMaxFeatures;
+  plain.features = MaxFeaturesOf(plain.engine);
   if (options.sfm != plain) json["sfm"] = JsonOf(options.sfm);
   json["seed"] = options.seed;
   json["completion"] = options.depth.completion;
@@ -58,6 +59,7 @@ Json ProvenanceJson(const BuildOptions& options, const Json& option_values, cons
   provenance["depth_engine"] = options.depth.engine;
   provenance["options"] = option_values;
   provenance["photos"] = photos;
+  AddLenses(calibrated.model, provenance);
   provenance["not_registered"] = report.not_registered;
   provenance["held_out_not_registered"] = report.held_out_not_registered;
   provenance["skipped"] = Json::array();

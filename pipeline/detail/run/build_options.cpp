@@ -11,9 +11,8 @@ namespace dtr::pipeline {
 BuildOptions ByPreset(BuildOptions options) {
   const Preset& preset = PresetCalled(options.depth.preset);
   if (options.max_size_px < 0) options.max_size_px = preset.max_size_px;
-  if (options.sfm.features == 0) {
-    options.sfm.features = options.poses.empty() ? preset.features : colmap::kMaxFeatures;
-  }
+  if (options.sfm.features == 0 && options.poses.empty()) options.sfm.features = preset.features;
+  if (options.sfm.features == 0) options.sfm.features = MaxFeaturesOf(options.sfm.engine);
   return options;
 }
 

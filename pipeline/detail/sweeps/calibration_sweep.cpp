@@ -24,8 +24,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-enum CalibrationAxis : size_t { kFeatureSize, kFeatures, kMatching, kCameraModel, kRefine };
-constexpr const char *kYes = "yes", *kNo = "no";
+enum CalibrationAxis : size_t { kSfm, kFeatureSize, kFeatures, kMatching, kCameraModel, kRefine };
+constexpr const char *kYes = "yes", *kNo = "no", *kMax = "max";
 // Scale of the loss over the photos' long side: half a pixel of 1000, about what observations err
 // by, so that wrong ones, which err the same by any cameras, do not hide what the cameras do.
 constexpr double kLossShare = 0.0005;
@@ -85,9 +85,12 @@ std::vector<std::string> MatchingValues(size_t photos) {
   return values;
 }
 
-std::vector<std::string> FeatureValues() {
-  std::vector<std::string> values;
-  for (const int part : {1, 2, 4}) values.push_back(std::to_string(colmap::kMaxFeatures / part));
+/// Without COLMAP there is one engine.
+std::vector<std::string> EngineValues() {
+  std::vector<std::string> values{colmap::NameOf(colmap::SfmEngine::kGlobal)};
+  if (colmap::Program::IsInstalled()) {
+    values.emplace_back(colmap::NameOf(colmap::SfmEngine::kColmap));
+  }
   return values;
 }
 
@@ -95,7 +98,6 @@ std::vector<std::string> FeatureValues() {
 
 CalibrationSweep::CalibrationSweep(CalibrationSweepOptions options, Progress& progress)
     : options_(std::move(options)), progress_(progress) {
-  RequireCalibration({}, colmap::SfmEngine::kColmap);
   photos_ = PhotosOf(options_, progress_);
   std::vector<std::pair<int, int>> sizes_px;
   int longest = 0;
@@ -107,9 +109,10 @@ CalibrationSweep::CalibrationSweep(CalibrationSweepOptions options, Progress& pr
   RequirePhotosOfTheSet(options_, names_);
   tracks_ = ReferenceTracksOf(photos_, options_.photos, options_.threads, progress_);
   loss_scale_px_ = kLossShare * longest;
-  axes_ = {{"feature-size",
+  axes_ = {{"sfm", EngineValues()},
+           {"feature-size",
             SizeValues(options_.feature_sizes_px, FeatureImageSizePx(sizes_px, kDefaultMemoryGb))},
-           {"features", FeatureValues()},
+           {"features", {kMax, "4096", "2048"}},
            {"matching", MatchingValues(names_.size())},
            {"lens-model", {SfmChoice{}.lens_model, "SIMPLE_RADIAL", "OPENCV"}},
            {"refine", {kYes, kNo}}};
@@ -122,7 +125,11 @@ const std::string& CalibrationSweep::Value(const eval::SweepSetting& setting, si
 SfmChoice CalibrationSweep::ChoiceOf(const eval::SweepSetting& setting) const {
   SfmChoice choice;
   choice.feature_size_px = std::stoi(Value(setting, kFeatureSize));
-  choice.features = std::stoi(Value(setting, kFeatures));
+  choice.engine = Value(setting, kSfm) == colmap::NameOf(colmap::SfmEngine::kColmap)
+                      ? colmap::SfmEngine::kColmap
+                      : colmap::SfmEngine::kGlobal;
+  const std::string& features = Value(setting, kFeatures);
+  choice.features = features == kMax ? MaxFeaturesOf(choice.engine) : std::stoi(features);
   for (const auto matching : {colmap::Matching::kExhaustive, colmap::Matching::kPreselected,
                               colmap::Matching::kSequential}) {
     if (Value(setting, kMatching) == colmap::NameOf(matching)) choice.matching = matching;
@@ -139,9 +146,9 @@ eval::SweepMeasurement CalibrationSweep::Measure(const eval::SweepSetting& setti
   calibrate.memory_gb = kDefaultMemoryGb;
   calibrate.refine = Value(setting, kRefine) == kYes;
   calibrate.sfm = ChoiceOf(setting);
-  // Refinement begins where COLMAP ends: with and without it there is one workspace.
+  // Refinement begins where structure from motion ends: with and without it there is one workspace.
   std::string folder;
-  for (const CalibrationAxis axis : {kFeatureSize, kFeatures, kMatching, kCameraModel}) {
+  for (const CalibrationAxis axis : {kSfm, kFeatureSize, kFeatures, kMatching, kCameraModel}) {
     folder += (folder.empty() ? "" : "-") + Value(setting, axis);
   }
   const double start_ms = ProcessCpuMilliseconds();
@@ -164,14 +171,15 @@ eval::SweepMeasurement CalibrationSweep::Measure(const eval::SweepSetting& setti
 }
 
 std::string CalibrationSweep::Identity() const {
-  return InputHash(options_.photos) + " " + colmap::Program().version();
+  std::string identity = InputHash(options_.photos) + " " + colmap::kOwnVersion;
+  if (colmap::Program::IsInstalled()) identity += " " + colmap::Program().version();
+  return identity;
 }
 
 std::string CalibrationSweep::Conditions() const {
   return fmt::format(
       "{} photos, one calibration of each setting; measured by {} points that structure from "
-      "motion "
-      "knows nothing of, every observation of them held out in turn",
+      "motion knows nothing of, every observation of them held out in turn",
       names_.size(), tracks_.size());
 }
 

@@ -37,11 +37,10 @@ struct CalibrationSweepOptions {
 class CalibrationSweep {
  public:
   /// Reads the photos and finds the reference tracks. Throws UsageError for a folder without
-  /// photos, Error for photos of another set, for such as share too little to measure by, and
-  /// without COLMAP.
+  /// photos, Error for photos of another set and for such as share too little to measure by.
   CalibrationSweep(CalibrationSweepOptions options, Progress& progress);
   eval::SweepStage Stage() const;  ///< its functions borrow this object
-  /// What decides the results beside the settings: photos, COLMAP.
+  /// What decides the results beside the settings: photos, versions of the engines.
   std::string Identity() const;
   /// For people: what the reference tracks are.
   std::string Conditions() const;

@@ -33,6 +33,8 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::SizeIs;
 
+const SfmOptions kByColmap{.engine = SfmEngine::kColmap};
+
 // Three photos that only a fake COLMAP will open, of two cameras.
 class KnownPosesWithFake : public ::testing::Test {
  protected:
@@ -55,7 +57,7 @@ class KnownPosesWithFake : public ::testing::Test {
   }
 
   SfmResult Run() {
-    return TriangulateWithPoses(photos_.path(), posed_, workspace_ / "posed", {}, silent_);
+    return TriangulateWithPoses(photos_.path(), posed_, workspace_ / "posed", kByColmap, silent_);
   }
 
   const dtr::testing::TemporaryFolder photos_, workspace_;
@@ -111,7 +113,7 @@ TEST_F(KnownPosesWithFake, PhotosWithoutAnythingInCommonAreSaidToBeSo) {
   fake_.LeaveDatabase({"000002.jpg", "000000.jpg", "000001.jpg"}, {1, 1, 2}, {{0, 1, 40}});
   dtr::testing::TemporaryFolder other;
   try {
-    TriangulateWithPoses(photos_.path(), posed_, other / "posed", {}, silent_);
+    TriangulateWithPoses(photos_.path(), posed_, other / "posed", kByColmap, silent_);
     FAIL() << "nothing was thrown";
   } catch (const Error& error) {
     EXPECT_THAT(error.what(), HasSubstr("point_triangulator"));
@@ -127,7 +129,7 @@ TEST_F(KnownPosesWithFake, PairsThatCannotOverlapAreNotMatchedAndSaidOnce) {
   // b.jpg turns its back on the others, from behind them.
   posed_[1].cam_from_world = {Eigen::Quaterniond(0, 0, 1, 0), {0, 0, -9}};
   dtr::testing::NotedLines notes;
-  TriangulateWithPoses(photos_.path(), posed_, workspace_ / "posed", {}, notes);
+  TriangulateWithPoses(photos_.path(), posed_, workspace_ / "posed", kByColmap, notes);
   EXPECT_THAT(notes.lines, ElementsAre("2 of 3 pairs of photos left out of matching: their cameras "
                                        "cannot see the same thing"));
   std::string matching;
@@ -144,7 +146,7 @@ TEST_F(KnownPosesWithFake, PairsThatCannotOverlapAreNotMatchedAndSaidOnce) {
 
 TEST_F(KnownPosesWithFake, PairsThatMayOverlapAreAllMatched) {
   dtr::testing::NotedLines notes;
-  TriangulateWithPoses(photos_.path(), posed_, workspace_ / "posed", {}, notes);
+  TriangulateWithPoses(photos_.path(), posed_, workspace_ / "posed", kByColmap, notes);
   EXPECT_THAT(notes.lines, SizeIs(0));
   EXPECT_THAT(fake_.Calls()[2], HasSubstr("exhaustive_matcher"));
 }
@@ -263,7 +265,7 @@ class HeldOutWithFake : public ::testing::Test {
 
   HeldOutResult Run() {
     return RegisterHeldOut(photos_.path(), held_out_, model_, sources_, workspace_ / "sfm",
-                           workspace_ / "held", {}, silent_);
+                           workspace_ / "held", kByColmap, silent_);
   }
 
   const dtr::testing::TemporaryFolder photos_, workspace_;

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
 
 #include "calib/colmap/held_out.h"
@@ -69,6 +70,32 @@ TEST_F(OwnSfm, CalibratesPhotosAndPlacesAHeldOutOneWithoutColmap) {
   EXPECT_EQ(placed.cameras.at(image.camera_id).params,
             sfm.model.cameras.at(sfm.model.images.front().camera_id).params);
   EXPECT_LT(DegreesOff(sfm.model, image), kRotationDeg);
+}
+
+TEST_F(OwnSfm, TriangulatesAndColoursThePointsOfGivenCameras) {
+  const std::vector<PosedImage> posed(truth_.images.begin() + kFirst,
+                                      truth_.images.begin() + kLast + 1);
+  const SfmResult sfm =
+      TriangulateWithPoses(kPlaza / "images", posed, folder_ / "sfm", options_, silent_);
+  EXPECT_THAT(sfm.report.not_registered, IsEmpty());
+  ASSERT_EQ(sfm.model.images.size(), posed.size());
+  for (size_t i = 0; i < posed.size(); ++i) {
+    EXPECT_EQ(sfm.model.images[i].cam_from_world.translation, posed[i].cam_from_world.translation);
+    EXPECT_EQ(sfm.model.cameras.at(sfm.model.images[i].camera_id).params, posed[i].camera.params);
+  }
+  EXPECT_GT(sfm.model.points.size(), 300u);
+  EXPECT_LT(sfm.report.mean_reprojection_error_px, kMeanErrorPx);
+
+  const ImageRgb8 photo = io::ReadImage(kPlaza / "images" / posed[0].name);
+  std::vector<int> off;  // levels between a point's colour and this photo's pixel
+  for (const calib::SfmFeature& feature : sfm.model.images[0].features) {
+    if (feature.point_id == calib::SfmFeature::kNoPoint) continue;
+    const auto& rgb = sfm.model.points.at(feature.point_id).rgb;
+    const int x = static_cast<int>(feature.pixel.x()), y = static_cast<int>(feature.pixel.y());
+    off.push_back(std::abs(rgb[1] - photo(x, y, 1)));
+  }
+  std::nth_element(off.begin(), off.begin() + static_cast<int>(off.size() / 2), off.end());
+  EXPECT_LT(off[off.size() / 2], 12);
 }
 
 TEST_F(OwnSfm, GivesTheSameModelForAnyNumberOfThreadsAndFromItsCheckpoints) {

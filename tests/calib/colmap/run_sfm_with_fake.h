@@ -45,6 +45,7 @@ class RunSfmWithFake : public ::testing::Test {
       WriteFileAtomically(photos_ / name, std::string("photo ") + name);
       images_.push_back({name, 640, 480, 500.0, "camera one"});
     }
+    options_.engine = SfmEngine::kColmap;
     options_.threads = 2;
     fake_.LeaveDatabase(Aliases());
     LeaveModel(0, 2);

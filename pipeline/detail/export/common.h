@@ -1,0 +1,50 @@
+// pipeline/detail/export/common.h -- what all exports begin with.
+#pragma once
+#include <Eigen/Core>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "dtr/base/progress.h"
+#include "dtr/types/dtr_set.h"
+#include "dtr/types/pose.h"
+#include "pipeline/export.h"
+
+namespace dtr::pipeline {
+
+/// The set to export, without pixels. Notes where its validation failed. Throws UsageError when the
+/// output exists, Error for a broken set and for one of several time steps; `format` is what the
+/// message calls it.
+DtrSet SetToExport(const ExportRequest& request, const char* format, Progress& progress);
+
+/// SetToExport, where at least one view must have depth. Throws Error.
+DtrSet SetWithDepth(const ExportRequest& request, const char* format, Progress& progress);
+
+/// Names of the views' files: the photos' names with `extension` instead of their own; the whole
+/// name before it where two photos differ only in that.
+std::vector<std::string> FileNames(const std::vector<View>& views, const std::string& extension);
+
+/// The same for images, with the extension of what the set stores of each.
+std::vector<std::string> ImageNames(const std::vector<View>& views);
+
+/// What every sidecar says of the set: tool, unit, world_origin, validation result.
+nlohmann::ordered_json SetFacts(const DtrSet& set);
+/// The same as lines of text, for comments of files.
+std::vector<std::string> FactLines(const DtrSet& set);
+
+/// "500000 4500000.25 100": with enough digits to read back the same numbers.
+std::string NumbersText(const Eigen::Vector3d& v);
+
+/// Notes that coordinates are relative to the set's origin, where that is not zero.
+void NoteOffset(const DtrSet& set, Progress& progress);
+
+/// [R t; 0 0 0 1], row by row.
+nlohmann::ordered_json MatrixJson(const Pose& pose);
+
+/// `file`, the folder of which now exists.
+std::filesystem::path InItsFolder(const std::filesystem::path& file);
+
+/// Writes JSON with a line break at its end, atomically.
+void WriteJson(const std::filesystem::path& file, const nlohmann::ordered_json& json);
+
+}  // namespace dtr::pipeline

@@ -1,0 +1,55 @@
+// pipeline/detail/export/file_stream.h -- large files, written piece by piece.
+#pragma once
+#include <cstring>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <type_traits>
+
+#include "dtr/base/open_file.h"
+#include "dtr/base/work_folder.h"
+
+namespace dtr::pipeline {
+
+/// A new file. Numbers are written as the machine has them: little-endian on all it runs on. Every
+/// function throws Error where the disk rejects what it is given.
+class FileStream {
+ public:
+  explicit FileStream(std::filesystem::path file);
+
+  void Write(std::string_view bytes);
+  template <typename T>
+  void Put(T value) {
+    static_assert(std::is_arithmetic_v<T>);
+    char bytes[sizeof value];
+    std::memcpy(bytes, &value, sizeof value);
+    Write({bytes, sizeof value});
+  }
+  /// Writes what is buffered.
+  void Flush();
+  /// Flush, then `bytes` in the place of as many at the file's beginning.
+  void Replace(std::string_view bytes);
+
+ private:
+  std::filesystem::path file_;
+  std::string buffer_;
+  std::optional<OpenFile> open_;
+};
+
+/// An export that is a single file: it is made in a work folder beside it and appears when it is
+/// whole. Throws as WorkFolder.
+class FileInWork {
+ public:
+  explicit FileInWork(const std::filesystem::path& target);
+  /// Where to write it.
+  std::filesystem::path path() const { return work_.path() / target_.filename(); }
+  /// Puts it on the disk under its name.
+  void Publish();
+
+ private:
+  std::filesystem::path target_;
+  WorkFolder work_;
+};
+
+}  // namespace dtr::pipeline

@@ -1,0 +1,60 @@
+// pipeline/detail/export/gaussians.h -- the fused samples of a view as 3D Gaussians.
+#pragma once
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "pipeline/detail/export/fuse.h"
+
+namespace dtr::pipeline {
+
+/// One Gaussian of a splat file.
+struct Gaussian {
+  Eigen::Vector3f position;            ///< in the stored world
+  Eigen::Vector3f deviation;           ///< standard deviations along its axes, scene units
+  Eigen::Quaternionf world_from_axes;  ///< unit length
+  std::array<float, 3> rgb{};          ///< sRGB, 0...1
+  float opacity = 1;
+};
+
+/// The samples of a view in squares of 1, 2, 4, ... pixels. A square that is full may become one
+/// Gaussian; `cost` says what is lost by that: 1 is about what the eye begins to see.
+class SplatTree {
+ public:
+  /// `surface` with its colours.
+  SplatTree(const SurfaceView& surface, const std::vector<FusedSample>& samples);
+
+  size_t samples() const { return samples_.size(); }
+  /// Of every square that can be merged: four become one where its cost is at most the bound. No
+  /// square costs less than one within it.
+  std::vector<float> MergeCosts() const;
+  /// One Gaussian for each of the largest squares that cost at most `bound`.
+  void AddGaussians(float bound, std::vector<Gaussian>& gaussians) const;
+
+ private:
+  struct Sample {
+    Eigen::Vector3f p, normal;
+    float sigma = 0;
+    std::array<std::uint8_t, 3> rgb{};
+    std::uint8_t views = 1;
+  };
+  struct Level {
+    int columns = 0, rows = 0;
+    std::vector<float> cost;  // infinite: not a full square
+  };
+  float CostOf(const SurfaceView& surface, int x, int y, int side) const;
+  bool Merged(size_t level, int x, int y, float bound) const;
+  Gaussian GaussianOf(int x, int y, int side) const;
+  const Sample& At(int x, int y) const { return samples_[static_cast<size_t>(index_(x, y))]; }
+
+  PinholeCamera camera_;
+  Eigen::Matrix3d rotation_;
+  Eigen::Vector3d centre_;
+  Grid<std::int32_t> index_;  // into samples_; -1: none
+  std::vector<Sample> samples_;
+  std::vector<Level> levels_;  // of 2, 4, ... pixels
+};
+
+}  // namespace dtr::pipeline
