@@ -14,6 +14,7 @@
 #include "dtr/render/scene.h"
 #include "dtr/render/time_steps.h"
 #include "pipeline/detail/web/web_view.h"
+#include "pipeline/evaluate.h"
 #include "viewer/web/web_page.h"
 
 namespace dtr::pipeline {
@@ -61,24 +62,60 @@ std::string Name(const fs::path& set) {
   return WithoutTrailingSlash(fs::absolute(set)).stem().string();
 }
 
-Json Figures(const DtrSet& set, const std::vector<View>& views) {
+using Figures = std::vector<std::pair<std::string, std::string>>;
+
+/// Means over the held-out photos, as `dtr evaluate` has them.
+void AddHeldOut(const WebPageRequest& request, const DtrSet& set, Figures& figures,
+                Progress& progress) {
   const std::vector<View>& all = set.frames.front().views;
-  const auto held_out = std::count_if(
+  const auto count = std::count_if(
       all.begin(), all.end(), [](const View& view) { return view.role == ViewRole::kHeldOut; });
+  figures.emplace_back("held-out photos", std::to_string(count));
+  if (count == 0 || !request.make_renderer) return;
+  EvaluateRequest evaluate;
+  evaluate.set = request.set;
+  evaluate.render = request.render;
+  evaluate.threads = request.threads;
+  const eval::ViewScore mean = Evaluate(evaluate, request.make_renderer, progress).views.mean;
+  if (mean.psnr_db) figures.emplace_back("their PSNR", fmt::format("{:.2f} dB", *mean.psnr_db));
+  if (mean.psnr_covered_db) {
+    figures.emplace_back("on seen pixels", fmt::format("{:.2f} dB", *mean.psnr_covered_db));
+  }
+  if (mean.ssim) figures.emplace_back("their SSIM", fmt::format("{:.3f}", *mean.ssim));
+  figures.emplace_back("of them seen", fmt::format("{:.1f} %", 100 * mean.coverage));
+}
+
+/// Each test of the set's validation, where it has one: free text to a reader of sets.
+void AddValidation(const DtrSet& set, Figures& figures) {
+  figures.emplace_back("calibration", io::ValidationLine(set));
+  const Json validation = Json::parse(set.validation_json, nullptr, false);
+  if (!validation.is_object() || !validation.contains("tests")) return;
+  for (const Json& test : validation["tests"]) {
+    if (!test.is_object() || !test.value("name", Json()).is_string() ||
+        !test.value("value", Json()).is_number() || !test.value("limit", Json()).is_number()) {
+      continue;
+    }
+    std::string name = test["name"];
+    std::replace(name.begin(), name.end(), '_', ' ');
+    const bool failed = test.value("passed", Json()) == false;
+    figures.emplace_back(name, fmt::format("{:.3g}, limit {:.3g}{}", test["value"].get<double>(),
+                                           test["limit"].get<double>(), failed ? ": failed" : ""));
+  }
+}
+
+Figures FiguresOf(const WebPageRequest& request, const DtrSet& set, const std::vector<View>& views,
+                  Progress& progress) {
   const PinholeCamera& camera = views.front().camera;
-  Json figures = Json::array();
-  const auto add = [&](const char* name, const std::string& value) {
-    figures.push_back({name, value});
-  };
-  add("photos", std::to_string(views.size()));
-  add("first photo", fmt::format("{} x {} pixels", camera.width_px(), camera.height_px()));
-  add("held out", std::to_string(held_out));
-  add("unit", NameOf(set.unit));
-  add("calibration", io::ValidationLine(set));
+  Figures figures = {
+      {"photos", std::to_string(views.size())},
+      {"first photo", fmt::format("{} x {} pixels", camera.width_px(), camera.height_px())},
+      {"unit", NameOf(set.unit)}};
+  AddHeldOut(request, set, figures, progress);
+  AddValidation(set, figures);
   return figures;
 }
 
-std::string SetJson(const fs::path& folder, const DtrSet& set, const std::vector<View>& views,
+std::string SetJson(const fs::path& folder, const DtrSet& set, const Figures& figures,
                     const std::vector<WebView>& packed) {
   Json json = {{"format", "dtr-web-page"},
                {"version", 2},
@@ -88,7 +125,7 @@ std::string SetJson(const fs::path& folder, const DtrSet& set, const std::vector
                {"bounds", nullptr},
                {"validation", io::ValidationLine(set)},
                {"validation_failed", !io::ValidationWarning(set).empty()},
-               {"figures", Figures(set, views)}};
+               {"figures", figures}};
   if (!set.bounds.empty()) {
     json["bounds"] = {{"min", JsonOf(set.bounds.min)}, {"max", JsonOf(set.bounds.max)}};
   }
@@ -100,7 +137,7 @@ std::string SetJson(const fs::path& folder, const DtrSet& set, const std::vector
 }
 
 std::string PageOf(const WebPageRequest& request, const DtrSet& set, const std::vector<View>& views,
-                   const WebCoding& coding, Progress& progress) {
+                   const Figures& figures, const WebCoding& coding, Progress& progress) {
   web::WebPage page{Name(request.set), DTR_VERSION, "", {}};
   std::vector<WebView> packed;
   progress.Stage("packing views", static_cast<int>(views.size()));
@@ -114,7 +151,7 @@ std::string PageOf(const WebPageRequest& request, const DtrSet& set, const std::
     packed.push_back(PackView(view, request.set, coding));
     progress.Update(static_cast<int>(packed.size()));
   }
-  page.set_json = SetJson(request.set, set, views, packed);
+  page.set_json = SetJson(request.set, set, figures, packed);
   for (WebView& view : packed) page.views.push_back(std::move(view.bytes));
   return web::MakeWebPage(page);
 }
@@ -134,14 +171,18 @@ WebPageReport ExportWebPage(const WebPageRequest& request, Progress& progress) {
   WebPageReport report;
   report.views = views.size();
   report.warning = io::ValidationWarning(set);
+  const Figures figures = FiguresOf(request, set, views, progress);
   std::string page;
   for (WebCoding coding : kCodings) {
+    coding.depth_error_px = coding.recodes_jpeg
+                                ? std::max(coding.depth_error_px, request.depth_error_px)
+                                : request.depth_error_px;
     if (request.jpeg_quality && !coding.recodes_jpeg) {
       coding = {*request.jpeg_quality, coding.depth_error_px, true};
     }
     if (request.jpeg_quality)
       coding.jpeg_quality = std::min(coding.jpeg_quality, *request.jpeg_quality);
-    page = PageOf(request, set, views, coding, progress);
+    page = PageOf(request, set, views, figures, coding, progress);
     report.bytes = page.size();
     report.jpeg_quality = coding.recodes_jpeg || !AllAreJpeg(views) ? coding.jpeg_quality : 0;
     report.depth_error_px = coding.depth_error_px;

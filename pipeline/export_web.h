@@ -3,10 +3,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 
 #include "dtr/base/progress.h"
+#include "dtr/eval/held_out.h"
+#include "dtr/render/options.h"
 
 namespace dtr::pipeline {
 
@@ -17,6 +20,12 @@ struct WebPageRequest {
   std::optional<double> max_mb;
   /// Of photos, 1...100; without it 85, and photos that the set stores as JPEG go in as they are.
   std::optional<int> jpeg_quality;
+  double depth_error_px = 0.15;  ///< largest error of depth by rounding, pixels of disparity
+  /// For the figures of held-out photos that the page shows, as Evaluate draws them; not called
+  /// where the set has none. Empty: no such figures.
+  std::function<eval::RenderFunction()> make_renderer;
+  RenderOptions render;
+  int threads = 0;
 };
 
 struct WebPageReport {

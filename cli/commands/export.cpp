@@ -9,6 +9,8 @@
 
 #include "cli/command.h"
 #include "cli/output_file.h"
+#include "cli/render_options.h"
+#include "cli/renderers.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "pipeline/export_web.h"
@@ -57,6 +59,7 @@ struct ExportOptions {
   std::string format = "colmap";
   Request request;
   pipeline::WebPageRequest web;
+  bool evaluates_web = true;
   std::vector<FormatOption> of_formats;
 };
 
@@ -120,6 +123,11 @@ int RunExport(ExportOptions options, const Context& context) {
   if (options.format == "web") {
     options.web.set = options.request.set;
     options.web.output = options.request.output;
+    options.web.threads = context.common.threads;
+    if (options.evaluates_web) {
+      options.web.render = StoredRenderOptions(io::ReadSet(options.web.set), WholeFrames());
+      options.web.make_renderer = [&context] { return MakeRenderer({}, context.console); };
+    }
     return RunWeb(options.web, context);
   }
   const auto format = std::find_if(Formats().begin(), Formats().end(), [&](const Format& known) {
@@ -217,6 +225,18 @@ void AddWebOptions(CLI::App& command, ExportOptions& options) {
                        "web: of the photos [85, or the JPEG that the set stores]")
            ->check(CLI::Range(1, 100))
            ->type_name("Q"),
+       {"web"}});
+  options.of_formats.push_back(
+      {command
+           .add_option("--depth-error", options.web.depth_error_px,
+                       "web: depth is rounded to within PX pixels of disparity [0.15]")
+           ->check(CLI::Range(0.001, 10.0))
+           ->type_name("PX"),
+       {"web"}});
+  options.of_formats.push_back(
+      {command.add_flag("!--no-evaluate", options.evaluates_web,
+                        "web: without figures of held-out photos, which take as long as `dtr "
+                        "evaluate`"),
        {"web"}});
 }
 

@@ -1,4 +1,5 @@
 // `dtr export --format web`: one file that holds everything, or none.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <zlib.h>
@@ -61,8 +62,7 @@ class ExportWeb : public ::testing::Test {
 };
 
 // Every depth is there, and off by no more than docs/EXPORT.md says.
-void ExpectDepth(const View& view, const nlohmann::json& range,
-                 const Grid<std::uint16_t>& codes) {
+void ExpectDepth(const View& view, const nlohmann::json& range, const Grid<std::uint16_t>& codes) {
   const InverseDepthCode code(range["near_z"], range["far_z"], range["steps"]);
   const double pixel = ThresholdsOf(view, {}).pixel;
   double worst_px = 0;
@@ -107,6 +107,26 @@ TEST_F(ExportWeb, HoldsEveryViewWithItsChecksumAndDepth) {
   }
   EXPECT_EQ(json["views"].size(), sources);
   EXPECT_GT(sources, 2u);
+}
+
+TEST_F(ExportWeb, HoldsTheFiguresOfHeldOutPhotos) {
+  const auto value_of = [&](const std::string& page, const std::string& name) {
+    const auto json = nlohmann::json::parse(Between(
+        Text(folder_ / page), "<script type=\"application/json\" id=\"set\">", "</script>"));
+    for (const auto& figure : json["figures"]) {
+      if (figure[0] == name) return figure[1].get<std::string>();
+    }
+    return std::string("none");
+  };
+  DtrOk(Arguments("page.html"));
+  const Ran ran = Dtr({"evaluate", (folder_ / "set.dtr").string(), "--json", "-"});
+  const auto mean = nlohmann::json::parse(ran.out)["mean"];
+  EXPECT_EQ(value_of("page.html", "their PSNR"),
+            fmt::format("{:.2f} dB", mean["psnr_db"].get<double>()));
+  EXPECT_EQ(value_of("page.html", "held-out photos"), "2");
+  EXPECT_EQ(value_of("page.html", "calibration"), "not validated");
+  DtrOk(Arguments("quick.html", {"--no-evaluate"}));
+  EXPECT_EQ(value_of("quick.html", "their PSNR"), "none");
 }
 
 TEST_F(ExportWeb, NeedsNoOtherFileAndNoServer) {

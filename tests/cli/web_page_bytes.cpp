@@ -117,13 +117,13 @@ Grid<std::uint16_t> DecodedMap(const std::string& place_bytes, const std::string
       const int above = y > 0 ? values(x, y - 1) : x > 0 ? values(x - 1, 0) : 0;
       const int left = x > 0 ? values(x - 1, y) : above;
       const int corner = x > 0 && y > 0 ? values(x - 1, y - 1) : above;
-      const int predicted = std::max(std::min(left, above),
-                                     std::min(std::max(left, above), left + above - corner));
+      const int predicted =
+          std::max(std::min(left, above), std::min(std::max(left, above), left + above - corner));
       values(x, y) = predicted;
       residuals(x, y) = (error(x - 1, y) + error(x, y - 1)) / 4;
       if (places(x, y) == 0) continue;
-      const int sum = 2 * (error(x - 1, y) + error(x, y - 1)) + error(x + 1, y - 1) +
-                      error(x - 1, y - 1);
+      const int sum =
+          2 * (error(x - 1, y) + error(x, y - 1)) + error(x + 1, y - 1) + error(x - 1, y - 1);
       const int activity =
           sum < 6 ? sum : std::min(13, 3 + static_cast<int>(std::bit_width(unsigned(sum))));
       const int step = std::max(std::abs(left - corner), std::abs(above - corner));

@@ -15,6 +15,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/base/random.h"
+#include "dtr/io/small_jpeg.h"
 #include "tests/support/photo_kinds.h"
 #include "tests/support/test_data.h"
 #include "tests/support/truncation.h"
@@ -342,6 +343,32 @@ TEST(ReadImageHeader, ReadsTheGpsPositionSouthAndWestNegative) {
   EXPECT_NEAR(gps->longitude_deg, -70.25, 1e-6);
   EXPECT_NEAR(gps->altitude_m.value_or(0), 512.5, 1e-3);
   EXPECT_NEAR(gps->horizontal_error_m.value_or(0), 4.5, 1e-3);
+}
+
+TEST(SmallJpeg, IsTheSamePixelsInFewerBytes) {
+  const TemporaryFolder folder;
+  ImageRgb8 image(64, 48, 3);
+  for (int y = 0; y < 48; ++y) {
+    for (int x = 0; x < 64; ++x) {
+      for (int c = 0; c < 3; ++c) {
+        image(x, y, c) = static_cast<std::uint8_t>(128 + 60 * std::sin(0.2 * x + c) + y);
+      }
+    }
+  }
+  WriteImage(folder / "usual.jpg", image, 85);
+  const std::string bytes = SmallJpeg(image, 85);
+  EXPECT_LT(bytes.size(), std::filesystem::file_size(folder / "usual.jpg"));
+  WriteFileAtomically(folder / "small.jpg", bytes);
+  EXPECT_EQ(ReadImage(folder / "small.jpg").data(), ReadImage(folder / "usual.jpg").data());
+}
+
+TEST(SmallJpeg, SaysWhatJpegCannotHold) {
+  try {
+    SmallJpeg(ImageRgb8(65501, 1, 3), 85);
+    FAIL() << "a JPEG of more than 65500 pixels a side";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), ::testing::StartsWith("cannot code a JPEG: "));
+  }
 }
 
 TEST(ReadMask, HalfScaleAndMoreIsUsable) {

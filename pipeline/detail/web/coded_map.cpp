@@ -14,16 +14,16 @@ namespace {
 
 // Residuals by how large those around were: 0...5 one by one, then by powers of two.
 constexpr int kActivities = 14, kPlainActivities = 6;
-constexpr int kSlopes = 4;      // steps between the three neighbours
+constexpr int kSlopes = 4;       // steps between the three neighbours
 constexpr int kUnarySteps = 18;  // larger magnitudes in Elias' gamma code
 constexpr int kGammaBits = 17;
 
 int Activity(int west, int north, int north_east, int north_west) {
-  const int sum = 2 * (std::abs(west) + std::abs(north)) + std::abs(north_east) +
-                  std::abs(north_west);
+  const int sum =
+      2 * (std::abs(west) + std::abs(north)) + std::abs(north_east) + std::abs(north_west);
   if (sum < kPlainActivities) return sum;
-  return std::min(kActivities - 1, 3 + static_cast<int>(std::bit_width(
-                                           static_cast<unsigned>(sum))));
+  return std::min(kActivities - 1,
+                  3 + static_cast<int>(std::bit_width(static_cast<unsigned>(sum))));
 }
 
 int Slope(int left, int above, int above_left) {
