@@ -26,14 +26,6 @@ using ::testing::Not;
 
 constexpr double kDepthErrorPx = 0.1501;  // 0.15 and what float depths add
 
-// What stands between two marks.
-std::string Between(const std::string& text, const std::string& start, const std::string& end) {
-  const size_t first = text.find(start);
-  if (first == std::string::npos) return "";
-  const size_t from = first + start.size();
-  return text.substr(from, text.find(end, from) - from);
-}
-
 // A set with true depth.
 class ExportWeb : public ::testing::Test {
  protected:

@@ -80,6 +80,13 @@ Grid<std::uint8_t> Places(const std::string& bytes, int columns, int rows) {
 
 }  // namespace
 
+std::string Between(const std::string& text, const std::string& start, const std::string& end) {
+  const size_t first = text.find(start);
+  if (first == std::string::npos) return "";
+  const size_t from = first + start.size();
+  return text.substr(from, text.find(end, from) - from);
+}
+
 std::string BytesOfText(const std::string& text, size_t size) {
   std::string bits;
   const auto put = [&bits](unsigned seven) {

@@ -7,6 +7,9 @@
 
 namespace dtr::testing {
 
+/// What stands between two marks; nothing where the first is missing.
+std::string Between(const std::string& text, const std::string& start, const std::string& end);
+
 /// The bytes of a script element's text, `size` of them.
 std::string BytesOfText(const std::string& text, size_t size);
 
