@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 #include <nlohmann/json.hpp>
+#include <span>
 #include <vector>
 
 #include "dtr/base/error.h"
@@ -15,6 +17,7 @@
 #include "dtr/render/time_steps.h"
 #include "pipeline/detail/web/web_view.h"
 #include "pipeline/evaluate.h"
+#include "pipeline/prune.h"
 #include "viewer/web/web_page.h"
 
 namespace dtr::pipeline {
@@ -29,6 +32,9 @@ constexpr double kBytesPerMb = 1e6;
 constexpr WebCoding kCodings[] = {{85, 0.15, false}, {80, 0.15, true}, {70, 0.2, true},
                                   {60, 0.25, true},  {45, 0.35, true}, {30, 0.5, true},
                                   {15, 0.5, true}};
+/// So many of them before anything of the set is left out, for these losses in dB.
+constexpr size_t kCodingsBeforePruning = 4;
+constexpr double kPruningDb[] = {0.5, 2};
 
 /// The source views, each once, in byte order of their ids.
 std::vector<View> SourceViews(DtrSet& set) {
@@ -115,11 +121,11 @@ Figures FiguresOf(const WebPageRequest& request, const DtrSet& set, const std::v
   return figures;
 }
 
-std::string SetJson(const fs::path& folder, const DtrSet& set, const Figures& figures,
+std::string SetJson(const std::string& name, const DtrSet& set, const Figures& figures,
                     const std::vector<WebView>& packed) {
   Json json = {{"format", "dtr-web-page"},
                {"version", 2},
-               {"name", Name(folder)},
+               {"name", name},
                {"unit", NameOf(set.unit)},
                {"scene_center", JsonOf(set.scene_center)},
                {"bounds", nullptr},
@@ -136,24 +142,111 @@ std::string SetJson(const fs::path& folder, const DtrSet& set, const Figures& fi
   return text + "]}";
 }
 
-std::string PageOf(const WebPageRequest& request, const DtrSet& set, const std::vector<View>& views,
-                   const Figures& figures, const WebCoding& coding, Progress& progress) {
-  web::WebPage page{Name(request.set), DTR_VERSION, "", {}};
+/// What a page is made of.
+struct Source {
+  fs::path folder;
+  DtrSet set;
+  std::vector<View> views;
+  Figures figures;
+};
+
+Source SourceOf(const WebPageRequest& request, Progress& progress) {
+  Source source{request.set, io::ReadSet(request.set), {}, {}};
+  RequireOneFrame(source.set);
+  source.views = SourceViews(source.set);
+  RequireDepth(request.set, source.views);
+  source.figures = FiguresOf(request, source.set, source.views, progress);
+  return source;
+}
+
+std::string PageOf(const std::string& name, const Source& source, const WebCoding& coding,
+                   Progress& progress) {
+  web::WebPage page{name, DTR_VERSION, "", {}};
   std::vector<WebView> packed;
-  progress.Stage("packing views", static_cast<int>(views.size()));
-  for (const View& described : views) {
+  progress.Stage("packing views", static_cast<int>(source.views.size()));
+  for (const View& described : source.views) {
     progress.ThrowIfInterrupted();
     View view = described;
     io::LoadOptions load;
     load.completed = load.sigma = true;
-    io::LoadPixels(request.set, view, load);
+    io::LoadPixels(source.folder, view, load);
     RequireLoaded(view);
-    packed.push_back(PackView(view, request.set, coding));
+    packed.push_back(PackView(view, source.folder, coding));
     progress.Update(static_cast<int>(packed.size()));
   }
-  page.set_json = SetJson(request.set, set, figures, packed);
+  page.set_json = SetJson(name, source.set, source.figures, packed);
   for (WebView& view : packed) page.views.push_back(std::move(view.bytes));
   return web::MakeWebPage(page);
+}
+
+WebCoding CodingOf(const WebPageRequest& request, WebCoding coding) {
+  if (request.jpeg_quality) {
+    coding.jpeg_quality = coding.recodes_jpeg ? std::min(coding.jpeg_quality, *request.jpeg_quality)
+                                              : *request.jpeg_quality;
+  }
+  coding.depth_error_px = coding.recodes_jpeg
+                              ? std::max(coding.depth_error_px, request.depth_error_px)
+                              : request.depth_error_px;
+  coding.recodes_jpeg = coding.recodes_jpeg || request.jpeg_quality.has_value();
+  return coding;
+}
+
+bool Fits(const WebPageRequest& request, const std::string& page) {
+  return !request.max_mb || static_cast<double>(page.size()) <= *request.max_mb * kBytesPerMb;
+}
+
+/// The first page that fits, or the last of these codings.
+std::string PageWithin(const WebPageRequest& request, const Source& source,
+                       std::span<const WebCoding> codings, WebPageReport& report,
+                       Progress& progress) {
+  std::string page;
+  for (const WebCoding& listed : codings) {
+    const WebCoding coding = CodingOf(request, listed);
+    page = PageOf(Name(request.set), source, coding, progress);
+    report.views = source.views.size();
+    report.bytes = page.size();
+    report.jpeg_quality =
+        coding.recodes_jpeg || !AllAreJpeg(source.views) ? coding.jpeg_quality : 0;
+    report.depth_error_px = coding.depth_error_px;
+    if (Fits(request, page)) break;
+  }
+  return page;
+}
+
+/// The set without what may go for this loss.
+Source Pruned(const WebPageRequest& request, double loss_db, const fs::path& output,
+              Progress& progress) {
+  PruneSetOptions prune;
+  prune.set = request.set;
+  prune.output = output;
+  prune.prune.max_loss_db = loss_db;
+  prune.prune.render = request.render;
+  prune.threads = request.threads;
+  prune.make_renderer = request.make_renderer;
+  prune.make_timed_renderer = request.make_timed_renderer;
+  PruneSet(prune, progress);
+  WebPageRequest of_pruned = request;
+  of_pruned.set = output;
+  return SourceOf(of_pruned, progress);
+}
+
+std::string SmallestPage(const WebPageRequest& request, const Source& source, const fs::path& work,
+                         WebPageReport& report, Progress& progress) {
+  const std::span<const WebCoding> codings(kCodings);
+  if (!request.max_mb || !request.make_renderer || !request.make_timed_renderer) {
+    return PageWithin(request, source, codings, report, progress);
+  }
+  std::string page =
+      PageWithin(request, source, codings.first(kCodingsBeforePruning), report, progress);
+  for (const double loss_db : kPruningDb) {
+    if (Fits(request, page)) return page;
+    report.pruned_db = loss_db;
+    const bool last = loss_db == std::end(kPruningDb)[-1];
+    page = PageWithin(request,
+                      Pruned(request, loss_db, work / fmt::format("{}.dtr", loss_db), progress),
+                      last ? codings : codings.first(kCodingsBeforePruning), report, progress);
+  }
+  return page;
 }
 
 }  // namespace
@@ -163,41 +256,22 @@ WebPageReport ExportWebPage(const WebPageRequest& request, Progress& progress) {
     throw UsageError(
         fmt::format("{}: exists already; choose another name", request.output.string()));
   }
-  DtrSet set = io::ReadSet(request.set);
-  RequireOneFrame(set);
-  const std::vector<View> views = SourceViews(set);
-  RequireDepth(request.set, views);
-  WorkFolder work(WorkFolder::Of(request.output), "export");
+  const Source source = SourceOf(request, progress);
+  const WorkFolder work(WorkFolder::Of(request.output), "export");
   WebPageReport report;
-  report.views = views.size();
-  report.warning = io::ValidationWarning(set);
-  const Figures figures = FiguresOf(request, set, views, progress);
-  std::string page;
-  for (WebCoding coding : kCodings) {
-    coding.depth_error_px = coding.recodes_jpeg
-                                ? std::max(coding.depth_error_px, request.depth_error_px)
-                                : request.depth_error_px;
-    if (request.jpeg_quality && !coding.recodes_jpeg) {
-      coding = {*request.jpeg_quality, coding.depth_error_px, true};
-    }
-    if (request.jpeg_quality)
-      coding.jpeg_quality = std::min(coding.jpeg_quality, *request.jpeg_quality);
-    page = PageOf(request, set, views, figures, coding, progress);
-    report.bytes = page.size();
-    report.jpeg_quality = coding.recodes_jpeg || !AllAreJpeg(views) ? coding.jpeg_quality : 0;
-    report.depth_error_px = coding.depth_error_px;
-    if (!request.max_mb || static_cast<double>(page.size()) <= *request.max_mb * kBytesPerMb) {
-      const fs::path file = work.path() / request.output.filename();
-      WriteFileAtomically(file, page);
-      Rename(file, request.output);
-      SyncFolder(fs::absolute(request.output).parent_path());
-      return report;
-    }
+  report.warning = io::ValidationWarning(source.set);
+  const std::string page = SmallestPage(request, source, work.path(), report, progress);
+  if (!Fits(request, page)) {
+    throw Error(fmt::format(
+        "`max_mb` {}: the smallest page of this set takes {:.2f} MB; leave views out with `dtr "
+        "prune` first",
+        *request.max_mb, std::ceil(static_cast<double>(page.size()) / kBytesPerMb * 100) / 100));
   }
-  throw Error(fmt::format(
-      "`max_mb` {}: the smallest page of this set takes {:.2f} MB; leave views out with `dtr "
-      "prune` first",
-      *request.max_mb, std::ceil(static_cast<double>(page.size()) / kBytesPerMb * 100) / 100));
+  const fs::path file = work.path() / request.output.filename();
+  WriteFileAtomically(file, page);
+  Rename(file, request.output);
+  SyncFolder(fs::absolute(request.output).parent_path());
+  return report;
 }
 
 }  // namespace dtr::pipeline

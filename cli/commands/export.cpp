@@ -109,12 +109,18 @@ int RunWeb(const pipeline::WebPageRequest& request, const Context& context) {
   const std::string photos = report.jpeg_quality > 0
                                  ? fmt::format("photos of JPEG quality {}", report.jpeg_quality)
                                  : "photos as in the set";
-  context.console.Say(fmt::format(
-      "{}: {} views, {:.2f} MB, {}, depth within {} px of disparity", request.output.string(),
-      report.views, static_cast<double>(report.bytes) / 1e6, photos, report.depth_error_px));
-  context.EmitJson(
-      fmt::format("{{\"views\": {}, \"bytes\": {}, \"jpeg_quality\": {}, \"depth_error_px\": {}}}",
-                  report.views, report.bytes, report.jpeg_quality, report.depth_error_px));
+  const std::string pruned =
+      report.pruned_db > 0 ? fmt::format(", pruned for at most {} dB", report.pruned_db) : "";
+  context.console.Say(fmt::format("{}: {} views, {:.2f} MB, {}, depth within {} px of disparity{}",
+                                  request.output.string(), report.views,
+                                  static_cast<double>(report.bytes) / 1e6, photos,
+                                  report.depth_error_px, pruned));
+  const nlohmann::ordered_json json = {{"views", report.views},
+                                       {"bytes", report.bytes},
+                                       {"jpeg_quality", report.jpeg_quality},
+                                       {"depth_error_px", report.depth_error_px},
+                                       {"pruned_db", report.pruned_db}};
+  context.EmitJson(json, -1);
   return kDone;
 }
 
@@ -127,6 +133,9 @@ int RunExport(ExportOptions options, const Context& context) {
     if (options.evaluates_web) {
       options.web.render = StoredRenderOptions(io::ReadSet(options.web.set), WholeFrames());
       options.web.make_renderer = [&context] { return MakeRenderer({}, context.console); };
+      options.web.make_timed_renderer = [&context] {
+        return MakeTimedRenderer({}, context.console);
+      };
     }
     return RunWeb(options.web, context);
   }
@@ -214,8 +223,8 @@ void AddWebOptions(CLI::App& command, ExportOptions& options) {
   options.of_formats.push_back(
       {command
            .add_option("--max-mb", options.web.max_mb,
-                       "web: at most N MB (10^6 bytes); photos and depth are coded more coarsely "
-                       "until the page fits")
+                       "web: at most N MB (10^6 bytes); photos and depth are coded more coarsely, "
+                       "and what images need least is left out, until the page fits")
            ->check(CLI::PositiveNumber)
            ->type_name("N"),
        {"web"}});
@@ -235,8 +244,8 @@ void AddWebOptions(CLI::App& command, ExportOptions& options) {
        {"web"}});
   options.of_formats.push_back(
       {command.add_flag("!--no-evaluate", options.evaluates_web,
-                        "web: without figures of held-out photos, which take as long as `dtr "
-                        "evaluate`"),
+                        "web: without figures of held-out photos, which take as long as dtr "
+                        "evaluate, and leave nothing out for --max-mb"),
        {"web"}});
 }
 

@@ -153,6 +153,15 @@ TEST_F(ExportWeb, FitsTheSizeThatIsAskedFor) {
   EXPECT_LE(fs::file_size(folder_ / "small.html"), limit);
 }
 
+TEST_F(ExportWeb, LeavesOutWhatImagesDoNotNeedForASmallSize) {
+  DtrOk(Arguments("whole.html"));
+  const double limit = 0.5 * static_cast<double>(fs::file_size(folder_ / "whole.html")) / 1e6;
+  const Ran ran =
+      DtrOk(Arguments("small.html", {"--max-mb", std::to_string(limit), "--json", "-"}));
+  EXPECT_LE(static_cast<double>(fs::file_size(folder_ / "small.html")), 1e6 * limit);
+  EXPECT_GT(nlohmann::json::parse(ran.out)["pruned_db"], 0);
+}
+
 TEST_F(ExportWeb, APageThatCannotBeSoSmallSaysTheLeastThatCan) {
   const Ran ran = Dtr(Arguments("page.html", {"--max-mb", "0.01"}));
   ExpectRejected(ran, kFailed, "the smallest page of this set takes");
