@@ -69,6 +69,10 @@ ExportReport ExportDepth(const ExportRequest& request, Progress& progress);
 /// masks, sparse_pc.ply.
 ExportReport ExportNerfstudio(const ExportRequest& request, Progress& progress);
 
+/// Writes the same cloud as one LAS 1.4 file (point format 2): whole steps of a power of ten in the
+/// user's world; views as user data, view number as source id, sigma as extra bytes.
+ExportReport ExportLas(const ExportRequest& request, Progress& progress);
+
 /// Writes a triangle mesh with normals and vertex colours, one file, .ply or .glb by its extension
 /// (detail/export/mesh.h). Error where `min_views` views show no surface.
 ExportReport ExportMesh(const ExportRequest& request, Progress& progress);

@@ -33,6 +33,7 @@ const std::vector<Format>& Formats() {
   static const std::vector<Format> formats = {
       {"colmap", pipeline::ExportColmap, {}, "points"},
       {"ply", pipeline::ExportPly, {".ply"}, "points"},
+      {"las", pipeline::ExportLas, {".las"}, "points"},
       {"mesh", pipeline::ExportMesh, {".ply", ".glb"}, "vertices"},
       {"splat", pipeline::ExportSplat, {".ply", ".splat", ".glb"}, "gaussians"},
       {"depth", pipeline::ExportDepth, {}, nullptr},
@@ -150,14 +151,14 @@ void AddCloudOptions(CLI::App& command, ExportOptions& options) {
   options.of_formats.push_back(
       {command.add_flag("--completed", request.completed,
                         "With completed depth, not only what was measured"),
-       {"ply", "mesh", "depth", "nerfstudio", "mvsnet"}});
+       {"ply", "las", "mesh", "depth", "nerfstudio", "mvsnet"}});
   options.of_formats.push_back(
       {command
            .add_option("--min-views", request.min_views,
-                       "ply, mesh: views that must show a point at the same depth [2]")
+                       "ply, las, mesh: views that must show a point at the same depth [2]")
            ->check(CLI::Range(1, 100))
            ->type_name("N"),
-       {"ply", "mesh"}});
+       {"ply", "las", "mesh"}});
   options.of_formats.push_back(
       {command
            .add_option("--voxel", request.voxel,

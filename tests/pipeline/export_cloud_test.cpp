@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "dtr/base/error.h"
+#include "dtr/base/process.h"
 #include "dtr/base/random.h"
 #include "pipeline/export.h"
 #include "tests/pipeline/exact_set.h"
@@ -200,6 +201,50 @@ TEST_F(ExportCloud, LargeCoordinatesAreDoubles) {
   for (const Eigen::Vector3d& p : points) {
     ASSERT_LT(OffCentrePx(views_, p - options.world_origin), kResidualPx);
   }
+}
+
+TEST_F(ExportCloud, LasHoldsTheSamePoints) {
+  ExactSetOptions options;
+  options.world_origin = {500000, 4500000.25, 100};
+  Make(options);
+  const Ply ply = Cloud(Request("cloud.ply"));
+  EXPECT_EQ(pipeline::ExportLas(Request("cloud.las"), noted_).points, ply.count);
+  const std::string las = ReadFile(folder_ / "cloud.las", 1 << 28);
+  const auto at = [&](size_t place, auto value) {
+    std::memcpy(&value, las.data() + place, sizeof value);
+    return value;
+  };
+  EXPECT_EQ(las.substr(0, 4), "LASF");
+  EXPECT_EQ(at(247, std::uint64_t{}), ply.count);
+  const size_t first = at(96, std::uint32_t{}), bytes = at(105, std::uint16_t{});
+  ASSERT_EQ(las.size(), first + bytes * ply.count);
+  for (size_t i = 0; i < ply.count; ++i) {
+    Eigen::Vector3d p;
+    for (size_t c = 0; c < 3; ++c) {
+      p[static_cast<int>(c)] =
+          at(first + i * bytes + 4 * c, std::int32_t{}) * at(131 + 8 * c, double{}) +
+          at(155 + 8 * c, double{});
+      EXPECT_LE(at(187 + 16 * c, double{}), p[static_cast<int>(c)]);
+      EXPECT_GE(at(179 + 16 * c, double{}), p[static_cast<int>(c)]);
+    }
+    ASSERT_LT(OffCentrePx(views_, p - options.world_origin), kResidualPx);
+    EXPECT_EQ(at(first + i * bytes + 17, std::uint8_t{}), ply["views"][i]);
+    EXPECT_FLOAT_EQ(at(first + i * bytes + 26, float{}), static_cast<float>(ply["sigma"][i]));
+  }
+}
+
+TEST_F(ExportCloud, PdalReadsLas) {
+  const std::string pdal = "/usr/bin/pdal";
+  if (!std::filesystem::exists(pdal)) GTEST_SKIP() << "no pdal";
+  Make({});
+  const size_t points = pipeline::ExportLas(Request("cloud.las"), noted_).points;
+  ProcessOptions options;
+  options.log_file = folder_ / "log";
+  const std::string las = (folder_ / "cloud.las").string();
+  ASSERT_TRUE(RunProcess({pdal, "info", "--stats", las}, options).Ok());
+  const std::string log = ReadFile(options.log_file, 1 << 20);
+  EXPECT_THAT(log, HasSubstr("\"count\": " + std::to_string(points)));
+  EXPECT_THAT(log, HasSubstr("\"name\": \"sigma\""));
 }
 
 TEST_F(ExportCloud, AFailedValidationStandsInTheFileAndIsNoted) {

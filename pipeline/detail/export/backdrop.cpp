@@ -11,8 +11,9 @@ namespace {
 
 constexpr double kCellPx = 3;  // wide, in pixels of the view with the median focal length
 constexpr int kMostCells = 1024;
-// Its distance, in multiples of the farthest depth: so far that views agree on directions.
-constexpr double kDistance = 10;
+// Its distance, in multiples of the farthest depth of the median view: viewers lose what is much
+// farther.
+constexpr double kDistance = 3;
 // Views that stand beyond the given ones see somewhat past their borders.
 constexpr double kPastBorder = 0.5;
 constexpr float kOneColour = 5;  // levels of 8 bits between cells that are one
@@ -22,15 +23,11 @@ constexpr int kLargestSquare = 16;
 // Against the sky's 1, so that surfaces are smeared over squares of 16 cells.
 constexpr float kSurfaceWeight = 1.0f / 256;
 
-double MedianFocal(const DtrSet& set) {
-  std::vector<double> focal;
-  for (const View& view : set.frames.front().views) {
-    if (view.depth_file) focal.push_back(view.DepthCamera().fx_px());
-  }
-  if (focal.empty()) return 1;
-  std::nth_element(focal.begin(), focal.begin() + static_cast<std::ptrdiff_t>(focal.size() / 2),
-                   focal.end());
-  return focal[focal.size() / 2];
+double Median(std::vector<double> values) {
+  if (values.empty()) return 1;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
 }
 
 }  // namespace
@@ -41,15 +38,16 @@ void Backdrop::Sum::Add(const Sum& other, float factor) {
 }
 
 Backdrop::Backdrop(const DtrSet& set, int threads) : set_(set), threads_(threads) {
-  int views = 0;
+  std::vector<double> focal, far_z;
   for (const View& view : set.frames.front().views) {
     if (!view.depth_file) continue;
     centre_ += view.CenterInWorld();
-    radius_ = std::max({radius_, kDistance * view.far_z, view.completed_far_z});
-    ++views;
+    focal.push_back(view.DepthCamera().fx_px());
+    far_z.push_back(view.far_z);
   }
-  if (views > 0) centre_ /= views;
-  const double cells = 2 * MedianFocal(set) / kCellPx;
+  if (!focal.empty()) centre_ /= static_cast<double>(focal.size());
+  radius_ = kDistance * Median(far_z);
+  const double cells = 2 * Median(focal) / kCellPx;
   while (side_ < cells && side_ < kMostCells) side_ *= 2;
   const size_t all = 6 * static_cast<size_t>(side_) * static_cast<size_t>(side_);
   sky_.resize(all);
@@ -75,7 +73,7 @@ Backdrop::Place Backdrop::PlaceOf(const Eigen::Vector3d& direction) const {
 }
 
 void Backdrop::AddView(const SurfaceView& surface) {
-  if (!surface.far.empty()) AddSky(surface);
+  AddSky(surface);
   AddSurface(surface);
 }
 
@@ -88,7 +86,9 @@ void Backdrop::AddSky(const SurfaceView& surface) {
       const auto pixel = surface.camera.PixelFromCam(surface.InCam(p));
       if (!pixel || !surface.camera.Contains(*pixel)) continue;
       const int u = static_cast<int>(pixel->x()), v = static_cast<int>(pixel->y());
-      if (surface.far(u, v) == 0) continue;
+      const float w = surface.inverse_depth(u, v);
+      const bool sky = !surface.far.empty() && surface.far(u, v) != 0;
+      if (!sky && !(w > 0 && Hides(surface.PointAt({u + 0.5, v + 0.5}, w)))) continue;
       Sum& sum = sky_[At(face, x, y)];
       sum.weight += 1;
       for (int c = 0; c < 3; ++c) sum.rgb[static_cast<size_t>(c)] += surface.colours(u, v, c);
@@ -103,6 +103,7 @@ void Backdrop::AddSurface(const SurfaceView& surface) {
       const float w = surface.inverse_depth(x, y);
       if (!(w > 0)) continue;
       const Eigen::Vector3d p = surface.PointAt({x + 0.5, y + 0.5}, w) - centre_;
+      if (Hides(p + centre_)) continue;
       const Place place = PlaceOf(p);
       const double share = p.norm() / radius_;
       const auto weight = static_cast<float>(share * share);

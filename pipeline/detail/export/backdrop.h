@@ -21,11 +21,17 @@ class Backdrop {
   /// `surface` with its colours. Views in the set's order, once each.
   void AddView(const SurfaceView& surface);
 
+  /// Whether a point lies so far that it is behind: it counts as sky.
+  bool Hides(const Eigen::Vector3d& p_in_world) const {
+    return !((p_in_world - centre_).norm() < kNearer * radius_);
+  }
+
   /// One Gaussian for each cell, or square of cells of nearly one colour, that some view could see
   /// behind what it does see. Empty where no view was added.
   std::vector<Gaussian> Gaussians();
 
  private:
+  static constexpr double kNearer = 0.9;  // share of the distance at which surfaces end
   struct Sum {
     float weight = 0;
     std::array<float, 3> rgb{};

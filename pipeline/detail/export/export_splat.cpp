@@ -44,7 +44,10 @@ class Gaussians {
     gaussians_ = backdrop.Gaussians();
     Fuse(
         views, {.min_views = 1, .threads = request_.threads},
-        [&](const SurfaceView& surface, const std::vector<FusedSample>& samples) {
+        [&](const SurfaceView& surface, std::vector<FusedSample> samples) {
+          std::erase_if(samples, [&](const FusedSample& sample) {
+            return backdrop.Hides(sample.p_in_world);
+          });
           if (samples.empty()) return;
           SplatTree tree(surface, samples);
           if (request_.max_count == 0) {

@@ -15,7 +15,7 @@ constexpr double kClearlyFiner = 0.7;
 // Below this cosine a footprint is taken as at it, and a depth says nothing along another ray.
 constexpr double kSmallestCosine = 0.15;
 // Depths that differ by more than this share are never one surface, however near the cameras are.
-constexpr double kSameDepth = 0.05;
+constexpr double kSameSurfaceDepth = 0.05;
 // Where sigma is small, and where it is unknown: pixels of disparity that rounding, interpolation
 // and calibration take.
 constexpr double kFloorPx = 0.25;
@@ -136,7 +136,7 @@ class ViewFusion {
     const double sigma = std::hypot(own, other.SigmaAt(*pixel));
     const bool sigma_known = own > 0 && other.SigmaAt(*pixel) > 0;
     const bool within_px = std::abs(nearer) <= options_.tolerance_px * per_px &&
-                           std::abs(nearer) <= kSameDepth / p.z();
+                           std::abs(nearer) <= kSameSurfaceDepth / p.z();
     if (within_px &&
         (!sigma_known ||
          std::abs(nearer) <= std::max(kFloorPx * per_px, options_.tolerance_sigmas * sigma))) {

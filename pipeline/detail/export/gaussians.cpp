@@ -18,6 +18,8 @@ constexpr double kColourDeviation = 3, kBendPx = 0.25;
 constexpr double kVariance = 0.55;
 // What renderers add to it, square pixels (Kerbl et al. 2023). The rest is never less than kLeast.
 constexpr double kLowPass = 0.3, kLeastVariance = 0.2;
+// What a square costs that reaches over the end of its surface.
+constexpr double kBesideHole = 10;
 // Surfaces are drawn no more oblique to the view than this cosine: its pixels know no better.
 constexpr double kLeastCosine = 0.25;
 // Thickness along the normal, shares of the distance to its neighbour.
@@ -70,6 +72,7 @@ SplatTree::SplatTree(const SurfaceView& surface, const std::vector<FusedSample>&
 float SplatTree::CostOf(const SurfaceView& surface, int x, int y, int side) const {
   double sum[3] = {}, squares[3] = {};
   double w_sum = 0, w_x = 0, w_y = 0, spread = 0;
+  int holes = 0;
   const double middle = 0.5 * (side - 1);
   const int x0 = std::max(0, x - side / 2),
             x1 = std::min(surface.colours.width(), x + side + side / 2);
@@ -77,14 +80,17 @@ float SplatTree::CostOf(const SurfaceView& surface, int x, int y, int side) cons
             y1 = std::min(surface.colours.height(), y + side + side / 2);
   for (int v = y0; v < y1; ++v) {
     for (int u = x0; u < x1; ++u) {
-      if (!(surface.inverse_depth(u, v) > 0)) return kNoSquare;
+      if (!(surface.inverse_depth(u, v) > 0)) {
+        ++holes;
+        continue;
+      }
       for (int c = 0; c < 3; ++c) {
         sum[c] += surface.colours(u, v, c);
         squares[c] += double(surface.colours(u, v, c)) * surface.colours(u, v, c);
       }
     }
   }
-  const double around = double(x1 - x0) * (y1 - y0);
+  const double around = double(x1 - x0) * (y1 - y0) - holes;
   double deviation = 0;
   for (int c = 0; c < 3; ++c) {
     deviation = std::max(deviation, squares[c] / around - sum[c] * sum[c] / (around * around));
@@ -101,13 +107,15 @@ float SplatTree::CostOf(const SurfaceView& surface, int x, int y, int side) cons
   double bend = 0;
   for (int v = y0; v < y1; ++v) {
     for (int u = x0; u < x1; ++u) {
+      if (!(surface.inverse_depth(u, v) > 0)) continue;
       const double plane = w_sum / (double(side) * side) + w_x / spread * (u - x - middle) +
                            w_y / spread * (v - y - middle);
       bend = std::max(bend, std::abs(surface.inverse_depth(u, v) - plane));
     }
   }
-  return static_cast<float>(std::max(std::sqrt(std::max(0.0, deviation)) / kColourDeviation,
-                                     bend / (kBendPx * surface.inverse_depth_per_px)));
+  return static_cast<float>(std::max(
+      std::sqrt(std::max(0.0, deviation)) / kColourDeviation + (holes > 0 ? kBesideHole : 0),
+      bend / (kBendPx * surface.inverse_depth_per_px)));
 }
 
 std::vector<float> SplatTree::MergeCosts() const {

@@ -18,6 +18,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::uint32_t kMagic = 0x46546C67, kJsonChunk = 0x4E4F534A, kBinChunk = 0x004E4942;
+constexpr int kAttributes = 34962, kIndices = 34963;  // targets of buffer views
 constexpr size_t kHeaderBytes = 12, kChunkBytes = 8;
 
 size_t Components(const std::string& type) {
@@ -78,8 +79,10 @@ void WriteGlb(const std::filesystem::path& file, const DtrSet& set, const GlbPri
       own["attributes"][array.attribute()] = i;
     }
     json["accessors"].push_back(array.Accessor(i));
-    json["bufferViews"].push_back(
-        {{"buffer", 0}, {"byteOffset", bytes}, {"byteLength", array.bytes().size()}});
+    json["bufferViews"].push_back({{"buffer", 0},
+                                   {"byteOffset", bytes},
+                                   {"byteLength", array.bytes().size()},
+                                   {"target", array.attribute().empty() ? kIndices : kAttributes}});
     bytes += array.bytes().size();
   }
   Json used = Json::array();

@@ -12,7 +12,7 @@ constexpr int kSide = kBlockSide + 1;  // with the neighbours' first voxels
 constexpr double kLargestStep = 2;
 // Noise that all distances have besides sigma, voxels.
 constexpr double kFloor = 0.25;
-constexpr double kSmallestCosine = 0.1;
+constexpr double kMeshLeastCosine = 0.1;
 constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
 
 // Cosine between the ray and the normal where the ray of a pixel meets the surface; 0 where the
@@ -56,7 +56,7 @@ void Observe(const SurfaceView& surface, const Eigen::Vector3d& p_in_world, doub
   const Eigen::Vector3d ray = p / p.z();
   const double cosine = CosineAt(surface, x, y, ray);
   const double along = (1 / *w - p.z()) * ray.norm();
-  if (cosine < kSmallestCosine) return;
+  if (cosine < kMeshLeastCosine) return;
   const double distance = along * cosine / voxel;
   if (distance < -kTruncation) return;
   if (distance > kTruncation) {
