@@ -6,6 +6,7 @@
 #include <cmath>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <span>
 #include <vector>
 
@@ -160,8 +161,18 @@ Source SourceOf(const WebPageRequest& request, Progress& progress) {
   return source;
 }
 
-std::string PageOf(const std::string& name, const Source& source, const WebCoding& coding,
-                   Progress& progress) {
+/// What is written: the page, or what a site consists of.
+using Files = std::vector<web::SiteFile>;
+
+std::uint64_t BytesOf(const Files& files) {
+  return std::accumulate(
+      files.begin(), files.end(), std::uint64_t{0},
+      [](std::uint64_t sum, const web::SiteFile& file) { return sum + file.bytes.size(); });
+}
+
+Files FilesOf(const WebPageRequest& request, const Source& source, const WebCoding& coding,
+              Progress& progress) {
+  const std::string name = Name(request.set);
   web::WebPage page{name, DTR_VERSION, "", {}};
   std::vector<WebView> packed;
   progress.Stage("packing views", static_cast<int>(source.views.size()));
@@ -177,7 +188,8 @@ std::string PageOf(const std::string& name, const Source& source, const WebCodin
   }
   page.set_json = SetJson(name, source.set, source.figures, packed);
   for (WebView& view : packed) page.views.push_back(std::move(view.bytes));
-  return web::MakeWebPage(page);
+  if (request.as_site) return web::MakeWebSite(page);
+  return {{request.output.filename().string(), web::MakeWebPage(page)}};
 }
 
 WebCoding CodingOf(const WebPageRequest& request, WebCoding coding) {
@@ -192,26 +204,25 @@ WebCoding CodingOf(const WebPageRequest& request, WebCoding coding) {
   return coding;
 }
 
-bool Fits(const WebPageRequest& request, const std::string& page) {
-  return !request.max_mb || static_cast<double>(page.size()) <= *request.max_mb * kBytesPerMb;
+bool Fits(const WebPageRequest& request, const Files& files) {
+  return !request.max_mb || static_cast<double>(BytesOf(files)) <= *request.max_mb * kBytesPerMb;
 }
 
 /// The first page that fits, or the last of these codings.
-std::string PageWithin(const WebPageRequest& request, const Source& source,
-                       std::span<const WebCoding> codings, WebPageReport& report,
-                       Progress& progress) {
-  std::string page;
+Files FilesWithin(const WebPageRequest& request, const Source& source,
+                  std::span<const WebCoding> codings, WebPageReport& report, Progress& progress) {
+  Files files;
   for (const WebCoding& listed : codings) {
     const WebCoding coding = CodingOf(request, listed);
-    page = PageOf(Name(request.set), source, coding, progress);
+    files = FilesOf(request, source, coding, progress);
     report.views = source.views.size();
-    report.bytes = page.size();
+    report.bytes = BytesOf(files);
     report.jpeg_quality =
         coding.recodes_jpeg || !AllAreJpeg(source.views) ? coding.jpeg_quality : 0;
     report.depth_error_px = coding.depth_error_px;
-    if (Fits(request, page)) break;
+    if (Fits(request, files)) break;
   }
-  return page;
+  return files;
 }
 
 /// The set without what may go for this loss.
@@ -231,23 +242,38 @@ Source Pruned(const WebPageRequest& request, double loss_db, const fs::path& out
   return SourceOf(of_pruned, progress);
 }
 
-std::string SmallestPage(const WebPageRequest& request, const Source& source, const fs::path& work,
-                         WebPageReport& report, Progress& progress) {
+Files SmallEnough(const WebPageRequest& request, const Source& source, const fs::path& work,
+                  WebPageReport& report, Progress& progress) {
   const std::span<const WebCoding> codings(kCodings);
   if (!request.max_mb || !request.make_renderer || !request.make_timed_renderer) {
-    return PageWithin(request, source, codings, report, progress);
+    return FilesWithin(request, source, codings, report, progress);
   }
-  std::string page =
-      PageWithin(request, source, codings.first(kCodingsBeforePruning), report, progress);
+  Files files =
+      FilesWithin(request, source, codings.first(kCodingsBeforePruning), report, progress);
   for (const double loss_db : kPruningDb) {
-    if (Fits(request, page)) return page;
+    if (Fits(request, files)) return files;
     report.pruned_db = loss_db;
     const bool last = loss_db == std::end(kPruningDb)[-1];
-    page = PageWithin(request,
-                      Pruned(request, loss_db, work / fmt::format("{}.dtr", loss_db), progress),
-                      last ? codings : codings.first(kCodingsBeforePruning), report, progress);
+    files = FilesWithin(request,
+                        Pruned(request, loss_db, work / fmt::format("{}.dtr", loss_db), progress),
+                        last ? codings : codings.first(kCodingsBeforePruning), report, progress);
   }
-  return page;
+  return files;
+}
+
+/// Under their names, once all of them are whole.
+void Write(const WebPageRequest& request, const Files& files, const fs::path& work) {
+  fs::path made = work / "site";
+  if (request.as_site) {
+    fs::create_directory(made);
+    for (const auto& [name, bytes] : files) WriteFileAtomically(made / name, bytes);
+    SyncFolder(made);
+  } else {
+    made = work / files.front().name;
+    WriteFileAtomically(made, files.front().bytes);
+  }
+  Rename(made, request.output);
+  SyncFolder(fs::absolute(request.output).parent_path());
 }
 
 }  // namespace
@@ -261,17 +287,14 @@ WebPageReport ExportWebPage(const WebPageRequest& request, Progress& progress) {
   const WorkFolder work(WorkFolder::Of(request.output), "export");
   WebPageReport report;
   report.warning = io::ValidationWarning(source.set);
-  const std::string page = SmallestPage(request, source, work.path(), report, progress);
-  if (!Fits(request, page)) {
+  const Files files = SmallEnough(request, source, work.path(), report, progress);
+  if (!Fits(request, files)) {
     throw Error(fmt::format(
         "`max_mb` {}: the smallest page of this set takes {:.2f} MB; leave views out with `dtr "
         "prune` first",
-        *request.max_mb, std::ceil(static_cast<double>(page.size()) / kBytesPerMb * 100) / 100));
+        *request.max_mb, std::ceil(static_cast<double>(BytesOf(files)) / kBytesPerMb * 100) / 100));
   }
-  const fs::path file = work.path() / request.output.filename();
-  WriteFileAtomically(file, page);
-  Rename(file, request.output);
-  SyncFolder(fs::absolute(request.output).parent_path());
+  Write(request, files, work.path());
   return report;
 }
 

@@ -1,4 +1,4 @@
-// pipeline/export_web.h -- a set as one HTML file that shows it in a browser (docs/EXPORT.md).
+// pipeline/export_web.h -- a set as a page that shows it in a browser (docs/EXPORT.md).
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -17,7 +17,9 @@ namespace dtr::pipeline {
 
 struct WebPageRequest {
   std::filesystem::path set;
-  std::filesystem::path output;  ///< the file to write
+  std::filesystem::path output;  ///< the file to write, or the folder
+  /// A folder of files for a web server, which gives views one by one, instead of one HTML file.
+  bool as_site = false;
   /// At most so many MB (10^6 bytes): photos and depth are coded more coarsely, and less is taken
   /// of the set, until the page fits.
   std::optional<double> max_mb;
@@ -43,7 +45,7 @@ struct WebPageReport {
   std::string warning;  ///< a failed validation in a line, which the page shows, too; or empty
 };
 
-/// Writes the page of the set's source views. Nothing of it exists until it is whole. Throws
+/// Writes the page, or the site, of the set's source views. Nothing of it exists until it is whole. Throws
 /// UsageError where the output exists and for dynamic sets, Error for a set without depth, a broken
 /// one, and where max_mb cannot be met: then it says the least that can.
 WebPageReport ExportWebPage(const WebPageRequest& request, Progress& progress);

@@ -103,8 +103,14 @@ int RunFormat(Request request, const Format& format, const Context& context) {
   return kDone;
 }
 
-int RunWeb(const pipeline::WebPageRequest& request, const Context& context) {
-  RequireOutputFile(request.output, "-o", {".html", ".htm"});
+int RunWeb(pipeline::WebPageRequest request, const Context& context) {
+  request.as_site = !request.output.has_filename() || !request.output.has_extension();
+  request.output = WithoutTrailingSlash(request.output);
+  if (request.as_site) {
+    RequireFolderOf(request.output, "-o");
+  } else {
+    RequireOutputFile(request.output, "-o", {".html", ".htm"});
+  }
   const pipeline::WebPageReport report = pipeline::ExportWebPage(request, context.console);
   if (!report.warning.empty()) context.console.Note(report.warning);
   const std::string photos = report.jpeg_quality > 0
@@ -262,8 +268,8 @@ void AddExportCommand(CLI::App& app) {
         command.add_option("SET", options->request.set, "The set")->required();
         command
             .add_option("--format", options->format,
-                        "What to write, see docs/EXPORT.md; web is one HTML file that shows the "
-                        "scene in a browser [colmap]")
+                        "What to write, see docs/EXPORT.md; web is one HTML file, or a folder for "
+                        "a web server, that shows the scene in a browser [colmap]")
             ->check(CLI::IsMember(FormatNames()))
             ->type_name(fmt::format("{}", fmt::join(FormatNames(), "|")));
         options->of_formats.push_back(

@@ -145,6 +145,41 @@ TEST_F(ExportWeb, AFileThatExistsIsNotReplaced) {
   EXPECT_EQ(Text(folder_ / "page.html"), "notes");
 }
 
+TEST_F(ExportWeb, AFolderIsASiteOfTheSameViews) {
+  DtrOk(Arguments("page.html"));
+  DtrOk(Arguments("site"));
+  const std::string page = Text(folder_ / "page.html");
+  const auto json = nlohmann::json::parse(
+      Between(page, "<script type=\"application/json\" id=\"set\">", "</script>"));
+  EXPECT_EQ(nlohmann::json::parse(Text(folder_ / "site/set.json")), json);
+  for (size_t i = 0; i < json["views"].size(); ++i) {
+    const std::string number = std::to_string(i);
+    EXPECT_EQ(Text(folder_ / ("site/view-" + number + ".bin")),
+              BytesOfText(Between(page, "id=\"view-" + number + "\">", "</script>"),
+                          json["views"][i]["bytes"]));
+  }
+  EXPECT_THAT(Text(folder_ / "site/index.html"), Not(HasSubstr("{{")));
+  EXPECT_THAT(Text(folder_ / "site/dtr-viewer.js"), HasSubstr("\nexport async function openPage("));
+  EXPECT_THAT(Text(folder_ / "site/dtr-viewer.js"), Not(HasSubstr("\nimport {")));
+  ExpectRejected(Dtr(Arguments("site")), kWrongUsage, "exists already; choose another name");
+  // A site is as small as is asked for, too.
+  double whole = 0;
+  for (const auto& entry : fs::directory_iterator(folder_ / "site")) {
+    whole += static_cast<double>(entry.file_size());
+  }
+  DtrOk(Arguments("small/", {"--max-mb", std::to_string(0.9 * whole / 1e6), "--no-evaluate"}));
+  double small = 0;
+  for (const auto& entry : fs::directory_iterator(folder_ / "small")) {
+    small += static_cast<double>(entry.file_size());
+  }
+  EXPECT_LE(small, 0.9 * whole);
+}
+
+TEST_F(ExportWeb, APageIsHtmlOrAFolder) {
+  ExpectRejected(Dtr(Arguments("page.pdf")), kWrongUsage, "expected a name ending in");
+  ExpectNothingLeft();
+}
+
 TEST_F(ExportWeb, FitsTheSizeThatIsAskedFor) {
   DtrOk(Arguments("whole.html"));
   const auto whole = fs::file_size(folder_ / "whole.html");

@@ -1,22 +1,18 @@
-// The exported page in Chromium, driven by playwright-core (npm): DTR_PLAYWRIGHT names a folder
-// with its node_modules.
+// The exported page of one file.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <nlohmann/json.hpp>
 
 #include "dtr/base/files.h"
-#include "dtr/base/process.h"
 #include "dtr/cpu/renderer.h"
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
 #include "dtr/types/inverse_depth_code.h"
 #include "tests/cli/run_dtr.h"
-#include "tests/cli/small_courtyard.h"
 #include "tests/cli/web_page_bytes.h"
-#include "tests/support/test_data.h"
+#include "tests/viewer/web/in_chromium.h"
 
 namespace dtr::testing {
 namespace {
@@ -26,37 +22,24 @@ using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-constexpr char kChromium[] = "/usr/bin/chromium";
 // Of the image's pixels: a dark pixel of a photo may be black.
 constexpr double kBlackShare = 0.001;
 // Single precision, 8-bit targets and another JPEG decoder; away from depth edges.
 constexpr int kStepsOf255 = 2;
 constexpr double kAgreeing = 0.99;
 
-class WebPage : public ::testing::Test {
+class WebPage : public InChromium {
  protected:
   void SetUp() override {
-    const char* folder = std::getenv("DTR_PLAYWRIGHT");
-    if (folder == nullptr || !fs::exists(fs::path(folder) / "node_modules/playwright-core")) {
-      GTEST_SKIP() << "needs DTR_PLAYWRIGHT, a folder with playwright-core";
-    }
-    if (!fs::exists(kChromium)) GTEST_SKIP() << "needs Chromium";
-    MakeSmallCourtyard(folder_ / "courtyard");
-    ImportSmallCourtyard(folder_ / "courtyard", folder_ / "set.dtr");
+    InChromium::SetUp();
+    if (IsSkipped()) return;
     DtrOk({"export", (folder_ / "set.dtr").string(), "--format", "web", "-o", Page().string()});
   }
   fs::path Page() const { return folder_ / "page.html"; }
   nlohmann::json Driven(const std::string& camera = "") const {
-    std::string lines, json = "{}";
-    ProcessOptions options;
-    options.on_line = [&](const std::string& line) {
-      lines += line + "\n";
-      if (line.starts_with("{\"messages\"")) json = line;
-    };
-    std::vector<std::string> words = {"node", DTR_DRIVE_PAGE, Page().string(), kChromium};
+    std::vector<std::string> words = {DTR_DRIVE_PAGE, Page().string(), kChromium};
     if (!camera.empty()) words.push_back(camera);
-    EXPECT_TRUE(RunProcess(words, options).Ok()) << lines;
-    return nlohmann::json::parse(json);
+    return Found(words);
   }
   // Puts `by` over the page's bytes from `at` behind the mark on.
   void Damage(const std::string& mark, size_t at, const std::string& by) const {
@@ -66,8 +49,6 @@ class WebPage : public ::testing::Test {
     page.replace(from + mark.size() + at, by.size(), by);
     WriteFileAtomically(Page(), page);
   }
-
-  TemporaryFolder folder_;
 };
 
 TEST_F(WebPage, ShowsTheSceneAndDoesWhatMouseKeysAndFingersAsk) {

@@ -1,4 +1,4 @@
-// A view out of the page's text: what renderers need of it. Runs in workers, and without a document.
+// A view out of its bytes: what renderers need of it. Runs in workers, and without a document.
 import { fail } from "./problem.js";
 import { bytesOfText, crc32 } from "./bytes.js";
 import { decodePlaces, decodeValues, inverseDepthTable } from "./depth_codes.js";
@@ -50,10 +50,11 @@ function joined(measured, completed, measuredCodes) {
   return measured;
 }
 
-/** The view of a header with its pixels: photo (ImageBitmap), codes, flags of blocks, mesh, mask distances (null: no mask). */
-export async function decodeView(view, text) {
+/** The view of a header with its pixels, of {text} (bytes as text) or {bytes}: photo (ImageBitmap), codes, flags of blocks, mesh, mask distances (null: no mask). */
+export async function decodeView(view, data) {
   const where = `photo ${view.name}`;
-  const bytes = bytesOfText(text, view.bytes, where);
+  const bytes = data.bytes ?? bytesOfText(data.text, view.bytes, where);
+  if (bytes.length !== view.bytes) fail(where, `${view.bytes} bytes`, String(bytes.length));
   if (crc32(bytes) !== view.crc) fail(where, "bytes of its checksum", "others");
   const part = (name) => bytes.subarray(view.parts[name].first, view.parts[name].end);
   const photo = await createImageBitmap(new Blob([part("image")], { type: "image/jpeg" }),
@@ -80,11 +81,11 @@ export async function decodeView(view, text) {
   return { photo, codes, blocks: blockFlags(samples, masked), mesh, distance };
 }
 
-/** In a worker: takes {view, text}, answers {pixels} or {problem}. */
+/** In a worker: takes {view, bytes}, answers {pixels} or {problem}. */
 export function serveDecoding(scope) {
   scope.onmessage = async ({ data }) => {
     try {
-      const pixels = await decodeView(data.view, data.text);
+      const pixels = await decodeView(data.view, data.bytes);
       const { photo, codes, blocks, mesh, distance } = pixels;
       scope.postMessage({ index: data.view.index, pixels }, [photo, codes.buffer, blocks.buffer, mesh.vertices.buffer,
         mesh.indices.buffer, mesh.cells.buffer, ...(distance ? [distance.buffer] : [])]);
