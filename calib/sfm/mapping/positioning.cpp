@@ -98,45 +98,106 @@ double CostOf(const Problem& problem, const State& state) {
   return cost;
 }
 
-class Solver {
+// Blocks of cameras that share a point: where they are, and which of them a point adds to. Made
+// once for all starts and all steps.
+class Pattern {
  public:
-  explicit Solver(const Problem& problem) : problem_(problem) {
-    // Blocks of cameras that share a point, lower triangle, by column.
-    std::vector<std::uint64_t> keys;
+  explicit Pattern(const Problem& problem) : cameras_(problem.cameras) {
     for (size_t p = 0; p + 1 < problem.first.size(); ++p) {
-      for (size_t i = problem.first[p]; i < problem.first[p + 1]; ++i) {
-        for (size_t k = problem.first[p]; k < problem.first[p + 1]; ++k) {
-          if (problem.seen[i].camera >= problem.seen[k].camera) {
-            keys.push_back(Key(problem.seen[i].camera, problem.seen[k].camera));
-          }
+      ForEachPair(problem, p, [&](int row, int column) { keys_.push_back(Key(row, column)); });
+      if (keys_.size() > kKeysAtOnce) SortUnique();
+    }
+    for (int c = 0; c < cameras_; ++c) keys_.push_back(Key(c, c));
+    SortUnique();
+    for (size_t p = 0; p + 1 < problem.first.size(); ++p) {
+      ForEachPair(problem, p, [&](int row, int column) { slots_.push_back(SlotOf(row, column)); });
+    }
+    for (int c = 0; c < cameras_; ++c) diagonal_.push_back(SlotOf(c, c));
+    MakeMatrix();
+  }
+
+  /// Calls body(row, column) for the cameras of each two observations of a point, lower triangle.
+  template <typename Body>
+  static void ForEachPair(const Problem& problem, size_t point, const Body& body) {
+    for (size_t i = problem.first[point]; i < problem.first[point + 1]; ++i) {
+      for (size_t k = problem.first[point]; k < problem.first[point + 1]; ++k) {
+        const int row = problem.seen[i].camera, column = problem.seen[k].camera;
+        if (row >= column) body(row, column);
+      }
+    }
+  }
+
+  size_t blocks() const { return keys_.size(); }
+  /// Of the pairs of all points, in the order of ForEachPair.
+  const std::vector<std::uint32_t>& slots() const { return slots_; }
+  std::uint32_t diagonal(int camera) const { return diagonal_[camera]; }
+
+  /// The lower triangle of the matrix with these blocks.
+  void Fill(const std::vector<Matrix3d>& blocks, Eigen::SparseMatrix<double>* matrix) const {
+    *matrix = zeros_;
+    double* value = matrix->valuePtr();
+    ForEachEntry([&](size_t block, int i, int k) { *value++ = blocks[block](i, k); });
+  }
+
+ private:
+  static constexpr size_t kKeysAtOnce = 4000000;
+
+  static std::uint64_t Key(int row, int column) {
+    return static_cast<std::uint64_t>(column) << 32 | static_cast<std::uint32_t>(row);
+  }
+  static int Row(std::uint64_t key) { return static_cast<int>(key & 0xffffffffu); }
+  static int Column(std::uint64_t key) { return static_cast<int>(key >> 32); }
+  void SortUnique() {
+    std::sort(keys_.begin(), keys_.end());
+    keys_.erase(std::unique(keys_.begin(), keys_.end()), keys_.end());
+  }
+  std::uint32_t SlotOf(int row, int column) const {
+    const auto at = std::lower_bound(keys_.begin(), keys_.end(), Key(row, column));
+    return static_cast<std::uint32_t>(at - keys_.begin());
+  }
+
+  // Calls body(block, row in it, column in it) for all entries of the lower triangle, column by
+  // column, as a compressed matrix stores them.
+  template <typename Body>
+  void ForEachEntry(const Body& body) const {
+    for (size_t begin = 0, end = 0; begin < keys_.size(); begin = end) {
+      while (end < keys_.size() && Column(keys_[end]) == Column(keys_[begin])) ++end;
+      for (int k = 0; k < 3; ++k) {
+        for (size_t block = begin; block < end; ++block) {
+          const bool on_diagonal = Row(keys_[block]) == Column(keys_[block]);
+          for (int i = on_diagonal ? k : 0; i < 3; ++i) body(block, i, k);
         }
       }
-      if (keys.size() > 4000000) Unique(&keys);
     }
-    Unique(&keys);
-    keys_ = std::move(keys);
-    blocks_.resize(keys_.size());
   }
+
+  void MakeMatrix() {
+    std::vector<Eigen::Triplet<double>> entries;
+    ForEachEntry([&](size_t block, int i, int k) {
+      entries.emplace_back(3 * Row(keys_[block]) + i, 3 * Column(keys_[block]) + k, 0.0);
+    });
+    zeros_.resize(3 * cameras_, 3 * cameras_);
+    zeros_.setFromTriplets(entries.begin(), entries.end());
+  }
+
+  int cameras_;
+  std::vector<std::uint64_t> keys_;
+  std::vector<std::uint32_t> slots_, diagonal_;
+  Eigen::SparseMatrix<double> zeros_;
+};
+
+class Solver {
+ public:
+  Solver(const Problem& problem, const Pattern& pattern)
+      : problem_(problem), pattern_(pattern), blocks_(pattern.blocks()) {}
 
   // Reduced equations at `state`, solved; false where they cannot be.
   bool Step(const State& state, double lambda, State* next) {
     Build(state, lambda);
-    const int size = 3 * problem_.cameras;
-    Eigen::SparseMatrix<double> matrix(size, size);
-    std::vector<Eigen::Triplet<double>> entries;
-    entries.reserve(9 * keys_.size());
-    for (size_t b = 0; b < keys_.size(); ++b) {
-      const int row = 3 * Row(keys_[b]), column = 3 * Column(keys_[b]);
-      for (int i = 0; i < 3; ++i) {
-        for (int k = 0; k < 3; ++k) {
-          if (row + i >= column + k) entries.emplace_back(row + i, column + k, blocks_[b](i, k));
-        }
-      }
-    }
-    matrix.setFromTriplets(entries.begin(), entries.end());
-    if (!analysed_) solver_.analyzePattern(matrix);
+    pattern_.Fill(blocks_, &matrix_);
+    if (!analysed_) solver_.analyzePattern(matrix_);
     analysed_ = true;
-    solver_.factorize(matrix);
+    solver_.factorize(matrix_);
     if (solver_.info() != Eigen::Success) return false;
     const Eigen::VectorXd step = solver_.solve(right_);
     if (!step.allFinite()) return false;
@@ -145,20 +206,6 @@ class Solver {
   }
 
  private:
-  static std::uint64_t Key(int row, int column) {
-    return static_cast<std::uint64_t>(column) << 32 | static_cast<std::uint32_t>(row);
-  }
-  static int Row(std::uint64_t key) { return static_cast<int>(key & 0xffffffffu); }
-  static int Column(std::uint64_t key) { return static_cast<int>(key >> 32); }
-  static void Unique(std::vector<std::uint64_t>* keys) {
-    std::sort(keys->begin(), keys->end());
-    keys->erase(std::unique(keys->begin(), keys->end()), keys->end());
-  }
-  Matrix3d& Block(int row, int column) {
-    const auto at = std::lower_bound(keys_.begin(), keys_.end(), Key(row, column));
-    return blocks_[at - keys_.begin()];
-  }
-
   // An observation with its factor eliminated. With u = X - c, residual r = v - d u has the
   // derivatives -u by d, -d by X and d by c. Elimination of d leaves the matrix w d^2 P with
   // P = 1 - u u^T / ((1 + lambda) u^2), and the gradient by X  -w d P r.
@@ -184,6 +231,7 @@ class Solver {
     gradient_.resize(state.points.size());
     parts_.resize(problem_.seen.size());
     Eigen::VectorXd diagonal = Eigen::VectorXd::Zero(3 * problem_.cameras);
+    const std::uint32_t* slot = pattern_.slots().data();
     for (size_t p = 0; p < state.points.size(); ++p) {
       Matrix3d h = Matrix3d::Zero();
       Vector3d g = Vector3d::Zero();
@@ -193,7 +241,7 @@ class Solver {
         h += parts_[i].h;
         g += parts_[i].g;
         const int c = problem_.seen[i].camera;
-        Block(c, c) += parts_[i].h;
+        blocks_[pattern_.diagonal(c)] += parts_[i].h;
         diagonal.segment<3>(3 * c) += parts_[i].h.diagonal();
         right_.segment<3>(3 * c) += parts_[i].g;  // minus the gradient by c
       }
@@ -208,13 +256,14 @@ class Solver {
         right_.segment<3>(3 * ci) -= hi * g;
         for (size_t k = first; k < end; ++k) {
           const int ck = problem_.seen[k].camera;
-          if (ci >= ck) Block(ci, ck) -= hi * parts_[k].h;
+          if (ci >= ck) blocks_[*slot++].noalias() -= hi * parts_[k].h;
         }
       }
     }
     for (int c = 0; c < problem_.cameras; ++c) {
-      Block(c, c).diagonal() += lambda * diagonal.segment<3>(3 * c);
-      Block(c, c).diagonal().array() += 1e-10;  // the gauge: world's origin and unit
+      Matrix3d& block = blocks_[pattern_.diagonal(c)];
+      block.diagonal() += lambda * diagonal.segment<3>(3 * c);
+      block.diagonal().array() += 1e-10;  // the gauge: world's origin and unit
     }
   }
 
@@ -238,17 +287,19 @@ class Solver {
   }
 
   const Problem& problem_;
-  std::vector<std::uint64_t> keys_;
+  const Pattern& pattern_;
   std::vector<Matrix3d> blocks_, inverse_;
   std::vector<Vector3d> gradient_;
   std::vector<Part> parts_;
   Eigen::VectorXd right_;
+  Eigen::SparseMatrix<double> matrix_;
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver_;
   bool analysed_ = false;
 };
 
-double Minimise(const Problem& problem, State* state, const Progress* progress) {
-  Solver solver(problem);
+double Minimise(const Problem& problem, const Pattern& pattern, State* state,
+                const Progress* progress) {
+  Solver solver(problem, pattern);
   double cost = CostOf(problem, *state), lambda = 1e-2;
   State next;
   int small = 0;
@@ -295,11 +346,12 @@ Positions PlaceCameras(std::span<const Matrix3d> cam_from_world, const Rays& ray
   const auto images = static_cast<int>(cam_from_world.size());
   const Problem problem =
       MakeProblem(cam_from_world, rays, tracks, CoveringTracks(images, tracks, kTracksPerImage));
+  const Pattern pattern(problem);
   std::vector<State> states(kStarts);
   std::vector<double> costs(kStarts);
   ParallelFor(0, kStarts, threads, [&](int s) {
     states[s] = RandomStart(problem, HashOf(seed, static_cast<std::uint64_t>(s)));
-    costs[s] = Minimise(problem, &states[s], progress);
+    costs[s] = Minimise(problem, pattern, &states[s], progress);
   });
   const auto best = std::min_element(costs.begin(), costs.end()) - costs.begin();
   Positions positions{std::vector<Vector3d>(images, Vector3d::Zero()), costs[best]};
