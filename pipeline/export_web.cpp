@@ -3,7 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <iterator>
 #include <nlohmann/json.hpp>
+#include <numeric>
+#include <span>
 #include <vector>
 
 #include "dtr/base/error.h"
@@ -14,6 +18,8 @@
 #include "dtr/render/scene.h"
 #include "dtr/render/time_steps.h"
 #include "pipeline/detail/web/web_view.h"
+#include "pipeline/evaluate.h"
+#include "pipeline/prune.h"
 #include "viewer/web/web_page.h"
 
 namespace dtr::pipeline {
@@ -26,8 +32,11 @@ constexpr double kBytesPerMb = 1e6;
 
 /// From as the page is by default to the smallest that still shows the scene.
 constexpr WebCoding kCodings[] = {{85, 0.15, false}, {80, 0.15, true}, {70, 0.2, true},
-                                  {50, 0.25, true},  {35, 0.35, true}, {25, 0.5, true},
+                                  {60, 0.25, true},  {45, 0.35, true}, {30, 0.5, true},
                                   {15, 0.5, true}};
+/// So many of them before anything of the set is left out, for these losses in dB.
+constexpr size_t kCodingsBeforePruning = 4;
+constexpr double kPruningDb[] = {0.5, 2};
 
 /// The source views, each once, in byte order of their ids.
 std::vector<View> SourceViews(DtrSet& set) {
@@ -61,34 +70,70 @@ std::string Name(const fs::path& set) {
   return WithoutTrailingSlash(fs::absolute(set)).stem().string();
 }
 
-Json Figures(const DtrSet& set, const std::vector<View>& views) {
+using Figures = std::vector<std::pair<std::string, std::string>>;
+
+/// Means over the held-out photos, as `dtr evaluate` has them.
+void AddHeldOut(const WebPageRequest& request, const DtrSet& set, Figures& figures,
+                Progress& progress) {
   const std::vector<View>& all = set.frames.front().views;
-  const auto held_out = std::count_if(
+  const auto count = std::count_if(
       all.begin(), all.end(), [](const View& view) { return view.role == ViewRole::kHeldOut; });
+  figures.emplace_back("held-out photos", std::to_string(count));
+  if (count == 0 || !request.make_renderer) return;
+  EvaluateRequest evaluate;
+  evaluate.set = request.set;
+  evaluate.render = request.render;
+  evaluate.threads = request.threads;
+  const eval::ViewScore mean = Evaluate(evaluate, request.make_renderer, progress).views.mean;
+  if (mean.psnr_db) figures.emplace_back("their PSNR", fmt::format("{:.2f} dB", *mean.psnr_db));
+  if (mean.psnr_covered_db) {
+    figures.emplace_back("on seen pixels", fmt::format("{:.2f} dB", *mean.psnr_covered_db));
+  }
+  if (mean.ssim) figures.emplace_back("their SSIM", fmt::format("{:.3f}", *mean.ssim));
+  figures.emplace_back("of them seen", fmt::format("{:.1f} %", 100 * mean.coverage));
+}
+
+/// Each test of the set's validation, where it has one: free text to a reader of sets.
+void AddValidation(const DtrSet& set, Figures& figures) {
+  figures.emplace_back("calibration", io::ValidationLine(set));
+  const Json validation = Json::parse(set.validation_json, nullptr, false);
+  if (!validation.is_object() || !validation.contains("tests")) return;
+  for (const Json& test : validation["tests"]) {
+    if (!test.is_object() || !test.value("name", Json()).is_string() ||
+        !test.value("value", Json()).is_number() || !test.value("limit", Json()).is_number()) {
+      continue;
+    }
+    std::string name = test["name"];
+    std::replace(name.begin(), name.end(), '_', ' ');
+    const bool failed = test.value("passed", Json()) == false;
+    figures.emplace_back(name, fmt::format("{:.3g}, limit {:.3g}{}", test["value"].get<double>(),
+                                           test["limit"].get<double>(), failed ? ": failed" : ""));
+  }
+}
+
+Figures FiguresOf(const WebPageRequest& request, const DtrSet& set, const std::vector<View>& views,
+                  Progress& progress) {
   const PinholeCamera& camera = views.front().camera;
-  Json figures = Json::array();
-  const auto add = [&](const char* name, const std::string& value) {
-    figures.push_back({name, value});
-  };
-  add("photos", std::to_string(views.size()));
-  add("first photo", fmt::format("{} x {} pixels", camera.width_px(), camera.height_px()));
-  add("held out", std::to_string(held_out));
-  add("unit", NameOf(set.unit));
-  add("calibration", io::ValidationLine(set));
+  Figures figures = {
+      {"photos", std::to_string(views.size())},
+      {"first photo", fmt::format("{} x {} pixels", camera.width_px(), camera.height_px())},
+      {"unit", NameOf(set.unit)}};
+  AddHeldOut(request, set, figures, progress);
+  AddValidation(set, figures);
   return figures;
 }
 
-std::string SetJson(const fs::path& folder, const DtrSet& set, const std::vector<View>& views,
+std::string SetJson(const std::string& name, const DtrSet& set, const Figures& figures,
                     const std::vector<WebView>& packed) {
   Json json = {{"format", "dtr-web-page"},
                {"version", 2},
-               {"name", Name(folder)},
+               {"name", name},
                {"unit", NameOf(set.unit)},
                {"scene_center", JsonOf(set.scene_center)},
                {"bounds", nullptr},
                {"validation", io::ValidationLine(set)},
                {"validation_failed", !io::ValidationWarning(set).empty()},
-               {"figures", Figures(set, views)}};
+               {"figures", figures}};
   if (!set.bounds.empty()) {
     json["bounds"] = {{"min", JsonOf(set.bounds.min)}, {"max", JsonOf(set.bounds.max)}};
   }
@@ -99,24 +144,136 @@ std::string SetJson(const fs::path& folder, const DtrSet& set, const std::vector
   return text + "]}";
 }
 
-std::string PageOf(const WebPageRequest& request, const DtrSet& set, const std::vector<View>& views,
-                   const WebCoding& coding, Progress& progress) {
-  web::WebPage page{Name(request.set), DTR_VERSION, "", {}};
+/// What a page is made of.
+struct Source {
+  fs::path folder;
+  DtrSet set;
+  std::vector<View> views;
+  Figures figures;
+};
+
+Source SourceOf(const WebPageRequest& request, Progress& progress) {
+  Source source{request.set, io::ReadSet(request.set), {}, {}};
+  RequireOneFrame(source.set);
+  source.views = SourceViews(source.set);
+  RequireDepth(request.set, source.views);
+  source.figures = FiguresOf(request, source.set, source.views, progress);
+  return source;
+}
+
+/// What is written: the page, or what a site consists of.
+using Files = std::vector<web::SiteFile>;
+
+std::uint64_t BytesOf(const Files& files) {
+  return std::accumulate(
+      files.begin(), files.end(), std::uint64_t{0},
+      [](std::uint64_t sum, const web::SiteFile& file) { return sum + file.bytes.size(); });
+}
+
+Files FilesOf(const WebPageRequest& request, const Source& source, const WebCoding& coding,
+              Progress& progress) {
+  const std::string name = Name(request.set);
+  web::WebPage page{name, DTR_VERSION, "", {}};
   std::vector<WebView> packed;
-  progress.Stage("packing views", static_cast<int>(views.size()));
-  for (const View& described : views) {
+  progress.Stage("packing views", static_cast<int>(source.views.size()));
+  for (const View& described : source.views) {
     progress.ThrowIfInterrupted();
     View view = described;
     io::LoadOptions load;
     load.completed = load.sigma = true;
-    io::LoadPixels(request.set, view, load);
+    io::LoadPixels(source.folder, view, load);
     RequireLoaded(view);
-    packed.push_back(PackView(view, request.set, coding));
+    packed.push_back(PackView(view, source.folder, coding));
     progress.Update(static_cast<int>(packed.size()));
   }
-  page.set_json = SetJson(request.set, set, views, packed);
+  page.set_json = SetJson(name, source.set, source.figures, packed);
   for (WebView& view : packed) page.views.push_back(std::move(view.bytes));
-  return web::MakeWebPage(page);
+  if (request.as_site) return web::MakeWebSite(page);
+  return {{request.output.filename().string(), web::MakeWebPage(page)}};
+}
+
+WebCoding CodingOf(const WebPageRequest& request, WebCoding coding) {
+  if (request.jpeg_quality) {
+    coding.jpeg_quality = coding.recodes_jpeg ? std::min(coding.jpeg_quality, *request.jpeg_quality)
+                                              : *request.jpeg_quality;
+  }
+  coding.depth_error_px = coding.recodes_jpeg
+                              ? std::max(coding.depth_error_px, request.depth_error_px)
+                              : request.depth_error_px;
+  coding.recodes_jpeg = coding.recodes_jpeg || request.jpeg_quality.has_value();
+  return coding;
+}
+
+bool Fits(const WebPageRequest& request, const Files& files) {
+  return !request.max_mb || static_cast<double>(BytesOf(files)) <= *request.max_mb * kBytesPerMb;
+}
+
+/// The first page that fits, or the last of these codings.
+Files FilesWithin(const WebPageRequest& request, const Source& source,
+                  std::span<const WebCoding> codings, WebPageReport& report, Progress& progress) {
+  Files files;
+  for (const WebCoding& listed : codings) {
+    const WebCoding coding = CodingOf(request, listed);
+    files = FilesOf(request, source, coding, progress);
+    report.views = source.views.size();
+    report.bytes = BytesOf(files);
+    report.jpeg_quality =
+        coding.recodes_jpeg || !AllAreJpeg(source.views) ? coding.jpeg_quality : 0;
+    report.depth_error_px = coding.depth_error_px;
+    if (Fits(request, files)) break;
+  }
+  return files;
+}
+
+/// The set without what may go for this loss.
+Source Pruned(const WebPageRequest& request, double loss_db, const fs::path& output,
+              Progress& progress) {
+  PruneSetOptions prune;
+  prune.set = request.set;
+  prune.output = output;
+  prune.prune.max_loss_db = loss_db;
+  prune.prune.render = request.render;
+  prune.threads = request.threads;
+  prune.make_renderer = request.make_renderer;
+  prune.make_timed_renderer = request.make_timed_renderer;
+  PruneSet(prune, progress);
+  WebPageRequest of_pruned = request;
+  of_pruned.set = output;
+  return SourceOf(of_pruned, progress);
+}
+
+Files SmallEnough(const WebPageRequest& request, const Source& source, const fs::path& work,
+                  WebPageReport& report, Progress& progress) {
+  const std::span<const WebCoding> codings(kCodings);
+  if (!request.max_mb || !request.make_renderer || !request.make_timed_renderer) {
+    return FilesWithin(request, source, codings, report, progress);
+  }
+  Files files =
+      FilesWithin(request, source, codings.first(kCodingsBeforePruning), report, progress);
+  for (const double loss_db : kPruningDb) {
+    if (Fits(request, files)) return files;
+    report.pruned_db = loss_db;
+    const bool last = loss_db == std::end(kPruningDb)[-1];
+    files = FilesWithin(request,
+                        Pruned(request, loss_db, work / fmt::format("{}.dtr", loss_db), progress),
+                        last ? codings : codings.first(kCodingsBeforePruning), report, progress);
+  }
+  return files;
+}
+
+/// Under their names, once all of them are whole.
+void Write(const WebPageRequest& request, const Files& files, const fs::path& work) {
+  fs::path made = work / "site";
+  if (request.as_site) {
+    fs::create_directory(made);
+    for (const auto& [name, bytes] : files) WriteFileAtomically(made / name, bytes);
+    SyncFolder(made);
+  } else {
+    made = work / files.front().name;
+    WriteFileAtomically(made, files.front().bytes);
+  }
+  Rename(made, request.output);
+  SyncFolder(fs::absolute(request.output).parent_path());
 }
 
 }  // namespace
@@ -126,37 +283,19 @@ WebPageReport ExportWebPage(const WebPageRequest& request, Progress& progress) {
     throw UsageError(
         fmt::format("{}: exists already; choose another name", request.output.string()));
   }
-  DtrSet set = io::ReadSet(request.set);
-  RequireOneFrame(set);
-  const std::vector<View> views = SourceViews(set);
-  RequireDepth(request.set, views);
-  WorkFolder work(WorkFolder::Of(request.output), "export");
+  const Source source = SourceOf(request, progress);
+  const WorkFolder work(WorkFolder::Of(request.output), "export");
   WebPageReport report;
-  report.views = views.size();
-  report.warning = io::ValidationWarning(set);
-  std::string page;
-  for (WebCoding coding : kCodings) {
-    if (request.jpeg_quality && !coding.recodes_jpeg) {
-      coding = {*request.jpeg_quality, coding.depth_error_px, true};
-    }
-    if (request.jpeg_quality)
-      coding.jpeg_quality = std::min(coding.jpeg_quality, *request.jpeg_quality);
-    page = PageOf(request, set, views, coding, progress);
-    report.bytes = page.size();
-    report.jpeg_quality = coding.recodes_jpeg || !AllAreJpeg(views) ? coding.jpeg_quality : 0;
-    report.depth_error_px = coding.depth_error_px;
-    if (!request.max_mb || static_cast<double>(page.size()) <= *request.max_mb * kBytesPerMb) {
-      const fs::path file = work.path() / request.output.filename();
-      WriteFileAtomically(file, page);
-      Rename(file, request.output);
-      SyncFolder(fs::absolute(request.output).parent_path());
-      return report;
-    }
+  report.warning = io::ValidationWarning(source.set);
+  const Files files = SmallEnough(request, source, work.path(), report, progress);
+  if (!Fits(request, files)) {
+    throw Error(fmt::format(
+        "`max_mb` {}: the smallest page of this set takes {:.2f} MB; leave views out with `dtr "
+        "prune` first",
+        *request.max_mb, std::ceil(static_cast<double>(BytesOf(files)) / kBytesPerMb * 100) / 100));
   }
-  throw Error(fmt::format(
-      "`max_mb` {}: the smallest page of this set takes {:.2f} MB; leave views out with `dtr "
-      "prune` first",
-      *request.max_mb, std::ceil(static_cast<double>(page.size()) / kBytesPerMb * 100) / 100));
+  Write(request, files, work.path());
+  return report;
 }
 
 }  // namespace dtr::pipeline

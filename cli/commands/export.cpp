@@ -9,6 +9,8 @@
 
 #include "cli/command.h"
 #include "cli/output_file.h"
+#include "cli/render_options.h"
+#include "cli/renderers.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "pipeline/export_web.h"
@@ -58,6 +60,7 @@ struct ExportOptions {
   std::string format = "colmap";
   Request request;
   pipeline::WebPageRequest web;
+  bool evaluates_web = true;
   std::vector<FormatOption> of_formats;
 };
 
@@ -100,21 +103,31 @@ int RunFormat(Request request, const Format& format, const Context& context) {
   return kDone;
 }
 
-int RunWeb(const pipeline::WebPageRequest& request, const Context& context) {
-  RequireOutputFile(request.output, "-o", {".html", ".htm"});
+int RunWeb(pipeline::WebPageRequest request, const Context& context) {
+  request.as_site = !request.output.has_filename() || !request.output.has_extension();
+  request.output = WithoutTrailingSlash(request.output);
+  if (request.as_site) {
+    RequireFolderOf(request.output, "-o");
+  } else {
+    RequireOutputFile(request.output, "-o", {".html", ".htm"});
+  }
   const pipeline::WebPageReport report = pipeline::ExportWebPage(request, context.console);
   if (!report.warning.empty()) context.console.Note(report.warning);
   const std::string photos = report.jpeg_quality > 0
                                  ? fmt::format("photos of JPEG quality {}", report.jpeg_quality)
                                  : "photos as in the set";
-  const std::string depth =
-      fmt::format("depth within {} px of disparity of the set's", report.depth_error_px);
-  context.console.Say(fmt::format("{}: {} views, {:.1f} MB, {}, {}", request.output.string(),
-                                  report.views, static_cast<double>(report.bytes) / 1e6, photos,
-                                  depth));
-  context.EmitJson(
-      fmt::format("{{\"views\": {}, \"bytes\": {}, \"jpeg_quality\": {}, \"depth_error_px\": {}}}",
-                  report.views, report.bytes, report.jpeg_quality, report.depth_error_px));
+  const std::string pruned =
+      report.pruned_db > 0 ? fmt::format(", pruned for at most {} dB", report.pruned_db) : "";
+  context.console.Say(fmt::format("{}: {} views, {:.2f} MB, {}, depth within {} px of disparity{}",
+                                  request.output.string(), report.views,
+                                  static_cast<double>(report.bytes) / 1e6, photos,
+                                  report.depth_error_px, pruned));
+  const nlohmann::ordered_json json = {{"views", report.views},
+                                       {"bytes", report.bytes},
+                                       {"jpeg_quality", report.jpeg_quality},
+                                       {"depth_error_px", report.depth_error_px},
+                                       {"pruned_db", report.pruned_db}};
+  context.EmitJson(json, -1);
   return kDone;
 }
 
@@ -123,6 +136,14 @@ int RunExport(ExportOptions options, const Context& context) {
   if (options.format == "web") {
     options.web.set = options.request.set;
     options.web.output = options.request.output;
+    options.web.threads = context.common.threads;
+    if (options.evaluates_web) {
+      options.web.render = StoredRenderOptions(io::ReadSet(options.web.set), WholeFrames());
+      options.web.make_renderer = [&context] { return MakeRenderer({}, context.console); };
+      options.web.make_timed_renderer = [&context] {
+        return MakeTimedRenderer({}, context.console);
+      };
+    }
     return RunWeb(options.web, context);
   }
   const auto format = std::find_if(Formats().begin(), Formats().end(), [&](const Format& known) {
@@ -209,8 +230,8 @@ void AddWebOptions(CLI::App& command, ExportOptions& options) {
   options.of_formats.push_back(
       {command
            .add_option("--max-mb", options.web.max_mb,
-                       "web: at most N MB (10^6 bytes); photos and depth are coded more coarsely "
-                       "until the page fits")
+                       "web: at most N MB (10^6 bytes); photos and depth are coded more coarsely, "
+                       "and what images need least is left out, until the page fits")
            ->check(CLI::PositiveNumber)
            ->type_name("N"),
        {"web"}});
@@ -220,6 +241,18 @@ void AddWebOptions(CLI::App& command, ExportOptions& options) {
                        "web: of the photos [85, or the JPEG that the set stores]")
            ->check(CLI::Range(1, 100))
            ->type_name("Q"),
+       {"web"}});
+  options.of_formats.push_back(
+      {command
+           .add_option("--depth-error", options.web.depth_error_px,
+                       "web: depth is rounded to within PX pixels of disparity [0.15]")
+           ->check(CLI::Range(0.001, 10.0))
+           ->type_name("PX"),
+       {"web"}});
+  options.of_formats.push_back(
+      {command.add_flag("!--no-evaluate", options.evaluates_web,
+                        "web: without figures of held-out photos, which take as long as dtr "
+                        "evaluate, and leave nothing out for --max-mb"),
        {"web"}});
 }
 
@@ -235,8 +268,8 @@ void AddExportCommand(CLI::App& app) {
         command.add_option("SET", options->request.set, "The set")->required();
         command
             .add_option("--format", options->format,
-                        "What to write, see docs/EXPORT.md; web is one HTML file that shows the "
-                        "scene in a browser [colmap]")
+                        "What to write, see docs/EXPORT.md; web is one HTML file, or a folder for "
+                        "a web server, that shows the scene in a browser [colmap]")
             ->check(CLI::IsMember(FormatNames()))
             ->type_name(fmt::format("{}", fmt::join(FormatNames(), "|")));
         options->of_formats.push_back(

@@ -15,6 +15,7 @@
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/base/random.h"
+#include "dtr/io/small_jpeg.h"
 #include "tests/support/photo_kinds.h"
 #include "tests/support/test_data.h"
 #include "tests/support/truncation.h"
@@ -342,6 +343,45 @@ TEST(ReadImageHeader, ReadsTheGpsPositionSouthAndWestNegative) {
   EXPECT_NEAR(gps->longitude_deg, -70.25, 1e-6);
   EXPECT_NEAR(gps->altitude_m.value_or(0), 512.5, 1e-3);
   EXPECT_NEAR(gps->horizontal_error_m.value_or(0), 4.5, 1e-3);
+}
+
+TEST(SmallJpeg, HasLessErrorInAsManyBytes) {
+  const TemporaryFolder folder;
+  Random random(7);
+  ImageRgb8 image(128, 96, 3);
+  for (int y = 0; y < 96; ++y) {
+    for (int x = 0; x < 128; ++x) {
+      const double texture = 4 * random.Uniform(-1, 1);
+      for (int c = 0; c < 3; ++c) {
+        image(x, y, c) = static_cast<std::uint8_t>(128 + 60 * std::sin(0.2 * x + c) + texture);
+      }
+    }
+  }
+  const auto squared_error = [&](const std::string& name) {
+    const ImageRgb8 read = ReadImage(folder / name);
+    double sum = 0;
+    for (size_t i = 0; i < read.data().size(); ++i) {
+      sum += std::pow(double(read.data()[i]) - image.data()[i], 2);
+    }
+    return sum;
+  };
+  const std::string small = SmallJpeg(image, 85);
+  WriteFileAtomically(folder / "small.jpg", small);
+  // The usual one of at least this size.
+  for (int quality = 50; quality <= 100; ++quality) {
+    WriteImage(folder / "usual.jpg", image, quality);
+    if (std::filesystem::file_size(folder / "usual.jpg") >= small.size()) break;
+  }
+  EXPECT_LT(squared_error("small.jpg"), squared_error("usual.jpg"));
+}
+
+TEST(SmallJpeg, SaysWhatJpegCannotHold) {
+  try {
+    SmallJpeg(ImageRgb8(65501, 1, 3), 85);
+    FAIL() << "a JPEG of more than 65500 pixels a side";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), ::testing::StartsWith("cannot code a JPEG: "));
+  }
 }
 
 TEST(ReadMask, HalfScaleAndMoreIsUsable) {

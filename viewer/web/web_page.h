@@ -1,4 +1,4 @@
-// viewer/web/web_page.h -- one HTML file of the viewer's sources and a set's data.
+// viewer/web/web_page.h -- a page, or a site, of the viewer's sources and a set's data.
 #pragma once
 #include <string>
 #include <string_view>
@@ -17,11 +17,18 @@ struct WebPage {
 /// The whole page: no other file and no server is needed to open it.
 std::string MakeWebPage(const WebPage& page);
 
-/// Bytes as UTF-8 text that HTML keeps as it is within a script element, 8 bytes for 7
-/// (docs/EXPORT.md, "Text").
+/// Bytes as text of UTF-8 for a script element, 8/7 of their size: seven bits a byte, and what
+/// HTML does not let through with the next seven bits in a character of two bytes (after base122
+/// by K. Albertson, 2016; docs/EXPORT.md, "Bytes as text").
 std::string TextOfBytes(std::string_view bytes);
 
-/// The page's modules as one, each after those that it imports.
-std::string JoinedScript();
+struct SiteFile {
+  std::string name;
+  std::string bytes;
+};
+
+/// The page as files for a web server: index.html, dtr-viewer.js (a module that other pages can
+/// use, too), set.json, and for each view the bytes in view-0.bin, view-1.bin, ...
+std::vector<SiteFile> MakeWebSite(const WebPage& page);
 
 }  // namespace dtr::web

@@ -7,6 +7,7 @@
 #include <map>
 
 #include "calib/sfm/matching/lens_vote.h"
+#include "calib/sfm/matching/pair_kind.h"
 #include "calib/sfm/matching/robust_fit.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/base/random.h"
@@ -18,7 +19,6 @@ constexpr size_t kVoters = 40;         // pairs
 constexpr size_t kCandidates = 80;     // pairs whose fundamental matrix is looked at
 constexpr size_t kVotingMatches = 80;  // of a pair
 constexpr size_t kFewestInliers = 30;  // of a pair that votes: more than chance gives
-constexpr double kPlanarShare = 0.8;   // one homography explains the pair, as in pair_kind.cpp
 constexpr double kSureDeviation = 0.1, kContradiction = 1.15, kClearlyLower = 0.9;
 constexpr double kContradictionSigmas = 3;
 

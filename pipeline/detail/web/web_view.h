@@ -10,10 +10,10 @@ namespace dtr::pipeline {
 /// How closely a page holds a set.
 struct WebCoding {
   int jpeg_quality = 85;
-  /// Largest error of depth by rounding, pixels of disparity; coarser codes of the set stay.
+  /// Largest error of depth by rounding, pixels of disparity.
   double depth_error_px = 0.15;
-  bool recodes_jpeg =
-      false;  ///< also photos that the set stores as JPEG; else those go in as they are
+  /// Also photos that the set stores as JPEG; else those go in as they are.
+  bool recodes_jpeg = false;
 };
 
 /// As docs/EXPORT.md describes it.

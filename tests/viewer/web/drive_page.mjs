@@ -1,9 +1,13 @@
-// node drive_page.mjs PAGE.html CHROMIUM [SCREENSHOTS]: uses a page as people do and prints what it found as JSON.
+// node drive_page.mjs PAGE.html CHROMIUM [SCREENSHOTS|CAMERA.json]: uses a page as people do and prints what it found as JSON. With a
+// camera {width, height, fx, fy, cx, cy, rotation, translation} it draws that alone and
+// writes its RGBA pixels to CAMERA.rgba.
 // playwright-core is looked for below DTR_PLAYWRIGHT, a folder with node_modules.
+import { readFileSync, writeFileSync } from "node:fs";
 import { createRequire } from "node:module";
 
 const { chromium } = createRequire(`${process.env.DTR_PLAYWRIGHT}/`)("playwright-core");
-const [page_file, program, screenshots] = process.argv.slice(2);
+const [page_file, program, third] = process.argv.slice(2);
+const novel = third?.endsWith(".json") ? JSON.parse(readFileSync(third, "utf8")) : null, screenshots = novel ? undefined : third;
 const kArguments = ["--no-sandbox", "--disable-dev-shm-usage", "--disable-background-networking", "--disable-component-update",
   "--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
 
@@ -26,7 +30,10 @@ if (await page.evaluate(() => globalThis.dtrPage !== undefined)) {
   await page.evaluate(() => globalThis.dtrPage.allLoaded);
   found.loaded = await page.evaluate(() => globalThis.dtrPage.renderer.store.loaded.size);
   found.problem = await problem();
-  if (found.loaded > 0) {
+  if (novel) {
+    const pixels = await page.evaluate((camera) => Array.from(globalThis.dtrPage.render(camera).pixels), novel);
+    writeFileSync(third.replace(/json$/, "rgba"), Buffer.from(pixels));
+  } else if (found.loaded > 0) {
     await page.evaluate(() => globalThis.dtrPage.firstPicture);
     await look("first");
     const box = { x: 160, y: 70 };

@@ -1,5 +1,5 @@
-// Bytes as the page holds them: text, a checksum, deflate. Nothing here trusts a length.
-import { Problem, fail } from "./problem.js";
+// Bytes as the page holds them: as text, with a checksum. Nothing here trusts a length.
+import { fail } from "./problem.js";
 
 const kCrcTable = Uint32Array.from({ length: 256 }, (_, n) => {
   let c = n;
@@ -14,57 +14,30 @@ export function crc32(bytes) {
   return (c ^ 0xffffffff) >>> 0;
 }
 
-// Values of 7 bits that HTML does not leave as they are; with the value after it each is one character from here on.
-const kReplaced = [0, 13, 60], kPairs = 0x100;
+// Of character codes 128 on: the bits of 128 to 255 stand for the first of what HTML lets not through, and so on.
+const kForbidden = [0, 10, 13, 60];
 
-/** `size` bytes out of text that holds 7 bits a character (docs/EXPORT.md, "Text"); a Problem where it holds others. */
+/** The `size` bytes of a text: seven bits a character, fourteen in those beyond ASCII. A Problem where it is none. */
 export function bytesOfText(text, size, where) {
-  if (8 * text.length < 4 * size) fail(where, `${size} bytes`, String(Math.floor(text.length * 7 / 8)));
   const bytes = new Uint8Array(size);
-  let filled = 0, bits = 0, count = 0;
-  const put = (value) => {
-    bits = bits << 7 | value;
+  let held = 0, count = 0, filled = 0;
+  const put = (seven) => {
+    held = (held << 7 | seven) & 0x7fff;
     count += 7;
     if (count < 8) return;
     count -= 8;
-    if (filled < size) bytes[filled] = bits >> count;
+    if (filled < size) bytes[filled] = held >> count & 255;
     ++filled;
-    bits &= (1 << count) - 1;
   };
   for (let i = 0; i < text.length; ++i) {
-    const c = text.charCodeAt(i), pair = c - kPairs;
-    if (c < 128) {
-      put(c);
-    } else if (pair >= 0 && pair < 128 * kReplaced.length) {
-      put(kReplaced[pair >> 7]);
-      put(pair & 127);
-    } else {
-      fail(where, "bytes of its checksum", "others");
+    const code = text.charCodeAt(i);
+    if (code >= 128) {
+      const forbidden = kForbidden[(code >> 7) - 1];
+      if (forbidden === undefined) return fail(where, "bytes as text", "another character");
+      put(forbidden);
     }
+    put(code & 127);
   }
-  // A character of two values may add one at the end.
+  // What remains are at most thirteen zeros that fill up the last character.
   return filled === size || filled === size + 1 ? bytes : fail(where, `${size} bytes`, String(filled));
-}
-
-/** Exactly `size` bytes out of a zlib stream (RFC 1950). No more than that is ever kept. */
-export async function inflate(bytes, size, where) {
-  const out = new Uint8Array(size);
-  let filled = 0;
-  try {
-    const reader = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate")).getReader();
-    for (;;) {
-      const { done, value } = await reader.read();
-      if (done) break;
-      if (filled + value.length > size) {
-        reader.cancel().catch(() => {});
-        return fail(where, `${size} bytes`, "more");
-      }
-      out.set(value, filled);
-      filled += value.length;
-    }
-  } catch (error) {
-    if (error instanceof Problem) throw error;
-    return fail(where, "a whole deflate stream", "a damaged one");
-  }
-  return filled === size ? out : fail(where, `${size} bytes`, String(filled));
 }

@@ -1,22 +1,23 @@
-// A view out of the page's text: what renderers need of it. Runs in workers, and without a document.
+// A view out of its bytes: what renderers need of it. Runs in workers, and without a document.
 import { fail } from "./problem.js";
-import { bytesOfText, crc32, inflate } from "./bytes.js";
-import { decodeCodes, inverseDepthTable } from "./depth_codes.js";
+import { bytesOfText, crc32 } from "./bytes.js";
+import { decodePlaces, decodeValues, inverseDepthTable } from "./depth_codes.js";
 import { Samples, blockFlags } from "./breaks.js";
-import { makeMesh, parseCover } from "./mesh.js";
+import { coverBlocks } from "./cover.js";
+import { makeMesh } from "./mesh.js";
 import { rimWidth } from "./selection.js";
 
-// Bits, rows padded to bytes, 1: usable. Of each pixel the chessboard distance to the nearest masked one, 0 at one.
-function maskDistances(bits, view, where) {
-  const { width, height } = view, rowBytes = (width + 7) >> 3;
-  if (bits.length !== rowBytes * height) fail(where, `${rowBytes * height} bytes`, String(bits.length));
+const kMeshTolerancePx = 0.7;  // SPEC 5.1
+
+// Of each pixel the chessboard distance to the nearest masked one, 0 at one.
+function maskDistances(usable, view) {
+  const { width, height } = view;
   const most = Math.min(rimWidth(view) + 1, 255);
   const distance = new Uint8Array(width * height);
   const at = (x, y) => (x >= 0 && y >= 0 && x < width && y < height ? distance[y * width + x] : most);
   for (let y = 0; y < height; ++y) {
     for (let x = 0; x < width; ++x) {
-      const usable = bits[y * rowBytes + (x >> 3)] >> (x & 7) & 1;
-      distance[y * width + x] = usable ? Math.min(at(x - 1, y), at(x - 1, y - 1), at(x, y - 1), at(x + 1, y - 1), most - 1) + 1 : 0;
+      distance[y * width + x] = usable[y * width + x] ? Math.min(at(x - 1, y), at(x - 1, y - 1), at(x, y - 1), at(x + 1, y - 1), most - 1) + 1 : 0;
     }
   }
   for (let y = height - 1; y >= 0; --y) {
@@ -43,36 +44,48 @@ function maskedSamples(distance, view) {
   return masked;
 }
 
-/** The view of a header with its pixels: photo (ImageBitmap), codes, flags of blocks, mesh, mask distances (null: no mask). */
-export async function decodeView(view, text) {
+// Measured and completed codes in one map.
+function joined(measured, completed, measuredCodes) {
+  for (let k = 0; k < measured.length; ++k) if (completed[k] !== 0) measured[k] = completed[k] + measuredCodes;
+  return measured;
+}
+
+/** The view of a header with its pixels, of {text} (bytes as text) or {bytes}: photo (ImageBitmap), codes, flags of blocks, mesh, mask distances (null: no mask). */
+export async function decodeView(view, data) {
   const where = `photo ${view.name}`;
-  const bytes = bytesOfText(text, view.bytes, where);
+  const bytes = data.bytes ?? bytesOfText(data.text, view.bytes, where);
+  if (bytes.length !== view.bytes) fail(where, `${view.bytes} bytes`, String(bytes.length));
   if (crc32(bytes) !== view.crc) fail(where, "bytes of its checksum", "others");
   const part = (name) => bytes.subarray(view.parts[name].first, view.parts[name].end);
-  const inflated = (name) => (view.parts[name].size > 0 ? inflate(part(name), view.parts[name].size, `${where}: ${name}`) : null);
-  const [mask, cover] = await Promise.all(["mask", "mesh"].map(inflated));
   const photo = await createImageBitmap(new Blob([part("image")], { type: "image/jpeg" }),
     { colorSpaceConversion: "none", premultiplyAlpha: "none" }).catch(() => fail(`${where}: image`, "a JPEG", "something else"));
   if (photo.width !== view.width || photo.height !== view.height) {
     fail(`${where}: image`, `${view.width}x${view.height} pixels`, `${photo.width}x${photo.height}`);
   }
   const { columns, rows } = view;
-  const codes = decodeCodes(part("depth"), view, `${where}: depth`);
-  const distance = mask && maskDistances(mask, view, `${where}: mask`);
+  const placesOf = (name, known) => decodePlaces(part(name), columns, rows, known, `${where}: ${name}`);
+  const codesOf = (places, code, name) => decodeValues(part(name), places, columns, rows, code.steps + 1, `${where}: ${name}`);
+  const measured = codesOf(placesOf("depth_places", null), view.measured, "depth");
+  const codes = view.completed
+    ? joined(measured, codesOf(placesOf("completed_places", measured), view.completed, "completed"), view.measured.steps + 1)
+    : measured;
+  const distance = view.parts.mask.size > 0
+    ? maskDistances(decodePlaces(part("mask"), view.width, view.height, null, `${where}: mask`), view) : null;
   const masked = distance && maskedSamples(distance, view);
   if (masked) for (let k = 0; k < codes.length; ++k) if (masked[k]) codes[k] = 0;
   const table = inverseDepthTable(view);
-  const w = Float64Array.from(codes, (code) => table[code]);
-  const samples = new Samples(w, columns, rows, 1 / (view.fx * view.baseline));
-  const mesh = makeMesh(samples, cover ? parseCover(cover, columns, rows, `${where}: mesh`) : [], `${where}: mesh`);
+  const w = new Float64Array(codes.length);
+  for (let k = 0; k < w.length; ++k) w[k] = table[codes[k]];
+  const pixel = 1 / (view.fx * view.baseline), samples = new Samples(w, columns, rows, pixel);
+  const mesh = makeMesh(samples, coverBlocks(samples, kMeshTolerancePx * pixel));
   return { photo, codes, blocks: blockFlags(samples, masked), mesh, distance };
 }
 
-/** In a worker: takes {view, text}, answers {pixels} or {problem}. */
+/** In a worker: takes {view, bytes}, answers {pixels} or {problem}. */
 export function serveDecoding(scope) {
   scope.onmessage = async ({ data }) => {
     try {
-      const pixels = await decodeView(data.view, data.text);
+      const pixels = await decodeView(data.view, data.bytes);
       const { photo, codes, blocks, mesh, distance } = pixels;
       scope.postMessage({ index: data.view.index, pixels }, [photo, codes.buffer, blocks.buffer, mesh.vertices.buffer,
         mesh.indices.buffer, mesh.cells.buffer, ...(distance ? [distance.buffer] : [])]);

@@ -1,91 +1,95 @@
-// Codes of inverse depth without loss: pipeline/detail/web/depth_coder.cpp writes them (docs/EXPORT.md, "Depth").
+// Coded maps (docs/EXPORT.md): where there are values, and residuals of their prediction.
+import { BitDecoder, BitModels } from "./bit_decoder.js";
 import { fail } from "./problem.js";
-import { RangeDecoder, bitModels } from "./range_decoder.js";
 
-// The same numbers stand in pipeline/detail/web/depth_coder.cpp.
-const kClassNeighbours = 729;
-const kActivities = 16, kSides = 3;
-const kMaxError = 64;
-const kUnary = 14;
-const kZero = 0, kNegative = 1, kMore = 2, kLength = kMore + kUnary, kModels = 36;
-const kMaxLength = 16;
-const kRough = [12, 16, 23, 32, 45, 64, 91];
+const kActivities = 14, kPlainActivities = 6, kSlopes = 4, kUnarySteps = 18, kGammaBits = 17;
 
-function activityLevel(activity) {
-  if (activity < 8) return activity;
-  let level = 8;
-  while (level < 15 && activity >= kRough[level - 8]) ++level;
-  return level;
-}
-
-// Per pixel: 0 no depth, 1 measured, 2 completed.
-function decodeClasses(decoder, columns, rows) {
-  const models = bitModels(2 * kClassNeighbours);
-  const classes = new Uint8Array(columns * rows);
-  const at = (x, y) => (x >= 0 && y >= 0 && x < columns ? classes[y * columns + x] : 0);
+/** 1 for each element that there is, of columns x rows; none is stored where `known` is not 0. */
+export function decodePlaces(bytes, columns, rows, known, where) {
+  const decoder = new BitDecoder(bytes), models = new BitModels(1 << 12);
+  // With a border of two elements, so that no neighbour is off the map.
+  const stride = columns + 4;
+  const here = new Uint8Array(stride * (rows + 3)), other = new Uint8Array(here.length);
+  for (let y = 0; known && y < rows; ++y) {
+    for (let x = 0; x < columns; ++x) other[(y + 2) * stride + x + 2] = known[y * columns + x] ? 1 : 0;
+  }
+  const places = new Uint8Array(columns * rows);
   for (let y = 0, k = 0; y < rows; ++y) {
-    for (let x = 0; x < columns; ++x, ++k) {
-      const context = ((((at(x - 1, y) * 3 + at(x, y - 1)) * 3 + at(x - 1, y - 1)) * 3 + at(x + 1, y - 1)) * 3 + at(x - 2, y)) * 3 + at(x, y - 2);
-      if (decoder.bit(models, 2 * context)) classes[k] = 1;
-      else if (decoder.bit(models, 2 * context + 1)) classes[k] = 2;
+    for (let x = 0, i = (y + 2) * stride + 2; x < columns; ++x, ++i, ++k) {
+      if (other[i]) continue;
+      const above = i - stride;
+      const context = here[i - 1] | here[above] << 1 | here[above - 1] << 2 | here[above + 1] << 3 | here[i - 2] << 4 |
+        here[above - stride] << 5 | here[above + 2] << 6 | here[above - 2] << 7 | other[i + 1] << 8 | other[i + stride] << 9 |
+        other[i - 1] << 10 | other[above] << 11;
+      here[i] = places[k] = decoder.get(models, context);
     }
   }
-  return classes;
+  return decoder.ended ? places : fail(where, "the bits of this map", "others");
 }
 
-function decodeResidual(decoder, models, first) {
-  if (!decoder.bit(models, first + kZero)) return 0;
-  const negative = decoder.bit(models, first + kNegative);
-  let magnitude = 1;
-  while (magnitude <= kUnary && decoder.bit(models, first + kMore + magnitude - 1)) ++magnitude;
-  if (magnitude > kUnary) {
-    let length = 0;
-    while (decoder.bit(models, first + kLength + length)) {
-      if (++length > kMaxLength) return fail(decoder.where, `residuals of ${kMaxLength} bits`, "more");
-    }
-    magnitude = kUnary + (1 << length | decoder.plain(length));
+function magnitudeBits(v) {
+  return 32 - Math.clz32(v);
+}
+
+class ResidualDecoder {
+  constructor(bytes) {
+    this.decoder = new BitDecoder(bytes);
+    this.zero = new BitModels(kActivities * kSlopes);
+    this.sign = new BitModels(kActivities);
+    this.unary = new BitModels(kActivities * kUnarySteps);
+    this.length = new BitModels(kGammaBits + 1);
+    this.digit = new BitModels(kGammaBits);
   }
-  return negative ? -magnitude : magnitude;
-}
 
-// Adds `offset` + the codes 1 to `largest` of the pixels of one class.
-function decodeSurface(decoder, classes, wanted, columns, rows, largest, offset, codes) {
-  const models = bitModels(kActivities * kSides * kModels);
-  const row = new Int32Array(columns), errors = new Int32Array(columns + 1);
-  for (let y = 0, k = 0; y < rows; ++y) {
-    let left = row[0], aboveLeft = left, leftError = 0;
-    for (let x = 0; x < columns; ++x, ++k) {
-      const above = y === 0 ? left : row[x];
-      if (y === 0) aboveLeft = left;
-      const predicted = Math.max(Math.min(left, above), Math.min(Math.max(left, above), left + above - aboveLeft));
-      let value = predicted;
-      if (classes[k] === wanted) {
-        const aboveRight = y > 0 && x + 1 < columns ? row[x + 1] : above;
-        const activity = Math.abs(left - aboveLeft) + Math.abs(above - aboveLeft) + Math.abs(aboveRight - above) +
-          leftError + errors[x] + errors[x + 1];
-        const side = left < above ? 0 : left === above ? 1 : 2;
-        value += decodeResidual(decoder, models, (activityLevel(activity) * kSides + side) * kModels);
-        if (value < 1 || value > largest) fail(decoder.where, `codes from 1 to ${largest}`, "others");
-        codes[k] = offset + value;
-      }
-      aboveLeft = above;
-      row[x] = left = value;
-      errors[x] = leftError = Math.min(Math.abs(value - predicted), kMaxError);
+  get(activity, slope) {
+    const { decoder } = this;
+    if (!decoder.get(this.zero, activity * kSlopes + slope)) return 0;
+    const negative = decoder.get(this.sign, activity);
+    let more = 0;
+    while (more < kUnarySteps && decoder.get(this.unary, activity * kUnarySteps + more)) ++more;
+    if (more === kUnarySteps) {
+      let bits = 1, rest = 1;
+      while (bits < kGammaBits && decoder.get(this.length, bits)) ++bits;
+      for (let i = bits - 2; i >= 0; --i) rest = 2 * rest + decoder.get(this.digit, i);
+      more += rest - 1;
     }
+    return negative ? -1 - more : 1 + more;
   }
 }
 
-/** The codes of a view's samples out of its bytes: 1 to steps + 1 measured, what follows completed, 0 none. */
-export function decodeCodes(bytes, view, where) {
-  const { columns, rows, measured, completed } = view;
-  const decoder = new RangeDecoder(bytes, where);
-  const classes = decodeClasses(decoder, columns, rows);
-  if (!completed && classes.includes(2)) fail(where, "measured depth alone", "completed depth");
+/** Codes from 1 to `largest` where there are places, else 0. */
+export function decodeValues(bytes, places, columns, rows, largest, where) {
+  const residual = new ResidualDecoder(bytes);
   const codes = new Uint16Array(columns * rows);
-  decodeSurface(decoder, classes, 1, columns, rows, measured.steps + 1, 0, codes);
-  if (completed) decodeSurface(decoder, classes, 2, columns, rows, completed.steps + 1, measured.steps + 1, codes);
-  decoder.finish();
-  return codes;
+  let values = new Int32Array(columns + 2), aboveValues = new Int32Array(columns + 2);
+  let residuals = new Int32Array(columns + 2), aboveResiduals = new Int32Array(columns + 2);
+  for (let y = 0, k = 0; y < rows; ++y) {
+    for (let x = 0; x < columns; ++x, ++k) {
+      const i = x + 1;
+      const above = y === 0 ? (x === 0 ? 0 : values[i - 1]) : aboveValues[i];
+      const left = x === 0 ? above : values[i - 1];
+      const aboveLeft = y === 0 || x === 0 ? above : aboveValues[i - 1];
+      const low = Math.min(left, above), high = Math.max(left, above);
+      const predicted = Math.max(low, Math.min(high, left + above - aboveLeft));
+      const west = x === 0 ? 0 : Math.abs(residuals[i - 1]), north = Math.abs(aboveResiduals[i]);
+      if (!places[k]) {
+        values[i] = predicted;
+        residuals[i] = west + north >> 2;
+        continue;
+      }
+      const sum = 2 * (west + north) + Math.abs(aboveResiduals[i + 1]) + Math.abs(aboveResiduals[i - 1]);
+      const activity = sum < kPlainActivities ? sum : Math.min(kActivities - 1, 3 + magnitudeBits(sum));
+      const step = Math.max(Math.abs(left - aboveLeft), Math.abs(above - aboveLeft));
+      const found = residual.get(activity, step === 0 ? 0 : step < 3 ? 1 : step < 12 ? 2 : 3);
+      const value = predicted + found;
+      if (value < 1 || value > largest) return fail(where, `codes from 1 to ${largest}`, String(value));
+      codes[k] = values[i] = value;
+      residuals[i] = found;
+    }
+    [values, aboveValues] = [aboveValues, values];
+    [residuals, aboveResiduals] = [aboveResiduals, residuals];
+  }
+  return residual.decoder.ended ? codes : fail(where, "the values of this map", "others");
 }
 
 /** How the codes of both maps stand for 1/z: see inverseDepthTable. */

@@ -72,6 +72,23 @@ export class Program {
   }
 }
 
+const kUnits = 4;  // of textures that shaders use together
+
+/** The state that the renderer expects, whatever another program left. */
+export function takeState(gl) {
+  for (const what of [gl.BLEND, gl.SCISSOR_TEST, gl.STENCIL_TEST, gl.DEPTH_TEST, gl.CULL_FACE, gl.POLYGON_OFFSET_FILL, gl.DITHER,
+    gl.RASTERIZER_DISCARD, gl.SAMPLE_ALPHA_TO_COVERAGE, gl.SAMPLE_COVERAGE]) gl.disable(what);
+  gl.colorMask(true, true, true, true);
+  gl.depthRange(0, 1);
+  gl.bindVertexArray(null);
+  gl.bindBuffer(gl.PIXEL_UNPACK_BUFFER, null);
+  gl.bindBuffer(gl.PIXEL_PACK_BUFFER, null);
+  for (let i = 0; i < kUnits; ++i) gl.bindSampler(i, null);
+  for (const name of [gl.UNPACK_FLIP_Y_WEBGL, gl.UNPACK_PREMULTIPLY_ALPHA_WEBGL]) gl.pixelStorei(name, false);
+  for (const name of [gl.UNPACK_ROW_LENGTH, gl.UNPACK_SKIP_ROWS, gl.UNPACK_SKIP_PIXELS, gl.UNPACK_SKIP_IMAGES, gl.UNPACK_IMAGE_HEIGHT,
+    gl.PACK_ROW_LENGTH, gl.PACK_SKIP_ROWS, gl.PACK_SKIP_PIXELS]) gl.pixelStorei(name, 0);
+}
+
 /** A texture for texelFetch: nearest, clamped, without levels. */
 export function makeTexture(gl, target, format, width, height, layers = 0) {
   const texture = gl.createTexture();

@@ -1,6 +1,7 @@
 // The page's description of the set, checked before anything is allocated for it.
 import { fail } from "./problem.js";
 
+const kVersion = 2;
 const kMaxViews = 4096;
 const kMaxSidePx = 16384;
 const kMaxPixels = 1 << 26;
@@ -34,15 +35,15 @@ function codeOf(value, where) {
   return { near, far, steps: whole(value.steps, `${where}.steps`, 1, kMaxCode - 1) };
 }
 
+const kParts = ["image", "depth_places", "depth", "completed_places", "completed", "mask"];
+
 function partsOf(value, bytes, where) {
   const parts = {};
   let end = 0;
-  for (const name of ["image", "depth", "mask", "mesh"]) {
-    const sizes = numbers(value?.[name] ?? [0, 0], 2, `${where}.${name}`, 0, 4 * kMaxPixels);
-    const stored = whole(sizes[0], `${where}.${name}[0]`, 0, bytes);
-    const size = whole(sizes[1], `${where}.${name}[1]`, 0, 5 * kMaxPixels);
-    parts[name] = { first: end, end: end + stored, size };
-    end += stored;
+  for (const name of kParts) {
+    const size = whole(value?.[name] ?? 0, `${where}.${name}`, 0, bytes);
+    parts[name] = { first: end, end: end + size, size };
+    end += size;
   }
   return end === bytes ? parts : fail(where, `parts of ${bytes} bytes together`, String(end));
 }
@@ -85,7 +86,7 @@ export function parseHeader(text) {
   } catch {
     return fail("set", "a JSON object", "something else");
   }
-  if (json?.format !== "dtr-web-page" || json.version !== 2) fail("set", "a dtr-web-page of version 2", "another format");
+  if (json?.format !== "dtr-web-page" || json.version !== kVersion) fail("set", `a dtr-web-page of version ${kVersion}`, "another format");
   if (!Array.isArray(json.views) || json.views.length < 1 || json.views.length > kMaxViews) {
     fail("set.views", `1 to ${kMaxViews} views`, String(json.views?.length));
   }

@@ -1,26 +1,15 @@
-// Starts the page, or, in a worker, the decoder of its views.
-import { parseHeader } from "./header.js";
-import { Page, showProblem } from "./page.js";
+// Starts the page of one file, or, in a worker, the decoder of its views.
+import { startPage } from "./start.js";
+import { embeddedSource } from "./source.js";
 import { serveDecoding } from "./decode.js";
 
 function start() {
   const text = (id) => document.getElementById(id)?.textContent ?? "";
-  document.getElementById("problem").hidden = true;
-  try {
-    const set = parseHeader(text("set"));
-    document.getElementById("name").textContent = set.name;
-    const validation = document.getElementById("validation");
-    validation.textContent = `calibration: ${set.validation}`;
-    validation.classList.toggle("failed", set.failed);
-    document.getElementById("figures").replaceChildren(...set.figures.map(([name, value]) => {
-      const row = document.createElement("tr");
-      row.append(...[name, value].map((words) => Object.assign(document.createElement("td"), { textContent: words })));
-      return row;
-    }));
-    globalThis.dtrPage = new Page(set, JSON.parse(text("shaders")), text("script"));
-  } catch (error) {
-    showProblem(String(error.message ?? error));
-  }
+  const script = text("script");
+  startPage(text("set"), JSON.parse(text("shaders")), {
+    dataOf: embeddedSource.dataOf,
+    makeWorker: () => new Worker(URL.createObjectURL(new Blob([script], { type: "text/javascript" }))),
+  });
 }
 
 if (typeof document === "undefined") serveDecoding(globalThis);

@@ -1,34 +1,9 @@
-// SPEC 5.1: a view's reduced mesh from the rectangles that the page holds of it.
-import { fail } from "./problem.js";
+// SPEC 5.1: a view's reduced mesh from the rectangles of its cover.
 
-const kRootSide = 16;
 // Of a sample: a corner of a rectangle; which quarters of its cell are closed; inside a rectangle.
 const kVertex = 1, kClosedAbove = 2 | 4, kClosedBelow = 8 | 16, kClosedLeft = 2 | 8, kClosedRight = 4 | 16, kInner = 32;
 const kQuarterOfCorner = [16, 8, 4, 2];
 const kFloatsPerVertex = 3, kFloatsPerCell = 5;
-
-/** Rectangles {x, y, width, height} of docs/FORMAT.md section 7: per root square u16 n and n times u16. */
-export function parseCover(bytes, columns, rows, where) {
-  const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.length);
-  const across = Math.ceil(columns / kRootSide), down = Math.ceil(rows / kRootSide);
-  const rectangles = [];
-  let at = 0;
-  const next = () => {
-    if (at + 2 > bytes.length) fail(where, "rectangles", "the end");
-    at += 2;
-    return view.getUint16(at - 2, true);
-  };
-  for (let root = 0; root < across * down; ++root) {
-    const rootX = root % across * kRootSide, rootY = Math.floor(root / across) * kRootSide;
-    for (let n = next(); n > 0; --n) {
-      const code = next();
-      const r = { x: rootX + (code & 15), y: rootY + (code >> 4 & 15), width: (code >> 8 & 15) + 1, height: (code >> 12) + 1 };
-      if (r.x + r.width >= columns || r.y + r.height >= rows) fail(where, "rectangles on the map", "one beyond it");
-      rectangles.push(r);
-    }
-  }
-  return at === bytes.length ? rectangles : fail(where, `${at} bytes`, String(bytes.length));
-}
 
 // A growing list of floats or whole numbers.
 class List {
@@ -50,10 +25,9 @@ class List {
 }
 
 class MeshMaker {
-  constructor(samples, where) {
+  constructor(samples) {
     const count = samples.columns * samples.rows;
     this.samples = samples;
-    this.where = where;
     this.state = new Uint8Array(count);
     this.number = new Uint32Array(count);
     this.vertices = new List(Float32Array);
@@ -62,9 +36,7 @@ class MeshMaker {
   }
 
   setState(x, y, state) {
-    const at = y * this.samples.columns + x;
-    if (!(this.samples.w[at] > 0)) fail(this.where, "rectangles of this depth map", "one with a hole");
-    this.state[at] |= state;
+    this.state[y * this.samples.columns + x] |= state;
   }
 
   mark(r) {
@@ -131,7 +103,7 @@ class MeshMaker {
         const diagonal = (next[0] - p[0]) ** 2 + (next[1] - p[1]) ** 2;
         if (diagonal < shortest) [ear, shortest, earArea] = [i, diagonal, area];
       }
-      if (ear < 0) fail(this.where, "rectangles that do not overlap", "others");
+      if (ear < 0) return;  // not with rectangles that do not overlap
       left -= earArea;
       this.addTriangle(points[(ear + n - 1) % n], points[ear], points[(ear + 1) % n]);
       points.splice(ear, 1);
@@ -175,8 +147,8 @@ class MeshMaker {
  * Vertices (x, y in half samples from the edge of the first cell, 1/z), triangles as indices, and the cells of samples that no
  * rectangle holds (x, y, 1/z, slopes of 1/z per sample).
  */
-export function makeMesh(samples, rectangles, where) {
-  const maker = new MeshMaker(samples, where);
+export function makeMesh(samples, rectangles) {
+  const maker = new MeshMaker(samples);
   for (const r of rectangles) maker.mark(r);
   for (const r of rectangles) maker.addRectangle(r);
   maker.addCells();

@@ -23,7 +23,8 @@ export function showProblem(text) {
 }
 
 export class Page {
-  constructor(set, shaders, script) {
+  /** `dataOf(view)`: promise of its bytes (loader.js); `makeWorker()`: a worker that decodes. */
+  constructor(set, shaders, { dataOf, makeWorker }) {
     this.set = { ...set, views: set.views.map(placed) };
     this.canvas = element("canvas");
     const gl = this.canvas.getContext("webgl2", { alpha: false, antialias: false, depth: false, powerPreference: "high-performance" });
@@ -38,7 +39,7 @@ export class Page {
     this.dirty = true;
     this.last = 0;
     this.loader = new Loader({
-      store: this.renderer.store, script, order: () => this.order(), textOf: (view) => this.textOf(view),
+      store: this.renderer.store, makeWorker, order: () => this.order(), dataOf,
       loaded: () => this.arrived(), failed: (view, problem) => this.missing(problem),
     });
     this.firstPicture = new Promise((resolve) => { this.pictured = resolve; });
@@ -55,10 +56,6 @@ export class Page {
 
   order() {
     return ranked(this.set, this.set.views, this.camera()).candidates.map((c) => c.view);
-  }
-
-  textOf(view) {
-    return element(`view-${view.index}`)?.textContent ?? "";
   }
 
   arrived() {

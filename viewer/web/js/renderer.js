@@ -46,6 +46,7 @@ export class Renderer {
     this.fill = screen("fill.frag");
     this.smooth = screen("smooth.frag", { MAX_VIEWS: kCandidates });
     this.show = screen("show.frag");
+    this.composer = null;
     this.blocks = gl.createBuffer();
     this.targets = null;
     this.leastInverseDepth = set.bounds ? 1 / Math.max(norm(sub(set.bounds.max, set.bounds.min)), 1e-30) : 0;
@@ -225,6 +226,22 @@ export class Renderer {
     if (shown) block.set(blockOf(shown, placementOf(shown, novel), 1, { gain: 1, offset: 0 }, store.layerOf(shown), false));
     this.setBlock(program, "Photo", block);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
+  }
+
+  /** The drawn image with its depth into another framebuffer (SetScene.compose). */
+  compose({ novel }, framebuffer, [x, y, width, height], depthOf, linear) {
+    const { gl } = this;
+    this.composer ??= new Program(gl, this.shaders, "full_screen.vert", "compose.frag");
+    gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
+    gl.viewport(x, y, width, height);
+    gl.enable(gl.DEPTH_TEST);
+    gl.depthFunc(gl.LEQUAL);
+    gl.depthMask(true);
+    this.composer.use().bind("image", 0, gl.TEXTURE_2D, this.image.textures[0])
+      .bind("depth", 1, gl.TEXTURE_2D, this.targets.result.textures[1]).set("viewport", x, y, width, height)
+      .set("image_from_viewport", novel.width / width, novel.height / height).set("depth_of", ...depthOf).setInt("linear", linear ? 1 : 0);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    gl.disable(gl.DEPTH_TEST);
   }
 
   /** Plane z of the surface at a pixel of the last image; null where none was seen. */
