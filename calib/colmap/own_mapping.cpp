@@ -30,10 +30,16 @@ constexpr double kClearlyWorse = 1.2;
 // Observations by which two models are compared; fewer tell nothing.
 constexpr int kMinHeldOut = 50;
 
-// What the photos leave undetermined of a model, as a clause; empty: nothing. The adjustment that
-// tells is expensive, and made only where the geometry of cameras and points, or pairs that one
-// homography explains, give cause: of a wall, a map that is far from it may look sound.
-std::string WhyUndetermined(Workspace& workspace, const calib::SfmModel& model,
+// What the photos leave undetermined of a model, as a clause; empty: nothing.
+struct Undetermined {
+  std::string clause;
+  bool by_path = false;  // of the camera alone, which is that of any model of the matches
+};
+
+// The adjustment that tells is expensive, and made only where the geometry of cameras and points,
+// or pairs that one homography explains, give cause: of a wall, a map that is far from it may look
+// sound.
+Undetermined UndeterminedOf(Workspace& workspace, const calib::SfmModel& model,
                             const SfmOptions& options) {
   calib::Adjusted as_given;
   as_given.bundle = calib::BundleOf(model);
@@ -42,12 +48,18 @@ std::string WhyUndetermined(Workspace& workspace, const calib::SfmModel& model,
   const bool suspicious = std::any_of(found.begin(), found.end(), [](const auto& degeneracy) {
     return degeneracy.name != "duplicate_images" && degeneracy.name != "too_few_views";
   });
-  if (!suspicious && LackOfParallax(CountPairs(workspace)).empty()) return "";
+  if (!suspicious && LackOfParallax(CountPairs(workspace)).empty()) return {};
   calib::RefineOptions refine;
   refine.threads = options.threads;
   refine.seed = options.seed;
   refine.progress = &workspace.progress();
-  return calib::WhyUndetermined(model, refine);
+  const auto has = [&](const char* name) {
+    return std::any_of(found.begin(), found.end(),
+                       [&](const auto& degeneracy) { return degeneracy.name == name; });
+  };
+  // Of points that are all seen under small angles, the path is not known either.
+  const bool by_path = (has("collinear_centres") || has("forward_motion")) && !has("small_angles");
+  return {calib::WhyUndetermined(model, refine), by_path};
 }
 
 // Drops COLMAP's models unless the matches agree with the largest. Returns why not.
@@ -63,18 +75,22 @@ std::string DropContradicted(Workspace& workspace, std::vector<calib::SfmModel>&
 // A model of the global mapper, and what the photos leave undetermined of it where it passes.
 struct Own {
   GloballyMapped mapped;
-  std::string undetermined;
+  Undetermined undetermined;
 
   bool Passes() const { return mapped.why_not.empty() && !mapped.model.images.empty(); }
   // A model that validation rejects is no result, however well it fits the matches.
-  bool IsResult() const { return Passes() && undetermined.empty(); }
+  bool IsResult() const { return Passes() && undetermined.clause.empty(); }
+  // What the path of the camera leaves open no other mapper finds.
+  bool IsAllThereIs() const { return IsResult() || (Passes() && undetermined.by_path); }
 };
 
 bool TakeColmaps(Workspace& workspace, const Own& own, const calib::SfmModel& colmaps,
                  const SfmOptions& options) {
   const GloballyMapped& ours = own.mapped;
   if (!own.Passes()) return true;
-  if (!own.undetermined.empty()) return WhyUndetermined(workspace, colmaps, options).empty();
+  if (!own.undetermined.clause.empty()) {
+    return UndeterminedOf(workspace, colmaps, options).clause.empty();
+  }
   if (colmaps.images.size() <= ours.model.images.size()) return false;
   int own_count = 0, colmap_count = 0;
   const double own_px = calib::HeldOutErrorPx(ours.model, options.seed, &own_count);
@@ -88,7 +104,7 @@ std::string WhyAsked(const Workspace& workspace, const Own& own) {
     const std::string lack = LackOfParallax(CountPairs(workspace));
     return lack.empty() ? ours.why_not : ours.why_not + "; " + lack;
   }
-  if (!own.undetermined.empty()) return own.undetermined;
+  if (!own.undetermined.clause.empty()) return own.undetermined.clause;
   return fmt::format("{} of {} photos have no camera",
                      workspace.images().size() - ours.model.images.size(),
                      workspace.images().size());
@@ -129,39 +145,36 @@ std::vector<calib::SfmModel> AskColmap(
   }
 }
 
-Own MapOwn(Workspace& workspace, const SfmOptions& options,
-           const std::optional<GroupLenses>& fixed = {}) {
-  Own own{MapHere(workspace, options, fixed), ""};
-  if (own.Passes()) own.undetermined = WhyUndetermined(workspace, own.mapped.model, options);
+Own MapOwn(Workspace& workspace, const SfmOptions& options, bool focals_hold) {
+  Own own{MapHere(workspace, options, {}, focals_hold), {}};
+  if (own.Passes()) own.undetermined = UndeterminedOf(workspace, own.mapped.model, options);
   return own;
 }
 
-// The lenses by which photos were matched, where EXIF knows every focal length and no vote of the
-// matches changed one.
-std::optional<GroupLenses> LensesWithExif(const Workspace& workspace,
-                                          const std::vector<CameraGroup>& groups) {
+// Whether EXIF knows every focal length and no vote of the matches changed one.
+bool AllFocalsAreExifs(const Workspace& workspace, const std::vector<CameraGroup>& groups) {
   const GroupLenses exif = LensesOf(workspace, groups);
   const sfm::ViewGraph graph = ReadViewGraph(workspace.database());
-  if (graph.cameras.size() != exif.lenses.size()) return std::nullopt;
+  if (graph.cameras.size() != exif.lenses.size()) return false;
   for (size_t i = 0; i < exif.lenses.size(); ++i) {
-    const bool holds =
+    const bool is_exifs =
         exif.focal_is_known[i] && graph.cameras[i].params[0] == exif.lenses[i].params[0];
-    if (!holds) return std::nullopt;
+    if (!is_exifs) return false;
   }
-  return GroupLenses{graph.cameras, exif.focal_is_known};
+  return true;
 }
 
 // Where matches alone do not lead to a model (of a wall any focal length fits two photos, of a
 // straight walk any fits all), with EXIF's focal lengths they may: all photos must have a camera.
 bool MapsWithExifHeld(Workspace& workspace, const std::vector<CameraGroup>& groups,
                       const SfmOptions& options, Own& own) {
-  const auto lenses = LensesWithExif(workspace, groups);
-  if (!lenses) return false;
-  Own held = MapOwn(workspace, options, *lenses);
-  if (!held.Passes() || held.mapped.model.images.size() < workspace.images().size()) return false;
+  if (!AllFocalsAreExifs(workspace, groups)) return false;
+  Own held = MapOwn(workspace, options, true);
+  const bool is_whole = held.mapped.model.images.size() == workspace.images().size();
+  if (!held.IsAllThereIs() || !is_whole) return false;
   workspace.progress().Note(
       fmt::format("global mapper: {}; EXIF's focal length is held", WhyAsked(workspace, own)));
-  if (!held.undetermined.empty()) {
+  if (!held.undetermined.clause.empty()) {
     WriteFileAtomically(workspace.folder() / kFixedIntrinsicsNote, "");
   }
   own = std::move(held);
@@ -184,11 +197,11 @@ bool CanAsk(Workspace& workspace, const SfmOptions& options, const std::string& 
 std::vector<calib::SfmModel> MapOrFallBack(
     Workspace& workspace, const std::vector<CameraGroup>& groups, const SfmOptions& options,
     const std::function<std::vector<calib::SfmModel>()>& by_colmap) {
-  Own own = MapOwn(workspace, options);
+  Own own = MapOwn(workspace, options, false);
   const bool held = !own.IsResult() && MapsWithExifHeld(workspace, groups, options, own);
   const bool passes = own.Passes();
   const GloballyMapped& ours = own.mapped;
-  if (held || (own.IsResult() && ours.model.images.size() == workspace.images().size())) {
+  if (held || (own.IsAllThereIs() && ours.model.images.size() == workspace.images().size())) {
     WriteNote(workspace, ours, false, "");
     return {ours.model};
   }

@@ -190,7 +190,7 @@ void OwnMatches(Workspace& workspace, const fs::path& features,
 }
 
 GloballyMapped MapHere(Workspace& workspace, const SfmOptions& options,
-                       const std::optional<GroupLenses>& fixed) {
+                       const std::optional<GroupLenses>& fixed, bool focals_hold) {
   sfm::ViewGraph graph = ReadViewGraph(workspace.database());
   // Under the photos' own names, which messages name.
   for (sfm::GraphImage& image : graph.images) image.name = workspace.NameOfAlias(image.name);
@@ -201,6 +201,7 @@ GloballyMapped MapHere(Workspace& workspace, const SfmOptions& options,
     sfm::Mapped mapped = sfm::MapGlobally(graph, {.threads = workspace.threads(),
                                                   .seed = options.seed,
                                                   .intrinsics_are_known = fixed.has_value(),
+                                                  .focals_are_known = focals_hold,
                                                   .progress = &workspace.progress()});
     result.model = std::move(mapped.model);
     ColourPoints(workspace, result.model);

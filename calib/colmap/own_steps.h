@@ -47,8 +47,9 @@ struct GloballyMapped {
   std::string why_not;
   std::map<std::string, std::string> why_without_camera;
 };
-/// `fixed`: intrinsics that hold, in the place of what the matches determine.
+/// `fixed`: intrinsics that hold, in the place of what the matches determine. `focals_hold`: the
+/// matches' focal lengths do.
 GloballyMapped MapHere(Workspace& workspace, const SfmOptions& options,
-                       const std::optional<GroupLenses>& fixed = {});
+                       const std::optional<GroupLenses>& fixed = {}, bool focals_hold = false);
 
 }  // namespace dtr::colmap

@@ -36,6 +36,7 @@ bool AdjustMap(const AdjustMapOptions& options, calib::Bundle* bundle) {
   constexpr double kKnownFocalShare =
       0.04;  // EXIF gives whole millimetres of some 28, nominal ones
   constexpr double kNoiseOfScale = 1.0 / 3;
+  plain.free_focal = !options.focals_hold;
   plain.known_focals_px = options.known_focals_px;
   plain.focal_sigma_share = kKnownFocalShare / (kNoiseOfScale * options.cauchy_px);
   plain.cauchy_px = options.cauchy_px;

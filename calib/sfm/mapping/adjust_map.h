@@ -17,7 +17,8 @@ struct AdjustMapOptions {
   /// a focal length leave it there: it is drawn by 4 % (standard deviation), an observation by a
   /// third of the loss's scale.
   std::vector<std::vector<double>> known_focals_px = {};
-  double cauchy_px = 1;  ///< scale of Cauchy's loss
+  bool focals_hold = false;  ///< of all lenses: distortion alone moves
+  double cauchy_px = 1;      ///< scale of Cauchy's loss
   int iterations = 30;
   double cost_tolerance = 1e-5;  ///< relative; an adjustment that another follows needs no more
   int threads = 1;

@@ -164,6 +164,7 @@ class Mapper {
     std::vector<int> images(graph_.cameras.size());
     for (const int i : image_of) ++images[graph_.images[i].camera];
     AdjustMapOptions options{.lenses = {},
+                             .focals_hold = options_.focals_are_known,
                              .cauchy_px = cauchy,
                              .iterations = iterations,
                              .cost_tolerance = cost_tolerance,

@@ -15,6 +15,7 @@ struct MapOptions {
   int threads = 0;  ///< 0: all cores; the result does not depend on it
   std::uint64_t seed = 0;
   bool intrinsics_are_known = false;   ///< the graph's cameras hold
+  bool focals_are_known = false;       ///< their focal lengths do
   const Progress* progress = nullptr;  ///< asked whether to stop (Interrupted is thrown); null: not
 };
 

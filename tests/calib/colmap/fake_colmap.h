@@ -41,6 +41,8 @@ class FakeColmap {
   void Fail(const std::string& command, const std::string& shell_lines) {
     WriteFileAtomically(folder_ / ("fail." + command), shell_lines + "\n");
   }
+  /// From now on it is a program that answers nothing.
+  void Break() const { WriteFileAtomically(folder_ / "broken", ""); }
   /// Features that two images of a database have in common, a < b by their numbers from 0.
   struct Common {
     size_t a, b;

@@ -1,6 +1,7 @@
 #!/bin/sh
 # Stands in for `colmap` in tests; fake_colmap.h says what the files in $FAKE_COLMAP mean.
 here=$FAKE_COLMAP
+if [ -f "$here/broken" ]; then exit 3; fi
 if [ "$1" = help ]; then
   echo "COLMAP 3.8 (a fake one)"
   if [ -f "$here/cuda" ]; then echo "(Commit 0 on never with CUDA)"; fi

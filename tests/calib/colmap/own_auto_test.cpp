@@ -9,7 +9,9 @@
 #include "calib/colmap/model_io.h"
 #include "calib/colmap/sfm.h"
 #include "calib/colmap/workspace.h"
+#include "datasets/hard/hard_sets.h"
 #include "dtr/base/error.h"
+#include "dtr/io/formats/cameras_json.h"
 #include "dtr/io/image_io.h"
 #include "tests/calib/colmap/fake_colmap.h"
 #include "tests/calib/colmap/model_test_support.h"
@@ -159,6 +161,19 @@ TEST_F(AutoSfm, AFailureOfColmapDoesNotLoseOurModel) {
   EXPECT_THAT(listener_.notes, Contains(StartsWith("COLMAP's mapper failed:")));
 }
 
+// A program of that name that does not work, such as one whose libraries are gone.
+TEST_F(AutoSfm, AColmapThatDoesNotWorkIsOneNote) {
+  fake_.Break();
+  EXPECT_EQ(Run("whole").model.images.size(), size_t{kPhotos});
+  EXPECT_THAT(listener_.notes, Not(Contains(HasSubstr("COLMAP"))));
+  AddNoise("z.png");
+  EXPECT_EQ(Run("sfm").model.images.size(), size_t{kPhotos});
+  const auto says = [](const std::string& note) {
+    return note.find("with COLMAP in working order (") != std::string::npos;
+  };
+  EXPECT_EQ(std::count_if(listener_.notes.begin(), listener_.notes.end(), says), 1);
+}
+
 TEST_F(AutoSfm, WhereNeitherMapsThePhotosTheReasonIsOneLine) {
   inputs_.clear();
   for (const char* name : {"a.png", "b.png"}) {
@@ -180,6 +195,34 @@ TEST_F(AutoSfm, KnownIntrinsicsHoldInTheGlobalMapper) {
   EXPECT_LT(WorstDegrees(fixed->model), kRotationDeg);
   for (const auto& [id, camera] : fixed->model.cameras) {
     EXPECT_EQ(camera.params[0], *inputs_.front().focal_prior_px);
+  }
+}
+
+// Any focal length fits photos from one line with parallel axes.
+TEST_F(AutoSfm, AStraightWalkIsMappedWithExifsFocalLength) {
+  const auto sets = datasets::HardSets();
+  auto walk = std::find_if(sets.begin(), sets.end(),
+                           [](const auto& set) { return set.name == "straight_walk"; });
+  ASSERT_NE(walk, sets.end());
+  datasets::WriteHardSet(*walk, folder_ / "walk", 0);
+  inputs_.clear();
+  const auto truth = io::ReadCamerasJson(folder_ / "walk" / "cameras.json").cameras;
+  for (const auto& camera : truth) {
+    inputs_.push_back({camera.name, camera.camera.width_px(), camera.camera.height_px(),
+                       camera.camera.fx_px(), "camera"});
+  }
+  options_.lens_model = "SIMPLE_RADIAL";
+  const SfmResult sfm =
+      RunSfm(folder_ / "walk" / "photos", inputs_, folder_ / "sfm", options_, listener_);
+  EXPECT_FALSE(MapperRan());
+  EXPECT_TRUE(sfm.report.fixed_intrinsics);
+  EXPECT_EQ(sfm.model.images.size(), truth.size());
+  EXPECT_EQ(sfm.model.cameras.begin()->second.params[0], truth[0].camera.fx_px());
+  EXPECT_THAT(listener_.notes, Contains(HasSubstr("EXIF's focal length is held")));
+  for (size_t i = 0; i < sfm.model.images.size(); ++i) {
+    EXPECT_LT(DegreesBetween(sfm.model.images[i].cam_from_world, sfm.model.images[0].cam_from_world,
+                             truth[i].cam_from_world, truth[0].cam_from_world),
+              0.1);
   }
 }
 
