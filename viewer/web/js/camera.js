@@ -9,6 +9,12 @@ export function placed(camera) {
   return { ...camera, rotation, matrix, centre: scaled(times(transposed(matrix), camera.translation), -1) };
 }
 
+/** A set with its views placed, and `steps`, the views of each time step. */
+export function placedSet(set) {
+  const views = set.views.map(placed);
+  return { ...set, views, steps: set.times.map((_, i) => views.filter((view) => view.step === i)) };
+}
+
 /** A camera at `centre` with orientation `rotation`. */
 export function cameraAt(intrinsics, rotation, centre) {
   return placed({ ...intrinsics, rotation, translation: scaled(times(matrixOfQuaternion(unitQuaternion(rotation)), centre), -1) });
