@@ -43,6 +43,12 @@ export function fitted(photo, width, height) {
   };
 }
 
+/** fx, fy, cx, cy in pixels of a perspective projection matrix of OpenGL, 16 numbers, column by column. */
+export function intrinsicsOf(projection, width, height) {
+  const p = projection;
+  return { fx: p[0] * width / 2, fy: p[5] * height / 2, cx: (1 - p[8]) * width / 2, cy: (1 + p[9]) * height / 2 };
+}
+
 /** Towards the sky, from how the photos were held: the mean of their upward axes. */
 export function upOf(views) {
   const sum = views.reduce((total, view) => add(total, scaled(view.matrix[1], -1)), [0, 0, 0]);

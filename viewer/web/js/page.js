@@ -7,6 +7,7 @@ import { placed, placedSet, upOf } from "./camera.js";
 import { kViews, wantedOrder } from "./selection.js";
 import { TimeControl } from "./time.js";
 import { drawMeasure, pickedPoint } from "./measure.js";
+import { Headset } from "./xr.js";
 import { Problem } from "./problem.js";
 
 const kMaxCanvasPixels = 2.1e6;
@@ -33,10 +34,13 @@ export class Page {
       throw new Problem("this page needs WebGL2, which this browser does not offer here; open it in a current Firefox, Chrome, Edge or Safari, with graphics acceleration on");
     }
     this.renderer = new Renderer(gl, shaders, this.set);
-    this.navigation = new Navigation({ ...this.set, views: this.set.steps[0] }, upOf(this.set.views));
+    const up = upOf(this.set.views);
+    this.navigation = new Navigation({ ...this.set, views: this.set.steps[0] }, up);
+    this.headset = new Headset(this, gl, up, element("headset"));
     this.time = new TimeControl(this.set.times, element("time"), element("play"), () => { this.dirty = true; });
     this.options = { depth: false, compare: false, measure: false, split: 0.5 };
     this.points = [];
+    this.eye = null;  // the camera of a headset's eye
     this.level = 0;
     this.dirty = true;
     this.last = 0;
@@ -57,7 +61,7 @@ export class Page {
   }
 
   order() {
-    return wantedOrder(this.set, this.time.step, this.camera());
+    return wantedOrder(this.set, this.time.step, this.eye ?? this.camera());
   }
 
   arrived() {
@@ -115,6 +119,7 @@ export class Page {
       Period: () => this.stepPhoto(1), Comma: () => this.stepPhoto(-1), KeyC: () => this.toggle("compare"),
       KeyV: () => this.toggle("depth"), KeyM: () => this.toggle("measure"), KeyF: () => this.fullScreen(),
       KeyH: () => this.togglePanel(), Home: () => this.goTo(0), Space: () => this.time.toggle(),
+      KeyX: () => this.headset.toggle().catch((error) => showProblem(`the headset cannot be used: ${error.message}`)),
     };
     this.keys = new Keys(commands);
     for (const button of document.querySelectorAll("button[data-key]")) button.addEventListener("click", commands[button.dataset.key]);
@@ -206,7 +211,7 @@ export class Page {
   }
 
   tick(now) {
-    if (this.stopped) return;
+    if (this.stopped || this.headset.active) return;
     const seconds = Math.min((now - this.last) / 1000, kMostStepS);
     this.fitCanvas();
     this.time.play(seconds, this.renderer.step === this.time.step);
@@ -238,6 +243,21 @@ export class Page {
     drawMeasure(element("marks"), this.camera(), this.points, this.set.unit);
     this.loader.run();
     this.pictured();
+  }
+
+  /** One eye's image into its part of a framebuffer. */
+  drawEye(camera, framebuffer, viewport) {
+    this.eye = camera;
+    this.chooseStep();
+    if (this.pictureOf(this.renderer.step)) this.renderer.compose(this.renderer.draw(camera), framebuffer, viewport, [0, 0], false);
+    this.loader.run();
+  }
+
+  /** After the headset. */
+  resume() {
+    this.eye = null;
+    this.dirty = true;
+    requestAnimationFrame((now) => this.tick(now));
   }
 
   // The range of false colours: that of the measured depth of the views in use.
