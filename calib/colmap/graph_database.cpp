@@ -301,41 +301,59 @@ void AddFeatures(const fs::path& database, std::span<const size_t> images,
   transaction.Commit();
 }
 
-sfm::Features ReadFeatures(const fs::path& database, std::uint32_t image_id) {
+std::vector<sfm::Keypoint> ReadKeypoints(const fs::path& database, std::uint32_t image_id) {
   const ReadOnlyDatabase opened(database);
-  sfm::Features features;
+  std::vector<sfm::Keypoint> keypoints;
   int records = 0;
-  const std::string of_image = " WHERE image_id = " + std::to_string(image_id);
-  opened.ForEachRow(
-      ("SELECT rows, cols, data FROM keypoints" + of_image).c_str(), [&](sqlite3_stmt* row) {
-        const auto values = opened.Matrix<float>(row, 0, kKeypointColumns);
-        ++records;
-        for (size_t i = 0; i < values.rows; ++i) {
-          const sfm::Keypoint keypoint{values.At(i, 0), values.At(i, 1), values.At(i, 2),
-                                       values.At(i, 3)};
-          if (!std::isfinite(keypoint.x_px) || !std::isfinite(keypoint.y_px) ||
-              !std::isfinite(keypoint.scale_px) || !std::isfinite(keypoint.orientation_rad)) {
-            RejectDatabase(database, "a feature that is not finite");
-          }
-          features.keypoints.push_back(keypoint);
-        }
-      });
-  opened.ForEachRow(
-      ("SELECT rows, cols, data FROM descriptors" + of_image).c_str(), [&](sqlite3_stmt* row) {
-        const auto values = opened.Matrix<std::uint8_t>(row, 0, kDescriptorColumns);
-        if (values.rows > 0 && values.cols != kDescriptorColumns) {
-          RejectDatabase(database, "descriptors of " + std::to_string(values.cols) + " numbers");
-        }
-        features.descriptors.resize(values.rows);
-        if (values.rows > 0) {
-          std::memcpy(features.descriptors.data(), values.data, values.rows * kDescriptorColumns);
-        }
-      });
+  const std::string query =
+      "SELECT rows, cols, data FROM keypoints WHERE image_id = " + std::to_string(image_id);
+  opened.ForEachRow(query.c_str(), [&](sqlite3_stmt* row) {
+    const auto values = opened.Matrix<float>(row, 0, kKeypointColumns);
+    ++records;
+    for (size_t i = 0; i < values.rows; ++i) {
+      const sfm::Keypoint keypoint{values.At(i, 0), values.At(i, 1), values.At(i, 2),
+                                   values.At(i, 3)};
+      if (!std::isfinite(keypoint.x_px) || !std::isfinite(keypoint.y_px) ||
+          !std::isfinite(keypoint.scale_px) || !std::isfinite(keypoint.orientation_rad)) {
+        RejectDatabase(database, "a feature that is not finite");
+      }
+      keypoints.push_back(keypoint);
+    }
+  });
   if (records == 0) RejectDatabase(database, "no features of image " + std::to_string(image_id));
-  if (features.keypoints.size() != features.descriptors.size()) {
-    RejectDatabase(database, std::to_string(features.keypoints.size()) + " features with " +
-                                 std::to_string(features.descriptors.size()) + " descriptors");
+  return keypoints;
+}
+
+std::vector<sfm::Descriptor> ReadDescriptors(const fs::path& database, std::uint32_t image_id,
+                                             size_t keypoints, size_t first) {
+  const ReadOnlyDatabase opened(database);
+  std::vector<sfm::Descriptor> descriptors;
+  size_t found = 0;
+  const std::string query =
+      "SELECT rows, cols, data FROM descriptors WHERE image_id = " + std::to_string(image_id);
+  opened.ForEachRow(query.c_str(), [&](sqlite3_stmt* row) {
+    const auto values = opened.Matrix<std::uint8_t>(row, 0, kDescriptorColumns);
+    if (values.rows > 0 && values.cols != kDescriptorColumns) {
+      RejectDatabase(database, "descriptors of " + std::to_string(values.cols) + " numbers");
+    }
+    found = values.rows;
+    descriptors.resize(std::min(first, values.rows));
+    if (!descriptors.empty()) {
+      std::memcpy(descriptors.data(), values.data, descriptors.size() * kDescriptorColumns);
+    }
+  });
+  if (found != keypoints) {
+    RejectDatabase(database, std::to_string(keypoints) + " features with " +
+                                 std::to_string(found) + " descriptors");
   }
+  return descriptors;
+}
+
+sfm::Features ReadFeatures(const fs::path& database, std::uint32_t image_id) {
+  sfm::Features features;
+  features.keypoints = ReadKeypoints(database, image_id);
+  const size_t count = features.keypoints.size();
+  features.descriptors = ReadDescriptors(database, image_id, count, count);
   return features;
 }
 

@@ -33,6 +33,13 @@ void AddFeatures(const std::filesystem::path& database, std::span<const size_t> 
 /// Features of an image by its id. Throws Error where the database has no record of them, is no
 /// COLMAP database, or its records do not fit each other.
 sfm::Features ReadFeatures(const std::filesystem::path& database, std::uint32_t image_id);
+std::vector<sfm::Keypoint> ReadKeypoints(const std::filesystem::path& database,
+                                         std::uint32_t image_id);
+/// The `first` descriptors of an image, of which there must be `keypoints`, or all where it has
+/// fewer.
+std::vector<sfm::Descriptor> ReadDescriptors(const std::filesystem::path& database,
+                                             std::uint32_t image_id, size_t keypoints,
+                                             size_t first);
 
 /// Replaces cameras and matches of a database by the graph's: of every pair the matches that agree
 /// with its geometry, both as what was matched and as what was verified.

@@ -6,9 +6,14 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "calib/bundle/bundle.h"
+#include "calib/bundle/degeneracy.h"
 #include "calib/bundle/refine.h"
+#include "calib/colmap/graph_database.h"
 #include "calib/colmap/own_steps.h"
+#include "calib/colmap/parallax.h"
 #include "calib/colmap/sfm_steps.h"
+#include "calib/sfm/mapping/model_check.h"
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 
@@ -25,9 +30,51 @@ constexpr double kClearlyWorse = 1.2;
 // Observations by which two models are compared; fewer tell nothing.
 constexpr int kMinHeldOut = 50;
 
-bool TakeColmaps(const GloballyMapped& ours, const calib::SfmModel& colmaps,
+// What the photos leave undetermined of a model, as a clause; empty: nothing. The adjustment that
+// tells is expensive, and made only where the geometry of cameras and points, or pairs that one
+// homography explains, give cause: of a wall, a map that is far from it may look sound.
+std::string WhyUndetermined(Workspace& workspace, const calib::SfmModel& model,
+                            const SfmOptions& options) {
+  calib::Adjusted as_given;
+  as_given.bundle = calib::BundleOf(model);
+  as_given.used.assign(as_given.bundle.observations.size(), true);
+  const auto found = calib::FindDegeneracies(as_given, {}, calib::kMaxFocalShare);
+  const bool suspicious = std::any_of(found.begin(), found.end(), [](const auto& degeneracy) {
+    return degeneracy.name != "duplicate_images" && degeneracy.name != "too_few_views";
+  });
+  if (!suspicious && LackOfParallax(CountPairs(workspace)).empty()) return "";
+  calib::RefineOptions refine;
+  refine.threads = options.threads;
+  refine.seed = options.seed;
+  refine.progress = &workspace.progress();
+  return calib::WhyUndetermined(model, refine);
+}
+
+// Drops COLMAP's models unless the matches agree with the largest. Returns why not.
+std::string DropContradicted(Workspace& workspace, std::vector<calib::SfmModel>& colmaps) {
+  if (colmaps.empty()) return "";
+  sfm::ViewGraph graph = ReadViewGraph(workspace.database());
+  for (sfm::GraphImage& image : graph.images) image.name = workspace.NameOfAlias(image.name);
+  std::string why = sfm::WhyContradicted(graph, colmaps.front(), workspace.threads());
+  if (!why.empty()) colmaps.clear();
+  return why;
+}
+
+// A model of the global mapper, and what the photos leave undetermined of it where it passes.
+struct Own {
+  GloballyMapped mapped;
+  std::string undetermined;
+
+  bool Passes() const { return mapped.why_not.empty() && !mapped.model.images.empty(); }
+  // A model that validation rejects is no result, however well it fits the matches.
+  bool IsResult() const { return Passes() && undetermined.empty(); }
+};
+
+bool TakeColmaps(Workspace& workspace, const Own& own, const calib::SfmModel& colmaps,
                  const SfmOptions& options) {
-  if (!ours.why_not.empty() || ours.model.images.empty()) return true;
+  const GloballyMapped& ours = own.mapped;
+  if (!own.Passes()) return true;
+  if (!own.undetermined.empty()) return WhyUndetermined(workspace, colmaps, options).empty();
   if (colmaps.images.size() <= ours.model.images.size()) return false;
   int own_count = 0, colmap_count = 0;
   const double own_px = calib::HeldOutErrorPx(ours.model, options.seed, &own_count);
@@ -35,8 +82,13 @@ bool TakeColmaps(const GloballyMapped& ours, const calib::SfmModel& colmaps,
   return std::min(own_count, colmap_count) >= kMinHeldOut && colmap_px <= kClearlyWorse * own_px;
 }
 
-std::string WhyAsked(const Workspace& workspace, const GloballyMapped& ours) {
-  if (!ours.why_not.empty()) return ours.why_not;
+std::string WhyAsked(const Workspace& workspace, const Own& own) {
+  const GloballyMapped& ours = own.mapped;
+  if (!ours.why_not.empty()) {
+    const std::string lack = LackOfParallax(CountPairs(workspace));
+    return lack.empty() ? ours.why_not : ours.why_not + "; " + lack;
+  }
+  if (!own.undetermined.empty()) return own.undetermined;
   return fmt::format("{} of {} photos have no camera",
                      workspace.images().size() - ours.model.images.size(),
                      workspace.images().size());
@@ -77,29 +129,77 @@ std::vector<calib::SfmModel> AskColmap(
   }
 }
 
+Own MapOwn(Workspace& workspace, const SfmOptions& options,
+           const std::optional<GroupLenses>& fixed = {}) {
+  Own own{MapHere(workspace, options, fixed), ""};
+  if (own.Passes()) own.undetermined = WhyUndetermined(workspace, own.mapped.model, options);
+  return own;
+}
+
+// The lenses by which photos were matched, where EXIF knows every focal length and no vote of the
+// matches changed one.
+std::optional<GroupLenses> LensesWithExif(const Workspace& workspace,
+                                          const std::vector<CameraGroup>& groups) {
+  const GroupLenses exif = LensesOf(workspace, groups);
+  const sfm::ViewGraph graph = ReadViewGraph(workspace.database());
+  if (graph.cameras.size() != exif.lenses.size()) return std::nullopt;
+  for (size_t i = 0; i < exif.lenses.size(); ++i) {
+    const bool holds =
+        exif.focal_is_known[i] && graph.cameras[i].params[0] == exif.lenses[i].params[0];
+    if (!holds) return std::nullopt;
+  }
+  return GroupLenses{graph.cameras, exif.focal_is_known};
+}
+
+// Where matches alone do not lead to a model (of a wall any focal length fits two photos, of a
+// straight walk any fits all), with EXIF's focal lengths they may: all photos must have a camera.
+bool MapsWithExifHeld(Workspace& workspace, const std::vector<CameraGroup>& groups,
+                      const SfmOptions& options, Own& own) {
+  const auto lenses = LensesWithExif(workspace, groups);
+  if (!lenses) return false;
+  Own held = MapOwn(workspace, options, *lenses);
+  if (!held.Passes() || held.mapped.model.images.size() < workspace.images().size()) return false;
+  workspace.progress().Note(
+      fmt::format("global mapper: {}; EXIF's focal length is held", WhyAsked(workspace, own)));
+  if (!held.undetermined.empty()) {
+    WriteFileAtomically(workspace.folder() / kFixedIntrinsicsNote, "");
+  }
+  own = std::move(held);
+  return true;
+}
+
+// Whether COLMAP's mapper is to be asked: it works, or a note says why not.
+bool CanAsk(Workspace& workspace, const SfmOptions& options, const std::string& why) {
+  if (options.engine != SfmEngine::kAuto) return false;
+  const Program::State state = Program::Find();
+  if (state.Works()) return true;
+  workspace.progress().Note(fmt::format(
+      "global mapper: {}; with COLMAP {} its mapper would be tried, too", why,
+      state.why_not.empty() ? "installed" : "in working order (" + state.why_not + ")"));
+  return false;
+}
+
 }  // namespace
 
 std::vector<calib::SfmModel> MapOrFallBack(
-    Workspace& workspace, const SfmOptions& options,
+    Workspace& workspace, const std::vector<CameraGroup>& groups, const SfmOptions& options,
     const std::function<std::vector<calib::SfmModel>()>& by_colmap) {
-  GloballyMapped ours = MapHere(workspace, options);
-  const bool passes = ours.why_not.empty() && !ours.model.images.empty();
-  if (passes && ours.model.images.size() == workspace.images().size()) {
+  Own own = MapOwn(workspace, options);
+  const bool held = !own.IsResult() && MapsWithExifHeld(workspace, groups, options, own);
+  const bool passes = own.Passes();
+  const GloballyMapped& ours = own.mapped;
+  if (held || (own.IsResult() && ours.model.images.size() == workspace.images().size())) {
     WriteNote(workspace, ours, false, "");
-    return {std::move(ours.model)};
+    return {ours.model};
   }
-  const std::string why = WhyAsked(workspace, ours);
-  const bool may_ask = options.engine == SfmEngine::kAuto;
-  const bool ask = may_ask && Program::IsInstalled();
+  const std::string why = WhyAsked(workspace, own);
+  const bool ask = CanAsk(workspace, options, why);
   if (!ask && !passes) {
-    ThrowRejected(why, may_ask ? "photos must overlap by half, from several places; or install "
-                                 "COLMAP (apt-get install colmap), whose mapper is tried then"
-                               : "photos must overlap by half, from several places; or use --sfm "
-                                 "auto, with which COLMAP's mapper is tried");
-  }
-  if (!ask && may_ask) {
-    workspace.progress().Note(fmt::format(
-        "global mapper: {}; with COLMAP installed its mapper would be tried, too", why));
+    ThrowRejected(why, options.engine == SfmEngine::kAuto
+                           ? "photos must overlap by half, from several places; or install COLMAP "
+                             "(apt-get install colmap), whose mapper is tried then"
+                           : "photos must overlap by half, from several places; or use --sfm auto, "
+                             "with which COLMAP's mapper is tried");
   }
   std::vector<calib::SfmModel> colmaps;
   if (ask) {
@@ -108,7 +208,14 @@ std::vector<calib::SfmModel> MapOrFallBack(
     colmaps = AskColmap(workspace, passes, by_colmap);
   }
   if (colmaps.empty() && !passes) return {};
-  const bool take = !colmaps.empty() && TakeColmaps(ours, colmaps.front(), options);
+  if (const std::string against = DropContradicted(workspace, colmaps); !against.empty()) {
+    if (!passes) {
+      ThrowRejected(why + ", and of COLMAP's model that " + against,
+                    "photos must overlap by half, from several places");
+    }
+    workspace.progress().Note("COLMAP's model does not pass: " + against);
+  }
+  const bool take = !colmaps.empty() && TakeColmaps(workspace, own, colmaps.front(), options);
   if (ask) {
     workspace.progress().Note(take ? "COLMAP's model is taken"
                                    : "the global mapper's model is taken");
@@ -119,7 +226,7 @@ std::vector<calib::SfmModel> MapOrFallBack(
   }
   WriteNote(workspace, ours, take, why);
   if (take) return colmaps;
-  return {std::move(ours.model)};
+  return {ours.model};
 }
 
 void ReadOwnMappingNote(const Workspace& workspace, SfmReport& report) {

@@ -3,18 +3,23 @@
 #include <functional>
 #include <vector>
 
+#include "calib/colmap/features.h"
 #include "calib/colmap/workspace.h"
 
 namespace dtr::colmap {
 
-/// Models of the workspace's database, largest first; none where no photos can be placed. With
-/// SfmEngine::kAuto, a model of the global mapper that does not pass or leaves photos out, and
-/// COLMAP on the PATH, `by_colmap` is called for the models that COLMAP makes of the same matches:
-/// theirs is taken where ours did not pass, or where it has more photos and does not predict
+/// Models of the workspace's database, largest first; none where no photos can be placed. Where a
+/// model of the global mapper does not pass, or the photos do not determine it
+/// (calib/bundle/refine.h, WhyUndetermined), EXIF's focal lengths are held, if that gives every
+/// photo a camera. Where this does not help, or photos are left out, with SfmEngine::kAuto and a
+/// COLMAP that works `by_colmap` is called for the models that COLMAP makes of the same matches;
+/// with one that does not, a note says so. COLMAP's largest
+/// must agree with the matches (sfm/mapping/model_check.h); it is taken where ours did not pass,
+/// where the photos determine it and not ours, or where it has more photos and does not predict
 /// held-out observations clearly worse. What was decided is noted, and kept in the workspace.
 /// Throws Error where no model passes: the reason, and what helps.
 std::vector<calib::SfmModel> MapOrFallBack(
-    Workspace& workspace, const SfmOptions& options,
+    Workspace& workspace, const std::vector<CameraGroup>& groups, const SfmOptions& options,
     const std::function<std::vector<calib::SfmModel>()>& by_colmap);
 
 /// File in the workspace that says which mapper made its model, and why photos have no camera.

@@ -23,6 +23,8 @@ namespace {
 
 // Where EXIF says nothing, of the long side: a moderate wide angle, as COLMAP assumes.
 constexpr double kGuessedFocal = 1.2;
+// Of the memory, for descriptors; matches and what they are copied to take the rest.
+constexpr double kDescriptorShare = 0.5;
 
 // Brightness of a photo by the weights of ITU-R BT.709.
 Grid<std::uint8_t> GreyOf(const ImageRgb8& image) {
@@ -38,6 +40,9 @@ Grid<std::uint8_t> GreyOf(const ImageRgb8& image) {
   }
   return grey;
 }
+
+// Of images()[image] in a database.
+std::uint32_t IdOf(size_t image) { return static_cast<std::uint32_t>(image + 1); }
 
 // All photos in the order of groups.
 std::vector<size_t> InOrder(const std::vector<CameraGroup>& groups) {
@@ -157,23 +162,31 @@ void OwnMatches(Workspace& workspace, const fs::path& features,
   }
   for (size_t i = 0; i < workspace.images().size(); ++i) {
     const SfmImageInput& image = workspace.images()[i];
-    photos.push_back({workspace.AliasOf(i), image.width_px, image.height_px, group_of[i],
-                      ReadFeatures(features, static_cast<std::uint32_t>(i + 1))});
+    photos.push_back({workspace.AliasOf(i), image.width_px, image.height_px, group_of[i], {}});
+    photos.back().features.keypoints = ReadKeypoints(features, IdOf(i));
   }
-  const auto pairs = PairsFor(photos.size(), matching, allowed);
+  sfm::MatchOptions match;
+  match.threads = workspace.threads();
+  match.seed = options.seed;
+  match.lens_is_known.assign(known.lenses.size(), known_lenses);
+  match.pairs = PairsFor(photos.size(), matching, allowed);
+  match.preselect = matching == Matching::kPreselected;
+  match.load_descriptors = [&](int photo, size_t first) {
+    const auto i = static_cast<size_t>(photo);
+    return ReadDescriptors(features, IdOf(i), photos[i].features.keypoints.size(), first);
+  };
+  match.descriptor_gb = kDescriptorShare * options.memory_gb;
+  match.journal = workspace.folder() / "matches.begun";
+  match.journal_inputs = workspace.fingerprint();
+  match.progress = &workspace.progress();
   workspace.RunHere([&] {
     const sfm::MatchResult result =
-        sfm::MatchPhotos(photos, known.lenses, known.focal_is_known,
-                         {.threads = workspace.threads(),
-                          .seed = options.seed,
-                          .lens_is_known = std::vector<bool>(known.lenses.size(), known_lenses),
-                          .pairs = pairs,
-                          .preselect = matching == Matching::kPreselected,
-                          .progress = &workspace.progress()});
+        sfm::MatchPhotos(photos, known.lenses, known.focal_is_known, match);
     for (const std::string& note : result.notes) workspace.progress().Note(note);
     CopyDatabase(features, workspace.database());
     WriteViewGraph(workspace.database(), result.graph);
   });
+  RemoveAll(match.journal);
 }
 
 GloballyMapped MapHere(Workspace& workspace, const SfmOptions& options,

@@ -73,6 +73,15 @@ std::string HowItEnded(const ProcessResult& result) {
 
 bool Program::IsInstalled() { return !FindProgram(kProgram).empty(); }
 
+Program::State Program::Find() {
+  if (!IsInstalled()) return {};
+  try {
+    return {Program().version(), ""};
+  } catch (const Error& error) {
+    return {"", error.what()};
+  }
+}
+
 Program::Program() {
   if (!IsInstalled()) {
     throw Error(

@@ -21,6 +21,13 @@ class Program {
 
   /// Whether there is a colmap on the PATH at all.
   static bool IsInstalled();
+  /// What there is, without a throw.
+  struct State {
+    std::string version;  ///< of one that works
+    std::string why_not;  ///< one line of one that does not; empty where there is none
+    bool Works() const { return !version.empty(); }
+  };
+  static State Find();
 
   const std::string& version() const { return version_; }
   /// Whether it was built with CUDA, by its own words.

@@ -161,9 +161,9 @@ void MappingStep(Workspace& workspace, const std::vector<CameraGroup>& groups,
     RemoveAll(workspace.folder() / part);
   }
   const auto by_colmap = [&] { return MadeByColmap(workspace, groups, options); };
-  const std::vector<calib::SfmModel> made = options.engine == SfmEngine::kColmap
-                                                ? by_colmap()
-                                                : MapOrFallBack(workspace, options, by_colmap);
+  const std::vector<calib::SfmModel> made =
+      options.engine == SfmEngine::kColmap ? by_colmap()
+                                           : MapOrFallBack(workspace, groups, options, by_colmap);
   if (made.empty()) ThrowNoModel(workspace);
   std::string sizes;
   for (const auto& model : made) sizes += fmt::format("{}\n", model.images.size());
@@ -193,7 +193,8 @@ std::string MappingInputs(const SfmOptions& options) {
   std::string inputs = fmt::format("seed {}", options.seed);
   if (options.engine != SfmEngine::kColmap) inputs += fmt::format(" {}", NameOf(options.engine));
   if (options.engine == SfmEngine::kAuto) {
-    inputs += Program::IsInstalled() ? " " + Program().version() : " without COLMAP";
+    const Program::State colmap = Program::Find();
+    inputs += colmap.Works() ? " " + colmap.version : " without COLMAP";
   }
   return inputs;
 }

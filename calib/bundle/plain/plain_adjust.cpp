@@ -20,6 +20,8 @@ void CheckPlain(const Bundle& bundle, const PlainOptions& options, const std::ve
   };
   if (!fits(options.fixed_lenses, bundle.lenses.size()) ||
       !fits(options.fixed_images, bundle.images.size()) ||
+      (!options.known_focals_px.empty() &&
+       options.known_focals_px.size() != bundle.lenses.size()) ||
       !fits(used, bundle.observations.size())) {
     RejectPlain("a list of what is fixed or used must have an entry for each");
   }
@@ -43,6 +45,21 @@ std::vector<int> FreeParamsOf(const LensCamera& lens, const PlainOptions& option
   return free;
 }
 
+std::vector<plain::LensPrior> FocalPriors(const Bundle& bundle, const PlainOptions& options) {
+  std::vector<plain::LensPrior> priors;
+  for (size_t i = 0; i < options.known_focals_px.size() && options.free_focal; ++i) {
+    if (!options.fixed_lenses.empty() && options.fixed_lenses[i]) continue;
+    const std::vector<double>& known_px = options.known_focals_px[i];
+    const auto focals = static_cast<size_t>(FocalCount(bundle.lenses[i].model));
+    for (size_t k = 0; k < std::min(focals, known_px.size()); ++k) {
+      if (!(known_px[k] > 0)) RejectPlain("a known focal length must be positive");
+      priors.push_back({i, false, static_cast<int>(k), known_px[k],
+                        1 / (options.focal_sigma_share * known_px[k])});
+    }
+  }
+  return priors;
+}
+
 }  // namespace
 
 bool IsPlain(const LensCamera& lens) { return plain::HasIntrinsics(lens.model); }
@@ -55,6 +72,7 @@ PlainResult AdjustPlain(const PlainOptions& options, const std::vector<bool>& us
   settings.free_poses = options.free_poses;
   settings.fixed_images = options.fixed_images;
   settings.cauchy_px = options.cauchy_px;
+  settings.lens_priors = FocalPriors(bundle, options);
   for (size_t i = 0; i < bundle.lenses.size(); ++i) {
     const bool fixed = !options.fixed_lenses.empty() && options.fixed_lenses[i];
     settings.free_params.push_back(fixed ? std::vector<int>{}

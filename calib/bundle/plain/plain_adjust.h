@@ -21,6 +21,11 @@ struct PlainOptions {
   /// Above 0: every image's own principal point moves, drawn to its lens's by this standard
   /// deviation, px, where an observation's coordinate has one of 1 px. Requires free poses.
   double principal_point_sigma_px = 0;
+  /// Per lens, px: what is known of its one or two focal lengths; no number: nothing. Where they
+  /// are free they are drawn there by a standard deviation of `focal_sigma_share` of the value,
+  /// where an observation's coordinate has one of 1 px. Empty: nothing is known of any.
+  std::vector<std::vector<double>> known_focals_px;
+  double focal_sigma_share = 0.04;
   double cauchy_px = 0;          ///< scale of Cauchy's loss; 0: least squares
   double cost_tolerance = 1e-9;  ///< converged where no step promises more, relative to the cost
   int max_iterations = 50;

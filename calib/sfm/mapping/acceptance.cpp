@@ -114,42 +114,6 @@ std::string WhyNotErrors(const MapEvidence& evidence, MapStatistics* statistics)
   return "";
 }
 
-std::string WhyNotContradicted(const MapEvidence& evidence, MapStatistics* statistics) {
-  std::vector<double> matches(evidence.graph.images.size()), against(matches.size());
-  double all = 0, contradicted = 0;
-  int pairs = 0;
-  for (const PairGeometry& pair : evidence.graph.pairs) {
-    const auto count = static_cast<double>(pair.matches.size());
-    if (count < kStrongMatches || !evidence.cameras.placed[pair.image_a] ||
-        !evidence.cameras.placed[pair.image_b]) {
-      continue;
-    }
-    const bool is_contradicted =
-        AgreeingShare(evidence.graph, evidence.cameras, pair, kAgreePx) < kContradictedBelow;
-    all += count;
-    contradicted += is_contradicted ? count : 0;
-    pairs += is_contradicted ? 1 : 0;
-    for (const int image : {pair.image_a, pair.image_b}) {
-      matches[image] += count;
-      against[image] += is_contradicted ? count : 0;
-    }
-  }
-  statistics->contradicted_share = all > 0 ? contradicted / all : 0;
-  if (statistics->contradicted_share > kMaxContradicted) {
-    return fmt::format(
-        "{} pairs of photos with {:.0f} % of all matches contradict the map (repeated "
-        "structure?)",
-        pairs, 100 * statistics->contradicted_share);
-  }
-  for (size_t i = 0; i < matches.size(); ++i) {
-    if (against[i] > kMaxContradictedOfImage * matches[i]) {
-      return fmt::format("{:.0f} % of the matches of {} contradict the map",
-                         100 * against[i] / matches[i], evidence.graph.images[i].name);
-    }
-  }
-  return "";
-}
-
 // Builds the map up again, image by image.
 class Growth {
  public:
@@ -283,6 +247,53 @@ double AgreeingShare(const ViewGraph& graph, const MapCameras& cameras, const Pa
   return looked_at > 0 ? static_cast<double>(agree) / looked_at : 0;
 }
 
+std::string WhyNotContradicted(const MapEvidence& evidence, MapStatistics* statistics) {
+  std::vector<double> matches(evidence.graph.images.size()), against(matches.size());
+  double all = 0, contradicted = 0;
+  int pairs = 0;
+  for (const PairGeometry& pair : evidence.graph.pairs) {
+    const auto count = static_cast<double>(pair.matches.size());
+    if (count < kStrongMatches || !evidence.cameras.placed[pair.image_a] ||
+        !evidence.cameras.placed[pair.image_b]) {
+      continue;
+    }
+    const bool is_contradicted =
+        AgreeingShare(evidence.graph, evidence.cameras, pair, kAgreePx) < kContradictedBelow;
+    all += count;
+    contradicted += is_contradicted ? count : 0;
+    pairs += is_contradicted ? 1 : 0;
+    for (const int image : {pair.image_a, pair.image_b}) {
+      matches[image] += count;
+      against[image] += is_contradicted ? count : 0;
+    }
+  }
+  statistics->contradicted_share = all > 0 ? contradicted / all : 0;
+  if (statistics->contradicted_share > kMaxContradicted) {
+    return fmt::format(
+        "{} pairs of photos with {:.0f} % of all matches contradict the map (repeated "
+        "structure?)",
+        pairs, 100 * statistics->contradicted_share);
+  }
+  for (size_t i = 0; i < matches.size(); ++i) {
+    if (against[i] > kMaxContradictedOfImage * matches[i]) {
+      return fmt::format("{:.0f} % of the matches of {} contradict the map",
+                         100 * against[i] / matches[i], evidence.graph.images[i].name);
+    }
+  }
+  return "";
+}
+
+std::string WhyNotJoined(const MapEvidence& evidence) {
+  int most = 0;
+  const std::vector<int> loose =
+      LooselyJoined(evidence.cameras, evidence.points, kMinPointsPerImage, &most);
+  if (loose.empty()) return "";
+  return fmt::format(
+      "{} photo(s) ({}) hang on the others by {} points of known depth, which do not determine "
+      "their scale",
+      loose.size(), NamesOf(evidence.graph, loose), most);
+}
+
 std::string WhyNot(const MapEvidence& evidence, MapStatistics* statistics) {
   if (const std::string why = WhyNotErrors(evidence, statistics); !why.empty()) return why;
   for (const LeftOut& left : evidence.left_out) {
@@ -303,16 +314,7 @@ std::string WhyNot(const MapEvidence& evidence, MapStatistics* statistics) {
   }
   if (const std::string why = WhyNotFocal(evidence); !why.empty()) return why;
   if (const std::string why = WhyNotContradicted(evidence, statistics); !why.empty()) return why;
-  int most = 0;
-  const std::vector<int> loose =
-      LooselyJoined(evidence.cameras, evidence.points, kMinPointsPerImage, &most);
-  if (!loose.empty()) {
-    return fmt::format(
-        "{} photo(s) ({}) hang on the others by {} points of known depth, which do not "
-        "determine their scale",
-        loose.size(), NamesOf(evidence.graph, loose), most);
-  }
-  return "";
+  return WhyNotJoined(evidence);
 }
 
 }  // namespace dtr::sfm

@@ -30,6 +30,10 @@ std::vector<int> LooselyJoined(const MapCameras& cameras, std::span<const MapPoi
 double AgreeingShare(const ViewGraph& graph, const MapCameras& cameras, const PairGeometry& pair,
                      double limit_px);
 
+/// The parts of WhyNot that say whether matches contradict the map, and whether parts of it float.
+std::string WhyNotContradicted(const MapEvidence& evidence, MapStatistics* statistics);
+std::string WhyNotJoined(const MapEvidence& evidence);
+
 /// Why the map must not be trusted, as one clause; empty: it can be. Completes `statistics` by
 /// the errors and by what contradicts the map.
 std::string WhyNot(const MapEvidence& evidence, MapStatistics* statistics);

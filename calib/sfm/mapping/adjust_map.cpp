@@ -33,6 +33,11 @@ bool AdjustMap(const AdjustMapOptions& options, calib::Bundle* bundle) {
   for (const MapLens lens : options.lenses) {
     plain.fixed_lenses.push_back(lens == MapLens::kFixed);
   }
+  constexpr double kKnownFocalShare =
+      0.04;  // EXIF gives whole millimetres of some 28, nominal ones
+  constexpr double kNoiseOfScale = 1.0 / 3;
+  plain.known_focals_px = options.known_focals_px;
+  plain.focal_sigma_share = kKnownFocalShare / (kNoiseOfScale * options.cauchy_px);
   plain.cauchy_px = options.cauchy_px;
   plain.cost_tolerance = options.cost_tolerance;
   plain.max_iterations = options.iterations;

@@ -163,12 +163,17 @@ class Mapper {
     calib::Bundle bundle = BundleOfMap(graph_, cameras_, points_, &image_of);
     std::vector<int> images(graph_.cameras.size());
     for (const int i : image_of) ++images[graph_.images[i].camera];
-    AdjustMapOptions options{
-        {}, cauchy, iterations, cost_tolerance, options_.threads, options_.progress};
+    AdjustMapOptions options{.lenses = {},
+                             .cauchy_px = cauchy,
+                             .iterations = iterations,
+                             .cost_tolerance = cost_tolerance,
+                             .threads = options_.threads,
+                             .progress = options_.progress};
     double scale = 1;
     for (size_t c = 0; c < images.size(); ++c) {
       const bool enough = lenses && !options_.intrinsics_are_known && images[c] >= kImagesForLens;
       options.lenses.push_back(enough ? MapLens::kFocalAndDistortion : MapLens::kFixed);
+      options.known_focals_px.push_back(KnownFocalsPx(c));
       if (images[c] > 0) scale = std::max(scale, LimitPx(1, cameras_.lenses[c]));
     }
     options.cauchy_px *= scale;
@@ -176,6 +181,12 @@ class Mapper {
     TakeFromBundle(bundle, image_of, &cameras_, &points_);
     if (lenses) cameras_.rays = RaysOf(graph_, cameras_.lenses, options_.threads);
     return true;
+  }
+
+  std::vector<double> KnownFocalsPx(size_t camera) const {
+    if (!graph_.focal_is_known[camera]) return {};
+    const calib::LensCamera& lens = graph_.cameras[camera];
+    return {lens.params.begin(), lens.params.begin() + calib::FocalCount(lens.model)};
   }
 
   // Where errors begin to count as outliers: some times their median, px of an image of 1000 px.

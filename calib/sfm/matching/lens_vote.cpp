@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "dtr/base/parallel_for.h"
 
@@ -107,6 +108,19 @@ struct Normal {
   double weights = 0, squares = 0;
 };
 
+// Of the lens alone, the pose eliminated.
+struct Reduced {
+  Eigen::Matrix2d h = Eigen::Matrix2d::Zero();
+  Eigen::Vector2d g = Eigen::Vector2d::Zero();
+};
+
+Reduced ReducedOf(const Normal& n) {
+  const auto pose = n.h.topLeftCorner<5, 5>().ldlt();
+  const Eigen::Matrix<double, 5, 2> across = n.h.topRightCorner<5, 2>();
+  return {n.h.bottomRightCorner<2, 2>() - across.transpose() * pose.solve(across),
+          n.g.tail<2>() - across.transpose() * pose.solve(n.g.head<5>())};
+}
+
 VoteLens Stepped(const VoteLens& lens, double log_focal, double k1) {
   return {lens.focal * std::exp(log_focal), lens.k1 + k1};
 }
@@ -195,6 +209,10 @@ class Joint {
     const double k = noise / (kK1Deviation * kK1Deviation);
     h = Eigen::Vector2d(f, k).asDiagonal();
     g << f * std::log(lens_.focal / options_.prior_focal), k * lens_.k1;
+    const auto add = [&](const Reduced& of_pair) {
+      h += of_pair.h;
+      g += of_pair.g;
+    };
     normals.resize(pairs_.size());
     ParallelFor(0, static_cast<int>(pairs_.size()), options_.threads, [&](int i) {
       const auto p = static_cast<size_t>(i);
@@ -203,10 +221,7 @@ class Joint {
     for (Normal& n : normals) {
       n.h.diagonal().head<5>() *= 1 + damping;
       n.h.diagonal().head<5>().array() += 1e-9;
-      const auto pose = n.h.topLeftCorner<5, 5>().ldlt();
-      const Eigen::Matrix<double, 5, 2> across = n.h.topRightCorner<5, 2>();
-      h += n.h.bottomRightCorner<2, 2>() - across.transpose() * pose.solve(across);
-      g += n.g.tail<2>() - across.transpose() * pose.solve(n.g.head<5>());
+      add(ReducedOf(n));
     }
     if (options_.focal_is_fixed) Fix(0, h, g);
     if (options_.k1_is_fixed) Fix(1, h, g);
@@ -257,7 +272,36 @@ class Joint {
       squares += n.squares;
     }
     if (!(weights > 0)) return std::numeric_limits<double>::infinity();
-    return std::sqrt(std::max(0.0, h.inverse()(0, 0) * squares / weights));
+    const double by_matches = h.inverse()(0, 0) * squares / weights;
+    return std::sqrt(std::max({0.0, by_matches, VarianceByPhotos(h, normals)}));
+  }
+
+  // What matches tell of the lens is wrong in the same way all over a pair, and in pairs that share
+  // a photo: one Newton step from the solution tells what it becomes without a photo's pairs. The
+  // jackknife over the nodes of a graph (Snijders and Borgatti, Connections 1999).
+  double VarianceByPhotos(const Eigen::Matrix2d& h, const std::vector<Normal>& normals) const {
+    std::map<int, Reduced> of_photo;
+    for (size_t p = 0; p < pairs_.size(); ++p) {
+      const Reduced reduced = ReducedOf(normals[p]);
+      for (const int photo : {pairs_[p].photo_a, pairs_[p].photo_b}) {
+        of_photo[photo].h += reduced.h;
+        of_photo[photo].g += reduced.g;
+      }
+    }
+    const auto count = static_cast<double>(of_photo.size());
+    if (count < 3) return 0;  // without one of two photos nothing is left
+    double sum = 0;
+    for (auto& [photo, reduced] : of_photo) {
+      if (options_.focal_is_fixed) Fix(0, reduced.h, reduced.g);
+      if (options_.k1_is_fixed) Fix(1, reduced.h, reduced.g);
+      Eigen::Matrix2d left = h - reduced.h;
+      for (int i = 0; i < 2; ++i) {
+        if (i == 0 ? options_.focal_is_fixed : options_.k1_is_fixed) left(i, i) = 1;
+      }
+      const double change = left.ldlt().solve(reduced.g)[0];
+      if (std::isfinite(change)) sum += change * change;
+    }
+    return (count - 2) / (2 * count) * sum;
   }
 
   const std::vector<VotePair>& pairs_;

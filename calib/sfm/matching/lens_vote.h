@@ -13,6 +13,7 @@ namespace dtr::sfm::matching {
 struct VotePair {
   PointPairs points;
   Eigen::Matrix3d fundamental = Eigen::Matrix3d::Zero();
+  int photo_a = 0, photo_b = 0;  ///< any numbers: errors of pairs that share one go together
 };
 
 /// A lens of one focal length (long sides) and x_d = x (1 + k1 |x|^2).
@@ -30,8 +31,10 @@ struct VoteOptions {
 
 struct VoteResult {
   VoteLens lens;
-  double log_focal_deviation = 0;  ///< standard deviation of log(focal), from the matches' spread
-  double cost = 0;                 ///< sum of RobustCost over all matches
+  /// Standard deviation of log(focal): the larger of what the matches' spread and what leaving out
+  /// one photo after the other tells.
+  double log_focal_deviation = 0;
+  double cost = 0;  ///< sum of RobustCost over all matches
 };
 
 /// The lens for which essential matrices explain the matches best: a grid over log(focal) and k1,

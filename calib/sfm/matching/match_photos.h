@@ -1,6 +1,8 @@
 // calib/sfm/matching/match_photos.h -- photos in, pairs with matches and relative poses out.
 #pragma once
 #include <cstdint>
+#include <filesystem>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -12,7 +14,8 @@
 
 namespace dtr::sfm {
 
-/// A photo with its features, the largest scale first.
+/// A photo with its features, the largest scale first; without descriptors where MatchOptions loads
+/// them.
 struct MatchPhoto {
   std::string name;
   int width_px = 0, height_px = 0;
@@ -26,9 +29,18 @@ struct MatchOptions {
   /// Per camera whether its intrinsics hold as given, and no vote changes them; empty: of none.
   std::vector<bool> lens_is_known = {};
   /// Pairs (a < b, sorted) that may be matched; empty: all.
-  std::optional<std::vector<std::pair<int, int>>> pairs;
+  std::optional<std::vector<std::pair<int, int>>> pairs = {};
   /// Of these, match each photo with those that resemble it and with the next in order only.
   bool preselect = false;
+  /// Loads the descriptors of a photo's `largest` first features, or of all where it has fewer; as
+  /// often as `descriptor_gb` gigabytes of them in memory (0: no bound) need. Threads call it at the
+  /// same time. Empty: the photos have their own.
+  std::function<std::vector<Descriptor>(int photo, size_t largest)> load_descriptors = {};
+  double descriptor_gb = 0;
+  /// Keeps what was matched, for an interrupted run of the same `journal_inputs` (all that the
+  /// result depends on) to go on with. Empty: nothing is kept.
+  std::filesystem::path journal = {};
+  std::string journal_inputs = {};
   Progress* progress = nullptr;
 };
 
@@ -48,7 +60,7 @@ struct MatchResult {
 /// left out there.
 /// Deterministic: the same bytes for any number of threads. Photos without features get no pairs.
 /// Throws std::invalid_argument when numbers of things that belong together differ or an index is
-/// out of range, Interrupted when `progress` says so.
+/// out of range, Interrupted when `progress` says so, Error where the journal cannot be written.
 MatchResult MatchPhotos(std::span<const MatchPhoto> photos,
                         std::span<const calib::LensCamera> cameras,
                         const std::vector<bool>& focal_is_known, const MatchOptions& options);

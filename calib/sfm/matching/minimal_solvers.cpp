@@ -80,12 +80,18 @@ Eigen::Matrix<double, 9, kCount> Equations(const PointPairs& points, std::span<c
   return m;
 }
 
+// Decompositions of matrices whose size the compiler knows are unrolled and take it a minute; these
+// have their size at run time and their place on the stack all the same.
+template <int kMaxRows, int kMaxCols>
+using Sized =
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMaxRows, kMaxCols>;
+
 // The 9 - kCount matrices that satisfy all equations, one per column.
 template <int kCount>
 Eigen::Matrix<double, 9, 9 - kCount> NullSpace(const Eigen::Matrix<double, 9, kCount>& equations) {
-  const Eigen::HouseholderQR<Eigen::Matrix<double, 9, kCount>> qr(equations);
-  const Eigen::Matrix<double, 9, 9> q = qr.householderQ();
-  return q.template rightCols<9 - kCount>();
+  const Eigen::HouseholderQR<Sized<9, 7>> qr(equations);
+  const Sized<9, 9> q = qr.householderQ() * Sized<9, 9>::Identity(9, 9);
+  return q.rightCols(9 - kCount);
 }
 
 Eigen::Matrix3d FromRows(const Eigen::Matrix<double, 9, 1>& v) {
@@ -148,14 +154,14 @@ std::vector<Eigen::Matrix3d> EssentialFromFive(const PointPairs& points,
                                                std::span<const int> five) {
   const Eigen::Matrix<double, 9, 4> basis = NullSpace<5>(Equations<5>(points, five));
   const Eigen::Matrix<double, 10, 20> m = Constraints(basis);
-  const Eigen::Matrix<double, 10, 10> reduced =
-      m.leftCols<10>().partialPivLu().solve(m.rightCols<10>());
+  const Sized<10, 10> left = m.leftCols<10>(), right = m.rightCols<10>();
+  const Eigen::Matrix<double, 10, 10> reduced = Eigen::PartialPivLU<Sized<10, 10>>(left).solve(right);
   if (!reduced.allFinite()) return {};
   // Multiplication by x in the basis of the last ten monomials (x^2 .. 1).
-  Eigen::Matrix<double, 10, 10> action = Eigen::Matrix<double, 10, 10>::Zero();
-  action.topRows<6>() = -reduced.topRows<6>();
+  Sized<10, 10> action = Sized<10, 10>::Zero(10, 10);
+  action.topRows(6) = -reduced.topRows(6);
   action(6, 0) = action(7, 1) = action(8, 2) = action(9, 6) = 1;
-  const Eigen::EigenSolver<Eigen::Matrix<double, 10, 10>> solver(action);
+  const Eigen::EigenSolver<Sized<10, 10>> solver(action);
   if (solver.info() != Eigen::Success) return {};
   std::vector<Eigen::Matrix3d> found;
   const auto vectors = solver.eigenvectors();

@@ -62,6 +62,10 @@ std::vector<std::vector<int>> ScoresOf(std::span<const MatchPhoto> photos,
   const int count = static_cast<int>(allowed.size());
   const int chunks = (count + kPairsAtOnce - 1) / kPairsAtOnce;
   progress.Stage("comparing photos", chunks);
+  std::vector<LoadedDescriptors> largest(photos.size());
+  ParallelFor(0, static_cast<int>(photos.size()), options.threads, [&](int i) {
+    largest[static_cast<size_t>(i)] = DescriptorsOf(photos, i, kGlance, options);
+  });
   std::atomic<int> done = 0;
   ParallelFor(0, chunks, options.threads, [&](int chunk) {
     progress.ThrowIfInterrupted();
@@ -69,7 +73,7 @@ std::vector<std::vector<int>> ScoresOf(std::span<const MatchPhoto> photos,
       const auto [a, b] = allowed[static_cast<size_t>(k)];
       const auto i = static_cast<size_t>(a), j = static_cast<size_t>(b);
       scores[i][j] = scores[j][i] =
-          static_cast<int>(CoarseMatches(photos[i].features, photos[j].features, kGlance).size());
+          static_cast<int>(CoarseMatches(largest[i].all, largest[j].all).size());
     }
     progress.Update(++done);
   });
@@ -78,11 +82,35 @@ std::vector<std::vector<int>> ScoresOf(std::span<const MatchPhoto> photos,
 
 }  // namespace
 
-std::vector<CoarseMatch> CoarseMatches(const Features& a, const Features& b, size_t largest) {
-  const auto first = [&](const Features& f) {
-    return std::span(f.descriptors).first(std::min(largest, f.descriptors.size()));
-  };
-  const NearestBothWays nearest = FindNearest(first(a), first(b));
+LoadedDescriptors DescriptorsOf(std::span<const MatchPhoto> photos, int photo, size_t largest,
+                                const MatchOptions& options) {
+  const Features& features = photos[static_cast<size_t>(photo)].features;
+  const size_t count = std::min(largest, features.keypoints.size());
+  LoadedDescriptors descriptors;
+  if (options.load_descriptors) {
+    descriptors.loaded = options.load_descriptors(photo, count);
+    if (descriptors.loaded.size() != count) {
+      throw std::invalid_argument("MatchPhotos: keypoints and loaded descriptors differ in number");
+    }
+    descriptors.all = descriptors.loaded;
+  } else {
+    descriptors.all = std::span(features.descriptors).first(count);
+  }
+  return descriptors;
+}
+
+std::vector<double> DescriptorBytes(std::span<const MatchPhoto> photos, size_t largest) {
+  std::vector<double> bytes;
+  for (const MatchPhoto& photo : photos) {
+    bytes.push_back(static_cast<double>(std::min(largest, photo.features.keypoints.size()) *
+                                        sizeof(Descriptor)));
+  }
+  return bytes;
+}
+
+std::vector<CoarseMatch> CoarseMatches(std::span<const Descriptor> a,
+                                       std::span<const Descriptor> b) {
+  const NearestBothWays nearest = FindNearest(a, b);
   std::vector<CoarseMatch> matches;
   for (size_t i = 0; i < nearest.of_a.size(); ++i) {
     const Nearest& there = nearest.of_a[i];

@@ -24,8 +24,28 @@ struct CoarseMatch {
   float ratio = 0;
 };
 
-/// Mutual nearest neighbours among the `largest` first features of each photo that pass the ratio
-/// test both ways, the most trusted first.
-std::vector<CoarseMatch> CoarseMatches(const Features& a, const Features& b, size_t largest);
+/// The matches of the largest features of two photos.
+struct CoarsePair {
+  int a = 0, b = 0;
+  std::vector<CoarseMatch> matches;
+};
+
+/// Descriptors of a photo: those that it has, or that were loaded.
+struct LoadedDescriptors {
+  std::vector<Descriptor> loaded;
+  std::span<const Descriptor> all;  ///< of `loaded`, or of the photo
+};
+
+/// The descriptors of the `largest` first features of a photo, or of all where it has fewer. Throws
+/// std::invalid_argument where options.load_descriptors gives another number.
+LoadedDescriptors DescriptorsOf(std::span<const MatchPhoto> photos, int photo, size_t largest,
+                                const MatchOptions& options);
+
+/// What each of them takes, at most.
+std::vector<double> DescriptorBytes(std::span<const MatchPhoto> photos, size_t largest);
+
+/// Mutual nearest neighbours that pass the ratio test both ways, the most trusted first.
+std::vector<CoarseMatch> CoarseMatches(std::span<const Descriptor> a,
+                                       std::span<const Descriptor> b);
 
 }  // namespace dtr::sfm::matching

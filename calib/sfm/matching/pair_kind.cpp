@@ -12,7 +12,6 @@ namespace dtr::sfm::matching {
 namespace {
 
 constexpr double kRotationRad = 0.2 * std::numbers::pi / 180;
-constexpr double kPlanarShare = 0.8;
 constexpr size_t kSeen = 400;  // matches that are looked at
 
 double Angle(const Eigen::Matrix3d& r, const Eigen::Vector2d& a, const Eigen::Vector2d& b) {

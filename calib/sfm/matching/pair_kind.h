@@ -7,6 +7,9 @@
 
 namespace dtr::sfm::matching {
 
+/// One homography explains a pair where at least this share of the matches agrees with it.
+inline constexpr double kPlanarShare = 0.8;
+
 /// Sets kind, rotation, translation and parallax of a pair from its pose and the matches (on
 /// z = 1) that agree with it. `threshold`: distance of a match from a homography that it agrees
 /// with. kRotation: the median angle after the best rotation is below 0.2 degrees.

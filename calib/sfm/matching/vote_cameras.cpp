@@ -7,6 +7,7 @@
 #include <map>
 
 #include "calib/sfm/matching/lens_vote.h"
+#include "calib/sfm/matching/pair_kind.h"
 #include "calib/sfm/matching/robust_fit.h"
 #include "dtr/base/parallel_for.h"
 #include "dtr/base/random.h"
@@ -19,6 +20,7 @@ constexpr size_t kCandidates = 80;     // pairs whose fundamental matrix is look
 constexpr size_t kVotingMatches = 80;  // of a pair
 constexpr size_t kFewestInliers = 30;  // of a pair that votes: more than chance gives
 constexpr double kSureDeviation = 0.1, kContradiction = 1.15, kClearlyLower = 0.9;
+constexpr double kContradictionSigmas = 3;
 
 // Where the first radial term stands among a model's parameters; -1: it has none. Empty: a lens
 // that this vote has no model for.
@@ -53,7 +55,8 @@ Eigen::Vector2d Centred(const calib::LensCamera& camera, const Keypoint& keypoin
 
 struct Candidate {
   VotePair pair;
-  double weight = 0;  // matches, less those of pairs without parallax
+  double weight = 0;    // matches, less those of pairs without parallax
+  bool planar = false;  // one homography explains it: any focal length does
 };
 
 Candidate CandidateOf(const CoarsePair& coarse, std::span<const MatchPhoto> photos,
@@ -77,7 +80,12 @@ Candidate CandidateOf(const CoarsePair& coarse, std::span<const MatchPhoto> phot
   const double parallax = MedianHomographyDistance(inliers) / (2 * band);
   candidate.weight =
       static_cast<double>(std::min<size_t>(inliers.size(), 200)) * std::clamp(parallax, 0.0, 1.0);
+  const auto homography = FitHomography(inliers, band, HashOf(seed, 1));
+  candidate.planar = homography && static_cast<double>(homography->inliers.size()) >=
+                                       kPlanarShare * static_cast<double>(inliers.size());
   candidate.pair.fundamental = fit->m;
+  candidate.pair.photo_a = coarse.a;
+  candidate.pair.photo_b = coarse.b;
   const size_t count = std::min(inliers.size(), kVotingMatches);
   for (size_t k = 0; k < count; ++k) {
     const size_t i = k * inliers.size() / count;
@@ -86,10 +94,15 @@ Candidate CandidateOf(const CoarsePair& coarse, std::span<const MatchPhoto> phot
   return candidate;
 }
 
-// The pairs that vote on a camera: the best of those with the most matches.
-std::vector<VotePair> VotersOf(std::vector<const CoarsePair*> pairs,
-                               std::span<const MatchPhoto> photos, const calib::LensCamera& camera,
-                               const MatchOptions& options) {
+struct Voters {
+  std::vector<VotePair> pairs;
+  bool on_focal = false;  // else they can vote on distortion alone
+};
+
+// The pairs that vote on a camera: the best of those with the most matches; where one homography
+// explains every pair, these.
+Voters VotersOf(std::vector<const CoarsePair*> pairs, std::span<const MatchPhoto> photos,
+                const calib::LensCamera& camera, const MatchOptions& options) {
   std::stable_sort(pairs.begin(), pairs.end(), [](const CoarsePair* p, const CoarsePair* q) {
     return p->matches.size() > q->matches.size();
   });
@@ -103,9 +116,13 @@ std::vector<VotePair> VotersOf(std::vector<const CoarsePair*> pairs,
   });
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const Candidate& p, const Candidate& q) { return p.weight > q.weight; });
-  std::vector<VotePair> voters;
+  std::erase_if(candidates, [](const Candidate& c) { return !(c.weight > 0); });
+  Voters voters;
+  voters.on_focal = std::any_of(candidates.begin(), candidates.end(),
+                                [](const Candidate& c) { return !c.planar; });
   for (Candidate& c : candidates) {
-    if (c.weight > 0 && voters.size() < kVoters) voters.push_back(std::move(c.pair));
+    if (c.planar && voters.on_focal) continue;
+    if (voters.pairs.size() < kVoters) voters.pairs.push_back(std::move(c.pair));
   }
   return voters;
 }
@@ -149,16 +166,19 @@ struct Decision {
   double deviation = 0;
 };
 
-std::optional<Decision> Decide(const std::vector<VotePair>& voters, VoteOptions vote, bool known) {
-  const auto free = VoteOnLens(voters, vote);
+std::optional<Decision> Decide(const Voters& voters, VoteOptions vote, bool known) {
+  vote.focal_is_fixed = !voters.on_focal;
+  const auto free = VoteOnLens(voters.pairs, vote);
   if (!free) return std::nullopt;
+  if (!voters.on_focal) return Decision{free->lens, known, false, 0};
   const bool sure = free->log_focal_deviation < kSureDeviation;
   Decision decision{free->lens, sure, sure, free->log_focal_deviation};
   if (sure && !known) return decision;
   vote.focal_is_fixed = true;
-  const auto fixed = VoteOnLens(voters, vote);
+  const auto fixed = VoteOnLens(voters.pairs, vote);
   const double factor = std::abs(std::log(free->lens.focal / vote.prior_focal));
   if (known && sure && factor > std::log(kContradiction) &&
+      factor > kContradictionSigmas * free->log_focal_deviation &&
       free->cost < kClearlyLower * fixed->cost) {
     return decision;
   }
@@ -194,8 +214,9 @@ void VoteOnCameras(std::span<const MatchPhoto> photos, std::span<const CoarsePai
     vote.threads = options.threads;
     vote.progress = options.progress;
     const auto voters = VotersOf(std::move(own), photos, prior, options);
-    const auto decision = Decide(voters, vote, known);
-    if (!decision) continue;
+    auto decision = Decide(voters, vote, known);
+    if (!decision && known) continue;
+    if (!decision) decision = Decision{{vote.prior_focal, 0}, false, false, 0};
     for (const int c : members) {
       Write(decision->lens, graph.cameras[static_cast<size_t>(c)]);
       graph.focal_is_known[static_cast<size_t>(c)] = decision->known;
@@ -204,12 +225,12 @@ void VoteOnCameras(std::span<const MatchPhoto> photos, std::span<const CoarsePai
     if (decision->changed) {
       notes.push_back(fmt::format(
           "camera {}: focal length {:.1f} px (+-{:.1f} %) and k1 {:.3f} by {} pairs{}", first + 1,
-          focal_px, 100 * decision->deviation, decision->lens.k1, voters.size(),
+          focal_px, 100 * decision->deviation, decision->lens.k1, voters.pairs.size(),
           known ? fmt::format("; EXIF's {:.1f} px contradict them", prior.params[0]) : ""));
     } else if (!known) {
       notes.push_back(
           fmt::format("camera {}: {} pairs do not determine the focal length; {:.1f} px is assumed",
-                      first + 1, voters.size(), focal_px));
+                      first + 1, voters.pairs.size(), focal_px));
     }
   }
 }

@@ -16,17 +16,12 @@ namespace dtr::sfm::matching {
 /// no better known than those of large ones.
 inline double BandOf(double long_side_px) { return std::max(4.0 / 1600, 1 / long_side_px); }
 
-/// The matches of the largest features of two photos.
-struct CoarsePair {
-  int a = 0, b = 0;
-  std::vector<CoarseMatch> matches;
-};
-
 /// Votes (lens_vote.h) on focal length and k1 of every camera, by the pairs whose photos both have
 /// it; cameras of one photo whose priors are the same vote together. At most 40 pairs vote, those
-/// with many matches and parallax. A focal length from EXIF holds unless the vote contradicts it by
-/// more than 15 % at a clearly lower cost. Updates cameras and focal_is_known of `graph` and adds
-/// to `notes`.
+/// with many matches and parallax; those that one homography explains have no vote on the focal
+/// length. A focal length from EXIF holds unless the vote contradicts it by more than 15 % and
+/// three standard deviations at a clearly lower cost. Updates cameras and focal_is_known of `graph`
+/// and adds to `notes`.
 void VoteOnCameras(std::span<const MatchPhoto> photos, std::span<const CoarsePair> pairs,
                    const MatchOptions& options, ViewGraph& graph, std::vector<std::string>& notes);
 

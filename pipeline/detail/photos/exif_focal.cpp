@@ -7,6 +7,7 @@
 #include <map>
 
 #include "calib/bundle/refine.h"
+#include "dtr/base/error.h"
 #include "dtr/base/order_statistics.h"
 
 namespace dtr::pipeline {
@@ -69,10 +70,10 @@ std::string Line(const FocalContradiction& focal, const Attempt& taken, const At
          fmt::format("held-out error {:.3g} px against {:.3g} px", taken.error_px, other->error_px);
 }
 
-}  // namespace
-
-std::optional<FocalContradiction> ContradictsExif(
-    const calib::SfmModel& model, const std::vector<colmap::SfmImageInput>& photos) {
+// The focal length that lies furthest from EXIF's, by more than `log_limit` in the logarithm.
+std::optional<FocalContradiction> FurthestFromExif(const calib::SfmModel& model,
+                                                   const std::vector<colmap::SfmImageInput>& photos,
+                                                   double log_limit) {
   std::map<std::string, double> prior_of;
   for (const colmap::SfmImageInput& photo : photos) {
     if (photo.focal_prior_px) prior_of[photo.name] = *photo.focal_prior_px;
@@ -83,7 +84,7 @@ std::optional<FocalContradiction> ContradictsExif(
     if (found != prior_of.end()) priors[image.camera_id].push_back(found->second);
   }
   std::optional<FocalContradiction> worst;
-  double most = std::log1p(kExifFocalError);
+  double most = log_limit;
   for (auto& [id, of_camera] : priors) {
     const double exif_px = UpperMedian(of_camera);
     const double found_px = model.cameras.at(id).params.front();
@@ -95,6 +96,52 @@ std::optional<FocalContradiction> ContradictsExif(
   return worst;
 }
 
+bool IsEnough(size_t part, size_t of, double share) {
+  return static_cast<double>(part) >= share * static_cast<double>(of);
+}
+
+PhotoRefinement Report(Attempt& taken, ExifFocal focal, bool exif_taken, const std::string& line,
+                       Progress& progress) {
+  focal.exif_taken = exif_taken;
+  focal.focal_fixed = taken.fixed;
+  taken.refined.report.exif_focal = focal;
+  progress.Note(line);
+  return std::move(taken.refined);
+}
+
+std::string Undetermined(const FocalContradiction& focal, const Attempt& exif) {
+  return Line(focal, exif, nullptr) + "the observations do not determine it; " +
+         (exif.fixed ? "EXIF's is used" : "EXIF's is taken and adjusted");
+}
+
+// Of a model whose observations do not determine its cameras, near EXIF's focal length as it may
+// be: the one with EXIF's, where that is known of all photos. Empty: `sfm` is determined, or the
+// other is no rival.
+std::optional<PhotoRefinement> WithExifHeld(const SfmRun& run, const CalibrateOptions& options,
+                                            colmap::SfmResult& sfm, Progress& progress) {
+  const auto focal = FurthestFromExif(sfm.model, run.inputs, 0);
+  if (!focal || WhyUndetermined(run, sfm.model, progress).empty()) return std::nullopt;
+  auto fixed_sfm = colmap::MapWithFixedIntrinsics(run.workspace / "photos", run.inputs,
+                                                  run.workspace / "sfm", run.sfm_options, progress);
+  if (!fixed_sfm ||
+      !IsEnough(fixed_sfm->model.images.size(), sfm.model.images.size(), kEnoughPhotos)) {
+    return std::nullopt;
+  }
+  Attempt exif = FromExif(run, options, *fixed_sfm, colmap::kFixedModel, progress);
+  sfm.model = std::move(fixed_sfm->model);
+  return Report(
+      exif,
+      {.exif_px = focal->exif_px, .found_px = focal->found_px, .exif_error_px = exif.error_px},
+      true, Undetermined(*focal, exif), progress);
+}
+
+}  // namespace
+
+std::optional<FocalContradiction> ContradictsExif(
+    const calib::SfmModel& model, const std::vector<colmap::SfmImageInput>& photos) {
+  return FurthestFromExif(model, photos, std::log1p(kExifFocalError));
+}
+
 PhotoRefinement RefineSfm(const SfmRun& run, colmap::SfmResult& sfm, Progress& progress) {
   CalibrateOptions options = run.options;
   options.advice = sfm.report.lack_of_parallax;
@@ -104,35 +151,37 @@ PhotoRefinement RefineSfm(const SfmRun& run, colmap::SfmResult& sfm, Progress& p
                         run.workspace / "sfm" / "model", run.workspace / "refined", progress);
   };
   if (given) return as_found();
-  const auto report = [&](Attempt& taken, ExifFocal focal, bool exif_taken,
+  const auto report = [&](Attempt& taken, const ExifFocal& focal, bool exif_taken,
                           const std::string& line) {
-    focal.exif_taken = exif_taken;
-    focal.focal_fixed = taken.fixed;
-    taken.refined.report.exif_focal = focal;
-    progress.Note(line);
-    return std::move(taken.refined);
+    return Report(taken, focal, exif_taken, line, progress);
   };
   if (sfm.report.fixed_intrinsics) {
     Attempt taken = FromExif(run, options, sfm, "model", progress);
     const double focal_px = sfm.model.cameras.begin()->second.params.front();
     return report(taken, {.exif_px = focal_px}, true,
-                  fmt::format("focal length: COLMAP made a model only with EXIF's {:.0f} px; {}",
+                  fmt::format("focal length: there is a sound model only with EXIF's {:.0f} px; {}",
                               focal_px, taken.fixed ? "it is fixed" : "adjusted afterwards"));
   }
   const auto contradiction = ContradictsExif(sfm.model, run.inputs);
-  if (!contradiction) return as_found();
+  if (!contradiction) {
+    try {
+      return as_found();
+    } catch (const Interrupted&) {
+      throw;
+    } catch (const Error&) {  // perhaps since the observations do not determine the cameras
+      if (auto held = WithExifHeld(run, options, sfm, progress)) return std::move(*held);
+      throw;
+    }
+  }
   ExifFocal focal{.exif_px = contradiction->exif_px, .found_px = contradiction->found_px};
   auto fixed_sfm = colmap::MapWithFixedIntrinsics(run.workspace / "photos", run.inputs,
                                                   run.workspace / "sfm", run.sfm_options, progress);
-  const auto enough = [](size_t part, size_t of, double share) {
-    return static_cast<double>(part) >= share * static_cast<double>(of);
-  };
   if (!fixed_sfm ||
-      !enough(fixed_sfm->model.images.size(), sfm.model.images.size(), kEnoughPhotos)) {
+      !IsEnough(fixed_sfm->model.images.size(), sfm.model.images.size(), kEnoughPhotos)) {
     Attempt taken = Refined(run, options, sfm, "model", "refined", progress);
     return report(taken, focal, false,
                   Line(*contradiction, taken, nullptr) +
-                      "with EXIF's COLMAP registers fewer photos; the found one is taken");
+                      "with EXIF's fewer photos are registered; the found one is taken");
   }
   const bool undetermined = !WhyUndetermined(run, sfm.model, progress).empty();
   Attempt exif = FromExif(run, options, *fixed_sfm, colmap::kFixedModel, progress);
@@ -140,10 +189,11 @@ PhotoRefinement RefineSfm(const SfmRun& run, colmap::SfmResult& sfm, Progress& p
   if (!undetermined) {
     Attempt found = Refined(run, options, sfm, "model", "refined", progress);
     focal.found_error_px = found.error_px;
-    const bool rival = enough(static_cast<size_t>(found.observations),
-                              static_cast<size_t>(exif.observations), kEnoughObservations);
-    const bool exif_is_rival = enough(static_cast<size_t>(exif.observations),
-                                      static_cast<size_t>(found.observations), kEnoughObservations);
+    const bool rival = IsEnough(static_cast<size_t>(found.observations),
+                                static_cast<size_t>(exif.observations), kEnoughObservations);
+    const bool exif_is_rival =
+        IsEnough(static_cast<size_t>(exif.observations), static_cast<size_t>(found.observations),
+                 kEnoughObservations);
     if (!exif_is_rival || (rival && found.error_px < kClearlyBetter * exif.error_px)) {
       return report(found, focal, false,
                     Line(*contradiction, found, &exif) +
@@ -155,9 +205,7 @@ PhotoRefinement RefineSfm(const SfmRun& run, colmap::SfmResult& sfm, Progress& p
                       (exif.fixed ? "EXIF's is used" : "EXIF's is taken and adjusted"));
   }
   sfm.model = std::move(fixed_sfm->model);
-  return report(exif, focal, true,
-                Line(*contradiction, exif, nullptr) + "the observations do not determine it; " +
-                    (exif.fixed ? "EXIF's is used" : "EXIF's is taken and adjusted"));
+  return report(exif, focal, true, Undetermined(*contradiction, exif));
 }
 
 }  // namespace dtr::pipeline

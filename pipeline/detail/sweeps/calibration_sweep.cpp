@@ -172,7 +172,8 @@ eval::SweepMeasurement CalibrationSweep::Measure(const eval::SweepSetting& setti
 
 std::string CalibrationSweep::Identity() const {
   std::string identity = InputHash(options_.photos) + " " + colmap::kOwnVersion;
-  if (colmap::Program::IsInstalled()) identity += " " + colmap::Program().version();
+  const colmap::Program::State program = colmap::Program::Find();
+  if (program.Works()) identity += " " + program.version;
   return identity;
 }
 

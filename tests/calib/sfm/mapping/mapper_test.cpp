@@ -4,6 +4,7 @@
 #include <functional>
 
 #include "calib/sfm/mapping/global_mapper.h"
+#include "calib/sfm/mapping/model_check.h"
 #include "tests/calib/sfm/mapping/synthetic_graph.h"
 
 namespace dtr::sfm {
@@ -88,6 +89,31 @@ Scene Walk(int images) {
 TEST(GlobalMapper, AStraightWalk) {
   const Scene scene = Walk(14);
   ExpectSolved(MapGlobally(GraphOf(scene).graph, {}), scene, 0.01, 0.3);
+}
+
+// Without anything that fixes it, focal length and depth of a straight walk with parallel axes grow
+// together: what EXIF or a vote told holds it.
+TEST(GlobalMapper, AStraightWalkKeepsTheKnownFocalLength) {
+  const Mapped mapped = MapGlobally(GraphOf(Walk(8)).graph, {});
+  EXPECT_EQ(mapped.why_not, "");
+  ASSERT_EQ(mapped.model.cameras.size(), 1u);
+  EXPECT_NEAR(mapped.model.cameras.at(1).params[0], 700, 0.02 * 700);
+}
+
+TEST(GlobalMapper, AWellDeterminedFocalLengthIsNotDrawnToAWrongOne) {
+  Seen seen = GraphOf(testing::Ring(16));
+  seen.graph.cameras[0].params[0] *= 1.1;
+  const Mapped mapped = MapGlobally(seen.graph, {});
+  EXPECT_EQ(mapped.why_not, "");
+  EXPECT_NEAR(mapped.model.cameras.at(1).params[0], 700, 0.003 * 700);
+}
+
+TEST(GlobalMapper, AStraightWalkAlongAPlane) {
+  Scene scene = Walk(10);
+  for (auto& point : scene.points) point.p.z() = 7;
+  GraphSpec spec;
+  spec.kind = PairKind::kPlanar;
+  ExpectSolvedOrRefused(MapGlobally(GraphOf(scene, spec).graph, {}), scene);
 }
 
 TEST(GlobalMapper, AForwardWalk) {
@@ -246,6 +272,21 @@ TEST(GlobalMapper, TwoClustersJoinedByOnePairAreRefused) {
   seen.graph.pairs.push_back(pair);
   testing::SortPairs(&seen.graph);
   EXPECT_NE(MapGlobally(seen.graph, {}).why_not, "");
+}
+
+TEST(WhyContradicted, AModelOfTheMatchesPassesAndOneOfMixedUpPhotosDoesNot) {
+  const Seen seen = GraphOf(testing::Ring(12));
+  calib::SfmModel model = MapGlobally(seen.graph, {}).model;
+  ASSERT_EQ(model.images.size(), 12u);
+  EXPECT_EQ(WhyContradicted(seen.graph, model, 1), "");
+  calib::SfmModel mixed_up = model;
+  std::swap(mixed_up.images[1].cam_from_world, mixed_up.images[5].cam_from_world);
+  EXPECT_THAT(WhyContradicted(seen.graph, mixed_up, 1), ::testing::HasSubstr("contradict"));
+  calib::SfmModel without_points = model;
+  without_points.points.clear();
+  EXPECT_THAT(WhyContradicted(seen.graph, without_points, 1), ::testing::HasSubstr("hang on"));
+  model.images[0].name = "another.jpg";
+  EXPECT_THROW(WhyContradicted(seen.graph, model, 1), std::invalid_argument);
 }
 
 TEST(GlobalMapper, APhotoWithoutMatchesIsLeftOutAndNamed) {

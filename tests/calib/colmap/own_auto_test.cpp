@@ -1,0 +1,225 @@
+// Which mapper's model SfmEngine::kAuto takes, and what --sfm global does with masks, sequences and
+// a kill; photos of the sample collection, a COLMAP that leaves what it is told.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+
+#include "calib/colmap/model_io.h"
+#include "calib/colmap/sfm.h"
+#include "calib/colmap/workspace.h"
+#include "dtr/base/error.h"
+#include "dtr/io/image_io.h"
+#include "tests/calib/colmap/fake_colmap.h"
+#include "tests/calib/colmap/model_test_support.h"
+#include "tests/calib/colmap/plaza_truth.h"
+#include "tests/calib/colmap/run_sfm_with_fake.h"
+#include "tests/support/message_of.h"
+#include "tests/support/test_data.h"
+
+namespace dtr::colmap {
+namespace {
+
+using namespace testing;
+namespace fs = std::filesystem;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+using ::testing::StartsWith;
+
+constexpr int kPhotos = 4;
+constexpr int kSmallSidePx = 480;
+
+// Blocks of 5 x 5 pixels: features, and no two images alike.
+void WriteNoise(const fs::path& file, unsigned seed) {
+  std::mt19937 random(seed);
+  ImageRgb8 blocks(320, 240, 3);
+  for (int y = 0; y < blocks.height(); y += 5) {
+    for (int x = 0; x < blocks.width(); x += 5) {
+      const auto value = static_cast<std::uint8_t>(random());
+      for (int i = 0; i < 75; ++i) blocks(x + i / 3 % 5, y + i / 15, i % 3) = value;
+    }
+  }
+  io::WriteImage(file, blocks);
+}
+
+class AutoSfm : public ::testing::Test {
+ protected:
+  AutoSfm() : truth_(PlazaTruth()) {
+    options_.engine = SfmEngine::kAuto;
+    options_.max_image_size_px = kSmallSidePx;
+    options_.lens_model = "SIMPLE_PINHOLE";
+    fs::create_directories(photos_);
+    for (int i = kFirst; i < kFirst + kPhotos; ++i) {
+      inputs_.push_back(truth_.inputs[static_cast<size_t>(i)]);
+      fs::copy_file(kPlaza / "images" / inputs_.back().name, photos_ / inputs_.back().name);
+    }
+  }
+
+  SfmResult Run(const std::string& folder) {
+    return RunSfm(photos_, inputs_, folder_ / folder, options_, listener_);
+  }
+
+  void AddNoise(const std::string& name) {
+    WriteNoise(photos_ / name, 7);
+    inputs_.push_back({name, 320, 240, {}, "noise"});
+  }
+
+  // What the fake mapper leaves, under the names that COLMAP knows.
+  void Leave(calib::SfmModel model) {
+    std::vector<std::string> names;
+    for (const SfmImageInput& input : inputs_) names.push_back(input.name);
+    std::sort(names.begin(), names.end());
+    for (calib::SfmImage& image : model.images) {
+      const auto at = std::find(names.begin(), names.end(), image.name) - names.begin();
+      image.name = Workspace::AliasFor("", static_cast<size_t>(at), image.name);
+    }
+    fs::remove_all(fake_ / "model.0");
+    WriteModel(fake_ / "model.0", model, Format::kBinary);
+  }
+
+  bool MapperRan() const {
+    const auto calls = fake_.Calls();
+    return std::any_of(calls.begin(), calls.end(),
+                       [](const std::string& call) { return call.starts_with("mapper"); });
+  }
+
+  double WorstDegrees(const calib::SfmModel& model) const {
+    double worst = 0;
+    const calib::SfmImage& first = model.images.front();
+    for (const calib::SfmImage& image : model.images) {
+      worst = std::max(
+          worst, DegreesBetween(image.cam_from_world, first.cam_from_world,
+                                truth_.CamFromWorld(image.name), truth_.CamFromWorld(first.name)));
+    }
+    return worst;
+  }
+
+  Truth truth_;
+  std::vector<SfmImageInput> inputs_;
+  SfmOptions options_;
+  Listener listener_;
+  FakeColmap fake_;
+  const dtr::testing::TemporaryFolder folder_;
+  const fs::path photos_ = folder_ / "photos";
+};
+
+TEST_F(AutoSfm, AModelOfTheGlobalMapperThatPassesIsTakenWithoutAskingColmap) {
+  const SfmResult sfm = Run("sfm");
+  EXPECT_EQ(sfm.model.images.size(), size_t{kPhotos});
+  EXPECT_FALSE(MapperRan());
+  EXPECT_THAT(sfm.report.version, Not(HasSubstr("COLMAP's mapper")));
+  EXPECT_LT(WorstDegrees(sfm.model), kRotationDeg);
+}
+
+TEST_F(AutoSfm, ColmapsModelIsTakenWhereOursDoesNotPassAndTheMatchesAgreeWithIt) {
+  options_.engine = SfmEngine::kGlobal;
+  const calib::SfmModel right = Run("right").model;
+  options_.engine = SfmEngine::kAuto;
+  options_.lens_model = "FULL_OPENCV";  // which the global mapper does not adjust
+  Leave(right);
+  const SfmResult sfm = Run("sfm");
+  EXPECT_TRUE(MapperRan());
+  EXPECT_EQ(sfm.model.images.size(), size_t{kPhotos});
+  EXPECT_THAT(sfm.report.version, HasSubstr("COLMAP's mapper"));
+  EXPECT_THAT(listener_.notes, Contains(HasSubstr("are not supported; trying COLMAP's mapper")));
+  EXPECT_THAT(listener_.notes, Contains(HasSubstr("COLMAP's model is taken")));
+  // A second call has the reason and the mapper from its checkpoint.
+  EXPECT_THAT(Run("sfm").report.version, HasSubstr("COLMAP's mapper"));
+
+  calib::SfmModel wrong = right;
+  std::swap(wrong.images[0].cam_from_world, wrong.images[2].cam_from_world);
+  Leave(wrong);
+  EXPECT_THAT(dtr::testing::MessageOf<Error>([&] { Run("wrong"); }),
+              HasSubstr("of COLMAP's model that"));
+}
+
+TEST_F(AutoSfm, APhotoThatNeitherPlacesIsNamedAndOurModelTaken) {
+  options_.engine = SfmEngine::kGlobal;
+  const calib::SfmModel right = Run("right").model;
+  options_.engine = SfmEngine::kAuto;
+  AddNoise("z.png");
+  Leave(right);
+  const SfmResult sfm = Run("sfm");
+  EXPECT_TRUE(MapperRan());
+  EXPECT_THAT(listener_.notes, Contains(HasSubstr("1 of 5 photos have no camera")));
+  EXPECT_THAT(listener_.notes, Contains("the global mapper's model is taken"));
+  EXPECT_THAT(sfm.report.version, Not(HasSubstr("COLMAP's mapper")));
+  EXPECT_EQ(sfm.report.not_registered, std::vector<std::string>{"z.png"});
+  EXPECT_THAT(sfm.report.why_not_registered.at("z.png"), HasSubstr("matches"));
+}
+
+TEST_F(AutoSfm, AFailureOfColmapDoesNotLoseOurModel) {
+  AddNoise("z.png");
+  fake_.Fail("mapper", "echo 'out of luck'; exit 1");
+  const SfmResult sfm = Run("sfm");
+  EXPECT_EQ(sfm.model.images.size(), size_t{kPhotos});
+  EXPECT_THAT(listener_.notes, Contains(StartsWith("COLMAP's mapper failed:")));
+}
+
+TEST_F(AutoSfm, WhereNeitherMapsThePhotosTheReasonIsOneLine) {
+  inputs_.clear();
+  for (const char* name : {"a.png", "b.png"}) {
+    WriteNoise(photos_ / name, static_cast<unsigned>(name[0]));
+    inputs_.push_back({name, 320, 240, {}, "noise"});
+  }
+  const std::string message = dtr::testing::MessageOf<Error>([&] { Run("sfm"); });
+  EXPECT_THAT(message, Not(IsEmpty()));
+  EXPECT_THAT(message, Not(HasSubstr("\n")));
+}
+
+TEST_F(AutoSfm, KnownIntrinsicsHoldInTheGlobalMapper) {
+  options_.engine = SfmEngine::kGlobal;
+  Run("sfm");
+  const auto fixed = MapWithFixedIntrinsics(photos_, inputs_, folder_ / "sfm", options_, listener_);
+  ASSERT_TRUE(fixed);
+  EXPECT_TRUE(fixed->report.fixed_intrinsics);
+  EXPECT_EQ(fixed->model.images.size(), size_t{kPhotos});
+  EXPECT_LT(WorstDegrees(fixed->model), kRotationDeg);
+  for (const auto& [id, camera] : fixed->model.cameras) {
+    EXPECT_EQ(camera.params[0], *inputs_.front().focal_prior_px);
+  }
+}
+
+TEST_F(AutoSfm, NoPointLiesUnderAMask) {
+  options_.engine = SfmEngine::kGlobal;
+  const int width = inputs_.front().width_px, height = inputs_.front().height_px;
+  Mask mask(width, height, 1);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) mask(x, y) = x < width / 4 ? 0 : 255;
+  }
+  io::WriteMask(folder_ / "mask.png", mask);
+  for (SfmImageInput& input : inputs_) input.mask_file = folder_ / "mask.png";
+  const SfmResult sfm = Run("sfm");
+  EXPECT_EQ(sfm.model.images.size(), size_t{kPhotos});
+  for (const calib::SfmImage& image : sfm.model.images) {
+    for (const calib::SfmFeature& feature : image.features) {
+      EXPECT_GE(feature.pixel.x(), width / 4);
+    }
+  }
+}
+
+TEST_F(AutoSfm, SequentialPairsGiveAModel) {
+  options_.engine = SfmEngine::kGlobal;
+  options_.matching = Matching::kSequential;
+  const SfmResult sfm = Run("sfm");
+  EXPECT_EQ(sfm.report.matching, Matching::kSequential);
+  EXPECT_LT(WorstDegrees(sfm.model), kRotationDeg);
+}
+
+TEST_F(AutoSfm, ARunStoppedWhileMatchingGoesOnToTheSameModel) {
+  options_.engine = SfmEngine::kGlobal;
+  const calib::SfmModel whole = Run("whole").model;
+  for (const char* stage : {"features", "matching", "mapping"}) {
+    listener_.stop_at = stage;
+    EXPECT_THROW(Run(stage), Interrupted) << stage;
+    listener_.stop_at = "";
+    listener_.stop = false;
+    ExpectSame(whole, Run(stage).model);
+  }
+}
+
+}  // namespace
+}  // namespace dtr::colmap

@@ -1,0 +1,81 @@
+#include "calib/sfm/matching/lens_vote.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+
+#include "dtr/base/random.h"
+
+namespace dtr::sfm::matching {
+namespace {
+
+constexpr double kFocal = 0.9;         // long sides
+constexpr double kNoise = 0.3 / 1600;  // of features
+
+// All pairs of seven photos about a box; of `zoomed`, the photos from the last but two on, the
+// focal length is another one.
+std::vector<VotePair> Pairs(double zoomed) {
+  constexpr int kPhotos = 7;
+  Random random(3);
+  std::vector<Eigen::Vector3d> points;
+  for (int i = 0; i < 80; ++i) {
+    const double x = random.Uniform(-3, 3), y = random.Uniform(-2, 2);
+    points.emplace_back(x, y, random.Uniform(5, 10));
+  }
+  std::vector<Eigen::Matrix3d> rotations;
+  std::vector<Eigen::Vector3d> translations;
+  for (int i = 0; i < kPhotos; ++i) {
+    rotations.push_back((Eigen::AngleAxisd(0.1 * (i - 3), Eigen::Vector3d::UnitY()) *
+                         Eigen::AngleAxisd(0.15 * std::sin(2.0 * i), Eigen::Vector3d::UnitX()) *
+                         Eigen::AngleAxisd(0.2 * std::cos(3.0 * i), Eigen::Vector3d::UnitZ()))
+                            .toRotationMatrix());
+    translations.push_back(-(
+        rotations.back() * Eigen::Vector3d(0.8 * (i - 3), 0.4 * std::sin(1.0 * i), 0.3 * (i % 2))));
+  }
+  const auto focal = [&](int photo) { return photo >= kPhotos - 2 ? zoomed : kFocal; };
+  std::vector<VotePair> pairs;
+  for (int a = 0; a < kPhotos; ++a) {
+    for (int b = a + 1; b < kPhotos; ++b) {
+      VotePair pair;
+      pair.photo_a = a;
+      pair.photo_b = b;
+      const auto seen = [&](int photo, const Eigen::Vector3d& p) {
+        const Eigen::Vector2d at = (rotations[photo] * p + translations[photo]).hnormalized();
+        const double dx = random.Normal();
+        return Eigen::Vector2d(focal(photo) * at + kNoise * Eigen::Vector2d(dx, random.Normal()));
+      };
+      for (const auto& p : points) {
+        const Eigen::Vector2d in_a = seen(a, p);
+        pair.points.Add(in_a, seen(b, p));
+      }
+      RelativePose pose;
+      pose.r = rotations[b] * rotations[a].transpose();
+      pose.t = (translations[b] - pose.r * translations[a]).normalized();
+      const Eigen::Vector3d k_a(1 / focal(a), 1 / focal(a), 1), k_b(1 / focal(b), 1 / focal(b), 1);
+      pair.fundamental = k_b.asDiagonal() * pose.Essential() * k_a.asDiagonal();
+      pairs.push_back(pair);
+    }
+  }
+  return pairs;
+}
+
+TEST(LensVote, FindsTheFocalLengthWithinItsDeviation) {
+  const auto vote = VoteOnLens(Pairs(kFocal), {});
+  ASSERT_TRUE(vote);
+  EXPECT_LT(std::abs(std::log(vote->lens.focal / kFocal)), 4 * vote->log_focal_deviation);
+  EXPECT_LT(vote->log_focal_deviation, 0.01);
+}
+
+// Matches of one zoomed photo agree with each other as well as any: only that photos differ tells.
+TEST(LensVote, ItsDeviationTellsThatPhotosDisagree) {
+  const auto agreed = VoteOnLens(Pairs(kFocal), {}), mixed = VoteOnLens(Pairs(1.05 * kFocal), {});
+  ASSERT_TRUE(agreed && mixed);
+  EXPECT_GT(mixed->log_focal_deviation, 3 * agreed->log_focal_deviation);
+  EXPECT_GT(4 * mixed->log_focal_deviation, std::abs(std::log(mixed->lens.focal / kFocal)));
+}
+
+TEST(LensVote, NoPairsVoteForNothing) { EXPECT_FALSE(VoteOnLens({}, {})); }
+
+}  // namespace
+}  // namespace dtr::sfm::matching
