@@ -16,7 +16,6 @@
 #include "dtr/io/set_io.h"
 #include "dtr/io/validation_result.h"
 #include "dtr/render/scene.h"
-#include "dtr/render/time_steps.h"
 #include "pipeline/detail/web/web_view.h"
 #include "pipeline/evaluate.h"
 #include "pipeline/prune.h"
@@ -38,11 +37,10 @@ constexpr WebCoding kCodings[] = {{85, 0.15, false}, {80, 0.15, true}, {70, 0.2,
 constexpr size_t kCodingsBeforePruning = 4;
 constexpr double kPruningDb[] = {0.5, 2};
 
-/// The source views, each once, in byte order of their ids.
-std::vector<View> SourceViews(DtrSet& set) {
-  io::CollapseDuplicates(set);
+/// The source views of a time step, each once, in byte order of their ids.
+std::vector<View> SourceViews(const Frame& frame) {
   std::vector<View> views;
-  for (View& view : set.frames.front().views) {
+  for (const View& view : frame.views) {
     if (view.role == ViewRole::kSource) views.push_back(view);
   }
   std::stable_sort(views.begin(), views.end(),
@@ -114,17 +112,40 @@ void AddValidation(const DtrSet& set, Figures& figures) {
 Figures FiguresOf(const WebPageRequest& request, const DtrSet& set, const std::vector<View>& views,
                   Progress& progress) {
   const PinholeCamera& camera = views.front().camera;
+  const bool is_still = set.frames.size() == 1;
   Figures figures = {
       {"photos", std::to_string(views.size())},
       {"first photo", fmt::format("{} x {} pixels", camera.width_px(), camera.height_px())},
       {"unit", NameOf(set.unit)}};
-  AddHeldOut(request, set, figures, progress);
+  if (is_still) {
+    AddHeldOut(request, set, figures, progress);
+  } else {
+    figures.emplace_back("time steps", std::to_string(set.frames.size()));
+  }
   AddValidation(set, figures);
   return figures;
 }
 
-std::string SetJson(const std::string& name, const DtrSet& set, const Figures& figures,
+/// What a page is made of.
+struct Source {
+  fs::path folder;
+  DtrSet set;
+  std::vector<View> views;  ///< of all time steps, one after the other
+  std::vector<size_t> views_of_step;
+  Figures figures;
+};
+
+Json TimeStepsJson(const Source& source) {
+  Json steps = Json::array();
+  for (size_t i = 0; i < source.views_of_step.size(); ++i) {
+    steps.push_back({{"time_s", source.set.frames[i].time_s}, {"views", source.views_of_step[i]}});
+  }
+  return steps;
+}
+
+std::string SetJson(const std::string& name, const Source& source,
                     const std::vector<WebView>& packed) {
+  const DtrSet& set = source.set;
   Json json = {{"format", "dtr-web-page"},
                {"version", 2},
                {"name", name},
@@ -133,7 +154,8 @@ std::string SetJson(const std::string& name, const DtrSet& set, const Figures& f
                {"bounds", nullptr},
                {"validation", io::ValidationLine(set)},
                {"validation_failed", !io::ValidationWarning(set).empty()},
-               {"figures", figures}};
+               {"figures", source.figures},
+               {"time_steps", TimeStepsJson(source)}};
   if (!set.bounds.empty()) {
     json["bounds"] = {{"min", JsonOf(set.bounds.min)}, {"max", JsonOf(set.bounds.max)}};
   }
@@ -144,19 +166,15 @@ std::string SetJson(const std::string& name, const DtrSet& set, const Figures& f
   return text + "]}";
 }
 
-/// What a page is made of.
-struct Source {
-  fs::path folder;
-  DtrSet set;
-  std::vector<View> views;
-  Figures figures;
-};
-
 Source SourceOf(const WebPageRequest& request, Progress& progress) {
-  Source source{request.set, io::ReadSet(request.set), {}, {}};
-  RequireOneFrame(source.set);
-  source.views = SourceViews(source.set);
-  RequireDepth(request.set, source.views);
+  Source source{request.set, io::ReadSet(request.set), {}, {}, {}};
+  io::CollapseDuplicates(source.set);
+  for (const Frame& frame : source.set.frames) {
+    const std::vector<View> views = SourceViews(frame);
+    RequireDepth(request.set, views);
+    source.views.insert(source.views.end(), views.begin(), views.end());
+    source.views_of_step.push_back(views.size());
+  }
   source.figures = FiguresOf(request, source.set, source.views, progress);
   return source;
 }
@@ -186,7 +204,7 @@ Files FilesOf(const WebPageRequest& request, const Source& source, const WebCodi
     packed.push_back(PackView(view, source.folder, coding));
     progress.Update(static_cast<int>(packed.size()));
   }
-  page.set_json = SetJson(name, source.set, source.figures, packed);
+  page.set_json = SetJson(name, source, packed);
   for (WebView& view : packed) page.views.push_back(std::move(view.bytes));
   if (request.as_site) return web::MakeWebSite(page);
   return {{request.output.filename().string(), web::MakeWebPage(page)}};
@@ -245,7 +263,9 @@ Source Pruned(const WebPageRequest& request, double loss_db, const fs::path& out
 Files SmallEnough(const WebPageRequest& request, const Source& source, const fs::path& work,
                   WebPageReport& report, Progress& progress) {
   const std::span<const WebCoding> codings(kCodings);
-  if (!request.max_mb || !request.make_renderer || !request.make_timed_renderer) {
+  const bool can_prune =
+      request.make_renderer && request.make_timed_renderer && source.set.frames.size() == 1;
+  if (!request.max_mb || !can_prune) {
     return FilesWithin(request, source, codings, report, progress);
   }
   Files files =

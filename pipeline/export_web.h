@@ -27,10 +27,10 @@ struct WebPageRequest {
   std::optional<int> jpeg_quality;
   double depth_error_px = 0.15;  ///< largest error of depth by rounding, pixels of disparity
   /// For the figures of held-out photos that the page shows, as Evaluate draws them; not called
-  /// where the set has none. Empty: no such figures.
+  /// where the set has none, or several time steps. Empty: no such figures.
   std::function<eval::RenderFunction()> make_renderer;
   /// With make_renderer: for max_mb, what images do not need is left out (PruneSet) where coarser
-  /// coding alone would cost more.
+  /// coding alone would cost more; not of sets of several time steps.
   std::function<std::unique_ptr<eval::TimedRenderer>()> make_timed_renderer;
   RenderOptions render;
   int threads = 0;
@@ -45,9 +45,9 @@ struct WebPageReport {
   std::string warning;  ///< a failed validation in a line, which the page shows, too; or empty
 };
 
-/// Writes the page, or the site, of the set's source views. Nothing of it exists until it is whole. Throws
-/// UsageError where the output exists and for dynamic sets, Error for a set without depth, a broken
-/// one, and where max_mb cannot be met: then it says the least that can.
+/// Writes the page, or the site, of the set's source views. Nothing of it exists until it is whole.
+/// Throws UsageError where the output exists, Error for a set without depth, a broken one, and
+/// where max_mb cannot be met: then it says the least that can.
 WebPageReport ExportWebPage(const WebPageRequest& request, Progress& progress);
 
 }  // namespace dtr::pipeline

@@ -140,6 +140,14 @@ TEST_F(DynamicSet, WhatKnowsStillScenesAloneSaysSo) {
                  "where nothing moves");
 }
 
+TEST_F(DynamicSet, ItsWebPageHasTheViewsOfAllTimeSteps) {
+  DtrOk({"export", Set(), "--format", "web", "-o", In("site/")});
+  const Json set = Json::parse(Text(In("site/set.json")));
+  EXPECT_EQ(set["time_steps"],
+            (Json{{{"time_s", 0}, {"views", 4}}, {{"time_s", 0.5}, {"views", 4}}}));
+  EXPECT_EQ(set["views"].size(), 8u);
+}
+
 // What up is, and whose metres, are told by the scale's provenance.
 TEST_F(DynamicSet, HowLengthsWereFoundIsKeptWhereAllTimeStepsSayTheSame) {
   const auto joined_scale = [&](const std::vector<Json>& scales) {

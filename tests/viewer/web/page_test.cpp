@@ -151,6 +151,18 @@ TEST_F(WebPage, DrawsWhatTheReferenceRendererDraws) {
   EXPECT_GT(within, kAgreeing * away) << within << " of " << away;
 }
 
+TEST_F(WebPage, ShowsEachEyeOfAHeadsetFromWhereItIs) {
+  const nlohmann::json found = Found({DTR_DRIVE_HEADSET, Page().string(), kChromium});
+  EXPECT_THAT(found["messages"], IsEmpty()) << found;
+  EXPECT_EQ(found["offered"], true);
+  EXPECT_EQ(found["worst"], 0);  // the same image, copied
+  EXPECT_GT(found["bright"], 0.5);
+  EXPECT_NEAR(found["apart"].get<double>(), 0.064, 1e-6);  // metres
+  EXPECT_EQ(found["right"], true);
+  EXPECT_GT(found["differing"], 0.02);
+  EXPECT_EQ(found["back"], true);
+}
+
 TEST_F(WebPage, OneDamagedPhotoIsNamedAndTheOthersAreShown) {
   Damage("id=\"view-1\">", 400, "AAAA");
   const nlohmann::json found = Driven();

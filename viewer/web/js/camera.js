@@ -9,6 +9,12 @@ export function placed(camera) {
   return { ...camera, rotation, matrix, centre: scaled(times(transposed(matrix), camera.translation), -1) };
 }
 
+/** A set with its views placed, and `steps`, the views of each time step. */
+export function placedSet(set) {
+  const views = set.views.map(placed);
+  return { ...set, views, steps: set.times.map((_, i) => views.filter((view) => view.step === i)) };
+}
+
 /** A camera at `centre` with orientation `rotation`. */
 export function cameraAt(intrinsics, rotation, centre) {
   return placed({ ...intrinsics, rotation, translation: scaled(times(matrixOfQuaternion(unitQuaternion(rotation)), centre), -1) });
@@ -35,6 +41,12 @@ export function fitted(photo, width, height) {
     width, height, fx: photo.fx * scale, fy: photo.fy * scale,
     cx: width / 2 + (photo.cx - photo.width / 2) * scale, cy: height / 2 + (photo.cy - photo.height / 2) * scale,
   };
+}
+
+/** fx, fy, cx, cy in pixels of a perspective projection matrix of OpenGL, 16 numbers, column by column. */
+export function intrinsicsOf(projection, width, height) {
+  const p = projection;
+  return { fx: p[0] * width / 2, fy: p[5] * height / 2, cx: (1 - p[8]) * width / 2, cy: (1 + p[9]) * height / 2 };
 }
 
 /** Towards the sky, from how the photos were held: the mean of their upward axes. */

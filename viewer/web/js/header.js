@@ -78,6 +78,19 @@ function viewOf(value, index) {
   };
 }
 
+// Views follow each other by their time step: to each of them the time step's index.
+function timeStepsOf(value, count) {
+  if (!Array.isArray(value) || value.length < 1 || value.length > count) {
+    fail("set.time_steps", `1 to ${count} time steps`, String(value?.length));
+  }
+  const steps = value.map((step, i) => ({
+    time: number(step?.time_s, `set.time_steps[${i}].time_s`, -1e12, 1e12),
+    views: whole(step.views, `set.time_steps[${i}].views`, 1, count),
+  }));
+  const sum = steps.reduce((total, step) => total + step.views, 0);
+  return sum === count ? steps : fail("set.time_steps", `${count} views together`, String(sum));
+}
+
 /** The set that the header's text describes. Throws a Problem for whatever the exporter cannot have written. */
 export function parseHeader(text) {
   let json;
@@ -90,6 +103,8 @@ export function parseHeader(text) {
   if (!Array.isArray(json.views) || json.views.length < 1 || json.views.length > kMaxViews) {
     fail("set.views", `1 to ${kMaxViews} views`, String(json.views?.length));
   }
+  const steps = timeStepsOf(json.time_steps, json.views.length);
+  const stepOfView = steps.flatMap((step, i) => Array(step.views).fill(i));
   const bounds = json.bounds === null ? null
     : { min: numbers(json.bounds?.min, 3, "set.bounds.min"), max: numbers(json.bounds?.max, 3, "set.bounds.max") };
   return {
@@ -98,6 +113,7 @@ export function parseHeader(text) {
     validation: words(json.validation, "set.validation"),
     failed: json.validation_failed === true,
     figures: Array.isArray(json.figures) ? json.figures.filter((f) => Array.isArray(f) && f.length === 2).map((f) => f.map(String)) : [],
-    views: json.views.map(viewOf),
+    times: steps.map((step) => step.time),
+    views: json.views.map((view, i) => ({ ...viewOf(view, i), step: stepOfView[i] })),
   };
 }

@@ -33,6 +33,14 @@ export function matrixOfQuaternion([w, x, y, z]) {
   ];
 }
 
+/** Of a rotation's rows; Shepperd 1978: from the largest of the four. */
+export function quaternionOfMatrix([[a, b, c], [d, e, f], [g, h, i]]) {
+  const squares = [1 + a + e + i, 1 + a - e - i, 1 - a + e - i, 1 - a - e + i], largest = squares.indexOf(Math.max(...squares));
+  const q = [[squares[0], h - f, c - g, d - b], [h - f, squares[1], b + d, c + g], [c - g, b + d, squares[2], f + h],
+    [d - b, c + g, f + h, squares[3]]][largest];
+  return unitQuaternion(q);
+}
+
 export function unitQuaternion(q) {
   const length = Math.hypot(...q);
   return q.map((v) => v / length);

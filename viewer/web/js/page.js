@@ -3,9 +3,11 @@ import { Renderer } from "./renderer.js";
 import { Loader } from "./loader.js";
 import { Navigation } from "./navigation.js";
 import { Keys, Pointers } from "./input.js";
-import { placed, upOf } from "./camera.js";
-import { ranked } from "./selection.js";
+import { placed, placedSet, upOf } from "./camera.js";
+import { kViews, wantedOrder } from "./selection.js";
+import { TimeControl } from "./time.js";
 import { drawMeasure, pickedPoint } from "./measure.js";
+import { Headset } from "./xr.js";
 import { Problem } from "./problem.js";
 
 const kMaxCanvasPixels = 2.1e6;
@@ -25,16 +27,20 @@ export function showProblem(text) {
 export class Page {
   /** `dataOf(view)`: promise of its bytes (loader.js); `makeWorker()`: a worker that decodes. */
   constructor(set, shaders, { dataOf, makeWorker }) {
-    this.set = { ...set, views: set.views.map(placed) };
+    this.set = placedSet(set);
     this.canvas = element("canvas");
     const gl = this.canvas.getContext("webgl2", { alpha: false, antialias: false, depth: false, powerPreference: "high-performance" });
     if (!gl) {
       throw new Problem("this page needs WebGL2, which this browser does not offer here; open it in a current Firefox, Chrome, Edge or Safari, with graphics acceleration on");
     }
     this.renderer = new Renderer(gl, shaders, this.set);
-    this.navigation = new Navigation(this.set, upOf(this.set.views));
+    const up = upOf(this.set.views);
+    this.navigation = new Navigation({ ...this.set, views: this.set.steps[0] }, up);
+    this.headset = new Headset(this, gl, up, element("headset"));
+    this.time = new TimeControl(this.set.times, element("time"), element("play"), () => { this.dirty = true; });
     this.options = { depth: false, compare: false, measure: false, split: 0.5 };
     this.points = [];
+    this.eye = null;  // the camera of a headset's eye
     this.level = 0;
     this.dirty = true;
     this.last = 0;
@@ -55,7 +61,7 @@ export class Page {
   }
 
   order() {
-    return ranked(this.set, this.set.views, this.camera()).candidates.map((c) => c.view);
+    return wantedOrder(this.set, this.time.step, this.eye ?? this.camera());
   }
 
   arrived() {
@@ -112,7 +118,8 @@ export class Page {
     const commands = {
       Period: () => this.stepPhoto(1), Comma: () => this.stepPhoto(-1), KeyC: () => this.toggle("compare"),
       KeyV: () => this.toggle("depth"), KeyM: () => this.toggle("measure"), KeyF: () => this.fullScreen(),
-      KeyH: () => this.togglePanel(), Home: () => this.goTo(0),
+      KeyH: () => this.togglePanel(), Home: () => this.goTo(0), Space: () => this.time.toggle(),
+      KeyX: () => this.headset.toggle().catch((error) => showProblem(`the headset cannot be used: ${error.message}`)),
     };
     this.keys = new Keys(commands);
     for (const button of document.querySelectorAll("button[data-key]")) button.addEventListener("click", commands[button.dataset.key]);
@@ -138,10 +145,22 @@ export class Page {
     return true;
   }
 
-  /** The photo taken nearest to where the camera is, of those loaded. */
+  /** The photo taken nearest to where the camera is, of those loaded of the time step that is shown. */
   nearest() {
-    const loaded = this.order().filter((view) => this.renderer.store.has(view));
-    return loaded[0] ?? this.set.views[0];
+    const { step, store } = this.renderer;
+    return this.order().find((view) => view.step === step && store.has(view)) ?? this.set.steps[step][0];
+  }
+
+  // The wanted time step is shown once the views that it is drawn from are there, or as much of them as can be.
+  chooseStep() {
+    const { renderer, loader } = this, wanted = this.order().filter((view) => view.step === this.time.step).slice(0, kViews);
+    if (wanted.every((view) => renderer.store.has(view) || loader.broken.has(view.index)) || !this.pictureOf(renderer.step)) {
+      renderer.step = this.time.step;
+    }
+  }
+
+  pictureOf(step) {
+    return this.set.steps[step].some((view) => this.renderer.store.has(view));
   }
 
   click(pixel) {
@@ -181,7 +200,7 @@ export class Page {
   }
 
   describe() {
-    const { photo } = this.navigation, { views } = this.set;
+    const { photo } = this.navigation, views = this.set.steps[0];
     element("photo").textContent = `${photo + 1} / ${views.length}  ${views[photo].name}`;
   }
 
@@ -192,9 +211,10 @@ export class Page {
   }
 
   tick(now) {
-    if (this.stopped) return;
+    if (this.stopped || this.headset.active) return;
     const seconds = Math.min((now - this.last) / 1000, kMostStepS);
     this.fitCanvas();
+    this.time.play(seconds, this.renderer.step === this.time.step);
     let moving = this.navigation.step(now);
     if (this.keys.flying) {
       const [x, y, z, turn] = this.keys.motion;
@@ -212,7 +232,8 @@ export class Page {
   drawFrame(scale) {
     this.dirty = false;
     this.coarse = scale !== 1;
-    if (this.renderer.store.loaded.size === 0) return;
+    this.chooseStep();
+    if (!this.pictureOf(this.renderer.step)) return this.loader.run();
     this.frame = this.renderer.draw(this.camera(scale));
     const { options } = this;
     this.renderer.present(this.frame, {
@@ -222,6 +243,21 @@ export class Page {
     drawMeasure(element("marks"), this.camera(), this.points, this.set.unit);
     this.loader.run();
     this.pictured();
+  }
+
+  /** One eye's image into its part of a framebuffer. */
+  drawEye(camera, framebuffer, viewport) {
+    this.eye = camera;
+    this.chooseStep();
+    if (this.pictureOf(this.renderer.step)) this.renderer.compose(this.renderer.draw(camera), framebuffer, viewport, [0, 0], false);
+    this.loader.run();
+  }
+
+  /** After the headset. */
+  resume() {
+    this.eye = null;
+    this.dirty = true;
+    requestAnimationFrame((now) => this.tick(now));
   }
 
   // The range of false colours: that of the measured depth of the views in use.

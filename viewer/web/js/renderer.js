@@ -35,6 +35,7 @@ export class Renderer {
     const floats = gl.getExtension("EXT_color_buffer_float") ?? gl.getExtension("EXT_color_buffer_half_float");
     this.cellFormat = floats ? gl.RGBA16F : gl.SRGB8_ALPHA8;
     this.store = new ViewStore(gl, shaders, set.views);
+    this.step = 0;  // the time step that is drawn
     const program = (vertex, fragment, defines) => new Program(gl, shaders, vertex, fragment, defines);
     const screen = (fragment, defines) => program("full_screen.vert", fragment, defines);
     this.triangles = program("coarse_triangles.vert", "coarse.frag");
@@ -86,7 +87,7 @@ export class Renderer {
 
   /** Views that this camera's image would be drawn from, of those that are loaded. */
   select(novel) {
-    return selectViews(this.set, this.set.views.filter((view) => this.store.has(view)), novel);
+    return selectViews(this.set, this.set.steps[this.step].filter((view) => this.store.has(view)), novel);
   }
 
   /** Draws; the image is in targets.smoothed, seen pixels and their depth in targets.result. Returns the frame's facts. */

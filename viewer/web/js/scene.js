@@ -3,8 +3,8 @@ import { Loader } from "./loader.js";
 import { Renderer } from "./renderer.js";
 import { FolderSource } from "./source.js";
 import { parseHeader } from "./header.js";
-import { placed, upOf } from "./camera.js";
-import { ranked } from "./selection.js";
+import { placed, placedSet, upOf } from "./camera.js";
+import { wantedOrder } from "./selection.js";
 import { takeState } from "./gl.js";
 
 /**
@@ -18,8 +18,9 @@ export class SetScene {
    */
   constructor(gl, shaders, set, { source, makeWorker, changed = () => {}, failed = () => {} }) {
     this.gl = gl;
-    this.set = { ...set, views: set.views.map(placed) };
+    this.set = placedSet(set);
     this.up = upOf(this.set.views);  // towards the sky, a unit vector of the set's world
+    this.step = 0;             // the time step that is shown, of set.times
     this.uploads = [];
     takeState(gl);
     this.renderer = new Renderer(gl, shaders, this.set);
@@ -45,7 +46,7 @@ export class SetScene {
   }
 
   order() {
-    return ranked(this.set, this.set.views, this.camera).candidates.map((c) => c.view);
+    return wantedOrder(this.set, this.step, this.camera);
   }
 
   /** Draws into textures of its own; null while no view is there. Leaves the context's state changed. */
@@ -53,8 +54,8 @@ export class SetScene {
     takeState(this.gl);
     this.camera = placed(camera);
     for (const put of this.uploads.splice(0)) put();
-    if (this.renderer.store.loaded.size === 0) return null;
-    const frame = this.renderer.draw(this.camera);
+    this.renderer.step = this.step;
+    const frame = this.set.steps[this.step].some((view) => this.renderer.store.has(view)) ? this.renderer.draw(this.camera) : null;
     this.loader.run();
     return frame;
   }

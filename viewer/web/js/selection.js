@@ -40,6 +40,11 @@ export function ranked(set, views, novel) {
   return { perPixel, candidates };
 }
 
+/** All views, most wanted first: those of a time step, then of the steps that follow it, from the last on to the first. */
+export function wantedOrder(set, step, novel) {
+  return set.steps.flatMap((_, i) => ranked(set, set.steps[(step + i) % set.steps.length], novel).candidates.map((c) => c.view));
+}
+
 function cutFactor(angle, cut) {
   return cut > 0 ? clamp((cut - angle) / (kFallingShare * cut), kLeastFactor, 1) : 1;
 }

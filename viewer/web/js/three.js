@@ -1,4 +1,6 @@
 // A set as an object of three.js. three.js itself is given by its user; nothing of it is here.
+import { intrinsicsOf } from "./camera.js";
+import { quaternionOfMatrix } from "./maths.js";
 import { Problem } from "./problem.js";
 
 const kShear = 1e-4;  // of a scale: what rounding leaves
@@ -19,12 +21,8 @@ function cameraOf(THREE, camera, object, width, height) {
   // x right, y down, z forward, out of x right, y up, z back.
   const cam_from_set = new THREE.Matrix4().makeScale(1, -1, -1).multiply(camera.matrixWorldInverse).multiply(object.matrixWorld);
   const { scale, rows, translation } = similarityOf(cam_from_set);
-  const rotation = new THREE.Quaternion().setFromRotationMatrix(new THREE.Matrix4().set(...rows.flatMap((row) => [...row, 0]), 0, 0, 0, 1));
   return {
-    camera: {
-      width, height, fx: p[0] * width / 2, fy: p[5] * height / 2, cx: (1 - p[8]) * width / 2, cy: (1 + p[9]) * height / 2,
-      rotation: [rotation.w, rotation.x, rotation.y, rotation.z], translation,
-    },
+    camera: { width, height, ...intrinsicsOf(p, width, height), rotation: quaternionOfMatrix(rows), translation },
     depthOf: [-p[10], p[14] / scale],
   };
 }

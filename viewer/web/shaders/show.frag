@@ -12,6 +12,7 @@ uniform float photo_from_px;     // of the canvas; the photo is right of it
 uniform vec3 exposure;           // the set's mean exposure to the photo's own
 layout(std140) uniform Photo { View photo; };
 
+#include "bilinear.glsl"
 #include "colour.glsl"
 layout(location = 0) out vec4 out_colour;
 
@@ -51,10 +52,6 @@ void main() {
     float t = (w - inverse_depths.y) / (inverse_depths.x - inverse_depths.y);
     out_colour = vec4(w > 0.0 ? FalseColour(clamp(t, 0.0, 1.0)) : vec3(0.0), 1.0);
   } else {
-    vec2 centre = pixel - 0.5;
-    ivec2 last = textureSize(image, 0) - 1, low = clamp(ivec2(floor(centre)), ivec2(0), last), high = min(low + 1, last);
-    vec2 share = clamp(centre - vec2(low), 0.0, 1.0);
-    out_colour = vec4(mix(mix(texelFetch(image, low, 0).rgb, texelFetch(image, ivec2(high.x, low.y), 0).rgb, share.x),
-                          mix(texelFetch(image, ivec2(low.x, high.y), 0).rgb, texelFetch(image, high, 0).rgb, share.x), share.y), 1.0);
+    out_colour = vec4(ImageAt(image, pixel), 1.0);
   }
 }
