@@ -343,8 +343,8 @@ std::vector<sfm::Descriptor> ReadDescriptors(const fs::path& database, std::uint
     }
   });
   if (found != keypoints) {
-    RejectDatabase(database, std::to_string(keypoints) + " features with " +
-                                 std::to_string(found) + " descriptors");
+    RejectDatabase(database, std::to_string(keypoints) + " features with " + std::to_string(found) +
+                                 " descriptors");
   }
   return descriptors;
 }

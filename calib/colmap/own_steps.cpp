@@ -196,7 +196,6 @@ GloballyMapped MapHere(Workspace& workspace, const SfmOptions& options,
   for (sfm::GraphImage& image : graph.images) image.name = workspace.NameOfAlias(image.name);
   if (fixed) graph.cameras = fixed->lenses;
   GloballyMapped result;
-  workspace.progress().Stage("mapping", 0);
   workspace.RunHere([&] {
     sfm::Mapped mapped = sfm::MapGlobally(graph, {.threads = workspace.threads(),
                                                   .seed = options.seed,

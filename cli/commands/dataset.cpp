@@ -58,9 +58,10 @@ void DeclareMakeOptions(CLI::App& command, MakeOptions& options) {
   command.add_option("--height", spec.height_px, "Photo height [640]")->type_name("PX");
   command.add_option("--noise", spec.noise, "Standard deviation of pixel noise, 8-bit levels [0]");
   command
-      .add_option("--supersampling", spec.supersampling,
-                  "N x N rays per pixel of a photo: 1 takes a ninth of the time, with stairs at edges "
-                  "[3]")
+      .add_option(
+          "--supersampling", spec.supersampling,
+          "N x N rays per pixel of a photo: 1 takes a ninth of the time, with stairs at edges "
+          "[3]")
       ->type_name("N");
   command.add_option("--exposure-drift", spec.exposure_drift,
                      "Stops from the first photo to the last [0]");

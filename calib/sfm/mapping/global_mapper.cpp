@@ -26,6 +26,7 @@ constexpr int kMinResected = 20;
 constexpr int kLongTracksEnough = 150;  // images with fewer use tracks of two features, too
 constexpr int kImagesForLens = 3;
 constexpr double kRadius = 10;  // of the cameras, in units of the world
+constexpr int kSteps = 8;       // that Step is called for
 
 void CheckGraph(const ViewGraph& graph) {
   const auto require = [](bool holds, const char* what) {
@@ -63,15 +64,19 @@ class Mapper {
       mapped_.why_not = "cameras of the model " + NameOf(camera.model) + " are not supported";
       return std::move(mapped_);
     }
+    if (options_.progress != nullptr) options_.progress->Stage("mapping", kSteps);
     cameras_.lenses = graph_.cameras;
     cameras_.rays = RaysOf(graph_, graph_.cameras, options_.threads);
-    Rotations rotations = SelectPairs(graph_, cameras_.rays, options_.threads, &mapped_.statistics);
+    Rotations rotations = SelectPairs(graph_, cameras_.rays, options_, &mapped_.statistics);
     mapped_.left_out = rotations.left_out;
     mapped_.why_not = rotations.why_not;
     if (!mapped_.why_not.empty()) return std::move(mapped_);
+    Step();
     tracks_ = BuildTracks(graph_, rotations.pairs);
+    Step();
     mapped_.statistics.tracks = static_cast<int>(tracks_.size());
     Place(rotations);
+    Step();
     if (!Settle() || !AdjustAll()) {
       mapped_.why_not = "bundle adjustment finds no cameras that agree with the matches";
       return std::move(mapped_);
@@ -82,6 +87,13 @@ class Mapper {
   }
 
  private:
+  // The next of kSteps is done.
+  void Step() {
+    if (options_.progress == nullptr) return;
+    options_.progress->ThrowIfInterrupted();
+    options_.progress->Update(++steps_done_);
+  }
+
   void Place(const Rotations& rotations) {
     const Positions positions = PlaceCameras(rotations.cam_from_world, cameras_.rays, tracks_,
                                              options_.seed, options_.threads, options_.progress);
@@ -118,6 +130,7 @@ class Mapper {
       FilterPoints(graph_, cameras_, {stage.max_error, kFirstAngleRad}, &points_);
       if (!Adjust(stage.cauchy, stage.lenses, stage.iterations)) return false;
       Normalise();
+      Step();
     }
     return true;
   }
@@ -130,6 +143,7 @@ class Mapper {
     FilterPoints(graph_, cameras_, {6}, &points_);
     ResectLost();
     if (!Adjust(1, true, 20)) return false;
+    Step();
     FilterPoints(graph_, cameras_, {4}, &points_);
     points_ = PointsOf(graph_, cameras_, tracks_, useful, {4}, options_.threads);
     UnplacePoor();
@@ -139,6 +153,7 @@ class Mapper {
     FilterPoints(graph_, cameras_, {4}, &points_);
     NameLost();
     Normalise();
+    Step();
     return true;
   }
 
@@ -290,6 +305,7 @@ class Mapper {
 
   const ViewGraph& graph_;
   const MapOptions& options_;
+  int steps_done_ = 0;
   Mapped mapped_;
   MapCameras cameras_;
   std::vector<Track> tracks_;

@@ -14,9 +14,11 @@ namespace dtr::sfm {
 struct MapOptions {
   int threads = 0;  ///< 0: all cores; the result does not depend on it
   std::uint64_t seed = 0;
-  bool intrinsics_are_known = false;   ///< the graph's cameras hold
-  bool focals_are_known = false;       ///< their focal lengths do
-  const Progress* progress = nullptr;  ///< asked whether to stop (Interrupted is thrown); null: not
+  bool intrinsics_are_known = false;  ///< the graph's cameras hold
+  bool focals_are_known = false;      ///< their focal lengths do
+  /// Told of the steps; asked between them, and within the long ones, whether to stop (Interrupted
+  /// is thrown). Null: neither.
+  Progress* progress = nullptr;
 };
 
 /// An image that the model lacks, and why.

@@ -242,9 +242,11 @@ Rays RaysOf(const ViewGraph& graph, std::span<const calib::LensCamera> cameras, 
 std::vector<std::optional<RelativeRotation>> RelativeRotationsOf(const ViewGraph& graph,
                                                                  const Rays& rays,
                                                                  std::span<const double> sigma_rad,
-                                                                 int threads) {
+                                                                 int threads,
+                                                                 const Progress* progress) {
   std::vector<std::optional<RelativeRotation>> of(graph.pairs.size());
   ParallelFor(0, static_cast<int>(graph.pairs.size()), threads, [&](int i) {
+    if (progress != nullptr) progress->ThrowIfInterrupted();
     const PairGeometry& pair = graph.pairs[i];
     of[i] = RotationOf(pair, i, rays, std::max(sigma_rad[pair.image_a], sigma_rad[pair.image_b]));
   });

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "calib/sfm/view_graph.h"
+#include "dtr/base/progress.h"
 
 namespace dtr::sfm {
 
@@ -34,10 +35,10 @@ struct RelativeRotation {
 /// rotation is where a robust fit of the epipolar angles (Sampson's, on the unit sphere; Cauchy's
 /// loss) starts. Pairs without one (kUncalibrated) start at the five-point algorithm (Nister
 /// 2004; OpenCV's, with RANSAC). `sigma_rad` is what a feature's position is known to, per image.
-std::vector<std::optional<RelativeRotation>> RelativeRotationsOf(const ViewGraph& graph,
-                                                                 const Rays& rays,
-                                                                 std::span<const double> sigma_rad,
-                                                                 int threads);
+/// Throws Interrupted where `progress` (null: nothing) asks to stop.
+std::vector<std::optional<RelativeRotation>> RelativeRotationsOf(
+    const ViewGraph& graph, const Rays& rays, std::span<const double> sigma_rad, int threads,
+    const Progress* progress = nullptr);
 
 /// Angle of a match to the epipolar geometry in rad, signed; `ray_a`, `ray_b` unit vectors.
 double EpipolarAngle(const Eigen::Matrix3d& b_from_a, const Eigen::Vector3d& b_translation_a,

@@ -92,13 +92,14 @@ std::vector<double> SigmasOf(const ViewGraph& graph) {
   return sigmas;
 }
 
-Rotations SelectPairs(const ViewGraph& graph, const Rays& rays, int threads,
+Rotations SelectPairs(const ViewGraph& graph, const Rays& rays, const MapOptions& options,
                       MapStatistics* statistics) {
   const auto images = static_cast<int>(graph.images.size());
   Rotations result;
   std::vector<RelativeRotation> pairs;
   bool parallax = false;
-  for (auto& rotation : RelativeRotationsOf(graph, rays, SigmasOf(graph), threads)) {
+  for (auto& rotation :
+       RelativeRotationsOf(graph, rays, SigmasOf(graph), options.threads, options.progress)) {
     if (!rotation || rotation->matches < kMinPairMatches) continue;
     parallax = parallax || graph.pairs[rotation->pair].kind != PairKind::kRotation;
     pairs.push_back(std::move(*rotation));

@@ -20,8 +20,8 @@ struct Rotations {
   std::string why_not;
 };
 
-/// Triplets, averaging, filtering, each followed by the largest connected part.
-Rotations SelectPairs(const ViewGraph& graph, const Rays& rays, int threads,
+/// Triplets, averaging, filtering, each followed by the largest connected part. Throws Interrupted.
+Rotations SelectPairs(const ViewGraph& graph, const Rays& rays, const MapOptions& options,
                       MapStatistics* statistics);
 
 /// What a feature's position is known to, in rad, per image.

@@ -93,8 +93,8 @@ std::vector<PairGeometry> Geometries(std::span<const MatchPhoto> photos,
         return graph.focal_is_known[static_cast<size_t>(photos[static_cast<size_t>(photo)].camera)];
       };
       found[static_cast<size_t>(k)] =
-          GeometryOf(features[a], features[b], coarse[static_cast<size_t>(k)],
-                     knows(a) && knows(b), HashOf(options.seed, 2, a, b));
+          GeometryOf(features[a], features[b], coarse[static_cast<size_t>(k)], knows(a) && knows(b),
+                     HashOf(options.seed, 2, a, b));
       progress.Update(++done);
     });
     journal.AddGeometries(std::span(found).subspan(begin, end - begin));
@@ -143,8 +143,8 @@ MatchResult MatchPhotos(std::span<const MatchPhoto> photos,
     if (options.lens_is_known[c]) graph.focal_is_known[c] = true;
   }
   VoteOnCameras(photos, coarse, options, graph, result.notes);
-  graph.pairs = Geometries(photos, pairs, coarse, std::move(kept.geometries), graph, options, journal,
-                           progress);
+  graph.pairs = Geometries(photos, pairs, coarse, std::move(kept.geometries), graph, options,
+                           journal, progress);
   return result;
 }
 

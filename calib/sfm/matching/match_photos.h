@@ -33,8 +33,8 @@ struct MatchOptions {
   /// Of these, match each photo with those that resemble it and with the next in order only.
   bool preselect = false;
   /// Loads the descriptors of a photo's `largest` first features, or of all where it has fewer; as
-  /// often as `descriptor_gb` gigabytes of them in memory (0: no bound) need. Threads call it at the
-  /// same time. Empty: the photos have their own.
+  /// often as `descriptor_gb` gigabytes of them in memory (0: no bound) need. Threads call it at
+  /// the same time. Empty: the photos have their own.
   std::function<std::vector<Descriptor>(int photo, size_t largest)> load_descriptors = {};
   double descriptor_gb = 0;
   /// Keeps what was matched, for an interrupted run of the same `journal_inputs` (all that the

@@ -155,7 +155,8 @@ std::vector<Eigen::Matrix3d> EssentialFromFive(const PointPairs& points,
   const Eigen::Matrix<double, 9, 4> basis = NullSpace<5>(Equations<5>(points, five));
   const Eigen::Matrix<double, 10, 20> m = Constraints(basis);
   const Sized<10, 10> left = m.leftCols<10>(), right = m.rightCols<10>();
-  const Eigen::Matrix<double, 10, 10> reduced = Eigen::PartialPivLU<Sized<10, 10>>(left).solve(right);
+  const Eigen::Matrix<double, 10, 10> reduced =
+      Eigen::PartialPivLU<Sized<10, 10>>(left).solve(right);
   if (!reduced.allFinite()) return {};
   // Multiplication by x in the basis of the last ten monomials (x^2 .. 1).
   Sized<10, 10> action = Sized<10, 10>::Zero(10, 10);

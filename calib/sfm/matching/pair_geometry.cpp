@@ -138,8 +138,9 @@ RayFeatures RaysOf(const std::vector<Keypoint>& keypoints, LoadedDescriptors des
   return features;
 }
 
-std::optional<PairGeometry> GeometryOf(const RayFeatures& a, const RayFeatures& b, const CoarsePair& coarse,
-                                       bool focal_is_known, std::uint64_t seed) {
+std::optional<PairGeometry> GeometryOf(const RayFeatures& a, const RayFeatures& b,
+                                       const CoarsePair& coarse, bool focal_is_known,
+                                       std::uint64_t seed) {
   FeatureMatches largest;
   for (const CoarseMatch& m : coarse.matches) largest.emplace_back(m.a, m.b);
   const PointPairs points = WithRays(a, b, largest).points;

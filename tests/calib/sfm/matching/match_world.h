@@ -69,7 +69,7 @@ inline Where At(const Eigen::Vector3d& centre, double yaw_deg, double pitch_deg 
 }
 
 inline MatchPhoto Photo(const World& world, const Where& where, const calib::LensCamera& camera,
-                 std::uint64_t seed) {
+                        std::uint64_t seed) {
   constexpr double kNoisePx = 0.3, kDescriptorNoise = 0.15;
   Random random(seed);
   MatchPhoto photo{"photo", camera.width_px, camera.height_px, 0, {}};
@@ -96,7 +96,7 @@ inline MatchPhoto Photo(const World& world, const Where& where, const calib::Len
 }
 
 inline MatchResult Match(const std::vector<MatchPhoto>& photos, const calib::LensCamera& camera,
-                  bool known, int threads = 2) {
+                         bool known, int threads = 2) {
   MatchOptions options;
   options.threads = threads;
   if (known) options.lens_is_known.assign(1, true);
