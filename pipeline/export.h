@@ -87,4 +87,14 @@ ExportReport ExportSplat(const ExportRequest& request, Progress& progress);
 /// with depth.
 ExportReport ExportMvsnet(const ExportRequest& request, Progress& progress);
 
+/// Writes a folder for OpenMVS: scene.mvs (its interface archive, version 5, with the points that
+/// two of its images see), depthNNNN.dmap with normals and confidence, images and masks of the
+/// views with depth.
+ExportReport ExportOpenmvs(const ExportRequest& request, Progress& progress);
+
+/// Writes a folder for MPEG's immersive video (ISO/IEC 23090-12) programs TMIV and RVS, and
+/// OpenDIBR: sequence.json, texture (10 bits, BT.709) and depth (16 bits, inverse depth) as raw
+/// 4:2:0 frames of the views with depth.
+ExportReport ExportMiv(const ExportRequest& request, Progress& progress);
+
 }  // namespace dtr::pipeline

@@ -39,6 +39,8 @@ const std::vector<Format>& Formats() {
       {"depth", pipeline::ExportDepth, {}, nullptr},
       {"nerfstudio", pipeline::ExportNerfstudio, {}, "points"},
       {"mvsnet", pipeline::ExportMvsnet, {}, nullptr},
+      {"openmvs", pipeline::ExportOpenmvs, {}, "points"},
+      {"miv", pipeline::ExportMiv, {}, nullptr},
   };
   return formats;
 }
@@ -157,7 +159,7 @@ void AddCloudOptions(CLI::App& command, ExportOptions& options) {
   options.of_formats.push_back(
       {command.add_flag("--completed", request.completed,
                         "With completed depth, not only what was measured"),
-       {"ply", "las", "mesh", "depth", "nerfstudio", "mvsnet"}});
+       {"ply", "las", "mesh", "depth", "nerfstudio", "mvsnet", "openmvs", "miv"}});
   options.of_formats.push_back(
       {command
            .add_option("--min-views", request.min_views,

@@ -71,6 +71,8 @@ const Command kCommands[] = {
     {.name = "export_depth", .words = "export OF/good.dtr --format depth -o IN/depth"},
     {.name = "export_nerfstudio", .words = "export OF/good.dtr --format nerfstudio -o IN/nerf"},
     {.name = "export_mvsnet", .words = "export OF/good.dtr --format mvsnet -o IN/mvsnet"},
+    {.name = "export_openmvs", .words = "export OF/good.dtr --format openmvs -o IN/openmvs"},
+    {.name = "export_miv", .words = "export OF/good.dtr --format miv -o IN/miv"},
     {.name = "bench",
      .words = "bench OF/good.dtr --stage storage --max-points 1 -o IN/bench --renderer cpu",
      .repeats = false,

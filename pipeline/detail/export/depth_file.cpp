@@ -36,6 +36,15 @@ DepthPlanes PlanesOf(const SurfaceView& surface, DepthKind kind) {
   return planes;
 }
 
+DepthImage OnImageGrid(const DepthImage& depth, int scale) {
+  if (scale == 1) return depth;
+  DepthImage wide(depth.width() * scale, depth.height() * scale, depth.kind());
+  for (int y = 0; y < wide.height(); ++y) {
+    for (int x = 0; x < wide.width(); ++x) wide(x, y) = depth(x / scale, y / scale);
+  }
+  return wide;
+}
+
 const char* ExtensionOf(DepthFileFormat format) {
   switch (format) {
     case DepthFileFormat::kExr:

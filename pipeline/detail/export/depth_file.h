@@ -19,6 +19,10 @@ struct DepthPlanes {
 /// Of a view on the grid of its depth map.
 DepthPlanes PlanesOf(const SurfaceView& surface, DepthKind kind);
 
+/// Of the image's size, each depth pixel as often as the image has pixels of it (`scale` per axis):
+/// readers would resize it in the same way.
+DepthImage OnImageGrid(const DepthImage& depth, int scale);
+
 /// ".exr", ".pfm", ".png", ".npy"; the format of floats beside it: of PNG that is EXR.
 const char* ExtensionOf(DepthFileFormat format);
 DepthFileFormat FloatFormatOf(DepthFileFormat format);

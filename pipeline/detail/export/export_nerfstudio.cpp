@@ -24,17 +24,6 @@ using Json = nlohmann::ordered_json;
 // good enough.
 constexpr double kUsualUnit = 0.001, kFineEnough = 0.001, kMost16Bits = 65535;
 
-// Of the image's size, each depth pixel as often as the image has pixels of it: readers would
-// resize it in the same way.
-DepthImage OnImageGrid(const DepthImage& depth, int scale) {
-  if (scale == 1) return depth;
-  DepthImage wide(depth.width() * scale, depth.height() * scale, depth.kind());
-  for (int y = 0; y < wide.height(); ++y) {
-    for (int x = 0; x < wide.width(); ++x) wide(x, y) = depth(x / scale, y / scale);
-  }
-  return wide;
-}
-
 // OpenGL axes, camera to world.
 Json TransformMatrix(const Pose& cam_from_world) {
   const Pose world_from_cam = cam_from_world.Inverse();
