@@ -65,25 +65,28 @@ class Gaussians {
   }
 
  private:
-  // Every merge makes one of four.
+  // The cheapest merges until few enough are left.
   float BoundForCount() const {
-    std::vector<float> costs;
-    size_t samples = 0;
+    std::vector<SplatTree::Square> merges;
+    size_t left = gaussians_.size();  // the backdrop
     for (const SplatTree& tree : trees_) {
-      const std::vector<float> own = tree.MergeCosts();
-      costs.insert(costs.end(), own.begin(), own.end());
-      samples += tree.samples();
+      const std::vector<SplatTree::Square> own = tree.Merges();
+      merges.insert(merges.end(), own.begin(), own.end());
+      left += tree.samples();
     }
-    const size_t behind = gaussians_.size();
-    if (samples + behind <= request_.max_count) return kUsualBound;
-    const size_t merges = (samples + behind - request_.max_count + 2) / 3;
-    if (merges > costs.size()) {
-      throw Error(fmt::format("`max_count` {} cannot be met: the least is {}; prune the set first",
-                              request_.max_count, samples + behind - 3 * costs.size()));
+    std::sort(merges.begin(), merges.end(),
+              [](const auto& a, const auto& b) { return a.cost < b.cost; });
+    float bound = kUsualBound;
+    for (auto merge = merges.begin(); left > request_.max_count; ++merge) {
+      if (merge == merges.end()) {
+        throw Error(
+            fmt::format("`max_count` {} cannot be met: the least is {}; prune the set first",
+                        request_.max_count, left));
+      }
+      bound = std::max(bound, merge->cost);
+      left -= static_cast<size_t>(merge->fewer);
     }
-    const auto place = costs.begin() + static_cast<std::ptrdiff_t>(merges) - 1;
-    std::nth_element(costs.begin(), place, costs.end());
-    return std::max(*place, kUsualBound);
+    return bound;
   }
 
   const ExportRequest& request_;

@@ -20,6 +20,9 @@ constexpr double kVariance = 0.55;
 constexpr double kLowPass = 0.3, kLeastVariance = 0.2;
 // What a square costs that reaches over the end of its surface.
 constexpr double kBesideHole = 10;
+// And one of whose pixels some have no sample, as other views show them better: more than what is
+// merged where no number of Gaussians is asked for.
+constexpr double kPartial = 1.01;
 // Surfaces are drawn no more oblique to the view than this cosine: its pixels know no better.
 constexpr double kLeastCosine = 0.25;
 // Thickness along the normal, shares of the distance to its neighbour.
@@ -43,35 +46,44 @@ SplatTree::SplatTree(const SurfaceView& surface, const std::vector<FusedSample>&
   for (int k = 1; k <= kLevels; ++k) {
     const int side = 1 << k;
     Level level{index_.width() / side, index_.height() / side, {}};
-    level.cost.assign(static_cast<size_t>(level.columns) * static_cast<size_t>(level.rows),
-                      kNoSquare);
+    level.squares.resize(static_cast<size_t>(level.columns) * static_cast<size_t>(level.rows));
     for (int y = 0; y < level.rows; ++y) {
       for (int x = 0; x < level.columns; ++x) {
-        float cost = 0;
-        for (int child = 0; child < 4 && cost < kNoSquare; ++child) {
-          const int cx = 2 * x + child % 2, cy = 2 * y + child / 2;
-          if (k == 1) {
-            if (index_(cx, cy) < 0) cost = kNoSquare;
-          } else {
-            const Level& finer = levels_.back();
-            cost = std::max(
-                cost, finer.cost[static_cast<size_t>(cy) * static_cast<size_t>(finer.columns) +
-                                 static_cast<size_t>(cx)]);
-          }
-        }
-        if (cost < kNoSquare) cost = std::max(cost, CostOf(surface, side * x, side * y, side));
-        level.cost[static_cast<size_t>(y) * static_cast<size_t>(level.columns) +
-                   static_cast<size_t>(x)] = cost;
+        const Square square = SquareOf(surface, x, y, side);
+        level.squares[static_cast<size_t>(y) * static_cast<size_t>(level.columns) +
+                      static_cast<size_t>(x)] = square;
       }
     }
     levels_.push_back(std::move(level));
   }
 }
 
+SplatTree::Square SplatTree::SquareOf(const SurfaceView& surface, int x, int y, int side) const {
+  Square square{0, -1};
+  bool is_full = true;
+  for (int child = 0; child < 4; ++child) {
+    const int cx = 2 * x + child % 2, cy = 2 * y + child / 2;
+    bool is_empty = false;
+    if (side == 2) {
+      is_empty = index_(cx, cy) < 0;
+    } else {
+      const Square& finer = levels_.back().At(cx, cy);
+      is_empty = !(finer.cost < kNoSquare);
+      if (!is_empty) square.cost = std::max(square.cost, finer.cost);
+    }
+    is_full = is_full && !is_empty;
+    square.fewer += is_empty ? 0 : 1;
+  }
+  if (square.fewer < 0) return {kNoSquare, 0};
+  const double partial = is_full ? 0 : kPartial;
+  square.cost = std::max(square.cost,
+                         static_cast<float>(CostOf(surface, side * x, side * y, side) + partial));
+  return square;
+}
+
 // Its Gaussian reaches half a side beyond the square, so what lies there must fit too.
-float SplatTree::CostOf(const SurfaceView& surface, int x, int y, int side) const {
+double SplatTree::CostOf(const SurfaceView& surface, int x, int y, int side) const {
   double sum[3] = {}, squares[3] = {};
-  double w_sum = 0, w_x = 0, w_y = 0, spread = 0;
   int holes = 0;
   const double middle = 0.5 * (side - 1);
   const int x0 = std::max(0, x - side / 2),
@@ -95,53 +107,58 @@ float SplatTree::CostOf(const SurfaceView& surface, int x, int y, int side) cons
   for (int c = 0; c < 3; ++c) {
     deviation = std::max(deviation, squares[c] / around - sum[c] * sum[c] / (around * around));
   }
+  Eigen::Matrix3d moments = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
   for (int j = 0; j < side; ++j) {
     for (int i = 0; i < side; ++i) {
       const double w = surface.inverse_depth(x + i, y + j);
-      w_sum += w;
-      w_x += w * (i - middle);
-      w_y += w * (j - middle);
-      spread += (i - middle) * (i - middle);
+      if (!(w > 0)) continue;
+      const Eigen::Vector3d at(1, i - middle, j - middle);
+      moments += at * at.transpose();
+      right += w * at;
     }
   }
+  // The plane of 1/z; of pixels in a row the flattest that fits them.
+  const Eigen::Vector3d plane_of = moments.completeOrthogonalDecomposition().solve(right);
   double bend = 0;
   for (int v = y0; v < y1; ++v) {
     for (int u = x0; u < x1; ++u) {
       if (!(surface.inverse_depth(u, v) > 0)) continue;
-      const double plane = w_sum / (double(side) * side) + w_x / spread * (u - x - middle) +
-                           w_y / spread * (v - y - middle);
+      const double plane = plane_of.dot(Eigen::Vector3d(1, u - x - middle, v - y - middle));
       bend = std::max(bend, std::abs(surface.inverse_depth(u, v) - plane));
     }
   }
-  return static_cast<float>(std::max(
+  return std::max(
       std::sqrt(std::max(0.0, deviation)) / kColourDeviation + (holes > 0 ? kBesideHole : 0),
-      bend / (kBendPx * surface.inverse_depth_per_px)));
+      bend / (kBendPx * surface.inverse_depth_per_px));
 }
 
-std::vector<float> SplatTree::MergeCosts() const {
-  std::vector<float> costs;
+std::vector<SplatTree::Square> SplatTree::Merges() const {
+  std::vector<Square> merges;
   for (const Level& level : levels_) {
-    for (const float cost : level.cost) {
-      if (cost < kNoSquare) costs.push_back(cost);
+    for (const Square& square : level.squares) {
+      if (square.cost < kNoSquare && square.fewer > 0) merges.push_back(square);
     }
   }
-  return costs;
+  return merges;
 }
 
 bool SplatTree::Merged(size_t level, int x, int y, float bound) const {
   const Level& at = levels_[level];
-  return x < at.columns && y < at.rows &&
-         at.cost[static_cast<size_t>(y) * static_cast<size_t>(at.columns) +
-                 static_cast<size_t>(x)] <= bound;
+  return x < at.columns && y < at.rows && at.At(x, y).cost <= bound;
 }
 
 Gaussian SplatTree::GaussianOf(int x, int y, int side) const {
   Eigen::Vector3d p = Eigen::Vector3d::Zero(), normal = Eigen::Vector3d::Zero();
-  double rgb[3] = {}, sigma = 0;
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
+  double rgb[3] = {}, sigma = 0, count = 0;
   int views = 255;
   for (int j = 0; j < side; ++j) {
     for (int i = 0; i < side; ++i) {
+      if (!Has(x + i, y + j)) continue;
       const Sample& sample = At(x + i, y + j);
+      ++count;
+      pixel += Eigen::Vector2d(x + i + 0.5, y + j + 0.5);
       p += sample.p.cast<double>();
       normal += sample.normal.cast<double>();
       sigma += sample.sigma;
@@ -149,8 +166,8 @@ Gaussian SplatTree::GaussianOf(int x, int y, int side) const {
       for (size_t c = 0; c < 3; ++c) rgb[c] += sample.rgb[c];
     }
   }
-  const double count = double(side) * side;
   p /= count;
+  pixel /= count;
   sigma /= count;
   const Eigen::Vector3d to_camera = (centre_ - p).normalized();
   normal = normal.norm() > 0 ? Eigen::Vector3d(normal.normalized()) : to_camera;
@@ -163,9 +180,9 @@ Gaussian SplatTree::GaussianOf(int x, int y, int side) const {
     return ray * (normal.dot(p - centre_) / normal.dot(ray));
   };
   // Steps of half a pixel, which no clamped plane turns away from the camera.
-  const double u = x + 0.5 * side, v = y + 0.5 * side;
-  const Eigen::Vector3d along_u = side * (hit(u + 0.25, v) - hit(u - 0.25, v)) * 2;
-  const Eigen::Vector3d along_v = side * (hit(u, v + 0.25) - hit(u, v - 0.25)) * 2;
+  const double u = pixel.x(), v = pixel.y(), width = std::sqrt(count);
+  const Eigen::Vector3d along_u = width * (hit(u + 0.25, v) - hit(u - 0.25, v)) * 2;
+  const Eigen::Vector3d along_v = width * (hit(u, v + 0.25) - hit(u, v - 0.25)) * 2;
   const double least = std::min(along_u.norm(), along_v.norm());
   const double thickness = std::clamp(sigma, kThinnest * least, kThickest * least);
   const double variance = std::max(kLeastVariance, kVariance - kLowPass / count);
@@ -193,9 +210,20 @@ void SplatTree::AddGaussians(float bound, std::vector<Gaussian>& gaussians) cons
         if (!Merged(level, x >> (level + 1), y >> (level + 1), bound)) break;
         side = 2 << level;
       }
-      if (x % side == 0 && y % side == 0) gaussians.push_back(GaussianOf(x, y, side));
+      const int left = x - x % side, top = y - y % side;
+      if (IsFirst(x, y, left, top, side)) gaussians.push_back(GaussianOf(left, top, side));
     }
   }
+}
+
+// Of the samples of a square, row by row.
+bool SplatTree::IsFirst(int x, int y, int left, int top, int side) const {
+  for (int v = top; v <= y; ++v) {
+    for (int u = left; u < left + side; ++u) {
+      if (Has(u, v)) return u == x && v == y;
+    }
+  }
+  return false;
 }
 
 }  // namespace dtr::pipeline

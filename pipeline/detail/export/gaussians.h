@@ -19,17 +19,23 @@ struct Gaussian {
   float opacity = 1;
 };
 
-/// The samples of a view in squares of 1, 2, 4, ... pixels. A square that is full may become one
-/// Gaussian; `cost` says what is lost by that: 1 is about what the eye begins to see.
+/// The samples of a view in squares of 1, 2, 4, ... pixels, each of which may become one Gaussian.
 class SplatTree {
  public:
   /// `surface` with its colours.
   SplatTree(const SurfaceView& surface, const std::vector<FusedSample>& samples);
 
+  /// A square that becomes one Gaussian.
+  struct Square {
+    /// What is lost by that: 1 is about what the eye begins to see, and below what a square with
+    /// pixels that have no sample costs; infinite where it has none at all.
+    float cost = 0;
+    int fewer = 0;  ///< Gaussians than its four quarters have, each as one
+  };
+
   size_t samples() const { return samples_.size(); }
-  /// Of every square that can be merged: four become one where its cost is at most the bound. No
-  /// square costs less than one within it.
-  std::vector<float> MergeCosts() const;
+  /// Every square that saves Gaussians. None costs less than one within it.
+  std::vector<Square> Merges() const;
   /// One Gaussian for each of the largest squares that cost at most `bound`.
   void AddGaussians(float bound, std::vector<Gaussian>& gaussians) const;
 
@@ -42,11 +48,18 @@ class SplatTree {
   };
   struct Level {
     int columns = 0, rows = 0;
-    std::vector<float> cost;  // infinite: not a full square
+    std::vector<Square> squares;
+    const Square& At(int x, int y) const {
+      return squares[static_cast<size_t>(y) * static_cast<size_t>(columns) +
+                     static_cast<size_t>(x)];
+    }
   };
-  float CostOf(const SurfaceView& surface, int x, int y, int side) const;
+  Square SquareOf(const SurfaceView& surface, int x, int y, int side) const;
+  double CostOf(const SurfaceView& surface, int x, int y, int side) const;
   bool Merged(size_t level, int x, int y, float bound) const;
   Gaussian GaussianOf(int x, int y, int side) const;
+  bool IsFirst(int x, int y, int left, int top, int side) const;
+  bool Has(int x, int y) const { return index_(x, y) >= 0; }
   const Sample& At(int x, int y) const { return samples_[static_cast<size_t>(index_(x, y))]; }
 
   PinholeCamera camera_;
