@@ -188,17 +188,7 @@ TEST_F(ExportWeb, FitsTheSizeThatIsAskedFor) {
   EXPECT_LE(fs::file_size(folder_ / "small.html"), limit);
 }
 
-// Below what coarser coding reaches before anything is left out.
-TEST_F(ExportWeb, LeavesOutWhatImagesDoNotNeedForASmallSize) {
-  DtrOk(Arguments("coarse.html", {"--jpeg-quality", "60", "--depth-error", "0.25"}));
-  const double limit = 0.98 * static_cast<double>(fs::file_size(folder_ / "coarse.html")) / 1e6;
-  const Ran ran =
-      DtrOk(Arguments("small.html", {"--max-mb", std::to_string(limit), "--json", "-"}));
-  EXPECT_LE(static_cast<double>(fs::file_size(folder_ / "small.html")), 1e6 * limit);
-  EXPECT_GT(nlohmann::json::parse(ran.out)["pruned_db"], 0);
-}
-
-// Where nothing may be left out, which takes longer.
+// Where nothing may be left out; export_web_prune_test has the other case.
 TEST_F(ExportWeb, APageThatCannotBeSoSmallSaysTheLeastThatCan) {
   const Ran ran = Dtr(Arguments("page.html", {"--max-mb", "0.01", "--no-evaluate"}));
   ExpectRejected(ran, kFailed, "the smallest page of this set takes");
