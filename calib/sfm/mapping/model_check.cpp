@@ -1,5 +1,7 @@
 #include "calib/sfm/mapping/model_check.h"
 
+#include <fmt/format.h>
+
 #include <map>
 #include <stdexcept>
 
@@ -7,6 +9,10 @@
 
 namespace dtr::sfm {
 namespace {
+
+// Photos that were taken from different places have two thirds and more of their matches explained;
+// of a camera that only turned, what noise gives a depth: a fiftieth.
+constexpr double kMinExplained = 0.2;
 
 MapCameras CamerasOf(const ViewGraph& graph, const calib::SfmModel& model, int threads) {
   std::map<std::string, size_t> index;
@@ -50,11 +56,36 @@ std::vector<MapPoint> PointsOfModel(const ViewGraph& graph, const calib::SfmMode
   return list;
 }
 
+// Share of the matches between images of the model whose two features see one point of it.
+double ExplainedShare(const ViewGraph& graph, const MapCameras& cameras,
+                      std::span<const MapPoint> points) {
+  constexpr size_t kNone = ~size_t{0};
+  std::vector<std::vector<size_t>> point_of;
+  for (const GraphImage& image : graph.images) point_of.emplace_back(image.pixels.size(), kNone);
+  for (size_t p = 0; p < points.size(); ++p) {
+    for (const TrackFeature& f : points[p].seen) point_of[f.image][f.feature] = p;
+  }
+  double all = 0, explained = 0;
+  for (const PairGeometry& pair : graph.pairs) {
+    if (!cameras.placed[pair.image_a] || !cameras.placed[pair.image_b]) continue;
+    for (const auto& [a, b] : pair.matches) {
+      const size_t p = point_of[pair.image_a][a];
+      ++all;
+      explained += p != kNone && p == point_of[pair.image_b][b] ? 1 : 0;
+    }
+  }
+  return all > 0 ? explained / all : 0;
+}
+
 }  // namespace
 
 std::string WhyContradicted(const ViewGraph& graph, const calib::SfmModel& model, int threads) {
   const MapCameras cameras = CamerasOf(graph, model, threads);
   const std::vector<MapPoint> points = PointsOfModel(graph, model);
+  const double explained = ExplainedShare(graph, cameras, points);
+  if (explained < kMinExplained) {
+    return fmt::format("only {:.0f} % of the matches became points", 100 * explained);
+  }
   const MapEvidence evidence{graph, cameras, points, {}};
   MapStatistics statistics;
   if (std::string why = WhyNotContradicted(evidence, &statistics); !why.empty()) return why;

@@ -8,11 +8,11 @@
 namespace dtr::sfm {
 
 /// Why a model of these matches must not be trusted, by the tests of the global mapper's own model
-/// that ask matches and points, not how they were mapped (global_mapper.h, why_not): many matches
-/// lie in pairs that contradict its cameras, or a part of it hangs on the rest by too few points of
-/// known depth to have its scale. One clause; empty: it can be trusted. Images are found by their
-/// names, features by their order. Throws std::invalid_argument where an image of the model is none
-/// of the graph's or has other features.
+/// that ask matches and points, not how they were mapped (global_mapper.h, why_not): few of the
+/// matches became points, many lie in pairs that contradict its cameras, or a part of it hangs on
+/// the rest by too few points of known depth to have its scale. One clause; empty: it can be
+/// trusted. Images are found by their names, features by their order. Throws std::invalid_argument
+/// where an image of the model is none of the graph's or has other features.
 std::string WhyContradicted(const ViewGraph& graph, const calib::SfmModel& model, int threads);
 
 }  // namespace dtr::sfm
