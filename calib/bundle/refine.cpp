@@ -193,8 +193,12 @@ size_t Choose(const Bundle& bundle, const ObservationSplit& split, const RefineO
   if (!refined.adjusted.converged) return kNoneConverged;
   if (HasPriors(options)) return chosen;
   if (refined.given_px <= kPrecisionPx) return 0;  // exact: what is left is rounding
-  // Beyond chance: a model that saw fewer observations, or none, need not be wrong for it.
-  return BootstrapOfDifference(adjusted, given, options.seed).second < 0 ? chosen : 0;
+  // Beyond chance: a model that saw fewer observations, or none, need not be wrong for it. Of more
+  // than a lens's usual freedom points that were not adjusted to have shown already that it is
+  // worth it; observations that both models were adjusted to must not contradict.
+  const auto [low, high] = BootstrapOfDifference(adjusted, given, options.seed);
+  const bool is_shown = candidates[chosen].lens != LensFreedom::kNoPrincipalPoint;
+  return high < 0 || (is_shown && low <= 0) ? chosen : 0;
 }
 
 bool Refinable(const SfmModel& model, std::string* reason) {
