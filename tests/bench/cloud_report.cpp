@@ -121,7 +121,7 @@ int Run(const std::string& folder, const std::string& file, const std::string& t
     fine += error < kFineDepth;
   }
   std::printf(
-      "%zu points, %.0f in sight of true depth: %.1f %% within 1 %% of it, %.1f %% within "
+      "%zu points, %.0f where true depth is known: %.1f %% within 1 %% of it, %.1f %% within "
       "0.3 %%; completeness %.1f %%\n",
       ply.count, judged, 100 * same / judged, 100 * fine / judged, 100 * views.Completeness());
   return 0;

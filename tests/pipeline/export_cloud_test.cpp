@@ -9,11 +9,9 @@
 #include "dtr/base/process.h"
 #include "dtr/base/random.h"
 #include "pipeline/export.h"
-#include "tests/pipeline/exact_set.h"
+#include "tests/pipeline/exact_export.h"
 #include "tests/pipeline/read_ply.h"
 #include "tests/support/message_of.h"
-#include "tests/support/noted_lines.h"
-#include "tests/support/test_data.h"
 
 namespace dtr::testing {
 namespace {
@@ -72,25 +70,12 @@ double Completeness(const std::vector<View>& views, const std::vector<Eigen::Vec
   return static_cast<double>(near) / static_cast<double>(all);
 }
 
-class ExportCloud : public ::testing::Test {
+class ExportCloud : public ExactExport {
  protected:
-  void Make(const ExactSetOptions& options) {
-    views_ = ExactViews(options);
-    WriteExactSet(folder_ / "set.dtr", views_, options);
-  }
-  pipeline::ExportRequest Request(const std::string& name) const {
-    pipeline::ExportRequest request;
-    request.set = folder_ / "set.dtr";
-    request.output = folder_ / name;
-    return request;
-  }
   Ply Cloud(pipeline::ExportRequest request) {
     report_ = pipeline::ExportPly(request, noted_);
     return ReadPly(request.output);
   }
-  TemporaryFolder folder_;
-  NotedLines noted_;
-  std::vector<View> views_;
   pipeline::ExportReport report_;
 };
 

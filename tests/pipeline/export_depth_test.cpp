@@ -17,10 +17,8 @@
 #include "dtr/io/image_io.h"
 #include "pipeline/detail/export/depth_file.h"
 #include "pipeline/export.h"
-#include "tests/pipeline/exact_set.h"
+#include "tests/pipeline/exact_export.h"
 #include "tests/pipeline/read_ply.h"
-#include "tests/support/noted_lines.h"
-#include "tests/support/test_data.h"
 
 namespace dtr::testing {
 namespace {
@@ -46,20 +44,9 @@ Eigen::Vector3d Unproject(const json& rows, double fx, double fy, double cx, dou
   return r.transpose() * (Eigen::Vector3d((u - cx) / fx * z, (v - cy) / fy * z, z) - t);
 }
 
-class ExportOfExactDepth : public ::testing::Test {
+class ExportOfExactDepth : public ExactExport {
  protected:
-  void Make(const ExactSetOptions& options = {}) {
-    views_ = ExactViews(options);
-    views_[3].role = ViewRole::kHeldOut;
-    DropDepth(views_[3]);
-    WriteExactSet(folder_ / "set.dtr", views_, options);
-  }
-  pipeline::ExportRequest Request(const std::string& name) const {
-    pipeline::ExportRequest request;
-    request.set = folder_ / "set.dtr";
-    request.output = folder_ / name;
-    return request;
-  }
+  void Make(const ExactSetOptions& options = {}) { MakeWithHeldOut(options); }
   // The point that the view's own camera has at a depth pixel.
   void ExpectSamePlace(const View& view, int x, int y, const Eigen::Vector3d& p) const {
     const auto pixel = view.DepthCamera().PixelFromCam(view.cam_from_world * p);
@@ -67,9 +54,6 @@ class ExportOfExactDepth : public ::testing::Test {
     EXPECT_LT((*pixel - Eigen::Vector2d(x + 0.5, y + 0.5)).norm(), kResidualPx);
     EXPECT_NEAR((view.cam_from_world * p).z() / view.depth(x, y), 1, 1e-4);
   }
-  TemporaryFolder folder_;
-  NotedLines noted_;
-  std::vector<View> views_;
 };
 
 TEST_F(ExportOfExactDepth, CamerasAndNumbersPutEveryPixelWhereTheSetHasIt) {

@@ -12,10 +12,8 @@
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "pipeline/export.h"
-#include "tests/pipeline/exact_set.h"
+#include "tests/pipeline/exact_export.h"
 #include "tests/pipeline/read_ply.h"
-#include "tests/support/noted_lines.h"
-#include "tests/support/test_data.h"
 
 namespace dtr::testing {
 namespace {
@@ -62,27 +60,14 @@ struct Glb {
   }
 };
 
-class ExportMeshes : public ::testing::Test {
+class ExportMeshes : public ExactExport {
  protected:
-  void Make(const ExactSetOptions& options) {
-    views_ = ExactViews(options);
-    WriteExactSet(folder_ / "set.dtr", views_, options);
-  }
-  pipeline::ExportRequest Request(const std::string& name) const {
-    pipeline::ExportRequest request;
-    request.set = folder_ / "set.dtr";
-    request.output = folder_ / name;
-    return request;
-  }
   Glb MeshFile(const std::string& name, double voxel = 0) {
     pipeline::ExportRequest request = Request(name);
     request.voxel = voxel;
     report_ = pipeline::ExportMesh(request, noted_);
     return Glb(request.output);
   }
-  TemporaryFolder folder_;
-  NotedLines noted_;
-  std::vector<View> views_;
   pipeline::ExportReport report_;
 };
 

@@ -13,9 +13,7 @@
 #include "dtr/base/files.h"
 #include "dtr/io/image_io.h"
 #include "pipeline/export.h"
-#include "tests/pipeline/exact_set.h"
-#include "tests/support/noted_lines.h"
-#include "tests/support/test_data.h"
+#include "tests/pipeline/exact_export.h"
 
 namespace dtr::testing {
 namespace {
@@ -61,20 +59,9 @@ class Bytes {
   size_t at_ = 0;
 };
 
-class ExportOfExactScene : public ::testing::Test {
+class ExportOfExactScene : public ExactExport {
  protected:
-  void Make(const ExactSetOptions& options) {
-    views_ = ExactViews(options);
-    views_[3].role = ViewRole::kHeldOut;
-    DropDepth(views_[3]);
-    WriteExactSet(folder_ / "set.dtr", views_, options);
-  }
-  pipeline::ExportRequest Request(const std::string& name) const {
-    pipeline::ExportRequest request;
-    request.set = folder_ / "set.dtr";
-    request.output = folder_ / name;
-    return request;
-  }
+  void Make(const ExactSetOptions& options) { MakeWithHeldOut(options); }
   // A point that a file puts at an image's pixel (centre of the first at 0.5) and depth.
   static void ExpectSeenAt(const View& view, const Eigen::Vector3d& p, double u, double v,
                            double z) {
@@ -85,9 +72,6 @@ class ExportOfExactScene : public ::testing::Test {
   }
 
   static constexpr size_t kSources[] = {0, 1, 2, 4};
-  TemporaryFolder folder_;
-  NotedLines noted_;
-  std::vector<View> views_;
 };
 
 TEST_F(ExportOfExactScene, OpenMvsHasDepthWithNormalsAndConfidence) {

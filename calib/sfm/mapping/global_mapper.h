@@ -16,7 +16,7 @@ struct MapOptions {
   std::uint64_t seed = 0;
   bool intrinsics_are_known = false;  ///< the graph's cameras hold
   bool focals_are_known = false;      ///< their focal lengths do
-  /// Told of the steps; asked between them, and within the long ones, whether to stop (Interrupted
+  /// Receives the steps; asked between them, and within the long ones, whether to stop (Interrupted
   /// is thrown). Null: neither.
   Progress* progress = nullptr;
 };

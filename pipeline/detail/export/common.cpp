@@ -7,6 +7,7 @@
 
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
+#include "dtr/base/work_folder.h"
 #include "dtr/io/set_io.h"
 #include "dtr/io/validation_result.h"
 
@@ -54,6 +55,18 @@ DtrSet SetWithDepth(const ExportRequest& request, const char* format, Progress& 
   }
   throw Error(fmt::format("{}: no view has depth, which {} needs; run dtr stereo on it",
                           request.set.string(), format));
+}
+
+ExportReport ExportFolder(
+    const ExportRequest& request, const char* format, Progress& progress,
+    const std::function<ExportReport(const DtrSet&, const fs::path&)>& write) {
+  const DtrSet set = SetWithDepth(request, format, progress);
+  NoteOffset(set, progress);
+  const fs::path output = WithoutTrailingSlash(request.output);
+  WorkFolder work(WorkFolder::Of(output), "export");
+  const ExportReport report = write(set, work.path());
+  work.Become(output);
+  return report;
 }
 
 std::vector<std::string> FileNames(const std::vector<View>& views, const std::string& extension) {

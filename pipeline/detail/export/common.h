@@ -1,6 +1,8 @@
 // pipeline/detail/export/common.h -- what all exports begin with.
 #pragma once
 #include <Eigen/Core>
+#include <filesystem>
+#include <functional>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
@@ -19,6 +21,12 @@ DtrSet SetToExport(const ExportRequest& request, const char* format, Progress& p
 
 /// SetToExport, where at least one view must have depth. Throws Error.
 DtrSet SetWithDepth(const ExportRequest& request, const char* format, Progress& progress);
+
+/// An export that is a folder of a set with depth: `write` fills a work folder, which then becomes
+/// request.output. Throws as SetWithDepth and as `write`, and leaves nothing then.
+ExportReport ExportFolder(
+    const ExportRequest& request, const char* format, Progress& progress,
+    const std::function<ExportReport(const DtrSet&, const std::filesystem::path&)>& write);
 
 /// Names of the views' files: the photos' names with `extension` instead of their own; the whole
 /// name before it where two photos differ only in that.

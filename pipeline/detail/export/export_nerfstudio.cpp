@@ -3,8 +3,6 @@
 #include <nlohmann/json.hpp>
 
 #include "dtr/base/durable.h"
-#include "dtr/base/files.h"
-#include "dtr/base/work_folder.h"
 #include "dtr/io/depth_io.h"
 #include "dtr/io/image_io.h"
 #include "dtr/io/set_io.h"
@@ -180,13 +178,10 @@ class NerfstudioExport {
 }  // namespace
 
 ExportReport ExportNerfstudio(const ExportRequest& request, Progress& progress) {
-  const DtrSet set = SetWithDepth(request, "nerfstudio", progress);
-  NoteOffset(set, progress);
-  const fs::path output = WithoutTrailingSlash(request.output);
-  WorkFolder work(WorkFolder::Of(output), "export");
-  const ExportReport report = NerfstudioExport(request, set, work.path()).Write(progress);
-  work.Become(output);
-  return report;
+  return ExportFolder(request, "nerfstudio", progress,
+                      [&](const DtrSet& set, const fs::path& folder) {
+                        return NerfstudioExport(request, set, folder).Write(progress);
+                      });
 }
 
 }  // namespace dtr::pipeline

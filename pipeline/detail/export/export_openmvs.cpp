@@ -7,8 +7,6 @@
 
 #include "calib/colmap/export.h"
 #include "dtr/base/durable.h"
-#include "dtr/base/files.h"
-#include "dtr/base/work_folder.h"
 #include "pipeline/detail/export/coloured_points.h"
 #include "pipeline/detail/export/common.h"
 #include "pipeline/detail/export/depth_file.h"
@@ -255,13 +253,9 @@ class OpenMvsExport {
 }  // namespace
 
 ExportReport ExportOpenmvs(const ExportRequest& request, Progress& progress) {
-  const DtrSet set = SetWithDepth(request, "openmvs", progress);
-  NoteOffset(set, progress);
-  const fs::path output = WithoutTrailingSlash(request.output);
-  WorkFolder work(WorkFolder::Of(output), "export");
-  const ExportReport report = OpenMvsExport(request, set, work.path()).Write(progress);
-  work.Become(output);
-  return report;
+  return ExportFolder(request, "openmvs", progress, [&](const DtrSet& set, const fs::path& folder) {
+    return OpenMvsExport(request, set, folder).Write(progress);
+  });
 }
 
 }  // namespace dtr::pipeline

@@ -1,5 +1,5 @@
 // Which mapper's model SfmEngine::kAuto takes, and what --sfm global does with masks, sequences and
-// a kill; photos of the sample collection, a COLMAP that leaves what it is told.
+// a kill; photos of the sample collection, a COLMAP that leaves what the test chooses.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
