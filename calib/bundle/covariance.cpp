@@ -14,12 +14,11 @@
 #include "calib/bundle/lens_params.h"
 #include "calib/bundle/normalised.h"
 #include "calib/bundle/observation_rows.h"
+#include "calib/bundle/unit_inverse.h"
 
 namespace dtr::calib {
 namespace {
 
-// Eigenvalues of a matrix with a unit diagonal below this are rounding: of sums of thousands.
-constexpr double kSingular = 1e-13;
 // A direction of the gauge is settled when the priors' information about it is more than this share
 // of the observations' typical information.
 constexpr double kSettled = 1e-12;
@@ -167,18 +166,17 @@ void Invert(const Bundle& bundle, const Eigen::MatrixXd& information, const Eige
     return;
   }
   const Eigen::VectorXd scale = diagonal.cwiseSqrt().cwiseInverse();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * closed *
-                                                             scale.asDiagonal());
-  const double least = eigen.eigenvalues()[0], most = eigen.eigenvalues()[unknowns - 1];
+  const Eigen::MatrixXd scaled = scale.asDiagonal() * closed * scale.asDiagonal();
+  const UnitInverse inverse = InverseOfUnitDiagonal(scaled);
   long index = 0;
-  eigen.eigenvectors().col(0).cwiseAbs().maxCoeff(&index);
+  inverse.weakest.cwiseAbs().maxCoeff(&index);
   out.weakest = NameOfUnknown(bundle, out, index);
-  out.condition = least > 0 ? std::sqrt(most / least) : std::numeric_limits<double>::infinity();
-  out.determined = least > kSingular;
+  out.condition = inverse.least > 0 ? std::sqrt(inverse.most / inverse.least)
+                                    : std::numeric_limits<double>::infinity();
+  out.determined = inverse.matrix.size() > 0;
   if (!out.determined) return;
-  const Eigen::MatrixXd half = scale.asDiagonal() * eigen.eigenvectors() *
-                               eigen.eigenvalues().cwiseSqrt().cwiseInverse().asDiagonal();
-  out.matrix = half * half.transpose() - open * open.transpose() / typical;
+  out.matrix = scale.asDiagonal() * inverse.matrix * scale.asDiagonal();
+  out.matrix -= open * open.transpose() / typical;
   out.matrix *= out.sigma_px * out.sigma_px;
 }
 

@@ -12,7 +12,9 @@ inline constexpr size_t kPartners = 20;  ///< of each photo, where pairs are pre
 
 /// The pairs (a < b, sorted): those that may be matched, or, preselected of them, each photo with
 /// the next and with its partners by the number of matches among the 300 largest features: the
-/// nearest 12, the others spread geometrically by rank, so that not all baselines are short.
+/// nearest 12, the others spread geometrically by rank, so that not all baselines are short. Of
+/// more than 101 photos only the 100 that an index (photo_index.h) ranks first are compared with
+/// each, so that the work grows with the number of photos.
 /// Throws std::invalid_argument where a pair names no two photos.
 std::vector<std::pair<int, int>> ChoosePairs(std::span<const MatchPhoto> photos,
                                              const MatchOptions& options, Progress& progress);
