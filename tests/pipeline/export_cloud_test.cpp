@@ -10,6 +10,7 @@
 #include "dtr/base/random.h"
 #include "pipeline/export.h"
 #include "tests/pipeline/exact_export.h"
+#include "tests/pipeline/off_centre.h"
 #include "tests/pipeline/read_ply.h"
 #include "tests/support/message_of.h"
 
@@ -25,19 +26,6 @@ std::vector<Eigen::Vector3d> Points(const Ply& ply) {
   std::vector<Eigen::Vector3d> points;
   for (size_t i = 0; i < ply.count; ++i) points.emplace_back(ply["x"][i], ply["y"][i], ply["z"][i]);
   return points;
-}
-
-// Distance from the nearest pixel centre of any view's depth grid.
-double OffCentrePx(const std::vector<View>& views, const Eigen::Vector3d& p) {
-  double nearest = 1;
-  for (const View& view : views) {
-    const auto pixel = view.DepthCamera().PixelFromCam(view.cam_from_world * p);
-    if (!pixel) continue;
-    const Eigen::Vector2d off(pixel->x() - std::floor(pixel->x()) - 0.5,
-                              pixel->y() - std::floor(pixel->y()) - 0.5);
-    nearest = std::min(nearest, off.norm());
-  }
-  return nearest;
 }
 
 // Share of the views' pixels on whose surface a point lies within `reach_px`.

@@ -16,7 +16,8 @@ constexpr int kMostCells = 1024;
 constexpr double kDistance = 3;
 // Views that stand beyond the given ones see somewhat past their borders.
 constexpr double kPastBorder = 0.5;
-constexpr float kOneColour = 5;  // levels of 8 bits between cells that are one
+constexpr float kOneColour =
+    5;  // levels of 8 bits between cells that are one, where nothing else is asked
 // Standard deviation by the distance of neighbours: nothing is seen between them.
 constexpr double kSpread = 0.9;
 constexpr int kLargestSquare = 16;
@@ -201,10 +202,18 @@ bool Backdrop::CouldBeSeen(const Eigen::Vector3d& p_in_world) const {
   return false;
 }
 
-std::vector<Gaussian> Backdrop::Gaussians() {
+std::vector<Gaussian> Backdrop::Gaussians(size_t max_count) const {
   const std::vector<Sum> cells = Filled();
+  constexpr float kAnyColour = 255;
+  for (float one_colour = kOneColour;; one_colour *= 2) {
+    std::vector<Gaussian> gaussians = GaussiansOf(cells, one_colour);
+    if (gaussians.size() <= max_count || one_colour >= kAnyColour) return gaussians;
+  }
+}
+
+std::vector<Gaussian> Backdrop::GaussiansOf(const std::vector<Sum>& cells, float one_colour) const {
   std::vector<Gaussian> gaussians;
-  const auto one_colour = [&](int face, int x, int y, int side) {
+  const auto is_one = [&](int face, int x, int y, int side) {
     for (size_t c = 0; c < 3; ++c) {
       float low = 255, high = 0;
       for (int i = 0; i < side * side; ++i) {
@@ -212,14 +221,14 @@ std::vector<Gaussian> Backdrop::Gaussians() {
         low = std::min(low, v);
         high = std::max(high, v);
       }
-      if (high - low > kOneColour) return false;
+      if (high - low > one_colour) return false;
     }
     return true;
   };
   const std::function<void(int, int, int, int)> add = [&](int face, int x, int y, int side) {
     const Eigen::Vector3d d = DirectionOf(face, x + 0.5 * side, y + 0.5 * side);
     const Eigen::Vector3d p = centre_ + radius_ * d.normalized();
-    if (side > 1 && !one_colour(face, x, y, side)) {
+    if (side > 1 && !is_one(face, x, y, side)) {
       for (int child = 0; child < 4; ++child) {
         add(face, x + side / 2 * (child % 2), y + side / 2 * (child / 2), side / 2);
       }

@@ -3,6 +3,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <array>
+#include <limits>
 #include <vector>
 
 #include "pipeline/detail/export/gaussians.h"
@@ -27,8 +28,10 @@ class Backdrop {
   }
 
   /// One Gaussian for each cell, or square of cells of nearly one colour, that some view could see
-  /// behind what it does see. Empty where no view was added.
-  std::vector<Gaussian> Gaussians();
+  /// behind what it does see. Empty where no view was added. With `max_count` the colours of a
+  /// square may differ by more until there are no more than that, or all squares are as large as
+  /// they can be.
+  std::vector<Gaussian> Gaussians(size_t max_count = std::numeric_limits<size_t>::max()) const;
 
  private:
   static constexpr double kNearer = 0.9;  // share of the distance at which surfaces end
@@ -46,6 +49,7 @@ class Backdrop {
   void AddSky(const SurfaceView& surface);
   void AddSurface(const SurfaceView& surface);
   std::vector<Sum> Filled() const;
+  std::vector<Gaussian> GaussiansOf(const std::vector<Sum>& cells, float one_colour) const;
   bool CouldBeSeen(const Eigen::Vector3d& p_in_world) const;
   size_t At(int face, int x, int y) const {
     return (static_cast<size_t>(face) * static_cast<size_t>(side_) + static_cast<size_t>(y)) *

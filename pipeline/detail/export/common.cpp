@@ -69,6 +69,25 @@ ExportReport ExportFolder(
   return report;
 }
 
+SurfaceViews::Options SurfaceOptions(const ExportRequest& request, bool colours) {
+  return {.completed = request.completed,
+          .colours = colours,
+          .memory_gb = request.memory_gb,
+          .threads = request.threads};
+}
+
+void ForEachDepth(SurfaceViews& surfaces, Progress& progress,
+                  const std::function<void(size_t, const View&, const SurfaceView&)>& write) {
+  const std::vector<int> views = surfaces.WithDepth();
+  progress.Stage("depth", static_cast<int>(views.size()));
+  for (size_t i = 0; i < views.size(); ++i) {
+    progress.ThrowIfInterrupted();
+    const auto surface = surfaces.Get(views[i]);
+    write(i, surfaces.set().frames.front().views[static_cast<size_t>(views[i])], *surface);
+    progress.Update(static_cast<int>(i) + 1);
+  }
+}
+
 std::vector<std::string> FileNames(const std::vector<View>& views, const std::string& extension) {
   return NamesWith(views, std::vector<std::string>(views.size(), extension));
 }

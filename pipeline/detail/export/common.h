@@ -10,6 +10,7 @@
 #include "dtr/base/progress.h"
 #include "dtr/types/dtr_set.h"
 #include "dtr/types/pose.h"
+#include "pipeline/detail/export/surface_views.h"
 #include "pipeline/export.h"
 
 namespace dtr::pipeline {
@@ -27,6 +28,15 @@ DtrSet SetWithDepth(const ExportRequest& request, const char* format, Progress& 
 ExportReport ExportFolder(
     const ExportRequest& request, const char* format, Progress& progress,
     const std::function<ExportReport(const DtrSet&, const std::filesystem::path&)>& write);
+
+/// How surfaces are read for a request: measured depth, with completed where it asks for it.
+SurfaceViews::Options SurfaceOptions(const ExportRequest& request, bool colours = false);
+
+/// Calls `write` with each view that has depth, in the set's order, and with its number among them,
+/// from 0. Reports progress and stops where that asks for it.
+void ForEachDepth(
+    SurfaceViews& surfaces, Progress& progress,
+    const std::function<void(size_t number, const View& view, const SurfaceView& surface)>& write);
 
 /// Names of the views' files: the photos' names with `extension` instead of their own; the whole
 /// name before it where two photos differ only in that.

@@ -75,10 +75,7 @@ class DepthExport {
         set_(set),
         folder_(folder),
         names_(DepthNamesOf(set, request.depth_format)),
-        surfaces_(request.set, set,
-                  {.completed = request.completed,
-                   .memory_gb = request.memory_gb,
-                   .threads = request.threads}) {}
+        surfaces_(request.set, set, SurfaceOptions(request)) {}
 
   ExportReport Write(Progress& progress) {
     if (request_.depth_grid == DepthGrid::kPhoto) FindLenses();

@@ -143,11 +143,7 @@ ExportReport ExportLas(const ExportRequest& request, Progress& progress) {
   header.step = StepOf(set);
   header.offset = set.world_origin;
   for (const std::string& line : FactLines(set)) header.facts += line + "\n";
-  SurfaceViews views(request.set, set,
-                     {.completed = request.completed,
-                      .colours = true,
-                      .memory_gb = request.memory_gb,
-                      .threads = request.threads});
+  SurfaceViews views(request.set, set, SurfaceOptions(request, true));
   FileStream file(target.path());
   file.Write(HeaderOf(header));
   Fuse(

@@ -7,7 +7,6 @@
 #include <numbers>
 
 #include "dtr/base/files.h"
-#include "dtr/base/work_folder.h"
 #include "pipeline/detail/export/coloured_points.h"
 #include "pipeline/detail/export/common.h"
 #include "pipeline/detail/export/depth_file.h"
@@ -160,32 +159,25 @@ Json SequenceJson(const DtrSet& set, const std::vector<const View*>& views,
 }  // namespace
 
 ExportReport ExportMiv(const ExportRequest& request, Progress& progress) {
-  const DtrSet set = SetWithDepth(request, "miv", progress);
-  NoteOffset(set, progress);
-  const fs::path output = WithoutTrailingSlash(request.output);
-  WorkFolder work(WorkFolder::Of(output), "export");
-  SurfaceViews surfaces(
-      request.set, set,
-      {.completed = request.completed, .memory_gb = request.memory_gb, .threads = request.threads});
-  const std::vector<int> numbers = surfaces.WithDepth();
-  std::vector<const View*> views;
-  bool odd = false;
-  progress.Stage("depth", static_cast<int>(numbers.size()));
-  for (const int number : numbers) {
-    progress.ThrowIfInterrupted();
-    const View& view = set.frames.front().views[static_cast<size_t>(number)];
-    const PinholeCamera& camera = view.camera;
-    odd = odd || camera.width_px() % 2 != 0 || camera.height_px() % 2 != 0;
-    WriteTexture(work.path() / TextureName(view), ImageOf(request.set, view, request.threads));
-    const DepthPlanes planes = PlanesOf(*surfaces.Get(number), DepthKind::kPlaneZ);
-    WriteDepth(work.path() / DepthName(view), view, OnImageGrid(planes.depth, view.depth_scale));
-    views.push_back(&view);
-    progress.Update(static_cast<int>(views.size()));
-  }
-  if (odd) progress.Note("frames of 4:2:0 have even sizes: the last odd column or row is left out");
-  WriteJson(work.path() / "sequence.json", SequenceJson(set, views, output.stem().string()));
-  work.Become(output);
-  return {.images = numbers.size(), .depth_maps = numbers.size()};
+  return ExportFolder(request, "miv", progress, [&](const DtrSet& set, const fs::path& folder) {
+    SurfaceViews surfaces(request.set, set, SurfaceOptions(request));
+    std::vector<const View*> views;
+    bool odd = false;
+    ForEachDepth(surfaces, progress, [&](size_t, const View& view, const SurfaceView& surface) {
+      const PinholeCamera& camera = view.camera;
+      odd = odd || camera.width_px() % 2 != 0 || camera.height_px() % 2 != 0;
+      WriteTexture(folder / TextureName(view), ImageOf(request.set, view, request.threads));
+      const DepthPlanes planes = PlanesOf(surface, DepthKind::kPlaneZ);
+      WriteDepth(folder / DepthName(view), view, OnImageGrid(planes.depth, view.depth_scale));
+      views.push_back(&view);
+    });
+    if (odd) {
+      progress.Note("frames of 4:2:0 have even sizes: the last odd column or row is left out");
+    }
+    const std::string name = WithoutTrailingSlash(request.output).stem().string();
+    WriteJson(folder / "sequence.json", SequenceJson(set, views, name));
+    return ExportReport{.images = views.size(), .depth_maps = views.size()};
+  });
 }
 
 }  // namespace dtr::pipeline

@@ -8,7 +8,6 @@
 #include "dtr/base/durable.h"
 #include "dtr/base/files.h"
 #include "dtr/base/lower_case.h"
-#include "dtr/base/work_folder.h"
 #include "dtr/io/formats/pfm.h"
 #include "dtr/io/image_io.h"
 #include "dtr/render/geometry.h"
@@ -92,40 +91,36 @@ void WriteJpg(const ExportRequest& request, const View& view, const fs::path& fi
   }
 }
 
+Json Sidecar(const DtrSet& set) {
+  Json json = SetFacts(set);
+  json["pixels"] =
+      "the centre of pixel (i, j) is (i + 0.5, j + 0.5), as MVSNet's own sampling has it; for "
+      "programs whose first pixel has its centre at 0 subtract 0.5 from cx and cy";
+  json["depth"] = "z in scene units, 0 a hole; depth_scale: the map is 1 / so much of the image";
+  json["views"] = Json::array();
+  return json;
+}
+
 }  // namespace
 
 ExportReport ExportMvsnet(const ExportRequest& request, Progress& progress) {
-  const DtrSet set = SetWithDepth(request, "mvsnet", progress);
-  NoteOffset(set, progress);
-  const fs::path output = WithoutTrailingSlash(request.output);
-  WorkFolder work(WorkFolder::Of(output), "export");
-  SurfaceViews surfaces(
-      request.set, set,
-      {.completed = request.completed, .memory_gb = request.memory_gb, .threads = request.threads});
-  const std::vector<int> numbers = surfaces.WithDepth();
-  Json sidecar = SetFacts(set);
-  sidecar["pixels"] =
-      "the centre of pixel (i, j) is (i + 0.5, j + 0.5), as MVSNet's own sampling has it; for "
-      "programs whose first pixel has its centre at 0 subtract 0.5 from cx and cy";
-  sidecar["depth"] = "z in scene units, 0 a hole; depth_scale: the map is 1 / so much of the image";
-  sidecar["views"] = Json::array();
-  progress.Stage("depth", static_cast<int>(numbers.size()));
-  for (size_t i = 0; i < numbers.size(); ++i) {
-    progress.ThrowIfInterrupted();
-    const View& view = set.frames.front().views[static_cast<size_t>(numbers[i])];
-    WriteJpg(request, view, Numbered(work.path() / "images", i, ".jpg"));
-    WriteFileAtomically(Numbered(work.path() / "cams", i, "_cam.txt"), CamText(view));
-    const DepthPlanes planes = PlanesOf(*surfaces.Get(numbers[i]), DepthKind::kPlaneZ);
-    io::WritePfm(Numbered(work.path() / "depths", i, ".pfm"), planes.depth.grid());
-    io::WritePfm(Numbered(work.path() / "depths", i, "_sigma.pfm"), planes.sigma);
-    sidecar["views"].push_back(
-        {{"number", i}, {"photo", view.name}, {"depth_scale", view.depth_scale}});
-    progress.Update(static_cast<int>(i) + 1);
-  }
-  WriteFileAtomically(work.path() / "pair.txt", PairsText(surfaces, numbers));
-  WriteJson(work.path() / "dtr.json", sidecar);
-  work.Become(output);
-  return {.images = numbers.size(), .depth_maps = numbers.size()};
+  return ExportFolder(request, "mvsnet", progress, [&](const DtrSet& set, const fs::path& folder) {
+    SurfaceViews surfaces(request.set, set, SurfaceOptions(request));
+    Json sidecar = Sidecar(set);
+    ForEachDepth(surfaces, progress, [&](size_t i, const View& view, const SurfaceView& surface) {
+      WriteJpg(request, view, Numbered(folder / "images", i, ".jpg"));
+      WriteFileAtomically(Numbered(folder / "cams", i, "_cam.txt"), CamText(view));
+      const DepthPlanes planes = PlanesOf(surface, DepthKind::kPlaneZ);
+      io::WritePfm(Numbered(folder / "depths", i, ".pfm"), planes.depth.grid());
+      io::WritePfm(Numbered(folder / "depths", i, "_sigma.pfm"), planes.sigma);
+      sidecar["views"].push_back(
+          {{"number", i}, {"photo", view.name}, {"depth_scale", view.depth_scale}});
+    });
+    const std::vector<int> numbers = surfaces.WithDepth();
+    WriteFileAtomically(folder / "pair.txt", PairsText(surfaces, numbers));
+    WriteJson(folder / "dtr.json", sidecar);
+    return ExportReport{.images = numbers.size(), .depth_maps = numbers.size()};
+  });
 }
 
 }  // namespace dtr::pipeline

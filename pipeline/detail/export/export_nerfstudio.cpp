@@ -46,10 +46,7 @@ class NerfstudioExport {
         folder_(folder),
         images_(ImageNames(Views())),
         pngs_(FileNames(Views(), ".png")),
-        surfaces_(request.set, set,
-                  {.completed = request.completed,
-                   .memory_gb = request.memory_gb,
-                   .threads = request.threads}) {}
+        surfaces_(request.set, set, SurfaceOptions(request)) {}
 
   ExportReport Write(Progress& progress) {
     const std::vector<int> with_depth = surfaces_.WithDepth();

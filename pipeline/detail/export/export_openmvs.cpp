@@ -57,10 +57,7 @@ class OpenMvsExport {
       : request_(request),
         set_(set),
         folder_(std::move(folder)),
-        surfaces_(request.set, set,
-                  {.completed = request.completed,
-                   .memory_gb = request.memory_gb,
-                   .threads = request.threads}),
+        surfaces_(request.set, set, SurfaceOptions(request)),
         chosen_(surfaces_.WithDepth()),
         image_of_(Views().size(), -1) {
     for (size_t i = 0; i < chosen_.size(); ++i) {

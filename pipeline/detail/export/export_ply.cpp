@@ -4,7 +4,6 @@
 #include "pipeline/detail/export/file_stream.h"
 #include "pipeline/detail/export/fuse.h"
 #include "pipeline/detail/export/ply_header.h"
-#include "pipeline/detail/export/sample_colours.h"
 #include "pipeline/export.h"
 
 namespace dtr::pipeline {
@@ -27,14 +26,14 @@ CloudLayout CloudLayoutOf(const DtrSet& set, const ExportRequest& request) {
   return layout;
 }
 
-void Put(const FusedSample& sample, const std::uint8_t* rgb, const Eigen::Vector3d& origin,
-         const CloudLayout& layout, FileStream& file) {
+void Put(const FusedSample& sample, const Eigen::Vector3d& origin, const CloudLayout& layout,
+         FileStream& file) {
   for (int c = 0; c < 3; ++c) {
     const double value = sample.p_in_world[c] + origin[c];
     layout.as_double ? file.Put(value) : file.Put(static_cast<float>(value));
   }
   for (int c = 0; c < 3; ++c) file.Put(sample.normal[c]);
-  for (int c = 0; c < 3; ++c) file.Put(rgb[c]);
+  for (const std::uint8_t v : sample.rgb) file.Put(v);
   file.Put(sample.sigma);
   file.Put(static_cast<std::uint8_t>(std::min(sample.views, 255)));
   if (layout.completed) file.Put(static_cast<std::uint8_t>(sample.completed));
@@ -49,20 +48,14 @@ ExportReport ExportPly(const ExportRequest& request, Progress& progress) {
   const CloudLayout layout = CloudLayoutOf(set, request);
   std::vector<std::string> comments = FactLines(set);
   comments.emplace_back("sigma: standard deviation along the viewing ray in units, 0 not known");
-  SurfaceViews views(
-      request.set, set,
-      {.completed = request.completed, .memory_gb = request.memory_gb, .threads = request.threads});
+  SurfaceViews views(request.set, set, SurfaceOptions(request, true));
   ExportReport report{.images = views.WithDepth().size()};
   FileStream file(target.path());
   file.Write(PlyHeader(0, comments, layout.properties));
   Fuse(
       views, {.min_views = request.min_views, .threads = request.threads},
-      [&](const SurfaceView& surface, const std::vector<FusedSample>& samples) {
-        if (samples.empty()) return;
-        const ImageRgb8 colours = ColoursOnDepthGrid(request.set, *surface.view);
-        for (const FusedSample& sample : samples) {
-          Put(sample, &colours(sample.x, sample.y), set.world_origin, layout, file);
-        }
+      [&](const SurfaceView&, const std::vector<FusedSample>& samples) {
+        for (const FusedSample& sample : samples) Put(sample, set.world_origin, layout, file);
         report.points += samples.size();
       },
       progress);

@@ -23,6 +23,7 @@ namespace dtr::pipeline {
 namespace {
 
 constexpr float kUsualBound = 1;
+constexpr size_t kBackdropPart = 4;  // the backdrop has at most one of so many of a given count
 constexpr double kShDegree0 = 0.28209479177387814;  // 1 / (2 sqrt(pi))
 constexpr int kShRest = 45;                         // degrees 1 to 3, three channels
 
@@ -41,7 +42,7 @@ class Gaussians {
       progress.ThrowIfInterrupted();
       backdrop.AddView(*views.Get(v));
     }
-    gaussians_ = backdrop.Gaussians();
+    if (request_.max_count == 0) gaussians_ = backdrop.Gaussians();
     Fuse(
         views, {.min_views = 1, .threads = request_.threads},
         [&](const SurfaceView& surface, std::vector<FusedSample> samples) {
@@ -58,31 +59,35 @@ class Gaussians {
         },
         progress);
     if (request_.max_count > 0) {
-      const float bound = BoundForCount();
+      const float bound = BoundForCount(backdrop);
       for (const SplatTree& tree : trees_) tree.AddGaussians(bound, gaussians_);
     }
     return std::move(gaussians_);
   }
 
  private:
-  // The cheapest merges until few enough are left.
-  float BoundForCount() const {
+  // The backdrop in a share of the count, or in what surfaces leave of it where they need more; the
+  // cheapest merges of surfaces until few enough are left.
+  float BoundForCount(const Backdrop& backdrop) {
     std::vector<SplatTree::Square> merges;
-    size_t left = gaussians_.size();  // the backdrop
+    size_t left = 0, fewer = 0;
     for (const SplatTree& tree : trees_) {
       const std::vector<SplatTree::Square> own = tree.Merges();
       merges.insert(merges.end(), own.begin(), own.end());
       left += tree.samples();
+      for (const SplatTree::Square& square : own) fewer += static_cast<size_t>(square.fewer);
+    }
+    const size_t least = left - fewer, most = request_.max_count;
+    gaussians_ = backdrop.Gaussians(std::min(most / kBackdropPart, most - std::min(most, least)));
+    if (least + gaussians_.size() > most) {
+      throw Error(fmt::format("`max_count` {} cannot be met: the least is {}; prune the set first",
+                              most, least + gaussians_.size()));
     }
     std::sort(merges.begin(), merges.end(),
               [](const auto& a, const auto& b) { return a.cost < b.cost; });
+    left += gaussians_.size();
     float bound = kUsualBound;
-    for (auto merge = merges.begin(); left > request_.max_count; ++merge) {
-      if (merge == merges.end()) {
-        throw Error(
-            fmt::format("`max_count` {} cannot be met: the least is {}; prune the set first",
-                        request_.max_count, left));
-      }
+    for (auto merge = merges.begin(); left > most; ++merge) {
       bound = std::max(bound, merge->cost);
       left -= static_cast<size_t>(merge->fewer);
     }

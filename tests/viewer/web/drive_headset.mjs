@@ -1,15 +1,11 @@
 // node drive_headset.mjs PAGE.html CHROMIUM: the page with a headset that this script plays (two eyes beside each other, no device), and
-// what it found as JSON. playwright-core is looked for below DTR_PLAYWRIGHT.
-import { createRequire } from "node:module";
+// what it found as JSON.
+import { launchChromium, newPage } from "../../../scripts/chromium.mjs";
 
-const { chromium } = createRequire(`${process.env.DTR_PLAYWRIGHT}/`)("playwright-core");
 const [page_file, program] = process.argv.slice(2);
 const found = { messages: [] };
-const browser = await chromium.launch({ executablePath: program, args: ["--no-sandbox", "--disable-dev-shm-usage",
-  "--disable-background-networking", "--disable-component-update", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"] });
-const page = await browser.newPage({ viewport: { width: 320, height: 200 } });
-page.on("console", (message) => found.messages.push(message.text()));
-page.on("pageerror", (error) => found.messages.push(error.message));
+const browser = await launchChromium(program);
+const page = await newPage(browser, { viewport: { width: 320, height: 200 } }, (text) => found.messages.push(text));
 
 // As much of WebXR as the page uses: https://www.w3.org/TR/webxr/.
 await page.addInitScript(() => {
@@ -87,7 +83,7 @@ Object.assign(found, await page.evaluate(() => {
   };
 }));
 await page.keyboard.press("KeyX");
-await page.waitForFunction(() => !globalThis.dtrPage.headset.active && !globalThis.dtrPage.dirty, null, { timeout: 60000 });
+await page.waitForFunction(() => !globalThis.dtrPage.headset.active && globalThis.dtrPage.still, null, { timeout: 60000 });
 found.back = true;
 await browser.close();
 console.log(JSON.stringify(found));

@@ -1,21 +1,15 @@
 // node drive_page.mjs PAGE.html CHROMIUM [SCREENSHOTS|CAMERA.json]: uses a page as people do and prints what it found as JSON. With a
 // camera {width, height, fx, fy, cx, cy, rotation, translation} it draws that alone and
 // writes its RGBA pixels to CAMERA.rgba.
-// playwright-core is looked for below DTR_PLAYWRIGHT, a folder with node_modules.
 import { readFileSync, writeFileSync } from "node:fs";
-import { createRequire } from "node:module";
+import { launchChromium, newPage, problemOf } from "../../../scripts/chromium.mjs";
 
-const { chromium } = createRequire(`${process.env.DTR_PLAYWRIGHT}/`)("playwright-core");
 const [page_file, program, third] = process.argv.slice(2);
 const novel = third?.endsWith(".json") ? JSON.parse(readFileSync(third, "utf8")) : null, screenshots = novel ? undefined : third;
-const kArguments = ["--no-sandbox", "--disable-dev-shm-usage", "--disable-background-networking", "--disable-component-update",
-  "--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
 
 const found = { messages: [] };
-const browser = await chromium.launch({ executablePath: program, args: kArguments });
-const page = await browser.newPage({ viewport: { width: 320, height: 200 }, hasTouch: true });
-page.on("console", (message) => found.messages.push(message.text()));
-page.on("pageerror", (error) => found.messages.push(error.message));
+const browser = await launchChromium(program);
+const page = await newPage(browser, { viewport: { width: 320, height: 200 }, hasTouch: true }, (text) => found.messages.push(text));
 page.on("request", (request) => { if (!/^(file|blob|data):/.test(request.url())) found.messages.push(request.url()); });
 await page.goto(`file://${page_file}`);
 
@@ -24,12 +18,11 @@ const look = (name) => screenshots && page.screenshot({ path: `${screenshots}/${
 const camera = () => page.evaluate(() => globalThis.dtrPage.camera().centre.join(" "));
 // Until two frames were drawn.
 const drawn = () => page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done()))));
-const problem = () => page.evaluate(() => { const box = document.getElementById("problem"); return box.hidden ? "" : box.textContent; });
 
 if (await page.evaluate(() => globalThis.dtrPage !== undefined)) {
   await page.evaluate(() => globalThis.dtrPage.allLoaded);
   found.loaded = await page.evaluate(() => globalThis.dtrPage.renderer.store.loaded.size);
-  found.problem = await problem();
+  found.problem = await problemOf(page);
   if (novel) {
     const pixels = await page.evaluate((camera) => Array.from(globalThis.dtrPage.render(camera).pixels), novel);
     writeFileSync(third.replace(/json$/, "rgba"), Buffer.from(pixels));
@@ -67,7 +60,8 @@ if (await page.evaluate(() => globalThis.dtrPage !== undefined)) {
 
     const touched = await camera();
     const touch = await page.context().newCDPSession(page);
-    const fingers = (type, ...points) => touch.send("Input.dispatchTouchEvent", { type, touchPoints: points.map(([x, y], id) => ({ x, y, id })) });
+    const fingers = (type, ...points) => touch.send("Input.dispatchTouchEvent",
+      { type, touchPoints: points.map(([x, y], id) => ({ x, y, id })) });
     await fingers("touchStart", [120, 80]);
     await fingers("touchMove", [150, 80]);
     await fingers("touchEnd");
@@ -99,7 +93,7 @@ if (await page.evaluate(() => globalThis.dtrPage !== undefined)) {
     await look("distance");
   }
 } else {
-  found.problem = await problem();
+  found.problem = await problemOf(page);
 }
 await browser.close();
 console.log(JSON.stringify(found));

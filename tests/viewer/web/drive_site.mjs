@@ -1,11 +1,10 @@
 // node drive_site.mjs SITE CHROMIUM EXAMPLES [SCREENSHOTS]: serves a site of `dtr export --format web` on this machine, with the example
-// pages beside it, uses it, and prints what it found as JSON. playwright-core and three are looked for below DTR_PLAYWRIGHT.
+// pages beside it, uses it, and prints what it found as JSON. three is looked for below DTR_PLAYWRIGHT.
 import { existsSync, readFileSync } from "node:fs";
 import { createServer } from "node:http";
-import { createRequire } from "node:module";
 import { extname, join, normalize } from "node:path";
+import { launchChromium, newPage, problemOf } from "../../../scripts/chromium.mjs";
 
-const { chromium } = createRequire(`${process.env.DTR_PLAYWRIGHT}/`)("playwright-core");
 const [site, program, examples, screenshots] = process.argv.slice(2);
 const kTypes = { ".html": "text/html", ".js": "text/javascript", ".json": "application/json", ".bin": "application/octet-stream" };
 const kSize = { width: 320, height: 200 };
@@ -22,20 +21,18 @@ await new Promise((done) => server.listen(0, "127.0.0.1", done));
 const address = `http://127.0.0.1:${server.address().port}`;
 
 const found = { messages: [] };
-const browser = await chromium.launch({ executablePath: program, args: ["--no-sandbox", "--disable-dev-shm-usage",
-  "--disable-background-networking", "--disable-component-update", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"] });
+const browser = await launchChromium(program);
 
 async function opened(name) {
-  const page = await browser.newPage({ viewport: kSize });
   const report = (text) => { if (!/GPU stall|favicon/.test(text)) found.messages.push(`${name}: ${text}`); };
-  page.on("console", (message) => report(`${message.text()} ${message.location().url}`));
-  page.on("pageerror", (error) => report(error.message));
-  page.on("request", (request) => { if (!request.url().startsWith(address) && !/^(blob|data):/.test(request.url())) report(request.url()); });
+  const page = await newPage(browser, { viewport: kSize }, (text, url) => report(`${text} ${url}`));
+  page.on("request", (request) => {
+    if (!request.url().startsWith(address) && !/^(blob|data):/.test(request.url())) report(request.url());
+  });
   await page.goto(`${address}/${name}`);
   return page;
 }
 const look = (page, name) => screenshots && page.screenshot({ path: `${screenshots}/${name}.png` });
-const problem = (page) => page.evaluate(() => { const box = document.getElementById("problem"); return box.hidden ? "" : box.textContent; });
 // Mean colour of a rectangle of what is seen.
 const colourOf = async (page, x, y, width, height) => {
   const image = (await page.screenshot({ clip: { x, y, width, height } })).toString("base64");
@@ -58,7 +55,7 @@ if (await page.evaluate(() => globalThis.dtrPage !== undefined)) {
   found.nearestFirst = await page.evaluate(() => globalThis.dtrPage.order().map((view) => view.index));
   await look(page, "site");
 }
-found.problem = await problem(page);
+found.problem = await problemOf(page);
 await page.close();
 
 if (found.loaded > 0 && !found.problem) {

@@ -1,15 +1,10 @@
 // node drive_time.mjs PAGE.html CHROMIUM: moves the slider of a page of several time steps, plays it, and prints what it found as JSON.
-// playwright-core is looked for below DTR_PLAYWRIGHT.
-import { createRequire } from "node:module";
+import { launchChromium, newPage } from "../../../scripts/chromium.mjs";
 
-const { chromium } = createRequire(`${process.env.DTR_PLAYWRIGHT}/`)("playwright-core");
 const [page_file, program] = process.argv.slice(2);
 const found = { messages: [] };
-const browser = await chromium.launch({ executablePath: program, args: ["--no-sandbox", "--disable-dev-shm-usage",
-  "--disable-background-networking", "--disable-component-update", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"] });
-const page = await browser.newPage({ viewport: { width: 320, height: 200 } });
-page.on("console", (message) => found.messages.push(message.text()));
-page.on("pageerror", (error) => found.messages.push(error.message));
+const browser = await launchChromium(program);
+const page = await newPage(browser, { viewport: { width: 320, height: 200 } }, (text) => found.messages.push(text));
 await page.goto(`file://${page_file}`);
 await page.evaluate(() => globalThis.dtrPage.allLoaded);
 found.slider = await page.evaluate(() => { const { hidden, max } = document.getElementById("time"); return { hidden, max }; });

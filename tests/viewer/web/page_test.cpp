@@ -12,7 +12,7 @@
 #include "dtr/types/inverse_depth_code.h"
 #include "tests/cli/run_dtr.h"
 #include "tests/cli/web_page_bytes.h"
-#include "tests/viewer/web/in_chromium.h"
+#include "tests/viewer/web/in_browser.h"
 
 namespace dtr::testing {
 namespace {
@@ -149,6 +149,17 @@ TEST_F(WebPage, DrawsWhatTheReferenceRendererDraws) {
   }
   EXPECT_GT(away, 6000);  // of 24576: the courtyard has many edges
   EXPECT_GT(within, kAgreeing * away) << within << " of " << away;
+}
+
+// Without a GPU a frame takes as long as many views take to decode.
+TEST_F(WebPage, DrawsSeldomWhileViewsArriveAndAtTheEndFromAllThatItNeeds) {
+  const nlohmann::json found = Found({DTR_DRIVE_LOADING, Page().string(), kChromium});
+  EXPECT_THAT(found["messages"], IsEmpty()) << found;
+  EXPECT_GT(found["loaded"], 4);
+  EXPECT_GE(found["images"], 1);
+  EXPECT_LE(2 * found["images"].get<int>(), found["loaded"].get<int>())
+      << "one for each without pace";
+  EXPECT_EQ(found["drawn"], found["wanted"]);
 }
 
 TEST_F(WebPage, ShowsEachEyeOfAHeadsetFromWhereItIs) {

@@ -8,7 +8,7 @@
 
 #include "dtr/base/files.h"
 #include "tests/cli/run_dtr.h"
-#include "tests/viewer/web/in_chromium.h"
+#include "tests/viewer/web/in_browser.h"
 
 namespace dtr::testing {
 namespace {

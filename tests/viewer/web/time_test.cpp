@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/cli/run_dtr.h"
-#include "tests/viewer/web/in_chromium.h"
+#include "tests/viewer/web/in_browser.h"
 
 namespace dtr::testing {
 namespace {

@@ -17,7 +17,8 @@ function maskDistances(usable, view) {
   const at = (x, y) => (x >= 0 && y >= 0 && x < width && y < height ? distance[y * width + x] : most);
   for (let y = 0; y < height; ++y) {
     for (let x = 0; x < width; ++x) {
-      distance[y * width + x] = usable[y * width + x] ? Math.min(at(x - 1, y), at(x - 1, y - 1), at(x, y - 1), at(x + 1, y - 1), most - 1) + 1 : 0;
+      const around = Math.min(at(x - 1, y), at(x - 1, y - 1), at(x, y - 1), at(x + 1, y - 1), most - 1);
+      distance[y * width + x] = usable[y * width + x] ? around + 1 : 0;
     }
   }
   for (let y = height - 1; y >= 0; --y) {
@@ -50,7 +51,10 @@ function joined(measured, completed, measuredCodes) {
   return measured;
 }
 
-/** The view of a header with its pixels, of {text} (bytes as text) or {bytes}: photo (ImageBitmap), codes, flags of blocks, mesh, mask distances (null: no mask). */
+/**
+ * The view of a header with its pixels, of {text} (bytes as text) or {bytes}: photo (ImageBitmap), codes, flags of blocks, mesh, mask
+ * distances (null: no mask).
+ */
 export async function decodeView(view, data) {
   const where = `photo ${view.name}`;
   const bytes = data.bytes ?? bytesOfText(data.text, view.bytes, where);

@@ -33,7 +33,8 @@ export class Program {
     gl.linkProgram(this.program);
     if (!gl.getProgramParameter(this.program, gl.LINK_STATUS) && !gl.isContextLost()) {
       const logs = parts.map(({ shader, name }) => [name, gl.getShaderInfoLog(shader)]).filter(([, log]) => log);
-      throw new Problem(`this browser's WebGL2 rejects a shader: ${logs.map((l) => l.join(": ")).join("; ") || gl.getProgramInfoLog(this.program)}`);
+      const log = logs.map((l) => l.join(": ")).join("; ") || gl.getProgramInfoLog(this.program);
+      throw new Problem(`this browser's WebGL2 rejects a shader: ${log}`);
     }
     for (const { shader } of parts) gl.deleteShader(shader);
     this.places = new Map();

@@ -4,7 +4,8 @@ import { Loader } from "./loader.js";
 import { Navigation } from "./navigation.js";
 import { Keys, Pointers } from "./input.js";
 import { placed, placedSet, upOf } from "./camera.js";
-import { kViews, wantedOrder } from "./selection.js";
+import { kCandidates, kViews, sameSelection, wantedOrder } from "./selection.js";
+import { Pace } from "./pace.js";
 import { TimeControl } from "./time.js";
 import { drawMeasure, pickedPoint } from "./measure.js";
 import { Headset } from "./xr.js";
@@ -31,7 +32,8 @@ export class Page {
     this.canvas = element("canvas");
     const gl = this.canvas.getContext("webgl2", { alpha: false, antialias: false, depth: false, powerPreference: "high-performance" });
     if (!gl) {
-      throw new Problem("this page needs WebGL2, which this browser does not offer here; open it in a current Firefox, Chrome, Edge or Safari, with graphics acceleration on");
+      throw new Problem("this page needs WebGL2, which this browser does not offer here; open it in a current Firefox, Chrome, Edge " +
+        "or Safari, with graphics acceleration on");
     }
     this.renderer = new Renderer(gl, shaders, this.set);
     const up = upOf(this.set.views);
@@ -43,6 +45,8 @@ export class Page {
     this.eye = null;  // the camera of a headset's eye
     this.level = 0;
     this.dirty = true;
+    this.arrivals = false;  // views that the image would be drawn from have arrived since it was drawn
+    this.pace = new Pace(gl);
     this.last = 0;
     this.loader = new Loader({
       store: this.renderer.store, makeWorker, order: () => this.order(), dataOf,
@@ -65,10 +69,32 @@ export class Page {
   }
 
   arrived() {
-    this.dirty = true;
+    this.arrivals = true;
     const loaded = this.renderer.store.loaded.size, wanted = Math.min(this.set.views.length, this.renderer.store.layers);
     element("progress").style.width = loaded < wanted ? `${100 * loaded / wanted}%` : "0";
     if (this.loader.done) this.complete();
+  }
+
+  // Views that have arrived are drawn at once where there is no image yet or nothing more is to come for it, else now and then.
+  takeArrivals(now) {
+    if (!this.arrivals) return;
+    const { step } = this.renderer;
+    this.chooseStep();
+    if (!this.frame || this.renderer.step !== step) this.dirty = true;
+    else if (!this.options.compare && sameSelection(this.renderer.select(this.frame.novel), this.frame.selection)) this.arrivals = false;
+    else if (this.pace.rested(now) || (this.pace.idle(now) && (this.loader.done || this.nearestLoaded))) this.dirty = true;
+  }
+
+  // Views that follow in the order change nothing: SPEC 1.2 needs one more than it draws from.
+  get nearestLoaded() {
+    const count = (this.frame.perPixel ? kCandidates : kViews) + 1;
+    return this.order().filter((view) => view.step === this.renderer.step && !this.loader.broken.has(view.index)).slice(0, count)
+      .every((view) => this.renderer.store.has(view));
+  }
+
+  /** Nothing is to be drawn or being drawn; for programs that look at the page. */
+  get still() {
+    return this.loader.done && !this.dirty && !this.coarse && !this.arrivals && this.pace.idle(performance.now());
   }
 
   missing(problem) {
@@ -223,6 +249,7 @@ export class Page {
     }
     moving ||= this.pointers.down.size > 0 && this.dirty;
     if (moving && this.wasMoving) this.adapt(now - this.last);
+    this.takeArrivals(now);
     if (this.dirty || moving || this.coarse) this.drawFrame(moving ? kScales[this.level] : 1);
     this.wasMoving = moving;
     this.last = now;
@@ -230,7 +257,7 @@ export class Page {
   }
 
   drawFrame(scale) {
-    this.dirty = false;
+    this.dirty = this.arrivals = false;
     this.coarse = scale !== 1;
     this.chooseStep();
     if (!this.pictureOf(this.renderer.step)) return this.loader.run();
@@ -240,6 +267,7 @@ export class Page {
       depth: options.depth, photo: options.compare ? this.nearest() : null, photoFrom: options.split * this.canvas.width,
       inverseDepths: this.inverseDepths(),
     });
+    this.pace.drawn(performance.now());
     drawMeasure(element("marks"), this.camera(), this.points, this.set.unit);
     this.loader.run();
     this.pictured();

@@ -103,7 +103,7 @@ export class Renderer {
     this.drawResult(novel, selection, placements, exposure);
     if (fill) this.fillHoles();
     this.finish(novel, placements, fill, smooth);
-    return { novel, views: selection.views.map(({ view }) => view), perPixel: selection.perPixel, exposure };
+    return { novel, selection, views: selection.views.map(({ view }) => view), perPixel: selection.perPixel, exposure };
   }
 
   drawCoarse(novel, selection, placements) {

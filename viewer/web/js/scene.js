@@ -34,7 +34,7 @@ export class SetScene {
         this.uploads.push(() => { try { resolve(put()); } catch (error) { reject(error); } });
         changed();
       }),
-      loaded: () => { settled(); changed(); }, failed: (view, problem) => { settled(); failed(problem); },
+      loaded: settled, failed: (view, problem) => { settled(); failed(problem); },
     });
     this.loader.run();
   }

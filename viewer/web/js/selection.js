@@ -59,6 +59,12 @@ export function selectViews(set, views, novel) {
   return { perPixel, views: chosen.sort((a, b) => a.view.index - b.view.index) };
 }
 
+/** Images drawn from the one and the other are the same, for the same camera. */
+export function sameSelection(a, b) {
+  return a.perPixel === b.perPixel && a.views.length === b.views.length
+    && a.views.every(({ view, cut }, i) => view === b.views[i].view && cut === b.views[i].cut);
+}
+
 /** SPEC 4.9: per channel; 1 where no view has a gain. */
 export function frameExposure(set, selected, novel) {
   if (selected.every(({ view }) => view.gain.every((g) => g === 1))) return [1, 1, 1];

@@ -1,4 +1,4 @@
-// tests/viewer/web/in_chromium.h -- exported pages in Chromium, driven by playwright-core (npm):
+// tests/viewer/web/in_browser.h -- exported pages in browsers of Debian, driven by modules of npm:
 // DTR_PLAYWRIGHT names a folder with its node_modules. SKIPPED without.
 #pragma once
 #include <gtest/gtest.h>
@@ -16,17 +16,20 @@
 namespace dtr::testing {
 
 inline constexpr char kChromium[] = "/usr/bin/chromium";
+inline constexpr char kFirefox[] = "/usr/bin/firefox-esr";
 
-/// With a set of true depth, `set.dtr`.
-class InChromium : public ::testing::Test {
+/// With a set of true depth, `set.dtr`. `module`: of npm, which drives `browser`.
+class InBrowser : public ::testing::Test {
  protected:
+  InBrowser(std::string browser, std::string module)
+      : browser_(std::move(browser)), module_(std::move(module)) {}
   void SetUp() override {
     const char* folder = std::getenv("DTR_PLAYWRIGHT");
     if (folder == nullptr ||
-        !std::filesystem::exists(std::filesystem::path(folder) / "node_modules/playwright-core")) {
-      GTEST_SKIP() << "needs DTR_PLAYWRIGHT, a folder with playwright-core";
+        !std::filesystem::exists(std::filesystem::path(folder) / "node_modules" / module_)) {
+      GTEST_SKIP() << "needs DTR_PLAYWRIGHT, a folder with " << module_;
     }
-    if (!std::filesystem::exists(kChromium)) GTEST_SKIP() << "needs Chromium";
+    if (!std::filesystem::exists(browser_)) GTEST_SKIP() << "needs " << browser_;
     MakeSmallCourtyard(folder_ / "courtyard");
     ImportSmallCourtyard(folder_ / "courtyard", folder_ / "set.dtr");
   }
@@ -44,6 +47,14 @@ class InChromium : public ::testing::Test {
   }
 
   TemporaryFolder folder_;
+
+ private:
+  std::string browser_, module_;
+};
+
+class InChromium : public InBrowser {
+ protected:
+  InChromium() : InBrowser(kChromium, "playwright-core") {}
 };
 
 }  // namespace dtr::testing
