@@ -19,7 +19,7 @@ struct ModelFacts {
   bool fisheye;
 };
 
-constexpr std::array<ModelFacts, 11> kModels{{
+constexpr std::array<ModelFacts, 20> kModels{{
     {CameraModel::kSimplePinhole, "SIMPLE_PINHOLE", 3, 1, false},
     {CameraModel::kPinhole, "PINHOLE", 4, 2, false},
     {CameraModel::kSimpleRadial, "SIMPLE_RADIAL", 4, 1, false},
@@ -31,6 +31,15 @@ constexpr std::array<ModelFacts, 11> kModels{{
     {CameraModel::kSimpleRadialFisheye, "SIMPLE_RADIAL_FISHEYE", 4, 1, true},
     {CameraModel::kRadialFisheye, "RADIAL_FISHEYE", 5, 1, true},
     {CameraModel::kThinPrismFisheye, "THIN_PRISM_FISHEYE", 12, 2, true},
+    {CameraModel::kRadTanThinPrismFisheye, "RAD_TAN_THIN_PRISM_FISHEYE", 16, 2, true},
+    {CameraModel::kSimpleDivision, "SIMPLE_DIVISION", 4, 1, false},
+    {CameraModel::kDivision, "DIVISION", 5, 2, false},
+    {CameraModel::kSimpleFisheye, "SIMPLE_FISHEYE", 3, 1, true},
+    {CameraModel::kFisheye, "FISHEYE", 4, 2, true},
+    {CameraModel::kEucm, "EUCM", 6, 2, false},
+    {CameraModel::kBrownAffine, "BROWN_AFFINE", 15, 2, false},
+    {CameraModel::kFisheyeAffine, "FISHEYE_AFFINE", 15, 2, true},
+    {CameraModel::kInverseRadial, "INVERSE_RADIAL", 5, 2, false},
 }};
 
 const ModelFacts& FactsOf(CameraModel model) {
@@ -55,6 +64,18 @@ std::optional<CameraModel> CameraModelFromName(const std::string& name) {
   return std::nullopt;
 }
 
+std::optional<CameraModel> CameraModelFromId(int id) {
+  for (const ModelFacts& facts : kModels) {
+    if (id == static_cast<int>(facts.model)) return facts.model;
+  }
+  return std::nullopt;
+}
+
+bool IsAdjustable(CameraModel model) {
+  return model != CameraModel::kFov &&
+         static_cast<int>(model) <= static_cast<int>(CameraModel::kThinPrismFisheye);
+}
+
 void LensCamera::Check() const {
   const ModelFacts& facts = FactsOf(model);
   if (width_px <= 0 || height_px <= 0) {
@@ -75,6 +96,11 @@ void LensCamera::Check() const {
                                   std::to_string(params[static_cast<size_t>(i)]));
     }
   }
+  if (model == CameraModel::kEucm && !(params[4] >= 0 && params[4] <= 1 && params[5] > 0)) {
+    throw std::invalid_argument(
+        "LensCamera: EUCM must have alpha in [0, 1] and beta above 0, found " +
+        std::to_string(params[4]) + " and " + std::to_string(params[5]));
+  }
 }
 
 PinholeCamera LensCamera::Pinhole() const {
@@ -89,6 +115,7 @@ bool LensCamera::IsUndistorted() const {
   Check();
   const ModelFacts& facts = FactsOf(model);
   if (facts.fisheye) return false;  // equidistant even when every coefficient is zero
+  if (model == CameraModel::kEucm) return params[4] == 0;
   const auto distortion = params.begin() + facts.focal_lengths + 2;
   return std::all_of(distortion, params.end(), [](double p) { return p == 0; });
 }
@@ -107,7 +134,9 @@ LensCamera WithTwoFocalLengths(LensCamera camera) {
       {CameraModel::kSimpleRadial, CameraModel::kOpenCv},
       {CameraModel::kRadial, CameraModel::kOpenCv},
       {CameraModel::kSimpleRadialFisheye, CameraModel::kOpenCvFisheye},
-      {CameraModel::kRadialFisheye, CameraModel::kOpenCvFisheye}};
+      {CameraModel::kRadialFisheye, CameraModel::kOpenCvFisheye},
+      {CameraModel::kSimpleDivision, CameraModel::kDivision},
+      {CameraModel::kSimpleFisheye, CameraModel::kFisheye}};
   const auto wider = kWider.find(camera.model);
   if (wider == kWider.end()) return camera;
   camera.model = wider->second;

@@ -10,8 +10,10 @@
 
 namespace dtr::calib {
 
-/// Lens models with COLMAP's names and ids (its sensor models 0 to 10); the parameter order is
-/// COLMAP's too. Ids beyond are rejected by the readers, by name.
+/// Camera models with COLMAP's names and ids (its sensor models 0 to 16); the parameter order is
+/// COLMAP's too. Its model 17, EQUIRECTANGULAR, is rejected by the readers, by name. The last three
+/// are ours, for cameras of other programs that no model of COLMAP describes; their ids stay out
+/// of its range. Models 11 and above are not known to COLMAP 3.
 enum class CameraModel : int {
   kSimplePinhole = 0,        ///< f, cx, cy
   kPinhole = 1,              ///< fx, fy, cx, cy
@@ -24,7 +26,21 @@ enum class CameraModel : int {
   kSimpleRadialFisheye = 8,  ///< f, cx, cy, k
   kRadialFisheye = 9,        ///< f, cx, cy, k1, k2
   kThinPrismFisheye = 10,    ///< fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, sx1, sy1
+  /// fx, fy, cx, cy, k0 to k5, p0, p1, s0 to s3 (Fisheye624 of Project Aria)
+  kRadTanThinPrismFisheye = 11,
+  kSimpleDivision = 12,  ///< f, cx, cy, k (Fitzgibbon 2001)
+  kDivision = 13,        ///< fx, fy, cx, cy, k
+  kSimpleFisheye = 14,   ///< f, cx, cy: equidistant
+  kFisheye = 15,         ///< fx, fy, cx, cy: equidistant
+  kEucm = 16,            ///< fx, fy, cx, cy, alpha, beta (Khomutenko, Garcia & Martinet 2016)
+  /// fx, fy, cx, cy, k1 to k6, p1 to p4, skew: Metashape's and RealityScan's formula
+  kBrownAffine = 100,
+  kFisheyeAffine = 101,  ///< the same of the angle
+  kInverseRadial = 102,  ///< fx, fy, cx, cy, r: VisualSFM's, q = d (1 + r |d|^2)
 };
+
+/// The largest number of parameters of any model.
+inline constexpr int kMaxCameraParameters = 16;
 
 /// Number of parameters of a model.
 int ParameterCount(CameraModel model);
@@ -34,6 +50,10 @@ int FocalCount(CameraModel model);
 std::string NameOf(CameraModel model);
 /// Inverse of NameOf; empty for names this version does not know.
 std::optional<CameraModel> CameraModelFromName(const std::string& name);
+/// The model with this number; empty for others.
+std::optional<CameraModel> CameraModelFromId(int id);
+/// False where bundle adjustment takes no camera of the model (FOV, and all above 10).
+bool IsAdjustable(CameraModel model);
 
 /// A camera with a lens. Pixels: origin at the outer corner of the top-left pixel.
 struct LensCamera {

@@ -80,20 +80,26 @@ double FirstPositiveRoot(const Polynomial& p) {
 
 LensMap::LensMap(const LensCamera& camera)
     : formula_((camera.Check(), FormulaOf(camera.model, camera.params.data()))) {
-  if (camera.model == CameraModel::kFov) {
-    fov_ = camera.params[4] != 0;  // the limit omega -> 0 is the pinhole camera
-    omega_ = std::abs(camera.params[4]);
+  if (formula_.law == RadialLaw::kFov) formula_.law_a = std::abs(formula_.law_a);
+  for (const double term :
+       {formula_.p1, formula_.p2, formula_.sx, formula_.sy, formula_.sx2, formula_.sy2}) {
+    decentred_ = decentred_ || term != 0;
   }
-  decentred_ = formula_.p1 != 0 || formula_.p2 != 0 || formula_.sx != 0 || formula_.sy != 0;
   max_radius_ = FindMaxRadius();
 }
 
 // The derivative of r N(s) / D(s) by r, s = r^2, has the sign of (N + 2 s N') D - 2 s N D' as long
 // as D stays positive.
 double LensMap::FindMaxRadius() const {
-  if (fov_) return omega_ < std::numbers::pi ? kInfinity : 0;
+  const double a = formula_.law_a;
+  if (formula_.law == RadialLaw::kFov) return a < std::numbers::pi ? kInfinity : 0;
+  if (formula_.law == RadialLaw::kDivision) return a > 0 ? 1 / (2 * std::sqrt(a)) : kInfinity;
+  if (formula_.law == RadialLaw::kEucm) return kInfinity;
+  if (formula_.law == RadialLaw::kInverseRadial) {
+    return a < 0 ? 2 / (3 * std::sqrt(-3 * a)) : kInfinity;
+  }
   const auto& k = formula_.numerator;
-  const Polynomial n{1, k[0], k[1], k[2], k[3]};
+  const Polynomial n{1, k[0], k[1], k[2], k[3], k[4], k[5]};
   const Polynomial d{1, formula_.denominator[0], formula_.denominator[1], formula_.denominator[2]};
   const Polynomial two_s{0, 2};
   Polynomial slope = Product(two_s, Derivative(n));
@@ -108,7 +114,8 @@ double LensMap::FindMaxRadius() const {
 LensMap::RadialValue LensMap::RadialFactor(double s) const {
   const auto& k = formula_.numerator;
   const auto& d = formula_.denominator;
-  const double n_slope = k[0] + s * (2 * k[1] + s * (3 * k[2] + s * 4 * k[3]));
+  double n_slope = k[0] + s * (2 * k[1] + s * (3 * k[2] + s * 4 * k[3]));
+  if (formula_.extended) n_slope += s * s * s * s * (5 * k[4] + s * 6 * k[5]);
   const double m = formula_.RadialDenominator(s);
   const double m_slope = d[0] + s * (2 * d[1] + s * 3 * d[2]);
   const double factor = formula_.RadialNumerator(s) / m;
@@ -116,15 +123,29 @@ LensMap::RadialValue LensMap::RadialFactor(double s) const {
 }
 
 LensMap::Distorted LensMap::Distort(const Eigen::Vector2d& q) const {
-  const double x = q.x(), y = q.y();
-  const double p1 = formula_.p1, p2 = formula_.p2;
   const auto [factor, slope] = RadialFactor(q.squaredNorm());
   Distorted out;
   formula_.Distort(q.data(), out.point.data());
-  out.jacobian << factor + 2 * x * x * slope + 2 * p1 * y + 6 * p2 * x + 2 * formula_.sx * x,
-      2 * x * y * slope + 2 * p1 * x + 2 * p2 * y + 2 * formula_.sx * y,
-      2 * x * y * slope + 2 * p2 * y + 2 * p1 * x + 2 * formula_.sy * x,
-      factor + 2 * y * y * slope + 2 * p2 * x + 6 * p1 * y + 2 * formula_.sy * y;
+  const Eigen::Matrix2d radial =
+      factor * Eigen::Matrix2d::Identity() + 2 * slope * q * q.transpose();
+  // Tangential and prism terms: of q, or of the radially scaled point.
+  const Eigen::Vector2d at = formula_.scaled_first ? Eigen::Vector2d(factor * q) : q;
+  const double x = at.x(), y = at.y(), s = at.squaredNorm();
+  const double p1 = formula_.p1, p2 = formula_.p2;
+  Eigen::Matrix2d decentring;
+  decentring << 2 * p1 * y + 6 * p2 * x, 2 * p1 * x + 2 * p2 * y, 2 * p2 * y + 2 * p1 * x,
+      2 * p2 * x + 6 * p1 * y;
+  const Eigen::Vector2d prism(formula_.sx + 2 * s * formula_.sx2,
+                              formula_.sy + 2 * s * formula_.sy2);
+  if (formula_.p3 != 0 || formula_.p4 != 0) {
+    const Eigen::Vector2d tangential(2 * p1 * x * y + p2 * (s + 2 * x * x),
+                                     2 * p2 * x * y + p1 * (s + 2 * y * y));
+    decentring *= 1 + s * (formula_.p3 + s * formula_.p4);
+    decentring += tangential * 2 * (formula_.p3 + 2 * s * formula_.p4) * at.transpose();
+  }
+  decentring += 2 * prism * at.transpose();
+  out.jacobian = formula_.scaled_first ? Eigen::Matrix2d(radial + decentring * radial)
+                                       : Eigen::Matrix2d(radial + decentring);
   return out;
 }
 
@@ -140,10 +161,8 @@ std::optional<Eigen::Vector2d> LensMap::PixelFromCam(const Eigen::Vector3d& p_in
   const double radius = q->norm();
   if (!(radius < max_radius_)) return std::nullopt;
   Eigen::Vector2d distorted;
-  if (fov_) {
-    const double scale = 2 * std::tan(omega_ / 2);
-    distorted =
-        radius == 0 ? *q : Eigen::Vector2d(*q * (std::atan(radius * scale) / (omega_ * radius)));
+  if (formula_.law != RadialLaw::kPolynomial) {
+    distorted = *q * formula_.OwnFactor(q->squaredNorm());
   } else if (!decentred_) {
     distorted = *q * RadialFactor(q->squaredNorm()).factor;
   } else {
@@ -152,8 +171,9 @@ std::optional<Eigen::Vector2d> LensMap::PixelFromCam(const Eigen::Vector3d& p_in
     distorted = d.point;
   }
   if (!distorted.allFinite()) return std::nullopt;
-  return Eigen::Vector2d(formula_.fx_px * distorted.x() + formula_.cx_px,
-                         formula_.fy_px * distorted.y() + formula_.cy_px);
+  return Eigen::Vector2d(
+      formula_.fx_px * distorted.x() + formula_.skew * distorted.y() + formula_.cx_px,
+      formula_.fy_px * distorted.y() + formula_.cy_px);
 }
 
 // Newton on r N / D - target inside a bracket that bisection shrinks whenever Newton leaves it.
@@ -181,18 +201,42 @@ std::optional<double> LensMap::InverseRadius(double distorted_radius) const {
   return r < max_radius_ ? std::optional<double>(r) : std::nullopt;
 }
 
-std::optional<Eigen::Vector2d> LensMap::UndistortFov(const Eigen::Vector2d& distorted) const {
+// |q| of a law that is no polynomial.
+std::optional<double> LensMap::InverseOwnRadius(double distorted_radius) const {
+  const double a = formula_.law_a, b = formula_.law_b, square = distorted_radius * distorted_radius;
+  if (formula_.law == RadialLaw::kDivision) {
+    const double divisor = 1 + a * square;
+    // Beyond 1 / sqrt(k) lies the other branch of the square root.
+    if (!(divisor > 0) || !(a * square < 1)) return std::nullopt;
+    return distorted_radius / divisor;
+  }
+  if (formula_.law == RadialLaw::kEucm) {  // equations 9 and 10 of the paper
+    const double root = 1 - (2 * a - 1) * b * square;
+    if (!(root >= 0)) return std::nullopt;
+    const double z = (1 - b * a * a * square) / (a * std::sqrt(root) + 1 - a);
+    return z > 0 ? std::optional<double>(distorted_radius / z) : std::nullopt;
+  }
+  if (a == 0) return distorted_radius;
+  if (formula_.law == RadialLaw::kInverseRadial) {
+    // Beyond the turning point of the cubic lies another branch.
+    if (!(1 + 3 * a * square > 0)) return std::nullopt;
+    return distorted_radius * (1 + a * square);
+  }
+  const double angle = distorted_radius * a;
+  if (!(angle < std::numbers::pi / 2)) return std::nullopt;
+  return std::tan(angle) / (2 * std::tan(a / 2));
+}
+
+std::optional<Eigen::Vector2d> LensMap::UndistortOwn(const Eigen::Vector2d& distorted) const {
   const double radius = distorted.norm();
-  const double angle = radius * omega_;
-  if (!(max_radius_ > 0) || !(angle < std::numbers::pi / 2)) return std::nullopt;
-  if (radius == 0) return distorted;
-  const double undistorted = std::tan(angle) / (2 * std::tan(omega_ / 2));
-  if (!(undistorted < kLargestTangent)) return std::nullopt;
-  return Eigen::Vector2d(distorted * (undistorted / radius));
+  if (!(max_radius_ > 0)) return std::nullopt;
+  const std::optional<double> undistorted = InverseOwnRadius(radius);
+  if (!undistorted || !(*undistorted < std::min(max_radius_, kLargestTangent))) return std::nullopt;
+  return radius == 0 ? distorted : Eigen::Vector2d(distorted * (*undistorted / radius));
 }
 
 std::optional<Eigen::Vector2d> LensMap::Undistort(const Eigen::Vector2d& distorted) const {
-  if (fov_) return UndistortFov(distorted);
+  if (formula_.law != RadialLaw::kPolynomial) return UndistortOwn(distorted);
   const double radius = distorted.norm();
   const std::optional<double> start = InverseRadius(radius);
   if (!decentred_) {
@@ -229,8 +273,9 @@ std::optional<Eigen::Vector2d> LensMap::Undistort(const Eigen::Vector2d& distort
 
 std::optional<Eigen::Vector3d> LensMap::RayFromPixel(const Eigen::Vector2d& pixel) const {
   if (!pixel.allFinite()) return std::nullopt;
-  const auto q = Undistort({(pixel.x() - formula_.cx_px) / formula_.fx_px,
-                            (pixel.y() - formula_.cy_px) / formula_.fy_px});
+  const double y = (pixel.y() - formula_.cy_px) / formula_.fy_px;
+  const double x = (pixel.x() - formula_.skew * y - formula_.cx_px) / formula_.fx_px;
+  const auto q = Undistort({x, y});
   if (!q) return std::nullopt;
   if (!formula_.fisheye) return Eigen::Vector3d(q->x(), q->y(), 1).normalized();
   const double angle = q->norm();

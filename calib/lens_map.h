@@ -8,9 +8,7 @@
 
 namespace dtr::calib {
 
-/// LensFormula with its derivatives, its guard and its inverse, and the FOV model beside it
-/// (Devernay & Faugeras 2001): d = q * atan(2 |q| tan(omega / 2)) / (omega |q|). These are the
-/// models COLMAP documents.
+/// LensFormula with its derivatives, its guard and its inverse.
 ///
 /// A lens maps different rays to different pixels, a polynomial does not for ever: the mapping ends
 /// at the smallest radius at which |d| stops growing with |q| (tangential and prism terms apart,
@@ -43,14 +41,13 @@ class LensMap {
   RadialValue RadialFactor(double s) const;
   Distorted Distort(const Eigen::Vector2d& q) const;
   std::optional<double> InverseRadius(double distorted_radius) const;
-  std::optional<Eigen::Vector2d> UndistortFov(const Eigen::Vector2d& distorted) const;
+  std::optional<double> InverseOwnRadius(double distorted_radius) const;
+  std::optional<Eigen::Vector2d> UndistortOwn(const Eigen::Vector2d& distorted) const;
   std::optional<Eigen::Vector2d> Undistort(const Eigen::Vector2d& distorted) const;
   std::optional<Eigen::Vector2d> PlaneFromCam(const Eigen::Vector3d& p_in_cam) const;
 
   LensFormula<double> formula_;
-  bool fov_ = false;
-  double omega_ = 0;
-  bool decentred_ = false;  // any of p1, p2, sx, sy
+  bool decentred_ = false;  // any tangential or prism term
   double max_radius_ = 0;
 };
 

@@ -12,6 +12,7 @@ find_package(JPEG REQUIRED)
 find_package(ZLIB REQUIRED)
 find_package(nlohmann_json 3.11 REQUIRED)
 find_package(fmt 9 REQUIRED)
+find_package(pugixml 1.13 REQUIRED)
 find_package(hwy 1.0 REQUIRED)
 # Vectors whose size is known when the program runs fit no struct and no array; ARM processors that
 # have them have NEON too.

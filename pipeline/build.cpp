@@ -21,6 +21,7 @@
 #include "pipeline/advise.h"
 #include "pipeline/calibrate.h"
 #include "pipeline/capture.h"
+#include "pipeline/detail/cameras/camera_formats.h"
 #include "pipeline/detail/depth/depth_engine.h"
 #include "pipeline/detail/depth/depth_stage.h"
 #include "pipeline/detail/pages/set_page.h"
@@ -150,6 +151,12 @@ void LeaveOutSameImages(const BuildOptions& options, capture::Capture& photos, P
   }
 }
 
+// Of the cameras and of the lists that their reader takes in.
+std::string PosesHash(const std::filesystem::path& poses) {
+  const std::vector<std::filesystem::path> files = WithCompanions(poses);
+  return files.size() > 1 ? InputHash(files) : InputHash(poses);
+}
+
 void RequireTwoSources(const capture::Capture& capture, const std::vector<bool>& held_out,
                        const CalibratedPhotos& calibrated) {
   int sources = 0;
@@ -218,7 +225,7 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
   RunLog log;
   RecordedNotes progress(listener);
 
-  RequireCalibration(options.poses, options.sfm);
+  RequireCalibration(options.poses, options.poses_format, options.sfm);
   io::SetWriter::RequireTarget(options.output, options.force);
   log.Begin("capture");
   const bool from_video = !capture::VideosOf(options.photos).empty();
@@ -227,7 +234,8 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
   const auto look = [&] {
     LeaveOutSameImages(options, photos, progress);
     capture::RequireEnoughPhotos(photos, options.photos);
-    if (!options.poses.empty()) TakePhotosAsCamerasDo(options.poses, photos, progress);
+    if (!options.poses.empty())
+      TakePhotosAsCamerasDo(options.poses, options.poses_format, photos, progress);
     held_out = ChooseHeldOut(options.holdout, NamesOf(photos));
     RequireMetres(options.metres, photos, options.photos.string(),
                   options.holdout_strict ? held_out : std::vector<bool>());
@@ -246,13 +254,13 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
       {"time_budget_s", options.depth.time_budget_s.value_or(0)},
       {"photos", from_video ? VideoJson(options)
                             : PhotosJson(photos, std::vector<bool>(held_out.size(), true))},
-      {"poses_sha256", InputHash(options.poses)},
+      {"poses_sha256", PosesHash(options.poses)},
       {"workspace_sha256", InputHash(options.depth.workspace)}};
   if (rig) fingerprint["rig_sha256"] = InputHash(options.rig);
   if (std::filesystem::exists(options.photos / capture::kCaptureFile)) {
     fingerprint["stored_sha256"] = StoredHashes(photos);
   }
-  if (NeedsFeatures(options.poses)) {
+  if (NeedsFeatures(options.poses, options.poses_format)) {
     // COLMAP looks for features, of a size that is the one thing --memory decides of the result.
     const auto sizes = SizesOf(options, photos, held_out);
     if (!sizes.empty()) {
@@ -291,6 +299,7 @@ BuildReport BuildSet(const BuildOptions& asked, Progress& listener) {
   log.Begin("calibration");
   CalibrateOptions calibrate;
   calibrate.poses = options.poses;
+  calibrate.poses_format = options.poses_format;
   calibrate.held_out = held_out;
   calibrate.strict = options.holdout_strict;
   calibrate.threads = options.threads;

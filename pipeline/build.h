@@ -25,13 +25,14 @@ struct BuildOptions {
   std::string holdout;           ///< "", "every:N" or names
   bool holdout_strict = false;
   DepthChoice depth;
-  int max_size_px = -1;  ///< long side; 0 = full size, -1 = what the preset says
-  std::filesystem::path poses;
-  bool keep_duplicates = false;  ///< photos with the same pixels as another one
-  bool refine = true;            ///< bundle adjustment after SfM, where it pays
-  std::filesystem::path rig;     ///< calibration of the rig that took all photos; empty: none
-  SfmChoice sfm;                 ///< how cameras are looked for
-  MetreOptions metres;           ///< places and distances that the refinement holds
+  int max_size_px = -1;           ///< long side; 0 = full size, -1 = what the preset says
+  std::filesystem::path poses;    ///< known cameras, of a format that CameraFormats() names
+  std::string poses_format = {};  ///< its name; empty: by the content
+  bool keep_duplicates = false;   ///< photos with the same pixels as another one
+  bool refine = true;             ///< bundle adjustment after SfM, where it pays
+  std::filesystem::path rig;      ///< calibration of the rig that took all photos; empty: none
+  SfmChoice sfm;                  ///< how cameras are looked for
+  MetreOptions metres;            ///< places and distances that the refinement holds
   bool force = false;
   std::string force_stage;  ///< of an interrupted run: done again with all after it; "": none
   int threads = 0;

@@ -13,6 +13,7 @@
 #include "capture/contents_json.h"
 #include "capture/sfm_images.h"
 #include "dtr/base/error.h"
+#include "pipeline/detail/cameras/camera_formats.h"
 #include "pipeline/detail/cameras/known_poses.h"
 #include "pipeline/detail/photos/exif_focal.h"
 #include "pipeline/detail/reports/calibration_json.h"
@@ -147,27 +148,28 @@ int FeatureImageSizePx(const std::vector<std::pair<int, int>>& sizes_px, double 
   return colmap::PlanExtraction(images, 1, memory_gb, asked_px).max_image_size_px;
 }
 
-bool NeedsFeatures(const fs::path& poses) {
-  return !fs::is_directory(poses) || colmap::ReadModel(colmap::ModelFolderIn(poses)).points.empty();
+bool NeedsFeatures(const fs::path& poses, const std::string& poses_format) {
+  return !IsColmapModel(poses, poses_format) ||
+         colmap::ReadModel(colmap::ModelFolderIn(poses)).points.empty();
 }
 
-void RequireCalibration(const fs::path& poses, const SfmChoice& sfm) {
+void RequireCalibration(const fs::path& poses, const std::string& poses_format,
+                        const SfmChoice& sfm) {
   if (sfm.features > MaxFeaturesOf(sfm.engine)) {
     throw UsageError(
         fmt::format("`features` {}: expected at most {}, the limit of `sfm` {}; give fewer",
                     sfm.features, MaxFeaturesOf(sfm.engine), colmap::NameOf(sfm.engine)));
   }
-  if (!poses.empty() && !fs::exists(poses)) {
-    throw UsageError(fmt::format("`poses` {}: no such file or folder", poses.string()));
-  }
-  if (sfm.engine == colmap::SfmEngine::kColmap && NeedsFeatures(poses)) (void)colmap::Program();
+  if (!poses.empty()) (void)FormatOf(poses, poses_format, "`poses`");
+  if (sfm.engine == colmap::SfmEngine::kColmap && NeedsFeatures(poses, poses_format))
+    (void)colmap::Program();
 }
 
 CalibratedPhotos CalibratePhotos(const capture::Capture& capture, const CalibrateOptions& options,
                                  const fs::path& workspace, Progress& progress) {
   CalibrateOptions checked = options;
   checked.held_out.resize(capture.photos.size(), false);
-  RequireCalibration(checked.poses, checked.sfm);
+  RequireCalibration(checked.poses, checked.poses_format, checked.sfm);
   if (checked.rig) RejectTurned(capture, "the rig is");
   if (checked.lens) RejectTurned(capture, "the intrinsics are");
   fs::create_directories(workspace);

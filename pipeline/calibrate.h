@@ -20,9 +20,10 @@ namespace dtr::pipeline {
 
 /// How cameras are found.
 struct CalibrateOptions {
-  std::filesystem::path
-      poses;  ///< empty: SfM; else a COLMAP model, cameras.json or poses_bounds.npy
-  std::vector<bool> held_out;  ///< per photo; empty: none
+  /// Empty: SfM; else cameras of a format that CameraFormats() names (pipeline/import.h).
+  std::filesystem::path poses;
+  std::string poses_format = {};  ///< its name; empty: by the content
+  std::vector<bool> held_out;     ///< per photo; empty: none
   bool strict = false;  ///< held-out photos take no part in SfM and are registered afterwards
   int threads = 0;
   std::uint64_t seed = 0;
@@ -66,12 +67,13 @@ std::string ToJson(const CalibratedPhotos& calibrated, const capture::FolderCont
 
 /// Whether features must be found: not where `poses` is a model that brings its points.
 /// Throws Error where that is broken.
-bool NeedsFeatures(const std::filesystem::path& poses);
+bool NeedsFeatures(const std::filesystem::path& poses, const std::string& poses_format);
 
 /// Rejects before any work what cannot work: UsageError for `poses` that do not exist and for more
 /// features than the engine takes, Error when
 /// COLMAP is needed (by SfmEngine::kColmap, where NeedsFeatures) and not installed.
-void RequireCalibration(const std::filesystem::path& poses, const SfmChoice& sfm);
+void RequireCalibration(const std::filesystem::path& poses, const std::string& poses_format,
+                        const SfmChoice& sfm);
 
 /// The long side to which SfM shrinks photos of these sizes (width and height, px), so that looking
 /// for features in them fits into `memory_gb` (`asked_px` at most; 0: nothing is asked): it decides

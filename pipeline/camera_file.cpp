@@ -4,7 +4,7 @@
 
 #include "calib/colmap/model_io.h"
 #include "calib/files/calibration.h"
-#include "calib/files/opencv_yaml.h"
+#include "calib/files/rig_files.h"
 #include "dtr/base/error.h"
 
 namespace dtr::pipeline {
@@ -23,8 +23,11 @@ calib::LensCamera ReadLens(const std::filesystem::path& file) {
     only_one(calibration.cameras.size());
     return calibration.cameras.front().camera;
   }
-  if (extension == ".yml" || extension == ".yaml" || extension == ".xml") {
-    return calib::ReadOpenCvYaml(file);
+  if (extension == ".yml" || extension == ".yaml" || extension == ".xml" ||
+      extension == ".cameramodel") {
+    const calib::CameraFile cameras = calib::ReadCamerasOf(file);
+    only_one(cameras.cameras.size());
+    return cameras.cameras.front().camera;
   }
   if (extension == ".txt") {
     const auto cameras = colmap::ReadCamerasText(file);
@@ -32,8 +35,8 @@ calib::LensCamera ReadLens(const std::filesystem::path& file) {
     return cameras.begin()->second;
   }
   throw UsageError(
-      fmt::format("{}: expected a .json of `dtr calibrate board`, a .yml or "
-                  ".xml of OpenCV or a cameras.txt of COLMAP",
+      fmt::format("{}: expected a .json of `dtr calibrate board`, a .yml or .xml of OpenCV, ROS, "
+                  "Kalibr or ORB-SLAM, a .cameramodel of mrcal or a cameras.txt of COLMAP",
                   file.string()));
 }
 

@@ -7,7 +7,8 @@
 namespace dtr::pipeline {
 
 /// The one camera of a file: .json as `dtr calibrate board` writes it, .yml, .yaml or .xml of
-/// OpenCV, .txt of COLMAP (cameras.txt). Throws UsageError on another extension, Error on a broken
+/// OpenCV, ROS, Kalibr or ORB-SLAM and .cameramodel of mrcal (calib/files/rig_files.h), .txt of
+/// COLMAP (cameras.txt). Throws UsageError on another extension, Error on a broken
 /// file or one with several cameras.
 calib::LensCamera ReadLens(const std::filesystem::path& file);
 

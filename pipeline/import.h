@@ -16,7 +16,7 @@ namespace dtr::pipeline {
 
 struct ImportRequest {
   std::filesystem::path cameras;  ///< a file or folder of a format that CameraFormats() names
-  std::string format;             ///< one of them; empty: by the name of `cameras`
+  std::string format;             ///< one of them; empty: by the content of `cameras`
   std::filesystem::path images;   ///< folder of the images
   std::filesystem::path depth;    ///< folder of depth maps; empty: COLMAP's points alone
   std::filesystem::path masks;    ///< empty: where `cameras` says, else `masks` beside the images
@@ -40,7 +40,7 @@ struct ImportReport {
   capture::FolderContents contents;                          ///< of the folder of images
 };
 
-/// The formats of ImportRequest::cameras.
+/// The formats of ImportRequest::cameras and BuildOptions::poses, in byte order.
 std::vector<std::string> CameraFormats();
 
 /// Writes a whole set. Distorted photos are undistorted; a set without depth maps gets the points

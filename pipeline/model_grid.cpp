@@ -8,6 +8,7 @@
 
 #include "calib/colmap/model_io.h"
 #include "dtr/base/files.h"
+#include "pipeline/detail/cameras/camera_formats.h"
 #include "pipeline/detail/cameras/known_poses.h"
 #include "pipeline/detail/photos/names_of_photos.h"
 
@@ -24,9 +25,10 @@ struct CameraSizes {
   PhotoGrid convention = PhotoGrid::kStored;
 };
 
-CameraSizes SizesOf(const fs::path& poses, const capture::Capture& photos) {
+CameraSizes SizesOf(const fs::path& poses, const std::string& format,
+                    const capture::Capture& photos) {
   CameraSizes sizes;
-  if (fs::is_directory(poses)) {
+  if (IsColmapModel(poses, format)) {
     const fs::path folder = colmap::ModelFolderIn(poses);
     const calib::SfmModel model = ReadModelOf(photos, poses);
     for (const calib::SfmImage& image : model.images) {
@@ -36,7 +38,7 @@ CameraSizes SizesOf(const fs::path& poses, const capture::Capture& photos) {
     sizes.convention = GridOfModel(folder);
     return sizes;
   }
-  const io::CameraList list = ReadPoses(photos, poses).list;
+  const io::CameraList list = ReadPoses(photos, poses, format).list;
   for (const io::NamedCamera& named : list.cameras) {
     sizes.by_name[named.name] = {named.camera.width_px(), named.camera.height_px()};
   }
@@ -56,11 +58,12 @@ void MarkUpright(const fs::path& model_folder) {
                       "orientation.\n");
 }
 
-void TakePhotosAsCamerasDo(const fs::path& poses, capture::Capture& photos, Progress& progress) {
+void TakePhotosAsCamerasDo(const fs::path& poses, const std::string& format,
+                           capture::Capture& photos, Progress& progress) {
   const bool any = std::any_of(photos.photos.begin(), photos.photos.end(),
                                [](const auto& photo) { return photo.exif_orientation != 1; });
   if (!any) return;
-  const CameraSizes sizes = SizesOf(poses, photos);
+  const CameraSizes sizes = SizesOf(poses, format, photos);
   std::string first_stored, first_turned;
   int stored = 0, turned = 0;
   for (capture::Photo& photo : photos.photos) {

@@ -1,6 +1,7 @@
 // pipeline/model_grid.h -- which pixels of photos with an EXIF orientation a model describes.
 #pragma once
 #include <filesystem>
+#include <string>
 
 #include "capture/photo.h"
 #include "dtr/base/progress.h"
@@ -18,7 +19,8 @@ void MarkUpright(const std::filesystem::path& model_folder);
 /// Settles which pixels `poses` (a file or folder of cameras) describe of photos with an EXIF
 /// orientation: by the size of their cameras, else by the program that wrote them. Photos that are
 /// meant as stored become so (capture::TakeAsStored); one line says of how many.
-void TakePhotosAsCamerasDo(const std::filesystem::path& poses, capture::Capture& photos,
-                           Progress& progress);
+/// `format`: of `poses`, empty: by its content.
+void TakePhotosAsCamerasDo(const std::filesystem::path& poses, const std::string& format,
+                           capture::Capture& photos, Progress& progress);
 
 }  // namespace dtr::pipeline

@@ -2,14 +2,18 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <set>
 
+#include "calib/colmap/model_io.h"
 #include "dtr/base/error.h"
 #include "dtr/io/formats/cameras_json.h"
 #include "dtr/io/formats/transforms_json.h"
 #include "dtr/render/camera_path.h"
+#include "pipeline/detail/cameras/camera_formats.h"
+#include "pipeline/detail/cameras/foreign_cameras.h"
 #include "pipeline/detail/photos/named_files.h"
 #include "pipeline/view_names.h"
 
@@ -48,12 +52,48 @@ io::CameraList FromTransforms(const std::filesystem::path& file) {
   return list;
 }
 
+// Cameras of any program, with the size that their file says. A COLMAP model's are as they are.
+io::CameraList ReadCameras(const std::filesystem::path& file) {
+  const CameraFormat& format = FormatOf(file, "", "cameras");
+  const std::string kind = format.name;
+  if (kind == "cameras-json") return io::ReadCamerasJson(file);
+  if (kind == "nerf") return FromTransforms(file);
+  if (kind == "llff") {
+    throw UsageError(file.string() +
+                     ": its cameras have no names and no photos here; give a "
+                     "cameras.json");
+  }
+  io::CameraList list;
+  if (format.read != nullptr) {
+    list = CamerasWithoutPhotos(format.read(file), file.string());
+  } else {
+    const calib::SfmModel model = colmap::ReadModel(colmap::ModelFolderIn(file));
+    for (const calib::SfmImage& image : model.images) {
+      io::NamedCamera named;
+      named.name = image.name;
+      const calib::LensCamera& lens = model.cameras.at(image.camera_id);
+      named.camera = lens.Pinhole();
+      if (!lens.IsUndistorted()) named.distortion = {calib::NameOf(lens.model), lens.params};
+      named.cam_from_world = image.cam_from_world;
+      list.cameras.push_back(named);
+    }
+  }
+  return list;
+}
+
 // A file's poses act on p_world - its origin, the set's on p_world - the set's.
-std::vector<NovelFrame> FromFile(const DtrSet& set, const std::filesystem::path& file) {
-  const io::CameraList list =
-      io::IsTransformsJson(file) ? FromTransforms(file) : io::ReadCamerasJson(file);
+std::vector<NovelFrame> FromFile(const DtrSet& set, const std::filesystem::path& file,
+                                 std::vector<std::string>* notes) {
+  const io::CameraList list = ReadCameras(file);
   const Eigen::Vector3d shift = set.world_origin - list.world_origin;
   std::vector<NovelFrame> cameras;
+  const auto distorted = std::count_if(list.cameras.begin(), list.cameras.end(),
+                                       [](const auto& named) { return named.distortion; });
+  if (distorted > 0 && notes != nullptr) {
+    notes->push_back(fmt::format(
+        "{}: {} of its cameras have distortion; frames are rendered without, as if undistorted",
+        file.string(), distorted));
+  }
   for (const io::NamedCamera& named : list.cameras) {
     Pose cam_from_world = named.cam_from_world;
     cam_from_world.translation += cam_from_world.rotation * shift;
@@ -91,20 +131,21 @@ PinholeCamera WithSize(const PinholeCamera& camera, const std::string& size) {
   return camera.Resized(width, height);
 }
 
-std::vector<NovelFrame> NovelFrames(const DtrSet& set, const NovelCameraRequest& request) {
+std::vector<NovelFrame> NovelFrames(const DtrSet& set, const NovelCameraRequest& request,
+                                    std::vector<std::string>* notes) {
   std::vector<NovelFrame> cameras;
   if (!request.like.empty()) {
     const View& view = FindView(set, request.like);
     cameras.push_back({view.id, view.camera, view.cam_from_world});
   } else if (!request.camera_file.empty()) {
-    cameras = FromFile(set, request.camera_file);
+    cameras = FromFile(set, request.camera_file, notes);
     if (cameras.size() > 1) {
       throw UsageError(
           fmt::format("`camera` {}: expected one camera, found {}; give `path` for several",
                       request.camera_file.string(), cameras.size()));
     }
   } else if (!request.path_file.empty()) {
-    cameras = FromFile(set, request.path_file);
+    cameras = FromFile(set, request.path_file, notes);
   } else if (request.fly_through_frames > 0) {
     int index = 0;
     for (const NovelCamera& step : FlyThrough(set, request.fly_through_frames)) {

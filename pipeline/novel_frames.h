@@ -17,8 +17,12 @@ struct NovelFrame {
   Pose cam_from_world;
 };
 
-/// The cameras of a request. Throws UsageError for a malformed one, Error for a broken file.
-std::vector<NovelFrame> NovelFrames(const DtrSet& set, const NovelCameraRequest& request);
+/// The cameras of a request. A file of cameras may be of any format that CameraFormats() names
+/// (pipeline/import.h) but LLFF's; `notes`, where given, gets a line where its cameras have
+/// distortion: frames are rendered without. Throws UsageError for a malformed request, Error for a
+/// broken file.
+std::vector<NovelFrame> NovelFrames(const DtrSet& set, const NovelCameraRequest& request,
+                                    std::vector<std::string>* notes = nullptr);
 
 /// The camera at a size given as "WxH" (empty: its own). Throws UsageError for a malformed one.
 PinholeCamera WithSize(const PinholeCamera& camera, const std::string& size);

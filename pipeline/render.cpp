@@ -75,9 +75,12 @@ void WritePlanes(const RenderRequest& request, const RenderResult& result) {
 }
 
 // When playing, one camera sees every frame of the set.
-std::vector<NovelFrame> CamerasOf(const RenderRequest& request, const DtrSet& set) {
+std::vector<NovelFrame> CamerasOf(const RenderRequest& request, const DtrSet& set,
+                                  Progress& progress) {
+  std::vector<std::string> notes;
   std::vector<NovelFrame> cameras =
-      NovelFrames(AtFrame(set, request.frame.value_or(0)), request.cameras);
+      NovelFrames(AtFrame(set, request.frame.value_or(0)), request.cameras, &notes);
+  for (const std::string& note : notes) progress.Note(note);
   if (!request.play) return cameras;
   if (cameras.size() != 1 || request.frame) {
     throw UsageError("`play`: expected `like` or `camera` with it, and no `frame`");
@@ -107,7 +110,7 @@ RenderReport Render(const RenderRequest& request,
                     const std::function<eval::RenderFunction()>& make_renderer,
                     Progress& progress) {
   const DtrSet described = io::ReadSet(request.set);
-  const auto cameras = CamerasOf(request, described);
+  const auto cameras = CamerasOf(request, described, progress);
   RequireOneOutput(request);
   const eval::RenderFunction draw = make_renderer();
   RenderOptions render = request.render;

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "calib/files/calibration.h"
+#include "calib/files/rig_files.h"
 #include "dtr/base/error.h"
 #include "dtr/io/json_fields.h"
 #include "pipeline/detail/boards/rig_names.h"
@@ -104,13 +105,38 @@ double MovedPx(const View& view, const Pose& cam_from_world, const SparseScene& 
   return std::sqrt(squares / static_cast<double>(seen.size()));
 }
 
+// Of another program, which has no board and no views.
+SetRig ForeignRig(const fs::path& file) {
+  const calib::CameraFile cameras = calib::ReadCamerasOf(file);
+  if (cameras.cameras.size() < 2) {
+    throw Error(fmt::format(
+        "`rig` {}: expected a rig of 2 cameras or more, found 1; one camera alone is for dtr "
+        "calibrate photos `lens`",
+        file.string()));
+  }
+  SetRig rig;
+  rig.file = file.filename().string();
+  rig.unit = cameras.metric ? LengthUnit::kMetre : LengthUnit::kUnknown;
+  for (const calib::FiledCamera& camera : cameras.cameras) {
+    rig.names.push_back(camera.name);
+    rig.known.lenses.push_back(camera.camera);
+    rig.known.cam_from_rig.push_back(camera.cam_from_rig);
+  }
+  return rig;
+}
+
 }  // namespace
 
 SetRig ReadSetRig(const fs::path& file) {
-  if (!fs::is_regular_file(file) || file.extension() != ".json") {
-    throw UsageError(fmt::format("`rig` {}: expected a .json of dtr calibrate rig, found {}",
-                                 file.string(), fs::exists(file) ? "something else" : "nothing"));
+  const std::string extension = file.extension().string();
+  const bool foreign = extension == ".yml" || extension == ".yaml" || extension == ".xml";
+  if (!fs::is_regular_file(file) || (extension != ".json" && !foreign)) {
+    throw UsageError(fmt::format(
+        "`rig` {}: expected a .json of dtr calibrate rig, a camera chain of Kalibr (.yaml) or a "
+        "stereo pair of OpenCV (.yml), found {}",
+        file.string(), fs::exists(file) ? "something else" : "nothing"));
   }
+  if (foreign) return ForeignRig(file);
   const calib::Calibration calibration = calib::ReadCalibration(file);
   if (calibration.cameras.size() < 2) {
     throw Error(fmt::format(

@@ -250,8 +250,9 @@ void CheckBundle(const Bundle& bundle) {
     } catch (const std::invalid_argument& error) {
       reject(error.what());
     }
-    if (lens.model == CameraModel::kFov) {
-      reject("expected intrinsics model other than FOV; undistort the images first");
+    if (!IsAdjustable(lens.model)) {
+      reject("expected intrinsics model other than " + NameOf(lens.model) +
+             "; undistort the images first");
     }
   }
   const auto lenses = static_cast<int>(bundle.lenses.size());

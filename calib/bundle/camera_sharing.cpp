@@ -183,8 +183,8 @@ SharedCameras ShareCameras(const SfmModel& model, std::vector<std::uint32_t> cam
     return out;
   }
   for (const auto& [id, camera] : model.cameras) {
-    if (camera.model != CameraModel::kFov) continue;
-    out.not_tested = "the camera model FOV cannot be adjusted";
+    if (IsAdjustable(camera.model)) continue;
+    out.not_tested = "the camera model " + NameOf(camera.model) + " cannot be adjusted";
     return out;
   }
   const Comparison comparison(model, options);

@@ -30,6 +30,23 @@ std::vector<std::string> ParameterNames(CameraModel model) {
       return with(two, {"omega"});
     case CameraModel::kThinPrismFisheye:
       return with(two, {"k1", "k2", "p1", "p2", "k3", "k4", "sx1", "sy1"});
+    case CameraModel::kRadTanThinPrismFisheye:
+      return with(two, {"k0", "k1", "k2", "k3", "k4", "k5", "p0", "p1", "s0", "s1", "s2", "s3"});
+    case CameraModel::kSimpleDivision:
+      return with(one, {"k"});
+    case CameraModel::kDivision:
+      return with(two, {"k"});
+    case CameraModel::kSimpleFisheye:
+      return one;
+    case CameraModel::kFisheye:
+      return two;
+    case CameraModel::kInverseRadial:
+      return with(two, {"r"});
+    case CameraModel::kEucm:
+      return with(two, {"alpha", "beta"});
+    case CameraModel::kBrownAffine:
+    case CameraModel::kFisheyeAffine:
+      return with(two, {"k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2", "p3", "p4", "skew"});
   }
   return {};
 }

@@ -203,8 +203,8 @@ size_t Choose(const Bundle& bundle, const ObservationSplit& split, const RefineO
 
 bool Refinable(const SfmModel& model, std::string* reason) {
   for (const auto& [id, camera] : model.cameras) {
-    if (camera.model != CameraModel::kFov) continue;
-    *reason = "the camera model FOV cannot be adjusted";
+    if (IsAdjustable(camera.model)) continue;
+    *reason = "the camera model " + NameOf(camera.model) + " cannot be adjusted";
     return false;
   }
   if (model.images.size() < 3) {
@@ -295,7 +295,7 @@ Refined Refine(const SfmModel& model, const RefineOptions& options) {
 
 std::vector<Degeneracy> DegeneraciesOf(const SfmModel& model, const RefineOptions& options) {
   for (const auto& [id, camera] : model.cameras) {
-    if (camera.model == CameraModel::kFov) return {};
+    if (!IsAdjustable(camera.model)) return {};
   }
   const Bundle bundle =
       SomePoints(BundleOf(model, options.separate_lenses), kMaxComparedPoints, options.seed);

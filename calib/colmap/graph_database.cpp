@@ -198,10 +198,10 @@ void ReadCameras(const ReadOnlyDatabase& opened, const fs::path& database, sfm::
         camera.width_px = sqlite3_column_int(row, 1);
         camera.height_px = sqlite3_column_int(row, 2);
         const auto bytes = static_cast<size_t>(sqlite3_column_bytes(row, 3));
-        constexpr size_t kMaxParams = 12;
+        constexpr size_t kMaxParams = calib::kMaxCameraParameters;
         const int model = sqlite3_column_int(row, 0);
-        if (model < 0 || model > static_cast<int>(calib::CameraModel::kThinPrismFisheye) ||
-            bytes % sizeof(double) != 0 || bytes > kMaxParams * sizeof(double)) {
+        if (!calib::CameraModelFromId(model) || bytes % sizeof(double) != 0 ||
+            bytes > kMaxParams * sizeof(double)) {
           RejectDatabase(database, "a camera of the model " + std::to_string(model) + " with " +
                                        std::to_string(bytes) + " bytes of parameters");
         }

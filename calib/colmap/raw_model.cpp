@@ -13,7 +13,7 @@
 namespace dtr::colmap {
 namespace {
 
-constexpr int kLastCameraModel = static_cast<int>(calib::CameraModel::kThinPrismFisheye);
+constexpr int kEquirectangular = 17;                 // of COLMAP
 constexpr std::uint64_t kLongestSidePx = 1'000'000;  // no photo is larger; keeps int products sane
 // A quaternion this close to unit length is kept bit for bit, so that a model written by us reads
 // back equal; others are normalised, as COLMAP does. Ten times the rounding of a normalisation.
@@ -103,12 +103,18 @@ void CheckTracks(const RawModel& raw) {
 }  // namespace
 
 calib::CameraModel CheckedCameraModel(const std::string& where, int model_id) {
-  if (model_id < 0 || model_id > kLastCameraModel) {
-    Reject(where, fmt::format("expected a camera model 0 to {}, found the unknown id {}; "
-                              "undistort the images first (colmap image_undistorter)",
-                              kLastCameraModel, model_id));
-  }
-  return static_cast<calib::CameraModel>(model_id);
+  const auto model = calib::CameraModelFromId(model_id);
+  if (model) return *model;
+  if (model_id == kEquirectangular) RejectEquirectangular(where);
+  Reject(where, fmt::format("expected a camera model 0 to 16, found the unknown id {}; undistort "
+                            "the images first (colmap image_undistorter)",
+                            model_id));
+}
+
+void RejectEquirectangular(const std::string& where) {
+  Reject(where,
+         "the camera model EQUIRECTANGULAR is of whole panoramas and cannot be used; cut "
+         "perspective images out of them and calibrate these");
 }
 
 calib::LensCamera CheckedCamera(const std::string& where, int model_id, std::uint64_t width_px,

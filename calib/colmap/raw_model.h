@@ -44,6 +44,7 @@ std::vector<RawModel::Camera> ReadTextCameras(const std::filesystem::path& file)
 calib::LensCamera CheckedCamera(const std::string& where, int model_id, std::uint64_t width_px,
                                 std::uint64_t height_px, std::vector<double> params);
 calib::CameraModel CheckedCameraModel(const std::string& where, int model_id);
+[[noreturn]] void RejectEquirectangular(const std::string& where);
 Pose CheckedPose(const std::string& where, const double wxyz[4], const double translation[3]);
 double CheckedFinite(const std::string& where, double value);
 

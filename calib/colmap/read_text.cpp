@@ -210,10 +210,11 @@ std::vector<RawModel::Camera> ReadTextCameras(const std::filesystem::path& file)
     camera.id = line->Take<std::uint32_t>("a camera id");
     const std::string name(line->TakeWord("a camera model"));
     const auto model = calib::CameraModelFromName(name);
+    if (name == "EQUIRECTANGULAR") RejectEquirectangular(line->where());
     if (!model) {
       throw Error(
-          fmt::format("{}: expected a camera model SIMPLE_PINHOLE to THIN_PRISM_FISHEYE, "
-                      "found '{}'; undistort the images first (colmap image_undistorter)",
+          fmt::format("{}: expected a camera model SIMPLE_PINHOLE to EUCM, found '{}'; undistort "
+                      "the images first (colmap image_undistorter)",
                       line->where(), name));
     }
     const auto width_px = line->Take<std::uint64_t>("a width");

@@ -141,8 +141,18 @@ std::vector<double> OpenCvCoefficients(const LensCamera& camera) {
       const bool rational = p[9] != 0 || p[10] != 0 || p[11] != 0;
       return {p.begin() + 4, p.begin() + (rational ? 12 : 9)};
     }
+    case CameraModel::kSimpleFisheye:
+    case CameraModel::kFisheye:
+      return {0, 0, 0, 0};
     case CameraModel::kFov:
     case CameraModel::kThinPrismFisheye:
+    case CameraModel::kRadTanThinPrismFisheye:
+    case CameraModel::kSimpleDivision:
+    case CameraModel::kDivision:
+    case CameraModel::kEucm:
+    case CameraModel::kBrownAffine:
+    case CameraModel::kFisheyeAffine:
+    case CameraModel::kInverseRadial:
       break;
   }
   throw Error("OpenCV has no camera model " + NameOf(camera.model) +
@@ -151,7 +161,8 @@ std::vector<double> OpenCvCoefficients(const LensCamera& camera) {
 
 bool IsFisheye(CameraModel model) {
   return model == CameraModel::kOpenCvFisheye || model == CameraModel::kSimpleRadialFisheye ||
-         model == CameraModel::kRadialFisheye;
+         model == CameraModel::kRadialFisheye || model == CameraModel::kSimpleFisheye ||
+         model == CameraModel::kFisheye;
 }
 
 std::string Matrix(const char* key, int rows, const std::vector<double>& data) {

@@ -346,8 +346,9 @@ BoardSolution SolveBoard(const Board& board, std::span<const BoardView> views, i
 
 std::optional<Pose> SolvePose(const Board& board, const BoardView& view, const LensCamera& camera,
                               std::span<const int> ignored) {
-  if (camera.model == CameraModel::kFov) {
-    throw Error("calibration: a pose cannot be solved with the camera model FOV; use another one");
+  if (!IsAdjustable(camera.model)) {
+    throw Error("calibration: a pose cannot be solved with the camera model " +
+                NameOf(camera.model) + "; use another one");
   }
   const auto start = PoseOfBoard(board, view, camera);
   if (!start) return std::nullopt;

@@ -9,6 +9,7 @@
 #include "cli/sfm_options.h"
 #include "cli/video_options.h"
 #include "pipeline/build.h"
+#include "pipeline/import.h"
 
 namespace dtr::cli {
 namespace {
@@ -67,10 +68,13 @@ void AddBuildCommand(CLI::App& app) {
             ->check(CLI::Range(0, 65536))
             ->type_name("PX");
         command
-            .add_option(
-                "--poses", options->poses,
-                "Known cameras: a COLMAP model, cameras.json or poses_bounds.npy; no SfM then")
+            .add_option("--poses", options->poses,
+                        "Known cameras, a file or folder of any program that --format names; no "
+                        "SfM then")
             ->type_name("FILE");
+        command.add_option("--format", options->poses_format, "Format of --poses [by its content]")
+            ->check(CLI::IsMember(pipeline::CameraFormats()))
+            ->needs("--poses");
         command
             .add_option("--rig", options->rig,
                         "Calibration of the rig that took all photos, of `dtr calibrate rig`: its "

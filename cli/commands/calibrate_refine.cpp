@@ -104,7 +104,8 @@ CLI::Option* AddLensOption(CLI::App& command, std::filesystem::path& lens) {
       .add_option(
           "--lens", lens,
           "The intrinsics of all photos, known: a .json of `dtr calibrate board`, a .yml or "
-          ".xml of OpenCV or a cameras.txt; it is not changed")
+          ".xml of OpenCV, ROS, Kalibr or ORB-SLAM, a .cameramodel of mrcal or a cameras.txt; it "
+          "is not changed")
       ->check(CLI::ExistingFile)
       ->type_name("FILE");
 }

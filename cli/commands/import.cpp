@@ -51,10 +51,12 @@ void AddImportCommand(CLI::App& app) {
       [](CLI::App& command) -> Action {
         auto options = std::make_shared<pipeline::ImportRequest>();
         auto depth_kind = std::make_shared<std::string>();
-        command.add_option("--cameras", options->cameras, "cameras.json, or a file of --format")
+        command
+            .add_option("--cameras", options->cameras,
+                        "A file or folder of cameras, of any program that --format names")
             ->required()
             ->type_name("FILE");
-        command.add_option("--format", options->format, "Format of --cameras [by its name]")
+        command.add_option("--format", options->format, "Format of --cameras [by its content]")
             ->check(CLI::IsMember(pipeline::CameraFormats()));
         command.add_option("--images", options->images, "Folder of the images")
             ->required()

@@ -81,9 +81,14 @@ void AddRenderCommand(CLI::App& app) {
         auto* where = command.add_option_group("where", "Where to look from (exactly one)");
         where->add_option("--like", options->request.cameras.like, "From a view's position")
             ->type_name("VIEW");
-        where->add_option("--camera", options->request.cameras.camera_file, "From a cameras.json")
+        where
+            ->add_option("--camera", options->request.cameras.camera_file,
+                         "From the camera of a file, as --path")
             ->type_name("FILE");
-        where->add_option("--path", options->request.cameras.path_file, "Along a cameras.json")
+        where
+            ->add_option(
+                "--path", options->request.cameras.path_file,
+                "Along the cameras of a file: a cameras.json, or what dtr import --cameras reads")
             ->type_name("FILE");
         where
             ->add_option("--fly-through", options->request.cameras.fly_through_frames,

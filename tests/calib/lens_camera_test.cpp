@@ -31,7 +31,9 @@ TEST(CameraModel, NamesAndParameterCountsAreColmaps) {
     EXPECT_EQ(RandomLens(model, random).params.size(), static_cast<size_t>(ParameterCount(model)));
   }
   EXPECT_FALSE(CameraModelFromName("opencv"));
-  EXPECT_THROW(ParameterCount(static_cast<CameraModel>(11)), std::invalid_argument);
+  EXPECT_THROW(ParameterCount(static_cast<CameraModel>(17)), std::invalid_argument);
+  EXPECT_FALSE(CameraModelFromId(17));
+  EXPECT_FALSE(CameraModelFromId(-1));
 }
 
 TEST(LensCamera, HandWorkedPixels) {
@@ -75,6 +77,51 @@ TEST(LensCamera, HandWorkedFisheyePixels) {
   // FOV draws r = 1 at atan(2 tan(0.5)) / 1.
   EXPECT_NEAR(x(CameraModel::kFov, {500, 500, 320, 240, 1}), 500 * std::atan(2 * std::tan(0.5)),
               kHandWorkedPx);
+}
+
+// COLMAP 4's models from their definitions (its documentation, "Camera Models"; sensor/models.h).
+TEST(LensCamera, HandWorkedPixelsOfColmap4) {
+  const auto pixel = [](CameraModel model, std::vector<double> params, Eigen::Vector3d p) {
+    return *LensCamera{model, 640, 480, std::move(params)}.PixelFromCam(p);
+  };
+  const Eigen::Vector3d p(0.6, -0.4, 2);  // x/z 0.3, y/z -0.2, r^2 0.13
+  // (x, y, 1) ~ (d, 1 + k |d|^2): k 0.25 and d (0.3, -0.2) c solve c = 1 + 0.25 * 0.13 c^2.
+  const double c = 2 / (1 + std::sqrt(1 - 4 * 0.25 * 0.13));
+  const Eigen::Vector2d division = pixel(CameraModel::kDivision, {500, 400, 320, 240, 0.25}, p);
+  EXPECT_NEAR(division.x(), 320 + 150 * c, kHandWorkedPx);
+  EXPECT_NEAR(division.y(), 240 - 80 * c, kHandWorkedPx);
+  EXPECT_NEAR(c, 1 + 0.25 * 0.13 * c * c, 1e-15);
+  EXPECT_NEAR(pixel(CameraModel::kSimpleDivision, {500, 320, 240, 0.25}, p).x(), 320 + 150 * c,
+              kHandWorkedPx);
+  // d = (x, y) / (alpha sqrt(beta (x^2 + y^2) + z^2) + (1 - alpha) z)
+  const double den = 0.6 * std::sqrt(1.2 * 0.52 + 4) + 0.4 * 2;
+  const Eigen::Vector2d eucm = pixel(CameraModel::kEucm, {500, 400, 320, 240, 0.6, 1.2}, p);
+  EXPECT_NEAR(eucm.x(), 320 + 500 * 0.6 / den, kHandWorkedPx);
+  EXPECT_NEAR(eucm.y(), 240 - 400 * 0.4 / den, kHandWorkedPx);
+  // Equidistant: the angle in the direction of (x, y).
+  const double scale = std::atan(std::sqrt(0.13)) / std::sqrt(0.13);
+  EXPECT_NEAR(pixel(CameraModel::kFisheye, {500, 400, 320, 240}, p).y(), 240 - 80 * scale,
+              kHandWorkedPx);
+  EXPECT_NEAR(pixel(CameraModel::kSimpleFisheye, {500, 320, 240}, p).x(), 320 + 150 * scale,
+              kHandWorkedPx);
+  // u = angles; a = u (1 + k0 s + k1 s^2 + ... + k5 s^6); then of a, p0 at r^2 + 2 x^2 and p1 at
+  // r^2 + 2 y^2, s0 r^2 + s1 r^4 in x, s2 r^2 + s3 r^4 in y.
+  const Eigen::Vector2d u = Eigen::Vector2d(0.3, -0.2) * scale;
+  const double s = u.squaredNorm(), k[] = {0.1, -0.2, 0.3, -0.4, 0.5, -0.6};
+  double factor = 1;
+  for (int i = 0; i < 6; ++i) factor += k[i] * std::pow(s, i + 1);
+  const Eigen::Vector2d a = u * factor;
+  const double r2 = a.squaredNorm(), p0 = 0.01, p1 = -0.02;
+  const Eigen::Vector2d d(
+      a.x() + 2 * p1 * a.x() * a.y() + p0 * (r2 + 2 * a.x() * a.x()) + 0.03 * r2 + 0.04 * r2 * r2,
+      a.y() + 2 * p0 * a.x() * a.y() + p1 * (r2 + 2 * a.y() * a.y()) + 0.05 * r2 + 0.06 * r2 * r2);
+  const Eigen::Vector2d aria = pixel(
+      CameraModel::kRadTanThinPrismFisheye,
+      {500, 400, 320, 240, 0.1, -0.2, 0.3, -0.4, 0.5, -0.6, p0, p1, 0.03, 0.04, 0.05, 0.06}, p);
+  EXPECT_NEAR(aria.x(), 320 + 500 * d.x(), kHandWorkedPx);
+  EXPECT_NEAR(aria.y(), 240 + 400 * d.y(), kHandWorkedPx);
+  EXPECT_THROW((LensCamera{CameraModel::kEucm, 640, 480, {500, 500, 320, 240, 1.5, 1}}.Check()),
+               std::invalid_argument);
 }
 
 TEST(LensCamera, PixelAndRayRoundTripForEveryModel) {

@@ -7,7 +7,7 @@
 
 namespace dtr::calib::testing {
 
-inline constexpr std::array<CameraModel, 11> kAllModels{CameraModel::kSimplePinhole,
+inline constexpr std::array<CameraModel, 20> kAllModels{CameraModel::kSimplePinhole,
                                                         CameraModel::kPinhole,
                                                         CameraModel::kSimpleRadial,
                                                         CameraModel::kRadial,
@@ -17,7 +17,16 @@ inline constexpr std::array<CameraModel, 11> kAllModels{CameraModel::kSimplePinh
                                                         CameraModel::kFov,
                                                         CameraModel::kSimpleRadialFisheye,
                                                         CameraModel::kRadialFisheye,
-                                                        CameraModel::kThinPrismFisheye};
+                                                        CameraModel::kThinPrismFisheye,
+                                                        CameraModel::kRadTanThinPrismFisheye,
+                                                        CameraModel::kSimpleDivision,
+                                                        CameraModel::kDivision,
+                                                        CameraModel::kSimpleFisheye,
+                                                        CameraModel::kFisheye,
+                                                        CameraModel::kEucm,
+                                                        CameraModel::kBrownAffine,
+                                                        CameraModel::kFisheyeAffine,
+                                                        CameraModel::kInverseRadial};
 
 /// A 640x480 camera of the model; coefficients of the sizes that real lenses have.
 inline LensCamera RandomLens(CameraModel model, Random& random) {
@@ -56,6 +65,33 @@ inline LensCamera RandomLens(CameraModel model, Random& random) {
     case CameraModel::kThinPrismFisheye:
       camera.params = {fx,        fy,        cx,        cy,         any(0.1),  any(0.03),
                        any(2e-3), any(2e-3), any(0.01), any(0.003), any(2e-3), any(2e-3)};
+      break;
+    case CameraModel::kRadTanThinPrismFisheye:
+      camera.params = {fx,        fy,        cx,        cy,        any(0.1),  any(0.03),
+                       any(0.01), any(3e-3), any(1e-3), any(3e-4), any(2e-3), any(2e-3),
+                       any(2e-3), any(5e-4), any(2e-3), any(5e-4)};
+      break;
+    case CameraModel::kSimpleDivision:
+      camera.params = {fx, cx, cy, any(0.15)};
+      break;
+    case CameraModel::kDivision:
+    case CameraModel::kInverseRadial:
+      camera.params = {fx, fy, cx, cy, any(0.1)};
+      break;
+    case CameraModel::kSimpleFisheye:
+      camera.params = {fx, cx, cy};
+      break;
+    case CameraModel::kFisheye:
+      camera.params = {fx, fy, cx, cy};
+      break;
+    case CameraModel::kEucm:
+      camera.params = {fx, fy, cx, cy, random.Uniform(0.1, 0.8), random.Uniform(0.5, 1.5)};
+      break;
+    case CameraModel::kBrownAffine:
+    case CameraModel::kFisheyeAffine:
+      camera.params = {fx,        fy,        cx,        cy,        any(0.1),
+                       any(0.03), any(0.01), any(3e-3), any(1e-3), any(3e-4),
+                       any(2e-3), any(2e-3), any(0.2),  any(0.1),  any(3)};
       break;
   }
   return camera;

@@ -184,7 +184,7 @@ TEST_F(BuildRig, PhotosThatAreNotTheRigsAreRejectedBeforeAnyWork) {
   colmap::testing::FakeColmap colmap;
   const std::vector<std::string> with_rig{"--rig", In("rig.json")};
   ExpectRejected(Build({"--rig", In("absent.json")}), kWrongUsage,
-                 "expected a .json of dtr calibrate rig, found nothing");
+                 "or a stereo pair of OpenCV (.yml), found nothing");
   ExpectRejected(Build({"--rig", In("rig.json"), "--poses", In("photos")}), kWrongUsage,
                  "--rig: sets the poses of what SfM finds; expected no --poses beside it");
   ExpectRejected(Build({"--rig", In("rig.json"), "--no-refine"}), kWrongUsage,

@@ -11,7 +11,6 @@ struct LeftOut {
 inline constexpr LeftOut kLeftOut[] = {
     // Single fields of readers that all say FILE: FIELD: expected X, found Y.
     {"calib/files/calibration_json.cpp", "cameras: params"},
-    {"capture/capture_json.cpp", "expected a field"},
     {"dtr/io/formats/json_fields.cpp", ""},
     {"dtr/io/formats/text_numbers.cpp", ""},
 
@@ -33,11 +32,10 @@ inline constexpr LeftOut kLeftOut[] = {
     {"calib/scale.cpp", "expected a measured distance"},
     {"calib/scale.cpp", "scale: expected at least"},
     {"calib/similarity.cpp", "found NaN or infinity"},
-    {"calib/solve/board_solve.cpp", "with the camera model FOV"},
+    {"calib/solve/board_solve.cpp", "with the camera model"},
     {"calib/sparse_from_sfm.cpp", ""},
     {"calib/validation/reprojection.cpp", ""},
     {"capture/video/ingest_video.cpp", "expected a number of frames above 0"},
-    {"pipeline/novel_frames.cpp", "expected at least one camera"},
     {"pipeline/novel_frames.cpp", "expected one of --like"},
     {"pipeline/depth_settings.cpp", "--preset: expected"},
     {"pipeline/validate_calibration.cpp", "expected one view per camera and frame"},

@@ -23,7 +23,8 @@ TEST_F(Rejections, WhatCannotBeImported) {
   io::WriteImage(In("pngs/0000.png"), ImageRgb8(4, 4, 3));
   ExpectAllRejected({
       {kWrongUsage, ": no such file or folder", import(In("cameras.json"), {"--images", Photos()})},
-      {kWrongUsage, "a transforms.json or a poses_bounds.npy, found another name; give --format",
+      {kWrongUsage,
+       "not recognised; what can be read (its --format): the folder of a COLMAP model (colmap)",
        import(Write("cameras.xml", ""), {"--images", Photos()})},
       {kWrongUsage, ": no such folder",
        import(good, {"--images", Photos(), "--masks", In("masks")})},

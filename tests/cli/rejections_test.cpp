@@ -255,7 +255,8 @@ TEST_F(Rejections, PosesThatAreNotOfThesePhotos) {
   ExpectAllRejected({
       {kWrongUsage, "--holdout-strict: keeps the photos of --holdout out of SfM; it needs",
        build({"--holdout-strict"})},
-      {kWrongUsage, "a cameras.json, a transforms.json or a poses_bounds.npy",
+      {kWrongUsage,
+       "not recognised; what can be read (its --format): the folder of a COLMAP model (colmap)",
        build({"--poses", Write("poses.txt", "")})},
       {kFailed,
        "expected cameras for at least 2 of the photos by name, found 0; its first is 'a.jpg'",

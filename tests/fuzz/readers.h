@@ -27,6 +27,7 @@ struct ReaderKind {
 
 std::span<const ReaderKind> SetReaders();     ///< sets, their depth, meshes and points
 std::span<const ReaderKind> CameraReaders();  ///< lists of cameras and float maps of other programs
+std::span<const ReaderKind> SceneReaders();   ///< cameras and points of other programs
 std::span<const ReaderKind> ColmapReaders();  ///< COLMAP's models, depth maps and database
 std::span<const ReaderKind> CalibReaders();   ///< calibrations, captures, working files
 std::span<const ReaderKind> WorkReaders();    ///< what a run leaves for the next one

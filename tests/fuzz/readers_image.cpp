@@ -97,8 +97,8 @@ std::span<const ReaderKind> ImageReaders() { return kReaders; }
 
 std::vector<ReaderKind> AllReaders() {
   std::vector<ReaderKind> all;
-  for (const auto& some : {SetReaders(), CameraReaders(), ColmapReaders(), CalibReaders(),
-                           WorkReaders(), ImageReaders()}) {
+  for (const auto& some : {SetReaders(), CameraReaders(), SceneReaders(), ColmapReaders(),
+                           CalibReaders(), WorkReaders(), ImageReaders()}) {
     all.insert(all.end(), some.begin(), some.end());
   }
   return all;

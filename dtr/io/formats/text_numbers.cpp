@@ -1,5 +1,6 @@
 #include "dtr/io/formats/text_numbers.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 
@@ -34,6 +35,17 @@ bool TextNumbers::AtEnd() {
     ++position_;
   }
   return position_ == text_.size();
+}
+
+std::string_view TextNumbers::Line() {
+  word_line_ = line_;
+  const size_t begin = position_;
+  const size_t end = std::min(text_.find('\n', begin), text_.size());
+  position_ = std::min(end + 1, text_.size());
+  if (end < text_.size()) ++line_;
+  std::string_view line = std::string_view(text_).substr(begin, end - begin);
+  if (line.ends_with('\r')) line.remove_suffix(1);
+  return line;
 }
 
 void TextNumbers::ExpectEnd() {

@@ -18,6 +18,8 @@ class TextNumbers {
   TextNumbers(std::string text, std::string source);
 
   bool AtEnd();
+  /// What is left of the line, without its end; empty at the end of the text.
+  std::string_view Line();
   /// Throws unless nothing is left.
   void ExpectEnd();
   std::string Word(const char* what);

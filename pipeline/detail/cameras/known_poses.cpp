@@ -15,6 +15,8 @@
 #include "dtr/io/formats/cameras_json.h"
 #include "dtr/io/formats/llff.h"
 #include "dtr/io/formats/transforms_json.h"
+#include "pipeline/detail/cameras/camera_formats.h"
+#include "pipeline/detail/cameras/foreign_cameras.h"
 #include "pipeline/detail/import/camera_distortion.h"
 #include "pipeline/detail/photos/named_files.h"
 #include "pipeline/detail/photos/names_of_photos.h"
@@ -119,17 +121,16 @@ CalibratedPhotos Triangulated(const Given& given, const capture::Capture& captur
   return calibrated;
 }
 
-CalibratedPhotos FromColmapModel(const capture::Capture& capture, const CalibrateOptions& options,
-                                 const fs::path& workspace, Progress& progress) {
-  calib::SfmModel model = ReadModelOf(capture, options.poses);
-  Given given;
-  given.first = model.images.empty() ? "" : model.images.front().name;
+// Photos with their points, or without: then these are triangulated.
+CalibratedPhotos FromModel(calib::SfmModel model, Given given, const capture::Capture& capture,
+                           const CalibrateOptions& options, const fs::path& workspace,
+                           Progress& progress) {
   std::erase_if(model.images, [&](const calib::SfmImage& image) {
     return std::none_of(capture.photos.begin(), capture.photos.end(),
                         [&](const capture::Photo& photo) { return photo.name == image.name; });
   });
   RequireSharedNames(model.images.size(), options.poses, given.first, capture);
-  given.world_origin = RecentreModel(model);
+  given.world_origin += RecentreModel(model);
   CalibratedPhotos calibrated;
   // With one photo to build from there is nothing to triangulate, which is reported later.
   const auto sources = std::count_if(model.images.begin(), model.images.end(), [&](const auto& i) {
@@ -141,22 +142,40 @@ CalibratedPhotos FromColmapModel(const capture::Capture& capture, const Calibrat
           image.name,
           colmap::PosedImage{image.name, model.cameras.at(image.camera_id), image.cam_from_world});
     }
-    calibrated = Triangulated(given, capture, options, workspace, progress);
-  } else {
-    calibrated.model = std::move(model);
-    calibrated.unit = given.unit;
-    calibrated.world_origin = given.world_origin;
+    return Triangulated(given, capture, options, workspace, progress);
   }
+  calibrated.model = std::move(model);
+  calibrated.unit = given.unit;
+  calibrated.world_origin = given.world_origin;
+  return calibrated;
+}
+
+CalibratedPhotos FromColmapModel(const capture::Capture& capture, const CalibrateOptions& options,
+                                 const fs::path& workspace, Progress& progress) {
+  calib::SfmModel model = ReadModelOf(capture, options.poses);
+  Given given;
+  given.first = model.images.empty() ? "" : model.images.front().name;
+  CalibratedPhotos calibrated =
+      FromModel(std::move(model), given, capture, options, workspace, progress);
   calibrated.engine = "COLMAP model";
   return calibrated;
 }
 
 CalibratedPhotos FromCameraList(const capture::Capture& capture, const CalibrateOptions& options,
                                 const fs::path& workspace, Progress& progress) {
-  PosesFile file = ReadPoses(capture, options.poses);
+  PosesFile file = ReadPoses(capture, options.poses, options.poses_format);
   for (const std::string& note : file.notes) progress.Note(note);
-  const io::CameraList list = io::RecentreWorld(std::move(file.list));
-  CalibratedPhotos calibrated = Triangulated(GivenIn(list), capture, options, workspace, progress);
+  CalibratedPhotos calibrated;
+  if (file.model) {
+    Given given;
+    given.first = file.model->images.front().name;
+    given.unit = file.list.unit;
+    given.world_origin = file.list.world_origin;
+    calibrated = FromModel(std::move(*file.model), given, capture, options, workspace, progress);
+  } else {
+    const io::CameraList list = io::RecentreWorld(std::move(file.list));
+    calibrated = Triangulated(GivenIn(list), capture, options, workspace, progress);
+  }
   calibrated.engine = options.poses.filename().string();
   return calibrated;
 }
@@ -194,7 +213,7 @@ PosesFile FromTransforms(const std::vector<io::SizedImage>& images, const captur
     return photo == nullptr ? std::nullopt : std::optional(*photo);
   };
   io::TransformsFile read = io::ReadTransformsJson(poses, paths);
-  PosesFile file{std::move(read.list), std::move(read.notes)};
+  PosesFile file{std::move(read.list), std::move(read.notes), {}};
   if (!read.missing.empty()) {
     file.notes.push_back(fmt::format(
         "{}: {} of its {} frames have no photo here, first {}", poses.string(), read.missing.size(),
@@ -216,9 +235,37 @@ PosesFile FromTransforms(const std::vector<io::SizedImage>& images, const captur
   return file;
 }
 
+PosesFile FromForeign(const std::vector<io::SizedImage>& images, const CameraFormat& format,
+                      const capture::Capture& capture, const fs::path& poses) {
+  std::map<std::string, const io::SizedImage*> by_name;
+  std::vector<std::string> names;
+  for (const io::SizedImage& image : images) {
+    by_name[image.name] = &image;
+    names.push_back(image.name);
+  }
+  const std::string source = poses.string();
+  PlacedCameras placed = PlaceCameras(format.read(poses), source, PhotoNames(std::move(names)),
+                                      [&](const std::string& name) { return *by_name.at(name); });
+  PosesFile file{std::move(placed.list), std::move(placed.notes), std::move(placed.model)};
+  const size_t cameras = file.list.cameras.size() + placed.missing.size();
+  if (!placed.missing.empty()) {
+    file.notes.push_back(fmt::format("{}: {} of its {} cameras have no photo here, first {} ({})",
+                                     source, placed.missing.size(), cameras,
+                                     placed.missing.front().first, placed.missing.front().second));
+  }
+  const std::string line = LeftOutLine(source, placed.left_out, cameras);
+  if (!line.empty()) file.notes.push_back(line);
+  if (file.list.cameras.empty()) {
+    RequireSharedNames(0, poses, placed.missing.empty() ? "" : placed.missing.front().first,
+                       capture);
+  }
+  return file;
+}
+
 }  // namespace
 
-PosesFile ReadPoses(const capture::Capture& capture, const fs::path& poses) {
+PosesFile ReadPoses(const capture::Capture& capture, const fs::path& poses,
+                    const std::string& format) {
   std::vector<io::SizedImage> images;
   for (const capture::Photo& photo : capture.photos) {
     // Photos whose pixels are settled are as they are; of others their cameras' size will say.
@@ -226,17 +273,14 @@ PosesFile ReadPoses(const capture::Capture& capture, const fs::path& poses) {
     images.push_back({photo.name, stored.width_px, stored.height_px,
                       photo.as_stored ? 1 : photo.exif_orientation});
   }
-  if (poses.extension() == ".json") {
-    if (io::IsTransformsJson(poses)) return FromTransforms(images, capture, poses);
-    PosesFile file{io::ReadCamerasJson(poses), {}};
-    NameAsPhotos(capture, file.list);
-    return file;
-  }
-  if (poses.extension() == ".npy") return {io::ReadLlff(poses, std::move(images)).list, {}};
-  throw UsageError(
-      fmt::format("`poses` {}: expected the folder of a COLMAP model, a cameras.json, a "
-                  "transforms.json or a poses_bounds.npy",
-                  poses.string()));
+  const CameraFormat& chosen = FormatOf(poses, format, "`poses`");
+  const std::string kind = chosen.name;
+  if (chosen.read != nullptr) return FromForeign(images, chosen, capture, poses);
+  if (kind == "nerf") return FromTransforms(images, capture, poses);
+  if (kind == "llff") return {io::ReadLlff(poses, std::move(images)).list, {}, {}};
+  PosesFile file{io::ReadCamerasJson(poses), {}, {}};
+  NameAsPhotos(capture, file.list);
+  return file;
 }
 
 SparseScene TriangulatedPoints(const io::CameraList& list, const capture::Capture& photos,
@@ -275,7 +319,7 @@ void RegisterHeldOutPhotos(const capture::Capture& held_out,
 CalibratedPhotos FromKnownPoses(const capture::Capture& capture, const CalibrateOptions& options,
                                 const fs::path& workspace, Progress& progress) {
   progress.Note("structure from motion left out: cameras are given");
-  CalibratedPhotos calibrated = fs::is_directory(options.poses)
+  CalibratedPhotos calibrated = IsColmapModel(options.poses, options.poses_format)
                                     ? FromColmapModel(capture, options, workspace, progress)
                                     : FromCameraList(capture, options, workspace, progress);
   calibrated.report.points = calibrated.model.points.size();

@@ -1,6 +1,8 @@
 // pipeline/detail/cameras/known_poses.h -- cameras from a file instead of from SfM.
 #pragma once
 #include <filesystem>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "calib/colmap/sfm.h"
@@ -22,11 +24,15 @@ colmap::SfmOptions SfmOptionsFor(const CalibrateOptions& options);
 struct PosesFile {
   io::CameraList list;
   std::vector<std::string> notes;
+  /// The same with points, where the file says which photos show them.
+  std::optional<calib::SfmModel> model;
 };
 
-/// Reads a cameras.json, a transforms.json or a poses_bounds.npy for photos. Throws UsageError for
-/// another name, Error for a broken file or one of other photos.
-PosesFile ReadPoses(const capture::Capture& capture, const std::filesystem::path& poses);
+/// Reads cameras of any format of CameraFormatTable() but a COLMAP model for photos; `format`: its
+/// name, empty: by the content. Throws UsageError where it is not recognised, Error for a broken
+/// file or one of other photos.
+PosesFile ReadPoses(const capture::Capture& capture, const std::filesystem::path& poses,
+                    const std::string& format);
 
 /// Points that photos show, triangulated with the cameras of `list` held fixed; views are indices
 /// into it. Of `options` threads, seed, memory and held_out (for each photo) are used; photos that
@@ -36,8 +42,8 @@ SparseScene TriangulatedPoints(const io::CameraList& list, const capture::Captur
                                const std::filesystem::path& workspace, Progress& progress);
 
 /// Cameras from options.poses: the folder of a COLMAP model, or a file as of ReadPoses.
-/// A COLMAP model brings its points; for the others, points are triangulated with the cameras
-/// held fixed, from photos that are not held out. Cameras far from the origin get a world origin
+/// Where these bring no points, points are triangulated with the cameras held fixed, from photos
+/// that are not held out. Cameras far from the origin get a world origin
 /// near them (io::RecentreWorld). Photos that the file does not name stay without a camera. Throws
 /// Error when the file is broken or names too few of the photos.
 CalibratedPhotos FromKnownPoses(const capture::Capture& capture, const CalibrateOptions& options,

@@ -14,6 +14,8 @@
 #include "dtr/io/formats/llff.h"
 #include "dtr/io/formats/transforms_json.h"
 #include "dtr/io/image_io.h"
+#include "pipeline/detail/cameras/camera_formats.h"
+#include "pipeline/detail/cameras/foreign_cameras.h"
 #include "pipeline/detail/photos/holdout.h"
 #include "pipeline/detail/photos/named_files.h"
 #include "pipeline/import.h"
@@ -160,29 +162,62 @@ CamerasFromFile FromCamerasJson(const fs::path& file, const CameraFileFolders& f
   return cameras;
 }
 
-std::string FormatOf(const fs::path& file) {
-  if (fs::is_directory(file)) return "colmap";
-  if (file.extension() == ".npy") return "llff";
-  if (file.extension() == ".json") {
-    const bool called_so = file.filename().string().starts_with("transforms");
-    return called_so || io::IsTransformsJson(file) ? "nerf" : "cameras-json";
+// Names of all images below a folder.
+std::vector<std::string> ImagesBelow(const fs::path& folder) {
+  std::error_code error;
+  std::vector<std::string> names;
+  fs::recursive_directory_iterator entries(folder, error);
+  for (; !error && entries != fs::recursive_directory_iterator(); entries.increment(error)) {
+    if (!IsFile(entries->path()) ||
+        !capture::IsImageExtension(entries->path().extension().string())) {
+      continue;
+    }
+    const std::string name = entries->path().lexically_relative(folder).generic_string();
+    if (WhyUnsafeName(name).empty()) names.push_back(name);
   }
-  throw UsageError(
-      fmt::format("{}: expected the folder of a COLMAP model, a cameras.json, a transforms.json or "
-                  "a poses_bounds.npy, found another name; give `format`",
-                  file.string()));
+  if (error) throw UsageError(folder.string() + ": cannot be listed: " + error.message());
+  return names;
+}
+
+CamerasFromFile FromForeign(const fs::path& file, const CameraFormat& format,
+                            const CameraFileFolders& folders) {
+  const std::string source = file.string();
+  PlacedCameras placed =
+      PlaceCameras(format.read(file), source, PhotoNames(ImagesBelow(folders.images)),
+                   [&](const std::string& name) { return SizedImageAt(folders.images, name); });
+  CamerasFromFile cameras;
+  cameras.list = std::move(placed.list);
+  cameras.notes = std::move(placed.notes);
+  for (const auto& [path, entry] : placed.missing) {
+    cameras.skipped.emplace_back(path,
+                                 fmt::format("{}: not below {}", entry, folders.images.string()));
+  }
+  const size_t with_camera = cameras.list.cameras.size();
+  TellMissing(file, folders, with_camera + placed.missing.size(), cameras);
+  const std::string line =
+      LeftOutLine(source, placed.left_out, with_camera + placed.missing.size());
+  if (!line.empty()) cameras.notes.push_back(line);
+  for (auto& [path, reason] : placed.left_out) {
+    cameras.skipped.emplace_back(Printable(path), std::move(reason));
+  }
+  if (!placed.model) return cameras;
+  std::vector<std::string> names;
+  std::vector<PinholeCamera> pinholes;
+  for (const io::NamedCamera& named : cameras.list.cameras) {
+    names.push_back(named.name);
+    pinholes.push_back(named.camera);
+  }
+  cameras.points = calib::ToSparseScene(*placed.model, names, pinholes);
+  return cameras;
 }
 
 }  // namespace
 
-std::vector<std::string> CameraFormats() { return {"cameras-json", "colmap", "llff", "nerf"}; }
-
 CamerasFromFile ReadCameraFile(const fs::path& file, const std::string& format,
                                const CameraFileFolders& folders) {
-  if (!fs::exists(file)) {
-    throw UsageError(fmt::format("`cameras` {}: no such file or folder", file.string()));
-  }
-  const std::string kind = format.empty() ? FormatOf(file) : format;
+  const CameraFormat& chosen = FormatOf(file, format, "`cameras`");
+  const std::string kind = chosen.name;
+  if (chosen.read != nullptr) return FromForeign(file, chosen, folders);
   if (kind == "colmap") return FromColmap(file, folders);
   if (kind == "nerf") return FromTransforms(file, folders);
   if (kind == "llff") {

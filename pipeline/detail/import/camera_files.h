@@ -33,11 +33,10 @@ struct CameraFileFolders {
   bool allow_missing = false;   ///< cameras without a photo are left out
 };
 
-/// Reads cameras of images, which may have distortion. `format` is one of CameraFormats()
-/// (pipeline/import.h); "": a folder is a COLMAP model, poses_bounds.npy LLFF's, a .json with
-/// `frames` NeRF's, any other .json a cameras.json. `folders.images` gives the images' names and
-/// sizes to the formats that do not store them. Throws UsageError when the format cannot be told,
-/// Error when the file is broken or, without `allow_missing`, a photo is not there.
+/// Reads cameras of images, which may have distortion. `format`: as of FormatOf
+/// (detail/cameras/camera_formats.h), "" goes by the content. `folders.images` gives the images'
+/// names and sizes to the formats that do not store them. Throws UsageError where the format cannot
+/// be recognised, Error where the file is broken or, without `allow_missing`, a photo is not there.
 CamerasFromFile ReadCameraFile(const std::filesystem::path& file, const std::string& format,
                                const CameraFileFolders& folders);
 

@@ -108,7 +108,11 @@ TEST(ReadModel, UnknownCameraModelIsNamedByItsNumber) {
   std::memcpy(cameras.data() + 8 + 4, &equirectangular, sizeof equirectangular);
   WriteFileAtomically(folder / "cameras.bin", cameras);
   EXPECT_THAT(MessageOf(folder.path()), HasSubstr("cameras.bin: camera 1"));
-  EXPECT_THAT(MessageOf(folder.path()), HasSubstr("unknown id 17"));
+  EXPECT_THAT(MessageOf(folder.path()), HasSubstr("EQUIRECTANGULAR is of whole panoramas"));
+  const std::int32_t unknown = 18;
+  std::memcpy(cameras.data() + 8 + 4, &unknown, sizeof unknown);
+  WriteFileAtomically(folder / "cameras.bin", cameras);
+  EXPECT_THAT(MessageOf(folder.path()), HasSubstr("unknown id 18"));
 }
 
 TEST(ReadModel, HugeCountIsRejectedBeforeAnyAllocation) {
@@ -193,7 +197,7 @@ TEST_F(HandWritten, RecordsThatContradictEachOtherAreRejected) {
   Write("1 PINHOLE 640 480 500 500 320\n", images_, points_);
   EXPECT_THAT(MessageOf(folder_.path()), HasSubstr("cameras.txt: line 1"));
   Write("1 EQUIRECTANGULAR 640 480\n", images_, points_);
-  EXPECT_THAT(MessageOf(folder_.path()), HasSubstr("'EQUIRECTANGULAR'"));
+  EXPECT_THAT(MessageOf(folder_.path()), HasSubstr("the camera model EQUIRECTANGULAR"));
   Write(cameras_, "1 0 0 0 0 0 0 0 1 a.jpg\n\n", "");
   EXPECT_THAT(MessageOf(folder_.path()), HasSubstr("quaternion"));
 }

@@ -17,7 +17,7 @@ namespace dtr::colmap::testing {
 inline calib::SfmModel ModelWithEveryCamera(std::uint64_t seed) {
   Random random(seed);
   calib::SfmModel model;
-  constexpr int kModels = 11, kPoints = 5;
+  constexpr int kModels = 17, kPoints = 5;
   for (int id = 0; id < kModels; ++id) {
     calib::LensCamera camera;
     camera.model = static_cast<calib::CameraModel>(id);
@@ -27,6 +27,7 @@ inline calib::SfmModel ModelWithEveryCamera(std::uint64_t seed) {
     for (size_t i = 0; i < count; ++i) {
       camera.params.push_back(i < 4 ? random.Uniform(100, 500) : random.Uniform(-0.01, 0.01));
     }
+    if (camera.model == calib::CameraModel::kEucm) camera.params[4] = camera.params[5] = 0.7;
     const auto camera_id = static_cast<std::uint32_t>(3 * id + 1);
     model.cameras[camera_id] = camera;
     calib::SfmImage image;

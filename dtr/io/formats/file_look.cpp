@@ -1,0 +1,77 @@
+#include "dtr/io/formats/file_look.h"
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "dtr/base/error.h"
+
+namespace dtr::io {
+namespace {
+
+constexpr std::streamsize kHeadBytes = 64 << 10;
+
+// Collects the names of the fields of the object that begins at `depth_`.
+class KeyCollector : public nlohmann::json_sax<nlohmann::json> {
+ public:
+  KeyCollector(std::set<std::string>& keys, int depth) : keys_(keys), object_depth_(depth) {}
+
+  bool null() override { return true; }
+  bool boolean(bool) override { return true; }
+  bool number_integer(number_integer_t) override { return true; }
+  bool number_unsigned(number_unsigned_t) override { return true; }
+  bool number_float(number_float_t, const string_t&) override { return true; }
+  bool string(string_t&) override { return true; }
+  bool binary(binary_t&) override { return true; }
+  bool start_object(std::size_t) override {
+    ++depth_;
+    return true;
+  }
+  bool key(string_t& name) override {
+    constexpr size_t kMaxKeys = 4096;
+    if (depth_ == object_depth_ && keys_.size() < kMaxKeys) keys_.insert(name);
+    return true;
+  }
+  // The first object of a list is enough.
+  bool end_object() override { return depth_-- > object_depth_; }
+  bool start_array(std::size_t) override {
+    ++depth_;
+    return true;
+  }
+  bool end_array() override {
+    --depth_;
+    return true;
+  }
+  bool parse_error(std::size_t, const std::string&, const nlohmann::json::exception&) override {
+    return false;
+  }
+
+ private:
+  std::set<std::string>& keys_;
+  int object_depth_, depth_ = 0;
+};
+
+}  // namespace
+
+FileLook LookAt(const std::filesystem::path& file) {
+  FileLook look;
+  look.is_folder = std::filesystem::is_directory(file);
+  if (look.is_folder) return look;
+  std::ifstream in(file, std::ios::binary);
+  look.head.resize(static_cast<size_t>(kHeadBytes));
+  in.read(look.head.data(), kHeadBytes);
+  if (!in.is_open() || in.bad()) throw Error(file.string() + ": cannot be read");
+  look.head.resize(static_cast<size_t>(in.gcount()));
+  if (look.head.starts_with("\xef\xbb\xbf")) look.head.erase(0, 3);
+  const size_t first = look.head.find_first_not_of(" \t\r\n");
+  if (first == std::string::npos) return look;
+  look.is_json_list = look.head[first] == '[';
+  look.is_json = look.is_json_list || look.head[first] == '{';
+  if (!look.is_json) return look;
+  in.clear();
+  in.seekg(0);
+  KeyCollector collector(look.keys, look.is_json_list ? 2 : 1);
+  nlohmann::json::sax_parse(in, &collector);
+  return look;
+}
+
+}  // namespace dtr::io

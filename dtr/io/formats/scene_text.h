@@ -1,0 +1,22 @@
+// dtr/io/formats/scene_text.h -- large text files of cameras and points, with line numbers in the
+// errors. Internal to dtr/io/formats.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <filesystem>
+
+#include "dtr/io/formats/text_numbers.h"
+
+namespace dtr::io::internal {
+
+/// Words and numbers of a text that ends with a line end: without one a number cut in its middle
+/// would pass for a shorter number.
+class SceneText : public TextNumbers {
+ public:
+  static constexpr int kMaxCount = 1 << 30;
+
+  explicit SceneText(const std::filesystem::path& file);
+  std::array<std::uint8_t, 3> Colour();  ///< three numbers of 0 to 255
+};
+
+}  // namespace dtr::io::internal

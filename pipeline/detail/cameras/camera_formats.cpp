@@ -1,0 +1,206 @@
+#include "pipeline/detail/cameras/camera_formats.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "calib/colmap/model_io.h"
+#include "dtr/base/error.h"
+#include "dtr/base/lower_case.h"
+#include "dtr/io/formats/foreign_readers.h"
+#include "pipeline/detail/photos/named_files.h"
+#include "pipeline/import.h"
+
+namespace dtr::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+using io::FileLook;
+
+bool HoldsCams(const fs::path& folder) {
+  std::error_code error;
+  fs::directory_iterator entries(folder, error);
+  for (; !error && entries != fs::directory_iterator(); entries.increment(error)) {
+    if (entries->path().filename().string().ends_with("_cam.txt")) return true;
+  }
+  return false;
+}
+
+bool LooksMvsnet(const fs::path& file, const FileLook& look) {
+  return look.is_folder && (HoldsCams(file / "cams") || HoldsCams(file));
+}
+
+bool LooksColmap(const fs::path& file, const FileLook& look) {
+  if (!look.is_folder) return false;
+  const fs::path model = colmap::ModelFolderIn(file);
+  for (const char* part : {"cameras", "images", "points3D"}) {  // of one that is not whole, too
+    const std::string name = part;
+    if (IsFile(model / (name + ".bin")) || IsFile(model / (name + ".txt"))) return true;
+  }
+  return fs::is_directory(file / "sparse");  // with several models, of which none is meant
+}
+
+bool LooksLlff(const fs::path&, const FileLook& look) { return look.head.starts_with("\x93NUMPY"); }
+
+bool LooksMetashape(const fs::path&, const FileLook& look) {
+  return look.head.find("<document") != std::string::npos &&
+         look.head.find("<chunk") != std::string::npos &&
+         look.head.find("<sensors") != std::string::npos;
+}
+
+bool LooksBundler(const fs::path&, const FileLook& look) {
+  return look.head.starts_with("# Bundle file");
+}
+
+bool LooksNvm(const fs::path&, const FileLook& look) { return look.head.starts_with("NVM_V3"); }
+
+// A line that names columns, "#name,x,y,alt,..." or "#name,tx,ty,tz,R00,...".
+bool LooksRealityScan(const fs::path&, const FileLook& look) {
+  std::string line = look.head.substr(0, look.head.find('\n'));
+  if (line.starts_with("#cameras")) {
+    const size_t begin = line.size() + 1;
+    line = begin < look.head.size() ? look.head.substr(begin, look.head.find('\n', begin) - begin)
+                                    : "";
+  }
+  line = LowerCase(line);
+  return line.starts_with("#name,") &&
+         (line.find(",pitch") != std::string::npos || line.find(",r00") != std::string::npos);
+}
+
+bool LooksOpenSfm(const fs::path&, const FileLook& look) {
+  return look.is_json_list && look.Has("cameras") && look.Has("shots");
+}
+
+bool LooksOpenMvg(const fs::path&, const FileLook& look) {
+  return look.is_json && look.Has("sfm_data_version");
+}
+
+bool LooksAliceVision(const fs::path&, const FileLook& look) {
+  return look.is_json && look.Has("version") && look.Has("views") &&
+         (look.Has("intrinsics") || look.Has("poses"));
+}
+
+bool LooksMiv(const fs::path&, const FileLook& look) {
+  return look.is_json && !look.is_json_list && look.Has("cameras") &&
+         (look.Has("BoundingBox_center") || look.Has("lengthsInMeters") || look.Has("Fps") ||
+          look.Has("sourceCameraNames") || look.Has("Axial_system"));
+}
+
+bool LooksNerf(const fs::path&, const FileLook& look) {
+  return look.is_json && look.Has("frames") && !look.Has("views");
+}
+
+bool LooksCamerasJson(const fs::path&, const FileLook& look) {
+  return look.is_json && !look.is_json_list && look.Has("views") && !look.Has("intrinsics") &&
+         !look.Has("board");
+}
+
+constexpr CameraFormat kFormats[] = {
+    {"colmap", "the folder of a COLMAP model", LooksColmap, nullptr},
+    {"nerf", "a transforms.json (NeRF, instant-ngp, nerfstudio)", LooksNerf, nullptr},
+    {"metashape", "Metashape's cameras as XML", LooksMetashape, io::ReadMetashapeXml},
+    {"realityscan", "RealityScan's camera parameters as CSV", LooksRealityScan,
+     io::ReadRealityScanCsv},
+    {"opensfm", "OpenSfM's or ODM's reconstruction.json", LooksOpenSfm, io::ReadOpenSfmJson},
+    {"openmvg", "OpenMVG's sfm_data.json", LooksOpenMvg, io::ReadOpenMvgJson},
+    {"alicevision", "AliceVision's .sfm (JSON)", LooksAliceVision, io::ReadAliceVisionJson},
+    {"bundler", "Bundler's bundle.out", LooksBundler, io::ReadBundlerOut},
+    {"nvm", "VisualSFM's .nvm", LooksNvm, io::ReadNvm},
+    {"llff", "a poses_bounds.npy (LLFF)", LooksLlff, nullptr},
+    {"mvsnet", "a folder with MVSNet's cams", LooksMvsnet, io::ReadMvsnetFolder},
+    {"miv", "the JSON of an MPEG immersive video sequence", LooksMiv, io::ReadMivJson},
+    {"cameras-json", "a cameras.json", LooksCamerasJson, nullptr},
+};
+
+// What a file is that gives no cameras of photos, as a clause; empty: not known.
+std::string SeemsToBe(const fs::path& file, const FileLook& look) {
+  const auto has = [&](const char* text) { return look.head.find(text) != std::string::npos; };
+  const std::string extension = LowerExtension(file);
+  if (look.is_folder) {
+    return "the folder holds no cameras.bin, cameras.txt or cams; give the file in it that has the "
+           "cameras";
+  }
+  if (extension == ".psx") {
+    return "it is a Metashape project; export its cameras (File > Export > Export Cameras)";
+  }
+  if (extension == ".abc" || look.head.starts_with("Ogawa")) {
+    return "it is an Alembic file; take cameras.sfm, or convert it to .sfm (ConvertSfMFormat)";
+  }
+  if (extension == ".rcproj" || extension == ".rsproj" || has("xcr:Rotation")) {
+    return "it is of RealityScan; export its registration as \"Internal/External camera "
+           "parameters\"";
+  }
+  if (has("lensmodel") || has("distortion_model") || has("opencv_storage") ||
+      has("opencv-matrix") || has("camera_matrix") || look.Has("board")) {
+    return "it describes the intrinsics of a camera and no photos; give it to `lens` or `rig`";
+  }
+  if (look.head.starts_with("ply\n") || look.head.starts_with("ply\r\n")) {
+    return "it is a PLY file of points, not of cameras";
+  }
+  return "";
+}
+
+std::string Choices() {
+  std::string list;
+  for (const CameraFormat& format : kFormats) {
+    list += (list.empty() ? "" : ", ") + fmt::format("{} ({})", format.program, format.name);
+  }
+  return list;
+}
+
+}  // namespace
+
+std::span<const CameraFormat> CameraFormatTable() { return kFormats; }
+
+std::vector<std::string> CameraFormats() {
+  std::vector<std::string> names;
+  for (const CameraFormat& format : kFormats) names.push_back(format.name);
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+const CameraFormat& FormatOf(const fs::path& file, const std::string& name,
+                             const std::string& what) {
+  if (!fs::exists(file)) {
+    throw UsageError(fmt::format("{} {}: no such file or folder", what, file.string()));
+  }
+  if (!name.empty()) {
+    for (const CameraFormat& format : kFormats) {
+      if (name == format.name) return format;
+    }
+    throw UsageError(fmt::format("`format` {}: expected one of {}", name, Choices()));
+  }
+  const FileLook look = io::LookAt(file);
+  for (const CameraFormat& format : kFormats) {
+    if (format.looks_so(file, look)) return format;
+  }
+  const std::string other = SeemsToBe(file, look);
+  const std::string message =
+      fmt::format("{} {}: not recognised{}{}; what can be read (its `format`): {}", what,
+                  file.string(), other.empty() ? "" : ", ", other, Choices());
+  // A folder may be the right one and lack its files; a file is another one than was meant.
+  if (look.is_folder) throw Error(message);
+  throw UsageError(message);
+}
+
+bool IsColmapModel(const fs::path& file, const std::string& name) {
+  if (!name.empty()) return name == "colmap";
+  return fs::is_directory(file) && LooksColmap(file, {.is_folder = true, .head = "", .keys = {}});
+}
+
+std::vector<fs::path> WithCompanions(const fs::path& file) {
+  std::vector<fs::path> files = {file};
+  if (file.empty()) return files;
+  const fs::path folder = file.parent_path();
+  fs::path stem = file;
+  stem.replace_extension();
+  for (const fs::path& beside :
+       {fs::path(file.string() + ".list.txt"), fs::path(stem.string() + ".list.txt"),
+        folder / "list.txt", folder / ".." / "list.txt", folder / "image_list.txt",
+        folder / "tracks.csv"}) {
+    if (IsFile(beside)) files.push_back(beside);
+  }
+  return files;
+}
+
+}  // namespace dtr::pipeline
