@@ -211,14 +211,13 @@ TEST(CameraFormats, EveryPrefixOfAFileIsAnError) {
     if (program.format == "mvsnet") continue;  // behind the cameras stands what is not used
     SCOPED_TRACE(program.format + " " + program.variant);
     const CameraFormat& format = FormatOf(program.file, "", "x");
-    // JSON and XML may end before their last line break.
     std::string text = ReadFile(program.file, 1 << 24);
-    while (program.format != "realityscan" && program.format != "bundler" &&
-           program.format != "nvm" && text.ends_with('\n')) {
-      text.pop_back();
+    if (program.format == "nvm") {  // what stands behind the points may be absent
+      text.erase(text.find("\n0\n\n#"));
+    } else if (program.format != "realityscan" && program.format != "bundler") {
+      text.pop_back();  // JSON and XML may end before their last line break
     }
     WriteFileAtomically(program.file, text);
-    if (program.format == "nvm") continue;  // a model may end before the marks behind it
     dtr::testing::ExpectEveryPrefixIsAnError(program.file, 97, [&] { format.read(program.file); });
   }
 }

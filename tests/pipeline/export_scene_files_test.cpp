@@ -6,12 +6,16 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <cstring>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "dtr/base/error.h"
 #include "dtr/base/files.h"
 #include "dtr/io/image_io.h"
+#include "dtr/io/set_io.h"
+#include "pipeline/detail/cameras/camera_formats.h"
+#include "pipeline/detail/cameras/foreign_cameras.h"
 #include "pipeline/export.h"
 #include "tests/pipeline/exact_export.h"
 
@@ -262,6 +266,46 @@ TEST_F(ExportOfExactScene, ImmersiveVideoHasTheColours) {
   }
   // Colour differences are means of four pixels; the stored image is a JPEG of the one here.
   EXPECT_LT(error / (96 * 72 * 3), 4);
+}
+
+// What `dtr import --cameras` reads of them are the set's own cameras, unit and origin.
+TEST_F(ExportOfExactScene, MvsnetAndImmersiveVideoAreReadAsTheCamerasOfTheSet) {
+  constexpr double kSame = 1e-9;
+  Make({});
+  const DtrSet set = io::ReadSet(Request("").set);
+  pipeline::ExportMvsnet(Request("mvsnet"), noted_);
+  pipeline::ExportMiv(Request("miv"), noted_);
+  const std::pair<const char*, fs::path> exports[] = {
+      {"mvsnet", Request("mvsnet").output}, {"miv", Request("miv").output / "sequence.json"}};
+  for (const auto& [format, file] : exports) {
+    SCOPED_TRACE(format);
+    const pipeline::CameraFormat& recognised = pipeline::FormatOf(file, "", "`cameras`");
+    ASSERT_EQ(std::string(recognised.name), format);
+    std::map<std::string, const View*> view_of;
+    std::vector<std::string> names;
+    for (size_t i = 0; i < 4; ++i) {
+      const View& view = views_[kSources[i]];
+      names.push_back(std::string(format) == "miv" ? view.name
+                                                   : "0000000" + std::to_string(i) + ".jpg");
+      view_of[names.back()] = &view;
+    }
+    const auto placed =
+        pipeline::PlaceCameras(recognised.read(file), file.string(), pipeline::PhotoNames(names),
+                               [&](const std::string& name) {
+                                 const PinholeCamera& camera = view_of.at(name)->camera;
+                                 return io::SizedImage{name, camera.width_px(), camera.height_px()};
+                               });
+    ASSERT_EQ(placed.list.cameras.size(), 4u);
+    EXPECT_EQ(placed.list.unit, set.unit);
+    EXPECT_EQ(placed.list.world_origin, set.world_origin);
+    for (const io::NamedCamera& named : placed.list.cameras) {
+      const View& view = *view_of.at(named.name);
+      EXPECT_LT(named.cam_from_world.rotation.angularDistance(view.cam_from_world.rotation), kSame);
+      EXPECT_LT((named.cam_from_world.translation - view.cam_from_world.translation).norm(), kSame);
+      EXPECT_NEAR(named.camera.fx_px(), view.camera.fx_px(), kSame);
+      EXPECT_NEAR(named.camera.cy_px(), view.camera.cy_px(), kSame);
+    }
+  }
 }
 
 TEST_F(ExportOfExactScene, BothRejectWhatIsThere) {

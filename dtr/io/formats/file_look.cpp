@@ -42,12 +42,16 @@ class KeyCollector : public nlohmann::json_sax<nlohmann::json> {
     return true;
   }
   bool parse_error(std::size_t, const std::string&, const nlohmann::json::exception&) override {
+    is_broken_ = true;
     return false;
   }
+
+  bool is_broken() const { return is_broken_; }
 
  private:
   std::set<std::string>& keys_;
   int object_depth_, depth_ = 0;
+  bool is_broken_ = false;
 };
 
 }  // namespace
@@ -71,6 +75,7 @@ FileLook LookAt(const std::filesystem::path& file) {
   in.seekg(0);
   KeyCollector collector(look.keys, look.is_json_list ? 2 : 1);
   nlohmann::json::sax_parse(in, &collector);
+  look.is_broken = collector.is_broken();
   return look;
 }
 

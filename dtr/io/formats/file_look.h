@@ -12,6 +12,7 @@ struct FileLook {
   std::string head;           ///< the first 64 KiB
   bool is_json = false;       ///< begins as JSON does
   bool is_json_list = false;  ///< with [
+  bool is_broken = false;     ///< begins so, and is no JSON further on
   /// Names of the fields of the JSON object, or of the first object of the list, as far as the file
   /// is JSON.
   std::set<std::string> keys;

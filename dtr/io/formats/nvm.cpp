@@ -85,7 +85,6 @@ ForeignCamera NvmCamera(std::string_view line, bool matrices, const std::optiona
 }
 
 void ReadNvmPoints(SceneText& text, size_t cameras, ForeignScene& scene) {
-  if (text.AtEnd()) return;
   const int points = text.Int("the number of points", 0, SceneText::kMaxCount);
   for (int i = 0; i < points; ++i) {
     ForeignPoint point;

@@ -140,6 +140,19 @@ std::string SeemsToBe(const fs::path& file, const FileLook& look) {
   return "";
 }
 
+// Damaged files go by their names: their readers say what is wrong. Null: nobody's.
+const CameraFormat* ByNameOf(const fs::path& file, const FileLook& look) {
+  const std::string extension = LowerExtension(file);
+  const auto called = [](const char* name) {
+    return std::find_if(std::begin(kFormats), std::end(kFormats), [&](const CameraFormat& format) {
+      return std::string(format.name) == name;
+    });
+  };
+  if (extension == ".npy") return called("llff");
+  if (extension != ".json" || (look.is_json && !look.is_broken)) return nullptr;
+  return called(file.filename().string().starts_with("transforms") ? "nerf" : "cameras-json");
+}
+
 std::string Choices() {
   std::string list;
   for (const CameraFormat& format : kFormats) {
@@ -174,6 +187,7 @@ const CameraFormat& FormatOf(const fs::path& file, const std::string& name,
   for (const CameraFormat& format : kFormats) {
     if (format.looks_so(file, look)) return format;
   }
+  if (const CameraFormat* format = ByNameOf(file, look)) return *format;
   const std::string other = SeemsToBe(file, look);
   const std::string message =
       fmt::format("{} {}: not recognised{}{}; what can be read (its `format`): {}", what,
