@@ -201,6 +201,20 @@ void TriangulateHere(Workspace& workspace, const KnownCameras& known) {
   });
 }
 
+// COLMAP 3 ends without a word at a camera model that it does not know.
+void RequireColmapsModels(std::span<const PosedImage> images) {
+  for (const PosedImage& image : images) {
+    if (static_cast<int>(image.camera.model) <=
+        static_cast<int>(calib::CameraModel::kThinPrismFisheye)) {
+      continue;
+    }
+    throw Error(fmt::format(
+        "{}: its camera model {} is not known to COLMAP 3; let the points be triangulated without "
+        "COLMAP (`sfm` auto or global)",
+        image.name, calib::NameOf(image.camera.model)));
+  }
+}
+
 std::vector<std::string> ImagesWithoutPoints(const calib::SfmModel& model) {
   std::vector<std::string> names;
   for (const calib::SfmImage& image : model.images) {
@@ -221,6 +235,7 @@ SfmResult TriangulateWithPoses(const fs::path& images_dir, std::span<const Posed
     throw UsageError(fmt::format("{}: expected at least two photos with poses, found {}",
                                  images_dir.string(), images.size()));
   }
+  if (options.engine == SfmEngine::kColmap) RequireColmapsModels(images);
   const KnownCameras known = Arranged(images);
   Workspace workspace(workspace_folder, images_dir, InputsOf(known.images), "",
                       ResolveThreads(options.threads), progress, options.engine);

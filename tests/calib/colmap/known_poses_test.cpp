@@ -120,6 +120,15 @@ TEST_F(KnownPosesWithFake, PhotosWithoutAnythingInCommonAreSaidToBeSo) {
   }
 }
 
+TEST_F(KnownPosesWithFake, CameraModelsThatColmapDoesNotKnowAreRejectedBeforeAnyWork) {
+  posed_[0].camera.model = calib::CameraModel::kEucm;
+  posed_[0].camera.params = {400, 400, 320, 240, 0.5, 1};
+  EXPECT_THAT([&] { Run(); },
+              ::testing::ThrowsMessage<Error>(
+                  AllOf(HasSubstr("c.jpg: its camera model EUCM"), HasSubstr("`sfm` auto"))));
+  EXPECT_FALSE(fs::exists(workspace_ / "posed"));
+}
+
 TEST_F(KnownPosesWithFake, OnePhotoIsAUsageError) {
   posed_.resize(1);
   EXPECT_THROW(Run(), UsageError);
