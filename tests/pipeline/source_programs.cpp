@@ -64,6 +64,27 @@ Projection FisheyeProjection(const Terms& t) {
   };
 }
 
+// OpenSfM's fisheye62: (x, y) theta / r, six radial terms, tangential ones as OpenCV's.
+Projection Fisheye62Projection(const Terms& t) {
+  return [t](const Vector3d& p) {
+    const double r = std::hypot(p.x(), p.y()), theta = std::atan2(r, p.z());
+    const double x = p.x() * theta / r, y = p.y() * theta / r, s = theta * theta;
+    double radial = 1;
+    for (int i = 0; i < 6; ++i) radial += t.k[i] * std::pow(s, i + 1);
+    return Vector2d(t.f * (x * radial + 2 * t.p1 * x * y + t.p2 * (s + 2 * x * x)) + t.cx,
+                    t.fy * (y * radial + t.p1 * (s + 2 * y * y) + 2 * t.p2 * x * y) + t.cy);
+  };
+}
+
+// AliceVision's fisheye1: r becomes atan(2 r tan(k / 2)) / k.
+Projection Fisheye1Projection(const Terms& t) {
+  return [t](const Vector3d& p) {
+    const Vector2d n = Normalised(p);
+    const double r = n.norm(), d = std::atan(2 * r * std::tan(t.k[0] / 2)) / t.k[0];
+    return Vector2d(t.f * n.x() * d / r + t.cx, t.fy * n.y() * d / r + t.cy);
+  };
+}
+
 // Metashape's manual: x' = x (1 + K1 r2 + K2 r4 + K3 r6 + K4 r8) + (P1 (r2 + 2 x2) + 2 P2 x y) (1 +
 // P3 r2 + P4 r4), y' alike, u = w/2 + cx + x' f + x' B1 + y' B2, v = h/2 + cy + y' f. A fisheye
 // takes x theta / r for x.
@@ -610,6 +631,13 @@ std::vector<SourceProgram> WriteAllPrograms(const TrueCapture& capture, const fs
   w.OpenSfm("brown", brown, OpenCvProjection(brown), true);
   w.OpenSfm("fisheye", radial, FisheyeProjection(radial), false);
   w.OpenSfm("fisheye_opencv", four, FisheyeProjection(four), false);
+  w.OpenSfm("radial", radial, OpenCvProjection(radial), false);
+  Terms six = bent;
+  six.k[3] = 0.003;
+  six.k[4] = -0.002;
+  six.k[5] = 0.001;
+  six.fy = 504;
+  w.OpenSfm("fisheye62", six, Fisheye62Projection(six), false);
   w.Bundler();
   w.Nvm("barrel", 0.15, false);
   w.Nvm("cushion", -0.1, true);
@@ -629,6 +657,10 @@ std::vector<SourceProgram> WriteAllPrograms(const TrueCapture& capture, const fs
   w.AliceVision("radial3", "3", wide, OpenCvProjection(wide));
   w.AliceVision("brown", "11", brown, OpenCvProjection(brown));
   w.AliceVision("fisheye4", "11", four, FisheyeProjection(four));
+  w.AliceVision("radial1", "11", one_k, OpenCvProjection(one_k));
+  Terms view = one_k;
+  view.k[0] = 0.9;
+  w.AliceVision("fisheye1", "11", view, Fisheye1Projection(view));
   w.Mvsnet(Terms());
   w.Miv(Terms());
   return w.programs;
