@@ -22,7 +22,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::uint32_t kArchiveVersion = 5;
 constexpr int kMostNeighbours = 10;
-constexpr int kPlaneRadius = 2;  // of the surface that gives a normal
 // The confidence of a depth whose standard deviation is this share of it is 1.
 constexpr double kShareOfConfidence1 = 0.01;
 
@@ -143,7 +142,7 @@ class OpenMvsExport {
         Eigen::Vector3d normal = Eigen::Vector3d::Zero();
         if (surface.inverse_depth(x, y) > 0) {
           normal = surface.rotation * NormalOf(surface, Eigen::Vector2d(x + 0.5, y + 0.5),
-                                               PlaneAt(surface, x, y, kPlaneRadius));
+                                               PlaneAt(surface, x, y, kNormalRadius));
         }
         for (const double v : normal) stream.Put(static_cast<float>(v));
       }

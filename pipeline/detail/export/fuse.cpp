@@ -19,7 +19,6 @@ constexpr double kSameSurfaceDepth = 0.05;
 // Where sigma is small, and where it is unknown: pixels of disparity that rounding, interpolation
 // and calibration take.
 constexpr double kFloorPx = 0.25;
-constexpr int kPlaneRadius = 2;
 // Weight of the colour that another view as near as a sample's own shows.
 constexpr double kOtherColour = 0.5;
 
@@ -112,7 +111,7 @@ class ViewFusion {
     const Eigen::Vector2d pixel(x + 0.5, y + 0.5);
     const double w = surface_.inverse_depth(x, y);
     candidate.p_in_world = surface_.PointAt(pixel, w);
-    candidate.normal = NormalOf(surface_, pixel, PlaneAt(surface_, x, y, kPlaneRadius));
+    candidate.normal = NormalOf(surface_, pixel, PlaneAt(surface_, x, y, kNormalRadius));
     const Eigen::Vector3d to_point = candidate.p_in_world - surface_.centre;
     candidate.direction = to_point.normalized();
     candidate.footprint = Footprint(surface_, to_point, 1 / w, candidate.normal);

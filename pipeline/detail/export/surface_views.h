@@ -55,6 +55,7 @@ struct LocalPlane {
 /// From the samples within `radius` that lie on the surface of (x, y), which exists: whose 1/z
 /// differs by at most a pixel of disparity per pixel of distance.
 LocalPlane PlaneAt(const SurfaceView& surface, int x, int y, int radius);
+inline constexpr int kNormalRadius = 2;  ///< of the plane that gives an exported point its normal
 
 /// Unit normal in the world of a plane of 1/z at a pixel, turned to the camera.
 Eigen::Vector3d NormalOf(const SurfaceView& surface, const Eigen::Vector2d& pixel,
